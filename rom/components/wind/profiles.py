@@ -22,6 +22,7 @@ from rom.errors import ConfigError
 from rom.model import Array
 
 PROFILE_TABLE = Path(__file__).parent / "nrel5mw_profiles.csv"
+CAMBER_SHARE = 0.7  # of the lift, where the flow meets the wrong side or the wrong edge
 BLADE_ASPECT_RATIO = 17.0  # of the blade, length over chord: what its profiles were corrected with
 
 
@@ -75,8 +76,8 @@ def profile(
         drag = D sin(a)^2 + B cos(a)
         lift = D sin(2 a) / 2 + A cos(a)^2 / sin(a)
 
-    A and B such that both are continuous at a_s. Flow from behind (more than a right angle) has
-    0.7 times the lift of the mirrored one; where it comes straight from behind, lift is zero.
+    A and B such that both are continuous at a_s. Below zero and in flow from behind, of more than a
+    right angle, lift is 0.7 times that of the mirrored angle; straight from behind it is zero.
 
     Args:
         name: of the profile.
@@ -118,17 +119,17 @@ def _carried_on(name: str, table: tuple[Array, Array, Array], D: float) -> Profi
     a, cl, cd = table
     s, c = np.sin(a[-1]), np.cos(a[-1])
     A, B = (cl[-1] - D * s * c) * s / c**2, (cd[-1] - D * s**2) / c
-    beyond = np.radians(np.arange(np.ceil(np.degrees(a[-1])) + 1.0, 91.0, 2.0))
-    beyond = np.append(beyond, np.pi / 2) if beyond[-1] < np.pi / 2 else beyond
+    first = np.ceil(np.degrees(a[-1])) + 1.0
+    beyond = np.append(np.radians(np.arange(first, 90.0, 2.0)), np.pi / 2)
     lift = D / 2 * np.sin(2 * beyond) + A * np.cos(beyond) ** 2 / np.sin(beyond)
     drag = D * np.sin(beyond) ** 2 + B * np.cos(beyond)
-    lower = beyond > max(-a[0], a[-1]) + 1e-9
     back = slice(-2, None, -1)  # mirrored at a right angle, flow from behind
     positive = (np.concatenate([beyond, np.pi - beyond[back], [np.pi]]),
-                np.concatenate([lift, -0.7 * lift[back], [0.0]]),
+                np.concatenate([lift, -CAMBER_SHARE * lift[back], [0.0]]),
                 np.concatenate([drag, drag[back], cd[:1]]))  # fmt: skip
-    below = np.append(np.concatenate([lower, lower[back]]), True)
-    mirrored = (-positive[0][below][::-1], -0.7 * positive[1][below][::-1],
+    below = positive[0] > max(-a[0], a[-1]) + 1e-6
+    share = np.where(positive[0] > np.pi / 2, 1.0, CAMBER_SHARE)
+    mirrored = (-positive[0][below][::-1], -(share * positive[1])[below][::-1],
                 positive[2][below][::-1])  # fmt: skip
     return Profile(name, *(np.concatenate([m, t, p])
                            for m, t, p in zip(mirrored, table, positive, strict=True)))  # fmt: skip

@@ -179,6 +179,7 @@ def test_every_strip_meets_the_wind_of_its_place():
     load = rotor_load(blades, 9.0, speed, tower=True, n_azimuths=12)
     lean, back = (rotation.matrix(rotation.exp(x)) for x in ([0, tilt, 0], [0, -cone, 0]))
     hub = np.array([0.0, 0.0, 87.6 + 1.96256]) - 5.0191 * lean[:, 0]
+    loads, lengths = np.zeros((12, 2)), blades.length
     for i in range(12):
         A = lean @ rotation.matrix(rotation.exp([load.azimuth[i], 0.0, 0.0])) @ back
         for j in (9, 14):
@@ -193,6 +194,12 @@ def test_every_strip_meets_the_wind_of_its_place():
             F = loss(r, np.arctan2(through, across), R=63.0 * c, hub=1.5 * c)
             around = 3 * driving / (4 * np.pi * r * 1.225 * through * F)
             assert_allclose(across - around, tangential, rtol=1e-7)
+        for j in range(17):  # thrust and torque by vectors
+            force = lengths[j] * (A[:, :2] @ (load.strip[i, j, :2] * [1, -1]))
+            arm = A @ [0.0, 0.0, blades.radius[j]]
+            loads[i] += force @ lean[:, 0], np.cross(arm, force) @ lean[:, 0]
+    assert_allclose(loads.T, [load.blade_thrust, load.blade_torque], rtol=1e-9)
+    assert_allclose(3 * loads.mean(axis=0), [load.thrust, load.torque], rtol=1e-9)
 
 
 def test_the_dammed_wind_has_no_source_and_no_swirl():
@@ -234,10 +241,26 @@ def test_a_table_is_carried_on_past_stall_as_the_published_ones_were():
     assert_allclose(np.interp(np.pi / 2, cut.angle, cut.drag), 1.11 + 0.018 * 17)
     assert_allclose([cut.angle[0], cut.angle[-1]], [-np.pi, np.pi])
     assert (np.diff(cut.angle) > 0.0).all()
+    # lift goes on from its last value, and flow from behind has that of the mirrored section
+    end = np.radians(20.0)
+    assert_allclose(np.interp(end + 1e-3, cut.angle, cut.lift), whole.lift[near][-1], atol=0.03)
+    for back in (at[20:] + np.pi / 2, -at[20:] - np.pi / 2):
+        lift = np.interp(back, whole.angle, whole.lift)
+        assert_allclose(np.interp(back, cut.angle, cut.lift), lift, atol=0.35)
     inside = np.isin(cut.angle, whole.angle[near])
     assert_allclose(cut.lift[inside][:5], whole.lift[near][:5])
     slow = rotor_load(replace(straight(), profile=(cut,) * 17), 8.0, tip_ratio(2.0))
     assert np.isfinite(slow.strip).all()
+
+
+@pytest.mark.parametrize(("first", "last"), [(-180, 20), (-120, 15), (0, 89.9), (-9, 5)])
+def test_tables_of_any_extent_are_carried_on_once_round(first, last):
+    angle = np.radians(np.linspace(first, last, 9))
+    one = profile("any", angle, np.sin(2 * angle), 0.1 + np.sin(angle) ** 2)
+    assert_allclose(one.angle[[0, -1]], [-np.pi, np.pi])
+    assert (np.diff(one.angle) > 0.0).all()
+    assert one.angle.shape == one.lift.shape == one.drag.shape
+    assert np.isfinite(one.table).all() and (one.drag > 0.0).all()
 
 
 @pytest.mark.parametrize(
