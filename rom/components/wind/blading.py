@@ -46,6 +46,7 @@ ELEMENT_PROFILE = (*("Cylinder1",) * 2, "Cylinder2", "DU40", *("DU35",) * 2, "DU
 ROTOR_RADIUS = 63.0  # m
 AIR_DENSITY = 1.225  # [kg/m^3]
 BETZ_LIMIT = 16 / 27  # of the power in the wind
+LARGEST_ANGLE = 2 * math.pi  # of pitch, either way [rad]
 N_AZIMUTHS = 24  # of a turn, a multiple of three blades
 
 
@@ -220,6 +221,18 @@ def turn(strips, tables, counts, shape, angles, motion, tower, out):  # noqa: PL
             row[5] = 1.0 - flow[0] / far if far != 0.0 else 0.0
 
 
+def check_pitch(pitch: float) -> None:
+    """Refuse a pitch [rad] of more than a turn, which are degrees, and none.
+
+    Raises:
+        ConfigError: naming it.
+    """
+    if not abs(pitch) <= LARGEST_ANGLE:
+        raise ConfigError(f"a pitch of {pitch:g} rad is no angle of a blade.",
+                          hint="Pitch is in radians.")  # fmt: skip
+
+
+@typed
 def rotor_load(
     blades: Blading,
     wind: float,
@@ -240,14 +253,16 @@ def rotor_load(
         n_azimuths: places of a blade in a turn.
 
     Raises:
-        ConfigError: for a wind, a speed or a number of azimuths below zero or not finite.
+        ConfigError: for a wind or a speed below zero or not finite, a pitch of more than a turn,
+            or no azimuths.
     """
     for name, value in (("wind", wind), ("speed of the rotor", speed)):
         if not (np.isfinite(value) and value >= 0.0):
             raise ConfigError(f"a {name} of {value:g}; it is finite and not negative.",
                               hint="Turn the rotor into the wind.")  # fmt: skip
-    if not np.isfinite(pitch) or n_azimuths < 1:
-        raise ConfigError(f"a pitch of {pitch:g} rad at {n_azimuths} azimuths cannot be.")
+    check_pitch(pitch)
+    if n_azimuths < 1:
+        raise ConfigError(f"a turn of {n_azimuths} azimuths; it has one or more.")
     out = np.zeros((n_azimuths, len(blades.profile), 6))
     turn(blades.strips, *blades.tables, (blades.twist, blades.radius),
          (blades.tilt, blades.cone, HUB_OVERHANG, TOWER_HEIGHT + SHAFT_HEIGHT),

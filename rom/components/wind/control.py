@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import brentq
 
-from rom.arguments import vector
+from rom.arguments import typed, vector
 from rom.components.wind.blading import Blading, RotorLoad, blading, rotor_load
 from rom.components.wind.wind_turbine import GEAR_RATIO, RATED_SPEED
 from rom.errors import ConfigError
@@ -46,13 +46,19 @@ PUBLISHED_PITCH = ((12.0, 3.83), (13.0, 6.60), (14.0, 8.70), (15.0, 10.45), (16.
                    (22.0, 19.94), (23.0, 21.18), (24.0, 22.35), (25.0, 23.47))  # fmt: skip
 
 
+@typed
 def generator_torque(speed: float, pitch: float = 0.0) -> float:
     """Torque of the generator at its speed [rad/s], on the fast shaft [N m].
 
     Args:
         speed: of the generator [rad/s].
         pitch: of the blades [rad]; from one degree on the power is held at any speed.
+
+    Raises:
+        ConfigError: for a speed or a pitch that is not finite.
     """
+    if not (math.isfinite(speed) and math.isfinite(pitch)):
+        raise ConfigError(f"no generator turns at {speed:g} rad/s with a pitch of {pitch:g} rad.")
     if speed >= RATED_GENERATOR or (pitch >= RATED_PITCH_ANGLE and speed > 0.0):
         return min(RATED_POWER / speed, LARGEST_TORQUE)
     if speed <= CUT_IN_GENERATOR:
@@ -110,6 +116,7 @@ class Controller:
         self.pitch = min(max(asked, 0.0), LARGEST_PITCH)
 
 
+@typed
 def steady(wind: float, blades: Blading | None = None, *, tower: bool = False) -> RotorLoad:
     """Speed, pitch and loads at which the controlled turbine stays in a steady wind.
 
@@ -141,6 +148,7 @@ def steady(wind: float, blades: Blading | None = None, *, tower: bool = False) -
     return load(RATED_SPEED, float(pitch))
 
 
+@typed
 def power_curve(
     winds: npt.ArrayLike, blades: Blading | None = None, *, tower: bool = False
 ) -> dict[str, Array]:

@@ -16,7 +16,7 @@ import numpy as np
 
 from rom.arguments import positive, typed
 from rom.components.compiled import inner, kernel
-from rom.components.wind.blading import Blading, blading, strip_load
+from rom.components.wind.blading import Blading, blading, check_pitch, strip_load
 from rom.components.wind.control import (
     CUT_IN_WIND,
     CUT_OUT_WIND,
@@ -99,6 +99,7 @@ def wake_step(blades, flow, state, dt, out):
             strips[j], tables[j], counts[j], theta, met, half_density)  # fmt: skip
 
 
+@typed
 def operate(
     wind: Callable[[float], float],
     t_end: float,
@@ -123,7 +124,7 @@ def operate(
 
     Raises:
         ConfigError: for a step or an end that cannot be, or a wind in which the turbine is parked,
-            with its time.
+            with its time, or a speed or a pitch to hold that is none.
     """
     positive("t_end", t_end)
     if positive("dt", dt) > MAX_STEP:
@@ -173,6 +174,9 @@ class _Run:
         """Speed, pitch, power, torque and thrust at a time, and what the wake takes away."""
         if self.held is not None:
             self.speed, self.control.pitch = self.held(t)
+            check_pitch(self.control.pitch)
+            if not 0.0 <= self.speed < math.inf:
+                raise ConfigError(f"the rotor is held at {self.speed:g} rad/s, at {t:g} s.")
         cone, tilt = self.cosines
         flow = (wind * cone * tilt, self.speed, self.control.pitch, 0.5 * self.blades.density)
         wake_step(self.given, flow, self.wake, dt if self.dynamic else 0.0, self.loads)

@@ -60,6 +60,7 @@ def profiles() -> dict[str, Profile]:
             for name, (a, lift, drag) in ((n, np.array(r).T) for n, r in rows.items())}  # fmt: skip
 
 
+@typed
 def profile(
     name: str,
     angle: npt.ArrayLike,

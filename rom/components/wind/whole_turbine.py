@@ -19,6 +19,7 @@ from rom import rotation
 from rom.body import FlexibleBody
 from rom.components.cosserat import body
 from rom.components.wind.blade_element import in_wind
+from rom.components.wind.blading import check_pitch
 from rom.components.wind.wind_turbine import (
     CONE_ANGLE,
     GEAR_RATIO,
@@ -164,12 +165,14 @@ def turbine(  # noqa: PLR0913  one keyword per choice, all with defaults
         torsion: factor of this rigidity likewise; some programs know no twist.
 
     Raises:
-        ConfigError: for less than one segment of a blade, or a solid that is no hub.
+        ConfigError: for less than one segment of a blade, a pitch of more than a turn, or
+            a solid that is no hub.
         ModelError: if a rod is none, see `cosserat.rod`.
     """
     if segments < 1 or tower_segments < 0:
         raise ConfigError(f"{segments} segments of a blade and {tower_segments} of the tower.",
                           hint="A blade has one or more, a stiff tower none.")  # fmt: skip
+    check_pitch(pitch)
     mech = Mechanism(gravity=(0.0, 0.0, -gravity))
     factors = {"shear": shear, "torsion": torsion}
     top, standing = _tower(mech, tower_segments, factors)

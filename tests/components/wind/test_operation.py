@@ -91,6 +91,9 @@ def test_a_gust_speeds_the_rotor_up_by_what_its_inertia_takes():
         (lambda: operate(lambda t: np.nan, 10.0), "parked in a wind of nan"),
         (lambda: operate(lambda t: 8.0, 10.0, dt=2.0), "a step of 2 s is longer"),
         (lambda: operate(lambda t: 8.0, -1.0), "t_end"),
+        (lambda: operate(8.0, 10.0), "wind"),
+        (lambda: operate(lambda t: 8.0, 1.0, held=lambda t: (np.nan, 0.0)), "held at nan"),
+        (lambda: operate(lambda t: 8.0, 1.0, held=lambda t: (1.0, 20.0)), "pitch of 20 rad"),
     ],
 )
 def test_what_cannot_be_is_named(call, said):
