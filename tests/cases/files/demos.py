@@ -19,7 +19,7 @@ LONG_DEMOS = {
     "demo_robot_arm", "demo_rockfall", "demo_rolling_wheel", "demo_rotating_blade",
     "demo_rotor", "demo_satellite", "demo_sheet", "demo_slider_crank", "demo_snap_through",
     "demo_spin_up", "demo_transmission", "demo_two_stage", "demo_updating", "demo_whole_turbine",
-    "demo_wind_turbine",
+    "demo_wind_power", "demo_wind_turbine",
 }  # fmt: skip
 LEFT_BEHIND = {
     "demo_assembly": {"assembly_errors.png"},
@@ -64,6 +64,7 @@ LEFT_BEHIND = {
     },
     "demo_snap_through": {"snap_through.png"},
     "demo_spin_up": {"spin_up.png"},
+    "demo_wind_power": {"wind_power.png", "wind_turbine_hub.png"},
     "demo_wind_turbine": {
         "wind_turbine.png", "wind_turbine_campbell.png", "wind_turbine_shapes.png",
     },
