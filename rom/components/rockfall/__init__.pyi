@@ -16,3 +16,4 @@ from rom.components.rockfall.laws import Cushion as Cushion
 from rom.components.rockfall.laws import CushionForce as CushionForce
 from rom.components.rockfall.laws import Shear as Shear
 from rom.components.rockfall.layer import Layer as Layer
+from rom.components.rockfall.layer import bearing_pressure as bearing_pressure

@@ -11,13 +11,12 @@ import numpy as np
 from scipy.linalg import eigh
 
 from rom.components.rockfall import kernels
-from rom.components.rockfall.laws import Cushion, Shear
+from rom.components.rockfall.laws import GRAVITY, Cushion, Shear
 from rom.components.rockfall.layer import Layer
 from rom.errors import ConfigError, ModelError, SolverError
 from rom.model import Array
 from rom.rotation import skew
 
-GRAVITY = 9.81  # m/s^2
 STEP_RATIO = 0.1  # time step times the highest frequency
 STATES = ("whole", "cracked", "punched")
 # with no `t_end`: the longest periods in which no peak may have grown before an impact is over,
@@ -292,7 +291,10 @@ VARIED_NUMBERS = {  # what can be changed: where it stands, and the power of the
 }
 
 
-FITTED_NUMBERS = VARIED_NUMBERS | {"recovery of the cushion": ("cushion.recovery", 1.0)}
+FITTED_NUMBERS = VARIED_NUMBERS | {
+    "recovery of the cushion": ("cushion.recovery", 1.0),
+    "strength of the cushion": ("cushion.strength", 1.0),
+}
 
 
 def sensitivity(g: Gallery, answer: Any, factors: tuple[float, ...]) -> dict[str, Array]:
@@ -318,7 +320,8 @@ def scaled(g: Gallery, factors: dict[str, float]) -> Gallery:
 
     Args:
         g: the gallery.
-        factors: {name: factor [1]}, names of `sensitivity` and "recovery of the cushion".
+        factors: {name: factor [1]}, names of `sensitivity`, "recovery of the cushion", and
+            "strength of the cushion" of a layer.
 
     Raises:
         ConfigError: for a name that is none of them.
@@ -327,6 +330,8 @@ def scaled(g: Gallery, factors: dict[str, float]) -> Gallery:
         if name not in FITTED_NUMBERS:
             raise ConfigError(f"{name!r} cannot be varied; known are {', '.join(FITTED_NUMBERS)}.")
         path, power = FITTED_NUMBERS[name]
+        if name == "strength of the cushion" and not isinstance(g.cushion, Layer):
+            raise ConfigError("only a Layer has a strength of the cushion.")
         kind = "modulus" if isinstance(g.cushion, Layer) else "stiffness"
         g = _scaled(g, path.format(stiffness=kind), factor**power)
     return g

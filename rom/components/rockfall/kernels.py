@@ -21,8 +21,11 @@ def _log_remainder(y):
 
 
 @inner
-def _cone(d, modulus, radius, slope, thickness):
-    """Integral of the stiffness E pi a (a + t s) / t of a cone on a disc a, t = thickness - d."""
+def _cone(d, modulus, radius, slope, thickness, strength):
+    """Integral of the stiffness E pi a (a + t s) / t of a cone on a disc a, t = thickness - d.
+
+    At most the strength on the contact.
+    """
     x = min(d, radius)  # a^2 = 2 R x - x^2
     squares = thickness * (2.0 * radius - thickness) * _log_remainder(x / thickness) + 0.5 * x**2
     angle = 2.0 * math.asin(math.sqrt(0.5 * x / radius))
@@ -30,23 +33,24 @@ def _cone(d, modulus, radius, slope, thickness):
     if d > radius:
         squares += radius**2 * math.log((thickness - radius) / (thickness - d))
         widths += radius * (d - radius)
-    return modulus * math.pi * (squares + slope * widths)
+    elastic = modulus * math.pi * (squares + slope * widths)
+    return min(elastic, strength * math.pi * x * (2.0 * radius - x))
 
 
 @inner
 def _loading(d, c):
-    law, _, n, k, limit, p, r = c
+    law, _, n, k, limit, p, r, strength = c
     if d >= limit:
         return math.nan
     if law == CONE_LAW:
-        return _cone(d, k, p, r, limit)
+        return _cone(d, k, p, r, limit, strength)
     return k * d**n / (1.0 - d / limit) ** p
 
 
 @kernel
 def cushion(d, deepest, c):
     """Force at penetration d of a cushion that has been as deep as ``deepest`` >= d."""
-    _, recovery, n, _, _, _, _ = c
+    _, recovery, n, _, _, _, _, _ = c
     left = (1.0 - recovery) * deepest
     if d <= left or d <= 0.0:
         return 0.0

@@ -12,6 +12,7 @@ from rom.components.rockfall import kernels
 from rom.errors import ConfigError
 from rom.model import Array
 
+GRAVITY = 9.81  # m/s^2
 ROCK_DENSITY = 2600.0  # [kg/m^3]
 # share of the penetration, and with it of the energy, that sand gives back: a boulder returns with
 # a sixth of its speed, as the pulse measured on gravel does, see the page on rockfall
@@ -27,7 +28,7 @@ class Resistance(ABC):
     @property
     @abstractmethod
     def law(self) -> tuple[float, ...]:
-        """(7,) the numbers of the law, as `kernels.cushion` takes them."""
+        """(8,) the numbers of the law, as `kernels.cushion` takes them."""
 
     def force(self, d: float, deepest: float = 0.0) -> float:
         """Force [N] at penetration d after it has been as deep as ``deepest`` [m]."""
@@ -121,8 +122,8 @@ class Cushion(Resistance):
 
     @property
     def law(self) -> tuple[float, ...]:
-        """(7,) the numbers of the law, as `kernels.cushion` takes them."""
-        numbers = (self.recovery, self.exponent, self.stiffness, self.limit, self.hardening, 0)
+        """(8,) the numbers of the law, as `kernels.cushion` takes them."""
+        numbers = (self.recovery, self.exponent, self.stiffness, self.limit, self.hardening, 0, 0)
         return (kernels.POWER_LAW, *map(float, numbers))
 
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from rom.components.rockfall import kernels
 from rom.components.rockfall.laws import (
+    GRAVITY,
     ROCK_DENSITY,
     SAND_RECOVERY,
     Cushion,
@@ -34,8 +35,9 @@ class Layer(Resistance):
 
         dF/dd = E pi a (a + s t) / t
 
-    On a thick layer F = (2/3) sqrt(2) pi s E sqrt(R) d^(3/2), which is Hertz for s = sqrt(2) /
-    pi (1 - nu^2); on a thin one the stiffness grows without bound. Unloading as for `Cushion`.
+    until the sand fails below the boulder: F is at most strength pi a^2. On a thick layer that
+    does not fail F = (2/3) sqrt(2) pi s E sqrt(R) d^(3/2), Hertz for s = sqrt(2) / pi (1 - nu^2);
+    on a thin one the stiffness grows without bound. Unloading as for `Cushion`.
 
     Attributes:
         modulus: E of loading [Pa].
@@ -44,6 +46,7 @@ class Layer(Resistance):
         angle: by which the load spreads, from the vertical [rad].
         recovery: share of the penetration that comes back [1], above 0.
         density: of the sand [kg/m^3].
+        strength: pressure that the contact bears [Pa], see `bearing_pressure`.
 
     Raises:
         ConfigError: for a number out of its range.
@@ -55,11 +58,13 @@ class Layer(Resistance):
     angle: float = float(np.arctan(0.5))
     recovery: float = SAND_RECOVERY
     density: float = SAND_DENSITY
+    strength: float = np.inf
 
     def __post_init__(self) -> None:
         sizes = (self.modulus, self.radius, self.thickness, self.density)
-        if not (all(0 < x < np.inf for x in sizes) and 0 < self.recovery <= 1):
-            needed = "modulus, radius, thickness and density > 0, 0 < recovery <= 1"
+        good = all(0 < x < np.inf for x in sizes) and self.strength > 0
+        if not (good and 0 < self.recovery <= 1):
+            needed = "modulus, radius, thickness, density and strength > 0, 0 < recovery <= 1"
             raise ConfigError(f"{self}: needed are {needed}.")
         if not 0 < self.angle < np.pi / 2:
             raise ConfigError(f"{self}: the angle is one between 0 and pi / 2, in radians.")
@@ -96,9 +101,9 @@ class Layer(Resistance):
 
     @property
     def law(self) -> tuple[float, ...]:
-        """(7,) the numbers of the law, as `kernels.cushion` takes them."""
+        """(8,) the numbers of the law, as `kernels.cushion` takes them."""
         numbers = (self.recovery, self.exponent, self.modulus, self.thickness, self.radius,
-                   np.tan(self.angle))  # fmt: skip
+                   np.tan(self.angle), self.strength)  # fmt: skip
         return (kernels.CONE_LAW, *map(float, numbers))
 
     def contact(self, d: float) -> float:
@@ -165,6 +170,34 @@ class Layer(Resistance):
         stiffness = 2 * np.pi * modulus * slab / np.log1p(PUNCHING_SLOPE * slab / r)
         capacity = strength * 2 * np.pi * (r + 0.5 * PUNCHING_SLOPE * slab) * slab
         return Shear(float(stiffness), float(capacity), **more)
+
+
+def bearing_pressure(friction: float, radius: float, density: float = SAND_DENSITY) -> float:
+    """Pressure [Pa] under which dry sand fails below a disc on its surface.
+
+    0.6 rho g R N with N = 2 (N_q + 1) tan(phi), N_q = exp(pi tan(phi)) tan^2(pi / 4 + phi / 2),
+    for slow loading; 0.6 is the factor of a round foundation.
+
+    Args:
+        friction: angle phi of the sand [rad].
+        radius: R of the disc [m].
+        density: rho of the sand [kg/m^3].
+
+    Raises:
+        ConfigError: for an angle that is none of sand, or a size that is not positive.
+
+    Source:
+        Vesic, Analysis of ultimate loads of shallow foundations, J. Soil Mech. Found. Div. ASCE
+        99 (1973) 45.
+    """
+    if not (0 < friction < np.pi / 3 and radius > 0 and density > 0):
+        raise ConfigError(
+            f"friction = {friction} rad, radius = {radius} m, density = {density} kg/m^3: needed "
+            "are an angle between 0 and pi / 3 and sizes > 0."
+        )
+    slope = np.tan(friction)
+    n_q = np.exp(np.pi * slope) * np.tan(np.pi / 4 + friction / 2) ** 2
+    return float(0.6 * density * GRAVITY * radius * 2 * (n_q + 1) * slope)
 
 
 def _frustum(top: float, bottom: float, height: float) -> float:

@@ -218,3 +218,11 @@ GOOD = Layer(3e6, 0.6, 0.9)
 def test_messages_name_what_is_wrong(make, error, words):
     with pytest.raises(error, match=words):
         make()
+
+
+def test_a_contact_that_fails_bears_its_strength_only():
+    """Force over the disc of the chord, constant from the equator on, elastic before."""
+    soft = replace(GOOD, strength=2e5)
+    assert soft.force(0.01) == GOOD.force(0.01)
+    assert soft.force(0.3) == pytest.approx(2e5 * np.pi * (0.6**2 - 0.3**2))
+    assert soft.force(0.7) == soft.force(0.8) == pytest.approx(2e5 * np.pi * 0.36)
