@@ -14,7 +14,7 @@ from scipy.optimize import brentq
 
 from rom.components.rockfall.impact import Gallery, strike
 from rom.components.rockfall.layer import Layer
-from rom.errors import ConfigError
+from rom.errors import ConfigError, SolverError
 from rom.model import Array
 
 MAX_FALL = 300.0  # m; no boulder falls freely from further up onto a gallery
@@ -66,10 +66,15 @@ def design_check(g: Gallery, *, ductility: float = 1.0, depth: float = 1.0) -> V
         raise ConfigError(f"ductility = {ductility}, depth = {depth}: needed are ductility > 0 and "
                           "0 < depth <= 1.")  # fmt: skip
     try:
-        g.cushion.penetration(g.energy)
-    except ConfigError:
+        got = strike(replace(g, shear=replace(g.shear, capacity=np.inf)))
+    except SolverError as error:
+        if not error.solution.through(g):
+            raise
+        got = None
+    except ConfigError:  # a fall that no cushion of this kind takes up
+        got = None
+    if got is None:
         return Verdict(np.inf, np.inf, np.inf, "through")
-    got = strike(replace(g, shear=replace(g.shear, capacity=np.inf)))
     shear = float(got.peaks[1]) / g.shear.capacity
     return Verdict(
         got.deepest / (depth * g.cushion.limit),

@@ -22,6 +22,7 @@ STATES = ("whole", "cracked", "punched")
 # with no `t_end`: the longest periods in which no peak may have grown before an impact is over,
 # two for beats of slab and plug; and steps after which a motion that never ends is refused
 QUIET_PERIODS, MAX_STEPS = 2, 20_000_000
+NEARLY_THROUGH = 0.9  # of the limit of a cushion, where steps begin to miss it
 PARTS = (1, 4, 7, 10, 17)  # where time, ways, speeds, forces and energies end in a row
 
 
@@ -198,15 +199,15 @@ class Impact:
         return total - total[0]
 
     @property
-    def reach(self) -> float:
-        """Largest penetration among the instants kept [m]."""
-        return float((self.z[:, 0] - self.z[:, 1]).max())
-
-    @property
     def rebound(self) -> float:
         """Share of the boulder's energy with which it leaves, at most [1]."""
         up = np.minimum(self.v[:, 0], 0.0)
         return float((up.min() / self.v[0, 0]) ** 2)
+
+    def through(self, g: Gallery) -> bool:
+        """Whether the last instant kept is nearly at the limit of the cushion of a gallery."""
+        reach = float((self.z[:, 0] - self.z[:, 1]).max())
+        return g.cushion.limit < np.inf and reach > NEARLY_THROUGH * g.cushion.limit
 
 
 def strike(
@@ -216,8 +217,9 @@ def strike(
 
     Args:
         g: what strikes what.
-        t_end: duration [s]; None until neither a force nor the deflection has grown for two of
-            the longest periods. Later, weaker blows of a boulder that bounces are left out.
+        t_end: duration [s]; None until the cushion has let go and neither a force nor the
+            deflection has grown for two of the longest periods. Later, weaker blows of a boulder
+            that bounces are left out.
         dt: time step [s]; None for a tenth of the reciprocal of the highest frequency.
         keep: about how many instants to keep.
 
@@ -261,7 +263,7 @@ def _refuse(g: Gallery, out: Array, last: Array, step: float, over: bool) -> Non
     if not finite.all():
         reason = f"the impact grows without bound with a step of {step:.3g} s."
         before = _impact(out[: int(finite.argmin())], last)
-        if g.cushion.limit < np.inf and before.reach > 0.9 * g.cushion.limit:
+        if before.through(g):
             reason = f"the boulder is through the cushion of {g.cushion.limit:g} m."
         raise SolverError(reason, solution=before)
     if not over:
@@ -291,9 +293,10 @@ VARIED_NUMBERS = {  # what can be changed: where it stands, and the power of the
 }
 
 
+STRENGTH_NAME = "strength of the cushion"
 FITTED_NUMBERS = VARIED_NUMBERS | {
     "recovery of the cushion": ("cushion.recovery", 1.0),
-    "strength of the cushion": ("cushion.strength", 1.0),
+    STRENGTH_NAME: ("cushion.strength", 1.0),
 }
 
 
@@ -308,10 +311,12 @@ def sensitivity(g: Gallery, answer: Any, factors: tuple[float, ...]) -> dict[str
     Returns:
         {parameter: (f,) relative changes of the answer [1]}.
     """
-    first = answer(g)
+    first, names = answer(g), list(VARIED_NUMBERS)
+    if isinstance(g.cushion, Layer) and g.cushion.strength < np.inf:
+        names.append(STRENGTH_NAME)
     return {
         name: np.array([answer(scaled(g, {name: s})) for s in factors]) / first - 1
-        for name in VARIED_NUMBERS
+        for name in names
     }
 
 
@@ -330,7 +335,7 @@ def scaled(g: Gallery, factors: dict[str, float]) -> Gallery:
         if name not in FITTED_NUMBERS:
             raise ConfigError(f"{name!r} cannot be varied; known are {', '.join(FITTED_NUMBERS)}.")
         path, power = FITTED_NUMBERS[name]
-        if name == "strength of the cushion" and not isinstance(g.cushion, Layer):
+        if name == STRENGTH_NAME and not isinstance(g.cushion, Layer):
             raise ConfigError("only a Layer has a strength of the cushion.")
         kind = "modulus" if isinstance(g.cushion, Layer) else "stiffness"
         g = _scaled(g, path.format(stiffness=kind), factor**power)

@@ -10,6 +10,7 @@ POWER_LAW, CONE_LAW = 0.0, 1.0
 SERIES_BELOW = 1e-3  # where five terms of the logarithm are exact to round-off
 # a peak that grows by less does not keep the impact going; far below what is known of a cushion
 PEAK_RTOL = 1e-3
+RELEASED_RATIO = 0.05  # of the largest force, beside twice the weight: the cushion has let go
 
 
 @inner
@@ -111,8 +112,8 @@ def _grown(last, marked):
 def strike(numbers, modes, steps, out, last):
     """Rows of out: time, ways, speeds, forces, energies, modes; last: peaks and what stays.
 
-    Gives the number of rows; the impact ends after n steps, or when no peak has grown for
-    ``quiet`` ones. Rows that are full are thinned.
+    Gives the number of rows; the impact ends after n steps, or when the cushion has let go and no
+    peak has grown for ``quiet`` ones. Rows that are full are thinned.
     """
     (m1, m2, g, v1), c, s, (zeta, capacity, k3) = numbers
     phi, omega = modes
@@ -120,6 +121,7 @@ def strike(numbers, modes, steps, out, last):
     z1, z2, v2, d, e, F1, F2, deepest, yielded = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     q, w, took, state = np.zeros(phi.size), np.zeros(phi.size), np.zeros(7), 0
     slab, marked, mark, rows = (phi, omega, zeta, k3 * phi / omega**2), np.zeros(4), 0, 0
+    pressed = True
     for i in range(n + 1):
         d0, e0, f1, f2 = d, e, F1, F2
         z3, v3 = (phi * q).sum(), (phi * w).sum()
@@ -149,7 +151,8 @@ def strike(numbers, modes, steps, out, last):
             rows += 1
         last[0], last[1], last[2] = max(last[0], F1), max(last[1], F2), max(last[2], F3)
         last[3], last[4], last[5], last[6] = deepest, max(last[4], z3), yielded, state
-        if _grown(last, marked):
+        pressed = pressed and (v1 >= v2 or F1 > RELEASED_RATIO * last[0] + 2.0 * m1 * g)
+        if _grown(last, marked) or pressed:
             mark = i
         if 0 < quiet < i - mark:
             return rows, True

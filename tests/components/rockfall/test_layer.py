@@ -72,6 +72,8 @@ def test_a_boulder_that_never_stops_is_named(monkeypatch):
 
 # --- geometry ---
 
+GOOD = Layer(3e6, 0.6, 0.9)
+
 
 def test_a_thick_layer_is_hertz():
     """By the angle whose cone has the stiffness of the half space, 25.6 degrees for nu = 1/4."""
@@ -141,6 +143,10 @@ def test_the_modulus_of_a_layer_is_varied_as_its_stiffness():
     )
     assert change["stiffness of the cushion"] == pytest.approx([1.0])
     assert change["mass of the plug"] == pytest.approx([0.0])
+    assert "strength of the cushion" not in change
+    weak = baseline(cushion=replace(GOOD, strength=2e5))
+    change = sensitivity(weak, lambda g: g.cushion.force(0.5), (1.25,))
+    assert change["strength of the cushion"] == pytest.approx([0.25])
 
 
 # --- slabs of several modes that yield ---
@@ -194,8 +200,6 @@ def test_what_stays_is_the_shape_of_the_static_deflection():
 
 
 # --- messages ---
-
-GOOD = Layer(3e6, 0.6, 0.9)
 
 
 @pytest.mark.parametrize(

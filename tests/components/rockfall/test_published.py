@@ -105,7 +105,7 @@ def test_dense_sand_of_40_degrees_would_be_pressed_through_and_42_bear():
     assert design_check(full_size(granular(40))).state == "through"
     got = strike(full_size(granular(42)))
     assert got.peaks[0] == pytest.approx(SAND, rel=0.01)
-    assert contact_time(got) / DURATION == pytest.approx(1.3, abs=0.05)
+    assert contact_time(got) / DURATION == pytest.approx(1.43, abs=0.05)
 
 
 def test_a_layer_that_does_not_fail_doubles_the_force():
