@@ -153,7 +153,8 @@ class Gallery:
         """
         c, phi = self.cushion, np.asarray(self.slab.phi)
         d = c.penetration(self.energy)
-        slope = max((c.force(d) - c.force(0.999 * d)) / 0.001, c.exponent * c.force(d) / c.recovery)
+        share = c.exponent * c.force(d) * d / ((c.exponent + 1) * c.recovery * self.energy)
+        slope = max((c.force(d) - c.force(0.999 * d)) / 0.001, share * c.force(d))
         one, two = np.zeros((2, phi.size + 2))
         one[:2], two[1], two[2:] = (1.0, -1.0), 1.0, -phi
         K = slope / d * np.outer(one, one) + self.shear.stiffness * np.outer(two, two)

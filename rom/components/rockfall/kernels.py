@@ -10,6 +10,7 @@ POWER_LAW, CONE_LAW = 0.0, 1.0
 SERIES_BELOW = 1e-3  # where five terms of the logarithm are exact to round-off
 # a peak that grows by less does not keep the impact going; far below what is known of a cushion
 PEAK_RTOL = 1e-3
+GAUSS_POINTS, GAUSS_WEIGHTS = (tuple(x.tolist()) for x in np.polynomial.legendre.leggauss(8))
 RELEASED_RATIO = 0.05  # of the largest force, beside twice the weight: the cushion has let go
 
 
@@ -48,14 +49,34 @@ def _loading(d, c):
     return k * d**n / (1.0 - d / limit) ** p
 
 
+@inner
+def _work(d, c):
+    """Energy taken up on the way to penetration d."""
+    law, _, n, _, _, p, _, _ = c
+    if law == POWER_LAW and p == 0.0:
+        return _loading(d, c) * d / (n + 1.0)
+    total = 0.0
+    for k in range(8):
+        total += GAUSS_WEIGHTS[k] * _loading(0.5 * d * (1.0 + GAUSS_POINTS[k]), c)
+    return 0.5 * d * total
+
+
 @kernel
 def cushion(d, deepest, c):
-    """Force at penetration d of a cushion that has been as deep as ``deepest`` >= d."""
+    """Force at penetration d of a cushion that has been as deep as ``deepest`` >= d.
+
+    The way back, d - left at the start, gives back the share of the work.
+    """
     _, recovery, n, _, _, _, _, _ = c
-    left = (1.0 - recovery) * deepest
-    if d <= left or d <= 0.0:
+    if d <= 0.0:
         return 0.0
-    return _loading(deepest, c) * ((d - left) / (deepest - left)) ** n
+    largest = _loading(deepest, c)
+    if d >= deepest:
+        return largest
+    back = (n + 1.0) * recovery * _work(deepest, c) / largest
+    if d <= deepest - back:
+        return 0.0
+    return largest * ((d - deepest + back) / back) ** n
 
 
 @inner

@@ -14,8 +14,8 @@ from rom.model import Array
 
 GRAVITY = 9.81  # m/s^2
 ROCK_DENSITY = 2600.0  # [kg/m^3]
-# share of the penetration, and with it of the energy, that sand gives back: a boulder returns with
-# a sixth of its speed, as the pulse measured on gravel does, see the page on rockfall
+# share of the energy that sand gives back: a boulder returns with a sixth of its speed, as the
+# pulse measured on gravel does, see the page on rockfall
 SAND_RECOVERY = 0.03
 
 
@@ -68,14 +68,14 @@ class Resistance(ABC):
 class Cushion(Resistance):
     """Resistance of the cushion to penetration d; it cannot pull.
 
-    Loading k d^n / (1 - d / limit)^m; below the deepest penetration so far a share of it recovers,
-    F_max ((d - d_r) / (d_max - d_r))^n with d_r = (1 - recovery) d_max.
+    Loading k d^n / (1 - d / limit)^m; below the deepest penetration so far it gives back a share of
+    the energy taken up, F_max ((d - d_r) / (d_max - d_r))^n; without compaction d_max - d_r is the
+    same share of d_max.
 
     Attributes:
         stiffness: k [N/m^n].
         exponent: n [1]; 3/2 for a sphere after Hertz, 1 for a spring.
-        recovery: share of the penetration that comes back [1], above 0; 1 is elastic. Without
-            hardening it is the share of the energy as well.
+        recovery: share of the energy that comes back [1], above 0; 1 is elastic.
         limit: penetration at which the compacted cushion is rigid [m].
         hardening: m of the compaction [1], 0 for none.
 

@@ -44,7 +44,8 @@ class Layer(Resistance):
         radius: R of the boulder [m].
         thickness: of the layer [m].
         angle: by which the load spreads, from the vertical [rad].
-        recovery: share of the penetration that comes back [1], above 0.
+        recovery: share of the energy that comes back [1], above 0; less of it where sand that fails
+            leaves no way for so much.
         density: of the sand [kg/m^3].
         strength: pressure that the contact bears [Pa], see `bearing_pressure`.
 

@@ -230,3 +230,20 @@ def test_a_contact_that_fails_bears_its_strength_only():
     assert soft.force(0.01) == GOOD.force(0.01)
     assert soft.force(0.3) == pytest.approx(2e5 * np.pi * (0.6**2 - 0.3**2))
     assert soft.force(0.7) == soft.force(0.8) == pytest.approx(2e5 * np.pi * 0.36)
+
+
+@pytest.mark.parametrize("recovery", [1.0, 0.3, 0.03])
+@pytest.mark.parametrize(
+    ("cushion", "deepest"),
+    [(Cushion(2e6), 0.4), (Cushion(2e6, limit=0.5, hardening=1.0), 0.45), (GOOD, 0.5),
+     (Cushion(2e6, limit=0.5, hardening=1.0), 0.49), (replace(GOOD, strength=2e5), 0.8)],
+)  # fmt: skip
+def test_recovery_is_the_share_of_the_energy(cushion, deepest, recovery):
+    """Of compacted sand too: it gave back more than it took, or a ninth instead of 3 %."""
+    c = replace(cushion, recovery=recovery)
+    taken = quad(c.force, 0, deepest, limit=400)[0]
+    returned = quad(c.force, 0, deepest, args=(deepest,), limit=400, points=[
+        deepest - 3 * recovery * taken / c.force(deepest)])[0]  # fmt: skip
+    if c.exponent * recovery * taken < 0.7 * deepest * c.force(deepest):  # there is way enough
+        assert returned / taken == pytest.approx(recovery, rel=0.04)
+    assert returned < 1.02 * recovery * taken

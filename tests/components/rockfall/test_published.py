@@ -94,8 +94,8 @@ def test_geometry_and_strength_predict_force_and_duration_on_gravel():
         full_size(granular(45)), {"force in the cushion": pulse}, ["strength of the cushion"]
     )
     adjusted = strike(found.gallery)
-    assert adjusted.peaks[0] == pytest.approx(GRAVEL, rel=0.05)
-    assert found.factors["strength of the cushion"] == pytest.approx(1.29, abs=0.02)
+    assert adjusted.peaks[0] / GRAVEL == pytest.approx(1.06, abs=0.01)
+    assert found.factors["strength of the cushion"] == pytest.approx(1.32, abs=0.02)
     assert found.deviations["strength of the cushion"] == pytest.approx(0.0105, abs=0.002)
     assert found.residuals["force in the cushion"] == pytest.approx(0.15, abs=0.01)
 
@@ -105,7 +105,7 @@ def test_dense_sand_of_40_degrees_would_be_pressed_through_and_42_bear():
     assert design_check(full_size(granular(40))).state == "through"
     got = strike(full_size(granular(42)))
     assert got.peaks[0] == pytest.approx(SAND, rel=0.01)
-    assert contact_time(got) / DURATION == pytest.approx(1.43, abs=0.05)
+    assert contact_time(got) / DURATION == pytest.approx(1.48, abs=0.05)
 
 
 def test_a_layer_that_does_not_fail_doubles_the_force():
