@@ -360,6 +360,14 @@ def test_ten_modes_of_a_reduced_slab_bend_as_all_of_the_finite_elements(slab_mod
     assert strike(on_strip(few), t_end=0.06).deflection == pytest.approx(exact.deflection, rel=0.01)
 
 
+def test_a_reduced_slab_yields_at_its_capacity(slab_body):
+    bounded = Slab.of_body(slab_body, "impact", ENDS, damping=0.0, capacity=2e5)
+    got = strike(on_strip(bounded))
+    assert got.peaks[2] == pytest.approx(2e5, rel=1e-9)
+    assert got.energy[-1, 5] == pytest.approx(2e5 * got.plastic, rel=1e-9) and got.plastic > 0
+    assert strike(on_strip(replace(bounded, capacity=np.inf))).peaks[2] > 4e5
+
+
 def test_three_masses_are_the_first_mode_of_the_slab(slab_body):
     """The mass and spring of one mode give the peaks of all within a quarter, from below."""
     all_modes = Slab.of_body(slab_body, "impact", ENDS)
