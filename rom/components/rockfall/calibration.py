@@ -13,7 +13,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from rom.components.rockfall.impact import Gallery, Impact, scaled, strike
-from rom.errors import ConfigError, ModelError
+from rom.errors import ConfigError, ModelError, SolverError
 from rom.model import Array
 
 CHANNELS: dict[str, Callable[[Gallery, Impact], Array]] = {
@@ -32,6 +32,7 @@ MAX_FACTOR = 30.0  # by which a parameter may leave its first value
 MAX_GAP = 5.0  # a step of time that is so many medians long is a gap
 MIN_INSTANTS = 8  # of a history, so that its scatter says something
 MAX_DEVIATION = 1.0  # a parameter that is only known to its own size is not determined
+FAR_RATIO = 10.0  # of the largest value: how far off parameters are that stop no boulder
 # steps of derivatives, in logarithms: above the jumps of the time step, below curvature
 DERIVATIVE_STEP = 5e-3
 KEPT_INSTANTS = 4000  # so that interpolation between them stays below the noise of any sensor
@@ -117,7 +118,9 @@ def calibrate(
         t_end: time after which histories are left out [s]; None for all.
 
     Raises:
-        ConfigError: for an unknown channel or parameter, or nothing measured.
+        ConfigError: for an unknown channel or parameter, nothing measured, or first values that
+            stop no boulder.
+        SolverError: if an impact with the first values breaks down.
         ModelError: if the histories do not determine a parameter.
     """
     pieces = _pieces(measured, t_end)
@@ -134,7 +137,12 @@ def calibrate(
         nonlocal count
         count += 1
         trial = gallery(x)
-        impact = strike(trial, t_end=end, keep=KEPT_INSTANTS)
+        try:
+            impact = strike(trial, t_end=end, keep=KEPT_INSTANTS)
+        except (ConfigError, SolverError):  # such as a boulder through the cushion
+            if count == 1:
+                raise
+            return [np.full(h.t.size, FAR_RATIO * np.abs(h.values).max()) for _, h in pieces]
         return [np.interp(h.t, impact.t, CHANNELS[c](trial, impact)) - h.values for c, h in pieces]
 
     x, scales = np.zeros(len(names)), [float(np.abs(h.values).max()) for _, h in pieces]

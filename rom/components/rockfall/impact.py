@@ -230,7 +230,9 @@ def strike(
         SolverError: if the motion grows without bound because dt is too large, the boulder is
             through the cushion, or the impact does not end; ``error.solution`` is what was finite.
     """
-    if not ((t_end is None or 0 < t_end < np.inf) and keep >= 1 and (dt is None or dt > 0)):
+    if not (
+        (t_end is None or 0 < t_end < np.inf) and keep >= 1 and (dt is None or 0 < dt < np.inf)
+    ):
         raise ConfigError(f"t_end = {t_end} s, dt = {dt} s, keep = {keep}: all must be positive.")
     h = STEP_RATIO / g.highest_frequency() if dt is None else dt
     if t_end is None:

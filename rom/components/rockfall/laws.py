@@ -90,7 +90,7 @@ class Cushion(Resistance):
     hardening: float = 0.0
 
     def __post_init__(self) -> None:
-        good = self.stiffness > 0 and self.limit > 0 and 0 < self.recovery <= 1
+        good = 0 < self.stiffness < np.inf and self.limit > 0 and 0 < self.recovery <= 1
         if not (good and self.exponent >= 1 and self.hardening >= 0):
             needed = "stiffness and limit > 0, 0 < recovery <= 1, exponent >= 1, hardening >= 0"
             raise ConfigError(f"{self}: needed are {needed}.")
@@ -154,7 +154,7 @@ class Shear:
     damping: float = 0.05
 
     def __post_init__(self) -> None:
-        good = self.stiffness > 0 and self.capacity > 0 and self.ultimate > 0
+        good = 0 < self.stiffness < np.inf and self.capacity > 0 and self.ultimate > 0
         if not (good and self.reinforced >= 0 and self.damping >= 0):
             needed = "stiffness, capacity, ultimate > 0, reinforced, damping >= 0"
             raise ConfigError(f"{self}: needed are {needed}.")

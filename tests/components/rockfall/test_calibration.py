@@ -86,6 +86,18 @@ def test_a_channel_may_come_in_pieces_and_be_cut():
     assert_allclose([found.factors[n] for n in TRUE], list(TRUE.values()), rtol=2e-3)
 
 
+def test_a_sensor_in_the_boulder_reads_what_stops_it_and_its_weight():
+    got = strike(FIRST, t_end=0.1, keep=10**4)
+    stops = 9.81 - np.gradient(got.v[:, 0], got.t)
+    read = CHANNELS["acceleration of the boulder"](FIRST, got)
+    assert_allclose(read, stops, atol=0.01 * read.max())
+    sunk = CHANNELS["penetration"](FIRST, got)
+    assert sunk.max() == pytest.approx(got.deepest, rel=1e-6)
+    assert CHANNELS["deflection"](FIRST, got).max() == pytest.approx(got.deflection, rel=1e-3)
+    for k, name in enumerate(("force in the cushion", "force in shear", "force in bending")):
+        assert CHANNELS[name](FIRST, got).max() == pytest.approx(got.peaks[k], rel=1e-3)
+
+
 T = np.linspace(0, 0.1, 50)
 GAP = np.r_[T[:20], T[30:]]
 

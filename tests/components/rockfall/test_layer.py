@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.integrate import quad, solve_ivp
+from scipy.linalg import eigh
 
 from rom.components.rockfall import Cushion, Gallery, Layer, Shear, Slab, sensitivity, strike
 from rom.errors import ConfigError, SolverError
@@ -51,6 +52,16 @@ def test_an_impact_ends_after_its_peaks(slab, damping):
     assert got.t[-1] < 6 * g.longest_period
     assert 1000 <= got.t.size <= 2000
     assert_allclose(np.diff(got.t), got.t[1], rtol=1e-9)
+
+
+def test_the_longest_period_is_that_of_all_masses_on_the_slab():
+    """Exact for one mode; from above for several, of which a boulder that sticks moves all."""
+    period = 2 * np.pi * np.sqrt((4000 + 2500 + 6000) / 1.2e8)
+    assert baseline().longest_period == pytest.approx(period)
+    M = np.eye(3) + 6500 * np.outer(PLATE.phi, PLATE.phi)
+    lowest = eigh(np.diag(PLATE.omega**2), M, eigvals_only=True)[0]
+    bound = baseline(slab=PLATE).longest_period
+    assert 1.0 < bound * np.sqrt(lowest) / (2 * np.pi) < 1.2
 
 
 def test_a_soft_slab_was_not_at_its_peak():

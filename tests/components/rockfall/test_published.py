@@ -108,6 +108,17 @@ def test_dense_sand_of_40_degrees_would_be_pressed_through_and_42_bear():
     assert contact_time(got) / DURATION == pytest.approx(1.48, abs=0.05)
 
 
+def test_a_fit_passes_by_parameters_that_stop_no_boulder():
+    """The measured pulse asks for a third of the strength of 41 degrees; 40 are pressed through."""
+    t = np.linspace(0, 0.04, 81)
+    third = strike(full_size(granular(41)), t_end=0.04)
+    history = History(t, np.interp(t, third.t, third.forces[:, 0]) / 3)
+    start = full_size(granular(41))
+    found = calibrate(start, {"force in the cushion": history}, ["strength of the cushion"])
+    assert 0.9 < found.factors["strength of the cushion"] < 1.0
+    assert design_check(found.gallery).state != "through"
+
+
 def test_a_layer_that_does_not_fail_doubles_the_force():
     assert strike(full_size(Layer(2.5e6, RADIUS, 0.9))).peaks[0] > 2 * SAND
 
@@ -139,6 +150,10 @@ def test_sand_bears_as_vesic_says(degrees, factor):
         (lambda: bearing_pressure(40.0, 1.0), "friction = 40.0 rad"),
         (lambda: bearing_pressure(0.7, -1.0), "radius = -1.0 m"),
         (lambda: Layer(1e6, 1.0, 1.0, strength=0.0), "density and strength > 0"),
+        (lambda: calibrate(
+            full_size(granular(40)),
+            {"deflection": History(np.arange(9.0), np.ones(9))}, ["strength of the cushion"],
+        ), "pressed through"),
         (lambda: calibrate(full_size(Cushion(1e6)), {}, ["strength of the cushion"]),
          "nothing is measured"),
         (lambda: calibrate(

@@ -475,6 +475,11 @@ def test_parameters_are_varied_one_at_a_time():
 @pytest.mark.parametrize(
     ("make", "error", "words"),
     [
+        (lambda: Cushion(np.inf), ConfigError, "needed are stiffness"),
+        (lambda: Cushion(np.nan), ConfigError, "needed are stiffness"),
+        (lambda: Shear(np.inf), ConfigError, "needed are|stiffness, capacity"),
+        (lambda: baseline(boulder=np.nan), ConfigError, "boulder = nan kg"),
+        (lambda: strike(baseline(), dt=np.inf), ConfigError, "dt = inf s"),
         (lambda: Cushion(-1.0), ConfigError, "needed are stiffness and limit > 0"),
         (lambda: Cushion(1.0, recovery=0.0), ConfigError, "0 < recovery <= 1"),
         (lambda: Cushion(1.0, exponent=0.5), ConfigError, "exponent >= 1"),
