@@ -98,6 +98,12 @@ def test_a_sensor_in_the_boulder_reads_what_stops_it_and_its_weight():
         assert CHANNELS[name](FIRST, got).max() == pytest.approx(got.peaks[k], rel=1e-3)
 
 
+def elastic():
+    """The fit of an elastic cushion runs to the bound of what can be given back."""
+    got = strike(replace(FIRST, cushion=replace(FIRST.cushion, recovery=1.0)), t_end=0.2)
+    return {"force in the cushion": History(got.t, got.forces[:, 0])}
+
+
 T = np.linspace(0, 0.1, 50)
 GAP = np.r_[T[:20], T[30:]]
 
@@ -122,6 +128,9 @@ GAP = np.r_[T[:20], T[30:]]
         (lambda: calibrate(replace(FIRST, slab=Slab.of_mass(6e3, 1.2e8, damping=0.0)),
                            histories(0.01), ["damping of the slab"]), ModelError,
          "do not determine damping of the slab"),
+        (lambda: calibrate(
+            FIRST, elastic(), ["stiffness of the cushion", "recovery of the cushion"]), ModelError,
+         "do not determine recovery of the cushion"),
         (lambda: calibrate(FIRST, histories(0.01, sensors=("force in the cushion",)), t_end=0.004),
          ModelError, "do not determine recovery of the cushion"),
     ],

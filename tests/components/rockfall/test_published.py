@@ -109,14 +109,13 @@ def test_dense_sand_of_40_degrees_would_be_pressed_through_and_42_bear():
 
 
 def test_a_fit_passes_by_parameters_that_stop_no_boulder():
-    """The measured pulse asks for a third of the strength of 41 degrees; 0.85 of it lets through."""
+    """A pulse asks for a third of the strength of 41 degrees; 0.85 of it lets through."""
     t = np.linspace(0, 0.04, 81)
     third = strike(full_size(granular(41)), t_end=0.04)
     history = History(t, np.interp(t, third.t, third.forces[:, 0]) / 3)
     start = full_size(granular(41))
     found = calibrate(start, {"force in the cushion": history}, ["strength of the cushion"])
     assert 0.84 < found.factors["strength of the cushion"] < 0.9
-    assert design_check(found.gallery).state != "through"
 
 
 def test_a_layer_that_does_not_fail_doubles_the_force():
