@@ -50,11 +50,11 @@ def _loading(d, c):
 
 
 @inner
-def _work(d, c):
-    """Energy taken up on the way to penetration d."""
+def _work(d, force, c):
+    """Energy taken up on the way to penetration d, where the force is given."""
     law, _, n, _, _, p, _, _ = c
     if law == POWER_LAW and p == 0.0:
-        return _loading(d, c) * d / (n + 1.0)
+        return force * d / (n + 1.0)
     total = 0.0
     for k in range(8):
         total += GAUSS_WEIGHTS[k] * _loading(0.5 * d * (1.0 + GAUSS_POINTS[k]), c)
@@ -73,7 +73,7 @@ def cushion(d, deepest, c):
     largest = _loading(deepest, c)
     if d >= deepest:
         return largest
-    back = (n + 1.0) * recovery * _work(deepest, c) / largest
+    back = (n + 1.0) * recovery * _work(deepest, largest, c) / largest
     if d <= deepest - back:
         return 0.0
     return largest * ((d - deepest + back) / back) ** n
@@ -88,26 +88,6 @@ def _shear(d, rate, s, state):
     if state == 1 and abs(d) > ultimate:
         state = 2
     return (whole * d + damping * rate, reinforced * d, 0.0)[state], state
-
-
-@inner
-def _bend(modes, motion, force, steps, plastic, took):
-    """One step of the modes; the speed under the plug, and its energies."""
-    phi, omega, zeta, shape = modes
-    (q, w), (half, h) = motion, steps
-    speed = 0.0
-    for k in range(phi.size):
-        x = q[k] - plastic * shape[k]
-        b = zeta * omega[k] * half
-        n = ((1.0 - b) * w[k] + half * (phi[k] * force - omega[k] ** 2 * x)) / (1.0 + b)
-        u = 0.5 * (w[k] + n)
-        speed += phi[k] * u
-        took[0] += 0.5 * u * u
-        took[3] += 0.5 * (omega[k] * x) ** 2
-        took[4] += 2.0 * b * u * u
-        w[k] = n
-        q[k] += h * n
-    return speed
 
 
 @inner
@@ -137,12 +117,10 @@ def strike(numbers, modes, steps, out, last):
     peak has grown for ``quiet`` ones. Rows that are full are thinned.
     """
     (m1, m2, g, v1), c, s, (zeta, capacity, k3) = numbers
-    phi, omega = modes
-    h, n, every, quiet = steps
+    (phi, omega), (h, n, every, quiet) = modes, steps
     z1, z2, v2, d, e, F1, F2, deepest, yielded = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     q, w, took, state = np.zeros(phi.size), np.zeros(phi.size), np.zeros(7), 0
-    slab, marked, mark, rows = (phi, omega, zeta, k3 * phi / omega**2), np.zeros(4), 0, 0
-    pressed = True
+    shape, marked, mark, rows, pressed = k3 * phi / omega**2, np.zeros(4), 0, 0, True
     for i in range(n + 1):
         d0, e0, f1, f2 = d, e, F1, F2
         z3, v3 = (phi * q).sum(), (phi * w).sum()
@@ -165,18 +143,30 @@ def strike(numbers, modes, steps, out, last):
         n1, n2 = v1 + half * (g - F1 / m1), v2 + half * (F1 - F2) / m2
         u1, u2 = (0.5 * (v1 + n1), 0.5 * (v2 + n2)) if i else (v1, v2)
         took[0], took[3], took[6] = 0.5 * m1 * u1**2 + 0.5 * m2 * u2**2, 0.0, m1 * g * z1
-        u3 = _bend(slab, (q, w), F2, (half, h), yielded, took)
+        u3 = 0.0
+        for k in range(phi.size):
+            x = q[k] - yielded * shape[k]
+            b = zeta * omega[k] * half
+            after = ((1.0 - b) * w[k] + half * (phi[k] * F2 - omega[k] ** 2 * x)) / (1.0 + b)
+            u = 0.5 * (w[k] + after)
+            u3 += phi[k] * u
+            took[0] += 0.5 * u * u
+            took[3] += 0.5 * (omega[k] * x) ** 2
+            took[4] += 2.0 * b * u * u
+            w[k] = after
+            q[k] += h * after
         if kept:
             out[rows, :10] = i * h, z1, z2, z3, u1, u2, u3, F1, F2, F3
             out[rows, 10:17] = took
             rows += 1
         last[0], last[1], last[2] = max(last[0], F1), max(last[1], F2), max(last[2], F3)
         last[3], last[4], last[5], last[6] = deepest, max(last[4], z3), yielded, state
-        pressed = pressed and (v1 >= v2 or F1 > RELEASED_RATIO * last[0] + 2.0 * m1 * g)
-        if _grown(last, marked) or pressed:
-            mark = i
-        if 0 < quiet < i - mark:
-            return rows, True
+        if quiet > 0:
+            pressed = pressed and (v1 >= v2 or F1 > RELEASED_RATIO * last[0] + 2.0 * m1 * g)
+            if _grown(last, marked) or pressed:
+                mark = i
+            if i - mark > quiet:
+                return rows, True
         v1, v2 = n1, n2
         z1, z2 = z1 + h * v1, z2 + h * v2
     return rows, False
