@@ -103,6 +103,9 @@ def test_geometry_and_strength_predict_force_and_duration_on_gravel():
 def test_dense_sand_of_40_degrees_would_be_pressed_through_and_42_bear():
     """Blind the strength of slow loading is too small by a third; adjusted the force is met."""
     assert design_check(full_size(granular(40))).state == "through"
+    by_its_weight = full_size(granular(40.3))  # the fall alone is taken up
+    assert by_its_weight.cushion.penetration(by_its_weight.energy) < 0.9
+    assert design_check(by_its_weight).state == "through"
     got = strike(full_size(granular(42)))
     assert got.peaks[0] == pytest.approx(SAND, rel=0.01)
     assert contact_time(got) / DURATION == pytest.approx(1.48, abs=0.05)
