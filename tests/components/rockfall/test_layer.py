@@ -64,6 +64,21 @@ def test_the_longest_period_is_that_of_all_masses_on_the_slab():
     assert 1.0 < bound * np.sqrt(lowest) / (2 * np.pi) < 1.2
 
 
+def test_a_rigid_gallery_is_seen_until_the_cushion_lets_go():
+    rigid = Slab.of_mass(1e3, 1e11, damping=0.0)
+    got = strike(baseline(slab=rigid, shear=Shear(1e11, damping=0.0)))
+    assert got.forces[-1, 0] < 0.05 * got.peaks[0] + 2 * 9.81 * 4000
+
+
+def test_the_step_follows_the_cushion_on_its_way_back():
+    """Where the gallery is heavy and soft, the highest frequency is that of the boulder alone."""
+    heavy = {"plug": 1e9, "slab": Slab.of_mass(1e9, 1e6), "shear": Shear(1e6)}
+    g = baseline(**heavy)
+    c, d = g.cushion, g.cushion.penetration(g.energy)
+    slope = (c.force(d) - c.force(d * (1 - 1e-6), d)) / (1e-6 * d)
+    assert g.highest_frequency() == pytest.approx(np.sqrt(slope / 4000), rel=1e-4)
+
+
 def test_a_soft_slab_was_not_at_its_peak():
     """One mass under a short blow: z = J / sqrt(k M), a quarter of a period later."""
     g = baseline(slab=Slab.of_mass(2e5, 2e6, damping=0.0), weight=False)
@@ -108,6 +123,14 @@ def test_the_force_is_the_integral_of_the_stiffness_of_the_cone(thickness, depth
 
     expected = quad(stiffness, 0, depth, points=[0.6] if depth > 0.6 else None, limit=200)[0]
     assert layer.force(depth) == pytest.approx(expected, rel=1e-6)
+
+
+def test_a_shallow_contact_on_a_thick_layer_loses_no_digits():
+    """At d / e = 9e-4, by the series of the logarithm."""
+    layer = Layer(3e6, 60.0, 100.0, angle=0.01)
+    way = quad(lambda x: layer.contact(x) * layer.spread(x) / (100 - x), 0, 0.09,
+               epsrel=1e-12)[0]  # fmt: skip
+    assert layer.force(0.09) == pytest.approx(3e6 * np.pi * way, rel=1e-6)
 
 
 def test_contact_grows_with_depth_and_the_load_spreads():
