@@ -64,6 +64,15 @@ def test_the_longest_period_is_that_of_all_masses_on_the_slab():
     assert 1.0 < bound * np.sqrt(lowest) / (2 * np.pi) < 1.2
 
 
+def test_a_slab_that_flows_is_followed_until_it_rests():
+    """Its force stays at the capacity for longer than two periods, while it sinks."""
+    slab = Slab.of_mass(1e5, 1e9, damping=0.0, capacity=2e4)
+    g = baseline(slab=slab, weight=False)
+    got, long = strike(g), strike(g, t_end=20.0)
+    assert got.deflection == pytest.approx(long.deflection, rel=2e-3)
+    assert got.deflection > 1000 * 2e4 / 1e9
+
+
 def test_a_rigid_gallery_is_seen_until_the_cushion_lets_go():
     rigid = Slab.of_mass(1e3, 1e11, damping=0.0)
     got = strike(baseline(slab=rigid, shear=Shear(1e11, damping=0.0)))
