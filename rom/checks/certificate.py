@@ -45,6 +45,7 @@ def certify_body(
     """
     rows: list[Row] = []
     comparison = {}
+    matrices = basis_matrices(connection.ops, basis)
     statics = body.has_static_shapes
     supports: list[tuple[str, ...]] = [(), *((name,) for name in connection.parts if statics)]
     constrained = basis.labels[: len(connection.labels)] == connection.labels
@@ -58,7 +59,7 @@ def certify_body(
             if fixed == tuple(connection.parts)[:1] and len(connection.parts) > 1:
                 held = held if parts else connection.ops.hold(held)  # once, for loads and modes
                 static = _static_row(connection, body, held)
-            table = compared(connection, ops, body, (basis, parts), fixed, held)
+            table = compared(connection, ops, body, (basis, parts, matrices), fixed, held)
             if table["reduced"]:
                 comparison[support] = table
     if not connection.ops.affordable:
@@ -68,7 +69,7 @@ def certify_body(
         rows += _estimate_rows(support, table)
     rows += static
     rows += rigid_rows(ops, body, elastic)
-    rows += _matrix_rows(connection, basis, body)
+    rows += _matrix_rows(connection, basis, body, matrices)
     rows += _effective_mass(body, tuple(connection.parts)) if statics else []
     return Report(f"certificate of {body.name}", tuple(rows)), comparison
 
@@ -77,7 +78,7 @@ def compared(
     connection: Connection,
     ops: Operators,
     body: FlexibleBody,
-    reduction: tuple[Basis, Condensed | None],
+    reduction: tuple[Basis, Condensed | None, tuple[Array, Array]],
     fixed: tuple[str, ...],
     support: Any,
 ) -> dict[str, list[float]]:
@@ -87,7 +88,8 @@ def compared(
         connection: the full model in interface coordinates.
         ops: the full model in nodal dofs.
         body: the reduced body.
-        reduction: its basis, and the full model condensed to the interfaces where that is known.
+        reduction: its basis, the full model condensed to the interfaces where that is known, and
+            stiffness and mass of the basis.
         fixed: interfaces that are held.
         support: the same as `full_support` has it for the full model.
     """
@@ -98,8 +100,8 @@ def compared(
     if n <= 0 or n_rigid not in (0, 6):
         return table
     # the reduced shapes again, as combinations of the columns of the basis
-    basis, parts = reduction
-    shapes = reduced_shapes(connection, basis, fixed, n + n_rigid)
+    basis, parts, matrices = reduction
+    shapes = reduced_shapes(connection, basis, fixed, n + n_rigid, matrices)
     table["reduced"] = (omega_r[n_rigid : n_rigid + n] / (2 * np.pi)).tolist()
     if parts and not any(label.startswith("enhanced") for label in basis.labels):
         # constraint modes leave no residual on interfaces: one inverse serves every support
@@ -129,22 +131,43 @@ def condensed_model(connection: Connection, basis: Basis) -> Condensed:
     return parts
 
 
+def basis_matrices(ops: Operators, basis: Basis) -> tuple[Array, Array]:
+    """(r, r) stiffness and mass of the basis as they come, not made symmetric."""
+    Psi = basis.Psi
+    return ops.gram(Psi, ops.apply_K(Psi)), ops.gram(Psi, ops.apply_M(Psi))
+
+
 def full_support(connection: Connection, parts: Condensed | None, fixed: tuple[str, ...]) -> Any:
     """The full model in one support: dof numbers, or what solves for it without a new factor."""
     dofs = connection.held(fixed)
     return dofs if parts is None else parts.support(dofs)
 
 
-def reduced_shapes(connection: Connection, basis: Basis, fixed: tuple[str, ...], n: int) -> Array:
-    """(n_local, n) shapes of the reduced model, computed from the basis and not from the body."""
+def reduced_shapes(
+    connection: Connection,
+    basis: Basis,
+    fixed: tuple[str, ...],
+    n: int,
+    matrices: tuple[Array, Array] | None = None,
+) -> Array:
+    """(n_local, n) shapes of the reduced model, computed from the basis and not from the body.
+
+    Args:
+        connection: the full model in interface coordinates.
+        basis: whose shapes.
+        fixed: interfaces that are held.
+        n: number of shapes.
+        matrices: stiffness and mass of the basis, where they are known.
+    """
     ops = connection.ops
+    K, M = matrices or basis_matrices(ops, basis)
     if basis.labels[: len(connection.labels)] == connection.labels:
         keep = np.setdiff1d(np.arange(basis.Psi.shape[1]), connection.held_parts(fixed))
-        Psi = basis.Psi[:, keep]
+        Psi, K, M = basis.Psi[:, keep], K[np.ix_(keep, keep)], M[np.ix_(keep, keep)]
     else:  # modes alone: the combinations that keep the supports still
         rows = ops.rows(basis.Psi, connection.held(fixed))
-        Psi = basis.Psi @ null_space(rows, rcond=1e-10) if len(rows) else basis.Psi
-    K, M = ops.gram(Psi, ops.apply_K(Psi)), ops.gram(Psi, ops.apply_M(Psi))
+        N = null_space(rows, rcond=1e-10) if len(rows) else np.eye(basis.Psi.shape[1])
+        Psi, K, M = basis.Psi @ N, N.T @ K @ N, N.T @ M @ N
     scale = 1 / np.sqrt(np.diag(M))
     K, M = (scale[:, None] * (A + A.T) * (0.5 * scale) for A in (K, M))
     _, V = eigh(K, M, subset_by_index=(0, n - 1))
@@ -221,10 +244,10 @@ def rigid_rows(ops: Operators, body: FlexibleBody, elastic: Elastic) -> list[Row
     ]
 
 
-def _matrix_rows(connection: Connection, basis: Basis, body: FlexibleBody) -> list[Row]:
-    ops = connection.ops
-    M = ops.gram(basis.Psi, ops.apply_M(basis.Psi))
-    K = ops.gram(basis.Psi, ops.apply_K(basis.Psi))
+def _matrix_rows(
+    connection: Connection, basis: Basis, body: FlexibleBody, matrices: tuple[Array, Array]
+) -> list[Row]:
+    K, M = matrices
     quotient = np.diag(K) / np.diag(M)
     stiff = quotient > ROUND_OFF * quotient.max()  # a rigid column has no stiffness of its own
     asymmetry = max(_asymmetry(K[stiff][:, stiff]), _asymmetry(M))

@@ -8,6 +8,7 @@ import numpy as np
 from rom.body.flexible import FlexibleBody
 from rom.body.projection import elastic_part
 from rom.checks.certificate import (
+    basis_matrices,
     compared,
     condensed_model,
     full_support,
@@ -64,10 +65,11 @@ def certified(
         here = connect(ops, affine.model_at(point), interfaces)
         found: list[Row] = []
         parts = condensed_model(here, own) if affine.stretch is None else None
+        matrices = basis_matrices(here.ops, basis)
         for fixed in _supports(here):
             if parts:
                 support = full_support(here, parts, fixed)
-                table = compared(here, ops, body, (basis, parts), fixed, support)
+                table = compared(here, ops, body, (basis, parts, matrices), fixed, support)
             else:
                 table = _frequencies(here, body, fixed)
             if not table["reduced"]:

@@ -6,6 +6,7 @@ from contextvars import ContextVar
 from time import perf_counter
 from typing import Any
 
+from rom.process.launcher import ranks
 from rom.process.memory import peak_bytes
 
 # pieces that stages have in common; the rest of a stage belongs to none
@@ -16,6 +17,8 @@ FACTORISATION_PIECE, SOLUTION_PIECE, SEARCH_PIECE, REST_PIECE = (
     "rest",
 )
 MEGABYTE_SIZE = 1e6  # [bytes]
+# numbers that pieces of work leave with the stage under way
+FLOPS_NOTE, MISS_NOTE = "flops of the largest factorisation", "probability of a missed mode"
 
 
 class Stopwatch:
@@ -73,11 +76,15 @@ class Stopwatch:
         return sum(sum(pieces.values()) for pieces in self.stages.values())
 
     def table(self) -> dict[str, dict[str, float]]:
-        """{stage: {"seconds", "MB", and per piece its seconds}}, as provenance keeps it."""
+        """{stage: {"seconds", "MB", "ranks", pieces, their numbers, notes}}, as provenance has it.
+
+        Seconds and memory are those of one rank.
+        """
         return {
             stage: {
                 "seconds": round(sum(pieces.values()), 4),
                 "MB": round(self.peaks[stage], 1),
+                "ranks": ranks()[1],
                 **{piece: round(seconds, 4) for piece, seconds in pieces.items()},
                 **{f"number of {piece}": n for piece, n in self.counts[stage].items()},
                 **self.notes.get(stage, {}),

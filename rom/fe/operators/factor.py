@@ -8,7 +8,7 @@ from rom.errors import SolverError
 from rom.fe.operators.memory import allowed_bytes, factor_bytes, give_back, too_large
 from rom.fe.operators.solver import DIRECT_SOLVER, Solver
 from rom.model import Array
-from rom.process.stopwatch import FACTORISATION_PIECE, SOLUTION_PIECE, piece
+from rom.process.stopwatch import FACTORISATION_PIECE, FLOPS_NOTE, SOLUTION_PIECE, note, piece
 
 BLOCK_SIZE = 32  # right-hand sides solved together: five to eight times cheaper than one by one
 PIVOT_THRESHOLD = 0.01  # the default of MUMPS
@@ -86,10 +86,11 @@ class Factor:
             raise too_large(self.A.getSize()[0], need, self.allowed * self.A.comm.size)
         else:
             self.ok = code >= 0
+            note(FLOPS_NOTE, self.factor.getMumpsRinfog(3))
 
     def solve(self, F: Array) -> Array:
         """A^-1 F for (n_local, k) right-hand sides, in blocks."""
-        X = np.empty(F.shape)
+        X = np.empty(F.shape, order="F")
         for first in range(0, F.shape[1], BLOCK_SIZE):
             columns = slice(first, min(first + BLOCK_SIZE, F.shape[1]))
             with piece(SOLUTION_PIECE):
@@ -133,7 +134,7 @@ def dense_rows(A: PETSc.Mat, X: Array) -> Array:
         return _column_by_column(A, X)
     B = dense(X, A)
     Y = A.matMult(B)
-    out = Y.getDenseArray().copy()
+    out = Y.getDenseArray().copy(order="F")
     B.destroy(), Y.destroy()
     return out
 

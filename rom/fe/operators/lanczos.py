@@ -8,20 +8,20 @@ time spends twice the factorisation on twenty modes; in blocks it takes half of 
 from typing import Any
 
 import numpy as np
+from scipy.linalg.blas import dgemm
 
 from rom.eigen.completeness import miss_probability
 from rom.errors import SolverError
 from rom.fe.operators.spectrum import gaussian_block
 from rom.model import Array
-from rom.process.stopwatch import note
+from rom.process.stopwatch import MISS_NOTE, note
 
 BLOCK_SIZE = 6  # columns solved together: fewer make solving dearer, more make the space larger
 MAX_EXTRA_BLOCKS = 20  # beside the modes sought before a restart; twenty are seldom used
 MAX_RESTARTS = 20  # after which the method has failed
 MAX_FURTHER_BLOCKS = 6  # beyond convergence, for a proof; more cost as much as a count
 MAX_MISS_PROBABILITY = 1e-9
-MISS_PROBABILITY = "probability of a missed mode"
-EIGENVALUE_RTOL = 1e-10  # residual of an eigenvalue of the inverse
+EIGENVALUE_RTOL = 1e-9  # residual of an eigenvalue of the inverse
 SPARE_EIGENVALUE_RTOL = 1e-5  # the same for spare ones; the error of the eigenvalue is its square
 
 
@@ -103,9 +103,10 @@ class BlockLanczos:
         """
         V, MV = self.V[:, : self.size], self.MV[:, : self.size]
         H, R = np.zeros((self.size, W.shape[1])), np.eye(W.shape[1])
+        W = np.asfortranarray(W)
         for _ in range(2):
             G = self.ops.gram(MV, W)
-            W = W - V @ G
+            W = _less(W, V, G)
             H += G
         MW = self.ops.apply_M(W)
         for _ in range(2):
@@ -122,7 +123,7 @@ class BlockLanczos:
         for _ in range(MAX_FURTHER_BLOCKS):
             chance = miss_probability(self.T, self.start, self._residuals(), m)
             if chance <= MAX_MISS_PROBABILITY:
-                note(MISS_PROBABILITY, chance)
+                note(MISS_NOTE, chance)
                 return True
             if chance == 1.0 or self.size + BLOCK_SIZE > self.V.shape[1]:
                 break
@@ -157,6 +158,11 @@ class BlockLanczos:
     def _ritz(self, k: int) -> tuple[Array, Array]:
         theta, S = np.linalg.eigh(self.T)
         return theta[::-1][:k], S[:, ::-1][:, :k]
+
+
+def _less(W: Array, V: Array, G: Array) -> Array:
+    """W - V G in the place of W, arrays by columns."""
+    return dgemm(-1.0, V, G, 1.0, W, overwrite_c=True) if W.size and V.size else W
 
 
 def capacity(k: int) -> int:

@@ -14,9 +14,9 @@ from rom.model import Array
 
 CLUSTER_RTOL = 1e-7  # distance of eigenvalues whose modes are only defined as a plane
 EQUAL_ENTRY_RTOL = 1e-6  # difference of entries that count as equally large
-FINENESS = 2.0**40  # places that differ by less are one
-GOLDEN = np.uint64(0x9E3779B97F4A7C15)  # 2^64 over the golden ratio: steps of the counter
-MIXING = (  # Steele, Lea and Flood, OOPSLA 2014, with the constants of Stafford
+PLACE_SCALE = 2.0**40  # places that differ by less are one
+COUNTER_STEP = np.uint64(0x9E3779B97F4A7C15)  # 2^64 over the golden ratio: steps of the counter
+MIXING_STEPS = (  # Steele, Lea and Flood, OOPSLA 2014, with the constants of Stafford
     (np.uint64(30), np.uint64(0xBF58476D1CE4E5B9)),
     (np.uint64(27), np.uint64(0x94D049BB133111EB)),
 )
@@ -43,8 +43,8 @@ def gaussian_block(ops: Any, k: int) -> Array:
 
     The numbers depend on the place of a dof, mixed beyond recognition, and not on its rank.
     """
-    key = np.round(ops.fixed * FINENESS).astype(np.int64).view(np.uint64)
-    counter = key[:, None] + GOLDEN * np.arange(1, 2 * k + 1, dtype=np.uint64)
+    key = np.round(ops.fixed * PLACE_SCALE).astype(np.int64).view(np.uint64)
+    counter = key[:, None] + COUNTER_STEP * np.arange(1, 2 * k + 1, dtype=np.uint64)
     u = (_mixed(counter) >> np.uint64(11)).astype(float) * 2.0**-53 + 2.0**-54
     normal = np.sqrt(-2.0 * np.log(u[:, :k])) * np.cos(2.0 * np.pi * u[:, k:])  # Box and Muller
     return normal / np.sqrt(np.maximum(ops.mass_diagonal, np.finfo(float).tiny))[:, None]
@@ -52,7 +52,7 @@ def gaussian_block(ops: Any, k: int) -> Array:
 
 def _mixed(x: Any) -> Any:
     """64 bits of which each depends on all those given: the finaliser of SplitMix64."""
-    for shift, factor in MIXING:
+    for shift, factor in MIXING_STEPS:
         x = (x ^ (x >> shift)) * factor
     return x ^ (x >> np.uint64(31))
 
