@@ -2,6 +2,9 @@
 
 Forces are those in the middle of a step, at points that move with their stones. Held stones are
 moved to where they are at its end. Motion of the ground acts as inertia in the frame of the ground.
+
+Source:
+    Point loads and moved supports after Shi, Discontinuous deformation analysis (1988).
 """
 
 from collections.abc import Callable, Sequence
@@ -252,7 +255,7 @@ def facing(masonry: Masonry, direction: tuple[float, float]) -> tuple[tuple[int,
 
     Args:
         masonry: the stones.
-        direction: (2,) the wind blows in.
+        direction: (2,) the wind blows in [1].
 
     Raises:
         ConfigError: if the direction is none.

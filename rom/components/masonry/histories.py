@@ -1,6 +1,11 @@
 """What changes in time: pulses, harmonic motion, records, ramps.
 
 A history is a number, or a function of an array of times [s] that gives as many values.
+
+Source:
+    Pulses: Housner, The behavior of inverted pendulum structures during earthquakes, Bull. Seism.
+    Soc. Am. 53 (1963) 403; Zhang and Makris, Rocking response of free-standing blocks under
+    cycloidal pulses, J. Eng. Mech. 127 (2001) 473.
 """
 
 from collections.abc import Callable
@@ -23,7 +28,7 @@ class Table:
 
     Attributes:
         t: (n,) times, increasing [s].
-        values: (n,) values.
+        values: (n,) values [unit of the history].
 
     Raises:
         ConfigError: if the points are no history.
@@ -75,7 +80,7 @@ def recorded(t: npt.ArrayLike, values: npt.ArrayLike) -> Table:
 
     Args:
         t: (n,) times [s].
-        values: (n,) values.
+        values: (n,) values [unit of the history].
 
     Raises:
         ConfigError: if it is no history, or samples are missing.
@@ -97,7 +102,7 @@ def read_record(path: str | Path, *, scale: float = 1.0) -> Table:
 
     Args:
         path: of the file; columns are parted by commas or blanks.
-        scale: of the values, such as 9.81 for accelerations in g.
+        scale: of the values, such as 9.81 for accelerations in g [1].
 
     Raises:
         FileFormatError: if the file has no two columns of numbers.
@@ -117,9 +122,9 @@ def sine(amplitude: float, period: float, *, cycles: float = np.inf, phase: floa
     """Harmonic motion, or a pulse of some cycles of it: half a one, one, ten.
 
     Args:
-        amplitude: of the value.
+        amplitude: of the value [unit of the history].
         period: [s].
-        cycles: after which it ends.
+        cycles: after which it ends [1].
         phase: at the start [rad].
 
     Raises:

@@ -3,6 +3,9 @@
 A joint with strength is glued where stones touch at the start. It opens when a contact pulls more
 than its share of the tensile strength, and slips when it is sheared more than Coulomb's law allows;
 then its cohesion and its tensile strength are lost for good, and friction remains.
+
+Source:
+    After Shi, Discontinuous deformation analysis (1988): Coulomb's law with a limit of tension.
 """
 
 import tomllib

@@ -201,11 +201,14 @@ def load_factor(masonry: Masonry, loads: Sequence[Load], *, t: float = 0.0) -> f
         t: time of the loads [s].
 
     Returns:
-        The largest factor; infinite if the stones bear any.
+        The largest factor [1]; infinite if the stones bear any.
 
     Raises:
         ConfigError: if a load cannot be; if the stones do not even bear their weight.
         SolverError: if linear programming fails.
+
+    Source:
+        Livesley (1978), as above.
     """
     system, load = _joint_forces(masonry), _applied(masonry, loads, t)
     found = _solve(system, system.weight, load[:, None])

@@ -110,6 +110,9 @@ def simulate(  # noqa: PLR0913  all that a run needs
         ConfigError: if times or shapes do not fit, or an action cannot be.
         SolverError: if contacts do not settle even in the shortest steps; ``error.solution`` is the
             motion before.
+
+    Source:
+        After Shi (1988), as in `rom.components.masonry.discontinuous_deformation`.
     """
     B, law = masonry.blocks(), masonry.law
     n = _steps(t_end, dt, keep, save_every)
