@@ -3,7 +3,7 @@
 Total Lagrangian. The metric is evaluated at the middles of the sides, each from the four nodes of
 two neighbouring triangles; logarithmic strain, plasticity of von Mises with linear hardening.
 `triangles` has the meshes, `motion` forces and steps, `sides` the linear stiffness, `space` sheets
-as bodies; `kernels` are compiled.
+as bodies, which bend by `plates`; `kernels` are compiled.
 """
 
 from rom.lazy import front
