@@ -23,7 +23,7 @@ def in_space(body: Sheet, metal: Metal, interfaces: dict[str, Index]) -> FEModel
         InterfaceError: if the nodes of an interface contain no triangle or do not exist.
 
     Source:
-        Bending: Morley's triangle, see `plates`.
+        Bending: Morley, Aero. Quart. 19 (1968) 149, with fitted slopes as `plates` says.
     """
     if body.state != "plane stress":
         raise ConfigError(f"a sheet in space is in plane stress, not {body.state}.")
