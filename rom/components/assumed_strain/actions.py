@@ -1,4 +1,8 @@
-"""What acts on a sheet as time goes on: loads, pressure that follows, driven nodes, rigid tools."""
+"""What acts on a sheet as time goes on: loads, pressure that follows, driven nodes, rigid tools.
+
+Source:
+    Tools with Coulomb's friction: Wriggers, Computational Contact Mechanics, 2nd ed. (2006).
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -35,7 +39,7 @@ class Traction:
     """Pressure and shear on outer sides; both turn and grow with the sides.
 
     Attributes:
-        sides: (k, 2) nodes, rows of `outer_sides`.
+        sides: (k, 2) node numbers, rows of `outer_sides`.
         pressure: into the solid [Pa].
         shear: along the sides, with the solid on the left [Pa].
         history: times [s] and factors (m,) [1].
@@ -82,7 +86,7 @@ class Actions:
     """All that acts on a sheet.
 
     Attributes:
-        held: (k,) dofs that do not move.
+        held: (k,) dof numbers that do not move.
         loads: dead ones.
         tractions: pressure and shear.
         drives: prescribed motion.
@@ -136,6 +140,10 @@ class Prepared:
     def tools(self) -> tuple[Array, Index, Array]:
         """What `kernels.fly` takes of tools."""
         return self.faces, self.first, self.friction
+
+    def faces_of(self, k: int) -> Array:
+        """(f, 7) faces of a tool."""
+        return self.faces[self.first[k] : self.first[k + 1]]
 
     def at(self, t: float) -> Array:
         """(c,) values of all histories [1 or m]."""
@@ -321,7 +329,7 @@ def _refuse_overlap(body: Sheet, made: Prepared) -> None:
     """No node in a tool at the start, and no corner of a tool in a triangle."""
     X = body.points
     for k, (name, offset) in enumerate(zip(made.names, made.places(0.0), strict=True)):
-        faces = made.faces[made.first[k] : made.first[k + 1]]
+        faces = made.faces_of(k)
         gap = np.einsum("nfa,fa->nf", X[:, None] - offset - faces[:, :2], faces[:, 4:6]).max(axis=1)
         if gap.min() < -TOUCH_RTOL * faces[:, 6].max():
             raise MeshError(

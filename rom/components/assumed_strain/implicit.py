@@ -3,12 +3,9 @@
 Source:
     Steps in time: Chung and Hulbert, A time integration algorithm for structural dynamics with
     improved numerical dissipation: the generalized-alpha method, J. Appl. Mech. 60 (1993) 371.
-    Contact and friction by penalty and return mapping: Wriggers, Computational Contact Mechanics,
-    2nd ed. (2006).
 """
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -16,14 +13,14 @@ from scipy.sparse import coo_matrix, csr_matrix
 from scipy.sparse.linalg import spsolve
 
 from rom.components.assumed_strain import kernels
-from rom.components.assumed_strain.actions import Actions, nodal, prepared
+from rom.components.assumed_strain.actions import Actions, Load, nodal, prepared
+from rom.components.assumed_strain.contact import touch
 from rom.components.assumed_strain.motion import Metal, depth_of, forces, mass, tangent
 from rom.components.assumed_strain.triangles import Sheet
 from rom.errors import ConfigError, SolverError
 from rom.model import Array, Index
 
 PENALTY_RATIO = 20.0  # stiffness of a face at a node, over Young's modulus times depth
-SHEAR_RATIO = 0.1  # stiffness along a face before a node slides, over that across
 RESIDUAL_RTOL = 1e-9  # of the forces that are in balance
 # a bar that bounces from a wall kept 0.96 and 0.98 of its energy at 0 and 0.5, and got 2.7 at 0.8
 MAX_RHO_OF_IMPACTS = 0.5
@@ -41,8 +38,8 @@ class Course:
         x: (k, n, 2) positions [m].
         v: (k, n, 2) velocities [m/s]; without inertia means of the last step.
         plastic: (k, t, p) accumulated plastic strain [1].
-        pushes: (k, tools, 2) forces of the tools on the sheet [N].
-        pulls: (k, n, 2) forces of supports and drives on their nodes [N].
+        tool_forces: (k, tools, 2) forces of the tools on the sheet [N].
+        reactions: (k, n, 2) forces of supports and drives on their nodes [N].
         history: (t, p, 5) of the end, as of `forces` [1].
         iterations: most of Newton's iterations in a step.
     """
@@ -51,8 +48,8 @@ class Course:
     x: Array
     v: Array
     plastic: Array
-    pushes: Array
-    pulls: Array
+    tool_forces: Array
+    reactions: Array
     history: Array
     iterations: int
 
@@ -68,8 +65,8 @@ class _Now:
     history: Array
     slip: Array
     balance: Array
-    push: Array
-    pull: Array
+    tool_forces: Array
+    reactions: Array
 
 
 def quasi_static(body: Sheet, metal: Metal, actions: Actions, times: npt.ArrayLike) -> Course:
@@ -87,6 +84,33 @@ def quasi_static(body: Sheet, metal: Metal, actions: Actions, times: npt.ArrayLi
         SolverError: if no equilibrium is found; ``error.solution`` holds the instants before.
     """
     return _Way(body, metal, actions, None, 0.0).run(times, np.zeros_like(body.points))
+
+
+def equilibrium(
+    body: Sheet, metal: Metal, load: Array, held: npt.ArrayLike, *, steps: int = 1
+) -> tuple[Array, Array, int]:
+    """Rest under dead loads, which grow in equal steps; `quasi_static` has all other actions.
+
+    Args:
+        body: the sheet.
+        metal: its material.
+        load: (n, 2) dead forces [N].
+        held: (k,) dof numbers that do not move.
+        steps: load steps.
+
+    Returns:
+        Positions (n, 2) [m], history as of `forces`, and the most Newton iterations of a step.
+
+    Raises:
+        ConfigError: if loads or held dofs do not fit, or without a step.
+        SolverError: if Newton's method does not find equilibrium, even in halves of a step;
+            ``error.solution`` holds the steps before.
+    """
+    if steps < 1:
+        raise ConfigError(f"{steps} load steps: one or more are needed.")
+    actions = Actions(held, loads=[Load(load, ((0, 1), (0, 1)))])
+    course = quasi_static(body, metal, actions, np.linspace(0, 1, steps + 1))
+    return course.x[-1], course.history, course.iterations
 
 
 def implicit_motion(
@@ -127,7 +151,7 @@ class _Trial:
     then: _Now
     whole: Array
     size: float
-    entries: list[Any]
+    entries: list[tuple[Index, Array]]
 
     def norm(self, free: Index) -> float:
         """Of the free ones [N]; infinite where something is not finite."""
@@ -190,8 +214,8 @@ class _Way:
             return np.array([getattr(now, name) for now in kept])
 
         return Course(
-            rows("t"), rows("x"), rows("v"), rows("history")[..., 4], rows("push"), rows("pull"),
-            kept[-1].history, self.most,
+            rows("t"), rows("x"), rows("v"), rows("history")[..., 4], rows("tool_forces"),
+            rows("reactions"), kept[-1].history, self.most,
         )  # fmt: skip
 
     def start(self, t: float, v: Array) -> _Now:
@@ -204,57 +228,32 @@ class _Way:
                    np.zeros((slip.shape[1], 2)), np.zeros_like(x))  # fmt: skip
         if self.M is None:
             return now
-        balance, now, _ = self.balance(now, x, t, None)
+        balance, now, _ = self.balance(now, x, t, [])
         a, v = np.zeros(n), v.copy()
         v.reshape(-1)[self.acts.driven] = 0.0
         a[self.free] = spsolve(self.M[self.free][:, self.free].tocsc(), balance[self.free])
         return replace(now, a=a.reshape(-1, 2), v=v, balance=balance)
 
     def balance(
-        self, now: _Now, x: Array, t: float, entries: list[Any] | None
+        self, now: _Now, x: Array, t: float, entries: list[tuple[Index, Array]]
     ) -> tuple[Array, _Now, float]:
         """Forces out of balance without inertia (2n,) [N], the state there, and their size."""
         body, acts = self.body, self.acts
         f, history = forces(body, self.metal, x, now.history)
         g = np.zeros_like(x)
         kernels.applied(x, acts.at(t), acts.forces, depth_of(body), g)
-        push = np.zeros_like(now.push)
+        tool_forces = np.zeros_like(now.tool_forces)
         slip, c = np.zeros_like(now.slip), np.zeros_like(x)
         for k in range(len(acts.friction)):
-            on, slip[:, k] = self.touch(now, x, t, k, entries)
-            push[k], c = on.sum(axis=0), c + on
+            place, mu = acts.places(t)[k], acts.friction[k]
+            moved = x - now.x - (place - acts.places(now.t)[k])
+            on = touch(x - place, moved, now.slip[:, k], acts.faces_of(k), mu, self.stiff)
+            entries.append(on.entries)
+            slip[:, k], tool_forces[k], c = on.slip, on.forces.sum(axis=0), c + on.forces
         size = float(np.linalg.norm(f) + np.linalg.norm(g) + np.linalg.norm(c))
         r = (g + c - f).ravel()
-        return r, replace(now, t=t, x=x, history=history, slip=slip, push=push, balance=r), size
-
-    def touch(
-        self, now: _Now, x: Array, t: float, k: int, entries: list[Any] | None
-    ) -> tuple[Array, Array]:
-        """Forces (n, 2) of a tool [N], the elastic slip (n,) [m]; stiffness goes to the entries."""
-        acts = self.acts
-        faces = acts.faces[acts.first[k] : acts.first[k + 1]]
-        place = acts.places(t)[k]
-        gaps = np.einsum("nfa,fa->nf", x[:, None] - place - faces[:, :2], faces[:, 4:6])
-        face, depth = gaps.argmax(axis=1), np.maximum(-gaps.max(axis=1), 0.0)
-        along, normal, inside = faces[face, 2:4], faces[face, 4:6], depth > 0
-        pressed = self.stiff * depth
-        moved = x - now.x - (place - acts.places(now.t)[k])
-        slip = np.where(inside, now.slip[:, k] + (moved * along).sum(axis=1), 0.0)
-        limit = np.where(inside, acts.friction[k], 0.0) * np.where(inside, pressed, 1.0)
-        hold = SHEAR_RATIO * self.stiff
-        shear = -hold * slip
-        slides = np.abs(shear) >= limit
-        shear = np.where(slides, np.sign(shear) * np.where(slides, limit, 0.0), shear)
-        if entries is not None:
-            i = np.flatnonzero(inside)
-            n, s, K = normal[i], along[i], self.stiff[i, None, None]
-            A = K * n[:, :, None] * n[:, None, :]
-            rough = np.where(slides[i], acts.friction[k] if np.isfinite(acts.friction[k]) else 0, 0)
-            held = np.where(slides[i], 0.0, SHEAR_RATIO)[:, None, None] * K
-            A = A + held * s[:, :, None] * s[:, None, :]
-            turn = (rough * np.sign(shear[i]))[:, None, None] * K
-            entries.append((i, A + turn * s[:, :, None] * n[:, None, :]))
-        return pressed[:, None] * normal + shear[:, None] * along, -shear / hold
+        then = replace(now, t=t, x=x, history=history, slip=slip, tool_forces=tool_forces)
+        return r, replace(then, balance=r), size
 
     def step(self, now: _Now, t: float) -> _Now | None:
         """State after a step, None where Newton's method fails."""
@@ -295,7 +294,7 @@ class _Way:
 
     def trial(self, now: _Now, x: Array, t: float) -> "_Trial":
         """Balance of forces at positions, with inertia."""
-        entries: list[Any] = []
+        entries: list[tuple[Index, Array]] = []
         with np.errstate(all="ignore"):
             r, then, size = self.balance(now, x, t, entries)
         whole = (1 - self.alpha_f) * r + self.alpha_f * now.balance
@@ -303,20 +302,20 @@ class _Way:
             return _Trial(then, whole, size, entries)
         dt = t - now.t
         a = (x - now.x - dt * now.v - dt * dt * (0.5 - self.beta) * now.a) / (self.beta * dt * dt)
-        pull = self.M @ ((1 - self.alpha_m) * a + self.alpha_m * now.a).ravel()
-        size += float(np.linalg.norm(pull))
-        return _Trial(replace(then, a=a), whole - pull, size, entries)
+        inertia = self.M @ ((1 - self.alpha_m) * a + self.alpha_m * now.a).ravel()
+        size += float(np.linalg.norm(inertia))
+        return _Trial(replace(then, a=a), whole - inertia, size, entries)
 
     def arrived(self, now: _Now, trial: "_Trial") -> _Now:
         """State at the end of a step, with what supports and drives give."""
-        then, driven, pull = trial.then, self.acts.driven, np.zeros(trial.whole.size)
-        pull[driven] = -then.balance[driven]
+        then, driven, reactions = trial.then, self.acts.driven, np.zeros(trial.whole.size)
+        reactions[driven] = -then.balance[driven]
         if self.M is None:
             v = (then.x - now.x) / (then.t - now.t)
-            return replace(then, v=v, pull=pull.reshape(-1, 2))
-        pull[driven] += (self.M @ then.a.ravel())[driven]
+            return replace(then, v=v, reactions=reactions.reshape(-1, 2))
+        reactions[driven] += (self.M @ then.a.ravel())[driven]
         v = now.v + (then.t - now.t) * ((1 - self.gamma) * now.a + self.gamma * then.a)
-        return replace(then, v=v, pull=pull.reshape(-1, 2))
+        return replace(then, v=v, reactions=reactions.reshape(-1, 2))
 
     def stiffness(self, now: _Now, trial: "_Trial") -> csr_matrix:
         """(2n, 2n) of solid, tools, sides that turn under their pressure, and inertia [N/m]."""

