@@ -125,8 +125,8 @@ class Flight:
         plastic: (k, t, p) accumulated plastic strain [1].
         work: energy that went from motion, loads and tools into the solid [J].
         steps: number of time steps; -1 of a motion that was lost.
-        tool_forces: (k, tools, 2) forces of the tools on the sheet, means since the picture before [N].
-        reactions: (k, n, 2) inner forces less loads and pressure: what supports and drives give [N].
+        tool_forces: (k, tools, 2) mean forces of the tools on the sheet since the last picture [N].
+        reactions: (k, n, 2) inner forces less loads: what supports and drives give [N].
     """
 
     t: Array

@@ -451,7 +451,7 @@ SMALL, SOFT = sheet(*distorted((2, 2))), Metal(1.0, 0.3)
         (lambda: fly(SMALL, SOFT, np.zeros((3, 2)), [0], 1.0), ConfigError, "velocities of the"),
         (lambda: fly(SMALL, SOFT, 0 * SMALL.points, [18], 1.0), ConfigError, "held dofs 18 to 18"),
         (lambda: fly(SMALL, SOFT, 0 * SMALL.points, [0], -1.0), ConfigError, "t_end = -1.0 s"),
-        (lambda: equilibrium(SMALL, SOFT, np.zeros(3), [0]), ConfigError, "forces of load 0 of the shape"),
+        (lambda: equilibrium(SMALL, SOFT, np.zeros(3), [0]), ConfigError, "forces of load 0"),
         (lambda: equilibrium(SMALL, SOFT, 0 * SMALL.points, [0], steps=0), ConfigError, "0 load"),
     ],
 )  # fmt: skip
