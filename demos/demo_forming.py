@@ -62,7 +62,8 @@ for friction, course in courses.items():
 
 # ## A punch
 #
-# Rough, flat and rigid, on metal that does not harden. Slip lines: (2 + pi) times its shear strength.
+# Rough, flat and rigid, on metal that does not harden. Slip lines: (2 + pi) times its
+# shear strength.
 
 
 def graded(n):
@@ -150,8 +151,8 @@ view.deformed(
     title="Metal between tools",
     caption="Left: pressure of a rough flat punch that has sunk by 1.5 % of its width; ordinary "
     "triangles lock and go on rising. Middle: the plastic wedge and fans below the punch. Right: "
-    "section of a block, 20 mm wide and 20 mm high, upset to 12 mm between platens; dashed: before. "
-    "Grey: tools.",
+    "section of a block, 20 mm wide and 20 mm high, upset to 12 mm between platens; dashed: "
+    "before. Grey: tools.",
 )  # fmt: skip
 view.flow(
     courses[0.15].t,
