@@ -23,9 +23,12 @@ from rom.components.assumed_strain import (
     tangent,
 )
 from rom.components.assumed_strain.actions import prepared
+from rom.components.assumed_strain.contact import touch
 from rom.components.assumed_strain.implicit import _Way
 from rom.errors import ConfigError, MeshError, SolverError
 
+SMALL, SOFT = sheet(*distorted((2, 2))), Metal(1.0, 0.3)
+FAR = [(5, 5), (9, 6), (5, 9)]  # a tool beside it, whose first face is tilted
 PLANE = 2 / np.sqrt(3)  # yield in plane strain over that of a bar
 
 
@@ -195,6 +198,43 @@ def test_a_tool_that_drags_gives_coulombs_force():
     assert held.tool_forces[-1, 0, 0] > 3 * along[-1]
 
 
+TILTED = Tool("tilted", FAR)
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.3, np.inf])
+def test_the_stiffness_of_a_tool_is_the_derivative_of_its_forces(friction):
+    """Nodes that slide either way, that hold, and one outside, against a tilted face."""
+    faces = prepared(SMALL, Actions(tools=[TILTED])).faces_of(0)
+    x = np.array([[6.0, 5.3], [7.0, 5.55], [8.0, 5.8], [7.0, 5.2]])
+    moved, slip = np.array([[0.5, 0.1], [-0.5, 0.0], [1e-4, 0.0], [0.1, 0.0]]), np.zeros(4)
+    stiff = np.array([2.0, 3.0, 4.0, 5.0])
+
+    def forces(step):
+        return touch(x + step, moved + step, slip, faces, friction, stiff)
+
+    nodes, A = forces(0.0 * x).entries
+    assert nodes.tolist() == [0, 1, 2] and not forces(0.0 * x).forces[3].any()
+    for axis in range(2):
+        step = 1e-7 * np.eye(2)[axis]
+        change = (forces(step).forces - forces(-step).forces) / 2e-7
+        assert_allclose(-A[:, :, axis], change[:3], atol=1e-6)
+
+
+def test_a_node_that_holds_remembers_how_far_it_was_dragged():
+    """Two small steps along a face give the force of one of both; sliding forgets the excess."""
+    faces = prepared(SMALL, Actions(tools=[TILTED])).faces_of(0)
+    x, stiff = np.array([[7.0, 5.55]]), np.array([3.0])
+    step = 0.002 * faces[:1, 2:4]
+    one = touch(x, step, np.zeros(1), faces, 0.3, stiff)
+    two = touch(x, step, one.slip, faces, 0.3, stiff)
+    assert_allclose(two.forces, touch(x, 2 * step, np.zeros(1), faces, 0.3, stiff).forces)
+    assert np.abs(two.forces - one.forces).max() > 1e-5
+    far = touch(x, 1e3 * step, np.zeros(1), faces, 0.3, stiff)
+    along, across = far.forces[0] @ faces[0, 2:4], far.forces[0] @ faces[0, 4:6]
+    assert along == pytest.approx(-0.3 * across) and across > 0
+    assert_allclose(touch(x, 0 * step, far.slip, faces, 0.3, stiff).forces, far.forces)
+
+
 BAR = Metal(100.0, 0.0, 1.0)  # waves of 10 m/s
 
 
@@ -291,7 +331,6 @@ def test_taylors_bar_against_a_tool_is_that_of_held_nodes():
     assert feet[np.inf][0] < 0.9 * feet[0.0][0]
 
 
-SMALL, SOFT = sheet(*distorted((2, 2))), Metal(1.0, 0.3)
 ABOVE = box((-1, 1), (2, 2))
 
 
