@@ -143,7 +143,7 @@ CASES = [  # what fails, the numbers it leaves, how many instants or states at l
     (stuck_rod, lambda found: found.x, 7),
     (lost_rod, lambda found: found.t, 1),
     (finger, lambda found: found.tip, 3),
-    (crushed, lambda found: found[0], 9),
+    (crushed, lambda found: found.x[-1], 9),
     (flown, lambda found: found.x, 2),
     (stone, lambda found: found.q, 3),
     (rock, lambda found: found.z, 2),
