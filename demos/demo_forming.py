@@ -21,7 +21,7 @@ from rom.components.assumed_strain import (
     rectangle,
     sheet,
 )
-from rom.fe.mesh.read import read_triangles
+from rom.fe import mesh as meshing
 
 options = argparse.ArgumentParser(description="metal between tools")
 options.add_argument("--out", type=Path, default=Path("out"), help="folder, made if missing")
@@ -35,7 +35,9 @@ MESHES = Path(__file__).resolve().parent.parent / "meshes"
 # A quarter of the section, in plane strain. The platen comes down by four of ten millimetres; its
 # friction holds the metal back, so that the block bulges and its side folds against the platen.
 
-mesh = read_triangles(MESHES / "billet.geo", parameters={"lc": 0.9, "radius": 0.5}, scale=1e-3)
+mesh = meshing.read_triangles(
+    MESHES / "billet.geo", parameters={"lc": 0.9, "radius": 0.5}, scale=1e-3
+)
 billet = sheet(mesh.points, mesh.triangles, element="F1", state="plane strain")
 steel = Metal(200e9, 0.3, 7850.0, yield_stress=500e6, hardening=300e6)
 held = np.r_[2 * mesh.nodes("axis"), 2 * mesh.nodes("middle") + 1]

@@ -65,9 +65,9 @@ def certified(
         here = connect(ops, affine.model_at(point), interfaces)
         found: list[Row] = []
         parts = condensed_model(here, own) if affine.stretch is None else None
-        matrices = basis_matrices(here.ops, basis)
+        matrices = basis_matrices(here.ops, basis) if parts else None
         for fixed in _supports(here):
-            if parts:
+            if parts and matrices:
                 support = full_support(here, parts, fixed)
                 table = compared(here, ops, body, (basis, parts, matrices), fixed, support)
             else:
