@@ -24,7 +24,7 @@ parser = argparse.ArgumentParser(description="a gear housing on a coarse and on 
 parser.add_argument("--out", type=Path, default=Path("out"), help="folder, made if missing")
 parser.add_argument("--lc", type=float, nargs=2, default=(0.016, 0.012), help="element sizes [m]")
 parser.add_argument("--million", action="store_true", help="a million dofs; 16 GB and some minutes")
-parser.add_argument("--solver", default="direct", help="of the fine mesh, see rom.fe.model")
+parser.add_argument("--solver", default="auto", help="of the fine mesh, see rom.fe.model")
 parser.add_argument("-q", "--quiet", action="store_true", help="no tables")
 options = parser.parse_args()
 comm = MPI.COMM_WORLD

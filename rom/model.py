@@ -220,11 +220,13 @@ class Basis:
             under mpirun the rows of this rank.
         omega: (m,) circular frequencies [rad/s] of the last m columns, ascending.
         labels: (r,) what each column is, e.g. "constraint 12" or "fixed-interface 3".
+        held: the body with its boundary held, factored, of methods that have needed it.
     """
 
     Psi: Array
     omega: Array
     labels: tuple[str, ...]
+    held: Any = field(default=None, repr=False, compare=False)
 
     def __repr__(self) -> str:
         n, r = self.Psi.shape

@@ -131,7 +131,7 @@ def modes(
         InterfaceError: if an interface is unknown, or has no such coordinates; naming the motion
             that supports leave to the whole body.
         ConfigError: if not one of n and f_max is given, or it is not positive.
-        ModesMissedError: if the inertia count says that a mode was skipped.
+        ModesMissedError: if a count says that a mode was skipped.
         ParallelError: with f_max under mpirun.
 
     Example:
@@ -230,7 +230,8 @@ def reduce(  # noqa: PLR0913  one keyword per choice
         stress: make the stress on the outer surface recoverable, ``body.stress``.
         stiffening: give the body the geometric stiffness of centrifugal force and of loads on its
             interfaces, ``body.K_geo``: fast rotation and tension then stiffen it.
-        certify: compare with the full model; costs one more factorisation per support.
+        certify: compare with the full model; costs a search for its modes in each support, with
+            the factor of the reduction where interfaces were held for that.
 
     On a terminal a line says how far the reduction of a large model is; not under ``-q``, and not
     where the logger "rom" is set to errors.
@@ -243,7 +244,7 @@ def reduce(  # noqa: PLR0913  one keyword per choice
 
     Raises:
         InterfaceError, ConfigError: for a wrong interface, kind, method or reference.
-        ModesMissedError: if the inertia count says that a mode was skipped.
+        ModesMissedError: if a count says that a mode was skipped.
         ModelError: if the basis misses a rigid motion or has columns that depend on each other.
         SolverError: if no order of ``Polynomial()`` is accurate enough.
 

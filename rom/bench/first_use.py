@@ -115,8 +115,12 @@ def _rod() -> None:
 
 
 def _wind() -> None:
+    from rom.components.wind.blading import blading, rotor_load
+    from rom.components.wind.operation import operate
     from rom.components.wind.whole_turbine import turbine
 
+    rotor_load(blading(), 8.0, 1.0, n_azimuths=3)
+    operate(lambda t: 8.0, 0.1)
     _move(turbine(2, tower_segments=0, wind=8.0).mechanism)
 
 

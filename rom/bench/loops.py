@@ -10,7 +10,7 @@ from rom.components.assumed_strain import Flight, Metal, fly, rectangle, sheet
 from rom.components.linkages.dynamic_isotropy import angle_grid, isotropy_index
 from rom.components.linkages.two_dof_linkages import FiveBar, rod
 from rom.components.masonry.limits import arch
-from rom.components.masonry.stones import Motion, simulate
+from rom.components.masonry.motion import Motion, simulate
 
 COPPER = Metal(117e9, 0.35, 8930.0, yield_stress=400e6, hardening=100e6)
 BAR_LENGTH, BAR_RADIUS, IMPACT_SPEED = 32.4e-3, 3.2e-3, 227.0  # of Taylor's bar [m, m, m/s]

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rom.eigen.verbs import Operators
+from rom.eigen.verbs import Operators, column_blocks
 from rom.model import Array
 
 
@@ -53,10 +53,12 @@ def inertia_integrals(ops: Operators, points: Array, Psi: Array) -> InertiaInteg
         Psi: (n_local, r) shapes.
     """
     fields = np.column_stack([np.ones(ops.n_local), points.reshape(-1), Psi])
-    weighted = ops.apply_M(fields)
     n, k = fields.shape[0] // 3, fields.shape[1]
-    S = ops.gram(fields.reshape(n, 3 * k), weighted.reshape(n, 3 * k))
-    return _split(S.reshape(3, k, 3, k))
+    S = np.empty((3, k, 3, k))
+    for some in column_blocks(k):
+        weighted = ops.apply_M(fields[:, some]).reshape(n, -1)
+        S[..., some] = ops.gram(fields.reshape(n, 3 * k), weighted).reshape(3, k, 3, -1)
+    return _split(S)
 
 
 def point_integrals(points: Array, masses: Array, shapes: Array) -> InertiaIntegrals:

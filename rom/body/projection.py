@@ -20,6 +20,7 @@ from rom.eigen.verbs import (
     given_rigid_motions,
     mean_motion,
     orthonormal,
+    quadratic,
     rigid_motions,
 )
 from rom.errors import ConfigError, ModelError
@@ -53,8 +54,7 @@ def elastic_part(ops: Operators, Psi: Array) -> Elastic:
         ModelError: if a rigid motion is not in the span, the columns are dependent, or the body
             freed of its supports would buckle under its own stress.
     """
-    MPsi = ops.apply_M(Psi)
-    M, K = ops.gram(Psi, MPsi), ops.gram(Psi, ops.apply_K(Psi))
+    M, K = quadratic(ops, ops.apply_M, Psi), quadratic(ops, ops.apply_K, Psi)
     scale = 1 / np.sqrt(np.diag(M))
     M, K = _scaled(M, scale), _scaled(K, scale)
     if np.linalg.eigvalsh(M)[0] < 1e-13:
@@ -63,7 +63,7 @@ def elastic_part(ops: Operators, Psi: Array) -> Elastic:
             hint="Ask for fewer modes, or remove an interface that repeats another.",
         )
     R = orthonormal(ops, given_rigid_motions(ops))
-    B = np.linalg.solve(M, scale[:, None] * ops.gram(MPsi, R))
+    B = np.linalg.solve(M, scale[:, None] * ops.gram(Psi, ops.apply_M(R)))
     gap = R - Psi @ (scale[:, None] * B)
     residual = float(np.sqrt(np.diag(ops.gram(gap, ops.apply_M(gap))).max()))
     if residual > RIGID_RESIDUAL:
@@ -140,7 +140,7 @@ def canonical_columns(ops: Operators, E: Array, model: FEModel) -> Array:
     weight = np.column_stack(
         [1.0 + a + 0.7 * b**2 - c**3, 0.9 - b + 0.8 * c**2 + a**3, 0.8 + c - 0.6 * a**2 + b**3]
     )
-    sign = np.sign(ops.gram(weight.reshape(-1, 1), ops.apply_M(E)))[0]
+    sign = np.sign(ops.gram(ops.apply_M(weight.reshape(-1, 1)), E))[0]
     return E * np.where(sign == 0, 1.0, sign)
 
 
@@ -166,7 +166,7 @@ def _patch(interface: Interface, tie: Any) -> Patch | None:
     """The surface, if its coordinates let it deform; an averaged one keeps dofs of its own."""
     if tie.label in ("rbe2", "rbe3"):
         return None
-    shapes = tie.by_masters if tie.removed.size else None
+    shapes = csr_matrix(tie.by_masters).toarray() if tie.removed.size else None
     return Patch(interface.points, csr_matrix(interface.surface_mass), shapes)
 
 

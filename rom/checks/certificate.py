@@ -8,9 +8,12 @@ from scipy.linalg import eigh, null_space
 from rom.body.flexible import FlexibleBody
 from rom.body.projection import Elastic
 from rom.body.reference import rigid_mass
-from rom.eigen.verbs import Held, Operators, given_rigid_motions, mac, residual_errors
+from rom.eigen.condensed import Condensed, condensed
+from rom.eigen.verbs import Operators, given_rigid_motions, mac, quadratic, residual_errors
+from rom.errors import InterfaceError
 from rom.model import Array, Basis, Report, Row
 from rom.process.progress import MANY_DOFS, stages
+from rom.reduction.bases.fixed_interface import constraint_modes
 from rom.reduction.interfaces.records import Connection
 from rom.rows import FREQUENCY_RTOL, N_COMPARED, frequency_rows, row
 
@@ -20,6 +23,7 @@ ASYMMETRY_RTOL = 1e-6
 MIN_JUDGED_ERROR = 1e-6  # frequency error above which the estimate is compared with it
 MAX_ERROR_RATIO = 2.0  # frequency error over its estimate
 ROUND_OFF = 1e-9  # Rayleigh quotient, of the largest one of a basis, that is none
+STATIC_RTOL = 1e-6  # of the largest stiffness: what keeps a shape from being a constraint mode
 CLUSTER_RTOL = 1e-3  # relative distance of modes that are compared as one subspace
 
 
@@ -42,20 +46,21 @@ def certify_body(
     """
     rows: list[Row] = []
     comparison = {}
+    matrices = basis_matrices(connection.ops, basis)
     statics = body.has_static_shapes
     supports: list[tuple[str, ...]] = [(), *((name,) for name in connection.parts if statics)]
     constrained = basis.labels[: len(connection.labels)] == connection.labels
-    inner = connection.ops.hold(connection.boundary) if statics and constrained else None
+    parts = condensed_model(connection, basis) if statics and constrained else None
     static: list[Row] = []
     with stages(len(supports), long=ops.n > MANY_DOFS) as begin:
         for fixed in supports:
             support = " + ".join(fixed) + " held" if fixed else "free"
             begin(f"compare with the full model, {support}")
-            held = None
+            held = full_support(connection, parts, fixed)
             if fixed == tuple(connection.parts)[:1] and len(connection.parts) > 1:
-                held = connection.ops.hold(connection.held(fixed))  # once, for loads and modes
+                held = connection.ops.hold(held) if isinstance(held, np.ndarray) else held
                 static = _static_row(connection, body, held)
-            table = compared(connection, ops, body, (basis, inner), fixed, held)
+            table = compared(connection, ops, body, (basis, parts, matrices), fixed, held)
             if table["reduced"]:
                 comparison[support] = table
     if not connection.ops.affordable:
@@ -65,7 +70,7 @@ def certify_body(
         rows += _estimate_rows(support, table)
     rows += static
     rows += rigid_rows(ops, body, elastic)
-    rows += _matrix_rows(connection, basis, body)
+    rows += _matrix_rows(connection, basis, body, matrices)
     rows += _effective_mass(body, tuple(connection.parts)) if statics else []
     return Report(f"certificate of {body.name}", tuple(rows)), comparison
 
@@ -74,13 +79,20 @@ def compared(
     connection: Connection,
     ops: Operators,
     body: FlexibleBody,
-    reduction: tuple[Basis, Held | None],
+    reduction: tuple[Basis, Condensed | None, tuple[Array, Array]],
     fixed: tuple[str, ...],
-    held: Held | None = None,
+    support: Any,
 ) -> dict[str, list[float]]:
     """Frequencies of both models in one support, their errors, and the agreement of shapes.
 
-    The full model may be ``held`` there already; its factor is used up.
+    Args:
+        connection: the full model in interface coordinates.
+        ops: the full model in nodal dofs.
+        body: the reduced body.
+        reduction: its basis, the full model condensed to the interfaces where that is known, and
+            stiffness and mass of the basis.
+        fixed: interfaces that are held.
+        support: the same as `full_support` has it for the full model.
     """
     omega_r = body.modes(fixed=fixed)[0]
     n_rigid = int(np.count_nonzero(omega_r == 0.0))
@@ -89,15 +101,14 @@ def compared(
     if n <= 0 or n_rigid not in (0, 6):
         return table
     # the reduced shapes again, as combinations of the columns of the basis
-    basis, inner = reduction
-    shapes = reduced_shapes(connection, basis, fixed, n + n_rigid)
+    basis, parts, matrices = reduction
+    shapes = reduced_shapes(connection, basis, fixed, n + n_rigid, matrices)
     table["reduced"] = (omega_r[n_rigid : n_rigid + n] / (2 * np.pi)).tolist()
-    if inner and not any(label.startswith("enhanced") for label in basis.labels):
+    if parts and not any(label.startswith("enhanced") for label in basis.labels):
         # constraint modes leave no residual on interfaces: one inverse serves every support
-        found = residual_errors(connection.ops, inner, shapes[:, n_rigid:])
+        found = residual_errors(connection.ops, parts.held, shapes[:, n_rigid:])
         table["estimated"] = found.tolist()
     if connection.ops.affordable:
-        support = connection.held(fixed) if held is None else held
         omega, Phi = connection.ops.modes(support, n + n_rigid, finished=True)
         omega, Phi = omega[n_rigid:], connection.ops.expand(Phi[:, n_rigid:])
         agreement = mac(ops, Phi, connection.ops.expand(shapes))
@@ -106,16 +117,60 @@ def compared(
     return table
 
 
-def reduced_shapes(connection: Connection, basis: Basis, fixed: tuple[str, ...], n: int) -> Array:
-    """(n_local, n) shapes of the reduced model, computed from the basis and not from the body."""
+def condensed_model(connection: Connection, basis: Basis) -> Condensed:
+    """The full model condensed to its interfaces, with what the reduction has found if it fits.
+
+    It fits where the first columns of the basis are constraint modes of this very model.
+    """
+    ops, boundary = connection.ops, connection.boundary
+    held = basis.held if basis.held is not None else ops.hold(boundary)
+    Psi = basis.Psi[:, : boundary.size]
+    parts = condensed(ops, held, boundary, Psi)
+    forces = ops.rows(ops.apply_K(Psi), boundary)
+    if np.abs(parts.S - forces).max() > STATIC_RTOL * np.abs(parts.S).max():
+        parts = condensed(ops, held, boundary, constraint_modes(ops, held, boundary))
+    return parts
+
+
+def basis_matrices(ops: Operators, basis: Basis) -> tuple[Array, Array]:
+    """(r, r) stiffness and mass of the basis as they come, not made symmetric."""
+    return quadratic(ops, ops.apply_K, basis.Psi), quadratic(ops, ops.apply_M, basis.Psi)
+
+
+def full_support(connection: Connection, parts: Condensed | None, fixed: tuple[str, ...]) -> Any:
+    """The full model in one support: dof numbers, or what solves for it without a new factor."""
+    dofs = connection.held(fixed)
+    try:
+        return dofs if parts is None else parts.support(dofs)
+    except InterfaceError:  # a motion without stiffness, which the whole body names better
+        return dofs
+
+
+def reduced_shapes(
+    connection: Connection,
+    basis: Basis,
+    fixed: tuple[str, ...],
+    n: int,
+    matrices: tuple[Array, Array] | None = None,
+) -> Array:
+    """(n_local, n) shapes of the reduced model, computed from the basis and not from the body.
+
+    Args:
+        connection: the full model in interface coordinates.
+        basis: whose shapes.
+        fixed: interfaces that are held.
+        n: number of shapes.
+        matrices: stiffness and mass of the basis, where they are known.
+    """
     ops = connection.ops
+    K, M = matrices or basis_matrices(ops, basis)
     if basis.labels[: len(connection.labels)] == connection.labels:
         keep = np.setdiff1d(np.arange(basis.Psi.shape[1]), connection.held_parts(fixed))
-        Psi = basis.Psi[:, keep]
+        Psi, K, M = basis.Psi[:, keep], K[np.ix_(keep, keep)], M[np.ix_(keep, keep)]
     else:  # modes alone: the combinations that keep the supports still
         rows = ops.rows(basis.Psi, connection.held(fixed))
-        Psi = basis.Psi @ null_space(rows, rcond=1e-10) if len(rows) else basis.Psi
-    K, M = ops.gram(Psi, ops.apply_K(Psi)), ops.gram(Psi, ops.apply_M(Psi))
+        N = null_space(rows, rcond=1e-10) if len(rows) else np.eye(basis.Psi.shape[1])
+        Psi, K, M = basis.Psi @ N, N.T @ K @ N, N.T @ M @ N
     scale = 1 / np.sqrt(np.diag(M))
     K, M = (scale[:, None] * (A + A.T) * (0.5 * scale) for A in (K, M))
     _, V = eigh(K, M, subset_by_index=(0, n - 1))
@@ -149,7 +204,7 @@ def _estimate_rows(support: str, table: dict[str, list[float]]) -> list[Row]:
     return [worst, row(f"{support}: largest error over its estimate", ratio, MAX_ERROR_RATIO)]
 
 
-def _static_row(connection: Connection, body: FlexibleBody, held: Held) -> list[Row]:
+def _static_row(connection: Connection, body: FlexibleBody, held: Any) -> list[Row]:
     """Deflection under unit loads on the other interfaces, the first one held; exact for CB."""
     names = tuple(connection.parts)
     ops, first = connection.ops, names[0]
@@ -192,10 +247,10 @@ def rigid_rows(ops: Operators, body: FlexibleBody, elastic: Elastic) -> list[Row
     ]
 
 
-def _matrix_rows(connection: Connection, basis: Basis, body: FlexibleBody) -> list[Row]:
-    ops = connection.ops
-    M = ops.gram(basis.Psi, ops.apply_M(basis.Psi))
-    K = ops.gram(basis.Psi, ops.apply_K(basis.Psi))
+def _matrix_rows(
+    connection: Connection, basis: Basis, body: FlexibleBody, matrices: tuple[Array, Array]
+) -> list[Row]:
+    K, M = matrices
     quotient = np.diag(K) / np.diag(M)
     stiff = quotient > ROUND_OFF * quotient.max()  # a rigid column has no stiffness of its own
     asymmetry = max(_asymmetry(K[stiff][:, stiff]), _asymmetry(M))

@@ -16,7 +16,7 @@ GEOMETRY_OPTIONS: dict[str, Any] = {  # options of a geometry, and what they are
     "nu": None,
     "rho": None,
     "degree": 2,
-    "solver": "direct",
+    "solver": "auto",
     "parameter": [],
     "face": [],
     "scale": 1.0,

@@ -172,9 +172,9 @@ def add_material(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--solver",
-        default="direct",
-        help="direct (default), low-rank, out-of-core, low-rank+out-of-core, or iterative for "
-        "meshes whose factor does not fit",
+        default="auto",
+        help="auto (default: direct where its factor fits, else out-of-core, else iterative), "
+        "direct, low-rank, out-of-core, low-rank+out-of-core, iterative",
     )
 
 

@@ -102,7 +102,7 @@ TABLE = Table("A component.", (
         Key("degree", Whole(1, 3), "Degree of the displacement.", 2),
         Key("order", Whole(1, 2), "Degree of the cells' edges: 1 straight, 2 curved; 2 where the "
             "geometry is curved if missing."),
-        Key("solver", Text(), "How equations are solved, as `rom reduce --solver`.", "direct"),
+        Key("solver", Text(), "How equations are solved, as `rom reduce --solver`.", "auto"),
         Key("parameters", Named(Anything("number or text"), "parameters"),
             "Parameters of the geometry. A plain number goes there as it is; a length with its "
             "unit is converted to that of the geometry (`.step`: to metres), another quantity "

@@ -62,7 +62,7 @@ def cyclic_modes(sector: CyclicSector, diameter: int, n: int, *, speed: float = 
         ConfigError: if the wheel cannot have the diameters or the modes, or has no matrices of
             rotation.
         ModelError: if rotation leaves no stiffness.
-        ModesMissedError: if the inertia count says that a mode was skipped.
+        ModesMissedError: if a count says that a mode was skipped.
 
     Source:
         Thomas, Dynamics of rotationally periodic structures, Int. J. Numer. Meth. Engng. 14 (1979).

@@ -1,8 +1,9 @@
 """Eigenvalue problems, written on verbs of operators.
 
 `verbs` are what reductions need of K and M, `scipy` does them with SciPy on one process,
-`substructuring` finds all modes up to a frequency, on `fronts` of a tree that `dissection` cuts;
-`attachments` adds masses and springs at nodes, `supports` says what is held.
+`condensed` solves in every support with one factor, `completeness` says how surely no mode was
+missed, `substructuring` finds all modes up to a frequency, on `fronts` of a tree that `dissection`
+cuts, `attachments` adds masses and springs at nodes, `supports` says what is held.
 """
 
 from rom.lazy import front

@@ -9,6 +9,7 @@ from scipy.sparse import csc_matrix, csr_matrix
 from scipy.sparse.linalg import LinearOperator, SuperLU, eigsh, splu
 
 from rom.arguments import matrix
+from rom.eigen.condensed import Supported
 from rom.eigen.verbs import Weighted, canonical_signs, count_shift, orthonormal
 from rom.errors import (
     ConfigError,
@@ -134,7 +135,7 @@ class SciPyOperators:
 
     def modes(
         self,
-        held: npt.ArrayLike | HeldSciPy,
+        held: npt.ArrayLike | HeldSciPy | Supported,
         m: int,
         sigma: float | None = None,
         *,
@@ -142,7 +143,7 @@ class SciPyOperators:
     ) -> tuple[Array, Array]:
         """Lowest m modes, mass-normalised: omega (m,) [rad/s] and Phi (n, m)."""
         if not isinstance(held, HeldSciPy):
-            held_dofs = dof_set(held, self.n)
+            held_dofs = dof_set(held.dofs if isinstance(held, Supported) else held, self.n)
             if held_dofs.size == 0:
                 return self._free_modes(m, sigma)
             held = HeldSciPy(self.K, self.M, held_dofs)

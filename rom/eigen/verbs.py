@@ -19,6 +19,7 @@ Weighted = tuple[float, list[tuple[float, Any]]]
 CLUSTER_RTOL = 1e-5  # relative distance of eigenvalues that belong to one space
 DEPENDENT_RTOL = 1e-9  # share of a column that is new, below which it is dropped
 CANCELLING_RATIO = 0.7  # length after over before a projection that may have left a part of it
+COLUMNS_AT_ONCE = 32  # as many as factors solve for together
 ON_A_LINE = 1e-12  # smallest over largest moment of a surface that counts as a line
 
 
@@ -102,7 +103,7 @@ class Operators(Protocol):
         with omega exactly zero.
 
         Args:
-            held: (k,) dof numbers, or what `hold` returned.
+            held: (k,) dof numbers, what `hold` returned, or a support of a condensed body.
             m: number of modes.
             sigma: shift [rad^2/s^2]; chosen from the model when not given.
             finished: nobody else will use the factor.
@@ -112,7 +113,7 @@ class Operators(Protocol):
             positive [kg^-1/2].
 
         Raises:
-            ModesMissedError: if the inertia count says a mode was skipped.
+            ModesMissedError: if an inertia count says a mode was skipped.
         """
 
     def transform(self, T: Any, rigid: Array) -> "Operators":
@@ -224,6 +225,30 @@ def whole_clusters(lam: Array, m: int) -> int:
     while m < lam.size and lam[m] - lam[m - 1] <= CLUSTER_RTOL * lam[m]:
         m += 1
     return m
+
+
+def column_blocks(n: int) -> list[slice]:
+    """Slices of n columns, few at a time: products of all of them at once would be copies."""
+    return [slice(first, min(first + COLUMNS_AT_ONCE, n)) for first in range(0, n, COLUMNS_AT_ONCE)]
+
+
+def quadratic(ops: Operators, apply: Callable[[Array], Array], X: Array) -> Array:
+    """(k, k) X^T A X summed over the ranks, in units of A times those of X squared.
+
+    Args:
+        ops: sum over the ranks.
+        apply: (n_local, l) -> (n_local, l), the product with A, taken of few columns at a time.
+        X: (n_local, k) columns.
+    """
+    return np.hstack([ops.gram(X, apply(X[:, some])) for some in column_blocks(X.shape[1])])
+
+
+def unit_motions(ops: Operators, boundary: Index) -> Array:
+    """(n_local, n_b) columns of the identity: one boundary dof moved, everything else at rest."""
+    E = np.zeros((ops.n_local, boundary.size))
+    mine = (boundary >= ops.first) & (boundary < ops.first + ops.n_local)
+    E[boundary[mine] - ops.first, np.flatnonzero(mine)] = 1.0
+    return E
 
 
 def orthonormal(ops: Mass, X: Array) -> Array:

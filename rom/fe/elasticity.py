@@ -1,5 +1,6 @@
 """Stiffness and mass of a three-dimensional elastic body on a dolfinx mesh."""
 
+import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -23,12 +24,14 @@ from rom.fe.mesh.cad import Axis
 from rom.fe.mesh.curving import without_middles
 from rom.fe.mesh.solid import SolidMesh
 from rom.fe.operators.aij import symmetric, wrapped
+from rom.fe.operators.foreseen import automatic
 from rom.fe.operators.memory import give_back
 from rom.fe.operators.petsc import PETScOperators
-from rom.fe.operators.solver import parsed
+from rom.fe.operators.solver import DIRECT_SOLVER, parsed
 from rom.fe.parallel import collective, install_abort_hook, on_root
 from rom.model import Array, Attachment, FEModel, Index, Interface, Material, Orthotropic
 
+log = logging.getLogger("rom")
 WHOLE_REGION = "solid"  # name of the only region of a mesh without named regions
 DEGREES = (1, 2, 3)
 
@@ -41,7 +44,7 @@ def model(
     degree: int = 2,
     parameters: dict[str, float] | None = None,
     attachments: Sequence[Attachment] = (),
-    solver: str = "direct",
+    solver: str = "auto",
     comm: MPI.Comm = MPI.COMM_WORLD,
     **mesh_options: Any,
 ) -> FEModel:
@@ -54,10 +57,12 @@ def model(
         degree: polynomial degree of the displacement, 1 to 3; 2 unless you know better.
         parameters: {name: value} of the geometry's parameters, in the units of the geometry.
         attachments: point masses and rigid bodies carried by interfaces.
-        solver: how equations are solved. "direct": a MUMPS factor, the fastest when it fits;
-            "low-rank" or "low-rank:1e-8": the same with compressed blocks; "out-of-core": the
-            factor on disk; "low-rank+out-of-core"; "iterative": multigrid, with little memory
-            and without the count that proves no mode missed.
+        solver: how equations are solved. "auto": the first of "direct", "out-of-core" and
+            "iterative" that fits into memory, named in ``provenance["solver"]``; "direct": a
+            MUMPS factor, the fastest when it fits; "low-rank" or "low-rank:1e-8": the same with
+            compressed blocks; "out-of-core": the factor on disk; "low-rank+out-of-core";
+            "iterative": multigrid, with little memory and without the count that proves no mode
+            missed.
         comm: the ranks that share the model.
         mesh_options: ``scale``, ``faces``, ``order``, ``trust``, ``time_limit`` and
             ``memory_limit`` of `rom.fe.mesh.read.read_mesh`. Cells are curved where the geometry
@@ -72,7 +77,8 @@ def model(
             an unknown solver.
         UnsafeFileError: for a geometry that would do more than make a mesh, or is Python without
             ``trust``.
-        ResourceError: if meshing exceeds its limit of time or memory.
+        ResourceError: if meshing exceeds its limit of time or memory, or no way to solve would
+            fit.
         MaterialError: if a region has no material or a material no region.
         InterfaceError: if an interface is empty or an attachment hangs on none.
 
@@ -108,10 +114,13 @@ def model(
         attachments=attachments,
     )
     remarks = [*warnings, *made.provenance["warnings"]]
-    provenance = origin | made.provenance | {"warnings": remarks}
+    how, why = automatic(made.operators) if method.automatic else (method, solver)
+    if comm.rank == 0 and how != DIRECT_SOLVER and method.automatic:
+        log.info("solved %s", why)
+    provenance = origin | made.provenance | {"warnings": remarks, "solver": why}
     return replace(
         made,
-        operators=made.operators.solved_by(method),
+        operators=made.operators.solved_by(how),
         provenance=provenance,
         interfaces={key: _on_axis(x, axes.get(key)) for key, x in made.interfaces.items()},
     )

@@ -7,7 +7,14 @@ import numpy as np
 
 from rom.body.flexible import FlexibleBody
 from rom.body.projection import elastic_part
-from rom.checks.certificate import compared, reduced_shapes, rigid_rows
+from rom.checks.certificate import (
+    basis_matrices,
+    compared,
+    condensed_model,
+    full_support,
+    reduced_shapes,
+    rigid_rows,
+)
 from rom.eigen.verbs import residual_errors
 from rom.model import Basis, Report, Row
 from rom.parametric.affine import AffineModel
@@ -51,26 +58,28 @@ def certified(
     """Bodies of a family against full models, at points that were not sampled."""
     rows: list[Row] = []
     comparison: dict[str, Any] = {}
-    Psi = connection.ops.expand(basis.Psi)
+    Psi, own = connection.ops.expand(basis.Psi), replace(basis, held=None)  # of another point
     for point in scattered(affine.parameters, HELD_OUT, first):
         where = ", ".join(f"{name} = {value:.4g}" for name, value in point.items())
         ops, body = affine.at(point), family.at(extrapolate=False, **point)
         here = connect(ops, affine.model_at(point), interfaces)
         found: list[Row] = []
+        parts = condensed_model(here, own) if affine.stretch is None else None
+        matrices = basis_matrices(here.ops, basis)
         for fixed in _supports(here):
-            if affine.stretch is None:
-                inner = here.ops.hold(here.boundary)
-                table = compared(here, ops, body, (basis, inner), fixed)
+            if parts:
+                support = full_support(here, parts, fixed)
+                table = compared(here, ops, body, (basis, parts, matrices), fixed, support)
             else:
                 table = _frequencies(here, body, fixed)
             if not table["reduced"]:
                 continue
-            support = " + ".join(fixed) + " held" if fixed else "free"
-            comparison[f"{where}: {support}"] = table
+            words = " + ".join(fixed) + " held" if fixed else "free"
+            comparison[f"{where}: {words}"] = table
             if table["full"]:
-                found += frequency_rows(support, table, tol)
+                found += frequency_rows(words, table, tol)
             elif table["estimated"]:
-                label = f"{support}: estimated error of {len(table['reduced'])} frequencies"
+                label = f"{words}: estimated error of {len(table['reduced'])} frequencies"
                 found.append(row(label, max(table["estimated"]), tol))
         found += rigid_rows(ops, body, elastic_part(ops, Psi))
         rows += [replace(line, quantity=f"{where}: {line.quantity}") for line in found]

@@ -79,7 +79,7 @@ def reduce_parametric(  # noqa: PLR0913  one keyword per choice
     Raises:
         ParameterError: for a wrong parameter or an unknown region.
         InterfaceError, ConfigError: for a wrong interface, kind, method, reference or tolerance.
-        ModesMissedError: if the inertia count says that a mode was skipped.
+        ModesMissedError: if a count says that a mode was skipped.
         ModelError: if the basis misses a rigid motion or has columns that depend on each other.
 
     Source:

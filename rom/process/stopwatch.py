@@ -6,6 +6,7 @@ from contextvars import ContextVar
 from time import perf_counter
 from typing import Any
 
+from rom.process.launcher import ranks
 from rom.process.memory import peak_bytes
 
 # pieces that stages have in common; the rest of a stage belongs to none
@@ -16,6 +17,8 @@ FACTORISATION_PIECE, SOLUTION_PIECE, SEARCH_PIECE, REST_PIECE = (
     "rest",
 )
 MEGABYTE_SIZE = 1e6  # [bytes]
+# numbers that pieces of work leave with the stage under way
+FLOPS_NOTE, MISS_NOTE = "flops of the largest factorisation", "probability of a missed mode"
 
 
 class Stopwatch:
@@ -31,6 +34,7 @@ class Stopwatch:
         self.stages: dict[str, dict[str, float]] = {}
         self.counts: dict[str, dict[str, int]] = {}
         self.peaks: dict[str, float] = {}
+        self.notes: dict[str, dict[str, float]] = {}
         self._stage, self._pieces, self._since = "", [REST_PIECE], perf_counter()
 
     def begin(self, stage: str) -> None:
@@ -60,19 +64,30 @@ class Stopwatch:
         self._charge()
         self._pieces.pop()
 
+    def note(self, name: str, value: float) -> None:
+        """Keep a number with the stage under way, the largest of that name."""
+        if self._stage:
+            notes = self.notes.setdefault(self._stage, {})
+            notes[name] = max(notes.get(name, value), value)
+
     @property
     def seconds(self) -> float:
         """Of all stages so far [s]."""
         return sum(sum(pieces.values()) for pieces in self.stages.values())
 
     def table(self) -> dict[str, dict[str, float]]:
-        """{stage: {"seconds", "MB", and per piece its seconds}}, as provenance keeps it."""
+        """{stage: {"seconds", "MB", "ranks", pieces, their numbers, notes}}, as provenance has it.
+
+        Seconds and memory are those of one rank.
+        """
         return {
             stage: {
                 "seconds": round(sum(pieces.values()), 4),
                 "MB": round(self.peaks[stage], 1),
+                "ranks": ranks()[1],
                 **{piece: round(seconds, 4) for piece, seconds in pieces.items()},
                 **{f"number of {piece}": n for piece, n in self.counts[stage].items()},
+                **self.notes.get(stage, {}),
             }
             for stage, pieces in self.stages.items()
         }
@@ -112,3 +127,10 @@ def piece(name: str) -> Iterator[Any]:
         yield
     finally:
         watch.leave()
+
+
+def note(name: str, value: float) -> None:
+    """Keep a number with the stage under way, where somebody times."""
+    watch = _running.get()
+    if watch is not None:
+        watch.note(name, value)

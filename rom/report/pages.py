@@ -11,7 +11,14 @@ from rom.config.document import read_document
 from rom.errors import ConfigError, FileFormatError, RomError
 from rom.model import Report, Row
 from rom.process.child import scratch
-from rom.process.stopwatch import FACTORISATION_PIECE, REST_PIECE, SEARCH_PIECE, SOLUTION_PIECE
+from rom.process.stopwatch import (
+    FACTORISATION_PIECE,
+    FLOPS_NOTE,
+    MISS_NOTE,
+    REST_PIECE,
+    SEARCH_PIECE,
+    SOLUTION_PIECE,
+)
 from rom.report import html
 from rom.report.run import RECORD_FILE, SCENE_FILE, Run, run, versions
 from rom.report.scene import SHAPE_BYTES, modes_scene, motion_scene, start_scene
@@ -213,15 +220,20 @@ def _stages(stages: dict[str, dict[str, float]]) -> list[str]:
     pieces = (FACTORISATION_PIECE, SOLUTION_PIECE, SEARCH_PIECE, REST_PIECE)
     rows = [
         (stage, f"{found['seconds']:.2f}", *(_piece(found, name) for name in pieces),
-         f"{found['MB']:.0f}")
+         f"{found['MB']:.0f}", *(_noted(found, name) for name in (FLOPS_NOTE, MISS_NOTE)))
         for stage, found in stages.items()
     ]  # fmt: skip
-    header = ("stage", "seconds", *pieces, "memory [MB]")
+    header = ("stage", "seconds", *pieces, "memory [MB]", FLOPS_NOTE, MISS_NOTE)
+    ranks = max((found.get("ranks", 1) for found in stages.values()), default=1)
     caption = (
-        "Where the time of the reduction went, in seconds of one process, and in brackets how "
-        "often; the memory is the largest of that process so far."
+        f"Where the time of the reduction went, in seconds of one process of {ranks}, and in "
+        "brackets how often; the memory is the largest of that process so far."
     )
     return [html.table(header, rows, caption)] if rows else []
+
+
+def _noted(stage: dict[str, float], name: str) -> str:
+    return f"{stage[name]:.1e}" if name in stage else ""
 
 
 def _piece(stage: dict[str, float], name: str) -> str:

@@ -97,7 +97,14 @@ def test_a_mode_that_was_skipped_is_noticed(make, model, monkeypatch):
             lam, Phi = whole_petsc(self, *args, **kwargs)
             return np.delete(lam, 2), np.delete(Phi, 2, axis=1)
 
+        blocks = type(ops).by_blocks
+
+        def forgetful_blocks(self, *args):
+            lam, Phi, _ = blocks(self, *args)
+            return np.delete(lam, 2), np.delete(Phi, 2, axis=1), False
+
         monkeypatch.setattr(type(ops), "lowest", forgetful_petsc)
+        monkeypatch.setattr(type(ops), "by_blocks", forgetful_blocks)
     root = model.interfaces["root"].dofs
     for held in (root, ops.hold(root), ()):
         with pytest.raises(

@@ -166,8 +166,49 @@ def test_a_part_that_hangs_on_nothing_is_a_mechanism():
     K, M = (block_diag([a, b], "csr") for a, b in ((one.K, other.K), (one.M, other.M)))
     K, M = (PETSc.Mat().createAIJ(A.shape, csr=(A.indptr, A.indices, A.data)) for A in (K, M))
     ops = petsc.PETScOperators(K, M, rigid_motions(points))
-    with pytest.raises(ModelError, match="6 more motions without stiffness than the six"):
+    with pytest.raises(ModelError, match="6 more motions without stiffness than the six") as raised:
         ops.modes((), 14)
+    assert place_in(raised.value)[2] in (0.0, 0.08, 1.0, 1.08)  # a corner, of either beam
+    with pytest.raises(InterfaceError, match="leave a rigid motion free") as raised:
+        ops.hold(one.interfaces["x0"].dofs)
+    assert place_in(raised.value)[2] >= 1.0
+
+
+def place_in(error):
+    """The coordinates that a message names."""
+    words = error.message.split("It moves most at (")[1].split(")")[0]
+    return np.array([float(word) for word in words.split(",")])
+
+
+def test_a_part_that_hangs_on_a_line_is_named_by_its_far_end():
+    """A second beam shares one edge with the first, about which it turns."""
+    from petsc4py import PETSc
+
+    from scipy.sparse import block_diag, coo_matrix, csr_matrix
+
+    from rom.eigen.verbs import rigid_motions
+
+    one = beam((8, 2, 2))
+    moved = one.points + np.array([1.0, 0.0, 0.08])
+    k = len(moved)
+    same = np.linalg.norm(moved[:, None] - one.points, axis=2) < 1e-9
+    assert same.any(axis=1).sum() == 3  # the nodes of the hinge
+    number = np.where(same.any(axis=1), same.argmax(axis=1), -1)
+    number[number < 0] = k + np.arange(k - 3)
+    nodes = np.concatenate([np.arange(k), number])
+    dofs = (3 * nodes[:, None] + np.arange(3)).ravel()
+    T = csr_matrix(coo_matrix((np.ones(6 * k), (np.arange(6 * k), dofs))))
+    points = np.zeros((2 * k - 3, 3))
+    points[nodes] = np.vstack([one.points, moved])
+    K, M = ((T.T @ block_diag([A, A]) @ T).tocsr() for A in (one.K, one.M))
+    for A in (K, M):
+        A.sort_indices()
+    K, M = (PETSc.Mat().createAIJ(A.shape, csr=(A.indptr, A.indices, A.data)) for A in (K, M))
+    ops = petsc.PETScOperators(K, M, rigid_motions(points))
+    with pytest.raises(InterfaceError, match="leave a rigid motion free") as raised:
+        ops.hold(one.interfaces["x0"].dofs)
+    assert_allclose(place_in(raised.value)[[0, 2]], [2.0, 0.16], atol=1e-6)
+    assert "hangs on a point or on a line" in raised.value.hint
 
 
 @pytest.mark.parametrize("held", [("x0", (0,)), ("x0", (1, 2)), ("z0", (2,))])

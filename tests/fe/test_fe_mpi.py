@@ -107,3 +107,30 @@ def test_on_one_rank_errors_pass_as_they_are():
     with pytest.raises(MaterialError), collective(MPI.COMM_SELF):
         raise MaterialError("no")
     assert issubclass(MaterialError, RomError)
+
+
+@pytest.mark.parametrize("n", SHARED_BY)
+def test_interfaces_of_one_rank_and_of_all_ranks(n, tmp_path):
+    """All ranks ask for the interface of one of them; one of all is gathered from each."""
+    one, many = (reduced_on(ranks, tmp_path) for ranks in (1, n))
+    assert many["ranks of end"] < n
+    assert many["ranks of side"] == n
+    for name in set(one) - {"ranks of end", "ranks of side"}:
+        assert_allclose(many[name], one[name], rtol=1e-9, err_msg=name)
+
+
+def reduced_on(n, folder):
+    path = folder / f"{n}.npz"
+    done = subprocess.run(
+        [*mpirun(n), sys.executable, str(RANKS / "interfaces_under_mpi.py"), str(path)],
+        cwd=HERE, env=ENVIRONMENT, timeout=120, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    return dict(np.load(path))
+
+
+def test_a_rank_that_dies_ends_the_others():
+    """As when the machine kills the largest process: the others would wait for ever."""
+    done = on_ranks(2, "die", timeout=60)
+    assert done.returncode != 0
+    assert "signal 9 (Killed)" in done.stdout + done.stderr

@@ -1,5 +1,7 @@
 """Interface functions chosen before anything is solved."""
 
+import tracemalloc
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -8,10 +10,12 @@ from scipy.sparse import diags
 import rom
 from cases.solid import block
 from cases.surfaces import TURN, surface
+from rom.bench.models import bar
 from rom.eigen.scipy import HeldSciPy
-from rom.eigen.verbs import rigid_motions
+from rom.eigen.verbs import quadratic, rigid_motions
 from rom.errors import ConfigError, InterfaceError
 from rom.model import Interface
+from rom.reduction.bases.fixed_interface import constraint_modes
 from rom.reduction.interfaces.connection import connect
 from rom.reduction.interfaces.kinds import tie
 from rom.reduction.interfaces.polynomial import cylinder_coordinates, interface_functions
@@ -148,7 +152,41 @@ def test_text_and_record_name_the_same_kind():
     interface = surface("plane")
     assert tie(interface, "polynomial:3").label == tie(interface, rom.Polynomial(3)).label
     one, other = tie(interface, "fourier:3,0"), tie(interface, rom.FourierLegendre(3, 0))
-    assert_allclose(one.by_masters, other.by_masters)
+    assert_allclose(one.by_masters.toarray(), other.by_masters.toarray())
+
+
+def copies(work, columns):
+    """The memory that work takes at most, over that of the (n, r) columns it works on."""
+    tracemalloc.start()
+    work()
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    return peak / columns.nbytes
+
+
+def test_columns_of_a_large_surface_are_worked_on_few_at_a_time():
+    """625 nodes, 45 functions, 3 directions: a copy of everything would double the memory."""
+    model = bar((0.1, 1.0, 1.0), (1, 12, 12))
+    made = connect(operators(model), model, {"root": rom.Polynomial(8)})
+    n_functions = (8 + 1) * (8 + 2) // 2
+    assert made.ties["root"].by_masters.nnz <= 3 * 625 * n_functions  # nothing off the directions
+    held = made.ops.hold(made.boundary)
+    Psi = constraint_modes(made.ops, held, made.boundary)
+    assert Psi.shape[1] == 3 * n_functions
+    assert_allclose(Psi, at_once(made.ops, held, made.boundary), rtol=1e-9, atol=1e-15)
+    assert copies(lambda: constraint_modes(made.ops, held, made.boundary), Psi) < 2.5
+    ops, whole = operators(model), made.ops.expand(Psi)
+    expected = whole.T @ (model.K @ whole)
+    found = quadratic(ops, ops.apply_K, whole)
+    assert_allclose(found, expected, rtol=1e-9, atol=1e-12 * np.abs(expected).max())
+    assert copies(lambda: quadratic(ops, ops.apply_K, whole), whole) < 0.9
+
+
+def at_once(ops, held, boundary):
+    """Constraint modes by their definition."""
+    E = np.zeros((ops.n_local, boundary.size))
+    E[boundary, np.arange(boundary.size)] = 1.0
+    return E - held(ops.apply_K(E))
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,16 @@
+from rom.components.assumed_strain.actions import Actions as Actions
+from rom.components.assumed_strain.actions import Drive as Drive
+from rom.components.assumed_strain.actions import Load as Load
+from rom.components.assumed_strain.actions import Tool as Tool
+from rom.components.assumed_strain.actions import Traction as Traction
+from rom.components.assumed_strain.actions import disc as disc
+from rom.components.assumed_strain.actions import outer_sides as outer_sides
+from rom.components.assumed_strain.implicit import Course as Course
+from rom.components.assumed_strain.implicit import equilibrium as equilibrium
+from rom.components.assumed_strain.implicit import implicit_motion as implicit_motion
+from rom.components.assumed_strain.implicit import quasi_static as quasi_static
 from rom.components.assumed_strain.motion import Flight as Flight
 from rom.components.assumed_strain.motion import Metal as Metal
-from rom.components.assumed_strain.motion import equilibrium as equilibrium
 from rom.components.assumed_strain.motion import fly as fly
 from rom.components.assumed_strain.motion import forces as forces
 from rom.components.assumed_strain.motion import mass as mass

@@ -177,17 +177,97 @@ def tangents(x, patch, G, weights, radius, numbers, state, history, K):
 
 
 @kernel
-def fly(x, v, mass, free, parts, numbers, state, speed, times, histories, path, plastic):
+def applied(x, y, actions, depth, g):
+    """Add loads, pressure and shear at the values y of the histories to forces g (n, 2) [N].
+
+    The depth is the thickness of a plane solid [m], and none with axial symmetry.
+    """
+    loads, sides, stress, of_side = actions
+    for q in range(len(loads)):
+        for i in range(len(x)):
+            g[i, 0] += y[q] * loads[q, i, 0]
+            g[i, 1] += y[q] * loads[q, i, 1]
+    for k in range(len(sides)):
+        i, j = sides[k, 0], sides[k, 1]
+        dx, dy = x[j, 0] - x[i, 0], x[j, 1] - x[i, 1]
+        half = 0.5 * y[of_side[k]]
+        half *= depth if depth > 0 else np.pi * (x[i, 0] + x[j, 0])
+        fx = half * (stress[k, 1] * dx - stress[k, 0] * dy)
+        fy = half * (stress[k, 1] * dy + stress[k, 0] * dx)
+        g[i, 0], g[i, 1] = g[i, 0] + fx, g[i, 1] + fy
+        g[j, 0], g[j, 1] = g[j, 0] + fx, g[j, 1] + fy
+
+
+@inner
+def _row(times, table, t, y):
+    """Values of the histories at a time, straight between corners, into y."""
+    k = 0
+    while k < len(times) - 2 and t >= times[k + 1]:
+        k += 1
+    s = min((t - times[k]) / (times[k + 1] - times[k]), 1.0)
+    for c in range(len(y)):
+        y[c] = (1 - s) * table[k, c] + s * table[k + 1, c]
+
+
+@inner
+def _gap(px, py, faces, begin, end):
+    """Distance of a place from a convex tool, negative inside, and the nearest face."""
+    gap, face = -np.inf, begin
+    for j in range(begin, end):
+        d = (px - faces[j, 0]) * faces[j, 4] + (py - faces[j, 1]) * faces[j, 5]
+        if d > gap:
+            gap, face = d, j
+    return gap, face
+
+
+@inner
+def _keep_out(x, v, mass, free, tools, y, before, dt, impulse):
+    """Put nodes in tools onto their faces; the impulse has Coulomb's part along the face."""
+    faces, first, friction = tools
+    at = len(y) - 2 * len(friction)
+    for k in range(len(friction)):
+        ox, oy = y[at + 2 * k], y[at + 2 * k + 1]
+        wx, wy = (ox - before[at + 2 * k]) / dt, (oy - before[at + 2 * k + 1]) / dt
+        for i in range(len(x)):
+            gap, j = _gap(x[i, 0] - ox, x[i, 1] - oy, faces, first[k], first[k + 1])
+            if gap >= 0:
+                continue
+            normal = -gap / dt  # change of velocity along the outer normal
+            slip = (v[i, 0] - wx) * faces[j, 2] + (v[i, 1] - wy) * faces[j, 3]
+            along = -min(max(slip, -friction[k] * normal), friction[k] * normal)
+            for a in range(2):
+                if free[i, a]:
+                    change = normal * faces[j, 4 + a] + along * faces[j, 2 + a]
+                    v[i, a] += change
+                    x[i, a] += dt * change
+                    impulse[k, a] += mass[i] * change
+
+
+@kernel
+def fly(x, v, mass, free, parts, numbers, state, speed, acts, times, histories, seen):
     """Central differences; pictures at or just after the times wanted, which become those reached.
 
     Returns the number of steps, -1 if the motion was lost, and the energy that went into the solid.
     """
     patch, G, weights, radius, area = parts
+    corners, table, actions, depth, driven, columns, tools = acts
+    path, plastic, tool_forces, reactions = seen
     old, new = histories
-    f, t, dt, steps, shot, spent = np.zeros(x.shape), 0.0, 0.0, 0, 0, 0.0
+    f, g, start, impulse = (
+        np.zeros(x.shape),
+        np.zeros(x.shape),
+        x.copy(),
+        np.zeros(tool_forces[0].shape),
+    )
+    y, before = np.zeros(table.shape[1]), np.zeros(table.shape[1])
+    _row(corners, table, 0.0, before)
+    t, dt, steps, shot, spent, since = 0.0, 0.0, 0, 0, 0.0, 0.0
     while True:
         if t >= times[shot]:
             path[shot], plastic[shot], times[shot] = x, old[:, :, 4], t
+            tool_forces[shot] = impulse / (t - since) if t > since else impulse
+            reactions[shot] = f - g
+            impulse[:], since = 0.0, t
             shot += 1
             if shot == len(path):
                 return steps, spent
@@ -195,16 +275,26 @@ def fly(x, v, mass, free, parts, numbers, state, speed, times, histories, path, 
             dt = COURANT_NUMBER * _shortest(x, patch, area) / speed
             if not dt > 0:
                 return -1, spent
-        f[:] = 0.0
+        f[:], g[:] = 0.0, 0.0
         forces(x, patch, G, weights, radius, numbers, state, old, f, new)
+        applied(x, before, actions, depth, g)
+        _row(corners, table, t + dt, y)
         old, new = new, old
         for i in range(len(x)):
             for a in range(2):
                 if free[i, a]:
-                    before = v[i, a]
-                    v[i, a] -= dt * f[i, a] / mass[i]
-                    spent += dt * f[i, a] * 0.5 * (before + v[i, a])
+                    was = v[i, a]
+                    v[i, a] -= dt * (f[i, a] - g[i, a]) / mass[i]
+                    spent += dt * f[i, a] * 0.5 * (was + v[i, a])
                     x[i, a] += dt * v[i, a]
+        for k in range(len(driven)):
+            i, a = driven[k] // 2, driven[k] % 2
+            place = start[i, a] + (y[columns[k]] if columns[k] >= 0 else 0.0)
+            v[i, a] = (place - x[i, a]) / dt
+            spent += dt * f[i, a] * v[i, a]
+            x[i, a] = place
+        _keep_out(x, v, mass, free, tools, y, before, dt, impulse)
+        before[:] = y
         t += dt
         steps += 1
 

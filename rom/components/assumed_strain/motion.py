@@ -1,22 +1,22 @@
-"""Forces, stiffness and mass of a sheet; equilibrium and explicit motion.
+"""Forces, stiffness and mass of a sheet, and explicit motion.
 
 Source:
     Flores, A two-dimensional linear assumed strain triangular element for finite deformation
     analysis, J. Appl. Mech. 73 (2006) 970.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 from scipy.sparse import coo_matrix, csr_matrix, identity, kron
-from scipy.sparse.linalg import spsolve
 
 from rom.components.assumed_strain import kernels
+from rom.components.assumed_strain.actions import Actions, dofs_of, nodal, prepared
 from rom.components.assumed_strain.triangles import STATES, Sheet
 from rom.errors import ConfigError, MaterialError, SolverError
-from rom.model import Array, Index
+from rom.model import Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +75,7 @@ def tangent(body: Sheet, metal: Metal, x: Array, history: Array | None = None) -
     Raises:
         ConfigError: if the positions do not fit the sheet.
     """
-    K, x = np.zeros((len(body.patch), 12, 12)), _nodal("positions", x, body)
+    K, x = np.zeros((len(body.patch), 12, 12)), nodal("positions", x, body)
     kernels.tangents(x, *_parts(body, metal, history), K)
     dofs = (2 * body.patch[:, :, None] + np.arange(2)).reshape(-1, 12)
     rows, columns = np.repeat(dofs, 12, axis=1).ravel(), np.tile(dofs, (1, 12)).ravel()
@@ -102,7 +102,7 @@ def forces(
     """
     f, parts = np.zeros(body.points.shape), _parts(body, metal, history)
     new = np.empty_like(parts[-1])
-    kernels.forces(_nodal("positions", x, body), *parts, f, new)
+    kernels.forces(nodal("positions", x, body), *parts, f, new)
     return f, new
 
 
@@ -115,55 +115,6 @@ def mass(body: Sheet, metal: Metal) -> csr_matrix:
     return kron(coo_matrix((data, place), shape=(len(body.points),) * 2), identity(2), "csr")
 
 
-def equilibrium(
-    body: Sheet, metal: Metal, load: Array, held: npt.ArrayLike, *, steps: int = 1
-) -> tuple[Array, Array | None, int]:
-    """Rest under dead loads, which grow in equal steps.
-
-    Args:
-        body: the sheet.
-        metal: its material.
-        load: (n, 2) dead forces [N].
-        held: (k,) dof numbers that do not move.
-        steps: load steps.
-
-    Returns:
-        Positions (n, 2) [m], history as of `forces`, and the most Newton iterations of a step.
-
-    Raises:
-        ConfigError: if loads or held dofs do not fit, or without a step.
-        SolverError: if Newton's method does not find equilibrium; ``error.solution`` is that of the
-            load step before.
-    """
-    load, held = _nodal("loads", load, body), _dofs(held, body)
-    if steps < 1:
-        raise ConfigError(f"{steps} load steps: one or more are needed.")
-    free = np.setdiff1d(np.arange(load.size), held)
-    x, history, most = body.points.copy(), None, 0
-    before: tuple[Array, Any, int] = x.copy(), history, most
-    for k in range(1, steps + 1):
-        for i in range(30):
-            f, new = forces(body, metal, x, history)
-            r = (k / steps * load - f).ravel()[free]
-            if i and np.linalg.norm(r) <= 1e-10 * np.linalg.norm(load):
-                break
-            K = tangent(body, metal, x, history)[free][:, free]
-            x.reshape(-1)[free] += spsolve(K.tocsc(), r)
-            if not np.isfinite(x).all():
-                raise _lost(k, steps, before)
-        else:
-            raise _lost(k, steps, before)
-        history, most = new, max(most, i)
-        before = x.copy(), history, most
-    return x, history, most
-
-
-def _lost(k: int, steps: int, before: tuple[Array, Any, int]) -> SolverError:
-    return SolverError(
-        f"no equilibrium in load step {k} of {steps}.", hint="Take more steps.", solution=before
-    )
-
-
 @dataclass(frozen=True, slots=True)
 class Flight:
     """What happened, picture by picture.
@@ -172,8 +123,10 @@ class Flight:
         t: (k,) times [s].
         x: (k, n, 2) positions [m].
         plastic: (k, t, p) accumulated plastic strain [1].
-        work: energy that went from the motion into the solid [J].
+        work: energy that went from motion, loads and tools into the solid [J].
         steps: number of time steps; -1 of a motion that was lost.
+        tool_forces: (k, tools, 2) mean forces of the tools on the sheet since the last picture [N].
+        reactions: (k, n, 2) inner forces less loads: what supports and drives give [N].
     """
 
     t: Array
@@ -181,66 +134,64 @@ class Flight:
     plastic: Array
     work: float
     steps: int
+    tool_forces: Array
+    reactions: Array
 
 
 def fly(
-    body: Sheet, metal: Metal, v: Array, held: npt.ArrayLike, t_end: float, *, pictures: int = 41
-) -> Flight:
+    body: Sheet, metal: Metal, v: Array, held: npt.ArrayLike, t_end: float, *,
+    pictures: int = 41, actions: Actions | None = None,
+) -> Flight:  # fmt: skip
     """Explicit motion from rest lengths.
+
+    Nodes that come into a tool are put back onto its face, by an impulse with Coulomb's friction.
 
     Args:
         body: the sheet.
         metal: its material.
         v: (n, 2) velocities at the start [m/s].
-        held: (k,) dof numbers that do not move.
+        held: (k,) dof numbers that do not move, beside those of the actions.
         t_end: duration [s].
         pictures: number of instants that are kept.
+        actions: loads, pressure, driven nodes and tools.
 
     Raises:
-        ConfigError: if velocities, held dofs, duration or pictures do not fit.
+        ConfigError: if velocities, held dofs, actions, duration or pictures do not fit.
+        MeshError: if a tool begins inside the sheet.
         SolverError: if the motion is lost; ``error.solution`` holds the pictures before.
     """
-    v, held = _nodal("velocities", v, body), _dofs(held, body)
+    v, held = nodal("velocities", v, body), dofs_of(held, body)
     if not 0 < t_end < np.inf or pictures < 2:
         raise ConfigError(f"t_end = {t_end} s with {pictures} pictures: nothing to show.")
+    actions = actions or Actions()
+    acts = prepared(body, replace(actions, held=np.union1d(held, dofs_of(actions.held, body))))
     lumped = np.asarray(mass(body, metal).sum(axis=1)).ravel()[::2]
     free, x, parts = np.ones(v.shape, dtype=bool), body.points.copy(), _parts(body, metal, None)
-    free.reshape(-1)[held] = False
-    t = np.linspace(0, t_end, pictures)
-    path, seen = np.full((pictures, *x.shape), np.nan), np.zeros((pictures, *body.weights.shape))
+    free.reshape(-1)[acts.driven] = False
+    t, kept = np.linspace(0, t_end, pictures), (pictures, *x.shape)
+    seen = (np.full(kept, np.nan), np.zeros((pictures, *body.weights.shape)),
+            np.zeros((pictures, len(acts.friction), 2)), np.zeros(kept))  # fmt: skip
     steps, work = kernels.fly(
         x, np.where(free, v, 0.0), lumped, free, (*parts[:4], body.area), *parts[4:6],
-        metal.wave_speed, t, (parts[6], parts[6].copy()), path, seen,
+        metal.wave_speed, (acts.times, acts.table, acts.forces, depth_of(body), acts.driven,
+                           acts.columns, acts.tools), t, (parts[6], parts[6].copy()), seen,
     )  # fmt: skip
+    path, plastic, tool_forces, reactions = seen
     if steps < 0 or not np.isfinite(path).all():
-        taken = int(np.append(np.isfinite(path).all(axis=(1, 2)), False).argmin())
+        k = int(np.append(np.isfinite(path).all(axis=(1, 2)), False).argmin())
         raise SolverError(
             "the explicit motion was lost.",
             hint="Use the element F1, or finer time.",
-            solution=Flight(t[:taken], path[:taken], seen[:taken], work, steps),
+            solution=Flight(
+                t[:k], path[:k], plastic[:k], work, steps, tool_forces[:k], reactions[:k]
+            ),
         )
-    return Flight(t, path, seen, work, steps)
+    return Flight(t, path, plastic, work, steps, tool_forces, reactions)
 
 
-def _nodal(name: str, values: npt.ArrayLike, body: Sheet) -> Array:
-    """Finite values (n, 2) at the nodes of the sheet; kernels check no bounds."""
-    x = np.ascontiguousarray(values, dtype=float)
-    if x.shape != body.points.shape or not np.isfinite(x).all():
-        raise ConfigError(
-            f"{name} of the shape {x.shape}: {body.points.shape} finite numbers are needed."
-        )
-    return x
-
-
-def _dofs(held: npt.ArrayLike, body: Sheet) -> Index:
-    """Numbers of dofs, 2 * node + axis."""
-    dofs = np.asarray(held, dtype=np.int64).ravel()
-    if dofs.size and (dofs.min() < 0 or dofs.max() >= body.points.size):
-        raise ConfigError(
-            f"held dofs {dofs.min()} to {dofs.max()}; the sheet has 0 to {body.points.size - 1}.",
-            hint="A dof is 2 * node + axis.",
-        )
-    return dofs
+def depth_of(body: Sheet) -> float:
+    """Thickness of a plane solid [m]; -1 with axial symmetry."""
+    return -1.0 if body.state == "axisymmetric" else body.thickness
 
 
 def _parts(body: Sheet, metal: Metal, history: Array | None) -> tuple[Any, ...]:

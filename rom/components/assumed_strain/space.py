@@ -4,6 +4,7 @@ import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix, identity, kron
 
 from rom.components.assumed_strain.motion import Metal, mass, tangent
+from rom.components.assumed_strain.plates import bending
 from rom.components.assumed_strain.triangles import Sheet
 from rom.errors import ConfigError, InterfaceError
 from rom.model import Array, FEModel, Index, Interface, SurfaceMesh
@@ -19,53 +20,24 @@ def in_space(body: Sheet, metal: Metal, interfaces: dict[str, Index]) -> FEModel
 
     Raises:
         ConfigError: for another state than plane stress.
-        InterfaceError: if the nodes of an interface contain no triangle.
+        InterfaceError: if the nodes of an interface contain no triangle or do not exist.
 
     Source:
-        Bending by a quadratic fitted to the patch of a triangle: Nay and Utku, An alternative
-        for the finite element method, Variational Methods in Engineering (1972).
+        Bending: Morley, Aero. Quart. 19 (1968) 149, with fitted slopes as `plates` says.
     """
     if body.state != "plane stress":
         raise ConfigError(f"a sheet in space is in plane stress, not {body.state}.")
-    n = len(body.points)
+    n, parts = len(body.points), tuple(np.unique(nodes) for nodes in interfaces.values())
     points = np.column_stack([body.points, np.zeros(n)])
-    K = _placed(tangent(body, metal, body.points), (0, 1)) + _placed(bending(body, metal), (2,))
+    K = _placed(tangent(body, metal, body.points), (0, 1)) + _placed(
+        bending(body, metal, parts), (2,)
+    )
     M = kron(mass(body, metal)[::2, ::2], identity(3), "csr")
-    faces = {name: _interface(name, np.unique(nodes), body, points)
-             for name, nodes in interfaces.items()}  # fmt: skip
+    faces = {name: _interface(name, nodes, body, points)
+             for name, nodes in zip(interfaces, parts, strict=True)}  # fmt: skip
     surface = SurfaceMesh(np.arange(n), body.triangles)
     made = {"geometry": "sheet", "material": metal, "thickness [m]": body.thickness}
     return FEModel(K, M, points, faces, surface=surface, provenance=made)
-
-
-def bending(body: Sheet, metal: Metal) -> csr_matrix:
-    """(n, n) stiffness against deflection w [N/m], without rotations as unknowns.
-
-    The curvature of a triangle is that of the quadratic through the nodes of its patch. At an edge,
-    where nodes are missing, it is the one of least energy: the edge is free. Meshes with diagonals
-    along one direction converge. Crossed ones do not, whatever their size: a uniform curvature has
-    its energy, but its moments load inner nodes, and bending frequencies stay a fifth too low.
-
-    Source:
-        After Nay and Utku, who fit a quadratic to the patch by least squares.
-    """
-    X, size = body.points[body.patch], np.sqrt(body.area)[:, None]
-    x, y = np.moveaxis((X - X[:, :3].mean(axis=1, keepdims=True)) / size[..., None], 2, 0)
-    linear = np.stack([np.ones_like(x), x, y], axis=2)
-    quadratic = np.stack([x * x / 2, y * y / 2, x * y / 2], axis=2)  # the last is twice the twist
-    L = linear[:, 3:] @ np.linalg.inv(linear[:, :3])  # neighbours from the plane of the corners
-    N = quadratic[:, 3:] - L @ quadratic[:, :3]
-    above = np.concatenate([-L, np.broadcast_to(np.eye(3), L.shape)], axis=2)
-    alone = body.patch[:, 3:] == body.triangles
-    N[alone], above[alone] = 0.0, 0.0
-    t, nu = body.thickness, metal.nu
-    D = np.array([[1, nu, 0], [nu, 1, 0], [0, 0, (1 - nu) / 2]])
-    D *= metal.E * t**3 / 12 / (1 - nu**2)
-    root = np.linalg.inv(np.linalg.cholesky(D).T)  # curvature = root y has the energy y^T y / 2
-    Y = np.linalg.pinv(N @ root, rcond=1e-9) @ above / size[..., None]
-    K = np.swapaxes(Y, 1, 2) @ Y  # the area cancels one power of the size in each factor
-    rows, columns = np.repeat(body.patch, 6, axis=1).ravel(), np.tile(body.patch, (1, 6)).ravel()
-    return coo_matrix((K.ravel(), (rows, columns)), shape=(len(body.points),) * 2).tocsr()
 
 
 def _placed(A: csr_matrix, axes: tuple[int, ...]) -> csr_matrix:
@@ -77,6 +49,12 @@ def _placed(A: csr_matrix, axes: tuple[int, ...]) -> csr_matrix:
 
 
 def _interface(name: str, nodes: Index, body: Sheet, points: Array) -> Interface:
+    if nodes.size and not 0 <= nodes[0] <= nodes[-1] < len(points):
+        raise InterfaceError(
+            f"interface {name!r} names the nodes {nodes[0]} to {nodes[-1]}; "
+            f"there are {len(points)} points.",
+            hint="Count nodes from zero.",
+        )
     inside = np.isin(body.triangles, nodes).all(axis=1)
     if not inside.any():
         raise InterfaceError(

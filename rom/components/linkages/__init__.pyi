@@ -1,6 +1,7 @@
 from rom.components.linkages.dynamic_isotropy import Isotropic as Isotropic
 from rom.components.linkages.dynamic_isotropy import angle_grid as angle_grid
 from rom.components.linkages.dynamic_isotropy import closed_loci as closed_loci
+from rom.components.linkages.dynamic_isotropy import index_map as index_map
 from rom.components.linkages.dynamic_isotropy import (
     isotropic_configurations as isotropic_configurations,
 )

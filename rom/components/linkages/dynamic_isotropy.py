@@ -15,6 +15,7 @@ Source:
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -22,6 +23,7 @@ import numpy.typing as npt
 from rom.errors import ConfigError, ModelError, SolverError
 from rom.model import Array, Index
 
+Assembles = Callable[[Array, Array], Any]  # angles of equal shape (...) -> (...) true or false
 Inertia = Callable[[Array, Array], Array]  # angles of equal shape (...) -> (..., 2, 2)
 DIFFERENCE_STEP = 1e-5  # of central differences [rad]
 # least Jacobian of the normalised equations for an isotropic point that stands alone
@@ -82,38 +84,92 @@ class Isotropic:
     winding: Index
 
 
-def isotropic_configurations(inertia: Inertia, *, n: int = 400) -> Isotropic:
-    """All isotropic configurations on the torus of two angles.
+def index_map(inertia: Inertia, *, n: int = 400, assembles: Assembles | None = None) -> Array:
+    """(n, n) isotropy index on `angle_grid` [1], zero where the mechanism cannot be assembled.
+
+    At the border of what can be assembled a motor feels an unbounded inertia: the index goes to
+    zero there, and its loci stay closed.
+
+    Args:
+        inertia: function of two arrays of angles (...) that returns (..., 2, 2).
+        n: number of cells per turn.
+        assembles: function of the same angles that says where there is an inertia; None:
+            everywhere.
+
+    Raises:
+        ConfigError, ModelError: for less than four cells; if it can be assembled nowhere, or the
+            function returns no inertia.
+    """
+    q1, q2 = angle_grid(n)
+    there, index = _there(assembles, q1, q2, n), np.zeros((n, n))
+    index[there] = isotropy_index(inertia(q1[there], q2[there]))
+    return index
+
+
+def _there(assembles: Assembles | None, q1: Array, q2: Array, n: int) -> Array:
+    """(n, n) where the mechanism can be assembled.
+
+    Raises:
+        ConfigError, ModelError: for less than four cells; if there is no such place.
+    """
+    if n < 4:
+        raise ConfigError(f"n = {n}: a turn needs four cells or more.")
+    there = np.ones(q1.shape, bool) if assembles is None else np.asarray(assembles(q1, q2), bool)
+    if not there.any():
+        raise ModelError(
+            f"none of {n} by {n} positions of the cranks can be assembled.",
+            hint="Lengthen the couplers, or bring the pivots closer.",
+        )
+    return there
+
+
+def isotropic_configurations(
+    inertia: Inertia, *, n: int = 400, assembles: Assembles | None = None
+) -> Isotropic:
+    """All isotropic configurations on the torus of two angles, or on a part of it.
 
     Cells of an n by n grid in which both equations may change sign are refined by Newton.
 
     Args:
         inertia: function of two arrays of angles (...) that returns (..., 2, 2).
         n: number of cells per turn; points closer than a cell may be taken for one.
+        assembles: function of the same angles that says where there is an inertia, as
+            `FiveBar.assembles`; None: everywhere. Cells that its border crosses are left out, and
+            the windings of a part need not add up to zero.
 
     Raises:
-        ConfigError, ModelError: for a grid of less than four cells; if the function returns no
-            inertia.
+        ConfigError, ModelError: for a grid of less than four cells; if the mechanism can be
+            assembled nowhere, or the function returns no inertia.
         SolverError: if the windings of isolated points do not add up to zero: some were missed.
     """
-    if n < 4:
-        raise ConfigError(f"n = {n}: a turn needs four cells or more.")
-    start = _suspects(_anisotropy(inertia, *angle_grid(n)))
+    q1, q2 = angle_grid(n)
+    there = _there(assembles, q1, q2, n)
+    f = np.full((n, n, 2), np.nan)
+    f[there] = _anisotropy(inertia, q1[there], q2[there])
+    start = _suspects(f)
     q = 2 * np.pi * (start + 0.5) / n
     for _ in range(40):
+        q = q if assembles is None else q[_around(assembles, q)]
         f, J = _anisotropy(inertia, *q.T), _gradient(inertia, q)
         step = -np.einsum("kij,kj->ki", np.linalg.pinv(J, rcond=1e-9), f)
         q = q + step / np.maximum(np.abs(step).max(axis=1, initial=0.0) / 0.1, 1.0)[:, None]
+    q = q if assembles is None else q[_around(assembles, q)]
     q = _distinct(q[np.abs(_anisotropy(inertia, *q.T)).max(axis=1, initial=0.0) < 1e-11])
     turn = np.linalg.det(_gradient(inertia, q))
     winding = np.where(np.abs(turn) > MIN_JACOBIAN, np.sign(turn), 0).astype(int)
-    if winding.all() and winding.sum():
+    if there.all() and winding.all() and winding.sum():
         raise SolverError(
             f"the windings of {winding.size} isotropic points add up to {winding.sum()}, not 0: "
             f"a grid of {n} cells per turn misses some.",
             hint="Take a finer grid.",
         )
     return Isotropic(q, inertia(*q.T)[:, 0, 0], winding)
+
+
+def _around(assembles: Assembles, q: Array) -> Array:
+    """(k,) whether the mechanism can be assembled at angles (k, 2) and at those of differences."""
+    near = [q + s * e for e in DIFFERENCE_STEP * np.eye(2) for s in (-1, 1)]
+    return np.all([np.asarray(assembles(*x.T), bool) for x in (q, *near)], axis=0)
 
 
 def _anisotropy(inertia: Inertia, q1: Array, q2: Array) -> Array:

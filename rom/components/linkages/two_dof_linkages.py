@@ -25,6 +25,7 @@ from rom.mbs.mechanism import Mechanism
 from rom.model import Array
 
 Elastic = Literal["held", "free"]
+MIN_HEIGHT = 1e-6  # of the tip over the way between the elbows: flatter, and it counts as one line
 CHUNK_SIZE = 8192  # configurations at once: elastic links need (3 + r) (2 + sum r) numbers for each
 
 
@@ -209,18 +210,10 @@ class FiveBar:
         Raises:
             ModelError: if the couplers cannot reach each other at some angles.
         """
+        pivots, left, right = self._elbows(q1, q2)
         q1, q2 = np.broadcast_arrays(np.asarray(q1, dtype=float), np.asarray(q2, dtype=float))
-        pivots = np.zeros((2, *q1.shape, 2))
-        pivots[1, ..., 0] = self.base
-        left, right = (
-            pivot + crank.length * _directions(q)
-            for pivot, crank, q in zip(pivots, self.cranks, (q1, q2), strict=True)
-        )
         a, b = (coupler.length for coupler in self.couplers)
-        gap = right - left
-        square = (gap**2).sum(axis=-1)
-        along = 0.5 * (square + a * a - b * b) / square
-        height = a * a / square - along**2
+        gap, square, along, height = self._triangle(left, right)
         if not (height > 0).all():
             k = np.unravel_index(np.argmin(np.where(np.isnan(height), -np.inf, height)), q1.shape)
             raise ModelError(
@@ -232,6 +225,31 @@ class FiveBar:
         return np.stack(
             [pivots[0], left, left + along[..., None] * gap + across, right, pivots[1]], axis=-2
         )
+
+    def assembles(self, q1: npt.ArrayLike, q2: npt.ArrayLike) -> npt.NDArray[np.bool_]:
+        """Whether the couplers meet at angles (...) of the cranks [rad], and not in one line."""
+        _, left, right = self._elbows(q1, q2)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.asarray(self._triangle(left, right)[3] > MIN_HEIGHT**2)
+
+    def _elbows(self, q1: npt.ArrayLike, q2: npt.ArrayLike) -> tuple[Array, Array, Array]:
+        """Pivots (2, ..., 2) and both elbows (..., 2) [m]."""
+        q1, q2 = np.broadcast_arrays(np.asarray(q1, dtype=float), np.asarray(q2, dtype=float))
+        pivots = np.zeros((2, *q1.shape, 2))
+        pivots[1, ..., 0] = self.base
+        left, right = (
+            pivot + crank.length * _directions(q)
+            for pivot, crank, q in zip(pivots, self.cranks, (q1, q2), strict=True)
+        )
+        return pivots, left, right
+
+    def _triangle(self, left: Array, right: Array) -> tuple[Array, Array, Array, Array]:
+        """Way between the elbows, its square, and the tip along it and, squared, across it."""
+        a, b = (coupler.length for coupler in self.couplers)
+        gap = right - left
+        square = (gap**2).sum(axis=-1)
+        along = 0.5 * (square + a * a - b * b) / square
+        return gap, square, along, a * a / square - along**2
 
     def _of_all_rates(self, q1: Array, q2: Array) -> Array:
         links = self.cranks + self.couplers

@@ -42,17 +42,35 @@ class Blocks(NamedTuple):
     load: Array
 
 
-class Law(NamedTuple):
-    """Contact: stiffness [N/m] along normal and edge, friction, tension lost in round-off [N].
+class Bonds(NamedTuple):
+    """Corners glued to edges.
 
-    ``reach`` [m] is how near a corner must be to an edge to be watched.
+    Attributes:
+        who: (n, 5) as in `Contacts`.
+        pull: (n,) tension they bear [N].
+        cohesion: (n,) shear they bear without pressure [N].
+        intact: (n,) 1 until they break.
+    """
+
+    who: Index
+    pull: Array
+    cohesion: Array
+    intact: Index
+
+
+class Law(NamedTuple):
+    """Contact: stiffness [N/m] along normal and edge, tension lost in round-off [N].
+
+    ``reach`` [m] is how near a corner must be to an edge to be watched, ``friction`` (B, B) that of
+    each pair of blocks.
     """
 
     normal: float
     shear: float
-    friction: float
     tension: float
     reach: float
+    friction: Array
+    bonds: Bonds
 
 
 class Contacts(NamedTuple):
@@ -66,6 +84,8 @@ class Contacts(NamedTuple):
         way: (C,) direction of slip along the edge, -1 or 1.
         gap, slip: (C,) distance from the edge, and from the anchor along it [m].
         force: (C,) normal force [N].
+        friction: (C,) coefficient of friction.
+        bond: (C,) number of the bond; -1 for none.
         along: (C, 4) place of the corner on the edge, 0 to 1, normal and length of the edge.
         n, t: (C, 2, 3 + R) gap and slip per coordinate of both blocks.
     """
@@ -78,6 +98,8 @@ class Contacts(NamedTuple):
     gap: Array
     slip: Array
     force: Array
+    friction: Array
+    bond: Index
     along: Array
     n: Array
     t: Array
@@ -85,9 +107,9 @@ class Contacts(NamedTuple):
 
 def contacts(capacity: int, m: int) -> Contacts:
     """Room for contacts of blocks with at most m coordinates."""
-    shapes = ((), (), (), (), (), (), (4,), (2, m), (2, m))
+    shapes = ((), (), (), (), (), (), (), (), (4,), (2, m), (2, m))
     rows: list[Any] = [np.zeros((capacity, *shape)) for shape in shapes]
-    rows[0] = rows[0].astype(np.int64)
+    rows[0], rows[7] = rows[0].astype(np.int64), rows[7].astype(np.int64)
     return Contacts(np.zeros(1, dtype=np.int64), np.zeros((capacity, 5), dtype=np.int64), *rows)
 
 
@@ -164,9 +186,37 @@ def nearest_edge(B, P, i, a, j, reach):
 
 
 @inner
+def list_bonds(law, P, C):
+    """List the bonds that hold, wherever their corners are."""
+    for n in range(law.bonds.intact.size):
+        if law.bonds.intact[n] == 1:
+            k, a = C.used[0], law.bonds.who[n, 1]
+            c, o = law.bonds.who[n, 3], law.bonds.who[n, 4]
+            x, y = P[o, 0] - P[c, 0], P[o, 1] - P[c, 1]
+            l = math.hypot(x, y)
+            px, py = P[a, 0] - P[c, 0], P[a, 1] - P[c, 1]
+            for p in range(5):
+                C.who[k, p] = law.bonds.who[n, p]
+            C.gap[k], C.bond[k] = (px * y - py * x) / l, n
+            C.along[k, 0], C.along[k, 1], C.along[k, 2] = (px * x + py * y) / (l * l), y / l, -x / l
+            C.used[0] = k + 1
+
+
+@inner
+def glued(C, n_bonds, a, j):
+    """Whether corner a is glued to an edge of block j; bonds are the first contacts."""
+    for k in range(n_bonds):
+        if C.who[k, 1] == a and C.who[k, 2] == j:
+            return True
+    return False
+
+
+@inner
 def detect(B, law, P, old, C):
     """List the contacts of the blocks as they lie; what an old contact remembers is kept."""
     C.used[0] = 0
+    list_bonds(law, P, C)
+    n_bonds = C.used[0]
     for i in range(B.size.size):
         for j in range(B.size.size):
             if i == j or (B.equation[i] < 0 and B.equation[j] < 0):
@@ -175,15 +225,18 @@ def detect(B, law, P, old, C):
                 continue
             for a in range(B.first[i], B.first[i + 1]):
                 c, gap, w, nx, ny = nearest_edge(B, P, i, a, j, law.reach)
-                if c >= 0 and C.used[0] < C.state.size:
+                if c >= 0 and C.used[0] < C.state.size and not glued(C, n_bonds, a, j):
                     k = C.used[0]
+                    C.bond[k] = -1
                     C.who[k, 0], C.who[k, 1], C.who[k, 2] = i, a, j
                     C.who[k, 3], C.who[k, 4] = c, around(B, j, c, 1)
                     C.gap[k], C.along[k, 0], C.along[k, 1], C.along[k, 2] = gap, w, nx, ny
                     C.used[0] = k + 1
     drop_doubles(C, P, law.reach)
     for k in range(C.used[0]):
-        C.state[k], C.anchor[k], C.way[k], C.force[k] = OPEN, C.along[k, 0], 0.0, 0.0
+        C.friction[k] = law.friction[C.who[k, 0], C.who[k, 2]]
+        C.state[k] = STICKS if C.bond[k] >= 0 else OPEN
+        C.anchor[k], C.way[k], C.force[k] = C.along[k, 0], 0.0, 0.0
         for o in range(old.used[0]):
             if old.who[o, 1] == C.who[k, 1] and old.who[o, 3] == C.who[k, 3]:
                 C.state[k], C.way[k], C.force[k] = old.state[o], old.way[o], old.force[o]
@@ -204,7 +257,9 @@ def drop_doubles(C, P, reach):
             apart = math.hypot(P[a, 0] - P[c, 0], P[a, 1] - P[c, 1])
             dot = C.along[k, 1] * C.along[o, 1] + C.along[k, 2] * C.along[o, 2]
             if apart < reach and dot > -0.5:
-                if C.gap[k] < C.gap[o] or (C.gap[k] == C.gap[o] and k > o):
+                if C.bond[k] < 0 and (
+                    C.bond[o] >= 0 or C.gap[k] < C.gap[o] or (C.gap[k] == C.gap[o] and k > o)
+                ):
                     keep = False
         C.way[k] = 1.0 if keep else 0.0
     for k in range(C.used[0]):
@@ -213,7 +268,7 @@ def drop_doubles(C, P, reach):
                 C.who[kept, p] = C.who[k, p]
             for p in range(4):
                 C.along[kept, p] = C.along[k, p]
-            C.gap[kept] = C.gap[k]
+            C.gap[kept], C.bond[kept] = C.gap[k], C.bond[k]
             kept += 1
     C.used[0] = kept
 

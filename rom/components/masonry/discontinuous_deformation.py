@@ -26,8 +26,30 @@ STEP_FACTOR, MIN_STEP_RATIO = 3.0, 3.0**-8
 FRICTION_TOLERANCE = 1e-9  # of the largest normal force
 
 
+class Drive(NamedTuple):
+    """What acts from outside in each of n steps, besides weight.
+
+    Attributes:
+        block: (n, L) block each force acts on; -1 for none.
+        corner: (n, L, 3) corners of it that the point of action lies between.
+        share: (n, L, 3) their shares in it.
+        force: (n, L, 2) [N].
+        turns: (L,) 1 where the force turns with the block.
+        ground: (n, 2) acceleration of the frame of reference [m/s^2].
+        moved: (n, B, 3) by how much held blocks are moved [m, m, rad].
+    """
+
+    block: Index
+    corner: Index
+    share: Array
+    force: Array
+    turns: Index
+    ground: Array
+    moved: Array
+
+
 class Work(NamedTuple):
-    """Memory of a step: corners P and their Jacobians T, the equations, the solution."""
+    """Memory of a step: corners P and their Jacobians T, loads, the equations, the solution."""
 
     P: Array
     T: Array
@@ -37,6 +59,7 @@ class Work(NamedTuple):
     d: Array
     q: Array
     v: Array
+    load: Array
 
 
 def work(B: Blocks) -> Work:
@@ -46,6 +69,7 @@ def work(B: Blocks) -> Work:
     return Work(
         np.zeros((V, 2)), np.zeros((V, 2, m)), np.zeros((n, n)), np.zeros(n, dtype=np.int64),
         np.zeros(n), np.zeros((b, m)), np.zeros((b, m)), np.zeros((b, m)),
+        np.zeros((b, m)),
     )  # fmt: skip
 
 
@@ -129,22 +153,64 @@ def solve(A, left, x):
 
 
 @inner
+def set_loads(B, drive, n, W):
+    """Set W.load: weight in the moved frame, and the forces of step n where blocks are now."""
+    for b in range(B.size.size):
+        for p in range(B.size[b]):
+            W.load[b, p] = B.load[b, p]
+            if p < 2:
+                W.load[b, p] -= B.M[b, p, p] * drive.ground[n, p]
+    for l in range(drive.turns.size):
+        b, x, y = drive.block[n, l], drive.force[n, l, 0], drive.force[n, l, 1]
+        if b < 0:
+            continue
+        if drive.turns[l] == 1:
+            c, s = math.cos(W.q[b, 2]), math.sin(W.q[b, 2])
+            x, y = c * x - s * y, s * x + c * y
+        for e in range(3):
+            a, w = drive.corner[n, l, e], drive.share[n, l, e]
+            for p in range(B.size[b]):
+                W.load[b, p] += w * (W.T[a, 0, p] * x + W.T[a, 1, p] * y)
+
+
+@inner
+def set_held(B, drive, n, part, W):
+    """Set W.d of held blocks: their share in the motion of step n."""
+    for b in range(B.size.size):
+        for p in range(3 if B.equation[b] < 0 else 0):
+            W.d[b, p] = part * drive.moved[n, b, p]
+
+
+@inner
+def change(B, C, k, g, d, held):
+    """Gap or slip gained over the step: gradient g times increments; ``held``: of held blocks."""
+    total = 0.0
+    for one in range(2):
+        b = C.who[k, 2 * one]
+        if held and B.equation[b] >= 0:
+            continue
+        for p in range(B.size[b]):
+            total += g[k, one, p] * d[b, p]
+    return total
+
+
+@inner
 def right_hand_side(B, law, C, h, W):
     """Set W.rhs: momentum, loads, elastic forces, springs and friction at the start of the step."""
     for b in range(B.size.size):
         at = B.equation[b]
         for p in range(B.size[b] if at >= 0 else 0):
-            total = B.load[b, p]
+            total = W.load[b, p]
             for r in range(B.size[b]):
                 total += 2 * B.M[b, p, r] * W.v[b, r] / h - B.K[b, p, r] * W.q[b, r]
             W.rhs[at + p] = total
     for k in range(C.used[0]):
         if C.state[k] == OPEN:
             continue
-        normal_force = -law.normal * C.gap[k]
-        drag = -law.shear * C.slip[k]
+        normal_force = -law.normal * (C.gap[k] + change(B, C, k, C.n, W.d, held=True))
+        drag = -law.shear * (C.slip[k] + change(B, C, k, C.t, W.d, held=True))
         if C.state[k] == SLIDES:
-            drag = -C.way[k] * law.friction * C.force[k]
+            drag = -C.way[k] * C.friction[k] * C.force[k]
         for one in range(2):
             b = C.who[k, 2 * one]
             for p in range(B.size[b] if B.equation[b] >= 0 else 0):
@@ -152,29 +218,22 @@ def right_hand_side(B, law, C, h, W):
 
 
 @inner
-def change(B, C, k, g, d):
-    """Gap or slip gained over the step: its gradient g times the increments."""
-    total = 0.0
-    for one in range(2):
-        b = C.who[k, 2 * one]
-        for p in range(B.size[b]):
-            total += g[k, one, p] * d[b, p]
-    return total
-
-
-@inner
 def review(B, law, C, d):
     """States and normal forces at the end of the step: contacts that change, friction error."""
     changed, error, largest = 0, 0.0, 0.0
     for k in range(C.used[0]):
-        force = -law.normal * (C.gap[k] + change(B, C, k, C.n, d))
-        trial = law.shear * (C.slip[k] + change(B, C, k, C.t, d))
-        state = STICKS
-        if force < (law.tension if C.state[k] == OPEN else -law.tension):
+        force = -law.normal * (C.gap[k] + change(B, C, k, C.n, d, held=False))
+        trial = law.shear * (C.slip[k] + change(B, C, k, C.t, d, held=False))
+        state, pull, cohesion = STICKS, 0.0, 0.0
+        if C.bond[k] >= 0 and C.state[k] == STICKS:
+            pull, cohesion = law.bonds.pull[C.bond[k]], law.bonds.cohesion[C.bond[k]]
+        if force < (law.tension if C.state[k] == OPEN else -law.tension - pull):
             state = OPEN
-        elif abs(trial) > law.friction * force + law.tension:
+        elif abs(trial) > max(C.friction[k] * force + cohesion, 0.0) + law.tension:
             state = SLIDES
         direction, pressed = math.copysign(1.0, trial), max(force, 0.0)
+        if state == STICKS and C.bond[k] >= 0:
+            pressed = force
         if state != C.state[k] or (state == SLIDES and direction != C.way[k]):
             changed += 1
         if state == SLIDES:
@@ -217,16 +276,21 @@ def step(B, law, C, h, W):
 
 @inner
 def accept(B, law, C, h, keep, W):
-    """Move on by W.d: coordinates, velocities times ``keep``, anchors of what slipped."""
+    """Move on by W.d: coordinates, velocities times ``keep``, anchors of what slipped, bonds."""
     for k in range(C.used[0]):
+        if C.bond[k] >= 0 and C.state[k] != STICKS:
+            law.bonds.intact[C.bond[k]] = 0
         if C.state[k] == SLIDES:
-            end = C.along[k, 0] + change(B, C, k, C.t, W.d) / C.along[k, 3]
-            stretch = C.way[k] * law.friction * C.force[k] / law.shear
+            end = C.along[k, 0] + change(B, C, k, C.t, W.d, held=False) / C.along[k, 3]
+            stretch = C.way[k] * C.friction[k] * C.force[k] / law.shear
             C.anchor[k] = end - stretch / C.along[k, 3]
     for b in range(B.size.size):
         for p in range(B.size[b] if B.equation[b] >= 0 else 0):
             W.q[b, p] += W.d[b, p]
             W.v[b, p] = keep * (2 * W.d[b, p] / h - W.v[b, p])
+        for p in range(3 if B.equation[b] < 0 else 0):
+            W.q[b, p] += W.d[b, p]
+            W.v[b, p] = W.d[b, p] / h
 
 
 @inner
@@ -243,9 +307,9 @@ def energy(B, law, C, W):
         if C.state[k] != OPEN:
             total += 0.5 * C.force[k] ** 2 / law.normal
         if C.state[k] == SLIDES:
-            total += 0.5 * (law.friction * C.force[k]) ** 2 / law.shear
+            total += 0.5 * (C.friction[k] * C.force[k]) ** 2 / law.shear
         if C.state[k] == STICKS:
-            total += 0.5 * law.shear * (C.slip[k] + change(B, C, k, C.t, W.d)) ** 2
+            total += 0.5 * law.shear * (C.slip[k] + change(B, C, k, C.t, W.d, held=False)) ** 2
     return total
 
 
@@ -259,23 +323,26 @@ def remember(C, old):
 
 
 @kernel
-def advance(B, law, C, old, W, h, n_steps, keep, cuts):  # noqa: PLR0913  all there is
-    """Make steps of h from W.q, W.v; the energy at the end, NaN if a step cannot be made.
+def advance(B, law, C, old, W, h, drive, keep, cuts):  # noqa: PLR0913  all there is
+    """Make the steps of a drive from W.q, W.v; the energy at the end, NaN if one cannot be made.
 
     Steps that do not settle are cut by three, down to h / 3^8; ``cuts`` (1,) counts them.
     """
-    for _ in range(n_steps):
+    for n in range(len(drive.ground)):
         done, part = 0.0, h
         while done < h * (1 - 1e-9):
             part = min(part, h - done)
             remember(C, old)
             find_contacts(B, law, W.q, old, C, W.P, W.T)
+            set_loads(B, drive, n, W)
+            set_held(B, drive, n, part / h, W)
             while not step(B, law, C, part, W):
                 part /= STEP_FACTOR
                 cuts[0] += 1
                 if part < MIN_STEP_RATIO * h:
                     return math.nan
                 find_contacts(B, law, W.q, old, C, W.P, W.T)
+                set_held(B, drive, n, part / h, W)
             accept(B, law, C, part, keep ** (part / h), W)
             done += part
             part *= STEP_FACTOR

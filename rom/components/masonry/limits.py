@@ -2,7 +2,8 @@
 
 If any forces in the joints balance the weight, press and stay within friction, dry masonry stands
 (the lower bound theorem; with friction it is exact for joints that dilate as they slip).
-`arch` and `wall` lay the stones, `stands` looks for such forces by linear programming,
+`arch` and `wall` lay the stones, `stands` looks for such forces by linear programming and
+`load_factor` for the largest load,
 `minimum_thickness` is the closed form for circular arches of infinitely many voussoirs.
 
 Source:
@@ -11,16 +12,22 @@ Source:
     12 (1978) 1853.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.optimize import brentq, linprog, minimize_scalar
-from scipy.sparse import coo_matrix
+from scipy.sparse import coo_matrix, hstack
 
+from rom.components.masonry.actions import BaseMotion, MovingLoad, PointLoad, Wind
 from rom.components.masonry.stones import Masonry, Stone, stone, touching
 from rom.errors import ConfigError, SolverError
-from rom.model import Array
+from rom.model import Array, Index
+
+Load = PointLoad | MovingLoad | Wind | BaseMotion
+MAX_RATIO = 0.4  # thickness over radius up to which closed form and linear programming agree
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,7 +91,7 @@ def arch(
     Raises:
         ConfigError: if this is no arch.
     """
-    if n < 2 or not 0 < thickness < 2 * radius or not 0 < half_angle <= np.pi / 2:
+    if n < 2 or not 0 < thickness < 2 * radius or not 0 < half_angle < np.pi:
         raise ConfigError(
             f"no arch has {n} voussoirs, radius {radius}, thickness {thickness}, half angle "
             f"{half_angle}."
@@ -162,19 +169,78 @@ def _box(left: float, right: float, bottom: float, top: float) -> Array:
     return np.array([[left, bottom], [right, bottom], [right, top], [left, top]])
 
 
-def stands(masonry: Masonry) -> bool:
-    """Whether forces in the joints can carry the weight of rigid stones where they lie.
+def stands(masonry: Masonry, loads: Sequence[Load] = (), *, t: float = 0.0) -> bool:
+    """Whether forces in the joints can carry weight and loads of rigid stones where they lie.
 
-    Normal forces at the corners press, tangential ones stay within friction, and every stone that
-    is not held is in equilibrium.
+    Normal forces at the corners press, or pull no more than glue bears, tangential ones stay within
+    friction and cohesion, and every stone that is not held is in equilibrium.
+
+    Args:
+        masonry: the stones.
+        loads: what acts besides weight.
+        t: time of the loads [s].
 
     Raises:
+        ConfigError: if a load cannot be.
         SolverError: if linear programming fails.
     """
-    B, C = masonry.blocks(), touching(masonry)
-    row = np.where(B.equation >= 0, 3 * (np.cumsum(B.equation >= 0) - 1), -1)
+    system = _joint_forces(masonry)
+    carried = system.weight + _applied(masonry, loads, t)
+    found = _solve(system, carried, np.zeros((len(carried), 0)))
+    if found.status not in (0, 2):
+        raise SolverError(f"no answer whether the masonry stands: {found.message}")
+    return bool(found.status == 0)
+
+
+def load_factor(masonry: Masonry, loads: Sequence[Load], *, t: float = 0.0) -> float:
+    """By how much loads may be multiplied until rigid stones, under their weight too, give way.
+
+    Args:
+        masonry: the stones.
+        loads: what is multiplied; of a motion of the ground, its inertia.
+        t: time of the loads [s].
+
+    Returns:
+        The largest factor [1]; infinite if the stones bear any.
+
+    Raises:
+        ConfigError: if a load cannot be; if the stones do not even bear their weight.
+        SolverError: if linear programming fails.
+
+    Source:
+        Livesley (1978), as above.
+    """
+    system, load = _joint_forces(masonry), _applied(masonry, loads, t)
+    found = _solve(system, system.weight, load[:, None])
+    if found.status == 2:
+        raise ConfigError("the masonry does not stand under its own weight; no load factor exists.")
+    if found.status not in (0, 3):
+        raise SolverError(f"no load factor: {found.message}")
+    return float(found.x[-1]) if found.status == 0 else np.inf
+
+
+class _System(NamedTuple):
+    """Equilibrium of free stones: balance of joint forces, weight, and Coulomb's law."""
+
+    balance: Any
+    weight: Array
+    slip: Any
+    cohesion: Array
+    pull: Array
+
+
+def _free_rows(masonry: Masonry) -> tuple[Index, Array]:
+    """First equation of each stone, -1 for held ones, and (3,) scale of the equations."""
+    free = ~np.isin(np.arange(len(masonry.stones)), masonry.held)
+    row = np.where(free, 3 * (np.cumsum(free) - 1), -1)
+    M = masonry.stones[0].M
+    return row, np.r_[1.0, 1.0, 1 / np.sqrt(M[2, 2] / M[0, 0])]
+
+
+def _joint_forces(masonry: Masonry) -> _System:
+    B, C, bonds = masonry.blocks(), touching(masonry), masonry.law.bonds
+    row, scale = _free_rows(masonry)
     n, entries = int(C.used[0]), []
-    scale = np.r_[1.0, 1.0, 1 / np.sqrt(B.M[0, 2, 2] / B.M[0, 0, 0])]
     for one in range(2):
         at = row[C.who[:, 2 * one]]
         for k in np.flatnonzero(at >= 0):
@@ -182,21 +248,51 @@ def stands(masonry: Masonry) -> bool:
                 entries.append((at[k] + p, k, scale[p] * C.n[k, one, p]))
                 entries.append((at[k] + p, n + k, scale[p] * C.t[k, one, p]))
     i, j, values = np.array(entries).T
-    shape = (3 * int((B.equation >= 0).sum()), 2 * n)
+    shape = (3 * int((row >= 0).sum()), 2 * n)
     balance = coo_matrix((values, (i.astype(int), j.astype(int))), shape=shape)
-    weight = (B.load[B.equation >= 0, :3] * scale).ravel()
-    k, ones = np.arange(n), np.ones(n)
-    mu = np.full(n, masonry.friction)
+    k, ones, mu = np.arange(n), np.ones(n), C.friction
     slip = coo_matrix(
         (np.r_[-mu, ones, -mu, -ones], (np.r_[k, k, n + k, n + k], np.r_[k, n + k, k, n + k]))
     )
-    found = linprog(
-        np.zeros(2 * n), slip, np.zeros(2 * n), balance, -weight / np.abs(weight).max(),
-        [(0, None)] * n + [(None, None)] * n, method="highs",
+    pull, cohesion = np.zeros(n), np.zeros(n)
+    for bond, who in enumerate(bonds.who):
+        same = (C.who == who).all(axis=1)
+        pull[same], cohesion[same] = bonds.pull[bond], bonds.cohesion[bond]
+    weight = (B.load[row >= 0, :3] * scale).ravel()
+    return _System(balance, weight, slip, np.tile(cohesion, 2), pull)
+
+
+def _applied(masonry: Masonry, loads: Sequence[Load], t: float) -> Array:
+    """Forces and moments of loads on the free stones, scaled as the equations."""
+    row, scale = _free_rows(masonry)
+    corners, centres = np.vstack([s.outline for s in masonry.stones]), masonry.start()[:, :2]
+    total = np.zeros(3 * int((row >= 0).sum()))
+    for load in loads:
+        if isinstance(load, BaseMotion):
+            pull = -load.begin(masonry)(np.array([t]))[0]
+            for b in np.flatnonzero(row >= 0):
+                total[row[b] : row[b] + 2] += masonry.stones[b].M[0, 0] * pull
+            continue
+        found = load.begin(masonry)(np.array([t]))
+        for b, corner, share, force in zip(*(x[0] for x in found[:4]), strict=True):
+            if b >= 0 and row[b] >= 0:
+                r = share @ corners[corner] - centres[b]
+                wrench = np.r_[force, r[0] * force[1] - r[1] * force[0]]
+                total[row[b] : row[b] + 3] += scale * wrench
+    return total
+
+
+def _solve(system: _System, carried: Array, factored: Array) -> Any:
+    """The largest sum of factors of the columns of ``factored``; they come last."""
+    unit, n = float(np.abs(carried).max()), len(system.pull)
+    n_factors = factored.shape[1]
+    slip = hstack([system.slip, coo_matrix((2 * n, n_factors))])
+    balance = hstack([system.balance, factored / unit])
+    bounds = [(-x / unit, None) for x in system.pull] + [(None, None)] * n
+    return linprog(
+        np.r_[np.zeros(2 * n), -np.ones(n_factors)], slip, system.cohesion / unit, balance,
+        -carried / unit, bounds + [(0, None)] * n_factors, method="highs",
     )  # fmt: skip
-    if found.status not in (0, 2):
-        raise SolverError(f"no answer whether the masonry stands: {found.message}")
-    return bool(found.status == 0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -250,9 +346,10 @@ def minimum_thickness(*, half_angle: float = np.pi / 2, true_weight: bool = True
         )
         return best.fun - (1 - ratio / 2), best.x, H
 
-    if not 0 < half_angle <= np.pi / 2 or lowest(1e-6)[0] >= 0:
+    if not 0 < half_angle < np.pi or lowest(1e-6)[0] >= 0 or lowest(MAX_RATIO)[0] <= 0:
         raise ConfigError(
-            f"half_angle = {half_angle} rad: between 0 and pi / 2, and not too flat for hinges."
+            f"half_angle = {half_angle} rad: it must lie between 0 and pi, not too flat for "
+            f"hinges, and not so far round that the arch is thicker than {MAX_RATIO} of its radius."
         )
-    ratio = brentq(lambda x: lowest(x)[0], 1e-6, 0.5, xtol=1e-15)
+    ratio = brentq(lambda x: lowest(x)[0], 1e-6, MAX_RATIO, xtol=1e-15)
     return Limit(float(ratio), *map(float, lowest(ratio)[1:]))

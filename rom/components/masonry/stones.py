@@ -1,8 +1,9 @@
 """Dry masonry: arches and walls of stones that press, rock and slip on each other.
 
 A stone is a polygon with a frame and elastic shapes: three uniform strains, as in discontinuous
-deformation analysis, or the modes of a reduced body. `simulate` moves an assembly of stones.
-`rom.components.masonry.limits` lays arches and walls, and asks statics what they could carry.
+deformation analysis, or the modes of a reduced body. `rom.components.masonry.motion` moves an
+assembly of stones, `rom.components.masonry.limits` lays arches and walls, and asks statics what
+they could carry.
 
 Source:
     After Shi's discontinuous deformation analysis (1988) and its use for masonry by Bagi.
@@ -19,17 +20,16 @@ from scipy.sparse.csgraph import reverse_cuthill_mckee
 from rom.arguments import one_of
 from rom.body.flexible import FlexibleBody
 from rom.components.masonry.block_contact import (
-    OPEN,
-    SLIDES,
     Blocks,
+    Bonds,
     Contacts,
     Law,
     contacts,
     find_contacts,
 )
-from rom.components.masonry.discontinuous_deformation import advance, work
-from rom.errors import ConfigError, MaterialError, ModelError, SolverError
-from rom.model import Array
+from rom.components.masonry.joints import Joint, bonds, friction_of_pairs
+from rom.errors import ConfigError, MaterialError, ModelError
+from rom.model import Array, Index
 
 # distance of corner and edge from which they are watched, of the shortest edge
 CONTACT_REACH_RATIO = 0.05
@@ -164,9 +164,12 @@ class Masonry:
         friction: tangent of the angle of friction [1].
         gravity: (2,) [m/s^2].
         reach: distance within which corners watch edges [m]; None for 5 % of the shortest edge.
+        joints: laws of joints where they are not just friction; the last that fits a joint counts.
+        thickness: out of the plane [m], for strengths of joints and pressure of wind.
 
     Raises:
-        ConfigError: if contacts do not press, friction pushes, or a held stone does not exist.
+        ConfigError: if contacts do not press, friction pushes, or a held stone does not exist; if a
+            joint is between stones that do not exist, or glued where they do not touch.
     """
 
     stones: tuple[Stone, ...]
@@ -175,6 +178,8 @@ class Masonry:
     friction: float
     gravity: tuple[float, float] = (0.0, -9.81)
     reach: float | None = None
+    joints: tuple[Joint, ...] = ()
+    thickness: float = 1.0
 
     def __post_init__(self) -> None:
         if not (self.stiffness > 0 and self.friction >= 0):
@@ -184,24 +189,41 @@ class Masonry:
             )
         if not set(self.held) <= set(range(len(self.stones))):
             raise ConfigError(f"held are {self.held} of the stones 0 to {len(self.stones) - 1}.")
+        if not 0 < self.thickness < np.inf:
+            raise ConfigError(f"masonry is not {self.thickness} m thick.")
 
     @property
     def law(self) -> Law:
-        """Numbers of the contact law."""
+        """Numbers of the contact law, and the bonds of joints with strength, all intact."""
+        law = self._watch()
+        if not any(joint.cohesion or joint.tension for joint in self.joints):
+            return law
+        C, corners = touching(self), np.vstack([s.outline for s in self.stones])
+        found = bonds(self.joints, C, corners, len(self.stones), law.reach)
+        pull, cohesion = self.thickness * found.pull, self.thickness * found.cohesion
+        return law._replace(bonds=found._replace(pull=pull, cohesion=cohesion))
+
+    def _watch(self) -> Law:
         edges = [np.linalg.norm(s.outline - np.roll(s.outline, 1, axis=0), axis=1).min()
                  for s in self.stones]  # fmt: skip
         weight = np.mean([s.M[0, 0] for s in self.stones]) * np.linalg.norm(self.gravity)
         reach = CONTACT_REACH_RATIO * min(edges) if self.reach is None else self.reach
-        p = float(self.stiffness)
+        p, free = float(self.stiffness), np.zeros(0)
+        friction = friction_of_pairs(self.joints, self.friction, len(self.stones))
         return Law(
-            p, SHEAR_STIFFNESS_RATIO * p, float(self.friction), TENSION_RTOL * weight, float(reach)
-        )
+            p, SHEAR_STIFFNESS_RATIO * p, TENSION_RTOL * weight, float(reach), friction,
+            Bonds(np.zeros((0, 5), dtype=np.int64), free, free, free.astype(np.int64)),
+        )  # fmt: skip
 
     def start(self) -> Array:
         """(B, 3 + R) coordinates at the start [m, rad]: mass centre, angle zero, no deformation."""
         q = np.zeros((len(self.stones), 3 + self.R))
         q[:, :2] = [s.centre for s in self.stones]
         return q
+
+    def first_corners(self) -> Index:
+        """(B + 1,) number of the first corner of each stone, and of all corners."""
+        return np.cumsum([0, *(len(s.outline) for s in self.stones)])
 
     @property
     def R(self) -> int:
@@ -211,7 +233,7 @@ class Masonry:
     def blocks(self) -> Blocks:
         """The arrays of the kernels; neighbours get neighbouring equations."""
         m, sizes = 3 + self.R, np.array([3 + len(s.K) for s in self.stones])
-        first = np.cumsum([0, *(len(s.outline) for s in self.stones)])
+        first = self.first_corners()
         corner, shape = np.zeros((first[-1], 2)), np.zeros((first[-1], 2, self.R))
         M, K, load = (np.zeros((len(sizes), *d)) for d in ((m, m), (m, m), (m,)))
         for b, (s, n) in enumerate(zip(self.stones, sizes, strict=True)):
@@ -222,7 +244,7 @@ class Masonry:
         free = np.ones(len(sizes), dtype=bool)
         free[list(self.held)] = False
         B = Blocks(first, corner, shape, sizes, np.where(free, 0, -1), M, K, load)
-        who = _touching(B, self.law, self.start()).who[:, [0, 2]]
+        who = _touching(B, self._watch(), self.start()).who[:, [0, 2]]
         graph = csr_matrix(coo_matrix((np.ones(len(who)), who.T), shape=(len(sizes),) * 2))
         graph = (graph + graph.T)[free][:, free]
         order = np.flatnonzero(free)[reverse_cuthill_mckee(csr_matrix(graph), symmetric_mode=True)]
@@ -233,7 +255,7 @@ class Masonry:
 
 def touching(masonry: Masonry) -> Contacts:
     """Where the stones touch at the start, with gradients of gap and slip."""
-    return _touching(masonry.blocks(), masonry.law, masonry.start())
+    return _touching(masonry.blocks(), masonry._watch(), masonry.start())
 
 
 def _touching(B: Blocks, law: Law, q: Array) -> Contacts:
@@ -242,123 +264,3 @@ def _touching(B: Blocks, law: Law, q: Array) -> Contacts:
     find_contacts(B, law, q, contacts(0, m), C, P, T)
     rows: list[Any] = [C.used, *(x[: C.used[0]] for x in C[1:])]
     return Contacts(*rows)
-
-
-@dataclass(frozen=True)
-class Motion:
-    """Stones in motion.
-
-    Attributes:
-        masonry: the stones.
-        t: (n,) times [s].
-        q, v: (n, B, 3 + R) coordinates and rates: mass centre [m], angle [rad], elastic.
-        energy: (n,) kinetic, elastic, potential, and of the contacts [J].
-        contacts: those at the end.
-        cuts: how often a step was cut.
-    """
-
-    masonry: Masonry
-    t: Array
-    q: Array
-    v: Array
-    energy: Array
-    contacts: Contacts
-    cuts: int
-
-    def outlines(self, k: int = -1) -> list[Array]:
-        """The (corners, 2) outline of each stone at time k [m]."""
-        return [
-            x[:2] + (s.outline - s.centre + s.shapes @ x[3 : 3 + len(s.K)]) @ _turned(x[2]).T
-            for s, x in zip(self.masonry.stones, self.q[k], strict=True)
-        ]
-
-    def stress(self, k: int = -1) -> Array:
-        """(B, 3) stress xx, yy, xy in body axes of stones with uniform strain [Pa m], per depth."""
-        stones = self.masonry.stones
-        areas = [polygon_moments(s.outline)[0] for s in stones]
-        found = [s.K @ x[3 : 3 + len(s.K)] for s, x in zip(stones, self.q[k], strict=True)]
-        return np.array(found) / np.array(areas)[:, None]
-
-    def joints(self) -> dict[tuple[int, int], tuple[Array, Array]]:
-        """For each pair of stones that touch at the end: centre of pressure, force on the first.
-
-        Both (2,) [m], [N]; the centres along an arch are its line of thrust.
-        """
-        C, law = self.contacts, self.masonry.law
-        sums: dict[tuple[int, int], tuple[Array, Array, float]] = {}
-        corners = np.vstack(self.outlines())
-        for k in range(C.used[0]):
-            if C.state[k] == OPEN or C.force[k] <= 0:
-                continue
-            (i, a, j), normal = C.who[k, :3], C.along[k, 1:3]
-            slide = C.way[k] * law.friction * C.force[k]
-            drag = slide if C.state[k] == SLIDES else law.shear * C.slip[k]
-            force = C.force[k] * normal - drag * np.array([-normal[1], normal[0]])
-            x, f, total = sums.get((min(i, j), max(i, j)), (np.zeros(2), np.zeros(2), 0.0))
-            sums[min(i, j), max(i, j)] = (
-                x + C.force[k] * corners[a], f + (force if i < j else -force), total + C.force[k]
-            )  # fmt: skip
-        return {pair: (x / total, f) for pair, (x, f, total) in sorted(sums.items())}
-
-
-def _turned(angle: float) -> Array:
-    c, s = np.cos(angle), np.sin(angle)
-    return np.array([[c, -s], [s, c]])
-
-
-def simulate(
-    masonry: Masonry,
-    *,
-    t_end: float,
-    dt: float,
-    keep: float = 1.0,
-    save_every: int = 1,
-    q: npt.ArrayLike | None = None,
-    v: npt.ArrayLike | None = None,
-) -> Motion:
-    """Let the stones move.
-
-    Args:
-        masonry: the stones.
-        t_end: duration [s].
-        dt: step [s]; cut where contacts change too much.
-        keep: share of the velocity kept after each step [1]: 1 for dynamics, 0 for statics, 0.95 to
-            0.98 to come to rest.
-        save_every: steps between two saved ones.
-        q: (B, 3 + R) coordinates at the start [m, rad]; None for where the outlines are.
-        v: (B, 3 + R) rates at the start [m/s, rad/s]; None for rest.
-
-    Raises:
-        ConfigError: if times or shapes do not fit.
-        SolverError: if contacts do not settle even in the shortest steps; ``error.solution`` is the
-            motion before.
-    """
-    B, law = masonry.blocks(), masonry.law
-    if not (0 < dt < np.inf and abs(t_end) < np.inf):
-        raise ConfigError(f"t_end = {t_end} s in steps of dt = {dt} s: both must be positive.")
-    n = round(t_end / dt)
-    if n < 1 or save_every < 1 or not 0 <= keep <= 1:
-        raise ConfigError(f"{n} steps, save_every = {save_every}, keep = {keep}: nothing to do.")
-    W, m = work(B), B.load.shape[1]
-    for name, given, target in (("q", q, W.q), ("v", v, W.v)):
-        x = np.asarray(masonry.start() * (name == "q") if given is None else given, dtype=float)
-        if x.shape != target.shape:
-            raise ConfigError(f"{name} has the shape {x.shape}; the stones need {target.shape}.")
-        target[:] = x
-    C, old = (contacts(8 * len(B.corner), m) for _ in range(2))
-    cuts, kept = np.zeros(1, dtype=np.int64), [0, *range(save_every, n + 1, save_every)]
-    Q, U = np.zeros((2, len(kept), *W.q.shape))
-    E = np.full(len(kept), np.nan)
-    Q[0], U[0] = W.q, W.v
-    for k in range(1, len(kept)):
-        E[k] = advance(B, law, C, old, W, dt, save_every, keep, cuts)
-        Q[k], U[k] = W.q, W.v
-        if not np.isfinite(E[k]):
-            raise SolverError(
-                f"contacts do not settle near t = {dt * kept[k]:.6g} s, even in steps of "
-                f"{dt / 3**8:.2g} s.",
-                hint="Use softer contacts, or a smaller dt.",
-                solution=Motion(masonry, dt * np.array(kept[:k]), Q[:k], U[:k], E[:k], C,
-                                int(cuts[0])),
-            )  # fmt: skip
-    return Motion(masonry, dt * np.array(kept), Q, U, E, C, int(cuts[0]))

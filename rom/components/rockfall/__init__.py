@@ -11,8 +11,10 @@ z points down and counts from contact; plug and slab rest in balance with their 
 of a slab, such as those of a reduced finite element body, can take the place of the last mass:
 q'' + 2 zeta omega q' + omega^2 q = phi F_2, z_3 = phi . q.
 
-The laws are simple ones chosen here; no parameter and no result of a test is reproduced. `laws`
-has them, `impact` the motion and what decides over it, `kernels` are compiled.
+`laws` has simple laws of cushion and plug, `layer` the cushion as a layer of sand from its
+geometry, `impact` the motion and what decides over it, `calibration` fits parameters to measured
+histories, `design` says what a gallery bears, `kernels` are compiled. What is published of tests,
+and how far it is met: docs/theory/rockfall.md.
 
 Source:
     After Schellenberg, On the design of rockfall protection galleries, ETH Zurich (2009), and

@@ -11,28 +11,37 @@ import numpy as np
 from scipy.linalg import eigh
 
 from rom.components.rockfall import kernels
-from rom.components.rockfall.laws import Cushion, Shear
+from rom.components.rockfall.laws import GRAVITY, Cushion, Shear
+from rom.components.rockfall.layer import Layer
 from rom.errors import ConfigError, ModelError, SolverError
 from rom.model import Array
 from rom.rotation import skew
 
-GRAVITY = 9.81  # m/s^2
 STEP_RATIO = 0.1  # time step times the highest frequency
 STATES = ("whole", "cracked", "punched")
+# with no `t_end`: the longest periods in which no peak may have grown before an impact is over,
+# two for beats of slab and plug; and steps after which a motion that never ends is refused
+QUIET_PERIODS, MAX_STEPS = 2, 20_000_000
+NEARLY_THROUGH = 0.9  # of the limit of a cushion, where steps begin to miss it
+PARTS = (1, 4, 7, 10, 17)  # where time, ways, speeds, forces and energies end in a row
 
 
 @dataclass(frozen=True, slots=True)
 class Slab:
     """Modes of the slab on its supports, mass-normalised, as the plug feels them.
 
+    It yields where the force under the plug that would deflect it as far statically reaches its
+    capacity, by the shape of that deflection: the modes go by kappa k phi / omega^2, kappa under
+    the plug, and capacity times kappa is lost.
+
     Attributes:
         phi: (r,) deflection under the plug per modal coordinate [kg^-1/2].
         omega: (r,) frequencies [rad/s].
         damping: share of critical damping of all modes [1].
-        capacity: force at which a slab of one mode yields [N].
+        capacity: force under the plug at which the slab yields [N].
 
     Raises:
-        ModelError: if a slab of several modes has a capacity, or its modes do not fit.
+        ModelError: if its modes do not fit, or a number is out of its range.
     """
 
     phi: Array
@@ -43,8 +52,15 @@ class Slab:
     def __post_init__(self) -> None:
         if np.size(self.phi) != np.size(self.omega) or not (np.asarray(self.omega) > 0).all():
             raise ModelError("a slab needs as many phi as omega, and supports that hold it.")
-        if np.size(self.phi) > 1 and np.isfinite(self.capacity):
-            raise ModelError(f"a slab of {np.size(self.phi)} modes cannot yield; take one mass.")
+        if not (np.isfinite(self.phi).all() and np.isfinite(self.omega).all()):
+            raise ModelError("the modes of the slab are not finite.")
+        if not np.any(self.phi):
+            raise ModelError("no mode of the slab moves under the plug; move the plug.")
+        if not (self.capacity > 0 and 0 <= self.damping < np.inf):
+            raise ModelError(
+                f"capacity = {self.capacity} N, damping = {self.damping}: needed are capacity > 0, "
+                "damping >= 0."
+            )
 
     @classmethod
     def of_mass(cls, mass: float, stiffness: float, **more: float) -> "Slab":
@@ -60,7 +76,7 @@ class Slab:
     @classmethod
     def of_body(
         cls, body: Any, patch: str, supports: tuple[str, ...], *, down: Any = (0.0, 0.0, -1.0),
-        n: int | None = None, damping: float = 0.05,
+        n: int | None = None, damping: float = 0.05, capacity: float = np.inf,
     ) -> "Slab":  # fmt: skip
         """Modes of a reduced body.
 
@@ -71,11 +87,12 @@ class Slab:
             down: (3,) direction of the blow, body frame.
             n: modes kept, lowest first; None for all.
             damping: share of critical damping [1].
+            capacity: force under the plug at which it yields [N].
         """
         omega, V = body.modes(n, fixed=supports)
         m = body.marker(patch)
         reach = np.hstack([np.eye(3), -skew(m.point), m.translation])
-        return cls(np.asarray(down, dtype=float) @ reach @ V, omega, damping)
+        return cls(np.asarray(down, dtype=float) @ reach @ V, omega, damping, capacity)
 
     @property
     def stiffness(self) -> float:
@@ -100,13 +117,13 @@ class Gallery:
     boulder: float
     height: float
     plug: float
-    cushion: Cushion
+    cushion: Cushion | Layer
     shear: Shear
     slab: Slab
     weight: bool = True
 
     def __post_init__(self) -> None:
-        if not (self.boulder > 0 and self.plug > 0 and self.height > 0):
+        if not all(0 < x < np.inf for x in (self.boulder, self.plug, self.height)):
             raise ConfigError(
                 f"boulder = {self.boulder} kg, plug = {self.plug} kg, height = {self.height} m: "
                 "all must be positive."
@@ -117,11 +134,27 @@ class Gallery:
         """Speed of the boulder at contact [m/s]."""
         return float(np.sqrt(2 * GRAVITY * self.height))
 
+    @property
+    def energy(self) -> float:
+        """What the boulder brings [J]."""
+        return 0.5 * self.boulder * self.speed**2
+
+    @property
+    def longest_period(self) -> float:
+        """Of the slab, boulder and plug on it [s], from above: Dunkerley's sum of squares."""
+        masses = (self.boulder + self.plug) / self.slab.stiffness
+        return float(2 * np.pi * np.sqrt(masses + np.min(self.slab.omega) ** -2.0))
+
     def highest_frequency(self) -> float:
-        """Of the impact [rad/s], the cushion as stiff as at its deepest."""
+        """Of the impact [rad/s], the cushion as stiff as at its deepest.
+
+        Raises:
+            ConfigError: if the cushion cannot take up the energy of the fall.
+        """
         c, phi = self.cushion, np.asarray(self.slab.phi)
-        d = c.penetration(0.5 * self.boulder * self.speed**2)
-        slope = max((c.force(d) - c.force(0.999 * d)) / 0.001, c.exponent * c.force(d) / c.recovery)
+        d = c.penetration(self.energy)
+        share = c.exponent * c.force(d) * d / ((c.exponent + 1) * c.recovery * self.energy)
+        slope = max((c.force(d) - c.force(0.999 * d)) / 0.001, share * c.force(d))
         one, two = np.zeros((2, phi.size + 2))
         one[:2], two[1], two[2:] = (1.0, -1.0), 1.0, -phi
         K = slope / d * np.outer(one, one) + self.shear.stiffness * np.outer(two, two)
@@ -166,46 +199,85 @@ class Impact:
         total = self.energy[:, :6].sum(axis=1) - self.energy[:, 6]
         return total - total[0]
 
+    @property
+    def rebound(self) -> float:
+        """Share of the boulder's energy with which it leaves, at most [1]."""
+        up = np.minimum(self.v[:, 0], 0.0)
+        return float((up.min() / self.v[0, 0]) ** 2)
 
-def strike(g: Gallery, *, t_end: float = 0.15, dt: float | None = None, keep: int = 1000) -> Impact:
+    def through(self, g: Gallery) -> bool:
+        """Whether the last instant kept is nearly at the limit of the cushion of a gallery."""
+        reach = float((self.z[:, 0] - self.z[:, 1]).max())
+        return g.cushion.limit < np.inf and reach > NEARLY_THROUGH * g.cushion.limit
+
+
+def strike(
+    g: Gallery, *, t_end: float | None = None, dt: float | None = None, keep: int = 1000
+) -> Impact:
     """Let the boulder strike: central differences, damping at mid-step.
 
     Args:
         g: what strikes what.
-        t_end: duration [s].
+        t_end: duration [s]; None until the cushion has let go and neither a force nor the
+            deflection has grown for two of the longest periods. Later, weaker blows of a boulder
+            that bounces are left out.
         dt: time step [s]; None for a tenth of the reciprocal of the highest frequency.
         keep: about how many instants to keep.
 
     Raises:
-        ConfigError: for a duration, a step or a number of instants that is not positive.
-        SolverError: if the motion grows without bound because dt is too large; ``error.solution``
-            is what was finite of it.
+        ConfigError: for a duration, a step or a number of instants that is not positive, or a
+            cushion that cannot take up the energy of the fall.
+        SolverError: if the motion grows without bound because dt is too large, the boulder is
+            through the cushion, or the impact does not end; ``error.solution`` is what was finite.
     """
-    if not (0 < t_end < np.inf and keep >= 1 and (dt is None or dt > 0)):
+    if not (
+        (t_end is None or 0 < t_end < np.inf) and keep >= 1 and (dt is None or 0 < dt < np.inf)
+    ):
         raise ConfigError(f"t_end = {t_end} s, dt = {dt} s, keep = {keep}: all must be positive.")
-    n = int(np.ceil(t_end / (STEP_RATIO / g.highest_frequency() if dt is None else dt)))
-    every = max(1, n // keep)
-    numbers = (
+    h = STEP_RATIO / g.highest_frequency() if dt is None else dt
+    if t_end is None:
+        steps = (h, MAX_STEPS, 1, int(np.ceil(QUIET_PERIODS * g.longest_period / h)))
+        rows = 2 * keep
+    else:
+        n = int(np.ceil(t_end / h))
+        steps = (t_end / n, n, max(1, n // keep), 0)
+        rows = n // steps[2] + 1
+    modes = tuple(np.array(x, dtype=float) for x in (g.slab.phi, g.slab.omega))
+    out, last = np.zeros((rows, PARTS[-1] + modes[0].size)), np.zeros(7)
+    filled, over = kernels.strike(_numbers(g), modes, steps, out, last)
+    _refuse(g, out[:filled], last, steps[0], over or t_end is not None)
+    return _impact(out[:filled], last)
+
+
+def _numbers(g: Gallery) -> tuple[tuple[float, ...], ...]:
+    """Masses, cushion, shear and slab, as `kernels.strike` takes them."""
+    groups = (
         (g.boulder, g.plug, GRAVITY if g.weight else 0.0, g.speed),
-        astuple(g.cushion),
+        g.cushion.law,
         (*astuple(g.shear)[:4], 2 * g.shear.damping * np.sqrt(g.shear.stiffness * g.plug)),
         (g.slab.damping, g.slab.capacity, g.slab.stiffness),
     )
-    laws = tuple(tuple(map(float, group)) for group in numbers)
-    modes = tuple(np.array(x, dtype=float) for x in (g.slab.phi, g.slab.omega))
-    out, last = np.zeros((n // every + 1, 17 + modes[0].size)), np.zeros(7)
-    kernels.strike(laws, modes, t_end / n, every, out, last)
+    return tuple(tuple(map(float, group)) for group in groups)
+
+
+def _refuse(g: Gallery, out: Array, last: Array, step: float, over: bool) -> None:
+    """A named error for a motion that broke down or did not end."""
     finite = np.isfinite(out).all(axis=1)
     if not finite.all():
+        reason = f"the impact grows without bound with a step of {step:.3g} s."
+        before = _impact(out[: int(finite.argmin())], last)
+        if before.through(g):
+            reason = f"the boulder is through the cushion of {g.cushion.limit:g} m."
+        raise SolverError(reason, solution=before)
+    if not over:
         raise SolverError(
-            f"the impact grows without bound with a step of {t_end / n:.3g} s.",
-            solution=_impact(out[: int(finite.argmin())], last),
+            f"the peaks of the impact still grow after {out[-1, 0]:.3g} s; give t_end.",
+            solution=_impact(out, last),
         )
-    return _impact(out, last)
 
 
 def _impact(out: Array, last: Array) -> Impact:
-    t, z, v, forces, energy, modal = np.split(out, [1, 4, 7, 10, 17], axis=1)
+    t, z, v, forces, energy, modal = np.split(out, PARTS, axis=1)
     deepest, deflection, plastic = map(float, last[3:6])
     state = STATES[int(last[6])]
     return Impact(
@@ -213,14 +285,21 @@ def _impact(out: Array, last: Array) -> Impact:
     )
 
 
-VARIED_NUMBERS = {  # what `sensitivity` changes: where it stands, and the power of the factor there
+VARIED_NUMBERS = {  # what can be changed: where it stands, and the power of the factor there
     "mass of the boulder": ("boulder", 1.0),
     "height of the fall": ("height", 1.0),
-    "stiffness of the cushion": ("cushion.stiffness", 1.0),
+    "stiffness of the cushion": ("cushion.{stiffness}", 1.0),
     "mass of the plug": ("plug", 1.0),
     "stiffness in shear": ("shear.stiffness", 1.0),
     "stiffness in bending": ("slab.omega", 0.5),
     "damping of the slab": ("slab.damping", 1.0),
+}
+
+
+STRENGTH_NAME = "strength of the cushion"
+FITTED_NUMBERS = VARIED_NUMBERS | {
+    "recovery of the cushion": ("cushion.recovery", 1.0),
+    STRENGTH_NAME: ("cushion.strength", 1.0),
 }
 
 
@@ -235,11 +314,35 @@ def sensitivity(g: Gallery, answer: Any, factors: tuple[float, ...]) -> dict[str
     Returns:
         {parameter: (f,) relative changes of the answer [1]}.
     """
-    first = answer(g)
+    first, names = answer(g), list(VARIED_NUMBERS)
+    if isinstance(g.cushion, Layer) and g.cushion.strength < np.inf:
+        names.append(STRENGTH_NAME)
     return {
-        name: np.array([answer(_scaled(g, path, s**power)) for s in factors]) / first - 1
-        for name, (path, power) in VARIED_NUMBERS.items()
+        name: np.array([answer(scaled(g, {name: s})) for s in factors]) / first - 1
+        for name in names
     }
+
+
+def scaled(g: Gallery, factors: dict[str, float]) -> Gallery:
+    """A gallery with some numbers multiplied by factors.
+
+    Args:
+        g: the gallery.
+        factors: {name: factor [1]}, names of `sensitivity`, "recovery of the cushion", and
+            "strength of the cushion" of a layer.
+
+    Raises:
+        ConfigError: for a name that is none of them.
+    """
+    for name, factor in factors.items():
+        if name not in FITTED_NUMBERS:
+            raise ConfigError(f"{name!r} cannot be varied; known are {', '.join(FITTED_NUMBERS)}.")
+        path, power = FITTED_NUMBERS[name]
+        if name == STRENGTH_NAME and not isinstance(g.cushion, Layer):
+            raise ConfigError("only a Layer has a strength of the cushion.")
+        kind = "modulus" if isinstance(g.cushion, Layer) else "stiffness"
+        g = _scaled(g, path.format(stiffness=kind), factor**power)
+    return g
 
 
 def _scaled(record: Any, path: str, factor: float) -> Any:

@@ -1,6 +1,7 @@
 """What cushion and plug answer to being pressed."""
 
-from dataclasses import astuple, dataclass
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,20 +12,70 @@ from rom.components.rockfall import kernels
 from rom.errors import ConfigError
 from rom.model import Array
 
+GRAVITY = 9.81  # m/s^2
 ROCK_DENSITY = 2600.0  # [kg/m^3]
+# share of the energy that sand gives back: a boulder returns with a sixth of its speed, as the
+# pulse measured on gravel does, see the page on rockfall
+SAND_RECOVERY = 0.03
+
+
+class Resistance(ABC):
+    """What cushions of all laws have in common: a force, and the energy it takes up."""
+
+    __slots__ = ()
+    limit: float
+
+    @property
+    @abstractmethod
+    def law(self) -> tuple[float, ...]:
+        """(8,) the numbers of the law, as `kernels.cushion` takes them."""
+
+    def force(self, d: float, deepest: float = 0.0) -> float:
+        """Force [N] at penetration d after it has been as deep as ``deepest`` [m]."""
+        return kernels.cushion(float(d), float(max(d, deepest)), self.law)
+
+    def penetration(self, energy: float) -> float:
+        """Penetration [m] at which loading has taken up an energy [J].
+
+        Raises:
+            ConfigError: for a negative energy, or one that takes the boulder through the cushion.
+        """
+        if not 0 <= energy < np.inf:
+            raise ConfigError(f"energy = {energy} J: the cushion takes up what the boulder has.")
+
+        law, low, left = self.law, 0.0, energy
+
+        def missing(d: float) -> float:
+            return float(quad(lambda x: kernels.cushion(x, x, law), low, d)[0]) - left
+
+        for high in self._marks():
+            if (rest := missing(high)) >= 0:
+                return float(brentq(missing, low, high))
+            low, left = high, -rest
+        raise ConfigError(
+            f"energy = {energy:.3g} J: the cushion takes up {energy - left:.3g} J before it is "
+            f"pressed through to {self.limit:g} m. Take a thicker or a stiffer one, or a smaller "
+            "boulder."
+        )
+
+    def _marks(self) -> Array:
+        """Penetrations that close in on the limit, or grow without one."""
+        halves = 2.0 ** -np.arange(1, 31)
+        return 1e-3 / halves if self.limit == np.inf else self.limit * (1 - halves)
 
 
 @dataclass(frozen=True, slots=True)
-class Cushion:
+class Cushion(Resistance):
     """Resistance of the cushion to penetration d; it cannot pull.
 
-    Loading k d^n / (1 - d / limit)^m; below the deepest penetration so far a share of it recovers,
-    F_max ((d - d_r) / (d_max - d_r))^n with d_r = (1 - recovery) d_max.
+    Loading k d^n / (1 - d / limit)^m; below the deepest penetration so far it gives back a share of
+    the energy taken up, F_max ((d - d_r) / (d_max - d_r))^n; without compaction d_max - d_r is the
+    same share of d_max.
 
     Attributes:
         stiffness: k [N/m^n].
         exponent: n [1]; 3/2 for a sphere after Hertz, 1 for a spring.
-        recovery: share of the penetration that comes back [1], above 0; 1 is elastic.
+        recovery: share of the energy that comes back [1], above 0; 1 is elastic.
         limit: penetration at which the compacted cushion is rigid [m].
         hardening: m of the compaction [1], 0 for none.
 
@@ -34,12 +85,12 @@ class Cushion:
 
     stiffness: float
     exponent: float = 1.5
-    recovery: float = 1.0
+    recovery: float = SAND_RECOVERY
     limit: float = np.inf
     hardening: float = 0.0
 
     def __post_init__(self) -> None:
-        good = self.stiffness > 0 and self.limit > 0 and 0 < self.recovery <= 1
+        good = 0 < self.stiffness < np.inf and self.limit > 0 and 0 < self.recovery <= 1
         if not (good and self.exponent >= 1 and self.hardening >= 0):
             needed = "stiffness and limit > 0, 0 < recovery <= 1, exponent >= 1, hardening >= 0"
             raise ConfigError(f"{self}: needed are {needed}.")
@@ -66,29 +117,19 @@ class Cushion:
             raise ConfigError(
                 f"boulder = {boulder} kg, lame = {lame} Pa, rock = {rock} kg/m^3: all must be > 0."
             )
-        radius = (3 * boulder / (4 * np.pi * rock)) ** (1 / 3)
+        radius = ball_radius(boulder, rock)
         return cls(4 / 3 * 2.5 * lame / (1 - 0.25**2) * np.sqrt(radius), **more)
 
-    def force(self, d: float, deepest: float = 0.0) -> float:
-        """Force [N] at penetration d after it has been as deep as ``deepest`` [m]."""
-        law = tuple(map(float, astuple(self)))
-        return kernels.cushion(float(d), float(max(d, deepest)), law)
+    @property
+    def law(self) -> tuple[float, ...]:
+        """(8,) the numbers of the law, as `kernels.cushion` takes them."""
+        numbers = (self.recovery, self.exponent, self.stiffness, self.limit, self.hardening, 0, 0)
+        return (kernels.POWER_LAW, *map(float, numbers))
 
-    def penetration(self, energy: float) -> float:
-        """Penetration [m] at which loading has taken up an energy [J].
 
-        Raises:
-            ConfigError: for a negative energy.
-        """
-        if not 0 <= energy < np.inf:
-            raise ConfigError(f"energy = {energy} J: the cushion takes up what the boulder has.")
-        n = self.exponent + 1
-        high = min((n * energy / self.stiffness) ** (1 / n), self.limit * (1 - 1e-9))
-
-        def residual(d: float) -> float:
-            return float(quad(self.force, 0, d, limit=200)[0] - energy)
-
-        return float(brentq(residual, 0, high) if self.hardening > 0 < residual(high) else high)
+def ball_radius(boulder: float, rock: float = ROCK_DENSITY) -> float:
+    """Radius [m] of a ball of a mass [kg] and a density [kg/m^3]."""
+    return float((3 * boulder / (4 * np.pi * rock)) ** (1 / 3))
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,7 +154,7 @@ class Shear:
     damping: float = 0.05
 
     def __post_init__(self) -> None:
-        good = self.stiffness > 0 and self.capacity > 0 and self.ultimate > 0
+        good = 0 < self.stiffness < np.inf and self.capacity > 0 and self.ultimate > 0
         if not (good and self.reinforced >= 0 and self.damping >= 0):
             needed = "stiffness, capacity, ultimate > 0, reinforced, damping >= 0"
             raise ConfigError(f"{self}: needed are {needed}.")
@@ -123,12 +164,12 @@ class CushionForce:
     """The cushion between two markers of a mechanism, for one run of ``mechanism.user_force``.
 
     Args:
-        cushion: its law.
+        cushion: its law, a `Cushion` or a `Layer`.
         down: (3,) direction of the blow, world.
         gap: distance of the markers along it before contact [m].
     """
 
-    def __init__(self, cushion: Cushion, down: Any, gap: float):
+    def __init__(self, cushion: Resistance, down: Any, gap: float):
         self.cushion, self.down, self.gap = cushion, np.asarray(down, dtype=float), gap
         self.t, self.trial, self.deepest = -np.inf, 0.0, 0.0
 

@@ -1,7 +1,9 @@
 """A wind turbine, the NREL 5 MW reference.
 
-`wind_turbine` has blade and tower as rods, `drivetrain` the run-up of the rotor, `blade_element`
-the wind, `whole_turbine` all in one mechanism.
+`wind_turbine` has blade and tower as rods, `drivetrain` the run-up of the rotor, `whole_turbine`
+all in one mechanism. Of the wind, `profiles` has lift and drag, `momentum` the induction, `inflow`
+the dam of the tower, `blading` the loads of a rotor, `blade_element` those on rods, `control`
+torque, pitch and power curve, `operation` the turbine in wind that changes.
 """
 
 from rom.lazy import front

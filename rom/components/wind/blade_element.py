@@ -1,14 +1,13 @@
-"""Wind on the blades of a turbine: quasi-steady lift and drag on each vertex of a rod.
+"""Wind on the blades of a turbine: a balance of momentum on each vertex of a rod.
 
-Each vertex stands for a strip of blade. Air comes with a wind that the rotor has slowed down by one
-factor for all of it, less the velocity of the strip; what flows across the section makes lift and
-drag, all of the past is forgotten. The force follows the motion of the strip, so that it also damps
-flapping: it is a law of one frame, with exact derivatives.
+Each vertex stands for a strip of blade. The strip meets the wind, dammed by the tower if there is
+one, less its own velocity; the rotor slows this air by what lift and drag of its profile take from
+it, at each instant as in steady flow. The force follows the motion of the strip, so that it also
+damps flapping: it is a law of one frame.
 
 Source:
-    Strip theory as in Hansen, Aerodynamics of Wind Turbines, 2008, chapter 6, with a given
-    induction instead of its iteration; chords from Jonkman, Butterfield, Musial, Scott,
-    NREL/TP-500-38060, 2009, table 3-1.
+    Hansen, Aerodynamics of Wind Turbines, 2008, chapters 6 and 9; `momentum` and `inflow` say whose
+    balance and dam.
 """
 
 import math
@@ -20,66 +19,154 @@ import numpy as np
 import numpy.typing as npt
 from numba import carray
 
-from rom.components.wind.wind_turbine import BLADE_LENGTH, HUB_RADIUS
+from rom.arguments import unit_vector
+from rom.components.wind.blading import (
+    AIR_DENSITY,
+    CHORD,
+    ELEMENT_LENGTH,
+    ELEMENT_PROFILE,
+    ELEMENT_TWIST,
+    RADIUS,
+    ROTOR_RADIUS,
+    strip_load,
+)
+from rom.components.wind.inflow import NO_TOWER, TOWER_TUBE, slope_of_wind, wind_at
+from rom.components.wind.momentum import STRIP_WIDTH, induced
+from rom.components.wind.profiles import profiles
+from rom.components.wind.wind_turbine import (
+    BLADE_LENGTH,
+    CONE_ANGLE,
+    HUB_RADIUS,
+    N_BLADES,
+    stations,
+)
 from rom.errors import ConfigError
 from rom.mbs.elements.nonlinear import Elements, compiled_law
 from rom.mbs.elements.rods.bodies import RodBody
 from rom.mbs.elements.rods.energy import rotation_of
-from rom.model import Array, Mask
+from rom.mbs.kernels.compiled import inner
+from rom.model import Array
 
-RADIUS = (2.8667, 5.6, 8.3333, 11.75, 15.85, 19.95, 24.05, 28.15, 32.25, 36.35, 40.45, 44.55, 48.65,
-          52.75, 56.1667, 58.9, 61.6333)  # m from the axis of the rotor  # fmt: skip
-CHORD = (3.542, 3.854, 4.167, 4.557, 4.652, 4.458, 4.249, 4.007, 3.748, 3.502, 3.256, 3.010, 2.764,
-         2.518, 2.313, 2.086, 1.419)  # m  # fmt: skip
-CIRCULAR_RADIUS = 9.7  # distance from the axis [m]: sections inside are circles, without lift
-AIR_DENSITY = 1.225  # [kg/m^3]
-BETZ_INDUCTION = 1 / 3  # of the best rotor
-# one profile for the whole blade, ours: thin plate with the camber of the outer sections
-LIFT_SLOPE, ZERO_LIFT = 2 * math.pi, np.radians(-4.0)
-DRAG_COEFFICIENT, CIRCLE_DRAG_COEFFICIENT = 0.01, 0.5
+# what the law knows of a strip: half density, length, wind (3), axis (3), tower (3), the strip of
+# the balance (5), its twist less that of the frame, and from here on its number of angles and its
+# profile
+TWIST_PLACE, PROFILE_START = 16, 17
+# by which angles differ whose forces make a slope [rad]: errors of the rounding and of the
+# curvature are as large
+SLOPE_STEP = 1e-5
 
 
-def strip(numbers, pose, wanted, answer, space):
-    """Wind on one strip: half density times area, wind (3), lift (2), drag."""
-    given, s = carray(numbers, (7,)), carray(pose, (13,))
-    out, room = carray(answer, (2 + 6 + 72,)), carray(space, (64,))
-    out[:] = 0.0
-    R, J, L = room[0:9].reshape((3, 3)), room[9:18].reshape((3, 3)), room[18:27].reshape((3, 3))
-    rotation_of(s[3:7], R)
-    wx, wy, wz = given[1] - s[7], given[2] - s[8], given[3] - s[9]
-    # across the section: from the pressure side, and from the leading edge
-    a = R[0, 0] * wx + R[1, 0] * wy + R[2, 0] * wz
-    b = R[0, 1] * wx + R[1, 1] * wy + R[2, 1] * wz
-    c = R[0, 2] * wx + R[1, 2] * wy + R[2, 2] * wz
-    k, la, lb, drag = given[0], given[4], given[5], given[6]
-    lift, speed = k * (la * a + lb * b), math.sqrt(a * a + b * b)
-    f, g = lift * b + k * drag * speed * a, -lift * a + k * drag * speed * b
-    for i in range(3):
-        out[2 + i] = -(R[i, 0] * f + R[i, 1] * g)
-        out[1] += out[2 + i] * s[7 + i]
-    if wanted == 0 or speed == 0.0:
-        return
-    J[:] = 0.0
-    J[0, 0] = k * (la * b + drag * (speed + a * a / speed))
-    J[0, 1] = k * (la * a + 2 * lb * b + drag * a * b / speed)
-    J[1, 0] = k * (-2 * la * a - lb * b + drag * a * b / speed)
-    J[1, 1] = k * (-lb * a + drag * (speed + b * b / speed))
-    # by rotations of the frame: the force turns, and the air turns against it
-    L[:] = 0.0
+@inner
+def section_force(g, k, speed, flow, turned, out):
+    """Force on a section, its axes: air of a speed from an angle, a plane of the rotor turned.
+
+    The first axis is downwind without twist, the second towards the trailing edge; ``turned`` is
+    the angle of the normal of the plane from the first axis, ``flow`` that of the air from the
+    second.
+    """
+    axial, across = speed * math.sin(flow + turned), speed * math.cos(flow + turned)
+    strip, profile = g[11 : 11 + STRIP_WIDTH], g[PROFILE_START + 1 :]
+    theta = turned + g[TWIST_PLACE]
+    met = induced(strip, profile, k, theta, axial, across)
+    normal, driving, _ = strip_load(strip, profile, k, theta, met, g[0])
+    c, s = g[1] * math.cos(turned), g[1] * math.sin(turned)
+    out[0] = normal * c + driving * s
+    out[1] = normal * s - driving * c
+
+
+@inner
+def section_slopes(g, k, u, m, out):
+    """(2, 4) how that force grows with the air in the section (2) and with the normal (2).
+
+    With the square of a speed in proportion; with the two angles by differences.
+    """
+    ahead, behind = out[8:10], out[10:12]
+    air, size = u[0] * u[0] + u[1] * u[1], m[0] * m[0] + m[1] * m[1]
+    speed, flow, turned = math.sqrt(air), math.atan2(u[0], u[1]), math.atan2(m[1], m[0])
+    section_force(g, k, speed, flow, turned, ahead)
     for i in range(2):
-        L[i, 0] = J[i, 1] * c
-        L[i, 1] = -J[i, 0] * c
-        L[i, 2] = J[i, 0] * b - J[i, 1] * a
-    L[0, 2] -= g
-    L[1, 2] += f
-    L[2, 0], L[2, 1] = g, -f
+        for j in range(2):
+            out[4 * i + j] = 2.0 * ahead[i] * u[j] / air
+            out[4 * i + 2 + j] = 0.0
+    section_force(g, k, speed, flow + SLOPE_STEP, turned, ahead)
+    section_force(g, k, speed, flow - SLOPE_STEP, turned, behind)
+    for i in range(2):
+        slope = (ahead[i] - behind[i]) / (2.0 * SLOPE_STEP)
+        out[4 * i] += slope * u[1] / air
+        out[4 * i + 1] -= slope * u[0] / air
+    section_force(g, k, speed, flow, turned + SLOPE_STEP, ahead)
+    section_force(g, k, speed, flow, turned - SLOPE_STEP, behind)
+    for i in range(2):
+        slope = (ahead[i] - behind[i]) / (2.0 * SLOPE_STEP)
+        out[4 * i + 2] = -slope * m[1] / size
+        out[4 * i + 3] = slope * m[0] / size
+
+
+@inner
+def turns_of_section(J, u, m, force, out):
+    """(3, 3) how the force in axes of the section grows with their rotation.
+
+    Air and normal turn against the axes, the force with them.
+    """
+    for i in range(2):
+        out[i, 0] = J[4 * i + 1] * u[2] + J[4 * i + 3] * m[2]
+        out[i, 1] = -J[4 * i] * u[2] - J[4 * i + 2] * m[2]
+        out[i, 2] = (J[4 * i] * u[1] - J[4 * i + 1] * u[0]
+                     + J[4 * i + 2] * m[1] - J[4 * i + 3] * m[0])  # fmt: skip
+        out[2, i] = 0.0
+    out[2, 2] = 0.0
+    out[0, 2] -= force[1]
+    out[1, 2] += force[0]
+    out[2, 0], out[2, 1] = force[1], -force[0]
+
+
+@inner
+def spread(R, J, L, W, out):
+    """Write the derivatives of the resisting force: J by the air, L by rotations, W by places."""
     for i in range(3):
         for j in range(3):
             for m in range(3):
                 out[8 + 6 * i + 3 + j] -= R[i, m] * L[m, j]
+            for m in range(2):
                 for n in range(2):
-                    if m < 2:
-                        out[44 + 6 * i + j] += R[i, m] * J[m, n] * R[j, n]
+                    out[44 + 6 * i + j] += R[i, m] * J[4 * m + n] * R[j, n]
+    for i in range(3):
+        for j in range(3):
+            for m in range(3):
+                out[8 + 6 * i + j] -= out[44 + 6 * i + m] * W[m, j]
+
+
+def strip(numbers, pose, wanted, answer, space):
+    """Wind on one strip, see PROFILE_START for the numbers."""
+    k = int(carray(numbers, (PROFILE_START + 1,))[PROFILE_START])
+    g, s = carray(numbers, (PROFILE_START + 1 + 3 * k,)), carray(pose, (13,))
+    out, room = carray(answer, (2 + 6 + 72,)), carray(space, (64,))
+    out[:] = 0.0
+    R, L, W = room[0:9].reshape((3, 3)), room[9:18].reshape((3, 3)), room[18:27].reshape((3, 3))
+    air, u, m, force, J = room[27:30], room[30:33], room[33:36], room[36:38], room[38:50]
+    rotation_of(s[3:7], R)
+    tower = (g[8], g[9], g[10])
+    for i in range(3):
+        air[i] = g[2 + i]
+    wind_at(tower, s[0], s[1], s[2], air)
+    for i in range(3):
+        u[i] = m[i] = 0.0
+        for j in range(3):
+            u[i] += R[j, i] * (air[j] - s[7 + j])
+            m[i] += R[j, i] * g[5 + j]
+    speed = math.sqrt(u[0] * u[0] + u[1] * u[1])
+    if speed == 0.0 or m[0] * m[0] + m[1] * m[1] == 0.0:
+        return
+    section_force(g, k, speed, math.atan2(u[0], u[1]), math.atan2(m[1], m[0]), force)
+    for i in range(3):
+        out[2 + i] = -(R[i, 0] * force[0] + R[i, 1] * force[1])
+        out[1] += out[2 + i] * s[7 + i]
+    if wanted == 0:
+        return
+    section_slopes(g, k, u, m, J)
+    turns_of_section(J, u, m, force, L)
+    slope_of_wind(tower, (s[0], s[1], s[2]), (g[2], g[3]), W)
+    spread(R, J, L, W, out)
 
 
 @cache
@@ -92,7 +179,9 @@ def in_wind(
     blade: RodBody,
     wind: npt.ArrayLike,
     *,
-    induction: float = BETZ_INDUCTION,
+    axis: npt.ArrayLike = (1.0, 0.0, 0.0),
+    cone: float = CONE_ANGLE,
+    tower: bool = False,
     density: float = AIR_DENSITY,
 ) -> RodBody:
     """A blade of the NREL 5 MW turbine in the wind, for `rom.Mechanism.add_nonlinear`.
@@ -103,32 +192,59 @@ def in_wind(
     Args:
         blade: from ``cosserat.body(blade(...))``.
         wind: (3,) velocity of the wind far away, world [m/s].
-        induction: share by which the rotor slows the wind down, 0 to below 1 [1].
+        axis: (3,) of the shaft, downwind, world [1]; the plane of the rotor is normal to it.
+        cone: of the blades, upwind [rad].
+        tower: whether the tower on the origin of the world dams the wind.
         density: of the air [kg/m^3].
 
     Raises:
-        ConfigError: for a wind that is no vector, an induction or a density that cannot be.
+        ConfigError: for a wind that is no vector or comes from behind, or a density that cannot be.
     """
     wind = np.asarray(wind, dtype=float)
     if wind.shape != (3,) or not np.isfinite(wind).all():
         raise ConfigError(f"the wind {wind.tolist()} is no velocity of three numbers.")
-    if not 0.0 <= induction < 1.0 or not density > 0.0:
-        raise ConfigError(f"no rotor has the induction {induction:g} in air of {density:g} kg/m^3.",
-                          hint="The induction lies between 0 and 1.")  # fmt: skip
-    area, lifting = strips(blade)
-    n = area.size
-    lift = LIFT_SLOPE * np.array([np.cos(ZERO_LIFT), -np.sin(ZERO_LIFT)]) * lifting[:, None]
-    drag = np.where(lifting, DRAG_COEFFICIENT, CIRCLE_DRAG_COEFFICIENT)
-    slowed = np.tile((1.0 - induction) * wind, (n, 1))
-    numbers = np.column_stack([0.5 * density * area, slowed, lift, drag])
-    blown = Elements.of(compiled_strip(), np.arange(n)[:, None], numbers)
-    return replace(blade, elements=(*blade.elements, blown))
+    axis = unit_vector("axis", axis)
+    if wind @ axis < 0.0:
+        raise ConfigError(f"the wind {wind.tolist()} comes from behind the rotor.",
+                          hint="The axis of the shaft points downwind.")  # fmt: skip
+    if not density > 0.0:
+        raise ConfigError(f"there is no air of {density:g} kg/m^3.")
+    far = [0.5 * density, *wind, *axis, *(TOWER_TUBE if tower else NO_TOWER)]
+    elements = [
+        _strip_of(k, row, far, cone) for k, row in enumerate(zip(*strips(blade), strict=True))
+    ]
+    return replace(blade, elements=(*blade.elements, *elements))
 
 
-def strips(blade: RodBody) -> tuple[Array, Mask]:
-    """(N + 1,) areas of the strips of the vertices [m^2], and whether they make lift."""
-    radius = HUB_RADIUS + BLADE_LENGTH * np.linspace(0.0, 1.0, blade.rod.h.size + 1)
-    wide = np.zeros_like(radius)
-    wide[:-1] += blade.rod.h / 2
-    wide[1:] += blade.rod.h / 2
-    return wide * np.interp(radius, RADIUS, CHORD), radius > CIRCULAR_RADIUS
+def _strip_of(k: int, row: tuple[float, ...], far: list[float], cone: float) -> Elements:
+    """The element of the strip of vertex k: its middle, length, chord and twist in the frame."""
+    radius, length, chord, twist = row
+    at = np.searchsorted(HUB_RADIUS + np.cumsum(ELEMENT_LENGTH), radius)
+    profile = profiles()[ELEMENT_PROFILE[min(int(at), len(ELEMENT_PROFILE) - 1)]]
+    c = math.cos(cone)
+    of_strip = [
+        c * radius,
+        chord,
+        c * ROTOR_RADIUS,
+        c * HUB_RADIUS,
+        N_BLADES,
+        twist,
+        profile.angle.size,
+    ]
+    numbers = np.concatenate([far[:1], [length], far[1:], of_strip, profile.table.ravel()])
+    return Elements.of(compiled_strip(), np.array([[k]]), numbers[None, :])
+
+
+def strips(blade: RodBody) -> tuple[Array, Array, Array, Array]:
+    """(N + 1,) middles, lengths and chords [m] of the strips of the vertices, and twists [rad].
+
+    The latter against those of the frames, which turn as the segment before the vertex.
+    """
+    eta = np.append(0.0, np.cumsum(blade.rod.h)) / blade.rod.h.sum()
+    edges = np.concatenate([eta[:1], (eta[1:] + eta[:-1]) / 2, eta[-1:]])
+    middles = HUB_RADIUS + BLADE_LENGTH * (edges[1:] + edges[:-1]) / 2
+    table = stations()
+    of_frame = np.radians(np.interp(edges[:-1], table["eta"], table["twist_deg"]))
+    twist = np.radians(np.interp(middles, RADIUS, ELEMENT_TWIST))
+    chord = np.interp(middles, RADIUS, CHORD)
+    return middles, BLADE_LENGTH * np.diff(edges), chord, twist - of_frame

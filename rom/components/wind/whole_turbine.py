@@ -16,16 +16,21 @@ from typing import Any
 import numpy as np
 
 from rom import rotation
+from rom.body import FlexibleBody
 from rom.components.cosserat import body
 from rom.components.wind.blade_element import in_wind
+from rom.components.wind.blading import check_pitch
 from rom.components.wind.wind_turbine import (
+    CONE_ANGLE,
     GEAR_RATIO,
     GENERATOR_INERTIA,
     HUB_INERTIA,
     HUB_OVERHANG,
     N_BLADES,
     SHAFT_DAMPING,
+    SHAFT_HEIGHT,
     SHAFT_STIFFNESS,
+    SHAFT_TILT,
     TOWER_HEIGHT,
     blade,
     tower,
@@ -39,9 +44,6 @@ from rom.mbs.results.solution import Solution
 from rom.mbs.results.state import State
 from rom.model import Array
 
-SHAFT_HEIGHT = 1.96256  # from the top of the tower [m]
-SHAFT_TILT = np.radians(5.0)  # nose up [rad]
-CONE_ANGLE = np.radians(2.5)  # blades upwind, away from the tower [rad]
 HUB_MASS = 56_780.0  # kg
 NACELLE_MASS, NACELLE_CENTRE = 240_000.0, (1.9, 0.0, 1.75)  # kg, m from the top of the tower
 NACELLE_YAW = 2_607_890.0  # kg m^2 about the axis of the tower
@@ -134,8 +136,10 @@ def turbine(  # noqa: PLR0913  one keyword per choice, all with defaults
     cone: float = CONE_ANGLE,
     damped: bool = True,
     wind: float | None = None,
+    pitch: float = 0.0,
     speed: float = 0.0,
     shaft: tuple[float, float] = (SHAFT_STIFFNESS, SHAFT_DAMPING),
+    hub_body: FlexibleBody | None = None,
     shear: float = 1.0,
     torsion: float = 1.0,
 ) -> Turbine:
@@ -149,20 +153,26 @@ def turbine(  # noqa: PLR0913  one keyword per choice, all with defaults
         cone: of the blades, upwind [rad].
         damped: whether blades have the viscosity of the definition.
         wind: its speed along the first axis [m/s], see `rom.components.wind.blade_element`; None:
-            still.
+            still. The tower dams it.
+        pitch: of all blades, leading edge into the wind [rad].
         speed: with which the rotor starts to turn [rad/s].
         shaft: torsional stiffness [N m/rad] and damping [N m s/rad].
+        hub_body: a reduced solid for the hub with interfaces "shaft", "blade_1" to "blade_3", as of
+            ``meshes/turbine_hub.geo``; what it lacks of the mass of the hub sits in its centre.
+            None: rigid.
         shear: factor of this rigidity of blades and tower [1]; with a thousand they are the
             Euler-Bernoulli beams of other programs.
         torsion: factor of this rigidity likewise; some programs know no twist.
 
     Raises:
-        ConfigError: for less than one segment of a blade.
+        ConfigError: for less than one segment of a blade, a pitch of more than a turn, or
+            a solid that is no hub.
         ModelError: if a rod is none, see `cosserat.rod`.
     """
     if segments < 1 or tower_segments < 0:
         raise ConfigError(f"{segments} segments of a blade and {tower_segments} of the tower.",
                           hint="A blade has one or more, a stiff tower none.")  # fmt: skip
+    check_pitch(pitch)
     mech = Mechanism(gravity=(0.0, 0.0, -gravity))
     factors = {"shear": shear, "torsion": torsion}
     top, standing = _tower(mech, tower_segments, factors)
@@ -170,10 +180,13 @@ def turbine(  # noqa: PLR0913  one keyword per choice, all with defaults
     axis, hub = lean @ [1.0, 0.0, 0.0], np.array([0.0, 0.0, TOWER_HEIGHT + SHAFT_HEIGHT])
     hub = hub - HUB_OVERHANG * axis
     nacelle = _nacelle(mech, top)
-    turning = _train(mech, nacelle, (lean, hub, axis), shaft, speed)
+    turning = _hub(mech, hub_body, hub, lean, speed)
+    _train(mech, nacelle, turning, (hub, axis), shaft, speed)
     one = body(blade(segments, damped=damped, **factors))
-    one = one if wind is None else in_wind(one, (wind, 0.0, 0.0))
-    blades = tuple(_blade(mech, k, one, turning, (lean, hub, cone, speed)) for k in range(N_BLADES))
+    if wind is not None:
+        one = in_wind(one, (wind, 0.0, 0.0), axis=axis, cone=cone, tower=True)
+    place = lean, hub, cone, pitch, speed
+    blades = tuple(_blade(mech, k, one, turning, place) for k in range(N_BLADES))
     return Turbine(mech, blades, standing, axis, hub)
 
 
@@ -201,15 +214,37 @@ def _nacelle(mech: Mechanism, top: Marker) -> Part:
     return part
 
 
+def _hub(mech: Mechanism, solid: FlexibleBody | None, at: Array, lean: Array, speed: float) -> Part:
+    """The hub, which carries the blades, rigid or a solid with what else is in it."""
+    pose: dict[str, Any] = {"at": at, "orientation": lean, "omega": (speed, 0.0, 0.0)}
+    if solid is None:
+        return mech.add_rigid("hub", mass=HUB_MASS, inertia=(HUB_INERTIA,) * 3, **pose)
+    missing = {"shaft", *(f"blade_{k + 1}" for k in range(N_BLADES))} - set(solid.markers)
+    if missing:
+        raise ConfigError(f"the hub {solid.name!r} has no interfaces {sorted(missing)}.")
+    part = mech.add_flexible("hub", solid, **pose)
+    own = float(part.second[1, 1] + part.second[2, 2])
+    if not (part.mass < HUB_MASS and own < HUB_INERTIA):
+        raise ConfigError(f"the hub {solid.name!r} has {part.mass:g} kg and {own:g} kg m^2; all of "
+                          f"the hub has {HUB_MASS:g} and {HUB_INERTIA:g}.")  # fmt: skip
+    inside = mech.add_rigid(
+        "in the hub", mass=HUB_MASS - part.mass, inertia=(HUB_INERTIA - own,) * 3, **pose
+    )
+    flange = part.marker("shaft")
+    mech.fixed("drives", flange, inside.marker(part.point(flange)))
+    return part
+
+
 def _train(
     mech: Mechanism,
     nacelle: Part,
-    place: tuple[Array, Array, Array],
+    turning: Part,
+    place: tuple[Array, Array],
     shaft: tuple[float, float],
     speed: float,
-) -> Part:
-    """Gear wheel, generator and hub; the hub, which carries the blades."""
-    lean, hub, axis = place
+) -> None:
+    """Gear wheel and generator, and the shaft to the hub."""
+    hub, axis = place
     behind = nacelle.at
     bearing = nacelle.marker(hub + axis * (axis @ (behind - hub)) - behind)
     at = mech.design_point(bearing)
@@ -220,25 +255,23 @@ def _train(
     generator = mech.add_rigid(
         "generator", mass=GENERATOR_MASS, inertia=(GENERATOR_INERTIA,) * 3, at=at, omega=fast
     )
-    turning = mech.add_rigid(
-        "hub", mass=HUB_MASS, inertia=(HUB_INERTIA,) * 3, at=hub, orientation=lean,
-        omega=(speed, 0.0, 0.0),
-    )  # fmt: skip
     mech.revolute("slow", bearing, wheel.marker(NO_VELOCITY), axis=axis)
     mech.revolute("fast", bearing, generator.marker(NO_VELOCITY), axis=axis)
     mech.gear("gear", "slow", "fast", ratio=GEAR_RATIO)
-    mech.revolute("shaft", wheel.marker(hub - at), turning.marker(NO_VELOCITY), axis=axis)
+    end = turning.marker(NO_VELOCITY if turning.flexible is None else "shaft")
+    mech.revolute("shaft", wheel.marker(mech.design_point(end) - at), end, axis=axis)
     mech.rotational_spring("twist", "shaft", stiffness=shaft[0], damping=shaft[1])
-    return turning
 
 
 def _blade(mech: Mechanism, k: int, one: Any, hub: Part, place: Any) -> Assembly:
     """Blade k on the hub."""
-    lean, centre, cone, speed = place
+    lean, centre, cone, pitch, speed = place
     round_ = rotation.matrix(rotation.exp([2 * np.pi / N_BLADES * k, 0.0, 0.0]))
     A = lean @ round_ @ rotation.matrix(rotation.exp([0.0, -cone, 0.0]))
+    A = A @ rotation.matrix(rotation.exp([0.0, 0.0, -pitch]))
     turning = A.T @ lean @ [speed, 0.0, 0.0]
     added = mech.add_nonlinear(f"blade {k + 1}", one, at=centre, orientation=A, omega=turning)
     root = rotation.matrix(hub.p).T @ (mech.design_point(added.marker("start")) - centre)
-    mech.fixed(f"root {k + 1}", hub.marker(root), added.marker("start"))
+    flange = hub.marker(root if hub.flexible is None else f"blade_{k + 1}")
+    mech.fixed(f"root {k + 1}", flange, added.marker("start"))
     return added

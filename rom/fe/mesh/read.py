@@ -6,6 +6,7 @@ run in a process of their own (`rom.fe.mesh.child`), because hostile or broken f
 
 import hashlib
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +28,7 @@ from rom.fe.mesh.quality import straighten
 from rom.fe.mesh.repair import repair
 from rom.fe.mesh.solid import GEOMETRIES, PROGRAMS, Arrays, SolidMesh
 from rom.fe.mesh.validate import checked
+from rom.model import Array, Index
 from rom.names import check_text
 
 LARGEST_FILE = 2**32  # bytes; some ten million nodes
@@ -114,6 +116,87 @@ def read_mesh(  # noqa: PLR0913  limits and trust beside what is read
     if request["reader"] == "step" and scale != 1.0:
         remarks = [*remarks, _scaled_twice(mesh.size, scale)]
     return checked(mesh, remarks)
+
+
+@dataclass(frozen=True, slots=True)
+class FlatMesh:
+    """Triangles of a plane section.
+
+    Attributes:
+        points: (n, 2) coordinates [m].
+        triangles: (t, 3) corners, counter-clockwise.
+        curves: {name: (k, 2)} nodes of the sides of physical curves, the solid on the left.
+        provenance: where the mesh comes from: path, sha256, parameters, versions.
+    """
+
+    points: Array
+    triangles: Index
+    curves: dict[str, Index]
+    provenance: dict[str, Any]
+
+    def nodes(self, name: str) -> Index:
+        """(k,) nodes of a physical curve.
+
+        Raises:
+            TagError: if there is none of this name.
+        """
+        if name not in self.curves:
+            raise TagError(f"there is no curve {name!r}; there are {sorted(self.curves)}.",
+                           hint=f'Add Physical Curve("{name}") = {{...}};')  # fmt: skip
+        return np.unique(self.curves[name])
+
+
+@typed
+def read_triangles(
+    path: str | Path,
+    *,
+    parameters: Mapping[str, Any] | None = None,
+    scale: float = 1.0,
+    trust: bool = False,
+) -> FlatMesh:
+    """Read or make the triangles of a plane section, for sheets and other plane solids.
+
+    Args:
+        path: ``.geo`` gmsh geometry with plane surfaces in z = 0; ``.py`` file with
+            ``build(gmsh, **parameters)``; ``.msh`` 2.2 or 4.1.
+        parameters: named values for a geometry.
+        scale: factor on all coordinates, e.g. 1e-3 for a mesh drawn in millimetres.
+        trust: run a ``.py`` file.
+
+    Raises:
+        ConfigError: unknown suffix or parameter.
+        FileFormatError: the file is missing, cut, or not what its name promises.
+        UnsafeFileError: a geometry would do more than make a mesh, or is a ``.py`` not trusted.
+        MeshError: there are no triangles, other cells, or they leave the plane.
+        ResourceError: meshing exceeds its limit of time or memory.
+    """
+    path = Path(path)
+    reader = _reader(path)
+    if reader not in ("geo", "builder", "msh"):
+        raise ConfigError(f"the suffix {path.suffix!r} holds no plane section.", where=str(path),
+                          hint="Give .geo, .py or .msh.")  # fmt: skip
+    request = {
+        "path": str(path.absolute()), "reader": reader, "parameters": dict(parameters or {}),
+        "faces": {}, "order": None, "flat": True,
+    }  # fmt: skip
+    _check_request(path, request, scale)
+    _check_trust(path, reader, trust)
+    arrays, notes = read_apart(request, where=str(path), size=path.stat().st_size)
+    provenance = {"path": str(path), "sha256": _digest(path), "scale": scale}
+    X, T = arrays["points"][:, :2] * scale, arrays["cells"]
+    u, v = X[T[:, 1]] - X[T[:, 0]], X[T[:, 2]] - X[T[:, 0]]
+    T = np.where((u[:, 0] * v[:, 1] < u[:, 1] * v[:, 0])[:, None], T[:, ::-1], T)
+    curves = {name: _with_solid_on_left(arrays[f"facets {i}"], T)
+              for i, name in enumerate(notes["facet_names"])}  # fmt: skip
+    return FlatMesh(X, T, curves, provenance | notes["provenance"])
+
+
+def _with_solid_on_left(sides: Index, T: Index) -> Index:
+    """Sides (k, 2) turned as in the triangles that have them."""
+    n = T.max() + 1
+    there = np.concatenate([n * T[:, k] + T[:, (k + 1) % 3] for k in range(3)])
+    known = np.isin(n * sides[:, 0] + sides[:, 1], there)
+    return np.where(known[:, None], sides, sides[:, ::-1])
 
 
 def _scaled_twice(size: float, scale: float) -> str:

@@ -5,10 +5,12 @@ from petsc4py import PETSc
 import numpy as np
 
 from rom.errors import SolverError
-from rom.fe.operators.memory import allowed_bytes, factor_bytes, give_back, too_large
+from rom.fe.operators.disk import DISK_ERRORS, disk_too_small
+from rom.fe.operators.foreseen import check_disk, entry_count, too_large
+from rom.fe.operators.memory import allowed_bytes, factor_bytes, give_back
 from rom.fe.operators.solver import DIRECT_SOLVER, Solver
 from rom.model import Array
-from rom.process.stopwatch import FACTORISATION_PIECE, SOLUTION_PIECE, piece
+from rom.process.stopwatch import FACTORISATION_PIECE, FLOPS_NOTE, SOLUTION_PIECE, note, piece
 
 BLOCK_SIZE = 32  # right-hand sides solved together: five to eight times cheaper than one by one
 PIVOT_THRESHOLD = 0.01  # the default of MUMPS
@@ -30,13 +32,15 @@ class Factor:
         ok: False when MUMPS met a pivot it could not divide by.
 
     Raises:
-        ResourceError: if MUMPS runs out of memory.
+        ResourceError: if MUMPS runs out of memory or disk.
     """
 
     def __init__(self, A: PETSc.Mat, *, definite: bool, solver: Solver = DIRECT_SOLVER):
         A.setOption(PETSc.Mat.Option.SYMMETRIC, True)
         A.setOption(PETSc.Mat.Option.SPD, False)  # MUMPS then factors an indefinite one, too
         self.A, self.solver = A, solver
+        if solver.out_of_core:
+            check_disk(A, solver)
         self.allowed = allowed_bytes(A.comm.tompi4py())
         predicted = WORKSPACE_RATIO * factor_bytes(A.getSize()[0]) / A.comm.size
         self._offer(min(predicted + LEAST_WORKSPACE, self.allowed))
@@ -70,7 +74,7 @@ class Factor:
         """Factor A; again when its values have changed, without a new analysis.
 
         Raises:
-            ResourceError: if MUMPS runs out of memory.
+            ResourceError: if MUMPS runs out of memory or disk.
         """
         self.factor.setMumpsCntl(1, 0.0 if definite else PIVOT_THRESHOLD)
         with piece(FACTORISATION_PIECE):
@@ -84,12 +88,16 @@ class Factor:
         elif code in MEMORY_ERRORS:
             need = 1e6 * self.factor.getMumpsInfog(17)  # on all ranks, from the analysis
             raise too_large(self.A.getSize()[0], need, self.allowed * self.A.comm.size)
+        elif code in DISK_ERRORS:
+            need = 8.0 * entry_count(self.factor)
+            raise disk_too_small(self.A.getSize()[0], need)
         else:
             self.ok = code >= 0
+            note(FLOPS_NOTE, self.factor.getMumpsRinfog(3))
 
     def solve(self, F: Array) -> Array:
         """A^-1 F for (n_local, k) right-hand sides, in blocks."""
-        X = np.empty(F.shape)
+        X = np.empty(F.shape, order="F")
         for first in range(0, F.shape[1], BLOCK_SIZE):
             columns = slice(first, min(first + BLOCK_SIZE, F.shape[1]))
             with piece(SOLUTION_PIECE):
@@ -133,7 +141,7 @@ def dense_rows(A: PETSc.Mat, X: Array) -> Array:
         return _column_by_column(A, X)
     B = dense(X, A)
     Y = A.matMult(B)
-    out = Y.getDenseArray().copy()
+    out = Y.getDenseArray().copy(order="F")
     B.destroy(), Y.destroy()
     return out
 

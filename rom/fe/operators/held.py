@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 
 from rom.errors import InterfaceError
+from rom.fe.operators.place import moves_most
 from rom.model import Array, Index
 
 RIGID_RTOL = 1e-13  # eigenvalue of a motion without stiffness, of the largest one
@@ -65,15 +66,17 @@ class HeldPETSc:
         if np.linalg.matrix_rank(self.ops.rows(R, self.held), tol=1e-9) < R.shape[1]:
             raise self._singular()
 
-    def _singular(self) -> InterfaceError:
+    def _singular(self, place: str = "") -> InterfaceError:
         return InterfaceError(
-            f"K_ii is singular: the {self.held.size} boundary dofs leave a rigid motion free.",
-            hint="Fix at least three nodes that do not lie on one line, or hold another interface.",
+            f"K_ii is singular: the {self.held.size} boundary dofs leave a rigid motion free."
+            + place,
+            hint="Fix at least three nodes that do not lie on one line, or hold another interface; "
+            "a part of the mesh that hangs on a point or on a line moves alone.",
         )
 
     def _refuse_free_motion(self) -> None:
         """A rigid motion that is not held has, after one inverse iteration, no stiffness."""
-        ops, stiffness = self.ops, 0.0
+        ops, stiffness, X = self.ops, 0.0, np.zeros((self.mine.size, 1))
         if self.factor.ok:
             R = np.column_stack([ops.fixed]) if ops.rigid is None else ops.rigid
             X = self.factor.solve(ops.apply_M(R)[self.mine])
@@ -82,4 +85,4 @@ class HeldPETSc:
                 M = self.inner.gram(X, self.inner.apply_M(X))
                 stiffness = (np.diag(K) / np.diag(M)).min()
         if not stiffness > RIGID_RTOL * self.inner.largest():
-            raise self._singular()
+            raise self._singular(moves_most(ops, X, self.mine))

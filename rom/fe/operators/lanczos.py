@@ -8,15 +8,20 @@ time spends twice the factorisation on twenty modes; in blocks it takes half of 
 from typing import Any
 
 import numpy as np
+from scipy.linalg.blas import dgemm
 
+from rom.eigen.completeness import miss_probability
 from rom.errors import SolverError
-from rom.fe.operators.iterative import Inverse
+from rom.fe.operators.spectrum import gaussian_block
 from rom.model import Array
+from rom.process.stopwatch import MISS_NOTE, note
 
 BLOCK_SIZE = 6  # columns solved together: fewer make solving dearer, more make the space larger
 MAX_EXTRA_BLOCKS = 20  # beside the modes sought before a restart; twenty are seldom used
 MAX_RESTARTS = 20  # after which the method has failed
-EIGENVALUE_RTOL = 1e-10  # residual of an eigenvalue of the inverse
+MAX_FURTHER_BLOCKS = 6  # beyond convergence, for a proof; more cost as much as a count
+MAX_MISS_PROBABILITY = 1e-9
+EIGENVALUE_RTOL = 1e-9  # residual of an eigenvalue of the inverse
 SPARE_EIGENVALUE_RTOL = 1e-5  # the same for spare ones; the error of the eigenvalue is its square
 
 
@@ -25,7 +30,7 @@ class BlockLanczos:
 
     Args:
         ops: operators of the body.
-        factor: of K - sigma M.
+        factor: solves with K - sigma M.
         sigma: the shift, below all eigenvalues sought.
         deflated: (n_local, d) M-orthonormal modes to leave out.
         k: number of modes sought.
@@ -38,7 +43,7 @@ class BlockLanczos:
     """
 
     def __init__(
-        self, ops: Any, factor: Inverse, sigma: float, deflated: Array, k: int, spare: int = 0
+        self, ops: Any, factor: Any, sigma: float, deflated: Array, k: int, spare: int = 0
     ):
         self.ops, self.factor, self.sigma, self.k = ops, factor, sigma, k
         self.tolerance = np.repeat([EIGENVALUE_RTOL, SPARE_EIGENVALUE_RTOL], [k - spare, spare])
@@ -47,10 +52,12 @@ class BlockLanczos:
         self.V, self.MV = np.empty(shape, order="F"), np.empty(shape, order="F")
         self.size = 0
         self.T = np.zeros((0, 0))
+        self.restarted = False
         self._append(deflated, ops.apply_M(deflated))
-        phases = np.arange(1.0, BLOCK_SIZE + 1.0)
-        start = np.cos(np.outer(ops.fixed, phases) + phases)  # depends on the place only
-        self._append(*self._orthonormal(start)[:2])
+        start = gaussian_block(ops, BLOCK_SIZE)
+        start[getattr(factor, "mine", [])] = 0.0  # rows that a support holds
+        W, MW, _, self.start = self._orthonormal(start)
+        self._append(W, MW)
 
     def solve(self) -> None:
         """Let the space grow until the k leading pairs have converged.
@@ -60,7 +67,8 @@ class BlockLanczos:
         """
         for _ in range(MAX_RESTARTS):
             while self.size + BLOCK_SIZE <= self.V.shape[1]:
-                if self._converged(self._grow()):
+                self.R = self._grow()
+                if self._converged(self.R):
                     return
             self._restart()
         raise SolverError(
@@ -95,9 +103,10 @@ class BlockLanczos:
         """
         V, MV = self.V[:, : self.size], self.MV[:, : self.size]
         H, R = np.zeros((self.size, W.shape[1])), np.eye(W.shape[1])
+        W = np.asfortranarray(W)
         for _ in range(2):
             G = self.ops.gram(MV, W)
-            W = W - V @ G
+            W = _less(W, V, G)
             H += G
         MW = self.ops.apply_M(W)
         for _ in range(2):
@@ -107,8 +116,28 @@ class BlockLanczos:
             R = (U * root).T @ R
         return W, MW, H, R
 
+    def prove(self, m: int) -> bool:
+        """Go on until surely none of the lowest m modes is missing; False if that stays open."""
+        if self.restarted:
+            return False
+        for _ in range(MAX_FURTHER_BLOCKS):
+            chance = miss_probability(self.T, self.start, self._residuals(), m)
+            if chance <= MAX_MISS_PROBABILITY:
+                note(MISS_NOTE, chance)
+                return True
+            if chance == 1.0 or self.size + BLOCK_SIZE > self.V.shape[1]:
+                break
+            self.R = self._grow()
+        return False
+
+    def _residuals(self) -> Array:
+        """(N,) of all Ritz values, over them."""
+        theta, S = self._ritz(self.T.shape[0])
+        return np.linalg.norm(self.R @ S[-BLOCK_SIZE:], axis=0) / np.abs(theta)
+
     def _restart(self) -> None:
         """Keep the leading Ritz vectors and the last block only."""
+        self.restarted = True
         kept = self.k + BLOCK_SIZE
         theta, S = self._ritz(kept)
         ends = self.n_deflated + np.array([0, kept, kept + BLOCK_SIZE])
@@ -131,6 +160,11 @@ class BlockLanczos:
         return theta[::-1][:k], S[:, ::-1][:, :k]
 
 
+def _less(W: Array, V: Array, G: Array) -> Array:
+    """W - V G in the place of W, arrays by columns."""
+    return dgemm(-1.0, V, G, 1.0, W, overwrite_c=True) if W.size and V.size else W
+
+
 def capacity(k: int) -> int:
     """Columns the space of k modes may have."""
-    return k + MAX_EXTRA_BLOCKS * BLOCK_SIZE
+    return 2 * k + MAX_EXTRA_BLOCKS * BLOCK_SIZE

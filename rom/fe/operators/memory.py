@@ -5,7 +5,6 @@ import ctypes
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from rom.errors import ResourceError
 from rom.process.memory import free_bytes
 
 MAX_MEMORY_SHARE = 0.85  # of the memory that is free
@@ -51,34 +50,3 @@ def allowed_bytes(comm: MPI.Comm) -> float:
     share = MAX_MEMORY_SHARE * free_bytes() / node.size
     node.Free()
     return comm.allreduce(share, op=MPI.MIN)
-
-
-def check_factor_memory(n: int, n_columns: int = 0, *, comm: MPI.Comm) -> None:
-    """Refuse a factorisation that would not fit, whatever the shape of the body.
-
-    How much it really takes is known after the analysis, and `Factor` asks again.
-
-    Args:
-        n: number of dofs to factor.
-        n_columns: dense columns of that length that are kept beside the factor.
-        comm: the ranks that share the factor.
-
-    Raises:
-        ResourceError: with the need and what there is.
-    """
-    need, there = (
-        THIN_FACTOR_RATIO * factor_bytes(n) + 8.0 * n * n_columns,
-        allowed_bytes(comm) * comm.size,
-    )
-    if need > there:
-        raise too_large(n, need, there)
-
-
-def too_large(n: int, need: float, there: float) -> ResourceError:
-    """The error that says by how much a factor of n dofs does not fit."""
-    return ResourceError(
-        f"factoring {n} dofs is predicted to take {need / 2**30:.2f} GiB; "
-        f"{there / 2**30:.2f} GiB may be used ({MAX_MEMORY_SHARE:.0%} of what is free).",
-        hint='Use a coarser mesh, more machines, solver="out-of-core" (the factor on disk) or '
-        'solver="iterative" (no factor).',
-    )

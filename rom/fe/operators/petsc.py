@@ -1,8 +1,8 @@
 """The operator verbs on PETSc, MUMPS and SLEPc, distributed over the ranks.
 
-Modes of a model in a given support come from SLEPc. The normal modes of a reduction, whose
-stiffness is factored already, come from our block Lanczos, which asks for many solutions at a time
-and needs half the time. A certificate thereby compares two eigensolvers that share no line.
+Modes of a model in a given support come from SLEPc and are counted. The normal modes of a reduction
+and the modes it is compared with, whose stiffness is factored already, come from our block Lanczos,
+which asks for many solutions at a time, needs half the time and says how surely it is complete.
 """
 
 from functools import cached_property
@@ -16,17 +16,20 @@ import numpy.typing as npt
 from scipy.linalg import eigh
 from scipy.sparse import csr_matrix
 
+from rom.eigen.condensed import Supported
 from rom.eigen.scipy import dof_set
 from rom.eigen.verbs import Weighted, orthonormal
 from rom.errors import ConfigError, ModelError, SolverError
 from rom.fe.operators.aij import aij, chosen, gathered, symmetrized, weighted
 from rom.fe.operators.counting import verify_count
 from rom.fe.operators.factor import Factor, dense_rows
+from rom.fe.operators.foreseen import check_factor_memory
 from rom.fe.operators.held import RIGID_RTOL, HeldPETSc
 from rom.fe.operators.iterative import ConjugateGradients, Inverse, davidson, multigrid, refined
 from rom.fe.operators.krylov_schur import krylov_schur
 from rom.fe.operators.lanczos import BlockLanczos, capacity
-from rom.fe.operators.memory import check_factor_memory, give_back
+from rom.fe.operators.memory import give_back
+from rom.fe.operators.place import moves_most
 from rom.fe.operators.solver import DIRECT_SOLVER, Solver
 from rom.fe.operators.spectrum import first_elastic, fixed_vector, settled, signed
 from rom.model import Array, Index
@@ -183,13 +186,15 @@ class PETScOperators:
 
     def modes(
         self,
-        held: npt.ArrayLike | HeldPETSc,
+        held: npt.ArrayLike | HeldPETSc | Supported,
         m: int,
         sigma: float | None = None,
         *,
         finished: bool = False,
     ) -> tuple[Array, Array]:
         """Lowest m modes, mass-normalised: omega (m,) [rad/s] and Phi (n_local, m)."""
+        if isinstance(held, Supported):
+            return self._condensed_modes(held, m)
         in_blocks = isinstance(held, HeldPETSc)
         if not isinstance(held, HeldPETSc):
             if np.size(held) == 0:
@@ -216,13 +221,48 @@ class PETScOperators:
             lam, Phi = self.all_modes()
         else:
             none = np.zeros((self.n_local, 0))
-            lam, Phi = self.lowest(m + N_SPARE_MODES, 0.0, held.factor, none, in_blocks=in_blocks)
+            if in_blocks and not self.solver.iterative:
+                lam, Phi, proven = self.by_blocks(m, 0.0, held.factor, none)
+            else:
+                lam, Phi = self.lowest(m + N_SPARE_MODES, 0.0, held.factor, none)
+                proven = False
             if finished and not in_blocks:  # SLEPc has taken the factor's matrix for its own
                 held.release()
-            verify_count(self, lam, m, 0, held.factor if finished else None)
-            if finished and in_blocks:
+            if not proven:
+                verify_count(self, lam, m, 0, held.factor if finished else None)
+            if finished and in_blocks and not proven:
                 held.release()
         return lam[:m], settled(self, lam, Phi)[:, :m]
+
+    def _condensed_modes(self, support: Supported, m: int) -> tuple[Array, Array]:
+        """Lowest m modes with the factor of the inside alone; where they leave a doubt, with all.
+
+        The other path factors the whole body anew, searches by SLEPc and counts.
+        """
+        free = not support.dofs.size
+        R = orthonormal(self, self.rigid) if free and self.rigid is not None else None
+        R = np.zeros((self.n_local, 0)) if R is None else R
+        n_elastic = m - R.shape[1]
+        room = capacity(n_elastic + N_SPARE_MODES) + R.shape[1] + support.dofs.size
+        if n_elastic <= 0 or self.n <= max(MAX_DENSE_DOFS, room):
+            return self.modes(support.dofs, m)
+        lam, Phi, proven = self.by_blocks(n_elastic, 0.0, support, R)
+        if not proven:
+            return self.modes(support.dofs, m)
+        lam, Phi = lam[:n_elastic], settled(self, lam, Phi)[:, :n_elastic]
+        omega = np.concatenate([np.zeros(R.shape[1]), np.sqrt(lam)])
+        return omega, np.hstack([R, signed(self, Phi)])
+
+    def by_blocks(
+        self, m: int, sigma: float, inverse: Any, deflated: Array
+    ) -> tuple[Array, Array, bool]:
+        """Some more than m eigenvalues above sigma, modes, and whether surely none is missing."""
+        with piece(SEARCH_PIECE):
+            k = min(m + N_SPARE_MODES, self.n - deflated.shape[1])
+            space = BlockLanczos(self, inverse, sigma, deflated, k, min(k - m, k - 1))
+            space.solve()
+            proven = space.prove(m)
+            return *space.pairs(), proven
 
     def _free_modes(self, m: int, sigma: float | None) -> tuple[Array, Array]:
         if not 0 <= m <= self.n:
@@ -245,16 +285,16 @@ class PETScOperators:
             inverse = self.inverse(self.shifted(sigma), self.rigid)
             lam, Phi = self.lowest(m + N_SPARE_MODES, sigma, inverse, R)
             inverse.release()  # counting needs its memory
-            self._refuse_mechanisms(lam, n_rigid)
+            self._refuse_mechanisms(lam, Phi, n_rigid)
             verify_count(self, lam, m, n_rigid)
         return lam[:m], settled(self, lam, Phi)[:, :m]
 
-    def _refuse_mechanisms(self, lam: Array, n_rigid: int) -> None:
-        n_zero = int(np.count_nonzero(np.abs(lam) < RIGID_RTOL * self.largest()))
-        if n_rigid and n_zero:
+    def _refuse_mechanisms(self, lam: Array, Phi: Array, n_rigid: int) -> None:
+        loose = np.abs(lam) < RIGID_RTOL * self.largest()
+        if n_rigid and loose.any():
             raise ModelError(
-                f"at least {n_zero} more motions without stiffness than the six of a connected "
-                "body.",
+                f"at least {loose.sum()} more motions without stiffness than the six of a "
+                f"connected body.{moves_most(self, Phi[:, loose])}",
                 hint="Parts of the mesh are not connected, or joined at a point or an edge only.",
             )
 
@@ -274,8 +314,7 @@ class PETScOperators:
             if near_null is None:
                 raise ConfigError("the iterative solver needs the coordinates of the nodes.")
             return multigrid(A, near_null)
-        if self.solver == DIRECT_SOLVER:
-            check_factor_memory(A.getSize()[0], n_columns, comm=self.comm)
+        check_factor_memory(A, n_columns, self.solver)
         factor = Factor(A, definite=True, solver=self.solver)
         return refined(factor) if self.solver.low_rank and factor.ok else factor
 
@@ -302,18 +341,18 @@ class PETScOperators:
         A.axpy(-sigma, self.M, PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
         return A
 
-    def lowest(
-        self, k: int, sigma: float, factor: Inverse, deflated: Array, *, in_blocks: bool = False
-    ) -> tuple[Array, Array]:
+    def lowest(self, k: int, sigma: float, factor: Inverse, deflated: Array) -> tuple[Array, Array]:
         """The k eigenvalues above sigma beside the deflated columns, and their modes."""
         if self.solver.iterative and isinstance(factor, ConjugateGradients):
             return davidson(self, factor, deflated, k)
-        if not in_blocks and isinstance(factor, Factor):
+        if isinstance(factor, Factor):
             return krylov_schur(self, factor, sigma, deflated, k)
-        with piece(SEARCH_PIECE):
-            space = BlockLanczos(self, factor, sigma, deflated, k, min(N_SPARE_MODES, k - 1))
-            space.solve()
-            return space.pairs()
+        return self.by_blocks(k - N_SPARE_MODES, sigma, factor, deflated)[:2]
+
+    @cached_property
+    def mass_diagonal(self) -> Array:
+        """(n_local,) diagonal of M."""
+        return self.M.getDiagonal().array.copy()
 
     def all_modes(self) -> tuple[Array, Array]:
         """All eigenpairs of a small model, solved densely on every rank."""
@@ -336,6 +375,7 @@ class TiedOperators(PETScOperators):
     """
 
     parent: PETScOperators
+    T: PETSc.Mat
 
     def __init__(self, parent: PETScOperators, T: csr_matrix, rigid: Array):
         self.parent, self.rigid, self.comm, self.solver = parent, rigid, parent.comm, parent.solver
@@ -374,6 +414,19 @@ class TiedOperators(PETScOperators):
         if self.comm.allreduce(bool((same >= 0).all()), op=MPI.LAND):
             return self.parent.part(same)
         return super().part(rows)
+
+    @cached_property
+    def mass_diagonal(self) -> Array:
+        """(n_local,) diagonal of T^T diag(M) T: near that of the mass, which is not formed."""
+        squares = self.T.copy()
+        starts, columns, values = squares.getValuesCSR()
+        squares.setValuesCSR(starts, columns, values**2)
+        squares.assemble()
+        x, y = self.T.createVecs()
+        y.array[:] = self.parent.mass_diagonal
+        squares.multTranspose(y, x)
+        squares.destroy()
+        return x.array.copy()
 
     def apply_K(self, X: Array) -> Array:
         """T^T K T X."""

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 from rom.errors import ConfigError
 
 KNOWN_SOLVERS = (
-    '"direct", "low-rank", "low-rank:1e-8", "out-of-core", "low-rank+out-of-core", "iterative"'
+    '"auto", "direct", "low-rank", "low-rank:1e-8", "out-of-core", "iterative", '
+    '"low-rank+out-of-core"'
 )
 LOW_RANK_RTOL = 1e-8  # of a block's norm: what a compressed factor drops
 
@@ -19,12 +20,14 @@ class Solver:
             verified by an inertia count.
         low_rank: tolerance to which blocks of the factor are compressed; 0 for an exact factor.
             What is lost comes back by conjugate gradients on top.
-        out_of_core: the factor lives on disk (directory in MUMPS_OOC_TMPDIR, or the current one).
+        out_of_core: the factor lives on disk, in the folder of MUMPS_OOC_TMPDIR or in /tmp.
+        automatic: the first of direct, out-of-core and iterative that fits, to be chosen.
     """
 
     iterative: bool = False
     low_rank: float = 0.0
     out_of_core: bool = False
+    automatic: bool = False
 
 
 DIRECT_SOLVER = Solver()
@@ -40,6 +43,8 @@ def parsed(text: str) -> Solver:
         return DIRECT_SOLVER
     if text == "iterative":
         return Solver(iterative=True)
+    if text == "auto":
+        return Solver(automatic=True)
     low_rank, out_of_core = 0.0, False
     for word in str(text).split("+"):
         name, colon, number = word.partition(":")

@@ -14,6 +14,12 @@ from rom.model import Array
 
 CLUSTER_RTOL = 1e-7  # distance of eigenvalues whose modes are only defined as a plane
 EQUAL_ENTRY_RTOL = 1e-6  # difference of entries that count as equally large
+PLACE_SCALE = 2.0**40  # places that differ by less are one
+COUNTER_STEP = np.uint64(0x9E3779B97F4A7C15)  # 2^64 over the golden ratio: steps of the counter
+MIXING_STEPS = (  # Steele, Lea and Flood, OOPSLA 2014, with the constants of Stafford
+    (np.uint64(30), np.uint64(0xBF58476D1CE4E5B9)),
+    (np.uint64(27), np.uint64(0x94D049BB133111EB)),
+)
 DIRECTIONS = np.array([[3.1, 1.7, 2.3], [1.3, 3.7, 1.9], [2.1, 1.1, 3.3]])  # no symmetry
 
 
@@ -30,6 +36,25 @@ def fixed_vector(comm: MPI.Comm, rigid: Array | None, first: int, n_local: int) 
     high = comm.allreduce(points.max(axis=0, initial=-np.inf), op=MAXIMUM_OP)
     size = (high - low).max()
     return np.sin((points - low) / size @ DIRECTIONS + np.arange(1.0, 4.0)).ravel()
+
+
+def gaussian_block(ops: Any, k: int) -> Array:
+    """(n_local, k) Gaussian columns with components of about one in all modes.
+
+    The numbers depend on the place of a dof, mixed beyond recognition, and not on its rank.
+    """
+    key = np.round(ops.fixed * PLACE_SCALE).astype(np.int64).view(np.uint64)
+    counter = key[:, None] + COUNTER_STEP * np.arange(1, 2 * k + 1, dtype=np.uint64)
+    u = (_mixed(counter) >> np.uint64(11)).astype(float) * 2.0**-53 + 2.0**-54
+    normal = np.sqrt(-2.0 * np.log(u[:, :k])) * np.cos(2.0 * np.pi * u[:, k:])  # Box and Muller
+    return normal / np.sqrt(np.maximum(ops.mass_diagonal, np.finfo(float).tiny))[:, None]
+
+
+def _mixed(x: Any) -> Any:
+    """64 bits of which each depends on all those given: the finaliser of SplitMix64."""
+    for shift, factor in MIXING_STEPS:
+        x = (x ^ (x >> shift)) * factor
+    return x ^ (x >> np.uint64(31))
 
 
 def points_of(rigid: Array) -> Array:

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.linalg import eigh
 
 from rom.arguments import typed, whole
-from rom.eigen.verbs import Held, Operators
+from rom.eigen.verbs import Held, Operators, quadratic
 from rom.errors import ConfigError
 from rom.model import Array, Basis, Index
 from rom.reduction.bases.fixed_interface import constraint_modes
@@ -65,7 +65,7 @@ def residual_shapes(ops: Operators, held: Held, Psi_b: Array, omega: Array, Phi:
 
 def projected(ops: Operators, T: Array) -> tuple[Array, Array]:
     """(r, r) stiffness and mass T^T K T and T^T M T, symmetric."""
-    K, M = ops.gram(T, ops.apply_K(T)), ops.gram(T, ops.apply_M(T))
+    K, M = quadratic(ops, ops.apply_K, T), quadratic(ops, ops.apply_M, T)
     return 0.5 * (K + K.T), 0.5 * (M + M.T)
 
 

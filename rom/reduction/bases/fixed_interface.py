@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from rom.arguments import typed
 from rom.eigen.scipy import SciPyOperators
-from rom.eigen.verbs import Held, Operators
+from rom.eigen.verbs import Held, Operators, column_blocks, unit_motions
 from rom.model import Array, Basis
 
 
@@ -34,7 +34,7 @@ def craig_bampton(K: Any, M: Any, boundary: npt.ArrayLike, n_modes: int) -> Basi
     Raises:
         ConfigError: if the dof numbers or m do not fit the matrices.
         InterfaceError: if K_ii is singular.
-        ModesMissedError: if the inertia count says that a mode was skipped.
+        ModesMissedError: if a count says that a mode was skipped.
 
     Source:
         Craig and Bampton, Coupling of substructures for dynamic analyses, AIAA J. 6 (1968) 1313.
@@ -60,13 +60,7 @@ def fixed_interface(ops: Operators, boundary: npt.ArrayLike, n_modes: int) -> Ba
 
 def constraint_modes(ops: Operators, held: Held, boundary: npt.NDArray[np.int64]) -> Array:
     """(n_local, n_b) static shapes: one boundary dof moved by one, the other boundary dofs held."""
-    E = unit_motions(ops, boundary)
-    return E - held(ops.apply_K(E))
-
-
-def unit_motions(ops: Operators, boundary: npt.NDArray[np.int64]) -> Array:
-    """(n_local, n_b) columns of the identity: one boundary dof moved, everything else at rest."""
-    E = np.zeros((ops.n_local, boundary.size))
-    mine = (boundary >= ops.first) & (boundary < ops.first + ops.n_local)
-    E[boundary[mine] - ops.first, np.flatnonzero(mine)] = 1.0
-    return E
+    Psi = unit_motions(ops, boundary)
+    for some in column_blocks(boundary.size):
+        Psi[:, some] -= held(ops.apply_K(Psi[:, some]))
+    return Psi

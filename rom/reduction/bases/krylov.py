@@ -5,10 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from rom.arguments import typed, whole
-from rom.eigen.verbs import Operators, without_dependent
+from rom.eigen.verbs import Operators, unit_motions, without_dependent
 from rom.errors import ConfigError, SolverError
 from rom.model import Basis, Index
-from rom.reduction.bases.fixed_interface import unit_motions
 from rom.reduction.bases.free_interface import numbered
 
 RESONANCE_RTOL = 1e-8  # distance of a frequency from a mode

@@ -110,7 +110,7 @@ class CraigBampton:
         Raises:
             ConfigError: without any interface.
             InterfaceError: if the interfaces leave a rigid motion free.
-            ModesMissedError: if the inertia count says that a mode was skipped.
+            ModesMissedError: if a count says that a mode was skipped.
         """
         if boundary.size == 0:
             raise ConfigError(
@@ -124,7 +124,7 @@ class CraigBampton:
         else:
             omega, Phi = self._normal_modes(ops, held, boundary)
         normal = [f"fixed-interface {k + 1}" for k in range(omega.size)]
-        return Basis(np.hstack([Psi_b, Phi]), omega, (*labels, *normal))
+        return Basis(np.hstack([Psi_b, Phi]), omega, (*labels, *normal), held)
 
     def _wanted(self) -> Wanted:
         if self.f_max is not None and self.tol is not None:

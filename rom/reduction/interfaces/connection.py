@@ -88,9 +88,10 @@ def _transform(ops: Operators, chosen: list[Interface], ties: dict[str, Tie]) ->
             (t.by_masters, masters),
             (t.by_kept, _renumber(t.kept, removed)),
         ):
-            rows.append(np.repeat(row, column.size))
-            columns.append(np.tile(column, row.size))
-            values.append(block[here].ravel())
+            part = coo_matrix(block[here])
+            rows.append(row[part.row])
+            columns.append(column[part.col])
+            values.append(part.data)
         first_master += t.n_masters
     entries = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
     T = csr_matrix(coo_matrix(entries, shape=(ops.n_local, n_kept + n_masters)))

@@ -46,8 +46,8 @@ def tie(interface: Interface, kind: Any) -> Tie:
         return _found(interface, "characteristic", kind.functions(interface))
     Q = interface_functions(kind, interface)
     names = [f"{axis}{j + 1}" for j in range(Q.shape[1]) for axis in "xyz"]
-    L = np.kron((interface.surface_mass @ Q).T, np.eye(3))
-    return _stiff(interface, _label(kind), tuple(names), L, np.kron(Q, np.eye(3)))
+    L = kron((interface.surface_mass @ Q).T, identity(3), format="csr")
+    return _stiff(interface, _label(kind), tuple(names), L, kron(Q, identity(3), format="csr"))
 
 
 SIX_LABELS = ("ux", "uy", "uz", "rx", "ry", "rz")
@@ -62,7 +62,7 @@ def _full(interface: Interface) -> Tie:
 
 
 def _stiff(
-    interface: Interface, label: str, names: tuple[str, ...], coordinates: Array, shapes: Array
+    interface: Interface, label: str, names: tuple[str, ...], coordinates: Any, shapes: Any
 ) -> Tie:
     """All dofs of the surface follow from its coordinates."""
     none = np.zeros((shapes.shape[0], 0))

@@ -21,7 +21,8 @@ class Tie:
         names: (m,) what each coordinate is.
         coordinates: (m, 3k) map L from the dofs of the surface to its coordinates.
         removed: (d,) dofs replaced; none when the coordinates are the dofs themselves.
-        by_masters: (d, m) how they follow from the coordinates.
+        by_masters: (d, m) how they follow from the coordinates; sparse where a function moves one
+            direction only.
         kept: (s,) dofs that stay and take part.
         by_kept: (d, s) how the removed ones follow from them.
     """
@@ -30,7 +31,7 @@ class Tie:
     names: tuple[str, ...]
     coordinates: Any
     removed: Index
-    by_masters: Array
+    by_masters: Any
     kept: Index
     by_kept: Array
 

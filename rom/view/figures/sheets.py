@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 PAGE_WIDTH, PANEL_HEIGHT = 1500, 430  # pixel
 FILM_SIZE = (640, 700)  # of the picture in a film [pixel]
+TOOL_COLOUR = "#c9cfd6"
 SURFACE_COLOUR, EDGE_COLOUR, UNDEFORMED_COLOUR = "#dfe5ec", "#6b7480", "#d1495b"
 
 
@@ -38,6 +39,7 @@ class Shape:
         values: (t,) what the colours show, in units of the label, or None for one colour.
         label: what the values are.
         width: of its picture [pixel].
+        tools: outlines (k, 2) of rigid bodies beside it [m].
     """
 
     title: str
@@ -47,6 +49,7 @@ class Shape:
     values: Array | None = None
     label: str = ""
     width: int = 380
+    tools: tuple[Array, ...] = ()
 
 
 @path_came_first(1, 2, 0)
@@ -196,6 +199,8 @@ def _shape(
     drawn = axes.tripcolor(x, y, shape.triangles, **look)
     for edge in _boundary(shape.triangles):
         axes.plot(*shape.before[edge].T, color=UNDEFORMED_COLOUR, ls="--", lw=0.9)
+    for outline in shape.tools:
+        axes.fill(*outline.T, facecolor=TOOL_COLOUR, edgecolor=EDGE_COLOUR, hatch="///", lw=0.8)
     both = np.vstack([shape.points, shape.before]) if frame is None else frame
     low, high = both.min(axis=0), both.max(axis=0)
     margin = 0.04 * (high - low).max()

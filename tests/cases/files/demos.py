@@ -13,13 +13,14 @@ MESHED = [path for path in DEMOS if "rom.fe" in path.read_text()]
 # about ten seconds each and more, of what has tests of its own
 LONG_DEMOS = {
     "demo_assembly", "demo_beam", "demo_bent_blade", "demo_best_matching", "demo_bladed_disk",
-    "demo_compressor_blade", "demo_exchange", "demo_hand", "demo_large_mesh", "demo_lost_tip",
+    "demo_compressor_blade", "demo_exchange", "demo_forming", "demo_hand", "demo_large_mesh",
+    "demo_lost_tip",
     "demo_masonry", "demo_mistuning", "demo_oil_inlet", "demo_parameters", "demo_pendulum_chain",
     "demo_periodic", "demo_planetary",
     "demo_robot_arm", "demo_rockfall", "demo_rolling_wheel", "demo_rotating_blade",
     "demo_rotor", "demo_satellite", "demo_sheet", "demo_slider_crank", "demo_snap_through",
     "demo_spin_up", "demo_transmission", "demo_two_stage", "demo_updating", "demo_whole_turbine",
-    "demo_wind_turbine",
+    "demo_wind_power", "demo_wind_turbine",
 }  # fmt: skip
 LEFT_BEHIND = {
     "demo_assembly": {"assembly_errors.png"},
@@ -28,6 +29,7 @@ LEFT_BEHIND = {
     "demo_best_matching": {"best_matching.png"},
     "demo_bladed_disk": {"bladed_disk_modes.png", "bladed_disk_diagrams.png"},
     "demo_compressor_blade": {"compressor_blade.png"},
+    "demo_forming": {"forming.png", "upsetting.gif"},
     "demo_hand": {"hand.png", "hand_control.png", "hand_grasp.gif", "hand_grasp.png"},
     "demo_exchange": {
         "beam.SID_FEM", "beam.csv", "beam.dat", "beam.dmig", "beam.fem", "beam.glb", "beam.inp",
@@ -64,6 +66,7 @@ LEFT_BEHIND = {
     },
     "demo_snap_through": {"snap_through.png"},
     "demo_spin_up": {"spin_up.png"},
+    "demo_wind_power": {"wind_power.png", "wind_turbine_hub.png"},
     "demo_wind_turbine": {
         "wind_turbine.png", "wind_turbine_campbell.png", "wind_turbine_shapes.png",
     },

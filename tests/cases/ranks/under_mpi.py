@@ -1,5 +1,7 @@
 """Run by test_fe_mpi.py under mpirun: a model, its modes, interfaces and surface into one file."""
 
+import os
+import signal
 import sys
 
 from mpi4py import MPI
@@ -68,7 +70,16 @@ def fail(kind):
         on_root(COMM, lambda: 1 / 0)
 
 
-if sys.argv[1] == "model":
+def die():
+    """The last rank, while the others wait for it."""
+    if COMM.rank == COMM.size - 1:
+        os.kill(os.getpid(), signal.SIGKILL)
+    COMM.Barrier()
+
+
+if sys.argv[1] == "die":
+    die()
+elif sys.argv[1] == "model":
     model(sys.argv[2], tuple(map(int, sys.argv[3].split(","))), int(sys.argv[4]))
 else:
     fail(sys.argv[2])

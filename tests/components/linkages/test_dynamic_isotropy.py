@@ -5,11 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scipy.optimize import root
 
 from rom.components.linkages.dynamic_isotropy import (
     angle_grid,
     christoffel,
     closed_loci,
+    index_map,
     isotropic_configurations,
     isotropy_index,
 )
@@ -104,6 +106,80 @@ def test_other_lengths_have_other_numbers_of_configurations():
     for n in (150, 300):
         found = isotropic_configurations(short.inertia, n=n)
         assert found.winding.size == 12 and found.winding.sum() == 0
+
+
+ORDINARY = FiveBar(0.7, (rod(2.0, 0.3),) * 2, (rod(1.0, 0.4),) * 2, payload=0.5)
+
+
+def still_tips(five):
+    """Angles at which cranks and couplers are in line, so that no motor moves the tip."""
+    l1, l2, d, found = 0.3, 0.4, five.base, []
+    for one, other, up in np.array(np.meshgrid([1, -1], [1, -1], [1, -1])).reshape(3, -1).T:
+        a, b = l2 + one * l1, l2 + other * l1  # of the tip from both pivots
+        x = (d * d + a * a - b * b) / (2 * d)
+        if x * x < a * a:
+            tip = np.array([x, up * np.sqrt(a * a - x * x)])
+            arms = one * tip, other * (tip - [d, 0])
+            q = np.array([np.arctan2(arm[1], arm[0]) for arm in arms]) % (2 * np.pi)
+            if np.allclose(five.posture(*q)[2], tip):  # else it is the other side's
+                found.append(q)
+    return np.array(found)
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_cranks_of_limited_range_have_maps_points_and_closed_loci(side):
+    """An ordinary five-bar, refused as a whole; points by closed form and by another search."""
+    five = replace(ORDINARY, side=side)
+    with pytest.raises(ModelError, match="elbows are"):
+        five.inertia(*angle_grid(40))
+    found = isotropic_configurations(five.inertia, n=300, assembles=five.assembles)
+    A = five.inertia(*found.q.T)
+    assert_allclose(A, found.inertia[:, None, None] * np.eye(2), atol=1e-10)
+    still = still_tips(five)
+    assert len(still) >= 2
+    for q in still:
+        k = np.abs(found.q - q).max(axis=1).argmin()
+        assert_allclose(found.q[k], q, atol=1e-8)
+        assert found.inertia[k] == pytest.approx((2.0 + 1.0) * 0.3**2 / 3)
+    again = isotropic_configurations(five.inertia, n=500, assembles=five.assembles)
+    assert_allclose(again.q, found.q, atol=1e-8)
+    other = isotropic_configurations(
+        replace(five, side=-side).inertia, n=300, assembles=five.assembles
+    )
+    mirrored = np.mod(-other.q, 2 * np.pi)  # in the line of the pivots
+    assert_allclose(mirrored[np.lexsort(mirrored.T[::-1])], found.q, atol=1e-8)
+    index = index_map(five.inertia, n=200, assembles=five.assembles)
+    there = five.assembles(*angle_grid(200))
+    assert 0.3 < there.mean() < 0.9 and np.all(index[~there] == 0) and np.all(index[there] > 0)
+    for curve in closed_loci(index, 0.6):
+        assert_allclose((curve[-1] - curve[0]) % (2 * np.pi) % (2 * np.pi - 1e-9), 0, atol=1e-8)
+
+
+def test_another_search_finds_the_points_of_limited_cranks():
+    """From random starts, by the solver of another library."""
+    found = isotropic_configurations(ORDINARY.inertia, n=300, assembles=ORDINARY.assembles)
+
+    def out(q):
+        if not ORDINARY.assembles(*q):
+            return np.array([1e3, 1e3])
+        A = ORDINARY.inertia(*q)
+        return np.array([A[0, 0] - A[1, 1], 2 * A[0, 1]]) / np.trace(A)
+
+    rng, met = np.random.default_rng(0), []
+    for q in rng.uniform(0, 2 * np.pi, (300, 2)):
+        if ORDINARY.assembles(*q):
+            got = root(out, q, tol=1e-12)
+            if np.abs(got.fun).max() < 1e-10:
+                met.append(np.mod(got.x, 2 * np.pi))
+    apart = [np.abs((found.q - q + np.pi) % (2 * np.pi) - np.pi).max(axis=1).min() for q in met]
+    assert len(met) > 40 and max(apart) < 1e-6
+
+
+def test_cranks_that_cannot_assemble_are_named():
+    far = FiveBar(2.0, (rod(2.0, 0.3),) * 2, (rod(1.0, 0.4),) * 2)
+    for search in (isotropic_configurations, index_map):
+        with pytest.raises(ModelError, match="none of 40 by 40 positions of the cranks"):
+            search(far.inertia, n=40, assembles=far.assembles)
 
 
 def test_principal_directions_make_half_a_turn_around_each_point(found):

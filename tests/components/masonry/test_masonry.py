@@ -11,11 +11,11 @@ import rom
 from cases.solid import STEEL, block
 from rom.components.masonry.block_contact import SLIDES
 from rom.components.masonry.limits import Rock, arch, stands
+from rom.components.masonry.motion import simulate
 from rom.components.masonry.stones import (
     Masonry,
     polygon_moments,
     reduced_stone,
-    simulate,
     stone,
     touching,
 )

@@ -7,9 +7,7 @@ from scipy.optimize import brentq
 
 from rom.components.masonry import stones as module
 from rom.components.masonry.limits import Rock, arch, minimum_thickness, stands, wall
-from rom.components.masonry.stones import (
-    simulate,
-)
+from rom.components.masonry.motion import simulate
 from rom.errors import ConfigError
 
 G = 9.81

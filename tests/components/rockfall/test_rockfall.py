@@ -39,9 +39,9 @@ def baseline(**change):
     return replace(g, **change)
 
 
-def stiff(boulder, height, lame, **more):
-    """A gallery so stiff that the cushion alone gives way."""
-    cushion = Cushion.of_sand(boulder, lame, **more)
+def stiff(boulder, height, lame, recovery=1.0):
+    """A gallery so stiff that the cushion alone gives way, elastic as Hertz has it."""
+    cushion = Cushion.of_sand(boulder, lame, recovery=recovery)
     return Gallery(boulder, height, 1e3, cushion, weight=False, **RIGID)
 
 
@@ -54,7 +54,8 @@ def test_cushion_loads_unloads_and_does_not_pull():
     assert c.force(0.4) == pytest.approx(2e6 * 0.4**1.5)
     assert c.force(0.3, 0.4) == 0.0  # three quarters of the penetration stay
     assert c.force(0.35, 0.4) == pytest.approx(c.force(0.4) * 0.5**1.5)
-    assert Cushion(2e6).force(0.3, 0.4) == pytest.approx(Cushion(2e6).force(0.3))
+    elastic = Cushion(2e6, recovery=1.0)
+    assert elastic.force(0.3, 0.4) == pytest.approx(elastic.force(0.3))
 
 
 @pytest.mark.parametrize(
@@ -150,7 +151,7 @@ def test_the_illustration_has_the_numbers_of_an_independent_program():
 
 def test_three_springs_move_as_their_modes_say():
     """Linear cushion, no damping, until the boulder leaves it."""
-    g = baseline(cushion=Cushion(5e6, exponent=1.0), shear=Shear(2e9, damping=0.0),
+    g = baseline(cushion=Cushion(5e6, exponent=1.0, recovery=1.0), shear=Shear(2e9, damping=0.0),
                  slab=Slab.of_mass(6000.0, 1.2e8, damping=0.0))  # fmt: skip
     got = strike(g, t_end=0.08, dt=2e-6)
     k1, k2, k3 = 5e6, 2e9, 1.2e8
@@ -220,7 +221,10 @@ def test_a_yielding_slab_dissipates_its_capacity_times_what_stays():
 def test_a_plastic_slab_stops_as_a_rigid_plastic_one():
     """One heavy mass thrown onto a slab without elasticity: way = m v^2 / 2 F_y."""
     slab = Slab.of_mass(10.0, 1e10, damping=0.0, capacity=1e6)
-    got = strike(Gallery(1e3, 5.0, 10.0, Cushion(1e10, 1.0), Shear(1e10), slab, False), t_end=0.03)
+    got = strike(
+        Gallery(1e3, 5.0, 10.0, Cushion(1e10, 1.0, recovery=1.0), Shear(1e10), slab, False),
+        t_end=0.03,
+    )
     assert got.plastic == pytest.approx(1e3 * 9.81 * 5.0 / 1e6, rel=0.02)
 
 
@@ -258,7 +262,9 @@ def test_the_plug_rings_down_at_its_share_of_critical_damping():
 def test_a_slab_yields_upwards_as_well():
     """Plug and slab exchange their energy; the first swing up is stronger than that down."""
     slab = Slab.of_mass(1e3, 1e8, damping=0.0, capacity=6e5)
-    g = Gallery(300.0, 1.0, 500.0, Cushion(1e9), Shear(3e7, damping=0.0), slab, weight=False)
+    g = Gallery(
+        300.0, 1.0, 500.0, Cushion(1e9, recovery=1.0), Shear(3e7, damping=0.0), slab, weight=False
+    )
     got = strike(g, t_end=0.6, keep=10**4)
     assert got.forces[:, 2].min() == pytest.approx(-6e5, rel=1e-9)
     assert got.plastic < -2e-4
@@ -290,7 +296,7 @@ def test_one_mode_of_a_plate_is_an_eighth_too_stiff():
 def test_a_wide_plate_is_a_dashpot_before_its_edges_answer():
     """Zener: under a force F a thin infinite plate gives way with the speed F / 8 sqrt(D rho h)."""
     side, D, mass = 8.0, 4.0e7, 8.0**2 * 625.0
-    g = Gallery(500.0, 2.0, 1.0, Cushion(4e8), Shear(5e9, damping=0.0),
+    g = Gallery(500.0, 2.0, 1.0, Cushion(4e8, recovery=1.0), Shear(5e9, damping=0.0),
                 plate(side, D, mass, 81), weight=False)  # fmt: skip
     got = strike(g, t_end=0.006)
     c = 8 * np.sqrt(D * 625.0)
@@ -352,6 +358,14 @@ def test_ten_modes_of_a_reduced_slab_bend_as_all_of_the_finite_elements(slab_mod
     few = Slab.of_body(slab_body, "impact", ENDS, n=10, damping=0.02)
     assert few.omega.size == 10
     assert strike(on_strip(few), t_end=0.06).deflection == pytest.approx(exact.deflection, rel=0.01)
+
+
+def test_a_reduced_slab_yields_at_its_capacity(slab_body):
+    bounded = Slab.of_body(slab_body, "impact", ENDS, damping=0.0, capacity=2e5)
+    got = strike(on_strip(bounded))
+    assert got.peaks[2] == pytest.approx(2e5, rel=1e-9)
+    assert got.energy[-1, 5] == pytest.approx(2e5 * got.plastic, rel=1e-9) and got.plastic > 0
+    assert strike(on_strip(replace(bounded, capacity=np.inf))).peaks[2] > 4e5
 
 
 def test_three_masses_are_the_first_mode_of_the_slab(slab_body):
@@ -461,10 +475,17 @@ def test_parameters_are_varied_one_at_a_time():
 @pytest.mark.parametrize(
     ("make", "error", "words"),
     [
+        (lambda: Cushion(np.inf), ConfigError, "needed are stiffness"),
+        (lambda: Cushion(np.nan), ConfigError, "needed are stiffness"),
+        (lambda: Shear(np.inf), ConfigError, "needed are|stiffness, capacity"),
+        (lambda: baseline(boulder=np.nan), ConfigError, "boulder = nan kg"),
+        (lambda: strike(baseline(), dt=np.inf), ConfigError, "dt = inf s"),
         (lambda: Cushion(-1.0), ConfigError, "needed are stiffness and limit > 0"),
         (lambda: Cushion(1.0, recovery=0.0), ConfigError, "0 < recovery <= 1"),
         (lambda: Cushion(1.0, exponent=0.5), ConfigError, "exponent >= 1"),
-        (lambda: Slab(np.ones(2), np.ones(2), capacity=1.0), ModelError, "2 modes cannot yield"),
+        (lambda: Slab(np.ones(2), np.ones(2), capacity=-1.0), ModelError, "capacity = -1.0 N"),
+        (lambda: Slab(np.zeros(2), np.ones(2)), ModelError, "moves under the plug"),
+        (lambda: Slab(np.array([np.nan]), np.ones(1)), ModelError, "not finite"),
         (lambda: Slab(np.ones(2), np.array([0.0, 1.0])), ModelError, "supports that hold it"),
         (lambda: strike(baseline(), dt=0.01, t_end=20.0), SolverError, "grows without bound"),
         (lambda: strike(baseline(), t_end=-1.0), ConfigError, "t_end = -1.0 s"),

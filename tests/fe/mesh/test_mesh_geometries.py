@@ -217,6 +217,20 @@ def test_the_blade_meshes_over_its_range(seed):
     assert_allclose((top, -bottom), (p["span"], foot), rtol=1e-9)
 
 
+def test_the_hub_of_a_turbine_is_a_hollow_sphere_without_four_caps():
+    """Volume of shells and caps in closed form; rings as wide as the wall leaves them."""
+    mesh = read_mesh(MESHES / "turbine_hub.geo", parameters={"lc": 0.6}, order=2)
+    R, t = np.hypot(1.5, 3.542 / 2), 0.16
+
+    def cap(radius, at):
+        return np.pi / 3 * (radius - at) ** 2 * (2 * radius + at)
+
+    shell = 4 / 3 * np.pi * (R**3 - (R - t) ** 3)
+    for at in (1.5, 1.5, 1.5, 1.95):
+        shell -= cap(R, at) - cap(R - t, at)
+    assert_allclose(volume(mesh), shell, rtol=2e-3)
+
+
 @pytest.mark.parametrize("L", [0.018, 0.010])
 def test_the_phalanx_is_a_round_edged_cylinder_with_a_bore(L):
     """Edges after Pappus, plates without the bore, pad on the side of the palm."""
@@ -258,6 +272,7 @@ def test_the_phalanx_is_a_round_edged_cylinder_with_a_bore(L):
         ("compressor_blade", {"crown": 0.005}, "crown = 0.005"),
         ("crank", {"d_pin": 0.05}, "d_pin = 0.05"),
         ("crank", {"r": 0.005}, "r = 0.005"),
+        ("turbine_hub", {"t": 0.9}, "a wall of 0.9 leaves no rings"),
         ("phalanx", {"D": 0.012}, "radius D / 2 - R = 0.00475"),
         ("phalanx", {"w_pad": 0.02}, "w_pad = 0.02"),
         ("phalanx", {"L": 0.008}, "L = 0.008"),

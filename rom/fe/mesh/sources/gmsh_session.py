@@ -14,6 +14,7 @@ from rom.fe.mesh.sources import builder, step
 from rom.fe.mesh.sources.cad_faces import axes, faces
 from rom.fe.mesh.sources.confinement import confine
 from rom.fe.mesh.sources.gmsh_groups import check_declared, collect, version
+from rom.fe.mesh.sources.gmsh_triangles import triangles
 from rom.fe.mesh.sources.picking import pick
 from rom.fe.mesh.sources.script import check_script
 from rom.plausible import scaled_doubt
@@ -36,6 +37,8 @@ def run(request: dict[str, Any]) -> Read:
         declared = Path(request["folder"], "declared.msh")
         with complaints(gmsh):
             values, defaults = MAKERS[reader](gmsh, path, request)
+        if request.get("flat"):
+            return _flat(gmsh, request, values)
         if reader == "msh":
             declared = path
         else:
@@ -174,6 +177,21 @@ def _msh(gmsh: Any, path: Path, request: dict[str, Any]) -> Made:
     link.symlink_to(path)
     gmsh.merge(str(link))
     return {}, {}
+
+
+def _flat(gmsh: Any, request: dict[str, Any], values: dict[str, Any]) -> Read:
+    """Triangles of the surfaces, meshed here unless the file is a mesh."""
+    if request["reader"] != "msh":
+        gmsh.option.setNumber("Mesh.ElementOrder", 1)
+        with complaints(gmsh, MeshError):
+            gmsh.model.mesh.generate(2)
+    arrays, notes = triangles(gmsh)
+    notes["provenance"] = {
+        "gmsh": gmsh.option.getString("General.Version"),
+        "parameters": values,
+        "gmsh_warnings": _log(gmsh, "Warning"),
+    }
+    return arrays, notes
 
 
 def _generate(gmsh: Any, request: dict[str, Any], declared: Path) -> None:

@@ -1,0 +1,355 @@
+"""What acts on a sheet as time goes on: loads, pressure that follows, driven nodes, rigid tools.
+
+Source:
+    Tools with Coulomb's friction: Wriggers, Computational Contact Mechanics, 2nd ed. (2006).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from rom.components.assumed_strain.triangles import Sheet
+from rom.errors import ConfigError, MeshError
+from rom.model import Array, Index
+
+History = tuple[
+    npt.ArrayLike, npt.ArrayLike
+]  # times (m,) [s], and values (m, ...), straight between
+ALWAYS: History = ((0.0,), (1.0,))
+TOUCH_RTOL = 1e-6  # depth over the longest side of the outline that counts as touching at the start
+
+
+@dataclass(frozen=True, slots=True)
+class Load:
+    """Dead forces.
+
+    Attributes:
+        forces: (n, 2) [N]; per radian times 2 pi, that is of the whole ring, with axial symmetry.
+        history: times [s] and factors (m,) [1].
+    """
+
+    forces: npt.ArrayLike
+    history: History = ALWAYS
+
+
+@dataclass(frozen=True, slots=True)
+class Traction:
+    """Pressure and shear on outer sides; both turn and grow with the sides.
+
+    Attributes:
+        sides: (k, 2) node numbers, rows of `outer_sides`.
+        pressure: into the solid [Pa].
+        shear: along the sides, with the solid on the left [Pa].
+        history: times [s] and factors (m,) [1].
+    """
+
+    sides: npt.ArrayLike
+    pressure: float = 0.0
+    shear: float = 0.0
+    history: History = ALWAYS
+
+
+@dataclass(frozen=True, slots=True)
+class Drive:
+    """Prescribed displacements.
+
+    Attributes:
+        dofs: (k,) dof numbers, 2 * node + axis.
+        history: times [s] and displacements (m,) or (m, k) from the start [m].
+    """
+
+    dofs: npt.ArrayLike
+    history: History
+
+
+@dataclass(frozen=True, slots=True)
+class Tool:
+    """A rigid convex body that the nodes of the sheet cannot enter.
+
+    Attributes:
+        name: of messages.
+        outline: (k, 2) corners, counter-clockwise [m]; `disc` makes a round one.
+        friction: Coulomb's coefficient [1]; infinite for a rough tool that holds what it touches.
+        history: times [s] and displacements (m, 2) of the tool [m].
+    """
+
+    name: str
+    outline: npt.ArrayLike
+    friction: float = 0.0
+    history: History = ((0.0,), ((0.0, 0.0),))
+
+
+@dataclass(frozen=True, slots=True)
+class Actions:
+    """All that acts on a sheet.
+
+    Attributes:
+        held: (k,) dof numbers that do not move.
+        loads: dead ones.
+        tractions: pressure and shear.
+        drives: prescribed motion.
+        tools: rigid ones.
+    """
+
+    held: npt.ArrayLike = ()
+    loads: Sequence[Load] = ()
+    tractions: Sequence[Traction] = ()
+    drives: Sequence[Drive] = ()
+    tools: Sequence[Tool] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Prepared:
+    """Actions as arrays; the columns of the table are factors, displacements, and places of tools.
+
+    Attributes:
+        times: (m,) [s] at which a history has a corner.
+        table: (m, c) loads, tractions, driven dofs, two for each tool.
+        loads: (q, n, 2) [N].
+        sides: (w, 2), with the solid on the left.
+        stress: (w, 2) pressure and shear [Pa].
+        of_side: (w,) column of the factor.
+        driven: (k,) dof numbers, the held ones last, and their columns; -1 for held ones.
+        faces: (f, 7) corner, unit tangent and outer normal of each face of a tool, its length.
+        first: (tools + 1,) where the faces of each tool begin.
+        friction: (tools,) [1].
+        names: of the tools.
+    """
+
+    times: Array
+    table: Array
+    loads: Array
+    sides: Index
+    stress: Array
+    of_side: Index
+    driven: Index
+    columns: Index
+    faces: Array
+    first: Index
+    friction: Array
+    names: tuple[str, ...] = field(default=())
+
+    @property
+    def forces(self) -> tuple[Array, Index, Array, Index]:
+        """What `kernels.applied` takes."""
+        return self.loads, self.sides, self.stress, self.of_side
+
+    @property
+    def tools(self) -> tuple[Array, Index, Array]:
+        """What `kernels.fly` takes of tools."""
+        return self.faces, self.first, self.friction
+
+    def faces_of(self, k: int) -> Array:
+        """(f, 7) faces of a tool."""
+        return self.faces[self.first[k] : self.first[k + 1]]
+
+    def at(self, t: float) -> Array:
+        """(c,) values of all histories [1 or m]."""
+        k = int(np.clip(np.searchsorted(self.times, t, "right") - 1, 0, len(self.times) - 2))
+        s = (t - self.times[k]) / (self.times[k + 1] - self.times[k])
+        s = min(max(s, 0.0), 1.0)
+        return np.asarray((1 - s) * self.table[k] + s * self.table[k + 1])
+
+    def displacements(self, t: float) -> Array:
+        """(k,) of the driven dofs [m]."""
+        return np.where(self.columns < 0, 0.0, np.append(self.at(t), 0.0)[self.columns])
+
+    def places(self, t: float) -> Array:
+        """(tools, 2) displacements of the tools [m]."""
+        tools = len(self.friction)
+        return self.at(t)[self.table.shape[1] - 2 * tools :].reshape(tools, 2)
+
+
+def outer_sides(body: Sheet) -> Index:
+    """(k, 2) nodes of the sides at the edge of a sheet, the solid on the left."""
+    T = body.triangles
+    every = np.vstack([T[:, [1, 2]], T[:, [2, 0]], T[:, [0, 1]]])
+    alone = (body.patch[:, 3:] == T).T.ravel()
+    return every[alone]
+
+
+def disc(center: npt.ArrayLike, radius: float, *, n: int = 120) -> Array:
+    """(n, 2) corners of a round outline; flat between them, they lie on the circle [m].
+
+    Args:
+        center: (2,) [m].
+        radius: [m].
+        n: number of corners.
+
+    Raises:
+        ConfigError: for a radius that is not positive, or fewer than three corners.
+    """
+    if not 0 < radius < np.inf or n < 3:
+        raise ConfigError(f"a disc of the radius {radius} m with {n} corners has no inside.")
+    angle = 2 * np.pi * np.arange(n) / n
+    return np.asarray(center, dtype=float) + radius * np.column_stack(
+        [np.cos(angle), np.sin(angle)]
+    )
+
+
+def prepared(body: Sheet, actions: Actions) -> Prepared:
+    """Check actions and put them into arrays.
+
+    Raises:
+        ConfigError: if histories, dofs, sides or tools do not fit; naming which.
+        MeshError: if a tool begins inside the sheet, or the sheet in it.
+    """
+    loads = np.zeros((len(actions.loads), *body.points.shape))
+    for k, load in enumerate(actions.loads):
+        loads[k] = nodal(f"forces of load {k}", load.forces, body)
+    sides = [_outer(body, k, traction) for k, traction in enumerate(actions.tractions)]
+    stress = [[x.pressure, x.shear] for x in actions.tractions]
+    of = np.repeat(np.arange(len(sides)), [len(s) for s in sides])
+    moved = [dofs_of(drive.dofs, body) for drive in actions.drives]
+    driven, columns = _driven(dofs_of(actions.held, body), moved, len(loads) + len(sides))
+    times, table = _table(_histories(actions, [m.size for m in moved]))
+    faces = [_faces(tool) for tool in actions.tools]
+    made = Prepared(
+        times, table, loads, np.vstack([np.zeros((0, 2), dtype=np.int64), *sides]),
+        np.reshape(stress, (-1, 2)).astype(float)[of], len(loads) + of, driven, columns,
+        np.vstack([np.zeros((0, 7)), *faces]), np.cumsum([0, *(len(f) for f in faces)]),
+        np.array([tool.friction for tool in actions.tools], dtype=float),
+        tuple(tool.name for tool in actions.tools),
+    )  # fmt: skip
+    _refuse_overlap(body, made)
+    return made
+
+
+def _driven(held: Index, moved: list[Index], first: int) -> tuple[Index, Index]:
+    """Dofs of all drives, then held ones; their columns of the table, -1 for held ones."""
+    by_drives = np.concatenate([*moved, np.zeros(0, dtype=np.int64)])
+    if np.unique(by_drives).size < by_drives.size:
+        raise ConfigError("a dof is driven twice.", hint="One drive for each dof.")
+    driven = np.concatenate([by_drives, np.setdiff1d(held, by_drives)])
+    columns = np.full(driven.size, -1)
+    columns[: by_drives.size] = first + np.arange(by_drives.size)
+    return driven, columns
+
+
+def nodal(name: str, values: npt.ArrayLike, body: Sheet) -> Array:
+    """Finite values (n, 2) at the nodes of the sheet; kernels check no bounds.
+
+    Raises:
+        ConfigError: if they do not fit the sheet.
+    """
+    x = np.ascontiguousarray(values, dtype=float)
+    if x.shape != body.points.shape or not np.isfinite(x).all():
+        raise ConfigError(
+            f"{name} of the shape {x.shape}: {body.points.shape} finite numbers are needed."
+        )
+    return x
+
+
+def dofs_of(held: npt.ArrayLike, body: Sheet) -> Index:
+    """Numbers of dofs, 2 * node + axis.
+
+    Raises:
+        ConfigError: if the sheet has no such dofs.
+    """
+    dofs = np.asarray(held, dtype=np.int64).ravel()
+    if dofs.size and (dofs.min() < 0 or dofs.max() >= body.points.size):
+        raise ConfigError(
+            f"held dofs {dofs.min()} to {dofs.max()}; the sheet has 0 to {body.points.size - 1}.",
+            hint="A dof is 2 * node + axis.",
+        )
+    return dofs
+
+
+def _outer(body: Sheet, k: int, traction: Traction) -> Index:
+    """Sides of a traction; each must be at the edge, and turned as there."""
+    wanted = np.asarray(traction.sides, dtype=np.int64).reshape(-1, 2)
+    if not np.isfinite([traction.pressure, traction.shear]).all():
+        raise ConfigError(f"traction {k} is not finite.")
+    there = {tuple(side) for side in outer_sides(body).tolist()}
+    for side in wanted.tolist():
+        if tuple(side) not in there:
+            raise ConfigError(
+                f"traction {k}: the side {side[0]}-{side[1]} is not an outer one.",
+                hint="Take rows of outer_sides, which have the solid on the left.",
+            )
+    return wanted
+
+
+def _faces(tool: Tool) -> Array:
+    """(f, 7) corner, tangent, outer normal, length; a tool must be convex."""
+    X = np.asarray(tool.outline, dtype=float)
+    if X.ndim != 2 or X.shape[1] != 2 or len(X) < 3 or not np.isfinite(X).all():
+        raise ConfigError(f"tool {tool.name!r}: an outline has three finite corners or more.")
+    if not tool.friction >= 0:
+        raise ConfigError(f"tool {tool.name!r}: the friction {tool.friction} is negative.")
+    along = np.roll(X, -1, axis=0) - X
+    length = np.linalg.norm(along, axis=1)
+    if not length.min() > 0:
+        raise ConfigError(f"tool {tool.name!r}: a corner of the outline is named twice.")
+    t = along / length[:, None]
+    turn = np.roll(t, -1, axis=0)
+    if np.any(t[:, 0] * turn[:, 1] - t[:, 1] * turn[:, 0] < -1e-9):
+        raise ConfigError(
+            f"tool {tool.name!r}: the outline is not convex, or clockwise.",
+            hint="Order the corners counter-clockwise; make a hollow tool of several.",
+        )
+    return np.column_stack([X, t, t[:, 1], -t[:, 0], length])
+
+
+def _histories(actions: Actions, moved: list[int]) -> list[tuple[str, Array, Array]]:
+    """Name, times and values (m, columns) of every history, in the order of the table."""
+    asked = [(f"load {k}", x.history, 1) for k, x in enumerate(actions.loads)]
+    asked += [(f"traction {k}", x.history, 1) for k, x in enumerate(actions.tractions)]
+    asked += [(f"drive {k}", x.history, moved[k]) for k, x in enumerate(actions.drives)]
+    asked += [(f"tool {x.name!r}", x.history, 2) for x in actions.tools]
+    return [(name, *_checked(name, history, n)) for name, history, n in asked]
+
+
+def _checked(name: str, history: History, n: int) -> tuple[Array, Array]:
+    t, y = np.asarray(history[0], dtype=float), np.asarray(history[1], dtype=float)
+    if t.ndim != 1 or not t.size or len(y) != len(t) or not np.all(np.diff(t) > 0):
+        raise ConfigError(
+            f"{name}: times of the shape {t.shape} with values {y.shape}.",
+            hint="Times that grow, and one value, or row of values, for each.",
+        )
+    if y.ndim == 1 and not name.startswith("tool"):
+        y = np.repeat(y[:, None], n, axis=1)
+    if y.shape != (len(t), n) or not (np.isfinite(t).all() and np.isfinite(y).all()):
+        raise ConfigError(f"{name}: values of the shape {y.shape}, not {(len(t), n)} finite ones.")
+    return t, y
+
+
+def _table(histories: list[tuple[str, Array, Array]]) -> tuple[Array, Array]:
+    """Corners of all histories together; constant before the first and after the last."""
+    corners = [t for _, t, _ in histories]
+    times = np.unique(np.concatenate([[0.0], *corners]))
+    times = np.append(times, times[-1] + 1.0)
+    columns = [np.interp(times, t, y[:, k]) for _, t, y in histories for k in range(y.shape[1])]
+    return times, np.array(columns).T.reshape(len(times), -1).copy()
+
+
+def _refuse_overlap(body: Sheet, made: Prepared) -> None:
+    """No node in a tool at the start, and no corner of a tool in a triangle."""
+    X = body.points
+    for k, (name, offset) in enumerate(zip(made.names, made.places(0.0), strict=True)):
+        faces = made.faces_of(k)
+        gap = np.einsum("nfa,fa->nf", X[:, None] - offset - faces[:, :2], faces[:, 4:6]).max(axis=1)
+        if gap.min() < -TOUCH_RTOL * faces[:, 6].max():
+            raise MeshError(
+                f"tool {name!r} starts {-gap.min():.3g} m inside the sheet, at node "
+                f"{int(gap.argmin())}.",
+                hint="Move the tool until it only touches.",
+            )
+        corner = _covered(body, faces[:, :2] + offset)
+        if corner >= 0:
+            raise MeshError(
+                f"corner {corner} of the tool {name!r} starts inside the sheet.",
+                hint="Move the tool until it only touches.",
+            )
+
+
+def _covered(body: Sheet, places: Array) -> int:
+    """Number of a place inside a triangle by more than a touch; -1 if there is none."""
+    a, b, c = (body.points[body.triangles[:, k]] for k in range(3))
+    for k, p in enumerate(places):
+        parts = [np.cross(v - u, p - u) for u, v in ((a, b), (b, c), (c, a))]
+        if np.any(np.min(parts, axis=0) > 2 * 1e-3 * body.area):
+            return k
+    return -1

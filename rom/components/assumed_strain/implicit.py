@@ -1,0 +1,357 @@
+"""Equilibrium and implicit motion of a sheet under actions, by Newton's method.
+
+Source:
+    Steps in time: Chung and Hulbert, A time integration algorithm for structural dynamics with
+    improved numerical dissipation: the generalized-alpha method, J. Appl. Mech. 60 (1993) 371.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+from scipy.sparse import coo_matrix, csr_matrix
+from scipy.sparse.linalg import spsolve
+
+from rom.components.assumed_strain import kernels
+from rom.components.assumed_strain.actions import Actions, Load, nodal, prepared
+from rom.components.assumed_strain.contact import touch
+from rom.components.assumed_strain.motion import Metal, depth_of, forces, mass, tangent
+from rom.components.assumed_strain.triangles import Sheet
+from rom.errors import ConfigError, SolverError
+from rom.model import Array, Index
+
+PENALTY_RATIO = 20.0  # stiffness of a face at a node, over Young's modulus times depth
+RESIDUAL_RTOL = 1e-9  # of the forces that are in balance
+# a bar that bounces from a wall kept 0.96 and 0.98 of its energy at 0 and 0.5, and got 2.7 at 0.8
+MAX_RHO_OF_IMPACTS = 0.5
+MIN_SHARE = 1 / 64  # of a correction that is not halved any more
+MAX_ITERATIONS = 25
+MIN_STEP = 1 / 256  # part of the time between two instants that is not halved any more
+
+
+@dataclass(frozen=True, slots=True)
+class Course:
+    """What happened, instant by instant.
+
+    Attributes:
+        t: (k,) times [s]; without inertia only a measure of the way.
+        x: (k, n, 2) positions [m].
+        v: (k, n, 2) velocities [m/s]; without inertia means of the last step.
+        plastic: (k, t, p) accumulated plastic strain [1].
+        tool_forces: (k, tools, 2) forces of the tools on the sheet [N].
+        reactions: (k, n, 2) forces of supports and drives on their nodes [N].
+        history: (t, p, 5) of the end, as of `forces` [1].
+        iterations: most of Newton's iterations in a step.
+    """
+
+    t: Array
+    x: Array
+    v: Array
+    plastic: Array
+    tool_forces: Array
+    reactions: Array
+    history: Array
+    iterations: int
+
+
+@dataclass(frozen=True, slots=True)
+class _Now:
+    """State at an instant: motion, history, elastic slip at tools (n, tools), balance of forces."""
+
+    t: float
+    x: Array
+    v: Array
+    a: Array
+    history: Array
+    slip: Array
+    balance: Array
+    tool_forces: Array
+    reactions: Array
+
+
+def quasi_static(body: Sheet, metal: Metal, actions: Actions, times: npt.ArrayLike) -> Course:
+    """Equilibria at growing times; what happens between them is halved where Newton's method fails.
+
+    Args:
+        body: the sheet, without stress at the first time.
+        metal: its material.
+        actions: loads, pressure, driven nodes and tools.
+        times: (k,) instants [s].
+
+    Raises:
+        ConfigError: if actions or times do not fit.
+        MeshError: if a tool begins inside the sheet.
+        SolverError: if no equilibrium is found; ``error.solution`` holds the instants before.
+    """
+    return _Way(body, metal, actions, None, 0.0).run(times, np.zeros_like(body.points))
+
+
+def equilibrium(
+    body: Sheet, metal: Metal, load: Array, held: npt.ArrayLike, *, steps: int = 1
+) -> tuple[Array, Array, int]:
+    """Rest under dead loads, which grow in equal steps; `quasi_static` has all other actions.
+
+    Args:
+        body: the sheet.
+        metal: its material.
+        load: (n, 2) dead forces [N].
+        held: (k,) dof numbers that do not move.
+        steps: load steps.
+
+    Returns:
+        Positions (n, 2) [m], history as of `forces`, and the most Newton iterations of a step.
+
+    Raises:
+        ConfigError: if loads or held dofs do not fit, or without a step.
+        SolverError: if Newton's method does not find equilibrium, even in halves of a step;
+            ``error.solution`` holds the steps before.
+    """
+    if steps < 1:
+        raise ConfigError(f"{steps} load steps: one or more are needed.")
+    actions = Actions(held, loads=[Load(load, ((0, 1), (0, 1)))])
+    course = quasi_static(body, metal, actions, np.linspace(0, 1, steps + 1))
+    return course.x[-1], course.history, course.iterations
+
+
+def implicit_motion(
+    body: Sheet, metal: Metal, actions: Actions, times: npt.ArrayLike, *,
+    v: npt.ArrayLike | None = None, rho_inf: float = 0.5,
+) -> Course:  # fmt: skip
+    """Motion with inertia by generalized-alpha steps, from one instant to the next.
+
+    Args:
+        body: the sheet, without stress at the first time.
+        metal: its material.
+        actions: loads, pressure, driven nodes and tools.
+        times: (k,) instants [s].
+        v: (n, 2) velocities at the start [m/s]; None: at rest.
+        rho_inf: what a step leaves of fastest vibrations, 0 to 1 [1]; with tools 0.5 at most,
+            since impacts gain energy above.
+
+    Raises:
+        ConfigError: if actions, times or velocities do not fit.
+        MeshError: if a tool begins inside the sheet.
+        SolverError: if no motion is found; ``error.solution`` holds the instants before.
+    """
+    if not 0 <= rho_inf <= 1:
+        raise ConfigError(f"rho_inf = {rho_inf}: from 0 to 1.")
+    if actions.tools and rho_inf > MAX_RHO_OF_IMPACTS:
+        raise ConfigError(
+            f"rho_inf = {rho_inf} with tools: impacts would gain energy.",
+            hint=f"At most {MAX_RHO_OF_IMPACTS} beside tools.",
+        )
+    start = np.zeros_like(body.points) if v is None else nodal("velocities", v, body)
+    return _Way(body, metal, actions, mass(body, metal), rho_inf).run(times, start)
+
+
+@dataclass(frozen=True, slots=True)
+class _Trial:
+    """A state, its forces out of balance (2n,) with inertia, their size, stiffness of tools."""
+
+    then: _Now
+    whole: Array
+    size: float
+    entries: list[tuple[Index, Array]]
+
+    def norm(self, free: Index) -> float:
+        """Of the free ones [N]; infinite where something is not finite."""
+        found = float(np.linalg.norm(self.whole[free]))
+        return found if np.isfinite(found) else np.inf
+
+
+class _Way:
+    """One run: what does not change, and the steps of Newton's method."""
+
+    def __init__(
+        self, body: Sheet, metal: Metal, actions: Actions, M: csr_matrix | None, rho: float
+    ) -> None:
+        self.body, self.metal, self.M = body, metal, M
+        self.acts = prepared(body, actions)
+        self.free = np.setdiff1d(np.arange(body.points.size), self.acts.driven)
+        self.alpha_m, self.alpha_f = (2 * rho - 1) / (rho + 1), rho / (rho + 1)
+        self.gamma = 0.5 - self.alpha_m + self.alpha_f
+        self.beta = 0.25 * (1 - self.alpha_m + self.alpha_f) ** 2
+        if M is None:
+            self.alpha_m = self.alpha_f = 0.0
+        depth = depth_of(body)
+        around = 2 * np.pi * np.maximum(body.points[:, 0], 1e-3 * body.points[:, 0].max())
+        deep = np.full(len(around), depth) if depth > 0 else around
+        self.stiff = PENALTY_RATIO * metal.E * deep
+        extent = np.ptp(body.points, axis=0).max()
+        self.round_off = np.finfo(float).eps * metal.E * deep.max() * extent
+        self.most = 0
+
+    def run(self, times: npt.ArrayLike, v: Array) -> Course:
+        """Instants one after the other."""
+        t = np.asarray(times, dtype=float)
+        if t.ndim != 1 or len(t) < 2 or not np.isfinite(t).all() or not np.all(np.diff(t) > 0):
+            raise ConfigError(f"times of the shape {t.shape}: two or more that grow are needed.")
+        kept = [self.start(t[0], v)]
+        for k in range(1, len(t)):
+            now, part = kept[-1], 1.0
+            while now.t < t[k]:
+                end = min(now.t + part * (t[k] - t[k - 1]), t[k])
+                end = t[k] if t[k] - end < 1e-9 * (t[k] - t[k - 1]) else end
+                found = self.step(now, end)
+                if found is not None:
+                    now, part = found, min(2 * part, 1.0)
+                elif part > MIN_STEP:
+                    part /= 2
+                else:
+                    raise SolverError(
+                        f"no balance of forces between {now.t:.4g} s and {end:.4g} s, instant "
+                        f"{k} of {len(t) - 1}.",
+                        hint="Take more instants, or less load; the sheet may be free to move.",
+                        solution=self.course(kept),
+                    )
+            kept.append(now)
+        return self.course(kept)
+
+    def course(self, kept: list[_Now]) -> Course:
+        """Record of the instants."""
+
+        def rows(name: str) -> Array:
+            return np.array([getattr(now, name) for now in kept])
+
+        return Course(
+            rows("t"), rows("x"), rows("v"), rows("history")[..., 4], rows("tool_forces"),
+            rows("reactions"), kept[-1].history, self.most,
+        )  # fmt: skip
+
+    def start(self, t: float, v: Array) -> _Now:
+        """The sheet as it began; with inertia, its acceleration."""
+        x, n = self.body.points.copy(), self.body.points.size
+        x.reshape(-1)[self.acts.driven] += self.acts.displacements(t)
+        zero = np.zeros((*self.body.weights.shape, 5))
+        slip = np.zeros((len(x), len(self.acts.friction)))
+        now = _Now(t, x, np.zeros_like(x), np.zeros_like(x), zero, slip, np.zeros(n),
+                   np.zeros((slip.shape[1], 2)), np.zeros_like(x))  # fmt: skip
+        if self.M is None:
+            return now
+        balance, now, _ = self.balance(now, x, t, [])
+        a, v = np.zeros(n), v.copy()
+        v.reshape(-1)[self.acts.driven] = 0.0
+        a[self.free] = spsolve(self.M[self.free][:, self.free].tocsc(), balance[self.free])
+        return replace(now, a=a.reshape(-1, 2), v=v, balance=balance)
+
+    def balance(
+        self, now: _Now, x: Array, t: float, entries: list[tuple[Index, Array]]
+    ) -> tuple[Array, _Now, float]:
+        """Forces out of balance without inertia (2n,) [N], the state there, and their size."""
+        body, acts = self.body, self.acts
+        f, history = forces(body, self.metal, x, now.history)
+        g = np.zeros_like(x)
+        kernels.applied(x, acts.at(t), acts.forces, depth_of(body), g)
+        tool_forces = np.zeros_like(now.tool_forces)
+        slip, c = np.zeros_like(now.slip), np.zeros_like(x)
+        for k in range(len(acts.friction)):
+            place, mu = acts.places(t)[k], acts.friction[k]
+            moved = x - now.x - (place - acts.places(now.t)[k])
+            on = touch(x - place, moved, now.slip[:, k], acts.faces_of(k), mu, self.stiff)
+            entries.append(on.entries)
+            slip[:, k], tool_forces[k], c = on.slip, on.forces.sum(axis=0), c + on.forces
+        size = float(np.linalg.norm(f) + np.linalg.norm(g) + np.linalg.norm(c))
+        r = (g + c - f).ravel()
+        then = replace(now, t=t, x=x, history=history, slip=slip, tool_forces=tool_forces)
+        return r, replace(then, balance=r), size
+
+    def step(self, now: _Now, t: float) -> _Now | None:
+        """State after a step, None where Newton's method fails."""
+        free, driven, trial = self.free, self.acts.driven, self.first(now, t)
+        target = self.body.points.ravel()[driven] + self.acts.displacements(t)
+        for i in range(MAX_ITERATIONS):
+            if not np.isfinite(trial.whole).all():
+                return None
+            if i and trial.norm(free) <= RESIDUAL_RTOL * trial.size + self.round_off:
+                self.most = max(self.most, i)
+                return self.arrived(now, trial)
+            K, jump = self.stiffness(now, trial), target - trial.then.x.ravel()[driven]
+            rows, change = K[free], np.zeros(trial.whole.size)
+            change[driven] = jump
+            change[free] = spsolve(rows[:, free].tocsc(),
+                                   trial.whole[free] - rows[:, driven] @ jump)  # fmt: skip
+            if not np.isfinite(change).all():
+                return None
+            trial = self.searched(now, trial, change.reshape(-1, 2), i == 0)
+        return None
+
+    def first(self, now: _Now, t: float) -> "_Trial":
+        """Where a step begins: as the motion goes on."""
+        dt = t - now.t
+        trial = self.trial(now, now.x + dt * now.v + 0.5 * dt * dt * now.a, t)
+        return trial if trial.norm(self.free) < np.inf else self.trial(now, now.x, t)
+
+    def searched(self, now: _Now, old: "_Trial", change: Array, full: bool) -> "_Trial":
+        """The whole change, or that half, quarter, ... of it which leaves less out of balance."""
+        share, best, t = 1.0, None, old.then.t
+        while best is None or (share > MIN_SHARE and not full):
+            new = self.trial(now, old.then.x + share * change, t)
+            if full or new.norm(self.free) < (1 - 0.1 * share) * old.norm(self.free):
+                return new
+            best = new if best is None or new.norm(self.free) < best.norm(self.free) else best
+            share /= 2
+        return best
+
+    def trial(self, now: _Now, x: Array, t: float) -> "_Trial":
+        """Balance of forces at positions, with inertia."""
+        entries: list[tuple[Index, Array]] = []
+        with np.errstate(all="ignore"):
+            r, then, size = self.balance(now, x, t, entries)
+        whole = (1 - self.alpha_f) * r + self.alpha_f * now.balance
+        if self.M is None:
+            return _Trial(then, whole, size, entries)
+        dt = t - now.t
+        a = (x - now.x - dt * now.v - dt * dt * (0.5 - self.beta) * now.a) / (self.beta * dt * dt)
+        inertia = self.M @ ((1 - self.alpha_m) * a + self.alpha_m * now.a).ravel()
+        size += float(np.linalg.norm(inertia))
+        return _Trial(replace(then, a=a), whole - inertia, size, entries)
+
+    def arrived(self, now: _Now, trial: "_Trial") -> _Now:
+        """State at the end of a step, with what supports and drives give."""
+        then, driven, reactions = trial.then, self.acts.driven, np.zeros(trial.whole.size)
+        reactions[driven] = -then.balance[driven]
+        if self.M is None:
+            v = (then.x - now.x) / (then.t - now.t)
+            return replace(then, v=v, reactions=reactions.reshape(-1, 2))
+        reactions[driven] += (self.M @ then.a.ravel())[driven]
+        v = now.v + (then.t - now.t) * ((1 - self.gamma) * now.a + self.gamma * then.a)
+        return replace(then, v=v, reactions=reactions.reshape(-1, 2))
+
+    def stiffness(self, now: _Now, trial: "_Trial") -> csr_matrix:
+        """(2n, 2n) of solid, tools, sides that turn under their pressure, and inertia [N/m]."""
+        x, t = trial.then.x, trial.then.t
+        K = tangent(self.body, self.metal, x, now.history)
+        for nodes, A in trial.entries:
+            dofs = 2 * nodes[:, None] + np.arange(2)
+            K = K + _placed(A, dofs, dofs, x.size)
+        if len(self.acts.sides):
+            K = K - self.turning(x, t)
+        if self.M is None:
+            return K.tocsr()
+        inertia = (1 - self.alpha_m) / (self.beta * (t - now.t) ** 2)
+        return ((1 - self.alpha_f) * K + inertia * self.M).tocsr()
+
+    def turning(self, x: Array, t: float) -> csr_matrix:
+        """(2n, 2n) derivative of pressure and shear by the positions [N/m]."""
+        acts, (i, j) = self.acts, self.acts.sides.T
+        p, s = acts.stress.T
+        side, factor = x[j] - x[i], 0.5 * acts.at(t)[acts.of_side]
+        turn = np.moveaxis(np.array([[s, -p], [p, s]]), 2, 0)
+        depth = depth_of(self.body)
+        around = np.full(len(i), depth) if depth > 0 else np.pi * (x[i, 0] + x[j, 0])
+        wide = (factor * around)[:, None, None] * turn
+        A = np.concatenate([-wide, wide], axis=2)
+        if depth < 0:
+            more = np.pi * factor[:, None] * (turn @ side[..., None])[..., 0]
+            A[:, :, 0] += more
+            A[:, :, 2] += more
+        first, second = (2 * e[:, None] + np.arange(2) for e in (i, j))
+        ends = np.concatenate([first, second], axis=1)
+        return _placed(A, first, ends, x.size) + _placed(A, second, ends, x.size)
+
+
+def _placed(A: Array, rows: Array, columns: Array, n: int) -> csr_matrix:
+    """Small matrices (k, r, c) added at dofs (k, r) and (k, c)."""
+    place = (np.repeat(rows, columns.shape[1], axis=1).ravel(),
+             np.tile(columns, (1, rows.shape[1])).ravel())  # fmt: skip
+    return coo_matrix((A.ravel(), place), shape=(n, n)).tocsr()

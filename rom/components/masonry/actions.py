@@ -1,0 +1,398 @@
+"""What acts on masonry besides its weight: live loads, wind, supports that move, earthquakes.
+
+Forces are those in the middle of a step, at points that move with their stones. Held stones are
+moved to where they are at its end. Motion of the ground acts as inertia in the frame of the ground.
+
+Source:
+    Point loads and moved supports after Shi, Discontinuous deformation analysis (1988).
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from scipy.spatial import Delaunay
+
+from rom.components.masonry.discontinuous_deformation import Drive
+from rom.components.masonry.histories import History, ramp, values_at
+from rom.components.masonry.stones import Masonry, touching
+from rom.errors import ConfigError
+from rom.model import Array, Index
+
+ON_EDGE_RTOL = 1e-6  # of the size of a stone: how far from its edge a point is still on it
+
+
+class Forces(NamedTuple):
+    """L forces at n times; as in `Drive`."""
+
+    block: Index
+    corner: Index
+    share: Array
+    force: Array
+    turns: Index
+
+
+ForceHistory = Callable[[Array], Forces]
+
+
+@dataclass(frozen=True)
+class PointLoad:
+    """A force of fixed direction at a point of a stone.
+
+    Attributes:
+        stone: number of the stone.
+        at: (2,) point in or on it, where it lies at the start [m].
+        force: (2,) [N].
+        history: factor of the force.
+        name: for messages.
+    """
+
+    stone: int
+    at: tuple[float, float]
+    force: tuple[float, float]
+    history: History = 1.0
+    name: str = "point load"
+
+    def begin(self, masonry: Masonry) -> ForceHistory:
+        """Forces (n, 1) at times (n,).
+
+        Raises:
+            ConfigError: if there is no such stone, or the point lies outside of it.
+        """
+        block = _moving(self.name, self.stone, masonry)
+        corner, share = _place(self.name, masonry, block, np.asarray(self.at, dtype=float))
+        force = _vector(self.name, self.force)
+
+        def at(t: Array) -> Forces:
+            return _fixed(len(t), [block], [corner], [share], [0])._replace(
+                force=values_at(self.name, self.history, t)[:, None, None] * force
+            )
+
+        return at
+
+
+@dataclass(frozen=True)
+class MovingLoad:
+    """A force that rolls over the tops of the stones, on the highest one at its x.
+
+    Attributes:
+        force: (2,) [N].
+        speed: along x [m/s].
+        start: x at t = 0 [m].
+        name: for messages.
+    """
+
+    force: tuple[float, float]
+    speed: float
+    start: float
+    name: str = "moving load"
+
+    def begin(self, masonry: Masonry) -> ForceHistory:
+        """Forces (n, 1) at times (n,); before and behind the stones there is none.
+
+        Raises:
+            ConfigError: if it never reaches a stone.
+        """
+        first = masonry.first_corners()
+        top, who = _tops(masonry)
+        force = _vector(self.name, self.force)
+        _vector(self.name, (self.speed, self.start))
+        beyond = self.start > top[:, 1, 0].max() if self.speed >= 0 else False
+        before = self.start < top[:, 0, 0].min() if self.speed <= 0 else False
+        if beyond or before:
+            raise ConfigError(
+                f"{self.name} starts at x = {self.start} m and never comes upon the stones, which "
+                f"lie from x = {top[:, 0, 0].min():.6g} m to {top[:, 1, 0].max():.6g} m."
+            )
+
+        def at(t: Array) -> Forces:
+            x = (self.start + self.speed * t)[:, None]
+            w = (x - top[:, 0, 0]) / (top[:, 1, 0] - top[:, 0, 0])
+            y = np.where((w >= 0) & (w <= 1), top[:, 0, 1] + w * (top[:, 1, 1] - top[:, 0, 1]),
+                         -np.inf)  # fmt: skip
+            k = np.argmax(y, axis=1)
+            rows = np.arange(len(t))
+            share = np.stack([1 - w[rows, k], w[rows, k], 0 * w[rows, k]], axis=1)
+            block = np.where(np.isfinite(y[rows, k]), who[k, 0], -1)
+            corner = first[who[k, 0]][:, None] + who[k][:, [1, 2, 2]]
+            found = _fixed(len(t), [0], [corner[0]], [share[0]], [0])
+            return found._replace(
+                block=block[:, None], corner=corner[:, None], share=share[:, None],
+                force=np.tile(force, (len(t), 1, 1)),
+            )  # fmt: skip
+
+        return at
+
+
+@dataclass(frozen=True)
+class Wind:
+    """Pressure on edges; it turns with them.
+
+    Attributes:
+        pressure: [Pa], negative for suction.
+        edges: stone, and number of the edge from that corner to the next; `facing` finds them.
+        name: for messages.
+    """
+
+    pressure: History
+    edges: tuple[tuple[int, int], ...]
+    name: str = "wind"
+
+    def begin(self, masonry: Masonry) -> ForceHistory:
+        """Forces (n, edges) at times (n,).
+
+        Raises:
+            ConfigError: if there is no such stone or edge.
+        """
+        first, rows = masonry.first_corners(), []
+        for stone, edge in self.edges:
+            outline = masonry.stones[_moving(self.name, stone, masonry)].outline
+            if not 0 <= edge < len(outline):
+                raise ConfigError(
+                    f"{self.name} blows on edge {edge} of stone {stone}, whose edges are 0 to "
+                    f"{len(outline) - 1}."
+                )
+            o = (edge + 1) % len(outline)
+            along = outline[o] - outline[edge]
+            inward = masonry.thickness * np.array([-along[1], along[0]])
+            rows.append((stone, first[stone] + np.array([edge, o, o]), inward))
+        if not rows:
+            raise ConfigError(f"{self.name} blows on no edge.")
+        block, corner, force = (list(x) for x in zip(*rows, strict=True))
+        n = len(rows)
+
+        def at(t: Array) -> Forces:
+            found = _fixed(len(t), block, corner, [np.array([0.5, 0.5, 0.0])] * n, [1] * n)
+            pressure = values_at(self.name, self.pressure, t)
+            return found._replace(force=pressure[:, None, None] * np.array(force))
+
+        return at
+
+
+@dataclass(frozen=True)
+class SupportMotion:
+    """Settlement, spreading or turning of held stones.
+
+    Attributes:
+        stones: numbers of held stones.
+        shift: (2,) in the end [m].
+        turn: about their mass centres in the end [rad].
+        history: share of both, which begins with 0.
+        name: for messages.
+    """
+
+    stones: tuple[int, ...]
+    shift: tuple[float, float]
+    turn: float = 0.0
+    history: History = field(default_factory=lambda: ramp(1.0))
+    name: str = "motion of supports"
+
+    def begin(self, masonry: Masonry) -> Callable[[Array], Array]:
+        """Increments (n, B, 3) between times (n + 1,) [m, m, rad].
+
+        Raises:
+            ConfigError: if a stone is not held or touches nothing, or does not start where it is.
+        """
+        end = np.r_[_vector(self.name, self.shift), self.turn]
+        if not np.isfinite(self.turn):
+            raise ConfigError(f"{self.name} turns by {self.turn} rad.")
+        touched = set(np.unique(touching(masonry).who[:, [0, 2]]).tolist())
+        for stone in self.stones:
+            if stone not in masonry.held:
+                raise ConfigError(
+                    f"{self.name} moves stone {stone}, which is not held; held are {masonry.held}."
+                )
+            if stone not in touched:
+                raise ConfigError(f"{self.name} moves stone {stone}, which supports nothing.")
+        if abs(values_at(self.name, self.history, np.zeros(1))[0]) > 0.0:
+            raise ConfigError(
+                f"{self.name} begins away from where its stones lie.",
+                hint="Let its history be 0 at t = 0.",
+            )
+        chosen = np.isin(np.arange(len(masonry.stones)), self.stones)[:, None] * end
+
+        def between(t: Array) -> Array:
+            share = np.diff(values_at(self.name, self.history, t))
+            return np.asarray(share[:, None, None] * chosen)
+
+        return between
+
+
+@dataclass(frozen=True)
+class BaseMotion:
+    """Acceleration of the ground; the motion of the stones is relative to it.
+
+    Attributes:
+        acceleration: [m/s^2], harmonic, a pulse or recorded.
+        direction: (2,) that it is multiplied with [1].
+        name: for messages.
+    """
+
+    acceleration: History
+    direction: tuple[float, float] = (1.0, 0.0)
+    name: str = "motion of the ground"
+
+    def begin(self, masonry: Masonry) -> Callable[[Array], Array]:
+        """Accelerations (n, 2) at times (n,) [m/s^2].
+
+        Raises:
+            ConfigError: if the direction is none, or no stone is held by the ground.
+        """
+        direction = _vector(self.name, self.direction)
+        if not masonry.held:
+            raise ConfigError(f"{self.name}: no stone is held, so nothing stands on the ground.")
+        return lambda t: values_at(self.name, self.acceleration, t)[:, None] * direction
+
+
+Action = PointLoad | MovingLoad | Wind | SupportMotion | BaseMotion
+
+
+def facing(masonry: Masonry, direction: tuple[float, float]) -> tuple[tuple[int, int], ...]:
+    """Edges of free stones that wind of a direction meets first.
+
+    An edge counts if it is turned against the wind and nothing lies before its middle.
+
+    Args:
+        masonry: the stones.
+        direction: (2,) the wind blows in [1].
+
+    Raises:
+        ConfigError: if the direction is none.
+    """
+    d = _vector("wind", direction)
+    if not np.any(d):
+        raise ConfigError("wind blows in no direction.")
+    d = d / np.linalg.norm(d)
+    edges = [(b, k) for b, s in enumerate(masonry.stones) for k in range(len(s.outline))]
+    start = np.array([masonry.stones[b].outline[k] for b, k in edges])
+    end = np.array([np.roll(masonry.stones[b].outline, -1, axis=0)[k] for b, k in edges])
+    owner, middle, along = np.array([b for b, _ in edges]), (start + end) / 2, end - start
+    outward = np.column_stack([along[:, 1], -along[:, 0]])
+    found = []
+    for n in np.flatnonzero((outward @ d < -1e-9) & ~np.isin(owner, masonry.held)):
+        # middle - s d = start + w along, for all edges
+        apart = middle[n] - start
+        cross = d[0] * along[:, 1] - d[1] * along[:, 0]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            s = (apart[:, 0] * along[:, 1] - apart[:, 1] * along[:, 0]) / cross
+            w = (apart[:, 1] * d[0] - apart[:, 0] * d[1]) / cross
+        size = np.linalg.norm(along[n])
+        hidden = (s > -ON_EDGE_RTOL * size) & (w >= 0) & (w <= 1) & (owner != owner[n])
+        if not hidden.any():
+            found.append(edges[n])
+    return tuple(found)
+
+
+def driver(masonry: Masonry, actions: Sequence[Action]) -> Callable[[Array], Drive]:
+    """What acts in the steps between times (n + 1,).
+
+    Raises:
+        ConfigError: if an action cannot be, or two move the same support; while it runs, if a
+            support jumps in one step.
+    """
+    moved = [s for a in actions if isinstance(a, SupportMotion) for s in a.stones]
+    twice = sorted({s for s in moved if moved.count(s) > 1})
+    if twice:
+        raise ConfigError(f"supports {twice} are moved by two actions; let one move each.")
+    loads = [a.begin(masonry) for a in actions if isinstance(a, PointLoad | MovingLoad | Wind)]
+    supports = [a.begin(masonry) for a in actions if isinstance(a, SupportMotion)]
+    grounds = [a.begin(masonry) for a in actions if isinstance(a, BaseMotion)]
+    n_blocks, reach = len(masonry.stones), masonry.law.reach
+    size = np.array([np.linalg.norm(s.outline - s.centre, axis=1).max() for s in masonry.stones])
+
+    def at(t: Array) -> Drive:
+        middle = (t[1:] + t[:-1]) / 2
+        n = len(middle)
+        empty = _fixed(n, [], np.zeros((0, 3)), np.zeros((0, 3)), [])
+        parts = [empty, *(load(middle) for load in loads)]
+        columns = list(zip(*parts, strict=True))[:4]
+        block, corner, share, force = (np.concatenate(x, axis=1) for x in columns)
+        turns = np.concatenate([part.turns for part in parts])
+        ground = np.sum([np.zeros((n, 2)), *(g(middle) for g in grounds)], axis=0)
+        shift = np.sum([np.zeros((n, n_blocks, 3)), *(s(t) for s in supports)], axis=0)
+        jump = np.hypot(shift[..., 0], shift[..., 1]) + np.abs(shift[..., 2]) * size
+        if jump.size and jump.max() > 0.5 * reach:
+            k, stone = np.unravel_index(np.argmax(jump), jump.shape)
+            raise ConfigError(
+                f"support {stone} moves by {jump.max():.3g} m in the step before "
+                f"t = {t[k + 1]:g} s; corners watch edges within {reach:.3g} m.",
+                hint="Let its history be smooth, the step shorter, or reach longer.",
+            )
+        return Drive(block, corner, share, force, turns, ground, shift)
+
+    return at
+
+
+def _fixed(n: int, block: Sequence[int], corner: Sequence[Index] | Array,
+           share: Sequence[Array] | Array, turns: Sequence[int]) -> Forces:  # fmt: skip
+    """Places of forces that stay, n times; forces of zero."""
+    count = len(block)
+    whole = np.int64
+    return Forces(
+        np.tile(np.array(block, dtype=whole), (n, 1)),
+        np.tile(np.array(corner, dtype=whole).reshape(count, 3), (n, 1, 1)),
+        np.tile(np.array(share, dtype=float).reshape(count, 3), (n, 1, 1)),
+        np.zeros((n, count, 2)),
+        np.array(turns, dtype=whole),
+    )
+
+
+def _vector(name: str, x: tuple[float, float]) -> Array:
+    found = np.asarray(x, dtype=float)
+    if found.shape != (2,) or not np.isfinite(found).all():
+        raise ConfigError(f"{name} has {x}, which are not two numbers.")
+    return found
+
+
+def _moving(name: str, stone: int, masonry: Masonry) -> int:
+    if not 0 <= stone < len(masonry.stones):
+        raise ConfigError(
+            f"{name} acts on stone {stone} of the stones 0 to {len(masonry.stones) - 1}."
+        )
+    if stone in masonry.held:
+        raise ConfigError(f"{name} acts on stone {stone}, which is held and would not feel it.")
+    return stone
+
+
+def _tops(masonry: Masonry) -> tuple[Array, Index]:
+    """(n, 2, 2) ends of edges that look upwards, left to right, and (n, 3) stone and corners."""
+    ends, who = [], []
+    for b, s in enumerate(masonry.stones):
+        for k in range(len(s.outline)):
+            o = (k + 1) % len(s.outline)
+            if s.outline[o, 0] < s.outline[k, 0] - ON_EDGE_RTOL * np.ptp(s.outline):
+                ends.append(s.outline[[o, k]])
+                who.append((b, o, k))
+    return np.array(ends), np.array(who)
+
+
+def _place(name: str, masonry: Masonry, stone: int, x: Array) -> tuple[Index, Array]:
+    """Three corners of a stone that a point lies between, and their shares in it."""
+    _vector(name, (x[0], x[1]) if x.shape == (2,) else (np.nan, np.nan))
+    corners, first = masonry.stones[stone].outline, masonry.first_corners()[stone]
+    after = np.roll(corners, -1, axis=0) - corners
+    w = np.clip(((x - corners) * after).sum(axis=1) / (after**2).sum(axis=1), 0, 1)
+    far = np.linalg.norm(corners + w[:, None] * after - x, axis=1)
+    k = int(np.argmin(far))
+    if far[k] < ON_EDGE_RTOL * np.ptp(corners):
+        o = (k + 1) % len(corners)
+        return first + np.array([k, o, o]), np.array([1 - w[k], w[k], 0.0])
+    if not _inside(corners, x):
+        raise ConfigError(
+            f"{name} at {x.tolist()} lies {far[k]:.4g} m outside of stone {stone}.",
+            hint="Give a point in or on the stone, where it lies at the start.",
+        )
+    triangles = Delaunay(corners)
+    simplex = triangles.simplices[triangles.find_simplex(x)]
+    share = np.linalg.solve(np.vstack([corners[simplex].T, np.ones(3)]), np.r_[x, 1.0])
+    return first + simplex.astype(np.int64), share
+
+
+def _inside(corners: Array, x: Array) -> bool:
+    """Whether a ray to the right crosses the outline an odd number of times."""
+    a, b = corners, np.roll(corners, -1, axis=0)
+    spans = (a[:, 1] > x[1]) != (b[:, 1] > x[1])
+    a, b = a[spans], b[spans]
+    cut = a[:, 0] + (x[1] - a[:, 1]) * (b[:, 0] - a[:, 0]) / (b[:, 1] - a[:, 1])
+    return bool((cut > x[0]).sum() % 2)

@@ -1,0 +1,186 @@
+"""What changes in time: pulses, harmonic motion, records, ramps.
+
+A history is a number, or a function of an array of times [s] that gives as many values.
+
+Source:
+    Pulses: Housner, The behavior of inverted pendulum structures during earthquakes, Bull. Seism.
+    Soc. Am. 53 (1963) 403; Zhang and Makris, Rocking response of free-standing blocks under
+    cycloidal pulses, J. Eng. Mech. 127 (2001) 473.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from rom.errors import ConfigError, FileFormatError
+from rom.model import Array
+
+MAX_GAP_RATIO = 1.5  # longest interval of a record over its usual one; more is a gap
+History = float | Callable[[Array], Array]
+
+
+@dataclass(frozen=True)
+class Table:
+    """Straight lines between points of a history.
+
+    Attributes:
+        t: (n,) times, increasing [s].
+        values: (n,) values [unit of the history].
+
+    Raises:
+        ConfigError: if the points are no history.
+    """
+
+    t: npt.ArrayLike
+    values: npt.ArrayLike
+
+    def __post_init__(self) -> None:
+        t, values = (np.asarray(x, dtype=float) for x in (self.t, self.values))
+        if t.ndim != 1 or t.shape != values.shape or len(t) < 2:
+            raise ConfigError(
+                f"a history of {t.shape} times and {values.shape} values: two or more of each are "
+                "needed, as many times as values."
+            )
+        for name, x in (("time", t), ("value", values)):
+            if not np.isfinite(x).all():
+                k = int(np.argmin(np.isfinite(x)))
+                raise ConfigError(
+                    f"{name} {k} of the history is {x[k]}.",
+                    hint="Records with gaps are not mended; fill them, or cut the record there.",
+                )
+        if not (np.diff(t) > 0).all():
+            k = int(np.argmin(np.diff(t) > 0))
+            raise ConfigError(f"times of the history do not grow from {t[k]} s to {t[k + 1]} s.")
+
+    def __call__(self, t: Array) -> Array:
+        """Values at times.
+
+        Args:
+            t: (m,) times [s].
+
+        Raises:
+            ConfigError: for times outside the history.
+        """
+        known, values = np.asarray(self.t, dtype=float), np.asarray(self.values, dtype=float)
+        for at in (np.min(t), np.max(t)):
+            if not known[0] <= at <= known[-1]:
+                raise ConfigError(
+                    f"the history runs from {known[0]:g} s to {known[-1]:g} s; asked is "
+                    f"t = {at:g} s.",
+                    hint="Add points up to the end of the run, zeros after an earthquake.",
+                )
+        return np.interp(t, known, values)
+
+
+def recorded(t: npt.ArrayLike, values: npt.ArrayLike) -> Table:
+    """A record at equal intervals.
+
+    Args:
+        t: (n,) times [s].
+        values: (n,) values [unit of the history].
+
+    Raises:
+        ConfigError: if it is no history, or samples are missing.
+    """
+    table = Table(t, values)
+    times = np.asarray(t, dtype=float)
+    usual, longest = float(np.median(np.diff(times))), int(np.argmax(np.diff(times)))
+    if times[longest + 1] - times[longest] > MAX_GAP_RATIO * usual:
+        raise ConfigError(
+            f"the record has a gap from {times[longest]:g} s to {times[longest + 1]:g} s; samples "
+            f"are {usual:g} s apart elsewhere.",
+            hint="Fill the gap, or use Table if straight lines over it are meant.",
+        )
+    return table
+
+
+def read_record(path: str | Path, *, scale: float = 1.0) -> Table:
+    """A record from a text file of two columns, time [s] and value; # begins a comment.
+
+    Args:
+        path: of the file; columns are parted by commas or blanks.
+        scale: of the values, such as 9.81 for accelerations in g [1].
+
+    Raises:
+        FileFormatError: if the file has no two columns of numbers.
+        ConfigError: as `recorded`.
+    """
+    try:
+        text = Path(path).read_text(encoding="utf-8").replace(",", " ")
+        columns = np.loadtxt(text.splitlines(), ndmin=2)
+    except (OSError, ValueError) as error:
+        raise FileFormatError(f"{path} is no record: {error}") from error
+    if columns.shape[1] != 2:
+        raise FileFormatError(f"{path} has {columns.shape[1]} columns; time and value are needed.")
+    return recorded(columns[:, 0], scale * columns[:, 1])
+
+
+def sine(amplitude: float, period: float, *, cycles: float = np.inf, phase: float = 0.0) -> History:
+    """Harmonic motion, or a pulse of some cycles of it: half a one, one, ten.
+
+    Args:
+        amplitude: of the value [unit of the history].
+        period: [s].
+        cycles: after which it ends [1].
+        phase: at the start [rad].
+
+    Raises:
+        ConfigError: if there is no such motion.
+    """
+    if not (0 < period < np.inf and cycles > 0 and np.isfinite([amplitude, phase]).all()):
+        raise ConfigError(
+            f"no sine has amplitude = {amplitude}, period = {period} s, cycles = {cycles}, "
+            f"phase = {phase}."
+        )
+
+    def values(t: Array) -> Array:
+        turns = np.asarray(t) / period
+        return np.where(turns <= cycles, amplitude * np.sin(2 * np.pi * turns + phase), 0.0)
+
+    return values
+
+
+def rectangle(amplitude: float, duration: float) -> History:
+    """A value that stays for a time [s] and ends.
+
+    Raises:
+        ConfigError: if there is no such pulse.
+    """
+    if not (0 < duration < np.inf and np.isfinite(amplitude)):
+        raise ConfigError(f"no pulse has amplitude = {amplitude}, duration = {duration} s.")
+    return lambda t: np.where(np.asarray(t) < duration, amplitude, 0.0)
+
+
+def ramp(duration: float) -> History:
+    """From 0 to 1 along half a cosine in a time [s], and 1 from there on.
+
+    Raises:
+        ConfigError: if the time is not positive.
+    """
+    if not 0 < duration < np.inf:
+        raise ConfigError(f"no ramp takes {duration} s.")
+    return lambda t: (1 - np.cos(np.pi * np.clip(np.asarray(t) / duration, 0.0, 1.0))) / 2
+
+
+def values_at(name: str, history: History, t: Array) -> Array:
+    """(n,) values of a history at times t (n,) [s].
+
+    Raises:
+        ConfigError: if it gives anything but as many finite numbers.
+    """
+    given = history(t) if callable(history) else np.full(len(t), history)
+    found = np.asarray(given, dtype=float)
+    if found.shape != t.shape:
+        raise ConfigError(
+            f"the history of {name} gives the shape {found.shape} for {len(t)} times.",
+            hint="Write it for arrays, with np.where for cases.",
+        )
+    if not np.isfinite(found).all():
+        raise ConfigError(
+            f"the history of {name} is {found[~np.isfinite(found)][0]} at "
+            f"t = {t[np.argmin(np.isfinite(found))]:g} s."
+        )
+    return found

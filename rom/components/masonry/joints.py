@@ -1,0 +1,196 @@
+"""Laws of joints: friction, cohesion and tensile strength, by joint and from files.
+
+A joint with strength is glued where stones touch at the start. It opens when a contact pulls more
+than its share of the tensile strength, and slips when it is sheared more than Coulomb's law allows;
+then its cohesion and its tensile strength are lost for good, and friction remains.
+
+Source:
+    After Shi, Discontinuous deformation analysis (1988): Coulomb's law with a limit of tension.
+"""
+
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rom.components.masonry.block_contact import Bonds, Contacts
+from rom.errors import ConfigError, FileFormatError, RomError
+from rom.model import Array, Index
+from rom.units import in_si
+
+# of the distance at which corners are watched: stones nearer than that are glued
+BOND_GAP_RATIO = 0.02
+LAW_KEYS = {"between", "friction", "cohesion", "tension"}
+
+
+@dataclass(frozen=True, slots=True)
+class Joint:
+    """Law of joints.
+
+    Attributes:
+        friction: tangent of the angle of friction [1].
+        cohesion: shear stress borne without pressure, until it slips [Pa].
+        tension: tensile strength, until it opens [Pa].
+        between: pairs of stones; None for all joints.
+
+    Raises:
+        ConfigError: for numbers below zero.
+    """
+
+    friction: float
+    cohesion: float = 0.0
+    tension: float = 0.0
+    between: tuple[tuple[int, int], ...] | None = None
+
+    def __post_init__(self) -> None:
+        numbers = (self.friction, self.cohesion, self.tension)
+        if not all(0 <= x < np.inf for x in numbers):
+            raise ConfigError(
+                f"no joint has friction = {self.friction}, cohesion = {self.cohesion} Pa, "
+                f"tension = {self.tension} Pa.",
+                hint="All three are numbers of zero or more.",
+            )
+
+
+def read_joints(path: str | Path) -> tuple[Joint, ...]:
+    """Laws of joints from a file in TOML; later ones win where both apply.
+
+    A file is a list of laws, with numbers in SI units or text with a unit::
+
+        [[joint]]                      # all joints
+        friction = 0.6
+        [[joint]]
+        between = [[1, 2], [2, 3]]     # numbers of stones
+        friction = 0.7
+        cohesion = "0.2 MPa"
+        tension = "0.1 MPa"
+
+    Raises:
+        FileFormatError: if the file is no such list; it names the law and the key.
+        ConfigError: for numbers below zero.
+    """
+    try:
+        listed = tomllib.loads(Path(path).read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise FileFormatError(f"{path} is no file of joints: {error}") from error
+    laws = listed.get("joint")
+    if set(listed) != {"joint"} or not isinstance(laws, list) or not laws:
+        raise FileFormatError(
+            f"{path} has {sorted(listed)}; laws of joints are tables [[joint]] and nothing else."
+        )
+    return tuple(_law(f"{path}, joint {k + 1}", law) for k, law in enumerate(laws))
+
+
+def _law(where: str, law: Any) -> Joint:
+    if not isinstance(law, Mapping) or not {"friction"} <= set(law) <= LAW_KEYS:
+        keys = sorted(law) if isinstance(law, Mapping) else law
+        raise FileFormatError(
+            f"{where} has {keys}; it needs friction, and may have between, cohesion, tension."
+        )
+    units = {"friction": "1", "cohesion": "Pa", "tension": "Pa"}
+    try:
+        numbers = {key: _number(law[key], unit) for key, unit in units.items() if key in law}
+        between = law.get("between")
+        pairs = None if between is None else tuple((_count(i), _count(j)) for i, j in between)
+    except (TypeError, ValueError, RomError) as error:
+        raise FileFormatError(f"{where}: {error}") from error
+    try:
+        return Joint(**numbers, between=pairs)
+    except RomError as error:
+        raise ConfigError(f"{where}: {error}") from error
+
+
+def _number(value: Any, unit: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, str | int | float):
+        raise TypeError(f"{value!r} is no number.")
+    return float(in_si(value, unit)) if isinstance(value, str) else float(value)
+
+
+def _count(value: Any) -> int:
+    if isinstance(value, bool) or not isinstance(value, int):
+        raise TypeError(f"between = ...{value!r}: stones go by their numbers.")
+    return value
+
+
+def friction_of_pairs(joints: Sequence[Joint], friction: float, n: int) -> Array:
+    """(n, n) coefficients of friction of pairs of stones.
+
+    Raises:
+        ConfigError: if a law is for a stone that does not exist.
+    """
+    found = np.full((n, n), float(friction))
+    for joint in joints:
+        rows = _pairs(joint, n)
+        if rows is None:
+            found[:] = joint.friction
+        else:
+            found[rows[:, 0], rows[:, 1]] = found[rows[:, 1], rows[:, 0]] = joint.friction
+    return found
+
+
+def bonds(joints: Sequence[Joint], C: Contacts, corners: Array, n: int, reach: float) -> Bonds:
+    """What glues stones that touch: strengths times the length that falls to each contact.
+
+    Args:
+        joints: laws; the last one that fits a pair counts.
+        C: contacts at the start.
+        corners: (V, 2) positions of the corners [m].
+        n: number of stones.
+        reach: distance from which corners are watched [m].
+
+    Raises:
+        ConfigError: if a law glues stones that do not touch.
+    """
+    strength = np.zeros((n, n, 2))
+    for joint in joints:
+        rows = _pairs(joint, n)
+        i, j = (slice(None), slice(None)) if rows is None else np.vstack([rows, rows[:, ::-1]]).T
+        strength[i, j] = joint.tension, joint.cohesion
+    pairs = np.sort(C.who[:, [0, 2]], axis=1)
+    close = np.abs(C.gap) < BOND_GAP_RATIO * reach
+    length = np.zeros(len(pairs))
+    for pair in np.unique(pairs[close], axis=0):
+        at = np.flatnonzero(close & (pairs == pair).all(axis=1))
+        length[at] = _shares(corners[C.who[at, 1]])
+    _check_touch(joints, pairs[length > 0], n)
+    pull, cohesion = length * strength[C.who[:, 0], C.who[:, 2]].T
+    kept = (pull > 0) | (cohesion > 0)
+    return Bonds(C.who[kept], pull[kept], cohesion[kept], np.ones(int(kept.sum()), dtype=np.int64))
+
+
+def _shares(x: Array) -> Array:
+    """Length of a joint that falls to each of its contacts; those in one place share it."""
+    line = x - x[0]
+    along = line @ line[np.argmax(np.linalg.norm(line, axis=1))]
+    span = np.linalg.norm(line, axis=1).max()
+    if span == 0.0:
+        return np.zeros(len(x))
+    s = along / span
+    places, which, count = np.unique(np.round(s / span, 6), return_inverse=True, return_counts=True)
+    ends = np.r_[places[0], (places[1:] + places[:-1]) / 2, places[-1]]
+    return np.asarray(span * (np.diff(ends) / count)[which])
+
+
+def _pairs(joint: Joint, n: int) -> Index | None:
+    if joint.between is None:
+        return None
+    rows = np.array(joint.between, dtype=np.int64).reshape(-1, 2)
+    if rows.size and not (0 <= rows.min() and rows.max() < n and (rows[:, 0] != rows[:, 1]).all()):
+        raise ConfigError(f"a joint is between {joint.between}; stones are 0 to {n - 1}.")
+    return rows
+
+
+def _check_touch(joints: Sequence[Joint], touching: Index, n: int) -> None:
+    there = {tuple(pair) for pair in touching.tolist()}
+    for joint in joints:
+        rows = _pairs(joint, n) if joint.cohesion or joint.tension else None
+        for pair in [] if rows is None else np.sort(rows, axis=1).tolist():
+            if tuple(pair) not in there:
+                raise ConfigError(
+                    f"stones {pair[0]} and {pair[1]} have no joint that could be glued: they do "
+                    "not touch along an edge at the start.",
+                    hint="Name pairs that touch, or lay the stones closer.",
+                )

@@ -1,0 +1,158 @@
+"""Stones in motion: from step to step, with loads, moving supports and earthquakes."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from rom.components.masonry.actions import Action, driver
+from rom.components.masonry.block_contact import OPEN, SLIDES, Contacts, contacts
+from rom.components.masonry.discontinuous_deformation import advance, work
+from rom.components.masonry.stones import SHEAR_STIFFNESS_RATIO, Masonry, polygon_moments
+from rom.errors import ConfigError, SolverError
+from rom.model import Array, Index
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Stones in motion.
+
+    Attributes:
+        masonry: the stones.
+        t: (n,) times [s].
+        q, v: (n, B, 3 + R) coordinates and rates: mass centre [m], angle [rad], elastic.
+        energy: (n,) kinetic, elastic, potential, and of the contacts [J].
+        contacts: those at the end.
+        cuts: how often a step was cut.
+        broken: (n,) how many contacts of glued joints have broken.
+    """
+
+    masonry: Masonry
+    t: Array
+    q: Array
+    v: Array
+    energy: Array
+    contacts: Contacts
+    cuts: int
+    broken: Index
+
+    def outlines(self, k: int = -1) -> list[Array]:
+        """The (corners, 2) outline of each stone at time k [m]."""
+        return [
+            x[:2] + (s.outline - s.centre + s.shapes @ x[3 : 3 + len(s.K)]) @ _turned(x[2]).T
+            for s, x in zip(self.masonry.stones, self.q[k], strict=True)
+        ]
+
+    def stress(self, k: int = -1) -> Array:
+        """(B, 3) stress xx, yy, xy in body axes of stones with uniform strain [Pa m], per depth."""
+        stones = self.masonry.stones
+        areas = [polygon_moments(s.outline)[0] for s in stones]
+        found = [s.K @ x[3 : 3 + len(s.K)] for s, x in zip(stones, self.q[k], strict=True)]
+        return np.array(found) / np.array(areas)[:, None]
+
+    def joints(self) -> dict[tuple[int, int], tuple[Array, Array]]:
+        """For each pair of stones that touch at the end: centre of pressure, force on the first.
+
+        Both (2,) [m], [N]; the centres along an arch are its line of thrust. Joints that pull as
+        much as they press have no centre: NaN.
+        """
+        C, shear = self.contacts, SHEAR_STIFFNESS_RATIO * self.masonry.stiffness
+        sums: dict[tuple[int, int], tuple[Array, Array, float]] = {}
+        corners = np.vstack(self.outlines())
+        for k in range(C.used[0]):
+            if C.state[k] == OPEN or C.force[k] == 0:
+                continue
+            (i, a, j), normal = C.who[k, :3], C.along[k, 1:3]
+            slide = C.way[k] * C.friction[k] * C.force[k]
+            drag = slide if C.state[k] == SLIDES else shear * C.slip[k]
+            force = C.force[k] * normal - drag * np.array([-normal[1], normal[0]])
+            x, f, total = sums.get((min(i, j), max(i, j)), (np.zeros(2), np.zeros(2), 0.0))
+            sums[min(i, j), max(i, j)] = (
+                x + C.force[k] * corners[a], f + (force if i < j else -force), total + C.force[k]
+            )  # fmt: skip
+        return {
+            pair: (x / total if total > 0 else np.full(2, np.nan), f)
+            for pair, (x, f, total) in sorted(sums.items())
+        }
+
+
+def _turned(angle: float) -> Array:
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, -s], [s, c]])
+
+
+def simulate(  # noqa: PLR0913  all that a run needs
+    masonry: Masonry,
+    *,
+    t_end: float,
+    dt: float,
+    actions: Sequence[Action] = (),
+    keep: float = 1.0,
+    save_every: int = 1,
+    q: npt.ArrayLike | None = None,
+    v: npt.ArrayLike | None = None,
+) -> Motion:
+    """Let the stones move.
+
+    Args:
+        masonry: the stones.
+        t_end: duration [s].
+        dt: step [s]; cut where contacts change too much.
+        actions: what acts besides weight: loads, motions of supports, motion of the ground.
+        keep: share of the velocity kept after each step [1]: 1 for dynamics, 0 for statics, 0.95 to
+            0.98 to come to rest.
+        save_every: steps between two saved ones.
+        q: (B, 3 + R) coordinates at the start [m, rad]; None for where the outlines are.
+        v: (B, 3 + R) rates at the start [m/s, rad/s]; None for rest.
+
+    Raises:
+        ConfigError: if times or shapes do not fit, or an action cannot be.
+        SolverError: if contacts do not settle even in the shortest steps; ``error.solution`` is the
+            motion before.
+
+    Source:
+        After Shi (1988), as in `rom.components.masonry.discontinuous_deformation`.
+    """
+    B, law = masonry.blocks(), masonry.law
+    n = _steps(t_end, dt, keep, save_every)
+    W, acting = work(B), driver(masonry, actions)
+    for name, given, target in (("q", q, W.q), ("v", v, W.v)):
+        x = np.asarray(masonry.start() * (name == "q") if given is None else given, dtype=float)
+        if x.shape != target.shape:
+            raise ConfigError(f"{name} has the shape {x.shape}; the stones need {target.shape}.")
+        target[:] = x
+    C, old = (contacts(8 * len(B.corner), B.load.shape[1]) for _ in range(2))
+    cuts, kept = np.zeros(1, dtype=np.int64), np.array([0, *range(save_every, n + 1, save_every)])
+    found = Motion(
+        masonry, dt * kept, np.zeros((len(kept), *W.q.shape)), np.zeros((len(kept), *W.q.shape)),
+        np.full(len(kept), np.nan), C, 0, np.zeros(len(kept), dtype=np.int64),
+    )  # fmt: skip
+    found.q[0], found.v[0] = W.q, W.v
+    for k in range(1, len(kept)):
+        driven = acting(dt * np.arange(kept[k - 1], kept[k] + 1))
+        found.energy[k] = advance(B, law, C, old, W, dt, driven, keep, cuts)
+        found.q[k], found.v[k], found.broken[k] = W.q, W.v, np.sum(law.bonds.intact == 0)
+        if not np.isfinite(found.energy[k]):
+            raise SolverError(
+                f"contacts do not settle near t = {found.t[k]:.6g} s, even in steps of "
+                f"{dt / 3**8:.2g} s.",
+                hint="Use softer contacts, or a smaller dt.",
+                solution=_first(found, k, int(cuts[0])),
+            )
+    return _first(found, len(kept), int(cuts[0]))
+
+
+def _steps(t_end: float, dt: float, keep: float, save_every: int) -> int:
+    if not (0 < dt < np.inf and abs(t_end) < np.inf):
+        raise ConfigError(f"t_end = {t_end} s in steps of dt = {dt} s: both must be positive.")
+    n = round(t_end / dt)
+    if n < 1 or save_every < 1 or not 0 <= keep <= 1:
+        raise ConfigError(f"{n} steps, save_every = {save_every}, keep = {keep}: nothing to do.")
+    return n
+
+
+def _first(found: Motion, k: int, cuts: int) -> Motion:
+    """The first k saved steps."""
+    rows = {name: getattr(found, name)[:k] for name in ("t", "q", "v", "energy", "broken")}
+    return replace(found, **rows, cuts=cuts)

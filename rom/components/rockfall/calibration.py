@@ -1,0 +1,214 @@
+"""Parameters of a gallery from measured histories, with what is left uncertain of them.
+
+Source:
+    Least squares by channels of different noise: Bard, Nonlinear Parameter Estimation, Academic
+    Press (1974), chapters 4 and 7.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from rom.components.rockfall.impact import Gallery, Impact, scaled, strike
+from rom.errors import ConfigError, ModelError, SolverError
+from rom.model import Array
+
+CHANNELS: dict[str, Callable[[Gallery, Impact], Array]] = {
+    "acceleration of the boulder": lambda g, i: i.forces[:, 0] / g.boulder,  # as a sensor reads it
+    "force in the cushion": lambda _, i: i.forces[:, 0],
+    "force in shear": lambda _, i: i.forces[:, 1],
+    "force in bending": lambda _, i: i.forces[:, 2],
+    "penetration": lambda _, i: i.z[:, 0] - i.z[:, 1],
+    "deflection": lambda _, i: i.z[:, 2],
+}
+FIVE_PARAMETERS = (
+    "stiffness of the cushion", "recovery of the cushion", "mass of the plug",
+    "stiffness in bending", "damping of the slab",
+)  # fmt: skip
+MAX_FACTOR = 30.0  # by which a parameter may leave its first value
+MAX_GAP = 5.0  # a step of time that is so many medians long is a gap
+MIN_INSTANTS = 8  # of a history, so that its scatter says something
+MAX_DEVIATION = 1.0  # a parameter that is only known to its own size is not determined
+FAR_RATIO = 10.0  # of the largest value: how far off parameters are that stop no boulder
+# steps of derivatives, in logarithms: above the jumps of the time step, below curvature
+DERIVATIVE_STEP = 5e-3
+KEPT_INSTANTS = 4000  # so that interpolation between them stays below the noise of any sensor
+
+
+@dataclass(frozen=True, slots=True)
+class History:
+    """What was measured of one quantity, time counted from contact.
+
+    Attributes:
+        t: (n,) increasing times [s].
+        values: (n,) [SI].
+        deviation: standard deviation of a value [SI]; None if it is to be found.
+
+    Raises:
+        ConfigError: for gaps, times that do not increase, values that are not finite.
+    """
+
+    t: Array
+    values: Array
+    deviation: float | None = None
+
+    def __post_init__(self) -> None:
+        t, x = np.asarray(self.t, dtype=float), np.asarray(self.values, dtype=float)
+        if t.ndim != 1 or t.shape != x.shape or t.size < MIN_INSTANTS:
+            raise ConfigError(
+                f"a history needs as many times as values, {MIN_INSTANTS} at least; got "
+                f"{t.shape} and {x.shape}."
+            )
+        bad = np.flatnonzero(~(np.isfinite(t) & np.isfinite(x)))
+        if bad.size:
+            raise ConfigError(f"value {bad[0]} of {t.size} of the history is not finite; leave "
+                              "it out, or cut the history there.")  # fmt: skip
+        steps = np.diff(t)
+        if (steps <= 0).any() or t[0] < 0:
+            k = int(np.argmax(steps <= 0))
+            raise ConfigError(f"times of a history increase from contact, t >= 0; see {t[k]:g} s.")
+        if (steps > MAX_GAP * np.median(steps)).any():
+            k = int(steps.argmax())
+            raise ConfigError(f"the history has a gap from {t[k]:g} s to {t[k + 1]:g} s; cut it "
+                              "in two there.")  # fmt: skip
+        if not x.any() or not (self.deviation is None or self.deviation > 0):
+            raise ConfigError("a history of zeros, or a deviation that is not positive.")
+
+
+@dataclass(frozen=True, slots=True)
+class Calibration:
+    """Parameters that fit best, and how well.
+
+    Attributes:
+        gallery: with the parameters found.
+        factors: {name: what multiplies the first value [1]}.
+        deviations: {name: standard deviation of the parameter, relative [1]}.
+        correlation: (p, p) of the parameters [1].
+        residuals: {channel: root mean square of what is left, relative to the largest value [1]}.
+        evaluations: impacts that were computed.
+    """
+
+    gallery: Gallery
+    factors: dict[str, float]
+    deviations: dict[str, float]
+    correlation: Array
+    residuals: dict[str, float]
+    evaluations: int
+
+
+def calibrate(
+    g: Gallery, measured: dict[str, History | Sequence[History]],
+    names: Sequence[str] = FIVE_PARAMETERS, *, t_end: float | None = None,
+) -> Calibration:  # fmt: skip
+    """Fit parameters by least squares in their logarithms.
+
+    Every channel weighs by the scatter about its best fit, or by the deviation it comes with; the
+    covariance is the inverse of J^T J at the end, so it says what noise makes uncertain, not what
+    the model cannot do; the residuals say that.
+
+    Args:
+        g: the gallery with first values, within a factor of a few.
+        measured: {channel: history or histories}, channels "acceleration of the boulder",
+            "force in the cushion", "force in shear", "force in bending", "penetration",
+            "deflection".
+        names: parameters to fit, see `scaled`.
+        t_end: time after which histories are left out [s]; None for all.
+
+    Raises:
+        ConfigError: for an unknown channel or parameter, nothing measured, or first values that
+            stop no boulder.
+        SolverError: if an impact with the first values breaks down.
+        ModelError: if the histories do not determine a parameter.
+    """
+    pieces = _pieces(measured, t_end)
+    scaled(g, dict.fromkeys(names, 1.0))
+    if len(set(names)) != len(names) or not names:
+        raise ConfigError(f"names = {tuple(names)}: one or more parameters, each once.")
+    end = max(float(h.t[-1]) for _, h in pieces)
+    count = 0
+
+    def gallery(x: Array) -> Gallery:
+        return scaled(g, dict(zip(names, np.exp(x).tolist(), strict=True)))
+
+    def residuals(x: Array) -> list[Array]:
+        nonlocal count
+        count += 1
+        trial = gallery(x)
+        try:
+            impact = strike(trial, t_end=end, keep=KEPT_INSTANTS)
+        except (ConfigError, SolverError):  # such as a boulder through the cushion
+            if count == 1:
+                raise
+            return [np.full(h.t.size, FAR_RATIO * np.abs(h.values).max()) for _, h in pieces]
+        return [np.interp(h.t, impact.t, CHANNELS[c](trial, impact)) - h.values for c, h in pieces]
+
+    x, scales = np.zeros(len(names)), [float(np.abs(h.values).max()) for _, h in pieces]
+    for weights in (scales, None):  # by size first, by scatter then
+        deviations = weights or _scatter(residuals(x), pieces, len(names))
+        fit = least_squares(
+            lambda y, s=deviations: np.concatenate(
+                [r / d for r, d in zip(residuals(y), s, strict=True)]
+            ),
+            x, jac="3-point", bounds=_bounds(g, names), diff_step=DERIVATIVE_STEP, x_scale=1.0,
+        )  # fmt: skip
+        x = fit.x
+    cov = _covariance(fit.jac, x, names, _bounds(g, names))
+    sigma = np.sqrt(np.diag(cov))
+    left = {c: float(np.sqrt(np.mean(r**2)) / s)
+            for (c, _), r, s in zip(pieces, residuals(x), scales, strict=True)}  # fmt: skip
+    return Calibration(
+        gallery(x), dict(zip(names, np.exp(x).tolist(), strict=True)),
+        dict(zip(names, sigma.tolist(), strict=True)), cov / np.outer(sigma, sigma), left, count,
+    )  # fmt: skip
+
+
+def _pieces(measured: dict[str, Any], t_end: float | None) -> list[tuple[str, History]]:
+    """Channels and histories one by one, cut at the end."""
+    pieces: list[tuple[str, History]] = []
+    for channel, histories in measured.items():
+        if channel not in CHANNELS:
+            raise ConfigError(f"{channel!r} is no channel; known are {', '.join(CHANNELS)}.")
+        for h in [histories] if isinstance(histories, History) else histories:
+            t, x = np.asarray(h.t, dtype=float), np.asarray(h.values, dtype=float)
+            kept = t <= (np.inf if t_end is None else t_end)
+            pieces.append((channel, History(t[kept], x[kept], h.deviation)))
+    if not pieces:
+        raise ConfigError("nothing is measured; give at least one history.")
+    return pieces
+
+
+def _scatter(left: list[Array], pieces: list[tuple[str, History]], n: int) -> list[float]:
+    """Standard deviations of the histories: given, or of what is left of them."""
+    total = sum(r.size for r in left)
+    return [
+        h.deviation or float(np.sqrt((r**2).mean() * total / max(total - n, 1))) + 1e-12
+        for r, (_, h) in zip(left, pieces, strict=True)
+    ]
+
+
+def _bounds(g: Gallery, names: Sequence[str]) -> tuple[Array, Array]:
+    """Logarithms of the factors; nothing gives back more than it takes."""
+    high = np.full(len(names), np.log(MAX_FACTOR))
+    for k, name in enumerate(names):
+        if name == "recovery of the cushion":
+            high[k] = min(high[k], 1e-9 - np.log(g.cushion.recovery))
+    return np.full(len(names), -np.log(MAX_FACTOR)), high
+
+
+def _covariance(J: Array, x: Array, names: Sequence[str], bounds: tuple[Array, Array]) -> Array:
+    """Inverse of J^T J, or the name of what the histories do not determine."""
+    sizes = np.linalg.norm(J, axis=0)
+    blind = [n for n, s in zip(names, sizes, strict=True) if s == 0]
+    cov = np.linalg.pinv(J.T @ J, rcond=1e-14) if not blind else np.zeros((x.size, x.size))
+    wide = np.sqrt(np.diag(cov)) > MAX_DEVIATION
+    at_bound = (np.abs(x - bounds[0]) < DERIVATIVE_STEP) | (np.abs(x - bounds[1]) < DERIVATIVE_STEP)
+    lost = blind + [n for n, w, b in zip(names, wide, at_bound, strict=True) if w or b]
+    if lost:
+        raise ModelError(
+            f"the histories do not determine {', '.join(dict.fromkeys(lost))}; fit fewer "
+            "parameters, or measure where they matter."
+        )
+    return cov

@@ -1,0 +1,155 @@
+"""What a gallery bears: shares of its capacities, and the falls it stops.
+
+Source:
+    Limits after the three failures of Schellenberg, On the design of rockfall protection
+    galleries, ETH Zurich (2009): the cushion pressed through, punching, bending. The numbers
+    allowed are the user's.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from scipy.optimize import brentq
+
+from rom.components.rockfall.impact import Gallery, strike
+from rom.components.rockfall.layer import Layer
+from rom.errors import ConfigError, SolverError
+from rom.model import Array
+
+MAX_FALL = 300.0  # m; no boulder falls freely from further up onto a gallery
+HEIGHT_XTOL = 1e-3  # m
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """Shares of what is allowed; above one the gallery fails.
+
+    Attributes:
+        cushion: deepest penetration over what is allowed of the limit of the cushion [1].
+        shear: largest force in shear, if the plug did not crack, over the capacity [1].
+        bending: largest deflection over what is allowed of that at yielding [1].
+        state: "whole", "cracked", "punched", or "through" for a cushion that is pressed through.
+    """
+
+    cushion: float
+    shear: float
+    bending: float
+    state: str
+
+    @property
+    def share(self) -> float:
+        """The largest of the three [1]."""
+        return max(self.cushion, self.shear, self.bending)
+
+    @property
+    def decides(self) -> str:
+        """Which of the three is the largest."""
+        shares = {"cushion": self.cushion, "shear": self.shear, "bending": self.bending}
+        return max(shares, key=lambda name: shares[name])
+
+
+def design_check(g: Gallery, *, ductility: float = 1.0, depth: float = 1.0) -> Verdict:
+    """Strike and compare with what cushion, plug and slab bear.
+
+    A plug that has cracked carries less, so the force in shear is that of one that does not.
+
+    Args:
+        g: the gallery; without a limit, a capacity in shear or one in bending its share is zero.
+        ductility: deflection allowed, in multiples of that at yielding [1].
+        depth: penetration allowed, as a share of the limit of the cushion [1].
+
+    Raises:
+        ConfigError: for an allowance that is not positive, or a depth beyond the cushion.
+    """
+    if not (0 < ductility < np.inf and 0 < depth <= 1):
+        raise ConfigError(f"ductility = {ductility}, depth = {depth}: needed are ductility > 0 and "
+                          "0 < depth <= 1.")  # fmt: skip
+    try:
+        got = strike(replace(g, shear=replace(g.shear, capacity=np.inf)))
+    except SolverError as error:
+        if not error.solution.through(g):
+            raise
+        got = None
+    except ConfigError:  # a fall that no cushion of this kind takes up
+        got = None
+    if got is None:
+        return Verdict(np.inf, np.inf, np.inf, "through")
+    shear = float(got.peaks[1]) / g.shear.capacity
+    return Verdict(
+        got.deepest / (depth * g.cushion.limit),
+        shear,
+        got.deflection * g.slab.stiffness / (ductility * g.slab.capacity),
+        strike(g).state if shear > 1 else "whole",
+    )
+
+
+def with_boulder(g: Gallery, boulder: float, height: float | None = None) -> Gallery:
+    """The gallery under another boulder of the same shape and density.
+
+    Its radius goes by the cube root of the mass: that of a `Layer`, or, under its square root, the
+    stiffness of a `Cushion` after Hertz.
+
+    Args:
+        g: the gallery.
+        boulder: mass [kg].
+        height: of the fall [m]; None for that of g.
+
+    Raises:
+        ConfigError: for a mass or a height that is not positive.
+    """
+    if not 0 < boulder < np.inf:
+        raise ConfigError(f"boulder = {boulder} kg: it must be positive.")
+    ratio, c = (boulder / g.boulder) ** (1 / 3), g.cushion
+    cushion = (replace(c, radius=c.radius * ratio) if isinstance(c, Layer)
+               else replace(c, stiffness=c.stiffness * ratio**0.5))  # fmt: skip
+    return replace(
+        g, boulder=boulder, cushion=cushion, height=g.height if height is None else height
+    )
+
+
+def capacity_map(g: Gallery, boulders: Any, heights: Any, **allowed: float) -> list[list[Verdict]]:
+    """Verdicts for boulders and heights.
+
+    Args:
+        g: the gallery.
+        boulders: (b,) masses [kg].
+        heights: (h,) of falls [m].
+        allowed: of `design_check`.
+
+    Returns:
+        (b, h) verdicts.
+
+    Raises:
+        ConfigError: for a mass or a height that is not positive.
+    """
+    return [[design_check(with_boulder(g, m, h), **allowed) for h in heights] for m in boulders]
+
+
+def capacity_heights(g: Gallery, boulders: Any, **allowed: float) -> Array:
+    """(b,) heights [m] from which boulders [kg] take all that is allowed; inf beyond 300 m.
+
+    Args:
+        g: the gallery.
+        boulders: (b,) masses [kg].
+        allowed: of `design_check`.
+
+    Raises:
+        ConfigError: for a mass that is not positive, or a gallery that bears anything.
+    """
+    if not (g.cushion.limit < np.inf or g.shear.capacity < np.inf or g.slab.capacity < np.inf):
+        raise ConfigError("the gallery has no limit and no capacity; it bears anything.")
+    found = []
+    for m in boulders:
+
+        def excess(h: float, m: float = m) -> float:
+            return min(design_check(with_boulder(g, m, h), **allowed).share, 2.0) - 1
+
+        low, high = HEIGHT_XTOL, MAX_FALL
+        if excess(high) < 0:
+            found.append(np.inf)
+        elif excess(low) > 0:
+            found.append(0.0)
+        else:
+            found.append(float(brentq(excess, low, high, xtol=HEIGHT_XTOL)))
+    return np.array(found)

@@ -1,0 +1,206 @@
+"""The cushion as a layer: contact that grows with depth, load that spreads, plug beneath it.
+
+Source:
+    Cones in place of half spaces: Wolf and Deeks, Foundation Vibration Analysis, a Strength of
+    Materials Approach, Elsevier (2004). Load spread by 2:1 in sand: any textbook of foundations.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from rom.components.rockfall import kernels
+from rom.components.rockfall.laws import (
+    GRAVITY,
+    ROCK_DENSITY,
+    SAND_RECOVERY,
+    Cushion,
+    Resistance,
+    Shear,
+    ball_radius,
+)
+from rom.errors import ConfigError
+
+SAND_DENSITY, CONCRETE_DENSITY = 1800.0, 2500.0  # [kg/m^3]
+PUNCHING_SLOPE = 1.0  # of the cone that is punched out of the concrete, 45 degrees
+
+
+@dataclass(frozen=True, slots=True)
+class Layer(Resistance):
+    """A layer of sand of finite thickness under a boulder that is round below.
+
+    At penetration d the contact has the radius a, a^2 = 2 R d - d^2 up to R, and the sand left is
+    t = thickness - d. A load that spreads by s = tan(angle) finds the stiffness of a cone::
+
+        dF/dd = E pi a (a + s t) / t
+
+    until the sand fails below the boulder: F is at most strength pi a^2. On a thick layer that
+    does not fail F = (2/3) sqrt(2) pi s E sqrt(R) d^(3/2), Hertz for s = sqrt(2) / pi (1 - nu^2);
+    on a thin one the stiffness grows without bound. Unloading as for `Cushion`.
+
+    Attributes:
+        modulus: E of loading [Pa].
+        radius: R of the boulder [m].
+        thickness: of the layer [m].
+        angle: by which the load spreads, from the vertical [rad].
+        recovery: share of the energy that comes back [1], above 0; less of it where sand that fails
+            leaves no way for so much.
+        density: of the sand [kg/m^3].
+        strength: pressure that the contact bears [Pa], see `bearing_pressure`.
+
+    Raises:
+        ConfigError: for a number out of its range.
+    """
+
+    modulus: float
+    radius: float
+    thickness: float
+    angle: float = float(np.arctan(0.5))
+    recovery: float = SAND_RECOVERY
+    density: float = SAND_DENSITY
+    strength: float = np.inf
+
+    def __post_init__(self) -> None:
+        sizes = (self.modulus, self.radius, self.thickness, self.density)
+        good = all(0 < x < np.inf for x in sizes) and self.strength > 0
+        if not (good and 0 < self.recovery <= 1):
+            needed = "modulus, radius, thickness, density and strength > 0, 0 < recovery <= 1"
+            raise ConfigError(f"{self}: needed are {needed}.")
+        if not 0 < self.angle < np.pi / 2:
+            raise ConfigError(f"{self}: the angle is one between 0 and pi / 2, in radians.")
+
+    @classmethod
+    def of_sand(
+        cls, boulder: float, lame: float, thickness: float, *, rock: float = ROCK_DENSITY,
+        **more: Any,
+    ) -> "Layer":  # fmt: skip
+        """The sand of `Cushion.of_sand`, E = 2.5 lame, in a layer.
+
+        Args:
+            boulder: mass of a ball [kg].
+            lame: Lame constant of the sand [Pa].
+            thickness: of the layer [m].
+            rock: density of the boulder [kg/m^3].
+            more: further attributes.
+
+        Raises:
+            ConfigError: if a number is not positive.
+        """
+        Cushion.of_sand(boulder, lame, rock=rock)
+        return cls(2.5 * lame, ball_radius(boulder, rock), thickness, **more)
+
+    @property
+    def limit(self) -> float:  # type: ignore[override]
+        """Penetration at which the boulder is through [m]."""
+        return self.thickness
+
+    @property
+    def exponent(self) -> float:
+        """Of unloading [1]."""
+        return 1.5
+
+    @property
+    def law(self) -> tuple[float, ...]:
+        """(8,) the numbers of the law, as `kernels.cushion` takes them."""
+        numbers = (self.recovery, self.exponent, self.modulus, self.thickness, self.radius,
+                   np.tan(self.angle), self.strength)  # fmt: skip
+        return (kernels.CONE_LAW, *map(float, numbers))
+
+    def contact(self, d: float) -> float:
+        """Radius of the contact [m] at a penetration [m].
+
+        Raises:
+            ConfigError: for a penetration that is negative or through the layer.
+        """
+        if not 0 <= d < self.thickness:
+            raise ConfigError(f"d = {d} m: the layer is {self.thickness} m thick.")
+        x = min(d, self.radius)
+        return float(np.sqrt(2 * self.radius * x - x**2))
+
+    def spread(self, d: float) -> float:
+        """Radius on the slab over which the load arrives [m], at a penetration [m].
+
+        Raises:
+            ConfigError: for a penetration that is negative or through the layer.
+        """
+        return self.contact(d) + float(np.tan(self.angle)) * (self.thickness - d)
+
+    def plug(self, d: float, slab: float, *, concrete: float = CONCRETE_DENSITY) -> float:
+        """Mass [kg] of the sand under the boulder and of the cone of concrete below it.
+
+        Args:
+            d: penetration [m], for example of the energy of the fall.
+            slab: thickness of the concrete [m].
+            concrete: its density [kg/m^3].
+
+        Raises:
+            ConfigError: for a size that is not positive, or a boulder through the layer.
+        """
+        if not (slab > 0 and concrete > 0):
+            raise ConfigError(f"slab = {slab} m, concrete = {concrete} kg/m^3: both must be > 0.")
+        top, bottom = self.contact(d), self.spread(d)
+        sand = _frustum(top, bottom, self.thickness - d)
+        return self.density * sand + concrete * _frustum(
+            bottom, bottom + PUNCHING_SLOPE * slab, slab
+        )
+
+    def shear(self, d: float, slab: float, *, modulus: float, strength: float,
+              **more: float) -> Shear:  # fmt: skip
+        """The plug's ring of concrete in shear, from the load's edge a thickness outwards.
+
+        A ring of radii r and r + h that only shears has 2 pi G h / log(1 + h / r); it cracks at
+        the strength on the perimeter half a thickness outside the load.
+
+        Args:
+            d: penetration [m].
+            slab: thickness h of the concrete [m].
+            modulus: G of the concrete [Pa].
+            strength: in shear [Pa].
+            more: further attributes of `Shear`.
+
+        Raises:
+            ConfigError: for a number that is not positive, or a boulder through the layer.
+        """
+        if not (slab > 0 and modulus > 0 and strength > 0):
+            raise ConfigError(
+                f"slab = {slab} m, modulus = {modulus} Pa, strength = {strength} Pa: "
+                "all must be > 0."
+            )
+        r = self.spread(d)
+        stiffness = 2 * np.pi * modulus * slab / np.log1p(PUNCHING_SLOPE * slab / r)
+        capacity = strength * 2 * np.pi * (r + 0.5 * PUNCHING_SLOPE * slab) * slab
+        return Shear(float(stiffness), float(capacity), **more)
+
+
+def bearing_pressure(friction: float, radius: float, density: float = SAND_DENSITY) -> float:
+    """Pressure [Pa] under which dry sand fails below a disc on its surface.
+
+    0.6 rho g R N with N = 2 (N_q + 1) tan(phi), N_q = exp(pi tan(phi)) tan^2(pi / 4 + phi / 2),
+    for slow loading; 0.6 is the factor of a round foundation.
+
+    Args:
+        friction: angle phi of the sand [rad].
+        radius: R of the disc [m].
+        density: rho of the sand [kg/m^3].
+
+    Raises:
+        ConfigError: for an angle that is none of sand, or a size that is not positive.
+
+    Source:
+        Vesic, Analysis of ultimate loads of shallow foundations, J. Soil Mech. Found. Div. ASCE
+        99 (1973) 45.
+    """
+    if not (0 < friction < np.pi / 3 and radius > 0 and density > 0):
+        raise ConfigError(
+            f"friction = {friction} rad, radius = {radius} m, density = {density} kg/m^3: needed "
+            "are an angle between 0 and pi / 3 and sizes > 0."
+        )
+    slope = np.tan(friction)
+    n_q = np.exp(np.pi * slope) * np.tan(np.pi / 4 + friction / 2) ** 2
+    return float(0.6 * density * GRAVITY * radius * 2 * (n_q + 1) * slope)
+
+
+def _frustum(top: float, bottom: float, height: float) -> float:
+    """Volume of a truncated cone."""
+    return np.pi * height / 3 * (top**2 + top * bottom + bottom**2)

@@ -1,0 +1,279 @@
+"""The blades of a rotor as strips, and what the wind does to them at a steady speed.
+
+The shaft may be tilted and the blades coned; a strip then meets other air at each azimuth, and the
+balance of momentum is struck strip by strip and azimuth by azimuth. The tower dams the wind ahead.
+
+Source:
+    Jonkman, Butterfield, Musial, Scott, NREL/TP-500-38060, 2009, table 3-1: the blade.
+    Hansen, Aerodynamics of Wind Turbines, 2008, chapters 6 and 9: elements of a blade.
+"""
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from rom.arguments import typed
+from rom.components.compiled import inner, kernel
+from rom.components.wind.inflow import NO_TOWER, TOWER_TUBE, wind_at
+from rom.components.wind.momentum import CHORD_COLUMN, coefficients, induced
+from rom.components.wind.profiles import Profile, profiles
+from rom.components.wind.wind_turbine import (
+    CONE_ANGLE,
+    HUB_OVERHANG,
+    HUB_RADIUS,
+    N_BLADES,
+    SHAFT_HEIGHT,
+    SHAFT_TILT,
+    TOWER_HEIGHT,
+)
+from rom.errors import ConfigError
+from rom.model import Array
+
+# table 3-1: middle of an element from the axis [m], its length along the blade [m], its chord [m],
+# its twist [deg]
+RADIUS = (2.8667, 5.6, 8.3333, 11.75, 15.85, 19.95, 24.05, 28.15, 32.25, 36.35, 40.45, 44.55, 48.65,
+          52.75, 56.1667, 58.9, 61.6333)  # fmt: skip
+ELEMENT_LENGTH = (*(2.7333,) * 3, *(4.1,) * 11, *(2.7333,) * 3)
+CHORD = (3.542, 3.854, 4.167, 4.557, 4.652, 4.458, 4.249, 4.007, 3.748, 3.502, 3.256, 3.010, 2.764,
+         2.518, 2.313, 2.086, 1.419)  # fmt: skip
+ELEMENT_TWIST = (*(13.308,) * 4, 11.480, 10.162, 9.011, 7.795, 6.544, 5.361, 4.188, 3.125, 2.319,
+                 1.526, 0.863, 0.370, 0.106)  # fmt: skip
+ELEMENT_PROFILE = (*("Cylinder1",) * 2, "Cylinder2", "DU40", *("DU35",) * 2, "DU30",
+                   *("DU25",) * 2, *("DU21",) * 2, *("NACA64",) * 6)  # fmt: skip
+ROTOR_RADIUS = 63.0  # m
+AIR_DENSITY = 1.225  # [kg/m^3]
+BETZ_LIMIT = 16 / 27  # of the power in the wind
+LARGEST_ANGLE = 2 * math.pi  # of pitch, either way [rad]
+N_AZIMUTHS = 24  # of a turn, a multiple of three blades
+
+
+@typed
+@dataclass(frozen=True)
+class Blading:
+    """Blades of a rotor for the wind.
+
+    Attributes:
+        radius: (n,) middle of a strip from the axis of the rotor, along the blade [m].
+        length: (n,) of a strip along the blade [m].
+        chord: (n,) of a strip [m].
+        twist: (n,) leading edge into the wind [rad].
+        profile: (n,) profile of a strip.
+        rotor_radius: end of the blades [m].
+        hub_radius: start of the blades [m].
+        n_blades: number of blades.
+        tilt: of the shaft, nose up [rad].
+        cone: of the blades, upwind [rad].
+        density: of the air [kg/m^3].
+    """
+
+    radius: Array
+    length: Array
+    chord: Array
+    twist: Array
+    profile: tuple[Profile, ...]
+    rotor_radius: float = ROTOR_RADIUS
+    hub_radius: float = HUB_RADIUS
+    n_blades: int = N_BLADES
+    tilt: float = SHAFT_TILT
+    cone: float = CONE_ANGLE
+    density: float = AIR_DENSITY
+
+    def __post_init__(self) -> None:
+        """Refuse blades that cannot be."""
+        size = len(self.profile)
+        for name in ("radius", "length", "chord", "twist"):
+            if getattr(self, name).shape != (size,):
+                raise ConfigError(f"blades have {size} profiles and {getattr(self, name).shape} "
+                                  f"of {name}; one for each strip.")  # fmt: skip
+        if not (self.hub_radius > 0.0 and (self.radius > self.hub_radius).all()
+                and (self.radius < self.rotor_radius).all()):  # fmt: skip
+            raise ConfigError(f"strips lie from {self.radius.min():g} to {self.radius.max():g} m, "
+                              f"blades from {self.hub_radius:g} to {self.rotor_radius:g} m.",
+                              hint="Radii are those of the middles of strips.")  # fmt: skip
+        if not ((self.chord > 0.0).all() and (self.length > 0.0).all() and self.density > 0.0
+                and self.n_blades >= 1):  # fmt: skip
+            raise ConfigError("chords, lengths, the density of the air and the number of blades "
+                              "are positive.")  # fmt: skip
+        if not (abs(self.tilt) < np.pi / 4 and abs(self.cone) < np.pi / 4):
+            raise ConfigError(f"a shaft tilted by {self.tilt:g} rad and blades coned by "
+                              f"{self.cone:g} rad are beyond this model.",
+                              hint="Angles are in radians, below 0.78.")  # fmt: skip
+
+    @property
+    def area(self) -> float:
+        """Of the disc that the blades sweep without cone [m^2]."""
+        return float(np.pi * self.rotor_radius**2)
+
+    @cached_property
+    def strips(self) -> Array:
+        """(n, 5) what the balance of momentum knows of each strip."""
+        c, size = math.cos(self.cone), len(self.profile)
+        ends = np.tile([self.rotor_radius * c, self.hub_radius * c, self.n_blades], (size, 1))
+        return np.column_stack([self.radius * c, self.chord, ends])
+
+    @cached_property
+    def tables(self) -> tuple[Array, Array]:
+        """(n, 3 k) profiles, angles [rad], lift and drag [1] of each, and its number of angles."""
+        count = np.array([p.angle.size for p in self.profile])
+        rows = np.zeros((count.size, 3 * count.max()))
+        for row, one in zip(rows, self.profile, strict=True):
+            row[: 3 * one.angle.size] = one.table.ravel()
+        return rows, count
+
+
+class RotorLoad(NamedTuple):
+    """What the wind does to a rotor that turns steadily.
+
+    Attributes:
+        wind: speed far away [m/s].
+        speed: of the rotor [rad/s].
+        pitch: of the blades [rad].
+        thrust: along the shaft, mean over a turn [N].
+        torque: about the shaft, mean over a turn [N m].
+        power_coefficient: power over that in the wind through the disc [1].
+        thrust_coefficient: thrust over dynamic pressure times area [1].
+        azimuth: (k,) of a blade, 0 up [rad].
+        strip: (k, n, 6) at an azimuth and strip: force per length across the plane of the rotor and
+            in it [N/m], air through the plane and in it [m/s], angle of attack [rad], axial
+            induction [1].
+        blade_thrust: (k,) of one blade [N].
+        blade_torque: (k,) of one blade [N m].
+    """
+
+    wind: float
+    speed: float
+    pitch: float
+    thrust: float
+    torque: float
+    power_coefficient: float
+    thrust_coefficient: float
+    azimuth: Array
+    strip: Array
+    blade_thrust: Array
+    blade_torque: Array
+
+    @property
+    def power(self) -> float:
+        """On the shaft [W]."""
+        return self.torque * self.speed
+
+
+def blading(tilt: float = SHAFT_TILT, cone: float = CONE_ANGLE) -> Blading:
+    """The blades of the NREL 5 MW turbine, in seventeen strips.
+
+    Args:
+        tilt: of the shaft, nose up [rad].
+        cone: of the blades, upwind [rad].
+
+    Raises:
+        ConfigError: for angles beyond the model.
+    """
+    given = profiles()
+    return Blading(
+        radius=np.array(RADIUS),
+        length=np.array(ELEMENT_LENGTH),
+        chord=np.array(CHORD),
+        twist=np.radians(ELEMENT_TWIST),
+        profile=tuple(given[name] for name in ELEMENT_PROFILE),
+        tilt=tilt,
+        cone=cone,
+    )
+
+
+@inner
+def strip_load(strip, table, k, theta, flow, half_density):
+    """Force per length across the plane of the rotor and in it; air through and across; attack."""
+    through, across, _ = flow
+    phi = math.atan2(through, across)
+    cl, cd, _, _ = coefficients(table, k, phi - theta)
+    q = half_density * strip[CHORD_COLUMN] * math.sqrt(through * through + across * across)
+    return q * (cl * across + cd * through), q * (cl * through - cd * across), phi - theta
+
+
+@kernel
+def turn(strips, tables, counts, shape, angles, motion, tower, out):  # noqa: PLR0913  the state
+    """Rows of out for each azimuth and strip: the loads of one blade."""
+    axial, radius = shape
+    tilt, cone, overhang, height = angles
+    wind, speed, pitch, half_density = motion
+    ct, st, cc, sc = math.cos(tilt), math.sin(tilt), math.cos(cone), math.sin(cone)
+    v = np.zeros(3)
+    for i in range(out.shape[0]):
+        s, c = math.sin(2 * math.pi * i / out.shape[0]), math.cos(2 * math.pi * i / out.shape[0])
+        for j in range(out.shape[1]):
+            r, lift = radius[j] * cc, -overhang - radius[j] * sc
+            x = lift * ct + r * c * st
+            v[0], v[1], v[2] = wind, 0.0, 0.0
+            wind_at(tower, x, -r * s, height - lift * st + r * c * ct, v)
+            n, e = v[0] * ct, c * v[0] * st - s * v[1]
+            ahead = -c * v[1] - s * v[0] * st  # with the motion of the blade
+            theta = axial[j] + pitch
+            flow = induced(strips[j], tables[j], counts[j], theta, cc * n + sc * e,
+                           speed * r - ahead)  # fmt: skip
+            normal, tangential, attack = strip_load(
+                strips[j], tables[j], counts[j], theta, flow, half_density)  # fmt: skip
+            row = out[i, j]
+            row[0], row[1], row[2], row[3], row[4] = normal, tangential, flow[0], flow[1], attack
+            far = cc * n + sc * e
+            row[5] = 1.0 - flow[0] / far if far != 0.0 else 0.0
+
+
+def check_pitch(pitch: float) -> None:
+    """Refuse a pitch [rad] of more than a turn, which are degrees, and none.
+
+    Raises:
+        ConfigError: naming it.
+    """
+    if not abs(pitch) <= LARGEST_ANGLE:
+        raise ConfigError(f"a pitch of {pitch:g} rad is no angle of a blade.",
+                          hint="Pitch is in radians.")  # fmt: skip
+
+
+@typed
+def rotor_load(
+    blades: Blading,
+    wind: float,
+    speed: float,
+    pitch: float = 0.0,
+    *,
+    tower: bool = False,
+    n_azimuths: int = N_AZIMUTHS,
+) -> RotorLoad:
+    """Loads of a rotor in steady wind, by momentum balance on every strip and azimuth.
+
+    Args:
+        blades: see `blading`.
+        wind: its speed [m/s].
+        speed: of the rotor [rad/s].
+        pitch: of all blades, leading edge into the wind [rad].
+        tower: whether the tower of the turbine dams the wind.
+        n_azimuths: places of a blade in a turn.
+
+    Raises:
+        ConfigError: for a wind or a speed below zero or not finite, a pitch of more than a turn,
+            or no azimuths.
+    """
+    for name, value in (("wind", wind), ("speed of the rotor", speed)):
+        if not (np.isfinite(value) and value >= 0.0):
+            raise ConfigError(f"a {name} of {value:g}; it is finite and not negative.",
+                              hint="Turn the rotor into the wind.")  # fmt: skip
+    check_pitch(pitch)
+    if n_azimuths < 1:
+        raise ConfigError(f"a turn of {n_azimuths} azimuths; it has one or more.")
+    out = np.zeros((n_azimuths, len(blades.profile), 6))
+    turn(blades.strips, *blades.tables, (blades.twist, blades.radius),
+         (blades.tilt, blades.cone, HUB_OVERHANG, TOWER_HEIGHT + SHAFT_HEIGHT),
+         (float(wind), float(speed), float(pitch), 0.5 * blades.density),
+         TOWER_TUBE if tower else NO_TOWER, out)  # fmt: skip
+    c = math.cos(blades.cone)
+    thrust = c * out[:, :, 0] @ blades.length
+    torque = c * out[:, :, 1] @ (blades.radius * blades.length)
+    pushed, turned = blades.n_blades * thrust.mean(), blades.n_blades * torque.mean()
+    pressure = 0.5 * blades.density * blades.area * wind**2
+    C_P = turned * speed / (pressure * wind) if wind > 0.0 else 0.0
+    C_T = pushed / pressure if wind > 0.0 else 0.0
+    azimuth = 2 * np.pi / n_azimuths * np.arange(n_azimuths)
+    return RotorLoad(wind, speed, pitch, pushed, turned, C_P, C_T, azimuth, out, thrust, torque)

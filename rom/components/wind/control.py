@@ -1,0 +1,175 @@
+"""Generator torque and pitch of the NREL 5 MW turbine by its published laws, and its power curve.
+
+Below the rated speed blades stay at zero pitch and the torque follows the square of the speed of
+the generator, with ramps at both ends; above, the power is held by a torque in inverse proportion
+to the speed, and the speed by the pitch, whose gains fall as pitch makes the blades more sensitive.
+
+Source:
+    Jonkman, Butterfield, Musial, Scott, NREL/TP-500-38060, 2009, section 7 and its program in
+    appendix C.
+"""
+
+import math
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+import numpy.typing as npt
+from scipy.optimize import brentq
+
+from rom.arguments import typed, vector
+from rom.components.wind.blading import Blading, RotorLoad, blading, rotor_load
+from rom.components.wind.wind_turbine import GEAR_RATIO, RATED_SPEED
+from rom.errors import ConfigError
+from rom.model import Array
+
+CUT_IN_WIND, CUT_OUT_WIND = 3.0, 25.0  # m/s
+# of the generator [rad/s]: torque from the first on, square law from the second on; the third ends
+# it by a slip of ten percent; pitch holds the fourth
+CUT_IN_GENERATOR, SQUARE_GENERATOR = 70.16224, 91.21091
+RATED_GENERATOR, HELD_GENERATOR = 121.6805, 122.9096
+SQUARE_GAIN = 2.332287  # N m s^2/rad^2
+RATED_POWER, GENERATOR_EFFICIENCY = 5_296_610.0, 0.944  # W of the shaft; of the generator
+GENERATOR_SLIP = 0.10  # of the ramp below the rated speed
+SYNCHRONOUS_GENERATOR = RATED_GENERATOR / (1.0 + GENERATOR_SLIP)  # where that ramp starts [rad/s]
+RAMP_SLOPE = RATED_POWER / RATED_GENERATOR / (RATED_GENERATOR - SYNCHRONOUS_GENERATOR)  # N m s/rad
+LARGEST_TORQUE, LARGEST_TORQUE_RATE = 47_402.91, 15_000.0  # N m, N m/s
+RATED_PITCH_ANGLE = math.radians(1.0)  # beyond, the power is held at any speed [rad]
+PROPORTIONAL_GAIN, INTEGRAL_GAIN = 0.01882681, 0.008068634  # s and 1, at zero pitch
+DOUBLING_PITCH = 0.1099965  # where the power is twice as sensitive as at none [rad]
+LARGEST_PITCH, LARGEST_PITCH_RATE = math.radians(90.0), math.radians(8.0)  # rad, rad/s
+CORNER_FREQUENCY = 1.570796  # of the filter of the measured speed [rad/s]
+SPEED_RTOL = 1e-12  # of steady speeds and pitches: digits that repeat
+# steady pitch above the rated wind: table 7-1 (wind [m/s], pitch [deg])
+PUBLISHED_PITCH = ((12.0, 3.83), (13.0, 6.60), (14.0, 8.70), (15.0, 10.45), (16.0, 12.06),
+                   (17.0, 13.54), (18.0, 14.92), (19.0, 16.23), (20.0, 17.47), (21.0, 18.70),
+                   (22.0, 19.94), (23.0, 21.18), (24.0, 22.35), (25.0, 23.47))  # fmt: skip
+
+
+@typed
+def generator_torque(speed: float, pitch: float = 0.0) -> float:
+    """Torque of the generator at its speed [rad/s], on the fast shaft [N m].
+
+    Args:
+        speed: of the generator [rad/s].
+        pitch: of the blades [rad]; from one degree on the power is held at any speed.
+
+    Raises:
+        ConfigError: for a speed or a pitch that is not finite.
+    """
+    if not (math.isfinite(speed) and math.isfinite(pitch)):
+        raise ConfigError(f"no generator turns at {speed:g} rad/s with a pitch of {pitch:g} rad.")
+    if speed >= RATED_GENERATOR or (pitch >= RATED_PITCH_ANGLE and speed > 0.0):
+        return min(RATED_POWER / speed, LARGEST_TORQUE)
+    if speed <= CUT_IN_GENERATOR:
+        return 0.0
+    if speed < SQUARE_GENERATOR:
+        slope = SQUARE_GAIN * SQUARE_GENERATOR**2 / (SQUARE_GENERATOR - CUT_IN_GENERATOR)
+        return slope * (speed - CUT_IN_GENERATOR)
+    return max(SQUARE_GAIN * speed**2, RAMP_SLOPE * (speed - SYNCHRONOUS_GENERATOR))
+
+
+def gain_factor(pitch: float) -> float:
+    """Factor of both gains of the pitch at a pitch [rad], 1 / (1 + pitch / 6.3 degrees)."""
+    return 1.0 / (1.0 + max(pitch, 0.0) / DOUBLING_PITCH)
+
+
+@dataclass
+class Controller:
+    """The published controller as it runs: what it remembers between steps.
+
+    Attributes:
+        filtered: speed of the generator behind the filter [rad/s].
+        integral: of the error of that speed [rad].
+        pitch: that is asked for [rad].
+        torque: of the generator that is asked for [N m].
+    """
+
+    filtered: float
+    integral: float
+    pitch: float
+    torque: float
+
+    @classmethod
+    def at(cls, speed: float, pitch: float = 0.0) -> "Controller":
+        """One that has long been at a speed of the generator [rad/s] and a pitch [rad]."""
+        integral = pitch / (gain_factor(pitch) * INTEGRAL_GAIN)
+        return cls(speed, integral, pitch, generator_torque(speed, pitch))
+
+    def step(self, speed: float, dt: float) -> None:
+        """Take the speed of the generator [rad/s] that was measured a time dt [s] after the last.
+
+        Rates and ends of pitch and torque are those of the machine; the integral is kept where its
+        share of the pitch is within these ends.
+        """
+        share = math.exp(-CORNER_FREQUENCY * dt)
+        self.filtered = (1.0 - share) * speed + share * self.filtered
+        asked = generator_torque(self.filtered, self.pitch)
+        room = LARGEST_TORQUE_RATE * dt
+        self.torque = min(max(asked, self.torque - room), self.torque + room)
+        gain, error = gain_factor(self.pitch), self.filtered - HELD_GENERATOR
+        end = LARGEST_PITCH / (gain * INTEGRAL_GAIN)
+        self.integral = min(max(self.integral + error * dt, 0.0), end)
+        asked = gain * (PROPORTIONAL_GAIN * error + INTEGRAL_GAIN * self.integral)
+        room = LARGEST_PITCH_RATE * dt
+        asked = min(max(asked, self.pitch - room), self.pitch + room)
+        self.pitch = min(max(asked, 0.0), LARGEST_PITCH)
+
+
+@typed
+def steady(wind: float, blades: Blading | None = None, *, tower: bool = False) -> RotorLoad:
+    """Speed, pitch and loads at which the controlled turbine stays in a steady wind.
+
+    Args:
+        wind: its speed, from cut-in at 3 to cut-out at 25 [m/s].
+        blades: None: those of the turbine.
+        tower: whether the tower dams the wind.
+
+    Raises:
+        ConfigError: for a wind in which the turbine is parked.
+    """
+    if not CUT_IN_WIND <= wind <= CUT_OUT_WIND:
+        raise ConfigError(f"the turbine is parked in a wind of {wind:g} m/s.",
+                          hint="It works from 3 to 25 m/s.")  # fmt: skip
+    blades = blading() if blades is None else blades
+    load = partial(rotor_load, blades, float(wind), tower=tower)
+
+    def excess(speed: float) -> float:
+        turned = load(speed).torque
+        return turned - GEAR_RATIO * generator_torque(GEAR_RATIO * speed)
+
+    if load(RATED_SPEED).power <= RATED_POWER:
+        rated = RATED_GENERATOR / GEAR_RATIO
+        slowest = CUT_IN_GENERATOR / GEAR_RATIO
+        top = RATED_SPEED if excess(rated) > 0.0 else rated
+        return load(float(brentq(excess, slowest, top, rtol=SPEED_RTOL)))
+    pitch = brentq(lambda p: load(RATED_SPEED, p).power - RATED_POWER, 0.0, np.pi / 4,
+                   rtol=SPEED_RTOL)  # fmt: skip
+    return load(RATED_SPEED, float(pitch))
+
+
+@typed
+def power_curve(
+    winds: npt.ArrayLike, blades: Blading | None = None, *, tower: bool = False
+) -> dict[str, Array]:
+    """The turbine over steady winds.
+
+    Args:
+        winds: (k,) speeds [m/s].
+        blades: None: those of the turbine.
+        tower: whether the tower dams the wind.
+
+    Returns:
+        {name: (k,)} of ``wind`` [m/s], ``speed`` of the rotor [rad/s], ``pitch`` [rad], ``power``
+        of the generator behind its losses [W], ``thrust`` [N], ``torque`` of the rotor [N m], and
+        the coefficients ``power_coefficient`` and ``thrust_coefficient`` of the rotor [1].
+
+    Raises:
+        ConfigError: for winds that are no list, or in which the turbine is parked.
+    """
+    winds = vector("winds", winds)
+    points = [steady(float(wind), blades, tower=tower) for wind in winds]
+    names = ("wind", "speed", "pitch", "thrust", "torque", "power_coefficient",
+             "thrust_coefficient")  # fmt: skip
+    found = {name: np.array([getattr(p, name) for p in points]) for name in names}
+    return found | {"power": GENERATOR_EFFICIENCY * np.array([p.power for p in points])}

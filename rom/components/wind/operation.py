@@ -1,0 +1,192 @@
+"""The controlled turbine in wind that changes: a rigid rotor, its wake with or without memory.
+
+The wake follows a change of the loads late, so that after a step of pitch the loads first
+overshoot. Two filters in series on the induced velocity of each strip describe it.
+
+Source:
+    Oye, as in Hansen, Aerodynamics of Wind Turbines, 2008, chapter 9: filters and their times.
+    Jonkman, Butterfield, Musial, Scott, NREL/TP-500-38060, 2009, section 7: inertia, control.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from rom.arguments import positive, typed
+from rom.components.compiled import inner, kernel
+from rom.components.wind.blading import Blading, blading, check_pitch, strip_load
+from rom.components.wind.control import (
+    CUT_IN_WIND,
+    CUT_OUT_WIND,
+    GENERATOR_EFFICIENCY,
+    Controller,
+    steady,
+)
+from rom.components.wind.momentum import induced
+from rom.components.wind.wind_turbine import GEAR_RATIO
+from rom.errors import ConfigError
+from rom.model import Array
+
+DRIVE_INERTIA = 43_784_725.0  # of rotor and generator about the slow shaft [kg m^2], section 7
+WAKE_SHARE = 0.6  # of a change of the induced velocity that the first filter passes at once
+LARGEST_INDUCTION = 0.5  # beyond which times of the wake grow no more
+MAX_STEP = 0.5  # s: the filter of the controller knows a speed four times a second
+
+
+@typed
+@dataclass(frozen=True)
+class Operation:
+    """The turbine over time.
+
+    Attributes:
+        t: (k,) instants [s].
+        wind: (k,) its speed [m/s].
+        speed: (k,) of the rotor [rad/s].
+        pitch: (k,) of the blades [rad].
+        power: (k,) of the generator behind its losses [W].
+        torque: (k,) of the wind about the shaft [N m].
+        thrust: (k,) along the shaft [N].
+        induced: (k, n) velocity by which the air at the strips is slower [m/s].
+    """
+
+    t: Array
+    wind: Array
+    speed: Array
+    pitch: Array
+    power: Array
+    torque: Array
+    thrust: Array
+    induced: Array
+
+
+@inner
+def late(state, steady_now, dt, slow, fast):
+    """Take both filters a step further; state: the steady value, behind one filter, behind both."""
+    target = steady_now + WAKE_SHARE * slow * (steady_now - state[0]) / dt
+    state[0] = steady_now
+    before = state[1]
+    state[1] = target + (before - target) * math.exp(-dt / slow)
+    middle = 0.5 * (before + state[1])
+    state[2] = middle + (state[2] - middle) * math.exp(-dt / fast)
+
+
+@kernel
+def wake_step(blades, flow, state, dt, out):
+    """Loads per length (n, 2) of the strips in air that the wake has slowed down by now.
+
+    ``state`` (n, 2, 3) holds the filters of the velocity through the plane and in it; a step dt
+    of zero takes the steady wake.
+    """
+    strips, tables, counts, twist, radius = blades
+    axial, speed, pitch, half_density = flow
+    for j in range(out.shape[0]):
+        theta, across = twist[j] + pitch, speed * strips[j, 0]
+        met = induced(strips[j], tables[j], counts[j], theta, axial, across)
+        lost, gained = axial - met[0], met[1] - across
+        if dt <= 0.0:
+            state[j, 0, :] = lost
+            state[j, 1, :] = gained
+        else:
+            a = min(lost / max(axial, 1e-3), LARGEST_INDUCTION)
+            slow = 1.1 / (1.0 - 1.3 * max(a, 0.0)) * radius / max(axial, 1e-3)
+            fast = (0.39 - 0.26 * (strips[j, 0] / radius) ** 2) * slow
+            late(state[j, 0], lost, dt, slow, fast)
+            late(state[j, 1], gained, dt, slow, fast)
+        met = axial - state[j, 0, 2], across + state[j, 1, 2], 0.0
+        out[j, 0], out[j, 1], _ = strip_load(
+            strips[j], tables[j], counts[j], theta, met, half_density)  # fmt: skip
+
+
+@typed
+def operate(
+    wind: Callable[[float], float],
+    t_end: float,
+    *,
+    dt: float = 0.05,
+    blades: Blading | None = None,
+    dynamic: bool = True,
+    held: Callable[[float], tuple[float, float]] | None = None,
+) -> Operation:
+    """Let the controlled turbine work in a wind over time, from its steady state in the first.
+
+    The rotor is rigid; a tilted one meets the wind by the cosine of its tilt, the same at all
+    azimuths.
+
+    Args:
+        wind: its speed [m/s] over time [s].
+        t_end: end of the run [s].
+        dt: step [s].
+        blades: None: those of the turbine.
+        dynamic: whether the wake has a memory; False: as in steady flow at each instant.
+        held: speed of the rotor [rad/s] and pitch [rad] over time, in the place of the control.
+
+    Raises:
+        ConfigError: for a step or an end that cannot be, or a wind in which the turbine is parked,
+            with its time, or a speed or a pitch to hold that is none.
+    """
+    positive("t_end", t_end)
+    if positive("dt", dt) > MAX_STEP:
+        raise ConfigError(f"a step of {dt:g} s is longer than the control can follow, "
+                          f"{MAX_STEP:g} s.")  # fmt: skip
+    blades = blading() if blades is None else blades
+    t = dt * np.arange(round(t_end / dt) + 1)
+    blows = np.array([_wind_at(wind, s) for s in t])
+    run = _Run(blades, blows[0], dynamic, held)
+    rows = np.array([run.step(s, v, dt if k else 0.0)
+                     for k, (s, v) in enumerate(zip(t, blows, strict=True))])  # fmt: skip
+    speed, pitch, power, torque, thrust = rows[:, :5].T
+    return Operation(t, blows, speed, pitch, power, torque, thrust, rows[:, 5:])
+
+
+def _wind_at(wind: Callable[[float], float], t: float) -> float:
+    """The wind at a time, within what the turbine works in."""
+    speed = float(wind(t))
+    if not CUT_IN_WIND <= speed <= CUT_OUT_WIND:
+        raise ConfigError(f"the turbine is parked in a wind of {speed:g} m/s, at {t:g} s.",
+                          hint="It works from 3 to 25 m/s.")  # fmt: skip
+    return speed
+
+
+class _Run:
+    """Rotor, wake and controller between steps."""
+
+    def __init__(
+        self,
+        blades: Blading,
+        wind: float,
+        dynamic: bool,
+        held: Callable[[float], tuple[float, float]] | None,
+    ) -> None:
+        self.blades, self.dynamic, self.held = blades, dynamic, held
+        self.cosines = math.cos(blades.cone), math.cos(blades.tilt)
+        self.given = (blades.strips, *blades.tables, blades.twist, blades.rotor_radius)
+        self.wake, self.loads = (
+            np.zeros((blades.radius.size, 2, 3)),
+            np.zeros((blades.radius.size, 2)),
+        )
+        start = steady(wind, blades)
+        self.speed = start.speed
+        self.control = Controller.at(GEAR_RATIO * start.speed, start.pitch)
+
+    def step(self, t: float, wind: float, dt: float) -> list[float]:
+        """Speed, pitch, power, torque and thrust at a time, and what the wake takes away."""
+        if self.held is not None:
+            self.speed, self.control.pitch = self.held(t)
+            check_pitch(self.control.pitch)
+            if not 0.0 <= self.speed < math.inf:
+                raise ConfigError(f"the rotor is held at {self.speed:g} rad/s, at {t:g} s.")
+        cone, tilt = self.cosines
+        flow = (wind * cone * tilt, self.speed, self.control.pitch, 0.5 * self.blades.density)
+        wake_step(self.given, flow, self.wake, dt if self.dynamic else 0.0, self.loads)
+        b = self.blades
+        thrust = b.n_blades * cone * float(self.loads[:, 0] @ b.length)
+        torque = b.n_blades * cone * float(self.loads[:, 1] @ (b.radius * b.length))
+        fast = GEAR_RATIO * self.speed
+        power = GENERATOR_EFFICIENCY * self.control.torque * fast
+        row = [self.speed, self.control.pitch, power, torque, thrust, *self.wake[:, 0, 2]]
+        if dt > 0.0 and self.held is None:
+            self.speed += dt * (torque - GEAR_RATIO * self.control.torque) / DRIVE_INERTIA
+            self.control.step(fast, dt)
+        return row

@@ -1,0 +1,136 @@
+"""Profiles of the blade of the NREL 5 MW turbine: lift and drag over all angles of attack.
+
+Published tables go once round; one that ends at stall is carried on as a plate in a separated flow.
+
+Source:
+    Jonkman, Butterfield, Musial, Scott, NREL/TP-500-38060, 2009, section 3 and appendix B: profiles
+    of the DOWEC study, corrected for stall delay and with Viterna's drag; the numbers as the
+    regression tests of OpenFAST have them.
+    Viterna, Corrigan, Fixed pitch rotor performance of large horizontal axis wind turbines, 1982.
+"""
+
+import csv
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from rom.arguments import typed, vector
+from rom.errors import ConfigError
+from rom.model import Array
+
+PROFILE_TABLE = Path(__file__).parent / "nrel5mw_profiles.csv"
+CAMBER_SHARE = 0.7  # of the lift, where the flow meets the wrong side or the wrong edge
+BLADE_ASPECT_RATIO = 17.0  # of the blade, length over chord: what its profiles were corrected with
+
+
+@typed
+@dataclass(frozen=True)
+class Profile:
+    """Coefficients of a profile.
+
+    Attributes:
+        name: of the profile.
+        angle: (k,) of attack, ascending, from -pi to pi [rad].
+        lift: (k,) coefficient [1].
+        drag: (k,) coefficient [1].
+    """
+
+    name: str
+    angle: Array
+    lift: Array
+    drag: Array
+
+    @property
+    def table(self) -> Array:
+        """(3, k) angles [rad], lift and drag [1]."""
+        return np.array([self.angle, self.lift, self.drag])
+
+
+@cache
+def profiles() -> dict[str, Profile]:
+    """The eight profiles of the blade, circles of the root first, by name."""
+    rows: dict[str, list[tuple[float, ...]]] = {}
+    with PROFILE_TABLE.open(encoding="utf-8") as lines:
+        for name, *numbers in list(csv.reader(lines))[1:]:
+            rows.setdefault(name, []).append(tuple(map(float, numbers)))
+    return {name: Profile(name, np.radians(a), lift, drag)
+            for name, (a, lift, drag) in ((n, np.array(r).T) for n, r in rows.items())}  # fmt: skip
+
+
+@typed
+def profile(
+    name: str,
+    angle: npt.ArrayLike,
+    lift: npt.ArrayLike,
+    drag: npt.ArrayLike,
+    *,
+    aspect: float = BLADE_ASPECT_RATIO,
+) -> Profile:
+    """A profile from a table that may end at stall.
+
+    Past its last angle a_s (past -a_s below zero) the flow is separated, with
+    D = 1.11 + 0.018 aspect::
+
+        drag = D sin(a)^2 + B cos(a)
+        lift = D sin(2 a) / 2 + A cos(a)^2 / sin(a)
+
+    A and B such that both are continuous at a_s. Below zero and in flow from behind, of more than a
+    right angle, lift is 0.7 times that of the mirrored angle; straight from behind it is zero.
+
+    Args:
+        name: of the profile.
+        angle: (k,) of attack, ascending [rad].
+        lift: (k,) coefficient [1].
+        drag: (k,) coefficient, not negative [1].
+        aspect: length over chord of the blade [1].
+
+    Raises:
+        ConfigError: naming the profile, for a table that cannot be.
+    """
+    a, cl, cd = (vector(f"{what} of profile {name!r}", x) for what, x in
+                 (("angle", angle), ("lift", lift), ("drag", drag)))  # fmt: skip
+    _check(name, a, cl, cd)
+    if not aspect > 0.0:
+        raise ConfigError(f"profile {name!r} has an aspect ratio of {aspect:g}; it is positive.")
+    if a[0] <= -np.pi + 1e-6 and a[-1] >= np.pi - 1e-6:
+        return Profile(name, a, cl, cd)
+    return _carried_on(name, (a, cl, cd), 1.11 + 0.018 * aspect)
+
+
+def _check(name: str, a: Array, cl: Array, cd: Array) -> None:
+    """Refuse a table that is none."""
+    if a.size < 2 or a.shape != cl.shape or a.shape != cd.shape:
+        raise ConfigError(f"profile {name!r} has {a.size} angles, {cl.size} lifts and {cd.size} "
+                          "drags; as many of each, two or more.")  # fmt: skip
+    if (np.diff(a) <= 0.0).any() or a[0] < -np.pi - 1e-6 or a[-1] > np.pi + 1e-6:
+        raise ConfigError(f"angles of profile {name!r} do not ascend within -pi to pi.",
+                          hint="Angles of attack are in radians.")  # fmt: skip
+    if (cd < 0.0).any():
+        raise ConfigError(f"profile {name!r} has a drag of {cd.min():g}; drag is not negative.")
+    if not 0.0 < a[-1] < np.pi / 2 and a[-1] < np.pi - 1e-6:
+        raise ConfigError(f"the table of profile {name!r} ends at {np.degrees(a[-1]):g} degrees; "
+                          "stall lies between 0 and 90, or it goes once round.")  # fmt: skip
+
+
+def _carried_on(name: str, table: tuple[Array, Array, Array], D: float) -> Profile:
+    """The table within stall, a plate in separated flow outside."""
+    a, cl, cd = table
+    s, c = np.sin(a[-1]), np.cos(a[-1])
+    A, B = (cl[-1] - D * s * c) * s / c**2, (cd[-1] - D * s**2) / c
+    first = np.ceil(np.degrees(a[-1])) + 1.0
+    beyond = np.append(np.radians(np.arange(first, 90.0, 2.0)), np.pi / 2)
+    lift = D / 2 * np.sin(2 * beyond) + A * np.cos(beyond) ** 2 / np.sin(beyond)
+    drag = D * np.sin(beyond) ** 2 + B * np.cos(beyond)
+    back = slice(-2, None, -1)  # mirrored at a right angle, flow from behind
+    positive = (np.concatenate([beyond, np.pi - beyond[back], [np.pi]]),
+                np.concatenate([lift, -CAMBER_SHARE * lift[back], [0.0]]),
+                np.concatenate([drag, drag[back], cd[:1]]))  # fmt: skip
+    below = positive[0] > max(-a[0], a[-1]) + 1e-6
+    share = np.where(positive[0] > np.pi / 2, 1.0, CAMBER_SHARE)
+    mirrored = (-positive[0][below][::-1], -(share * positive[1])[below][::-1],
+                positive[2][below][::-1])  # fmt: skip
+    return Profile(name, *(np.concatenate([m, t, p])
+                           for m, t, p in zip(mirrored, table, positive, strict=True)))  # fmt: skip

@@ -1,0 +1,70 @@
+"""How surely a search from a random block of vectors has missed no mode.
+
+With the inverse B = K^-1 M of eigenvalues theta, a search spans the powers B^a W of a Gaussian
+block W (n, b). An eigenvalue theta_i >= theta_m that was missed has left no trace above s, the
+largest Ritz value beside those found: every polynomial p of the degree at hand then has
+
+    (theta_i - s) p(theta_i)^2 c^2  <=  s |p(B) W|^2   beside the modes found,
+
+with c the least length that the components of W in the space of theta_i can have beside the
+modes found there. As W knows nothing of the body, so small a c is improbable: of three rows of W
+the least singular value falls below c with at most 3 P(chi^2_(b-2) <= 3 c^2). Three members of one
+frequency or more are left to a count. p is theta^a times Chebyshev's polynomial on [0, s].
+
+Source:
+    Kuczynski and Wozniakowski, SIAM J. Matrix Anal. Appl. 13 (1992) 1094, for one vector; Saad,
+    SIAM J. Numer. Anal. 17 (1980) 687, for blocks.
+"""
+
+import numpy as np
+from scipy.special import gammainc
+
+from rom.model import Array
+
+N_TOGETHER = 3  # members of one frequency that are left to a count
+CLUSTER_RTOL = 1e-4  # relative distance of eigenvalues that count as one frequency
+ACCURATE_RTOL = 1e-7  # residual of a Ritz value that counts as found
+LEAST_SHARE = 0.05  # variance of a component of W: eigenvalues of diag(M)^-1 M are larger
+SAFETY_FACTOR = 100.0  # on c^2, for Ritz vectors that are not exact
+MAX_POWER = 8  # of theta in the polynomials tried
+
+
+def miss_probability(T: Array, start: Array, residual: Array, m: int) -> float:
+    """Bound of the probability that one of the lowest m modes is not among those found.
+
+    Args:
+        T: (N, N) projection of B on the space searched, whose first b columns span W.
+        start: (b, b) components of W in these columns.
+        residual: (N,) of its Ritz values, the largest first, over them.
+        m: number of modes asked for, the lowest.
+    """
+    theta, S = np.linalg.eigh(T)
+    theta, S = theta[::-1], S[:, ::-1]
+    b, n_blocks = start.shape[0], theta.size // start.shape[0]
+    inaccurate = np.flatnonzero(residual > ACCURATE_RTOL)
+    k = int(inaccurate[0]) if inaccurate.size else theta.size
+    if not m <= k < theta.size or theta[k] <= 0.0 or _repeated(theta[:k]):
+        return 1.0
+    ratio = float(theta[m - 1] / theta[k])
+    if ratio <= 1.0 + CLUSTER_RTOL:
+        return 1.0
+    W = S[:b].T @ start  # in Ritz vectors
+    powers = np.arange(float(min(MAX_POWER, n_blocks)))
+    left = [np.linalg.norm((theta[k:] / theta[m - 1])[:, None] ** a * W[k:], 2) for a in powers]
+    growth = _log_chebyshev(n_blocks - 1 - powers, 2.0 * ratio - 1.0)
+    log_c2 = np.min(2.0 * np.log(left) - 2.0 * growth) - np.log(ratio - 1.0)
+    c2 = SAFETY_FACTOR * np.exp(min(log_c2, 0.0)) / LEAST_SHARE
+    chance = N_TOGETHER * gammainc(0.5 * (b - N_TOGETHER + 1), 0.5 * N_TOGETHER * c2)
+    return float(min(1.0, (k + 1) * chance))
+
+
+def _repeated(theta: Array) -> bool:
+    """Whether three neighbours or more share one frequency."""
+    width = theta[: 1 - N_TOGETHER] - theta[N_TOGETHER - 1 :]
+    return bool((width <= CLUSTER_RTOL * theta[: 1 - N_TOGETHER]).any())
+
+
+def _log_chebyshev(degree: Array, x: float) -> Array:
+    """Logarithm of Chebyshev's polynomial T_degree(x), x > 1."""
+    t = degree * np.arccosh(x)
+    return t + np.log1p(np.exp(-2.0 * t)) - np.log(2.0)

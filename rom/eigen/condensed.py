@@ -1,0 +1,104 @@
+"""A body condensed to its interfaces: one factor of K_ii solves for it in every support."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve, eigh
+
+from rom.eigen.verbs import Held, Operators, quadratic, unit_motions
+from rom.errors import InterfaceError
+from rom.model import Array, Index
+
+LEAST_STIFFNESS = 1e-12  # of the scaled interface stiffness, below which a motion is free
+LEAST_PART = 1e-10  # of rigid motions seen by the interfaces, below which one is none
+
+
+@dataclass(frozen=True, slots=True)
+class Condensed:
+    """Constraint modes Psi and the stiffness S = Psi^T K Psi between the interface coordinates.
+
+    Attributes:
+        ops: the body in interface coordinates.
+        held: the same with its whole boundary held, factored.
+        boundary: (n_b,) dof numbers of the interface coordinates.
+        Psi: (n_local, n_b) constraint modes.
+        S: (n_b, n_b) condensed stiffness.
+        alone: (n_b,) stiffness of each coordinate while nothing else moves.
+    """
+
+    ops: Operators
+    held: Held
+    boundary: Index
+    Psi: Array
+    S: Array
+    alone: Array
+
+    def support(self, dofs: Index) -> "Supported":
+        """The body with some interface coordinates held, or with none.
+
+        Args:
+            dofs: (k,) numbers of those held, some of ``boundary``.
+
+        Raises:
+            InterfaceError: if a motion other than the six of the free body has no stiffness.
+        """
+        free = np.flatnonzero(~np.isin(self.boundary, dofs))
+        scale = 1.0 / np.sqrt(self.alone[free])
+        S = scale[:, None] * self.S[np.ix_(free, free)] * scale
+        if not dofs.size and self.ops.rigid is not None:
+            R = self.ops.rows(self.ops.rigid, self.boundary) / scale[:, None]
+            U, size, _ = np.linalg.svd(R, full_matrices=False)
+            U = U[:, size > LEAST_PART * size[0]]
+            S = S + U @ U.T  # rigid motions cost nothing; loads in balance do not feel this
+        if free.size and eigh(S, eigvals_only=True, subset_by_index=(0, 0))[0] < LEAST_STIFFNESS:
+            raise InterfaceError("the supports leave a motion of the interfaces without stiffness.")
+        return Supported(self, dofs, free, scale, cho_factor(S) if free.size else None)
+
+
+@dataclass(frozen=True, slots=True)
+class Supported:
+    """A body in one support; call it to solve, for loads that balance each other if it is free.
+
+    With the interface coordinates r that are not held::
+
+        u = K_ii^-1 f + Psi_r S_rr^-1 Psi_r^T f
+
+    as constraint modes and motions of the inside have no work in common.
+    """
+
+    body: Condensed
+    dofs: Index
+    free: Index
+    scale: Array
+    factor: tuple[Array, bool] | None
+
+    @property
+    def mine(self) -> Index:
+        """Rows of this rank that are held."""
+        ops = self.body.ops
+        here = (self.dofs >= ops.first) & (self.dofs < ops.first + ops.n_local)
+        return self.dofs[here] - ops.first
+
+    def __call__(self, F: Array) -> Array:
+        """(n_local, k) displacements under loads (n_local, k)."""
+        X = self.body.held(F)
+        if self.factor is None:
+            return X
+        Psi = self.body.Psi[:, self.free] * self.scale
+        return X + Psi @ cho_solve(self.factor, self.body.ops.gram(Psi, F))
+
+    solve = __call__
+
+
+def condensed(ops: Operators, held: Held, boundary: Index, Psi: Array) -> Condensed:
+    """The body condensed to its boundary.
+
+    Args:
+        ops: the body in interface coordinates.
+        held: the same with its boundary held, factored.
+        boundary: (n_b,) dof numbers of the interface coordinates.
+        Psi: (n_local, n_b) constraint modes.
+    """
+    S = quadratic(ops, ops.apply_K, Psi)
+    alone = np.diag(quadratic(ops, ops.apply_K, unit_motions(ops, boundary)))
+    return Condensed(ops, held, boundary, Psi, 0.5 * (S + S.T), alone)

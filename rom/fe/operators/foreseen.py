@@ -1,0 +1,167 @@
+"""What a factor will take, known from its analysis, and the way to solve that fits into that."""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+from petsc4py import PETSc
+
+from rom.errors import ResourceError
+from rom.fe.operators.disk import free_disk_bytes, reserve_disk, scratch_folder
+from rom.fe.operators.memory import MAX_MEMORY_SHARE, allowed_bytes, factor_bytes, give_back
+from rom.fe.operators.solver import DIRECT_SOLVER, Solver
+
+TAKEN_RATIO = 0.88  # measured over INFOG(17), whose reserve for pivots no definite matrix needs
+MAX_BLOCK_RATIO = 2.0  # of any shape and ordering over `factor_bytes`; measured: 0.3 to 1.3
+ENTRY_BYTES = 12.0  # value and column of a sparse matrix
+SEARCH_COLUMNS = 220  # measured for twenty modes: Lanczos space, its inertia, blocks solved for
+N_MATRICES = 3  # K and M off the interfaces, and K - sigma M for the count
+MULTIGRID_RATIO = 4.0  # coarse matrices, prolongations and their making over K
+ANALYSIS_ONLY = 1  # MB of work space with which MUMPS stops after the analysis
+TOTAL_MEMORY = {"plain": (17, 27), "low-rank": (37, 39)}  # INFOG of MUMPS, in core and out [MB]
+
+
+@dataclass(frozen=True, slots=True)
+class Foreseen:
+    """What a factor will take, on all ranks together [bytes].
+
+    Attributes:
+        in_core: memory of the factor.
+        out_of_core: memory when the factor is on disk.
+        on_disk: disk it then takes.
+    """
+
+    in_core: float
+    out_of_core: float
+    on_disk: float
+
+
+def analysed(A: PETSc.Mat, solver: Solver = DIRECT_SOLVER) -> Foreseen:
+    """What a factor of A will take, by the symbolic analysis of MUMPS: a tenth of a factorisation.
+
+    Within a tenth of what was measured for blocks, rods and plates of 13 725 to 259 917 dofs.
+    """
+    A.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+    A.setOption(PETSc.Mat.Option.SPD, False)
+    pc = PETSc.PC().create(A.comm)
+    pc.setOperators(A)
+    pc.setType(PETSc.PC.Type.CHOLESKY)
+    pc.setFactorSolverType(PETSc.Mat.SolverType.MUMPS)
+    pc.setFactorSetUpSolverType()
+    factor = pc.getFactorMatrix()
+    if solver.low_rank:
+        factor.setMumpsIcntl(35, 1)
+        factor.setMumpsCntl(7, solver.low_rank)
+    factor.setMumpsIcntl(23, ANALYSIS_ONLY)
+    pc.setUp()
+    in_core, out_of_core = TOTAL_MEMORY["low-rank" if solver.low_rank else "plain"]
+    found = Foreseen(
+        TAKEN_RATIO * 1e6 * factor.getMumpsInfog(in_core),
+        TAKEN_RATIO * 1e6 * factor.getMumpsInfog(out_of_core),
+        8.0 * entry_count(factor),
+    )
+    pc.destroy()
+    factor.destroy()
+    give_back()
+    return found
+
+
+def entry_count(factor: PETSc.Mat) -> float:
+    """Entries of a factor, from its analysis; MUMPS counts large ones in millions, below zero."""
+    entries = factor.getMumpsInfog(3)
+    return float(entries if entries >= 0 else -1e6 * entries)
+
+
+def beside_factor(A: PETSc.Mat, n_columns: int, n_matrices: int) -> float:
+    """Memory of dense columns and copies of the matrix A [bytes], on all ranks together."""
+    n = A.getSize()[0]
+    return ENTRY_BYTES * n_matrices * _entries(A) + 8.0 * n * (SEARCH_COLUMNS + n_columns)
+
+
+def multigrid_bytes(A: PETSc.Mat) -> float:
+    """Memory of multigrid for A [bytes], on all ranks together."""
+    return MULTIGRID_RATIO * ENTRY_BYTES * _entries(A)
+
+
+def check_factor_memory(A: PETSc.Mat, n_columns: int, solver: Solver) -> None:
+    """Refuse a factorisation that would not fit.
+
+    Where even the factor of a block with as many dofs fits twice, nothing is analysed.
+
+    Args:
+        A: the matrix.
+        n_columns: dense columns of its length that are kept beside the factor.
+        solver: where the factor is to live.
+
+    Raises:
+        ResourceError: with the need and what there is.
+    """
+    n, comm = A.getSize()[0], A.comm.tompi4py()
+    there, beside = allowed_bytes(comm) * comm.size, beside_factor(A, n_columns, 1)
+    if MAX_BLOCK_RATIO * factor_bytes(n) + beside <= there:
+        return
+    found = analysed(A, solver)
+    need = beside + (found.out_of_core if solver.out_of_core else found.in_core)
+    if need > there:
+        raise too_large(n, need, there)
+
+
+def check_disk(A: PETSc.Mat, solver: Solver) -> None:
+    """Refuse a factor that the disk cannot hold.
+
+    Raises:
+        ResourceError: with folder, size and reason.
+    """
+    reserve_disk(analysed(A, solver).on_disk, A.getSize()[0], A.comm.tompi4py())
+
+
+def automatic(ops: Any) -> tuple[Solver, str]:
+    """The first of direct, out-of-core and iterative that fits, and why, in words.
+
+    Args:
+        ops: `PETScOperators` of the whole body.
+
+    Raises:
+        ResourceError: if none of them fits, with what each would take.
+    """
+    K, comm = ops.K, ops.comm
+    there, beside = allowed_bytes(comm) * comm.size, beside_factor(K, 0, N_MATRICES)
+    if MAX_BLOCK_RATIO * factor_bytes(ops.n) + beside <= there:
+        return DIRECT_SOLVER, "direct"
+    found, disk = analysed(K), free_disk_bytes(comm)
+    direct, by_disk, by_iteration = (
+        beside + more for more in (found.in_core, found.out_of_core, multigrid_bytes(K))
+    )
+    limit = f"{_gib(there)} may be used"
+    on_disk = f"{_gib(by_disk)} with {_gib(found.on_disk)} on disk"
+    if direct <= there:
+        return DIRECT_SOLVER, f"direct: {_gib(direct)} foreseen, {limit}"
+    beyond = f"a factor in memory would take {_gib(direct)}, {limit}"
+    if by_disk <= there and found.on_disk <= disk:
+        return replace(DIRECT_SOLVER, out_of_core=True), f"out-of-core, {on_disk}: {beyond}"
+    if by_iteration <= there:
+        return Solver(iterative=True), f"iterative, {_gib(by_iteration)}: {beyond}; {on_disk}"
+    raise ResourceError(
+        f"reducing {ops.n} dofs is predicted to take {_gib(direct)} with the factor in memory, "
+        f"{on_disk} ({_gib(disk)} are free in {scratch_folder()}), {_gib(by_iteration)} without "
+        f"one; {limit} ({MAX_MEMORY_SHARE:.0%} of what is free).",
+        hint="Use a coarser mesh, or more machines with mpirun, which share the model.",
+    )
+
+
+def too_large(n: int, need: float, there: float) -> ResourceError:
+    """The error that says by how much a factor of n dofs does not fit."""
+    return ResourceError(
+        f"factoring {n} dofs is predicted to take {_gib(need)}; "
+        f"{_gib(there)} may be used ({MAX_MEMORY_SHARE:.0%} of what is free).",
+        hint='Use a coarser mesh, more machines, solver="out-of-core" (the factor on disk) or '
+        'solver="iterative" (no factor).',
+    )
+
+
+def _entries(A: PETSc.Mat) -> float:
+    """Number of entries on all ranks."""
+    return float(A.getInfo(PETSc.Mat.InfoType.GLOBAL_SUM)["nz_used"])
+
+
+def _gib(size: float) -> str:
+    return f"{size / 2**30:.2f} GiB"

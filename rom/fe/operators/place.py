@@ -1,0 +1,40 @@
+"""Where on the body a motion is: what an error about a singular matrix can say."""
+
+from typing import Any
+
+import numpy as np
+
+from rom.model import Array, Index
+
+X_Y_Z = ((1, 5, 1.0), (0, 5, -1.0), (1, 3, -1.0))  # row of a node, column of a rotation, and sign
+ROWS_RTOL = 1e-9  # of a node's rows in the rigid motions from unit translations
+
+
+def moves_most(ops: Any, X: Array, rows: Index | None = None) -> str:
+    """Words for the node that moves most in the columns X, empty where nodes are not known.
+
+    Args:
+        ops: `PETScOperators`, whose rigid motions tell where their nodes are.
+        X: (n_local, k) motions on the rows of this rank.
+        rows: (n_local,) which rows of ``ops`` these are; all if not given.
+    """
+    if ops.rigid is None:
+        return ""
+    rows = np.arange(X.shape[0]) if rows is None else rows
+    size = np.abs(np.where(np.isfinite(X), X, 0.0)).max(axis=1, initial=0.0)
+    at = int(np.argmax(size)) if size.size else 0
+    largest = float(size[at]) if size.size else -1.0
+    point = _point(ops.rigid, 3 * (int(rows[at]) // 3)) if largest > 0.0 else None
+    _, found = max(ops.comm.allgather((largest, point)), key=lambda pair: pair[0])
+    if found is None:
+        return ""
+    return f" It moves most at ({', '.join(f'{x:.4g}' for x in found)}) m."
+
+
+def _point(rigid: Array, first: int) -> Array | None:
+    """(3,) place of the node whose rows begin there, from u = omega x p in its rotations."""
+    rows = rigid[first : first + 3]
+    if rows.shape[0] < 3 or np.abs(rows[:, :3] - np.eye(3)).max() > ROWS_RTOL:
+        return None
+    point: Array = np.array([sign * rows[row, column] for row, column, sign in X_Y_Z])
+    return point + 0.0

@@ -1,0 +1,417 @@
+"""Loads, moving supports and earthquakes on stones: statics, closed forms of pulses, limits."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
+
+from rom.components.masonry import (
+    BaseMotion,
+    Masonry,
+    MovingLoad,
+    PointLoad,
+    Rock,
+    SupportMotion,
+    Table,
+    Wind,
+    arch,
+    facing,
+    load_factor,
+    minimum_thickness,
+    ramp,
+    read_record,
+    recorded,
+    rectangle,
+    simulate,
+    sine,
+    stands,
+    stone,
+    wall,
+)
+from rom.errors import ConfigError, FileFormatError
+
+G = 9.81
+SOFT = {"E": 1e9, "nu": 0.2, "rho": 2000.0}
+GROUND = np.array([[-10.0, -1.0], [10.0, -1.0], [10.0, 0.0], [-10.0, 0.0]])
+
+
+def box(width=1.0, height=1.0, at=(0.0, 0.0)):
+    return np.array([[0, 0], [width, 0], [width, height], [0, height]]) + np.asarray(at)
+
+
+def on_the_ground(*stones, friction=0.84, **options):
+    return Masonry((stone(GROUND, **SOFT), *stones), (0,), 10 * SOFT["E"], friction, **options)
+
+
+def alone(**options):
+    return Masonry((stone(box(2.0, 1.0), **SOFT),), (), 1e10, 0.0, (0.0, 0.0), **options)
+
+
+@pytest.mark.parametrize("at", [(0.3, 0.4), (0.3, 1.0), (1.0, 1.0)])
+def test_ground_feels_weight_and_a_point_load_where_they_are(at):
+    model, load = on_the_ground(stone(box(), **SOFT)), PointLoad(1, at, (0.0, -3e4))
+    still = simulate(model, t_end=1.0, dt=0.02, actions=[load], keep=0.0, save_every=50)
+    ((centre, force),) = still.joints().values()
+    weight = 2000 * G
+    assert_allclose(force, [0, -weight - 3e4], atol=1.0)
+    assert centre[0] == pytest.approx((0.5 * weight + 3e4 * at[0]) / (weight + 3e4), abs=1e-4)
+
+
+def test_a_push_at_a_corner_moves_and_turns():
+    """Momentum F t, angular momentum r x F t; a load that fades halves both."""
+    F, t = np.array([30.0, -20.0]), 0.5
+    for history, share in ((1.0, 1.0), (Table([0.0, t], [1.0, 0.0]), 0.5)):
+        load = PointLoad(0, (2.0, 1.0), tuple(F), history)
+        motion = simulate(alone(), t_end=t, dt=0.01, actions=[load])
+        M = motion.masonry.stones[0].M
+        assert_allclose(M[0, 0] * motion.v[-1, 0, :2], share * F * t, rtol=1e-9)
+        moment = 1.0 * F[1] - 0.5 * F[0]
+        assert M[2, 2] * motion.v[-1, 0, 2] == pytest.approx(share * moment * t, rel=1e-3)
+
+
+@pytest.mark.parametrize(("factor", "stays"), [(0.97, True), (1.03, False)])
+def test_wind_tips_a_block_at_its_closed_form(factor, stays):
+    """p h h / 2 = rho g b h b / 2; the wall is 0.5 m thick out of the plane."""
+    b, h = 0.5, 2.0
+    one = stone(box(b, h), **SOFT, thickness=0.5)
+    model = on_the_ground(one, thickness=0.5)
+    edges = facing(model, (1.0, 0.0))
+    assert edges == ((1, 3),)
+    wind = Wind(lambda t: factor * 2000 * G * b**2 / h * ramp(1.0)(t), edges)
+    motion = simulate(model, t_end=3.0, dt=5e-3, actions=[wind], keep=0.98, save_every=600)
+    assert bool(abs(motion.q[-1, 1, 2]) < 1e-3) is stays
+    assert stands(model, [wind], t=1.0) is stays
+
+
+def test_wind_turns_with_its_stone_and_a_weight_does_not():
+    """A block turned by 90 degrees: its left edge faces down, and wind on it lifts."""
+    q = alone().start()
+    q[0, 2] = -np.pi / 2
+    for action, axis in ((Wind(10.0, ((0, 3),)), 1), (PointLoad(0, (0.0, 0.5), (10.0, 0.0)), 0)):
+        v = simulate(alone(), t_end=0.01, dt=1e-3, actions=[action], q=q).v[-1, 0, :2]
+        assert v[axis] == pytest.approx((-1 if axis else 1) * 10.0 * 0.01 / 4000, rel=1e-3)
+        assert abs(v[1 - axis]) < 1e-3 * abs(v[axis])
+
+
+def test_wind_meets_only_what_faces_it():
+    model = on_the_ground(stone(box(), **SOFT), stone(box(at=(2.0, 0.0)), **SOFT),
+                          stone(box(at=(2.0, 1.0)), **SOFT))  # fmt: skip
+    assert facing(model, (1.0, 0.0)) == ((1, 3), (3, 3))
+    assert facing(model, (-2.0, 0.0)) == ((2, 1), (3, 1))
+
+
+def bridge():
+    stones = [stone(x, **SOFT) for x in (
+        box(0.2, 1.0, (-0.1, -1.0)), box(0.2, 1.0, (3.9, -1.0)), box(4.0, 0.5))]  # fmt: skip
+    return Masonry(tuple(stones), (0, 1), 10 * SOFT["E"], 0.5)
+
+
+def test_a_load_that_rolls_over_a_beam_is_shared_by_the_lever():
+    model, P, speed = bridge(), 1e4, 0.5
+    for t in (2.0, 5.0):
+        roll = MovingLoad((0.0, -P), speed, 0.0)
+        motion = simulate(model, t_end=t, dt=0.02, actions=[roll], keep=0.0, save_every=10)
+        joints, weight = motion.joints(), 4.0 * 0.5 * 2000 * G
+        x = speed * (t - 0.01)  # the middle of the last step
+        (left, up), (right, down) = joints[0, 2], joints[1, 2]
+        share = (right[0] - x) / (right[0] - left[0])
+        exact = weight * (right[0] - 2.0) / (right[0] - left[0]) + P * share
+        assert abs(up[1]) == pytest.approx(exact, rel=1e-3)
+        assert abs(up[1]) + abs(down[1]) == pytest.approx(weight + P, rel=1e-6)
+    gone = simulate(model, t_end=0.2, dt=0.02, keep=0.0,
+                    actions=[MovingLoad((0.0, -P), 100.0, -1000.0)])  # fmt: skip
+    assert abs(gone.joints()[0, 2][1][1]) == pytest.approx(weight / 2, rel=1e-6)
+
+
+def test_a_support_that_settles_turns_the_beam():
+    """Rigid geometry: the beam follows its two supports."""
+    settle = SupportMotion((1,), (0.0, -0.02), history=ramp(0.5))
+    motion = simulate(bridge(), t_end=1.0, dt=5e-3, actions=[settle], keep=0.9, save_every=200)
+    assert motion.q[-1, 1, 1] - motion.q[0, 1, 1] == pytest.approx(-0.02, rel=1e-12)
+    assert motion.q[-1, 2, 2] == pytest.approx(-0.02 / 3.9, rel=1e-3)  # between edges that touch
+    turned = simulate(
+        on_the_ground(stone(box(), **SOFT)), t_end=2.0, dt=5e-3, keep=0.9, save_every=400,
+        actions=[SupportMotion((0,), (0.0, 0.0), 0.1, ramp(1.5))])  # fmt: skip
+    assert_allclose(turned.q[-1, :, 2], 0.1, atol=1e-4)
+
+
+def test_moving_the_ground_or_the_frame_is_the_same():
+    """A sliding block: held ground moved by x(t), and inertia of x''(t), two ways to one slip."""
+    model = on_the_ground(stone(box(), **SOFT), friction=0.2)
+    a, T = 5.0, 0.8
+    shift = a * (T / (2 * np.pi)) ** 2
+
+    def x(t):
+        return 2 * np.pi * t / T - np.sin(2 * np.pi * t / T)
+
+    motion = dict(t_end=T, dt=1e-3)
+    moved = simulate(model, actions=[SupportMotion((0,), (shift, 0.0), history=x)], **motion)
+    frame = simulate(model, actions=[BaseMotion(sine(a, T))], **motion)
+    slip = moved.q[:, 1, 0] - (moved.q[:, 0, 0] - moved.q[0, 0, 0])
+    assert_allclose(slip - slip[0], frame.q[:, 1, 0] - frame.q[0, 1, 0], atol=2e-3 * 0.5)
+    assert np.abs(slip - slip[0]).max() > 0.05
+
+
+def test_slip_under_a_pulse_is_that_of_newmark():
+    """Newmark (1965): V^2 / (2 mu g) (1 - mu g / a), V = a t, for a rectangular pulse."""
+    mu, a, t = 0.3, 8.0, 0.2
+    model = on_the_ground(stone(box(), **SOFT), friction=mu)
+    settled = simulate(model, t_end=0.2, dt=0.01, keep=0.0).q[-1]
+    pulse = BaseMotion(rectangle(a, t))
+    motion = simulate(model, t_end=1.5, dt=5e-4, actions=[pulse], q=settled, save_every=3000)
+    V = a * t
+    exact = V**2 / (2 * mu * G) * (1 - mu * G / a)
+    assert motion.q[0, 1, 0] - motion.q[-1, 1, 0] == pytest.approx(exact, rel=0.01)
+
+
+SLENDER = (0.2, 2.0)  # width, height [m]
+ALPHA, P = np.arctan(0.1), np.sqrt(3 * G / (4 * np.hypot(0.1, 1.0)))
+
+
+def tips(acceleration, t_end=4.0):
+    """Whether a slender block falls over under an acceleration of the ground."""
+    rock = {"E": 1e10, "nu": 0.2, "rho": 2000.0}
+    model = Masonry((stone(GROUND, **rock), stone(box(*SLENDER, at=(-0.1, 0)), **rock)), (0,),
+                    20e10, 2.0)  # fmt: skip
+    settled = simulate(model, t_end=0.05, dt=1e-3, keep=0.0).q[-1]
+    motion = simulate(model, t_end=t_end, dt=1e-3, q=settled, save_every=100,
+                      actions=[BaseMotion(acceleration)])  # fmt: skip
+    return bool(np.abs(motion.q[:, 1, 2]).max() > 2 * ALPHA)
+
+
+@pytest.mark.parametrize("ratio", [1.5, 3.0])
+def test_a_block_tips_under_the_pulse_that_housner_says(ratio):
+    """Housner (1963), slender: cosh(p t) = 1 + 1 / (2 x (x - 1)), x = a / (g alpha)."""
+    needed = np.arccosh(1 + 1 / (2 * ratio * (ratio - 1))) / P
+    assert tips(rectangle(ratio * np.tan(ALPHA) * G, 1.03 * needed))
+    assert not tips(rectangle(ratio * np.tan(ALPHA) * G, 0.97 * needed))
+
+
+def left_after_a_sine(x, omega, cycles):
+    """Linear rocking from a sine pulse: theta' + p (theta - alpha) at its end; it tips if > 0.
+
+    theta = A sinh + B cosh - forced, until the pulse ends; no impact before (Zhang and Makris).
+    """
+    psi = np.arcsin(1 / x)
+    t, k = (2 * np.pi * cycles - psi) / omega, 1 / (1 + (omega / P) ** 2)
+    # theta'' - p^2 theta = p^2 alpha (x sin(omega t + psi) - 1) while it turns to one side
+    A = k * x * ALPHA * np.cos(psi) * omega / P
+    B = k * x * ALPHA * np.sin(psi) - ALPHA
+    forced = -k * x * ALPHA * np.sin(omega * t + psi) + ALPHA
+    rate = -k * x * ALPHA * omega * np.cos(omega * t + psi)
+    theta = A * np.sinh(P * t) + B * np.cosh(P * t) + forced
+    speed = P * (A * np.cosh(P * t) + B * np.sinh(P * t)) + rate
+    return speed + P * (theta - ALPHA)
+
+
+@pytest.mark.parametrize("frequency", [3.0, 5.0])
+def test_a_block_tips_under_half_a_sine_as_zhang_and_makris_say(frequency):
+    """Half a sine pulse, in closed form; frequency in units of p."""
+    omega = frequency * P
+    x = brentq(lambda x: left_after_a_sine(x, omega, 0.5), 1.01, 20.0)
+    for factor, falls in ((1.03, True), (0.97, False)):
+        pulse = sine(factor * x * np.tan(ALPHA) * G, 2 * np.pi / omega, cycles=0.5)
+        assert tips(pulse) is falls
+
+
+def test_a_block_follows_the_exact_rocking_motion_under_a_sine():
+    """Nonlinear equation of a rigid block, integrated by others, until the first impact."""
+    rock = {"E": 1e10, "nu": 0.2, "rho": 2000.0}
+    model = Masonry((stone(GROUND, **rock), stone(box(*SLENDER, at=(-0.1, 0)), **rock)), (0,),
+                    20e10, 2.0)  # fmt: skip
+    a, T = 0.2 * G, 0.5
+    settled = simulate(model, t_end=0.05, dt=1e-3, keep=0.0).q[-1]
+    motion = simulate(model, t_end=0.4, dt=2.5e-4, actions=[BaseMotion(sine(a, T))], q=settled)
+    start = T / (2 * np.pi) * np.arcsin(np.tan(ALPHA) * G / a)
+
+    def rate(t, y):
+        # turning to the left of the picture, about the left corner, is positive here
+        push = a / G * np.sin(2 * np.pi * t / T)
+        return y[1], P**2 * (push * np.cos(ALPHA - y[0]) - np.sin(ALPHA - y[0]))
+
+    exact = solve_ivp(rate, (start, 0.4), (0.0, 0.0), rtol=1e-9, atol=1e-12, dense_output=True)
+    late = motion.t > start + 0.05
+    theta = motion.q[late, 1, 2]
+    assert_allclose(theta, exact.sol(motion.t[late])[0], atol=0.02 * np.abs(theta).max())
+
+
+def four_hinges(model, x, n):
+    """Smallest factor of a weight on joint x among mechanisms of four hinges, by virtual work."""
+    best = np.inf
+    outer, inner = (
+        [model.stones[k].outline[c] for k in range(1, n + 1)] for c in (slice(0, 2), slice(2, 4))
+    )
+    face = {True: [o[1] for o in outer] + [outer[-1][0]],
+            False: [i[0] for i in inner] + [inner[-1][1]]}  # fmt: skip
+    weight = np.array([s.M[0, 0] * G for s in model.stones[1:-1]])
+    centre = np.array([s.centre for s in model.stones[1:-1]])
+    first_out = (False, True)
+    for outside in first_out:
+        sides = [outside, not outside, outside, not outside]
+        for a in range(n + 1):
+            for b in range(a + 1, n + 1):
+                for c in range(b + 1, n + 1):
+                    for d in range(c + 1, n + 1):
+                        h = [face[s][k] for s, k in zip(sides, (a, b, c, d), strict=True)]
+                        factor = _factor(h, (a, b, c, d), sides, weight, centre, x)
+                        best = min(best, factor)
+    return best
+
+
+def _factor(h, joints, sides, weight, centre, load):
+    """Turning rates w1, w2, w3 of the three parts: velocities fit at the hinges."""
+    r = [h[1] - h[0], h[2] - h[1], h[3] - h[2]]
+    N = np.linalg.svd(np.array(r).T)[2][-1]  # w1 r1 + w2 r2 + w3 r3 = 0
+    turn = np.r_[0.0, N, 0.0]
+    jump = np.diff(turn)
+    # a joint with its hinge outside opens inside: its right part turns counterclockwise
+    wanted = np.where(sides, 1.0, -1.0)
+    signs = jump * wanted
+    if (signs < -1e-12).all():
+        turn, signs = -turn, -signs
+    if not (signs > 1e-12).all():
+        return np.inf
+    lower = np.zeros(2)
+    work, push = 0.0, 0.0
+    for part in range(3):
+        w, pivot = turn[part + 1], h[part]
+        for k in range(joints[part], joints[part + 1]):
+            work += -weight[k] * (lower[1] + w * (centre[k] - pivot)[0])
+            if k == load[0]:
+                push = -(lower[1] + w * (load[1] - pivot)[0])
+        lower = lower + w * np.array([-r[part][1], r[part][0]])
+    return -work / push if push > 1e-12 else np.inf
+
+
+def test_load_on_an_arch_is_carried_until_four_hinges_open():
+    """Lower bound by linear programming, upper bound by trying all mechanisms: they meet."""
+    n = 16
+    model = arch(n, 5.0, 0.8)
+    for k in (5, 8):
+        at = model.stones[k].outline[:2].mean(axis=0)
+        found = load_factor(model, [PointLoad(k, tuple(at), (0.0, -1.0))])
+        assert found == pytest.approx(four_hinges(model, (k - 1, at), n), rel=1e-6)
+
+
+@pytest.mark.parametrize(("factor", "stays"), [(0.96, True), (1.04, False)])
+def test_stones_move_when_the_load_factor_is_passed(factor, stays):
+    model = arch(16, 5.0, 0.8)
+    at = tuple(model.stones[5].outline[:2].mean(axis=0))
+    limit = load_factor(model, [PointLoad(5, at, (0.0, -1.0))])
+    load = PointLoad(5, at, (0.0, -factor * limit), ramp(0.5))
+    motion = simulate(model, t_end=3.0, dt=1e-3, actions=[load], keep=0.97, save_every=500)
+    speed = np.abs(motion.v[:, 1:-1]).max(axis=(1, 2))
+    assert speed[-1] < 1e-6 if stays else speed[-1] > max(1e-3, speed[3])
+
+
+def test_an_arch_in_an_earthquake_opens_at_the_acceleration_of_oppenheim():
+    """Oppenheim (1992): seven voussoirs over 157.5 degrees, t / R = 0.15, need 0.37 g."""
+    model = arch(7, 10.0, 1.5, half_angle=np.radians(78.75))
+    limit = load_factor(model, [BaseMotion(G)])
+    assert limit == pytest.approx(0.37, abs=5e-4)
+    for factor, stays in ((0.97, True), (1.04, False)):
+        shake = BaseMotion(lambda t, a=factor * limit * G: a * ramp(0.5)(t))
+        motion = simulate(model, t_end=2.5, dt=1e-3, actions=[shake], keep=0.97, save_every=500)
+        speed = np.abs(motion.v[:, 1:-1]).max(axis=(1, 2))
+        assert speed[-1] < 1e-6 if stays else speed[-1] > max(1e-3, speed[3])
+
+
+@pytest.mark.parametrize("degrees", [100, 110, 120])
+def test_horseshoe_arches_obey_closed_form_and_linear_programming(degrees):
+    limit = minimum_thickness(half_angle=np.radians(degrees)).ratio
+    for factor, answer in ((1.001, True), (0.998, False)):
+        model = arch(150, 1.0, factor * limit, half_angle=np.radians(degrees))
+        assert stands(model) is answer, factor
+    thick, thin = (
+        simulate(arch(22, 5.0, 5 * f * limit, half_angle=np.radians(degrees)), t_end=2.0, dt=1e-3,
+                 keep=0.97, save_every=1000) for f in (1.1, 0.9))  # fmt: skip
+    assert np.abs(thick.v[-1]).max() < 1e-5 < 1e-3 < np.abs(thin.v[-1]).max()
+
+
+def test_records_come_from_files(tmp_path):
+    path = tmp_path / "quake.txt"
+    path.write_text("# t [s], a [g]\n0.0, 0.0\n0.1, 0.1\n0.2, -0.1\n0.3, 0.0\n")
+    assert_allclose(read_record(path, scale=G)(np.array([0.05, 0.2])), [0.05 * G, -0.1 * G])
+    path.write_text("0 0 0\n")
+    with pytest.raises(FileFormatError, match="has 3 columns"):
+        read_record(path)
+    path.write_text("zero\n")
+    with pytest.raises(FileFormatError, match="is no record"):
+        read_record(path)
+
+
+STONE = (1, (0.5, 0.5), (0.0, -1.0))
+
+
+@pytest.mark.parametrize(
+    ("actions", "words"),
+    [
+        ([PointLoad(1, (1.4, 0.5), (0.0, -1.0), name="crane")], "crane at .* lies 0.4 m outside"),
+        ([PointLoad(0, (0.0, 0.0), (0.0, -1.0))], "acts on stone 0, which is held"),
+        ([PointLoad(7, (0.0, 0.0), (0.0, -1.0))], "stone 7 of the stones 0 to 1"),
+        ([PointLoad(1, (0.5, np.nan), (0.0, -1.0))], "not two numbers"),
+        ([PointLoad(*STONE, history=Table([0.0, 0.05], [0.0, 1.0]))], "from 0 s to 0.05 s; asked"),
+        ([PointLoad(*STONE, history=lambda t: np.full(t.shape, np.inf))], "is inf at t ="),
+        ([PointLoad(*STONE, history=lambda t: 1.0)], "gives the shape"),
+        ([MovingLoad((0.0, -1.0), 1.0, 11.0)], "never comes upon the stones"),
+        ([Wind(1.0, ((1, 4),))], "edge 4 of stone 1, whose edges are 0 to 3"),
+        ([Wind(1.0, ())], "blows on no edge"),
+        ([SupportMotion((1,), (0.1, 0.0))], "moves stone 1, which is not held"),
+        ([SupportMotion((0,), (0.1, 0.0), history=1.0)], "begins away from where"),
+        ([SupportMotion((0,), (0.1, 0.0), history=rectangle(1.0, 1.0))], "begins away"),
+        (
+            [SupportMotion((0,), (50.0, 0.0), history=lambda t: t)],
+            "support 0 moves by .* in the step",
+        ),
+        ([SupportMotion((0,), (0.1, 0.0))] * 2, r"supports \[0\] are moved by two actions"),
+    ],
+)
+def test_actions_that_cannot_be_are_named(actions, words):
+    model = on_the_ground(stone(box(), **SOFT))
+    with pytest.raises(ConfigError, match=words):
+        simulate(model, t_end=0.1, dt=0.01, actions=actions)
+
+
+def test_supports_that_bear_nothing_and_frames_without_ground_are_named():
+    far = Masonry((stone(GROUND, **SOFT), stone(box(), **SOFT), stone(box(at=(0, 5.0)), **SOFT)),
+                  (0, 2), 1e10, 0.5)  # fmt: skip
+    with pytest.raises(ConfigError, match="moves stone 2, which supports nothing"):
+        simulate(far, t_end=0.1, dt=0.01, actions=[SupportMotion((2,), (0.1, 0.0))])
+    with pytest.raises(ConfigError, match="no stone is held"):
+        simulate(alone(), t_end=0.1, dt=0.01, actions=[BaseMotion(1.0)])
+    with pytest.raises(ConfigError, match="does not stand under its own weight"):
+        load_factor(arch(10, 5.0, 0.4), [BaseMotion(1.0)])
+    with pytest.raises(ConfigError, match="blows in no direction"):
+        facing(far, (0.0, 0.0))
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: Table([0.0, 1.0], [0.0, np.nan]), "value 1 of the history is nan.*gaps"),
+        (lambda: Table([0.0, 0.0], [0.0, 1.0]), "do not grow from 0.0 s to 0.0 s"),
+        (lambda: Table([0.0], [1.0]), "two or more of each"),
+        (lambda: recorded([0.0, 0.1, 0.2, 0.5, 0.6], np.zeros(5)), "gap from 0.2 s to 0.5 s"),
+        (lambda: sine(1.0, 0.0), "no sine has"),
+        (lambda: rectangle(1.0, -1.0), "no pulse has"),
+        (lambda: ramp(0.0), "no ramp takes"),
+        (lambda: minimum_thickness(half_angle=np.radians(140)), "not so far round"),
+        (lambda: arch(10, 5.0, 0.5, half_angle=3.2), "no arch has"),
+    ],
+)
+def test_histories_with_gaps_are_named(make, words):
+    with pytest.raises(ConfigError, match=words):
+        make()
+
+
+def test_a_wall_in_the_wind_falls_stone_by_stone():
+    """Linear programming of the whole wall agrees with the moving stones within a few percent."""
+    model = wall(1.0, 6, brick=(0.5, 0.25), rock=Rock(friction=0.6))
+    edges = facing(model, (1.0, 0.0))
+    assert len(edges) == 6
+    limit = load_factor(model, [Wind(1.0, edges)])
+    for factor, stays in ((0.95, True), (1.06, False)):
+        wind = Wind(lambda t, p=factor * limit: p * ramp(0.5)(t), edges)
+        motion = simulate(model, t_end=2.0, dt=2e-3, actions=[wind], keep=0.97, save_every=1000)
+        assert bool(np.abs(motion.v[-1]).max() < 1e-4) is stays

@@ -1,0 +1,292 @@
+"""Sand: what it gives back, the end of an impact, contact and spread; slabs that yield."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.integrate import quad, solve_ivp
+from scipy.linalg import eigh
+
+from rom.components.rockfall import Cushion, Gallery, Layer, Shear, Slab, sensitivity, strike
+from rom.errors import ConfigError, SolverError
+
+HERTZ_SLOPE = np.sqrt(2) / np.pi / (1 - 0.25**2)
+
+
+def baseline(**change):
+    """The illustration of `test_rockfall`, with the cushion of the default."""
+    g = Gallery(4000.0, 15.0, 2500.0, Cushion.of_sand(4000.0, 1e6), Shear(2e9),
+                Slab.of_mass(6000.0, 1.2e8))  # fmt: skip
+    return replace(g, **change)
+
+
+# --- sand does not bounce ---
+
+
+@pytest.mark.parametrize("height", [2.0, 15.0, 40.0])
+@pytest.mark.parametrize(
+    "cushion", [Cushion.of_sand(4000.0, 1e6), Layer.of_sand(4000.0, 1e6, 3.0)],
+)  # fmt: skip
+def test_sand_gives_back_less_than_a_twentieth_of_the_energy(cushion, height):
+    """A fall of 15 m on an elastic cushion returns by more than 12 m."""
+    got = strike(baseline(cushion=cushion, height=height))
+    assert 0.0 < got.rebound < 0.05
+    taken = got.energy[-1, 1] / got.energy[0, 0]
+    assert taken > 0.8
+    elastic = strike(baseline(cushion=replace(cushion, recovery=1.0), height=height))
+    assert elastic.rebound > 0.6
+
+
+# --- when an impact is over ---
+
+
+@pytest.mark.parametrize("slab", [(6e4, 5e6), (2e5, 2e6), (6e3, 1.2e8)])
+@pytest.mark.parametrize("damping", [0.0, 0.05])
+def test_an_impact_ends_after_its_peaks(slab, damping):
+    """A slab as soft as the first two is at its peak long after 0.15 s."""
+    g = baseline(slab=Slab.of_mass(*slab, damping=damping), weight=False)
+    got, long = strike(g), strike(g, t_end=30.0)
+    assert_allclose(got.peaks, long.peaks, rtol=2e-3)
+    assert got.deflection == pytest.approx(long.deflection, rel=2e-3)
+    assert got.t[-1] < 6 * g.longest_period
+    assert 1000 <= got.t.size <= 2000
+    assert_allclose(np.diff(got.t), got.t[1], rtol=1e-9)
+
+
+def test_the_longest_period_is_that_of_all_masses_on_the_slab():
+    """Exact for one mode; from above for several, of which a boulder that sticks moves all."""
+    period = 2 * np.pi * np.sqrt((4000 + 2500 + 6000) / 1.2e8)
+    assert baseline().longest_period == pytest.approx(period)
+    M = np.eye(3) + 6500 * np.outer(PLATE.phi, PLATE.phi)
+    lowest = eigh(np.diag(PLATE.omega**2), M, eigvals_only=True)[0]
+    bound = baseline(slab=PLATE).longest_period
+    assert 1.0 < bound * np.sqrt(lowest) / (2 * np.pi) < 1.2
+
+
+def test_a_slab_that_flows_is_followed_until_it_rests():
+    """Its force stays at the capacity for longer than two periods, while it sinks."""
+    slab = Slab.of_mass(1e5, 1e9, damping=0.0, capacity=2e4)
+    g = baseline(slab=slab, weight=False)
+    got, long = strike(g), strike(g, t_end=20.0)
+    assert got.deflection == pytest.approx(long.deflection, rel=2e-3)
+    assert got.deflection > 1000 * 2e4 / 1e9
+
+
+def test_a_rigid_gallery_is_seen_until_the_cushion_lets_go():
+    rigid = Slab.of_mass(1e3, 1e11, damping=0.0)
+    got = strike(baseline(slab=rigid, shear=Shear(1e11, damping=0.0)))
+    assert got.forces[-1, 0] < 0.05 * got.peaks[0] + 2 * 9.81 * 4000
+
+
+def test_the_step_follows_the_cushion_on_its_way_back():
+    """Where the gallery is heavy and soft, the highest frequency is that of the boulder alone."""
+    heavy = {"plug": 1e9, "slab": Slab.of_mass(1e9, 1e6), "shear": Shear(1e6)}
+    g = baseline(**heavy)
+    c, d = g.cushion, g.cushion.penetration(g.energy)
+    slope = (c.force(d) - c.force(d * (1 - 1e-6), d)) / (1e-6 * d)
+    assert g.highest_frequency() == pytest.approx(np.sqrt(slope / 4000), rel=1e-4)
+
+
+def test_a_soft_slab_was_not_at_its_peak():
+    """One mass under a short blow: z = J / sqrt(k M), a quarter of a period later."""
+    g = baseline(slab=Slab.of_mass(2e5, 2e6, damping=0.0), weight=False)
+    got = strike(g)
+    J = 4000.0 * g.speed * (1 + np.sqrt(got.rebound))  # the plug is carried along
+    expected = J / np.sqrt(2e6 * (2e5 + 2500.0))
+    assert got.deflection == pytest.approx(expected, rel=0.05)
+    assert strike(g, t_end=0.15).deflection < 0.6 * got.deflection
+
+
+def test_a_boulder_that_never_stops_is_named(monkeypatch):
+    monkeypatch.setattr("rom.components.rockfall.impact.MAX_STEPS", 2000)
+    with pytest.raises(SolverError, match="still grow after") as error:
+        strike(baseline(cushion=Cushion(1e-9)), dt=1e-4)
+    assert error.value.solution.t[-1] == pytest.approx(0.2, rel=0.01)
+
+
+# --- geometry ---
+
+GOOD = Layer(3e6, 0.6, 0.9)
+
+
+def test_a_thick_layer_is_hertz():
+    """By the angle whose cone has the stiffness of the half space, 25.6 degrees for nu = 1/4."""
+    assert np.degrees(np.arctan(HERTZ_SLOPE)) == pytest.approx(25.65, abs=0.01)
+    layer = Layer.of_sand(4000.0, 1e6, 1e5, angle=np.arctan(HERTZ_SLOPE))
+    hertz = Cushion.of_sand(4000.0, 1e6)
+    for d in (1e-6, 1e-3):  # the contact of Hertz is a chord that is small
+        assert layer.force(d) == pytest.approx(hertz.force(d), rel=2e-3)
+
+
+@pytest.mark.parametrize("thickness", [0.9, 2.5])
+@pytest.mark.parametrize("depth", [0.02, 0.5, 0.85])
+def test_the_force_is_the_integral_of_the_stiffness_of_the_cone(thickness, depth):
+    """Slices of the cone in series: 1 / k is the integral of dz / E pi (a + s z)^2."""
+    layer = Layer(3e6, 0.6, thickness, angle=0.4)
+
+    def stiffness(d):
+        a = layer.contact(d)
+        slices = quad(lambda z: 1 / (3e6 * np.pi * (a + np.tan(0.4) * z) ** 2), 0, thickness - d)
+        return 1 / slices[0]
+
+    expected = quad(stiffness, 0, depth, points=[0.6] if depth > 0.6 else None, limit=200)[0]
+    assert layer.force(depth) == pytest.approx(expected, rel=1e-6)
+
+
+def test_a_shallow_contact_on_a_thick_layer_loses_no_digits():
+    """At d / e = 9e-4, by the series of the logarithm."""
+    layer = Layer(3e6, 60.0, 100.0, angle=0.01)
+    way = quad(lambda x: layer.contact(x) * layer.spread(x) / (100 - x), 0, 0.09,
+               epsrel=1e-12)[0]  # fmt: skip
+    assert layer.force(0.09) == pytest.approx(3e6 * np.pi * way, rel=1e-6)
+
+
+def test_contact_grows_with_depth_and_the_load_spreads():
+    layer = Layer(3e6, 0.6, 0.9)
+    assert layer.contact(0.0) == 0.0
+    assert layer.contact(0.6) == layer.contact(0.8) == 0.6  # the equator
+    assert layer.contact(0.3) == pytest.approx(np.sqrt(0.6**2 - 0.3**2))  # a chord
+    assert layer.spread(0.3) == pytest.approx(layer.contact(0.3) + 0.3)  # 2:1 over 0.6 m
+    assert layer.spread(0.0) == pytest.approx(0.45)
+
+
+def test_a_thinner_layer_is_stiffer_and_strikes_harder():
+    peaks = [strike(baseline(cushion=Layer.of_sand(4000.0, 1e6, e))).peaks[0]
+             for e in (5.0, 2.0, 1.2)]  # fmt: skip
+    assert peaks[0] < peaks[1] < peaks[2]
+    assert peaks[0] == pytest.approx(strike(baseline()).peaks[0], rel=0.1)
+
+
+def test_the_plug_has_the_mass_of_its_cones():
+    """By slices, and of a cylinder where nothing spreads."""
+    layer = Layer(3e6, 0.6, 0.9, angle=0.4)
+    r = layer.spread(0.3)
+    sand = quad(lambda z: np.pi * (layer.contact(0.3) + np.tan(0.4) * z) ** 2, 0, 0.6)[0]
+    concrete = quad(lambda z: np.pi * (r + z) ** 2, 0, 0.25)[0]
+    assert layer.plug(0.3, 0.25) == pytest.approx(1800 * sand + 2500 * concrete)
+    straight = Layer(3e6, 0.6, 0.9, angle=1e-9)
+    assert straight.plug(0.6, 1e-9) == pytest.approx(1800 * np.pi * 0.36 * 0.3, rel=1e-6)
+
+
+def test_the_ring_of_concrete_shears_as_lame_says():
+    """Antiplane shear of a ring: w' = F / 2 pi r h G."""
+    layer = Layer(3e6, 0.6, 0.9)
+    shear = layer.shear(0.3, 0.25, modulus=12e9, strength=1e6, reinforced=1e7)
+    r = layer.spread(0.3)
+    way = quad(lambda x: 1 / (2 * np.pi * x * 0.25 * 12e9), r, r + 0.25)[0]
+    assert shear.stiffness == pytest.approx(1 / way)
+    assert shear.capacity == pytest.approx(1e6 * 2 * np.pi * (r + 0.125) * 0.25)
+    assert shear.reinforced == 1e7
+
+
+def test_the_modulus_of_a_layer_is_varied_as_its_stiffness():
+    change = sensitivity(
+        baseline(cushion=Layer.of_sand(4000.0, 1e6, 5.0)), lambda g: g.cushion.force(0.1), (2.0,)
+    )
+    assert change["stiffness of the cushion"] == pytest.approx([1.0])
+    assert change["mass of the plug"] == pytest.approx([0.0])
+    assert "strength of the cushion" not in change
+    weak = baseline(cushion=replace(GOOD, strength=2e5))
+    change = sensitivity(weak, lambda g: g.cushion.force(0.5), (1.25,))
+    assert change["strength of the cushion"] == pytest.approx([0.25])
+
+
+# --- slabs of several modes that yield ---
+
+PLATE = Slab(np.array([0.012, 0.009, -0.006]), np.array([150.0, 400.0, 900.0]), damping=0.0)
+
+
+def test_several_modes_yield_as_a_slip_under_the_plug():
+    """Against the same slip, viscous below a millisecond, by an implicit integrator."""
+    cap = 6e5
+    slab = replace(PLATE, capacity=cap)
+    cushion = Cushion(4e6, exponent=1.0, recovery=1.0)
+    g = baseline(slab=slab, cushion=cushion, shear=Shear(3e7, damping=0.0), weight=False)
+    got = strike(g, t_end=0.1)
+    phi, omega, k3 = slab.phi, slab.omega, slab.stiffness
+    shape = k3 * phi / omega**2
+
+    def rates(_, y):
+        z1, v1, z2, v2, slip, q, w = y[0], y[1], y[2], y[3], y[4], y[5:8], y[8:]
+        F1, F2 = 4e6 * max(z1 - z2, 0.0), 3e7 * (z2 - phi @ q)
+        S = k3 * (phi @ q - slip)
+        flow = np.sign(S) * max(abs(S) - cap, 0.0) / (k3 * 2e-6)
+        pull = phi * F2 - omega**2 * (q - slip * shape)
+        return np.concatenate([[v1, -F1 / 4000, v2, (F1 - F2) / 2500, flow], w, pull])
+
+    y = solve_ivp(rates, (0, 0.1), [0, g.speed] + 9 * [0], method="LSODA", rtol=1e-8, atol=1e-9).y
+    assert got.plastic == pytest.approx(y[4, -1], rel=5e-3)
+    assert got.plastic > 0.02
+    assert got.deflection == pytest.approx((phi @ y[5:8]).max(), rel=5e-3)
+    assert got.energy[-1, 5] == pytest.approx(cap * got.plastic, rel=1e-9)
+    assert np.abs(got.balance).max() < 1e-3 * got.energy[0, 0]
+    assert_allclose(got.peaks[2], cap, rtol=1e-9)
+
+
+def test_one_mode_yields_as_it_did():
+    """The shape of the static deflection of one mode is that mode."""
+    one = Slab.of_mass(6000.0, 1.2e8, damping=0.0, capacity=1.2e6)
+    twin = Slab(np.full(2, 6000.0**-0.5 / np.sqrt(2)), np.full(2, np.sqrt(1.2e8 / 6000)),
+                damping=0.0, capacity=1.2e6)  # fmt: skip
+    a, b = (strike(baseline(slab=s), t_end=0.2) for s in (one, twin))
+    assert a.plastic == pytest.approx(b.plastic, rel=1e-9) and a.plastic > 0.005
+
+
+def test_what_stays_is_the_shape_of_the_static_deflection():
+    """Long after a blow a damped slab lies where its plastic shape is, a share per mode."""
+    slab = replace(PLATE, damping=0.3, capacity=6e5)
+    got = strike(baseline(slab=slab, weight=False), t_end=2.0)
+    shape = slab.stiffness * slab.phi / slab.omega**2
+    late = got.modal[-1]
+    assert_allclose(late, got.plastic * shape, atol=2e-3 * np.abs(late).max())
+
+
+# --- messages ---
+
+
+@pytest.mark.parametrize(
+    ("make", "error", "words"),
+    [
+        (lambda: Layer(-1.0, 0.6, 0.9), ConfigError, "needed are modulus"),
+        (lambda: Layer(3e6, 0.6, float("nan")), ConfigError, "needed are modulus"),
+        (lambda: Layer(3e6, 0.6, 0.9, angle=30.0), ConfigError, "in radians"),
+        (lambda: Layer(3e6, 0.6, 0.9, recovery=0.0), ConfigError, "0 < recovery <= 1"),
+        (lambda: Layer.of_sand(-1.0, 1e6, 1.0), ConfigError, "boulder = -1.0 kg"),
+        (lambda: GOOD.contact(0.9), ConfigError, "0.9 m thick"),
+        (lambda: GOOD.spread(-0.1), ConfigError, "d = -0.1 m"),
+        (lambda: GOOD.plug(0.3, -1.0), ConfigError, "slab = -1.0 m"),
+        (lambda: GOOD.shear(0.3, 0.25, modulus=0.0, strength=1.0), ConfigError, "modulus = 0.0 Pa"),
+        (lambda: strike(baseline(cushion=GOOD, height=300.0)), ConfigError, "pressed through"),
+        (lambda: strike(baseline(cushion=GOOD, height=300.0), dt=1e-5), SolverError,
+         "through the cushion of 0.9 m"),
+    ],
+)  # fmt: skip
+def test_messages_name_what_is_wrong(make, error, words):
+    with pytest.raises(error, match=words):
+        make()
+
+
+def test_a_contact_that_fails_bears_its_strength_only():
+    """Force over the disc of the chord, constant from the equator on, elastic before."""
+    soft = replace(GOOD, strength=2e5)
+    assert soft.force(0.01) == GOOD.force(0.01)
+    assert soft.force(0.3) == pytest.approx(2e5 * np.pi * (0.6**2 - 0.3**2))
+    assert soft.force(0.7) == soft.force(0.8) == pytest.approx(2e5 * np.pi * 0.36)
+
+
+@pytest.mark.parametrize("recovery", [1.0, 0.3, 0.03])
+@pytest.mark.parametrize(
+    ("cushion", "deepest"),
+    [(Cushion(2e6), 0.4), (Cushion(2e6, limit=0.5, hardening=1.0), 0.45), (GOOD, 0.5),
+     (Cushion(2e6, limit=0.5, hardening=1.0), 0.49), (replace(GOOD, strength=2e5), 0.8)],
+)  # fmt: skip
+def test_recovery_is_the_share_of_the_energy(cushion, deepest, recovery):
+    """Of compacted sand too: it gave back more than it took, or a ninth instead of 3 %."""
+    c = replace(cushion, recovery=recovery)
+    taken = quad(c.force, 0, deepest, limit=400)[0]
+    returned = quad(c.force, 0, deepest, args=(deepest,), limit=400, points=[
+        deepest - 3 * recovery * taken / c.force(deepest)])[0]  # fmt: skip
+    if c.exponent * recovery * taken < 0.7 * deepest * c.force(deepest):  # there is way enough
+        assert returned / taken == pytest.approx(recovery, rel=0.04)
+    assert returned < 1.02 * recovery * taken

@@ -1,0 +1,290 @@
+"""Momentum balance of a rotor: against the balance itself, another solution, and publications."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from rom import rotation
+from rom.components.wind.blading import BETZ_LIMIT, CHORD, blading, rotor_load
+from rom.components.wind.inflow import TOWER_TUBE, slope_of_wind, wind_at
+from rom.components.wind.profiles import profile, profiles
+from rom.components.wind.whole_turbine import turbine
+from rom.components.wind.wind_turbine import RATED_SPEED
+from rom.errors import ConfigError
+
+WIND_AT, SLOPE_OF_WIND = (getattr(f, "py_func", f) for f in (wind_at, slope_of_wind))
+DESIGN_RATIO = 7.55  # speed of the tip over that of the wind at the largest power, report p. 19
+
+
+def straight(**options):
+    return blading(tilt=0.0, cone=0.0, **options)
+
+
+def tip_ratio(ratio, wind=8.0):
+    return ratio * wind / 63.0
+
+
+def loss(r, phi, blades=3, R=63.0, hub=1.5):
+    """Prandtl's factor as in Hansen, equation 6.34, and its likeness at the hub."""
+    s = np.abs(np.sin(phi))
+    tip = np.exp(-blades / 2 * (R - r) / (r * s))
+    root = np.exp(-blades / 2 * (r - hub) / (hub * s))
+    return (2 / np.pi) ** 2 * np.arccos(tip) * np.arccos(root)
+
+
+def balances(blades, load):
+    """Thrust and torque of each strip over those that the air loses, by the momentum of rings.
+
+    Beyond an induction of 0.4 thrust is that of Buhl: C_T = 8/9 + (4 F - 40/9) a +
+    (50/9 - 4 F) a^2.
+    """
+    normal, driving, through, across, _, a = load.strip[0].T
+    r, V = blades.radius, load.wind
+    phi = np.arctan2(through, across)
+    F = loss(r, phi)
+    C_T = 3 * normal / (0.5 * 1.225 * V**2 * 2 * np.pi * r)
+    ideal = np.where(a <= 0.4, 4 * a * F * (1 - a),
+                     8 / 9 + (4 * F - 40 / 9) * a + (50 / 9 - 4 * F) * a**2)  # fmt: skip
+    swirl = across - load.speed * r  # tangential velocity that the rotor gives to the air there
+    gained = 4 * np.pi * r * 1.225 * through * swirl * F
+    return C_T, ideal, 3 * driving, gained
+
+
+@pytest.mark.parametrize("ratio", [2.0, 4.0, 7.0, DESIGN_RATIO, 9.0, 12.0, 16.0])
+def test_loads_of_strips_are_the_momentum_that_rings_of_air_lose(ratio):
+    blades = straight()
+    load = rotor_load(blades, 8.0, tip_ratio(ratio), n_azimuths=1)
+    C_T, ideal, driving, gained = balances(blades, load)
+    assert_allclose(C_T, ideal, atol=1e-8)
+    assert_allclose(driving, gained, atol=1e-6 * np.abs(driving).max())
+
+
+def test_high_loading_follows_the_parabola_somewhere():
+    """The outer strips at a high tip-speed ratio are beyond the balance of momentum."""
+    a = rotor_load(straight(), 8.0, tip_ratio(12.0), n_azimuths=1).strip[0, :, 5]
+    assert (a > 0.4).sum() >= 5
+    assert a.max() < 1.0
+
+
+def test_inductions_are_those_of_the_usual_iteration():
+    """Hansen's algorithm with relaxation: another way to the same point, where it converges."""
+    blades, V, speed = straight(), 8.0, tip_ratio(DESIGN_RATIO)
+    found = rotor_load(blades, V, speed, n_azimuths=1).strip[0]
+    for j in range(4, 17):
+        r, one = blades.radius[j], blades.profile[j]
+        a, b = 0.2, 0.0
+        for _ in range(3000):
+            phi = np.arctan2((1 - a) * V, (1 + b) * speed * r)
+            lift, drag = (np.interp(phi - blades.twist[j], one.angle, x)
+                          for x in (one.lift, one.drag))  # fmt: skip
+            s, c, F = np.sin(phi), np.cos(phi), loss(r, phi)
+            solid = 3 * CHORD[j] / (2 * np.pi * r)
+            C_T = solid * (1 - a) ** 2 * (lift * c + drag * s) / s**2
+            new = 0.5 * (1 - np.sqrt(max(1 - C_T / F, 0.0)))
+            if new > 0.4:
+                root = C_T * (50 - 36 * F) + 12 * F * (3 * F - 4)
+                new = (18 * F - 20 - 3 * np.sqrt(root)) / (36 * F - 50)
+            a += 0.1 * (new - a)
+            b += 0.1 * (1 / (4 * F * s * c / (solid * (lift * s - drag * c)) - 1) - b)
+        assert_allclose(found[j, 5], a, rtol=1e-6)
+        assert_allclose(found[j, 3], (1 + b) * speed * r, rtol=1e-8)
+
+
+def test_power_is_below_betz_everywhere_and_near_the_published_peak():
+    """Report: 0.482 at a tip-speed ratio of 7.55 without pitch; below Betz at any of both."""
+    blades = blading()
+    ratios, pitches = np.arange(1.0, 18.0, 0.5), np.radians(np.arange(-10.0, 30.0, 2.5))
+    C_P = np.array([[rotor_load(blades, 8.0, tip_ratio(x), p, n_azimuths=6).power_coefficient
+                     for p in pitches] for x in ratios])  # fmt: skip
+    assert C_P.max() < BETZ_LIMIT
+    best = rotor_load(blades, 8.0, tip_ratio(DESIGN_RATIO))
+    assert_allclose(best.power_coefficient, 0.482, rtol=0.01)
+    around = [rotor_load(blades, 8.0, tip_ratio(x), p).power_coefficient
+              for x in (6.5, 7.55, 8.6) for p in np.radians((-2.0, 0.0, 2.0))]  # fmt: skip
+    assert int(np.argmax(around)) == 4
+
+
+def test_thrust_at_the_design_point_is_that_of_openfast():
+    """8 m/s at 9.1311 turns a minute, rows of a published run: 0.4907 and 0.7928."""
+    load = rotor_load(blading(), 7.924, 9.1311 * np.pi / 30)
+    assert_allclose([load.power_coefficient, load.thrust_coefficient], [0.4907, 0.7928], rtol=0.015)
+
+
+def test_no_state_of_a_rotor_lets_the_search_fail():
+    """Any wind, speed and pitch, standing, driving and driven, stalled: finite, and balanced."""
+    rng, blades = np.random.default_rng(3), straight()
+    balanced = 0
+    for _ in range(400):
+        V, speed = rng.uniform(0.1, 60.0), rng.choice([0.0, 1e-9, 1.0]) * rng.uniform(0.0, 4.0)
+        load = rotor_load(blades, V, speed, rng.uniform(-np.pi, np.pi), n_azimuths=1)
+        assert np.isfinite(load.strip).all()
+        C_T, ideal, _, _ = balances(blades, load)
+        a = load.strip[0, :, 5]
+        usual = (a > -1.0) & (a < 1.0) & (load.strip[0, :, 3] > 0.0) & (speed > 0.1)
+        assert_allclose(
+            C_T[usual], ideal[usual], atol=1e-6 * max(1.0, np.abs(C_T[usual]).max(initial=0))
+        )
+        balanced += usual.sum()
+    assert balanced > 1500
+
+
+def test_a_rotor_of_one_shape_has_coefficients_of_the_ratio_alone():
+    one, other = (rotor_load(blading(), V, tip_ratio(7.0, V)) for V in (5.0, 20.0))
+    assert_allclose(one.power_coefficient, other.power_coefficient, rtol=1e-9)
+    assert_allclose(other.thrust / one.thrust, 16.0, rtol=1e-9)
+
+
+def test_a_blade_that_is_pitched_once_round_is_the_same():
+    """Flow from behind and from all sides: tables go round."""
+    for pitch in np.radians((-150.0, -90.0, 100.0, 170.0)):
+        one, other = (rotor_load(blading(), 8.0, 1.0, p)
+                      for p in (pitch, pitch - 2 * np.pi * np.sign(pitch)))  # fmt: skip
+        here, there = (np.delete(x.strip, 4, axis=2) for x in (one, other))  # but for the attack
+        assert_allclose(here, there, rtol=1e-6, atol=1e-7 * np.abs(here).max())
+
+
+def test_tilt_and_cone_lower_the_power_by_the_wind_that_they_miss():
+    """cos^3 of the tilt times cos^2 of the cone: 0.989 and 0.998 of the power."""
+    speed = tip_ratio(DESIGN_RATIO)
+    both = (0.0, 0.0), (np.radians(5), 0.0), (0.0, np.radians(2.5))
+    power = [rotor_load(blading(tilt, cone), 8.0, speed).power for tilt, cone in both]
+    assert_allclose(power[1] / power[0], np.cos(np.radians(5)) ** 3, atol=2e-3)
+    assert_allclose(power[2] / power[0], np.cos(np.radians(2.5)) ** 2, atol=2e-3)
+    turned = rotor_load(blading(np.radians(5), 0.0), 8.0, speed)
+    # nose up: the blade that goes down meets the wind, which has a share upward along the disc
+    assert turned.strip[6, 10, 3] > turned.strip[18, 10, 3]
+
+
+def test_a_blade_passes_the_dam_of_the_tower():
+    """Nothing above the tower; ahead of it and beside it the wind of a cylinder."""
+    speed = tip_ratio(DESIGN_RATIO)
+    free, dammed = (rotor_load(blading(), 8.0, speed, tower=x) for x in (False, True))
+    change = dammed.blade_torque / free.blade_torque - 1
+    assert int(change.argmin()) == 12
+    assert -0.25 < change[12] < -0.05
+    assert_allclose(change[:6], 0.0, atol=1e-12)  # above the tower
+    v = np.array([8.0, 0.0, 0.0])
+    WIND_AT(TOWER_TUBE, -5.0191, 0.0, 40.0, v)
+    a = 3.0 + (1.935 - 3.0) * 40.0 / 87.6
+    assert_allclose(v, [8.0 * (1 - a**2 / 5.0191**2), 0.0, 0.0])
+    on_face = np.array([8.0, 0.0, 0.0])
+    WIND_AT(TOWER_TUBE, 0.0, 3.0 - 1.065 * 40.0 / 87.6, 40.0, on_face)
+    assert_allclose(on_face, [16.0, 0.0, 0.0])  # beside a cylinder air has twice the speed
+
+
+def test_every_strip_meets_the_wind_of_its_place():
+    """Places and directions by matrices; the air far away from what momentum left of it."""
+    tilt, cone, speed = np.radians(8.0), np.radians(4.0), 1.0
+    blades = blading(tilt, cone)
+    load = rotor_load(blades, 9.0, speed, tower=True, n_azimuths=12)
+    lean, back = (rotation.matrix(rotation.exp(x)) for x in ([0, tilt, 0], [0, -cone, 0]))
+    hub = np.array([0.0, 0.0, 87.6 + 1.96256]) - 5.0191 * lean[:, 0]
+    loads, lengths = np.zeros((12, 2)), blades.length
+    for i in range(12):
+        A = lean @ rotation.matrix(rotation.exp([load.azimuth[i], 0.0, 0.0])) @ back
+        for j in (9, 14):
+            place = hub + A @ [0.0, 0.0, blades.radius[j]]
+            v = np.array([9.0, 0.0, 0.0])
+            WIND_AT(TOWER_TUBE, *place, v)
+            moved = np.cross(speed * lean[:, 0], place - hub)
+            _, driving, through, across, _, a = load.strip[i, j]
+            axial, tangential = (A[:, k] @ (v - moved) for k in (0, 1))
+            assert_allclose(through / (1 - a), axial, rtol=1e-9)
+            c, r = np.cos(cone), blades.radius[j] * np.cos(cone)
+            F = loss(r, np.arctan2(through, across), R=63.0 * c, hub=1.5 * c)
+            around = 3 * driving / (4 * np.pi * r * 1.225 * through * F)
+            assert_allclose(across - around, tangential, rtol=1e-7)
+        for j in range(17):  # thrust and torque by vectors
+            force = lengths[j] * (A[:, :2] @ (load.strip[i, j, :2] * [1, -1]))
+            arm = A @ [0.0, 0.0, blades.radius[j]]
+            loads[i] += force @ lean[:, 0], np.cross(arm, force) @ lean[:, 0]
+    assert_allclose(loads.T, [load.blade_thrust, load.blade_torque], rtol=1e-9)
+    assert_allclose(3 * loads.mean(axis=0), [load.thrust, load.torque], rtol=1e-9)
+
+
+def test_the_dammed_wind_has_no_source_and_no_swirl():
+    rng, h = np.random.default_rng(5), 1e-5
+    for _ in range(10):
+        place = np.append(rng.uniform(4.0, 9.0, 2) * rng.choice([-1, 1], 2), rng.uniform(5.0, 80.0))
+        far, slope, numeric = np.array([7.0, 3.0, 0.5]), np.zeros((3, 3)), np.zeros((3, 3))
+        SLOPE_OF_WIND(TOWER_TUBE, tuple(place), (far[0], far[1]), slope)
+        for j in range(3):
+            for sign in (1, -1):
+                v = far.copy()
+                WIND_AT(TOWER_TUBE, *(place + sign * h * np.eye(3)[j]), v)
+                numeric[:, j] += sign * v / (2 * h)
+        assert_allclose(slope, numeric, atol=1e-8)
+        assert_allclose([slope[0, 0] + slope[1, 1], slope[0, 1] - slope[1, 0]], 0.0, atol=1e-14)
+
+
+def test_tables_of_profiles_are_whole():
+    """Once round, and some published numbers of the outermost profile."""
+    given = profiles()
+    assert len(given) == 8
+    for one in given.values():
+        assert_allclose(one.angle[[0, -1]], [-np.pi, np.pi])
+        assert (np.diff(one.angle) > 0.0).all()
+        assert_allclose([one.lift[0], one.drag[0]], [one.lift[-1], one.drag[-1]])
+    outer = given["NACA64"]
+    at = np.radians([0.0, 5.0, 9.0])
+    assert_allclose(np.interp(at, outer.angle, outer.lift), [0.442, 1.011, 1.326])
+
+
+def test_a_table_is_carried_on_past_stall_as_the_published_ones_were():
+    """The report has Viterna's drag up to a right angle from a blade of aspect 17."""
+    whole = profiles()["NACA64"]
+    near = (whole.angle >= np.radians(-9.0)) & (whole.angle <= np.radians(20.0))
+    cut = profile("cut", whole.angle[near], whole.lift[near], whole.drag[near])
+    at = np.radians(np.arange(21.0, 90.0))
+    drag = np.interp(at, whole.angle, whole.drag)
+    assert_allclose(np.interp(at, cut.angle, cut.drag), drag, atol=0.1)
+    assert_allclose(np.interp(np.pi / 2, cut.angle, cut.drag), 1.11 + 0.018 * 17)
+    assert_allclose([cut.angle[0], cut.angle[-1]], [-np.pi, np.pi])
+    assert (np.diff(cut.angle) > 0.0).all()
+    # lift goes on from its last value, and flow from behind has that of the mirrored section
+    end = np.radians(20.0)
+    assert_allclose(np.interp(end + 1e-3, cut.angle, cut.lift), whole.lift[near][-1], atol=0.03)
+    for back in (at[20:] + np.pi / 2, -at[20:] - np.pi / 2):
+        lift = np.interp(back, whole.angle, whole.lift)
+        assert_allclose(np.interp(back, cut.angle, cut.lift), lift, atol=0.35)
+    inside = np.isin(cut.angle, whole.angle[near])
+    assert_allclose(cut.lift[inside][:5], whole.lift[near][:5])
+    slow = rotor_load(replace(straight(), profile=(cut,) * 17), 8.0, tip_ratio(2.0))
+    assert np.isfinite(slow.strip).all()
+
+
+@pytest.mark.parametrize(("first", "last"), [(-180, 20), (-120, 15), (0, 89.9), (-9, 5)])
+def test_tables_of_any_extent_are_carried_on_once_round(first, last):
+    angle = np.radians(np.linspace(first, last, 9))
+    one = profile("any", angle, np.sin(2 * angle), 0.1 + np.sin(angle) ** 2)
+    assert_allclose(one.angle[[0, -1]], [-np.pi, np.pi])
+    assert (np.diff(one.angle) > 0.0).all()
+    assert one.angle.shape == one.lift.shape == one.drag.shape
+    assert np.isfinite(one.table).all() and (one.drag > 0.0).all()
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (lambda: rotor_load(blading(), -3.0, 1.0), "wind of -3"),
+        (lambda: rotor_load(blading(), np.nan, 1.0), "wind = nan must be a finite"),
+        (lambda: rotor_load(blading(), 8.0, -RATED_SPEED), "speed of the rotor of -1.2"),
+        (lambda: rotor_load(blading(), 8.0, 1.0, n_azimuths=0), "a turn of 0 azimuths"),
+        (lambda: rotor_load(blading(), 8.0, 1.0, n_azimuths=2.5), "n_azimuths"),
+        (lambda: rotor_load(blading(), "8", 1.0), "wind"),
+        (lambda: rotor_load(blading(), 8.0, 1.0, 17.47), "pitch of 17.47 rad is no angle"),
+        (lambda: rotor_load(blading(), 8.0, 1.0, np.nan), "pitch"),
+        (lambda: turbine(2, wind=8.0, pitch=17.47), "pitch of 17.47 rad is no angle"),
+        (lambda: blading(tilt=5.0), "tilted by 5 rad"),
+        (lambda: profile("x", [0.0, 0.2], [0.0], [0.0, 0.1]), "profile 'x' has 2 angles, 1 lifts"),
+        (lambda: profile("x", [0.2, 0.0], [0.0, 1.0], [0.0, 0.1]), "do not ascend"),
+        (lambda: profile("x", [-10.0, 15.0], [0.0, 1.0], [0.0, 0.1]), "within -pi to pi"),
+        (lambda: profile("x", [0.0, 0.2], [0.0, 1.0], [0.0, -0.1]), "drag of -0.1"),
+        (lambda: profile("x", [-1.0, -0.2], [0.0, 1.0], [0.0, 0.1]), "ends at -11"),
+    ],
+)
+def test_what_cannot_be_is_named(call, said):
+    with pytest.raises(ConfigError, match=said):
+        call()

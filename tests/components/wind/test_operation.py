@@ -1,0 +1,101 @@
+"""The turbine in wind that changes: steady ends, the memory of the wake, the control in time."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from rom.components.wind.blading import blading, rotor_load
+from rom.components.wind.control import steady
+from rom.components.wind.operation import late, operate
+from rom.errors import ConfigError
+
+LATE = getattr(late, "py_func", late)
+SPEED, PITCH = 1.0, np.radians(3.7)  # rad/s, rad
+
+
+def straight():
+    return blading(0.0, 0.0)
+
+
+@pytest.mark.parametrize("wind", [6.0, 8.0, 18.0])
+def test_steady_wind_leaves_the_turbine_where_its_laws_balance(wind):
+    run, rest = operate(lambda t: wind, 40.0, blades=straight()), steady(wind, straight())
+    for name in ("speed", "pitch", "torque", "thrust"):
+        assert_allclose(getattr(run, name), getattr(rest, name), rtol=1e-5, atol=1e-12)
+    assert_allclose(run.power, 0.944 * rest.power, rtol=1e-5)
+
+
+def test_filters_answer_a_step_as_their_equations_do():
+    """W_int + t1 W_int' = 1 after a share k at once; W + t2 W' = W_int: closed form."""
+    k, slow, fast, dt = 0.6, 8.0, 2.5, 0.01
+    state = np.zeros(3)
+    found = []
+    for _ in range(4000):
+        LATE(state, 1.0, dt, slow, fast)
+        found.append(state[2])
+    t = dt * np.arange(1, 4001)
+    first, second = np.exp(-t / slow), np.exp(-t / fast)
+    exact = 1 - second - (1 - k) * slow / (slow - fast) * (first - second)
+    assert_allclose(found, exact, atol=3e-3)
+
+
+def pitched(dynamic, back=False):
+    at = (0.0, PITCH)[:: -1 if back else 1]
+    return operate(lambda t: 8.7, 90.0, blades=straight(), dynamic=dynamic,
+                   held=lambda t: (SPEED, at[int(t >= 10.0)]))  # fmt: skip
+
+
+@pytest.mark.parametrize("back", [False, True])
+def test_a_step_of_pitch_overshoots_if_the_wake_has_a_memory(back):
+    """Both ends are steady loads; between, the old wake meets the new pitch."""
+    ends = [rotor_load(straight(), 8.7, SPEED, p) for p in ((PITCH, 0.0) if back else (0.0, PITCH))]
+    quick, slow = pitched(False, back), pitched(True, back)
+    for run in (quick, slow):
+        assert_allclose([run.thrust[190], run.thrust[-1]], [e.thrust for e in ends], rtol=4e-4)
+        assert_allclose([run.torque[190], run.torque[-1]], [e.torque for e in ends], rtol=1e-3)
+    change = ends[1].torque - ends[0].torque
+    most = ((slow.torque - ends[0].torque) / change).max()
+    assert 1.5 < most < 4.0  # of the final change, as in measured steps of pitch
+    assert ((quick.torque - ends[0].torque) / change).max() < 1.0 + 1e-6
+    # the wake is old: loads at once are those of the new pitch in the air of the old one
+    assert_allclose(slow.induced[200], slow.induced[199], rtol=0.12)
+    # and new after some times of the radius over the wind
+    gone = np.abs(slow.thrust - ends[1].thrust) / abs(ends[1].thrust - ends[0].thrust)
+    assert gone[slow.t > 10.0 + 8 * 63.0 / 8.7].max() < 0.02
+
+
+def test_the_control_carries_the_turbine_from_part_load_to_full_load():
+    """8 to 20 m/s in 200 s: speed held within 5 %, and at the end the steady pitch and power."""
+    run = operate(lambda t: 8.0 + 12.0 * min(max(t - 20.0, 0.0) / 200.0, 1.0), 400.0)
+    end = steady(20.0)
+    assert_allclose(run.speed.max(), end.speed, rtol=0.05)
+    assert_allclose(run.pitch[-1], end.pitch, rtol=3e-3)
+    assert_allclose(run.power[-1], 5e6, rtol=1e-5)
+    assert run.power.max() < 5.1e6
+
+
+def test_a_gust_speeds_the_rotor_up_by_what_its_inertia_takes():
+    """Momentum of 43.78e6 kg m^2, between the wind and 97 times the generator."""
+    run = operate(lambda t: 8.0 + 2.0 * (t > 5.0), 15.0)
+    dt, fast = run.t[1], 97.0 * run.speed
+    generator = 97.0 * run.power / (0.944 * fast)
+    impulse = (run.torque - generator)[1:-1].sum() * dt
+    assert_allclose(43_784_725 * (run.speed[-1] - run.speed[1]), impulse, rtol=1e-9)
+    assert run.speed[-1] > 1.02 * run.speed[0]
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (lambda: operate(lambda t: 8.0 + 20.0 * (t > 5.0), 10.0), "28 m/s, at 5.05 s"),
+        (lambda: operate(lambda t: np.nan, 10.0), "parked in a wind of nan"),
+        (lambda: operate(lambda t: 8.0, 10.0, dt=2.0), "a step of 2 s is longer"),
+        (lambda: operate(lambda t: 8.0, -1.0), "t_end"),
+        (lambda: operate(8.0, 10.0), "wind"),
+        (lambda: operate(lambda t: 8.0, 1.0, held=lambda t: (np.nan, 0.0)), "held at nan"),
+        (lambda: operate(lambda t: 8.0, 1.0, held=lambda t: (1.0, 20.0)), "pitch of 20 rad"),
+    ],
+)
+def test_what_cannot_be_is_named(call, said):
+    with pytest.raises(ConfigError, match=said):
+        call()

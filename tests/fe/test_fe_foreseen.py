@@ -1,0 +1,187 @@
+"""Memory and disk: foreseen from the analysis, and the way to solve chosen by them."""
+
+import gc
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import rom
+from cases.long import ROM_LONG
+from rom.errors import ResourceError
+from rom.workflow import operators
+
+pytestmark = pytest.mark.fenicsx
+STEEL = rom.Material(E=210e9, nu=0.3, rho=7850.0)
+KINDS = {"root": "rbe2", "tip": "rbe2"}
+SHAPES = {  # length, width, height, size of elements [m]
+    "plate": (1.0, 1.0, 0.02, 0.05),
+    "block": (1.0, 1.0, 1.0, 0.14),
+    "rod": (8.0, 0.3, 0.2, 0.07),
+    "large plate": (1.0, 1.0, 0.02, 0.02),
+    "large block": (1.0, 1.0, 1.0, 0.08),
+    "large rod": (16.0, 0.3, 0.2, 0.06),
+}
+TRIED = list(SHAPES) if ROM_LONG else ["plate", "rod"]
+GIB = 2.0**30
+
+
+def bar(size, solver="auto"):
+    sizes = dict(zip(("L", "b", "h", "lc"), size, strict=True))
+    return rom.fe.model("meshes/beam.geo", material=STEEL, parameters=sizes, solver=solver)
+
+
+def resident(kind):
+    """What this process takes now or has taken at most [bytes], as Linux counts it."""
+    lines = Path("/proc/self/status").read_text().splitlines()
+    return 1024.0 * float(dict(line.split(":", 1) for line in lines)[kind].split()[0])
+
+
+def growth(work):
+    """What a piece of work takes at most beyond what was there [bytes]."""
+    from mpi4py import MPI
+
+    from rom.fe.operators.memory import collect
+
+    gc.collect()
+    collect(MPI.COMM_WORLD)
+    Path("/proc/self/clear_refs").write_text("5")  # the largest so far is forgotten
+    before = resident("VmRSS")
+    work()
+    return resident("VmHWM") - before
+
+
+@pytest.mark.parametrize("shape", TRIED)
+def test_a_reduction_takes_the_memory_foreseen(shape):
+    from rom.fe.operators.foreseen import N_MATRICES, analysed, beside_factor
+
+    model = bar(SHAPES[shape])
+    K = operators(model).K
+    foreseen = beside_factor(K, 12, N_MATRICES) + analysed(K).in_core
+
+    def reduction(m):
+        rom.reduce(m, method=rom.CraigBampton(20), interfaces=KINDS, certify=False)
+
+    reduction(bar((1.0, 0.1, 0.1, 0.1)))  # what is loaded and compiled once is not foreseen
+    assert growth(lambda: reduction(model)) == pytest.approx(foreseen, rel=0.2)
+
+
+@pytest.fixture(scope="module")
+def block():
+    return bar(SHAPES["block"])
+
+
+@pytest.fixture(scope="module")
+def needs(block):
+    """What each way to solve is predicted to take [bytes]."""
+    from rom.fe.operators import foreseen
+
+    K = operators(block).K
+    found, beside = foreseen.analysed(K), foreseen.beside_factor(K, 0, foreseen.N_MATRICES)
+    multigrid = foreseen.multigrid_bytes(K)
+    return {"direct": beside + found.in_core, "out-of-core": beside + found.out_of_core,
+            "iterative": beside + multigrid, "disk": found.on_disk}  # fmt: skip
+
+
+def limited(monkeypatch, memory_bytes, disk_bytes=1e15):
+    """As if the machine had no more than that."""
+    from rom.fe.operators import disk, memory
+
+    monkeypatch.setattr(memory, "MAX_MEMORY_SHARE", 1.0)
+    monkeypatch.setattr(memory, "free_bytes", lambda: memory_bytes)
+    monkeypatch.setattr(disk.shutil, "disk_usage", lambda _: disk_type(disk_bytes))
+
+
+def disk_type(free):
+    return type("Usage", (), {"free": free})
+
+
+def test_the_first_way_that_fits_is_taken(block, needs, monkeypatch):
+    from rom.fe.operators.foreseen import automatic
+
+    ops = operators(block)
+    assert block.provenance["solver"] == "direct"
+    limited(monkeypatch, 1.001 * needs["direct"])
+    how, why = automatic(ops)
+    assert not (how.out_of_core or how.iterative)
+    assert why.startswith(f"direct: {needs['direct'] / GIB:.2f} GiB foreseen")
+    limited(monkeypatch, 0.999 * needs["direct"])
+    how, why = automatic(ops)
+    assert how.out_of_core
+    sizes = f"{needs['out-of-core'] / GIB:.2f} GiB with {needs['disk'] / GIB:.2f} GiB on disk"
+    assert why.startswith(f"out-of-core, {sizes}: a factor in memory would take ")
+    limited(monkeypatch, 0.999 * needs["direct"], 0.999 * needs["disk"])
+    how, why = automatic(ops)
+    assert how.iterative
+    assert why.startswith(f"iterative, {needs['iterative'] / GIB:.2f} GiB: ")
+
+
+def test_what_fits_nowhere_is_refused_with_the_sizes(block, needs, monkeypatch):
+    from rom.fe.operators.foreseen import automatic
+
+    smallest = min(needs["out-of-core"], needs["iterative"])
+    limited(monkeypatch, 0.999 * smallest)
+    with pytest.raises(ResourceError) as caught:
+        automatic(operators(block))
+    for way in ("direct", "out-of-core", "disk", "iterative"):
+        assert f"{needs[way] / GIB:.2f} GiB" in caught.value.message
+    assert f"{block.n_dofs} dofs" in caught.value.message
+    assert "coarser mesh" in caught.value.hint
+
+
+def test_the_way_taken_is_kept_with_the_body(block, needs, monkeypatch):
+    limited(monkeypatch, 0.99 * needs["direct"])
+    model = bar(SHAPES["block"])
+    monkeypatch.undo()
+    assert model.operators.solver.out_of_core
+    found, direct = (
+        rom.reduce(m, method=rom.CraigBampton(4), interfaces=KINDS, certify=False)
+        for m in (model, block)
+    )
+    assert found.provenance["solver"] == model.provenance["solver"]
+    assert found.frequencies()[6:] == pytest.approx(direct.frequencies()[6:], rel=1e-9)
+
+
+def test_columns_of_interfaces_count_beside_the_factor(block, needs, monkeypatch):
+    from rom.fe.operators.foreseen import check_factor_memory
+    from rom.fe.operators.solver import DIRECT_SOLVER
+
+    K = operators(block).K
+    limited(monkeypatch, needs["direct"])
+    check_factor_memory(K, 12, DIRECT_SOLVER)
+    with pytest.raises(ResourceError, match="is predicted to take"):
+        check_factor_memory(K, 10_000, DIRECT_SOLVER)
+
+
+FULL_DISK = """
+import resource
+import rom
+STEEL = rom.Material(E=210e9, nu=0.3, rho=7850.0)
+block = dict(L=1.0, b=1.0, h=0.02, lc=0.1)
+model = rom.fe.model("meshes/beam.geo", material=STEEL, parameters=block, solver="out-of-core")
+resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000))
+try:
+    model.operators.hold(model.interfaces["root"].dofs)
+except rom.errors.ResourceError as error:
+    print(error.message)
+"""
+
+
+def test_a_disk_that_would_fill_is_named_with_folder_and_size(tmp_path, monkeypatch):
+    """MUMPS itself would wait for its writer for ever."""
+    monkeypatch.setenv("MUMPS_OOC_TMPDIR", str(tmp_path))
+    ran = subprocess.run(
+        [sys.executable, "-c", FULL_DISK], capture_output=True, text=True, timeout=60
+    )
+    assert f"GiB on disk and cannot be kept in {tmp_path}: File too large" in ran.stdout, ran.stderr
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_folder_that_is_missing_is_named(block, monkeypatch, tmp_path):
+    from rom.fe.operators.factor import Factor
+    from rom.fe.operators.solver import parsed
+
+    monkeypatch.setenv("MUMPS_OOC_TMPDIR", str(tmp_path / "none"))
+    with pytest.raises(ResourceError, match=f"cannot be kept in {tmp_path}/none: No such file"):
+        Factor(operators(block).K, definite=True, solver=parsed("out-of-core"))
