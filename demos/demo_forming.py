@@ -21,7 +21,7 @@ from rom.components.assumed_strain import (
     rectangle,
     sheet,
 )
-from rom.fe.mesh import read_triangles
+from rom.fe.mesh.read import read_triangles
 
 options = argparse.ArgumentParser(description="metal between tools")
 options.add_argument("--out", type=Path, default=Path("out"), help="folder, made if missing")
