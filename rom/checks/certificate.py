@@ -13,7 +13,6 @@ from rom.eigen.verbs import Operators, given_rigid_motions, mac, quadratic, resi
 from rom.errors import InterfaceError
 from rom.model import Array, Basis, Report, Row
 from rom.process.progress import MANY_DOFS, stages
-from rom.reduction.bases.fixed_interface import constraint_modes
 from rom.reduction.interfaces.records import Connection
 from rom.rows import FREQUENCY_RTOL, N_COMPARED, frequency_rows, row
 
@@ -23,7 +22,6 @@ ASYMMETRY_RTOL = 1e-6
 MIN_JUDGED_ERROR = 1e-6  # frequency error above which the estimate is compared with it
 MAX_ERROR_RATIO = 2.0  # frequency error over its estimate
 ROUND_OFF = 1e-9  # Rayleigh quotient, of the largest one of a basis, that is none
-STATIC_RTOL = 1e-6  # of the largest stiffness: what keeps a shape from being a constraint mode
 CLUSTER_RTOL = 1e-3  # relative distance of modes that are compared as one subspace
 
 
@@ -50,7 +48,7 @@ def certify_body(
     statics = body.has_static_shapes
     supports: list[tuple[str, ...]] = [(), *((name,) for name in connection.parts if statics)]
     constrained = basis.labels[: len(connection.labels)] == connection.labels
-    parts = condensed_model(connection, basis) if statics and constrained else None
+    parts = condensed_model(connection, basis, matrices[0]) if statics and constrained else None
     static: list[Row] = []
     with stages(len(supports), long=ops.n > MANY_DOFS) as begin:
         for fixed in supports:
@@ -117,19 +115,17 @@ def compared(
     return table
 
 
-def condensed_model(connection: Connection, basis: Basis) -> Condensed:
-    """The full model condensed to its interfaces, with what the reduction has found if it fits.
+def condensed_model(connection: Connection, basis: Basis, K: Array) -> Condensed:
+    """The full model condensed to its interfaces, with what the reduction has found.
 
-    It fits where the first columns of the basis are constraint modes of this very model.
+    Args:
+        connection: the full model in interface coordinates.
+        basis: its columns of the interfaces come first; ``held`` is of this very model.
+        K: (r, r) stiffness of the basis.
     """
-    ops, boundary = connection.ops, connection.boundary
-    held = basis.held if basis.held is not None else ops.hold(boundary)
-    Psi = basis.Psi[:, : boundary.size]
-    parts = condensed(ops, held, boundary, Psi)
-    forces = ops.rows(ops.apply_K(Psi), boundary)
-    if np.abs(parts.S - forces).max() > STATIC_RTOL * np.abs(parts.S).max():
-        parts = condensed(ops, held, boundary, constraint_modes(ops, held, boundary))
-    return parts
+    boundary, n_b = connection.boundary, connection.boundary.size
+    held = basis.held if basis.held is not None else connection.ops.hold(boundary)
+    return condensed(connection.ops, held, boundary, basis.Psi[:, :n_b], K[:n_b, :n_b])
 
 
 def basis_matrices(ops: Operators, basis: Basis) -> tuple[Array, Array]:

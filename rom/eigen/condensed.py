@@ -5,11 +5,19 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve, eigh
 
-from rom.eigen.verbs import Held, Operators, quadratic, unit_motions
+from rom.eigen.verbs import (
+    Held,
+    Operators,
+    column_blocks,
+    constraint_modes,
+    quadratic,
+    unit_motions,
+)
 from rom.errors import InterfaceError
 from rom.model import Array, Index
 
 LEAST_STIFFNESS = 1e-12  # of the scaled interface stiffness, below which a motion is free
+STATIC_RTOL = 1e-6  # of the largest stiffness: what keeps a shape from being a constraint mode
 LEAST_PART = 1e-10  # of rigid motions seen by the interfaces, below which one is none
 
 
@@ -84,21 +92,33 @@ class Supported:
         X = self.body.held(F)
         if self.factor is None:
             return X
-        Psi = self.body.Psi[:, self.free] * self.scale
-        return X + Psi @ cho_solve(self.factor, self.body.ops.gram(Psi, F))
+        Psi = self.body.Psi
+        force = self.scale[:, None] * self.body.ops.gram(Psi, F)[self.free]
+        motion = np.zeros((Psi.shape[1], F.shape[1]))
+        motion[self.free] = self.scale[:, None] * cho_solve(self.factor, force)
+        return X + Psi @ motion
 
     solve = __call__
 
 
-def condensed(ops: Operators, held: Held, boundary: Index, Psi: Array) -> Condensed:
+def condensed(
+    ops: Operators, held: Held, boundary: Index, Psi: Array, S: Array | None = None
+) -> Condensed:
     """The body condensed to its boundary.
 
     Args:
         ops: the body in interface coordinates.
         held: the same with its boundary held, factored.
         boundary: (n_b,) dof numbers of the interface coordinates.
-        Psi: (n_local, n_b) constraint modes.
+        Psi: (n_local, n_b) shapes; constraint modes of this very body are taken, others replaced.
+        S: (n_b, n_b) Psi^T K Psi where it is known.
     """
-    S = quadratic(ops, ops.apply_K, Psi)
-    alone = np.diag(quadratic(ops, ops.apply_K, unit_motions(ops, boundary)))
+    S = quadratic(ops, ops.apply_K, Psi) if S is None else S
+    E, forces, alone = unit_motions(ops, boundary), np.empty_like(S), np.empty(boundary.size)
+    for some in column_blocks(boundary.size):
+        loads = ops.apply_K(E[:, some])
+        forces[some], alone[some] = ops.gram(loads, Psi), np.diag(ops.rows(loads, boundary[some]))
+    if np.abs(S - forces).max() > STATIC_RTOL * np.abs(S).max():
+        Psi = constraint_modes(ops, held, boundary)
+        S = quadratic(ops, ops.apply_K, Psi)
     return Condensed(ops, held, boundary, Psi, 0.5 * (S + S.T), alone)

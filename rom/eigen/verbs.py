@@ -251,6 +251,14 @@ def unit_motions(ops: Operators, boundary: Index) -> Array:
     return E
 
 
+def constraint_modes(ops: Operators, held: Held, boundary: Index) -> Array:
+    """(n_local, n_b) static shapes: one boundary dof moved by one, the other boundary dofs held."""
+    Psi = unit_motions(ops, boundary)
+    for some in column_blocks(boundary.size):
+        Psi[:, some] -= held(ops.apply_K(Psi[:, some]))
+    return Psi
+
+
 def orthonormal(ops: Mass, X: Array) -> Array:
     """M-orthonormal columns with the span of X, in the order given.
 

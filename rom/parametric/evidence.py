@@ -64,8 +64,10 @@ def certified(
         ops, body = affine.at(point), family.at(extrapolate=False, **point)
         here = connect(ops, affine.model_at(point), interfaces)
         found: list[Row] = []
-        parts = condensed_model(here, own) if affine.stretch is None else None
-        matrices = basis_matrices(here.ops, basis) if parts else None
+        parts = matrices = None
+        if affine.stretch is None:
+            matrices = basis_matrices(here.ops, basis)
+            parts = condensed_model(here, own, matrices[0])
         for fixed in _supports(here):
             if parts and matrices:
                 support = full_support(here, parts, fixed)

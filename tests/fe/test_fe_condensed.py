@@ -14,9 +14,9 @@ pytestmark = pytest.mark.fenicsx
 
 from rom.eigen.completeness import LEAST_SHARE  # noqa: E402
 from rom.eigen.condensed import condensed  # noqa: E402
+from rom.eigen.verbs import constraint_modes  # noqa: E402
 from rom.fe.elasticity import assemble  # noqa: E402
 from rom.fe.operators import factor, lanczos, petsc, spectrum  # noqa: E402
-from rom.reduction.bases.fixed_interface import constraint_modes  # noqa: E402
 from rom.reduction.interfaces.connection import connect  # noqa: E402
 from rom.workflow import operators  # noqa: E402
 

@@ -12,10 +12,9 @@ from cases.solid import block
 from cases.surfaces import TURN, surface
 from rom.bench.models import bar
 from rom.eigen.scipy import HeldSciPy
-from rom.eigen.verbs import quadratic, rigid_motions
+from rom.eigen.verbs import constraint_modes, quadratic, rigid_motions
 from rom.errors import ConfigError, InterfaceError
 from rom.model import Interface
-from rom.reduction.bases.fixed_interface import constraint_modes
 from rom.reduction.interfaces.connection import connect
 from rom.reduction.interfaces.kinds import tie
 from rom.reduction.interfaces.polynomial import cylinder_coordinates, interface_functions

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from rom.components.assumed_strain.triangles import Sheet
+from rom.components.assumed_strain.triangles import Sheet, sides_of
 from rom.errors import ConfigError, MeshError
 from rom.model import Array, Index
 
@@ -165,7 +165,7 @@ class Prepared:
 def outer_sides(body: Sheet) -> Index:
     """(k, 2) nodes of the sides at the edge of a sheet, the solid on the left."""
     T = body.triangles
-    every = np.vstack([T[:, [1, 2]], T[:, [2, 0]], T[:, [0, 1]]])
+    every = sides_of(T)
     alone = (body.patch[:, 3:] == T).T.ravel()
     return every[alone]
 

@@ -17,7 +17,7 @@ import numpy.typing as npt
 from scipy.sparse import coo_matrix, csr_matrix, eye, vstack
 
 from rom.components.assumed_strain.motion import Metal
-from rom.components.assumed_strain.triangles import Sheet
+from rom.components.assumed_strain.triangles import Sheet, sides_of
 from rom.model import Array, Index
 
 Mask = npt.NDArray[np.bool_]
@@ -54,7 +54,7 @@ def bending(body: Sheet, metal: Metal, parts: tuple[Index, ...] = ()) -> csr_mat
 
 def _sides(T: Index) -> tuple[Index, Index, Array]:
     """Ends (s, 2) of each side, the side (t, 3) opposite to each corner, and which are inner."""
-    every = np.sort(np.vstack([T[:, [1, 2]], T[:, [2, 0]], T[:, [0, 1]]]), axis=1)
+    every = np.sort(sides_of(T), axis=1)
     ends, side, count = np.unique(every, axis=0, return_inverse=True, return_counts=True)
     return ends, side.reshape(3, len(T)).T, count == 2
 

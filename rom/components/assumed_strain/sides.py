@@ -4,7 +4,7 @@ import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix
 
 from rom.components.assumed_strain.motion import Metal
-from rom.components.assumed_strain.triangles import Sheet, constant_gradients
+from rom.components.assumed_strain.triangles import Sheet, constant_gradients, sides_of
 from rom.errors import ConfigError
 from rom.model import Array, Index
 
@@ -47,7 +47,7 @@ def stiffness_by_sides(body: Sheet, metal: Metal, *, share: tuple[int, int] = (0
 
 def _triangles_at_sides(T: Index) -> tuple[Index, Array]:
     """(m, 2) triangles at each side, and whether they are there; at an edge one is named twice."""
-    sides = np.sort(np.vstack([T[:, [1, 2]], T[:, [2, 0]], T[:, [0, 1]]]), axis=1)
+    sides = np.sort(sides_of(T), axis=1)
     side = np.unique(sides, axis=0, return_inverse=True)[1].ravel()
     order, t = np.argsort(side, kind="stable"), np.tile(np.arange(len(T)), 3)
     first = np.flatnonzero(np.diff(side[order], prepend=-1))

@@ -128,9 +128,17 @@ def constant_gradients(X: Array, T: Index) -> tuple[Array, Array]:
     return G, area
 
 
+def sides_of(T: Index) -> Index:
+    """(3 t, 2) nodes of the sides opposite to the first corners, then the second, then the third.
+
+    The triangle is on the left of its sides.
+    """
+    return np.vstack([T[:, [1, 2]], T[:, [2, 0]], T[:, [0, 1]]])
+
+
 def _opposite(T: Index) -> Index:
     """(t, 3) the node behind the side opposite to each corner; -1 on the boundary."""
-    sides = np.sort(np.vstack([T[:, [1, 2]], T[:, [2, 0]], T[:, [0, 1]]]), axis=1)
+    sides = np.sort(sides_of(T), axis=1)
     corner, t = T.T.ravel(), len(T)
     _, place, count = np.unique(sides, axis=0, return_inverse=True, return_counts=True)
     if count.max() > 2:

@@ -210,14 +210,12 @@ def turn(strips, tables, counts, shape, angles, motion, tower, out):  # noqa: PL
             wind_at(tower, x, -r * s, height - lift * st + r * c * ct, v)
             n, e = v[0] * ct, c * v[0] * st - s * v[1]
             ahead = -c * v[1] - s * v[0] * st  # with the motion of the blade
-            theta = axial[j] + pitch
-            flow = induced(strips[j], tables[j], counts[j], theta, cc * n + sc * e,
-                           speed * r - ahead)  # fmt: skip
+            theta, far = axial[j] + pitch, cc * n + sc * e
+            flow = induced(strips[j], tables[j], counts[j], theta, far, speed * r - ahead)
             normal, tangential, attack = strip_load(
                 strips[j], tables[j], counts[j], theta, flow, half_density)  # fmt: skip
             row = out[i, j]
             row[0], row[1], row[2], row[3], row[4] = normal, tangential, flow[0], flow[1], attack
-            far = cc * n + sc * e
             row[5] = 1.0 - flow[0] / far if far != 0.0 else 0.0
 
 

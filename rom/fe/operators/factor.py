@@ -6,7 +6,7 @@ import numpy as np
 
 from rom.errors import SolverError
 from rom.fe.operators.disk import DISK_ERRORS, disk_too_small
-from rom.fe.operators.foreseen import check_disk, entry_count, too_large
+from rom.fe.operators.foreseen import by_mumps, check_disk, entry_count, too_large
 from rom.fe.operators.memory import allowed_bytes, factor_bytes, give_back
 from rom.fe.operators.solver import DIRECT_SOLVER, Solver
 from rom.model import Array
@@ -36,8 +36,6 @@ class Factor:
     """
 
     def __init__(self, A: PETSc.Mat, *, definite: bool, solver: Solver = DIRECT_SOLVER):
-        A.setOption(PETSc.Mat.Option.SYMMETRIC, True)
-        A.setOption(PETSc.Mat.Option.SPD, False)  # MUMPS then factors an indefinite one, too
         self.A, self.solver = A, solver
         if solver.out_of_core:
             check_disk(A, solver)
@@ -56,16 +54,9 @@ class Factor:
         self.ksp = PETSc.KSP().create(self.A.comm)
         self.ksp.setOperators(self.A)
         self.ksp.setType(PETSc.KSP.Type.PREONLY)
-        pc = self.ksp.getPC()
-        pc.setType(PETSc.PC.Type.CHOLESKY)
-        pc.setFactorSolverType(PETSc.Mat.SolverType.MUMPS)
-        pc.setFactorSetUpSolverType()
-        self.factor = pc.getFactorMatrix()
+        self.factor = by_mumps(self.ksp.getPC(), self.A, self.solver)
         self.factor.setMumpsIcntl(24, 1)  # needed by PETSc for the inertia
         self.factor.setMumpsIcntl(13, 1)  # a root shared by ranks would not report its pivots
-        if self.solver.low_rank:
-            self.factor.setMumpsIcntl(35, 1)
-            self.factor.setMumpsCntl(7, self.solver.low_rank)
         if self.solver.out_of_core:
             self.factor.setMumpsIcntl(22, 1)
         self.factor.setMumpsIcntl(23, max(int(workspace / 1e6), 1))  # obeyed after the analysis

@@ -35,15 +35,10 @@ class Foreseen:
     on_disk: float
 
 
-def analysed(A: PETSc.Mat, solver: Solver = DIRECT_SOLVER) -> Foreseen:
-    """What a factor of A will take, by the symbolic analysis of MUMPS: a tenth of a factorisation.
-
-    Within a tenth of what was measured for blocks, rods and plates of 13 725 to 259 917 dofs.
-    """
+def by_mumps(pc: PETSc.PC, A: PETSc.Mat, solver: Solver) -> PETSc.Mat:
+    """The factor L D L^T of A that a preconditioner will have made, not yet analysed."""
     A.setOption(PETSc.Mat.Option.SYMMETRIC, True)
-    A.setOption(PETSc.Mat.Option.SPD, False)
-    pc = PETSc.PC().create(A.comm)
-    pc.setOperators(A)
+    A.setOption(PETSc.Mat.Option.SPD, False)  # MUMPS then factors an indefinite one, too
     pc.setType(PETSc.PC.Type.CHOLESKY)
     pc.setFactorSolverType(PETSc.Mat.SolverType.MUMPS)
     pc.setFactorSetUpSolverType()
@@ -51,6 +46,17 @@ def analysed(A: PETSc.Mat, solver: Solver = DIRECT_SOLVER) -> Foreseen:
     if solver.low_rank:
         factor.setMumpsIcntl(35, 1)
         factor.setMumpsCntl(7, solver.low_rank)
+    return factor
+
+
+def analysed(A: PETSc.Mat, solver: Solver = DIRECT_SOLVER) -> Foreseen:
+    """What a factor of A will take, by the symbolic analysis of MUMPS: a tenth of a factorisation.
+
+    Within a tenth of what was measured for blocks, rods and plates of 13 725 to 259 917 dofs.
+    """
+    pc = PETSc.PC().create(A.comm)
+    pc.setOperators(A)
+    factor = by_mumps(pc, A, solver)
     factor.setMumpsIcntl(23, ANALYSIS_ONLY)
     pc.setUp()
     in_core, out_of_core = TOTAL_MEMORY["low-rank" if solver.low_rank else "plain"]

@@ -226,11 +226,9 @@ class PETScOperators:
             else:
                 lam, Phi = self.lowest(m + N_SPARE_MODES, 0.0, held.factor, none)
                 proven = False
-            if finished and not in_blocks:  # SLEPc has taken the factor's matrix for its own
-                held.release()
             if not proven:
                 verify_count(self, lam, m, 0, held.factor if finished else None)
-            if finished and in_blocks and not proven:
+            if finished and not proven:
                 held.release()
         return lam[:m], settled(self, lam, Phi)[:, :m]
 

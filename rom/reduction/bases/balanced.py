@@ -6,10 +6,9 @@ import numpy as np
 from scipy.linalg import qr, solve_continuous_lyapunov, svd
 
 from rom.arguments import typed, whole
-from rom.eigen.verbs import Operators
+from rom.eigen.verbs import Operators, constraint_modes
 from rom.errors import ConfigError, ModelError, ResourceError
 from rom.model import Array, Basis, Index
-from rom.reduction.bases.fixed_interface import constraint_modes
 from rom.reduction.bases.free_interface import numbered
 
 MAX_COORDINATES = 600  # a Lyapunov equation of twice the size is solved in seconds up to here
@@ -69,7 +68,7 @@ class BalancedTruncation:
             raise ConfigError(f"n_modes = {self.n_modes}, but {held.n_free} dofs are free.")
         omega, Phi = ops.modes(held, pool)
         if not omega.size:
-            return Basis(Psi_b, omega, labels)
+            return Basis(Psi_b, omega, labels, held)
         L = ops.gram(Phi, ops.apply_M(Psi_b))  # participation: how interfaces drive the modes
         K, D = np.diag(omega**2), np.diag(2 * self.damping_ratio * omega)
         S, R = _gramian_factors(K, np.eye(pool), D, L, L.T * omega**2)
@@ -77,7 +76,7 @@ class BalancedTruncation:
         V = qr(X[:, : self.n_modes], mode="economic")[0]
         lam, Y = np.linalg.eigh(V.T @ K @ V)
         names = numbered("balanced", lam.size)
-        return Basis(np.hstack([Psi_b, Phi @ V @ Y]), np.sqrt(lam), (*labels, *names))
+        return Basis(np.hstack([Psi_b, Phi @ V @ Y]), np.sqrt(lam), (*labels, *names), held)
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,10 +6,9 @@ import numpy as np
 from scipy.linalg import eigh
 
 from rom.arguments import typed, whole
-from rom.eigen.verbs import Held, Operators, quadratic
+from rom.eigen.verbs import Held, Operators, constraint_modes, quadratic
 from rom.errors import ConfigError
 from rom.model import Array, Basis, Index
-from rom.reduction.bases.fixed_interface import constraint_modes
 from rom.reduction.bases.free_interface import numbered
 
 
@@ -54,7 +53,7 @@ class EnhancedCraigBampton:
         K0, M0 = projected(ops, T0)
         H = np.linalg.solve(M0, K0)
         T0 += residual_shapes(ops, held, Psi_b, omega, Phi) @ H[: boundary.size]
-        return Basis(T0, omega, (*labels, *numbered("enhanced", omega.size)))
+        return Basis(T0, omega, (*labels, *numbered("enhanced", omega.size)), held)
 
 
 def residual_shapes(ops: Operators, held: Held, Psi_b: Array, omega: Array, Phi: Array) -> Array:

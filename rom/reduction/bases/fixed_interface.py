@@ -7,8 +7,8 @@ import numpy.typing as npt
 
 from rom.arguments import typed
 from rom.eigen.scipy import SciPyOperators
-from rom.eigen.verbs import Held, Operators, column_blocks, unit_motions
-from rom.model import Array, Basis
+from rom.eigen.verbs import Operators, constraint_modes
+from rom.model import Basis
 
 
 @typed
@@ -56,11 +56,3 @@ def fixed_interface(ops: Operators, boundary: npt.ArrayLike, n_modes: int) -> Ba
     omega, Phi = ops.modes(held, n_modes)
     labels = [f"constraint {d}" for d in b] + [f"fixed-interface {k + 1}" for k in range(n_modes)]
     return Basis(np.hstack([Psi_b, Phi]), omega, tuple(labels))
-
-
-def constraint_modes(ops: Operators, held: Held, boundary: npt.NDArray[np.int64]) -> Array:
-    """(n_local, n_b) static shapes: one boundary dof moved by one, the other boundary dofs held."""
-    Psi = unit_motions(ops, boundary)
-    for some in column_blocks(boundary.size):
-        Psi[:, some] -= held(ops.apply_K(Psi[:, some]))
-    return Psi

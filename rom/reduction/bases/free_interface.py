@@ -6,10 +6,15 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve, qr
 
 from rom.arguments import typed, whole
-from rom.eigen.verbs import Operators, orthonormal, unit_motions, without_dependent
+from rom.eigen.verbs import (
+    Operators,
+    constraint_modes,
+    orthonormal,
+    unit_motions,
+    without_dependent,
+)
 from rom.errors import ConfigError, InterfaceError
 from rom.model import Array, Basis, Index
-from rom.reduction.bases.fixed_interface import constraint_modes
 
 RIGID_RTOL = 1e-12  # eigenvalue of a rigid motion, of a rough vector's Rayleigh quotient
 FLEXIBILITY_RTOL = 1e-12  # of the whole one: residual flexibility below is round-off
@@ -95,7 +100,7 @@ class Herting:
         inner = np.hstack([relief, Phi - Psi_b @ ops.rows(Phi, boundary)])
         inner, kept = without_dependent(ops, inner)
         names = [*numbered("inertia relief", R.shape[1]), *numbered("free", omega.size)]
-        return Basis(np.hstack([Psi_b, inner]), omega, (*labels, *(names[k] for k in kept)))
+        return Basis(np.hstack([Psi_b, inner]), omega, (*labels, *(names[k] for k in kept)), held)
 
 
 @typed

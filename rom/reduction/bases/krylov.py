@@ -58,11 +58,11 @@ class MomentMatching:
         """
         if boundary.size == 0:
             raise ConfigError("the method holds the interfaces of the body, and none is given.")
-        E = unit_motions(ops, boundary)
-        blocks, Psi_b = [], E - ops.hold(boundary)(ops.apply_K(E))
+        E, still = unit_motions(ops, boundary), ops.hold(boundary)
+        blocks, Psi_b = [], E - still(ops.apply_K(E))
         for f in self.frequencies:
             s = (2 * np.pi * f) ** 2
-            held = ops.hold(boundary, s)
+            held = ops.hold(boundary, s) if s else still
             X = Psi_b
             if s:
                 _refuse_resonance(ops, held, s, f)
@@ -75,7 +75,7 @@ class MomentMatching:
         K = ops.gram(inner, ops.apply_K(inner))
         lam, V = np.linalg.eigh(0.5 * (K + K.T))
         names = numbered("moment", lam.size)
-        return Basis(np.hstack([Psi_b, inner @ V]), np.sqrt(lam), (*labels, *names))
+        return Basis(np.hstack([Psi_b, inner @ V]), np.sqrt(lam), (*labels, *names), still)
 
 
 def _refuse_resonance(ops: Operators, held: object, s: float, f: float) -> None:

@@ -46,12 +46,16 @@ class WithLoads:
         if basis.labels[:n_b] != labels:
             raise ConfigError(f"{self.method!r} has no constraint modes to which loads could join.")
         outer, inner = basis.Psi[:, :n_b], basis.Psi[:, n_b:]
-        answers = ops.hold(boundary)(F)
+        held = ops.hold(boundary) if basis.held is None else basis.held
+        answers = held(F)
         both, kept = without_dependent(ops, np.hstack([inner, answers]))
         new = both[:, [k >= inner.shape[1] for k in kept]]
         names = numbered("load", new.shape[1])
         return Basis(
-            np.hstack([outer, new, inner]), basis.omega, (*labels, *names, *basis.labels[n_b:])
+            np.hstack([outer, new, inner]),
+            basis.omega,
+            (*labels, *names, *basis.labels[n_b:]),
+            held,
         )
 
     def _forces(self, ops: Operators) -> Array:

@@ -7,10 +7,9 @@ import numpy as np
 
 from rom.arguments import one_of, typed, whole
 from rom.eigen.substructuring import modes_up_to
-from rom.eigen.verbs import Held, Operators, whole_clusters
+from rom.eigen.verbs import Held, Operators, constraint_modes, whole_clusters
 from rom.errors import ConfigError, warn
 from rom.model import Array, Basis, Index
-from rom.reduction.bases.fixed_interface import constraint_modes
 from rom.reduction.bases.selection import Wanted, enough_modes
 from rom.rows import FREQUENCY_RTOL
 
