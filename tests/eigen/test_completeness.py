@@ -2,7 +2,9 @@
 
 import numpy as np
 import pytest
+from numpy.polynomial import Chebyshev
 from numpy.testing import assert_allclose
+from scipy.stats import chi2
 
 from rom.eigen.completeness import _log_chebyshev, miss_probability
 
@@ -50,6 +52,44 @@ def test_what_is_called_sure_is_complete(growth):
                 assert found(theta, T, residual, 12)
                 sure += 1
     assert sure > 12
+
+
+@pytest.mark.parametrize(("growth", "n_blocks"), [(2 / 3, 22), (1.0, 18), (2.0, 14), (2.0, 22)])
+def test_what_a_search_has_missed_had_no_larger_part_in_the_start(growth, n_blocks):
+    """Starts that see one mode ever less, until it is missed and all others are found."""
+    rng, missed = np.random.default_rng(1), 0
+    theta = body(500, growth, rng)
+    start = rng.standard_normal((500, BLOCK))
+    for share in 10.0 ** -np.arange(4.0, 60.0, 2.0):
+        start[9] *= share / np.linalg.norm(start[9])
+        T, R, residual = searched(theta, start, n_blocks)
+        chance = miss_probability(T, R, residual, 10)
+        if chance < 1.0 and not found(theta, T, residual, 10):
+            k = np.flatnonzero(residual > 1e-7)[0]
+            assert chi2.ppf(chance / (3 * (k + 1)), 4) / 3 > share**2
+            missed += 1
+    assert missed > 5
+
+
+@pytest.mark.parametrize("n_blocks", [11, 13])
+def test_the_bound_is_that_of_the_page(n_blocks):
+    """The polynomials, the norm beside what was found and the law of chance, written out."""
+    rng = np.random.default_rng(9)
+    theta, m = body(300, 1.0, rng), 4
+    T, R, residual = searched(theta, rng.standard_normal((300, BLOCK)), n_blocks)
+    k = np.flatnonzero(residual > 1e-7)[0]
+    ritz, S = (x[..., ::-1] for x in np.linalg.eigh(T))
+    found_part, c2 = S[:, :k], np.inf
+    W = np.vstack([R, np.zeros((T.shape[0] - BLOCK, BLOCK))])
+    for a in range(8):
+        left = W - found_part @ (found_part.T @ W)
+        p = ritz[m - 1] ** a * Chebyshev.basis(n_blocks - 1 - a)(2 * ritz[m - 1] / ritz[k] - 1)
+        gap = ritz[m - 1] - ritz[k]
+        c2 = min(c2, ritz[k] / gap * np.linalg.norm(left, 2) ** 2 / p**2)
+        W = T @ W
+    bound = (k + 1) * 3 * chi2.cdf(3 * 100 * c2 / 0.05, 4)
+    assert 0.0 < bound < 1e-3
+    assert_allclose(miss_probability(T, R, residual, m), bound, rtol=1e-6)
 
 
 @pytest.mark.parametrize("share", [1e-2, 1e-4, 1e-6])

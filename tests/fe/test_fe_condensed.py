@@ -130,3 +130,27 @@ def test_a_certified_reduction_takes_one_factorisation():
     exact = rom.modes(beam((20, 4, 4)), 12, interfaces={"x0": "rbe2", "x1": "rbe3"})
     full = body.provenance["comparison"]["free"]["full"]
     assert_allclose(full, exact.frequencies[6 : 6 + len(full)], rtol=1e-9)
+
+
+def test_shapes_that_are_not_static_are_replaced():
+    """Enhanced columns answer to inertia too; supports need constraint modes, and one factor."""
+    kinds = {"x0": "rbe2", "x1": "rbe3"}
+    body = rom.reduce(beam((20, 4, 4)), method=rom.EnhancedCraigBampton(40), interfaces=kinds)
+    stages = body.provenance["stages"]
+    assert sum(table.get("number of factorisations", 0) for table in stages.values()) == 1
+    exact = rom.modes(beam((20, 4, 4)), 6, interfaces=kinds, fixed=("x0",)).frequencies
+    assert_allclose(body.provenance["comparison"]["x0 held"]["full"], exact, rtol=1e-9)
+
+
+def test_a_search_that_was_restarted_is_counted(monkeypatch):
+    """What is left of the start after a restart proves nothing."""
+    model, counted = beam((14, 4, 3)), []
+    monkeypatch.setattr(petsc, "MAX_DENSE_DOFS", 0)
+    monkeypatch.setattr(petsc, "verify_count", lambda *a: counted.append(1))
+    held = model.operators.hold(model.interfaces["x0"].dofs)
+    expected, _ = model.operators.modes(held, 10)
+    assert not counted
+    monkeypatch.setattr(lanczos, "capacity", lambda k: k + 5 * lanczos.BLOCK_SIZE)
+    omega, _ = model.operators.modes(held, 10)
+    assert counted
+    assert_allclose(omega, expected, rtol=1e-10)
