@@ -45,7 +45,8 @@ def gaussian_block(ops: Any, k: int, n_before: int = 0) -> Array:
     are independent when each is given how many columns were drawn before it.
     """
     key = np.round(ops.fixed * PLACE_SCALE).astype(np.int64).view(np.uint64)
-    counter = key[:, None] + COUNTER_STEP * np.arange(1 + 2 * n_before, 1 + 2 * (n_before + k), dtype=np.uint64)
+    numbers = np.arange(1 + 2 * n_before, 1 + 2 * (n_before + k), dtype=np.uint64)
+    counter = key[:, None] + COUNTER_STEP * numbers
     u = (_mixed(counter) >> np.uint64(11)).astype(float) * 2.0**-53 + 2.0**-54
     normal = np.sqrt(-2.0 * np.log(u[:, :k])) * np.cos(2.0 * np.pi * u[:, k:])  # Box and Muller
     return normal / np.sqrt(np.maximum(ops.mass_diagonal, np.finfo(float).tiny))[:, None]

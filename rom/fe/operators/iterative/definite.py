@@ -103,7 +103,8 @@ def searched(
             V = run.vector(column, Recurrence(ops.comm, apply, inverse.approximate,
                                               loads[:, column : column + 1]))  # fmt: skip
             return Verdict(1.0, V - Phi @ ops.gram(MPhi, V))
-        growth = log_chebyshev(len(run.diagonals) - 1, 1.0 + 2.0 * mu / bounds[1])
+        degree = np.array([len(run.diagonals) - 1.0])
+        growth = log_chebyshev(degree, 1.0 + 2.0 * mu / bounds[1])
         c2 = np.exp(np.log(bounds[1] * run.first / (mu * variance)) - 2.0 * growth)
         chance = float(np.minimum(1.0, np.sqrt(2.0 / np.pi * c2)).prod())
         if chance <= MAX_MISS_PROBABILITY:

@@ -37,8 +37,12 @@ class ConjugateGradients:
         self.A, self.approximate, self.release = A, approximate, release
         self.comm = A.comm.tompi4py()
 
-    def solve(self, F: Array) -> Array:
+    def solve(self, F: Array, rtol: float = RESIDUAL_RTOL) -> Array:
         """A^-1 F for (n_local, k) right-hand sides, in blocks.
+
+        Args:
+            F: the right-hand sides.
+            rtol: residual over that of zero, in the norm of the approximate inverse.
 
         Raises:
             SolverError: if a column does not converge.
@@ -47,15 +51,15 @@ class ConjugateGradients:
         with piece(SOLUTION_PIECE):
             for first in range(0, F.shape[1], BLOCK_SIZE):
                 columns = slice(first, first + BLOCK_SIZE)
-                X[:, columns] = self._solve(np.array(F[:, columns], order="F"))
+                X[:, columns] = self._solve(np.array(F[:, columns], order="F"), rtol)
         return X
 
-    def _solve(self, R: Array) -> Array:
+    def _solve(self, R: Array, rtol: float) -> Array:
         """A^-1 R, which is overwritten; columns leave as they converge."""
         X = np.zeros(R.shape, order="F")
         P = self.approximate(R)
         rz = column_dots(self.comm, R, P)
-        goal, left = RESIDUAL_RTOL**2 * rz, np.flatnonzero(rz > 0.0)
+        goal, left = rtol**2 * rz, np.flatnonzero(rz > 0.0)
         for _ in range(MAX_ITERATIONS):
             if not left.size:
                 return X
@@ -70,13 +74,12 @@ class ConjugateGradients:
             left = left[new > goal[left]]
         raise SolverError(
             f"{left.size} of {R.shape[1]} static solutions did not converge in {MAX_ITERATIONS} "
-            f"iterations (residual {np.sqrt((rz / goal).max()) * RESIDUAL_RTOL:.1e}).",
+            f"iterations (residual {np.sqrt((rz / goal).max()) * rtol:.1e}).",
             hint='Use solver="direct" if the factor fits, or improve cells of extreme shape.',
         )
 
 
 Inverse = Factor | ConjugateGradients
-
 
 
 def refined(factor: Factor) -> ConjugateGradients:

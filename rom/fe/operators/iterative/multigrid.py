@@ -15,7 +15,7 @@ from rom.fe.operators.iterative.gradients import ConjugateGradients
 from rom.fe.operators.iterative.recurrence import Recurrence
 from rom.model import Array
 
-SMOOTHING_DEGREE = 2  # of Chebyshev's polynomial, before and after the coarse correction
+SMOOTHING_DEGREE = 3  # of the polynomial, before and after the coarse correction; measured best
 N_BOUND_STEPS = 15  # of Lanczos for the largest eigenvalue of D^-1 A
 BOUND_SAFETY = 1.1  # on that eigenvalue, which Lanczos finds from below
 EMPTY_RTOL = 1e-13  # diagonal entry of a motion that no node makes, over the largest one
@@ -80,7 +80,7 @@ class Level:
 
         Source:
             Lottes, Optimal polynomial smoothers for multigrid V-cycles, Numer. Linear Algebra
-            Appl. 30 (2023) e2518: polynomials of the fourth kind, equations 14 to 16.
+            Appl. 30 (2023) e2518: the polynomials of the fourth kind.
         """
         Z = (4.0 / 3.0 / self.rho) * (self.scale * R)
         X = Z.copy(order="F")
