@@ -332,7 +332,7 @@ def test_what_drives_a_mass_gives_it_its_acceleration(way, driven):
 
 
 def test_a_belt_takes_a_block_along_until_both_are_as_fast():
-    """Explicit; v = mu p A t / m up to the speed of the belt, that of a tool that moves sideways."""
+    """Explicit; v = mu p A t / m up to the speed of the belt, a tool that moves sideways."""
     X, T = rectangle((3, 3), box((0, 0), (1, 1)))
     body, p, mu, fast = sheet(X, T, element="F1", thickness=0.5), 0.2, 0.3, 0.05
     sides = outer_sides(body)

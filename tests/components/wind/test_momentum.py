@@ -176,7 +176,7 @@ def test_a_blade_passes_the_dam_of_the_tower():
 
 
 def test_the_mean_with_a_tower_is_that_of_each_strip_in_the_wind_it_meets():
-    """A rotor in uniform wind, one for each place of a strip; the dam U (1 - a^2 / Z^2) as in books.
+    """A rotor in uniform wind, one for each place of a strip; the dam is U (1 - a^2 / Z^2).
 
     Without tilt and cone the blades are 5.0191 m ahead of the axis of the tower, whose radius
     falls from 3 to 1.935 m in 87.6 m.

@@ -75,7 +75,7 @@ def test_the_wake_of_each_strip_follows_a_step_as_the_closed_form_does(before, t
     share = answer(run.t[start:, None] - run.t[start] + 0.5 * dt, slow, fast)
     exact = axial[0] + (axial[1] - axial[0]) * share
     size = np.abs(axial[1] - axial[0]).max()
-    assert_allclose(run.induced[start:], exact, atol=3e-3 * size)
+    assert_allclose(run.induced[start:], exact, atol=5e-4 * size)
     assert (a == 0.5).any() == (V == 4.5)  # the last case has strips beyond the cap
     # loads at one instant, from velocities of both filters and the profiles
     at, half = start + round(3.0 / dt), 0.5 * 1.225
@@ -88,9 +88,9 @@ def test_the_wake_of_each_strip_follows_a_step_as_the_closed_form_does(before, t
     q = half * np.array(blades.chord) * (through**2 + across**2)
     normal = q * (lift * np.cos(phi) + drag * np.sin(phi))
     driving = q * (lift * np.sin(phi) - drag * np.cos(phi))
-    assert_allclose(run.thrust[at], 3 * normal @ blades.length, rtol=2e-3)
+    assert_allclose(run.thrust[at], 3 * normal @ blades.length, rtol=1.5e-4)
     torque = 3 * driving @ (blades.radius * blades.length)
-    assert_allclose(run.torque[at], torque, rtol=5e-3, atol=5e-3 * np.abs(run.torque).max())
+    assert_allclose(run.torque[at], torque, rtol=3e-4)
 
 
 def pitched(dynamic, back=False):
