@@ -58,7 +58,7 @@ LEFT_BEHIND = {
     "demo_whole_turbine": {
         "turbine_campbell.png", "whole_turbine.gif", "whole_turbine.png",
     },
-    "demo_sheet": {"sheet.png", "taylor_bar.gif"},
+    "demo_sheet": {"sheet.png", "strip.png", "taylor_bar.gif"},
     "demo_slider_crank": {
         "crank_mesh.png", "frames.png", "instants.png", "motion.png", "report.html",
         "rod.rom.npz", "rod.vtu", "rod_frequencies.png", "rod_mesh.png", "rod_modes.png",
