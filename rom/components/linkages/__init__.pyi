@@ -1,3 +1,4 @@
+from rom.components.linkages.chains import Link as Link
 from rom.components.linkages.dynamic_isotropy import Isotropic as Isotropic
 from rom.components.linkages.dynamic_isotropy import angle_grid as angle_grid
 from rom.components.linkages.dynamic_isotropy import closed_loci as closed_loci
@@ -16,7 +17,6 @@ from rom.components.linkages.prismatic_linkages import SlideArm as SlideArm
 from rom.components.linkages.prismatic_linkages import SlideFiveBar as SlideFiveBar
 from rom.components.linkages.two_dof_linkages import Driven as Driven
 from rom.components.linkages.two_dof_linkages import FiveBar as FiveBar
-from rom.components.linkages.two_dof_linkages import Link as Link
 from rom.components.linkages.two_dof_linkages import TwoLink as TwoLink
 from rom.components.linkages.two_dof_linkages import mechanism_inertia as mechanism_inertia
 from rom.components.linkages.two_dof_linkages import reduced_link as reduced_link

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -10,11 +10,29 @@ import numpy.typing as npt
 from rom.errors import ModelError
 from rom.model import Array
 
-if TYPE_CHECKING:
-    from rom.components.linkages.two_dof_linkages import Link
-
 MIN_HEIGHT = 1e-6  # of the tip over the way between the elbows: flatter, and it counts as one line
 CHUNK_SIZE = 8192  # configurations at once: elastic links need (3 + r) (2 + sum r) numbers for each
+
+
+@dataclass(frozen=True, slots=True)
+class Link:
+    """A planar link between two pins, its frame on the first pin, its axis through the second.
+
+    Attributes:
+        length: distance of the pins [m].
+        M: (3 + r, 3 + r) mass for velocity of the first pin along and across the axis, angular
+            velocity of that pin, rates of r elastic coordinates [kg, kg m, kg m^2].
+        tip: (2, r) displacement of the second pin along and across per elastic coordinate [m].
+    """
+
+    length: float
+    M: Array
+    tip: Array
+
+    @property
+    def r(self) -> int:
+        """Number of elastic coordinates."""
+        return self.tip.shape[1]
 
 
 @dataclass
@@ -34,7 +52,7 @@ class Motion:
         """No link yet, its pin on the ground."""
         return cls(np.zeros((N, n, n)), np.zeros((N, 2, n)))
 
-    def add(self, link: "Link", angle: Array, spin: Array, at: int) -> None:
+    def add(self, link: Link, angle: Array, spin: Array, at: int) -> None:
         """Add a link at an angle (N,) that turns with ``spin`` (N or 1, n)."""
         N, _, n = self.pin.shape
         e = directions(angle)
@@ -47,7 +65,7 @@ class Motion:
         self.pin = self.pin + swing + elastic_tip(link, angle, n, at)
 
 
-def elastic_tip(link: "Link", angle: Array, n: int, at: int) -> Array:
+def elastic_tip(link: Link, angle: Array, n: int, at: int) -> Array:
     """(N, 2, n) velocity of the second pin relative to the frame of the link."""
     e, out = directions(angle), np.zeros((angle.size, 2, n))
     out[:, :, at : at + link.r] = np.stack([e, left_of(e)], axis=2) @ link.tip
@@ -55,7 +73,7 @@ def elastic_tip(link: "Link", angle: Array, n: int, at: int) -> Array:
 
 
 def meeting(
-    left: Array, right: Array, couplers: tuple["Link", "Link"], side: int, q: tuple[Array, Array]
+    left: Array, right: Array, couplers: tuple[Link, Link], side: int, q: tuple[Array, Array]
 ) -> Array:
     """(..., 2) tip of two couplers that hang on elbows (..., 2) and (..., 2) [m].
 
@@ -81,14 +99,14 @@ def meeting(
     return left + along[..., None] * gap + side * np.sqrt(height)[..., None] * left_of(gap)
 
 
-def reach(left: Array, right: Array, couplers: tuple["Link", "Link"]) -> npt.NDArray[np.bool_]:
+def reach(left: Array, right: Array, couplers: tuple[Link, Link]) -> npt.NDArray[np.bool_]:
     """(...) whether couplers on elbows (..., 2) [m] meet, and not in one line."""
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.asarray(_triangle(left, right, couplers)[3] > MIN_HEIGHT**2)
 
 
 def _triangle(
-    left: Array, right: Array, couplers: tuple["Link", "Link"]
+    left: Array, right: Array, couplers: tuple[Link, Link]
 ) -> tuple[Array, Array, Array, Array]:
     """Way between the elbows, its square, and the tip along it and, squared, across it."""
     a, b = (coupler.length for coupler in couplers)
@@ -98,7 +116,7 @@ def _triangle(
     return gap, square, along, a * a / square - along**2
 
 
-def closed(sides: list[Motion], couplers: tuple["Link", "Link"], P: Array, at: Any) -> None:
+def closed(sides: list[Motion], couplers: tuple[Link, Link], P: Array, at: Any) -> None:
     """Add the couplers from elbows P[:, 0] and P[:, 2] to a tip P[:, 1] (N, 3, 2) [m].
 
     Both bring the same velocity to the tip: two equations for their two spins.

@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rom.components.linkages.chains import (
+    Link,
     Motion,
     closed,
     directions,
@@ -23,7 +24,7 @@ from rom.components.linkages.chains import (
     reach,
     unit_rows,
 )
-from rom.components.linkages.two_dof_linkages import Elastic, Link, as_elastic
+from rom.components.linkages.two_dof_linkages import Elastic, as_elastic
 from rom.errors import ModelError
 from rom.model import Array
 

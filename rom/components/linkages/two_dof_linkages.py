@@ -16,6 +16,7 @@ from scipy.linalg import null_space
 from rom.arguments import one_of
 from rom.body.flexible import FlexibleBody
 from rom.components.linkages.chains import (
+    Link,
     Motion,
     closed,
     directions,
@@ -35,27 +36,6 @@ from rom.model import Array
 
 Elastic = Literal["held", "free"]
 MAX_FOLLOWED = 0.5  # of a drive between two assemblies: farther, a linkage may close elsewhere
-
-
-@dataclass(frozen=True, slots=True)
-class Link:
-    """A planar link between two pins, its frame on the first pin, its axis through the second.
-
-    Attributes:
-        length: distance of the pins [m].
-        M: (3 + r, 3 + r) mass for velocity of the first pin along and across the axis, angular
-            velocity of that pin, rates of r elastic coordinates [kg, kg m, kg m^2].
-        tip: (2, r) displacement of the second pin along and across per elastic coordinate [m].
-    """
-
-    length: float
-    M: Array
-    tip: Array
-
-    @property
-    def r(self) -> int:
-        """Number of elastic coordinates."""
-        return self.tip.shape[1]
 
 
 def rigid_link(mass: float, length: float, centre: npt.ArrayLike, inertia: float) -> Link:
