@@ -96,7 +96,9 @@ def converted(body: Body, units: str) -> Body:
 
 def _quartic(old: Quartic, f: Factors) -> Quartic:
     energy, q = f.force * f.length, f.length / f.shape
-    return Quartic(old.K * (energy / q**2), old.cubic * (energy / q**3), old.quartic * (energy / q**4))
+    return Quartic(
+        old.K * (energy / q**2), old.cubic * (energy / q**3), old.quartic * (energy / q**4)
+    )
 
 
 def _marker(body: BodyData, marker: Marker, f: Factors) -> Marker:

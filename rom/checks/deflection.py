@@ -21,7 +21,7 @@ from rom.model import Array, FEModel, Row
 from rom.rows import row
 
 DISPLACEMENT_RTOL = 5e-3  # of the largest load, in the mean square over the mass
-TANGENT_RTOL = 1e-2  # frequencies about a deflected state are errors of one order more
+TANGENT_RTOL = 2e-2  # small errors of stress are large ones of the stiffness it gives a thin body
 FORCES = ("f_x", "f_y", "f_z", "m_x", "m_y", "m_z")
 N_TANGENT = 3  # lowest frequencies compared there
 MAX_ITERATIONS = 30  # of Newton's method on the full model
@@ -66,7 +66,9 @@ def load_cases(geometric: Geometric) -> dict[str, Array]:
     """{name: share of each component of the range (l,)}."""
     components = geometric.components()
     units = np.eye(len(components))
-    named = {f"{name} {FORCES[k]}": unit for (name, k, _), unit in zip(components, units, strict=True)}
+    named = {
+        f"{name} {FORCES[k]}": unit for (name, k, _), unit in zip(components, units, strict=True)
+    }
     cases = {f"{sign}{name}": value * unit for name, unit in named.items()
              for sign, value in (("", 1.0), ("-", -1.0))}  # fmt: skip
     if len(named) > 1:
@@ -105,7 +107,7 @@ class HeldSolid:
         self.inside = splu(csc_matrix(self.T.T @ self.T))
 
     def state(self, u: Array, W: Array) -> Array | None:
-        """(m,) equilibrium in a under nodal loads W (n,) [N], from near u (n,); None if not found."""
+        """(m,) equilibrium in a under nodal loads W (n,) [N] near u (n,); None if not found."""
         near = self.inside.solve(self.T.T @ u)
         found = self._newton(near, W)
         return self._from_rest(W) if found is None else found

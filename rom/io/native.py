@@ -250,10 +250,6 @@ def verify(body: FlexibleBody, path: Path) -> None:
         ):
             raise FileFormatError("the surface does not fit the body.", where=str(path))
     _verify_stiffening(body, path)
-    if body.quartic is not None and not body.quartic.fits(r):
-        raise FileFormatError(
-            f"the energy at large deflection does not fit {r} coordinates.", where=str(path)
-        )
     for name, A in (("K", body.K), ("D", body.D), ("inertia", body.inertia)):
         if np.abs(A - A.T).max(initial=0.0) > 1e-10 * np.abs(A).max(initial=1e-300):
             raise QualityGateError(f"{name} is not symmetric.", where=str(path))
@@ -262,6 +258,11 @@ def verify(body: FlexibleBody, path: Path) -> None:
 
 
 def _verify_stiffening(body: FlexibleBody, path: Path) -> None:
+    if body.quartic is not None and not body.quartic.fits(body.n_modes):
+        raise FileFormatError(
+            f"the energy at large deflection does not fit {body.n_modes} coordinates.",
+            where=str(path),
+        )
     for load, A in body.K_geo.items():
         if A.shape != body.K.shape:
             raise FileFormatError(

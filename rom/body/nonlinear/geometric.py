@@ -17,11 +17,11 @@ Source:
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from itertools import combinations
+from itertools import combinations, product
 from typing import Any
 
 import numpy as np
-from scipy.linalg import null_space
+from scipy.linalg import eigh, null_space
 
 from rom.arguments import typed, whole
 from rom.body.nonlinear.quartic import Quartic
@@ -33,6 +33,10 @@ from rom.names import offered
 
 DEPENDENT_RTOL = 1e-10  # energy of a derivative, of the largest, that the others explain
 EQUAL_RTOL = 1e-3  # of shares of energy: states of two planes of equal stiffness stay together
+N_MODES = 4  # about each state that a range leads to, for which shapes are kept
+# A mode loses 1e-4 of its stiffness if a hundredth of its energy norm is missed, states must not
+# lose that much: at the usual tolerance of 1e-4 both are met.
+MODE_SHARE = 1e-2
 MAX_COORDINATES = 80  # their tensors take 0.2 GB while they are made
 
 
@@ -99,8 +103,9 @@ class Geometric:
         n = len(self.components())
         units = np.eye(n)
         alone = [sign * unit for unit in units for sign in (1, -1)]
+        signs = list(product((1, -1), repeat=2))
         skew = [(a * units[i] + b * units[j]) / np.sqrt(2)
-                for i, j in combinations(range(n), 2) for a in (1, -1) for b in (1, -1)]  # fmt: skip
+                for (i, j), (a, b) in product(combinations(range(n), 2), signs)]  # fmt: skip
         return np.array(alone + skew)
 
 
@@ -142,11 +147,12 @@ def enriched(
     shapes, theta = _with_derivatives(geometric, model, ops, connection, basis, reference, energy)
     quartic = Quartic.from_gram(energy.gram(shapes.E), shapes.E.shape[1])
     states = _states(geometric, quartic, shapes.loads)
-    added = theta @ _principal(geometric, states[:, shapes.n_basis :].T)
-    labels = tuple(f"deflection {k + 1}" for k in range(added.shape[1]))
-    return replace(
-        basis, Psi=np.hstack([basis.Psi, added]), labels=(*basis.labels, *labels)
+    modes = _modes_about(states, quartic, quadratic(ops, ops.apply_M, shapes.E))
+    added = theta @ _principal(
+        geometric, states[:, shapes.n_basis :].T, modes[:, shapes.n_basis :].T
     )
+    labels = tuple(f"deflection {k + 1}" for k in range(added.shape[1]))
+    return replace(basis, Psi=np.hstack([basis.Psi, added]), labels=(*basis.labels, *labels))
 
 
 def refuse(
@@ -189,7 +195,7 @@ def refuse(
             )
 
 
-def _with_derivatives(  # noqa: PLR0913  those of `enriched`
+def _with_derivatives(
     geometric: Geometric, model: FEModel, ops: Operators, connection: Any, basis: Basis,
     reference: str, energy: Any,
 ) -> tuple[Shapes, Array]:  # fmt: skip
@@ -201,7 +207,8 @@ def _with_derivatives(  # noqa: PLR0913  those of `enriched`
     N = null_space(still / np.abs(still).max(axis=1, keepdims=True))
     moving = Psi[:, :n_b] @ N
     K = quadratic(ops, ops.apply_K, moving)
-    static = moving @ np.linalg.solve(K, _loads(geometric, model, ops, moving))
+    every = [(name, component, 1.0) for name in geometric.loads for component in range(6)]
+    static = moving @ np.linalg.solve(K, _loads(every, model, ops, moving))
     n_modes = min(geometric.n_modes, basis.omega.size)
     if n_modes:
         n_modes = whole_clusters(basis.omega**2, n_modes)
@@ -210,7 +217,7 @@ def _with_derivatives(  # noqa: PLR0913  those of `enriched`
     _refuse_many(n_basis + active.shape[1] * (active.shape[1] + 1) // 2)
     theta = _derivatives(connection.ops, basis, energy, active)
     E = np.hstack([moving, active[:, static.shape[1] :], connection.ops.expand(theta)])
-    return Shapes(E, _loads(geometric, model, ops, E), n_basis), theta
+    return Shapes(E, _loads(geometric.components(), model, ops, E), n_basis), theta
 
 
 def _refuse_many(n: int) -> None:
@@ -222,10 +229,10 @@ def _refuse_many(n: int) -> None:
         )
 
 
-def _loads(geometric: Geometric, model: FEModel, ops: Operators, E: Array) -> Array:
-    """(r, l) forces [N] of each component at its largest on shapes (n_local, r)."""
+def _loads(components: Any, model: FEModel, ops: Operators, E: Array) -> Array:
+    """(r, l) forces [N] of components of loads at their largest on shapes (n_local, r)."""
     columns = []
-    for name, component, largest in geometric.components():
+    for name, component, largest in components:
         interface = model.interfaces[name]
         columns.append(largest * (mean_motion(interface) @ ops.rows(E, interface.dofs))[component])
     return np.array(columns).T
@@ -260,8 +267,25 @@ def _states(geometric: Geometric, quartic: Quartic, loads: Array) -> Array:
     return np.vstack(found)
 
 
-def _principal(geometric: Geometric, Y: Array) -> Array:
-    """(p, k) directions of most energy in states (p, s), whose coordinates have the energy 1/2."""
+def _modes_about(states: Array, quartic: Quartic, M: Array) -> Array:
+    """(s m, r) lowest modes about each state (s, r), of the energy 1/2.
+
+    A beam that is bent in one plane needs companions of bending in the other one as well, however
+    small that is.
+    """
+    found = []
+    for q in states:
+        lam, V = eigh(quartic.tangent(q), M)
+        found.append((V[:, :N_MODES] / np.sqrt(np.maximum(lam[:N_MODES], lam[-1] * 1e-15))).T)
+    return np.vstack(found)
+
+
+def _principal(geometric: Geometric, Y: Array, modes: Array) -> Array:
+    """(p, k) directions of most energy in states (p, s) and modes (p, m) about them.
+
+    The coordinates have the energy 1/2. A mode weighs `MODE_SHARE` of all states together.
+    """
+    Y = np.hstack([Y, MODE_SHARE * np.linalg.norm(Y) * modes])
     U, s, _ = np.linalg.svd(Y, full_matrices=False)
     if geometric.n_shapes is not None:
         k = min(geometric.n_shapes, s.size)

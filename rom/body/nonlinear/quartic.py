@@ -81,10 +81,12 @@ class Quartic:
     @cached_property
     def by_pairs(self) -> tuple[Array, Array]:
         """T3 as (r (r + 1) / 2, r) and T4 as a matrix of pairs, for fast contraction."""
-        r, pair = self.n, self._pair
+        r = self.n
         i, j = np.triu_indices(r)
         third = np.arange(r)
-        T3 = self.cubic[position(np.stack(np.broadcast_arrays(i[:, None], j[:, None], third), -1), r)]
+        T3 = self.cubic[
+            position(np.stack(np.broadcast_arrays(i[:, None], j[:, None], third), -1), r)
+        ]
         four = np.broadcast_arrays(i[:, None], j[:, None], i[None], j[None])
         T4 = self.quartic[position(np.stack(four, -1), r)]
         return T3, T4

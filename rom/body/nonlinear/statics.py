@@ -37,7 +37,7 @@ def _led_to(energy: Quartic, q: Array, start: Array, end: Array) -> Array:
             step /= 2
             if step < MIN_LOAD_STEP:
                 raise ModelError(
-                    f"no equilibrium was found beyond {done:.0%} of a step of load.",
+                    f"no stable equilibrium was found beyond {done:.4g} of a step of load.",
                     hint="Ask for smaller loads: the body may snap through or buckle before.",
                 )
         else:

@@ -16,7 +16,6 @@ from collections.abc import Iterator
 from typing import Any
 
 from mpi4py import MPI
-from petsc4py import PETSc
 
 import numpy as np
 import ufl
