@@ -415,3 +415,10 @@ def test_a_wall_in_the_wind_falls_stone_by_stone():
         wind = Wind(lambda t, p=factor * limit: p * ramp(0.5)(t), edges)
         motion = simulate(model, t_end=2.0, dt=2e-3, actions=[wind], keep=0.97, save_every=1000)
         assert bool(np.abs(motion.v[-1]).max() < 1e-4) is stays
+
+
+def test_contacts_that_turn_back_within_a_step_stick():
+    """Sliding one way, then the other, in turns, never ends: steps were cut 281 times."""
+    shaking = BaseMotion(sine(1.0, 0.5))
+    motion = simulate(arch(40, 5.0, 0.6), t_end=0.4, dt=1e-3, actions=[shaking], keep=0.999)
+    assert motion.cuts < 40 and np.abs(motion.v).max() > 0.01
