@@ -299,12 +299,11 @@ def parted(C, P, reach, k, first, last):
 @inner
 def drop_doubles(C, P, reach):
     """Where two corners meet, let only the edge with the larger gap, or glue, part the blocks."""
-    for k in range(C.used[0]):
+    for k in range(C.first[0], C.used[0]):
         j = C.who[k, 2]
-        C.way[k] = 1.0
-        if C.bond[k] < 0 and (parted(C, P, reach, k, 0, C.first[0])
-                              or parted(C, P, reach, k, C.first[j], C.first[j + 1])):  # fmt: skip
-            C.way[k] = 0.0
+        double = parted(C, P, reach, k, 0, C.first[0])
+        double = double or parted(C, P, reach, k, C.first[j], C.first[j + 1])
+        C.way[k] = 0.0 if double else 1.0
     kept = C.first[0]
     for b in range(C.first.size - 1):
         start, end = C.first[b], C.first[b + 1]
