@@ -215,3 +215,44 @@ def test_frequencies_and_shapes_are_those_of_the_factor(size, kind):
     stage = other.provenance["stages"]["shapes"]
     assert stage["probability of a missed mode"] < 1e-9
     assert stage["largest residual of a mode"] < 1e-8
+
+
+def test_the_smoother_is_the_polynomial_of_the_fourth_kind(problem):
+    """What it leaves of an eigenvector: sin((k + 1/2) phi) / ((2k + 1) sin(phi / 2))."""
+    from rom.fe.operators.iterative import multigrid
+
+    ops, _, K, _ = problem
+    level = multigrid.Level(ops.K, ops.M)
+    lam, V = np.linalg.eigh(K / 6.0)  # the diagonal is six everywhere
+    phi = np.arccos(1.0 - 2.0 * lam / level.rho)
+    k = multigrid.SMOOTHING_DEGREE
+    left = np.sin((k + 0.5) * phi) / ((2 * k + 1) * np.sin(0.5 * phi))
+    X, R = level.smoothed(np.asfortranarray(V), residual=True)
+    assert_allclose(R, V * left, atol=1e-12)
+    assert_allclose(K @ X, V * (1.0 - left), atol=1e-12)
+
+
+def test_loads_are_independent_of_the_search_and_as_heavy_as_the_mass(problem, monkeypatch):
+    from rom.fe.operators.iterative import search as module
+    from rom.fe.operators.spectrum import gaussian_block
+
+    seen, said = [], module.searched
+    monkeypatch.setattr(module, "searched", lambda *a: seen.append(a) or said(*a))
+    search = found(problem, 11)
+    search.prove()
+    loads = seen[0][4]
+    assert loads.std() == pytest.approx(np.sqrt(MASS), rel=0.1)
+    start = gaussian_block(problem[0], search.width)
+    alike = np.corrcoef(np.hstack([start, loads]), rowvar=False) - np.eye(search.width + 4)
+    assert np.abs(alike).max() < 5.0 / np.sqrt(EDGE**3)
+
+
+def test_what_was_missed_stands_in_the_block(problem, monkeypatch):
+    from rom.fe.operators.iterative.search import BlockSearch
+
+    forgetful(monkeypatch, 1)
+    search, taken, take = found(problem, 11), [], BlockSearch._take
+    monkeypatch.setattr(BlockSearch, "_take", lambda self, X: taken.append(X) or take(self, X))
+    search.prove()
+    v = taken[0][:, -1]
+    assert (v @ problem[2] @ v) / (MASS * v @ v) < eigenvalues()[14]

@@ -13,7 +13,7 @@ from rom.fe.operators.spectrum import gaussian_block
 from rom.model import Array
 from rom.process.stopwatch import MISS_NOTE, RESIDUAL_NOTE, SEARCH_PIECE, note, piece
 
-MODE_RTOL = 1e-8  # residual in the norm of K^-1: frequencies of the reduced body follow it
+MODE_RTOL = 2e-9  # residual in the norm of K^-1: frequencies of the reduced body follow it
 SPARE_RTOL = 1e-2  # the same for spare modes, which only show where the next ones lie
 STILL_RTOL = 1e-11  # change of an eigenvalue whose vector is left alone once it has converged
 MAX_ITERATIONS = 300  # well posed elasticity takes 15 to 40
