@@ -51,7 +51,7 @@ def miss_probability(T: Array, start: Array, residual: Array, m: int) -> float:
     W = S[:b].T @ start  # in Ritz vectors
     powers = np.arange(float(min(MAX_POWER, n_blocks)))
     left = [np.linalg.norm((theta[k:] / theta[m - 1])[:, None] ** a * W[k:], 2) for a in powers]
-    growth = _log_chebyshev(n_blocks - 1 - powers, 2.0 * ratio - 1.0)
+    growth = log_chebyshev(n_blocks - 1 - powers, 2.0 * ratio - 1.0)
     log_c2 = np.min(2.0 * np.log(left) - 2.0 * growth) - np.log(ratio - 1.0)
     c2 = SAFETY_FACTOR * np.exp(min(log_c2, 0.0)) / LEAST_SHARE
     chance = N_TOGETHER * gammainc(0.5 * (b - N_TOGETHER + 1), 0.5 * N_TOGETHER * c2)
@@ -64,7 +64,7 @@ def _repeated(theta: Array) -> bool:
     return bool((width <= CLUSTER_RTOL * theta[: 1 - N_TOGETHER]).any())
 
 
-def _log_chebyshev(degree: Array, x: float) -> Array:
+def log_chebyshev(degree: Array, x: float) -> Array:
     """Logarithm of Chebyshev's polynomial T_degree(x), x > 1."""
     t = degree * np.arccosh(x)
     return t + np.log1p(np.exp(-2.0 * t)) - np.log(2.0)

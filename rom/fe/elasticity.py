@@ -61,8 +61,8 @@ def model(
             "iterative" that fits into memory, named in ``provenance["solver"]``; "direct": a
             MUMPS factor, the fastest when it fits; "low-rank" or "low-rank:1e-8": the same with
             compressed blocks; "out-of-core": the factor on disk; "low-rank+out-of-core";
-            "iterative": multigrid, with little memory and without the count that proves no mode
-            missed.
+            "iterative": multigrid, with little memory; that no mode is missed is then shown by
+            random loads, with the probability in ``provenance["stages"]``.
         comm: the ranks that share the model.
         mesh_options: ``scale``, ``faces``, ``order``, ``trust``, ``time_limit`` and
             ``memory_limit`` of `rom.fe.mesh.read.read_mesh`. Cells are curved where the geometry

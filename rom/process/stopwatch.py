@@ -19,6 +19,7 @@ FACTORISATION_PIECE, SOLUTION_PIECE, SEARCH_PIECE, REST_PIECE = (
 MEGABYTE_SIZE = 1e6  # [bytes]
 # numbers that pieces of work leave with the stage under way
 FLOPS_NOTE, MISS_NOTE = "flops of the largest factorisation", "probability of a missed mode"
+RESIDUAL_NOTE = "largest residual of a mode"  # in the norm of K^-1, of the mode
 
 
 class Stopwatch:

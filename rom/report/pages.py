@@ -15,6 +15,7 @@ from rom.process.stopwatch import (
     FACTORISATION_PIECE,
     FLOPS_NOTE,
     MISS_NOTE,
+    RESIDUAL_NOTE,
     REST_PIECE,
     SEARCH_PIECE,
     SOLUTION_PIECE,
@@ -218,12 +219,13 @@ def _provenance(body: "FlexibleBody") -> list[str]:
 def _stages(stages: dict[str, dict[str, float]]) -> list[str]:
     """Where the time of the reduction went."""
     pieces = (FACTORISATION_PIECE, SOLUTION_PIECE, SEARCH_PIECE, REST_PIECE)
+    notes = (FLOPS_NOTE, MISS_NOTE, RESIDUAL_NOTE)
     rows = [
         (stage, f"{found['seconds']:.2f}", *(_piece(found, name) for name in pieces),
-         f"{found['MB']:.0f}", *(_noted(found, name) for name in (FLOPS_NOTE, MISS_NOTE)))
+         f"{found['MB']:.0f}", *(_noted(found, name) for name in notes))
         for stage, found in stages.items()
     ]  # fmt: skip
-    header = ("stage", "seconds", *pieces, "memory [MB]", FLOPS_NOTE, MISS_NOTE)
+    header = ("stage", "seconds", *pieces, "memory [MB]", *notes)
     ranks = max((found.get("ranks", 1) for found in stages.values()), default=1)
     caption = (
         f"Where the time of the reduction went, in seconds of one process of {ranks}, and in "

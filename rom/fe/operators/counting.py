@@ -16,7 +16,7 @@ from rom.model import Array
 def verify_count(ops: Any, lam: Array, m: int, n_rigid: int, spent: Any = None) -> None:
     """Compare the number of modes found with the inertia of K - sigma M (Sylvester).
 
-    Without a factor there is nothing to count; `davidson` searches for missed modes instead.
+    Without a factor there is nothing to count; `definite` looks for missed modes instead.
 
     Args:
         ops: `PETScOperators` of the body.

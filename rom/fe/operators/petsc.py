@@ -25,7 +25,9 @@ from rom.fe.operators.counting import verify_count
 from rom.fe.operators.factor import Factor, dense_rows
 from rom.fe.operators.foreseen import check_factor_memory
 from rom.fe.operators.held import RIGID_RTOL, HeldPETSc
-from rom.fe.operators.iterative import ConjugateGradients, Inverse, davidson, multigrid, refined
+from rom.fe.operators.iterative.gradients import ConjugateGradients, Inverse, refined
+from rom.fe.operators.iterative.multigrid import multigrid
+from rom.fe.operators.iterative.search import lowest_modes
 from rom.fe.operators.krylov_schur import krylov_schur
 from rom.fe.operators.lanczos import BlockLanczos, capacity
 from rom.fe.operators.memory import give_back
@@ -342,7 +344,8 @@ class PETScOperators:
     def lowest(self, k: int, sigma: float, factor: Inverse, deflated: Array) -> tuple[Array, Array]:
         """The k eigenvalues above sigma beside the deflated columns, and their modes."""
         if self.solver.iterative and isinstance(factor, ConjugateGradients):
-            return davidson(self, factor, deflated, k)
+            spare = min(N_SPARE_MODES, k - 1)
+            return lowest_modes(self, factor, sigma, deflated, k - spare, spare)
         if isinstance(factor, Factor):
             return krylov_schur(self, factor, sigma, deflated, k)
         return self.by_blocks(k - N_SPARE_MODES, sigma, factor, deflated)[:2]

@@ -16,8 +16,8 @@ class Solver:
     """A choice among ways to solve.
 
     Attributes:
-        iterative: conjugate gradients with algebraic multigrid, no factor; modes are then not
-            verified by an inertia count.
+        iterative: blocks of vectors and algebraic multigrid, no factor; whether modes are missing
+            is then asked of random loads, not of an inertia.
         low_rank: tolerance to which blocks of the factor are compressed; 0 for an exact factor.
             What is lost comes back by conjugate gradients on top.
         out_of_core: the factor lives on disk, in the folder of MUMPS_OOC_TMPDIR or in /tmp.

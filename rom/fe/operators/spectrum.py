@@ -38,13 +38,15 @@ def fixed_vector(comm: MPI.Comm, rigid: Array | None, first: int, n_local: int) 
     return np.sin((points - low) / size @ DIRECTIONS + np.arange(1.0, 4.0)).ravel()
 
 
-def gaussian_block(ops: Any, k: int) -> Array:
+def gaussian_block(ops: Any, k: int, n_before: int = 0) -> Array:
     """(n_local, k) Gaussian columns with components of about one in all modes.
 
-    The numbers depend on the place of a dof, mixed beyond recognition, and not on its rank.
+    The numbers depend on the place of a dof, mixed beyond recognition, and not on its rank. Blocks
+    are independent when each is given how many columns were drawn before it.
     """
     key = np.round(ops.fixed * PLACE_SCALE).astype(np.int64).view(np.uint64)
-    counter = key[:, None] + COUNTER_STEP * np.arange(1, 2 * k + 1, dtype=np.uint64)
+    numbers = np.arange(1 + 2 * n_before, 1 + 2 * (n_before + k), dtype=np.uint64)
+    counter = key[:, None] + COUNTER_STEP * numbers
     u = (_mixed(counter) >> np.uint64(11)).astype(float) * 2.0**-53 + 2.0**-54
     normal = np.sqrt(-2.0 * np.log(u[:, :k])) * np.cos(2.0 * np.pi * u[:, k:])  # Box and Muller
     return normal / np.sqrt(np.maximum(ops.mass_diagonal, np.finfo(float).tiny))[:, None]

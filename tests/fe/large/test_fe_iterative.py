@@ -1,0 +1,260 @@
+"""The path without a factor: known spectra, planted misses, and the factor's own answers."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy import sparse
+
+import rom
+from cases.long import few
+from rom.errors import ModesMissedError
+
+pytestmark = pytest.mark.fenicsx
+STEEL = rom.Material(E=210e9, nu=0.3, rho=7850.0)
+EDGE = 8  # points of a cube's edge
+MASS = 2.0
+
+
+def chain():
+    return sparse.diags([-1.0, 2.0, -1.0], [-1, 0, 1], shape=(EDGE, EDGE))
+
+
+def cube():
+    """The Laplacian on a cube: most eigenvalues are three or six times there, in closed form."""
+    from mpi4py import MPI
+
+    from rom.fe.operators.petsc import PETScOperators, aij
+
+    n, line = EDGE**3, sparse.identity(EDGE)
+    K = sum(
+        sparse.kron(sparse.kron(a, b), c)
+        for a, b, c in ((chain(), line, line), (line, chain(), line), (line, line, chain()))
+    )
+    mats = [aij(sparse.csr_matrix(A), ((n, n), (n, n)), MPI.COMM_SELF)
+            for A in (K, MASS * sparse.identity(n))]  # fmt: skip
+    return PETScOperators(*mats), K.toarray()
+
+
+def eigenvalues():
+    lam = 4.0 * np.sin(np.pi * np.arange(1, EDGE + 1) / (2 * EDGE + 2)) ** 2
+    return np.sort((lam[:, None, None] + lam[:, None] + lam).ravel()) / MASS
+
+
+@pytest.fixture(scope="module")
+def problem():
+    """The cube, with an approximate inverse that errs by half at the lowest eigenvalue."""
+    from rom.fe.operators.iterative.gradients import ConjugateGradients
+
+    ops, K = cube()
+    P = np.linalg.inv(K + 0.4 * np.eye(K.shape[0]))
+    return ops, ConjugateGradients(ops.K, lambda F: P @ F, lambda: None), K, P
+
+
+def found(problem, m, spare=3):
+    from rom.fe.operators.iterative.search import BlockSearch
+
+    ops, inverse = problem[:2]
+    search = BlockSearch(ops, inverse, np.zeros((ops.n, 0)), m, spare)
+    search.solve()
+    return search
+
+
+@pytest.mark.parametrize("m", [1, 4, 7, 11, 40])
+def test_repeated_eigenvalues_are_all_found(problem, m):
+    search = found(problem, m)
+    assert_allclose(search.theta[:m], eigenvalues()[:m], rtol=1e-12)
+    assert search.prove() < 1e-9
+    X = search.X[:, : search.k]
+    assert_allclose(MASS * X.T @ X, np.eye(search.k), atol=1e-11)
+
+
+def test_static_solutions_are_those_of_a_dense_solver(problem):
+    _, inverse, K, _ = problem
+    F = np.random.default_rng(3).standard_normal((K.shape[0], 20))  # more than one block
+    X = np.linalg.solve(K, F)
+    assert_allclose(inverse.solve(F), X, atol=1e-10 * np.abs(X).max())
+
+
+def verdict(problem, missing, m=11, gap=0.5):
+    """What is said of the exact modes when some of them are withheld."""
+    from rom.fe.operators.iterative.definite import N_COLUMNS, searched, spectral_bounds
+
+    ops, inverse, K, _ = problem
+    lam, Phi = np.linalg.eigh(K)
+    kept = np.setdiff1d(np.arange(m), missing)
+    lam, beyond = lam[:m] / MASS, lam[m] / MASS
+    Phi = Phi[:, kept] / np.sqrt(MASS)
+    loads = np.random.default_rng(5).standard_normal((ops.n, N_COLUMNS)) * np.sqrt(MASS)
+    sigma = lam[-1] + gap * (beyond - lam[-1])
+    bounds = spectral_bounds(ops, inverse, loads)
+    modes = (Phi, MASS * Phi, lam[-1])
+    return searched(ops, inverse, modes, sigma, loads, bounds), sigma, Phi
+
+
+@pytest.mark.parametrize("missing", [[0], [1], [2, 3], [6], [10], [0, 5, 10]])
+def test_a_mode_withheld_is_found(problem, missing):
+    """Also one of three that share a frequency."""
+    said, sigma, Phi = verdict(problem, missing)
+    assert said.chance == 1.0
+    V = said.direction
+    assert np.abs(MASS * Phi.T @ V).max() < 1e-9 * np.abs(V).max()
+    assert (V.T @ problem[2] @ V) / (MASS * V.T @ V) < sigma
+
+
+def test_nothing_missing_is_said_with_its_probability(problem):
+    said, *_ = verdict(problem, [])
+    assert said.direction is None
+    assert 0.0 < said.chance < 1e-9
+
+
+def test_the_bounds_of_the_preconditioned_matrix_hold_its_eigenvalues(problem):
+    from rom.fe.operators.iterative.definite import spectral_bounds
+
+    ops, inverse, K, _ = problem
+    lam = np.linalg.eigvalsh(K)
+    loads = np.random.default_rng(2).standard_normal((ops.n, 2))
+    least, largest = spectral_bounds(ops, inverse, loads)
+    assert 0.4 * lam[0] / (lam[0] + 0.4) < least < lam[0] / (lam[0] + 0.4)
+    assert lam[-1] / (lam[-1] + 0.4) < largest < 1.1
+
+
+def test_the_probability_follows_its_formula(problem, monkeypatch):
+    """After ten steps, by numbers of its own: Chebyshev's polynomial by NumPy."""
+    from rom.fe.operators.iterative import definite
+
+    monkeypatch.setattr(definite, "MAX_STEPS", 10)
+    monkeypatch.setattr(definite, "LEAST_SHARE", 1e7)  # so that the bound is below one
+    ops, inverse, K, P = problem
+    said, sigma, _ = verdict(problem, [], gap=0.9)
+    theta = np.linalg.eigvalsh(K)[10] / MASS
+    loads = np.random.default_rng(5).standard_normal((ops.n, 4)) * np.sqrt(MASS)
+    delta, largest = definite.spectral_bounds(ops, inverse, loads)
+    mu = (sigma / theta - 1.0) * delta
+    growth = np.polynomial.Chebyshev.basis(9)(1.0 + 2.0 * mu / largest)
+    c = np.sqrt(largest * np.einsum("ij,ij->j", loads, P @ loads) / mu) / growth
+    expected = np.prod(np.sqrt(2.0 / np.pi) * c / np.sqrt(1e7 * delta / sigma))
+    assert said.chance == pytest.approx(min(expected, 1.0), rel=1e-9)
+    assert said.chance < 0.9
+
+
+def forgetful(monkeypatch, times):
+    """The search loses its third mode, that often."""
+    from rom.fe.operators.iterative.search import BlockSearch
+
+    solve, left = BlockSearch.solve, [times]
+
+    def forgetting(self):
+        solve(self)
+        if left[0]:
+            left[0] -= 1
+            order = [*range(2), *range(3, self.width), 2]
+            for name in ("X", "AX", "MX"):
+                setattr(self, name, getattr(self, name)[:, order])
+            self.theta = self.theta[order]
+            self.k = min(self.k, self.width - 1)
+
+    monkeypatch.setattr(BlockSearch, "solve", forgetting)
+
+
+def test_a_missed_mode_is_taken_in(problem, monkeypatch):
+    forgetful(monkeypatch, 1)
+    search = found(problem, 11)
+    assert not np.allclose(search.theta[:11], eigenvalues()[:11])
+    assert search.prove() < 1e-9
+    assert_allclose(search.theta[:11], eigenvalues()[:11], rtol=1e-12)
+
+
+def test_a_search_that_misses_again_and_again_has_failed(problem, monkeypatch):
+    forgetful(monkeypatch, 100)
+    with pytest.raises(ModesMissedError, match="after 3 modes that were missed below"):
+        found(problem, 11).prove()
+
+
+def bar(solver, size=(1.0, 0.2, 0.1), lc=0.06):
+    sizes = dict(zip("Lbh", size, strict=True)) | {"lc": lc}
+    return rom.fe.model("meshes/beam.geo", material=STEEL, parameters=sizes, solver=solver)
+
+
+def test_the_cycle_is_symmetric_and_below_the_inverse():
+    """x^T P y = y^T P x, and all eigenvalues of P K in (0, 1]."""
+    from rom.workflow import operators
+
+    model = bar("iterative")
+    held = operators(model).hold(model.interfaces["root"].dofs)
+    P, K = held.factor.approximate, held.inner.apply_K
+    X = np.random.default_rng(1).standard_normal((held.n_free, 6))
+    G = X.T @ P(X)
+    assert_allclose(G, G.T, atol=1e-13 * np.abs(G).max())
+    U = P(X)  # smooth and rough together
+    for _ in range(3):
+        lam = np.linalg.eigvals(np.linalg.solve(U.T @ K(U), K(U).T @ P(K(U))))
+        assert lam.real.min() > 0.01
+        assert lam.real.max() < 1.0 + 1e-12
+        U = P(K(U)) - 0.5 * U
+
+
+SHAPES = [
+    ((1.0, 0.2, 0.1), "rbe2"), ((1.0, 0.1, 0.1), "rbe3"), ((0.3, 0.3, 0.3), rom.Polynomial(1)),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("size", "kind"), few(1, SHAPES))
+def test_frequencies_and_shapes_are_those_of_the_factor(size, kind):
+    """A bar, one with pairs of equal frequencies, and a cube; by three kinds of interfaces."""
+    ends = {"root": kind, "tip": kind}
+    lc = 0.06 if size[0] > 0.5 else 0.07
+    one, other = (
+        rom.reduce(
+            bar(solver, size, lc), method=rom.CraigBampton(12), interfaces=ends, certify=False
+        )
+        for solver in ("direct", "iterative")
+    )
+    assert_allclose(other.frequencies()[6:], one.frequencies()[6:], rtol=1e-8)
+    n = one.K.shape[0] - 12  # constraint modes stand first
+    assert_allclose(other.K[:n, :n], one.K[:n, :n], atol=1e-9 * np.abs(one.K[:n, :n]).max())
+    stage = other.provenance["stages"]["shapes"]
+    assert stage["probability of a missed mode"] < 1e-9
+    assert stage["largest residual of a mode"] < 1e-8
+
+
+def test_the_smoother_is_the_polynomial_of_the_fourth_kind(problem):
+    """What it leaves of an eigenvector: sin((k + 1/2) phi) / ((2k + 1) sin(phi / 2))."""
+    from rom.fe.operators.iterative import multigrid
+
+    ops, _, K, _ = problem
+    level = multigrid.Level(ops.K, ops.M)
+    lam, V = np.linalg.eigh(K / 6.0)  # the diagonal is six everywhere
+    phi = np.arccos(1.0 - 2.0 * lam / level.rho)
+    k = multigrid.SMOOTHING_DEGREE
+    left = np.sin((k + 0.5) * phi) / ((2 * k + 1) * np.sin(0.5 * phi))
+    X, R = level.smoothed(np.asfortranarray(V), residual=True)
+    assert_allclose(R, V * left, atol=1e-12)
+    assert_allclose(K @ X, V * (1.0 - left), atol=1e-12)
+
+
+def test_loads_are_independent_of_the_search_and_as_heavy_as_the_mass(problem, monkeypatch):
+    from rom.fe.operators.iterative import search as module
+    from rom.fe.operators.spectrum import gaussian_block
+
+    seen, said = [], module.searched
+    monkeypatch.setattr(module, "searched", lambda *a: seen.append(a) or said(*a))
+    search = found(problem, 11)
+    search.prove()
+    loads = seen[0][4]
+    assert loads.std() == pytest.approx(np.sqrt(MASS), rel=0.1)
+    start = gaussian_block(problem[0], search.width)
+    both = np.hstack([start, loads])
+    for columns in (both, both**2):  # lengths and angles of normal numbers
+        alike = np.corrcoef(columns, rowvar=False) - np.eye(search.width + 4)
+        assert np.abs(alike).max() < 6.0 / np.sqrt(EDGE**3)
+
+
+def test_what_was_missed_stands_in_the_block(problem, monkeypatch):
+    from rom.fe.operators.iterative.search import BlockSearch
+
+    forgetful(monkeypatch, 1)
+    search, taken, take = found(problem, 11), [], BlockSearch._take
+    monkeypatch.setattr(BlockSearch, "_take", lambda self, X: taken.append(X) or take(self, X))
+    search.prove()
+    v = taken[0][:, -1]
+    assert (v @ problem[2] @ v) / (MASS * v @ v) < eigenvalues()[11]
