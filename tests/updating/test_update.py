@@ -1,0 +1,191 @@
+"""Updating of families by measured responses: derivatives, statistics of what is found, verdict."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.linalg import eigh, solve_sylvester, sqrtm
+
+import rom
+from cases.solid import STEEL, composite
+from rom.updating import AddedMass, Channels, GroundSpring, Responses
+from rom.updating.family_model import family_model
+from rom.updating.frf_data import noisy
+from rom.updating.normal_equations import Data, responses_at, sums
+
+KINDS = {"root": "rbe2", "tip": "rbe2"}
+SIZE, CELLS = (1.0, 0.1, 0.08), (12, 2, 2)
+PARAMETERS = {
+    "E_inner": rom.YoungsModulus("inner", 0.4, 2.5),
+    "E_outer": rom.YoungsModulus("outer", 0.4, 2.5),
+    "rho_outer": rom.Density("outer", 0.5, 2.0),
+}
+TRUE = {"E_inner": 1.3, "E_outer": 0.75, "rho_outer": 1.2}
+GRID = [[x, 0.05 * k, 0.04 * m] for x in (0.25, 0.5, 0.75, 1.0) for k, m in ((0, 0), (2, 2))]
+SENSORS = Channels(np.repeat(GRID, 2, axis=0), np.tile([[0, 1, 0], [0, 0, 1]], (8, 1)))
+INPUTS = Channels([[1.0, 0.0, 0.0], [0.5, 0.1, 0.08]], [[0, 1, 1], [0, 1, -0.5]])
+LINES = np.linspace(20, 1400, 300)
+AVERAGES = 50
+HELD = {"root": "x y z rx ry rz"}
+
+
+@pytest.fixture(scope="module")
+def family():
+    model = composite(
+        {"inner": STEEL, "outer": STEEL}, lambda c: "inner" if c[0] < 6 else "outer", SIZE, CELLS
+    )
+    return rom.reduce_parametric(
+        model, parameters=PARAMETERS, method=rom.CraigBampton(16), interfaces=KINDS, certify=False
+    )
+
+
+def model_of(family, attached=None, candidates=None, fixed=HELD):
+    rows = (SENSORS.rows(family.body, "sensor"), INPUTS.rows(family.body, "input"))
+    return family_model(family, rows, attached or {}, candidates or {}, fixed)
+
+
+def synthetic(family, level=0.05, seed=0, true=TRUE, zeta=0.02, lines=LINES, **made):
+    """A test with relative noise: coherence c of n averages has the error (1 - c) / (2 n c)."""
+    model = model_of(family, **made)
+    x = np.log([true.get(name, 1.0) for name in model.names])
+    H = responses_at(model, x, np.array([zeta]), 2 * np.pi * lines)
+    c = 1 / (1 + AVERAGES * level**2)  # level^2 / 2 for each part
+    H = noisy(H, level, np.random.default_rng(seed)) if level else H
+    return Responses(lines, H, SENSORS, INPUTS, c if level else 0.999, AVERAGES)
+
+
+def at_nodes(model, nodes):
+    return Channels(model.points[list(nodes)], np.tile([0, 1, 0], (len(nodes), 1)))
+
+
+def damped(K, M, zeta, omega, seen, driven):
+    """S Z^-1 F with equal damping ratios: C = 2 zeta M (M^-1 K)^(1/2)."""
+    C = 2 * zeta * M @ sqrtm(np.linalg.solve(M, K))
+    Z = [K - w**2 * M + 1j * w * C for w in omega]
+    return np.array([seen @ np.linalg.solve(z, driven.T) for z in Z])
+
+
+def summed(model, x, amount=1.0):
+    """K and M at logarithms x, which may be complex."""
+    k, m = (np.prod(np.exp(x) ** p, axis=1) * amount for p in (model.k_powers, model.m_powers))
+    return np.tensordot(k, model.K, 1), np.tensordot(m, model.M, 1)
+
+
+def logarithmic(model, x, ratios, omega):
+    """d ln H by all unknowns: gradients of residuals of one value, real and imaginary."""
+    shape = (omega.size, len(model.seen), len(model.driven))
+    out = np.zeros((*shape, x.size + ratios.size), dtype=complex)
+    log = np.log(responses_at(model, x, ratios, omega))
+    for at in np.ndindex(shape):
+        weight = np.zeros(shape)
+        weight[at] = 1.0
+        parts = [sums(model, x, ratios, Data(omega, log - c, weight)).gradient for c in (1, 1j)]
+        out[at] = parts[0] + 1j * parts[1]
+    return out
+
+
+def test_the_model_of_a_complete_basis_is_the_finite_element_model():
+    """Dense matrices of the mesh with the clamped nodes struck out."""
+    parts = {"inner": STEEL, "outer": STEEL}
+    model = composite(parts, lambda c: "inner" if c[0] < 1 else "outer", cells=(3, 1, 1))
+    family = rom.reduce_parametric(
+        model, parameters=PARAMETERS, method=rom.CraigBampton(24),
+        interfaces={"root": "full", "tip": "full"}, certify=False,
+    )  # fmt: skip
+    rows = [at_nodes(model, n).rows(family.body, "sensor") for n in ((5, 9, 14), (13,))]
+    small = family_model(family, rows, {}, {}, ("root",))
+    K, M = (getattr(model, name).toarray() for name in "KM")
+    for E, rho, part in ((1.3, 1.0, "inner"), (0.75, 1.2, "outer")):
+        K = K + (E - 1) * model.regions[part].K.toarray()
+        M = M + (rho - 1) * model.regions[part].M.toarray()
+    free = np.setdiff1d(np.arange(len(K)), model.interfaces["root"].dofs)
+    K, M = K[np.ix_(free, free)], M[np.ix_(free, free)]
+    S = np.eye(3 * len(model.points))[:, free]
+    omega = 2 * np.pi * np.array([100.0, 700.0, 2500.0])
+    full = damped(K, M, 0.02, omega, S[[16, 28, 43]], S[[40]])
+    found = responses_at(small, np.log([1.3, 0.75, 1.2]), np.array([0.02]), omega)
+    assert_allclose(found, full, atol=1e-8 * np.abs(full).max())
+
+
+def test_derivatives_are_those_of_a_complex_step(family):
+    """Without damping, where the step has the imaginary part for itself; of a candidate too."""
+    spring = GroundSpring("tip", (1e5, 2e5, 3e5), 0.1, 10)
+    model = model_of(family, {"k": spring}, {"m": AddedMass("tip", 1.0, 0.1, 10)})
+    omega, x = 2 * np.pi * np.array([33.0, 260.0, 900.0]), np.array([0.2, -0.3, 0.1, 0.4, 0.0])
+    none = np.array([1e-14])
+    by_x = logarithmic(model, x, none, omega)[..., :-1]
+    by_x = by_x * responses_at(model, x, none, omega)[..., None]
+    for j in range(5):
+        if j < 4:
+            K, M = summed(model, x + 1e-30j * (np.arange(5) == j), model.amount)
+        else:
+            K, M = summed(model, x, model.amount + 1e-30j * (model.amount == 0))
+        parts = [model.seen @ np.linalg.solve(K - w**2 * M, model.driven.T) for w in omega]
+        expected = np.array(parts).imag / 1e-30
+        assert_allclose(by_x[..., j].real, expected, atol=1e-10 * np.abs(expected).max())
+
+
+def test_derivatives_with_damping_are_those_of_the_square_root(family):
+    """C = 2 zeta M X, X X = M^-1 K: dX by Sylvester's equation, no mode has to be followed."""
+    model, zeta = model_of(family), 0.02
+    omega, x = 2 * np.pi * np.array([33.0, 260.0, 900.0]), np.array([0.2, -0.3, 0.1])
+    K, M = summed(model, x)
+    V = eigh(K, M)[1]  # mass-normalised coordinates: numbers of equal size
+    K, M, S, F = V.T @ K @ V, V.T @ M @ V, model.seen @ V, model.driven @ V
+    X = sqrtm(np.linalg.solve(M, K))
+    found = logarithmic(model, x, np.full(2, zeta), omega)
+    H = damped(K, M, zeta, omega, S, F)
+    for j in range(4):
+        dK, dM = np.zeros((2, *K.shape))
+        if j < 3:
+            dK, dM = (np.tensordot(p[:, j] * np.exp(p @ x), A, 1)
+                      for p, A in ((model.k_powers, model.K), (model.m_powers, model.M)))
+            dK, dM = V.T @ dK @ V, V.T @ dM @ V
+        dX = solve_sylvester(X, X, np.linalg.solve(M, dK - dM @ X @ X))
+        dC = 2 * zeta * (dM @ X + M @ dX) + (j == 3) * 2 * zeta * M @ X
+        expected = []
+        for w in omega:
+            Z, dZ = K - w**2 * M + 2j * w * zeta * M @ X, dK - w**2 * dM + 1j * w * dC
+            expected.append(-S @ np.linalg.solve(Z, dZ @ np.linalg.solve(Z, F.T)))
+        value = found[..., 3:].sum(axis=-1) if j == 3 else found[..., j]
+        scale = np.abs(expected).max()
+        assert_allclose(value * H, expected, atol=1e-8 * scale)
+
+
+def test_sums_do_not_depend_on_blocks(family, monkeypatch):
+    model, data = model_of(family), Data.of(synthetic(family))
+    x, ratios = np.zeros(3), np.full(4, 0.02)
+    whole = sums(model, x, ratios, data)
+    monkeypatch.setattr("rom.updating.normal_equations.BLOCK_LINES", 7)
+    pieces = sums(model, x, ratios, data)
+    for name in ("normal", "gradient", "squares", "offset"):
+        expected = getattr(whole, name)
+        scale = np.abs(expected).max()
+        assert_allclose(getattr(pieces, name), expected, atol=1e-11 * scale)
+
+
+def test_parameters_lie_inside_two_deviations_as_often_as_they_must(family):
+    """Of 100 draws 95 are expected, 90 to 99 by chance; chi-square is calibrated."""
+    inside, chi = np.zeros(3), []
+    lines = np.linspace(20, 1400, 80)
+    for seed in range(100):
+        test = synthetic(family, 0.1, seed, lines=lines)
+        found = rom.update(family, test, fixed=HELD, damping=0.02)
+        errors = [np.log(found.factors[n] / TRUE[n]) / found.deviations[n] for n in PARAMETERS]
+        inside += np.abs(errors) < 2
+        chi.append(found.verdict.rows[0].value)
+    assert (inside >= 90).all() and (inside <= 99).all(), inside
+    n = 2 * 80 * 16 * 2
+    assert_allclose(np.mean(chi), 1.0, atol=0.01)
+    assert_allclose(np.std(chi), np.sqrt(2 / n), rtol=0.3)
+
+
+def test_the_right_model_passes_and_its_report_says_so(family):
+    found = rom.update(family, synthetic(family), fixed=HELD)
+    assert found.verdict.ok and not found.unseen and not found.at_bound
+    for name, value in TRUE.items():
+        assert_allclose(found.factors[name], value, rtol=2e-3)
+    assert_allclose(found.zeta[:4], 0.02, rtol=0.05)
+    assert_allclose(found.body.mass, family.at(**found.factors).mass)
+    assert "E_inner = 1." in str(found)
+    test = synthetic(family, 0.0)
+    assert_allclose(found.responses(LINES), test.H, atol=0.02 * np.abs(test.H).max())
