@@ -27,10 +27,12 @@ from rom.updating.verdict import check_channels, scores, unseen_directions, verd
 
 MAX_STEPS = 60  # of the search; ten are usual
 MAX_LOG_STEP = 0.5  # of a factor in one step
-DECREMENT_TOL = 1e-9  # expected gain of chi-square, to which noise alone gives its number of values
-MAX_STIFFNESS_OF_STEP = 1e10  # beyond it no shorter step lowers the residual
+DECREMENT_TOL = 1e-4  # expected gain of chi-square: a hundredth of a standard deviation
+START_STIFFNESS = 1e-3  # of a step, over the information of each unknown
+MAX_STIFFNESS = 1e10  # beyond it no shorter step lowers the residual
 BAND_RATIO = 1.5  # modes up to here, over the highest line, have damping that lines can see
 BOUND_ATOL = 1e-9  # distance of a logarithm from the end of its range
+DAMPING_LOG_DEVIATION = 1.5  # of ratios about their start, before the test: a factor of 20 in two
 DAMPING_RANGE = (1e-6, 0.9)  # ratios that are tried
 Attached = Mapping[str, GroundSpring | AddedMass]
 
@@ -180,6 +182,7 @@ class _Search:
     theta: Array
     free: Array
     precision: Array
+    before: Array
     sums: Sums = field(init=False)
 
     @staticmethod
@@ -200,9 +203,10 @@ class _Search:
                 f"{data.n_values} usable numbers for {free.sum()} unknowns.",
                 hint="Measure more lines, or fix parameters; lines of low coherence do not count.",
             )
-        precision = np.r_[sigma**-2.0, np.zeros(m)]
-        theta = np.r_[x, np.full(m, np.log(damping))]
-        return _Search(model, data, theta, free, precision)
+        precision = np.r_[sigma**-2.0, np.full(m, DAMPING_LOG_DEVIATION**-2.0)]
+        before = np.r_[np.zeros(x.size), np.full(m, np.log(damping))]
+        theta = np.r_[x, before[x.size :]]
+        return _Search(model, data, theta, free, precision, before)
 
     @property
     def x(self) -> Array:
@@ -223,36 +227,41 @@ class _Search:
         """Sums and cost at some unknowns."""
         n = len(self.model.names)
         found = sums(self.model, theta[:n], np.exp(theta[n:]), self.data)
-        return found, found.chi_square + float(self.precision @ theta**2)
+        return found, found.chi_square + float(self.precision @ (theta - self.before) ** 2)
 
     def posterior(self) -> tuple[Array, Array]:
         """Information (n, n) of data and prior, and the gradient (n,) of half the cost."""
         N = self.sums.normal + np.diag(self.precision)
-        return N, self.sums.gradient + self.precision * self.theta
+        return N, self.sums.gradient + self.precision * (self.theta - self.before)
 
     def run(self) -> "_Search":
         """Levenberg-Marquardt until the expected gain vanishes."""
-        (self.sums, cost), mu = self.at(self.theta), 1e-3
+        (self.sums, cost), mu = self.at(self.theta), START_STIFFNESS
         low, high = self.bounds
         for _ in range(MAX_STEPS):
             N, g = self.posterior()
             stuck = ((self.theta <= low) & (g > 0)) | ((self.theta >= high) & (g < 0))
             a = np.flatnonzero(self.free & ~stuck)
-            if g[a] @ np.linalg.lstsq(N[np.ix_(a, a)], g[a], rcond=None)[0] < DECREMENT_TOL:
+            N, g = N[np.ix_(a, a)], g[a]
+            spread = max(1.0, cost / self.data.n_values)  # of a model that does not fit
+            if g @ np.linalg.lstsq(N, g, rcond=None)[0] < DECREMENT_TOL * spread:
                 return self
-            while mu < MAX_STIFFNESS_OF_STEP:
+            scaled = np.diag(np.maximum(np.diag(N), np.finfo(float).tiny))
+            while mu < MAX_STIFFNESS:
+                step = -np.linalg.lstsq(N + mu * scaled, g, rcond=None)[0]
                 trial = self.theta.copy()
-                stiff = N[np.ix_(a, a)] + mu * np.diag(np.diag(N)[a] + 1e-300)
-                step = -np.linalg.lstsq(stiff, g[a], rcond=None)[0]
                 trial[a] += np.clip(step, -MAX_LOG_STEP, MAX_LOG_STEP)
-                trial = np.where(self.free, np.clip(trial, low, high), self.theta)
+                trial = np.where(self.free, np.clip(trial, low, high), trial)
                 found, new = self.at(trial)
                 if new < cost:
                     break
-                mu *= 10
+                mu *= 4.0
             else:
                 return self
-            self.theta, self.sums, cost, mu = trial, found, new, max(mu / 10, 1e-12)
+            moved = (trial - self.theta)[a]
+            gain = (cost - new) / -(moved @ (2 * g + N @ moved))
+            mu *= max(1 / 3, 1 - (2 * gain - 1) ** 3) if gain > 0 else 1.0
+            self.theta, self.sums, cost = trial, found, new
         raise SolverError(
             f"updating did not settle in {MAX_STEPS} steps.",
             hint="Start from better values, or give a prior; see which parameters are correlated.",
