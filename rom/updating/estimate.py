@@ -14,7 +14,7 @@ import numpy as np
 from rom.arguments import finite, typed
 from rom.body.flexible import FlexibleBody
 from rom.errors import ConfigError, ParameterError, SolverError
-from rom.model import Array, Report
+from rom.model import Array, Mask, Report
 from rom.names import named
 from rom.parametric.family import BodyFamily
 from rom.plausible import check_damping_ratio
@@ -84,7 +84,7 @@ class Updated:
     @property
     def body(self) -> FlexibleBody:
         """The body at the factors found."""
-        own = {name: self.factors[name] for name in self.family.parameters}
+        own: dict[str, Any] = {name: self.factors[name] for name in self.family.parameters}
         return self.family.at(**own)
 
     def responses(self, frequencies: Any) -> Complex:
@@ -141,7 +141,8 @@ def update(  # noqa: PLR0913  keywords of one call
         `rom.updating.Updated`.
 
     Raises:
-        ConfigError: for channels off the body, of another scale or sign, or too few data.
+        ConfigError: for channels off the body, of another scale or sign, too few data, or a
+            family in other units than SI.
         ParameterError: for a name that is unknown.
         InterfaceError: if an interface is unknown.
         SolverError: if the search does not end.
@@ -150,6 +151,11 @@ def update(  # noqa: PLR0913  keywords of one call
         Berriet, Fillod and Bouhaddi, for weighted responses with modal damping.
     """
     check_damping_ratio(damping)
+    if family.body.units != "SI":
+        raise ConfigError(
+            f"the family is in {family.body.units}, responses in SI.",
+            hint="Reduce the model in SI units to update it.",
+        )
     attached, candidates = dict(attached or {}), dict(candidates or {})
     rows = (
         test.sensors.rows(family.body, "sensor", tolerance),
@@ -165,7 +171,7 @@ def update(  # noqa: PLR0913  keywords of one call
 
 def _unknown(
     model: FamilyModel, free: tuple[str, ...] | None, attached: Attached, candidates: Attached
-) -> Array:
+) -> Mask:
     """(n_p,) which parameters are unknown."""
     chosen = set(model.names) - set(candidates) if free is None else {*free, *attached}
     if wrong := chosen - set(model.names):
@@ -180,14 +186,14 @@ class _Search:
     model: FamilyModel
     data: Data
     theta: Array
-    free: Array
+    free: Mask
     precision: Array
     before: Array
     sums: Sums = field(init=False)
 
     @staticmethod
     def begun(
-        model: FamilyModel, data: Data, unknown: Array, damping: float, prior: dict[str, float]
+        model: FamilyModel, data: Data, unknown: Mask, damping: float, prior: dict[str, float]
     ) -> "_Search":
         x = np.clip(np.zeros(len(model.names)), np.log(model.low), np.log(model.high))
         lam = modal(model.at(x), ()).lam[model.n_rigid :]

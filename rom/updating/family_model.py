@@ -17,7 +17,7 @@ from rom.body.flexible import FlexibleBody
 from rom.body.reference import marker_motion
 from rom.eigen.supports import spring_matrices
 from rom.errors import ConfigError, ParameterError
-from rom.model import Array
+from rom.model import Array, Mask
 from rom.names import named
 from rom.parametric.family import BodyFamily
 from rom.parametric.parameters import Density, Parameter, YoungsModulus
@@ -145,7 +145,7 @@ class FamilyModel:
     n_rigid: int
 
     @property
-    def present(self) -> Array:
+    def present(self) -> Mask:
         """(n_p,) whether a parameter is part of the model: not a candidate."""
         n = len(self.names)
         absent = int(np.count_nonzero(self.amount == 0))
@@ -199,12 +199,19 @@ def family_model(
     N = _supported(family.body, fixed)
     known: dict[str, Any] = {**family.parameters, **outside}
     powers = _powers(family, tuple(outside))
-    amount = np.repeat([1.0, 0.0], [len(K) - len(candidates), len(candidates)])
     return FamilyModel(
-        N.T @ K @ N, N.T @ M @ N, *powers, rows[0] @ N, rows[1] @ N, tuple(known),
-        *(np.array([getattr(p, end) for p in known.values()]) for end in ("low", "high")),
-        amount, _count_free(family.body, attached, fixed),
-    )  # fmt: skip
+        K=N.T @ K @ N,
+        M=N.T @ M @ N,
+        k_powers=powers[0],
+        m_powers=powers[1],
+        seen=rows[0] @ N,
+        driven=rows[1] @ N,
+        names=tuple(known),
+        low=np.array([p.low for p in known.values()]),
+        high=np.array([p.high for p in known.values()]),
+        amount=np.repeat([1.0, 0.0], [len(K) - len(candidates), len(candidates)]),
+        n_rigid=_count_free(family.body, attached, fixed),
+    )
 
 
 def _term(body: FlexibleBody, share: Any) -> tuple[Array, Array]:

@@ -117,7 +117,7 @@ def _modal_sensitivity(model: ParametricModel, modes: Modal) -> tuple[Array, Arr
 
 def through_modes(
     model: ParametricModel, modes: Modal, m: int
-) -> Callable[[Complex, Complex, Array], Complex]:
+) -> Callable[[Any, Any, Array], Complex]:
     """The function of sides (n_f, a, n), (n_f, n, b) and lines (n_f,) that gives side dZ side.
 
     Derivatives (n_f, a, b, n_p + m) are those by p and by m logarithms of damping ratios.
@@ -130,7 +130,7 @@ def through_modes(
     by_p = _modal_sensitivity(model, modes)
     e = slice(model.n_rigid, model.n_rigid + m)
 
-    def change(left: Complex, right: Complex, omega: Array) -> Complex:
+    def change(left: Any, right: Any, omega: Array) -> Complex:
         damped = left[:, :, None, e] * np.swapaxes(right[:, e], 1, 2)[:, None]
         damped = damped * (1j * omega[:, None, None, None] * modes.d[e])
         return np.concatenate([_through(left, by_p, right, omega), damped], axis=-1)

@@ -9,9 +9,10 @@ import numpy as np
 from scipy.stats import chi2
 
 from rom.errors import ConfigError
-from rom.model import Array, Index, Report, Row
+from rom.model import Array, Index, Mask, Report, Row
 from rom.rows import row
 from rom.updating.frf_data import Complex
+from rom.updating.models import DEAD_RATIO
 from rom.updating.normal_equations import Data, Sums, wrapped
 
 KNOWN_FACTORS = {
@@ -41,6 +42,13 @@ def check_channels(H: Complex, data: Data) -> None:
         ConfigError: naming the sensor, the factor and its likely reason.
     """
     used = data.weight > 0
+    size = np.abs(H).max(axis=(0, 2))
+    for s in np.flatnonzero((size < DEAD_RATIO * size.max()) & used.any(axis=(0, 2))):
+        raise ConfigError(
+            f"sensor {s} moves by {size[s] / size.max():.1e} of the largest response of the model: "
+            "a support or symmetry keeps it still.",
+            hint="Leave it out, or give it the coherence 0.",
+        )
     log = wrapped(data.logarithm - np.log(H))
     level = np.array([np.median(log.real[:, s][used[:, s]]) if used[:, s].any() else 0.0
                       for s in range(H.shape[1])])  # fmt: skip
@@ -66,7 +74,7 @@ def _reason(level: float) -> str:
     return ""
 
 
-def _check_signs(cosine: Array, used: Array) -> None:
+def _check_signs(cosine: Array, used: Mask) -> None:
     count = np.maximum(used.sum(axis=(0, 2)), 1)
     mean = (cosine * used).sum(axis=(0, 2)) / count
     for s in np.flatnonzero(mean < MIN_PHASE_COSINE):

@@ -54,7 +54,9 @@ def synthetic(family, level=0.05, seed=0, true=TRUE, zeta=0.02, lines=LINES, **m
     H = responses_at(model, x, np.array([zeta]), 2 * np.pi * lines)
     c = 1 / (1 + AVERAGES * level**2)  # level^2 / 2 for each part
     H = noisy(H, level, np.random.default_rng(seed)) if level else H
-    return Responses(lines, H, made.get("sensors", SENSORS), INPUTS, c if level else 0.999, AVERAGES)
+    return Responses(
+        lines, H, made.get("sensors", SENSORS), INPUTS, c if level else 0.999, AVERAGES
+    )
 
 
 def at_nodes(model, nodes):
@@ -141,8 +143,10 @@ def test_derivatives_with_damping_are_those_of_the_square_root(family):
     for j in range(4):
         dK, dM = np.zeros((2, *K.shape))
         if j < 3:
-            dK, dM = (np.tensordot(p[:, j] * np.exp(p @ x), A, 1)
-                      for p, A in ((model.k_powers, model.K), (model.m_powers, model.M)))
+            dK, dM = (
+                np.tensordot(p[:, j] * np.exp(p @ x), A, 1)
+                for p, A in ((model.k_powers, model.K), (model.m_powers, model.M))
+            )
             dK, dM = V.T @ dK @ V, V.T @ dM @ V
         dX = solve_sylvester(X, X, np.linalg.solve(M, dK - dM @ X @ X))
         dC = 2 * zeta * (dM @ X + M @ dX) + (j == 3) * 2 * zeta * M @ X
@@ -305,9 +309,7 @@ def test_a_direction_that_the_data_do_not_see_is_named(family):
 
 
 def test_an_end_of_a_range_is_named(family):
-    found = rom.update(
-        family, synthetic(family, true={"E_inner": 3.0}), fixed=HELD, damping=0.02
-    )
+    found = rom.update(family, synthetic(family, true={"E_inner": 3.0}), fixed=HELD, damping=0.02)
     assert found.at_bound == ("E_inner",)
     assert not found.verdict.ok and "E_inner inside its range" in str(found)
 
@@ -332,6 +334,8 @@ def test_wrong_data_are_named(family):
     refused("sensor 0 at .* is 0.92 m off the body", sensors=Channels(
         np.asarray(SENSORS.points) + [[0, 0, 0.999 + 0.001 * (k == 0)] for k in range(16)],
         SENSORS.directions))  # fmt: skip
+    root = np.asarray(SENSORS.points) * [[k != 4, 1, 1] for k in range(16)]
+    refused("sensor 4 moves by .* a support", sensors=Channels(root, SENSORS.directions))
     refused("coherence", coherence=1.0)
     refused("no parameter 'E_web'", kind=ParameterError, free=("E_web",))
     refused("prior: there is no parameter 'E'", kind=ParameterError, prior={"E": 1.0})
@@ -350,3 +354,9 @@ def test_lines_without_coherence_do_not_count(family):
     H[:20], c[:20] = np.nan, 0.0
     found = rom.update(family, replace(test, H=H, coherence=c), fixed=HELD, damping=0.02)
     assert found.verdict.ok and np.isnan(found.by_line[:20]).all()
+
+
+def test_a_family_must_be_in_si_and_without_thickness(family):
+    odd = replace(family, body=replace(family.body, units="mm-t-s"))
+    with pytest.raises(ConfigError, match="mm-t-s, responses in SI"):
+        rom.update(odd, synthetic(family), fixed=HELD)

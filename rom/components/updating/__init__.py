@@ -1,4 +1,4 @@
-"""Updating by measured frequency responses: a test bed, `airframe`, and the names of `rom.updating`.
+"""Updating by measured frequency responses: a test bed, `airframe`, and names of `rom.updating`.
 
 After Berriet, Fillod and Bouhaddi. Unknown are relative changes of stiffness and mass and the
 damping ratios of the modes. The model can be condensed to the sensors, and test and model together
