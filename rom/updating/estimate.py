@@ -46,13 +46,13 @@ class Updated:
         factors: all parameters, also those that were kept [1].
         zeta: (m,) damping ratios of the lowest elastic modes, the last one of all others too [1].
         names: (n,) of the unknowns, damping ratios last.
-        covariance: (n, n) of the logarithms of the unknowns.
+        covariance: (n, n) of the logarithms of the unknowns [1].
         verdict: whether noise alone explains what is left, and where it does not.
         by_sensor: (n_s,) mean squared residual over its expectation [1].
-        by_line: (n_f,) likewise; NaN for lines that were not used.
-        scores: {name: standard deviations by which the data ask for a parameter not updated};
-            beyond four it is missing, with the sign of its change.
-        unseen: directions, {name: share} in the parameters, that the data do not see.
+        by_line: (n_f,) likewise [1]; NaN for lines that were not used.
+        scores: {name: by how many standard deviations the data ask for a parameter that was not
+            updated [1]}; beyond four it is missing, with the sign of its change.
+        unseen: directions, {name: share [1]} in the parameters, that the data do not see.
         at_bound: names of parameters that lie at an end of their range.
         model: the family at the sensors and inputs of the test.
     """
@@ -134,15 +134,15 @@ def update(  # noqa: PLR0913  keywords of one call
         attached: {name: `GroundSpring` or `AddedMass`} with unknown factors.
         candidates: {name: likewise}, which may be missing in the model: tried in the score test.
         damping: ratio to start from, of all modes [1].
-        prior: {name: relative standard deviation of its factor about one, before the test}.
+        prior: {name: relative standard deviation [1] of its factor about one, before the test}.
         tolerance: largest distance of a channel from a surface point [m], see `Channels.rows`.
 
     Returns:
         `rom.updating.Updated`.
 
     Raises:
-        ConfigError: for channels off the body, of another scale or sign, too few data, or a
-            family in other units than SI.
+        ConfigError: for channels off the body, of another scale or sign, too few data, a
+            damping that is none to start from, or a family in other units than SI.
         ParameterError: for a name that is unknown.
         InterfaceError: if an interface is unknown.
         SolverError: if the search does not end.
@@ -151,6 +151,8 @@ def update(  # noqa: PLR0913  keywords of one call
         Berriet, Fillod and Bouhaddi, for weighted responses with modal damping.
     """
     check_damping_ratio(damping)
+    if not DAMPING_RANGE[0] <= damping <= DAMPING_RANGE[1]:
+        raise ConfigError(f"damping = {damping} to start from is not within {DAMPING_RANGE}.")
     if family.body.units != "SI":
         raise ConfigError(
             f"the family is in {family.body.units}, responses in SI.",

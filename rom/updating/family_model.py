@@ -51,7 +51,7 @@ class GroundSpring:
         check_range(f"the spring at {self.at!r}", self.low, self.high)
 
     def term(self, body: FlexibleBody) -> tuple[Array, Array]:
-        """Stiffness and mass (6 + r, 6 + r) that it adds at a factor of one.
+        """Stiffness [N/m] and mass [kg] (6 + r, 6 + r) that it adds at a factor of one.
 
         Raises:
             ConfigError, InterfaceError: for a wrong stiffness or interface.
@@ -86,7 +86,7 @@ class AddedMass:
             raise ConfigError(f"the mass at {self.at!r} is {self.mass} kg: it must be positive.")
 
     def term(self, body: FlexibleBody) -> tuple[Array, Array]:
-        """Stiffness and mass (6 + r, 6 + r) that it adds at a factor of one.
+        """Stiffness [N/m] and mass [kg] (6 + r, 6 + r) that it adds at a factor of one.
 
         Raises:
             InterfaceError: for a wrong interface.

@@ -145,7 +145,7 @@ class Responses:
         return np.broadcast_to(random_error(c, self.averages), self.H.shape)
 
     def logarithm(self) -> Complex:
-        """(n_f, n_s, n_e) ln of the displacement per force; zero where H is not used."""
+        """(n_f, n_s, n_e) ln of the displacement per force [m/N]; zero where H is not used."""
         s = 2j * np.pi * self.frequencies[:, None, None]
         used = self.relative_error() <= MAX_RELATIVE_ERROR
         return np.log(np.where(used, self.H / s ** DERIVATIVES[self.quantity], 1.0))

@@ -150,6 +150,8 @@ def _through(left: Complex, S: tuple[Array, ...], right: Complex, omega: Array) 
     columns = np.ascontiguousarray(np.moveaxis(right, 1, 0).reshape(n, n_f * b))
     w, pushed = np.repeat(omega, b), np.zeros((), dtype=complex)
     for part, factor in zip(S, (1.0, -(w**2), 1j * w), strict=True):
+        if not part.any():
+            continue
         pairs = part.reshape(-1, n) @ (columns * factor).view(np.float64)  # a quarter of the work
         pushed = pushed + pairs.view(np.complex128)
     pushed = pushed.reshape(-1, n, n_f, b).transpose(2, 1, 3, 0).reshape(n_f, n, -1)

@@ -58,13 +58,11 @@ class Sums:
         normal: (n_q, n_q) J^T J.
         gradient: (n_q,) J^T r.
         squares: (n_f, n_s, n_e) squared residuals, of real and imaginary part together.
-        offset: (n_s, n_e) weighted mean of ln(H / H_measured).
     """
 
     normal: Array
     gradient: Array
     squares: Array
-    offset: Complex
 
     @property
     def chi_square(self) -> float:
@@ -99,32 +97,31 @@ def sums(model: FamilyModel, x: Array, ratios: Array, data: Data) -> Sums:
         ratios: (m,) damping ratios of the lowest elastic modes, the last one of all others too [1].
         data: what was measured.
     """
-    n_elastic = model.n_elastic
-    zeta = shared(ratios, n_elastic)
+    zeta = shared(ratios, model.n_elastic)
     here = model.at(x)
     modes = modal(here, zeta)
     seen, driven = model.seen @ modes.Phi, model.driven @ modes.Phi
     n = x.size + ratios.size
     normal, gradient = np.zeros((n, n)), np.zeros(n)
     squares = np.zeros(data.weight.shape)
-    offset, trust = np.zeros((2, *squares.shape[1:]), dtype=complex)
-    change = through_modes(here, modes, n_elastic)
+    own = ratios.size - 1
+    change, others = through_modes(here, modes, own), slice(model.n_rigid + own, None)
     for first in range(0, data.omega.size, BLOCK_LINES):
         block = slice(first, first + BLOCK_LINES)
         omega, w = data.omega[block], data.weight[block]
         g = modes.g(omega)
         H = receptance(seen, g, driven)
         log = wrapped(np.log(H) - data.logarithm[block]) * (w > 0)
-        J = -change(seen * g[:, None, :], g[:, :, None] * driven.T, omega)
-        J = (J * (w / H)[..., None]).reshape(-1, x.size + n_elastic)
-        J = np.add.reduceat(J, np.arange(n), axis=1)
+        left, right = seen * g[:, None, :], g[:, :, None] * driven.T
+        last = (left[:, :, others] * modes.d[others]) @ right[:, others]
+        last = 1j * omega[:, None, None, None] * last[..., None]
+        J = -np.concatenate([change(left, right, omega), last], axis=-1)
+        J = (J * (w / H)[..., None]).reshape(-1, n)
         r = (w * log).ravel()
         normal += (J.conj().T @ J).real
         gradient += (J.conj().T @ r).real
         squares[block] = np.abs(w * log) ** 2
-        offset += (w * log).sum(axis=0)
-        trust += w.sum(axis=0)
-    return Sums(normal, gradient, squares, offset / np.where(trust == 0, 1, trust))
+    return Sums(normal, gradient, squares)
 
 
 def wrapped(log: Complex) -> Complex:

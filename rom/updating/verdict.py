@@ -25,7 +25,7 @@ MAX_LOG_LEVEL = 1.5  # of all responses: a factor of 4.5, which no range of modu
 FACTOR_LOG_ATOL = 0.7  # within which a known factor is named
 MIN_PHASE_COSINE = -0.4  # mean over the lines: a sensor of which measures the other direction
 MIN_OTHERS_COSINE = 0.2  # mean over the other sensors, without which phases say nothing
-SIGNIFICANCE = 1e-3  # of wrongly refusing a right model
+MAX_FALSE_REFUSAL = 1e-3  # probability that a row refuses a right model
 MAX_SCORE = 4.0  # standard deviations
 N_BANDS = 8  # of lines, in which the misfit is looked for
 UNSEEN_RTOL = 0.5  # of a parameter's range: a wider standard deviation says nothing new
@@ -165,5 +165,5 @@ def _deviation(value: float, freedom: float) -> float:
 def _chi_row(name: str, value: float, freedom: float, trials: int) -> Row:
     """Chi-square over its expectation; the limit is kept by a right model but for one in 1000."""
     freedom = max(freedom, 1.0)
-    limit = chi2.isf(SIGNIFICANCE / trials, freedom) / freedom
+    limit = chi2.isf(MAX_FALSE_REFUSAL / trials, freedom) / freedom
     return row(f"{name}, over its expectation", value / freedom, float(limit))

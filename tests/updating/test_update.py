@@ -165,7 +165,7 @@ def test_sums_do_not_depend_on_blocks(family, monkeypatch):
     whole = sums(model, x, ratios, data)
     monkeypatch.setattr("rom.updating.normal_equations.BLOCK_LINES", 7)
     pieces = sums(model, x, ratios, data)
-    for name in ("normal", "gradient", "squares", "offset"):
+    for name in ("normal", "gradient", "squares"):
         expected = getattr(whole, name)
         scale = np.abs(expected).max()
         assert_allclose(getattr(pieces, name), expected, atol=1e-11 * scale)
@@ -360,3 +360,21 @@ def test_a_family_must_be_in_si_and_without_thickness(family):
     odd = replace(family, body=replace(family.body, units="mm-t-s"))
     with pytest.raises(ConfigError, match="mm-t-s, responses in SI"):
         rom.update(odd, synthetic(family), fixed=HELD)
+
+
+def test_a_free_body_has_its_rigid_motions_too(family):
+    """Mass by its rigid motion, at lines below the first elastic mode as well."""
+    found = rom.update(family, synthetic(family, fixed=()), damping=0.02)
+    assert found.model.n_rigid == 6 and found.verdict.ok
+    for name, value in TRUE.items():
+        assert_allclose(found.factors[name], value, rtol=2e-3)
+
+
+@pytest.mark.parametrize(("quantity", "power"), [("velocity", 1), ("acceleration", 2)])
+def test_velocities_and_accelerations_are_taken(family, quantity, power):
+    test = synthetic(family)
+    H = test.H * (2j * np.pi * LINES[:, None, None]) ** power
+    found = rom.update(family, replace(test, H=H, quantity=quantity), fixed=HELD, damping=0.02)
+    same = rom.update(family, test, fixed=HELD, damping=0.02)
+    for name in TRUE:
+        assert_allclose(found.factors[name], same.factors[name], rtol=1e-9)
