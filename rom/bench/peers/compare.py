@@ -41,6 +41,8 @@ def compared(lc: float) -> Iterator[tuple[str, str, float, str, str]]:
         yield case, "rom, one process", ours["processor"], "s of the processor", ""
         two = answer_of([*mpirun(2), *rod, "rbe2", str(N_MODES)])
         yield case, "one process over two", ours["seconds"] / two["seconds"], "", "above 1"
+        for work, gain in answer_of(child.python("rom.bench.peers.machine")).items():
+            yield "the machine", f"two processes over one, {work}", gain, "", ""
         for program, aim in (("superlu", ""), ("cholmod", "above 1"), ("exudyn", "above 10")):
             theirs = answer_of([python, str(SCRIPT_FILE), file, program, "rbe2", str(N_MODES)])
             yield case, f"{program} over rom", theirs["seconds"] / ours["processor"], "", aim

@@ -20,6 +20,7 @@ BLOCK_SIZE = 6  # columns solved together: fewer make solving dearer, more make 
 MAX_EXTRA_BLOCKS = 20  # beside the modes sought before a restart; twenty are seldom used
 MAX_RESTARTS = 20  # after which the method has failed
 MAX_FURTHER_BLOCKS = 6  # beyond convergence, for a proof; more cost as much as a count
+LOOK_GROWTH = 1.04  # of the space between two looks, which cost the cube of its size
 MAX_MISS_PROBABILITY = 1e-9
 EIGENVALUE_RTOL = 1e-9  # residual of an eigenvalue of the inverse
 SPARE_EIGENVALUE_RTOL = 1e-5  # the same for spare ones; the error of the eigenvalue is its square
@@ -52,7 +53,7 @@ class BlockLanczos:
         self.V, self.MV = np.empty(shape, order="F"), np.empty(shape, order="F")
         self.size = 0
         self.T = np.zeros((0, 0))
-        self.restarted = False
+        self.looked, self.restarted = 0, False
         self._append(deflated, ops.apply_M(deflated))
         start = gaussian_block(ops, BLOCK_SIZE)
         start[getattr(factor, "mine", [])] = 0.0  # rows that a support holds
@@ -136,7 +137,7 @@ class BlockLanczos:
 
     def _restart(self) -> None:
         """Keep the leading Ritz vectors and the last block only."""
-        self.restarted = True
+        self.looked, self.restarted = 0, True
         kept = self.k + BLOCK_SIZE
         theta, S = self._ritz(kept)
         ends = self.n_deflated + np.array([0, kept, kept + BLOCK_SIZE])
@@ -148,8 +149,11 @@ class BlockLanczos:
 
     def _converged(self) -> bool:
         """Whether the residuals of the k leading Ritz values are small."""
-        enough = self.T.shape[0] >= self.k
-        return enough and bool((self._residuals()[: self.k] <= self.tolerance).all())
+        N = self.T.shape[0]
+        if N < max(self.k, LOOK_GROWTH * self.looked):
+            return False
+        self.looked = N
+        return bool((self._residuals()[: self.k] <= self.tolerance).all())
 
     def _ritz(self, k: int) -> tuple[Array, Array]:
         theta, S = np.linalg.eigh(self.T)
