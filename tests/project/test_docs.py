@@ -413,3 +413,12 @@ def test_what_pages_name_exists():
             assert named(name), f"{path.name} names {name}"
         for name in re.findall(r"`((?:meshes|demos|tests|rom)/[\w./-]+)`", text):
             assert (ROOT / name).exists(), f"{path.name} names {name}"
+
+
+def test_claims_name_tests_that_exist():
+    """A claim without its test is none."""
+    known = {found for path in (ROOT / "tests").rglob("test_*.py")
+             for found in re.findall(r"def (test_\w+)", path.read_text())}  # fmt: skip
+    named_there = re.findall(r"`(test_\w+)`", (DOCS / "claims.md").read_text())
+    assert len(named_there) > 30
+    assert set(named_there) <= known, set(named_there) - known

@@ -290,7 +290,9 @@ def fly(x, v, mass, free, parts, numbers, state, speed, acts, times, histories, 
         for k in range(len(driven)):
             i, a = driven[k] // 2, driven[k] % 2
             place = start[i, a] + (y[columns[k]] if columns[k] >= 0 else 0.0)
+            was = v[i, a]
             v[i, a] = (place - x[i, a]) / dt
+            g[i, a] -= mass[i] * (v[i, a] - was) / dt
             spent += dt * f[i, a] * v[i, a]
             x[i, a] = place
         _keep_out(x, v, mass, free, tools, y, before, dt, impulse)

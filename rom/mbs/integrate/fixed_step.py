@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rom.errors import RomError, SolverError
+from rom.mbs.equations.equations import evaluate
 from rom.mbs.equations.python_laws import Laws, apply_laws
 from rom.mbs.integrate import generalized_alpha as alpha
 from rom.mbs.integrate.event_end import kept_before_the_end
@@ -14,6 +15,7 @@ from rom.mbs.integrate.generalized_alpha import Step
 from rom.mbs.integrate.radau_start import first_steps
 from rom.mbs.integrate.run import Record, standing_at
 from rom.mbs.integrate.step_memory import begin, copied, recall, remember
+from rom.mbs.kernels.system import ANGLE
 from rom.mbs.kernels.work import Work
 from rom.mbs.parts.signals import padded, sampled
 from rom.mbs.results.state import State
@@ -22,6 +24,7 @@ from rom.model import Array
 # seconds between looks at the keyboard and the progress line
 CHUNK_SECONDS = 0.2
 LARGEST_CHUNK = 4096
+LOSING_SHARE = 0.9  # of half a turn a step, from where on one that gains speed may exceed it
 
 
 def run_implicit(record: Record, W: Work, state: State) -> None:
@@ -190,9 +193,31 @@ def failed_step(record: Record, W: Work, step: Step, answer: int, t: float) -> S
         k = int(np.nanargmax(np.abs(W.value)))
         culprit = f"; the largest gap is {abs(W.value[k]):.3g} in {record.packed.row_owner[k]!r}"
     culprit += record.packed.broken_laws
+    cure = (
+        f"Take a smaller step than {step.method[0]:.3g} s; if that does not help, the "
+        "mechanism is near a singular position or a force is too stiff."
+    )
     return SolverError(
         f"{what} at t = {t:.9g} s (last increment {step.size[0]:.3g} of the size){culprit}.",
-        hint=f"Take a smaller step than {step.method[0]:.3g} s; if that does not help, the "
-        "mechanism is near a singular position or a force is too stiff. The motion up to there "
-        "is kept in error.solution.",
+        hint=f"{_lost_turn(record, W, float(step.method[0])) or cure} The motion up to there is "
+        "kept in error.solution.",
+    )
+
+
+def _lost_turn(record: Record, W: Work, h: float) -> str:
+    """Says which joint turns so fast that a step of h loses its turns; empty if none does."""
+    packed, state = record.packed, record.final or record.given
+    C, body = packed.system.coordinates, packed.system.markers.body
+    if not C.kind.size or state is None:
+        return ""
+    evaluate(packed.system, W, state.q, state.v)
+    turns = np.where(C.kind == ANGLE, np.abs(W.xd) * h, 0.0)
+    k = int(turns.argmax())
+    if turns[k] < LOSING_SHARE * np.pi:
+        return ""
+    one, other = (packed.names[b] if b >= 0 else "ground" for b in (body[C.i[k]], body[C.j[k]]))
+    return (
+        f"Body {other!r} turns by {turns[k]:.3g} rad a step against {one!r}, and the angle of "
+        "their joint, with the gear or spring that acts on it, loses turns from pi on: take steps "
+        f"below {np.pi * h / turns[k]:.3g} s."
     )

@@ -48,7 +48,7 @@ LEFT_BEHIND = {
     "demo_pendulum_chain": {"pendulum_chain.png"},
     "demo_periodic": {"periodic.png"},
     "demo_planetary": {"planetary.png", "planetary_motion.png"},
-    "demo_rockfall": {"rockfall.gif", "rockfall.png"},
+    "demo_rockfall": {"rockfall.gif", "rockfall.png", "rockfall_capacity.png"},
     "demo_rotating_blade": {"rotating_beam.png", "blade_campbell.png"},
     "demo_rotor": {"rotor_modes.png", "rotor_whirl.png"},
     "demo_robot_arm": {"robot_arm.png", "robot_arm.gif"},
@@ -58,7 +58,7 @@ LEFT_BEHIND = {
     "demo_whole_turbine": {
         "turbine_campbell.png", "whole_turbine.gif", "whole_turbine.png",
     },
-    "demo_sheet": {"sheet.png", "taylor_bar.gif"},
+    "demo_sheet": {"sheet.png", "strip.png", "taylor_bar.gif"},
     "demo_slider_crank": {
         "crank_mesh.png", "frames.png", "instants.png", "motion.png", "report.html",
         "rod.rom.npz", "rod.vtu", "rod_frequencies.png", "rod_mesh.png", "rod_modes.png",

@@ -311,6 +311,48 @@ def test_driven_nodes_move_as_told_in_both_ways():
         assert run.x[k, 0, 0] == pytest.approx(1e-3, rel=2e-3)
 
 
+@pytest.mark.parametrize("way", ["explicit", "implicit"])
+@pytest.mark.parametrize("driven", ["root", "all"])
+def test_what_drives_a_mass_gives_it_its_acceleration(way, driven):
+    """x = c t^3 from the start: the drive gives the mass times 6 c t, own nodes included."""
+    X, T = rectangle((10, 2), box((0, 0), (1, 0.2)))
+    body, times, c = sheet(X, T, element="F1", thickness=0.5), np.linspace(0, 4.0, 401), 1e-4
+    moved = dofs(X[:, 0] < (1e-9 if driven == "root" else 2.0), (0,))
+    drive = Drive(moved, (times, c * times**3))
+    actions = Actions(dofs(X[:, 0] >= 0, (1,)), drives=[drive])
+    if way == "implicit":
+        run = implicit_motion(body, BAR, actions, times)
+    else:  # histories are straight between corners, as long as its steps
+        h = np.linspace(0, 5.0, 50001)
+        actions = Actions(actions.held, drives=[Drive(moved, (h, c * h**3))])
+        run = fly(body, BAR, 0 * X, (), 4.0, pictures=101, actions=actions)
+    late = run.t > 2.0
+    given = run.reactions.reshape(len(run.t), -1)[:, moved].sum(axis=1)[late]
+    assert_allclose(given.mean(), (1.0 * 0.2 * 0.5 * 6 * c * run.t[late]).mean(), rtol=0.01)
+
+
+def test_a_belt_takes_a_block_along_until_both_are_as_fast():
+    """Explicit; v = mu p A t / m up to the speed of the belt, a tool that moves sideways."""
+    X, T = rectangle((3, 3), box((0, 0), (1, 1)))
+    body, p, mu, fast = sheet(X, T, element="F1", thickness=0.5), 0.2, 0.3, 0.05
+    sides = outer_sides(body)
+    top = sides[(X[sides][:, :, 1] > 1 - 1e-9).all(axis=1)]
+    load = Traction(top, pressure=p, history=((0, 2), (0, 1)))
+    for turned in (1, -1):
+        way = ((0, 8), ((0, 0), (turned * 8 * fast, 0)))
+        belt = Tool("belt", box((-9, -1), (9, 0)), mu, way)
+        run = fly(body, Metal(400.0, 0.0, 1.0), 0 * X, (), 2.5, pictures=251,
+                  actions=Actions(tools=[belt], tractions=[load]))  # fmt: skip
+        x, t = run.x[:, :, 0].mean(axis=1) - 0.5, run.t
+        # the pressure grows as t / 2, and so does friction: v = mu p t^2 / 4 until it is fast
+        end = np.sqrt(4 * fast / (mu * p))
+        exact = np.where(t < end, mu * p * t**3 / 12, mu * p * end**3 / 12 + fast * (t - end))
+        assert end < 2.0
+        assert_allclose(turned * x, exact, atol=0.03 * exact[-1])
+        impulse = (run.tool_forces[1:, 0, 0] * np.diff(t)).sum()
+        assert impulse == pytest.approx(turned * 0.5 * fast, rel=0.03)
+
+
 def test_taylors_bar_against_a_tool_is_that_of_held_nodes():
     """And a rough wall holds its foot; the impulse is the momentum with that of the rebound."""
     R, L = 3.2e-3, 32.4e-3

@@ -60,6 +60,43 @@ def test_a_billet_has_its_area_and_its_curves():
     assert mesh.provenance["parameters"]["radius"] == 2.0
 
 
+FOUR = """$MeshFormat
+2.2 0 8
+$EndMeshFormat
+$PhysicalNames
+1
+1 7 "low"
+$EndPhysicalNames
+$Nodes
+4
+1 0 0 0
+2 3 0 0
+3 3 2 0
+4 0 2 0
+$EndNodes
+$Elements
+3
+1 1 2 7 1 {low}
+2 2 2 9 1 {first}
+3 2 2 9 1 {second}
+$EndElements
+"""
+
+
+@pytest.mark.parametrize("low", ["1 2", "2 1"])
+@pytest.mark.parametrize(("first", "second"), [
+    ("1 2 3", "1 3 4"), ("1 3 2", "1 4 3"), ("1 2 3", "4 3 1")])  # fmt: skip
+def test_triangles_that_go_clockwise_are_turned(tmp_path, low, first, second):
+    """Whatever a file says: areas above zero, and sides with the solid on the left."""
+    (tmp_path / "four.msh").write_text(FOUR.format(low=low, first=first, second=second))
+    mesh = read_triangles(tmp_path / "four.msh")
+    body = sheet(mesh.points, mesh.triangles)
+    assert_allclose(body.area, 3.0)
+    side = np.diff(mesh.points[mesh.curves["low"][0]], axis=0)[0]
+    assert_allclose(side, [3.0, 0.0])
+    assert_allclose(outer_sides(body)[:, 0].sum(), 0 + 1 + 2 + 3)
+
+
 def test_a_bored_ring_under_pressure_is_that_of_lame(drawn):
     """Plane strain; the bore grows by (1 + nu) p a / E ((1 - 2 nu) a^2 + b^2) / (b^2 - a^2)."""
     mesh = read_triangles(drawn(RING))

@@ -8,6 +8,7 @@ from numpy.testing import assert_allclose
 
 from rom import rotation
 from rom.components.wind.blading import BETZ_LIMIT, CHORD, blading, rotor_load
+from rom.components.wind.control import power_curve, steady
 from rom.components.wind.inflow import TOWER_TUBE, slope_of_wind, wind_at
 from rom.components.wind.profiles import profile, profiles
 from rom.components.wind.whole_turbine import turbine
@@ -172,6 +173,43 @@ def test_a_blade_passes_the_dam_of_the_tower():
     on_face = np.array([8.0, 0.0, 0.0])
     WIND_AT(TOWER_TUBE, 0.0, 3.0 - 1.065 * 40.0 / 87.6, 40.0, on_face)
     assert_allclose(on_face, [16.0, 0.0, 0.0])  # beside a cylinder air has twice the speed
+
+
+def test_the_mean_with_a_tower_is_that_of_each_strip_in_the_wind_it_meets():
+    """A rotor in uniform wind, one for each place of a strip; the dam is U (1 - a^2 / Z^2).
+
+    Without tilt and cone the blades are 5.0191 m ahead of the axis of the tower, whose radius
+    falls from 3 to 1.935 m in 87.6 m.
+    """
+    blades, V, speed, n = straight(), 8.0, tip_ratio(DESIGN_RATIO), 24
+    open_wind = rotor_load(blades, V, speed, n_azimuths=1).strip[0]
+    mean = np.zeros((17, 2))
+    for psi in 2 * np.pi * np.arange(n) / n:
+        for j, r in enumerate(blades.radius):
+            y, z = -r * np.sin(psi), 87.6 + 1.96256 + r * np.cos(psi)
+            row = open_wind[j]
+            if z <= 87.6:
+                radius = 3.0 + (1.935 - 3.0) * z / 87.6
+                met = np.conj(V * (1 - radius**2 / complex(-5.0191, y) ** 2))
+                turned = speed + np.cos(psi) * met.imag / r
+                row = rotor_load(blades, met.real, turned, n_azimuths=1).strip[0, j]
+            mean[j] += row[:2] / n
+    load = rotor_load(blades, V, speed, tower=True)
+    assert load.azimuth.size == n
+    assert_allclose(load.thrust, 3 * mean[:, 0] @ blades.length, rtol=1e-9)
+    assert_allclose(load.torque, 3 * mean[:, 1] @ (blades.radius * blades.length), rtol=1e-9)
+    assert 0.97 < load.torque / rotor_load(blades, V, speed).torque < 0.995
+
+
+def test_the_control_knows_of_the_tower():
+    """It keeps the rated power in the dammed wind by less pitch, and loses power below."""
+    for wind, ratio in ((8.0, 0.9975), (15.0, 1.0)):
+        free, dammed = (steady(wind, tower=x) for x in (False, True))
+        assert_allclose(dammed.power / free.power, ratio, atol=1e-3 if wind < 11 else 1e-9)
+        assert dammed.pitch < free.pitch if wind > 11 else dammed.power < free.power
+    curve = power_curve([8.0, 15.0], tower=True)
+    assert_allclose(curve["power"], 0.944 * np.array([steady(w, tower=True).power
+                                                      for w in (8.0, 15.0)]))  # fmt: skip
 
 
 def test_every_strip_meets_the_wind_of_its_place():

@@ -39,6 +39,60 @@ def test_filters_answer_a_step_as_their_equations_do():
     assert_allclose(found, exact, atol=3e-3)
 
 
+def answer(t, slow, fast):
+    """Of both filters to a step at 0, the first of which passes a share of 0.6 at once."""
+    first, second = np.exp(-t / slow), np.exp(-t / fast)
+    return 1 - second - 0.4 * slow / (slow - fast) * (first - second)
+
+
+def after_a_step(before, then, dt):
+    """Steady inductions [m/s] before and after a step of wind or pitch, and what `operate` finds.
+
+    ``before`` and ``then`` are wind [m/s] and pitch [rad]; the step is at 1 s.
+    """
+    blades = straight()
+    rows = [rotor_load(blades, wind, SPEED, pitch, n_azimuths=1).strip[0] for wind, pitch in (
+        before, then)]  # fmt: skip
+    axial = [wind - row[:, 2] for row, (wind, _) in zip(rows, (before, then), strict=True)]
+    swirl = [row[:, 3] - SPEED * blades.radius for row in rows]
+    start = round(1.0 / dt)
+    run = operate(lambda t: (before, then)[int(t >= 1.0 - 1e-9)][0], 25.0, dt=dt, blades=blades,
+                  held=lambda t: (SPEED, (before, then)[int(t >= 1.0 - 1e-9)][1]))  # fmt: skip
+    return blades, axial, swirl, run, start
+
+
+@pytest.mark.parametrize(
+    ("before", "then"),
+    [((8.7, 0.0), (8.7, PITCH)), ((7.0, 0.0), (9.0, 0.0)), ((9.0, 0.0), (4.5, 0.0))],
+)
+def test_the_wake_of_each_strip_follows_a_step_as_the_closed_form_does(before, then):
+    """Steady values and induction are constant after it; 1 / (1 - 1.3 a) is capped at a = 0.5."""
+    dt, V = 0.01, then[0]
+    blades, axial, swirl, run, start = after_a_step(before, then, dt)
+    a = np.clip(axial[1] / V, 0.0, 0.5)
+    slow = 1.1 / (1 - 1.3 * a) * 63.0 / V
+    fast = (0.39 - 0.26 * (blades.radius / 63.0) ** 2) * slow
+    share = answer(run.t[start:, None] - run.t[start] + 0.5 * dt, slow, fast)
+    exact = axial[0] + (axial[1] - axial[0]) * share
+    size = np.abs(axial[1] - axial[0]).max()
+    assert_allclose(run.induced[start:], exact, atol=5e-4 * size)
+    assert (a == 0.5).any() == (V == 4.5)  # the last case has strips beyond the cap
+    # loads at one instant, from velocities of both filters and the profiles
+    at, half = start + round(3.0 / dt), 0.5 * 1.225
+    through = V - exact[at - start]
+    across = SPEED * blades.radius + swirl[0] + (swirl[1] - swirl[0]) * share[at - start]
+    phi = np.arctan2(through, across)
+    lift, drag = np.array([
+        [np.interp(p - twist - then[1], one.angle, x) for x in (one.lift, one.drag)]
+        for p, twist, one in zip(phi, blades.twist, blades.profile, strict=True)]).T  # fmt: skip
+    q = half * np.array(blades.chord) * (through**2 + across**2)
+    normal = q * (lift * np.cos(phi) + drag * np.sin(phi))
+    driving = q * (lift * np.sin(phi) - drag * np.cos(phi))
+    assert_allclose(run.thrust[at], 3 * normal @ blades.length, rtol=1.5e-4)
+    torque = 3 * driving @ (blades.radius * blades.length)
+    assert_allclose(run.torque[at], torque, rtol=3e-4)
+
+
 def pitched(dynamic, back=False):
     at = (0.0, PITCH)[:: -1 if back else 1]
     return operate(lambda t: 8.7, 90.0, blades=straight(), dynamic=dynamic,

@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 
 from cases.mbs.mechanisms import prepared, random_body, random_pose, random_state, simulate_quietly
 from cases.mbs.tangents import GRAVITY, check_tangents, difference, shifted
-from rom.errors import ConfigError, ModelError
+from rom.errors import ConfigError, ModelError, SolverError
 from rom.mbs.equations.equations import evaluate, linearize_constraints
 from rom.mbs.integrate.simulation import simulate
 from rom.mbs.kernels.system import ROLL
@@ -102,13 +102,13 @@ def test_a_nut_falls_on_a_steep_screw_with_the_acceleration_of_the_closed_form()
     assert audit(sol).ok, audit(sol)
 
 
-def gear_pair(ratio, torque, carrier=False):
+def gear_pair(ratio, torque, speed=0.0):
     """Two wheels on parallel axles a metre apart, the first one driven by a torque."""
     mech = Mechanism(gravity=(0, 0, 0))
     base = mech.ground
-    for name, x, J in (("pinion", 0.0, 0.02), ("wheel", 1.0, 0.3)):
+    for name, x, J, turns in (("pinion", 0.0, 0.02, 1.0), ("wheel", 1.0, 0.3, ratio)):
         part = mech.add_rigid(name, mass=1.0, inertia=(J, J, J), at=(x, 0, 0),
-                              markers={"o": (0, 0, 0)})  # fmt: skip
+                              omega=(0, 0, turns * speed), markers={"o": (0, 0, 0)})  # fmt: skip
         mech.revolute(f"axle of {name}", base.marker((x, 0, 0)), part.marker("o"), axis=Z)
     mech.gear("teeth", "axle of pinion", "axle of wheel", ratio=ratio)
     mech.torque("engine", mech.parts["pinion"].marker("o"), (0, 0, torque))
@@ -125,6 +125,19 @@ def test_a_gear_pair_accelerates_the_sum_of_its_inertias():
     assert 0.5 * alpha * sol.t[-1] ** 2 > 20 * np.pi
     assert_allclose(sol.reaction("teeth")[-1, 5], 0.3 * ratio * alpha, rtol=1e-8)
     assert_allclose(sol.base[-1], sol.base[-1, 1] * np.array([ratio, 1.0]), rtol=1e-9)
+
+
+@pytest.mark.parametrize("method", ["generalized-alpha", "bdf"])
+def test_a_gear_that_turns_by_half_a_turn_a_step_is_named_with_the_step_it_takes(method):
+    """A wheel held at 1 rad/s drives one of 97 rad/s: below pi / 97 s all is well."""
+    mech = gear_pair(97.0, 0.0, speed=1.0)
+    mech.drive("speed", "axle of pinion", lambda t: t, rate=lambda t: 1.0)
+    fits = simulate(mech, t_end=1.0, dt=0.96 * np.pi / 97, method=method)
+    assert_allclose(fits.base[-1], [97.0, 1.0], rtol=1e-6)
+    with pytest.raises(SolverError, match=r"gap is .* in 'teeth'") as caught:
+        simulate(mech, t_end=1.0, dt=0.04, method=method)
+    assert "Body 'wheel' turns by 3.88 rad a step against 'ground'" in caught.value.hint
+    assert "take steps below 0.0324 s" in caught.value.hint
 
 
 @pytest.mark.parametrize("ratio", [0.05, -0.2])
