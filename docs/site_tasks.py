@@ -12,7 +12,7 @@ TASKS: dict[str, tuple[str, str]] = {
         "A method and kinds of interfaces make a small body of a large model.",
         """reduce CraigBampton Guyan Rubin Herting FreeFree AssumedModes EnhancedCraigBampton
         BalancedTruncation MomentMatching WithLoads reduction.Method Polynomial FourierLegendre
-        Characteristic Snapshots Rayleigh ModalDamping FlexibleBody Basis craig_bampton
+        Characteristic Snapshots Geometric Rayleigh ModalDamping FlexibleBody Basis craig_bampton
         second_order_balanced_truncation body.Marker body.Surface body.InertiaIntegrals""",
     ),
     "Parameters": (

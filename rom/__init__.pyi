@@ -24,6 +24,7 @@ from rom.assembly.dual import FreeSubstructure as FreeSubstructure
 from rom.body.damping import ModalDamping as ModalDamping
 from rom.body.damping import Rayleigh as Rayleigh
 from rom.body.flexible import FlexibleBody as FlexibleBody
+from rom.body.nonlinear.geometric import Geometric as Geometric
 from rom.body.spread import SpreadLoad as SpreadLoad
 from rom.body.spread import mass_load as mass_load
 from rom.body.spread import surface_load as surface_load

@@ -14,10 +14,13 @@ from rom.assembly.dual import FreeSubstructure, free_substructure, with_certific
 from rom.body.correction import residual_motion
 from rom.body.damping import ModalDamping, Rayleigh, damped
 from rom.body.flexible import FlexibleBody
+from rom.body.frame import at_large_deflection
+from rom.body.nonlinear.geometric import Geometric, enriched
 from rom.body.prestress import UnitLoads
-from rom.body.projection import elastic_part, flexible_body
+from rom.body.projection import canonical_columns, elastic_part, flexible_body
 from rom.body.records import Marker
 from rom.checks.certificate import certify_body
+from rom.checks.deflection import deflection_rows
 from rom.cyclic.reduced import ReducedSector, reduce_sector
 from rom.cyclic.sector import CyclicSector
 from rom.deprecated import renamed
@@ -190,6 +193,7 @@ def reduce(
     name: str = "body",
     stress: bool = False,
     stiffening: bool = False,
+    nonlinear: Geometric | None = None,
     certify: bool = True,
 ) -> FlexibleBody: ...
 
@@ -211,6 +215,7 @@ def reduce(  # noqa: PLR0913  one keyword per choice
     name: str = "body",
     stress: bool = False,
     stiffening: bool = False,
+    nonlinear: Geometric | None = None,
     certify: bool = True,
 ) -> FlexibleBody | ReducedSector:
     """A flexible body that stands for the full model, with the evidence for it.
@@ -230,6 +235,9 @@ def reduce(  # noqa: PLR0913  one keyword per choice
         stress: make the stress on the outer surface recoverable, ``body.stress``.
         stiffening: give the body the geometric stiffness of centrifugal force and of loads on its
             interfaces, ``body.K_geo``: fast rotation and tension then stiffen it.
+        nonlinear: the loads under which the body is to deflect far, see `Geometric`: shapes are
+            added for them, and ``body.quartic`` is its energy at finite strain. The reference is
+            then an interface.
         certify: compare with the full model; costs a search for its modes in each support, with
             the factor of the reduction where interfaces were held for that.
 
@@ -257,13 +265,19 @@ def reduce(  # noqa: PLR0913  one keyword per choice
         (46, True)
     """
     if isinstance(model, CyclicSector):
-        of_bodies = (reference != "mean-axis", damping is not None, stress, stiffening)
+        of_bodies = (reference != "mean-axis", damping, stress, stiffening, nonlinear)
         return _reduced_sector(model, method, interfaces or {}, any(of_bodies))
     check_name(name, "a body")
+    if nonlinear is not None and (stress or stiffening):
+        raise ConfigError(
+            "stress and stiffening are those of small deflection; nonlinear has the stiffening of "
+            "loads in its energy, and no stress is recovered with it.",
+            hint="Leave stress and stiffening out.",
+        )
     with stopwatch() as watch:
         body = _reduced_body(
             watch, model, method, interfaces or {}, name=name, reference=reference,
-            damping=damping, further=(stress, stiffening), certify=certify,
+            damping=damping, further=(stress, stiffening, nonlinear), certify=certify,
         )  # fmt: skip
     body.provenance["stages"] = watch.table()
     return body
@@ -278,10 +292,11 @@ def _reduced_body(  # noqa: PLR0913  those of `reduce`
     name: str,
     reference: Any,
     damping: Rayleigh | ModalDamping | None,
-    further: tuple[bool, bool],
+    further: tuple[bool, bool, Geometric | None],
     certify: bool,
 ) -> FlexibleBody:
-    """The body of `reduce`, whose stages are timed; `further` are stress and stiffening."""
+    """The body of `reduce`, timed; `further` are stress, stiffening and large deflection."""
+    stress, stiffening, nonlinear = further
     watch.begin("interfaces")
     bare, ops = mesh_operators(model), operators(model)
     interfaces, method = with_orders(ops, model, by_name(interfaces), method)
@@ -298,6 +313,9 @@ def _reduced_body(  # noqa: PLR0913  those of `reduce`
         watch.begin("shapes")
         begin(f"shapes of {ops.n} dofs")
         basis = chosen.basis(connection.ops, connection.boundary, connection.labels)
+        if nonlinear is not None:
+            watch.begin("derivatives of shapes")
+            basis = enriched(nonlinear, model, ops, connection, basis, reference)
         watch.begin("energies")
         begin(f"energies of {basis.Psi.shape[1]} shapes")
         Psi = connection.ops.expand(basis.Psi)
@@ -309,7 +327,6 @@ def _reduced_body(  # noqa: PLR0913  those of `reduce`
         return residual_motion(ops, connection, basis, holds, model.points[own])
 
     watch.begin("body")
-    stress, stiffening = further
     body = flexible_body(
         model,
         bare,
@@ -320,7 +337,12 @@ def _reduced_body(  # noqa: PLR0913  those of `reduce`
         stress=left_out if stress else None,
         stiffening=UnitLoads(model, bare, ops, connection) if stiffening else None,
         provenance=model.provenance | {"reduction": _described(described, basis, ops.n)},
-    ).with_reference(reference)
+    )
+    if nonlinear is None:
+        body = body.with_reference(reference)
+    else:
+        E = canonical_columns(bare, Psi @ elastic.V, model)
+        body, E = at_large_deflection(body, reference, E, model, bare)
     if damping is not None:
         body = damped(body, damping)
     watch.end()
@@ -330,6 +352,10 @@ def _reduced_body(  # noqa: PLR0913  those of `reduce`
     watch.begin("comparison")
     say("compare the reduced body with the full model")
     certificate, comparison = certify_body(connection, ops, body, basis, elastic)
+    if nonlinear is not None:
+        rows, deflections = deflection_rows(nonlinear, model, connection, body, E)
+        certificate = replace(certificate, rows=(*certificate.rows, *rows))
+        body.provenance["large deflection"] = deflections
     return replace(
         body, certificate=certificate, provenance=body.provenance | {"comparison": comparison}
     )
@@ -359,8 +385,8 @@ def _reduced_sector(
     """One sector of a wheel by the method and the functions on its cyclic faces."""
     if of_bodies:
         raise ConfigError(
-            "reference, damping, stress and stiffening belong to bodies in motion; a sector has "
-            "none of them.",
+            "reference, damping, stress, stiffening and nonlinear belong to bodies in motion; a "
+            "sector has none of them.",
             hint="Give a sector the matrices of its rotation by rom.rotating_sector.",
         )
     if set(interfaces) - {CYCLIC_FACES}:

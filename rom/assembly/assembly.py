@@ -26,7 +26,7 @@ from rom.body.flexible import FlexibleBody
 from rom.body.records import Marker
 from rom.errors import ConfigError
 from rom.model import Array, Modes, Report, Row
-from rom.names import offered
+from rom.names import named, offered
 from rom.rows import N_COMPARED, frequency_rows, row
 
 Place = tuple[str, str]  # body, interface
@@ -64,6 +64,11 @@ class Assembly:
             raise ConfigError(
                 f"projection = {self.projection!r} gives no functions of a surface.",
                 hint="Use for example rom.Polynomial(4).",
+            )
+        if far := [name for name, body in self.bodies.items() if body.quartic is not None]:
+            raise ConfigError(
+                f"{named(far)} has the energy of large deflection, and an assembly is linear.",
+                hint="Reduce without nonlinear.",
             )
         in_si = {name: body.in_units("SI") for name, body in self.bodies.items()}
         object.__setattr__(self, "bodies", in_si)

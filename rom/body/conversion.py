@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rom.body.nonlinear.quartic import Quartic
 from rom.body.records import Body, BodyData, Marker, Patch
 from rom.body.recovery import N_FRAME_LOADS, StressRecovery
 from rom.body.stiffening import ANGULAR_LOADS, CENTRIFUGAL_LOADS, ELASTIC_LOAD, LINEAR_LOADS
@@ -84,11 +85,19 @@ def converted(body: Body, units: str) -> Body:
         K=body.K * (m * s**2 / t**2),
         D=body.D * (m * s**2 / t),
         K_geo={load: A * (m * (s / t) ** 2 / f.load(load)) for load, A in body.K_geo.items()},
+        quartic=None if body.quartic is None else _quartic(body.quartic, f),
         markers={name: _marker(body, marker, f) for name, marker in body.markers.items()},
         surface=surface,
         stress=None if body.stress is None else _stress(body.stress, f),
         omega=body.omega / t,
         units=units,
+    )
+
+
+def _quartic(old: Quartic, f: Factors) -> Quartic:
+    energy, q = f.force * f.length, f.length / f.shape
+    return Quartic(
+        old.K * (energy / q**2), old.cubic * (energy / q**3), old.quartic * (energy / q**4)
     )
 
 

@@ -43,6 +43,8 @@ class FlexibleBody(BodyData):
         D: (r, r) damping [N s/m].
         K_geo: (r, r) geometric stiffness per unit load, by name of the load, see
             `rom.body.stiffening`.
+        quartic: strain energy at large deflection, of which K is the part of second order; None
+            for a body of small deflection.
         markers: interfaces by name.
         surface: outer surface, or None.
         stress: recovery of the stress on it, or None.

@@ -6,11 +6,13 @@ from typing import Any
 import numpy as np
 from scipy.linalg import eigh
 
+from rom.body.nonlinear.quartic import Quartic
 from rom.body.records import Body, Marker
 from rom.body.reference import moved_frame, reference_motion
 from rom.body.stiffening import SecondOrder, moved_stiffening, recombined_stiffening
+from rom.eigen.verbs import Operators, rigid_motions
 from rom.errors import ConfigError, ModelError
-from rom.model import OWN_FRAME, Array
+from rom.model import OWN_FRAME, Array, FEModel
 
 STILL_RTOL = 1e-9  # momentum of a shape, of the largest that its mass lets it have
 
@@ -49,8 +51,39 @@ def seen_from(body: Body, reference: Any) -> Body:
     return _recombined(moved, V, omega, reference_label(reference))
 
 
+def at_large_deflection(
+    body: Body, reference: Any, E: Array, model: FEModel, ops: Operators
+) -> tuple[Body, Array]:
+    """The body in another frame with its energy at finite strain, and its nodal shapes there.
+
+    Args:
+        body: the body in the old frame.
+        reference: the reference condition of the new frame.
+        E: (n_local, r) its nodal shapes.
+        model: has the energy.
+        ops: operators of the mesh in nodal dofs.
+    """
+    moved, X = moved_to(body, reference), reference_motion(body, reference)
+    omega, V = _normal_modes(moved.K, moved.M)
+    points = model.points[ops.first // 3 : (ops.first + ops.n_local) // 3]
+    shapes = (E - rigid_motions(points) @ X) @ V
+    found = _recombined(moved, V, omega, reference_label(reference))
+    energy = Quartic.from_gram(model.stresses.large_strain().gram(shapes), omega.size)
+    return replace(found, quartic=replace(energy, K=found.K)), shapes
+
+
 def moved_to(body: Body, reference: Any) -> Body:
-    """The body in another frame, with the elastic coordinates it has."""
+    """The body in another frame, with the elastic coordinates it has.
+
+    Raises:
+        ModelError: for a body of large deflection.
+    """
+    if body.quartic is not None:
+        raise ModelError(
+            f"body {body.name!r} of large deflection is seen from {body.reference!r} for good: "
+            "its shapes hold the second order of rotations about that.",
+            hint="Give rom.reduce the other reference.",
+        )
     X = reference_motion(body, reference)
     moved = moved_frame(body, X)
     stress = None if body.stress is None else body.stress.moved(X)

@@ -6,6 +6,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from rom.arguments import typed
+from rom.body.nonlinear.quartic import Quartic
 from rom.body.recovery import StressRecovery
 from rom.eigen.supports import Fixed, held_coordinates, supports
 from rom.errors import InterfaceError, ModelError
@@ -88,6 +89,7 @@ class BodyData:
     labels: tuple[str, ...]
     reference: str = "mean-axis"
     K_geo: dict[str, Array] = field(default_factory=dict)
+    quartic: Quartic | None = None
     surface: Surface | None = None
     stress: StressRecovery | None = None
     units: str = "SI"

@@ -1,6 +1,7 @@
 """Quality gates, and what a reduction lost.
 
-`gates` checks models and bodies row by row, `certificate` compares full with reduced.
+`gates` checks models and bodies row by row, `certificate` compares full with reduced, `deflection`
+the same at large deflection.
 """
 
 from rom.lazy import front

@@ -84,6 +84,15 @@ def assemble_vector(form: ufl.Form) -> Array:
     return values
 
 
+def assembled_vector(form: Any) -> Array:
+    """(n_local,) vector of a compiled linear form, summed over the ranks that share a node."""
+    b = fem_petsc.assemble_vector(form)
+    b.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
+    values = b.array.copy()
+    b.destroy()
+    return values
+
+
 def compiled(form: ufl.Form) -> Any:
     """Form ready to assemble, with our options."""
     name = "jit_options" if hasattr(fem, "functionspace") else "jit_params"
@@ -223,8 +232,14 @@ def node_coordinates(space: Any) -> Array:
 
 def quadrature_points(mesh: Any, degree: int) -> Array:
     """(k, 3) points of a quadrature that is exact for that degree, in the reference cell."""
+    return quadrature_rule(mesh, degree)[0]
+
+
+def quadrature_rule(mesh: Any, degree: int) -> tuple[Array, Array]:
+    """Points (k, 3) and weights (k,) of a quadrature exact for that degree, reference cell."""
     kind = getattr(basix.CellType, cell_name(mesh))
-    return np.asarray(basix.make_quadrature(kind, max(degree, 1))[0])
+    points, weights = basix.make_quadrature(kind, max(degree, 1))
+    return np.asarray(points), np.asarray(weights)
 
 
 def evaluated(expression: Any, mesh: Any, cells: Integers) -> Array:

@@ -52,6 +52,7 @@ def _write_abaqus(body: FlexibleBody, path: str | Path) -> Path:
 
 
 OWN_UNITS = ("npz", "sid", "sid-pysid", "sid-geisler")  # say the units of the body; others are SI
+NONLINEAR_FORMATS = ("npz", "vtu")  # keep the energy at large deflection, or have no need of any
 FORMATS: dict[str, tuple[str, Any]] = {  # name: (ending that chooses it, writer)
     "npz": (".npz", save),
     "vtu": (".vtu", write_vtu),
@@ -106,6 +107,12 @@ def export(
     kind = format_of(path, to)
     if held and kind not in HOLDING_FORMATS:
         raise ConfigError(f"interfaces are held for {HOLDING_FORMATS[0]} alone, not for {kind}.")
+    if body.quartic is not None and kind not in NONLINEAR_FORMATS:
+        raise ConfigError(
+            f"the format {kind!r} has no place for the energy of body {body.name!r} at large "
+            "deflection.",
+            hint="Write the native file, or reduce without nonlinear.",
+        )
     options = {"held": tuple(held)} if held else {}
     body = body if kind in OWN_UNITS else body.in_units("SI")
     return FORMATS[kind][1](body, path, **options)

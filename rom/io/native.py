@@ -14,6 +14,7 @@ import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix
 
 from rom.body.flexible import FlexibleBody
+from rom.body.nonlinear.quartic import Quartic
 from rom.body.records import Marker, Patch, Surface
 from rom.body.recovery import N_FRAME_LOADS, StressRecovery
 from rom.errors import ConfigError, FileFormatError, QualityGateError
@@ -23,10 +24,11 @@ from rom.names import named
 from rom.units import SYSTEMS
 
 SCHEMA_NAME = "rom-body"
-VERSION = (1, 4)  # a new major number breaks readers, a new minor number only adds
+VERSION = (1, 5)  # a new major number breaks readers, a new minor number only adds
 FIELDS = ("first_moment", "inertia", "S", "Ibar_kl", "S_kl", "K", "D", "omega")
 MARKER_ARRAYS = ("point", "translation", "rotation", "hold")  # arrays of each
 SURFACE_ARRAYS = ("points", "triangles", "shape")
+QUARTIC_ARRAYS = ("cubic", "quartic")
 
 
 def save(body: FlexibleBody, path: str | Path) -> Path:
@@ -97,6 +99,8 @@ def body_arrays(body: FlexibleBody) -> dict[str, Array]:
     arrays["mass"] = np.array(body.mass)
     for name, A in body.K_geo.items():
         arrays[f"K_geo/{name}"] = A
+    if body.quartic is not None:
+        arrays |= {f"quartic/{part}": getattr(body.quartic, part) for part in QUARTIC_ARRAYS}
     for i, marker in enumerate(body.markers.values()):
         for part in MARKER_ARRAYS:
             arrays[f"marker/{i}/{part}"] = getattr(marker, part)
@@ -169,6 +173,9 @@ def body_of(manifest: dict[str, Any], arrays: dict[str, Array]) -> FlexibleBody:
         stress = StressRecovery(
             arrays["stress/points"], arrays["stress/operator"], arrays.get("stress/inertial")
         )
+    quartic = None  # bodies of small deflection have none, and so have older files
+    if "quartic/cubic" in arrays:
+        quartic = Quartic(arrays["K"], *(arrays[f"quartic/{part}"] for part in QUARTIC_ARRAYS))
     report = manifest["certificate"]
     if report is not None:
         report = Report(report["title"], tuple(Row(**row) for row in report["rows"]))
@@ -177,6 +184,7 @@ def body_of(manifest: dict[str, Any], arrays: dict[str, Array]) -> FlexibleBody:
         mass=arrays["mass"].item(),
         **{name: arrays[name] for name in FIELDS},
         K_geo={name: arrays[f"K_geo/{name}"] for name in manifest["geometric_stiffness"]},
+        quartic=quartic,
         markers=markers,
         surface=surface,
         stress=stress,
@@ -250,6 +258,11 @@ def verify(body: FlexibleBody, path: Path) -> None:
 
 
 def _verify_stiffening(body: FlexibleBody, path: Path) -> None:
+    if body.quartic is not None and not body.quartic.fits(body.n_modes):
+        raise FileFormatError(
+            f"the energy at large deflection does not fit {body.n_modes} coordinates.",
+            where=str(path),
+        )
     for load, A in body.K_geo.items():
         if A.shape != body.K.shape:
             raise FileFormatError(

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from rom import rotation
 from rom.arguments import AnyBody, finite, matrix33, positive, start_pose, typed
-from rom.errors import ConfigError
+from rom.errors import ConfigError, ModelError
 from rom.mbs.connections import drives as joint_drives
 from rom.mbs.connections import gears, lower_pairs, rolling, universal
 from rom.mbs.connections import points as joint_points
@@ -315,6 +315,12 @@ class Mechanism:
             >>> round(beam.mass, 6)
             11.775
         """
+        if getattr(body, "quartic", None) is not None:
+            raise ModelError(
+                f"body {body.name!r} is one of large deflection, whose markers turn too far for a "
+                "mechanism, which takes their small rotations.",
+                hint="Reduce it without nonlinear, or model it as a rod.",
+            )
         body = body.in_units("SI") if getattr(body, "units", "SI") != "SI" else body
         r = body.K.shape[0]
         elastic = (

@@ -10,7 +10,8 @@ The rest has no momentum and no angular momentum: the condition of Tisserand. A 
 over a reference obeys that of Eckart; in a flexible body this is the mean-axis frame, and for small
 deformations both are. The toys of N bodies, which are Newton's, show what remains of mechanics:
 shapes, and a time read off them. Nothing here is about gravity as geometry. `projection` matches,
-`bodies` are the toys, `shapes` those of three.
+`bodies` are the toys, `shapes` those of three, `linking` the one system of which the motions of
+Newton and of shapes are two gauges.
 
 Source:
     After Mercati's chapter on shape dynamics, a theory of gravity of which this package takes the

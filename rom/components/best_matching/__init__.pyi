@@ -1,4 +1,8 @@
 from rom.components.best_matching.bodies import Bodies as Bodies
+from rom.components.best_matching.linking import Extended as Extended
+from rom.components.best_matching.linking import Linking as Linking
+from rom.components.best_matching.linking import newton_gauge as newton_gauge
+from rom.components.best_matching.linking import shape_gauge as shape_gauge
 from rom.components.best_matching.projection import Matched as Matched
 from rom.components.best_matching.projection import emergent_rate as emergent_rate
 from rom.components.best_matching.projection import frame as frame

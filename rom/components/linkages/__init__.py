@@ -1,6 +1,8 @@
 """Linkages of two motors.
 
-`two_dof_linkages` are the mechanisms, `dynamic_isotropy` says where both motors feel the same.
+`two_dof_linkages` and `prismatic_linkages` are the mechanisms, of `chains` that may meet in a tip;
+`dynamic_isotropy` says where both motors feel the same, `isotropic_sets` of what kind the set of
+such postures is, and how equal a tool feels the mechanism.
 """
 
 from rom.lazy import front

@@ -145,17 +145,19 @@ def isotropic_configurations(
     q1, q2 = angle_grid(n)
     there = _there(assembles, q1, q2, n)
     f = np.full((n, n, 2), np.nan)
-    f[there] = _anisotropy(inertia, q1[there], q2[there])
+    f[there] = anisotropy(inertia, q1[there], q2[there])
     start = _suspects(f)
     q = 2 * np.pi * (start + 0.5) / n
     for _ in range(40):
-        q = q if assembles is None else q[_around(assembles, q)]
-        f, J = _anisotropy(inertia, *q.T), _gradient(inertia, q)
+        q = q if assembles is None else q[around(assembles, q)]
+        f, J = anisotropy(inertia, *q.T), anisotropy_gradient(inertia, q)
         step = -np.einsum("kij,kj->ki", np.linalg.pinv(J, rcond=1e-9), f)
         q = q + step / np.maximum(np.abs(step).max(axis=1, initial=0.0) / 0.1, 1.0)[:, None]
-    q = q if assembles is None else q[_around(assembles, q)]
-    q = _distinct(q[np.abs(_anisotropy(inertia, *q.T)).max(axis=1, initial=0.0) < 1e-11])
-    turn = np.linalg.det(_gradient(inertia, q))
+        if np.abs(step).max(initial=0.0) < 1e-13:
+            break
+    q = q if assembles is None else q[around(assembles, q)]
+    q = _distinct(q[np.abs(anisotropy(inertia, *q.T)).max(axis=1, initial=0.0) < 1e-11])
+    turn = np.linalg.det(anisotropy_gradient(inertia, q))
     winding = np.where(np.abs(turn) > MIN_JACOBIAN, np.sign(turn), 0).astype(int)
     if there.all() and winding.all() and winding.sum():
         raise SolverError(
@@ -166,14 +168,23 @@ def isotropic_configurations(
     return Isotropic(q, inertia(*q.T)[:, 0, 0], winding)
 
 
-def _around(assembles: Assembles, q: Array) -> Array:
-    """(k,) whether the mechanism can be assembled at angles (k, 2) and at those of differences."""
+def around(assembles: Assembles, q: Array) -> npt.NDArray[np.bool_]:
+    """(k,) whether a mechanism can be assembled at angles (k, 2) [rad] and beside them."""
     near = [q + s * e for e in DIFFERENCE_STEP * np.eye(2) for s in (-1, 1)]
     return np.all([np.asarray(assembles(*x.T), bool) for x in (q, *near)], axis=0)
 
 
-def _anisotropy(inertia: Inertia, q1: Array, q2: Array) -> Array:
-    """(..., 2) half the difference of the diagonal, and the coupling, over half the trace."""
+def anisotropy(inertia: Inertia, q1: Array, q2: Array) -> Array:
+    """(..., 2) half the difference of the diagonal, and the coupling, over half the trace.
+
+    Args:
+        inertia: function of two arrays (...) of coordinates that returns (..., 2, 2).
+        q1: (...) first coordinate [rad or m].
+        q2: (...) second coordinate [rad or m].
+
+    Raises:
+        ModelError: if the function returns no inertia.
+    """
     A = _positive(inertia(q1, q2))
     trace = A[..., 0, 0] + A[..., 1, 1]
     return np.stack([(A[..., 0, 0] - A[..., 1, 1]) / trace, 2 * A[..., 0, 1] / trace], axis=-1)
@@ -190,10 +201,10 @@ def _positive(A: Array) -> Array:
     return A
 
 
-def _gradient(inertia: Inertia, q: Array) -> Array:
-    """(k, 2, 2) derivatives of both equations at angles (k, 2)."""
+def anisotropy_gradient(inertia: Inertia, q: Array) -> Array:
+    """(k, 2, 2) derivatives of `anisotropy` at angles (k, 2) [rad], by central differences."""
     columns = [
-        _anisotropy(inertia, *(q + e).T) - _anisotropy(inertia, *(q - e).T)
+        anisotropy(inertia, *(q + e).T) - anisotropy(inertia, *(q - e).T)
         for e in DIFFERENCE_STEP * np.eye(2)
     ]
     return np.stack(columns, axis=-1) / (2 * DIFFERENCE_STEP)

@@ -6,9 +6,8 @@ coordinates are held, or free to follow a sudden torque. `mechanism_inertia` fin
 the mass matrix and the constraints of any `rom.Mechanism`.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -16,6 +15,17 @@ from scipy.linalg import null_space
 
 from rom.arguments import one_of
 from rom.body.flexible import FlexibleBody
+from rom.components.linkages.chains import (
+    Link,
+    Motion,
+    closed,
+    directions,
+    gram,
+    in_chunks,
+    meeting,
+    reach,
+    unit_rows,
+)
 from rom.errors import ConfigError, ModelError
 from rom.mbs.equations.equations import linearize_constraints
 from rom.mbs.equations.packing import pack
@@ -25,29 +35,7 @@ from rom.mbs.mechanism import Mechanism
 from rom.model import Array
 
 Elastic = Literal["held", "free"]
-MIN_HEIGHT = 1e-6  # of the tip over the way between the elbows: flatter, and it counts as one line
-CHUNK_SIZE = 8192  # configurations at once: elastic links need (3 + r) (2 + sum r) numbers for each
-
-
-@dataclass(frozen=True, slots=True)
-class Link:
-    """A planar link between two pins, its frame on the first pin, its axis through the second.
-
-    Attributes:
-        length: distance of the pins [m].
-        M: (3 + r, 3 + r) mass for velocity of the first pin along and across the axis, angular
-            velocity of that pin, rates of r elastic coordinates [kg, kg m, kg m^2].
-        tip: (2, r) displacement of the second pin along and across per elastic coordinate [m].
-    """
-
-    length: float
-    M: Array
-    tip: Array
-
-    @property
-    def r(self) -> int:
-        """Number of elastic coordinates."""
-        return self.tip.shape[1]
+MAX_FOLLOWED = 0.5  # of a drive between two assemblies: farther, a linkage may close elsewhere
 
 
 def rigid_link(mass: float, length: float, centre: npt.ArrayLike, inertia: float) -> Link:
@@ -143,16 +131,22 @@ class TwoLink:
             elastic: "held", what slow motors feel; "free", what a sudden torque meets: the
                 elastic coordinates take the rates that make the kinetic energy least.
         """
-        links = _links((self.first, self.second), elastic)
-        return _in_chunks(replace(self, first=links[0], second=links[1])._of_all_rates, q1, q2)
+        links = as_elastic((self.first, self.second), elastic)
+        return in_chunks(replace(self, first=links[0], second=links[1])._of_all_rates, q1, q2)
+
+    def tip(self, q1: npt.ArrayLike, q2: npt.ArrayLike) -> Array:
+        """(..., 2) where the end of the chain is at angles (...) [m]; q1 and q2 in [rad]."""
+        q1, q2 = np.asarray(q1, dtype=float), np.asarray(q2, dtype=float)
+        angle = q2 + q1 if self.relative else q2
+        return self.first.length * directions(q1) + self.second.length * directions(angle)
 
     def _of_all_rates(self, q1: Array, q2: Array) -> Array:
         n = 2 + self.first.r + self.second.r
-        motion, angle = _Motion.at_rest(q1.size, n), q2 + q1 if self.relative else q2
-        spin = _unit_rows(n, 0, 1) if self.relative else _unit_rows(n, 1)
-        motion.add(self.first, q1, _unit_rows(n, 0), 2)
+        motion, angle = Motion.at_rest(q1.size, n), q2 + q1 if self.relative else q2
+        spin = unit_rows(n, 0, 1) if self.relative else unit_rows(n, 1)
+        motion.add(self.first, q1, unit_rows(n, 0), 2)
         motion.add(self.second, angle, spin, 2 + self.first.r)
-        return motion.A + self.payload * _gram(motion.pin, motion.pin)
+        return motion.A + self.payload * gram(motion.pin, motion.pin)
 
 
 @dataclass(frozen=True, slots=True)
@@ -193,9 +187,9 @@ class FiveBar:
         Raises:
             ModelError: if the couplers cannot reach each other at some angles.
         """
-        a, b, c, d = _links(self.cranks + self.couplers, elastic)
+        a, b, c, d = as_elastic(self.cranks + self.couplers, elastic)
         moved = replace(self, cranks=(a, b), couplers=(c, d))
-        return _in_chunks(moved._of_all_rates, q1, q2)
+        return in_chunks(moved._of_all_rates, q1, q2)
 
     def posture(self, q1: npt.ArrayLike, q2: npt.ArrayLike) -> Array:
         """Where the joints are at angles of the cranks.
@@ -212,25 +206,21 @@ class FiveBar:
         """
         pivots, left, right = self._elbows(q1, q2)
         q1, q2 = np.broadcast_arrays(np.asarray(q1, dtype=float), np.asarray(q2, dtype=float))
-        a, b = (coupler.length for coupler in self.couplers)
-        gap, square, along, height = self._triangle(left, right)
-        if not (height > 0).all():
-            k = np.unravel_index(np.argmin(np.where(np.isnan(height), -np.inf, height)), q1.shape)
-            raise ModelError(
-                f"at q = ({q1[k]:.4g}, {q2[k]:.4g}) the elbows are {np.sqrt(square[k]):.4g} m "
-                f"apart; couplers of {a:.4g} m and {b:.4g} m do not meet or lie in one line.",
-                hint="Lengthen the couplers or shorten the cranks.",
-            )
-        across = self.side * np.sqrt(height)[..., None] * _left_of(gap)
-        return np.stack(
-            [pivots[0], left, left + along[..., None] * gap + across, right, pivots[1]], axis=-2
-        )
+        tip = meeting(left, right, self.couplers, self.side, (q1, q2))
+        return np.stack([pivots[0], left, tip, right, pivots[1]], axis=-2)
+
+    def tip(self, q1: npt.ArrayLike, q2: npt.ArrayLike) -> Array:
+        """(..., 2) where the tool is at angles (...) of the cranks [m]; q1 and q2 in [rad].
+
+        Raises:
+            ModelError: as `posture`.
+        """
+        return self.posture(q1, q2)[..., 2, :]
 
     def assembles(self, q1: npt.ArrayLike, q2: npt.ArrayLike) -> npt.NDArray[np.bool_]:
         """Whether the couplers meet at angles (...) of the cranks [rad], and not in one line."""
         _, left, right = self._elbows(q1, q2)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            return np.asarray(self._triangle(left, right)[3] > MIN_HEIGHT**2)
+        return reach(left, right, self.couplers)
 
     def _elbows(self, q1: npt.ArrayLike, q2: npt.ArrayLike) -> tuple[Array, Array, Array]:
         """Pivots (2, ..., 2) and both elbows (..., 2) [m]."""
@@ -238,111 +228,32 @@ class FiveBar:
         pivots = np.zeros((2, *q1.shape, 2))
         pivots[1, ..., 0] = self.base
         left, right = (
-            pivot + crank.length * _directions(q)
+            pivot + crank.length * directions(q)
             for pivot, crank, q in zip(pivots, self.cranks, (q1, q2), strict=True)
         )
         return pivots, left, right
-
-    def _triangle(self, left: Array, right: Array) -> tuple[Array, Array, Array, Array]:
-        """Way between the elbows, its square, and the tip along it and, squared, across it."""
-        a, b = (coupler.length for coupler in self.couplers)
-        gap = right - left
-        square = (gap**2).sum(axis=-1)
-        along = 0.5 * (square + a * a - b * b) / square
-        return gap, square, along, a * a / square - along**2
 
     def _of_all_rates(self, q1: Array, q2: Array) -> Array:
         links = self.cranks + self.couplers
         at = 2 + np.cumsum([0, *(link.r for link in links)])
         n, N = int(at[-1]), q1.size
-        sides = [_Motion.at_rest(N, n) for _ in range(2)]
+        sides = [Motion.at_rest(N, n) for _ in range(2)]
         for k, q in enumerate((q1, q2)):
-            sides[k].add(links[k], q, _unit_rows(n, k), at[k])
+            sides[k].add(links[k], q, unit_rows(n, k), at[k])
         P = self.posture(q1, q2)
-        arms = P[:, 2] - P[:, 1], P[:, 2] - P[:, 3]
-        angles = [np.arctan2(arm[:, 1], arm[:, 0]) for arm in arms]
-        # both couplers bring the same velocity to the tip: two equations for their two spins
-        slip = [
-            sides[k].pin + _elastic_tip(links[2 + k], angles[k], n, at[2 + k]) for k in range(2)
-        ]
-        closing = np.stack([_left_of(arms[0]), -_left_of(arms[1])], axis=-1)
-        spins = np.linalg.solve(closing, slip[1] - slip[0])
-        for k in range(2):
-            sides[k].add(links[2 + k], angles[k], spins[:, k], at[2 + k])
-        return sides[0].A + sides[1].A + self.payload * _gram(sides[0].pin, sides[0].pin)
+        closed(sides, self.couplers, P[:, 1:4], at[2:])
+        return sides[0].A + sides[1].A + self.payload * gram(sides[0].pin, sides[0].pin)
 
 
-@dataclass
-class _Motion:
-    """Kinetic energy of a chain and velocity of its last pin, per unit of all n rates.
+def as_elastic(links: tuple[Link, ...], elastic: Elastic) -> tuple[Link, ...]:
+    """The links with their elastic coordinates, or without if these are held.
 
-    Attributes:
-        A: (N, n, n) inertia of the links added so far.
-        pin: (N, 2, n) velocity of the last pin.
+    Raises:
+        ConfigError: for another word than "held" or "free".
     """
-
-    A: Array
-    pin: Array
-
-    @classmethod
-    def at_rest(cls, N: int, n: int) -> "_Motion":
-        return cls(np.zeros((N, n, n)), np.zeros((N, 2, n)))
-
-    def add(self, link: Link, angle: Array, spin: Array, at: int) -> None:
-        """Add a link at an angle (N,) that turns with ``spin`` (N or 1, n)."""
-        N, _, n = self.pin.shape
-        e = _directions(angle)
-        R = np.stack([e, _left_of(e)], axis=1)  # rows along and across
-        J = np.zeros((N, 3 + link.r, n))
-        J[:, :2], J[:, 2] = R @ self.pin, spin
-        J[:, 3:, at : at + link.r] = np.eye(link.r)
-        self.A += _gram(J, link.M @ J)
-        swing = link.length * _left_of(e)[:, :, None] * spin[:, None]
-        self.pin = self.pin + swing + _elastic_tip(link, angle, n, at)
-
-
-def _elastic_tip(link: Link, angle: Array, n: int, at: int) -> Array:
-    """(N, 2, n) velocity of the second pin relative to the frame of the link."""
-    e, out = _directions(angle), np.zeros((angle.size, 2, n))
-    out[:, :, at : at + link.r] = np.stack([e, _left_of(e)], axis=2) @ link.tip
-    return out
-
-
-def _directions(angle: Array) -> Array:
-    return np.stack([np.cos(angle), np.sin(angle)], axis=-1)
-
-
-def _left_of(x: Array) -> Array:
-    return np.stack([-x[..., 1], x[..., 0]], axis=-1)
-
-
-def _unit_rows(n: int, *ones: int) -> Array:
-    row = np.zeros((1, n))
-    row[0, list(ones)] = 1.0
-    return row
-
-
-def _gram(X: Array, Y: Array) -> Array:
-    return np.swapaxes(X, -1, -2) @ Y
-
-
-def _links(links: tuple[Link, ...], elastic: Elastic) -> tuple[Link, ...]:
     if one_of("elastic", elastic, ("held", "free")) == "free":
         return links
     return tuple(replace(link, M=link.M[:3, :3], tip=np.zeros((2, 0))) for link in links)
-
-
-def _in_chunks(of_all_rates: Callable[[Array, Array], Array], q1: Any, q2: Any) -> Array:
-    """Inertia of the two motors, for angles of any shape, from that of all rates."""
-    q1, q2 = np.broadcast_arrays(np.asarray(q1, dtype=float), np.asarray(q2, dtype=float))
-    x, y, out = q1.ravel(), q2.ravel(), np.empty((q1.size, 2, 2))
-    for k in range(0, q1.size, CHUNK_SIZE):
-        A = of_all_rates(x[k : k + CHUNK_SIZE], y[k : k + CHUNK_SIZE])
-        freed = (
-            A[:, :2, 2:] @ np.linalg.solve(A[:, 2:, 2:], A[:, 2:, :2]) if A.shape[1] > 2 else 0.0
-        )
-        out[k : k + CHUNK_SIZE] = A[:, :2, :2] - freed
-    return out.reshape(*q1.shape, 2, 2)
 
 
 def mechanism_inertia(
@@ -368,27 +279,106 @@ def mechanism_inertia(
         ConfigError: if a drive is unknown.
         ModelError: if the drives do not determine the motion there, or it cannot be assembled.
     """
-    packed = pack(mechanism, whole=True)
-    rows = [int(k) for name in drives for k in packed.rows_of(name)]
-    if len(rows) != 2 or not set(drives) <= set(mechanism.drives):
-        raise ConfigError(f"{drives!r} are not two of the drives {sorted(mechanism.drives)}.")
-    W, s = workspace(packed.system, len(packed.signals)), packed.system
-    W.signal[s.rows.signal[rows], 0] = np.asarray(angles, dtype=float)
-    q = assembled(packed, W, packed.q)
-    linearize_constraints(s, W, q, np.zeros(packed.v.size))
-    size = np.sqrt(np.diag(W.S))
-    held = np.zeros((0, size.size))
-    if elastic == "held":
-        at = [t + 6 + k for t, r in zip(s.bodies.v_at, s.bodies.r, strict=True) for k in range(r)]
-        held = np.eye(size.size)[at]
-    G = np.vstack([np.delete(W.G, rows, axis=0) / size, held])
-    G /= np.maximum(np.linalg.norm(G, axis=1, keepdims=True), 1e-300)
-    N = null_space(G, rcond=1e-9) / size[:, None]
-    E = W.G[rows] @ N
-    mobility = E @ np.linalg.solve(N.T @ W.S @ N, E.T)
-    if (elastic == "held" and N.shape[1] != 2) or np.linalg.cond(mobility) > 1e12:
-        raise ModelError(
-            f"with elastic coordinates held the joints leave {N.shape[1]} motions to the two "
-            f"drives {drives!r}: a singular position, or not a mechanism of two dof."
+    return Driven(mechanism, drives, elastic=elastic).inertia(*np.asarray(angles, dtype=float))
+
+
+class Driven:
+    """Inertia of a `rom.Mechanism` over the coordinates of two drives, for maps and searches.
+
+    Coordinates count from where the bodies were added; every posture is assembled from there, a
+    large one in steps.
+
+    Args:
+        mechanism: bodies and joints; everything else that moves it is left out.
+        drives: names of the two drives.
+        tool: name of the body whose frame is the tool, moving in the plane z = const; for a rigid
+            body that is its mass centre.
+        elastic: "held" or "free", see `TwoLink.inertia`.
+
+    Raises:
+        ConfigError: if a drive or the tool is unknown.
+    """
+
+    def __init__(
+        self,
+        mechanism: Mechanism,
+        drives: tuple[str, str],
+        *,
+        tool: str | None = None,
+        elastic: Elastic = "held",
+    ) -> None:
+        self._packed, self.drives = pack(mechanism, whole=True), drives
+        rows = [int(k) for name in drives for k in self._packed.rows_of(name)]
+        if len(rows) != 2 or not set(drives) <= set(mechanism.drives):
+            raise ConfigError(f"{drives!r} are not two of the drives {sorted(mechanism.drives)}.")
+        if tool is not None and tool not in self._packed.names:
+            raise ConfigError(f"the tool {tool!r} is none of {list(self._packed.names)}.")
+        self._rows, self._tool = np.array(rows), tool
+        self._work = workspace(self._packed.system, len(self._packed.signals))
+        self._is_held = one_of("elastic", elastic, ("held", "free")) == "held"
+
+    def inertia(self, q1: npt.ArrayLike, q2: npt.ArrayLike) -> Array:
+        """(..., 2, 2) generalised inertia at coordinates (...) [rad or m]; [kg m^2, kg m, kg].
+
+        Raises:
+            ModelError: if the drives do not determine the motion there, or it cannot be assembled.
+        """
+        q1, q2 = np.broadcast_arrays(np.asarray(q1, dtype=float), np.asarray(q2, dtype=float))
+        out = np.array([self._of(self._posture(q)) for q in zip(q1.flat, q2.flat, strict=True)])
+        return out.reshape(*q1.shape, 2, 2)
+
+    def tip(self, q1: npt.ArrayLike, q2: npt.ArrayLike) -> Array:
+        """(..., 2) where the tool is in the plane z = const [m]; q1 and q2 in [rad or m].
+
+        Raises:
+            ConfigError, ModelError: without a tool; as `inertia`.
+        """
+        if self._tool is None:
+            raise ConfigError("no tool was named: Driven(mechanism, drives, tool=...).")
+        q1, q2 = np.broadcast_arrays(np.asarray(q1, dtype=float), np.asarray(q2, dtype=float))
+        at = self._packed.system.bodies.q_at[self._packed.names.index(self._tool)]
+        places = [self._posture(q)[at : at + 2] for q in zip(q1.flat, q2.flat, strict=True)]
+        return np.array(places).reshape(*q1.shape, 2)
+
+    def assembles(self, q1: npt.ArrayLike, q2: npt.ArrayLike) -> npt.NDArray[np.bool_]:
+        """(...) whether there is an inertia at coordinates (...) [rad or m]."""
+        q1, q2 = np.broadcast_arrays(np.asarray(q1, dtype=float), np.asarray(q2, dtype=float))
+        return np.array([self._exists(q) for q in zip(q1.flat, q2.flat, strict=True)]).reshape(
+            q1.shape
         )
-    return np.linalg.inv(mobility)
+
+    def _exists(self, q: tuple[float, float]) -> bool:
+        try:
+            self._of(self._posture(q))
+        except ModelError:
+            return False
+        return True
+
+    def _posture(self, coordinates: tuple[float, float]) -> Array:
+        """All coordinates of the bodies, followed from where they were added."""
+        W, rows, q = self._work, self._packed.system.rows, self._packed.q
+        steps = max(1, int(np.ceil(np.abs(coordinates).max() / MAX_FOLLOWED)))
+        for share in np.arange(1, steps + 1) / steps:
+            W.signal[rows.signal[self._rows], 0] = share * np.asarray(coordinates)
+            q = assembled(self._packed, W, q)
+        return q
+
+    def _of(self, q: Array) -> Array:
+        W, s = self._work, self._packed.system
+        linearize_constraints(s, W, q, np.zeros(self._packed.v.size))
+        size = np.sqrt(np.diag(W.S))
+        held = np.zeros((0, size.size))
+        if self._is_held:
+            starts = zip(s.bodies.v_at, s.bodies.r, strict=True)
+            held = np.eye(size.size)[[t + 6 + k for t, r in starts for k in range(r)]]
+        G = np.vstack([np.delete(W.G, self._rows, axis=0) / size, held])
+        G /= np.maximum(np.linalg.norm(G, axis=1, keepdims=True), 1e-300)
+        N = null_space(G, rcond=1e-9) / size[:, None]
+        E = W.G[self._rows] @ N
+        mobility = E @ np.linalg.solve(N.T @ W.S @ N, E.T)
+        if (self._is_held and N.shape[1] != 2) or np.linalg.cond(mobility) > 1e12:
+            raise ModelError(
+                f"with elastic coordinates held the joints leave {N.shape[1]} motions to the two "
+                f"drives {self.drives!r}: a singular position, or not a mechanism of two dof."
+            )
+        return np.linalg.inv(mobility)

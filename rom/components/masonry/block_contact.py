@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rom.components.compiled import inner, kernel
+from rom.mbs.kernels.compiled import inner, kernel
 from rom.model import Array, Index
 
 OPEN, SLIDES, STICKS = 0, 1, 2
@@ -74,7 +74,7 @@ class Law(NamedTuple):
 
 
 class Contacts(NamedTuple):
-    """Corners that are near edges; the first ``used[0]`` rows are in use.
+    """Corners that are near edges, bonds first, then block by block; ``used[0]`` rows are in use.
 
     Attributes:
         used: (1,) how many.
@@ -88,6 +88,8 @@ class Contacts(NamedTuple):
         bond: (C,) number of the bond; -1 for none.
         along: (C, 4) place of the corner on the edge, 0 to 1, normal and length of the edge.
         n, t: (C, 2, 3 + R) gap and slip per coordinate of both blocks.
+        first: (B + 1,) first contact, after the bonds, of the corners of each block.
+        box: (B, 2, 2) smallest and largest x and y of each block [m].
     """
 
     used: Index
@@ -103,13 +105,16 @@ class Contacts(NamedTuple):
     along: Array
     n: Array
     t: Array
+    first: Index
+    box: Array
 
 
-def contacts(capacity: int, m: int) -> Contacts:
+def contacts(capacity: int, m: int, n_blocks: int) -> Contacts:
     """Room for contacts of blocks with at most m coordinates."""
     shapes = ((), (), (), (), (), (), (), (), (4,), (2, m), (2, m))
     rows: list[Any] = [np.zeros((capacity, *shape)) for shape in shapes]
     rows[0], rows[7] = rows[0].astype(np.int64), rows[7].astype(np.int64)
+    rows += [np.zeros(n_blocks + 1, dtype=np.int64), np.zeros((n_blocks, 2, 2))]
     return Contacts(np.zeros(1, dtype=np.int64), np.zeros((capacity, 5), dtype=np.int64), *rows)
 
 
@@ -132,18 +137,32 @@ def place_corners(B, q, P, T):
 
 
 @inner
-def near(B, P, i, j, reach):
+def place_boxes(B, P, box):
+    """Boxes around the blocks."""
+    for b in range(B.size.size):
+        for axis in range(2):
+            low = high = P[B.first[b], axis]
+            for a in range(B.first[b] + 1, B.first[b + 1]):
+                low, high = min(low, P[a, axis]), max(high, P[a, axis])
+            box[b, axis, 0], box[b, axis, 1] = low, high
+
+
+@inner
+def near(box, i, j, reach):
     """Whether the boxes around two blocks are within reach of each other."""
     for axis in range(2):
-        low_i = high_i = P[B.first[i], axis]
-        for a in range(B.first[i] + 1, B.first[i + 1]):
-            low_i, high_i = min(low_i, P[a, axis]), max(high_i, P[a, axis])
-        low_j = high_j = P[B.first[j], axis]
-        for a in range(B.first[j] + 1, B.first[j + 1]):
-            low_j, high_j = min(low_j, P[a, axis]), max(high_j, P[a, axis])
-        if low_i > high_j + reach or low_j > high_i + reach:
+        if box[i, axis, 0] > box[j, axis, 1] + reach or box[j, axis, 0] > box[i, axis, 1] + reach:
             return False
     return True
+
+
+@inner
+def outside(box, j, x, y, reach):
+    """Whether a point is too far from the box around block j to meet an edge of it."""
+    over = EDGE_OVERHANG_RTOL * (box[j, 0, 1] - box[j, 0, 0] + box[j, 1, 1] - box[j, 1, 0])
+    over += reach
+    return (x < box[j, 0, 0] - over or x > box[j, 0, 1] + over
+            or y < box[j, 1, 0] - over or y > box[j, 1, 1] + over)  # fmt: skip
 
 
 @inner
@@ -212,65 +231,92 @@ def glued(C, n_bonds, a, j):
 
 
 @inner
+def list_corners(B, law, P, C, i, j):
+    """List the corners of block i that meet an edge of block j and are not glued to it."""
+    for a in range(B.first[i], B.first[i + 1]):
+        if outside(C.box, j, P[a, 0], P[a, 1], law.reach):
+            continue
+        c, gap, w, nx, ny = nearest_edge(B, P, i, a, j, law.reach)
+        k = C.used[0]
+        if c >= 0 and k < C.state.size and not glued(C, C.first[0], a, j):
+            C.bond[k] = -1
+            C.who[k, 0], C.who[k, 1], C.who[k, 2] = i, a, j
+            C.who[k, 3], C.who[k, 4] = c, around(B, j, c, 1)
+            C.gap[k], C.along[k, 0], C.along[k, 1], C.along[k, 2] = gap, w, nx, ny
+            C.used[0] = k + 1
+
+
+@inner
 def detect(B, law, P, old, C):
     """List the contacts of the blocks as they lie; what an old contact remembers is kept."""
     C.used[0] = 0
     list_bonds(law, P, C)
-    n_bonds = C.used[0]
+    place_boxes(B, P, C.box)
     for i in range(B.size.size):
+        C.first[i] = C.used[0]
         for j in range(B.size.size):
             if i == j or (B.equation[i] < 0 and B.equation[j] < 0):
                 continue
-            if not near(B, P, i, j, law.reach):
-                continue
-            for a in range(B.first[i], B.first[i + 1]):
-                c, gap, w, nx, ny = nearest_edge(B, P, i, a, j, law.reach)
-                if c >= 0 and C.used[0] < C.state.size and not glued(C, n_bonds, a, j):
-                    k = C.used[0]
-                    C.bond[k] = -1
-                    C.who[k, 0], C.who[k, 1], C.who[k, 2] = i, a, j
-                    C.who[k, 3], C.who[k, 4] = c, around(B, j, c, 1)
-                    C.gap[k], C.along[k, 0], C.along[k, 1], C.along[k, 2] = gap, w, nx, ny
-                    C.used[0] = k + 1
+            if near(C.box, i, j, law.reach):
+                list_corners(B, law, P, C, i, j)
+    C.first[B.size.size] = C.used[0]
     drop_doubles(C, P, law.reach)
     for k in range(C.used[0]):
-        C.friction[k] = law.friction[C.who[k, 0], C.who[k, 2]]
+        i = C.who[k, 0]
+        C.friction[k] = law.friction[i, C.who[k, 2]]
         C.state[k] = STICKS if C.bond[k] >= 0 else OPEN
         C.anchor[k], C.way[k], C.force[k] = C.along[k, 0], 0.0, 0.0
-        for o in range(old.used[0]):
-            if old.who[o, 1] == C.who[k, 1] and old.who[o, 3] == C.who[k, 3]:
-                C.state[k], C.way[k], C.force[k] = old.state[o], old.way[o], old.force[o]
-                if old.state[o] != OPEN:
-                    C.anchor[k] = old.anchor[o]
+        recall(C, k, old, 0, old.first[0])
+        recall(C, k, old, old.first[i], old.first[i + 1])
+
+
+@inner
+def recall(C, k, old, first, last):
+    """Take over what the same contact, one of a range of old ones, remembers."""
+    for o in range(first, last):
+        if old.who[o, 1] == C.who[k, 1] and old.who[o, 3] == C.who[k, 3]:
+            C.state[k], C.way[k], C.force[k] = old.state[o], old.way[o], old.force[o]
+            if old.state[o] != OPEN:
+                C.anchor[k] = old.anchor[o]
+
+
+@inner
+def parted(C, P, reach, k, first, last):
+    """Whether one of a range of contacts, its corners met the other way round, goes before k."""
+    for o in range(first, last):
+        if C.who[o, 0] != C.who[k, 2] or C.who[o, 2] != C.who[k, 0]:
+            continue
+        a, c = C.who[k, 1], C.who[o, 1]
+        apart = math.hypot(P[a, 0] - P[c, 0], P[a, 1] - P[c, 1])
+        dot = C.along[k, 1] * C.along[o, 1] + C.along[k, 2] * C.along[o, 2]
+        if apart < reach and dot > -0.5:
+            larger = C.gap[k] < C.gap[o] or (C.gap[k] == C.gap[o] and k > o)
+            if C.bond[o] >= 0 or larger:
+                return True
+    return False
 
 
 @inner
 def drop_doubles(C, P, reach):
-    """Where two corners meet, let only the edge with the larger gap part the blocks."""
-    kept = 0
-    for k in range(C.used[0]):
-        keep = True
-        for o in range(C.used[0]):
-            if o == k or C.who[o, 0] != C.who[k, 2] or C.who[o, 2] != C.who[k, 0]:
-                continue
-            a, c = C.who[k, 1], C.who[o, 1]
-            apart = math.hypot(P[a, 0] - P[c, 0], P[a, 1] - P[c, 1])
-            dot = C.along[k, 1] * C.along[o, 1] + C.along[k, 2] * C.along[o, 2]
-            if apart < reach and dot > -0.5:
-                if C.bond[k] < 0 and (
-                    C.bond[o] >= 0 or C.gap[k] < C.gap[o] or (C.gap[k] == C.gap[o] and k > o)
-                ):
-                    keep = False
-        C.way[k] = 1.0 if keep else 0.0
-    for k in range(C.used[0]):
-        if C.way[k] > 0.0:
-            for p in range(5):
-                C.who[kept, p] = C.who[k, p]
-            for p in range(4):
-                C.along[kept, p] = C.along[k, p]
-            C.gap[kept], C.bond[kept] = C.gap[k], C.bond[k]
-            kept += 1
-    C.used[0] = kept
+    """Where two corners meet, let only the edge with the larger gap, or glue, part the blocks."""
+    for k in range(C.first[0], C.used[0]):
+        j = C.who[k, 2]
+        double = parted(C, P, reach, k, 0, C.first[0])
+        double = double or parted(C, P, reach, k, C.first[j], C.first[j + 1])
+        C.way[k] = 0.0 if double else 1.0
+    kept = C.first[0]
+    for b in range(C.first.size - 1):
+        start, end = C.first[b], C.first[b + 1]
+        C.first[b] = kept
+        for k in range(start, end):
+            if C.way[k] > 0.0:
+                for p in range(5):
+                    C.who[kept, p] = C.who[k, p]
+                for p in range(4):
+                    C.along[kept, p] = C.along[k, p]
+                C.gap[kept], C.bond[kept] = C.gap[k], C.bond[k]
+                kept += 1
+    C.first[C.first.size - 1] = C.used[0] = kept
 
 
 @inner

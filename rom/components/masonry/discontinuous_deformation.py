@@ -16,8 +16,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rom.components.compiled import inner, kernel
 from rom.components.masonry.block_contact import OPEN, SLIDES, STICKS, Blocks, find_contacts
+from rom.mbs.kernels.compiled import inner, kernel
 from rom.model import Array, Index
 
 STATE_CHANGES = 12  # open-close iterations before the step is cut
@@ -232,6 +232,8 @@ def review(B, law, C, d):
         elif abs(trial) > max(C.friction[k] * force + cohesion, 0.0) + law.tension:
             state = SLIDES
         direction, pressed = math.copysign(1.0, trial), max(force, 0.0)
+        if state == SLIDES and C.state[k] == SLIDES and direction != C.way[k]:
+            state = STICKS  # what would turn back within the step comes to rest in between
         if state == STICKS and C.bond[k] >= 0:
             pressed = force
         if state != C.state[k] or (state == SLIDES and direction != C.way[k]):
@@ -316,10 +318,14 @@ def energy(B, law, C, W):
 @inner
 def remember(C, old):
     """Copy what the next list of contacts takes over."""
-    n = C.used[0]
-    old.used[0] = n
-    old.who[:n], old.state[:n], old.anchor[:n] = C.who[:n], C.state[:n], C.anchor[:n]
-    old.way[:n], old.force[:n] = C.way[:n], C.force[:n]
+    old.used[0] = C.used[0]
+    for b in range(C.first.size):
+        old.first[b] = C.first[b]
+    for k in range(C.used[0]):
+        for p in range(5):
+            old.who[k, p] = C.who[k, p]
+        old.state[k], old.anchor[k] = C.state[k], C.anchor[k]
+        old.way[k], old.force[k] = C.way[k], C.force[k]
 
 
 @kernel

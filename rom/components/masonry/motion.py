@@ -122,7 +122,7 @@ def simulate(  # noqa: PLR0913  all that a run needs
         if x.shape != target.shape:
             raise ConfigError(f"{name} has the shape {x.shape}; the stones need {target.shape}.")
         target[:] = x
-    C, old = (contacts(8 * len(B.corner), B.load.shape[1]) for _ in range(2))
+    C, old = (contacts(8 * len(B.corner), B.load.shape[1], len(B.size)) for _ in range(2))
     cuts, kept = np.zeros(1, dtype=np.int64), np.array([0, *range(save_every, n + 1, save_every)])
     found = Motion(
         masonry, dt * kept, np.zeros((len(kept), *W.q.shape)), np.zeros((len(kept), *W.q.shape)),

@@ -260,7 +260,7 @@ def touching(masonry: Masonry) -> Contacts:
 
 def _touching(B: Blocks, law: Law, q: Array) -> Contacts:
     V, m = len(B.corner), B.load.shape[1]
-    C, P, T = contacts(8 * V, m), np.zeros((V, 2)), np.zeros((V, 2, m))
-    find_contacts(B, law, q, contacts(0, m), C, P, T)
-    rows: list[Any] = [C.used, *(x[: C.used[0]] for x in C[1:])]
+    C, none = (contacts(room, m, len(B.size)) for room in (8 * V, 0))
+    find_contacts(B, law, q, none, C, np.zeros((V, 2)), np.zeros((V, 2, m)))
+    rows: list[Any] = [C.used, *(x[: C.used[0]] for x in C[1:-2]), C.first, C.box]
     return Contacts(*rows)

@@ -20,6 +20,7 @@ from rom.fe.compat import (
     to_global,
 )
 from rom.fe.forms.finite_strain import FiniteStrain
+from rom.fe.forms.large_strain import LargeStrain
 from rom.fe.forms.material import geometric_stiffness, stress
 from rom.fe.jit import compiling
 from rom.fe.operators.aij import gathered
@@ -131,6 +132,10 @@ class Stresses:
     def finite_strain(self) -> Any:
         """The same solid in large motion, `finite_strain.FiniteStrain`; on one process."""
         return FiniteStrain(self.V, self.numbers, self.degree, *self.regions)
+
+    def large_strain(self) -> Any:
+        """Energy of shapes at finite strain, `large_strain.LargeStrain`."""
+        return LargeStrain(self.V, self.numbers, self.degree)
 
     def _second_variation(self, load: Any) -> ufl.Form:
         """Bilinear form; quadrature exact on straight tetrahedra, as for the mass on others."""

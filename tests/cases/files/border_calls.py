@@ -458,6 +458,7 @@ OBJECTS = {  # class -> an object of it: legal arguments of the class, and owner
     "MomentMatching": rom.MomentMatching,
     "Orthotropic": lambda: rom.Orthotropic((1e9,) * 3, (0.3,) * 3, (4e8,) * 3, 1e3),
     "Polynomial": lambda: rom.Polynomial(1),
+    "Geometric": lambda: rom.Geometric({"tip": (0, 1.0, 0, 0, 0, 0)}),
     "Rayleigh": rom.Rayleigh,
     "ReducedBlade": blade,
     "ReducedSpinUp": reduced_run_up,

@@ -415,3 +415,19 @@ def test_a_wall_in_the_wind_falls_stone_by_stone():
         wind = Wind(lambda t, p=factor * limit: p * ramp(0.5)(t), edges)
         motion = simulate(model, t_end=2.0, dt=2e-3, actions=[wind], keep=0.97, save_every=1000)
         assert bool(np.abs(motion.v[-1]).max() < 1e-4) is stays
+
+
+def test_contacts_that_turn_back_within_a_step_stick():
+    """Sliding one way, then the other, in turns, never ends: steps were cut 281 times."""
+    shaking = BaseMotion(sine(1.0, 0.5))
+    motion = simulate(arch(40, 5.0, 0.6), t_end=0.4, dt=1e-3, actions=[shaking], keep=0.999)
+    assert motion.cuts < 40 and np.abs(motion.v).max() > 0.01
+
+
+@pytest.mark.parametrize(("y", "force"), [(2.0, 1.0), (2.0, -1.0), (0.4, 1.0)])
+def test_a_horizontal_force_tips_a_block_by_its_lever_about_the_ground(y, force):
+    """F y = W b / 2, on whatever side and below or above the mass centre; friction of 4 holds."""
+    b, h = 0.5, 2.0
+    model = on_the_ground(stone(box(b, h), **SOFT), friction=4.0)
+    load = PointLoad(1, (0.0 if force > 0 else b, y), (force, 0.0))
+    assert load_factor(model, [load]) == pytest.approx(2000 * b * h * G * b / 2 / y, rel=1e-6)

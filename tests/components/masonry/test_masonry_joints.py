@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numba import njit
 from numpy.testing import assert_allclose
 
 from rom.components.masonry import (
@@ -20,6 +21,7 @@ from rom.components.masonry import (
     stands,
     stone,
 )
+from rom.components.masonry.block_contact import contacts, drop_doubles
 from rom.errors import ConfigError, FileFormatError
 
 G = 9.81
@@ -86,6 +88,24 @@ def test_cohesion_lost_leaves_friction():
     still = simulate(pair(Joint(mu, c, 1e6)), t_end=0.5, dt=1e-3,
                      actions=[PointLoad(1, (0.0, 1.5), (1.0, 0.0), unbroken)])  # fmt: skip
     assert still.broken[-1] == 0 and abs(still.q[-1, 1, 0] - still.q[0, 1, 0]) < 1e-3
+
+
+@njit
+def drop(C, P):
+    drop_doubles(C, P, 0.05)
+
+
+def test_of_two_corners_that_meet_the_glued_one_parts_the_stones():
+    """By gap alone the other, which bears no tension, would; without glue it does."""
+    for bond, left in ((0, [1]), (-1, [3])):
+        C = contacts(2, 3, 2)
+        C.used[0], C.first[:] = 2, ([1, 1, 2] if bond == 0 else [0, 1, 2])
+        C.who[:] = [0, 1, 1, 4, 5], [1, 3, 0, 2, 3]
+        C.bond[:], C.gap[:] = (bond, -1), (-1e-4, 1e-4)
+        C.along[:, 1:3] = (0.0, -1.0), (-1.0, 0.0)
+        drop(C, np.zeros((8, 2)))
+        assert C.who[: C.used[0], 1].tolist() == left
+        assert C.first.tolist() == ([1, 1, 1] if bond == 0 else [0, 0, 1])
 
 
 def test_a_joint_that_opened_does_not_glue_again():

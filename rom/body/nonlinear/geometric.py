@@ -1,0 +1,297 @@
+"""Shapes for large deflection: what bending drags along, for the loads that a body is to bear.
+
+A beam that bends pulls its end back. Where no shape of the basis does that, the strain of second
+order meets the stiffness of stretching, and the basis locks. The derivatives of shapes are what
+two of them drag along::
+
+    K theta_ij = -D^2 f [psi_i, psi_j],    interfaces held
+
+Their products with the amplitudes of a load range are few: the model with all derivatives bears
+its loads, and a proper orthogonal decomposition of its states in the norm of K says which.
+
+Source:
+    Idelsohn and Cardona, A reduction method for nonlinear structural dynamic analysis, Comput.
+    Methods Appl. Mech. Eng. 49 (1985) 253; Rutzmoser, Model order reduction for nonlinear
+    structural dynamics, dissertation, TU Munich (2018).
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from itertools import combinations, product
+from typing import Any
+
+import numpy as np
+from scipy.linalg import eigh, null_space
+
+from rom.arguments import typed, whole
+from rom.body.nonlinear.quartic import Quartic
+from rom.body.nonlinear.statics import follow
+from rom.eigen.verbs import Operators, column_blocks, mean_motion, quadratic, whole_clusters
+from rom.errors import ConfigError, InterfaceError, ModelError, ResourceError
+from rom.model import Array, Basis, FEModel, Index
+from rom.names import offered
+
+DEPENDENT_RTOL = 1e-10  # energy of a derivative, of the largest, that the others explain
+EQUAL_RTOL = 1e-3  # of shares of energy: states of two planes of equal stiffness stay together
+N_MODES = 4  # about each state that a range leads to, for which shapes are kept
+# A mode loses 1e-4 of its stiffness if a hundredth of its energy norm is missed, states must not
+# lose that much: at the usual tolerance of 1e-4 both are met.
+MODE_SHARE = 1e-2
+MAX_COORDINATES = 80  # their tensors take 0.2 GB while they are made
+
+
+@typed
+@dataclass(frozen=True)
+class Geometric:
+    """Large deflection under a range of loads, for `rom.reduce`.
+
+    Attributes:
+        loads: {interface: (6,) largest force [N] and moment [N m] of either sign, axes of the
+            geometry}; they keep their direction, a moment as a pair of forces.
+        n_modes: how many of the lowest fixed-interface modes drag others along, beside the
+            static shapes of the loads; a repeated frequency counts as a whole.
+        tol: how much of the energy of the states reached may be left out, as the root of its
+            share [1].
+        n_shapes: alternatively, the number of shapes added to the basis.
+        n_steps: of load on the way to its largest value, at each of which a state is taken.
+
+    Raises:
+        ConfigError: for loads that are none, or numbers out of range.
+
+    Example:
+        >>> rom.Geometric(loads={"tip": (0, 200.0, 0, 0, 0, 0)}).n_steps
+        4
+    """
+
+    loads: Mapping[str, Any]
+    n_modes: int = 4
+    tol: float = 1e-4
+    n_shapes: int | None = None
+    n_steps: int = 4
+
+    def __post_init__(self) -> None:
+        whole("n_steps", self.n_steps, 1)
+        whole("n_modes", self.n_modes)
+        if self.n_shapes is not None:
+            whole("n_shapes", self.n_shapes, 1, reason="without any the basis locks")
+        if not 0 < self.tol < 1:
+            raise ConfigError(f"tol = {self.tol!r} is a share between 0 and 1.")
+        for name, load in self.loads.items():
+            range_ = np.asarray(load, dtype=float)
+            if range_.shape != (6,) or not np.isfinite(range_).all() or not range_.any():
+                raise ConfigError(
+                    f"the range of loads at {name!r} is {load!r}; it has six numbers, forces [N], "
+                    "then moments [N m], not all zero."
+                )
+        if not self.loads:
+            raise ConfigError(
+                "no range of loads is given, for which the shapes would be.",
+                hint='Name an interface: loads={"tip": (0, 200.0, 0, 0, 0, 0)}.',
+            )
+
+    def components(self) -> list[tuple[str, int, float]]:
+        """Interface, component and largest value of the loads that are not zero."""
+        return [
+            (name, k, abs(float(x)))
+            for name, load in self.loads.items()
+            for k, x in enumerate(load)
+            if x
+        ]
+
+    def load_cases(self) -> Array:
+        """(c, l) directions of the components together, each alone and each two of them [1]."""
+        n = len(self.components())
+        units = np.eye(n)
+        alone = [sign * unit for unit in units for sign in (1, -1)]
+        signs = list(product((1, -1), repeat=2))
+        skew = [(a * units[i] + b * units[j]) / np.sqrt(2)
+                for (i, j), (a, b) in product(combinations(range(n), 2), signs)]  # fmt: skip
+        return np.array(alone + skew)
+
+
+@dataclass(frozen=True)
+class Shapes:
+    """A basis before it is cut, seen from a frame on the reference interface.
+
+    Attributes:
+        E: (n_local, r) nodal shapes, those that move an interface first.
+        loads: (r, l) forces of the components of the load range at their largest [N].
+        n_basis: how many of them the basis has already.
+    """
+
+    E: Array
+    loads: Array
+    n_basis: int
+
+
+def enriched(
+    geometric: Geometric, model: FEModel, ops: Operators, connection: Any, basis: Basis,
+    reference: Any,
+) -> Basis:  # fmt: skip
+    """The basis with the shapes that its load range asks for.
+
+    Args:
+        geometric: the range.
+        model: supplies interfaces and the energy of large strain.
+        ops: operators in nodal dofs.
+        connection: the model in interface coordinates.
+        basis: constraint and fixed-interface modes, with the factor of K_ii.
+        reference: the interface that carries the frame.
+
+    Raises:
+        ConfigError, InterfaceError, ResourceError: see `refuse`.
+        ModelError: if the body has no stable equilibrium within the range.
+    """
+    refuse(geometric, model, connection, basis, reference)
+    energy = model.stresses.large_strain()
+    shapes, theta = _with_derivatives(geometric, model, ops, connection, basis, reference, energy)
+    quartic = Quartic.from_gram(energy.gram(shapes.E), shapes.E.shape[1])
+    states = _states(geometric, quartic, shapes.loads)
+    modes = _modes_about(states, quartic, quadratic(ops, ops.apply_M, shapes.E))
+    added = theta @ _principal(
+        geometric, states[:, shapes.n_basis :].T, modes[:, shapes.n_basis :].T
+    )
+    labels = tuple(f"deflection {k + 1}" for k in range(added.shape[1]))
+    return replace(basis, Psi=np.hstack([basis.Psi, added]), labels=(*basis.labels, *labels))
+
+
+def refuse(
+    geometric: Geometric, model: FEModel, connection: Any, basis: Basis, reference: Any
+) -> None:
+    """Say what does not go together with large deflection.
+
+    Raises:
+        ConfigError: for a model without finite elements, another method, or another frame.
+        InterfaceError: for an unknown interface, or one that is rigid.
+    """
+    if model.stresses is None:
+        raise ConfigError(
+            "the model has no finite elements, from which alone large strain follows.",
+            hint="Make it with rom.fe.model.",
+        )
+    if basis.held is None:
+        raise ConfigError(
+            "large deflection takes constraint modes, and this method has none.",
+            hint="Use rom.CraigBampton or rom.Guyan.",
+        )
+    if reference not in connection.parts:
+        raise ConfigError(
+            f"reference = {reference!r}: large deflection is seen from an interface, here one of "
+            f"{offered(connection.parts)}.",
+            hint="Name the interface at which the body is held, or that turns least.",
+        )
+    for name in geometric.loads:
+        if name not in connection.parts or name == reference:
+            raise InterfaceError(
+                f"the range of loads names {name!r}; beside the reference {reference!r} the body "
+                f"has {offered(n for n in connection.parts if n != reference)}."
+            )
+    for name, tie in connection.ties.items():
+        if tie.label == "rbe2":
+            raise InterfaceError(
+                f"interface {name!r} is rigid, and a section that turns by a linear rotation "
+                "grows: at a slope of 0.03 the body would be several per cent too stiff.",
+                hint='Give it the kind "rbe3" or rom.Polynomial(1).',
+            )
+
+
+def _with_derivatives(
+    geometric: Geometric, model: FEModel, ops: Operators, connection: Any, basis: Basis,
+    reference: str, energy: Any,
+) -> tuple[Shapes, Array]:  # fmt: skip
+    """All shapes as nodal displacements, and the derivatives in interface coordinates."""
+    n_b = connection.boundary.size
+    Psi = connection.ops.expand(basis.Psi)
+    root = model.interfaces[reference]
+    still = mean_motion(root) @ ops.rows(Psi[:, :n_b], root.dofs)
+    N = null_space(still / np.abs(still).max(axis=1, keepdims=True))
+    moving = Psi[:, :n_b] @ N
+    K = quadratic(ops, ops.apply_K, moving)
+    every = [(name, component, 1.0) for name in geometric.loads for component in range(6)]
+    static = moving @ np.linalg.solve(K, _loads(every, model, ops, moving))
+    n_modes = min(geometric.n_modes, basis.omega.size)
+    if n_modes:
+        n_modes = whole_clusters(basis.omega**2, n_modes)
+    active = np.hstack([static, Psi[:, n_b : n_b + n_modes]])
+    n_basis = moving.shape[1] + n_modes
+    _refuse_many(n_basis + active.shape[1] * (active.shape[1] + 1) // 2)
+    theta = _derivatives(connection.ops, basis, energy, active)
+    E = np.hstack([moving, active[:, static.shape[1] :], connection.ops.expand(theta)])
+    return Shapes(E, _loads(geometric.components(), model, ops, E), n_basis), theta
+
+
+def _refuse_many(n: int) -> None:
+    if n > MAX_COORDINATES:
+        raise ResourceError(
+            f"the loads and modes have derivatives that make {n} coordinates; more than "
+            f"{MAX_COORDINATES} are refused.",
+            hint="Name fewer components of the load, or ask for fewer fixed-interface modes.",
+        )
+
+
+def _loads(components: Any, model: FEModel, ops: Operators, E: Array) -> Array:
+    """(r, l) forces [N] of components of loads at their largest on shapes (n_local, r)."""
+    columns = []
+    for name, component, largest in components:
+        interface = model.interfaces[name]
+        columns.append(largest * (mean_motion(interface) @ ops.rows(E, interface.dofs))[component])
+    return np.array(columns).T
+
+
+def _derivatives(ops: Operators, basis: Basis, energy: Any, active: Array) -> Array:
+    """(n_local, p) derivatives in interface coordinates, orthonormal in K and to normal modes."""
+    i, j = np.triu_indices(active.shape[1])
+    pairs: Index = np.column_stack([i, j])
+    theta = np.zeros((ops.n_local, len(pairs)))
+    for some in column_blocks(len(pairs)):
+        theta[:, some] = -basis.held(ops.restrict(energy.second_forces(active, pairs[some])))
+    normal = basis.Psi[:, basis.Psi.shape[1] - basis.omega.size :]
+    theta -= normal @ (ops.gram(normal, ops.apply_K(theta)) / basis.omega[:, None] ** 2)
+    K = quadratic(ops, ops.apply_K, theta)
+    scale = 1 / np.sqrt(np.maximum(np.diag(K), np.finfo(float).tiny))
+    lam, V = np.linalg.eigh(0.5 * (K + K.T) * np.outer(scale, scale))
+    kept = lam > DEPENDENT_RTOL * lam[-1]
+    return theta @ (scale[:, None] * V[:, kept] / np.sqrt(lam[kept]))
+
+
+def _states(geometric: Geometric, quartic: Quartic, loads: Array) -> Array:
+    """(s, r) states that the range of loads leads to."""
+    share = np.arange(1, geometric.n_steps + 1) / geometric.n_steps
+    found = []
+    for case in geometric.load_cases():
+        try:
+            found.append(follow(quartic, np.outer(share, loads @ case)))
+        except ModelError as error:
+            error.where = error.where or f"load {np.round(case, 3).tolist()} of the range"
+            raise
+    return np.vstack(found)
+
+
+def _modes_about(states: Array, quartic: Quartic, M: Array) -> Array:
+    """(s m, r) lowest modes about each state (s, r), of the energy 1/2.
+
+    A beam that is bent in one plane needs companions of bending in the other one as well, however
+    small that is.
+    """
+    found = []
+    for q in states:
+        lam, V = eigh(quartic.tangent(q), M)
+        found.append((V[:, :N_MODES] / np.sqrt(np.maximum(lam[:N_MODES], lam[-1] * 1e-15))).T)
+    return np.vstack(found)
+
+
+def _principal(geometric: Geometric, Y: Array, modes: Array) -> Array:
+    """(p, k) directions of most energy in states (p, s) and modes (p, m) about them.
+
+    The coordinates have the energy 1/2. A mode weighs `MODE_SHARE` of all states together.
+    """
+    Y = np.hstack([Y, MODE_SHARE * np.linalg.norm(Y) * modes])
+    U, s, _ = np.linalg.svd(Y, full_matrices=False)
+    if geometric.n_shapes is not None:
+        k = min(geometric.n_shapes, s.size)
+    else:
+        missed = np.sqrt(np.cumsum(s[::-1] ** 2)[::-1])  # with those from k on left out
+        k = int(np.count_nonzero(missed > geometric.tol * missed[0]))
+    while k < s.size and s[k] > (1 - EQUAL_RTOL) * s[k - 1]:
+        k += 1
+    return np.asarray(U[:, :k])

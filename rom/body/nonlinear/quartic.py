@@ -1,0 +1,128 @@
+"""Strain energy of a body at finite strain: a polynomial of fourth order in its coordinates.
+
+    U = q K q / 2 + T3 q q q + T4 q q q q,    f = K q + 3 T3 q q + 4 T4 q q q,
+    tangent K + 6 T3 q + 12 T4 q q
+
+T3 and T4 are symmetric in all indices, and only entries with i <= j <= k <= l are kept.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import combinations_with_replacement
+from math import comb
+
+import numpy as np
+
+from rom.model import Array, Index
+
+
+@dataclass(frozen=True)
+class Quartic:
+    """Strain energy of elastic coordinates q (r,).
+
+    Attributes:
+        K: (r, r) stiffness without load [N/m].
+        cubic: (r (r + 1) (r + 2) / 6,) entries of T3, i <= j <= k, the last index fastest.
+        quartic: (r (r + 1) (r + 2) (r + 3) / 24,) entries of T4, i <= j <= k <= l.
+    """
+
+    K: Array
+    cubic: Array
+    quartic: Array
+
+    @classmethod
+    def from_gram(cls, G: Array, r: int) -> "Quartic":
+        """The energy of the integrals of products of strains, see `rom.fe.forms.large_strain`.
+
+        Args:
+            G: (N, N) Gram matrix of r linear strains and r (r + 1) / 2 quadratic ones [N m].
+            r: number of coordinates.
+        """
+        K, A, B = G[:r, :r], G[:r, r:], G[r:, r:]
+        pair = pair_numbers(r)
+        i, j, k = entries(r, 3).T
+        cubic = (A[i, pair[j, k]] + A[j, pair[i, k]] + A[k, pair[i, j]]) / 6
+        i, j, k, l = entries(r, 4).T
+        quartic = B[pair[i, j], pair[k, l]] + B[pair[i, k], pair[j, l]] + B[pair[i, l], pair[j, k]]
+        return cls(0.5 * (K + K.T), cubic, quartic / 24)
+
+    def fits(self, r: int) -> bool:
+        """Whether there are as many entries as r coordinates have."""
+        shapes = self.K.shape, self.cubic.shape, self.quartic.shape
+        return shapes == ((r, r), (n_entries(r, 3),), (n_entries(r, 4),))
+
+    @property
+    def n(self) -> int:
+        """Number r of coordinates."""
+        return len(self.K)
+
+    def energy(self, q: Array) -> float:
+        """Strain energy [J] at the coordinates (r,)."""
+        S3, S4 = self._stresses(q)
+        return float(q @ (0.5 * self.K + S3 + S4) @ q)
+
+    def force(self, q: Array) -> Array:
+        """(r,) derivative of the energy [N] at the coordinates (r,)."""
+        S3, S4 = self._stresses(q)
+        return np.asarray((self.K + 3 * S3 + 4 * S4) @ q)
+
+    def tangent(self, q: Array) -> Array:
+        """(r, r) second derivative of the energy [N/m] at the coordinates (r,)."""
+        S3, S4 = self._stresses(q)
+        return self.K + 6 * S3 + 12 * S4
+
+    def _stresses(self, q: Array) -> tuple[Array, Array]:
+        """(r, r) contractions T3 q and T4 q q."""
+        i, j = np.triu_indices(self.n)
+        square = np.where(i == j, 1.0, 2.0) * q[i] * q[j]
+        by_one, by_two = self.by_pairs
+        return (by_one @ q)[self._pair], (by_two @ square)[self._pair]
+
+    @cached_property
+    def by_pairs(self) -> tuple[Array, Array]:
+        """T3 as (r (r + 1) / 2, r) and T4 as a matrix of pairs, for fast contraction."""
+        r = self.n
+        i, j = np.triu_indices(r)
+        third = np.arange(r)
+        T3 = self.cubic[
+            position(np.stack(np.broadcast_arrays(i[:, None], j[:, None], third), -1), r)
+        ]
+        four = np.broadcast_arrays(i[:, None], j[:, None], i[None], j[None])
+        T4 = self.quartic[position(np.stack(four, -1), r)]
+        return T3, T4
+
+    @cached_property
+    def _pair(self) -> Index:
+        return pair_numbers(self.n)
+
+
+def entries(r: int, order: int) -> Index:
+    """(e, order) indices i <= j <= ... < r of the entries that are kept, last one fastest."""
+    count = order * n_entries(r, order)
+    flat = (i for one in combinations_with_replacement(range(r), order) for i in one)
+    return np.fromiter(flat, dtype=np.int64, count=count).reshape(-1, order)
+
+
+def n_entries(r: int, order: int) -> int:
+    """Number of entries of a symmetric tensor."""
+    return comb(r + order - 1, order)
+
+
+def position(indices: Index, r: int) -> Index:
+    """Where the entries with these indices (..., order), in any sequence, are kept."""
+    ordered = np.sort(indices, axis=-1)
+    order = indices.shape[-1]
+    at = np.full(ordered.shape[:-1], n_entries(r, order) - 1)
+    for k in range(order):  # entries that come later, counted index by index
+        left = order - k
+        behind = np.array([comb(r - 1 - i + left - 1, left) for i in range(r)], dtype=np.int64)
+        at = at - behind[ordered[..., k]]
+    return at
+
+
+def pair_numbers(r: int) -> Index:
+    """(r, r) number of each pair among those with j <= k."""
+    number = np.empty((r, r), dtype=np.int64)
+    j, k = np.triu_indices(r)
+    number[j, k] = number[k, j] = np.arange(j.size)
+    return number

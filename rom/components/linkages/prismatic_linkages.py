@@ -1,0 +1,255 @@
+"""Planar linkages of two drives of which one or both are slides, and their closed forms.
+
+`CrossSlides` is PP, `PolarArm` RP, `SlideArm` PR, `SlideFiveBar` PRRRP. Beside an angle q, a slide
+has the coordinate [m]: `rom.components.linkages.isotropic_sets` takes a characteristic length.
+
+Source:
+    Kinetic energies of points and rods; the conditions of isotropy are derived in the page
+    `theory/isotropy`.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from rom.components.linkages.chains import (
+    Link,
+    Motion,
+    closed,
+    directions,
+    gram,
+    in_chunks,
+    meeting,
+    reach,
+    unit_rows,
+)
+from rom.components.linkages.two_dof_linkages import Elastic, as_elastic
+from rom.errors import ModelError
+from rom.model import Array
+
+
+def _not_negative(name: str, **numbers: float) -> None:
+    wrong = {key: value for key, value in numbers.items() if not 0 <= value < np.inf}
+    if wrong:
+        raise ModelError(f"{name}: {wrong}; masses and inertias are finite and not negative.")
+
+
+def _positive(name: str, **numbers: float) -> None:
+    wrong = {key: value for key, value in numbers.items() if not 0 < value < np.inf}
+    if wrong:
+        raise ModelError(
+            f"{name}: {wrong} must be positive.", hint="Without mass a motion costs no energy."
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class CrossSlides:
+    """PP: a slide along x that carries a second slide at an angle to it.
+
+    Attributes:
+        masses: of the first and of the second slide with its tool [kg].
+        angle: from the first guide to the second [rad].
+        motors: what rotors add to either coordinate, J / radius^2 [kg].
+
+    Raises:
+        ModelError: for a mass that is negative, a second slide without mass, or parallel guides.
+    """
+
+    masses: tuple[float, float]
+    angle: float = np.pi / 2
+    motors: tuple[float, float] = (0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        _positive("cross slides", second_slide=self.masses[1])
+        _not_negative(
+            "cross slides", first_slide=self.masses[0], motor=self.motors[0], other=self.motors[1]
+        )
+        if not abs(np.sin(self.angle)) > 1e-9:
+            raise ModelError(f"angle = {self.angle:g} rad: guides must not be parallel.")
+
+    def inertia(self, q1: npt.ArrayLike, q2: npt.ArrayLike) -> Array:
+        """(..., 2, 2) generalised inertia [kg], the same at all displacements (...) [m]."""
+        first, second = self.masses
+        coupling = second * np.cos(self.angle)
+        A = np.array([[first + second, coupling], [coupling, second]]) + np.diag(self.motors)
+        return np.broadcast_to(A, (*np.broadcast(q1, q2).shape, 2, 2)).copy()
+
+    def tip(self, q1: npt.ArrayLike, q2: npt.ArrayLike) -> Array:
+        """(..., 2) where the tool is at displacements (...) [m]; q1 and q2 in [m]."""
+        q1, q2 = np.broadcast_arrays(np.asarray(q1, dtype=float), np.asarray(q2, dtype=float))
+        return np.stack([q1, 0 * q1], axis=-1) + q2[..., None] * directions(np.array(self.angle))
+
+
+@dataclass(frozen=True, slots=True)
+class PolarArm:
+    """RP: a guide that turns about the origin, and a slide on it.
+
+    Attributes:
+        guide: inertia of guide and rotor about the pivot [kg m^2].
+        slide: mass of the slide with its tool [kg].
+        spin: inertia of the slide about its own mass centre [kg m^2].
+        offset: distance of that centre from the line through the pivot along the guide [m].
+        motor: what the rotor of the slide adds to its mass, if it does not turn with it [kg].
+
+    Raises:
+        ModelError: for a slide without mass, or a mass or inertia that is negative.
+    """
+
+    guide: float
+    slide: float
+    spin: float = 0.0
+    offset: float = 0.0
+    motor: float = 0.0
+
+    def __post_init__(self) -> None:
+        _positive("polar arm", slide=self.slide)
+        _not_negative("polar arm", guide=self.guide, spin=self.spin, motor=self.motor)
+
+    def inertia(self, q1: npt.ArrayLike, q2: npt.ArrayLike) -> Array:
+        """(..., 2, 2) generalised inertia [kg m^2, kg m, kg].
+
+        Args:
+            q1: (...,) angle of the guide [rad].
+            q2: (...,) displacement of the slide from the pivot [m].
+        """
+        _, s = np.broadcast_arrays(np.asarray(q1, dtype=float), np.asarray(q2, dtype=float))
+        A = np.empty((*s.shape, 2, 2))
+        A[..., 0, 0] = self.guide + self.spin + self.slide * (s * s + self.offset**2)
+        A[..., 0, 1] = A[..., 1, 0] = -self.slide * self.offset
+        A[..., 1, 1] = self.slide + self.motor
+        return A
+
+    def tip(self, q1: npt.ArrayLike, q2: npt.ArrayLike) -> Array:
+        """(..., 2) where the centre of the slide is [m]; q1 in [rad], q2 in [m]."""
+        q1, s = np.broadcast_arrays(np.asarray(q1, dtype=float), np.asarray(q2, dtype=float))
+        across = directions(q1 + np.pi / 2)
+        return s[..., None] * directions(q1) + self.offset * across
+
+    def isotropic_reach(self, length: float) -> float | None:
+        """Displacement [m] at which the arm is isotropic for a characteristic length [m], or None.
+
+        No offset, and s^2 = L^2 (1 + motor / slide) - (guide + spin) / slide.
+        """
+        square = length**2 * (1 + self.motor / self.slide) - (self.guide + self.spin) / self.slide
+        return float(np.sqrt(square)) if self.offset == 0.0 and square >= 0 else None
+
+
+@dataclass(frozen=True, slots=True)
+class SlideArm:
+    """PR: a slide along x, and a link on it.
+
+    Attributes:
+        slide: mass of the slide [kg].
+        link: the link.
+        payload: point mass at its end [kg].
+
+    Raises:
+        ModelError: for a mass that is negative.
+    """
+
+    slide: float
+    link: Link
+    payload: float = 0.0
+
+    def __post_init__(self) -> None:
+        _not_negative("slide with an arm", slide=self.slide, payload=self.payload)
+
+    def inertia(self, q1: npt.ArrayLike, q2: npt.ArrayLike, *, elastic: Elastic = "held") -> Array:
+        """(..., 2, 2) generalised inertia [kg, kg m, kg m^2].
+
+        Args:
+            q1: (...,) displacement of the slide [m].
+            q2: (...,) angle of the link [rad].
+            elastic: "held" or "free", see `TwoLink.inertia`.
+        """
+        (link,) = as_elastic((self.link,), elastic)
+        return in_chunks(replace(self, link=link)._of_all_rates, q1, q2)
+
+    def tip(self, q1: npt.ArrayLike, q2: npt.ArrayLike) -> Array:
+        """(..., 2) where the end of the link is [m]; q1 in [m], q2 in [rad]."""
+        q1, q2 = np.broadcast_arrays(np.asarray(q1, dtype=float), np.asarray(q2, dtype=float))
+        return np.stack([q1, 0 * q1], axis=-1) + self.link.length * directions(q2)
+
+    def _of_all_rates(self, q1: Array, q2: Array) -> Array:
+        n = 2 + self.link.r
+        motion = Motion.at_rest(q1.size, n)
+        motion.pin[:, 0, 0] = 1.0
+        motion.A[:, 0, 0] = self.slide
+        motion.add(self.link, q2, unit_rows(n, 1), 2)
+        return motion.A + self.payload * gram(motion.pin, motion.pin)
+
+
+@dataclass(frozen=True, slots=True)
+class SlideFiveBar:
+    """PRRRP: two slides on straight rails, two couplers that meet in the tip.
+
+    Attributes:
+        rails: (x, y, angle) of a point of the left and of the right rail [m, m, rad]; displacements
+            count from it.
+        slides: masses of the slides [kg].
+        couplers: links from the left and the right slide to the tip.
+        payload: point mass at the tip [kg].
+        side: 1 for the tip to the left of the line from the left to the right slide, -1 for right.
+
+    Raises:
+        ModelError: for a mass that is negative, or an unknown side.
+    """
+
+    rails: tuple[tuple[float, float, float], tuple[float, float, float]]
+    slides: tuple[float, float]
+    couplers: tuple[Link, Link]
+    payload: float = 0.0
+    side: int = 1
+
+    def __post_init__(self) -> None:
+        left, right = self.slides
+        _not_negative("five-bar on rails", left=left, right=right, payload=self.payload)
+        if self.side not in (1, -1):
+            raise ModelError(f"side = {self.side}: needed is 1 or -1.")
+
+    def inertia(self, q1: npt.ArrayLike, q2: npt.ArrayLike, *, elastic: Elastic = "held") -> Array:
+        """(..., 2, 2) generalised inertia [kg] at displacements (...) of the slides [m].
+
+        Args:
+            q1: (...,) displacement of the left slide [m].
+            q2: (...,) of the right one [m].
+            elastic: "held" or "free", see `TwoLink.inertia`.
+
+        Raises:
+            ModelError: if the couplers cannot reach each other somewhere.
+        """
+        left, right = as_elastic(self.couplers, elastic)
+        return in_chunks(replace(self, couplers=(left, right))._of_all_rates, q1, q2)
+
+    def tip(self, q1: npt.ArrayLike, q2: npt.ArrayLike) -> Array:
+        """(..., 2) where the tool is at displacements (...) [m]; q1 and q2 in [m].
+
+        Raises:
+            ModelError: if the couplers cannot reach each other somewhere.
+        """
+        q1, q2 = np.broadcast_arrays(np.asarray(q1, dtype=float), np.asarray(q2, dtype=float))
+        return meeting(*self._elbows(q1, q2), self.couplers, self.side, (q1, q2))
+
+    def assembles(self, q1: npt.ArrayLike, q2: npt.ArrayLike) -> npt.NDArray[np.bool_]:
+        """Whether the couplers meet at displacements (...) [m], and not in one line."""
+        return reach(*self._elbows(q1, q2), self.couplers)
+
+    def _elbows(self, q1: npt.ArrayLike, q2: npt.ArrayLike) -> tuple[Array, Array]:
+        left, right = (
+            np.array(rail[:2])
+            + np.asarray(q, dtype=float)[..., None] * directions(np.array(rail[2]))
+            for rail, q in zip(self.rails, np.broadcast_arrays(q1, q2), strict=True)
+        )
+        return left, right
+
+    def _of_all_rates(self, q1: Array, q2: Array) -> Array:
+        at = 2 + np.cumsum([0, *(link.r for link in self.couplers)])
+        left, right = self._elbows(q1, q2)
+        sides = [Motion.at_rest(q1.size, int(at[-1])) for _ in range(2)]
+        for k, (side, rail, mass) in enumerate(zip(sides, self.rails, self.slides, strict=True)):
+            side.pin[:, :, k] = directions(np.array(rail[2]))
+            side.A[:, k, k] = mass
+        P = np.stack([left, self.tip(q1, q2), right], axis=1)
+        closed(sides, self.couplers, P, at)
+        return sides[0].A + sides[1].A + self.payload * gram(sides[0].pin, sides[0].pin)

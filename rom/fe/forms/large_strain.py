@@ -1,0 +1,173 @@
+"""Strain energy of shapes at finite strain, a polynomial of fourth order in their amplitudes.
+
+St. Venant-Kirchhoff material, u = sum_i psi_i q_i, with L(u) = sym grad u and
+Q(a, b) = sym(grad a^T grad b)::
+
+    E = sum_i L_i q_i + sum_jk Q_jk q_j q_k / 2,     U = integral of E : C : E / 2
+
+All products are entries of one Gram matrix, of the columns L_i and Q_jk (j <= k).
+
+Source:
+    Mignolet, Przekop, Rizzi and Spottswood, A review of indirect/non-intrusive reduced order
+    modeling of nonlinear geometric structures, J. Sound Vib. 332 (2013) 2437.
+"""
+
+from collections.abc import Iterator
+from typing import Any
+
+from mpi4py import MPI
+
+import numpy as np
+import ufl
+from dolfinx import fem
+
+from rom.fe.compat import (
+    assembled_vector,
+    cell_name,
+    compiled,
+    evaluated,
+    geometry_degree,
+    quadrature_rule,
+)
+from rom.fe.forms.material import stress
+from rom.fe.jit import compiling
+from rom.model import PAIRS, Array, Index, Integers
+
+BLOCK_BYTES = 64e6  # of the columns of a block of cells, of which a few copies are made
+
+
+class LargeStrain:
+    """Energy of shapes at finite strain, and the forces of second order that shapes cause.
+
+    Args:
+        V: displacement space.
+        numbers: coefficients of the material, see `rom.fe.forms.material.coefficients`.
+        degree: of the displacement.
+    """
+
+    def __init__(self, V: Any, numbers: dict[str, Any], degree: int):
+        self.V, self.mesh, self.numbers = V, V.mesh, numbers
+        self.order = exact_degree(V.mesh, degree)
+        self.points, self.weights = quadrature_rule(self.mesh, self.order)
+        self.n_cells = self.mesh.topology.index_map(3).size_local
+
+    def gram(self, E: Array) -> Array:
+        """(N, N) integrals of Z^T C Z, with the columns L_i, then Q_jk for j <= k [N m].
+
+        Args:
+            E: (n_local, r) shapes [m]; N = r + r (r + 1) / 2.
+
+        Returns:
+            The matrix, equal on all ranks; row by row of the upper triangle for the pairs.
+        """
+        r = E.shape[1]
+        N = r + r * (r + 1) // 2
+        G = np.zeros((N, N))
+        per_cell = len(self.weights) * 8 * (6 * N + 9 * r * r)
+        n_blocks = 1 + int(self.n_cells * per_cell / BLOCK_BYTES)
+        cells = np.arange(self.n_cells, dtype=np.int32)
+        for H, root in self._gradients(E, np.array_split(cells, n_blocks)):
+            Z = np.concatenate([linear_strain(H), quadratic_strain(H)], axis=2)
+            Z = np.matmul(root, Z).reshape(-1, N)
+            G += Z.T @ Z
+        self.mesh.comm.Allreduce(MPI.IN_PLACE, G)
+        return 0.5 * (G + G.T)
+
+    def second_forces(self, U: Array, pairs: Index) -> Array:
+        """(n_local, p) forces D^2 f [u_i, u_j] at no displacement [N].
+
+        Args:
+            U: (n_local, m) displacements [m].
+            pairs: (p, 2) numbers i and j.
+        """
+        a, b, v = fem.Function(self.V), fem.Function(self.V), ufl.TestFunction(self.V)
+
+        def L(u: Any) -> Any:
+            return ufl.sym(ufl.grad(u))
+
+        def Q(u: Any, w: Any) -> Any:
+            return ufl.sym(ufl.dot(ufl.grad(u).T, ufl.grad(w)))
+
+        density = sum(
+            ufl.inner(stress(Q(x, y), self.numbers), L(z))
+            for x, y, z in ((a, b, v), (v, a, b), (v, b, a))
+        )
+        dx = ufl.Measure("dx", domain=self.mesh, metadata={"quadrature_degree": self.order})
+        with compiling(self.mesh.comm):
+            form = compiled(density * dx)
+        out = np.empty((U.shape[0], len(pairs)))
+        for k, (i, j) in enumerate(pairs):
+            _set(a, U[:, i])
+            _set(b, U[:, j])
+            out[:, k] = assembled_vector(form)
+        return out
+
+    def _gradients(self, E: Array, blocks: list[Integers]) -> Iterator[tuple[Array, Array]]:
+        """Gradients (p, 3, 3, r) [m/m] and sqrt(w C) (p, 6, 6) at the points of each block."""
+        u = fem.Function(self.V)
+        columns = []
+        for column in E.T:  # every rank exchanges all columns, however many blocks it has
+            _set(u, column)
+            columns.append(u.x.array.copy())
+        x = ufl.SpatialCoordinate(self.mesh)
+        with compiling(self.mesh.comm):
+            grad = fem.Expression(ufl.grad(u), self.points)
+            volume = fem.Expression(ufl.JacobianDeterminant(self.mesh), self.points)
+            law = fem.Expression(_stiffness(self.numbers, x), self.points[:1])
+        p = len(self.points)
+        for cells in blocks:
+            if not cells.size:
+                continue
+            H = np.empty((cells.size * p, 3, 3, E.shape[1]))
+            for k, column in enumerate(columns):
+                u.x.array[:] = column
+                H[..., k] = evaluated(grad, self.mesh, cells).reshape(-1, 3, 3)
+            w = np.abs(evaluated(volume, self.mesh, cells).reshape(-1, p)) * self.weights
+            C = evaluated(law, self.mesh, cells).reshape(-1, 6, 6)
+            root = np.linalg.cholesky(C).transpose(0, 2, 1)
+            yield H, (np.sqrt(w)[:, :, None, None] * root[:, None]).reshape(-1, 6, 6)
+
+
+def linear_strain(H: Array) -> Array:
+    """(p, 6, r) Voigt columns of sym grad u, shear doubled, from gradients (p, 3, 3, r) [1]."""
+    rows = [H[:, a, a] if a == b else H[:, a, b] + H[:, b, a] for a, b in PAIRS]
+    return np.stack(rows, axis=1)
+
+
+def quadratic_strain(H: Array) -> Array:
+    """(p, 6, r (r + 1) / 2) Voigt columns of sym(grad a^T grad b), shear doubled [1].
+
+    Args:
+        H: (p, 3, 3, r) gradients of the shapes [1].
+    """
+    p, r = H.shape[0], H.shape[3]
+    flat = H.reshape(p, 3, 3 * r)
+    products = np.matmul(flat.transpose(0, 2, 1), flat).reshape(p, 3, r, 3, r)
+    j, k = np.triu_indices(r)
+    rows = [products[:, a, j, b, k] if a == b else
+            products[:, a, j, b, k] + products[:, b, j, a, k] for a, b in PAIRS]  # fmt: skip
+    return np.stack(rows, axis=1)
+
+
+def exact_degree(mesh: Any, degree: int) -> int:
+    """Quadrature degree that is exact for the fourth power of grad u on straight cells."""
+    curved = geometry_degree(mesh) - 1
+    if cell_name(mesh) == "tetrahedron":
+        return max(4 * (degree - 1) + 3 * curved, 1)
+    return 4 * degree + 2 * curved
+
+
+def _stiffness(numbers: dict[str, Any], x: Any) -> Any:
+    """The (6, 6) stiffness row by row, a ufl vector of the mesh."""
+    rows = []
+    for a, b in PAIRS:
+        unit = np.zeros((3, 3))
+        unit[a, b] = unit[b, a] = 1.0 if a == b else 0.5
+        s = stress(ufl.as_matrix(unit.tolist()), numbers)
+        rows += [s[i, j] + 0 * x[0] for i, j in PAIRS]
+    return ufl.as_vector(rows)
+
+
+def _set(u: Any, column: Array) -> None:
+    u.x.array[: column.size] = column
+    u.x.scatter_forward()

@@ -1,0 +1,285 @@
+"""Bodies of large deflection: the energy of shapes, their derivatives, and beams that bend far."""
+
+import subprocess
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import rom
+from cases.boxes import box, distort
+from cases.long import SHARED_BY
+from cases.paths import RANKS, ROOT
+from cases.ranks.environment import ENVIRONMENT
+from rom.body.nonlinear.quartic import Quartic, entries, n_entries, position
+from rom.body.nonlinear.statics import follow
+from rom.checks.deflection import rows_of
+from rom.eigen.verbs import rigid_motions
+from rom.errors import ConfigError, InterfaceError, ModelError, ResourceError
+from rom.process.mpirun import mpirun
+
+pytest.importorskip("dolfinx", reason="dolfinx is not installed")
+pytestmark = [
+    pytest.mark.fenicsx,
+    pytest.mark.filterwarnings("ignore:Number of integration points"),
+    pytest.mark.filterwarnings("ignore::rom.errors.RomWarning"),
+]
+E_STEEL = 210e9
+# dead transverse load at the tip of an inextensible cantilever: P L^2 / EI, slope, shortening and
+# deflection over L, integrals of the elastica found by quadrature
+ELASTICA = np.array([
+    [0.25, 0.124292, 0.004118, 0.082746],
+    [0.5, 0.244534, 0.015919, 0.162144],
+    [1.0, 0.461352, 0.056433, 0.301721],
+    [2.0, 0.781750, 0.160642, 0.493457],
+    [5.0, 1.215368, 0.387628, 0.713792],
+])  # fmt: skip
+
+
+def assembled(size=(1.0, 0.1, 0.08), cells=(3, 1, 1), kind="hexahedron", degree=2, **options):
+    from rom.fe.elasticity import assemble
+
+    mesh, faces = box(size, cells, kind)
+    if options.pop("distorted", False):
+        distort(mesh, 0.05)
+    material = options.pop("material", STEEL)
+    facets = {"root": faces["x0"], "tip": faces["x1"]}
+    return assemble(mesh, facet_tags=facets, material=material, degree=degree)
+
+
+def energy_of(model, E):
+    r = E.shape[1]
+    return Quartic.from_gram(model.stresses.large_strain().gram(E), r)
+
+
+STEEL = rom.Material(E=E_STEEL, nu=0.3, rho=7850.0)
+TIMBER = rom.Orthotropic(
+    E=(11e9, 0.9e9, 0.5e9), nu=(0.3, 0.4, 0.5), G=(0.1e9, 0.7e9, 0.6e9), rho=450.0
+)
+
+
+@pytest.mark.parametrize(
+    "kind, degree, material",
+    [("hexahedron", 2, STEEL), ("tetrahedron", 2, TIMBER), ("tetrahedron", 1, STEEL)],
+)
+def test_energy_force_and_tangent_are_those_of_the_finite_elements(kind, degree, material):
+    """Against the derivatives that UFL takes of the strain energy."""
+    import ufl
+    from dolfinx import fem
+
+    from rom.fe.compat import assemble_matrix, assemble_vector
+    from rom.fe.forms.material import stress
+
+    model = assembled(kind=kind, degree=degree, distorted=True, cells=(2, 1, 2), material=material)
+    V, numbers = model.stresses.V, model.stresses.numbers
+    rng = np.random.default_rng(1)
+    E, q = 0.1 * rng.standard_normal((model.n_dofs, 4)), rng.standard_normal(4)
+    u = fem.Function(V)
+    u.x.array[:] = E @ q
+    H = ufl.grad(u)
+    strain = ufl.sym(H) + 0.5 * ufl.dot(H.T, H)
+    rule = {"quadrature_degree": 4 * degree}
+    U = 0.5 * ufl.inner(stress(strain, numbers), strain) * ufl.dx(metadata=rule)
+    f = ufl.derivative(U, u)
+    K = assemble_matrix(ufl.derivative(f, u))
+    found = energy_of(model, E)
+    assert_allclose(found.energy(q), fem.assemble_scalar(fem.form(U)), rtol=1e-10)
+    force, tangent = E.T @ assemble_vector(f), E.T @ (rows_of(K) @ E)
+    assert_allclose(found.force(q), force, rtol=0, atol=1e-10 * np.abs(force).max())
+    assert_allclose(found.tangent(q), tangent, rtol=0, atol=1e-10 * np.abs(tangent).max())
+
+
+def test_a_body_that_turns_by_any_angle_inside_its_span_has_no_energy():
+    """exp(w) - 1 = sin W + (1 - cos) W^2 is linear in two amplitudes: all orders must cancel."""
+    model = assembled()
+    axis = np.array([0.36, 0.48, 0.8])
+    W = rigid_motions(model.points)[:, 3:] @ axis
+    WW = np.cross(axis, W.reshape(-1, 3)).ravel()
+    found = energy_of(model, np.column_stack([W, WW]))
+    scale = found.energy(np.array([0.0, 1.0]))
+    for angle in (0.3, 1.2, 2.9):
+        q = np.array([np.sin(angle), 1 - np.cos(angle)])
+        assert abs(found.energy(q)) < 1e-13 * scale
+        assert np.abs(found.force(q)).max() < 1e-12 * scale
+    assert found.energy(np.array([0.3, 0.0])) > 1e-4 * scale  # a linear rotation strains
+
+
+def test_forces_of_second_order_are_those_of_the_cubic_terms():
+    model = assembled(cells=(2, 1, 1))
+    E = 0.1 * np.random.default_rng(2).standard_normal((model.n_dofs, 3))
+    T3, pairs = energy_of(model, E).by_pairs[0], np.array([[0, 1], [2, 2], [1, 2]])
+    F = model.stresses.large_strain().second_forces(E, pairs)
+    numbers = {(0, 1): 1, (2, 2): 5, (1, 2): 4}  # of the pairs (0, 0), (0, 1), ..., (2, 2)
+    expected = np.array([6 * T3[numbers[i, j]] for i, j in pairs.tolist()]).T
+    assert_allclose(E.T @ F, expected, rtol=1e-10, atol=1e-10 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("order", [3, 4])
+def test_entries_are_kept_once_in_any_sequence_of_their_indices(order):
+    r = 5
+    kept = entries(r, order)
+    assert len(kept) == n_entries(r, order) == {3: 35, 4: 70}[order]
+    for turn in (slice(None), slice(None, None, -1)):
+        assert_allclose(position(kept[:, turn], r), np.arange(len(kept)))
+
+
+def slender(slenderness, cells, nu=0.0):
+    h = 1.0 / slenderness
+    material = rom.Material(E=E_STEEL, nu=nu, rho=7850.0)
+    return assembled((1.0, h, h), (cells, 1, 1), material=material), E_STEEL * h**4 / 12
+
+
+def reduced(model, loads, *, n_modes=4, kinds="rbe3", certify=False, active=4, **options):
+    return rom.reduce(
+        model,
+        method=rom.CraigBampton(n_modes=n_modes),
+        interfaces={"root": kinds, "tip": kinds},
+        reference="root",
+        nonlinear=rom.Geometric(loads={"tip": loads}, n_modes=active, **options),
+        certify=certify,
+    )
+
+
+def tip_of(body, q):
+    """Slope [rad], shortening and deflection [m] of the tip."""
+    tip = body.marker("tip")
+    x, y, _ = tip.translation @ q
+    return np.array([np.arcsin((tip.rotation @ q)[2]), -x, y])
+
+
+@pytest.mark.parametrize("kinds, n_shapes", [("rbe3", 14), (rom.Polynomial(1), 14)])
+def test_a_cantilever_follows_the_elastica(kinds, n_shapes):
+    """One body of at most 25 coordinates, six more where sections may strain; L / h = 100."""
+    model, EI = slender(100, 40)
+    loads = (0, 5 * EI, 0, 0, 0, 0)
+    body = reduced(model, loads, n_modes=2, active=2, kinds=kinds, n_shapes=n_shapes)
+    assert body.n_modes <= (25 if kinds == "rbe3" else 31)
+    loads = np.outer(ELASTICA[:, 0] * EI, body.marker("tip").translation[1])
+    for q, (_, *expected) in zip(follow(body.quartic, loads), ELASTICA, strict=True):
+        assert_allclose(tip_of(body, q), expected, rtol=2e-3)
+
+
+@pytest.fixture(scope="module")
+def certified():
+    """A cantilever fifty times as long as thick with Poisson's ratio, and its range of loads."""
+    model, EI = slender(50, 12, nu=0.3)
+    loads = (0, 2 * EI, EI, 0, 0, 0)
+    return reduced(model, loads, n_modes=10, active=2, certify=True), model, loads
+
+
+def deflections_compared(body):
+    return {r.quantity: r for r in body.certificate.rows if "tip f" in r.quantity}
+
+
+def test_the_certificate_compares_with_the_full_model_at_large_deflection(certified):
+    body, *_ = certified
+    assert body.certificate.ok, body.certificate
+    assert {"tip f_y: displacement", "-tip f_z: frequencies about it"} <= set(
+        deflections_compared(body)
+    )
+    assert set(body.provenance["large deflection"]) == {
+        "tip f_y", "-tip f_y", "tip f_z", "-tip f_z", "all together"
+    }  # fmt: skip
+
+
+def test_a_basis_without_derivatives_locks_and_its_certificate_fails(certified, monkeypatch):
+    _, model, loads = certified
+    monkeypatch.setattr("rom.workflow.enriched", lambda *given: given[4])
+    body = reduced(model, loads, n_modes=10, certify=True)
+    assert not body.certificate.ok
+    failed = deflections_compared(body)["tip f_y: displacement"]
+    assert not failed.ok and 0.87 < failed.value < 0.95
+
+
+def test_the_linear_part_is_that_of_the_linear_body(certified):
+    body, *_ = certified
+    r = body.n_modes
+    assert_allclose(body.quartic.tangent(np.zeros(r)), np.diag(body.omega**2), rtol=0, atol=1e-9)
+
+
+def test_a_file_and_other_units_keep_the_energy(certified, tmp_path):
+    body, *_ = certified
+    read = rom.load(rom.save(body, tmp_path / "body.rom.npz"))
+    q = 1e-3 * np.random.default_rng(0).standard_normal(body.n_modes)
+    assert read.quartic.energy(q) == body.quartic.energy(q)
+    other, tip = body.in_units("mm-t-s"), body.marker("tip").translation
+    same = q * 1e3 * tip[0, 0] / other.marker("tip").translation[0, 0]  # 1 m is 1000 mm
+    assert_allclose(
+        other.quartic.energy(same), 1e3 * body.quartic.energy(q)
+    )  # 1 J is 1000 t mm^2/s^2
+    cut = replace(body, quartic=replace(body.quartic, quartic=body.quartic.quartic[1:]))
+    with pytest.raises(rom.errors.FileFormatError, match="does not fit"):
+        rom.load(rom.save(cut, tmp_path / "cut.rom.npz"))
+
+
+@pytest.mark.parametrize(
+    "change, error, says",
+    [
+        ({"interfaces": {"root": "rbe2", "tip": "rbe3"}}, InterfaceError, "'root' is rigid"),
+        ({"reference": "mean-axis"}, ConfigError, "seen from an interface"),
+        ({"method": rom.FreeFree(n_modes=4)}, ConfigError, "no(ne| constraint)|has none"),
+        ({"stress": True}, ConfigError, "no stress is recovered"),
+        ({"stiffening": True}, ConfigError, "small deflection"),
+        ({"nonlinear": {"hub": (1, 0, 0, 0, 0, 0)}}, InterfaceError, "names 'hub'"),
+        ({"nonlinear": {"root": (1, 0, 0, 0, 0, 0)}}, InterfaceError, "names 'root'"),
+        ({"modes": 12}, ResourceError, "more than 80 are refused"),
+    ],
+)  # fmt: skip
+def test_what_does_not_go_together_is_refused_by_name(change, error, says):
+    model, _ = slender(20, 4)
+    loads = change.pop("nonlinear", {"tip": (0, 1.0, 0, 0, 0, 0)})
+    options = {
+        "method": rom.CraigBampton(n_modes=12),
+        "interfaces": {"root": "rbe3", "tip": "rbe3"},
+        "reference": "root",
+        "nonlinear": rom.Geometric(loads=loads, n_modes=change.pop("modes", 2)),
+    }
+    with pytest.raises(error, match=says):
+        rom.reduce(model, certify=False, **options | change)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [{"loads": {}}, {"loads": {"tip": (1, 2, 3)}}, {"loads": {"tip": (0,) * 6}}, {"tol": 2.0},
+     {"loads": {"tip": (0, np.nan, 0, 0, 0, 0)}}, {"n_shapes": 0}, {"n_steps": 0}],
+)  # fmt: skip
+def test_a_range_that_is_none_is_refused(wrong):
+    with pytest.raises(ConfigError):
+        rom.Geometric(**{"loads": {"tip": (0, 1.0, 0, 0, 0, 0)}} | wrong)
+
+
+def test_a_range_in_which_the_body_buckles_is_refused():
+    """Euler's load of a cantilever is pi^2 / 4 EI / L^2."""
+    model, EI = slender(20, 4)
+    with pytest.raises(ModelError, match=r"load \[-1.0\] of the range: no stable equilibrium"):
+        reduced(model, (3 * EI, 0, 0, 0, 0, 0), n_modes=2, active=2)
+    assert reduced(model, (2 * EI, 0, 0, 0, 0, 0), n_modes=2, active=2).quartic is not None
+
+
+def test_a_body_of_large_deflection_keeps_its_frame_and_its_programs(certified, tmp_path):
+    body, *_ = certified
+    with pytest.raises(ModelError, match="'root' for good"):
+        body.with_reference("mean-axis")
+    with pytest.raises(ModelError, match="large deflection"):
+        rom.Mechanism().add_flexible("beam", body)
+    with pytest.raises(ConfigError, match="large deflection"):
+        rom.export(body, tmp_path / "beam.SID_FEM")
+
+
+@pytest.mark.mpi
+def test_energy_and_body_are_the_same_on_any_number_of_processes(tmp_path):
+    found = {}
+    for n in (1, *SHARED_BY):
+        file = tmp_path / f"{n}.npz"
+        script = str(RANKS / "large_strain_under_mpi.py")
+        subprocess.run(
+            [*mpirun(n), sys.executable, script, str(file)],
+            env=ENVIRONMENT, timeout=300, check=True, capture_output=True, cwd=ROOT,
+        )  # fmt: skip
+        found[n] = np.load(file)
+    for n in SHARED_BY:
+        for name, rtol in (("G", 1e-12), ("F", 1e-12), ("tip", 1e-6)):
+            one, other = found[1][name], found[n][name]
+            assert_allclose(other, one, rtol=0, atol=rtol * np.abs(one).max(), err_msg=name)

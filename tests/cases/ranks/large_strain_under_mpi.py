@@ -1,0 +1,31 @@
+"""Run by test_large_deflection.py under mpirun: energy and forces of shapes, summed over ranks."""
+
+import sys
+
+import numpy as np
+
+import rom
+from cases.boxes import box
+from rom.body.nonlinear.statics import follow
+from rom.fe.elasticity import assemble
+
+mesh, faces = box((1.0, 0.1, 0.1), (8, 1, 1))
+interfaces = {"root": faces["x0"], "tip": faces["x1"]}
+model = assemble(mesh, facet_tags=interfaces, material=rom.Material(E=210e9, nu=0.3, rho=7850.0))
+ops, energy = model.operators, model.stresses.large_strain()
+x, y, z = model.points[ops.first // 3 : (ops.first + ops.n_local) // 3].T
+fields = [(y * x, x * z, x**2), (np.sin(x), y**2, x * y), (z, x * y * z, np.cos(2 * x))]
+E = np.column_stack([np.column_stack(field).ravel() for field in fields])
+G = energy.gram(E)
+F = ops.gram(E, energy.second_forces(E, np.array([[0, 1], [2, 2]])))
+body = rom.reduce(
+    model,
+    method=rom.CraigBampton(n_modes=2),
+    interfaces={"root": "rbe3", "tip": "rbe3"},
+    reference="root",
+    nonlinear=rom.Geometric(loads={"tip": (0, 1e6, 0, 0, 0, 0)}, n_modes=2, n_shapes=8),
+)
+load = body.marker("tip").translation[1]
+q = follow(body.quartic, 1e6 * np.outer([0.5, 1.0], load))[-1]
+if ops.first == 0:
+    np.savez(sys.argv[1], G=G, F=F, tip=body.marker("tip").translation @ q)

@@ -1,0 +1,332 @@
+"""Isotropic sets of two-dof mechanisms by closed forms, and the figure that compares them."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.integrate import quad
+
+import rom
+from rom.components.linkages import (
+    CrossSlides,
+    Driven,
+    FiveBar,
+    PolarArm,
+    SlideArm,
+    SlideFiveBar,
+    TwoLink,
+    isotropic_set,
+    rigid_link,
+    rod,
+    tool_isotropy,
+)
+from rom.errors import ConfigError, ModelError
+
+RAILS = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+MU, PAYLOAD, REACH = 0.8, 0.5, 0.6
+GLIDE = SlideFiveBar(RAILS, (1.3, 1.3), (rod(MU, REACH),) * 2, PAYLOAD)
+SPAN = ((0.0, 0.2), (0.3, 1.5))
+ARM = PolarArm(guide=0.05, slide=2.0, spin=0.01)
+FIVE = FiveBar(0.7, (rod(2.0, 0.3),) * 2, (rod(1.0, 0.8),) * 2, payload=0.5)
+
+
+# --- inertias against moving points ---
+
+
+def energy_of_points(posture, masses, q, rate):
+    """Kinetic energy of points (k, 2) that a posture places."""
+    h = 1e-6
+    v = (posture(*(q + h * rate)) - posture(*(q - h * rate))) / (2 * h)
+    return 0.5 * masses @ np.square(v).sum(axis=1)
+
+
+def along(a, b, mass, k=2):
+    """Gauss points of a rod: two carry its exact kinetic energy."""
+    s = 0.5 + np.array([-1, 1]) / np.sqrt(12)
+    return a + s[:, None] * (b - a), np.full(k, mass / k)
+
+
+def points_of_arm(q1, q2):
+    u, n = np.array([np.cos(q1), np.sin(q1)]), np.array([-np.sin(q1), np.cos(q1)])
+    centre, half = q2 * u + 0.03 * n, np.sqrt(0.01 / 2.0)
+    return np.array([np.sqrt(0.05) * u, centre + half * u, centre - half * u])
+
+
+def points_of_slide_arm(q1, q2):
+    o = np.array([q1, 0.0])
+    e = o + 0.4 * np.array([np.cos(q2), np.sin(q2)])
+    return np.vstack([o, along(o, e, 0.9)[0], e])
+
+
+def glide_points(five):
+    def points(q1, q2):
+        left, right = five._elbows(np.array(q1), np.array(q2))
+        tip = five.tip(q1, q2)
+        rods = [along(p, tip, MU)[0] for p in (left, right)]
+        return np.vstack([left, right, *rods, tip])
+
+    return points
+
+
+TILTED = SlideFiveBar(
+    ((0, 0, 0.4), (0.8, 0.1, 2.0)), (1.3, 0.7), (rod(MU, REACH), rod(MU, 0.5)), PAYLOAD, -1
+)
+CASES = {
+    "PP": (
+        CrossSlides((3.0, 2.0), 1.1, (0.0, 0.0)),
+        lambda a, b: np.array([[a, 0.0], [a + b * np.cos(1.1), b * np.sin(1.1)]]),
+        [3.0, 2.0],
+    ),
+    "RP": (replace(ARM, offset=0.03), points_of_arm, [1.0, 1.0, 1.0]),
+    "PR": (SlideArm(1.5, rod(0.9, 0.4), 0.3), points_of_slide_arm, [1.5, 0.45, 0.45, 0.3]),
+    "PRRRP": (TILTED, glide_points(TILTED), [1.3, 0.7, *[MU / 2] * 4, PAYLOAD]),
+}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_inertia_of_linkages_with_slides_is_that_of_moving_points(name):
+    linkage, posture, masses = CASES[name]
+    rng = np.random.default_rng(2)
+    for q in rng.uniform(0.1, 0.4, (5, 2)):
+        A, rate = linkage.inertia(*q), rng.normal(size=2)
+        expected = energy_of_points(posture, np.array(masses), q, rate)
+        assert 0.5 * rate @ A @ rate == pytest.approx(expected, rel=1e-7)
+
+
+def test_rotors_of_slides_add_to_their_own_coordinate():
+    A = CrossSlides((1.0, 2.0), motors=(0.5, 0.25)).inertia(0.0, np.zeros(3))
+    assert_allclose(A, np.tile(np.diag([3.5, 2.25]), (3, 1, 1)), atol=1e-15)
+    assert replace(ARM, motor=0.7).inertia(0.0, 0.2)[1, 1] == pytest.approx(2.7)
+
+
+# --- classes ---
+
+
+def test_two_slides_are_isotropic_everywhere_or_nowhere():
+    """Everywhere if the guides are square and the rotor of the second makes up for the first."""
+    span = ((0.0, 0.5), (0.0, 0.3))
+    alike = CrossSlides((1.0, 2.0), motors=(0.2, 1.2))
+    found = isotropic_set(alike.inertia, span, n=20)
+    assert found.kind == "everywhere" and len(found.q) == 19**2
+    assert_allclose(found.inertia, 3.2, rtol=1e-14)
+    assert_allclose([found.q.min(axis=0), found.q.max(axis=0)], [[0, 0], [0.5, 0.3]], atol=1e-12)
+    for other in (replace(alike, angle=1.5), replace(alike, motors=(0.2, 1.3))):
+        assert isotropic_set(other.inertia, span, n=20).kind == "none"
+
+
+def test_a_polar_arm_is_isotropic_on_a_circle():
+    """s^2 = L^2 - J / m; no circle if L^2 < J / m, none with an offset, whatever L."""
+    L = 0.3
+    s = ARM.isotropic_reach(L)
+    assert s == pytest.approx(np.sqrt(L**2 - 0.06 / 2.0), rel=1e-14)
+    found = isotropic_set(ARM.inertia, (None, (0.05, 0.6)), lengths=(L, 1.0), n=60)
+    assert found.kind == "curves" and not found.winding.any()
+    assert_allclose(found.q[:, 1], s, rtol=1e-9)
+    assert np.ptp(found.q[:, 0]) > 6
+    assert_allclose(found.inertia, 2.0, rtol=1e-9)
+    assert ARM.isotropic_reach(0.17) is None
+    short = isotropic_set(ARM.inertia, (None, (0.05, 0.6)), lengths=(0.17, 1.0), n=60)
+    aside = replace(ARM, offset=0.02)
+    wide = isotropic_set(aside.inertia, (None, (0.05, 0.6)), lengths=(L, 1.0), n=60)
+    assert short.kind == wide.kind == "none" and aside.isotropic_reach(L) is None
+
+
+def test_a_slide_with_an_arm_is_isotropic_on_lines_or_everywhere():
+    """sin q2 = 0 if (m1 + m2) L^2 is the inertia of the arm; everywhere if balanced besides."""
+    span, arm = ((0.0, 0.4), None), rod(0.9, 0.4)
+    L = np.sqrt(0.9 * 0.4**2 / 3 / 2.4)
+    found = isotropic_set(SlideArm(1.5, arm).inertia, span, lengths=(1.0, L), n=60)
+    assert found.kind == "curves"
+    assert_allclose(np.sin(found.q[:, 1]), 0.0, atol=1e-9)
+    assert np.cos(found.q[:, 1]).min() < -0.99 < 0.99 < np.cos(found.q[:, 1]).max()
+    other = isotropic_set(SlideArm(1.5, arm).inertia, span, lengths=(1.0, 1.1 * L), n=60)
+    assert other.kind == "none"
+    balanced = SlideArm(1.5, rigid_link(0.9, 0.4, (0.0, 0.0), 0.02))
+    L = np.sqrt(0.02 / 2.4)
+    assert isotropic_set(balanced.inertia, span, lengths=(1.0, L), n=20).kind == "everywhere"
+
+
+def test_equal_sides_on_one_rail_are_isotropic_at_one_spread():
+    """cot^2 of the couplers' slope = (4/3 mu + M) / (2/3 mu + M); 45 degrees without their mass."""
+    cot = np.sqrt((4 / 3 * MU + PAYLOAD) / (2 / 3 * MU + PAYLOAD))
+    spread = 2 * REACH * cot / np.hypot(1, cot)
+    found = isotropic_set(GLIDE.inertia, SPAN, n=60, assembles=GLIDE.assembles)
+    assert found.kind == "curves"
+    assert_allclose(found.q[:, 1] - found.q[:, 0], spread, rtol=1e-8)
+    unequal = replace(GLIDE, slides=(1.3, 1.0))
+    assert isotropic_set(unequal.inertia, SPAN, n=60, assembles=GLIDE.assembles).kind == "none"
+
+
+def test_two_links_are_isotropic_everywhere_on_curves_or_nowhere():
+    """In angles to the ground: a = c and cos(q1 - q2) = 0, or no coupling at all."""
+    even = TwoLink(rigid_link(1.0, 0.3, (0.1, 0.0), 0.02), rigid_link(0.4, 0.5, (0, 0), 0.066))
+    assert even.first.M[2, 2] + 0.4 * 0.3**2 == pytest.approx(0.066)
+    assert isotropic_set(even.inertia, n=40).kind == "everywhere"
+    leaning = TwoLink(even.first, rigid_link(0.4, 0.5, (0.2, 0.0), 0.066 - 0.4 * 0.2**2))
+    found = isotropic_set(leaning.inertia, n=40)
+    assert found.kind == "curves"
+    assert_allclose(np.cos(found.q[:, 0] - found.q[:, 1]), 0.0, atol=1e-9)
+    heavier = TwoLink(rigid_link(1.1, 0.3, (0.1, 0.0), 0.02), leaning.second)
+    assert isotropic_set(heavier.inertia, n=40).kind == "none"
+
+
+def test_points_stay_under_small_changes_where_curves_vanish():
+    """Rank two is stable: each posture of the five-bar moves by about the change of a mass."""
+    one = isotropic_set(FIVE.inertia, n=120)
+    other = isotropic_set(replace(FIVE, payload=0.501).inertia, n=120)
+    assert one.kind == other.kind == "points" and len(one.q) == len(other.q) == 8
+    assert 1e-6 < np.abs(one.q - other.q).max() < 1e-2
+    part = isotropic_set(FIVE.inertia, ((0.5, 3.0), (0.5, 3.0)), n=120)
+    assert_allclose(part.q, one.q[2:5], atol=1e-9)
+    assert_allclose(part.winding, one.winding[2:5])
+
+
+def test_a_double_point_is_no_curve():
+    """f = (x^2 - y^2, 2 x y) up to order three: rank zero at the origin, winding two."""
+
+    def inertia(x, y):
+        f = 0.2 * np.stack([np.cos(y) - np.cos(x), np.sin(x) * np.sin(y)])
+        return np.stack([[1 + f[0], f[1]], [f[1], 1 - f[0]]]).transpose(2, 0, 1)
+
+    found = isotropic_set(inertia, ((-1.0, 1.1), (-1.0, 1.05)), n=40)
+    assert found.kind == "points" and not found.winding.any()
+    assert_allclose(found.q, 0.0, atol=1e-4)
+
+
+# --- the figure that compares ---
+
+
+def test_slides_have_the_tool_isotropy_of_their_masses():
+    """2 sqrt(m2 (m1 + m2)) / (m1 + 2 m2) in any coordinates of the plane, on any rectangle."""
+    m1, m2 = 3.0, 2.0
+    found = tool_isotropy(CrossSlides((m1, m2)).inertia, CrossSlides((m1, m2)).tip,
+                          ((0, 0.5), (-1, 2)), n=10)  # fmt: skip
+    assert found.mean == pytest.approx(2 * np.sqrt(m2 * (m1 + m2)) / (m1 + 2 * m2), rel=1e-9)
+    assert found.area == pytest.approx(1.5, rel=1e-9)
+
+
+def test_the_polar_arm_has_the_tool_isotropy_of_its_closed_form():
+    """The tool feels m along and m + J / s^2 across; integrated over s ds by w = 2 m s^2 + J."""
+    m, J, (s1, s2) = 2.0, 0.06, (0.1, 0.6)
+
+    def primitive(s):
+        w = 2 * m * s * s + J
+        return np.sqrt(w * w - J * J) - J * np.arccos(J / w)
+
+    expected = (primitive(s2) - primitive(s1)) / (2 * m * (s2**2 - s1**2))
+    by_quad = quad(lambda s: 2 * np.sqrt(m * (m + J / s**2)) / (2 * m + J / s**2) * s, s1, s2)[0]
+    assert expected == pytest.approx(by_quad * 2 / (s2**2 - s1**2), rel=1e-9)
+    found = tool_isotropy(ARM.inertia, ARM.tip, (None, (s1, s2)), n=300)
+    assert found.mean == pytest.approx(expected, rel=1e-5)
+    assert found.area == pytest.approx(np.pi * (s2**2 - s1**2), rel=1e-9)
+
+
+def test_a_tool_without_a_machine_is_isotropic():
+    """Links of no mass: every linkage is one point mass, and the figure is one."""
+    thin = rigid_link(1e-12, 0.3, (0.0, 0.0), 0.0)
+    for linkage, span in (
+        (TwoLink(thin, thin, 2.0), (None, (0.5, 2.5))),
+        (SlideFiveBar(RAILS, (0.0, 0.0), (thin, thin), 2.0), ((0, 0.1), (0.2, 0.5))),
+        (SlideArm(0.0, thin, 1.0), ((0, 0.2), (0.3, 2.8))),
+    ):
+        assert tool_isotropy(linkage.inertia, linkage.tip, span, n=20).mean == pytest.approx(1.0)
+
+
+def test_units_gears_and_coordinates_do_not_matter():
+    chain = TwoLink(rod(1.0, 0.5), rod(2.0, 0.4), 0.3)
+    turned = replace(chain, relative=True)
+    large = TwoLink(rod(7.0, 1.0), rod(14.0, 0.8), 2.1)
+    plain = tool_isotropy(chain.inertia, chain.tip)
+    relative = tool_isotropy(turned.inertia, turned.tip)
+    assert relative.mean == pytest.approx(plain.mean, rel=3e-4)  # kinks of |det J| on the grid
+    grown = tool_isotropy(large.inertia, large.tip)
+    assert grown.mean == pytest.approx(plain.mean, rel=1e-9)
+    assert grown.area == pytest.approx(4 * plain.area, rel=1e-9)
+    geared = tool_isotropy(lambda a, b: chain.inertia(a / 3, b) / np.array([[9, 3], [3, 1]]),
+                           lambda a, b: chain.tip(a / 3, b), ((0, 6 * np.pi), None))  # fmt: skip
+    assert geared.mean == pytest.approx(plain.mean, rel=1e-8)
+
+
+# --- mechanisms of the multibody core ---
+
+
+def polar_of_the_core():
+    """ARM as bodies and joints: a guide on a pin, a slide on it, displaced by 0.3 m."""
+    mech = rom.Mechanism(gravity=(0, 0, 0))
+    guide = mech.add_rigid("guide", mass=1.0, inertia=(0.05,) * 3, at=(0, 0, 0))
+    slide = mech.add_rigid("slide", mass=2.0, inertia=(0.01,) * 3, at=(0.3, 0, 0))
+    mech.revolute("pin", mech.ground.marker((0, 0, 0)), guide.marker((0, 0, 0)), axis=(0, 0, 1))
+    mech.prismatic("rail", guide.marker((0, 0, 0)), slide.marker((0, 0, 0)), axis=(1, 0, 0))
+    mech.drive("turn", "pin", lambda t: 0.0)
+    mech.drive("feed", "rail", lambda t: 0.0)
+    return mech
+
+
+def test_a_mechanism_of_bodies_and_joints_has_the_set_and_the_figure_of_its_formula():
+    core, L = Driven(polar_of_the_core(), ("turn", "feed"), tool="slide"), 0.3
+    q = np.array([[0.2, 0.1], [2.5, -0.2], [5.0, 0.2]])
+    shift = core.tip(0.0, 0.1)[0] - 0.1  # of the coordinate of the rail
+    assert_allclose(core.inertia(*q.T), ARM.inertia(q[:, 0], q[:, 1] + shift), rtol=1e-8, atol=1e-9)
+    assert_allclose(core.tip(*q.T), ARM.tip(q[:, 0], q[:, 1] + shift), atol=1e-9)
+    span = ((0.0, 1.0), (-0.2, 0.2))
+    found = isotropic_set(core.inertia, span, lengths=(L, 1.0), n=6, assembles=core.assembles)
+    assert found.kind == "curves"
+    assert_allclose(found.q[:, 1] + shift, ARM.isotropic_reach(L), rtol=1e-7)
+    one = tool_isotropy(core.inertia, core.tip, span, n=4, assembles=core.assembles)
+    other = tool_isotropy(ARM.inertia, ARM.tip, (span[0], (-0.2 + shift, 0.2 + shift)), n=4)
+    assert one.mean == pytest.approx(other.mean, rel=1e-6)
+
+
+# --- what cannot be ---
+
+
+@pytest.mark.parametrize(
+    ("make", "error", "words"),
+    [
+        (lambda: CrossSlides((1.0, 0.0)), ModelError, "must be positive"),
+        (lambda: CrossSlides((-1.0, 1.0)), ModelError, "not negative"),
+        (lambda: CrossSlides((1.0, 1.0), angle=np.pi), ModelError, "parallel"),
+        (lambda: PolarArm(0.1, 0.0), ModelError, "must be positive"),
+        (lambda: PolarArm(float("nan"), 1.0), ModelError, "finite"),
+        (lambda: SlideArm(-1.0, rod(1, 1)), ModelError, "not negative"),
+        (lambda: replace(GLIDE, side=0), ModelError, "needed is 1 or -1"),
+        (lambda: replace(GLIDE, slides=(1.0, -1.0)), ModelError, "right"),
+        (lambda: GLIDE.inertia(0.0, 1.3), ModelError, "do not meet"),
+        (
+            lambda: isotropic_set(
+                GLIDE.inertia, ((0, 0.1), (1.3, 1.5)), n=10, assembles=GLIDE.assembles
+            ),
+            ModelError,
+            "none of 10 by 10",
+        ),
+        (
+            lambda: tool_isotropy(
+                GLIDE.inertia, GLIDE.tip, ((0, 0.1), (1.3, 1.5)), assembles=GLIDE.assembles
+            ),
+            ModelError,
+            "reaches nothing",
+        ),
+        (lambda: isotropic_set(ARM.inertia, (None, (1, 1))), ConfigError, "low < high"),
+        (lambda: isotropic_set(ARM.inertia, lengths=(1, 0)), ConfigError, "two positive"),
+        (lambda: isotropic_set(ARM.inertia, n=2), ConfigError, "four cells"),
+        (lambda: tool_isotropy(ARM.inertia, ARM.tip, n=0), ConfigError, "needs a cell"),
+        (
+            lambda: tool_isotropy(ARM.inertia, lambda a, s: ARM.tip(0 * a, s), (None, (0.1, 1))),
+            ModelError,
+            "along a line",
+        ),
+        (
+            lambda: Driven(polar_of_the_core(), ("turn", "feed"), tool="x"), ConfigError,
+            "none of",
+        ),
+        (
+            lambda: Driven(polar_of_the_core(), ("turn", "feed")).tip(0, 0), ConfigError,
+            "no tool",
+        ),
+        (lambda: Driven(polar_of_the_core(), ("turn", "x")), ConfigError, "x"),
+    ],
+)  # fmt: skip
+def test_what_is_no_linkage_is_refused(make, error, words):
+    with pytest.raises(error, match=words):
+        make()
