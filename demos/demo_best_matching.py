@@ -3,7 +3,7 @@
 # After Barbour and Bertotti, and a chapter of Mercati on shape dynamics: only what changes between
 # the bodies is motion. Pictures are laid over each other so that as little as possible differs, and
 # what then differs is what moved. The same projection defines the mean-axis frame of a flexible
-# body. Nothing here is about gravity as geometry: the bodies are Newton's.
+# body. Nothing about gravity is computed here beyond Newton's attraction of three points.
 #
 # Run: `python demos/demo_best_matching.py`
 # Writes: `best_matching.png` into `out/`; another folder with `--out`
@@ -19,11 +19,14 @@ import rom
 from rom import rotation, view
 from rom.components.best_matching import (
     Bodies,
+    Extended,
+    Linking,
     ShapeSphere,
     emergent_rate,
     frame,
     generators,
     match,
+    shape_gauge,
     stacked,
 )
 
@@ -87,6 +90,19 @@ size = np.sqrt([bodies.size(y) for y in x])
 complexity = np.array([bodies.complexity(y) for y in x])
 janus = np.interp(0.0, D, t)
 say(f"shapes from both mechanics differ by {apart:.1e}; D = 0 at t = {janus:.6f}")
+
+# ## Two gauges of one system
+#
+# With a scale phi and its momentum pi beside positions and momenta, Newton's motion is the gauge
+# phi = 0. In another one pi is the clock and the bodies have no size: what comes out of it, scaled
+# back, is Newton's.
+
+linking = Linking(bodies)
+state = Extended(x[0], m[:, None] * v[0], 0.0, D[0], t[0]).scaled(np.log(size[0]))
+sizeless = linking.move(state, shape_gauge, D)
+newton = sizeless.scaled(0.0)
+between_gauges = max(np.abs(newton.x - x).max(), np.abs(newton.time - t).max())
+say(f"both gauges give the same positions and times to {between_gauges:.1e}")
 
 # ## A flexible beam
 #
@@ -172,6 +188,14 @@ if first:
                            {"smallest size": (janus, np.interp(janus, t, complexity))}),
             ],
             [
+                view.Panel("The gauge without size: clock pi", "x", "y",
+                           {n: sizeless.x[:, k, :2].T for k, n in enumerate(names)}, equal=True),
+                view.Panel("What it hides", "clock pi", "phi, time",
+                           {"scale phi": (D, sizeless.phi), "time, from N": (D, sizeless.time)},
+                           {"Newton": (np.concatenate([D[some], D[some]]),
+                                       np.concatenate([np.log(size)[some], t[some]]))}),
+            ],
+            [
                 view.Scene("A floating beam in true size", beams, view=(0.15, 0.3, 1.0),
                            up=(0, 1, 0)),
                 view.Panel("Which way it faces", "time [ms]", "angle [mrad]",
@@ -189,9 +213,11 @@ if first:
         "size, frame or clock, draws the same line as Newton's. Middle left: without energy and "
         "rotation the system has one smallest size, and D, half the rate of I = sum m r^2, one "
         "direction. Middle right: from there the triangle becomes more clustered both ways, "
-        "though not steadily. Bottom: the same projection in engineering, a free steel beam that "
-        "turns and bends. A frame fixed to one end wobbles; the undeformed beam, laid over the "
-        "nodes, finds the mean-axis frame.",
+        "though not steadily. Below: Newton's motion and this one are gauges of one system. Left, "
+        "size is kept at one and pi is the clock; right, scale and time come out of two "
+        "constraints and are Newton's. Bottom: the same projection in engineering, a free steel "
+        "beam that turns and bends. A frame fixed to one end wobbles; the undeformed beam, laid "
+        "over the nodes, finds the mean-axis frame.",
     )  # fmt: skip
 
 # ## What to remember
@@ -205,6 +231,7 @@ results = {
     "laid pictures, 1 + distance to Newton's orbits": (1 + astray, 1.0, 2e-3),
     "time read off the pictures": (passed, 12.0, 1e-3),
     "shapes of both mechanics, 1 + distance": (1 + apart, 1.0, 2.9e-10),
+    "both gauges, 1 + distance": (1 + between_gauges, 1.0, 1e-9),
     "instant of smallest size": (janus, -0.569365, 1e-3),
     "root of I at t = 3": (size[450], 7.104722808, 1e-9),
     "frame of nodes and mean axis, 1 + angle": (1 + exact, 1.0, 1e-9),

@@ -21,7 +21,10 @@ STAGES = {  # what lies on the way, and the folders and files in which it lies
     "geometry": ("fe.mesh",),
     "matrices": ("fe.forms", "fe.operators", "fe"),
     "modes": ("eigen", "reduction.interfaces", "reduction.bases"),
-    "body": ("body", "checks", "workflow", "io", "assembly", "parametric", "cyclic", "prestress"),
+    "body": (
+        *("body", "checks", "workflow", "io"),
+        *("assembly", "parametric", "updating", "cyclic", "prestress"),
+    ),
     "mechanism": ("mbs.kernels", "mbs.parts", "mbs.elements", "mbs"),
     "motion": ("mbs.equations", "mbs.integrate", "mbs.results"),
     "results": ("mbs.analysis", "view", "fmu"),

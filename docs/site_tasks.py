@@ -19,6 +19,11 @@ TASKS: dict[str, tuple[str, str]] = {
         "One reduction for a range of moduli, densities and thicknesses.",
         """reduce_parametric parametric.Parameter YoungsModulus Density Thickness BodyFamily""",
     ),
+    "Update": (
+        "A family of bodies corrected by measured responses, and what the data can say.",
+        """update updating.Updated updating.Responses updating.Channels updating.GroundSpring
+        updating.AddedMass""",
+    ),
     "Check": (
         "What tells how far to trust a model, a body, a motion or a law.",
         """check Report audit check_law eigen.mac eigen.residual_errors io.check_sid""",

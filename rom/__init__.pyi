@@ -17,6 +17,7 @@ from rom import prestress as prestress
 from rom import reduction as reduction
 from rom import rotation as rotation
 from rom import units as units
+from rom import updating as updating
 from rom import view as view
 from rom.assembly.assembly import Assembly as Assembly
 from rom.assembly.dual import DualAssembly as DualAssembly
@@ -142,6 +143,7 @@ from rom.reduction.interfaces.polynomial import FourierLegendre as FourierLegend
 from rom.reduction.interfaces.polynomial import Polynomial as Polynomial
 from rom.reduction.interfaces.snapshots import Snapshots as Snapshots
 from rom.report.html import write_report as write_report
+from rom.updating.estimate import update as update
 from rom.view.scenes.animation_files import write_animation as write_animation
 from rom.workflow import mass_properties as mass_properties
 from rom.workflow import modes as modes

@@ -264,6 +264,8 @@ def test_a_body_of_large_deflection_keeps_its_frame_and_its_programs(certified, 
         body.with_reference("mean-axis")
     with pytest.raises(ModelError, match="large deflection"):
         rom.Mechanism().add_flexible("beam", body)
+    with pytest.raises(ConfigError, match="'beam' has the energy of large deflection"):
+        rom.Assembly({"beam": body}, couplings=())
     with pytest.raises(ConfigError, match="large deflection"):
         rom.export(body, tmp_path / "beam.SID_FEM")
 

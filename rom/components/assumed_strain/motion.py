@@ -126,7 +126,8 @@ class Flight:
         work: energy that went from motion, loads and tools into the solid [J].
         steps: number of time steps; -1 of a motion that was lost.
         tool_forces: (k, tools, 2) mean forces of the tools on the sheet since the last picture [N].
-        reactions: (k, n, 2) inner forces less loads: what supports and drives give [N].
+        reactions: (k, n, 2) inner forces less loads, of driven nodes with their inertia: what
+            supports and drives give [N].
     """
 
     t: Array

@@ -1,8 +1,8 @@
-"""Updating of a model by measured frequency responses, after Berriet, Fillod and Bouhaddi.
+"""Updating by measured frequency responses: a test bed, `airframe`, and names of `rom.updating`.
 
-Unknown are relative changes of stiffness and mass and the damping ratios of the modes. The model
-can be condensed to the sensors, and test and model together to one common basis: `models` and
-`methods`. `frf_data` are responses as a test gives them, `airframe` a test bed.
+After Berriet, Fillod and Bouhaddi. Unknown are relative changes of stiffness and mass and the
+damping ratios of the modes. The model can be condensed to the sensors, and test and model together
+to one common basis.
 """
 
 from rom.lazy import front

@@ -30,6 +30,8 @@ from rom.mbs.elements.gears.geometry import GearPair
 from rom.mbs.results.solution import Solution
 from rom.mbs.results.state import State
 from rom.reduction.interfaces.connection import connect
+from rom.updating.family_model import family_model
+from rom.updating.normal_equations import responses_at
 
 X, Y, Z = np.eye(3)
 KINDS = {"root": "rbe2", "tip": "rbe2"}
@@ -128,6 +130,16 @@ def family():
         regions(), parameters={"E": rom.YoungsModulus("web", 0.9, 1.1)}, method=rom.CraigBampton(2),
         interfaces=KINDS, certify=False, tol=0.1,
     )  # fmt: skip
+
+
+def measured():
+    """Responses of the family at the tip."""
+    at = rom.updating.Channels([[1.0, 0.0, 0.0], [1.0, 0.1, 0.08]], [X + Y, X + Z])
+    rows = at.rows(family().body, "sensor")
+    model = family_model(family(), (rows, rows), {}, {}, ())
+    f = np.linspace(1.0, 100.0, 20)
+    H = responses_at(model, np.zeros(1), np.array([0.02]), 2 * np.pi * f)
+    return rom.updating.Responses(f, H, at, at, 0.9, 10)
 
 
 def mechanism():
@@ -357,6 +369,7 @@ GIVEN = {  # callable -> legal values of its own
         "frequencies": lambda: [1.0], "drive": lambda: "shaker", "motion": lambda: marked()[1]
     },
     "travelling_modes": {"sector": spinning, "diameter": lambda: 2, "speed": lambda: 0.1},
+    "update": {"family": family, "test": measured},
     "wheel_campbell": {"sector": spinning, "diameter": lambda: 2, "speeds": lambda: [0.1, 0.2]},
     "write_animation": {"path": lambda: "out.glb", "frames": lambda: 2},
     "write_body_fmu": {"path": lambda: "nowhere/out.fmu"},

@@ -35,7 +35,7 @@ LEFT_BEHIND = {
         "beam.SID_FEM", "beam.csv", "beam.dat", "beam.dmig", "beam.fem", "beam.glb", "beam.inp",
         "beam.mat", "beam.op4", "beam.py", "beam.vtu", "exchange.png",
     },
-    "demo_isotropy": {"isotropy.png"},
+    "demo_isotropy": {"isotropy.png", "isotropy_compared.png"},
     "demo_large_mesh": {"housing_mesh.png", "housing_modes.png"},
     "demo_lost_tip": {"lost_tip.png"},
     "demo_masonry": {"masonry.gif", "masonry.png"},

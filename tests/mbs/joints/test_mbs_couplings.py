@@ -140,6 +140,15 @@ def test_a_gear_that_turns_by_half_a_turn_a_step_is_named_with_the_step_it_takes
     assert "take steps below 0.0324 s" in caught.value.hint
 
 
+def test_a_gear_that_turns_slowly_is_not_blamed_for_a_force_that_breaks_down():
+    mech = gear_pair(3.0, 0.0, speed=1.0)
+    mech.motor("brake", "axle of pinion", lambda t, x, v: 0.0 if t < 0.1 else np.nan)
+    with pytest.raises(SolverError, match="'brake' gives no finite number") as caught:
+        simulate(mech, t_end=1.0, dt=0.04)
+    assert "Take a smaller step than 0.04 s" in caught.value.hint
+    assert "turns" not in caught.value.hint
+
+
 @pytest.mark.parametrize("ratio", [0.05, -0.2])
 def test_a_pinion_drives_its_rack(ratio):
     """Way = ratio times angle: (J + m ratio^2) alpha = T, and the rack is pushed by m a."""

@@ -6,6 +6,7 @@ Source:
     8 (1994) 437.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,7 +14,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import least_squares
 
-from rom.components.updating.models import (
+from rom.errors import ConfigError
+from rom.model import Array
+from rom.updating.models import (
     AtSensors,
     Complex,
     Measurement,
@@ -23,8 +26,6 @@ from rom.components.updating.models import (
     modal,
     sensor_dofs,
 )
-from rom.errors import ConfigError
-from rom.model import Array
 
 MAX_EVALUATIONS = 100  # evaluations of the responses; more are needed if the start is too far away
 MAX_STEPS = 40  # linear solutions
@@ -79,11 +80,22 @@ def responses(
     return _receptance(here, modal(here, zeta), omega, inputs)
 
 
+def receptance(seen: Array, g: Complex, driven: Array) -> Complex:
+    """(n_f, n_s, n_e) sum over the modes of seen, receptance and driven [m/N].
+
+    Args:
+        seen: (n_s, n) modes at the sensors [kg^-1/2].
+        g: (n_f, n) receptance of each mode [s^2].
+        driven: (n_e, n) modes at the inputs [kg^-1/2].
+    """
+    return np.asarray((seen * g[:, None, :]) @ driven.T)
+
+
 def _receptance(
     model: ParametricModel, modes: Modal, omega: Array, inputs: tuple[int, ...]
 ) -> Complex:
     seen = model.sensors @ modes.Phi
-    return np.einsum("sn,fn,en->fse", seen, modes.g(omega), seen[list(inputs)], optimize=True)
+    return receptance(seen, modes.g(omega), seen[list(inputs)])
 
 
 def _modal_sensitivity(model: ParametricModel, modes: Modal) -> tuple[Array, Array, Array]:
@@ -103,13 +115,27 @@ def _modal_sensitivity(model: ParametricModel, modes: Modal) -> tuple[Array, Arr
     return A, B, C
 
 
-def _by_all(model: ParametricModel, modes: Modal, m: int, *sides: Any) -> Complex:
-    """Sides times Phi^T dZ Phi, (n_f, a, b, n_p + m): by p and m logarithms of damping ratios."""
-    left, right, omega = sides
-    by_p = _through(left, _modal_sensitivity(model, modes), right, omega)
+def through_modes(
+    model: ParametricModel, modes: Modal, m: int
+) -> Callable[[Any, Any, Array], Complex]:
+    """The function of sides (n_f, a, n), (n_f, n, b) and lines (n_f,) that gives side dZ side.
+
+    Derivatives (n_f, a, b, n_p + m) are those by p and by m logarithms of damping ratios.
+
+    Args:
+        model: at its origin.
+        modes: of the model.
+        m: number of the lowest elastic modes whose damping is unknown.
+    """
+    by_p = _modal_sensitivity(model, modes)
     e = slice(model.n_rigid, model.n_rigid + m)
-    damped = left[:, :, None, e] * np.swapaxes(right[:, e], 1, 2)[:, None]
-    return np.concatenate([by_p, damped * (1j * omega[:, None, None, None] * modes.d[e])], axis=-1)
+
+    def change(left: Any, right: Any, omega: Array) -> Complex:
+        damped = left[:, :, None, e] * np.swapaxes(right[:, e], 1, 2)[:, None]
+        damped = damped * (1j * omega[:, None, None, None] * modes.d[e])
+        return np.concatenate([_through(left, by_p, right, omega), damped], axis=-1)
+
+    return change
 
 
 def _through(left: Complex, S: tuple[Array, ...], right: Complex, omega: Array) -> Complex:
@@ -124,6 +150,8 @@ def _through(left: Complex, S: tuple[Array, ...], right: Complex, omega: Array) 
     columns = np.ascontiguousarray(np.moveaxis(right, 1, 0).reshape(n, n_f * b))
     w, pushed = np.repeat(omega, b), np.zeros((), dtype=complex)
     for part, factor in zip(S, (1.0, -(w**2), 1j * w), strict=True):
+        if not part.any():
+            continue
         pairs = part.reshape(-1, n) @ (columns * factor).view(np.float64)  # a quarter of the work
         pushed = pushed + pairs.view(np.complex128)
     pushed = pushed.reshape(-1, n, n_f, b).transpose(2, 1, 3, 0).reshape(n_f, n, -1)
@@ -153,7 +181,7 @@ def sensitivity(
     seen, g = here.sensors @ modes.Phi, modes.g(omega)
     sides = (seen * g[:, None, :], g[:, :, None] * seen[list(inputs)].T, omega)
     H = _receptance(here, modes, omega, inputs)
-    return H, -_by_all(here, modes, np.size(zeta), *sides)
+    return H, -through_modes(here, modes, np.size(zeta))(*sides)
 
 
 def update_by_output(model: Model, test: Measurement, p: ArrayLike, zeta: ArrayLike) -> Update:
@@ -218,7 +246,7 @@ def update_by_input(
         U = common_basis(test.H, H, rank)
         y = modes.Phi.T @ here.M @ (U @ (U.T @ test.H))  # Phi^-1 = Phi^T M
         left = (U.T @ modes.Phi) * modes.g(test.omega)[:, None, :]
-        J = _weighted(weights, _by_all(here, modes, ratios.size, left, y, test.omega))
+        J = _weighted(weights, through_modes(here, modes, ratios.size)(left, y, test.omega))
         r = _weighted(weights, U.T @ (test.H - H))
         step = np.clip(
             -np.linalg.lstsq(J, r, rcond=None)[0], -MAX_PARAMETER_CHANGE, MAX_PARAMETER_CHANGE

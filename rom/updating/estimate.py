@@ -1,0 +1,314 @@
+"""Updating of a family of bodies by measured responses, with what the data can and cannot say.
+
+Source:
+    Levenberg-Marquardt with bounds, as in Nocedal and Wright, Numerical optimization (2006);
+    posterior and score test: Cox and Hinkley, Theoretical statistics (1974).
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from rom.arguments import finite, typed
+from rom.body.flexible import FlexibleBody
+from rom.errors import ConfigError, ParameterError, SolverError
+from rom.model import Array, Mask, Report
+from rom.names import named
+from rom.parametric.family import BodyFamily
+from rom.plausible import check_damping_ratio
+from rom.updating.family_model import AddedMass, FamilyModel, GroundSpring, family_model
+from rom.updating.frf_data import Complex
+from rom.updating.measured import Responses
+from rom.updating.models import modal
+from rom.updating.normal_equations import Data, Sums, responses_at, sums
+from rom.updating.verdict import check_channels, scores, unseen_directions, verdict
+
+MAX_STEPS = 60  # of the search; ten are usual
+MAX_LOG_STEP = 0.5  # of a factor in one step
+DECREMENT_TOL = 1e-4  # expected gain of chi-square: a hundredth of a standard deviation
+START_STIFFNESS = 1e-3  # of a step, over the information of each unknown
+MAX_STIFFNESS = 1e10  # beyond it no shorter step lowers the residual
+BAND_RATIO = 1.5  # modes up to here, over the highest line, have damping that lines can see
+BOUND_ATOL = 1e-9  # distance of a logarithm from the end of its range
+DAMPING_LOG_DEVIATION = 1.5  # of ratios about their start, before the test: a factor of 20 in two
+DAMPING_RANGE = (1e-6, 0.9)  # ratios that are tried
+Attached = Mapping[str, GroundSpring | AddedMass]
+
+
+@dataclass(frozen=True, slots=True)
+class Updated:
+    """What a test says about a family.
+
+    Attributes:
+        family: that was updated.
+        factors: all parameters, also those that were kept [1].
+        zeta: (m,) damping ratios of the lowest elastic modes, the last one of all others too [1].
+        names: (n,) of the unknowns, damping ratios last.
+        covariance: (n, n) of the logarithms of the unknowns [1].
+        verdict: whether noise alone explains what is left, and where it does not.
+        by_sensor: (n_s,) mean squared residual over its expectation [1].
+        by_line: (n_f,) likewise [1]; NaN for lines that were not used.
+        scores: {name: by how many standard deviations the data ask for a parameter that was not
+            updated [1]}; beyond four it is missing, with the sign of its change.
+        unseen: directions, {name: share [1]} in the parameters, that the data do not see.
+        at_bound: names of parameters that lie at an end of their range.
+        model: the family at the sensors and inputs of the test.
+    """
+
+    family: BodyFamily
+    factors: dict[str, float]
+    zeta: Array
+    names: tuple[str, ...]
+    covariance: Array
+    verdict: Report
+    by_sensor: Array
+    by_line: Array
+    scores: dict[str, float]
+    unseen: tuple[dict[str, float], ...]
+    at_bound: tuple[str, ...]
+    model: FamilyModel
+
+    @property
+    def deviations(self) -> dict[str, float]:
+        """Relative standard deviation of each unknown [1]."""
+        return dict(zip(self.names, np.sqrt(np.diag(self.covariance)).tolist(), strict=True))
+
+    @property
+    def correlations(self) -> Array:
+        """(n, n) correlation of the unknowns [1]."""
+        d = np.sqrt(np.diag(self.covariance))
+        return self.covariance / np.outer(d, d)
+
+    @property
+    def body(self) -> FlexibleBody:
+        """The body at the factors found."""
+        own: dict[str, Any] = {name: self.factors[name] for name in self.family.parameters}
+        return self.family.at(**own)
+
+    def responses(self, frequencies: Any) -> Complex:
+        """(n_f, n_s, n_e) displacement per force of the updated model at lines [Hz] [m/N].
+
+        Raises:
+            ConfigError: for lines that are not finite.
+        """
+        x = np.log(np.where(self.model.present, list(self.factors.values()), 1.0))
+        omega = 2 * np.pi * finite("frequencies", frequencies, None)
+        return responses_at(self.model, x, self.zeta, omega)
+
+    def __str__(self) -> str:
+        d = self.deviations
+        lines = [
+            f"  {name} = {self.factors.get(name, np.nan):.5g} +- {100 * d[name]:.2g} %"
+            for name in self.names if name in self.factors
+        ]  # fmt: skip
+        return "\n".join(["updated factors", *lines, str(self.verdict)])
+
+
+@typed
+def update(  # noqa: PLR0913  keywords of one call
+    family: BodyFamily,
+    test: Responses,
+    *,
+    free: tuple[str, ...] | None = None,
+    fixed: Any = (),
+    attached: Attached | None = None,
+    candidates: Attached | None = None,
+    damping: float = 0.01,
+    prior: dict[str, float] | None = None,
+    tolerance: float | None = None,
+) -> Updated:
+    """Find the factors of a family, and damping ratios, that explain measured responses.
+
+    The logarithm of each response is compared, weighted by its standard deviation. Damping ratios
+    of all modes up to one and a half times the highest line are unknowns
+    as well, and one for all others.
+
+    Args:
+        family: from `rom.reduce_parametric`, with moduli and densities.
+        test: what was measured.
+        free: names of the unknown parameters; None for all. Others stay one and are tried in the
+            score test.
+        fixed: what was held in the test, see `FlexibleBody.frequencies`.
+        attached: {name: `GroundSpring` or `AddedMass`} with unknown factors.
+        candidates: {name: likewise}, which may be missing in the model: tried in the score test.
+        damping: ratio to start from, of all modes [1].
+        prior: {name: relative standard deviation [1] of its factor about one, before the test}.
+        tolerance: largest distance of a channel from a surface point [m], see `Channels.rows`.
+
+    Returns:
+        `rom.updating.Updated`.
+
+    Raises:
+        ConfigError: for channels off the body, of another scale or sign, too few data, a
+            damping that is none to start from, or a family in other units than SI.
+        ParameterError: for a name that is unknown.
+        InterfaceError: if an interface is unknown.
+        SolverError: if the search does not end.
+
+    Source:
+        Berriet, Fillod and Bouhaddi, for weighted responses with modal damping.
+    """
+    check_damping_ratio(damping)
+    if not DAMPING_RANGE[0] <= damping <= DAMPING_RANGE[1]:
+        raise ConfigError(f"damping = {damping} to start from is not within {DAMPING_RANGE}.")
+    if family.body.units != "SI":
+        raise ConfigError(
+            f"the family is in {family.body.units}, responses in SI.",
+            hint="Reduce the model in SI units to update it.",
+        )
+    attached, candidates = dict(attached or {}), dict(candidates or {})
+    rows = (
+        test.sensors.rows(family.body, "sensor", tolerance),
+        test.inputs.rows(family.body, "input", tolerance),
+    )
+    model = family_model(family, rows, attached, candidates, fixed)
+    unknown = _unknown(model, free, attached, candidates)
+    data = Data.of(test)
+    search = _Search.begun(model, data, unknown, damping, prior or {})
+    check_channels(responses_at(model, search.x, search.zeta, data.omega), data)
+    return _found(family, search.run())
+
+
+def _unknown(
+    model: FamilyModel, free: tuple[str, ...] | None, attached: Attached, candidates: Attached
+) -> Mask:
+    """(n_p,) which parameters are unknown."""
+    chosen = set(model.names) - set(candidates) if free is None else {*free, *attached}
+    if wrong := chosen - set(model.names):
+        raise ParameterError(f"there is no parameter {named(wrong)}; known are {model.names}.")
+    return np.array([name in chosen for name in model.names])
+
+
+@dataclass(slots=True)
+class _Search:
+    """The least squares problem and where its search has come to."""
+
+    model: FamilyModel
+    data: Data
+    theta: Array
+    free: Mask
+    precision: Array
+    before: Array
+    sums: Sums = field(init=False)
+
+    @staticmethod
+    def begun(
+        model: FamilyModel, data: Data, unknown: Mask, damping: float, prior: dict[str, float]
+    ) -> "_Search":
+        x = np.clip(np.zeros(len(model.names)), np.log(model.low), np.log(model.high))
+        lam = modal(model.at(x), ()).lam[model.n_rigid :]
+        m = min(int(np.count_nonzero(lam < (BAND_RATIO * data.omega[-1]) ** 2)) + 1, lam.size)
+        if wrong := set(prior) - set(model.names):
+            raise ParameterError(f"prior: there is no parameter {named(wrong)}.")
+        sigma = np.array([prior.get(name, np.inf) for name in model.names])
+        if not (sigma > 0).all():
+            raise ConfigError("prior: a standard deviation is positive.")
+        free = np.r_[unknown, np.ones(m, dtype=bool)]
+        if data.n_values <= free.sum():
+            raise ConfigError(
+                f"{data.n_values} usable numbers for {free.sum()} unknowns.",
+                hint="Measure more lines, or fix parameters; lines of low coherence do not count.",
+            )
+        precision = np.r_[sigma**-2.0, np.full(m, DAMPING_LOG_DEVIATION**-2.0)]
+        before = np.r_[np.zeros(x.size), np.full(m, np.log(damping))]
+        theta = np.r_[x, before[x.size :]]
+        return _Search(model, data, theta, free, precision, before)
+
+    @property
+    def x(self) -> Array:
+        return self.theta[: len(self.model.names)]
+
+    @property
+    def zeta(self) -> Array:
+        return np.exp(self.theta[len(self.model.names) :])
+
+    @property
+    def bounds(self) -> tuple[Array, Array]:
+        m = self.theta.size - len(self.model.names)
+        ends = zip((self.model.low, self.model.high), DAMPING_RANGE, strict=True)
+        low, high = (np.log(np.r_[p, np.full(m, z)]) for p, z in ends)
+        return low, high
+
+    def at(self, theta: Array) -> tuple[Sums, float]:
+        """Sums and cost at some unknowns."""
+        n = len(self.model.names)
+        found = sums(self.model, theta[:n], np.exp(theta[n:]), self.data)
+        return found, found.chi_square + float(self.precision @ (theta - self.before) ** 2)
+
+    def posterior(self) -> tuple[Array, Array]:
+        """Information (n, n) of data and prior, and the gradient (n,) of half the cost."""
+        N = self.sums.normal + np.diag(self.precision)
+        return N, self.sums.gradient + self.precision * (self.theta - self.before)
+
+    def run(self) -> "_Search":
+        """Levenberg-Marquardt until the expected gain vanishes."""
+        (self.sums, cost), mu = self.at(self.theta), START_STIFFNESS
+        low, high = self.bounds
+        for _ in range(MAX_STEPS):
+            N, g = self.posterior()
+            stuck = ((self.theta <= low) & (g > 0)) | ((self.theta >= high) & (g < 0))
+            a = np.flatnonzero(self.free & ~stuck)
+            N, g = N[np.ix_(a, a)], g[a]
+            spread = max(1.0, cost / self.data.n_values)  # of a model that does not fit
+            if g @ np.linalg.lstsq(N, g, rcond=None)[0] < DECREMENT_TOL * spread:
+                return self
+            scaled = np.diag(np.maximum(np.diag(N), np.finfo(float).tiny))
+            while mu < MAX_STIFFNESS:
+                step = -np.linalg.lstsq(N + mu * scaled, g, rcond=None)[0]
+                trial = self.theta.copy()
+                trial[a] += np.clip(step, -MAX_LOG_STEP, MAX_LOG_STEP)
+                trial = np.where(self.free, np.clip(trial, low, high), trial)
+                found, new = self.at(trial)
+                if new < cost:
+                    break
+                mu *= 4.0
+            else:
+                return self
+            moved = (trial - self.theta)[a]
+            gain = (cost - new) / -(moved @ (2 * g + N @ moved))
+            mu *= max(1 / 3, 1 - (2 * gain - 1) ** 3) if gain > 0 else 1.0
+            self.theta, self.sums, cost = trial, found, new
+        raise SolverError(
+            f"updating did not settle in {MAX_STEPS} steps.",
+            hint="Start from better values, or give a prior; see which parameters are correlated.",
+        )
+
+
+def _found(family: BodyFamily, search: _Search) -> Updated:
+    """The record of a search that has ended."""
+    model, data, s = search.model, search.data, search.sums
+    n, free = len(model.names), np.flatnonzero(search.free)
+    zetas = tuple(f"zeta {k + 1}" for k in range(search.theta.size - n))
+    labels = tuple((*model.names, *zetas)[k] for k in free)
+    N, g = search.posterior()
+    width = np.r_[np.log(model.high / model.low), np.ones(len(zetas))][free]
+    low, high = search.bounds
+    ends = np.minimum(search.x - low[:n], high[:n] - search.x) <= BOUND_ATOL
+    at_bound = tuple(
+        name for name, end in zip(model.names, ends & search.free[:n], strict=True) if end
+    )
+    missing = scores(N, g, free, model.names)
+    factors = np.where(model.present, np.exp(search.x), 0.0)
+    own = N[np.ix_(free, free)]
+    return Updated(
+        family=family,
+        factors=dict(zip(model.names, factors.tolist(), strict=True)),
+        zeta=search.zeta,
+        names=labels,
+        covariance=np.linalg.pinv(own, hermitian=True),
+        verdict=verdict(s, data, free.size, missing, at_bound),
+        by_sensor=_mean(s.squares, data, (0, 2)),
+        by_line=_mean(s.squares, data, (1, 2)),
+        scores=missing,
+        unseen=unseen_directions(own, width, labels),
+        at_bound=at_bound,
+        model=model,
+    )
+
+
+def _mean(squares: Array, data: Data, axes: tuple[int, int]) -> Array:
+    """Mean of squared residuals over their expectation; NaN where there are none."""
+    expected = 2.0 * np.count_nonzero(data.weight, axis=axes)
+    return squares.sum(axis=axes) / np.where(expected > 0, expected, np.nan)

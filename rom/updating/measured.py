@@ -1,0 +1,151 @@
+"""Measured responses with their points, directions and random errors.
+
+Source:
+    Bendat and Piersol, Random data (2010): var |H| / |H|^2 = (1 - c) / (2 n c).
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rom.arguments import finite, one_of
+from rom.body.flexible import FlexibleBody
+from rom.body.surface import surface_of
+from rom.errors import ConfigError
+from rom.model import Array
+from rom.rotation import skew
+from rom.updating.frf_data import Complex, random_error
+
+DERIVATIVES = {"displacement": 0, "velocity": 1, "acceleration": 2}
+POINT_RTOL = 0.02  # distance of a sensor from the nearest point of the surface, of the body's size
+MAX_RELATIVE_ERROR = 0.3  # of a value; beyond it the logarithm of noise is no longer normal
+MAX_LINES_NAMED = 5  # in a message
+
+
+@dataclass(frozen=True, slots=True)
+class Channels:
+    """Where and along which direction something is measured or driven.
+
+    Attributes:
+        points: (k, 3) points in the axes of the geometry [m].
+        directions: (k, 3) directions; their length does not matter [1].
+
+    Raises:
+        ConfigError: unless both are k rows of three numbers, and all directions have a length.
+    """
+
+    points: npt.ArrayLike
+    directions: npt.ArrayLike
+
+    def __post_init__(self) -> None:
+        for name in ("points", "directions"):
+            value = np.atleast_2d(finite(name, getattr(self, name), None))
+            object.__setattr__(self, name, value)
+        shapes = np.shape(self.points), np.shape(self.directions)
+        if shapes[0] != shapes[1] or len(shapes[0]) != 2 or shapes[0][1] != 3:
+            raise ConfigError(f"points {shapes[0]}, directions {shapes[1]}: (k, 3) of both.")
+        if not np.linalg.norm(self.directions, axis=1).all():
+            raise ConfigError("a channel has a direction of length zero.")
+
+    def rows(self, body: FlexibleBody, what: str, tolerance: float | None = None) -> Array:
+        """(k, 6 + r) displacement along each channel per rigid and elastic coordinate [1].
+
+        Args:
+            body: with its outer surface.
+            what: "sensor" or "input", for messages.
+            tolerance: largest distance from a point of the surface [m]; None for two per cent of
+                the body's size.
+
+        Raises:
+            ConfigError: if a channel is off the body.
+            ModelError: if the body carries no surface.
+        """
+        surface, points = surface_of(body), np.asarray(self.points)
+        reach = POINT_RTOL * np.ptp(surface.points, axis=0).max()
+        reach = reach if tolerance is None else tolerance
+        found = []
+        for k, (x, d) in enumerate(zip(points, np.asarray(self.directions), strict=True)):
+            far = np.linalg.norm(surface.points - x, axis=1)
+            n = int(far.argmin())
+            if far[n] > reach:
+                raise ConfigError(
+                    f"{what} {k} at {x.tolist()} is {far[n]:.3g} m off the body; {reach:.3g} m is "
+                    "taken.",
+                    hint="Compare the units and axes of the test with those of the geometry.",
+                )
+            shape = surface.shape[3 * n : 3 * n + 3]
+            motion = np.hstack([np.eye(3), -skew(surface.points[n]), shape])
+            found.append(d / np.linalg.norm(d) @ motion)
+        return np.array(found)
+
+
+@dataclass(frozen=True, slots=True)
+class Responses:
+    """Measured frequency responses.
+
+    Attributes:
+        frequencies: (n_f,) lines, ascending and above zero [Hz].
+        H: (n_f, n_s, n_e) response of each sensor per unit force of each input
+            [m/N, m/(s N) or m/(s^2 N)].
+        sensors: where they are.
+        inputs: where forces act.
+        coherence: (n_f, n_s, n_e) from 0 to 1, or one number; 0 for a line not to be used [1].
+        averages: number of averages behind H and the coherence.
+        quantity: "displacement", "velocity" or "acceleration".
+
+    Raises:
+        ConfigError: if these do not fit each other, or values are not finite.
+    """
+
+    frequencies: Array
+    H: Complex
+    sensors: Channels
+    inputs: Channels
+    coherence: Any
+    averages: int
+    quantity: str = "displacement"
+
+    def __post_init__(self) -> None:
+        f = finite("frequencies", self.frequencies, None)
+        object.__setattr__(self, "frequencies", f)
+        object.__setattr__(self, "H", np.asarray(self.H, dtype=complex))
+        one_of("quantity", self.quantity, tuple(DERIVATIVES))
+        if f.ndim != 1 or not f.size or f[0] <= 0 or (np.diff(f) <= 0).any():
+            raise ConfigError("frequencies must ascend and lie above zero.")
+        wanted = (f.size, len(np.asarray(self.sensors.points)), len(np.asarray(self.inputs.points)))
+        if self.H.shape != wanted:
+            raise ConfigError(
+                f"H is {self.H.shape}; lines, sensors and inputs are {wanted}.",
+            )
+        c = np.asarray(self.coherence, dtype=float)
+        if c.shape not in ((), wanted) or not ((c >= 0) & (c < 1)).all():
+            raise ConfigError(
+                f"coherence {c.shape} must be one number or {wanted}, from 0 up to below 1.",
+                hint="A coherence of exactly one comes of a single average: it says nothing.",
+            )
+        random_error(0.5, self.averages)
+        self._check_values()
+
+    def _check_values(self) -> None:
+        used = self.relative_error() <= MAX_RELATIVE_ERROR
+        bad = (~np.isfinite(self.H) | (self.H == 0)) & used
+        if bad.any():
+            lines = np.flatnonzero(bad.any(axis=(1, 2)))
+            some = ", ".join(f"{x:.5g}" for x in self.frequencies[lines[:MAX_LINES_NAMED]])
+            raise ConfigError(
+                f"H is zero or not finite at {lines.size} lines, e.g. at {some} Hz.",
+                hint="Give these lines the coherence 0.",
+            )
+
+    def relative_error(self) -> Array:
+        """(n_f, n_s, n_e) standard deviation of real and imaginary part, over |H| [1]."""
+        c = np.maximum(np.asarray(self.coherence, dtype=float), 1e-12)
+        return np.broadcast_to(random_error(c, self.averages), self.H.shape)
+
+    def logarithm(self) -> Complex:
+        """(n_f, n_s, n_e) ln of the displacement per force [m/N]; zero where H is not used."""
+        s = 2j * np.pi * self.frequencies[:, None, None]
+        used = self.relative_error() <= MAX_RELATIVE_ERROR
+        return np.log(np.where(used, self.H / s ** DERIVATIVES[self.quantity], 1.0))

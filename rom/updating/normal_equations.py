@@ -1,0 +1,129 @@
+"""Residuals of responses and their sums over lines: memory does not grow with their number.
+
+The residual is ln(H / H_measured) over its standard deviation, real and imaginary part. Circular
+noise leaves the mean of the logarithm where it is, as all powers of it have the mean zero.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rom.model import Array
+from rom.updating.family_model import FamilyModel
+from rom.updating.frf_data import Complex
+from rom.updating.measured import MAX_RELATIVE_ERROR, Responses
+from rom.updating.methods import receptance, through_modes
+from rom.updating.models import modal
+
+BLOCK_LINES = 256  # at once: some ten megabytes of derivatives for sixty channels
+
+
+@dataclass(frozen=True, slots=True)
+class Data:
+    """Logarithms of responses and what they are worth.
+
+    Attributes:
+        omega: (n_f,) lines [rad/s].
+        logarithm: (n_f, n_s, n_e) ln of displacement per force.
+        weight: (n_f, n_s, n_e) one over the standard deviation of both its parts; 0 for values
+            that are not used.
+    """
+
+    omega: Array
+    logarithm: Complex
+    weight: Array
+
+    @staticmethod
+    def of(test: Responses) -> "Data":
+        """What a test says."""
+        error = test.relative_error()
+        weight = np.where(error <= MAX_RELATIVE_ERROR, 1.0 / error, 0.0)
+        return Data(2 * np.pi * test.frequencies, test.logarithm(), weight)
+
+    def lines(self, chosen: Array) -> "Data":
+        """Some of the lines."""
+        return Data(self.omega[chosen], self.logarithm[chosen], self.weight[chosen])
+
+    @property
+    def n_values(self) -> int:
+        """Number of real residuals."""
+        return 2 * int(np.count_nonzero(self.weight))
+
+
+@dataclass(frozen=True, slots=True)
+class Sums:
+    """Sums over all lines.
+
+    Attributes:
+        normal: (n_q, n_q) J^T J.
+        gradient: (n_q,) J^T r.
+        squares: (n_f, n_s, n_e) squared residuals, of real and imaginary part together.
+    """
+
+    normal: Array
+    gradient: Array
+    squares: Array
+
+    @property
+    def chi_square(self) -> float:
+        """Sum of all squared residuals."""
+        return float(self.squares.sum())
+
+
+def responses_at(model: FamilyModel, x: Array, ratios: Array, omega: Array) -> Complex:
+    """(n_f, n_s, n_e) receptances [m/N].
+
+    Args:
+        model: the family with its sensors.
+        x: (n_p,) logarithms of its factors.
+        ratios: (m,) damping ratios of the lowest elastic modes, the last one of all others too [1].
+        omega: (n_f,) lines [rad/s].
+    """
+    modes = modal(model.at(x), shared(ratios, model.n_elastic))
+    return receptance(model.seen @ modes.Phi, modes.g(omega), model.driven @ modes.Phi)
+
+
+def shared(ratios: Array, n: int) -> Array:
+    """(n,) damping ratios of all elastic modes; from the last one given on they are equal."""
+    return np.r_[ratios, np.full(n - ratios.size, ratios[-1])]
+
+
+def sums(model: FamilyModel, x: Array, ratios: Array, data: Data) -> Sums:
+    """J^T J and J^T r by the logarithms of factors and of damping ratios.
+
+    Args:
+        model: the family with its sensors.
+        x: (n_p,) logarithms of its factors.
+        ratios: (m,) damping ratios of the lowest elastic modes, the last one of all others too [1].
+        data: what was measured.
+    """
+    zeta = shared(ratios, model.n_elastic)
+    here = model.at(x)
+    modes = modal(here, zeta)
+    seen, driven = model.seen @ modes.Phi, model.driven @ modes.Phi
+    n = x.size + ratios.size
+    normal, gradient = np.zeros((n, n)), np.zeros(n)
+    squares = np.zeros(data.weight.shape)
+    own = ratios.size - 1
+    change, others = through_modes(here, modes, own), slice(model.n_rigid + own, None)
+    for first in range(0, data.omega.size, BLOCK_LINES):
+        block = slice(first, first + BLOCK_LINES)
+        omega, w = data.omega[block], data.weight[block]
+        g = modes.g(omega)
+        H = receptance(seen, g, driven)
+        log = wrapped(np.log(H) - data.logarithm[block]) * (w > 0)
+        left, right = seen * g[:, None, :], g[:, :, None] * driven.T
+        last = (left[:, :, others] * modes.d[others]) @ right[:, others]
+        last = 1j * omega[:, None, None, None] * last[..., None]
+        J = -np.concatenate([change(left, right, omega), last], axis=-1)
+        J = (J * (w / H)[..., None]).reshape(-1, n)
+        r = (w * log).ravel()
+        normal += (J.conj().T @ J).real
+        gradient += (J.conj().T @ r).real
+        squares[block] = np.abs(w * log) ** 2
+    return Sums(normal, gradient, squares)
+
+
+def wrapped(log: Complex) -> Complex:
+    """The logarithm with its phase between -pi and pi."""
+    return log - 2j * np.pi * np.round(log.imag / (2 * np.pi))

@@ -1,0 +1,169 @@
+"""What the data say: channels that cannot be right, whether noise explains what is left, and where.
+
+Source:
+    Score test: Rao, Large sample tests of statistical hypotheses, Proc. Cambridge Philos. Soc. 44
+    (1948) 50.
+"""
+
+import numpy as np
+from scipy.stats import chi2
+
+from rom.errors import ConfigError
+from rom.model import Array, Index, Mask, Report, Row
+from rom.rows import row
+from rom.updating.frf_data import Complex
+from rom.updating.models import DEAD_RATIO
+from rom.updating.normal_equations import Data, Sums, wrapped
+
+KNOWN_FACTORS = {
+    9.80665: "acceleration in g",
+    1 / 9.80665: "acceleration in m/s^2 taken for g",
+    1e3: "millimetres or millivolts",
+    1e-3: "metres taken for millimetres",
+}
+MAX_LOG_LEVEL = 1.5  # of all responses: a factor of 4.5, which no range of moduli explains
+FACTOR_LOG_ATOL = 0.7  # within which a known factor is named
+MIN_PHASE_COSINE = -0.4  # mean over the lines: a sensor of which measures the other direction
+MIN_OTHERS_COSINE = 0.2  # mean over the other sensors, without which phases say nothing
+MAX_FALSE_REFUSAL = 1e-3  # probability that a row refuses a right model
+MAX_SCORE = 4.0  # standard deviations
+N_BANDS = 8  # of lines, in which the misfit is looked for
+UNSEEN_RTOL = 0.5  # of a parameter's range: a wider standard deviation says nothing new
+
+
+def check_channels(H: Complex, data: Data) -> None:
+    """Refuse responses whose scale or sign no parameter explains.
+
+    Args:
+        H: (n_f, n_s, n_e) of the model before updating [m/N].
+        data: what was measured.
+
+    Raises:
+        ConfigError: naming the sensor, the factor and its likely reason.
+    """
+    used = data.weight > 0
+    size = np.abs(H).max(axis=(0, 2))
+    for s in np.flatnonzero((size < DEAD_RATIO * size.max()) & used.any(axis=(0, 2))):
+        raise ConfigError(
+            f"sensor {s} moves by {size[s] / size.max():.1e} of the largest response of the model: "
+            "a support or symmetry keeps it still.",
+            hint="Leave it out, or give it the coherence 0.",
+        )
+    log = wrapped(data.logarithm - np.log(H))
+    level = np.array([np.median(log.real[:, s][used[:, s]]) if used[:, s].any() else 0.0
+                      for s in range(H.shape[1])])  # fmt: skip
+    common = float(np.median(level))
+    if abs(common) > MAX_LOG_LEVEL:
+        raise ConfigError(
+            f"all responses are {np.exp(common):.3g} times those of the model{_reason(common)}.",
+            hint="Check units, quantity, and whether the data are of this body.",
+        )
+    for s in np.flatnonzero(np.abs(level - common) > MAX_LOG_LEVEL):
+        raise ConfigError(
+            f"sensor {s} gives {np.exp(level[s]):.3g} times the model{_reason(level[s])}, the "
+            f"others {np.exp(common):.3g} times.",
+            hint="Check its scale, its direction and its place.",
+        )
+    _check_signs(np.cos(log.imag), used)
+
+
+def _reason(level: float) -> str:
+    for factor, what in KNOWN_FACTORS.items():
+        if abs(level - np.log(factor)) < FACTOR_LOG_ATOL:
+            return f" (about {factor:.4g}: {what}?)"
+    return ""
+
+
+def _check_signs(cosine: Array, used: Mask) -> None:
+    count = np.maximum(used.sum(axis=(0, 2)), 1)
+    mean = (cosine * used).sum(axis=(0, 2)) / count
+    for s in np.flatnonzero(mean < MIN_PHASE_COSINE):
+        others = np.delete(mean, s)
+        if others.size and np.median(others) > MIN_OTHERS_COSINE:
+            raise ConfigError(
+                f"sensor {s} moves against the model (mean cosine of the phase {mean[s]:.2f}; "
+                f"{np.median(others):.2f} of the others): it looks turned around.",
+                hint="Turn its direction, or see whether two cables are exchanged.",
+            )
+
+
+def scores(normal: Array, gradient: Array, free: Index, names: tuple[str, ...]) -> dict[str, float]:
+    """{name: score in standard deviations} of parameters not updated; positive: more of it.
+
+    Args:
+        normal: (n, n) J^T J.
+        gradient: (n,) J^T r.
+        free: numbers of what was updated.
+        names: of the parameters, the first of all unknowns.
+    """
+    own = np.linalg.pinv(normal[np.ix_(free, free)], hermitian=True)
+    found = {}
+    for j in np.setdiff1d(np.arange(len(names)), free):
+        across = normal[j, free] @ own
+        information = normal[j, j] - across @ normal[free, j]
+        if information > 1e-12 * normal[j, j]:
+            slope = gradient[j] - across @ gradient[free]
+            found[names[j]] = float(-slope / np.sqrt(information))
+    return found
+
+
+def unseen_directions(
+    normal: Array, width: Array, names: tuple[str, ...]
+) -> tuple[dict[str, float], ...]:
+    """Directions whose standard deviation exceeds half the range of the parameters.
+
+    Args:
+        normal: (n, n) information on the logarithms of the unknowns.
+        width: (n,) ranges of these logarithms.
+        names: (n,) of the unknowns.
+    """
+    lam, V = np.linalg.eigh(normal * np.outer(width, width))
+    unseen = V[:, lam < UNSEEN_RTOL**-2.0]
+    return tuple(
+        {names[k]: float(v[k]) for k in np.argsort(-np.abs(v)) if abs(v[k]) > 0.1} for v in unseen.T
+    )
+
+
+def verdict(
+    s: Sums, data: Data, n: int, missing: dict[str, float], at_bound: tuple[str, ...]
+) -> Report:
+    """Whether noise alone explains what is left.
+
+    Args:
+        s: sums at the end of the search.
+        data: what was measured.
+        n: number of unknowns.
+        missing: scores of parameters not updated.
+        at_bound: names of parameters at an end of their range.
+    """
+    freedom = data.n_values - n
+    counted = 2.0 * (data.weight > 0)
+    rows = [_chi_row("chi-square of all residuals", s.chi_square, freedom, 1)]
+    n_s = s.squares.shape[1]
+    worst = [(_deviation(s.squares[:, k].sum(), counted[:, k].sum()), k) for k in range(n_s)]
+    k = max(worst)[1]
+    rows.append(_chi_row(f"worst sensor, {k}", s.squares[:, k].sum(), counted[:, k].sum(), n_s))
+    blocks = np.array_split(np.arange(data.omega.size), min(N_BANDS, data.omega.size))
+    worst = [(_deviation(s.squares[b].sum(), counted[b].sum()), j) for j, b in enumerate(blocks)]
+    b = blocks[max(worst)[1]]
+    hz = data.omega[b[[0, -1]]] / (2 * np.pi)
+    name = f"worst band, {hz[0]:.4g} to {hz[1]:.4g} Hz"
+    rows.append(_chi_row(name, s.squares[b].sum(), counted[b].sum(), len(blocks)))
+    if missing:
+        worst_name = max(missing, key=lambda name: abs(missing[name]))
+        quantity = f"largest score, {worst_name} [deviations]"
+        rows.append(row(quantity, abs(missing[worst_name]), MAX_SCORE))
+    rows += [row(f"{name} inside its range", 1.0, 0.0) for name in at_bound]
+    return Report("updating", tuple(rows))
+
+
+def _deviation(value: float, freedom: float) -> float:
+    """Standard deviations of chi-square above its expectation."""
+    return float((value - freedom) / np.sqrt(2 * max(freedom, 1.0)))
+
+
+def _chi_row(name: str, value: float, freedom: float, trials: int) -> Row:
+    """Chi-square over its expectation; the limit is kept by a right model but for one in 1000."""
+    freedom = max(freedom, 1.0)
+    limit = chi2.isf(MAX_FALSE_REFUSAL / trials, freedom) / freedom
+    return row(f"{name}, over its expectation", value / freedom, float(limit))

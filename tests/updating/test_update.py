@@ -1,0 +1,380 @@
+"""Updating of families by measured responses: derivatives, statistics of what is found, verdict."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.linalg import eigh, solve_sylvester, sqrtm
+
+import rom
+from cases.solid import STEEL, composite
+from rom.errors import ConfigError, ParameterError
+from rom.updating import AddedMass, Channels, GroundSpring, Responses
+from rom.updating.family_model import family_model
+from rom.updating.frf_data import estimators, noisy, random_error
+from rom.updating.normal_equations import Data, responses_at, sums
+
+KINDS = {"root": "rbe2", "tip": "rbe2"}
+SIZE, CELLS = (1.0, 0.1, 0.08), (12, 2, 2)
+PARAMETERS = {
+    "E_inner": rom.YoungsModulus("inner", 0.4, 2.5),
+    "E_outer": rom.YoungsModulus("outer", 0.4, 2.5),
+    "rho_outer": rom.Density("outer", 0.5, 2.0),
+}
+TRUE = {"E_inner": 1.3, "E_outer": 0.75, "rho_outer": 1.2}
+GRID = [[x, 0.05 * k, 0.04 * m] for x in (0.25, 0.5, 0.75, 1.0) for k, m in ((0, 0), (2, 2))]
+SENSORS = Channels(np.repeat(GRID, 2, axis=0), np.tile([[0, 1, 0], [0, 0, 1]], (8, 1)))
+FEW = Channels(np.asarray(SENSORS.points)[5:11], np.asarray(SENSORS.directions)[5:11])
+INPUTS = Channels([[1.0, 0.0, 0.0], [0.5, 0.1, 0.08]], [[0, 1, 1], [0, 1, -0.5]])
+LINES = np.linspace(20, 1400, 300)
+AVERAGES = 50
+HELD = {"root": "x y z rx ry rz"}
+
+
+@pytest.fixture(scope="module")
+def family():
+    model = composite(
+        {"inner": STEEL, "outer": STEEL}, lambda c: "inner" if c[0] < 6 else "outer", SIZE, CELLS
+    )
+    return rom.reduce_parametric(
+        model, parameters=PARAMETERS, method=rom.CraigBampton(10), interfaces=KINDS, certify=False
+    )
+
+
+def model_of(family, attached=None, candidates=None, fixed=HELD, sensors=SENSORS):
+    rows = (sensors.rows(family.body, "sensor"), INPUTS.rows(family.body, "input"))
+    return family_model(family, rows, attached or {}, candidates or {}, fixed)
+
+
+def synthetic(family, level=0.05, seed=0, true=TRUE, zeta=0.02, lines=LINES, **made):
+    """A test with relative noise: coherence c of n averages has the error (1 - c) / (2 n c)."""
+    model = model_of(family, **made)
+    x = np.log([true.get(name, 1.0) for name in model.names])
+    H = responses_at(model, x, np.array([zeta]), 2 * np.pi * lines)
+    c = 1 / (1 + AVERAGES * level**2)  # level^2 / 2 for each part
+    H = noisy(H, level, np.random.default_rng(seed)) if level else H
+    return Responses(
+        lines, H, made.get("sensors", SENSORS), INPUTS, c if level else 0.999, AVERAGES
+    )
+
+
+def at_nodes(model, nodes):
+    return Channels(model.points[list(nodes)], np.tile([0, 1, 0], (len(nodes), 1)))
+
+
+def damped(K, M, zeta, omega, seen, driven):
+    """S Z^-1 F with equal damping ratios: C = 2 zeta M (M^-1 K)^(1/2)."""
+    C = 2 * zeta * M @ sqrtm(np.linalg.solve(M, K))
+    Z = [K - w**2 * M + 1j * w * C for w in omega]
+    return np.array([seen @ np.linalg.solve(z, driven.T) for z in Z])
+
+
+def summed(model, x, amount=1.0):
+    """K and M at logarithms x, which may be complex."""
+    k, m = (np.prod(np.exp(x) ** p, axis=1) * amount for p in (model.k_powers, model.m_powers))
+    return np.tensordot(k, model.K, 1), np.tensordot(m, model.M, 1)
+
+
+def logarithmic(model, x, ratios, omega):
+    """d ln H by all unknowns: gradients of residuals of one value, real and imaginary."""
+    shape = (omega.size, len(model.seen), len(model.driven))
+    out = np.zeros((*shape, x.size + ratios.size), dtype=complex)
+    log = np.log(responses_at(model, x, ratios, omega))
+    for at in np.ndindex(shape):
+        weight = np.zeros(shape)
+        weight[at] = 1.0
+        parts = [sums(model, x, ratios, Data(omega, log - c, weight)).gradient for c in (1, 1j)]
+        out[at] = parts[0] + 1j * parts[1]
+    return out
+
+
+def test_the_model_of_a_complete_basis_is_the_finite_element_model():
+    """Dense matrices of the mesh with the clamped nodes struck out."""
+    parts = {"inner": STEEL, "outer": STEEL}
+    model = composite(parts, lambda c: "inner" if c[0] < 1 else "outer", cells=(3, 1, 1))
+    family = rom.reduce_parametric(
+        model, parameters=PARAMETERS, method=rom.CraigBampton(24),
+        interfaces={"root": "full", "tip": "full"}, certify=False,
+    )  # fmt: skip
+    rows = [at_nodes(model, n).rows(family.body, "sensor") for n in ((5, 9, 14), (13,))]
+    small = family_model(family, rows, {}, {}, ("root",))
+    K, M = (getattr(model, name).toarray() for name in "KM")
+    for E, rho, part in ((1.3, 1.0, "inner"), (0.75, 1.2, "outer")):
+        K = K + (E - 1) * model.regions[part].K.toarray()
+        M = M + (rho - 1) * model.regions[part].M.toarray()
+    free = np.setdiff1d(np.arange(len(K)), model.interfaces["root"].dofs)
+    K, M = K[np.ix_(free, free)], M[np.ix_(free, free)]
+    S = np.eye(3 * len(model.points))[:, free]
+    omega = 2 * np.pi * np.array([100.0, 700.0, 2500.0])
+    full = damped(K, M, 0.02, omega, S[[16, 28, 43]], S[[40]])
+    found = responses_at(small, np.log([1.3, 0.75, 1.2]), np.array([0.02]), omega)
+    assert_allclose(found, full, atol=1e-8 * np.abs(full).max())
+
+
+def test_derivatives_are_those_of_a_complex_step(family):
+    """Without damping, where the step has the imaginary part for itself; of a candidate too."""
+    spring = GroundSpring("tip", (1e5, 2e5, 3e5), 0.1, 10)
+    model = model_of(family, {"k": spring}, {"m": AddedMass("tip", 1.0, 0.1, 10)})
+    omega, x = 2 * np.pi * np.array([33.0, 260.0, 900.0]), np.array([0.2, -0.3, 0.1, 0.4, 0.0])
+    none = np.array([1e-14])
+    by_x = logarithmic(model, x, none, omega)[..., :-1]
+    by_x = by_x * responses_at(model, x, none, omega)[..., None]
+    for j in range(5):
+        if j < 4:
+            K, M = summed(model, x + 1e-30j * (np.arange(5) == j), model.amount)
+        else:
+            K, M = summed(model, x, model.amount + 1e-30j * (model.amount == 0))
+        parts = [model.seen @ np.linalg.solve(K - w**2 * M, model.driven.T) for w in omega]
+        expected = np.array(parts).imag / 1e-30
+        assert_allclose(by_x[..., j].real, expected, atol=1e-10 * np.abs(expected).max())
+
+
+def test_derivatives_with_damping_are_those_of_the_square_root(family):
+    """C = 2 zeta M X, X X = M^-1 K: dX by Sylvester's equation, no mode has to be followed."""
+    model, zeta = model_of(family), 0.02
+    omega, x = 2 * np.pi * np.array([33.0, 260.0, 900.0]), np.array([0.2, -0.3, 0.1])
+    K, M = summed(model, x)
+    V = eigh(K, M)[1]  # mass-normalised coordinates: numbers of equal size
+    K, M, S, F = V.T @ K @ V, V.T @ M @ V, model.seen @ V, model.driven @ V
+    X = sqrtm(np.linalg.solve(M, K))
+    found = logarithmic(model, x, np.full(2, zeta), omega)
+    H = damped(K, M, zeta, omega, S, F)
+    for j in range(4):
+        dK, dM = np.zeros((2, *K.shape))
+        if j < 3:
+            dK, dM = (
+                np.tensordot(p[:, j] * np.exp(p @ x), A, 1)
+                for p, A in ((model.k_powers, model.K), (model.m_powers, model.M))
+            )
+            dK, dM = V.T @ dK @ V, V.T @ dM @ V
+        dX = solve_sylvester(X, X, np.linalg.solve(M, dK - dM @ X @ X))
+        dC = 2 * zeta * (dM @ X + M @ dX) + (j == 3) * 2 * zeta * M @ X
+        expected = []
+        for w in omega:
+            Z, dZ = K - w**2 * M + 2j * w * zeta * M @ X, dK - w**2 * dM + 1j * w * dC
+            expected.append(-S @ np.linalg.solve(Z, dZ @ np.linalg.solve(Z, F.T)))
+        value = found[..., 3:].sum(axis=-1) if j == 3 else found[..., j]
+        scale = np.abs(expected).max()
+        assert_allclose(value * H, expected, atol=1e-8 * scale)
+
+
+def test_sums_do_not_depend_on_blocks(family, monkeypatch):
+    model, data = model_of(family), Data.of(synthetic(family))
+    x, ratios = np.zeros(3), np.full(4, 0.02)
+    whole = sums(model, x, ratios, data)
+    monkeypatch.setattr("rom.updating.normal_equations.BLOCK_LINES", 7)
+    pieces = sums(model, x, ratios, data)
+    for name in ("normal", "gradient", "squares"):
+        expected = getattr(whole, name)
+        scale = np.abs(expected).max()
+        assert_allclose(getattr(pieces, name), expected, atol=1e-11 * scale)
+
+
+def test_parameters_lie_inside_two_deviations_as_often_as_they_must(family):
+    """Of 100 draws 95 are expected, 90 to 99 by chance; chi-square is calibrated."""
+    inside, chi = np.zeros(3), []
+    lines = np.linspace(20, 1400, 40)
+    for seed in range(100):
+        test = synthetic(family, 0.1, seed, lines=lines, sensors=FEW)
+        found = rom.update(family, test, fixed=HELD, damping=0.02)
+        errors = [np.log(found.factors[n] / TRUE[n]) / found.deviations[n] for n in PARAMETERS]
+        inside += np.abs(errors) < 2
+        chi.append(found.verdict.rows[0].value)
+    assert (inside >= 90).all() and (inside <= 99).all(), inside
+    n = 2 * 40 * 6 * 2
+    assert_allclose(np.mean(chi), 1.0, atol=0.01)
+    assert_allclose(np.std(chi), np.sqrt(2 / n), rtol=0.3)
+
+
+def test_the_right_model_passes_and_its_report_says_so(family):
+    found = rom.update(family, synthetic(family), fixed=HELD)
+    assert found.verdict.ok and not found.unseen and not found.at_bound
+    for name, value in TRUE.items():
+        assert_allclose(found.factors[name], value, rtol=2e-3)
+    assert_allclose(found.zeta[:4], 0.02, rtol=0.05)
+    assert_allclose(found.body.mass, family.at(**found.factors).mass)
+    assert "E_inner = 1." in str(found)
+    test = synthetic(family, 0.0)
+    assert_allclose(found.responses(LINES), test.H, atol=0.02 * np.abs(test.H).max())
+
+
+def test_noise_of_averages_is_what_the_coherence_says():
+    """var |H| / |H|^2 = (1 - c) / (2 n c), simulated with noise on the response."""
+    rng, n, trials, level = np.random.default_rng(5), 40, 4000, 0.5
+    f = gauss(rng, (n, trials))
+    x = 2.0 * f + 2.0 * level * gauss(rng, (n, trials))
+    H1, _, _, coherence = estimators(x, f)
+    c = 1 / (1 + level**2)
+    assert_allclose(coherence.mean(), c, rtol=0.02)
+    assert_allclose(np.var(np.abs(H1)) / 4, (1 - c) / (2 * n * c), rtol=0.08)
+    assert_allclose(np.var(np.abs(H1)) / 4, random_error(c, n) ** 2, rtol=0.08)
+
+
+@pytest.mark.parametrize(("name", "place"), [("H1", 0), ("H2", 1), ("Hv", 2)])
+def test_noise_on_forces_biases_h1_and_noise_on_responses_h2(family, name, place):
+    """Far below resonance H1, low by 1 / (1 + v), makes stiffness 1 + v times too large."""
+    rng, n, level = np.random.default_rng(1), 400, 0.3
+    lines = np.linspace(0.5, 3, 30)
+    exact = synthetic(family, 0.0, true={}, lines=lines).H
+    f = gauss(rng, (n, *exact.shape))
+    x = exact * (f + level * gauss(rng, f.shape))
+    f = f + level * gauss(rng, f.shape)
+    *found, coherence = estimators(x, f)
+    test = Responses(lines, found[place], SENSORS, INPUTS, coherence, n)
+    result = rom.update(family, test, fixed=HELD, free=("E_inner", "E_outer"), damping=0.02)
+    bias = {"H1": 1 + level**2, "H2": 1 / (1 + level**2), "Hv": 1.0}[name]
+    for p in ("E_inner", "E_outer"):
+        assert abs(np.log(result.factors[p] / bias)) < 3.5 * result.deviations[p]
+    seen = abs(np.log(result.factors["E_inner"])) / result.deviations["E_inner"]
+    assert seen > 10 or name == "Hv"  # the bias is no matter of chance
+
+
+def gauss(rng, shape):
+    return (rng.standard_normal(shape) + 1j * rng.standard_normal(shape)) / np.sqrt(2)
+
+
+WRONG = {  # what the structure has and the model has not: the candidate of that name finds it
+    "missing spring": ({"tip spring": GroundSpring("tip", (0, 3e5, 3e5), 0.1, 10)}, {}),
+    "missing mass": ({}, {"tip mass": AddedMass("tip", 1.0, 0.1, 10)}),
+}
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_a_wrong_model_is_refused_and_what_is_missing_is_named(family, case):
+    spring, mass = WRONG[case]
+    candidates = {
+        "tip spring": GroundSpring("tip", (0, 3e5, 3e5), 0.1, 10),
+        "tip mass": AddedMass("tip", 1.0, 0.1, 10),
+        "tip twist": GroundSpring("tip", (0, 0, 0, 1e3, 0, 0), 0.1, 10),
+    }
+    test = synthetic(family, attached=spring | mass)
+    found = rom.update(
+        family, test, fixed=HELD, candidates=candidates, free=("E_inner", "E_outer"), damping=0.02
+    )
+    (name,) = spring | mass
+    assert not found.verdict.ok
+    assert found.factors["tip mass"] == 0.0
+    cured = rom.update(
+        family, test, fixed=HELD, attached=spring | mass, free=("E_inner", "E_outer", "rho_outer"),
+        damping=0.02,
+    )  # fmt: skip
+    assert cured.verdict.ok
+    assert abs(np.log(cured.factors[name])) < 4 * cured.deviations[name]
+
+
+def test_the_score_names_the_parameter_that_is_missing(family):
+    """Everything is right but one density, which is not updated."""
+    true = {"rho_outer": 1.03}
+    extra = {"tip mass": AddedMass("root", 1.0, 0.1, 10)}
+    test = synthetic(family, true=true)
+    found = rom.update(
+        family, test, fixed=HELD, free=("E_inner", "E_outer"), candidates=extra, damping=0.02
+    )
+    assert not found.verdict.ok and found.scores["rho_outer"] > 4
+    right = rom.update(family, synthetic(family, true={"E_outer": 1.03}), fixed=HELD,
+                       free=("E_inner", "E_outer"), damping=0.02)  # fmt: skip
+    assert right.verdict.ok and abs(right.scores["rho_outer"]) < 4
+
+
+def test_a_wrong_support_is_refused(family):
+    """The root stands on springs in the test, and is held in the model."""
+    soft = GroundSpring("root", (1e9, 1e9, 1e9, 2e7, 2e7, 2e7), 0.1, 10)
+    test = synthetic(family, attached={"soft": soft}, fixed=())
+    assert not rom.update(family, test, fixed=HELD, damping=0.02).verdict.ok
+
+
+def test_a_sensor_with_noise_of_its_own_is_located(family):
+    test = synthetic(family)
+    H = test.H.copy()
+    H[:, 5] *= 1.03
+    found = rom.update(family, replace(test, H=H), fixed=HELD, damping=0.02)
+    assert not found.verdict.ok and np.nanargmax(found.by_sensor) == 5
+    assert any("worst sensor, 5" in row.quantity for row in found.verdict.failures)
+    H = test.H.copy()
+    H[100:140] *= 1.05
+    found = rom.update(family, replace(test, H=H), fixed=HELD, damping=0.02)
+    assert 100 <= np.nanargmax(np.convolve(found.by_line, np.ones(9), "same")) < 140
+
+
+def test_a_direction_that_the_data_do_not_see_is_named(family):
+    """At one line far below resonance, without mass, compliance alone is seen: not the density."""
+    test = synthetic(family, lines=np.linspace(0.5, 1.0, 4))
+    found = rom.update(family, test, fixed=HELD, damping=0.02)
+    assert any(abs(v.get("rho_outer", 0.0)) > 0.9 for v in found.unseen)
+    assert found.deviations["rho_outer"] > 0.5
+    held = rom.update(family, test, fixed=HELD, damping=0.02, prior={"rho_outer": 0.05})
+    assert_allclose(held.deviations["rho_outer"], 0.05, rtol=0.01)
+    assert not any("rho_outer" in v for v in held.unseen)
+
+
+def test_an_end_of_a_range_is_named(family):
+    found = rom.update(family, synthetic(family, true={"E_inner": 3.0}), fixed=HELD, damping=0.02)
+    assert found.at_bound == ("E_inner",)
+    assert not found.verdict.ok and "E_inner inside its range" in str(found)
+
+
+def test_wrong_data_are_named(family):
+    test = synthetic(family)
+
+    def refused(words, kind=ConfigError, **fields):
+        keywords = {k: fields.pop(k) for k in tuple(fields) if k in ("free", "prior", "attached")}
+        with pytest.raises(kind, match=words):
+            rom.update(family, replace(test, **fields), fixed=HELD, **keywords)
+
+    flipped, scaled, nan = (test.H.copy() for _ in range(3))
+    flipped[:, 3] *= -1
+    scaled[:, 2] *= 1000
+    nan[7, 0, 0] = np.nan
+    refused("sensor 3 moves against the model", H=flipped)
+    refused("sensor 2 gives .*1000: millimetres", H=scaled)
+    refused("all responses .*9.807: acceleration in g", H=9.80665 * test.H)
+    refused("all responses .*0.001: metres taken", H=1e-3 * test.H)
+    refused("zero or not finite at 1 lines, e.g. at 52.308 Hz", H=nan)
+    refused("sensor 0 at .* is 0.92 m off the body", sensors=Channels(
+        np.asarray(SENSORS.points) + [[0, 0, 0.999 + 0.001 * (k == 0)] for k in range(16)],
+        SENSORS.directions))  # fmt: skip
+    root = np.asarray(SENSORS.points) * [[k != 4, 1, 1] for k in range(16)]
+    refused("sensor 4 moves by .* a support", sensors=Channels(root, SENSORS.directions))
+    refused("coherence", coherence=1.0)
+    refused("no parameter 'E_web'", kind=ParameterError, free=("E_web",))
+    refused("prior: there is no parameter 'E'", kind=ParameterError, prior={"E": 1.0})
+    refused("names two", kind=ParameterError, attached={"E_inner": AddedMass("tip", 1, 0.5, 2)})
+    refused("usable numbers for", coherence=0.01)
+    with pytest.raises(ConfigError, match="H is"):
+        replace(test, H=test.H[:, :3])
+    with pytest.raises(ConfigError, match="length zero"):
+        Channels([[0, 0, 0]], [[0, 0, 0]])
+
+
+def test_lines_without_coherence_do_not_count(family):
+    test = synthetic(family)
+    c = np.full(test.H.shape, float(test.coherence))
+    H = test.H.copy()
+    H[:20], c[:20] = np.nan, 0.0
+    found = rom.update(family, replace(test, H=H, coherence=c), fixed=HELD, damping=0.02)
+    assert found.verdict.ok and np.isnan(found.by_line[:20]).all()
+
+
+def test_a_family_must_be_in_si_and_without_thickness(family):
+    odd = replace(family, body=replace(family.body, units="mm-t-s"))
+    with pytest.raises(ConfigError, match="mm-t-s, responses in SI"):
+        rom.update(odd, synthetic(family), fixed=HELD)
+
+
+def test_a_free_body_has_its_rigid_motions_too(family):
+    """Mass by its rigid motion, at lines below the first elastic mode as well."""
+    found = rom.update(family, synthetic(family, fixed=()), damping=0.02)
+    assert found.model.n_rigid == 6 and found.verdict.ok
+    for name, value in TRUE.items():
+        assert_allclose(found.factors[name], value, rtol=2e-3)
+
+
+@pytest.mark.parametrize(("quantity", "power"), [("velocity", 1), ("acceleration", 2)])
+def test_velocities_and_accelerations_are_taken(family, quantity, power):
+    test = synthetic(family)
+    H = test.H * (2j * np.pi * LINES[:, None, None]) ** power
+    found = rom.update(family, replace(test, H=H, quantity=quantity), fixed=HELD, damping=0.02)
+    same = rom.update(family, test, fixed=HELD, damping=0.02)
+    for name in TRUE:
+        assert_allclose(found.factors[name], same.factors[name], rtol=1e-9)
