@@ -94,6 +94,11 @@ def test_inertia_of_linkages_with_slides_is_that_of_moving_points(name):
         assert 0.5 * rate @ A @ rate == pytest.approx(expected, rel=1e-7)
 
 
+def test_the_tool_of_the_polar_arm_lies_beside_its_guide():
+    middle = points_of_arm(0.7, 0.4)[1:].mean(axis=0)
+    assert_allclose(replace(ARM, offset=0.03).tip(0.7, 0.4), middle, atol=1e-15)
+
+
 def test_rotors_of_slides_add_to_their_own_coordinate():
     A = CrossSlides((1.0, 2.0), motors=(0.5, 0.25)).inertia(0.0, np.zeros(3))
     assert_allclose(A, np.tile(np.diag([3.5, 2.25]), (3, 1, 1)), atol=1e-15)
@@ -126,6 +131,9 @@ def test_a_polar_arm_is_isotropic_on_a_circle():
     assert np.ptp(found.q[:, 0]) > 6
     assert_allclose(found.inertia, 2.0, rtol=1e-9)
     assert ARM.isotropic_reach(0.17) is None
+    geared = replace(ARM, motor=0.7)
+    A = geared.inertia(0.0, geared.isotropic_reach(L))
+    assert_allclose(A, 2.7 * np.diag([L**2, 1.0]), rtol=1e-12)
     short = isotropic_set(ARM.inertia, (None, (0.05, 0.6)), lengths=(0.17, 1.0), n=60)
     aside = replace(ARM, offset=0.02)
     wide = isotropic_set(aside.inertia, (None, (0.05, 0.6)), lengths=(L, 1.0), n=60)
