@@ -70,7 +70,7 @@ for mu, ratio in zip(frictions, needed, strict=True):
 
 # ## A wall with an opening
 
-bricks = wall(4.0, 10, opening=(1.5, 2.5, 3, 7))
+bricks = wall(4.0, 10, openings=[(1.5, 2.5, 3, 7)])
 standing = simulate(bricks, t_end=0.4, dt=4e-3, keep=0.0, save_every=100)
 pressure = -standing.stress()[1:, 1] / 1e3
 joints = standing.joints()

@@ -60,6 +60,7 @@ NEW_IN_FRONTS = {
     "modes",
     "motion",
     "arch",
+    "drawn",
     "minimum_thickness",
     "stands",
     "wall",

@@ -241,7 +241,7 @@ WRONG = {  # what the structure has and the model has not: the candidate of that
 
 
 @pytest.mark.parametrize("case", WRONG)
-def test_a_wrong_model_is_refused_and_what_is_missing_is_named(family, case):
+def test_a_wrong_model_is_refused(family, case):
     spring, mass = WRONG[case]
     candidates = {
         "tip spring": GroundSpring("tip", (0, 3e5, 3e5), 0.1, 10),

@@ -1,6 +1,7 @@
 """Stones in contact.
 
-`stones` puts walls and arches together, `motion` moves them, `limits` finds the loads they bear;
+`stones` puts walls and arches together, `drawings` takes them from plane surfaces, `motion` moves
+them, `limits` finds the loads they bear;
 `actions` and `histories` are loads, moving supports and earthquakes, `joints` laws of joints;
 `discontinuous_deformation` and `block_contact` are the compiled kernels.
 """

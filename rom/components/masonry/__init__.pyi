@@ -4,6 +4,7 @@ from rom.components.masonry.actions import PointLoad as PointLoad
 from rom.components.masonry.actions import SupportMotion as SupportMotion
 from rom.components.masonry.actions import Wind as Wind
 from rom.components.masonry.actions import facing as facing
+from rom.components.masonry.drawings import drawn as drawn
 from rom.components.masonry.histories import Table as Table
 from rom.components.masonry.histories import ramp as ramp
 from rom.components.masonry.histories import read_record as read_record

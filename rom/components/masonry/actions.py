@@ -378,7 +378,7 @@ def _place(name: str, masonry: Masonry, stone: int, x: Array) -> tuple[Index, Ar
     if far[k] < ON_EDGE_RTOL * np.ptp(corners):
         o = (k + 1) % len(corners)
         return first + np.array([k, o, o]), np.array([1 - w[k], w[k], 0.0])
-    if not _inside(corners, x):
+    if not is_inside(corners, x):
         raise ConfigError(
             f"{name} at {x.tolist()} lies {far[k]:.4g} m outside of stone {stone}.",
             hint="Give a point in or on the stone, where it lies at the start.",
@@ -389,7 +389,7 @@ def _place(name: str, masonry: Masonry, stone: int, x: Array) -> tuple[Index, Ar
     return first + simplex.astype(np.int64), share
 
 
-def _inside(corners: Array, x: Array) -> bool:
+def is_inside(corners: Array, x: Array) -> bool:
     """Whether a ray to the right crosses the outline an odd number of times."""
     a, b = corners, np.roll(corners, -1, axis=0)
     spans = (a[:, 1] > x[1]) != (b[:, 1] > x[1])

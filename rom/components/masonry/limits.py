@@ -129,38 +129,45 @@ def wall(
     courses: int,
     *,
     brick: tuple[float, float] = (0.5, 0.25),
-    opening: tuple[float, float, int, int] | None = None,
+    openings: Sequence[tuple[float, float, int, int]] = (),
     rock: Rock | None = None,
 ) -> Masonry:
-    """Wall in running bond on held ground, the first stone; with an opening under one long lintel.
+    """Wall in running bond on held ground, the first stone; each opening is under one long lintel.
+
+    Lintels bear on half a brick at either end.
 
     Args:
         length: a multiple of half a brick [m].
         courses: number of courses.
         brick: length and height of a brick [m].
-        opening: left and right end [m], first course and the course of the lintel.
+        openings: left and right end [m], first course and the course of the lintel of each.
         rock: material and joints; the default is hard stone.
 
     Raises:
-        ConfigError: if nothing of the wall is left, or the opening is not inside it.
+        ConfigError: if nothing of the wall is left, an opening is not inside it, or two meet.
     """
     rock, (b, h) = rock or Rock(), brick
     if not (length > 0 and courses >= 1 and min(brick) > 0):
         raise ConfigError(f"no wall is {length} m long with {courses} courses of bricks {brick}.")
-    if opening and not (0 < opening[0] < opening[1] < length and opening[2] <= opening[3]):
-        raise ConfigError(
-            f"the opening {opening} is not in a wall of {length} m.",
-            hint="Left end, right end [m], first course, course of the lintel.",
-        )
+    for opening in openings:
+        left, right, low, top = opening
+        if not (0 < left < right < length and 0 <= low <= top < courses):
+            raise ConfigError(
+                f"the opening {opening} is not in a wall of {length} m and {courses} courses.",
+                hint="Left end, right end [m], first course, course of the lintel.",
+            )
     stones = [rock.stone(_box(-b, length + b, -h, 0.0))]
     for r in range(courses):
+        holes = sorted((x - b / 2 * (r == top), y + b / 2 * (r == top), r == top)
+                       for x, y, low, top in openings if low <= r <= top)  # fmt: skip
+        if any(one[1] > other[0] + 1e-9 for one, other in pairwise(holes)):
+            raise ConfigError(f"in course {r} of the wall two of the openings {openings} meet.",
+                              hint="Leave a brick between two lintels.")  # fmt: skip
         cuts = np.r_[0.0, np.arange(b / 2 if r % 2 else b, length - 1e-9, b), length]
-        spans, hole = list(pairwise(cuts)), None
-        if opening and opening[2] <= r <= opening[3]:
-            bearing = b / 2 if r == opening[3] else 0.0
-            hole = opening[0] - bearing, opening[1] + bearing
-            spans = [s for x, y in spans for s in ((x, min(y, hole[0])), (max(x, hole[1]), y))]
-        spans += [hole] if hole and opening and r == opening[3] else []
+        spans = list(pairwise(cuts))
+        for x, y, _ in holes:
+            spans = [s for u, v in spans for s in ((u, min(v, x)), (max(u, y), v))]
+        spans += [(x, y) for x, y, is_lintel in holes if is_lintel]
         stones += [rock.stone(_box(x, y, r * h, r * h + h)) for x, y in spans if y > x + 1e-9]
     return rock.masonry(stones, (0,))
 

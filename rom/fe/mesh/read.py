@@ -126,12 +126,15 @@ class FlatMesh:
         points: (n, 2) coordinates [m].
         triangles: (t, 3) corners, counter-clockwise.
         curves: {name: (k, 2)} nodes of the sides of physical curves, the solid on the left.
+        surfaces: {name: (k,)} triangles of each plane surface; those of a physical surface of
+            several are numbered, "stone 1", "stone 2". Without physical ones, all there are.
         provenance: where the mesh comes from: path, sha256, parameters, versions.
     """
 
     points: Array
     triangles: Index
     curves: dict[str, Index]
+    surfaces: dict[str, Index]
     provenance: dict[str, Any]
 
     def nodes(self, name: str) -> Index:
@@ -188,7 +191,8 @@ def read_triangles(
     T = np.where((u[:, 0] * v[:, 1] < u[:, 1] * v[:, 0])[:, None], T[:, ::-1], T)
     curves = {name: _with_solid_on_left(arrays[f"facets {i}"], T)
               for i, name in enumerate(notes["facet_names"])}  # fmt: skip
-    return FlatMesh(X, T, curves, provenance | notes["provenance"])
+    surfaces = {name: arrays[f"surface {i}"] for i, name in enumerate(notes["surface_names"])}
+    return FlatMesh(X, T, curves, surfaces, provenance | notes["provenance"])
 
 
 def _with_solid_on_left(sides: Index, T: Index) -> Index:

@@ -236,6 +236,58 @@ def test_a_block_follows_the_exact_rocking_motion_under_a_sine():
     assert_allclose(theta, exact.sol(motion.t[late])[0], atol=0.02 * np.abs(theta).max())
 
 
+def overturns(a, T):
+    """Whether a rigid slender block tips under one cycle of a sine, by the nonlinear equation.
+
+    At each impact it keeps 1 - 3/2 sin^2 alpha of its speed (Housner). Returns impacts before too.
+    """
+    t, y, side, impacts = T / (2 * np.pi) * np.arcsin(np.tan(ALPHA) * G / a), (0.0, 0.0), 1.0, 0
+
+    def rate(t, y, side):
+        pulse = a / G * np.sin(2 * np.pi * t / T) * (t <= T)
+        lever = side * ALPHA - y[0]
+        return y[1], P**2 * (pulse * np.cos(lever) - np.sin(lever))
+
+    def lands(t, y, side):
+        return side * y[0] + 1e-9
+
+    def falls(t, y, side):
+        return abs(y[0]) - 2 * ALPHA
+
+    lands.terminal, lands.direction, falls.terminal = True, -1, True
+    while impacts < 8:
+        course = solve_ivp(rate, (t, 6.0), y, rtol=1e-8, atol=1e-11, events=[lands, falls],
+                           max_step=0.02, args=(side,))  # fmt: skip
+        if not len(course.t_events[0]):
+            return len(course.t_events[1]) > 0, impacts
+        t, side, impacts = course.t[-1], -side, impacts + 1
+        y = (side * 1e-9, course.y[1, -1] * (1 - 1.5 * np.sin(ALPHA) ** 2))
+    return False, impacts
+
+
+@pytest.mark.parametrize("frequency", [4.0, 5.0, 6.0])
+def test_a_block_tips_after_an_impact_as_housner_loses_speed(frequency):
+    """One cycle of a sine, smallest acceleration that tips; it falls to the other side."""
+    T, low, high = 2 * np.pi / (frequency * P), 1.3, 4.0
+    while high - low > 5e-3:
+        x = (low + high) / 2
+        low, high = (low, x) if overturns(x * np.tan(ALPHA) * G, T)[0] else (x, high)
+    assert overturns(high * np.tan(ALPHA) * G, T) == (True, 1)
+    for factor, falls in ((1.04, True), (0.96, False)):
+        assert tips(sine(factor * high * np.tan(ALPHA) * G, T, cycles=1)) is falls
+
+
+def test_a_support_that_parts_lets_its_stone_fall_and_catches_it():
+    """Drawn away at 2 g for 0.2 s: free fall by g t^2 / 2, then it lies on the support again."""
+    model, T = on_the_ground(stone(box(), **SOFT)), 0.2
+    away = SupportMotion((0,), (0.0, -G * T**2), history=lambda t: np.minimum(t / T, 1.0) ** 2)
+    motion = simulate(model, t_end=2.0, dt=1e-3, actions=[away], keep=1.0)
+    flight = (motion.t > 0.05) & (motion.t < 0.28)
+    fallen = motion.q[0, 1, 1] - motion.q[:, 1, 1]
+    assert_allclose(fallen[flight], G * motion.t[flight] ** 2 / 2, atol=2e-3)
+    assert fallen[-1] == pytest.approx(G * T**2, abs=0.01)
+
+
 def four_hinges(model, x, n):
     """Smallest factor of a weight on joint x among mechanisms of four hinges, by virtual work."""
     best = np.inf

@@ -1,4 +1,4 @@
-"""From an open gmsh model to flat triangles and named curves; runs in the child process."""
+"""From an open gmsh model to flat triangles, curves and surfaces; runs in the child process."""
 
 from typing import Any
 
@@ -22,6 +22,7 @@ def triangles(gmsh: Any) -> Read:
     order = np.argsort(tags, kind="stable")
     tags, points = tags[order].astype(np.int64), x.reshape(-1, 3)[order]
     cells, ids = _cells(gmsh, tags)
+    surfaces = _surfaces(gmsh, ids)
     used, cells = np.unique(cells, return_inverse=True)
     points, cells = points[used], cells.reshape(-1, 3)
     extent = np.ptp(points, axis=0)
@@ -34,8 +35,11 @@ def triangles(gmsh: Any) -> Read:
         gmsh.model.getPhysicalName(dim, tag) or f"curve_{tag}": _lines(gmsh, tag, tags, place)
         for dim, tag in gmsh.model.getPhysicalGroups(1)
     }
-    return packed(points, cells, "tri3", np.ones(len(cells), dtype=int), ids, facets=curves,
-                  region_names={1: "body"}, warnings=[])  # fmt: skip
+    arrays, notes = packed(
+        points, cells, "tri3", np.ones(len(cells), dtype=int), ids, facets=curves,
+        region_names={1: "body"}, surface_names=list(surfaces), warnings=[],
+    )  # fmt: skip
+    return arrays | {f"surface {i}": rows for i, rows in enumerate(surfaces.values())}, notes
 
 
 def _cells(gmsh: Any, tags: Index) -> tuple[Index, Index]:
@@ -49,6 +53,25 @@ def _cells(gmsh: Any, tags: Index) -> tuple[Index, Index]:
         raise MeshError("there are no triangles: the geometry has no plane surface.",
                         hint="Add Plane Surface(1) = {...};")  # fmt: skip
     return np.searchsorted(tags, nodes[0].astype(np.int64)).reshape(-1, 3), ids[0].astype(np.int64)
+
+
+def _surfaces(gmsh: Any, ids: Index) -> dict[str, Index]:
+    """Triangles of each plane surface: those of physical ones if there are any, or of all."""
+    named: dict[str, int] = {}
+    for dim, tag in gmsh.model.getPhysicalGroups(2):
+        parts = [int(part) for part in gmsh.model.getEntitiesForPhysicalGroup(dim, tag)]
+        name = gmsh.model.getPhysicalName(dim, tag) or f"surface_{tag}"
+        single = len(parts) == 1
+        named |= {name if single else f"{name} {k}": part for k, part in enumerate(parts, 1)}
+    named = named or {f"surface {tag}": tag for _, tag in gmsh.model.getEntities(2)}
+    order = np.argsort(ids, kind="stable")
+    return {name: order[np.searchsorted(ids[order], _triangle_ids(gmsh, tag))]
+            for name, tag in named.items()}  # fmt: skip
+
+
+def _triangle_ids(gmsh: Any, surface: int) -> Index:
+    found = gmsh.model.mesh.getElements(2, surface)[1]
+    return np.concatenate([np.zeros(0, dtype=np.int64), *(x.astype(np.int64) for x in found)])
 
 
 def _lines(gmsh: Any, tag: int, tags: Index, place: Array) -> Index:

@@ -1,0 +1,102 @@
+"""Stones from gmsh geometries; a vault on buttresses against the statics of its mechanism."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.optimize import brentq
+
+from cases.paths import ROOT
+from rom.components.masonry import Rock, drawn, simulate, stands
+from rom.errors import ConfigError, ModelError
+from rom.fe.mesh import read_triangles
+
+pytestmark = pytest.mark.fenicsx
+pytest.importorskip("gmsh", reason="stones are drawn in gmsh")
+R, T, H = 5.0, 0.8, 4.0
+
+
+def vault(**parameters):
+    mesh = read_triangles(ROOT / "meshes" / "buttressed_vault.geo", parameters=parameters)
+    return drawn(mesh.points, mesh.triangles, mesh.surfaces, held=("ground",), rock=Rock())
+
+
+def test_stones_of_a_vault_are_the_surfaces_with_their_corners():
+    """16 voussoirs, five courses a side, the ground; curved sides become chords, sectors grow."""
+    plain, fine = vault(), vault(chords=8.0)
+    assert len(plain.stones) == 27 and plain.held == (0,)
+    assert [len(s.outline) for s in plain.stones] == 27 * [4]
+    assert [len(s.outline) for s in fine.stones[1:17]] == 16 * [18]
+    for model, chords in ((plain, 1), (fine, 8)):
+        sector = np.sin(np.pi / 16 / chords) * 16 * chords / np.pi  # of its area, within chords
+        arch = sum(s.M[0, 0] for s in model.stones[1:17])
+        assert arch == pytest.approx(2000 * np.pi * R * T * sector, rel=1e-9)
+    course = plain.stones[17]
+    assert_allclose(course.outline.min(axis=0), [-4.6 - 2.4, 0.0], atol=1e-9)
+    assert_allclose(course.outline.max(axis=0), [-4.6, 0.8], atol=1e-9)
+
+
+def needed_width(model):
+    """Width at which a half tips about the outer foot of its buttress, hinges open in the vault.
+
+    The thrust at the outer face of the crown is the largest that hinges on the inner face ask for.
+    """
+    Ri, Ro = R - T / 2, R + T / 2
+    half = model.stones[9:17]
+    W, x = (np.array(v) for v in ([s.M[0, 0] for s in half], [s.centre[0] for s in half]))
+    thrust = 0.0
+    for k in range(1, 9):
+        angle = k * np.pi / 16
+        moment = (W[:k] * (Ri * np.sin(angle) - x[:k])).sum()
+        thrust = max(thrust, moment / (Ro - Ri * np.cos(angle)))
+
+    def spare(b):
+        return (W * (Ri + b - x)).sum() + 2000 * b * H * b / 2 - thrust * (H + Ro)
+
+    return brentq(spare, 0.1, 5.0)
+
+
+def test_a_buttress_tips_at_the_width_that_statics_says():
+    """Virtual work of Heyman's mechanism, linear programming, and motion: one width."""
+    b = needed_width(vault())
+    assert T < b < 2.4
+    assert stands(vault(b=1.0005 * b)) and not stands(vault(b=0.9995 * b))
+    for factor, stays in ((1.05, True), (0.95, False)):
+        motion = simulate(vault(b=factor * b), t_end=3.0, dt=2e-3, keep=0.97, save_every=1500)
+        assert bool(np.abs(motion.v[-1]).max() < 1e-4) is stays
+
+
+def square(side=1.0, at=(0.0, 0.0)):
+    return np.array([[0, 0], [side, 0], [side, side], [0, side]]) + np.asarray(at)
+
+
+def stones_of(*outlines):
+    """Squares of two triangles each."""
+    first = 4 * np.arange(len(outlines))[:, None]
+    T = np.hstack([first, first + 1, first + 2, first, first + 2, first + 3]).reshape(-1, 3)
+    return np.vstack(outlines), T, {f"stone {k}": [2 * k, 2 * k + 1] for k in range(len(outlines))}
+
+
+RING = [(0, 1, 5), (0, 5, 4), (1, 2, 6), (1, 6, 5), (2, 3, 7), (2, 7, 6), (3, 0, 4), (3, 4, 7)]
+
+
+@pytest.mark.parametrize(
+    ("drawing", "held", "words"),
+    [
+        (stones_of(square(), square(at=(0, 1.0))), ("floor",), r"held is 'floor', .* \['stone 0'"),
+        (stones_of(square(), square(at=(0, 0.4))), ("stone 0",), "'stone 0' and 'stone 1' overlap"),
+        (stones_of(square(), square(at=(0, 0.99))), ("stone 0",), "overlap by 0.01 m"),
+        (stones_of(square(), square(at=(0, 1.01))), ("stone 0",),
+         "'stone 1' touches no other; the nearest is 0.01 m away"),
+        (stones_of(square(), square(at=(0, 3.0))), ("stone 0",), "none is near"),
+        ((np.vstack([square(3.0), square(1.0, (1, 1))]), RING, {"ring": range(8)}), (),
+         "'ring' of 8 triangles is not one piece without holes: .* 4 of 8 sides"),
+        ((*stones_of(square(), square(at=(5, 0)))[:2], {"both": range(4)}), (),
+         "'both' of 4 triangles is not one piece"),
+        ((*stones_of(square())[:2], {"none": []}), (), "'none' of 0 triangles"),
+        ((*stones_of(square())[:2], {"far": [2]}), (), "stone 'far': numbers from 2 to 2, of 2"),
+        ((square(), [(0, 1, 4)], {"far": [0]}), (), "triangles: numbers from 0 to 4, of 4"),
+    ],
+)  # fmt: skip
+def test_drawings_that_are_no_masonry_are_named(drawing, held, words):
+    with pytest.raises((ConfigError, ModelError), match=words):
+        drawn(*drawing, held=held)
