@@ -79,6 +79,10 @@ class YoungsModulus(Parameter):
 
     Raises:
         ParameterError: as `Parameter`.
+
+    Example:
+        >>> rom.YoungsModulus("web", low=0.5, high=2.0).high
+        2.0
     """
 
     __slots__ = ()
