@@ -2,7 +2,7 @@
 
 import logging
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Any, overload
@@ -30,7 +30,7 @@ from rom.eigen.substructuring import modes_up_to
 from rom.eigen.supports import Fixed, Springs, refuse_loose, spring_matrices, supports
 from rom.eigen.verbs import Operators, rigid_motions
 from rom.errors import ConfigError, InterfaceError
-from rom.model import Array, FEModel, Index, Modes
+from rom.model import Array, Basis, FEModel, Index, Modes
 from rom.names import check_name
 from rom.process.progress import MANY_DOFS, stages
 from rom.process.stopwatch import Stopwatch, stopwatch
@@ -321,11 +321,6 @@ def _reduced_body(  # noqa: PLR0913  those of `reduce`
         Psi = connection.ops.expand(basis.Psi)
         elastic = elastic_part(ops, Psi)
 
-    def left_out(markers: dict[str, Marker]) -> Array | None:
-        holds = {name: marker.hold for name, marker in markers.items()}
-        own = slice(ops.first // 3, (ops.first + ops.n_local) // 3)
-        return residual_motion(ops, connection, basis, holds, model.points[own])
-
     watch.begin("body")
     body = flexible_body(
         model,
@@ -334,12 +329,12 @@ def _reduced_body(  # noqa: PLR0913  those of `reduce`
         elastic,
         ties=connection.ties,
         name=name,
-        stress=left_out if stress else None,
+        stress=_left_out(model, ops, connection, basis) if stress else None,
         stiffening=UnitLoads(model, bare, ops, connection) if stiffening else None,
         provenance=model.provenance | {"reduction": _described(described, basis, ops.n)},
     )
     if nonlinear is None:
-        body = body.with_reference(reference)
+        body, E = body.with_reference(reference), None
     else:
         E = canonical_columns(bare, Psi @ elastic.V, model)
         body, E = at_large_deflection(body, reference, E, model, bare)
@@ -352,13 +347,26 @@ def _reduced_body(  # noqa: PLR0913  those of `reduce`
     watch.begin("comparison")
     say("compare the reduced body with the full model")
     certificate, comparison = certify_body(connection, ops, body, basis, elastic)
-    if nonlinear is not None:
+    if nonlinear is not None and E is not None:
         rows, deflections = deflection_rows(nonlinear, model, connection, body, E)
         certificate = replace(certificate, rows=(*certificate.rows, *rows))
         body.provenance["large deflection"] = deflections
     return replace(
         body, certificate=certificate, provenance=body.provenance | {"comparison": comparison}
     )
+
+
+def _left_out(
+    model: FEModel, ops: Operators, connection: Connection, basis: Basis
+) -> Callable[[dict[str, Marker]], Array | None]:
+    """The function of the markers that gives the motion which the basis leaves out."""
+
+    def motion(markers: dict[str, Marker]) -> Array | None:
+        holds = {name: marker.hold for name, marker in markers.items()}
+        own = slice(ops.first // 3, (ops.first + ops.n_local) // 3)
+        return residual_motion(ops, connection, basis, holds, model.points[own])
+
+    return motion
 
 
 def _chosen(method: Any, model: FEModel, connection: Connection, reference: Any) -> Any:

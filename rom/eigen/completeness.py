@@ -25,6 +25,7 @@ N_TOGETHER = 3  # members of one frequency that are left to a count
 CLUSTER_RTOL = 1e-4  # relative distance of eigenvalues that count as one frequency
 ACCURATE_RTOL = 1e-7  # residual of a Ritz value that counts as found
 LEAST_SHARE = 0.05  # variance of a component of W: eigenvalues of diag(M)^-1 M are larger
+MAX_MISS_PROBABILITY = 1e-9  # beyond it a search goes on, or modes are counted
 SAFETY_FACTOR = 100.0  # on c^2, for Ritz vectors that are not exact
 MAX_POWER = 8  # of theta in the polynomials tried
 

@@ -9,7 +9,6 @@ from rom.fe.operators.place import moves_most
 from rom.model import Array, Index
 
 RIGID_RTOL = 1e-13  # eigenvalue of a motion without stiffness, of the largest one
-
 COARSE_RTOL = 1e-2  # residual of solutions that only show whether there is stiffness
 
 

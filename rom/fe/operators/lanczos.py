@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from scipy.linalg.blas import dgemm
 
-from rom.eigen.completeness import miss_probability
+from rom.eigen.completeness import MAX_MISS_PROBABILITY, miss_probability
 from rom.errors import SolverError
 from rom.fe.operators.spectrum import gaussian_block
 from rom.model import Array
@@ -21,7 +21,6 @@ MAX_EXTRA_BLOCKS = 20  # beside the modes sought before a restart; twenty are se
 MAX_RESTARTS = 20  # after which the method has failed
 MAX_FURTHER_BLOCKS = 6  # beyond convergence, for a proof; more cost as much as a count
 LOOK_GROWTH = 1.04  # of the space between two looks, which cost the cube of its size
-MAX_MISS_PROBABILITY = 1e-9
 EIGENVALUE_RTOL = 1e-9  # residual of an eigenvalue of the inverse
 SPARE_EIGENVALUE_RTOL = 1e-5  # the same for spare ones; the error of the eigenvalue is its square
 

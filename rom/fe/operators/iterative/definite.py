@@ -32,7 +32,7 @@ from typing import Any
 
 import numpy as np
 
-from rom.eigen.completeness import log_chebyshev
+from rom.eigen.completeness import MAX_MISS_PROBABILITY, log_chebyshev
 from rom.fe.operators.factor import dense_rows
 from rom.fe.operators.iterative.gradients import ConjugateGradients
 from rom.fe.operators.iterative.recurrence import Recurrence
@@ -45,7 +45,6 @@ N_BOUND_STEPS = 40  # for the least eigenvalue of P K
 LEAST_MARGIN = 0.5  # on that eigenvalue, which is found from above
 LARGEST_MARGIN = 1.05  # on the largest one, which is found from below
 LEAST_SHARE = 0.03  # of v^T M v in v^T diag(M) v: 27 nodes of a cell can add up, no more
-MAX_MISS_PROBABILITY = 1e-9
 GAP_SHARE = 0.8  # of the gap above the last mode, where the shift lies
 
 
