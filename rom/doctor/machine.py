@@ -11,9 +11,8 @@ import numpy as np
 
 from rom.doctor.core import abilities, better, taken_for
 from rom.doctor.probes import Finding
-from rom.fe.probe import mapped_files
 from rom.places import PACKAGE
-from rom.process.memory import free_bytes
+from rom.process.memory import free_bytes, mapped_files
 
 BLAS_FILE = re.compile(r"/lib(blas|openblas|scipy_openblas|mkl_rt|blis|flexiblas|cblas)[^/]*\.so")
 FAST_BLAS = re.compile(r"openblas|mkl|blis|atlas", re.IGNORECASE)

@@ -23,7 +23,7 @@ from rom.fe.jit import compiling
 from rom.fe.mesh.cad import Axis
 from rom.fe.mesh.curving import without_middles
 from rom.fe.mesh.solid import SolidMesh
-from rom.fe.operators.aij import symmetric, wrapped
+from rom.fe.operators.aij import symmetric, without_zeros, wrapped
 from rom.fe.operators.foreseen import automatic
 from rom.fe.operators.memory import give_back
 from rom.fe.operators.petsc import PETScOperators
@@ -201,6 +201,7 @@ def _finish(K: PETSc.Mat, M: PETSc.Mat, points: Array, fields: dict[str, Any]) -
     first, end = K.getOwnershipRange()
     rigid = rigid_motions(points[first // 3 : end // 3])
     if K.comm.size > 1:
+        M = without_zeros(M)
         return FEModel(K, M, points, operators=PETScOperators(K, M, rigid), **fields)
     A, B = symmetric(K), symmetric(M)
     K.destroy()

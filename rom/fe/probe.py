@@ -12,6 +12,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from rom.process.memory import mapped_files
+
 
 def main(arguments: list[str]) -> None:
     """Write one JSON line per library."""
@@ -111,15 +113,6 @@ def _forms(fix: bool) -> dict[str, Any]:
     stale = clear_stale_cache() if fix else stale_sources()
     writable = os.access(path if path.exists() else Path.home(), os.W_OK)
     return {"path": str(path), "stale": [str(s) for s in stale], "writable": writable}
-
-
-def mapped_files() -> list[str]:
-    """Shared libraries this process has loaded; empty where the system does not tell."""
-    try:
-        lines = Path("/proc/self/maps").read_text().splitlines()
-    except OSError:
-        return []
-    return sorted({line.split()[-1] for line in lines if ".so" in line})
 
 
 if __name__ == "__main__":

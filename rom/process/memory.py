@@ -1,4 +1,4 @@
-"""How much memory there is, and how much of it this process may still take."""
+"""How much memory there is, how much of it this process may still take, and what it has mapped."""
 
 import os
 import resource
@@ -34,6 +34,15 @@ def free_bytes() -> float:
 def peak_bytes() -> int:
     """Largest memory of this process so far [bytes]; Linux counts in units of 1024."""
     return 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+
+
+def mapped_files() -> list[str]:
+    """Shared libraries this process has loaded; empty where the system does not tell."""
+    try:
+        lines = Path("/proc/self/maps").read_text().splitlines()
+    except OSError:
+        return []
+    return sorted({line.split()[-1] for line in lines if ".so" in line})
 
 
 def machine_free_bytes() -> float:

@@ -153,6 +153,8 @@ ORDER = {
         "aij",
         "foreseen",
         "factor",
+        "mumps",
+        "substructured",
         "place",
         "held",
         "spectrum",

@@ -50,19 +50,33 @@ def wrapped(A: csr_matrix) -> PETSc.Mat:
     return PETSc.Mat().createAIJWithArrays(A.shape, csr, bsize=3, comm=MPI.COMM_SELF)
 
 
-def aij(A: csr_matrix, sizes: Any, comm: MPI.Comm) -> PETSc.Mat:
+def aij(A: csr_matrix, sizes: Any, comm: MPI.Comm, block_size: int = 1) -> PETSc.Mat:
     """The rows of this rank of a distributed matrix.
 
     Args:
         A: (n_local, columns) these rows.
         sizes: ((local, all) rows, (local, all) columns).
         comm: the ranks.
+        block_size: dofs of a node.
     """
     index = PETSc.IntType
     csr = (A.indptr.astype(index), A.indices.astype(index), A.data)
-    matrix = PETSc.Mat().createAIJ(size=sizes, csr=csr, comm=comm)
+    matrix = PETSc.Mat().createAIJ(size=sizes, bsize=block_size, csr=csr, comm=comm)
     matrix.assemble()
     return matrix
+
+
+def without_zeros(A: PETSc.Mat) -> PETSc.Mat:
+    """The same matrix, in which entries that are zero do not stand; A is spent.
+
+    In a mass two thirds are, those that couple two directions.
+    """
+    starts, columns, values = A.getValuesCSR()
+    rows = csr_matrix((values, columns, starts), shape=(starts.size - 1, A.getSize()[1]))
+    rows.eliminate_zeros()
+    B = aij(rows, A.getSizes(), A.comm.tompi4py(), A.getBlockSize())
+    A.destroy()
+    return B
 
 
 def chosen(dofs: Index, n: int, comm: MPI.Comm) -> PETSc.IS:

@@ -98,6 +98,11 @@ class Factor:
                 B.destroy(), Y.destroy()
         return X
 
+    def apply(self, b: PETSc.Vec, x: PETSc.Vec) -> None:
+        """One solution x for b."""
+        with piece(SOLUTION_PIECE):
+            self.factor.solve(b, x)
+
     def release(self) -> None:
         """Give the memory back now; PETSc would wait until all ranks collect their garbage."""
         self.ksp.destroy()

@@ -9,15 +9,16 @@ import numpy as np
 
 from rom.errors import SolverError
 from rom.fe.operators.factor import Factor
+from rom.fe.operators.substructured import SubstructuredFactor
 from rom.model import Array
-from rom.process.stopwatch import SEARCH_PIECE, SOLUTION_PIECE, piece
+from rom.process.stopwatch import SEARCH_PIECE, piece
 
 EIGENVALUE_RTOL = 1e-11  # SLEPc's residual, of the eigenvalue
 MAX_RESTARTS = 500
 
 
 def krylov_schur(
-    ops: Any, factor: Factor, sigma: float, deflated: Array, k: int
+    ops: Any, factor: Factor | SubstructuredFactor, sigma: float, deflated: Array, k: int
 ) -> tuple[Array, Array]:
     """The k eigenvalues next to the shift, ascending, and their mass-normalised modes.
 
@@ -58,7 +59,7 @@ def krylov_schur(
     return pairs
 
 
-def factor_at_hand(factor: Factor) -> PETSc.KSP:
+def factor_at_hand(factor: Factor | SubstructuredFactor) -> PETSc.KSP:
     """A solver that applies a factor; given the factor's own, SLEPc would factor K - sigma M again.
 
     The second factor would cost as much as the first, and its work space would be what MUMPS
@@ -74,13 +75,12 @@ def factor_at_hand(factor: Factor) -> PETSc.KSP:
 class _Applied:
     """A factor as PETSc's preconditioner."""
 
-    def __init__(self, factor: Factor):
-        self.factor = factor.factor
+    def __init__(self, factor: Factor | SubstructuredFactor):
+        self.factor = factor
 
     def apply(self, pc: PETSc.PC, b: PETSc.Vec, x: PETSc.Vec) -> None:
         """Solve A x = b."""
-        with piece(SOLUTION_PIECE):
-            self.factor.solve(b, x)
+        self.factor.apply(b, x)
 
 
 def vector(A: Any, values: Array) -> Any:

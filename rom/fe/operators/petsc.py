@@ -34,6 +34,7 @@ from rom.fe.operators.memory import give_back
 from rom.fe.operators.place import moves_most
 from rom.fe.operators.solver import DIRECT_SOLVER, Solver
 from rom.fe.operators.spectrum import first_elastic, fixed_vector, settled, signed
+from rom.fe.operators.substructured import substructured
 from rom.model import Array, Index
 from rom.process.stopwatch import SEARCH_PIECE, piece
 
@@ -315,6 +316,9 @@ class PETScOperators:
                 raise ConfigError("the iterative solver needs the coordinates of the nodes.")
             return multigrid(A, near_null)
         check_factor_memory(A, n_columns, self.solver)
+        shared = substructured(A, self.solver)
+        if shared is not None:
+            return shared
         factor = Factor(A, definite=True, solver=self.solver)
         return refined(factor) if self.solver.low_rank and factor.ok else factor
 
@@ -346,9 +350,9 @@ class PETScOperators:
         if self.solver.iterative and isinstance(factor, ConjugateGradients):
             spare = min(N_SPARE_MODES, k - 1)
             return lowest_modes(self, factor, sigma, deflated, k - spare, spare)
-        if isinstance(factor, Factor):
-            return krylov_schur(self, factor, sigma, deflated, k)
-        return self.by_blocks(k - N_SPARE_MODES, sigma, factor, deflated)[:2]
+        if isinstance(factor, ConjugateGradients):
+            return self.by_blocks(k - N_SPARE_MODES, sigma, factor, deflated)[:2]
+        return krylov_schur(self, factor, sigma, deflated, k)
 
     @cached_property
     def mass_diagonal(self) -> Array:

@@ -1,0 +1,227 @@
+"""A factor that ranks share as substructures: each has its inside, all have the border between.
+
+MUMPS over two ranks gains little in the factorisation and nothing in solving few columns, for which
+it waits at every front of its tree. Insides need no other rank; what is left to agree on is one sum
+over the border for each solution.
+
+Source: Przemieniecki, Matrix structural analysis of substructures, AIAA J. 1 (1963) 138.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+from mpi4py import MPI
+from petsc4py import PETSc
+
+import numpy as np
+from scipy.linalg import LinAlgError, cho_factor, cho_solve
+from scipy.sparse import coo_matrix, csr_matrix
+
+from rom.fe.operators.factor import BLOCK_SIZE, MEMORY_ERRORS
+from rom.fe.operators.memory import allowed_bytes, give_back
+from rom.fe.operators.mumps import Inside, elimination_order, library
+from rom.fe.operators.solver import Solver
+from rom.model import Array, Index
+from rom.process.stopwatch import FACTORISATION_PIECE, FLOPS_NOTE, SOLUTION_PIECE, note, piece
+
+MAX_BORDER_RATIO = 1.0  # flops of the border, which every rank spends, over those of an inside
+MAX_CLIQUE_RATIO = 10.0  # pairs of nodes on a border over entries of the matrix: slow to order
+N_BORDER_MATRICES = 4  # (m, m) on a rank at once: of MUMPS, its own, the sum, and that on its way
+
+
+class SubstructuredFactor:
+    """K^-1 of a positive definite matrix whose rows lie on several ranks.
+
+    With i for the insides, which no entry joins, and b for the border,
+
+        S = K_bb - sum K_bi K_ii^-1 K_ib,  u_b = S^-1 (f_b - sum K_bi K_ii^-1 f_i),
+        u_i = K_ii^-1 (f_i - K_ib u_b).
+
+    Args:
+        A: the matrix.
+        split: its rows as insides and border.
+        inside: of this rank, analysed.
+
+    Attributes:
+        code: of MUMPS, the worst of all ranks.
+        ok: False when a part had no positive definite factor.
+    """
+
+    def __init__(self, A: PETSc.Mat, split: "Split", inside: Inside):
+        self.A, self.comm = A, A.comm.tompi4py()
+        self.split, self.inside = split, inside
+        with piece(FACTORISATION_PIECE):
+            complement = inside.factor()
+            self.code = self.comm.allreduce(inside.code, op=MPI.MIN)
+            self.ok = self.code >= 0 and self._factor_border(complement)
+        note(FLOPS_NOTE, inside.flops)
+
+    def _factor_border(self, complement: Array) -> bool:
+        """Factor S; whether it is positive definite."""
+        split = self.split
+        S = split.K_border.toarray()
+        S[np.ix_(split.touched, split.touched)] += complement
+        self.comm.Allreduce(MPI.IN_PLACE, S)
+        try:
+            self.S = cho_factor(S, lower=True, overwrite_a=True)
+        except (LinAlgError, ValueError):  # the second where numbers are not finite
+            return False
+        return True
+
+    def solve(self, F: Array) -> Array:
+        """A^-1 F for (n_local, k) right-hand sides, in blocks."""
+        X = np.empty(F.shape, order="F")
+        for first in range(0, F.shape[1], BLOCK_SIZE):
+            columns = slice(first, min(first + BLOCK_SIZE, F.shape[1]))
+            with piece(SOLUTION_PIECE):
+                self._solve(F[:, columns], X[:, columns])
+        return X
+
+    def _solve(self, F: Array, X: Array) -> None:
+        """Fill (n_local, k) solutions X."""
+        split = self.split
+        loads = np.zeros((split.K_border.shape[0], F.shape[1]))
+        half, loads[split.touched] = self.inside.reduced(F[split.inside])
+        loads[split.place] += F[split.mine]
+        self.comm.Allreduce(MPI.IN_PLACE, loads)
+        U = cho_solve(self.S, loads, check_finite=False)
+        X[split.inside] = self.inside.expanded(half, U[split.touched])
+        X[split.mine] = U[split.place]
+
+    def apply(self, b: PETSc.Vec, x: PETSc.Vec) -> None:
+        """One solution x for b."""
+        x.array[:] = self.solve(b.array_r[:, None])[:, 0]
+
+    def release(self) -> None:
+        """Give the memory back now."""
+        self.inside.release()
+        self.S = None
+        give_back()
+
+
+@dataclass(frozen=True, slots=True)
+class Split:
+    """Rows of a distributed matrix: insides that no entry joins, one on each rank, and a border.
+
+    Attributes:
+        inside: (n_inside,) rows of this rank's inside, local numbers.
+        mine: (m_local,) the other rows of this rank, local numbers.
+        place: (m_local,) where these stand among the m of the border, which are in order of ranks.
+        touched: (t,) places in the border that this inside is joined to.
+        K_border: (m, m) the rows of K_bb that are this rank's, the others zero.
+        K_inside: (n_inside + t,) * 2 matrix [K_ii, K_ib; ., 0], of K_ii the upper triangle.
+    """
+
+    inside: Index
+    mine: Index
+    place: Index
+    touched: Index
+    K_border: csr_matrix
+    K_inside: coo_matrix
+
+
+def substructured(A: PETSc.Mat, solver: Solver) -> SubstructuredFactor | None:
+    """The factor of a positive definite matrix; None where that of MUMPS over ranks is better.
+
+    It is where the factor is to be compressed or on disk, where the border is large, as between
+    many ranks, where a rank has no inside, and where MUMPS cannot be called directly.
+    """
+    comm = A.comm.tompi4py()
+    if comm.size == 1 or solver.out_of_core or solver.low_rank:
+        return None
+    module = library(comm)
+    if module is None:
+        return None
+    with piece(FACTORISATION_PIECE):
+        split = divided(A)
+        inside = None if split is None else _analysed(module, split, A.getBlockSize())
+        if split is None or not _pays(split, inside, comm) or inside is None:
+            return None
+    factor = SubstructuredFactor(A, split, inside)
+    if factor.code in MEMORY_ERRORS:
+        factor.release()
+        return None
+    return factor
+
+
+def _analysed(module: Any, split: Split, block_size: int) -> Inside | None:
+    """The inside of this rank with its order of elimination, found for whole nodes."""
+    K, m = split.K_inside, split.touched.size
+    n_blocks = K.shape[0] // block_size
+    if (m // block_size) ** 2 > MAX_CLIQUE_RATIO * K.nnz / block_size**2:
+        return None
+    pattern = coo_matrix(
+        (np.ones(K.nnz), (K.row // block_size, K.col // block_size)), shape=(n_blocks, n_blocks)
+    ).tocsr()
+    places = elimination_order(module, pattern + pattern.T, m // block_size)
+    if places is None:
+        return None
+    dofs = block_size * places[:, None] + np.arange(block_size)
+    return Inside(module, K, m, dofs.ravel())
+
+
+def _pays(split: Split, inside: Inside | None, comm: MPI.Comm) -> bool:
+    """Whether the border is cheap and all of it fits, by the analysis."""
+    m, allowed = split.K_border.shape[0], allowed_bytes(comm)
+    flops, need = 0.0, np.inf
+    if inside is not None and inside.code >= 0:
+        flops, need = inside.flops, inside.bytes + 8.0 * N_BORDER_MATRICES * m**2
+    cheap = m**3 / 3 <= MAX_BORDER_RATIO * comm.allreduce(flops, op=MPI.MAX)
+    return bool(comm.allreduce(cheap and need <= allowed, op=MPI.LAND))
+
+
+def divided(A: PETSc.Mat) -> Split | None:
+    """The parts of a symmetric matrix; None if a rank has no inside, or one that stands alone."""
+    comm, (first, end) = A.comm.tompi4py(), A.getOwnershipRange()
+    starts, columns, values = A.getValuesCSR()
+    K = csr_matrix((values, columns, starts), shape=(end - first, A.getSize()[1]))
+    cover = covering(K, first, comm)
+    cover = np.repeat(cover.reshape(-1, A.getBlockSize()).any(axis=1), A.getBlockSize())
+    mine, inside = np.flatnonzero(cover), np.flatnonzero(~cover)
+    border = np.concatenate(comm.allgather(first + mine))
+    K_ib, K_ii = K[inside][:, border], K[inside][:, first + inside]
+    touched = np.unique(K_ib.indices)
+    if not comm.allreduce(bool(inside.size and touched.size), op=MPI.LAND):
+        return None
+    place = np.searchsorted(border, first + mine)
+    rows = csr_matrix((np.ones(mine.size), (place, mine)), shape=(border.size, K.shape[0]))
+    K_border = (rows @ K)[:, border]
+    return Split(inside, mine, place, touched, K_border, _beside(K_ii, K_ib[:, touched]))
+
+
+def covering(K: csr_matrix, first: int, comm: MPI.Comm) -> Index:
+    """(n_local,) whether a row belongs to the border.
+
+    Of two rows of different ranks that an entry joins, it is the one joined to more of other ranks:
+    a node on the faces between two ranks sees half of its neighbours there, the next ones few.
+
+    Args:
+        K: (n_local, n) rows of this rank.
+        first: number of the first.
+        comm: the ranks.
+    """
+    n_local = K.shape[0]
+    elsewhere = (K.indices < first) | (K.indices >= first + n_local)
+    row = np.repeat(np.arange(n_local), np.diff(K.indptr))[elsewhere]
+    column = K.indices[elsewhere]
+    degree = np.bincount(row, minlength=n_local)
+    ends = np.flatnonzero(degree)
+    degrees = np.zeros(K.shape[1], dtype=np.int64)
+    degrees[np.concatenate(comm.allgather(first + ends))] = np.concatenate(
+        comm.allgather(degree[ends])
+    )
+    there = degrees[column]
+    wins = (degree[row] > there) | ((degree[row] == there) & (column < first))
+    cover = np.zeros(n_local, dtype=bool)
+    cover[row[wins]] = True
+    return cover
+
+
+def _beside(K_ii: csr_matrix, K_ib: csr_matrix) -> coo_matrix:
+    """The upper triangle of [K_ii, K_ib; ., 0]."""
+    A, B = K_ii.tocoo(), K_ib.tocoo()
+    upper, n, m = A.row <= A.col, A.shape[0], B.shape[1]
+    row, column = np.concatenate([A.row[upper], B.row]), np.concatenate([A.col[upper], n + B.col])
+    return coo_matrix(
+        (np.concatenate([A.data[upper], B.data]), (row, column)), shape=(n + m, n + m)
+    )

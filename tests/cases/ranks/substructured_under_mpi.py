@@ -1,0 +1,105 @@
+"""Under mpirun: `substructured_under_mpi.py RESULT` writes as JSON how far the factor that ranks
+share is from dense solutions, and which matrices it refuses."""
+
+import json
+import sys
+from pathlib import Path
+
+from mpi4py import MPI
+
+import numpy as np
+from scipy.sparse import csr_matrix, diags, identity, kron, random
+
+from rom.fe.operators.aij import aij
+from rom.fe.operators.solver import DIRECT_SOLVER, Solver
+from rom.fe.operators.substructured import divided, substructured
+
+COMM = MPI.COMM_WORLD
+
+
+def chain(n, width, rng):
+    """Dofs in rows of some width, three to a node, stiff only to their neighbours."""
+    line = diags([-1.0, 2.1, -1.0], [-1, 0, 1], shape=(n, n))
+    across = random(width, width, 0.2, random_state=rng)
+    node = rng.standard_normal((3, 3))
+    return kron(
+        kron(line, identity(width) + 0.05 * (across + across.T)), node @ node.T + 3.0 * np.eye(3)
+    )
+
+
+def distributed(K, block_size=3):
+    """The rows of this rank, whole nodes, more on the last ones."""
+    n = K.shape[0]
+    nodes = np.array([n // block_size * k * (k + 1) // (COMM.size * (COMM.size + 1))
+                      for k in range(COMM.size + 1)])  # fmt: skip
+    first, end = block_size * nodes[COMM.rank], block_size * nodes[COMM.rank + 1]
+    local = end - first
+    return aij(csr_matrix(K)[first:end], ((local, n), (local, n)), COMM, block_size), first, end
+
+
+def error(K, A, first, end, rng):
+    """Of forty solutions, over the largest."""
+    F = rng.standard_normal((K.shape[0], 40))
+    factor = substructured(A, DIRECT_SOLVER)
+    if factor is None or not factor.ok:
+        return None
+    exact = np.linalg.solve(K.toarray(), F)
+    X = factor.solve(np.asfortranarray(F[first:end]))
+    x, b = A.createVecs()
+    b.array[:] = F[first:end, 0]
+    factor.apply(b, x)
+    factor.release()
+    gap = max(np.abs(X - exact[first:end]).max(), np.abs(x.array - exact[first:end, 0]).max())
+    return COMM.allreduce(gap, op=MPI.MAX) / np.abs(exact).max()
+
+
+def joined(A):
+    """Entries between the insides of different ranks, of which there must be none."""
+    split, (first, _) = divided(A), A.getOwnershipRange()
+    inside = np.concatenate(COMM.allgather(first + split.inside))
+    owner = np.repeat(np.arange(COMM.size), COMM.allgather(split.inside.size))
+    starts, columns, values = A.getValuesCSR()
+    rows = csr_matrix((values, columns, starts), shape=(starts.size - 1, A.getSize()[1]))
+    return int(COMM.allreduce(rows[split.inside][:, inside[owner != COMM.rank]].nnz))
+
+
+def refused(K):
+    """Whether a matrix that is not positive definite is said to be none, or answers show it."""
+    A, first, end = distributed(csr_matrix(K))
+    factor = substructured(A, DIRECT_SOLVER)
+    if not factor.ok:
+        return True
+    X = factor.solve(np.asfortranarray(np.eye(K.shape[0])[first:end, :6]))
+    return bool(COMM.allreduce(np.abs(X).max(), op=MPI.MAX) > 1e10)
+
+
+def main(path):
+    rng = np.random.default_rng(3)
+    found = {"errors": [], "joined": []}
+    for block_size, width in ((3, 4), (3, 9), (1, 4), (1, 2)):
+        K = csr_matrix(chain(40, width, rng))
+        A, first, end = distributed(K, block_size)
+        found["errors"].append(error(K, A, first, end, rng))
+        found["joined"].append(joined(A))
+    K = csr_matrix(chain(40, 4, rng))
+    A, *_ = distributed(K)
+    for name, solver in (
+        ("on disk", Solver(out_of_core=True)),
+        ("low rank", Solver(low_rank=1e-8)),
+    ):
+        found[name] = substructured(A, solver) is None
+    found["full"] = (
+        substructured(distributed(csr_matrix(np.ones((60, 60))))[0], DIRECT_SOLVER) is None
+    )
+    apart = csr_matrix(kron(identity(COMM.size * (COMM.size + 1) // 2), chain(8, 2, rng)))
+    found["apart"] = substructured(distributed(apart)[0], DIRECT_SOLVER) is None
+    loose = diags([-1.0, 2.0, -1.0], [-1, 0, 1], shape=(40, 40)).tolil()
+    loose[0, 0] = loose[-1, -1] = 1.0  # free at both ends
+    found["loose"] = refused(kron(loose, np.eye(6)))
+    found["negative"] = refused(-K)
+    if COMM.rank == 0:
+        Path(path).write_text(json.dumps(found))
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

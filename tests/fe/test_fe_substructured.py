@@ -1,0 +1,141 @@
+"""The factor that ranks share as substructures: beside dense solutions, and when it is not made."""
+
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.sparse import coo_matrix, csr_matrix, random, triu
+
+from cases.long import SHARED_BY
+from cases.paths import RANKS, ROOT
+from cases.ranks.environment import ENVIRONMENT
+from rom.process.mpirun import mpirun
+
+pytest.importorskip("dolfinx", reason="dolfinx is not installed")
+pytestmark = [pytest.mark.fenicsx, pytest.mark.mpi]
+SCRIPT = RANKS / "substructured_under_mpi.py"
+N_VERTICES, N_LAST = 60, 7
+
+
+@pytest.fixture(scope="module")
+def library():
+    from mpi4py import MPI
+
+    from rom.fe.operators import mumps
+
+    return mumps.library(MPI.COMM_SELF)
+
+
+@pytest.fixture(scope="module")
+def found(tmp_path_factory):
+    folder, answers = tmp_path_factory.mktemp("substructured"), {}
+    for n in SHARED_BY:
+        file = folder / f"{n}.json"
+        done = subprocess.run(
+            [*mpirun(n), sys.executable, str(SCRIPT), str(file)],
+            env=ENVIRONMENT, timeout=300, capture_output=True, text=True, check=False, cwd=ROOT,
+        )  # fmt: skip
+        assert file.exists(), done.stderr
+        answers[n] = json.loads(file.read_text())
+    return answers
+
+
+@pytest.mark.parametrize("n", SHARED_BY)
+def test_solutions_are_those_of_the_whole_matrix(found, n):
+    assert len(found[n]["errors"]) == 4
+    assert max(found[n]["errors"]) < 1e-12
+
+
+@pytest.mark.parametrize("n", SHARED_BY)
+def test_no_entry_joins_two_insides(found, n):
+    assert found[n]["joined"] == [0] * 4
+
+
+@pytest.mark.parametrize("n", SHARED_BY)
+@pytest.mark.parametrize("case", ["on disk", "low rank", "full", "apart"])
+def test_it_leaves_what_it_is_not_made_for_to_mumps(found, n, case):
+    assert found[n][case]
+
+
+@pytest.mark.parametrize("n", SHARED_BY)
+@pytest.mark.parametrize("case", ["loose", "negative"])
+def test_a_matrix_that_is_not_positive_definite_is_noticed(found, n, case):
+    assert found[n][case]
+
+
+def fill(pattern, places):
+    """Entries of the factor by elimination in a dense matrix of zeros and ones."""
+    order = np.argsort(places)
+    A = (pattern.toarray() != 0)[np.ix_(order, order)]
+    for k in range(len(A)):
+        below = k + 1 + np.flatnonzero(A[k + 1 :, k])
+        A[np.ix_(below, below)] = True
+    return np.tril(A, -1).sum()
+
+
+def generated(seed):
+    """A graph of some 150 edges, connected or not, whose last vertices are joined to each other."""
+    A = random(N_VERTICES, N_VERTICES, 0.04, random_state=seed)
+    end = np.arange(N_VERTICES - N_LAST, N_VERTICES)
+    clique = (np.ones(N_LAST**2), (np.tile(end, N_LAST), np.repeat(end, N_LAST)))
+    return csr_matrix(A + A.T + coo_matrix(clique, shape=A.shape) + np.eye(N_VERTICES))
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_given_unknowns_come_last_at_no_further_fill(library, seed):
+    """Beside the order of MUMPS itself, the entries of the factor counted by elimination."""
+    from rom.fe.operators import mumps
+
+    pattern = generated(seed)
+    places = mumps.elimination_order(library, pattern, N_LAST)
+    assert sorted(places) == list(range(N_VERTICES))
+    assert_allclose(places[-N_LAST:], np.arange(N_VERTICES - N_LAST, N_VERTICES))
+    own = mumps._Instance(library, triu(pattern, format="coo"))
+    assert fill(pattern, places) <= fill(pattern, own.order())
+    own.release()
+
+
+def test_an_order_with_less_fill_is_not_found_by_chance(library):
+    """The count of fill tells a good order from one at random."""
+    from rom.fe.operators import mumps
+
+    pattern, rng = generated(0), np.random.default_rng(0)
+    places = mumps.elimination_order(library, pattern, N_LAST)
+    at_random = [fill(pattern, rng.permutation(N_VERTICES)) for _ in range(20)]
+    assert fill(pattern, places) < 0.6 * min(at_random)
+
+
+@pytest.mark.parametrize("m", [1, 5, 30])
+def test_a_solution_in_two_halves_around_a_border(library, m):
+    from rom.fe.operators import mumps
+
+    rng, n = np.random.default_rng(m), 40
+    A = rng.standard_normal((n + m, n + m))
+    K = A @ A.T + np.eye(n + m)
+    K_ii, K_ib = K[:n, :n], K[:n, n:]
+    upper = np.triu(K)
+    upper[n:] = 0.0
+    places = np.concatenate([rng.permutation(n), np.arange(n, n + m)])
+    inside = mumps.Inside(library, coo_matrix(upper), m, places)
+    complement = -K_ib.T @ np.linalg.solve(K_ii, K_ib)
+    assert_allclose(np.tril(inside.factor()), np.tril(complement), atol=1e-9)
+    F, U = rng.standard_normal((n, 35)), rng.standard_normal((m, 35))
+    half, loads = inside.reduced(F)
+    assert_allclose(loads, -K_ib.T @ np.linalg.solve(K_ii, F), atol=1e-9)
+    assert_allclose(inside.expanded(half, U), np.linalg.solve(K_ii, F - K_ib @ U), atol=1e-9)
+    inside.release()
+    inside.release()
+
+
+def test_without_the_library_mumps_shares_the_factor_as_petsc_calls_it(monkeypatch):
+    from mpi4py import MPI
+
+    from rom.fe.operators import mumps
+
+    monkeypatch.setattr(mumps, "mapped_files", list)
+    assert mumps.library(MPI.COMM_SELF) is None
+    monkeypatch.setattr(mumps, "mapped_files", lambda: ["/nowhere/libdmumps.so"])
+    assert mumps.library(MPI.COMM_SELF) is None
