@@ -64,7 +64,7 @@ def test_a_buttress_tips_at_the_width_that_statics_says():
     assert T < b < 2.4
     assert stands(vault(b=1.0005 * b)) and not stands(vault(b=0.9995 * b))
     for factor, stays in ((1.05, True), (0.95, False)):
-        motion = simulate(vault(b=factor * b), t_end=3.0, dt=2e-3, keep=0.97, save_every=1500)
+        motion = simulate(vault(b=factor * b), t_end=3.0, dt=2e-3, damping=15.0, save_every=1500)
         assert bool(np.abs(motion.v[-1]).max() < 1e-4) is stays
 
 
@@ -123,7 +123,7 @@ def test_a_voussoir_in_space_takes_the_place_of_a_drawn_one(k):
     mixed = replace(drawing, stones=tuple(fine if i == k else s
                                           for i, s in enumerate(drawing.stones)))  # fmt: skip
     load = PointLoad(8, (0.0, H + R + T / 2), (0.0, -20e3), ramp(0.5))
-    one, other = (simulate(m, t_end=2.0, dt=2e-3, keep=0.97, save_every=1000, actions=[load])
+    one, other = (simulate(m, t_end=2.0, dt=2e-3, damping=15.0, save_every=1000, actions=[load])
                   for m in (drawing, mixed))  # fmt: skip
     assert np.abs(other.v[-1]).max() < 1e-6
     left = (k - 1, k) if k > 1 else (1, 21)
