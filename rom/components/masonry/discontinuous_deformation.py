@@ -277,8 +277,9 @@ def step(B, law, C, h, W):
 
 
 @inner
-def accept(B, law, C, h, keep, W):
-    """Move on by W.d: coordinates, velocities times ``keep``, anchors of what slipped, bonds."""
+def accept(B, law, C, h, damping, W):
+    """Move on by W.d: coordinates, velocities that die away, anchors of what slipped, bonds."""
+    kept = math.exp(-damping * h)
     for k in range(C.used[0]):
         if C.bond[k] >= 0 and C.state[k] != STICKS:
             law.bonds.intact[C.bond[k]] = 0
@@ -289,7 +290,7 @@ def accept(B, law, C, h, keep, W):
     for b in range(B.size.size):
         for p in range(B.size[b] if B.equation[b] >= 0 else 0):
             W.q[b, p] += W.d[b, p]
-            W.v[b, p] = keep * (2 * W.d[b, p] / h - W.v[b, p])
+            W.v[b, p] = kept * (2 * W.d[b, p] / h - W.v[b, p])
         for p in range(3 if B.equation[b] < 0 else 0):
             W.q[b, p] += W.d[b, p]
             W.v[b, p] = W.d[b, p] / h
@@ -329,7 +330,7 @@ def remember(C, old):
 
 
 @kernel
-def advance(B, law, C, old, W, h, drive, keep, cuts):  # noqa: PLR0913  all there is
+def advance(B, law, C, old, W, h, drive, damping, cuts):  # noqa: PLR0913  all there is
     """Make the steps of a drive from W.q, W.v; the energy at the end, NaN if one cannot be made.
 
     Steps that do not settle are cut by three, down to h / 3^8; ``cuts`` (1,) counts them.
@@ -349,7 +350,7 @@ def advance(B, law, C, old, W, h, drive, keep, cuts):  # noqa: PLR0913  all ther
                     return math.nan
                 find_contacts(B, law, W.q, old, C, W.P, W.T)
                 set_held(B, drive, n, part / h, W)
-            accept(B, law, C, part, keep ** (part / h), W)
+            accept(B, law, C, part, damping, W)
             done += part
             part *= STEP_FACTOR
     return energy(B, law, C, W)

@@ -38,7 +38,7 @@ LEFT_BEHIND = {
     "demo_isotropy": {"isotropy.png", "isotropy_compared.png"},
     "demo_large_mesh": {"housing_mesh.png", "housing_modes.png"},
     "demo_lost_tip": {"lost_tip.png"},
-    "demo_masonry": {"masonry.gif", "masonry.png"},
+    "demo_masonry": {"masonry.gif", "masonry.png", "masonry_vault.png"},
     "demo_mistuning": {"mistuning.png"},
     "demo_oil_inlet": {"oil_inlet.gif", "oil_inlet.png", "oil_inlet_static.png"},
     "demo_parameters": {"parameters.png"},
