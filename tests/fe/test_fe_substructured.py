@@ -45,23 +45,29 @@ def found(tmp_path_factory):
 
 @pytest.mark.parametrize("n", SHARED_BY)
 def test_solutions_are_those_of_the_whole_matrix(found, n):
-    assert len(found[n]["errors"]) == 4
+    assert len(found[n]["errors"]) == 5
     assert max(found[n]["errors"]) < 1e-12
 
 
 @pytest.mark.parametrize("n", SHARED_BY)
 def test_no_entry_joins_two_insides(found, n):
-    assert found[n]["joined"] == [0] * 4
+    assert found[n]["joined"] == [0] * 5
 
 
 @pytest.mark.parametrize("n", SHARED_BY)
-@pytest.mark.parametrize("case", ["on disk", "low rank", "full", "apart"])
+def test_the_border_is_small(found, n):
+    """One dof joined to ten of the next rank, at each of the n - 1 joints."""
+    assert found[n]["border of stars"] == n - 1
+
+
+@pytest.mark.parametrize("n", SHARED_BY)
+@pytest.mark.parametrize("case", ["on disk", "low rank", "full", "apart", "costly"])
 def test_it_leaves_what_it_is_not_made_for_to_mumps(found, n, case):
     assert found[n][case]
 
 
 @pytest.mark.parametrize("n", SHARED_BY)
-@pytest.mark.parametrize("case", ["loose", "negative"])
+@pytest.mark.parametrize("case", ["loose", "negative", "without stiffness"])
 def test_a_matrix_that_is_not_positive_definite_is_noticed(found, n, case):
     assert found[n][case]
 

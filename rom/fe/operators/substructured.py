@@ -156,8 +156,7 @@ def _analysed(module: Any, split: Split, block_size: int) -> Inside | None:
     places = elimination_order(module, pattern + pattern.T, m // block_size)
     if places is None:
         return None
-    dofs = block_size * places[:, None] + np.arange(block_size)
-    return Inside(module, K, m, dofs.ravel())
+    return Inside(module, K, m, _whole(places, block_size))
 
 
 def _pays(split: Split, inside: Inside | None, comm: MPI.Comm) -> bool:
@@ -175,18 +174,23 @@ def divided(A: PETSc.Mat) -> Split | None:
     comm, (first, end) = A.comm.tompi4py(), A.getOwnershipRange()
     starts, columns, values = A.getValuesCSR()
     K = csr_matrix((values, columns, starts), shape=(end - first, A.getSize()[1]))
-    cover = covering(K, first, comm)
-    cover = np.repeat(cover.reshape(-1, A.getBlockSize()).any(axis=1), A.getBlockSize())
+    block_size = A.getBlockSize()
+    cover = np.repeat(covering(K, first, comm).reshape(-1, block_size).any(axis=1), block_size)
     mine, inside = np.flatnonzero(cover), np.flatnonzero(~cover)
     border = np.concatenate(comm.allgather(first + mine))
     K_ib, K_ii = K[inside][:, border], K[inside][:, first + inside]
-    touched = np.unique(K_ib.indices)
+    touched = _whole(np.unique(K_ib.indices // block_size), block_size)
     if not comm.allreduce(bool(inside.size and touched.size), op=MPI.LAND):
         return None
     place = np.searchsorted(border, first + mine)
     rows = csr_matrix((np.ones(mine.size), (place, mine)), shape=(border.size, K.shape[0]))
     K_border = (rows @ K)[:, border]
     return Split(inside, mine, place, touched, K_border, _beside(K_ii, K_ib[:, touched]))
+
+
+def _whole(nodes: Index, block_size: int) -> Index:
+    """The dofs of nodes."""
+    return (block_size * nodes[:, None] + np.arange(block_size)).ravel()
 
 
 def covering(K: csr_matrix, first: int, comm: MPI.Comm) -> Index:

@@ -3,6 +3,7 @@ share is from dense solutions, and which matrices it refuses."""
 
 import json
 import sys
+from itertools import pairwise
 from pathlib import Path
 
 from mpi4py import MPI
@@ -63,14 +64,39 @@ def joined(A):
     return int(COMM.allreduce(rows[split.inside][:, inside[owner != COMM.rank]].nnz))
 
 
+def one_way(n):
+    """Nodes in a line, stiff to the ground, that only their first dofs join."""
+    line = diags([-1.0, -1.0], [-1, 1], shape=(n, n))
+    return csr_matrix(kron(line, diags([1.0, 0.0, 0.0])) + 3.0 * identity(3 * n))
+
+
+def star(first):
+    """Dofs in a line; the last of a rank is joined to ten of the next."""
+    n = 30 * COMM.size * (COMM.size + 1) // 2
+    K = diags([-1.0, 30.0, -1.0], [-1, 0, 1], shape=(n, n)).tolil()
+    for end in first[1:]:
+        K[end - 1, end : end + 10] = K[end : end + 10, end - 1] = 1.0
+    return K.tocsr()
+
+
+def costly(first):
+    """Each of fifty dofs joined to one of the next rank: a border as large as an inside."""
+    n = 60 * COMM.size * (COMM.size + 1) // 2
+    K = 30.0 * identity(n, format="lil")
+    for here, there in pairwise(first):
+        for k in range(50):
+            K[here + k, there + k] = K[there + k, here + k] = 1.0
+    return K.tocsr()
+
+
 def refused(K):
     """Whether a matrix that is not positive definite is said to be none, or answers show it."""
     A, first, end = distributed(csr_matrix(K))
     factor = substructured(A, DIRECT_SOLVER)
     if not factor.ok:
         return True
-    X = factor.solve(np.asfortranarray(np.eye(K.shape[0])[first:end, :6]))
-    return bool(COMM.allreduce(np.abs(X).max(), op=MPI.MAX) > 1e10)
+    X = factor.solve(np.asfortranarray(np.eye(K.shape[0])[first:end, :12]))
+    return not COMM.allreduce(np.abs(X).max(), op=MPI.MAX) < 1e10
 
 
 def main(path):
@@ -81,6 +107,16 @@ def main(path):
         A, first, end = distributed(K, block_size)
         found["errors"].append(error(K, A, first, end, rng))
         found["joined"].append(joined(A))
+    K = one_way(60)
+    A, first, end = distributed(K)
+    found["errors"].append(error(K, A, first, end, rng))
+    found["joined"].append(joined(A))
+    A, *_ = distributed(star([0] * COMM.size), 1)
+    A, *_ = distributed(star(A.getOwnershipRanges()[:-1]), 1)
+    found["border of stars"] = divided(A).K_border.shape[0]
+    A, *_ = distributed(costly([0] * COMM.size), 1)
+    A, *_ = distributed(costly(A.getOwnershipRanges()[:-1]), 1)
+    found["costly"] = substructured(A, DIRECT_SOLVER) is None
     K = csr_matrix(chain(40, 4, rng))
     A, *_ = distributed(K)
     for name, solver in (
@@ -97,6 +133,9 @@ def main(path):
     loose[0, 0] = loose[-1, -1] = 1.0  # free at both ends
     found["loose"] = refused(kron(loose, np.eye(6)))
     found["negative"] = refused(-K)
+    empty = K.tolil()
+    empty[7, :] = empty[:, 7] = 0.0
+    found["without stiffness"] = refused(empty)
     if COMM.rank == 0:
         Path(path).write_text(json.dumps(found))
 
