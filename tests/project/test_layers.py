@@ -147,6 +147,7 @@ ORDER = {
         "probe",
     ),
     "fe.operators": (
+        "costs",
         "solver",
         "memory",
         "disk",
