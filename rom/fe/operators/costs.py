@@ -15,6 +15,7 @@ PASS_SECONDS = 2.6e-9  # of a solution with six columns, per entry of the factor
 PASS_COLUMNS = 6
 PASSES_PER_MODE = 0.95  # of the search for 20 modes, measured
 SEARCH_SECONDS = 34e-9  # per dof and mode squared, measured for 20: vectors made orthogonal
+LEAST_SHARED_DOFS = 30_000  # one, two and three processes of two cores; above, sharing gains
 REST_SECONDS = 8e-6  # per dof: interfaces, energies, the body
 
 
