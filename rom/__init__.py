@@ -10,13 +10,13 @@ import os
 
 import rom.moved  # noqa: F401  old paths of modules
 from rom.lazy import front as _front
-from rom.process.launcher import one_thread_each as _one_thread_each
+from rom.process.launcher import share_the_machine as _share_the_machine
 
 # Empty is the default; it wins over a .numba_config.yaml in the working folder, by which Numba
 # would load compiled code from wherever that file says.
 for _name in ("NUMBA_CACHE_DIR", "NUMBA_CACHE_LOCATOR_CLASSES"):
     os.environ.setdefault(_name, "")
-_one_thread_each()
+_share_the_machine()
 
 __version__ = "0.1.0"
 

@@ -24,6 +24,7 @@ from rom.fe.mesh.cad import Axis
 from rom.fe.mesh.curving import without_middles
 from rom.fe.mesh.solid import SolidMesh
 from rom.fe.operators.aij import symmetric, without_zeros, wrapped
+from rom.fe.operators.costs import LEAST_SHARED_DOFS, reduction_seconds
 from rom.fe.operators.foreseen import automatic
 from rom.fe.operators.memory import give_back
 from rom.fe.operators.petsc import PETScOperators
@@ -34,6 +35,7 @@ from rom.model import Array, Attachment, FEModel, Index, Interface, Material, Or
 log = logging.getLogger("rom")
 WHOLE_REGION = "solid"  # name of the only region of a mesh without named regions
 DEGREES = (1, 2, 3)
+SOME_COORDINATES, SOME_MODES = 12, 20  # of two stiff interfaces, for the time of a small model
 
 
 @typed
@@ -114,6 +116,7 @@ def model(
         attachments=attachments,
     )
     remarks = [*warnings, *made.provenance["warnings"]]
+    _advise(comm, made.n_dofs)
     how, why = automatic(made.operators) if method.automatic else (method, solver)
     if comm.rank == 0 and how != DIRECT_SOLVER and method.automatic:
         log.info("solved %s", why)
@@ -124,6 +127,17 @@ def model(
         provenance=provenance,
         interfaces={key: _on_axis(x, axes.get(key)) for key, x in made.interfaces.items()},
     )
+
+
+def _advise(comm: MPI.Comm, n: int) -> None:
+    """Say where a model is too small to be shared."""
+    if comm.rank == 0 and comm.size > 1 and n < LEAST_SHARED_DOFS:
+        seconds = reduction_seconds(n, SOME_COORDINATES, SOME_MODES)
+        log.warning(
+            f"{n} dofs are shared by {comm.size} processes; below {LEAST_SHARED_DOFS} one process "
+            f"is faster, and reduces them to {SOME_COORDINATES} interface coordinates and "
+            f"{SOME_MODES} modes in about {max(seconds, 0.1):.1f} s."
+        )
 
 
 def _on_axis(interface: Interface, axis: Axis | None) -> Interface:

@@ -14,6 +14,8 @@ from rom.errors import ParallelError, RomError
 from rom.process.launcher import ranks
 
 T = TypeVar("T")
+N_EAGER_TRIES = 100  # looks for a message that may come at once
+FIRST_SLEEP, LONGEST_SLEEP = 1e-5, 5e-3  # [s] between two looks for one that does not
 GRACE_PERIOD = 1.0  # [s] that other ranks leave rank 0 to print an error all of them have
 
 
@@ -90,11 +92,31 @@ def together(comm: MPI.Comm, function: Callable[[], T]) -> T:
     return value
 
 
+def meet(comm: MPI.Comm) -> None:
+    """Wait for all ranks asleep: MPI itself would wait for them in a busy loop.
+
+    Whoever comes first may wait for minutes, while one rank meshes or reads, on a machine whose
+    cores others need. A wait is prolonged by about its own length at most, and by `LONGEST_SLEEP`.
+
+    Args:
+        comm: the ranks; all of them must call.
+    """
+    if comm.size == 1:
+        return
+    met, tries, pause = comm.Ibarrier(), 0, FIRST_SLEEP
+    while not met.Test():
+        tries += 1
+        if tries > N_EAGER_TRIES:
+            time.sleep(pause)
+            pause = min(2.0 * pause, LONGEST_SLEEP)
+
+
 def _raise_together(comm: MPI.Comm, error: Exception | None) -> None:
     if comm.size == 1:
         if error is not None:
             raise error
         return
+    meet(comm)
     first_error = next(
         (e for e in comm.allgather(_portable(error, comm.rank)) if e is not None), None
     )

@@ -1,8 +1,10 @@
-"""What mpirun says to each process, and that each of them computes in one thread.
+"""What mpirun says to each process; each computes in one thread, and leaves its core when it waits.
 
 A BLAS that is not told otherwise takes all cores in every rank: ranks then wait for each other's
 threads. It reads its variables when it is loaded, so that this runs before NumPy is; a NumPy that
-came first is told by a call.
+came first is told by a call. Open MPI waits in a loop that keeps a core busy unless it is told to
+let others run, by a variable before it starts and by a call after that: it does not see by itself
+that a machine has other work, or that ranks of another mpirun are there.
 """
 
 # Of what Python has not loaded itself nothing is imported here, for the reason in `rom`.
@@ -12,6 +14,9 @@ import sys
 RANK_AND_SIZE = (("OMPI_COMM_WORLD_RANK", "OMPI_COMM_WORLD_SIZE"), ("PMI_RANK", "PMI_SIZE"))
 THREADS_VARIABLE = "OMP_NUM_THREADS"
 OTHER_VARIABLES = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "BLIS_NUM_THREADS")
+YIELD_VARIABLE = "OMPI_MCA_mpi_yield_when_idle"
+OPEN_MPI_FILE = r"/\S*libopen-pal\S*\.so\S*$"
+OPEN_MPI_CALLS = ("opal_progress_set_yield_when_idle",)
 OPENBLAS_FILE = r"/\S*openblas\S*\.so\S*$"
 OPENBLAS_CALLS = (  # each build has one of them
     "openblas_set_num_threads",
@@ -29,26 +34,34 @@ def ranks() -> tuple[int, int]:
     return 0, 1
 
 
-def one_thread_each() -> None:
-    """Under mpirun give this rank one thread, unless the user has chosen a number."""
-    chosen = any(name in os.environ for name in (THREADS_VARIABLE, *OTHER_VARIABLES))
-    if ranks()[1] == 1 or chosen:
+def share_the_machine() -> None:
+    """Under mpirun give this rank one thread, and let others run while it waits for messages.
+
+    What the user has chosen in a variable stays.
+    """
+    if ranks()[1] == 1:
         return
-    os.environ[THREADS_VARIABLE] = "1"
-    if "numpy" in sys.modules:
-        _tell_openblas()
+    if not any(name in os.environ for name in (THREADS_VARIABLE, *OTHER_VARIABLES)):
+        os.environ[THREADS_VARIABLE] = "1"
+        if "numpy" in sys.modules:
+            _tell(OPENBLAS_FILE, OPENBLAS_CALLS)
+    if YIELD_VARIABLE not in os.environ:
+        os.environ[YIELD_VARIABLE] = "1"
+        if "mpi4py.MPI" in sys.modules:
+            _tell(OPEN_MPI_FILE, OPEN_MPI_CALLS)
 
 
-def _tell_openblas() -> None:
+def _tell(file: str, calls: tuple[str, ...]) -> None:
+    """Call with 1 what a library that is loaded has of these functions."""
     import ctypes
     import re
 
     try:
-        with open("/proc/self/maps") as file:
-            lines = file.read().splitlines()
-        for path in {found[0] for line in lines if (found := re.search(OPENBLAS_FILE, line))}:
+        with open("/proc/self/maps") as maps:
+            lines = maps.read().splitlines()
+        for path in {found[0] for line in lines if (found := re.search(file, line))}:
             library = ctypes.CDLL(path)
-            for name in OPENBLAS_CALLS:
+            for name in calls:
                 if hasattr(library, name):
                     getattr(library, name)(1)
     except OSError:  # there are other systems than Linux

@@ -34,7 +34,7 @@ from rom.fe.operators.memory import give_back
 from rom.fe.operators.place import moves_most
 from rom.fe.operators.solver import DIRECT_SOLVER, Solver
 from rom.fe.operators.spectrum import first_elastic, fixed_vector, settled, signed
-from rom.fe.operators.substructured import substructured
+from rom.fe.operators.substructures.shared import substructured
 from rom.model import Array, Index
 from rom.process.stopwatch import SEARCH_PIECE, piece
 

@@ -13,7 +13,7 @@ from scipy.sparse import csr_matrix, diags, identity, kron, random
 
 from rom.fe.operators.aij import aij
 from rom.fe.operators.solver import DIRECT_SOLVER, Solver
-from rom.fe.operators.substructured import divided, substructured
+from rom.fe.operators.substructures.shared import divided, substructured
 
 COMM = MPI.COMM_WORLD
 

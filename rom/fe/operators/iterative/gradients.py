@@ -9,7 +9,7 @@ import numpy as np
 from rom.errors import SolverError
 from rom.fe.operators.factor import Factor, dense_rows
 from rom.fe.operators.iterative.recurrence import column_dots
-from rom.fe.operators.substructured import SubstructuredFactor
+from rom.fe.operators.substructures.shared import SubstructuredFactor
 from rom.model import Array
 from rom.process.stopwatch import SOLUTION_PIECE, piece
 

@@ -19,8 +19,8 @@ from scipy.sparse import coo_matrix, csr_matrix
 
 from rom.fe.operators.factor import BLOCK_SIZE, MEMORY_ERRORS
 from rom.fe.operators.memory import allowed_bytes, give_back
-from rom.fe.operators.mumps import Inside, elimination_order, library
 from rom.fe.operators.solver import Solver
+from rom.fe.operators.substructures.mumps import Inside, elimination_order, library
 from rom.model import Array, Index
 from rom.process.stopwatch import FACTORISATION_PIECE, FLOPS_NOTE, SOLUTION_PIECE, note, piece
 

@@ -24,7 +24,7 @@ N_VERTICES, N_LAST = 60, 7
 def library():
     from mpi4py import MPI
 
-    from rom.fe.operators import mumps
+    from rom.fe.operators.substructures import mumps
 
     return mumps.library(MPI.COMM_SELF)
 
@@ -93,7 +93,7 @@ def generated(seed):
 @pytest.mark.parametrize("seed", range(8))
 def test_given_unknowns_come_last_at_no_further_fill(library, seed):
     """Beside the order of MUMPS itself, the entries of the factor counted by elimination."""
-    from rom.fe.operators import mumps
+    from rom.fe.operators.substructures import mumps
 
     pattern = generated(seed)
     places = mumps.elimination_order(library, pattern, N_LAST)
@@ -106,7 +106,7 @@ def test_given_unknowns_come_last_at_no_further_fill(library, seed):
 
 def test_an_order_with_less_fill_is_not_found_by_chance(library):
     """The count of fill tells a good order from one at random."""
-    from rom.fe.operators import mumps
+    from rom.fe.operators.substructures import mumps
 
     pattern, rng = generated(0), np.random.default_rng(0)
     places = mumps.elimination_order(library, pattern, N_LAST)
@@ -116,7 +116,7 @@ def test_an_order_with_less_fill_is_not_found_by_chance(library):
 
 @pytest.mark.parametrize("m", [1, 5, 30])
 def test_a_solution_in_two_halves_around_a_border(library, m):
-    from rom.fe.operators import mumps
+    from rom.fe.operators.substructures import mumps
 
     rng, n = np.random.default_rng(m), 40
     A = rng.standard_normal((n + m, n + m))
@@ -139,7 +139,7 @@ def test_a_solution_in_two_halves_around_a_border(library, m):
 def test_without_the_library_mumps_shares_the_factor_as_petsc_calls_it(monkeypatch):
     from mpi4py import MPI
 
-    from rom.fe.operators import mumps
+    from rom.fe.operators.substructures import mumps
 
     monkeypatch.setattr(mumps, "mapped_files", list)
     assert mumps.library(MPI.COMM_SELF) is None

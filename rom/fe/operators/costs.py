@@ -1,0 +1,72 @@
+"""What a factor costs by the number of dofs alone, before any matrix is there.
+
+Powers of n fitted to what MUMPS counted for beams of quadratic tetrahedra with 10 500 to 295 000
+dofs; times are those of one thread that has a processor to itself.
+"""
+
+from dataclasses import dataclass
+
+FLOPS_LAW = (1.51, 2.119)  # of a factorisation: factor and exponent of n
+ENTRIES_LAW = (2.82, 1.463)  # of one triangle of the factor
+BYTES_PER_ENTRY = 10.0  # value, indices and work space; measured: 9.8 to 10.3
+PEAK_RATE = 58e9  # flops of one thread in a second, products of dense matrices
+SECONDS_PER_ENTRY = 40e-9  # of a factorisation, beside its flops
+PASS_SECONDS = 2.6e-9  # of a solution with six columns, per entry of the factor
+PASS_COLUMNS = 6
+PASSES_PER_MODE = 0.95  # of the search for 20 modes, measured
+SEARCH_SECONDS = 34e-9  # per dof and mode squared, measured for 20: vectors made orthogonal
+LEAST_SHARED_DOFS = 30_000  # one, two and three processes of two cores; above, sharing gains
+REST_SECONDS = 8e-6  # per dof: interfaces, energies, the body
+
+
+@dataclass(frozen=True, slots=True)
+class FactorCost:
+    """A factor of the stiffness of a body, and what is done with it in one process.
+
+    Attributes:
+        flops: of the factorisation.
+        entries: of one triangle of the factor.
+        memory: that it takes [bytes].
+        seconds: of the factorisation.
+        solution_seconds: of solving for six columns.
+    """
+
+    flops: float
+    entries: float
+    memory: float
+    seconds: float
+    solution_seconds: float
+
+
+def factor_cost(n: float) -> FactorCost:
+    """The cost of one factor of a body of n dofs, a beam of 20 : 1 or what is as slender.
+
+    A cube costs more, a plate less: its separators are larger or smaller. Exponents of two and
+    four thirds are those of nested dissection of a cube.
+
+    Source:
+        George, Nested dissection of a regular finite element mesh, SIAM J. Numer. Anal. 10 (1973)
+        345, for the powers; figures measured here.
+    """
+    flops, entries = (factor * n**power for factor, power in (FLOPS_LAW, ENTRIES_LAW))
+    seconds = flops / PEAK_RATE + SECONDS_PER_ENTRY * entries
+    return FactorCost(flops, entries, BYTES_PER_ENTRY * entries, seconds, PASS_SECONDS * entries)
+
+
+def reduction_seconds(n: float, n_interface: int, n_modes: int) -> float:
+    """Time of a reduction without certificate in one process [s].
+
+    Args:
+        n: number of dofs.
+        n_interface: interface coordinates, each a solution.
+        n_modes: fixed-interface modes.
+    """
+    cost = factor_cost(n)
+    n_passes = n_interface / PASS_COLUMNS + PASSES_PER_MODE * n_modes
+    by_dof = SEARCH_SECONDS * n_modes**2 + REST_SECONDS
+    return cost.seconds + n_passes * cost.solution_seconds + by_dof * n
+
+
+def least_machines(n: float, memory: float) -> int:
+    """How many machines of so much memory [bytes] hold the factor between them."""
+    return int(-(-factor_cost(n).memory // memory))
