@@ -71,8 +71,8 @@ def work(B: Blocks) -> Work:
     n = int(B.size[B.equation >= 0].sum())
     return Work(
         np.zeros((V, 2)), np.zeros((V, 2, m)), np.zeros((n, n)), np.zeros((n, n)),
-        np.zeros(n, dtype=np.int64), np.zeros(n), np.zeros((b, m)), np.zeros((b, m)), np.zeros((b, m)),
-        np.zeros((b, m)),
+        np.zeros(n, dtype=np.int64), np.zeros(n), np.zeros((b, m)), np.zeros((b, m)),
+        np.zeros((b, m)), np.zeros((b, m)),
     )  # fmt: skip
 
 
@@ -104,16 +104,22 @@ def assemble(B, law, C, h, W):
         for p in range(B.size[b] if at >= 0 else 0):
             for r in range(p + 1):
                 W.A[at + p, at + r] += 2 * B.M[b, p, r] / (h * h) + B.K[b, p, r]
-    symmetric = True
+    n_sliding = 0
     for k in range(C.used[0]):
         if C.state[k] != OPEN:
             add_product(B, C.who[k], C.n[k], C.n[k], law.normal, W.A)
         if C.state[k] == STICKS:
             add_product(B, C.who[k], C.t[k], C.t[k], law.shear, W.A)
-        if C.state[k] == SLIDES and C.friction[k] > 0.0:
-            symmetric = False
-    if symmetric:
+        n_sliding += C.state[k] == SLIDES
+    if n_sliding == 0:
         return True
+    add_friction(B, law, C, W)
+    return False
+
+
+@inner
+def add_friction(B, law, C, W):
+    """Set W.U to the symmetric part, and add to both triangles what drags sliding contacts."""
     for row in range(W.left.size):
         for column in range(W.left[row], row + 1):
             W.U[row, column] = W.A[row, column]
@@ -122,7 +128,6 @@ def assemble(B, law, C, h, W):
             drag = -C.way[k] * C.friction[k] * law.normal
             add_product(B, C.who[k], C.t[k], C.n[k], drag, W.A)
             add_product(B, C.who[k], C.n[k], C.t[k], drag, W.U)
-    return False
 
 
 @inner
