@@ -174,12 +174,12 @@ if first:
                            {n: film[:, k, :2].T for k, n in enumerate(names)}, equal=True),
                 view.Panel("The same pictures, best matched", "x", "y",
                            {n: laid[:, k, :2].T for k, n in enumerate(names)}, orbits, equal=True),
-                view.Panel("The sphere of triangles, from its pole", "shape n1", "shape n2",
+            ],
+            [
+                view.Panel("Shapes, from a pole", "shape n1", "shape n2",
                            {"_rim": (np.cos(circle), np.sin(circle)),
                             "shape mechanics": alone[:, :2].T},
                            {"Newton": shapes[some, :2].T}, equal=True),
-            ],
-            [
                 view.Panel("Two arrows of time", "Newton's time", "length",
                            {"size, root of I": (t, size), "growth D / 5": (t, D / 5)},
                            {"smallest size": (janus, np.interp(janus, t, size))}),
@@ -208,16 +208,17 @@ if first:
         title="Best matching: motion without a frame",
         caption="Top: three bodies attract each other. A camera that shifts and turns at will "
         "films tangles (left). Every picture laid over the one before, so that the mass-weighted "
-        "sum of squares of what differs is smallest, gives Newton's orbits back (middle). Right: "
-        "the shape of the triangle is a point on a sphere; mechanics of shapes alone, without "
-        "size, frame or clock, draws the same line as Newton's. Middle left: without energy and "
-        "rotation the system has one smallest size, and D, half the rate of I = sum m r^2, one "
-        "direction. Middle right: from there the triangle becomes more clustered both ways, "
-        "though not steadily. Below: Newton's motion and this one are gauges of one system. Left, "
+        "sum of squares of what differs is smallest, gives Newton's orbits back (right). Second "
+        "row, left: the shape of the triangle is a point on a sphere; mechanics of shapes alone, "
+        "without size, frame or clock, draws the same line as Newton's. Middle: without energy "
+        "and rotation the system has one smallest size, and D, half the rate of I = sum m r^2, "
+        "one direction. Right: from there the triangle becomes more clustered both ways, though "
+        "not steadily. Third row: Newton's motion and this one are gauges of one system. Left, "
         "size is kept at one and pi is the clock; right, scale and time come out of two "
         "constraints and are Newton's. Bottom: the same projection in engineering, a free steel "
         "beam that turns and bends. A frame fixed to one end wobbles; the undeformed beam, laid "
-        "over the nodes, finds the mean-axis frame.",
+        "over the nodes, finds the mean-axis frame. Lengths, masses and times of the three bodies "
+        "are those in which the constant of gravity is one.",
     )  # fmt: skip
 
 # ## What to remember

@@ -23,11 +23,13 @@ class Link:
         M: (3 + r, 3 + r) mass for velocity of the first pin along and across the axis, angular
             velocity of that pin, rates of r elastic coordinates [kg, kg m, kg m^2].
         tip: (2, r) displacement of the second pin along and across per elastic coordinate [m].
+        K: (r, r) stiffness [N/m].
     """
 
     length: float
     M: Array
     tip: Array
+    K: Array
 
     @property
     def r(self) -> int:

@@ -161,7 +161,7 @@ class SlideArm:
         Args:
             q1: (...,) displacement of the slide [m].
             q2: (...,) angle of the link [rad].
-            elastic: "held" or "free", see `TwoLink.inertia`.
+            elastic: "held", a frequency or "free", see `TwoLink.inertia`.
         """
         (link,) = as_elastic((self.link,), elastic)
         return in_chunks(replace(self, link=link)._of_all_rates, q1, q2)
@@ -214,7 +214,7 @@ class SlideFiveBar:
         Args:
             q1: (...,) displacement of the left slide [m].
             q2: (...,) of the right one [m].
-            elastic: "held" or "free", see `TwoLink.inertia`.
+            elastic: "held", a frequency or "free", see `TwoLink.inertia`.
 
         Raises:
             ModelError: if the couplers cannot reach each other somewhere.

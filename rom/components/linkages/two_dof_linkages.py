@@ -2,8 +2,8 @@
 
 Every link moves in its own frame with a constant mass matrix; the inertia the motors feel is the
 sum of J^T M J over the links, with the velocities J of a link per unit of all rates. Elastic
-coordinates are held, or free to follow a sudden torque. `mechanism_inertia` finds the same from
-the mass matrix and the constraints of any `rom.Mechanism`.
+coordinates are held, vibrate with the torques of the motors, or are free. `mechanism_inertia` finds
+the same from the mass matrix and the constraints of any `rom.Mechanism`.
 """
 
 from dataclasses import dataclass, replace
@@ -34,7 +34,7 @@ from rom.mbs.kernels.work import workspace
 from rom.mbs.mechanism import Mechanism
 from rom.model import Array
 
-Elastic = Literal["held", "free"]
+Elastic = Literal["held", "free"] | float
 MAX_FOLLOWED = 0.5  # of a drive between two assemblies: farther, a linkage may close elsewhere
 
 
@@ -55,7 +55,7 @@ def rigid_link(mass: float, length: float, centre: npt.ArrayLike, inertia: float
         raise ModelError(f"no link has mass {mass} kg, length {length} m, inertia {inertia} kg m2.")
     J = inertia + mass * (x * x + y * y)
     M = np.array([[mass, 0, -mass * y], [0, mass, mass * x], [-mass * y, mass * x, J]])
-    return Link(float(length), M, np.zeros((2, 0)))
+    return Link(float(length), M, np.zeros((2, 0)), np.zeros((0, 0)))
 
 
 def rod(mass: float, length: float) -> Link:
@@ -96,7 +96,8 @@ def reduced_link(body: FlexibleBody, first: str, second: str) -> Link:
     spin = body.Ibar_kl[0, 1] - body.Ibar_kl[1, 0] - (a[0] * body.S[1] - a[1] * body.S[0])
     rigid = np.array([[body.mass, 0, -y], [0, body.mass, x], [-y, x, J]])
     coupling = np.vstack([R @ body.S[:2], spin])
-    return Link(length, np.block([[rigid, coupling], [coupling.T, body.M]]), R @ b.translation[:2])
+    M = np.block([[rigid, coupling], [coupling.T, body.M]])
+    return Link(length, M, R @ b.translation[:2], body.K)
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,8 +129,12 @@ class TwoLink:
         Args:
             q1: (...,) angle of the first link [rad].
             q2: (...,) angle of the second one, of the same shape [rad].
-            elastic: "held", what slow motors feel; "free", what a sudden torque meets: the
-                elastic coordinates take the rates that make the kinetic energy least.
+            elastic: "held", what slow motors feel; the circular frequency of their torques
+                [rad/s], at which elastic coordinates vibrate with them; "free", that without
+                bound: it falls with every mode a link keeps, and says nothing about the machine.
+
+        Raises:
+            ConfigError: for another word, or a frequency that is not positive.
         """
         links = as_elastic((self.first, self.second), elastic)
         return in_chunks(replace(self, first=links[0], second=links[1])._of_all_rates, q1, q2)
@@ -182,7 +187,7 @@ class FiveBar:
         Args:
             q1: (...,) angle of the left crank against the base [rad].
             q2: (...,) angle of the right one, of the same shape [rad].
-            elastic: "held" or "free", see `TwoLink.inertia`.
+            elastic: "held", a frequency or "free", see `TwoLink.inertia`.
 
         Raises:
             ModelError: if the couplers cannot reach each other at some angles.
@@ -248,12 +253,20 @@ class FiveBar:
 def as_elastic(links: tuple[Link, ...], elastic: Elastic) -> tuple[Link, ...]:
     """The links with their elastic coordinates, or without if these are held.
 
+    At a frequency w elastic forces -K q = K q'' / w^2 are those of a mass -K / w^2.
+
     Raises:
-        ConfigError: for another word than "held" or "free".
+        ConfigError: for another word than "held" or "free", or a frequency that is not positive.
     """
+    if isinstance(elastic, int | float):
+        if not 0 < elastic < np.inf:
+            raise ConfigError(f"elastic = {elastic} rad/s is no frequency of torques.")
+        padded = (np.pad(link.K / elastic**2, ((3, 0), (3, 0))) for link in links)
+        return tuple(replace(link, M=link.M - K) for link, K in zip(links, padded, strict=True))
     if one_of("elastic", elastic, ("held", "free")) == "free":
         return links
-    return tuple(replace(link, M=link.M[:3, :3], tip=np.zeros((2, 0))) for link in links)
+    tip, K = np.zeros((2, 0)), np.zeros((0, 0))
+    return tuple(replace(link, M=link.M[:3, :3], tip=tip, K=K) for link in links)
 
 
 def mechanism_inertia(
@@ -261,7 +274,7 @@ def mechanism_inertia(
     drives: tuple[str, str],
     *,
     angles: npt.ArrayLike = (0.0, 0.0),
-    elastic: Elastic = "held",
+    elastic: Literal["held", "free"] = "held",
 ) -> Array:
     """(2, 2) generalised inertia of a mechanism that two drives move [kg m^2], from constraints.
 
@@ -305,7 +318,7 @@ class Driven:
         drives: tuple[str, str],
         *,
         tool: str | None = None,
-        elastic: Elastic = "held",
+        elastic: Literal["held", "free"] = "held",
     ) -> None:
         self._packed, self.drives = pack(mechanism, whole=True), drives
         rows = [int(k) for name in drives for k in self._packed.rows_of(name)]

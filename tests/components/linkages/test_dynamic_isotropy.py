@@ -265,7 +265,7 @@ def test_equal_cranks_that_bend_keep_the_isotropic_postures(found):
     M = np.zeros((4, 4))
     M[:3, :3] = rod(2.0, 0.3).M
     M[3] = M[:, 3] = 2.0 * np.array([0.0, 3 / 8, 0.3 * 11 / 40, 33 / 140])
-    bending = Link(0.3, M, np.array([[0.0], [1.0]]))
+    bending = Link(0.3, M, np.array([[0.0], [1.0]]), np.ones((1, 1)))
     five = replace(FIVE, cranks=(bending, bending))
     bent = isotropic_configurations(lambda a, b: five.inertia(a, b, elastic="free"), n=200)
     assert_allclose(bent.q, found.q, atol=1e-8)

@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 
 import rom
 from cases.mbs.mechanisms import simulate_quietly
-from cases.solid import block
+from cases.solid import STEEL, block
 from rom import rotation
 from rom.components.linkages.dynamic_isotropy import (
     christoffel,
@@ -155,6 +155,40 @@ def test_free_links_feel_lighter_whatever_the_direction(bar):
     assert link.length == pytest.approx(0.3)
 
 
+def apparent_inertia(L, mu, EI, w):
+    """Of a uniform beam about its driven end at circular frequency w: torque over acceleration.
+
+    The fourth derivative of y is k^4 y; y = 0 and y' = 1 at the driven end, the other is free.
+    """
+    k = (mu * w**2 / EI) ** 0.25
+    c, s, C, S = np.cos(k * L), np.sin(k * L), np.cosh(k * L), np.sinh(k * L)
+    # y = a (cos - cosh) + b sin + d sinh of k x; no moment and no force at the end
+    A = np.array([[-c - C, -s, S], [s - S, -c, C], [0, k, k]])
+    a, _, _ = np.linalg.solve(A, [0, 0, 1])
+    return -2 * a * k**2 * EI / w**2
+
+
+def test_inertia_at_a_frequency_is_that_of_a_beam_and_converges_with_its_modes():
+    """Without bound on the frequency each mode takes more away; at a frequency they converge."""
+    L, side, w = 0.5, 0.02, 2 * np.pi * 40.0
+    mu, EI = STEEL.rho * side**2, STEEL.E * side**4 / 12
+    found, free = [], []
+    model = block((L, side, side), (120, 1, 1), replace(STEEL, nu=0.0))
+    for n in (1, 4, 12):
+        body = rom.reduce(model, method=rom.CraigBampton(n_modes=n),
+                          interfaces={"root": "rbe2", "tip": "rbe2"}, certify=False)  # fmt: skip
+        arm = TwoLink(rod(1.0, 0.3), reduced_link(body, "root", "tip"))
+        found.append(arm.inertia(0.0, 1.0, elastic=w)[1, 1])
+        free.append(arm.inertia(0.0, 1.0, elastic="free")[1, 1])
+        assert_allclose(arm.inertia(0.0, 1.0, elastic=1e-3 * w), arm.inertia(0.0, 1.0), rtol=1e-5)
+        assert_allclose(arm.inertia(0.0, 1.0, elastic=1e6 * w)[1, 1], free[-1], rtol=1e-5)
+    exact, rigid = apparent_inertia(L, mu, EI, w), mu * L**3 / 3
+    assert apparent_inertia(L, mu, EI, 1.0) == pytest.approx(rigid, rel=1e-4)
+    assert found[2] == pytest.approx(exact, rel=0.02) and abs(exact - rigid) > 0.1 * rigid
+    assert found[1] == pytest.approx(found[2], rel=1e-3)
+    assert free[2] < 0.8 * free[1] < 0.64 * free[0]
+
+
 def test_the_frame_of_a_flexible_coupler_is_a_matter_of_taste(bar):
     link = reduced_link(bar, "root", "tip")
     other = reduced_link(bar.with_reference(("root", "tip")), "root", "tip")
@@ -205,6 +239,9 @@ def test_what_cannot_be_is_refused():
         FiveBar(0.7, (rod(2.0, 0.3),) * 2, (rod(1.0, 0.3),) * 2).inertia(np.pi, [0.0, 1.0])
     with pytest.raises(ConfigError, match="elastic = 'loose' is none of"):
         TWO.inertia(0.0, 1.0, elastic="loose")
+    for frequency in (0.0, -1.0, np.nan):
+        with pytest.raises(ConfigError, match="is no frequency of torques"):
+            TWO.inertia(0.0, 1.0, elastic=frequency)
     mech = Mechanism()
     mech.add_rigid("box", mass=1.0, inertia=(1, 1, 1), at=(0, 0, 0))
     with pytest.raises(ConfigError, match="are not two of the drives"):

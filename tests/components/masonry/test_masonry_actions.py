@@ -497,6 +497,15 @@ def test_contacts_that_turn_back_within_a_step_stick():
     assert motion.cuts < 40 and np.abs(motion.v).max() > 0.01
 
 
+@pytest.mark.parametrize(("friction", "cuts"), [(0.6, 20), (1.0, 40), (1.5, 500)])
+def test_steps_settle_with_friction_of_one_and_more(friction, cuts):
+    """Friction in turns with normal forces diverged from one on: 766 and 1222 cuts of steps."""
+    model = wall(2.0, 8, brick=(0.5, 0.25), rock=Rock(friction=friction))
+    shaking = BaseMotion(sine(4.0, 0.4))
+    motion = simulate(model, t_end=0.5, dt=1e-3, actions=[shaking], save_every=500)
+    assert motion.cuts < cuts
+
+
 @pytest.mark.parametrize(("y", "force"), [(2.0, 1.0), (2.0, -1.0), (0.4, 1.0)])
 def test_a_horizontal_force_tips_a_block_by_its_lever_about_the_ground(y, force):
     """F y = W b / 2, on whatever side and below or above the mass centre; friction of 4 holds."""

@@ -131,3 +131,13 @@ def test_a_voussoir_in_space_takes_the_place_of_a_drawn_one(k):
     assert carried[1] == pytest.approx(carried[0], rel=1e-2)
     sag = [motion.q[-1, 8, 1] - motion.q[0, 8, 1] for motion in (one, other)]
     assert sag[1] == pytest.approx(sag[0], rel=0.3) and sag[0] < -1e-5
+
+
+@pytest.mark.parametrize(("aside", "corners"), [(0.0, 4), (2e-7, 4), (-2e-7, 4), (2e-5, 5)])
+def test_a_node_aside_of_a_side_by_round_off_is_no_corner(aside, corners):
+    """A node in the middle of the lower side of 1 m: its turn is four times how far it lies off."""
+    points = np.vstack([square(), [[0.5, -aside]], square(at=(0.0, 1.0))])
+    triangles = [(0, 4, 3), (4, 2, 3), (4, 1, 2), (5, 6, 7), (5, 7, 8)]
+    stones = {"stone": [0, 1, 2], "ceiling": [3, 4]}
+    model = drawn(points, triangles, stones, held=("ceiling",))
+    assert len(model.stones[0].outline) == corners
