@@ -13,6 +13,7 @@ from scipy.sparse import csr_matrix, diags, identity, kron, random
 
 from rom.fe.operators.aij import aij
 from rom.fe.operators.solver import DIRECT_SOLVER, Solver
+from rom.fe.operators.substructures import shared
 from rom.fe.operators.substructures.shared import divided, substructured
 
 COMM = MPI.COMM_WORLD
@@ -89,6 +90,27 @@ def costly(first):
     return K.tocsr()
 
 
+class Starved(shared.Inside):
+    """MUMPS finds on the last rank that its work space does not suffice."""
+
+    def factor(self):
+        S = super().factor()
+        self.code = -9 if COMM.rank == COMM.size - 1 else self.code
+        return S
+
+
+def without_memory(A, name):
+    """Whether MUMPS over ranks is left to say how much memory is needed."""
+    kept = shared.allowed_bytes, shared.Inside
+    if name == "no room":
+        shared.allowed_bytes = lambda comm: 1e3
+    else:
+        shared.Inside = Starved
+    answer = substructured(A, DIRECT_SOLVER)
+    shared.allowed_bytes, shared.Inside = kept
+    return answer is None
+
+
 def refused(K):
     """Whether a matrix that is not positive definite is said to be none, or answers show it."""
     A, first, end = distributed(csr_matrix(K))
@@ -124,6 +146,8 @@ def main(path):
         ("low rank", Solver(low_rank=1e-8)),
     ):
         found[name] = substructured(A, solver) is None
+    for name in ("no room", "room runs out"):
+        found[name] = without_memory(A, name)
     found["full"] = (
         substructured(distributed(csr_matrix(np.ones((60, 60))))[0], DIRECT_SOLVER) is None
     )

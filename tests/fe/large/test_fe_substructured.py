@@ -61,7 +61,9 @@ def test_the_border_is_small(found, n):
 
 
 @pytest.mark.parametrize("n", SHARED_BY)
-@pytest.mark.parametrize("case", ["on disk", "low rank", "full", "apart", "costly"])
+@pytest.mark.parametrize(
+    "case", ["on disk", "low rank", "full", "apart", "costly", "no room", "room runs out"]
+)
 def test_it_leaves_what_it_is_not_made_for_to_mumps(found, n, case):
     assert found[n][case]
 
