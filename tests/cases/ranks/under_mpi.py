@@ -5,6 +5,7 @@ import signal
 import sys
 
 from mpi4py import MPI
+from petsc4py import PETSc
 
 import numpy as np
 from dolfinx.mesh import meshtags
@@ -30,6 +31,7 @@ def model(path, cells, degree):
     out = {"free": free.frequencies, "fixed": fixed.frequencies, "tied": tied.frequencies}
     shapes = {"free": free.shapes[:, 6:], "fixed": fixed.shapes, "tied": tied.shapes[:, 6:]}
     out["mass"] = made.mass()
+    out["entries"] = made.operators.M.getInfo(PETSc.Mat.InfoType.GLOBAL_SUM)["nz_used"]
     for name, face in made.interfaces.items():
         out[f"points {name}"] = face.points
         out[f"mass {name}"] = face.surface_mass.toarray()
