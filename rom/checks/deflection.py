@@ -1,14 +1,17 @@
 """Large deflection of a reduced body against that of its finite elements.
 
-Each component of the load range alone, of either sign, and all of them together: the states of the
-full model under the largest loads, its displacement, and its frequencies about that state.
+Each component of the load range alone, of either sign, and several together in proportions that no
+shape was made for: at steps of the load the state of the full model, its displacement, and its
+frequencies about that state.
 """
 
+from dataclasses import dataclass
+from itertools import takewhile
 from typing import Any
 
 import numpy as np
 from scipy.linalg import eigh
-from scipy.sparse import bmat, csc_matrix, csr_matrix, identity
+from scipy.sparse import bmat, csc_matrix, csr_matrix, identity, vstack
 from scipy.sparse.linalg import LinearOperator, eigsh, splu
 
 from rom.body.flexible import FlexibleBody
@@ -23,6 +26,8 @@ from rom.rows import row
 DISPLACEMENT_RTOL = 5e-3  # of the largest load, in the mean square over the mass
 TANGENT_RTOL = 2e-2  # small errors of stress are large ones of the stiffness it gives a thin body
 FORCES = ("f_x", "f_y", "f_z", "m_x", "m_y", "m_z")
+STEP_SHARES = (0.35, 0.7, 1.0)  # of the largest load
+PROPORTION = np.sqrt(2) - 1  # of a component to the one before: between one alone and two equal
 N_TANGENT = 3  # lowest frequencies compared there
 MAX_ITERATIONS = 30  # of Newton's method on the full model
 INCREMENT_RTOL = 1e-8  # last increment of it; the next one is its square
@@ -32,7 +37,11 @@ MIN_LOAD_STEP = 2.0**-8  # at which a path of the full model is given up
 def deflection_rows(
     geometric: Geometric, model: FEModel, connection: Any, body: FlexibleBody, E: Array
 ) -> tuple[list[Row], dict[str, Any]]:
-    """Rows of the certificate, and a table {load case: its loads and errors}.
+    """Rows of the certificate, and a table {load case: its loads, errors and how far it holds}.
+
+    The table has for each case "case", the share of each component of the range; "share" of the
+    load at the steps compared, and there "displacement" and "frequencies", relative errors;
+    "holds to", the share up to which all steps hold; and "energy" [J] of the body there.
 
     Args:
         geometric: the range of loads.
@@ -41,29 +50,83 @@ def deflection_rows(
         body: the reduced body, seen from its reference interface.
         E: (n_local, r) its nodal shapes.
     """
-    if connection.ops.comm.size > 1:
-        ranks = connection.ops.comm.size
-        return [Row("ranks; large deflection is compared on one", ranks, "--", True)], {}
     full, quartic = HeldSolid(model, connection, body.reference), energy_of(body)
+    E = full.whole(E)
     units = [nodal_load(model, *component) for component in geometric.components()]
-    share, rows, table = np.linspace(0.25, 1.0, 4), list[Row](), dict[str, Any]()
+    rows, table = list[Row](), dict[str, Any]()
     for name, case in load_cases(geometric).items():
         W = case @ np.array(units)
-        q = follow(quartic, np.outer(share, W @ E))[-1]
-        a = full.state(E @ q, W)
-        rows.append(row(f"{name}: full states found", float(a is not None), 0.5, above=True))
-        if a is None:
-            continue
-        error = full.distance(E @ q, a)
-        gaps = np.abs(tangent_frequencies(body, q) / full.frequencies(a) - 1)
-        rows.append(row(f"{name}: displacement", error, DISPLACEMENT_RTOL))
-        rows.append(row(f"{name}: frequencies about it", gaps.max(), TANGENT_RTOL))
-        table[name] = {"case": case.tolist(), "displacement": error, "frequencies": gaps.tolist()}
+        path = follow(quartic, np.outer(STEP_SHARES, W @ E))
+        steps = []
+        for share, q in zip(STEP_SHARES, path, strict=True):
+            step = _compared(full, body, E @ q, q, share * W)
+            if step is None:
+                break
+            steps.append(step)
+        rows += _rows(name, steps)
+        held = len(list(takewhile(_holds, steps)))
+        table[name] = {
+            "case": case.tolist(),
+            "share": list(STEP_SHARES[: len(steps)]),
+            "displacement": [step.displacement for step in steps],
+            "frequencies": [step.frequencies for step in steps],
+            "holds to": STEP_SHARES[held - 1] if held else 0.0,
+            "energy": quartic.energy(path[held - 1]) if held else 0.0,
+        }
     return rows, table
 
 
+@dataclass(frozen=True)
+class Step:
+    """A state of the body against that of the full model.
+
+    Attributes:
+        displacement: distance of the two, relative, in the mean square over the mass [1].
+        reached: displacement of the body along that of the full model, as a share of it [1].
+        frequencies: largest relative error of the lowest frequencies about it [1].
+    """
+
+    displacement: float
+    reached: float
+    frequencies: float
+
+
+def _compared(full: "HeldSolid", body: FlexibleBody, u: Array, q: Array, W: Array) -> Step | None:
+    """A step of load; None if the full model has no equilibrium there that is found."""
+    a = full.state(u, W)
+    if a is None:
+        return None
+    gaps = np.abs(tangent_frequencies(body, q) / full.frequencies(a) - 1)
+    return Step(full.distance(u, a), full.reached(u, a), float(gaps.max()))
+
+
+def _holds(step: Step) -> bool:
+    return step.displacement <= DISPLACEMENT_RTOL and step.frequencies <= TANGENT_RTOL
+
+
+def _rows(name: str, steps: list[Step]) -> list[Row]:
+    """Lines of a load case, the worst of its steps; one more where the basis locks."""
+    n = len(STEP_SHARES)
+    rows = [row(f"{name}: full states found, of {n}", len(steps), n - 0.5, above=True)]
+    if not steps:
+        return rows
+    displacement = max(step.displacement for step in steps)
+    rows.append(row(f"{name}: displacement", displacement, DISPLACEMENT_RTOL))
+    frequencies = max(step.frequencies for step in steps)
+    rows.append(row(f"{name}: frequencies about it", frequencies, TANGENT_RTOL))
+    reached = min(step.reached for step in steps)
+    if reached < 1 - DISPLACEMENT_RTOL:
+        why = f"{name}: share of the full deflection; the body is too stiff, it has too few shapes"
+        rows.append(row(why, reached, 1 - DISPLACEMENT_RTOL, above=True))
+    return rows
+
+
 def load_cases(geometric: Geometric) -> dict[str, Array]:
-    """{name: share of each component of the range (l,)}."""
+    """{name: share of each component of the range (l,)}.
+
+    Where there are several components, two cases have all of them, in falling proportion and in
+    rising proportion with alternating signs.
+    """
     components = geometric.components()
     units = np.eye(len(components))
     named = {
@@ -72,7 +135,10 @@ def load_cases(geometric: Geometric) -> dict[str, Array]:
     cases = {f"{sign}{name}": value * unit for name, unit in named.items()
              for sign, value in (("", 1.0), ("-", -1.0))}  # fmt: skip
     if len(named) > 1:
-        cases["all together"] = units.sum(axis=0) / np.sqrt(len(named))
+        falling = PROPORTION ** np.arange(len(named))
+        falling /= np.linalg.norm(falling)
+        cases["all, the first most"] = falling
+        cases["all, the last most"] = falling[::-1] * (-1.0) ** np.arange(len(named))
     return cases
 
 
@@ -93,7 +159,7 @@ class HeldSolid:
     """The full model at finite strain, one of its interfaces held in the mean.
 
     Args:
-        model: with finite elements, on one process.
+        model: with finite elements; every process has all of it.
         connection: the same in interface coordinates a, u = T a.
         reference: the interface that is held.
     """
@@ -101,10 +167,15 @@ class HeldSolid:
     def __init__(self, model: FEModel, connection: Any, reference: str):
         ops, interface = connection.ops, model.interfaces[reference]
         self.solid = model.stresses.finite_strain()
+        self.comm = ops.comm
         self.T = csr_matrix(identity(model.n_dofs) if ops.T is None else rows_of(ops.T))
         self.M = self.T.T @ ops.gathered(model.operators.M) @ self.T
         self.C = csr_matrix(mean_motion(interface)) @ self.T[interface.dofs]
         self.inside = splu(csc_matrix(self.T.T @ self.T))
+
+    def whole(self, E: Array) -> Array:
+        """(n, r) all rows of shapes (n_local, r)."""
+        return np.vstack(self.comm.allgather(E))
 
     def state(self, u: Array, W: Array) -> Array | None:
         """(m,) equilibrium in a under nodal loads W (n,) [N] near u (n,); None if not found."""
@@ -145,6 +216,11 @@ class HeldSolid:
         scale = np.abs(K.diagonal()).mean() / np.abs(self.C).max()
         return splu(csc_matrix(bmat([[K, scale * self.C.T], [scale * self.C, None]])))
 
+    def reached(self, u: Array, a: Array) -> float:
+        """Part of a displacement (n,) along the state a, as a share of it."""
+        Ma = self.M @ a
+        return float((self.inside.solve(self.T.T @ u) @ Ma) / (a @ Ma))
+
     def distance(self, u: Array, a: Array) -> float:
         """Distance of a displacement (n,) from the state a, in the mean square, relative."""
         gap = self.inside.solve(self.T.T @ u) - a
@@ -161,9 +237,10 @@ class HeldSolid:
 
 
 def rows_of(A: Any) -> csr_matrix:
-    """A PETSc matrix on one process as a SciPy one."""
+    """All rows of a distributed PETSc matrix, on every rank, as a SciPy matrix."""
     starts, columns, values = A.getValuesCSR()
-    return csr_matrix((values, columns, starts), shape=A.getSize())
+    mine = csr_matrix((values, columns, starts), shape=(len(starts) - 1, A.getSize()[1]))
+    return csr_matrix(vstack(A.comm.tompi4py().allgather(mine)))
 
 
 def energy_of(body: FlexibleBody) -> Quartic:

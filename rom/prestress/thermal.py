@@ -24,7 +24,7 @@ from rom.cyclic.sector import CyclicSector
 from rom.eigen.scipy import SciPyOperators, negative_count
 from rom.eigen.supports import Fixed, held_dofs
 from rom.eigen.verbs import dofs_of, rigid_motions
-from rom.errors import ConfigError, ModelError
+from rom.errors import ConfigError, ModelError, ParallelError
 from rom.model import Array, FEModel, Index
 from rom.prestress.heat import Heat
 
@@ -125,12 +125,15 @@ def finite_solid(model: FEModel, heat: Heat | None = None) -> Any:
 
     Raises:
         ConfigError: if the model has no finite elements.
+        ParallelError: on several processes.
     """
     if model.stresses is None:
         raise ConfigError(
             "the model has no finite elements, from which alone its stress follows.",
             hint="Make it with rom.fe.model.",
         )
+    if model.operators.comm.size > 1:
+        raise ParallelError("large motion and heat of a solid are computed on one process.")
     solid = model.stresses.finite_strain()
     if heat is not None:
         solid.heat(*heat.on(model))

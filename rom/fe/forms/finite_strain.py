@@ -17,23 +17,25 @@ import ufl
 from dolfinx import fem
 from scipy.sparse import csr_matrix
 
-from rom.errors import ParallelError
 from rom.fe.compat import (
     assemble_matrix,
-    assemble_vector,
+    assembled_vector,
     cell_name,
     compiled,
     geometry_degree,
     per_cell,
 )
 from rom.fe.forms.material import geometric_stiffness, stress
+from rom.fe.forms.nodes import gathered as gathered_rows
 from rom.fe.jit import compiling
-from rom.fe.operators.aij import symmetric, wrapped
+from rom.fe.operators.aij import gathered, symmetric, wrapped
 from rom.model import Array
 
 
 class FiniteStrain:
-    """Forces and stiffness of a solid at any displacement; on one process.
+    """Forces and stiffness of a solid at any displacement.
+
+    Displacements, forces and matrices are those of the whole solid, on every rank.
 
     Args:
         V: displacement space.
@@ -48,8 +50,6 @@ class FiniteStrain:
     ):
         self.V, self.mesh, self.numbers = V, V.mesh, numbers
         self.tags, self.names = tags, names
-        if self.mesh.comm.size > 1:
-            raise ParallelError("large motion and heat of a solid are computed on one process.")
         cold = np.zeros(tags.size)
         self.u, self.at_nodes = fem.Function(V), fem.Function(V)
         with compiling(self.mesh.comm):
@@ -82,26 +82,32 @@ class FiniteStrain:
 
     def force(self, u: Array) -> Array:
         """(n,) forces that hold the solid at a displacement (n,) [N]."""
-        self.u.x.array[:] = u
-        return assemble_vector(self._force)
+        self._set(u)
+        return gathered_rows(self.mesh.comm, assembled_vector(self._force))
 
     def tangent(self, u: Array) -> csr_matrix:
         """(n, n) derivative of the forces at a displacement (n,) [N/m]."""
-        self.u.x.array[:] = u
+        self._set(u)
         return self._matrix(self._tangent)
 
     def geometric(self, u: Array) -> csr_matrix:
         """(n, n) geometric stiffness of the stress C : (eps(u) - theta I) [N/m]."""
-        self.u.x.array[:] = u
+        self._set(u)
         return self._matrix(self._geometric)
 
     def layout(self, A: csr_matrix) -> Any:
         """The same matrix for the operators of the model."""
         return wrapped(A)
 
+    def _set(self, u: Array) -> None:
+        rows = self.V.dofmap.index_map
+        first, end = 3 * np.array(rows.local_range)
+        self.u.x.array[: end - first] = u[first:end]
+        self.u.x.scatter_forward()
+
     def _matrix(self, form: Any) -> csr_matrix:
         A = assemble_matrix(form)
-        found = symmetric(A)
+        found = gathered(A) if self.mesh.comm.size > 1 else symmetric(A)
         A.destroy()
         return found
 

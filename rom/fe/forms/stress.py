@@ -130,7 +130,7 @@ class Stresses:
         return K_geo
 
     def finite_strain(self) -> Any:
-        """The same solid in large motion, `finite_strain.FiniteStrain`; on one process."""
+        """The same solid in large motion, `finite_strain.FiniteStrain`."""
         return FiniteStrain(self.V, self.numbers, self.degree, *self.regions)
 
     def large_strain(self) -> Any:

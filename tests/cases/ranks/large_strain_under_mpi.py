@@ -18,6 +18,9 @@ fields = [(y * x, x * z, x**2), (np.sin(x), y**2, x * y), (z, x * y * z, np.cos(
 E = np.column_stack([np.column_stack(field).ravel() for field in fields])
 G = energy.gram(E)
 F = ops.gram(E, energy.second_forces(E, np.array([[0, 1], [2, 2]])))
+solid, whole = model.stresses.finite_strain(), np.vstack(ops.comm.allgather(E))
+far = whole @ [0.3, -0.2, 0.5]
+resisted = np.column_stack([whole.T @ solid.force(far), whole.T @ (solid.tangent(far) @ whole)])
 body = rom.reduce(
     model,
     method=rom.CraigBampton(n_modes=2),
@@ -27,5 +30,8 @@ body = rom.reduce(
 )
 load = body.marker("tip").translation[1]
 q = follow(body.quartic, 1e6 * np.outer([0.5, 1.0], load))[-1]
+table = body.provenance["large deflection"].values()
+errors = [[case[of] for of in ("displacement", "frequencies")] for case in table]
 if ops.first == 0:
-    np.savez(sys.argv[1], G=G, F=F, tip=body.marker("tip").translation @ q)
+    tip = body.marker("tip").translation @ q
+    np.savez(sys.argv[1], G=G, F=F, tip=tip, errors=errors, resisted=resisted)
