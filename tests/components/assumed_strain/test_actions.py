@@ -118,6 +118,17 @@ def test_upsetting_without_friction_follows_the_closed_form():
     assert np.all(np.diff(course.plastic, axis=0) >= 0)
 
 
+def test_upsetting_by_two_thirds_follows_the_closed_form():
+    """To 0.34 of the height; each step presses by 2 % of what is left at most."""
+    metal, (body, held) = Metal(200e3, 0.3, 1.0, 500.0, 300.0), block((4, 4), state="plane strain")
+    course = pressed(body, held, metal, share=0.66, steps=100)
+    late = course.x[3:]  # what was elastic is no part of the formula
+    heights, width = late[:, :, 1].max(axis=1), late[:, :, 0].max(axis=1)
+    stress = PLANE * (500 + 300 * PLANE * np.log(1 / heights))
+    assert heights[-1] == pytest.approx(0.34, abs=1e-3)
+    assert_allclose(-course.tool_forces[3:, 0, 1] / width, stress, rtol=1.5e-3)
+
+
 @pytest.mark.parametrize("friction", [0.0, 0.05, 0.1])
 def test_upsetting_of_a_disc_follows_siebels_formula(friction):
     """Mean pressure on a flat cylinder: yield stress (1 + 2 mu R / (3 h)), h the whole height."""
