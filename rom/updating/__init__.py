@@ -1,7 +1,8 @@
 """Updating of models by measured frequency responses.
 
 `estimate` updates a family of bodies: what was `measured` beside the `family_model`, summed line by
-line in `normal_equations`, and what the data say in `verdict`. Small models with matrices of their
+line in `normal_equations`, and what the data say in `verdict`. A test is
+planned by `placement`. Small models with matrices of their
 own, after Berriet, Fillod and Bouhaddi: `models`, `methods`, `frf_data`.
 """
 
