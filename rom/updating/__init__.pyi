@@ -7,3 +7,8 @@ from rom.updating.placement import Plan as Plan
 from rom.updating.placement import candidates as candidates
 from rom.updating.placement import independent as independent
 from rom.updating.placement import place as place
+from rom.updating.tracking import Observer as Observer
+from rom.updating.tracking import Sensors as Sensors
+from rom.updating.tracking import Track as Track
+from rom.updating.tracking import Tracker as Tracker
+from rom.updating.tracking import tracker as tracker
