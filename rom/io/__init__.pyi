@@ -10,6 +10,7 @@ from rom.io.fields.vtu import write_stress as write_stress
 from rom.io.fields.vtu import write_stress_history as write_stress_history
 from rom.io.fields.vtu import write_vtu as write_vtu
 from rom.io.fmu.body import write_body_fmu as write_body_fmu
+from rom.io.fmu.observer import write_observer_fmu as write_observer_fmu
 from rom.io.history import write_history as write_history
 from rom.io.matrices.calculix import read_stored_matrix as read_stored_matrix
 from rom.io.matrices.dmig import read_dmig as read_dmig

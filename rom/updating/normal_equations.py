@@ -4,6 +4,7 @@ The residual is ln(H / H_measured) over its standard deviation, real and imagina
 noise leaves the mean of the logarithm where it is, as all powers of it have the mean zero.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -88,6 +89,36 @@ def shared(ratios: Array, n: int) -> Array:
     return np.r_[ratios, np.full(n - ratios.size, ratios[-1])]
 
 
+def sensitivity(
+    model: FamilyModel, x: Array, ratios: Array
+) -> Callable[[Array], tuple[Complex, Complex]]:
+    """The function of lines (n_f,) [rad/s] that gives receptances and their derivatives.
+
+    These are (n_f, n_s, n_e) [m/N] and (n_f, n_s, n_e, n_q) by the logarithms of factors and of
+    damping ratios.
+
+    Args:
+        model: the family with its sensors.
+        x: (n_p,) logarithms of its factors.
+        ratios: (m,) damping ratios of the lowest elastic modes, the last one of all others too [1].
+    """
+    here = model.at(x)
+    modes = modal(here, shared(ratios, model.n_elastic))
+    seen, driven = model.seen @ modes.Phi, model.driven @ modes.Phi
+    own = ratios.size - 1
+    change, others = through_modes(here, modes, own), slice(model.n_rigid + own, None)
+
+    def at(omega: Array) -> tuple[Complex, Complex]:
+        g = modes.g(omega)
+        left, right = seen * g[:, None, :], g[:, :, None] * driven.T
+        last = (left[:, :, others] * modes.d[others]) @ right[:, others]
+        last = 1j * omega[:, None, None, None] * last[..., None]
+        J = -np.concatenate([change(left, right, omega), last], axis=-1)
+        return receptance(seen, g, driven), J
+
+    return at
+
+
 def sums(model: FamilyModel, x: Array, ratios: Array, data: Data) -> Sums:
     """J^T J and J^T r by the logarithms of factors and of damping ratios.
 
@@ -97,25 +128,15 @@ def sums(model: FamilyModel, x: Array, ratios: Array, data: Data) -> Sums:
         ratios: (m,) damping ratios of the lowest elastic modes, the last one of all others too [1].
         data: what was measured.
     """
-    zeta = shared(ratios, model.n_elastic)
-    here = model.at(x)
-    modes = modal(here, zeta)
-    seen, driven = model.seen @ modes.Phi, model.driven @ modes.Phi
     n = x.size + ratios.size
     normal, gradient = np.zeros((n, n)), np.zeros(n)
     squares = np.zeros(data.weight.shape)
-    own = ratios.size - 1
-    change, others = through_modes(here, modes, own), slice(model.n_rigid + own, None)
+    at = sensitivity(model, x, ratios)
     for first in range(0, data.omega.size, BLOCK_LINES):
         block = slice(first, first + BLOCK_LINES)
-        omega, w = data.omega[block], data.weight[block]
-        g = modes.g(omega)
-        H = receptance(seen, g, driven)
+        w = data.weight[block]
+        H, J = at(data.omega[block])
         log = wrapped(np.log(H) - data.logarithm[block]) * (w > 0)
-        left, right = seen * g[:, None, :], g[:, :, None] * driven.T
-        last = (left[:, :, others] * modes.d[others]) @ right[:, others]
-        last = 1j * omega[:, None, None, None] * last[..., None]
-        J = -np.concatenate([change(left, right, omega), last], axis=-1)
         J = (J * (w / H)[..., None]).reshape(-1, n)
         r = (w * log).ravel()
         normal += (J.conj().T @ J).real

@@ -40,7 +40,7 @@ MAY_IMPORT = {  # module or package below rom/ -> what it may import from rom be
     "body": {"model", "eigen", "rotation", "notebook", "units", "errors"},
     "assembly": {"model", "rows", "eigen", "body", "reduction", "errors"},
     "mbs": {"model", "rotation", "io", "notebook", "errors"},
-    "io": {"model", "units", "body", "parametric", "errors"},
+    "io": {"model", "units", "body", "parametric", "updating", "errors"},
     "checks": {"model", "rows", "eigen", "body", "reduction", "errors"},
     "workflow": LIGHT | {"checks"},
     "prestress": {"model", "rows", "eigen", "rotation", "cyclic", "reduction", "errors"},

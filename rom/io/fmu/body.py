@@ -64,7 +64,8 @@ def write_body_fmu(body: FlexibleBody, path: str | Path, *, fixed: tuple[str, ..
         raise ConfigError(f"body {body.name!r} cannot move with {fixed!r} held.")
     first = omega[omega > 0.0][:1] / (2 * np.pi)
     step = 1.0 / (STEPS_PER_PERIOD * float(first[0])) if first.size else 1e-3
-    describe = partial(_description, path.stem, _variables(body), step)
+    about = f"Small motions of the flexible body {path.stem}, inputs held over a step."
+    describe = partial(description, path.stem, about, _variables(body), step)
     content = Content(path.stem, "linear.c", describe, data=_tables(body, omega, V))
     return write_archive(path, content)
 
@@ -91,7 +92,7 @@ def _tables(body: FlexibleBody, omega: Array, V: Array) -> str:
         "MOTION": motion,
     }
     sizes = f"enum {{ MODES = {omega.size}, INTERFACES = {len(body.markers)} }};\n"
-    return sizes + "".join(_table(name, A) for name, A in tables.items())
+    return sizes + "".join(table(name, A) for name, A in tables.items())
 
 
 def _modal_damping(body: FlexibleBody, omega: Array, V: Array) -> Array:
@@ -102,7 +103,8 @@ def _modal_damping(body: FlexibleBody, omega: Array, V: Array) -> Array:
     return np.where((pairs > 0.0) & (np.abs(XI) > ROUND_OFF * pairs), XI, 0.0)
 
 
-def _table(name: str, A: Array) -> str:
+def table(name: str, A: Array) -> str:
+    """An array of C."""
     numbers = ",\n".join(float(x).hex() for x in np.ravel(A))
     return f"static const double {name}[{A.size}] = {{\n{numbers}}};\n"
 
@@ -121,13 +123,14 @@ def _three(parts: tuple[str, ...], causality: str, unit: str) -> list[Variable]:
     return [Variable(f"{name}[{k}]", causality, unit, start) for k in (1, 2, 3)]
 
 
-def _description(
+def description(
     name: str,
+    about: str,
     variables: list[Variable],
     step: float,
     guid: str,
     identifier: str,
     sources: tuple[str, ...],
 ) -> bytes:
-    about = f"Small motions of the flexible body {name}, inputs held over a step."
+    """The text of ``modelDescription.xml`` of a model that needs nothing where it runs."""
     return model_description(Model(name, identifier, guid, False, sources, step, about), variables)

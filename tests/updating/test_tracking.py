@@ -1,0 +1,242 @@
+"""Kalman filter of a body: Riccati, chi-square, forces found, stress where nothing is measured."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.integrate import quad_vec
+from scipy.linalg import eigh, expm, solve_discrete_are
+from scipy.stats import chi2
+
+import rom
+from cases.mbs.fmu_instance import Instance, fmpy
+from cases.solid import STEEL, block
+from rom.body.recovery import StressRecovery
+from rom.errors import ConfigError, ModelError
+from rom.updating import Channels, Sensors, tracker
+from rom.updating.tracking import discrete, steady, stress_rows
+
+DT, WALK = 5e-4, 400.0
+TIP = Channels([[1.0, 0, 0]], [[0, 0, 1]])
+FEW = (
+    Sensors(Channels([[0.5, 0, 0]], [[0, 0, 1]]), "displacement", 1e-6),
+    Sensors(Channels([[1.0, 0.1, 0], [0.75, 0, 0]], [[0, 0, 1]] * 2), "acceleration", 0.5),
+)
+GAUGE = [[0.125, 0.05, 0.08], [0.25, 0.05, 0.08]]
+WANTED = (
+    Sensors(Channels(GAUGE[:1], [[1, 0, 0]]), "stress"),
+    Sensors(TIP, "displacement"),
+)
+
+
+@pytest.fixture(scope="module")
+def model():
+    return block(cells=(8, 2, 2))
+
+
+@pytest.fixture(scope="module")
+def body(model):
+    body = rom.reduce(
+        model, method=rom.CraigBampton(4), certify=False,
+        interfaces={"root": "rbe2", "tip": "rbe2"}, reference="root",
+        damping=rom.ModalDamping(0.02),
+    )  # fmt: skip
+    # strain between two points of the surface, along x, stands for the stress of a gauge
+    surface = body.surface
+    a, b = (int(np.linalg.norm(surface.points - x, axis=1).argmin()) for x in GAUGE)
+    operator = np.zeros((6, body.n_modes))
+    operator[0] = STEEL.E / 0.125 * (surface.shape[3 * b] - surface.shape[3 * a])
+    return replace(body, stress=StressRecovery(surface.points[[a]], operator))
+
+
+@pytest.fixture(scope="module")
+def filter_(body):
+    return made(body)
+
+
+def made(body, sensors=FEW, forces=TIP, wanted=WANTED, **options):
+    options = {"dt": DT, "walk": WALK, "fixed": ("root",), "unmodelled": 1e-3, **options}
+    return tracker(body, sensors, forces, wanted, **options)
+
+
+def modes_of(model):
+    """Frequencies (m,) of the full model with its root held, and shapes (n_dof, m)."""
+    held = model.interfaces["root"].dofs
+    kept = np.setdiff1d(np.arange(model.n_dofs), held)
+    lam, V = eigh(model.K.toarray()[np.ix_(kept, kept)], model.M.toarray()[np.ix_(kept, kept)])
+    shapes = np.zeros((model.n_dofs, len(kept)))
+    shapes[kept] = V
+    return np.sqrt(lam), shapes
+
+
+def walked(t, rng, seconds=None):
+    """A filter and one record of what it assumes: states (n_t, n) and samples (n_t, n_y)."""
+    n_t = 400 if seconds is None else int(seconds / t.dt)
+    root = np.linalg.cholesky(t.Q + 1e-14 * np.diag(np.diag(t.Q)) + 1e-300 * np.eye(len(t.Q)))
+    x = np.sqrt(np.diag(t.P)) * rng.standard_normal(len(t.P))
+    states = []
+    for _ in range(n_t):
+        states.append(x)
+        x = t.A @ x + root @ rng.standard_normal(len(x))
+    states = np.array(states)
+    return states, states @ t.C.T + np.sqrt(t.R) * rng.standard_normal((n_t, len(t.C)))
+
+
+def test_noise_of_a_step_is_its_integral():
+    """Quadrature of exp(As) W exp(A's), for steps short and long beside the periods."""
+    rng = np.random.default_rng(0)
+    A, w = rng.normal(size=(4, 4)) - 3 * np.eye(4), np.diag([0.0, 1.0, 2.0, 0.5])
+    for h in (0.01, 2.0):
+        step, Q = discrete(A, w, h)
+        assert_allclose(step, expm(A * h), rtol=1e-10, atol=1e-13)
+        integral = quad_vec(lambda s: expm(A * s) @ w @ expm(A.T * s), 0, h, epsrel=1e-11)[0]
+        assert_allclose(Q, integral, rtol=1e-9, atol=1e-12)
+
+
+def test_the_filter_settles_where_the_riccati_equation_says(filter_):
+    t = filter_
+    samples = np.zeros((3000, len(t.C)))
+    found = t.run(samples)
+    o = t.observer()
+    P = t.A @ found.covariance @ t.A.T + t.Q  # before the next sample
+    gain = P @ t.C.T @ np.linalg.inv(t.C @ P @ t.C.T + np.diag(t.R))
+    assert_allclose(o.W @ gain, o.W @ o.G, rtol=1e-5, atol=1e-7 * np.abs(o.W @ o.G).max())
+    size = np.sqrt(np.einsum("ij,ij->i", o.W @ P, o.W))
+    assert_allclose(size, o.deviations, rtol=1e-6)
+
+
+def test_the_steady_state_is_that_of_the_riccati_equation(filter_):
+    """Of a rough system, and of the body in coordinates of equal size, by another program."""
+    rng, t = np.random.default_rng(8), filter_
+    A, B = 0.4 * rng.normal(size=(5, 5)), rng.normal(size=(5, 3))
+    C, R = rng.normal(size=(2, 5)), np.array([0.3, 2.0])
+    found = steady(A, C, B @ B.T, R)
+    assert_allclose(found, solve_discrete_are(A.T, C.T, B @ B.T, np.diag(R)), rtol=1e-8)
+    P = steady(t.A, t.C, t.Q, t.R)
+    size = np.sqrt(np.diag(P))
+    A, C, Q = t.A * size / size[:, None], t.C * size / np.sqrt(t.R)[:, None], t.Q
+    scaled = solve_discrete_are(A.T, C.T, Q / np.outer(size, size), np.eye(len(C)))
+    assert_allclose(np.diag(scaled), 1.0, rtol=1e-6)
+
+
+def test_errors_and_innovations_are_as_large_as_the_filter_says(filter_):
+    """Normalised squared errors of what is wanted, and of the samples, over 60 records."""
+    t, rng = filter_, np.random.default_rng(2)
+    error, surprise = [], []
+    for _ in range(60):
+        states, y = walked(t, rng)
+        found = t.run(y, DT * np.arange(len(y)))
+        error.append(((found.values[-1] - states[-1] @ t.W.T) / found.deviations[-1]) ** 2)
+        surprise.append(found.surprise.sum())
+    n = 60 * 400 * len(t.C)
+    assert chi2.ppf(1e-3, n) < np.sum(surprise) < chi2.ppf(1 - 1e-3, n)
+    for total in np.sum(error, axis=0):
+        assert chi2.ppf(1e-3, 60) < total < chi2.ppf(1 - 1e-3, 60)
+
+
+def test_force_and_stress_of_the_full_model_are_found(model, body):
+    """A force on the tip that rises and stays; its sensors are noisy dofs of the full model."""
+    omega, shapes = modes_of(model)
+    where = {tuple(np.round(x, 9)): 3 * k for k, x in enumerate(model.points)}
+    n_t, F = 600, 50.0
+    load = np.zeros(model.n_dofs)
+    load[where[1.0, 0.0, 0.0] + 2] = F
+    g, wd = shapes.T @ load, omega * np.sqrt(1 - 0.02**2)
+    times = DT * np.arange(n_t)[:, None]
+    decay = np.exp(-0.02 * omega * times)
+    y = g / omega**2 * (1 - decay * (np.cos(wd * times) + 0.02 * omega / wd * np.sin(wd * times)))
+    a = g * decay * (np.cos(wd * times) - 0.02 * omega / wd * np.sin(wd * times))
+    rng = np.random.default_rng(4)
+    dofs = [where[0.5, 0.0, 0.0] + 2, where[1.0, 0.1, 0.0] + 2, where[0.75, 0.0, 0.0] + 2]
+    low = omega < 2 * np.pi * 3000  # what an amplifier lets through
+    clean = np.column_stack([y @ shapes[dofs[0]], a[:, low] @ shapes[dofs[1:]][:, low].T])
+    noise = np.array([1e-6, 0.5, 0.5])
+    samples = clean + noise * rng.standard_normal(clean.shape)
+    near, far = (where[tuple(x)] for x in GAUGE)
+    stress = STEEL.E / 0.125 * y @ (shapes[far] - shapes[near])
+    t = made(body, unmodelled=0.05)
+    t_late = slice(n_t // 2, None)
+    found = t.run(samples, times[:, 0])
+    assert_allclose(found.forces[t_late].mean(), F, rtol=0.03)
+    late = found.values[t_late]
+    assert_allclose(late[:, 0].mean(), stress[t_late].mean(), rtol=0.03)
+    tip = y @ shapes[where[1.0, 0.0, 0.0] + 2]
+    # the tip is rigid in the body, and gives way below the force in the full model
+    assert_allclose(late[:, 1].mean(), tip[t_late].mean(), rtol=0.02)
+    inside = np.abs(found.values[20:, 0] - stress[20:]) < 3 * found.deviations[20:, 0]
+    assert inside.mean() > 0.97
+
+
+def test_the_fmu_says_what_python_says(filter_, tmp_path):
+    o = filter_.observer()
+    path = rom.io.write_observer_fmu(o, tmp_path / "tip.fmu")
+    assert fmpy.validation.validate_fmu(str(path)) == []
+    _, y = walked(filter_, np.random.default_rng(1))
+    expected = o.run(y[:100])
+    one = Instance(path, tmp_path).begin()
+    names = [name for name, _ in o.outputs]
+    found = []
+    for k, sample in enumerate(y[:100]):
+        for (name, _), z in zip(o.inputs, sample, strict=True):
+            one.set(f"sensor.{name}", z)
+        one.fmu.doStep(k * DT, DT)
+        found.append(one.get(*(f"estimate.{name}" for name in names)))
+    scale = np.abs(expected).max(axis=0)
+    assert_allclose(found / scale, expected / scale, rtol=0, atol=1e-10)
+    assert_allclose(one.get(*(f"deviation.{name}" for name in names)), o.deviations, rtol=1e-15)
+    assert "must be the 0.0005 s" in one.fails(one.fmu.doStep, 100 * DT, 2 * DT)
+    assert "not a finite" in one.fails(one.set, "sensor.displacement[1]", np.nan)
+
+
+def test_a_missing_sample_is_left_out(filter_):
+    """A record with one sensor away for a while: bounds grow, and are those of the others alone."""
+    t = filter_
+    _, y = walked(t, np.random.default_rng(7))
+    gone = y.copy()
+    gone[:, 1] = np.nan
+    rest = replace(t, C=t.C[[0, 2]], R=t.R[[0, 2]])
+    assert_allclose(t.run(gone).values, rest.run(y[:, [0, 2]]).values, rtol=1e-8, atol=1e-12)
+    assert (t.run(gone).deviations[-1] > t.run(y).deviations[-1]).all()
+
+
+def test_stress_turns_with_its_direction(body):
+    """Normal stress along d is d sigma d; shear counts twice."""
+    rng = np.random.default_rng(3)
+    s = rng.normal(size=(6, body.n_modes))
+    odd = replace(body, stress=StressRecovery(np.array(GAUGE[:1]), s))
+    d = np.array([0.6, 0.0, 0.8])
+    q = rng.normal(size=body.n_modes)
+    xx, yy, zz, yz, xz, xy = s @ q
+    tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    row, _ = stress_rows(odd, Channels(GAUGE[:1], [5 * d]), "sensor")
+    assert_allclose(row[0] @ q, d @ tensor @ d)
+
+
+def test_what_cannot_be_tracked_is_named(body, filter_):
+    def refused(words, kind=ConfigError, **options):
+        with pytest.raises(kind, match=words):
+            made(body, **options)
+
+    refused("do not see 'force 0'", ModelError, sensors=FEW[1:])
+    refused("1 sensors for 2 unknown forces", sensors=FEW[:1],
+            forces=Channels([[1, 0, 0], [0.5, 0, 0]], [[0, 0, 1]] * 2))  # fmt: skip
+    refused("no noise", sensors=(replace(FEW[0], noise=0.0),))
+    refused("off the body", sensors=(replace(FEW[0], channels=Channels([[3, 0, 0]], [[0, 0, 1]])),))
+    refused("off the body", wanted=(replace(WANTED[0], channels=TIP),))
+    refused("dt", dt=0.0)
+    refused("walk", walk=-1.0)
+    refused("unmodelled", unmodelled=-1.0)
+    refused("drift", ModelError, fixed=(), sensors=FEW[:1])
+    with pytest.raises(ConfigError, match="quantity"):
+        Sensors(TIP, "strain")
+    with pytest.raises(ConfigError, match="negative"):
+        Sensors(TIP, "velocity", -1.0)
+    with pytest.raises(ModelError, match="carries no stress"):
+        made(replace(body, stress=None))
+    with pytest.raises(ConfigError, match=r"samples \(4, 2\)"):
+        filter_.run(np.zeros((4, 2)))
+    with pytest.raises(ConfigError, match=r"step after t = 0\.0005 s is 0.001 s"):
+        filter_.run(np.zeros((3, 3)), [0.0, DT, 3 * DT])
+    with pytest.raises(ConfigError, match="finite"):
+        filter_.observer().run(np.full((2, 3), np.nan))
