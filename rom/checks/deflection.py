@@ -27,7 +27,7 @@ DISPLACEMENT_RTOL = 5e-3  # of the largest load, in the mean square over the mas
 TANGENT_RTOL = 2e-2  # small errors of stress are large ones of the stiffness it gives a thin body
 FORCES = ("f_x", "f_y", "f_z", "m_x", "m_y", "m_z")
 STEP_SHARES = (0.35, 0.7, 1.0)  # of the largest load
-PROPORTION = np.sqrt(2) - 1  # of a component to the one before: between one alone and two equal
+UNTRAINED_RATIO = np.sqrt(2) - 1  # of a component to the one before, as trained nowhere
 N_TANGENT = 3  # lowest frequencies compared there
 MAX_ITERATIONS = 30  # of Newton's method on the full model
 INCREMENT_RTOL = 1e-8  # last increment of it; the next one is its square
@@ -135,7 +135,7 @@ def load_cases(geometric: Geometric) -> dict[str, Array]:
     cases = {f"{sign}{name}": value * unit for name, unit in named.items()
              for sign, value in (("", 1.0), ("-", -1.0))}  # fmt: skip
     if len(named) > 1:
-        falling = PROPORTION ** np.arange(len(named))
+        falling = UNTRAINED_RATIO ** np.arange(len(named))
         falling /= np.linalg.norm(falling)
         cases["all, the first most"] = falling
         cases["all, the last most"] = falling[::-1] * (-1.0) ** np.arange(len(named))

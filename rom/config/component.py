@@ -16,6 +16,7 @@ from rom.units import LENGTH, in_si, unit
 if TYPE_CHECKING:
     from rom.body.damping import ModalDamping, Rayleigh
     from rom.body.flexible import FlexibleBody
+    from rom.body.nonlinear.geometric import Geometric
     from rom.model import Attachment, FEModel
 
 
@@ -120,7 +121,7 @@ class Component:
             self.model(), method=method, interfaces=kinds, damping=damping, name=self.name,
             reference=reference[0] if len(reference) == 1 else reference,
             stress=reduction["stress"], stiffening=reduction["stiffening"],
-            certify=reduction["certificate"],
+            nonlinear=self.nonlinear(), certify=reduction["certificate"],
         )  # fmt: skip
 
     def material(self) -> Any:
@@ -146,6 +147,20 @@ class Component:
             )
         with self.at("damping"):
             return ModalDamping(values["ratio"]) if "ratio" in values else Rayleigh(**values)
+
+    def nonlinear(self) -> "Geometric | None":
+        """Loads of large deflection for `rom.reduce`; None for a body of small deflection."""
+        from rom.body.nonlinear.geometric import Geometric
+
+        values = self.values["reduction"].get("nonlinear")
+        if values is None:
+            return None
+        loads = {name: (*x["force"], *x["moment"]) for name, x in values["loads"].items()}
+        with self.at("reduction", "nonlinear"):
+            return Geometric(
+                loads=loads, n_modes=values["modes"], tol=values["tol"],
+                n_shapes=values.get("shapes"), n_steps=values["steps"],
+            )  # fmt: skip
 
     def at(self, *path: str) -> "Located":
         """Context that tells the line of a key in errors raised below it."""

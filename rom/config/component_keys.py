@@ -142,6 +142,16 @@ TABLE = Table("A component.", (
         Key("reference", Words(), "The frame: mean-axis, an interface, or two of them.",
             ("mean-axis",)),
         Key("stiffening", Flag(), "Add the geometric stiffness of rotation and loads.", False),
+        Key("nonlinear", Table("Loads under which it is to deflect far, and shapes for them.", (
+            Key("loads", Named(Table("The largest load on an interface, of either sign.", (
+                Key("force", Quantity("N", ((3,),)), "Along the axes of the geometry.", (0.0,) * 3),
+                Key("moment", Quantity("N m", ((3,),)), "About the same axes.", (0.0,) * 3),
+            )), "loads"), "Largest loads by interface.", ...),
+            Key("modes", Whole(), "So many of the lowest modes drag others along.", 4),
+            Key("tol", Quantity("1", positive=True), "Share of the states left out.", 1e-4),
+            Key("shapes", Whole(1), "So many shapes are added; as tol asks if missing."),
+            Key("steps", Whole(1), "States on the way to the largest load.", 4),
+        )), "Reach large deflection."),
         Key("stress", Flag(), "Make stress on the surface recoverable.", False),
         Key("certificate", Flag(), "Compare with the full model.", True),
     )), "How it is reduced.", {}),

@@ -205,6 +205,8 @@ def test_no_load_of_the_certificate_together_with_others_is_one_of_the_shapes():
         cosines = np.abs(geometric.load_cases() @ np.array(list(cases.values())).T)
         assert cosines.max() < 0.93
         assert_allclose([v @ v for v in cases.values()], 1.0)
+        first, last = cases.values()
+        assert np.all(first[1:] * first[:-1] > 0) and np.all(last[1:] * last[:-1] < 0)
 
 
 def test_the_range_is_stored_with_the_share_up_to_which_it_holds(certified):

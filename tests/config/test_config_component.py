@@ -267,3 +267,28 @@ def test_the_page_has_every_key_with_its_meaning():
         assert any(meant in line for line in row), name
     assert "| must be given | Young's modulus. |" in text and '"mean-axis"' in text
     assert all(sample.strip() in text for sample in samples)
+
+
+def test_loads_of_large_deflection_are_those_of_the_same_words_in_python(folder):
+    asked = """
+[reduction.nonlinear]
+modes = 2
+shapes = 9
+[reduction.nonlinear.loads.tip]
+force = ["0 N", "2 kN", "0 N"]
+moment = [0, 0, "3 N m"]
+"""
+    file = folder / "bar.toml"
+    plain = file.read_text()
+    assert read_component(file).nonlinear() is None
+    file.write_text(plain + asked)
+    found = read_component(file).nonlinear()
+    assert found == rom.Geometric(
+        loads={"tip": (0.0, 2000.0, 0.0, 0.0, 0.0, 3.0)}, n_modes=2, n_shapes=9
+    )
+    with pytest.raises(ConfigError, match="no finite elements"):
+        read_component(file).body()
+    file.write_text(plain + asked.replace("2 kN", "0 N").replace("3 N m", "0 N m"))
+    with pytest.raises(ConfigError, match="not all zero") as refused:
+        read_component(file).nonlinear()
+    assert "bar.toml:" in str(refused.value)
