@@ -148,8 +148,8 @@ view.plane(
     options.out / "virtual_sensing.png",
     title="A displacement, two accelerations, and the stress elsewhere",
     caption="Sensors are where effective independence keeps three of 75 candidates. A Kalman "
-    "filter with the reduced rod and a force of unknown history, a random walk, gives force and stress "
-    "with two standard deviations about them. The record was simulated with a richer basis.",
+    "filter with the reduced rod and a force of unknown history, a random walk, gives force and "
+    "stress with two standard deviations about them. A richer basis made the record.",
 )  # fmt: skip
 
 # ## What to remember
