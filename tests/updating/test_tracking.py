@@ -213,6 +213,18 @@ def test_stress_turns_with_its_direction(body):
     assert_allclose(row[0] @ q, d @ tensor @ d)
 
 
+def test_modes_left_out_follow_the_accelerations(body):
+    """As the recovery itself says, of frame and elastic accelerations."""
+    rng, r = np.random.default_rng(6), body.n_modes
+    own = StressRecovery(np.array(GAUGE[:1]), rng.normal(size=(6, r)), rng.normal(size=(6, 12 + r)))
+    static, inertial = stress_rows(
+        replace(body, stress=own), Channels(GAUGE[:1], [[0, 1, 0]]), "sensor"
+    )
+    q, a = rng.normal(size=r), rng.normal(size=6 + r)
+    expected = own.field(q, own.accelerations(a[:3], a[3:6], np.zeros(3), a[6:]))[0, 1]
+    assert_allclose(static[0] @ q + inertial[0] @ a, expected)
+
+
 def test_what_cannot_be_tracked_is_named(body, filter_):
     def refused(words, kind=ConfigError, **options):
         with pytest.raises(kind, match=words):

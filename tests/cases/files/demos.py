@@ -19,7 +19,8 @@ LONG_DEMOS = {
     "demo_periodic", "demo_planetary",
     "demo_robot_arm", "demo_rockfall", "demo_rolling_wheel", "demo_rotating_blade",
     "demo_rotor", "demo_satellite", "demo_sheet", "demo_slider_crank", "demo_snap_through",
-    "demo_spin_up", "demo_transmission", "demo_two_stage", "demo_updating", "demo_whole_turbine",
+    "demo_spin_up", "demo_transmission", "demo_two_stage", "demo_updating", "demo_virtual_sensing",
+    "demo_whole_turbine",
     "demo_wind_power", "demo_wind_turbine",
 }  # fmt: skip
 LEFT_BEHIND = {
@@ -55,6 +56,7 @@ LEFT_BEHIND = {
     "demo_satellite": {"satellite.png", "satellite.gif"},
     "demo_rolling_wheel": {"rolling_wheel.png"},
     "demo_updating": {"updating.png"},
+    "demo_virtual_sensing": {"virtual_sensing.png"},
     "demo_whole_turbine": {
         "turbine_campbell.png", "whole_turbine.gif", "whole_turbine.png",
     },
