@@ -54,25 +54,32 @@ def growth(work):
     return resident("VmHWM") - before
 
 
-def taken_and_foreseen(shape):
-    """Memory of a reduction and what its analysis said [bytes]."""
-    from rom.fe.operators.foreseen import N_MATRICES, analysed, beside_factor
+def taken_and_foreseen(shape, solver):
+    """Memory of a reduction and what its analysis, or the matrix alone, said [bytes]."""
+    from rom.fe.operators.foreseen import N_MATRICES, analysed, beside_factor, multigrid_bytes
 
-    model = bar(SHAPES[shape])
+    model = bar(SHAPES[shape], solver)
     K = operators(model).K
-    foreseen = beside_factor(K, 12, N_MATRICES) + analysed(K).in_core
+    solved = analysed(K).in_core if solver == "direct" else multigrid_bytes(K)
+    foreseen = beside_factor(K, 12, N_MATRICES) + solved
 
     def reduction(m):
         rom.reduce(m, method=rom.CraigBampton(20), interfaces=KINDS, certify=False)
 
-    reduction(bar((1.0, 0.1, 0.1, 0.1)))  # what is loaded and compiled once is not foreseen
+    reduction(bar((1.0, 0.1, 0.1, 0.1), solver))  # what is loaded and compiled once is not foreseen
     return growth(lambda: reduction(model)), foreseen
 
 
-@pytest.mark.parametrize("shape", TRIED)
-def test_a_reduction_takes_the_memory_foreseen(shape):
+@pytest.mark.parametrize(
+    ("shape", "solver"),
+    [
+        *((shape, "direct") for shape in TRIED),
+        *(pytest.param(s, "iterative", marks=pytest.mark.long) for s in ("plate", "rod")),
+    ],
+)
+def test_a_reduction_takes_the_memory_foreseen(shape, solver):
     """In a process of its own: what other tests leave in the heap is no part of it."""
-    code = f"import test_fe_foreseen as t; print(*t.taken_and_foreseen({shape!r}))"
+    code = f"import test_fe_foreseen as t; print(*t.taken_and_foreseen{shape, solver})"
     here = f"{Path(__file__).parent}{os.pathsep}{ENVIRONMENT['PYTHONPATH']}"
     ran = subprocess.run([sys.executable, "-c", code], env=ENVIRONMENT | {"PYTHONPATH": here},
                          capture_output=True, text=True, check=True)  # fmt: skip
