@@ -62,6 +62,10 @@ class ModalDamping:
 
     Warns:
         RomWarning: for a ratio that no structure has.
+
+    Example:
+        >>> ModalDamping(0.02).ratio
+        0.02
     """
 
     ratio: npt.ArrayLike

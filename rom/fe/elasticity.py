@@ -24,7 +24,7 @@ from rom.fe.mesh.cad import Axis
 from rom.fe.mesh.curving import without_middles
 from rom.fe.mesh.solid import SolidMesh
 from rom.fe.operators.aij import symmetric, without_zeros, wrapped
-from rom.fe.operators.costs import LEAST_SHARED_DOFS, reduction_seconds
+from rom.fe.costs import LEAST_SHARED_DOFS, reduction_seconds
 from rom.fe.operators.foreseen import automatic
 from rom.fe.operators.memory import give_back
 from rom.fe.operators.petsc import PETScOperators

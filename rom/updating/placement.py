@@ -74,7 +74,7 @@ class Plan:
                 rows.append(",".join([kind, str(k), *(f"{x:.9g}" for x in values)]))
         return "\n".join(rows) + "\n"
 
-    def universal(self) -> str:
+    def uff(self) -> str:
         """Data set 15 of a universal file: the points, sensors first, numbered from one [m]."""
         points = np.vstack([self.sensors.points, self.inputs.points])
         lines = [

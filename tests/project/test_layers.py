@@ -137,6 +137,7 @@ ORDER = {
         "blades",
     ),
     "fe": (
+        "costs",
         "parallel",
         "jit",
         "compat",
@@ -147,7 +148,6 @@ ORDER = {
         "probe",
     ),
     "fe.operators": (
-        "costs",
         "solver",
         "memory",
         "disk",

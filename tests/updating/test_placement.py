@@ -148,7 +148,7 @@ def test_the_plan_is_written(family):
     assert [row[0] for row in rows] == ["kind", *["sensor"] * 3, *["input"] * 2]
     assert_allclose(np.array(rows[1:4])[:, 2:5].astype(float), plan.sensors.points)
     assert_allclose(np.array(rows[4], dtype=object)[5:].astype(float), [0, 0.5**0.5, 0.5**0.5])
-    lines = plan.universal().splitlines()
+    lines = plan.uff().splitlines()
     assert [lines[k].strip() for k in (0, 1, -1)] == ["-1", "15", "-1"]
     points = np.array([[float(x) for x in line[40:].split()] for line in lines[2:-1]])
     assert_allclose(points, np.vstack([plan.sensors.points, plan.inputs.points]), atol=1e-5)

@@ -2,7 +2,7 @@
 
 import pytest
 
-from rom.fe.operators.costs import factor_cost, least_machines, reduction_seconds
+from rom.fe.costs import factor_cost, least_machines, reduction_seconds
 
 # dofs, flops, entries, of beams of quadratic tetrahedra, by the analysis of MUMPS
 COUNTED = [
