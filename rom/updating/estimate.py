@@ -86,7 +86,7 @@ class Updated:
         """The body at the factors found; its provenance says by which data, and how surely."""
         own: dict[str, Any] = {name: self.factors[name] for name in self.family.parameters}
         body = self.family.at(**own)
-        said = {
+        data = {
             "factors": self.factors,
             "deviations": self.deviations,
             "damping": self.zeta.tolist(),
@@ -94,7 +94,7 @@ class Updated:
             "sensors": self.by_sensor.size,
             "verdict holds": self.verdict.ok,
         }
-        return replace(body, provenance=body.provenance | {"updating": said})
+        return replace(body, provenance=body.provenance | {"updating": data})
 
     def responses(self, frequencies: Any) -> Complex:
         """(n_f, n_s, n_e) displacement per force of the updated model at lines [Hz] [m/N].

@@ -24,7 +24,7 @@ EXAMPLES = """\
       --spring clamp=root:1e8,1e8,1e8:0.1:10 --mass cable=tip:0.05:0.1:10 --candidate cable \\
       -o updated.rom.npz
 """
-FACTORS = "by a factor from LOW to HIGH that is sought; may be repeated"
+FACTOR_HELP = "by a factor from LOW to HIGH that is sought; may be repeated"
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -41,11 +41,11 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     parser.add_argument(
         "--spring", metavar="NAME=INTERFACE:KX,KY,KZ:LOW:HIGH", type=assignment, action="append",
-        default=[], help=f"between an interface and the ground [N/m, N m/rad], {FACTORS}",
+        default=[], help=f"between an interface and the ground [N/m, N m/rad], {FACTOR_HELP}",
     )  # fmt: skip
     parser.add_argument(
         "--mass", metavar="NAME=INTERFACE:KG:LOW:HIGH", type=assignment, action="append",
-        default=[], help=f"on an interface [kg], {FACTORS}",
+        default=[], help=f"on an interface [kg], {FACTOR_HELP}",
     )  # fmt: skip
     parser.add_argument(
         "--candidate", metavar="NAME,...", type=names, default=(),

@@ -17,7 +17,7 @@ from rom.io.hdf5 import h5py
 from rom.updating.measured import Channels, Responses
 
 MAX_ARRAY_BYTES = 2**32  # of all arrays of a test
-WANTED = ("frequencies", "H", "coherence", "sensors/points", "sensors/directions",
+DATA_SETS = ("frequencies", "H", "coherence", "sensors/points", "sensors/directions",
           "inputs/points", "inputs/directions")  # fmt: skip
 
 
@@ -32,7 +32,7 @@ def written(test: Responses, path: Path) -> Path:
               test.sensors.directions, test.inputs.points, test.inputs.directions)  # fmt: skip
     data = io.BytesIO()
     with h5py(".uff").File(data, "w") as file:
-        for name, value in zip(WANTED, values, strict=True):
+        for name, value in zip(DATA_SETS, values, strict=True):
             file[name] = np.asarray(value)
         file.attrs["averages"] = test.averages
         file.attrs["quantity"] = test.quantity
@@ -59,17 +59,17 @@ def read(path: Path) -> Responses:
 
 def _test(path: Path, file: Any) -> Responses:
     h5 = h5py(".uff")
-    if missing := [name for name in WANTED if not isinstance(file.get(name), h5.Dataset)]:
+    if missing := [name for name in DATA_SETS if not isinstance(file.get(name), h5.Dataset)]:
         raise FileFormatError(f"there is no data set {missing[0]!r}.", where=str(path))
     if missing := [name for name in ("averages", "quantity", "units") if name not in file.attrs]:
         raise FileFormatError(f"the file has no attribute {missing[0]!r}.", where=str(path))
     if file.attrs["units"] != "SI":
         raise FileFormatError(f"units are {file.attrs['units']!r}, not 'SI'.", where=str(path))
-    if sum(file[name].nbytes for name in WANTED) > MAX_ARRAY_BYTES:
+    if sum(file[name].nbytes for name in DATA_SETS) > MAX_ARRAY_BYTES:
         raise UnsafeFileError("its arrays take more than 4 GiB.", where=str(path))
-    if wrong := [name for name in WANTED if file[name].dtype.kind not in "fciu"]:
+    if wrong := [name for name in DATA_SETS if file[name].dtype.kind not in "fciu"]:
         raise FileFormatError(f"{wrong[0]!r} holds no numbers.", where=str(path))
-    f, H, c, *where = (file[name][()] for name in WANTED)
+    f, H, c, *where = (file[name][()] for name in DATA_SETS)
     sensors, inputs = Channels(*where[:2]), Channels(*where[2:])
     averages, quantity = int(file.attrs["averages"]), str(file.attrs["quantity"])
     return Responses(f, H, sensors, inputs, c, averages, quantity)

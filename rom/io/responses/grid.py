@@ -41,10 +41,10 @@ def side_by_side(
         ConfigError: as `Responses`.
     """
     found = _by_pair(path, [f for f in functions if f.kind == FREQUENCY_RESPONSE])
-    said = _by_pair(path, [f for f in functions if f.kind == COHERENCE_KIND])
+    coherences = _by_pair(path, [f for f in functions if f.kind == COHERENCE_KIND])
     if not found:
         raise FileFormatError("there is no frequency response to a force.", where=str(path))
-    if coherence is None and (silent := sorted(set(found) - set(said))):
+    if coherence is None and (silent := sorted(set(found) - set(coherences))):
         raise FileFormatError(
             f"there is no coherence of {_some(silent)}.",
             where=str(path),
@@ -58,7 +58,7 @@ def side_by_side(
         at = sensors.index(sensor), inputs.index(force)
         _check_lines(path, f, x)
         H[at] = _receptance(f)
-        own = said.get((sensor, force))
+        own = coherences.get((sensor, force))
         c[at] = coherence if own is None or coherence is not None else _rounded(path, own, x)
     keep = x > 0  # no displacement follows from motion at 0 Hz
     where = [_channels(path, dofs, points) for dofs in (sensors, inputs)]

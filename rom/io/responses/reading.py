@@ -10,7 +10,11 @@ from rom.io.responses.grid import side_by_side
 from rom.model import Array
 from rom.updating.measured import MeasuredModes, Responses
 
-UNIVERSAL, TABLES, ARRAYS = (".uff", ".unv", ".uf"), (".csv", ".txt"), (".h5", ".hdf5")
+UNIVERSAL_ENDINGS, TABLE_ENDINGS, ARRAY_ENDINGS = (
+    (".uff", ".unv", ".uf"),
+    (".csv", ".txt"),
+    (".h5", ".hdf5"),
+)
 
 
 @typed
@@ -48,22 +52,22 @@ def read_responses(
 
     path = Path(path)
     ending = path.suffix.lower()
-    if ending in ARRAYS:
+    if ending in ARRAY_ENDINGS:
         from rom.io.responses.arrays import read
 
         if averages is not None or coherence is not None or points is not None:
             raise ConfigError(f"{path} says averages, coherence and points itself.")
         with _of(path):
             return read(path)
-    if ending not in UNIVERSAL + TABLES:
-        raise _unknown(path, UNIVERSAL + TABLES + ARRAYS)
+    if ending not in UNIVERSAL_ENDINGS + TABLE_ENDINGS:
+        raise _unknown(path, UNIVERSAL_ENDINGS + TABLE_ENDINGS + ARRAY_ENDINGS)
     if averages is None:
         raise ConfigError(
             "averages is missing: how many are behind the functions?",
             hint="Without it the coherence says nothing of random errors.",
         )
     nodes: dict[int, Array] = {}
-    if ending in TABLES:
+    if ending in TABLE_ENDINGS:
         functions = functions_of(path)
     else:
         functions, nodes = functions_and_points(path)
@@ -108,8 +112,8 @@ def write_responses(test: Responses, path: str | Path) -> Path:
     """
     from rom.io.responses.arrays import written
 
-    if Path(path).suffix.lower() not in ARRAYS:
-        raise _unknown(Path(path), ARRAYS)
+    if Path(path).suffix.lower() not in ARRAY_ENDINGS:
+        raise _unknown(Path(path), ARRAY_ENDINGS)
     return written(test, Path(path))
 
 
@@ -129,7 +133,9 @@ def _points(path: str | Path | None) -> dict[int, Array]:
     if path is None:
         return {}
     path = Path(path)
-    return points_of(path) if path.suffix.lower() in TABLES else functions_and_points(path)[1]
+    return (
+        points_of(path) if path.suffix.lower() in TABLE_ENDINGS else functions_and_points(path)[1]
+    )
 
 
 def _unknown(path: Path, known: tuple[str, ...]) -> ConfigError:

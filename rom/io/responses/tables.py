@@ -19,15 +19,17 @@ from rom.io.responses.test_units import length_of, motion_per_force
 from rom.model import Array
 
 MAX_TABLE_BYTES = 2**29
-COLUMN = re.compile(
+COLUMN_NAME = re.compile(
     r"(\d+)\s*:?\s*([+-]?)([XYZ])\s*/\s*(\d+)\s*:?\s*([+-]?)([XYZ])[\s,;:]*"
     r"(real|imag|magnitude|phase|coherence)\s*(?:[\[(](.+)[\])])?",
     re.IGNORECASE,
 )
 POINT_COLUMN = re.compile(r"([xyz])\s*[\[(](.+)[\])]", re.IGNORECASE)
 ANGLES = {"deg": np.pi / 180, "rad": 1.0}
-HINT = "A column is named as in 12+Z/3-Y real [m/s^2/N]; parts are real and imag, or magnitude "
-HINT += "and phase [deg], and coherence."
+NAME_HINT = (
+    "A column is named as in 12+Z/3-Y real [m/s^2/N]; parts are real and imag, or magnitude "
+)
+NAME_HINT += "and phase [deg], and coherence."
 Row = list[str]
 
 
@@ -42,10 +44,10 @@ def functions_of(path: Path) -> tuple[Function, ...]:
         values[:, 0] *= 1e3
     parts: dict[tuple[Dof, Dof], dict[str, tuple[str, Array]]] = {}
     for k, name in enumerate(names[1:], 1):
-        found = COLUMN.fullmatch(name)
+        found = COLUMN_NAME.fullmatch(name)
         if not found:
             raise FileFormatError(
-                f"column {k + 1} has the name {name!r}.", where=str(path), hint=HINT
+                f"column {k + 1} has the name {name!r}.", where=str(path), hint=NAME_HINT
             )
         s, s_sign, s_axis, e, e_sign, e_axis, part, unit = found.groups()
         pair = (int(s), _axis(s_sign, s_axis)), (int(e), _axis(e_sign, e_axis))
@@ -90,7 +92,7 @@ def _functions(
     response = set(own) - {"coherence"}
     if response not in ({"real", "imag"}, {"magnitude", "phase"}, set()):
         raise FileFormatError(
-            f"of {pair} there is {sorted(response)} alone.", where=str(path), hint=HINT
+            f"of {pair} there is {sorted(response)} alone.", where=str(path), hint=NAME_HINT
         )
     found = []
     if response:
@@ -102,13 +104,13 @@ def _functions(
             )
         if first == "magnitude" and other not in ANGLES:
             raise FileFormatError(
-                f"of {pair} the phase has the unit {other!r}.", where=str(path), hint=HINT
+                f"of {pair} the phase has the unit {other!r}.", where=str(path), hint=NAME_HINT
             )
         try:
             kind, factor = motion_per_force(unit)
         except ConfigError as error:
             raise FileFormatError(
-                error.message, where=str(path), hint=error.hint or HINT
+                error.message, where=str(path), hint=error.hint or NAME_HINT
             ) from error
         y = a + 1j * b if first == "real" else a * np.exp(1j * b * ANGLES[other])
         found.append(_function(FREQUENCY_RESPONSE, pair, x, y * factor, kind))
