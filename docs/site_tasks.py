@@ -22,7 +22,7 @@ TASKS: dict[str, tuple[str, str]] = {
     "Update": (
         "A family of bodies corrected by measured responses, and what the data can say.",
         """update updating.Updated updating.Responses updating.Channels updating.GroundSpring
-        updating.AddedMass updating.Plan updating.place updating.candidates updating.independent
+        updating.AddedMass updating.MeasuredModes updating.Plan updating.place updating.candidates updating.independent
         updating.tracker updating.Tracker updating.Sensors updating.Track updating.Observer
         io.write_observer_fmu""",
     ),
@@ -84,7 +84,8 @@ TASKS: dict[str, tuple[str, str]] = {
         io.write_vtu io.write_vtkhdf io.write_glb io.MovingMesh write_fmu write_mechanism_fmu
         write_body_fmu read_sid io.write_sid io.sid_body io.standard_input io.StandardInput
         io.write_mbdyn io.write_exudyn io.write_openfast io.read_openfast io.Superelement
-        io.write_simscape io.write_radioss io.interface_form io.InterfaceForm io.read_universal""",
+        io.write_simscape io.write_radioss io.interface_form io.InterfaceForm io.read_universal
+        io.read_responses io.read_modes io.write_responses""",
     ),
     "Matrices of other programs": (
         "Stiffness and mass from files, to be reduced here, and back.",

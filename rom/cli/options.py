@@ -29,6 +29,18 @@ def number(text: str) -> float:
     return value
 
 
+def typed_number(option: str, text: str) -> float:
+    """A finite number in the value of an option.
+
+    Raises:
+        ConfigError: naming what is none.
+    """
+    try:
+        return number(text)
+    except argparse.ArgumentTypeError as error:
+        raise ConfigError(f"{option}: {error}.") from None
+
+
 def positive(text: str) -> float:
     """A number above zero."""
     value = number(text)

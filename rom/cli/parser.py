@@ -17,6 +17,7 @@ from rom.cli.verbs import (
     report,
     simulate,
     swing,
+    update,
     view,
 )
 from rom.config.keys import nearest
@@ -33,6 +34,7 @@ VERBS = (
     view,
     report,
     swing,
+    update,
     bench,
     completion,
 )

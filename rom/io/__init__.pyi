@@ -35,6 +35,9 @@ from rom.io.programs.openfast_reading import Superelement as Superelement
 from rom.io.programs.openfast_reading import read_openfast as read_openfast
 from rom.io.programs.radioss import write_radioss as write_radioss
 from rom.io.programs.simscape import write_simscape as write_simscape
+from rom.io.responses.reading import read_modes as read_modes
+from rom.io.responses.reading import read_responses as read_responses
+from rom.io.responses.reading import write_responses as write_responses
 from rom.io.sid.body import sid_body as sid_body
 from rom.io.sid.body import standard_input as standard_input
 from rom.io.sid.dialect import check_sid as check_sid

@@ -2,6 +2,7 @@ from rom.updating.estimate import Updated as Updated
 from rom.updating.family_model import AddedMass as AddedMass
 from rom.updating.family_model import GroundSpring as GroundSpring
 from rom.updating.measured import Channels as Channels
+from rom.updating.measured import MeasuredModes as MeasuredModes
 from rom.updating.measured import Responses as Responses
 from rom.updating.placement import Plan as Plan
 from rom.updating.placement import candidates as candidates

@@ -6,7 +6,7 @@ Source:
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -83,9 +83,18 @@ class Updated:
 
     @property
     def body(self) -> FlexibleBody:
-        """The body at the factors found."""
+        """The body at the factors found; its provenance says by which data, and how surely."""
         own: dict[str, Any] = {name: self.factors[name] for name in self.family.parameters}
-        return self.family.at(**own)
+        body = self.family.at(**own)
+        data = {
+            "factors": self.factors,
+            "deviations": self.deviations,
+            "damping": self.zeta.tolist(),
+            "lines": int(np.count_nonzero(np.isfinite(self.by_line))),
+            "sensors": self.by_sensor.size,
+            "verdict holds": self.verdict.ok,
+        }
+        return replace(body, provenance=body.provenance | {"updating": data})
 
     def responses(self, frequencies: Any) -> Complex:
         """(n_f, n_s, n_e) displacement per force of the updated model at lines [Hz] [m/N].

@@ -149,3 +149,62 @@ class Responses:
         s = 2j * np.pi * self.frequencies[:, None, None]
         used = self.relative_error() <= MAX_RELATIVE_ERROR
         return np.log(np.where(used, self.H / s ** DERIVATIVES[self.quantity], 1.0))
+
+
+@dataclass(frozen=True, slots=True)
+class MeasuredModes:
+    """Modes that another program found in a test.
+
+    Attributes:
+        frequencies: (m,) ascending [Hz].
+        damping: (m,) ratios [1].
+        points: (k, 3) where shapes are known, in the axes of the geometry [m].
+        shapes: (m, k, 3) real or complex, of any scale.
+
+    Raises:
+        ConfigError: if these do not fit each other, or a shape is zero or not finite.
+    """
+
+    frequencies: Array
+    damping: Array
+    points: Array
+    shapes: Any
+
+    def __post_init__(self) -> None:
+        m, k = len(self.frequencies), len(self.points)
+        shapes = np.asarray(self.shapes)
+        if shapes.shape != (m, k, 3) or np.shape(self.damping) != (m,):
+            raise ConfigError(f"shapes {shapes.shape} for {m} modes at {k} points: ({m}, {k}, 3).")
+        size = np.linalg.norm(shapes, axis=(1, 2))
+        if bad := np.flatnonzero(~(np.isfinite(size) & (size > 0))).tolist():
+            raise ConfigError(f"the shape of mode {bad[0] + 1} is zero or not finite.")
+
+    def mac(
+        self, body: FlexibleBody, *, fixed: Any = (), n: int, tolerance: float | None = None
+    ) -> Array:
+        """(m, n) modal assurance criterion of measured modes and elastic ones of a body [1].
+
+        Args:
+            body: with its outer surface.
+            fixed: what was held in the test, see `FlexibleBody.frequencies`.
+            n: number of elastic modes.
+            tolerance: see `Channels.rows` [m].
+
+        Raises:
+            ConfigError: if a point is off the body, or it has fewer modes.
+            InterfaceError, ModelError: see `FlexibleBody.modes` and `Channels.rows`.
+
+        Source:
+            Allemang and Brown, A correlation coefficient for modal vector analysis, IMAC (1982):
+            |a^H b|^2 / (a^H a b^H b).
+        """
+        omega, Phi = body.modes(fixed=fixed)
+        Phi = Phi[:, omega > 0]
+        if not 1 <= n <= Phi.shape[1]:
+            raise ConfigError(f"n = {n}: the body has {Phi.shape[1]} elastic modes.")
+        axes = np.tile(np.eye(3), (len(self.points), 1))
+        rows = Channels(np.repeat(self.points, 3, axis=0), axes).rows(body, "point", tolerance)
+        own = rows @ Phi[:, :n]
+        seen = np.asarray(self.shapes).reshape(len(self.frequencies), -1)
+        cross = np.abs(seen.conj() @ own) ** 2
+        return cross / np.outer((np.abs(seen) ** 2).sum(axis=1), (own**2).sum(axis=0))

@@ -57,8 +57,8 @@ def answer(capsys, *arguments):
 
 
 def test_verbs_are_those_of_the_design():
-    design = "doctor mesh modes reduce check export simulate view report swing bench completion"
-    assert design.split() == NAMES
+    first = "doctor mesh modes reduce check export simulate view report swing update"
+    assert [*first.split(), "bench", "completion"] == NAMES
 
 
 @pytest.mark.skipif(shutil.which("bash") is None, reason="there is no bash")

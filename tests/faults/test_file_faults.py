@@ -2,6 +2,7 @@
 
 import os
 import shutil
+from functools import partial
 
 import numpy as np
 import pytest
@@ -108,6 +109,9 @@ TEXTS = {  # case: (file name, its content, reader)
     "openfast": ("x.dat", exported("openfast", ["root"]), read_openfast),
     "openfast-4": ("x.dat", exported("openfast-4", ["root"]), read_openfast),
     "universal": ("x.unv", lambda folder: universal(False), read_universal),
+    "test": ("x.unv", whole("sdynpy_test.unv"), partial(rom.io.read_responses, averages=9)),
+    "test binary": ("x.uff", whole("pyuff_test.uff"), partial(rom.io.read_responses, averages=9)),
+    "modes": ("x.unv", whole("sdynpy_test.unv"), rom.io.read_modes),
     "universal binary": ("x.uff", lambda folder: universal(True), read_universal),
     "universal of another program": ("x.uff", whole("pyuff_binary.uff"), read_universal),
     "nodes": ("x.inp", deck, read_nodes),

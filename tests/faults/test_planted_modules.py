@@ -53,6 +53,7 @@ VERBS = {  # verb: a line that does what the verb is for
     "view": ("bar.rom.npz", "-o", "bar.png"),
     "report": ("bar.rom.npz", "-o", "bar.html"),
     "swing": ("box.geo", "--hinge", "root", "-m", "4", "--t-end", "1e-4", "-o", "swing"),
+    "update": ("--help",),
     "bench": ("--help",),
     "completion": ("bash",),
 }

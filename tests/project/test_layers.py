@@ -187,6 +187,7 @@ ORDER = {
         "archive",
         "native",
         "fields",
+        "responses",
         "matrices",
         "sid",
         "programs",

@@ -55,6 +55,9 @@ def test_names_are_found_where_they_were():
 
 
 NEW_IN_FRONTS = {
+    "read_modes",
+    "read_responses",
+    "write_responses",
     "Limit",
     "Rock",
     "modes",

@@ -13,10 +13,9 @@ from rom.cli.options import (
     assignment,
     count,
     names,
-    number,
+    typed_number,
     unique,
 )
-from rom.errors import ConfigError
 
 SUMMARY = "natural frequencies of the full model"
 EXAMPLES = """\
@@ -57,18 +56,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def _numbers(text: str) -> list[float]:
-    """Numbers with commas.
-
-    Raises:
-        ConfigError: naming what is none.
-    """
-    try:
-        return [number(part) for part in text.split(",")]
-    except argparse.ArgumentTypeError as error:
-        raise ConfigError(f"--spring: {error}.") from None
-
-
 def run(args: argparse.Namespace) -> Answer:
     """Assemble and solve."""
     from rom.workflow import modes
@@ -81,7 +68,10 @@ def run(args: argparse.Namespace) -> Answer:
     else:
         kinds, model = unique(args.interface, "-i"), read_model(args)
         n, fixed, springs = args.number, args.fixed, args.spring
-    stiffness = {name: _numbers(text) for name, text in unique(springs, "--spring").items()}
+    stiffness = {
+        name: [typed_number("--spring", part) for part in text.split(",")]
+        for name, text in unique(springs, "--spring").items()
+    }
     found = modes(model, n, fixed=fixed, springs=stiffness, interfaces=kinds or None)
     data = {
         "file": str(args.file),

@@ -1,4 +1,8 @@
-"""Functions at nodal dofs in universal files: dataset 58, in text and in binary (58b)."""
+"""Functions at nodal dofs in universal files: dataset 58, in text and in binary (58b).
+
+Source:
+    SDRC, Universal file datasets 58 and 58b, as published by the University of Cincinnati.
+"""
 
 from dataclasses import dataclass
 from itertools import pairwise
@@ -18,6 +22,7 @@ N_HEADER_RECORDS = 11  # before the values
 FREQUENCY_RESPONSE = 4
 PER_RECEPTANCE = {8: 0, 11: 1, 12: 2}  # displacement, velocity, acceleration: powers of i omega
 FORCE_TYPE = 13
+UNIT_LABEL = slice(47, 67)  # columns of records 8 to 11
 COMPLEX_TYPES, DOUBLE_TYPES = (5, 6), (4, 6)  # types of ordinate
 
 
@@ -34,6 +39,7 @@ class Function:
         numerator: type of the ordinate: 8 displacement, 11 velocity, 12 acceleration, 13 force.
         denominator: type of what it is divided by.
         labels: the first five lines, stripped.
+        units: labels of the units of numerator and denominator, stripped.
     """
 
     kind: int
@@ -44,6 +50,7 @@ class Function:
     numerator: int
     denominator: int
     labels: tuple[str, ...]
+    units: tuple[str, str] = ("", "")
 
     def receptance(self) -> npt.NDArray[np.complex128]:
         """(n,) displacement per force [m/N], whatever was measured.
@@ -71,9 +78,26 @@ def read_universal(path: str | Path) -> tuple[Function, ...]:
         FileFormatError: if the file is missing, cut, or holds no function.
         UnsafeFileError: if it is larger than 1 GiB.
     """
+    found, _ = scan(path)
+    if not found:
+        raise FileFormatError(f"{path} holds no function at nodal dofs (dataset 58).")
+    return found
+
+
+def scan(path: str | Path) -> tuple[tuple[Function, ...], dict[str, list[list[str]]]]:
+    """All datasets of a universal file: functions, and lines of the others by their number.
+
+    Args:
+        path: the file, .unv or .uff.
+
+    Raises:
+        FileFormatError: if the file is missing, or a dataset 58 is cut.
+        UnsafeFileError: if it is larger than 1 GiB.
+    """
     path = check_readable(path, MAX_BYTES)
     data, place = path.read_bytes(), 0
     found: list[Function] = []
+    others: dict[str, list[list[str]]] = {}
     while (place := _mark(data, place)) >= 0:
         place = _line_end(data, place)
         head = data[place : (after := _line_end(data, place))].split()
@@ -82,10 +106,13 @@ def read_universal(path: str | Path) -> tuple[Function, ...]:
         except (ValueError, IndexError, OverflowError) as error:
             where = f"dataset {len(found) + 1}"
             raise FileFormatError(f"{path}: {where} is cut or no dataset 58: {error}.") from error
-        found += [function] if function else []
-    if not found:
-        raise FileFormatError(f"{path} holds no function at nodal dofs (dataset 58).")
-    return tuple(found)
+        if function:
+            found.append(function)
+        elif head:
+            end = _mark(data, after)
+            text = data[after : end if end >= 0 else len(data)].decode("ascii", "replace")
+            others.setdefault(head[0].decode("ascii", "replace"), []).append(text.splitlines())
+    return tuple(found), others
 
 
 def assemble(
@@ -192,6 +219,7 @@ def _function(lines: list[str], values: Array, spacing: int, parts: int) -> Func
         numerator=int(lines[8][:10]),
         denominator=int(lines[9][:10]),
         labels=tuple(line.strip() for line in lines[:5]),
+        units=(lines[8][UNIT_LABEL].strip(), lines[9][UNIT_LABEL].strip()),
     )
 
 

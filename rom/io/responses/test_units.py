@@ -1,0 +1,84 @@
+"""Units of responses as test programs write them.
+
+Source:
+    The international yard and pound, 1959: 1 in = 0.0254 m, 1 lb = 0.45359237 kg; standard gravity
+    9.80665 m/s^2 of the third general conference on weights and measures, 1901.
+"""
+
+import re
+
+from rom.errors import ConfigError
+
+STANDARD_GRAVITY = 9.80665  # [m/s^2]
+LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254, "ft": 0.3048}  # [m]
+FORCES = {
+    "n": 1.0, "kn": 1e3, "mn": 1e-3, "kgf": STANDARD_GRAVITY, "lbf": 0.45359237 * STANDARD_GRAVITY
+}  # fmt: skip
+MOTIONS = {"": 8, "/s": 11, "/s^2": 12}  # types of ordinate in universal files
+SPELLINGS = {"\u00b2": "^2", "\u00b5": "u", "\u03bc": "u", "**": "^", "s2": "s^2", "inch": "in"}
+IN_G = ("g", "gn")
+NO_UNITS = ("", "none", "unknown", "unkn", "si")
+
+
+def plain(text: str) -> str:
+    """A unit without blanks and brackets, in one spelling."""
+    text = re.sub(r"[\s()\[\]]", "", text).lower()
+    for own, usual in SPELLINGS.items():
+        text = text.replace(own, usual)
+    return text
+
+
+def length_of(text: str) -> float:
+    """Metres of a unit of length.
+
+    Raises:
+        ConfigError: for another word.
+    """
+    if plain(text) not in LENGTHS:
+        raise ConfigError(f"the unit {text!r} is no length; known are {', '.join(LENGTHS)}.")
+    return LENGTHS[plain(text)]
+
+
+def motion_of_unit(text: str) -> tuple[int, float]:
+    """Type of ordinate (8 displacement, 11 velocity, 12 acceleration) and factor to SI units.
+
+    Raises:
+        ConfigError: for another word, as V, of a sensor that is not calibrated.
+    """
+    unit = plain(text)
+    if unit in IN_G:
+        return 12, STANDARD_GRAVITY
+    length, per, rest = unit.partition("/")
+    if length in LENGTHS and per + rest in MOTIONS:
+        return MOTIONS[per + rest], LENGTHS[length]
+    raise ConfigError(
+        f"the unit {text!r} is no motion.",
+        hint=f"Known are g, and {', '.join(LENGTHS)}, each also per s and s^2; calibrate volts.",
+    )
+
+
+def force_of(text: str) -> float:
+    """Newtons of a unit of force; mN is a millinewton.
+
+    Raises:
+        ConfigError: for another word.
+    """
+    if plain(text) not in FORCES:
+        raise ConfigError(
+            f"the unit {text!r} is no force.",
+            hint=f"Known are {', '.join(FORCES)}; calibrate volts.",
+        )
+    return FORCES[plain(text)]
+
+
+def motion_per_force(text: str) -> tuple[int, float]:
+    """Type of ordinate and factor to SI units of a ratio, as (m/s^2)/N.
+
+    Raises:
+        ConfigError: for another word.
+    """
+    motion, slash, force = plain(text).rpartition("/")
+    if not slash:
+        raise ConfigError(f"the unit {text!r} is no motion per force, as m/s^2/N.")
+    kind, factor = motion_of_unit(motion)
+    return kind, factor / force_of(force)

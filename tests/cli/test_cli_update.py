@@ -1,0 +1,106 @@
+"""The verb update: what it prints is what `rom.update` finds, and the body it writes is updated."""
+
+import json
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import rom
+from cases.files.schema import errors
+from cases.solid import STEEL, composite
+from rom.cli.main import main
+from rom.cli.schemas import schema
+from rom.updating import AddedMass, Channels, GroundSpring, Responses
+from rom.updating.frf_data import noisy
+
+SIZE, CELLS = (1.0, 0.1, 0.08), (8, 1, 1)
+PARAMETERS = {name: rom.YoungsModulus(name, 0.4, 2.5) for name in ("inner", "outer")}
+TRUE = {"inner": 1.3, "outer": 0.8}
+SPRING = GroundSpring("tip", (0.0, 2e5, 3e5), 0.1, 10.0)
+MASS = AddedMass("tip", 0.4, 0.1, 10.0)
+WORDS = ["--family", "family.rom.npz", "--fixed", "root", "--damping", "0.02"]
+ATTACHED = ["--spring", "soil=tip:0,2e5,3e5:0.1:10", "--mass", "cable=tip:0.4:0.1:10"]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A family, a test of it as HDF5, and a body alone."""
+    pytest.importorskip("h5py", reason="h5py is not installed")
+    path = tmp_path_factory.mktemp("update")
+    part = composite(
+        dict.fromkeys(TRUE, STEEL), lambda c: "inner" if c[0] < 4 else "outer", SIZE, CELLS
+    )
+    family = rom.reduce_parametric(
+        part, parameters=PARAMETERS, method=rom.CraigBampton(8),
+        interfaces={"root": "rbe2", "tip": "rbe2"}, certify=False,
+    )  # fmt: skip
+    rom.save(family, path / "family.rom.npz")
+    rom.save(family.body, path / "body.rom.npz")
+    points = [[x, y, 0.08] for x in (0.5, 0.75, 1.0) for y in (0.0, 0.1)]
+    sensors = Channels(np.repeat(points, 2, axis=0), np.tile([[0, 1, 0], [0, 0, 1]], (6, 1)))
+    force = Channels([[0.75, 0.1, 0.0]], [[0, 1, 2]])
+    true = family.at(**TRUE)
+    omega, Phi = true.modes(fixed=("root",))
+    f = np.linspace(20, 900, 80)
+    w = 2 * np.pi * f[:, None]
+    seen, driven = (c.rows(true, "sensor") @ Phi for c in (sensors, force))
+    H = np.einsum("sn,fn,en->fse", seen, 1 / (omega**2 - w**2 + 0.04j * w * omega), driven)
+    H = noisy(H, np.sqrt(2) * 0.02, np.random.default_rng(2))
+    test = Responses(f, H, sensors, force, 1 / (1 + 2 * 50 * 0.02**2), 50)
+    rom.io.write_responses(test, path / "test.h5")
+    return path
+
+
+@pytest.fixture(autouse=True)
+def there(folder, monkeypatch):
+    monkeypatch.chdir(folder)
+
+
+def answered(words, capsys, code=0):
+    capsys.readouterr()
+    assert main(["update", "test.h5", *WORDS, *words, "--json"]) == code
+    found = json.loads(capsys.readouterr().out)
+    assert errors(found, schema("update")) == []
+    return found
+
+
+def test_the_verb_finds_what_the_function_finds_and_writes_the_body(capsys):
+    found = answered(["-o", "updated.rom.npz"], capsys)
+    family, test = rom.load("family.rom.npz"), rom.io.read_responses("test.h5")
+    same = rom.update(family, test, fixed=("root",), damping=0.02)
+    assert found["factors"] == same.factors and found["deviations"] == same.deviations
+    assert found["report"]["ok"] and "failed" not in found
+    for name, value in TRUE.items():
+        assert abs(np.log(found["factors"][name] / value)) < 4 * found["deviations"][name]
+    body = rom.load("updated.rom.npz")
+    assert_allclose(body.modes(4).omega, family.at(**same.factors).modes(4).omega, rtol=1e-12)
+    told = body.provenance["updating"]
+    assert told["deviations"] == same.deviations and told["verdict holds"] is True
+    assert told["lines"] == 80 and told["sensors"] == 12
+
+
+def test_springs_masses_candidates_and_priors_are_taken(capsys):
+    found = answered([*ATTACHED, "--candidate", "cable", "--free", "inner",
+                      "--prior", "inner=0.5"], capsys, code=5)  # fmt: skip
+    same = rom.update(
+        rom.load("family.rom.npz"), rom.io.read_responses("test.h5"), fixed=("root",),
+        free=("inner",), attached={"soil": SPRING}, candidates={"cable": MASS},
+        prior={"inner": 0.5}, damping=0.02,
+    )  # fmt: skip
+    assert found["factors"] == same.factors and found["scores"] == same.scores
+    assert set(found["scores"]) == {"outer", "cable"} and found["failed"]
+
+
+def test_what_is_wrong_with_the_options_is_said(capsys):
+    def refused(words, message, file="test.h5"):
+        capsys.readouterr()
+        assert main(["update", file, *WORDS, *words]) == 2
+        assert message in capsys.readouterr().err
+
+    refused(["--spring", "soil=tip:2e5:0.1"], "is not INTERFACE:VALUE:LOW:HIGH")
+    refused(["--mass", "cable=tip:heavy:0.1:10"], "--mass: 'heavy' is not a number")
+    refused([*ATTACHED[:2], "--mass", "soil=tip:1:0.1:10"], "soil is a --spring and a --mass")
+    refused(["--candidate", "cable"], "--candidate cable is neither")
+    refused(["--family", "body.rom.npz"], "holds one body, without parameters")
+    refused(["-o", "family.rom.npz"], "family.rom.npz")

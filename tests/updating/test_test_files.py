@@ -1,0 +1,223 @@
+"""Tests of vibration from files: two other programs, tables, HDF5; what contradicts is named."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+import rom
+from cases.files.decks import IM, RE, X, dataset
+from cases.paths import TESTS
+from cases.solid import block
+from rom.errors import ConfigError, FileFormatError
+from rom.updating import Channels, Responses
+
+HERE = TESTS / "reference" / "foreign"
+F = np.arange(2.0, 14.0, 2.0)
+NODES = {5: (0.1, 0.2, 0.3), 9: (0.4, -0.5, 0.6), 11: (-0.7, 0.8, 0.0)}  # [m]
+ACCELERANCE = [1 / (30 + 1j * F), 2 * (1 / (30 + 1j * F) + 0.01)]  # [m/s^2/N]
+COHERENCE = [1 - 0.01 * k * np.arange(1, 7) / 6 for k in (1, 2)]
+SHAPES = [
+    [(0.1, 0.2, -0.3), (0, 0, 1.0), (0.5, -0.25, 0)],
+    [(1.0, 0, 0), (0.3, 0.2, 0.1), (0, -1.0, 0.5)],
+]
+
+
+def fields(test):
+    return (test.frequencies, test.H, test.coherence, test.sensors.points, test.sensors.directions,
+            test.inputs.points, test.inputs.directions, test.averages, test.quantity)  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ["pyuff_test.uff", "sdynpy_test.unv"])
+def test_a_test_of_another_program_is_read_in_si_units(name):
+    """Written by pyuff 2.5.8 and SDynPy 0.23.0 in millimetres and millinewtons: 15, 2411, 55, 58.
+
+    One of them labels its axes, the other relies on dataset 164 and numbers its axes from one.
+    """
+    test = rom.io.read_responses(HERE / name, averages=20)
+    assert_allclose(test.frequencies, F)
+    power = -((2 * np.pi * F) ** 2)
+    for k in range(2):
+        assert_allclose(test.H[:, k, 0], ACCELERANCE[k] / power, rtol=1e-9)
+        assert_allclose(test.coherence[:, k, 0], COHERENCE[k], rtol=1e-6)
+    assert_allclose(test.sensors.points, [NODES[5], NODES[9]], rtol=1e-6)
+    assert_array_equal(test.sensors.directions, [[0, 1, 0], [0, 0, -1]])
+    assert_allclose(test.inputs.points, [NODES[11]], rtol=1e-6)
+    assert_array_equal(test.inputs.directions, [[0, 0, -1]])
+    assert test.averages == 20 and test.quantity == "displacement"
+
+
+@pytest.mark.parametrize(("name", "factor"), [("pyuff_test.uff", 1), ("sdynpy_test.unv", 1 + 0.5j)])
+def test_modes_of_another_program_are_read(name, factor):
+    """Real ones with a damping ratio, and complex ones with their eigenvalue."""
+    modes = rom.io.read_modes(HERE / name)
+    assert_allclose(modes.frequencies, [12.5, 31.0], rtol=1e-5)
+    assert_allclose(modes.damping, [0.01, 0.02], rtol=1e-5)
+    assert_allclose(modes.points, list(NODES.values()), rtol=1e-6)
+    assert_allclose(modes.shapes, factor * np.array(SHAPES), rtol=1e-5)
+
+
+@pytest.fixture(scope="module")
+def body():
+    kinds = {"root": "rbe2", "tip": "rbe2"}
+    return rom.reduce(block(cells=(6, 1, 1)), method=rom.CraigBampton(12), interfaces=kinds)
+
+
+def modes_of(body, factors, order):
+    """Its own first modes, held at the root, at six points."""
+    omega, Phi = body.modes(fixed=("root",))
+    points = body.surface.points[[-1, -9, -17, 20, 12, 8]]
+    axes = np.tile(np.eye(3), (6, 1))
+    rows = Channels(np.repeat(points, 3, axis=0), axes).rows(body, "point")
+    shapes = (rows @ Phi[:, order]).T.reshape(len(order), 6, 3)
+    shapes = np.asarray(factors)[:, None, None] * shapes
+    f = omega[order] / (2 * np.pi)
+    return rom.updating.MeasuredModes(f, np.zeros(len(order)), points, shapes)
+
+
+def test_mac_of_own_modes_is_one_whatever_their_factor(body):
+    modes = modes_of(body, [2.0, -1j, 1 + 1j], [0, 1, 2])
+    found = modes.mac(body, fixed=("root",), n=3)
+    assert_allclose(np.diag(found), 1.0, rtol=1e-12)
+    assert found.max() <= 1 + 1e-12
+    swapped = modes_of(body, [1.0, 1.0], [2, 0]).mac(body, fixed=("root",), n=4)
+    assert_array_equal(swapped.argmax(axis=1), [2, 0])
+    a, b = modes.shapes[0].real.ravel(), modes.shapes[1].imag.ravel()
+    assert_allclose(found[0, 1], (a @ b) ** 2 / (a @ a) / (b @ b), rtol=1e-10)
+    with pytest.raises(ConfigError, match="elastic modes"):
+        modes.mac(body, n=99)
+    with pytest.raises(ConfigError, match="zero or not finite"):
+        modes_of(body, [1.0, 0.0], [0, 1])
+
+
+TABLE = """analyser 3 of the laboratory
+Frequency [Hz]{s}5+Y/11-Z real [{u}]{s}5+Y/11-Z imag [{u}]{s}9-Z/11-Z magnitude [{u}]{s}\
+9-Z/11-Z phase [deg]{s}5+Y/11-Z coherence{s}9-Z/11-Z coherence
+"""
+POINTS = "node,x [mm],y [mm],z [mm]\n" + "".join(
+    f"{n},{1e3 * x},{1e3 * y},{1e3 * z}\n" for n, (x, y, z) in NODES.items()
+)
+
+
+def table(unit="m/s^2/N", factor=1.0, separator=",", comma=False):
+    a, b = (H / factor for H in ACCELERANCE)
+    columns = [F, a.real, a.imag, abs(b), np.angle(b, deg=True), *COHERENCE]
+    lines = [separator.join(f"{x:.10g}" for x in row) for row in np.column_stack(columns)]
+    lines = [line.replace(".", ",") if comma else line for line in lines]
+    return TABLE.format(s=separator, u=unit) + "\n".join(lines) + "\n"
+
+
+UNITS = [("m/s^2/N", 1.0), ("(m/s\u00b2)/N", 1.0), ("g/N", 9.80665), ("mm/s^2/N", 1e-3),
+         ("g/lbf", 9.80665 / 4.4482216152605), ("in/s^2/kN", 0.0254 / 1e3)]  # fmt: skip
+
+
+@pytest.mark.parametrize(("unit", "factor"), UNITS)
+def test_a_table_of_an_analyser_is_read(unit, factor, tmp_path):
+    (tmp_path / "test.csv").write_text(table(unit, factor))
+    (tmp_path / "points.csv").write_text(POINTS)
+    points = tmp_path / "points.csv"
+    test = rom.io.read_responses(tmp_path / "test.csv", averages=20, points=points)
+    same = rom.io.read_responses(HERE / "pyuff_test.uff", averages=20)
+    for found, expected in zip(fields(test)[:-1], fields(same)[:-1], strict=True):
+        assert_allclose(found, expected, rtol=1e-6)
+
+
+def test_a_table_with_decimal_commas_and_in_velocities_is_read(tmp_path):
+    (tmp_path / "test.txt").write_text(table(separator=";", comma=True))
+    (tmp_path / "points.csv").write_text(POINTS)
+    read = {"averages": 20, "points": tmp_path / "points.csv"}
+    test = rom.io.read_responses(tmp_path / "test.txt", **read)
+    assert_allclose(test.H[:, 0, 0], -ACCELERANCE[0] / (2 * np.pi * F) ** 2, rtol=1e-8)
+    (tmp_path / "test.csv").write_text(table("mm/s/N", 1e-3))
+    test = rom.io.read_responses(tmp_path / "test.csv", **read)
+    assert_allclose(test.H[:, 1, 0], ACCELERANCE[1] / (2j * np.pi * F), rtol=1e-8)
+
+
+def test_hdf5_brings_the_same_test_back(tmp_path):
+    test = rom.io.read_responses(HERE / "pyuff_test.uff", averages=20)
+    path = rom.io.write_responses(test, tmp_path / "test.h5")
+    for found, expected in zip(*map(fields, (rom.io.read_responses(path), test)), strict=True):
+        assert_array_equal(found, expected)
+    with pytest.raises(ConfigError, match="says averages"):
+        rom.io.read_responses(path, averages=3)
+    with pytest.raises(ConfigError, match=r"ending is not one of \.h5"):
+        rom.io.write_responses(test, tmp_path / "test.mat")
+
+
+def two(**second):
+    """Text of functions (7, 3) by (11, -3), and one more."""
+    nodes = "".join(
+        f"{n:10d}{0:10d}{0:10d}{0:10d}" + f"{n:13.5e}{0:13.5e}{0:13.5e}\n" for n in (7, 8, 11)
+    )
+    first = f"{-1:6d}\n{15:6d}\n{nodes}{-1:6d}\n" + dataset(6, 1, [RE, IM])
+    return first + dataset(6, 1, [RE, IM], **{"response": (8, 1)} | second)
+
+
+def test_what_a_universal_file_lacks_is_named(tmp_path):
+    path = tmp_path / "x.unv"
+
+    def refused(text, words, kind=FileFormatError, **options):
+        path.write_text(text)
+        with pytest.raises(kind, match=words):
+            rom.io.read_responses(path, **{"averages": 5, "coherence": 0.9} | options)
+
+    whole = two()
+    path.write_text(whole)
+    test = rom.io.read_responses(path, averages=5, coherence=0.9)
+    assert test.H.shape == (X.size, 2, 1) and (test.coherence == 0.9).all()
+    refused(whole, "averages is missing", ConfigError, averages=None)
+    refused(whole, r"no coherence of 7\+Z/11-Z, 8\+X/11-Z", coherence=None)
+    refused(two(response=(6, 1)), "nodes without coordinates: 6")
+    refused(two(response=(8, 4)), r"function of 8\+4 by 11-Z is no translation")
+    refused(two(response=(7, 3)), r"7\+Z/11-Z is there twice")
+    refused(two(numerator=13), "numerator 13 is no motion")
+    refused(whole.replace(f"{12:10d}{0:5d}{0:5d}{0:5d} {'NONE':<20} {'NONE':<20}",
+                          f"{12:10d}{0:5d}{0:5d}{0:5d} {'NONE':<20} {'V':<20}"),
+            "the unit 'V' is no motion.*calibrate")  # fmt: skip
+    refused(whole.replace(f"{12:10d}{0:5d}{0:5d}{0:5d} {'NONE':<20} {'NONE':<20}",
+                          f"{12:10d}{0:5d}{0:5d}{0:5d} {'NONE':<20} {'mm':<20}"),
+            "type of its numerator is 12, its unit 'mm'")  # fmt: skip
+    refused(whole.replace(f"{2.0:13.5e}{0.5:13.5e}", f"{2.0:13.5e}{0.6:13.5e}", 1), "other lines")
+    units = f"{-1:6d}\n{164:6d}\n{1:10d}{'SI':>20}{1:10d}\n" + 3 * f"{1.0:25.17e}" + f"\n{-1:6d}\n"
+    labelled = whole.replace(f"{12:10d}{0:5d}{0:5d}{0:5d} {'NONE':<20} {'NONE':<20}",
+                             f"{12:10d}{0:5d}{0:5d}{0:5d} {'NONE':<20} {'mm/s^2':<20}")  # fmt: skip
+    refused(units + labelled, "0.001 times that of dataset 164")
+    axes = f"{-1:6d}\n{2420:6d}\n{1:10d}\n{-1:6d}\n"
+    turned = whole.replace(f"{8:10d}{0:10d}{0:10d}", f"{8:10d}{0:10d}{3:10d}")
+    refused(axes + turned, "node 8 is in the local coordinate system 3")
+    path.write_text(axes + whole)  # local axes that no node uses
+    rom.io.read_responses(path, averages=5, coherence=0.9)
+    with pytest.raises(FileFormatError, match="no mode"):
+        rom.io.read_modes(path)
+    with pytest.raises(ConfigError, match="ending is not one of"):
+        rom.io.read_responses("x.mat", averages=3)
+
+
+def test_pairs_that_were_not_measured_do_not_count(tmp_path):
+    """Sensor 7 by force 11, and 8 by 7: two of four responses."""
+    (tmp_path / "x.unv").write_text(two(reference=(7, 2)))
+    test = rom.io.read_responses(tmp_path / "x.unv", averages=5, coherence=0.9)
+    assert test.H.shape == (X.size, 2, 2)
+    assert_array_equal(test.coherence[0] > 0, [[False, True], [True, False]])
+    assert isinstance(test, Responses) and np.isfinite(test.H[:, [0, 1], [1, 0]]).all()
+
+
+def test_what_a_table_lacks_is_named(tmp_path):
+    (tmp_path / "points.csv").write_text(POINTS)
+    path = tmp_path / "x.csv"
+
+    def refused(text, words):
+        path.write_text(text)
+        with pytest.raises(FileFormatError, match=words):
+            rom.io.read_responses(path, averages=5, points=tmp_path / "points.csv")
+
+    whole = table()
+    refused(whole.replace("5+Y/11-Z real", "tip real"), "column 2 has the name 'tip real")
+    refused(whole.replace("5+Y/11-Z imag [m/s^2/N]", "6+Y/11-Z coherence"), r"there is \['real'\]")
+    refused(whole.replace("imag [m/s^2/N]", "imag [g/N]"), "the units are")
+    refused(whole.replace("[deg]", "[grad]"), "phase has the unit 'grad'")
+    refused(whole.replace("m/s^2/N", "V/V"), "is no motion|is no force")
+    refused(whole.replace("0.02", "x", 1), "line 8: could not convert")
+    refused(whole + "1,2\n", "line 9 has 2 numbers under 7 names")
+    refused("a\nb\n", "no column is named")
+    (tmp_path / "points.csv").write_text(POINTS.replace("x [mm]", "x"))
+    refused(whole, "columns .* node, x")
