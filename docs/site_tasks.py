@@ -22,9 +22,9 @@ TASKS: dict[str, tuple[str, str]] = {
     "Update": (
         "A family of bodies corrected by measured responses, and what the data can say.",
         """update updating.Updated updating.Responses updating.Channels updating.GroundSpring
-        updating.AddedMass updating.MeasuredModes updating.Plan updating.place updating.candidates updating.independent
-        updating.tracker updating.Tracker updating.Sensors updating.Track updating.Observer
-        io.write_observer_fmu""",
+        updating.AddedMass updating.MeasuredModes updating.Plan updating.place
+        updating.candidates updating.independent updating.tracker updating.Tracker
+        updating.Sensors updating.Track updating.Observer io.write_observer_fmu""",
     ),
     "Check": (
         "What tells how far to trust a model, a body, a motion or a law.",

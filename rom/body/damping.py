@@ -64,7 +64,7 @@ class ModalDamping:
         RomWarning: for a ratio that no structure has.
 
     Example:
-        >>> ModalDamping(0.02).ratio
+        >>> rom.ModalDamping(0.02).ratio
         0.02
     """
 

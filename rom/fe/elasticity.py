@@ -15,6 +15,7 @@ from rom.arguments import typed
 from rom.eigen.verbs import rigid_motions
 from rom.errors import ConfigError, InterfaceError, MeshError, TagError, warn
 from rom.fe.compat import assemble_matrix, cell_name, geometry_degree, lagrange, versions
+from rom.fe.costs import LEAST_SHARED_DOFS, reduction_seconds
 from rom.fe.forms.material import by_region, coefficients, described, doubts
 from rom.fe.forms.nodes import all_points, interface, outer_surface
 from rom.fe.forms.region import Regions, forms
@@ -24,7 +25,6 @@ from rom.fe.mesh.cad import Axis
 from rom.fe.mesh.curving import without_middles
 from rom.fe.mesh.solid import SolidMesh
 from rom.fe.operators.aij import symmetric, without_zeros, wrapped
-from rom.fe.costs import LEAST_SHARED_DOFS, reduction_seconds
 from rom.fe.operators.foreseen import automatic
 from rom.fe.operators.memory import give_back
 from rom.fe.operators.petsc import PETScOperators

@@ -69,8 +69,8 @@ class Track:
     """What a filter says about a record.
 
     Attributes:
-        values: (n_t, n_v) what is wanted, by the samples up to then.
-        deviations: (n_t, n_v) their standard deviations.
+        values: (n_t, n_v) what is wanted, by the samples up to then [m, m/s, m/s^2 or Pa].
+        deviations: (n_t, n_v) their standard deviations [m, m/s, m/s^2 or Pa].
         forces: (n_t, n_e) estimated forces [N].
         force_deviations: (n_t, n_e) their standard deviations [N].
         surprise: (n_t,) squared innovations over their covariance: chi-square with as many
@@ -94,11 +94,11 @@ class Observer:
 
     Attributes:
         dt: step [s].
-        A: (n, n) transition.
-        G: (n, n_y) gain.
-        C: (n_y, n) what sensors see.
-        W: (n_v, n) what is wanted, forces first.
-        deviations: (n_v,) standard deviations of these one step ahead.
+        A: (n, n) transition [1].
+        G: (n, n_y) gain [unit of a state / unit of a sensor].
+        C: (n_y, n) what sensors see [unit of a sensor / unit of a state].
+        W: (n_v, n) what is wanted, forces first [unit of a value / unit of a state].
+        deviations: (n_v,) standard deviations of these one step ahead [unit of a value].
         inputs: (n_y,) name and unit of each sensor.
         outputs: (n_v,) likewise of what is wanted.
     """
@@ -113,7 +113,7 @@ class Observer:
     outputs: tuple[tuple[str, str], ...]
 
     def run(self, samples: Any) -> Array:
-        """(n_t, n_v) values one step after each of the samples (n_t, n_y), from rest.
+        """(n_t, n_v) values [m, m/s, m/s^2 or Pa] a step after samples (n_t, n_y), from rest.
 
         Raises:
             ConfigError: for another number of sensors, or samples that are not finite.
@@ -138,12 +138,12 @@ class Tracker:
 
     Attributes:
         dt: step [s].
-        A: (n, n) transition over a step.
-        Q: (n, n) covariance of what a step adds.
-        C: (n_y, n) what sensors see.
-        R: (n_y,) variances of samples.
-        W: (n_v, n) what is wanted.
-        P: (n, n) covariance before the first sample.
+        A: (n, n) transition over a step [1].
+        Q: (n, n) covariance of what a step adds [units of two states].
+        C: (n_y, n) what sensors see [unit of a sensor / unit of a state].
+        R: (n_y,) variances of samples [unit of a sensor, squared].
+        W: (n_v, n) what is wanted [unit of a value / unit of a state].
+        P: (n, n) covariance before the first sample [units of two states].
         n_forces: number of unknown forces.
         inputs: (n_y,) name and unit of each sensor.
         outputs: (n_v,) likewise of what is wanted.

@@ -43,9 +43,6 @@ def read_responses(
 
     Source:
         SDRC, Universal file datasets, as published by the University of Cincinnati.
-
-    Example:
-        >>> test = rom.io.read_responses("wing.uff", averages=50)  # doctest: +SKIP
     """
     from rom.io.responses.tables import functions_of
     from rom.io.responses.universal_test import functions_and_points
