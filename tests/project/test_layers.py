@@ -252,6 +252,7 @@ ORDER = {
         "rolling",
         "films",
         "round_bodies",
+        "solids",
     ),
     "body": (
         "nonlinear",

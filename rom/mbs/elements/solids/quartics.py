@@ -14,7 +14,6 @@ from typing import Any
 
 import numpy as np
 
-from rom.body.nonlinear.quartic import Quartic
 from rom.errors import ModelError
 from rom.mbs.elements.family import Family, Places, apart, integers, on_joint
 from rom.mbs.kernels.compiled import inner
@@ -27,10 +26,10 @@ from rom.notebook import listed
 
 @dataclass(frozen=True, slots=True)
 class LargeDeflection:
-    """The energy of a body of large deflection, in its coordinates q."""
+    """The energy of a body of large deflection, a `rom.body.nonlinear.quartic.Quartic`."""
 
     body: str
-    energy: Quartic
+    energy: Any
 
 
 def refuse_stiffening_twice(body: Any) -> None:
