@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from rom import rotation
 from rom.arguments import AnyBody, finite, matrix33, positive, start_pose, typed
-from rom.errors import ConfigError, ModelError
+from rom.errors import ConfigError
 from rom.mbs.connections import drives as joint_drives
 from rom.mbs.connections import gears, lower_pairs, rolling, universal
 from rom.mbs.connections import points as joint_points
@@ -31,6 +31,7 @@ from rom.mbs.elements.films import journal_bearings
 from rom.mbs.elements.gears import meshes
 from rom.mbs.elements.rolling import bearings
 from rom.mbs.elements.round_bodies import spins
+from rom.mbs.elements.solids import quartics
 from rom.mbs.elements.tendons import tendons
 from rom.mbs.parts.bodies import GROUND, Marker, Part, flexible_part, ground_part, rigid_part
 from rom.mbs.parts.joints import Joint, Row, coordinate_of
@@ -57,6 +58,7 @@ FAMILIES = (
     bearings.ROLLING_BEARINGS_FAMILY,
     journal_bearings.JOURNAL_BEARINGS_FAMILY,
     spins.SPINS_FAMILY,
+    quartics.QUARTICS_FAMILY,
 )
 Element = TypeVar("Element")
 
@@ -307,7 +309,8 @@ class Mechanism:
         Raises:
             ConfigError: for no body, a name in use, a wrong shape or a number that is not finite.
             ModelError: if the mass matrix of the body is singular: rigid motions left in it; or a
-                body that spins is not round.
+                body that spins is not round, or one of large deflection, or such a one has
+                geometric stiffness.
 
         Example:
             >>> mech = rom.Mechanism()
@@ -315,12 +318,7 @@ class Mechanism:
             >>> round(beam.mass, 6)
             11.775
         """
-        if getattr(body, "quartic", None) is not None:
-            raise ModelError(
-                f"body {body.name!r} is one of large deflection, whose markers turn too far for a "
-                "mechanism, which takes their small rotations.",
-                hint="Reduce it without nonlinear, or model it as a rod.",
-            )
+        quartics.refuse_stiffening_twice(body)
         body = body.in_units("SI") if getattr(body, "units", "SI") != "SI" else body
         r = body.K.shape[0]
         elastic = (
@@ -420,10 +418,13 @@ class Mechanism:
         self.check_new(part.name)
         warn_outside(SPEED, float(np.linalg.norm(part.velocity)), f"body {part.name!r}")
         part = part if spin is None else replace(part, spin=finite("spin", spin, (3,)))
+        deflects = quartics.large_deflection_of(part)
         turns = spins.spin_of(part) if part.spin.any() else None
         self.parts[part.name] = part
         if turns is not None:
             self.add(f"spin of {part.name}", turns, spins.SPINS_FAMILY)
+        if deflects is not None:
+            self.add(f"deflection of {part.name}", deflects, quartics.QUARTICS_FAMILY)
         return part
 
     def check_new(self, name: str) -> None:

@@ -253,6 +253,7 @@ ORDER = {
         "rolling",
         "films",
         "round_bodies",
+        "solids",
     ),
     "body": (
         "nonlinear",

@@ -13,6 +13,8 @@ from rom.model import Array
 
 # of the size of the body: beyond a tenth, linear elasticity is no longer to be trusted
 MAX_DEFORMATION = 0.1
+# of an interface against the frame [rad]: there exp(sin x) falls short of the angle x by 1.5 %
+MAX_MARKER_TURN = 0.3
 
 
 def warn_of_limits(solution: Solution) -> None:
@@ -20,6 +22,9 @@ def warn_of_limits(solution: Solution) -> None:
     _warn_of_lost_turns(solution)
     for name, part in solution.mechanism.parts.items():
         if not part.r:
+            continue
+        if part.flexible.quartic is not None:
+            _warn_of_turned_markers(solution, name)
             continue
         share, bent = softening(solution, name), deformation(solution, name, surface=False)
         if share >= 1.0:
@@ -34,6 +39,21 @@ def warn_of_limits(solution: Solution) -> None:
                 f"body {name!r} deformed by {bent:.2g} of its size and left the range of small "
                 "elastic deformation; its motion is no longer to be trusted. Divide it into "
                 "several bodies, or look for a load or drive that is too large."
+            )
+
+
+def _warn_of_turned_markers(solution: Solution, name: str) -> None:
+    """Axes of markers follow the linear rotation, which is the sine of the angle."""
+    q = solution.elastic(name)
+    for marker, m in solution.mechanism.parts[name].flexible.markers.items():
+        turn = np.linalg.norm(q @ np.asarray(m.rotation).T, axis=1)
+        if np.nanmax(turn, initial=0.0) > MAX_MARKER_TURN:
+            k = int(np.nanargmax(turn > MAX_MARKER_TURN))
+            warn(
+                f"interface {marker!r} of body {name!r} turned by more than {MAX_MARKER_TURN} rad "
+                f"against the frame at {solution.t[k]:.4g} s: the axes of what is joined to it "
+                "fall short of that angle. Its place, and forces on it, are exact; for joints that "
+                "hold its direction cut the body in two."
             )
 
 

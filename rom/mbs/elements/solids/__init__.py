@@ -1,0 +1,4 @@
+"""Solids at large deflection as bodies of mechanisms.
+
+`quartics` is what their strain energy has beyond that of small deflection, as elements.
+"""
