@@ -2,18 +2,21 @@
 
 import subprocess
 import sys
+import tracemalloc
 from dataclasses import replace
 from itertools import combinations_with_replacement
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scipy.spatial.transform import Rotation
 
 import rom
 from cases.boxes import box, distort
 from cases.long import SHARED_BY, few
 from cases.paths import RANKS, ROOT
 from cases.ranks.environment import ENVIRONMENT
+from rom.body.nonlinear.geometric import ELLIPTIC_STRETCH, foreseen
 from rom.body.nonlinear.quartic import Quartic, entries, n_entries, position
 from rom.body.nonlinear.statics import follow
 from rom.checks.deflection import DISPLACEMENT_RTOL, STEP_SHARES, load_cases, rows_of
@@ -270,7 +273,11 @@ def test_a_file_and_other_units_keep_the_energy(certified, tmp_path):
         ({"stiffening": True}, ConfigError, "small deflection"),
         ({"nonlinear": {"hub": (1, 0, 0, 0, 0, 0)}}, InterfaceError, "names 'hub'"),
         ({"nonlinear": {"root": (1, 0, 0, 0, 0, 0)}}, InterfaceError, "names 'root'"),
-        ({"modes": 12}, ResourceError, "more than 80 are refused"),
+        (
+            {"modes": 12},
+            ResourceError,
+            r"more than 80 are refused. Their tensors would take [\d.]+ GB and about [\d.]+ min",
+        ),
     ],
 )  # fmt: skip
 def test_what_does_not_go_together_is_refused_by_name(change, error, says):
@@ -304,6 +311,51 @@ def test_a_range_in_which_the_body_buckles_is_refused():
     assert reduced(model, (2 * EI, 0, 0, 0, 0, 0), n_modes=2, active=2).quartic is not None
 
 
+def test_a_layer_gives_way_at_the_stretch_that_is_refused():
+    """Uniaxial strain, for any Poisson's ratio: the force F^3 - F has its extremum at 1/sqrt(3)."""
+    model = assembled(distorted=True)
+    pressed = np.zeros((model.n_dofs, 1))
+    pressed[::3, 0] = model.points[:, 0]
+    found = energy_of(model, pressed)
+    at = np.array([ELLIPTIC_STRETCH - 1])
+    scale = found.K[0, 0]
+    assert abs(found.tangent(at)[0, 0]) < 1e-12 * scale
+    assert found.tangent(at - 0.01)[0, 0] < 0 < found.tangent(at + 0.01)[0, 0]
+
+
+def test_the_least_stretch_is_that_of_a_turned_body_too():
+    model = assembled(distorted=True)
+    R = Rotation.from_rotvec([0.7, -1.1, 0.4]).as_matrix()
+    stretches = ([1.2, 0.6, 1.1], [1.0, 1.3, 1.5], [0.45, 1.0, 1.0])
+    gradients = [R @ np.diag(s) @ R.T @ R - np.eye(3) for s in stretches]
+    U = np.array([(model.points @ H.T).ravel() for H in gradients]).T
+    assert_allclose(model.stresses.large_strain().least_stretch(U), [0.6, 1.0, 0.45])
+
+
+def test_a_range_that_compresses_the_material_until_it_gives_way_is_refused():
+    model, EI = slender(2, 2)
+    says = r"load \+1 tip m_z of the range compresses the material to 0\.\d{3} .* from 0\.577 on"
+    with pytest.raises(ModelError, match=says):
+        reduced(model, (0, 0, 0, 0, 0, 3 * EI), n_modes=2, active=2)
+    assert reduced(model, (0, 0, 0, 0, 0, EI), n_modes=2, active=2).quartic is not None
+
+
+def test_memory_for_tensors_is_foreseen():
+    """Of the peak that NumPy takes for them, at the number of coordinates of a usual body."""
+    r = 40
+    N = r + r * (r + 1) // 2
+    G = np.ones((N, N))
+    tracemalloc.start()
+    try:
+        assert Quartic.from_gram(G, r).by_pairs
+        peak = tracemalloc.get_traced_memory()[1] + G.nbytes
+    finally:
+        tracemalloc.stop()
+    memory, time = foreseen(r, 1000)
+    assert 0.7 < peak / memory < 1.4
+    assert_allclose(time, 6 * 1000 * 860.0**2 / 1e10)
+
+
 def test_a_body_of_large_deflection_keeps_its_frame_and_its_programs(certified, tmp_path):
     body, *_ = certified
     with pytest.raises(ModelError, match="'root' for good"):
@@ -331,7 +383,7 @@ def test_energy_and_body_are_the_same_on_any_number_of_processes(tmp_path):
         assert found[1]["errors"].shape == (2, 2, 3)  # displacement and frequencies at three steps
         assert_allclose(found[n]["errors"][:, 0], found[1]["errors"][:, 0], rtol=0, atol=1e-6)
         assert_allclose(found[n]["errors"][:, 1], found[1]["errors"][:, 1], rtol=0, atol=1e-4)
-        exact = [(name, 1e-12) for name in ("G", "F", "resisted")]
+        exact = [(name, 1e-12) for name in ("G", "F", "resisted", "least")]
         for name, rtol in (*exact, ("tip", 1e-6)):
             one, other = found[1][name], found[n][name]
             assert_allclose(other, one, rtol=0, atol=rtol * np.abs(one).max(), err_msg=name)

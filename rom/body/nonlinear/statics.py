@@ -61,7 +61,7 @@ def newton(energy: Quartic, q: Array, load: Array) -> Array | None:
         if size <= INCREMENT_RTOL * np.linalg.norm(scale * q):
             return q + step if lam[0] > 0 else None
         slope = SUFFICIENT_DESCENT * float(gap @ step)
-        ahead = _descent(energy, q, load, step, slope, U - load @ q)
+        ahead = _descent(energy, q, load, step, slope, float(U - load @ q))
         if ahead is None:
             return q if size <= 1e4 * INCREMENT_RTOL * np.linalg.norm(scale * q) else None
         q, (U, force, K) = ahead
