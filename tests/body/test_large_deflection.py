@@ -9,7 +9,10 @@ from itertools import combinations_with_replacement
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scipy.integrate import quad
+from scipy.linalg import eigh
 from scipy.spatial.transform import Rotation
+from scipy.special import ellipk
 
 import rom
 from cases.boxes import box, distort
@@ -181,6 +184,39 @@ def test_a_cantilever_follows_the_elastica(slenderness, cells, kinds):
     loads = np.outer(ELASTICA[:, 0] * EI, body.marker("tip").translation[1])
     for q, (_, *expected) in zip(follow(body.quartic, loads), ELASTICA, strict=True):
         assert_allclose(tip_of(body, q), expected, rtol=2e-3)
+
+
+def test_a_beam_between_immovable_hinges_hardens_as_the_elliptic_integral_says():
+    """Half of it, from its middle, which moves across, to a hinge.
+
+    Woinowsky-Krieger, J. Appl. Mech. 17 (1950) 35: one mode, no inertia along the beam,
+    omega / omega_0 = pi sqrt(1 + b) / (2 K(m)), b = (a / rho)^2 / 4, m = b / (2 (1 + b)).
+    """
+    slenderness = 50
+    model, EI = slender(slenderness, 12)
+    h = 1 / slenderness
+    EA, rho = 12 * EI / h**2, h / np.sqrt(12)
+    body = reduced(model, (0, 0.1 * EI, 0, 0, 0, 0))
+    x, y = body.marker("tip").translation[:2]
+    M = body.M - np.outer(body.S[1], y) - np.outer(y, body.S[1]) + body.mass * np.outer(y, y)
+    held = replace(body.quartic, K=body.quartic.K + 1e5 * EA * np.outer(x, x))
+    lam, V = eigh(held.K, M)
+    omega, mode = np.sqrt(lam[0]), V[:, 0] / (y @ V[:, 0])
+    assert_allclose(omega, (np.pi / 2) ** 2 * np.sqrt(EI / (7850 * h**2)), rtol=1e-3)
+    m = mode @ M @ mode
+    forces = m * omega**2 * rho * np.linspace(0.05, 11, 16)
+    a = follow(held, np.outer(forces, M @ mode / m)) @ M @ mode / m
+    assert a[-1] > 3 * rho
+    k1, k3 = np.linalg.lstsq(np.array([a, a**3]).T / forces[:, None], np.ones(16), rcond=None)[0]
+    for share in (0.5, 1.0, 1.5, 2.0, 3.0):
+        A, b = share * rho, share**2 / 4
+
+        def slowness(angle, A=A):  # dt / d(angle), for a = A sin(angle)
+            return np.sqrt(2 * m / (2 * k1 + k3 * A**2 * (1 + np.sin(angle) ** 2)))
+
+        found = np.pi / 2 / quad(slowness, 0, np.pi / 2)[0] / omega
+        expected = np.pi * np.sqrt(1 + b) / (2 * ellipk(b / (2 * (1 + b))))
+        assert_allclose(found, expected, rtol=1e-3)
 
 
 @pytest.fixture(scope="module")
