@@ -4,7 +4,7 @@ import subprocess
 import sys
 import tracemalloc
 from dataclasses import replace
-from itertools import combinations_with_replacement
+from itertools import combinations_with_replacement, cycle
 
 import numpy as np
 import pytest
@@ -22,7 +22,15 @@ from cases.ranks.environment import ENVIRONMENT
 from rom.body.nonlinear.geometric import ELLIPTIC_STRETCH, foreseen
 from rom.body.nonlinear.quartic import Quartic, entries, n_entries, position
 from rom.body.nonlinear.statics import follow
-from rom.checks.deflection import DISPLACEMENT_RTOL, STEP_SHARES, load_cases, rows_of
+from rom.checks.deflection import (
+    DISPLACEMENT_RTOL,
+    STEP_SHARES,
+    Step,
+    deflection_rows,
+    load_cases,
+    nodal_load,
+    rows_of,
+)
 from rom.eigen.verbs import rigid_motions
 from rom.errors import ConfigError, InterfaceError, ModelError, ResourceError
 from rom.process.mpirun import mpirun
@@ -276,6 +284,50 @@ def test_the_range_is_stored_with_the_share_up_to_which_it_holds(certified):
     q = follow(body.quartic, np.outer([0.5, 1.0], load))[-1]
     assert_allclose(table["energy"], body.quartic.energy(q), rtol=1e-6)
     assert max(table["displacement"]) <= DISPLACEMENT_RTOL
+
+
+GOOD, FAR, SLACK = Step(1e-3, 1.0, 1e-3), Step(6e-3, 1.0, 1e-3), Step(1e-3, 1.0, 3e-2)
+
+
+@pytest.mark.parametrize(
+    "steps, holds, n_found",
+    [
+        ((GOOD, GOOD, GOOD), 3, 3),
+        ((GOOD, GOOD, FAR), 2, 3),
+        ((GOOD, SLACK, GOOD), 1, 3),  # what holds again further out does not count
+        ((FAR, GOOD, GOOD), 0, 3),
+        ((GOOD, GOOD, None), 2, 2),
+        ((GOOD, None, GOOD), 1, 1),
+        ((None, GOOD, GOOD), 0, 0),
+    ],
+)
+def test_a_range_holds_to_the_last_step_before_one_that_fails(
+    certified, monkeypatch, steps, holds, n_found
+):
+    body, model, loads = certified
+    geometric = rom.Geometric(loads={"tip": loads})
+    W = np.array([nodal_load(model, *one) for one in geometric.components()])
+    E = np.linalg.pinv(W) @ np.outer(loads[1:3], [1.0] * 3 + [0.0] * (body.n_modes - 3)) * 1e-3
+    after = cycle(steps[: n_found + 1] if n_found < 3 else steps)
+    monkeypatch.setattr("rom.checks.deflection.HeldSolid", WholeShapes)
+    monkeypatch.setattr("rom.checks.deflection._compared", lambda *given: next(after))
+    rows, table = deflection_rows(geometric, model, None, body, E)
+    one, shares = table["-tip f_z"], (0.0, *STEP_SHARES)
+    assert one["holds to"] == shares[holds]
+    assert one["share"] == list(STEP_SHARES[:n_found])
+    assert one["frequencies"] == [step.frequencies for step in steps[:n_found]]
+    load = -loads[2] * np.array([1.0] * 3 + [0.0] * (body.n_modes - 3)) * 1e-3
+    path = follow(body.quartic, np.outer(STEP_SHARES, load))
+    energies = [0.0, *map(body.quartic.energy, path)]
+    assert_allclose(one["energy"], energies[holds], rtol=1e-6)
+    assert all(r.ok for r in rows) == (holds == 3)
+
+
+class WholeShapes:
+    """Stands for the full model where its states are given."""
+
+    def __init__(self, *given):
+        self.whole = np.asarray
 
 
 def test_the_linear_part_is_that_of_the_linear_body(certified):
