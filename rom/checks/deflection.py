@@ -15,7 +15,7 @@ from scipy.sparse import bmat, csc_matrix, csr_matrix, identity, vstack
 from scipy.sparse.linalg import LinearOperator, eigsh, splu
 
 from rom.body.flexible import FlexibleBody
-from rom.body.nonlinear.geometric import Geometric
+from rom.body.nonlinear.geometric import FORCES, Geometric
 from rom.body.nonlinear.quartic import Quartic
 from rom.body.nonlinear.statics import follow
 from rom.eigen.verbs import mean_motion
@@ -25,7 +25,6 @@ from rom.rows import row
 
 DISPLACEMENT_RTOL = 5e-3  # of the largest load, in the mean square over the mass
 TANGENT_RTOL = 2e-2  # small errors of stress are large ones of the stiffness it gives a thin body
-FORCES = ("f_x", "f_y", "f_z", "m_x", "m_y", "m_z")
 STEP_SHARES = (0.35, 0.7, 1.0)  # of the largest load
 UNTRAINED_RATIO = np.sqrt(2) - 1  # of a component to the one before, as trained nowhere
 N_TANGENT = 3  # lowest frequencies compared there

@@ -2,20 +2,35 @@
 
 import subprocess
 import sys
+import tracemalloc
 from dataclasses import replace
+from itertools import combinations_with_replacement, cycle
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scipy.integrate import quad
+from scipy.linalg import eigh
+from scipy.spatial.transform import Rotation
+from scipy.special import ellipk
 
 import rom
 from cases.boxes import box, distort
-from cases.long import SHARED_BY
+from cases.long import SHARED_BY, few
 from cases.paths import RANKS, ROOT
 from cases.ranks.environment import ENVIRONMENT
+from rom.body.nonlinear.geometric import ELLIPTIC_STRETCH, foreseen
 from rom.body.nonlinear.quartic import Quartic, entries, n_entries, position
 from rom.body.nonlinear.statics import follow
-from rom.checks.deflection import DISPLACEMENT_RTOL, STEP_SHARES, load_cases, rows_of
+from rom.checks.deflection import (
+    DISPLACEMENT_RTOL,
+    STEP_SHARES,
+    Step,
+    deflection_rows,
+    load_cases,
+    nodal_load,
+    rows_of,
+)
 from rom.eigen.verbs import rigid_motions
 from rom.errors import ConfigError, InterfaceError, ModelError, ResourceError
 from rom.process.mpirun import mpirun
@@ -123,6 +138,21 @@ def test_entries_are_kept_once_in_any_sequence_of_their_indices(order):
     assert len(kept) == n_entries(r, order) == {3: 35, 4: 70}[order]
     for turn in (slice(None), slice(None, None, -1)):
         assert_allclose(position(kept[:, turn], r), np.arange(len(kept)))
+    assert kept.tolist() == [list(c) for c in combinations_with_replacement(range(r), order)]
+
+
+def test_energy_force_and_tangent_at_once_are_the_sums_over_all_indices():
+    r, rng = 3, np.random.default_rng(3)
+    K, T3, T4 = rng.standard_normal((r, r)), np.empty((r,) * 3), np.empty((r,) * 4)
+    found = Quartic(K + K.T, rng.standard_normal(10), rng.standard_normal(15))
+    for n, T in enumerate((T3, T4)):
+        T[:] = (found.cubic, found.quartic)[n][position(np.moveaxis(np.indices(T.shape), 0, -1), r)]
+    q = rng.standard_normal(r)
+    energy, force, tangent = found.expansion(q)
+    T3q, T4qq = T3 @ q, T4 @ q @ q
+    assert_allclose(energy, q @ (found.K / 2 + T3q + T4qq) @ q)
+    assert_allclose(force, (found.K + 3 * T3q + 4 * T4qq) @ q)
+    assert_allclose(tangent, found.K + 6 * T3q + 12 * T4qq)
 
 
 def slender(slenderness, cells, nu=0.0):
@@ -149,15 +179,52 @@ def tip_of(body, q):
     return np.array([np.arcsin((tip.rotation @ q)[2]), -x, y])
 
 
-@pytest.mark.parametrize("cells, kinds", [(40, "rbe3"), (60, "rbe3"), (40, rom.Polynomial(1))])
-def test_a_cantilever_follows_the_elastica(cells, kinds):
-    """One body of at most 25 coordinates, six more where sections may strain; L / h = 100."""
-    model, EI = slender(100, cells)
+@pytest.mark.parametrize(
+    "slenderness, cells, kinds",
+    few(2, [(100, 40, "rbe3"), (50, 20, rom.Polynomial(1)),
+            (100, 60, "rbe3"), (100, 40, rom.Polynomial(1))]),
+)  # fmt: skip
+def test_a_cantilever_follows_the_elastica(slenderness, cells, kinds):
+    """One body of at most 25 coordinates, six more where sections may strain."""
+    model, EI = slender(slenderness, cells)
     body = reduced(model, (0, 5 * EI, 0, 0, 0, 0), kinds=kinds, n_shapes=15)
     assert body.n_modes <= (25 if kinds == "rbe3" else 31)
     loads = np.outer(ELASTICA[:, 0] * EI, body.marker("tip").translation[1])
     for q, (_, *expected) in zip(follow(body.quartic, loads), ELASTICA, strict=True):
         assert_allclose(tip_of(body, q), expected, rtol=2e-3)
+
+
+def test_a_beam_between_immovable_hinges_hardens_as_the_elliptic_integral_says():
+    """Half of it, from its middle, which moves across, to a hinge.
+
+    Woinowsky-Krieger, J. Appl. Mech. 17 (1950) 35: one mode, no inertia along the beam,
+    omega / omega_0 = pi sqrt(1 + b) / (2 K(m)), b = (a / rho)^2 / 4, m = b / (2 (1 + b)).
+    """
+    slenderness = 50
+    model, EI = slender(slenderness, 12)
+    h = 1 / slenderness
+    EA, rho = 12 * EI / h**2, h / np.sqrt(12)
+    body = reduced(model, (0, 0.1 * EI, 0, 0, 0, 0))
+    x, y = body.marker("tip").translation[:2]
+    M = body.M - np.outer(body.S[1], y) - np.outer(y, body.S[1]) + body.mass * np.outer(y, y)
+    held = replace(body.quartic, K=body.quartic.K + 1e5 * EA * np.outer(x, x))
+    lam, V = eigh(held.K, M)
+    omega, mode = np.sqrt(lam[0]), V[:, 0] / (y @ V[:, 0])
+    assert_allclose(omega, (np.pi / 2) ** 2 * np.sqrt(EI / (7850 * h**2)), rtol=1e-3)
+    m = mode @ M @ mode
+    forces = m * omega**2 * rho * np.linspace(0.05, 11, 16)
+    a = follow(held, np.outer(forces, M @ mode / m)) @ M @ mode / m
+    assert a[-1] > 3 * rho
+    k1, k3 = np.linalg.lstsq(np.array([a, a**3]).T / forces[:, None], np.ones(16), rcond=None)[0]
+    for share in (0.5, 1.0, 1.5, 2.0, 3.0):
+        A, b = share * rho, share**2 / 4
+
+        def slowness(angle, A=A):  # dt / d(angle), for a = A sin(angle)
+            return np.sqrt(2 * m / (2 * k1 + k3 * A**2 * (1 + np.sin(angle) ** 2)))
+
+        found = np.pi / 2 / quad(slowness, 0, np.pi / 2)[0] / omega
+        expected = np.pi * np.sqrt(1 + b) / (2 * ellipk(b / (2 * (1 + b))))
+        assert_allclose(found, expected, rtol=1e-3)
 
 
 @pytest.fixture(scope="module")
@@ -186,7 +253,7 @@ def test_the_certificate_compares_with_the_full_model_at_large_deflection(certif
 def test_a_basis_without_derivatives_locks_and_its_certificate_fails(certified, monkeypatch):
     _, model, loads = certified
     monkeypatch.setattr("rom.workflow.enriched", lambda *given: given[4])
-    body = reduced(model, loads, n_modes=10, certify=True)
+    body = reduced(model, (0, loads[1], 0, 0, 0, 0), n_modes=10, certify=True)
     assert not body.certificate.ok
     failed = deflections_compared(body)["tip f_y: displacement"]
     assert not failed.ok and 0.87 < failed.value < 0.95
@@ -217,6 +284,50 @@ def test_the_range_is_stored_with_the_share_up_to_which_it_holds(certified):
     q = follow(body.quartic, np.outer([0.5, 1.0], load))[-1]
     assert_allclose(table["energy"], body.quartic.energy(q), rtol=1e-6)
     assert max(table["displacement"]) <= DISPLACEMENT_RTOL
+
+
+GOOD, FAR, SLACK = Step(1e-3, 1.0, 1e-3), Step(6e-3, 1.0, 1e-3), Step(1e-3, 1.0, 3e-2)
+
+
+@pytest.mark.parametrize(
+    "steps, holds, n_found",
+    [
+        ((GOOD, GOOD, GOOD), 3, 3),
+        ((GOOD, GOOD, FAR), 2, 3),
+        ((GOOD, SLACK, GOOD), 1, 3),  # what holds again further out does not count
+        ((FAR, GOOD, GOOD), 0, 3),
+        ((GOOD, GOOD, None), 2, 2),
+        ((GOOD, None, GOOD), 1, 1),
+        ((None, GOOD, GOOD), 0, 0),
+    ],
+)
+def test_a_range_holds_to_the_last_step_before_one_that_fails(
+    certified, monkeypatch, steps, holds, n_found
+):
+    body, model, loads = certified
+    geometric = rom.Geometric(loads={"tip": loads})
+    W = np.array([nodal_load(model, *one) for one in geometric.components()])
+    E = np.linalg.pinv(W) @ np.outer(loads[1:3], [1.0] * 3 + [0.0] * (body.n_modes - 3)) * 1e-3
+    after = cycle(steps[: n_found + 1] if n_found < 3 else steps)
+    monkeypatch.setattr("rom.checks.deflection.HeldSolid", WholeShapes)
+    monkeypatch.setattr("rom.checks.deflection._compared", lambda *given: next(after))
+    rows, table = deflection_rows(geometric, model, None, body, E)
+    one, shares = table["-tip f_z"], (0.0, *STEP_SHARES)
+    assert one["holds to"] == shares[holds]
+    assert one["share"] == list(STEP_SHARES[:n_found])
+    assert one["frequencies"] == [step.frequencies for step in steps[:n_found]]
+    load = -loads[2] * np.array([1.0] * 3 + [0.0] * (body.n_modes - 3)) * 1e-3
+    path = follow(body.quartic, np.outer(STEP_SHARES, load))
+    energies = [0.0, *map(body.quartic.energy, path)]
+    assert_allclose(one["energy"], energies[holds], rtol=1e-6)
+    assert all(r.ok for r in rows) == (holds == 3)
+
+
+class WholeShapes:
+    """Stands for the full model where its states are given."""
+
+    def __init__(self, *given):
+        self.whole = np.asarray
 
 
 def test_the_linear_part_is_that_of_the_linear_body(certified):
@@ -250,7 +361,11 @@ def test_a_file_and_other_units_keep_the_energy(certified, tmp_path):
         ({"stiffening": True}, ConfigError, "small deflection"),
         ({"nonlinear": {"hub": (1, 0, 0, 0, 0, 0)}}, InterfaceError, "names 'hub'"),
         ({"nonlinear": {"root": (1, 0, 0, 0, 0, 0)}}, InterfaceError, "names 'root'"),
-        ({"modes": 12}, ResourceError, "more than 80 are refused"),
+        (
+            {"modes": 12},
+            ResourceError,
+            r"more than 80 are refused. Their tensors would take [\d.]+ GB and about [\d.]+ min",
+        ),
     ],
 )  # fmt: skip
 def test_what_does_not_go_together_is_refused_by_name(change, error, says):
@@ -282,6 +397,51 @@ def test_a_range_in_which_the_body_buckles_is_refused():
     with pytest.raises(ModelError, match=r"load \[-1.0\] of the range: no stable equilibrium"):
         reduced(model, (3 * EI, 0, 0, 0, 0, 0), n_modes=2, active=2)
     assert reduced(model, (2 * EI, 0, 0, 0, 0, 0), n_modes=2, active=2).quartic is not None
+
+
+def test_a_layer_gives_way_at_the_stretch_that_is_refused():
+    """Uniaxial strain, for any Poisson's ratio: the force F^3 - F has its extremum at 1/sqrt(3)."""
+    model = assembled(distorted=True)
+    pressed = np.zeros((model.n_dofs, 1))
+    pressed[::3, 0] = model.points[:, 0]
+    found = energy_of(model, pressed)
+    at = np.array([ELLIPTIC_STRETCH - 1])
+    scale = found.K[0, 0]
+    assert abs(found.tangent(at)[0, 0]) < 1e-12 * scale
+    assert found.tangent(at - 0.01)[0, 0] < 0 < found.tangent(at + 0.01)[0, 0]
+
+
+def test_the_least_stretch_is_that_of_a_turned_body_too():
+    model = assembled(distorted=True)
+    R = Rotation.from_rotvec([0.7, -1.1, 0.4]).as_matrix()
+    stretches = ([1.2, 0.6, 1.1], [1.0, 1.3, 1.5], [0.45, 1.0, 1.0])
+    gradients = [R @ np.diag(s) @ R.T @ R - np.eye(3) for s in stretches]
+    U = np.array([(model.points @ H.T).ravel() for H in gradients]).T
+    assert_allclose(model.stresses.large_strain().least_stretch(U), [0.6, 1.0, 0.45])
+
+
+def test_a_range_that_compresses_the_material_until_it_gives_way_is_refused():
+    model, EI = slender(2, 2)
+    says = r"load \+1 tip m_z of the range compresses the material to 0\.\d{3} .* from 0\.577 on"
+    with pytest.raises(ModelError, match=says):
+        reduced(model, (0, 0, 0, 0, 0, 3 * EI), n_modes=2, active=2)
+    assert reduced(model, (0, 0, 0, 0, 0, EI), n_modes=2, active=2).quartic is not None
+
+
+def test_memory_for_tensors_is_foreseen():
+    """Of the peak that NumPy takes for them, at the number of coordinates of a usual body."""
+    r = 40
+    N = r + r * (r + 1) // 2
+    G = np.ones((N, N))
+    tracemalloc.start()
+    try:
+        assert Quartic.from_gram(G, r).by_pairs
+        peak = tracemalloc.get_traced_memory()[1] + G.nbytes
+    finally:
+        tracemalloc.stop()
+    memory, time = foreseen(r, 1000)
+    assert 0.7 < peak / memory < 1.4
+    assert_allclose(time, 6 * 1000 * 860.0**2 / 1e10)
 
 
 def test_a_body_of_large_deflection_keeps_its_frame_and_its_programs(certified, tmp_path):
@@ -323,7 +483,7 @@ def test_energy_and_body_are_the_same_on_any_number_of_processes(tmp_path):
         assert found[1]["errors"].shape == (2, 2, 3)  # displacement and frequencies at three steps
         assert_allclose(found[n]["errors"][:, 0], found[1]["errors"][:, 0], rtol=0, atol=1e-6)
         assert_allclose(found[n]["errors"][:, 1], found[1]["errors"][:, 1], rtol=0, atol=1e-4)
-        exact = [(name, 1e-12) for name in ("G", "F", "resisted")]
+        exact = [(name, 1e-12) for name in ("G", "F", "resisted", "least")]
         for name, rtol in (*exact, ("tip", 1e-6)):
             one, other = found[1][name], found[n][name]
             assert_allclose(other, one, rtol=0, atol=rtol * np.abs(one).max(), err_msg=name)

@@ -1,6 +1,7 @@
 """Component files: the body is that of the same words in Python; mistakes have file and line."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -288,6 +289,8 @@ moment = [0, 0, "3 N m"]
     )
     with pytest.raises(ConfigError, match="no finite elements"):
         read_component(file).body()
+    file.write_text(plain + asked.replace("shapes = 9", "tol = 0.002\nsteps = 7"))
+    assert read_component(file).nonlinear() == replace(found, n_shapes=None, tol=0.002, n_steps=7)
     file.write_text(plain + asked.replace("2 kN", "0 N").replace("3 N m", "0 N m"))
     with pytest.raises(ConfigError, match="not all zero") as refused:
         read_component(file).nonlinear()

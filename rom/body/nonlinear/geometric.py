@@ -33,11 +33,17 @@ from rom.names import offered
 
 DEPENDENT_RTOL = 1e-10  # energy of a derivative, of the largest, that the others explain
 EQUAL_RTOL = 1e-3  # of shares of energy: states of two planes of equal stiffness stay together
+FORCES = ("f_x", "f_y", "f_z", "m_x", "m_y", "m_z")
 N_MODES = 4  # about each state that a range leads to, for which shapes are kept
 # A mode loses 1e-4 of its stiffness if a hundredth of its energy norm is missed, states must not
 # lose that much: at the usual tolerance of 1e-4 both are met.
 MODE_SHARE = 1e-2
-MAX_COORDINATES = 80  # their tensors take 0.2 GB while they are made
+MAX_COORDINATES = 80
+TENSOR_COPIES = 11  # of the Gram matrix while it is ordered into tensors
+FLOP_RATE = 1e10  # of one core in a product of matrices [1/s]
+# stretch at which the force of St. Venant-Kirchhoff material, proportional to F^3 - F, has its
+# extremum: from there on a compressed layer gives way, and the equations are no longer elliptic
+ELLIPTIC_STRETCH = 3.0**-0.5
 
 
 @typed
@@ -90,7 +96,7 @@ class Geometric:
             )
 
     def components(self) -> list[tuple[str, int, float]]:
-        """Interface, component and largest value of the loads that are not zero."""
+        """Interface, component and largest value [N, N m] of the loads that are not zero."""
         return [
             (name, k, abs(float(x)))
             for name, load in self.loads.items()
@@ -140,13 +146,15 @@ def enriched(
 
     Raises:
         ConfigError, InterfaceError, ResourceError: see `refuse`.
-        ModelError: if the body has no stable equilibrium within the range.
+        ModelError: if the body has no stable equilibrium within the range, or its material is
+            compressed until it loses ellipticity.
     """
     refuse(geometric, model, connection, basis, reference)
     energy = model.stresses.large_strain()
     shapes, theta = _with_derivatives(geometric, model, ops, connection, basis, reference, energy)
     quartic = Quartic.from_gram(energy.gram(shapes.E), shapes.E.shape[1])
     states = _states(geometric, quartic, shapes.loads)
+    _refuse_collapse(geometric, energy.least_stretch(shapes.E @ states.T))
     modes = _modes_about(states, quartic, quadratic(ops, ops.apply_M, shapes.E))
     added = theta @ _principal(
         geometric, states[:, shapes.n_basis :].T, modes[:, shapes.n_basis :].T
@@ -214,19 +222,44 @@ def _with_derivatives(
         n_modes = whole_clusters(basis.omega**2, n_modes)
     active = np.hstack([static, Psi[:, n_b : n_b + n_modes]])
     n_basis = moving.shape[1] + n_modes
-    _refuse_many(n_basis + active.shape[1] * (active.shape[1] + 1) // 2)
+    _refuse_many(n_basis + active.shape[1] * (active.shape[1] + 1) // 2, energy)
     theta = _derivatives(connection.ops, basis, energy, active)
     E = np.hstack([moving, active[:, static.shape[1] :], connection.ops.expand(theta)])
     return Shapes(E, _loads(geometric.components(), model, ops, E), n_basis), theta
 
 
-def _refuse_many(n: int) -> None:
+def _refuse_many(n: int, energy: Any) -> None:
     if n > MAX_COORDINATES:
+        memory, time = foreseen(n, energy.n_points)
         raise ResourceError(
             f"the loads and modes have derivatives that make {n} coordinates; more than "
-            f"{MAX_COORDINATES} are refused.",
+            f"{MAX_COORDINATES} are refused. Their tensors would take {memory / 1e9:.2g} GB and "
+            f"about {time / 60:.2g} minutes.",
             hint="Name fewer components of the load, or ask for fewer fixed-interface modes.",
         )
+
+
+def foreseen(n: int, n_points: int) -> tuple[float, float]:
+    """Memory [B] and time [s] for the tensors of n coordinates from so many quadrature points."""
+    N = n + n * (n + 1) / 2
+    return TENSOR_COPIES * 8 * N**2, 6 * n_points * N**2 / FLOP_RATE
+
+
+def _refuse_collapse(geometric: Geometric, stretches: Array) -> None:
+    """Say which of the load cases compresses the material too far; steps (s,) case by case."""
+    k = int(np.argmin(stretches))
+    if stretches[k] > ELLIPTIC_STRETCH:
+        return
+    case, step = divmod(k, geometric.n_steps)
+    names = [f"{name} {FORCES[component]}" for name, component, _ in geometric.components()]
+    signs = geometric.load_cases()[case]
+    parts = [f"{x:+.2g} {name}" for x, name in zip(signs, names, strict=True) if x]
+    raise ModelError(
+        f"load {', '.join(parts)} of the range compresses the material to {stretches[k]:.3f} of "
+        f"its length at {(step + 1) / geometric.n_steps:.2g} of it; from {ELLIPTIC_STRETCH:.3f} on "
+        "St. Venant-Kirchhoff material loses ellipticity and gives way.",
+        hint="Ask for smaller loads, or a law that stiffens in compression.",
+    )
 
 
 def _loads(components: Any, model: FEModel, ops: Operators, E: Array) -> Array:

@@ -8,7 +8,6 @@ T3 and T4 are symmetric in all indices, and only entries with i <= j <= k <= l a
 
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import combinations_with_replacement
 from math import comb
 
 import numpy as np
@@ -58,25 +57,24 @@ class Quartic:
 
     def energy(self, q: Array) -> float:
         """Strain energy [J] at the coordinates (r,)."""
-        S3, S4 = self._stresses(q)
-        return float(q @ (0.5 * self.K + S3 + S4) @ q)
+        return self.expansion(q)[0]
 
     def force(self, q: Array) -> Array:
         """(r,) derivative of the energy [N] at the coordinates (r,)."""
-        S3, S4 = self._stresses(q)
-        return np.asarray((self.K + 3 * S3 + 4 * S4) @ q)
+        return self.expansion(q)[1]
 
     def tangent(self, q: Array) -> Array:
         """(r, r) second derivative of the energy [N/m] at the coordinates (r,)."""
-        S3, S4 = self._stresses(q)
-        return self.K + 6 * S3 + 12 * S4
+        return self.expansion(q)[2]
 
-    def _stresses(self, q: Array) -> tuple[Array, Array]:
-        """(r, r) contractions T3 q and T4 q q."""
+    def expansion(self, q: Array) -> tuple[float, Array, Array]:
+        """Energy [J], force (r,) [N] and tangent (r, r) [N/m] at the coordinates (r,) at once."""
         i, j = np.triu_indices(self.n)
         square = np.where(i == j, 1.0, 2.0) * q[i] * q[j]
         by_one, by_two = self.by_pairs
-        return (by_one @ q)[self._pair], (by_two @ square)[self._pair]
+        S3, S4 = (by_one @ q)[self._pair], (by_two @ square)[self._pair]
+        energy = float(q @ (0.5 * self.K + S3 + S4) @ q)
+        return energy, (self.K + 3 * S3 + 4 * S4) @ q, self.K + 6 * S3 + 12 * S4
 
     @cached_property
     def by_pairs(self) -> tuple[Array, Array]:
@@ -98,9 +96,14 @@ class Quartic:
 
 def entries(r: int, order: int) -> Index:
     """(e, order) indices i <= j <= ... < r of the entries that are kept, last one fastest."""
-    count = order * n_entries(r, order)
-    flat = (i for one in combinations_with_replacement(range(r), order) for i in one)
-    return np.fromiter(flat, dtype=np.int64, count=count).reshape(-1, order)
+    found: Index = np.arange(r)[:, None]
+    for _ in range(order - 1):
+        last = found[:, -1]
+        count = r - last
+        before = np.cumsum(count) - count
+        further = np.arange(count.sum()) - np.repeat(before - last, count)
+        found = np.column_stack([np.repeat(found, count, axis=0), further])
+    return found
 
 
 def n_entries(r: int, order: int) -> int:

@@ -51,28 +51,32 @@ def newton(energy: Quartic, q: Array, load: Array) -> Array | None:
     Newton's method with a search along each increment.
     """
     scale = np.sqrt(np.diag(energy.K))
+    U, force, K = energy.expansion(q)
     for _ in range(MAX_ITERATIONS):
-        gap = (energy.force(q) - load) / scale
-        lam, V = np.linalg.eigh(energy.tangent(q) / np.outer(scale, scale))
+        gap = force - load
+        lam, V = np.linalg.eigh(K / np.outer(scale, scale))
         floor = 1e-12 * np.abs(lam).max()
-        step = -(V @ ((V.T @ gap) / np.maximum(np.abs(lam), floor))) / scale
+        step = -(V @ ((V.T @ (gap / scale)) / np.maximum(np.abs(lam), floor))) / scale
         size = np.linalg.norm(scale * step)
         if size <= INCREMENT_RTOL * np.linalg.norm(scale * q):
             return q + step if lam[0] > 0 else None
-        share = _descent(energy, q, load, step)
-        if not share:
+        slope = SUFFICIENT_DESCENT * float(gap @ step)
+        ahead = _descent(energy, q, load, step, slope, float(U - load @ q))
+        if ahead is None:
             return q if size <= 1e4 * INCREMENT_RTOL * np.linalg.norm(scale * q) else None
-        q = q + share * step
+        q, (U, force, K) = ahead
     return None
 
 
-def _descent(energy: Quartic, q: Array, load: Array, step: Array) -> float:
-    """Share of a step that lowers the potential enough; 0 if there is none."""
-    start, slope = energy.energy(q) - load @ q, (energy.force(q) - load) @ step
+def _descent(
+    energy: Quartic, q: Array, load: Array, step: Array, slope: float, start: float
+) -> tuple[Array, tuple[float, Array, Array]] | None:
+    """Where a step, or a half of it and so on, falls from a start by a slope; None if nowhere."""
     share = 1.0
     while share > MIN_STEP:
         ahead = q + share * step
-        if energy.energy(ahead) - load @ ahead <= start + SUFFICIENT_DESCENT * share * slope:
-            return share
+        found = energy.expansion(ahead)
+        if found[0] - load @ ahead <= start + share * slope:
+            return ahead, found
         share /= 2
-    return 0.0
+    return None

@@ -51,6 +51,11 @@ class LargeStrain:
         self.points, self.weights = quadrature_rule(self.mesh, self.order)
         self.n_cells = self.mesh.topology.index_map(3).size_local
 
+    @property
+    def n_points(self) -> int:
+        """Number of quadrature points, of all ranks."""
+        return len(self.weights) * int(self.mesh.topology.index_map(3).size_global)
+
     def gram(self, E: Array) -> Array:
         """(N, N) integrals of Z^T C Z, with the columns L_i, then Q_jk for j <= k [N m].
 
@@ -63,15 +68,28 @@ class LargeStrain:
         r = E.shape[1]
         N = r + r * (r + 1) // 2
         G = np.zeros((N, N))
-        per_cell = len(self.weights) * 8 * (6 * N + 9 * r * r)
-        n_blocks = 1 + int(self.n_cells * per_cell / BLOCK_BYTES)
-        cells = np.arange(self.n_cells, dtype=np.int32)
-        for H, root in self._gradients(E, np.array_split(cells, n_blocks)):
+        for H, root in self._gradients(E, self._blocks(6 * N + 9 * r * r)):
             Z = np.concatenate([linear_strain(H), quadratic_strain(H)], axis=2)
             Z = np.matmul(root, Z).reshape(-1, N)
             G += Z.T @ Z
         self.mesh.comm.Allreduce(MPI.IN_PLACE, G)
         return 0.5 * (G + G.T)
+
+    def least_stretch(self, U: Array) -> Array:
+        """(s,) least principal stretch [1] of each displacement (n_local, s), on all ranks."""
+        least = np.full(U.shape[1], np.inf)
+        for H, _ in self._gradients(U, self._blocks(27 * U.shape[1])):
+            F = np.moveaxis(H, 3, 0) + np.eye(3)
+            squares = np.linalg.eigvalsh(F.swapaxes(-1, -2) @ F)[..., 0]
+            least = np.minimum(least, squares.min(axis=1))
+        self.mesh.comm.Allreduce(MPI.IN_PLACE, least, MPI.MIN)
+        return np.sqrt(np.maximum(least, 0.0))
+
+    def _blocks(self, numbers: int) -> list[Integers]:
+        """Blocks of cells for so many numbers at each quadrature point."""
+        per_cell = len(self.weights) * 8 * numbers
+        n_blocks = 1 + int(self.n_cells * per_cell / BLOCK_BYTES)
+        return np.array_split(np.arange(self.n_cells, dtype=np.int32), n_blocks)
 
     def second_forces(self, U: Array, pairs: Index) -> Array:
         """(n_local, p) forces D^2 f [u_i, u_j] at no displacement [N].

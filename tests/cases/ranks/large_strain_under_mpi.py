@@ -18,6 +18,7 @@ fields = [(y * x, x * z, x**2), (np.sin(x), y**2, x * y), (z, x * y * z, np.cos(
 E = np.column_stack([np.column_stack(field).ravel() for field in fields])
 G = energy.gram(E)
 F = ops.gram(E, energy.second_forces(E, np.array([[0, 1], [2, 2]])))
+least = energy.least_stretch(E)
 solid, whole = model.stresses.finite_strain(), np.vstack(ops.comm.allgather(E))
 far = whole @ [0.3, -0.2, 0.5]
 resisted = np.column_stack([whole.T @ solid.force(far), whole.T @ (solid.tangent(far) @ whole)])
@@ -34,4 +35,4 @@ table = body.provenance["large deflection"].values()
 errors = [[case[of] for of in ("displacement", "frequencies")] for case in table]
 if ops.first == 0:
     tip = body.marker("tip").translation @ q
-    np.savez(sys.argv[1], G=G, F=F, tip=tip, errors=errors, resisted=resisted)
+    np.savez(sys.argv[1], G=G, F=F, tip=tip, errors=errors, resisted=resisted, least=least)
