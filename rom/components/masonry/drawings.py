@@ -33,8 +33,8 @@ def drawn(
 
     Args:
         points: (n, 2) coordinates [m].
-        triangles: (t, 3) corners, counter-clockwise.
-        surfaces: {name: (k,)} triangles of each stone.
+        triangles: (t, 3) corners, counter-clockwise, numbers of points [1].
+        surfaces: {name: (k,)} numbers of the triangles of each stone [1].
         held: names of those that do not move; "ground" also means "ground 1", "ground 2".
         rock: material and joints; the default is hard stone.
 
