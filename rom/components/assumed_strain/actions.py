@@ -39,7 +39,7 @@ class Traction:
     """Pressure and shear on outer sides; both turn and grow with the sides.
 
     Attributes:
-        sides: (k, 2) node numbers, rows of `outer_sides`.
+        sides: (k, 2) node numbers, rows of `outer_sides` [1].
         pressure: into the solid [Pa].
         shear: along the sides, with the solid on the left [Pa].
         history: times [s] and factors (m,) [1].

@@ -27,6 +27,9 @@ ROUND_OFF_ULPS = 2  # of forces at rest: 0.8 to 1.1 found, times the root of the
 MAX_RHO_OF_IMPACTS = 0.5
 MIN_SHARE = 1 / 64  # of a correction that is not halved any more
 MAX_ITERATIONS = 25
+# most plastic strain that grows in a step: blocks upset to 0.34 of their height were 1.1 % off the
+# closed form with 0.10, 4 % with 0.17, 0.1 % with 0.05
+MAX_STRAIN_STEP = 0.05
 MIN_STEP = 1 / 256  # part of the time between two instants that is not halved any more
 
 
@@ -71,7 +74,10 @@ class _Now:
 
 
 def quasi_static(body: Sheet, metal: Metal, actions: Actions, times: npt.ArrayLike) -> Course:
-    """Equilibria at growing times; what happens between them is halved where Newton's method fails.
+    """Equilibria at growing times, with steps between them halved where they do not hold.
+
+    That is where Newton's method fails, or plastic strain grows by more than 0.05 in a step: longer
+    steps may settle on another balance.
 
     Args:
         body: the sheet, without stress at the first time.
@@ -82,7 +88,8 @@ def quasi_static(body: Sheet, metal: Metal, actions: Actions, times: npt.ArrayLi
     Raises:
         ConfigError: if actions or times do not fit.
         MeshError: if a tool begins inside the sheet.
-        SolverError: if no equilibrium is found; ``error.solution`` holds the instants before.
+        SolverError: if no equilibrium is found, or plastic strain leaps even in the shortest steps;
+            ``error.solution`` holds the instants before.
     """
     return _Way(body, metal, actions, None, 0.0).run(times, np.zeros_like(body.points))
 
@@ -132,7 +139,8 @@ def implicit_motion(
     Raises:
         ConfigError: if actions, times or velocities do not fit.
         MeshError: if a tool begins inside the sheet.
-        SolverError: if no motion is found; ``error.solution`` holds the instants before.
+        SolverError: if no motion is found, or plastic strain leaps even in the shortest steps;
+            ``error.solution`` holds the instants before.
     """
     if not 0 <= rho_inf <= 1:
         raise ConfigError(f"rho_inf = {rho_inf}: from 0 to 1.")
@@ -195,14 +203,18 @@ class _Way:
                 end = min(now.t + part * (t[k] - t[k - 1]), t[k])
                 end = t[k] if t[k] - end < 1e-9 * (t[k] - t[k - 1]) else end
                 found = self.step(now, end)
-                if found is not None:
-                    now, part = found, min(2 * part, 1.0)
+                grown = 0.0 if found is None else _grown(now, found)
+                if found is not None and grown <= MAX_STRAIN_STEP:
+                    now, part = found, min(part * (1 + (2 * grown <= MAX_STRAIN_STEP)), 1.0)
                 elif part > MIN_STEP:
                     part /= 2
                 else:
+                    what = "no balance of forces" if found is None else (
+                        f"plastic strain grows by {grown:.2g}, more than {MAX_STRAIN_STEP} a step,"
+                    )  # fmt: skip
                     raise SolverError(
-                        f"no balance of forces between {now.t:.4g} s and {end:.4g} s, instant "
-                        f"{k} of {len(t) - 1}.",
+                        f"{what} between {now.t:.4g} s and {end:.4g} s, instant {k} of "
+                        f"{len(t) - 1}.",
                         hint="Take more instants, or less load; the sheet may be free to move.",
                         solution=self.course(kept),
                     )
@@ -350,6 +362,11 @@ class _Way:
         first, second = (2 * e[:, None] + np.arange(2) for e in (i, j))
         ends = np.concatenate([first, second], axis=1)
         return _placed(A, first, ends, x.size) + _placed(A, second, ends, x.size)
+
+
+def _grown(now: _Now, then: _Now) -> float:
+    """Most plastic strain that has grown anywhere in a step [1]."""
+    return float((then.history - now.history)[..., 4].max())
 
 
 def _placed(A: Array, rows: Array, columns: Array, n: int) -> csr_matrix:

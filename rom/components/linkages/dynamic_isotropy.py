@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from rom.arguments import shortened, typed
 from rom.errors import ConfigError, ModelError, SolverError
 from rom.model import Array, Index
 
@@ -31,6 +32,7 @@ MIN_JACOBIAN = 1e-6
 DETERMINANT_RTOL = 1e-12  # of the squared trace: round-off by which a determinant is negative
 
 
+@typed
 def isotropy_index(A: Array, *, lengths: npt.ArrayLike = (1.0, 1.0)) -> Array:
     """(...,) index 2 sqrt(det A) / tr A [1], one where isotropic; independent of the scale of A.
 
@@ -50,6 +52,7 @@ def isotropy_index(A: Array, *, lengths: npt.ArrayLike = (1.0, 1.0)) -> Array:
     return 2 * np.sqrt(np.maximum(determinant, 0.0)) / (A[..., 0, 0] + A[..., 1, 1])
 
 
+@typed
 def christoffel(inertia: Inertia, q: npt.ArrayLike) -> Array:
     """(2, 2, 2) symbols of the first kind: motors give A q'' + sum_jk symbols[:, j, k] q'_j q'_k.
 
@@ -62,8 +65,15 @@ def christoffel(inertia: Inertia, q: npt.ArrayLike) -> Array:
     return 0.5 * (np.einsum("kij->ijk", D) + np.einsum("jik->ijk", D) - D)
 
 
+@typed
 def angle_grid(n: int) -> tuple[Array, Array]:
-    """(n, n), (n, n) angles of both motors over one turn [rad], the first along the rows."""
+    """(n, n), (n, n) angles of both motors over one turn [rad], the first along the rows.
+
+    Raises:
+        ConfigError: for less than four cells.
+    """
+    if n < 4:
+        raise ConfigError(f"n = {n}: a turn needs four cells or more.")
     angles = 2 * np.pi * np.arange(n) / n
     q1, q2 = np.meshgrid(angles, angles, indexing="ij")
     return q1, q2
@@ -84,6 +94,7 @@ class Isotropic:
     winding: Index
 
 
+@typed
 def index_map(inertia: Inertia, *, n: int = 400, assembles: Assembles | None = None) -> Array:
     """(n, n) isotropy index on `angle_grid` [1], zero where the mechanism cannot be assembled.
 
@@ -102,7 +113,7 @@ def index_map(inertia: Inertia, *, n: int = 400, assembles: Assembles | None = N
     """
     q1, q2 = angle_grid(n)
     there, index = _there(assembles, q1, q2, n), np.zeros((n, n))
-    index[there] = isotropy_index(inertia(q1[there], q2[there]))
+    index[there] = isotropy_index(inertia_at(inertia, q1[there], q2[there]))
     return index
 
 
@@ -110,10 +121,8 @@ def _there(assembles: Assembles | None, q1: Array, q2: Array, n: int) -> Array:
     """(n, n) where the mechanism can be assembled.
 
     Raises:
-        ConfigError, ModelError: for less than four cells; if there is no such place.
+        ModelError: if there is no such place.
     """
-    if n < 4:
-        raise ConfigError(f"n = {n}: a turn needs four cells or more.")
     there = np.ones(q1.shape, bool) if assembles is None else np.asarray(assembles(q1, q2), bool)
     if not there.any():
         raise ModelError(
@@ -123,6 +132,7 @@ def _there(assembles: Assembles | None, q1: Array, q2: Array, n: int) -> Array:
     return there
 
 
+@typed
 def isotropic_configurations(
     inertia: Inertia, *, n: int = 400, assembles: Assembles | None = None
 ) -> Isotropic:
@@ -185,9 +195,30 @@ def anisotropy(inertia: Inertia, q1: Array, q2: Array) -> Array:
     Raises:
         ModelError: if the function returns no inertia.
     """
-    A = _positive(inertia(q1, q2))
+    A = _positive(inertia_at(inertia, q1, q2))
     trace = A[..., 0, 0] + A[..., 1, 1]
     return np.stack([(A[..., 0, 0] - A[..., 1, 1]) / trace, 2 * A[..., 0, 1] / trace], axis=-1)
+
+
+def inertia_at(inertia: Inertia, q1: Array, q2: Array) -> Array:
+    """(..., 2, 2) what a function returns at coordinates (...), if it is one inertia for each.
+
+    Args:
+        inertia: function of two arrays (...) of coordinates that returns (..., 2, 2).
+        q1: (...) first coordinate [rad or m].
+        q2: (...) second coordinate [rad or m].
+
+    Raises:
+        ModelError: if it is not.
+    """
+    A, wanted = inertia(q1, q2), (*np.shape(q1), 2, 2)
+    if np.shape(A) != wanted or np.asarray(A).dtype.kind not in "iuf":
+        raise ModelError(
+            f"inertia returns {shortened(A)}; for arrays of angles {np.shape(q1)} it must return "
+            f"numbers of the shape {wanted}, not {np.shape(A)}.",
+            hint="Write it for arrays of angles.",
+        )
+    return np.asarray(A, dtype=float)
 
 
 def _positive(A: Array) -> Array:
@@ -229,6 +260,7 @@ def _distinct(q: Array) -> Array:
     return np.array(kept).reshape(-1, 2)
 
 
+@typed
 def closed_loci(index: Array, level: float) -> list[Array]:
     """Curves of one value of a field on the torus, each closed, across the seam as well.
 
@@ -243,7 +275,12 @@ def closed_loci(index: Array, level: float) -> list[Array]:
     Raises:
         ConfigError: if the field is not that of a square grid, or has gaps.
     """
-    if np.ndim(index) != 2 or len(set(np.shape(index))) != 1 or not np.isfinite(index).all():
+    if (
+        np.ndim(index) != 2
+        or len(set(np.shape(index))) != 1
+        or not index.size
+        or not np.isfinite(index).all()
+    ):
         raise ConfigError(f"a field {np.shape(index)}: (n, n) finite values are needed.")
     names, neighbours = _joined(index, level)
     points, fresh, curves = _crossings(index, level, names), np.ones(len(names), dtype=bool), []

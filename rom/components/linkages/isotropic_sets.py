@@ -22,6 +22,7 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
+from rom.arguments import typed
 from rom.components.linkages.dynamic_isotropy import (
     DIFFERENCE_STEP,
     Assembles,
@@ -29,6 +30,7 @@ from rom.components.linkages.dynamic_isotropy import (
     anisotropy,
     anisotropy_gradient,
     around,
+    inertia_at,
     isotropic_configurations,
     isotropy_index,
 )
@@ -59,6 +61,7 @@ class IsotropicSet:
     winding: Index
 
 
+@typed
 def isotropic_set(
     inertia: Inertia,
     ranges: Ranges = (None, None),
@@ -137,6 +140,7 @@ class ToolIsotropy:
     area: float
 
 
+@typed
 def tool_isotropy(
     inertia: Inertia,
     tip: Tip,
@@ -162,7 +166,8 @@ def tool_isotropy(
 
     Raises:
         ConfigError: for ranges that cannot be, or no cell.
-        ModelError: if it can be assembled nowhere, has no inertia, or the tool moves along a line.
+        ModelError: if it can be assembled nowhere, has no inertia or place of the tool, or the tool
+            moves along a line.
     """
     if n < 1:
         raise ConfigError(f"n = {n}: the midpoint rule needs a cell.")
@@ -172,14 +177,14 @@ def tool_isotropy(
     q = q[around(there.assembles, q)]
     if not len(q):
         raise ModelError("none of the postures can be assembled: the tool reaches nothing.")
-    J = np.stack(
-        [
-            (tip(*there.coordinates(q + e).T) - tip(*there.coordinates(q - e).T))
-            / (2 * DIFFERENCE_STEP)
-            for e in DIFFERENCE_STEP * np.eye(2)
-        ],
-        axis=-1,
-    )
+    ends = [[tip(*there.coordinates(q + s * e).T) for s in (1, -1)]
+            for e in DIFFERENCE_STEP * np.eye(2)]  # fmt: skip
+    if any(np.shape(x) != q.shape for both in ends for x in both):
+        raise ModelError(
+            f"tip returns the shape {np.shape(ends[0][0])} for {len(q)} postures, not {q.shape}.",
+            hint="Write it for arrays of coordinates; a place is two numbers.",
+        )
+    J = np.stack([(up - down) / (2 * DIFFERENCE_STEP) for up, down in ends], axis=-1)
     weight = np.abs(np.linalg.det(J)) * (2 * np.pi / n) ** 2
     if weight.sum() <= 1e-9 * np.square(J).sum() * (2 * np.pi / n) ** 2:
         raise ModelError("the tool moves along a line only: two drives, one direction.")
@@ -218,7 +223,7 @@ class _Stretched:
     def inertia(self, q1: Array, q2: Array) -> Array:
         """Inertia for the rates of both coordinates, multiplied by lengths."""
         q = self.coordinates(np.column_stack([np.ravel(q1), np.ravel(q2)]))
-        A = self.of(*q.T).reshape(*np.shape(q1), 2, 2)
+        A = inertia_at(self.of, *q.T).reshape(*np.shape(q1), 2, 2)
         return A / np.multiply.outer(self.lengths, self.lengths)
 
     def assembles(self, q1: Array, q2: Array) -> npt.NDArray[np.bool_]:

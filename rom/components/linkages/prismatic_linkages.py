@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from rom.arguments import typed
 from rom.components.linkages.chains import (
     Link,
     Motion,
@@ -43,6 +44,7 @@ def _positive(name: str, **numbers: float) -> None:
         )
 
 
+@typed
 @dataclass(frozen=True, slots=True)
 class CrossSlides:
     """PP: a slide along x that carries a second slide at an angle to it.
@@ -81,6 +83,7 @@ class CrossSlides:
         return np.stack([q1, 0 * q1], axis=-1) + q2[..., None] * directions(np.array(self.angle))
 
 
+@typed
 @dataclass(frozen=True, slots=True)
 class PolarArm:
     """RP: a guide that turns about the origin, and a slide on it.
@@ -135,6 +138,7 @@ class PolarArm:
         return float(np.sqrt(square)) if self.offset == 0.0 and square >= 0 else None
 
 
+@typed
 @dataclass(frozen=True, slots=True)
 class SlideArm:
     """PR: a slide along x, and a link on it.
@@ -180,6 +184,7 @@ class SlideArm:
         return motion.A + self.payload * gram(motion.pin, motion.pin)
 
 
+@typed
 @dataclass(frozen=True, slots=True)
 class SlideFiveBar:
     """PRRRP: two slides on straight rails, two couplers that meet in the tip.

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import null_space
 
-from rom.arguments import one_of
+from rom.arguments import one_of, typed
 from rom.body.flexible import FlexibleBody
 from rom.components.linkages.chains import (
     Link,
@@ -38,6 +38,7 @@ Elastic = Literal["held", "free"] | float
 MAX_FOLLOWED = 0.5  # of a drive between two assemblies: farther, a linkage may close elsewhere
 
 
+@typed
 def rigid_link(mass: float, length: float, centre: npt.ArrayLike, inertia: float) -> Link:
     """A rigid link.
 
@@ -58,6 +59,7 @@ def rigid_link(mass: float, length: float, centre: npt.ArrayLike, inertia: float
     return Link(float(length), M, np.zeros((2, 0)), np.zeros((0, 0)))
 
 
+@typed
 def rod(mass: float, length: float) -> Link:
     """A uniform slender rod of that mass [kg] and length [m].
 
@@ -67,6 +69,7 @@ def rod(mass: float, length: float) -> Link:
     return rigid_link(mass, length, (length / 2, 0.0), mass * length**2 / 12)
 
 
+@typed
 def reduced_link(body: FlexibleBody, first: str, second: str) -> Link:
     """A reduced flexible body as a link in the plane of its x and y axes.
 
@@ -100,6 +103,7 @@ def reduced_link(body: FlexibleBody, first: str, second: str) -> Link:
     return Link(length, M, R @ b.translation[:2], body.K)
 
 
+@typed
 @dataclass(frozen=True, slots=True)
 class TwoLink:
     """A chain of two links on a fixed pivot, a point mass at its end.
@@ -154,6 +158,7 @@ class TwoLink:
         return motion.A + self.payload * gram(motion.pin, motion.pin)
 
 
+@typed
 @dataclass(frozen=True, slots=True)
 class FiveBar:
     """Two driven cranks on a common base, two couplers that meet in the tip.
@@ -269,6 +274,7 @@ def as_elastic(links: tuple[Link, ...], elastic: Elastic) -> tuple[Link, ...]:
     return tuple(replace(link, M=link.M[:3, :3], tip=tip, K=K) for link in links)
 
 
+@typed
 def mechanism_inertia(
     mechanism: Mechanism,
     drives: tuple[str, str],

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial import Delaunay
 
+from rom.arguments import shortened, typed
 from rom.components.masonry.discontinuous_deformation import Drive
 from rom.components.masonry.histories import History, ramp, values_at
 from rom.components.masonry.stones import Masonry, touching
@@ -36,6 +37,7 @@ class Forces(NamedTuple):
 ForceHistory = Callable[[Array], Forces]
 
 
+@typed
 @dataclass(frozen=True)
 class PointLoad:
     """A force of fixed direction at a point of a stone.
@@ -72,6 +74,7 @@ class PointLoad:
         return at
 
 
+@typed
 @dataclass(frozen=True)
 class MovingLoad:
     """A force that rolls over the tops of the stones, on the highest one at its x.
@@ -125,6 +128,7 @@ class MovingLoad:
         return at
 
 
+@typed
 @dataclass(frozen=True)
 class Wind:
     """Pressure on edges; it turns with them.
@@ -170,6 +174,7 @@ class Wind:
         return at
 
 
+@typed
 @dataclass(frozen=True)
 class SupportMotion:
     """Settlement, spreading or turning of held stones.
@@ -219,6 +224,7 @@ class SupportMotion:
         return between
 
 
+@typed
 @dataclass(frozen=True)
 class BaseMotion:
     """Acceleration of the ground; the motion of the stones is relative to it.
@@ -248,6 +254,7 @@ class BaseMotion:
 Action = PointLoad | MovingLoad | Wind | SupportMotion | BaseMotion
 
 
+@typed
 def facing(masonry: Masonry, direction: tuple[float, float]) -> tuple[tuple[int, int], ...]:
     """Edges of free stones that wind of a direction meets first.
 
@@ -288,9 +295,15 @@ def driver(masonry: Masonry, actions: Sequence[Action]) -> Callable[[Array], Dri
     """What acts in the steps between times (n + 1,).
 
     Raises:
-        ConfigError: if an action cannot be, or two move the same support; while it runs, if a
-            support jumps in one step.
+        ConfigError: if an action is none or cannot be, or two move the same support; while it
+            runs, if a support jumps in one step.
     """
+    for k, one in enumerate(actions):
+        if not isinstance(one, Action):
+            raise ConfigError(
+                f"action {k} is {shortened(one)}, which does nothing to masonry.",
+                hint="Give loads, wind, motion of supports or of the ground.",
+            )
     moved = [s for a in actions if isinstance(a, SupportMotion) for s in a.stones]
     twice = sorted({s for s in moved if moved.count(s) > 1})
     if twice:

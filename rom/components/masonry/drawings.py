@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import numpy.typing as npt
 
+from rom.arguments import finite, typed
 from rom.components.masonry.actions import is_inside
 from rom.components.masonry.limits import Rock
 from rom.components.masonry.stones import Masonry, touching
@@ -15,6 +16,7 @@ STRAIGHT_RTOL = 1e-6  # sine of the turn below which a node is no corner: round-
 OVERLAP_RTOL = 1e-6  # of the size of all stones: deeper corners were drawn wrong
 
 
+@typed
 def drawn(
     points: npt.ArrayLike,
     triangles: npt.ArrayLike,
@@ -31,33 +33,47 @@ def drawn(
 
     Args:
         points: (n, 2) coordinates [m].
-        triangles: (t, 3) corners, counter-clockwise.
-        surfaces: {name: (k,)} triangles of each stone.
+        triangles: (t, 3) corners, counter-clockwise, numbers of points [1].
+        surfaces: {name: (k,)} numbers of the triangles of each stone [1].
         held: names of those that do not move; "ground" also means "ground 1", "ground 2".
         rock: material and joints; the default is hard stone.
 
     Raises:
-        ConfigError: if a held stone does not exist.
+        ConfigError: if a held stone does not exist, or all are held.
         ModelError: if a surface is no stone, stones overlap, or one touches no other, by its name;
             if numbers of nodes or triangles do not exist.
     """
-    x, T = np.asarray(points, dtype=float), np.asarray(triangles, dtype=np.int64)
-    rows = {name: np.asarray(chosen, dtype=np.int64) for name, chosen in surfaces.items()}
-    _check_numbers("triangles", T, len(x))
-    for name, chosen in rows.items():
-        _check_numbers(f"stone {name!r}", chosen, len(T))
+    x = finite("points", points, None)
+    if x.ndim != 2 or x.shape[1] != 2:
+        raise ModelError(f"points of the shape {x.shape}: stones lie in a plane, as (n, 2).")
+    T = _numbers_below("triangles", triangles, len(x))
+    if T.ndim != 2 or T.shape[1] != 3:
+        raise ModelError(f"triangles of the shape {T.shape}: each has three corners, as (t, 3).")
+    rows = {name: _numbers_below(f"stone {name!r}", chosen, len(T)).ravel()
+            for name, chosen in surfaces.items()}  # fmt: skip
     rock, names = rock or Rock(), list(rows)
     outlines = [x[_outline(name, x, T[chosen])] for name, chosen in rows.items()]
     fixed = {k for name in held for k in _numbers(name, names)}
+    if len(fixed) == len(names):
+        raise ConfigError(
+            f"all stones are held: {', '.join(names) or 'there is none'}.",
+            hint="Leave one free to move, or draw it.",
+        )
     masonry = rock.masonry([rock.stone(o) for o in outlines], tuple(sorted(fixed)))
     _check_apart(names, outlines, x[T].mean(axis=1), list(rows.values()))
     _check_joints(names, masonry)
     return masonry
 
 
-def _check_numbers(what: str, numbers: Index, count: int) -> None:
+def _numbers_below(what: str, given: npt.ArrayLike, count: int) -> Index:
+    """Whole numbers that count from 0."""
+    found = finite(what, given, None)
+    numbers = found.astype(np.int64)
+    if (numbers != found).any():
+        raise ModelError(f"{what}: {found[numbers != found][0]} is no whole number.")
     if numbers.size and not 0 <= numbers.min() <= numbers.max() < count:
         raise ModelError(f"{what}: numbers from {numbers.min()} to {numbers.max()}, of {count}.")
+    return numbers
 
 
 def _numbers(name: str, names: list[str]) -> list[int]:

@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from rom.arguments import typed
 from rom.errors import ConfigError, FileFormatError
 from rom.model import Array
 
@@ -38,7 +39,10 @@ class Table:
     values: npt.ArrayLike
 
     def __post_init__(self) -> None:
-        t, values = (np.asarray(x, dtype=float) for x in (self.t, self.values))
+        try:
+            t, values = (np.asarray(x, dtype=float) for x in (self.t, self.values))
+        except (TypeError, ValueError) as error:
+            raise ConfigError("times or values of the history are not made of numbers.") from error
         if t.ndim != 1 or t.shape != values.shape or len(t) < 2:
             raise ConfigError(
                 f"a history of {t.shape} times and {values.shape} values: two or more of each are "
@@ -97,6 +101,7 @@ def recorded(t: npt.ArrayLike, values: npt.ArrayLike) -> Table:
     return table
 
 
+@typed
 def read_record(path: str | Path, *, scale: float = 1.0) -> Table:
     """A record from a text file of two columns, time [s] and value; # begins a comment.
 
@@ -118,6 +123,7 @@ def read_record(path: str | Path, *, scale: float = 1.0) -> Table:
     return recorded(columns[:, 0], scale * columns[:, 1])
 
 
+@typed
 def sine(amplitude: float, period: float, *, cycles: float = np.inf, phase: float = 0.0) -> History:
     """Harmonic motion, or a pulse of some cycles of it: half a one, one, ten.
 
@@ -143,6 +149,7 @@ def sine(amplitude: float, period: float, *, cycles: float = np.inf, phase: floa
     return values
 
 
+@typed
 def rectangle(amplitude: float, duration: float) -> History:
     """A value that stays for a time [s] and ends.
 
@@ -154,6 +161,7 @@ def rectangle(amplitude: float, duration: float) -> History:
     return lambda t: np.where(np.asarray(t) < duration, amplitude, 0.0)
 
 
+@typed
 def ramp(duration: float) -> History:
     """From 0 to 1 along half a cosine in a time [s], and 1 from there on.
 

@@ -21,6 +21,7 @@ import numpy as np
 from scipy.optimize import brentq, linprog, minimize_scalar
 from scipy.sparse import coo_matrix, hstack
 
+from rom.arguments import typed
 from rom.components.masonry.actions import BaseMotion, MovingLoad, PointLoad, Wind
 from rom.components.masonry.stones import Masonry, Stone, stone, touching
 from rom.errors import ConfigError, SolverError
@@ -69,6 +70,7 @@ class Rock:
         return Masonry(tuple(stones), held, self.contact * self.E, self.friction)
 
 
+@typed
 def arch(
     n: int,
     radius: float,
@@ -124,6 +126,7 @@ def _springer(inner: float, outer: float, angle: float) -> Array:
     return ring if side > 0 else ring[::-1]
 
 
+@typed
 def wall(
     length: float,
     courses: int,
@@ -176,6 +179,7 @@ def _box(left: float, right: float, bottom: float, top: float) -> Array:
     return np.array([[left, bottom], [right, bottom], [right, top], [left, top]])
 
 
+@typed
 def stands(masonry: Masonry, loads: Sequence[Load] = (), *, t: float = 0.0) -> bool:
     """Whether forces in the joints can carry weight and loads of rigid stones where they lie.
 
@@ -199,6 +203,7 @@ def stands(masonry: Masonry, loads: Sequence[Load] = (), *, t: float = 0.0) -> b
     return bool(found.status == 0)
 
 
+@typed
 def load_factor(masonry: Masonry, loads: Sequence[Load], *, t: float = 0.0) -> float:
     """By how much loads may be multiplied until rigid stones, under their weight too, give way.
 
@@ -317,6 +322,7 @@ class Limit:
     thrust: float
 
 
+@typed
 def minimum_thickness(*, half_angle: float = np.pi / 2, true_weight: bool = True) -> Limit:
     """Thinnest circular arch with hinges at the crown and springings outside, between them inside.
 

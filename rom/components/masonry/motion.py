@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from rom.arguments import finite, shortened
 from rom.components.masonry.actions import Action, driver
 from rom.components.masonry.block_contact import OPEN, SLIDES, Contacts, contacts
 from rom.components.masonry.discontinuous_deformation import advance, work
@@ -115,11 +116,13 @@ def simulate(  # noqa: PLR0913  all that a run needs
     Source:
         After Shi (1988), as in `rom.components.masonry.discontinuous_deformation`.
     """
+    if not isinstance(actions, Sequence):
+        raise ConfigError(f"actions = {shortened(actions)}: a list of them is needed.")
     B, law = masonry.blocks(), masonry.law
     n = _steps(t_end, dt, damping, save_every)
     W, acting = work(B), driver(masonry, actions)
     for name, given, target in (("q", q, W.q), ("v", v, W.v)):
-        x = np.asarray(masonry.start() * (name == "q") if given is None else given, dtype=float)
+        x = finite(name, masonry.start() * (name == "q") if given is None else given, None)
         if x.shape != target.shape:
             raise ConfigError(f"{name} has the shape {x.shape}; the stones need {target.shape}.")
         target[:] = x

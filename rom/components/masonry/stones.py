@@ -17,7 +17,7 @@ import numpy.typing as npt
 from scipy.sparse import coo_matrix, csr_matrix
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
-from rom.arguments import one_of
+from rom.arguments import finite, typed
 from rom.body.flexible import FlexibleBody
 from rom.components.masonry.block_contact import (
     Blocks,
@@ -57,6 +57,7 @@ class Stone:
     shapes: Array
 
 
+@typed
 def stone(
     outline: npt.ArrayLike,
     *,
@@ -82,19 +83,13 @@ def stone(
         ConfigError, MaterialError: for an unknown state; if no stone has these numbers.
         ModelError: if the outline does not enclose an area counterclockwise.
     """
-    one_of("state", state, ("plane stress", "plane strain"))
     if not (E > 0 and -1 < nu < 0.5 and rho > 0 and thickness > 0):
         raise MaterialError(
             f"no stone has E = {E} Pa, nu = {nu}, rho = {rho} kg/m^3, thickness = {thickness} m.",
             hint="E, rho, thickness > 0; -1 < nu < 0.5.",
         )
-    corners = np.asarray(outline, dtype=float)
-    area, centre, S = polygon_moments(np.asarray(corners if solid is None else solid, dtype=float))
-    if corners.ndim != 2 or len(corners) < 3 or not area > 0:
-        raise ModelError(
-            f"a stone of {len(corners)} corners encloses {area:.4g} m2.",
-            hint="List three corners or more, counterclockwise.",
-        )
+    corners = _corners(outline)
+    area, centre, S = polygon_moments(corners if solid is None else _corners(solid))
     Sx, Sy, Sxy = S[0, 0], S[1, 1], S[0, 1]
     M = np.zeros((6, 6))
     M[0, 0] = M[1, 1] = area
@@ -110,6 +105,24 @@ def stone(
     return Stone(corners, centre, M, area * thickness * D, shapes)
 
 
+def _corners(outline: npt.ArrayLike) -> Array:
+    """(k, 2) corners of a polygon that encloses an area, counterclockwise."""
+    x = finite("the outline of a stone", outline, None)
+    if x.ndim != 2 or x.shape[1] != 2 or len(x) < 3:
+        raise ModelError(f"an outline of the shape {x.shape}: three rows or more of x, y make one.")
+    sides = np.linalg.norm(np.roll(x, -1, axis=0) - x, axis=1)
+    if not sides.all():
+        raise ModelError(f"corner {int(sides.argmin())} of a stone is listed twice in turn.")
+    y = np.roll(x, -1, axis=0)
+    area = float((x[:, 0] * y[:, 1] - x[:, 1] * y[:, 0]).sum() / 2)
+    if not area > 0:
+        raise ModelError(
+            f"a stone of {len(x)} corners encloses {area:.4g} m2.",
+            hint="List three corners or more, counterclockwise.",
+        )
+    return x
+
+
 def polygon_moments(x: Array) -> tuple[float, Array, Array]:
     """Area [m^2], centroid (2,) [m] and integral (2, 2) of X X^T about it [m^4] of a polygon."""
     y = np.roll(x, -1, axis=0)
@@ -122,6 +135,7 @@ def polygon_moments(x: Array) -> tuple[float, Array, Array]:
     return area, centre, np.asarray(S)
 
 
+@typed
 def reduced_stone(body: FlexibleBody, outline: npt.ArrayLike) -> Stone:
     """A reduced body as a stone in the plane of its x and y axes.
 
@@ -132,9 +146,9 @@ def reduced_stone(body: FlexibleBody, outline: npt.ArrayLike) -> Stone:
     Raises:
         ModelError: if the outline is not one, or has a corner without a node.
     """
-    body, corners = body.with_reference("mean-axis"), np.asarray(outline, dtype=float)
-    if body.surface is None or not polygon_moments(corners)[0] > 0:
-        raise ModelError(f"body {body.name!r} has no surface, or its outline is not one.")
+    body, corners = body.with_reference("mean-axis"), _corners(outline)
+    if body.surface is None:
+        raise ModelError(f"body {body.name!r} has no surface.")
     points, shape = body.surface.points, body.surface.shape.reshape(-1, 3, body.n_modes)
     far = np.linalg.norm(points[None, :, :2] - corners[:, None], axis=2)
     at = far < 1e-6 * body.size
@@ -152,6 +166,7 @@ def reduced_stone(body: FlexibleBody, outline: npt.ArrayLike) -> Stone:
     return Stone(corners, centre, M, body.K, shapes)
 
 
+@typed
 @dataclass(frozen=True)
 class Masonry:
     """Stones in contact.
@@ -168,8 +183,9 @@ class Masonry:
         thickness: out of the plane [m], for strengths of joints and pressure of wind.
 
     Raises:
-        ConfigError: if contacts do not press, friction pushes, or a held stone does not exist; if a
-            joint is between stones that do not exist, or glued where they do not touch.
+        ConfigError: without a stone that can move; if contacts do not press, friction pushes, or a
+            held stone does not exist; if a joint is between stones that do not exist, or glued
+            where they do not touch; for a reach or gravity that is none.
     """
 
     stones: tuple[Stone, ...]
@@ -189,8 +205,15 @@ class Masonry:
             )
         if not set(self.held) <= set(range(len(self.stones))):
             raise ConfigError(f"held are {self.held} of the stones 0 to {len(self.stones) - 1}.")
+        if len(set(self.held)) == len(self.stones):
+            raise ConfigError(
+                f"all of {len(self.stones)} stones are held.", hint="Leave one free to move."
+            )
         if not 0 < self.thickness < np.inf:
             raise ConfigError(f"masonry is not {self.thickness} m thick.")
+        if self.reach is not None and not self.reach > 0:
+            raise ConfigError(f"reach = {self.reach} m: corners watch edges within more than 0.")
+        finite("gravity", self.gravity, (2,))
 
     @property
     def law(self) -> Law:

@@ -16,7 +16,11 @@ from rom.components.linkages import (
     SlideArm,
     SlideFiveBar,
     TwoLink,
+    angle_grid,
+    closed_loci,
+    index_map,
     isotropic_set,
+    isotropy_index,
     rigid_link,
     rod,
     tool_isotropy,
@@ -296,7 +300,7 @@ def test_a_mechanism_of_bodies_and_joints_has_the_set_and_the_figure_of_its_form
         (lambda: CrossSlides((-1.0, 1.0)), ModelError, "not negative"),
         (lambda: CrossSlides((1.0, 1.0), angle=np.pi), ModelError, "parallel"),
         (lambda: PolarArm(0.1, 0.0), ModelError, "must be positive"),
-        (lambda: PolarArm(float("nan"), 1.0), ModelError, "finite"),
+        (lambda: PolarArm(float("nan"), 1.0), ConfigError, "finite"),
         (lambda: SlideArm(-1.0, rod(1, 1)), ModelError, "not negative"),
         (lambda: replace(GLIDE, side=0), ModelError, "needed is 1 or -1"),
         (lambda: replace(GLIDE, slides=(1.0, -1.0)), ModelError, "right"),
@@ -338,3 +342,34 @@ def test_a_mechanism_of_bodies_and_joints_has_the_set_and_the_figure_of_its_form
 def test_what_is_no_linkage_is_refused(make, error, words):
     with pytest.raises(error, match=words):
         make()
+
+
+def eyes(q1, q2):
+    return np.tile(np.eye(2), (*np.shape(q1), 1, 1))
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        (lambda: isotropy_index(np.eye(2), lengths="a"), "lengths = 'a'"),
+        (lambda: index_map(eyes, n=4.5), "n = 4.5"),
+        (lambda: index_map(None), "inertia = None"),
+        (lambda: index_map(eyes, n=4, assembles=3), "assembles = 3"),
+        (lambda: index_map(lambda a, b: np.eye(2), n=4), r"for arrays of angles .16,. it must"),
+        (lambda: index_map(lambda a, b: "a", n=4), "inertia returns 'a'"),
+        (lambda: isotropic_set(lambda a, b: 0 * a), "inertia returns"),
+        (lambda: angle_grid(0), "n = 0: a turn needs four"),
+        (lambda: closed_loci(np.eye(4), np.nan), "level = nan"),
+        (lambda: closed_loci(np.zeros((0, 0)), 1.0), r"a field \(0, 0\)"),
+        (lambda: isotropic_set(eyes, (0, 1)), r"ranges\[0\] = 0"),
+        (lambda: isotropic_set(eyes, None), "ranges = None"),
+        (lambda: isotropic_set(eyes, ((0, 1),) * 3), "a row of 2"),
+        (lambda: tool_isotropy(eyes, None), "tip = None"),
+        (lambda: tool_isotropy(eyes, lambda a, b: a), r"tip returns the shape \(40000,\)"),
+        (lambda: rod("a", 1.0), "mass = 'a'"),
+        (lambda: PolarArm(guide="a", slide=1.0), "guide = 'a'"),
+    ],
+)  # fmt: skip
+def test_what_is_no_mechanism_is_named_where_it_is_given(wrong, words):
+    with pytest.raises((ConfigError, ModelError), match=words):
+        wrong()

@@ -1,5 +1,7 @@
 """Loads, moving supports and earthquakes on stones: statics, closed forms of pulses, limits."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -29,7 +31,7 @@ from rom.components.masonry import (
     stone,
     wall,
 )
-from rom.errors import ConfigError, FileFormatError
+from rom.errors import ConfigError, FileFormatError, ModelError
 
 G = 9.81
 SOFT = {"E": 1e9, "nu": 0.2, "rho": 2000.0}
@@ -415,6 +417,7 @@ def test_records_come_from_files(tmp_path):
 
 
 STONE = (1, (0.5, 0.5), (0.0, -1.0))
+ONE = Masonry((stone(box(), **SOFT),), (), 1e9, 0.5)
 
 
 @pytest.mark.parametrize(
@@ -423,7 +426,7 @@ STONE = (1, (0.5, 0.5), (0.0, -1.0))
         ([PointLoad(1, (1.4, 0.5), (0.0, -1.0), name="crane")], "crane at .* lies 0.4 m outside"),
         ([PointLoad(0, (0.0, 0.0), (0.0, -1.0))], "acts on stone 0, which is held"),
         ([PointLoad(7, (0.0, 0.0), (0.0, -1.0))], "stone 7 of the stones 0 to 1"),
-        ([PointLoad(1, (0.5, np.nan), (0.0, -1.0))], "not two numbers"),
+        ([STONE], "action 0 is .* which does nothing to masonry"),
         ([PointLoad(*STONE, history=Table([0.0, 0.05], [0.0, 1.0]))], "from 0 s to 0.05 s; asked"),
         ([PointLoad(*STONE, history=lambda t: np.full(t.shape, np.inf))], "is inf at t ="),
         ([PointLoad(*STONE, history=lambda t: 1.0)], "gives the shape"),
@@ -444,6 +447,36 @@ def test_actions_that_cannot_be_are_named(actions, words):
     model = on_the_ground(stone(box(), **SOFT))
     with pytest.raises(ConfigError, match=words):
         simulate(model, t_end=0.1, dt=0.01, actions=actions)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        (lambda: PointLoad(1, (0.5, np.nan), (0.0, -1.0)), r"PointLoad: at\[1\] = nan"),
+        (lambda: PointLoad(1, (0.5, 0.5, 0.0), (0.0, -1.0)), "at = .* a row of 2"),
+        (lambda: PointLoad(1.5, (0.5, 0.5), (0.0, -1.0)), "stone = 1.5 must be a whole number"),
+        (lambda: PointLoad(*STONE, history="up"), "history = 'up'"),
+        (lambda: MovingLoad((0.0, -1.0), np.nan, 0.0), "speed = nan"),
+        (lambda: Wind(1.0, (1, 2)), r"edges\[0\] = 1"),
+        (lambda: SupportMotion(0, (0.0, 1.0)), "stones = 0"),
+        (lambda: BaseMotion("shake"), "acceleration = 'shake'"),
+        (lambda: Table("a", "b"), "not made of numbers"),
+        (lambda: ramp(None), "duration = None"),
+        (lambda: sine("a", 1.0), "amplitude = 'a'"),
+        (lambda: stone([0, 1, 2], **SOFT), r"an outline of the shape \(3,\)"),
+        (lambda: stone(box()[[0, 0, 1, 2, 3]], **SOFT), "corner 0 of a stone is listed twice"),
+        (lambda: Masonry((), (), 1e9, 0.5), "all of 0 stones are held"),
+        (lambda: Masonry((stone(box(), **SOFT),), (0,), 1e9, 0.5), "all of 1 stones are held"),
+        (lambda: replace(ONE, gravity=(0.0, 0.0, -9.81)), "gravity = .* a row of 2"),
+        (lambda: replace(ONE, reach=-1.0), "reach = -1.0 m"),
+        (lambda: replace(ONE, stiffness=np.inf), "stiffness = inf"),
+        (lambda: simulate(ONE, t_end=1.0, dt=0.1, actions=BaseMotion(1.0)), "actions = "),
+        (lambda: simulate(ONE, t_end=1.0, dt=0.1, v=np.full((1, 6), np.nan)), "v = .* not finite"),
+    ],
+)  # fmt: skip
+def test_what_is_no_masonry_and_no_action_is_named_where_it_is_made(wrong, words):
+    with pytest.raises((ConfigError, ModelError), match=words):
+        wrong()
 
 
 def test_supports_that_bear_nothing_and_frames_without_ground_are_named():

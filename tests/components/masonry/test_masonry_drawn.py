@@ -98,6 +98,12 @@ RING = [(0, 1, 5), (0, 5, 4), (1, 2, 6), (1, 6, 5), (2, 3, 7), (2, 7, 6), (3, 0,
         ((*stones_of(square())[:2], {"none": []}), (), "'none' of 0 triangles"),
         ((*stones_of(square())[:2], {"far": [2]}), (), "stone 'far': numbers from 2 to 2, of 2"),
         ((square(), [(0, 1, 4)], {"far": [0]}), (), "triangles: numbers from 0 to 4, of 4"),
+        (stones_of(square()), ("stone 0",), "all stones are held: stone 0. Leave one free"),
+        (stones_of(square(), square(at=(0, 1.0))), ("stone",), "held: stone 0, stone 1"),
+        ((*stones_of(square())[:2], {}), (), "all stones are held: there is none"),
+        ((np.ones((4, 3)), [(0, 1, 2)], {"one": [0]}), (), r"points of the shape \(4, 3\)"),
+        ((square(), [(0, 1, 2, 3)], {"one": [0]}), (), r"triangles of the shape \(1, 4\)"),
+        ((square(), [(0, 1, 2)], {"one": [0.5]}), (), "'one': 0.5 is no whole number"),
     ],
 )  # fmt: skip
 def test_drawings_that_are_no_masonry_are_named(drawing, held, words):
