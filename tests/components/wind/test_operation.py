@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from rom.components.masonry.histories import Table, recorded
 from rom.components.wind.blading import blading, rotor_load
 from rom.components.wind.control import steady
 from rom.components.wind.operation import late, operate
@@ -178,6 +179,11 @@ def test_a_gust_speeds_the_rotor_up_by_what_its_inertia_takes():
         (lambda: operate(lambda t: 8.0, 10.0, dt=2.0), "a step of 2 s is longer"),
         (lambda: operate(lambda t: 8.0, -1.0), "t_end"),
         (lambda: operate(8.0, 10.0), "wind"),
+        (
+            lambda: operate(Table([0.0, 5.0], [8.0, 9.0]), 10.0),
+            "from 0 s to 5 s; asked is t = 5.05",
+        ),
+        (lambda: operate(recorded([0.0, 1.0, 2.0, 5.0], [8.0] * 4), 5.0), "a gap from 2 s to 5 s"),
         (lambda: operate(lambda t: 8.0, 1.0, held=lambda t: (np.nan, 0.0)), "held at nan"),
         (lambda: operate(lambda t: 8.0, 1.0, held=lambda t: (1.0, 20.0)), "pitch of 20 rad"),
     ],
