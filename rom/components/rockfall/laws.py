@@ -8,6 +8,7 @@ import numpy as np
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
+from rom.arguments import unit_vector
 from rom.components.rockfall import kernels
 from rom.errors import ConfigError
 from rom.model import Array
@@ -167,15 +168,30 @@ class CushionForce:
         cushion: its law, a `Cushion` or a `Layer`.
         down: (3,) direction of the blow, world.
         gap: distance of the markers along it before contact [m].
+        reach: how far the slab goes aside of the lower marker [m].
+
+    Raises:
+        ConfigError: for a gap or a reach that cannot be; in the run, for a boulder that touches
+            beside the slab.
     """
 
-    def __init__(self, cushion: Resistance, down: Any, gap: float):
-        self.cushion, self.down, self.gap = cushion, np.asarray(down, dtype=float), gap
+    def __init__(self, cushion: Resistance, down: Any, gap: float, reach: float = np.inf):
+        if not (0.0 <= gap < np.inf and reach > 0.0):
+            raise ConfigError(
+                f"gap = {gap} m, reach = {reach} m: needed are gap >= 0 and reach > 0."
+            )
+        self.cushion, self.down = cushion, unit_vector("down", down)
+        self.gap, self.reach = gap, reach
         self.t, self.trial, self.deepest = -np.inf, 0.0, 0.0
 
     def __call__(self, t: float, boulder: Any, below: Any) -> tuple[Array, Array]:
         """Force and moment on the boulder; only a step that has ended leaves a trace."""
         if t > self.t:
             self.t, self.deepest = t, max(self.deepest, self.trial)
-        self.trial = self.gap - float((below.position - boulder.position) @ self.down)
+        arm = below.position - boulder.position
+        self.trial = self.gap - float(arm @ self.down)
+        aside = float(np.linalg.norm(arm - (arm @ self.down) * self.down))
+        if self.trial > 0.0 and aside > self.reach:
+            raise ConfigError(f"the boulder comes down {aside:.3g} m aside at t = {t:.4g} s, "
+                              f"beyond the slab, which reaches {self.reach:g} m.")  # fmt: skip
         return -self.cushion.force(self.trial, self.deepest) * self.down, np.zeros(3)

@@ -18,7 +18,7 @@ import numpy as np
 from rom.arguments import typed
 from rom.components.compiled import inner, kernel
 from rom.components.wind.inflow import NO_TOWER, TOWER_TUBE, wind_at
-from rom.components.wind.momentum import CHORD_COLUMN, coefficients, induced
+from rom.components.wind.momentum import CHORD_COLUMN, coefficients, induced, skewed
 from rom.components.wind.profiles import Profile, profiles
 from rom.components.wind.wind_turbine import (
     CONE_ANGLE,
@@ -194,24 +194,29 @@ def strip_load(strip, table, k, theta, flow, half_density):
 
 
 @kernel
-def turn(strips, tables, counts, shape, angles, motion, tower, out):  # noqa: PLR0913  the state
+def turn(strips, tables, counts, shape, angles, wind, motion, tower, out):  # noqa: PLR0913  the state
     """Rows of out for each azimuth and strip: the loads of one blade."""
     axial, radius = shape
     tilt, cone, overhang, height = angles
-    wind, speed, pitch, half_density = motion
+    speed, pitch, half_density = motion
+    front, side, skew = wind
     ct, st, cc, sc = math.cos(tilt), math.sin(tilt), math.cos(cone), math.sin(cone)
     v = np.zeros(3)
+    along = math.hypot(front * st, side)  # the disc
+    lean = skew * math.atan2(along, front * ct)
     for i in range(out.shape[0]):
         s, c = math.sin(2 * math.pi * i / out.shape[0]), math.cos(2 * math.pi * i / out.shape[0])
+        toward = (c * front * st - s * side) / along if along > 0.0 else 0.0
         for j in range(out.shape[1]):
             r, lift = radius[j] * cc, -overhang - radius[j] * sc
             x = lift * ct + r * c * st
-            v[0], v[1], v[2] = wind, 0.0, 0.0
+            v[0], v[1], v[2] = front, side, 0.0
             wind_at(tower, x, -r * s, height - lift * st + r * c * ct, v)
             n, e = v[0] * ct, c * v[0] * st - s * v[1]
             ahead = -c * v[1] - s * v[0] * st  # with the motion of the blade
             theta, far = axial[j] + pitch, cc * n + sc * e
             flow = induced(strips[j], tables[j], counts[j], theta, far, speed * r - ahead)
+            flow = skewed(strips[j], far, flow[0], lean, toward), flow[1], flow[2]
             normal, tangential, attack = strip_load(
                 strips[j], tables[j], counts[j], theta, flow, half_density)  # fmt: skip
             row = out[i, j]
@@ -231,40 +236,54 @@ def check_pitch(pitch: float) -> None:
 
 
 @typed
-def rotor_load(
+def rotor_load(  # noqa: PLR0913  one keyword per choice, all with defaults
     blades: Blading,
     wind: float,
     speed: float,
     pitch: float = 0.0,
     *,
+    yaw: float = 0.0,
+    skew: bool = True,
     tower: bool = False,
     n_azimuths: int = N_AZIMUTHS,
 ) -> RotorLoad:
     """Loads of a rotor in steady wind, by momentum balance on every strip and azimuth.
+
+    Example:
+        >>> from rom.components.wind import blading, rotor_load
+        >>> ahead, aside = (rotor_load(blading(), 8.0, 1.0, yaw=x) for x in (0.0, 0.5))
+        >>> aside.power < 0.8 * ahead.power
+        True
 
     Args:
         blades: see `blading`.
         wind: its speed [m/s].
         speed: of the rotor [rad/s].
         pitch: of all blades, leading edge into the wind [rad].
+        yaw: of the wind about the upright axis, from the first axis to the second [rad].
+        skew: whether the wake leans as the wind does on a disc that is tilted or yawed.
         tower: whether the tower of the turbine dams the wind.
         n_azimuths: places of a blade in a turn.
 
     Raises:
         ConfigError: for a wind or a speed below zero or not finite, a pitch of more than a turn,
-            or no azimuths.
+            a yaw beyond the model, or no azimuths.
     """
     for name, value in (("wind", wind), ("speed of the rotor", speed)):
         if not (np.isfinite(value) and value >= 0.0):
             raise ConfigError(f"a {name} of {value:g}; it is finite and not negative.",
                               hint="Turn the rotor into the wind.")  # fmt: skip
     check_pitch(pitch)
+    if not abs(yaw) < np.pi / 4:
+        raise ConfigError(f"a wind from {yaw:g} rad aside is beyond this model.",
+                          hint="Yaw is in radians, below 0.78.")  # fmt: skip
     if n_azimuths < 1:
         raise ConfigError(f"a turn of {n_azimuths} azimuths; it has one or more.")
     out = np.zeros((n_azimuths, len(blades.profile), 6))
     turn(blades.strips, *blades.tables, (blades.twist, blades.radius),
          (blades.tilt, blades.cone, HUB_OVERHANG, TOWER_HEIGHT + SHAFT_HEIGHT),
-         (float(wind), float(speed), float(pitch), 0.5 * blades.density),
+         (wind * math.cos(yaw), wind * math.sin(yaw), float(skew)),
+         (float(speed), float(pitch), 0.5 * blades.density),
          TOWER_TUBE if tower else NO_TOWER, out)  # fmt: skip
     c = math.cos(blades.cone)
     thrust = c * out[:, :, 0] @ blades.length

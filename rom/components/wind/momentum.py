@@ -9,6 +9,9 @@ Source:
     convergence, Wind Energy 17 (2014) 1327: equations 6 to 16 and the order of intervals.
     Buhl, A new empirical relationship between thrust coefficient and induction factor, NREL/
     TP-500-36834, 2005: beyond the validity of the balance, continuous with Prandtl's losses.
+    Coleman, Feingold, Stempin, Evaluation of the induced-velocity field of an idealized helicopter
+    rotor, NACA ARR L5E10, 1945: the skewed cylinder of vortices.
+    Burton, Sharpe, Jenkins, Bossanyi, Wind Energy Handbook, 2001, section 3.10: angle of the wake.
 """
 
 import math
@@ -21,6 +24,7 @@ STRIP_WIDTH = 5
 MOMENTUM_LIMIT = 2 / 3  # of the loading k: from induction 0.4 on, thrust by Buhl's parabola
 SMALLEST_ANGLE = 1e-6  # of the flow [rad]: the ends of intervals
 ANGLE_ATOL = 1e-12  # to which the angle of flow is found [rad]
+SKEW_GROWTH = 0.6  # of the angle of the wake, in those of the wind, with the induction
 MAX_HALVINGS = 60  # of an interval below pi: more than its digits
 
 
@@ -138,3 +142,19 @@ def induced(strip, table, k, theta, axial, tangential):
     # both say the same at the root; near a right angle the loading in the plane is large
     across = tangential / (1.0 - driving) if math.cos(phi) > 0.5 else through / math.tan(phi)
     return through, across, phi
+
+
+@inner
+def skewed(strip, axial, through, lean, toward):
+    """Air through a strip whose wake leaves a disc that the wind meets at an angle.
+
+    The induction grows to the side to which the wake leans, by tan(chi / 2) r / R, the slope of a
+    skewed cylinder of vortices in the middle of its end; the mean of a turn stays. ``lean`` is the
+    angle of the wind from the axis, ``toward`` the cosine of that of the blade from the side.
+    """
+    if axial <= 0.0:
+        return through
+    a = min(max(1.0 - through / axial, 0.0), 1.0)
+    slope = math.tan(0.5 * (1.0 + SKEW_GROWTH * a) * lean)
+    share = slope * toward * strip[RADIUS_COLUMN] / strip[ROTOR_COLUMN]
+    return through - (axial - through) * share

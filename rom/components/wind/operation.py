@@ -24,7 +24,7 @@ from rom.components.wind.control import (
     Controller,
     steady,
 )
-from rom.components.wind.momentum import induced
+from rom.components.wind.momentum import RADIUS_COLUMN, ROTOR_COLUMN, induced
 from rom.components.wind.wind_turbine import GEAR_RATIO
 from rom.errors import ConfigError
 from rom.model import Array
@@ -79,10 +79,10 @@ def wake_step(blades, flow, state, dt, out):
     ``state`` (n, 2, 3) holds the filters of the velocity through the plane and in it; a step dt
     of zero takes the steady wake.
     """
-    strips, tables, counts, twist, radius = blades
+    strips, tables, counts, twist = blades
     axial, speed, pitch, half_density = flow
     for j in range(out.shape[0]):
-        theta, across = twist[j] + pitch, speed * strips[j, 0]
+        theta, across = twist[j] + pitch, speed * strips[j, RADIUS_COLUMN]
         met = induced(strips[j], tables[j], counts[j], theta, axial, across)
         lost, gained = axial - met[0], met[1] - across
         if dt <= 0.0:
@@ -90,8 +90,9 @@ def wake_step(blades, flow, state, dt, out):
             state[j, 1, :] = gained
         else:
             a = min(lost / max(axial, 1e-3), LARGEST_INDUCTION)
+            radius = strips[j, ROTOR_COLUMN]
             slow = 1.1 / (1.0 - 1.3 * max(a, 0.0)) * radius / max(axial, 1e-3)
-            fast = (0.39 - 0.26 * (strips[j, 0] / radius) ** 2) * slow
+            fast = (0.39 - 0.26 * (strips[j, RADIUS_COLUMN] / radius) ** 2) * slow
             late(state[j, 0], lost, dt, slow, fast)
             late(state[j, 1], gained, dt, slow, fast)
         met = axial - state[j, 0, 2], across + state[j, 1, 2], 0.0
@@ -115,7 +116,8 @@ def operate(
     azimuths.
 
     Args:
-        wind: its speed [m/s] over time [s].
+        wind: its speed [m/s] over time [s]; `rom.components.masonry.histories.read_record` reads a
+            measured one and refuses times beyond it.
         t_end: end of the run [s].
         dt: step [s].
         blades: None: those of the turbine.
@@ -161,7 +163,7 @@ class _Run:
     ) -> None:
         self.blades, self.dynamic, self.held = blades, dynamic, held
         self.cosines = math.cos(blades.cone), math.cos(blades.tilt)
-        self.given = (blades.strips, *blades.tables, blades.twist, blades.rotor_radius)
+        self.given = (blades.strips, *blades.tables, blades.twist)
         self.wake, self.loads = (
             np.zeros((blades.radius.size, 2, 3)),
             np.zeros((blades.radius.size, 2)),

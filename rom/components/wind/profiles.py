@@ -21,6 +21,7 @@ from rom.arguments import typed, vector
 from rom.errors import ConfigError
 from rom.model import Array
 
+ROUND_ATOL = 1e-6  # [rad]: how far from -pi and pi a table may begin and end
 PROFILE_TABLE = Path(__file__).parent / "nrel5mw_profiles.csv"
 CAMBER_SHARE = 0.7  # of the lift, where the flow meets the wrong side or the wrong edge
 BLADE_ASPECT_RATIO = 17.0  # of the blade, length over chord: what its profiles were corrected with
@@ -36,12 +37,26 @@ class Profile:
         angle: (k,) of attack, ascending, from -pi to pi [rad].
         lift: (k,) coefficient [1].
         drag: (k,) coefficient [1].
+
+    Raises:
+        ConfigError: naming the profile, for a table that cannot be or does not go once round.
     """
 
     name: str
     angle: Array
     lift: Array
     drag: Array
+
+    def __post_init__(self) -> None:
+        """Refuse a table beyond which flow would have no lift and drag."""
+        a = self.angle
+        _check(self.name, a, self.lift, self.drag)
+        if a[0] > ROUND_ATOL - np.pi or a[-1] < np.pi - ROUND_ATOL:
+            first, last = np.degrees(a[[0, -1]])
+            raise ConfigError(f"profile {self.name!r} is known from {first:g} to {last:g} degrees; "
+                              "flow beyond has no lift and drag.",
+                              hint="rom.components.wind.profiles.profile carries a table on past "
+                              "stall.")  # fmt: skip
 
     @property
     def table(self) -> Array:
@@ -95,7 +110,7 @@ def profile(
     _check(name, a, cl, cd)
     if not aspect > 0.0:
         raise ConfigError(f"profile {name!r} has an aspect ratio of {aspect:g}; it is positive.")
-    if a[0] <= -np.pi + 1e-6 and a[-1] >= np.pi - 1e-6:
+    if a[0] <= ROUND_ATOL - np.pi and a[-1] >= np.pi - ROUND_ATOL:
         return Profile(name, a, cl, cd)
     return _carried_on(name, (a, cl, cd), 1.11 + 0.018 * aspect)
 
@@ -105,12 +120,12 @@ def _check(name: str, a: Array, cl: Array, cd: Array) -> None:
     if a.size < 2 or a.shape != cl.shape or a.shape != cd.shape:
         raise ConfigError(f"profile {name!r} has {a.size} angles, {cl.size} lifts and {cd.size} "
                           "drags; as many of each, two or more.")  # fmt: skip
-    if (np.diff(a) <= 0.0).any() or a[0] < -np.pi - 1e-6 or a[-1] > np.pi + 1e-6:
+    if (np.diff(a) <= 0.0).any() or a[0] < -np.pi - ROUND_ATOL or a[-1] > np.pi + ROUND_ATOL:
         raise ConfigError(f"angles of profile {name!r} do not ascend within -pi to pi.",
                           hint="Angles of attack are in radians.")  # fmt: skip
     if (cd < 0.0).any():
         raise ConfigError(f"profile {name!r} has a drag of {cd.min():g}; drag is not negative.")
-    if not 0.0 < a[-1] < np.pi / 2 and a[-1] < np.pi - 1e-6:
+    if not 0.0 < a[-1] < np.pi / 2 and a[-1] < np.pi - ROUND_ATOL:
         raise ConfigError(f"the table of profile {name!r} ends at {np.degrees(a[-1]):g} degrees; "
                           "stall lies between 0 and 90, or it goes once round.")  # fmt: skip
 

@@ -505,6 +505,32 @@ def test_messages_name_what_is_wrong(make, error, words):
         make()
 
 
+def struck_aside(aside, **more):
+    """A boulder that falls onto a plug at rest, so far aside of its middle [m]."""
+    mech = rom.Mechanism(gravity=(0, 0, 0))
+    center, place = {"c": (0, 0, 0)}, (0.6 * aside, 0.8 * aside, 1)
+    plug = mech.add_rigid("plug", mass=5e3, inertia=(50,) * 3, at=(0, 0, 0), markers=center)
+    boulder = mech.add_rigid("boulder", mass=1e3, inertia=(100,) * 3, at=place,
+                             velocity=(0, 0, -10), markers=center)  # fmt: skip
+    law = CushionForce(Cushion.of_sand(1e3, 1e6), (0, 0, -1), gap=0.9, **more)
+    mech.user_force("cushion", law, boulder.marker("c"), plug.marker("c"))
+    return rom.simulate(mech, t_end=0.03, dt=5e-4).velocity("boulder")[-1, 2]
+
+
+def test_a_boulder_beside_the_slab_is_named():
+    """Where it touches, not on its way down."""
+    inside = struck_aside(1.9, reach=2.0)
+    assert inside > -9.9
+    assert inside == struck_aside(1.9)
+    with pytest.raises(ConfigError, match=r"down 2\.1 m aside at t = 0\.01\d* s, beyond the slab"):
+        struck_aside(2.1, reach=2.0)
+    for more, words in (({"gap": -1.0}, "gap = -1"), ({"gap": 0.1, "reach": 0.0}, "reach = 0")):
+        with pytest.raises(ConfigError, match=words):
+            CushionForce(Cushion(1.0), (0, 0, -1), **more)
+    with pytest.raises(ConfigError, match="down"):
+        CushionForce(Cushion(1.0), (0, 0, 0), gap=1.0)
+
+
 @pytest.mark.fenicsx
 def test_a_patch_beyond_the_supports_is_refused():
     pytest.importorskip("gmsh", reason="needs gmsh")

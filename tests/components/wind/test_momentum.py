@@ -10,12 +10,14 @@ from rom import rotation
 from rom.components.wind.blading import BETZ_LIMIT, CHORD, blading, rotor_load
 from rom.components.wind.control import power_curve, steady
 from rom.components.wind.inflow import TOWER_TUBE, slope_of_wind, wind_at
-from rom.components.wind.profiles import profile, profiles
+from rom.components.wind.momentum import skewed
+from rom.components.wind.profiles import Profile, profile, profiles
 from rom.components.wind.whole_turbine import turbine
 from rom.components.wind.wind_turbine import RATED_SPEED
 from rom.errors import ConfigError
 
-WIND_AT, SLOPE_OF_WIND = (getattr(f, "py_func", f) for f in (wind_at, slope_of_wind))
+WIND_AT, SLOPE_OF_WIND, SKEWED = (getattr(f, "py_func", f)
+                                  for f in (wind_at, slope_of_wind, skewed))  # fmt: skip
 DESIGN_RATIO = 7.55  # speed of the tip over that of the wind at the largest power, report p. 19
 
 
@@ -216,7 +218,7 @@ def test_every_strip_meets_the_wind_of_its_place():
     """Places and directions by matrices; the air far away from what momentum left of it."""
     tilt, cone, speed = np.radians(8.0), np.radians(4.0), 1.0
     blades = blading(tilt, cone)
-    load = rotor_load(blades, 9.0, speed, tower=True, n_azimuths=12)
+    load = rotor_load(blades, 9.0, speed, tower=True, skew=False, n_azimuths=12)
     lean, back = (rotation.matrix(rotation.exp(x)) for x in ([0, tilt, 0], [0, -cone, 0]))
     hub = np.array([0.0, 0.0, 87.6 + 1.96256]) - 5.0191 * lean[:, 0]
     loads, lengths = np.zeros((12, 2)), blades.length
@@ -240,6 +242,92 @@ def test_every_strip_meets_the_wind_of_its_place():
             loads[i] += force @ lean[:, 0], np.cross(arm, force) @ lean[:, 0]
     assert_allclose(loads.T, [load.blade_thrust, load.blade_torque], rtol=1e-9)
     assert_allclose(3 * loads.mean(axis=0), [load.thrust, load.torque], rtol=1e-9)
+
+
+def biot_savart(chi, place, n=400):
+    """Velocity through the end of a skewed half-infinite cylinder of vortex rings at a place.
+
+    Rings lie parallel to the end, their middles on a line that leaves it at an angle chi, along the
+    second axis. Their radius is 1, and so is their strength per length of this line; the integral
+    over it is that of (A + B s) / (square s^2 + 2 b s + q)^(3/2) from 0 on, a closed form.
+    """
+    t = 2 * np.pi * (np.arange(n) + 0.5) / n
+    ring, element = (np.array(x) for x in ([np.cos(t), np.sin(t)], [-np.sin(t), np.cos(t)]))
+    arm = np.asarray(place)[:, None] - ring  # in the plane; behind it, less s (0, tan chi) and s
+    along = np.array([0.0, np.tan(chi)])
+    A = element[0] * arm[1] - element[1] * arm[0]
+    B = element[1] * along[0] - element[0] * along[1]
+    square, b, q = 1 + along @ along, -(along @ arm), (arm * arm).sum(axis=0)
+    root, gap = np.sqrt(q), q * square - b * b
+    by_one = (np.sqrt(square) - b / root) / gap
+    by_s = (root - b / np.sqrt(square)) / gap
+    return (A * by_one + B * by_s).sum() / (2 * n * np.cos(chi))
+
+
+@pytest.mark.parametrize("chi", np.radians([5.0, 20.0, 45.0]))
+def test_the_slope_of_the_induction_is_that_of_a_skewed_cylinder_of_vortices(chi):
+    """By Biot and Savart: half a strength in the middle, and tan(chi / 2) of it per radius."""
+    middle, h = abs(biot_savart(chi, (0.0, 0.0))), 1e-3
+    assert_allclose(middle, 0.5, rtol=1e-6)
+    ahead, behind, aside = (abs(biot_savart(chi, x)) for x in ((0.0, h), (0.0, -h), (h, 0.0)))
+    slope = (ahead - behind) / (2 * h * middle)
+    assert_allclose(slope, np.tan(chi / 2), rtol=1e-5)
+    assert_allclose(aside, middle, rtol=1e-5)
+    # and by the rotor, in which chi is 1 + 0.6 a times the angle of the wind
+    strip, a = np.array([31.5, 1.0, 63.0, 1.5, 3.0]), 0.25
+    for toward in (1.0, -0.3):
+        through = SKEWED(strip, 8.0, 8.0 * (1 - a), chi / 1.15, toward)
+        assert_allclose(through, 8.0 * (1 - a * (1 + 0.5 * slope * toward)), rtol=1e-6)
+
+
+def aside_from(yaw, tilt=0.0, **more):
+    return rotor_load(blading(tilt, 0.0), 8.0, tip_ratio(DESIGN_RATIO), yaw=yaw, **more)
+
+
+def moments(load, blades):
+    """(2,) of the thrust about the upright axis and the second axis, mean over a turn [N m]."""
+    arm = blades.radius * blades.length @ load.strip[:, :, 0].T
+    return 3 * np.array([arm @ np.sin(load.azimuth), arm @ np.cos(load.azimuth)]) / arm.size
+
+
+@pytest.mark.parametrize(("yaw", "tilt"), [(0.5, 0.0), (-0.5, 0.0), (0.0, 0.3), (0.3, -0.2)])
+def test_a_wake_that_leans_slows_the_air_where_it_leans_to(yaw, tilt):
+    """The mean over a turn stays, its first harmonic is along the wind in the disc."""
+    plain, leaning = (aside_from(yaw, tilt, skew=x) for x in (False, True))
+    axial = plain.strip[:, 12, 2] / (1 - plain.strip[:, 12, 5])
+    assert_allclose(axial, 8.0 * np.cos(yaw) * np.cos(tilt), rtol=1e-12)
+    change = leaning.strip[:, 12, 5] / plain.strip[:, 12, 5] - 1
+    in_disc = np.array([np.cos(yaw) * np.sin(tilt), np.sin(yaw)])  # up and to the second axis
+    lean = np.arctan2(np.hypot(*in_disc), np.cos(yaw) * np.cos(tilt))
+    chi = (1 + 0.6 * plain.strip[:, 12, 5]) * lean
+    r, psi = blading().radius[12] / 63.0, plain.azimuth
+    blade = np.array([np.cos(psi), -np.sin(psi)])
+    toward = in_disc @ blade / np.hypot(*in_disc)
+    assert_allclose(change, np.tan(chi / 2) * r * toward, rtol=1e-9, atol=1e-12)
+    assert np.abs(change).max() > 0.05
+
+
+@pytest.mark.parametrize("yaw", [0.35, -0.35])
+def test_a_leaning_wake_turns_the_rotor_into_the_wind(yaw):
+    """More thrust on the side that the wind meets first."""
+    blades = blading(0.0, 0.0)
+    plain, leaning = (moments(aside_from(yaw, skew=x), blades) for x in (False, True))
+    assert (leaning - plain)[0] * yaw > 0.0
+    assert abs((leaning - plain)[0]) > 1e5
+
+
+def test_a_rotor_aside_loses_as_its_axial_wind_does():
+    """Mirrored, a side is the other; near the best ratio power falls as the cube of the cosine."""
+    one, other = aside_from(0.3), aside_from(-0.3)
+    assert_allclose([one.thrust, one.torque], [other.thrust, other.torque], rtol=1e-10)
+    for yaw in np.radians((6.0, 11.0, 20.0)):
+        ratio = aside_from(yaw).power / aside_from(0.0).power
+        assert_allclose(ratio, np.cos(yaw) ** 3, rtol=1e-3)
+    for name in ("thrust", "torque"):  # the tilt of the turbine, of second order
+        plain, leaning = (getattr(aside_from(0.0, np.radians(5.0), skew=x), name)
+                          for x in (False, True))  # fmt: skip
+        assert_allclose(leaning, plain, rtol=2e-3)
+        assert leaning != plain
 
 
 def test_the_dammed_wind_has_no_source_and_no_swirl():
@@ -312,9 +400,17 @@ def test_tables_of_any_extent_are_carried_on_once_round(first, last):
         (lambda: rotor_load(blading(), 8.0, 1.0, n_azimuths=0), "a turn of 0 azimuths"),
         (lambda: rotor_load(blading(), 8.0, 1.0, n_azimuths=2.5), "n_azimuths"),
         (lambda: rotor_load(blading(), "8", 1.0), "wind"),
+        (lambda: rotor_load(blading(), 8.0, 1.0, yaw=30.0), "wind from 30 rad aside"),
+        (lambda: rotor_load(blading(), 8.0, 1.0, yaw=np.nan), "yaw = nan must be a finite"),
         (lambda: rotor_load(blading(), 8.0, 1.0, 17.47), "pitch of 17.47 rad is no angle"),
         (lambda: rotor_load(blading(), 8.0, 1.0, np.nan), "pitch"),
         (lambda: turbine(2, wind=8.0, pitch=17.47), "pitch of 17.47 rad is no angle"),
+        (
+            lambda: Profile("x", np.radians([-9.0, 20.0]), np.ones(2), np.ones(2)),
+            "profile 'x' is known from -9 to 20 degrees",
+        ),
+        (lambda: Profile("x", np.array([-np.pi, 1.5]), np.ones(2), np.ones(2)), "to 85.9437 deg"),
+        (lambda: Profile("x", np.array([-2.0, np.pi]), np.ones(2), np.ones(2)), "from -114.592"),
         (lambda: blading(tilt=5.0), "tilted by 5 rad"),
         (lambda: profile("x", [0.0, 0.2], [0.0], [0.0, 0.1]), "profile 'x' has 2 angles, 1 lifts"),
         (lambda: profile("x", [0.2, 0.0], [0.0, 1.0], [0.0, 0.1]), "do not ascend"),

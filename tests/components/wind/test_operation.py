@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from rom.components.masonry.histories import Table, recorded
 from rom.components.wind.blading import blading, rotor_load
 from rom.components.wind.control import steady
 from rom.components.wind.operation import late, operate
@@ -45,15 +46,17 @@ def answer(t, slow, fast):
     return 1 - second - 0.4 * slow / (slow - fast) * (first - second)
 
 
-def after_a_step(before, then, dt):
+def after_a_step(before, then, dt, cone=0.0):
     """Steady inductions [m/s] before and after a step of wind or pitch, and what `operate` finds.
 
     ``before`` and ``then`` are wind [m/s] and pitch [rad]; the step is at 1 s.
     """
-    blades = straight()
+    blades = blading(0.0, cone)
     rows = [rotor_load(blades, wind, SPEED, pitch, n_azimuths=1).strip[0] for wind, pitch in (
         before, then)]  # fmt: skip
-    axial = [wind - row[:, 2] for row, (wind, _) in zip(rows, (before, then), strict=True)]
+    axial = [
+        wind * np.cos(cone) - row[:, 2] for row, (wind, _) in zip(rows, (before, then), strict=True)
+    ]
     swirl = [row[:, 3] - SPEED * blades.radius for row in rows]
     start = round(1.0 / dt)
     run = operate(lambda t: (before, then)[int(t >= 1.0 - 1e-9)][0], 25.0, dt=dt, blades=blades,
@@ -91,6 +94,36 @@ def test_the_wake_of_each_strip_follows_a_step_as_the_closed_form_does(before, t
     assert_allclose(run.thrust[at], 3 * normal @ blades.length, rtol=1.5e-4)
     torque = 3 * driving @ (blades.radius * blades.length)
     assert_allclose(run.torque[at], torque, rtol=3e-4)
+
+
+@pytest.mark.parametrize("cone", [0.0, 0.3])
+def test_the_wake_of_a_rotor_that_drives_the_air_is_as_quick_as_without_induction(cone):
+    """Pitched away, strips push: 1 / (1 - 1.3 a) is 1 for a below zero.
+
+    Cone makes the disc smaller by its cosine, and the wind through the strips slower by it.
+    """
+    dt, V = 0.01, 5.0
+    blades, axial, _, run, start = after_a_step((V, 0.0), (V, np.radians(12.0)), dt, cone)
+    driving = axial[1] < -0.1 * V
+    assert driving.sum() >= 4
+    slow = 1.1 * 63.0 / V
+    fast = (0.39 - 0.26 * (blades.radius / 63.0) ** 2) * slow
+    share = answer(run.t[start:, None] - run.t[start] + 0.5 * dt, slow, fast)
+    exact = axial[0] + (axial[1] - axial[0]) * share
+    size = np.abs(axial[1] - axial[0]).max()
+    assert_allclose(run.induced[start:][:, driving], exact[:, driving], atol=5e-4 * size)
+
+
+@pytest.mark.parametrize("dynamic", [False, True])
+def test_a_tilted_rotor_with_cone_has_the_loads_of_one_that_its_axial_wind_meets(dynamic):
+    """Held, it meets the wind by the cosine of its tilt; cone by the sum over its strips."""
+    tilt, cone, V, pitch = 0.3, 0.2, 8.0, 0.02
+    run = operate(lambda t: V, 2.0, dt=0.1, blades=blading(tilt, cone), dynamic=dynamic,
+                  held=lambda t: (SPEED, pitch))  # fmt: skip
+    load = rotor_load(blading(0.0, cone), V * np.cos(tilt), SPEED, pitch)
+    assert_allclose(run.thrust, load.thrust, rtol=1e-10)
+    assert_allclose(run.torque, load.torque, rtol=1e-10)
+    assert_allclose(run.induced[-1], V * np.cos(tilt) * np.cos(cone) * load.strip[0, :, 5])
 
 
 def pitched(dynamic, back=False):
@@ -146,6 +179,11 @@ def test_a_gust_speeds_the_rotor_up_by_what_its_inertia_takes():
         (lambda: operate(lambda t: 8.0, 10.0, dt=2.0), "a step of 2 s is longer"),
         (lambda: operate(lambda t: 8.0, -1.0), "t_end"),
         (lambda: operate(8.0, 10.0), "wind"),
+        (
+            lambda: operate(Table([0.0, 5.0], [8.0, 9.0]), 10.0),
+            "from 0 s to 5 s; asked is t = 5.05",
+        ),
+        (lambda: operate(recorded([0.0, 1.0, 2.0, 5.0], [8.0] * 4), 5.0), "a gap from 2 s to 5 s"),
         (lambda: operate(lambda t: 8.0, 1.0, held=lambda t: (np.nan, 0.0)), "held at nan"),
         (lambda: operate(lambda t: 8.0, 1.0, held=lambda t: (1.0, 20.0)), "pitch of 20 rad"),
     ],

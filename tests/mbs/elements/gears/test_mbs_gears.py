@@ -99,6 +99,45 @@ def test_shifts_along_the_axis_and_tilts_add_what_they_do_in_first_order(pair):
     assert_allclose(found - wanted, 0.0, atol=1e-3 * np.abs(change).max())
 
 
+@pytest.mark.parametrize("helix", [0.35, -0.35, 0.0])
+@pytest.mark.parametrize("turn", [3e-4, -3e-3])
+def test_forces_of_helical_teeth_are_those_of_the_textbook(helix, turn):
+    """By pitch radii: axial over tangential tan(beta), radial tan(alpha_n) / cos(beta); ISO 21771.
+
+    The tangential force takes its side from the torque, the axial one from torque and hand, and the
+    radial one always parts the wheels.
+    """
+    pair = GearPair((26, 40), 4e-3, 0.05, helix=helix, thinning=5e-5)
+    packed, W = prepared(wheels(pair, phase=0.4))
+    q = np.zeros(12)
+    q[5] = turn
+    found = wrench(packed, W, moved(packed, q), np.zeros(12))
+    r1, r2 = (z * 4e-3 / (2 * np.cos(helix)) for z in (26, 40))
+    along = found[5] / r1
+    assert along * turn < 0.0
+    assert abs(along) > 1e4
+    wanted = [-abs(along) * np.tan(np.radians(20.0)) / np.cos(helix), along, -along * np.tan(helix)]
+    assert_allclose(found[:3], wanted, atol=1e-3 * abs(along))
+    assert_allclose(found[6:9], -found[:3], atol=1e-9 * abs(along))
+    assert_allclose(found[11] / r2, along, rtol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("teeth", "helix", "width"), [((26, 40), 0.35, 0.05), ((20, 40), 0.0, 0.02)]
+)
+def test_contact_ratios_are_those_of_the_textbook(teeth, helix, width):
+    """ISO 21771: paths outside both pitch points over the pitch, and b sin(beta) / (pi m_n)."""
+    m, a_n = 4e-3, np.radians(20.0)
+    pair = GearPair(teeth, m, width, helix=helix)
+    a_t = np.arctan(np.tan(a_n) / np.cos(helix))
+    r = np.array(teeth) * m / np.cos(helix) / 2
+    beyond = np.sqrt((r + m) ** 2 - (r * np.cos(a_t)) ** 2) - r * np.sin(a_t)
+    ratio = beyond.sum() * np.cos(helix) / (np.pi * m * np.cos(a_t))
+    assert pair.contact_ratio == pytest.approx(ratio, rel=1e-9)
+    assert pair.overlap == pytest.approx(width * np.sin(helix) / (np.pi * m), rel=1e-9)
+    assert 1.2 < pair.contact_ratio < 2.0  # standard teeth of twenty degrees
+
+
 def test_forces_turn_with_the_whole():
     turned = np.array([0.5, -0.3, 0.7, 0.2])
     turned = turned / np.linalg.norm(turned)
