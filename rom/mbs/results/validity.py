@@ -23,7 +23,7 @@ def warn_of_limits(solution: Solution) -> None:
     for name, part in solution.mechanism.parts.items():
         if not part.r:
             continue
-        if part.flexible.quartic is not None:
+        if getattr(part.flexible, "quartic", None) is not None:
             _warn_of_turned_markers(solution, name)
             continue
         share, bent = softening(solution, name), deformation(solution, name, surface=False)
