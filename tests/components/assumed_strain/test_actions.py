@@ -433,7 +433,7 @@ ABOVE = box((-1, 1), (2, 2))
         ({"drives": [Drive([3], ((0,), (np.nan,)))]}, ConfigError, "drive 0: values"),
         ({"loads": [Load(0 * SMALL.points, None)]}, ConfigError, "load 0: its history is no"),
         ({"loads": [Load(0 * SMALL.points, Table((0, 0.5), (0, 1)))]}, ConfigError, "0.5 s; asked"),
-        ({"tools": [Tool("pad", ABOVE, 0.0, np.sin)]}, ConfigError, r"'pad': .*\(257,\), not \(257, 2\)"),
+        ({"tools": [Tool("pad", ABOVE, 0.0, np.sin)]}, ConfigError, r"'pad': .*\(257,\), not"),
         ({"tractions": [Traction([(0, 4)], 1.0)]}, ConfigError, "the side 0-4 is not an outer"),
         ({"tractions": [Traction([(1, 0)], 1.0)]}, ConfigError, "solid on the left"),
         ({"tractions": [Traction([(0, 1)], np.inf)]}, ConfigError, "traction 0 is not finite"),
