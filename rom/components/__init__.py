@@ -2,7 +2,8 @@
 
 Structures: rods of `cosserat`, sheets of `assumed_strain`, `masonry`, `rockfall`.
 Machines: `hand`, `linkages`, `wind`, `gear_mesh`, `journal_bearing`, `transmission`. Methods:
-`updating` by measured responses, `best_matching`. `compiled` is the compiler of their kernels.
+`updating` by measured responses, `best_matching`. `histories` are what
+changes in time, `compiled` is the compiler of their kernels.
 """
 
 from rom.lazy import front

@@ -11,13 +11,10 @@ import numpy as np
 import numpy.typing as npt
 
 from rom.components.assumed_strain.triangles import Sheet, sides_of
+from rom.components.histories import History, straightened
 from rom.errors import ConfigError, MeshError
 from rom.model import Array, Index
 
-History = tuple[
-    npt.ArrayLike, npt.ArrayLike
-]  # times (m,) [s], and values (m, ...), straight between
-ALWAYS: History = ((0.0,), (1.0,))
 TOUCH_RTOL = 1e-6  # depth over the longest side of the outline that counts as touching at the start
 
 
@@ -27,11 +24,11 @@ class Load:
 
     Attributes:
         forces: (n, 2) [N]; per radian times 2 pi, that is of the whole ring, with axial symmetry.
-        history: times [s] and factors (m,) [1].
+        history: factor [1]: a number, a function of times, or times [s] and factors (m,).
     """
 
     forces: npt.ArrayLike
-    history: History = ALWAYS
+    history: History = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,13 +39,13 @@ class Traction:
         sides: (k, 2) node numbers, rows of `outer_sides` [1].
         pressure: into the solid [Pa].
         shear: along the sides, with the solid on the left [Pa].
-        history: times [s] and factors (m,) [1].
+        history: factor [1]: a number, a function of times, or times [s] and factors (m,).
     """
 
     sides: npt.ArrayLike
     pressure: float = 0.0
     shear: float = 0.0
-    history: History = ALWAYS
+    history: History = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +54,8 @@ class Drive:
 
     Attributes:
         dofs: (k,) dof numbers, 2 * node + axis.
-        history: times [s] and displacements (m,) or (m, k) from the start [m].
+        history: displacements from the start [m]: a function of times (m,) [s] that returns (m,) or
+            (m, k), or times [s] and such displacements.
     """
 
     dofs: npt.ArrayLike
@@ -72,7 +70,8 @@ class Tool:
         name: of messages.
         outline: (k, 2) corners, counter-clockwise [m]; `disc` makes a round one.
         friction: Coulomb's coefficient [1]; infinite for a rough tool that holds what it touches.
-        history: times [s] and displacements (m, 2) of the tool [m].
+        history: displacements of the tool [m]: a function of times (m,) [s] that returns (m, 2), or
+            times [s] and displacements (m, 2).
     """
 
     name: str
@@ -189,8 +188,8 @@ def disc(center: npt.ArrayLike, radius: float, *, n: int = 120) -> Array:
     )
 
 
-def prepared(body: Sheet, actions: Actions) -> Prepared:
-    """Check actions and put them into arrays.
+def prepared(body: Sheet, actions: Actions, span: tuple[float, float] = (0.0, 1.0)) -> Prepared:
+    """Check actions and put them into arrays; histories become lines over a span of time [s].
 
     Raises:
         ConfigError: if histories, dofs, sides or tools do not fit; naming which.
@@ -204,7 +203,7 @@ def prepared(body: Sheet, actions: Actions) -> Prepared:
     of = np.repeat(np.arange(len(sides)), [len(s) for s in sides])
     moved = [dofs_of(drive.dofs, body) for drive in actions.drives]
     driven, columns = _driven(dofs_of(actions.held, body), moved, len(loads) + len(sides))
-    times, table = _table(_histories(actions, [m.size for m in moved]))
+    times, table = _table(_histories(actions, [m.size for m in moved], span))
     faces = [_faces(tool) for tool in actions.tools]
     made = Prepared(
         times, table, loads, np.vstack([np.zeros((0, 2), dtype=np.int64), *sides]),
@@ -293,27 +292,18 @@ def _faces(tool: Tool) -> Array:
     return np.column_stack([X, t, t[:, 1], -t[:, 0], length])
 
 
-def _histories(actions: Actions, moved: list[int]) -> list[tuple[str, Array, Array]]:
+def _histories(
+    actions: Actions, moved: list[int], span: tuple[float, float]
+) -> list[tuple[str, Array, Array]]:
     """Name, times and values (m, columns) of every history, in the order of the table."""
     asked = [(f"load {k}", x.history, 1) for k, x in enumerate(actions.loads)]
     asked += [(f"traction {k}", x.history, 1) for k, x in enumerate(actions.tractions)]
     asked += [(f"drive {k}", x.history, moved[k]) for k, x in enumerate(actions.drives)]
     asked += [(f"tool {x.name!r}", x.history, 2) for x in actions.tools]
-    return [(name, *_checked(name, history, n)) for name, history, n in asked]
-
-
-def _checked(name: str, history: History, n: int) -> tuple[Array, Array]:
-    t, y = np.asarray(history[0], dtype=float), np.asarray(history[1], dtype=float)
-    if t.ndim != 1 or not t.size or len(y) != len(t) or not np.all(np.diff(t) > 0):
-        raise ConfigError(
-            f"{name}: times of the shape {t.shape} with values {y.shape}.",
-            hint="Times that grow, and one value, or row of values, for each.",
-        )
-    if y.ndim == 1 and not name.startswith("tool"):
-        y = np.repeat(y[:, None], n, axis=1)
-    if y.shape != (len(t), n) or not (np.isfinite(t).all() and np.isfinite(y).all()):
-        raise ConfigError(f"{name}: values of the shape {y.shape}, not {(len(t), n)} finite ones.")
-    return t, y
+    return [
+        (name, *straightened(name, history, span, n, rows=name.startswith("tool")))
+        for name, history, n in asked
+    ]
 
 
 def _table(histories: list[tuple[str, Array, Array]]) -> tuple[Array, Array]:

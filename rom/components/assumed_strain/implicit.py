@@ -12,6 +12,7 @@ import numpy.typing as npt
 from scipy.sparse import coo_matrix, csr_matrix
 from scipy.sparse.linalg import spsolve
 
+from rom.arguments import finite
 from rom.components.assumed_strain import kernels
 from rom.components.assumed_strain.actions import Actions, Load, nodal, prepared
 from rom.components.assumed_strain.contact import touch
@@ -91,7 +92,8 @@ def quasi_static(body: Sheet, metal: Metal, actions: Actions, times: npt.ArrayLi
         SolverError: if no equilibrium is found, or plastic strain leaps even in the shortest steps;
             ``error.solution`` holds the instants before.
     """
-    return _Way(body, metal, actions, None, 0.0).run(times, np.zeros_like(body.points))
+    t = _instants(times)
+    return _Way(body, metal, actions, None, 0.0, (t[0], t[-1])).run(t, np.zeros_like(body.points))
 
 
 def equilibrium(
@@ -150,7 +152,8 @@ def implicit_motion(
             hint=f"At most {MAX_RHO_OF_IMPACTS} beside tools.",
         )
     start = np.zeros_like(body.points) if v is None else nodal("velocities", v, body)
-    return _Way(body, metal, actions, mass(body, metal), rho_inf).run(times, start)
+    t, M = _instants(times), mass(body, metal)
+    return _Way(body, metal, actions, M, rho_inf, (t[0], t[-1])).run(t, start)
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,10 +175,11 @@ class _Way:
     """One run: what does not change, and the steps of Newton's method."""
 
     def __init__(
-        self, body: Sheet, metal: Metal, actions: Actions, M: csr_matrix | None, rho: float
-    ) -> None:
+        self, body: Sheet, metal: Metal, actions: Actions, M: csr_matrix | None, rho: float,
+        span: tuple[float, float] = (0.0, 1.0),
+    ) -> None:  # fmt: skip
         self.body, self.metal, self.M = body, metal, M
-        self.acts = prepared(body, actions)
+        self.acts = prepared(body, actions, span)
         self.free = np.setdiff1d(np.arange(body.points.size), self.acts.driven)
         self.alpha_m, self.alpha_f = (2 * rho - 1) / (rho + 1), rho / (rho + 1)
         self.gamma = 0.5 - self.alpha_m + self.alpha_f
@@ -191,11 +195,8 @@ class _Way:
         self.round_off *= np.sqrt(len(body.points))
         self.most = 0
 
-    def run(self, times: npt.ArrayLike, v: Array) -> Course:
-        """Instants one after the other."""
-        t = np.asarray(times, dtype=float)
-        if t.ndim != 1 or len(t) < 2 or not np.isfinite(t).all() or not np.all(np.diff(t) > 0):
-            raise ConfigError(f"times of the shape {t.shape}: two or more that grow are needed.")
+    def run(self, t: Array, v: Array) -> Course:
+        """Instants (k,) one after the other."""
         kept = [self.start(t[0], v)]
         for k in range(1, len(t)):
             now, part = kept[-1], 1.0
@@ -362,6 +363,13 @@ class _Way:
         first, second = (2 * e[:, None] + np.arange(2) for e in (i, j))
         ends = np.concatenate([first, second], axis=1)
         return _placed(A, first, ends, x.size) + _placed(A, second, ends, x.size)
+
+
+def _instants(times: npt.ArrayLike) -> Array:
+    t = finite("times", times, None)
+    if t.ndim != 1 or len(t) < 2 or not np.all(np.diff(t) > 0):
+        raise ConfigError(f"times of the shape {t.shape}: two or more that grow are needed.")
+    return t
 
 
 def _grown(now: _Now, then: _Now) -> float:

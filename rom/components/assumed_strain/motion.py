@@ -165,7 +165,8 @@ def fly(
     if not 0 < t_end < np.inf or pictures < 2:
         raise ConfigError(f"t_end = {t_end} s with {pictures} pictures: nothing to show.")
     actions = actions or Actions()
-    acts = prepared(body, replace(actions, held=np.union1d(held, dofs_of(actions.held, body))))
+    held = np.union1d(held, dofs_of(actions.held, body))
+    acts = prepared(body, replace(actions, held=held), (0.0, t_end))
     lumped = np.asarray(mass(body, metal).sum(axis=1)).ravel()[::2]
     free, x, parts = np.ones(v.shape, dtype=bool), body.points.copy(), _parts(body, metal, None)
     free.reshape(-1)[acts.driven] = False

@@ -2,7 +2,7 @@
 
 `stones` puts walls and arches together, `drawings` takes them from plane surfaces, `motion` moves
 them, `limits` finds the loads they bear;
-`actions` and `histories` are loads, moving supports and earthquakes, `joints` laws of joints;
+`actions` are loads, moving supports and earthquakes, `joints` laws of joints;
 `discontinuous_deformation` and `block_contact` are the compiled kernels.
 """
 

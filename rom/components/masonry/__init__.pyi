@@ -1,3 +1,9 @@
+from rom.components.histories import Table as Table
+from rom.components.histories import ramp as ramp
+from rom.components.histories import read_record as read_record
+from rom.components.histories import recorded as recorded
+from rom.components.histories import rectangle as rectangle
+from rom.components.histories import sine as sine
 from rom.components.masonry.actions import BaseMotion as BaseMotion
 from rom.components.masonry.actions import MovingLoad as MovingLoad
 from rom.components.masonry.actions import PointLoad as PointLoad
@@ -5,12 +11,6 @@ from rom.components.masonry.actions import SupportMotion as SupportMotion
 from rom.components.masonry.actions import Wind as Wind
 from rom.components.masonry.actions import facing as facing
 from rom.components.masonry.drawings import drawn as drawn
-from rom.components.masonry.histories import Table as Table
-from rom.components.masonry.histories import ramp as ramp
-from rom.components.masonry.histories import read_record as read_record
-from rom.components.masonry.histories import recorded as recorded
-from rom.components.masonry.histories import rectangle as rectangle
-from rom.components.masonry.histories import sine as sine
 from rom.components.masonry.joints import Joint as Joint
 from rom.components.masonry.joints import read_joints as read_joints
 from rom.components.masonry.limits import Limit as Limit

@@ -15,8 +15,8 @@ import numpy as np
 from scipy.spatial import Delaunay
 
 from rom.arguments import shortened, typed
+from rom.components.histories import History, ramp, values_at
 from rom.components.masonry.discontinuous_deformation import Drive
-from rom.components.masonry.histories import History, ramp, values_at
 from rom.components.masonry.stones import Masonry, touching
 from rom.errors import ConfigError
 from rom.model import Array, Index

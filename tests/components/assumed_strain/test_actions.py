@@ -27,6 +27,7 @@ from rom.components.assumed_strain import (
 from rom.components.assumed_strain.actions import prepared
 from rom.components.assumed_strain.contact import touch
 from rom.components.assumed_strain.implicit import _Way
+from rom.components.masonry import Table, sine
 from rom.errors import ConfigError, MeshError, SolverError
 
 SMALL, SOFT = sheet(*distorted((2, 2))), Metal(1.0, 0.3)
@@ -387,6 +388,29 @@ def test_taylors_bar_against_a_tool_is_that_of_held_nodes():
     assert feet[np.inf][0] < 0.9 * feet[0.0][0]
 
 
+@pytest.mark.parametrize("way", ["quasi_static", "implicit", "explicit"])
+def test_a_history_is_a_number_a_function_a_table_or_a_pair(way):
+    """One load by each of them, with a sine between and beyond the instants: one motion."""
+    f, times = 0.01 * np.ones_like(SMALL.points), np.linspace(0, 1, 5)
+    fine = np.linspace(0, 1, 2001)
+    wave = sine(1.0, 0.7)
+    found = []
+    for history in (wave, Table(fine, wave(fine)), (fine, wave(fine)), lambda t: 0 * t, 0.0):
+        actions = Actions(range(6), loads=[Load(f, history)],
+                          tools=[Tool("far", FAR, 0.0, lambda t: np.outer(t, [1, 0]))])  # fmt: skip
+        if way == "quasi_static":
+            found.append(quasi_static(SMALL, SOFT, actions, times).x)
+        elif way == "implicit":
+            found.append(implicit_motion(SMALL, SOFT, actions, times).x)
+        else:
+            found.append(fly(SMALL, SOFT, 0 * f, (), 1.0, pictures=5, actions=actions).x)
+    assert np.abs(found[0] - SMALL.points).max() > 1e-4
+    assert_allclose(found[1], found[0], atol=1e-7)
+    assert_allclose(found[2], found[1], atol=1e-14)
+    assert_allclose(found[3], np.tile(SMALL.points, (5, 1, 1)), atol=1e-12)
+    assert_allclose(found[4], found[3], atol=1e-14)
+
+
 ABOVE = box((-1, 1), (2, 2))
 
 
@@ -407,6 +431,9 @@ ABOVE = box((-1, 1), (2, 2))
         ({"drives": [Drive([18], ((0,), (0,)))]}, ConfigError, "held dofs 18 to 18"),
         ({"drives": [Drive([3], ((0,), (0,))), Drive([3], ((0,), (1,)))]}, ConfigError, "twice"),
         ({"drives": [Drive([3], ((0,), (np.nan,)))]}, ConfigError, "drive 0: values"),
+        ({"loads": [Load(0 * SMALL.points, None)]}, ConfigError, "load 0: its history is no"),
+        ({"loads": [Load(0 * SMALL.points, Table((0, 0.5), (0, 1)))]}, ConfigError, "0.5 s; asked"),
+        ({"tools": [Tool("pad", ABOVE, 0.0, np.sin)]}, ConfigError, r"'pad': .*\(257,\), not"),
         ({"tractions": [Traction([(0, 4)], 1.0)]}, ConfigError, "the side 0-4 is not an outer"),
         ({"tractions": [Traction([(1, 0)], 1.0)]}, ConfigError, "solid on the left"),
         ({"tractions": [Traction([(0, 1)], np.inf)]}, ConfigError, "traction 0 is not finite"),

@@ -416,6 +416,14 @@ def test_records_come_from_files(tmp_path):
         read_record(path)
 
 
+def test_a_pair_of_times_and_values_is_a_history_that_holds_its_ends():
+    model, still = on_the_ground(stone(box(), **SOFT)), []
+    for history in (((0.0, 0.1), (0.0, 1.0)), Table([0, 0.1, 9], [0, 1, 1])):
+        load = PointLoad(1, (0.5, 1.0), (2e4, -3e4), history)
+        still.append(simulate(model, t_end=0.2, dt=0.02, actions=[load]).q)
+    assert np.array_equal(*still)
+
+
 STONE = (1, (0.5, 0.5), (0.0, -1.0))
 ONE = Masonry((stone(box(), **SOFT),), (), 1e9, 0.5)
 

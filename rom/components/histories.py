@@ -1,6 +1,7 @@
 """What changes in time: pulses, harmonic motion, records, ramps.
 
-A history is a number, or a function of an array of times [s] that gives as many values.
+A history is a number, a function of an array of times [s] that gives as many values, such as a
+`Table`, or a pair of times and values, which holds its first and its last value.
 
 Source:
     Pulses: Housner, The behavior of inverted pendulum structures during earthquakes, Bull. Seism.
@@ -11,16 +12,20 @@ Source:
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from rom.arguments import typed
+from rom.arguments import is_number, typed
 from rom.errors import ConfigError, FileFormatError
 from rom.model import Array
 
 MAX_GAP_RATIO = 1.5  # longest interval of a record over its usual one; more is a gap
-History = float | Callable[[Array], Array]
+MAX_HALVINGS = 20  # of 256 intervals: jumps of functions become as steep as 4e-9 of the span
+STRAIGHT_RTOL = 1e-5  # of the largest value: how far lines stray from a function
+Pair = tuple[npt.ArrayLike, npt.ArrayLike]
+History = float | Callable[[Array], Array] | Pair
 
 
 @dataclass(frozen=True)
@@ -173,12 +178,84 @@ def ramp(duration: float) -> History:
     return lambda t: (1 - np.cos(np.pi * np.clip(np.asarray(t) / duration, 0.0, 1.0))) / 2
 
 
+def corners_of(name: str, pair: Pair, n: int = 1, *, rows: bool = False) -> tuple[Array, Array]:
+    """Times (m,) [s] and values (m, n) [unit of the history] of a pair.
+
+    Args:
+        name: for messages.
+        pair: times (m,) [s] and values (m,) or (m, n) [unit of the history].
+        n: number of columns.
+        rows: whether values (m,) do not stand for all columns.
+
+    Raises:
+        ConfigError: if they are none.
+    """
+    try:
+        t, y = (np.asarray(x, dtype=float) for x in pair)
+    except (TypeError, ValueError) as error:
+        raise ConfigError(
+            f"{name}: its history is no number, no function, and no pair of times and values."
+        ) from error
+    if t.ndim != 1 or not t.size or y.shape[:1] != t.shape or not np.all(np.diff(t) > 0):
+        raise ConfigError(
+            f"{name}: times of the shape {t.shape} with values {y.shape}.",
+            hint="Times that grow, and one value, or row of values, for each.",
+        )
+    y = np.repeat(y[:, None], n, axis=1) if y.ndim == 1 and not rows else y
+    if y.shape != (len(t), n) or not (np.isfinite(t).all() and np.isfinite(y).all()):
+        raise ConfigError(f"{name}: values of the shape {y.shape}, not {(len(t), n)} finite ones.")
+    return t, y
+
+
+def straightened(
+    name: str, history: History, span: tuple[float, float], n: int = 1, *, rows: bool = False
+) -> tuple[Array, Array]:
+    """Times (m,) [s] and values (m, n) [unit of the history] between which lines follow it.
+
+    Lines stray from functions by 1e-5 of the largest value at most, where those have no jumps.
+
+    Args:
+        name: for messages.
+        history: a function may return (k,) or (k, n) for (k,) times [unit of the history].
+        span: first and last time that are needed [s].
+        n: number of columns.
+        rows: whether values (k,) do not stand for all columns.
+
+    Raises:
+        ConfigError: if it is no history, or does not reach over the span.
+    """
+    if not callable(history):
+        pair: Any = ((0.0,), (history,)) if is_number(history) else history
+        return corners_of(name, pair, n, rows=rows)
+    if isinstance(history, Table):
+        history(np.array(span))
+        return corners_of(name, (history.t, history.values), n, rows=rows)
+    t = np.linspace(*span, 257)
+    y = corners_of(name, (t, history(t)), n, rows=rows)[1]
+    bent = np.ones(len(t) - 1, dtype=bool)
+    for _ in range(MAX_HALVINGS):
+        k = np.flatnonzero(bent)
+        if not k.size:
+            break
+        middle = (t[k] + t[k + 1]) / 2
+        there = corners_of(name, (middle, history(middle)), n, rows=rows)[1]
+        off = np.abs(there - (y[k] + y[k + 1]) / 2).max(axis=1) > STRAIGHT_RTOL * np.abs(y).max()
+        t, y = np.insert(t, k + 1, middle), np.insert(y, k + 1, there, axis=0)
+        left = (k + np.arange(len(k)))[off]
+        bent = np.zeros(len(t) - 1, dtype=bool)
+        bent[left] = bent[left + 1] = True
+    return t, y
+
+
 def values_at(name: str, history: History, t: Array) -> Array:
     """(n,) values of a history at times t (n,) [s].
 
     Raises:
         ConfigError: if it gives anything but as many finite numbers.
     """
+    if isinstance(history, tuple | list):
+        times, values = corners_of(name, history)
+        return np.interp(t, times, values[:, 0])
     given = history(t) if callable(history) else np.full(len(t), history)
     found = np.asarray(given, dtype=float)
     if found.shape != t.shape:
