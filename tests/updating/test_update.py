@@ -360,6 +360,21 @@ def test_a_direction_that_the_data_do_not_see_is_named(family):
     assert not any("rho_outer" in v for v in held.unseen)
 
 
+def test_a_prior_as_sure_as_the_data_halves_what_they_find(family):
+    """Mean of zero and the estimate, weighted by precision; deviation over the square root of 2."""
+    lines = np.linspace(20, 1400, 40)
+    test = synthetic(family, 0.05, true={"E_inner": 1.003}, lines=lines, sensors=FEW)
+    options = {"fixed": HELD, "free": ("E_inner",), "damping": 0.02}
+    alone = rom.update(family, test, **options)
+    deviation = alone.deviations["E_inner"]
+    found = rom.update(family, test, prior={"E_inner": deviation}, **options)
+    ratio = np.log(found.factors["E_inner"]) / np.log(alone.factors["E_inner"])
+    assert_allclose(ratio, 0.5, rtol=0.02)
+    assert_allclose(found.deviations["E_inner"], deviation / np.sqrt(2), rtol=0.02)
+    for values in (alone.by_sensor, alone.by_line):
+        assert_allclose(np.mean(values), 1.0, atol=0.15)
+
+
 def test_an_end_of_a_range_is_named(family):
     found = rom.update(family, synthetic(family, true={"E_inner": 3.0}), fixed=HELD, damping=0.02)
     assert found.at_bound == ("E_inner",)

@@ -39,7 +39,7 @@ def test_a_direction_is_seen_from_half_its_range_on(width, named):
 
 
 def test_each_row_is_over_its_own_expectation():
-    """Ten values of twelve count: 20 numbers less 3 unknowns; bands and sensors by what they have."""
+    """Ten values of twelve count: 20 numbers less 3; bands and sensors by theirs."""
     weight = np.ones(SHAPE)
     weight[5] = 0.0
     squares = 2.0 * weight
@@ -49,6 +49,16 @@ def test_each_row_is_over_its_own_expectation():
     assert_allclose(values, [25 / 17, 15 / 10, 9 / 4])
     assert [row.quantity.split(",")[0] for row in report.rows[1:]] == ["worst sensor", "worst band"]
     assert "worst sensor, 1" in report.rows[1].quantity and "4 to 4 Hz" in report.rows[2].quantity
+
+
+def test_the_worst_sensor_is_so_by_its_deviations():
+    """Of two numbers 12 are 5 deviations too much, of ten 24 are 3.1: 14 more, but less rare."""
+    weight = np.ones(SHAPE)
+    weight[1:, 0] = 0.0
+    weight[5] = 0.0
+    squares = weight * [[12.0], [4.8]]
+    report = verdict(Sums(np.eye(1), np.zeros(1), squares), data_of(weight), 0, {}, [])
+    assert "worst sensor, 0" in report.rows[1].quantity
 
 
 def test_the_limit_is_that_of_all_trials_together():
