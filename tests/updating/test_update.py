@@ -12,6 +12,7 @@ from cases.solid import STEEL, composite
 from rom.errors import ConfigError, ParameterError, SolverError
 from rom.parametric.layers import Stretch
 from rom.updating import AddedMass, Channels, GroundSpring, Responses
+from rom.updating.estimate import _Search
 from rom.updating.family_model import family_model
 from rom.updating.frf_data import estimators, noisy, random_error
 from rom.updating.normal_equations import Data, responses_at, sums
@@ -373,6 +374,19 @@ def test_a_prior_as_sure_as_the_data_halves_what_they_find(family):
     assert_allclose(found.deviations["E_inner"], deviation / np.sqrt(2), rtol=0.02)
     for values in (alone.by_sensor, alone.by_line):
         assert_allclose(np.mean(values), 1.0, atol=0.15)
+
+
+def test_the_gradient_is_that_of_the_cost_with_its_prior(family):
+    """Differences of half the cost, away from the prior; 8 modes lie below 2100 Hz."""
+    test = synthetic(family, lines=LINES[::10], sensors=FEW)
+    model, data = model_of(family, sensors=FEW), Data.of(test)
+    search = _Search.begun(model, data, np.ones(3, bool), 0.01, {"E_inner": 1e-3, "rho_outer": 0.1})
+    assert search.zeta.size == 9
+    search.theta = search.theta + 0.1 * np.random.default_rng(0).standard_normal(12)
+    search.sums, _ = search.at(search.theta)
+    ends = [[search.at(search.theta + h)[1] for h in s * 1e-5 * np.eye(12)] for s in (1, -1)]
+    expected = (np.array(ends[0]) - ends[1]) / 4e-5
+    assert_allclose(search.posterior()[1], expected, atol=1e-5 * np.abs(expected).max(), rtol=1e-4)
 
 
 def test_an_end_of_a_range_is_named(family):
