@@ -160,14 +160,14 @@ def _plan(args: argparse.Namespace) -> Answer:
         prior={name: typed_number("--prior", text) for name, text in prior.items()},
     )  # fmt: skip
     channels = (("sensors", plan.sensors), ("inputs", plan.inputs))
-    told = {
+    placed = {
         name: [[*x, *d] for x, d in zip(np.asarray(c.points).tolist(),
                                         np.asarray(c.directions).tolist(), strict=True)]
         for name, c in channels
     }  # fmt: skip
     data = {
         "family": str(args.family),
-        "plan": told,
+        "plan": placed,
         "deviations": plan.deviations,
         "unseen": list(plan.unseen),
     }
