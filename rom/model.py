@@ -331,6 +331,17 @@ FAILURE_COSTS = {
     f'stiffening=True or reference="mean-axis" lose least. {SMALLER_STEPS}',
     "gap in a joint": f"Joints come apart. {SMALLER_STEPS}",
     "slip of what rolls": f"What rolls slips. {SMALLER_STEPS}",
+    "chi-square of all residuals": "The model is not that of the test: deviations, which are those "
+    "of noise alone, do not hold. Offer springs, masses and kept parameters as candidates; their "
+    "scores say what is missing.",
+    "steps of the search": "Where it stands says little: what is missing makes many values equally "
+    "wrong. Free fewer parameters, give a prior, or offer what may be missing as candidates.",
+    "median FRAC": "Nothing fits: see whether the data are of this body, its supports and its "
+    "points.",
+    "highest line over": "The basis has no modes to trust there. Leave these lines out, or reduce "
+    "with more modes.",
+    "inside its range": "The range ends before the best value: widen it, or something else is "
+    "wrong.",
     "Newton corrections": f"Steps are hard to solve: something is stiff. {SMALLER_STEPS}",
 }
 

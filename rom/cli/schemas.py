@@ -198,8 +198,18 @@ VERBS: dict[str, Schema] = {
         certificate=REPORT,
     ),
     "update": record(
-        "what a test says about a family of bodies",
-        optional=("output",),
+        "what a test says about a family of bodies; with --plan, what one will say",
+        optional=(
+            "file",
+            "factors",
+            "damping",
+            "scores",
+            "by_sensor",
+            "at_bound",
+            "report",
+            "plan",
+            "output",
+        ),
         file=FILE,
         family=text("the family read"),
         factors=by_name(number("factor"), "all parameters; 0 for a candidate, not in the model"),
@@ -210,6 +220,11 @@ VERBS: dict[str, Schema] = {
         unseen=each(by_name(number("share"), "a direction"), "directions the data do not see"),
         at_bound=each(text("parameter"), "those at an end of their range"),
         report=REPORT,
+        plan=record(
+            "channels of a test: point [m] and direction",
+            sensors=each(each(number("[m] and direction"), "x, y, z, dx, dy, dz"), "sensors"),
+            inputs=each(each(number("[m] and direction"), "x, y, z, dx, dy, dz"), "forces"),
+        ),
         output=OUTPUT,
     ),
     "bench": record(

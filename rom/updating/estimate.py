@@ -14,18 +14,20 @@ import numpy as np
 from rom.arguments import finite, typed
 from rom.body.flexible import FlexibleBody
 from rom.errors import ConfigError, ParameterError, SolverError
-from rom.model import Array, Mask, Report
+from rom.model import Array, Mask, Report, Row
 from rom.names import named
 from rom.parametric.family import BodyFamily
 from rom.plausible import check_damping_ratio
+from rom.rows import row
 from rom.updating.family_model import AddedMass, FamilyModel, GroundSpring, family_model
 from rom.updating.frf_data import Complex
 from rom.updating.measured import Responses
 from rom.updating.models import modal
 from rom.updating.normal_equations import Data, Sums, responses_at, sums
-from rom.updating.verdict import check_channels, scores, unseen_directions, verdict
+from rom.updating.verdict import band, check_channels, likeness, scores, unseen_directions, verdict
 
 MAX_STEPS = 60  # of the search; ten are usual
+MAX_MISFIT = 2.0  # chi-square over its expectation: what did not settle here is a wrong model
 MAX_LOG_STEP = 0.5  # of a factor in one step
 DECREMENT_TOL = 1e-4  # expected gain of chi-square: a hundredth of a standard deviation
 START_STIFFNESS = 1e-3  # of a step, over the information of each unknown
@@ -154,7 +156,8 @@ def update(  # noqa: PLR0913  keywords of one call
             damping that is none to start from, or a family in other units than SI.
         ParameterError: for a name that is unknown.
         InterfaceError: if an interface is unknown.
-        SolverError: if the search does not end.
+        SolverError: if the search does not end though the model fits. Of a model that does not
+            fit the verdict says that the search has not ended.
 
     Source:
         Berriet, Fillod and Bouhaddi, for weighted responses with modal damping.
@@ -201,6 +204,7 @@ class _Search:
     precision: Array
     before: Array
     sums: Sums = field(init=False)
+    settled: bool = False
 
     @staticmethod
     def begun(
@@ -262,6 +266,7 @@ class _Search:
             N, g = N[np.ix_(a, a)], g[a]
             spread = max(1.0, cost / self.data.n_values)  # of a model that does not fit
             if g @ np.linalg.lstsq(N, g, rcond=None)[0] < DECREMENT_TOL * spread:
+                self.settled = True
                 return self
             scaled = np.diag(np.maximum(np.diag(N), np.finfo(float).tiny))
             while mu < MAX_STIFFNESS:
@@ -274,11 +279,14 @@ class _Search:
                     break
                 mu *= 4.0
             else:
+                self.settled = True
                 return self
             moved = (trial - self.theta)[a]
             gain = (cost - new) / -(moved @ (2 * g + N @ moved))
             mu *= max(1 / 3, 1 - (2 * gain - 1) ** 3) if gain > 0 else 1.0
             self.theta, self.sums, cost = trial, found, new
+        if cost > MAX_MISFIT * self.data.n_values:
+            return self
         raise SolverError(
             f"updating did not settle in {MAX_STEPS} steps.",
             hint="Start from better values, or give a prior; see which parameters are correlated.",
@@ -307,7 +315,7 @@ def _found(family: BodyFamily, search: _Search) -> Updated:
         zeta=search.zeta,
         names=labels,
         covariance=np.linalg.pinv(own, hermitian=True),
-        verdict=verdict(s, data, free.size, missing, at_bound),
+        verdict=verdict(s, data, free.size, missing, _doubts(search, at_bound)),
         by_sensor=_mean(s.squares, data, (0, 2)),
         by_line=_mean(s.squares, data, (1, 2)),
         scores=missing,
@@ -315,6 +323,18 @@ def _found(family: BodyFamily, search: _Search) -> Updated:
         at_bound=at_bound,
         model=model,
     )
+
+
+def _doubts(search: _Search, at_bound: tuple[str, ...]) -> list[Row]:
+    """What makes the end of a search doubtful, whatever noise explains."""
+    model, data = search.model, search.data
+    H = responses_at(model, search.x, search.zeta, data.omega)
+    lam = modal(model.at(search.x), ()).lam[model.n_rigid :]
+    used = data.omega[(data.weight > 0).any(axis=(1, 2))]
+    rows = [likeness(H, data), band(np.sqrt(lam) / (2 * np.pi), used[-1] / (2 * np.pi))]
+    if not search.settled:
+        rows.append(row("steps of the search, which has not ended", MAX_STEPS, MAX_STEPS - 1))
+    return rows + [row(f"{name} inside its range", 1.0, 0.0) for name in at_bound]
 
 
 def _mean(squares: Array, data: Data, axes: tuple[int, int]) -> Array:

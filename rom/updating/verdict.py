@@ -11,7 +11,7 @@ from scipy.stats import chi2
 from rom.errors import ConfigError
 from rom.model import Array, Index, Mask, Report, Row
 from rom.rows import row
-from rom.updating.frf_data import Complex
+from rom.updating.frf_data import Complex, frac
 from rom.updating.models import DEAD_RATIO
 from rom.updating.normal_equations import Data, Sums, wrapped
 
@@ -28,6 +28,7 @@ MIN_OTHERS_COSINE = 0.2  # mean over the other sensors, without which phases say
 MAX_FALSE_REFUSAL = 1e-3  # probability that a row refuses a right model
 MAX_SCORE = 4.0  # standard deviations
 N_BANDS = 8  # of lines, in which the misfit is looked for
+MAX_UNLIKE = 0.5  # one less the median FRAC: more is another body
 UNSEEN_RTOL = 0.5  # of a parameter's range: a wider standard deviation says nothing new
 
 
@@ -124,9 +125,7 @@ def unseen_directions(
     )
 
 
-def verdict(
-    s: Sums, data: Data, n: int, missing: dict[str, float], at_bound: tuple[str, ...]
-) -> Report:
+def verdict(s: Sums, data: Data, n: int, missing: dict[str, float], doubts: list[Row]) -> Report:
     """Whether noise alone explains what is left.
 
     Args:
@@ -134,7 +133,7 @@ def verdict(
         data: what was measured.
         n: number of unknowns.
         missing: scores of parameters not updated.
-        at_bound: names of parameters at an end of their range.
+        doubts: rows beside those of residuals.
     """
     freedom = data.n_values - n
     counted = 2.0 * (data.weight > 0)
@@ -153,8 +152,36 @@ def verdict(
         worst_name = max(missing, key=lambda name: abs(missing[name]))
         quantity = f"largest score, {worst_name} [deviations]"
         rows.append(row(quantity, abs(missing[worst_name]), MAX_SCORE))
-    rows += [row(f"{name} inside its range", 1.0, 0.0) for name in at_bound]
-    return Report("updating", tuple(rows))
+    return Report("updating", (*rows, *doubts))
+
+
+def likeness(H: Complex, data: Data) -> Row:
+    """One less the median FRAC of all pairs of channels, over the lines that count.
+
+    Args:
+        H: (n_f, n_s, n_e) of the updated model [m/N].
+        data: what was measured.
+    """
+    used = data.weight > 0
+    pairs = used.any(axis=0)
+    value = frac(H * used, np.exp(data.logarithm) * used)[pairs]
+    return row("one less the median FRAC", 1.0 - float(np.median(value)), MAX_UNLIKE)
+
+
+def band(frequencies: Array, highest: float) -> Row:
+    """The highest line over the middle one of the frequencies of the updated model.
+
+    Of the frequencies of a basis the lower half is trusted, as of vectors that are iterated.
+
+    Args:
+        frequencies: (n,) ascending, of elastic modes of the updated model [Hz].
+        highest: line that counts [Hz].
+
+    Source:
+        Bathe, Finite element procedures (1996), 11.6: twice as many vectors as modes.
+    """
+    middle = frequencies[(frequencies.size - 1) // 2]
+    return row(f"highest line over {middle:.4g} Hz, the band of the basis", highest / middle, 1.0)
 
 
 def _deviation(value: float, freedom: float) -> float:

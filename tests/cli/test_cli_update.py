@@ -1,6 +1,7 @@
 """The verb update: what it prints is what `rom.update` finds, and the body it writes is updated."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from cases.files.schema import errors
 from cases.solid import STEEL, composite
 from rom.cli.main import main
 from rom.cli.schemas import schema
-from rom.updating import AddedMass, Channels, GroundSpring, Responses
+from rom.updating import AddedMass, Channels, GroundSpring, Responses, candidates, place
 from rom.updating.frf_data import noisy
 
 SIZE, CELLS = (1.0, 0.1, 0.08), (8, 1, 1)
@@ -90,6 +91,46 @@ def test_springs_masses_candidates_and_priors_are_taken(capsys):
     )  # fmt: skip
     assert found["factors"] == same.factors and found["scores"] == same.scores
     assert set(found["scores"]) == {"outer", "cable"} and found["failed"]
+
+
+@pytest.mark.parametrize("ending", ["csv", "uff"])
+def test_a_test_is_planned(capsys, ending):
+    words = ["--plan", "5,2", "--lines", "20:900", "--noise", "0.02", "--prior", "inner=0.3",
+             *ATTACHED[:2], "-o", f"plan.{ending}"]  # fmt: skip
+    assert main(["update", *WORDS, *words, "--force", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert errors(found, schema("update")) == []
+    family = rom.load("family.rom.npz")
+    offered = candidates(family.body, 20, fixed=("root",))
+    same = place(
+        family, offered, offered, np.linspace(20, 900, 100), n_sensors=5, n_inputs=2, noise=0.02,
+        fixed=("root",), attached={"soil": SPRING}, damping=0.02, prior={"inner": 0.3},
+    )  # fmt: skip
+    assert Path(f"plan.{ending}").read_text() == getattr(same, ending)()
+    assert found["deviations"] == same.deviations
+    assert_allclose(found["plan"]["sensors"], np.hstack([same.sensors.points,
+                                                        same.sensors.directions]))  # fmt: skip
+    assert_allclose(np.array(found["plan"]["inputs"])[:, :3], same.inputs.points)
+
+
+def test_wrong_plans_are_said(capsys):
+    def refused(words, message):
+        capsys.readouterr()
+        try:
+            code = main(["update", *WORDS, *words])
+        except SystemExit as end:
+            code = end.code
+        assert code == 2
+        assert message in capsys.readouterr().err
+
+    lines = ["--lines", "20:900"]
+    refused([], "required: file")
+    refused(["--plan", "5,1"], "required: --lines")
+    refused(["--plan", "5", *lines], "is not two whole numbers")
+    refused(["--plan", "5,1", "--lines", "900:20"], "does not ascend")
+    refused(["test.h5", "--plan", "5,1", *lines], "neither a test nor")
+    refused(["--plan", "5,1", *lines, "-o", "plan.txt"], "written as .csv or .uff")
+    refused(["--plan", "500,1", *lines], "n_sensors = 500")
 
 
 def test_what_is_wrong_with_the_options_is_said(capsys):

@@ -9,8 +9,10 @@ from scipy.linalg import eigh, solve_sylvester, sqrtm
 
 import rom
 from cases.solid import STEEL, composite
-from rom.errors import ConfigError, ParameterError
+from rom.errors import ConfigError, ParameterError, SolverError
+from rom.parametric.layers import Stretch
 from rom.updating import AddedMass, Channels, GroundSpring, Responses
+from rom.updating.estimate import _Search
 from rom.updating.family_model import family_model
 from rom.updating.frf_data import estimators, noisy, random_error
 from rom.updating.normal_equations import Data, responses_at, sums
@@ -277,6 +279,57 @@ def test_the_score_names_the_parameter_that_is_missing(family):
     assert right.verdict.ok and abs(right.scores["rho_outer"]) < 4
 
 
+def test_what_is_missing_is_named_though_the_search_does_not_end(family):
+    """Everything is free and 1 kg is missing: 60 steps are not enough, its score is the largest."""
+    offered = {
+        "tip mass": AddedMass("tip", 1.0, 0.1, 10),
+        "tip spring": GroundSpring("tip", (0, 3e5, 3e5), 0.1, 10),
+    }
+    test = synthetic(family, attached={"tip mass": offered["tip mass"]})
+    found = rom.update(family, test, fixed=HELD, candidates=offered, damping=0.02)
+    failed = [row.quantity for row in found.verdict.failures]
+    assert "steps of the search, which has not ended" in failed
+    assert "largest score, tip mass [deviations]" in failed and found.scores["tip mass"] > 4
+    assert "Offer springs, masses" in str(found) and "Free fewer parameters" in str(found)
+
+
+def test_a_search_that_does_not_end_at_a_model_that_fits_is_an_error(family, monkeypatch):
+    monkeypatch.setattr("rom.updating.estimate.MAX_MISFIT", np.inf)
+    monkeypatch.setattr("rom.updating.estimate.MAX_STEPS", 2)
+    with pytest.raises(SolverError, match="did not settle in 2 steps"):
+        rom.update(family, synthetic(family), fixed=HELD)
+
+
+def test_data_of_another_body_are_named(family):
+    """Of one that carries 5 kg at its tip, half as much as itself: half the responses differ."""
+    test = synthetic(family, attached={"m": AddedMass("tip", 5.0, 0.1, 10)})
+    found = rom.update(family, test, fixed=HELD, damping=0.02)
+    (unlike,) = (row for row in found.verdict.failures if "median FRAC" in row.quantity)
+    expected = [
+        np.abs(np.vdot(a, b)) ** 2 / np.vdot(a, a).real / np.vdot(b, b).real
+        for a, b in zip(
+            found.responses(LINES).reshape(300, -1).T, test.H.reshape(300, -1).T, strict=True
+        )
+    ]
+    assert_allclose(unlike.value, 1 - np.median(expected), atol=1e-12)
+    assert "whether the data are of this body" in str(found)
+
+
+def test_lines_above_the_band_of_the_basis_are_named(family):
+    """Of 34 elastic modes the lower 17 are trusted; lines that do not count are not judged."""
+    lines = np.r_[LINES, 7000.0, 9000.0]
+    test = synthetic(family, lines=lines)
+    found = rom.update(family, test, fixed=HELD, damping=0.02)
+    (above,) = (row for row in found.verdict.failures if "the band" in row.quantity)
+    omega, _ = found.body.modes(fixed=HELD)
+    assert omega.size == 34
+    assert_allclose(above.value, 9000 * 2 * np.pi / omega[16], rtol=1e-9)
+    assert f"over {omega[16] / (2 * np.pi):.4g} Hz" in above.quantity
+    assert "Leave these lines out" in str(found)
+    c = np.where(lines > 1400, 0.0, float(test.coherence))[:, None, None] * np.ones(test.H.shape)
+    assert rom.update(family, replace(test, coherence=c), fixed=HELD, damping=0.02).verdict.ok
+
+
 def test_a_wrong_support_is_refused(family):
     """The root stands on springs in the test, and is held in the model."""
     soft = GroundSpring("root", (1e9, 1e9, 1e9, 2e7, 2e7, 2e7), 0.1, 10)
@@ -306,6 +359,34 @@ def test_a_direction_that_the_data_do_not_see_is_named(family):
     held = rom.update(family, test, fixed=HELD, damping=0.02, prior={"rho_outer": 0.05})
     assert_allclose(held.deviations["rho_outer"], 0.05, rtol=0.01)
     assert not any("rho_outer" in v for v in held.unseen)
+
+
+def test_a_prior_as_sure_as_the_data_halves_what_they_find(family):
+    """Mean of zero and the estimate, weighted by precision; deviation over the square root of 2."""
+    lines = np.linspace(20, 1400, 40)
+    test = synthetic(family, 0.05, true={"E_inner": 1.003}, lines=lines, sensors=FEW)
+    options = {"fixed": HELD, "free": ("E_inner",), "damping": 0.02}
+    alone = rom.update(family, test, **options)
+    deviation = alone.deviations["E_inner"]
+    found = rom.update(family, test, prior={"E_inner": deviation}, **options)
+    ratio = np.log(found.factors["E_inner"]) / np.log(alone.factors["E_inner"])
+    assert_allclose(ratio, 0.5, rtol=0.02)
+    assert_allclose(found.deviations["E_inner"], deviation / np.sqrt(2), rtol=0.02)
+    for values in (alone.by_sensor, alone.by_line):
+        assert_allclose(np.mean(values), 1.0, atol=0.15)
+
+
+def test_the_gradient_is_that_of_the_cost_with_its_prior(family):
+    """Differences of half the cost, away from the prior; 8 modes lie below 2100 Hz."""
+    test = synthetic(family, lines=LINES[::10], sensors=FEW)
+    model, data = model_of(family, sensors=FEW), Data.of(test)
+    search = _Search.begun(model, data, np.ones(3, bool), 0.01, {"E_inner": 1e-3, "rho_outer": 0.1})
+    assert search.zeta.size == 9
+    search.theta = search.theta + 0.1 * np.random.default_rng(0).standard_normal(12)
+    search.sums, _ = search.at(search.theta)
+    ends = [[search.at(search.theta + h)[1] for h in s * 1e-5 * np.eye(12)] for s in (1, -1)]
+    expected = (np.array(ends[0]) - ends[1]) / 4e-5
+    assert_allclose(search.posterior()[1], expected, atol=1e-5 * np.abs(expected).max(), rtol=1e-4)
 
 
 def test_an_end_of_a_range_is_named(family):
@@ -360,6 +441,9 @@ def test_a_family_must_be_in_si_and_without_thickness(family):
     odd = replace(family, body=replace(family.body, units="mm-t-s"))
     with pytest.raises(ConfigError, match="mm-t-s, responses in SI"):
         rom.update(odd, synthetic(family), fixed=HELD)
+    layered = replace(family, stretch=Stretch(2, ("outer",), (((0.0, 0.08),),)))
+    with pytest.raises(ConfigError, match="parameter of thickness cannot be updated"):
+        rom.update(layered, synthetic(family), fixed=HELD)
 
 
 def test_a_free_body_has_its_rigid_motions_too(family):

@@ -1,7 +1,8 @@
 """Update a family of bodies by a vibration test, and say what the test can and cannot tell.
 
 The family comes from `rom.reduce_parametric` and a file of `rom.save`. With -o the body at the
-factors found is written.
+factors found is written. With --plan and no test, the sensors and forces that will tell most are
+chosen, and written with -o.
 """
 
 import argparse
@@ -9,11 +10,21 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rom.cli.answer import Answer, failures, report_data
-from rom.cli.options import assignment, count, names, number, positive, typed_number, unique
+from rom.cli.options import (
+    assignment,
+    count,
+    names,
+    number,
+    positive,
+    require,
+    typed_number,
+    unique,
+)
 from rom.cli.output import add_force, checked
 from rom.errors import ConfigError
 
 if TYPE_CHECKING:
+    from rom.parametric.family import BodyFamily
     from rom.updating import AddedMass, GroundSpring, Updated
 
 SUMMARY = "update a family of bodies by a vibration test"
@@ -23,13 +34,17 @@ EXAMPLES = """\
   rom update test.uff --family panel.rom.npz --averages 50 --free core,clamp \\
       --spring clamp=root:1e8,1e8,1e8:0.1:10 --mass cable=tip:0.05:0.1:10 --candidate cable \\
       -o updated.rom.npz
+  rom update --plan 8,1 --lines 20:800 --family panel.rom.npz --fixed root -o plan.csv
 """
+PLAN_LINES = 100  # between the first and the last one
+PLAN_POINTS = 20  # of the surface that are offered, each along three axes
+PLAN_ENDINGS = (".csv", ".uff")
 FACTOR_HELP = "by a factor from LOW to HIGH that is sought; may be repeated"
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Options of the verb."""
-    parser.add_argument("file", type=Path, help="test: .uff, .unv, .csv, .txt or .h5")
+    parser.add_argument("file", type=Path, nargs="?", help="test: .uff, .unv, .csv, .txt or .h5")
     parser.add_argument("--family", type=Path, required=True, help="family file, .rom.npz")
     parser.add_argument("--averages", type=count, help="number of them behind each function")
     parser.add_argument("--coherence", type=number, help="of all values, where the file has none")
@@ -59,24 +74,32 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--damping", type=positive, default=0.01, help="to start from (default 1 %%)"
     )
     parser.add_argument("--tolerance", type=positive, help="of points off the body [m]")
-    parser.add_argument("-o", "--output", type=Path, help="updated body, .rom.npz")
+    parser.add_argument(
+        "--plan", metavar="SENSORS,FORCES", type=_two_counts, help="choose so many for a test to be"
+    )
+    parser.add_argument(
+        "--lines", metavar="LOW:HIGH", type=_range, help="of the test that is planned [Hz]"
+    )
+    parser.add_argument(
+        "--noise", type=positive, default=0.05, help="relative, of what is planned (default 5 %%)"
+    )
+    parser.add_argument(
+        "-o", "--output", type=Path, help="updated body, .rom.npz; plan, .csv or .uff"
+    )
     add_force(parser)
 
 
 def run(args: argparse.Namespace) -> Answer:
     """Read, update, judge."""
-    from rom.io.family import load, save
+    from rom.io.family import save
     from rom.io.responses.reading import read_responses
-    from rom.parametric.family import BodyFamily
     from rom.updating.estimate import update
 
+    if args.plan is not None:
+        return _plan(args)
+    require({"file": args.file}, hint="A test, or --plan for one that is to be made.")
     output = args.output and checked(args, args.output, "npz")
-    family = load(args.family)
-    if not isinstance(family, BodyFamily):
-        raise ConfigError(
-            f"{args.family} holds one body, without parameters.",
-            hint="Make a family with rom.reduce_parametric and write it with rom.save.",
-        )
+    family = _family(args)
     test = read_responses(
         args.file, averages=args.averages, coherence=args.coherence, points=args.points
     )
@@ -95,6 +118,82 @@ def run(args: argparse.Namespace) -> Answer:
     write = None if output is None else lambda: save(found.body, output)
     text = f"{args.file}: {test.H.shape[1]} sensors, {test.H.shape[2]} forces, {len(test.H)} lines"
     return Answer(_data(args, found), f"{text}\n{found}", write, failures(found.verdict))
+
+
+def _family(args: argparse.Namespace) -> "BodyFamily":
+    from rom.io.family import load
+    from rom.parametric.family import BodyFamily
+
+    family = load(args.family)
+    if not isinstance(family, BodyFamily):
+        raise ConfigError(
+            f"{args.family} holds one body, without parameters.",
+            hint="Make a family with rom.reduce_parametric and write it with rom.save.",
+        )
+    return family
+
+
+def _plan(args: argparse.Namespace) -> Answer:
+    """Choose the channels of a test.
+
+    Raises:
+        ConfigError: for a test that is there, no lines, or an output of another kind.
+    """
+    import numpy as np
+
+    from rom.updating.placement import candidates, place
+
+    if args.file is not None or args.candidate:
+        raise ConfigError("--plan takes neither a test nor --candidate: it comes before the test.")
+    require({"--lines": args.lines}, hint="For example --lines 20:800, from 20 to 800 Hz.")
+    output = args.output and checked(args, args.output)
+    if output and output.suffix.lower() not in PLAN_ENDINGS:
+        raise ConfigError(f"-o {output}: a plan is written as {' or '.join(PLAN_ENDINGS)}.")
+    family = _family(args)
+    offered = candidates(family.body, PLAN_POINTS, fixed=args.fixed)
+    n_sensors, n_inputs = args.plan
+    prior = unique(args.prior, "--prior")
+    plan = place(
+        family, offered, offered, np.linspace(*args.lines, PLAN_LINES), n_sensors=n_sensors,
+        n_inputs=n_inputs, noise=args.noise, fixed=args.fixed, attached=_outside(args),
+        damping=args.damping,
+        prior={name: typed_number("--prior", text) for name, text in prior.items()},
+    )  # fmt: skip
+    channels = (("sensors", plan.sensors), ("inputs", plan.inputs))
+    placed = {
+        name: [[*x, *d] for x, d in zip(np.asarray(c.points).tolist(),
+                                        np.asarray(c.directions).tolist(), strict=True)]
+        for name, c in channels
+    }  # fmt: skip
+    data = {
+        "family": str(args.family),
+        "plan": placed,
+        "deviations": plan.deviations,
+        "unseen": list(plan.unseen),
+    }
+    if not output:
+        return Answer(data, f"{plan}\n{plan.csv()}")
+    text = plan.uff() if output.suffix.lower() == ".uff" else plan.csv()
+    return Answer(
+        data | {"output": str(output)}, str(plan), lambda: output.write_text(text, "ascii")
+    )
+
+
+def _two_counts(text: str) -> tuple[int, int]:
+    parts = text.split(",")
+    if len(parts) != 2:
+        raise argparse.ArgumentTypeError(f"{text!r} is not two whole numbers, as in 8,1")
+    return count(parts[0]), count(parts[1])
+
+
+def _range(text: str) -> tuple[float, float]:
+    parts = text.split(":")
+    if len(parts) != 2:
+        raise argparse.ArgumentTypeError(f"{text!r} is not LOW:HIGH, as in 20:800")
+    low, high = map(positive, parts)
+    if not low < high:
+        raise argparse.ArgumentTypeError(f"{text!r} does not ascend")
+    return low, high
 
 
 def _data(args: argparse.Namespace, found: "Updated") -> dict[str, Any]:

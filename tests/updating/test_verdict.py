@@ -1,0 +1,84 @@
+"""What the data say, against least squares on numbers of their own; one mistake turns one red."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import rom.updating.frf_data as frf
+from rom.updating.normal_equations import Data, Sums
+from rom.updating.verdict import scores, unseen_directions, verdict
+
+SHAPE = (6, 2, 1)
+
+
+def data_of(weight):
+    return Data(2 * np.pi * np.arange(1.0, 7.0), np.zeros(SHAPE, complex), weight)
+
+
+def test_scores_are_those_of_one_more_column_in_least_squares():
+    """A column more with the estimate b +- s has the score b / s; all others are sought again."""
+    rng = np.random.default_rng(0)
+    J, r = rng.standard_normal((40, 3)), rng.standard_normal(40)
+    J[:, 2] += 0.8 * J[:, 0] - 0.5 * J[:, 1]
+    found = scores(J.T @ J, J.T @ r, np.array([0, 1]), ("a", "b", "c"))
+    change, covariance = -np.linalg.lstsq(J, r, rcond=None)[0], np.linalg.inv(J.T @ J)
+    assert list(found) == ["c"]
+    assert_allclose(found["c"], change[2] / np.sqrt(covariance[2, 2]), rtol=1e-10)
+
+
+def test_a_parameter_that_others_replace_has_no_score():
+    J = np.array([[1.0, 2.0], [2.0, 4.0], [3.0, 6.0]])
+    assert scores(J.T @ J, J.T @ np.ones(3), np.array([0]), ("a", "b")) == {}
+
+
+@pytest.mark.parametrize(("width", "named"), [(3.9, True), (4.1, False)])
+def test_a_direction_is_seen_from_half_its_range_on(width, named):
+    """Standard deviation 2: half of 4. The other one is known to 0.01 of a range of 1."""
+    found = unseen_directions(np.diag([0.25, 1e4]), np.array([width, 1.0]), ("a", "b"))
+    assert [list(direction) for direction in found] == [["a"]] * named
+
+
+def test_each_row_is_over_its_own_expectation():
+    """Ten values of twelve count: 20 numbers less 3; bands and sensors by theirs."""
+    weight = np.ones(SHAPE)
+    weight[5] = 0.0
+    squares = 2.0 * weight
+    squares[3, 1] += 5.0
+    report = verdict(Sums(np.eye(3), np.zeros(3), squares), data_of(weight), 3, {}, [])
+    values = [row.value for row in report.rows]
+    assert_allclose(values, [25 / 17, 15 / 10, 9 / 4])
+    assert [row.quantity.split(",")[0] for row in report.rows[1:]] == ["worst sensor", "worst band"]
+    assert "worst sensor, 1" in report.rows[1].quantity and "4 to 4 Hz" in report.rows[2].quantity
+
+
+def test_the_worst_sensor_is_so_by_its_deviations():
+    """Of two numbers 12 are 5 deviations too much, of ten 24 are 3.1: 14 more, but less rare."""
+    weight = np.ones(SHAPE)
+    weight[1:, 0] = 0.0
+    weight[5] = 0.0
+    squares = weight * [[12.0], [4.8]]
+    report = verdict(Sums(np.eye(1), np.zeros(1), squares), data_of(weight), 0, {}, [])
+    assert "worst sensor, 0" in report.rows[1].quantity
+
+
+def test_the_limit_is_that_of_all_trials_together():
+    """0.001 of a right model; 0.0005 for each of two sensors. Chi-square of two: -2 ln P / 2."""
+    weight = np.zeros(SHAPE)
+    weight[0] = 1.0
+    report = verdict(Sums(np.eye(1), np.zeros(1), 2 * weight), data_of(weight), 0, {}, [])
+    assert report.rows[1].limit == f"<= {-np.log(0.0005):g}"
+
+
+def test_estimators_keep_the_phase_and_assurance_is_of_conjugates():
+    H, f = 2.0 * np.exp(0.7j), np.exp(1j * np.arange(5.0))
+    H1, H2, Hv, coherence = frf.estimators(H * f, f)
+    assert_allclose([H1, H2, Hv], H, rtol=1e-12)
+    assert_allclose(coherence, 1.0)
+    A = np.exp(1j * np.arange(12.0)).reshape(SHAPE)
+    assert_allclose(frf.frac(A, 1j * A), 1.0)
+    assert_allclose(np.diag(frf.fdac(A, 1j * A)), 1.0)
+
+
+def test_noise_has_the_level_of_both_parts_together():
+    H = frf.noisy(np.full(200_000, 3.0 + 4.0j), 0.1, np.random.default_rng(0))
+    assert_allclose(np.sqrt(np.mean(np.abs(H / (3 + 4j) - 1) ** 2)), 0.1, rtol=0.01)
