@@ -38,8 +38,9 @@ def test_a_front_has_the_names_of_its_stub_and_shows_no_others(package):
     own = [line for line in lines if line.module != "typing"]
     assert isinstance(front, Front)
     assert dir(front) == sorted(alias.asname for line in own for alias in line.names)
-    # components show the elements of mechanisms, and the methods, that they are made of
-    below = ["rom.mbs.elements.", "rom.updating."] * package.startswith("rom.components.")
+    # components show the elements of mechanisms, methods and histories that they are made of
+    below = ["rom.mbs.elements.", "rom.updating.", "rom.components.histories."]
+    below *= package.startswith("rom.components.")
     inside = (f"{package}.", *below)
     for line in own:
         assert f"{line.module}.".startswith(inside), f"{package}: {line.module} is not in it"

@@ -152,9 +152,10 @@ def _plan(args: argparse.Namespace) -> Answer:
     family = _family(args)
     offered = candidates(family.body, PLAN_POINTS, fixed=args.fixed)
     n_sensors, n_inputs = args.plan
+    low, high = args.lines
     prior = unique(args.prior, "--prior")
     plan = place(
-        family, offered, offered, np.linspace(*args.lines, PLAN_LINES), n_sensors=n_sensors,
+        family, offered, offered, np.linspace(low, high, PLAN_LINES), n_sensors=n_sensors,
         n_inputs=n_inputs, noise=args.noise, fixed=args.fixed, attached=_outside(args),
         damping=args.damping,
         prior={name: typed_number("--prior", text) for name, text in prior.items()},

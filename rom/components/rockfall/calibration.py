@@ -44,8 +44,8 @@ class History:
 
     Attributes:
         t: (n,) increasing times [s].
-        values: (n,) [SI].
-        deviation: standard deviation of a value [SI]; None if it is to be found.
+        values: (n,) of the channel [m, m/s^2 or N].
+        deviation: standard deviation of a value [m, m/s^2 or N]; None if it is to be found.
 
     Raises:
         ConfigError: for gaps, times that do not increase, values that are not finite.
