@@ -164,7 +164,7 @@ def likeness(H: Complex, data: Data) -> Row:
     """
     used = data.weight > 0
     pairs = used.any(axis=0)
-    measured: Complex = np.exp(data.logarithm) * used
+    measured = np.where(used, np.exp(data.logarithm), 0.0)
     value = frac(H * used, measured)[pairs]
     return row("one less the median FRAC", 1.0 - float(np.median(value)), MAX_UNLIKE)
 
