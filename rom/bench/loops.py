@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from rom.components.assumed_strain import Flight, Metal, fly, rectangle, sheet
+from rom.components.histories import sine
 from rom.components.linkages.dynamic_isotropy import angle_grid, isotropy_index
 from rom.components.linkages.two_dof_linkages import FiveBar, rod
 from rom.components.masonry.actions import BaseMotion
-from rom.components.masonry.histories import sine
 from rom.components.masonry.limits import arch
 from rom.components.masonry.motion import Motion, simulate
 

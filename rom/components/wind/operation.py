@@ -116,7 +116,7 @@ def operate(
     azimuths.
 
     Args:
-        wind: its speed [m/s] over time [s]; `rom.components.masonry.histories.read_record` reads a
+        wind: its speed [m/s] over time [s]; `rom.components.histories.read_record` reads a
             measured one and refuses times beyond it.
         t_end: end of the run [s].
         dt: step [s].

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from rom.components.masonry.histories import Table, recorded
+from rom.components.histories import Table, recorded
 from rom.components.wind.blading import blading, rotor_load
 from rom.components.wind.control import steady
 from rom.components.wind.operation import late, operate
