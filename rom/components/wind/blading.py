@@ -1,7 +1,8 @@
 """The blades of a rotor as strips, and what the wind does to them at a steady speed.
 
 The shaft may be tilted and the blades coned; a strip then meets other air at each azimuth, and the
-balance of momentum is struck strip by strip and azimuth by azimuth. The tower dams the wind ahead.
+balance of momentum is struck strip by strip and azimuth by azimuth. Its wake leans, so that the
+lee side of the rotor is slowed down more than the other. The tower dams the wind ahead.
 
 Source:
     Jonkman, Butterfield, Musial, Scott, NREL/TP-500-38060, 2009, table 3-1: the blade.
@@ -18,7 +19,7 @@ import numpy as np
 from rom.arguments import typed
 from rom.components.compiled import inner, kernel
 from rom.components.wind.inflow import NO_TOWER, TOWER_TUBE, wind_at
-from rom.components.wind.momentum import CHORD_COLUMN, coefficients, induced
+from rom.components.wind.momentum import CHORD_COLUMN, coefficients, induced, skewed
 from rom.components.wind.profiles import Profile, profiles
 from rom.components.wind.wind_turbine import (
     CONE_ANGLE,
@@ -212,6 +213,7 @@ def turn(strips, tables, counts, shape, angles, motion, tower, out):  # noqa: PL
             ahead = -c * v[1] - s * v[0] * st  # with the motion of the blade
             theta, far = axial[j] + pitch, cc * n + sc * e
             flow = induced(strips[j], tables[j], counts[j], theta, far, speed * r - ahead)
+            flow = skewed(strips[j], far, flow[0], tilt, c), flow[1], flow[2]
             normal, tangential, attack = strip_load(
                 strips[j], tables[j], counts[j], theta, flow, half_density)  # fmt: skip
             row = out[i, j]

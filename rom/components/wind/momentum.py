@@ -9,6 +9,9 @@ Source:
     convergence, Wind Energy 17 (2014) 1327: equations 6 to 16 and the order of intervals.
     Buhl, A new empirical relationship between thrust coefficient and induction factor, NREL/
     TP-500-36834, 2005: beyond the validity of the balance, continuous with Prandtl's losses.
+    Pitt, Peters, Theoretical prediction of dynamic-inflow derivatives, Vertica 5 (1981) 21: slope
+    of the induced velocity over a disc whose wake leans. Burton et al., Wind Energy Handbook, 2001,
+    chapter 3: by how much it leans.
 """
 
 import math
@@ -22,6 +25,10 @@ MOMENTUM_LIMIT = 2 / 3  # of the loading k: from induction 0.4 on, thrust by Buh
 SMALLEST_ANGLE = 1e-6  # of the flow [rad]: the ends of intervals
 ANGLE_ATOL = 1e-12  # to which the angle of flow is found [rad]
 MAX_HALVINGS = 60  # of an interval below pi: more than its digits
+SKEW_SLOPE = 15 * math.pi / 32  # of the induced velocity over the disc, times tan(chi / 2)
+SKEW_GROWTH = 0.6  # by which induction leans the wake more than the wind
+LARGEST_INDUCTION = 0.5  # beyond which wakes lean no more and take no more time
+LARGEST_SKEW = math.pi / 3  # of a wake, so that air goes through the disc everywhere [rad]
 
 
 @inner
@@ -138,3 +145,18 @@ def induced(strip, table, k, theta, axial, tangential):
     # both say the same at the root; near a right angle the loading in the plane is large
     across = tangential / (1.0 - driving) if math.cos(phi) > 0.5 else through / math.tan(phi)
     return through, across, phi
+
+
+@inner
+def skewed(strip, far, through, yaw, side):
+    """Air that reaches the strip along the axis if the wake leans: least on its lee side.
+
+    ``yaw`` is the angle of the wind from the axis, ``side`` the cosine of the angle between the
+    blade and the wind in the plane of the rotor.
+    """
+    if far <= 0.0:
+        return through
+    a = min(max(1.0 - through / far, 0.0), LARGEST_INDUCTION)
+    chi = min(max((1.0 + SKEW_GROWTH * a) * yaw, -LARGEST_SKEW), LARGEST_SKEW)
+    out = side * strip[RADIUS_COLUMN] / strip[ROTOR_COLUMN]
+    return through - (far - through) * SKEW_SLOPE * math.tan(0.5 * chi) * out

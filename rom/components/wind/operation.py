@@ -24,14 +24,13 @@ from rom.components.wind.control import (
     Controller,
     steady,
 )
-from rom.components.wind.momentum import induced
+from rom.components.wind.momentum import LARGEST_INDUCTION, induced
 from rom.components.wind.wind_turbine import GEAR_RATIO
 from rom.errors import ConfigError
 from rom.model import Array
 
 DRIVE_INERTIA = 43_784_725.0  # of rotor and generator about the slow shaft [kg m^2], section 7
 WAKE_SHARE = 0.6  # of a change of the induced velocity that the first filter passes at once
-LARGEST_INDUCTION = 0.5  # beyond which times of the wake grow no more
 MAX_STEP = 0.5  # s: the filter of the controller knows a speed four times a second
 
 

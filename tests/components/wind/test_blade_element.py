@@ -9,7 +9,16 @@ from cases.mbs.mechanisms import residual_at, tangents_at
 from rom import rotation
 from rom.components import cosserat
 from rom.components.wind.blade_element import in_wind, strips
-from rom.components.wind.blading import CHORD, ELEMENT_LENGTH, blading, rotor_load
+from rom.components.wind.blading import (
+    CHORD,
+    ELEMENT_LENGTH,
+    ELEMENT_PROFILE,
+    ELEMENT_TWIST,
+    RADIUS,
+    Blading,
+    blading,
+    rotor_load,
+)
 from rom.components.wind.control import steady
 from rom.components.wind.profiles import profiles
 from rom.components.wind.whole_turbine import N_BLADES, turbine
@@ -87,6 +96,31 @@ def test_a_strip_has_lift_across_and_drag_along_the_air_that_reaches_it(resting)
     assert found[0] > 0  # thrust
     assert found[1] < 0  # which drives the rotor: blades move against the second axis
     assert_allclose(W.power[2], -found @ v[t : t + 3], rtol=1e-10)
+
+
+@pytest.mark.parametrize("down", [False, True])
+def test_strips_in_wind_from_below_have_the_loads_of_a_tilted_rotor(down):
+    """The same strips as a rotor nose up, whose wake leans up; a blade that points up or down."""
+    yaw, speed, n = np.radians(20.0), 1.1, 24
+    one = in_wind(cosserat.body(blade(n)), (WIND * np.cos(yaw), 0.0, WIND * np.sin(yaw)), cone=0.0)
+    mech = rom.Mechanism(gravity=(0, 0, 0))
+    A = rotation.matrix(rotation.exp([np.pi if down else 0.0, 0.0, 0.0]))
+    mech.add_nonlinear("blade", one, orientation=A)
+    packed = pack(mech, whole=True)
+    v = np.zeros(packed.v.size)
+    middles, length, chord, _ = strips(one)
+    used = np.arange(4, n - 1)
+    v[packed.system.bodies.v_at[used] + 1] = speed * middles[used] * (1 if down else -1)
+    W = workspace(packed.system, 0)
+    found = -forces(packed, W, v).reshape(-1, 6)[used, :2]
+    given = profiles()
+    at = np.searchsorted(1.5 + np.cumsum(ELEMENT_LENGTH), middles[used])
+    rotor = Blading(middles[used], length[used], chord[used],
+                    np.radians(np.interp(middles[used], RADIUS, ELEMENT_TWIST)),
+                    tuple(given[ELEMENT_PROFILE[k]] for k in at), tilt=yaw, cone=0.0)  # fmt: skip
+    row = rotor_load(rotor, WIND, speed, n_azimuths=2).strip[int(down)]
+    drives = -row[:, 1] if not down else row[:, 1]
+    assert_allclose(found, length[used, None] * np.column_stack([row[:, 0], drives]), rtol=1e-6)
 
 
 def without_stiffness(n=6):

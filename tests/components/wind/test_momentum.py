@@ -7,15 +7,18 @@ import pytest
 from numpy.testing import assert_allclose
 
 from rom import rotation
-from rom.components.wind.blading import BETZ_LIMIT, CHORD, blading, rotor_load
+from rom.components.wind.blading import BETZ_LIMIT, CHORD, RADIUS, blading, rotor_load
 from rom.components.wind.control import power_curve, steady
 from rom.components.wind.inflow import TOWER_TUBE, slope_of_wind, wind_at
+from rom.components.wind.momentum import skewed
 from rom.components.wind.profiles import profile, profiles
 from rom.components.wind.whole_turbine import turbine
 from rom.components.wind.wind_turbine import RATED_SPEED
 from rom.errors import ConfigError
 
-WIND_AT, SLOPE_OF_WIND = (getattr(f, "py_func", f) for f in (wind_at, slope_of_wind))
+WIND_AT, SLOPE_OF_WIND, SKEWED = (
+    getattr(f, "py_func", f) for f in (wind_at, slope_of_wind, skewed)
+)
 DESIGN_RATIO = 7.55  # speed of the tip over that of the wind at the largest power, report p. 19
 
 
@@ -227,11 +230,19 @@ def test_every_strip_meets_the_wind_of_its_place():
             v = np.array([9.0, 0.0, 0.0])
             WIND_AT(TOWER_TUBE, *place, v)
             moved = np.cross(speed * lean[:, 0], place - hub)
-            _, driving, through, across, _, a = load.strip[i, j]
+            _, _, through, across, _, lost = load.strip[i, j]
             axial, tangential = (A[:, k] @ (v - moved) for k in (0, 1))
-            assert_allclose(through / (1 - a), axial, rtol=1e-9)
-            c, r = np.cos(cone), blades.radius[j] * np.cos(cone)
-            F = loss(r, np.arctan2(through, across), R=63.0 * c, hub=1.5 * c)
+            assert_allclose(through / (1 - lost), axial, rtol=1e-9)
+            a, out = lost, blades.radius[j] / 63.0 * np.cos(load.azimuth[i])
+            for _ in range(40):  # what momentum left of it before the wake leant
+                a = lost / (1 + 15 * np.pi / 32 * np.tan(0.5 * (1 + 0.6 * a) * tilt) * out)
+            c, r, through = np.cos(cone), blades.radius[j] * np.cos(cone), (1 - a) * axial
+            phi, one = np.arctan2(through, across), blades.profile[j]
+            lift, drag = (np.interp(phi - blades.twist[j], one.angle, x)
+                          for x in (one.lift, one.drag))  # fmt: skip
+            q = 0.5 * 1.225 * blades.chord[j] * np.hypot(through, across)
+            F = loss(r, phi, R=63.0 * c, hub=1.5 * c)
+            driving = q * (lift * through - drag * across)
             around = 3 * driving / (4 * np.pi * r * 1.225 * through * F)
             assert_allclose(across - around, tangential, rtol=1e-7)
         for j in range(17):  # thrust and torque by vectors
@@ -326,3 +337,79 @@ def test_tables_of_any_extent_are_carried_on_once_round(first, last):
 def test_what_cannot_be_is_named(call, said):
     with pytest.raises(ConfigError, match=said):
         call()
+
+
+def slopes_of_pressures(x, y, z):
+    """How the pressures of both discs grow across them, ahead of them (z < 0).
+
+    Potentials in coordinates of the oblate spheroid, z = m h, x^2 + y^2 = (1 - m^2) (1 + h^2), with
+    jumps in proportion to m and to m (1 - m^2), the latter zero at centre and rim.
+    """
+    s = x * x + y * y + z * z - 1.0
+    root = np.hypot(s, 2.0 * z)
+    h = np.sqrt(np.where(s > 0.0, 0.5 * (root + s), 2.0 * z * z / (root + np.abs(s))))
+    m, a = z / h, np.arctan2(1.0, h)
+    mz, hz = h * (1 - m**2) / root, m * (1 + h**2) / root
+    one, d_one = 1 - h * a, h / (1 + h**2) - a
+    three = 1 + 15 / 4 * h**2 - 3 / 4 * h * (5 * h**2 + 3) * a
+    d_three = 15 / 2 * h - 3 / 4 * (15 * h**2 + 3) * a + 3 / 4 * h * (5 * h**2 + 3) / (1 + h**2)
+    first = mz * one + m * d_one * hz
+    return first, first - (7.5 * m**2 - 1.5) * mz * three - (2.5 * m**3 - 1.5 * m) * d_three * hz
+
+
+@pytest.mark.parametrize("chi", [0.2, 0.8])
+def test_the_slope_over_the_disc_is_that_of_a_pressure_that_air_runs_through(chi):
+    """Pitt and Peters: pressure falls along straight lines of air that lean by chi.
+
+    The slope over the mean is 3 pi / 4 tan(chi / 2) for a pressure that is largest in the centre
+    and 15 pi / 32 tan(chi / 2), the number in use, if it vanishes there.
+    """
+    x, weight = np.polynomial.legendre.leggauss(24)
+    r, dr = 0.5 * (x + 1), 0.5 * weight
+    x, weight = np.polynomial.legendre.leggauss(400)
+    u, du = 0.5 * (x + 1), 0.5 * weight
+    way, step = (u / (1 - u)) ** 2, 2 * u / (1 - u) ** 3 * du
+    way, step = way[way < 100.0], step[way < 100.0]
+    psi = 2 * np.pi * (np.arange(32) + 0.5) / 32
+    X, Y = (r[:, None] * f(psi) for f in (np.cos, np.sin))
+    at = X[..., None] - np.sin(chi) * way, Y[..., None] + 0.0 * way, -np.cos(chi) * way
+    ratio = []
+    for slope in slopes_of_pressures(*at):
+        induced = -slope @ step
+        mean = 2 * (induced.mean(axis=1) * r) @ dr
+        ratio.append(8 * ((induced * np.cos(psi)).mean(axis=1) * r**2) @ dr / mean)
+    assert_allclose(ratio / np.tan(chi / 2), [3 * np.pi / 4, 15 * np.pi / 32], rtol=1e-3)
+    blades, a = straight(), 0.3
+    yaw = chi / (1 + 0.6 * a)
+    met = SKEWED(blades.strips[9], 8.0, (1 - a) * 8.0, yaw, 1.0)
+    more = (8.0 - met) / (8.0 * a) - 1.0
+    assert_allclose(more / (blades.radius[9] / 63.0), ratio[1], rtol=1e-3)
+
+
+def test_a_leaning_wake_turns_the_rotor_into_the_wind_and_keeps_its_mean():
+    """Nose up, the wake goes up: blades below meet more wind, and push their side downwind.
+
+    Means stay those of the wind through the disc: cos^3 of the tilt, to one per cent.
+    """
+    tilt = np.radians(20.0)
+    load = rotor_load(blading(tilt, 0.0), 8.0, tip_ratio(DESIGN_RATIO))
+    through = rotor_load(straight(), 8.0 * np.cos(tilt), tip_ratio(DESIGN_RATIO))
+    assert_allclose([load.power, load.thrust], [through.power, through.thrust], rtol=0.01)
+    up, down = load.strip[0, 14], load.strip[12, 14]
+    a = through.strip[0, 14, 5]
+    lean = 15 * np.pi / 32 * np.tan(0.5 * (1 + 0.6 * a) * tilt) * RADIUS[14] / 63.0
+    assert_allclose([up[5], down[5]], a * (1 + lean * np.array([1, -1])), rtol=1e-9)
+    assert load.blade_thrust[12] > 1.03 * load.blade_thrust[0]
+
+
+def test_a_wake_leans_so_far_only_that_air_goes_through_everywhere():
+    """Sixty degrees; air from behind and a rotor that drives it lean by the wind alone."""
+    strip = straight().strips[-1]
+    for yaw in (1.0, 1.4):
+        met = SKEWED(strip, 8.0, 2.0, yaw, 1.0)
+        lean = 15 * np.pi / 32 * np.tan(np.pi / 6) * RADIUS[-1] / 63.0
+        assert_allclose(met, 2.0 - 6.0 * lean)
+    assert_allclose(SKEWED(strip, 8.0, 4.0, -1.4, 1.0), SKEWED(strip, 8.0, 4.0, 1.4, -1.0))
+    assert SKEWED(strip, -8.0, -8.0, 1.0, 1.0) == -8.0
+    driven = 15 * np.pi / 32 * np.tan(0.1) * RADIUS[-1] / 63.0
+    assert_allclose(SKEWED(strip, 8.0, 9.0, 0.2, 1.0), 9.0 + driven)
