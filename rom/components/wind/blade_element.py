@@ -57,6 +57,14 @@ SLOPE_STEP = 1e-5
 
 
 @inner
+def on_section(length, turned, normal, driving, out):
+    """Force on a section, its axes, from those per length across the plane and in it."""
+    c, s = length * math.cos(turned), length * math.sin(turned)
+    out[0] = normal * c + driving * s
+    out[1] = normal * s - driving * c
+
+
+@inner
 def section_force(g, k, speed, flow, turned, lee, out):
     """Force on a section, its axes: air of a speed from an angle, a plane of the rotor turned.
 
@@ -71,9 +79,7 @@ def section_force(g, k, speed, flow, turned, lee, out):
     met = induced(strip, profile, k, theta, axial, across)
     met = skewed(strip, axial, met[0], lee[0], lee[1]), met[1], met[2]
     normal, driving, _ = strip_load(strip, profile, k, theta, met, g[0])
-    c, s = g[1] * math.cos(turned), g[1] * math.sin(turned)
-    out[0] = normal * c + driving * s
-    out[1] = normal * s - driving * c
+    on_section(g[1], turned, normal, driving, out)
 
 
 @inner
@@ -160,6 +166,25 @@ def lean_of_wake(g, R, out):
     return math.atan2(beside, along)
 
 
+@inner
+def meet(g, wind, place, velocity, R, room):
+    """Air of a multiple of a wind that a section meets, the angle of the wind from the shaft.
+
+    Fills (12,): air there in the world, air and normal of the plane of the rotor in axes of the
+    section, where the wake leans.
+    """
+    air, u, m, lean = room[0:3], room[3:6], room[6:9], room[9:12]
+    for i in range(3):
+        air[i] = wind * g[2 + i]
+    wind_at((g[8], g[9], g[10]), place[0], place[1], place[2], air)
+    for i in range(3):
+        u[i] = m[i] = 0.0
+        for j in range(3):
+            u[i] += R[j, i] * (air[j] - velocity[j])
+            m[i] += R[j, i] * g[5 + j]
+    return lean_of_wake(g, R, lean)
+
+
 def strip(numbers, pose, wanted, answer, space):
     """Wind on one strip, see PROFILE_START for the numbers."""
     k = int(carray(numbers, (PROFILE_START + 1,))[PROFILE_START])
@@ -167,22 +192,12 @@ def strip(numbers, pose, wanted, answer, space):
     out, room = carray(answer, (2 + 6 + 72,)), carray(space, (64,))
     out[:] = 0.0
     R, L, W = room[0:9].reshape((3, 3)), room[9:18].reshape((3, 3)), room[18:27].reshape((3, 3))
-    air, u, m, force, J = room[27:30], room[30:33], room[33:36], room[36:38], room[38:52]
-    lean = room[52:55]
+    u, m, lean, force, J = room[30:33], room[33:36], room[36:39], room[39:41], room[41:55]
     rotation_of(s[3:7], R)
-    tower = (g[8], g[9], g[10])
-    for i in range(3):
-        air[i] = g[2 + i]
-    wind_at(tower, s[0], s[1], s[2], air)
-    for i in range(3):
-        u[i] = m[i] = 0.0
-        for j in range(3):
-            u[i] += R[j, i] * (air[j] - s[7 + j])
-            m[i] += R[j, i] * g[5 + j]
+    yaw = meet(g, 1.0, s[0:3], s[7:10], R, room[27:39])
     speed = math.sqrt(u[0] * u[0] + u[1] * u[1])
     if speed == 0.0 or m[0] * m[0] + m[1] * m[1] == 0.0:
         return
-    yaw = lean_of_wake(g, R, lean)
     lee = yaw, lean[2]
     section_force(g, k, speed, math.atan2(u[0], u[1]), math.atan2(m[1], m[0]), lee, force)
     for i in range(3):
@@ -192,7 +207,7 @@ def strip(numbers, pose, wanted, answer, space):
         return
     section_slopes(g, k, u, m, lee, J)
     turns_of_section(J, u, m, lean, force, L)
-    slope_of_wind(tower, (s[0], s[1], s[2]), (g[2], g[3]), W)
+    slope_of_wind((g[8], g[9], g[10]), (s[0], s[1], s[2]), (g[2], g[3]), W)
     spread(R, J, L, W, out)
 
 
@@ -227,6 +242,16 @@ def in_wind(
     Raises:
         ConfigError: for a wind that is no vector or comes from behind, or a density that cannot be.
     """
+    far = far_away(wind, axis, tower=tower, density=density)
+    groups = [Elements.of(compiled_strip(), np.array([[k]]), numbers[None, :])
+              for k, numbers in enumerate(strip_rows(blade, far, cone))]  # fmt: skip
+    return replace(blade, elements=(*blade.elements, *groups))
+
+
+def far_away(
+    wind: npt.ArrayLike, axis: npt.ArrayLike, *, tower: bool, density: float
+) -> list[float]:
+    """Half the density, wind, axis and tower as strips know them; `in_wind` refuses the same."""
     wind = np.asarray(wind, dtype=float)
     if wind.shape != (3,) or not np.isfinite(wind).all():
         raise ConfigError(f"the wind {wind.tolist()} is no velocity of three numbers.")
@@ -236,15 +261,16 @@ def in_wind(
                           hint="The axis of the shaft points downwind.")  # fmt: skip
     if not density > 0.0:
         raise ConfigError(f"there is no air of {density:g} kg/m^3.")
-    far = [0.5 * density, *wind, *axis, *(TOWER_TUBE if tower else NO_TOWER)]
-    elements = [
-        _strip_of(k, row, far, cone) for k, row in enumerate(zip(*strips(blade), strict=True))
-    ]
-    return replace(blade, elements=(*blade.elements, *elements))
+    return [0.5 * density, *wind, *axis, *(TOWER_TUBE if tower else NO_TOWER)]
 
 
-def _strip_of(k: int, row: tuple[float, ...], far: list[float], cone: float) -> Elements:
-    """The element of the strip of vertex k: its middle, length, chord and twist in the frame."""
+def strip_rows(blade: RodBody, far: list[float], cone: float) -> list[Array]:
+    """The numbers of the strip of each vertex, see PROFILE_START."""
+    return [_strip_of(row, far, cone) for row in zip(*strips(blade), strict=True)]
+
+
+def _strip_of(row: tuple[float, ...], far: list[float], cone: float) -> Array:
+    """Numbers of a strip from its middle, length, chord and twist in the frame."""
     radius, length, chord, twist = row
     at = np.searchsorted(HUB_RADIUS + np.cumsum(ELEMENT_LENGTH), radius)
     profile = profiles()[ELEMENT_PROFILE[min(int(at), len(ELEMENT_PROFILE) - 1)]]
@@ -258,8 +284,7 @@ def _strip_of(k: int, row: tuple[float, ...], far: list[float], cone: float) -> 
         twist,
         profile.angle.size,
     ]
-    numbers = np.concatenate([far[:1], [length], far[1:], of_strip, profile.table.ravel()])
-    return Elements.of(compiled_strip(), np.array([[k]]), numbers[None, :])
+    return np.concatenate([far[:1], [length], far[1:], of_strip, profile.table.ravel()])
 
 
 def strips(blade: RodBody) -> tuple[Array, Array, Array, Array]:

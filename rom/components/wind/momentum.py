@@ -32,16 +32,24 @@ LARGEST_SKEW = math.pi / 3  # of a wake, so that air goes through the disc every
 
 
 @inner
-def coefficients(table, k, angle):
-    """Lift and drag at an angle of attack, and how both grow with it."""
-    angle -= 2 * math.pi * math.floor((angle + math.pi) / (2 * math.pi))
+def interval(ascending, k, x):
+    """Where the interval of the first k numbers begins that has x in it, at the ends the next."""
     low, high = 0, k - 1
     while high - low > 1:
         middle = (low + high) // 2
-        if table[middle] > angle:
+        if ascending[middle] > x:
             high = middle
         else:
             low = middle
+    return low
+
+
+@inner
+def coefficients(table, k, angle):
+    """Lift and drag at an angle of attack, and how both grow with it."""
+    angle -= 2 * math.pi * math.floor((angle + math.pi) / (2 * math.pi))
+    low = interval(table, k, angle)
+    high = low + 1
     wide = table[high] - table[low]
     s = (angle - table[low]) / wide
     lift, drag = table[k + low], table[2 * k + low]
