@@ -55,9 +55,9 @@ def control(t, parameters, motion, memory, out):
     """Torque of the generator and moments of the actuators, a law of N_MARKERS markers."""
     n = N_MARKERS
     given, known = carray(parameters, (N_NUMBERS,)), carray(memory, (CONTROLLER_SIZE,))
-    moved, told = carray(motion, (18 * n,)), carray(out, (6 * n + 2 + CONTROLLER_SIZE + 2,))
+    moved, answer = carray(motion, (18 * n,)), carray(out, (6 * n + 2 + CONTROLLER_SIZE + 2,))
     axes, omega = moved[3 * n : 12 * n], moved[15 * n : 18 * n]
-    moment, kept = told[3 * n : 6 * n], told[6 * n + 2 :]
+    moment, kept = answer[3 * n : 6 * n], answer[6 * n + 2 :]
     axis, state, speed = np.empty(3), np.empty(4), 0.0
     for i in range(3):
         axis[i] = axes[3 * i] * given[0] + axes[3 * i + 1] * given[1] + axes[3 * i + 2] * given[2]

@@ -99,7 +99,7 @@ def late_strip(t, parameters, motion, memory, out):
     n, k = int(sizes[0]), int(sizes[1])
     size = 2 + 2 * n + PROFILE_START + 1 + 3 * k
     numbers, moved = carray(parameters, (size,)), carray(motion, (18,))
-    known, told = carray(memory, (WAKE_SIZE,)), carray(out, (8 + WAKE_SIZE,))
+    known, answer = carray(memory, (WAKE_SIZE,)), carray(out, (8 + WAKE_SIZE,))
     winds, g = numbers[2 : 2 + 2 * n], numbers[2 + 2 * n :]
     R, room = moved[3:12].reshape((3, 3)), np.empty(12)
     u, m, lean = room[3:6], room[6:9], room[9:12]
@@ -118,15 +118,15 @@ def late_strip(t, parameters, motion, memory, out):
     began = known[6] > NEVER_BEFORE
     if not began or t > known[6]:
         follow(strip, axial, across, met, state, t - known[6] if began else 0.0)
-        told[14] = t
+        answer[14] = t
     for i in range(6):
-        told[8 + i] = state[i]
+        answer[8 + i] = state[i]
     through = skewed(strip, axial, axial - state[2], yaw, lean[2])
     met = through, across + state[5], 0.0
     normal, driving, _ = strip_load(strip, profile, k, theta, met, g[0])
     on_section(g[1], turned, normal, driving, force)
     for i in range(3):
-        told[i] = R[i, 0] * force[0] + R[i, 1] * force[1]
+        answer[i] = R[i, 0] * force[0] + R[i, 1] * force[1]
 
 
 @cache
