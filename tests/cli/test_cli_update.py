@@ -15,6 +15,7 @@ from rom.cli.schemas import schema
 from rom.updating import AddedMass, Channels, GroundSpring, Responses, candidates, place
 from rom.updating.frf_data import noisy
 
+pytestmark = pytest.mark.once  # the environment without FEniCSx has no h5py
 SIZE, CELLS = (1.0, 0.1, 0.08), (8, 1, 1)
 PARAMETERS = {name: rom.YoungsModulus(name, 0.4, 2.5) for name in ("inner", "outer")}
 TRUE = {"inner": 1.3, "outer": 0.8}

@@ -132,6 +132,7 @@ def test_a_table_with_decimal_commas_and_in_velocities_is_read(tmp_path):
     assert_allclose(test.H[:, 1, 0], ACCELERANCE[1] / (2j * np.pi * F), rtol=1e-8)
 
 
+@pytest.mark.once
 def test_hdf5_brings_the_same_test_back(tmp_path):
     test = rom.io.read_responses(HERE / "pyuff_test.uff", averages=20)
     path = rom.io.write_responses(test, tmp_path / "test.h5")
