@@ -3,6 +3,7 @@
 import pickle
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ import pytest
 import rom
 from cases.command import environment
 from cases.mbs.mechanisms import random_body
+from rom.body.nonlinear.quartic import Quartic, n_entries
 from rom.components.cosserat import body, straight
 from rom.mbs.elements.gears.geometry import GearPair
 from rom.mbs.equations.packing import pack
@@ -124,6 +126,12 @@ def loaded_body(mech):
     mech.spread_load("weight", part, rom.mass_load(soft, (0, 0, -1.0)))
 
 
+def bending_body(mech):
+    soft = random_body(np.random.default_rng(1), damped=False)
+    energy = Quartic(soft.K, *(np.ones(n_entries(len(soft.K), order)) for order in (3, 4)))
+    mech.add_flexible("c", replace(soft, quartic=energy))
+
+
 def geared_body(mech, a, b):
     mech.prismatic("other", mech.ground.marker((0, 0, 0)), b, axis=(1, 0, 0))
     mech.gear("e", "slide", "other", ratio=2.0)
@@ -152,6 +160,7 @@ ELEMENTS = {  # family -> what asks for it
     "rolling_bearings": lambda m, a, b: m.rolling_bearing("e", a, ground(m), **BALLS),
     "journal_bearings": lambda m, a, b: m.journal_bearing("e", a, ground(m), **FILM),
     "spins": lambda m, a, b: m.add_rigid("e", **WHEEL),
+    "bodies of large deflection": lambda m, a, b: bending_body(m),
 }
 KERNELS = ("residuals", "tangents", "energy", "multiplier_columns", "pair_tangents")
 

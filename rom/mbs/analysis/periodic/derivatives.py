@@ -200,14 +200,16 @@ def confirmed(found: Return, known: Tangent | None = None) -> Tangent:
     values, shapes = np.linalg.eig(np.linalg.solve(known.B.T, known.E.T).T)
     shapes = shapes / np.abs(shapes).max(axis=0)
     y = (shapes @ np.exp(1j * np.arange(len(shapes)))).real
-    tangent, missed = known.measured((y / np.abs(y).max())[:, None])
+    # only how far they are off: a correction in this one direction, of what fades at once, would
+    # move the multipliers of what does not
+    _, missed = known.measured((y / np.abs(y).max())[:, None])
     near = (np.abs(values) > 1.0 - missed) & (values.imag >= 0.0)
     if missed > (CARRIED_TOL if carried else SMOOTH_TOL) or (carried and near.sum() > MAX_NEAR):
         return by_differences(found, NEAR_PROBE_RTOL)
     if not carried:
         return known
     slow = shapes[:, near]
-    return tangent.measured(np.hstack([slow.real, slow.imag[:, values[near].imag > 0.0]]))[0]
+    return known.measured(np.hstack([slow.real, slow.imag[:, values[near].imag > 0.0]]))[0]
 
 
 def by_differences(found: Return, d: float = PROBE_RTOL) -> Tangent:
