@@ -16,9 +16,9 @@ from scipy.special import ellipk
 
 import rom
 from cases.long import SHARED_BY, few
+from cases.mbs.slender import STEEL, assembled, cantilever, reduced, slender
 from cases.paths import RANKS, ROOT
 from cases.ranks.environment import ENVIRONMENT
-from cases.slender import STEEL, assembled, cantilever, reduced, slender
 from rom.body.nonlinear.geometric import ELLIPTIC_STRETCH, foreseen
 from rom.body.nonlinear.quartic import Quartic, entries, n_entries, position
 from rom.body.nonlinear.statics import follow

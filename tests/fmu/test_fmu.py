@@ -15,6 +15,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 import rom
 from cases.mbs.fmu_instance import Instance, fmpy
 from cases.mbs.mechanisms import random_body, simulate_quietly, slider_crank
+from cases.mbs.trusses import truss
 from cases.paths import ROOT
 from rom.errors import ConfigError, ResourceError, RomWarning
 from rom.fmu.driven import Driven
@@ -241,6 +242,40 @@ def hanging(tmp_path_factory):
         patch.delenv("PYTHONPATH", raising=False)
         return rom.write_fmu(script, folder / "hanging.fmu", inputs=["pull"], outputs=["one.b"],
                              dt=1e-2, files=[body])  # fmt: skip
+
+
+FAR = """
+from pathlib import Path
+import rom
+
+def mechanism():
+    mech = rom.Mechanism()
+    truss = mech.add_flexible("truss", rom.load(Path(__file__).with_name("truss.rom.npz")))
+    place = mech.design_point(truss.marker("mean"))
+    mech.revolute("hook", mech.ground.marker(place), truss.marker("mean"), axis=(0, 0, 1))
+    mech.force("pull", truss.marker("n3"), (2.0, -3.0, 4.0))
+    return mech
+"""
+
+
+@pytest.mark.once
+def test_a_body_of_large_deflection_on_a_fitted_marker_moves_in_it_as_here(tmp_path):
+    """With its energy and the surface to which its marker is fitted, from its file."""
+    body = rom.save(truss(), tmp_path / "truss.rom.npz")
+    script = tmp_path / "far.py"
+    script.write_text(FAR)
+    file = rom.write_fmu(
+        script, tmp_path / "far.fmu", inputs=["pull"], outputs=["truss.n3"], dt=1e-2, files=[body]
+    )
+    names = [f"truss.n3.position[{k}]" for k in (1, 2, 3)]
+    one = Instance(file, tmp_path).begin(rho_inf=0.9)
+    one.fmu.doStep(0.0, 0.3)
+    space = {"Path": Path, "__file__": str(script), "rom": rom}
+    exec(FAR, space)
+    there = rom.simulate(space["mechanism"](), t_end=0.3, dt=1e-2, rho_inf=0.9)
+    moved = there.position("truss", "n3")
+    assert np.linalg.norm(moved[-1] - moved[0]) > 0.04
+    assert_allclose(one.get(*names), moved[-1], rtol=SAME_CODE, atol=SAME_CODE)
 
 
 @pytest.mark.once

@@ -14,6 +14,8 @@ import numpy as np
 
 from rom.model import Array, Index
 
+BLOCK_ENTRIES = 4_000_000  # products of coordinates at many instants that are held at once
+
 
 @dataclass(frozen=True)
 class Quartic:
@@ -58,6 +60,17 @@ class Quartic:
     def energy(self, q: Array) -> float:
         """Strain energy [J] at the coordinates (r,)."""
         return self.expansion(q)[0]
+
+    def energies(self, Q: Array) -> Array:
+        """(t,) strain energies [J] at the coordinates (t, r)."""
+        i, j = np.triu_indices(self.n)
+        by_one, by_two = self.by_pairs
+        weight, found = np.where(i == j, 1.0, 2.0), [np.zeros(0)]
+        for q in np.array_split(Q, 1 + Q.shape[0] * i.size // BLOCK_ENTRIES):
+            square = weight * q[:, i] * q[:, j]
+            higher = q @ by_one.T + square @ by_two
+            found.append((square * (0.5 * self.K[i, j] + higher)).sum(axis=1))
+        return np.concatenate(found)
 
     def force(self, q: Array) -> Array:
         """(r,) derivative of the energy [N] at the coordinates (r,)."""

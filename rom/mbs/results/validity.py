@@ -25,6 +25,7 @@ def warn_of_limits(solution: Solution) -> None:
             continue
         if getattr(part.flexible, "quartic", None) is not None:
             _warn_of_turned_markers(solution, name)
+            _warn_of_range(solution, name)
             continue
         share, bent = softening(solution, name), deformation(solution, name, surface=False)
         if share >= 1.0:
@@ -40,6 +41,23 @@ def warn_of_limits(solution: Solution) -> None:
                 "elastic deformation; its motion is no longer to be trusted. Divide it into "
                 "several bodies, or look for a load or drive that is too large."
             )
+
+
+def _warn_of_range(solution: Solution, name: str) -> None:
+    """Bodies of large deflection that store more energy than where they were compared."""
+    body: Any = solution.mechanism.parts[name].flexible
+    cases = body.provenance.get("large deflection")
+    if not cases:
+        return
+    most = max(case["energy"] for case in cases.values())
+    energy = body.quartic.energies(solution.elastic(name))
+    if np.nanmax(energy, initial=0.0) > most:
+        k = int(np.nanargmax(energy > most))
+        warn(
+            f"body {name!r} left the range of its certificate at {solution.t[k]:.4g} s: its strain "
+            f"energy reached {np.nanmax(energy):.3g} J, and no load case of its range holds beyond "
+            f"{most:.3g} J. Reduce it for larger loads, or for more shapes."
+        )
 
 
 def _warn_of_turned_markers(solution: Solution, name: str) -> None:

@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from cases.mbs.dumbbell import HUB_INERTIA, MASS, REST, SPRING, dumbbell
+from cases.mbs.trusses import HUB_INERTIA, MASS, REST, SPRING, dumbbell
 from rom import rotation
 from rom.mbs.integrate.simulation import simulate
 from rom.mbs.mechanism import Mechanism

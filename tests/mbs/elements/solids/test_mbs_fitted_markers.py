@@ -11,19 +11,13 @@ from scipy.spatial.transform import Rotation
 import rom
 from cases.mbs.mechanisms import nodal_body, prepared, random_body, random_pose, random_state
 from cases.mbs.tangents import check_tangents, difference, shifted
+from cases.mbs.trusses import covariance_of
 from rom.mbs.equations.equations import evaluate, linearize_constraints
 from rom.mbs.kernels.algebra import row
 from rom.mbs.kernels.markers import nearest_rotation
 
 # corners of a plate and a point off it, seen from the first; the third turns about it in the plane
 PLATE = np.array([[0.0, 0, 0], [1.0, 0, 0], [1.1, 0.8, 0], [-0.1, 0.7, 0]])
-
-
-def covariance_of(points, moved):
-    """(3, 3, ...) of points (n, 3) and displacements (n, 3, r), all of one weight."""
-    X = points - points.mean(axis=0)
-    moved = np.concatenate([X[..., None], moved], axis=2)
-    return np.einsum("nak,nb->abk", moved, X) / (X**2).sum()
 
 
 def fitted(body, rng, flat=True):

@@ -10,7 +10,6 @@ from scipy.integrate import solve_ivp
 
 import rom
 from cases.mbs.mechanisms import (
-    nodal_body,
     prepared,
     random_body,
     random_pose,
@@ -19,47 +18,11 @@ from cases.mbs.mechanisms import (
     stored_at,
 )
 from cases.mbs.tangents import check_tangents, difference, shifted
+from cases.mbs.trusses import FREE, MASSES, NODES, START, bar_forces, truss
 from rom import rotation
 from rom.body.nonlinear.quartic import Quartic, n_entries
 from rom.body.nonlinear.statics import follow
 from rom.errors import ModelError, RomWarning
-
-# four masses and six bars; seen from the first, the second moves on a line, the third in a plane
-NODES = np.array([[0.0, 0, 0], [1.0, 0, 0], [0.3, 0.9, 0], [0.4, 0.3, 1.1]])
-MASSES = np.array([0.7, 0.4, 0.5, 0.3])
-BARS = [(0, 1, 40.0), (0, 2, 25.0), (0, 3, 60.0), (1, 2, 30.0), (1, 3, 20.0), (2, 3, 45.0)]
-FREE = [(1, 0), (2, 0), (2, 1), (3, 0), (3, 1), (3, 2)]  # (node, axis) of the coordinates
-START = np.array([0.15, -0.1, 0.2, 0.1, -0.2, 0.25])
-
-
-def truss(**options):
-    """Its elastic coordinates carry any deformation, so that nothing is approximate."""
-    shapes = np.zeros((len(FREE), *NODES.shape))
-    for k, place in enumerate(FREE):
-        shapes[(k, *place)] = 1.0
-    r, G = len(FREE), 0.0
-    j, k = np.triu_indices(r)
-    for a, b, stiffness in BARS:
-        bar = NODES[b] - NODES[a]
-        D, length = (shapes[:, b] - shapes[:, a]).T, np.linalg.norm(bar)
-        Z = np.r_[bar @ D, (D.T @ D)[j, k]] / length
-        G = G + stiffness * np.outer(Z, Z)
-    energy = Quartic.from_gram(G, r)
-    places = {f"n{i}": (x, shapes[:, i].T, np.zeros((3, r))) for i, x in enumerate(NODES)}
-    body = nodal_body(NODES, np.diag(MASSES), shapes, energy.K, markers=places, **options)
-    return replace(body, quartic=energy)
-
-
-def bar_forces(x):
-    """(4, 3) forces of the bars on the masses at x, and their energy."""
-    f, U = np.zeros_like(x), 0.0
-    for a, b, stiffness in BARS:
-        d, length = x[b] - x[a], np.linalg.norm(NODES[b] - NODES[a])
-        strain = (d @ d / length - length) / 2
-        f[a] += stiffness * strain * d / length
-        f[b] -= stiffness * strain * d / length
-        U += stiffness * strain**2 / 2
-    return f, U
 
 
 @pytest.fixture(scope="module")
@@ -185,6 +148,31 @@ def test_what_would_be_wrong_is_refused_by_name():
         mech.add_flexible("truss", truss(), spin=(0, 0, 3.0))
     with pytest.raises(ModelError, match="counted twice"):
         mech.add_flexible("truss", replace(truss(), K_geo={"n1 f_x": np.eye(6)}))
+
+
+def test_a_motion_that_leaves_the_range_of_the_certificate_says_so_with_body_and_time():
+    """From rest at a node that is pulled: by its energy, which is that of the bars."""
+    body = truss()
+    mech = rom.Mechanism(gravity=(0, 0, 0))
+    part = mech.add_flexible("truss", body)
+    mech.fixed("held", mech.ground.marker((0, 0, 0)), part.marker("n0"))
+    mech.force("pull", part.marker("n3"), (2.0, -3.0, 4.0))
+    free = rom.simulate(mech, t_end=0.2, dt=0.01)
+    q = free.elastic("truss")
+    energy = body.quartic.energies(q)
+    assert_allclose(energy, [body.quartic.energy(x) for x in q], rtol=1e-13)
+    assert np.all(np.diff(energy[:16]) > 0)
+    for k in (10, 15):
+        most = float(energy[k] * (1 - 1e-6))
+        table = {"low": {"energy": 0.5 * most}, "n3 f_z": {"energy": most}}
+        body.provenance["large deflection"] = table
+        says = rf"body 'truss' left the range of its certificate at {free.t[k]:.4g} s"
+        with pytest.warns(RomWarning, match=says):
+            rom.simulate(mech, t_end=0.2, dt=0.01)
+    table["n3 f_z"]["energy"] = float(energy.max() * 1.01)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        rom.simulate(mech, t_end=0.2, dt=0.01)
 
 
 def test_interfaces_that_turn_far_are_told_with_body_and_time():

@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 
 import rom
 from cases.beam import spin_up
-from cases.slender import reduced, slender
+from cases.mbs.slender import reduced, slender
 from rom.components import cosserat
 
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")
