@@ -163,9 +163,11 @@ def test_equal_sides_on_one_rail_are_isotropic_at_one_spread():
     """cot^2 of the couplers' slope = (4/3 mu + M) / (2/3 mu + M); 45 degrees without their mass."""
     cot = np.sqrt((4 / 3 * MU + PAYLOAD) / (2 / 3 * MU + PAYLOAD))
     spread = 2 * REACH * cot / np.hypot(1, cot)
-    found = isotropic_set(GLIDE.inertia, SPAN, n=60, assembles=GLIDE.assembles)
-    assert found.kind == "curves"
-    assert_allclose(found.q[:, 1] - found.q[:, 0], spread, rtol=1e-8)
+    for mass in (0.0, 1.3, 20.0):  # whatever both slides weigh
+        glide = replace(GLIDE, slides=(mass, mass))
+        found = isotropic_set(glide.inertia, SPAN, n=60, assembles=GLIDE.assembles)
+        assert found.kind == "curves"
+        assert_allclose(found.q[:, 1] - found.q[:, 0], spread, rtol=1e-8)
     unequal = replace(GLIDE, slides=(1.3, 1.0))
     assert isotropic_set(unequal.inertia, SPAN, n=60, assembles=GLIDE.assembles).kind == "none"
 
@@ -179,6 +181,12 @@ def test_two_links_are_isotropic_everywhere_on_curves_or_nowhere():
     found = isotropic_set(leaning.inertia, n=40)
     assert found.kind == "curves"
     assert_allclose(np.cos(found.q[:, 0] - found.q[:, 1]), 0.0, atol=1e-9)
+    turned = [replace(one, relative=True) for one in (even, leaning)]
+    geared = replace(even, first=rigid_link(1.0, 0.3, (0.1, 0.0), 0.086), relative=True)
+    A = geared.inertia(0.0, 0.0)  # without coupling of the links, a = 2 c: still the elbow's motor
+    assert_allclose(A, [[3 * 0.066, 0.066], [0.066, 0.066]])
+    for one in (*turned, geared):
+        assert isotropic_set(one.inertia, n=40).kind == "none"
     heavier = TwoLink(rigid_link(1.1, 0.3, (0.1, 0.0), 0.02), leaning.second)
     assert isotropic_set(heavier.inertia, n=40).kind == "none"
 

@@ -11,9 +11,7 @@ import rom
 from cases.mbs.mechanisms import simulate_quietly
 from cases.solid import STEEL, block
 from rom import rotation
-from rom.components.linkages.dynamic_isotropy import (
-    christoffel,
-)
+from rom.components.linkages.dynamic_isotropy import christoffel, index_map
 from rom.components.linkages.two_dof_linkages import (
     FiveBar,
     TwoLink,
@@ -187,6 +185,16 @@ def test_inertia_at_a_frequency_is_that_of_a_beam_and_converges_with_its_modes()
     assert found[2] == pytest.approx(exact, rel=0.02) and abs(exact - rigid) > 0.1 * rigid
     assert found[1] == pytest.approx(found[2], rel=1e-3)
     assert free[2] < 0.8 * free[1] < 0.64 * free[0]
+
+
+def test_above_the_first_frequency_on_held_drives_there_is_no_inertia(bar):
+    """A link that swings against its motor has less than none, which no index may hide."""
+    arm = TwoLink(rod(1.0, 0.3), reduced_link(bar, "root", "tip"))
+    first = bar.frequencies(1, fixed=("root",))[0]
+    below, above = (2 * np.pi * share * first for share in (0.9, 1.1))
+    index_map(lambda a, b: arm.inertia(a, b, elastic=below), n=4)
+    with pytest.raises(ModelError, match="not positive"):
+        index_map(lambda a, b: arm.inertia(a, b, elastic=above), n=4)
 
 
 def test_the_frame_of_a_flexible_coupler_is_a_matter_of_taste(bar):
