@@ -31,6 +31,7 @@ MAX_MISFIT = 2.0  # chi-square over its expectation: what did not settle here is
 MAX_LOG_STEP = 0.5  # of a factor in one step
 DECREMENT_TOL = 1e-4  # expected gain of chi-square: a hundredth of a standard deviation
 START_STIFFNESS = 1e-3  # of a step, over the information of each unknown
+NEAR_STIFFNESS = 1e-9  # the same, close to the end
 MAX_STIFFNESS = 1e10  # beyond it no shorter step lowers the residual
 BAND_RATIO = 1.5  # modes up to here, over the highest line, have damping that lines can see
 BOUND_ATOL = 1e-9  # distance of a logarithm from the end of its range
@@ -256,8 +257,22 @@ class _Search:
         return N, self.sums.gradient + self.precision * (self.theta - self.before)
 
     def run(self) -> "_Search":
-        """Levenberg-Marquardt until the expected gain vanishes."""
-        (self.sums, cost), mu = self.at(self.theta), START_STIFFNESS
+        """Descend on few lines with large errors, where a start may be far away, then on all."""
+        few = replace(self, data=self.data.roughly())
+        few._descend(START_STIFFNESS)
+        if self.at(few.theta)[1] < self.at(self.theta)[1]:
+            self.theta = few.theta
+        cost = self._descend(NEAR_STIFFNESS)
+        if self.settled or cost > MAX_MISFIT * self.data.n_values:
+            return self
+        raise SolverError(
+            f"updating did not settle in {MAX_STEPS} steps.",
+            hint="Start from better values, or give a prior; see which parameters are correlated.",
+        )
+
+    def _descend(self, mu: float) -> float:
+        """Levenberg-Marquardt until the expected gain vanishes; the cost there."""
+        self.sums, cost = self.at(self.theta)
         low, high = self.bounds
         for _ in range(MAX_STEPS):
             N, g = self.posterior()
@@ -267,7 +282,7 @@ class _Search:
             spread = max(1.0, cost / self.data.n_values)  # of a model that does not fit
             if g @ np.linalg.lstsq(N, g, rcond=None)[0] < DECREMENT_TOL * spread:
                 self.settled = True
-                return self
+                return cost
             scaled = np.diag(np.maximum(np.diag(N), np.finfo(float).tiny))
             while mu < MAX_STIFFNESS:
                 step = -np.linalg.lstsq(N + mu * scaled, g, rcond=None)[0]
@@ -280,17 +295,12 @@ class _Search:
                 mu *= 4.0
             else:
                 self.settled = True
-                return self
+                return cost
             moved = (trial - self.theta)[a]
             gain = (cost - new) / -(moved @ (2 * g + N @ moved))
             mu *= max(1 / 3, 1 - (2 * gain - 1) ** 3) if gain > 0 else 1.0
             self.theta, self.sums, cost = trial, found, new
-        if cost > MAX_MISFIT * self.data.n_values:
-            return self
-        raise SolverError(
-            f"updating did not settle in {MAX_STEPS} steps.",
-            hint="Start from better values, or give a prior; see which parameters are correlated.",
-        )
+        return cost
 
 
 def _found(family: BodyFamily, search: _Search) -> Updated:

@@ -159,8 +159,8 @@ class FamilyModel:
     def at(self, x: Array) -> ParametricModel:
         """The model at logarithms x (n_p,) of the factors, with the derivatives by them."""
         k, m = np.exp(self.k_powers @ x), np.exp(self.m_powers @ x)
-        dK = np.einsum("tp,t,tij->pij", self.k_powers, k, self.K, optimize=True)
-        dM = np.einsum("tp,t,tij->pij", self.m_powers, m, self.M, optimize=True)
+        dK = np.tensordot(self.k_powers.T * k, self.K, 1)
+        dM = np.tensordot(self.m_powers.T * m, self.M, 1)
         K, M = (np.tensordot(self.amount * c, A, 1) for c, A in ((k, self.K), (m, self.M)))
         return ParametricModel(K, M, dK, dM, self.seen, self.n_rigid)
 
