@@ -148,13 +148,20 @@ def test_the_control_in_a_mechanism_is_the_controller_at_its_speed():
     assert_allclose(found["pitch"][1:], pitch[1:], atol=1e-3 * max(pitch))
     assert_allclose(found["torque"][1:], torque[1:], atol=1e-3 * max(torque))
     # blades follow on their bearings, turned about their axes against the third one
-    for each in plant.blades:
+    for k, each in enumerate(plant.blades):
         A, B = (np.array([rotation.matrix(p) for p in sol.orientation(x)])
                 for x in ("hub", each.parts[0].name))  # fmt: skip
         seen = np.einsum("tji,tjk->tik", A, B)
         turned = np.einsum("ji,tjk->tik", seen[0], seen)
         angles = np.arctan2(-turned[:, 1, 0], turned[:, 0, 0])
         assert_allclose(angles, found["pitch"], atol=np.radians(0.02))
+        # by spring and damper, about the axis of the bearing
+        apart = sol.omega(each.parts[0].name) - np.einsum("tji,tj->ti", seen, sol.omega("hub"))
+        spring = PITCH_STIFFNESS * (found["pitch"] - angles)
+        damper = PITCH_DAMPING * apart[:, 2]
+        acts = np.einsum("ti,ti->t", sol.law("control").moment[:, 3 + 2 * k], B[:, :, 2])
+        assert np.abs(damper).max() > 1e4
+        assert_allclose(acts[1:], -(spring + damper)[1:], atol=10.0)
 
 
 def test_the_generator_is_braked_against_the_nacelle():
