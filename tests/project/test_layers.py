@@ -102,6 +102,7 @@ ORDER = {
         "units",
         "two_stages",
         "peers",
+        "updating",
         "loops",
         "first_use",
         "wheel",
