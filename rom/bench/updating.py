@@ -22,8 +22,8 @@ N_SENSORS, N_INPUTS, N_LINES = 20, 3, 4000
 HIGHEST_LINE = 1500.0  # [Hz]
 RELATIVE_NOISE, AVERAGES, DAMPING_RATIO = 0.05, 50, 0.02
 TRUE_LOGS = (0.2, -0.1, 0.3, -0.3, 0.2, -0.2)  # of the six factors
-PARAMETERS = {"E": YoungsModulus(None, 0.4, 2.5), "rho": Density(None, 0.5, 2.0)}
-ATTACHED: dict[str, GroundSpring | AddedMass] = {
+BEAM_PARAMETERS = {"E": YoungsModulus(None, 0.4, 2.5), "rho": Density(None, 0.5, 2.0)}
+ATTACHED_PARTS: dict[str, GroundSpring | AddedMass] = {
     "pull at the root": GroundSpring("root", (1e9, 1e9, 1e9), 0.1, 10.0),
     "turn at the root": GroundSpring("root", (0, 0, 0, 1e6, 1e6, 1e6), 0.1, 10.0),
     "pull at the tip": GroundSpring("tip", (1e6, 1e6, 1e6), 0.1, 10.0),
@@ -40,7 +40,7 @@ def measured(model: FEModel, n_lines: int = N_LINES) -> Iterator[Row]:
         n_lines: of the test, 20 sensors by 3 inputs each.
     """
     family = reduce_parametric(
-        model, parameters=PARAMETERS, method=CraigBampton(20), interfaces=KINDS, certify=False
+        model, parameters=BEAM_PARAMETERS, method=CraigBampton(20), interfaces=KINDS, certify=False
     )
     rng = np.random.default_rng(0)
     points = surface_of(family.body).points
@@ -50,13 +50,13 @@ def measured(model: FEModel, n_lines: int = N_LINES) -> Iterator[Row]:
         for n in (N_SENSORS, N_INPUTS)
     )
     rows = (sensors.rows(family.body, "sensor"), inputs.rows(family.body, "input"))
-    true = family_model(family, rows, ATTACHED, {}, ())
+    true = family_model(family, rows, ATTACHED_PARTS, {}, ())
     lines = np.linspace(20.0, HIGHEST_LINE, n_lines)
     H = responses_at(true, np.array(TRUE_LOGS), np.array([DAMPING_RATIO]), 2 * np.pi * lines)
     coherence = 1 / (1 + AVERAGES * RELATIVE_NOISE**2)
     test = Responses(lines, noisy(H, RELATIVE_NOISE, rng), sensors, inputs, coherence, AVERAGES)
     start = process_time()
-    found = update(family, test, attached=ATTACHED)
+    found = update(family, test, attached=ATTACHED_PARTS)
     spent = process_time() - start
     off = np.log(list(found.factors.values())) - TRUE_LOGS
     worst = np.abs(off / [found.deviations[name] for name in found.factors]).max()

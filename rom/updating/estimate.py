@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from rom.arguments import finite, typed
+from rom.arguments import finite, typed, whole
 from rom.body.flexible import FlexibleBody
 from rom.errors import ConfigError, ParameterError, SolverError
 from rom.model import Array, Mask, Report, Row
@@ -21,7 +21,7 @@ from rom.plausible import check_damping_ratio
 from rom.rows import row
 from rom.updating.family_model import AddedMass, FamilyModel, GroundSpring, family_model
 from rom.updating.frf_data import Complex
-from rom.updating.measured import Responses
+from rom.updating.measured import Channels, Responses
 from rom.updating.models import modal
 from rom.updating.normal_equations import Data, Sums, responses_at, sums
 from rom.updating.verdict import band, check_channels, likeness, scores, unseen_directions, verdict
@@ -108,6 +108,44 @@ class Updated:
         x = np.log(np.where(self.model.present, list(self.factors.values()), 1.0))
         omega = 2 * np.pi * finite("frequencies", frequencies, None)
         return responses_at(self.model, x, self.zeta, omega)
+
+    def drawn(
+        self, frequencies: Any, sensors: Channels, inputs: Channels, *, n: int, seed: int = 0
+    ) -> Complex:
+        """Responses, also where nothing was measured, at factors that the test leaves possible.
+
+        Logarithms of the unknowns are normal about what was found, with its covariance. The spread
+        of the responses is what is not known of them if the model is right.
+
+        Args:
+            frequencies: (n_f,) lines [Hz].
+            sensors: anywhere on the body.
+            inputs: likewise.
+            n: number of draws.
+            seed: of the random numbers.
+
+        Returns:
+            (n, n_f, n_s, n_e) displacement per force [m/N].
+
+        Raises:
+            ConfigError: for lines that are not finite, channels off the body, or no draw.
+        """
+        whole("n", n, 1, None)
+        seen, driven = (
+            channels.rows(self.family.body, what) @ self.model.motions
+            for channels, what in ((sensors, "sensor"), (inputs, "input"))
+        )
+        model = replace(self.model, seen=seen, driven=driven)
+        x = np.log(np.where(model.present, list(self.factors.values()), 1.0))
+        labels = (*model.names, *(f"zeta {k + 1}" for k in range(self.zeta.size)))
+        unknown = [labels.index(name) for name in self.names]
+        theta = np.tile(np.r_[x, np.log(self.zeta)], (n, 1))
+        rng = np.random.default_rng(seed)
+        theta[:, unknown] += rng.multivariate_normal(np.zeros(len(unknown)), self.covariance, n)
+        omega = 2 * np.pi * finite("frequencies", frequencies, None)
+        return np.array(
+            [responses_at(model, row[: x.size], np.exp(row[x.size :]), omega) for row in theta]
+        )
 
     def __str__(self) -> str:
         d = self.deviations

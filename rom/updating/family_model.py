@@ -130,6 +130,7 @@ class FamilyModel:
         high: (n_p,) largest factors.
         amount: (n_t,) one; zero for a candidate, which is not in the model but has derivatives.
         n_rigid: number of motions that nothing holds.
+        motions: (6 + r, n) rigid and elastic coordinates of the family per coordinate here.
     """
 
     K: Array
@@ -143,6 +144,7 @@ class FamilyModel:
     high: Array
     amount: Array
     n_rigid: int
+    motions: Array
 
     @property
     def present(self) -> Mask:
@@ -211,6 +213,7 @@ def family_model(
         high=np.array([p.high for p in known.values()]),
         amount=np.repeat([1.0, 0.0], [len(K) - len(candidates), len(candidates)]),
         n_rigid=_count_free(family.body, attached, fixed),
+        motions=N,
     )
 
 

@@ -185,6 +185,30 @@ def test_the_right_model_passes_and_its_report_says_so(family):
     assert_allclose(found.responses(LINES), test.H, atol=0.02 * np.abs(test.H).max())
 
 
+def test_draws_spread_as_the_covariance_says(family):
+    """ln|H| of another point, to first order: J C J^T with J by differences; the median is H."""
+    found = rom.update(family, synthetic(family, 0.02), fixed=HELD, damping=0.02)
+    there, pushed, f = at_end(), Channels([[0.5, 0.1, 0.08]], [[0, 1, 0.3]]), [300.0, 700.0]
+    level = np.log(np.abs(found.drawn(f, there, pushed, n=400)[:, :, 0, 0]))
+    model = model_of(family)
+    model = replace(model, seen=there.rows(family.body, "s") @ model.motions,
+                    driven=pushed.rows(family.body, "s") @ model.motions)  # fmt: skip
+    theta = np.r_[np.log(list(found.factors.values())), np.log(found.zeta)]
+
+    def at(q):
+        return np.log(np.abs(responses_at(model, q[:3], np.exp(q[3:]), 2 * np.pi * np.array(f))))
+
+    steps = 1e-5 * np.eye(theta.size)
+    J = np.array([(at(theta + h) - at(theta - h))[:, 0, 0] / 2e-5 for h in steps]).T
+    expected = np.sqrt(np.diag(J @ found.covariance @ J.T))
+    assert_allclose(level.std(axis=0), expected, rtol=0.15)
+    assert (np.abs(np.median(level, axis=0) - at(theta)[:, 0, 0]) < 0.2 * expected).all()
+
+
+def at_end():
+    return Channels([[1.0, 0.1, 0.08]], [[0, 0.2, 1]])
+
+
 def test_noise_of_averages_is_what_the_coherence_says():
     """var |H| / |H|^2 = (1 - c) / (2 n c), simulated with noise on the response."""
     rng, n, trials, level = np.random.default_rng(5), 40, 4000, 0.5
