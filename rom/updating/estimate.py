@@ -260,8 +260,7 @@ class _Search:
         """Descend on few lines with large errors, where a start may be far away, then on all."""
         few = replace(self, data=self.data.roughly())
         few._descend(START_STIFFNESS)
-        if self.at(few.theta)[1] < self.at(self.theta)[1]:
-            self.theta = few.theta
+        self.theta = few.theta
         cost = self._descend(NEAR_STIFFNESS)
         if self.settled or cost > MAX_MISFIT * self.data.n_values:
             return self

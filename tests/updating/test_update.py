@@ -29,7 +29,7 @@ GRID = [[x, 0.05 * k, 0.04 * m] for x in (0.25, 0.5, 0.75, 1.0) for k, m in ((0,
 SENSORS = Channels(np.repeat(GRID, 2, axis=0), np.tile([[0, 1, 0], [0, 0, 1]], (8, 1)))
 FEW = Channels(np.asarray(SENSORS.points)[5:11], np.asarray(SENSORS.directions)[5:11])
 INPUTS = Channels([[1.0, 0.0, 0.0], [0.5, 0.1, 0.08]], [[0, 1, 1], [0, 1, -0.5]])
-LINES = np.linspace(20, 1400, 300)
+LINES = np.linspace(20, 1400, 150)
 AVERAGES = 50
 HELD = {"root": "x y z rx ry rz"}
 
@@ -263,8 +263,9 @@ def test_the_score_names_the_parameter_that_is_missing(family):
     assert right.verdict.ok and abs(right.scores["rho_outer"]) < 4
 
 
-def test_what_is_missing_is_named_though_the_search_does_not_end(family):
-    """Everything is free and 1 kg is missing: 60 steps are not enough, its score is the largest."""
+def test_what_is_missing_is_named_though_the_search_does_not_end(family, monkeypatch):
+    """Everything is free and 1 kg is missing: 12 steps are not enough, its score is the largest."""
+    monkeypatch.setattr("rom.updating.estimate.MAX_STEPS", 12)
     offered = {
         "tip mass": AddedMass("tip", 1.0, 0.1, 10),
         "tip spring": GroundSpring("tip", (0, 3e5, 3e5), 0.1, 10),
@@ -292,7 +293,7 @@ def test_data_of_another_body_are_named(family):
     expected = [
         np.abs(np.vdot(a, b)) ** 2 / np.vdot(a, a).real / np.vdot(b, b).real
         for a, b in zip(
-            found.responses(LINES).reshape(300, -1).T, test.H.reshape(300, -1).T, strict=True
+            found.responses(LINES).reshape(150, -1).T, test.H.reshape(150, -1).T, strict=True
         )
     ]
     assert_allclose(unlike.value, 1 - np.median(expected), atol=1e-12)
@@ -329,9 +330,9 @@ def test_a_sensor_with_noise_of_its_own_is_located(family):
     assert not found.verdict.ok and np.nanargmax(found.by_sensor) == 5
     assert any("worst sensor, 5" in row.quantity for row in found.verdict.failures)
     H = test.H.copy()
-    H[100:140] *= 1.05
+    H[50:70] *= 1.05
     found = rom.update(family, replace(test, H=H), fixed=HELD, damping=0.02)
-    assert 100 <= np.nanargmax(np.convolve(found.by_line, np.ones(9), "same")) < 140
+    assert 50 <= np.nanargmax(np.convolve(found.by_line, np.ones(9), "same")) < 70
 
 
 def test_a_direction_that_the_data_do_not_see_is_named(family):
@@ -362,7 +363,7 @@ def test_a_prior_as_sure_as_the_data_halves_what_they_find(family):
 
 def test_the_gradient_is_that_of_the_cost_with_its_prior(family):
     """Differences of half the cost, away from the prior; 8 modes lie below 2100 Hz."""
-    test = synthetic(family, lines=LINES[::10], sensors=FEW)
+    test = synthetic(family, lines=LINES[::5], sensors=FEW)
     model, data = model_of(family, sensors=FEW), Data.of(test)
     search = _Search.begun(model, data, np.ones(3, bool), 0.01, {"E_inner": 1e-3, "rho_outer": 0.1})
     assert search.zeta.size == 9
@@ -395,7 +396,7 @@ def test_wrong_data_are_named(family):
     refused("sensor 2 gives .*1000: millimetres", H=scaled)
     refused("all responses .*9.807: acceleration in g", H=9.80665 * test.H)
     refused("all responses .*0.001: metres taken", H=1e-3 * test.H)
-    refused("zero or not finite at 1 lines, e.g. at 52.308 Hz", H=nan)
+    refused("zero or not finite at 1 lines, e.g. at 84.832 Hz", H=nan)
     refused("sensor 0 at .* is 0.92 m off the body", sensors=Channels(
         np.asarray(SENSORS.points) + [[0, 0, 0.999 + 0.001 * (k == 0)] for k in range(16)],
         SENSORS.directions))  # fmt: skip

@@ -10,6 +10,7 @@ from scipy.optimize import brentq
 
 import rom
 from cases.linkages import (
+    ball,
     cross_slides_of_the_core,
     five_bar_of_the_core,
     rail_of_the_core,
@@ -376,6 +377,27 @@ def test_a_five_bar_of_the_core_has_a_point_of_the_table():
     assert_allclose(core.tip(0.1, 0.05), FIVE.tip(2.4, 0.85), atol=1e-9)
 
 
+def test_postures_far_from_where_bodies_were_added_are_followed_there():
+    """Half a turn and more, where both couplers could also meet on the other side."""
+    start = np.array([1.0, 2.2])
+    mech = five_bar_of_the_core(start, [(2.0, 0.3)] * 2, [(1.0, 0.8)] * 2, FIVE.posture(*start))
+    turns = np.array([[2.9, -2.6], [-3.0, 3.1], [6.2, 0.4]])
+    core = Driven(mech, ("left", "right"), tool="ball")
+    assert_allclose(core.inertia(*turns.T), FIVE.inertia(*(start + turns).T), rtol=1e-6)
+    assert_allclose(core.tip(*turns.T), FIVE.tip(*(start + turns).T), atol=1e-8)
+    swapped = Driven(mech, ("right", "left")).inertia(*turns[0, ::-1])
+    assert_allclose(swapped, core.inertia(*turns[0])[::-1, ::-1], rtol=1e-6)
+
+
+def test_mechanisms_of_more_than_two_motions_are_refused():
+    mech = two_link_of_the_core((1.0, 0.3), (1.0, 0.4), (0.2, 1.0))
+    ball(mech, "loose", 0.1, (1.0, 1.0))
+    core = Driven(mech, ("shoulder", "elbow"))
+    with pytest.raises(ModelError, match="the joints leave 8 motions"):
+        core.inertia(0.1, 0.2)
+    assert not core.assembles(0.1, 0.2)
+
+
 # --- maps and loci within strokes ---
 
 
@@ -491,6 +513,8 @@ def test_loci_within_a_window_are_those_of_the_torus():
             "no tool",
         ),
         (lambda: Driven(polar_of_the_core(), ("turn", "x")), ConfigError, "x"),
+        (lambda: Driven(polar_of_the_core(), ("turn", "feed", "feed")), ConfigError, "not two"),
+        (lambda: Driven(polar_of_the_core(), ("turn",)), ConfigError, "not two"),
     ],
 )  # fmt: skip
 def test_what_is_no_linkage_is_refused(make, error, words):
