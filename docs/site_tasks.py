@@ -24,7 +24,8 @@ TASKS: dict[str, tuple[str, str]] = {
         """update updating.Updated updating.Responses updating.Channels updating.GroundSpring
         updating.AddedMass updating.MeasuredModes updating.Plan updating.place
         updating.candidates updating.independent updating.tracker updating.Tracker
-        updating.Sensors updating.Track updating.Observer io.write_observer_fmu""",
+        updating.Sensors updating.Track updating.Observer io.write_observer_fmu
+        updating.parameter_tracker updating.ParameterTracker updating.Drift""",
     ),
     "Check": (
         "What tells how far to trust a model, a body, a motion or a law.",

@@ -112,7 +112,15 @@ def _marker(body: BodyData, marker: Marker, f: Factors) -> Marker:
         rotation=marker.rotation * (f.shape / f.length),
         hold=hold,
         patch=None if marker.patch is None else _patch(marker.patch, f),
+        covariance=_covariance(marker, f),
     )
+
+
+def _covariance(marker: Marker, f: Factors) -> Array | None:
+    if marker.covariance is None:
+        return None
+    per_coordinate = np.full(marker.covariance.shape[2] - 1, f.shape / f.length)
+    return marker.covariance * np.r_[1.0, per_coordinate]
 
 
 def _coordinates(body: BodyData, marker: Marker, f: Factors) -> Array:

@@ -12,7 +12,7 @@ from rom.body.reference import moved_frame, reference_motion
 from rom.body.stiffening import SecondOrder, moved_stiffening, recombined_stiffening
 from rom.eigen.verbs import Operators, rigid_motions
 from rom.errors import ConfigError, ModelError
-from rom.model import OWN_FRAME, Array, FEModel
+from rom.model import OWN_FRAME, Array, FEModel, Interface
 
 STILL_RTOL = 1e-9  # momentum of a shape, of the largest that its mass lets it have
 
@@ -69,7 +69,20 @@ def at_large_deflection(
     shapes = (E - rigid_motions(points) @ X) @ V
     found = _recombined(moved, V, omega, reference_label(reference))
     energy = Quartic.from_gram(model.stresses.large_strain().gram(shapes), omega.size)
-    return replace(found, quartic=replace(energy, K=found.K)), shapes
+    markers = {
+        name: replace(marker, covariance=_covariance(ops, model.interfaces[name], shapes))
+        for name, marker in found.markers.items()
+    }
+    return replace(found, markers=markers, quartic=replace(energy, K=found.K)), shapes
+
+
+def _covariance(ops: Operators, interface: Interface, E: Array) -> Array:
+    """(3, 3, 1 + r) that of an interface under shapes E (n_local, r), see `Marker.covariance`."""
+    area = np.asarray(interface.surface_mass.sum(axis=0)).ravel()
+    X = interface.points - area @ interface.points / area.sum()
+    weights = interface.surface_mass @ X
+    moved = np.concatenate([X[..., None], ops.rows(E, interface.dofs).reshape(len(X), 3, -1)], 2)
+    return np.einsum("nak,nb->abk", moved, weights) / float((X * weights).sum())
 
 
 def moved_to(body: Body, reference: Any) -> Body:

@@ -45,6 +45,10 @@ class Marker:
             rotation about the body origin) and elastic coordinates, in units of these; zero when it
             is held.
         patch: the surface of a deformable interface; None when its motion is rigid or averaged.
+        covariance: (3, 3, 1 + r) cross-covariance of the deformed with the undeformed surface, over
+            the variance of the latter [1]: without deformation, then per unit of each elastic
+            coordinate. The rotation nearest to it, whatever its angle, is that of the marker.
+            None for bodies of small deflection, which turn by exp(rotation q).
     """
 
     name: str
@@ -54,6 +58,7 @@ class Marker:
     kind: str
     hold: Array
     patch: Patch | None = None
+    covariance: Array | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -24,7 +24,7 @@ from rom.names import named
 from rom.units import SYSTEMS
 
 SCHEMA_NAME = "rom-body"
-VERSION = (1, 5)  # a new major number breaks readers, a new minor number only adds
+VERSION = (1, 6)  # a new major number breaks readers, a new minor number only adds
 FIELDS = ("first_moment", "inertia", "S", "Ibar_kl", "S_kl", "K", "D", "omega")
 MARKER_ARRAYS = ("point", "translation", "rotation", "hold")  # arrays of each
 SURFACE_ARRAYS = ("points", "triangles", "shape")
@@ -105,6 +105,8 @@ def body_arrays(body: FlexibleBody) -> dict[str, Array]:
         for part in MARKER_ARRAYS:
             arrays[f"marker/{i}/{part}"] = getattr(marker, part)
         arrays |= {f"marker/{i}/{part}": A for part, A in _patch_arrays(marker.patch).items()}
+        if marker.covariance is not None:
+            arrays[f"marker/{i}/covariance"] = marker.covariance
     if body.surface is not None:
         for part in SURFACE_ARRAYS:
             arrays[f"surface/{part}"] = getattr(body.surface, part)
@@ -163,6 +165,7 @@ def body_of(manifest: dict[str, Any], arrays: dict[str, Array]) -> FlexibleBody:
             kind=m["kind"],
             **{part: arrays[f"marker/{i}/{part}"] for part in MARKER_ARRAYS},
             patch=_patch(arrays, f"marker/{i}"),
+            covariance=arrays.get(f"marker/{i}/covariance"),  # of large deflection, from 1.6 on
         )
         for i, m in enumerate(manifest["markers"])
     }
@@ -236,6 +239,7 @@ def verify(body: FlexibleBody, path: Path) -> None:
             raise FileFormatError(
                 f"marker {m.name!r} does not fit {r} coordinates.", where=str(path)
             )
+        _verify_covariance(m, r, path)
         _verify_patch(m, path)
     if body.stress is not None:
         n, A = body.stress.points.shape[0], body.stress.inertial
@@ -274,6 +278,14 @@ def _verify_stiffening(body: FlexibleBody, path: Path) -> None:
             raise QualityGateError(
                 f"the geometric stiffness {load!r} is not symmetric.", where=str(path)
             )
+
+
+def _verify_covariance(m: Marker, r: int, path: Path) -> None:
+    if m.covariance is not None and m.covariance.shape != (3, 3, 1 + r):
+        raise FileFormatError(
+            f"the covariance of marker {m.name!r} does not fit {r} coordinates.",
+            where=str(path),
+        )
 
 
 def _verify_patch(marker: Marker, path: Path) -> None:

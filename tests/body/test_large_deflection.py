@@ -155,6 +155,44 @@ def test_a_cantilever_follows_the_elastica(slenderness, cells, kinds):
     loads = np.outer(ELASTICA[:, 0] * EI, body.marker("tip").translation[1])
     for q, (_, *expected) in zip(follow(body.quartic, loads), ELASTICA, strict=True):
         assert_allclose(tip_of(body, q), expected, rtol=2e-3)
+    mech, part = cantilever(body)
+    mech.force("load", part.marker("tip"), (0, ELASTICA[-1, 0] * EI, 0))
+    assert_allclose(slope_of(mech, "beam", "tip"), ELASTICA[-1, 1], rtol=2e-3)
+
+
+def cantilever(body):
+    """A mechanism of the body, its root held."""
+    mech = rom.Mechanism(gravity=(0, 0, 0))
+    part = mech.add_flexible("beam", body)
+    mech.fixed("wall", mech.ground.marker(part.point(part.marker("root"))), part.marker("root"))
+    return mech, part
+
+
+def slope_of(mech, name, marker):
+    """Angle about z of a marker in equilibrium [rad]."""
+    still = rom.snapshot(mech, rom.equilibrium(mech, steps=4))
+    E = still.axes(name, marker)[0]
+    return np.arctan2(E[1, 0], E[0, 0])
+
+
+def test_what_is_welded_to_the_tip_turns_with_it_to_the_end_of_an_arc():
+    """A moment on it bends the beam to a circle of the radius EI / M, by 57 degrees at L."""
+    model, EI = slender(50, 12)
+    body = reduced(model, (0, 0, 0, 0, 0, 3 * EI), n_shapes=18)
+    mech, part = cantilever(body)
+    point = part.point(part.marker("tip"))
+    block = mech.add_rigid(
+        "block", mass=1.0, inertia=(1e-3,) * 3, at=point, markers={"c": (0,) * 3}
+    )
+    mech.fixed("weld", part.marker("tip"), block.marker("c"))
+    for angle in (0.3, 1.0):
+        mech.elements.pop("moment", None)
+        mech.torque("moment", block.marker("c"), (0, 0, angle * EI))
+        assert_allclose(slope_of(mech, "block", "c"), angle, rtol=1e-2)
+        still = rom.snapshot(mech, rom.equilibrium(mech, steps=4))
+        x, y, _ = still.position("block", "c")[0] - body.marker("root").point
+        assert_allclose([1 - x, y], [1 - np.sin(angle) / angle, (1 - np.cos(angle)) / angle],
+                        rtol=1.5e-2)  # fmt: skip
 
 
 def test_a_beam_between_immovable_hinges_hardens_as_the_elliptic_integral_says():
@@ -302,6 +340,8 @@ def test_the_linear_part_is_that_of_the_linear_body(certified):
 def test_a_file_and_other_units_keep_the_energy(certified, tmp_path):
     body, *_ = certified
     read = rom.load(rom.save(body, tmp_path / "body.rom.npz"))
+    for name, marker in body.markers.items():
+        assert_allclose(read.marker(name).covariance, marker.covariance, rtol=0, atol=0)
     q = 1e-3 * np.random.default_rng(0).standard_normal(body.n_modes)
     assert read.quartic.energy(q) == body.quartic.energy(q)
     other, tip = body.in_units("mm-t-s"), body.marker("tip").translation
@@ -309,9 +349,37 @@ def test_a_file_and_other_units_keep_the_energy(certified, tmp_path):
     assert_allclose(
         other.quartic.energy(same), 1e3 * body.quartic.energy(q)
     )  # 1 J is 1000 t mm^2/s^2
+    turned = [b.marker("tip").covariance @ np.r_[1.0, x] for b, x in ((body, q), (other, same))]
+    assert_allclose(*turned, atol=1e-12)
     cut = replace(body, quartic=replace(body.quartic, quartic=body.quartic.quartic[1:]))
-    with pytest.raises(rom.errors.FileFormatError, match="does not fit"):
+    with pytest.raises(rom.errors.FileFormatError, match=r"energy .* does not fit"):
         rom.load(rom.save(cut, tmp_path / "cut.rom.npz"))
+    short = replace(body.marker("tip"), covariance=body.marker("tip").covariance[..., 1:])
+    cut = replace(body, markers=body.markers | {"tip": short})
+    with pytest.raises(rom.errors.FileFormatError, match="covariance of marker 'tip'"):
+        rom.load(rom.save(cut, tmp_path / "cut.rom.npz"))
+
+
+def test_markers_turn_at_first_as_their_linear_rotation_says(certified):
+    """The rotation of the covariance is that of the least squares, of which it is the slope."""
+    body, *_ = certified
+    q = 1e-6 * np.random.default_rng(1).standard_normal(body.n_modes)
+    q /= np.abs(body.marker("tip").rotation).max()
+    for name in ("root", "tip"):
+        marker = body.marker(name)
+        U, _, Vt = np.linalg.svd(marker.covariance @ np.r_[1.0, q])
+        R = U @ np.diag([1.0, 1.0, np.linalg.det(U @ Vt)]) @ Vt
+        turn = [R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]]
+        assert_allclose(np.array(turn) / 2, marker.rotation @ q, rtol=0, atol=1e-11)
+    assert np.abs(body.marker("tip").rotation @ q).max() > 1e-7
+
+
+def test_files_without_covariance_are_read_and_their_markers_turn_as_before(certified, tmp_path):
+    """As those of version 1.5 are."""
+    body, *_ = certified
+    markers = {name: replace(m, covariance=None) for name, m in body.markers.items()}
+    read = rom.load(rom.save(replace(body, markers=markers), tmp_path / "old.rom.npz"))
+    assert read.marker("tip").covariance is None
 
 
 @pytest.mark.parametrize(
@@ -423,9 +491,7 @@ def test_a_cantilever_in_a_mechanism_bends_as_it_does_alone(certified):
     force = np.array([0.0, *loads[1:3]]) / np.sqrt(2)
     share = np.linspace(0.25, 1, 4)
     (*_, q) = follow(body.quartic, np.outer(share, force @ body.marker("tip").translation))
-    mech = rom.Mechanism(gravity=(0, 0, 0))
-    part = mech.add_flexible("beam", body)
-    mech.fixed("wall", mech.ground.marker(part.point(part.marker("root"))), part.marker("root"))
+    mech, part = cantilever(body)
     mech.force("load", part.marker("tip"), force)
     found = rom.equilibrium(mech).q[7:]
     assert_allclose(found, q, rtol=0, atol=1e-7 * np.abs(q).max())

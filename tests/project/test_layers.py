@@ -104,6 +104,7 @@ ORDER = {
         "units",
         "two_stages",
         "peers",
+        "updating",
         "loops",
         "first_use",
         "wheel",

@@ -390,7 +390,20 @@ def _markers(mechanism: Mechanism, handles: list[Marker], R: int) -> Markers:
         shape,
         twist,
         _bends(mechanism, handles, R),
+        *_fits(mechanism, handles, R),
     )
+
+
+def _fits(mechanism: Mechanism, handles: list[Marker], R: int) -> tuple[Index, Array]:
+    """Tables fit and covariance of `rom.mbs.kernels.system.Markers`."""
+    fit, found = np.full(len(handles), -1, dtype=np.int64), list[Array]()
+    for k, marker in enumerate(handles):
+        covariance = mechanism.part(marker.body).covariance(marker)
+        if covariance is not None:
+            fit[k] = len(found)
+            missing = 1 + R - covariance.shape[2]
+            found.append(np.pad(covariance.reshape(9, -1), ((0, 0), (0, missing))))
+    return fit, np.array(found).reshape(len(found), 9, 1 + R)
 
 
 def _rows(mechanism: Mechanism, places: Places) -> Rows:

@@ -67,6 +67,8 @@ STAGE_NAMES = (
     "keep_pair_tangents",
     "renew_pair_tangents",
     "add_renewed",
+    "fitted_motion",
+    "fitted_wrench_stiffness",
 )
 STAGE_KERNELS: dict[str, "Stage"] = {}
 STAGE_ADDRESSES = np.zeros(len(STAGE_NAMES), dtype=np.int64)  # 0 until a stage is linked

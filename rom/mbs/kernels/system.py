@@ -74,12 +74,16 @@ class Bodies(Table):
 class Markers(Table):
     """Points with axes on bodies: P = r + A (x + shape q + q bend q / 2), axes A exp(twist q).
 
+    Fitted markers have the axes A R, R the rotation nearest to their covariance.
+
     Attributes:
         body: (k,) body, -1 for the ground.
         point: (k, 3) undeformed position in the body frame [m].
         shape: (k, 3, R) displacement per elastic coordinate.
         twist: (k, 3, R) small rotation per elastic coordinate.
         bend: (k, 6, R, R) displacement and rotation of second order, of stiffened bodies.
+        fit: (k,) row of fitted markers in their table, -1 for others.
+        covariance: (f, 9, 1 + R) entry 3 a + b: see `rom.body.records.Marker`.
     """
 
     body: Index1
@@ -87,6 +91,8 @@ class Markers(Table):
     shape: Array3
     twist: Array3
     bend: Array4
+    fit: Index1
+    covariance: Array3
 
 
 @table

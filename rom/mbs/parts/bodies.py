@@ -162,6 +162,13 @@ class Part:
         m = self.moving.markers[marker.place]
         return np.asarray(m.translation, dtype=float), np.asarray(m.rotation, dtype=float)
 
+    def covariance(self, marker: Marker) -> Array | None:
+        """(3, 3, 1 + r) from which a marker has its rotation [1], None if it turns by exp."""
+        if self.flexible is None or marker.place not in self.moving.markers:
+            return None
+        found = getattr(self.moving.markers[marker.place], "covariance", None)
+        return None if found is None else np.asarray(found, dtype=float)
+
     def _surface_row(self, place: Any) -> int | None:
         """Point of the surface that a contact has put a marker on, or None."""
         if self.flexible is None or not isinstance(place, str) or place in self.names:

@@ -43,17 +43,19 @@ def warn_of_limits(solution: Solution) -> None:
 
 
 def _warn_of_turned_markers(solution: Solution, name: str) -> None:
-    """Axes of markers follow the linear rotation, which is the sine of the angle."""
+    """Axes of markers that are not fitted to a surface follow the linear rotation, a sine."""
     q = solution.elastic(name)
     for marker, m in solution.mechanism.parts[name].flexible.markers.items():
+        if m.covariance is not None:
+            continue
         turn = np.linalg.norm(q @ np.asarray(m.rotation).T, axis=1)
         if np.nanmax(turn, initial=0.0) > MAX_MARKER_TURN:
             k = int(np.nanargmax(turn > MAX_MARKER_TURN))
             warn(
                 f"interface {marker!r} of body {name!r} turned by more than {MAX_MARKER_TURN} rad "
                 f"against the frame at {solution.t[k]:.4g} s: the axes of what is joined to it "
-                "fall short of that angle. Its place, and forces on it, are exact; for joints that "
-                "hold its direction cut the body in two."
+                "fall short of that angle. Its place, and forces on it, are exact; reduce the body "
+                "again, for joints that hold its direction: its file is of an older version."
             )
 
 

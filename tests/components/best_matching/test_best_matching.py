@@ -61,7 +61,8 @@ def test_matched_energy_is_kinetic_energy_without_momenta(scale):
     assert found.energy == pytest.approx(expected, rel=1e-12)
     assert_allclose(m @ found.rest, 0, atol=1e-12)
     assert_allclose(m @ np.cross(x, found.rest), 0, atol=1e-12)
-    assert_allclose(found.motion[3:6], np.linalg.solve(inertia, L), rtol=0.2 if scale else 1e-9)
+    assert_allclose(found.motion[3:6], np.linalg.solve(inertia, L), rtol=1e-9)
+    assert_allclose(found.motion[6:], [D / size] * scale, rtol=1e-9)
 
 
 @pytest.mark.parametrize(("scale", "rank"), [(False, 6), (True, 7)])
