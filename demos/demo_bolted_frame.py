@@ -235,8 +235,8 @@ view.plane(
     caption="A test with noise of 20 % on responses and 5 % on forces is compared with a reduced "
     "family of solid frames. Without the instrument on the beam, of which the model does not know, "
     "factors of stiffness settle at wrong values and the verdict refuses them; its largest score "
-    "names the instrument. Red: the test, or the object itself. Shaded: 95 of 100 draws of what the "
-    "test leaves open.",
+    "names the instrument. Red: the test, or the object itself. Shaded: 95 of 100 draws of what "
+    "the test leaves open.",
 )  # fmt: skip
 
 # ## What to remember
