@@ -20,7 +20,7 @@ from rom.updating.normal_equations import responses_at
 
 N_SENSORS, N_INPUTS, N_LINES = 20, 3, 4000
 HIGHEST_LINE = 1500.0  # [Hz]
-RELATIVE_NOISE, AVERAGES, DAMPING_RATIO = 0.05, 50, 0.02
+RELATIVE_NOISE, N_AVERAGES, DAMPING_RATIO = 0.05, 50, 0.02
 TRUE_LOGS = (0.2, -0.1, 0.3, -0.3, 0.2, -0.2)  # of the six factors
 BEAM_PARAMETERS = {"E": YoungsModulus(None, 0.4, 2.5), "rho": Density(None, 0.5, 2.0)}
 ATTACHED_PARTS: dict[str, GroundSpring | AddedMass] = {
@@ -53,8 +53,8 @@ def measured(model: FEModel, n_lines: int = N_LINES) -> Iterator[Row]:
     true = family_model(family, rows, ATTACHED_PARTS, {}, ())
     lines = np.linspace(20.0, HIGHEST_LINE, n_lines)
     H = responses_at(true, np.array(TRUE_LOGS), np.array([DAMPING_RATIO]), 2 * np.pi * lines)
-    coherence = 1 / (1 + AVERAGES * RELATIVE_NOISE**2)
-    test = Responses(lines, noisy(H, RELATIVE_NOISE, rng), sensors, inputs, coherence, AVERAGES)
+    coherence = 1 / (1 + N_AVERAGES * RELATIVE_NOISE**2)
+    test = Responses(lines, noisy(H, RELATIVE_NOISE, rng), sensors, inputs, coherence, N_AVERAGES)
     start = process_time()
     found = update(family, test, attached=ATTACHED_PARTS)
     spent = process_time() - start
