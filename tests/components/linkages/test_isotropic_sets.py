@@ -9,7 +9,7 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 
 import rom
-from cases.linkages import (
+from cases.mbs.linkages import (
     ball,
     cross_slides_of_the_core,
     five_bar_of_the_core,

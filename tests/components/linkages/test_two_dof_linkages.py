@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 
 import rom
-from cases.linkages import five_bar_of_the_core
+from cases.mbs.linkages import five_bar_of_the_core
 from cases.mbs.mechanisms import simulate_quietly
 from cases.solid import STEEL, block
 from rom.components.linkages.dynamic_isotropy import christoffel, index_map
