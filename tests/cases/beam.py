@@ -1,10 +1,12 @@
-"""Planar Euler-Bernoulli beams of Hermite elements, and a body made of one."""
+"""Planar Euler-Bernoulli beams of Hermite elements, a body made of one, and its spin-up."""
 
 import numpy as np
 from scipy.linalg import eigh
 
 from rom.body.flexible import FlexibleBody
 from rom.body.records import Marker
+from rom.mbs.integrate.simulation import simulate
+from rom.mbs.mechanism import Mechanism
 
 N = 40  # elements
 
@@ -93,3 +95,29 @@ def stiffened_beam(length=1.0, EI=1.0, rhoA=1.0, *, n_modes=20, stiffened=True):
         reference="root",
         K_geo={k: 0.5 * (A + A.T) for k, A in K_geo.items()} if stiffened else {},
     )
+
+
+def spin_up(body, speed, t_end, *, duration=15.0, **options):
+    """The base turns from rest to a speed; tip deflection (u, v) in the frame of the base."""
+    rate = 2 * np.pi / duration
+    mech = Mechanism(gravity=(0, 0, 0))
+    beam = mech.add_flexible("beam", body)
+    mech.revolute("base", mech.ground.marker((0, 0, 0)), beam.marker("root"), axis=(0, 0, 1))
+
+    def angle(t):
+        if t >= duration:
+            return speed * (t - duration / 2)
+        return speed / duration * (t**2 / 2 + (np.cos(rate * t) - 1) / rate**2)
+
+    def velocity(t):
+        return speed / duration * (t - np.sin(rate * t) / rate) if t < duration else speed
+
+    def acceleration(t):
+        return speed / duration * (1 - np.cos(rate * t)) if t < duration else 0.0
+
+    mech.drive("motor", "base", angle, rate=velocity, acceleration=acceleration)
+    sol = simulate(mech, t_end=t_end, **{"dt": 5e-3, "rho_inf": 0.9} | options)
+    psi = np.array([angle(t) for t in sol.t])
+    tip, arm = sol.position("beam", "tip"), body.marker("tip").point - body.marker("root").point
+    u = np.cos(psi) * tip[:, 0] + np.sin(psi) * tip[:, 1] - arm[0]
+    return sol, u, np.cos(psi) * tip[:, 1] - np.sin(psi) * tip[:, 0]

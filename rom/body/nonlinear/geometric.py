@@ -33,6 +33,9 @@ from rom.model import Array, Basis, FEModel, Index
 from rom.names import offered
 
 DEPENDENT_RTOL = 1e-10  # energy of a derivative, of the largest, that the others explain
+# energy of a derivative over those of its two shapes, of the largest such, from which it is none;
+# for slender bodies pull and bending differ by the square of the slenderness
+ROUND_OFF_RTOL = 1e-18
 EQUAL_RTOL = 1e-3  # of shares of energy: states of two planes of equal stiffness stay together
 FORCES = ("f_x", "f_y", "f_z", "m_x", "m_y", "m_z")
 N_MODES = 4  # about each state that a range leads to, for which shapes are kept
@@ -260,7 +263,8 @@ def _with_derivatives(
     active = np.hstack([static, Psi[:, n_b : n_b + n_modes]])
     n_basis = moving.shape[1] + n_modes
     _refuse_many(n_basis + active.shape[1] * (active.shape[1] + 1) // 2, energy)
-    theta = _derivatives(connection.ops, basis, energy, active)
+    size = np.diag(quadratic(ops, ops.apply_K, active))
+    theta = _derivatives(connection.ops, basis, energy, active, size)
     E = np.hstack([moving, active[:, static.shape[1] :], connection.ops.expand(theta)])
     loads, rows = (_loads(some, model, ops, E) for some in (geometric.components(), held))
     return Shapes(E, loads, rows.T, n_basis), theta
@@ -316,8 +320,19 @@ def _loads(components: Any, model: FEModel, ops: Operators, E: Array) -> Array:
     return np.array(columns).reshape(-1, E.shape[1]).T
 
 
-def _derivatives(ops: Operators, basis: Basis, energy: Any, active: Array) -> Array:
-    """(n_local, p) derivatives in interface coordinates, orthonormal in K and to normal modes."""
+def _derivatives(ops: Operators, basis: Basis, energy: Any, active: Array, size: Array) -> Array:
+    """(n_local, p) derivatives in interface coordinates, orthonormal in K and to normal modes.
+
+    Two shapes that drag nothing along, as pull and twist of a prism, have round-off as their
+    derivative, which must not become a shape: it differs from run to run.
+
+    Args:
+        ops: operators in interface coordinates.
+        basis: supplies the held factor and the normal modes.
+        energy: at large strain.
+        active: (n_local, a) nodal shapes of which derivatives are taken.
+        size: (a,) twice their energies [J].
+    """
     i, j = np.triu_indices(active.shape[1])
     pairs: Index = np.column_stack([i, j])
     theta = np.zeros((ops.n_local, len(pairs)))
@@ -326,7 +341,10 @@ def _derivatives(ops: Operators, basis: Basis, energy: Any, active: Array) -> Ar
     normal = basis.Psi[:, basis.Psi.shape[1] - basis.omega.size :]
     theta -= normal @ (ops.gram(normal, ops.apply_K(theta)) / basis.omega[:, None] ** 2)
     K = quadratic(ops, ops.apply_K, theta)
-    scale = 1 / np.sqrt(np.maximum(np.diag(K), np.finfo(float).tiny))
+    share = np.diag(K) / (size[i] * size[j])
+    real = share > ROUND_OFF_RTOL * share.max()
+    theta, K = theta[:, real], K[np.ix_(real, real)]
+    scale = 1 / np.sqrt(np.diag(K))
     lam, V = np.linalg.eigh(0.5 * (K + K.T) * np.outer(scale, scale))
     kept = lam > DEPENDENT_RTOL * lam[-1]
     return theta @ (scale[:, None] * V[:, kept] / np.sqrt(lam[kept]))

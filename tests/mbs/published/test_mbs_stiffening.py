@@ -8,7 +8,7 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.linalg import eigh
 
-from cases.beam import stiffened_beam
+from cases.beam import spin_up, stiffened_beam
 from cases.mbs.mechanisms import (
     nodal_body,
     prepared,
@@ -68,32 +68,6 @@ def test_supports_share_the_pull_of_a_body_between_them():
 # Dyn. 10 (1987) 139; the beam of Wu and Haug. Extremes from a spectral beam theory.
 KRB = {"length": 10.0, "EI": 1.4e4, "rhoA": 1.2, "n_modes": 4}
 WU = {"length": 8.0, "EI": 6.8952e10 * 8.2181e-9, "rhoA": 2766.67 * 7.2968e-5, "n_modes": 4}
-
-
-def spin_up(body, speed, t_end, *, duration=15.0, **options):
-    """The base turns from rest to a speed; tip deflection (u, v) in the frame of the base."""
-    rate = 2 * np.pi / duration
-    mech = Mechanism(gravity=(0, 0, 0))
-    beam = mech.add_flexible("beam", body)
-    mech.revolute("base", mech.ground.marker((0, 0, 0)), beam.marker("root"), axis=(0, 0, 1))
-
-    def angle(t):
-        if t >= duration:
-            return speed * (t - duration / 2)
-        return speed / duration * (t**2 / 2 + (np.cos(rate * t) - 1) / rate**2)
-
-    def velocity(t):
-        return speed / duration * (t - np.sin(rate * t) / rate) if t < duration else speed
-
-    def acceleration(t):
-        return speed / duration * (1 - np.cos(rate * t)) if t < duration else 0.0
-
-    mech.drive("motor", "base", angle, rate=velocity, acceleration=acceleration)
-    sol = simulate(mech, t_end=t_end, **{"dt": 5e-3, "rho_inf": 0.9} | options)
-    psi = np.array([angle(t) for t in sol.t])
-    tip, arm = sol.position("beam", "tip"), body.marker("tip").point - body.marker("root").point
-    u = np.cos(psi) * tip[:, 0] + np.sin(psi) * tip[:, 1] - arm[0]
-    return sol, u, np.cos(psi) * tip[:, 1] - np.sin(psi) * tip[:, 0]
 
 
 def at(sol, values, times):

@@ -72,7 +72,7 @@ class Quartics(Table):
     Attributes:
         body: (e,) which.
         energy: (e,) which of the u energies it has.
-        by_one: (u, P, R) T3 [N/m^2].
+        by_one: (u, R, P) T3, its last two indices as a pair [N/m^2].
         by_two: (u, P, P) T4 by its first and last two indices [N/m^3].
         square: (P,) products of coordinates, twice where these differ.
         S3, S4: (e, P) both contractions at the last residual.
@@ -92,10 +92,10 @@ def pack(found: Mapping[str, LargeDeflection], places: Places) -> Quartics:
     energies = {id(one.energy): one.energy for one in found.values()}
     R, u, e = max((x.n for x in energies.values()), default=0), len(energies), len(found)
     P = R * (R + 1) // 2
-    by_one, by_two = np.zeros((u, P, R)), np.zeros((u, P, P))
+    by_one, by_two = np.zeros((u, R, P)), np.zeros((u, P, P))
     for k, x in enumerate(energies.values()):
         T3, T4 = x.by_pairs
-        by_one[k, : len(T3), : x.n] = T3
+        by_one[k, : x.n, : len(T3)] = T3.T
         by_two[k, : len(T4), : len(T4)] = T4
     number = list(energies)
     return Quartics(
@@ -107,22 +107,26 @@ def pack(found: Mapping[str, LargeDeflection], places: Places) -> Quartics:
 
 @inner
 def contract(s, quartics, e, q):
-    """Set the rows e of S3 and S4 at the coordinates of the body."""
+    """Set the rows e of S3 and S4 at the coordinates of the body.
+
+    Whole rows are added up: sums over a row would be done number by number.
+    """
     b, u = quartics.body[e], quartics.energy[e]
     at, r, p = s.bodies.q_at[b] + 7, s.bodies.r[b], 0
     for i in range(r):
         for j in range(i, r):
             quartics.square[p] = (1.0 if i == j else 2.0) * q[at + i] * q[at + j]
             p += 1
-    for k in range(p):
-        total = 0.0
-        for l in range(r):
-            total += quartics.by_one[u, k, l] * q[at + l]
-        quartics.S3[e, k] = total
-        total = 0.0
+    S3, S4 = quartics.S3[e], quartics.S4[e]
+    S3[:p], S4[:p] = 0.0, 0.0
+    for k in range(r):
+        row, x = quartics.by_one[u, k], q[at + k]
         for l in range(p):
-            total += quartics.by_two[u, k, l] * quartics.square[l]
-        quartics.S4[e, k] = total
+            S3[l] += x * row[l]
+    for k in range(p):
+        row, x = quartics.by_two[u, k], quartics.square[k]
+        for l in range(p):
+            S4[l] += x * row[l]
 
 
 @residuals.of(Quartics)
