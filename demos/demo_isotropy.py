@@ -23,8 +23,8 @@ from rom.components.linkages import (
     PolarArm,
     SlideFiveBar,
     TwoLink,
-    angle_grid,
     closed_loci,
+    index_map,
     isotropic_configurations,
     isotropic_set,
     isotropy_index,
@@ -76,7 +76,7 @@ def fast(q1, q2):
 LEVELS = {"rods": (0.5, 0.7, 0.9, 0.97, 0.995), "gmsh": (0.5, 0.7, 0.9, 0.97, 0.995)}
 maps, loci, found = {}, {}, {}
 for name, inertia in {"rods": rigid.inertia, "gmsh": solid.inertia}.items():
-    maps[name] = isotropy_index(inertia(*angle_grid(400)))
+    maps[name] = index_map(inertia)
     loci[name] = {level: closed_loci(maps[name], level) for level in LEVELS[name]}
     curves = [curve for closed in loci[name].values() for curve in closed]
     found[name] = isotropic_configurations(inertia, n=200)
@@ -84,8 +84,7 @@ for name, inertia in {"rods": rigid.inertia, "gmsh": solid.inertia}.items():
     for q, a, w in zip(np.degrees(found[name].q), found[name].inertia, found[name].winding,
                        strict=True):  # fmt: skip
         say(f"  q = ({q[0]:9.5f}, {q[1]:9.5f}) deg, inertia {a:.6f} kg m^2, winding {w:+d}")
-eased = isotropy_index(fast(*angle_grid(60)))
-slow = isotropy_index(solid.inertia(*angle_grid(60)))
+eased, slow = index_map(fast, n=60), index_map(solid.inertia, n=60)
 say(f"at {FAST:g} Hz the couplers change the index by {np.abs(eased - slow).max():.3f} at most")
 
 # ## Drives that slide
@@ -97,9 +96,8 @@ say(f"at {FAST:g} Hz the couplers change the index by {np.abs(eased - slow).max(
 mu, reach = 0.8, 0.6
 glide = SlideFiveBar(((0, 0, 0), (0, 0, 0)), (1.3, 1.3), (rod(mu, reach), rod(mu, reach)), tool)
 stroke = ((0.0, 0.3), (0.85, 1.15))
-at = [low + (high - low) * np.arange(200) / 199 for low, high in stroke]
-slides = np.meshgrid(*at, indexing="ij")
-glide_map = isotropy_index(glide.inertia(*slides))
+glide_map = index_map(glide.inertia, stroke, n=200)
+glide_loci = {level: closed_loci(glide_map, level, stroke) for level in (0.98, 0.995)}
 on_line = isotropic_set(glide.inertia, stroke, n=60)
 cot = np.sqrt((4 / 3 * mu + tool) / (2 / 3 * mu + tool))
 apart = 2 * reach * cot / np.hypot(1, cot)
@@ -191,7 +189,7 @@ view.plane(
         torus("gmsh", "Couplers from gmsh, reduced"),
         view.Drawing("Two slides on one rail", "left slide [m]", "right slide [m]",
                      (*stroke[0], *stroke[1]), glide_map, "isotropy index",
-                     levels={1.0: [on_line.q[np.argsort(on_line.q[:, 0])]]}),
+                     levels=glide_loci | {1.0: [on_line.q[np.argsort(on_line.q[:, 0])]]}),
         view.Drawing(f"Couplers from gmsh at {FAST:g} Hz", "left crank [deg]",
                      "right crank [deg]", (0.0, 360.0, 0.0, 360.0), eased, "isotropy index"),
         view.Scene("The linkage in two postures", things, view=(0.35, 0.3, 1.0), up=(0, 1, 0)),
@@ -203,7 +201,7 @@ view.plane(
     title="Where two motors of a linkage feel the same inertia",
     caption="Top: isotropy index 2 sqrt(det A) / tr A of the generalised inertia A over the angles "
     "of both cranks of a five-bar; left and right edges belong together, as do top and bottom. "
-    "Level curves are all closed. Marks: the isotropic postures, where the vector "
+    "Level curves of cranks are all closed. Marks: the isotropic postures, where the vector "
     "(a11 - a22, 2 a12) turns once to the left or to the right, as often one as the other. With "
     "two slides on a rail these postures fill a line. In the linkage motors are grey, the tool is "
     "at the top. Torques of the same size in all directions accelerate an isotropic posture "
@@ -235,6 +233,9 @@ results = {
     "1 + sum of windings, couplers from gmsh": (1 + found["gmsh"].winding.sum(), 1, 0.0),
     "mass of a coupler [kg]": (eyes.M[0, 0], model.mass(), 1e-9),
     "distance of the slides on the line [m]": (np.ptp(on_line.q, axis=1).mean(), apart, 1e-8),
+    "loci of two slides that run from limit to limit": (
+        np.mean([np.isclose(c[[0, -1], :, None], np.array(stroke)).any(axis=2).any(axis=1).all()
+                 for c in [c for curves in glide_loci.values() for c in curves]]), 1.0, 1e-12),
     "figure of cross slides, tool 2 kg": (
         figures["PP, cross slides"][4], 2 * np.sqrt(4 * 8) / 12, 1e-9),
     "inertia with the tool at rest [kg m^2]": (values[:4].max(), still, 1e-9),

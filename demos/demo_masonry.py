@@ -62,7 +62,25 @@ for ratio in (0.1075, 0.10725):
         *(f"{v:.1e}" for v in speed[ratio]), "m/s")  # fmt: skip
 
 resting = after_two_seconds(20, 0.115)
-falling = simulate(arch(20, R, 0.1 * R), t_end=1.05, dt=1e-3, save_every=30)
+thin = arch(20, R, 0.1 * R)
+falling = simulate(thin, t_end=0.96, dt=1e-3, save_every=30)
+
+
+def thrust_of(k):
+    """(21, 2) centres of pressure along the thin arch at a saved time, by one step from there."""
+    one = simulate(thin, t_end=1e-3, dt=1e-3, q=falling.q[k], v=falling.v[k])
+    joints = one.joints()
+    return np.array([joints[k, k + 1][0] for k in range(21)])
+
+
+# Where stones turn against each other a joint is a hinge: it opens on one side, and the line of
+# thrust leaves the arch no more than to the corner that still touches.
+
+lines = np.array([thrust_of(k) for k in range(1, falling.t.size)])
+lines = np.concatenate([lines[:1], lines])
+turns = np.degrees(np.diff(falling.q[..., 2], axis=1))
+hinges = np.flatnonzero(np.abs(turns[-1]) > 5.0)
+say("hinges at", *(f"{180 - 9 * k} degrees," for k in hinges), "from the right springing")
 
 # ## The thinnest arch that friction allows
 #
@@ -192,18 +210,26 @@ heavy = [m.joints()[CROWN - 1, CROWN][1][1] for m in loaded]
 # ## The picture
 
 DEPTH = {"arch": 1.5, "wall": 0.5}  # of the stones, for the picture
-angle = np.linspace(-np.pi / 2, np.pi / 2, 200)
-arc = np.column_stack([np.sin(angle), np.cos(angle)]) * R
 level = frictions[[0, -1]], [limit.ratio] * 2
 thrust = np.array([x for x, _ in resting.joints().values()])
 seen = {"view": (0.45, 0.3, 1.0), "up": (0, 1, 0)}
 
 
 def in_front(points, depth):
-    """A line on the face of the stones that is turned to the reader."""
-    line = np.column_stack([points, np.full(len(points), 0.505 * depth)])
-    k = np.arange(len(line) - 1)
+    """A line, or lines that move, on the face of the stones that is turned to the reader."""
+    line = np.concatenate([points, np.full((*points.shape[:-1], 1), 0.505 * depth)], axis=-1)
+    k = np.arange(line.shape[-2] - 1)
     return view.Thing(line, np.column_stack([k, k + 1]), "#d1495b", width=4.0)
+
+
+def opened(frames, depth, radius=0.16):
+    """A ball for each joint of the thin arch, as large as it has turned, up to 5 degrees."""
+    ball, cells = view.ellipsoid((1.0,) * 3, (0.0, 0.0, 0.0))
+    size = radius * np.clip(np.abs(turns[frames]) / 5.0, 1e-3, 1.0)
+    middle = np.concatenate([lines[frames], np.full((*size.shape, 1), 0.505 * depth)], axis=-1)
+    points = middle[:, :, None] + size[:, :, None, None] * ball
+    cells = np.concatenate([cells + k * len(ball) for k in range(size.shape[1])])
+    return view.Thing(points.reshape(len(points), -1, 3), cells, "#2f7f9f")
 
 
 def stones(motion, frames, depth, **look):
@@ -219,7 +245,8 @@ if first:
     at_rest = {"stones": stones(resting, [-1], DEPTH["arch"]),
                "line of thrust": in_front(thrust, DEPTH["arch"])}  # fmt: skip
     folded = {"stones": stones(falling, [-1], DEPTH["arch"]),
-              "centre line at the start": in_front(arc, DEPTH["arch"])}  # fmt: skip
+              "line of thrust": in_front(lines[-1], DEPTH["arch"]),
+              "hinges": opened([-1], DEPTH["arch"])}  # fmt: skip
     view.panels(
         [
             [view.Scene("Thickness 11.5 % of the radius: at rest", at_rest, **seen),
@@ -236,24 +263,29 @@ if first:
         title="Arches and walls of stones that nothing glues",
         caption="Top left: a semicircular arch carries its weight if a line of thrust, through the "
         "centres of pressure of all joints, fits between its faces. Top right: in a thinner one "
-        "no line fits, and it folds into a mechanism of hinges at crown, haunches and springings. "
-        "Bottom left: weight finds its way around an opening; colours are the uniform vertical "
-        "strain of each stone as a pressure. Bottom right: forty stones; enough friction leaves "
-        "only hinges to fear, and their limit; below 0.395 stones slip and the arch must be "
-        "thicker. Statics and motion are those of a section; its depth is chosen for the picture.",
+        "no line fits, and it folds into a mechanism: the line, with inertia, runs through the "
+        "corners that still touch, hinges at crown, haunches and springings. Bottom left: weight "
+        "finds its way around an opening; colours are the uniform vertical strain of each stone "
+        "as a pressure. Bottom right: forty stones; enough friction leaves only hinges to fear, "
+        "and their limit; below 0.395 stones slip and the arch must be thicker. Statics and motion "
+        "are those of a section; its depth is chosen for the picture.",
     )  # fmt: skip
     around = np.array([x for x, _ in loaded[1].joints().values()])
     around = around[np.argsort(around[:, 0])]
     plain = [o for k, o in enumerate(loaded[1].outlines()) if k not in (0, CROWN)]
     base = view.box((18.0, 0.4, 1.4), (0.0, -0.2, 0.0))
     stone_in_space = (body.surface.points, body.surface.triangles)
+    arrow = np.array([(0, 0.1, 0), (0, 2, 0), (-0.3, 0.6, 0), (0.3, 0.6, 0)], dtype=float)
+    arrow[:, 1] += HIGH + R + THICK / 2
     view.panels(
         [
             [view.Scene(f"A vault on buttresses, with {half:.1f} kN on its crown",
                         {"stones": view.plates([plain], DEEP),
                          "stone of finite elements": view.Thing(*stone_in_space, "#2f7f9f"),
                          "ground": view.Thing(*base, "#9aa5b1"),
-                         "centres of pressure": in_front(around, DEEP)}, **seen)],
+                         "line of thrust": in_front(around, DEEP),
+                         "load": view.Thing(arrow, [(0, 1), (0, 2), (0, 3)], "#edae49", width=5.0)},
+                        **seen)],
             [view.Scene("The stone left of the crown, reduced",
                         {"stone": view.Thing(*stone_in_space, values=felt)},
                         "horizontal pressure [MPa]",
@@ -265,20 +297,23 @@ if first:
         options.out / "masonry_vault.png",
         title="A vault drawn in gmsh, one stone of it with its stress",
         caption="Above: section of a half circle of sixteen voussoirs on two buttresses of "
-        "courses, one metre deep, with half the load that it bears; the line joins the centres of "
-        "pressure of the joints. Below left: the stone left of the crown is a solid of finite "
-        "elements, reduced to 20 coordinates. Its neighbours touch it along its edges, where the "
-        "thrust enters; one node in twenty presses more than the colours show. "
+        "courses, one metre deep, with half the load that it bears (arrow); the line joins the "
+        "centres of pressure of the joints. Below left: the stone left of the crown is a solid of "
+        "finite elements, reduced to 20 coordinates. Its neighbours touch it along its edges, "
+        "where the thrust enters; one node in twenty presses more than the colours show. "
         "Below right: the wider the buttresses, the more the vault bears, until hinges in the "
         "vault alone decide.",
     )  # fmt: skip
     view.film(
         falling.t,
         view.Scene("An arch too thin to stand",
-                   {"stones": stones(falling, range(falling.t.size), DEPTH["arch"])}, **seen),
+                   {"stones": stones(falling, range(falling.t.size), DEPTH["arch"]),
+                    "line of thrust": in_front(lines, DEPTH["arch"]),
+                    "hinges": opened(range(falling.t.size), DEPTH["arch"])}, **seen),
         options.out / "masonry.gif",
         caption="A semicircular arch of twenty stones, its thickness 10 % of its radius of 5 m, "
-        "under its own weight. Hinges open at the crown, the haunches and the springings.",
+        "under its own weight. Hinges open at the crown, the haunches and the springings; the line "
+        "of thrust runs through them.",
     )  # fmt: skip
 
 # ## What to remember
@@ -295,6 +330,7 @@ results = {
     "weight that reaches the ground [N]": (carried, weight, 1e-4),
     "line of thrust inside the arch": (
         float((np.abs(np.linalg.norm(thrust, axis=1) - R) < 0.0575 * R + 1e-6).all()), 1.0, 0.0),
+    "hinges of the falling arch: springings, haunches, crown": (float(len(hinges)), 5.0, 0.0),
     "width of buttresses that bear the vault [m]": (high, narrowest(), 1e-3),
     "mass of the stone in space [kg]": (solid.mass(), DRAWN.stones[CROWN].M[0, 0], 1e-9),
     "weight and load between two stones [N]": (heavy[1], heavy[0], 1e-3),

@@ -10,6 +10,7 @@
 # Writes: `wind_turbine_hub.png` and `wind_power.png` into `out/`; another folder with `--out`
 
 import argparse
+import dataclasses
 from pathlib import Path
 
 from mpi4py import MPI
@@ -96,9 +97,12 @@ step = {name: operate(lambda t: 8.7, 90.0, dynamic=x, held=held) for name, x in 
 gusty = operate(lambda t: 10.0 + 8.0 * min(max(t - 20.0, 0.0) / 20.0, 1.0), 120.0)
 
 # ## The turbine with its solid hub in the wind
+#
+# Each strip has a wake with a memory and is a law of the mechanism, which says its force.
 
 point = steady(8.0, tower=True)
-plant = turbine(16, tower_segments=12, wind=8.0, speed=point.speed, pitch=point.pitch, hub_body=hub)
+plant = turbine(16, tower_segments=12, wind=8.0, late_wake=True, speed=point.speed,
+                pitch=point.pitch, hub_body=hub)  # fmt: skip
 plant.turn_by(lambda t: point.speed * t, lambda t: point.speed)
 motion = rom.simulate(plant.mechanism, t_end=20.0, dt=0.02, rho_inf=0.6, save_every=5)
 say(rom.audit(motion))
@@ -159,8 +163,24 @@ bodies |= view.sleeves(plant.tower, wall)
 bodies |= {"nacelle": view.box((12, 4, 4)), "wheel": view.box((0.5, 3, 3)),
            "generator": view.box((1.5, 1.5, 1.5)),
            "in the hub": view.box((0.5, 0.5, 0.5))}  # fmt: skip
-seen = view.posed(plant.mechanism, motion, 20.0, title="After 20 s in 8 m/s of wind", shapes=bodies,
-                  symbols=False, view=(-0.8, -1.0, 0.1), up=(0, 0, 1))  # fmt: skip
+seen = view.posed(plant.mechanism, motion, 20.0, title="After 20 s in 8 m/s of wind, and its loads",
+                  shapes=bodies, symbols=False, view=(-0.8, -1.0, 0.5), up=(0, 0, 1))  # fmt: skip
+
+
+def arrow(blade, k):
+    """The force of the wind on a strip at the end, per length of blade, 1 kN/m as 8 m."""
+    force, start = (motion.law(f"{blade.name} strip {k}").force[-1, 0],
+                    motion.position(blade.marker(k).body)[-1])  # fmt: skip
+    end = start + 8e-3 * force / (61.5 / 16 * (0.5 if k in (0, 16) else 1.0))
+    neck = start + 0.7 * (end - start)
+    points, triangles = view.cylinder(neck, end, 1.2, sides=8)
+    points[(points - neck) @ (end - neck) > 0.5 * (end - neck) @ (end - neck)] = end
+    return view.joined([view.cylinder(start, neck, 0.4, sides=8), (points, triangles)])
+
+
+arrows = [arrow(blade, k) for blade in plant.blades for k in range(3, 17)]
+loads = view.Thing(*view.joined(arrows), "#d1495b", edges=np.zeros((0, 2), dtype=int))
+seen = dataclasses.replace(seen, things=seen.things | {"force of the wind": loads})
 tips = {f"blade {k + 1}": (motion.t, plant.tip(motion, k)[:, 0]) for k in range(3)}
 view.panels(
     [[hub_scene, seen],
@@ -172,8 +192,8 @@ view.panels(
     caption=f"The hub of {hub_mass / 1e3:.1f} t is meshed with gmsh and reduced to its four rings "
     "and twenty shapes; three rods stand on it. The rotor is held at the speed that the control "
     "gives at 8 m/s; the wind comes from the left at once, so that blades, shaft and tower swing "
-    "for a while, mostly the rotor on its twisting shaft at 0.6 Hz. Colours: how far the hub gives "
-    "way.",
+    "for a while, mostly the rotor on its twisting shaft at 0.6 Hz. Arrows: what the wind does to "
+    "each strip, 8 m for 1 kN/m. Colours: how far the hub gives way.",
 )  # fmt: skip
 
 # ## What to remember

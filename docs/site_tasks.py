@@ -24,7 +24,8 @@ TASKS: dict[str, tuple[str, str]] = {
         """update updating.Updated updating.Responses updating.Channels updating.GroundSpring
         updating.AddedMass updating.MeasuredModes updating.Plan updating.place
         updating.candidates updating.independent updating.tracker updating.Tracker
-        updating.Sensors updating.Track updating.Observer io.write_observer_fmu""",
+        updating.Sensors updating.Track updating.Observer io.write_observer_fmu
+        updating.parameter_tracker updating.ParameterTracker updating.Drift""",
     ),
     "Check": (
         "What tells how far to trust a model, a body, a motion or a law.",
@@ -71,8 +72,8 @@ TASKS: dict[str, tuple[str, str]] = {
         "Drawings, films and pages.",
         """view.mesh view.mode_shapes view.start view.animate view.instants view.wheel_modes
         view.frequencies view.convergence view.campbell view.history view.Panel view.panels
-        view.Drawing view.plane view.Shape view.deformed view.flow view.updating view.faces
-        view.Thing view.Scene view.meshed view.wheel view.plates view.film view.posed
+        view.Drawing view.plane view.Shape view.deformed view.flow view.updating view.channels
+        view.faces view.Thing view.Scene view.meshed view.wheel view.plates view.film view.posed
         view.Film view.plotter view.bar view.box view.cylinder view.ring view.tube view.coil
         view.wound view.ellipsoid view.extruded view.gear view.joined view.sleeves
         view.toothed_shaft view.tooth_walls view.film_wall

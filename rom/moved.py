@@ -59,6 +59,7 @@ ROWS = (  # old package, new package, modules; old=new where the name differs
      "sensitivity steady=steady_motion tangent variation=local_equations"),
     ("rom.mbs", "rom.mbs.analysis.rotors", "frames=moving_axes"),
     ("rom.mbs.analysis", "rom.mbs.analysis.rotors", "moving_axes"),
+    ("rom.mbs.analysis.continuation", "rom.paths", "arc_length"),
     ("rom.mbs", "rom.mbs.elements",
      "nonlinear spread=spread_loads"),
     ("rom.mbs", "rom.mbs.elements.contact", "contact=points impact surface_contact=surfaces"),

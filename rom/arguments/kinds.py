@@ -242,7 +242,8 @@ def _mapping(key: Taken | None, one: Taken | None) -> Taken:
             raise TypeError(value)
         for name in value:
             (key or ANY_VALUE)(name)
-        if one is None:
+        # one that makes its values when they are asked for may take long: they are not asked for
+        if one is None or not isinstance(value, dict | types.MappingProxyType):
             return value
         return dict(zip(value, _each(one, value.items()), strict=True))
 

@@ -445,6 +445,21 @@ def start(**cases: tuple[str, ...]) -> Iterator[Figure]:
         yield Figure("start", case, quantity, value, unit, aim)
 
 
+def updating(sizes: tuple[float, ...] = (2e3, 25e3)) -> Iterator[Figure]:
+    """The beam updated by 240 000 responses, with a coarse and with a fine mesh: processor time.
+
+    Args:
+        sizes: numbers of dofs aimed at.
+    """
+    from rom.bench.updating import measured
+    from rom.fe import model as read_model
+
+    for size in sizes:
+        model = read_model(geometry("beam"), material=STEEL, parameters=_beam(size))
+        for row in measured(model):
+            yield Figure("updating", *row)
+
+
 BENCHMARKS: dict[str, Callable[[], Iterator[Figure]]] = {
     "blade": blade,
     "film": film,
@@ -462,6 +477,7 @@ BENCHMARKS: dict[str, Callable[[], Iterator[Figure]]] = {
     "motion": motion,
     "rods": rods,
     "start": start,
+    "updating": updating,
 }
 
 

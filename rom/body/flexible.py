@@ -1,5 +1,6 @@
 """The flexible body: everything a floating-frame integrator needs, independent of the mesh."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -7,15 +8,18 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import eigh, null_space
 
-from rom.arguments import typed, whole
+from rom.arguments import finite, typed, whole
 from rom.body.conversion import converted
 from rom.body.frame import on_mean_axes, seen_from
+from rom.body.nonlinear.quartic import Quartic
+from rom.body.nonlinear.statics import critical_shares, follow
 from rom.body.records import BodyData, Marker, Patch, Surface
 from rom.body.reference import marker_motion, rigid_elastic, rigid_mass
 from rom.body.rotating import rotating_frequencies
 from rom.body.stiffening import SecondOrder
 from rom.body.surface import Where, point_areas
 from rom.eigen.supports import Fixed, Springs, spring_matrices
+from rom.errors import ModelError
 from rom.model import Array, Modes
 from rom.notebook import html_table, listed
 from rom.units import unit_system
@@ -255,6 +259,55 @@ class FlexibleBody(BodyData):
             ConfigError: if a load is unknown, or a matrix is no symmetric (r, r) matrix.
         """
         return SecondOrder.of(self)
+
+    def equilibria(
+        self, loads: Mapping[str, Any], *, shares: npt.ArrayLike = (1.0,), fixed: Fixed = ()
+    ) -> Array:
+        """(s, r) elastic coordinates at rest under shares of dead loads, one after the other.
+
+        Of a body of large deflection, whose reference interface is held. Where it snaps on the way
+        the state beyond is found by arc length.
+
+        Args:
+            loads: {interface: (6,) force [N] and moment [N m]}, axes of the geometry.
+            shares: (s,) of the loads, in the order in which they are reached.
+            fixed: interfaces held in the mean beside the reference, or {name: directions}.
+
+        Raises:
+            ConfigError, InterfaceError: for loads that are none, or interfaces unknown.
+            ModelError: if there is no stable equilibrium, or for a body of small deflection.
+        """
+        rising = finite("shares", shares, None).reshape(-1)
+        return follow(self.energy(), np.outer(rising, self.forces_on(loads)), self.mean_rows(fixed))
+
+    def critical_loads(self, loads: Mapping[str, Any], *, fixed: Fixed = ()) -> Array:
+        """(k,) shares of dead loads at which a stiffness vanishes: the body buckles or snaps [1].
+
+        Of a body of large deflection, whose reference interface is held; on its path from rest by
+        arc length, in the order in which they are passed, none beyond the loads themselves.
+
+        Args:
+            loads: {interface: (6,) force [N] and moment [N m]}, axes of the geometry.
+            fixed: interfaces held in the mean beside the reference, or {name: directions}.
+
+        Raises:
+            ConfigError, InterfaceError: for loads that are none, or interfaces unknown.
+            ModelError: if the path does not lead to the loads, or for a body of small deflection.
+        """
+        return critical_shares(self.energy(), self.forces_on(loads), self.mean_rows(fixed))
+
+    def energy(self) -> Quartic:
+        """Strain energy at large deflection.
+
+        Raises:
+            ModelError: for a body of small deflection.
+        """
+        if self.quartic is None:
+            raise ModelError(
+                f"body {self.name!r} is one of small deflection.",
+                hint="Reduce it with nonlinear=rom.Geometric(...).",
+            )
+        return self.quartic
 
     def full_matrices(self) -> tuple[Array, Array]:
         """Mass and stiffness of small motions.

@@ -1,14 +1,15 @@
 """What a flexible body consists of; the functions that make and move one take this."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
 import numpy as np
 
-from rom.arguments import typed
+from rom.arguments import finite, typed
 from rom.body.nonlinear.quartic import Quartic
 from rom.body.recovery import StressRecovery
-from rom.eigen.supports import Fixed, held_coordinates, supports
+from rom.eigen.supports import DIRECTIONS, Fixed, held_coordinates, supports
 from rom.errors import InterfaceError, ModelError
 from rom.model import Array, Index, Report
 from rom.names import check_text, named, offered
@@ -148,6 +149,33 @@ class BodyData:
             kind = self.markers[name].kind
             rows.append(hold[held_coordinates(name, kind, len(hold), directions)])
         return np.vstack(rows)
+
+    def mean_rows(self, fixed: Fixed) -> Array:
+        """(h, r) elastic part of the mean motion of interfaces in the directions that are held.
+
+        Raises:
+            ConfigError, InterfaceError: see `rom.eigen.supports`.
+        """
+        rows = [np.zeros((0, self.n_modes))]
+        for name, directions in supports(fixed, self.markers, f"body {self.name!r}").items():
+            motion = np.vstack([self.markers[name].translation, self.markers[name].rotation])
+            rows.append(motion[[DIRECTIONS.index(d) for d in directions or DIRECTIONS]])
+        return np.vstack(rows)
+
+    def forces_on(self, loads: Mapping[str, Any]) -> Array:
+        """(r,) forces on the elastic coordinates, SI or units of the body.
+
+        Args:
+            loads: {interface: (6,) force [N] and moment [N m]}, axes of the body frame.
+
+        Raises:
+            ConfigError, InterfaceError: for loads that are none, or on interfaces unknown.
+        """
+        force = np.zeros(self.n_modes)
+        for name, load in loads.items():
+            six, marker = finite(f"loads[{name!r}]", load, (6,)), self.marker(name)
+            force += six @ np.vstack([marker.translation, marker.rotation])
+        return force
 
     @property
     def size(self) -> float:

@@ -1,4 +1,4 @@
-"""The outer surface of a body: places on it and their areas."""
+"""The outer surface of a body: places on it, their areas and strains."""
 
 from collections.abc import Callable
 from typing import Any
@@ -11,6 +11,8 @@ from rom.model import Array, Index
 
 Where = Callable[[Array], Any] | str | None
 COINCIDENT_RTOL = 1e-9  # of the body's size
+GAUGE_RTOL = 0.02  # distance of a strain gauge from the surface, of the body's size
+MAX_TILT = 0.2  # sine of the angle between a strain gauge and the surface; facets of a round one
 
 
 def surface_of(body: BodyData) -> Surface:
@@ -41,6 +43,69 @@ def chosen_triangles(body: BodyData, where: Where) -> tuple[Index, Array]:
     chosen = surface.triangles[_chosen(body, where)]
     a, b, c = np.moveaxis(surface.points[chosen], 1, 0)
     return chosen, 0.5 * np.cross(b - a, c - a)
+
+
+def strain_rows(body: BodyData, points: Any, directions: Any, what: str) -> Array:
+    """(k, r) normal strain along directions in the surface per elastic coordinate [1/m].
+
+    It is constant in the triangle in which the point lies, as under a gauge of its size.
+
+    Args:
+        body: with its surface.
+        points: (k, 3) places of gauges [m].
+        directions: (k, 3) their axes, of any length [1].
+        what: they are, for messages.
+
+    Raises:
+        ConfigError: if a gauge is off the surface, or stands up from it.
+        ModelError: if the body carries no surface.
+    """
+    surface = surface_of(body)
+    corners = surface.points[surface.triangles]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+    reach = GAUGE_RTOL * float(np.ptp(surface.points, axis=0).max())
+    found = []
+    for k, (x, d) in enumerate(zip(np.asarray(points), np.asarray(directions), strict=True)):
+        d = d / np.linalg.norm(d)
+        lies = np.flatnonzero(np.abs(normals @ d) <= MAX_TILT)
+        far = _distances(x, corners[lies])
+        if not lies.size or far.min() > reach:
+            raise ConfigError(
+                f"{what} {k} at {x.tolist()} along {d.round(4).tolist()} lies on no face of body "
+                f"{body.name!r} within {reach:.3g} m.",
+                hint="Strain is measured along the surface; compare axes and units with the mesh.",
+            )
+        t = int(lies[far.argmin()])
+        d = d - normals[t] * (normals[t] @ d)
+        d = d / np.linalg.norm(d)
+        shape = surface.shape.reshape(len(surface.points), 3, -1)[surface.triangles[t]]
+        # weights of the corners that give the derivative along d of any linear function
+        weights = np.linalg.pinv(np.vstack([np.ones(3), corners[t].T - x[:, None]])) @ np.r_[0.0, d]
+        found.append(np.einsum("c,i,cir->r", weights, d, shape))
+    return np.array(found).reshape(-1, surface.shape.shape[1])
+
+
+def _distances(x: Array, corners: Array) -> Array:
+    """(t,) distance of a point from triangles (t, 3, 3)."""
+    a, b, c = np.moveaxis(corners - x, 1, 0)
+    u, v = b - a, c - a
+    n = np.cross(u, v)
+    size = np.maximum(np.einsum("ti,ti->t", n, n), 1e-300)
+    s = np.einsum("ti,ti->t", np.cross(-a, v), n) / size
+    r = np.einsum("ti,ti->t", np.cross(u, -a), n) / size
+    inside = (s >= 0) & (r >= 0) & (s + r <= 1)
+    height = np.abs(np.einsum("ti,ti->t", a, n)) / np.sqrt(size)
+    edges = np.min([_to_line(p, q) for p, q in ((a, b), (b, c), (c, a))], axis=0)
+    return np.where(inside, height, edges)
+
+
+def _to_line(p: Array, q: Array) -> Array:
+    """(t,) distance of the origin from lines between points p and q (t, 3)."""
+    along = q - p
+    size = np.maximum(np.einsum("ti,ti->t", along, along), 1e-300)
+    at = np.clip(-np.einsum("ti,ti->t", p, along) / size, 0.0, 1.0)
+    return np.linalg.norm(p + at[:, None] * along, axis=1)
 
 
 def _chosen(body: BodyData, where: Where) -> Any:

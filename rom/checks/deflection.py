@@ -16,10 +16,8 @@ from scipy.sparse.linalg import LinearOperator, eigsh, splu
 
 from rom.body.flexible import FlexibleBody
 from rom.body.nonlinear.geometric import FORCES, Geometric
-from rom.body.nonlinear.quartic import Quartic
-from rom.body.nonlinear.statics import follow
+from rom.body.nonlinear.statics import follow, free_motions
 from rom.eigen.verbs import mean_motion
-from rom.errors import ModelError
 from rom.model import Array, FEModel, Row
 from rom.rows import row
 
@@ -49,16 +47,18 @@ def deflection_rows(
         body: the reduced body, seen from its reference interface.
         E: (n_local, r) its nodal shapes.
     """
-    full, quartic = HeldSolid(model, connection, body.reference), energy_of(body)
+    full = HeldSolid(model, connection, body.reference, geometric.held(model.interfaces))
+    quartic, still = body.energy(), body.mean_rows(geometric.fixed)
+    tangent = Tangent(body, still)
     E = full.whole(E)
     units = [nodal_load(model, *component) for component in geometric.components()]
     rows, table = list[Row](), dict[str, Any]()
     for name, case in load_cases(geometric).items():
         W = case @ np.array(units)
-        path = follow(quartic, np.outer(STEP_SHARES, W @ E))
+        path = follow(quartic, np.outer(STEP_SHARES, W @ E), still)
         steps = []
         for share, q in zip(STEP_SHARES, path, strict=True):
-            step = _compared(full, body, E @ q, q, share * W)
+            step = _compared(full, tangent, E @ q, q, share * W)
             if step is None:
                 break
             steps.append(step)
@@ -90,12 +90,12 @@ class Step:
     frequencies: float
 
 
-def _compared(full: "HeldSolid", body: FlexibleBody, u: Array, q: Array, W: Array) -> Step | None:
+def _compared(full: "HeldSolid", body: "Tangent", u: Array, q: Array, W: Array) -> Step | None:
     """A step of load; None if the full model has no equilibrium there that is found."""
     a = full.state(u, W)
     if a is None:
         return None
-    gaps = np.abs(tangent_frequencies(body, q) / full.frequencies(a) - 1)
+    gaps = np.abs(body.frequencies(q) / full.frequencies(a) - 1)
     return Step(full.distance(u, a), full.reached(u, a), float(gaps.max()))
 
 
@@ -148,28 +148,47 @@ def nodal_load(model: FEModel, name: str, component: int, largest: float) -> Arr
     return W
 
 
-def tangent_frequencies(body: FlexibleBody, q: Array) -> Array:
-    """(k,) lowest frequencies about the state q (r,), on the reference interface [rad/s]."""
-    lam = eigh(energy_of(body).tangent(q), body.M, eigvals_only=True)[:N_TANGENT]
-    return np.sqrt(np.maximum(lam, 0.0))
+class Tangent:
+    """Small vibrations of a body about states on its supports.
+
+    Args:
+        body: of large deflection.
+        held: (h, r) motions that vanish.
+    """
+
+    def __init__(self, body: FlexibleBody, held: Array):
+        self.energy = body.energy()
+        self.N = free_motions(held)
+        self.M = self.N.T @ body.M @ self.N
+
+    def frequencies(self, q: Array) -> Array:
+        """(k,) lowest frequencies about the state q (r,) [rad/s]."""
+        K = self.N.T @ self.energy.tangent(q) @ self.N
+        lam = eigh(K, self.M, eigvals_only=True)[:N_TANGENT]
+        return np.sqrt(np.maximum(lam, 0.0))
 
 
 class HeldSolid:
-    """The full model at finite strain, one of its interfaces held in the mean.
+    """The full model at finite strain, interfaces held in the mean.
 
     Args:
         model: with finite elements; every process has all of it.
         connection: the same in interface coordinates a, u = T a.
         reference: the interface that is held.
+        held: interface and component, 0 to 5, of the motions held beside.
     """
 
-    def __init__(self, model: FEModel, connection: Any, reference: str):
-        ops, interface = connection.ops, model.interfaces[reference]
+    def __init__(
+        self, model: FEModel, connection: Any, reference: str, held: list[tuple[str, int]]
+    ):
+        ops, root = connection.ops, [(reference, k) for k in range(6)]
         self.solid = model.stresses.finite_strain()
         self.comm = ops.comm
         self.T = csr_matrix(identity(model.n_dofs) if ops.T is None else rows_of(ops.T))
         self.M = self.T.T @ ops.gathered(model.operators.M) @ self.T
-        self.C = csr_matrix(mean_motion(interface)) @ self.T[interface.dofs]
+        rows = [csr_matrix(mean_motion(model.interfaces[name])[k]) @ self.T[
+            model.interfaces[name].dofs] for name, k in (*root, *held)]  # fmt: skip
+        self.C = vstack(rows)
         self.inside = splu(csc_matrix(self.T.T @ self.T))
 
     def whole(self, E: Array) -> Array:
@@ -212,7 +231,7 @@ class HeldSolid:
     def _bordered(self, a: Array) -> Any:
         """Factor of the stiffness at a (m,) with the interface held by multipliers."""
         K = self.T.T @ self.solid.tangent(self.T @ a) @ self.T
-        scale = np.abs(K.diagonal()).mean() / np.abs(self.C).max()
+        scale = np.abs(K.diagonal()).mean() / abs(self.C).max()
         return splu(csc_matrix(bmat([[K, scale * self.C.T], [scale * self.C, None]])))
 
     def reached(self, u: Array, a: Array) -> float:
@@ -240,14 +259,3 @@ def rows_of(A: Any) -> csr_matrix:
     starts, columns, values = A.getValuesCSR()
     mine = csr_matrix((values, columns, starts), shape=(len(starts) - 1, A.getSize()[1]))
     return csr_matrix(vstack(A.comm.tompi4py().allgather(mine)))
-
-
-def energy_of(body: FlexibleBody) -> Quartic:
-    """The energy of a body of large deflection.
-
-    Raises:
-        ModelError: for a body of small deflection.
-    """
-    if body.quartic is None:
-        raise ModelError(f"body {body.name!r} is one of small deflection.")
-    return body.quartic

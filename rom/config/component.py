@@ -160,6 +160,7 @@ class Component:
             return Geometric(
                 loads=loads, n_modes=values["modes"], tol=values["tol"],
                 n_shapes=values.get("shapes"), n_steps=values["steps"],
+                fixed=tuple(values["fixed"]),
             )  # fmt: skip
 
     def at(self, *path: str) -> "Located":

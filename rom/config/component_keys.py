@@ -151,6 +151,7 @@ TABLE = Table("A component.", (
             Key("tol", Quantity("1", positive=True), "Share of the states left out.", 1e-4),
             Key("shapes", Whole(1), "So many shapes are added; as tol asks if missing."),
             Key("steps", Whole(1), "States on the way to the largest load.", 4),
+            Key("fixed", Words(), "Held beside the reference, wholly or as `name:yz`.", ()),
         )), "Reach large deflection."),
         Key("stress", Flag(), "Make stress on the surface recoverable.", False),
         Key("certificate", Flag(), "Compare with the full model.", True),

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 from mpi4py import MPI
-from petsc4py import PETSc
 
 import numpy as np
 
@@ -30,7 +29,7 @@ from rom.fe.operators.memory import give_back
 from rom.fe.operators.petsc import PETScOperators
 from rom.fe.operators.solver import DIRECT_SOLVER, parsed
 from rom.fe.parallel import collective, install_abort_hook, on_root
-from rom.model import Array, Attachment, FEModel, Index, Interface, Material, Orthotropic
+from rom.model import Attachment, FEModel, Index, Interface, Material, Orthotropic
 
 log = logging.getLogger("rom")
 WHOLE_REGION = "solid"  # name of the only region of a mesh without named regions
@@ -176,6 +175,7 @@ def assemble(
         ConfigError, MeshError, TagError, MaterialError, InterfaceError: see `model`.
     """
     regions, facet_tags = dict(regions or {WHOLE_REGION: 0}), dict(facet_tags or {})
+    shared = mesh.comm.size > 1
     name = _check_mesh(mesh, degree)
     solids = by_region(material, regions)
     _check_attachments(attachments, facet_tags)
@@ -185,19 +185,29 @@ def assemble(
         V = lagrange(mesh, degree)
         points = all_points(V)
         numbers = coefficients(mesh, tags, solids)
-        K, M = (assemble_matrix(f) for f in forms(V, numbers, degree))
+        stiffness, mass = forms(V, numbers, degree)
+        # the mass first: a third of it is kept, and less stands beside the stiffness
+        M = without_zeros(assemble_matrix(mass)) if shared else symmetric(assemble_matrix(mass))
+        K = assemble_matrix(stiffness) if shared else symmetric(assemble_matrix(stiffness))
         interfaces = {key: interface(key, value, V, points) for key, value in facet_tags.items()}
     named = {region: solids[tag] for region, tag in regions.items()}
     remarks = list(doubts(named, float(np.ptp(points, axis=0).max()), name, degree))
     _warn(mesh.comm, remarks)
     doubts_found = list(dict.fromkeys(solid.doubt for solid in named.values() if solid.doubt))
-    fields = {
-        "interfaces": interfaces,
-        "attachments": tuple(attachments),
-        "surface": outer_surface(V, points, degree),
-        "stresses": Stresses(V, numbers, degree, (tags, regions)),
-        "regions": Regions(V, tags, solids, regions, degree),
-        "provenance": {
+    give_back()
+    A, B = (K, M) if shared else (wrapped(K), wrapped(M))
+    first, end = A.getOwnershipRange()
+    return FEModel(
+        K,
+        M,
+        points,
+        interfaces,
+        attachments=tuple(attachments),
+        surface=outer_surface(V, points, degree),
+        operators=PETScOperators(A, B, rigid_motions(points[first // 3 : end // 3])),
+        stresses=Stresses(V, numbers, degree, (tags, regions)),
+        regions=Regions(V, tags, solids, regions, degree),
+        provenance={
             "material": described(named),
             "degree": degree,
             "degree of the geometry": geometry_degree(mesh),
@@ -206,22 +216,7 @@ def assemble(
             "versions": versions(),
             "warnings": [*doubts_found, *remarks],  # the first where the materials were made
         },
-    }
-    return _finish(K, M, points, fields)
-
-
-def _finish(K: PETSc.Mat, M: PETSc.Mat, points: Array, fields: dict[str, Any]) -> FEModel:
-    """On one process, SciPy matrices that are symmetric to the last bit beside the operators."""
-    first, end = K.getOwnershipRange()
-    rigid = rigid_motions(points[first // 3 : end // 3])
-    if K.comm.size > 1:
-        M = without_zeros(M)
-        return FEModel(K, M, points, operators=PETScOperators(K, M, rigid), **fields)
-    A, B = symmetric(K), symmetric(M)
-    K.destroy()
-    M.destroy()
-    give_back()
-    return FEModel(A, B, points, operators=PETScOperators(wrapped(A), wrapped(B), rigid), **fields)
+    )
 
 
 def _check_mesh(mesh: Any, degree: int) -> str:

@@ -1,9 +1,10 @@
 """Updating of models by measured frequency responses.
 
-`estimate` updates a family of bodies: what was `measured` beside the `family_model`, summed line by
-line in `normal_equations`, and what the data say in `verdict`. A test is planned by `placement`; in
-operation a few sensors are enough for `tracking`. Small models with matrices of their own, after
-Berriet, Fillod and Bouhaddi: `models`, `methods`, `frf_data`.
+`estimate` updates a family of bodies: what was `measured` beside the `family_model`, summed line
+by line in `normal_equations`, and what the data say in `verdict`. A test is planned by `placement`.
+For a body in `operation` few sensors are enough: `tracking` follows motion, forces and stress,
+`parameter_tracking` also what changes, both by the `filter_steps`. Small models with matrices of
+their own, after Berriet, Fillod and Bouhaddi: `models`, `methods`, `frf_data`.
 """
 
 from rom.lazy import front

@@ -4,12 +4,15 @@ from rom.updating.family_model import GroundSpring as GroundSpring
 from rom.updating.measured import Channels as Channels
 from rom.updating.measured import MeasuredModes as MeasuredModes
 from rom.updating.measured import Responses as Responses
+from rom.updating.operation import Sensors as Sensors
+from rom.updating.parameter_tracking import Drift as Drift
+from rom.updating.parameter_tracking import ParameterTracker as ParameterTracker
+from rom.updating.parameter_tracking import parameter_tracker as parameter_tracker
 from rom.updating.placement import Plan as Plan
 from rom.updating.placement import candidates as candidates
 from rom.updating.placement import independent as independent
 from rom.updating.placement import place as place
 from rom.updating.tracking import Observer as Observer
-from rom.updating.tracking import Sensors as Sensors
 from rom.updating.tracking import Track as Track
 from rom.updating.tracking import Tracker as Tracker
 from rom.updating.tracking import tracker as tracker

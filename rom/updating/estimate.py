@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from rom.arguments import finite, typed
+from rom.arguments import finite, typed, whole
 from rom.body.flexible import FlexibleBody
 from rom.errors import ConfigError, ParameterError, SolverError
 from rom.model import Array, Mask, Report, Row
@@ -21,7 +21,7 @@ from rom.plausible import check_damping_ratio
 from rom.rows import row
 from rom.updating.family_model import AddedMass, FamilyModel, GroundSpring, family_model
 from rom.updating.frf_data import Complex
-from rom.updating.measured import Responses
+from rom.updating.measured import Channels, Responses
 from rom.updating.models import modal
 from rom.updating.normal_equations import Data, Sums, responses_at, sums
 from rom.updating.verdict import band, check_channels, likeness, scores, unseen_directions, verdict
@@ -31,6 +31,7 @@ MAX_MISFIT = 2.0  # chi-square over its expectation: what did not settle here is
 MAX_LOG_STEP = 0.5  # of a factor in one step
 DECREMENT_TOL = 1e-4  # expected gain of chi-square: a hundredth of a standard deviation
 START_STIFFNESS = 1e-3  # of a step, over the information of each unknown
+NEAR_STIFFNESS = 1e-9  # the same, close to the end
 MAX_STIFFNESS = 1e10  # beyond it no shorter step lowers the residual
 BAND_RATIO = 1.5  # modes up to here, over the highest line, have damping that lines can see
 BOUND_ATOL = 1e-9  # distance of a logarithm from the end of its range
@@ -107,6 +108,44 @@ class Updated:
         x = np.log(np.where(self.model.present, list(self.factors.values()), 1.0))
         omega = 2 * np.pi * finite("frequencies", frequencies, None)
         return responses_at(self.model, x, self.zeta, omega)
+
+    def drawn(
+        self, frequencies: Any, sensors: Channels, inputs: Channels, *, n: int, seed: int = 0
+    ) -> Complex:
+        """Responses, also where nothing was measured, at factors that the test leaves possible.
+
+        Logarithms of the unknowns are normal about what was found, with its covariance. The spread
+        of the responses is what is not known of them if the model is right.
+
+        Args:
+            frequencies: (n_f,) lines [Hz].
+            sensors: anywhere on the body.
+            inputs: likewise.
+            n: number of draws.
+            seed: of the random numbers.
+
+        Returns:
+            (n, n_f, n_s, n_e) displacement per force [m/N].
+
+        Raises:
+            ConfigError: for lines that are not finite, channels off the body, or no draw.
+        """
+        whole("n", n, 1, None)
+        seen, driven = (
+            channels.rows(self.family.body, what) @ self.model.motions
+            for channels, what in ((sensors, "sensor"), (inputs, "input"))
+        )
+        model = replace(self.model, seen=seen, driven=driven)
+        x = np.log(np.where(model.present, list(self.factors.values()), 1.0))
+        labels = (*model.names, *(f"zeta {k + 1}" for k in range(self.zeta.size)))
+        unknown = [labels.index(name) for name in self.names]
+        theta = np.tile(np.r_[x, np.log(self.zeta)], (n, 1))
+        rng = np.random.default_rng(seed)
+        theta[:, unknown] += rng.multivariate_normal(np.zeros(len(unknown)), self.covariance, n)
+        omega = 2 * np.pi * finite("frequencies", frequencies, None)
+        return np.array(
+            [responses_at(model, row[: x.size], np.exp(row[x.size :]), omega) for row in theta]
+        )
 
     def __str__(self) -> str:
         d = self.deviations
@@ -256,8 +295,21 @@ class _Search:
         return N, self.sums.gradient + self.precision * (self.theta - self.before)
 
     def run(self) -> "_Search":
-        """Levenberg-Marquardt until the expected gain vanishes."""
-        (self.sums, cost), mu = self.at(self.theta), START_STIFFNESS
+        """Descend on few lines with large errors, where a start may be far away, then on all."""
+        few = replace(self, data=self.data.roughly())
+        few._descend(START_STIFFNESS)
+        self.theta = few.theta
+        cost = self._descend(NEAR_STIFFNESS)
+        if self.settled or cost > MAX_MISFIT * self.data.n_values:
+            return self
+        raise SolverError(
+            f"updating did not settle in {MAX_STEPS} steps.",
+            hint="Start from better values, or give a prior; see which parameters are correlated.",
+        )
+
+    def _descend(self, mu: float) -> float:
+        """Levenberg-Marquardt until the expected gain vanishes; the cost there."""
+        self.sums, cost = self.at(self.theta)
         low, high = self.bounds
         for _ in range(MAX_STEPS):
             N, g = self.posterior()
@@ -267,7 +319,7 @@ class _Search:
             spread = max(1.0, cost / self.data.n_values)  # of a model that does not fit
             if g @ np.linalg.lstsq(N, g, rcond=None)[0] < DECREMENT_TOL * spread:
                 self.settled = True
-                return self
+                return cost
             scaled = np.diag(np.maximum(np.diag(N), np.finfo(float).tiny))
             while mu < MAX_STIFFNESS:
                 step = -np.linalg.lstsq(N + mu * scaled, g, rcond=None)[0]
@@ -280,17 +332,12 @@ class _Search:
                 mu *= 4.0
             else:
                 self.settled = True
-                return self
+                return cost
             moved = (trial - self.theta)[a]
             gain = (cost - new) / -(moved @ (2 * g + N @ moved))
             mu *= max(1 / 3, 1 - (2 * gain - 1) ** 3) if gain > 0 else 1.0
             self.theta, self.sums, cost = trial, found, new
-        if cost > MAX_MISFIT * self.data.n_values:
-            return self
-        raise SolverError(
-            f"updating did not settle in {MAX_STEPS} steps.",
-            hint="Start from better values, or give a prior; see which parameters are correlated.",
-        )
+        return cost
 
 
 def _found(family: BodyFamily, search: _Search) -> Updated:

@@ -130,6 +130,7 @@ class FamilyModel:
         high: (n_p,) largest factors.
         amount: (n_t,) one; zero for a candidate, which is not in the model but has derivatives.
         n_rigid: number of motions that nothing holds.
+        motions: (6 + r, n) rigid and elastic coordinates of the family per coordinate here.
     """
 
     K: Array
@@ -143,6 +144,7 @@ class FamilyModel:
     high: Array
     amount: Array
     n_rigid: int
+    motions: Array
 
     @property
     def present(self) -> Mask:
@@ -159,8 +161,8 @@ class FamilyModel:
     def at(self, x: Array) -> ParametricModel:
         """The model at logarithms x (n_p,) of the factors, with the derivatives by them."""
         k, m = np.exp(self.k_powers @ x), np.exp(self.m_powers @ x)
-        dK = np.einsum("tp,t,tij->pij", self.k_powers, k, self.K, optimize=True)
-        dM = np.einsum("tp,t,tij->pij", self.m_powers, m, self.M, optimize=True)
+        dK = np.tensordot(self.k_powers.T * k, self.K, 1)
+        dM = np.tensordot(self.m_powers.T * m, self.M, 1)
         K, M = (np.tensordot(self.amount * c, A, 1) for c, A in ((k, self.K), (m, self.M)))
         return ParametricModel(K, M, dK, dM, self.seen, self.n_rigid)
 
@@ -211,6 +213,7 @@ def family_model(
         high=np.array([p.high for p in known.values()]),
         amount=np.repeat([1.0, 0.0], [len(K) - len(candidates), len(candidates)]),
         n_rigid=_count_free(family.body, attached, fixed),
+        motions=N,
     )
 
 

@@ -22,6 +22,8 @@ DERIVATIVES = {"displacement": 0, "velocity": 1, "acceleration": 2}
 POINT_RTOL = 0.02  # distance of a sensor from the nearest point of the surface, of the body's size
 MAX_RELATIVE_ERROR = 0.3  # of a value; beyond it the logarithm of noise is no longer normal
 MAX_LINES_NAMED = 5  # in a message
+FREEDOM_LOST = 2  # averages, by a variance that is estimated from the same records as the response
+MIN_OWN_SHARE = 0.1  # of the variance of a response that is left to its sensor
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,9 +93,12 @@ class Responses:
             [m/N, m/(s N) or m/(s^2 N)].
         sensors: where they are.
         inputs: where forces act.
-        coherence: (n_f, n_s, n_e) from 0 to 1, or one number; 0 for a line not to be used [1].
+        coherence: (n_f, n_s, n_e) from 0 to 1, estimated with H; or one number, which is known; 0
+            for a line not to be used [1].
         averages: number of averages behind H and the coherence.
         quantity: "displacement", "velocity" or "acceleration".
+        force_noise: noise on the signal of a force over the force itself [1]. All sensors that were
+            measured at the same time have the error in common that comes of it.
 
     Raises:
         ConfigError: if these do not fit each other, or values are not finite.
@@ -106,6 +111,7 @@ class Responses:
     coherence: Any
     averages: int
     quantity: str = "displacement"
+    force_noise: float = 0.0
 
     def __post_init__(self) -> None:
         f = finite("frequencies", self.frequencies, None)
@@ -126,6 +132,13 @@ class Responses:
                 hint="A coherence of exactly one comes of a single average: it says nothing.",
             )
         random_error(0.5, self.averages)
+        if c.shape and self.averages <= FREEDOM_LOST:
+            raise ConfigError(
+                f"coherence estimated from {self.averages} averages says nothing of the noise.",
+                hint="Average more, or give one number that is known.",
+            )
+        if not finite("force_noise", self.force_noise, ()) >= 0:
+            raise ConfigError(f"force_noise = {self.force_noise}: zero or more.")
         self._check_values()
 
     def _check_values(self) -> None:
@@ -140,9 +153,28 @@ class Responses:
             )
 
     def relative_error(self) -> Array:
-        """(n_f, n_s, n_e) standard deviation of real and imaginary part, over |H| [1]."""
+        """(n_f, n_s, n_e) standard deviation of real and imaginary part, over |H| [1].
+
+        Squared residuals over estimated variances have the mean n / (n - 2) for n averages.
+
+        Source:
+            Bendat and Piersol, Random data, F-distribution of 2 and 2 n - 2 freedoms.
+        """
         c = np.maximum(np.asarray(self.coherence, dtype=float), 1e-12)
-        return np.broadcast_to(random_error(c, self.averages), self.H.shape)
+        n = self.averages - FREEDOM_LOST * bool(c.ndim)
+        return np.broadcast_to(random_error(c, n), self.H.shape)
+
+    def errors(self) -> tuple[Array, float]:
+        """Of ln H: (n_f, n_s, n_e) errors of the sensors, and the one that they have in common [1].
+
+        The first is infinite where a value is not used. Of circular errors with the variance
+        s^2 in each part the logarithm has s^2 (1 + s^2 + ...).
+        """
+        error = self.relative_error()
+        common = self.force_noise / np.sqrt(2 * self.averages)
+        own = np.maximum(error**2 - common**2, MIN_OWN_SHARE * error**2)
+        used = error <= MAX_RELATIVE_ERROR
+        return np.sqrt(np.where(used, own * (1 + error**2), np.inf)), common
 
     def logarithm(self) -> Complex:
         """(n_f, n_s, n_e) ln of the displacement per force [m/N]; zero where H is not used."""

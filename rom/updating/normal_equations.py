@@ -5,17 +5,19 @@ noise leaves the mean of the logarithm where it is, as all powers of it have the
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rom.model import Array
+from rom.model import Array, Index
 from rom.updating.family_model import FamilyModel
 from rom.updating.frf_data import Complex
-from rom.updating.measured import MAX_RELATIVE_ERROR, Responses
+from rom.updating.measured import Responses
 from rom.updating.methods import receptance, through_modes
 from rom.updating.models import modal
 
+ROUGH_LINES = 500  # at most: enough to see resonances
+ROUGH_ERROR = 0.3  # of responses, with which the search begins
 BLOCK_LINES = 256  # at once: some ten megabytes of derivatives for sixty channels
 
 
@@ -28,22 +30,33 @@ class Data:
         logarithm: (n_f, n_s, n_e) ln of displacement per force.
         weight: (n_f, n_s, n_e) one over the standard deviation of both its parts; 0 for values
             that are not used.
+        common: standard deviation of the error that all sensors of a line and an input share.
     """
 
     omega: Array
     logarithm: Complex
     weight: Array
+    common: float = 0.0
 
     @staticmethod
     def of(test: Responses) -> "Data":
         """What a test says."""
-        error = test.relative_error()
-        weight = np.where(error <= MAX_RELATIVE_ERROR, 1.0 / error, 0.0)
-        return Data(2 * np.pi * test.frequencies, test.logarithm(), weight)
+        own, common = test.errors()
+        return Data(2 * np.pi * test.frequencies, test.logarithm(), 1.0 / own, common)
 
-    def lines(self, chosen: Array) -> "Data":
+    def lines(self, chosen: Index) -> "Data":
         """Some of the lines."""
-        return Data(self.omega[chosen], self.logarithm[chosen], self.weight[chosen])
+        return replace(
+            self,
+            omega=self.omega[chosen],
+            logarithm=self.logarithm[chosen],
+            weight=self.weight[chosen],
+        )
+
+    def roughly(self) -> "Data":
+        """Lines at even distances, with errors that are large enough to start from afar."""
+        few = self.lines(np.arange(0, self.omega.size, -(-self.omega.size // ROUGH_LINES)))
+        return replace(few, weight=np.minimum(few.weight, 1 / ROUGH_ERROR), common=0.0)
 
     @property
     def n_values(self) -> int:
@@ -137,12 +150,31 @@ def sums(model: FamilyModel, x: Array, ratios: Array, data: Data) -> Sums:
         w = data.weight[block]
         H, J = at(data.omega[block])
         log = wrapped(np.log(H) - data.logarithm[block]) * (w > 0)
-        J = (J * (w / H)[..., None]).reshape(-1, n)
-        r = (w * log).ravel()
+        J = white(J / H[..., None], w, data.common).reshape(-1, n)
+        r = white(log[..., None], w, data.common)[..., 0]
         normal += (J.conj().T @ J).real
-        gradient += (J.conj().T @ r).real
-        squares[block] = np.abs(w * log) ** 2
+        gradient += (J.conj().T @ r.ravel()).real
+        squares[block] = np.abs(r) ** 2
     return Sums(normal, gradient, squares)
+
+
+def white(log: Complex, weight: Array, common: float) -> Complex:
+    """(n_f, n_s, n_e, n) logarithms whose errors become independent and of the variance one.
+
+    Errors have the covariance D^-1 + c^2 1 1^T over the sensors, D = weight^2. With s the
+    sum of D and k = 1 - 1 / sqrt(1 + c^2 s), D^(1/2) (1 - k 1 1^T D / s) makes it the identity.
+
+    Args:
+        log: (n_f, n_s, n_e, n) logarithms.
+        weight: (n_f, n_s, n_e) one over the errors of the sensors.
+        common: error that they share.
+    """
+    if common:
+        d = weight[..., None] ** 2
+        s = np.maximum(d.sum(axis=1, keepdims=True), np.finfo(float).tiny)
+        share = 1 - 1 / np.sqrt(1 + common**2 * s)
+        log = log - share * (d * log).sum(axis=1, keepdims=True) / s
+    return weight[..., None] * log
 
 
 def wrapped(log: Complex) -> Complex:

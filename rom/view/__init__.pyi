@@ -10,6 +10,7 @@ from rom.view.canvas.solids import joined as joined
 from rom.view.canvas.solids import ring as ring
 from rom.view.canvas.solids import tube as tube
 from rom.view.canvas.solids import wound as wound
+from rom.view.figures.channels import channels as channels
 from rom.view.figures.curves import campbell as campbell
 from rom.view.figures.curves import convergence as convergence
 from rom.view.figures.curves import frequencies as frequencies

@@ -12,7 +12,8 @@ from scipy.linalg import eigh
 
 import rom
 from cases.paths import ROOT
-from rom.bench import benchmarks, many_modes, wheel
+from cases.solid import block
+from rom.bench import benchmarks, many_modes, updating, wheel
 from rom.bench.models import planetary_train, shaft_in_films
 from rom.eigen.verbs import rigid_motions
 from rom.errors import ResourceError
@@ -191,6 +192,12 @@ def test_a_wheel_and_its_sector_are_measured_on_the_same_modes():
     assert 1e-8 < figures["reduced sector above sector"] < 1e-3
     assert figures["sector against wheel"] < 1e-8
     assert all(value > 0.0 for value in figures.values())
+
+
+def test_an_update_is_timed_that_finds_the_truth():
+    rows = {quantity: value for _, quantity, value, _, _ in updating.measured(block(), 200)}
+    assert rows["largest error over its deviation"] < 4
+    assert rows["processor time of an update"] > 0
 
 
 @pytest.mark.long

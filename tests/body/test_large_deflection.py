@@ -16,7 +16,7 @@ from scipy.special import ellipk
 
 import rom
 from cases.long import SHARED_BY, few
-from cases.mbs.slender import STEEL, assembled, cantilever, reduced, slender
+from cases.mbs.slender import STEEL, assembled, cantilever, reduced, slender, tip_of
 from cases.paths import RANKS, ROOT
 from cases.ranks.environment import ENVIRONMENT
 from rom.body.nonlinear.geometric import ELLIPTIC_STRETCH, foreseen
@@ -142,13 +142,6 @@ def test_energy_force_and_tangent_at_once_are_the_sums_over_all_indices():
     assert_allclose(tangent, found.K + 6 * T3q + 12 * T4qq)
 
 
-def tip_of(body, q):
-    """Slope [rad], shortening and deflection [m] of the tip."""
-    tip = body.marker("tip")
-    x, y, _ = tip.translation @ q
-    return np.array([np.arcsin((tip.rotation @ q)[2]), -x, y])
-
-
 @pytest.mark.parametrize(
     "slenderness, cells, kinds",
     few(2, [(100, 40, "rbe3"), (50, 20, rom.Polynomial(1)),
@@ -250,10 +243,10 @@ def test_the_certificate_compares_with_the_full_model_at_large_deflection(certif
     }  # fmt: skip
 
 
-def test_a_basis_without_derivatives_locks_and_its_certificate_fails(certified, monkeypatch):
-    _, model, loads = certified
+def test_a_basis_without_derivatives_locks_and_its_certificate_fails(monkeypatch):
+    model, EI = slender(50, 6, nu=0.3)
     monkeypatch.setattr("rom.workflow.enriched", lambda *given: given[4])
-    body = reduced(model, (0, loads[1], 0, 0, 0, 0), n_modes=10, certify=True)
+    body = reduced(model, (0, 2 * EI, 0, 0, 0, 0), n_modes=4, certify=True)
     assert not body.certificate.ok
     failed = deflections_compared(body)["tip f_y: displacement"]
     assert not failed.ok and 0.87 < failed.value < 0.95
@@ -452,7 +445,7 @@ def test_the_least_stretch_is_that_of_a_turned_body_too():
 
 def test_a_range_that_compresses_the_material_until_it_gives_way_is_refused():
     model, EI = slender(2, 2)
-    says = r"load \+1 tip m_z of the range compresses the material to 0\.\d{3} .* from 0\.577 on"
+    says = r"load [+-]1 tip m_z of the range compresses the material to 0\.\d{3} .* from 0\.577 on"
     with pytest.raises(ModelError, match=says):
         reduced(model, (0, 0, 0, 0, 0, 3 * EI), n_modes=2, active=2)
     assert reduced(model, (0, 0, 0, 0, 0, EI), n_modes=2, active=2).quartic is not None

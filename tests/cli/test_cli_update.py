@@ -1,6 +1,7 @@
 """The verb update: what it prints is what `rom.update` finds, and the body it writes is updated."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -80,6 +81,13 @@ def test_the_verb_finds_what_the_function_finds_and_writes_the_body(capsys):
     told = body.provenance["updating"]
     assert told["deviations"] == same.deviations and told["verdict holds"] is True
     assert told["lines"] == 80 and told["sensors"] == 12
+
+
+def test_noise_of_forces_is_taken(capsys):
+    found = answered(["--force-noise", "0.03"], capsys)
+    test = replace(rom.io.read_responses("test.h5"), force_noise=0.03)
+    same = rom.update(rom.load("family.rom.npz"), test, fixed=("root",), damping=0.02)
+    assert found["factors"] == same.factors and found["deviations"] == same.deviations
 
 
 def test_springs_masses_candidates_and_priors_are_taken(capsys):

@@ -289,8 +289,12 @@ moment = [0, 0, "3 N m"]
     )
     with pytest.raises(ConfigError, match="no finite elements"):
         read_component(file).body()
-    file.write_text(plain + asked.replace("shapes = 9", "tol = 0.002\nsteps = 7"))
-    assert read_component(file).nonlinear() == replace(found, n_shapes=None, tol=0.002, n_steps=7)
+    file.write_text(plain + asked.replace("shapes = 9", 'tol = 0.002\nfixed = "hub:yz"'))
+    assert read_component(file).nonlinear() == replace(
+        found, n_shapes=None, tol=0.002, fixed=("hub:yz",)
+    )
+    file.write_text(plain + asked.replace("shapes = 9", "steps = 7"))
+    assert read_component(file).nonlinear() == replace(found, n_shapes=None, n_steps=7)
     file.write_text(plain + asked.replace("2 kN", "0 N").replace("3 N m", "0 N m"))
     with pytest.raises(ConfigError, match="not all zero") as refused:
         read_component(file).nonlinear()

@@ -1,8 +1,11 @@
 """Stiffness, mass, interfaces and surface that come out of dolfinx."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scipy.sparse import csr_matrix
 
 import rom
 from cases.boxes import box, distort, dofs
@@ -13,7 +16,11 @@ from rom.errors import ConfigError, InterfaceError, MaterialError, RomWarning, T
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")
 pytestmark = pytest.mark.fenicsx
 
+from mpi4py import MPI  # noqa: E402
+
 from rom.fe.elasticity import assemble  # noqa: E402
+from rom.fe.forms import region  # noqa: E402
+from rom.fe.operators.aij import aij, symmetric  # noqa: E402
 
 STEEL = rom.Material(E=210e9, nu=0.3, rho=7850.0)
 ELEMENTS = [(kind, degree) for kind in ("tetrahedron", "hexahedron") for degree in (1, 2)]
@@ -193,6 +200,34 @@ def test_two_materials_in_series_stretch_like_two_springs(second):
     moment = along @ (model.M @ (along * np.repeat(model.points[:, 0], 3)))
     assert_allclose(moment, 0.008 * (1200.0 * 0.25**2 + 2700.0 * (1 - 0.25**2)) / 2, rtol=1e-12)
     assert model.provenance["material"]["pad"]["E"] == 3e9
+
+
+def test_regions_are_assembled_when_they_are_asked_for_and_no_sooner(monkeypatch):
+    """Each has matrices as large as those of the whole body, which few ask for."""
+    mesh, tags = box(cells=(4, 1, 1))
+    made, assembled = [], region.assemble_matrix
+    monkeypatch.setattr(region, "assemble_matrix", lambda form: made.append(1) or assembled(form))
+    names = {"pad": 4, "shank": 9}
+    model = assemble(mesh, regions_of(mesh), tags, material=HARD, regions=names)
+    model = replace(model, provenance={})
+    assert not made and list(model.regions) == list(names)
+    parts = [model.regions[name].M for name in names]
+    n = model.n_dofs
+    total = sum(csr_matrix(A.getValuesCSR()[::-1], shape=(n, n)) for A in parts)
+    assert len(made) == 4 and np.abs(total - model.M).max() < 1e-12 * np.abs(model.M).max()
+
+
+@pytest.mark.parametrize("same_pattern", [True, False])
+def test_a_matrix_made_symmetric_is_the_mean_with_its_transpose(same_pattern):
+    A = np.random.default_rng(2).normal(size=(6, 6))
+    A[0, 1] = A[1, 0] = 0.0  # stands as an entry, and is dropped
+    rows = csr_matrix(A if same_pattern else np.triu(A))
+    if same_pattern:
+        rows = csr_matrix((A.ravel(), np.tile(np.arange(6), 6), np.arange(0, 37, 6)), shape=(6, 6))
+    found = symmetric(aij(rows, ((6, 6), (6, 6)), MPI.COMM_SELF))
+    wanted = rows.toarray()
+    assert_allclose(found.toarray(), (wanted + wanted.T) / 2, rtol=1e-15)
+    assert found.nnz == np.count_nonzero(wanted + wanted.T) and found.has_sorted_indices
 
 
 def test_regions_without_material_and_materials_without_region_are_named():

@@ -172,6 +172,31 @@ def test_a_part_that_hangs_on_nothing_is_a_mechanism():
     with pytest.raises(InterfaceError, match="leave a rigid motion free") as raised:
         ops.hold(one.interfaces["x0"].dofs)
     assert place_in(raised.value)[2] >= 1.0
+    low, high = points[len(one.points) :].min(axis=0), points.max(axis=0)
+    words = [f"({', '.join(f'{x:.4g}' for x in point)}) m" for point in (low, high)]
+    n = len(points)
+    assert f"and {n // 2} of {n} nodes move, between {' and '.join(words)}." in raised.value.message
+
+
+def test_a_factor_that_breaks_down_is_named_by_the_part_that_moves(small, monkeypatch):
+    """On a pivot of zero MUMPS gives up, and there is no solution to look at."""
+    from rom.fe.operators.factor import Factor
+
+    def breaks_down(factor, *, definite):
+        computed(factor, definite=definite)
+        factor.ok = not definite
+
+    computed = Factor.compute
+    monkeypatch.setattr(Factor, "compute", breaks_down)
+    ops = small.operators
+    corner = small.points.argmin(axis=0)[0]
+    with pytest.raises(InterfaceError, match="leave a rigid motion free") as raised:
+        ops.hold(3 * corner + np.arange(3))
+    far = np.linalg.norm(small.points - small.points[corner], axis=1)
+    at = np.linalg.norm(small.points - place_in(raised.value), axis=1).argmin()
+    assert far[at] > 0.8 * far.max()
+    n = len(far)
+    assert f"and {n - 1} of {n} nodes move" in raised.value.message
 
 
 def place_in(error):

@@ -10,10 +10,11 @@ import signal
 import sys
 import warnings
 from collections import Counter
+from collections.abc import Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from timeit import timeit
-from types import SimpleNamespace
+from types import MappingProxyType, SimpleNamespace
 from typing import Any, Literal
 
 import numpy as np
@@ -224,6 +225,7 @@ def taken(  # noqa: PLR0913  one of each kind
     *rest: int,
     path: str | Path = "",
     way: Literal["up", "down"] = "up",
+    parts: "Mapping[str, Unknown] | None" = None,
     **more: float,
 ):
     """What a typed function gets."""
@@ -240,6 +242,27 @@ def test_what_stands_for_the_same_thing_becomes_it():
     assert type(got.n) is int and got.numbers.dtype == float and got.path == Path("x")
     assert taken(names=(name for name in "ab")).names == ("a", "b")
     assert taken(x=np.array(2.0)).x == 2.0 and taken(k=1.0).more == {"k": 1.0}
+
+
+class Asked(Mapping):
+    """Makes its values when they are asked for, which takes long."""
+
+    def __getitem__(self, name):
+        raise AssertionError(name)
+
+    def __iter__(self):
+        return iter(["one"])
+
+    def __len__(self):
+        return 1
+
+
+def test_values_that_are_made_when_they_are_asked_for_are_not_asked_for():
+    parts = Asked()
+    assert taken(parts=parts).parts is parts
+    for wrong in ({"one": 2.0}, MappingProxyType({"one": 2.0})):
+        with pytest.raises(rom.errors.ConfigError, match=r"parts\['one'\] = 2.0 must be"):
+            taken(parts=wrong)
 
 
 @pytest.mark.parametrize(

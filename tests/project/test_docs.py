@@ -416,9 +416,12 @@ def test_what_pages_name_exists():
 
 
 def test_claims_name_tests_that_exist():
-    """A claim without its test is none."""
-    known = {found for path in (ROOT / "tests").rglob("test_*.py")
-             for found in re.findall(r"def (test_\w+)", path.read_text())}  # fmt: skip
-    named_there = re.findall(r"`(test_\w+)`", (DOCS / "claims.md").read_text())
-    assert len(named_there) > 30
-    assert set(named_there) <= known, set(named_there) - known
+    """A claim without its test is none; names that are long may end in dots."""
+    known = set()
+    for path in (ROOT / "tests").rglob("test_*.py"):
+        known |= {path.stem, *re.findall(r"def (test_\w+)", path.read_text())}
+    for path in DOCS.rglob("*.md"):
+        for name, dots in re.findall(r"`(test_\w+)(\.\.\.)?`", path.read_text()):
+            there = name in known or (dots and any(one.startswith(name) for one in known))
+            assert there, f"{path.name} names {name}"
+    assert len(re.findall(r"`test_\w+`", (DOCS / "claims.md").read_text())) > 30

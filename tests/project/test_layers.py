@@ -14,7 +14,7 @@ pytestmark = pytest.mark.once
 HEAVY = {"dolfinx", "ufl", "basix", "ffcx", "petsc4py", "slepc4py", "mpi4py", "gmsh", "meshio"}
 DRAWING = {"pyvista", "vtk", "vtkmodules", "matplotlib"}
 LIGHT = {"assembly", "body", "cyclic", "eigen", "errors", "io", "mbs", "model", "parametric",
-         "reduction", "rotation", "units"}  # fmt: skip
+         "paths", "reduction", "rotation", "units"}  # fmt: skip
 ANYTHING = {"__init__", "__main__", "bench", "cli", "doctor"}  # they stand in front
 # what every part stands on, none of it above another
 GROUND = {
@@ -34,12 +34,13 @@ MAY_IMPORT = {  # module or package below rom/ -> what it may import from rom be
     "model": {"errors", "material", "notebook"},
     "units": {"errors"},
     "rotation": {"errors"},
+    "paths": {"model", "errors"},
     "eigen": {"model", "errors"},
     "reduction": {"model", "rows", "eigen", "errors"},
     "cyclic": {"model", "rows", "eigen", "rotation", "reduction", "errors"},
-    "body": {"model", "eigen", "rotation", "notebook", "units", "errors"},
+    "body": {"model", "eigen", "rotation", "notebook", "paths", "units", "errors"},
     "assembly": {"model", "rows", "eigen", "body", "reduction", "errors"},
-    "mbs": {"model", "rotation", "io", "notebook", "errors"},
+    "mbs": {"model", "rotation", "io", "notebook", "paths", "errors"},
     "io": {"model", "units", "body", "parametric", "updating", "errors"},
     "checks": {"model", "rows", "eigen", "body", "reduction", "errors"},
     "workflow": LIGHT | {"checks"},
@@ -74,6 +75,7 @@ ORDER = {
         "material",
         "model",
         "rows",
+        "paths",
         "eigen",
         "reduction",
         "body",
@@ -102,6 +104,7 @@ ORDER = {
         "units",
         "two_stages",
         "peers",
+        "updating",
         "loops",
         "first_use",
         "wheel",

@@ -55,6 +55,7 @@ def test_names_are_found_where_they_were():
 
 
 NEW_IN_FRONTS = {
+    "in_late_wind",
     "read_modes",
     "read_responses",
     "write_responses",

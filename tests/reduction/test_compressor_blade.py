@@ -1,10 +1,13 @@
 """The compressor blade: its geometry, its first mode, and what its flanks need as interfaces."""
 
+import runpy
+import sys
+
 import numpy as np
 import pytest
 from numpy.polynomial.legendre import leggauss
 from numpy.testing import assert_allclose
-from scipy.linalg import eigh
+from scipy.linalg import block_diag, eigh
 from scipy.sparse import coo_matrix, identity, kron
 from scipy.sparse.linalg import eigsh
 
@@ -12,6 +15,7 @@ import rom
 from cases.long import ROM_LONG
 from cases.measures import areas
 from cases.paths import ROOT
+from rom.errors import RomWarning
 from rom.fe.mesh.quality import aspect_ratio, scaled_jacobian
 from rom.fe.mesh.read import read_mesh
 from rom.reduction.interfaces.polynomial import Polynomial, interface_functions
@@ -196,3 +200,86 @@ def test_a_crown_costs_the_functions_of_a_quadric(blade):
             for p in (1, 2, 3, 4)
         ]
         assert ranks == ([4, 9, 16, 25] if crown else [3, 6, 10, 15])
+
+
+@pytest.fixture(scope="module")
+def compared(tmp_path_factory):
+    """What `demo_compressor_blade.py` has found on a blade of 1872 dofs, 186 of them on flanks."""
+    coarse = ("--lc", "0.014", "--lc-flank", "0.005", "--degree", "1")
+    out, demo = tmp_path_factory.mktemp("blade"), ROOT / "demos" / "demo_compressor_blade.py"
+    with pytest.MonkeyPatch.context() as patch, pytest.warns(RomWarning, match="linear tetra"):
+        patch.setattr(sys, "argv", [str(demo), "--quiet", "--out", str(out), *coarse])
+        return runpy.run_path(str(demo), run_name="__main__")
+
+
+@pytest.fixture(scope="module")
+def dense(compared):
+    """Of the same blade, by dense matrices: those on the bed and of the flanks, and all modes."""
+    model, n = compared["alone"], compared["alone"].n_dofs
+    K, K_bed, M = (A.toarray() for A in (model.K, compared["K_bed"], model.M))
+    b = np.concatenate([model.interfaces[name].dofs for name in FLANKS])
+    i = np.setdiff1d(np.arange(n), b)
+    Psi = np.zeros((n, b.size))
+    Psi[b] = np.eye(b.size)
+    Psi[i] = -np.linalg.solve(K[np.ix_(i, i)], K[np.ix_(i, b)])
+    Phi = np.zeros((n, 60))
+    Phi[i] = eigh(K[np.ix_(i, i)], M[np.ix_(i, i)], subset_by_index=(0, 59))[1]
+    exact = eigh(K_bed, M, eigvals_only=True, subset_by_index=(0, 9))
+    return K, K_bed, M, Psi, Phi, b, exact
+
+
+def worst_seated(dense, W):
+    """Worst error of ten frequencies on the bed where the flanks follow the columns of W."""
+    _, K_bed, M, Psi, Phi, _, exact = dense
+    T = np.hstack([Psi @ W, Phi])
+    lam = eigh(T.T @ K_bed @ T, T.T @ M @ T, eigvals_only=True)[:10]
+    return np.abs(np.sqrt(lam / exact) - 1).max()
+
+
+def test_polynomials_of_the_comparison_are_those_of_dense_matrices(compared, dense):
+    for order in (1, 3):
+        found = [interface_functions(Polynomial(order), compared["alone"].interfaces[name])
+                 for name in FLANKS]  # fmt: skip
+        W = block_diag(*(np.kron(Q, np.eye(3)) for Q in found))
+        row = compared["table"][f"polynomial:{order}"]
+        assert row["coordinates"] == row["solutions"] == W.shape[1]
+        assert row["seated"] == pytest.approx(worst_seated(dense, W), rel=1e-5)
+
+
+@pytest.mark.parametrize("n", [12, 24, 60])
+@pytest.mark.parametrize("level", ["system", "local", "alone"])
+def test_characteristic_modes_of_the_comparison_are_those_of_dense_matrices(
+    compared, dense, level, n
+):
+    """Condensed to the flanks by hand; the rigid motions beside them, as in the demo."""
+    K, K_bed, M, Psi, _, b, _ = dense
+    K_b, M_b = (Psi.T @ A @ Psi for A in (K if level == "alone" else K_bed, M))
+    if level == "local":
+        half, m = np.split(np.arange(b.size), 2), (n - 6) // 2
+        chi = block_diag(*(eigh(K_b[np.ix_(d, d)], M_b[np.ix_(d, d)])[1][:, :m] for d in half))
+    else:
+        first = 6 if level == "alone" else 0
+        chi = eigh(K_b, M_b)[1][:, first : first + n - 6]
+    rigid = rom.eigen.rigid_motions(compared["alone"].points)[b]
+    row = compared["table"][f"characteristic, {level} {n}"]
+    assert (row["coordinates"], row["solutions"]) == (n, b.size)
+    assert row["seated"] == pytest.approx(worst_seated(dense, np.hstack([rigid, chi])), rel=1e-4)
+
+
+def test_the_comparison_puts_the_kinds_of_flanks_in_their_order(compared):
+    """What knows more of blade and bed needs fewer functions; polynomials need fewest solutions."""
+    table = {label: row["seated"] for label, row in compared["table"].items()}
+    assert table["all dofs"] <= min(table.values()) * (1 + 1e-9)
+    for kind in ("polynomial:{}", "Fourier-Legendre {0} {0}"):
+        few, many = table[kind.format(1)], table[kind.format(4)]
+        assert table["all dofs"] < many < few < table["rbe2"]
+    for n in (24, 60):
+        system, local, alone = (
+            table[f"characteristic, {level} {n}"] for level in ("system", "local", "alone")
+        )
+        assert system < table[f"snapshots {n}"] < local < alone
+    lost = {label: row["lost"] for label, row in compared["table"].items()}
+    assert lost["polynomial:4"] < lost["polynomial:2"] < lost["polynomial:1"] < lost["rbe2"]
+    taken = compared["table"]
+    assert taken["polynomial:3"]["solutions"] < taken["snapshots 60"]["solutions"] < 186
+    assert taken["polynomial:3"]["MB"] < taken["all dofs"]["MB"]

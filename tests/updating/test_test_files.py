@@ -1,5 +1,7 @@
 """Tests of vibration from files: two other programs, tables, HDF5; what contradicts is named."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
@@ -134,8 +136,9 @@ def test_a_table_with_decimal_commas_and_in_velocities_is_read(tmp_path):
 
 @pytest.mark.once
 def test_hdf5_brings_the_same_test_back(tmp_path):
-    test = rom.io.read_responses(HERE / "pyuff_test.uff", averages=20)
+    test = replace(rom.io.read_responses(HERE / "pyuff_test.uff", averages=20), force_noise=0.05)
     path = rom.io.write_responses(test, tmp_path / "test.h5")
+    assert rom.io.read_responses(path).force_noise == 0.05
     for found, expected in zip(*map(fields, (rom.io.read_responses(path), test)), strict=True):
         assert_array_equal(found, expected)
     with pytest.raises(ConfigError, match="says averages"):

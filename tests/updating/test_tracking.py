@@ -13,9 +13,11 @@ import rom
 from cases.mbs.fmu_instance import Instance, fmpy
 from cases.solid import STEEL, block
 from rom.body.recovery import StressRecovery
+from rom.body.surface import strain_rows
 from rom.errors import ConfigError, ModelError
 from rom.updating import Channels, Sensors, tracker
-from rom.updating.tracking import discrete, steady, stress_rows
+from rom.updating.operation import discrete, stress_rows
+from rom.updating.tracking import steady
 
 DT, WALK = 5e-4, 400.0
 TIP = Channels([[1.0, 0, 0]], [[0, 0, 1]])
@@ -225,6 +227,52 @@ def test_modes_left_out_follow_the_accelerations(body):
     assert_allclose(static[0] @ q + inertial[0] @ a, expected)
 
 
+def pulled(body, F):
+    """(r,) elastic coordinates under a force along x on the tip, its root held."""
+    omega, V = body.modes(fixed=("root",))
+    load = F * body.marker("tip").translation[0] @ V[6:]
+    return V[6:] @ (load / omega**2)
+
+
+def test_strain_gauges_read_hooke_and_poisson(body):
+    """F / EA along a bar in tension, -nu of it across, and (1 - nu) / 2 under 45 degrees."""
+    F, area = 1e4, 0.1 * 0.08
+    q = pulled(body, F)
+    axes = [[1, 0, 0], [0, 1, 0], [1, 1, 0], [2, 0, 0.1]]
+    found = strain_rows(body, [[0.52, 0.03, 0.08]] * 4, axes, "sensor") @ q
+    nu = STEEL.nu
+    expected = F / STEEL.E / area * np.array([1, -nu, (1 - nu) / 2, 1])
+    assert_allclose(found, expected, rtol=2e-3)
+    side = strain_rows(body, [[0.52, 0.1, 0.03]], [[0, 0, 1]], "sensor") @ q
+    assert_allclose(side, [-nu * F / STEEL.E / area], rtol=5e-3)
+
+
+def test_a_gauge_reads_the_gradient_of_its_triangle(body):
+    """Of any linear motion d G d, on an edge of the body too."""
+    G = np.random.default_rng(5).normal(size=(3, 3))
+    points = body.surface.points
+    linear = replace(body, surface=replace(body.surface, shape=(points @ G.T).reshape(-1, 1)))
+    for x, d in (([0.3, 0.0, 0.0], [3, 1, 0]), ([1.0, 0.02, 0.05], [0, 1, 2]),
+                 ([0.3, 0.0, 0.0], [3, 0, 1])):  # fmt: skip
+        d = np.array(d) / np.linalg.norm(d)
+        assert_allclose(strain_rows(linear, [x], [d], "sensor")[0], [d @ G @ d], rtol=1e-12)
+
+
+def test_a_gauge_and_accelerations_find_a_force_that_stays(body):
+    """Accelerations alone do not see it; the gauge of the root does."""
+    gauge = Channels([[0.1, 0.05, 0.08]], [[1, 0, 0]])
+    t = made(body, sensors=(Sensors(gauge, "strain", 1e-8), FEW[1]))
+    assert t.inputs[0] == ("strain[1]", "1")
+    rng = np.random.default_rng(9)
+    bent = np.linalg.solve(np.eye(len(t.A) - 1) - t.A[:-1, :-1], t.A[:-1, -1] * 50.0)
+    y = np.tile(t.C @ np.r_[bent, 50.0], (1500, 1))
+    found = t.run(y + np.sqrt(t.R) * rng.standard_normal(y.shape))
+    late = found.forces[1000:, 0]
+    assert abs(late.mean() - 50.0) < 4 * found.force_deviations[-1, 0]
+    with pytest.raises(ModelError, match="'force 0'"):
+        made(body, sensors=FEW[1:])
+
+
 def test_what_cannot_be_tracked_is_named(body, filter_):
     def refused(words, kind=ConfigError, **options):
         with pytest.raises(kind, match=words):
@@ -236,12 +284,16 @@ def test_what_cannot_be_tracked_is_named(body, filter_):
     refused("no noise", sensors=(replace(FEW[0], noise=0.0),))
     refused("off the body", sensors=(replace(FEW[0], channels=Channels([[3, 0, 0]], [[0, 0, 1]])),))
     refused("off the body", wanted=(replace(WANTED[0], channels=TIP),))
+    stands = Channels(GAUGE[:1], [[0, 0, 1]])
+    refused("lies on no face", sensors=(Sensors(stands, "strain", 1e-8), *FEW))
+    away = Channels([[0.3, 0.05, 0.2]], [[1, 0, 0]])
+    refused("lies on no face", sensors=(Sensors(away, "strain", 1e-8), *FEW))
     refused("dt", dt=0.0)
     refused("walk", walk=-1.0)
     refused("unmodelled", unmodelled=-1.0)
     refused("drift", ModelError, fixed=(), sensors=FEW[:1])
     with pytest.raises(ConfigError, match="quantity"):
-        Sensors(TIP, "strain")
+        Sensors(TIP, "force")
     with pytest.raises(ConfigError, match="negative"):
         Sensors(TIP, "velocity", -1.0)
     with pytest.raises(ModelError, match="carries no stress"):

@@ -29,7 +29,7 @@ GRID = [[x, 0.05 * k, 0.04 * m] for x in (0.25, 0.5, 0.75, 1.0) for k, m in ((0,
 SENSORS = Channels(np.repeat(GRID, 2, axis=0), np.tile([[0, 1, 0], [0, 0, 1]], (8, 1)))
 FEW = Channels(np.asarray(SENSORS.points)[5:11], np.asarray(SENSORS.directions)[5:11])
 INPUTS = Channels([[1.0, 0.0, 0.0], [0.5, 0.1, 0.08]], [[0, 1, 1], [0, 1, -0.5]])
-LINES = np.linspace(20, 1400, 300)
+LINES = np.linspace(20, 1400, 150)
 AVERAGES = 50
 HELD = {"root": "x y z rx ry rz"}
 
@@ -173,22 +173,6 @@ def test_sums_do_not_depend_on_blocks(family, monkeypatch):
         assert_allclose(getattr(pieces, name), expected, atol=1e-11 * scale)
 
 
-def test_parameters_lie_inside_two_deviations_as_often_as_they_must(family):
-    """Of 100 draws 95 are expected, 90 to 99 by chance; chi-square is calibrated."""
-    inside, chi = np.zeros(3), []
-    lines = np.linspace(20, 1400, 40)
-    for seed in range(100):
-        test = synthetic(family, 0.1, seed, lines=lines, sensors=FEW)
-        found = rom.update(family, test, fixed=HELD, damping=0.02)
-        errors = [np.log(found.factors[n] / TRUE[n]) / found.deviations[n] for n in PARAMETERS]
-        inside += np.abs(errors) < 2
-        chi.append(found.verdict.rows[0].value)
-    assert (inside >= 90).all() and (inside <= 99).all(), inside
-    n = 2 * 40 * 6 * 2
-    assert_allclose(np.mean(chi), 1.0, atol=0.01)
-    assert_allclose(np.std(chi), np.sqrt(2 / n), rtol=0.3)
-
-
 def test_the_right_model_passes_and_its_report_says_so(family):
     found = rom.update(family, synthetic(family), fixed=HELD)
     assert found.verdict.ok and not found.unseen and not found.at_bound
@@ -199,6 +183,30 @@ def test_the_right_model_passes_and_its_report_says_so(family):
     assert "E_inner = 1." in str(found)
     test = synthetic(family, 0.0)
     assert_allclose(found.responses(LINES), test.H, atol=0.02 * np.abs(test.H).max())
+
+
+def test_draws_spread_as_the_covariance_says(family):
+    """ln|H| of another point, to first order: J C J^T with J by differences; the median is H."""
+    found = rom.update(family, synthetic(family, 0.02), fixed=HELD, damping=0.02)
+    there, pushed, f = at_end(), Channels([[0.5, 0.1, 0.08]], [[0, 1, 0.3]]), [300.0, 700.0]
+    level = np.log(np.abs(found.drawn(f, there, pushed, n=400)[:, :, 0, 0]))
+    model = model_of(family)
+    model = replace(model, seen=there.rows(family.body, "s") @ model.motions,
+                    driven=pushed.rows(family.body, "s") @ model.motions)  # fmt: skip
+    theta = np.r_[np.log(list(found.factors.values())), np.log(found.zeta)]
+
+    def at(q):
+        return np.log(np.abs(responses_at(model, q[:3], np.exp(q[3:]), 2 * np.pi * np.array(f))))
+
+    steps = 1e-5 * np.eye(theta.size)
+    J = np.array([(at(theta + h) - at(theta - h))[:, 0, 0] / 2e-5 for h in steps]).T
+    expected = np.sqrt(np.diag(J @ found.covariance @ J.T))
+    assert_allclose(level.std(axis=0), expected, rtol=0.15)
+    assert (np.abs(np.median(level, axis=0) - at(theta)[:, 0, 0]) < 0.2 * expected).all()
+
+
+def at_end():
+    return Channels([[1.0, 0.1, 0.08]], [[0, 0.2, 1]])
 
 
 def test_noise_of_averages_is_what_the_coherence_says():
@@ -279,8 +287,9 @@ def test_the_score_names_the_parameter_that_is_missing(family):
     assert right.verdict.ok and abs(right.scores["rho_outer"]) < 4
 
 
-def test_what_is_missing_is_named_though_the_search_does_not_end(family):
-    """Everything is free and 1 kg is missing: 60 steps are not enough, its score is the largest."""
+def test_what_is_missing_is_named_though_the_search_does_not_end(family, monkeypatch):
+    """Everything is free and 1 kg is missing: 12 steps are not enough, its score is the largest."""
+    monkeypatch.setattr("rom.updating.estimate.MAX_STEPS", 12)
     offered = {
         "tip mass": AddedMass("tip", 1.0, 0.1, 10),
         "tip spring": GroundSpring("tip", (0, 3e5, 3e5), 0.1, 10),
@@ -308,7 +317,7 @@ def test_data_of_another_body_are_named(family):
     expected = [
         np.abs(np.vdot(a, b)) ** 2 / np.vdot(a, a).real / np.vdot(b, b).real
         for a, b in zip(
-            found.responses(LINES).reshape(300, -1).T, test.H.reshape(300, -1).T, strict=True
+            found.responses(LINES).reshape(150, -1).T, test.H.reshape(150, -1).T, strict=True
         )
     ]
     assert_allclose(unlike.value, 1 - np.median(expected), atol=1e-12)
@@ -345,9 +354,9 @@ def test_a_sensor_with_noise_of_its_own_is_located(family):
     assert not found.verdict.ok and np.nanargmax(found.by_sensor) == 5
     assert any("worst sensor, 5" in row.quantity for row in found.verdict.failures)
     H = test.H.copy()
-    H[100:140] *= 1.05
+    H[50:70] *= 1.05
     found = rom.update(family, replace(test, H=H), fixed=HELD, damping=0.02)
-    assert 100 <= np.nanargmax(np.convolve(found.by_line, np.ones(9), "same")) < 140
+    assert 50 <= np.nanargmax(np.convolve(found.by_line, np.ones(9), "same")) < 70
 
 
 def test_a_direction_that_the_data_do_not_see_is_named(family):
@@ -378,7 +387,7 @@ def test_a_prior_as_sure_as_the_data_halves_what_they_find(family):
 
 def test_the_gradient_is_that_of_the_cost_with_its_prior(family):
     """Differences of half the cost, away from the prior; 8 modes lie below 2100 Hz."""
-    test = synthetic(family, lines=LINES[::10], sensors=FEW)
+    test = synthetic(family, lines=LINES[::5], sensors=FEW)
     model, data = model_of(family, sensors=FEW), Data.of(test)
     search = _Search.begun(model, data, np.ones(3, bool), 0.01, {"E_inner": 1e-3, "rho_outer": 0.1})
     assert search.zeta.size == 9
@@ -411,7 +420,7 @@ def test_wrong_data_are_named(family):
     refused("sensor 2 gives .*1000: millimetres", H=scaled)
     refused("all responses .*9.807: acceleration in g", H=9.80665 * test.H)
     refused("all responses .*0.001: metres taken", H=1e-3 * test.H)
-    refused("zero or not finite at 1 lines, e.g. at 52.308 Hz", H=nan)
+    refused("zero or not finite at 1 lines, e.g. at 84.832 Hz", H=nan)
     refused("sensor 0 at .* is 0.92 m off the body", sensors=Channels(
         np.asarray(SENSORS.points) + [[0, 0, 0.999 + 0.001 * (k == 0)] for k in range(16)],
         SENSORS.directions))  # fmt: skip

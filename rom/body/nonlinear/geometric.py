@@ -21,11 +21,12 @@ from itertools import combinations, product
 from typing import Any
 
 import numpy as np
-from scipy.linalg import eigh, null_space
+from scipy.linalg import eigh
 
 from rom.arguments import typed, whole
 from rom.body.nonlinear.quartic import Quartic
-from rom.body.nonlinear.statics import follow
+from rom.body.nonlinear.statics import free_motions, passages
+from rom.eigen.supports import DIRECTIONS, Fixed, supports
 from rom.eigen.verbs import Operators, column_blocks, mean_motion, quadratic, whole_clusters
 from rom.errors import ConfigError, InterfaceError, ModelError, ResourceError
 from rom.model import Array, Basis, FEModel, Index
@@ -63,6 +64,10 @@ class Geometric:
             share [1].
         n_shapes: alternatively, the number of shapes added to the basis.
         n_steps: of load on the way to its largest value, at each of which a state is taken.
+        fixed: interfaces held in the mean beside the reference while the loads act, or
+            {name: directions}: the far end of an arch, {"crown": "x rx ry rz"} at half of one.
+
+    Where the body snaps on the way to a load, its path is followed by arc length.
 
     Raises:
         ConfigError: for loads that are none, or numbers out of range.
@@ -77,6 +82,7 @@ class Geometric:
     tol: float = 1e-4
     n_shapes: int | None = None
     n_steps: int = 4
+    fixed: Fixed = ()
 
     def __post_init__(self) -> None:
         whole("n_steps", self.n_steps, 1)
@@ -97,6 +103,21 @@ class Geometric:
                 "no range of loads is given, for which the shapes would be.",
                 hint='Name an interface: loads={"tip": (0, 200.0, 0, 0, 0, 0)}.',
             )
+
+    def held(self, known: Any) -> list[tuple[str, int]]:
+        """Interface and component, 0 to 5, of each motion held beside the reference.
+
+        Args:
+            known: names of the interfaces there are.
+
+        Raises:
+            ConfigError, InterfaceError: see `rom.eigen.supports.supports`.
+        """
+        return [
+            (name, DIRECTIONS.index(direction))
+            for name, directions in supports(self.fixed, known).items()
+            for direction in directions or DIRECTIONS
+        ]
 
     def components(self) -> list[tuple[str, int, float]]:
         """Interface, component and largest value [N, N m] of the loads that are not zero."""
@@ -125,11 +146,13 @@ class Shapes:
     Attributes:
         E: (n_local, r) nodal shapes, those that move an interface first.
         loads: (r, l) forces of the components of the load range at their largest [N].
+        held: (h, r) motions that supports let vanish.
         n_basis: how many of them the basis has already.
     """
 
     E: Array
     loads: Array
+    held: Array
     n_basis: int
 
 
@@ -156,9 +179,10 @@ def enriched(
     energy = model.stresses.large_strain()
     shapes, theta = _with_derivatives(geometric, model, ops, connection, basis, reference, energy)
     quartic = Quartic.from_gram(energy.gram(shapes.E), shapes.E.shape[1])
-    states = _states(geometric, quartic, shapes.loads)
-    _refuse_collapse(geometric, energy.least_stretch(shapes.E @ states.T))
-    modes = _modes_about(states, quartic, quadratic(ops, ops.apply_M, shapes.E))
+    passed = _states(geometric, quartic, shapes)
+    states = np.vstack(passed)
+    _refuse_collapse(geometric, energy.least_stretch(shapes.E @ states.T), list(map(len, passed)))
+    modes = _modes_about(states, quartic, quadratic(ops, ops.apply_M, shapes.E), shapes.held)
     added = theta @ _principal(
         geometric, states[:, shapes.n_basis :].T, modes[:, shapes.n_basis :].T
     )
@@ -172,7 +196,8 @@ def refuse(
     """Say what does not go together with large deflection.
 
     Raises:
-        ConfigError: for a model without finite elements, another method, or another frame.
+        ConfigError: for a model without finite elements, another method, or another frame, and
+            for a load where the body is held.
         InterfaceError: for an unknown interface, or one that is rigid.
     """
     if model.stresses is None:
@@ -197,6 +222,14 @@ def refuse(
                 f"the range of loads names {name!r}; beside the reference {reference!r} the body "
                 f"has {offered(n for n in connection.parts if n != reference)}."
             )
+    held = geometric.held([name for name in connection.parts if name != reference])
+    for name, k, _ in geometric.components():
+        if (name, k) in held:
+            raise ConfigError(
+                f"the range has a load {name} {FORCES[k]} where the body is held: it deflects "
+                "nothing.",
+                hint="Leave the load out, or that direction of fixed.",
+            )
     for name, tie in connection.ties.items():
         if tie.label == "rbe2":
             raise InterfaceError(
@@ -215,11 +248,15 @@ def _with_derivatives(
     Psi = connection.ops.expand(basis.Psi)
     root = model.interfaces[reference]
     still = mean_motion(root) @ ops.rows(Psi[:, :n_b], root.dofs)
-    N = null_space(still / np.abs(still).max(axis=1, keepdims=True))
+    N = free_motions(still)
     moving = Psi[:, :n_b] @ N
     K = quadratic(ops, ops.apply_K, moving)
-    every = [(name, component, 1.0) for name in geometric.loads for component in range(6)]
-    static = moving @ np.linalg.solve(K, _loads(every, model, ops, moving))
+    every = [(name, k, 1.0) for name in geometric.loads for k in range(6)
+             if (name, k) not in geometric.held(model.interfaces)]  # fmt: skip
+    held = [(name, k, 1.0) for name, k in geometric.held(model.interfaces)]
+    F = free_motions(_loads(held, model, ops, moving).T)
+    forces = _loads(every, model, ops, moving)
+    static = moving @ F @ np.linalg.solve(F.T @ K @ F, F.T @ forces)
     n_modes = min(geometric.n_modes, basis.omega.size)
     if n_modes:
         n_modes = whole_clusters(basis.omega**2, n_modes)
@@ -229,7 +266,8 @@ def _with_derivatives(
     size = np.diag(quadratic(ops, ops.apply_K, active))
     theta = _derivatives(connection.ops, basis, energy, active, size)
     E = np.hstack([moving, active[:, static.shape[1] :], connection.ops.expand(theta)])
-    return Shapes(E, _loads(geometric.components(), model, ops, E), n_basis), theta
+    loads, rows = (_loads(some, model, ops, E) for some in (geometric.components(), held))
+    return Shapes(E, loads, rows.T, n_basis), theta
 
 
 def _refuse_many(n: int, energy: Any) -> None:
@@ -249,12 +287,19 @@ def foreseen(n: int, n_points: int) -> tuple[float, float]:
     return TENSOR_COPIES * 8 * N**2, 6 * n_points * N**2 / FLOP_RATE
 
 
-def _refuse_collapse(geometric: Geometric, stretches: Array) -> None:
-    """Say which of the load cases compresses the material too far; steps (s,) case by case."""
+def _refuse_collapse(geometric: Geometric, stretches: Array, counts: list[int]) -> None:
+    """Say which of the load cases compresses the material too far.
+
+    Args:
+        geometric: the range.
+        stretches: (s,) least ones of the states, load by load.
+        counts: number of states on the way to each load.
+    """
     k = int(np.argmin(stretches))
     if stretches[k] > ELLIPTIC_STRETCH:
         return
-    case, step = divmod(k, geometric.n_steps)
+    load = int(np.searchsorted(np.cumsum(counts), k, side="right"))
+    case, step = divmod(load, geometric.n_steps)
     names = [f"{name} {FORCES[component]}" for name, component, _ in geometric.components()]
     signs = geometric.load_cases()[case]
     parts = [f"{x:+.2g} {name}" for x, name in zip(signs, names, strict=True) if x]
@@ -272,7 +317,7 @@ def _loads(components: Any, model: FEModel, ops: Operators, E: Array) -> Array:
     for name, component, largest in components:
         interface = model.interfaces[name]
         columns.append(largest * (mean_motion(interface) @ ops.rows(E, interface.dofs))[component])
-    return np.array(columns).T
+    return np.array(columns).reshape(-1, E.shape[1]).T
 
 
 def _derivatives(ops: Operators, basis: Basis, energy: Any, active: Array, size: Array) -> Array:
@@ -305,29 +350,33 @@ def _derivatives(ops: Operators, basis: Basis, energy: Any, active: Array, size:
     return theta @ (scale[:, None] * V[:, kept] / np.sqrt(lam[kept]))
 
 
-def _states(geometric: Geometric, quartic: Quartic, loads: Array) -> Array:
-    """(s, r) states that the range of loads leads to."""
+def _states(geometric: Geometric, quartic: Quartic, shapes: Shapes) -> list[Array]:
+    """For each load case and step of it the states (k, r) on the way there, itself the last."""
     share = np.arange(1, geometric.n_steps + 1) / geometric.n_steps
-    found = []
+    found = list[Array]()
     for case in geometric.load_cases():
         try:
-            found.append(follow(quartic, np.outer(share, loads @ case)))
+            found += passages(quartic, np.outer(share, shapes.loads @ case), shapes.held)
         except ModelError as error:
             error.where = error.where or f"load {np.round(case, 3).tolist()} of the range"
             raise
-    return np.vstack(found)
+    return found
 
 
-def _modes_about(states: Array, quartic: Quartic, M: Array) -> Array:
+def _modes_about(states: Array, quartic: Quartic, M: Array, held: Array) -> Array:
     """(s m, r) lowest modes about each state (s, r), of the energy 1/2.
 
     A beam that is bent in one plane needs companions of bending in the other one as well, however
-    small that is.
+    small that is. Without stiffness, at the load that makes it snap, a mode is no larger than at
+    rest.
     """
+    N = free_motions(held)
+    mass = N.T @ M @ N
+    softest = eigh(N.T @ quartic.K @ N, mass, eigvals_only=True, subset_by_index=(0, 0))[0]
     found = []
     for q in states:
-        lam, V = eigh(quartic.tangent(q), M)
-        found.append((V[:, :N_MODES] / np.sqrt(np.maximum(lam[:N_MODES], lam[-1] * 1e-15))).T)
+        lam, V = eigh(N.T @ quartic.tangent(q) @ N, mass)
+        found.append((N @ V[:, :N_MODES] / np.sqrt(np.maximum(lam[:N_MODES], 0.1 * softest))).T)
     return np.vstack(found)
 
 

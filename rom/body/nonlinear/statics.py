@@ -1,51 +1,217 @@
-"""Deflections of a body on its reference interface under loads that keep their direction."""
+"""Deflections of a body on its supports under loads that keep their direction."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property, partial
+from typing import Any
 
 import numpy as np
+from scipy.linalg import eigh, null_space
 
 from rom.body.nonlinear.quartic import Quartic
-from rom.errors import ModelError
+from rom.errors import ModelError, SolverError
 from rom.model import Array
+from rom.paths.arc_length import Curve, Point
 
 MAX_ITERATIONS = 60  # of Newton's method in one step of load
 INCREMENT_RTOL = 1e-10  # last increment, of the coordinates in the norm of the energy
 MIN_STEP = 2.0**-20  # of an increment, where a descent is given up
-MIN_LOAD_STEP = 2.0**-10  # of the loads, where a path is given up
+MIN_LOAD_STEP = 2.0**-5  # of the loads, from where on a path is followed by its arc length
 SUFFICIENT_DESCENT = 1e-4  # share of the slope that a step has to keep (Armijo)
+LONGEST_STEP = 0.2  # of the deflection that small loads would cause
+LOCATION_RTOL = 1e-7  # of a step, to which a stiffness that vanishes is found
+MAX_POINTS = 400  # of a path between two loads
 
 
-def follow(energy: Quartic, loads: Array) -> Array:
+@dataclass(frozen=True)
+class Held:
+    """The strain energy of a body with some of its motions held.
+
+    Attributes:
+        energy: of all coordinates q (r,).
+        N: (r, m) motions that are left, q = N y.
+    """
+
+    energy: Quartic
+    N: Array
+
+    @property
+    def n(self) -> int:
+        """Number m of motions left."""
+        return int(self.N.shape[1])
+
+    @cached_property
+    def K(self) -> Array:
+        """(m, m) stiffness without load [N/m]."""
+        return self.N.T @ self.energy.K @ self.N
+
+    def expansion(self, y: Array) -> tuple[float, Array, Array]:
+        """Energy [J], force (m,) [N] and tangent (m, m) [N/m] at y (m,) at once."""
+        U, force, K = self.energy.expansion(self.N @ y)
+        return U, self.N.T @ force, self.N.T @ K @ self.N
+
+
+def free_motions(rows: Array) -> Array:
+    """(r, m) motions for which rows (h, r) of coordinates vanish."""
+    scale = np.abs(rows).max(axis=1, initial=0.0)
+    rows = rows[scale > 0] / scale[scale > 0, None]
+    return null_space(rows) if len(rows) else np.eye(rows.shape[1])
+
+
+def follow(energy: Quartic, loads: Array, held: Array | None = None) -> Array:
     """(s, r) coordinates in equilibrium with loads (s, r) [N], one after the other from rest.
 
+    Args:
+        energy: of the body.
+        loads: forces on the coordinates.
+        held: (h, r) rows of coordinates that supports let vanish.
+
     Raises:
-        ModelError: if no stable equilibrium is found on the way to a load.
+        ModelError: if no stable equilibrium is found at a load.
     """
-    q, at, found = np.zeros(energy.n), np.zeros(energy.n), []
-    for load in loads:
-        q = _led_to(energy, q, at, load)
-        at = load
-        found.append(q)
-    return np.array(found)
+    return np.array([passed[-1] for passed in passages(energy, loads, held)])
 
 
-def _led_to(energy: Quartic, q: Array, start: Array, end: Array) -> Array:
+def passages(energy: Quartic, loads: Array, held: Array | None = None) -> list[Array]:
+    """For each load the states (k, r) on the way to it, itself the last.
+
+    Where a body snaps, these are the states of its path by arc length, stable or not.
+
+    Raises:
+        ModelError: see `follow`.
+    """
+    body = Held(energy, free_motions(np.zeros((0, energy.n)) if held is None else held))
+    y, at, found = np.zeros(body.n), np.zeros(body.n), []
+    for load in loads @ body.N:
+        passed = _led_to(body, y, at, load)
+        y, at = passed[-1], load
+        found.append(np.array(passed) @ body.N.T)
+    return found
+
+
+def _led_to(body: Held, y: Array, start: Array, end: Array) -> list[Array]:
     """The equilibrium at the end of a stretch of load, halved where Newton's method fails."""
     done, step = 0.0, 1.0
     while done < 1.0:
         step = min(step, 1.0 - done)
-        near = newton(energy, q, start + (done + step) * (end - start))
+        near = newton(body, y, start + (done + step) * (end - start))
         if near is None:
             step /= 2
             if step < MIN_LOAD_STEP:
-                raise ModelError(
-                    f"no stable equilibrium was found beyond {done:.4g} of a step of load.",
-                    hint="Ask for smaller loads: the body may snap through or buckle before.",
-                )
+                return _beyond(body, y, (start, end), done)
         else:
-            q, done, step = near, done + step, 2 * step
-    return q
+            y, done, step = near, done + step, 2 * step
+    return [y]
 
 
-def newton(energy: Quartic, q: Array, load: Array) -> Array | None:
+def _beyond(body: Held, y: Array, stretch: tuple[Array, Array], done: float) -> list[Array]:
+    """States on the path by arc length, from a share of a stretch of load to its end."""
+    path = Stretch(body, *stretch)
+    curve, passed = Curve(path, 1.0), list[Array]()
+    try:
+        steps: Iterable[tuple[Point, float, Point]] = curve.steps(
+            curve.start(y, done, forwards=True), LONGEST_STEP
+        )
+        for _, (one, h, two) in zip(range(MAX_POINTS), steps, strict=False):
+            if two.p < 1.0:
+                passed.append(two.at)
+                continue
+            _, last = curve.located(one, h, lambda x: x.p - 1.0)
+            stable = newton(body, last.at, stretch[1])
+            near = stable is not None and path.size(stable - last.at) < LONGEST_STEP
+            if stable is None or not near:
+                break
+            return [*passed, stable]
+    except SolverError as error:
+        raise _lost(done) from error
+    raise _lost(done)
+
+
+def _lost(done: float) -> ModelError:
+    return ModelError(
+        f"no stable equilibrium was found beyond {done:.4g} of a step of load.",
+        hint="Ask for smaller loads: the body buckles before, or gives way.",
+    )
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """Equilibria between two loads on a body, as `rom.paths.arc_length` asks for them.
+
+    Attributes:
+        body: the body on its supports.
+        start, end: (m,) loads [N]; the parameter is the share of the way.
+    """
+
+    body: Held
+    start: Array
+    end: Array
+
+    def corrections(self, at: Array, p: float) -> tuple[Array, Array]:
+        """Newton's correction, and the change of the state per share of the load."""
+        _, force, K = self.body.expansion(at)
+        rate = self.end - self.start
+        try:
+            found = np.linalg.solve(K, np.column_stack([self.start + p * rate - force, rate]))
+        except np.linalg.LinAlgError as error:  # at a limit point to the last bit
+            raise SolverError("the stiffness is singular.") from error
+        return found[:, 0], found[:, 1]
+
+    def stiffness(self, at: Array) -> Array:
+        """(m,) stiffness, of that at rest, in its principal motions [1], ascending."""
+        return eigh(self.body.expansion(at)[2], self.body.K, eigvals_only=True)
+
+    def stiffness_of(self, k: int, point: Point) -> float:
+        """That of the motion with k softer ones, at a point of the path."""
+        return float(self.stiffness(point.at)[k])
+
+    def moved(self, at: Array, step: Array, p: float) -> Array:
+        """The state after a change of the coordinates."""
+        return at + step
+
+    def inner(self, a: Array, b: Array) -> float:
+        """Product of two changes, the energy of the deflection by small loads as unit."""
+        return float(a @ self.body.K @ b / self._unit)
+
+    def size(self, step: Array) -> float:
+        """Largest part of a change, in deflections by small loads."""
+        return float(np.sqrt(self.inner(step, step)))
+
+    @cached_property
+    def _unit(self) -> float:
+        largest = max(self.start, self.end, key=lambda load: float(load @ load))
+        return float(largest @ np.linalg.solve(self.body.K, largest))
+
+
+def critical_shares(energy: Quartic, load: Array, held: Array) -> Array:
+    """(k,) shares, at most one, of a load (r,) [N] at which a stiffness vanishes on the way.
+
+    In the order in which they are passed on the path by arc length, limits and bifurcations.
+
+    Raises:
+        ModelError: if the path does not lead to the load.
+    """
+    N = free_motions(held)
+    body = Held(energy, N)
+    path = Stretch(body, np.zeros(body.n), load @ N)
+    curve, found = Curve(path, 1.0), list[float]()
+    try:
+        steps = curve.steps(curve.start(np.zeros(body.n), 0.0, forwards=True), LONGEST_STEP)
+        for _, (one, h, two) in zip(range(MAX_POINTS), steps, strict=False):
+            below = [int(np.count_nonzero(path.stiffness(x.at) < 0)) for x in (one, two)]
+            points = [
+                curve.located(one, h, partial(path.stiffness_of, k), LOCATION_RTOL)
+                for k in range(min(below), max(below))
+            ]
+            found += [point.p for _, point in sorted(points, key=lambda x: x[0])]
+            if two.p >= 1.0:
+                return np.array([p for p in found if p <= 1.0])
+    except SolverError as error:
+        raise _lost(0.0) from error
+    raise _lost(0.0)
+
+
+def newton(energy: Any, q: Array, load: Array) -> Array | None:
     """The minimum (r,) of energy less work of a load (r,) [N] near q (r,); None if there is none.
 
     Newton's method with a search along each increment.
@@ -69,7 +235,7 @@ def newton(energy: Quartic, q: Array, load: Array) -> Array | None:
 
 
 def _descent(
-    energy: Quartic, q: Array, load: Array, step: Array, slope: float, start: float
+    energy: Any, q: Array, load: Array, step: Array, slope: float, start: float
 ) -> tuple[Array, tuple[float, Array, Array]] | None:
     """Where a step, or a half of it and so on, falls from a start by a slope; None if nowhere."""
     share = 1.0

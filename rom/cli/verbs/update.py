@@ -6,6 +6,7 @@ chosen, and written with -o.
 """
 
 import argparse
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -48,6 +49,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--family", type=Path, required=True, help="family file, .rom.npz")
     parser.add_argument("--averages", type=count, help="number of them behind each function")
     parser.add_argument("--coherence", type=number, help="of all values, where the file has none")
+    parser.add_argument(
+        "--force-noise", type=positive, help="on the signal of a force, over the force itself"
+    )
     parser.add_argument("--points", type=Path, help="another file with the nodes of the test")
     parser.add_argument("--fixed", metavar="NAME,...", type=names, default=(), help="what was held")
     parser.add_argument(
@@ -103,6 +107,8 @@ def run(args: argparse.Namespace) -> Answer:
     test = read_responses(
         args.file, averages=args.averages, coherence=args.coherence, points=args.points
     )
+    if args.force_noise is not None:
+        test = replace(test, force_noise=args.force_noise)
     outside = _outside(args)
     if wrong := sorted(set(args.candidate) - set(outside)):
         raise ConfigError(f"--candidate {wrong[0]} is neither a --spring nor a --mass.")

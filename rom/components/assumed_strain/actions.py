@@ -10,7 +10,8 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from rom.components.assumed_strain.triangles import Sheet, sides_of
+from rom.arguments import finite, is_number, shortened, typed
+from rom.components.assumed_strain.triangles import Sheet, sides_of, whole_numbers
 from rom.components.histories import History, straightened
 from rom.errors import ConfigError, MeshError
 from rom.model import Array, Index
@@ -161,6 +162,7 @@ class Prepared:
         return self.at(t)[self.table.shape[1] - 2 * tools :].reshape(tools, 2)
 
 
+@typed
 def outer_sides(body: Sheet) -> Index:
     """(k, 2) nodes of the sides at the edge of a sheet, the solid on the left."""
     T = body.triangles
@@ -169,6 +171,7 @@ def outer_sides(body: Sheet) -> Index:
     return every[alone]
 
 
+@typed
 def disc(center: npt.ArrayLike, radius: float, *, n: int = 120) -> Array:
     """(n, 2) corners of a round outline; flat between them, they lie on the circle [m].
 
@@ -183,9 +186,7 @@ def disc(center: npt.ArrayLike, radius: float, *, n: int = 120) -> Array:
     if not 0 < radius < np.inf or n < 3:
         raise ConfigError(f"a disc of the radius {radius} m with {n} corners has no inside.")
     angle = 2 * np.pi * np.arange(n) / n
-    return np.asarray(center, dtype=float) + radius * np.column_stack(
-        [np.cos(angle), np.sin(angle)]
-    )
+    return finite("center", center, (2,)) + radius * np.column_stack([np.cos(angle), np.sin(angle)])
 
 
 def prepared(body: Sheet, actions: Actions, span: tuple[float, float] = (0.0, 1.0)) -> Prepared:
@@ -195,13 +196,14 @@ def prepared(body: Sheet, actions: Actions, span: tuple[float, float] = (0.0, 1.
         ConfigError: if histories, dofs, sides or tools do not fit; naming which.
         MeshError: if a tool begins inside the sheet, or the sheet in it.
     """
+    _refuse_strangers(actions)
     loads = np.zeros((len(actions.loads), *body.points.shape))
     for k, load in enumerate(actions.loads):
         loads[k] = nodal(f"forces of load {k}", load.forces, body)
     sides = [_outer(body, k, traction) for k, traction in enumerate(actions.tractions)]
     stress = [[x.pressure, x.shear] for x in actions.tractions]
     of = np.repeat(np.arange(len(sides)), [len(s) for s in sides])
-    moved = [dofs_of(drive.dofs, body) for drive in actions.drives]
+    moved = [dofs_of(x.dofs, body, f"drive {k}:") for k, x in enumerate(actions.drives)]
     driven, columns = _driven(dofs_of(actions.held, body), moved, len(loads) + len(sides))
     times, table = _table(_histories(actions, [m.size for m in moved], span))
     faces = [_faces(tool) for tool in actions.tools]
@@ -214,6 +216,21 @@ def prepared(body: Sheet, actions: Actions, span: tuple[float, float] = (0.0, 1.
     )  # fmt: skip
     _refuse_overlap(body, made)
     return made
+
+
+def _refuse_strangers(actions: Actions) -> None:
+    """Every list of actions holds records of its kind."""
+    kinds = {"loads": Load, "tractions": Traction, "drives": Drive, "tools": Tool}
+    for name, kind in kinds.items():
+        given = getattr(actions, name)
+        if not isinstance(given, Sequence) or isinstance(given, str):
+            raise ConfigError(
+                f"{name} = {shortened(given)} of the actions is no list.",
+                hint=f"Write [{kind.__name__}(...)], also of one.",
+            )
+        for k, one in enumerate(given):
+            if not isinstance(one, kind):
+                raise ConfigError(f"{name}[{k}] = {shortened(one)} is no {kind.__name__}.")
 
 
 def _driven(held: Index, moved: list[Index], first: int) -> tuple[Index, Index]:
@@ -233,24 +250,24 @@ def nodal(name: str, values: npt.ArrayLike, body: Sheet) -> Array:
     Raises:
         ConfigError: if they do not fit the sheet.
     """
-    x = np.ascontiguousarray(values, dtype=float)
-    if x.shape != body.points.shape or not np.isfinite(x).all():
+    x = np.ascontiguousarray(finite(name, values, None))
+    if x.shape != body.points.shape:
         raise ConfigError(
             f"{name} of the shape {x.shape}: {body.points.shape} finite numbers are needed."
         )
     return x
 
 
-def dofs_of(held: npt.ArrayLike, body: Sheet) -> Index:
+def dofs_of(held: npt.ArrayLike, body: Sheet, name: str = "held") -> Index:
     """Numbers of dofs, 2 * node + axis.
 
     Raises:
         ConfigError: if the sheet has no such dofs.
     """
-    dofs = np.asarray(held, dtype=np.int64).ravel()
+    dofs = whole_numbers(f"{name} dofs", held).ravel()
     if dofs.size and (dofs.min() < 0 or dofs.max() >= body.points.size):
         raise ConfigError(
-            f"held dofs {dofs.min()} to {dofs.max()}; the sheet has 0 to {body.points.size - 1}.",
+            f"{name} dofs {dofs.min()} to {dofs.max()}; the sheet has 0 to {body.points.size - 1}.",
             hint="A dof is 2 * node + axis.",
         )
     return dofs
@@ -258,8 +275,10 @@ def dofs_of(held: npt.ArrayLike, body: Sheet) -> Index:
 
 def _outer(body: Sheet, k: int, traction: Traction) -> Index:
     """Sides of a traction; each must be at the edge, and turned as there."""
-    wanted = np.asarray(traction.sides, dtype=np.int64).reshape(-1, 2)
-    if not np.isfinite([traction.pressure, traction.shear]).all():
+    wanted = whole_numbers(f"traction {k}: sides", traction.sides)
+    if wanted.ndim != 2 or wanted.shape[1] != 2:
+        raise ConfigError(f"traction {k}: sides of the shape {wanted.shape}, not (k, 2).")
+    if not (is_number(traction.pressure) and is_number(traction.shear)):
         raise ConfigError(f"traction {k} is not finite.")
     there = {tuple(side) for side in outer_sides(body).tolist()}
     for side in wanted.tolist():
@@ -273,11 +292,17 @@ def _outer(body: Sheet, k: int, traction: Traction) -> Index:
 
 def _faces(tool: Tool) -> Array:
     """(f, 7) corner, tangent, outer normal, length; a tool must be convex."""
-    X = np.asarray(tool.outline, dtype=float)
-    if X.ndim != 2 or X.shape[1] != 2 or len(X) < 3 or not np.isfinite(X).all():
+    if not isinstance(tool.name, str):
+        raise ConfigError(f"a tool has the name {shortened(tool.name)}, which is no text.")
+    X = finite(f"tool {tool.name!r}: the outline", tool.outline, None)
+    if X.ndim != 2 or X.shape[1] != 2 or len(X) < 3:
         raise ConfigError(f"tool {tool.name!r}: an outline has three finite corners or more.")
-    if not tool.friction >= 0:
-        raise ConfigError(f"tool {tool.name!r}: the friction {tool.friction} is negative.")
+    rough = isinstance(tool.friction, float) and tool.friction == np.inf
+    if not (rough or (is_number(tool.friction) and tool.friction >= 0)):
+        raise ConfigError(
+            f"tool {tool.name!r}: the friction {shortened(tool.friction)} must be a number from 0 "
+            "on, or infinite."
+        )
     along = np.roll(X, -1, axis=0) - X
     length = np.linalg.norm(along, axis=1)
     if not length.min() > 0:

@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.sparse import coo_matrix, csr_matrix, identity, kron
 
+from rom.arguments import finite, is_number, shortened, typed
 from rom.components.assumed_strain import kernels
 from rom.components.assumed_strain.actions import Actions, dofs_of, nodal, prepared
 from rom.components.assumed_strain.triangles import STATES, Sheet
@@ -43,6 +44,12 @@ class Metal:
     linear: bool = False
 
     def __post_init__(self) -> None:
+        for name in ("E", "nu", "rho", "yield_stress", "hardening"):
+            value = getattr(self, name)
+            if not is_number(value) and not (name == "yield_stress" and _endless(value)):
+                raise MaterialError(f"{name} = {shortened(value)} must be a finite number.")
+        if not isinstance(self.linear, bool):
+            raise MaterialError(f"linear = {shortened(self.linear)} must be True or False.")
         plastic = self.yield_stress > 0 and self.hardening >= 0
         if not (self.E > 0 and -1 < self.nu < 0.5 and self.rho > 0 and plastic):
             raise MaterialError(
@@ -63,6 +70,11 @@ class Metal:
         return float(np.sqrt((K + 4 / 3 * mu) / self.rho))
 
 
+def _endless(value: object) -> bool:
+    return isinstance(value, float) and value == np.inf
+
+
+@typed
 def tangent(body: Sheet, metal: Metal, x: Array, history: Array | None = None) -> csr_matrix:
     """(2n, 2n) tangent stiffness [N/m], where the positions began the linear one.
 
@@ -73,7 +85,7 @@ def tangent(body: Sheet, metal: Metal, x: Array, history: Array | None = None) -
         history: (t, p, 5) as of `forces` [1]; None: virgin.
 
     Raises:
-        ConfigError: if the positions do not fit the sheet.
+        ConfigError: if positions or history do not fit the sheet.
     """
     K, x = np.zeros((len(body.patch), 12, 12)), nodal("positions", x, body)
     kernels.tangents(x, *_parts(body, metal, history), K)
@@ -83,6 +95,7 @@ def tangent(body: Sheet, metal: Metal, x: Array, history: Array | None = None) -
     return coo_matrix((K.ravel(), (rows, columns)), shape=(2 * len(x),) * 2).tocsr()
 
 
+@typed
 def forces(
     body: Sheet, metal: Metal, x: Array, history: Array | None = None
 ) -> tuple[Array, Array]:
@@ -98,7 +111,7 @@ def forces(
         Forces (n, 2) [N] and the history after it.
 
     Raises:
-        ConfigError: if the positions do not fit the sheet.
+        ConfigError: if positions or history do not fit the sheet.
     """
     f, parts = np.zeros(body.points.shape), _parts(body, metal, history)
     new = np.empty_like(parts[-1])
@@ -106,6 +119,7 @@ def forces(
     return f, new
 
 
+@typed
 def mass(body: Sheet, metal: Metal) -> csr_matrix:
     """(2n, 2n) consistent mass [kg]; lumped by its row sums in `fly`."""
     m = body.weights.sum(axis=1) * metal.rho / 12
@@ -139,6 +153,7 @@ class Flight:
     reactions: Array
 
 
+@typed
 def fly(
     body: Sheet, metal: Metal, v: Array, held: npt.ArrayLike, t_end: float, *,
     pictures: int = 41, actions: Actions | None = None,
@@ -198,6 +213,7 @@ def depth_of(body: Sheet) -> float:
 
 def _parts(body: Sheet, metal: Metal, history: Array | None) -> tuple[Any, ...]:
     """Arguments of the kernels between positions and results."""
-    history = np.zeros((*body.weights.shape, 5)) if history is None else history
+    shape = (*body.weights.shape, 5)
+    history = np.zeros(shape) if history is None else finite("history", history, shape)
     numbers, state = metal.numbers, STATES[body.state]
     return body.patch, body.gradients, body.weights, body.radius, numbers, state, history

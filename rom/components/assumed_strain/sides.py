@@ -3,12 +3,14 @@
 import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix
 
+from rom.arguments import typed
 from rom.components.assumed_strain.motion import Metal
 from rom.components.assumed_strain.triangles import Sheet, constant_gradients, sides_of
 from rom.errors import ConfigError
 from rom.model import Array, Index
 
 
+@typed
 def stiffness_by_sides(body: Sheet, metal: Metal, *, share: tuple[int, int] = (0, 1)) -> csr_matrix:
     """(2n, 2n) linear stiffness of the element "F3" where the sheet began [N/m].
 

@@ -3,6 +3,7 @@
 import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix, identity, kron
 
+from rom.arguments import typed
 from rom.components.assumed_strain.motion import Metal, mass, tangent
 from rom.components.assumed_strain.plates import bending
 from rom.components.assumed_strain.triangles import Sheet
@@ -10,6 +11,7 @@ from rom.errors import ConfigError, InterfaceError
 from rom.model import Array, FEModel, Index, Interface, SurfaceMesh
 
 
+@typed
 def in_space(body: Sheet, metal: Metal, interfaces: dict[str, Index]) -> FEModel:
     """Stiffness and mass of a plane-stress sheet in the plane z = 0, free, for any reduction.
 

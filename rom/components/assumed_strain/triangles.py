@@ -10,11 +10,12 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from rom.arguments import one_of
+from rom.arguments import finite, one_of, shortened, typed
 from rom.errors import ConfigError, MeshError
 from rom.model import Array, Index
 
 STATES = {"plane stress": 0, "plane strain": 1, "axisymmetric": 2}
+LARGEST_WHOLE = 2**53  # up to which floats tell all whole numbers apart
 ELEMENTS = ("CST", "F1", "F3")  # constant strain; one point of mean metric; three points
 
 
@@ -51,6 +52,7 @@ class Sheet:
         return self.points[self.triangles, 0].mean(axis=1)
 
 
+@typed
 def sheet(
     points: npt.ArrayLike,
     triangles: npt.ArrayLike,
@@ -70,17 +72,23 @@ def sheet(
 
     Raises:
         ConfigError: for an unknown element or state, or a thickness that is not positive.
-        MeshError: if a triangle is turned over or names no point, a side belongs to three, or a
-            radius is negative.
+        MeshError: if a triangle is turned over or names no point, a point has no triangle, a side
+            belongs to three, or a radius is negative.
     """
     one_of("element", element, ELEMENTS)
     one_of("state", state, STATES)
     if not 0 < thickness < np.inf:
         raise ConfigError(f"thickness = {thickness} m: no sheet is as thin or as thick.")
-    X, T = np.asarray(points, dtype=float), np.asarray(triangles, dtype=np.int64)
+    X, T = finite("points", points, None), whole_numbers("triangles", triangles)
     _refuse_no_mesh(X, T, state)
     constant, area = constant_gradients(X, T)
     patch = np.hstack([T, _opposite(T)])
+    loose = np.setdiff1d(np.arange(len(X)), T)
+    if loose.size:
+        raise MeshError(
+            f"{loose.size} of {len(X)} points belong to no triangle, the first is {loose[0]}.",
+            hint="Leave them out: they have no mass, and nothing holds them.",
+        )
     G = np.zeros((len(T), 3, 6, 2))
     for k in range(3):
         G[:, k] = _side_gradients(X, patch, constant, k)
@@ -96,6 +104,21 @@ def sheet(
     depth = 2 * np.pi * X[T, 0].mean(axis=1) if state == "axisymmetric" else thickness
     weights = np.repeat((area * depth / G.shape[1])[:, None], G.shape[1], axis=1)
     return Sheet(X, T, patch, np.ascontiguousarray(G), weights, area, state, thickness)
+
+
+def whole_numbers(name: str, value: npt.ArrayLike) -> Index:
+    """Whole numbers of any shape, which counts of nodes or dofs are; True and False are none.
+
+    Raises:
+        ConfigError: for anything else.
+    """
+    found = finite(name, value, None)
+    if np.any(found % 1) or np.abs(found).max(initial=0.0) > LARGEST_WHOLE:
+        raise ConfigError(
+            f"{name} = {shortened(value)}: numbers of nodes or dofs are whole, 2^53 at most.",
+            hint="np.flatnonzero makes numbers of a condition.",
+        )
+    return found.astype(np.int64)
 
 
 def _refuse_no_mesh(X: Array, T: Index, state: str) -> None:
@@ -167,6 +190,7 @@ def _side_gradients(X: Array, patch: Index, constant: Array, k: int) -> Array:
     return G
 
 
+@typed
 def rectangle(
     n: tuple[int, int], corners: npt.ArrayLike, diagonal: str = "/"
 ) -> tuple[Array, Index]:
@@ -184,12 +208,12 @@ def rectangle(
         Points (m, 2) [m] and triangles (t, 3).
 
     Raises:
-        ConfigError: for fewer than one division, or another way to split.
+        ConfigError: for fewer than one division, other corners, or another way to split.
     """
     if min(n) < 1 or diagonal not in ("/", "\\", "x"):
         raise ConfigError(f'n = {n}, diagonal = {diagonal!r}: one or more, and "/", "\\\\" or "x".')
     s, t = (np.linspace(0, 1, k + 1) for k in n)
-    C = np.asarray(corners, dtype=float)
+    C = finite("corners", corners, (4, 2))
     a, b = (x.ravel() for x in np.meshgrid(s, t))
     X = np.column_stack([(1 - a) * (1 - b), a * (1 - b), a * b, (1 - a) * b]) @ C
     i = (np.arange(n[1])[:, None] * (n[0] + 1) + np.arange(n[0])).ravel()

@@ -3,8 +3,9 @@
 The kinetic energy of a mechanism with two degrees of freedom is q'^T A(q) q' / 2. It is isotropic
 where A is a multiple of the identity: a11 = a22 and a12 = 0. Two equations for two angles leave
 isolated points in general. The index 2 sqrt(det A) / tr A is one there and smaller elsewhere; on
-the torus of both angles its level curves are closed. Around an isolated isotropic point the vector
-((a11 - a22) / 2, a12) winds once, to the left or to the right, and these windings add up to zero.
+the torus of both angles its level curves are closed, within strokes some go from limit to limit.
+Around an isolated isotropic point the vector ((a11 - a22) / 2, a12) winds once, to the left or to
+the right, and on the torus these windings add up to zero.
 
 `rom.components.linkages.two_dof_linkages` has inertias to begin with.
 
@@ -26,9 +27,13 @@ from rom.model import Array, Index
 
 Assembles = Callable[[Array, Array], Any]  # angles of equal shape (...) -> (...) true or false
 Inertia = Callable[[Array, Array], Array]  # angles of equal shape (...) -> (..., 2, 2)
+Range = tuple[float, float] | None  # of a coordinate [rad or m]; None: a whole turn
+Ranges = tuple[Range, Range]
+TURNS: Ranges = (None, None)
 DIFFERENCE_STEP = 1e-5  # of central differences [rad]
 # least Jacobian of the normalised equations for an isotropic point that stands alone
 MIN_JACOBIAN = 1e-6
+SETTLED_ATOL = 1e-9  # of both equations: nearer, a step that does not halve them is round-off
 DETERMINANT_RTOL = 1e-12  # of the squared trace: round-off by which a determinant is negative
 
 
@@ -66,17 +71,35 @@ def christoffel(inertia: Inertia, q: npt.ArrayLike) -> Array:
 
 
 @typed
-def angle_grid(n: int) -> tuple[Array, Array]:
-    """(n, n), (n, n) angles of both motors over one turn [rad], the first along the rows.
+def angle_grid(n: int, ranges: Ranges = TURNS) -> tuple[Array, Array]:
+    """(n, n), (n, n) coordinates of both drives [rad or m], the first along the rows.
+
+    Args:
+        n: of nodes along each; a turn ends one node before it repeats, a range at both its ends.
+        ranges: (low, high) of each coordinate [rad or m]; None for an angle that makes whole turns.
 
     Raises:
-        ConfigError: for less than four cells.
+        ConfigError: for less than four nodes, or ranges that cannot be.
     """
     if n < 4:
-        raise ConfigError(f"n = {n}: a turn needs four cells or more.")
-    angles = 2 * np.pi * np.arange(n) / n
-    q1, q2 = np.meshgrid(angles, angles, indexing="ij")
+        raise ConfigError(f"n = {n}: a turn needs four cells or more, a range as well.")
+    at = (
+        2 * np.pi * np.arange(n) / n if r is None else np.linspace(*r, n) for r in checked(ranges)
+    )
+    q1, q2 = np.meshgrid(*at, indexing="ij")
     return q1, q2
+
+
+def checked(ranges: Ranges) -> Ranges:
+    """The ranges (low, high) [rad or m] if they can be.
+
+    Raises:
+        ConfigError: if one has no width.
+    """
+    for r in ranges:
+        if r is not None and not (np.isfinite(r).all() and r[0] < r[1]):
+            raise ConfigError(f"a range {r!r}: (low, high) with low < high, or None for a turn.")
+    return ranges
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,25 +118,34 @@ class Isotropic:
 
 
 @typed
-def index_map(inertia: Inertia, *, n: int = 400, assembles: Assembles | None = None) -> Array:
+def index_map(
+    inertia: Inertia,
+    ranges: Ranges = TURNS,
+    *,
+    lengths: npt.ArrayLike = (1.0, 1.0),
+    n: int = 400,
+    assembles: Assembles | None = None,
+) -> Array:
     """(n, n) isotropy index on `angle_grid` [1], zero where the mechanism cannot be assembled.
 
     At the border of what can be assembled a motor feels an unbounded inertia: the index goes to
     zero there, and its loci stay closed.
 
     Args:
-        inertia: function of two arrays of angles (...) that returns (..., 2, 2).
-        n: number of cells per turn.
-        assembles: function of the same angles that says where there is an inertia; None:
+        inertia: function of two arrays of coordinates (...) that returns (..., 2, 2).
+        ranges: (low, high) of each coordinate [rad or m]; None for an angle that makes whole turns.
+        lengths: (2,) as in `isotropy_index` [1 or m]: (L, 1) for an angle before a displacement.
+        n: number of nodes along each coordinate.
+        assembles: function of the same coordinates that says where there is an inertia; None:
             everywhere.
 
     Raises:
-        ConfigError, ModelError: for less than four cells; if it can be assembled nowhere, or the
-            function returns no inertia.
+        ConfigError, ModelError: for less than four nodes, or ranges and lengths that cannot be; if
+            it can be assembled nowhere, or the function returns no inertia.
     """
-    q1, q2 = angle_grid(n)
+    q1, q2 = angle_grid(n, ranges)
     there, index = _there(assembles, q1, q2, n), np.zeros((n, n))
-    index[there] = isotropy_index(inertia_at(inertia, q1[there], q2[there]))
+    index[there] = isotropy_index(inertia_at(inertia, q1[there], q2[there]), lengths=lengths)
     return index
 
 
@@ -157,15 +189,7 @@ def isotropic_configurations(
     f = np.full((n, n, 2), np.nan)
     f[there] = anisotropy(inertia, q1[there], q2[there])
     start = _suspects(f)
-    q = 2 * np.pi * (start + 0.5) / n
-    for _ in range(40):
-        q = q if assembles is None else q[around(assembles, q)]
-        f, J = anisotropy(inertia, *q.T), anisotropy_gradient(inertia, q)
-        step = -np.einsum("kij,kj->ki", np.linalg.pinv(J, rcond=1e-9), f)
-        q = q + step / np.maximum(np.abs(step).max(axis=1, initial=0.0) / 0.1, 1.0)[:, None]
-        if np.abs(step).max(initial=0.0) < 1e-13:
-            break
-    q = q if assembles is None else q[around(assembles, q)]
+    q = _refined(inertia, 2 * np.pi * (start + 0.5) / n, assembles)
     q = _distinct(q[np.abs(anisotropy(inertia, *q.T)).max(axis=1, initial=0.0) < 1e-11])
     turn = np.linalg.det(anisotropy_gradient(inertia, q))
     winding = np.where(np.abs(turn) > MIN_JACOBIAN, np.sign(turn), 0).astype(int)
@@ -176,6 +200,26 @@ def isotropic_configurations(
             hint="Take a finer grid.",
         )
     return Isotropic(q, inertia(*q.T)[:, 0, 0], winding)
+
+
+def _refined(inertia: Inertia, q: Array, assembles: Assembles | None) -> Array:
+    """Where Newton leads from angles (k, 2), as far as there is an inertia around."""
+    before, settled = np.full(len(q), np.inf), np.zeros((0, 2))
+    for _ in range(40):
+        fits = np.ones(len(q), bool) if assembles is None else around(assembles, q)
+        q, before = q[fits], before[fits]
+        f = anisotropy(inertia, *q.T)
+        left = np.abs(f).max(axis=1, initial=0.0)
+        moves = (left > SETTLED_ATOL) | (left < 0.5 * before)
+        settled = np.vstack([settled, q[~moves]])
+        q, f, before = q[moves], f[moves], left[moves]
+        if not len(q):
+            break
+        pinv = np.linalg.pinv(anisotropy_gradient(inertia, q), rcond=1e-9)
+        step = -np.einsum("kij,kj->ki", pinv, f)
+        q = q + step / np.maximum(np.abs(step).max(axis=1, initial=0.0) / 0.1, 1.0)[:, None]
+    q = q if assembles is None else q[around(assembles, q)]
+    return np.vstack([settled, q])
 
 
 def around(assembles: Assembles, q: Array) -> npt.NDArray[np.bool_]:
@@ -261,46 +305,60 @@ def _distinct(q: Array) -> Array:
 
 
 @typed
-def closed_loci(index: Array, level: float) -> list[Array]:
-    """Curves of one value of a field on the torus, each closed, across the seam as well.
+def closed_loci(index: Array, level: float, ranges: Ranges = TURNS) -> list[Array]:
+    """Curves of one value of a field, closed, or within ranges from one limit to another.
 
     Args:
         index: (n, n) values on `angle_grid`, in units of the field.
         level: the value, in units of the field.
+        ranges: (low, high) of each coordinate, as of that grid [rad or m]; None for an angle that
+            makes whole turns.
 
     Returns:
-        (k, 2) angles of each curve [rad], continuous; the last point is the first one, moved by
-        whole turns if the curve goes around the torus.
+        (k, 2) coordinates of each curve [rad or m], continuous; the last point of a closed one is
+        the first one, moved by whole turns if the curve goes around the torus.
 
     Raises:
-        ConfigError: if the field is not that of a square grid, or has gaps.
+        ConfigError: if the field is not that of a square grid, or has gaps; for ranges that cannot
+            be.
     """
     if (
         np.ndim(index) != 2
         or len(set(np.shape(index))) != 1
-        or not index.size
+        or len(index) < 2
         or not np.isfinite(index).all()
     ):
         raise ConfigError(f"a field {np.shape(index)}: (n, n) finite values are needed.")
-    names, neighbours = _joined(index, level)
-    points, fresh, curves = _crossings(index, level, names), np.ones(len(names), dtype=bool), []
-    for start in range(len(names)):
+    names, neighbours = _joined(index, level, checked(ranges))
+    nodes, fresh, curves = _crossings(index, level, names), np.ones(len(names), dtype=bool), []
+    ends = np.flatnonzero(neighbours[:, 1] < 0)
+    for start in [*ends, *range(len(names))]:
         if not fresh[start]:
             continue
         path, before, at = [start], start, neighbours[start, 0]
-        while at != start:
+        while at not in (start, -1):
             path.append(at)
             one, other = neighbours[at]
             before, at = at, other if one == before else one
         fresh[path] = False
-        curves.append(np.unwrap(points[[*path, start]], axis=0))
+        curves.append(_placed(nodes[[*path, start] if at == start else path], ranges, len(index)))
     return curves
 
 
-def _joined(index: Array, level: float) -> tuple[Index, Index]:
+def _placed(nodes: Array, ranges: Ranges, n: int) -> Array:
+    """(k, 2) continuous coordinates of places (k, 2) counted in nodes of the grid."""
+    columns = [
+        2 * np.pi / n * np.unwrap(x, period=n) if r is None else r[0] + (r[1] - r[0]) * x / (n - 1)
+        for x, r in zip(nodes.T, ranges, strict=True)
+    ]
+    return np.column_stack(columns)
+
+
+def _joined(index: Array, level: float, ranges: Ranges) -> tuple[Index, Index]:
     """Grid edges that the level crosses (k,), and the two crossings next to each (k, 2).
 
-    Each edge belongs to two cells and every cell joins its crossings in pairs: curves cannot end.
+    Each edge belongs to two cells and every cell joins its crossings in pairs: curves cannot end
+    but at the limit of a range, whose edges have one cell: their second neighbour is -1.
     """
     n = len(index)
     along = np.arange(n * n).reshape(n, n)  # edge from node (i, j) to (i + 1, j)
@@ -311,6 +369,8 @@ def _joined(index: Array, level: float) -> tuple[Index, Index]:
     )
     inside = corners >= level
     cut = inside != np.roll(inside, -1, axis=0)
+    cut[:, -1:, :] &= ranges[0] is None  # no cells beyond the last node of a range
+    cut[:, :, -1:] &= ranges[1] is None
     plain, saddle = cut.sum(axis=0) == 2, cut.all(axis=0)
     pairs = sides[:, plain].T[cut[:, plain].T].reshape(-1, 2)
     bottom, right, top, left = sides[:, saddle]
@@ -320,15 +380,19 @@ def _joined(index: Array, level: float) -> tuple[Index, Index]:
     pairs = np.vstack([pairs, one, other])
     ends = np.vstack([pairs, pairs[:, ::-1]])
     ends = ends[np.argsort(ends[:, 0], kind="stable")]
-    names = ends[::2, 0]
-    return names, np.searchsorted(names, ends[:, 1]).reshape(-1, 2)
+    names, first, count = np.unique(ends[:, 0], return_index=True, return_counts=True)
+    neighbours = np.full((len(names), 2), -1)
+    neighbours[:, 0] = np.searchsorted(names, ends[first, 1])
+    inner = count == 2
+    neighbours[inner, 1] = np.searchsorted(names, ends[first[inner] + 1, 1])
+    return names, neighbours
 
 
 def _crossings(index: Array, level: float, names: Index) -> Array:
-    """(k, 2) angles at which the level crosses grid edges, linearly interpolated."""
+    """(k, 2) places where the level crosses grid edges, in nodes, linearly interpolated."""
     n = len(index)
     up, node = np.divmod(names, n * n)
     i, j = np.divmod(node, n)
     here, there = index[i, j], index[(i + 1 - up) % n, (j + up) % n]
     share = (level - here) / (there - here)
-    return 2 * np.pi / n * np.column_stack([i + share * (1 - up), j + share * up])
+    return np.column_stack([i + share * (1 - up), j + share * up])

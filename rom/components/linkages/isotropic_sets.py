@@ -25,11 +25,14 @@ import numpy.typing as npt
 from rom.arguments import typed
 from rom.components.linkages.dynamic_isotropy import (
     DIFFERENCE_STEP,
+    TURNS,
     Assembles,
     Inertia,
+    Ranges,
     anisotropy,
     anisotropy_gradient,
     around,
+    checked,
     inertia_at,
     isotropic_configurations,
     isotropy_index,
@@ -37,8 +40,6 @@ from rom.components.linkages.dynamic_isotropy import (
 from rom.errors import ConfigError, ModelError
 from rom.model import Array, Index
 
-Range = tuple[float, float] | None  # of a coordinate [rad or m]; None: a whole turn
-Ranges = tuple[Range, Range]
 Tip = Callable[[Array, Array], Array]  # coordinates of equal shape (...) -> (..., 2)
 EVERYWHERE_ATOL = 1e-9  # of f: below it in all postures, A is a multiple of the identity
 CURVE_STEP = 0.01  # along a curve of isotropy, to see whether it goes on [rad]
@@ -64,7 +65,7 @@ class IsotropicSet:
 @typed
 def isotropic_set(
     inertia: Inertia,
-    ranges: Ranges = (None, None),
+    ranges: Ranges = TURNS,
     *,
     lengths: npt.ArrayLike = (1.0, 1.0),
     n: int = 120,
@@ -88,7 +89,7 @@ def isotropic_set(
     """
     if n < 4:
         raise ConfigError(f"n = {n}: the search needs four cells or more.")
-    there = _Stretched(_checked(ranges), n, inertia, _both(lengths), assembles)
+    there = _Stretched(checked(ranges), n, inertia, _both(lengths), assembles)
     q1, q2 = np.meshgrid(*2 * [2 * np.pi * np.arange(n) / n], indexing="ij")
     inside = there.assembles(q1, q2)
     if inside.any():
@@ -96,7 +97,7 @@ def isotropic_set(
         if np.abs(anisotropy(there.inertia, *q.T)).max() < EVERYWHERE_ATOL:
             A = there.inertia(*q.T)[:, 0, 0]
             return IsotropicSet("everywhere", there.coordinates(q), A, np.zeros(len(q), int))
-    whole = ranges == (None, None) and assembles is None
+    whole = ranges == TURNS and assembles is None
     found = isotropic_configurations(
         there.inertia, n=n, assembles=None if whole else there.assembles
     )
@@ -144,7 +145,7 @@ class ToolIsotropy:
 def tool_isotropy(
     inertia: Inertia,
     tip: Tip,
-    ranges: Ranges = (None, None),
+    ranges: Ranges = TURNS,
     *,
     n: int = 200,
     assembles: Assembles | None = None,
@@ -171,7 +172,7 @@ def tool_isotropy(
     """
     if n < 1:
         raise ConfigError(f"n = {n}: the midpoint rule needs a cell.")
-    there = _Stretched(_checked(ranges), n, inertia, np.ones(2), assembles, closed=True)
+    there = _Stretched(checked(ranges), n, inertia, np.ones(2), assembles, closed=True)
     q = np.stack(np.meshgrid(*2 * [2 * np.pi * (np.arange(n) + 0.5) / n], indexing="ij"), axis=-1)
     q = q.reshape(-1, 2)
     q = q[around(there.assembles, q)]
@@ -242,13 +243,6 @@ class _Stretched:
 
     def _end(self) -> float:
         return 2 * np.pi * (1.0 if self.closed else 1 - 2 / self.n)
-
-
-def _checked(ranges: Ranges) -> Ranges:
-    for r in ranges:
-        if r is not None and not (np.isfinite(r).all() and r[0] < r[1]):
-            raise ConfigError(f"a range {r!r}: (low, high) with low < high, or None for a turn.")
-    return ranges
 
 
 def _both(lengths: npt.ArrayLike) -> Array:

@@ -7,6 +7,7 @@ the same from the mass matrix and the constraints of any `rom.Mechanism`.
 """
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Literal
 
 import numpy as np
@@ -35,7 +36,9 @@ from rom.mbs.mechanism import Mechanism
 from rom.model import Array
 
 Elastic = Literal["held", "free"] | float
-MAX_FOLLOWED = 0.5  # of a drive between two assemblies: farther, a linkage may close elsewhere
+KEPT_POSTURES = 4096  # whose inertia is known: asking whether it exists costs nothing more
+# of a drive between two assemblies [rad, or sizes of the mechanism]: farther, it closes elsewhere
+MAX_FOLLOWED = 0.5
 
 
 @typed
@@ -334,6 +337,7 @@ class Driven:
             raise ConfigError(f"the tool {tool!r} is none of {list(self._packed.names)}.")
         self._rows, self._tool = np.array(rows), tool
         self._work = workspace(self._packed.system, len(self._packed.signals))
+        self._known = lru_cache(KEPT_POSTURES)(self._found)
         self._is_held = one_of("elastic", elastic, ("held", "free")) == "held"
 
     def inertia(self, q1: npt.ArrayLike, q2: npt.ArrayLike) -> Array:
@@ -343,8 +347,11 @@ class Driven:
             ModelError: if the drives do not determine the motion there, or it cannot be assembled.
         """
         q1, q2 = np.broadcast_arrays(np.asarray(q1, dtype=float), np.asarray(q2, dtype=float))
-        out = np.array([self._of(self._posture(q)) for q in zip(q1.flat, q2.flat, strict=True)])
-        return out.reshape(*q1.shape, 2, 2)
+        out = [self._known(*q) for q in zip(q1.flat, q2.flat, strict=True)]
+        for found in out:
+            if isinstance(found, ModelError):
+                raise found
+        return np.array(out).reshape(*q1.shape, 2, 2)
 
     def tip(self, q1: npt.ArrayLike, q2: npt.ArrayLike) -> Array:
         """(..., 2) where the tool is in the plane z = const [m]; q1 and q2 in [rad or m].
@@ -362,21 +369,21 @@ class Driven:
     def assembles(self, q1: npt.ArrayLike, q2: npt.ArrayLike) -> npt.NDArray[np.bool_]:
         """(...) whether there is an inertia at coordinates (...) [rad or m]."""
         q1, q2 = np.broadcast_arrays(np.asarray(q1, dtype=float), np.asarray(q2, dtype=float))
-        return np.array([self._exists(q) for q in zip(q1.flat, q2.flat, strict=True)]).reshape(
-            q1.shape
-        )
+        known = (self._known(*q) for q in zip(q1.flat, q2.flat, strict=True))
+        return np.array([not isinstance(x, ModelError) for x in known], bool).reshape(q1.shape)
 
-    def _exists(self, q: tuple[float, float]) -> bool:
+    def _found(self, q1: float, q2: float) -> Array | ModelError:
+        """Inertia (2, 2), or why there is none."""
         try:
-            self._of(self._posture(q))
-        except ModelError:
-            return False
-        return True
+            return self._of(self._posture((q1, q2)))
+        except ModelError as error:
+            return error
 
     def _posture(self, coordinates: tuple[float, float]) -> Array:
         """All coordinates of the bodies, followed from where they were added."""
         W, rows, q = self._work, self._packed.system.rows, self._packed.q
-        steps = max(1, int(np.ceil(np.abs(coordinates).max() / MAX_FOLLOWED)))
+        far = np.abs(coordinates) / self._packed.row_scale[self._rows]
+        steps = max(1, int(np.ceil(far.max() / MAX_FOLLOWED)))
         for share in np.arange(1, steps + 1) / steps:
             W.signal[rows.signal[self._rows], 0] = share * np.asarray(coordinates)
             q = assembled(self._packed, W, q)

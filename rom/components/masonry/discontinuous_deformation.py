@@ -157,10 +157,10 @@ def eliminate(L, U, left, i):
 
 @inner
 def factorise(L, U, left, symmetric):
-    """Triangular factors of equal diagonals in place, within the envelope; U is transposed.
+    """Triangular factors in place, their diagonals equal but for signs; U is transposed.
 
-    False if a pivot is not positive, as friction can make it. Where equations are symmetric, L is
-    handed over as U.
+    Large friction makes pivots negative without making states wrong. False if one vanishes, or is
+    negative where equations are symmetric and L is handed over as U.
     """
     for i in range(left.size):
         eliminate(L, U, left, i)
@@ -169,9 +169,10 @@ def factorise(L, U, left, symmetric):
         pivot = L[i, i]
         for k in range(left[i], i):
             pivot -= L[i, k] * U[i, k]
-        if not pivot > 0.0:
+        if not (pivot > 0.0 or (pivot < 0.0 and not symmetric)):
             return False
-        L[i, i] = U[i, i] = math.sqrt(pivot)
+        L[i, i] = math.sqrt(abs(pivot))
+        U[i, i] = math.copysign(L[i, i], pivot)
     return True
 
 
@@ -257,8 +258,8 @@ def right_hand_side(B, law, C, h, W):
 
 @inner
 def review(B, law, C, d):
-    """States and normal forces at the end of the step; True if a contact has changed."""
-    changed = False
+    """States and normal forces at the end of the step; 0 if none has changed, or a sum of them."""
+    changed, code = False, 1
     for k in range(C.used[0]):
         force = -law.normal * (C.gap[k] + change(B, C, k, C.n, d, held=False))
         trial = law.shear * (C.slip[k] + change(B, C, k, C.t, d, held=False))
@@ -277,12 +278,18 @@ def review(B, law, C, d):
         if state != C.state[k] or (state == SLIDES and direction != C.way[k]):
             changed = True
         C.state[k], C.way[k], C.force[k] = state, direction, pressed
-    return changed
+        code = 31 * code + 3 * state + (state == SLIDES and direction > 0.0)
+    return 2 * code + 1 if changed else 0
 
 
 @inner
 def step(B, law, C, h, W):
-    """Open-close iteration for the increments W.d over h; False if it does not settle."""
+    """Open-close iteration for the increments W.d over h; False if it does not settle.
+
+    It does not where a contact with much friction neither sticks nor slips in steps of h: forces
+    beyond friction let it slip, the pressure that slipping brings lets it stick, in turns.
+    """
+    last = earlier = 0
     for _ in range(STATE_CHANGES + 1):
         symmetric = assemble(B, law, C, h, W)
         U = W.A if symmetric else W.U
@@ -300,8 +307,12 @@ def step(B, law, C, h, W):
                     for p in range(B.size[b]):
                         displacement += W.T[a, axis, p] * W.d[b, p]
                     farthest = max(farthest, abs(displacement))
-        if not review(B, law, C, W.d):
+        found = review(B, law, C, W.d)
+        if found == 0:
             return farthest < 0.5 * law.reach
+        if found == earlier:
+            return False
+        earlier, last = last, found
     return False
 
 

@@ -2,8 +2,9 @@
 
 `wind_turbine` has blade and tower as rods, `drivetrain` the run-up of the rotor, `whole_turbine`
 all in one mechanism. Of the wind, `profiles` has lift and drag, `momentum` the induction, `inflow`
-the dam of the tower, `blading` the loads of a rotor, `blade_element` those on rods, `control`
-torque, pitch and power curve, `operation` the turbine in wind that changes.
+the dam of the tower, `blading` the loads of a rotor, `blade_element` those on rods, `wake` the
+memory of their wake, `control` torque, pitch and power curve, `controlled` both in a mechanism,
+`operation` the turbine in wind that changes.
 """
 
 from rom.lazy import front

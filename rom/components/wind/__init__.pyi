@@ -18,6 +18,7 @@ from rom.components.wind.operation import operate as operate
 from rom.components.wind.profiles import Profile as Profile
 from rom.components.wind.profiles import profile as profile
 from rom.components.wind.profiles import profiles as profiles
+from rom.components.wind.wake import in_late_wind as in_late_wind
 from rom.components.wind.whole_turbine import PLACES as PLACES
 from rom.components.wind.whole_turbine import PUBLISHED_FREQUENCIES as PUBLISHED_FREQUENCIES
 from rom.components.wind.whole_turbine import Turbine as Turbine

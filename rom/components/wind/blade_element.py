@@ -31,7 +31,7 @@ from rom.components.wind.blading import (
     strip_load,
 )
 from rom.components.wind.inflow import NO_TOWER, TOWER_TUBE, slope_of_wind, wind_at
-from rom.components.wind.momentum import STRIP_WIDTH, induced
+from rom.components.wind.momentum import STRIP_WIDTH, slowed
 from rom.components.wind.profiles import profiles
 from rom.components.wind.wind_turbine import (
     BLADE_LENGTH,
@@ -57,60 +57,72 @@ SLOPE_STEP = 1e-5
 
 
 @inner
-def section_force(g, k, speed, flow, turned, out):
-    """Force on a section, its axes: air of a speed from an angle, a plane of the rotor turned.
-
-    The first axis is downwind without twist, the second towards the trailing edge; ``turned`` is
-    the angle of the normal of the plane from the first axis, ``flow`` that of the air from the
-    second.
-    """
-    axial, across = speed * math.sin(flow + turned), speed * math.cos(flow + turned)
-    strip, profile = g[11 : 11 + STRIP_WIDTH], g[PROFILE_START + 1 :]
-    theta = turned + g[TWIST_PLACE]
-    met = induced(strip, profile, k, theta, axial, across)
-    normal, driving, _ = strip_load(strip, profile, k, theta, met, g[0])
-    c, s = g[1] * math.cos(turned), g[1] * math.sin(turned)
+def on_section(length, turned, normal, driving, out):
+    """Force on a section, its axes, from those per length across the plane and in it."""
+    c, s = length * math.cos(turned), length * math.sin(turned)
     out[0] = normal * c + driving * s
     out[1] = normal * s - driving * c
 
 
 @inner
-def section_slopes(g, k, u, m, out):
+def section_force(g, k, speed, flow, turned, lee, out):
+    """Force on a section, its axes: air of a speed from an angle, a plane of the rotor turned.
+
+    The first axis is downwind without twist, the second towards the trailing edge; ``turned`` is
+    the angle of the normal of the plane from the first axis, ``flow`` that of the air from the
+    second, ``lee`` the angle of the wind from the axis and how far the blade points to where the
+    wake leans.
+    """
+    axial, across = speed * math.sin(flow + turned), speed * math.cos(flow + turned)
+    strip, profile = g[11 : 11 + STRIP_WIDTH], g[PROFILE_START + 1 :]
+    theta = turned + g[TWIST_PLACE]
+    met = slowed(strip, profile, k, theta, (axial, across), lee)
+    normal, driving, _ = strip_load(strip, profile, k, theta, met, g[0])
+    on_section(g[1], turned, normal, driving, out)
+
+
+@inner
+def section_slopes(g, k, u, m, lee, out):
     """(2, 4) how that force grows with the air in the section (2) and with the normal (2).
 
-    With the square of a speed in proportion; with the two angles by differences.
+    With the square of a speed in proportion; with the two angles by differences, and likewise (2)
+    with where the blade points.
     """
-    ahead, behind = out[8:10], out[10:12]
+    ahead, behind = out[10:12], out[12:14]
     air, size = u[0] * u[0] + u[1] * u[1], m[0] * m[0] + m[1] * m[1]
     speed, flow, turned = math.sqrt(air), math.atan2(u[0], u[1]), math.atan2(m[1], m[0])
-    section_force(g, k, speed, flow, turned, ahead)
+    section_force(g, k, speed, flow, turned, lee, ahead)
     for i in range(2):
         for j in range(2):
             out[4 * i + j] = 2.0 * ahead[i] * u[j] / air
             out[4 * i + 2 + j] = 0.0
-    section_force(g, k, speed, flow + SLOPE_STEP, turned, ahead)
-    section_force(g, k, speed, flow - SLOPE_STEP, turned, behind)
+    section_force(g, k, speed, flow + SLOPE_STEP, turned, lee, ahead)
+    section_force(g, k, speed, flow - SLOPE_STEP, turned, lee, behind)
     for i in range(2):
         slope = (ahead[i] - behind[i]) / (2.0 * SLOPE_STEP)
         out[4 * i] += slope * u[1] / air
         out[4 * i + 1] -= slope * u[0] / air
-    section_force(g, k, speed, flow, turned + SLOPE_STEP, ahead)
-    section_force(g, k, speed, flow, turned - SLOPE_STEP, behind)
+    section_force(g, k, speed, flow, turned + SLOPE_STEP, lee, ahead)
+    section_force(g, k, speed, flow, turned - SLOPE_STEP, lee, behind)
     for i in range(2):
         slope = (ahead[i] - behind[i]) / (2.0 * SLOPE_STEP)
         out[4 * i + 2] = -slope * m[1] / size
         out[4 * i + 3] = slope * m[0] / size
+    section_force(g, k, speed, flow, turned, (lee[0], lee[1] + SLOPE_STEP), ahead)
+    section_force(g, k, speed, flow, turned, (lee[0], lee[1] - SLOPE_STEP), behind)
+    for i in range(2):
+        out[8 + i] = (ahead[i] - behind[i]) / (2.0 * SLOPE_STEP)
 
 
 @inner
-def turns_of_section(J, u, m, force, out):
+def turns_of_section(J, u, m, lean, force, out):
     """(3, 3) how the force in axes of the section grows with their rotation.
 
-    Air and normal turn against the axes, the force with them.
+    Air, normal and the lean of the wake turn against the axes, the force with them.
     """
     for i in range(2):
-        out[i, 0] = J[4 * i + 1] * u[2] + J[4 * i + 3] * m[2]
-        out[i, 1] = -J[4 * i] * u[2] - J[4 * i + 2] * m[2]
+        out[i, 0] = J[4 * i + 1] * u[2] + J[4 * i + 3] * m[2] - J[8 + i] * lean[1]
+        out[i, 1] = -J[4 * i] * u[2] - J[4 * i + 2] * m[2] + J[8 + i] * lean[0]
         out[i, 2] = (J[4 * i] * u[1] - J[4 * i + 1] * u[0]
                      + J[4 * i + 2] * m[1] - J[4 * i + 3] * m[0])  # fmt: skip
         out[2, i] = 0.0
@@ -136,6 +148,48 @@ def spread(R, J, L, W, out):
                 out[8 + 6 * i + j] -= out[44 + 6 * i + m] * W[m, j]
 
 
+@inner
+def lean_of_wake(g, R, m, out):
+    """Angle of the wind from the shaft; fills (3,) in axes of the section: where the wake leans.
+
+    Its last number is the cosine of the angle between this direction and the blade, seen in the
+    plane of the rotor, the others what that grows by with turns about the second axis and against
+    the first. All are zero if wind and shaft are parallel; ``m`` is the normal of this plane.
+    """
+    along, size = g[2] * g[5] + g[3] * g[6] + g[4] * g[7], m[0] * m[0] + m[1] * m[1]
+    for i in range(3):
+        out[i] = 0.0
+        for j in range(3):
+            out[i] += R[j, i] * (g[2 + j] - along * g[5 + j])
+    beside = math.sqrt(out[0] * out[0] + out[1] * out[1] + out[2] * out[2])
+    scale = 1.0 / (beside * math.sqrt(size)) if beside * size > 0.0 else 0.0
+    for i in range(3):
+        out[i] *= scale
+    if scale > 0.0:
+        for i in range(2):
+            out[i] += out[2] * m[2] * m[i] / size
+    return math.atan2(beside, along)
+
+
+@inner
+def meet(g, wind, place, velocity, R, room):
+    """Air of a multiple of a wind that a section meets, the angle of the wind from the shaft.
+
+    Fills (12,): air there in the world, air and normal of the plane of the rotor in axes of the
+    section, where the wake leans.
+    """
+    air, u, m, lean = room[0:3], room[3:6], room[6:9], room[9:12]
+    for i in range(3):
+        air[i] = wind * g[2 + i]
+    wind_at((g[8], g[9], g[10]), place[0], place[1], place[2], air)
+    for i in range(3):
+        u[i] = m[i] = 0.0
+        for j in range(3):
+            u[i] += R[j, i] * (air[j] - velocity[j])
+            m[i] += R[j, i] * g[5 + j]
+    return lean_of_wake(g, R, m, lean)
+
+
 def strip(numbers, pose, wanted, answer, space):
     """Wind on one strip, see PROFILE_START for the numbers."""
     k = int(carray(numbers, (PROFILE_START + 1,))[PROFILE_START])
@@ -143,29 +197,22 @@ def strip(numbers, pose, wanted, answer, space):
     out, room = carray(answer, (2 + 6 + 72,)), carray(space, (64,))
     out[:] = 0.0
     R, L, W = room[0:9].reshape((3, 3)), room[9:18].reshape((3, 3)), room[18:27].reshape((3, 3))
-    air, u, m, force, J = room[27:30], room[30:33], room[33:36], room[36:38], room[38:50]
+    u, m, lean, force, J = room[30:33], room[33:36], room[36:39], room[39:41], room[41:55]
     rotation_of(s[3:7], R)
-    tower = (g[8], g[9], g[10])
-    for i in range(3):
-        air[i] = g[2 + i]
-    wind_at(tower, s[0], s[1], s[2], air)
-    for i in range(3):
-        u[i] = m[i] = 0.0
-        for j in range(3):
-            u[i] += R[j, i] * (air[j] - s[7 + j])
-            m[i] += R[j, i] * g[5 + j]
+    yaw = meet(g, 1.0, s[0:3], s[7:10], R, room[27:39])
     speed = math.sqrt(u[0] * u[0] + u[1] * u[1])
     if speed == 0.0 or m[0] * m[0] + m[1] * m[1] == 0.0:
         return
-    section_force(g, k, speed, math.atan2(u[0], u[1]), math.atan2(m[1], m[0]), force)
+    lee = yaw, lean[2]
+    section_force(g, k, speed, math.atan2(u[0], u[1]), math.atan2(m[1], m[0]), lee, force)
     for i in range(3):
         out[2 + i] = -(R[i, 0] * force[0] + R[i, 1] * force[1])
         out[1] += out[2 + i] * s[7 + i]
     if wanted == 0:
         return
-    section_slopes(g, k, u, m, J)
-    turns_of_section(J, u, m, force, L)
-    slope_of_wind(tower, (s[0], s[1], s[2]), (g[2], g[3]), W)
+    section_slopes(g, k, u, m, lee, J)
+    turns_of_section(J, u, m, lean, force, L)
+    slope_of_wind((g[8], g[9], g[10]), (s[0], s[1], s[2]), (g[2], g[3]), W)
     spread(R, J, L, W, out)
 
 
@@ -200,6 +247,16 @@ def in_wind(
     Raises:
         ConfigError: for a wind that is no vector or comes from behind, or a density that cannot be.
     """
+    far = far_away(wind, axis, tower=tower, density=density)
+    groups = [Elements.of(compiled_strip(), np.array([[k]]), numbers[None, :])
+              for k, numbers in enumerate(strip_rows(blade, far, cone))]  # fmt: skip
+    return replace(blade, elements=(*blade.elements, *groups))
+
+
+def far_away(
+    wind: npt.ArrayLike, axis: npt.ArrayLike, *, tower: bool, density: float
+) -> list[float]:
+    """Half the density, wind, axis and tower as strips know them; `in_wind` refuses the same."""
     wind = np.asarray(wind, dtype=float)
     if wind.shape != (3,) or not np.isfinite(wind).all():
         raise ConfigError(f"the wind {wind.tolist()} is no velocity of three numbers.")
@@ -209,15 +266,16 @@ def in_wind(
                           hint="The axis of the shaft points downwind.")  # fmt: skip
     if not density > 0.0:
         raise ConfigError(f"there is no air of {density:g} kg/m^3.")
-    far = [0.5 * density, *wind, *axis, *(TOWER_TUBE if tower else NO_TOWER)]
-    elements = [
-        _strip_of(k, row, far, cone) for k, row in enumerate(zip(*strips(blade), strict=True))
-    ]
-    return replace(blade, elements=(*blade.elements, *elements))
+    return [0.5 * density, *wind, *axis, *(TOWER_TUBE if tower else NO_TOWER)]
 
 
-def _strip_of(k: int, row: tuple[float, ...], far: list[float], cone: float) -> Elements:
-    """The element of the strip of vertex k: its middle, length, chord and twist in the frame."""
+def strip_rows(blade: RodBody, far: list[float], cone: float) -> list[Array]:
+    """The numbers of the strip of each vertex, see PROFILE_START."""
+    return [_strip_of(row, far, cone) for row in zip(*strips(blade), strict=True)]
+
+
+def _strip_of(row: tuple[float, ...], far: list[float], cone: float) -> Array:
+    """Numbers of a strip from its middle, length, chord and twist in the frame."""
     radius, length, chord, twist = row
     at = np.searchsorted(HUB_RADIUS + np.cumsum(ELEMENT_LENGTH), radius)
     profile = profiles()[ELEMENT_PROFILE[min(int(at), len(ELEMENT_PROFILE) - 1)]]
@@ -231,8 +289,7 @@ def _strip_of(k: int, row: tuple[float, ...], far: list[float], cone: float) -> 
         twist,
         profile.angle.size,
     ]
-    numbers = np.concatenate([far[:1], [length], far[1:], of_strip, profile.table.ravel()])
-    return Elements.of(compiled_strip(), np.array([[k]]), numbers[None, :])
+    return np.concatenate([far[:1], [length], far[1:], of_strip, profile.table.ravel()])
 
 
 def strips(blade: RodBody) -> tuple[Array, Array, Array, Array]:

@@ -18,7 +18,7 @@ import numpy as np
 from rom.arguments import typed
 from rom.components.compiled import inner, kernel
 from rom.components.wind.inflow import NO_TOWER, TOWER_TUBE, wind_at
-from rom.components.wind.momentum import CHORD_COLUMN, coefficients, induced, skewed
+from rom.components.wind.momentum import CHORD_COLUMN, coefficients, slowed
 from rom.components.wind.profiles import Profile, profiles
 from rom.components.wind.wind_turbine import (
     CONE_ANGLE,
@@ -215,8 +215,8 @@ def turn(strips, tables, counts, shape, angles, wind, motion, tower, out):  # no
             n, e = v[0] * ct, c * v[0] * st - s * v[1]
             ahead = -c * v[1] - s * v[0] * st  # with the motion of the blade
             theta, far = axial[j] + pitch, cc * n + sc * e
-            flow = induced(strips[j], tables[j], counts[j], theta, far, speed * r - ahead)
-            flow = skewed(strips[j], far, flow[0], lean, toward), flow[1], flow[2]
+            far_off = far, speed * r - ahead
+            flow = slowed(strips[j], tables[j], counts[j], theta, far_off, (lean, toward))
             normal, tangential, attack = strip_load(
                 strips[j], tables[j], counts[j], theta, flow, half_density)  # fmt: skip
             row = out[i, j]

@@ -18,6 +18,7 @@ import numpy.typing as npt
 from scipy.optimize import brentq
 
 from rom.arguments import typed, vector
+from rom.components.compiled import inner, kernel
 from rom.components.wind.blading import Blading, RotorLoad, blading, rotor_load
 from rom.components.wind.wind_turbine import GEAR_RATIO, RATED_SPEED
 from rom.errors import ConfigError
@@ -46,6 +47,47 @@ PUBLISHED_PITCH = ((12.0, 3.83), (13.0, 6.60), (14.0, 8.70), (15.0, 10.45), (16.
                    (22.0, 19.94), (23.0, 21.18), (24.0, 22.35), (25.0, 23.47))  # fmt: skip
 
 
+@inner
+def asked_torque(speed, pitch):
+    """Torque of the generator at its speed with a pitch of the blades."""
+    if speed >= RATED_GENERATOR or (pitch >= RATED_PITCH_ANGLE and speed > 0.0):
+        return min(RATED_POWER / speed, LARGEST_TORQUE)
+    if speed <= CUT_IN_GENERATOR:
+        return 0.0
+    if speed < SQUARE_GENERATOR:
+        slope = SQUARE_GAIN * SQUARE_GENERATOR**2 / (SQUARE_GENERATOR - CUT_IN_GENERATOR)
+        return slope * (speed - CUT_IN_GENERATOR)
+    return max(SQUARE_GAIN * speed**2, RAMP_SLOPE * (speed - SYNCHRONOUS_GENERATOR))
+
+
+@inner
+def advance(state, speed, dt):
+    """Take a controller a step further, see `Controller`: its four numbers in their order."""
+    share = math.exp(-CORNER_FREQUENCY * dt)
+    state[0] = (1.0 - share) * speed + share * state[0]
+    room = LARGEST_TORQUE_RATE * dt
+    state[3] = min(max(asked_torque(state[0], state[2]), state[3] - room), state[3] + room)
+    gain, error = 1.0 / (1.0 + max(state[2], 0.0) / DOUBLING_PITCH), state[0] - HELD_GENERATOR
+    end = LARGEST_PITCH / (gain * INTEGRAL_GAIN)
+    state[1] = min(max(state[1] + error * dt, 0.0), end)
+    asked = gain * (PROPORTIONAL_GAIN * error + INTEGRAL_GAIN * state[1])
+    room = LARGEST_PITCH_RATE * dt
+    asked = min(max(asked, state[2] - room), state[2] + room)
+    state[2] = min(max(asked, 0.0), LARGEST_PITCH)
+
+
+@kernel
+def controller_step(state, speed, dt):
+    """`advance` for Python."""
+    advance(state, speed, dt)
+
+
+@kernel
+def torque_at(speed, pitch):
+    """`asked_torque` for Python."""
+    return asked_torque(speed, pitch)
+
+
 @typed
 def generator_torque(speed: float, pitch: float = 0.0) -> float:
     """Torque of the generator at its speed [rad/s], on the fast shaft [N m].
@@ -59,14 +101,7 @@ def generator_torque(speed: float, pitch: float = 0.0) -> float:
     """
     if not (math.isfinite(speed) and math.isfinite(pitch)):
         raise ConfigError(f"no generator turns at {speed:g} rad/s with a pitch of {pitch:g} rad.")
-    if speed >= RATED_GENERATOR or (pitch >= RATED_PITCH_ANGLE and speed > 0.0):
-        return min(RATED_POWER / speed, LARGEST_TORQUE)
-    if speed <= CUT_IN_GENERATOR:
-        return 0.0
-    if speed < SQUARE_GENERATOR:
-        slope = SQUARE_GAIN * SQUARE_GENERATOR**2 / (SQUARE_GENERATOR - CUT_IN_GENERATOR)
-        return slope * (speed - CUT_IN_GENERATOR)
-    return max(SQUARE_GAIN * speed**2, RAMP_SLOPE * (speed - SYNCHRONOUS_GENERATOR))
+    return float(torque_at(float(speed), float(pitch)))
 
 
 def gain_factor(pitch: float) -> float:
@@ -102,18 +137,9 @@ class Controller:
         Rates and ends of pitch and torque are those of the machine; the integral is kept where its
         share of the pitch is within these ends.
         """
-        share = math.exp(-CORNER_FREQUENCY * dt)
-        self.filtered = (1.0 - share) * speed + share * self.filtered
-        asked = generator_torque(self.filtered, self.pitch)
-        room = LARGEST_TORQUE_RATE * dt
-        self.torque = min(max(asked, self.torque - room), self.torque + room)
-        gain, error = gain_factor(self.pitch), self.filtered - HELD_GENERATOR
-        end = LARGEST_PITCH / (gain * INTEGRAL_GAIN)
-        self.integral = min(max(self.integral + error * dt, 0.0), end)
-        asked = gain * (PROPORTIONAL_GAIN * error + INTEGRAL_GAIN * self.integral)
-        room = LARGEST_PITCH_RATE * dt
-        asked = min(max(asked, self.pitch - room), self.pitch + room)
-        self.pitch = min(max(asked, 0.0), LARGEST_PITCH)
+        state = np.array([self.filtered, self.integral, self.pitch, self.torque])
+        controller_step(state, float(speed), float(dt))
+        self.filtered, self.integral, self.pitch, self.torque = map(float, state)
 
 
 @typed

@@ -26,19 +26,28 @@ SMALLEST_ANGLE = 1e-6  # of the flow [rad]: the ends of intervals
 ANGLE_ATOL = 1e-12  # to which the angle of flow is found [rad]
 SKEW_GROWTH = 0.6  # of the angle of the wake, in those of the wind, with the induction
 MAX_HALVINGS = 60  # of an interval below pi: more than its digits
+LARGEST_SKEW = math.pi / 2  # of a wake: it lies in the disc, and slows no air before it [rad]
+
+
+@inner
+def interval(ascending, k, x):
+    """Where the interval of the first k numbers begins that has x in it, at the ends the next."""
+    low, high = 0, k - 1
+    while high - low > 1:
+        middle = (low + high) // 2
+        if ascending[middle] > x:
+            high = middle
+        else:
+            low = middle
+    return low
 
 
 @inner
 def coefficients(table, k, angle):
     """Lift and drag at an angle of attack, and how both grow with it."""
     angle -= 2 * math.pi * math.floor((angle + math.pi) / (2 * math.pi))
-    low, high = 0, k - 1
-    while high - low > 1:
-        middle = (low + high) // 2
-        if table[middle] > angle:
-            high = middle
-        else:
-            low = middle
+    low = interval(table, k, angle)
+    high = low + 1
     wide = table[high] - table[low]
     s = (angle - table[low]) / wide
     lift, drag = table[k + low], table[2 * k + low]
@@ -150,11 +159,23 @@ def skewed(strip, axial, through, lean, toward):
 
     The induction grows to the side to which the wake leans, by tan(chi / 2) r / R, the slope of a
     skewed cylinder of vortices in the middle of its end; the mean of a turn stays. ``lean`` is the
-    angle of the wind from the axis, ``toward`` the cosine of that of the blade from the side.
+    angle of the wind from the axis, not below zero, ``toward`` the cosine of that of the blade from
+    the side.
     """
     if axial <= 0.0:
         return through
     a = min(max(1.0 - through / axial, 0.0), 1.0)
-    slope = math.tan(0.5 * (1.0 + SKEW_GROWTH * a) * lean)
+    slope = math.tan(0.5 * min((1.0 + SKEW_GROWTH * a) * lean, LARGEST_SKEW))
     share = slope * toward * strip[RADIUS_COLUMN] / strip[ROTOR_COLUMN]
     return through - (axial - through) * share
+
+
+@inner
+def slowed(strip, table, k, theta, flow, lee):
+    """Air that reaches the strip, as `induced` has it, behind a wake that leans as `skewed` says.
+
+    ``flow`` is the air far away along the axis and against the motion, ``lee`` where the wake
+    leans: the last two arguments of `skewed`.
+    """
+    through, across, phi = induced(strip, table, k, theta, flow[0], flow[1])
+    return skewed(strip, flow[0], through, lee[0], lee[1]), across, phi

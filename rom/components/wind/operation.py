@@ -1,10 +1,9 @@
 """The controlled turbine in wind that changes: a rigid rotor, its wake with or without memory.
 
-The wake follows a change of the loads late, so that after a step of pitch the loads first
-overshoot. Two filters in series on the induced velocity of each strip describe it.
+The wake follows a change of the loads late, see `rom.components.wind.wake`, so that after a step
+of pitch the loads first overshoot.
 
 Source:
-    Oye, as in Hansen, Aerodynamics of Wind Turbines, 2008, chapter 9: filters and their times.
     Jonkman, Butterfield, Musial, Scott, NREL/TP-500-38060, 2009, section 7: inertia, control.
 """
 
@@ -15,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rom.arguments import positive, typed
-from rom.components.compiled import inner, kernel
+from rom.components.compiled import kernel
 from rom.components.wind.blading import Blading, blading, check_pitch, strip_load
 from rom.components.wind.control import (
     CUT_IN_WIND,
@@ -24,14 +23,13 @@ from rom.components.wind.control import (
     Controller,
     steady,
 )
-from rom.components.wind.momentum import RADIUS_COLUMN, ROTOR_COLUMN, induced
+from rom.components.wind.momentum import RADIUS_COLUMN, induced
+from rom.components.wind.wake import follow
 from rom.components.wind.wind_turbine import GEAR_RATIO
 from rom.errors import ConfigError
 from rom.model import Array
 
 DRIVE_INERTIA = 43_784_725.0  # of rotor and generator about the slow shaft [kg m^2], section 7
-WAKE_SHARE = 0.6  # of a change of the induced velocity that the first filter passes at once
-LARGEST_INDUCTION = 0.5  # beyond which times of the wake grow no more
 MAX_STEP = 0.5  # s: the filter of the controller knows a speed four times a second
 
 
@@ -61,41 +59,19 @@ class Operation:
     induced: Array
 
 
-@inner
-def late(state, steady_now, dt, slow, fast):
-    """Take both filters a step further; state: the steady value, behind one filter, behind both."""
-    target = steady_now + WAKE_SHARE * slow * (steady_now - state[0]) / dt
-    state[0] = steady_now
-    before = state[1]
-    state[1] = target + (before - target) * math.exp(-dt / slow)
-    middle = 0.5 * (before + state[1])
-    state[2] = middle + (state[2] - middle) * math.exp(-dt / fast)
-
-
 @kernel
 def wake_step(blades, flow, state, dt, out):
     """Loads per length (n, 2) of the strips in air that the wake has slowed down by now.
 
-    ``state`` (n, 2, 3) holds the filters of the velocity through the plane and in it; a step dt
-    of zero takes the steady wake.
+    ``state`` (n, 6) is that of `follow`; a step dt of zero takes the steady wake.
     """
     strips, tables, counts, twist = blades
     axial, speed, pitch, half_density = flow
     for j in range(out.shape[0]):
         theta, across = twist[j] + pitch, speed * strips[j, RADIUS_COLUMN]
         met = induced(strips[j], tables[j], counts[j], theta, axial, across)
-        lost, gained = axial - met[0], met[1] - across
-        if dt <= 0.0:
-            state[j, 0, :] = lost
-            state[j, 1, :] = gained
-        else:
-            a = min(lost / max(axial, 1e-3), LARGEST_INDUCTION)
-            radius = strips[j, ROTOR_COLUMN]
-            slow = 1.1 / (1.0 - 1.3 * max(a, 0.0)) * radius / max(axial, 1e-3)
-            fast = (0.39 - 0.26 * (strips[j, RADIUS_COLUMN] / radius) ** 2) * slow
-            late(state[j, 0], lost, dt, slow, fast)
-            late(state[j, 1], gained, dt, slow, fast)
-        met = axial - state[j, 0, 2], across + state[j, 1, 2], 0.0
+        follow(strips[j], axial, across, met, state[j], dt)
+        met = axial - state[j, 2], across + state[j, 5], 0.0
         out[j, 0], out[j, 1], _ = strip_load(
             strips[j], tables[j], counts[j], theta, met, half_density)  # fmt: skip
 
@@ -165,7 +141,7 @@ class _Run:
         self.cosines = math.cos(blades.cone), math.cos(blades.tilt)
         self.given = (blades.strips, *blades.tables, blades.twist)
         self.wake, self.loads = (
-            np.zeros((blades.radius.size, 2, 3)),
+            np.zeros((blades.radius.size, 6)),
             np.zeros((blades.radius.size, 2)),
         )
         start = steady(wind, blades)
@@ -187,7 +163,7 @@ class _Run:
         torque = b.n_blades * cone * float(self.loads[:, 1] @ (b.radius * b.length))
         fast = GEAR_RATIO * self.speed
         power = GENERATOR_EFFICIENCY * self.control.torque * fast
-        row = [self.speed, self.control.pitch, power, torque, thrust, *self.wake[:, 0, 2]]
+        row = [self.speed, self.control.pitch, power, torque, thrust, *self.wake[:, 2]]
         if dt > 0.0 and self.held is None:
             self.speed += dt * (torque - GEAR_RATIO * self.control.torque) / DRIVE_INERTIA
             self.control.step(fast, dt)

@@ -14,12 +14,15 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from rom import rotation
 from rom.body import FlexibleBody
 from rom.components.cosserat import body
 from rom.components.wind.blade_element import in_wind
 from rom.components.wind.blading import check_pitch
+from rom.components.wind.controlled import add_control
+from rom.components.wind.wake import in_late_wind
 from rom.components.wind.wind_turbine import (
     CONE_ANGLE,
     GEAR_RATIO,
@@ -135,7 +138,9 @@ def turbine(  # noqa: PLR0913  one keyword per choice, all with defaults
     tilt: float = SHAFT_TILT,
     cone: float = CONE_ANGLE,
     damped: bool = True,
-    wind: float | None = None,
+    wind: npt.ArrayLike | None = None,
+    late_wake: bool = False,
+    controlled: bool = False,
     pitch: float = 0.0,
     speed: float = 0.0,
     shaft: tuple[float, float] = (SHAFT_STIFFNESS, SHAFT_DAMPING),
@@ -152,9 +157,13 @@ def turbine(  # noqa: PLR0913  one keyword per choice, all with defaults
         tilt: of the shaft, nose up [rad].
         cone: of the blades, upwind [rad].
         damped: whether blades have the viscosity of the definition.
-        wind: its speed along the first axis [m/s], see `rom.components.wind.blade_element`; None:
-            still. The tower dams it.
-        pitch: of all blades, leading edge into the wind [rad].
+        wind: its speed along the first axis [m/s], see `rom.components.wind.blade_element`; with a
+            late wake also (k, 2) instants [s] and speeds, see `in_late_wind`; None: still. The
+            tower dams it.
+        late_wake: whether the wake has a memory; else it is as in steady flow at each instant.
+        controlled: whether the published controller brakes the generator and pitches the blades, as
+            the law "control".
+        pitch: of all blades at the start, leading edge into the wind [rad].
         speed: with which the rotor starts to turn [rad/s].
         shaft: torsional stiffness [N m/rad] and damping [N m s/rad].
         hub_body: a reduced solid for the hub with interfaces "shaft", "blade_1" to "blade_3", as of
@@ -165,8 +174,8 @@ def turbine(  # noqa: PLR0913  one keyword per choice, all with defaults
         torsion: factor of this rigidity likewise; some programs know no twist.
 
     Raises:
-        ConfigError: for less than one segment of a blade, a pitch of more than a turn, or
-            a solid that is no hub.
+        ConfigError: for less than one segment of a blade, a pitch of more than a turn, a solid that
+            is no hub, or a wind that changes without a late wake.
         ModelError: if a rod is none, see `cosserat.rod`.
     """
     if segments < 1 or tower_segments < 0:
@@ -183,10 +192,20 @@ def turbine(  # noqa: PLR0913  one keyword per choice, all with defaults
     turning = _hub(mech, hub_body, hub, lean, speed)
     _train(mech, nacelle, turning, (hub, axis), shaft, speed)
     one = body(blade(segments, damped=damped, **factors))
-    if wind is not None:
+    if wind is not None and not late_wake:
+        if not isinstance(wind, int | float):
+            raise ConfigError("a wind that changes meets a late wake.", hint="late_wake=True")
         one = in_wind(one, (wind, 0.0, 0.0), axis=axis, cone=cone, tower=True)
     place = lean, hub, cone, pitch, speed
-    blades = tuple(_blade(mech, k, one, turning, place) for k in range(N_BLADES))
+    blades = tuple(_blade(mech, k, one, place) for k in range(N_BLADES))
+    if wind is not None and late_wake:
+        for each in blades:
+            in_late_wind(mech, each, wind, axis=axis, cone=cone, tower=True)
+    ends = [_mount(mech, k, turning, each, controlled) for k, each in enumerate(blades)]
+    if controlled:
+        generator = mech.part("generator").marker(NO_VELOCITY)
+        markers = _bearing(nacelle, hub, axis), generator, *(m for pair in ends for m in pair)
+        add_control(mech, markers, axis, (speed, pitch))
     return Turbine(mech, blades, standing, axis, hub)
 
 
@@ -235,6 +254,12 @@ def _hub(mech: Mechanism, solid: FlexibleBody | None, at: Array, lean: Array, sp
     return part
 
 
+def _bearing(nacelle: Part, hub: Array, axis: Array) -> Marker:
+    """The place of the nacelle on the axis of the shaft."""
+    behind = nacelle.at
+    return nacelle.marker(hub + axis * (axis @ (behind - hub)) - behind)
+
+
 def _train(
     mech: Mechanism,
     nacelle: Part,
@@ -245,8 +270,7 @@ def _train(
 ) -> None:
     """Gear wheel and generator, and the shaft to the hub."""
     hub, axis = place
-    behind = nacelle.at
-    bearing = nacelle.marker(hub + axis * (axis @ (behind - hub)) - behind)
+    bearing = _bearing(nacelle, hub, axis)
     at = mech.design_point(bearing)
     slow, fast = speed * axis, GEAR_RATIO * speed * axis
     wheel = mech.add_rigid(
@@ -263,15 +287,26 @@ def _train(
     mech.rotational_spring("twist", "shaft", stiffness=shaft[0], damping=shaft[1])
 
 
-def _blade(mech: Mechanism, k: int, one: Any, hub: Part, place: Any) -> Assembly:
-    """Blade k on the hub."""
+def _blade(mech: Mechanism, k: int, one: Any, place: Any) -> Assembly:
+    """Blade k where the hub carries it."""
     lean, centre, cone, pitch, speed = place
     round_ = rotation.matrix(rotation.exp([2 * np.pi / N_BLADES * k, 0.0, 0.0]))
     A = lean @ round_ @ rotation.matrix(rotation.exp([0.0, -cone, 0.0]))
     A = A @ rotation.matrix(rotation.exp([0.0, 0.0, -pitch]))
     turning = A.T @ lean @ [speed, 0.0, 0.0]
-    added = mech.add_nonlinear(f"blade {k + 1}", one, at=centre, orientation=A, omega=turning)
-    root = rotation.matrix(hub.p).T @ (mech.design_point(added.marker("start")) - centre)
-    flange = hub.marker(root if hub.flexible is None else f"blade_{k + 1}")
-    mech.fixed(f"root {k + 1}", flange, added.marker("start"))
-    return added
+    return mech.add_nonlinear(f"blade {k + 1}", one, at=centre, orientation=A, omega=turning)
+
+
+def _mount(
+    mech: Mechanism, k: int, hub: Part, added: Assembly, turns: bool
+) -> tuple[Marker, Marker]:
+    """Bolt blade k to the hub, or set it on a bearing along its axis; both ends."""
+    root = added.marker("start")
+    arm = rotation.matrix(hub.p).T @ (mech.design_point(root) - hub.at)
+    flange = hub.marker(arm if hub.flexible is None else f"blade_{k + 1}")
+    if turns:
+        axis = rotation.matrix(added.parts[0].p)[:, 2]
+        mech.revolute(f"root {k + 1}", flange, root, axis=axis)
+    else:
+        mech.fixed(f"root {k + 1}", flange, root)
+    return flange, root

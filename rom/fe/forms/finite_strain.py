@@ -107,7 +107,9 @@ class FiniteStrain:
 
     def _matrix(self, form: Any) -> csr_matrix:
         A = assemble_matrix(form)
-        found = gathered(A) if self.mesh.comm.size > 1 else symmetric(A)
+        if self.mesh.comm.size == 1:
+            return symmetric(A)
+        found = gathered(A)
         A.destroy()
         return found
 

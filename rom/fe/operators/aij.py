@@ -16,10 +16,22 @@ N_COPIES = 20  # matrices as large as the one gathered that one rank then makes 
 
 
 def symmetric(A: PETSc.Mat) -> csr_matrix:
-    """(A + A^T) / 2 as a SciPy matrix, on one process."""
+    """(A + A^T) / 2 without its zeros as a SciPy matrix, on one process; A is spent.
+
+    Two matrices like A stand side by side, not the four that a sum of SciPy would take.
+    """
     starts, columns, values = A.getValuesCSR()
-    half = csr_matrix((0.5 * values, columns, starts), shape=A.getSize())
-    return (half + half.T).tocsr()
+    size = A.getSize()
+    A.destroy()
+    values *= 0.5
+    half = csr_matrix((values, columns, starts), shape=size)
+    turned = half.T.tocsr()
+    if not np.array_equal(half.indices, turned.indices):
+        return (half + turned).tocsr()
+    half.data += turned.data
+    del turned
+    half.eliminate_zeros()
+    return half
 
 
 def symmetrized(A: PETSc.Mat) -> PETSc.Mat:

@@ -10,6 +10,7 @@ from rom.model import Array, Index
 
 RIGID_RTOL = 1e-13  # eigenvalue of a motion without stiffness, of the largest one
 COARSE_RTOL = 1e-2  # residual of solutions that only show whether there is stiffness
+SHIFT_RTOL = 1e-9  # of the largest eigenvalue: below zero, where a singular stiffness has a factor
 
 
 class HeldPETSc:
@@ -92,4 +93,16 @@ class HeldPETSc:
                 M = self.inner.gram(X, self.inner.apply_M(X))
                 stiffness = (np.diag(K) / np.diag(M)).min()
         if not stiffness > RIGID_RTOL * self.inner.largest():
+            if not self.factor.ok and not ops.solver.out_of_core:
+                X = self._loose()
             raise self._singular(moves_most(ops, X, self.mine))
+
+    def _loose(self) -> Array:
+        """(n_free here, 1) the motion without stiffness on which a factor broke down."""
+        self.release()
+        factor = self.inner.indefinite(-SHIFT_RTOL * self.inner.largest())
+        X = self.ops.fixed[self.mine][:, None]
+        for _ in range(2):
+            X = factor.solve(self.inner.apply_M(X))
+        factor.release()
+        return X

@@ -8,10 +8,13 @@ from rom.model import Array, Index
 
 X_Y_Z = ((1, 5, 1.0), (0, 5, -1.0), (1, 3, -1.0))  # row of a node, column of a rotation, and sign
 ROWS_RTOL = 1e-9  # of a node's rows in the rigid motions from unit translations
+MOVING_RATIO = 1e-3  # of the largest motion: less is that of a part at rest
 
 
 def moves_most(ops: Any, X: Array, rows: Index | None = None) -> str:
-    """Words for the node that moves most in the columns X, empty where nodes are not known.
+    """Words for the node that moves most in the columns X, and for the part that moves with it.
+
+    Empty where nodes are not known.
 
     Args:
         ops: `PETScOperators`, whose rigid motions tell where their nodes are.
@@ -25,10 +28,25 @@ def moves_most(ops: Any, X: Array, rows: Index | None = None) -> str:
     at = int(np.argmax(size)) if size.size else 0
     largest = float(size[at]) if size.size else -1.0
     point = _point(ops.rigid, 3 * (int(rows[at]) // 3)) if largest > 0.0 else None
-    _, found = max(ops.comm.allgather((largest, point)), key=lambda pair: pair[0])
+    largest, found = max(ops.comm.allgather((largest, point)), key=lambda pair: pair[0])
     if found is None:
         return ""
-    return f" It moves most at ({', '.join(f'{x:.4g}' for x in found)}) m."
+    loose = np.unique(rows[size > MOVING_RATIO * largest] // 3)
+    return f" It moves most at {_words(found)}, {_part(ops, loose)}."
+
+
+def _part(ops: Any, loose: Index) -> str:
+    """Words for some nodes of this rank and those of the others: how many, and where."""
+    points = [_point(ops.rigid, 3 * int(node)) for node in loose]
+    there = np.array([point for point in points if point is not None]).reshape(-1, 3)
+    there = np.vstack(ops.comm.allgather(there))
+    share = f"{len(there)} of {ops.n // 3} nodes move"
+    return f"and {share}, between {_words(there.min(axis=0))} and {_words(there.max(axis=0))}"
+
+
+def _words(point: Array) -> str:
+    """A place as it is printed."""
+    return f"({', '.join(f'{x:.4g}' for x in point + 0.0)}) m"
 
 
 def _point(rigid: Array, first: int) -> Array | None:

@@ -91,7 +91,7 @@ def scan(path: str | Path) -> tuple[tuple[Function, ...], dict[str, list[list[st
         path: the file, .unv or .uff.
 
     Raises:
-        FileFormatError: if the file is missing, or a dataset 58 is cut.
+        FileFormatError: if the file is missing, or a dataset is cut.
         UnsafeFileError: if it is larger than 1 GiB.
     """
     path = check_readable(path, MAX_BYTES)
@@ -108,9 +108,11 @@ def scan(path: str | Path) -> tuple[tuple[Function, ...], dict[str, list[list[st
             raise FileFormatError(f"{path}: {where} is cut or no dataset 58: {error}.") from error
         if function:
             found.append(function)
+        elif (end := _mark(data, after)) < 0:
+            kind = head[0].decode("ascii", "replace") if head else "without a number"
+            raise FileFormatError(f"{path}: dataset {kind} is cut: the closing -1 is missing.")
         elif head:
-            end = _mark(data, after)
-            text = data[after : end if end >= 0 else len(data)].decode("ascii", "replace")
+            text = data[after:end].decode("ascii", "replace")
             others.setdefault(head[0].decode("ascii", "replace"), []).append(text.splitlines())
     return tuple(found), others
 

@@ -2,7 +2,7 @@
 
 Data sets are frequencies (n_f,), H (n_f, n_s, n_e) complex, coherence (one number or as H), and
 sensors and inputs, groups with points and directions (k, 3); attributes of the file are averages,
-quantity and units, always SI.
+quantity, force_noise (zero where it is missing) and units, always SI.
 """
 
 import io
@@ -36,6 +36,7 @@ def written(test: Responses, path: Path) -> Path:
             file[name] = np.asarray(value)
         file.attrs["averages"] = test.averages
         file.attrs["quantity"] = test.quantity
+        file.attrs["force_noise"] = test.force_noise
         file.attrs["units"] = "SI"
     write_whole(path, lambda out: out.write(data.getvalue()))
     return path
@@ -72,4 +73,5 @@ def _test(path: Path, file: Any) -> Responses:
     f, H, c, *where = (file[name][()] for name in DATA_SETS)
     sensors, inputs = Channels(*where[:2]), Channels(*where[2:])
     averages, quantity = int(file.attrs["averages"]), str(file.attrs["quantity"])
-    return Responses(f, H, sensors, inputs, c, averages, quantity)
+    noise = float(file.attrs.get("force_noise", 0.0))
+    return Responses(f, H, sensors, inputs, c, averages, quantity, noise)

@@ -15,7 +15,7 @@ from rom.errors import ConfigError, FileFormatError
 from rom.io.fields.universal import FORCE_TYPE, FREQUENCY_RESPONSE, Function
 from rom.io.files import check_readable
 from rom.io.responses.grid import COHERENCE_KIND, Dof
-from rom.io.responses.test_units import length_of, motion_per_force
+from rom.io.responses.unit_labels import length_of, motion_per_force
 from rom.model import Array
 
 MAX_TABLE_BYTES = 2**29

@@ -12,7 +12,7 @@ import numpy as np
 
 from rom.errors import ConfigError, FileFormatError
 from rom.io.fields.universal import FREQUENCY_RESPONSE, Function, scan
-from rom.io.responses.test_units import IN_G, NO_UNITS, force_of, motion_of_unit, plain
+from rom.io.responses.unit_labels import IN_G, NO_UNITS, force_of, motion_of_unit, plain
 from rom.model import Array
 from rom.updating.measured import MeasuredModes
 

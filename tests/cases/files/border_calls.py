@@ -402,6 +402,10 @@ GIVEN = {  # callable -> legal values of its own
     "FlexibleBody.with_reference": {"reference": lambda: "root"},
     "FlexibleBody.rotating_frequencies": {"speed": lambda: 1.0, "axis": lambda: Z},
     "FlexibleBody.marker": {"name": lambda: "root"},
+    "FlexibleBody.equilibria": {"loads": lambda: {"tip": (1.0, 0, 0, 0, 0, 0)}},
+    "FlexibleBody.critical_loads": {"loads": lambda: {"tip": (1.0, 0, 0, 0, 0, 0)}},
+    "FlexibleBody.forces_on": {"loads": lambda: {"tip": (1.0, 0, 0, 0, 0, 0)}},
+    "FlexibleBody.mean_rows": {"fixed": lambda: {"tip": "x"}},
     "FlexibleBody.in_units": {"units": lambda: "mm-t-s"},
     "Material.from_units": {
         "units": lambda: "mm-t-s", "E": lambda: 210e3, "nu": lambda: 0.3, "rho": lambda: 7.85e-9

@@ -13,8 +13,8 @@ MESHED = [path for path in DEMOS if "rom.fe" in path.read_text()]
 # about ten seconds each and more, of what has tests of its own
 LONG_DEMOS = {
     "demo_assembly", "demo_beam", "demo_bent_blade", "demo_best_matching", "demo_bladed_disk",
-    "demo_compressor_blade", "demo_exchange", "demo_forming", "demo_hand", "demo_large_mesh",
-    "demo_lost_tip",
+    "demo_bolted_frame", "demo_compressor_blade", "demo_exchange", "demo_forming", "demo_hand",
+    "demo_large_deflection", "demo_large_mesh", "demo_lost_tip",
     "demo_masonry", "demo_mistuning", "demo_oil_inlet", "demo_parameters", "demo_pendulum_chain",
     "demo_periodic", "demo_planetary",
     "demo_robot_arm", "demo_rockfall", "demo_rolling_wheel", "demo_rotating_blade",
@@ -28,6 +28,7 @@ LEFT_BEHIND = {
     "demo_beam": {"beam_modes.png", "beam_frequencies.png"},
     "demo_bent_blade": {"bent_blade.png"},
     "demo_best_matching": {"best_matching.png"},
+    "demo_bolted_frame": {"bolted_frame.png"},
     "demo_bladed_disk": {"bladed_disk_modes.png", "bladed_disk_diagrams.png"},
     "demo_compressor_blade": {"compressor_blade.png"},
     "demo_forming": {"forming.png", "upsetting.gif"},
@@ -37,6 +38,7 @@ LEFT_BEHIND = {
         "beam.mat", "beam.op4", "beam.py", "beam.vtu", "exchange.png",
     },
     "demo_isotropy": {"isotropy.png", "isotropy_compared.png"},
+    "demo_large_deflection": {"large_deflection.png"},
     "demo_large_mesh": {"housing_mesh.png", "housing_modes.png"},
     "demo_lost_tip": {"lost_tip.png"},
     "demo_masonry": {"masonry.gif", "masonry.png", "masonry_vault.png"},

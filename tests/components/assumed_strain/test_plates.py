@@ -131,6 +131,18 @@ def test_a_strip_twists_like_a_free_bar_and_bends_in_spite_of_poisson(diagonal):
     assert np.abs(f[5:] / twist - 1).min() < 0.03
 
 
+@pytest.mark.parametrize(("diagonal", "soft"), [("/", 0.02), ("x", 0.003)])
+def test_one_row_of_triangles_bends_a_little_softly(diagonal, soft):
+    """Slopes of sides that run across the strip are fitted to four nodes on two lines."""
+    X, T = rectangle((40, 1), [(0, 0), (0.4, 0), (0.4, 0.04), (0, 0.04)], diagonal)
+    body, metal = sheet(X, T, thickness=0.002), Metal(210e9, 0.0, 7850.0)
+    K, M = bending(body, metal).toarray(), mass(body, metal)[::2, ::2].toarray()
+    f = np.sqrt(np.abs(eigh(K, M, eigvals_only=True)[3:5])) / (2 * np.pi)
+    unit = np.sqrt(210e9 * 0.002**2 / 12 / 7850) / 0.4**2 / (2 * np.pi)
+    error = f / (np.array([4.730041, 7.853205]) ** 2 * unit) - 1
+    assert np.all(error < 0) and -soft < error.min() < -soft / 4
+
+
 def test_interfaces_that_name_no_node_of_the_sheet():
     with pytest.raises(InterfaceError, match="'edge' names the nodes 0 to 99; there are 25"):
         in_space(sheet(*distorted()), STEEL, {"edge": np.array([0, 1, 99])})

@@ -6,8 +6,17 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.integrate import quad
+from scipy.optimize import brentq
 
 import rom
+from cases.mbs.linkages import (
+    ball,
+    cross_slides_of_the_core,
+    five_bar_of_the_core,
+    rail_of_the_core,
+    slide_arm_of_the_core,
+    two_link_of_the_core,
+)
 from rom.components.linkages import (
     CrossSlides,
     Driven,
@@ -163,9 +172,11 @@ def test_equal_sides_on_one_rail_are_isotropic_at_one_spread():
     """cot^2 of the couplers' slope = (4/3 mu + M) / (2/3 mu + M); 45 degrees without their mass."""
     cot = np.sqrt((4 / 3 * MU + PAYLOAD) / (2 / 3 * MU + PAYLOAD))
     spread = 2 * REACH * cot / np.hypot(1, cot)
-    found = isotropic_set(GLIDE.inertia, SPAN, n=60, assembles=GLIDE.assembles)
-    assert found.kind == "curves"
-    assert_allclose(found.q[:, 1] - found.q[:, 0], spread, rtol=1e-8)
+    for mass in (0.0, 1.3, 20.0):  # whatever both slides weigh
+        glide = replace(GLIDE, slides=(mass, mass))
+        found = isotropic_set(glide.inertia, SPAN, n=60, assembles=GLIDE.assembles)
+        assert found.kind == "curves"
+        assert_allclose(found.q[:, 1] - found.q[:, 0], spread, rtol=1e-8)
     unequal = replace(GLIDE, slides=(1.3, 1.0))
     assert isotropic_set(unequal.inertia, SPAN, n=60, assembles=GLIDE.assembles).kind == "none"
 
@@ -179,6 +190,12 @@ def test_two_links_are_isotropic_everywhere_on_curves_or_nowhere():
     found = isotropic_set(leaning.inertia, n=40)
     assert found.kind == "curves"
     assert_allclose(np.cos(found.q[:, 0] - found.q[:, 1]), 0.0, atol=1e-9)
+    turned = [replace(one, relative=True) for one in (even, leaning)]
+    geared = replace(even, first=rigid_link(1.0, 0.3, (0.1, 0.0), 0.086), relative=True)
+    A = geared.inertia(0.0, 0.0)  # without coupling of the links, a = 2 c: still the elbow's motor
+    assert_allclose(A, [[3 * 0.066, 0.066], [0.066, 0.066]])
+    for one in (*turned, geared):
+        assert isotropic_set(one.inertia, n=40).kind == "none"
     heavier = TwoLink(rigid_link(1.1, 0.3, (0.1, 0.0), 0.02), leaning.second)
     assert isotropic_set(heavier.inertia, n=40).kind == "none"
 
@@ -290,6 +307,165 @@ def test_a_mechanism_of_bodies_and_joints_has_the_set_and_the_figure_of_its_form
     assert one.mean == pytest.approx(other.mean, rel=1e-6)
 
 
+def test_cross_slides_of_the_core_are_isotropic_everywhere_or_nowhere():
+    """The first slide carries the second: everywhere only without a mass of its own."""
+    span = ((-0.1, 0.2), (-0.1, 0.3))
+    light, square = (1e-12, 2.0), np.pi / 2
+    for masses, angle, kind in (
+        ((1.0, 2.0), square, "none"), (light, 1.4, "none"), (light, square, "everywhere"),
+    ):  # fmt: skip
+        core = Driven(cross_slides_of_the_core(masses, angle), ("x", "y"), tool="b")
+        formula = CrossSlides(masses, angle)
+        assert_allclose(core.inertia(0.1, -0.2), formula.inertia(0.1, -0.2), atol=1e-8)
+        assert_allclose(core.tip(0.1, -0.2), formula.tip(0.1, -0.2), atol=1e-12)
+        assert isotropic_set(core.inertia, span, n=4).kind == kind
+    mean = tool_isotropy(core.inertia, core.tip, span, n=2).mean
+    assert mean == pytest.approx(1.0)  # of a point, whatever its guides
+
+
+def test_a_slide_with_an_arm_of_the_core_is_isotropic_where_the_arm_lies_along_the_rail():
+    L = np.sqrt(0.9 * 0.4**2 / 3 / 2.4)
+    core = Driven(slide_arm_of_the_core(1.5, (0.9, 0.4), 0.3), ("x", "turn"), tool="arm")
+    formula = SlideArm(1.5, rod(0.9, 0.4))
+    q = np.array([[0.1, 0.5], [-0.2, -1.1]])
+    assert_allclose(core.inertia(*q.T), formula.inertia(q[:, 0], q[:, 1] + 0.3), rtol=1e-8)
+    assert_allclose(core.tip(0.0, 0.0), 0.2 * np.array([np.cos(0.3), np.sin(0.3)]), atol=1e-12)
+    span = ((-0.1, 0.1), (-0.9, 0.5))  # turns from where it was added, at 0.3
+    found = isotropic_set(core.inertia, span, lengths=(1.0, L), n=6)
+    assert found.kind == "curves"
+    assert_allclose(found.q[:, 1], -0.3, atol=1e-7)
+    other = isotropic_set(core.inertia, span, lengths=(1.0, 1.2 * L), n=6)
+    assert other.kind == "none"
+
+
+def test_two_links_of_the_core_are_isotropic_where_the_elbow_has_its_closed_form():
+    """Motor on the elbow, a = 2 c: cos q2 = -c / b; the shoulder does not matter."""
+    m1, l1, m2, l2 = 3.375, 0.3, 1.0, 0.45
+    c, b = m2 * l2**2 / 3, m2 * l1 * l2 / 2
+    m1 = (2 * c - m2 * l1**2) * 3 / l1**2
+    core = Driven(two_link_of_the_core((m1, l1), (m2, l2), (0.2, 2.8)), ("shoulder", "elbow"))
+    assert_allclose(core.inertia(0.4, 0.1), TwoLink(rod(m1, l1), rod(m2, l2), relative=True)
+                    .inertia(0.6, 2.9), rtol=1e-7)  # fmt: skip
+    bend = np.arccos(-c / b) - 2.8
+    found = isotropic_set(core.inertia, ((-0.2, 0.2), (bend - 0.11, bend + 0.17)), n=6)
+    assert found.kind == "curves" and not found.winding.any()
+    assert_allclose(found.q[:, 1], bend, atol=1e-7)
+
+
+def test_two_slides_of_the_core_are_isotropic_at_one_spread():
+    cot = np.sqrt((4 / 3 * MU + PAYLOAD) / (2 / 3 * MU + PAYLOAD))
+    spread = 2 * REACH * cot / np.hypot(1, cot)
+    core = Driven(rail_of_the_core(1.3, (MU, REACH), PAYLOAD, 0.9), ("left", "right"), tool="tool")
+    assert_allclose(core.inertia(0.1, 0.05), GLIDE.inertia(0.1, 0.95), rtol=1e-7)
+    assert_allclose(core.tip(0.1, 0.05), GLIDE.tip(0.1, 0.95), atol=1e-9)
+    span = ((-0.05, 0.05), (-0.1, 0.1))
+    found = isotropic_set(core.inertia, span, n=6, assembles=core.assembles)
+    assert found.kind == "curves"
+    assert_allclose(0.9 + found.q[:, 1] - found.q[:, 0], spread, atol=1e-7)
+    assert core.assembles([0.0, 0.0], [0.0, 0.4]).tolist() == [True, False]  # 1.3 m apart
+
+
+def test_a_five_bar_of_the_core_has_a_point_of_the_table():
+    """Of the eight, the one at 135.7231 and 44.2769 degrees: rank two, winding -1."""
+    start = np.array([2.3, 0.8])
+    mech = five_bar_of_the_core(start, [(2.0, 0.3)] * 2, [(1.0, 0.8)] * 2, FIVE.posture(*start))
+    core = Driven(mech, ("left", "right"), tool="ball")
+    found = isotropic_set(core.inertia, ((-0.1, 0.2), (-0.1, 0.15)), n=6)
+    assert found.kind == "points" and found.winding.tolist() == [-1]
+    assert_allclose(np.degrees(found.q[0] + start), [135.72310, 44.27690], atol=1e-5)
+    assert found.inertia[0] == pytest.approx(0.224984, abs=1e-6)
+    assert_allclose(core.tip(0.1, 0.05), FIVE.tip(2.4, 0.85), atol=1e-9)
+
+
+def test_postures_far_from_where_bodies_were_added_are_followed_there():
+    """Half a turn and more, where both couplers could also meet on the other side."""
+    start = np.array([1.0, 2.2])
+    mech = five_bar_of_the_core(start, [(2.0, 0.3)] * 2, [(1.0, 0.8)] * 2, FIVE.posture(*start))
+    turns = np.array([[2.9, -2.6], [-3.0, 3.1], [6.2, 0.4]])
+    core = Driven(mech, ("left", "right"), tool="ball")
+    assert_allclose(core.inertia(*turns.T), FIVE.inertia(*(start + turns).T), rtol=1e-6)
+    assert_allclose(core.tip(*turns.T), FIVE.tip(*(start + turns).T), atol=1e-8)
+    swapped = Driven(mech, ("right", "left")).inertia(*turns[0, ::-1])
+    assert_allclose(swapped, core.inertia(*turns[0])[::-1, ::-1], rtol=1e-6)
+
+
+def test_mechanisms_of_more_than_two_motions_are_refused():
+    mech = two_link_of_the_core((1.0, 0.3), (1.0, 0.4), (0.2, 1.0))
+    ball(mech, "loose", 0.1, (1.0, 1.0))
+    core = Driven(mech, ("shoulder", "elbow"))
+    with pytest.raises(ModelError, match="the joints leave 8 motions"):
+        core.inertia(0.1, 0.2)
+    assert not core.assembles(0.1, 0.2)
+
+
+# --- maps and loci within strokes ---
+
+
+def index_of_the_rail(spread):
+    """Energies of the mean and of the difference of both speeds, by hand."""
+    cot2 = spread**2 / (4 * REACH**2 - spread**2)
+    mean = (2 * 1.3 + 2 * MU + PAYLOAD) / 2
+    apart = 1.3 + MU / 3 * (1 + cot2) + PAYLOAD / 2 * cot2
+    return 2 * np.sqrt(mean * apart) / (mean + apart)
+
+
+def test_loci_of_two_slides_run_from_limit_to_limit():
+    """The index knows the spread alone: lines of slope one, which end where a stroke does."""
+    stroke = ((0.0, 0.3), (0.75, 1.15))
+    index = index_map(GLIDE.inertia, stroke, n=60)
+    q = np.stack(angle_grid(60, stroke))
+    assert_allclose([q[0, 0, 0], q[0, -1, 0], q[1, 0, 0], q[1, 0, -1]], [0, 0.3, 0.75, 1.15])
+    assert_allclose(index, index_of_the_rail(q[1] - q[0]), rtol=1e-10)
+    best = 2 * REACH * np.sqrt((4 / 3 * MU + PAYLOAD) / (2 * MU + 2 * PAYLOAD))
+    level = 0.995
+    expected = [brentq(lambda s: index_of_the_rail(s) - level, *ends)
+                for ends in ((0.3, best), (best, 1.19))]  # fmt: skip
+    curves = closed_loci(index, level, stroke)
+    assert len(curves) == 2
+    spreads = [curve[:, 1] - curve[:, 0] for curve in curves]
+    assert_allclose(sorted(np.mean(s) for s in spreads), expected, atol=2e-4)
+    for curve, spread in zip(curves, spreads, strict=True):
+        assert np.ptp(spread) < 5e-4
+        for end in curve[[0, -1]]:
+            at = [np.isclose(end[k], stroke[k], atol=1e-12).any() for k in (0, 1)]
+            assert any(at)
+        assert np.abs(np.diff(curve, axis=0)).max() <= 0.4 / 59 * (1 + 1e-9)
+
+
+def test_loci_of_a_polar_arm_close_around_a_turn_of_its_guide():
+    """One coordinate turns, the other has a stroke, and a length makes both displacements."""
+    L, stroke, level = 0.3, (None, (0.05, 0.6)), 0.97
+    index = index_map(ARM.inertia, stroke, lengths=(L, 1.0), n=80)
+    ratio = ((2 - level**2 + s * 2 * np.sqrt(1 - level**2)) / level**2 for s in (1, -1))
+    expected = [np.sqrt(L**2 * r - 0.06 / 2.0) for r in ratio]
+    curves = closed_loci(index, level, stroke)
+    assert len(curves) == 2
+    for curve in curves:
+        assert abs(curve[-1, 0] - curve[0, 0]) == pytest.approx(2 * np.pi, abs=1e-12)
+        assert np.ptp(curve[:, 1]) < 1e-9
+    assert_allclose(sorted(c[0, 1] for c in curves), sorted(expected), atol=2e-3)
+
+
+def test_loci_within_a_window_are_those_of_the_torus():
+    """Around a point of the five-bar: closed in a wide window, cut where a narrow one ends."""
+    centre, level = np.radians([225.573, 314.427]), 0.99
+    whole = closed_loci(index_map(FIVE.inertia, n=720), level)
+    near = min(whole, key=lambda c: np.abs(c.mean(axis=0) - centre).max())
+    reach = np.abs(near - centre).max(axis=0)
+    wide = [(c - 1.5 * r, c + 1.4 * r) for c, r in zip(centre, reach, strict=True)]
+    curves = closed_loci(index_map(FIVE.inertia, tuple(wide), n=80), level, tuple(wide))
+    closed = [c for c in curves if np.array_equal(c[0], c[-1])]
+    assert len(closed) == 1
+    size = 0.5 * np.abs(np.cross(closed[0][:-1] - centre, closed[0][1:] - centre).sum())
+    expected = 0.5 * np.abs(np.cross(near[:-1] - centre, near[1:] - centre).sum())
+    assert size == pytest.approx(expected, rel=0.02)
+    cut = ((centre[0], wide[0][1]), wide[1])
+    halves = closed_loci(index_map(FIVE.inertia, cut, n=80), level, cut)
+    assert all(np.allclose(end[0], centre[0]) for c in halves for end in c[[0, -1]]
+               if np.abs(c - centre).max() < 1.2 * reach.max())  # fmt: skip
+    assert not any(np.array_equal(c[0], c[-1]) for c in halves)
+
+
 # --- what cannot be ---
 
 
@@ -337,6 +513,8 @@ def test_a_mechanism_of_bodies_and_joints_has_the_set_and_the_figure_of_its_form
             "no tool",
         ),
         (lambda: Driven(polar_of_the_core(), ("turn", "x")), ConfigError, "x"),
+        (lambda: Driven(polar_of_the_core(), ("turn", "feed", "feed")), ConfigError, "not two"),
+        (lambda: Driven(polar_of_the_core(), ("turn",)), ConfigError, "not two"),
     ],
 )  # fmt: skip
 def test_what_is_no_linkage_is_refused(make, error, words):
@@ -360,6 +538,9 @@ def eyes(q1, q2):
         (lambda: isotropic_set(lambda a, b: 0 * a), "inertia returns"),
         (lambda: angle_grid(0), "n = 0: a turn needs four"),
         (lambda: closed_loci(np.eye(4), np.nan), "level = nan"),
+        (lambda: closed_loci(np.eye(4), 0.5, (None, (1, 0))), "low < high"),
+        (lambda: index_map(eyes, ((0, 0), None), n=4), "low < high"),
+        (lambda: index_map(eyes, n=4, lengths=(1, -1)), "two positive"),
         (lambda: closed_loci(np.zeros((0, 0)), 1.0), r"a field \(0, 0\)"),
         (lambda: isotropic_set(eyes, (0, 1)), r"ranges\[0\] = 0"),
         (lambda: isotropic_set(eyes, None), "ranges = None"),

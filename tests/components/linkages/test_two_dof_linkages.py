@@ -8,12 +8,10 @@ from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 
 import rom
+from cases.mbs.linkages import five_bar_of_the_core
 from cases.mbs.mechanisms import simulate_quietly
 from cases.solid import STEEL, block
-from rom import rotation
-from rom.components.linkages.dynamic_isotropy import (
-    christoffel,
-)
+from rom.components.linkages.dynamic_isotropy import christoffel, index_map
 from rom.components.linkages.two_dof_linkages import (
     FiveBar,
     TwoLink,
@@ -75,44 +73,6 @@ def test_kinetic_energy_of_the_five_bar_from_moving_points():
     A = FIVE.inertia(*q.T)
     assert_allclose(0.5 * np.einsum("ki,kij,kj->k", rate, A, rate), energy, rtol=1e-8)
     assert (np.linalg.eigvalsh(A) > 0).all()
-
-
-def crank_of_the_core(mech, name, body, at, angle, first):
-    """Add a link to a mechanism: a rod (mass, length), or a flexible body with pins root, tip."""
-    A = rotation.matrix(np.array([np.cos(angle / 2), 0, 0, np.sin(angle / 2)]))
-    at = np.array([*at, 0.0])
-    if isinstance(body, tuple):
-        mass, length = body
-        J, half = mass * length**2 / 12, np.array([length / 2, 0, 0])
-        part = mech.add_rigid(
-            name, mass=mass, inertia=(J / 100, J, J), at=at + A @ half, orientation=A,
-            markers={"root": -half, "tip": half},
-        )  # fmt: skip
-    else:
-        at = at - A @ body.marker("root").point
-        part = mech.add_flexible(name, body, at=at, orientation=A)
-    mech.revolute(f"{name} pin", first, part.marker("root"), axis=(0, 0, 1))
-    return part
-
-
-def five_bar_of_the_core(q, cranks, couplers, posture):
-    """The five-bar as a `rom.Mechanism`, drives "left" and "right" on its base joints."""
-    mech = Mechanism(gravity=(0, 0, 0))
-    tips = []
-    for k, (pivot, elbow) in enumerate(((0, 1), (4, 3))):
-        o = mech.ground.marker((*posture[pivot], 0.0))
-        crank = crank_of_the_core(mech, f"crank {k}", cranks[k], posture[pivot], q[k], o)
-        arm = posture[2] - posture[elbow]
-        coupler = crank_of_the_core(
-            mech, f"coupler {k}", couplers[k], posture[elbow], np.arctan2(arm[1], arm[0]),
-            crank.marker("tip"),
-        )  # fmt: skip
-        tips.append(coupler.marker("tip"))
-        mech.drive(("left", "right")[k], f"crank {k} pin", lambda t: 0.0)
-    mech.revolute("tip", *tips, axis=(0, 0, 1))
-    ball = mech.add_rigid("ball", mass=0.5, inertia=(1e-9,) * 3, at=(*posture[2], 0.0))
-    mech.fixed("held", tips[0], ball.marker((0, 0, 0)))
-    return mech
 
 
 def test_closed_form_equals_the_mass_matrix_of_the_multibody_core():
@@ -187,6 +147,16 @@ def test_inertia_at_a_frequency_is_that_of_a_beam_and_converges_with_its_modes()
     assert found[2] == pytest.approx(exact, rel=0.02) and abs(exact - rigid) > 0.1 * rigid
     assert found[1] == pytest.approx(found[2], rel=1e-3)
     assert free[2] < 0.8 * free[1] < 0.64 * free[0]
+
+
+def test_above_the_first_frequency_on_held_drives_there_is_no_inertia(bar):
+    """A link that swings against its motor has less than none, which no index may hide."""
+    arm = TwoLink(rod(1.0, 0.3), reduced_link(bar, "root", "tip"))
+    first = bar.frequencies(1, fixed=("root",))[0]
+    below, above = (2 * np.pi * share * first for share in (0.9, 1.1))
+    index_map(lambda a, b: arm.inertia(a, b, elastic=below), n=4)
+    with pytest.raises(ModelError, match="not positive"):
+        index_map(lambda a, b: arm.inertia(a, b, elastic=above), n=4)
 
 
 def test_the_frame_of_a_flexible_coupler_is_a_matter_of_taste(bar):

@@ -155,10 +155,11 @@ def test_moving_the_ground_or_the_frame_is_the_same():
     assert np.abs(slip - slip[0]).max() > 0.05
 
 
-def test_slip_under_a_pulse_is_that_of_newmark():
+@pytest.mark.parametrize(("mu", "a", "width"), [(0.3, 8.0, 1.0), (1.5, 40.0, 4.0)])
+def test_slip_under_a_pulse_is_that_of_newmark(mu, a, width):
     """Newmark (1965): V^2 / (2 mu g) (1 - mu g / a), V = a t, for a rectangular pulse."""
-    mu, a, t = 0.3, 8.0, 0.2
-    model = on_the_ground(stone(box(), **SOFT), friction=mu)
+    t = 0.2
+    model = on_the_ground(stone(box(width), **SOFT), friction=mu)
     settled = simulate(model, t_end=0.2, dt=0.01, damping=np.inf).q[-1]
     pulse = BaseMotion(rectangle(a, t))
     motion = simulate(model, t_end=1.5, dt=5e-4, actions=[pulse], q=settled, save_every=3000)
@@ -538,9 +539,14 @@ def test_contacts_that_turn_back_within_a_step_stick():
     assert motion.cuts < 40 and np.abs(motion.v).max() > 0.01
 
 
-@pytest.mark.parametrize(("friction", "cuts"), [(0.6, 20), (1.0, 40), (1.5, 500)])
+@pytest.mark.parametrize(
+    ("friction", "cuts"), [(0.6, 5), (1.0, 10), (1.5, 220), (2.0, 280), (3.0, 260)]
+)
 def test_steps_settle_with_friction_of_one_and_more(friction, cuts):
-    """Friction in turns with normal forces diverged from one on: 766 and 1222 cuts of steps."""
+    """Friction in turns with normal forces diverged from one on: 766 and 1222 cuts of steps.
+
+    Where negative pivots cut steps they were 245, 1682 and 5589 at 1.5, 2 and 3.
+    """
     model = wall(2.0, 8, brick=(0.5, 0.25), rock=Rock(friction=friction))
     shaking = BaseMotion(sine(4.0, 0.4))
     motion = simulate(model, t_end=0.5, dt=1e-3, actions=[shaking], save_every=500)

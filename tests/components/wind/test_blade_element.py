@@ -6,6 +6,7 @@ from numpy.testing import assert_allclose
 
 import rom
 from cases.mbs.mechanisms import residual_at, tangents_at
+from cases.mbs.stiff_blades import on_driven_hub, same_strips, stiff_body
 from rom import rotation
 from rom.components import cosserat
 from rom.components.wind.blade_element import in_wind, strips
@@ -89,18 +90,48 @@ def test_a_strip_has_lift_across_and_drag_along_the_air_that_reaches_it(resting)
     assert_allclose(W.power[2], -found @ v[t : t + 3], rtol=1e-10)
 
 
+@pytest.mark.parametrize("cone", [0.0, 0.3])
+@pytest.mark.parametrize(("tilt", "yaw"), [(0.0, 0.0), (0.35, 0.0), (0.0, -0.4), (-0.5, 0.7)])
+def test_strips_of_a_rod_have_the_loads_of_the_rotor_whose_wake_leans(tilt, yaw, cone):
+    """The same strips as a rotor, tilted, yawed and coned, at four azimuths: two programs."""
+    speed, n = 1.1, 24
+    wind = WIND * np.array([np.cos(yaw) * np.cos(tilt), np.sin(yaw), np.cos(yaw) * np.sin(tilt)])
+    one, used = in_wind(cosserat.body(blade(n)), wind, cone=cone), np.arange(4, n - 1)
+    rotor = same_strips(one, used, tilt=tilt, cone=cone)
+    load = rotor_load(rotor, WIND, speed, yaw=yaw, n_azimuths=4)
+    for azimuth, row in zip(load.azimuth, load.strip, strict=True):
+        A = rotation.matrix(rotation.exp([azimuth, 0.0, 0.0]))
+        A = A @ rotation.matrix(rotation.exp([0.0, -cone, 0.0]))
+        mech = rom.Mechanism(gravity=(0, 0, 0))
+        mech.add_nonlinear("blade", one, orientation=A)
+        packed = pack(mech, whole=True)
+        v = np.zeros(packed.v.size)
+        places = rotor.radius[:, None] * A[:, 2]
+        v.reshape(-1, 6)[used, :3] = np.cross([speed, 0.0, 0.0], places)
+        W = workspace(packed.system, 0)
+        found = -forces(packed, W, v).reshape(-1, 6)[used, :3] @ A[:, :2]
+        expected = rotor.length[:, None] * row[:, :2] * [1, -1]
+        assert_allclose(found, expected, rtol=1e-6)
+
+
 def without_stiffness(n=6):
     """A blade that does not bend back, so that forces are those of the wind."""
     one = blade(n)
     return one._replace(stretch=1e-14 * one.stretch, bend=1e-14 * one.bend)
 
 
-@pytest.mark.parametrize("tower", [False, True])
-def test_tangents_of_the_wind_are_derivatives(tower):
-    """By rotations, by velocities, and by places if there is a tower, five metres behind."""
+@pytest.mark.parametrize(
+    ("tower", "wind"),
+    [(False, (WIND, 2.0, 0.0)), (True, (WIND, 2.0, 0.0)), (False, (1.0, 9.0, 4.0))],
+)
+def test_tangents_of_the_wind_are_derivatives(tower, wind):
+    """By rotations, by velocities, and by places if there is a tower, five metres behind.
+
+    In the last wind, from 84 degrees aside, the wake lies in the plane of the rotor.
+    """
     mech = rom.Mechanism(gravity=(0, 0, 0))
     down = rotation.exp([np.pi, 0, 0])
-    one = in_wind(cosserat.body(without_stiffness()), (WIND, 2.0, 0.0), tower=tower)
+    one = in_wind(cosserat.body(without_stiffness()), wind, tower=tower)
     mech.add_nonlinear("blade", one, at=(-5, 1, 90), orientation=down)
     packed = pack(mech, whole=True)
     W = workspace(packed.system, 0)
@@ -132,21 +163,12 @@ def test_tangents_of_the_wind_are_derivatives(tower):
         assert np.abs(slope).max() > (10.0 if tower or 3 in of else 0.0)
 
 
-def stiff_blade(n, wind, pitch):
-    """One blade of three hundred times its rigidity on a driven hub."""
-    one, mech = blade(n, damped=True), rom.Mechanism(gravity=(0, 0, 0))
-    one = one._replace(stretch=300 * one.stretch, bend=300 * one.bend)
-    A = rotation.matrix(rotation.exp([0.0, 0.0, -pitch]))
-    part = mech.add_nonlinear(
-        "blade", in_wind(cosserat.body(one), (wind, 0.0, 0.0), cone=0.0),
-        orientation=A, omega=A.T @ [RATED_SPEED, 0.0, 0.0])  # fmt: skip
-    hub = mech.add_rigid(
-        "hub", mass=1.0, inertia=(1, 1, 1), at=(0, 0, 0), omega=(RATED_SPEED, 0, 0)
-    )
-    mech.revolute("shaft", mech.ground.marker((0, 0, 0)), hub.marker((0, 0, 0)), axis=(1, 0, 0))
-    mech.drive("speed", "shaft", lambda t: RATED_SPEED * t, rate=lambda t: RATED_SPEED)
-    root = mech.design_point(part.marker("start"))
-    mech.fixed("root", hub.marker(root), part.marker("start"))
+def stiff_blade(n, wind, pitch=0.0):
+    """A stiff blade on a driven hub, in a wind (3,)."""
+    A, mech = rotation.matrix(rotation.exp([0.0, 0.0, -pitch])), rom.Mechanism(gravity=(0, 0, 0))
+    part = mech.add_nonlinear("blade", in_wind(stiff_body(n), wind, cone=0.0),
+                              orientation=A, omega=A.T @ [RATED_SPEED, 0.0, 0.0])  # fmt: skip
+    on_driven_hub(mech, part, RATED_SPEED)
     return mech
 
 
@@ -154,12 +176,30 @@ def stiff_blade(n, wind, pitch):
 def test_a_stiff_rotor_in_a_mechanism_has_the_loads_of_its_strips(wind, pitch):
     """Rods at the vertices beside seventeen published elements: one per cent apart."""
     pitch = np.radians(pitch)
-    sol = rom.simulate(stiff_blade(24, wind, pitch), t_end=2.0, dt=0.02, rho_inf=0.3)
+    sol = rom.simulate(stiff_blade(24, (wind, 0.0, 0.0), pitch), t_end=2.0, dt=0.02, rho_inf=0.3)
     late = sol.t > 1.5
     load = rotor_load(blading(0.0, 0.0), wind, RATED_SPEED, pitch)
     torque = -N_BLADES * sol.drive_load("speed")[late].mean()
     thrust = N_BLADES * np.abs(sol.reaction("shaft")[late][:, 0].mean())
     assert_allclose([torque, thrust], [load.torque, load.thrust], rtol=0.016)
+
+
+def test_a_stiff_rotor_in_wind_from_aside_has_the_loads_of_each_azimuth():
+    """Torque and the moment that bends the root, over the last turn, beside `rotor_load`."""
+    n, yaw, V = 8, 0.6, 9.0
+    mech = stiff_blade(n, (V * np.cos(yaw), V * np.sin(yaw), 0.0))
+    sol = rom.simulate(mech, t_end=8.0, dt=0.02, rho_inf=0.3)
+    rotor = same_strips(stiff_body(n))
+    load = rotor_load(rotor, V, RATED_SPEED, yaw=yaw, n_azimuths=48)
+    arm = load.strip[:, :, 0] @ (rotor.radius * rotor.length)
+    late = sol.t > 8.0 - 2 * np.pi / RATED_SPEED
+    azimuth = RATED_SPEED * sol.t[late] % (2 * np.pi)
+    turned, bent = (np.interp(azimuth, load.azimuth, x, period=2 * np.pi)
+                    for x in (load.blade_torque, arm))  # fmt: skip
+    assert_allclose(-sol.drive_load("speed")[late], turned, atol=0.01 * np.ptp(turned))
+    _, across, up = sol.reaction("shaft")[late][:, 3:].T
+    found = -across * np.cos(azimuth) - up * np.sin(azimuth)
+    assert_allclose(found, bent, atol=0.04 * np.ptp(bent))  # its mass follows a bending of 1 cm
 
 
 @pytest.mark.parametrize("wind", [8.0, 20.0])

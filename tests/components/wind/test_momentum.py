@@ -280,6 +280,14 @@ def test_the_slope_of_the_induction_is_that_of_a_skewed_cylinder_of_vortices(chi
         assert_allclose(through, 8.0 * (1 - a * (1 + 0.5 * slope * toward)), rtol=1e-6)
 
 
+@pytest.mark.parametrize("lean", [1.3, 1.5, np.pi / 2])
+def test_a_wake_leans_until_it_lies_in_the_disc(lean):
+    """Then nothing is induced before it, and twice as much where it goes, at any angle of wind."""
+    edge, a = np.array([63.0, 1.0, 63.0, 1.5, 3.0]), 0.4
+    before, behind = (SKEWED(edge, 8.0, 8.0 * (1 - a), lean, x) for x in (-1.0, 1.0))
+    assert_allclose([before, behind], [8.0, 8.0 * (1 - 2 * a)], rtol=1e-12)
+
+
 def aside_from(yaw, tilt=0.0, **more):
     return rotor_load(blading(tilt, 0.0), 8.0, tip_ratio(DESIGN_RATIO), yaw=yaw, **more)
 

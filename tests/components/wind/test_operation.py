@@ -7,7 +7,8 @@ from numpy.testing import assert_allclose
 from rom.components.histories import Table, recorded
 from rom.components.wind.blading import blading, rotor_load
 from rom.components.wind.control import steady
-from rom.components.wind.operation import late, operate
+from rom.components.wind.operation import operate
+from rom.components.wind.wake import late
 from rom.errors import ConfigError
 
 LATE = getattr(late, "py_func", late)

@@ -10,8 +10,8 @@ from scipy.optimize import brentq
 
 import rom
 from cases.beam import stiffened_beam
-from cases.mbs.trusses import HUB_INERTIA, MASS, REST, SPRING, dumbbell
 from cases.mbs.mechanisms import random_body, rotor
+from cases.mbs.trusses import HUB_INERTIA, MASS, REST, SPRING, dumbbell
 from rom.errors import ConfigError, ModelError, RomWarning
 from rom.mbs.analysis.linearize import linearize
 from rom.mbs.analysis.local_equations import difference, instant

@@ -1,5 +1,4 @@
-"""Paths of solutions over a parameter.
+"""Equilibria of a mechanism over the time at which its drives and loads are taken.
 
-`arc_length` follows any path, past limit points; `equilibria` are those of a mechanism over the
-time at which its drives and loads are taken.
+`equilibria` follows them past limit points and onto branches, by `rom.paths`.
 """

@@ -10,7 +10,6 @@ from scipy.linalg import eig, eigh, null_space
 
 from rom.arguments import finite, positive, typed, whole
 from rom.errors import ConfigError, RomWarning, SolverError, reached
-from rom.mbs.analysis.continuation.arc_length import Curve, Point
 from rom.mbs.analysis.equilibrium import equilibrium
 from rom.mbs.analysis.few_modes import RANK_RTOL, Pencil
 from rom.mbs.analysis.local_equations import DIFFERENCE_STEP, MAX_DENSE, Instant, instant
@@ -20,6 +19,7 @@ from rom.mbs.mechanism import Mechanism
 from rom.mbs.parts.bodies import Marker
 from rom.mbs.results.state import State
 from rom.model import Array
+from rom.paths.arc_length import Curve, Point
 
 TIME_STEP = 1e-6  # of differences, of the span
 N_NEAREST = 6  # stiffnesses around zero that are looked at in large mechanisms

@@ -10,7 +10,6 @@ import numpy.typing as npt
 
 from rom.arguments import finite, positive, typed, whole
 from rom.errors import ConfigError, SolverError, reached
-from rom.mbs.analysis.continuation.arc_length import Curve, Point
 from rom.mbs.analysis.periodic.derivatives import confirmed
 from rom.mbs.analysis.periodic.family import Family, Period, period_at
 from rom.mbs.analysis.periodic.flow import Flow
@@ -26,6 +25,7 @@ from rom.mbs.mechanism import Mechanism
 from rom.mbs.results.solution import Solution
 from rom.mbs.results.state import State
 from rom.model import Array
+from rom.paths.arc_length import Curve, Point
 from rom.process.progress import line
 
 CLOSED_TOL = 1e-7  # corrections that count as none, of the size of the motion

@@ -1,0 +1,398 @@
+"""A body in operation as equations of first order, with their derivatives by its parameters.
+
+State: s y and y' of modes, s the larger of frequency and one, then forces::
+
+    M(p) y'' + Xi y' + K(p) y = Phi' f,   K = sum k_i(p) K_i,   M alike
+
+Modes are those at factors of one. Sensors and what is wanted are rows of the state, accelerations
+by the equation of motion.
+
+Source:
+    Noise of a step: Van Loan, Computing integrals involving the matrix exponential, IEEE Trans.
+    Autom. Control 23 (1978) 395; its derivative: Najfeld and Havel, Derivatives of the matrix
+    exponential and their computation, Adv. Appl. Math. 16 (1995) 321.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from scipy.linalg import eigh, expm, expm_frechet
+
+from rom.arguments import finite, one_of
+from rom.body.flexible import FlexibleBody
+from rom.body.recovery import StressRecovery
+from rom.body.surface import strain_rows
+from rom.errors import ConfigError, ModelError
+from rom.model import Array
+from rom.names import named
+from rom.parametric.family import BodyFamily
+from rom.updating.family_model import AddedMass, GroundSpring, family_model
+from rom.updating.measured import POINT_RTOL, Channels
+
+UNITS = {
+    "displacement": "m", "velocity": "m/s", "acceleration": "m/s2", "strain": "1", "stress": "Pa"
+}  # fmt: skip
+UNSEEN_STATE_RTOL = 1e-9  # singular value of a motion that no sensor sees, over the largest
+DAMPED_RTOL = 1e-9  # decay over frequency from which on an unseen motion dies out by itself
+MAX_NORM = 0.5  # of a matrix whose exponential is summed; longer steps are doublings
+
+
+@dataclass(frozen=True, slots=True)
+class Sensors:
+    """Channels of one kind, measured or wanted.
+
+    Attributes:
+        channels: where, and along which direction.
+        quantity: "displacement", "velocity", "acceleration", or along the direction the normal
+            "strain", in the surface and constant over a triangle of it, or the normal "stress".
+        noise: standard deviation of a sample [unit of the quantity]; not used where it is wanted.
+
+    Raises:
+        ConfigError: for another quantity, or noise that is negative or not finite.
+    """
+
+    channels: Channels
+    quantity: str
+    noise: float = 0.0
+
+    def __post_init__(self) -> None:
+        one_of("quantity", self.quantity, tuple(UNITS))
+        if finite("noise", self.noise, ()) < 0:
+            raise ConfigError(f"noise = {self.noise} is negative.")
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Quantity and number from one of each channel."""
+        n = len(np.asarray(self.channels.points))
+        return tuple(f"{self.quantity}[{k}]" for k in range(1, n + 1))
+
+
+@dataclass(frozen=True, slots=True)
+class Rows:
+    """What sensors see of m modes; n_t terms have factors.
+
+    Attributes:
+        displacement: (k, m) of y [unit of a sensor / (m kg^(1/2))].
+        carried: (n_t, k, m) of y, times the factor of a term of the stiffness.
+        velocity: (k, m) of y'.
+        acceleration: (k, m) of y''.
+    """
+
+    displacement: Array
+    carried: Array
+    velocity: Array
+    acceleration: Array
+
+
+@dataclass(frozen=True, slots=True)
+class Linear:
+    """The equations at one point of the parameters, with their derivatives there.
+
+    Attributes:
+        A: (n, n) rates of the state [1/s].
+        dA: (n_p, n, n) by the logarithms of factors.
+        C: (n_y, n) what sensors see [unit of a sensor / unit of a state].
+        dC: (n_p, n_y, n) likewise.
+        W: (n_v, n) what is wanted.
+        dW: (n_p, n_v, n) likewise.
+    """
+
+    A: Array
+    dA: Array
+    C: Array
+    dC: Array
+    W: Array
+    dW: Array
+
+
+@dataclass(frozen=True, slots=True)
+class Operation:
+    """Modes of a body, forces on them, and what is seen.
+
+    Attributes:
+        names: (n_p,) of the parameters.
+        low: (n_p,) smallest logarithms of factors [1].
+        high: (n_p,) largest ones [1].
+        omega: (m,) frequencies at factors of one [rad/s].
+        K: (n_t, m, m) terms of the stiffness.
+        M: (n_t, m, m) terms of the mass.
+        k_powers: (n_t, n_p) one where a parameter multiplies a term of the stiffness.
+        m_powers: (n_t, n_p) likewise of the mass.
+        XI: (m, m) damping [1/s].
+        driven: (m, n_e) forces of the modes per force.
+        seen: rows of the sensors.
+        wanted: rows of what is wanted.
+    """
+
+    names: tuple[str, ...]
+    low: Array
+    high: Array
+    omega: Array
+    K: Array
+    M: Array
+    k_powers: Array
+    m_powers: Array
+    XI: Array
+    driven: Array
+    seen: Rows
+    wanted: Rows
+
+    @property
+    def scale(self) -> Array:
+        """(m,) what makes a velocity of a displacement [rad/s]."""
+        return np.maximum(self.omega, 1.0)
+
+    def at(self, x: Array) -> Linear:
+        """The equations at logarithms x (n_p,) of factors."""
+        m, n_e = self.driven.shape
+        k = np.exp(self.k_powers @ x)
+        acc, dacc = self._accelerations(x)
+        A, at = np.zeros((2 * m + n_e,) * 2), np.arange(m)
+        A[at, m + at] = self.scale
+        A[m : 2 * m] = acc
+        dA = np.zeros((x.size, *A.shape))
+        dA[:, m : 2 * m] = dacc
+        found = []
+        for rows in (self.seen, self.wanted):
+            y = np.tensordot(k, rows.carried, 1) + rows.displacement
+            C = rows.acceleration @ acc
+            C[:, :m] += y / self.scale
+            C[:, m : 2 * m] += rows.velocity
+            dC = rows.acceleration @ dacc
+            dC[..., :m] += np.einsum("tp,t,tkm->pkm", self.k_powers, k, rows.carried) / self.scale
+            found += [C, dC]
+        return Linear(A, dA, *found)
+
+    def _accelerations(self, x: Array) -> tuple[Array, Array]:
+        """(m, n) accelerations of the modes by the state, and (n_p, m, n) their derivatives."""
+        k, m = np.exp(self.k_powers @ x), np.exp(self.m_powers @ x)
+        K, M = np.tensordot(k, self.K, 1), np.tensordot(m, self.M, 1)
+        acc = np.linalg.solve(M, np.hstack([-K / self.scale, -self.XI, self.driven]))
+        dK = np.einsum("tp,t,tij->pij", self.k_powers, k, self.K) / self.scale
+        right = -np.einsum("tp,t,tij,jk->pik", self.m_powers, m, self.M, acc, optimize=True)
+        right[..., : len(K)] -= dK
+        return acc, np.linalg.solve(M, right)
+
+
+def of_body(
+    body: FlexibleBody,
+    sensors: Sequence[Sensors],
+    forces: Channels,
+    wanted: Sequence[Sensors],
+    fixed: Any,
+) -> Operation:
+    """The equations of one body, without parameters.
+
+    Raises:
+        ConfigError: if nothing can move, or for channels off the body.
+        ModelError: if the body has no surface or stress where they are needed.
+    """
+    omega, V = body.modes(fixed=fixed)
+    m, none = omega.size, np.zeros(0)
+    if not m:
+        raise ConfigError(f"body {body.name!r} cannot move with {fixed!r} held.")
+    XI = V[6:].T @ body.D @ V[6:]
+    XI[omega == 0], XI[:, omega == 0] = 0.0, 0.0  # rigid motion is not damped
+    groups = [
+        _rows(body, _stress(body, several), V, several, what)
+        for several, what in ((sensors, "sensor"), (wanted, "wanted value"))
+    ]
+    return Operation(
+        (), none, none, omega,
+        K=np.diag(omega**2)[None], M=np.eye(m)[None],
+        k_powers=np.zeros((1, 0)), m_powers=np.zeros((1, 0)),
+        XI=XI, driven=(forces.rows(body, "force") @ V).T,
+        seen=groups[0], wanted=groups[1],
+    )  # fmt: skip
+
+
+def of_family(
+    family: BodyFamily,
+    names: Sequence[str],
+    attached: Mapping[str, GroundSpring | AddedMass],
+    channels: tuple[Sequence[Sensors], Channels, Sequence[Sensors]],
+    damping: float,
+    fixed: Any,
+) -> Operation:
+    """The equations of a family; parameters that are not named stay at factors of one.
+
+    Args:
+        family: without parameters of thickness.
+        names: of parameters that change.
+        attached: springs and masses, by name.
+        channels: sensors, forces and what is wanted.
+        damping: ratio of all modes at factors of one [1].
+        fixed: what is held, see `FlexibleBody.frequencies`.
+
+    Raises:
+        ConfigError, ModelError: as `of_body`; ConfigError for a name that is not known.
+    """
+    body, nothing = family.body, np.zeros((0, 6 + family.body.n_modes))
+    model = family_model(family, (np.eye(6 + body.n_modes), nothing), attached, {}, fixed)
+    if wrong := set(names) - set(model.names):
+        raise ConfigError(
+            f"there is no parameter {named(sorted(wrong))}.",
+            hint=f"The family and what is attached have {named(model.names)}.",
+        )
+    if not model.K.shape[1]:
+        raise ConfigError(f"body {body.name!r} cannot move with {fixed!r} held.")
+    lam, U = eigh(model.K.sum(axis=0), model.M.sum(axis=0))
+    omega, V = np.sqrt(np.maximum(lam, 0.0)), model.seen @ U
+    omega[: model.n_rigid] = 0.0
+    chosen = [model.names.index(name) for name in names]
+    sensors, forces, wanted = channels
+    parts = [share.stress for share in family.shares] + [None] * len(attached)
+    groups = [
+        _rows(body, _stress(body, several, parts), V, several, what)
+        for several, what in ((sensors, "sensor"), (wanted, "wanted value"))
+    ]
+    return Operation(
+        tuple(names), np.log(model.low[chosen]), np.log(model.high[chosen]), omega,
+        K=U.T @ model.K @ U, M=U.T @ model.M @ U,
+        k_powers=model.k_powers[:, chosen], m_powers=model.m_powers[:, chosen],
+        XI=np.diag(2 * damping * omega), driven=(forces.rows(body, "force") @ V).T,
+        seen=groups[0], wanted=groups[1],
+    )  # fmt: skip
+
+
+def _stress(
+    body: FlexibleBody, several: Sequence[Sensors], parts: Sequence[Array | None] = ()
+) -> list[FlexibleBody]:
+    """The body with the stress of each term, where stress is asked for.
+
+    Raises:
+        ModelError: if the body knows no stress.
+    """
+    recovery = body.stress
+    if all(s.quantity != "stress" for s in several):
+        return [body] * max(len(parts), 1)
+    if recovery is None:
+        raise ModelError(f"body {body.name!r} carries no stress.", hint="Reduce with stress=True.")
+    if not parts:
+        return [body]
+    none = np.zeros_like(recovery.operator)
+    return [
+        replace(body, stress=StressRecovery(recovery.points, none if A is None else A))
+        for A in parts
+    ]
+
+
+def _rows(
+    body: FlexibleBody, terms: list[FlexibleBody], V: Array, several: Sequence[Sensors], what: str
+) -> Rows:
+    """Rows of channels, one below the other."""
+    k, m, order = sum(len(s.names) for s in several), V.shape[1], ("displacement", "velocity")
+    parts = {name: np.zeros((k, m)) for name in (*order, "acceleration")}
+    carried, first = np.zeros((len(terms), k, m)), 0
+    for s in several:
+        own = slice(first, first + len(s.names))
+        first = own.stop
+        if s.quantity == "stress":
+            for t, term in enumerate(terms):
+                static, inertial = stress_rows(term, s.channels, what)
+                carried[t, own] = static @ V[6:]
+                parts["acceleration"][own] += inertial @ V
+        elif s.quantity == "strain":
+            parts["displacement"][own] = (
+                strain_rows(body, s.channels.points, s.channels.directions, what) @ V[6:]
+            )
+        else:
+            parts[s.quantity][own] = s.channels.rows(body, what) @ V
+    return Rows(parts["displacement"], carried, parts["velocity"], parts["acceleration"])
+
+
+def stress_rows(body: FlexibleBody, channels: Channels, what: str) -> tuple[Array, Array]:
+    """Normal stress along channels by elastic coordinates (k, r) [Pa], and by accelerations.
+
+    The latter (k, 6 + r), of rigid and elastic coordinates, is that of modes left out.
+
+    Args:
+        body: with stress on its surface.
+        channels: where, and along which direction.
+        what: they are, for messages.
+
+    Raises:
+        ConfigError: if a channel is off the body.
+        ModelError: if the body knows no stress.
+    """
+    recovery = body.stress
+    if recovery is None:
+        raise ModelError(f"body {body.name!r} carries no stress.", hint="Reduce with stress=True.")
+    reach = POINT_RTOL * np.ptp(recovery.points, axis=0).max()
+    n_r = body.n_modes
+    extra = recovery.inertial
+    left_out = np.zeros((len(recovery.operator), 6 + n_r))
+    if extra is not None:
+        left_out = np.hstack([extra[:, :6], extra[:, -n_r:]])
+    static, inertial = [], []
+    directions = np.asarray(channels.directions)
+    for k, (x, d) in enumerate(zip(np.asarray(channels.points), directions, strict=True)):
+        far = np.linalg.norm(recovery.points - x, axis=1)
+        n = int(far.argmin())
+        if far[n] > reach:
+            raise ConfigError(f"{what} {k} at {x.tolist()} is {far[n]:.3g} m off the body.")
+        a, b, c = d / np.linalg.norm(d)
+        along = np.array([a * a, b * b, c * c, 2 * b * c, 2 * a * c, 2 * a * b])
+        static.append(along @ recovery.operator[6 * n : 6 * n + 6])
+        inertial.append(along @ left_out[6 * n : 6 * n + 6])
+    return np.array(static), np.array(inertial)
+
+
+def check_seen(at: Linear, body: Operation) -> None:
+    """Refuse what lasts and is not seen: at each undamped root of A, after Popov and Hautus.
+
+    Raises:
+        ModelError: naming the force or the motion.
+    """
+    m, n_e = body.driven.shape
+    scale = np.r_[np.ones(2 * m), 1 / np.maximum(np.abs(body.driven).max(axis=0), 1e-300)]
+    A, C = at.A * scale / scale[:, None], at.C * scale
+    C = C / np.maximum(np.abs(C).max(axis=1, keepdims=True), 1e-300)
+    undamped = (np.diag(body.XI) <= DAMPED_RTOL * body.omega) & (body.omega > 0)
+    for root in (0.0, *(1j * body.omega[undamped])):
+        test = A - root * np.eye(len(A))
+        test = test / np.maximum(np.abs(test).max(axis=1, keepdims=True), 1e-300)
+        _, size, Vh = np.linalg.svd(np.vstack([test, C]))
+        if size[-1] > UNSEEN_STATE_RTOL * size[0]:
+            continue
+        x = np.abs(Vh[-1])
+        unseen = [f"force {k}" for k in range(n_e) if x[2 * m + k] > 0.1 * x.max()]
+        unseen += [
+            f"the motion at {w / (2 * np.pi):.4g} Hz"
+            for k, w in enumerate(body.omega) if max(x[k], x[m + k]) > 0.1 * x.max()
+        ]  # fmt: skip
+        raise ModelError(
+            f"the sensors do not see {named(unseen)}, which would drift.",
+            hint="Add a displacement or a stress: accelerations do not see what stands still.",
+        )
+
+
+def discrete(A: Array, white: Array, dt: float) -> tuple[Array, Array]:
+    """Transition (n, n) over a step, and covariance (n, n) of what white noise adds.
+
+    A short step by Van Loan's exponential, then doublings, which do not overflow for modes far
+    above the samples.
+
+    Args:
+        A: (n, n) rates of the state [1/s].
+        white: (n, n) intensity of the noise.
+        dt: step [s].
+    """
+    n = len(A)
+    halvings = max(0, int(np.ceil(np.log2(max(np.abs(A).sum(axis=1).max() * dt / MAX_NORM, 1.0)))))
+    h = dt / 2.0**halvings
+    E = expm(np.block([[-A, white], [np.zeros((n, n)), A.T]]) * h)
+    step = E[n:, n:].T
+    Q = step @ E[:n, n:]
+    for _ in range(halvings):
+        Q = Q + step @ Q @ step.T
+        step = step @ step
+    return step, 0.5 * (Q + Q.T)
+
+
+def step_derivatives(A: Array, dA: Array, dt: float) -> Array:
+    """(n_p, n, n) derivatives of the transition exp(A dt) along dA (n_p, n, n) [1/s]."""
+    found = [expm_frechet(A * dt, B * dt, compute_expm=False) for B in dA]
+    return np.array(found).reshape(dA.shape)

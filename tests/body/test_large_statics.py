@@ -1,0 +1,151 @@
+"""Bodies of large deflection at rest: snap-through, buckling, and loads in space."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.linalg import eigh, null_space
+
+import rom
+from cases.mbs.slender import SYMMETRIC, Full, assembled, reduced, slender
+from rom.errors import ConfigError, InterfaceError, ModelError
+
+pytest.importorskip("dolfinx", reason="dolfinx is not installed")
+pytestmark = [
+    pytest.mark.fenicsx,
+    pytest.mark.once,
+    pytest.mark.filterwarnings("ignore:Number of integration points"),
+    pytest.mark.filterwarnings("ignore::rom.errors.RomWarning"),
+]
+HALF, RISE, HEIGHT, PRESSED = 0.5, 0.03, 0.01, 600.0  # of a clamped arch [m], and its load [N]
+
+
+@pytest.fixture(scope="module")
+def arch():
+    """Half of it; it snaps on the way to the largest load."""
+    model = assembled((HALF, HEIGHT, HEIGHT), (10, 1, 1), rise=RISE)
+    body = reduced(model, (0, 0, -PRESSED, 0, 0, 0), n_modes=8, active=7, tol=1e-5,
+                   fixed=SYMMETRIC)  # fmt: skip
+    return body, model
+
+
+def test_a_shallow_arch_snaps_at_the_loads_of_the_full_model(arch):
+    """Its crown is pushed down in steps: the force on it has a maximum and a minimum."""
+    body, model = arch
+    found = body.critical_loads({"tip": (0, 0, -PRESSED, 0, 0, 0)}, fixed=SYMMETRIC) * PRESSED
+    assert found.size == 2
+    full, u = Full(model, held=range(6)), np.zeros(model.n_dofs)
+    steps = np.r_[0.004, 0.008, 0.0115, 0.0128, 0.0141, 0.021, 0.028, 0.034, 0.0353, 0.0366]
+    forces = {}
+    for down in steps:
+        moved = np.zeros(12)
+        moved[8] = -down
+        u, held = full.state(u, np.zeros(6), moved)
+        forces[down] = -held[8]
+    for load, around in zip(found, (steps[2:5], steps[7:]), strict=True):
+        a, b, c = np.polyfit(around, [forces[x] for x in around], 2)
+        assert around[0] < -b / (2 * a) < around[-1]
+        assert_allclose(load, c - b**2 / (4 * a), rtol=0.01)
+    assert forces[steps[3]] > 1.5 * forces[steps[8]]
+
+
+def test_behind_its_snap_the_arch_rests_where_the_full_model_does(arch):
+    body, model = arch
+    load = np.array([0, 0, -PRESSED, 0, 0, 0])
+    before, behind = body.equilibria({"tip": load}, shares=(0.5, 1.0), fixed=SYMMETRIC)
+    down = body.marker("tip").translation[2]
+    assert down @ before > -0.2 * RISE and down @ behind < -1.5 * RISE
+    full = Full(model, held=(0, 1, 3, 4, 5))
+    u = np.zeros(model.n_dofs)
+    moved = Full(model, held=range(6))
+    for share in (0.3, 0.6, 1.0):
+        target = np.zeros(12)
+        target[8] = share * (down @ behind)
+        u, _ = moved.state(u, np.zeros(6), target)
+    u, _ = full.state(u, load, np.zeros(11))
+    assert_allclose(down @ behind, (full.motion @ u)[8], rtol=5e-3)
+
+
+def test_a_column_buckles_at_eulers_load():
+    """pi^2 EI / 4 at first in both planes, 9 times that then; nearly 4 pi^2 EI between clamps."""
+    model, EI = slender(50, 12)
+    body = reduced(model, (EI, 0, 0, 0, 0, 0), n_modes=8)
+    euler = np.pi**2 / 4
+    found = 25 * body.critical_loads({"tip": (-25 * EI, 0, 0, 0, 0, 0)})
+    assert_allclose(found, [euler, euler, 9 * euler, 9 * euler], rtol=2e-2)
+    assert_allclose(found[:2], euler, rtol=3e-3)
+    clamped = body.critical_loads({"tip": (-45 * EI, 0, 0, 0, 0, 0)}, fixed={"tip": "yzrxryrz"})
+    assert_allclose(45 * clamped, 16 * euler, rtol=0.03)
+    assert body.critical_loads({"tip": (EI, 0, 0, 0, 0, 0)}).size == 0
+    u, full = np.zeros(model.n_dofs), Full(model)
+    u, _ = full.state(u, np.array([-1e-3 * EI, 0, 0, 0, 0, 0]), np.zeros(6))
+    N = null_space(full.C)
+    softer = 0.5e3 * (full.solid.tangent(-u) - full.solid.tangent(u))
+    rest = full.solid.tangent(0 * u)
+    share = eigh(N.T @ (softer @ N), N.T @ (rest @ N), eigvals_only=True)[::-1][:4]
+    assert_allclose(found, 1 / share, rtol=2e-3)
+
+
+@pytest.mark.parametrize("nu, rtol", [(0.0, 5e-3), (0.3, 3e-3)])
+def test_a_cantilever_bends_in_space_as_finite_elements_do(nu, rtol):
+    """Force along all axes and a twist at once, to a slope of half a radian."""
+    model, EI = slender(50, 12, nu)
+    loads = np.array([0.2, 1.0, 0.6, 0.3, 0, 0]) * EI
+    body = reduced(model, loads, n_modes=10, active=2)
+    (q,) = body.equilibria({"tip": loads * [-1, 1, -1, 1, 0, 0]})
+    full = Full(model).under(loads * [-1, 1, -1, 1, 0, 0])[6:]
+    found = body.marker("tip").translation @ q
+    assert_allclose(found, full[:3], rtol=0, atol=rtol * np.linalg.norm(full[:3]))
+    assert np.linalg.norm(full[3:]) > 0.4
+
+
+# flapwise and edgewise deflection [mm] at angles of 30, 60, 90 degrees under 8.896 N: solid
+# elements of Ansys (4 x 12 x 500) and its beams, Obrezkov, Mikkola and Matikainen, Nonlinear
+# Dyn. 109 (2022) 31, as quoted by ANCFBeamTest.py of Exudyn; a geometrically exact beam.
+PRINCETON = {
+    30: [(76.967, 9.938), (79.395, 10.112), (79.547, 10.208)],
+    60: [(127.251, 6.500), (129.888, 6.605), (129.958, 6.742)],
+    90: [(143.849, 0.0), (146.246, 0.0), (146.252, 0.0)],
+}
+
+
+@pytest.mark.slow
+def test_the_princeton_beam_is_no_further_from_published_solids_than_published_beams_are():
+    """The tip goes down by a quarter of the length; these solids and beams are 2 to 3 % apart."""
+    force, b, t = 8.896, 12.3777e-3, 3.2024e-3
+    aluminium = rom.Material(E=71.7e9, nu=0.31, rho=2700.0)
+    model = assembled((0.508, b, t), (12, 1, 1), material=aluminium)
+    body = reduced(model, (0, force, force, 0, 0, 0), n_modes=12, active=3, tol=1e-5)
+    tip = body.marker("tip").translation
+    for angle, (solid, *beams) in PRINCETON.items():
+        beta = np.radians(angle)
+        load = force * np.array([0, -np.cos(beta), np.sin(beta), 0, 0, 0])
+        (q,) = body.equilibria({"tip": load})
+        found = 1e3 * np.array([1, -1]) * (tip @ q)[[2, 1]]
+        away = np.linalg.norm(np.subtract(beams, solid), axis=1)
+        assert np.linalg.norm(found - solid) < away.min() < 0.04 * np.linalg.norm(solid)
+
+
+@pytest.mark.parametrize(
+    "change, error, says",
+    [
+        ({"fixed": ("hub",)}, InterfaceError, "hub"),
+        ({"fixed": ("root",)}, InterfaceError, "root"),
+        ({"fixed": {"tip": "up"}}, ConfigError, "directions are"),
+        ({"fixed": {"tip": "y"}}, ConfigError, "tip f_y where the body is held"),
+    ],
+)
+def test_supports_that_are_none_are_refused(change, error, says):
+    model, _ = slender(20, 2)
+    with pytest.raises(error, match=says):
+        reduced(model, (0, 1.0, 0, 0, 0, 0), n_modes=2, active=1, **change)
+
+
+def test_bodies_of_small_deflection_have_no_such_statics():
+    model, _ = slender(20, 2)
+    body = rom.reduce(model, method=rom.CraigBampton(n_modes=2), certify=False,
+                      interfaces={"root": "rbe3", "tip": "rbe3"}, reference="root")  # fmt: skip
+    for ask in (body.equilibria, body.critical_loads):
+        with pytest.raises(ModelError, match="small deflection"):
+            ask({"tip": (1.0, 0, 0, 0, 0, 0)})
+    with pytest.raises(ConfigError, match="loads"):
+        body.forces_on({"tip": (1.0, 2.0)})

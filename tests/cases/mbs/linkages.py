@@ -1,0 +1,123 @@
+"""Linkages of two drives as bodies and joints of the multibody core."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+import rom
+from rom import rotation
+
+Z = (0.0, 0.0, 1.0)
+
+
+def still(t: float) -> float:
+    """No displacement of a drive."""
+    return 0.0
+
+
+def link_of_the_core(
+    mech: rom.Mechanism, name: str, body: Any, at: Sequence[float], angle: float
+) -> Any:
+    """Add a link at a place (2,): a rod (mass, length), or a flexible body with pins root, tip."""
+    A = rotation.matrix(np.array([np.cos(angle / 2), 0, 0, np.sin(angle / 2)]))
+    place = np.array([*at, 0.0])
+    if isinstance(body, tuple):
+        mass, length = body
+        J, half = mass * length**2 / 12, np.array([length / 2, 0, 0])
+        return mech.add_rigid(
+            name, mass=mass, inertia=(J / 100, J, J), at=place + A @ half, orientation=A,
+            markers={"root": -half, "tip": half},
+        )  # fmt: skip
+    return mech.add_flexible(name, body, at=place - A @ body.marker("root").point, orientation=A)
+
+
+def pinned(mech: rom.Mechanism, name: str, body: Any, at: Any, angle: float, first: Any) -> Any:
+    """Add a link as `link_of_the_core` on a pin at a marker."""
+    part = link_of_the_core(mech, name, body, at, angle)
+    mech.revolute(f"{name} pin", first, part.marker("root"), axis=Z)
+    return part
+
+
+def ball(
+    mech: rom.Mechanism, name: str, mass: float, at: Sequence[float], inertia: float = 1e-9
+) -> Any:
+    """Add a body that is nearly a point."""
+    return mech.add_rigid(name, mass=mass, inertia=(inertia,) * 3, at=(*at, 0.0))
+
+
+def direction(arm: Any) -> float:
+    """Angle of a vector (2,) [rad]."""
+    return float(np.arctan2(arm[1], arm[0]))
+
+
+def five_bar_of_the_core(q: Any, cranks: Any, couplers: Any, posture: Any) -> rom.Mechanism:
+    """The five-bar with a tool of 0.5 kg, drives "left" and "right" on its base joints."""
+    mech = rom.Mechanism(gravity=(0, 0, 0))
+    tips = []
+    for k, (pivot, elbow) in enumerate(((0, 1), (4, 3))):
+        o = mech.ground.marker((*posture[pivot], 0.0))
+        crank = pinned(mech, f"crank {k}", cranks[k], posture[pivot], q[k], o)
+        turn = direction(posture[2] - posture[elbow])
+        coupler = pinned(
+            mech, f"coupler {k}", couplers[k], posture[elbow], turn, crank.marker("tip")
+        )
+        tips.append(coupler.marker("tip"))
+        mech.drive(("left", "right")[k], f"crank {k} pin", still)
+    mech.revolute("tip", *tips, axis=Z)
+    mech.fixed("held", tips[0], ball(mech, "ball", 0.5, posture[2]).marker((0, 0, 0)))
+    return mech
+
+
+def cross_slides_of_the_core(masses: tuple[float, float], angle: float) -> rom.Mechanism:
+    """PP: drives "x" along x and "y" at an angle to it."""
+    mech = rom.Mechanism(gravity=(0, 0, 0))
+    first, second = (ball(mech, n, m, (0, 0), 0.01 * m) for n, m in zip("ab", masses, strict=True))
+    o = (0, 0, 0)
+    mech.prismatic("low", mech.ground.marker(o), first.marker(o), axis=(1, 0, 0))
+    guide = (np.cos(angle), np.sin(angle), 0)
+    mech.prismatic("high", first.marker(o), second.marker(o), axis=guide)
+    mech.drive("x", "low", still)
+    mech.drive("y", "high", still)
+    return mech
+
+
+def slide_arm_of_the_core(slide: float, arm: tuple[float, float], angle: float) -> rom.Mechanism:
+    """PR: a slide on a rail along x, drive "x", and a rod on it at an angle, drive "turn"."""
+    mech = rom.Mechanism(gravity=(0, 0, 0))
+    base, o = ball(mech, "slide", slide, (0, 0)), (0, 0, 0)
+    mech.prismatic("rail", mech.ground.marker(o), base.marker(o), axis=(1, 0, 0))
+    pinned(mech, "arm", arm, (0, 0), angle, base.marker(o))
+    mech.drive("x", "rail", still)
+    mech.drive("turn", "arm pin", still)
+    return mech
+
+
+def two_link_of_the_core(first: Any, second: Any, q: Any) -> rom.Mechanism:
+    """2R: two rods, drives "shoulder" on the ground and "elbow" between them."""
+    mech = rom.Mechanism(gravity=(0, 0, 0))
+    upper = pinned(mech, "upper", first, (0, 0), q[0], mech.ground.marker((0, 0, 0)))
+    elbow = first[1] * np.array([np.cos(q[0]), np.sin(q[0])])
+    pinned(mech, "lower", second, elbow, q[0] + q[1], upper.marker("tip"))
+    mech.drive("shoulder", "upper pin", still)
+    mech.drive("elbow", "lower pin", still)
+    return mech
+
+
+def rail_of_the_core(
+    slide: float, coupler: tuple[float, float], payload: float, spread: float
+) -> rom.Mechanism:
+    """PRRRP on one rail along x: slides at 0 and at the spread, drives "left" and "right"."""
+    mech, o, tips = rom.Mechanism(gravity=(0, 0, 0)), (0, 0, 0), []
+    tip = np.array([spread / 2, np.sqrt(coupler[1] ** 2 - spread**2 / 4)])
+    for name, x in (("left", 0.0), ("right", spread)):
+        base = ball(mech, f"{name} slide", slide, (x, 0))
+        mech.prismatic(f"{name} rail", mech.ground.marker((x, 0, 0)), base.marker(o),
+                       axis=(1, 0, 0))  # fmt: skip
+        turn = direction(tip - [x, 0])
+        rod = pinned(mech, f"{name} coupler", coupler, (x, 0), turn, base.marker(o))
+        tips.append(rod.marker("tip"))
+        mech.drive(name, f"{name} rail", still)
+    mech.revolute("tip", *tips, axis=Z)
+    mech.fixed("held", tips[0], ball(mech, "tool", payload, tip).marker(o))
+    return mech

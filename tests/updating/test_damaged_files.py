@@ -1,0 +1,165 @@
+"""Files of tests damaged one way after another: each is named, none is taken for whole."""
+
+import re
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import rom
+from cases.paths import TESTS
+from cases.solid import STEEL, composite
+from rom.errors import FileFormatError, RomError
+from rom.updating import Channels
+
+HERE = TESTS / "reference" / "foreign"
+F = np.linspace(20.0, 700.0, 60)
+NODES = {1: (0.5, 0.0, 0.08), 2: (0.75, 0.1, 0.08), 3: (1.0, 0.1, 0.0), 4: (1.0, 0.0, 0.08)}
+SENSORS = tuple((node, axis) for node in NODES for axis in "YZ")
+FORCE = (3, "Z")
+TRUE = {"inner": 1.2, "outer": 0.9}
+AXES = {"Y": (0.0, 1.0, 0.0), "Z": (0.0, 0.0, 1.0)}
+
+
+@pytest.fixture(scope="module")
+def family():
+    part = composite(
+        dict.fromkeys(TRUE, STEEL), lambda c: "inner" if c[0] < 4 else "outer",
+        (1.0, 0.1, 0.08), (8, 1, 1),
+    )  # fmt: skip
+    return rom.reduce_parametric(
+        part, parameters={name: rom.YoungsModulus(name, 0.4, 2.5) for name in TRUE},
+        method=rom.CraigBampton(8), interfaces={"root": "rbe2", "tip": "rbe2"}, certify=False,
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def responses(family):
+    """(n_f, n_s) accelerations per force of the true body, with noise of 2 % [m/s^2/N]."""
+    true = family.at(**TRUE)
+    omega, V = true.modes(fixed=("root",))
+    w = 2 * np.pi * F[:, None]
+
+    def rows(dofs):
+        channels = Channels([NODES[n] for n, _ in dofs], [AXES[a] for _, a in dofs])
+        return channels.rows(true, "sensor") @ V
+
+    g = -(w**2) / (omega**2 - w**2 + 0.02j * w * omega)
+    H = np.einsum("sn,fn,n->fs", rows(SENSORS), g, rows([FORCE])[0])
+    rng = np.random.default_rng(0)
+    return H * (1 + 0.02 * (rng.standard_normal(H.shape) + 1j * rng.standard_normal(H.shape)))
+
+
+def written(folder, H, *, nodes=None, unit="m/s^2/N", length="m", force=FORCE):
+    """A table of an analyser and one of its nodes."""
+    names = ["Frequency [Hz]"]
+    for node, axis in SENSORS:
+        names += [
+            f"{node}+{axis}/{force[0]}+{force[1]} {part} [{unit}]" for part in ("real", "imag")
+        ]
+    parts = np.stack([H.real, H.imag], axis=2).reshape(len(F), -1)
+    lines = [",".join(names)]
+    lines += [",".join(f"{x:.10g}" for x in row) for row in np.column_stack([F, parts])]
+    points = [f"node,x [{length}],y [{length}],z [{length}]"]
+    points += [f"{n},{x},{y},{z}" for n, (x, y, z) in (nodes or NODES).items()]
+    (folder / "test.csv").write_text("\n".join(lines) + "\n")
+    (folder / "points.csv").write_text("\n".join(points) + "\n")
+    return folder
+
+
+def updated(family, folder):
+    test = rom.io.read_responses(
+        folder / "test.csv", averages=50, coherence=1 / (1 + 2 * 50 * 0.02**2),
+        points=folder / "points.csv",
+    )  # fmt: skip
+    return rom.update(family, test, fixed=("root",))
+
+
+def test_a_whole_file_is_updated(family, responses, tmp_path):
+    found = updated(family, written(tmp_path, responses))
+    assert found.verdict.ok
+    for name, value in TRUE.items():
+        assert abs(np.log(found.factors[name] / value)) < 4 * found.deviations[name]
+
+
+def scaled(factor, sensor=None):
+    def damage(H):
+        H = H.copy()
+        H[:, slice(None) if sensor is None else sensor] *= factor
+        return H
+
+    return damage
+
+
+def lost(H):
+    H = H.copy()
+    H[7, 2] = np.nan
+    return H
+
+
+MOVED = {**NODES, 2: (0.75, 0.1, 0.2)}
+DAMAGES = {
+    "a line is not a number": (lost, {}, r"not finite at 1 lines, e\.g\. at 100\.\d* Hz"),
+    "a node is off the body": (scaled(1.0), {"nodes": MOVED}, r"sensor 2 at .* is 0\.12 m off"),
+    # a thousandth of the body lies at its support
+    "nodes are in millimetres": (scaled(1.0), {"length": "mm"}, "all responses are .* Check units"),
+    "a node is missing": (scaled(1.0), {"nodes": {1: NODES[1]}}, "without coordinates: 2, 3, 4"),
+    "a sensor is turned around": (scaled(-1.0, 5), {}, "sensor 5"),
+    "a sensor is in g": (scaled(1 / 9.80665, 4), {}, "sensor 4.*taken for g|sensor 4.*in g"),
+    "all are in millimetres": (scaled(1e3), {}, "all responses .*millimetres"),
+    "units of the header are wrong": (scaled(1.0), {"unit": "mm/s^2/N"}, "all responses"),
+    "volts are not calibrated": (scaled(1.0), {"unit": "V/N"}, "'v' is no motion.*calibrate"),
+    "the force is off the body": (
+        scaled(1.0), {"force": (9, "Z"), "nodes": {**NODES, 9: (2.0, 0.0, 0.0)}},
+        "input 0 .* off the body"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", DAMAGES)
+def test_what_is_wrong_in_a_table_is_named(family, responses, tmp_path, name):
+    damage, more, words = DAMAGES[name]
+    with pytest.raises(RomError) as caught:
+        updated(family, written(tmp_path, damage(responses), **more))
+    assert re.search(words, str(caught.value)), str(caught.value)
+
+
+def test_a_table_that_is_cut_is_named_at_each_place(responses, tmp_path):
+    """Of all places within its last two lines; a whole line less is a shorter test."""
+    text = (written(tmp_path, responses) / "test.csv").read_text()
+    start = text[:-1].rindex("\n") + 1
+    read = {"averages": 50, "coherence": 0.9, "points": tmp_path / "points.csv"}
+    for end in range(start + 3, len(text) - 12, 7):
+        (tmp_path / "test.csv").write_text(text[:end])
+        with pytest.raises(FileFormatError, match=r"line 61"):
+            rom.io.read_responses(tmp_path / "test.csv", **read)
+    (tmp_path / "test.csv").write_text(text[:start])
+    assert len(rom.io.read_responses(tmp_path / "test.csv", **read).frequencies) == len(F) - 1
+
+
+@pytest.mark.parametrize("name", ["pyuff_test.uff", "sdynpy_test.unv"])
+def test_a_universal_file_that_is_cut_is_named_at_each_line(tmp_path, name):
+    """Of two programs; only between data sets it cannot be seen, and what is read is right."""
+    lines = (HERE / name).read_bytes().split(b"\n")
+    whole = rom.io.read_responses(HERE / name, averages=20)
+    path, passed = tmp_path / name, []
+    for k in range(len(lines) - 1):
+        path.write_bytes(b"\n".join(lines[:k]))
+        try:
+            test = rom.io.read_responses(path, averages=20)
+        except FileFormatError as error:
+            assert name in str(error)
+            continue
+        passed.append(k)
+        n = test.H.shape[1]
+        assert_allclose(test.H, whole.H[:, :n], rtol=0)
+        assert lines[k - 1].endswith(b"    -1")
+    assert len(passed) <= 4
+
+
+def test_numbers_that_are_none_are_named_in_a_universal_file(tmp_path):
+    text = (HERE / "sdynpy_test.unv").read_text("ascii").splitlines()
+    first = next(k for k, line in enumerate(text) if line.strip() == "58") + 12
+    text[first] = "NaN".rjust(20) + text[first][20:]
+    (tmp_path / "x.unv").write_text("\n".join(text))
+    with pytest.raises(FileFormatError, match=r"not finite at 1 lines, e\.g\. at 2 Hz"):
+        rom.io.read_responses(tmp_path / "x.unv", averages=20)

@@ -1,0 +1,166 @@
+"""What is found in a hundred simulated tests: as often right as its deviations say."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.stats import chi2, kstest
+
+import rom
+from cases.solid import STEEL, composite
+from rom.errors import ConfigError
+from rom.updating import Channels, Responses
+from rom.updating.family_model import family_model
+from rom.updating.frf_data import estimators
+from rom.updating.normal_equations import responses_at, white
+
+PARAMETERS = {
+    "E_inner": rom.YoungsModulus("inner", 0.4, 2.5),
+    "E_outer": rom.YoungsModulus("outer", 0.4, 2.5),
+    "rho": rom.Density(None, 0.5, 2.0),
+}
+TRUE = {"E_inner": 1.05, "E_outer": 0.9, "rho": 1.1}
+SENSORS = Channels(
+    [[x, 0.1, 0.08] for x in (0.5, 0.75, 1.0)] * 2, [[0, 1, 0]] * 3 + [[0, 0, 1]] * 3
+)
+INPUTS = Channels([[1.0, 0.0, 0.0], [0.5, 0.1, 0.08]], [[0, 1, 1], [0, 1, -0.5]])
+LINES = np.linspace(40, 160, 20)
+HELD = ("root",)
+AVERAGES, DRAWS = 100, 100
+
+
+@pytest.fixture(scope="module")
+def family():
+    parts = {"inner": STEEL, "outer": STEEL}
+    model = composite(parts, lambda c: "inner" if c[0] < 2 else "outer", cells=(4, 1, 1))
+    return rom.reduce_parametric(
+        model, parameters=PARAMETERS, method=rom.CraigBampton(1),
+        interfaces={"root": "rbe2", "tip": "rbe2"}, certify=False,
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def exact(family):
+    rows = (SENSORS.rows(family.body, "sensor"), INPUTS.rows(family.body, "input"))
+    model = family_model(family, rows, {}, {}, HELD)
+    x = np.log([TRUE[name] for name in model.names])
+    return responses_at(model, x, np.array([0.02]), 2 * np.pi * LINES)
+
+
+def gauss(rng, shape):
+    return (rng.standard_normal(shape) + 1j * rng.standard_normal(shape)) / np.sqrt(2)
+
+
+def measured(exact, name, on_force, on_response, rng):
+    """One force drives all sensors; its noise is in all of their responses."""
+    f = gauss(rng, (AVERAGES, LINES.size, 1, 2))
+    x = exact * (f + on_response * gauss(rng, (AVERAGES, *exact.shape)))
+    f = f + on_force * gauss(rng, f.shape)
+    *H, coherence = estimators(x, np.broadcast_to(f, x.shape))
+    H = H[("H1", "H2", "Hv").index(name)]
+    return Responses(LINES, H, SENSORS, INPUTS, coherence, AVERAGES, force_noise=on_force)
+
+
+@pytest.fixture(scope="module")
+def drawn(family, exact):
+    """The function that gives errors over deviations (n, 3), errors, and the updates."""
+
+    @cache
+    def draw(name, on_force, on_response, n=DRAWS, **changes):
+        rng, found = np.random.default_rng(0), []
+        for _ in range(n):
+            test = replace(measured(exact, name, on_force, on_response, rng), **changes)
+            found.append(rom.update(family, test, fixed=HELD, damping=0.02))
+        errors = np.log([[u.factors[p] / TRUE[p] for p in PARAMETERS] for u in found])
+        return errors / [[u.deviations[p] for p in PARAMETERS] for u in found], errors, found
+
+    return draw
+
+
+KNOWN = {"coherence": 1 / (1 + 0.1**2)}
+
+
+@pytest.mark.parametrize(
+    ("name", "on_force", "on_response", "known"),
+    [
+        ("H1", 0.0, 0.1, KNOWN),
+        ("H2", 0.03, 0.01, {}),
+        ("Hv", 0.01, 0.01, {}),
+        ("Hv", 0.1, 0.1, {}),
+    ],
+)
+def test_parameters_lie_inside_two_deviations_as_often_as_they_must(
+    drawn, name, on_force, on_response, known
+):
+    """Of 100 draws 95 are expected, 90 to 99 by chance; of damping ratios with their prior too."""
+    scaled, _, found = drawn(name, on_force, on_response, **known)
+    inside = np.count_nonzero(np.abs(scaled) < 2, axis=0)
+    assert (inside >= 90).all() and (inside <= 99).all(), inside
+    ratios = [[np.log(u.zeta[k] / 0.02) / u.deviations[f"zeta {k + 1}"] for k in (0, 1)]
+              for u in found]  # fmt: skip
+    assert (np.count_nonzero(np.abs(ratios) < 2.0, axis=0) >= 88).all()
+    assert np.mean([u.verdict.ok for u in found]) >= 0.95
+
+
+@pytest.mark.parametrize(("name", "power"), [("H1", 1), ("H2", -1)])
+def test_a_biased_estimator_is_wrong_by_its_bias_and_nearly_never_inside(drawn, name, power):
+    """Ten per cent on both: stiffness and mass 1 % too large by H1, too small by H2."""
+    scaled, errors, _ = drawn(name, 0.1, 0.1, 15)
+    assert_allclose(errors.mean(axis=0)[[0, 2]], power * np.log(1.01), rtol=0.1)
+    assert np.count_nonzero(np.abs(scaled[:, [0, 2]]) < 2, axis=0).max() <= 2
+
+
+def test_noise_of_a_force_that_is_taken_for_that_of_sensors_makes_deviations_too_small(drawn):
+    scaled, *_ = drawn("Hv", 0.1, 0.1, 40, force_noise=0.0)
+    assert np.count_nonzero(np.abs(scaled) < 2, axis=0).min() < 0.8 * 40
+
+
+def test_chi_square_is_distributed_as_its_limits_suppose(drawn, exact):
+    """Probabilities of what is left are even between 0 and 1, where coherence is known."""
+    *_, found = drawn("H1", 0.0, 0.1, **KNOWN)
+    freedom = 2 * exact.size - 3 - found[0].zeta.size
+    value = freedom * np.array([u.verdict.rows[0].value for u in found])
+    assert_allclose(value.mean() / freedom, 1.0, atol=0.02)
+    assert kstest(chi2.sf(value, freedom), "uniform").pvalue > 0.02
+
+
+def test_estimated_coherence_has_the_expectation_of_its_averages():
+    """Of few averages squared errors over estimated variances have the mean n / (n - 2)."""
+    rng, n = np.random.default_rng(2), 12
+    f = gauss(rng, (n, 60_000))
+    H, _, _, c = estimators(f + 0.2 * gauss(rng, f.shape), f)
+    test = Responses(np.arange(1.0, 60_001), H[:, None, None], one(), one(), c[:, None, None], n)
+    error, _ = test.errors()
+    assert_allclose(np.mean(np.abs(np.log(H) / error[:, 0, 0]) ** 2) / 2, 1.0, atol=0.015)
+
+
+def test_large_errors_have_the_variance_of_their_logarithm():
+    rng, n, level = np.random.default_rng(3), 40, 0.35
+    H = 1 + level * gauss(rng, (60_000,))
+    c = 1 / (1 + n * level**2)
+    test = Responses(np.arange(1.0, 60_001), H[:, None, None], one(), one(), c, n)
+    error, _ = test.errors()
+    assert_allclose(np.mean(np.abs(np.log(H) / error[:, 0, 0]) ** 2) / 2, 1.0, atol=0.03)
+
+
+def one():
+    return Channels([[0.0, 0.0, 0.0]], [[0.0, 0.0, 1.0]])
+
+
+def test_errors_that_sensors_share_are_made_independent():
+    """The covariance D^-1 + c^2 becomes the identity; a sensor without weight stays out."""
+    weight = np.array([30.0, 0.0, 80.0, 10.0])[None, :, None]
+    A = white(np.eye(4)[None, :, None, :], weight, 0.05)[0, :, 0]
+    own = np.diag(1 / np.where(weight, weight, np.inf).ravel() ** 2)
+    covariance = A @ (own + 0.05**2) @ A.T
+    assert_allclose(covariance, np.diag([1.0, 0.0, 1.0, 1.0]), atol=1e-12)
+
+
+def test_noise_of_forces_and_few_averages_are_checked(exact):
+    test = measured(exact, "H1", 0.0, 0.1, np.random.default_rng(0))
+    with pytest.raises(ConfigError, match=r"force_noise = -0\.1: zero or more"):
+        replace(test, force_noise=-0.1)
+    with pytest.raises(ConfigError, match="estimated from 2 averages says nothing"):
+        replace(test, averages=2)

@@ -1,0 +1,257 @@
+"""Parameters that change in operation: exact derivatives, another filter, chi-square both ways."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.stats import chi2
+
+import rom
+from cases.solid import STEEL, composite
+from rom.body.recovery import StressRecovery
+from rom.errors import ConfigError, ParameterError, SolverError
+from rom.updating import (
+    Channels,
+    Drift,
+    GroundSpring,
+    Sensors,
+    parameter_tracker,
+    tracker,
+)  # fmt: skip
+from rom.updating.operation import discrete
+from rom.updating.parameter_tracking import LINEAR_REACH
+
+DT = 1e-3
+PARAMETERS = {
+    "E_inner": rom.YoungsModulus("inner", 0.4, 2.5),
+    "rho_outer": rom.Density("outer", 0.5, 2.0),
+}
+TIP = Channels([[1.0, 0, 0]], [[0, 0, 1]])
+GAUGE = Channels([[0.1, 0.05, 0.08]], [[1, 0, 0]])
+FEW = (
+    Sensors(GAUGE, "strain", 2e-7),
+    Sensors(Channels([[0.5, 0.1, 0], [1.0, 0.1, 0]], [[0, 0, 1]] * 2), "acceleration", 0.5),
+)
+WANTED = (Sensors(TIP, "displacement"), Sensors(GAUGE, "stress"))
+SPRING = {"clamp": GroundSpring("tip", (0.0, 0.0, 4e6), 0.2, 5.0)}
+DRIFTS = {"E_inner": Drift(0.05, 0.02), "clamp": Drift(0.05, 0.02)}
+
+
+@pytest.fixture(scope="module")
+def family():
+    model = composite(
+        {"inner": STEEL, "outer": STEEL}, lambda c: "inner" if c[0] < 4 else "outer",
+        (1.0, 0.1, 0.08), (8, 1, 1),
+    )  # fmt: skip
+    family = rom.reduce_parametric(
+        model, parameters=PARAMETERS, method=rom.CraigBampton(2), certify=False,
+        interfaces={"root": "rbe2", "tip": "rbe2"}, reference="root",
+    )  # fmt: skip
+    # bricks recover no stress: any shares of it will do
+    rng, r = np.random.default_rng(0), family.body.n_modes
+    shares = [replace(s, stress=rng.normal(size=(6, r))) for s in family.shares]
+    stress = StressRecovery(np.array(GAUGE.points), sum(s.stress for s in shares))
+    return replace(family, shares=tuple(shares), body=replace(family.body, stress=stress))
+
+
+@pytest.fixture(scope="module")
+def filter_(family):
+    return made(family)
+
+
+def made(family, **options):
+    options = {
+        "sensors": FEW, "forces": TIP, "wanted": WANTED, "parameters": DRIFTS, "dt": DT,
+        "walk": 3000.0, "fixed": ("root",), "unmodelled": 1e-3, "attached": SPRING, **options,
+    }  # fmt: skip
+    channels = [options.pop(name) for name in ("sensors", "forces", "wanted")]
+    return parameter_tracker(family, *channels, **options)
+
+
+def walked(t, rng, n_t):
+    """A record of what a filter assumes: logarithms of factors, values, and samples.
+
+    Parameters walk every 50 steps, as far as they do in that time.
+    """
+    o, first = t.operation, np.array([d.first for d in t.drifts.values()])
+    walk = np.array([d.walk for d in t.drifts.values()])
+    P = t.assumed.before(o)
+    x = np.sqrt(np.diag(P)) * rng.standard_normal(len(P))
+    p = first * rng.standard_normal(len(first))
+    factors, values, clean = [], [], []
+    for k in range(n_t):
+        if k % 50 == 0:
+            p = p + (k > 0) * walk * np.sqrt(50 * DT) * rng.standard_normal(len(p))
+            at, step, root = stepped(t, p)
+        factors.append(p)
+        values.append(at.W @ x)
+        clean.append(at.C @ x)
+        x = step @ x + root @ rng.standard_normal(len(x))
+    clean = np.array(clean)
+    y = clean + np.sqrt(t.R) * rng.standard_normal(clean.shape)
+    return np.array(factors), np.array(values), y
+
+
+def stepped(t, p):
+    """The equations, transition and root of the noise of a step at logarithms p of factors."""
+    at = t.operation.at(p)
+    step, Q = discrete(at.A, t.assumed.white(t.operation), DT)
+    return at, step, np.linalg.cholesky(Q + 1e-13 * np.diag(np.diag(Q)))
+
+
+def test_derivatives_are_those_of_differences(filter_):
+    x, h = np.array([0.2, -0.3]), 1e-5
+    at = filter_.operation.at(x)
+    _, steps, _ = filter_.at(x)
+    for j, d in enumerate(h * np.eye(2)):
+        up, down = (filter_.operation.at(x + s * d) for s in (1, -1))
+        for name in ("A", "C", "W"):
+            expected = (getattr(up, name) - getattr(down, name)) / (2 * h)
+            size = np.abs(expected).max() + 1e-300
+            assert_allclose(getattr(at, f"d{name}")[j] / size, expected / size, atol=1e-7)
+        expected = (filter_.at(x + d)[1].A - filter_.at(x - d)[1].A) / (2 * h)
+        assert_allclose(steps.dA[j], expected, atol=1e-6 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize(
+    ("factors", "damping"), [({}, 0.02), ({"E_inner": 1.5, "rho_outer": 0.7}, 0.0)]
+)
+def test_held_factors_are_those_of_the_body_there(family, factors, damping):
+    """The family's equations, in modes at factors of one, and the body's own in its modes."""
+    drifts = {name: Drift(0.1) for name in PARAMETERS}
+    askew = [replace(c.channels, directions=[[1, 2, 3]] * len(c.names)) for c in FEW[1:]]
+    few = FEW[0], replace(FEW[1], channels=askew[0])  # all motions are seen
+    force = replace(TIP, directions=[[1, 2, 3]])
+    held = made(family, sensors=few, forces=force, parameters=drifts, attached=None,
+                unmodelled=0.0, damping=damping).held(**factors)  # fmt: skip
+    body = family.at(**factors)
+    body = replace(body, D=rom.ModalDamping(damping).matrix(body))
+    own = tracker(body, few, force, WANTED, dt=DT, walk=3000.0, fixed=("root",))
+    y = 50 * np.sqrt(held.R) * np.random.default_rng(1).standard_normal((300, 3))
+    a, b = held.run(y), own.run(y)
+    for name in ("values", "deviations", "forces"):
+        scale = np.abs(getattr(b, name)).max(axis=0)
+        assert_allclose(getattr(a, name) / scale, getattr(b, name) / scale, atol=1e-6)
+
+
+def test_the_filter_is_an_extended_one_linearised_at_every_step(family, filter_):
+    """Written out in NumPy, with the transition and its derivative where the estimate is."""
+    t, rng = filter_, np.random.default_rng(5)
+    _, _, y = walked(t, rng, 300)
+    n = len(t.assumed.before(t.operation))
+    z = np.zeros(n + 2)
+    P = np.zeros((n + 2,) * 2)
+    P[:n, :n] = t.assumed.before(t.operation)
+    P[n:, n:] = 0.05**2 * np.eye(2)
+    for k, sample in enumerate(y):
+        if k:
+            _, at, Q = t.at(z[n:])
+            F = np.eye(n + 2)
+            F[:n, :n] = at.A
+            F[:n, n:] = (at.dA @ z[:n]).T
+            z[:n] = at.A @ z[:n]
+            P = F @ P @ F.T + Q
+        at = t.operation.at(z[n:])
+        C = np.hstack([at.C, (at.dC @ z[:n]).T])
+        S = C @ P @ C.T + np.diag(t.R)
+        G = P @ C.T @ np.linalg.inv(S)
+        z, P = z + G @ (sample - at.C @ z[:n]), P - G @ S @ G.T
+    found = t.run(y)
+    size = np.sqrt(np.diag(P))[n:]
+    assert_allclose(np.log(found.factors[-1]), z[n:], atol=0.1 * size.min())
+    assert_allclose(found.factor_deviations[-1], size, rtol=0.03)
+    assert size.max() < 0.3 * 0.05  # the record says something
+    assert abs(np.log(found.factors)).max() > 3 * LINEAR_REACH
+
+
+def totals(t, assumed, n_draws, n_t, seed):
+    """Normalised squares of innovations, of logarithms of factors, and of what is wanted."""
+    rng, sums = np.random.default_rng(seed), [0.0, 0.0, 0.0]
+    for _ in range(n_draws):
+        factors, values, y = walked(t, rng, n_t)
+        found = assumed.run(y)
+        own = found.covariance[-2:, -2:]
+        e = np.log(found.factors[-1]) - factors[-1]
+        wanted = ((found.values[-1] - values[-1]) / found.deviations[-1]) ** 2
+        parts = found.surprise.sum(), e @ np.linalg.solve(own, e), wanted
+        sums = [a + b for a, b in zip(sums, parts, strict=True)]
+    return sums
+
+
+def test_errors_are_as_large_as_the_filter_says(filter_):
+    """20 records with parameters that walk: inside chi-square bands, on both sides."""
+    n, n_t = 20, 300
+    surprise, factors, wanted = totals(filter_, filter_, n, n_t, 11)
+    inside(surprise, 3 * n * n_t)
+    inside(factors, 2 * n)
+    for total in wanted:
+        inside(total, n)
+
+
+def inside(total, freedom):
+    assert chi2.ppf(1e-3, freedom) < total < chi2.ppf(1 - 1e-3, freedom)
+
+
+@pytest.mark.parametrize(("noise", "side"), [(1.1, -1), (0.9, 1)])
+def test_noise_wrong_by_a_tenth_leaves_the_band(filter_, noise, side):
+    """A filter that thinks too little of sensors and forces fails as one that thinks too much."""
+    n, n_t, assumed = 8, 300, filter_.assumed
+    assumed = replace(
+        assumed,
+        walk=noise * assumed.walk,
+        unmodelled=noise * assumed.unmodelled,
+        first=assumed.walk,
+    )
+    wrong = replace(filter_, R=filter_.R * noise**2, assumed=assumed)
+    surprise, _, _ = totals(filter_, wrong, n, n_t, 12)
+    low, high = chi2.ppf([1e-3, 1 - 1e-3], 3 * n * n_t)
+    assert surprise < low if side < 0 else surprise > high
+
+
+def test_a_joint_that_loosens_is_followed(family):
+    """The spring at the tip loses half in a second; nobody told the filter when."""
+    t = made(family, parameters={"clamp": Drift(0.02, 0.5)})
+    rng, n_t = np.random.default_rng(3), 2000
+    true = np.log(0.5) * np.clip((np.arange(n_t) // 50 * 50 - 500) / 1000, 0, 1)
+    x, y = np.zeros(len(t.assumed.before(t.operation))), []
+    for k in range(n_t):
+        if k % 50 == 0:
+            at, step, root = stepped(t, true[k : k + 1])
+        y.append(at.C @ x)
+        x = step @ x + root @ rng.standard_normal(len(x))
+    y = np.array(y) + np.sqrt(t.R) * rng.standard_normal((n_t, 3))
+    found = t.run(y, DT * np.arange(n_t))
+    error = np.log(found.factors[:, 0]) - true
+    assert abs(found.factors[-1, 0] - 0.5) < 0.05
+    assert (np.abs(error) < 3 * found.factor_deviations[:, 0]).mean() > 0.98
+    stays = t.held().run(y)  # a filter that does not follow is surprised
+    assert stays.surprise[1500:].sum() > chi2.ppf(1 - 1e-6, 3 * 500)
+    assert found.surprise[1500:].sum() < chi2.ppf(1 - 1e-6, 3 * 500)
+
+
+def test_what_cannot_be_followed_is_named(family, filter_):
+    def refused(words, kind=ConfigError, **options):
+        with pytest.raises(kind, match=words):
+            made(family, **options)
+
+    refused("no parameter 'E_outer'.*clamp", parameters={"E_outer": Drift(0.1)})
+    refused("no parameter changes", parameters={})
+    refused("must be of type Drift", parameters={"clamp": 0.1})
+    with pytest.raises(ConfigError, match="first"):
+        Drift(0.0)
+    with pytest.raises(ConfigError, match="walk = -1"):
+        Drift(0.1, -1.0)
+    with pytest.raises(ParameterError, match=r"'E'.*tracked are"):
+        filter_.held(E=1.0)
+    with pytest.raises(ConfigError, match=r"samples \(5, 2\)"):
+        filter_.run(np.zeros((5, 2)))
+    wide = {name: Drift(0.3) for name in DRIFTS}
+    _, _, y = walked(replace(filter_, drifts=wide), np.random.default_rng(0), 200)
+    narrow = {"clamp": GroundSpring("tip", (0.0, 0.0, 4e6), 0.98, 1.02)}
+    with pytest.raises(SolverError, match=r"'clamp' has reached the factor .* 0\.98 to 1\.02"):
+        made(family, parameters=wide, attached=narrow).run(y)
+
+
+def test_a_record_without_samples_is_empty(filter_):
+    assert filter_.run(np.zeros((0, 3))).factors.shape == (0, 2)
