@@ -15,7 +15,7 @@ from scipy.sparse import bmat, csc_matrix, csr_matrix, identity, vstack
 from scipy.sparse.linalg import LinearOperator, eigsh, splu
 
 from rom.body.flexible import FlexibleBody
-from rom.body.nonlinear.geometric import FORCES, Geometric
+from rom.body.nonlinear.geometric import FORCES, Geometric, held_motions
 from rom.body.nonlinear.statics import follow, free_motions
 from rom.eigen.verbs import mean_motion
 from rom.model import Array, FEModel, Row
@@ -47,7 +47,7 @@ def deflection_rows(
         body: the reduced body, seen from its reference interface.
         E: (n_local, r) its nodal shapes.
     """
-    full = HeldSolid(model, connection, body.reference, geometric.held(model.interfaces))
+    full = HeldSolid(model, connection, body.reference, held_motions(geometric, model.interfaces))
     quartic, still = body.energy(), body.mean_rows(geometric.fixed)
     tangent = Tangent(body, still)
     E = full.whole(E)

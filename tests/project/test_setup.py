@@ -206,7 +206,8 @@ def test_types_are_checked_strictly_wherever_users_call():
     }
     for name in untyped - {"rom.mbs.kernels.*"}:
         text = (ROOT / f"{name.replace('.', '/')}.py").read_text()
-        assert "compiled import" in text or "compiled_law" in text, name
+        ways = "compiled import", "compiled_law", "numba.njit"
+        assert any(way in text for way in ways), name
     for exception in checked["overrides"]:
         names = exception["module"]
         assert isinstance(names, str) or len(set(names)) == len(names)

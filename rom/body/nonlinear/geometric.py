@@ -104,21 +104,6 @@ class Geometric:
                 hint='Name an interface: loads={"tip": (0, 200.0, 0, 0, 0, 0)}.',
             )
 
-    def held(self, known: Any) -> list[tuple[str, int]]:
-        """Interface and component, 0 to 5, of each motion held beside the reference.
-
-        Args:
-            known: names of the interfaces there are.
-
-        Raises:
-            ConfigError, InterfaceError: see `rom.eigen.supports.supports`.
-        """
-        return [
-            (name, DIRECTIONS.index(direction))
-            for name, directions in supports(self.fixed, known).items()
-            for direction in directions or DIRECTIONS
-        ]
-
     def components(self) -> list[tuple[str, int, float]]:
         """Interface, component and largest value [N, N m] of the loads that are not zero."""
         return [
@@ -190,6 +175,23 @@ def enriched(
     return replace(basis, Psi=np.hstack([basis.Psi, added]), labels=(*basis.labels, *labels))
 
 
+def held_motions(geometric: Geometric, known: Any) -> list[tuple[str, int]]:
+    """Interface and component, 0 to 5, of each motion held beside the reference.
+
+    Args:
+        geometric: the range and its supports.
+        known: names of the interfaces there are.
+
+    Raises:
+        ConfigError, InterfaceError: see `rom.eigen.supports.supports`.
+    """
+    return [
+        (name, DIRECTIONS.index(direction))
+        for name, directions in supports(geometric.fixed, known).items()
+        for direction in directions or DIRECTIONS
+    ]
+
+
 def refuse(
     geometric: Geometric, model: FEModel, connection: Any, basis: Basis, reference: Any
 ) -> None:
@@ -222,7 +224,7 @@ def refuse(
                 f"the range of loads names {name!r}; beside the reference {reference!r} the body "
                 f"has {offered(n for n in connection.parts if n != reference)}."
             )
-    held = geometric.held([name for name in connection.parts if name != reference])
+    held = held_motions(geometric, [name for name in connection.parts if name != reference])
     for name, k, _ in geometric.components():
         if (name, k) in held:
             raise ConfigError(
@@ -252,8 +254,8 @@ def _with_derivatives(
     moving = Psi[:, :n_b] @ N
     K = quadratic(ops, ops.apply_K, moving)
     every = [(name, k, 1.0) for name in geometric.loads for k in range(6)
-             if (name, k) not in geometric.held(model.interfaces)]  # fmt: skip
-    held = [(name, k, 1.0) for name, k in geometric.held(model.interfaces)]
+             if (name, k) not in held_motions(geometric, model.interfaces)]  # fmt: skip
+    held = [(name, k, 1.0) for name, k in held_motions(geometric, model.interfaces)]
     F = free_motions(_loads(held, model, ops, moving).T)
     forces = _loads(every, model, ops, moving)
     static = moving @ F @ np.linalg.solve(F.T @ K @ F, F.T @ forces)

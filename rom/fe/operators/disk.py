@@ -89,6 +89,7 @@ def set_up_watched(ksp: PETSc.KSP) -> bool:
     if not comm.allreduce(ended, op=MPI.LAND):
         abandoned.append(ksp)
         _remove_files()
+        comm.Barrier()  # a rank that raises ends the others, whose files are gone by then
         return False
     comm.Free()
     if any(codes):

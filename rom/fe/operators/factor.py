@@ -88,6 +88,7 @@ class Factor:
             need = 8.0 * entry_count(self.factor)
             if self.ksp not in abandoned:
                 self.release()  # its files as well
+                self.A.comm.tompi4py().Barrier()  # before one that raises ends the others
             reason = f"it filled before all was written; {free_words()} without the factor"
             raise disk_too_small(self.A.getSize()[0], need, reason)
         else:

@@ -55,7 +55,7 @@ def test_a_rotating_cantilever_stiffens_as_southwells_beam_does(blade, eta):
     found = turning(eta / UNIT, solid(blade))
     flap = np.array(FLAP[eta])
     lag = np.sqrt(flap**2 - eta**2)
-    for known, rtol in ((flap, 6e-4), (lag, 1.5e-3)):
+    for known, rtol in ((flap, 7e-4), (lag, 1.5e-3)):
         nearest = found[np.abs(found[:, None] - known).argmin(axis=0)]
         assert_allclose(nearest, known, rtol=rtol)
 
