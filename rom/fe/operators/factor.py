@@ -5,13 +5,7 @@ from petsc4py import PETSc
 import numpy as np
 
 from rom.errors import SolverError
-from rom.fe.operators.disk import (
-    DISK_ERRORS,
-    abandoned,
-    disk_too_small,
-    free_words,
-    set_up_watched,
-)
+from rom.fe.operators.disk import DISK_ERRORS, disk_too_small
 from rom.fe.operators.foreseen import by_mumps, check_disk, entry_count, too_large
 from rom.fe.operators.memory import allowed_bytes, factor_bytes, give_back
 from rom.fe.operators.solver import DIRECT_SOLVER, Solver
@@ -75,33 +69,22 @@ class Factor:
         """
         self.factor.setMumpsCntl(1, 0.0 if definite else PIVOT_THRESHOLD)
         with piece(FACTORISATION_PIECE):
-            code = self._factor()
+            self.ksp.setUp()
+            self.ksp.getPC().setUp()  # the first does not look at the matrix a second time
+        code = self.factor.getMumpsInfog(1)
         if code in MEMORY_ERRORS and self.workspace < self.allowed:
             self.release()
             self._offer(self.allowed)
             self.compute(definite=definite)
         elif code in MEMORY_ERRORS:
             need = 1e6 * self.factor.getMumpsInfog(17)  # on all ranks, from the analysis
-            self.release()
             raise too_large(self.A.getSize()[0], need, self.allowed * self.A.comm.size)
         elif code in DISK_ERRORS:
             need = 8.0 * entry_count(self.factor)
-            if self.ksp not in abandoned:
-                self.release()  # its files as well
-                self.A.comm.tompi4py().Barrier()  # before one that raises ends the others
-            reason = f"it filled before all was written; {free_words()} without the factor"
-            raise disk_too_small(self.A.getSize()[0], need, reason)
+            raise disk_too_small(self.A.getSize()[0], need)
         else:
             self.ok = code >= 0
             note(FLOPS_NOTE, self.factor.getMumpsRinfog(3))
-
-    def _factor(self) -> int:
-        """INFOG(1) of MUMPS after the factorisation."""
-        if self.solver.out_of_core and not set_up_watched(self.ksp):
-            return DISK_ERRORS[0]
-        self.ksp.setUp()
-        self.ksp.getPC().setUp()  # the first does not look at the matrix a second time
-        return int(self.factor.getMumpsInfog(1))
 
     def solve(self, F: Array) -> Array:
         """A^-1 F for (n_local, k) right-hand sides, in blocks."""

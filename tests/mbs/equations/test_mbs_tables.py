@@ -11,6 +11,7 @@ import pytest
 import rom
 from cases.command import environment
 from cases.mbs.mechanisms import random_body
+from cases.mbs.trusses import truss
 from rom.body.nonlinear.quartic import Quartic, n_entries
 from rom.components.cosserat import body, straight
 from rom.mbs.elements.gears.geometry import GearPair
@@ -212,6 +213,9 @@ ASKED = {  # stages -> what asks for them
         lambda m, a, b: m.rolling("e", m.ground.marker((0, 0, 0)), b, normal=(0, 0, 1), radius=0.3),
     ],
     "elastic_damping elastic_stiffness": [lambda m, a, b: flexible_body(m)],
+    "elastic_damping elastic_stiffness fitted_motion fitted_wrench_stiffness": [
+        lambda m, a, b: m.force("e", m.add_flexible("c", truss()).marker("mean"), (1, 0, 0)),
+    ],
     "elastic_damping elastic_stiffness "
     "bent_coordinates bent_integrals bent_mass bent_damping bent_motion bent_stiffness "
     "bent_wrench_stiffness": [
