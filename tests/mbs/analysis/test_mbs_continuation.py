@@ -50,8 +50,8 @@ def test_a_branch_that_crosses_at_an_angle_is_the_closed_form():
     mech.spring_damper("spring", mech.ground.marker((1, 0, 0)), top, stiffness=10.0)
     mech.force("load", top, lambda t: (0, 0, -t))
     start = rom.continuation(mech, (0.0, 20.0)).critical[0]
-    # at a crossing at an angle equations fix the column to the root of round-off, 1e-8, and the load
-    # at which it is critical follows in proportion
+    # at a crossing at an angle equations fix the column to the root of round-off, 1e-8, and its
+    # critical load follows in proportion
     assert_allclose(start.state.t, 5.0, rtol=1e-7)
     for sign in (1, -1):
         branch = rom.continuation(
