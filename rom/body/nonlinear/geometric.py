@@ -253,9 +253,10 @@ def _with_derivatives(
     N = free_motions(still)
     moving = Psi[:, :n_b] @ N
     K = quadratic(ops, ops.apply_K, moving)
+    at_rest = held_motions(geometric, model.interfaces)
     every = [(name, k, 1.0) for name in geometric.loads for k in range(6)
-             if (name, k) not in held_motions(geometric, model.interfaces)]  # fmt: skip
-    held = [(name, k, 1.0) for name, k in held_motions(geometric, model.interfaces)]
+             if (name, k) not in at_rest]  # fmt: skip
+    held = [(name, k, 1.0) for name, k in at_rest]
     F = free_motions(_loads(held, model, ops, moving).T)
     forces = _loads(every, model, ops, moving)
     static = moving @ F @ np.linalg.solve(F.T @ K @ F, F.T @ forces)
