@@ -205,12 +205,19 @@ def lasting_scratch(kind: str) -> Path:
 
 
 def _locked(kind: str) -> tuple[Path, int]:
-    """A new folder, and the descriptor whose lock says that its maker lives."""
+    """A new folder, and the descriptor whose lock says that its maker lives.
+
+    Until it is locked, the sweep of another process may take it for abandoned: it is gone then, or
+    goes while the lock is waited for, and another one is made.
+    """
     while True:
         path = Path(tempfile.mkdtemp(prefix=f"{FOLDER_PREFIX}{kind}-", suffix=FOLDER_SUFFIX))
-        descriptor = os.open(path, os.O_RDONLY | os.O_DIRECTORY)
-        with suppress(OSError):  # no locks here, or a sweep that was faster
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        try:
+            descriptor = os.open(path, os.O_RDONLY | os.O_DIRECTORY)
+        except FileNotFoundError:
+            continue
+        with suppress(OSError):  # no locks on this file system; then no sweep has one either
+            fcntl.flock(descriptor, fcntl.LOCK_EX)
         if path.is_dir():
             return path, descriptor
         os.close(descriptor)

@@ -4,6 +4,7 @@ The folder is full of modules and option files that leave a mark when they are r
 """
 
 import ast
+import fcntl
 import json
 import os
 import shutil
@@ -11,6 +12,7 @@ import signal
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 from functools import cache
 from importlib.util import find_spec
@@ -250,6 +252,30 @@ def test_only_abandoned_folders_of_our_own_are_swept(tmp_path, monkeypatch):
             child.sweep()
             assert wide.exists()
     assert not outer.exists() and not inner.exists()
+
+
+@pytest.mark.parametrize("held", [0.0, 0.2])
+def test_a_folder_that_another_process_sweeps_before_it_is_locked_is_made_anew(
+    tmp_path, monkeypatch, held
+):
+    """A sweep just after a folder is made, and one that has begun when its maker asks for it."""
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    make, made = tempfile.mkdtemp, []
+
+    def made_and_swept(**words):
+        made.append(Path(make(**words)))
+        if len(made) == 1:
+            descriptor = os.open(made[0], os.O_RDONLY | os.O_DIRECTORY)
+            fcntl.flock(descriptor, fcntl.LOCK_EX)
+            timer = threading.Timer(held, lambda: (made[0].rmdir(), os.close(descriptor)))
+            timer.start()
+            if not held:
+                timer.join()
+        return str(made[-1])
+
+    monkeypatch.setattr(tempfile, "mkdtemp", made_and_swept)
+    with child.scratch("late") as folder:
+        assert folder == made[1] and folder.is_dir() and not made[0].exists()
 
 
 def test_numba_loads_nothing_from_where_the_folder_says(planted):
