@@ -5,7 +5,7 @@ import re
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from typing import Any, overload
+from typing import Any, Literal, overload
 
 import numpy as np
 
@@ -194,7 +194,7 @@ def reduce(
     stress: bool = False,
     stiffening: bool = False,
     nonlinear: Geometric | None = None,
-    certify: bool = True,
+    certify: bool | Literal["full"] = True,
 ) -> FlexibleBody: ...
 
 
@@ -216,7 +216,7 @@ def reduce(  # noqa: PLR0913  one keyword per choice
     stress: bool = False,
     stiffening: bool = False,
     nonlinear: Geometric | None = None,
-    certify: bool = True,
+    certify: bool | Literal["full"] = True,
 ) -> FlexibleBody | ReducedSector:
     """A flexible body that stands for the full model, with the evidence for it.
 
@@ -239,7 +239,9 @@ def reduce(  # noqa: PLR0913  one keyword per choice
             added for them, and ``body.quartic`` is its energy at finite strain. The reference is
             then an interface.
         certify: compare with the full model; costs a search for its modes in each support, with
-            the factor of the reduction where interfaces were held for that.
+            the factor of the reduction where interfaces were held for that. Where these take more
+            than a minute and more than the reduction, full modes are those of the free body alone,
+            and errors are estimated in the other supports; "full" has them everywhere.
 
     On a terminal a line says how far the reduction of a large model is; not under ``-q``, and not
     where the logger "rom" is set to errors.
@@ -293,7 +295,7 @@ def _reduced_body(  # noqa: PLR0913  those of `reduce`
     reference: Any,
     damping: Rayleigh | ModalDamping | None,
     further: tuple[bool, bool, Geometric | None],
-    certify: bool,
+    certify: bool | Literal["full"],
 ) -> FlexibleBody:
     """The body of `reduce`, timed; `further` are stress, stiffening and large deflection."""
     stress, stiffening, nonlinear = further
@@ -346,7 +348,9 @@ def _reduced_body(  # noqa: PLR0913  those of `reduce`
         return body
     watch.begin("comparison")
     say("compare the reduced body with the full model")
-    certificate, comparison = certify_body(connection, ops, body, basis, elastic)
+    certificate, comparison = certify_body(
+        connection, ops, body, basis, elastic, everywhere=certify == "full"
+    )
     if nonlinear is not None and E is not None:
         rows, deflections = deflection_rows(nonlinear, model, connection, body, E)
         certificate = replace(certificate, rows=(*certificate.rows, *rows))

@@ -26,7 +26,13 @@ CLUSTER_RTOL = 1e-3  # relative distance of modes that are compared as one subsp
 
 
 def certify_body(
-    connection: Connection, ops: Operators, body: FlexibleBody, basis: Basis, elastic: Elastic
+    connection: Connection,
+    ops: Operators,
+    body: FlexibleBody,
+    basis: Basis,
+    elastic: Elastic,
+    *,
+    everywhere: bool = False,
 ) -> tuple[Report, dict[str, Any]]:
     """Compare a reduced body with the full model it came from.
 
@@ -36,10 +42,12 @@ def certify_body(
         body: the reduced body.
         basis: its basis in interface coordinates.
         elastic: the elastic part of the basis.
+        everywhere: full modes in every support, also where they cost more than the reduction;
+            without it those of the free body are then found, and the estimates go for the others.
 
     Returns:
         The report, and a table {support: {"reduced": [Hz], "estimated": [relative errors],
-        "full": [Hz], "mac": []}}; the last two are empty when full modes cannot be afforded, and
+        "full": [Hz], "mac": []}}; the last two are empty where full modes cost too much, and
         the estimates when the method has none.
     """
     rows: list[Row] = []
@@ -49,20 +57,28 @@ def certify_body(
     supports: list[tuple[str, ...]] = [(), *((name,) for name in connection.parts if statics)]
     constrained = basis.labels[: len(connection.labels)] == connection.labels
     parts = condensed_model(connection, basis, matrices[0]) if statics and constrained else None
+    n_b = len(connection.labels)
+    known = connection.ops.comparison_pays(len(supports), n_b, basis.Psi.shape[1] - n_b)
+    known = known or everywhere or parts is None or not _estimable(basis)
     static: list[Row] = []
     with stages(len(supports), long=ops.n > MANY_DOFS) as begin:
         for fixed in supports:
             support = " + ".join(fixed) + " held" if fixed else "free"
             begin(f"compare with the full model, {support}")
+            full = connection.ops.affordable and (known or not fixed)
             held = full_support(connection, parts, fixed)
             if fixed == tuple(connection.parts)[:1] and len(connection.parts) > 1:
                 held = connection.ops.hold(held) if isinstance(held, np.ndarray) else held
                 static = _static_row(connection, body, held)
-            table = compared(connection, ops, body, (basis, parts, matrices), fixed, held)
+            reduction = basis, parts, matrices
+            table = compared(connection, ops, body, reduction, fixed, held if full else None)
             if table["reduced"]:
                 comparison[support] = table
     if not connection.ops.affordable:
         rows.append(Row("dofs; full modes are too dear, errors estimated", ops.n, "--", True))
+    elif not known:
+        words = "supports estimated only; full modes cost more than the reduction"
+        rows.append(Row(words, len(supports) - 1, "--", True))
     for support, table in comparison.items():
         rows += frequency_rows(support, table) if table["full"] else []
         rows += _estimate_rows(support, table)
@@ -90,7 +106,7 @@ def compared(
         reduction: its basis, the full model condensed to the interfaces where that is known, and
             stiffness and mass of the basis.
         fixed: interfaces that are held.
-        support: the same as `full_support` has it for the full model.
+        support: the same as `full_support` has it for the full model; None to estimate only.
     """
     omega_r = body.modes(fixed=fixed)[0]
     n_rigid = int(np.count_nonzero(omega_r == 0.0))
@@ -102,17 +118,24 @@ def compared(
     basis, parts, matrices = reduction
     shapes = reduced_shapes(connection, basis, fixed, n + n_rigid, matrices)
     table["reduced"] = (omega_r[n_rigid : n_rigid + n] / (2 * np.pi)).tolist()
-    if parts and not any(label.startswith("enhanced") for label in basis.labels):
-        # constraint modes leave no residual on interfaces: one inverse serves every support
+    if parts is not None and _estimable(basis):
         found = residual_errors(connection.ops, parts.held, shapes[:, n_rigid:])
         table["estimated"] = found.tolist()
-    if connection.ops.affordable:
+    if support is not None:
         omega, Phi = connection.ops.modes(support, n + n_rigid, finished=True)
         omega, Phi = omega[n_rigid:], connection.ops.expand(Phi[:, n_rigid:])
         agreement = mac(ops, Phi, connection.ops.expand(shapes))
         table["full"] = (omega / (2 * np.pi)).tolist()
         table["mac"] = _cluster_mac(agreement, omega_r[: n + n_rigid]).tolist()
     return table
+
+
+def _estimable(basis: Basis) -> bool:
+    """Whether errors follow from residuals: constraint modes leave none on the interfaces.
+
+    One inverse then serves every support.
+    """
+    return not any(label.startswith("enhanced") for label in basis.labels)
 
 
 def condensed_model(connection: Connection, basis: Basis, K: Array) -> Condensed:

@@ -136,4 +136,5 @@ SPECIAL_KEYS: dict[str, Callable[[Any], Changes]] = {
     "damping_ratio": lambda ratio: {("damping",): {"ratio": ratio}},
     "rayleigh": _rayleigh,
     "no_certificate": lambda _: {("reduction", "certificate"): False},
+    "full_certificate": lambda _: {("reduction", "certificate"): "full"},
 }

@@ -154,7 +154,8 @@ TABLE = Table("A component.", (
             Key("fixed", Words(), "Held beside the reference, wholly or as `name:yz`.", ()),
         )), "Reach large deflection."),
         Key("stress", Flag(), "Make stress on the surface recoverable.", False),
-        Key("certificate", Flag(), "Compare with the full model.", True),
+        Key("certificate", Flag("full"), "Compare with the full model; full: in every support, "
+            "however long it takes.", True),
     )), "How it is reduced.", {}),
     Key("damping", Table("Structural damping: a ratio, or alpha and beta.", (
         Key("ratio", Quantity(), "Damping ratio of every mode."),

@@ -141,15 +141,20 @@ class Whole:
 
 @dataclass(frozen=True, slots=True)
 class Flag:
-    """true or false."""
+    """true or false, or a word that says more than true."""
 
-    summary: str = "true or false"
+    more: str = ""
 
-    def read(self, value: Any, place: Place) -> bool:
+    @property
+    def summary(self) -> str:
+        """What it may be."""
+        return f'true, false or "{self.more}"' if self.more else "true or false"
+
+    def read(self, value: Any, place: Place) -> bool | str:
         """The value."""
-        if not isinstance(value, bool):
-            raise place.error(f"{place.name} = {as_text(value)} is not true or false.")
-        return value
+        if isinstance(value, bool) or (self.more and value == self.more):
+            return value
+        raise place.error(f"{place.name} = {as_text(value)} is not {self.summary}.")
 
 
 @dataclass(frozen=True, slots=True)

@@ -78,6 +78,10 @@ class SciPyOperators:
         self.n = self.n_local = self.K.shape[0]
         self.rigid, self.T = rigid, T
 
+    def comparison_pays(self, n_supports: int, n_interface: int, n_modes: int) -> bool:
+        """Always: matrices whose origin is unknown are compared in every support."""
+        return True
+
     def apply_K(self, X: Array) -> Array:
         """K X."""
         return self.K @ X

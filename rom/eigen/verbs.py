@@ -77,6 +77,15 @@ class Operators(Protocol):
         Any two arrays (n_local, k) and (n_local, l) with equally distributed rows.
         """
 
+    def comparison_pays(self, n_supports: int, n_interface: int, n_modes: int) -> bool:
+        """Whether full modes in so many supports cost less than the reduction did, or little.
+
+        Args:
+            n_supports: in which a reduced body would be compared.
+            n_interface: interface coordinates of the reduction.
+            n_modes: its modes.
+        """
+
     def hold(self, dofs: npt.ArrayLike, shift: float = 0.0) -> Held:
         """Eliminate the held dofs (global numbers, equal on all ranks) and factor the rest.
 

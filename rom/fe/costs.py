@@ -16,6 +16,9 @@ PASS_COLUMNS = 6
 PASSES_PER_MODE = 0.95  # of the search for 20 modes, measured
 SEARCH_SECONDS = 34e-9  # per dof and mode squared, measured for 20: vectors made orthogonal
 LEAST_SHARED_DOFS = 30_000  # one, two and three processes of two cores; above, sharing gains
+PASSES_PER_SUPPORT = 10  # of a comparison of six modes with the full model, measured
+MODES_PER_SUPPORT = 12  # that the search for them makes orthogonal, with rigid ones
+LONG_COMPARISON = 60.0  # [s]; a shorter one is not weighed against the reduction
 REST_SECONDS = 8e-6  # per dof: interfaces, energies, the body
 
 
@@ -65,6 +68,18 @@ def reduction_seconds(n: float, n_interface: int, n_modes: int) -> float:
     n_passes = n_interface / PASS_COLUMNS + PASSES_PER_MODE * n_modes
     by_dof = SEARCH_SECONDS * n_modes**2 + REST_SECONDS
     return cost.seconds + n_passes * cost.solution_seconds + by_dof * n
+
+
+def comparison_seconds(n: float, n_supports: int) -> float:
+    """Time of full modes in so many supports with the factor of the reduction [s]."""
+    passes = PASSES_PER_SUPPORT * factor_cost(n).solution_seconds
+    return n_supports * (passes + SEARCH_SECONDS * MODES_PER_SUPPORT**2 * n)
+
+
+def comparison_pays(n: float, n_supports: int, n_interface: int, n_modes: int) -> bool:
+    """Whether full modes in all supports cost less than the reduction did, or little."""
+    reduction = reduction_seconds(n, n_interface, n_modes)
+    return comparison_seconds(n, n_supports) <= max(reduction, LONG_COMPARISON)
 
 
 def least_machines(n: float, memory: float) -> int:

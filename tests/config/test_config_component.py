@@ -98,6 +98,16 @@ def test_options_go_before_the_file(folder, capsys):
     assert "tip" in found["reference"] and "f_max=3000" in str(found["provenance"])
 
 
+def test_a_certificate_is_wanted_or_not_or_wanted_in_full(folder, capsys):
+    given = ("reduction", "certificate")
+    assert read_component("bar.toml", {given: "full"}).values["reduction"]["certificate"] == "full"
+    with pytest.raises(ConfigError, match='not true, false or "full"'):
+        read_component("bar.toml", {given: "half"})
+    assert main(["reduce", "bar.toml", "-m", "3", "--full-certificate", "-q"]) in (0, 5)
+    assert main(["reduce", "bar.toml", "--full-certificate", "--no-certificate"]) == 2
+    assert "not allowed with" in capsys.readouterr().err
+
+
 def test_modes_of_a_component_have_the_interfaces_of_its_body(folder, bar, capsys):
     assert main(["modes", "bar.toml", "--fixed", "root", "-n", "2", "--json"]) == 0
     found = json.loads(capsys.readouterr().out)

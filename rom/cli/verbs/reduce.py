@@ -72,7 +72,13 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--name", help="name of the body (default: that of the file)")
     parser.add_argument("--stress", action="store_true", help="make surface stress recoverable")
-    parser.add_argument("--no-certificate", action="store_true", help="skip the comparison")
+    evidence = parser.add_mutually_exclusive_group()
+    evidence.add_argument("--no-certificate", action="store_true", help="skip the comparison")
+    evidence.add_argument(
+        "--full-certificate",
+        action="store_true",
+        help="full modes in every support, however long it takes",
+    )
     parser.add_argument(
         "-o", "--output", type=Path, help="e.g. rod.rom.npz; may be said by a .toml file"
     )
@@ -120,7 +126,7 @@ def _by_options(args: argparse.Namespace) -> "tuple[FlexibleBody, Path]":
         name=name,
         stress=args.stress,
         stiffening=args.stiffening,
-        certify=not args.no_certificate,
+        certify="full" if args.full_certificate else not args.no_certificate,
     )
     return body, output
 

@@ -156,7 +156,7 @@ class BlockLanczos:
 
     def _ritz(self, k: int) -> tuple[Array, Array]:
         theta, S = np.linalg.eigh(self.T)
-        return theta[::-1][:k], S[:, ::-1][:, :k]
+        return theta[::-1][:k], np.asfortranarray(S[:, ::-1][:, :k])  # which BLAS takes as it is
 
 
 def _less(W: Array, V: Array, G: Array) -> Array:

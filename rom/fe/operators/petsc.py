@@ -20,6 +20,7 @@ from rom.eigen.condensed import Supported
 from rom.eigen.scipy import dof_set
 from rom.eigen.verbs import Weighted, orthonormal
 from rom.errors import ConfigError, ModelError, SolverError
+from rom.fe.costs import comparison_pays
 from rom.fe.operators.aij import aij, chosen, gathered, symmetrized, weighted
 from rom.fe.operators.counting import verify_count
 from rom.fe.operators.factor import Factor, dense_rows
@@ -84,6 +85,10 @@ class PETScOperators:
         if fixed is None:
             fixed = fixed_vector(self.comm, rigid, self.first, self.n_local)
         self.fixed = fixed
+
+    def comparison_pays(self, n_supports: int, n_interface: int, n_modes: int) -> bool:
+        """By what a factor of this size costs."""
+        return self.affordable and comparison_pays(self.n, n_supports, n_interface, n_modes)
 
     def apply_K(self, X: Array) -> Array:
         """K X."""
