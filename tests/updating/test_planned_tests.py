@@ -139,7 +139,10 @@ def test_a_test_made_after_a_written_plan_is_read_and_updates(case, tmp_path):
     rows = [line.split(",") for line in plan.csv().splitlines()[1:]]
     d = np.array([row[5:] for row in rows], dtype=float)
     axis = np.abs(d).argmax(axis=1)
-    dofs = [f"{k}{'-+'[int(x[a] > 0)]}{'XYZ'[a]}" for k, (a, x) in enumerate(zip(axis, d), 1)]
+    dofs = [
+        f"{k}{'-+'[int(x[a] > 0)]}{'XYZ'[a]}"
+        for k, (a, x) in enumerate(zip(axis, d, strict=True), 1)
+    ]
     H = plan_responses(case, plan)
     names = [f"{dof}/{dofs[-1]} {part} [m/N]" for dof in dofs[:-1] for part in ("real", "imag")]
     values = np.column_stack([case.lines, H.view(float).reshape(len(H), -1)])
