@@ -87,6 +87,11 @@ class Updated:
         return self.covariance / np.outer(d, d)
 
     @property
+    def logarithms(self) -> Array:
+        """(n_p,) of all factors; zero for parameters that are not in the model [1]."""
+        return np.log(np.where(self.model.present, list(self.factors.values()), 1.0))
+
+    @property
     def body(self) -> FlexibleBody:
         """The body at the factors found; its provenance says by which data, and how surely."""
         own: dict[str, Any] = {name: self.factors[name] for name in self.family.parameters}
@@ -107,9 +112,8 @@ class Updated:
         Raises:
             ConfigError: for lines that are not finite.
         """
-        x = np.log(np.where(self.model.present, list(self.factors.values()), 1.0))
         omega = 2 * np.pi * finite("frequencies", frequencies, None)
-        return responses_at(self.model, x, self.zeta, omega)
+        return responses_at(self.model, self.logarithms, self.zeta, omega)
 
     def drawn(
         self, frequencies: Any, sensors: Channels, inputs: Channels, *, n: int, seed: int = 0
@@ -138,7 +142,7 @@ class Updated:
             for channels, what in ((sensors, "sensor"), (inputs, "input"))
         )
         model = replace(self.model, seen=seen, driven=driven)
-        x = np.log(np.where(model.present, list(self.factors.values()), 1.0))
+        x = self.logarithms
         labels = (*model.names, *(f"zeta {k + 1}" for k in range(self.zeta.size)))
         unknown = [labels.index(name) for name in self.names]
         theta = np.tile(np.r_[x, np.log(self.zeta)], (n, 1))
