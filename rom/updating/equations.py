@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import null_space
 
+from rom.arguments import whole
 from rom.errors import ConfigError
 from rom.model import Array, Mask
 from rom.updating.family_model import FamilyModel
@@ -107,7 +108,7 @@ def by_equations(
     test = Measurement(data.omega[lines], H, inputs, data.weight[lines])
     limits = np.log(model.low[free]), np.log(model.high[free])
     small = AtSensors(InSensors.of(model, x, free))
-    rank = min(n_s, needed) if rank is None else rank
+    rank = whole("rank", min(n_s, needed) if rank is None else rank, 1, n_s, reason="sensors")
     return update_by_input(small, test, x[free], np.full(m, damping), rank=rank, limits=limits)
 
 

@@ -156,6 +156,7 @@ def test_what_equations_need_is_named(family, model):
     refused("rank belongs", rank=3, residual="responses")
     refused("a prior to that of responses", prior={"E_inner": 0.1})
     refused("rank = 99", rank=99)
+    refused("rank = 1.5", rank=1.5)
     away = Channels([[1.0, 0.1, 0.08]], [[0, 1, 1]])
     refused("input 0 has no sensor", replace(test, inputs=away))
     n = [*range(14), 4]
