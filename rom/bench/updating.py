@@ -73,7 +73,8 @@ def measured(model: FEModel, n_lines: int = N_LINES) -> Iterator[Row]:
         sums(found.model, x, zeta, Data.of(test))
         step = process_time() - start
         whole = factored(model, 2 * np.pi * lines) * len(lines) * (1 + x.size)
-        yield case, "work of a step by differences on the mesh, over it", whole / step, "times", "above 100"
+        what = "work of a step by differences on the mesh, over it"
+        yield case, what, whole / step, "times", "above 100"
 
 
 def factored(model: FEModel, omega: Array) -> float:

@@ -74,7 +74,8 @@ def measured(family, model, *, level=0.0, sign=1.0, H=None, seed=0):
         H = responses_at(small(family, model, sign), np.log(TRUE), np.array([0.02]),
                          2 * np.pi * LINES)  # fmt: skip
     H = noisy(H, level, np.random.default_rng(seed)) if level else H
-    return Responses(LINES, H, sensors, force, 0.99, AVERAGES)
+    coherence = 1 - np.random.default_rng(1).uniform(0.001, 0.2, H.shape)
+    return Responses(LINES, H, sensors, force, coherence, AVERAGES)
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
@@ -89,6 +90,7 @@ def test_equations_find_what_they_find_on_dense_matrices(family, model, dense, s
     factors = np.array(list(found.factors.values()))
     assert_allclose(factors, 1 + same.p, rtol=1e-8)
     assert_allclose(found.zeta[:m], same.zeta, rtol=1e-7)
+    assert len(found.names) == 3 + m
     scale = np.r_[factors, np.ones(m)]
     assert_allclose(found.covariance * np.outer(scale, scale), same.covariance,
                     rtol=1e-5, atol=1e-12)  # fmt: skip
@@ -132,6 +134,14 @@ def test_only_what_is_sought_moves(family, model):
     assert_allclose(list(found.factors.values()), np.exp(x), rtol=1e-6)
 
 
+def test_factors_stay_in_their_range(family, model):
+    narrow = dict(PARAMETERS, E_inner=rom.YoungsModulus("inner", 0.9, 1.05))
+    test = measured(family, model)
+    found = rom.update(replace(family, parameters=narrow), test, fixed=("root",),
+                       residual="equations")  # fmt: skip
+    assert found.at_bound == ("E_inner",) and found.factors["E_inner"] == pytest.approx(1.05)
+
+
 def test_the_bias_of_the_condensation_is_seen_by_the_verdict(family, model):
     """Responses find the truth; equations do not, and noise does not explain what is left."""
     test = measured(family, model, level=0.01)
@@ -146,7 +156,7 @@ def test_the_bias_of_the_condensation_is_seen_by_the_verdict(family, model):
 
 
 def test_what_equations_need_is_named(family, model):
-    test = measured(family, model)
+    test = replace(measured(family, model), coherence=0.99)
 
     def refused(words, test=test, **options):
         with pytest.raises(ConfigError, match=words):
