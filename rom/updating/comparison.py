@@ -29,8 +29,8 @@ class Comparison:
     Attributes:
         names: of the sets.
         n_unknowns: (k,) of each set, damping ratios too.
-        by_line: (k, n_f) squared residuals of each line, in the update of all others.
-        expected: (n_f,) of these squares, by noise alone.
+        by_line: (k, n_f) squared residuals of each line, in the update of all others [1].
+        expected: (n_f,) of these squares, by noise alone [1].
     """
 
     names: tuple[str, ...]

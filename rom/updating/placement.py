@@ -141,7 +141,7 @@ def independent(
 
     Returns:
         numbers (n,) of the sensors kept, ascending, and (modes, modes) the auto-MAC of the modes
-        there: ones on its diagonal, small beside it.
+        there: ones on its diagonal, small beside it [1].
 
     Raises:
         ConfigError: for sensors off the body, or a wrong number.
