@@ -4,10 +4,12 @@ from collections.abc import Iterator
 from time import process_time
 
 import numpy as np
+from scipy.sparse import csc_matrix
+from scipy.sparse.linalg import splu
 
 from rom.bench.models import KINDS
 from rom.body.surface import surface_of
-from rom.model import FEModel
+from rom.model import Array, FEModel
 from rom.parametric.parameters import Density, YoungsModulus
 from rom.parametric.reduce import reduce_parametric
 from rom.process.memory import peak_bytes
@@ -16,11 +18,12 @@ from rom.updating.estimate import update
 from rom.updating.family_model import AddedMass, GroundSpring, family_model
 from rom.updating.frf_data import noisy
 from rom.updating.measured import Channels, Responses
-from rom.updating.normal_equations import responses_at
+from rom.updating.normal_equations import Data, responses_at, sums
 
 N_SENSORS, N_INPUTS, N_LINES = 20, 3, 4000
 HIGHEST_LINE = 1500.0  # [Hz]
 RELATIVE_NOISE, N_AVERAGES, DAMPING_RATIO = 0.05, 50, 0.02
+N_FACTORED, MAX_FACTORED_DOFS = 4, 5000  # lines and dofs of the mesh beside
 TRUE_LOGS = (0.2, -0.1, 0.3, -0.3, 0.2, -0.2)  # of the six factors
 BEAM_PARAMETERS = {"E": YoungsModulus(None, 0.4, 2.5), "rho": Density(None, 0.5, 2.0)}
 ATTACHED_PARTS: dict[str, GroundSpring | AddedMass] = {
@@ -64,3 +67,30 @@ def measured(model: FEModel, n_lines: int = N_LINES) -> Iterator[Row]:
     yield case, "processor time of an update", spent, "s", "below 10"
     yield case, "peak memory of the process", peak_bytes() / 1024**3, "GiB", "below 1"
     yield case, "largest error over its deviation", float(worst), "", "below 4"
+    if model.n_dofs <= MAX_FACTORED_DOFS:
+        x, zeta = found.logarithms, found.zeta
+        start = process_time()
+        sums(found.model, x, zeta, Data.of(test))
+        step = process_time() - start
+        whole = factored(model, 2 * np.pi * lines) * len(lines) * (1 + x.size)
+        what = "work of a step by differences on the mesh, over it"
+        yield case, what, whole / step, "times", "above 100"
+
+
+def factored(model: FEModel, omega: Array) -> float:
+    """Processor time of the dynamic stiffness of a mesh, factored and solved at a line [s].
+
+    Without it there are no responses of the mesh; for derivatives by differences it is done again
+    with each factor changed. Mean over few of the lines.
+
+    Args:
+        model: with its matrices.
+        omega: (n_f,) lines [rad/s].
+    """
+    K, M = csc_matrix(model.K), csc_matrix(model.M)
+    F = np.eye(model.n_dofs, N_INPUTS)
+    few = omega[:: max(1, omega.size // N_FACTORED)]
+    start = process_time()
+    for w in few:
+        splu(((1 + 2j * DAMPING_RATIO) * K - w**2 * M).tocsc()).solve(F.astype(complex))
+    return (process_time() - start) / few.size

@@ -1,3 +1,5 @@
+from rom.updating.comparison import Comparison as Comparison
+from rom.updating.comparison import compare as compare
 from rom.updating.estimate import Updated as Updated
 from rom.updating.family_model import AddedMass as AddedMass
 from rom.updating.family_model import GroundSpring as GroundSpring

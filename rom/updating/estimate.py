@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from rom.arguments import finite, typed, whole
+from rom.arguments import finite, one_of, typed, whole
 from rom.body.flexible import FlexibleBody
 from rom.errors import ConfigError, ParameterError, SolverError
 from rom.model import Array, Mask, Report, Row
@@ -19,9 +19,11 @@ from rom.names import named
 from rom.parametric.family import BodyFamily
 from rom.plausible import check_damping_ratio
 from rom.rows import row
+from rom.updating.equations import by_equations
 from rom.updating.family_model import AddedMass, FamilyModel, GroundSpring, family_model
 from rom.updating.frf_data import Complex
 from rom.updating.measured import Channels, Responses
+from rom.updating.methods import Update
 from rom.updating.models import modal
 from rom.updating.normal_equations import Data, Sums, responses_at, sums
 from rom.updating.verdict import band, check_channels, likeness, scores, unseen_directions, verdict
@@ -85,6 +87,11 @@ class Updated:
         return self.covariance / np.outer(d, d)
 
     @property
+    def logarithms(self) -> Array:
+        """(n_p,) of all factors; zero for parameters that are not in the model [1]."""
+        return np.log(np.where(self.model.present, list(self.factors.values()), 1.0))
+
+    @property
     def body(self) -> FlexibleBody:
         """The body at the factors found; its provenance says by which data, and how surely."""
         own: dict[str, Any] = {name: self.factors[name] for name in self.family.parameters}
@@ -105,9 +112,8 @@ class Updated:
         Raises:
             ConfigError: for lines that are not finite.
         """
-        x = np.log(np.where(self.model.present, list(self.factors.values()), 1.0))
         omega = 2 * np.pi * finite("frequencies", frequencies, None)
-        return responses_at(self.model, x, self.zeta, omega)
+        return responses_at(self.model, self.logarithms, self.zeta, omega)
 
     def drawn(
         self, frequencies: Any, sensors: Channels, inputs: Channels, *, n: int, seed: int = 0
@@ -136,7 +142,7 @@ class Updated:
             for channels, what in ((sensors, "sensor"), (inputs, "input"))
         )
         model = replace(self.model, seen=seen, driven=driven)
-        x = np.log(np.where(model.present, list(self.factors.values()), 1.0))
+        x = self.logarithms
         labels = (*model.names, *(f"zeta {k + 1}" for k in range(self.zeta.size)))
         unknown = [labels.index(name) for name in self.names]
         theta = np.tile(np.r_[x, np.log(self.zeta)], (n, 1))
@@ -168,6 +174,8 @@ def update(  # noqa: PLR0913  keywords of one call
     damping: float = 0.01,
     prior: dict[str, float] | None = None,
     tolerance: float | None = None,
+    residual: str = "responses",
+    rank: int | None = None,
 ) -> Updated:
     """Find the factors of a family, and damping ratios, that explain measured responses.
 
@@ -186,6 +194,9 @@ def update(  # noqa: PLR0913  keywords of one call
         damping: ratio to start from, of all modes [1].
         prior: {name: relative standard deviation [1] of its factor about one, before the test}.
         tolerance: largest distance of a channel from a surface point [m], see `Channels.rows`.
+        residual: "responses", or "equations": of motion at the sensors, linear in what is sought,
+            biased by noise and by the condensation; the verdict is that of responses.
+        rank: of the basis of equations; None for one direction per mode up to the highest line.
 
     Returns:
         `rom.updating.Updated`.
@@ -202,6 +213,11 @@ def update(  # noqa: PLR0913  keywords of one call
         Berriet, Fillod and Bouhaddi, for weighted responses with modal damping.
     """
     check_damping_ratio(damping)
+    one_of("residual", residual, ("responses", "equations"))
+    if {"responses": rank is not None, "equations": bool(prior)}[residual]:
+        raise ConfigError(
+            "rank belongs to the residual of equations, a prior to that of responses."
+        )
     if not DAMPING_RANGE[0] <= damping <= DAMPING_RANGE[1]:
         raise ConfigError(f"damping = {damping} to start from is not within {DAMPING_RANGE}.")
     if family.body.units != "SI":
@@ -219,7 +235,10 @@ def update(  # noqa: PLR0913  keywords of one call
     data = Data.of(test)
     search = _Search.begun(model, data, unknown, damping, prior or {})
     check_channels(responses_at(model, search.x, search.zeta, data.omega), data)
-    return _found(family, search.run())
+    if residual == "responses":
+        return _found(family, search.run())
+    found = by_equations(model, data, search.x, unknown, damping, rank)
+    return replace(_found(family, search.moved(found)), covariance=found.covariance)
 
 
 def _unknown(
@@ -293,6 +312,15 @@ class _Search:
         """Information (n, n) of data and prior, and the gradient (n,) of half the cost."""
         N = self.sums.normal + np.diag(self.precision)
         return N, self.sums.gradient + self.precision * (self.theta - self.before)
+
+    def moved(self, found: Update) -> "_Search":
+        """Where equations led, damping of the modes above the highest line as it was."""
+        n, m = len(self.model.names), found.zeta.size
+        self.theta[np.flatnonzero(self.free[:n])] = found.p
+        self.theta[n : n + m], self.free[n + m :] = np.log(found.zeta), False
+        self.sums, _ = self.at(self.theta)
+        self.settled = True
+        return self
 
     def run(self) -> "_Search":
         """Descend on few lines with large errors, where a start may be far away, then on all."""

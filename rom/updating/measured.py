@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from scipy.spatial import cKDTree
 
 from rom.arguments import finite, one_of
 from rom.body.flexible import FlexibleBody
@@ -19,6 +20,12 @@ from rom.rotation import skew
 from rom.updating.frf_data import Complex, random_error
 
 DERIVATIVES = {"displacement": 0, "velocity": 1, "acceleration": 2}
+LENGTHS = {  # factors by which points that are off a body may all lie on it
+    1e-3: "millimetres taken for metres",
+    1e3: "metres taken for millimetres",
+    1e-2: "centimetres taken for metres",
+    0.0254: "inches taken for metres",
+}
 POINT_RTOL = 0.02  # distance of a sensor from the nearest point of the surface, of the body's size
 MAX_RELATIVE_ERROR = 0.3  # of a value; beyond it the logarithm of noise is no longer normal
 MAX_LINES_NAMED = 5  # in a message
@@ -67,20 +74,37 @@ class Channels:
         surface, points = surface_of(body), np.asarray(self.points)
         reach = POINT_RTOL * np.ptp(surface.points, axis=0).max()
         reach = reach if tolerance is None else tolerance
+        tree = cKDTree(surface.points)
+        _check_lengths(points, tree, reach, what)
+        far, nearest = tree.query(points)
         found = []
-        for k, (x, d) in enumerate(zip(points, np.asarray(self.directions), strict=True)):
-            far = np.linalg.norm(surface.points - x, axis=1)
-            n = int(far.argmin())
-            if far[n] > reach:
+        for k, (d, n) in enumerate(zip(np.asarray(self.directions), nearest, strict=True)):
+            if far[k] > reach:
                 raise ConfigError(
-                    f"{what} {k} at {x.tolist()} is {far[n]:.3g} m off the body; {reach:.3g} m is "
-                    "taken.",
+                    f"{what} {k} at {points[k].tolist()} is {far[k]:.3g} m off the body; "
+                    f"{reach:.3g} m is taken.",
                     hint="Compare the units and axes of the test with those of the geometry.",
                 )
             shape = surface.shape[3 * n : 3 * n + 3]
             motion = np.hstack([np.eye(3), -skew(surface.points[n]), shape])
             found.append(d / np.linalg.norm(d) @ motion)
         return np.array(found)
+
+
+def _check_lengths(points: Array, surface: cKDTree, reach: float, what: str) -> None:
+    """Refuse points that are off a body, or all in one spot, and on it by another unit."""
+    spread, now = np.ptp(points, axis=0).max(), surface.query(points)[0]
+    if (now <= reach).all() and not 0 < spread < reach:
+        return
+    spread = spread if len(points) > 1 else np.linalg.norm(points)
+    for factor, why in LENGTHS.items():
+        if factor * spread > reach and (surface.query(factor * points)[0] <= reach).all():
+            k = int(now.argmax())
+            raise ConfigError(
+                f"{what} {k} at {points[k].tolist()} is {now[k]:.3g} m off the body; times "
+                f"{factor:g} all {len(points)} of them lie on it: {why}?",
+                hint="Give points in metres.",
+            )
 
 
 @dataclass(frozen=True, slots=True)

@@ -41,16 +41,21 @@ class Update:
     Attributes:
         p: (n_p,) relative changes of stiffness and mass [1].
         zeta: (m,) damping ratios of the lowest elastic modes [1].
-        deviation: (n_p + m,) standard deviations of p and ln zeta that the residual implies [1].
+        covariance: (n_p + m, n_p + m) of p and ln zeta that the residual implies [1].
         history: (k, n_p) p after each step [1].
         residual: root mean square of the weighted residual [1].
     """
 
     p: Array
     zeta: Array
-    deviation: Array
+    covariance: Array
     history: Array
     residual: float
+
+    @property
+    def deviation(self) -> Array:
+        """(n_p + m,) standard deviations of p and ln zeta [1]."""
+        return np.sqrt(np.diag(self.covariance))
 
 
 def responses(
@@ -221,13 +226,19 @@ def update_by_output(model: Model, test: Measurement, p: ArrayLike, zeta: ArrayL
 
 
 def update_by_input(
-    model: AtSensors, test: Measurement, p: ArrayLike, zeta: ArrayLike, *, rank: int
+    model: AtSensors,
+    test: Measurement,
+    p: ArrayLike,
+    zeta: ArrayLike,
+    *,
+    rank: int,
+    limits: tuple[ArrayLike, ArrayLike] = (MIN_PARAMETER, np.inf),
 ) -> Update:
     """Least squares of U^T Z^-1 (Z(p) U U^T y - f): linear in p and zeta in each step.
 
     U spans the strongest ``rank`` directions of all test and model responses together; both sets
     are condensed with it. The rank, at most the number of sensors, must reach the number of modes
-    in the band. Otherwise as `update_by_output`.
+    in the band; p stays within the limits [1]. Otherwise as `update_by_output`.
 
     Raises:
         ConfigError: if the test does not fit the model, or has not so many sensors.
@@ -252,7 +263,7 @@ def update_by_input(
             -np.linalg.lstsq(J, r, rcond=None)[0], -MAX_PARAMETER_CHANGE, MAX_PARAMETER_CHANGE
         )
         ratios = ratios * np.exp(step[x.size :])
-        x = np.maximum(x + step[: x.size], MIN_PARAMETER)
+        x = np.clip(x + step[: x.size], *limits)
         path.append(x)
     return _update(np.concatenate([x, np.log(ratios)]), x.size, r, J, path)
 
@@ -320,8 +331,8 @@ def common_basis(test: Complex, model: Complex, rank: int) -> Array:
 
 def _update(x: Array, n_p: int, r: Array, J: Array, path: list[Array]) -> Update:
     variance = (r @ r) / max(r.size - x.size, 1)
-    spread = np.sqrt(np.diag(np.linalg.pinv(J.T @ J)) * variance)
-    return Update(x[:n_p], np.exp(x[n_p:]), spread, np.array(path), np.sqrt((r @ r) / r.size))
+    covariance = np.linalg.pinv(J.T @ J) * variance
+    return Update(x[:n_p], np.exp(x[n_p:]), covariance, np.array(path), np.sqrt((r @ r) / r.size))
 
 
 def _weighted(weights: Any, r: Complex) -> Array:

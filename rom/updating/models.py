@@ -6,7 +6,7 @@ Source:
 """
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -76,6 +76,17 @@ class ParametricModel:
         return ParametricModel(K, M, dK, dM, self.sensors @ T, self.n_rigid)
 
 
+class SensorModel(Protocol):
+    """A model whose sensors are dofs, with its origin where it is asked for."""
+
+    @property
+    def sensors(self) -> Array:
+        """(n_s, n) rows that give the measured displacements [1]."""
+
+    def at(self, p: Array) -> ParametricModel:
+        """The model with its origin at p (n_p,) [1]."""
+
+
 @dataclass(frozen=True, slots=True)
 class AtSensors:
     """A parametric model condensed statically to its sensors, anew for each p.
@@ -88,7 +99,7 @@ class AtSensors:
         full: the model; its sensors are dofs.
     """
 
-    full: ParametricModel
+    full: "SensorModel"
 
     def at(self, p: ArrayLike) -> ParametricModel:
         """The condensed model with its origin at p (n_p,) [1] and the derivatives there.
@@ -96,7 +107,7 @@ class AtSensors:
         Raises:
             ConfigError, ModelError: if sensors are no dofs, or do not hold the structure.
         """
-        model = self.full.at(p)
+        model = self.full.at(np.asarray(p, dtype=float))
         s = sensor_dofs(model)
         o = np.setdiff1d(np.arange(len(model.K)), s)
         try:

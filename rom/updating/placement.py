@@ -27,7 +27,7 @@ from rom.updating.estimate import BAND_RATIO, DAMPING_LOG_DEVIATION, Attached
 from rom.updating.family_model import FamilyModel, family_model
 from rom.updating.frf_data import Complex
 from rom.updating.measured import DERIVATIVES, Channels
-from rom.updating.models import modal
+from rom.updating.models import DEAD_RATIO, modal
 from rom.updating.normal_equations import sensitivity
 from rom.updating.verdict import unseen_directions
 
@@ -141,7 +141,7 @@ def independent(
 
     Returns:
         numbers (n,) of the sensors kept, ascending, and (modes, modes) the auto-MAC of the modes
-        there: ones on its diagonal, small beside it.
+        there: ones on its diagonal, small beside it [1].
 
     Raises:
         ConfigError: for sensors off the body, or a wrong number.
@@ -270,13 +270,15 @@ def _information(
     m = min(int(np.count_nonzero(lam < (BAND_RATIO * omega.max()) ** 2)) + 1, lam.size)
     at, n = sensitivity(model, x, np.full(m, damping)), x.size + m
     n_s, n_e = len(model.seen), len(model.driven)
-    blocks = np.zeros((n_s, n_e, n, n))
+    blocks, size = np.zeros((n_s, n_e, n, n)), np.zeros((n_s, n_e))
     lines = max(1, BLOCK_VALUES // (n_s * n_e * n))
     for first in range(0, omega.size, lines):
         w = omega[first : first + lines]
         H, J = at(w)
         J = np.moveaxis(J / error.of(H, w)[..., None], 0, 2)
         blocks += (np.swapaxes(J.conj(), 2, 3) @ J).real
+        size = np.maximum(size, np.abs(H).max(axis=0))
+    blocks[size < DEAD_RATIO * size.max()] = 0.0  # relative noise makes nothing of round-off
     width = np.log(model.high / model.low)
     sigma = np.array([prior.get(k, w) for k, w in zip(model.names, width, strict=True)])
     if not (sigma > 0).all():

@@ -122,6 +122,22 @@ def test_a_test_is_planned(capsys, ending):
     assert_allclose(np.array(found["plan"]["inputs"])[:, :3], same.inputs.points)
 
 
+def test_a_plan_is_drawn_and_has_a_size_of_its_own(capsys):
+    words = ["--plan", "--lines", "20:900", "--floor", "0.02", "-o", "plan.png"]
+    assert main(["update", *WORDS, *words, "--force", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert [len(found["plan"][name]) for name in ("sensors", "inputs")] == [8, 1]
+    assert Path("plan.png").read_bytes()[:4] == b"\x89PNG"
+    quiet = answered_plan(words[:3], capsys)  # without a floor antiresonances tell too much
+    for name in TRUE:
+        assert found["deviations"][name] > 2 * quiet["deviations"][name]
+
+
+def answered_plan(words, capsys):
+    assert main(["update", *WORDS, *words, "--json"]) == 0
+    return json.loads(capsys.readouterr().out)
+
+
 def test_wrong_plans_are_said(capsys):
     def refused(words, message):
         capsys.readouterr()
@@ -135,10 +151,11 @@ def test_wrong_plans_are_said(capsys):
     lines = ["--lines", "20:900"]
     refused([], "required: file")
     refused(["--plan", "5,1"], "required: --lines")
+    refused(["test.h5", "--plan", *lines], "neither a test nor")
     refused(["--plan", "5", *lines], "is not two whole numbers")
     refused(["--plan", "5,1", "--lines", "900:20"], "does not ascend")
     refused(["test.h5", "--plan", "5,1", *lines], "neither a test nor")
-    refused(["--plan", "5,1", *lines, "-o", "plan.txt"], "written as .csv or .uff")
+    refused(["--plan", "5,1", *lines, "-o", "plan.txt"], "written as .csv, .uff, .png")
     refused(["--plan", "500,1", *lines], "n_sensors = 500")
 
 

@@ -101,8 +101,14 @@ MOVED = {**NODES, 2: (0.75, 0.1, 0.2)}
 DAMAGES = {
     "a line is not a number": (lost, {}, r"not finite at 1 lines, e\.g\. at 100\.\d* Hz"),
     "a node is off the body": (scaled(1.0), {"nodes": MOVED}, r"sensor 2 at .* is 0\.12 m off"),
-    # a thousandth of the body lies at its support
-    "nodes are in millimetres": (scaled(1.0), {"length": "mm"}, "all responses are .* Check units"),
+    "nodes are in metres": (
+        scaled(1.0), {"length": "mm"}, "times 1000 all 8 of them .*: metres taken for millimetres"),
+    "nodes are in millimetres": (
+        scaled(1.0), {"nodes": {n: tuple(1e3 * x for x in p) for n, p in NODES.items()}},
+        r"sensor \d at .* times 0\.001 all 8 of them .*: millimetres taken for metres"),
+    "nodes are in inches": (
+        scaled(1.0), {"nodes": {n: tuple(x / 0.0254 for x in p) for n, p in NODES.items()}},
+        r"times 0\.0254 all 8 .*: inches"),
     "a node is missing": (scaled(1.0), {"nodes": {1: NODES[1]}}, "without coordinates: 2, 3, 4"),
     "a sensor is turned around": (scaled(-1.0, 5), {}, "sensor 5"),
     "a sensor is in g": (scaled(1 / 9.80665, 4), {}, "sensor 4.*taken for g|sensor 4.*in g"),
@@ -163,3 +169,84 @@ def test_numbers_that_are_none_are_named_in_a_universal_file(tmp_path):
     (tmp_path / "x.unv").write_text("\n".join(text))
     with pytest.raises(FileFormatError, match=r"not finite at 1 lines, e\.g\. at 2 Hz"):
         rom.io.read_responses(tmp_path / "x.unv", averages=20)
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """A test in HDF5, as bytes."""
+    test = rom.io.read_responses(HERE / "pyuff_test.uff", averages=20)
+    return rom.io.write_responses(test, tmp_path_factory.mktemp("whole") / "a.h5").read_bytes()
+
+
+@pytest.mark.once
+def test_a_byte_that_is_wrong_anywhere_in_hdf5_is_named(whole, tmp_path):
+    """Headers without checksums of their own let such files end the process."""
+    path, rng = tmp_path / "x.h5", np.random.default_rng(0)
+    path.write_bytes(whole)
+    test = rom.io.read_responses(path)
+    for k in rng.permutation(len(whole))[:400]:
+        data = bytearray(whole)
+        data[k] ^= 1 << rng.integers(8)
+        path.write_bytes(data)
+        try:
+            found = rom.io.read_responses(path)
+        except FileFormatError as error:
+            assert "x.h5" in str(error)
+            continue
+        assert_allclose(found.H, test.H, rtol=0)  # a byte that nothing lies in
+        assert_allclose(found.sensors.points, test.sensors.points, rtol=0)
+        assert (found.averages, found.quantity) == (test.averages, test.quantity)
+    for k in range(0, len(whole), 97):
+        path.write_bytes(whole[:k])
+        with pytest.raises(FileFormatError, match=r"x\.h5"):
+            rom.io.read_responses(path)
+
+
+CHANGES = {
+    "no data set 'H'": lambda file: file.__delitem__("H"),
+    "no attribute 'averages'": lambda file: file.attrs.__delitem__("averages"),
+    "averages = .* is no number": lambda file: file.attrs.__setitem__("averages", [1, 2]),
+    "averages = nan": lambda file: file.attrs.__setitem__("averages", np.nan),
+    "averages = 2.5 is no whole number": lambda file: file.attrs.__setitem__("averages", 2.5),
+    "force_noise = a is no number": lambda file: file.attrs.__setitem__("force_noise", "a"),
+    "units are 'mm'": lambda file: file.attrs.__setitem__("units", "mm"),
+    "not those of its checksum": lambda file: file["H"].__setitem__((0, 0, 0), 1.0),
+    "'frequencies' holds no real": lambda file: other(file, "frequencies", [1j, 2j]),
+    "'H' holds no numbers": lambda file: other(file, "H", np.bytes_("H")),
+    r"H is \(6, 2, 1\); lines": lambda file: other(file, "frequencies", [1.0, 2.0], True),
+    "quantity": lambda file: file.attrs.__setitem__("quantity", "force"),
+}
+
+
+def other(file, name, value, without_checksum=False):
+    del file[name]
+    file[name] = value
+    if without_checksum:
+        del file.attrs["checksum"]
+
+
+@pytest.mark.once
+@pytest.mark.parametrize("words", CHANGES)
+def test_what_is_wrong_in_hdf5_is_named(words, whole, tmp_path):
+    path = tmp_path / "x.h5"
+    path.write_bytes(whole)
+    with rom.io.hdf5.h5py("").File(path, "r+") as file:
+        CHANGES[words](file)
+    with pytest.raises(FileFormatError, match=words):
+        rom.io.read_responses(path)
+
+
+@pytest.mark.once
+def test_hdf5_of_another_program_is_read(whole, tmp_path):
+    """Without a checksum, texts of free length, headers of any version."""
+    path, there = tmp_path / "x.h5", tmp_path / "whole.h5"
+    there.write_bytes(whole)
+    test = rom.io.read_responses(there)
+    h5py = rom.io.hdf5.h5py("")
+    with h5py.File(there, "r") as file, h5py.File(path, "w") as new:
+        for name in ("frequencies", "H", "coherence", "sensors", "inputs"):
+            file.copy(name, new)
+        new.attrs.update({"averages": 20, "quantity": "displacement", "units": "SI"})
+    found = rom.io.read_responses(path)
+    assert_allclose(found.H, test.H, rtol=0)
+    assert found.quantity == "displacement" and found.averages == 20

@@ -26,7 +26,7 @@ from rom.errors import ConfigError
 
 if TYPE_CHECKING:
     from rom.parametric.family import BodyFamily
-    from rom.updating import AddedMass, GroundSpring, Updated
+    from rom.updating import AddedMass, GroundSpring, Plan, Updated
 
 SUMMARY = "update a family of bodies by a vibration test"
 EXAMPLES = """\
@@ -36,10 +36,14 @@ EXAMPLES = """\
       --spring clamp=root:1e8,1e8,1e8:0.1:10 --mass cable=tip:0.05:0.1:10 --candidate cable \\
       -o updated.rom.npz
   rom update --plan 8,1 --lines 20:800 --family panel.rom.npz --fixed root -o plan.csv
+  rom update --plan --lines 20:800 --family panel.rom.npz --fixed root -o plan.png
 """
 PLAN_LINES = 100  # between the first and the last one
 PLAN_POINTS = 20  # of the surface that are offered, each along three axes
-PLAN_ENDINGS = (".csv", ".uff")
+PLAN_ENDINGS = (".csv", ".uff", ".png")
+PLAN_SIZE = (8, 1)  # sensors and forces, where none are asked for
+PIN_RATIO = 0.12  # length of a pin in a picture, over the size of the body
+PIN_SLENDERNESS = 12.0  # of a pin; its ball is three times as thick
 FACTOR_HELP = "by a factor from LOW to HIGH that is sought; may be repeated"
 
 
@@ -79,8 +83,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--tolerance", type=positive, help="of points off the body [m]")
     parser.add_argument(
-        "--plan", metavar="SENSORS,FORCES", type=_two_counts, help="choose so many for a test to be"
-    )
+        "--plan", metavar="SENSORS,FORCES", type=_two_counts, nargs="?", const=PLAN_SIZE,
+        help="choose so many for a test to be (8,1 where they are left out)",
+    )  # fmt: skip
     parser.add_argument(
         "--lines", metavar="LOW:HIGH", type=_range, help="of the test that is planned [Hz]"
     )
@@ -88,7 +93,11 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--noise", type=positive, default=0.05, help="relative, of what is planned (default 5 %%)"
     )
     parser.add_argument(
-        "-o", "--output", type=Path, help="updated body, .rom.npz; plan, .csv or .uff"
+        "--floor", type=positive, default=0.0,
+        help="noise of what is planned where nothing moves [m/s^2 per N] (default none)",
+    )  # fmt: skip
+    parser.add_argument(
+        "-o", "--output", type=Path, help="updated body, .rom.npz; plan, .csv, .uff or .png"
     )
     add_force(parser)
 
@@ -154,7 +163,7 @@ def _plan(args: argparse.Namespace) -> Answer:
     require({"--lines": args.lines}, hint="For example --lines 20:800, from 20 to 800 Hz.")
     output = args.output and checked(args, args.output)
     if output and output.suffix.lower() not in PLAN_ENDINGS:
-        raise ConfigError(f"-o {output}: a plan is written as {' or '.join(PLAN_ENDINGS)}.")
+        raise ConfigError(f"-o {output}: a plan is written as {', '.join(PLAN_ENDINGS)}.")
     family = _family(args)
     offered = candidates(family.body, PLAN_POINTS, fixed=args.fixed)
     n_sensors, n_inputs = args.plan
@@ -162,8 +171,8 @@ def _plan(args: argparse.Namespace) -> Answer:
     prior = unique(args.prior, "--prior")
     plan = place(
         family, offered, offered, np.linspace(low, high, PLAN_LINES), n_sensors=n_sensors,
-        n_inputs=n_inputs, noise=args.noise, fixed=args.fixed, attached=_outside(args),
-        damping=args.damping,
+        n_inputs=n_inputs, noise=args.noise, floor=args.floor, fixed=args.fixed,
+        attached=_outside(args), damping=args.damping,
         prior={name: typed_number("--prior", text) for name, text in prior.items()},
     )  # fmt: skip
     channels = (("sensors", plan.sensors), ("inputs", plan.inputs))
@@ -180,10 +189,42 @@ def _plan(args: argparse.Namespace) -> Answer:
     }
     if not output:
         return Answer(data, f"{plan}\n{plan.csv()}")
+    if output.suffix.lower() == ".png":
+        return Answer(
+            data | {"output": str(output)}, str(plan), lambda: _drawn(family, plan, output)
+        )
     text = plan.uff() if output.suffix.lower() == ".uff" else plan.csv()
     return Answer(
         data | {"output": str(output)}, str(plan), lambda: output.write_text(text, "ascii")
     )
+
+
+def _drawn(family: "BodyFamily", plan: "Plan", path: Path) -> None:
+    """A picture of the body with a pin along each channel, its ball where it is mounted."""
+    import numpy as np
+
+    from rom import view
+
+    surface = family.body.surface
+    assert surface is not None  # else the plan would have no candidates
+    length = PIN_RATIO * float(np.ptp(surface.points, axis=0).max())
+    thick = length / PIN_SLENDERNESS
+    things = {"body": (surface.points, surface.triangles)}
+    for name, channels in (("sensors", plan.sensors), ("forces", plan.inputs)):
+        pins = []
+        for x, d in zip(np.asarray(channels.points), np.asarray(channels.directions), strict=True):
+            pins += [view.cylinder(x, x + length * d / np.linalg.norm(d), thick, sides=12)]
+            pins += [view.ellipsoid((1.5 * thick,) * 3, x, sides=12)]
+        things[name] = view.joined(pins)
+    view.plane(
+        [view.Scene(f"Seen from {side}", things, view=(0.6 * y, y, 0.7 * z), up=(0, 0, 1))
+         for side, y, z in (("the front and above", -1.0, 1.0), ("behind and below", 1.0, -1.0))],
+        path, title="Plan of a vibration test",
+        caption="A ball marks a point, its pin the direction, in the axes of the geometry; a "
+        "point may carry several. Standard deviations that the test will leave: "
+        + ", ".join(f"{name} to {100 * d:.2g} %" for name, d in plan.deviations.items()
+                    if name in family.parameters) + ".",
+    )  # fmt: skip
 
 
 def _two_counts(text: str) -> tuple[int, int]:

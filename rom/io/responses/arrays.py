@@ -2,10 +2,14 @@
 
 Data sets are frequencies (n_f,), H (n_f, n_s, n_e) complex, coherence (one number or as H), and
 sensors and inputs, groups with points and directions (k, 3); attributes of the file are averages,
-quantity, force_noise (zero where it is missing) and units, always SI.
+quantity, force_noise (zero where it is missing), units, always SI, and checksum, SHA-256 of the
+data sets, which is compared where it is there. Headers of HDF5 1.8 have checksums of their own:
+without them, and by texts in its heap, a byte that is wrong can end the process.
 """
 
 import io
+from collections.abc import Sequence
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +20,8 @@ from rom.io.files import check_readable, write_whole
 from rom.io.hdf5 import h5py
 from rom.updating.measured import Channels, Responses
 
+HEADERS = ("v108", "v108")  # oldest and newest version of HDF5 that is written
+KINDS = {"fiu": "real numbers", "fciu": "numbers"}  # by the letters of NumPy
 MAX_ARRAY_BYTES = 2**32  # of all arrays of a test
 DATA_SETS = ("frequencies", "H", "coherence", "sensors/points", "sensors/directions",
           "inputs/points", "inputs/directions")  # fmt: skip
@@ -31,13 +37,14 @@ def written(test: Responses, path: Path) -> Path:
     values = (test.frequencies, test.H, test.coherence, test.sensors.points,
               test.sensors.directions, test.inputs.points, test.inputs.directions)  # fmt: skip
     data = io.BytesIO()
-    with h5py(".uff").File(data, "w") as file:
+    with h5py(".uff").File(data, "w", libver=HEADERS) as file:
         for name, value in zip(DATA_SETS, values, strict=True):
             file[name] = np.asarray(value)
         file.attrs["averages"] = test.averages
-        file.attrs["quantity"] = test.quantity
         file.attrs["force_noise"] = test.force_noise
-        file.attrs["units"] = "SI"
+        texts = {"quantity": test.quantity, "units": "SI", "checksum": _checksum(values)}
+        for name, text in texts.items():
+            file.attrs[name] = np.bytes_(text)
     write_whole(path, lambda out: out.write(data.getvalue()))
     return path
 
@@ -54,8 +61,8 @@ def read(path: Path) -> Responses:
     try:
         with h5py(".uff").File(check_readable(path), "r") as file:
             return _test(path, file)
-    except OSError as error:
-        raise FileFormatError(f"this is no HDF5 file: {error}.", where=str(path)) from error
+    except (OSError, RuntimeError, KeyError, TypeError, ValueError) as error:
+        raise FileFormatError(f"this is no whole HDF5 file: {error}.", where=str(path)) from error
 
 
 def _test(path: Path, file: Any) -> Responses:
@@ -64,14 +71,43 @@ def _test(path: Path, file: Any) -> Responses:
         raise FileFormatError(f"there is no data set {missing[0]!r}.", where=str(path))
     if missing := [name for name in ("averages", "quantity", "units") if name not in file.attrs]:
         raise FileFormatError(f"the file has no attribute {missing[0]!r}.", where=str(path))
-    if file.attrs["units"] != "SI":
-        raise FileFormatError(f"units are {file.attrs['units']!r}, not 'SI'.", where=str(path))
+    if (units := _text(file.attrs["units"])) != "SI":
+        raise FileFormatError(f"units are {units!r}, not 'SI'.", where=str(path))
     if sum(file[name].nbytes for name in DATA_SETS) > MAX_ARRAY_BYTES:
         raise UnsafeFileError("its arrays take more than 4 GiB.", where=str(path))
-    if wrong := [name for name in DATA_SETS if file[name].dtype.kind not in "fciu"]:
-        raise FileFormatError(f"{wrong[0]!r} holds no numbers.", where=str(path))
-    f, H, c, *where = (file[name][()] for name in DATA_SETS)
+    for name in DATA_SETS:
+        kinds = "fciu" if name == "H" else "fiu"
+        if file[name].dtype.kind not in kinds:
+            raise FileFormatError(f"{name!r} holds no {KINDS[kinds]}.", where=str(path))
+    f, H, c, *where = values = [file[name][()] for name in DATA_SETS]
+    if "checksum" in file.attrs and _text(file.attrs["checksum"]) != _checksum(values):
+        raise FileFormatError(
+            "the arrays are not those of its checksum: it was damaged or changed.", where=str(path)
+        )
     sensors, inputs = Channels(*where[:2]), Channels(*where[2:])
-    averages, quantity = int(file.attrs["averages"]), str(file.attrs["quantity"])
-    noise = float(file.attrs.get("force_noise", 0.0))
-    return Responses(f, H, sensors, inputs, c, averages, quantity, noise)
+    averages = _number(path, file, "averages")
+    if averages != int(averages):
+        raise FileFormatError(f"averages = {averages} is no whole number.", where=str(path))
+    noise = _number(path, file, "force_noise") if "force_noise" in file.attrs else 0.0
+    quantity = _text(file.attrs["quantity"])
+    return Responses(f, H, sensors, inputs, c, int(averages), quantity, noise)
+
+
+def _checksum(values: Sequence[Any]) -> str:
+    """SHA-256 of the bytes of all arrays, one after another."""
+    whole = sha256()
+    for value in values:
+        whole.update(np.ascontiguousarray(value).tobytes())
+    return whole.hexdigest()
+
+
+def _text(value: Any) -> str:
+    """An attribute of fixed or free length."""
+    return value.decode("ascii", "replace") if isinstance(value, bytes) else str(value)
+
+
+def _number(path: Path, file: Any, name: str) -> float:
+    value = np.asarray(file.attrs[name])
+    if value.shape or value.dtype.kind not in "fiu" or not np.isfinite(value):
+        raise FileFormatError(f"{name} = {file.attrs[name]} is no number.", where=str(path))
+    return float(value)

@@ -1,0 +1,180 @@
+"""Families updated by equations at their sensors, beside the method on dense matrices."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import rom
+from cases.solid import STEEL, composite
+from rom.errors import ConfigError
+from rom.updating import Channels, Responses
+from rom.updating.equations import InSensors
+from rom.updating.family_model import family_model
+from rom.updating.frf_data import noisy
+from rom.updating.methods import update_by_input
+from rom.updating.models import AtSensors, Measurement, ParametricModel, modal
+from rom.updating.normal_equations import responses_at
+
+PARAMETERS = {
+    "E_inner": rom.YoungsModulus("inner", 0.3, 3.0),
+    "E_outer": rom.YoungsModulus("outer", 0.3, 3.0),
+    "rho_outer": rom.Density("outer", 0.5, 2.0),
+}
+TRUE = np.array([1.15, 0.85, 1.1])
+NODES, DRIVEN = (8, 9, 10, 13, 14, 16, 19), 5
+LINES = np.linspace(20, 1400, 120)
+AVERAGES = 100
+
+
+@pytest.fixture(scope="module")
+def model():
+    parts = {"inner": STEEL, "outer": STEEL}
+    return composite(parts, lambda c: "inner" if c[0] < 2 else "outer", cells=(4, 1, 1))
+
+
+@pytest.fixture(scope="module")
+def family(model):
+    return rom.reduce_parametric(
+        model, parameters=PARAMETERS, method=rom.CraigBampton(36),
+        interfaces={"root": "full", "tip": "full"}, certify=False,
+    )  # fmt: skip
+
+
+def channels(model, sign=1.0):
+    """Two directions at seven nodes; a force at one of these."""
+    axes = np.tile([[0, 1, 0], [0, 0, 1]], (len(NODES), 1))
+    sensors = Channels(np.repeat(model.points[list(NODES)], 2, axis=0), axes)
+    force = Channels(sensors.points[DRIVEN], sign * axes[DRIVEN])
+    return sensors, force
+
+
+@pytest.fixture(scope="module")
+def dense(model):
+    """The finite elements, clamped, with the nodes' dofs as sensors; changes of p are linear."""
+    free = np.setdiff1d(np.arange(3 * len(model.points)), model.interfaces["root"].dofs)
+    K, M = (getattr(model, name).toarray()[np.ix_(free, free)] for name in "KM")
+    parts = [model.regions[name] for name in ("inner", "outer", "outer")]
+    dK = np.array([part.K.toarray()[np.ix_(free, free)] for part in parts])
+    dM = np.array([part.M.toarray()[np.ix_(free, free)] for part in parts])
+    dK[2], dM[:2] = 0.0, 0.0
+    dofs = [3 * n + axis for n in NODES for axis in (1, 2)]
+    return ParametricModel(K, M, dK, dM, np.eye(3 * len(model.points))[dofs][:, free])
+
+
+def small(family, model, sign=1.0):
+    rows = [c.rows(family.body, "channel") for c in channels(model, sign)]
+    return family_model(family, rows, {}, {}, ("root",))
+
+
+def measured(family, model, *, level=0.0, sign=1.0, H=None, seed=0):
+    sensors, force = channels(model, sign)
+    if H is None:
+        H = responses_at(small(family, model, sign), np.log(TRUE), np.array([0.02]),
+                         2 * np.pi * LINES)  # fmt: skip
+    H = noisy(H, level, np.random.default_rng(seed)) if level else H
+    coherence = 1 - np.random.default_rng(1).uniform(0.001, 0.2, H.shape)
+    return Responses(LINES, H, sensors, force, coherence, AVERAGES)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_equations_find_what_they_find_on_dense_matrices(family, model, dense, sign):
+    """Logarithms of factors here, changes there: the same minimum; a force may point backwards."""
+    test = measured(family, model, level=0.01, sign=sign)
+    found = rom.update(family, test, fixed=("root",), residual="equations", damping=0.02)
+    m = found.covariance.shape[0] - 3
+    weights = 1 / test.errors()[0]
+    there = Measurement(2 * np.pi * LINES, sign * test.H, (DRIVEN,), weights)
+    same = update_by_input(AtSensors(dense), there, np.zeros(3), np.full(m, 0.02), rank=m)
+    factors = np.array(list(found.factors.values()))
+    assert_allclose(factors, 1 + same.p, rtol=1e-8)
+    assert_allclose(found.zeta[:m], same.zeta, rtol=1e-7)
+    assert len(found.names) == 3 + m
+    scale = np.r_[factors, np.ones(m)]
+    assert_allclose(found.covariance * np.outer(scale, scale), same.covariance,
+                    rtol=1e-5, atol=1e-12)  # fmt: skip
+
+
+def test_condensed_matrices_have_the_derivatives_of_a_complex_step(family, model):
+    x = np.array([0.2, -0.1, 0.15])
+    here = small(family, model)
+    inside = InSensors.of(here, x, np.ones(3, bool))
+    found, n_s = AtSensors(inside).at(x), len(here.seen)
+
+    def condensed(x):
+        k, m = (np.prod(np.exp(x) ** p, axis=1) for p in (here.k_powers, here.m_powers))
+        K, M = (
+            inside.basis.T @ np.tensordot(c, A, 1) @ inside.basis
+            for c, A in ((k, here.K), (m, here.M))
+        )
+        T = np.vstack([np.eye(n_s), -np.linalg.solve(K[n_s:, n_s:], K[n_s:, :n_s])])
+        return T.T @ K @ T, T.T @ M @ T
+
+    K, M = condensed(x)
+    assert_allclose(found.K, K, atol=1e-9 * np.abs(K).max())
+    assert_allclose(found.M, M, atol=1e-9 * np.abs(M).max())
+    for j in range(3):
+        expected = condensed(x + 1e-30j * (np.arange(3) == j))
+        for dA, A in zip((found.dK[j], found.dM[j]), expected, strict=True):
+            assert_allclose(dA, A.imag / 1e-30, atol=1e-9 * np.abs(A).max())
+
+
+def test_only_what_is_sought_moves(family, model):
+    """One density is right and kept; of the model's own condensed responses nothing is left."""
+    x = np.log([1.15, 0.85, 1.0])
+    here = small(family, model)
+    own = AtSensors(InSensors.of(here, x, np.ones(3, bool))).at(x)
+    modes = modal(own, np.full(4, 0.02))
+    H = np.einsum("sn,fn,n->fs", modes.Phi, modes.g(2 * np.pi * LINES), modes.Phi[DRIVEN])
+    test = measured(family, model, H=H[:, :, None])
+    found = rom.update(family, test, fixed=("root",), residual="equations",
+                       free=("E_inner", "E_outer"))  # fmt: skip
+    assert found.factors["rho_outer"] == 1.0 and found.names[:2] == ("E_inner", "E_outer")
+    assert_allclose(list(found.factors.values()), np.exp(x), rtol=1e-6)
+
+
+def test_factors_stay_in_their_range(family, model):
+    narrow = dict(PARAMETERS, E_inner=rom.YoungsModulus("inner", 0.9, 1.05))
+    test = measured(family, model)
+    found = rom.update(replace(family, parameters=narrow), test, fixed=("root",),
+                       residual="equations")  # fmt: skip
+    assert found.at_bound == ("E_inner",) and found.factors["E_inner"] == pytest.approx(1.05)
+
+
+def test_the_bias_of_the_condensation_is_seen_by_the_verdict(family, model):
+    """Responses find the truth; equations do not, and noise does not explain what is left."""
+    test = measured(family, model, level=0.01)
+    by_responses = rom.update(family, test, fixed=("root",))
+    by_equations = rom.update(family, test, fixed=("root",), residual="equations")
+    off = [
+        np.abs(np.array(list(u.factors.values())) / TRUE - 1).max()
+        for u in (by_responses, by_equations)
+    ]
+    assert off[0] < 0.01 < off[1] < 0.3
+    assert not by_equations.verdict.ok
+
+
+def test_what_equations_need_is_named(family, model):
+    test = replace(measured(family, model), coherence=0.99)
+
+    def refused(words, test=test, **options):
+        with pytest.raises(ConfigError, match=words):
+            rom.update(family, test, fixed=("root",), **{"residual": "equations"} | options)
+
+    refused("residual = 'force'", residual="force")
+    refused("rank belongs", rank=3, residual="responses")
+    refused("a prior to that of responses", prior={"E_inner": 0.1})
+    refused("rank = 99", rank=99)
+    refused("rank = 1.5", rank=1.5)
+    away = Channels([[1.0, 0.1, 0.08]], [[0, 1, 1]])
+    refused("input 0 has no sensor", replace(test, inputs=away))
+    n = [*range(14), 4]
+    twice = Channels(np.asarray(test.sensors.points)[n], np.asarray(test.sensors.directions)[n])
+    refused("15 sensors .* follow from others", replace(test, H=test.H[:, n], sensors=twice))
+    c = np.full(test.H.shape, 0.99)
+    c[:, 3] = 0.0
+    refused("no line counts for all", replace(test, coherence=c))
+    few = Channels(np.asarray(test.sensors.points)[[5, 4]],
+                   np.asarray(test.sensors.directions)[[5, 4]])  # fmt: skip
+    refused("2 sensors for . modes", replace(test, H=test.H[:, [5, 4]], sensors=few))
