@@ -67,7 +67,8 @@ class CauchyRecovery:
                 "no stress of modes left out is known at large deflection.",
                 hint="Leave accelerations out, and keep as many modes as the loads excite.",
             )
-        F = self._deformation(q)
+        H = self._gradient(q)
+        F = np.eye(3) + H
         J = np.linalg.det(F)
         if J.min(initial=1.0) <= 0:
             place = self.points[self.node[np.argmin(J)]].tolist()
@@ -76,7 +77,7 @@ class CauchyRecovery:
                 f"{J.min():.3g} of that at rest.",
                 hint="Stay within the range of loads that the body was reduced for.",
             )
-        sigma = F @ self._second_piola(F) @ F.swapaxes(1, 2) / J[:, None, None]
+        sigma = F @ self._second_piola(H) @ F.swapaxes(1, 2) / J[:, None, None]
         return self._at_points(sigma)
 
     def second_piola(self, q: Array) -> Array:
@@ -88,7 +89,7 @@ class CauchyRecovery:
         Raises:
             ConfigError: if q has another length or holds a number that is not finite.
         """
-        return self._at_points(self._second_piola(self._deformation(q)))
+        return self._at_points(self._second_piola(self._gradient(q)))
 
     def von_mises(self, q: Array, accelerations: Array | None = None) -> Array:
         """(p,) equivalent stress [Pa]; see `field`."""
@@ -116,14 +117,13 @@ class CauchyRecovery:
             for numbers, n in ((self.node, p), (self.material, m))
         ) and np.allclose(np.bincount(self.node, self.share, p), 1.0)
 
-    def _deformation(self, q: Array) -> Array:
-        """(s, 3, 3) deformation gradient F at the samples [1]."""
+    def _gradient(self, q: Array) -> Array:
+        """(s, 3, 3) displacement gradient H at the samples [1]."""
         q = finite("q", q, (self.n_modes,))
-        return np.eye(3) + (self.gradient @ q).reshape(-1, 3, 3)
+        return (self.gradient @ q).reshape(-1, 3, 3)
 
-    def _second_piola(self, F: Array) -> Array:
-        """(s, 3, 3) second Piola-Kirchhoff stress of deformation gradients [Pa]."""
-        H = F - np.eye(3)  # strains are small differences: F^T F - 1 would lose digits
+    def _second_piola(self, H: Array) -> Array:
+        """(s, 3, 3) second Piola-Kirchhoff stress of displacement gradients [Pa]."""
         E = 0.5 * (H + H.swapaxes(1, 2) + H.swapaxes(1, 2) @ H)
         strain = np.stack([E[:, a, b] * (1 if a == b else 2) for a, b in PAIRS], axis=1)
         found = np.einsum("sij,sj->si", self.stiffness[self.material], strain)
