@@ -15,9 +15,16 @@ from rom.body.correction import residual_motion
 from rom.body.damping import ModalDamping, Rayleigh, damped
 from rom.body.flexible import FlexibleBody
 from rom.body.frame import at_large_deflection
+from rom.body.nonlinear.cauchy import refuse_many
 from rom.body.nonlinear.geometric import Geometric, enriched
 from rom.body.prestress import UnitLoads
-from rom.body.projection import canonical_columns, elastic_part, flexible_body
+from rom.body.projection import (
+    canonical_columns,
+    cauchy_recovery,
+    elastic_part,
+    flexible_body,
+    stressed_nodes,
+)
 from rom.body.records import Marker
 from rom.checks.certificate import certify_body
 from rom.checks.deflection import deflection_rows
@@ -232,7 +239,8 @@ def reduce(  # noqa: PLR0913  one keyword per choice
         reference: how the floating frame follows the body, see `FlexibleBody.with_reference`.
         damping: structural damping; none if not given.
         name: name of the body.
-        stress: make the stress on the outer surface recoverable, ``body.stress``.
+        stress: make the stress on the outer surface recoverable, ``body.stress``; with nonlinear
+            that of finite strain, in the deformed body.
         stiffening: give the body the geometric stiffness of centrifugal force and of loads on its
             interfaces, ``body.K_geo``: fast rotation and tension then stiffen it.
         nonlinear: the loads under which the body is to deflect far, see `Geometric`: shapes are
@@ -270,11 +278,11 @@ def reduce(  # noqa: PLR0913  one keyword per choice
         of_bodies = (reference != "mean-axis", damping, stress, stiffening, nonlinear)
         return _reduced_sector(model, method, interfaces or {}, any(of_bodies))
     check_name(name, "a body")
-    if nonlinear is not None and (stress or stiffening):
+    if nonlinear is not None and stiffening:
         raise ConfigError(
-            "stress and stiffening are those of small deflection; nonlinear has the stiffening of "
-            "loads in its energy, and no stress is recovered with it.",
-            hint="Leave stress and stiffening out.",
+            "stiffening is that of small deflection; nonlinear has the stiffening of loads in its "
+            "energy.",
+            hint="Leave stiffening out.",
         )
     with stopwatch() as watch:
         body = _reduced_body(
@@ -318,6 +326,8 @@ def _reduced_body(  # noqa: PLR0913  those of `reduce`
         if nonlinear is not None:
             watch.begin("derivatives of shapes")
             basis = enriched(nonlinear, model, ops, connection, basis, reference)
+            if stress:
+                refuse_many(stressed_nodes(model).size, basis.Psi.shape[1] - 6)
         watch.begin("energies")
         begin(f"energies of {basis.Psi.shape[1]} shapes")
         Psi = connection.ops.expand(basis.Psi)
@@ -331,7 +341,7 @@ def _reduced_body(  # noqa: PLR0913  those of `reduce`
         elastic,
         ties=connection.ties,
         name=name,
-        stress=_left_out(model, ops, connection, basis) if stress else None,
+        stress=_left_out(model, ops, connection, basis) if stress and not nonlinear else None,
         stiffening=UnitLoads(model, bare, ops, connection) if stiffening else None,
         provenance=model.provenance | {"reduction": _described(described, basis, ops.n)},
     )
@@ -340,6 +350,8 @@ def _reduced_body(  # noqa: PLR0913  those of `reduce`
     else:
         E = canonical_columns(bare, Psi @ elastic.V, model)
         body, E = at_large_deflection(body, reference, E, model, bare)
+        if stress:
+            body = replace(body, stress=cauchy_recovery(model, E))
     if damping is not None:
         body = damped(body, damping)
     watch.end()

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rom.body.nonlinear.cauchy import CauchyRecovery
 from rom.body.nonlinear.quartic import Quartic
 from rom.body.records import Body, BodyData, Marker, Patch
 from rom.body.recovery import N_FRAME_LOADS, StressRecovery
@@ -147,7 +148,9 @@ def _patch(patch: Patch, f: Factors) -> Patch:
     )
 
 
-def _stress(stress: StressRecovery, f: Factors) -> StressRecovery:
+def _stress(stress: StressRecovery | CauchyRecovery, f: Factors) -> StressRecovery | CauchyRecovery:
+    if isinstance(stress, CauchyRecovery):
+        return stress.in_units(f.length, f.pressure, f.length / f.shape)
     per_coordinate = f.pressure * f.shape / f.length
     inertial = stress.inertial
     if inertial is not None:

@@ -51,7 +51,8 @@ class FlexibleBody(BodyData):
             for a body of small deflection.
         markers: interfaces by name.
         surface: outer surface, or None.
-        stress: recovery of the stress on it, or None.
+        stress: recovery of the stress on it, `StressRecovery`, at large deflection
+            `CauchyRecovery`; or None.
         omega: (r,) natural frequencies of the elastic coordinates, frame held still [rad/s].
         labels: (r,) what each coordinate is.
         reference: the reference condition.

@@ -8,6 +8,7 @@ from scipy.linalg import eigh
 
 from rom.body.nonlinear.quartic import Quartic
 from rom.body.records import Body, Marker
+from rom.body.recovery import StressRecovery
 from rom.body.reference import moved_frame, reference_motion
 from rom.body.stiffening import SecondOrder, moved_stiffening, recombined_stiffening
 from rom.eigen.verbs import Operators, rigid_motions
@@ -99,7 +100,7 @@ def moved_to(body: Body, reference: Any) -> Body:
         )
     X = reference_motion(body, reference)
     moved = moved_frame(body, X)
-    stress = None if body.stress is None else body.stress.moved(X)
+    stress = body.stress.moved(X) if isinstance(body.stress, StressRecovery) else None
     stiffening = moved_stiffening(body, moved, X, reference)
     return replace(moved, K_geo=stiffening, stress=stress, reference=reference_label(reference))
 
@@ -138,9 +139,7 @@ def _recombined(body: Body, V: Array, omega: Array, reference: str) -> Body:
     surface = body.surface
     if surface is not None:
         surface = replace(surface, shape=surface.shape @ V)
-    stress = body.stress
-    if stress is not None:
-        stress = stress.recombined(V)
+    stress = body.stress.recombined(V) if isinstance(body.stress, StressRecovery) else None
     S_kl = np.einsum("abkl,km,ln->abmn", body.S_kl, V, V, optimize=True)
     return replace(
         body,

@@ -10,6 +10,7 @@ from scipy.sparse import csr_matrix
 
 from rom.body.flexible import FlexibleBody
 from rom.body.inertia import InertiaIntegrals, inertia_integrals, point_integrals
+from rom.body.nonlinear.cauchy import CauchyRecovery
 from rom.body.prestress import UnitLoads
 from rom.body.records import Marker, Patch, Surface
 from rom.body.recovery import StressRecovery
@@ -24,7 +25,7 @@ from rom.eigen.verbs import (
     rigid_motions,
 )
 from rom.errors import ConfigError, ModelError
-from rom.model import Array, FEModel, Interface
+from rom.model import Array, FEModel, Index, Interface
 
 NEGATIVE_STIFFNESS_RTOL = 1e-9  # of the largest eigenvalue of K; round-off is smaller
 RIGID_RESIDUAL = 1e-6  # relative distance of a rigid motion from the basis that is still accepted
@@ -179,16 +180,39 @@ def _surface(ops: Operators, model: FEModel, E: Array) -> Surface | None:
 
 
 def _recovery(model: FEModel, E: Array, missing: Array | None) -> StressRecovery:
+    nodes = stressed_nodes(model)
+    shapes = E if missing is None else np.hstack([E, missing])
+    operator = model.stresses.at_nodes(shapes, nodes).reshape(6 * nodes.size, -1)
+    inertial = None if missing is None else operator[:, E.shape[1] :]
+    return StressRecovery(model.points[nodes], operator[:, : E.shape[1]], inertial)
+
+
+def cauchy_recovery(model: FEModel, E: Array) -> CauchyRecovery:
+    """Stress on the surface at large deflection.
+
+    Args:
+        model: supplies points, surface and material.
+        E: (n_local, r) nodal displacement per unit of each coordinate.
+
+    Raises:
+        ConfigError: if the model has no finite elements or no surface.
+    """
+    nodes = stressed_nodes(model)
+    return CauchyRecovery(model.points[nodes], **model.stresses.gradients_at_nodes(E, nodes))
+
+
+def stressed_nodes(model: FEModel) -> Index:
+    """(p,) nodes of the surface, at which stress is recovered.
+
+    Raises:
+        ConfigError: if the model has no finite elements or no surface.
+    """
     if model.stresses is None or model.surface is None:
         raise ConfigError(
             "the model has no finite elements, from which alone stress follows.",
             hint="Make it with rom.fe.model, or reduce with stress=False.",
         )
-    nodes = model.surface.nodes
-    shapes = E if missing is None else np.hstack([E, missing])
-    operator = model.stresses.at_nodes(shapes, nodes).reshape(6 * nodes.size, -1)
-    inertial = None if missing is None else operator[:, E.shape[1] :]
-    return StressRecovery(model.points[nodes], operator[:, : E.shape[1]], inertial)
+    return model.surface.nodes
 
 
 def _scaled(A: Array, scale: Array) -> Array:

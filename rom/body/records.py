@@ -7,6 +7,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from rom.arguments import finite, typed
+from rom.body.nonlinear.cauchy import CauchyRecovery
 from rom.body.nonlinear.quartic import Quartic
 from rom.body.recovery import StressRecovery
 from rom.eigen.supports import DIRECTIONS, Fixed, held_coordinates, supports
@@ -97,7 +98,7 @@ class BodyData:
     K_geo: dict[str, Array] = field(default_factory=dict)
     quartic: Quartic | None = None
     surface: Surface | None = None
-    stress: StressRecovery | None = None
+    stress: StressRecovery | CauchyRecovery | None = None
     units: str = "SI"
     provenance: dict[str, Any] = field(default_factory=dict)
     certificate: Report | None = None

@@ -64,6 +64,12 @@ class StressRecovery:
         """(p,) equivalent stress [Pa]; see `field`."""
         return von_mises(self.field(q, accelerations))
 
+    def fits(self, r: int) -> bool:
+        """Whether the arrays belong together, and to r coordinates."""
+        n, A = len(self.points), self.inertial
+        whole = self.points.shape == (n, 3) and self.operator.shape == (6 * n, r)
+        return whole and (A is None or A.shape == (6 * n, N_FRAME_LOADS + r))
+
     @staticmethod
     def accelerations(a: Array, alpha: Array, omega: Array, qdd: Array) -> Array:
         """(12 + r,) what the stress of the modes left out depends on.

@@ -14,9 +14,10 @@ import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix
 
 from rom.body.flexible import FlexibleBody
+from rom.body.nonlinear.cauchy import CauchyRecovery
 from rom.body.nonlinear.quartic import Quartic
 from rom.body.records import Marker, Patch, Surface
-from rom.body.recovery import N_FRAME_LOADS, StressRecovery
+from rom.body.recovery import StressRecovery
 from rom.errors import ConfigError, FileFormatError, QualityGateError
 from rom.io.archive import MAX_BYTES, Kind, read_archive, write_archive
 from rom.model import Array, Report, Row
@@ -24,11 +25,12 @@ from rom.names import named
 from rom.units import SYSTEMS
 
 SCHEMA_NAME = "rom-body"
-VERSION = (1, 6)  # a new major number breaks readers, a new minor number only adds
+VERSION = (1, 7)  # a new major number breaks readers, a new minor number only adds
 FIELDS = ("first_moment", "inertia", "S", "Ibar_kl", "S_kl", "K", "D", "omega")
 MARKER_ARRAYS = ("point", "translation", "rotation", "hold")  # arrays of each
 SURFACE_ARRAYS = ("points", "triangles", "shape")
 QUARTIC_ARRAYS = ("cubic", "quartic")
+CAUCHY_ARRAYS = ("points", "gradient", "stiffness", "node", "material", "share")
 
 
 def save(body: FlexibleBody, path: str | Path) -> Path:
@@ -111,7 +113,8 @@ def body_arrays(body: FlexibleBody) -> dict[str, Array]:
         for part in SURFACE_ARRAYS:
             arrays[f"surface/{part}"] = getattr(body.surface, part)
     if body.stress is not None:
-        for part in ("points", "operator"):
+        far = isinstance(body.stress, CauchyRecovery)
+        for part in CAUCHY_ARRAYS if far else ("points", "operator"):
             arrays[f"stress/{part}"] = getattr(body.stress, part)
         if body.stress.inertial is not None:
             arrays["stress/inertial"] = body.stress.inertial
@@ -171,11 +174,6 @@ def body_of(manifest: dict[str, Any], arrays: dict[str, Array]) -> FlexibleBody:
     }
     parts: Any = (arrays[f"surface/{part}"] for part in SURFACE_ARRAYS)
     surface = Surface(*parts) if manifest["surface"] else None
-    stress = None  # bodies whose stress is not recovered have none, and so have older files
-    if "stress/points" in arrays:
-        stress = StressRecovery(
-            arrays["stress/points"], arrays["stress/operator"], arrays.get("stress/inertial")
-        )
     quartic = None  # bodies of small deflection have none, and so have older files
     if "quartic/cubic" in arrays:
         quartic = Quartic(arrays["K"], *(arrays[f"quartic/{part}"] for part in QUARTIC_ARRAYS))
@@ -190,12 +188,24 @@ def body_of(manifest: dict[str, Any], arrays: dict[str, Array]) -> FlexibleBody:
         quartic=quartic,
         markers=markers,
         surface=surface,
-        stress=stress,
+        stress=_stress(arrays),
         labels=tuple(manifest["labels"]),
         reference=manifest["reference"],
         units=manifest["units"],
         provenance=manifest["provenance"],
         certificate=report,
+    )
+
+
+def _stress(arrays: dict[str, Array]) -> StressRecovery | CauchyRecovery | None:
+    """Bodies whose stress is not recovered have none; at large deflection, from 1.7 on."""
+    if "stress/points" not in arrays:
+        return None
+    if "stress/gradient" in arrays:
+        parts: Any = {part: arrays[f"stress/{part}"] for part in CAUCHY_ARRAYS}
+        return CauchyRecovery(**parts)
+    return StressRecovery(
+        arrays["stress/points"], arrays["stress/operator"], arrays.get("stress/inertial")
     )
 
 
@@ -241,11 +251,8 @@ def verify(body: FlexibleBody, path: Path) -> None:
             )
         _verify_covariance(m, r, path)
         _verify_patch(m, path)
-    if body.stress is not None:
-        n, A = body.stress.points.shape[0], body.stress.inertial
-        fits = body.stress.points.shape == (n, 3) and body.stress.operator.shape == (6 * n, r)
-        if not fits or (A is not None and A.shape != (6 * n, N_FRAME_LOADS + r)):
-            raise FileFormatError("the stress recovery does not fit the body.", where=str(path))
+    if body.stress is not None and not body.stress.fits(r):
+        raise FileFormatError("the stress recovery does not fit the body.", where=str(path))
     if body.surface is not None:
         n = body.surface.points.shape[0]
         triangles = body.surface.triangles

@@ -8,6 +8,7 @@ import numpy as np
 
 from rom.body.flexible import FlexibleBody
 from rom.body.inertia import InertiaIntegrals, inertia_integrals, point_integrals, weighted
+from rom.body.recovery import StressRecovery
 from rom.eigen.attachments import added_mass, carried_displacements
 from rom.eigen.verbs import Operators
 from rom.errors import ParameterError
@@ -100,7 +101,7 @@ class AffineModel:
             body: the body at the centre of the ranges.
             E: (n_local, r) its shapes.
         """
-        stress = None if body.stress is None else body.stress.operator
+        stress = body.stress.operator if isinstance(body.stress, StressRecovery) else None
         return {"body": body, "shares": tuple(self.shares(E, stress))}
 
     def bare(self, point: Point) -> Operators:

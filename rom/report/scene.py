@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from rom.arguments import finite, positive
 from rom.body.records import Surface
-from rom.body.recovery import von_mises
+from rom.body.recovery import StressRecovery, von_mises
 from rom.errors import ConfigError
 from rom.model import Array, Index
 from rom.names import named, offered
@@ -194,11 +194,11 @@ def _surface(body: Any) -> Surface | None:
 
 
 def _stress(body: "FlexibleBody") -> Array | None:
-    """(6 s, r) stress on the points of the surface, where the body has it."""
-    surface = _surface(body)
-    if body.stress is None or surface is None or body.stress.points.shape != surface.points.shape:
+    """(6 s, r) stress on the points of the surface, where the body has it and it is linear."""
+    surface, recovery = _surface(body), body.stress
+    if surface is None or not isinstance(recovery, StressRecovery):
         return None
-    return body.stress.operator
+    return recovery.operator if recovery.points.shape == surface.points.shape else None
 
 
 def _modes(body: "FlexibleBody") -> Iterator[dict[str, Any]]:

@@ -265,11 +265,9 @@ def _stress(
     Raises:
         ModelError: if the body knows no stress.
     """
-    recovery = body.stress
     if all(s.quantity != "stress" for s in several):
         return [body] * max(len(parts), 1)
-    if recovery is None:
-        raise ModelError(f"body {body.name!r} carries no stress.", hint="Reduce with stress=True.")
+    recovery = _linear_stress(body)
     if not parts:
         return [body]
     none = np.zeros_like(recovery.operator)
@@ -317,9 +315,7 @@ def stress_rows(body: FlexibleBody, channels: Channels, what: str) -> tuple[Arra
         ConfigError: if a channel is off the body.
         ModelError: if the body knows no stress.
     """
-    recovery = body.stress
-    if recovery is None:
-        raise ModelError(f"body {body.name!r} carries no stress.", hint="Reduce with stress=True.")
+    recovery = _linear_stress(body)
     reach = POINT_RTOL * np.ptp(recovery.points, axis=0).max()
     n_r = body.n_modes
     extra = recovery.inertial
@@ -338,6 +334,19 @@ def stress_rows(body: FlexibleBody, channels: Channels, what: str) -> tuple[Arra
         static.append(along @ recovery.operator[6 * n : 6 * n + 6])
         inertial.append(along @ left_out[6 * n : 6 * n + 6])
     return np.array(static), np.array(inertial)
+
+
+def _linear_stress(body: FlexibleBody) -> StressRecovery:
+    recovery = body.stress
+    if recovery is None:
+        raise ModelError(f"body {body.name!r} carries no stress.", hint="Reduce with stress=True.")
+    if not isinstance(recovery, StressRecovery):
+        raise ModelError(
+            f"the stress of body {body.name!r} is that of large deflection, and what is estimated "
+            "here is linear.",
+            hint="Reduce without nonlinear.",
+        )
+    return recovery
 
 
 def check_seen(at: Linear, body: Operation) -> None:

@@ -51,7 +51,7 @@ def test_files_of_older_versions_are_read(body, file, tmp_path):
     """Minor versions only add: what is missing is empty."""
 
     def older(name, data):
-        return data.replace(b'"version": [1, 6]', b'"version": [1, 0]')
+        return data.replace(b'"version": [1, 7]', b'"version": [1, 0]')
 
     assert rom.load(rewritten(file, tmp_path / "old.npz", older)).K_geo == {}
 
@@ -147,7 +147,7 @@ def test_other_files_and_newer_versions_are_named(file, tmp_path, body):
         rom.load(tmp_path / "missing.npz")
 
     def newer(name, data):
-        return data.replace(b'"version": [1, 6]', b'"version": [9, 0]')
+        return data.replace(b'"version": [1, 7]', b'"version": [9, 0]')
 
     with pytest.raises(FileFormatError, match=r"schema 'rom-body' \[9, 0\]"):
         rom.load(rewritten(file, tmp_path / "new.npz", newer))

@@ -29,7 +29,7 @@ from rom.fe.compat import (
     geometry_degree,
     quadrature_rule,
 )
-from rom.fe.forms.material import stress
+from rom.fe.forms.material import stiffness, stress
 from rom.fe.jit import compiling
 from rom.model import PAIRS, Array, Index, Integers
 
@@ -131,7 +131,7 @@ class LargeStrain:
         with compiling(self.mesh.comm):
             grad = fem.Expression(ufl.grad(u), self.points)
             volume = fem.Expression(ufl.JacobianDeterminant(self.mesh), self.points)
-            law = fem.Expression(_stiffness(self.numbers, x), self.points[:1])
+            law = fem.Expression(stiffness(self.numbers, x), self.points[:1])
         p = len(self.points)
         for cells in blocks:
             if not cells.size:
@@ -173,17 +173,6 @@ def exact_degree(mesh: Any, degree: int) -> int:
     if cell_name(mesh) == "tetrahedron":
         return max(4 * (degree - 1) + 3 * curved, 1)
     return 4 * degree + 2 * curved
-
-
-def _stiffness(numbers: dict[str, Any], x: Any) -> Any:
-    """The (6, 6) stiffness row by row, a ufl vector of the mesh."""
-    rows = []
-    for a, b in PAIRS:
-        unit = np.zeros((3, 3))
-        unit[a, b] = unit[b, a] = 1.0 if a == b else 0.5
-        s = stress(ufl.as_matrix(unit.tolist()), numbers)
-        rows += [s[i, j] + 0 * x[0] for i, j in PAIRS]
-    return ufl.as_vector(rows)
 
 
 def _set(u: Any, column: Array) -> None:

@@ -10,7 +10,7 @@ from dolfinx import fem
 
 from rom.errors import MaterialError, TagError
 from rom.fe.compat import per_cell
-from rom.model import Index, Material, Orthotropic
+from rom.model import PAIRS, Index, Material, Orthotropic
 from rom.names import named, offered
 from rom.plausible import FOAM_SPEED
 
@@ -104,6 +104,17 @@ def stress(strain: Any, numbers: dict[str, Any]) -> Any:
     voigt = ufl.as_vector([e[0, 0], e[1, 1], e[2, 2], 2 * e[1, 2], 2 * e[0, 2], 2 * e[0, 1]])
     s = ufl.dot(numbers["C"], voigt)
     return ufl.as_matrix([[s[0], s[5], s[4]], [s[5], s[1], s[3]], [s[4], s[3], s[2]]])
+
+
+def stiffness(numbers: dict[str, Any], x: Any) -> Any:
+    """The (6, 6) stiffness row by row, a ufl vector of the mesh."""
+    rows = []
+    for a, b in PAIRS:
+        unit = np.zeros((3, 3))
+        unit[a, b] = unit[b, a] = 1.0 if a == b else 0.5
+        s = stress(ufl.as_matrix(unit.tolist()), numbers)
+        rows += [s[i, j] + 0 * x[0] for i, j in PAIRS]
+    return ufl.as_vector(rows)
 
 
 def geometric_stiffness(u: Any, v: Any, sigma: Any) -> Any:

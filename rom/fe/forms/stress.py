@@ -1,4 +1,4 @@
-"""Stress of displacement fields: averaged at nodes, or at the quadrature points of the cells."""
+"""Stress and gradient of displacements: averaged at nodes, or at the points of a quadrature."""
 
 from typing import Any
 
@@ -21,7 +21,7 @@ from rom.fe.compat import (
 )
 from rom.fe.forms.finite_strain import FiniteStrain
 from rom.fe.forms.large_strain import LargeStrain
-from rom.fe.forms.material import geometric_stiffness, stress
+from rom.fe.forms.material import geometric_stiffness, stiffness, stress
 from rom.fe.jit import compiling
 from rom.fe.operators.aij import gathered
 from rom.fe.operators.factor import dense_rows
@@ -54,20 +54,81 @@ class Stresses:
         Returns:
             (p, 6, k) stress xx, yy, zz, yz, xz, xy [Pa], equal on all ranks.
         """
+        one = np.zeros(self.n_cells, dtype=np.int64)
+        return self._means(self._hooke, 6, U, nodes, one)[0]
+
+    def gradients_at_nodes(self, U: Array, nodes: Index) -> dict[str, Array]:
+        """Displacement gradient at nodes: the mean of their cells, material by material.
+
+        Args:
+            U: (n_local, k) displacements [m].
+            nodes: (p,) node numbers, equal on all ranks.
+
+        Returns:
+            The arrays of `rom.body.nonlinear.cauchy.CauchyRecovery`, equal on all ranks.
+        """
+        laws, of_cell = self._laws()
+        gradient, node, material, count = self._means(
+            lambda u: ufl.as_vector([ufl.grad(u)[a, b] for a in range(3) for b in range(3)]),
+            9, U, nodes, of_cell,
+        )  # fmt: skip
+        return {
+            "gradient": gradient.reshape(9 * len(node), -1),
+            "stiffness": laws,
+            "node": node,
+            "material": material,
+            "share": count / np.bincount(node, count, nodes.size)[node],
+        }
+
+    def _means(
+        self, of: Any, width: int, U: Array, nodes: Index, group: Index
+    ) -> tuple[Array, Index, Index, Array]:
+        """Means over the cells of one group at nodes, for all pairs of the two that exist.
+
+        Args:
+            of: the numbers, a ufl vector, of a displacement.
+            width: how many.
+            U: (n_local, k) displacements [m].
+            nodes: (p,) node numbers, equal on all ranks.
+            group: (cells,) group of each cell of this rank.
+
+        Returns:
+            (s, width, k) means; number of the node, group, and number of cells of each of the s
+            pairs, node by node; equal on all ranks.
+        """
         cells, table = self._cells_at(nodes)
         X = reference_points(self.V)
         order = self._order(cells, X)
         place = np.full(self.V.dofmap.index_map.size_global, -1)
         place[nodes] = np.arange(nodes.size)
-        to = place[table]  # (cells, points of a cell): where each value belongs, or -1
-        sums = np.zeros((nodes.size, 6, U.shape[1]))
-        for k, values in enumerate(self._evaluated(U, cells, X)):
-            ordered = np.take_along_axis(values, order[:, :, None], axis=1)
-            np.add.at(sums[:, :, k], to[to >= 0], ordered[to >= 0])
-        count = np.bincount(to[to >= 0], minlength=nodes.size).astype(float)
-        self.mesh.comm.Allreduce(MPI.IN_PLACE, sums)
+        at = place[table]  # (cells, points of a cell): where each value belongs, or -1
+        n_groups = self.mesh.comm.allreduce(int(group.max(initial=0)), MPI.MAX) + 1
+        pair = at * n_groups + group[cells][:, None]
+        count = np.bincount(pair[at >= 0], minlength=nodes.size * n_groups).astype(float)
         self.mesh.comm.Allreduce(MPI.IN_PLACE, count)
-        return sums / count[:, None, None]
+        kept = np.flatnonzero(count)
+        row = np.searchsorted(kept, pair[at >= 0])
+        sums = np.zeros((kept.size, width, U.shape[1]))
+        for k, values in enumerate(self._evaluated(of, width, U, cells, X)):
+            ordered = np.take_along_axis(values, order[:, :, None], axis=1)
+            np.add.at(sums[:, :, k], row, ordered[at >= 0])
+        self.mesh.comm.Allreduce(MPI.IN_PLACE, sums)
+        means = sums / count[kept][:, None, None]
+        return means, kept // n_groups, kept % n_groups, count[kept]
+
+    def _laws(self) -> tuple[Array, Index]:
+        """(m, 6, 6) stiffness of each material [Pa], and the number of that of each own cell."""
+        cells = np.arange(self.n_cells, dtype=np.int32)
+        x = ufl.SpatialCoordinate(self.mesh)
+        with compiling(self.mesh.comm):
+            law = fem.Expression(stiffness(self.numbers, x), reference_points(self.V)[:1])
+        C = evaluated(law, self.mesh, cells).reshape(cells.size, 36)
+        mine = np.unique(C, axis=0)
+        every = np.unique(np.vstack(self.mesh.comm.allgather(mine)), axis=0)
+        of_cell = np.zeros(cells.size, dtype=np.int64)
+        for number, row in enumerate(every):
+            of_cell[(row == C).all(axis=1)] = number
+        return every.reshape(-1, 6, 6), of_cell
 
     def at_gauss_points(self, U: Array) -> tuple[Array, Array]:
         """Stress at the quadrature points of this rank's cells.
@@ -83,7 +144,8 @@ class Stresses:
         with compiling(self.mesh.comm):
             x = fem.Expression(ufl.SpatialCoordinate(self.mesh), X)
         points = evaluated(x, self.mesh, cells).reshape(-1, 3)
-        found = [values.reshape(-1, 6) for values in self._evaluated(U, cells, X)]
+        fields = self._evaluated(self._hooke, 6, U, cells, X)
+        found = [values.reshape(-1, 6) for values in fields]
         return points, np.stack(found, axis=2)
 
     def geometric_stiffness(self, U: Array, Psi: Array) -> Array:
@@ -149,17 +211,20 @@ class Stresses:
         dx = ufl.Measure("dx", domain=self.mesh, metadata={"quadrature_degree": max(degree, 1)})
         return geometric_stiffness(u, v, sigma) * dx
 
-    def _evaluated(self, U: Array, cells: Integers, X: Array) -> Any:
-        """(cells, points, 6) stress of each column."""
-        u = fem.Function(self.V)
+    def _hooke(self, u: Any) -> Any:
+        """Stress xx, yy, zz, yz, xz, xy of a displacement, a ufl vector."""
         s = stress(ufl.sym(ufl.grad(u)), self.numbers)
-        voigt = ufl.as_vector([s[i, j] for i, j in PAIRS])
+        return ufl.as_vector([s[i, j] for i, j in PAIRS])
+
+    def _evaluated(self, of: Any, width: int, U: Array, cells: Integers, X: Array) -> Any:
+        """(cells, points, width) numbers of each column, of a ufl vector of the displacement."""
+        u = fem.Function(self.V)
         with compiling(self.mesh.comm):
-            expression = fem.Expression(voigt, X)
+            expression = fem.Expression(of(u), X)
         for column in U.T:
             u.x.array[: column.size] = column
             u.x.scatter_forward()
-            yield evaluated(expression, self.mesh, cells).reshape(cells.size, len(X), 6)
+            yield evaluated(expression, self.mesh, cells).reshape(cells.size, len(X), width)
 
     def _cells_at(self, nodes: Index) -> tuple[Integers, Index]:
         """Cells of this rank that touch the nodes, and the global numbers of their nodes."""

@@ -28,6 +28,7 @@ body = rom.reduce(
     interfaces={"root": "rbe3", "tip": "rbe3"},
     reference="root",
     nonlinear=rom.Geometric(loads={"tip": (0, 1e6, 0, 0, 0, 0)}, n_modes=2, n_shapes=8),
+    stress=True,
 )
 load = body.marker("tip").translation[1]
 q = follow(body.quartic, 1e6 * np.outer([0.5, 1.0], load))[-1]
@@ -35,4 +36,6 @@ table = body.provenance["large deflection"].values()
 errors = [[case[of] for of in ("displacement", "frequencies")] for case in table]
 if ops.first == 0:
     tip = body.marker("tip").translation @ q
-    np.savez(sys.argv[1], G=G, F=F, tip=tip, errors=errors, resisted=resisted, least=least)
+    order = np.lexsort(body.stress.points.T.round(9))
+    arrays = {"G": G, "F": F, "resisted": resisted, "least": least, "errors": errors}
+    np.savez(sys.argv[1], tip=tip, stress=body.stress.field(q)[order], **arrays)

@@ -1,0 +1,156 @@
+"""Stress of a body at large deflection, by the gradient of its displacement."""
+
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+import numpy as np
+
+from rom.arguments import finite
+from rom.body.recovery import von_mises
+from rom.errors import ConfigError, ModelError, ResourceError
+from rom.model import PAIRS, Array, Index
+
+MAX_BYTES = 2e9  # of the gradients of a body; as much again is taken while they are found
+
+
+@dataclass(frozen=True, slots=True)
+class CauchyRecovery:
+    """Stress on the outer surface at finite strain.
+
+    The gradient H of the displacement is linear in the elastic coordinates. From it follow, with
+    nothing left out, F = 1 + H, Green's strain (F^T F - 1) / 2, the second Piola-Kirchhoff stress
+    S = C : E of St. Venant-Kirchhoff material, and the stress in the deformed body F S F^T / det F.
+    The gradient at a point is the mean of what its cells say, material by material, not weighted,
+    and so is the stress where materials meet. At small deflection it is that of `StressRecovery`.
+
+    Attributes:
+        points: (p, 3) undeformed positions [m].
+        gradient: (9 s, r) displacement gradient at the samples per unit of each elastic coordinate
+            [1/m]; row 9 * sample + 3 a + b is the derivative of component a along b.
+        stiffness: (m, 6, 6) Hooke's law of each material, shear strains doubled [Pa].
+        node: (s,) number of the point of each sample.
+        material: (s,) number of its material.
+        share: (s,) share of the point that it stands for [1].
+
+    Source:
+        Bonet and Wood, Nonlinear Continuum Mechanics for Finite Element Analysis, Cambridge
+        (2008), chapters 4 and 5.
+    """
+
+    points: Array
+    gradient: Array
+    stiffness: Array
+    node: Index
+    material: Index
+    share: Array
+    inertial: ClassVar[None] = None  # no correction for modes left out is known at large deflection
+
+    @property
+    def n_modes(self) -> int:
+        """Number r of elastic coordinates."""
+        return self.gradient.shape[1]
+
+    def field(self, q: Array, accelerations: Array | None = None) -> Array:
+        """(p, 6) stress xx, yy, zz, yz, xz, xy in the deformed body, axes of its frame [Pa].
+
+        Args:
+            q: (r,) elastic coordinates.
+            accelerations: None; a body of large deflection has no correction for modes left out.
+
+        Raises:
+            ConfigError: if q has another length or holds a number that is not finite, or
+                accelerations are given.
+            ModelError: if q turns the material inside out.
+        """
+        if accelerations is not None:
+            raise ConfigError(
+                "no stress of modes left out is known at large deflection.",
+                hint="Leave accelerations out, and keep as many modes as the loads excite.",
+            )
+        H = self._gradient(q)
+        F = np.eye(3) + H
+        J = np.linalg.det(F)
+        if J.min(initial=1.0) <= 0:
+            place = self.points[self.node[np.argmin(J)]].tolist()
+            raise ModelError(
+                f"the elastic coordinates turn the material at {place} inside out: its volume is "
+                f"{J.min():.3g} of that at rest.",
+                hint="Stay within the range of loads that the body was reduced for.",
+            )
+        sigma = F @ self._second_piola(H) @ F.swapaxes(1, 2) / J[:, None, None]
+        return self._at_points(sigma)
+
+    def second_piola(self, q: Array) -> Array:
+        """(p, 6) second Piola-Kirchhoff stress xx, yy, zz, yz, xz, xy [Pa], which rotation leaves.
+
+        Args:
+            q: (r,) elastic coordinates.
+
+        Raises:
+            ConfigError: if q has another length or holds a number that is not finite.
+        """
+        return self._at_points(self._second_piola(self._gradient(q)))
+
+    def von_mises(self, q: Array, accelerations: Array | None = None) -> Array:
+        """(p,) equivalent stress [Pa]; see `field`."""
+        return von_mises(self.field(q, accelerations))
+
+    def in_units(self, length: float, pressure: float, coordinate: float) -> "CauchyRecovery":
+        """In other units, whose factors are given; a coordinate is multiplied by its own."""
+        return replace(
+            self,
+            points=self.points * length,
+            gradient=self.gradient / coordinate,
+            stiffness=self.stiffness * pressure,
+        )
+
+    def fits(self, r: int) -> bool:
+        """Whether the arrays belong together, to r coordinates and to points that exist."""
+        p, s, m = len(self.points), len(self.node), len(self.stiffness)
+        shapes = (self.points.shape, self.gradient.shape, self.stiffness.shape)
+        if shapes != ((p, 3), (9 * s, r), (m, 6, 6)):
+            return False
+        if not self.node.shape == self.material.shape == self.share.shape == (s,):
+            return False
+        return all(
+            numbers.dtype.kind == "i" and numbers.size and 0 <= numbers.min() <= numbers.max() < n
+            for numbers, n in ((self.node, p), (self.material, m))
+        ) and np.allclose(np.bincount(self.node, self.share, p), 1.0)
+
+    def _gradient(self, q: Array) -> Array:
+        """(s, 3, 3) displacement gradient H at the samples [1]."""
+        q = finite("q", q, (self.n_modes,))
+        return (self.gradient @ q).reshape(-1, 3, 3)
+
+    def _second_piola(self, H: Array) -> Array:
+        """(s, 3, 3) second Piola-Kirchhoff stress of displacement gradients [Pa]."""
+        E = 0.5 * (H + H.swapaxes(1, 2) + H.swapaxes(1, 2) @ H)
+        strain = np.stack([E[:, a, b] * (1 if a == b else 2) for a, b in PAIRS], axis=1)
+        found = np.einsum("sij,sj->si", self.stiffness[self.material], strain)
+        S = np.empty_like(E)
+        for k, (a, b) in enumerate(PAIRS):
+            S[:, a, b] = S[:, b, a] = found[:, k]
+        return S
+
+    def _at_points(self, stress: Array) -> Array:
+        """(p, 6) means of the samples (s, 3, 3)."""
+        out = np.zeros((len(self.points), 6))
+        np.add.at(
+            out, self.node, self.share[:, None] * np.stack([stress[:, a, b] for a, b in PAIRS], 1)
+        )
+        return out
+
+
+def refuse_many(n_points: int, r: int) -> None:
+    """Say what the gradients of r coordinates at so many points would take, if that is too much.
+
+    Raises:
+        ResourceError: naming both numbers.
+    """
+    needed = 9 * 8 * n_points * r
+    if needed > MAX_BYTES:
+        raise ResourceError(
+            f"the stress of {r} coordinates at large deflection takes {needed / 1e9:.3g} GB for "
+            f"{n_points} points of the surface; more than {MAX_BYTES / 1e9:g} GB are refused.",
+            hint="Ask for fewer shapes, mesh the surface coarser, or reduce with stress=False.",
+        )

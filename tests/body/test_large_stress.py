@@ -1,0 +1,298 @@
+"""Stress of bodies of large deflection: closed forms, and the finite elements at finite strain."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.spatial import cKDTree
+from scipy.spatial.transform import Rotation
+
+import rom
+from cases.boxes import box
+from cases.mbs.slender import E_STEEL, STEEL, Full, assembled, cantilever, slender
+from rom.body.nonlinear.cauchy import CauchyRecovery
+from rom.body.projection import cauchy_recovery
+from rom.body.recovery import von_mises
+from rom.errors import ConfigError, FileFormatError, ModelError, ResourceError
+from rom.updating import Channels
+from rom.updating.operation import stress_rows
+
+pytest.importorskip("dolfinx", reason="dolfinx is not installed")
+pytestmark = [
+    pytest.mark.fenicsx,
+    pytest.mark.filterwarnings("ignore:Number of integration points"),
+    pytest.mark.filterwarnings("ignore::rom.errors.RomWarning"),
+]
+TIMBER = rom.Orthotropic(
+    E=(11e9, 0.9e9, 0.5e9), nu=(0.3, 0.4, 0.5), G=(0.1e9, 0.7e9, 0.6e9), rho=450.0
+)
+VOIGT = [(0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1)]
+
+
+def tensor(voigt):
+    """(p, 3, 3) of (p, 6)."""
+    xx, yy, zz, yz, xz, xy = voigt.T
+    return np.moveaxis(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]), 2, 0)
+
+
+def hooke(material):
+    """(3, 3, 3, 3) stiffness, filled in by the symmetries of its indices."""
+    C = np.empty((3,) * 4)
+    for row, (i, j) in enumerate(VOIGT):
+        for column, (k, l) in enumerate(VOIGT):
+            value = material.stiffness[row, column]
+            for a, b in ((i, j), (j, i)):
+                C[a, b, k, l] = C[a, b, l, k] = value
+    return C
+
+
+def cauchy(C, F):
+    """(3, 3) stress of St. Venant-Kirchhoff material, all indices summed."""
+    E = 0.5 * (np.einsum("ki,kj->ij", F, F) - np.eye(3))
+    S = np.einsum("ijkl,kl->ij", C, E)
+    return np.einsum("ia,ab,jb->ij", F, S, F) / np.linalg.det(F)
+
+
+def quadratic_field(x, a):
+    """u_i = a_ijk x_j x_k at points (p, 3)."""
+    return np.einsum("ijk,pj,pk->pi", a, x, x)
+
+
+@pytest.mark.parametrize("kind, material", [("hexahedron", STEEL), ("tetrahedron", TIMBER)])
+def test_stress_of_quadratic_fields_is_that_of_their_gradients(kind, material):
+    """Fields that the elements hold exactly, at strains of some tenths."""
+    model = assembled((1.0, 0.6, 0.5), (3, 2, 2), kind, material=material, distorted=True)
+    a = 0.25 * np.random.default_rng(1).standard_normal((3, 3, 3, 3))
+    E = np.column_stack([quadratic_field(model.points, field).ravel() for field in a])
+    q = np.array([0.4, -0.3, 0.5])
+    found = cauchy_recovery(model, E).field(q)
+    whole = np.einsum("n,nijk->ijk", q, a)
+    H = np.einsum("ijk,pk->pij", whole + whole.swapaxes(1, 2), model.points[model.surface.nodes])
+    expected = np.array([cauchy(hooke(material), F) for F in np.eye(3) + H])
+    assert np.abs(H).max() > 0.3
+    assert_allclose(tensor(found), expected, rtol=0, atol=1e-11 * np.abs(expected).max())
+
+
+@pytest.fixture(scope="module")
+def bent():
+    """Finite elements, body, coordinates under a force across its tip, and its nodal shapes."""
+    model, EI = slender(50, 12, nu=0.3)
+    shapes, load = [], {"tip": (0, 3 * EI, EI, 0, 0, 0)}
+
+    def recovery(model, E):
+        shapes.append(E)
+        return cauchy_recovery(model, E)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("rom.workflow.cauchy_recovery", recovery)
+        body = stressed(model, load["tip"])
+    return model, body, body.equilibria(load, shares=(0.5, 1.0))[-1], shapes[0], load["tip"]
+
+
+def stressed(model, load, n_modes=4, **options):
+    return rom.reduce(
+        model, method=rom.CraigBampton(n_modes=n_modes),
+        interfaces={"root": "rbe3", "tip": "rbe3"}, reference="root",
+        nonlinear=rom.Geometric(loads={"tip": load}, **options), stress=True, certify=False,
+    )  # fmt: skip
+
+
+def gradients(model, u):
+    """(p, 3, 3) mean gradients at the surface: interpolated cell by cell, gathered by place."""
+    import ufl
+    from dolfinx import fem
+
+    from rom.fe.compat import evaluated, reference_points
+
+    V = model.stresses.V
+    field = fem.Function(V)
+    field.x.array[:] = u
+    cells, X = np.arange(model.stresses.n_cells, dtype=np.int32), reference_points(V)
+    of = (ufl.grad(field), ufl.SpatialCoordinate(V.mesh))
+    H, x = (evaluated(fem.Expression(value, X), V.mesh, cells) for value in of)
+    here = cKDTree(x.reshape(-1, 3)).query_ball_point(model.points[model.surface.nodes], 1e-9)
+    assert max(map(len, here)) > 1
+    return np.array([H.reshape(-1, 3, 3)[k].mean(axis=0) for k in here])
+
+
+def test_stress_in_the_span_is_that_of_the_finite_elements(bent):
+    """At a slope of 50 degrees."""
+    model, body, q, E, _ = bent
+    rows = (3 * model.surface.nodes[:, None] + np.arange(3)).ravel()
+    assert_allclose(body.surface.shape, E[rows], rtol=0, atol=1e-12)
+    F = np.eye(3) + gradients(model, E @ q)
+    assert np.abs(F - np.eye(3)).max() > 0.75
+    expected = np.array([cauchy(hooke(STEEL), one) for one in F])
+    found = tensor(body.stress.field(q))
+    assert_allclose(found, expected, rtol=0, atol=1e-10 * np.abs(expected).max())
+
+
+def test_stress_under_a_load_is_that_of_the_full_solution(bent):
+    """Its own equilibrium, in steps of the load; away from the ends, whose section it holds."""
+    model, body, q, _, load = bent
+    full, u = Full(model), np.zeros(model.n_dofs)
+    for share in (0.25, 0.5, 0.75, 1.0):
+        u, _ = full.state(u, share * np.array(load), np.zeros(6))
+    expected = von_mises(cauchy_recovery(model, u[:, None]).field(np.ones(1)))
+    found = body.stress.von_mises(q)
+    inner = np.abs(body.stress.points[:, 0] - 0.5) < 0.45
+    assert_allclose(found[inner], expected[inner], rtol=0, atol=0.02 * expected.max())
+    linear = np.linalg.solve(body.K, body.forces_on({"tip": load}))
+    assert von_mises_of_small(model, bent, linear)[inner].max() > 1.2 * expected[inner].max()
+
+
+def von_mises_of_small(model, bent, q):
+    """That of Hooke's law, of the linear solution."""
+    return von_mises(model.stresses.at_nodes((bent[3] @ q)[:, None], model.surface.nodes)[..., 0])
+
+
+def test_pure_bending_has_the_stress_of_an_arc():
+    """Fibres at y stretch by 1 - k y, and S = E (stretch^2 - 1) / 2, sigma = stretch S.
+
+    The moment EI / L is a pair of dead forces, whose arms turn with the tip: k L = cos(k L).
+    """
+    h, k = 1 / 50, 0.7390851332
+    model, EI = slender(50, 24)
+    body = stressed(model, (0, 0, 0, 0, 0, EI), n_modes=6, n_shapes=18)
+    q = body.equilibria({"tip": (0, 0, 0, 0, 0, EI)}, shares=(0.5, 1.0))[-1]
+    s, p = body.stress.field(q), body.stress.points
+    for side in (0.0, h):
+        edge = (np.abs(p[:, 0] - 0.5) < 0.2) & (np.abs(p[:, 1] - side) < 1e-9)
+        y, angle = side - h / 2, k * p[edge, 0]
+        along = np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
+        found = np.einsum("pi,pij,pj->p", along, tensor(s[edge]), along)
+        stretch = 1 - k * y
+        assert_allclose(found, E_STEEL * stretch * (stretch**2 - 1) / 2, rtol=0.02)
+        assert_allclose(found, -E_STEEL * k * y, rtol=0.03)  # as Bernoulli says
+
+
+@pytest.fixture(scope="module")
+def homogeneous():
+    """A box whose nine coordinates are the entries of F - 1, row by row."""
+    model = assembled((1.0, 0.4, 0.3), (2, 1, 1))
+    E = np.zeros((model.n_dofs, 9))
+    for k in range(9):
+        E[k // 3 :: 3, k] = model.points[:, k % 3]
+    return cauchy_recovery(model, E)
+
+
+def deformed(recovery, F):
+    return tensor(recovery.field((np.asarray(F) - np.eye(3)).ravel()))
+
+
+@pytest.mark.parametrize("stretch", [0.8, 1.3])
+def test_uniaxial_stretch_has_the_closed_form(homogeneous, stretch):
+    nu, strain = 0.3, (stretch**2 - 1) / 2
+    lateral = np.sqrt(1 - 2 * nu * strain)
+    q = (np.diag([stretch, lateral, lateral]) - np.eye(3)).ravel()
+    S = np.zeros((3, 3))
+    S[0, 0] = E_STEEL * strain
+    assert_allclose(tensor(homogeneous.second_piola(q))[0], S, atol=1e-4)
+    S[0, 0] *= stretch / lateral**2
+    assert_allclose(tensor(homogeneous.field(q))[0], S, atol=1e-4)
+    assert_allclose(homogeneous.von_mises(q), abs(S[0, 0]), rtol=1e-12)
+
+
+def test_simple_shear_has_the_closed_form(homogeneous):
+    """F = 1 + g e1 e2^T: E_12 = g / 2, E_22 = g^2 / 2, and no change of volume."""
+    g, nu = 0.4, 0.3
+    mu, lam = E_STEEL / (2 * (1 + nu)), E_STEEL * nu / ((1 + nu) * (1 - 2 * nu))
+    s11, s22, s12 = lam * g**2 / 2, (lam / 2 + mu) * g**2, mu * g
+    expected = np.array([
+        [s11 + 2 * g * s12 + g**2 * s22, s12 + g * s22, 0], [s12 + g * s22, s22, 0], [0, 0, s11],
+    ])  # fmt: skip
+    F = np.eye(3) + g * np.outer([1, 0, 0], [0, 1, 0])
+    assert_allclose(deformed(homogeneous, F)[3], expected, atol=1e-4)
+
+
+def test_rotation_has_no_stress_and_turns_the_one_there_is(homogeneous):
+    rng = np.random.default_rng(3)
+    R = Rotation.from_rotvec([0.9, -1.4, 1.1]).as_matrix()
+    U = np.eye(3) + 0.1 * rng.standard_normal((3, 3))
+    assert np.abs(deformed(homogeneous, R)).max() < 1e-13 * E_STEEL
+    still = deformed(homogeneous, U)
+    assert_allclose(deformed(homogeneous, R @ U), R @ still @ R.T, atol=1e-12 * E_STEEL)
+    S = [homogeneous.second_piola((F - np.eye(3)).ravel()) for F in (U, R @ U)]
+    assert_allclose(*S, atol=1e-12 * E_STEEL)
+
+
+def layered(materials):
+    """A box of four cells along x, two of each material."""
+    from dolfinx import mesh as dm
+
+    from rom.fe.elasticity import assemble
+
+    mesh, _ = box((1.0, 0.3, 0.2), (4, 1, 1))
+    middles = dm.compute_midpoints(mesh, 3, np.arange(4, dtype=np.int32))
+    tags = dm.meshtags(
+        mesh, 3, np.arange(4, dtype=np.int32), (middles[:, 0] > 0.5).astype(np.int32)
+    )
+    return assemble(mesh, cell_tags=tags, regions={"inner": 0, "outer": 1}, material=materials)
+
+
+def test_where_materials_meet_small_deflection_has_the_stress_of_hookes_law():
+    soft = rom.Material(E=70e9, nu=0.34, rho=2700.0)
+    for other in (soft, TIMBER):
+        model = layered({"inner": STEEL, "outer": other})
+        U = np.random.default_rng(4).standard_normal((model.n_dofs, 2))
+        nodes = np.arange(len(model.points))
+        recovery = CauchyRecovery(model.points, **model.stresses.gradients_at_nodes(U, nodes))
+        assert len(recovery.stiffness) == 2 and 0.0 < recovery.share.min() < 1.0
+        for k in range(2):
+            small = 1e-11 * np.eye(2)[k]
+            expected = model.stresses.at_nodes(U, nodes)[:, :, k]
+            assert_allclose(recovery.field(small) / 1e-11, expected, rtol=0,
+                            atol=1e-7 * np.abs(expected).max())  # fmt: skip
+
+
+def test_files_and_other_units_keep_it(bent, tmp_path):
+    _, body, q, *_ = bent
+    read = rom.load(rom.save(body, tmp_path / "body.rom.npz"))
+    assert_allclose(read.stress.field(q), body.stress.field(q), rtol=0, atol=0)
+    other, tip = body.in_units("mm-t-s"), body.marker("tip").translation
+    same = q * 1e3 * tip[0, 0] / other.marker("tip").translation[0, 0]
+    assert_allclose(other.stress.field(same), 1e-6 * body.stress.field(q), atol=1e-8)
+    assert_allclose(other.stress.points, 1e3 * body.stress.points)
+    whole = body.stress
+    for wrong in (
+        {"gradient": whole.gradient[:, 1:]}, {"gradient": whole.gradient[9:]},
+        {"stiffness": whole.stiffness[0]}, {"node": whole.node + 1}, {"node": 0 * whole.node},
+        {"material": whole.material + 1}, {"share": 0.5 * whole.share},
+        {"node": whole.node.astype(float)},
+    ):  # fmt: skip
+        cut = replace(body, stress=replace(whole, **wrong))
+        with pytest.raises(FileFormatError, match="stress recovery does not fit"):
+            rom.load(rom.save(cut, tmp_path / "cut.rom.npz"))
+
+
+def test_a_mechanism_tells_it_at_each_instant_and_a_file_shows_it(bent, tmp_path):
+    _, body, q, _, load = bent
+    mech, part = cantilever(body)
+    mech.force("load", part.marker("tip"), load[:3])
+    state = rom.equilibrium(mech, steps=4)
+    still = rom.snapshot(mech, state)
+    expected = body.stress.field(state.q[7:])
+    assert_allclose(still.stress("beam", 0), expected)
+    assert_allclose(expected, body.stress.field(q), atol=1e-4 * np.abs(expected).max())
+    rom.io.write_stress_history(still, "beam", tmp_path / "beam.pvd")
+    rom.io.write_stress(body, state.q[7:], tmp_path / "beam.vtu")
+    series = (tmp_path / "beam" / "beam_000000.vtu").read_text()
+    assert series == (tmp_path / "beam.vtu").read_text() and "von Mises" in series
+
+
+def test_what_cannot_be_is_refused_by_name(bent, monkeypatch, homogeneous):
+    model, body, q, *_ = bent
+    with pytest.raises(ConfigError, match="modes left out"):
+        body.stress.field(q, np.zeros(12 + q.size))
+    with pytest.raises(ConfigError, match=rf"q has shape .*{q.size - 1}"):
+        body.stress.field(q[1:])
+    with pytest.raises(ConfigError, match="not finite"):
+        body.stress.von_mises(q * np.nan)
+    with pytest.raises(ModelError, match=r"inside out: its volume is -0.2 "):
+        deformed(homogeneous, np.diag([-0.2, 1.0, 1.0]))
+    with pytest.raises(ModelError, match=r"'body' is that of large deflection"):
+        stress_rows(body, Channels([body.stress.points[0]], [[1, 0, 0]]), "gauge")
+    monkeypatch.setattr("rom.body.nonlinear.cauchy.MAX_BYTES", 1e5)
+    with pytest.raises(ResourceError, match=r"takes [\d.e-]+ GB for \d+ points"):
+        stressed(model, (0, 1.0, 0, 0, 0, 0), n_shapes=2)
