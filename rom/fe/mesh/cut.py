@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from rom.arguments import finite, whole
-from rom.errors import MeshError, TagError
+from rom.errors import ConfigError, MeshError, TagError
 from rom.fe.mesh.solid import SolidMesh
 from rom.fe.mesh.topology import faces_of, row_ids
 from rom.model import Array, Index
@@ -50,7 +50,13 @@ def cut(mesh: SolidMesh, n: int | None = None, axis: Any = None) -> dict[str, So
                        hint="Give it another one.")  # fmt: skip
     if axis is not None:
         _refuse_rough(mesh, cuts, np.asarray(axis, dtype=float))
-    return {name: _piece(mesh, piece, k, cuts, name) for k, name in enumerate(names)}
+    found = {name: _piece(mesh, piece, k, cuts, name) for k, name in enumerate(names)}
+    for cut_name, ((i, j), _) in cuts.items():
+        both = set(found[names[i]].facets) & set(found[names[j]].facets) & set(mesh.facets)
+        if both:
+            raise TagError(f"surface {named(sorted(both))} lies on {cut_name!r}.",
+                           hint="Leave it without a name: the cut has one.")  # fmt: skip
+    return found
 
 
 def _by_planes(mesh: SolidMesh, n: int | None, axis: Any) -> tuple[Index, list[str]]:
@@ -84,8 +90,8 @@ def _by_regions(mesh: SolidMesh, n: int | None) -> tuple[Index, list[str]]:
     return np.searchsorted(tags, mesh.regions), [mesh.region_names[tag] for tag in tags]
 
 
-def _nothing_to_cut(n: Any, axis: Any) -> MeshError:
-    return MeshError(
+def _nothing_to_cut(n: Any, axis: Any) -> ConfigError:
+    return ConfigError(
         f"n = {n!r} and axis = {axis!r} say no cuts.",
         hint="Give both, as n=4, axis=(1, 0, 0), or neither to make a piece of each region.",
     )
