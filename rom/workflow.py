@@ -32,7 +32,7 @@ from rom.eigen.supports import Fixed, Springs, refuse_loose, spring_matrices, su
 from rom.eigen.verbs import Operators, rigid_motions
 from rom.errors import ConfigError, InterfaceError
 from rom.model import Array, Basis, FEModel, Index, Modes
-from rom.names import check_name, named, offered
+from rom.names import check_name
 from rom.process.progress import MANY_DOFS, stages
 from rom.process.stopwatch import Stopwatch, stopwatch
 from rom.reduction.bases.assumed import AssumedModes, obeying
@@ -310,8 +310,7 @@ def reduce_pieces(
         certify: compare each piece with its full model.
 
     Raises:
-        ConfigError, InterfaceError, ModelError: for pieces that do not hang together, form a ring,
-            or a range that says nothing of the loads between them; see `reduce`.
+        RomError: for pieces that do not hang together, or form a ring; see `reduce`.
 
     Example:
         >>> beam = {"n": 2, "axis": (1, 0, 0), "material": rom.Material(E=2e11, nu=0, rho=7850.0)}
@@ -322,22 +321,14 @@ def reduce_pieces(
     """
     tree = Tree.of(models, reference)
     ranges = dict.fromkeys(models) if nonlinear is None else tree.ranges(nonlinear, models)
-    kinds, bodies = interfaces or {}, {}
-    every = {name for model in models.values() for name in model.interfaces}
-    if unknown := [name for name in kinds if name not in every]:
-        raise InterfaceError(f"there is no interface {named(unknown)}; the pieces have "
-                             f"{offered(every)}.")  # fmt: skip
+    kinds, bodies = interfaces or {}, dict[str, FlexibleBody]()
+    tree.refuse_unknown(kinds, models)
     for name, seen_from in tree.reference.items():
         bodies[name] = reduce(
-            models[name],
-            method=method,
+            models[name], method=method, reference=seen_from, nonlinear=ranges[name],
             interfaces={key: kinds.get(key, "rbe3") for key in models[name].interfaces},
-            reference=seen_from,
-            nonlinear=ranges[name],
-            damping=damping,
-            name=name,
-            certify=certify,
-        )
+            damping=damping, name=name, certify=certify,
+        )  # fmt: skip
     return Pieces({name: bodies[name] for name in models}, tree.joints)
 
 

@@ -8,7 +8,7 @@ of the whole, moved to its far section, and turned, because its frame turns::
     f,   m + arm x f    at the section, of each the largest of either sign
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -119,8 +119,9 @@ class Tree:
                 owners.setdefault(interface, []).append(key)
         for interface, keys in owners.items():
             if len(keys) > 2:
-                raise InterfaceError(f"interface {interface!r} belongs to the pieces {named(keys)}; "
-                                     "two can meet there.")  # fmt: skip
+                raise InterfaceError(
+                    f"interface {interface!r} belongs to the pieces {named(keys)}; two meet there."
+                )
         free = [interface for interface, keys in owners.items() if len(keys) == 1]
         if reference not in free:
             raise InterfaceError(
@@ -157,6 +158,17 @@ class Tree:
             if one in found:
                 found.append(other)
         return found
+
+    def refuse_unknown(self, names: Iterable[str], models: Mapping[str, FEModel]) -> None:
+        """Refuse names of interfaces that no piece has.
+
+        Raises:
+            InterfaceError: offering those there are.
+        """
+        every = {name for model in models.values() for name in model.interfaces}
+        if unknown := [name for name in names if name not in every]:
+            raise InterfaceError(f"there is no interface {named(unknown)}; the pieces have "
+                                 f"{offered(every)}.")  # fmt: skip
 
     def ranges(
         self, geometric: Geometric, models: Mapping[str, FEModel]

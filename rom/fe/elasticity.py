@@ -109,7 +109,7 @@ def pieces(  # noqa: PLR0913  those of `model`, and how to cut
     comm: MPI.Comm = MPI.COMM_WORLD,
     **mesh_options: Any,
 ) -> dict[str, FEModel]:
-    """{name: finite element model} of the pieces into which a solid is cut, for `rom.reduce_pieces`.
+    """{name: finite element model} of the pieces of a solid, for `rom.reduce_pieces`.
 
     Where two pieces meet both have an interface of one name: "cut 1" between the pieces "1" and
     "2" along an axis, "hub-blade" between two regions. All have the coordinates of the whole.
@@ -136,7 +136,8 @@ def pieces(  # noqa: PLR0913  those of `model`, and how to cut
         >>> steel = rom.Material(E=210e9, nu=0.3, rho=7850.0)
         >>> grid = {"hex": 1, "nx": 6, "ny": 1, "nz": 1}
         >>> beam = {"n": 2, "axis": (1, 0, 0), "material": steel, "parameters": grid}
-        >>> {name: m.interface_names for name, m in rom.fe.pieces("meshes/beam.geo", **beam).items()}
+        >>> models = rom.fe.pieces("meshes/beam.geo", **beam)
+        >>> {name: model.interface_names for name, model in models.items()}
         {'1': ('root', 'cut 1'), '2': ('tip', 'cut 1')}
     """
     from rom.fe.mesh.cut import cut

@@ -30,9 +30,7 @@ def beam(n, cells, *, nu=0.0, thick=THICK):
     material = rom.Material(E=E, nu=nu, rho=7850.0)
     if n == 1:
         return rom.fe.model("meshes/beam.geo", material=material, parameters=size)
-    return rom.fe.pieces(
-        "meshes/beam.geo", n=n, axis=(1, 0, 0), material=material, parameters=size
-    )
+    return rom.fe.pieces("meshes/beam.geo", n=n, axis=(1, 0, 0), material=material, parameters=size)
 
 
 def clamped(pieces):
@@ -138,17 +136,21 @@ def test_pieces_that_spin_freely_keep_energy_and_momentum():
         nonlinear=rom.Geometric(loads=loads, n_modes=1, n_shapes=6),
         certify=False,
     )
-    mech = rom.Mechanism(gravity=(0, 0, 0))
-    pieces.add_to(mech, "beam", at=(1, 2, 3), velocity=(0.2, 0, -0.1), omega=(0, 4.0, 1.0))
-    found = rom.simulate(mech, t_end=0.05, dt=2e-4, rho_inf=1.0)
-    energy = found.energy.total
-    assert_allclose(energy, energy[0], rtol=2e-5)
-    assert np.ptp(found.elastic("beam 1"), axis=0).max() > 1e-6
-    for k in (0, 1):
-        start = found.momentum[k][0]
-        assert_allclose(found.momentum[k] - start, 0, atol=2e-5 * np.linalg.norm(start))
-    for name in ("beam 1", "beam 2"):
-        assert_allclose(found.position("beam 1", "cut 1"), found.position(name, "cut 1"), atol=1e-8)
+    mech, pulse = rom.Mechanism(gravity=(0, 0, 0)), 0.01
+    markers = pieces.add_to(mech, "beam", at=(1, 2, 3), velocity=(0.2, 0, -0.1), omega=(0, 4.0, 1))
+    mech.force("kick", markers["tip"], lambda t: (0, 0, 0.5 * EI * (t < pulse)))
+    found = rom.simulate(mech, t_end=0.04, dt=1e-4, rho_inf=1.0)
+    free = found.t > pulse + 1e-9
+    across = [found.position("beam 1", "root"), found.position("beam 1", "cut 1"),
+              found.position("beam 2", "tip")]  # fmt: skip
+    bent = np.linalg.norm(across[0] + across[2] - 2 * across[1], axis=1)
+    assert bent.max() > 0.03  # of its length: far beyond small deflection of one this slender
+    energy = found.energy.total[free]
+    assert_allclose(energy, energy[0], rtol=2e-3)
+    for momentum in found.momentum:
+        kept = momentum[free]
+        assert_allclose(kept, kept[:1].repeat(len(kept), 0), atol=1e-4 * np.linalg.norm(kept[0]))
+    assert_allclose(found.position("beam 1", "cut 1"), found.position("beam 2", "cut 1"), atol=1e-8)
 
 
 def test_loads_reach_the_sections_of_pieces():
@@ -167,16 +169,16 @@ def test_loads_reach_the_sections_of_pieces():
     assert_allclose(ranges["2"].loads["cut 2"], np.repeat([5, 5 / 3], 3), atol=1e-12)
     from_tip = Tree.of(models, "tip")
     assert from_tip.reference == {"3": "tip", "2": "cut 2", "1": "cut 1"}
-    assert from_tip.ranges(rom.Geometric(loads={"root": (1, 0, 0, 0, 0, 0)}), models)["3"] is not None
+    at_root = rom.Geometric(loads={"root": (1, 0, 0, 0, 0, 0)})
+    assert_allclose(from_tip.ranges(at_root, models)["3"].loads["cut 2"], [1, 0, 0, 0, 0, 0])
 
 
 def test_pieces_that_make_no_body_are_refused_by_name():
     models = beam(3, 3)
 
-    def renamed(key, **names):
-        model = models[key]
-        return replace(model, interfaces={names.get(n.replace(" ", "_"), n): x
-                                          for n, x in model.interfaces.items()})  # fmt: skip
+    def named(key, *names):
+        face = next(iter(models[key].interfaces.values()))
+        return replace(models[key], interfaces=dict.fromkeys(names, face))
 
     with pytest.raises(ConfigError, match="1 pieces are no body"):
         Tree.of({"1": models["1"]}, "root")
@@ -185,12 +187,11 @@ def test_pieces_that_make_no_body_are_refused_by_name():
     with pytest.raises(InterfaceError, match="'cut 1' is no interface of one piece"):
         Tree.of(models, "cut 1")
     with pytest.raises(InterfaceError, match="piece '3' does not hang on"):
-        Tree.of(models | {"3": renamed("3", cut_2="loose")}, "root")
-    with pytest.raises(ModelError, match="form a ring that closes at"):
-        Tree.of(models | {"1": renamed("1", root="x"), "3": renamed("3", tip="cut 1")}
-                | {"4": renamed("2", cut_1="x", cut_2="end")}
-                | {"1": replace(renamed("1"), interfaces=renamed("2").interfaces
-                                | renamed("1").interfaces)}, "root")  # fmt: skip
+        Tree.of(models | {"3": named("3", "tip")}, "root")
+    with pytest.raises(ModelError, match="form a ring that closes at 'y'"):
+        Tree.of({"1": named("1", "root", "x", "y"), "2": named("2", "x", "y")}, "root")
+    with pytest.raises(InterfaceError, match="'x' belongs to the pieces '1', '2', '3'"):
+        Tree.of({key: named(key, "x", f"end {key}") for key in models}, "end 1")
     tree = Tree.of(models, "root")
     with pytest.raises(InterfaceError, match="names 'cut 1'"):
         tree.ranges(rom.Geometric(loads={"cut 1": (1, 0, 0, 0, 0, 0)}), models)
