@@ -14,13 +14,15 @@ from typing import Any
 
 import numpy as np
 
+from rom.arguments import typed
 from rom.body.flexible import FlexibleBody
 from rom.body.nonlinear.geometric import Geometric
 from rom.errors import ConfigError, InterfaceError, ModelError
-from rom.model import Array, FEModel
+from rom.model import Array, FEModel, Mask
 from rom.names import check_name, named, offered
 
 
+@typed
 @dataclass(frozen=True)
 class Pieces:
     """Reduced bodies that are one body, for a mechanism.
@@ -70,6 +72,8 @@ class Pieces:
             >>> markers["tip"].body, list(mech.joints)
             ('beam 2', ['beam cut 1'])
         """
+        if not hasattr(mech, "add_flexible"):
+            raise ConfigError(f"mech = {mech!r:.60} is no Mechanism, to which bodies are added.")
         check_name(name, "a body")
         allowed = ("at", "orientation", "velocity", "omega")
         if unknown := [key for key in pose if key not in allowed]:
@@ -225,7 +229,7 @@ def _moved(load: Array, arm: Array) -> Array:
     return np.concatenate([load[:3], load[3:] + cross @ load[:3]])
 
 
-def _turned(load: Array, turning: Array) -> Array:
+def _turned(load: Array, turning: Mask) -> Array:
     """Largest force and moment (6,) in a frame that turns about some of the axes (3,)."""
     if np.count_nonzero(turning) > 1:
         return np.repeat([np.linalg.norm(load[:3]), np.linalg.norm(load[3:])], 3)

@@ -81,9 +81,9 @@ def test_a_cantilever_of_pieces_follows_the_elastica_to_ten():
 
 def test_a_moment_bends_pieces_to_half_a_circle_the_better_the_more_there_are():
     gaps = []
-    for n in (3, 6):
+    for n in (4, 8):
         pieces = rom.reduce_pieces(
-            beam(n, 36),
+            beam(n, 32),
             reference="root",
             method=rom.CraigBampton(n_modes=2),
             nonlinear=rom.Geometric(loads={"tip": (0, 0, 0, 0, np.pi * EI, 0)}, n_modes=2),
@@ -94,7 +94,7 @@ def test_a_moment_bends_pieces_to_half_a_circle_the_better_the_more_there_are():
         slope, x, z = tip_at(mech, tip, 8)
         gaps.append(np.linalg.norm([x, z - 2 / np.pi]))
         assert abs(slope - np.pi) < 0.02 * np.pi
-    assert gaps[1] < 0.012 and gaps[1] < 0.8 * gaps[0], gaps
+    assert gaps[1] < 0.01 and gaps[1] < 0.8 * gaps[0]
 
 
 @pytest.fixture(scope="module")
@@ -136,21 +136,27 @@ def test_pieces_that_spin_freely_keep_energy_and_momentum():
         nonlinear=rom.Geometric(loads=loads, n_modes=1, n_shapes=6),
         certify=False,
     )
+    drifts = np.array([drift_of_spin(pieces, dt) for dt in (1e-4, 5e-5)])
+    assert np.all(drifts[1] < [1e-3, 1e-3, 1e-4])
+    assert np.all(drifts[0] > 3 * drifts[1])
+
+
+def drift_of_spin(pieces, dt):
+    """Relative change of both momenta and of the energy after a kick that bends the beam far."""
     mech, pulse = rom.Mechanism(gravity=(0, 0, 0)), 0.01
     markers = pieces.add_to(mech, "beam", at=(1, 2, 3), velocity=(0.2, 0, -0.1), omega=(0, 4.0, 1))
-    mech.force("kick", markers["tip"], lambda t: (0, 0, 0.5 * EI * (t < pulse)))
-    found = rom.simulate(mech, t_end=0.04, dt=1e-4, rho_inf=1.0)
-    free = found.t > pulse + 1e-9
-    across = [found.position("beam 1", "root"), found.position("beam 1", "cut 1"),
-              found.position("beam 2", "tip")]  # fmt: skip
-    bent = np.linalg.norm(across[0] + across[2] - 2 * across[1], axis=1)
-    assert bent.max() > 0.03  # of its length: far beyond small deflection of one this slender
-    energy = found.energy.total[free]
-    assert_allclose(energy, energy[0], rtol=2e-3)
+    mech.force("kick", markers["tip"], lambda t: (0, 0, EI * (t < pulse)))
+    found = rom.simulate(mech, t_end=0.03, dt=dt, rho_inf=1.0)
+    one, two = found.position("beam 1", "cut 1"), found.position("beam 2", "cut 1")
+    assert_allclose(one, two, atol=1e-8)
+    bent = found.position("beam 1", "root") + found.position("beam 2", "tip") - 2 * one
+    assert np.linalg.norm(bent, axis=1).max() > 0.04
+    free, drifts = found.t > pulse + 2.5e-4, []
     for momentum in found.momentum:
         kept = momentum[free]
-        assert_allclose(kept, kept[:1].repeat(len(kept), 0), atol=1e-4 * np.linalg.norm(kept[0]))
-    assert_allclose(found.position("beam 1", "cut 1"), found.position("beam 2", "cut 1"), atol=1e-8)
+        drifts.append(np.abs(kept - kept[0]).max() / np.linalg.norm(kept[0]))
+    energy = found.energy.total[free]
+    return [*drifts, np.abs(energy / energy[0] - 1).max()]
 
 
 def test_loads_reach_the_sections_of_pieces():

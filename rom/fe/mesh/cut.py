@@ -52,9 +52,9 @@ def cut(mesh: SolidMesh, n: int | None = None, axis: Any = None) -> dict[str, So
         _refuse_rough(mesh, cuts, np.asarray(axis, dtype=float))
     found = {name: _piece(mesh, piece, k, cuts, name) for k, name in enumerate(names)}
     for cut_name, ((i, j), _) in cuts.items():
-        both = set(found[names[i]].facets) & set(found[names[j]].facets) & set(mesh.facets)
-        if both:
-            raise TagError(f"surface {named(sorted(both))} lies on {cut_name!r}.",
+        doubled = set(found[names[i]].facets) & set(found[names[j]].facets) & set(mesh.facets)
+        if doubled:
+            raise TagError(f"surface {named(sorted(doubled))} lies on {cut_name!r}.",
                            hint="Leave it without a name: the cut has one.")  # fmt: skip
     return found
 
