@@ -1,5 +1,7 @@
 """One solid as several reduced bodies: statics far out, frequencies, momentum, and its refusals."""
 
+import subprocess
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -9,8 +11,11 @@ from scipy.optimize import brentq
 from scipy.special import ellipe, ellipeinc, ellipk, ellipkinc
 
 import rom
+from cases.paths import RANKS, ROOT
+from cases.ranks.environment import ENVIRONMENT
 from rom.assembly.pieces import Tree
 from rom.errors import ConfigError, InterfaceError, ModelError
+from rom.process.mpirun import mpirun
 
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")
 pytest.importorskip("gmsh", reason="gmsh is not installed")
@@ -210,3 +215,19 @@ def test_pieces_that_make_no_body_are_refused_by_name():
 def test_a_mechanism_takes_pieces_as_one_body_only(three):
     with pytest.raises(ConfigError, match="pieces take no 'q'"):
         three[0].add_to(rom.Mechanism(), "beam", q=np.zeros(3))
+
+
+@pytest.mark.mpi
+def test_pieces_are_the_same_on_two_processes(tmp_path):
+    found = []
+    for n in (1, 2):
+        file = tmp_path / f"{n}.npz"
+        script = str(RANKS / "pieces_under_mpi.py")
+        subprocess.run(
+            [*mpirun(n), sys.executable, script, str(file)],
+            env=ENVIRONMENT, timeout=300, check=True, capture_output=True, cwd=ROOT,
+        )  # fmt: skip
+        found.append(np.load(file))
+    assert_allclose(found[0]["mass"], 11.775 + 0.5, rtol=1e-12)
+    for name in ("a", "b", "mass"):
+        assert_allclose(found[1][name], found[0][name], rtol=1e-7)
