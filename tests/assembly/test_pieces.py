@@ -41,6 +41,7 @@ def beam(n, cells, *, nu=0.0, thick=THICK):
 def clamped(pieces):
     mech = rom.Mechanism(gravity=(0, 0, 0))
     markers = pieces.add_to(mech, "beam")
+    assert set(markers) == {"root", "tip"}
     mech.fixed("wall", mech.ground.marker((0, 0, 0)), markers["root"])
     return mech, markers["tip"]
 
