@@ -22,6 +22,7 @@ from rom import view as view
 from rom.assembly.assembly import Assembly as Assembly
 from rom.assembly.dual import DualAssembly as DualAssembly
 from rom.assembly.dual import FreeSubstructure as FreeSubstructure
+from rom.assembly.pieces import Pieces as Pieces
 from rom.body.damping import ModalDamping as ModalDamping
 from rom.body.damping import Rayleigh as Rayleigh
 from rom.body.flexible import FlexibleBody as FlexibleBody
@@ -148,6 +149,7 @@ from rom.view.scenes.animation_files import write_animation as write_animation
 from rom.workflow import mass_properties as mass_properties
 from rom.workflow import modes as modes
 from rom.workflow import reduce as reduce
+from rom.workflow import reduce_pieces as reduce_pieces
 from rom.workflow import substructure as substructure
 
 __version__: str

@@ -2,7 +2,7 @@
 
 import logging
 import re
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Any, Literal, overload
@@ -11,6 +11,7 @@ import numpy as np
 
 from rom.arguments import typed, whole
 from rom.assembly.dual import FreeSubstructure, free_substructure, with_certificate
+from rom.assembly.pieces import Pieces, Tree
 from rom.body.correction import residual_motion
 from rom.body.damping import ModalDamping, Rayleigh, damped
 from rom.body.flexible import FlexibleBody
@@ -291,6 +292,54 @@ def reduce(  # noqa: PLR0913  one keyword per choice
         )  # fmt: skip
     body.provenance["stages"] = watch.table()
     return body
+
+
+@typed
+def reduce_pieces(
+    models: Mapping[str, FEModel],
+    *,
+    reference: str,
+    method: Method = ENOUGH_MODES,
+    interfaces: dict[str, Any] | None = None,
+    nonlinear: Geometric | None = None,
+    damping: Rayleigh | ModalDamping | None = None,
+    certify: bool = True,
+) -> Pieces:
+    """Reduced bodies of the pieces of one solid, for rotations beyond what one frame carries.
+
+    Args:
+        models: {name: piece} of `rom.fe.pieces`, or any others that have an interface of one name
+            where they meet.
+        reference: interface at which the whole is held, or that turns least; each piece is seen
+            from its section towards it.
+        method: how to reduce each of them.
+        interfaces: {name: kind}; "rbe3" for all that are not named.
+        nonlinear: the loads of the whole under which it is to deflect far; each piece is made for
+            those that reach its sections.
+        damping: structural damping of each.
+        certify: compare each piece with its full model.
+
+    Raises:
+        RomError: for pieces that do not hang together, or form a ring; see `reduce`.
+
+    Example:
+        >>> beam = {"n": 2, "axis": (1, 0, 0), "material": rom.Material(E=2e11, nu=0, rho=7850.0)}
+        >>> beam["parameters"] = {"hex": 1, "nx": 8, "ny": 1, "nz": 1}
+        >>> models = rom.fe.pieces("meshes/beam.geo", **beam)
+        >>> rom.reduce_pieces(models, reference="root", method=rom.CraigBampton(n_modes=2))
+        Pieces(2 bodies with 16 coordinates, 1 welds)
+    """
+    tree = Tree.of(models, reference)
+    ranges = dict.fromkeys(models) if nonlinear is None else tree.ranges(nonlinear, models)
+    kinds, bodies = interfaces or {}, dict[str, FlexibleBody]()
+    tree.refuse_unknown(kinds, models)
+    for name, seen_from in tree.reference.items():
+        bodies[name] = reduce(
+            models[name], method=method, reference=seen_from, nonlinear=ranges[name],
+            interfaces={key: kinds.get(key, "rbe3") for key in models[name].interfaces},
+            damping=damping, name=name, certify=certify,
+        )  # fmt: skip
+    return Pieces({name: bodies[name] for name in models}, tree.joints)
 
 
 def _reduced_body(  # noqa: PLR0913  those of `reduce`

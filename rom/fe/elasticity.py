@@ -1,8 +1,8 @@
 """Stiffness and mass of a three-dimensional elastic body on a dolfinx mesh."""
 
 import logging
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -89,42 +89,150 @@ def model(
         >>> beam.interface_names
         ('root', 'tip')
     """
-    from rom.fe.mesh.read import is_geometry, read_mesh, to_dolfinx
+    options = _Options(path, material, degree, parameters, tuple(attachments), solver, comm)
+    (made,) = _models(options, mesh_options, lambda mesh: {"": mesh}).values()
+    _advise(comm, made.n_dofs)
+    return made
 
-    method = parsed(solver)  # before a mesh is made in vain
-    install_abort_hook(comm)  # whatever a script does next, one failing rank must end all
-    read: list[SolidMesh] = []  # on rank 0; the others never hold the whole mesh
 
-    def head() -> tuple[dict[int, str], list[str], dict[str, Any], dict[str, Axis]]:
-        if degree == 1 and mesh_options.get("order") is None and is_geometry(path):
+@typed
+def pieces(  # noqa: PLR0913  those of `model`, and how to cut
+    path: str | Path,
+    *,
+    n: int | None = None,
+    axis: Any = None,
+    material: Material | Orthotropic | Mapping[str, Material | Orthotropic],
+    degree: int = 2,
+    parameters: dict[str, float] | None = None,
+    attachments: Sequence[Attachment] = (),
+    solver: str = "auto",
+    comm: MPI.Comm = MPI.COMM_WORLD,
+    **mesh_options: Any,
+) -> dict[str, FEModel]:
+    """{name: finite element model} of the pieces of a solid, for `rom.reduce_pieces`.
+
+    Where two pieces meet both have an interface of one name: "cut 1" between the pieces "1" and
+    "2" along an axis, "hub-blade" between two regions. All have the coordinates of the whole.
+
+    Args:
+        path: geometry or mesh file, see `model`.
+        n: number of pieces of about equal length, cut between layers of cells.
+        axis: (3,) direction of the normal of the cuts [1]; without n and axis each region is a
+            piece.
+        material: as for the whole.
+        degree: as for `model`, as are all that follow.
+        parameters: of the geometry.
+        attachments: each goes with the piece that has its interface.
+        solver: how equations are solved.
+        comm: the ranks that share each of the models.
+        mesh_options: see `model`.
+
+    Raises:
+        MeshError: if there are fewer layers of cells than pieces, or these are not flat.
+        TagError: if there is nowhere to cut, or a cut crosses a named surface.
+        RomError: see `model`.
+
+    Example:
+        >>> steel = rom.Material(E=210e9, nu=0.3, rho=7850.0)
+        >>> grid = {"hex": 1, "nx": 6, "ny": 1, "nz": 1}
+        >>> beam = {"n": 2, "axis": (1, 0, 0), "material": steel, "parameters": grid}
+        >>> models = rom.fe.pieces("meshes/beam.geo", **beam)
+        >>> {name: model.interface_names for name, model in models.items()}
+        {'1': ('root', 'cut 1'), '2': ('tip', 'cut 1')}
+    """
+    from rom.fe.mesh.cut import cut
+
+    options = _Options(path, material, degree, parameters, tuple(attachments), solver, comm)
+    return _models(options, mesh_options, lambda mesh: cut(mesh, n, axis))
+
+
+@dataclass(frozen=True)
+class _Options:
+    """What `model` and `pieces` are asked for."""
+
+    path: str | Path
+    material: Any
+    degree: int
+    parameters: dict[str, float] | None
+    attachments: tuple[Attachment, ...]
+    solver: str
+    comm: MPI.Comm
+
+
+Division = Callable[[SolidMesh], dict[str, SolidMesh]]
+
+
+def _models(
+    options: _Options, mesh_options: dict[str, Any], division: Division
+) -> dict[str, FEModel]:
+    """Models of the parts into which a mesh is divided on rank 0; the others never hold it."""
+    from rom.fe.mesh.read import is_geometry, read_mesh
+    from rom.fe.mesh.validate import checked
+
+    parsed(options.solver)  # before a mesh is made in vain
+    install_abort_hook(options.comm)  # whatever a script does next, one failing rank must end all
+    parts: dict[str, SolidMesh] = {}
+
+    def head() -> dict[str, _Head]:
+        if options.degree == 1 and mesh_options.get("order") is None and is_geometry(options.path):
             mesh_options["order"] = 1
-        read.append(without_middles(read_mesh(path, parameters=parameters, **mesh_options)))
-        mesh = read[0]
-        return mesh.region_names, list(mesh.warnings or ()), mesh.provenance, mesh.axes
+        mesh = read_mesh(options.path, parameters=options.parameters, **mesh_options)
+        mesh = without_middles(mesh)
+        by_region(options.material, {name: tag for tag, name in mesh.region_names.items()})
+        _check_attachments(options.attachments, mesh.facets)
+        for name, part in division(mesh).items():
+            parts[name] = part if part.warnings is not None else checked(part)
+        return {name: _Head.of(part) for name, part in parts.items()}
 
-    region_names, warnings, origin, axes = on_root(comm, head)
+    heads = on_root(options.comm, head)
+    return {name: _model(options, parts.pop(name, None), one) for name, one in heads.items()}
+
+
+@dataclass(frozen=True)
+class _Head:
+    """What all ranks know of a mesh that rank 0 holds."""
+
+    regions: dict[str, int]
+    facets: tuple[str, ...]
+    warnings: tuple[str, ...]
+    origin: dict[str, Any]
+    axes: dict[str, Axis]
+
+    @classmethod
+    def of(cls, mesh: SolidMesh) -> "_Head":
+        regions = {name: tag for tag, name in mesh.region_names.items()}
+        return cls(regions, tuple(mesh.facets), mesh.warnings or (), mesh.provenance, mesh.axes)
+
+
+def _model(options: _Options, part: SolidMesh | None, head: _Head) -> FEModel:
+    """The model of one mesh, which rank 0 holds."""
+    from rom.fe.mesh.read import to_dolfinx
+
+    comm, material = options.comm, options.material
     with compiling(comm):
-        mesh, cell_tags, facet_tags = to_dolfinx(read.pop() if read else None, comm)
+        mesh, cell_tags, facet_tags = to_dolfinx(part, comm)
+    if isinstance(material, Mapping):
+        material = {region: material[region] for region in head.regions}
     made = assemble(
         mesh,
         cell_tags,
         facet_tags,
         material=material,
-        degree=degree,
-        regions={name: tag for tag, name in region_names.items()},
-        attachments=attachments,
+        degree=options.degree,
+        regions=head.regions,
+        attachments=[x for x in options.attachments if x.interface in head.facets],
     )
-    remarks = [*warnings, *made.provenance["warnings"]]
-    _advise(comm, made.n_dofs)
-    how, why = automatic(made.operators) if method.automatic else (method, solver)
+    remarks = [*head.warnings, *made.provenance["warnings"]]
+    method = parsed(options.solver)
+    how, why = automatic(made.operators) if method.automatic else (method, options.solver)
     if comm.rank == 0 and how != DIRECT_SOLVER and method.automatic:
         log.info("solved %s", why)
-    provenance = origin | made.provenance | {"warnings": remarks, "solver": why}
+    provenance = head.origin | made.provenance | {"warnings": remarks, "solver": why}
     return replace(
         made,
         operators=made.operators.solved_by(how),
         provenance=provenance,
-        interfaces={key: _on_axis(x, axes.get(key)) for key, x in made.interfaces.items()},
+        interfaces={key: _on_axis(x, head.axes.get(key)) for key, x in made.interfaces.items()},
     )
 
 

@@ -179,6 +179,7 @@ ORDER = {
         "quality",
         "repair",
         "validate",
+        "cut",
         "distribute",
         "read",
         "summary",

@@ -73,6 +73,18 @@ class CellType:
         return sum(set(s) <= set(self.faces[0]) for s in self.supports)
 
     @cached_property
+    def face_nodes(self) -> tuple[tuple[int, ...], ...]:
+        """Node numbers of each face, in the order of gmsh: corners, edges around, the middle."""
+        number = {frozenset(s): k for k, s in enumerate(self.supports)}
+        found = []
+        for face in self.faces:
+            around = zip(face, (*face[1:], face[0]), strict=True)
+            wanted = [*((c,) for c in face), *around, face]
+            listed = [number[frozenset(s)] for s in wanted if frozenset(s) in number]
+            found.append(tuple(listed))
+        return tuple(found)
+
+    @cached_property
     def mirrored(self) -> tuple[int, ...]:
         """Node order of the same cell seen in a mirror: swaps the sign of its volume."""
         flipped = self.nodes[:, [1, 0, 2]]

@@ -3,7 +3,7 @@
 import inspect
 import os
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
@@ -97,6 +97,21 @@ def body():
 def behind():
     """The block behind that one."""
     return block(cells=(3, 1, 1), origin=(1.0, 0.0, 0.0))
+
+
+@cache
+def models_in_a_row():
+    """Two models with an interface of one name where they meet."""
+    (root, end), (start, tip) = (m.interfaces.values() for m in (model(), behind()))
+    of = {"a": {"root": root, "joint": replace(end, name="joint")},
+          "b": {"joint": replace(start, name="joint"), "tip": tip}}  # fmt: skip
+    return {"a": replace(model(), interfaces=of["a"]), "b": replace(behind(), interfaces=of["b"])}
+
+
+@cache
+def pieces():
+    """Their bodies."""
+    return rom.reduce_pieces(models_in_a_row(), reference="root", method=rom.Guyan(), certify=False)
 
 
 @cache
@@ -343,6 +358,7 @@ GIVEN = {  # callable -> legal values of its own
         "model": regions,
         "parameters": lambda: {"E": rom.YoungsModulus("web", 0.9, 1.1)},
     },
+    "reduce_pieces": {"models": models_in_a_row, "reference": lambda: "root"},
     "reduced_blade": WHEEL | {"sector": lambda: wheel().parts},
     "release": {"state": lambda: rom.equilibrium(driven())},
     "rotating_sector": WHEEL,
@@ -415,6 +431,7 @@ GIVEN = {  # callable -> legal values of its own
         "G": lambda: (4e2,) * 3, "rho": lambda: 1e-9,
     },
     "FourierLegendre.functions": {"interface": lambda: model().interfaces["root"]},
+    "Pieces.add_to": {"mech": rom.Mechanism, "name": lambda: "beam"},
     "Polynomial.functions": {"interface": lambda: model().interfaces["root"]},
     "Heat.on": WHEEL,
     "Heat.described": {"share": lambda: 0.5},
@@ -474,6 +491,7 @@ OBJECTS = {  # class -> an object of it: legal arguments of the class, and owner
     "Modes": lambda: rom.modes(model(), 1),
     "MomentMatching": rom.MomentMatching,
     "Orthotropic": lambda: rom.Orthotropic((1e9,) * 3, (0.3,) * 3, (4e8,) * 3, 1e3),
+    "Pieces": pieces,
     "Polynomial": lambda: rom.Polynomial(1),
     "Geometric": lambda: rom.Geometric({"tip": (0, 1.0, 0, 0, 0, 0)}),
     "Rayleigh": rom.Rayleigh,

@@ -1,0 +1,239 @@
+"""A slender body as several reduced ones in a chain or tree, each in a floating frame of its own.
+
+The rotation that one frame carries is limited by its shapes; pieces share it. Sections between two
+pieces are welded in the mean: their centres and axes are one, and what the loads of a rod do to
+them, warping and lateral strain, stays free. A piece is trained for the loads that reach it: those
+of the whole, moved to its far section, and turned, because its frame turns::
+
+    f,   m + arm x f    at the section, of each the largest of either sign
+"""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from rom.arguments import typed
+from rom.body.flexible import FlexibleBody
+from rom.body.nonlinear.geometric import Geometric
+from rom.errors import ConfigError, InterfaceError, ModelError
+from rom.model import Array, FEModel, Mask
+from rom.names import check_name, named, offered
+
+
+@typed
+@dataclass(frozen=True)
+class Pieces:
+    """Reduced bodies that are one body, for a mechanism.
+
+    Attributes:
+        bodies: by name of the piece; all in the coordinates of the whole.
+        joints: {interface: the two pieces that meet there}.
+    """
+
+    bodies: dict[str, FlexibleBody]
+    joints: dict[str, tuple[str, str]]
+
+    def __repr__(self) -> str:
+        n = sum(body.n_modes for body in self.bodies.values())
+        return f"Pieces({len(self.bodies)} bodies with {n} coordinates, {len(self.joints)} welds)"
+
+    @property
+    def mass(self) -> float:
+        """Mass of the whole [kg]."""
+        return float(sum(body.mass for body in self.bodies.values()))
+
+    def add_to(self, mech: Any, name: str, **pose: Any) -> dict[str, Any]:
+        """Add all bodies to a mechanism, welded to each other.
+
+        They are called "name piece" there, the welds "name interface".
+
+        Args:
+            mech: the `rom.Mechanism`.
+            name: of the whole.
+            pose: ``at``, ``orientation``, ``velocity`` and ``omega`` of the whole at the start, see
+                `rom.Mechanism.add_flexible`.
+
+        Returns:
+            {interface: its marker} of the interfaces that are no welds.
+
+        Raises:
+            ConfigError: see `rom.Mechanism.add_flexible`; for elastic coordinates, which each
+                piece has of its own.
+
+        Example:
+            >>> beam = {"n": 2, "axis": (1, 0, 0), "material": rom.Material(E=2e11, nu=0, rho=1.0)}
+            >>> beam["parameters"] = {"hex": 1, "nx": 6, "ny": 1, "nz": 1}
+            >>> models = rom.fe.pieces("meshes/beam.geo", **beam)
+            >>> pieces = rom.reduce_pieces(models, reference="root")
+            >>> mech = rom.Mechanism()
+            >>> markers = pieces.add_to(mech, "beam")
+            >>> markers["tip"].body, list(mech.joints)
+            ('beam 2', ['beam cut 1'])
+        """
+        if not hasattr(mech, "add_flexible"):
+            raise ConfigError(f"mech = {mech!r:.60} is no Mechanism, to which bodies are added.")
+        check_name(name, "a body")
+        allowed = ("at", "orientation", "velocity", "omega")
+        if unknown := [key for key in pose if key not in allowed]:
+            raise ConfigError(
+                f"pieces take no {named(unknown)}, but {offered(allowed)}: elastic coordinates "
+                "belong to each piece.",
+                hint="Add the bodies one by one.",
+            )
+        parts = {key: mech.add_flexible(f"{name} {key}", body, **pose)
+                 for key, body in self.bodies.items()}  # fmt: skip
+        for joint, (one, other) in self.joints.items():
+            mech.fixed(f"{name} {joint}", parts[one].marker(joint), parts[other].marker(joint))
+        return {interface: parts[key].marker(interface) for key, body in self.bodies.items()
+                for interface in body.markers if interface not in self.joints}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Tree:
+    """Pieces in the order in which they hang on the one with the reference.
+
+    Attributes:
+        reference: {piece: interface on which its frame sits}, parents first.
+        joints: {interface: its two pieces, the nearer one to the reference first}.
+    """
+
+    reference: dict[str, str]
+    joints: dict[str, tuple[str, str]]
+
+    @classmethod
+    def of(cls, models: Mapping[str, FEModel], reference: str) -> "Tree":
+        """That of pieces which meet in interfaces of one name.
+
+        Raises:
+            ConfigError: if there are fewer than two pieces.
+            InterfaceError: if the reference is none of one piece, three pieces have one interface,
+                or a piece hangs on nothing.
+            ModelError: if they form a ring.
+        """
+        if len(models) < 2:
+            raise ConfigError(
+                f"{len(models)} pieces are no body cut into pieces.",
+                hint='Cut it: rom.fe.pieces("beam.geo", n=4, axis=(1, 0, 0), material=steel).',
+            )
+        owners: dict[str, list[str]] = {}
+        for key, model in models.items():
+            for interface in model.interfaces:
+                owners.setdefault(interface, []).append(key)
+        for interface, keys in owners.items():
+            if len(keys) > 2:
+                raise InterfaceError(
+                    f"interface {interface!r} belongs to the pieces {named(keys)}; two meet there."
+                )
+        free = [interface for interface, keys in owners.items() if len(keys) == 1]
+        if reference not in free:
+            raise InterfaceError(
+                f"reference = {reference!r} is no interface of one piece alone; they have "
+                f"{offered(free, reference)}."
+            )
+        found, joints = {owners[reference][0]: reference}, dict[str, tuple[str, str]]()
+        waiting = [owners[reference][0]]
+        while waiting:
+            here = waiting.pop(0)
+            for interface in models[here].interfaces:
+                if len(owners[interface]) == 1 or interface in joints:
+                    continue
+                (there,) = (key for key in owners[interface] if key != here)
+                if there in found:
+                    raise ModelError(
+                        f"the pieces form a ring that closes at {interface!r}: which loads pass "
+                        "there depends on their stiffness.",
+                        hint="Reduce each by rom.reduce with loads of its own, and weld them.",
+                    )
+                found[there], joints[interface] = interface, (here, there)
+                waiting.append(there)
+        if loose := [key for key in models if key not in found]:
+            raise InterfaceError(
+                f"piece {named(loose)} does not hang on that with {reference!r}: no interface has "
+                "the name of one of another piece.",
+            )
+        return cls(found, joints)
+
+    def beyond(self, joint: str) -> list[str]:
+        """Names of the pieces that hang on a joint."""
+        found = [self.joints[joint][1]]
+        for one, other in self.joints.values():  # nearer ones come first
+            if one in found:
+                found.append(other)
+        return found
+
+    def refuse_unknown(self, names: Iterable[str], models: Mapping[str, FEModel]) -> None:
+        """Refuse names of interfaces that no piece has.
+
+        Raises:
+            InterfaceError: offering those there are.
+        """
+        every = {name for model in models.values() for name in model.interfaces}
+        if unknown := [name for name in names if name not in every]:
+            raise InterfaceError(f"there is no interface {named(unknown)}; the pieces have "
+                                 f"{offered(every)}.")  # fmt: skip
+
+    def ranges(
+        self, geometric: Geometric, models: Mapping[str, FEModel]
+    ) -> dict[str, Geometric | None]:
+        """{piece: the loads that reach it}, None for a piece that none reaches.
+
+        Args:
+            geometric: those of the whole.
+            models: the pieces.
+
+        Raises:
+            ConfigError: for supports beside the reference, with which they depend on stiffness.
+            InterfaceError: for loads on an interface that no piece has, or on a joint.
+        """
+        if geometric.fixed:
+            raise ConfigError(
+                f"fixed = {geometric.fixed!r}: with supports beside the reference, which loads "
+                "reach a piece depends on their stiffness.",
+                hint="Name as loads what the supports bear at most, and leave fixed out.",
+            )
+        owner = {interface: key for key, model in models.items() for interface in model.interfaces
+                 if interface not in self.joints}  # fmt: skip
+        if unknown := [name for name in geometric.loads if name not in owner]:
+            raise InterfaceError(
+                f"the range of loads names {named(unknown)}; the pieces have {offered(owner)}."
+            )
+        loads: dict[str, dict[str, Array]] = {key: {} for key in self.reference}
+        for name, load in geometric.loads.items():
+            loads[owner[name]][name] = np.abs(np.asarray(load, dtype=float))
+        for joint, (one, _) in self.joints.items():
+            beyond = self.beyond(joint)
+            at = models[one].interfaces[joint].origin
+            loads[one][joint] = sum(
+                (_moved(load, models[owner[name]].interfaces[name].origin - at)
+                 for name, load in ((n, np.abs(np.asarray(x, dtype=float)))
+                                    for n, x in geometric.loads.items())
+                 if owner[name] in beyond),
+                start=np.zeros(6),
+            )  # fmt: skip
+        turning = sum((six[3:] for of in loads.values() for six in of.values()), np.zeros(3)) > 0
+        first = next(iter(self.reference))
+        found: dict[str, Geometric | None] = {}
+        for key, of in loads.items():
+            own = {name: six if key == first else _turned(six, turning)
+                   for name, six in of.items() if six.any()}  # fmt: skip
+            found[key] = replace(geometric, loads=own) if own else None
+        return found
+
+
+def _moved(load: Array, arm: Array) -> Array:
+    """(6,) largest force and moment at a point from those (6,) that act at an arm from it."""
+    x, y, z = np.abs(arm)
+    cross = np.array([[0, z, y], [z, 0, x], [y, x, 0]])
+    return np.concatenate([load[:3], load[3:] + cross @ load[:3]])
+
+
+def _turned(load: Array, turning: Mask) -> Array:
+    """Largest force and moment (6,) in a frame that turns about some of the axes (3,)."""
+    if np.count_nonzero(turning) > 1:
+        return np.repeat([np.linalg.norm(load[:3]), np.linalg.norm(load[3:])], 3)
+    found = load.copy()
+    across = ~turning
+    found[:3][across] = np.linalg.norm(load[:3][across])
+    return found

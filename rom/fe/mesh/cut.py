@@ -1,0 +1,150 @@
+"""A mesh cut along faces of its cells, by planes or by regions."""
+
+from dataclasses import replace
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+
+from rom.arguments import finite, whole
+from rom.errors import ConfigError, MeshError, TagError
+from rom.fe.mesh.solid import SolidMesh
+from rom.fe.mesh.topology import faces_of, row_ids
+from rom.model import Array, Index
+from rom.names import named
+
+PLANE_RTOL = 1e-6  # of the length along the axis: how far nodes of a cut may lie from its plane
+
+
+def cut(mesh: SolidMesh, n: int | None = None, axis: Any = None) -> dict[str, SolidMesh]:
+    """{name: piece} of a mesh, cut into n along an axis, or by its regions.
+
+    Where two pieces meet both have the surface, of one name: "cut 1" between the pieces "1" and
+    "2" of an axis, "hub-blade" between two regions.
+
+    Args:
+        mesh: the whole, in layers of cells where it is cut by planes.
+        n: number of pieces of about equal length, cut between layers of cells.
+        axis: (3,) direction of the cuts' normal [1]; None to make a piece of each region.
+
+    Raises:
+        ConfigError: for n or axis without the other, or out of range.
+        MeshError: if there are fewer layers than pieces, or they are not flat.
+        TagError: if there is one region only, a cut crosses a named surface, or a surface has the
+            name of a cut.
+    """
+    faces = faces_of(mesh.cells, mesh.kind, len(mesh.points))
+    piece, names = _by_planes(mesh, n, axis) if axis is not None else _by_regions(mesh, n)
+    rows = mesh.cells[:, np.array(mesh.kind.face_nodes)]
+    cuts: dict[str, tuple[tuple[int, int], Index]] = {}
+    inner = faces.count[faces.of_cell] == 2
+    for i, j in combinations(range(len(names)), 2):
+        both = [np.unique(faces.of_cell[piece == k][inner[piece == k]]) for k in (i, j)]
+        shared = np.intersect1d(*both)
+        if shared.size:
+            of_first = np.isin(faces.of_cell, shared) & (piece == i)[:, None]
+            name = f"cut {i + 1}" if axis is not None else f"{names[i]}-{names[j]}"
+            cuts[name] = (i, j), rows[of_first]
+    if double := sorted(set(cuts) & set(mesh.facets)):
+        raise TagError(f"surface {named(double)} has the name of a cut.",
+                       hint="Give it another one.")  # fmt: skip
+    if axis is not None:
+        _refuse_rough(mesh, cuts, np.asarray(axis, dtype=float))
+    found = {name: _piece(mesh, piece, k, cuts, name) for k, name in enumerate(names)}
+    for cut_name, ((i, j), _) in cuts.items():
+        doubled = set(found[names[i]].facets) & set(found[names[j]].facets) & set(mesh.facets)
+        if doubled:
+            raise TagError(f"surface {named(sorted(doubled))} lies on {cut_name!r}.",
+                           hint="Leave it without a name: the cut has one.")  # fmt: skip
+    return found
+
+
+def _by_planes(mesh: SolidMesh, n: int | None, axis: Any) -> tuple[Index, list[str]]:
+    """The piece of each cell by its middle, and the names of the pieces."""
+    a = finite("axis", axis, (3,))
+    if n is None or not a.any():
+        raise _nothing_to_cut(n, axis)
+    whole("n", n, 2, reason="one piece is the whole body")
+    along = mesh.points @ (a / np.linalg.norm(a))
+    middle = along[mesh.corners].mean(axis=1)
+    low, high = along.min(), along.max()
+    piece = np.floor(n * (middle - low) / (high - low)).astype(np.int64)
+    if empty := sorted(set(range(n)) - set(piece.tolist())):
+        raise MeshError(
+            f"piece {empty[0] + 1} of {n} along {a.tolist()} has no cells: they are longer.",
+            hint="Ask for fewer pieces, or mesh more finely along the axis.",
+        )
+    return piece, [str(k + 1) for k in range(n)]
+
+
+def _by_regions(mesh: SolidMesh, n: int | None) -> tuple[Index, list[str]]:
+    """The piece of each cell is its region."""
+    if n is not None:
+        raise _nothing_to_cut(n, None)
+    tags = sorted(mesh.region_names)
+    if len(tags) < 2:
+        raise TagError(
+            f"the mesh has one region, {named(mesh.region_names.values())}: nowhere to cut it.",
+            hint="Give n and axis, or name volumes that share faces in the geometry.",
+        )
+    return np.searchsorted(tags, mesh.regions), [mesh.region_names[tag] for tag in tags]
+
+
+def _nothing_to_cut(n: Any, axis: Any) -> ConfigError:
+    return ConfigError(
+        f"n = {n!r} and axis = {axis!r} say no cuts.",
+        hint="Give both, as n=4, axis=(1, 0, 0), or neither to make a piece of each region.",
+    )
+
+
+def _refuse_rough(mesh: SolidMesh, cuts: Any, axis: Array) -> None:
+    """Say where the faces between two pieces do not lie in a plane."""
+    along = mesh.points @ (axis / np.linalg.norm(axis))
+    for name, (_, rows) in cuts.items():
+        depth = float(np.ptp(along[rows]))
+        if depth > PLANE_RTOL * np.ptp(along):
+            raise MeshError(
+                f"{name!r} is not flat: its nodes lie {depth:.3g} m apart along {axis.tolist()}, "
+                "the cells are not in layers there.",
+                hint="Cut the geometry in gmsh and name the volumes: without n and axis each "
+                "region is a piece.",
+            )
+
+
+def _piece(mesh: SolidMesh, piece: Index, k: int, cuts: Any, name: str) -> SolidMesh:
+    """The cells of one piece, with the surfaces that it has."""
+    own = piece == k
+    outer = {key: rows for key, (pair, rows) in cuts.items() if k in pair}
+    used = set(np.unique(mesh.regions[own]).tolist())
+    ids = np.flatnonzero(own) if mesh.cell_ids is None else mesh.cell_ids[own]
+    facets = _named_facets(mesh, own, name) | outer
+    return replace(
+        mesh,
+        cells=mesh.cells[own],
+        regions=mesh.regions[own],
+        region_names={tag: text for tag, text in mesh.region_names.items() if tag in used},
+        facets=facets,
+        cell_ids=ids,
+        warnings=None,
+        axes={key: axis for key, axis in mesh.axes.items() if key in facets},
+        provenance=mesh.provenance | {"piece": name},
+    )
+
+
+def _named_facets(mesh: SolidMesh, own: Any, name: str) -> dict[str, Index]:
+    """Those surfaces of the mesh that are faces of the cells of one piece."""
+    kind, n = mesh.kind, len(mesh.points)
+    listed = mesh.corners[own][:, np.array(kind.faces)].reshape(-1, kind.corners_per_face)
+    found = {}
+    for key, rows in mesh.facets.items():
+        corners = rows[:, : kind.corners_per_face]
+        both, _ = row_ids(np.sort(np.vstack([listed, corners]), axis=1), n)
+        inside = np.isin(both[len(listed) :], both[: len(listed)])
+        if inside.all():
+            found[key] = rows
+        elif inside.any():
+            raise TagError(
+                f"surface {key!r} lies partly on piece {name!r}: a cut crosses it.",
+                hint="Name the parts of the surface, or cut elsewhere.",
+            )
+    return found

@@ -1,0 +1,234 @@
+"""One solid as several reduced bodies: statics far out, frequencies, momentum, and its refusals."""
+
+import subprocess
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.optimize import brentq
+from scipy.special import ellipe, ellipeinc, ellipk, ellipkinc
+
+import rom
+from cases.paths import RANKS, ROOT
+from cases.ranks.environment import ENVIRONMENT
+from rom.assembly.pieces import Tree
+from rom.errors import ConfigError, InterfaceError, ModelError
+from rom.process.mpirun import mpirun
+
+pytest.importorskip("dolfinx", reason="dolfinx is not installed")
+pytest.importorskip("gmsh", reason="gmsh is not installed")
+pytestmark = [
+    pytest.mark.fenicsx,
+    pytest.mark.once,
+    pytest.mark.filterwarnings("ignore:Number of integration points"),
+    pytest.mark.filterwarnings("ignore::rom.errors.RomWarning"),
+]
+E, THICK = 210e9, 0.01
+EI = E * THICK**4 / 12
+
+
+def beam(n, cells, *, nu=0.0, thick=THICK):
+    """Models of the pieces of a beam 1 m long along x."""
+    size = {"L": 1.0, "b": thick, "h": thick, "hex": 1, "nx": cells, "ny": 1, "nz": 1}
+    material = rom.Material(E=E, nu=nu, rho=7850.0)
+    if n == 1:
+        return rom.fe.model("meshes/beam.geo", material=material, parameters=size)
+    return rom.fe.pieces("meshes/beam.geo", n=n, axis=(1, 0, 0), material=material, parameters=size)
+
+
+def clamped(pieces):
+    mech = rom.Mechanism(gravity=(0, 0, 0))
+    markers = pieces.add_to(mech, "beam")
+    assert set(markers) == {"root", "tip"}
+    mech.fixed("wall", mech.ground.marker((0, 0, 0)), markers["root"])
+    return mech, markers["tip"]
+
+
+def elastica(load):
+    """Slope [rad], place along and across over the length of the tip under load EI / L^2.
+
+    sqrt(load) = K(k) - F(arcsin(1 / (k sqrt 2)), k), the slope at the tip is arcsin(2 k^2 - 1).
+    """
+
+    def length(k):
+        return ellipk(k * k) - ellipkinc(np.arcsin(1 / (k * np.sqrt(2))), k * k)
+
+    k = brentq(lambda k: length(k) - np.sqrt(load), np.sqrt(0.5) + 1e-13, 1 - 1e-14)
+    m, s = k * k, 2 * k * k - 1
+    bent = ellipe(m) - ellipeinc(np.arcsin(1 / (k * np.sqrt(2))), m)
+    return np.arcsin(s), np.sqrt(2 * s / load), 1 - 2 / np.sqrt(load) * bent
+
+
+def tip_at(mech, tip, steps):
+    """Slope [rad], place along and across [m]."""
+    still = rom.snapshot(mech, rom.equilibrium(mech, steps=steps))
+    x, _, z = still.position(tip.body, tip.place)[0]
+    A = still.axes(tip.body, tip.place)[0]
+    return np.array([np.arctan2(A[2, 0], A[0, 0]), x, z])
+
+
+def test_a_cantilever_of_pieces_follows_the_elastica_to_ten():
+    assert_allclose(elastica(5.0), [1.215368, 1 - 0.387628, 0.713792], atol=1e-6)
+    loads = {"tip": (0, 0, 10 * EI, 0, 0, 0)}
+    pieces = rom.reduce_pieces(
+        beam(4, 40),
+        reference="root",
+        method=rom.CraigBampton(n_modes=4),
+        nonlinear=rom.Geometric(loads=loads, n_modes=2),
+        certify=False,
+    )
+    for load in (2.0, 10.0):
+        mech, tip = clamped(pieces)
+        mech.force("load", tip, (0, 0, load * EI))
+        assert_allclose(tip_at(mech, tip, 16), elastica(load), rtol=0, atol=2e-3)
+
+
+def test_a_moment_bends_pieces_to_half_a_circle_the_better_the_more_there_are():
+    gaps = []
+    for n in (4, 8):
+        pieces = rom.reduce_pieces(
+            beam(n, 32),
+            reference="root",
+            method=rom.CraigBampton(n_modes=2),
+            nonlinear=rom.Geometric(loads={"tip": (0, 0, 0, 0, np.pi * EI, 0)}, n_modes=2),
+            certify=False,
+        )
+        mech, tip = clamped(pieces)
+        mech.torque("load", tip, (0, -np.pi * EI, 0))
+        slope, x, z = tip_at(mech, tip, 8)
+        gaps.append(np.linalg.norm([x, z - 2 / np.pi]))
+        assert abs(slope - np.pi) < 0.02 * np.pi
+    assert gaps[1] < 0.01 and gaps[1] < 0.8 * gaps[0]
+
+
+@pytest.fixture(scope="module")
+def three():
+    """Linear pieces with Poisson's ratio, and the models they are of."""
+    models = beam(3, 12, nu=0.3, thick=0.05)
+    method = rom.CraigBampton(n_modes=12)
+    return rom.reduce_pieces(models, reference="root", method=method, certify=False), models
+
+
+def test_frequencies_and_mass_are_those_of_one_body(three):
+    """Flexible ones of the cantilever; rigid sections would stiffen the pieces."""
+    pieces, models = three
+    whole = beam(1, 12, nu=0.3, thick=0.05)
+    assert_allclose(pieces.mass, whole.mass(), rtol=1e-12)
+    body = rom.reduce(whole, method=rom.CraigBampton(n_modes=30), reference="root",
+                      interfaces={"root": "rbe3", "tip": "rbe3"}, certify=False)  # fmt: skip
+    known = np.sort(body.frequencies(6, fixed=("root",)))
+    found = cantilever_frequencies(pieces)
+    assert_allclose(found[:4], known[:4], rtol=2e-4)
+    stiff = dict.fromkeys(("cut 1", "cut 2"), "rbe2")
+    rigid = rom.reduce_pieces(models, reference="root", method=rom.CraigBampton(n_modes=12),
+                              interfaces=stiff, certify=False)  # fmt: skip
+    worse = cantilever_frequencies(rigid)[:2] / known[:2] - 1
+    assert worse.min() > 10 * np.abs(found[:2] / known[:2] - 1).max()
+
+
+def cantilever_frequencies(pieces):
+    mech, _ = clamped(pieces)
+    return np.sort(rom.linearize(mech, rom.equilibrium(mech)).frequencies)
+
+
+def test_pieces_that_spin_freely_keep_energy_and_momentum():
+    loads = {"tip": (0, 0, EI, 0, 0, 0)}
+    pieces = rom.reduce_pieces(
+        beam(2, 8),
+        reference="root",
+        method=rom.CraigBampton(n_modes=2),
+        nonlinear=rom.Geometric(loads=loads, n_modes=1, n_shapes=6),
+        certify=False,
+    )
+    drifts = np.array([drift_of_spin(pieces, dt) for dt in (1e-4, 5e-5)])
+    assert np.all(drifts[1] < [1e-3, 1e-3, 1e-4])
+    assert np.all(drifts[0] > 3 * drifts[1])
+
+
+def drift_of_spin(pieces, dt):
+    """Relative change of both momenta and of the energy after a kick that bends the beam far."""
+    mech, pulse = rom.Mechanism(gravity=(0, 0, 0)), 0.01
+    markers = pieces.add_to(mech, "beam", at=(1, 2, 3), velocity=(0.2, 0, -0.1), omega=(0, 4.0, 1))
+    mech.force("kick", markers["tip"], lambda t: (0, 0, EI * (t < pulse)))
+    found = rom.simulate(mech, t_end=0.03, dt=dt, rho_inf=1.0)
+    one, two = found.position("beam 1", "cut 1"), found.position("beam 2", "cut 1")
+    assert_allclose(one, two, atol=1e-8)
+    bent = found.position("beam 1", "root") + found.position("beam 2", "tip") - 2 * one
+    assert np.linalg.norm(bent, axis=1).max() > 0.04
+    free, drifts = found.t > pulse + 2.5e-4, []
+    for momentum in found.momentum:
+        kept = momentum[free]
+        drifts.append(np.abs(kept - kept[0]).max() / np.linalg.norm(kept[0]))
+    energy = found.energy.total[free]
+    return [*drifts, np.abs(energy / energy[0] - 1).max()]
+
+
+def test_loads_reach_the_sections_of_pieces():
+    """Three pieces of a third of a metre; by hand."""
+    models = beam(3, 3)
+    tree = Tree.of(models, "root")
+    assert tree.reference == {"1": "root", "2": "cut 1", "3": "cut 2"}
+    ranges = tree.ranges(rom.Geometric(loads={"tip": (0, 0, -3.0, 0, 0, 0)}, tol=1e-3), models)
+    assert all(r.tol == 1e-3 for r in ranges.values())
+    assert_allclose(ranges["1"].loads["cut 1"], [0, 0, 3, 0, 2, 0], atol=1e-12)
+    assert_allclose(ranges["2"].loads["cut 2"], [3, 0, 3, 0, 1, 0], atol=1e-12)
+    assert_allclose(ranges["3"].loads["tip"], [3, 0, 3, 0, 0, 0], atol=1e-12)
+    other = rom.Geometric(loads={"tip": (0, 4.0, 3.0, 0, 0, 0)})
+    ranges = tree.ranges(other, models)
+    assert_allclose(ranges["1"].loads["cut 1"], [0, 4, 3, 0, 2, 8 / 3], atol=1e-12)
+    assert_allclose(ranges["2"].loads["cut 2"], np.repeat([5, 5 / 3], 3), atol=1e-12)
+    from_tip = Tree.of(models, "tip")
+    assert from_tip.reference == {"3": "tip", "2": "cut 2", "1": "cut 1"}
+    at_root = rom.Geometric(loads={"root": (1, 0, 0, 0, 0, 0)})
+    assert_allclose(from_tip.ranges(at_root, models)["3"].loads["cut 2"], [1, 0, 0, 0, 0, 0])
+
+
+def test_pieces_that_make_no_body_are_refused_by_name():
+    models = beam(3, 3)
+
+    def named(key, *names):
+        face = next(iter(models[key].interfaces.values()))
+        return replace(models[key], interfaces=dict.fromkeys(names, face))
+
+    with pytest.raises(ConfigError, match="1 pieces are no body"):
+        Tree.of({"1": models["1"]}, "root")
+    with pytest.raises(InterfaceError, match="'hub' is no interface of one piece"):
+        Tree.of(models, "hub")
+    with pytest.raises(InterfaceError, match="'cut 1' is no interface of one piece"):
+        Tree.of(models, "cut 1")
+    with pytest.raises(InterfaceError, match="piece '3' does not hang on"):
+        Tree.of(models | {"3": named("3", "tip")}, "root")
+    with pytest.raises(ModelError, match="form a ring that closes at 'y'"):
+        Tree.of({"1": named("1", "root", "x", "y"), "2": named("2", "x", "y")}, "root")
+    with pytest.raises(InterfaceError, match="'x' belongs to the pieces '1', '2', '3'"):
+        Tree.of({key: named(key, "x", f"end {key}") for key in models}, "end 1")
+    tree = Tree.of(models, "root")
+    with pytest.raises(InterfaceError, match="names 'cut 1'"):
+        tree.ranges(rom.Geometric(loads={"cut 1": (1, 0, 0, 0, 0, 0)}), models)
+    with pytest.raises(ConfigError, match="with supports beside the reference"):
+        tree.ranges(rom.Geometric(loads={"tip": (1, 0, 0, 0, 0, 0)}, fixed=("tip",)), models)
+    with pytest.raises(InterfaceError, match="no interface 'hub'"):
+        rom.reduce_pieces(models, reference="root", interfaces={"hub": "rbe3"})
+
+
+def test_a_mechanism_takes_pieces_as_one_body_only(three):
+    with pytest.raises(ConfigError, match="pieces take no 'q'"):
+        three[0].add_to(rom.Mechanism(), "beam", q=np.zeros(3))
+
+
+@pytest.mark.mpi
+def test_pieces_are_the_same_on_two_processes(tmp_path):
+    found = []
+    for n in (1, 2):
+        file = tmp_path / f"{n}.npz"
+        script = str(RANKS / "pieces_under_mpi.py")
+        subprocess.run(
+            [*mpirun(n), sys.executable, script, str(file)],
+            env=ENVIRONMENT, timeout=300, check=True, capture_output=True, cwd=ROOT,
+        )  # fmt: skip
+        found.append(np.load(file))
+    assert_allclose(found[0]["mass"], 11.775 + 0.5, rtol=1e-12)
+    for name in ("a", "b", "mass"):
+        assert_allclose(found[1][name], found[0][name], rtol=1e-7)
