@@ -129,7 +129,10 @@ if first:
               "carrier": view.joined([*arms, axle])}  # fmt: skip
     view.instants(train(error=0.0), smooth, options.out / "planetary_motion.png", shapes=shapes,
                   times=[0.0, 0.012, 0.024, 0.036], view=(0.3, 0.2, 1.0), up=(0, 1, 0),
-                  symbols=False)  # fmt: skip
+                  symbols=False,
+                  caption=f"Planetary train seen from the motor: a sun of {SUN} teeth drives three "
+                  f"planets of {PLANET} inside a ring of {abs(RING)}, drawn without its teeth; the "
+                  "carrier behind them is braked, and is carried round.")  # fmt: skip
     t = smooth.t[late]
     some = t < t[0] + 0.03
     out = np.linalg.norm(rough.element("sun and planet 0").force[late, 0], axis=1)

@@ -19,6 +19,7 @@ from rom.mbs.analysis.campbell import Campbell  # noqa: E402
 from rom.model import FEModel, Interface, SurfaceMesh  # noqa: E402
 from rom.view.canvas.offscreen import render  # noqa: E402
 from rom.view.canvas.scene import Actor, Camera, aimed, sharp_edges  # noqa: E402
+from rom.view.figures.curves import _apart  # noqa: E402
 from rom.view.scenes.film import Look, _stage  # noqa: E402
 
 
@@ -264,6 +265,11 @@ def test_values_within_two_decades_have_ticks_at_one_two_five():
     before = list(axes.get_yticks())
     near_ticks(axes.yaxis)
     assert list(axes.get_yticks()) == before
+
+
+def test_ticks_too_close_for_words_have_none():
+    sizes = [12, 18, 24, 30, 36, 60, 90, 96, 99, 126, 1482]
+    assert _apart(sizes, 1500 / 11) == [f"{x}" * (x not in (96, 99)) for x in sizes]
 
 
 def test_convergence_is_drawn_per_panel_and_curve(tmp_path):

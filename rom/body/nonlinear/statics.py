@@ -130,7 +130,8 @@ def _beyond(body: Held, y: Array, stretch: tuple[Array, Array], done: float) -> 
 def _lost(done: float) -> ModelError:
     return ModelError(
         f"no stable equilibrium was found beyond {done:.4g} of a step of load.",
-        hint="Ask for smaller loads: the body buckles before, or gives way.",
+        hint="Ask for smaller loads: the body buckles before, or gives way. A piece of a slender "
+        "body that is cut (rom.fe.pieces) has more of them to share the turning with.",
     )
 
 

@@ -27,6 +27,7 @@ GREY = "#5c636e"
 LEVEL_STYLE = {"color": GREY, "ls": "-.", "lw": 0.9, "zorder": 1.5}
 RAYS_LABEL = "multiples of the speed"
 MAX_TICKS = 10  # sizes that have room for a tick each
+TICK_DISTANCE = 0.03  # least distance of words of ticks, of a logarithmic axis
 MIN_ERROR = 1e-12  # errors below are drawn there: round-off has no meaning
 
 
@@ -334,6 +335,16 @@ def _multiples(axes: Any, diagram: Any, turns: Any, orders: Sequence[float]) -> 
             axes.plot(at, order * at / 60, "o", ms=11, mfc="none", mec="#1d2733", mew=1.3)
 
 
+def _apart(ticks: Any, span: float) -> list[str]:
+    """Words of ticks on a logarithmic axis of that span; none where they would overlap."""
+    words, last = [], 0.0
+    for tick in ticks:
+        clear = tick >= last * span**TICK_DISTANCE
+        words.append(f"{tick:g}" if clear else "")
+        last = tick if clear else last
+    return words
+
+
 def _same_sizes(areas: Sequence[Any], sizes: list[Any]) -> None:
     """One horizontal axis for all panels, with ticks at the sizes themselves if they are few."""
     ticks = np.unique(np.concatenate([np.asarray(x, dtype=float) for x in sizes]))
@@ -343,7 +354,7 @@ def _same_sizes(areas: Sequence[Any], sizes: list[Any]) -> None:
         ticks = np.outer(decades, [1, 2, 5]).ravel()
         ticks = ticks[(ticks >= low) & (ticks <= high)]
     for axes in areas:
-        axes.set_xticks(ticks, [f"{x:g}" for x in ticks])
+        axes.set_xticks(ticks, _apart(ticks, high / low))
         axes.minorticks_off()
         axes.set_xlim(low, high)
 

@@ -108,11 +108,13 @@ def instants(  # noqa: PLR0913  keywords of one picture, all with defaults
     traces: tuple[str, ...] = (),
     view: npt.ArrayLike | None = None,
     up: npt.ArrayLike | None = None,
+    caption: str = "",
 ) -> "Figure":
     """The mechanism at some instants (n,) [s], side by side; otherwise as `animate`.
 
     Without ``times`` the start and up to three more instants are drawn, at which the bodies are
-    farthest from where they are in the others. The path ends in .png.
+    farthest from where they are in the others. The path ends in .png. What ``caption`` says of
+    them stands before what is said of deformations.
 
     Raises:
         ConfigError: for an unknown body, or if pictures cannot be made here.
@@ -125,7 +127,8 @@ def instants(  # noqa: PLR0913  keywords of one picture, all with defaults
     camera = stage.camera(STILL_WIDTH, view, up)
     images = render(stage.actors, camera, limits=stage.limits)
     with page.styled():
-        return page.save(_series_sheet(stage, camera, images, solution.t[steps], magnify), path)
+        words = f"{caption} {_words(stage, magnify)}".lstrip()
+        return page.save(_series_sheet(stage, camera, images, solution.t[steps], words), path)
 
 
 @typed
@@ -350,11 +353,11 @@ def _film_sheet(stage: Stage, camera: Camera, height: int, magnify: float) -> Im
     return page.pixels(figure)
 
 
-def _series_sheet(stage: Stage, camera: Camera, images: Image, times: Array, magnify: float) -> Any:
+def _series_sheet(stage: Stage, camera: Camera, images: Image, times: Array, words: str) -> Any:
     columns = min(2, len(images))
     width, height = columns * (STILL_WIDTH + 20) + 20, images.shape[1] + 50
     rows = -(-len(images) // columns)
-    text, below = page.caption(_words(stage, magnify), width - 60)
+    text, below = page.caption(words, width - 60)
     foot = 20 + rows * height
     figure = page.sheet(width, foot + STRIP_HEIGHT + below + 40)
     texts = clock_texts(times)
