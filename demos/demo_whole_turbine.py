@@ -153,10 +153,11 @@ view.history(
     beside=[view.posed(plant.mechanism, motion, time, title=f"After {time:g} s", **look)
             for time in (0.0, 10.0, 40.0)],
     caption="Tower and blades are rods, the hub is meshed and reduced, nacelle and generator are "
-    "rigid. A torque that is limited and vanishes at 12.1 turns a minute starts the rotor from rest. "
-    "Blades lag behind while they gain speed and swing under their weight once a turn, a third of a "
-    "turn after each other. The tower leans upwind under the weight of the rotor; the torque tilts "
-    "it sideways, where it sways at its own 0.31 Hz. Colours: how far the hub gives way.",
+    "rigid. A torque that is limited and vanishes at 12.1 turns a minute starts the rotor from "
+    "rest. Blades lag behind while they gain speed and swing under their weight once a turn, a "
+    "third of a turn after each other. The tower leans upwind under the weight of the rotor; the "
+    "torque tilts it sideways, where it sways at its own 0.31 Hz. Colours: how far the hub gives "
+    "way.",
 )  # fmt: skip
 
 # ## The film
