@@ -57,7 +57,7 @@ def unit(torque, rpm, helix=0.0, celsius=60.0, correction=None):
         )
         for z, way, size in zip(TEETH, (load + np.pi, -load), BUSHES, strict=True)
     ]  # fmt: skip
-    k = 15e9 if helix else stiffness_table(pair, force=torque / pair.rb[0] / pair.width)
+    k = stiffness_table(pair, force=torque / pair.rb[0] / pair.width)
     mesh = Mesh(pair, k, correction or Correction(), damping=2e-6)
     viscosity = float(OIL.viscosity(celsius))
     return Transmission(*rotors, mesh, rpm * np.pi / 30, torque * TEETH[1] / TEETH[0], viscosity)

@@ -1,6 +1,7 @@
 """Loads, tools and steps in time of sheets: closed forms of statics, impact and metal forming."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -144,6 +145,24 @@ def test_a_block_that_is_pressed_too_flat_is_doubted(n, share):
     height, width = x[:, 1].max(), x[:, 0].max()
     stress = PLANE * (500 + 300 * PLANE * np.log(1 / height))
     assert -course.tool_forces[-1, 0, 1] / width < 0.99 * stress
+
+
+@pytest.mark.parametrize("at_once", [1, 100, 100_000])
+def test_the_doubt_names_the_first_instant_and_its_worst_triangle(monkeypatch, at_once):
+    """Of sheared and uneven sheets, flat at the third instant and the fourth of seven."""
+    monkeypatch.setattr("rom.components.assumed_strain.implicit.TRIANGLES_AT_ONCE", at_once)
+    (body, held), rng, kept = block((4, 4)), np.random.default_rng(5), []
+    for k, height in enumerate((1.0, 0.35, 0.18, 0.1, 0.4, 0.5, 1.0)):
+        x = body.points @ [[1.0, 0.0], [0.7, height]] + rng.normal(0, 0.006, body.points.shape)
+        kept.append(SimpleNamespace(t=0.1 * k, x=x))
+    F = [np.einsum("tia,tsib->tsab", now.x[body.patch], body.gradients[:, 0]) for now in kept]
+    s = np.linalg.svd(np.reshape(F, (7, len(body.patch), -1, 2)), compute_uv=False)
+    worst = s[..., 0] / s[..., 1]
+    assert [ratio.max() > 10 for ratio in worst] == [False] * 2 + [True] * 2 + [False] * 3
+    named = f"from 0.2 s on triangle {worst[2].argmax()} is stretched {worst[2].max():.3g} times"
+    with pytest.warns(RomWarning, match=named) as told:
+        _Way(body, SOFT, Actions(held), None, 0.0).doubt(kept)
+    assert len(told) == 1
 
 
 @pytest.mark.parametrize("friction", [0.0, 0.05, 0.1])

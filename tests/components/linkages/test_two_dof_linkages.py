@@ -8,11 +8,12 @@ from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 
 import rom
-from cases.mbs.linkages import five_bar_of_the_core
+from cases.mbs.linkages import five_bar_of_the_core, rail_of_the_core
 from cases.mbs.mechanisms import simulate_quietly
 from cases.solid import STEEL, block
 from rom.components.linkages.dynamic_isotropy import christoffel, index_map
 from rom.components.linkages.two_dof_linkages import (
+    Driven,
     FiveBar,
     TwoLink,
     mechanism_inertia,
@@ -88,6 +89,34 @@ def test_the_core_moves_to_other_angles():
     mech = five_bar_of_the_core(q, [(2.0, 0.3)] * 2, [(1.0, 0.8)] * 2, FIVE.posture(*q))
     core = mechanism_inertia(mech, ("left", "right"), angles=turn)
     assert_allclose(core, FIVE.inertia(*(q + turn)), rtol=1e-7)
+
+
+@pytest.mark.parametrize(("base", "cranks", "couplers", "start", "turn"), [
+    (0.884, (0.548, 0.400), (0.989, 0.949), (5.132, 1.752), (-3.249, 2.956)),
+    (0.497, (0.539, 0.286), (0.658, 0.885), (1.584, 3.499), (3.224, -2.560)),
+    (0.642, (0.325, 0.446), (0.579, 0.774), (0.014, 4.312), (4.384, 4.304)),
+])  # fmt: skip
+def test_cranks_that_turn_far_keep_the_tip_on_its_side(base, cranks, couplers, start, turn):
+    """Assembled at once, couplers would meet on the other side, 0.9 m and more away."""
+    sizes = [[(1.0, length) for length in pair] for pair in (cranks, couplers)]
+    five = FiveBar(base, *(tuple(rod(*size) for size in pair) for pair in sizes), payload=0.5)
+    start, end = np.array(start), np.add(start, turn)
+    core = Driven(five_bar_of_the_core(start, *sizes, five.posture(*start)), ("left", "right"),
+                  tool="ball")  # fmt: skip
+    assert np.linalg.norm(five.tip(*end) - replace(five, side=-1).tip(*end)) > 0.8
+    assert_allclose(core.tip(*turn), five.tip(*end), atol=1e-8)
+    assert_allclose(core.inertia(*turn), five.inertia(*end), rtol=1e-6)
+
+
+def test_slides_of_a_small_mechanism_travel_many_of_its_sizes():
+    """Couplers of 4 mm on a rail of 200 mm: lengths count in sizes of the mechanism."""
+    core = Driven(rail_of_the_core(1.3, (0.9, 4e-3), 0.4, 5e-3), ("left", "right"), tool="tool")
+    travel = 0.2
+    there = core.tip([0.0, travel], [1e-3, travel + 1e-3])
+    height = np.sqrt(4e-3**2 - 3e-3**2)
+    assert_allclose(there, [[3e-3, height], [3e-3 + travel, height]], rtol=1e-9)
+    inertia = core.inertia([0.0, travel], [1e-3, travel + 1e-3])
+    assert_allclose(inertia[1], inertia[0], rtol=1e-7)
 
 
 @pytest.mark.parametrize("elastic", ["held", "free"])
