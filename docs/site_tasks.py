@@ -4,8 +4,8 @@
 TASKS: dict[str, tuple[str, str]] = {
     "From geometry to matrices": (
         "A mesh and its materials become stiffness and mass.",
-        """Material Orthotropic Layered fe.model fe.assemble read_component Region Interface
-        Attachment SurfaceMesh FEModel mass_properties modes Modes
+        """Material Orthotropic Layered fe.model fe.pieces fe.assemble read_component Region
+        Interface Attachment SurfaceMesh FEModel mass_properties modes Modes
         eigen.substructured_modes""",
     ),
     "Reduce": (
@@ -25,7 +25,8 @@ TASKS: dict[str, tuple[str, str]] = {
         updating.AddedMass updating.MeasuredModes updating.Plan updating.place
         updating.candidates updating.independent updating.tracker updating.Tracker
         updating.Sensors updating.Track updating.Observer io.write_observer_fmu
-        updating.parameter_tracker updating.ParameterTracker updating.Drift""",
+        updating.parameter_tracker updating.ParameterTracker updating.Drift updating.compare
+        updating.Comparison""",
     ),
     "Check": (
         "What tells how far to trust a model, a body, a motion or a law.",
@@ -34,7 +35,7 @@ TASKS: dict[str, tuple[str, str]] = {
     "Assemble": (
         "Bodies put together before any motion.",
         """Assembly assembly.CondensedAssembly substructure FreeSubstructure
-        assembly.free_substructure DualAssembly""",
+        assembly.free_substructure DualAssembly reduce_pieces Pieces""",
     ),
     "Wheels": (
         "Equal sectors, at rest and in rotation, with blades that are alike or not.",

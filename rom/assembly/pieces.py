@@ -63,12 +63,10 @@ class Pieces:
                 piece has of its own.
 
         Example:
-            >>> beam = {"n": 2, "axis": (1, 0, 0), "material": rom.Material(E=2e11, nu=0, rho=1.0)}
-            >>> beam["parameters"] = {"hex": 1, "nx": 6, "ny": 1, "nz": 1}
-            >>> models = rom.fe.pieces("meshes/beam.geo", **beam)
-            >>> pieces = rom.reduce_pieces(models, reference="root")
-            >>> mech = rom.Mechanism()
-            >>> markers = pieces.add_to(mech, "beam")
+            >>> beam = {"material": rom.Material(E=2e11, nu=0, rho=7850), "parameters": {"lc": 0.1}}
+            >>> halves = rom.fe.pieces("meshes/beam.geo", n=2, axis=(1, 0, 0), **beam)
+            >>> pieces = rom.reduce_pieces(halves, reference="root")
+            >>> markers = pieces.add_to(mech := rom.Mechanism(), "beam")
             >>> markers["tip"].body, list(mech.joints)
             ('beam 2', ['beam cut 1'])
         """

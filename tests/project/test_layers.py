@@ -260,8 +260,8 @@ ORDER = {
         "solids",
     ),
     "body": (
-        "nonlinear",
         "recovery",
+        "nonlinear",
         "records",
         "inertia",
         "reference",
