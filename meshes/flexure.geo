@@ -4,8 +4,8 @@
 // Volume "body"; surfaces "base" (the back of the base) and "drive" (the end of the tongue).
 DefineConstant[
   L = {0.05, Name "L"},         // length of a leaf
-  t = {0.0005, Name "t"},       // thickness of a leaf, along y
-  b = {0.003, Name "b"},        // thickness of the plate, along z
+  t = {0.001, Name "t"},       // thickness of a leaf, along y
+  b = {0.005, Name "b"},        // thickness of the plate, along z
   s = {0.024, Name "s"},        // distance of the middles of the leaves
   w = {0.008, Name "w"},        // base and stage, along x
   a = {0.008, Name "a"},        // width of the tongue, along y
