@@ -170,8 +170,8 @@ if first:
         title="A stage on two leaves, cut from one plate",
         caption=f"A plate of aluminium, {1e3 * b:.0f} mm thick, with leaves {1e3 * L:.0f} mm long "
         f"and {1e3 * t:.0f} mm thick, held at the back of its base and pushed across at its "
-        f"tongue, as one reduced body of {body.n_modes} coordinates in a mechanism. Top right: von Mises "
-        "stress along the middle of the upper leaf; near the roots the blocks hinder it from "
+        f"tongue, as one reduced body of {body.n_modes} coordinates in a mechanism. Top right: von "
+        "Mises stress along the middle of the upper leaf; near the roots the blocks hinder it from "
         "changing its width, which lowers it. Below: force, motion towards the base and hardening "
         "against thin lines; a linear body goes straight. Bottom right: the reduced body against "
         "the finite elements at three loads, and what is allowed.",
