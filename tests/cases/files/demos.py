@@ -13,7 +13,8 @@ MESHED = [path for path in DEMOS if "rom.fe" in path.read_text()]
 # about ten seconds each and more, of what has tests of its own
 LONG_DEMOS = {
     "demo_assembly", "demo_beam", "demo_bent_blade", "demo_best_matching", "demo_bladed_disk",
-    "demo_bolted_frame", "demo_compressor_blade", "demo_exchange", "demo_forming", "demo_hand",
+    "demo_bolted_frame", "demo_compressor_blade", "demo_exchange", "demo_flexure", "demo_forming",
+    "demo_hand",
     "demo_large_deflection", "demo_large_mesh", "demo_lost_tip",
     "demo_masonry", "demo_mistuning", "demo_oil_inlet", "demo_parameters", "demo_pendulum_chain",
     "demo_periodic", "demo_planetary",
@@ -31,6 +32,7 @@ LEFT_BEHIND = {
     "demo_bolted_frame": {"bolted_frame.png"},
     "demo_bladed_disk": {"bladed_disk_modes.png", "bladed_disk_diagrams.png"},
     "demo_compressor_blade": {"compressor_blade.png"},
+    "demo_flexure": {"flexure.png"},
     "demo_forming": {"forming.png", "upsetting.gif"},
     "demo_hand": {"hand.png", "hand_control.png", "hand_grasp.gif", "hand_grasp.png"},
     "demo_exchange": {
