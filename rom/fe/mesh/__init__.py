@@ -2,7 +2,7 @@
 
 `sources` reads files into a `solid`, in a `child` process; `picks` says which faces are meant,
 `cad` what is known of them; `topology`, `curving`, `quality`, `repair`, `validate` and `summary`
-look at it; `cell_types` numbers nodes; `distribute` hands it to the ranks,
+look at it; `cell_types` numbers nodes; `cut` makes pieces, `distribute` hands it to the ranks,
 `input_deck` to other programs; `read` does all.
 """
 
