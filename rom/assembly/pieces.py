@@ -197,19 +197,15 @@ class Tree:
             raise InterfaceError(
                 f"the range of loads names {named(unknown)}; the pieces have {offered(owner)}."
             )
+        largest = {name: np.abs(np.asarray(x, dtype=float)) for name, x in geometric.loads.items()}
         loads: dict[str, dict[str, Array]] = {key: {} for key in self.reference}
-        for name, load in geometric.loads.items():
-            loads[owner[name]][name] = np.abs(np.asarray(load, dtype=float))
+        for name, load in largest.items():
+            loads[owner[name]][name] = load
         for joint, (one, _) in self.joints.items():
-            beyond = self.beyond(joint)
-            at = models[one].interfaces[joint].origin
-            loads[one][joint] = sum(
-                (_moved(load, models[owner[name]].interfaces[name].origin - at)
-                 for name, load in ((n, np.abs(np.asarray(x, dtype=float)))
-                                    for n, x in geometric.loads.items())
-                 if owner[name] in beyond),
-                start=np.zeros(6),
-            )  # fmt: skip
+            beyond, at = self.beyond(joint), models[one].interfaces[joint].origin
+            moved = (_moved(load, models[owner[name]].interfaces[name].origin - at)
+                     for name, load in largest.items() if owner[name] in beyond)  # fmt: skip
+            loads[one][joint] = sum(moved, start=np.zeros(6))
         turning = sum((six[3:] for of in loads.values() for six in of.values()), np.zeros(3)) > 0
         first = next(iter(self.reference))
         found: dict[str, Geometric | None] = {}

@@ -66,8 +66,9 @@ def certify_body(
             support = " + ".join(fixed) + " held" if fixed else "free"
             begin(f"compare with the full model, {support}")
             full = connection.ops.affordable and (known or not fixed)
-            held = full_support(connection, parts, fixed)
-            if fixed == tuple(connection.parts)[:1] and len(connection.parts) > 1:
+            loaded = fixed == tuple(connection.parts)[:1] and len(connection.parts) > 1
+            held = full_support(connection, parts, fixed) if full or loaded else None
+            if loaded:
                 held = connection.ops.hold(held) if isinstance(held, np.ndarray) else held
                 static = _static_row(connection, body, held)
             reduction = basis, parts, matrices
