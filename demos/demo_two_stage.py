@@ -31,6 +31,7 @@ say = print if first and not options.quiet else lambda *_: None
 # solid up to their root circles; their rims carry harmonics around times polynomials along
 # the face.
 
+MESHES = Path(__file__).parents[1] / "meshes"
 STEEL = rom.Material(E=206e9, nu=0.3, rho=7850.0)
 IRON = rom.Material(E=120e9, nu=0.26, rho=7200.0)
 PAIRS = {
@@ -57,7 +58,7 @@ def shaft(name, rim):
         root = (teeth - 2.5) * module
         keys = ("D", "b") if end == "w" else ("D_2", "b_2")
         sizes |= {f"z_{end}": z} | dict(zip(keys, (root, width), strict=True))
-    model = rom.fe.model("meshes/gear_shaft.geo", material=STEEL, parameters=sizes)
+    model = rom.fe.model(MESHES / "gear_shaft.geo", material=STEEL, parameters=sizes)
     rims = {wheel: rim for wheel in WHEELS[name]}
     seats = dict.fromkeys(("journal_a", "journal_b", "end_a"), "rbe3")
     return rom.reduce(model, method=rom.CraigBampton(4), interfaces=seats | rims,
@@ -67,7 +68,7 @@ def shaft(name, rim):
 box = {"L": 0.6, "W": 0.2, "H": 0.28, "a": 0.13, "a_2": 0.17, "z_s": HEIGHT, "l_s": SEAT,
        "d_1": DIAMETER["input"], "d_m": DIAMETER["middle"], "d_2": DIAMETER["output"],
        "lc": 0.024}  # fmt: skip
-housing_model = rom.fe.model("meshes/housing.geo", material=IRON, parameters=box)
+housing_model = rom.fe.model(MESHES / "housing.geo", material=IRON, parameters=box)
 seats = {f"{name}_{side}": "rbe3" for name in PLACE for side in ("front", "back")}
 housing = rom.reduce(housing_model, method=rom.CraigBampton(6), interfaces=seats | {"feet": "rbe2"},
                      reference="feet", certify=False)  # fmt: skip
