@@ -183,12 +183,11 @@ if first:
                           shift=out * np.sign(SPINS[name]))
            for name in PLACE for side, out in (("front", -0.016), ("back", 0.016))]  # fmt: skip
     case = view.meshed(housing_model)["_surface"]
-    lower = case.cells[case.points[case.cells, 2].mean(axis=1) < HEIGHT]
     things = {
-        "_housing": view.Thing(
-            case.points, lower, "#c9d1da", opacity=0.35, edges=np.zeros((0, 2), dtype=int)
-        ),
         **{f"{name} shaft": view.toothed_shaft(mech, name) for name in PLACE},
+        "housing": view.Thing(
+            case.points, case.cells, "#c9d1da", opacity=0.35, edges=np.zeros((0, 2), dtype=int)
+        ),
         "load on the teeth": view.Thing(*view.joined(walls), "#edae49"),
         "oil pressure": view.Thing(*view.joined(oil), "#66a182"),
     }
@@ -221,9 +220,9 @@ if first:
                      notes={"half-speed whirl": (26, 0.27), "coupling": (98, 0.06)})]],
         options.out / "two_stage.png", title="Two stages of gears on six oil films",
         caption="Three solid shafts and a housing, meshed and reduced, at 3000 turns a minute with "
-        f"{TORQUE:g} N m on the input shaft. Above, left, with the upper half of the housing taken "
-        "off: walls on the lines of contact are as high as the load on the teeth, up to "
-        f"{strongest:.0f} N/mm, those around the journals as the pressure of the oil, up to "
+        f"{TORQUE:g} N m on the input shaft. Above, left, the housing drawn as of glass: walls on "
+        f"the lines of contact are as high as the load on the teeth, up to {strongest:.0f} N/mm, "
+        "those around the journals as the pressure of the oil, up to "
         f"{highest:.1f} MPa. Right: where both journals of each shaft rest; the circle is the "
         "clearance. Below, left: mean over time of the load across the faces; shafts, films and "
         "housing give way, and one end carries more. Middle: tips are relieved, and teeth still "
