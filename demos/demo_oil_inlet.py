@@ -55,7 +55,7 @@ HEIGHT, LONG = 0.115, 0.025  # of the shafts above the bottom, and length of the
 SIDES = {"near": "back", "far": "front"}
 AXES = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])  # rows: those of the unit in those of the box
 box = {"L": 0.4, "W": SEATS["far"] - SEATS["near"] + LONG, "a": PAIR.distance, "z_s": HEIGHT,
-       "d_1": BORE, "d_2": BORE, "l_s": LONG, "lc": 0.02}  # fmt: skip
+       "d_1": BORE, "d_2": BORE, "l_s": LONG, "lc": 0.026}  # fmt: skip
 housing_model = rom.fe.model(Path(__file__).parents[1] / "meshes" / "housing.geo", parameters=box,
                              material=rom.Material(E=120e9, nu=0.26, rho=7200.0))  # fmt: skip
 SHAFTS = {"pinion": "input", "gear": "output"}
