@@ -16,7 +16,7 @@ from mpi4py import MPI
 import numpy as np
 
 import rom
-from rom import view
+from rom import rotation, view
 from rom.components.gear_mesh import Correction, GearPair, stiffness_table
 
 options = argparse.ArgumentParser(description="a planetary gear on ball bearings")
@@ -174,7 +174,18 @@ if first:
 #
 # `tests/project/test_demos.py` checks the numbers below: value, expected value, relative tolerance.
 
+# Statics of the arm: what planets do to its pins, in its own axes, against the brake.
+A = np.array([rotation.matrix(p) for p in smooth.orientation("carrier")[late]])
+back = arms.markers["back"].rotation[2]
+load, around = -TORQUE * back, -back
+for k, pin in enumerate(arms.markers[name] for name in PINS):
+    on_planet = smooth.reaction(f"pin {k}")[late].reshape(-1, 2, 3)
+    F, M = -np.einsum("nji,nkj->ki", A, on_planet) / late.sum()
+    load = load + F @ pin.translation + M @ pin.rotation
+    around = around + np.cross(Z, pin.point) @ pin.translation / 3 / arm**2
+moved = smooth.elastic("carrier")[late].mean(axis=0), np.linalg.solve(arms.K, load)
 results = {
+    "turn of the pins against the shaft [rad], by statics": (*(around @ q for q in moved), 1e-3),
     "speed of the arm over that of the sun": (ratio, carrier_speed, 1e-4),
     "mean torque at the sun [N m]": (torque[NAMES[0]].mean(), TORQUE * carrier_speed, 0.02),
     "share of the tooth frequency and its multiples, all alike": (passing[NAMES[0]], 1.0, 0.05),
