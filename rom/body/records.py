@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
 import numpy as np
+from scipy.linalg import null_space
 
 from rom.arguments import finite, typed
 from rom.body.nonlinear.cauchy import CauchyRecovery
@@ -14,6 +15,19 @@ from rom.eigen.supports import DIRECTIONS, Fixed, held_coordinates, supports
 from rom.errors import InterfaceError, ModelError
 from rom.model import Array, Index, Report
 from rom.names import check_text, named, offered
+
+REPEATED_ROW_RTOL = 1e-7  # singular value of rows that repeat others; modes are as accurate as 1e-8
+
+
+def still_motions(H: Array) -> Array:
+    """(6 + r, m) basis of the motions that leave H (h, 6 + r) at rest.
+
+    A row that repeats others counts once. Modes that do not twist a body turn its ends by what their
+    own error leaves, so that a twist held twice repeats itself to that error only.
+    """
+    return null_space(
+        H / np.maximum(np.linalg.norm(H, axis=1, keepdims=True), 1e-300), rcond=REPEATED_ROW_RTOL
+    )
 
 
 @dataclass(frozen=True, slots=True)

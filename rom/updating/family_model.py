@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.linalg import null_space
 
 from rom.arguments import finite
 from rom.body.flexible import FlexibleBody
+from rom.body.records import still_motions
 from rom.body.reference import marker_motion
 from rom.eigen.supports import spring_matrices
 from rom.errors import ConfigError, ParameterError
@@ -246,8 +246,7 @@ def _supported(body: FlexibleBody, fixed: Any) -> Array:
     body.check_support(fixed)
     if not fixed:
         return np.eye(6 + body.n_modes)
-    H = body.held_rows(fixed)
-    return null_space(H / np.maximum(np.linalg.norm(H, axis=1, keepdims=True), 1e-300), rcond=1e-10)
+    return still_motions(body.held_rows(fixed))
 
 
 def _count_free(body: FlexibleBody, attached: Mapping[str, Any], fixed: Any) -> int:

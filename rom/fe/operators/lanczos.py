@@ -16,7 +16,7 @@ from rom.fe.operators.spectrum import gaussian_block
 from rom.model import Array
 from rom.process.stopwatch import MISS_NOTE, note
 
-BLOCK_SIZE = 6  # columns solved together: fewer make solving dearer, more make the space larger
+BLOCK_SIZE = 8  # columns solved together: fewer make solving dearer, more make the space larger
 MAX_EXTRA_BLOCKS = 20  # beside the modes sought before a restart; twenty are seldom used
 MAX_RESTARTS = 20  # after which the method has failed
 MAX_FURTHER_BLOCKS = 6  # beyond convergence, for a proof; more cost as much as a count
@@ -103,17 +103,24 @@ class BlockLanczos:
         V, MV = self.V[:, : self.size], self.MV[:, : self.size]
         H, R = np.zeros((self.size, W.shape[1])), np.eye(W.shape[1])
         W = np.asfortranarray(W)
-        for _ in range(2):
-            G = self.ops.gram(MV, W)
-            W = _less(W, V, G)
-            H += G
+        for first in (self._first_coupled(), 0):
+            G = self.ops.gram(MV[:, first:], W)
+            W = _less(W, V[:, first:], G)
+            H[first:] += G
         MW = self.ops.apply_M(W)
         for _ in range(2):
             g, U = np.linalg.eigh(self.ops.gram(W, MW))
             root = np.sqrt(np.maximum(g, 1e-30 * max(g[-1], np.finfo(float).tiny)))
-            W, MW = W @ (U / root), MW @ (U / root)
+            W, MW = _combined(W, U / root), _combined(MW, U / root)
             R = (U * root).T @ R
         return W, MW, H, R
+
+    def _first_coupled(self) -> int:
+        """First column on which a new block depends by more than round-off.
+
+        In exact arithmetic these are the last two blocks; after a restart, all that were kept.
+        """
+        return 0 if self.restarted else max(self.size - 2 * BLOCK_SIZE, 0)
 
     def prove(self, m: int) -> bool:
         """Go on until surely none of the lowest m modes is missing; False if that stays open."""
@@ -162,6 +169,11 @@ class BlockLanczos:
 def _less(W: Array, V: Array, G: Array) -> Array:
     """W - V G in the place of W, arrays by columns."""
     return dgemm(-1.0, V, G, 1.0, W, overwrite_c=True) if W.size and V.size else W
+
+
+def _combined(W: Array, U: Array) -> Array:
+    """W U by columns, as the space is kept."""
+    return dgemm(1.0, W, U) if W.size else W
 
 
 def capacity(k: int) -> int:
