@@ -22,8 +22,8 @@ REPEATED_ROW_RTOL = 1e-7  # singular value of rows that repeat others; modes are
 def still_motions(H: Array) -> Array:
     """(6 + r, m) basis of the motions that leave H (h, 6 + r) at rest.
 
-    A row that repeats others counts once. Modes that do not twist a body turn its ends by what their
-    own error leaves, so that a twist held twice repeats itself to that error only.
+    A row that repeats others counts once. Modes that do not twist a body turn its ends by their own
+    error all the same, so that a twist held twice repeats itself to that error only.
     """
     return null_space(
         H / np.maximum(np.linalg.norm(H, axis=1, keepdims=True), 1e-300), rcond=REPEATED_ROW_RTOL
