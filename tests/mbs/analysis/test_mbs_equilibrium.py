@@ -54,7 +54,7 @@ def chain_with_springs(n, bending, twist):
 
 @pytest.mark.parametrize("angle", [0.7, 1.3, 1.7])  # of half a turn
 def test_a_moment_about_an_axis_fixed_in_space_bends_further_than_is_stable(angle):
-    """It has no potential: a chain weak in twist would leave the plane; its bend is still M n / k."""
+    """It has no potential: a chain weak in twist would leave the plane; it bends by M n / k."""
     mech, tip = chain_with_springs(4, 4.0, 0.3)
     mech.torque("moment", tip, (0, -np.pi * angle, 0))
     with pytest.warns(RomWarning, match="unstable: body 'link 3' turns about its own axis"):
