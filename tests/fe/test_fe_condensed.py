@@ -7,6 +7,7 @@ from scipy.linalg import eigh
 
 import rom
 from cases.boxes import box
+from rom.eigen import lanczos
 from rom.errors import InterfaceError
 
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")
@@ -16,7 +17,7 @@ from rom.eigen.completeness import LEAST_SHARE  # noqa: E402
 from rom.eigen.condensed import condensed  # noqa: E402
 from rom.eigen.verbs import constraint_modes  # noqa: E402
 from rom.fe.elasticity import assemble  # noqa: E402
-from rom.fe.operators import factor, lanczos, petsc, spectrum  # noqa: E402
+from rom.fe.operators import factor, petsc, spectrum  # noqa: E402
 from rom.reduction.interfaces.connection import connect  # noqa: E402
 from rom.workflow import operators  # noqa: E402
 

@@ -164,7 +164,6 @@ ORDER = {
         "iterative",
         "counting",
         "krylov_schur",
-        "lanczos",
         "petsc",
     ),
     "fe.mesh": (

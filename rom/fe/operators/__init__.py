@@ -2,7 +2,6 @@
 
 `petsc` has them on matrices of `aij`, also in new coordinates; a `solver` is chosen by what is
 `foreseen` of `memory` and `disk`: `held` and `factor` solve, over ranks the folder `substructures`;
-`lanczos` and `krylov_schur` find modes with a shift of `spectrum`, `counting` proves that none is
-missed, and `place` says where a body is loose; the folder `iterative` does all of it without a
-factor.
+`krylov_schur` finds modes with a shift of `spectrum`, `counting` proves that none is missed, and
+`place` says where a body is loose; the folder `iterative` does all of it without a factor.
 """

@@ -17,6 +17,7 @@ from scipy.linalg import eigh
 from scipy.sparse import csr_matrix
 
 from rom.eigen.condensed import Supported
+from rom.eigen.lanczos import BLOCK_SIZE, EIGENVALUE_RTOLS, BlockLanczos, capacity
 from rom.eigen.scipy import dof_set
 from rom.eigen.verbs import Weighted, orthonormal
 from rom.errors import ConfigError, ModelError, SolverError
@@ -30,11 +31,10 @@ from rom.fe.operators.iterative.gradients import ConjugateGradients, Inverse, re
 from rom.fe.operators.iterative.multigrid import multigrid
 from rom.fe.operators.iterative.search import lowest_modes
 from rom.fe.operators.krylov_schur import krylov_schur
-from rom.fe.operators.lanczos import BlockLanczos, capacity
 from rom.fe.operators.memory import give_back
 from rom.fe.operators.place import moves_most
 from rom.fe.operators.solver import DIRECT_SOLVER, Solver
-from rom.fe.operators.spectrum import first_elastic, fixed_vector, settled, signed
+from rom.fe.operators.spectrum import first_elastic, fixed_vector, gaussian_block, settled, signed
 from rom.fe.operators.substructures.shared import substructured
 from rom.model import Array, Index
 from rom.process.stopwatch import SEARCH_PIECE, piece
@@ -265,7 +265,10 @@ class PETScOperators:
         """Some more than m eigenvalues above sigma, modes, and whether surely none is missing."""
         with piece(SEARCH_PIECE):
             k = min(m + N_SPARE_MODES, self.n - deflated.shape[1])
-            space = BlockLanczos(self, inverse, sigma, deflated, k, min(k - m, k - 1))
+            start = gaussian_block(self, BLOCK_SIZE)
+            start[getattr(inverse, "mine", [])] = 0.0  # rows that a support holds
+            sought = np.repeat(EIGENVALUE_RTOLS, [max(m, 1), k - max(m, 1)])
+            space = BlockLanczos(self, inverse, sigma, deflated, start, sought)
             space.solve()
             proven = space.prove(m)
             return *space.pairs(), proven

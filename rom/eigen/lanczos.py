@@ -12,7 +12,6 @@ from scipy.linalg.blas import dgemm
 
 from rom.eigen.completeness import MAX_MISS_PROBABILITY, miss_probability
 from rom.errors import SolverError
-from rom.fe.operators.spectrum import gaussian_block
 from rom.model import Array
 from rom.process.stopwatch import MISS_NOTE, note
 
@@ -20,9 +19,7 @@ BLOCK_SIZE = 8  # columns solved together: fewer make solving dearer, more make 
 MAX_EXTRA_BLOCKS = 20  # beside the modes sought before a restart; twenty are seldom used
 MAX_RESTARTS = 20  # after which the method has failed
 MAX_FURTHER_BLOCKS = 6  # beyond convergence, for a proof; more cost as much as a count
-LOOK_GROWTH = 1.04  # of the space between two looks, which cost the cube of its size
-EIGENVALUE_RTOL = 1e-9  # residual of an eigenvalue of the inverse
-SPARE_EIGENVALUE_RTOL = 1e-5  # the same for spare ones; the error of the eigenvalue is its square
+EIGENVALUE_RTOLS = 1e-9, 1e-5  # of modes sought and spare ones, whose error is its square
 
 
 class BlockLanczos:
@@ -33,8 +30,8 @@ class BlockLanczos:
         factor: solves with K - sigma M.
         sigma: the shift, below all eigenvalues sought.
         deflated: (n_local, d) M-orthonormal modes to leave out.
-        k: number of modes sought.
-        spare: how many of them only need good eigenvalues.
+        start: (n_local, p) random columns; so many are solved for at once.
+        tolerance: (k,) residuals allowed of the k modes sought, of their eigenvalues of the inverse.
 
     Source:
         Grimes, Lewis and Simon, A shifted block Lanczos algorithm for solving sparse symmetric
@@ -42,20 +39,18 @@ class BlockLanczos:
         orthogonalisation, and the thick restart of Wu and Simon, ibid. 22 (2000) 602.
     """
 
-    def __init__(
-        self, ops: Any, factor: Any, sigma: float, deflated: Array, k: int, spare: int = 0
+    def __init__(  # noqa: PLR0913  what is sought, where, and from what
+        self, ops: Any, factor: Any, sigma: float, deflated: Array, start: Array, tolerance: Array
     ):
-        self.ops, self.factor, self.sigma, self.k = ops, factor, sigma, k
-        self.tolerance = np.repeat([EIGENVALUE_RTOL, SPARE_EIGENVALUE_RTOL], [k - spare, spare])
-        self.n_deflated = deflated.shape[1]
-        shape = (ops.n_local, self.n_deflated + capacity(k))
+        self.ops, self.factor, self.sigma = ops, factor, sigma
+        self.k, self.tolerance = tolerance.size, tolerance
+        self.n_deflated, self.width = deflated.shape[1], start.shape[1]
+        shape = (ops.n_local, self.n_deflated + capacity(self.k))
         self.V, self.MV = np.empty(shape, order="F"), np.empty(shape, order="F")
         self.size = 0
         self.T = np.zeros((0, 0))
-        self.looked, self.restarted = 0, False
+        self.next_look, self.restarted = 0.0, False
         self._append(deflated, ops.apply_M(deflated))
-        start = gaussian_block(ops, BLOCK_SIZE)
-        start[getattr(factor, "mine", [])] = 0.0  # rows that a support holds
         W, MW, _, self.start = self._orthonormal(start)
         self._append(W, MW)
 
@@ -66,7 +61,7 @@ class BlockLanczos:
             SolverError: if they do not.
         """
         for _ in range(MAX_RESTARTS):
-            while self.size + BLOCK_SIZE <= self.V.shape[1]:
+            while self.size + self.width <= self.V.shape[1]:
                 self._grow()
                 if self._converged():
                     return
@@ -79,7 +74,7 @@ class BlockLanczos:
     def pairs(self) -> tuple[Array, Array]:
         """The k eigenvalues next to the shift, ascending, and their mass-normalised modes."""
         theta, S = self._ritz(self.k)
-        return self.sigma + 1.0 / theta, self.V[:, self.n_deflated : self.size - BLOCK_SIZE] @ S
+        return self.sigma + 1.0 / theta, self.V[:, self.n_deflated : self.size - self.width] @ S
 
     def _append(self, X: Array, MX: Array) -> None:
         new = slice(self.size, self.size + X.shape[1])
@@ -88,7 +83,7 @@ class BlockLanczos:
 
     def _grow(self) -> None:
         """One more block, and R (p, p), its coupling to the block before."""
-        load = self.MV[:, self.size - BLOCK_SIZE : self.size]
+        load = self.MV[:, self.size - self.width : self.size]
         W, MW, H, self.R = self._orthonormal(self.factor.solve(load))
         k, H = self.T.shape[0], H[self.n_deflated :]
         self.T = np.block([[self.T, H[:k]], [H[:k].T, 0.5 * (H[k:] + H[k:].T)]])
@@ -131,7 +126,7 @@ class BlockLanczos:
             if chance <= MAX_MISS_PROBABILITY:
                 note(MISS_NOTE, chance)
                 return True
-            if chance == 1.0 or self.size + BLOCK_SIZE > self.V.shape[1]:
+            if chance == 1.0 or self.size + self.width > self.V.shape[1]:
                 break
             self._grow()
         return False
@@ -139,26 +134,26 @@ class BlockLanczos:
     def _residuals(self) -> Array:
         """(N,) of all Ritz values, over them."""
         theta, S = self._ritz(self.T.shape[0])
-        return np.linalg.norm(self.R @ S[-BLOCK_SIZE:], axis=0) / np.abs(theta)
+        return np.linalg.norm(self.R @ S[-self.width:], axis=0) / np.abs(theta)
 
     def _restart(self) -> None:
         """Keep the leading Ritz vectors and the last block only."""
-        self.looked, self.restarted = 0, True
-        kept = self.k + BLOCK_SIZE
+        self.next_look, self.restarted = 0.0, True
+        kept = self.k + self.width
         theta, S = self._ritz(kept)
-        ends = self.n_deflated + np.array([0, kept, kept + BLOCK_SIZE])
+        ends = self.n_deflated + np.array([0, kept, kept + self.width])
         for V in (self.V, self.MV):
-            last = V[:, self.size - BLOCK_SIZE : self.size].copy()
-            V[:, ends[0] : ends[1]] = V[:, ends[0] : self.size - BLOCK_SIZE] @ S
+            last = V[:, self.size - self.width : self.size].copy()
+            V[:, ends[0] : ends[1]] = V[:, ends[0] : self.size - self.width] @ S
             V[:, ends[1] : ends[2]] = last
         self.size, self.T = ends[2], np.diag(theta)
 
     def _converged(self) -> bool:
         """Whether the residuals of the k leading Ritz values are small."""
         N = self.T.shape[0]
-        if N < max(self.k, LOOK_GROWTH * self.looked):
+        if N < max(self.k, self.next_look):
             return False
-        self.looked = N
+        self.next_look = N + N**2 / self.ops.n  # to look costs as much as to grow by this
         return bool((self._residuals()[: self.k] <= self.tolerance).all())
 
     def _ritz(self, k: int) -> tuple[Array, Array]:
