@@ -58,7 +58,8 @@ def elastica(slope):
 # It is held at the back of its base and pushed at the end of its tongue, half way along the leaves,
 # where a force across does not pitch the stage.
 
-plate = rom.fe.model("meshes/flexure.geo", material=rom.Material(E=E, nu=0.33, rho=rho), degree=2,
+plate = rom.fe.model(Path(__file__).parents[1] / "meshes" / "flexure.geo", degree=2,
+                     material=rom.Material(E=E, nu=0.33, rho=rho),
                      parameters={"L": L, "t": t, "b": b, "s": s, "w": w, "a": a})  # fmt: skip
 push = stiffness * FAR
 body = rom.reduce(

@@ -23,13 +23,13 @@ options.add_argument("-q", "--quiet", action="store_true", help="no tables")
 options = options.parse_args()
 first = MPI.COMM_WORLD.rank == 0
 say = print if first and not options.quiet else lambda *_: None
-E = 210e9
+E, MESHES = 210e9, Path(__file__).parents[1] / "meshes"
 
 
 def reduced(geometry, end, force, *, nu, kept, parameters, **geometric):
     """A body on its root, for a force along z at the other end."""
     return rom.reduce(
-        rom.fe.model(f"meshes/{geometry}.geo", material=rom.Material(E=E, nu=nu, rho=7850.0),
+        rom.fe.model(MESHES / f"{geometry}.geo", material=rom.Material(E=E, nu=nu, rho=7850.0),
                      degree=2, parameters=parameters),
         method=rom.CraigBampton(n_modes=kept),
         interfaces={"root": "rbe3", end: "rbe3"},

@@ -90,7 +90,7 @@ def solid(k):
     diameter, length, _ = BUSHES[k]
     sizes = {"L": 0.28, "z_a": 0.04, "z_w": 0.14, "z_b": 0.24, "l_j": length, "d": diameter,
              "b": FACE, "D": (TEETH[k] - 2.5) * MODULE, "lc": (0.013, 0.03)[k]}  # fmt: skip
-    model = rom.fe.model("meshes/gear_shaft.geo", parameters=sizes,
+    model = rom.fe.model(Path(__file__).parents[1] / "meshes" / "gear_shaft.geo", parameters=sizes,
                          material=rom.Material(E=206e9, nu=0.3, rho=7850.0))  # fmt: skip
     seats = dict.fromkeys(("journal_a", "journal_b", "end_a"), "rbe3")
     return rom.reduce(model, method=rom.CraigBampton(4), reference="mean-axis", certify=False,

@@ -31,6 +31,7 @@ say = print if first and not options.quiet else lambda *_: None
 # solid up to their root circles; their rims carry harmonics around times polynomials along
 # the face.
 
+MESHES = Path(__file__).parents[1] / "meshes"
 STEEL = rom.Material(E=206e9, nu=0.3, rho=7850.0)
 IRON = rom.Material(E=120e9, nu=0.26, rho=7200.0)
 PAIRS = {
@@ -57,7 +58,7 @@ def shaft(name, rim):
         root = (teeth - 2.5) * module
         keys = ("D", "b") if end == "w" else ("D_2", "b_2")
         sizes |= {f"z_{end}": z} | dict(zip(keys, (root, width), strict=True))
-    model = rom.fe.model("meshes/gear_shaft.geo", material=STEEL, parameters=sizes)
+    model = rom.fe.model(MESHES / "gear_shaft.geo", material=STEEL, parameters=sizes)
     rims = {wheel: rim for wheel in WHEELS[name]}
     seats = dict.fromkeys(("journal_a", "journal_b", "end_a"), "rbe3")
     return rom.reduce(model, method=rom.CraigBampton(4), interfaces=seats | rims,
@@ -67,7 +68,7 @@ def shaft(name, rim):
 box = {"L": 0.6, "W": 0.2, "H": 0.28, "a": 0.13, "a_2": 0.17, "z_s": HEIGHT, "l_s": SEAT,
        "d_1": DIAMETER["input"], "d_m": DIAMETER["middle"], "d_2": DIAMETER["output"],
        "lc": 0.024}  # fmt: skip
-housing_model = rom.fe.model("meshes/housing.geo", material=IRON, parameters=box)
+housing_model = rom.fe.model(MESHES / "housing.geo", material=IRON, parameters=box)
 seats = {f"{name}_{side}": "rbe3" for name in PLACE for side in ("front", "back")}
 housing = rom.reduce(housing_model, method=rom.CraigBampton(6), interfaces=seats | {"feet": "rbe2"},
                      reference="feet", certify=False)  # fmt: skip
@@ -182,12 +183,11 @@ if first:
                           shift=out * np.sign(SPINS[name]))
            for name in PLACE for side, out in (("front", -0.016), ("back", 0.016))]  # fmt: skip
     case = view.meshed(housing_model)["_surface"]
-    lower = case.cells[case.points[case.cells, 2].mean(axis=1) < HEIGHT]
     things = {
-        "_housing": view.Thing(
-            case.points, lower, "#c9d1da", opacity=0.35, edges=np.zeros((0, 2), dtype=int)
-        ),
         **{f"{name} shaft": view.toothed_shaft(mech, name) for name in PLACE},
+        "housing": view.Thing(
+            case.points, case.cells, "#c9d1da", opacity=0.35, edges=np.zeros((0, 2), dtype=int)
+        ),
         "load on the teeth": view.Thing(*view.joined(walls), "#edae49"),
         "oil pressure": view.Thing(*view.joined(oil), "#66a182"),
     }
@@ -220,9 +220,9 @@ if first:
                      notes={"half-speed whirl": (26, 0.27), "coupling": (98, 0.06)})]],
         options.out / "two_stage.png", title="Two stages of gears on six oil films",
         caption="Three solid shafts and a housing, meshed and reduced, at 3000 turns a minute with "
-        f"{TORQUE:g} N m on the input shaft. Above, left, with the upper half of the housing taken "
-        "off: walls on the lines of contact are as high as the load on the teeth, up to "
-        f"{strongest:.0f} N/mm, those around the journals as the pressure of the oil, up to "
+        f"{TORQUE:g} N m on the input shaft. Above, left, the housing drawn as of glass: walls on "
+        f"the lines of contact are as high as the load on the teeth, up to {strongest:.0f} N/mm, "
+        "those around the journals as the pressure of the oil, up to "
         f"{highest:.1f} MPa. Right: where both journals of each shaft rest; the circle is the "
         "clearance. Below, left: mean over time of the load across the faces; shafts, films and "
         "housing give way, and one end carries more. Middle: tips are relieved, and teeth still "

@@ -422,7 +422,7 @@ def wheel(families: int = 10, parameters: dict[str, float] | None = None) -> Ite
 
 
 def loops(*sizes: int) -> Iterator[Figure]:
-    """Stones in contact, a map of postures, a bar that flows: compiled loops on one processor.
+    """Stones, postures, a bar that flows, boulders, wind: compiled loops on one processor.
 
     Args:
         sizes: as `rom.bench.loops.measured` takes them.

@@ -13,16 +13,36 @@ from rom.components.linkages.two_dof_linkages import FiveBar, rod
 from rom.components.masonry.actions import BaseMotion
 from rom.components.masonry.limits import arch
 from rom.components.masonry.motion import Motion, simulate
+from rom.components.rockfall import (
+    Cushion,
+    Gallery,
+    History,
+    Shear,
+    Slab,
+    calibrate,
+    scaled,
+    strike,
+)
+from rom.components.rockfall.calibration import CHANNELS, FIVE_PARAMETERS
+from rom.components.wind import power_curve
 
 COPPER = Metal(117e9, 0.35, 8930.0, yield_stress=400e6, hardening=100e6)
 BAR_LENGTH, BAR_RADIUS, IMPACT_SPEED = 32.4e-3, 3.2e-3, 227.0  # of Taylor's bar [m, m, m/s]
 SHAKING_ACCELERATION = 1.0  # of the ground; 0.46 already sets the arch moving [m/s^2]
+FIRST_GALLERY = Gallery(
+    4000.0, 15.0, 2500.0, Cushion.of_sand(4000.0, 1e6, recovery=0.1), Shear(2e9),
+    Slab.of_mass(6000.0, 1.2e8),
+)  # fmt: skip
+TRUE_FACTORS = dict(zip(FIVE_PARAMETERS, (1.4, 0.6, 1.3, 0.8, 1.5), strict=True))
+SENSOR_CHANNELS = ("acceleration of the boulder", "force in bending", "deflection")
+SENSOR_TIMES = np.arange(0, 0.2, 2e-4)  # s
+WIND_SPEEDS = np.linspace(4.0, 25.0, 20)  # m/s
 
 
 def measured(
     blocks: int = 40, steps: int = 10_000, cells: int = 400, height: int = 50
 ) -> Iterator[tuple[str, str, float, str, str]]:
-    """Case, quantity, value, unit and aim: an arch, still and shaken, isotropy, Taylor's bar.
+    """Case, quantity, value, unit and aim: an arch, isotropy, Taylor's bar, a gallery, wind.
 
     Args:
         blocks: voussoirs of the arch.
@@ -52,6 +72,21 @@ def measured(
     case = f"Taylor's bar, {flight.steps} steps"
     yield case, "processor time", taken, "s", "below 20"
     yield case, "radius of its foot", 1e3 * float(flight.x[-1, :, 0].max()), "mm", "below 7.1"
+    case = f"gallery, {len(TRUE_FACTORS)} parameters from {len(SENSOR_CHANNELS)} histories"
+    true = scaled(FIRST_GALLERY, TRUE_FACTORS)
+    got = strike(true, t_end=0.2, keep=20_000)
+    seen = {
+        name: History(SENSOR_TIMES, np.interp(SENSOR_TIMES, got.t, CHANNELS[name](true, got)))
+        for name in SENSOR_CHANNELS
+    }
+    taken, found = _timed(calibrate, FIRST_GALLERY, seen)
+    yield case, "processor time", taken, "s", "below 30"
+    off = max(abs(found.factors[name] / x - 1) for name, x in TRUE_FACTORS.items())
+    yield case, "largest error of them", off, "", "below 0.01"
+    taken, curve = _timed(power_curve, WIND_SPEEDS)
+    case = f"power curve of the 5 MW turbine, {WIND_SPEEDS.size} winds"
+    yield case, "processor time", taken, "s", "below 60"
+    yield case, "largest power", float(curve["power"].max()) / 1e6, "MW", "below 5.001"
 
 
 def _still(

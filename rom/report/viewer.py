@@ -83,8 +83,8 @@ def modes_words(name: str) -> str:
 MOTION_WORDS = (
     "The computed motion. Deformations of flexible bodies are drawn so many times larger as the "
     "slider says; colours tell how far points are displaced relative to the moving frame of their "
-    "body, or the equivalent stress of its elastic coordinates. Bodies in one colour are rigid, "
-    f"drawn as bars between their markers where no shape is known. {EYE_WORDS} of the world."
+    "body, or the equivalent stress of its elastic coordinates. Bodies in one colour are rigid, or "
+    f"rods, drawn as bars between their markers where no shape is known. {EYE_WORDS} of the world."
 )
 START_WORDS = (
     "Bodies as they are placed, before joints pull them together, flexible ones by their surface, "

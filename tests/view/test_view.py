@@ -14,13 +14,16 @@ from PIL import Image  # noqa: E402
 
 from cases.mbs.drawn import lattice_bar, squeezed, swinging  # noqa: E402
 from rom import view  # noqa: E402
+from rom.components import cosserat  # noqa: E402
 from rom.errors import ConfigError, InterfaceError  # noqa: E402
 from rom.mbs.analysis.campbell import Campbell  # noqa: E402
+from rom.mbs.integrate.simulation import simulate  # noqa: E402
+from rom.mbs.mechanism import Mechanism  # noqa: E402
 from rom.model import FEModel, Interface, SurfaceMesh  # noqa: E402
 from rom.view.canvas.offscreen import render  # noqa: E402
 from rom.view.canvas.scene import Actor, Camera, aimed, sharp_edges  # noqa: E402
 from rom.view.figures.curves import _apart  # noqa: E402
-from rom.view.scenes.film import Look, _stage  # noqa: E402
+from rom.view.scenes.film import Look, _stage, _words  # noqa: E402
 
 
 def pixels(path, frame=0):
@@ -172,6 +175,16 @@ def test_bodies_are_drawn_where_they_are(bar):
     scale = {"m": 1.0, "mm": 1e3, "µm": 1e6, "nm": 1e9}[stage.unit]
     size = scale * np.linalg.norm(u, axis=1)
     np.testing.assert_allclose(stage.actors[0].values[:, 7], size, atol=1e-9 * size.max())
+
+
+def test_rods_are_grey_and_not_called_rigid(bar):
+    mech = Mechanism(gravity=(0, 0, 0))
+    mech.add_flexible("bar", bar)
+    section = {"stretch": (5e5, 5e5, 1e6), "bend": (1e3,) * 3, "mass": 1.0, "inertia": (1e-2,) * 3}
+    for grey in ("rigid bodies.", "rigid bodies and rods."):
+        stage = _stage(mech, simulate(mech, t_end=1e-4, dt=1e-4), np.array([0]), Look({}))
+        assert _words(stage, 1.0).endswith(f"; grey are {grey}")
+        mech.add_nonlinear(f"beside {grey}", cosserat.body(cosserat.straight(1.0, 1, **section)))
 
 
 def test_instants_are_drawn_side_by_side(bar, tmp_path):

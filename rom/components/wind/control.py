@@ -61,13 +61,19 @@ def asked_torque(speed, pitch):
 
 
 @inner
+def gain_at(pitch):
+    """Factor of both gains of the pitch, see `gain_factor`."""
+    return 1.0 / (1.0 + max(pitch, 0.0) / DOUBLING_PITCH)
+
+
+@inner
 def advance(state, speed, dt):
     """Take a controller a step further, see `Controller`: its four numbers in their order."""
     share = math.exp(-CORNER_FREQUENCY * dt)
     state[0] = (1.0 - share) * speed + share * state[0]
     room = LARGEST_TORQUE_RATE * dt
     state[3] = min(max(asked_torque(state[0], state[2]), state[3] - room), state[3] + room)
-    gain, error = 1.0 / (1.0 + max(state[2], 0.0) / DOUBLING_PITCH), state[0] - HELD_GENERATOR
+    gain, error = gain_at(state[2]), state[0] - HELD_GENERATOR
     end = LARGEST_PITCH / (gain * INTEGRAL_GAIN)
     state[1] = min(max(state[1] + error * dt, 0.0), end)
     asked = gain * (PROPORTIONAL_GAIN * error + INTEGRAL_GAIN * state[1])
@@ -106,7 +112,7 @@ def generator_torque(speed: float, pitch: float = 0.0) -> float:
 
 def gain_factor(pitch: float) -> float:
     """Factor of both gains of the pitch at a pitch [rad], 1 / (1 + pitch / 6.3 degrees)."""
-    return 1.0 / (1.0 + max(pitch, 0.0) / DOUBLING_PITCH)
+    return float(gain_at.py_func(pitch))
 
 
 @dataclass

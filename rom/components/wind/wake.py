@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 from numba import carray
 
+from rom.arguments import finite
 from rom.components.wind.blade_element import (
     PROFILE_START,
     TWIST_PLACE,
@@ -164,7 +165,7 @@ def in_late_wind(
         ConfigError: for a wind that is no speed over time or comes from behind, or a density that
             cannot be.
     """
-    winds = _checked(wind)
+    winds = over_time(wind)
     far = far_away((1.0, 0.0, 0.0), axis, tower=tower, density=density)
     for k, numbers in enumerate(strip_rows(cast(RodBody, blade.body), far, cone)):
         sizes = len(winds), numbers[PROFILE_START]
@@ -177,15 +178,19 @@ def in_late_wind(
         )
 
 
-def _checked(wind: npt.ArrayLike) -> Array:
-    """(k, 2) instants and speeds."""
-    given = np.asarray(wind, dtype=float)
+def over_time(wind: npt.ArrayLike) -> Array:
+    """(k, 2) instants [s] and speeds [m/s] of a wind, see `in_late_wind`.
+
+    Raises:
+        ConfigError: if it is no speed over time, or comes from behind.
+    """
+    given = finite("wind", wind, None)
     winds = np.array([[0.0, given]]) if given.ndim == 0 else given
     if winds.ndim != 2 or winds.shape[1:] != (2,) or not len(winds):
         raise ConfigError(f"a wind of shape {given.shape} is no speed over time.",
                           hint="Give one speed, or rows of an instant and a speed.")  # fmt: skip
-    if not np.isfinite(winds).all() or (np.diff(winds[:, 0]) <= 0.0).any():
-        raise ConfigError("instants of a wind ascend, and they and its speeds are finite.")
+    if (np.diff(winds[:, 0]) <= 0.0).any():
+        raise ConfigError("instants of a wind ascend.")
     if (winds[:, 1] < 0.0).any():
         raise ConfigError(f"the wind of {winds[:, 1].min():g} m/s comes from behind the rotor.")
     return winds

@@ -21,8 +21,9 @@ from rom.body import FlexibleBody
 from rom.components.cosserat import body
 from rom.components.wind.blade_element import in_wind
 from rom.components.wind.blading import check_pitch
+from rom.components.wind.control import CUT_OUT_WIND
 from rom.components.wind.controlled import add_control
-from rom.components.wind.wake import in_late_wind
+from rom.components.wind.wake import in_late_wind, over_time
 from rom.components.wind.wind_turbine import (
     CONE_ANGLE,
     GEAR_RATIO,
@@ -175,13 +176,16 @@ def turbine(  # noqa: PLR0913  one keyword per choice, all with defaults
 
     Raises:
         ConfigError: for less than one segment of a blade, a pitch of more than a turn, a solid that
-            is no hub, or a wind that changes without a late wake.
+            is no hub, a wind that changes without a late wake, or one in which no controller works.
         ModelError: if a rod is none, see `cosserat.rod`.
     """
     if segments < 1 or tower_segments < 0:
         raise ConfigError(f"{segments} segments of a blade and {tower_segments} of the tower.",
                           hint="A blade has one or more, a stiff tower none.")  # fmt: skip
     check_pitch(pitch)
+    if controlled and wind is not None and (most := over_time(wind)[:, 1].max()) > CUT_OUT_WIND:
+        raise ConfigError(f"no controller works in a wind of {most:g} m/s, above 25 m/s.",
+                          hint="Stand in it without: controlled=False.")  # fmt: skip
     mech = Mechanism(gravity=(0.0, 0.0, -gravity))
     factors = {"shear": shear, "torsion": torsion}
     top, standing = _tower(mech, tower_segments, factors)

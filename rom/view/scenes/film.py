@@ -1,6 +1,6 @@
 """Films and series of instants of a moving mechanism."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -196,12 +196,14 @@ class Stage:
         limits: (2,) deformation at the ends of the colours, in ``unit``.
         unit: unit of the colours.
         name: names of the flexible bodies.
+        grey: what has no colours.
     """
 
     actors: list[Actor]
     limits: tuple[float, float]
     unit: str
     name: str
+    grey: str = "rigid bodies"
 
     def camera(self, width: int, view: Any, up: Any) -> Camera:
         """A camera that sees everything all the time."""
@@ -227,7 +229,8 @@ def _stage(mechanism: Any, solution: Any, steps: Any, look: Look) -> Stage:
     more = [actor for _, _, *rest in drawn.values() for actor in rest]
     more += symbols_of(places, look) if look.symbols else []
     more += [_trace(solution.position(name)) for name in look.traces]
-    return Stage([*stage.actors, *together(more)], stage.limits, stage.unit, stage.name)
+    grey = "rigid bodies and rods" if mechanism.nonlinear else stage.grey
+    return replace(stage, actors=[*stage.actors, *together(more)], grey=grey)
 
 
 def _body(places: Places, name: str, look: Look) -> list[Actor]:
@@ -332,7 +335,7 @@ def _words(stage: Stage, magnify: float) -> str:
     how = "true size" if magnify == 1.0 else f"{magnify:g} times larger"
     return (
         f"Motion of the mechanism, deformation of {stage.name} drawn {how}. Colours: "
-        f"displacement relative to the floating frame, in {stage.unit}; grey bodies are rigid."
+        f"displacement relative to the floating frame, in {stage.unit}; grey are {stage.grey}."
     )
 
 

@@ -7,6 +7,7 @@ from numpy.testing import assert_allclose
 from rom.components.wind.blading import BETZ_LIMIT, blading
 from rom.components.wind.control import (
     DOUBLING_PITCH,
+    HELD_GENERATOR,
     PUBLISHED_PITCH,
     Controller,
     gain_factor,
@@ -57,6 +58,9 @@ def test_gains_fall_with_the_pitch_as_published():
     one.step(1.001 * GEAR_RATIO * RATED_SPEED, 1e3)
     error = 1e-3 * GEAR_RATIO * RATED_SPEED
     assert_allclose(one.pitch, P * error + I * error * 1e3, rtol=2e-3)
+    there = Controller.at(HELD_GENERATOR, DOUBLING_PITCH)
+    there.step(HELD_GENERATOR, 0.1)
+    assert_allclose(there.pitch, DOUBLING_PITCH)  # where the factor of `at` is that of the steps
 
 
 @pytest.fixture(scope="module")

@@ -187,6 +187,7 @@ def test_the_actuator_is_that_of_the_report():
     [
         ([[0.0, 8.0], [0.0, 9.0]], "instants of a wind ascend"),
         ([[0.0, np.nan]], "finite"),
+        (lambda t: 8.0, "wind"),
         ([8.0, 9.0], "no speed over time"),
         (np.zeros((0, 2)), "no speed over time"),
         (-8.0, "from behind"),
@@ -195,6 +196,12 @@ def test_the_actuator_is_that_of_the_report():
 def test_a_wind_that_cannot_be_is_named(wind, said):
     with pytest.raises(ConfigError, match=said):
         turbine(2, wind=wind, late_wake=True)
+
+
+@pytest.mark.parametrize("wind", [26.0, [[0.0, 8.0], [9.0, 26.0]]])
+def test_no_controller_works_beyond_its_wind(wind):
+    with pytest.raises(ConfigError, match="no controller works in a wind of 26 m/s"):
+        turbine(2, wind=wind, late_wake=True, controlled=True)
 
 
 def test_a_wind_that_changes_needs_a_wake_that_is_late():

@@ -1,4 +1,4 @@
-"""Geometries of gear units: shafts with wheels of their own, housings of two stages."""
+"""Geometries of gear units: shafts with wheels, housings of two stages, carriers of planets."""
 
 import numpy as np
 import pytest
@@ -37,12 +37,28 @@ def test_a_housing_of_two_stages_has_six_seats_on_three_axes():
     }
 
 
+def test_a_carrier_has_its_mass_its_pins_and_its_journals():
+    model = body("carrier", {"n": 4, "lc": 0.012}, degree=2)
+    disc, shaft = 0.012 * (0.128**2 - 0.034**2), (0.116 - 0.024) * (0.05**2 - 0.034**2)
+    rest = 4 * 0.024 * 0.02**2 + 2 * 0.016 * (0.056**2 - 0.05**2)
+    assert model.mass() == pytest.approx(7850 * np.pi / 4 * (disc + shaft + rest), rel=0.01)
+    at = {f"pin_{k + 1}": (0.048 * x, 0.048 * y, 0)
+          for k, (x, y) in enumerate(((1, 0), (0, 1), (-1, 0), (0, -1)))}  # fmt: skip
+    at |= {"front": (0, 0, -0.04), "back": (0, 0, -0.1)}
+    assert {name: pytest.approx(x, abs=1e-9) for name, x in at.items()} == {
+        name: face.origin for name, face in model.interfaces.items()
+    }
+
+
 @pytest.mark.parametrize(("name", "parameters", "message"), [
     ("gear_shaft", SHAFT | {"z_2": 0.16}, "the wheels at z_w = 0.12 and z_2 = 0.16 overlap"),
     ("gear_shaft", SHAFT | {"D_2": 0.03}, "thinner than the shaft"),
     ("gear_shaft", SHAFT | {"z_2": 0.33}, "must lie apart"),
     ("housing", STAGES | {"a": 0.07}, "the seats overlap: shafts 0.07 apart"),
     ("housing", STAGES | {"L": 0.36}, "seats do not fit"),
+    ("carrier", {"n": 2.5}, "n = 2.5: a carrier needs a whole number"),
+    ("carrier", {"a": 0.06}, "3 pins of d_p = 0.02 at a = 0.06 do not fit"),
+    ("carrier", {"z_f": 0.03}, "z_f = 0.03 and z_b = 0.1 do not fit on the shaft"),
 ])  # fmt: skip
 def test_sizes_that_do_not_fit_are_named(name, parameters, message):
     with pytest.raises(ConfigError, match=message):
