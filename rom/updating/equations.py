@@ -7,11 +7,12 @@ good the data are; the verdict, of responses of the model that is not condensed,
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import null_space
+from scipy.linalg import null_space, qr
 
 from rom.arguments import whole
 from rom.errors import ConfigError
 from rom.model import Array, Mask
+from rom.names import named
 from rom.updating.family_model import FamilyModel
 from rom.updating.methods import Update, update_by_input
 from rom.updating.models import AtSensors, Measurement, ParametricModel, modal
@@ -45,12 +46,11 @@ class InSensors:
             ConfigError: if a sensor follows from others, or the family has too few coordinates.
         """
         S = model.seen
-        size = np.linalg.svd(S, compute_uv=False)
-        if len(S) > S.shape[1] or size[-1] <= SENSOR_RTOL * size[0]:
+        if follow := sorted(_followers(S)):
             raise ConfigError(
-                f"{len(S)} sensors measure no more than {S.shape[1]} coordinates of the family, or "
-                "some follow from others: equations at the sensors need independent ones.",
-                hint="Leave sensors out, reduce with more modes, or update by responses.",
+                f"sensors {named(follow)} of {len(S)} follow from others in a family of "
+                f"{S.shape[1]} coordinates: equations need independent ones.",
+                hint="Leave them out, reduce with more modes, or update by responses.",
             )
         return InSensors(model, x, free, np.hstack([np.linalg.pinv(S), null_space(S)]))
 
@@ -71,7 +71,14 @@ class InSensors:
 
 
 def by_equations(
-    model: FamilyModel, data: Data, x: Array, free: Mask, damping: float, rank: int | None
+    model: FamilyModel,
+    data: Data,
+    x: Array,
+    free: Mask,
+    damping: float,
+    *,
+    prior: Array,
+    rank: int | None,
 ) -> Update:
     """Logarithms of factors, and damping ratios of the modes up to the highest line.
 
@@ -83,6 +90,7 @@ def by_equations(
         x: (n_p,) logarithms of the factors to start from.
         free: (n_p,) which are sought.
         damping: ratio to start from [1].
+        prior: (n_p,) standard deviations of the logarithms about zero before the test [1].
         rank: of the basis that tests and models share; None for what the modes need.
 
     Raises:
@@ -109,7 +117,16 @@ def by_equations(
     limits = np.log(model.low[free]), np.log(model.high[free])
     small = AtSensors(InSensors.of(model, x, free))
     rank = whole("rank", min(n_s, needed) if rank is None else rank, 1, n_s, reason="sensors")
-    return update_by_input(small, test, x[free], np.full(m, damping), rank=rank, limits=limits)
+    start = x[free], np.full(m, damping)
+    return update_by_input(small, test, *start, rank=rank, limits=limits, prior=prior[free])
+
+
+def _followers(S: Array) -> list[int]:
+    """Numbers of the rows (n_s, n) that follow from the others."""
+    R, order = qr(S.T, mode="r", pivoting=True)
+    size = np.abs(np.diag(R))
+    rank = int(np.count_nonzero(size > SENSOR_RTOL * size[0]))
+    return [int(k) for k in order[rank:]]
 
 
 def _collocated(model: FamilyModel) -> tuple[tuple[int, ...], Array]:

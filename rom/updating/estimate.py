@@ -195,7 +195,8 @@ def update(  # noqa: PLR0913  keywords of one call
         prior: {name: relative standard deviation [1] of its factor about one, before the test}.
         tolerance: largest distance of a channel from a surface point [m], see `Channels.rows`.
         residual: "responses", or "equations": of motion at the sensors, linear in what is sought,
-            biased by noise and by the condensation; the verdict is that of responses.
+            biased by noise and by the condensation; the verdict is that of responses. A prior
+            weighs against what the equations leave.
         rank: of the basis of equations; None for one direction per mode up to the highest line.
 
     Returns:
@@ -214,10 +215,8 @@ def update(  # noqa: PLR0913  keywords of one call
     """
     check_damping_ratio(damping)
     one_of("residual", residual, ("responses", "equations"))
-    if {"responses": rank is not None, "equations": bool(prior)}[residual]:
-        raise ConfigError(
-            "rank belongs to the residual of equations, a prior to that of responses."
-        )
+    if rank is not None and residual == "responses":
+        raise ConfigError("rank belongs to the residual of equations.")
     if not DAMPING_RANGE[0] <= damping <= DAMPING_RANGE[1]:
         raise ConfigError(f"damping = {damping} to start from is not within {DAMPING_RANGE}.")
     if family.body.units != "SI":
@@ -237,7 +236,8 @@ def update(  # noqa: PLR0913  keywords of one call
     check_channels(responses_at(model, search.x, search.zeta, data.omega), data)
     if residual == "responses":
         return _found(family, search.run())
-    found = by_equations(model, data, search.x, unknown, damping, rank)
+    sigma = _deviations(prior or {}, model.names)
+    found = by_equations(model, data, search.x, unknown, damping, prior=sigma, rank=rank)
     return replace(_found(family, search.moved(found)), covariance=found.covariance)
 
 
@@ -249,6 +249,16 @@ def _unknown(
     if wrong := chosen - set(model.names):
         raise ParameterError(f"there is no parameter {named(wrong)}; known are {model.names}.")
     return np.array([name in chosen for name in model.names])
+
+
+def _deviations(prior: dict[str, float], names: tuple[str, ...]) -> Array:
+    """(n_p,) standard deviations before the test; infinite without one."""
+    if wrong := set(prior) - set(names):
+        raise ParameterError(f"prior: there is no parameter {named(wrong)}.")
+    sigma = np.array([prior.get(name, np.inf) for name in names])
+    if not (sigma > 0).all():
+        raise ConfigError("prior: a standard deviation is positive.")
+    return sigma
 
 
 @dataclass(slots=True)
@@ -271,11 +281,7 @@ class _Search:
         x = np.clip(np.zeros(len(model.names)), np.log(model.low), np.log(model.high))
         lam = modal(model.at(x), ()).lam[model.n_rigid :]
         m = min(int(np.count_nonzero(lam < (BAND_RATIO * data.omega[-1]) ** 2)) + 1, lam.size)
-        if wrong := set(prior) - set(model.names):
-            raise ParameterError(f"prior: there is no parameter {named(wrong)}.")
-        sigma = np.array([prior.get(name, np.inf) for name in model.names])
-        if not (sigma > 0).all():
-            raise ConfigError("prior: a standard deviation is positive.")
+        sigma = _deviations(prior, model.names)
         free = np.r_[unknown, np.ones(m, dtype=bool)]
         if data.n_values <= free.sum():
             raise ConfigError(

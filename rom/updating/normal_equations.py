@@ -13,12 +13,11 @@ from rom.model import Array, Index
 from rom.updating.family_model import FamilyModel
 from rom.updating.frf_data import Complex
 from rom.updating.measured import Responses
-from rom.updating.methods import receptance, through_modes
+from rom.updating.methods import blocks, receptance, through_modes
 from rom.updating.models import modal
 
 ROUGH_LINES = 500  # at most: enough to see resonances
 ROUGH_ERROR = 0.3  # of responses, with which the search begins
-BLOCK_LINES = 256  # at once: some ten megabytes of derivatives for sixty channels
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,8 +144,7 @@ def sums(model: FamilyModel, x: Array, ratios: Array, data: Data) -> Sums:
     normal, gradient = np.zeros((n, n)), np.zeros(n)
     squares = np.zeros(data.weight.shape)
     at = sensitivity(model, x, ratios)
-    for first in range(0, data.omega.size, BLOCK_LINES):
-        block = slice(first, first + BLOCK_LINES)
+    for block in blocks(data.omega.size):
         w = data.weight[block]
         H, J = at(data.omega[block])
         log = wrapped(np.log(H) - data.logarithm[block]) * (w > 0)

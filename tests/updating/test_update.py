@@ -165,7 +165,7 @@ def test_sums_do_not_depend_on_blocks(family, monkeypatch):
     model, data = model_of(family), Data.of(synthetic(family))
     x, ratios = np.zeros(3), np.full(4, 0.02)
     whole = sums(model, x, ratios, data)
-    monkeypatch.setattr("rom.updating.normal_equations.BLOCK_LINES", 7)
+    monkeypatch.setattr("rom.updating.methods.BLOCK_LINES", 7)
     pieces = sums(model, x, ratios, data)
     for name in ("normal", "gradient", "squares"):
         expected = getattr(whole, name)
