@@ -168,6 +168,17 @@ def test_a_prior_as_sure_as_the_equations_halves_what_they_find(family, model):
     assert_allclose(found.deviations["E_inner"], sure / np.sqrt(2), rtol=0.02)
 
 
+def test_equations_without_bias_err_as_much_as_they_say(family, model):
+    """Over 20 draws of 1 % the errors over their deviations have the deviation 1 +- 0.16."""
+    options = {"fixed": ("root",), "residual": "equations", "free": ("E_inner",)}
+    errors = []
+    for seed in range(20):
+        test = condensed(family, model, np.zeros(3), level=0.01, seed=seed)
+        found = rom.update(family, test, **options)
+        errors.append(np.log(found.factors["E_inner"]) / found.deviations["E_inner"])
+    assert_allclose(np.sqrt(np.mean(np.square(errors))), 1.0, atol=0.24)
+
+
 def test_the_bias_of_the_condensation_is_seen_by_the_verdict(family, model):
     """Responses find the truth; equations do not, and noise does not explain what is left."""
     test = measured(family, model, level=0.01)
