@@ -5,6 +5,8 @@ Source:
     (1948) 50.
 """
 
+from collections.abc import Iterable
+
 import numpy as np
 from scipy.stats import chi2
 
@@ -22,6 +24,7 @@ KNOWN_FACTORS = {
     1e-3: "metres taken for millimetres",
 }
 MAX_LOG_LEVEL = 1.5  # of all responses: a factor of 4.5, which no range of moduli explains
+LEFT_LOG_LEVEL = 0.7  # of a sensor at the end of the search: a factor of two
 FACTOR_LOG_ATOL = 0.7  # within which a known factor is named
 MIN_PHASE_COSINE = -0.4  # mean over the lines: a sensor of which measures the other direction
 MIN_OTHERS_COSINE = 0.2  # mean over the other sensors, without which phases say nothing
@@ -32,40 +35,63 @@ MAX_UNLIKE = 0.5  # one less the median FRAC: more is another body
 UNSEEN_RTOL = 0.5  # of a parameter's range: a wider standard deviation says nothing new
 
 
-def check_channels(H: Complex, data: Data) -> None:
-    """Refuse responses whose scale or sign no parameter explains.
+def check_channels(models: Iterable[Complex], data: Data) -> None:
+    """Refuse responses whose scale or sign no model explains.
 
     Args:
-        H: (n_f, n_s, n_e) of the model before updating [m/N].
+        models: (n_f, n_s, n_e) responses before updating, then with one factor after another at
+            the ends of its range, which are only asked for where the first ones do not fit [m/N].
         data: what was measured.
 
     Raises:
         ConfigError: naming the sensor, the factor and its likely reason.
     """
-    used = data.weight > 0
+    found: dict[str, tuple[str, str]] = {}
+    for k, H in enumerate(models):
+        here = suspects(H, data, MAX_LOG_LEVEL, unsure=k > 0)
+        found = here if k == 0 else {key: found[key] for key in found if key in here}
+        if not found:
+            return
+    for message, hint in found.values():
+        raise ConfigError(message, hint=hint)
+
+
+def suspects(
+    H: Complex, data: Data, most: float, *, unsure: bool = False
+) -> dict[str, tuple[str, str]]:
+    """{"all", "level 3", "sign 3": (message, hint)} of what differs from a model.
+
+    Args:
+        H: (n_f, n_s, n_e) of the model [m/N].
+        data: what was measured.
+        most: logarithm of a level that is taken.
+        unsure: whether signs are listed too that the model says little about.
+    """
+    used, found = data.weight > 0, {}
     size = np.abs(H).max(axis=(0, 2))
     for s in np.flatnonzero((size < DEAD_RATIO * size.max()) & used.any(axis=(0, 2))):
-        raise ConfigError(
+        found[f"level {s}"] = (
             f"sensor {s} moves by {size[s] / size.max():.1e} of the largest response of the model: "
             "a support or symmetry keeps it still.",
-            hint="Leave it out, or give it the coherence 0.",
+            "Leave it out, or give it the coherence 0.",
         )
     log = wrapped(data.logarithm - np.log(H))
     level = np.array([np.median(log.real[:, s][used[:, s]]) if used[:, s].any() else 0.0
                       for s in range(H.shape[1])])  # fmt: skip
     common = float(np.median(level))
-    if abs(common) > MAX_LOG_LEVEL:
-        raise ConfigError(
+    if abs(common) > most:
+        found["all"] = (
             f"all responses are {np.exp(common):.3g} times those of the model{_reason(common)}.",
-            hint="Check units, quantity, and whether the data are of this body.",
+            "Check units, quantity, and whether the data are of this body.",
         )
-    for s in np.flatnonzero(np.abs(level - common) > MAX_LOG_LEVEL):
-        raise ConfigError(
+    for s in np.flatnonzero(np.abs(level - common) > most):
+        found.setdefault(f"level {s}", (
             f"sensor {s} gives {np.exp(level[s]):.3g} times the model{_reason(level[s])}, the "
             f"others {np.exp(common):.3g} times.",
-            hint="Check its scale, its direction and its place.",
-        )
-    _check_signs(np.cos(log.imag), used)
+            "Check its scale, its direction and its place.",
+        ))  # fmt: skip
+    turned = _turned(np.cos(log.imag), used, unsure)
+    return found | {f"sign {s}": message for s, message in turned.items()}
 
 
 def _reason(level: float) -> str:
@@ -75,17 +101,21 @@ def _reason(level: float) -> str:
     return ""
 
 
-def _check_signs(cosine: Array, used: Mask) -> None:
+def _turned(cosine: Array, used: Mask, unsure: bool) -> dict[int, tuple[str, str]]:
     count = np.maximum(used.sum(axis=(0, 2)), 1)
     mean = (cosine * used).sum(axis=(0, 2)) / count
-    for s in np.flatnonzero(mean < MIN_PHASE_COSINE):
-        others = np.delete(mean, s)
-        if others.size and np.median(others) > MIN_OTHERS_COSINE:
-            raise ConfigError(
+    found = {}
+    for s in range(mean.size):
+        others = float(np.median(np.delete(mean, s))) if mean.size > 1 else 0.0
+        most = 0.0 if unsure else MIN_PHASE_COSINE
+        turned = mean[s] < most if others > MIN_OTHERS_COSINE else unsure
+        if turned:
+            found[s] = (
                 f"sensor {s} moves against the model (mean cosine of the phase {mean[s]:.2f}; "
-                f"{np.median(others):.2f} of the others): it looks turned around.",
-                hint="Turn its direction, or see whether two cables are exchanged.",
+                f"{others:.2f} of the others): it looks turned around.",
+                "Turn its direction, or see whether two cables are exchanged.",
             )
+    return found
 
 
 def scores(normal: Array, gradient: Array, free: Index, names: tuple[str, ...]) -> dict[str, float]:
