@@ -71,6 +71,18 @@ def test_coupled_families_have_the_frequencies_of_their_assembly(families):
     values = {"frame.E": 1.2, "arm.E": 0.8}
     expected = joined.at(**values).modes(8, fixed=HELD).omega
     assert_allclose(np.sqrt(found), expected, rtol=1e-8)
+    modes = joined.nominal.modes(fixed=HELD)
+    seen, driven = (
+        sum(side.rows({name: body}, "channel", 0.6) @ modes.shapes[name]
+            * (np.asarray(side.points)[:, :1] > 0.5 if name == "arm"
+               else np.asarray(side.points)[:, :1] < 0.5)
+            for name, body in joined.nominal.bodies.items())
+        for side in channels()
+    )  # fmt: skip
+    w = 2 * np.pi * LINES
+    H = np.einsum("sn,fn,en->fse", seen, 1 / (modes.omega**2 - w[:, None] ** 2), driven)
+    same = responses_at(model, np.zeros(2), np.array([1e-12]), w)
+    assert_allclose(same, H, rtol=1e-6, atol=1e-9 * np.abs(H).max())
 
 
 def test_two_bodies_on_a_spring_swing_as_two_masses(bolted):
