@@ -20,7 +20,7 @@ from rom.names import named
 from rom.parametric.assembled import FamilyAssembly
 from rom.plausible import check_damping_ratio
 from rom.rows import row
-from rom.updating.equations import by_equations
+from rom.updating.equations import by_equations, by_response_functions
 from rom.updating.family_model import Attached, Family, FamilyModel, Parts, family_model
 from rom.updating.frf_data import Complex
 from rom.updating.measured import Channels, Responses
@@ -48,6 +48,7 @@ MAX_STIFFNESS = 1e10  # beyond it no shorter step lowers the residual
 BAND_RATIO = 1.5  # modes up to here, over the highest line, have damping that lines can see
 BOUND_ATOL = 1e-9  # distance of a logarithm from the end of its range
 DAMPING_LOG_DEVIATION = 1.5  # of ratios about their start, before the test: a factor of 20 in two
+RESIDUALS = ("responses", "equations", "response-function")
 DAMPING_RANGE = (1e-6, 0.9)  # ratios that are tried
 
 
@@ -229,8 +230,9 @@ def update(  # noqa: PLR0913  keywords of one call
         prior: {name: relative standard deviation [1] of its factor about one, before the test}.
         tolerance: largest distance of a channel from a surface point [m], see `Channels.rows`.
         residual: "responses", or "equations": of motion at the sensors, linear in what is sought,
-            biased by noise and by the condensation; the verdict is that of responses. A prior
-            weighs against what the equations leave.
+            biased by noise and by the condensation; or "response-function": H - H_test is
+            H dZ H_test, linear too, and without condensation. The verdict is that of responses; a
+            prior weighs against what they leave.
         rank: of the basis of equations; None for one direction per mode up to the highest line.
 
     Returns:
@@ -248,8 +250,8 @@ def update(  # noqa: PLR0913  keywords of one call
         Berriet, Fillod and Bouhaddi, for weighted responses with modal damping.
     """
     check_damping_ratio(damping)
-    one_of("residual", residual, ("responses", "equations"))
-    if rank is not None and residual == "responses":
+    one_of("residual", residual, RESIDUALS)
+    if rank is not None and residual != "equations":
         raise ConfigError("rank belongs to the residual of equations.")
     if not DAMPING_RANGE[0] <= damping <= DAMPING_RANGE[1]:
         raise ConfigError(f"damping = {damping} to start from is not within {DAMPING_RANGE}.")
@@ -272,7 +274,12 @@ def update(  # noqa: PLR0913  keywords of one call
     if residual == "responses":
         return _found(family, search.run())
     sigma = _deviations(prior or {}, model.names)
-    found = by_equations(model, data, search.x, unknown, damping, prior=sigma, rank=rank)
+    begin = model, data, search.x, unknown, damping
+    if residual == "equations":
+        found = by_equations(*begin, prior=sigma, rank=rank)
+    else:
+        ratios = search.zeta.size, DAMPING_LOG_DEVIATION
+        found = by_response_functions(*begin, prior=sigma, prior_damping=ratios)
     return replace(_found(family, search.moved(found)), covariance=found.covariance)
 
 

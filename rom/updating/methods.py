@@ -30,7 +30,7 @@ from rom.updating.models import (
 MAX_EVALUATIONS = 100  # evaluations of the responses; more are needed if the start is too far away
 BLOCK_LINES = 256  # at once: some ten megabytes of derivatives for sixty channels
 MAX_STEPS = 40  # linear solutions
-STEP_ATOL = 1e-13  # of parameters, below which equations are solved
+STEP_ATOL = 1e-8  # in standard deviations, below which equations are solved
 MAX_PARAMETER_CHANGE = 0.2  # in one step
 MIN_PARAMETER = -0.95  # change that leaves a twentieth of the stiffness or mass
 EQUAL_EIGENVALUE_RTOL = 1e-12  # distance of eigenvalues whose modes have no derivative
@@ -211,12 +211,12 @@ def update_by_output(model: Model, test: Measurement, p: ArrayLike, zeta: ArrayL
 
     def residual(x: Array) -> Array:
         H = responses(model, x[:n_p], np.exp(x[n_p:]), test.omega, test.inputs)
-        return _weighted(test.weights, np.log(H / test.H))
+        return weighted(test.weights, np.log(H / test.H))
 
     def jacobian(x: Array) -> Array:
         path.append(x[:n_p].copy())
         H, dH = sensitivity(model, x[:n_p], np.exp(x[n_p:]), test.omega, test.inputs)
-        return _weighted(test.weights, dH / H[..., None])
+        return weighted(test.weights, dH / H[..., None])
 
     start = np.concatenate([p, np.log(zeta)])
     low = np.concatenate([np.full(n_p, MIN_PARAMETER), np.full(np.size(zeta), -np.inf)])
@@ -252,15 +252,47 @@ def update_by_input(
     test.check(model, zeta)
     if not 1 <= rank <= test.H.shape[1]:
         raise ConfigError(f"rank = {rank} is not among 1 to {test.H.shape[1]} sensors.")
-    x, ratios, path = np.array(p, dtype=float), np.array(zeta, dtype=float), []
-    precision = np.diag(np.r_[1.0 / np.broadcast_to(prior, x.shape), np.zeros(ratios.size)])
-    n, n_values = len(precision), 2 * rank * test.omega.size * len(test.inputs)
+    n_values = 2 * rank * test.omega.size * len(test.inputs)
+
+    def triangle(x: Array, ratios: Array) -> Array:
+        return _equations(model.at(x), test, ratios, rank)
+
+    start = np.array(p, dtype=float), np.array(zeta, dtype=float)
+    return solved(triangle, start, n_values, limits, prior)
+
+
+def solved(
+    triangle: Callable[[Array, Array], Array],
+    start: tuple[Array, Array],
+    n_values: int,
+    limits: tuple[ArrayLike, ArrayLike],
+    prior: ArrayLike,
+    prior_damping: tuple[float, float] = (1.0, np.inf),
+    enough: float = STEP_ATOL,
+) -> Update:
+    """Least squares that are linear in p and ln zeta in each step, none longer than 0.2.
+
+    Args:
+        triangle: the function of p and zeta that gives the triangle (n + 1, n + 1) of derivatives
+            and residual, see `folded`.
+        start: p (n_p,) [1] and zeta (m,) [1].
+        n_values: number of residuals.
+        limits: of p [1].
+        prior: (n_p,) standard deviation of p about zero before the test [1]; it weighs against
+            the residual that is left.
+        prior_damping: ratio before the test and standard deviation of its logarithm [1].
+        enough: length of a step in standard deviations that is the last one [1].
+    """
+    (x, ratios), path = start, []
+    before = np.r_[np.zeros(x.size), np.full(ratios.size, np.log(prior_damping[0]))]
+    sigma = np.r_[np.broadcast_to(prior, x.shape), np.full(ratios.size, prior_damping[1])]
+    precision, n = np.diag(1.0 / sigma), sigma.size
     for _ in range(MAX_STEPS):
-        R = _equations(model.at(x), test, ratios, rank)
+        R = triangle(x, ratios)
         left = R[:, n] @ R[:, n]
         noise = np.sqrt(left / max(n_values - n, 1)) or 1.0
         J = np.vstack([R[:, :n] / noise, precision])
-        r = np.r_[R[:, n] / noise, precision[:, : x.size] @ x]
+        r = np.r_[R[:, n] / noise, precision @ (np.r_[x, np.log(ratios)] - before)]
         step = np.clip(
             -np.linalg.lstsq(J, r, rcond=None)[0], -MAX_PARAMETER_CHANGE, MAX_PARAMETER_CHANGE
         )
@@ -268,7 +300,7 @@ def update_by_input(
         step[: x.size] = np.clip(x + step[: x.size], *limits) - x
         x = x + step[: x.size]
         path.append(x)
-        if np.abs(step).max() < STEP_ATOL:
+        if np.linalg.norm(J @ step) < enough:
             break
     covariance = np.linalg.pinv(J.T @ J, hermitian=True)
     return Update(x, ratios, covariance, np.array(path), np.sqrt(left / n_values))
@@ -287,7 +319,7 @@ def _equations(here: ParametricModel, test: Measurement, ratios: Array, rank: in
         omega, w = test.omega[block], weights[block]
         J = change(seen * modes.g(omega)[:, None, :], condensed @ test.H[block], omega)
         r = np.asarray(U.T @ (test.H[block] - H[block]), dtype=complex)
-        R = folded(R, np.column_stack([_weighted(w, J), _weighted(w, r)]))
+        R = folded(R, np.column_stack([weighted(w, J), weighted(w, r)]))
     return R
 
 
@@ -332,7 +364,7 @@ def response_function_method(
         known[:, s] = test.H
         known[:, o] = np.linalg.solve(Z[:, o][:, :, o], F[o] - Z[:, o][:, :, s] @ test.H)
         change = _through(H, (model.dK, model.dM, 0 * model.dK), known, test.omega)
-        J, r = _weighted(test.weights, change), _weighted(test.weights, H @ F - test.H)
+        J, r = weighted(test.weights, change), weighted(test.weights, H @ F - test.H)
         step = np.linalg.lstsq(J, r, rcond=None)[0]
         p = np.maximum(p + np.clip(step, -clip, clip), MIN_PARAMETER)
         path.append(p)
@@ -374,7 +406,7 @@ def _update(x: Array, n_p: int, r: Array, J: Array, path: list[Array]) -> Update
     return Update(x[:n_p], np.exp(x[n_p:]), covariance, np.array(path), np.sqrt((r @ r) / r.size))
 
 
-def _weighted(weights: Any, r: Complex) -> Array:
+def weighted(weights: Any, r: Complex) -> Array:
     """Weighted residual, or its derivatives (.., n_q), real parts above imaginary parts."""
     weights = np.asarray(weights, dtype=float)
     if r.ndim == 3:

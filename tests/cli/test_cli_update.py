@@ -116,6 +116,8 @@ def test_equations_are_taken_with_their_rank_and_a_prior(capsys):
     )  # fmt: skip
     assert found["factors"] == same.factors and found["deviations"] == same.deviations
     free = answered(words[:4], capsys, code=5, file="driven.h5")
+    unbiased = answered(["--residual", "response-function"], capsys, file="driven.h5")
+    assert unbiased["factors"]["inner"] == pytest.approx(TRUE["inner"], rel=0.01)
     assert found["deviations"]["inner"] < 0.01 and found["factors"] != free["factors"]
 
 

@@ -179,6 +179,33 @@ def test_equations_without_bias_err_as_much_as_they_say(family, model):
     assert_allclose(np.sqrt(np.mean(np.square(errors))), 1.0, atol=0.24)
 
 
+def test_the_response_function_method_finds_what_is_true(family, model):
+    """Nothing is condensed: without noise no bias, where that of equations is above a per cent.
+
+    The input has no sensor, and 4 sensors are enough for 4 modes.
+    """
+    whole = measured(family, model)
+    few = [1, 4, 7, 10]
+    sensors = Channels(whole.sensors.points[few], whole.sensors.directions[few])
+    test = replace(whole, H=whole.H[:, few], coherence=whole.coherence[:, few], sensors=sensors)
+    found = rom.update(family, test, fixed=("root",), residual="response-function", damping=0.02)
+    assert_allclose(list(found.factors.values()), TRUE, rtol=1e-8)
+
+
+def test_the_response_function_method_errs_as_much_as_it_says(family, model):
+    """Errors over deviations of 3 factors in 8 draws of 1 %: the deviation 1 +- 0.14."""
+    errors = []
+    for seed in range(8):
+        test = measured(family, model, level=0.01, seed=seed)
+        test = replace(test, frequencies=LINES[::3], H=test.H[::3],
+                       coherence=1 / (1 + AVERAGES * 0.01**2))  # fmt: skip
+        found = rom.update(family, test, fixed=("root",), residual="response-function")
+        off = np.log(np.array(list(found.factors.values())) / TRUE)
+        errors.append(off / [found.deviations[name] for name in PARAMETERS])
+        assert found.verdict.ok, found
+    assert_allclose(np.sqrt(np.mean(np.square(errors))), 1.0, atol=0.28)
+
+
 def test_the_bias_of_the_condensation_is_seen_by_the_verdict(family, model):
     """Responses find the truth; equations do not, and noise does not explain what is left."""
     test = measured(family, model, level=0.01)
@@ -201,6 +228,7 @@ def test_what_equations_need_is_named(family, model):
 
     refused("residual = 'force'", residual="force")
     refused("rank belongs", rank=3, residual="responses")
+    refused("rank belongs", rank=3, residual="response-function")
     refused("a standard deviation is positive", prior={"E_inner": -0.1})
     refused("rank = 99", rank=99)
     refused("rank = 1.5", rank=1.5)

@@ -80,8 +80,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         help="relative standard deviation of a factor about one, before the test",
     )  # fmt: skip
     parser.add_argument(
-        "--residual", choices=("responses", "equations"), default="responses",
-        help="what is made small: responses (default), or equations of motion at the sensors",
+        "--residual", choices=("responses", "equations", "response-function"), default="responses",
+        help="what is made small: responses (default), equations of motion at the sensors, or what "
+        "the response function method leaves",
     )  # fmt: skip
     parser.add_argument(
         "--rank", type=count, help="of the basis of equations (default: one per mode of the band)"
