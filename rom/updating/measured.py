@@ -191,8 +191,10 @@ class Responses:
         if bad.any():
             lines = np.flatnonzero(bad.any(axis=(1, 2)))
             some = ", ".join(f"{x:.5g}" for x in self.frequencies[lines[:MAX_LINES_NAMED]])
+            own = np.flatnonzero(bad.any(axis=(0, 2)))
+            where = "" if own.size == len(bad[0]) else f" of sensors {named(own.tolist())}"
             raise ConfigError(
-                f"H is zero or not finite at {lines.size} lines, e.g. at {some} Hz.",
+                f"H{where} is zero or not finite at {lines.size} lines, e.g. at {some} Hz.",
                 hint="Give these lines the coherence 0.",
             )
 

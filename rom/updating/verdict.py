@@ -59,7 +59,7 @@ def check_channels(models: Iterable[Complex], data: Data) -> None:
 def suspects(
     H: Complex, data: Data, most: float, *, unsure: bool = False
 ) -> dict[str, tuple[str, str]]:
-    """{"all", "level 3", "sign 3": (message, hint)} of what differs from a model.
+    """{"level 3", "sign of input 1": (message, hint)} of channels that differ from a model.
 
     Args:
         H: (n_f, n_s, n_e) of the model [m/N].
@@ -76,22 +76,40 @@ def suspects(
             "Leave it out, or give it the coherence 0.",
         )
     log = wrapped(data.logarithm - np.log(H))
-    level = np.array([np.median(log.real[:, s][used[:, s]]) if used[:, s].any() else 0.0
-                      for s in range(H.shape[1])])  # fmt: skip
-    common = float(np.median(level))
-    if abs(common) > most:
-        found["all"] = (
+    return found or _levels(log.real, used, most) | _turned(np.cos(log.imag), used, unsure)
+
+
+def _levels(log: Array, used: Mask, most: float) -> dict[str, tuple[str, str]]:
+    """Sensors beside all of them, inputs beside the other ones, and all beside the model."""
+    found = {}
+    sensors, inputs = (_medians(log, used, axis) for axis in (1, 2))
+    for e, level in enumerate(inputs):
+        others = float(np.median(np.delete(inputs, e))) if inputs.size > 1 else level
+        if abs(level - others) > most and abs(level) > abs(others):
+            found[f"level of input {e}"] = (
+                f"responses to input {e} are {np.exp(level):.3g} times those of the model"
+                f"{_reason(level)}, to others {np.exp(others):.3g} times.",
+                "Check the scale, the direction and the place of this force.",
+            )
+    common = float(np.median(sensors))
+    if abs(common) > most and not found:
+        found["level of all"] = (
             f"all responses are {np.exp(common):.3g} times those of the model{_reason(common)}.",
             "Check units, quantity, and whether the data are of this body.",
         )
-    for s in np.flatnonzero(np.abs(level - common) > most):
-        found.setdefault(f"level {s}", (
-            f"sensor {s} gives {np.exp(level[s]):.3g} times the model{_reason(level[s])}, the "
+    for s in np.flatnonzero(np.abs(sensors - common) > most):
+        found[f"level {s}"] = (
+            f"sensor {s} gives {np.exp(sensors[s]):.3g} times the model{_reason(sensors[s])}, the "
             f"others {np.exp(common):.3g} times.",
             "Check its scale, its direction and its place.",
-        ))  # fmt: skip
-    turned = _turned(np.cos(log.imag), used, unsure)
-    return found | {f"sign {s}": message for s, message in turned.items()}
+        )
+    return found
+
+
+def _medians(log: Array, used: Mask, axis: int) -> Array:
+    """(k,) median of what counts for each channel; zero without."""
+    pairs = zip(np.moveaxis(log, axis, 0), np.moveaxis(used, axis, 0), strict=True)
+    return np.array([np.median(own[kept]) if kept.any() else 0.0 for own, kept in pairs])
 
 
 def _reason(level: float) -> str:
@@ -101,20 +119,26 @@ def _reason(level: float) -> str:
     return ""
 
 
-def _turned(cosine: Array, used: Mask, unsure: bool) -> dict[int, tuple[str, str]]:
-    count = np.maximum(used.sum(axis=(0, 2)), 1)
-    mean = (cosine * used).sum(axis=(0, 2)) / count
-    found = {}
-    for s in range(mean.size):
-        others = float(np.median(np.delete(mean, s))) if mean.size > 1 else 0.0
-        most = 0.0 if unsure else MIN_PHASE_COSINE
-        turned = mean[s] < most if others > MIN_OTHERS_COSINE else unsure
-        if turned:
-            found[s] = (
-                f"sensor {s} moves against the model (mean cosine of the phase {mean[s]:.2f}; "
-                f"{others:.2f} of the others): it looks turned around.",
-                "Turn its direction, or see whether two cables are exchanged.",
-            )
+def _turned(cosine: Array, used: Mask, unsure: bool) -> dict[str, tuple[str, str]]:
+    """Sensors and inputs of which phases run against the model while those of others do not."""
+    most, found = 0.0 if unsure else MIN_PHASE_COSINE, {}
+    hint = "Turn its direction, or see whether two cables are exchanged."
+    for what, axes in (("sensor", (0, 2)), ("input", (0, 1))):
+        mean = (cosine * used).sum(axis=axes) / np.maximum(used.sum(axis=axes), 1)
+        for k in range(mean.size):
+            others = float(np.median(np.delete(mean, k))) if mean.size > 1 else 0.0
+            if mean[k] < most if others > MIN_OTHERS_COSINE else unsure:
+                found[f"sign of {what} {k}"] = (
+                    f"{what} {k} moves against the model (mean cosine of the phase {mean[k]:.2f}; "
+                    f"{others:.2f} of the others): it looks turned around.",
+                    hint,
+                )
+    if mean.max() < most:
+        found["sign of all"] = (
+            f"all responses run against the model (mean cosine of the phase {mean.max():.2f}): "
+            "forces or sensors look turned around.",
+            "Turn the direction of the force, or see whether it is that of the reaction.",
+        )
     return found
 
 
