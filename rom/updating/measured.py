@@ -4,6 +4,7 @@ Source:
     Bendat and Piersol, Random data (2010): var |H| / |H|^2 = (1 - c) / (2 n c).
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,6 +17,7 @@ from rom.body.flexible import FlexibleBody
 from rom.body.surface import surface_of
 from rom.errors import ConfigError
 from rom.model import Array
+from rom.names import named
 from rom.rotation import skew
 from rom.updating.frf_data import Complex, random_error
 
@@ -27,6 +29,7 @@ LENGTHS = {  # factors by which points that are off a body may all lie on it
     0.0254: "inches taken for metres",
 }
 POINT_RTOL = 0.02  # distance of a sensor from the nearest point of the surface, of the body's size
+SAME_RTOL = 1e-6  # distance of surfaces that touch, of the size of all
 MAX_RELATIVE_ERROR = 0.3  # of a value; beyond it the logarithm of noise is no longer normal
 MAX_LINES_NAMED = 5  # in a message
 FREEDOM_LOST = 2  # averages, by a variance that is estimated from the same records as the response
@@ -58,37 +61,54 @@ class Channels:
         if not np.linalg.norm(self.directions, axis=1).all():
             raise ConfigError("a channel has a direction of length zero.")
 
-    def rows(self, body: FlexibleBody, what: str, tolerance: float | None = None) -> Array:
+    def rows(
+        self,
+        body: FlexibleBody | Mapping[str, FlexibleBody],
+        what: str,
+        tolerance: float | None = None,
+    ) -> Array:
         """(k, 6 + r) displacement along each channel per rigid and elastic coordinate [1].
 
         Args:
-            body: with its outer surface.
+            body: with its outer surface; of {name: body} each channel takes the nearest one, and
+                the coordinates of one body come after those of another.
             what: "sensor" or "input", for messages.
             tolerance: largest distance from a point of the surface [m]; None for two per cent of
-                the body's size.
+                the size of all.
 
         Raises:
-            ConfigError: if a channel is off the body.
-            ModelError: if the body carries no surface.
+            ConfigError: if a channel is off the body, or as near to two bodies.
+            ModelError: if a body carries no surface.
         """
-        surface, points = surface_of(body), np.asarray(self.points)
-        reach = POINT_RTOL * np.ptp(surface.points, axis=0).max()
-        reach = reach if tolerance is None else tolerance
-        tree = cKDTree(surface.points)
-        _check_lengths(points, tree, reach, what)
-        far, nearest = tree.query(points)
-        found = []
-        for k, (d, n) in enumerate(zip(np.asarray(self.directions), nearest, strict=True)):
-            if far[k] > reach:
+        bodies = {"": body} if isinstance(body, FlexibleBody) else body
+        surfaces, points = [surface_of(one) for one in bodies.values()], np.asarray(self.points)
+        everywhere = np.vstack([surface.points for surface in surfaces])
+        size = np.ptp(everywhere, axis=0).max()
+        reach = POINT_RTOL * size if tolerance is None else tolerance
+        _check_lengths(points, cKDTree(everywhere), reach, what)
+        asked = [cKDTree(surface.points).query(points) for surface in surfaces]
+        far, nearest = (np.array([pair[i] for pair in asked]) for i in (0, 1))
+        ends = np.cumsum([6 + one.n_modes for one in bodies.values()])
+        found = np.zeros((len(points), ends[-1]))
+        for k, d in enumerate(np.asarray(self.directions)):
+            own = int(far[:, k].argmin())
+            if far[own, k] > reach:
                 raise ConfigError(
-                    f"{what} {k} at {points[k].tolist()} is {far[k]:.3g} m off the body; "
+                    f"{what} {k} at {points[k].tolist()} is {far[own, k]:.3g} m off the body; "
                     f"{reach:.3g} m is taken.",
                     hint="Compare the units and axes of the test with those of the geometry.",
                 )
+            if len(near := np.flatnonzero(far[:, k] <= far[own, k] + SAME_RTOL * size)) > 1:
+                raise ConfigError(
+                    f"{what} {k} at {points[k].tolist()} is as near to one as to another of "
+                    f"{named(list(bodies)[j] for j in near)}.",
+                    hint="Give a point of the body that is meant, beside its joint.",
+                )
+            surface, n = surfaces[own], int(nearest[own, k])
             shape = surface.shape[3 * n : 3 * n + 3]
             motion = np.hstack([np.eye(3), -skew(surface.points[n]), shape])
-            found.append(d / np.linalg.norm(d) @ motion)
-        return np.array(found)
+            found[k, ends[own] - motion.shape[1] : ends[own]] = d / np.linalg.norm(d) @ motion
+        return found
 
 
 def _check_lengths(points: Array, surface: cKDTree, reach: float, what: str) -> None:
@@ -171,8 +191,10 @@ class Responses:
         if bad.any():
             lines = np.flatnonzero(bad.any(axis=(1, 2)))
             some = ", ".join(f"{x:.5g}" for x in self.frequencies[lines[:MAX_LINES_NAMED]])
+            own = np.flatnonzero(bad.any(axis=(0, 2)))
+            where = "" if own.size == len(bad[0]) else f" of sensors {named(own.tolist())}"
             raise ConfigError(
-                f"H is zero or not finite at {lines.size} lines, e.g. at {some} Hz.",
+                f"H{where} is zero or not finite at {lines.size} lines, e.g. at {some} Hz.",
                 hint="Give these lines the coherence 0.",
             )
 

@@ -23,7 +23,7 @@ from rom.model import Array
 from rom.names import named
 from rom.parametric.family import BodyFamily
 from rom.plausible import check_damping_ratio
-from rom.updating.estimate import Attached
+from rom.updating.family_model import Attached
 from rom.updating.measured import Channels
 from rom.updating.operation import (
     Linear,

@@ -23,8 +23,8 @@ from rom.model import Array, Index
 from rom.names import named
 from rom.parametric.family import BodyFamily
 from rom.plausible import check_damping_ratio
-from rom.updating.estimate import BAND_RATIO, DAMPING_LOG_DEVIATION, Attached
-from rom.updating.family_model import FamilyModel, family_model
+from rom.updating.estimate import BAND_RATIO, DAMPING_LOG_DEVIATION
+from rom.updating.family_model import Attached, FamilyModel, family_model
 from rom.updating.frf_data import Complex
 from rom.updating.measured import DERIVATIVES, Channels
 from rom.updating.models import DEAD_RATIO, modal

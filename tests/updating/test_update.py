@@ -165,7 +165,7 @@ def test_sums_do_not_depend_on_blocks(family, monkeypatch):
     model, data = model_of(family), Data.of(synthetic(family))
     x, ratios = np.zeros(3), np.full(4, 0.02)
     whole = sums(model, x, ratios, data)
-    monkeypatch.setattr("rom.updating.normal_equations.BLOCK_LINES", 7)
+    monkeypatch.setattr("rom.updating.methods.BLOCK_LINES", 7)
     pieces = sums(model, x, ratios, data)
     for name in ("normal", "gradient", "squares"):
         expected = getattr(whole, name)
@@ -420,7 +420,12 @@ def test_wrong_data_are_named(family):
     refused("sensor 2 gives .*1000: millimetres", H=scaled)
     refused("all responses .*9.807: acceleration in g", H=9.80665 * test.H)
     refused("all responses .*0.001: metres taken", H=1e-3 * test.H)
-    refused("zero or not finite at 1 lines, e.g. at 84.832 Hz", H=nan)
+    refused("sensors 0 is zero or not finite at 1 lines, e.g. at 84.832 Hz", H=nan)
+    for e in (0, 1):
+        pair = np.where(np.arange(2) == e, -1.0, 1.0)
+        refused(f"input {e} moves against .* turned around", H=pair * test.H)
+        refused(f"responses to input {e} are .*1000: millim", H=1000.0 ** (pair < 0) * test.H)
+    refused("all responses run against the model", H=-test.H)
     refused("sensor 0 at .* is 0.92 m off the body", sensors=Channels(
         np.asarray(SENSORS.points) + [[0, 0, 0.999 + 0.001 * (k == 0)] for k in range(16)],
         SENSORS.directions))  # fmt: skip
