@@ -17,7 +17,8 @@ from rom.body.damping import ModalDamping, Rayleigh, damped
 from rom.body.flexible import FlexibleBody
 from rom.body.frame import at_large_deflection
 from rom.body.nonlinear.cauchy import refuse_many
-from rom.body.nonlinear.geometric import Geometric, enriched
+from rom.body.nonlinear.geometric import enriched
+from rom.body.nonlinear.ranges import Geometric
 from rom.body.prestress import UnitLoads
 from rom.body.projection import (
     canonical_columns,
@@ -413,7 +414,7 @@ def _reduced_body(  # noqa: PLR0913  those of `reduce`
         connection, ops, body, basis, elastic, everywhere=certify == "full"
     )
     if nonlinear is not None and E is not None:
-        rows, deflections = deflection_rows(nonlinear, model, connection, body, E)
+        rows, deflections = deflection_rows(nonlinear, model, ops, connection, body, E)
         certificate = replace(certificate, rows=(*certificate.rows, *rows))
         body.provenance["large deflection"] = deflections
     return replace(

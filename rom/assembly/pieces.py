@@ -16,7 +16,7 @@ import numpy as np
 
 from rom.arguments import typed
 from rom.body.flexible import FlexibleBody
-from rom.body.nonlinear.geometric import Geometric
+from rom.body.nonlinear.ranges import Geometric
 from rom.errors import ConfigError, InterfaceError, ModelError
 from rom.model import Array, FEModel, Mask
 from rom.names import check_name, named, offered
@@ -182,7 +182,8 @@ class Tree:
             models: the pieces.
 
         Raises:
-            ConfigError: for supports beside the reference, with which they depend on stiffness.
+            ConfigError: for supports beside the reference, with which they depend on stiffness, and
+                for centrifugal force.
             InterfaceError: for loads on an interface that no piece has, or on a joint.
         """
         if geometric.fixed:
@@ -190,6 +191,12 @@ class Tree:
                 f"fixed = {geometric.fixed!r}: with supports beside the reference, which loads "
                 "reach a piece depends on their stiffness.",
                 hint="Name as loads what the supports bear at most, and leave fixed out.",
+            )
+        if np.any(geometric.spin):
+            raise ConfigError(
+                f"spin = {geometric.spin!r}: which centrifugal force pulls at the sections of "
+                "pieces is not known.",
+                hint="Name that force as a load of the interface farthest out.",
             )
         owner = {interface: key for key, model in models.items() for interface in model.interfaces
                  if interface not in self.joints}  # fmt: skip

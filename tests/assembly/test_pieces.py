@@ -209,6 +209,8 @@ def test_pieces_that_make_no_body_are_refused_by_name():
         tree.ranges(rom.Geometric(loads={"cut 1": (1, 0, 0, 0, 0, 0)}), models)
     with pytest.raises(ConfigError, match="with supports beside the reference"):
         tree.ranges(rom.Geometric(loads={"tip": (1, 0, 0, 0, 0, 0)}, fixed=("tip",)), models)
+    with pytest.raises(ConfigError, match="which centrifugal force pulls"):
+        tree.ranges(rom.Geometric(loads={}, spin=(0, 0, 1.0)), models)
     with pytest.raises(InterfaceError, match="no interface 'hub'"):
         rom.reduce_pieces(models, reference="root", interfaces={"hub": "rbe3"})
 

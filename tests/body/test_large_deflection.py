@@ -21,6 +21,7 @@ from cases.paths import RANKS, ROOT
 from cases.ranks.environment import ENVIRONMENT
 from rom.body.nonlinear.geometric import ELLIPTIC_STRETCH, foreseen
 from rom.body.nonlinear.quartic import Quartic, entries, n_entries, position
+from rom.body.nonlinear.ranges import nodal_forces
 from rom.body.nonlinear.statics import follow
 from rom.checks.deflection import (
     DISPLACEMENT_RTOL,
@@ -28,7 +29,6 @@ from rom.checks.deflection import (
     Step,
     deflection_rows,
     load_cases,
-    nodal_load,
     rows_of,
 )
 from rom.eigen.verbs import rigid_motions
@@ -258,15 +258,39 @@ def test_a_basis_without_derivatives_locks_and_its_certificate_fails(monkeypatch
 
 def test_no_load_of_the_certificate_together_with_others_is_one_of_the_shapes():
     """Neither sums nor differences of two: each makes an angle with every load that was borne."""
-    for n in (2, 3):
-        geometric = rom.Geometric(loads={"tip": (1.0,) * n + (0,) * (6 - n)})
+    for n, spin in ((2, 0.0), (3, 0.0), (1, 2.0), (2, 2.0)):
+        geometric = rom.Geometric(loads={"tip": (1.0,) * n + (0,) * (6 - n)}, spin=(0, 0, spin))
         cases = {k: v for k, v in load_cases(geometric).items() if k.startswith("all")}
         assert len(cases) == 2
         cosines = np.abs(geometric.load_cases() @ np.array(list(cases.values())).T)
         assert cosines.max() < 0.93
         assert_allclose([v @ v for v in cases.values()], 1.0)
         first, last = cases.values()
-        assert np.all(first[1:] * first[:-1] > 0) and np.all(last[1:] * last[:-1] < 0)
+        assert np.all(first[1:] * first[:-1] > 0)
+        assert np.all(last[-1] > 0 if spin else last[1:] * last[:-1] < 0)
+
+
+def test_centrifugal_force_is_a_load_that_is_certified_and_never_pushes():
+    """About a point beside the body: the load at each node is its mass times speed^2 x."""
+    model, EI = slender(50, 8)
+    speed = 8 * np.sqrt(EI / (7850 / 2500))
+    body = reduced(model, (0, 0.2 * EI, 0, 0, 0, 0), n_modes=8, active=2, certify=True,
+                   spin=(0, 0, speed), about=(-0.3, 0, 0))  # fmt: skip
+    rows = deflections_compared(body) | {r.quantity: r for r in body.certificate.rows
+                                         if "omega" in r.quantity}  # fmt: skip
+    assert body.certificate.ok, body.certificate
+    assert rows["omega_z^2: displacement"].value < 5e-4
+    assert rows["omega_z^2: frequencies about it"].value < 1e-3
+    assert not [name for name in rows if "-omega" in name]
+    geometric = rom.Geometric(loads={}, spin=(1, 2, 3))
+    assert [x.name for x in geometric.components()][:2] == ["omega_x^2", "omega_y^2"]
+    assert len(geometric.load_cases()) == 3 + 2 * 3 + 3 + 2 * 9 + 4 * 3
+    about, loads = np.array([0.1, -0.2, 0.3]), geometric.components()
+    F = nodal_forces(loads, model, model.operators, about).sum(axis=1)
+    arms = model.points - about
+    w = np.array([1.0, 2.0, 3.0])
+    a = -np.cross(w, np.cross(w, arms))
+    assert_allclose(F, model.operators.apply_M(a.reshape(-1, 1))[:, 0], atol=1e-9)
 
 
 def test_the_range_is_stored_with_the_share_up_to_which_it_holds(certified):
@@ -299,12 +323,12 @@ def test_a_range_holds_to_the_last_step_before_one_that_fails(
 ):
     body, model, loads = certified
     geometric = rom.Geometric(loads={"tip": loads})
-    W = np.array([nodal_load(model, *one) for one in geometric.components()])
-    E = np.linalg.pinv(W) @ np.outer(loads[1:3], [1.0] * 3 + [0.0] * (body.n_modes - 3)) * 1e-3
+    W = nodal_forces(geometric.components(), model, model.operators, np.zeros(3))
+    E = np.linalg.pinv(W.T) @ np.outer(loads[1:3], [1.0] * 3 + [0.0] * (body.n_modes - 3)) * 1e-3
     after = cycle(steps[: n_found + 1] if n_found < 3 else steps)
     monkeypatch.setattr("rom.checks.deflection.HeldSolid", WholeShapes)
     monkeypatch.setattr("rom.checks.deflection._compared", lambda *given: next(after))
-    rows, table = deflection_rows(geometric, model, None, body, E)
+    rows, table = deflection_rows(geometric, model, model.operators, None, body, E)
     one, shares = table["-tip f_z"], (0.0, *STEP_SHARES)
     assert one["holds to"] == shares[holds]
     assert one["share"] == list(STEP_SHARES[:n_found])
@@ -406,7 +430,9 @@ def test_what_does_not_go_together_is_refused_by_name(change, error, says):
 @pytest.mark.parametrize(
     "wrong",
     [{"loads": {}}, {"loads": {"tip": (1, 2, 3)}}, {"loads": {"tip": (0,) * 6}}, {"tol": 2.0},
-     {"loads": {"tip": (0, np.nan, 0, 0, 0, 0)}}, {"n_shapes": 0}, {"n_steps": 0}],
+     {"loads": {"tip": (0, np.nan, 0, 0, 0, 0)}}, {"n_shapes": 0}, {"n_steps": 0},
+     {"loads": {}, "spin": (0, np.inf, 0)},
+     {"about": (0, 0, 1)}, {"loads": {}, "spin": (0, 0, 1), "about": (0, 0)}],
 )  # fmt: skip
 def test_a_range_that_is_none_is_refused(wrong):
     with pytest.raises(ConfigError):
