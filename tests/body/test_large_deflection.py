@@ -180,11 +180,11 @@ def test_what_is_welded_to_the_tip_turns_with_it_to_the_end_of_an_arc():
     for angle in (0.3, 1.0):
         mech.elements.pop("moment", None)
         mech.torque("moment", block.marker("c"), (0, 0, angle * EI))
-        assert_allclose(slope_of(mech, "block", "c"), angle, rtol=1e-2)
+        assert_allclose(slope_of(mech, "block", "c"), angle, rtol=6e-3)
         still = rom.snapshot(mech, rom.equilibrium(mech, steps=4))
         x, y, _ = still.position("block", "c")[0] - body.marker("root").point
         assert_allclose([1 - x, y], [1 - np.sin(angle) / angle, (1 - np.cos(angle)) / angle],
-                        rtol=1.5e-2)  # fmt: skip
+                        rtol=1e-2)  # fmt: skip
 
 
 def test_a_beam_between_immovable_hinges_hardens_as_the_elliptic_integral_says():

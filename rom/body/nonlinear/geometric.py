@@ -21,9 +21,10 @@ from typing import Any
 import numpy as np
 from scipy.linalg import eigh
 
+from rom import rotation
 from rom.body.nonlinear.quartic import Quartic
 from rom.body.nonlinear.ranges import Geometric, Load, held_motions, nodal_forces
-from rom.body.nonlinear.statics import free_motions, passages
+from rom.body.nonlinear.statics import Held, free_motions, newton, passages
 from rom.eigen.verbs import Operators, column_blocks, mean_motion, quadratic, whole_clusters
 from rom.errors import ConfigError, InterfaceError, ModelError, ResourceError
 from rom.model import Array, Basis, FEModel, Index
@@ -38,6 +39,7 @@ N_MODES = 4  # about each state that a range leads to, for which shapes are kept
 # A mode loses 1e-4 of its stiffness if a hundredth of its energy norm is missed, states must not
 # lose that much: at the usual tolerance of 1e-4 both are met.
 MODE_SHARE = 1e-2
+N_TURNS = 4  # of moments with the section on which they act, each by what the last one left
 MAX_COORDINATES = 80
 TENSOR_COPIES = 11  # of the Gram matrix while it is ordered into tensors
 FLOP_RATE = 1e10  # of one core in a product of matrices [1/s]
@@ -55,12 +57,38 @@ class Shapes:
         loads: (r, l) forces of the components of the load range at their largest [N].
         held: (h, r) motions that supports let vanish.
         n_basis: how many of them the basis has already.
+        sections: of the interfaces with moments.
     """
 
     E: Array
     loads: Array
     held: Array
     n_basis: int
+    sections: list["Section"]
+
+
+@dataclass(frozen=True)
+class Section:
+    """How moments on an interface turn with it: as tractions that are linear over the section.
+
+    Attributes:
+        turn: (3, r) its rotation, of small angles, per unit of each shape [1/m].
+        moments: (3, l) components of the load range at their largest [N m].
+        tractions: (r, 3, 3, 3) forces on the shapes, [:, a, b, k], where the part b of the
+            tractions of a unit moment about axis k acts along axis a.
+    """
+
+    turn: Array
+    moments: Array
+    tractions: Array
+
+    def difference(self, case: Array, q: Array) -> Array:
+        """(r,) forces of the moments of a load case, turned with the section, less as at rest."""
+        sine, moment = self.turn @ q, self.moments @ case
+        size = max(float(np.linalg.norm(sine)), 1e-30)
+        R = rotation.matrix(rotation.exp(np.arcsin(min(size, 1.0)) / size * sine))
+        turned = np.einsum("rabk,ab,k->r", self.tractions, R, R.T @ moment)
+        return np.asarray(turned - np.einsum("raak,k->r", self.tractions, moment))
 
 
 def enriched(
@@ -172,6 +200,9 @@ def _with_derivatives(
     along = basis.held(connection.ops.restrict(nodal_forces(turning, model, ops, about)))
     static = moving @ borne
     static[:, len(every) :] += connection.ops.expand(along)
+    bent = [name for name, load in geometric.loads.items() if np.any(load[3:])]
+    units = [nodal_forces([Load(name, k) for k in (3, 4, 5)], model, ops, about) for name in bent]
+    squeezed = [basis.held(connection.ops.restrict(_turnable(F))) for F in units]
     n_modes = min(geometric.n_modes, basis.omega.size)
     if n_modes:
         n_modes = whole_clusters(basis.omega**2, n_modes)
@@ -179,9 +210,27 @@ def _with_derivatives(
     n_basis, n_active = moving.shape[1] + n_modes, active.shape[1]
     _refuse_many(n_basis + len(turning) + n_active * (n_active + 1) // 2, energy)
     size = np.diag(quadratic(ops, ops.apply_K, active))
-    theta = _derivatives(connection.ops, basis, energy, (active, size), along)
+    theta = _derivatives(connection.ops, basis, energy, (active, size), [along, *squeezed])
     E = np.hstack([moving, active[:, static.shape[1] :], connection.ops.expand(theta)])
-    return Shapes(E, forces(geometric.components(), E), forces(held, E).T, n_basis), theta
+    components = geometric.components()
+    sections = [
+        Section(ops.gram(F, E), _moments(name, components),
+                ops.gram(E, _turnable(F)).reshape(-1, 3, 3, 3))
+        for name, F in zip(bent, units, strict=True)
+    ]  # fmt: skip
+    return Shapes(E, forces(components, E), forces(held, E).T, n_basis, sections), theta
+
+
+def _moments(interface: str, components: list[Load]) -> Array:
+    """(3, l) moments about the axes of the components of a range on an interface [N m]."""
+    return np.array([[load.largest * (load.interface == interface and load.component == k)
+                      for load in components] for k in (3, 4, 5)])  # fmt: skip
+
+
+def _turnable(F: Array) -> Array:
+    """(n_local, 27) forces along each axis a of the part b of forces (n_local, 3) of moments k."""
+    parts = np.einsum("ac,nbk->ncabk", np.eye(3), F.reshape(-1, 3, 3))
+    return np.asarray(parts.reshape(-1, 27))
 
 
 def _refuse_many(n: int, energy: Any) -> None:
@@ -225,8 +274,9 @@ def _refuse_collapse(geometric: Geometric, stretches: Array, counts: list[int]) 
 
 
 def _derivatives(
-    ops: Operators, basis: Basis, energy: Any, dragging: tuple[Array, Array], along: Array
-) -> Array:
+    ops: Operators, basis: Basis, energy: Any, dragging: tuple[Array, Array],
+    further: list[Array],
+) -> Array:  # fmt: skip
     """(n_local, p) derivatives in interface coordinates, orthonormal in K and to normal modes.
 
     Two shapes that drag nothing along, as pull and twist of a prism, have round-off as their
@@ -238,20 +288,23 @@ def _derivatives(
         energy: at large strain.
         dragging: (n_local, a) nodal shapes of which derivatives are taken, and (a,) twice their
             energies [J].
-        along: (n_local, t) further shapes of the same span, in interface coordinates.
+        further: (n_local, t) shapes of the same span, in interface coordinates; of each kind those
+            with much less energy than others are round-off.
     """
     active, size = dragging
     i, j = np.triu_indices(active.shape[1])
     pairs: Index = np.column_stack([i, j])
-    theta, t = np.zeros((ops.n_local, len(pairs))), along.shape[1]
+    theta = np.zeros((ops.n_local, len(pairs)))
     for some in column_blocks(len(pairs)):
         theta[:, some] = -basis.held(ops.restrict(energy.second_forces(active, pairs[some])))
-    theta = np.hstack([along, theta])
+    theta = np.hstack([*further, theta])
     normal = basis.Psi[:, basis.Psi.shape[1] - basis.omega.size :]
     theta -= normal @ (ops.gram(normal, ops.apply_K(theta)) / basis.omega[:, None] ** 2)
     K = quadratic(ops, ops.apply_K, theta)
-    share = np.diag(K)[t:] / (size[i] * size[j])
-    real = np.r_[np.diag(K)[:t] > 0, share > ROUND_OFF_RTOL * share.max()]
+    *shares, share = np.split(np.diag(K), np.cumsum([X.shape[1] for X in further]))
+    shares = [x > DEPENDENT_RTOL * x.max(initial=0.0) for x in shares]
+    share = share / (size[i] * size[j])
+    real = np.concatenate([*shares, share > ROUND_OFF_RTOL * share.max()])
     theta, K = theta[:, real], K[np.ix_(real, real)]
     scale = 1 / np.sqrt(np.diag(K))
     lam, V = np.linalg.eigh(0.5 * (K + K.T) * np.outer(scale, scale))
@@ -265,11 +318,32 @@ def _states(geometric: Geometric, quartic: Quartic, shapes: Shapes) -> list[Arra
     found = list[Array]()
     for case in geometric.load_cases():
         try:
-            found += passages(quartic, np.outer(share, shapes.loads @ case), shapes.held)
+            passed = passages(quartic, np.outer(share, shapes.loads @ case), shapes.held)
+            found += [_turned(quartic, shapes, x * case, states)
+                      for x, states in zip(share, passed, strict=True)]  # fmt: skip
         except ModelError as error:
             error.where = error.where or f"load {np.round(case, 3).tolist()} of the range"
             raise
     return found
+
+
+def _turned(quartic: Quartic, shapes: Shapes, case: Array, states: Array) -> Array:
+    """States (k, r) on the way to a load case, and before them that with moments that follow.
+
+    A moment as a pair of dead forces squeezes a section that has turned; what is welded to it
+    does not.
+    """
+    bent = [section for section in shapes.sections if (section.moments @ case).any()]
+    if not bent:
+        return states
+    body, q = Held(quartic, free_motions(shapes.held)), states[-1]
+    for _ in range(N_TURNS):
+        load = shapes.loads @ case + sum(section.difference(case, q) for section in bent)
+        near = newton(body, q @ body.N, load @ body.N)
+        if near is None:
+            return states
+        q = body.N @ near
+    return np.vstack([q, states])
 
 
 def _modes_about(states: Array, quartic: Quartic, M: Array, held: Array) -> Array:
