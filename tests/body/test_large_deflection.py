@@ -19,9 +19,9 @@ from cases.long import SHARED_BY, few
 from cases.mbs.slender import STEEL, assembled, cantilever, reduced, slender, tip_of
 from cases.paths import RANKS, ROOT
 from cases.ranks.environment import ENVIRONMENT
-from rom.body.nonlinear.geometric import ELLIPTIC_STRETCH, foreseen
+from rom.body.nonlinear.geometric import ELLIPTIC_STRETCH, Section, foreseen
 from rom.body.nonlinear.quartic import Quartic, entries, n_entries, position
-from rom.body.nonlinear.ranges import nodal_forces
+from rom.body.nonlinear.ranges import Load, nodal_forces
 from rom.body.nonlinear.statics import follow
 from rom.checks.deflection import (
     DISPLACEMENT_RTOL,
@@ -185,6 +185,21 @@ def test_what_is_welded_to_the_tip_turns_with_it_to_the_end_of_an_arc():
         x, y, _ = still.position("block", "c")[0] - body.marker("root").point
         assert_allclose([1 - x, y], [1 - np.sin(angle) / angle, (1 - np.cos(angle)) / angle],
                         rtol=1e-2)  # fmt: skip
+
+
+def test_moments_for_which_shapes_are_made_turn_with_their_section():
+    """Their work on any motion: each node's force is turned, that of the moment turned back."""
+    model, rng = assembled(cells=(2, 1, 1)), np.random.default_rng(0)
+    ops, tip = model.operators, model.interfaces["tip"]
+    R, X = Rotation.from_rotvec([0, 0.8, 0]).as_matrix(), model.points - tip.origin
+    turned = (X @ R.T - X).ravel()
+    E = np.column_stack([turned, rng.standard_normal((model.n_dofs, 3))])
+    unit = nodal_forces([Load("tip", k) for k in (3, 4, 5)], model, ops, np.zeros(3))
+    moments = rng.standard_normal((3, 2))
+    found = Section.of(ops, unit, E, moments).difference(np.array([1.0, -2.0]), np.eye(4)[0])
+    M = moments @ [1.0, -2.0]
+    force = (unit @ (R.T @ M)).reshape(-1, 3) @ R.T - (unit @ M).reshape(-1, 3)
+    assert_allclose(found, E.T @ force.ravel(), atol=1e-10)
 
 
 def test_a_beam_between_immovable_hinges_hardens_as_the_elliptic_integral_says():

@@ -82,6 +82,11 @@ class Section:
     moments: Array
     tractions: Array
 
+    @classmethod
+    def of(cls, ops: Operators, F: Array, E: Array, moments: Array) -> "Section":
+        """That of shapes E (n_local, r), from the nodal forces F (n_local, 3) of unit moments."""
+        return cls(ops.gram(F, E), moments, ops.gram(E, _turnable(F)).reshape(-1, 3, 3, 3))
+
     def difference(self, case: Array, q: Array) -> Array:
         """(r,) forces of the moments of a load case, turned with the section, less as at rest."""
         sine, moment = self.turn @ q, self.moments @ case
@@ -213,11 +218,8 @@ def _with_derivatives(
     theta = _derivatives(connection.ops, basis, energy, (active, size), [along, *squeezed])
     E = np.hstack([moving, active[:, static.shape[1] :], connection.ops.expand(theta)])
     components = geometric.components()
-    sections = [
-        Section(ops.gram(F, E), _moments(name, components),
-                ops.gram(E, _turnable(F)).reshape(-1, 3, 3, 3))
-        for name, F in zip(bent, units, strict=True)
-    ]  # fmt: skip
+    sections = [Section.of(ops, F, E, _moments(name, components))
+                for name, F in zip(bent, units, strict=True)]  # fmt: skip
     return Shapes(E, forces(components, E), forces(held, E).T, n_basis, sections), theta
 
 
