@@ -26,7 +26,7 @@ from rom.assembly.pieces import Pieces as Pieces
 from rom.body.damping import ModalDamping as ModalDamping
 from rom.body.damping import Rayleigh as Rayleigh
 from rom.body.flexible import FlexibleBody as FlexibleBody
-from rom.body.nonlinear.geometric import Geometric as Geometric
+from rom.body.nonlinear.ranges import Geometric as Geometric
 from rom.body.spread import SpreadLoad as SpreadLoad
 from rom.body.spread import mass_load as mass_load
 from rom.body.spread import surface_load as surface_load

@@ -10,8 +10,8 @@ import numpy as np
 from rom.body.nonlinear.cauchy import CauchyRecovery
 from rom.body.nonlinear.quartic import Quartic
 from rom.body.records import Body, BodyData, Marker, Patch
-from rom.body.recovery import N_FRAME_LOADS, StressRecovery
-from rom.body.stiffening import ANGULAR_LOADS, CENTRIFUGAL_LOADS, ELASTIC_LOAD, LINEAR_LOADS
+from rom.body.recovery import CENTRIFUGAL_LOADS, N_FRAME_LOADS, StressRecovery
+from rom.body.stiffening import ANGULAR_LOADS, ELASTIC_LOAD, LINEAR_LOADS
 from rom.errors import ModelError
 from rom.model import Array
 from rom.units import UnitSystem, unit_system

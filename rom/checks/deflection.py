@@ -15,9 +15,9 @@ from scipy.sparse import bmat, csc_matrix, csr_matrix, identity, vstack
 from scipy.sparse.linalg import LinearOperator, eigsh, splu
 
 from rom.body.flexible import FlexibleBody
-from rom.body.nonlinear.geometric import FORCES, Geometric, held_motions
+from rom.body.nonlinear.ranges import Geometric, Load, held_motions, nodal_forces
 from rom.body.nonlinear.statics import follow, free_motions
-from rom.eigen.verbs import mean_motion
+from rom.eigen.verbs import Operators, mean_motion
 from rom.model import Array, FEModel, Row
 from rom.rows import row
 
@@ -32,8 +32,9 @@ MIN_LOAD_STEP = 2.0**-8  # at which a path of the full model is given up
 
 
 def deflection_rows(
-    geometric: Geometric, model: FEModel, connection: Any, body: FlexibleBody, E: Array
-) -> tuple[list[Row], dict[str, Any]]:
+    geometric: Geometric, model: FEModel, ops: Operators, connection: Any, body: FlexibleBody,
+    E: Array,
+) -> tuple[list[Row], dict[str, Any]]:  # fmt: skip
     """Rows of the certificate, and a table {load case: its loads, errors and how far it holds}.
 
     The table has for each case "case", the share of each component of the range; "share" of the
@@ -43,6 +44,7 @@ def deflection_rows(
     Args:
         geometric: the range of loads.
         model: the full model.
+        ops: its operators in nodal dofs, with all it carries.
         connection: the same in interface coordinates, so that like is compared with like.
         body: the reduced body, seen from its reference interface.
         E: (n_local, r) its nodal shapes.
@@ -51,10 +53,11 @@ def deflection_rows(
     quartic, still = body.energy(), body.mean_rows(geometric.fixed)
     tangent = Tangent(body, still)
     E = full.whole(E)
-    units = [nodal_load(model, *component) for component in geometric.components()]
+    about = geometric.axis_point(model, body.reference)
+    units = full.whole(nodal_forces(geometric.components(), model, ops, about))
     rows, table = list[Row](), dict[str, Any]()
     for name, case in load_cases(geometric).items():
-        W = case @ np.array(units)
+        W = units @ case
         path = follow(quartic, np.outer(STEP_SHARES, W @ E), still)
         steps = []
         for share, q in zip(STEP_SHARES, path, strict=True):
@@ -128,24 +131,17 @@ def load_cases(geometric: Geometric) -> dict[str, Array]:
     """
     components = geometric.components()
     units = np.eye(len(components))
-    named = {
-        f"{name} {FORCES[k]}": unit for (name, k, _), unit in zip(components, units, strict=True)
-    }
-    cases = {f"{sign}{name}": value * unit for name, unit in named.items()
-             for sign, value in (("", 1.0), ("-", -1.0))}  # fmt: skip
-    if len(named) > 1:
-        falling = UNTRAINED_RATIO ** np.arange(len(named))
+    cases = {"-"[sign > 0 :] + load.name: sign * unit
+             for load, unit in zip(components, units, strict=True)
+             for sign in load.signs}  # fmt: skip
+    n = len(components)
+    if n > 1:
+        falling = UNTRAINED_RATIO ** np.arange(n)
         falling /= np.linalg.norm(falling)
+        signs = [(-1.0) ** k if -1 in load.signs else 1.0 for k, load in enumerate(components)]
         cases["all, the first most"] = falling
-        cases["all, the last most"] = falling[::-1] * (-1.0) ** np.arange(len(named))
+        cases["all, the last most"] = falling[::-1] * signs
     return cases
-
-
-def nodal_load(model: FEModel, name: str, component: int, largest: float) -> Array:
-    """(n,) forces of one component of the load on an interface [N]."""
-    interface, W = model.interfaces[name], np.zeros(model.n_dofs)
-    W[interface.dofs] = largest * mean_motion(interface)[component]
-    return W
 
 
 class Tangent:
@@ -175,19 +171,17 @@ class HeldSolid:
         model: with finite elements; every process has all of it.
         connection: the same in interface coordinates a, u = T a.
         reference: the interface that is held.
-        held: interface and component, 0 to 5, of the motions held beside.
+        held: loads whose motions are held beside.
     """
 
-    def __init__(
-        self, model: FEModel, connection: Any, reference: str, held: list[tuple[str, int]]
-    ):
-        ops, root = connection.ops, [(reference, k) for k in range(6)]
+    def __init__(self, model: FEModel, connection: Any, reference: str, held: list[Load]):
+        ops, root = connection.ops, [Load(reference, k) for k in range(6)]
         self.solid = model.stresses.finite_strain()
         self.comm = ops.comm
         self.T = csr_matrix(identity(model.n_dofs) if ops.T is None else rows_of(ops.T))
         self.M = self.T.T @ ops.gathered(model.operators.M) @ self.T
-        rows = [csr_matrix(mean_motion(model.interfaces[name])[k]) @ self.T[
-            model.interfaces[name].dofs] for name, k in (*root, *held)]  # fmt: skip
+        rows = [csr_matrix(mean_motion(model.interfaces[load.interface])[load.component]) @ self.T[
+            model.interfaces[load.interface].dofs] for load in (*root, *held)]  # fmt: skip
         self.C = vstack(rows)
         self.inside = splu(csc_matrix(self.T.T @ self.T))
 
