@@ -39,7 +39,7 @@ MAY_IMPORT = {  # module or package below rom/ -> what it may import from rom be
     "reduction": {"model", "rows", "eigen", "errors"},
     "cyclic": {"model", "rows", "eigen", "rotation", "reduction", "errors"},
     "body": {"model", "eigen", "rotation", "notebook", "paths", "units", "errors"},
-    "assembly": {"model", "rows", "eigen", "body", "reduction", "errors"},
+    "assembly": {"rotation", "model", "rows", "eigen", "body", "reduction", "errors"},
     "mbs": {"model", "rotation", "io", "notebook", "paths", "errors"},
     "io": {"model", "units", "body", "parametric", "updating", "errors"},
     "checks": {"model", "rows", "eigen", "body", "reduction", "errors"},
