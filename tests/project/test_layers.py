@@ -167,6 +167,7 @@ ORDER = {
         "aij",
         "foreseen",
         "factor",
+        "corrected",
         "substructures",
         "place",
         "held",
