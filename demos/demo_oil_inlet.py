@@ -55,7 +55,7 @@ HEIGHT, LONG = 0.115, 0.025  # of the shafts above the bottom, and length of the
 SIDES = {"near": "back", "far": "front"}
 AXES = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])  # rows: those of the unit in those of the box
 box = {"L": 0.4, "W": SEATS["far"] - SEATS["near"] + LONG, "a": PAIR.distance, "z_s": HEIGHT,
-       "d_1": BORE, "d_2": BORE, "l_s": LONG, "lc": 0.02}  # fmt: skip
+       "d_1": BORE, "d_2": BORE, "l_s": LONG, "lc": 0.026}  # fmt: skip
 housing_model = rom.fe.model(Path(__file__).parents[1] / "meshes" / "housing.geo", parameters=box,
                              material=rom.Material(E=120e9, nu=0.26, rho=7200.0))  # fmt: skip
 SHAFTS = {"pinion": "input", "gear": "output"}
@@ -136,6 +136,7 @@ def unit(speed, films, *, oil=OIL, inlet=None):
 # tilted shafts press harder on one end of the face.
 
 PERIODS, KEPT, STEPS, STRIPS = 18, 4, 80, 11
+SHOWN = slice(-STEPS - 1, -1, 4)  # a mesh period of each run
 
 
 @dataclass(frozen=True)
@@ -143,8 +144,9 @@ class Run:
     """What was found at a speed."""
 
     still: object
-    motion: object
     F: object  # between the teeth, through the last mesh periods [N]
+    t: object  # of what is shown [s]
+    loads: list  # on the teeth then
 
     @property
     def load_factor(self):
@@ -172,8 +174,10 @@ def run(speed, films, **oil):
     at_rest = rom.equilibrium(mech)
     motion = rom.simulate(mech, state=at_rest, t_end=PERIODS * period, dt=period / STEPS,
                           rho_inf=0.6)  # fmt: skip
-    F = np.array([x.force.sum() for x in rom.mbs.tooth_loads(motion, "teeth")])
-    return Run(rom.mbs.snapshot(mech, at_rest), motion, F[-KEPT * STEPS :])
+    loads = rom.mbs.tooth_loads(motion, "teeth")
+    F = np.array([x.force.sum() for x in loads[-KEPT * STEPS :]])
+    return Run(rom.mbs.snapshot(mech, at_rest), F, motion.t[SHOWN] - motion.t[SHOWN][0],
+               loads[SHOWN])  # fmt: skip
 
 
 CASES = {
@@ -391,10 +395,7 @@ if first:
         "Middle: error of transmission through a mesh period at 3000 turns a minute, of several "
         "clearances. Right: a film that begins late has little oil to carry its heat off.",
     )  # fmt: skip
-    last = slice(-STEPS - 1, -1, 4)
-    moving = rom.mbs.tooth_loads(BASE.motion, "teeth")[last]
-    view.film(BASE.motion.t[last] - BASE.motion.t[last][0],
-              scene("Load on the teeth", BASE.motion.t[last], moving),
+    view.film(BASE.t, scene("Load on the teeth", BASE.t, BASE.loads),
               options.out / "oil_inlet.gif", seconds=3.0,
               caption="A mesh period at 3000 turns a minute: the wall on each line of "
               "contact is as high as its load.")  # fmt: skip
