@@ -33,6 +33,7 @@ SAME_RTOL = 1e-6  # distance of surfaces that touch, of the size of all
 MAX_RELATIVE_ERROR = 0.3  # of a value; beyond it the logarithm of noise is no longer normal
 MAX_LINES_NAMED = 5  # in a message
 FREEDOM_LOST = 2  # averages, by a variance that is estimated from the same records as the response
+MAX_VARIED = 0.2  # relative variance of an estimated one, up to which first order says much
 MIN_OWN_SHARE = 0.1  # of the variance of a response that is left to its sensor
 
 
@@ -214,11 +215,19 @@ class Responses:
         """Of ln H: (n_f, n_s, n_e) errors of the sensors, and the one that they have in common [1].
 
         The first is infinite where a value is not used. Of circular errors with the variance
-        s^2 in each part the logarithm has s^2 (1 + s^2 + ...).
+        s^2 in each part the logarithm has s^2 (1 + s^2 + ...). An estimated variance v of n
+        averages varies by v^2 / (n - 1); what is left of it without the common part varies as
+        much, so that one over it is too large by (v / left)^2 / (n - 2), to first order.
         """
-        error = self.relative_error()
-        common = self.force_noise / np.sqrt(2 * self.averages)
-        own = np.maximum(error**2 - common**2, MIN_OWN_SHARE * error**2)
+        error, n = self.relative_error(), self.averages
+        common = self.force_noise / np.sqrt(2 * n)
+        estimated = np.ndim(self.coherence) > 0
+        total = error**2 * ((n - FREEDOM_LOST) / (n - 1) if estimated else 1.0)
+        least = MIN_OWN_SHARE * total
+        own = np.maximum(total - common**2, least)
+        if estimated:
+            varied = (total / own) ** 2 / (n - FREEDOM_LOST)
+            own = own * (1 + np.where(own > least, np.minimum(varied, MAX_VARIED), 0.0))
         used = error <= MAX_RELATIVE_ERROR
         return np.sqrt(np.where(used, own * (1 + error**2), np.inf)), common
 
