@@ -262,10 +262,7 @@ def update(  # noqa: PLR0913  keywords of one call
             hint="Reduce the model in SI units to update it.",
         )
     attached, candidates = dict(attached or {}), dict(candidates or {})
-    rows = (
-        test.sensors.rows(bodies, "sensor", tolerance),
-        test.inputs.rows(bodies, "input", tolerance),
-    )
+    rows = test.rows(bodies, tolerance)
     model = family_model(family, rows, attached, candidates, fixed)
     unknown = _unknown(model, free, attached, candidates)
     data = Data.of(test)

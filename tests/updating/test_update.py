@@ -476,3 +476,43 @@ def test_velocities_and_accelerations_are_taken(family, quantity, power):
     same = rom.update(family, test, fixed=HELD, damping=0.02)
     for name in TRUE:
         assert_allclose(found.factors[name], same.factors[name], rtol=1e-9)
+
+
+GAUGES = Channels([[0.6, 0.0, 0.04], [0.3, 0.05, 0.08]], [[1, 0, 0]] * 2)
+AXIAL = Channels([[1.0, 0.05, 0.04]], [[1, 0, 0]])
+
+
+def test_gauges_are_sensors(family, tmp_path):
+    """A pull at the tip, far below resonance, strains a bar by F / EA; mixed with accelerations."""
+    sensors = Channels(
+        np.vstack([GAUGES.points, SENSORS.points]),
+        np.vstack([GAUGES.directions, SENSORS.directions]),
+    )
+    quantity = ("strain",) * 2 + ("acceleration",) * 16
+    true = np.log([TRUE[name] for name in PARAMETERS])
+    both = []
+    for force, lines in ((AXIAL, np.array([1.0])), (INPUTS, LINES)):
+        rows = (sensors.rows(family.body, "sensor", gauges=[q == "strain" for q in quantity]),
+                force.rows(family.body, "input"))  # fmt: skip
+        model = family_model(family, rows, {}, {}, HELD)
+        both.append(responses_at(model, true, np.array([0.02]), 2 * np.pi * lines))
+    for k, name in ((0, "E_outer"), (1, "E_inner")):
+        assert_allclose(both[0][0, k, 0].real * 0.1 * 0.08 * 210e9 * TRUE[name], 1.0, rtol=0.02)
+    s = 2j * np.pi * LINES[:, None, None]
+    H = noisy(both[1], 0.05, np.random.default_rng(0))
+    H[:, 2:] *= s**2
+    test = Responses(LINES, H, sensors, INPUTS, 1 / (1 + AVERAGES * 0.05**2), AVERAGES, quantity)
+    found = rom.update(family, test, fixed=HELD, damping=0.02)
+    assert found.verdict.ok, found
+    for name, value in TRUE.items():
+        assert abs(np.log(found.factors[name] / value)) < 4 * found.deviations[name] < 0.01
+    with pytest.raises(ConfigError, match=r"sensor 1 .* lies on no face"):
+        across = np.where(np.arange(18)[:, None] == 1, [0, 0, 1], sensors.directions)
+        rom.update(family, replace(test, sensors=Channels(sensors.points, across)), fixed=HELD)
+    with pytest.raises(ConfigError, match="17 quantities of 18 sensors"):
+        replace(test, quantity=quantity[1:])
+    with pytest.raises(ConfigError, match="quantity = 'volts'"):
+        replace(test, quantity="volts")
+    pytest.importorskip("h5py", reason="h5py is not installed")
+    rom.io.write_responses(test, tmp_path / "test.h5")
+    assert rom.io.read_responses(tmp_path / "test.h5").quantity == quantity
