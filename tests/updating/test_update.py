@@ -12,7 +12,7 @@ from cases.solid import STEEL, composite
 from rom.errors import ConfigError, ParameterError, SolverError
 from rom.parametric.layers import Stretch
 from rom.updating import AddedMass, Channels, GroundSpring, Responses
-from rom.updating.estimate import _Search
+from rom.updating.estimate import _Before, _Search
 from rom.updating.family_model import family_model
 from rom.updating.frf_data import estimators, noisy, random_error
 from rom.updating.normal_equations import Data, responses_at, sums
@@ -389,13 +389,42 @@ def test_the_gradient_is_that_of_the_cost_with_its_prior(family):
     """Differences of half the cost, away from the prior; 8 modes lie below 2100 Hz."""
     test = synthetic(family, lines=LINES[::5], sensors=FEW)
     model, data = model_of(family, sensors=FEW), Data.of(test)
-    search = _Search.begun(model, data, np.ones(3, bool), 0.01, {"E_inner": 1e-3, "rho_outer": 0.1})
+    before = _Before.of({"E_inner": 1e-3, "rho_outer": 0.1}, model)
+    search = _Search.begun(model, data, np.ones(3, bool), 0.01, before)
     assert search.zeta.size == 9
     search.theta = search.theta + 0.1 * np.random.default_rng(0).standard_normal(12)
     search.sums, _ = search.at(search.theta)
     ends = [[search.at(search.theta + h)[1] for h in s * 1e-5 * np.eye(12)] for s in (1, -1)]
     expected = (np.array(ends[0]) - ends[1]) / 4e-5
     assert_allclose(search.posterior()[1], expected, atol=1e-5 * np.abs(expected).max(), rtol=1e-4)
+
+
+def test_two_tests_with_two_supports_say_more_than_one(family):
+    """Held, then free: information adds up, and a change between them is refused."""
+    held = rom.update(family, synthetic(family, lines=LINES[:60]), fixed=HELD, damping=0.02)
+    loose = synthetic(family, fixed=(), seed=1, lines=LINES[::2])
+    alone = rom.update(family, loose, damping=0.02)
+    both = rom.update(family, loose, damping=0.02, prior=held)
+    assert both.verdict.ok, both
+    precision = sum(np.linalg.inv(u.covariance[:3, :3]) for u in (held, alone))
+    mean = np.linalg.solve(precision, sum(
+        np.linalg.inv(u.covariance[:3, :3]) @ np.log(list(u.factors.values()))
+        for u in (held, alone)))  # fmt: skip
+    C = np.linalg.inv(precision)
+    assert_allclose(both.covariance[:3, :3], C, rtol=0.05, atol=0.05 * np.diag(C).min())
+    assert_allclose(np.log(list(both.factors.values())), mean, atol=0.2 * np.sqrt(np.diag(C)).min())
+    A = np.random.default_rng(0).normal(size=(len(held.names),) * 2)
+    tied = _Before.of(replace(held, covariance=A @ A.T), held.model)  # to damping: it is left open
+    assert_allclose(np.linalg.inv(tied.precision), (A @ A.T)[:3, :3], rtol=1e-9)
+    other = synthetic(family, fixed=(), seed=1, lines=LINES[::2], true=TRUE | {"E_inner": 1.35})
+    torn = rom.update(family, other, damping=0.02, prior=held)
+    assert any("distance from the test before" in row.quantity for row in torn.verdict.failures)
+    kept = rom.update(family, loose, damping=0.02, prior=held, free=("E_outer",))
+    assert kept.factors["E_inner"] == pytest.approx(held.factors["E_inner"])
+    with pytest.raises(ConfigError, match="prior for the residual of responses"):
+        rom.update(family, loose, prior=held, residual="equations")
+    with pytest.raises(ConfigError, match="found none of 'E_inner'"):
+        rom.update(family, loose, prior=replace(held, names=("zeta 1",)))
 
 
 def test_an_end_of_a_range_is_named(family):
