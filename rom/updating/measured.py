@@ -77,7 +77,7 @@ class Channels:
             what: "sensor" or "input", for messages.
             tolerance: largest distance from a point of the surface [m]; None for two per cent of
                 the size of all.
-            gauges: (k,) or one for all, which measure strain in the surface.
+            gauges: (k,) or one for all, which measure strain in the surface [0, 1].
 
         Raises:
             ConfigError: if a channel is off the body, as near to two bodies, or a gauge on no face.
@@ -219,7 +219,7 @@ class Responses:
     def rows(
         self, bodies: Mapping[str, FlexibleBody], tolerance: float | None = None
     ) -> tuple[Array, Array]:
-        """(n_s, 6 + r) of the sensors, displacement or strain, and (n_e, 6 + r) of the inputs.
+        """(n_s, 6 + r) of sensors, displacement [1] or strain [1/m], and (n_e, 6 + r) of inputs.
 
         Args:
             bodies: see `Channels.rows`.
