@@ -21,10 +21,9 @@ from rom.body.surface import surface_of
 from rom.errors import ConfigError, ModelError, ParameterError
 from rom.model import Array, Index
 from rom.names import named
-from rom.parametric.family import BodyFamily
 from rom.plausible import check_damping_ratio
 from rom.updating.estimate import BAND_RATIO, DAMPING_LOG_DEVIATION
-from rom.updating.family_model import Attached, FamilyModel, family_model
+from rom.updating.family_model import Attached, Family, FamilyModel, Parts, family_model
 from rom.updating.frf_data import Complex
 from rom.updating.measured import DERIVATIVES, Channels
 from rom.updating.models import DEAD_RATIO, modal
@@ -168,7 +167,7 @@ def independent(
 
 @typed
 def place(  # noqa: PLR0913  keywords of one call
-    family: BodyFamily,
+    family: Family,
     sensors: Channels,
     inputs: Channels,
     frequencies: Any,
@@ -190,7 +189,8 @@ def place(  # noqa: PLR0913  keywords of one call
     are left out one by one, and chosen ones are exchanged until no exchange gains.
 
     Args:
-        family: from `rom.reduce_parametric`, with moduli and densities, in SI units.
+        family: from `rom.reduce_parametric`, with moduli and densities, in SI units; or several,
+            as a `rom.parametric.FamilyAssembly`.
         sensors: candidates.
         inputs: candidates.
         frequencies: (n_f,) lines that will be measured [Hz].
@@ -202,7 +202,7 @@ def place(  # noqa: PLR0913  keywords of one call
             themselves. Without a floor antiresonances tell more than they can.
         quantity: "displacement", "velocity" or "acceleration".
         fixed: what will be held, see `FlexibleBody.frequencies`.
-        attached: {name: `GroundSpring` or `AddedMass`} with unknown factors.
+        attached: {name: `GroundSpring`, `AddedMass` or `JointSpring`} with unknown factors.
         damping: expected ratio of all modes [1].
         prior: {name: relative standard deviation [1] of its factor before the test}; without one
             the logarithm of its range.
@@ -215,15 +215,16 @@ def place(  # noqa: PLR0913  keywords of one call
     """
     check_damping_ratio(damping)
     one_of("quantity", quantity, tuple(DERIVATIVES))
-    if family.body.units != "SI":
-        raise ConfigError(f"the family is in {family.body.units}; plan in SI units.")
+    bodies = Parts.of(family).bodies
+    if other := {body.units for body in bodies.values()} - {"SI"}:
+        raise ConfigError(f"the family is in {other.pop()}; plan in SI units.")
     least = 0.0 if floor is None else floor
     if min(noise, least) < 0 or not 0 < finite("noise + floor", noise + least, ()):
         raise ConfigError("noise and floor are not negative, and one of them is positive.")
     omega = 2 * np.pi * np.atleast_1d(finite("frequencies", frequencies, None))
     if not omega.size or omega.min() <= 0:
         raise ConfigError("frequencies must lie above zero.")
-    rows = sensors.rows(family.body, "sensor"), inputs.rows(family.body, "input")
+    rows = sensors.rows(bodies, "sensor"), inputs.rows(bodies, "input")
     whole("n_sensors", n_sensors, 1, len(rows[0]), reason="candidates")
     whole("n_inputs", n_inputs, 1, len(rows[1]), reason="candidates")
     model = family_model(family, rows, dict(attached or {}), {}, fixed)
