@@ -112,7 +112,7 @@ class Assembly:
         return {}
 
     def conditions(self, fixed: tuple[Place, ...] = ()) -> Array:
-        """(c, 6 n_b + r) what is zero: differences of coupled interfaces, coordinates of held ones.
+        """(c, 6 n_b + r) what is zero: gaps of coupled interfaces, coordinates of held ones [m, 1].
 
         Columns are the rigid and elastic coordinates of one body after another.
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from rom.arguments import finite, one_of, typed, whole
 from rom.assembly.assembly import Assembly
@@ -31,6 +32,7 @@ from rom.updating.verdict import (
     LEFT_LOG_LEVEL,
     band,
     check_channels,
+    chi_row,
     likeness,
     scores,
     suspects,
@@ -206,7 +208,7 @@ def update(  # noqa: PLR0913  keywords of one call
     attached: Attached | None = None,
     candidates: Attached | None = None,
     damping: float = 0.01,
-    prior: dict[str, float] | None = None,
+    prior: dict[str, float] | Updated | None = None,
     tolerance: float | None = None,
     residual: str = "responses",
     rank: int | None = None,
@@ -227,7 +229,9 @@ def update(  # noqa: PLR0913  keywords of one call
         attached: {name: `GroundSpring`, `AddedMass` or `JointSpring`} with unknown factors.
         candidates: {name: likewise}, which may be missing in the model: tried in the score test.
         damping: ratio to start from, of all modes [1].
-        prior: {name: relative standard deviation [1] of its factor about one, before the test}.
+        prior: {name: relative standard deviation [1] of its factor about one, before the test}; or
+            what an update by another test found, with other supports, channels or load cases:
+            both tests together then say what is found, and parameters that are not free stay.
         tolerance: largest distance of a channel from a surface point [m], see `Channels.rows`.
         residual: "responses", or "equations": of motion at the sensors, linear in what is sought,
             biased by noise and by the condensation; or "response-function": H - H_test is
@@ -262,18 +266,19 @@ def update(  # noqa: PLR0913  keywords of one call
             hint="Reduce the model in SI units to update it.",
         )
     attached, candidates = dict(attached or {}), dict(candidates or {})
-    rows = (
-        test.sensors.rows(bodies, "sensor", tolerance),
-        test.inputs.rows(bodies, "input", tolerance),
-    )
+    rows = test.rows(bodies, tolerance)
     model = family_model(family, rows, attached, candidates, fixed)
     unknown = _unknown(model, free, attached, candidates)
     data = Data.of(test)
-    search = _Search.begun(model, data, unknown, damping, prior or {})
+    if isinstance(prior, Updated) and residual != "responses":
+        raise ConfigError("the update by another test is a prior for the residual of responses.")
+    before = _Before.of(prior or {}, model)
+    search = _Search.begun(model, data, unknown, damping, before)
     check_channels(search.extremes(), search.data.roughly())
     if residual == "responses":
         return _found(family, search.run())
-    sigma = _deviations(prior or {}, model.names)
+    root = np.sqrt(np.diag(before.precision))
+    sigma = np.divide(1.0, root, out=np.full(root.size, np.inf), where=root > 0)
     begin = model, data, search.x, unknown, damping
     if residual == "equations":
         found = by_equations(*begin, prior=sigma, rank=rank)
@@ -293,14 +298,43 @@ def _unknown(
     return np.array([name in chosen for name in model.names])
 
 
-def _deviations(prior: dict[str, float], names: tuple[str, ...]) -> Array:
-    """(n_p,) standard deviations before the test; infinite without one."""
-    if wrong := set(prior) - set(names):
-        raise ParameterError(f"prior: there is no parameter {named(wrong)}.")
-    sigma = np.array([prior.get(name, np.inf) for name in names])
-    if not (sigma > 0).all():
-        raise ConfigError("prior: a standard deviation is positive.")
-    return sigma
+@dataclass(frozen=True, slots=True)
+class _Before:
+    """What is known of the logarithms of factors before a test.
+
+    Attributes:
+        x: (n_p,) where they are.
+        precision: (n_p, n_p) inverse of their covariance.
+        n_known: number of those that another test found; 0 without.
+    """
+
+    x: Array
+    precision: Array
+    n_known: int = 0
+
+    @staticmethod
+    def of(prior: dict[str, float] | Updated, model: FamilyModel) -> "_Before":
+        """From standard deviations about one, or from the update by another test.
+
+        Raises:
+            ConfigError, ParameterError: for a deviation that is not positive, an unknown name, or
+                a test that found none of the parameters.
+        """
+        names, precision = model.names, np.zeros((len(model.names),) * 2)
+        if not isinstance(prior, Updated):
+            if wrong := set(prior) - set(names):
+                raise ParameterError(f"prior: there is no parameter {named(wrong)}.")
+            sigma = np.array([prior.get(name, np.inf) for name in names])
+            if not (sigma > 0).all():
+                raise ConfigError("prior: a standard deviation is positive.")
+            return _Before(np.zeros(len(names)), np.diag(sigma**-2.0))
+        known = [name for name in prior.names if name in names]
+        if not known:
+            raise ConfigError(f"prior: the test before found none of {named(names)}.")
+        here, there = ([those.index(n) for n in known] for those in (names, prior.names))
+        precision[np.ix_(here, here)] = np.linalg.inv(prior.covariance[np.ix_(there, there)])
+        x = [np.log(prior.factors.get(name, 1.0) or 1.0) for name in names]
+        return _Before(np.array(x), precision, len(known))
 
 
 @dataclass(slots=True)
@@ -313,27 +347,26 @@ class _Search:
     free: Mask
     precision: Array
     before: Array
+    n_known: int
     sums: Sums = field(init=False)
     settled: bool = False
 
     @staticmethod
     def begun(
-        model: FamilyModel, data: Data, unknown: Mask, damping: float, prior: dict[str, float]
+        model: FamilyModel, data: Data, unknown: Mask, damping: float, prior: _Before
     ) -> "_Search":
-        x = np.clip(np.zeros(len(model.names)), np.log(model.low), np.log(model.high))
+        x = np.clip(prior.x, np.log(model.low), np.log(model.high))
         lam = modal(model.at(x), ()).lam[model.n_rigid :]
         m = min(int(np.count_nonzero(lam < (BAND_RATIO * data.omega[-1]) ** 2)) + 1, lam.size)
-        sigma = _deviations(prior, model.names)
         free = np.r_[unknown, np.ones(m, dtype=bool)]
         if data.n_values <= free.sum():
             raise ConfigError(
                 f"{data.n_values} usable numbers for {free.sum()} unknowns.",
                 hint="Measure more lines, or fix parameters; lines of low coherence do not count.",
             )
-        precision = np.r_[sigma**-2.0, np.full(m, DAMPING_LOG_DEVIATION**-2.0)]
-        before = np.r_[np.zeros(x.size), np.full(m, np.log(damping))]
-        theta = np.r_[x, before[x.size :]]
-        return _Search(model, data, theta, free, precision, before)
+        precision = block_diag(prior.precision, np.eye(m) * DAMPING_LOG_DEVIATION**-2.0)
+        before, theta = (np.r_[y, np.full(m, np.log(damping))] for y in (prior.x, x))
+        return _Search(model, data, theta, free, precision, before, prior.n_known)
 
     def extremes(self) -> Iterator[Complex]:
         """Responses where the search begins, then with each factor at both ends of its range."""
@@ -362,14 +395,14 @@ class _Search:
 
     def at(self, theta: Array) -> tuple[Sums, float]:
         """Sums and cost at some unknowns."""
-        n = len(self.model.names)
+        n, off = len(self.model.names), theta - self.before
         found = sums(self.model, theta[:n], np.exp(theta[n:]), self.data)
-        return found, found.chi_square + float(self.precision @ (theta - self.before) ** 2)
+        return found, found.chi_square + float(off @ self.precision @ off)
 
     def posterior(self) -> tuple[Array, Array]:
         """Information (n, n) of data and prior, and the gradient (n,) of half the cost."""
-        N = self.sums.normal + np.diag(self.precision)
-        return N, self.sums.gradient + self.precision * (self.theta - self.before)
+        N = self.sums.normal + self.precision
+        return N, self.sums.gradient + self.precision @ (self.theta - self.before)
 
     def moved(self, found: Update) -> "_Search":
         """Where equations led, damping of the modes above the highest line as it was."""
@@ -465,6 +498,11 @@ def _doubts(search: _Search, at_bound: tuple[str, ...]) -> list[Row]:
     lam = modal(model.at(search.x), ()).lam[model.n_rigid :]
     used = data.omega[(data.weight > 0).any(axis=(1, 2))]
     rows = [likeness(H, data), band(np.sqrt(lam) / (2 * np.pi), used[-1] / (2 * np.pi))]
+    if search.n_known:
+        n = len(model.names)
+        off = (search.theta - search.before)[:n]
+        moved = float(off @ search.precision[:n, :n] @ off)
+        rows.append(chi_row("distance from the test before", moved, search.n_known, 1))
     for message, _ in suspects(H, data, LEFT_LOG_LEVEL).values():
         rows.append(row(message, 1.0, 0.0))
     if not search.settled:

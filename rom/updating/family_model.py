@@ -43,9 +43,13 @@ class Parts:
     bodies: dict[str, FlexibleBody]
 
     @staticmethod
-    def of(family: Family) -> "Parts":
+    def of(structure: "Family | FlexibleBody | Parts") -> "Parts":
         """Those of an assembly, or of a body alone."""
-        return Parts({name: part.body for name, part in families_of(family).items()})
+        if isinstance(structure, Parts):
+            return structure
+        if isinstance(structure, FlexibleBody):
+            return Parts({"": structure})
+        return Parts({name: part.body for name, part in families_of(structure).items()})
 
     @property
     def columns(self) -> dict[str, slice]:
@@ -123,12 +127,13 @@ class GroundSpring:
     def __post_init__(self) -> None:
         check_range(f"the spring at {self.at!r}", self.low, self.high)
 
-    def term(self, parts: Parts) -> tuple[Array, Array]:
-        """Stiffness [N/m] and mass [kg] (n, n) that it adds at a factor of one.
+    def term(self, structure: FlexibleBody | Parts) -> tuple[Array, Array]:
+        """Stiffness [N/m] and mass [kg] (n, n) that it adds to a body at a factor of one.
 
         Raises:
             ConfigError, InterfaceError: for a wrong stiffness or interface.
         """
+        parts = Parts.of(structure)
         H = parts.motion(self.at)
         return H.T @ _stiffness(self.at, self.stiffness) @ H, np.zeros((parts.n,) * 2)
 
@@ -160,13 +165,13 @@ class JointSpring:
     def __post_init__(self) -> None:
         check_range(f"the joint of {self.one!r} and {self.other!r}", self.low, self.high)
 
-    def term(self, parts: Parts) -> tuple[Array, Array]:
-        """Stiffness [N/m] and mass [kg] (n, n) that it adds at a factor of one.
+    def term(self, structure: FlexibleBody | Parts) -> tuple[Array, Array]:
+        """Stiffness [N/m] and mass [kg] (n, n) that it adds to a body at a factor of one.
 
         Raises:
             ConfigError, InterfaceError: for a wrong stiffness, body or interface.
         """
-        arm = np.eye(6)
+        parts, arm = Parts.of(structure), np.eye(6)
         arm[:3, 3:] = -skew(parts.marker(self.one)[1].point - parts.marker(self.other)[1].point)
         H = parts.motion(self.one) - arm @ parts.motion(self.other)
         return H.T @ _stiffness(self.one, self.stiffness) @ H, np.zeros((parts.n,) * 2)
@@ -196,13 +201,13 @@ class AddedMass:
         if not finite("mass", self.mass, ()) > 0:
             raise ConfigError(f"the mass at {self.at!r} is {self.mass} kg: it must be positive.")
 
-    def term(self, parts: Parts) -> tuple[Array, Array]:
-        """Stiffness [N/m] and mass [kg] (n, n) that it adds at a factor of one.
+    def term(self, structure: FlexibleBody | Parts) -> tuple[Array, Array]:
+        """Stiffness [N/m] and mass [kg] (n, n) that it adds to a body at a factor of one.
 
         Raises:
             InterfaceError: for a wrong interface.
         """
-        H = parts.motion(self.at)[:MASS_DOFS]
+        H = Parts.of(structure).motion(self.at)[:MASS_DOFS]
         return np.zeros((H.shape[1],) * 2), self.mass * H.T @ H
 
 

@@ -191,17 +191,17 @@ def verdict(s: Sums, data: Data, n: int, missing: dict[str, float], doubts: list
     """
     freedom = data.n_values - n
     counted = 2.0 * (data.weight > 0)
-    rows = [_chi_row("chi-square of all residuals", s.chi_square, freedom, 1)]
+    rows = [chi_row("chi-square of all residuals", s.chi_square, freedom, 1)]
     n_s = s.squares.shape[1]
     worst = [(_deviation(s.squares[:, k].sum(), counted[:, k].sum()), k) for k in range(n_s)]
     k = max(worst)[1]
-    rows.append(_chi_row(f"worst sensor, {k}", s.squares[:, k].sum(), counted[:, k].sum(), n_s))
+    rows.append(chi_row(f"worst sensor, {k}", s.squares[:, k].sum(), counted[:, k].sum(), n_s))
     blocks = np.array_split(np.arange(data.omega.size), min(N_BANDS, data.omega.size))
     worst = [(_deviation(s.squares[b].sum(), counted[b].sum()), j) for j, b in enumerate(blocks)]
     b = blocks[max(worst)[1]]
     hz = data.omega[b[[0, -1]]] / (2 * np.pi)
     name = f"worst band, {hz[0]:.4g} to {hz[1]:.4g} Hz"
-    rows.append(_chi_row(name, s.squares[b].sum(), counted[b].sum(), len(blocks)))
+    rows.append(chi_row(name, s.squares[b].sum(), counted[b].sum(), len(blocks)))
     if missing:
         worst_name = max(missing, key=lambda name: abs(missing[name]))
         quantity = f"largest score, {worst_name} [deviations]"
@@ -244,7 +244,7 @@ def _deviation(value: float, freedom: float) -> float:
     return float((value - freedom) / np.sqrt(2 * max(freedom, 1.0)))
 
 
-def _chi_row(name: str, value: float, freedom: float, trials: int) -> Row:
+def chi_row(name: str, value: float, freedom: float, trials: int) -> Row:
     """Chi-square over its expectation; the limit is kept by a right model but for one in 1000."""
     freedom = max(freedom, 1.0)
     limit = chi2.isf(MAX_FALSE_REFUSAL / trials, freedom) / freedom

@@ -11,7 +11,15 @@ from cases.solid import STEEL, composite
 from rom.errors import ConfigError, InterfaceError
 from rom.parametric import FamilyAssembly
 from rom.parametric.parameters import centre
-from rom.updating import AddedMass, Channels, GroundSpring, JointSpring, Responses
+from rom.updating import (
+    AddedMass,
+    Channels,
+    GroundSpring,
+    JointSpring,
+    Responses,
+    candidates,
+    place,
+)  # fmt: skip
 from rom.updating.family_model import Parts, family_model
 from rom.updating.frf_data import noisy
 from rom.updating.models import modal
@@ -146,6 +154,19 @@ def test_a_joint_taken_for_rigid_is_refused_and_a_missing_mass_is_named(families
     found = rom.update(bolted, test, fixed=HELD, attached=attached, candidates=heavy | prop)
     assert not found.verdict.ok
     assert max(found.scores, key=lambda name: abs(found.scores[name])) == "cable"
+
+
+def test_an_assembly_of_one_is_planned_as_a_body(families):
+    family, one = families["frame"], FamilyAssembly({"frame": families["frame"]})
+    offered = candidates(family.body, 3, fixed=("root",))
+    load = AddedMass("tip", 2.0, 0.1, 10.0)
+    options = {"n_sensors": 2, "noise": 0.05}
+    alone = place(family, offered, offered, LINES[::5], fixed=("root",),
+                  attached={"load": load}, **options)  # fmt: skip
+    same = place(one, offered, offered, LINES[::5], fixed=HELD,
+                 attached={"load": replace(load, at=("frame", "tip"))}, **options)  # fmt: skip
+    assert alone.names[:2] == ("E", "load") and same.names[:2] == ("frame.E", "load")
+    assert_allclose(same.covariance, alone.covariance, rtol=1e-8)
 
 
 def test_what_does_not_fit_an_assembly_is_named(families, bolted):

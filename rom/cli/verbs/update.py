@@ -102,8 +102,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--noise", type=positive, default=0.05, help="relative, of what is planned (default 5 %%)"
     )
     parser.add_argument(
-        "--floor", type=positive, default=0.0,
-        help="noise of what is planned where nothing moves [m/s^2 per N] (default none)",
+        "--floor", type=number,
+        help="noise of what is planned where nothing moves [m/s^2 per N] (default: a thousandth of "
+        "the largest response)",
     )  # fmt: skip
     parser.add_argument(
         "-o", "--output", type=Path, help="updated body, .rom.npz; plan, .csv, .uff or .png"
