@@ -50,8 +50,9 @@ def deflection_rows(
         E: (n_local, r) its nodal shapes.
     """
     full = HeldSolid.of(
-        model, connection, body.reference, held_motions(geometric, model.interfaces)
-    )
+        model, connection, body.reference, held_motions(geometric, model.interfaces),
+        neo_hookean=geometric.sampling is not None,
+    )  # fmt: skip
     quartic, still = body.energy(), body.mean_rows(geometric.fixed)
     tangent = Tangent(body, still)
     E = full.whole(E)
@@ -184,14 +185,18 @@ class HeldSolid:
         self.inside = splu(csc_matrix(self.T.T @ self.T))
 
     @classmethod
-    def of(cls, model: FEModel, connection: Any, reference: str, held: list[Load]) -> "HeldSolid":
+    def of(
+        cls, model: FEModel, connection: Any, reference: str, held: list[Load], *,
+        neo_hookean: bool = False,
+    ) -> "HeldSolid":  # fmt: skip
         """That of a model in interface coordinates, its reference and further motions held."""
         ops, C = connection.ops, lil_matrix((6 + len(held), model.n_dofs))
         for k, load in enumerate([*(Load(reference, k) for k in range(6)), *held]):
             interface = model.interfaces[load.interface]
             C[k, interface.dofs] = mean_motion(interface)[load.component]
         T = None if ops.T is None else rows_of(ops.T)
-        solid, M = model.stresses.finite_strain(), ops.gathered(model.operators.M)
+        solid = model.stresses.finite_strain(neo_hookean=neo_hookean)
+        M = ops.gathered(model.operators.M)
         return cls(solid, M, C, T, ops.comm)
 
     def whole(self, E: Array) -> Array:
