@@ -36,7 +36,8 @@ TASKS: dict[str, tuple[str, str]] = {
     "Assemble": (
         "Bodies put together before any motion.",
         """Assembly assembly.CondensedAssembly substructure FreeSubstructure
-        assembly.free_substructure DualAssembly reduce_pieces Pieces""",
+        assembly.free_substructure DualAssembly reduce_pieces Pieces
+        certify_pieces""",
     ),
     "Wheels": (
         "Equal sectors, at rest and in rotation, with blades that are alike or not.",

@@ -144,6 +144,7 @@ from rom.reduction.interfaces.polynomial import FourierLegendre as FourierLegend
 from rom.reduction.interfaces.polynomial import Polynomial as Polynomial
 from rom.reduction.interfaces.snapshots import Snapshots as Snapshots
 from rom.report.html import write_report as write_report
+from rom.report.pieces import certify_pieces as certify_pieces
 from rom.updating.estimate import update as update
 from rom.view.scenes.animation_files import write_animation as write_animation
 from rom.workflow import mass_properties as mass_properties

@@ -19,6 +19,7 @@ from rom.body.frame import at_large_deflection
 from rom.body.nonlinear.cauchy import refuse_many
 from rom.body.nonlinear.geometric import enriched
 from rom.body.nonlinear.ranges import Geometric
+from rom.body.nonlinear.sampled import sampled_energy
 from rom.body.prestress import UnitLoads
 from rom.body.projection import (
     canonical_columns,
@@ -384,6 +385,11 @@ def _reduced_body(  # noqa: PLR0913  those of `reduce`
         if nonlinear is not None:
             watch.begin("derivatives of shapes")
             basis = enriched(nonlinear, model, ops, connection, basis, reference)
+            if stress and nonlinear.sampling is not None:
+                raise ConfigError(
+                    "stress and sampling do not go together: most elements are left out.",
+                    hint="Leave stress out, or sampling for St. Venant-Kirchhoff material.",
+                )
             if stress:
                 refuse_many(stressed_nodes(model).size, basis.Psi.shape[1] - 6)
         watch.begin("energies")
@@ -408,7 +414,11 @@ def _reduced_body(  # noqa: PLR0913  those of `reduce`
     else:
         E = canonical_columns(bare, Psi @ elastic.V, model)
         body, E = at_large_deflection(body, reference, E, model, bare)
-        if stress:
+        if nonlinear.sampling is not None:
+            energy, training = sampled_energy(body, nonlinear, model.stresses.large_strain(), E)
+            body = replace(body, quartic=energy)
+            body.provenance["sampling"] = training
+        elif stress:
             body = replace(body, stress=cauchy_recovery(model, E))
     if damping is not None:
         body = damped(body, damping)

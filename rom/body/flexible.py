@@ -12,6 +12,7 @@ from rom.arguments import finite, typed, whole
 from rom.body.conversion import converted
 from rom.body.frame import on_mean_axes, seen_from
 from rom.body.nonlinear.quartic import Quartic
+from rom.body.nonlinear.sampled import Sampled
 from rom.body.nonlinear.statics import critical_shares, follow
 from rom.body.records import BodyData, Marker, Patch, Surface, still_motions
 from rom.body.reference import marker_motion, rigid_elastic, rigid_mass
@@ -297,7 +298,7 @@ class FlexibleBody(BodyData):
         """
         return critical_shares(self.energy(), self.forces_on(loads), self.mean_rows(fixed))
 
-    def energy(self) -> Quartic:
+    def energy(self) -> Quartic | Sampled:
         """Strain energy at large deflection.
 
         Raises:

@@ -10,6 +10,7 @@ from scipy.linalg import null_space
 from rom.arguments import finite, typed
 from rom.body.nonlinear.cauchy import CauchyRecovery
 from rom.body.nonlinear.quartic import Quartic
+from rom.body.nonlinear.sampled import Sampled
 from rom.body.recovery import StressRecovery
 from rom.eigen.supports import DIRECTIONS, Fixed, held_coordinates, supports
 from rom.errors import InterfaceError, ModelError
@@ -110,7 +111,7 @@ class BodyData:
     labels: tuple[str, ...]
     reference: str = "mean-axis"
     K_geo: dict[str, Array] = field(default_factory=dict)
-    quartic: Quartic | None = None
+    quartic: Quartic | Sampled | None = None
     surface: Surface | None = None
     stress: StressRecovery | CauchyRecovery | None = None
     units: str = "SI"

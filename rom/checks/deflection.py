@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 from scipy.linalg import eigh
-from scipy.sparse import bmat, csc_matrix, csr_matrix, identity, vstack
+from scipy.sparse import bmat, csc_matrix, csr_matrix, identity, lil_matrix, vstack
 from scipy.sparse.linalg import LinearOperator, eigsh, splu
 
 from rom.body.flexible import FlexibleBody
@@ -49,7 +49,10 @@ def deflection_rows(
         body: the reduced body, seen from its reference interface.
         E: (n_local, r) its nodal shapes.
     """
-    full = HeldSolid(model, connection, body.reference, held_motions(geometric, model.interfaces))
+    full = HeldSolid.of(
+        model, connection, body.reference, held_motions(geometric, model.interfaces),
+        neo_hookean=geometric.sampling is not None,
+    )  # fmt: skip
     quartic, still = body.energy(), body.mean_rows(geometric.fixed)
     tangent = Tangent(body, still)
     E = full.whole(E)
@@ -65,7 +68,7 @@ def deflection_rows(
             if step is None:
                 break
             steps.append(step)
-        rows += _rows(name, steps)
+        rows += case_rows(name, steps)
         held = len(list(takewhile(_holds, steps)))
         table[name] = {
             "case": case.tolist(),
@@ -106,7 +109,7 @@ def _holds(step: Step) -> bool:
     return step.displacement <= DISPLACEMENT_RTOL and step.frequencies <= TANGENT_RTOL
 
 
-def _rows(name: str, steps: list[Step]) -> list[Row]:
+def case_rows(name: str, steps: list[Step]) -> list[Row]:
     """Lines of a load case, the worst of its steps; one more where the basis locks."""
     n = len(STEP_SHARES)
     rows = [row(f"{name}: full states found, of {n}", len(steps), n - 0.5, above=True)]
@@ -165,25 +168,36 @@ class Tangent:
 
 
 class HeldSolid:
-    """The full model at finite strain, interfaces held in the mean.
+    """A full model at finite strain, motions of its interfaces held in the mean.
 
     Args:
-        model: with finite elements; every process has all of it.
-        connection: the same in interface coordinates a, u = T a.
-        reference: the interface that is held.
-        held: loads whose motions are held beside.
+        solid: its ``force`` and ``tangent``.
+        M: (n, n) mass [kg].
+        C: (h, n) motions that are held.
+        T: (n, m) its displacements u = T a; None for the identity.
+        comm: of the processes, every one of which has all of it.
     """
 
-    def __init__(self, model: FEModel, connection: Any, reference: str, held: list[Load]):
-        ops, root = connection.ops, [Load(reference, k) for k in range(6)]
-        self.solid = model.stresses.finite_strain()
-        self.comm = ops.comm
-        self.T = csr_matrix(identity(model.n_dofs) if ops.T is None else rows_of(ops.T))
-        self.M = self.T.T @ ops.gathered(model.operators.M) @ self.T
-        rows = [csr_matrix(mean_motion(model.interfaces[load.interface])[load.component]) @ self.T[
-            model.interfaces[load.interface].dofs] for load in (*root, *held)]  # fmt: skip
-        self.C = vstack(rows)
+    def __init__(self, solid: Any, M: Any, C: Any, T: Any = None, comm: Any = None):
+        self.solid, self.comm = solid, comm
+        self.T = csr_matrix(identity(M.shape[0]) if T is None else T)
+        self.M, self.C = self.T.T @ M @ self.T, csr_matrix(C) @ self.T
         self.inside = splu(csc_matrix(self.T.T @ self.T))
+
+    @classmethod
+    def of(
+        cls, model: FEModel, connection: Any, reference: str, held: list[Load], *,
+        neo_hookean: bool = False,
+    ) -> "HeldSolid":  # fmt: skip
+        """That of a model in interface coordinates, its reference and further motions held."""
+        ops, C = connection.ops, lil_matrix((6 + len(held), model.n_dofs))
+        for k, load in enumerate([*(Load(reference, k) for k in range(6)), *held]):
+            interface = model.interfaces[load.interface]
+            C[k, interface.dofs] = mean_motion(interface)[load.component]
+        T = None if ops.T is None else rows_of(ops.T)
+        solid = model.stresses.finite_strain(neo_hookean=neo_hookean)
+        M = ops.gathered(model.operators.M)
+        return cls(solid, M, C, T, ops.comm)
 
     def whole(self, E: Array) -> Array:
         """(n, r) all rows of shapes (n_local, r)."""

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.optimize import brentq
+from scipy.spatial import cKDTree
 from scipy.special import ellipe, ellipeinc, ellipk, ellipkinc
 
 import rom
@@ -15,6 +16,7 @@ from cases.paths import RANKS, ROOT
 from cases.ranks.environment import ENVIRONMENT
 from rom import rotation
 from rom.assembly.pieces import Tree, together
+from rom.checks.glued import GluedSolid
 from rom.errors import ConfigError, InterfaceError, ModelError
 from rom.process.mpirun import mpirun
 
@@ -175,6 +177,70 @@ def test_pieces_that_repeat_each_other_are_reduced_once_for_the_largest_of_their
     assert len({id(body.quartic) for body in other.bodies.values()}) == 2
     full = rom.reduce_pieces(models, interfaces={"cut 2": rom.Polynomial(1)}, **made)
     assert len({id(body.quartic) for body in full.bodies.values()}) == 3
+
+
+@pytest.fixture(scope="module")
+def halves():
+    """Models of two pieces, their range, and how they are reduced."""
+    made = {"reference": "root", "method": rom.CraigBampton(n_modes=4), "certify": False}
+    return (
+        beam(2, 8, nu=0.3),
+        rom.Geometric(loads={"tip": (0, 0, 2 * EI, 0, 0, 0)}, n_modes=2),
+        made,
+    )
+
+
+def test_the_certificate_of_pieces_compares_them_with_the_whole_solid(halves):
+    """Glued of their finite elements, up to 45 degrees; pieces of small deflection fail."""
+    models, loads, made = halves
+    pieces = rom.reduce_pieces(models, nonlinear=loads, **made)
+    assert pieces.certificate is None
+    report = rom.certify_pieces(pieces, models, nonlinear=loads).certificate
+    rows = {row.quantity: row for row in report.rows}
+    assert report.ok and len(rows) == 6, report
+    small = rom.reduce_pieces(models, **made)
+    report = rom.certify_pieces(small, models, nonlinear=loads).certificate
+    failed = {row.quantity: row.value for row in report.failures}
+    assert 0.01 < failed["tip f_z: displacement"] < 0.2
+
+
+def test_the_solid_glued_of_pieces_is_the_one_that_was_cut(halves):
+    models, *_ = halves
+    whole, glued = beam(1, 8, nu=0.3), GluedSolid.of(models, {"cut 1": ("1", "2")})
+    assert glued.n == whole.n_dofs
+    x = np.zeros((glued.n // 3, 3))
+    for key, model in models.items():
+        x[glued.dofs[key][::3] // 3] = model.points
+    at = cKDTree(x).query(whole.points)[1]
+    dofs = (3 * at[:, None] + np.arange(3)).ravel()
+    u = 0.01 * np.sin(40 * x + x[:, [1, 2, 0]]).ravel()
+    solid = whole.stresses.finite_strain()
+    force, K = solid.force(u[dofs]), solid.tangent(u[dofs])
+    assert_allclose(glued.force(u)[dofs], force, rtol=0, atol=1e-9 * np.abs(force).max())
+    assert abs(glued.tangent(u)[dofs][:, dofs] - K).max() < 1e-9 * abs(K).max()
+    assert_allclose(glued.M.sum(), 3 * whole.mass(), rtol=1e-10)
+    shifted = replace(models["2"].interfaces["cut 1"], points=models["2"].points[:25] + 1.0)
+    apart = replace(models["2"], interfaces={"cut 1": shifted})
+    with pytest.raises(ModelError, match="do not meet at 'cut 1'"):
+        GluedSolid.of(models | {"2": apart}, {"cut 1": ("1", "2")})
+
+
+@pytest.mark.parametrize(
+    "change, says",
+    [
+        ({"loads": {"tip": (0, 0, 1, 0, 2.0, 0)}}, "'tip m_y'.* pair of dead forces"),
+        ({"spin": (0, 0, 3.0)}, "certified for forces; the range has 'omega_z"),
+        ({"fixed": ("tip",)}, "holds .*'tip'"),
+        ({"loads": {"cut 1": (1.0, 0, 0, 0, 0, 0)}}, "names 'cut 1'"),
+        ({}, "the models are '1', the pieces '1', '2'"),
+    ],
+)
+def test_pieces_are_certified_for_what_the_whole_can_bear_too(halves, change, says):
+    models, loads, made = halves
+    pieces = rom.reduce_pieces(models, **made)
+    few = {"1": models["1"]} if not change else models
+    with pytest.raises(ConfigError, match=says):
+        rom.certify_pieces(pieces, few, nonlinear=replace(loads, **change))
 
 
 def drift_of_spin(pieces, dt):

@@ -39,7 +39,7 @@ MAY_IMPORT = {  # module or package below rom/ -> what it may import from rom be
     "reduction": {"model", "rows", "eigen", "errors"},
     "cyclic": {"model", "rows", "eigen", "rotation", "reduction", "errors"},
     "body": {"model", "eigen", "rotation", "notebook", "paths", "units", "errors"},
-    "assembly": {"rotation", "model", "rows", "eigen", "body", "reduction", "errors"},
+    "assembly": {"model", "rows", "eigen", "body", "reduction", "rotation", "errors"},
     "mbs": {"model", "rotation", "io", "notebook", "paths", "errors"},
     "io": {"model", "units", "body", "parametric", "updating", "errors"},
     "checks": {"model", "rows", "eigen", "body", "reduction", "errors"},
@@ -62,7 +62,7 @@ MAY_IMPORT = {  # module or package below rom/ -> what it may import from rom be
     "view": {"model", "mbs", "rotation", "io", "errors"},
     "fmu": {"model", "mbs", "rotation", "body", "io", "errors"},
     "config": LIGHT | {"checks", "fe", "fmu", "workflow"},
-    "report": {"model", "rotation", "body", "checks", "config", "mbs", "view", "io", "errors"},
+    "report": LIGHT | {"checks", "config", "view"},
     "material": {"errors", "units"},
     "rows": {"model"},
 }

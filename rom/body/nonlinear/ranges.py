@@ -64,6 +64,9 @@ class Geometric:
             force is a load beside the others.
         about: (3,) a point of the axis of rotation [m]; if missing the origin of the reference.
 
+        sampling: if given, the material is neo-Hookean with the same constants, and its energy that
+            of a few weighted elements, whose forces differ by this share from those of all [1].
+
     Where the body snaps on the way to a load, its path is followed by arc length.
 
     Raises:
@@ -82,6 +85,7 @@ class Geometric:
     fixed: Fixed = ()
     spin: tuple[float, float, float] = (0.0, 0.0, 0.0)
     about: tuple[float, float, float] | None = None
+    sampling: float | None = None
 
     def __post_init__(self) -> None:
         whole("n_steps", self.n_steps, 1)
@@ -90,6 +94,8 @@ class Geometric:
             whole("n_shapes", self.n_shapes, 1, reason="without any the basis locks")
         if not 0 < self.tol < 1:
             raise ConfigError(f"tol = {self.tol!r} is a share between 0 and 1.")
+        if self.sampling is not None and not 0 < self.sampling < 1:
+            raise ConfigError(f"sampling = {self.sampling!r} is a share between 0 and 1.")
         for name, load in self.loads.items():
             range_ = np.asarray(load, dtype=float)
             if range_.shape != (6,) or not np.isfinite(range_).all() or not range_.any():
