@@ -12,7 +12,7 @@ from rom.eigen.dissection import Substructure, dissected
 from rom.errors import InterfaceError, SolverError
 from rom.model import Array
 
-MAX_PART_DOFS = 600  # smaller parts cost more calls, larger ones more work on dense matrices
+MAX_PART_DOFS = 128  # smaller parts cost more calls, larger ones more work on dense matrices
 
 
 class SubstructuredBody:
@@ -28,7 +28,9 @@ class SubstructuredBody:
         cutoff: largest eigenvalue of a substructure that is kept [rad^2/s^2].
 
     Attributes:
-        mass: (r, r) T^T M T [s^2/rad^2]; T^T K T is one.
+        couplings: of T^T M T [s^2/rad^2], where T^T K T is one: the rows that modes of each
+            substructure are coupled to, the last of them its own, and the values.
+        n_kept: number r of modes of all substructures.
 
     Raises:
         InterfaceError: if K is not positive definite.
@@ -40,11 +42,10 @@ class SubstructuredBody:
         self.factors: list[Any] = []
         self.shapes: list[Array] = []
         self.static: list[Array] = []
-        self.mass = np.zeros((0, 0))
+        self.couplings: list[tuple[slice, Array]] = []
         self._transform(cutoff)
 
     def _transform(self, cutoff: float) -> None:
-        couplings: list[tuple[slice, Array]] = []
         below: dict[int, list[tuple[Substructure, int, Array]]] = {}
         stiffness, mass = Extended(self.K, self.parts), Extended(self.M, self.parts)
         n_kept = 0
@@ -61,16 +62,27 @@ class SubstructuredBody:
             own = slice(n_kept, n_kept + mu.size)
             n_kept = own.stop
             C_s = C[:, : part.size]
-            couplings.append((slice(first, n_kept), np.vstack([C_s @ Phi, np.diag(mu)])))
+            self.couplings.append((slice(first, n_kept), np.vstack([C_s @ Phi, np.diag(mu)])))
             C = np.vstack([C[:, part.size :] + C_s @ Psi, Phi.T @ (M_sb + moved)])
             below.setdefault(part.parent, []).append((part, first, C))
             self.factors.append(factor)
             self.shapes.append(Phi)
             self.static.append(Psi)
-        self.mass = np.zeros((n_kept, n_kept))
-        for rows, values in couplings:
-            own = slice(rows.stop - values.shape[1], rows.stop)
-            self.mass[rows, own], self.mass[own, rows] = values, values.T
+        self.n_kept = n_kept
+
+    @property
+    def compliance(self) -> Array:
+        """(r,) diagonal of T^T M T, 1/lambda of each mode of a substructure [s^2/rad^2]."""
+        return np.concatenate([np.diag(values[-values.shape[1]:]) for _, values in self.couplings])
+
+    def apply_mass(self, Y: Array) -> Array:
+        """T^T M T Y, (r, k) of coordinates (r, k)."""
+        MY = np.zeros(Y.shape)
+        for rows, values in self.couplings:
+            below = rows.stop - values.shape[1]
+            MY[rows] += values @ Y[below : rows.stop]
+            MY[below : rows.stop] += values[: below - rows.start].T @ Y[rows.start : below]
+        return MY
 
     def expand(self, Y: Array) -> Array:
         """T Y, (n, k) displacements of coordinates (r, k)."""

@@ -157,7 +157,9 @@ def test_the_transformed_body_is_the_body():
     T = whole.expand(np.eye(K.shape[0]))
     assert len(whole.parts) > 6
     assert_allclose(T.T @ (K @ T), np.eye(K.shape[0]), atol=1e-9)
-    assert_allclose(T.T @ (M @ T), whole.mass, atol=1e-12 * whole.mass.max())
+    mass = whole.apply_mass(np.eye(K.shape[0]))
+    assert_allclose(T.T @ (M @ T), mass, atol=1e-12 * mass.max())
+    assert_allclose(whole.compliance, np.diag(mass))
     F = np.random.default_rng(0).normal(size=(K.shape[0], 3))
     assert_allclose(K @ whole.solve(F), F, atol=1e-8)
 
