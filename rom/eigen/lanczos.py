@@ -130,7 +130,7 @@ class BlockLanczos:
     def _residuals(self) -> Array:
         """(N,) of all Ritz values, over them."""
         theta, S = self._ritz(self.T.shape[0])
-        return np.linalg.norm(self.R @ S[-self.width:], axis=0) / np.abs(theta)
+        return np.linalg.norm(self.R @ S[-self.width :], axis=0) / np.abs(theta)
 
     def _restart(self) -> None:
         """Keep the leading Ritz vectors and the last block only."""

@@ -14,7 +14,7 @@ from scipy.linalg import eigh, qr
 from scipy.sparse import csr_matrix, issparse
 
 from rom.arguments import positive
-from rom.eigen.fronts import SubstructuredBody
+from rom.eigen.fronts import SubstructuredBody, refuse_beyond
 from rom.eigen.lanczos import BlockLanczos, capacity
 from rom.eigen.scipy import RIGID_RTOL, SciPyOperators, dof_set
 from rom.eigen.verbs import canonical_signs, orthonormal
@@ -29,6 +29,7 @@ SHIFT_SHARE = 1e-3  # of the last eigenvalue, by which free bodies are shifted
 SHIFT_RTOL = 1e-11  # of the largest eigenvalue of the mesh: a smaller shift would be round-off
 MAX_STEPS = 4  # of inverse iteration; two are usual, after which modes are counted
 N_COLUMNS = 256  # solved together: more take memory, fewer make products of matrices slow
+WORK_COLUMNS, WORK_MATRICES = 5, 6  # of n rows so many times N_COLUMNS, of k rows k columns
 N_ROWS = 4096  # turned together, in place
 LANCZOS_WIDTH = 24  # columns of the search among modes of substructures
 LANCZOS_RTOL = 0.02  # of its eigenvalues, whose modes are only where the iteration starts
@@ -61,6 +62,7 @@ def substructured_modes(
         InterfaceError: if a body that should be held is free.
         ModelError: if a free body has other motions without stiffness.
         ModesMissedError: if the inertia count differs.
+        ResourceError: if the memory is foreseen not to suffice.
         SolverError: if the bounds stay above the tolerance.
 
     Source:
@@ -82,7 +84,11 @@ def substructured_modes(
         search = _Search(ops, last, ratio)
         for k in range(1, MAX_STEPS + 1):
             search.step()
-            if k >= COUNT_STEP and search.complete and (worst := search.bounds()[1].max(initial=0.0)) <= tol:
+            if (
+                k >= COUNT_STEP
+                and search.complete
+                and (worst := search.bounds()[1].max(initial=0.0)) <= tol
+            ):
                 return search.modes()
     if search.complete:
         raise SolverError(
@@ -128,12 +134,22 @@ class _Search:
         self.MR = ops.M @ self.R
         K = csr_matrix(ops.K + shift * ops.M)
         self.body = SubstructuredBody(K, ops.M, cutoff_ratio * last + shift)
-        Y = _kept_modes(self.body, limit)
+        k = np.count_nonzero(self.body.compliance > 1.0 / limit)  # about as many as there are
+        self._refuse_beyond_memory(k)
+        Y = _kept_modes(self.body, limit, k)
         X = np.empty((ops.n, Y.shape[1]))
         for new in _blocks(Y.shape[1], N_COLUMNS):
             X[:, new] = self.body.expand(Y[:, new])
         self.X, self.gram = self._elastic(X)
         self.n_steps = 0
+
+    def _refuse_beyond_memory(self, k: int) -> None:
+        r, n = self.body.n_kept, self.ops.n
+        N = min(capacity(k), r)
+        search = 2 * r * N + 3 * N**2
+        iteration = n * (k + WORK_COLUMNS * min(N_COLUMNS, k)) + WORK_MATRICES * k**2
+        answer = 2 * n * k  # the block, and the part of it that is handed out
+        refuse_beyond(8.0 * max(search, iteration, answer), f"finding {k} modes of {n} dofs")
 
     def _elastic(self, X: Array) -> tuple[Array, Array]:
         """X without rigid motions and the columns that are nearest to them, and X^T M X."""
@@ -239,10 +255,9 @@ class _Kept:
         return X.T @ Y
 
 
-def _kept_modes(body: SubstructuredBody, limit: float) -> Array:
-    """(r, k) modes of all substructures together up to an eigenvalue, M-orthonormal, ascending."""
+def _kept_modes(body: SubstructuredBody, limit: float, k: int) -> Array:
+    """(r, about k) modes of all substructures together up to a limit, M-orthonormal, ascending."""
     r = body.n_kept
-    k = np.count_nonzero(body.compliance > 1.0 / limit)  # about as many as there are
     while 2 * capacity(k) < r:
         start = np.random.default_rng(1).normal(size=(r, LANCZOS_WIDTH))
         kept = _Kept(body)
