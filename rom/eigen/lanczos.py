@@ -31,7 +31,7 @@ class BlockLanczos:
         sigma: the shift, below all eigenvalues sought.
         deflated: (n_local, d) M-orthonormal modes to leave out.
         start: (n_local, p) random columns; so many are solved for at once.
-        tolerance: (k,) residuals allowed of the k modes sought, of their eigenvalues of the inverse.
+        tolerance: (k,) residuals allowed of the modes sought, over the inverse's eigenvalues.
 
     Source:
         Grimes, Lewis and Simon, A shifted block Lanczos algorithm for solving sparse symmetric
@@ -39,7 +39,7 @@ class BlockLanczos:
         orthogonalisation, and the thick restart of Wu and Simon, ibid. 22 (2000) 602.
     """
 
-    def __init__(  # noqa: PLR0913  what is sought, where, and from what
+    def __init__(
         self, ops: Any, factor: Any, sigma: float, deflated: Array, start: Array, tolerance: Array
     ):
         self.ops, self.factor, self.sigma = ops, factor, sigma

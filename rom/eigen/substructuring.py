@@ -246,7 +246,7 @@ class _Kept:
         self.n = self.n_local = body.n_kept
         self.solve = body.apply_mass
 
-    def apply_M(self, X: Array) -> Array:  # noqa: N802  a name of `Operators`
+    def apply_M(self, X: Array) -> Array:
         """X."""
         return X
 

@@ -23,7 +23,7 @@ def free_on(folder: str) -> int:
 
 
 def main(folder: str, least: int, pid: int) -> None:
-    """Look until less than the least is free, and stays so; then say so on the standard error of PID, end it."""
+    """Look until less than the least stays free; then say so where PID complains, end it."""
     n_full = 0
     while n_full < N_LOOKS:
         free = free_on(folder)

@@ -61,7 +61,7 @@ def reserve_disk(need: float, n: int, comm: MPI.Comm) -> None:
 
 @contextmanager
 def watched() -> Iterator[None]:
-    """End this process, and say why, when the disk fills: by others, or beyond what was foreseen."""
+    """End this process, and say why, when the disk fills: by others, or beyond the foreseen."""
     numbers = (str(number) for number in (LEAST_FREE_BYTES, os.getpid()))
     watch = start(python("rom.process.disk_watch", str(scratch_folder()), *numbers))
     try:
