@@ -31,6 +31,7 @@ class Factor:
 
     Attributes:
         ksp: the PETSc solver that holds the factor.
+        counted: its flops and entries, as MUMPS has counted them.
         ok: False when MUMPS met a pivot it could not divide by.
 
     Raises:
@@ -87,7 +88,8 @@ class Factor:
             raise disk_too_small(self.A.getSize()[0], need)
         else:
             self.ok = code >= 0
-            note(FLOPS_NOTE, self.factor.getMumpsRinfog(3))
+            self.counted = self.factor.getMumpsRinfog(3), entry_count(self.factor)
+            note(FLOPS_NOTE, self.counted[0])
 
     def solve(self, F: Array) -> Array:
         """A^-1 F for (n_local, k) right-hand sides, in blocks."""

@@ -21,7 +21,7 @@ from rom.eigen.lanczos import BLOCK_SIZE, EIGENVALUE_RTOLS, BlockLanczos, capaci
 from rom.eigen.scipy import dof_set
 from rom.eigen.verbs import Weighted, orthonormal
 from rom.errors import ConfigError, ModelError, SolverError
-from rom.fe.costs import comparison_pays
+from rom.fe.costs import comparison_pays, cost_of
 from rom.fe.operators.aij import aij, chosen, gathered, symmetrized, weighted
 from rom.fe.operators.counting import verify_count
 from rom.fe.operators.factor import Factor, dense_rows
@@ -74,6 +74,7 @@ class PETScOperators:
     ):
         self.K, self.M, self.rigid, self.T, self.parent = K, M, rigid, T, parent
         self.solver, self.affordable = solver, not solver.iterative
+        self.counted: tuple[float, float] | None = None  # flops and entries of the last factor
         self.comm = K.comm.tompi4py()
         self.n = K.getSize()[0]
         self.first, end = K.getOwnershipRange()
@@ -87,8 +88,9 @@ class PETScOperators:
         self.fixed = fixed
 
     def comparison_pays(self, n_supports: int, n_interface: int, n_modes: int) -> bool:
-        """By what a factor of this size costs."""
-        return self.affordable and comparison_pays(self.n, n_supports, n_interface, n_modes)
+        """By what the last factor has cost; one that was shared or compressed, by its size."""
+        cost = None if self.counted is None else cost_of(*self.counted)
+        return self.affordable and comparison_pays(self.n, n_supports, n_interface, n_modes, cost)
 
     def apply_K(self, X: Array) -> Array:
         """K X."""
