@@ -31,7 +31,7 @@ class BlockLanczos:
         sigma: the shift, below all eigenvalues sought.
         deflated: (n_local, d) M-orthonormal modes to leave out.
         start: (n_local, p) random columns; so many are solved for at once.
-        tolerance: (k,) residuals allowed of the eigenvalues of the inverse that are sought.
+        tolerance: (k,) residuals allowed of the modes sought, over the inverse's eigenvalues.
 
     Source:
         Grimes, Lewis and Simon, A shifted block Lanczos algorithm for solving sparse symmetric
@@ -47,7 +47,8 @@ class BlockLanczos:
         self.n_deflated, self.width = deflated.shape[1], start.shape[1]
         shape = (ops.n_local, self.n_deflated + capacity(self.k))
         self.V, self.MV = np.empty(shape, order="F"), np.empty(shape, order="F")
-        self.size = 0
+        self.size, self.coupled = 0, 0
+        self.found: tuple[Array, Array] | None = None  # all pairs of T
         self.T = np.zeros((0, 0))
         self.next_look, self.restarted = 0.0, False
         self._append(deflated, ops.apply_M(deflated))
@@ -88,20 +89,22 @@ class BlockLanczos:
         k, H = self.T.shape[0], H[self.n_deflated :]
         self.T = np.block([[self.T, H[:k]], [H[:k].T, 0.5 * (H[k:] + H[k:].T)]])
         self._append(W, MW)
+        self.coupled, self.found = self.size - 2 * self.width, None
 
     def _orthonormal(self, W: Array) -> tuple[Array, Array, Array, Array]:
         """W made M-orthonormal to the space, M W, its components in the space, and the rest.
 
-        When the space holds W already, round-off is left, orthogonal to it after the second pass:
-        a random block with which the search goes on.
+        The first pass goes over what the recurrence couples it with, the second over all. When the
+        space holds W already, round-off is left, orthogonal to it after the second pass: a random
+        block with which the search goes on.
         """
-        V, MV = self.V[:, : self.size], self.MV[:, : self.size]
         H, R = np.zeros((self.size, W.shape[1])), np.eye(W.shape[1])
         W = np.asfortranarray(W)
-        for first in (self._first_coupled(), 0):
-            G = self.ops.gram(MV[:, first:], W)
-            W = _less(W, V[:, first:], G)
-            H[first:] += G
+        for first in (self.coupled, 0):
+            with_these = slice(first, self.size)
+            G = self.ops.gram(self.MV[:, with_these], W)
+            W = _less(W, self.V[:, with_these], G)
+            H[with_these] += G
         MW = self.ops.apply_M(W)
         for _ in range(2):
             g, U = np.linalg.eigh(self.ops.gram(W, MW))
@@ -109,13 +112,6 @@ class BlockLanczos:
             W, MW = _combined(W, U / root), _combined(MW, U / root)
             R = (U * root).T @ R
         return W, MW, H, R
-
-    def _first_coupled(self) -> int:
-        """First column on which a new block depends by more than round-off.
-
-        In exact arithmetic these are the last two blocks; after a restart, all that were kept.
-        """
-        return 0 if self.restarted else max(self.size - 2 * BLOCK_SIZE, 0)
 
     def prove(self, m: int) -> bool:
         """Go on until surely none of the lowest m modes is missing; False if that stays open."""
@@ -147,6 +143,7 @@ class BlockLanczos:
             V[:, ends[0] : ends[1]] = V[:, ends[0] : self.size - self.width] @ S
             V[:, ends[1] : ends[2]] = last
         self.size, self.T = ends[2], np.diag(theta)
+        self.coupled, self.found = 0, None
 
     def _converged(self) -> bool:
         """Whether the residuals of the k leading Ritz values are small."""
@@ -157,8 +154,11 @@ class BlockLanczos:
         return bool((self._residuals()[: self.k] <= self.tolerance).all())
 
     def _ritz(self, k: int) -> tuple[Array, Array]:
-        theta, S = np.linalg.eigh(self.T)
-        return theta[::-1][:k], np.asfortranarray(S[:, ::-1][:, :k])  # which BLAS takes as it is
+        if self.found is None:
+            theta, S = np.linalg.eigh(self.T)
+            self.found = theta[::-1], np.asfortranarray(S[:, ::-1])  # which BLAS takes as it is
+        theta, S = self.found
+        return theta[:k], S[:, :k]
 
 
 def _less(W: Array, V: Array, G: Array) -> Array:

@@ -34,6 +34,7 @@ class Corrected:
         self, factor: Any, gram: Callable[[Array, Array], Array], V: Array, E_T: Array, D: Array
     ):
         self.factor, self.gram, self.A = factor, gram, factor.A
+        self.counted = getattr(factor, "counted", None)
         c, eye = np.abs(np.diag(D)).mean(), np.eye(len(D))
         W = np.asfortranarray(np.hstack([V / c, E_T]))
         self.Y = factor.solve(W)

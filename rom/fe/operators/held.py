@@ -59,6 +59,7 @@ class HeldPETSc:
             return
         near_null = None if self.ops.rigid is None else self.ops.rigid[self.mine]
         self.factor = self.inner.stiffness_inverse(near_null, self.held.size)
+        self.ops.counted = getattr(self.factor, "counted", None)
 
     def _refuse_loose(self) -> None:
         """Iteration on a body that can move would only run on: judge the held dofs first."""

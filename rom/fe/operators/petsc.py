@@ -21,7 +21,7 @@ from rom.eigen.lanczos import BLOCK_SIZE, EIGENVALUE_RTOLS, BlockLanczos, capaci
 from rom.eigen.scipy import dof_set
 from rom.eigen.verbs import Weighted, orthonormal
 from rom.errors import ConfigError, ModelError, SolverError
-from rom.fe.costs import comparison_pays
+from rom.fe.costs import comparison_pays, cost_of
 from rom.fe.operators.aij import aij, chosen, gathered, symmetrized, weighted
 from rom.fe.operators.corrected import Corrected
 from rom.fe.operators.counting import verify_count
@@ -76,6 +76,7 @@ class PETScOperators:
     ):
         self.K, self.M, self.rigid, self.T, self.parent = K, M, rigid, T, parent
         self.solver, self.affordable = solver, not solver.iterative
+        self.counted: tuple[float, float] | None = None  # flops and entries of the last factor
         self.comm = K.comm.tompi4py()
         self.n = K.getSize()[0]
         self.first, end = K.getOwnershipRange()
@@ -89,8 +90,9 @@ class PETScOperators:
         self.fixed = fixed
 
     def comparison_pays(self, n_supports: int, n_interface: int, n_modes: int) -> bool:
-        """By what a factor of this size costs."""
-        return self.affordable and comparison_pays(self.n, n_supports, n_interface, n_modes)
+        """By what the last factor has cost; one that was shared or compressed, by its size."""
+        cost = None if self.counted is None else cost_of(*self.counted)
+        return self.affordable and comparison_pays(self.n, n_supports, n_interface, n_modes, cost)
 
     def apply_K(self, X: Array) -> Array:
         """K X."""
@@ -500,6 +502,7 @@ class CarryingOperators(TiedOperators):
         self.n_local = own.size
         self.own_rows, self.carried, self.bare = own, carried, self.parent.part(own)
         self.own, self.fixed = np.full(own.size, -1), self.bare.fixed
+        self.counted = None
 
     def largest(self) -> float:
         """Estimate of the largest eigenvalue from the diagonals, without what is carried."""
