@@ -63,6 +63,8 @@ class PETScOperators:
         SolverError: if an entry is not finite.
     """
 
+    counted: tuple[float, float] | None = None  # flops and entries of the last factor
+
     def __init__(
         self,
         K: PETSc.Mat,
@@ -76,7 +78,6 @@ class PETScOperators:
     ):
         self.K, self.M, self.rigid, self.T, self.parent = K, M, rigid, T, parent
         self.solver, self.affordable = solver, not solver.iterative
-        self.counted: tuple[float, float] | None = None  # flops and entries of the last factor
         self.comm = K.comm.tompi4py()
         self.n = K.getSize()[0]
         self.first, end = K.getOwnershipRange()
@@ -502,7 +503,6 @@ class CarryingOperators(TiedOperators):
         self.n_local = own.size
         self.own_rows, self.carried, self.bare = own, carried, self.parent.part(own)
         self.own, self.fixed = np.full(own.size, -1), self.bare.fixed
-        self.counted = None
 
     def largest(self) -> float:
         """Estimate of the largest eigenvalue from the diagonals, without what is carried."""
