@@ -12,6 +12,7 @@ packages="python3-dolfinx python3-petsc4py python3-slepc4py python3-gmsh python3
 # a program that tests compare with, and a browser that opens reports; where they cannot be had,
 # those tests are skipped
 optional="calculix-ccx chromium"
+peer="pyuff==2.5.8" # reads and writes universal files
 
 fail() {
   echo "setup: $1" >&2
@@ -69,6 +70,8 @@ environment() { # folder, options of venv, what pip installs
   folder="$1"
   shift 2
   "$folder/bin/python" -m pip install -q --no-compile --disable-pip-version-check "$@"
+  "$folder/bin/python" -m pip install -q --no-compile --disable-pip-version-check --no-deps \
+    "$peer" 2>/dev/null || echo "setup: not installed: $peer; a test is skipped" >&2
   echo "$wanted" >"$folder/.stamp"
 }
 

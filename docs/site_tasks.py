@@ -17,7 +17,8 @@ TASKS: dict[str, tuple[str, str]] = {
     ),
     "Parameters": (
         "One reduction for a range of moduli, densities and thicknesses.",
-        """reduce_parametric parametric.Parameter YoungsModulus Density Thickness BodyFamily""",
+        """reduce_parametric parametric.Parameter YoungsModulus Density Thickness BodyFamily
+        parametric.FamilyAssembly""",
     ),
     "Update": (
         "A family of bodies corrected by measured responses, and what the data can say.",
@@ -26,7 +27,7 @@ TASKS: dict[str, tuple[str, str]] = {
         updating.candidates updating.independent updating.tracker updating.Tracker
         updating.Sensors updating.Track updating.Observer io.write_observer_fmu
         updating.parameter_tracker updating.ParameterTracker updating.Drift updating.compare
-        updating.Comparison""",
+        updating.Comparison updating.JointSpring""",
     ),
     "Check": (
         "What tells how far to trust a model, a body, a motion or a law.",
@@ -35,7 +36,8 @@ TASKS: dict[str, tuple[str, str]] = {
     "Assemble": (
         "Bodies put together before any motion.",
         """Assembly assembly.CondensedAssembly substructure FreeSubstructure
-        assembly.free_substructure DualAssembly reduce_pieces Pieces""",
+        assembly.free_substructure DualAssembly reduce_pieces Pieces
+        certify_pieces""",
     ),
     "Wheels": (
         "Equal sectors, at rest and in rotation, with blades that are alike or not.",

@@ -26,7 +26,7 @@ from rom.assembly.pieces import Pieces as Pieces
 from rom.body.damping import ModalDamping as ModalDamping
 from rom.body.damping import Rayleigh as Rayleigh
 from rom.body.flexible import FlexibleBody as FlexibleBody
-from rom.body.nonlinear.geometric import Geometric as Geometric
+from rom.body.nonlinear.ranges import Geometric as Geometric
 from rom.body.spread import SpreadLoad as SpreadLoad
 from rom.body.spread import mass_load as mass_load
 from rom.body.spread import surface_load as surface_load
@@ -144,6 +144,7 @@ from rom.reduction.interfaces.polynomial import FourierLegendre as FourierLegend
 from rom.reduction.interfaces.polynomial import Polynomial as Polynomial
 from rom.reduction.interfaces.snapshots import Snapshots as Snapshots
 from rom.report.html import write_report as write_report
+from rom.report.pieces import certify_pieces as certify_pieces
 from rom.updating.estimate import update as update
 from rom.view.scenes.animation_files import write_animation as write_animation
 from rom.workflow import mass_properties as mass_properties

@@ -12,6 +12,8 @@ ROWS = (  # old package, new package, modules; old=new where the name differs
     ("rom", "rom.bench", "bench_loops=loops bench_models=models bench_wheel=wheel peers"),
     ("rom", "rom.checks", "certificate"),
     ("rom", "rom.eigen", "attachment=attachments scipy_operators=scipy"),
+    ("rom.fe", "rom.eigen", "lanczos"),
+    ("rom.fe.operators", "rom.eigen", "lanczos"),
     ("rom", "rom.parametric", "parameters"),
     ("rom", "rom.process", "child interruption launcher memory"),
     ("rom.body", "rom.assembly", "assembly condensed coupling"),
@@ -45,7 +47,7 @@ ROWS = (  # old package, new package, modules; old=new where the name differs
     ("rom.fe", "rom.fe.mesh.sources",
      "abaqus builder deck gmsh_groups gmsh_session nastran readers step"),
     ("rom.fe", "rom.fe.operators",
-     "aij counting factor held iterative krylov_schur lanczos memory petsc solver spectrum "
+     "aij counting factor held iterative krylov_schur memory petsc solver spectrum "
      "tied=petsc"),
     ("rom.fe.operators", "rom.fe.operators", "tied=petsc"),
     ("rom.io", "rom.io.fields", "gltf universal vtkhdf vtu"),

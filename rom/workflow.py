@@ -11,13 +11,15 @@ import numpy as np
 
 from rom.arguments import typed, whole
 from rom.assembly.dual import FreeSubstructure, free_substructure, with_certificate
-from rom.assembly.pieces import Pieces, Tree
+from rom.assembly.pieces import Pieces, Tree, together
 from rom.body.correction import residual_motion
 from rom.body.damping import ModalDamping, Rayleigh, damped
 from rom.body.flexible import FlexibleBody
 from rom.body.frame import at_large_deflection
 from rom.body.nonlinear.cauchy import refuse_many
-from rom.body.nonlinear.geometric import Geometric, enriched
+from rom.body.nonlinear.geometric import enriched
+from rom.body.nonlinear.ranges import Geometric
+from rom.body.nonlinear.sampled import sampled_energy
 from rom.body.prestress import UnitLoads
 from rom.body.projection import (
     canonical_columns,
@@ -315,7 +317,8 @@ def reduce_pieces(
         method: how to reduce each of them.
         interfaces: {name: kind}; "rbe3" for all that are not named.
         nonlinear: the loads of the whole under which it is to deflect far; each piece is made for
-            those that reach its sections.
+            those that reach its sections. Pieces that repeat each other are reduced once, for the
+            largest loads of any of them.
         damping: structural damping of each.
         certify: compare each piece with its full model.
 
@@ -333,13 +336,20 @@ def reduce_pieces(
     ranges = dict.fromkeys(models) if nonlinear is None else tree.ranges(nonlinear, models)
     kinds, bodies = interfaces or {}, dict[str, FlexibleBody]()
     tree.refuse_unknown(kinds, models)
+    repeated = tree.repeated(models, kinds)
     for name, seen_from in tree.reference.items():
+        if name in repeated:
+            continue
+        copies = [(ranges[key], one) for key, one in repeated.items() if one.of == name]
         bodies[name] = reduce(
-            models[name], method=method, reference=seen_from, nonlinear=ranges[name],
+            models[name], method=method, reference=seen_from,
+            nonlinear=together(ranges[name], copies),
             interfaces={key: kinds.get(key, "rbe3") for key in models[name].interfaces},
             damping=damping, name=name, certify=certify,
         )  # fmt: skip
-    return Pieces({name: bodies[name] for name in models}, tree.joints)
+    bodies |= {key: one.named_as(bodies[one.of], key) for key, one in repeated.items()}
+    places = {key: one.shift for key, one in repeated.items()}
+    return Pieces({name: bodies[name] for name in models}, tree.joints, places)
 
 
 def _reduced_body(  # noqa: PLR0913  those of `reduce`
@@ -375,6 +385,11 @@ def _reduced_body(  # noqa: PLR0913  those of `reduce`
         if nonlinear is not None:
             watch.begin("derivatives of shapes")
             basis = enriched(nonlinear, model, ops, connection, basis, reference)
+            if stress and nonlinear.sampling is not None:
+                raise ConfigError(
+                    "stress and sampling do not go together: most elements are left out.",
+                    hint="Leave stress out, or sampling for St. Venant-Kirchhoff material.",
+                )
             if stress:
                 refuse_many(stressed_nodes(model).size, basis.Psi.shape[1] - 6)
         watch.begin("energies")
@@ -399,7 +414,11 @@ def _reduced_body(  # noqa: PLR0913  those of `reduce`
     else:
         E = canonical_columns(bare, Psi @ elastic.V, model)
         body, E = at_large_deflection(body, reference, E, model, bare)
-        if stress:
+        if nonlinear.sampling is not None:
+            energy, training = sampled_energy(body, nonlinear, model.stresses.large_strain(), E)
+            body = replace(body, quartic=energy)
+            body.provenance["sampling"] = training
+        elif stress:
             body = replace(body, stress=cauchy_recovery(model, E))
     if damping is not None:
         body = damped(body, damping)
@@ -413,7 +432,7 @@ def _reduced_body(  # noqa: PLR0913  those of `reduce`
         connection, ops, body, basis, elastic, everywhere=certify == "full"
     )
     if nonlinear is not None and E is not None:
-        rows, deflections = deflection_rows(nonlinear, model, connection, body, E)
+        rows, deflections = deflection_rows(nonlinear, model, ops, connection, body, E)
         certificate = replace(certificate, rows=(*certificate.rows, *rows))
         body.provenance["large deflection"] = deflections
     return replace(

@@ -111,6 +111,21 @@ class Assembly:
     def _found(self) -> dict[Any, tuple[Array, Array]]:
         return {}
 
+    def conditions(self, fixed: tuple[Place, ...] = ()) -> Array:
+        """(c, 6 n_b + r) what is zero: gaps of coupled interfaces, coordinates of held ones [m, 1].
+
+        Columns are the rigid and elastic coordinates of one body after another.
+
+        Args:
+            fixed: (body, interface) pairs that are held.
+
+        Raises:
+            ConfigError, InterfaceError: if a body or an interface is unknown.
+        """
+        held = [((place, self._marker(place).hold, 1.0),) for place in fixed]
+        n = sum(self._widths().values())
+        return np.vstack([np.zeros((0, n)), *map(self._placed, [*self._coupled, *held])])
+
     def reduced(
         self, n_interface: int, *, level: str = "system", fixed: tuple[Place, ...] = ()
     ) -> CondensedAssembly:
@@ -167,7 +182,7 @@ class Assembly:
             return []
         V = self._natural(())[1][:, self._n_rigid(()) :][:, :N_COMPARED]
         sides = [np.abs(self._placed(term[:1]) @ V).max() for term in self._coupled]
-        gap = np.abs(self._rows(()) @ V).max()
+        gap = np.abs(self.conditions(()) @ V).max()
         return [row("gap of coupled interfaces, over their motion", gap / max(sides), GAP_RTOL)]
 
     def _traces(self, n: int, fixed: tuple[Place, ...]) -> list[list[Array]]:
@@ -252,13 +267,7 @@ class Assembly:
             [np.r_[np.ones(3), np.full(3, 1 / size), np.ones(b.n_modes)]
              for b in self.bodies.values()]
         )  # fmt: skip
-        return scale[:, None] * supported(self._rows(fixed) * scale)
-
-    def _rows(self, fixed: tuple[Place, ...]) -> Array:
-        """(c, n) what is zero: differences of coupled interfaces, coordinates of held ones."""
-        held = [((place, self._marker(place).hold, 1.0),) for place in fixed]
-        n = sum(self._widths().values())
-        return np.vstack([np.zeros((0, n)), *map(self._placed, [*self._coupled, *held])])
+        return scale[:, None] * supported(self.conditions(fixed) * scale)
 
     def _placed(self, term: tuple[tuple[Place, Array, float], ...]) -> Array:
         """(c, n) sum of rows, each at the columns of its body."""

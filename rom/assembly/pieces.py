@@ -9,17 +9,20 @@ of the whole, moved to its far section, and turned, because its frame turns::
 """
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
-from rom.arguments import typed
+from rom import rotation
+from rom.arguments import start_pose, typed
 from rom.body.flexible import FlexibleBody
-from rom.body.nonlinear.geometric import Geometric
+from rom.body.nonlinear.ranges import Geometric
 from rom.errors import ConfigError, InterfaceError, ModelError
-from rom.model import Array, FEModel, Mask
+from rom.model import Array, FEModel, Mask, Report
 from rom.names import check_name, named, offered
+
+SAME_RTOL = 1e-9  # of places and matrices of pieces that repeat each other
 
 
 @typed
@@ -28,12 +31,16 @@ class Pieces:
     """Reduced bodies that are one body, for a mechanism.
 
     Attributes:
-        bodies: by name of the piece; all in the coordinates of the whole.
+        bodies: by name of the piece.
         joints: {interface: the two pieces that meet there}.
+        places: {piece: (3,) its origin in the coordinates of the whole [m]}, zero if missing.
+        certificate: evidence that together they stand for the whole, see `rom.certify_pieces`.
     """
 
     bodies: dict[str, FlexibleBody]
     joints: dict[str, tuple[str, str]]
+    places: dict[str, Array] = field(default_factory=dict)
+    certificate: Report | None = None
 
     def __repr__(self) -> str:
         n = sum(body.n_modes for body in self.bodies.values())
@@ -80,12 +87,80 @@ class Pieces:
                 "belong to each piece.",
                 hint="Add the bodies one by one.",
             )
-        parts = {key: mech.add_flexible(f"{name} {key}", body, **pose)
+        parts = {key: mech.add_flexible(f"{name} {key}", body, **self._pose_of(key, **pose))
                  for key, body in self.bodies.items()}  # fmt: skip
         for joint, (one, other) in self.joints.items():
             mech.fixed(f"{name} {joint}", parts[one].marker(joint), parts[other].marker(joint))
         return {interface: parts[key].marker(interface) for key, body in self.bodies.items()
                 for interface in body.markers if interface not in self.joints}  # fmt: skip
+
+    def _pose_of(self, key: str, **pose: Any) -> dict[str, Any]:
+        """The pose of one piece where the whole has another."""
+        place = self.places.get(key, np.zeros(3))
+        if not np.any(place):
+            return pose
+        at, p, velocity, omega = start_pose(
+            *(pose.get(of, default) for of, default in (
+                ("at", (0.0, 0.0, 0.0)), ("orientation", None), ("velocity", None), ("omega", None)
+            ))
+        )  # fmt: skip
+        A = rotation.matrix(p)
+        return {"at": at + A @ place, "orientation": p, "omega": omega,
+                "velocity": velocity + A @ np.cross(omega, place)}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Repeated:
+    """A piece that is another one elsewhere.
+
+    Attributes:
+        of: name of the other one.
+        shift: (3,) from its place to this one [m].
+        interfaces: {interface: that of the other one}.
+    """
+
+    of: str
+    shift: Array
+    interfaces: dict[str, str]
+
+    @classmethod
+    def found(
+        cls, key: str, others: Iterable[str], models: Mapping[str, FEModel], tree: "Tree"
+    ) -> "Repeated | None":
+        """The first of the pieces before it that a piece repeats in nodes and matrices."""
+        model, seen = models[key], tree.reference
+        for name in others:
+            if name == key:
+                return None
+            other = models[name]
+            if other.points.shape != model.points.shape or model.attachments or other.attachments:
+                continue
+            shift = (model.points - other.points).mean(axis=0)
+            gaps = np.abs(model.points - other.points - shift).max()
+            same = {one.name: two.name for one in model.interfaces.values()
+                    for two in other.interfaces.values()
+                    if np.array_equal(one.nodes, two.nodes)}  # fmt: skip
+            paired = len(same) == len(model.interfaces) == len(other.interfaces)
+            if gaps > SAME_RTOL * np.ptp(model.points) or not paired:
+                continue
+            if same[seen[key]] == seen[name] and _equal(model.K, other.K):
+                if _equal(model.M, other.M):
+                    return cls(name, shift, same)
+        return None
+
+    def named_as(self, body: FlexibleBody, key: str) -> FlexibleBody:
+        """The other body under the names of this piece."""
+        markers = {name: replace(body.markers[old], name=name)
+                   for name, old in self.interfaces.items()}  # fmt: skip
+        own = {old: name for name, old in self.interfaces.items()}
+        return replace(body, name=key, markers=markers, reference=own[body.reference])
+
+
+def _equal(A: Any, B: Any) -> bool:
+    """Whether two sparse matrices of one process are the same but for round-off."""
+    if not (hasattr(A, "tocsr") and hasattr(B, "tocsr")):
+        return False
+    return bool(abs(A - B).max() <= SAME_RTOL * abs(A).max())
 
 
 @dataclass(frozen=True)
@@ -182,7 +257,8 @@ class Tree:
             models: the pieces.
 
         Raises:
-            ConfigError: for supports beside the reference, with which they depend on stiffness.
+            ConfigError: for supports beside the reference, with which they depend on stiffness, and
+                for centrifugal force.
             InterfaceError: for loads on an interface that no piece has, or on a joint.
         """
         if geometric.fixed:
@@ -190,6 +266,12 @@ class Tree:
                 f"fixed = {geometric.fixed!r}: with supports beside the reference, which loads "
                 "reach a piece depends on their stiffness.",
                 hint="Name as loads what the supports bear at most, and leave fixed out.",
+            )
+        if np.any(geometric.spin):
+            raise ConfigError(
+                f"spin = {geometric.spin!r}: which centrifugal force pulls at the sections of "
+                "pieces is not known.",
+                hint="Name that force as a load of the interface farthest out.",
             )
         owner = {interface: key for key, model in models.items() for interface in model.interfaces
                  if interface not in self.joints}  # fmt: skip
@@ -214,6 +296,31 @@ class Tree:
                    for name, six in of.items() if six.any()}  # fmt: skip
             found[key] = replace(geometric, loads=own) if own else None
         return found
+
+    def repeated(
+        self, models: Mapping[str, FEModel], kinds: Mapping[str, Any]
+    ) -> dict[str, Repeated]:
+        """{piece: the one that it repeats} for those that repeat another, interfaces alike."""
+        found = dict[str, Repeated]()
+        for key in self.reference:
+            one = Repeated.found(key, [k for k in self.reference if k not in found], models, self)
+            if one and all(kinds.get(a, "rbe3") == kinds.get(b, "rbe3")
+                           for a, b in one.interfaces.items()):  # fmt: skip
+                found[key] = one
+        return found
+
+
+def together(
+    own: Geometric | None, copies: Iterable[tuple[Geometric | None, Repeated]]
+) -> Geometric | None:
+    """The largest loads of a piece and of those that repeat it, None for none."""
+    loads = {} if own is None else dict(own.loads)
+    for range_, one in copies:
+        for name, six in ({} if range_ is None else range_.loads).items():
+            at = one.interfaces[name]
+            loads[at] = np.maximum(six, loads.get(at, 0.0))
+            own = own or range_
+    return None if own is None else replace(own, loads=loads)
 
 
 def _moved(load: Array, arm: Array) -> Array:

@@ -9,10 +9,11 @@ import numpy as np
 
 from rom.body.nonlinear.cauchy import CauchyRecovery
 from rom.body.nonlinear.quartic import Quartic
+from rom.body.nonlinear.sampled import Sampled
 from rom.body.records import Body, BodyData, Marker, Patch
-from rom.body.recovery import N_FRAME_LOADS, StressRecovery
-from rom.body.stiffening import ANGULAR_LOADS, CENTRIFUGAL_LOADS, ELASTIC_LOAD, LINEAR_LOADS
-from rom.errors import ModelError
+from rom.body.recovery import CENTRIFUGAL_LOADS, N_FRAME_LOADS, StressRecovery
+from rom.body.stiffening import ANGULAR_LOADS, ELASTIC_LOAD, LINEAR_LOADS
+from rom.errors import ConfigError, ModelError
 from rom.model import Array
 from rom.units import UnitSystem, unit_system
 
@@ -95,7 +96,12 @@ def converted(body: Body, units: str) -> Body:
     )
 
 
-def _quartic(old: Quartic, f: Factors) -> Quartic:
+def _quartic(old: Quartic | Sampled, f: Factors) -> Quartic:
+    if isinstance(old, Sampled):
+        raise ConfigError(
+            "a body of sampled elements has one unit system, that of its model.",
+            hint="Give the model its numbers in the units that you want.",
+        )
     energy, q = f.force * f.length, f.length / f.shape
     return Quartic(
         old.K * (energy / q**2), old.cubic * (energy / q**3), old.quartic * (energy / q**4)

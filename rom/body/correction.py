@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from rom.body.prestress import centrifugal
+from rom.body.recovery import centrifugal
 from rom.eigen.verbs import Operators
 from rom.model import Array, Basis
 

@@ -6,14 +6,15 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.linalg import eigh, null_space
+from scipy.linalg import eigh
 
 from rom.arguments import finite, typed, whole
 from rom.body.conversion import converted
 from rom.body.frame import on_mean_axes, seen_from
 from rom.body.nonlinear.quartic import Quartic
+from rom.body.nonlinear.sampled import Sampled
 from rom.body.nonlinear.statics import critical_shares, follow
-from rom.body.records import BodyData, Marker, Patch, Surface
+from rom.body.records import BodyData, Marker, Patch, Surface, still_motions
 from rom.body.reference import marker_motion, rigid_elastic, rigid_mass
 from rom.body.rotating import rotating_frequencies
 from rom.body.stiffening import SecondOrder
@@ -297,7 +298,7 @@ class FlexibleBody(BodyData):
         """
         return critical_shares(self.energy(), self.forces_on(loads), self.mean_rows(fixed))
 
-    def energy(self) -> Quartic:
+    def energy(self) -> Quartic | Sampled:
         """Strain energy at large deflection.
 
         Raises:
@@ -328,9 +329,7 @@ class FlexibleBody(BodyData):
         scale = np.r_[np.ones(3), np.full(3, 1 / size), np.ones(self.n_modes)]
         if not fixed:
             return np.diag(scale)
-        H = self.held_rows(fixed) * scale
-        H = H / np.maximum(np.linalg.norm(H, axis=1, keepdims=True), 1e-300)
-        return scale[:, None] * null_space(H, rcond=1e-10)
+        return scale[:, None] * still_motions(self.held_rows(fixed) * scale)
 
     def _on_springs(self, springs: Springs | None) -> list[tuple[Array, Array]]:
         """Motions (6, 6 + r) of interfaces, and stiffness (6, 6) to the ground there."""

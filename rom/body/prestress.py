@@ -14,8 +14,8 @@ import numpy as np
 from scipy.linalg import qr
 
 from rom.body.records import Marker
-from rom.body.recovery import PRODUCTS
-from rom.body.stiffening import CENTRIFUGAL_LOADS, elastic_loads, interface_loads
+from rom.body.recovery import CENTRIFUGAL_LOADS, centrifugal
+from rom.body.stiffening import elastic_loads, interface_loads
 from rom.eigen.attachments import carried_displacements
 from rom.eigen.verbs import Operators, dofs_of, mean_motion, rigid_motions
 from rom.errors import ConfigError
@@ -157,18 +157,6 @@ class UnitLoads:
 
     def _rotation(self, interface: Interface, E: Array) -> Array:
         return mean_motion(interface)[3:] @ self.mesh.rows(E, interface.dofs)
-
-
-def centrifugal(points: Array) -> Array:
-    """(3 p, 6) centrifugal acceleration of points per product of angular velocities."""
-    out = np.zeros((points.shape[0], 3, 6))
-    for k, (i, j) in enumerate(PRODUCTS):
-        if i == j:
-            out[:, :, k] = points
-            out[:, i, k] = 0.0
-        else:
-            out[:, i, k], out[:, j, k] = -points[:, j], -points[:, i]
-    return out.reshape(-1, 6)
 
 
 def _turning(moment: Array, theta: Array) -> Array:

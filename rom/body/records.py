@@ -5,15 +5,30 @@ from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
 import numpy as np
+from scipy.linalg import null_space
 
 from rom.arguments import finite, typed
 from rom.body.nonlinear.cauchy import CauchyRecovery
 from rom.body.nonlinear.quartic import Quartic
+from rom.body.nonlinear.sampled import Sampled
 from rom.body.recovery import StressRecovery
 from rom.eigen.supports import DIRECTIONS, Fixed, held_coordinates, supports
 from rom.errors import InterfaceError, ModelError
 from rom.model import Array, Index, Report
 from rom.names import check_text, named, offered
+
+REPEATED_ROW_RTOL = 1e-7  # singular value of rows that repeat others; modes are as accurate as 1e-8
+
+
+def still_motions(H: Array) -> Array:
+    """(6 + r, m) basis of the motions that leave H (h, 6 + r) at rest.
+
+    A row that repeats others counts once. Modes that do not twist a body turn its ends by their own
+    error all the same, so that a twist held twice repeats itself to that error only.
+    """
+    return null_space(
+        H / np.maximum(np.linalg.norm(H, axis=1, keepdims=True), 1e-300), rcond=REPEATED_ROW_RTOL
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,7 +111,7 @@ class BodyData:
     labels: tuple[str, ...]
     reference: str = "mean-axis"
     K_geo: dict[str, Array] = field(default_factory=dict)
-    quartic: Quartic | None = None
+    quartic: Quartic | Sampled | None = None
     surface: Surface | None = None
     stress: StressRecovery | CauchyRecovery | None = None
     units: str = "SI"

@@ -8,6 +8,11 @@ from rom.errors import ConfigError
 from rom.model import Array
 
 PRODUCTS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))  # of two angular velocities
+AXIS_NAMES = "xyz"
+CENTRIFUGAL_LOADS = tuple(
+    f"omega_{AXIS_NAMES[i]}^2" if i == j else f"omega_{AXIS_NAMES[i]} omega_{AXIS_NAMES[j]}"
+    for i, j in PRODUCTS
+)
 N_FRAME_LOADS = 12  # acceleration, angular acceleration, products of angular velocities
 
 
@@ -103,3 +108,15 @@ def von_mises(stress: Array) -> Array:
     xx, yy, zz, yz, xz, xy = stress.T
     normal = (xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2
     return np.sqrt(0.5 * normal + 3 * (yz**2 + xz**2 + xy**2))
+
+
+def centrifugal(points: Array) -> Array:
+    """(3 p, 6) centrifugal acceleration of points per product of angular velocities."""
+    out = np.zeros((points.shape[0], 3, 6))
+    for k, (i, j) in enumerate(PRODUCTS):
+        if i == j:
+            out[:, :, k] = points
+            out[:, i, k] = 0.0
+        else:
+            out[:, i, k], out[:, j, k] = -points[:, j], -points[:, i]
+    return out.reshape(-1, 6)

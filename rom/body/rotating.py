@@ -6,7 +6,7 @@ from scipy.linalg import eigvals, null_space
 
 from rom.arguments import finite, unit_vector
 from rom.body.frame import seen_from
-from rom.body.records import BodyData
+from rom.body.records import REPEATED_ROW_RTOL, BodyData
 from rom.body.stiffening import SecondOrder
 from rom.eigen.supports import Fixed, held_coordinates, supports
 from rom.errors import ConfigError, ModelError, warn
@@ -53,7 +53,7 @@ def rotating_frequencies(
     seen = seen_from(body, first)  # in its frame the first support is at rest
     held = {name: _rows(seen, name, directions) for name, directions in others}
     H = np.vstack([_held(seen, rows) for rows in (seen.marker(first).hold, *held.values())])
-    N = null_space(H, rcond=1e-10) if H.size else np.eye(seen.n_modes)
+    N = null_space(H, rcond=REPEATED_ROW_RTOL) if H.size else np.eye(seen.n_modes)
     K, G = rotating_matrices(seen, w, arm, held)
     M, K, G = (N.T @ A @ N for A in (seen.M, K, G))
     return _frequencies(M, K, G, f"body {body.name!r} at {speed:g} rad/s")

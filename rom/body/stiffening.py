@@ -29,17 +29,12 @@ from typing import Any
 import numpy as np
 
 from rom.body.records import BodyData, Marker
-from rom.body.recovery import PRODUCTS
+from rom.body.recovery import AXIS_NAMES, CENTRIFUGAL_LOADS, PRODUCTS
 from rom.body.reference import moved_integrals, moved_marker, reference_motion, skew_tensor
 from rom.errors import ConfigError
 from rom.model import Array
 
-AXIS_NAMES = "xyz"
 ROUND_OFF = 1e-11  # of the largest displacement of second order
-CENTRIFUGAL_LOADS = tuple(
-    f"omega_{AXIS_NAMES[i]}^2" if i == j else f"omega_{AXIS_NAMES[i]} omega_{AXIS_NAMES[j]}"
-    for i, j in PRODUCTS
-)
 ANGULAR_LOADS = tuple(f"domega_{axis}" for axis in AXIS_NAMES)
 LINEAR_LOADS = tuple(f"a_{axis}" for axis in AXIS_NAMES)
 ELASTIC_LOAD = "ddq_"  # before the number of the coordinate

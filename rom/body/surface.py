@@ -45,7 +45,9 @@ def chosen_triangles(body: BodyData, where: Where) -> tuple[Index, Array]:
     return chosen, 0.5 * np.cross(b - a, c - a)
 
 
-def strain_rows(body: BodyData, points: Any, directions: Any, what: str) -> Array:
+def strain_rows(
+    body: BodyData, points: Any, directions: Any, what: str, numbers: Any = None
+) -> Array:
     """(k, r) normal strain along directions in the surface per elastic coordinate [1/m].
 
     It is constant in the triangle in which the point lies, as under a gauge of its size.
@@ -55,6 +57,7 @@ def strain_rows(body: BodyData, points: Any, directions: Any, what: str) -> Arra
         points: (k, 3) places of gauges [m].
         directions: (k, 3) their axes, of any length [1].
         what: they are, for messages.
+        numbers: (k,) of them, for messages; None for those from zero on.
 
     Raises:
         ConfigError: if a gauge is off the surface, or stands up from it.
@@ -66,7 +69,8 @@ def strain_rows(body: BodyData, points: Any, directions: Any, what: str) -> Arra
     normals = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
     reach = GAUGE_RTOL * float(np.ptp(surface.points, axis=0).max())
     found = []
-    for k, (x, d) in enumerate(zip(np.asarray(points), np.asarray(directions), strict=True)):
+    numbers = range(len(points)) if numbers is None else numbers
+    for k, x, d in zip(numbers, np.asarray(points), np.asarray(directions), strict=True):
         d = d / np.linalg.norm(d)
         lies = np.flatnonzero(np.abs(normals @ d) <= MAX_TILT)
         far = _distances(x, corners[lies])

@@ -11,13 +11,13 @@ from typing import Any
 
 import numpy as np
 from scipy.linalg import eigh
-from scipy.sparse import bmat, csc_matrix, csr_matrix, identity, vstack
+from scipy.sparse import bmat, csc_matrix, csr_matrix, identity, lil_matrix, vstack
 from scipy.sparse.linalg import LinearOperator, eigsh, splu
 
 from rom.body.flexible import FlexibleBody
-from rom.body.nonlinear.geometric import FORCES, Geometric, held_motions
+from rom.body.nonlinear.ranges import Geometric, Load, held_motions, nodal_forces
 from rom.body.nonlinear.statics import follow, free_motions
-from rom.eigen.verbs import mean_motion
+from rom.eigen.verbs import Operators, mean_motion
 from rom.model import Array, FEModel, Row
 from rom.rows import row
 
@@ -32,8 +32,9 @@ MIN_LOAD_STEP = 2.0**-8  # at which a path of the full model is given up
 
 
 def deflection_rows(
-    geometric: Geometric, model: FEModel, connection: Any, body: FlexibleBody, E: Array
-) -> tuple[list[Row], dict[str, Any]]:
+    geometric: Geometric, model: FEModel, ops: Operators, connection: Any, body: FlexibleBody,
+    E: Array,
+) -> tuple[list[Row], dict[str, Any]]:  # fmt: skip
     """Rows of the certificate, and a table {load case: its loads, errors and how far it holds}.
 
     The table has for each case "case", the share of each component of the range; "share" of the
@@ -43,18 +44,23 @@ def deflection_rows(
     Args:
         geometric: the range of loads.
         model: the full model.
+        ops: its operators in nodal dofs, with all it carries.
         connection: the same in interface coordinates, so that like is compared with like.
         body: the reduced body, seen from its reference interface.
         E: (n_local, r) its nodal shapes.
     """
-    full = HeldSolid(model, connection, body.reference, held_motions(geometric, model.interfaces))
+    full = HeldSolid.of(
+        model, connection, body.reference, held_motions(geometric, model.interfaces),
+        neo_hookean=geometric.sampling is not None,
+    )  # fmt: skip
     quartic, still = body.energy(), body.mean_rows(geometric.fixed)
     tangent = Tangent(body, still)
     E = full.whole(E)
-    units = [nodal_load(model, *component) for component in geometric.components()]
+    about = geometric.axis_point(model, body.reference)
+    units = full.whole(nodal_forces(geometric.components(), model, ops, about))
     rows, table = list[Row](), dict[str, Any]()
     for name, case in load_cases(geometric).items():
-        W = case @ np.array(units)
+        W = units @ case
         path = follow(quartic, np.outer(STEP_SHARES, W @ E), still)
         steps = []
         for share, q in zip(STEP_SHARES, path, strict=True):
@@ -62,7 +68,7 @@ def deflection_rows(
             if step is None:
                 break
             steps.append(step)
-        rows += _rows(name, steps)
+        rows += case_rows(name, steps)
         held = len(list(takewhile(_holds, steps)))
         table[name] = {
             "case": case.tolist(),
@@ -103,7 +109,7 @@ def _holds(step: Step) -> bool:
     return step.displacement <= DISPLACEMENT_RTOL and step.frequencies <= TANGENT_RTOL
 
 
-def _rows(name: str, steps: list[Step]) -> list[Row]:
+def case_rows(name: str, steps: list[Step]) -> list[Row]:
     """Lines of a load case, the worst of its steps; one more where the basis locks."""
     n = len(STEP_SHARES)
     rows = [row(f"{name}: full states found, of {n}", len(steps), n - 0.5, above=True)]
@@ -128,24 +134,17 @@ def load_cases(geometric: Geometric) -> dict[str, Array]:
     """
     components = geometric.components()
     units = np.eye(len(components))
-    named = {
-        f"{name} {FORCES[k]}": unit for (name, k, _), unit in zip(components, units, strict=True)
-    }
-    cases = {f"{sign}{name}": value * unit for name, unit in named.items()
-             for sign, value in (("", 1.0), ("-", -1.0))}  # fmt: skip
-    if len(named) > 1:
-        falling = UNTRAINED_RATIO ** np.arange(len(named))
+    cases = {"-"[sign > 0 :] + load.name: sign * unit
+             for load, unit in zip(components, units, strict=True)
+             for sign in load.signs}  # fmt: skip
+    n = len(components)
+    if n > 1:
+        falling = UNTRAINED_RATIO ** np.arange(n)
         falling /= np.linalg.norm(falling)
+        signs = [(-1.0) ** k if -1 in load.signs else 1.0 for k, load in enumerate(components)]
         cases["all, the first most"] = falling
-        cases["all, the last most"] = falling[::-1] * (-1.0) ** np.arange(len(named))
+        cases["all, the last most"] = falling[::-1] * signs
     return cases
-
-
-def nodal_load(model: FEModel, name: str, component: int, largest: float) -> Array:
-    """(n,) forces of one component of the load on an interface [N]."""
-    interface, W = model.interfaces[name], np.zeros(model.n_dofs)
-    W[interface.dofs] = largest * mean_motion(interface)[component]
-    return W
 
 
 class Tangent:
@@ -169,27 +168,36 @@ class Tangent:
 
 
 class HeldSolid:
-    """The full model at finite strain, interfaces held in the mean.
+    """A full model at finite strain, motions of its interfaces held in the mean.
 
     Args:
-        model: with finite elements; every process has all of it.
-        connection: the same in interface coordinates a, u = T a.
-        reference: the interface that is held.
-        held: interface and component, 0 to 5, of the motions held beside.
+        solid: its ``force`` and ``tangent``.
+        M: (n, n) mass [kg].
+        C: (h, n) motions that are held.
+        T: (n, m) its displacements u = T a; None for the identity.
+        comm: of the processes, every one of which has all of it.
     """
 
-    def __init__(
-        self, model: FEModel, connection: Any, reference: str, held: list[tuple[str, int]]
-    ):
-        ops, root = connection.ops, [(reference, k) for k in range(6)]
-        self.solid = model.stresses.finite_strain()
-        self.comm = ops.comm
-        self.T = csr_matrix(identity(model.n_dofs) if ops.T is None else rows_of(ops.T))
-        self.M = self.T.T @ ops.gathered(model.operators.M) @ self.T
-        rows = [csr_matrix(mean_motion(model.interfaces[name])[k]) @ self.T[
-            model.interfaces[name].dofs] for name, k in (*root, *held)]  # fmt: skip
-        self.C = vstack(rows)
+    def __init__(self, solid: Any, M: Any, C: Any, T: Any = None, comm: Any = None):
+        self.solid, self.comm = solid, comm
+        self.T = csr_matrix(identity(M.shape[0]) if T is None else T)
+        self.M, self.C = self.T.T @ M @ self.T, csr_matrix(C) @ self.T
         self.inside = splu(csc_matrix(self.T.T @ self.T))
+
+    @classmethod
+    def of(
+        cls, model: FEModel, connection: Any, reference: str, held: list[Load], *,
+        neo_hookean: bool = False,
+    ) -> "HeldSolid":  # fmt: skip
+        """That of a model in interface coordinates, its reference and further motions held."""
+        ops, C = connection.ops, lil_matrix((6 + len(held), model.n_dofs))
+        for k, load in enumerate([*(Load(reference, k) for k in range(6)), *held]):
+            interface = model.interfaces[load.interface]
+            C[k, interface.dofs] = mean_motion(interface)[load.component]
+        T = None if ops.T is None else rows_of(ops.T)
+        solid = model.stresses.finite_strain(neo_hookean=neo_hookean)
+        M = ops.gathered(model.operators.M)
+        return cls(solid, M, C, T, ops.comm)
 
     def whole(self, E: Array) -> Array:
         """(n, r) all rows of shapes (n_local, r)."""

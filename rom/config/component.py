@@ -16,7 +16,7 @@ from rom.units import LENGTH, in_si, unit
 if TYPE_CHECKING:
     from rom.body.damping import ModalDamping, Rayleigh
     from rom.body.flexible import FlexibleBody
-    from rom.body.nonlinear.geometric import Geometric
+    from rom.body.nonlinear.ranges import Geometric
     from rom.model import Attachment, FEModel
 
 
@@ -150,7 +150,7 @@ class Component:
 
     def nonlinear(self) -> "Geometric | None":
         """Loads of large deflection for `rom.reduce`; None for a body of small deflection."""
-        from rom.body.nonlinear.geometric import Geometric
+        from rom.body.nonlinear.ranges import Geometric
 
         values = self.values["reduction"].get("nonlinear")
         if values is None:
@@ -160,7 +160,8 @@ class Component:
             return Geometric(
                 loads=loads, n_modes=values["modes"], tol=values["tol"],
                 n_shapes=values.get("shapes"), n_steps=values["steps"],
-                fixed=tuple(values["fixed"]),
+                fixed=tuple(values["fixed"]), spin=tuple(values["spin"]),
+                about=tuple(values["about"]) if "about" in values else None,
             )  # fmt: skip
 
     def at(self, *path: str) -> "Located":

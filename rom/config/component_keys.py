@@ -152,6 +152,9 @@ TABLE = Table("A component.", (
             Key("shapes", Whole(1), "So many shapes are added; as tol asks if missing."),
             Key("steps", Whole(1), "States on the way to the largest load.", 4),
             Key("fixed", Words(), "Held beside the reference, wholly or as `name:yz`.", ()),
+            Key("spin", Quantity("rad/s", ((3,),)), "Largest angular velocity about each axis.",
+                (0.0,) * 3),
+            Key("about", Quantity("m", ((3,),)), "A point of its axis; the reference if missing."),
         )), "Reach large deflection."),
         Key("stress", Flag(), "Make stress on the surface recoverable.", False),
         Key("certificate", Flag("full"), "Compare with the full model; full: in every support, "

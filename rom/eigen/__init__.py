@@ -2,8 +2,9 @@
 
 `verbs` are what reductions need of K and M, `scipy` does them with SciPy on one process,
 `condensed` solves in every support with one factor, `completeness` says how surely no mode was
-missed, `substructuring` finds all modes up to a frequency, on `fronts` of a tree that `dissection`
-cuts, `attachments` adds masses and springs at nodes, `supports` says what is held.
+missed, `lanczos` searches in blocks, `substructuring` finds all modes up to a frequency, on
+`fronts` of a tree that `dissection` cuts, `attachments` adds masses and springs at nodes,
+`supports` says what is held.
 """
 
 from rom.lazy import front

@@ -9,10 +9,13 @@ from scipy.linalg.lapack import dpotrf, dsysv
 from scipy.sparse import csr_matrix
 
 from rom.eigen.dissection import Substructure, dissected
-from rom.errors import InterfaceError, SolverError
+from rom.errors import InterfaceError, ResourceError, SolverError
 from rom.model import Array
+from rom.process.memory import free_bytes
 
-MAX_PART_DOFS = 600  # smaller parts cost more calls, larger ones more work on dense matrices
+MAX_PART_DOFS = 128  # smaller parts cost more calls, larger ones more work on dense matrices
+
+FRONT_COPIES = 4  # of stiffness and mass, and what they become
 
 
 class SubstructuredBody:
@@ -28,23 +31,26 @@ class SubstructuredBody:
         cutoff: largest eigenvalue of a substructure that is kept [rad^2/s^2].
 
     Attributes:
-        mass: (r, r) T^T M T [s^2/rad^2]; T^T K T is one.
+        couplings: of T^T M T [s^2/rad^2], where T^T K T is one: the rows that modes of each
+            substructure are coupled to, the last of them its own, and the values.
+        n_kept: number r of modes of all substructures.
 
     Raises:
         InterfaceError: if K is not positive definite.
+        ResourceError: if the blocks are foreseen not to fit into memory.
     """
 
     def __init__(self, K: csr_matrix, M: csr_matrix, cutoff: float):
         self.order, self.parts = dissected(csr_matrix(abs(K) + abs(M)), MAX_PART_DOFS)
+        refuse_beyond(blocks_bytes(self.parts), f"eliminating {K.shape[0]} dofs in dense blocks")
         self.K, self.M = (csr_matrix(A[self.order][:, self.order]) for A in (K, M))
         self.factors: list[Any] = []
         self.shapes: list[Array] = []
         self.static: list[Array] = []
-        self.mass = np.zeros((0, 0))
+        self.couplings: list[tuple[slice, Array]] = []
         self._transform(cutoff)
 
     def _transform(self, cutoff: float) -> None:
-        couplings: list[tuple[slice, Array]] = []
         below: dict[int, list[tuple[Substructure, int, Array]]] = {}
         stiffness, mass = Extended(self.K, self.parts), Extended(self.M, self.parts)
         n_kept = 0
@@ -61,16 +67,27 @@ class SubstructuredBody:
             own = slice(n_kept, n_kept + mu.size)
             n_kept = own.stop
             C_s = C[:, : part.size]
-            couplings.append((slice(first, n_kept), np.vstack([C_s @ Phi, np.diag(mu)])))
+            self.couplings.append((slice(first, n_kept), np.vstack([C_s @ Phi, np.diag(mu)])))
             C = np.vstack([C[:, part.size :] + C_s @ Psi, Phi.T @ (M_sb + moved)])
             below.setdefault(part.parent, []).append((part, first, C))
             self.factors.append(factor)
             self.shapes.append(Phi)
             self.static.append(Psi)
-        self.mass = np.zeros((n_kept, n_kept))
-        for rows, values in couplings:
-            own = slice(rows.stop - values.shape[1], rows.stop)
-            self.mass[rows, own], self.mass[own, rows] = values, values.T
+        self.n_kept = n_kept
+
+    @property
+    def compliance(self) -> Array:
+        """(r,) diagonal of T^T M T, 1/lambda of each mode of a substructure [s^2/rad^2]."""
+        return np.concatenate([np.diag(values[-values.shape[1] :]) for _, values in self.couplings])
+
+    def apply_mass(self, Y: Array) -> Array:
+        """T^T M T Y, (r, k) of coordinates (r, k)."""
+        MY = np.zeros(Y.shape)
+        for rows, values in self.couplings:
+            below = rows.stop - values.shape[1]
+            MY[rows] += values @ Y[below : rows.stop]
+            MY[below : rows.stop] += values[: below - rows.start].T @ Y[rows.start : below]
+        return MY
 
     def expand(self, Y: Array) -> Array:
         """T Y, (n, k) displacements of coordinates (r, k)."""
@@ -143,6 +160,30 @@ class Extended:
     def hand_on(self, k: int, values: Array) -> None:
         """Give the substructure that comes next on the boundary what is left there."""
         self.handed.setdefault(self.parts[k].parent, []).append((self.parts[k], values))
+
+
+def blocks_bytes(parts: list[Substructure]) -> float:
+    """Memory of the factor in dense blocks, and of fronts and what they hand on [bytes]."""
+    kept, waiting, most = 0, 0, 0
+    handed = [0] * (len(parts) + 1)
+    for k, part in enumerate(parts):
+        s, b = part.size, part.boundary.size
+        most = max(most, kept + 2 * waiting + FRONT_COPIES * (s + b) ** 2)
+        waiting += b**2 - handed[k]
+        handed[part.parent] += b**2
+        kept += s * (s + b)
+    return 8.0 * most
+
+
+def refuse_beyond(need: float, what: str) -> None:
+    """Raise ResourceError where something takes more memory [bytes] than there is."""
+    there = free_bytes()
+    if need > there:
+        raise ResourceError(
+            f"{what} takes {need / 2**30:.3g} GiB; {there / 2**30:.3g} GiB are free.",
+            hint="Ask for modes up to a lower frequency, or for a number of modes, which Lanczos "
+            "finds; or use a coarser mesh.",
+        )
 
 
 def _couplings(

@@ -14,19 +14,26 @@ from scipy.linalg import eigh, qr
 from scipy.sparse import csr_matrix, issparse
 
 from rom.arguments import positive
-from rom.eigen.fronts import SubstructuredBody
+from rom.eigen.fronts import SubstructuredBody, refuse_beyond
+from rom.eigen.lanczos import BlockLanczos, capacity
 from rom.eigen.scipy import RIGID_RTOL, SciPyOperators, dof_set
 from rom.eigen.verbs import canonical_signs, orthonormal
 from rom.errors import ConfigError, ModelError, ModesMissedError, ParallelError, SolverError
 from rom.model import Array, Modes
 
-CUTOFF_RATIOS = (6.0, 24.0)  # eigenvalues of substructures kept up to, over the last one sought
-COUNT_RATIOS = (1.1, 1.3)  # eigenvalues, over the last one sought, between which they are counted
-SPARE_RATIO = 1.6  # eigenvalues of substructuring up to here are taken along: they are too high
+CUTOFF_RATIOS = (9.0, 24.0)  # eigenvalues of substructures kept up to, over the last one sought
+COUNT_RATIOS = (1.05, 1.15)  # eigenvalues, over the last one sought, between which they are counted
+SPARE_RATIO = 1.5  # eigenvalues of substructuring up to here are taken along: they are too high
+COUNT_STEP = 2  # whose frequencies are near enough to choose a gap
 SHIFT_SHARE = 1e-3  # of the last eigenvalue, by which free bodies are shifted
 SHIFT_RTOL = 1e-11  # of the largest eigenvalue of the mesh: a smaller shift would be round-off
-MAX_STEPS = 4  # of inverse iteration; one or two are usual
+MAX_STEPS = 4  # of inverse iteration; two are usual, after which modes are counted
 N_COLUMNS = 256  # solved together: more take memory, fewer make products of matrices slow
+WORK_COLUMNS, WORK_MATRICES = 5, 6  # of n rows so many times N_COLUMNS, of k rows k columns
+N_ROWS = 4096  # turned together, in place
+LANCZOS_WIDTH = 24  # columns of the search among modes of substructures
+LANCZOS_RTOL = 0.02  # of its eigenvalues, whose modes are only where the iteration starts
+LOOSE_SHARE = 0.3  # of them, the last ones, that need not have converged
 ROUND_OFF = 1e-13  # of the last eigenvalue: what sums over the dofs leave uncertain
 STIFF_ROUND_OFF = 1e-15  # of the largest eigenvalue of the mesh, likewise in solutions
 
@@ -55,6 +62,7 @@ def substructured_modes(
         InterfaceError: if a body that should be held is free.
         ModelError: if a free body has other motions without stiffness.
         ModesMissedError: if the inertia count differs.
+        ResourceError: if the memory is foreseen not to suffice.
         SolverError: if the bounds stay above the tolerance.
 
     Source:
@@ -74,9 +82,13 @@ def substructured_modes(
     last = (2 * np.pi * positive("f_max", f_max)) ** 2
     for ratio in CUTOFF_RATIOS:
         search = _Search(ops, last, ratio)
-        for _ in range(MAX_STEPS):
+        for k in range(1, MAX_STEPS + 1):
             search.step()
-            if search.complete and (worst := search.bounds()[1].max(initial=0.0)) <= tol:
+            if (
+                k >= COUNT_STEP
+                and search.complete
+                and (worst := search.bounds()[1].max(initial=0.0)) <= tol
+            ):
                 return search.modes()
     if search.complete:
         raise SolverError(
@@ -118,17 +130,26 @@ class _Search:
         self.ops, self.last = ops, last
         self.shift = shift = 0.0 if ops.rigid is None else _shift(ops, last)
         limit = SPARE_RATIO * last + shift
-        none = np.zeros((ops.n, 0))
-        self.R = none if ops.rigid is None else orthonormal(ops, ops.rigid)
+        self.R = np.zeros((ops.n, 0)) if ops.rigid is None else orthonormal(ops, ops.rigid)
         self.MR = ops.M @ self.R
         K = csr_matrix(ops.K + shift * ops.M)
         self.body = SubstructuredBody(K, ops.M, cutoff_ratio * last + shift)
-        mu, Y = none[0], none[:0]
-        if self.body.mass.size:
-            interval = (1.0 / limit, np.inf)
-            mu, Y = eigh(self.body.mass, subset_by_value=interval, driver="evr")
-        self.X, self.gram = self._elastic(self.body.expand((Y / np.sqrt(mu))[:, ::-1]))
+        k = np.count_nonzero(self.body.compliance > 1.0 / limit)  # about as many as there are
+        self._refuse_beyond_memory(k)
+        Y = _kept_modes(self.body, limit, k)
+        X = np.empty((ops.n, Y.shape[1]))
+        for new in _blocks(Y.shape[1], N_COLUMNS):
+            X[:, new] = self.body.expand(Y[:, new])
+        self.X, self.gram = self._elastic(X)
         self.n_steps = 0
+
+    def _refuse_beyond_memory(self, k: int) -> None:
+        r, n = self.body.n_kept, self.ops.n
+        N = min(capacity(k), r)
+        search = 2 * r * N + 3 * N**2
+        iteration = n * (k + WORK_COLUMNS * min(N_COLUMNS, k)) + WORK_MATRICES * k**2
+        answer = 2 * n * k  # the block, and the part of it that is handed out
+        refuse_beyond(8.0 * max(search, iteration, answer), f"finding {k} modes of {n} dofs")
 
     def _elastic(self, X: Array) -> tuple[Array, Array]:
         """X without rigid motions and the columns that are nearest to them, and X^T M X."""
@@ -141,29 +162,31 @@ class _Search:
 
     def step(self) -> None:
         """Solve with the block, and take the best modes in the space of the solutions."""
-        Z, A0, A1 = self._solutions()
+        A0, A1 = self._solve()
         scale = 1.0 / np.sqrt(np.diag(A0))
         A0, A1, A2 = (A * np.outer(scale, scale) for A in (A0, A1, self.gram))
         self.theta, C = _eigh(A1, A0)
         self.residual = C.T @ A2 @ C - np.diag(self.theta**2)
-        self.X, self.gram = Z @ (scale[:, None] * C), C.T @ A0 @ C
+        self.gram, C = C.T @ A0 @ C, scale[:, None] * C
+        for rows in _blocks(self.ops.n, N_ROWS):
+            self.X[rows] = self.X[rows] @ C
         self.n_steps += 1
-        if self.n_steps == 1:
+        if self.n_steps == COUNT_STEP:
             self._count()
 
-    def _solutions(self) -> tuple[Array, Array, Array]:
-        """Z with (K + shift M) Z = M X, and its products with M and with K + shift M."""
-        n, k = self.X.shape
-        Z, A0, A1 = np.empty((n, k), order="F"), np.zeros((k, k)), np.zeros((k, k))
-        for start in range(0, k, N_COLUMNS):
-            new = slice(start, min(start + N_COLUMNS, k))
+    def _solve(self) -> tuple[Array, Array]:
+        """Put Z with (K + shift M) Z = M X in the place of X; Z^T M Z and Z^T M X."""
+        k = self.X.shape[1]
+        A0, A1 = np.zeros((k, k)), np.zeros((k, k))
+        for new in _blocks(k, N_COLUMNS):
             MX = self.ops.M @ self.X[:, new]
-            Z_new = self.body.solve(MX)
-            Z[:, new] = Z_new - self.R @ (self.MR.T @ Z_new)
-            for A, load in ((A0, self.ops.M @ Z[:, new]), (A1, MX)):
-                A[: new.stop, new] = Z[:, : new.stop].T @ load
+            Z = self.body.solve(MX)
+            Z -= self.R @ (self.MR.T @ Z)
+            self.X[:, new] = Z
+            for A, load in ((A0, self.ops.M @ Z), (A1, MX)):
+                A[: new.stop, new] = self.X[:, : new.stop].T @ load
         A0, A1 = (np.triu(A) + np.triu(A, 1).T for A in (A0, A1))
-        return Z, A0, A1
+        return A0, A1
 
     def _count(self) -> None:
         """Count the eigenvalues up to the widest gap behind the last one asked for."""
@@ -216,6 +239,46 @@ class _Search:
             )
 
 
+class _Kept:
+    """Modes of substructures as Lanczos sees them: their stiffness is one."""
+
+    def __init__(self, body: SubstructuredBody):
+        self.n = self.n_local = body.n_kept
+        self.solve = body.apply_mass
+
+    def apply_M(self, X: Array) -> Array:
+        """X."""
+        return X
+
+    def gram(self, X: Array, Y: Array) -> Array:
+        """X^T Y."""
+        return X.T @ Y
+
+
+def _kept_modes(body: SubstructuredBody, limit: float, k: int) -> Array:
+    """(r, about k) modes of all substructures together up to a limit, M-orthonormal, ascending."""
+    r = body.n_kept
+    while 2 * capacity(k) < r:
+        start = np.random.default_rng(1).normal(size=(r, LANCZOS_WIDTH))
+        kept = _Kept(body)
+        allowed = np.where(np.arange(k) < (1.0 - LOOSE_SHARE) * k, LANCZOS_RTOL, np.inf)
+        space = BlockLanczos(kept, kept, 0.0, start[:, :0], start, allowed)
+        space.solve()
+        lam, Y = space.pairs()
+        if k and lam[-1] >= limit:
+            return Y[:, lam < limit] * np.sqrt(lam[lam < limit])
+        k = 10 + 2 * k
+    if not r:
+        return np.zeros((0, 0))
+    mass = body.apply_mass(np.eye(r))
+    mu, Y = eigh(mass, subset_by_value=(1.0 / limit, np.inf), driver="evr")
+    return (Y / np.sqrt(mu))[:, ::-1]
+
+
+def _blocks(n: int, size: int) -> list[slice]:
+    return [slice(first, min(first + size, n)) for first in range(0, n, size)]
+
+
 def _shift(ops: SciPyOperators, last: float) -> float:
     return max(SHIFT_SHARE * last, SHIFT_RTOL * ops.largest())
 
@@ -231,7 +294,8 @@ def lehmann_bounds(theta: Array, residual: Array, rho: float) -> Array:
     Source:
         Lehmann, Optimale Eigenwerteinschliessungen, Numer. Math. 5 (1963) 246.
     """
-    tau = _eigh(np.diag(theta - rho), np.diag((theta - rho) ** 2) + residual)[0]
+    B = np.diag((theta - rho) ** 2) + residual
+    tau = eigh(np.diag(theta - rho), 0.5 * (B + B.T), eigvals_only=True) if theta.size else theta
     return rho + 1.0 / tau[tau < 0][::-1]
 
 

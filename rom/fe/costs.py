@@ -1,4 +1,4 @@
-"""What a factor costs by the number of dofs alone, before any matrix is there.
+"""What a factor costs, by the number of dofs before any matrix is there, by its own counts after.
 
 Powers of n fitted to what MUMPS counted for beams of quadratic tetrahedra with 10 500 to 295 000
 dofs; times are those of one thread that has a processor to itself.
@@ -51,35 +51,44 @@ def factor_cost(n: float) -> FactorCost:
         George, Nested dissection of a regular finite element mesh, SIAM J. Numer. Anal. 10 (1973)
         345, for the powers; figures measured here.
     """
-    flops, entries = (factor * n**power for factor, power in (FLOPS_LAW, ENTRIES_LAW))
+    return cost_of(*(factor * n**power for factor, power in (FLOPS_LAW, ENTRIES_LAW)))
+
+
+def cost_of(flops: float, entries: float) -> FactorCost:
+    """The cost of a factor with so many flops and entries of one triangle, of any body."""
     seconds = flops / PEAK_RATE + SECONDS_PER_ENTRY * entries
     return FactorCost(flops, entries, BYTES_PER_ENTRY * entries, seconds, PASS_SECONDS * entries)
 
 
-def reduction_seconds(n: float, n_interface: int, n_modes: int) -> float:
+def reduction_seconds(
+    n: float, n_interface: int, n_modes: int, cost: FactorCost | None = None
+) -> float:
     """Time of a reduction without certificate in one process [s].
 
     Args:
         n: number of dofs.
         n_interface: interface coordinates, each a solution.
         n_modes: fixed-interface modes.
+        cost: of the factor, where it is known; of a beam without.
     """
-    cost = factor_cost(n)
+    cost = cost or factor_cost(n)
     n_passes = n_interface / PASS_COLUMNS + PASSES_PER_MODE * n_modes
     by_dof = SEARCH_SECONDS * n_modes**2 + REST_SECONDS
     return cost.seconds + n_passes * cost.solution_seconds + by_dof * n
 
 
-def comparison_seconds(n: float, n_supports: int) -> float:
+def comparison_seconds(n: float, n_supports: int, cost: FactorCost | None = None) -> float:
     """Time of full modes in so many supports with the factor of the reduction [s]."""
-    passes = PASSES_PER_SUPPORT * factor_cost(n).solution_seconds
+    passes = PASSES_PER_SUPPORT * (cost or factor_cost(n)).solution_seconds
     return n_supports * (passes + SEARCH_SECONDS * MODES_PER_SUPPORT**2 * n)
 
 
-def comparison_pays(n: float, n_supports: int, n_interface: int, n_modes: int) -> bool:
+def comparison_pays(
+    n: float, n_supports: int, n_interface: int, n_modes: int, cost: FactorCost | None = None
+) -> bool:
     """Whether full modes in all supports cost less than the reduction did, or little."""
-    reduction = reduction_seconds(n, n_interface, n_modes)
-    return comparison_seconds(n, n_supports) <= max(reduction, LONG_COMPARISON)
+    reduction = reduction_seconds(n, n_interface, n_modes, cost)
+    return comparison_seconds(n, n_supports, cost) <= max(reduction, LONG_COMPARISON)
 
 
 def least_machines(n: float, memory: float) -> int:

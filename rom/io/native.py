@@ -16,6 +16,7 @@ from scipy.sparse import coo_matrix, csr_matrix
 from rom.body.flexible import FlexibleBody
 from rom.body.nonlinear.cauchy import CauchyRecovery
 from rom.body.nonlinear.quartic import Quartic
+from rom.body.nonlinear.sampled import Sampled
 from rom.body.records import Marker, Patch, Surface
 from rom.body.recovery import StressRecovery
 from rom.errors import ConfigError, FileFormatError, QualityGateError
@@ -101,6 +102,11 @@ def body_arrays(body: FlexibleBody) -> dict[str, Array]:
     arrays["mass"] = np.array(body.mass)
     for name, A in body.K_geo.items():
         arrays[f"K_geo/{name}"] = A
+    if isinstance(body.quartic, Sampled):
+        raise ConfigError(
+            f"body {body.name!r} has the energy of sampled elements, which no file holds.",
+            hint="Reduce it where it is used, or leave sampling out.",
+        )
     if body.quartic is not None:
         arrays |= {f"quartic/{part}": getattr(body.quartic, part) for part in QUARTIC_ARRAYS}
     for i, marker in enumerate(body.markers.values()):

@@ -31,7 +31,7 @@ from rom.mbs.elements.films import journal_bearings
 from rom.mbs.elements.gears import meshes
 from rom.mbs.elements.rolling import bearings
 from rom.mbs.elements.round_bodies import spins
-from rom.mbs.elements.solids import quartics
+from rom.mbs.elements.solids import quartics, sampled
 from rom.mbs.elements.tendons import tendons
 from rom.mbs.parts.bodies import GROUND, Marker, Part, flexible_part, ground_part, rigid_part
 from rom.mbs.parts.joints import Joint, Row, coordinate_of
@@ -59,6 +59,7 @@ FAMILIES = (
     journal_bearings.JOURNAL_BEARINGS_FAMILY,
     spins.SPINS_FAMILY,
     quartics.QUARTICS_FAMILY,
+    sampled.SAMPLES_FAMILY,
 )
 Element = TypeVar("Element")
 
@@ -424,7 +425,9 @@ class Mechanism:
         if turns is not None:
             self.add(f"spin of {part.name}", turns, spins.SPINS_FAMILY)
         if deflects is not None:
-            self.add(f"deflection of {part.name}", deflects, quartics.QUARTICS_FAMILY)
+            by_points = hasattr(deflects.energy, "gradients")
+            family = sampled.SAMPLES_FAMILY if by_points else quartics.QUARTICS_FAMILY
+            self.add(f"deflection of {part.name}", deflects, family)
         return part
 
     def check_new(self, name: str) -> None:

@@ -1,3 +1,4 @@
+from rom.parametric.assembled import FamilyAssembly as FamilyAssembly
 from rom.parametric.family import BodyFamily as BodyFamily
 from rom.parametric.parameters import Density as Density
 from rom.parametric.parameters import Parameter as Parameter

@@ -1,7 +1,8 @@
 """How this program runs as a process.
 
 `launcher` tells ranks and threads, `mpirun` starts ranks, `interruption` makes signals exceptions,
-`child` starts every other process by way of `child_entry`, `memory` says what may be taken.
+`child` starts every other process by way of `child_entry`, `memory` says what may be taken,
+`disk_watch` ends what waits for a full disk.
 Processes that would make the same file take `turns`, `patience` says how long a user waits,
 `progress` how far work is and `stopwatch` where its time goes.
 Nothing is imported here: the package comes by before the working folder is off the path of modules.

@@ -3,6 +3,7 @@ from rom.updating.comparison import compare as compare
 from rom.updating.estimate import Updated as Updated
 from rom.updating.family_model import AddedMass as AddedMass
 from rom.updating.family_model import GroundSpring as GroundSpring
+from rom.updating.family_model import JointSpring as JointSpring
 from rom.updating.measured import Channels as Channels
 from rom.updating.measured import MeasuredModes as MeasuredModes
 from rom.updating.measured import Responses as Responses

@@ -14,8 +14,8 @@ import numpy as np
 from rom.arguments import typed, whole
 from rom.errors import ConfigError
 from rom.model import Array, Index
-from rom.parametric.family import BodyFamily
 from rom.updating.estimate import Updated, update
+from rom.updating.family_model import Family
 from rom.updating.measured import Responses
 from rom.updating.normal_equations import Data, sums
 
@@ -77,7 +77,7 @@ class Comparison:
 
 @typed
 def compare(
-    family: BodyFamily,
+    family: Family,
     test: Responses,
     sets: Mapping[str, Mapping[str, Any]],
     *,

@@ -7,17 +7,26 @@ good the data are; the verdict, of responses of the model that is not condensed,
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import null_space
+from scipy.linalg import null_space, qr
 
 from rom.arguments import whole
 from rom.errors import ConfigError
-from rom.model import Array, Mask
+from rom.model import Array, Index, Mask
+from rom.names import named
 from rom.updating.family_model import FamilyModel
-from rom.updating.methods import Update, update_by_input
+from rom.updating.methods import (
+    Update,
+    blocks,
+    folded,
+    solved,
+    update_by_input,
+    weighted,
+)
 from rom.updating.models import AtSensors, Measurement, ParametricModel, modal
-from rom.updating.normal_equations import Data
+from rom.updating.normal_equations import Data, shared, through_shared
 
 SENSOR_RTOL = 1e-8  # singular value of sensors that follow others, over the largest
+ROUGH_STEP, FINE_STEP = 1.0, 1e-5  # in standard deviations: the last ones of far and near
 COLLOCATED_RTOL = 1e-8  # of the row of a sensor that measures what an input drives
 
 
@@ -45,12 +54,11 @@ class InSensors:
             ConfigError: if a sensor follows from others, or the family has too few coordinates.
         """
         S = model.seen
-        size = np.linalg.svd(S, compute_uv=False)
-        if len(S) > S.shape[1] or size[-1] <= SENSOR_RTOL * size[0]:
+        if follow := sorted(_followers(S)):
             raise ConfigError(
-                f"{len(S)} sensors measure no more than {S.shape[1]} coordinates of the family, or "
-                "some follow from others: equations at the sensors need independent ones.",
-                hint="Leave sensors out, reduce with more modes, or update by responses.",
+                f"sensors {named(follow)} of {len(S)} follow from others in a family of "
+                f"{S.shape[1]} coordinates: equations need independent ones.",
+                hint="Leave them out, reduce with more modes, or update by responses.",
             )
         return InSensors(model, x, free, np.hstack([np.linalg.pinv(S), null_space(S)]))
 
@@ -71,7 +79,14 @@ class InSensors:
 
 
 def by_equations(
-    model: FamilyModel, data: Data, x: Array, free: Mask, damping: float, rank: int | None
+    model: FamilyModel,
+    data: Data,
+    x: Array,
+    free: Mask,
+    damping: float,
+    *,
+    prior: Array,
+    rank: int | None,
 ) -> Update:
     """Logarithms of factors, and damping ratios of the modes up to the highest line.
 
@@ -83,17 +98,13 @@ def by_equations(
         x: (n_p,) logarithms of the factors to start from.
         free: (n_p,) which are sought.
         damping: ratio to start from [1].
+        prior: (n_p,) standard deviations of the logarithms about zero before the test [1].
         rank: of the basis that tests and models share; None for what the modes need.
 
     Raises:
         ConfigError: if an input has no sensor, sensors follow from others, or there are too few.
     """
-    lines = np.flatnonzero((data.weight > 0).all(axis=(1, 2)))
-    if not lines.size:
-        raise ConfigError(
-            "no line counts for all sensors and inputs.",
-            hint="Leave out the sensor of low coherence, or update by responses.",
-        )
+    lines = _whole_lines(data)
     inputs, signs = _collocated(model)
     lam = modal(model.at(x), ()).lam
     m = int(np.count_nonzero(lam[model.n_rigid :] <= data.omega[lines[-1]] ** 2))
@@ -109,7 +120,90 @@ def by_equations(
     limits = np.log(model.low[free]), np.log(model.high[free])
     small = AtSensors(InSensors.of(model, x, free))
     rank = whole("rank", min(n_s, needed) if rank is None else rank, 1, n_s, reason="sensors")
-    return update_by_input(small, test, x[free], np.full(m, damping), rank=rank, limits=limits)
+    start = x[free], np.full(m, damping)
+    return update_by_input(small, test, *start, rank=rank, limits=limits, prior=prior[free])
+
+
+def by_response_functions(
+    model: FamilyModel,
+    data: Data,
+    x: Array,
+    free: Mask,
+    damping: float,
+    *,
+    prior: Array,
+    prior_damping: tuple[int, float],
+) -> Update:
+    """Logarithms of factors, and damping ratios, by H - H_test = H dZ H_test, linear in each step.
+
+    What is not measured of H_test follows its sensors as the model at the last step says, so that
+    nothing is condensed; inputs need no sensors. Noise of H_test is in the derivatives too.
+
+    Args:
+        model: see `by_equations`.
+        data: see `by_equations`.
+        x: see `by_equations`.
+        free: see `by_equations`.
+        damping: ratio to start from [1].
+        prior: see `by_equations`.
+        prior_damping: number of ratios, of the lowest elastic modes, the last one of all others
+            too, and the standard deviation of their logarithms before the test [1].
+
+    Raises:
+        ConfigError: if sensors follow from others, or no line counts for all of them.
+
+    Source:
+        Lin and Ewins, Analytical model improvement using frequency response functions, Mech. Syst.
+        Signal Process. 8 (1994) 437.
+    """
+    lines = _whole_lines(data)
+    inside, omega = InSensors.of(model, x, free), data.omega[lines]
+    n_s, (m, spread) = len(model.seen), prior_damping
+    H, F = np.exp(data.logarithm[lines]), inside.basis.T @ model.driven.T
+    weights = 1 / np.linalg.norm(H, axis=(1, 2), keepdims=True)  # where far away: peaks first
+
+    def triangle(x: Array, ratios: Array) -> Array:
+        here = inside.at(x)
+        modes = modal(here, shared(ratios, model.n_elastic))
+        change, MPhi = through_shared(here, modes, ratios.size), here.M @ modes.Phi
+        C, R = (MPhi * modes.d) @ MPhi.T, np.zeros((0, x.size + ratios.size + 1))
+        for block in blocks(omega.size):
+            w, test = omega[block], H[block]
+            Z = here.K - w[:, None, None] ** 2 * here.M + 1j * w[:, None, None] * C
+            unseen = np.linalg.solve(Z[:, n_s:, n_s:], F[n_s:] - Z[:, n_s:, :n_s] @ test)
+            left = modes.Phi[:n_s] * modes.g(w)[:, None, :]
+            J = change(left, MPhi.T @ np.concatenate([test, unseen], axis=1), w)
+            r = test - left @ (modes.Phi.T @ F)
+            R = folded(R, np.column_stack([weighted(weights[block], A) for A in (J, r)]))
+        return R
+
+    start, limits = (
+        (x[free], np.full(m, damping)),
+        tuple(np.log((model.low[free], model.high[free]))),
+    )
+    options = 2 * H.size, limits, prior[free], (damping, spread)
+    near = solved(triangle, start, *options, enough=ROUGH_STEP)
+    weights = data.weight[lines] / np.abs(H)
+    return solved(triangle, (near.p, near.zeta), *options, enough=FINE_STEP)
+
+
+def _whole_lines(data: Data) -> Index:
+    """Numbers of the lines of which every value counts."""
+    lines = np.flatnonzero((data.weight > 0).all(axis=(1, 2)))
+    if not lines.size:
+        raise ConfigError(
+            "no line counts for all sensors and inputs.",
+            hint="Leave out the sensor of low coherence, or update by responses.",
+        )
+    return lines
+
+
+def _followers(S: Array) -> list[int]:
+    """Numbers of the rows (n_s, n) that follow from the others."""
+    R, order = qr(S.T, mode="r", pivoting=True)
+    size = np.abs(np.diag(R))
+    rank = int(np.count_nonzero(size > SENSOR_RTOL * size[0]))
+    return [int(k) for k in order[rank:]]
 
 
 def _collocated(model: FamilyModel) -> tuple[tuple[int, ...], Array]:

@@ -5,28 +5,40 @@ Source:
     posterior and score test: Cox and Hinkley, Theoretical statistics (1974).
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from rom.arguments import finite, one_of, typed, whole
+from rom.assembly.assembly import Assembly
 from rom.body.flexible import FlexibleBody
 from rom.errors import ConfigError, ParameterError, SolverError
 from rom.model import Array, Mask, Report, Row
 from rom.names import named
-from rom.parametric.family import BodyFamily
+from rom.parametric.assembled import FamilyAssembly
 from rom.plausible import check_damping_ratio
 from rom.rows import row
-from rom.updating.equations import by_equations
-from rom.updating.family_model import AddedMass, FamilyModel, GroundSpring, family_model
+from rom.updating.equations import by_equations, by_response_functions
+from rom.updating.family_model import Attached, Family, FamilyModel, Parts, family_model
 from rom.updating.frf_data import Complex
 from rom.updating.measured import Channels, Responses
 from rom.updating.methods import Update
 from rom.updating.models import modal
 from rom.updating.normal_equations import Data, Sums, responses_at, sums
-from rom.updating.verdict import band, check_channels, likeness, scores, unseen_directions, verdict
+from rom.updating.verdict import (
+    LEFT_LOG_LEVEL,
+    band,
+    check_channels,
+    chi_row,
+    likeness,
+    scores,
+    suspects,
+    unseen_directions,
+    verdict,
+)
 
 MAX_STEPS = 60  # of the search; ten are usual
 MAX_MISFIT = 2.0  # chi-square over its expectation: what did not settle here is a wrong model
@@ -38,8 +50,8 @@ MAX_STIFFNESS = 1e10  # beyond it no shorter step lowers the residual
 BAND_RATIO = 1.5  # modes up to here, over the highest line, have damping that lines can see
 BOUND_ATOL = 1e-9  # distance of a logarithm from the end of its range
 DAMPING_LOG_DEVIATION = 1.5  # of ratios about their start, before the test: a factor of 20 in two
+RESIDUALS = ("responses", "equations", "response-function")
 DAMPING_RANGE = (1e-6, 0.9)  # ratios that are tried
-Attached = Mapping[str, GroundSpring | AddedMass]
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +59,7 @@ class Updated:
     """What a test says about a family.
 
     Attributes:
-        family: that was updated.
+        family: that was updated, or the assembly of families.
         factors: all parameters, also those that were kept [1].
         zeta: (m,) damping ratios of the lowest elastic modes, the last one of all others too [1].
         names: (n,) of the unknowns, damping ratios last.
@@ -62,7 +74,7 @@ class Updated:
         model: the family at the sensors and inputs of the test.
     """
 
-    family: BodyFamily
+    family: Family
     factors: dict[str, float]
     zeta: Array
     names: tuple[str, ...]
@@ -93,9 +105,33 @@ class Updated:
 
     @property
     def body(self) -> FlexibleBody:
-        """The body at the factors found; its provenance says by which data, and how surely."""
-        own: dict[str, Any] = {name: self.factors[name] for name in self.family.parameters}
-        body = self.family.at(**own)
+        """The body at the factors found; its provenance says by which data, and how surely.
+
+        Raises:
+            ConfigError: if an assembly was updated.
+        """
+        if isinstance(self.family, FamilyAssembly):
+            raise ConfigError("an assembly has several bodies.", hint="Take Updated.assembly.")
+        return self._signed(self.family.at(**self._own))
+
+    @property
+    def assembly(self) -> Assembly:
+        """The assembly at the factors found, without what is attached; bodies as `body`.
+
+        Raises:
+            ConfigError: if a body alone was updated.
+        """
+        if not isinstance(self.family, FamilyAssembly):
+            raise ConfigError("one body was updated, no assembly.", hint="Take Updated.body.")
+        found = self.family.at(**self._own)
+        bodies = {name: self._signed(body) for name, body in found.bodies.items()}
+        return replace(found, bodies=bodies)
+
+    @property
+    def _own(self) -> dict[str, Any]:
+        return {name: self.factors[name] for name in self.family.parameters}
+
+    def _signed(self, body: FlexibleBody) -> FlexibleBody:
         data = {
             "factors": self.factors,
             "deviations": self.deviations,
@@ -138,7 +174,7 @@ class Updated:
         """
         whole("n", n, 1, None)
         seen, driven = (
-            channels.rows(self.family.body, what) @ self.model.motions
+            channels.rows(Parts.of(self.family).bodies, what) @ self.model.motions
             for channels, what in ((sensors, "sensor"), (inputs, "input"))
         )
         model = replace(self.model, seen=seen, driven=driven)
@@ -164,7 +200,7 @@ class Updated:
 
 @typed
 def update(  # noqa: PLR0913  keywords of one call
-    family: BodyFamily,
+    family: Family,
     test: Responses,
     *,
     free: tuple[str, ...] | None = None,
@@ -172,7 +208,7 @@ def update(  # noqa: PLR0913  keywords of one call
     attached: Attached | None = None,
     candidates: Attached | None = None,
     damping: float = 0.01,
-    prior: dict[str, float] | None = None,
+    prior: dict[str, float] | Updated | None = None,
     tolerance: float | None = None,
     residual: str = "responses",
     rank: int | None = None,
@@ -184,18 +220,23 @@ def update(  # noqa: PLR0913  keywords of one call
     as well, and one for all others.
 
     Args:
-        family: from `rom.reduce_parametric`, with moduli and densities.
+        family: from `rom.reduce_parametric`, with moduli and densities; or several, as a
+            `rom.parametric.FamilyAssembly`, whose parameters are called "body.parameter".
         test: what was measured.
         free: names of the unknown parameters; None for all. Others stay one and are tried in the
             score test.
         fixed: what was held in the test, see `FlexibleBody.frequencies`.
-        attached: {name: `GroundSpring` or `AddedMass`} with unknown factors.
+        attached: {name: `GroundSpring`, `AddedMass` or `JointSpring`} with unknown factors.
         candidates: {name: likewise}, which may be missing in the model: tried in the score test.
         damping: ratio to start from, of all modes [1].
-        prior: {name: relative standard deviation [1] of its factor about one, before the test}.
+        prior: {name: relative standard deviation [1] of its factor about one, before the test}; or
+            what an update by another test found, with other supports, channels or load cases:
+            both tests together then say what is found, and parameters that are not free stay.
         tolerance: largest distance of a channel from a surface point [m], see `Channels.rows`.
         residual: "responses", or "equations": of motion at the sensors, linear in what is sought,
-            biased by noise and by the condensation; the verdict is that of responses.
+            biased by noise and by the condensation; or "response-function": H - H_test is
+            H dZ H_test, linear too, and without condensation. The verdict is that of responses; a
+            prior weighs against what they leave.
         rank: of the basis of equations; None for one direction per mode up to the highest line.
 
     Returns:
@@ -213,31 +254,37 @@ def update(  # noqa: PLR0913  keywords of one call
         Berriet, Fillod and Bouhaddi, for weighted responses with modal damping.
     """
     check_damping_ratio(damping)
-    one_of("residual", residual, ("responses", "equations"))
-    if {"responses": rank is not None, "equations": bool(prior)}[residual]:
-        raise ConfigError(
-            "rank belongs to the residual of equations, a prior to that of responses."
-        )
+    one_of("residual", residual, RESIDUALS)
+    if rank is not None and residual != "equations":
+        raise ConfigError("rank belongs to the residual of equations.")
     if not DAMPING_RANGE[0] <= damping <= DAMPING_RANGE[1]:
         raise ConfigError(f"damping = {damping} to start from is not within {DAMPING_RANGE}.")
-    if family.body.units != "SI":
+    bodies = Parts.of(family).bodies
+    if other := {body.units for body in bodies.values()} - {"SI"}:
         raise ConfigError(
-            f"the family is in {family.body.units}, responses in SI.",
+            f"the family is in {other.pop()}, responses in SI.",
             hint="Reduce the model in SI units to update it.",
         )
     attached, candidates = dict(attached or {}), dict(candidates or {})
-    rows = (
-        test.sensors.rows(family.body, "sensor", tolerance),
-        test.inputs.rows(family.body, "input", tolerance),
-    )
+    rows = test.rows(bodies, tolerance)
     model = family_model(family, rows, attached, candidates, fixed)
     unknown = _unknown(model, free, attached, candidates)
     data = Data.of(test)
-    search = _Search.begun(model, data, unknown, damping, prior or {})
-    check_channels(responses_at(model, search.x, search.zeta, data.omega), data)
+    if isinstance(prior, Updated) and residual != "responses":
+        raise ConfigError("the update by another test is a prior for the residual of responses.")
+    before = _Before.of(prior or {}, model)
+    search = _Search.begun(model, data, unknown, damping, before)
+    check_channels(search.extremes(), search.data.roughly())
     if residual == "responses":
         return _found(family, search.run())
-    found = by_equations(model, data, search.x, unknown, damping, rank)
+    root = np.sqrt(np.diag(before.precision))
+    sigma = np.divide(1.0, root, out=np.full(root.size, np.inf), where=root > 0)
+    begin = model, data, search.x, unknown, damping
+    if residual == "equations":
+        found = by_equations(*begin, prior=sigma, rank=rank)
+    else:
+        ratios = search.zeta.size, DAMPING_LOG_DEVIATION
+        found = by_response_functions(*begin, prior=sigma, prior_damping=ratios)
     return replace(_found(family, search.moved(found)), covariance=found.covariance)
 
 
@@ -251,6 +298,45 @@ def _unknown(
     return np.array([name in chosen for name in model.names])
 
 
+@dataclass(frozen=True, slots=True)
+class _Before:
+    """What is known of the logarithms of factors before a test.
+
+    Attributes:
+        x: (n_p,) where they are.
+        precision: (n_p, n_p) inverse of their covariance.
+        n_known: number of those that another test found; 0 without.
+    """
+
+    x: Array
+    precision: Array
+    n_known: int = 0
+
+    @staticmethod
+    def of(prior: dict[str, float] | Updated, model: FamilyModel) -> "_Before":
+        """From standard deviations about one, or from the update by another test.
+
+        Raises:
+            ConfigError, ParameterError: for a deviation that is not positive, an unknown name, or
+                a test that found none of the parameters.
+        """
+        names, precision = model.names, np.zeros((len(model.names),) * 2)
+        if not isinstance(prior, Updated):
+            if wrong := set(prior) - set(names):
+                raise ParameterError(f"prior: there is no parameter {named(wrong)}.")
+            sigma = np.array([prior.get(name, np.inf) for name in names])
+            if not (sigma > 0).all():
+                raise ConfigError("prior: a standard deviation is positive.")
+            return _Before(np.zeros(len(names)), np.diag(sigma**-2.0))
+        known = [name for name in prior.names if name in names]
+        if not known:
+            raise ConfigError(f"prior: the test before found none of {named(names)}.")
+        here, there = ([those.index(n) for n in known] for those in (names, prior.names))
+        precision[np.ix_(here, here)] = np.linalg.inv(prior.covariance[np.ix_(there, there)])
+        x = [np.log(prior.factors.get(name, 1.0) or 1.0) for name in names]
+        return _Before(np.array(x), precision, len(known))
+
+
 @dataclass(slots=True)
 class _Search:
     """The least squares problem and where its search has come to."""
@@ -261,31 +347,36 @@ class _Search:
     free: Mask
     precision: Array
     before: Array
+    n_known: int
     sums: Sums = field(init=False)
     settled: bool = False
 
     @staticmethod
     def begun(
-        model: FamilyModel, data: Data, unknown: Mask, damping: float, prior: dict[str, float]
+        model: FamilyModel, data: Data, unknown: Mask, damping: float, prior: _Before
     ) -> "_Search":
-        x = np.clip(np.zeros(len(model.names)), np.log(model.low), np.log(model.high))
+        x = np.clip(prior.x, np.log(model.low), np.log(model.high))
         lam = modal(model.at(x), ()).lam[model.n_rigid :]
         m = min(int(np.count_nonzero(lam < (BAND_RATIO * data.omega[-1]) ** 2)) + 1, lam.size)
-        if wrong := set(prior) - set(model.names):
-            raise ParameterError(f"prior: there is no parameter {named(wrong)}.")
-        sigma = np.array([prior.get(name, np.inf) for name in model.names])
-        if not (sigma > 0).all():
-            raise ConfigError("prior: a standard deviation is positive.")
         free = np.r_[unknown, np.ones(m, dtype=bool)]
         if data.n_values <= free.sum():
             raise ConfigError(
                 f"{data.n_values} usable numbers for {free.sum()} unknowns.",
                 hint="Measure more lines, or fix parameters; lines of low coherence do not count.",
             )
-        precision = np.r_[sigma**-2.0, np.full(m, DAMPING_LOG_DEVIATION**-2.0)]
-        before = np.r_[np.zeros(x.size), np.full(m, np.log(damping))]
-        theta = np.r_[x, before[x.size :]]
-        return _Search(model, data, theta, free, precision, before)
+        precision = block_diag(prior.precision, np.eye(m) * DAMPING_LOG_DEVIATION**-2.0)
+        before, theta = (np.r_[y, np.full(m, np.log(damping))] for y in (prior.x, x))
+        return _Search(model, data, theta, free, precision, before, prior.n_known)
+
+    def extremes(self) -> Iterator[Complex]:
+        """Responses where the search begins, then with each factor at both ends of its range."""
+        omega = self.data.roughly().omega
+        yield responses_at(self.model, self.x, self.zeta, omega)
+        for j in np.flatnonzero(self.free[: len(self.model.names)] & self.model.present):
+            for end in (self.model.low[j], self.model.high[j]):
+                x = self.x.copy()
+                x[j] = np.log(end)
+                yield responses_at(self.model, x, self.zeta, omega)
 
     @property
     def x(self) -> Array:
@@ -304,14 +395,14 @@ class _Search:
 
     def at(self, theta: Array) -> tuple[Sums, float]:
         """Sums and cost at some unknowns."""
-        n = len(self.model.names)
+        n, off = len(self.model.names), theta - self.before
         found = sums(self.model, theta[:n], np.exp(theta[n:]), self.data)
-        return found, found.chi_square + float(self.precision @ (theta - self.before) ** 2)
+        return found, found.chi_square + float(off @ self.precision @ off)
 
     def posterior(self) -> tuple[Array, Array]:
         """Information (n, n) of data and prior, and the gradient (n,) of half the cost."""
-        N = self.sums.normal + np.diag(self.precision)
-        return N, self.sums.gradient + self.precision * (self.theta - self.before)
+        N = self.sums.normal + self.precision
+        return N, self.sums.gradient + self.precision @ (self.theta - self.before)
 
     def moved(self, found: Update) -> "_Search":
         """Where equations led, damping of the modes above the highest line as it was."""
@@ -368,7 +459,7 @@ class _Search:
         return cost
 
 
-def _found(family: BodyFamily, search: _Search) -> Updated:
+def _found(family: Family, search: _Search) -> Updated:
     """The record of a search that has ended."""
     model, data, s = search.model, search.data, search.sums
     n, free = len(model.names), np.flatnonzero(search.free)
@@ -407,6 +498,13 @@ def _doubts(search: _Search, at_bound: tuple[str, ...]) -> list[Row]:
     lam = modal(model.at(search.x), ()).lam[model.n_rigid :]
     used = data.omega[(data.weight > 0).any(axis=(1, 2))]
     rows = [likeness(H, data), band(np.sqrt(lam) / (2 * np.pi), used[-1] / (2 * np.pi))]
+    if search.n_known:
+        n = len(model.names)
+        off = (search.theta - search.before)[:n]
+        moved = float(off @ search.precision[:n, :n] @ off)
+        rows.append(chi_row("distance from the test before", moved, search.n_known, 1))
+    for message, _ in suspects(H, data, LEFT_LOG_LEVEL).values():
+        rows.append(row(message, 1.0, 0.0))
     if not search.settled:
         rows.append(row("steps of the search, which has not ended", MAX_STEPS, MAX_STEPS - 1))
     return rows + [row(f"{name} inside its range", 1.0, 0.0) for name in at_bound]

@@ -10,21 +10,98 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.linalg import null_space
+from scipy.linalg import block_diag
 
 from rom.arguments import finite
 from rom.body.flexible import FlexibleBody
+from rom.body.records import Marker, still_motions
 from rom.body.reference import marker_motion
 from rom.eigen.supports import spring_matrices
 from rom.errors import ConfigError, ParameterError
-from rom.model import Array, Mask
+from rom.model import Array, Index, Mask
 from rom.names import named
+from rom.parametric.assembled import FamilyAssembly
 from rom.parametric.family import BodyFamily
 from rom.parametric.parameters import Density, Parameter, YoungsModulus
+from rom.rotation import skew
 from rom.updating.models import ParametricModel
 
 HELD_RTOL = 1e-9  # singular value of a motion that nothing holds
 MASS_DOFS = 3  # translations, which a point mass resists
+Family = BodyFamily | FamilyAssembly
+Place = str | tuple[str, str]  # interface of a body alone; body and interface of an assembly
+
+
+@dataclass(frozen=True, slots=True)
+class Parts:
+    """The families of a structure, whose rigid and elastic coordinates stand one after another.
+
+    Attributes:
+        bodies: {name: body} at the centre of the ranges; one alone has no name.
+    """
+
+    bodies: dict[str, FlexibleBody]
+
+    @staticmethod
+    def of(structure: "Family | FlexibleBody | Parts") -> "Parts":
+        """Those of an assembly, or of a body alone."""
+        if isinstance(structure, Parts):
+            return structure
+        if isinstance(structure, FlexibleBody):
+            return Parts({"": structure})
+        return Parts({name: part.body for name, part in families_of(structure).items()})
+
+    @property
+    def columns(self) -> dict[str, slice]:
+        """Where the coordinates of each body stand."""
+        ends = np.cumsum([6 + body.n_modes for body in self.bodies.values()])
+        return {
+            name: slice(int(end) - 6 - body.n_modes, int(end))
+            for (name, body), end in zip(self.bodies.items(), ends, strict=True)
+        }
+
+    @property
+    def n(self) -> int:
+        """Number of all coordinates."""
+        return sum(6 + body.n_modes for body in self.bodies.values())
+
+    def rigid(self) -> tuple[Index, Array]:
+        """(6 n_b,) numbers of the rigid coordinates, and their sizes where points move by one."""
+        size = max(body.size for body in self.bodies.values())
+        first = [columns.start + np.arange(6) for columns in self.columns.values()]
+        return np.concatenate(first), np.tile(np.r_[np.ones(3), np.full(3, 1 / size)], len(first))
+
+    def marker(self, place: Place) -> tuple[str, Marker]:
+        """Name of the body and its interface.
+
+        Raises:
+            ConfigError: for a place of another kind, or an unknown body.
+            InterfaceError: for a wrong interface.
+        """
+        if "" in self.bodies:
+            return "", self.bodies[""].marker(str(place))
+        body, interface = place if isinstance(place, tuple) and len(place) == 2 else ("", "")
+        if body not in self.bodies:
+            raise ConfigError(
+                f"{place!r} is no place (body, interface); bodies are {named(self.bodies)}."
+            )
+        return body, self.bodies[body].marker(interface)
+
+    def motion(self, place: Place) -> Array:
+        """(6, n) translation and rotation of an interface by all coordinates.
+
+        Raises:
+            ConfigError, InterfaceError: see `marker`.
+        """
+        body, marker = self.marker(place)
+        H = np.zeros((6, self.n))
+        H[:, self.columns[body]] = np.hstack(marker_motion(marker, self.bodies[body].n_modes))
+        return H
+
+
+def families_of(family: Family) -> dict[str, BodyFamily]:
+    """{name: family} of an assembly; of one alone, without a name."""
+    return family.families if isinstance(family, FamilyAssembly) else {"": family}
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +109,7 @@ class GroundSpring:
     """A spring between an interface and the ground, unknown by a factor.
 
     Attributes:
-        at: name of the interface.
+        at: name of the interface; (body, interface) of an assembly.
         stiffness: (3,) translations, (6,) with rotations, or (6, 6) at a factor of one
             [N/m, N m/rad].
         low: smallest factor [1].
@@ -42,7 +119,7 @@ class GroundSpring:
         ConfigError: unless 0 < low <= high.
     """
 
-    at: str
+    at: Place
     stiffness: npt.ArrayLike
     low: float
     high: float
@@ -50,15 +127,54 @@ class GroundSpring:
     def __post_init__(self) -> None:
         check_range(f"the spring at {self.at!r}", self.low, self.high)
 
-    def term(self, body: FlexibleBody) -> tuple[Array, Array]:
-        """Stiffness [N/m] and mass [kg] (6 + r, 6 + r) that it adds at a factor of one.
+    def term(self, structure: FlexibleBody | Parts) -> tuple[Array, Array]:
+        """Stiffness [N/m] and mass [kg] (n, n) that it adds to a body at a factor of one.
 
         Raises:
             ConfigError, InterfaceError: for a wrong stiffness or interface.
         """
-        k = spring_matrices({self.at: self.stiffness}, body.markers, f"body {body.name!r}")
-        H = motion_of(body, self.at)
-        return H.T @ k[self.at] @ H, np.zeros((H.shape[1],) * 2)
+        parts = Parts.of(structure)
+        H = parts.motion(self.at)
+        return H.T @ _stiffness(self.at, self.stiffness) @ H, np.zeros((parts.n,) * 2)
+
+
+@dataclass(frozen=True, slots=True)
+class JointSpring:
+    """A spring between two interfaces of an assembly, unknown by a factor: a bolted joint.
+
+    It acts where the first one is; the second one reaches there by a rigid arm.
+
+    Attributes:
+        one: (body, interface).
+        other: (body, interface).
+        stiffness: (3,) translations, (6,) with rotations, or (6, 6) at a factor of one
+            [N/m, N m/rad].
+        low: smallest factor [1].
+        high: largest factor [1].
+
+    Raises:
+        ConfigError: unless 0 < low <= high.
+    """
+
+    one: tuple[str, str]
+    other: tuple[str, str]
+    stiffness: npt.ArrayLike
+    low: float
+    high: float
+
+    def __post_init__(self) -> None:
+        check_range(f"the joint of {self.one!r} and {self.other!r}", self.low, self.high)
+
+    def term(self, structure: FlexibleBody | Parts) -> tuple[Array, Array]:
+        """Stiffness [N/m] and mass [kg] (n, n) that it adds to a body at a factor of one.
+
+        Raises:
+            ConfigError, InterfaceError: for a wrong stiffness, body or interface.
+        """
+        parts, arm = Parts.of(structure), np.eye(6)
+        arm[:3, 3:] = -skew(parts.marker(self.one)[1].point - parts.marker(self.other)[1].point)
+        H = parts.motion(self.one) - arm @ parts.motion(self.other)
+        return H.T @ _stiffness(self.one, self.stiffness) @ H, np.zeros((parts.n,) * 2)
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +182,7 @@ class AddedMass:
     """A point mass on an interface, unknown by a factor.
 
     Attributes:
-        at: name of the interface.
+        at: name of the interface; (body, interface) of an assembly.
         mass: at a factor of one [kg].
         low: smallest factor [1].
         high: largest factor [1].
@@ -75,7 +191,7 @@ class AddedMass:
         ConfigError: unless 0 < low <= high and the mass is positive.
     """
 
-    at: str
+    at: Place
     mass: float
     low: float
     high: float
@@ -85,13 +201,13 @@ class AddedMass:
         if not finite("mass", self.mass, ()) > 0:
             raise ConfigError(f"the mass at {self.at!r} is {self.mass} kg: it must be positive.")
 
-    def term(self, body: FlexibleBody) -> tuple[Array, Array]:
-        """Stiffness [N/m] and mass [kg] (6 + r, 6 + r) that it adds at a factor of one.
+    def term(self, structure: FlexibleBody | Parts) -> tuple[Array, Array]:
+        """Stiffness [N/m] and mass [kg] (n, n) that it adds to a body at a factor of one.
 
         Raises:
             InterfaceError: for a wrong interface.
         """
-        H = motion_of(body, self.at)[:MASS_DOFS]
+        H = Parts.of(structure).motion(self.at)[:MASS_DOFS]
         return np.zeros((H.shape[1],) * 2), self.mass * H.T @ H
 
 
@@ -105,13 +221,12 @@ def check_range(what: str, low: float, high: float) -> None:
         raise ConfigError(f"{what} has the range {low} to {high}; factors are positive.")
 
 
-def motion_of(body: FlexibleBody, name: str) -> Array:
-    """(6, 6 + r) translation and rotation of an interface by rigid and elastic coordinates.
+def _stiffness(place: Place, stiffness: npt.ArrayLike) -> Array:
+    """(6, 6) of a spring at a place."""
+    return spring_matrices({str(place): stiffness}, (str(place),), "the structure")[str(place)]
 
-    Raises:
-        InterfaceError: for a wrong interface.
-    """
-    return np.hstack(marker_motion(body.marker(name), body.n_modes))
+
+Attached = Mapping[str, GroundSpring | JointSpring | AddedMass]
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,7 +245,7 @@ class FamilyModel:
         high: (n_p,) largest factors.
         amount: (n_t,) one; zero for a candidate, which is not in the model but has derivatives.
         n_rigid: number of motions that nothing holds.
-        motions: (6 + r, n) rigid and elastic coordinates of the family per coordinate here.
+        motions: (n_q, n) rigid and elastic coordinates of all bodies per coordinate here.
     """
 
     K: Array
@@ -168,26 +283,28 @@ class FamilyModel:
 
 
 def family_model(
-    family: BodyFamily,
+    family: Family,
     rows: tuple[Array, Array],
-    attached: Mapping[str, GroundSpring | AddedMass],
-    candidates: Mapping[str, GroundSpring | AddedMass],
+    attached: Attached,
+    candidates: Attached,
     fixed: Any,
 ) -> FamilyModel:
     """A family seen at sensors and driven at inputs.
 
     Args:
         family: without parameters of thickness.
-        rows: (n_s, 6 + r) of the sensors and (n_e, 6 + r) of the inputs.
+        rows: (n_s, n) of the sensors and (n_e, n) of the inputs, by rigid and elastic coordinates
+            of one body after another.
         attached: springs and masses with unknown factors, by name.
         candidates: springs and masses that may be missing; not part of the model.
-        fixed: what is held, see `FlexibleBody.frequencies`.
+        fixed: what is held, see `FlexibleBody.frequencies` and `rom.Assembly.frequencies`.
 
     Raises:
         ConfigError: for a parameter of thickness, or a name that is taken.
         InterfaceError: if an interface is unknown.
     """
-    if family.stretch is not None:
+    families, parts = families_of(family), Parts.of(family)
+    if any(one.stretch is not None for one in families.values()):
         raise ConfigError(
             "a family with a parameter of thickness cannot be updated.",
             hint="Reduce a family with moduli and densities alone.",
@@ -195,12 +312,17 @@ def family_model(
     outside = {**attached, **candidates}
     if len(outside) < len(attached) + len(candidates) or set(outside) & set(family.parameters):
         raise ParameterError(f"one of {named(outside)} names two parameters.")
-    pairs = [(*_term(family.body, share), share) for share in family.shares]
-    added = [(*item.term(family.body), None) for item in outside.values()]
+    pairs = [
+        tuple(_placed(A, columns, parts.n) for A in _term(one.body, share))
+        for one, columns in zip(families.values(), parts.columns.values(), strict=True)
+        for share in one.shares
+    ]
+    added = [item.term(parts) for item in outside.values()]
     K, M = (np.array([t[i] for t in pairs + added]) for i in (0, 1))
-    N = _supported(family.body, fixed)
+    held = _conditions(family, fixed)
+    N = _supported(held)
     known: dict[str, Any] = {**family.parameters, **outside}
-    powers = _powers(family, tuple(outside))
+    powers = _powers(families, tuple(outside))
     return FamilyModel(
         K=N.T @ K @ N,
         M=N.T @ M @ N,
@@ -212,7 +334,7 @@ def family_model(
         low=np.array([p.low for p in known.values()]),
         high=np.array([p.high for p in known.values()]),
         amount=np.repeat([1.0, 0.0], [len(K) - len(candidates), len(candidates)]),
-        n_rigid=_count_free(family.body, attached, fixed),
+        n_rigid=_count_free(parts, attached, held),
         motions=N,
     )
 
@@ -224,36 +346,50 @@ def _term(body: FlexibleBody, share: Any) -> tuple[Array, Array]:
     return K, M
 
 
-def _powers(family: BodyFamily, attached: tuple[str, ...]) -> tuple[Array, Array]:
+def _placed(A: Array, columns: slice, n: int) -> Array:
+    """A matrix of one body among the coordinates (n, n) of all."""
+    whole = np.zeros((n, n))
+    whole[columns, columns] = A
+    return whole
+
+
+def _powers(families: dict[str, BodyFamily], outside: tuple[str, ...]) -> tuple[Array, Array]:
     """Which parameters multiply which terms."""
-    n, n_p = len(family.shares), len(family.parameters)
-    both = np.zeros((2, n + len(attached), n_p + len(attached)))
+    own = [_own_powers(family) for family in families.values()] + [(np.eye(len(outside)),) * 2]
+    k, m = (block_diag(*(pair[i] for pair in own)) for i in (0, 1))
+    return k, m
+
+
+def _own_powers(family: BodyFamily) -> tuple[Array, Array]:
+    k, m = np.zeros((2, len(family.shares), len(family.parameters)))
     for i, share in enumerate(family.shares):
         for j, p in enumerate(family.parameters.values()):
-            both[0, i, j] = _acts(p, YoungsModulus, share.region)
-            both[1, i, j] = _acts(p, Density, share.region) and not share.fixed
-    own = np.arange(len(attached))
-    both[:, n + own, n_p + own] = 1.0
-    return both[0], both[1]
+            k[i, j] = _acts(p, YoungsModulus, share.region)
+            m[i, j] = _acts(p, Density, share.region) and not share.fixed
+    return k, m
 
 
 def _acts(parameter: Parameter, kind: type, region: str | None) -> bool:
     return isinstance(parameter, kind) and parameter.region in (None, region)
 
 
-def _supported(body: FlexibleBody, fixed: Any) -> Array:
-    """(6 + r, n) motions that keep what is held still."""
-    body.check_support(fixed)
-    if not fixed:
-        return np.eye(6 + body.n_modes)
-    H = body.held_rows(fixed)
-    return null_space(H / np.maximum(np.linalg.norm(H, axis=1, keepdims=True), 1e-300), rcond=1e-10)
+def _conditions(family: Family, fixed: Any) -> Array:
+    """(c, n) coordinates that supports and couplings keep zero."""
+    if isinstance(family, FamilyAssembly):
+        return family.nominal.conditions(tuple(fixed))
+    family.body.check_support(fixed)
+    return family.body.held_rows(fixed)
 
 
-def _count_free(body: FlexibleBody, attached: Mapping[str, Any], fixed: Any) -> int:
-    """Number of rigid motions that neither supports nor springs hold."""
-    scale = np.r_[np.ones(3), np.full(3, 1 / body.size)]
-    stiff = [item.term(body)[0][:6, :6] for item in attached.values()]
+def _supported(held: Array) -> Array:
+    """(n, m) motions that keep what is held still."""
+    return still_motions(held) if len(held) else np.eye(held.shape[1])
+
+
+def _count_free(parts: Parts, attached: Attached, held: Array) -> int:
+    """Number of rigid motions of all bodies that neither supports, couplings nor springs hold."""
+    rigid, scale = parts.rigid()
+    stiff = [item.term(parts)[0][np.ix_(rigid, rigid)] for item in attached.values()]
     pulls = [k * np.outer(scale, scale) / max(np.abs(k).max(), 1e-300) for k in stiff]
-    rows = np.vstack([np.zeros((1, 6)), body.held_rows(fixed)[:, :6] * scale, *pulls])
-    return 6 - int(np.linalg.matrix_rank(rows, tol=HELD_RTOL))
+    rows = np.vstack([np.zeros((1, rigid.size)), held[:, rigid] * scale, *pulls])
+    return int(rigid.size - np.linalg.matrix_rank(rows, tol=HELD_RTOL))

@@ -4,6 +4,7 @@ Source:
     Bendat and Piersol, Random data (2010): var |H| / |H|^2 = (1 - c) / (2 n c).
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,9 +14,10 @@ from scipy.spatial import cKDTree
 
 from rom.arguments import finite, one_of
 from rom.body.flexible import FlexibleBody
-from rom.body.surface import surface_of
+from rom.body.surface import strain_rows, surface_of
 from rom.errors import ConfigError
 from rom.model import Array
+from rom.names import named
 from rom.rotation import skew
 from rom.updating.frf_data import Complex, random_error
 
@@ -27,9 +29,11 @@ LENGTHS = {  # factors by which points that are off a body may all lie on it
     0.0254: "inches taken for metres",
 }
 POINT_RTOL = 0.02  # distance of a sensor from the nearest point of the surface, of the body's size
+SAME_RTOL = 1e-6  # distance of surfaces that touch, of the size of all
 MAX_RELATIVE_ERROR = 0.3  # of a value; beyond it the logarithm of noise is no longer normal
 MAX_LINES_NAMED = 5  # in a message
 FREEDOM_LOST = 2  # averages, by a variance that is estimated from the same records as the response
+MAX_VARIED = 0.2  # relative variance of an estimated one, up to which first order says much
 MIN_OWN_SHARE = 0.1  # of the variance of a response that is left to its sensor
 
 
@@ -58,37 +62,61 @@ class Channels:
         if not np.linalg.norm(self.directions, axis=1).all():
             raise ConfigError("a channel has a direction of length zero.")
 
-    def rows(self, body: FlexibleBody, what: str, tolerance: float | None = None) -> Array:
-        """(k, 6 + r) displacement along each channel per rigid and elastic coordinate [1].
+    def rows(
+        self,
+        body: FlexibleBody | Mapping[str, FlexibleBody],
+        what: str,
+        tolerance: float | None = None,
+        gauges: npt.ArrayLike = False,
+    ) -> Array:
+        """(k, 6 + r) displacement [1] or strain [1/m] along each channel per coordinate.
 
         Args:
-            body: with its outer surface.
+            body: with its outer surface; of {name: body} each channel takes the nearest one, and
+                the coordinates of one body come after those of another.
             what: "sensor" or "input", for messages.
             tolerance: largest distance from a point of the surface [m]; None for two per cent of
-                the body's size.
+                the size of all.
+            gauges: (k,) or one for all, which measure strain in the surface [0, 1].
 
         Raises:
-            ConfigError: if a channel is off the body.
-            ModelError: if the body carries no surface.
+            ConfigError: if a channel is off the body, as near to two bodies, or a gauge on no face.
+            ModelError: if a body carries no surface.
         """
-        surface, points = surface_of(body), np.asarray(self.points)
-        reach = POINT_RTOL * np.ptp(surface.points, axis=0).max()
-        reach = reach if tolerance is None else tolerance
-        tree = cKDTree(surface.points)
-        _check_lengths(points, tree, reach, what)
-        far, nearest = tree.query(points)
-        found = []
-        for k, (d, n) in enumerate(zip(np.asarray(self.directions), nearest, strict=True)):
-            if far[k] > reach:
+        bodies = {"": body} if isinstance(body, FlexibleBody) else body
+        surfaces, points = [surface_of(one) for one in bodies.values()], np.asarray(self.points)
+        everywhere = np.vstack([surface.points for surface in surfaces])
+        size = np.ptp(everywhere, axis=0).max()
+        reach = POINT_RTOL * size if tolerance is None else tolerance
+        _check_lengths(points, cKDTree(everywhere), reach, what)
+        asked = [cKDTree(surface.points).query(points) for surface in surfaces]
+        far, nearest = (np.array([pair[i] for pair in asked]) for i in (0, 1))
+        ends = np.cumsum([6 + one.n_modes for one in bodies.values()])
+        found, strains = np.zeros((len(points), ends[-1])), np.broadcast_to(gauges, len(points))
+        for k, d in enumerate(np.asarray(self.directions)):
+            own = int(far[:, k].argmin())
+            if far[own, k] > reach and not strains[k]:  # a gauge lies in a face, between nodes
                 raise ConfigError(
-                    f"{what} {k} at {points[k].tolist()} is {far[k]:.3g} m off the body; "
+                    f"{what} {k} at {points[k].tolist()} is {far[own, k]:.3g} m off the body; "
                     f"{reach:.3g} m is taken.",
                     hint="Compare the units and axes of the test with those of the geometry.",
                 )
+            if len(near := np.flatnonzero(far[:, k] <= far[own, k] + SAME_RTOL * size)) > 1:
+                raise ConfigError(
+                    f"{what} {k} at {points[k].tolist()} is as near to one as to another of "
+                    f"{named(list(bodies)[j] for j in near)}.",
+                    hint="Give a point of the body that is meant, beside its joint.",
+                )
+            surface, n = surfaces[own], int(nearest[own, k])
+            if strains[k]:
+                part = list(bodies.values())[own]
+                elastic = strain_rows(part, points[[k]], [d], what, [k])[0]
+                found[k, ends[own] - elastic.size : ends[own]] = elastic
+                continue
             shape = surface.shape[3 * n : 3 * n + 3]
             motion = np.hstack([np.eye(3), -skew(surface.points[n]), shape])
-            found.append(d / np.linalg.norm(d) @ motion)
-        return np.array(found)
+            found[k, ends[own] - motion.shape[1] : ends[own]] = d / np.linalg.norm(d) @ motion
+        return found
 
 
 def _check_lengths(points: Array, surface: cKDTree, reach: float, what: str) -> None:
@@ -114,13 +142,14 @@ class Responses:
     Attributes:
         frequencies: (n_f,) lines, ascending and above zero [Hz].
         H: (n_f, n_s, n_e) response of each sensor per unit force of each input
-            [m/N, m/(s N) or m/(s^2 N)].
+            [m/N, m/(s N), m/(s^2 N) or 1/N].
         sensors: where they are.
         inputs: where forces act.
         coherence: (n_f, n_s, n_e) from 0 to 1, estimated with H; or one number, which is known; 0
             for a line not to be used [1].
         averages: number of averages behind H and the coherence.
-        quantity: "displacement", "velocity" or "acceleration".
+        quantity: "displacement", "velocity", "acceleration" or "strain" in the surface, of all
+            sensors or (n_s,) of each.
         force_noise: noise on the signal of a force over the force itself [1]. All sensors that were
             measured at the same time have the error in common that comes of it.
 
@@ -134,14 +163,15 @@ class Responses:
     inputs: Channels
     coherence: Any
     averages: int
-    quantity: str = "displacement"
+    quantity: str | tuple[str, ...] = "displacement"
     force_noise: float = 0.0
 
     def __post_init__(self) -> None:
         f = finite("frequencies", self.frequencies, None)
         object.__setattr__(self, "frequencies", f)
         object.__setattr__(self, "H", np.asarray(self.H, dtype=complex))
-        one_of("quantity", self.quantity, tuple(DERIVATIVES))
+        for one in self.quantities:
+            one_of("quantity", one, (*DERIVATIVES, "strain"))
         if f.ndim != 1 or not f.size or f[0] <= 0 or (np.diff(f) <= 0).any():
             raise ConfigError("frequencies must ascend and lie above zero.")
         wanted = (f.size, len(np.asarray(self.sensors.points)), len(np.asarray(self.inputs.points)))
@@ -149,6 +179,8 @@ class Responses:
             raise ConfigError(
                 f"H is {self.H.shape}; lines, sensors and inputs are {wanted}.",
             )
+        if len(self.quantities) != wanted[1]:
+            raise ConfigError(f"{len(self.quantities)} quantities of {wanted[1]} sensors.")
         c = np.asarray(self.coherence, dtype=float)
         if c.shape not in ((), wanted) or not ((c >= 0) & (c < 1)).all():
             raise ConfigError(
@@ -171,10 +203,36 @@ class Responses:
         if bad.any():
             lines = np.flatnonzero(bad.any(axis=(1, 2)))
             some = ", ".join(f"{x:.5g}" for x in self.frequencies[lines[:MAX_LINES_NAMED]])
+            own = np.flatnonzero(bad.any(axis=(0, 2)))
+            where = "" if own.size == len(bad[0]) else f" of sensors {named(own.tolist())}"
             raise ConfigError(
-                f"H is zero or not finite at {lines.size} lines, e.g. at {some} Hz.",
+                f"H{where} is zero or not finite at {lines.size} lines, e.g. at {some} Hz.",
                 hint="Give these lines the coherence 0.",
             )
+
+    @property
+    def quantities(self) -> tuple[str, ...]:
+        """(n_s,) what each sensor measures."""
+        one, n = self.quantity, len(np.asarray(self.sensors.points))
+        return (one,) * n if isinstance(one, str) else tuple(one)
+
+    def rows(
+        self, bodies: Mapping[str, FlexibleBody], tolerance: float | None = None
+    ) -> tuple[Array, Array]:
+        """(n_s, 6 + r) of sensors, displacement [1] or strain [1/m], and (n_e, 6 + r) of inputs.
+
+        Args:
+            bodies: see `Channels.rows`.
+            tolerance: see `Channels.rows` [m].
+
+        Raises:
+            ConfigError, ModelError: see `Channels.rows`.
+        """
+        gauges = [quantity == "strain" for quantity in self.quantities]
+        return (
+            self.sensors.rows(bodies, "sensor", tolerance, gauges),
+            self.inputs.rows(bodies, "input", tolerance),
+        )
 
     def relative_error(self) -> Array:
         """(n_f, n_s, n_e) standard deviation of real and imaginary part, over |H| [1].
@@ -192,19 +250,28 @@ class Responses:
         """Of ln H: (n_f, n_s, n_e) errors of the sensors, and the one that they have in common [1].
 
         The first is infinite where a value is not used. Of circular errors with the variance
-        s^2 in each part the logarithm has s^2 (1 + s^2 + ...).
+        s^2 in each part the logarithm has s^2 (1 + s^2 + ...). An estimated variance v of n
+        averages varies by v^2 / (n - 1); what is left of it without the common part varies as
+        much, so that one over it is too large by (v / left)^2 / (n - 2), to first order.
         """
-        error = self.relative_error()
-        common = self.force_noise / np.sqrt(2 * self.averages)
-        own = np.maximum(error**2 - common**2, MIN_OWN_SHARE * error**2)
+        error, n = self.relative_error(), self.averages
+        common = self.force_noise / np.sqrt(2 * n)
+        estimated = np.ndim(self.coherence) > 0
+        total = error**2 * ((n - FREEDOM_LOST) / (n - 1) if estimated else 1.0)
+        least = MIN_OWN_SHARE * total
+        own = np.maximum(total - common**2, least)
+        if estimated:
+            varied = (total / own) ** 2 / (n - FREEDOM_LOST)
+            own = own * (1 + np.where(own > least, np.minimum(varied, MAX_VARIED), 0.0))
         used = error <= MAX_RELATIVE_ERROR
         return np.sqrt(np.where(used, own * (1 + error**2), np.inf)), common
 
     def logarithm(self) -> Complex:
-        """(n_f, n_s, n_e) ln of the displacement per force [m/N]; zero where H is not used."""
+        """(n_f, n_s, n_e) ln of displacement [m/N] or strain [1/N]; zero where H is not used."""
         s = 2j * np.pi * self.frequencies[:, None, None]
         used = self.relative_error() <= MAX_RELATIVE_ERROR
-        return np.log(np.where(used, self.H / s ** DERIVATIVES[self.quantity], 1.0))
+        orders = np.array([DERIVATIVES.get(quantity, 0) for quantity in self.quantities])
+        return np.log(np.where(used, self.H / s ** orders[:, None], 1.0))
 
 
 @dataclass(frozen=True, slots=True)

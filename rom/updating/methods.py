@@ -6,7 +6,7 @@ Source:
     8 (1994) 437.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -28,7 +28,9 @@ from rom.updating.models import (
 )
 
 MAX_EVALUATIONS = 100  # evaluations of the responses; more are needed if the start is too far away
+BLOCK_LINES = 256  # at once: some ten megabytes of derivatives for sixty channels
 MAX_STEPS = 40  # linear solutions
+STEP_ATOL = 1e-8  # in standard deviations, below which equations are solved
 MAX_PARAMETER_CHANGE = 0.2  # in one step
 MIN_PARAMETER = -0.95  # change that leaves a twentieth of the stiffness or mass
 EQUAL_EIGENVALUE_RTOL = 1e-12  # distance of eigenvalues whose modes have no derivative
@@ -209,12 +211,12 @@ def update_by_output(model: Model, test: Measurement, p: ArrayLike, zeta: ArrayL
 
     def residual(x: Array) -> Array:
         H = responses(model, x[:n_p], np.exp(x[n_p:]), test.omega, test.inputs)
-        return _weighted(test.weights, np.log(H / test.H))
+        return weighted(test.weights, np.log(H / test.H))
 
     def jacobian(x: Array) -> Array:
         path.append(x[:n_p].copy())
         H, dH = sensitivity(model, x[:n_p], np.exp(x[n_p:]), test.omega, test.inputs)
-        return _weighted(test.weights, dH / H[..., None])
+        return weighted(test.weights, dH / H[..., None])
 
     start = np.concatenate([p, np.log(zeta)])
     low = np.concatenate([np.full(n_p, MIN_PARAMETER), np.full(np.size(zeta), -np.inf)])
@@ -233,12 +235,15 @@ def update_by_input(
     *,
     rank: int,
     limits: tuple[ArrayLike, ArrayLike] = (MIN_PARAMETER, np.inf),
+    prior: ArrayLike = np.inf,
 ) -> Update:
     """Least squares of U^T Z^-1 (Z(p) U U^T y - f): linear in p and zeta in each step.
 
     U spans the strongest ``rank`` directions of all test and model responses together; both sets
     are condensed with it. The rank, at most the number of sensors, must reach the number of modes
-    in the band; p stays within the limits [1]. Otherwise as `update_by_output`.
+    in the band; p stays within the limits [1]. Equations are summed over blocks of lines.
+    The prior (n_p,) is the standard deviation of p about zero before the test [1]; it weighs as
+    much as the residual that is left says. Otherwise as `update_by_output`.
 
     Raises:
         ConfigError: if the test does not fit the model, or has not so many sensors.
@@ -247,25 +252,75 @@ def update_by_input(
     test.check(model, zeta)
     if not 1 <= rank <= test.H.shape[1]:
         raise ConfigError(f"rank = {rank} is not among 1 to {test.H.shape[1]} sensors.")
-    x, ratios, path = np.array(p, dtype=float), np.array(zeta, dtype=float), []
-    weights = test.weights / np.linalg.norm(test.H, axis=(1, 2), keepdims=True)
-    weights = weights.mean(axis=1, keepdims=True)
+    n_values = 2 * rank * test.omega.size * len(test.inputs)
+
+    def triangle(x: Array, ratios: Array) -> Array:
+        return _equations(model.at(x), test, ratios, rank)
+
+    start = np.array(p, dtype=float), np.array(zeta, dtype=float)
+    return solved(triangle, start, n_values, limits, prior)
+
+
+def solved(
+    triangle: Callable[[Array, Array], Array],
+    start: tuple[Array, Array],
+    n_values: int,
+    limits: tuple[ArrayLike, ArrayLike],
+    prior: ArrayLike,
+    prior_damping: tuple[float, float] = (1.0, np.inf),
+    enough: float = STEP_ATOL,
+) -> Update:
+    """Least squares that are linear in p and ln zeta in each step, none longer than 0.2.
+
+    Args:
+        triangle: the function of p and zeta that gives the triangle (n + 1, n + 1) of derivatives
+            and residual, see `folded`.
+        start: p (n_p,) [1] and zeta (m,) [1].
+        n_values: number of residuals.
+        limits: of p [1].
+        prior: (n_p,) standard deviation of p about zero before the test [1]; it weighs against
+            the residual that is left.
+        prior_damping: ratio before the test and standard deviation of its logarithm [1].
+        enough: length of a step in standard deviations that is the last one [1].
+    """
+    (x, ratios), path = start, []
+    before = np.r_[np.zeros(x.size), np.full(ratios.size, np.log(prior_damping[0]))]
+    sigma = np.r_[np.broadcast_to(prior, x.shape), np.full(ratios.size, prior_damping[1])]
+    precision, n = np.diag(1.0 / sigma), sigma.size
     for _ in range(MAX_STEPS):
-        here = model.at(x)
-        modes = modal(here, ratios)
-        H = _receptance(here, modes, test.omega, test.inputs)
-        U = common_basis(test.H, H, rank)
-        y = modes.Phi.T @ here.M @ (U @ (U.T @ test.H))  # Phi^-1 = Phi^T M
-        left = (U.T @ modes.Phi) * modes.g(test.omega)[:, None, :]
-        J = _weighted(weights, through_modes(here, modes, ratios.size)(left, y, test.omega))
-        r = _weighted(weights, U.T @ (test.H - H))
+        R = triangle(x, ratios)
+        left = R[:, n] @ R[:, n]
+        noise = np.sqrt(left / max(n_values - n, 1)) or 1.0
+        J = np.vstack([R[:, :n] / noise, precision])
+        r = np.r_[R[:, n] / noise, precision @ (np.r_[x, np.log(ratios)] - before)]
         step = np.clip(
             -np.linalg.lstsq(J, r, rcond=None)[0], -MAX_PARAMETER_CHANGE, MAX_PARAMETER_CHANGE
         )
         ratios = ratios * np.exp(step[x.size :])
-        x = np.clip(x + step[: x.size], *limits)
+        step[: x.size] = np.clip(x + step[: x.size], *limits) - x
+        x = x + step[: x.size]
         path.append(x)
-    return _update(np.concatenate([x, np.log(ratios)]), x.size, r, J, path)
+        if np.linalg.norm(J @ step) < enough:
+            break
+    covariance = np.linalg.pinv(J.T @ J, hermitian=True)
+    return Update(x, ratios, covariance, np.array(path), np.sqrt(left / n_values))
+
+
+def _equations(here: ParametricModel, test: Measurement, ratios: Array, rank: int) -> Array:
+    """(n + 1, n + 1) triangle with the R^T R of derivatives and residual of all lines together."""
+    modes = modal(here, ratios)
+    H = _receptance(here, modes, test.omega, test.inputs)
+    U, R = common_basis(test.H, H, rank), np.zeros((0, len(here.dK) + ratios.size + 1))
+    weights = test.weights / np.linalg.norm(test.H, axis=(1, 2), keepdims=True)
+    weights = weights.mean(axis=1, keepdims=True)
+    condensed = modes.Phi.T @ here.M @ U @ U.T  # Phi^-1 = Phi^T M
+    seen, change = U.T @ modes.Phi, through_modes(here, modes, ratios.size)
+    for block in blocks(test.omega.size):
+        omega, w = test.omega[block], weights[block]
+        J = change(seen * modes.g(omega)[:, None, :], condensed @ test.H[block], omega)
+        r = np.asarray(U.T @ (test.H[block] - H[block]), dtype=complex)
+        R = folded(R, np.column_stack([weighted(w, J), weighted(w, r)]))
+    return R
 
 
 def response_function_method(
@@ -309,7 +364,7 @@ def response_function_method(
         known[:, s] = test.H
         known[:, o] = np.linalg.solve(Z[:, o][:, :, o], F[o] - Z[:, o][:, :, s] @ test.H)
         change = _through(H, (model.dK, model.dM, 0 * model.dK), known, test.omega)
-        J, r = _weighted(test.weights, change), _weighted(test.weights, H @ F - test.H)
+        J, r = weighted(test.weights, change), weighted(test.weights, H @ F - test.H)
         step = np.linalg.lstsq(J, r, rcond=None)[0]
         p = np.maximum(p + np.clip(step, -clip, clip), MIN_PARAMETER)
         path.append(p)
@@ -324,9 +379,25 @@ def common_basis(test: Complex, model: Complex, rank: int) -> Array:
         model: (n_f, n_s, n_e) those of the model [m/N].
         rank: number of directions.
     """
-    Y = np.concatenate([np.moveaxis(H, 1, 0).reshape(H.shape[1], -1) for H in (test, model)], 1)
-    Y = Y / np.linalg.norm(Y, axis=0)
-    return np.linalg.svd(np.hstack([Y.real, Y.imag]), full_matrices=False)[0][:, :rank]
+    R = np.zeros((0, test.shape[1]))
+    for H in (A[block] for block in blocks(len(test)) for A in (test, model)):
+        Y = np.moveaxis(H, 1, 2).reshape(-1, H.shape[1])
+        Y = Y / np.linalg.norm(Y, axis=1, keepdims=True)
+        R = folded(R, np.vstack([Y.real, Y.imag]))
+    return np.linalg.svd(R, full_matrices=False)[2][:rank].T
+
+
+def blocks(n: int) -> Iterator[slice]:
+    """Lines (n,) piece by piece, so that memory does not grow with their number."""
+    return (slice(first, first + BLOCK_LINES) for first in range(0, n, BLOCK_LINES))
+
+
+def folded(R: Array, A: Array) -> Array:
+    """(min(m, n), n) triangle with the R^T R of the rows R (.., n) and A (.., n) together.
+
+    Unlike sums of A^T A, triangles keep the digits of small singular values.
+    """
+    return np.asarray(np.linalg.qr(np.vstack([R, A]), mode="r"))
 
 
 def _update(x: Array, n_p: int, r: Array, J: Array, path: list[Array]) -> Update:
@@ -335,7 +406,7 @@ def _update(x: Array, n_p: int, r: Array, J: Array, path: list[Array]) -> Update
     return Update(x[:n_p], np.exp(x[n_p:]), covariance, np.array(path), np.sqrt((r @ r) / r.size))
 
 
-def _weighted(weights: Any, r: Complex) -> Array:
+def weighted(weights: Any, r: Complex) -> Array:
     """Weighted residual, or its derivatives (.., n_q), real parts above imaginary parts."""
     weights = np.asarray(weights, dtype=float)
     if r.ndim == 3:

@@ -6,6 +6,7 @@ noise leaves the mean of the logarithm where it is, as all powers of it have the
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -13,12 +14,11 @@ from rom.model import Array, Index
 from rom.updating.family_model import FamilyModel
 from rom.updating.frf_data import Complex
 from rom.updating.measured import Responses
-from rom.updating.methods import receptance, through_modes
-from rom.updating.models import modal
+from rom.updating.methods import blocks, receptance, through_modes
+from rom.updating.models import Modal, ParametricModel, modal
 
 ROUGH_LINES = 500  # at most: enough to see resonances
 ROUGH_ERROR = 0.3  # of responses, with which the search begins
-BLOCK_LINES = 256  # at once: some ten megabytes of derivatives for sixty channels
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,16 +118,32 @@ def sensitivity(
     here = model.at(x)
     modes = modal(here, shared(ratios, model.n_elastic))
     seen, driven = model.seen @ modes.Phi, model.driven @ modes.Phi
-    own = ratios.size - 1
-    change, others = through_modes(here, modes, own), slice(model.n_rigid + own, None)
+    change = through_shared(here, modes, ratios.size)
 
     def at(omega: Array) -> tuple[Complex, Complex]:
         g = modes.g(omega)
         left, right = seen * g[:, None, :], g[:, :, None] * driven.T
+        return receptance(seen, g, driven), -change(left, right, omega)
+
+    return at
+
+
+def through_shared(
+    model: ParametricModel, modes: Modal, m: int
+) -> Callable[[Any, Any, Array], Complex]:
+    """The function of `through_modes` where the last of m ratios is that of all other modes too.
+
+    Args:
+        model: at its origin.
+        modes: of the model.
+        m: number of damping ratios.
+    """
+    change, others = through_modes(model, modes, m - 1), slice(model.n_rigid + m - 1, None)
+
+    def at(left: Any, right: Any, omega: Array) -> Complex:
         last = (left[:, :, others] * modes.d[others]) @ right[:, others]
         last = 1j * omega[:, None, None, None] * last[..., None]
-        J = -np.concatenate([change(left, right, omega), last], axis=-1)
-        return receptance(seen, g, driven), J
+        return np.concatenate([change(left, right, omega), last], axis=-1)
 
     return at
 
@@ -145,8 +161,7 @@ def sums(model: FamilyModel, x: Array, ratios: Array, data: Data) -> Sums:
     normal, gradient = np.zeros((n, n)), np.zeros(n)
     squares = np.zeros(data.weight.shape)
     at = sensitivity(model, x, ratios)
-    for first in range(0, data.omega.size, BLOCK_LINES):
-        block = slice(first, first + BLOCK_LINES)
+    for block in blocks(data.omega.size):
         w = data.weight[block]
         H, J = at(data.omega[block])
         log = wrapped(np.log(H) - data.logarithm[block]) * (w > 0)

@@ -13,7 +13,7 @@ Source:
     exponential and their computation, Adv. Appl. Math. 16 (1995) 321.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -28,7 +28,7 @@ from rom.errors import ConfigError, ModelError
 from rom.model import Array
 from rom.names import named
 from rom.parametric.family import BodyFamily
-from rom.updating.family_model import AddedMass, GroundSpring, family_model
+from rom.updating.family_model import Attached, family_model
 from rom.updating.measured import POINT_RTOL, Channels
 
 UNITS = {
@@ -211,7 +211,7 @@ def of_body(
 def of_family(
     family: BodyFamily,
     names: Sequence[str],
-    attached: Mapping[str, GroundSpring | AddedMass],
+    attached: Attached,
     channels: tuple[Sequence[Sensors], Channels, Sequence[Sensors]],
     damping: float,
     fixed: Any,

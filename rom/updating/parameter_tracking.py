@@ -23,7 +23,7 @@ from rom.model import Array
 from rom.names import named
 from rom.parametric.family import BodyFamily
 from rom.plausible import check_damping_ratio
-from rom.updating.estimate import Attached
+from rom.updating.family_model import Attached
 from rom.updating.measured import Channels
 from rom.updating.operation import (
     Linear,
@@ -74,7 +74,7 @@ class ParameterTracker:
         operation: its equations.
         assumed: of steps and forces.
         drifts: of the parameters, by name.
-        R: (n_y,) variances of samples.
+        R: (n_y,) variances of samples [unit of a sensor, squared].
         sensors: what is measured.
         wanted: what is to be estimated.
     """
@@ -109,7 +109,7 @@ class ParameterTracker:
         return recorded(y, P, self.R, n_e, first.size, self.at, LINEAR_REACH)
 
     def at(self, x: Array) -> tuple[Array, Linear, Array]:
-        """The point x (n_p,), steps of the equations there, and the noise (N, N) of one.
+        """The point x (n_p,) [1], steps of the equations there, and noise (N, N) [of two states].
 
         Raises:
             SolverError: if a parameter has left its range.

@@ -21,18 +21,18 @@ from rom.body.surface import surface_of
 from rom.errors import ConfigError, ModelError, ParameterError
 from rom.model import Array, Index
 from rom.names import named
-from rom.parametric.family import BodyFamily
 from rom.plausible import check_damping_ratio
-from rom.updating.estimate import BAND_RATIO, DAMPING_LOG_DEVIATION, Attached
-from rom.updating.family_model import FamilyModel, family_model
+from rom.updating.estimate import BAND_RATIO, DAMPING_LOG_DEVIATION
+from rom.updating.family_model import Attached, Family, FamilyModel, Parts, family_model
 from rom.updating.frf_data import Complex
 from rom.updating.measured import DERIVATIVES, Channels
 from rom.updating.models import DEAD_RATIO, modal
-from rom.updating.normal_equations import sensitivity
+from rom.updating.normal_equations import responses_at, sensitivity
 from rom.updating.verdict import unseen_directions
 
 INDEPENDENCE_RTOL = 1e-10  # smallest singular value of modes at the sensors, over the largest
 MAX_EXCHANGES = 50  # rounds; three are usual
+DYNAMIC_RANGE = 1e-3  # of responses that are measured at once, over the largest: 60 dB
 BLOCK_VALUES = 2_000_000  # derivatives at once: 32 MB
 GAIN_ATOL = 1e-9  # of the logarithm of a determinant
 
@@ -167,7 +167,7 @@ def independent(
 
 @typed
 def place(  # noqa: PLR0913  keywords of one call
-    family: BodyFamily,
+    family: Family,
     sensors: Channels,
     inputs: Channels,
     frequencies: Any,
@@ -175,7 +175,7 @@ def place(  # noqa: PLR0913  keywords of one call
     n_sensors: int,
     n_inputs: int = 1,
     noise: float = 0.0,
-    floor: float = 0.0,
+    floor: float | None = None,
     quantity: str = "acceleration",
     fixed: Any = (),
     attached: Attached | None = None,
@@ -189,17 +189,20 @@ def place(  # noqa: PLR0913  keywords of one call
     are left out one by one, and chosen ones are exchanged until no exchange gains.
 
     Args:
-        family: from `rom.reduce_parametric`, with moduli and densities, in SI units.
+        family: from `rom.reduce_parametric`, with moduli and densities, in SI units; or several,
+            as a `rom.parametric.FamilyAssembly`.
         sensors: candidates.
         inputs: candidates.
         frequencies: (n_f,) lines that will be measured [Hz].
         n_sensors: number of sensors to choose.
         n_inputs: number of inputs to choose.
         noise: standard deviation of real and imaginary part, over |H| [1].
-        floor: the same where there is no response, per unit force [unit of the quantity per N].
+        floor: the same where there is no response, per unit force [unit of the quantity per N];
+            None for a thousandth of the largest response: 60 dB below it cables and analysers see
+            themselves. Without a floor antiresonances tell more than they can.
         quantity: "displacement", "velocity" or "acceleration".
         fixed: what will be held, see `FlexibleBody.frequencies`.
-        attached: {name: `GroundSpring` or `AddedMass`} with unknown factors.
+        attached: {name: `GroundSpring`, `AddedMass` or `JointSpring`} with unknown factors.
         damping: expected ratio of all modes [1].
         prior: {name: relative standard deviation [1] of its factor before the test}; without one
             the logarithm of its range.
@@ -212,18 +215,23 @@ def place(  # noqa: PLR0913  keywords of one call
     """
     check_damping_ratio(damping)
     one_of("quantity", quantity, tuple(DERIVATIVES))
-    if family.body.units != "SI":
-        raise ConfigError(f"the family is in {family.body.units}; plan in SI units.")
-    if min(noise, floor) < 0 or not 0 < finite("noise + floor", noise + floor, ()):
+    bodies = Parts.of(family).bodies
+    if other := {body.units for body in bodies.values()} - {"SI"}:
+        raise ConfigError(f"the family is in {other.pop()}; plan in SI units.")
+    least = 0.0 if floor is None else floor
+    if min(noise, least) < 0 or not 0 < finite("noise + floor", noise + least, ()):
         raise ConfigError("noise and floor are not negative, and one of them is positive.")
     omega = 2 * np.pi * np.atleast_1d(finite("frequencies", frequencies, None))
     if not omega.size or omega.min() <= 0:
         raise ConfigError("frequencies must lie above zero.")
-    rows = sensors.rows(family.body, "sensor"), inputs.rows(family.body, "input")
+    rows = sensors.rows(bodies, "sensor"), inputs.rows(bodies, "input")
     whole("n_sensors", n_sensors, 1, len(rows[0]), reason="candidates")
     whole("n_inputs", n_inputs, 1, len(rows[1]), reason="candidates")
     model = family_model(family, rows, dict(attached or {}), {}, fixed)
-    error = _Error(noise, floor, DERIVATIVES[quantity])
+    order = DERIVATIVES[quantity]
+    if floor is None:
+        floor = DYNAMIC_RANGE * _largest(model, omega, damping, order)
+    error = _Error(noise, floor, order)
     blocks, known, names = _information(model, omega, damping, prior or {}, error)
     s, e = _chosen(blocks, known, len(model.names), n_sensors, n_inputs)
     N = known + blocks[np.ix_(s, e)].sum(axis=(0, 1))
@@ -257,6 +265,18 @@ class _Error:
     def of(self, H: Complex, omega: Array) -> Array:
         """Standard deviation (n_f, n_s, n_e) of displacement per force, both parts [m/N]."""
         return np.hypot(self.noise * np.abs(H), self.floor / omega[:, None, None] ** self.order)
+
+
+def _largest(model: FamilyModel, omega: Array, damping: float, order: int) -> float:
+    """Largest response at factors of one, a derivative of this order [1/N]."""
+    x = np.clip(np.zeros(len(model.names)), np.log(model.low), np.log(model.high))
+    lines = max(1, BLOCK_VALUES // (len(model.seen) * len(model.driven)))
+    sizes = []
+    for first in range(0, omega.size, lines):
+        w = omega[first : first + lines]
+        size = np.abs(responses_at(model, x, np.array([damping]), w)).max(axis=(1, 2))
+        sizes.append((w**order * size).max())
+    return float(max(sizes))
 
 
 def _information(

@@ -5,6 +5,8 @@ Source:
     (1948) 50.
 """
 
+from collections.abc import Iterable
+
 import numpy as np
 from scipy.stats import chi2
 
@@ -22,6 +24,7 @@ KNOWN_FACTORS = {
     1e-3: "metres taken for millimetres",
 }
 MAX_LOG_LEVEL = 1.5  # of all responses: a factor of 4.5, which no range of moduli explains
+LEFT_LOG_LEVEL = 0.7  # of a sensor at the end of the search: a factor of two
 FACTOR_LOG_ATOL = 0.7  # within which a known factor is named
 MIN_PHASE_COSINE = -0.4  # mean over the lines: a sensor of which measures the other direction
 MIN_OTHERS_COSINE = 0.2  # mean over the other sensors, without which phases say nothing
@@ -32,40 +35,81 @@ MAX_UNLIKE = 0.5  # one less the median FRAC: more is another body
 UNSEEN_RTOL = 0.5  # of a parameter's range: a wider standard deviation says nothing new
 
 
-def check_channels(H: Complex, data: Data) -> None:
-    """Refuse responses whose scale or sign no parameter explains.
+def check_channels(models: Iterable[Complex], data: Data) -> None:
+    """Refuse responses whose scale or sign no model explains.
 
     Args:
-        H: (n_f, n_s, n_e) of the model before updating [m/N].
+        models: (n_f, n_s, n_e) responses before updating, then with one factor after another at
+            the ends of its range, which are only asked for where the first ones do not fit [m/N].
         data: what was measured.
 
     Raises:
         ConfigError: naming the sensor, the factor and its likely reason.
     """
-    used = data.weight > 0
+    found: dict[str, tuple[str, str]] = {}
+    for k, H in enumerate(models):
+        here = suspects(H, data, MAX_LOG_LEVEL, unsure=k > 0)
+        found = here if k == 0 else {key: found[key] for key in found if key in here}
+        if not found:
+            return
+    for message, hint in found.values():
+        raise ConfigError(message, hint=hint)
+
+
+def suspects(
+    H: Complex, data: Data, most: float, *, unsure: bool = False
+) -> dict[str, tuple[str, str]]:
+    """{"level 3", "sign of input 1": (message, hint)} of channels that differ from a model.
+
+    Args:
+        H: (n_f, n_s, n_e) of the model [m/N].
+        data: what was measured.
+        most: logarithm of a level that is taken.
+        unsure: whether signs are listed too that the model says little about.
+    """
+    used, found = data.weight > 0, {}
     size = np.abs(H).max(axis=(0, 2))
     for s in np.flatnonzero((size < DEAD_RATIO * size.max()) & used.any(axis=(0, 2))):
-        raise ConfigError(
+        found[f"level {s}"] = (
             f"sensor {s} moves by {size[s] / size.max():.1e} of the largest response of the model: "
             "a support or symmetry keeps it still.",
-            hint="Leave it out, or give it the coherence 0.",
+            "Leave it out, or give it the coherence 0.",
         )
     log = wrapped(data.logarithm - np.log(H))
-    level = np.array([np.median(log.real[:, s][used[:, s]]) if used[:, s].any() else 0.0
-                      for s in range(H.shape[1])])  # fmt: skip
-    common = float(np.median(level))
-    if abs(common) > MAX_LOG_LEVEL:
-        raise ConfigError(
+    return found or _levels(log.real, used, most) | _turned(np.cos(log.imag), used, unsure)
+
+
+def _levels(log: Array, used: Mask, most: float) -> dict[str, tuple[str, str]]:
+    """Sensors beside all of them, inputs beside the other ones, and all beside the model."""
+    found = {}
+    sensors, inputs = (_medians(log, used, axis) for axis in (1, 2))
+    for e, level in enumerate(inputs):
+        others = float(np.median(np.delete(inputs, e))) if inputs.size > 1 else level
+        if abs(level - others) > most and abs(level) > abs(others):
+            found[f"level of input {e}"] = (
+                f"responses to input {e} are {np.exp(level):.3g} times those of the model"
+                f"{_reason(level)}, to others {np.exp(others):.3g} times.",
+                "Check the scale, the direction and the place of this force.",
+            )
+    common = float(np.median(sensors))
+    if abs(common) > most and not found:
+        found["level of all"] = (
             f"all responses are {np.exp(common):.3g} times those of the model{_reason(common)}.",
-            hint="Check units, quantity, and whether the data are of this body.",
+            "Check units, quantity, and whether the data are of this body.",
         )
-    for s in np.flatnonzero(np.abs(level - common) > MAX_LOG_LEVEL):
-        raise ConfigError(
-            f"sensor {s} gives {np.exp(level[s]):.3g} times the model{_reason(level[s])}, the "
+    for s in np.flatnonzero(np.abs(sensors - common) > most):
+        found[f"level {s}"] = (
+            f"sensor {s} gives {np.exp(sensors[s]):.3g} times the model{_reason(sensors[s])}, the "
             f"others {np.exp(common):.3g} times.",
-            hint="Check its scale, its direction and its place.",
+            "Check its scale, its direction and its place.",
         )
-    _check_signs(np.cos(log.imag), used)
+    return found
+
+
+def _medians(log: Array, used: Mask, axis: int) -> Array:
+    """(k,) median of what counts for each channel; zero without."""
+    pairs = zip(np.moveaxis(log, axis, 0), np.moveaxis(used, axis, 0), strict=True)
+    return np.array([np.median(own[kept]) if kept.any() else 0.0 for own, kept in pairs])
 
 
 def _reason(level: float) -> str:
@@ -75,17 +119,27 @@ def _reason(level: float) -> str:
     return ""
 
 
-def _check_signs(cosine: Array, used: Mask) -> None:
-    count = np.maximum(used.sum(axis=(0, 2)), 1)
-    mean = (cosine * used).sum(axis=(0, 2)) / count
-    for s in np.flatnonzero(mean < MIN_PHASE_COSINE):
-        others = np.delete(mean, s)
-        if others.size and np.median(others) > MIN_OTHERS_COSINE:
-            raise ConfigError(
-                f"sensor {s} moves against the model (mean cosine of the phase {mean[s]:.2f}; "
-                f"{np.median(others):.2f} of the others): it looks turned around.",
-                hint="Turn its direction, or see whether two cables are exchanged.",
-            )
+def _turned(cosine: Array, used: Mask, unsure: bool) -> dict[str, tuple[str, str]]:
+    """Sensors and inputs of which phases run against the model while those of others do not."""
+    most, found = 0.0 if unsure else MIN_PHASE_COSINE, {}
+    hint = "Turn its direction, or see whether two cables are exchanged."
+    for what, axes in (("sensor", (0, 2)), ("input", (0, 1))):
+        mean = (cosine * used).sum(axis=axes) / np.maximum(used.sum(axis=axes), 1)
+        for k in range(mean.size):
+            others = float(np.median(np.delete(mean, k))) if mean.size > 1 else 0.0
+            if mean[k] < most if others > MIN_OTHERS_COSINE else unsure:
+                found[f"sign of {what} {k}"] = (
+                    f"{what} {k} moves against the model (mean cosine of the phase {mean[k]:.2f}; "
+                    f"{others:.2f} of the others): it looks turned around.",
+                    hint,
+                )
+    if mean.max() < most:
+        found["sign of all"] = (
+            f"all responses run against the model (mean cosine of the phase {mean.max():.2f}): "
+            "forces or sensors look turned around.",
+            "Turn the direction of the force, or see whether it is that of the reaction.",
+        )
+    return found
 
 
 def scores(normal: Array, gradient: Array, free: Index, names: tuple[str, ...]) -> dict[str, float]:
@@ -137,17 +191,17 @@ def verdict(s: Sums, data: Data, n: int, missing: dict[str, float], doubts: list
     """
     freedom = data.n_values - n
     counted = 2.0 * (data.weight > 0)
-    rows = [_chi_row("chi-square of all residuals", s.chi_square, freedom, 1)]
+    rows = [chi_row("chi-square of all residuals", s.chi_square, freedom, 1)]
     n_s = s.squares.shape[1]
     worst = [(_deviation(s.squares[:, k].sum(), counted[:, k].sum()), k) for k in range(n_s)]
     k = max(worst)[1]
-    rows.append(_chi_row(f"worst sensor, {k}", s.squares[:, k].sum(), counted[:, k].sum(), n_s))
+    rows.append(chi_row(f"worst sensor, {k}", s.squares[:, k].sum(), counted[:, k].sum(), n_s))
     blocks = np.array_split(np.arange(data.omega.size), min(N_BANDS, data.omega.size))
     worst = [(_deviation(s.squares[b].sum(), counted[b].sum()), j) for j, b in enumerate(blocks)]
     b = blocks[max(worst)[1]]
     hz = data.omega[b[[0, -1]]] / (2 * np.pi)
     name = f"worst band, {hz[0]:.4g} to {hz[1]:.4g} Hz"
-    rows.append(_chi_row(name, s.squares[b].sum(), counted[b].sum(), len(blocks)))
+    rows.append(chi_row(name, s.squares[b].sum(), counted[b].sum(), len(blocks)))
     if missing:
         worst_name = max(missing, key=lambda name: abs(missing[name]))
         quantity = f"largest score, {worst_name} [deviations]"
@@ -190,7 +244,7 @@ def _deviation(value: float, freedom: float) -> float:
     return float((value - freedom) / np.sqrt(2 * max(freedom, 1.0)))
 
 
-def _chi_row(name: str, value: float, freedom: float, trials: int) -> Row:
+def chi_row(name: str, value: float, freedom: float, trials: int) -> Row:
     """Chi-square over its expectation; the limit is kept by a right model but for one in 1000."""
     freedom = max(freedom, 1.0)
     limit = chi2.isf(MAX_FALSE_REFUSAL / trials, freedom) / freedom

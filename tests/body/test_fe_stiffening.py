@@ -17,10 +17,10 @@ from cases.beam import gauss_hermite, hermite_beam
 from cases.long import SHARED_BY, few
 from cases.ranks.environment import ENVIRONMENT
 from rom.body.prestress import UnitLoads, _turning, centrifugal
+from rom.body.recovery import CENTRIFUGAL_LOADS
 from rom.body.rotating import rotating_matrices
 from rom.body.stiffening import (
     ANGULAR_LOADS,
-    CENTRIFUGAL_LOADS,
     LINEAR_LOADS,
     elastic_loads,
     interface_loads,

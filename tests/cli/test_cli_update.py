@@ -28,7 +28,7 @@ ATTACHED = ["--spring", "soil=tip:0,2e5,3e5:0.1:10", "--mass", "cable=tip:0.4:0.
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """A family, a test of it as HDF5, and a body alone."""
+    """A family, two tests of it as HDF5, one with a sensor at the force, and a body alone."""
     pytest.importorskip("h5py", reason="h5py is not installed")
     path = tmp_path_factory.mktemp("update")
     part = composite(
@@ -42,16 +42,21 @@ def folder(tmp_path_factory):
     rom.save(family.body, path / "body.rom.npz")
     points = [[x, y, 0.08] for x in (0.5, 0.75, 1.0) for y in (0.0, 0.1)]
     sensors = Channels(np.repeat(points, 2, axis=0), np.tile([[0, 1, 0], [0, 0, 1]], (6, 1)))
-    force = Channels([[0.75, 0.1, 0.0]], [[0, 1, 2]])
     true = family.at(**TRUE)
     omega, Phi = true.modes(fixed=("root",))
     f = np.linspace(20, 900, 80)
     w = 2 * np.pi * f[:, None]
-    seen, driven = (c.rows(true, "sensor") @ Phi for c in (sensors, force))
-    H = np.einsum("sn,fn,en->fse", seen, 1 / (omega**2 - w**2 + 0.04j * w * omega), driven)
-    H = noisy(H, np.sqrt(2) * 0.02, np.random.default_rng(2))
-    test = Responses(f, H, sensors, force, 1 / (1 + 2 * 50 * 0.02**2), 50)
-    rom.io.write_responses(test, path / "test.h5")
+    own = np.delete(np.arange(12), 10)  # of two along y on the rigid face of the tip one is enough
+    independent = Channels(sensors.points[own], sensors.directions[own])
+    for name, seeing, force in (
+        ("test.h5", sensors, Channels([[0.75, 0.1, 0.0]], [[0, 1, 2]])),
+        ("driven.h5", independent, Channels(sensors.points[7], sensors.directions[7])),
+    ):
+        seen, driven = (c.rows(true, "sensor") @ Phi for c in (seeing, force))
+        H = np.einsum("sn,fn,en->fse", seen, 1 / (omega**2 - w**2 + 0.04j * w * omega), driven)
+        H = noisy(H, np.sqrt(2) * 0.02, np.random.default_rng(2))
+        test = Responses(f, H, seeing, force, 1 / (1 + 2 * 50 * 0.02**2), 50)
+        rom.io.write_responses(test, path / name)
     return path
 
 
@@ -60,9 +65,9 @@ def there(folder, monkeypatch):
     monkeypatch.chdir(folder)
 
 
-def answered(words, capsys, code=0):
+def answered(words, capsys, code=0, file="test.h5"):
     capsys.readouterr()
-    assert main(["update", "test.h5", *WORDS, *words, "--json"]) == code
+    assert main(["update", file, *WORDS, *words, "--json"]) == code
     found = json.loads(capsys.readouterr().out)
     assert errors(found, schema("update")) == []
     return found
@@ -102,6 +107,20 @@ def test_springs_masses_candidates_and_priors_are_taken(capsys):
     assert set(found["scores"]) == {"outer", "cable"} and found["failed"]
 
 
+def test_equations_are_taken_with_their_rank_and_a_prior(capsys):
+    words = ["--residual", "equations", "--rank", "7", "--prior", "inner=0.01"]
+    found = answered(words, capsys, code=5, file="driven.h5")
+    same = rom.update(
+        rom.load("family.rom.npz"), rom.io.read_responses("driven.h5"), fixed=("root",),
+        damping=0.02, residual="equations", rank=7, prior={"inner": 0.01},
+    )  # fmt: skip
+    assert found["factors"] == same.factors and found["deviations"] == same.deviations
+    free = answered(words[:4], capsys, code=5, file="driven.h5")
+    unbiased = answered(["--residual", "response-function"], capsys, file="driven.h5")
+    assert unbiased["factors"]["inner"] == pytest.approx(TRUE["inner"], rel=0.01)
+    assert found["deviations"]["inner"] < 0.01 and found["factors"] != free["factors"]
+
+
 @pytest.mark.parametrize("ending", ["csv", "uff"])
 def test_a_test_is_planned(capsys, ending):
     words = ["--plan", "5,2", "--lines", "20:900", "--noise", "0.02", "--prior", "inner=0.3",
@@ -128,7 +147,7 @@ def test_a_plan_is_drawn_and_has_a_size_of_its_own(capsys):
     found = json.loads(capsys.readouterr().out)
     assert [len(found["plan"][name]) for name in ("sensors", "inputs")] == [8, 1]
     assert Path("plan.png").read_bytes()[:4] == b"\x89PNG"
-    quiet = answered_plan(words[:3], capsys)  # without a floor antiresonances tell too much
+    quiet = answered_plan([*words[:4], "0"], capsys)  # without a floor antiresonances tell too much
     for name in TRUE:
         assert found["deviations"][name] > 2 * quiet["deviations"][name]
 
@@ -168,6 +187,8 @@ def test_what_is_wrong_with_the_options_is_said(capsys):
     refused(["--spring", "soil=tip:2e5:0.1"], "is not INTERFACE:VALUE:LOW:HIGH")
     refused(["--mass", "cable=tip:heavy:0.1:10"], "--mass: 'heavy' is not a number")
     refused([*ATTACHED[:2], "--mass", "soil=tip:1:0.1:10"], "soil is a --spring and a --mass")
+    refused(["--rank", "3"], "rank belongs to the residual of equations")
+    refused(["--residual", "equations"], "input 0 has no sensor at its point")
     refused(["--candidate", "cable"], "--candidate cable is neither")
     refused(["--family", "body.rom.npz"], "holds one body, without parameters")
     refused(["-o", "family.rom.npz"], "family.rom.npz")

@@ -12,7 +12,14 @@ from rom.eigen import dissection, fronts, substructuring
 from rom.eigen.scipy import SciPyOperators
 from rom.eigen.substructuring import lehmann_bounds, substructured_modes
 from rom.eigen.verbs import rigid_motions
-from rom.errors import ConfigError, InterfaceError, ModelError, ModesMissedError, SolverError
+from rom.errors import (
+    ConfigError,
+    InterfaceError,
+    ModelError,
+    ModesMissedError,
+    ResourceError,
+    SolverError,
+)
 
 ROUND_OFF = 1e-10  # of frequencies of dense solutions, 1e-16 times the ratio of the extremes
 
@@ -157,7 +164,9 @@ def test_the_transformed_body_is_the_body():
     T = whole.expand(np.eye(K.shape[0]))
     assert len(whole.parts) > 6
     assert_allclose(T.T @ (K @ T), np.eye(K.shape[0]), atol=1e-9)
-    assert_allclose(T.T @ (M @ T), whole.mass, atol=1e-12 * whole.mass.max())
+    mass = whole.apply_mass(np.eye(K.shape[0]))
+    assert_allclose(T.T @ (M @ T), mass, atol=1e-12 * mass.max())
+    assert_allclose(whole.compliance, np.diag(mass))
     F = np.random.default_rng(0).normal(size=(K.shape[0], 3))
     assert_allclose(K @ whole.solve(F), F, atol=1e-8)
 
@@ -237,6 +246,44 @@ def test_what_does_not_suit_is_refused():
     two = block_diag([K] * 2, "csr"), block_diag([M] * 2, "csr")
     with pytest.raises(ModelError, match="6 motions without stiffness more"):
         substructured_modes(*two, 1e4, rigid=np.vstack([rigid] * 2))
+
+
+def test_modes_of_substructures_by_lanczos_are_those_of_the_dense_problem(monkeypatch):
+    """Up to a limit, two of whose modes are so near to each other that a block must hold both."""
+    K, M, _ = body((0.3, 0.05, 0.05), (10, 2, 2), held=True)
+    lam = exact(K, M, None) ** 2
+    whole = fronts.SubstructuredBody(K, M, 6.0 * lam[24])
+    dense = substructuring._kept_modes(whole, lam[24], whole.n_kept)
+    monkeypatch.setattr(substructuring, "LANCZOS_WIDTH", 4)
+    monkeypatch.setattr(substructuring, "LOOSE_SHARE", 0.0)
+    monkeypatch.setattr(substructuring, "LANCZOS_RTOL", 1e-8)
+    monkeypatch.setattr(substructuring, "capacity", lambda k: k + 30)  # too narrow at first
+    Y = substructuring._kept_modes(whole, lam[24], 2)
+    assert Y.shape == dense.shape and whole.n_kept > 2 * (Y.shape[1] + 30)
+    assert_allclose(np.sum(Y**2, axis=0), np.sum(dense**2, axis=0), rtol=1e-9)
+    assert_allclose(Y.T @ whole.apply_mass(Y), np.eye(Y.shape[1]), atol=1e-9)
+
+
+def test_the_search_by_lanczos_keeps_all_bounds(monkeypatch):
+    monkeypatch.setattr(substructuring, "capacity", lambda k: k + 60)
+    K, M, rigid = body((0.3, 0.07, 0.05), (6, 3, 2))
+    certain(K, M, rigid, exact(K, M, rigid)[26] * 1.003 / (2 * np.pi))
+
+
+@pytest.mark.parametrize(
+    ("module", "what"),
+    [(fronts, "360 dofs in dense blocks"), (substructuring, "modes of 360 dofs")],
+)
+def test_too_little_memory_is_said_before(monkeypatch, module, what):
+    """First what the blocks take, then what the modes do; with a frequency that is not too high."""
+    K, M, _ = body((0.2, 0.05, 0.04), (4, 2, 1), held=True)
+    refuse = fronts.refuse_beyond
+    monkeypatch.setattr(fronts, "free_bytes", lambda: 1e3)
+    if module is substructuring:
+        monkeypatch.setattr(fronts, "refuse_beyond", lambda *a: None)
+        monkeypatch.setattr(substructuring, "refuse_beyond", refuse)
+    with pytest.raises(ResourceError, match=rf"{what} takes .* GiB; 9.31e-07 GiB are free"):
+        substructured_modes(K, M, 2e4)
 
 
 def test_a_mode_that_is_missed_is_said(monkeypatch):

@@ -7,6 +7,7 @@ from scipy.linalg import eigh
 
 import rom
 from cases.boxes import box
+from rom.eigen import lanczos
 from rom.errors import InterfaceError
 
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")
@@ -16,7 +17,7 @@ from rom.eigen.completeness import LEAST_SHARE  # noqa: E402
 from rom.eigen.condensed import condensed  # noqa: E402
 from rom.eigen.verbs import constraint_modes  # noqa: E402
 from rom.fe.elasticity import assemble  # noqa: E402
-from rom.fe.operators import factor, lanczos, petsc, spectrum  # noqa: E402
+from rom.fe.operators import factor, petsc, spectrum  # noqa: E402
 from rom.reduction.interfaces.connection import connect  # noqa: E402
 from rom.workflow import operators  # noqa: E402
 
@@ -79,6 +80,23 @@ def test_deflections_in_a_support_are_those_of_the_matrices(kind):
     assert not u[dofs].any()
     assert_allclose(u[free], np.linalg.solve(K[np.ix_(free, free)], F[free]),
                     atol=1e-8 * np.abs(u).max())  # fmt: skip
+
+
+def test_a_body_that_carries_a_few_dofs_is_solved_by_the_factor_without_them():
+    """As with the matrix in which averages of a face make dense blocks."""
+    model = beam((9, 3, 2), degree=2)
+    connection = connect(operators(model), model, {"x0": "rbe3", "x1": "rbe3"})
+    ops, inside = connection.ops, np.setdiff1d(np.arange(connection.ops.n), connection.boundary)
+    part = ops.part(inside)
+    assert isinstance(part, petsc.CarryingOperators) and part.carried.size == 12
+    whole, _ = matrices(ops)
+    K = whole[np.ix_(inside, inside)]
+    assert_allclose(part.apply_K(np.eye(part.n)), K, atol=1e-12 * np.abs(K).max())
+    F = np.random.default_rng(3).standard_normal((part.n, 3))
+    u = part.stiffness_inverse(None).solve(F)
+    assert_allclose(u, np.linalg.solve(K, F), atol=1e-9 * np.abs(u).max())
+    n_entries = [A.getInfo()["nz_used"] for A in (part.bare.K, part.K)]
+    assert n_entries[0] < 0.9 * n_entries[1]  # the factor is of the first
 
 
 def test_loads_in_balance_bend_the_free_body():

@@ -198,6 +198,35 @@ def test_a_disk_that_would_fill_is_named_with_folder_and_size(tmp_path, monkeypa
     assert not list(tmp_path.iterdir())
 
 
+DEAF_PROCESS = """
+import ctypes
+from rom.fe.operators import disk
+disk.LEAST_FREE_BYTES = 1 << 60
+with disk.watched():
+    ctypes.PyDLL(None).sleep(60)  # as deaf as one that waits for a writer
+"""
+
+
+def test_a_process_that_waits_for_a_full_disk_is_ended_and_says_so(tmp_path, monkeypatch):
+    """What counts as full is more than any disk has free."""
+    monkeypatch.setenv("MUMPS_OOC_TMPDIR", str(tmp_path))
+    ran = subprocess.run([sys.executable, "-c", DEAF_PROCESS], capture_output=True, timeout=60)
+    assert ran.returncode < 0
+    assert f"ResourceError: the disk of {tmp_path} filled while a".encode() in ran.stderr
+
+
+@pytest.mark.parametrize("kind", ["direct", "out-of-core"])
+def test_the_disk_is_watched_while_a_factor_is_written(block, monkeypatch, kind):
+    from rom.fe.operators import factor
+    from rom.fe.operators.solver import parsed
+
+    seen, watched = [], factor.watched
+    monkeypatch.setattr(factor, "watched", lambda: seen.append(1) or watched())
+    F = factor.Factor(operators(block).K, definite=True, solver=parsed(kind))
+    assert len(seen) == (kind == "out-of-core")
+    F.release()
+
+
 def test_a_folder_that_is_missing_is_named(block, monkeypatch, tmp_path):
     from rom.fe.operators.factor import Factor
     from rom.fe.operators.solver import parsed

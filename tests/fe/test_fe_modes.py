@@ -9,13 +9,14 @@ from scipy.linalg import eigh
 
 import rom
 from cases.boxes import box, faces_held
+from rom.eigen import lanczos
 from rom.errors import ConfigError, InterfaceError, ModelError, ModesMissedError, ResourceError
 
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")
 pytestmark = pytest.mark.fenicsx
 
 from rom.fe.elasticity import assemble  # noqa: E402
-from rom.fe.operators import factor, lanczos, memory, petsc, spectrum  # noqa: E402
+from rom.fe.operators import factor, memory, petsc, spectrum  # noqa: E402
 
 STEEL = rom.Material(E=210e9, nu=0.3, rho=7850.0)
 

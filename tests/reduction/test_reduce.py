@@ -326,6 +326,9 @@ def test_messages_for_wrong_interfaces(model, body):
         "twin", one.nodes[:3], one.points[:3], one.surface_mass[:3, :3], one.origin
     )
     shared = rom.FEModel(model.K, model.M, model.points, {"root": one, "twin": twin})
+    other = replace(model, interfaces=model.interfaces | {"hub": model.interfaces["tip"]})
+    with pytest.raises(InterfaceError, match="'hub' of the model calls itself 'tip'"):
+        connect(operators(other), other, {"hub": "rbe2"})
     with pytest.raises(InterfaceError, match="'root' and 'twin' share 3 nodes"):
         rom.reduce(shared, method=rom.CraigBampton(3), interfaces={"root": "rbe2", "twin": "rbe2"})
 

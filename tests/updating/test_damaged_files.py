@@ -1,6 +1,7 @@
 """Files of tests damaged one way after another: each is named, none is taken for whole."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -127,6 +128,57 @@ def test_what_is_wrong_in_a_table_is_named(family, responses, tmp_path, name):
     with pytest.raises(RomError) as caught:
         updated(family, written(tmp_path, damage(responses), **more))
     assert re.search(words, str(caught.value)), str(caught.value)
+
+
+def swapped(H, k, rng):
+    """The cable of the next sensor."""
+    own = np.arange(H.shape[1])
+    own[[k, k - 1]] = k - 1, k
+    return H[:, own]
+
+
+def no_signal(H, k, rng):
+    H = H.copy()
+    H[:, k] = np.abs(H[:, k]).mean() * np.exp(2j * np.pi * rng.random(len(H)))
+    return H
+
+
+def some_lost(H, k, rng):
+    H = H.copy()
+    H[rng.choice(len(H), 3, replace=False), k] = np.nan
+    return H
+
+
+GENERATED = {
+    "turned": (lambda H, k, rng: scaled(-1.0, k)(H), "turned around"),
+    "in g": (lambda H, k, rng: scaled(1 / 9.80665, k)(H), "in g|for g"),
+    "taken for g": (lambda H, k, rng: scaled(9.80665, k)(H), "in g|for g"),
+    "in millimetres": (lambda H, k, rng: scaled(1e3, k)(H), "millimetres"),
+    "taken for millimetres": (lambda H, k, rng: scaled(1e-3, k)(H), "millimetres"),
+    "a quarter less": (lambda H, k, rng: scaled(0.75, k)(H), "worst sensor"),
+    "lost lines": (some_lost, "not finite at 3 lines"),
+    "swapped": (swapped, "sensor"),
+    "no signal": (no_signal, "sensor"),
+}
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("name", GENERATED)
+def test_a_sensor_drawn_at_random_is_named(family, responses, tmp_path, name, seed):
+    """Ranges from 0.1 to 10 explain a level by themselves: the verdict then says what is wrong."""
+    wide = {n: replace(p, low=0.1, high=10.0) for n, p in family.parameters.items()}
+    wide = family if seed == 0 else replace(family, parameters=wide)
+    rng = np.random.default_rng([seed, *name.encode()])
+    k = int(rng.integers(responses.shape[1]))
+    damage, why = GENERATED[name]
+    try:
+        words = str(updated(wide, written(tmp_path, damage(responses, k, rng))).verdict)
+    except RomError as error:
+        words = str(error)
+    numbers = {k, (k - 1) % responses.shape[1]} if name == "swapped" else {k}
+    named = re.findall(r"ensors?,? (\d+)", words)
+    assert {int(n) for n in named} <= numbers and named, words
+    assert re.search(why, words), words
 
 
 def test_a_table_that_is_cut_is_named_at_each_place(responses, tmp_path):

@@ -8,6 +8,7 @@ from numpy.testing import assert_allclose
 from scipy.stats import chi2
 
 import rom
+from cases.mbs.fmu_instance import Instance, fmpy
 from cases.solid import STEEL, composite
 from rom.body.recovery import StressRecovery
 from rom.errors import ConfigError, ParameterError, SolverError
@@ -228,6 +229,56 @@ def test_a_joint_that_loosens_is_followed(family):
     stays = t.held().run(y)  # a filter that does not follow is surprised
     assert stays.surprise[1500:].sum() > chi2.ppf(1 - 1e-6, 3 * 500)
     assert found.surprise[1500:].sum() < chi2.ppf(1 - 1e-6, 3 * 500)
+
+
+def test_the_fmu_follows_as_python_does(family, tmp_path):
+    """400 steps in which the point of linearisation moves; a state is kept and taken up again."""
+    t = made(family, parameters=DRIFTS | {"rho_outer": Drift(0.05, 0.02)})
+    _, _, y = walked(t, np.random.default_rng(1), 400)
+    path = rom.io.write_observer_fmu(t, tmp_path / "joint.fmu")
+    assert fmpy.validation.validate_fmu(str(path)) == []
+    one, expected = Instance(path, tmp_path).begin(), t.run(y)
+    assert np.ptp(np.log(expected.factors), axis=0).min() > 2 * LINEAR_REACH
+    wanted = ("displacement[1]", "stress[1]", "force[1]", *(f"factor.{name}" for name in t.names))
+    sensors = ("strain[1]", "acceleration[1]", "acceleration[2]")
+    found = []
+    for k, sample in enumerate(y):
+        if k == 100:
+            kept = one.fmu.getFMUState()
+        if k == 120:
+            one.fmu.setFMUState(kept)
+            for j in range(100, 120):  # the same again
+                step(one, sensors, y[j], j)
+        step(one, sensors, sample, k)
+        found.append([one.get(*(f"{kind}.{name}" for name in wanted))
+                      for kind in ("estimate", "deviation")])  # fmt: skip
+    for j, parts in enumerate(
+        (("values", "forces", "factors"), ("deviations", "force_deviations", "factor_deviations"))
+    ):
+        same = np.hstack([getattr(expected, part) for part in parts])
+        scale = np.abs(same).max(axis=0)
+        assert_allclose(np.array(found)[:, j] / scale, same / scale, rtol=0, atol=1e-10)
+
+
+def step(one, sensors, sample, k):
+    for name, value in zip(sensors, sample, strict=True):
+        one.set(f"sensor.{name}", value)
+    one.fmu.doStep(k * DT, DT)
+
+
+def test_the_fmu_names_the_parameter_that_leaves_its_range(family, tmp_path):
+    narrow = {"clamp": replace(SPRING["clamp"], low=0.97, high=1.03)}
+    t = made(family, attached=narrow)
+    _, _, y = walked(made(family), np.random.default_rng(2), 400)
+    with pytest.raises(SolverError, match="'clamp' has reached"):
+        t.run(y)
+    one = Instance(rom.io.write_observer_fmu(t, tmp_path / "joint.fmu"), tmp_path).begin()
+    sensors = ("strain[1]", "acceleration[1]", "acceleration[2]")
+    with pytest.raises(fmpy.fmi1.FMICallException):
+        for k, sample in enumerate(y):
+            step(one, sensors, sample, k)
+    assert "parameter 'clamp' has reached the factor" in one.log[-1]
+    assert "from 0.97 to 1.03" in one.log[-1]
 
 
 def test_what_cannot_be_followed_is_named(family, filter_):

@@ -141,6 +141,18 @@ def test_what_is_not_seen_is_named(family):
     assert not any("rho_outer" in v for v in known.unseen)
 
 
+def test_the_floor_is_a_thousandth_of_the_largest_response(family):
+    """Accelerations per force of the finest peak among the candidates, at factors of one."""
+    offered = candidates(family.body, 4, fixed=("root",))
+    rows = offered.rows(family.body, "candidate")
+    H = responses_at(family_model(family, (rows, rows), {}, {}, ("root",)), np.zeros(3),
+                     np.array([0.01]), 2 * np.pi * LINES)  # fmt: skip
+    largest = ((2 * np.pi * LINES) ** 2 * np.abs(H).max(axis=(1, 2))).max()
+    same = planned(family, offered, 3, shakers=offered, noise=0.05, floor=1e-3 * largest)
+    found = planned(family, offered, 3, shakers=offered, noise=0.05, floor=None)
+    assert_allclose(found.covariance, same.covariance, rtol=1e-9)
+
+
 def test_the_plan_is_written(family):
     offered = candidates(family.body, 4, fixed=("root",))
     plan = planned(family, offered, 3, n_inputs=2)

@@ -11,7 +11,7 @@ from cases.files.decks import IM, RE, X, dataset
 from cases.paths import TESTS
 from cases.solid import block
 from rom.errors import ConfigError, FileFormatError
-from rom.updating import Channels, Responses
+from rom.updating import Channels, Plan, Responses
 
 HERE = TESTS / "reference" / "foreign"
 F = np.arange(2.0, 14.0, 2.0)
@@ -46,6 +46,37 @@ def test_a_test_of_another_program_is_read_in_si_units(name):
     assert_allclose(test.inputs.points, [NODES[11]], rtol=1e-6)
     assert_array_equal(test.inputs.directions, [[0, 0, -1]])
     assert test.averages == 20 and test.quantity == "displacement"
+
+
+@pytest.mark.parametrize("binary", [0, 1])
+def test_pyuff_reads_the_points_that_are_written_and_writes_what_is_read(tmp_path, binary):
+    """The points of a plan go out, and come back with responses to a force at the last of them."""
+    pyuff = pytest.importorskip("pyuff", reason="pyuff is not installed")
+    sensors = Channels([NODES[5], NODES[9]], [[0, 1, 0], [0, 0, -1]])
+    force = Channels([NODES[11]], [[0, 0, -1]])
+    plan = Plan(sensors, force, np.arange(2), np.arange(1), (), np.zeros((0, 0)), ())
+    (tmp_path / "plan.uff").write_text(plan.uff())
+    file = pyuff.UFF(str(tmp_path / "plan.uff"))
+    found = file.read_sets(0)
+    assert file.get_set_types().tolist() == [15]
+    assert_allclose(np.column_stack([found[c] for c in "xyz"]), list(NODES.values()), atol=1e-6)
+    file = pyuff.UFF(str(tmp_path / "test.uff"))
+    file.write_sets([found], mode="add")
+    for node, axis, H in ((1, 2, ACCELERANCE[0]), (2, -3, ACCELERANCE[1])):
+        one = pyuff.prepare_58(
+            binary=binary, func_type=4, rsp_node=node, rsp_dir=axis, ref_node=3, ref_dir=-3,
+            data=H, x=F, abscissa_min=F[0], abscissa_inc=2.0, abscissa_spacing=1,
+            ordinate_spec_data_type=12, ordinate_axis_units_lab="m/s^2",
+            orddenom_spec_data_type=13, orddenom_axis_units_lab="N", abscissa_axis_units_lab="Hz",
+        )  # fmt: skip
+        file.write_sets([one], mode="add")
+    test = rom.io.read_responses(tmp_path / "test.uff", averages=20, coherence=0.9)
+    assert_allclose(test.frequencies, F)
+    assert_allclose(test.H[:, :, 0] * -((2 * np.pi * F[:, None]) ** 2), np.transpose(ACCELERANCE),
+                    rtol=1e-5)  # fmt: skip
+    for read, written in ((test.sensors, sensors), (test.inputs, force)):
+        assert_allclose(read.points, written.points, atol=1e-6)
+        assert_array_equal(read.directions, written.directions)
 
 
 @pytest.mark.parametrize(("name", "factor"), [("pyuff_test.uff", 1), ("sdynpy_test.unv", 1 + 0.5j)])

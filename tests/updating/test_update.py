@@ -12,7 +12,7 @@ from cases.solid import STEEL, composite
 from rom.errors import ConfigError, ParameterError, SolverError
 from rom.parametric.layers import Stretch
 from rom.updating import AddedMass, Channels, GroundSpring, Responses
-from rom.updating.estimate import _Search
+from rom.updating.estimate import _Before, _Search
 from rom.updating.family_model import family_model
 from rom.updating.frf_data import estimators, noisy, random_error
 from rom.updating.normal_equations import Data, responses_at, sums
@@ -165,7 +165,7 @@ def test_sums_do_not_depend_on_blocks(family, monkeypatch):
     model, data = model_of(family), Data.of(synthetic(family))
     x, ratios = np.zeros(3), np.full(4, 0.02)
     whole = sums(model, x, ratios, data)
-    monkeypatch.setattr("rom.updating.normal_equations.BLOCK_LINES", 7)
+    monkeypatch.setattr("rom.updating.methods.BLOCK_LINES", 7)
     pieces = sums(model, x, ratios, data)
     for name in ("normal", "gradient", "squares"):
         expected = getattr(whole, name)
@@ -389,13 +389,42 @@ def test_the_gradient_is_that_of_the_cost_with_its_prior(family):
     """Differences of half the cost, away from the prior; 8 modes lie below 2100 Hz."""
     test = synthetic(family, lines=LINES[::5], sensors=FEW)
     model, data = model_of(family, sensors=FEW), Data.of(test)
-    search = _Search.begun(model, data, np.ones(3, bool), 0.01, {"E_inner": 1e-3, "rho_outer": 0.1})
+    before = _Before.of({"E_inner": 1e-3, "rho_outer": 0.1}, model)
+    search = _Search.begun(model, data, np.ones(3, bool), 0.01, before)
     assert search.zeta.size == 9
     search.theta = search.theta + 0.1 * np.random.default_rng(0).standard_normal(12)
     search.sums, _ = search.at(search.theta)
     ends = [[search.at(search.theta + h)[1] for h in s * 1e-5 * np.eye(12)] for s in (1, -1)]
     expected = (np.array(ends[0]) - ends[1]) / 4e-5
     assert_allclose(search.posterior()[1], expected, atol=1e-5 * np.abs(expected).max(), rtol=1e-4)
+
+
+def test_two_tests_with_two_supports_say_more_than_one(family):
+    """Held, then free: information adds up, and a change between them is refused."""
+    held = rom.update(family, synthetic(family, lines=LINES[:60]), fixed=HELD, damping=0.02)
+    loose = synthetic(family, fixed=(), seed=1, lines=LINES[::2])
+    alone = rom.update(family, loose, damping=0.02)
+    both = rom.update(family, loose, damping=0.02, prior=held)
+    assert both.verdict.ok, both
+    precision = sum(np.linalg.inv(u.covariance[:3, :3]) for u in (held, alone))
+    mean = np.linalg.solve(precision, sum(
+        np.linalg.inv(u.covariance[:3, :3]) @ np.log(list(u.factors.values()))
+        for u in (held, alone)))  # fmt: skip
+    C = np.linalg.inv(precision)
+    assert_allclose(both.covariance[:3, :3], C, rtol=0.05, atol=0.05 * np.diag(C).min())
+    assert_allclose(np.log(list(both.factors.values())), mean, atol=0.2 * np.sqrt(np.diag(C)).min())
+    A = np.random.default_rng(0).normal(size=(len(held.names),) * 2)
+    tied = _Before.of(replace(held, covariance=A @ A.T), held.model)  # to damping: it is left open
+    assert_allclose(np.linalg.inv(tied.precision), (A @ A.T)[:3, :3], rtol=1e-9)
+    other = synthetic(family, fixed=(), seed=1, lines=LINES[::2], true=TRUE | {"E_inner": 1.35})
+    torn = rom.update(family, other, damping=0.02, prior=held)
+    assert any("distance from the test before" in row.quantity for row in torn.verdict.failures)
+    kept = rom.update(family, loose, damping=0.02, prior=held, free=("E_outer",))
+    assert kept.factors["E_inner"] == pytest.approx(held.factors["E_inner"])
+    with pytest.raises(ConfigError, match="prior for the residual of responses"):
+        rom.update(family, loose, prior=held, residual="equations")
+    with pytest.raises(ConfigError, match="found none of 'E_inner'"):
+        rom.update(family, loose, prior=replace(held, names=("zeta 1",)))
 
 
 def test_an_end_of_a_range_is_named(family):
@@ -420,7 +449,12 @@ def test_wrong_data_are_named(family):
     refused("sensor 2 gives .*1000: millimetres", H=scaled)
     refused("all responses .*9.807: acceleration in g", H=9.80665 * test.H)
     refused("all responses .*0.001: metres taken", H=1e-3 * test.H)
-    refused("zero or not finite at 1 lines, e.g. at 84.832 Hz", H=nan)
+    refused("sensors 0 is zero or not finite at 1 lines, e.g. at 84.832 Hz", H=nan)
+    for e in (0, 1):
+        pair = np.where(np.arange(2) == e, -1.0, 1.0)
+        refused(f"input {e} moves against .* turned around", H=pair * test.H)
+        refused(f"responses to input {e} are .*1000: millim", H=1000.0 ** (pair < 0) * test.H)
+    refused("all responses run against the model", H=-test.H)
     refused("sensor 0 at .* is 0.92 m off the body", sensors=Channels(
         np.asarray(SENSORS.points) + [[0, 0, 0.999 + 0.001 * (k == 0)] for k in range(16)],
         SENSORS.directions))  # fmt: skip
@@ -471,3 +505,43 @@ def test_velocities_and_accelerations_are_taken(family, quantity, power):
     same = rom.update(family, test, fixed=HELD, damping=0.02)
     for name in TRUE:
         assert_allclose(found.factors[name], same.factors[name], rtol=1e-9)
+
+
+GAUGES = Channels([[0.6, 0.0, 0.04], [0.3, 0.05, 0.08]], [[1, 0, 0]] * 2)
+AXIAL = Channels([[1.0, 0.05, 0.04]], [[1, 0, 0]])
+
+
+def test_gauges_are_sensors(family, tmp_path):
+    """A pull at the tip, far below resonance, strains a bar by F / EA; mixed with accelerations."""
+    sensors = Channels(
+        np.vstack([GAUGES.points, SENSORS.points]),
+        np.vstack([GAUGES.directions, SENSORS.directions]),
+    )
+    quantity = ("strain",) * 2 + ("acceleration",) * 16
+    true = np.log([TRUE[name] for name in PARAMETERS])
+    both = []
+    for force, lines in ((AXIAL, np.array([1.0])), (INPUTS, LINES)):
+        rows = (sensors.rows(family.body, "sensor", gauges=[q == "strain" for q in quantity]),
+                force.rows(family.body, "input"))  # fmt: skip
+        model = family_model(family, rows, {}, {}, HELD)
+        both.append(responses_at(model, true, np.array([0.02]), 2 * np.pi * lines))
+    for k, name in ((0, "E_outer"), (1, "E_inner")):
+        assert_allclose(both[0][0, k, 0].real * 0.1 * 0.08 * 210e9 * TRUE[name], 1.0, rtol=0.02)
+    s = 2j * np.pi * LINES[:, None, None]
+    H = noisy(both[1], 0.05, np.random.default_rng(0))
+    H[:, 2:] *= s**2
+    test = Responses(LINES, H, sensors, INPUTS, 1 / (1 + AVERAGES * 0.05**2), AVERAGES, quantity)
+    found = rom.update(family, test, fixed=HELD, damping=0.02)
+    assert found.verdict.ok, found
+    for name, value in TRUE.items():
+        assert abs(np.log(found.factors[name] / value)) < 4 * found.deviations[name] < 0.01
+    with pytest.raises(ConfigError, match=r"sensor 1 .* lies on no face"):
+        across = np.where(np.arange(18)[:, None] == 1, [0, 0, 1], sensors.directions)
+        rom.update(family, replace(test, sensors=Channels(sensors.points, across)), fixed=HELD)
+    with pytest.raises(ConfigError, match="17 quantities of 18 sensors"):
+        replace(test, quantity=quantity[1:])
+    with pytest.raises(ConfigError, match="quantity = 'volts'"):
+        replace(test, quantity="volts")
+    pytest.importorskip("h5py", reason="h5py is not installed")
+    rom.io.write_responses(test, tmp_path / "test.h5")
+    assert rom.io.read_responses(tmp_path / "test.h5").quantity == quantity

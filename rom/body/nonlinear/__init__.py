@@ -1,5 +1,6 @@
 """Solids at large deflection.
 
-`quartic` is the strain energy of the coordinates, `statics` balances it with loads, `geometric`
-says which deflections a body is to reach and finds the shapes for them, `cauchy` the stress.
+`quartic` is the strain energy of the coordinates, `sampled` that of neo-Hookean material by a few
+elements, `statics` balances it with loads, `ranges` says which loads a body is to bear, `geometric`
+finds the shapes for them, and `cauchy` the stress.
 """

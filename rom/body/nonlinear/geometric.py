@@ -15,18 +15,16 @@ Source:
     structural dynamics, dissertation, TU Munich (2018).
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from itertools import combinations, product
 from typing import Any
 
 import numpy as np
 from scipy.linalg import eigh
 
-from rom.arguments import typed, whole
+from rom import rotation
 from rom.body.nonlinear.quartic import Quartic
-from rom.body.nonlinear.statics import free_motions, passages
-from rom.eigen.supports import DIRECTIONS, Fixed, supports
+from rom.body.nonlinear.ranges import Geometric, Load, held_motions, nodal_forces
+from rom.body.nonlinear.statics import Held, free_motions, newton, passages
 from rom.eigen.verbs import Operators, column_blocks, mean_motion, quadratic, whole_clusters
 from rom.errors import ConfigError, InterfaceError, ModelError, ResourceError
 from rom.model import Array, Basis, FEModel, Index
@@ -37,91 +35,17 @@ DEPENDENT_RTOL = 1e-10  # energy of a derivative, of the largest, that the other
 # for slender bodies pull and bending differ by the square of the slenderness
 ROUND_OFF_RTOL = 1e-18
 EQUAL_RTOL = 1e-3  # of shares of energy: states of two planes of equal stiffness stay together
-FORCES = ("f_x", "f_y", "f_z", "m_x", "m_y", "m_z")
 N_MODES = 4  # about each state that a range leads to, for which shapes are kept
 # A mode loses 1e-4 of its stiffness if a hundredth of its energy norm is missed, states must not
 # lose that much: at the usual tolerance of 1e-4 both are met.
 MODE_SHARE = 1e-2
+N_TURNS = 4  # of moments with the section on which they act, each by what the last one left
 MAX_COORDINATES = 80
 TENSOR_COPIES = 11  # of the Gram matrix while it is ordered into tensors
 FLOP_RATE = 1e10  # of one core in a product of matrices [1/s]
 # stretch at which the force of St. Venant-Kirchhoff material, proportional to F^3 - F, has its
 # extremum: from there on a compressed layer gives way, and the equations are no longer elliptic
 ELLIPTIC_STRETCH = 3.0**-0.5
-
-
-@typed
-@dataclass(frozen=True)
-class Geometric:
-    """Large deflection under a range of loads, for `rom.reduce`.
-
-    Attributes:
-        loads: {interface: (6,) largest force [N] and moment [N m] of either sign, axes of the
-            geometry}; they keep their direction, a moment as a pair of forces.
-        n_modes: how many of the lowest fixed-interface modes drag others along, beside the
-            static shapes of the loads; a repeated frequency counts as a whole.
-        tol: how much of the energy of the states reached may be left out, as the root of its
-            share [1].
-        n_shapes: alternatively, the number of shapes added to the basis.
-        n_steps: of load on the way to its largest value, at each of which a state is taken.
-        fixed: interfaces held in the mean beside the reference while the loads act, or
-            {name: directions}: the far end of an arch, {"crown": "x rx ry rz"} at half of one.
-
-    Where the body snaps on the way to a load, its path is followed by arc length.
-
-    Raises:
-        ConfigError: for loads that are none, or numbers out of range.
-
-    Example:
-        >>> rom.Geometric(loads={"tip": (0, 200.0, 0, 0, 0, 0)}).n_steps
-        4
-    """
-
-    loads: Mapping[str, Any]
-    n_modes: int = 4
-    tol: float = 1e-4
-    n_shapes: int | None = None
-    n_steps: int = 4
-    fixed: Fixed = ()
-
-    def __post_init__(self) -> None:
-        whole("n_steps", self.n_steps, 1)
-        whole("n_modes", self.n_modes)
-        if self.n_shapes is not None:
-            whole("n_shapes", self.n_shapes, 1, reason="without any the basis locks")
-        if not 0 < self.tol < 1:
-            raise ConfigError(f"tol = {self.tol!r} is a share between 0 and 1.")
-        for name, load in self.loads.items():
-            range_ = np.asarray(load, dtype=float)
-            if range_.shape != (6,) or not np.isfinite(range_).all() or not range_.any():
-                raise ConfigError(
-                    f"the range of loads at {name!r} is {load!r}; it has six numbers, forces [N], "
-                    "then moments [N m], not all zero."
-                )
-        if not self.loads:
-            raise ConfigError(
-                "no range of loads is given, for which the shapes would be.",
-                hint='Name an interface: loads={"tip": (0, 200.0, 0, 0, 0, 0)}.',
-            )
-
-    def components(self) -> list[tuple[str, int, float]]:
-        """Interface, component and largest value [N, N m] of the loads that are not zero."""
-        return [
-            (name, k, abs(float(x)))
-            for name, load in self.loads.items()
-            for k, x in enumerate(load)
-            if x
-        ]
-
-    def load_cases(self) -> Array:
-        """(c, l) directions of the components together, each alone and each two of them [1]."""
-        n = len(self.components())
-        units = np.eye(n)
-        alone = [sign * unit for unit in units for sign in (1, -1)]
-        signs = list(product((1, -1), repeat=2))
-        skew = [(a * units[i] + b * units[j]) / np.sqrt(2)
-                for (i, j), (a, b) in product(combinations(range(n), 2), signs)]  # fmt: skip
-        return np.array(alone + skew)
 
 
 @dataclass(frozen=True)
@@ -133,12 +57,43 @@ class Shapes:
         loads: (r, l) forces of the components of the load range at their largest [N].
         held: (h, r) motions that supports let vanish.
         n_basis: how many of them the basis has already.
+        sections: of the interfaces with moments.
     """
 
     E: Array
     loads: Array
     held: Array
     n_basis: int
+    sections: list["Section"]
+
+
+@dataclass(frozen=True)
+class Section:
+    """How moments on an interface turn with it: as tractions that are linear over the section.
+
+    Attributes:
+        turn: (3, r) its rotation, of small angles, per unit of each shape [1/m].
+        moments: (3, l) components of the load range at their largest [N m].
+        tractions: (r, 3, 3, 3) forces on the shapes, [:, a, b, k], where the part b of the
+            tractions of a unit moment about axis k acts along axis a.
+    """
+
+    turn: Array
+    moments: Array
+    tractions: Array
+
+    @classmethod
+    def of(cls, ops: Operators, F: Array, E: Array, moments: Array) -> "Section":
+        """That of shapes E (n_local, r), from the nodal forces F (n_local, 3) of unit moments."""
+        return cls(ops.gram(F, E), moments, ops.gram(E, _turnable(F)).reshape(-1, 3, 3, 3))
+
+    def difference(self, case: Array, q: Array) -> Array:
+        """(r,) forces of the moments of a load case, turned with the section, less as at rest."""
+        sine, moment = self.turn @ q, self.moments @ case
+        size = max(float(np.linalg.norm(sine)), 1e-30)
+        R = rotation.matrix(rotation.exp(np.arcsin(min(size, 1.0)) / size * sine))
+        turned = np.einsum("rabk,ab,k->r", self.tractions, R, R.T @ moment)
+        return np.asarray(turned - np.einsum("raak,k->r", self.tractions, moment))
 
 
 def enriched(
@@ -175,23 +130,6 @@ def enriched(
     return replace(basis, Psi=np.hstack([basis.Psi, added]), labels=(*basis.labels, *labels))
 
 
-def held_motions(geometric: Geometric, known: Any) -> list[tuple[str, int]]:
-    """Interface and component, 0 to 5, of each motion held beside the reference.
-
-    Args:
-        geometric: the range and its supports.
-        known: names of the interfaces there are.
-
-    Raises:
-        ConfigError, InterfaceError: see `rom.eigen.supports.supports`.
-    """
-    return [
-        (name, DIRECTIONS.index(direction))
-        for name, directions in supports(geometric.fixed, known).items()
-        for direction in directions or DIRECTIONS
-    ]
-
-
 def refuse(
     geometric: Geometric, model: FEModel, connection: Any, basis: Basis, reference: Any
 ) -> None:
@@ -225,11 +163,10 @@ def refuse(
                 f"has {offered(n for n in connection.parts if n != reference)}."
             )
     held = held_motions(geometric, [name for name in connection.parts if name != reference])
-    for name, k, _ in geometric.components():
-        if (name, k) in held:
+    for load in geometric.components():
+        if replace(load, largest=1.0) in held:
             raise ConfigError(
-                f"the range has a load {name} {FORCES[k]} where the body is held: it deflects "
-                "nothing.",
+                f"the range has a load {load.name} where the body is held: it deflects nothing.",
                 hint="Leave the load out, or that direction of fixed.",
             )
     for name, tie in connection.ties.items():
@@ -253,24 +190,49 @@ def _with_derivatives(
     N = free_motions(still)
     moving = Psi[:, :n_b] @ N
     K = quadratic(ops, ops.apply_K, moving)
-    at_rest = held_motions(geometric, model.interfaces)
-    every = [(name, k, 1.0) for name in geometric.loads for k in range(6)
-             if (name, k) not in at_rest]  # fmt: skip
-    held = [(name, k, 1.0) for name, k in at_rest]
-    F = free_motions(_loads(held, model, ops, moving).T)
-    forces = _loads(every, model, ops, moving)
-    static = moving @ F @ np.linalg.solve(F.T @ K @ F, F.T @ forces)
+    held = held_motions(geometric, model.interfaces)
+    every = [load for name in geometric.loads for k in range(6)
+             if (load := Load(name, k)) not in held]  # fmt: skip
+    turning = [load for load in geometric.components() if not load.interface]
+    about = geometric.axis_point(model, reference)
+
+    def forces(loads: list[Load], E: Array) -> Array:
+        return ops.gram(E, nodal_forces(loads, model, ops, about))
+
+    F = free_motions(forces(held, moving).T)
+    borne = F @ np.linalg.solve(F.T @ K @ F, F.T @ forces(every + turning, moving))
+    # what turns bears its own load along the way: interfaces held, and K-orthogonal to their motion
+    along = basis.held(connection.ops.restrict(nodal_forces(turning, model, ops, about)))
+    static = moving @ borne
+    static[:, len(every) :] += connection.ops.expand(along)
+    bent = [name for name, load in geometric.loads.items() if np.any(load[3:])]
+    units = [nodal_forces([Load(name, k) for k in (3, 4, 5)], model, ops, about) for name in bent]
+    squeezed = [basis.held(connection.ops.restrict(_turnable(F))) for F in units]
     n_modes = min(geometric.n_modes, basis.omega.size)
     if n_modes:
         n_modes = whole_clusters(basis.omega**2, n_modes)
     active = np.hstack([static, Psi[:, n_b : n_b + n_modes]])
-    n_basis = moving.shape[1] + n_modes
-    _refuse_many(n_basis + active.shape[1] * (active.shape[1] + 1) // 2, energy)
+    n_basis, n_active = moving.shape[1] + n_modes, active.shape[1]
+    _refuse_many(n_basis + len(turning) + n_active * (n_active + 1) // 2, energy)
     size = np.diag(quadratic(ops, ops.apply_K, active))
-    theta = _derivatives(connection.ops, basis, energy, active, size)
+    theta = _derivatives(connection.ops, basis, energy, (active, size), [along, *squeezed])
     E = np.hstack([moving, active[:, static.shape[1] :], connection.ops.expand(theta)])
-    loads, rows = (_loads(some, model, ops, E) for some in (geometric.components(), held))
-    return Shapes(E, loads, rows.T, n_basis), theta
+    components = geometric.components()
+    sections = [Section.of(ops, F, E, _moments(name, components))
+                for name, F in zip(bent, units, strict=True)]  # fmt: skip
+    return Shapes(E, forces(components, E), forces(held, E).T, n_basis, sections), theta
+
+
+def _moments(interface: str, components: list[Load]) -> Array:
+    """(3, l) moments about the axes of the components of a range on an interface [N m]."""
+    return np.array([[load.largest * (load.interface == interface and load.component == k)
+                      for load in components] for k in (3, 4, 5)])  # fmt: skip
+
+
+def _turnable(F: Array) -> Array:
+    """(n_local, 27) forces along each axis a of the part b of forces (n_local, 3) of moments k."""
+    parts = np.einsum("ac,nbk->ncabk", np.eye(3), F.reshape(-1, 3, 3))
+    return np.asarray(parts.reshape(-1, 27))
 
 
 def _refuse_many(n: int, energy: Any) -> None:
@@ -303,9 +265,8 @@ def _refuse_collapse(geometric: Geometric, stretches: Array, counts: list[int]) 
         return
     load = int(np.searchsorted(np.cumsum(counts), k, side="right"))
     case, step = divmod(load, geometric.n_steps)
-    names = [f"{name} {FORCES[component]}" for name, component, _ in geometric.components()]
-    signs = geometric.load_cases()[case]
-    parts = [f"{x:+.2g} {name}" for x, name in zip(signs, names, strict=True) if x]
+    signs = zip(geometric.load_cases()[case], geometric.components(), strict=True)
+    parts = [f"{x:+.2g} {load.name}" for x, load in signs if x]
     raise ModelError(
         f"load {', '.join(parts)} of the range compresses the material to {stretches[k]:.3f} of "
         f"its length at {(step + 1) / geometric.n_steps:.2g} of it; from {ELLIPTIC_STRETCH:.3f} on "
@@ -314,16 +275,10 @@ def _refuse_collapse(geometric: Geometric, stretches: Array, counts: list[int]) 
     )
 
 
-def _loads(components: Any, model: FEModel, ops: Operators, E: Array) -> Array:
-    """(r, l) forces [N] of components of loads at their largest on shapes (n_local, r)."""
-    columns = []
-    for name, component, largest in components:
-        interface = model.interfaces[name]
-        columns.append(largest * (mean_motion(interface) @ ops.rows(E, interface.dofs))[component])
-    return np.array(columns).reshape(-1, E.shape[1]).T
-
-
-def _derivatives(ops: Operators, basis: Basis, energy: Any, active: Array, size: Array) -> Array:
+def _derivatives(
+    ops: Operators, basis: Basis, energy: Any, dragging: tuple[Array, Array],
+    further: list[Array],
+) -> Array:  # fmt: skip
     """(n_local, p) derivatives in interface coordinates, orthonormal in K and to normal modes.
 
     Two shapes that drag nothing along, as pull and twist of a prism, have round-off as their
@@ -333,19 +288,25 @@ def _derivatives(ops: Operators, basis: Basis, energy: Any, active: Array, size:
         ops: operators in interface coordinates.
         basis: supplies the held factor and the normal modes.
         energy: at large strain.
-        active: (n_local, a) nodal shapes of which derivatives are taken.
-        size: (a,) twice their energies [J].
+        dragging: (n_local, a) nodal shapes of which derivatives are taken, and (a,) twice their
+            energies [J].
+        further: (n_local, t) shapes of the same span, in interface coordinates; of each kind those
+            with much less energy than others are round-off.
     """
+    active, size = dragging
     i, j = np.triu_indices(active.shape[1])
     pairs: Index = np.column_stack([i, j])
     theta = np.zeros((ops.n_local, len(pairs)))
     for some in column_blocks(len(pairs)):
         theta[:, some] = -basis.held(ops.restrict(energy.second_forces(active, pairs[some])))
+    theta = np.hstack([*further, theta])
     normal = basis.Psi[:, basis.Psi.shape[1] - basis.omega.size :]
     theta -= normal @ (ops.gram(normal, ops.apply_K(theta)) / basis.omega[:, None] ** 2)
     K = quadratic(ops, ops.apply_K, theta)
-    share = np.diag(K) / (size[i] * size[j])
-    real = share > ROUND_OFF_RTOL * share.max()
+    *shares, share = np.split(np.diag(K), np.cumsum([X.shape[1] for X in further]))
+    shares = [x > DEPENDENT_RTOL * x.max(initial=0.0) for x in shares]
+    share = share / (size[i] * size[j])
+    real = np.concatenate([*shares, share > ROUND_OFF_RTOL * share.max()])
     theta, K = theta[:, real], K[np.ix_(real, real)]
     scale = 1 / np.sqrt(np.diag(K))
     lam, V = np.linalg.eigh(0.5 * (K + K.T) * np.outer(scale, scale))
@@ -359,11 +320,32 @@ def _states(geometric: Geometric, quartic: Quartic, shapes: Shapes) -> list[Arra
     found = list[Array]()
     for case in geometric.load_cases():
         try:
-            found += passages(quartic, np.outer(share, shapes.loads @ case), shapes.held)
+            passed = passages(quartic, np.outer(share, shapes.loads @ case), shapes.held)
+            found += [_turned(quartic, shapes, x * case, states)
+                      for x, states in zip(share, passed, strict=True)]  # fmt: skip
         except ModelError as error:
             error.where = error.where or f"load {np.round(case, 3).tolist()} of the range"
             raise
     return found
+
+
+def _turned(quartic: Quartic, shapes: Shapes, case: Array, states: Array) -> Array:
+    """States (k, r) on the way to a load case, and before them that with moments that follow.
+
+    A moment as a pair of dead forces squeezes a section that has turned; what is welded to it
+    does not.
+    """
+    bent = [section for section in shapes.sections if (section.moments @ case).any()]
+    if not bent:
+        return states
+    body, q = Held(quartic, free_motions(shapes.held)), states[-1]
+    for _ in range(N_TURNS):
+        load = shapes.loads @ case + sum(section.difference(case, q) for section in bent)
+        near = newton(body, q @ body.N, load @ body.N)
+        if near is None:
+            return states
+        q = body.N @ near
+    return np.vstack([q, states])
 
 
 def _modes_about(states: Array, quartic: Quartic, M: Array, held: Array) -> Array:

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 from scipy.linalg import eigh, null_space
 
-from rom.body.nonlinear.quartic import Quartic
 from rom.errors import ModelError, SolverError
 from rom.model import Array
 from rom.paths.arc_length import Curve, Point
@@ -32,7 +31,7 @@ class Held:
         N: (r, m) motions that are left, q = N y.
     """
 
-    energy: Quartic
+    energy: Any
     N: Array
 
     @property
@@ -58,7 +57,7 @@ def free_motions(rows: Array) -> Array:
     return null_space(rows) if len(rows) else np.eye(rows.shape[1])
 
 
-def follow(energy: Quartic, loads: Array, held: Array | None = None) -> Array:
+def follow(energy: Any, loads: Array, held: Array | None = None) -> Array:
     """(s, r) coordinates in equilibrium with loads (s, r) [N], one after the other from rest.
 
     Args:
@@ -72,7 +71,7 @@ def follow(energy: Quartic, loads: Array, held: Array | None = None) -> Array:
     return np.array([passed[-1] for passed in passages(energy, loads, held)])
 
 
-def passages(energy: Quartic, loads: Array, held: Array | None = None) -> list[Array]:
+def passages(energy: Any, loads: Array, held: Array | None = None) -> list[Array]:
     """For each load the states (k, r) on the way to it, itself the last.
 
     Where a body snaps, these are the states of its path by arc length, stable or not.
@@ -184,7 +183,7 @@ class Stretch:
         return float(largest @ np.linalg.solve(self.body.K, largest))
 
 
-def critical_shares(energy: Quartic, load: Array, held: Array) -> Array:
+def critical_shares(energy: Any, load: Array, held: Array) -> Array:
     """(k,) shares, at most one, of a load (r,) [N] at which a stiffness vanishes on the way.
 
     In the order in which they are passed on the path by arc length, limits and bifurcations.

@@ -35,6 +35,7 @@ EXAMPLES = """\
   rom update test.uff --family panel.rom.npz --averages 50 --free core,clamp \\
       --spring clamp=root:1e8,1e8,1e8:0.1:10 --mass cable=tip:0.05:0.1:10 --candidate cable \\
       -o updated.rom.npz
+  rom update test.uff --family panel.rom.npz --averages 50 --residual equations --prior core=0.3
   rom update --plan 8,1 --lines 20:800 --family panel.rom.npz --fixed root -o plan.csv
   rom update --plan --lines 20:800 --family panel.rom.npz --fixed root -o plan.png
 """
@@ -79,6 +80,14 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         help="relative standard deviation of a factor about one, before the test",
     )  # fmt: skip
     parser.add_argument(
+        "--residual", choices=("responses", "equations", "response-function"), default="responses",
+        help="what is made small: responses (default), equations of motion at the sensors, or what "
+        "the response function method leaves",
+    )  # fmt: skip
+    parser.add_argument(
+        "--rank", type=count, help="of the basis of equations (default: one per mode of the band)"
+    )
+    parser.add_argument(
         "--damping", type=positive, default=0.01, help="to start from (default 1 %%)"
     )
     parser.add_argument("--tolerance", type=positive, help="of points off the body [m]")
@@ -93,8 +102,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--noise", type=positive, default=0.05, help="relative, of what is planned (default 5 %%)"
     )
     parser.add_argument(
-        "--floor", type=positive, default=0.0,
-        help="noise of what is planned where nothing moves [m/s^2 per N] (default none)",
+        "--floor", type=number,
+        help="noise of what is planned where nothing moves [m/s^2 per N] (default: a thousandth of "
+        "the largest response)",
     )  # fmt: skip
     parser.add_argument(
         "-o", "--output", type=Path, help="updated body, .rom.npz; plan, .csv, .uff or .png"
@@ -129,6 +139,8 @@ def run(args: argparse.Namespace) -> Answer:
         candidates={name: outside[name] for name in args.candidate},
         prior=prior,
         tolerance=args.tolerance,
+        residual=args.residual,
+        rank=args.rank,
     )  # fmt: skip
     write = None if output is None else lambda: save(found.body, output)
     text = f"{args.file}: {test.H.shape[1]} sensors, {test.H.shape[2]} forces, {len(test.H)} lines"

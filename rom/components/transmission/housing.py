@@ -9,9 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.linalg import eigh, null_space
+from scipy.linalg import eigh
 
 from rom.body.flexible import FlexibleBody
+from rom.body.records import still_motions
 from rom.errors import ModelError
 from rom.model import Array
 
@@ -64,7 +65,7 @@ class Housing:
         if A.shape != (3, 3) or not np.allclose(A @ A.T, np.eye(3), atol=1e-9):
             raise ModelError(f"axes {A.tolist()} of the unit are not orthonormal rows.")
         M, K = body.full_matrices()
-        N = null_space(np.vstack([body.marker(name).hold for name in fixed]), rcond=1e-10)
+        N = still_motions(np.vstack([body.marker(name).hold for name in fixed]))
         omega2, V = eigh(N.T @ K @ N, N.T @ M @ N)
         if omega2[0] < 1e-9 * omega2[-1]:
             raise ModelError(

@@ -43,11 +43,14 @@ class FiniteStrain:
         degree: of the displacement.
         tags: (cells,) region of each cell.
         names: {region: tag}.
+        neo_hookean: the law of `rom.body.nonlinear.sampled` instead, for isotropic cold material.
     """
 
     def __init__(
-        self, V: Any, numbers: dict[str, Any], degree: int, tags: Array, names: dict[str, int]
-    ):
+        self, V: Any, numbers: dict[str, Any], degree: int, tags: Array, names: dict[str, int],
+        *, neo_hookean: bool = False,
+    ):  # fmt: skip
+        self.neo_hookean = neo_hookean
         self.V, self.mesh, self.numbers = V, V.mesh, numbers
         self.tags, self.names = tags, names
         cold = np.zeros(tags.size)
@@ -121,6 +124,9 @@ class FiniteStrain:
     @cached_property
     def _tangent(self) -> Any:
         w, v = ufl.TrialFunction(self.V), ufl.TestFunction(self.V)
+        if self.neo_hookean:
+            force = ufl.inner(ufl.dot(self._F, self._S), ufl.grad(v))
+            return self._compiled(ufl.derivative(force, self.u, w))
         dE, dE_v = (ufl.sym(ufl.dot(self._F.T, ufl.grad(x))) for x in (w, v))
         material = ufl.inner(stress(dE, self.numbers), dE_v)
         return self._compiled(material + ufl.inner(ufl.dot(ufl.grad(w), self._S), ufl.grad(v)))
@@ -137,6 +143,10 @@ class FiniteStrain:
 
     @property
     def _S(self) -> Any:
+        if self.neo_hookean:
+            inverse, log = ufl.inv(ufl.dot(self._F.T, self._F)), ufl.ln(ufl.det(self._F))
+            lam, mu = self.numbers["lam"], self.numbers["mu"]
+            return mu * (ufl.Identity(3) - inverse) + lam * log * inverse
         H = ufl.grad(self.u)  # F^T F - I would leave small strains no digits
         return self._stress(ufl.sym(H) + 0.5 * ufl.dot(H.T, H))
 

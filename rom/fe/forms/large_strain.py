@@ -68,8 +68,9 @@ class LargeStrain:
         r = E.shape[1]
         N = r + r * (r + 1) // 2
         G = np.zeros((N, N))
-        for H, root in self._gradients(E, self._blocks(6 * N + 9 * r * r)):
+        for H, w, C in self._gradients(E, self._blocks(6 * N + 9 * r * r)):
             Z = np.concatenate([linear_strain(H), quadratic_strain(H)], axis=2)
+            root = np.sqrt(w)[:, None, None] * np.linalg.cholesky(C).transpose(0, 2, 1)
             Z = np.matmul(root, Z).reshape(-1, N)
             G += Z.T @ Z
         self.mesh.comm.Allreduce(MPI.IN_PLACE, G)
@@ -78,12 +79,23 @@ class LargeStrain:
     def least_stretch(self, U: Array) -> Array:
         """(s,) least principal stretch [1] of each displacement (n_local, s), on all ranks."""
         least = np.full(U.shape[1], np.inf)
-        for H, _ in self._gradients(U, self._blocks(27 * U.shape[1])):
+        for H, *_ in self._gradients(U, self._blocks(27 * U.shape[1])):
             F = np.moveaxis(H, 3, 0) + np.eye(3)
             squares = np.linalg.eigvalsh(F.swapaxes(-1, -2) @ F)[..., 0]
             least = np.minimum(least, squares.min(axis=1))
         self.mesh.comm.Allreduce(MPI.IN_PLACE, least, MPI.MIN)
         return np.sqrt(np.maximum(least, 0.0))
+
+    def at_points(self, E: Array) -> tuple[Array, Array, Array, Array]:
+        """Of this process: gradients (p, 9, r), weights (p,), cells (p,) and stiffness (p, 6, 6).
+
+        Args:
+            E: (n_local, r) shapes [m].
+        """
+        blocks = list(self._gradients(E, [np.arange(self.n_cells, dtype=np.int32)]))
+        H, w, C = (np.concatenate(parts) for parts in zip(*blocks, strict=True))
+        cells = np.repeat(np.arange(self.n_cells), len(self.points))
+        return H.reshape(len(w), 9, -1), w, cells, C
 
     def _blocks(self, numbers: int) -> list[Integers]:
         """Blocks of cells for so many numbers at each quadrature point."""
@@ -120,8 +132,8 @@ class LargeStrain:
             out[:, k] = assembled_vector(form)
         return out
 
-    def _gradients(self, E: Array, blocks: list[Integers]) -> Iterator[tuple[Array, Array]]:
-        """Gradients (p, 3, 3, r) [m/m] and sqrt(w C) (p, 6, 6) at the points of each block."""
+    def _gradients(self, E: Array, blocks: list[Integers]) -> Iterator[tuple[Array, ...]]:
+        """Gradients (p, 3, 3, r) [m/m], weights (p,) and C (p, 6, 6) of each block, at points."""
         u = fem.Function(self.V)
         columns = []
         for column in E.T:  # every rank exchanges all columns, however many blocks it has
@@ -142,8 +154,7 @@ class LargeStrain:
                 H[..., k] = evaluated(grad, self.mesh, cells).reshape(-1, 3, 3)
             w = np.abs(evaluated(volume, self.mesh, cells).reshape(-1, p)) * self.weights
             C = evaluated(law, self.mesh, cells).reshape(-1, 6, 6)
-            root = np.linalg.cholesky(C).transpose(0, 2, 1)
-            yield H, (np.sqrt(w)[:, :, None, None] * root[:, None]).reshape(-1, 6, 6)
+            yield H, w.ravel(), np.repeat(C, p, axis=0)
 
 
 def linear_strain(H: Array) -> Array:

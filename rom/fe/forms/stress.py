@@ -191,9 +191,11 @@ class Stresses:
         A.destroy()
         return K_geo
 
-    def finite_strain(self) -> Any:
+    def finite_strain(self, *, neo_hookean: bool = False) -> Any:
         """The same solid in large motion, `finite_strain.FiniteStrain`."""
-        return FiniteStrain(self.V, self.numbers, self.degree, *self.regions)
+        return FiniteStrain(
+            self.V, self.numbers, self.degree, *self.regions, neo_hookean=neo_hookean
+        )
 
     def large_strain(self) -> Any:
         """Energy of shapes at finite strain, `large_strain.LargeStrain`."""

@@ -3,15 +3,19 @@
 import os
 import shutil
 import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from mpi4py import MPI
 
 from rom.errors import ResourceError
+from rom.process.child import python, start
 
 FOLDER_VARIABLE = "MUMPS_OOC_TMPDIR"
 DEFAULT_FOLDER = "/tmp"  # of MUMPS
 MOST_FILE_BYTES = 1_879_048_192  # of one file of MUMPS, which then begins another
+LEAST_FREE_BYTES = 1_000_000  # below that MUMPS cannot go on
 DISK_ERRORS = (-90,)  # INFOG(1) of MUMPS: a file could not be made, written or read
 
 
@@ -53,6 +57,18 @@ def reserve_disk(need: float, n: int, comm: MPI.Comm) -> None:
     comm.Barrier()  # what one has tried is gone before another tries again
     if refused:
         raise disk_too_small(n, need, refused[0])
+
+
+@contextmanager
+def watched() -> Iterator[None]:
+    """End this process, and say why, when the disk fills: by others, or beyond the foreseen."""
+    numbers = (str(number) for number in (LEAST_FREE_BYTES, os.getpid()))
+    watch = start(python("rom.process.disk_watch", str(scratch_folder()), *numbers))
+    try:
+        yield
+    finally:
+        watch.kill()
+        watch.communicate()
 
 
 def _refusal(size: float) -> str:

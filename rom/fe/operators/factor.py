@@ -1,11 +1,13 @@
 """One MUMPS factorisation, used for many right-hand sides and for counting eigenvalues."""
 
+from contextlib import nullcontext
+
 from petsc4py import PETSc
 
 import numpy as np
 
 from rom.errors import SolverError
-from rom.fe.operators.disk import DISK_ERRORS, disk_too_small
+from rom.fe.operators.disk import DISK_ERRORS, disk_too_small, watched
 from rom.fe.operators.foreseen import by_mumps, check_disk, entry_count, too_large
 from rom.fe.operators.memory import allowed_bytes, factor_bytes, give_back
 from rom.fe.operators.solver import DIRECT_SOLVER, Solver
@@ -29,6 +31,7 @@ class Factor:
 
     Attributes:
         ksp: the PETSc solver that holds the factor.
+        counted: its flops and entries, as MUMPS has counted them.
         ok: False when MUMPS met a pivot it could not divide by.
 
     Raises:
@@ -68,7 +71,8 @@ class Factor:
             ResourceError: if MUMPS runs out of memory or disk.
         """
         self.factor.setMumpsCntl(1, 0.0 if definite else PIVOT_THRESHOLD)
-        with piece(FACTORISATION_PIECE):
+        watch = watched() if self.solver.out_of_core else nullcontext()
+        with watch, piece(FACTORISATION_PIECE):
             self.ksp.setUp()
             self.ksp.getPC().setUp()  # the first does not look at the matrix a second time
         code = self.factor.getMumpsInfog(1)
@@ -84,7 +88,8 @@ class Factor:
             raise disk_too_small(self.A.getSize()[0], need)
         else:
             self.ok = code >= 0
-            note(FLOPS_NOTE, self.factor.getMumpsRinfog(3))
+            self.counted = self.factor.getMumpsRinfog(3), entry_count(self.factor)
+            note(FLOPS_NOTE, self.counted[0])
 
     def solve(self, F: Array) -> Array:
         """A^-1 F for (n_local, k) right-hand sides, in blocks."""

@@ -58,7 +58,8 @@ class HeldPETSc:
             self.factor = self.inner.indefinite(self.shift)
             return
         near_null = None if self.ops.rigid is None else self.ops.rigid[self.mine]
-        self.factor = self.inner.inverse(self.inner.K, near_null, self.held.size)
+        self.factor = self.inner.stiffness_inverse(near_null, self.held.size)
+        self.ops.counted = getattr(self.factor, "counted", None)
 
     def _refuse_loose(self) -> None:
         """Iteration on a body that can move would only run on: judge the held dofs first."""

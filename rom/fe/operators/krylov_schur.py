@@ -8,6 +8,7 @@ from slepc4py import SLEPc
 import numpy as np
 
 from rom.errors import SolverError
+from rom.fe.operators.corrected import Corrected
 from rom.fe.operators.factor import Factor
 from rom.fe.operators.substructures.shared import SubstructuredFactor
 from rom.model import Array
@@ -18,7 +19,11 @@ MAX_RESTARTS = 500
 
 
 def krylov_schur(
-    ops: Any, factor: Factor | SubstructuredFactor, sigma: float, deflated: Array, k: int
+    ops: Any,
+    factor: Factor | SubstructuredFactor | Corrected,
+    sigma: float,
+    deflated: Array,
+    k: int,
 ) -> tuple[Array, Array]:
     """The k eigenvalues next to the shift, ascending, and their mass-normalised modes.
 
@@ -59,7 +64,7 @@ def krylov_schur(
     return pairs
 
 
-def factor_at_hand(factor: Factor | SubstructuredFactor) -> PETSc.KSP:
+def factor_at_hand(factor: Factor | SubstructuredFactor | Corrected) -> PETSc.KSP:
     """A solver that applies a factor; given the factor's own, SLEPc would factor K - sigma M again.
 
     The second factor would cost as much as the first, and its work space would be what MUMPS
@@ -75,7 +80,7 @@ def factor_at_hand(factor: Factor | SubstructuredFactor) -> PETSc.KSP:
 class _Applied:
     """A factor as PETSc's preconditioner."""
 
-    def __init__(self, factor: Factor | SubstructuredFactor):
+    def __init__(self, factor: Factor | SubstructuredFactor | Corrected):
         self.factor = factor
 
     def apply(self, pc: PETSc.PC, b: PETSc.Vec, x: PETSc.Vec) -> None:

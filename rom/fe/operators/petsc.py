@@ -17,11 +17,13 @@ from scipy.linalg import eigh
 from scipy.sparse import csr_matrix
 
 from rom.eigen.condensed import Supported
+from rom.eigen.lanczos import BLOCK_SIZE, EIGENVALUE_RTOLS, BlockLanczos, capacity
 from rom.eigen.scipy import dof_set
 from rom.eigen.verbs import Weighted, orthonormal
 from rom.errors import ConfigError, ModelError, SolverError
-from rom.fe.costs import comparison_pays
+from rom.fe.costs import comparison_pays, cost_of
 from rom.fe.operators.aij import aij, chosen, gathered, symmetrized, weighted
+from rom.fe.operators.corrected import Corrected
 from rom.fe.operators.counting import verify_count
 from rom.fe.operators.factor import Factor, dense_rows
 from rom.fe.operators.foreseen import check_factor_memory
@@ -30,16 +32,16 @@ from rom.fe.operators.iterative.gradients import ConjugateGradients, Inverse, re
 from rom.fe.operators.iterative.multigrid import multigrid
 from rom.fe.operators.iterative.search import lowest_modes
 from rom.fe.operators.krylov_schur import krylov_schur
-from rom.fe.operators.lanczos import BlockLanczos, capacity
 from rom.fe.operators.memory import give_back
 from rom.fe.operators.place import moves_most
 from rom.fe.operators.solver import DIRECT_SOLVER, Solver
-from rom.fe.operators.spectrum import first_elastic, fixed_vector, settled, signed
+from rom.fe.operators.spectrum import first_elastic, fixed_vector, gaussian_block, settled, signed
 from rom.fe.operators.substructures.shared import substructured
 from rom.model import Array, Index
 from rom.process.stopwatch import SEARCH_PIECE, piece
 
 N_SPARE_MODES = 3  # beyond the ones asked for, so that a gap for counting is found
+MAX_CARRIED_DOFS = 100  # each costs two solutions; more are worked into the matrix
 MAX_DENSE_DOFS = 300  # all eigenvalues are computed at once up to here
 SHIFT_RATIO = 0.02  # of the first elastic eigenvalue, below zero: K - sigma M is positive definite
 
@@ -60,6 +62,8 @@ class PETScOperators:
     Raises:
         SolverError: if an entry is not finite.
     """
+
+    counted: tuple[float, float] | None = None  # flops and entries of the last factor
 
     def __init__(
         self,
@@ -87,8 +91,9 @@ class PETScOperators:
         self.fixed = fixed
 
     def comparison_pays(self, n_supports: int, n_interface: int, n_modes: int) -> bool:
-        """By what a factor of this size costs."""
-        return self.affordable and comparison_pays(self.n, n_supports, n_interface, n_modes)
+        """By what the last factor has cost; one that was shared or compressed, by its size."""
+        cost = None if self.counted is None else cost_of(*self.counted)
+        return self.affordable and comparison_pays(self.n, n_supports, n_interface, n_modes, cost)
 
     def apply_K(self, X: Array) -> Array:
         """K X."""
@@ -265,7 +270,10 @@ class PETScOperators:
         """Some more than m eigenvalues above sigma, modes, and whether surely none is missing."""
         with piece(SEARCH_PIECE):
             k = min(m + N_SPARE_MODES, self.n - deflated.shape[1])
-            space = BlockLanczos(self, inverse, sigma, deflated, k, min(k - m, k - 1))
+            start = gaussian_block(self, BLOCK_SIZE)
+            start[getattr(inverse, "mine", [])] = 0.0  # rows that a support holds
+            sought = np.repeat(EIGENVALUE_RTOLS, [max(m, 1), k - max(m, 1)])
+            space = BlockLanczos(self, inverse, sigma, deflated, start, sought)
             space.solve()
             proven = space.prove(m)
             return *space.pairs(), proven
@@ -327,6 +335,10 @@ class PETScOperators:
         factor = Factor(A, definite=True, solver=self.solver)
         return refined(factor) if self.solver.low_rank and factor.ok else factor
 
+    def stiffness_inverse(self, near_null: Array | None, n_columns: int = 0) -> Inverse | Corrected:
+        """K^-1 of a body that cannot move as a whole, see `inverse`."""
+        return self.inverse(self.K, near_null, n_columns)
+
     def indefinite(self, shift: float) -> Factor:
         """(K - shift M)^-1 for a shift among the eigenvalues.
 
@@ -350,7 +362,9 @@ class PETScOperators:
         A.axpy(-sigma, self.M, PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
         return A
 
-    def lowest(self, k: int, sigma: float, factor: Inverse, deflated: Array) -> tuple[Array, Array]:
+    def lowest(
+        self, k: int, sigma: float, factor: Inverse | Corrected, deflated: Array
+    ) -> tuple[Array, Array]:
         """The k eigenvalues above sigma beside the deflated columns, and their modes."""
         if self.solver.iterative and isinstance(factor, ConjugateGradients):
             spare = min(N_SPARE_MODES, k - 1)
@@ -399,31 +413,38 @@ class TiedOperators(PETScOperators):
         y.array[:] = parent.fixed
         self.T.multTranspose(y, x)
         self.fixed = x.array.copy()
-        self.plain = self._plain(T)
+        self.own = self._own(T)
 
-    def _plain(self, T: csr_matrix) -> Index:
-        """(n_local,) row of the parent that is this coordinate and no other's; -1 if there is none.
+    def _own(self, T: csr_matrix) -> Index:
+        """(n_local,) row of the parent that is this coordinate and nothing else, or -1.
 
         Kept dofs stay on their rank, so that their rows are here.
         """
         alone = np.flatnonzero(np.diff(T.indptr) == 1)
         alone = alone[T.data[T.indptr[alone]] == 1.0]
-        others = np.setdiff1d(np.arange(T.shape[0]), alone)
-        shared = np.concatenate(self.comm.allgather(np.unique(T[others].indices)))
         column = T.indices[T.indptr[alone]]
         here = (column >= self.first) & (column < self.first + self.n_local)
-        plain = np.full(self.n_local, -1)
-        plain[column[here] - self.first] = alone[here]
-        shared = shared[(shared >= self.first) & (shared < self.first + self.n_local)]
-        plain[shared.astype(np.int64) - self.first] = -1
-        return plain
+        own = np.full(self.n_local, -1)
+        own[column[here] - self.first] = alone[here]
+        return own
 
     def part(self, rows: Index) -> PETScOperators:
         """The body with all coordinates held but these."""
-        same = self.plain[rows]
-        if self.comm.allreduce(bool((same >= 0).all()), op=MPI.LAND):
-            return self.parent.part(same)
-        return super().part(rows)
+        own = self.own[rows]
+        every = np.arange(self.parent.n_local) + self.parent.first
+        T = self.T.createSubMatrix(
+            chosen(every, self.parent.n, self.comm), chosen(self.first + rows, self.n, self.comm)
+        )
+        others = np.diff(T.getValuesCSR()[0]) > 0
+        others[own[own >= 0]] = False
+        n_others = self.comm.allreduce(np.count_nonzero(others))
+        if not self.comm.allreduce(bool((own >= 0).all()), op=MPI.LAND):
+            return super().part(rows)
+        if not n_others:
+            return self.parent.part(own)
+        if n_others > MAX_CARRIED_DOFS or self.solver.iterative or self.solver.low_rank:
+            return super().part(rows)
+        return CarryingOperators(self, T, own, np.flatnonzero(others))
 
     @cached_property
     def mass_diagonal(self) -> Array:
@@ -460,3 +481,42 @@ class TiedOperators(PETScOperators):
         projected = symmetrized(A.ptap(self.T))
         give_back()
         return projected
+
+
+class CarryingOperators(TiedOperators):
+    """The inside of a body, dofs u = P a, that carries a few more, d = E a.
+
+    The stiffness P^T K P + P^T K E + E^T K P + E^T K E has dense blocks, one for each interface of
+    averaged motion; the first term is as sparse as K, and is all that is factored.
+
+    Args:
+        whole: the body, in the coordinates of the interfaces.
+        T: (n of u and d, n of a) P + E.
+        own: rows of P on this rank.
+        carried: rows of E on this rank.
+    """
+
+    def __init__(self, whole: TiedOperators, T: PETSc.Mat, own: Index, carried: Index):
+        self.parent, self.comm, self.solver = whole.parent, whole.comm, whole.solver
+        self.affordable, self.T, self.rigid, self.last = whole.affordable, T, None, whole.last
+        self.n, (self.first, _) = T.getSize()[1], T.getOwnershipRangeColumn()
+        self.n_local = own.size
+        self.own_rows, self.carried, self.bare = own, carried, self.parent.part(own)
+        self.own, self.fixed = np.full(own.size, -1), self.bare.fixed
+
+    def largest(self) -> float:
+        """Estimate of the largest eigenvalue from the diagonals, without what is carried."""
+        return self.bare.largest()
+
+    def stiffness_inverse(self, near_null: Array | None, n_columns: int = 0) -> Inverse | Corrected:
+        """K^-1 by the factor of P^T K P and a correction of low rank."""
+        counts = self.comm.allgather(self.carried.size)
+        before, n = sum(counts[: self.comm.rank]), sum(counts)
+        factor = self.bare.stiffness_inverse(near_null, n_columns + 2 * n)
+        if not factor.ok:
+            return factor
+        unit = np.zeros((self.parent.n_local, n))
+        unit[self.carried, before + np.arange(self.carried.size)] = 1.0
+        K_d = self.parent.apply_K(unit)
+        K_dd = self.parent.gram(unit, K_d)
+        return Corrected(factor, self.gram, K_d[self.own_rows], self.restrict(unit), K_dd)

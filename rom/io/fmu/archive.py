@@ -29,6 +29,7 @@ class Content:
     Attributes:
         name: of the model.
         core: C file of the model behind the interface.
+        headers: C files that it includes.
         resources: files by their names below ``resources/``.
         data: C text of tables that the core includes as ``tables.h``.
         describe: (guid, identifier, names of C files) -> text of ``modelDescription.xml``.
@@ -39,6 +40,7 @@ class Content:
     describe: Callable[[str, str, tuple[str, ...]], bytes]
     resources: dict[str, bytes] = field(default_factory=dict)
     data: str = ""
+    headers: tuple[str, ...] = ()
 
 
 def write_archive(path: Path, content: Content) -> Path:
@@ -52,16 +54,18 @@ def write_archive(path: Path, content: Content) -> Path:
     identifier = re.sub(r"\W", "_", content.name, flags=re.ASCII)
     identifier = identifier if identifier[:1].isalpha() else f"m{identifier}"
     names = ("fmi2.c", content.core)
-    sources = {name: (SOURCES / name).read_bytes() for name in (*names, "model.h")}
+    sources = {
+        name: (SOURCES / name).read_bytes() for name in (*names, "model.h", *content.headers)
+    }
     guid = _guid(sources, content)
     sources["config.h"] = f'#define GUID "{guid}"\n'.encode()
     if content.data:
         sources["tables.h"] = content.data.encode()
-    files = {f"sources/{name}": data for name, data in sources.items()}
-    files |= {f"resources/{name}": data for name, data in content.resources.items()}
-    files[f"binaries/{_platform()}/{identifier}.so"] = _library(sources, names)
-    files["modelDescription.xml"] = content.describe(guid, identifier, names)
-    write_whole(path, lambda file: _pack(file, files))
+    packed = {f"sources/{name}": data for name, data in sources.items()}
+    packed |= {f"resources/{name}": data for name, data in content.resources.items()}
+    packed[f"binaries/{_platform()}/{identifier}.so"] = _library(sources, names)
+    packed["modelDescription.xml"] = content.describe(guid, identifier, names)
+    write_whole(path, lambda file: _pack(file, packed))
     return path
 
 

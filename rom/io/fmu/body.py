@@ -104,9 +104,9 @@ def _modal_damping(body: FlexibleBody, omega: Array, V: Array) -> Array:
 
 
 def table(name: str, A: Array) -> str:
-    """An array of C."""
-    numbers = ",\n".join(float(x).hex() for x in np.ravel(A))
-    return f"static const double {name}[{A.size}] = {{\n{numbers}}};\n"
+    """An array of C; of nothing, one zero."""
+    numbers = [float(x).hex() for x in np.ravel(A)] or ["0.0"]
+    return f"static const double {name}[{len(numbers)}] = {{\n" + ",\n".join(numbers) + "};\n"
 
 
 def _variables(body: FlexibleBody) -> list[Variable]:

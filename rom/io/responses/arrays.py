@@ -2,9 +2,10 @@
 
 Data sets are frequencies (n_f,), H (n_f, n_s, n_e) complex, coherence (one number or as H), and
 sensors and inputs, groups with points and directions (k, 3); attributes of the file are averages,
-quantity, force_noise (zero where it is missing), units, always SI, and checksum, SHA-256 of the
-data sets, which is compared where it is there. Headers of HDF5 1.8 have checksums of their own:
-without them, and by texts in its heap, a byte that is wrong can end the process.
+quantity (of all sensors, or of each with commas between), force_noise (zero where it is missing),
+units, always SI, and checksum, SHA-256 of the data sets, which is compared where it is there.
+Headers of HDF5 1.8 have checksums of their own: without them, and by texts in its heap, a byte that
+is wrong can end the process.
 """
 
 import io
@@ -42,7 +43,11 @@ def written(test: Responses, path: Path) -> Path:
             file[name] = np.asarray(value)
         file.attrs["averages"] = test.averages
         file.attrs["force_noise"] = test.force_noise
-        texts = {"quantity": test.quantity, "units": "SI", "checksum": _checksum(values)}
+        texts = {
+            "quantity": ",".join(test.quantities),
+            "units": "SI",
+            "checksum": _checksum(values),
+        }
         for name, text in texts.items():
             file.attrs[name] = np.bytes_(text)
     write_whole(path, lambda out: out.write(data.getvalue()))
@@ -89,7 +94,8 @@ def _test(path: Path, file: Any) -> Responses:
     if averages != int(averages):
         raise FileFormatError(f"averages = {averages} is no whole number.", where=str(path))
     noise = _number(path, file, "force_noise") if "force_noise" in file.attrs else 0.0
-    quantity = _text(file.attrs["quantity"])
+    text = _text(file.attrs["quantity"])
+    quantity = tuple(text.split(",")) if "," in text else text
     return Responses(f, H, sensors, inputs, c, int(averages), quantity, noise)
 
 

@@ -7,11 +7,10 @@ from scipy.linalg import eigh
 
 from rom.body.flexible import FlexibleBody
 from rom.body.records import Marker
-from rom.body.recovery import PRODUCTS
+from rom.body.recovery import CENTRIFUGAL_LOADS, PRODUCTS
 from rom.body.reference import skew_tensor
 from rom.body.stiffening import (
     ANGULAR_LOADS,
-    CENTRIFUGAL_LOADS,
     LINEAR_LOADS,
     SecondOrder,
     interface_loads,

@@ -45,7 +45,9 @@ def equilibrium(
 
     Gravity, loads and Python forces grow in steps, which are halved where Newton's method fails.
     Where the potential curves downwards corrections follow the force, so that the search leaves
-    unstable positions unless it starts on one.
+    unstable positions unless it starts on one. Where that finds none, as where a moment that keeps
+    its direction in space has no potential, an unstable one next to that of the load step before
+    is taken.
 
     Args:
         mechanism: bodies, joints, forces; drives hold their values at time t.
@@ -164,7 +166,7 @@ class _Search:
             load = min(done + width, 1.0)
             load = load if load < 1.0 - 1e-9 else 1.0
             try:
-                state = self.settle(state, load)
+                state = self.settled(state, load, beside=done > 0.0)
             except SolverError:
                 width /= 2
                 if width < least / steps:
@@ -173,8 +175,29 @@ class _Search:
             done = load
             yield state
 
-    def settle(self, state: State, load: float) -> State:
+    def settled(self, state: State, load: float, *, beside: bool) -> State:
+        """Equilibrium at a share of the loads, a stable one if it is found.
+
+        Args:
+            state: where the search starts.
+            load: the share.
+            beside: whether that is an equilibrium at another share, next to which one may be taken.
+        """
+        try:
+            return self.settle(state, load)
+        except SolverError:
+            if beside:
+                with suppress(SolverError):
+                    return self.settle(state, load, directly=True)
+            raise
+
+    def settle(self, state: State, load: float, *, directly: bool = False) -> State:
         """Equilibrium at a share of the loads.
+
+        Args:
+            state: where the search starts.
+            load: the share.
+            directly: by Newton's corrections as they are, as long as they shrink.
 
         Raises:
             SolverError: if Newton's method fails.
@@ -186,7 +209,8 @@ class _Search:
             equations = beyond or self.tangent(now, state)
             found = None
             # forces that go around, as those of films, have no potential that curves
-            straight = None if now.packed.has_potential else equations.newton
+            descends = now.packed.has_potential and not directly
+            straight = None if descends else equations.newton
             if straight is None and trials and not equations.rises:
                 found, trials = self.tried(now, state, equations), trials - 1
             if found is None:
@@ -194,7 +218,7 @@ class _Search:
                 beyond = None
             else:
                 size, state, beyond = found
-            if not np.isfinite(size):
+            if not np.isfinite(size) or (directly and size > max(last, STALLED_TOL)):
                 break
             if size < CORRECTION_TOL or (size < STALLED_TOL and size > 0.5 * last):
                 return state

@@ -55,6 +55,12 @@ def found(model: FEModel, names: Iterable[str]) -> list[Interface]:
             f"there is no interface {named(unknown)}; the model has {offered(model.interfaces)}.",
             hint="Interfaces are the named physical surfaces of the geometry.",
         )
+    if wrong := [name for name in names if model.interfaces[name].name != name]:
+        raise InterfaceError(
+            f"interface {named(wrong)} of the model calls itself "
+            f"{named(model.interfaces[name].name for name in wrong)}.",
+            hint="Rename it as well: dataclasses.replace(interface, name=...).",
+        )
     return [model.interfaces[name] for name in names]
 
 

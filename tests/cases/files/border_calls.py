@@ -358,6 +358,10 @@ GIVEN = {  # callable -> legal values of its own
         "model": regions,
         "parameters": lambda: {"E": rom.YoungsModulus("web", 0.9, 1.1)},
     },
+    "certify_pieces": {
+        "pieces": pieces, "models": models_in_a_row,
+        "nonlinear": lambda: rom.Geometric(loads={"tip": (0, 1.0, 0, 0, 0, 0)}),
+    },
     "reduce_pieces": {"models": models_in_a_row, "reference": lambda: "root"},
     "reduced_blade": WHEEL | {"sector": lambda: wheel().parts},
     "release": {"state": lambda: rom.equilibrium(driven())},

@@ -64,6 +64,31 @@ def test_full_modes_are_found_where_they_cost_less_than_the_reduction_or_little(
     assert not costs.comparison_pays(299_967, 13, n_interface=72, n_modes=20)
     assert costs.comparison_pays(299_967, 13, n_interface=72, n_modes=200)
     assert costs.comparison_pays(29_286, 13, n_interface=72, n_modes=1)  # short in any case
+    n, flops, entries = COUNTED[-1]
+    own = costs.cost_of(flops, entries)
+    assert costs.reduction_seconds(n, 12, 20, own) == pytest.approx(8.6, rel=0.1)
+    beam = factor_cost(299_967)
+    thin = costs.cost_of(beam.flops / 5, beam.entries / 4)  # as of walls
+    assert costs.comparison_pays(299_967, 13, n_interface=72, n_modes=20, cost=thin)
+
+
+@pytest.mark.fenicsx
+def test_a_factor_that_was_made_says_what_it_cost(monkeypatch):
+    pytest.importorskip("dolfinx", reason="needs finite elements")
+    from rom.fe.operators import petsc
+    from rom.workflow import operators
+
+    model = rom.fe.model(
+        "meshes/beam.geo", material=rom.Material(E=210e9, nu=0.3, rho=7850.0),
+        parameters={"L": 1.0, "b": 1.0, "h": 0.02, "lc": 0.1},
+    )  # fmt: skip
+    ops, asked = operators(model), []
+    monkeypatch.setattr(petsc, "comparison_pays", lambda *a: asked.append(a[-1]) or True)
+    assert ops.comparison_pays(3, 12, 20) and asked == [None]
+    held = ops.hold(model.interfaces["root"].dofs)
+    ops.comparison_pays(3, 12, 20)
+    assert asked[1].flops == held.factor.factor.getMumpsRinfog(3)
+    assert asked[1].entries == held.factor.factor.getMumpsInfog(3)
 
 
 @pytest.mark.fenicsx

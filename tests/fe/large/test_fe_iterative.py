@@ -147,10 +147,13 @@ def forgetful(monkeypatch, times):
         solve(self)
         if left[0]:
             left[0] -= 1
-            order = [*range(2), *range(3, self.width), 2]
-            for name in ("X", "AX", "MX"):
-                setattr(self, name, getattr(self, name)[:, order])
-            self.theta = self.theta[order]
+            highest = np.sin(np.pi * EDGE * np.arange(1, EDGE + 1) / (EDGE + 1))
+            v = np.einsum("i,j,k->ijk", *[highest] * 3).ravel()[:, None]
+            v /= np.sqrt(MASS * v.T @ v)
+            theta = eigenvalues()[-1]  # in the place of the mode that is lost
+            for name, added in (("X", v), ("AX", MASS * theta * v), ("MX", MASS * v)):
+                setattr(self, name, np.hstack([np.delete(getattr(self, name), 2, axis=1), added]))
+            self.theta = np.append(np.delete(self.theta, 2), theta)
             self.k = min(self.k, self.width - 1)
 
     monkeypatch.setattr(BlockSearch, "solve", forgetting)
@@ -258,3 +261,33 @@ def test_what_was_missed_stands_in_the_block(problem, monkeypatch):
     search.prove()
     v = taken[0][:, -1]
     assert (v @ problem[2] @ v) / (MASS * v @ v) < eigenvalues()[11]
+
+
+def test_directions_that_depend_on_others_are_dropped(problem):
+    search = found(problem, 4)
+    Y = np.random.default_rng(4).standard_normal((EDGE**3, 3))
+    Q, MQ = search._orthonormal(np.hstack([Y, Y @ [[1.0], [-2.0], [0.5]], Y[:, :1]]))
+    assert Q.shape == Y.shape
+    assert_allclose(MASS * Q.T @ Q, np.eye(3), atol=1e-12)
+    assert_allclose(MQ, MASS * Q)
+
+
+def test_modes_left_alone_are_looked_at_once_more(problem, monkeypatch):
+    """One that has converged is spoilt behind the back of the search."""
+    from rom.fe.operators.iterative import search as module
+
+    improve, spoilt = module.BlockSearch._improve, []
+
+    def spoiling(self, Y, wanted):
+        improve(self, Y, wanted)
+        if not wanted[0] and not spoilt:
+            spoilt.append(1)
+            for A in (self.X, self.AX, self.MX):
+                A[:, 0] += 1e-4 * A[:, -1]
+
+    monkeypatch.setattr(module.BlockSearch, "_improve", spoiling)
+    monkeypatch.setattr(module, "N_BETWEEN_REFRESHES", 40)
+    search = found(problem, 11)
+    assert spoilt
+    rest = problem[2] @ search.X[:, :11] - MASS * search.X[:, :11] * search.theta[:11]
+    assert np.abs(rest).max() < 1e-7

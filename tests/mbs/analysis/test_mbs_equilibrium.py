@@ -37,6 +37,32 @@ def test_a_pendulum_hangs_down_from_wherever_it_starts(angle):
     assert_allclose(reaction[0, :3], [0, 0, 2.0 * g], atol=1e-9)
 
 
+def chain_with_springs(n, bending, twist):
+    """Links of 1 m together, in a row on ball joints with springs against bending and twist."""
+    mech, length = rom.Mechanism(gravity=(0, 0, 0)), 1.0 / n
+    last = mech.ground.marker((0, 0, 0))
+    for i in range(n):
+        ends = {"begin": (-length / 2, 0, 0), "end": (length / 2, 0, 0)}
+        at = {"at": (length * (i + 0.5), 0, 0), "markers": ends}
+        link = mech.add_rigid(f"link {i}", mass=0.1, inertia=(1e-3,) * 3, **at)
+        mech.spherical(f"joint {i}", last, link.marker("begin"))
+        springs = (0, 0, 0, twist, bending, bending)
+        mech.bushing(f"spring {i}", last, link.marker("begin"), stiffness=springs)
+        last = link.marker("end")
+    return mech, last
+
+
+@pytest.mark.parametrize("angle", [0.7, 1.3, 1.7])  # of half a turn
+def test_a_moment_about_an_axis_fixed_in_space_bends_further_than_is_stable(angle):
+    """It has no potential: a chain weak in twist would leave the plane; it bends by M n / k."""
+    mech, tip = chain_with_springs(4, 4.0, 0.3)
+    mech.torque("moment", tip, (0, -np.pi * angle, 0))
+    with pytest.warns(RomWarning, match="unstable: body 'link 3' turns about its own axis"):
+        still = rom.snapshot(mech, rom.equilibrium(mech, steps=8))
+    A = still.axes(tip.body, tip.place)[0]
+    assert_allclose(A[:, 0], [np.cos(np.pi * angle), 0, np.sin(np.pi * angle)], atol=1e-9)
+
+
 def test_on_its_head_it_is_said_to_be_unstable():
     with pytest.warns(RomWarning, match="unstable: body 'bob' turns about its own axis"):
         state = rom.equilibrium(pendulum(np.pi))

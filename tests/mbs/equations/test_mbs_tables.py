@@ -13,6 +13,7 @@ from cases.command import environment
 from cases.mbs.mechanisms import random_body
 from cases.mbs.trusses import truss
 from rom.body.nonlinear.quartic import Quartic, n_entries
+from rom.body.nonlinear.sampled import Sampled
 from rom.components.cosserat import body, straight
 from rom.mbs.elements.gears.geometry import GearPair
 from rom.mbs.equations.packing import pack
@@ -133,6 +134,15 @@ def bending_body(mech):
     mech.add_flexible("c", replace(soft, quartic=energy))
 
 
+def rubber_body(mech):
+    """A flexible body whose energy is that of two points."""
+    soft = random_body(np.random.default_rng(1), damped=False)
+    rng = np.random.default_rng(0)
+    r = soft.n_modes
+    energy = Sampled(soft.K, rng.standard_normal((2, 9, r)), np.ones(2), np.ones((2, 2)))
+    mech.add_flexible("c", replace(soft, quartic=energy))
+
+
 def geared_body(mech, a, b):
     mech.prismatic("other", mech.ground.marker((0, 0, 0)), b, axis=(1, 0, 0))
     mech.gear("e", "slide", "other", ratio=2.0)
@@ -162,6 +172,7 @@ ELEMENTS = {  # family -> what asks for it
     "journal_bearings": lambda m, a, b: m.journal_bearing("e", a, ground(m), **FILM),
     "spins": lambda m, a, b: m.add_rigid("e", **WHEEL),
     "bodies of large deflection": lambda m, a, b: bending_body(m),
+    "bodies of sampled elements": lambda m, a, b: rubber_body(m),
 }
 KERNELS = ("residuals", "tangents", "energy", "multiplier_columns", "pair_tangents")
 

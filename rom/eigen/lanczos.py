@@ -12,17 +12,14 @@ from scipy.linalg.blas import dgemm
 
 from rom.eigen.completeness import MAX_MISS_PROBABILITY, miss_probability
 from rom.errors import SolverError
-from rom.fe.operators.spectrum import gaussian_block
 from rom.model import Array
 from rom.process.stopwatch import MISS_NOTE, note
 
-BLOCK_SIZE = 6  # columns solved together: fewer make solving dearer, more make the space larger
+BLOCK_SIZE = 8  # columns solved together: fewer make solving dearer, more make the space larger
 MAX_EXTRA_BLOCKS = 20  # beside the modes sought before a restart; twenty are seldom used
 MAX_RESTARTS = 20  # after which the method has failed
 MAX_FURTHER_BLOCKS = 6  # beyond convergence, for a proof; more cost as much as a count
-LOOK_GROWTH = 1.04  # of the space between two looks, which cost the cube of its size
-EIGENVALUE_RTOL = 1e-9  # residual of an eigenvalue of the inverse
-SPARE_EIGENVALUE_RTOL = 1e-5  # the same for spare ones; the error of the eigenvalue is its square
+EIGENVALUE_RTOLS = 1e-9, 1e-5  # of modes sought and spare ones, whose error is its square
 
 
 class BlockLanczos:
@@ -33,8 +30,8 @@ class BlockLanczos:
         factor: solves with K - sigma M.
         sigma: the shift, below all eigenvalues sought.
         deflated: (n_local, d) M-orthonormal modes to leave out.
-        k: number of modes sought.
-        spare: how many of them only need good eigenvalues.
+        start: (n_local, p) random columns; so many are solved for at once.
+        tolerance: (k,) residuals allowed of the modes sought, over the inverse's eigenvalues.
 
     Source:
         Grimes, Lewis and Simon, A shifted block Lanczos algorithm for solving sparse symmetric
@@ -43,19 +40,18 @@ class BlockLanczos:
     """
 
     def __init__(
-        self, ops: Any, factor: Any, sigma: float, deflated: Array, k: int, spare: int = 0
+        self, ops: Any, factor: Any, sigma: float, deflated: Array, start: Array, tolerance: Array
     ):
-        self.ops, self.factor, self.sigma, self.k = ops, factor, sigma, k
-        self.tolerance = np.repeat([EIGENVALUE_RTOL, SPARE_EIGENVALUE_RTOL], [k - spare, spare])
-        self.n_deflated = deflated.shape[1]
-        shape = (ops.n_local, self.n_deflated + capacity(k))
+        self.ops, self.factor, self.sigma = ops, factor, sigma
+        self.k, self.tolerance = tolerance.size, tolerance
+        self.n_deflated, self.width = deflated.shape[1], start.shape[1]
+        shape = (ops.n_local, self.n_deflated + capacity(self.k))
         self.V, self.MV = np.empty(shape, order="F"), np.empty(shape, order="F")
-        self.size = 0
+        self.size, self.coupled = 0, 0
+        self.found: tuple[Array, Array] | None = None  # all pairs of T
         self.T = np.zeros((0, 0))
-        self.looked, self.restarted = 0, False
+        self.next_look, self.restarted = 0.0, False
         self._append(deflated, ops.apply_M(deflated))
-        start = gaussian_block(ops, BLOCK_SIZE)
-        start[getattr(factor, "mine", [])] = 0.0  # rows that a support holds
         W, MW, _, self.start = self._orthonormal(start)
         self._append(W, MW)
 
@@ -66,7 +62,7 @@ class BlockLanczos:
             SolverError: if they do not.
         """
         for _ in range(MAX_RESTARTS):
-            while self.size + BLOCK_SIZE <= self.V.shape[1]:
+            while self.size + self.width <= self.V.shape[1]:
                 self._grow()
                 if self._converged():
                     return
@@ -79,7 +75,7 @@ class BlockLanczos:
     def pairs(self) -> tuple[Array, Array]:
         """The k eigenvalues next to the shift, ascending, and their mass-normalised modes."""
         theta, S = self._ritz(self.k)
-        return self.sigma + 1.0 / theta, self.V[:, self.n_deflated : self.size - BLOCK_SIZE] @ S
+        return self.sigma + 1.0 / theta, self.V[:, self.n_deflated : self.size - self.width] @ S
 
     def _append(self, X: Array, MX: Array) -> None:
         new = slice(self.size, self.size + X.shape[1])
@@ -88,30 +84,32 @@ class BlockLanczos:
 
     def _grow(self) -> None:
         """One more block, and R (p, p), its coupling to the block before."""
-        load = self.MV[:, self.size - BLOCK_SIZE : self.size]
+        load = self.MV[:, self.size - self.width : self.size]
         W, MW, H, self.R = self._orthonormal(self.factor.solve(load))
         k, H = self.T.shape[0], H[self.n_deflated :]
         self.T = np.block([[self.T, H[:k]], [H[:k].T, 0.5 * (H[k:] + H[k:].T)]])
         self._append(W, MW)
+        self.coupled, self.found = self.size - 2 * self.width, None
 
     def _orthonormal(self, W: Array) -> tuple[Array, Array, Array, Array]:
         """W made M-orthonormal to the space, M W, its components in the space, and the rest.
 
-        When the space holds W already, round-off is left, orthogonal to it after the second pass:
-        a random block with which the search goes on.
+        The first pass goes over what the recurrence couples it with, the second over all. When the
+        space holds W already, round-off is left, orthogonal to it after the second pass: a random
+        block with which the search goes on.
         """
-        V, MV = self.V[:, : self.size], self.MV[:, : self.size]
         H, R = np.zeros((self.size, W.shape[1])), np.eye(W.shape[1])
         W = np.asfortranarray(W)
-        for _ in range(2):
-            G = self.ops.gram(MV, W)
-            W = _less(W, V, G)
-            H += G
+        for first in (self.coupled, 0):
+            with_these = slice(first, self.size)
+            G = self.ops.gram(self.MV[:, with_these], W)
+            W = _less(W, self.V[:, with_these], G)
+            H[with_these] += G
         MW = self.ops.apply_M(W)
         for _ in range(2):
             g, U = np.linalg.eigh(self.ops.gram(W, MW))
             root = np.sqrt(np.maximum(g, 1e-30 * max(g[-1], np.finfo(float).tiny)))
-            W, MW = W @ (U / root), MW @ (U / root)
+            W, MW = _combined(W, U / root), _combined(MW, U / root)
             R = (U * root).T @ R
         return W, MW, H, R
 
@@ -124,7 +122,7 @@ class BlockLanczos:
             if chance <= MAX_MISS_PROBABILITY:
                 note(MISS_NOTE, chance)
                 return True
-            if chance == 1.0 or self.size + BLOCK_SIZE > self.V.shape[1]:
+            if chance == 1.0 or self.size + self.width > self.V.shape[1]:
                 break
             self._grow()
         return False
@@ -132,36 +130,45 @@ class BlockLanczos:
     def _residuals(self) -> Array:
         """(N,) of all Ritz values, over them."""
         theta, S = self._ritz(self.T.shape[0])
-        return np.linalg.norm(self.R @ S[-BLOCK_SIZE:], axis=0) / np.abs(theta)
+        return np.linalg.norm(self.R @ S[-self.width :], axis=0) / np.abs(theta)
 
     def _restart(self) -> None:
         """Keep the leading Ritz vectors and the last block only."""
-        self.looked, self.restarted = 0, True
-        kept = self.k + BLOCK_SIZE
+        self.next_look, self.restarted = 0.0, True
+        kept = self.k + self.width
         theta, S = self._ritz(kept)
-        ends = self.n_deflated + np.array([0, kept, kept + BLOCK_SIZE])
+        ends = self.n_deflated + np.array([0, kept, kept + self.width])
         for V in (self.V, self.MV):
-            last = V[:, self.size - BLOCK_SIZE : self.size].copy()
-            V[:, ends[0] : ends[1]] = V[:, ends[0] : self.size - BLOCK_SIZE] @ S
+            last = V[:, self.size - self.width : self.size].copy()
+            V[:, ends[0] : ends[1]] = V[:, ends[0] : self.size - self.width] @ S
             V[:, ends[1] : ends[2]] = last
         self.size, self.T = ends[2], np.diag(theta)
+        self.coupled, self.found = 0, None
 
     def _converged(self) -> bool:
         """Whether the residuals of the k leading Ritz values are small."""
         N = self.T.shape[0]
-        if N < max(self.k, LOOK_GROWTH * self.looked):
+        if N < max(self.k, self.next_look):
             return False
-        self.looked = N
+        self.next_look = N + N**2 / self.ops.n  # to look costs as much as to grow by this
         return bool((self._residuals()[: self.k] <= self.tolerance).all())
 
     def _ritz(self, k: int) -> tuple[Array, Array]:
-        theta, S = np.linalg.eigh(self.T)
-        return theta[::-1][:k], np.asfortranarray(S[:, ::-1][:, :k])  # which BLAS takes as it is
+        if self.found is None:
+            theta, S = np.linalg.eigh(self.T)
+            self.found = theta[::-1], np.asfortranarray(S[:, ::-1])  # which BLAS takes as it is
+        theta, S = self.found
+        return theta[:k], S[:, :k]
 
 
 def _less(W: Array, V: Array, G: Array) -> Array:
     """W - V G in the place of W, arrays by columns."""
     return dgemm(-1.0, V, G, 1.0, W, overwrite_c=True) if W.size and V.size else W
+
+
+def _combined(W: Array, U: Array) -> Array:
+    """W U by columns, as the space is kept."""
+    return dgemm(1.0, W, U) if W.size else W
 
 
 def capacity(k: int) -> int:

@@ -1,0 +1,182 @@
+"""The loads under which a body is to deflect far, as forces on its nodes."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import combinations, product
+from typing import Any
+
+import numpy as np
+
+from rom.arguments import finite, typed, whole
+from rom.body.recovery import CENTRIFUGAL_LOADS, PRODUCTS, centrifugal
+from rom.eigen.supports import DIRECTIONS, Fixed, supports
+from rom.eigen.verbs import Operators, mean_motion
+from rom.errors import ConfigError
+from rom.model import Array, FEModel
+
+FORCES = ("f_x", "f_y", "f_z", "m_x", "m_y", "m_z")
+
+
+@dataclass(frozen=True)
+class Load:
+    """A component of a range of loads.
+
+    Attributes:
+        interface: where it acts; "" for centrifugal force, which acts everywhere.
+        component: 0 to 5 of force and moment, or of the products of angular velocities.
+        largest: [N, N m, 1/s^2].
+    """
+
+    interface: str
+    component: int
+    largest: float = 1.0
+
+    @property
+    def name(self) -> str:
+        """What it is called in reports."""
+        if not self.interface:
+            return CENTRIFUGAL_LOADS[self.component]
+        return f"{self.interface} {FORCES[self.component]}"
+
+    @property
+    def signs(self) -> tuple[int, ...]:
+        """Those that it can have: the square of a speed has one."""
+        return (1,) if not self.interface and self.component < 3 else (1, -1)
+
+
+@typed
+@dataclass(frozen=True)
+class Geometric:
+    """Large deflection under a range of loads, for `rom.reduce`.
+
+    Attributes:
+        loads: {interface: (6,) largest force [N] and moment [N m] of either sign, axes of the
+            geometry}; they keep their direction, a moment as a pair of forces.
+        n_modes: how many of the lowest fixed-interface modes drag others along, beside the
+            static shapes of the loads; a repeated frequency counts as a whole.
+        tol: how much of the energy of the states reached may be left out, as the root of its
+            share [1].
+        n_shapes: alternatively, the number of shapes added to the basis.
+        n_steps: of load on the way to its largest value, at each of which a state is taken.
+        fixed: interfaces held in the mean beside the reference while the loads act, or
+            {name: directions}: the far end of an arch, {"crown": "x rx ry rz"} at half of one.
+        spin: (3,) largest angular velocity about each axis of the geometry [rad/s]: centrifugal
+            force is a load beside the others.
+        about: (3,) a point of the axis of rotation [m]; if missing the origin of the reference.
+
+        sampling: if given, the material is neo-Hookean with the same constants, and its energy that
+            of a few weighted elements, whose forces differ by this share from those of all [1].
+
+    Where the body snaps on the way to a load, its path is followed by arc length.
+
+    Raises:
+        ConfigError: for loads that are none, or numbers out of range.
+
+    Example:
+        >>> rom.Geometric(loads={"tip": (0, 200.0, 0, 0, 0, 0)}).n_steps
+        4
+    """
+
+    loads: Mapping[str, Any]
+    n_modes: int = 4
+    tol: float = 1e-4
+    n_shapes: int | None = None
+    n_steps: int = 4
+    fixed: Fixed = ()
+    spin: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    about: tuple[float, float, float] | None = None
+    sampling: float | None = None
+
+    def __post_init__(self) -> None:
+        whole("n_steps", self.n_steps, 1)
+        whole("n_modes", self.n_modes)
+        if self.n_shapes is not None:
+            whole("n_shapes", self.n_shapes, 1, reason="without any the basis locks")
+        if not 0 < self.tol < 1:
+            raise ConfigError(f"tol = {self.tol!r} is a share between 0 and 1.")
+        if self.sampling is not None and not 0 < self.sampling < 1:
+            raise ConfigError(f"sampling = {self.sampling!r} is a share between 0 and 1.")
+        for name, load in self.loads.items():
+            range_ = np.asarray(load, dtype=float)
+            if range_.shape != (6,) or not np.isfinite(range_).all() or not range_.any():
+                raise ConfigError(
+                    f"the range of loads at {name!r} is {load!r}; it has six numbers, forces [N], "
+                    "then moments [N m], not all zero."
+                )
+        spins = finite("spin", self.spin, (3,)).any()
+        if not self.loads and not spins:
+            raise ConfigError(
+                "no range of loads is given, for which the shapes would be.",
+                hint='Name an interface: loads={"tip": (0, 200.0, 0, 0, 0, 0)}.',
+            )
+        if self.about is not None:
+            finite("about", self.about, (3,))
+            if not spins:
+                raise ConfigError(f"about = {self.about!r} is a point of an axis, and spin is 0.")
+
+    def components(self) -> list[Load]:
+        """The loads that are not zero: those of interfaces, then centrifugal ones."""
+        of_interfaces = [
+            Load(name, k, abs(float(x)))
+            for name, load in self.loads.items()
+            for k, x in enumerate(load)
+            if x
+        ]
+        squares = [abs(float(self.spin[i] * self.spin[j])) for i, j in PRODUCTS]
+        return of_interfaces + [Load("", k, x) for k, x in enumerate(squares) if x]
+
+    def load_cases(self) -> Array:
+        """(c, l) directions of the components together, each alone and each two of them [1]."""
+        components = self.components()
+        units = np.eye(len(components))
+        alone = [s * unit for unit, load in zip(units, components, strict=True) for s in load.signs]
+        skew = [(a * units[i] + b * units[j]) / np.sqrt(2)
+                for i, j in combinations(range(len(units)), 2)
+                for a, b in product(components[i].signs, components[j].signs)]  # fmt: skip
+        return np.array(alone + skew)
+
+    def axis_point(self, model: FEModel, reference: str) -> Array:
+        """(3,) the point of the axis of rotation [m], for a body that is held at its reference."""
+        return np.asarray(model.interfaces[reference].origin if self.about is None else self.about)
+
+
+def held_motions(geometric: Geometric, known: Any) -> list[Load]:
+    """Each motion held beside the reference, as the load that would move it.
+
+    Args:
+        geometric: the range and its supports.
+        known: names of the interfaces there are.
+
+    Raises:
+        ConfigError, InterfaceError: see `rom.eigen.supports.supports`.
+    """
+    return [
+        Load(name, DIRECTIONS.index(direction))
+        for name, directions in supports(geometric.fixed, known).items()
+        for direction in directions or DIRECTIONS
+    ]
+
+
+def nodal_forces(loads: list[Load], model: FEModel, ops: Operators, about: Array) -> Array:
+    """(n_local, l) forces of loads at their largest on the nodes of this process [N].
+
+    Args:
+        loads: some components of a range.
+        model: supplies points and interfaces.
+        ops: its operators in nodal dofs, with all it carries.
+        about: (3,) a point of the axis of rotation [m].
+    """
+    F, nodes = np.zeros((ops.n_local, len(loads))), slice(ops.first // 3, None)
+    field = centrifugal(model.points[nodes][: ops.n_local // 3] - about)
+    for k, load in enumerate(loads):
+        if not load.interface:
+            F[:, k] = field[:, load.component]
+            continue
+        interface = model.interfaces[load.interface]
+        at = interface.dofs - ops.first
+        mine = (at >= 0) & (at < ops.n_local)
+        F[at[mine], k] = load.largest * mean_motion(interface)[load.component, mine]
+    turning = [k for k, load in enumerate(loads) if not load.interface]
+    if turning:
+        F[:, turning] = ops.apply_M(F[:, turning]) * [loads[k].largest for k in turning]
+    return F

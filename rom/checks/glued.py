@@ -1,0 +1,117 @@
+"""Pieces of a solid, cut along faces of its cells, as the solid again."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from scipy.sparse import coo_matrix, csr_matrix
+from scipy.spatial import cKDTree
+
+from rom.body.nonlinear.ranges import Load
+from rom.eigen.verbs import mean_motion
+from rom.errors import ModelError
+from rom.model import Array, FEModel, Index, Interface
+
+MEETING_RTOL = 1e-6  # of the size of a section: how far nodes that meet may lie apart
+
+
+@dataclass(frozen=True)
+class GluedSolid:
+    """The whole solid at finite strain.
+
+    Attributes:
+        models: the pieces.
+        dofs: {piece: (n_k,) numbers of its dofs in the whole}.
+        n: number of dofs of the whole.
+    """
+
+    models: Mapping[str, FEModel]
+    dofs: dict[str, Index]
+    n: int
+
+    @classmethod
+    def of(
+        cls, models: Mapping[str, FEModel], joints: Mapping[str, tuple[str, str]]
+    ) -> "GluedSolid":
+        """Pieces glued at the nodes of their joints.
+
+        Raises:
+            ModelError: if nodes of two pieces do not meet at a joint.
+        """
+        hangs = {other: (joint, one) for joint, (one, other) in joints.items()}
+        number, n = dict[str, Index](), 0
+        for key in [k for k in models if k not in hangs] + [other for _, other in joints.values()]:
+            model = models[key]
+            nodes = np.full(len(model.points), -1)
+            if key in hangs:
+                joint, one = hangs[key]
+                mine, other = model.interfaces[joint], models[one].interfaces[joint]
+                nodes[mine.nodes] = number[one][other.nodes[_meeting(mine, other)]]
+            new = nodes < 0
+            nodes[new] = n + np.arange(np.count_nonzero(new))
+            number[key], n = nodes, n + int(np.count_nonzero(new))
+        dofs = {key: (3 * nodes[:, None] + np.arange(3)).ravel() for key, nodes in number.items()}
+        return cls(models, dofs, 3 * n)
+
+    def force(self, u: Array) -> Array:
+        """(n,) forces that hold the solid at a displacement (n,) [N]."""
+        f = np.zeros(self.n)
+        for key, solid in self._solids.items():
+            f[self.dofs[key]] += solid.force(u[self.dofs[key]])
+        return f
+
+    def tangent(self, u: Array) -> csr_matrix:
+        """(n, n) derivative of the forces at a displacement (n,) [N/m]."""
+        return self._sum({key: solid.tangent(u[self.dofs[key]])
+                          for key, solid in self._solids.items()})  # fmt: skip
+
+    @cached_property
+    def M(self) -> csr_matrix:
+        """(n, n) mass [kg]."""
+        return self._sum({key: model.operators.gathered(model.operators.M)
+                          if model.operators else model.M
+                          for key, model in self.models.items()})  # fmt: skip
+
+    def motion(self, load: Load) -> Array:
+        """(n,) row of the mean motion of an interface on which a unit load works [1, 1/m]."""
+        row = np.zeros(self.n)
+        for key, model in self.models.items():
+            if load.interface in model.interfaces:
+                interface = model.interfaces[load.interface]
+                row[self.dofs[key][interface.dofs]] = mean_motion(interface)[load.component]
+        return row
+
+    def nodal_force(self, load: Load) -> Array:
+        """(n,) forces of a load at its largest [N]."""
+        return load.largest * self.motion(load)
+
+    @cached_property
+    def _solids(self) -> dict[str, Any]:
+        return {key: model.stresses.finite_strain() for key, model in self.models.items()}
+
+    def _sum(self, parts: Mapping[str, Any]) -> csr_matrix:
+        """(n, n) sum of matrices of the pieces, by their numbers in the whole."""
+        rows, columns, values = [], [], []
+        for key, part in parts.items():
+            A = coo_matrix(part)
+            rows.append(self.dofs[key][A.row])
+            columns.append(self.dofs[key][A.col])
+            values.append(A.data)
+        where = np.concatenate(rows), np.concatenate(columns)
+        return csr_matrix((np.concatenate(values), where), shape=(self.n, self.n))
+
+
+def _meeting(one: Interface, other: Interface) -> Index:
+    """(k,) number of the node of the other interface at each node of one."""
+    distance, at = cKDTree(other.points).query(one.points)
+    size = np.ptp(one.points, axis=0).max()
+    if one.nodes.size != other.nodes.size or distance.max() > MEETING_RTOL * size:
+        raise ModelError(
+            f"{one.nodes.size} and {other.nodes.size} nodes of two pieces do not meet at "
+            f"{one.name!r}: they lie up to {distance.max():.3g} m apart.",
+            hint="Cut one mesh (rom.fe.pieces): of pieces with meshes of their own the whole is "
+            "not known.",
+        )
+    return np.asarray(at)

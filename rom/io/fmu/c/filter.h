@@ -1,0 +1,79 @@
+/* What all filters share. Before it: SENSORS and DT of the tables, and a Model whose State `now` has
+   the time t and the samples y. */
+
+Model *model_open(const char *resources, char *message)
+{
+    Model *m = malloc(sizeof *m);
+    (void)resources;
+    if (!m)
+        snprintf(message, MESSAGE, "no memory for %d sensors and their filter.", SENSORS);
+    else
+        model_reset(m, message);
+    return m;
+}
+
+void model_close(Model *m) { free(m); }
+
+int model_set(Model *m, size_t n, const unsigned refs[], const double values[], char *message)
+{
+    for (size_t k = 0; k < n; k++) {
+        if (refs[k] >= SENSORS || !isfinite(values[k])) {
+            snprintf(message, MESSAGE, refs[k] >= SENSORS
+                         ? "value reference %u cannot be set (to %g); sensors are the first %d."
+                         : "the sample of value reference %u = %g is not a finite number.",
+                     refs[k], values[k], SENSORS);
+            return ERROR;
+        }
+        m->now.y[refs[k]] = values[k];
+    }
+    return OK;
+}
+
+static double product(const double *row, const double *x, int n)
+{
+    double sum = 0.0;
+    for (int j = 0; j < n; j++)
+        sum += row[j] * x[j];
+    return sum;
+}
+
+/* Steps follow each other and are as long as those of the filter. */
+static int wrong_time(const Model *m, double t, double h, char *message)
+{
+    if (!(fabs(h - DT[0]) <= 1e-6 * DT[0])) {
+        snprintf(message, MESSAGE, "the communication step %g s must be the %g s of the filter.", h,
+                 DT[0]);
+        return 1;
+    }
+    if (!(fabs(t - m->now.t) <= 1e-6 * fmax(h, 1e-3 * fabs(t)))) {
+        snprintf(message, MESSAGE, "a step from t = %.9g s is asked for, the filter is at %.9g s.",
+                 t, m->now.t);
+        return 1;
+    }
+    return 0;
+}
+
+int model_keep(Model *m, void **state, char *message)
+{
+    *state = malloc(sizeof m->now);
+    if (!*state) {
+        snprintf(message, MESSAGE, "no memory for a state.");
+        return ERROR;
+    }
+    memcpy(*state, &m->now, sizeof m->now);
+    return OK;
+}
+
+int model_recall(Model *m, void *state, char *message)
+{
+    (void)message;
+    memcpy(&m->now, state, sizeof m->now);
+    return OK;
+}
+
+int model_drop(Model *m, void *state, char *message)
+{
+    (void)m, (void)message;
+    free(state);
+    return OK;
+}

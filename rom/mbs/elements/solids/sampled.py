@@ -1,0 +1,174 @@
+"""Bodies of neo-Hookean material by sampled elements: their energy beyond that of small deflection.
+
+    force = sum of w G^T P - K q,    tangent = sum of w G^T dP/dF G - K
+
+over the points that were kept, see `rom.body.nonlinear.sampled`. With Y_k = F^-1 G_k::
+
+    G_k : dP/dF : G_l = mu G_k : G_l + (mu - lam ln J) tr(Y_k Y_l) + lam tr(Y_k) tr(Y_l)
+"""
+
+from collections.abc import Mapping
+from math import log1p, nan
+
+import numpy as np
+
+from rom.mbs.elements.family import Family, Places, apart, integers, on_joint
+from rom.mbs.elements.solids.quartics import LargeDeflection
+from rom.mbs.kernels.compiled import inner
+from rom.mbs.kernels.element_calls import energy, residuals, tangents
+from rom.mbs.kernels.markers import own_corner
+from rom.mbs.kernels.tables import Array1, Array2, Array3, Index1, Scratch1, Scratch2, Table, table
+
+
+@table
+class Samples(Table):
+    """All bodies of sampled elements.
+
+    Attributes:
+        body: (e,) which.
+        start: (e + 1,) first of its points.
+        gradients: (p, 9, R) displacement gradient per unit of each coordinate [1/m].
+        weights: (p,) [m^3].
+        lame: (p, 2) lam and mu [Pa].
+        K: (e, R, R) stiffness at small deflection [N/m].
+        state: (p, 20) gradient H, inverse of F, ln J, energy density, at the last residual.
+        Y: (9, R) F^-1 G at a point.
+        stress: (9,) P at a point.
+    """
+
+    body: Index1
+    start: Index1
+    gradients: Array3
+    weights: Array1
+    lame: Array2
+    K: Array3
+    state: Scratch2
+    Y: Scratch2
+    stress: Scratch1
+
+
+def pack(found: Mapping[str, LargeDeflection], places: Places) -> Samples:
+    """The energies as arrays."""
+    every = [one.energy for one in found.values()]
+    counts = [len(x.weights) for x in every]
+    R, p, e = max((x.n for x in every), default=0), sum(counts), len(every)
+    G, K, start = np.zeros((p, 9, R)), np.zeros((e, R, R)), np.cumsum([0, *counts])
+    for k, x in enumerate(every):
+        G[start[k] : start[k + 1], :, : x.n] = x.gradients
+        K[k, : x.n, : x.n] = x.K
+    return Samples(
+        integers(places.body[one.body] for one in found.values()), integers(start), G,
+        np.concatenate([np.zeros(0), *(x.weights for x in every)]),
+        np.vstack([np.zeros((0, 2)), *(x.lame for x in every)]),
+        K, np.zeros((p, 20)), np.zeros((9, R)), np.zeros(9),
+    )  # fmt: skip
+
+
+@inner
+def take_state(s, samples, e, p, q):
+    """Set the state of point p of element e at the coordinates of its body."""
+    b, X = samples.body[e], samples.state[p]
+    at, r = s.bodies.q_at[b] + 7, s.bodies.r[b]
+    for i in range(9):
+        X[i] = 0.0
+        for k in range(r):
+            X[i] += samples.gradients[p, i, k] * q[at + k]
+    minors = X[0] * X[4] - X[1] * X[3] + X[0] * X[8] - X[2] * X[6] + X[4] * X[8] - X[5] * X[7]
+    third = (X[0] * (X[4] * X[8] - X[5] * X[7]) - X[1] * (X[3] * X[8] - X[5] * X[6])
+             + X[2] * (X[3] * X[7] - X[4] * X[6]))  # fmt: skip
+    grown = X[0] + X[4] + X[8] + minors + third
+    X[18] = log1p(grown) if grown > -1.0 else nan
+    a, d, g = 1.0 + X[0], 1.0 + X[4], 1.0 + X[8]
+    J = 1.0 + grown
+    X[9], X[10], X[11] = d * g - X[5] * X[7], X[2] * X[7] - X[1] * g, X[1] * X[5] - X[2] * d
+    X[12], X[13], X[14] = X[5] * X[6] - X[3] * g, a * g - X[2] * X[6], X[2] * X[3] - a * X[5]
+    X[15], X[16], X[17] = X[3] * X[7] - d * X[6], X[1] * X[6] - a * X[7], a * d - X[1] * X[3]
+    square = 2.0 * (X[0] + X[4] + X[8])
+    for i in range(9):
+        X[9 + i] /= J
+        square += X[i] * X[i]
+    lam, mu = samples.lame[p, 0], samples.lame[p, 1]
+    X[19] = mu * (0.5 * square - X[18]) + 0.5 * lam * X[18] * X[18]
+
+
+@residuals.of(Samples)
+def sample_residuals(s, W, samples, q, v, _lam):
+    """Add the forces beyond those of small deflection to W.residual."""
+    P = samples.stress
+    for e in range(samples.body.size):
+        b = samples.body[e]
+        at, t, r = s.bodies.q_at[b] + 7, s.bodies.v_at[b] + 6, s.bodies.r[b]
+        for i in range(r):
+            for j in range(r):
+                W.residual[t + i] -= samples.K[e, i, j] * q[at + j]
+        for p in range(samples.start[e], samples.start[e + 1]):
+            take_state(s, samples, e, p, q)
+            X, w = samples.state[p], samples.weights[p]
+            lam, mu = samples.lame[p, 0], samples.lame[p, 1]
+            for i in range(3):
+                for j in range(3):
+                    F = X[3 * i + j] + (1.0 if i == j else 0.0)
+                    turned = X[9 + 3 * j + i]
+                    P[3 * i + j] = w * (mu * (F - turned) + lam * X[18] * turned)
+            for k in range(r):
+                for i in range(9):
+                    W.residual[t + k] += samples.gradients[p, i, k] * P[i]
+
+
+@inner
+def pull_back(samples, p, r):
+    """Set Y to F^-1 G at a point of a body of r coordinates; its state first."""
+    X, G, Y = samples.state[p], samples.gradients[p], samples.Y
+    for i in range(3):
+        for j in range(3):
+            for k in range(r):
+                Y[3 * i + j, k] = 0.0
+                for l in range(3):
+                    Y[3 * i + j, k] += X[9 + 3 * i + l] * G[3 * l + j, k]
+
+
+@tangents.of(Samples)
+def sample_tangents(s, W, samples, _lam, ck, _cc):
+    """Add ck times the derivative of the forces to W.Kt; `sample_residuals` first."""
+    Y = samples.Y
+    for e in range(samples.body.size):
+        b = samples.body[e]
+        (x, y), r = own_corner(s, b), s.bodies.r[b]
+        for k in range(r):
+            for l in range(r):
+                W.Kt[x + 6 + k, y + 6 + l] -= ck * samples.K[e, k, l]
+        for p in range(samples.start[e], samples.start[e + 1]):
+            G, w = samples.gradients[p], ck * samples.weights[p]
+            lam, mu = samples.lame[p, 0], samples.lame[p, 1]
+            second = mu - lam * samples.state[p, 18]
+            pull_back(samples, p, r)
+            for k in range(r):
+                trace = lam * (Y[0, k] + Y[4, k] + Y[8, k])
+                for l in range(r):
+                    total = trace * (Y[0, l] + Y[4, l] + Y[8, l])
+                    for i in range(9):
+                        total += mu * G[i, k] * G[i, l]
+                        total += second * Y[i, k] * Y[3 * (i % 3) + i // 3, l]
+                    W.Kt[x + 6 + k, y + 6 + l] += w * total
+
+
+@energy.of(Samples)
+def sample_energy(s, _W, samples, q, _v):
+    """Energy beyond that of small deflection."""
+    total = 0.0
+    for e in range(samples.body.size):
+        b = samples.body[e]
+        at, r = s.bodies.q_at[b] + 7, s.bodies.r[b]
+        for p in range(samples.start[e], samples.start[e + 1]):
+            take_state(s, samples, e, p, q)
+            total += samples.weights[p] * samples.state[p, 19]
+        for i in range(r):
+            for j in range(r):
+                total -= 0.5 * q[at + i] * samples.K[e, i, j] * q[at + j]
+    return total
+
+
+SAMPLES_FAMILY = Family(
+    "bodies of sampled elements", LargeDeflection, pack, sample_residuals, sample_tangents,
+    sample_energy, ends=on_joint, couples=apart, by_rate=lambda _: False, complete=True,
+)  # fmt: skip

@@ -1,0 +1,209 @@
+"""Assemblies of families with an unknown joint, updated."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import rom
+from cases.solid import STEEL, composite
+from rom.errors import ConfigError, InterfaceError
+from rom.parametric import FamilyAssembly
+from rom.parametric.parameters import centre
+from rom.updating import (
+    AddedMass,
+    Channels,
+    GroundSpring,
+    JointSpring,
+    Responses,
+    candidates,
+    place,
+)  # fmt: skip
+from rom.updating.family_model import Parts, family_model
+from rom.updating.frf_data import noisy
+from rom.updating.models import modal
+from rom.updating.normal_equations import responses_at
+
+BOLTS = JointSpring(
+    ("frame", "tip"), ("arm", "root"), (4e8, 4e8, 4e8, 2e5, 1e5, 1e5), 0.1, 10.0
+)  # fmt: skip
+HELD = (("frame", "root"),)
+LINES = np.linspace(20, 1000, 150)
+AVERAGES, LEVEL = 50, 0.03
+
+
+@pytest.fixture(scope="module")
+def families():
+    """Two halves of a beam, 0.5 m each."""
+    found = {}
+    for name, x in (("frame", 0.0), ("arm", 0.5)):
+        half = composite({name: STEEL}, lambda c, n=name: n, (0.5, 0.1, 0.08), (4, 1, 1), (x, 0, 0))
+        found[name] = rom.reduce_parametric(
+            half, parameters={"E": rom.YoungsModulus(name, 0.3, 3.0)},
+            method=rom.CraigBampton(12), interfaces={"root": "rbe2", "tip": "rbe2"}, certify=False,
+        )  # fmt: skip
+    return found
+
+
+@pytest.fixture(scope="module")
+def bolted(families):
+    return FamilyAssembly(families)
+
+
+def channels():
+    points = [[x, y, 0.08] for x in (0.25, 0.375, 0.625, 0.75, 1.0) for y in (0.0, 0.1)]
+    sensors = Channels(np.repeat(points, 2, axis=0), np.tile([[0, 1, 0], [0, 0, 1]], (10, 1)))
+    return sensors, Channels([[0.75, 0.1, 0.0]], [[0, 1, 2]])
+
+
+def model_of(family, attached, fixed=HELD):
+    bodies = Parts.of(family).bodies
+    rows = [c.rows(bodies, "channel") for c in channels()]
+    return family_model(family, rows, attached, {}, fixed)
+
+
+def measured(family, attached, true, seed=0):
+    model = model_of(family, attached)
+    x = np.log([true.get(name, 1.0) for name in model.names])
+    H = responses_at(model, x, np.array([0.02]), 2 * np.pi * LINES)
+    H = noisy(H, LEVEL, np.random.default_rng(seed))
+    coherence = 1 / (1 + AVERAGES * LEVEL**2)
+    return Responses(LINES, H, *channels(), coherence, AVERAGES)
+
+
+def test_coupled_families_have_the_frequencies_of_their_assembly(families):
+    joined = FamilyAssembly(families, ((("frame", "tip"), ("arm", "root")),))
+    model = model_of(joined, {})
+    assert model.names == ("frame.E", "arm.E") and model.n_rigid == 0
+    found = modal(model.at(np.log([1.2, 0.8])), ()).lam[:8]
+    values = {"frame.E": 1.2, "arm.E": 0.8}
+    expected = joined.at(**values).modes(8, fixed=HELD).omega
+    assert_allclose(np.sqrt(found), expected, rtol=1e-8)
+    modes = joined.nominal.modes(fixed=HELD)
+    seen, driven = (
+        sum(side.rows({name: body}, "channel", 0.6) @ modes.shapes[name]
+            * (np.asarray(side.points)[:, :1] > 0.5 if name == "arm"
+               else np.asarray(side.points)[:, :1] < 0.5)
+            for name, body in joined.nominal.bodies.items())
+        for side in channels()
+    )  # fmt: skip
+    w = 2 * np.pi * LINES
+    H = np.einsum("sn,fn,en->fse", seen, 1 / (modes.omega**2 - w[:, None] ** 2), driven)
+    x = np.log(list(centre(joined.parameters).values()))
+    same = responses_at(model, x, np.array([1e-12]), w)
+    assert_allclose(same, H, rtol=1e-6, atol=1e-9 * np.abs(H).max())
+
+
+def test_two_bodies_on_a_spring_swing_as_two_masses(bolted):
+    """A soft spring along x: omega^2 = k (1/m + 1/m) of two halves; 11 other motions are free."""
+    k = 1e3
+    soft = JointSpring(("frame", "tip"), ("arm", "root"), (k, 0, 0), 0.1, 10.0)
+    model = model_of(bolted, {"bolts": soft}, fixed=())
+    assert model.n_rigid == 11
+    half = 7850.0 * 0.5 * 0.1 * 0.08
+    assert_allclose(modal(model.at(np.zeros(3)), ()).lam[11], 2 * k / half, rtol=1e-5)
+    assert model_of(bolted, {"bolts": BOLTS}, fixed=()).n_rigid == 6
+
+
+def test_a_spring_reaches_a_body_that_is_apart_by_a_rigid_arm(bolted):
+    """No rigid motion of the whole stretches it, wherever its ends are."""
+    parts = Parts.of(bolted)
+    long = JointSpring(("frame", "root"), ("arm", "tip"), (3.0, 4.0, 5.0), 0.1, 10.0)
+    K, _ = long.term(parts)
+    rigid = np.zeros((parts.n, 6))
+    for columns in parts.columns.values():
+        rigid[columns.start : columns.start + 6] = np.eye(6)
+    assert_allclose(K @ rigid, 0.0, atol=1e-12)
+    moved = np.zeros(parts.n)
+    moved[parts.columns["arm"].start + np.array([2, 5])] = 2.0, 1.0  # along and about z
+    y = 0.05  # of the root, which is at x = 0: along x the turn moves it by -y
+    assert_allclose(moved @ K @ moved, 5.0 * 2.0**2 + 3.0 * y**2)
+
+
+def test_a_stiff_joint_is_a_coupling(families, bolted):
+    joined = FamilyAssembly(families, ((("frame", "tip"), ("arm", "root")),))
+    stiff = replace(BOLTS, stiffness=(1e14,) * 3 + (1e12,) * 3)
+    found = modal(model_of(bolted, {"bolts": stiff}).at(np.zeros(3)), ()).lam[:6]
+    assert_allclose(found, modal(model_of(joined, {}).at(np.zeros(2)), ()).lam[:6], rtol=1e-4)
+
+
+def test_a_joint_and_both_moduli_are_found(bolted):
+    true = {"frame.E": 1.2, "arm.E": 0.85, "bolts": 0.5}
+    attached = {"bolts": BOLTS}
+    found = rom.update(bolted, measured(bolted, attached, true), fixed=HELD, attached=attached)
+    assert found.verdict.ok, found
+    for name, value in true.items():
+        assert abs(np.log(found.factors[name] / value)) < 4 * found.deviations[name] < 0.1
+    bodies = found.assembly.bodies
+    assert bodies["arm"].provenance["updating"]["factors"] == found.factors
+    alone = bolted.families["arm"].at(E=found.factors["arm.E"])
+    assert_allclose(bodies["arm"].frequencies(4), alone.frequencies(4), rtol=1e-12)
+    drawn = found.drawn(LINES[:3], *channels(), n=2)
+    assert drawn.shape == (2, 3, 20, 1)
+
+
+def test_a_joint_taken_for_rigid_is_refused_and_a_missing_mass_is_named(families, bolted):
+    attached = {"bolts": BOLTS}
+    test = measured(bolted, attached, {"bolts": 0.3})
+    joined = FamilyAssembly(families, ((("frame", "tip"), ("arm", "root")),))
+    assert not rom.update(joined, test, fixed=HELD).verdict.ok
+    heavy = {"cable": AddedMass(("arm", "tip"), 1.0, 0.1, 10.0)}
+    test = measured(bolted, attached | heavy, {})
+    prop = {"prop": GroundSpring(("frame", "tip"), (1e6, 1e6, 1e6), 0.1, 10.0)}
+    found = rom.update(bolted, test, fixed=HELD, attached=attached, candidates=heavy | prop)
+    assert not found.verdict.ok
+    assert max(found.scores, key=lambda name: abs(found.scores[name])) == "cable"
+
+
+def test_an_assembly_of_one_is_planned_as_a_body(families):
+    family, one = families["frame"], FamilyAssembly({"frame": families["frame"]})
+    offered = candidates(family.body, 3, fixed=("root",))
+    load = AddedMass("tip", 2.0, 0.1, 10.0)
+    options = {"n_sensors": 2, "noise": 0.05}
+    alone = place(family, offered, offered, LINES[::5], fixed=("root",),
+                  attached={"load": load}, **options)  # fmt: skip
+    same = place(one, offered, offered, LINES[::5], fixed=HELD,
+                 attached={"load": replace(load, at=("frame", "tip"))}, **options)  # fmt: skip
+    assert alone.names[:2] == ("E", "load") and same.names[:2] == ("frame.E", "load")
+    assert_allclose(same.covariance, alone.covariance, rtol=1e-8)
+
+
+def test_what_does_not_fit_an_assembly_is_named(families, bolted):
+    test = measured(bolted, {"bolts": BOLTS}, {})
+
+    def refused(words, error=ConfigError, test=test, attached=BOLTS, fixed=HELD, **options):
+        with pytest.raises(error, match=words):
+            rom.update(bolted, test, fixed=fixed, attached={"bolts": attached}, **options)
+
+    seam = Channels([[0.5, 0.1, 0.08]], [[0, 0, 1]])
+    refused("input 0 at .* is as near to one as to another of 'frame', 'arm'",
+            test=replace(test, inputs=seam))  # fmt: skip
+    refused("'tip' is no place .body, interface.; bodies are 'frame', 'arm'",
+            attached=AddedMass("tip", 1.0, 0.1, 1.0))  # fmt: skip
+    refused("no place", attached=replace(BOLTS, one=("leg", "tip")))
+    refused("knee", InterfaceError, attached=replace(BOLTS, one=("arm", "knee")))
+    refused("no body 'leg'", fixed=(("leg", "root"),))
+    with pytest.raises(ConfigError, match="has the range"):
+        replace(BOLTS, low=0.0)
+    with pytest.raises(ConfigError, match="there is no family"):
+        FamilyAssembly({})
+    inches = replace(families["arm"], body=replace(families["arm"].body, units="mm-t-s"))
+    with pytest.raises(ConfigError, match="families 'arm' are not in SI"):
+        FamilyAssembly(families | {"arm": inches})
+    one = rom.update(families["frame"], alone(families["frame"]), fixed=("root",))
+    with pytest.raises(ConfigError, match="one body was updated"):
+        _ = one.assembly
+    whole = rom.update(bolted, test, fixed=HELD, attached={"bolts": BOLTS})
+    with pytest.raises(ConfigError, match="has several bodies"):
+        _ = whole.body
+
+
+def alone(family):
+    """A test of one body."""
+    sensors = Channels([[0.375, 0.1, 0.08]], [[0, 1, 2]])
+    rows = (sensors.rows(family.body, "sensor"),) * 2
+    H = responses_at(family_model(family, rows, {}, {}, ("root",)), np.zeros(1),
+                     np.array([0.02]), 2 * np.pi * LINES)  # fmt: skip
+    H = noisy(H, LEVEL, np.random.default_rng(0))
+    return Responses(LINES, H, sensors, sensors, 1 / (1 + AVERAGES * LEVEL**2), AVERAGES)
