@@ -8,8 +8,8 @@ from rom.components.wind import Blading, profile, profiles, rotor_load
 from rom.errors import ConfigError
 
 # Hand and others, NREL/TP-500-29955 (2001), table A-1: radius [m], chord [m], twist [deg] against
-# the place at three quarters; tips were pitched by 3 degrees. Were that place, thrust at 7 m/s would be
-# 12 % above what was measured
+# the place at three quarters; tips were pitched by 3 degrees. If that place was instead, thrust at
+# 7 m/s is 12 % above what was measured
 BLADE = np.array([
     [1.2575, 0.737, 20.040], [1.343, 0.728, 18.074], [1.51, 0.711, 14.292], [1.648, 0.697, 11.909],
     [1.952, 0.666, 7.979], [2.257, 0.636, 5.308], [2.562, 0.605, 3.425], [2.867, 0.574, 2.083],
