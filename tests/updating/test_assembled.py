@@ -195,6 +195,11 @@ def test_what_does_not_fit_an_assembly_is_named(families, bolted):
         replace(BOLTS, low=0.0)
     with pytest.raises(ConfigError, match="there is no family"):
         FamilyAssembly({})
+    with pytest.raises(ConfigError, match="the name of a family must be a text"):
+        FamilyAssembly({"": families["arm"]})
+    two = replace(families["arm"], parameters={"b.E": families["arm"].parameters["E"]})
+    with pytest.raises(ConfigError, match=r"two parameters have one name among 'a\.b\.E'"):
+        FamilyAssembly({"a": two, "a.b": families["arm"]})
     inches = replace(families["arm"], body=replace(families["arm"].body, units="mm-t-s"))
     with pytest.raises(ConfigError, match="families 'arm' are not in SI"):
         FamilyAssembly(families | {"arm": inches})
