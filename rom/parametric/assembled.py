@@ -7,7 +7,7 @@ from typing import Any
 from rom.arguments import typed
 from rom.assembly.assembly import Assembly, Place
 from rom.errors import ConfigError
-from rom.names import named
+from rom.names import check_text, named
 from rom.parametric.family import BodyFamily
 from rom.parametric.parameters import Parameter, complete
 
@@ -23,7 +23,8 @@ class FamilyAssembly:
             `rom.Assembly`. What is joined by springs alone is not coupled.
 
     Raises:
-        ConfigError: without families, or for one in other units.
+        ConfigError: without families, for one in other units or without a name, or where two
+            parameters get one name.
         ConfigError, InterfaceError: see `rom.Assembly`.
     """
 
@@ -36,6 +37,13 @@ class FamilyAssembly:
             raise ConfigError(
                 f"families {named(other)} are not in SI units." if other else "there is no family.",
                 hint="Reduce the models of all parts in SI units.",
+            )
+        for name in self.families:
+            check_text(name, "a family")
+        if len(self.parameters) < sum(len(f.parameters) for f in self.families.values()):
+            raise ConfigError(
+                f"two parameters have one name among {named(self.parameters)}.",
+                hint="Give families names without a dot.",
             )
         _ = self.nominal  # refuses couplings that cannot be
 

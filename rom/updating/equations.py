@@ -26,7 +26,7 @@ from rom.updating.models import AtSensors, Measurement, ParametricModel, modal
 from rom.updating.normal_equations import Data, shared, through_shared
 
 SENSOR_RTOL = 1e-8  # singular value of sensors that follow others, over the largest
-ROUGH_STEP, FINE_STEP = 1.0, 1e-5  # in standard deviations: the last ones of far and near
+LAST_STEP = 1e-3  # in standard deviations
 COLLOCATED_RTOL = 1e-8  # of the row of a sensor that measures what an input drives
 
 
@@ -129,10 +129,10 @@ def by_response_functions(
     data: Data,
     x: Array,
     free: Mask,
-    damping: float,
+    ratios: Array,
     *,
     prior: Array,
-    prior_damping: tuple[int, float],
+    prior_damping: tuple[float, float],
 ) -> Update:
     """Logarithms of factors, and damping ratios, by H - H_test = H dZ H_test, linear in each step.
 
@@ -144,10 +144,9 @@ def by_response_functions(
         data: see `by_equations`.
         x: see `by_equations`.
         free: see `by_equations`.
-        damping: ratio to start from [1].
+        ratios: (m,) of the lowest elastic modes, the last one of all others too, to start from [1].
         prior: see `by_equations`.
-        prior_damping: number of ratios, of the lowest elastic modes, the last one of all others
-            too, and the standard deviation of their logarithms before the test [1].
+        prior_damping: ratio before the test and standard deviation of its logarithm [1].
 
     Raises:
         ConfigError: if sensors follow from others, or no line counts for all of them.
@@ -158,9 +157,9 @@ def by_response_functions(
     """
     lines = _whole_lines(data)
     inside, omega = InSensors.of(model, x, free), data.omega[lines]
-    n_s, (m, spread) = len(model.seen), prior_damping
+    n_s = len(model.seen)
     H, F = np.exp(data.logarithm[lines]), inside.basis.T @ model.driven.T
-    weights = 1 / np.linalg.norm(H, axis=(1, 2), keepdims=True)  # where far away: peaks first
+    weights = data.weight[lines] / np.abs(H)
 
     def triangle(x: Array, ratios: Array) -> Array:
         here = inside.at(x)
@@ -177,14 +176,9 @@ def by_response_functions(
             R = folded(R, np.column_stack([weighted(weights[block], A) for A in (J, r)]))
         return R
 
-    start, limits = (
-        (x[free], np.full(m, damping)),
-        tuple(np.log((model.low[free], model.high[free]))),
-    )
-    options = 2 * H.size, limits, prior[free], (damping, spread)
-    near = solved(triangle, start, *options, enough=ROUGH_STEP)
-    weights = data.weight[lines] / np.abs(H)
-    return solved(triangle, (near.p, near.zeta), *options, enough=FINE_STEP)
+    limits = np.log(model.low[free]), np.log(model.high[free])
+    options = 2 * H.size, limits, prior[free], prior_damping
+    return solved(triangle, (x[free], ratios), *options, enough=LAST_STEP)
 
 
 def _whole_lines(data: Data) -> Index:

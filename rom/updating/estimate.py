@@ -235,8 +235,8 @@ def update(  # noqa: PLR0913  keywords of one call
         tolerance: largest distance of a channel from a surface point [m], see `Channels.rows`.
         residual: "responses", or "equations": of motion at the sensors, linear in what is sought,
             biased by noise and by the condensation; or "response-function": H - H_test is
-            H dZ H_test, linear too, and without condensation. The verdict is that of responses; a
-            prior weighs against what they leave.
+            H dZ H_test, linear too, and without condensation, from where few responses lead. The
+            verdict is that of responses; a prior weighs against what they leave.
         rank: of the basis of equations; None for one direction per mode up to the highest line.
 
     Returns:
@@ -279,12 +279,13 @@ def update(  # noqa: PLR0913  keywords of one call
         return _found(family, search.run())
     root = np.sqrt(np.diag(before.precision))
     sigma = np.divide(1.0, root, out=np.full(root.size, np.inf), where=root > 0)
-    begin = model, data, search.x, unknown, damping
     if residual == "equations":
-        found = by_equations(*begin, prior=sigma, rank=rank)
+        found = by_equations(model, data, search.x, unknown, damping, prior=sigma, rank=rank)
     else:
-        ratios = search.zeta.size, DAMPING_LOG_DEVIATION
-        found = by_response_functions(*begin, prior=sigma, prior_damping=ratios)
+        start, ratios = search.near().x, (damping, DAMPING_LOG_DEVIATION)
+        found = by_response_functions(
+            model, data, start, unknown, search.zeta, prior=sigma, prior_damping=ratios
+        )
     return replace(_found(family, search.moved(found)), covariance=found.covariance)
 
 
@@ -413,12 +414,16 @@ class _Search:
         self.settled = True
         return self
 
-    def run(self) -> "_Search":
-        """Descend on few lines with large errors, where a start may be far away, then on all."""
+    def near(self) -> "_Search":
+        """Descend on few lines with large errors, where a start may be far away."""
         few = replace(self, data=self.data.roughly())
         few._descend(START_STIFFNESS)
         self.theta = few.theta
-        cost = self._descend(NEAR_STIFFNESS)
+        return self
+
+    def run(self) -> "_Search":
+        """Approach, then descend on all lines."""
+        cost = self.near()._descend(NEAR_STIFFNESS)
         if self.settled or cost > MAX_MISFIT * self.data.n_values:
             return self
         raise SolverError(

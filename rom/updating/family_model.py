@@ -376,6 +376,8 @@ def _acts(parameter: Parameter, kind: type, region: str | None) -> bool:
 def _conditions(family: Family, fixed: Any) -> Array:
     """(c, n) coordinates that supports and couplings keep zero."""
     if isinstance(family, FamilyAssembly):
+        for place in fixed:
+            Parts.of(family).marker(place)
         return family.nominal.conditions(tuple(fixed))
     family.body.check_support(fixed)
     return family.body.held_rows(fixed)

@@ -33,7 +33,6 @@ SAME_RTOL = 1e-6  # distance of surfaces that touch, of the size of all
 MAX_RELATIVE_ERROR = 0.3  # of a value; beyond it the logarithm of noise is no longer normal
 MAX_LINES_NAMED = 5  # in a message
 FREEDOM_LOST = 2  # averages, by a variance that is estimated from the same records as the response
-MAX_VARIED = 0.2  # relative variance of an estimated one, up to which first order says much
 MIN_OWN_SHARE = 0.1  # of the variance of a response that is left to its sensor
 
 
@@ -262,7 +261,7 @@ class Responses:
         own = np.maximum(total - common**2, least)
         if estimated:
             varied = (total / own) ** 2 / (n - FREEDOM_LOST)
-            own = own * (1 + np.where(own > least, np.minimum(varied, MAX_VARIED), 0.0))
+            own = own * (1 + np.where(own > least, varied, 0.0))
         used = error <= MAX_RELATIVE_ERROR
         return np.sqrt(np.where(used, own * (1 + error**2), np.inf)), common
 

@@ -95,7 +95,10 @@ def receptance(seen: Array, g: Complex, driven: Array) -> Complex:
         g: (n_f, n) receptance of each mode [s^2].
         driven: (n_e, n) modes at the inputs [kg^-1/2].
     """
-    return np.asarray((seen * g[:, None, :]) @ driven.T)
+    H = np.empty((len(g), len(seen), len(driven)), dtype=complex)
+    for block in blocks(len(g)):
+        H[block] = (seen * g[block][:, None, :]) @ driven.T
+    return H
 
 
 def _receptance(

@@ -152,6 +152,25 @@ def test_a_plan_is_drawn_and_has_a_size_of_its_own(capsys):
         assert found["deviations"][name] > 2 * quiet["deviations"][name]
 
 
+def test_points_are_drawn_also_where_they_are_off_the_body(capsys, monkeypatch):
+    drawn = []
+    monkeypatch.setattr("rom.view.plane", lambda scenes, path, **k: drawn.append((scenes, path, k)))
+    test = rom.io.read_responses("test.h5")
+    points = np.array(test.sensors.points)
+    points[3, 2] += 0.5
+    off = replace(test, sensors=Channels(points, test.sensors.directions))
+    rom.io.write_responses(off, "off.h5")
+    capsys.readouterr()
+    assert main(["update", "off.h5", *WORDS, "--picture", "points.png"]) == 2
+    assert "sensor 3" in capsys.readouterr().err
+    ((scenes, path, words),) = drawn
+    assert str(path) == "points.png" and len(scenes) == 2
+    assert "Largest distance of the 13 points from one of the surface: 0.5 m" in words["caption"]
+    assert np.ptp(scenes[0].things["sensors"][0][:, 2]) > 0.5
+    assert main(["update", "off.h5", *WORDS, "--picture", "points.svg"]) == 2
+    assert "written as .png" in capsys.readouterr().err
+
+
 def answered_plan(words, capsys):
     assert main(["update", *WORDS, *words, "--json"]) == 0
     return json.loads(capsys.readouterr().out)

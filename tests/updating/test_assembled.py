@@ -131,10 +131,17 @@ def test_a_stiff_joint_is_a_coupling(families, bolted):
 def test_a_joint_and_both_moduli_are_found(bolted):
     true = {"frame.E": 1.2, "arm.E": 0.85, "bolts": 0.5}
     attached = {"bolts": BOLTS}
-    found = rom.update(bolted, measured(bolted, attached, true), fixed=HELD, attached=attached)
+    test = measured(bolted, attached, true)
+    found = rom.update(bolted, test, fixed=HELD, attached=attached)
     assert found.verdict.ok, found
     for name, value in true.items():
         assert abs(np.log(found.factors[name] / value)) < 4 * found.deviations[name] < 0.1
+    own = np.delete(np.arange(20), 18)  # of two along y on the rigid face of the tip one is enough
+    fewer = Channels(test.sensors.points[own], test.sensors.directions[own])
+    other = rom.update(bolted, replace(test, H=test.H[:, own], sensors=fewer), fixed=HELD,
+                       attached=attached, residual="response-function")  # fmt: skip
+    for name, value in true.items():
+        assert_allclose(other.factors[name], value, rtol=0.02)
     bodies = found.assembly.bodies
     assert bodies["arm"].provenance["updating"]["factors"] == found.factors
     alone = bolted.families["arm"].at(E=found.factors["arm.E"])
@@ -183,11 +190,17 @@ def test_what_does_not_fit_an_assembly_is_named(families, bolted):
             attached=AddedMass("tip", 1.0, 0.1, 1.0))  # fmt: skip
     refused("no place", attached=replace(BOLTS, one=("leg", "tip")))
     refused("knee", InterfaceError, attached=replace(BOLTS, one=("arm", "knee")))
-    refused("no body 'leg'", fixed=(("leg", "root"),))
+    for fixed in ((("leg", "root"),), ("root",), "root", {"root": "x"}):
+        refused("is no place .body, interface.", fixed=fixed)
     with pytest.raises(ConfigError, match="has the range"):
         replace(BOLTS, low=0.0)
     with pytest.raises(ConfigError, match="there is no family"):
         FamilyAssembly({})
+    with pytest.raises(ConfigError, match="the name of a family must be a text"):
+        FamilyAssembly({"": families["arm"]})
+    two = replace(families["arm"], parameters={"b.E": families["arm"].parameters["E"]})
+    with pytest.raises(ConfigError, match=r"two parameters have one name among 'a\.b\.E'"):
+        FamilyAssembly({"a": two, "a.b": families["arm"]})
     inches = replace(families["arm"], body=replace(families["arm"].body, units="mm-t-s"))
     with pytest.raises(ConfigError, match="families 'arm' are not in SI"):
         FamilyAssembly(families | {"arm": inches})

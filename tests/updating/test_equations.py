@@ -156,10 +156,17 @@ def test_lines_are_summed_in_blocks(family, model, monkeypatch):
     assert_allclose(pieces.covariance, whole.covariance, rtol=1e-6, atol=1e-12)
 
 
-def test_a_prior_as_sure_as_the_equations_halves_what_they_find(family, model):
+@pytest.mark.parametrize(("residual", "made", "away"), [
+    ("equations", "condensed", 2e-4), ("response-function", "measured", 2e-3),
+])  # fmt: skip
+def test_a_prior_as_sure_as_the_data_halves_what_they_find(family, model, residual, made, away):
     """Mean of zero and the estimate, weighted by precision; deviation over the square root of 2."""
-    test = condensed(family, model, np.array([2e-4, 0, 0]), level=0.01)
-    options = {"fixed": ("root",), "residual": "equations", "free": ("E_inner",)}
+    x = np.array([away, 0, 0])
+    H = responses_at(small(family, model), x, np.array([0.02]), 2 * np.pi * LINES)
+    test = measured(family, model, H=H, level=0.05)
+    if made == "condensed":
+        test = condensed(family, model, x, level=0.01)
+    options = {"fixed": ("root",), "residual": residual, "free": ("E_inner",)}
     alone = rom.update(family, test, **options)
     sure = alone.deviations["E_inner"]
     found = rom.update(family, test, prior={"E_inner": sure}, **options)

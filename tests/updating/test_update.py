@@ -1,5 +1,6 @@
 """Updating of families by measured responses: derivatives, statistics of what is found, verdict."""
 
+import tracemalloc
 from dataclasses import replace
 
 import numpy as np
@@ -15,6 +16,7 @@ from rom.updating import AddedMass, Channels, GroundSpring, Responses
 from rom.updating.estimate import _Before, _Search
 from rom.updating.family_model import family_model
 from rom.updating.frf_data import estimators, noisy, random_error
+from rom.updating.methods import receptance
 from rom.updating.normal_equations import Data, responses_at, sums
 
 KINDS = {"root": "rbe2", "tip": "rbe2"}
@@ -171,6 +173,19 @@ def test_sums_do_not_depend_on_blocks(family, monkeypatch):
         expected = getattr(whole, name)
         scale = np.abs(expected).max()
         assert_allclose(getattr(pieces, name), expected, atol=1e-11 * scale)
+
+
+def test_responses_of_many_lines_take_their_own_memory():
+    """And that of a block: of all lines and modes at once it would be 192 MB."""
+    rng = np.random.default_rng(0)
+    seen, driven, g = (rng.normal(size=(n, 200)) for n in (20, 3, 3000))
+    g = g + 1j
+    tracemalloc.start()
+    H = receptance(seen, g, driven)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < H.nbytes + 40e6
+    assert_allclose(H, np.einsum("sn,fn,en->fse", seen, g, driven, optimize=True), rtol=1e-9)
 
 
 def test_the_right_model_passes_and_its_report_says_so(family):

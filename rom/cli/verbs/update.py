@@ -26,12 +26,13 @@ from rom.errors import ConfigError
 
 if TYPE_CHECKING:
     from rom.parametric.family import BodyFamily
-    from rom.updating import AddedMass, GroundSpring, Plan, Updated
+    from rom.updating import AddedMass, Channels, GroundSpring, Responses, Updated
 
 SUMMARY = "update a family of bodies by a vibration test"
 EXAMPLES = """\
   rom update test.uff --family panel.rom.npz --averages 50 --fixed root
-  rom update test.csv --points points.csv --family panel.rom.npz --averages 50 --coherence 0.98
+  rom update test.csv --points points.csv --family panel.rom.npz --averages 50 --coherence 0.98 \\
+      --picture points.png
   rom update test.uff --family panel.rom.npz --averages 50 --free core,clamp \\
       --spring clamp=root:1e8,1e8,1e8:0.1:10 --mass cable=tip:0.05:0.1:10 --candidate cable \\
       -o updated.rom.npz
@@ -92,6 +93,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--tolerance", type=positive, help="of points off the body [m]")
     parser.add_argument(
+        "--picture", type=Path, help="of the points of a test on the body, .png, drawn first"
+    )
+    parser.add_argument(
         "--plan", metavar="SENSORS,FORCES", type=_two_counts, nargs="?", const=PLAN_SIZE,
         help="choose so many for a test to be (8,1 where they are left out)",
     )  # fmt: skip
@@ -126,6 +130,8 @@ def run(args: argparse.Namespace) -> Answer:
     test = read_responses(
         args.file, averages=args.averages, coherence=args.coherence, points=args.points
     )
+    if args.picture is not None:
+        _match(args, family, test)
     if args.force_noise is not None:
         test = replace(test, force_noise=args.force_noise)
     outside = _outside(args)
@@ -202,40 +208,71 @@ def _plan(args: argparse.Namespace) -> Answer:
     if not output:
         return Answer(data, f"{plan}\n{plan.csv()}")
     if output.suffix.lower() == ".png":
+        left = ", ".join(f"{name} to {100 * d:.2g} %" for name, d in plan.deviations.items()
+                         if name in family.parameters)  # fmt: skip
+        title, more = "Plan of a vibration test", f"The test will leave deviations: {left}."
         return Answer(
-            data | {"output": str(output)}, str(plan), lambda: _drawn(family, plan, output)
-        )
+            data | {"output": str(output)}, str(plan),
+            lambda: _drawn(family, (plan.sensors, plan.inputs), output, title, more),
+        )  # fmt: skip
     text = plan.uff() if output.suffix.lower() == ".uff" else plan.csv()
     return Answer(
         data | {"output": str(output)}, str(plan), lambda: output.write_text(text, "ascii")
     )
 
 
-def _drawn(family: "BodyFamily", plan: "Plan", path: Path) -> None:
+def _match(args: argparse.Namespace, family: "BodyFamily", test: "Responses") -> None:
+    """Draw where the points of a test are, also of one that does not belong to the body.
+
+    Raises:
+        ConfigError: for a picture of another kind, or one that must not be replaced.
+        ModelError: if the body carries no surface.
+    """
+    import numpy as np
+    from scipy.spatial import cKDTree
+
+    from rom.body.surface import surface_of
+
+    path = checked(args, args.picture)
+    if path.suffix.lower() != ".png":
+        raise ConfigError(f"--picture {path}: it is written as .png.")
+    points = np.vstack([test.sensors.points, test.inputs.points])
+    far = cKDTree(surface_of(family.body).points).query(points)[0]
+    _drawn(
+        family, (test.sensors, test.inputs), path, "Points of a vibration test",
+        f"Largest distance of the {len(points)} points from one of the surface: {far.max():.3g} m.",
+    )  # fmt: skip
+
+
+def _drawn(
+    family: "BodyFamily",
+    channels: "tuple[Channels, Channels]",
+    path: Path,
+    title: str,
+    more: str,
+) -> None:
     """A picture of the body with a pin along each channel, its ball where it is mounted."""
     import numpy as np
 
     from rom import view
+    from rom.body.surface import surface_of
 
-    surface = family.body.surface
-    assert surface is not None  # else the plan would have no candidates
+    surface = surface_of(family.body)
     length = PIN_RATIO * float(np.ptp(surface.points, axis=0).max())
     thick = length / PIN_SLENDERNESS
     things = {"body": (surface.points, surface.triangles)}
-    for name, channels in (("sensors", plan.sensors), ("forces", plan.inputs)):
+    for name, several in zip(("sensors", "forces"), channels, strict=True):
         pins = []
-        for x, d in zip(np.asarray(channels.points), np.asarray(channels.directions), strict=True):
+        for x, d in zip(np.asarray(several.points), np.asarray(several.directions), strict=True):
             pins += [view.cylinder(x, x + length * d / np.linalg.norm(d), thick, sides=12)]
             pins += [view.ellipsoid((1.5 * thick,) * 3, x, sides=12)]
         things[name] = view.joined(pins)
     view.plane(
         [view.Scene(f"Seen from {side}", things, view=(0.6 * y, y, 0.7 * z), up=(0, 0, 1))
          for side, y, z in (("the front and above", -1.0, 1.0), ("behind and below", 1.0, -1.0))],
-        path, title="Plan of a vibration test",
+        path, title=title,
         caption="A ball marks a point, its pin the direction, in the axes of the geometry; a "
-        "point may carry several. Standard deviations that the test will leave: "
-        + ", ".join(f"{name} to {100 * d:.2g} %" for name, d in plan.deviations.items()
-                    if name in family.parameters) + ".",
+        f"point may carry several. {more}",
     )  # fmt: skip
 
 
