@@ -48,6 +48,7 @@ def test_a_test_of_another_program_is_read_in_si_units(name):
     assert test.averages == 20 and test.quantity == "displacement"
 
 
+@pytest.mark.once
 @pytest.mark.parametrize("binary", [0, 1])
 def test_pyuff_reads_the_points_that_are_written_and_writes_what_is_read(tmp_path, binary):
     """The points of a plan go out, and come back with responses to a force at the last of them."""
