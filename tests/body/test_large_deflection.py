@@ -341,8 +341,8 @@ def test_a_range_holds_to_the_last_step_before_one_that_fails(
     W = nodal_forces(geometric.components(), model, model.operators, np.zeros(3))
     E = np.linalg.pinv(W.T) @ np.outer(loads[1:3], [1.0] * 3 + [0.0] * (body.n_modes - 3)) * 1e-3
     after = cycle(steps[: n_found + 1] if n_found < 3 else steps)
-    monkeypatch.setattr("rom.checks.deflection.HeldSolid", WholeShapes)
-    monkeypatch.setattr("rom.checks.deflection._compared", lambda *given: next(after))
+    monkeypatch.setattr("rom.checks.deflection.HeldSolid.of", lambda *given, **law: Known(after))
+    monkeypatch.setattr("rom.checks.deflection._compared", lambda *given: given[-1])
     rows, table = deflection_rows(geometric, model, model.operators, None, body, E)
     one, shares = table["-tip f_z"], (0.0, *STEP_SHARES)
     assert one["holds to"] == shares[holds]
@@ -355,11 +355,11 @@ def test_a_range_holds_to_the_last_step_before_one_that_fails(
     assert all(r.ok for r in rows) == (holds == 3)
 
 
-class WholeShapes:
-    """Stands for the full model where its states are given."""
+class Known:
+    """Stands for the full model where the outcomes of its states are given."""
 
-    def __init__(self, *given):
-        self.whole = np.asarray
+    def __init__(self, after):
+        self.whole, self.state = np.asarray, lambda *given: next(after)
 
 
 def test_the_linear_part_is_that_of_the_linear_body(certified):
