@@ -42,7 +42,8 @@ def deflection_rows(
 
     The table has for each case "case", the share of each component of the range; "share" of the
     load at the steps compared, and there "displacement" and "frequencies", relative errors;
-    "holds to", the share up to which all steps hold; and "energy" [J] of the body there.
+    "holds to", the share up to which all steps hold; "energy" [J] of the body there, and "turn"
+    [rad] of the interface that has turned most.
 
     Args:
         geometric: the range of loads.
@@ -87,8 +88,22 @@ def deflection_rows(
             "frequencies": [step.frequencies for step in steps],
             "holds to": STEP_SHARES[held - 1] if held else 0.0,
             "energy": quartic.energy(path[held - 1]) if held else 0.0,
+            "turn": _turn(body, path[held - 1]) if held else 0.0,
         }
+    most = np.degrees(max(case["turn"] for case in table.values()))
+    rows.append(Row("turn of an interface that holds [degrees]", most, "information", True))
     return rows, table
+
+
+def _turn(body: FlexibleBody, q: Array) -> float:
+    """Largest rotation [rad] of an interface against the frame, nearest to all its points."""
+    angles = [0.0]
+    for marker in body.markers.values():
+        if marker.covariance is not None:
+            U, _, Vt = np.linalg.svd(marker.covariance @ np.r_[1.0, q])
+            R = U @ np.diag([1.0, 1.0, np.linalg.det(U @ Vt)]) @ Vt
+            angles.append(float(np.arccos(np.clip(0.5 * (np.trace(R) - 1), -1.0, 1.0))))
+    return max(angles)
 
 
 @dataclass(frozen=True)

@@ -311,6 +311,6 @@ moment = [0, 0, "3 N m"]
         found, n_shapes=None, spin=(0.0, 0.0, np.pi), about=(0.0, 0.02, 0.0)
     )
     file.write_text(plain + asked.replace("2 kN", "0 N").replace("3 N m", "0 N m"))
-    with pytest.raises(ConfigError, match="not all zero") as refused:
+    with pytest.raises(ConfigError, match="all are zero") as refused:
         read_component(file).nonlinear()
     assert "bar.toml:" in str(refused.value)

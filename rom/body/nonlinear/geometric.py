@@ -193,7 +193,7 @@ def _with_derivatives(
     held = held_motions(geometric, model.interfaces)
     every = [load for name in geometric.loads for k in range(6)
              if (load := Load(name, k)) not in held]  # fmt: skip
-    turning = [load for load in geometric.components() if not load.interface]
+    turning = [Load("", load.component) for load in geometric.components() if not load.interface]
     about = geometric.axis_point(model, reference)
 
     def forces(loads: list[Load], E: Array) -> Array:

@@ -14,6 +14,7 @@ from rom.eigen.verbs import Operators, mean_motion
 from rom.errors import ConfigError
 from rom.model import Array, FEModel
 
+MOST_STEPS = 1000  # of load, at each of which there is a state
 FORCES = ("f_x", "f_y", "f_z", "m_x", "m_y", "m_z")
 
 
@@ -88,7 +89,7 @@ class Geometric:
     sampling: float | None = None
 
     def __post_init__(self) -> None:
-        whole("n_steps", self.n_steps, 1)
+        whole("n_steps", self.n_steps, 1, MOST_STEPS)
         whole("n_modes", self.n_modes)
         if self.n_shapes is not None:
             whole("n_shapes", self.n_shapes, 1, reason="without any the basis locks")
@@ -97,12 +98,8 @@ class Geometric:
         if self.sampling is not None and not 0 < self.sampling < 1:
             raise ConfigError(f"sampling = {self.sampling!r} is a share between 0 and 1.")
         for name, load in self.loads.items():
-            range_ = np.asarray(load, dtype=float)
-            if range_.shape != (6,) or not np.isfinite(range_).all() or not range_.any():
-                raise ConfigError(
-                    f"the range of loads at {name!r} is {load!r}; it has six numbers, forces [N], "
-                    "then moments [N m], not all zero."
-                )
+            if not finite(f"the range of loads at {name!r}", load, (6,)).any():
+                raise ConfigError(f"the range of loads at {name!r} is {load!r}: all are zero.")
         spins = finite("spin", self.spin, (3,)).any()
         if not self.loads and not spins:
             raise ConfigError(
