@@ -16,7 +16,7 @@ from scipy.sparse.linalg import LinearOperator, eigsh, splu
 
 from rom.body.flexible import FlexibleBody
 from rom.body.nonlinear.cauchy import CauchyRecovery
-from rom.body.nonlinear.ranges import Geometric, Load, held_motions, nodal_forces
+from rom.body.nonlinear.ranges import Geometric, Load, axis_point, held_motions, nodal_forces
 from rom.body.nonlinear.statics import follow, free_motions
 from rom.body.projection import cauchy_recovery
 from rom.eigen.verbs import Operators, mean_motion
@@ -60,7 +60,7 @@ def deflection_rows(
     quartic, still = body.energy(), body.mean_rows(geometric.fixed)
     tangent = Tangent(body, still)
     E = full.whole(E)
-    about = geometric.axis_point(model, body.reference)
+    about = axis_point(geometric, model, body.reference)
     units = full.whole(nodal_forces(geometric.components(), model, ops, about))
     rows, table = list[Row](), dict[str, Any]()
     for name, case in load_cases(geometric).items():

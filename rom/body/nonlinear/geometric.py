@@ -23,7 +23,7 @@ from scipy.linalg import eigh
 
 from rom import rotation
 from rom.body.nonlinear.quartic import Quartic
-from rom.body.nonlinear.ranges import Geometric, Load, held_motions, nodal_forces
+from rom.body.nonlinear.ranges import Geometric, Load, axis_point, held_motions, nodal_forces
 from rom.body.nonlinear.statics import Held, free_motions, newton, passages
 from rom.eigen.verbs import Operators, column_blocks, mean_motion, quadratic, whole_clusters
 from rom.errors import ConfigError, InterfaceError, ModelError, ResourceError
@@ -194,7 +194,7 @@ def _with_derivatives(
     every = [load for name in geometric.loads for k in range(6)
              if (load := Load(name, k)) not in held]  # fmt: skip
     turning = [Load("", load.component) for load in geometric.components() if not load.interface]
-    about = geometric.axis_point(model, reference)
+    about = axis_point(geometric, model, reference)
 
     def forces(loads: list[Load], E: Array) -> Array:
         return ops.gram(E, nodal_forces(loads, model, ops, about))

@@ -132,10 +132,6 @@ class Geometric:
                 for a, b in product(components[i].signs, components[j].signs)]  # fmt: skip
         return np.array(alone + skew)
 
-    def axis_point(self, model: FEModel, reference: str) -> Array:
-        """(3,) the point of the axis of rotation [m], for a body that is held at its reference."""
-        return np.asarray(model.interfaces[reference].origin if self.about is None else self.about)
-
 
 def held_motions(geometric: Geometric, known: Any) -> list[Load]:
     """Each motion held beside the reference, as the load that would move it.
@@ -152,6 +148,12 @@ def held_motions(geometric: Geometric, known: Any) -> list[Load]:
         for name, directions in supports(geometric.fixed, known).items()
         for direction in directions or DIRECTIONS
     ]
+
+
+def axis_point(geometric: Geometric, model: FEModel, reference: str) -> Array:
+    """(3,) the point of the axis of rotation [m], for a body that is held at its reference."""
+    about = geometric.about
+    return np.asarray(model.interfaces[reference].origin if about is None else about)
 
 
 def nodal_forces(loads: list[Load], model: FEModel, ops: Operators, about: Array) -> Array:
