@@ -19,6 +19,7 @@ from cases.long import SHARED_BY, few
 from cases.mbs.slender import STEEL, assembled, cantilever, reduced, slender, tip_of
 from cases.paths import RANKS, ROOT
 from cases.ranks.environment import ENVIRONMENT
+from rom.body.nonlinear.full import rows_of
 from rom.body.nonlinear.geometric import ELLIPTIC_STRETCH, Section, foreseen
 from rom.body.nonlinear.quartic import Quartic, entries, n_entries, position
 from rom.body.nonlinear.ranges import Load, nodal_forces
@@ -29,7 +30,6 @@ from rom.checks.deflection import (
     Step,
     deflection_rows,
     load_cases,
-    rows_of,
 )
 from rom.eigen.verbs import rigid_motions
 from rom.errors import ConfigError, InterfaceError, ModelError, ResourceError, RomWarning
@@ -341,7 +341,7 @@ def test_a_range_holds_to_the_last_step_before_one_that_fails(
     W = nodal_forces(geometric.components(), model, model.operators, np.zeros(3))
     E = np.linalg.pinv(W.T) @ np.outer(loads[1:3], [1.0] * 3 + [0.0] * (body.n_modes - 3)) * 1e-3
     after = cycle(steps[: n_found + 1] if n_found < 3 else steps)
-    monkeypatch.setattr("rom.checks.deflection.HeldSolid.of", lambda *given, **law: Known(after))
+    monkeypatch.setattr("rom.body.nonlinear.full.HeldSolid.of", lambda *given, **law: Known(after))
     monkeypatch.setattr("rom.checks.deflection._compared", lambda *given: given[-1])
     rows, table = deflection_rows(geometric, model, model.operators, None, body, E)
     one, shares = table["-tip f_z"], (0.0, *STEP_SHARES)

@@ -65,6 +65,8 @@ class Geometric:
             force is a load beside the others.
         about: (3,) a point of the axis of rotation [m]; if missing the origin of the reference.
 
+        snapshots: solve the full model at the largest loads, each alone and each two together, and
+            let what is new in its states be shapes beside the derivatives: for third order.
         sampling: if given, the material is neo-Hookean with the same constants, and its energy that
             of a few weighted elements, whose forces differ by this share from those of all [1].
 
@@ -87,6 +89,7 @@ class Geometric:
     spin: tuple[float, float, float] = (0.0, 0.0, 0.0)
     about: tuple[float, float, float] | None = None
     sampling: float | None = None
+    snapshots: bool = False
 
     def __post_init__(self) -> None:
         whole("n_steps", self.n_steps, 1, MOST_STEPS)
