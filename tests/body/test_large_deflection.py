@@ -476,9 +476,7 @@ WRONG = (True, "x", -1, 1.5, np.nan, np.inf, 10**160, (1, 2), [[1]], 1j, {"tip":
 @pytest.mark.parametrize("key", [one.name for one in fields(rom.Geometric) if one.name != "fixed"])
 def test_no_value_of_a_wrong_kind_passes_into_a_range(key):
     """Whatever it is, the error is one of the package, which names what it is about."""
-    for value in WRONG:
-        if (key, value) == ("tol", 1.5) or (key in ("spin", "about") and value == (1, 2)):
-            continue
+    for value in WRONG[key == "snapshots" :]:  # for which the first is right
         with pytest.raises(ConfigError, match=r"tip|loads|\b" + key):
             rom.Geometric(**{"loads": {"tip": (0, 1.0, 0, 0, 0, 0)}} | {key: value})
 
