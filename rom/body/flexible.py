@@ -20,10 +20,12 @@ from rom.body.rotating import rotating_frequencies
 from rom.body.stiffening import SecondOrder
 from rom.body.surface import Where, point_areas
 from rom.eigen.supports import Fixed, Springs, spring_matrices
-from rom.errors import ModelError
+from rom.errors import ModelError, warn
 from rom.model import Array, Modes
 from rom.notebook import html_table, listed
 from rom.units import unit_system
+
+ENERGY_RTOL = 1e-6  # of states on the very edge of a range
 
 __all__ = ["FlexibleBody", "Marker", "Patch", "Surface"]  # where pickles look for the last three
 
@@ -278,9 +280,21 @@ class FlexibleBody(BodyData):
         Raises:
             ConfigError, InterfaceError: for loads that are none, or interfaces unknown.
             ModelError: if there is no stable equilibrium, or for a body of small deflection.
+
+        Warns:
+            RomWarning: of a share at which the body stores more energy than was compared.
         """
-        rising = finite("shares", shares, None).reshape(-1)
-        return follow(self.energy(), np.outer(rising, self.forces_on(loads)), self.mean_rows(fixed))
+        rising, energy = finite("shares", shares, None).reshape(-1), self.energy()
+        found = follow(energy, np.outer(rising, self.forces_on(loads)), self.mean_rows(fixed))
+        beyond = energy.energies(found) > (1 + ENERGY_RTOL) * self.certified_energy
+        if beyond.any():
+            warn(
+                f"body {self.name!r} leaves the range of its certificate at "
+                f"{rising[np.argmax(beyond)]:.4g} of these loads: no load case of its range holds "
+                f"beyond {self.certified_energy:.3g} J. Reduce it for larger loads, or for more "
+                "shapes."
+            )
+        return found
 
     def critical_loads(self, loads: Mapping[str, Any], *, fixed: Fixed = ()) -> Array:
         """(k,) shares of dead loads at which a stiffness vanishes: the body buckles or snaps [1].

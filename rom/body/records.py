@@ -214,6 +214,12 @@ class BodyData:
         self._refuse_unknown((name,))
         return self.markers[name]
 
+    @property
+    def certified_energy(self) -> float:
+        """Strain energy to which some load case at large deflection holds [J]; inf if not known."""
+        cases = self.provenance.get("large deflection") or {}
+        return max((case["energy"] for case in cases.values()), default=np.inf)
+
     def _refuse_unknown(self, names: tuple[str, ...]) -> None:
         if unknown := [name for name in names if name not in self.markers]:
             raise InterfaceError(

@@ -162,6 +162,7 @@ class Component:
                 n_shapes=values.get("shapes"), n_steps=values["steps"],
                 fixed=tuple(values["fixed"]), spin=tuple(values["spin"]),
                 about=tuple(values["about"]) if "about" in values else None,
+                snapshots=values["snapshots"], sampling=values.get("sampling"),
             )  # fmt: skip
 
     def at(self, *path: str) -> "Located":

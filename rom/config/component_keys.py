@@ -155,6 +155,10 @@ TABLE = Table("A component.", (
             Key("spin", Quantity("rad/s", ((3,),)), "Largest angular velocity about each axis.",
                 (0.0,) * 3),
             Key("about", Quantity("m", ((3,),)), "A point of its axis; the reference if missing."),
+            Key("snapshots", Flag(), "Full solutions at the largest loads are shapes as well.",
+                False),
+            Key("sampling", Quantity("1", positive=True),
+                "The material is neo-Hookean, and few elements have its energy to this share."),
         )), "Reach large deflection."),
         Key("stress", Flag(), "Make stress on the surface recoverable.", False),
         Key("certificate", Flag("full"), "Compare with the full model; full: in every support, "

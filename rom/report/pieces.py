@@ -8,8 +8,9 @@ import numpy as np
 from rom import rotation
 from rom.arguments import typed
 from rom.assembly.pieces import Pieces
+from rom.body.nonlinear.full import N_TANGENT, HeldSolid
 from rom.body.nonlinear.ranges import Geometric, Load
-from rom.checks.deflection import N_TANGENT, STEP_SHARES, HeldSolid, Step, case_rows, load_cases
+from rom.checks.deflection import STEP_SHARES, Step, case_rows, load_cases
 from rom.checks.glued import GluedSolid
 from rom.errors import ConfigError, ModelError, SolverError
 from rom.mbs.analysis.equilibrium import equilibrium

@@ -3,7 +3,7 @@
 import subprocess
 import sys
 import tracemalloc
-from dataclasses import replace
+from dataclasses import fields, replace
 from itertools import combinations_with_replacement, cycle
 
 import numpy as np
@@ -19,6 +19,7 @@ from cases.long import SHARED_BY, few
 from cases.mbs.slender import STEEL, assembled, cantilever, reduced, slender, tip_of
 from cases.paths import RANKS, ROOT
 from cases.ranks.environment import ENVIRONMENT
+from rom.body.nonlinear.full import rows_of
 from rom.body.nonlinear.geometric import ELLIPTIC_STRETCH, Section, foreseen
 from rom.body.nonlinear.quartic import Quartic, entries, n_entries, position
 from rom.body.nonlinear.ranges import Load, nodal_forces
@@ -29,10 +30,9 @@ from rom.checks.deflection import (
     Step,
     deflection_rows,
     load_cases,
-    rows_of,
 )
 from rom.eigen.verbs import rigid_motions
-from rom.errors import ConfigError, InterfaceError, ModelError, ResourceError
+from rom.errors import ConfigError, InterfaceError, ModelError, ResourceError, RomWarning
 from rom.process.mpirun import mpirun
 
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")
@@ -341,8 +341,8 @@ def test_a_range_holds_to_the_last_step_before_one_that_fails(
     W = nodal_forces(geometric.components(), model, model.operators, np.zeros(3))
     E = np.linalg.pinv(W.T) @ np.outer(loads[1:3], [1.0] * 3 + [0.0] * (body.n_modes - 3)) * 1e-3
     after = cycle(steps[: n_found + 1] if n_found < 3 else steps)
-    monkeypatch.setattr("rom.checks.deflection.HeldSolid", WholeShapes)
-    monkeypatch.setattr("rom.checks.deflection._compared", lambda *given: next(after))
+    monkeypatch.setattr("rom.body.nonlinear.full.HeldSolid.of", lambda *given, **law: Known(after))
+    monkeypatch.setattr("rom.checks.deflection._compared", lambda *given: given[-1])
     rows, table = deflection_rows(geometric, model, model.operators, None, body, E)
     one, shares = table["-tip f_z"], (0.0, *STEP_SHARES)
     assert one["holds to"] == shares[holds]
@@ -355,11 +355,25 @@ def test_a_range_holds_to_the_last_step_before_one_that_fails(
     assert all(r.ok for r in rows) == (holds == 3)
 
 
-class WholeShapes:
-    """Stands for the full model where its states are given."""
+class Known:
+    """Stands for the full model where the outcomes of its states are given."""
 
-    def __init__(self, *given):
-        self.whole = np.asarray
+    def __init__(self, after):
+        self.whole, self.state = np.asarray, lambda *given: next(after)
+
+
+def test_the_range_says_how_far_an_interface_turns_and_who_leaves_it_is_told(certified):
+    body, _, loads = certified
+    tip = body.marker("tip")
+    cases = body.provenance["large deflection"]
+    turns = {name: np.degrees(case["turn"]) for name, case in cases.items()}
+    (q,) = body.equilibria({"tip": (0, loads[1], 0, 0, 0, 0)})
+    assert_allclose(turns["tip f_y"], np.degrees(np.arcsin((tip.rotation @ q)[2])), rtol=2e-2)
+    assert 40 < turns["tip f_y"] < 50 and turns["tip f_z"] < 0.7 * turns["tip f_y"]
+    row = next(r for r in body.certificate.rows if "turn" in r.quantity)
+    assert_allclose(row.value, max(turns.values()))
+    with pytest.warns(RomWarning, match=r"leaves the range of its certificate at 1\.04 of these"):
+        body.equilibria({"tip": (0, loads[1], 0, 0, 0, 0)}, shares=(1.0, 1.04, 1.4))
 
 
 def test_the_linear_part_is_that_of_the_linear_body(certified):
@@ -452,6 +466,28 @@ def test_what_does_not_go_together_is_refused_by_name(change, error, says):
 def test_a_range_that_is_none_is_refused(wrong):
     with pytest.raises(ConfigError):
         rom.Geometric(**{"loads": {"tip": (0, 1.0, 0, 0, 0, 0)}} | wrong)
+
+
+WRONG = (True, "x", -1, 1.5, np.nan, np.inf, 10**160, (1, 2), [[1]], 1j, {"tip": None},
+         {"tip": "x"}, {"tip": (0, 1j, 0, 0, 0, 0)}, {"tip": (1, 2, 3)},
+         {1: (0, 1, 0, 0, 0, 0)})  # fmt: skip
+
+
+@pytest.mark.parametrize("key", [one.name for one in fields(rom.Geometric) if one.name != "fixed"])
+def test_no_value_of_a_wrong_kind_passes_into_a_range(key):
+    """Whatever it is, the error is one of the package, which names what it is about."""
+    for value in WRONG[key == "snapshots" :]:  # for which the first is right
+        with pytest.raises(ConfigError, match=r"tip|loads|\b" + key):
+            rom.Geometric(**{"loads": {"tip": (0, 1.0, 0, 0, 0, 0)}} | {key: value})
+
+
+@pytest.mark.parametrize(
+    "load, spin",
+    [((0, 1e140, 0, 0, 0, 0), 0), ((0, 0, 0, 1e20, 0, 0), 0), ((1, 0, 0, 0, 0, 0), 1e60)],
+)
+def test_loads_out_of_all_proportion_are_refused(load, spin):
+    with pytest.raises(ModelError, match=r"no stable equilibrium|compresses the material"):
+        reduced(slender(20, 3)[0], load, n_modes=1, active=0, n_steps=1, spin=(0, 0, spin))
 
 
 def test_a_range_in_which_the_body_buckles_is_refused():

@@ -90,11 +90,11 @@ def bent():
     return model, body, body.equilibria(load, shares=(0.5, 1.0))[-1], shapes[0], load["tip"]
 
 
-def stressed(model, load, n_modes=4, **options):
+def stressed(model, load, n_modes=4, certify=False, **options):
     return rom.reduce(
         model, method=rom.CraigBampton(n_modes=n_modes),
         interfaces={"root": "rbe3", "tip": "rbe3"}, reference="root",
-        nonlinear=rom.Geometric(loads={"tip": load}, **options), stress=True, certify=False,
+        nonlinear=rom.Geometric(loads={"tip": load}, **options), stress=True, certify=certify,
     )  # fmt: skip
 
 
@@ -140,6 +140,19 @@ def test_stress_under_a_load_is_that_of_the_full_solution(bent):
     assert_allclose(found[inner], expected[inner], rtol=0, atol=0.02 * expected.max())
     linear = np.linalg.solve(body.K, body.forces_on({"tip": load}))
     assert von_mises_of_small(model, bent, linear)[inner].max() > 1.2 * expected[inner].max()
+
+
+def test_the_certificate_has_a_row_of_stress(monkeypatch):
+    """Over the whole surface, ends included; a body that locks has less of it."""
+    model, EI = slender(50, 8)
+    rows = {}
+    for name in ("all", "locked"):
+        if name == "locked":
+            monkeypatch.setattr("rom.workflow.enriched", lambda *given: given[4])
+        body = stressed(model, (0, EI, 0, 0, 0, 0), n_modes=2, certify=True)
+        rows[name] = next(r for r in body.certificate.rows if r.quantity == "tip f_y: stress")
+    assert rows["all"].ok and rows["all"].value < 0.02
+    assert not rows["locked"].ok and 0.5 < rows["locked"].value < 2.0
 
 
 def von_mises_of_small(model, bent, q):

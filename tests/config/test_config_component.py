@@ -305,12 +305,17 @@ moment = [0, 0, "3 N m"]
     )
     file.write_text(plain + asked.replace("shapes = 9", "steps = 7"))
     assert read_component(file).nonlinear() == replace(found, n_shapes=None, n_steps=7)
-    turning = 'spin = [0, 0, "30 rpm"]\nabout = [0, "20 mm", 0]'
+    turning = 'spin = [0, 0, "30 rpm"]\nabout = [0, "20 mm", 0]\nsnapshots = true\nsampling = 0.01'
     file.write_text(plain + asked.replace("shapes = 9", turning))
     assert read_component(file).nonlinear() == replace(
-        found, n_shapes=None, spin=(0.0, 0.0, np.pi), about=(0.0, 0.02, 0.0)
+        found,
+        n_shapes=None,
+        spin=(0.0, 0.0, np.pi),
+        about=(0.0, 0.02, 0.0),
+        snapshots=True,
+        sampling=0.01,
     )
     file.write_text(plain + asked.replace("2 kN", "0 N").replace("3 N m", "0 N m"))
-    with pytest.raises(ConfigError, match="not all zero") as refused:
+    with pytest.raises(ConfigError, match="all are zero") as refused:
         read_component(file).nonlinear()
     assert "bar.toml:" in str(refused.value)

@@ -16,14 +16,16 @@ Source:
 """
 
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import Any
 
 import numpy as np
 from scipy.linalg import eigh
 
 from rom import rotation
+from rom.body.nonlinear.full import HeldSolid
 from rom.body.nonlinear.quartic import Quartic
-from rom.body.nonlinear.ranges import Geometric, Load, held_motions, nodal_forces
+from rom.body.nonlinear.ranges import Geometric, Load, axis_point, held_motions, nodal_forces
 from rom.body.nonlinear.statics import Held, free_motions, newton, passages
 from rom.eigen.verbs import Operators, column_blocks, mean_motion, quadratic, whole_clusters
 from rom.errors import ConfigError, InterfaceError, ModelError, ResourceError
@@ -40,6 +42,7 @@ N_MODES = 4  # about each state that a range leads to, for which shapes are kept
 # lose that much: at the usual tolerance of 1e-4 both are met.
 MODE_SHARE = 1e-2
 N_TURNS = 4  # of moments with the section on which they act, each by what the last one left
+SNAPSHOT_SHARES = (0.5, 1.0)  # of the loads, at which the full model is solved
 MAX_COORDINATES = 80
 TENSOR_COPIES = 11  # of the Gram matrix while it is ordered into tensors
 FLOP_RATE = 1e10  # of one core in a product of matrices [1/s]
@@ -193,8 +196,8 @@ def _with_derivatives(
     held = held_motions(geometric, model.interfaces)
     every = [load for name in geometric.loads for k in range(6)
              if (load := Load(name, k)) not in held]  # fmt: skip
-    turning = [load for load in geometric.components() if not load.interface]
-    about = geometric.axis_point(model, reference)
+    turning = [Load("", load.component) for load in geometric.components() if not load.interface]
+    about = axis_point(geometric, model, reference)
 
     def forces(loads: list[Load], E: Array) -> Array:
         return ops.gram(E, nodal_forces(loads, model, ops, about))
@@ -213,14 +216,44 @@ def _with_derivatives(
         n_modes = whole_clusters(basis.omega**2, n_modes)
     active = np.hstack([static, Psi[:, n_b : n_b + n_modes]])
     n_basis, n_active = moving.shape[1] + n_modes, active.shape[1]
-    _refuse_many(n_basis + len(turning) + n_active * (n_active + 1) // 2, energy)
+    n_further = len(turning) + geometric.snapshots * 2 * len(geometric.load_cases())
+    _refuse_many(n_basis + n_further + n_active * (n_active + 1) // 2, energy)
     size = np.diag(quadratic(ops, ops.apply_K, active))
-    theta = _derivatives(connection.ops, basis, energy, (active, size), [along, *squeezed])
+    further = [along, *squeezed]
+    if geometric.snapshots:
+        further.append(_snapshots(geometric, model, ops, connection, basis, reference))
+    theta = _derivatives(connection.ops, basis, energy, (active, size), further)
     E = np.hstack([moving, active[:, static.shape[1] :], connection.ops.expand(theta)])
     components = geometric.components()
     sections = [Section.of(ops, F, E, _moments(name, components))
                 for name, F in zip(bent, units, strict=True)]  # fmt: skip
     return Shapes(E, forces(components, E), forces(held, E).T, n_basis, sections), theta
+
+
+def _snapshots(
+    geometric: Geometric, model: FEModel, ops: Operators, connection: Any, basis: Basis,
+    reference: str,
+) -> Array:  # fmt: skip
+    """(n_local, c) full states at the largest loads in interface coordinates, interfaces at rest.
+
+    Raises:
+        ModelError: for a load case in which the full model has no equilibrium that is found.
+    """
+    full = HeldSolid.of(model, connection, reference, held_motions(geometric, model.interfaces))
+    about = axis_point(geometric, model, reference)
+    units = full.whole(nodal_forces(geometric.components(), model, ops, about))
+    mine = slice(connection.ops.first, connection.ops.first + connection.ops.n_local)
+    n_b, found = connection.boundary.size, []
+    for case, share in product(geometric.load_cases(), SNAPSHOT_SHARES):
+        a = full.state(np.zeros(len(units)), share * units @ case)
+        if a is None:
+            raise ModelError(
+                "the full model has no equilibrium that is found.",
+                where=f"load {np.round(case, 3).tolist()} of the range",
+                hint="Ask for smaller loads, or leave snapshots out.",
+            )
+        found.append(a[mine] - basis.Psi[:, :n_b] @ a[connection.boundary])
+    return np.array(found).T
 
 
 def _moments(interface: str, components: list[Load]) -> Array:

@@ -14,6 +14,7 @@ from rom.eigen.verbs import Operators, mean_motion
 from rom.errors import ConfigError
 from rom.model import Array, FEModel
 
+MOST_STEPS = 1000  # of load, at each of which there is a state
 FORCES = ("f_x", "f_y", "f_z", "m_x", "m_y", "m_z")
 
 
@@ -64,6 +65,8 @@ class Geometric:
             force is a load beside the others.
         about: (3,) a point of the axis of rotation [m]; if missing the origin of the reference.
 
+        snapshots: solve the full model at the largest loads, each alone and each two together, and
+            let what is new in its states be shapes beside the derivatives: for third order.
         sampling: if given, the material is neo-Hookean with the same constants, and its energy that
             of a few weighted elements, whose forces differ by this share from those of all [1].
 
@@ -86,9 +89,10 @@ class Geometric:
     spin: tuple[float, float, float] = (0.0, 0.0, 0.0)
     about: tuple[float, float, float] | None = None
     sampling: float | None = None
+    snapshots: bool = False
 
     def __post_init__(self) -> None:
-        whole("n_steps", self.n_steps, 1)
+        whole("n_steps", self.n_steps, 1, MOST_STEPS)
         whole("n_modes", self.n_modes)
         if self.n_shapes is not None:
             whole("n_shapes", self.n_shapes, 1, reason="without any the basis locks")
@@ -97,12 +101,8 @@ class Geometric:
         if self.sampling is not None and not 0 < self.sampling < 1:
             raise ConfigError(f"sampling = {self.sampling!r} is a share between 0 and 1.")
         for name, load in self.loads.items():
-            range_ = np.asarray(load, dtype=float)
-            if range_.shape != (6,) or not np.isfinite(range_).all() or not range_.any():
-                raise ConfigError(
-                    f"the range of loads at {name!r} is {load!r}; it has six numbers, forces [N], "
-                    "then moments [N m], not all zero."
-                )
+            if not finite(f"the range of loads at {name!r}", load, (6,)).any():
+                raise ConfigError(f"the range of loads at {name!r} is {load!r}: all are zero.")
         spins = finite("spin", self.spin, (3,)).any()
         if not self.loads and not spins:
             raise ConfigError(
@@ -135,10 +135,6 @@ class Geometric:
                 for a, b in product(components[i].signs, components[j].signs)]  # fmt: skip
         return np.array(alone + skew)
 
-    def axis_point(self, model: FEModel, reference: str) -> Array:
-        """(3,) the point of the axis of rotation [m], for a body that is held at its reference."""
-        return np.asarray(model.interfaces[reference].origin if self.about is None else self.about)
-
 
 def held_motions(geometric: Geometric, known: Any) -> list[Load]:
     """Each motion held beside the reference, as the load that would move it.
@@ -155,6 +151,12 @@ def held_motions(geometric: Geometric, known: Any) -> list[Load]:
         for name, directions in supports(geometric.fixed, known).items()
         for direction in directions or DIRECTIONS
     ]
+
+
+def axis_point(geometric: Geometric, model: FEModel, reference: str) -> Array:
+    """(3,) the point of the axis of rotation [m], for a body that is held at its reference."""
+    about = geometric.about
+    return np.asarray(model.interfaces[reference].origin if about is None else about)
 
 
 def nodal_forces(loads: list[Load], model: FEModel, ops: Operators, about: Array) -> Array:
