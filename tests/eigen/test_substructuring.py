@@ -1,5 +1,7 @@
 """Modes by substructuring: none missed, and every frequency within the bound stated with it."""
 
+import tracemalloc
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -269,6 +271,23 @@ def test_the_search_by_lanczos_keeps_all_bounds(monkeypatch):
     monkeypatch.setattr(substructuring, "capacity", lambda k: k + 60)
     K, M, rigid = body((0.3, 0.07, 0.05), (6, 3, 2))
     certain(K, M, rigid, exact(K, M, rigid)[26] * 1.003 / (2 * np.pi))
+
+
+def test_the_memory_foreseen_is_what_the_blocks_take(monkeypatch):
+    K, M, _ = body((0.3, 0.07, 0.05), (10, 3, 3), held=True)
+    foreseen, before = [], []
+
+    def noted(need, what):
+        foreseen.append(need)
+        before.append(tracemalloc.get_traced_memory()[0])
+        tracemalloc.reset_peak()
+
+    monkeypatch.setattr(fronts, "refuse_beyond", noted)
+    tracemalloc.start()
+    fronts.SubstructuredBody(K, M, 0.0)
+    taken = tracemalloc.get_traced_memory()[1] - before[0]
+    tracemalloc.stop()
+    assert foreseen[0] == pytest.approx(taken, rel=0.08)
 
 
 @pytest.mark.parametrize(
