@@ -22,7 +22,7 @@ from rom.errors import ConfigError, ModelError, ModesMissedError, ParallelError,
 from rom.model import Array, Modes
 
 CUTOFF_RATIOS = (9.0, 16.0)  # eigenvalues of substructures kept up to, over the last one sought
-COUNT_RATIOS = (1.03, 1.12)  # eigenvalues, over the last one sought, between which they are counted
+COUNT_RATIOS = (1.08, 1.18)  # eigenvalues, over the last one sought, between which they are counted
 SPARE_RATIOS = (1.6, 2.4)  # eigenvalues up to here are taken along: they come out too high
 COUNT_STEP = 2  # whose frequencies are near enough to choose a gap
 SHIFT_SHARE = 1e-3  # of the last eigenvalue, by which free bodies are shifted
