@@ -38,7 +38,7 @@ from rom.eigen.attachments import added_mass
 from rom.eigen.scipy import SciPyOperators
 from rom.eigen.substructuring import modes_up_to
 from rom.eigen.supports import Fixed, Springs, refuse_loose, spring_matrices, supports
-from rom.eigen.verbs import Operators, rigid_motions
+from rom.eigen.verbs import COLUMNS_AT_ONCE, Operators, rigid_motions
 from rom.errors import ConfigError, InterfaceError
 from rom.model import Array, Basis, FEModel, Index, Modes
 from rom.names import check_name
@@ -182,13 +182,17 @@ def modes(
 
 def _residual(ops: Operators, held: Index, omega: Array, Phi: Array) -> Array:
     """norm(K phi - lambda M phi) / (lambda norm(M phi)) on the free dofs."""
-    free = ~np.isin(np.arange(ops.first, ops.first + ops.n_local), held)
-    inertia = ops.apply_M(Phi)
-    residual = (ops.apply_K(Phi) - inertia * omega**2) * free[:, None]
-    inertia = inertia * free[:, None]
+    free = ~np.isin(np.arange(ops.first, ops.first + ops.n_local), held)[:, None]
+    norms = np.zeros((2, omega.size))
+    for first in range(0, omega.size, COLUMNS_AT_ONCE):
+        few = slice(first, first + COLUMNS_AT_ONCE)
+        inertia = ops.apply_M(Phi[:, few])
+        residual = ops.apply_K(Phi[:, few]) - inertia * omega[few] ** 2
+        norms[:, few] = [
+            np.sqrt(np.diag(ops.gram(X * free, X * free))) for X in (residual, inertia)
+        ]
     scale = np.maximum(omega, omega[omega > 0].min(initial=np.inf)) ** 2
     scale[~np.isfinite(scale)] = 1.0
-    norms = [np.sqrt(np.diag(ops.gram(X, X))) for X in (residual, inertia)]
     return norms[0] / (scale * norms[1])
 
 

@@ -97,7 +97,7 @@ def many_modes(size: float = 30e3, counts: tuple[int, ...] = (100, 300)) -> Iter
 
     Args:
         size: number of dofs aimed at.
-        counts: numbers of modes; Lanczos takes two minutes for a thousand.
+        counts: numbers of modes; Lanczos takes a minute for a thousand.
     """
     from rom.bench.many_modes import measured
     from rom.fe import model as read_model

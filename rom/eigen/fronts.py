@@ -15,7 +15,7 @@ from rom.process.memory import free_bytes
 
 MAX_PART_DOFS = 128  # smaller parts cost more calls, larger ones more work on dense matrices
 
-FRONT_COPIES = 4  # of stiffness and mass, and what they become
+FRONT_COPIES = 6  # of stiffness and mass, and what they become
 
 
 class SubstructuredBody:

@@ -21,9 +21,9 @@ from rom.eigen.verbs import canonical_signs, orthonormal
 from rom.errors import ConfigError, ModelError, ModesMissedError, ParallelError, SolverError
 from rom.model import Array, Modes
 
-CUTOFF_RATIOS = (9.0, 24.0)  # eigenvalues of substructures kept up to, over the last one sought
-COUNT_RATIOS = (1.05, 1.15)  # eigenvalues, over the last one sought, between which they are counted
-SPARE_RATIO = 1.5  # eigenvalues of substructuring up to here are taken along: they are too high
+CUTOFF_RATIOS = (9.0, 16.0)  # eigenvalues of substructures kept up to, over the last one sought
+COUNT_RATIOS = (1.08, 1.18)  # eigenvalues, over the last one sought, between which they are counted
+SPARE_RATIOS = (1.6, 2.4)  # eigenvalues up to here are taken along: they come out too high
 COUNT_STEP = 2  # whose frequencies are near enough to choose a gap
 SHIFT_SHARE = 1e-3  # of the last eigenvalue, by which free bodies are shifted
 SHIFT_RTOL = 1e-11  # of the largest eigenvalue of the mesh: a smaller shift would be round-off
@@ -33,7 +33,8 @@ WORK_COLUMNS, WORK_MATRICES = 5, 6  # of n rows so many times N_COLUMNS, of k ro
 N_ROWS = 4096  # turned together, in place
 LANCZOS_WIDTH = 24  # columns of the search among modes of substructures
 LANCZOS_RTOL = 0.02  # of its eigenvalues, whose modes are only where the iteration starts
-LOOSE_SHARE = 0.3  # of them, the last ones, that need not have converged
+ENOUGH_SHARE = 0.85  # of the limit up to which they are sought
+LOOSE_SHARE = 0.25  # of them, the last ones, that need not have converged
 ROUND_OFF = 1e-13  # of the last eigenvalue: what sums over the dofs leave uncertain
 STIFF_ROUND_OFF = 1e-15  # of the largest eigenvalue of the mesh, likewise in solutions
 
@@ -80,8 +81,8 @@ def substructured_modes(
         raise ConfigError(f"tol = {tol!r} is a relative error between 0 and 1.")
     ops = SciPyOperators(K, M, rigid)
     last = (2 * np.pi * positive("f_max", f_max)) ** 2
-    for ratio in CUTOFF_RATIOS:
-        search = _Search(ops, last, ratio)
+    for ratio, spare in zip(CUTOFF_RATIOS, SPARE_RATIOS, strict=True):
+        search = _Search(ops, last, ratio, spare)
         for k in range(1, MAX_STEPS + 1):
             search.step()
             if (
@@ -126,10 +127,10 @@ class _Search:
     invariant space, in the norm of M^-1 of what is left of K z - lambda M z.
     """
 
-    def __init__(self, ops: SciPyOperators, last: float, cutoff_ratio: float):
+    def __init__(self, ops: SciPyOperators, last: float, cutoff_ratio: float, spare_ratio: float):
         self.ops, self.last = ops, last
         self.shift = shift = 0.0 if ops.rigid is None else _shift(ops, last)
-        limit = SPARE_RATIO * last + shift
+        limit = spare_ratio * last + shift
         self.R = np.zeros((ops.n, 0)) if ops.rigid is None else orthonormal(ops, ops.rigid)
         self.MR = ops.M @ self.R
         K = csr_matrix(ops.K + shift * ops.M)
@@ -265,9 +266,9 @@ def _kept_modes(body: SubstructuredBody, limit: float, k: int) -> Array:
         space = BlockLanczos(kept, kept, 0.0, start[:, :0], start, allowed)
         space.solve()
         lam, Y = space.pairs()
-        if k and lam[-1] >= limit:
-            return Y[:, lam < limit] * np.sqrt(lam[lam < limit])
-        k = 10 + 2 * k
+        if k and lam[-1] >= ENOUGH_SHARE * limit:
+            return Y * np.sqrt(lam)
+        k = 10 + 3 * k // 2
     if not r:
         return np.zeros((0, 0))
     mass = body.apply_mass(np.eye(r))

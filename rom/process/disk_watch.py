@@ -11,7 +11,7 @@ from contextlib import suppress
 from pathlib import Path
 from time import sleep
 
-LOOK_SECONDS = 0.1  # between two looks [s]
+LOOK_PERIOD = 0.1  # between two looks [s]
 N_LOOKS = 20  # one after another at a full disk: what waits no longer says by itself what is wrong
 GRACE_PERIOD = 1.0  # [s] between SIGTERM and SIGKILL
 
@@ -28,7 +28,7 @@ def main(folder: str, least: int, pid: int) -> None:
     while n_full < N_LOOKS:
         free = free_on(folder)
         n_full = n_full + 1 if free < least else 0
-        sleep(LOOK_SECONDS)
+        sleep(LOOK_PERIOD)
     with suppress(OSError), Path(f"/proc/{pid}/fd/2").open("a") as its_error:
         its_error.write(
             f"ResourceError: the disk of {folder} filled while a factor was written there: {free} "
