@@ -45,7 +45,7 @@ def test_a_mode_and_an_interface_cost_solutions():
     n = 100_995
     one = factor_cost(n).solution_seconds
     base = reduction_seconds(n, 12, 20)
-    assert reduction_seconds(n, 18, 20) - base == pytest.approx(one)
+    assert reduction_seconds(n, 20, 20) - base == pytest.approx(one)
     assert one < reduction_seconds(n, 12, 21) - base < 2 * one
 
 
