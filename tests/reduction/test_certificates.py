@@ -72,5 +72,6 @@ def test_every_class_with_a_certificate_is_tried_here():
                      for one in getattr(node, "body", ())]  # fmt: skip
             if isinstance(node, ast.ClassDef) and "certificate" in names:
                 found.add(node.name)
+    found.remove("Pieces")  # certified on demand: tests/assembly/test_pieces.py
     base = {"SubstructuredSector": "ReducedSector", "FlexibleBody": "BodyData"}
     assert found == {base.get(name, name) for name in (*LIGHT, *FROM_FINITE_ELEMENTS)}

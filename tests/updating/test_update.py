@@ -526,6 +526,7 @@ GAUGES = Channels([[0.6, 0.0, 0.04], [0.3, 0.05, 0.08]], [[1, 0, 0]] * 2)
 AXIAL = Channels([[1.0, 0.05, 0.04]], [[1, 0, 0]])
 
 
+@pytest.mark.once
 def test_gauges_are_sensors(family, tmp_path):
     """A pull at the tip, far below resonance, strains a bar by F / EA; mixed with accelerations."""
     sensors = Channels(
