@@ -66,7 +66,8 @@ def write_body_fmu(body: FlexibleBody, path: str | Path, *, fixed: tuple[str, ..
     step = 1.0 / (STEPS_PER_PERIOD * float(first[0])) if first.size else 1e-3
     about = f"Small motions of the flexible body {path.stem}, inputs held over a step."
     describe = partial(description, path.stem, about, _variables(body), step)
-    content = Content(path.stem, "linear.c", describe, data=_tables(body, omega, V))
+    tables = _tables(body, omega, V)
+    content = Content(path.stem, "linear.c", describe, data=tables, headers=("states.h",))
     return write_archive(path, content)
 
 

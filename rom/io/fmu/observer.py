@@ -49,7 +49,8 @@ def write_observer_fmu(observer: Observer | ParameterTracker, path: str | Path) 
     dt = observer.dt if isinstance(observer, Observer) else observer.assumed.dt
     about = f"Estimates of {path.stem} from a few sensors, {when}."
     describe = partial(description, path.stem, about, variables, dt)
-    return write_archive(path, Content(path.stem, core, describe, data=text, headers=("filter.h",)))
+    headers = ("filter.h", "states.h")
+    return write_archive(path, Content(path.stem, core, describe, data=text, headers=headers))
 
 
 Names = tuple[tuple[str, str], ...]

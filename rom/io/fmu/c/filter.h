@@ -1,6 +1,8 @@
 /* What all filters share. Before it: SENSORS and DT of the tables, and a Model whose State `now` has
    the time t and the samples y. */
 
+#include "states.h"
+
 Model *model_open(const char *resources, char *message)
 {
     Model *m = malloc(sizeof *m);
@@ -51,29 +53,4 @@ static int wrong_time(const Model *m, double t, double h, char *message)
         return 1;
     }
     return 0;
-}
-
-int model_keep(Model *m, void **state, char *message)
-{
-    *state = malloc(sizeof m->now);
-    if (!*state) {
-        snprintf(message, MESSAGE, "no memory for a state.");
-        return ERROR;
-    }
-    memcpy(*state, &m->now, sizeof m->now);
-    return OK;
-}
-
-int model_recall(Model *m, void *state, char *message)
-{
-    (void)message;
-    memcpy(&m->now, state, sizeof m->now);
-    return OK;
-}
-
-int model_drop(Model *m, void *state, char *message)
-{
-    (void)m, (void)message;
-    free(state);
-    return OK;
 }
