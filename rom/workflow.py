@@ -291,6 +291,11 @@ def reduce(  # noqa: PLR0913  one keyword per choice
             "energy.",
             hint="Leave stiffening out.",
         )
+    if nonlinear is not None and nonlinear.sampling is not None and stress:
+        raise ConfigError(
+            "stress and sampling do not go together: most elements are left out.",
+            hint="Leave stress out, or sampling for St. Venant-Kirchhoff material.",
+        )
     with stopwatch() as watch:
         body = _reduced_body(
             watch, model, method, interfaces or {}, name=name, reference=reference,
@@ -356,6 +361,17 @@ def reduce_pieces(
     return Pieces({name: bodies[name] for name in models}, tree.joints, places)
 
 
+def _with_sampling_or_stress(
+    body: FlexibleBody, model: FEModel, E: Array, nonlinear: Geometric, *, stress: bool
+) -> FlexibleBody:
+    """A body of large deflection, its energy by a few elements, or with its stress if wanted."""
+    if nonlinear.sampling is None:
+        return replace(body, stress=cauchy_recovery(model, E)) if stress else body
+    energy, training = sampled_energy(body, nonlinear, model.stresses.large_strain(), E)
+    body.provenance["sampling"] = training
+    return replace(body, quartic=energy)
+
+
 def _reduced_body(  # noqa: PLR0913  those of `reduce`
     watch: Stopwatch,
     model: FEModel,
@@ -389,11 +405,6 @@ def _reduced_body(  # noqa: PLR0913  those of `reduce`
         if nonlinear is not None:
             watch.begin("derivatives of shapes")
             basis = enriched(nonlinear, model, ops, connection, basis, reference)
-            if stress and nonlinear.sampling is not None:
-                raise ConfigError(
-                    "stress and sampling do not go together: most elements are left out.",
-                    hint="Leave stress out, or sampling for St. Venant-Kirchhoff material.",
-                )
             if stress:
                 refuse_many(stressed_nodes(model).size, basis.Psi.shape[1] - 6)
         watch.begin("energies")
@@ -418,12 +429,7 @@ def _reduced_body(  # noqa: PLR0913  those of `reduce`
     else:
         E = canonical_columns(bare, Psi @ elastic.V, model)
         body, E = at_large_deflection(body, reference, E, model, bare)
-        if nonlinear.sampling is not None:
-            energy, training = sampled_energy(body, nonlinear, model.stresses.large_strain(), E)
-            body = replace(body, quartic=energy)
-            body.provenance["sampling"] = training
-        elif stress:
-            body = replace(body, stress=cauchy_recovery(model, E))
+        body = _with_sampling_or_stress(body, model, E, nonlinear, stress=stress)
     if damping is not None:
         body = damped(body, damping)
     watch.end()

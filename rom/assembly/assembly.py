@@ -18,12 +18,11 @@ from rom.assembly.condensed import (
     natural_modes,
     partition,
     per_body,
-    supported,
     system_functions,
 )
 from rom.assembly.coupling import coupled_rows
 from rom.body.flexible import FlexibleBody
-from rom.body.records import Marker
+from rom.body.records import Marker, still_motions
 from rom.errors import ConfigError
 from rom.model import Array, Modes, Report, Row
 from rom.names import named, offered
@@ -213,7 +212,7 @@ class Assembly:
             else:
                 fixed = tuple(place for place in fixed if place[0] == name)
                 body, held = self.bodies[name], [self._marker(place).hold for place in fixed]
-                N = supported(np.vstack([np.zeros((0, 6 + body.n_modes)), *held]))
+                N = still_motions(np.vstack([np.zeros((0, 6 + body.n_modes)), *held]))
                 H, matrices = np.vstack([*self._rows_of(name).values()]), body.full_matrices()
             self._partitions[key] = partition(*matrices, N, H, self._n_rigid(fixed))
         return self._partitions[key]
@@ -267,7 +266,7 @@ class Assembly:
             [np.r_[np.ones(3), np.full(3, 1 / size), np.ones(b.n_modes)]
              for b in self.bodies.values()]
         )  # fmt: skip
-        return scale[:, None] * supported(self.conditions(fixed) * scale)
+        return scale[:, None] * still_motions(self.conditions(fixed) * scale)
 
     def _placed(self, term: tuple[tuple[Place, Array, float], ...]) -> Array:
         """(c, n) sum of rows, each at the columns of its body."""

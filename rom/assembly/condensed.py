@@ -17,7 +17,7 @@ import logging
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import block_diag, eigh, null_space
+from scipy.linalg import block_diag, eigh
 
 from rom.arguments import lowest, whole
 from rom.eigen.verbs import whole_clusters
@@ -192,9 +192,3 @@ def joint_functions(moved: Array, traces: list[list[Array]]) -> Array:
     X = np.linalg.lstsq(moved, block_diag(*unions), rcond=RANK_RTOL)[0]
     Q, spectrum, _ = np.linalg.svd(X, full_matrices=False)
     return Q[:, spectrum > RANK_RTOL * spectrum[0]]
-
-
-def supported(rows: Array) -> Array:
-    """(n, m) motions for which all rows vanish."""
-    rows = rows / np.maximum(np.linalg.norm(rows, axis=1, keepdims=True), 1e-300)
-    return null_space(rows, rcond=RANK_RTOL) if rows.size else np.eye(rows.shape[1])

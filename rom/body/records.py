@@ -26,9 +26,10 @@ def still_motions(H: Array) -> Array:
     A row that repeats others counts once. Modes that do not twist a body turn its ends by their own
     error all the same, so that a twist held twice repeats itself to that error only.
     """
-    return null_space(
-        H / np.maximum(np.linalg.norm(H, axis=1, keepdims=True), 1e-300), rcond=REPEATED_ROW_RTOL
-    )
+    if not len(H):
+        return np.eye(H.shape[1])
+    sizes = np.maximum(np.linalg.norm(H, axis=1, keepdims=True), 1e-300)
+    return null_space(H / sizes, rcond=REPEATED_ROW_RTOL)
 
 
 @dataclass(frozen=True, slots=True)

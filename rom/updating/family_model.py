@@ -320,7 +320,7 @@ def family_model(
     added = [item.term(parts) for item in outside.values()]
     K, M = (np.array([t[i] for t in pairs + added]) for i in (0, 1))
     held = _conditions(family, fixed)
-    N = _supported(held)
+    N = still_motions(held)
     known: dict[str, Any] = {**family.parameters, **outside}
     powers = _powers(families, tuple(outside))
     return FamilyModel(
@@ -381,11 +381,6 @@ def _conditions(family: Family, fixed: Any) -> Array:
         return family.nominal.conditions(tuple(fixed))
     family.body.check_support(fixed)
     return family.body.held_rows(fixed)
-
-
-def _supported(held: Array) -> Array:
-    """(n, m) motions that keep what is held still."""
-    return still_motions(held) if len(held) else np.eye(held.shape[1])
 
 
 def _count_free(parts: Parts, attached: Attached, held: Array) -> int:
