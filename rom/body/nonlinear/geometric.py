@@ -141,7 +141,7 @@ def refuse(
     Raises:
         ConfigError: for a model without finite elements, another method, or another frame, and
             for a load where the body is held.
-        InterfaceError: for an unknown interface, or one that is rigid.
+        InterfaceError: for an unknown interface, or a rigid one that turns relative to the frame.
     """
     if model.stresses is None:
         raise ConfigError(
@@ -173,7 +173,7 @@ def refuse(
                 hint="Leave the load out, or that direction of fixed.",
             )
     for name, tie in connection.ties.items():
-        if tie.label == "rbe2":
+        if tie.label == "rbe2" and name != reference:
             raise InterfaceError(
                 f"interface {name!r} is rigid, and a section that turns by a linear rotation "
                 "grows: at a slope of 0.03 the body would be several per cent too stiff.",

@@ -52,7 +52,8 @@ class Geometric:
 
     Attributes:
         loads: {interface: (6,) largest force [N] and moment [N m] of either sign, axes of the
-            geometry}; they keep their direction, a moment as a pair of forces.
+            geometry}; they keep their direction, a moment as a pair of forces. Each component
+            alone, each two together, and all of them as given belong to the range.
         n_modes: how many of the lowest fixed-interface modes drag others along, beside the
             static shapes of the loads; a repeated frequency counts as a whole.
         tol: how much of the energy of the states reached may be left out, as the root of its
@@ -125,15 +126,21 @@ class Geometric:
         squares = [abs(float(self.spin[i] * self.spin[j])) for i, j in PRODUCTS]
         return of_interfaces + [Load("", k, x) for k, x in enumerate(squares) if x]
 
+    def given(self) -> Array:
+        """(l,) the signs with which the components are given, all at once [1]."""
+        forces = [x for load in self.loads.values() for x in load if x]
+        squares = [self.spin[i] * self.spin[j] for i, j in PRODUCTS]
+        return np.sign([float(x) for x in forces + squares if x])
+
     def load_cases(self) -> Array:
-        """(c, l) directions of the components together, each alone and each two of them [1]."""
+        """(c, l) shares of the components: each alone, each two of them, all as given."""
         components = self.components()
         units = np.eye(len(components))
         alone = [s * unit for unit, load in zip(units, components, strict=True) for s in load.signs]
         skew = [(a * units[i] + b * units[j]) / np.sqrt(2)
                 for i, j in combinations(range(len(units)), 2)
                 for a, b in product(components[i].signs, components[j].signs)]  # fmt: skip
-        return np.array(alone + skew)
+        return np.array(alone + skew + [self.given()] * (len(units) > 1))
 
 
 def held_motions(geometric: Geometric, known: Any) -> list[Load]:
