@@ -113,7 +113,7 @@ def seconds_of_force(r: int, times: int = 2000) -> tuple[float, float]:
         r: number of coordinates; six of them belong to an interface.
         times: how often.
     """
-    linear = reduce(bar((1.0, 0.1, 0.1), (r, 1, 1)), method=CraigBampton(r - 6), certify=False,
+    linear = reduce(bar((1.0, 0.1, 0.07), (r, 1, 1)), method=CraigBampton(r - 6), certify=False,
                     interfaces=dict(KINDS), reference="root")  # fmt: skip
     rng = np.random.default_rng(SEED)
     cubic, quartic = (rng.standard_normal(n_entries(r, order)) for order in (3, 4))
@@ -176,9 +176,7 @@ def seconds_of_correction(model: FEModel) -> float:
     return process_time() - start
 
 
-def peers(
-    segments: tuple[int, ...], elements: tuple[int, ...], beside: Run
-) -> Iterator[Row]:
+def peers(segments: tuple[int, ...], elements: tuple[int, ...], beside: Run) -> Iterator[Row]:
     """Rows of rods, and of Exudyn's beams, beside the body."""
     for n in segments:
         run, case = spun_up(rod(n)), f"spin-up, rod of {n} segments"
