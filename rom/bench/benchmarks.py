@@ -299,37 +299,10 @@ def film(solves: int = 400) -> Iterator[Figure]:
     Args:
         solves: films around the orbit, each started from the one before.
     """
-    from rom.components.journal_bearing import Groove, JournalBearing
-    from rom.components.journal_bearing import film as film_of
+    from rom.bench.oil_films import measured
 
-    angle = np.linspace(0, 2 * pi, solves)
-    orbit = 1e-5 * np.stack([6 + np.cos(angle), 1.5 * np.sin(angle)], axis=1)
-    for law in ("reynolds", "jfo"):
-        bearing = JournalBearing(0.1, 0.05, 1e-4, [Groove(pi, 0.35)], cavitation=law, aligned=True)
-        now = film_of(bearing, orbit[0], speed=300.0, viscosity=0.03)
-        taken, changes = np.empty(solves), 0
-        for k, x in enumerate(orbit):
-            start = perf_counter()
-            now = film_of(bearing, x, speed=300.0, viscosity=0.03, warm=now.active)
-            taken[k], changes = perf_counter() - start, changes + now.iterations
-        case = f"120 x 8 cells, {law}"
-        each = 1e3 * float(np.median(taken))
-        yield Figure("film", case, "film and derivatives", each, "ms", "below 0.6")
-        yield Figure("film", case, "systems solved per film", changes / solves)
-        yield Figure("film", f"shaft in two films, {law}", "steps per second of the processor",
-                     _steps_in_films(law, 5 * solves), "1/s", "above 500")  # fmt: skip
-
-
-def _steps_in_films(law: str, steps: int) -> float:
-    """Steps per second of processor time."""
-    from rom.bench.models import shaft_in_films
-    from rom.mbs.integrate.simulation import simulate
-
-    mech, dt = shaft_in_films(law), 1e-4
-    warm = simulate(mech, t_end=5e-3, dt=dt, method="bdf")
-    start = process_time()
-    simulate(mech, t_end=5e-3 + dt * steps, state=warm.final, dt=dt, method="bdf")
-    return steps / (process_time() - start)
+    for case, quantity, value, unit, aim in measured(solves):
+        yield Figure("film", case, quantity, value, unit, aim)
 
 
 def geared(steps: int = 20000) -> Iterator[Figure]:
@@ -338,41 +311,10 @@ def geared(steps: int = 20000) -> Iterator[Figure]:
     Args:
         steps: of 1e-5 s.
     """
-    from rom.bench.models import planetary_train
-    from rom.components.gear_mesh import Hertz, Mesh
+    from rom.bench.gears import measured
 
-    case = "planetary train, 6 meshes of 21 slices"
-    options: dict[str, dict[str, Any]] = {
-        "": {},
-        ", along involutes": {"conservative": False},
-        ", slices coupled": {"coupling": 2e-3},
-        ", contact by Hertz": {"hertz": Hertz((2e-3, 2e-3))},
-    }
-    for name, more in options.items():
-        mech, pair, stiffness = planetary_train(**more)
-        each = _seconds_per_step(mech, steps if not name else steps // 5)
-        yield Figure("geared", case + name, "steps per second of the processor", 1 / each, "1/s",
-                     "above 1000")  # fmt: skip
-        if not name:
-            whole = each
-    plane, motion = Mesh(pair, stiffness), np.zeros(12)
-    motion[5] = 1e-4
-    start = process_time()
-    for angle in np.linspace(0, 2 * pi, 200):
-        plane.forces(motion, float(angle))
-    one = (process_time() - start) / 200
-    yield Figure("geared", case, "six meshes by the plane model, over a step", 6 * one / whole, "",
-                 "above 0.5")  # fmt: skip
-
-
-def _seconds_per_step(mech: Any, steps: int) -> float:
-    """Processor time of a step of 1e-5 s, the kernels compiled."""
-    from rom.mbs.integrate.simulation import simulate
-
-    simulate(mech, t_end=1e-3, dt=1e-5, save_every=100, progress=False)
-    start = process_time()
-    simulate(mech, t_end=1e-5 * steps, dt=1e-5, save_every=100, progress=False)
-    return (process_time() - start) / steps
+    for case, quantity, value, unit, aim in measured(steps):
+        yield Figure("geared", case, quantity, value, unit, aim)
 
 
 def transmission(
@@ -460,6 +402,21 @@ def updating(sizes: tuple[float, ...] = (2e3, 25e3)) -> Iterator[Figure]:
             yield Figure("updating", *row)
 
 
+def large_deflection(size: float = 100e3, **more: Any) -> Iterator[Figure]:
+    """Tensors, forces and steps of bodies that bend far, beside finite elements, rods and Exudyn.
+
+    Processor time. The time of the finite elements is one correction, times the number of steps.
+
+    Args:
+        size: number of dofs aimed at, of tetrahedra.
+        more: as `rom.bench.large_deflection.measured` takes it.
+    """
+    from rom.bench.large_deflection import measured
+
+    for case, quantity, value, unit, aim in measured(_beam(size), **more):
+        yield Figure("large-deflection", case, quantity, value, unit, aim)
+
+
 BENCHMARKS: dict[str, Callable[[], Iterator[Figure]]] = {
     "blade": blade,
     "film": film,
@@ -478,6 +435,7 @@ BENCHMARKS: dict[str, Callable[[], Iterator[Figure]]] = {
     "rods": rods,
     "start": start,
     "updating": updating,
+    "large-deflection": large_deflection,
 }
 
 

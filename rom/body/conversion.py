@@ -4,6 +4,7 @@ Shapes are scaled so that the elastic mass matrix keeps its numbers: ``K`` stays
 """
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -93,7 +94,18 @@ def converted(body: Body, units: str) -> Body:
         stress=None if body.stress is None else _stress(body.stress, f),
         omega=body.omega / t,
         units=units,
+        provenance=_provenance(body.provenance, f),
     )
+
+
+def _provenance(old: dict[str, Any], f: Factors) -> dict[str, Any]:
+    """With the energies to which load cases at large deflection hold."""
+    cases = old.get("large deflection")
+    if not cases:
+        return old
+    changed = {name: case | {"energy": case["energy"] * f.force * f.length}
+               for name, case in cases.items()}  # fmt: skip
+    return old | {"large deflection": changed}
 
 
 def _quartic(old: Quartic | Sampled, f: Factors) -> Quartic:

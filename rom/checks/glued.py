@@ -9,6 +9,7 @@ import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix
 from scipy.spatial import cKDTree
 
+from rom.body.nonlinear.full import TurningSection
 from rom.body.nonlinear.ranges import Load
 from rom.eigen.verbs import mean_motion
 from rom.errors import ModelError
@@ -82,6 +83,12 @@ class GluedSolid:
                 interface = model.interfaces[load.interface]
                 row[self.dofs[key][interface.dofs]] = mean_motion(interface)[load.component]
         return row
+
+    def section(self, name: str) -> TurningSection:
+        """An interface of one piece, for moments that turn with it."""
+        (key,) = (key for key, model in self.models.items() if name in model.interfaces)
+        interface = self.models[key].interfaces[name]
+        return TurningSection.of(interface, self.dofs[key][interface.dofs])
 
     def nodal_force(self, load: Load) -> Array:
         """(n,) forces of a load at its largest [N]."""

@@ -31,20 +31,21 @@ def certify_pieces(
     """The pieces with a certificate: welded to each other they bend as the whole solid does.
 
     The whole is glued from the models, whose nodes meet at the cuts, and solved at finite strain.
-    At steps of each force and of several together, displacement of the surface and frequencies
-    about the state are compared, as they are for one body.
+    At steps of each load and of several together, displacement of the surface and frequencies
+    about the state are compared, as they are for one body. Moments turn with their sections on
+    either side.
 
     Args:
         pieces: of `reduce_pieces`.
         models: {name: piece} of which they were made.
-        nonlinear: the range; forces on interfaces, which keep their direction.
+        nonlinear: the range; loads on interfaces. Forces keep their direction, moments their axis.
 
     Returns:
         The pieces; ``certificate`` is a `Report`.
 
     Raises:
-        ConfigError: for a range with moments, which turn with a section of a mechanism, or with
-            centrifugal force or supports beside the reference; for models of other pieces.
+        ConfigError: for a range with centrifugal force or supports beside the reference; for models
+            of other pieces.
         ModelError: if nodes of two pieces do not meet at their cut.
 
     Example:
@@ -59,21 +60,35 @@ def certify_pieces(
     place = next(m.interfaces[reference].origin for m in models.values()
                  if reference in m.interfaces)  # fmt: skip
     solid = GluedSolid.of(models, pieces.joints)
-    full = HeldSolid(solid, solid.M, [solid.motion(Load(reference, k)) for k in range(6)])
     components = nonlinear.components()
-    units = np.array([solid.nodal_force(load) for load in components]).T
+    bent = list(dict.fromkeys(load.interface for load in components if load.component > 2))
+    full = HeldSolid(
+        solid, solid.M, [solid.motion(Load(reference, k)) for k in range(6)],
+        sections=[solid.section(name) for name in bent],
+    )  # fmt: skip
+    units = np.array([_load(solid, bent, load) for load in components]).T
     rows = list[Row]()
     for name, case in load_cases(nonlinear).items():
         rest = _AtRest(pieces, (reference, place), components, case)
-        steps, a = list[Step](), np.zeros(len(units))
+        steps, a = list[Step](), np.zeros(solid.n)
         for share in STEP_SHARES:
-            found = full.state(a, share * (units @ case))
+            W = share * (units @ case)
+            found = full.state(a, W)
             if found is None or not rest.moved_to(share):
                 break
             a = found
-            steps.append(_compared(rest, solid, full, a))
+            steps.append(_compared(rest, solid, full, (a, W)))
         rows += case_rows(name, steps)
     return replace(pieces, certificate=Report("certificate of pieces", tuple(rows)))
+
+
+def _load(solid: GluedSolid, bent: list[str], load: Load) -> Array:
+    """(n + 3 s,) a component at its largest: nodal forces, then moments on the sections."""
+    moments = np.zeros((len(bent), 3))
+    if load.component > 2:
+        moments[bent.index(load.interface), load.component - 3] = load.largest
+        return np.r_[np.zeros(solid.n), moments.ravel()]
+    return np.r_[solid.nodal_force(load), moments.ravel()]
 
 
 class _AtRest:
@@ -88,8 +103,9 @@ class _AtRest:
         markers = pieces.add_to(self.mech, "whole")
         self.mech.fixed("support", self.mech.ground.marker(support[1]), markers[support[0]])
         for k, (load, x) in enumerate(zip(components, case, strict=True)):
-            force = x * load.largest * np.eye(3)[load.component]
-            self.mech.force(f"load {k}", markers[load.interface], lambda t, force=force: t * force)
+            most = x * load.largest * np.eye(3)[load.component % 3]
+            push = self.mech.torque if load.component > 2 else self.mech.force
+            push(f"load {k}", markers[load.interface], lambda t, most=most: t * most)
 
     def moved_to(self, share: float) -> bool:
         """Whether there is an equilibrium at a share of the load; it is the state from then on."""
@@ -115,9 +131,11 @@ class _AtRest:
         return found
 
 
-def _compared(rest: _AtRest, solid: GluedSolid, full: HeldSolid, a: Array) -> Step:
-    """The pieces against the whole at a displacement (n,)."""
-    found, known = [], []
+def _compared(
+    rest: _AtRest, solid: GluedSolid, full: HeldSolid, at: tuple[Array, Array]
+) -> Step:  # fmt: skip
+    """The pieces against the whole at a displacement (n,) under a load."""
+    (a, W), found, known = at, [], []
     for key, u in rest.displacements().items():
         surface = solid.models[key].surface
         assert surface is not None
@@ -126,7 +144,7 @@ def _compared(rest: _AtRest, solid: GluedSolid, full: HeldSolid, a: Array) -> St
     u, v = np.vstack(found), np.vstack(known)
     size = float((v * v).sum())
     omega = 2 * np.pi * linearize(rest.mech, rest.state, n=N_TANGENT).frequencies[:N_TANGENT]
-    gaps = np.abs(omega / full.frequencies(a) - 1)
+    gaps = np.abs(omega / full.frequencies(a, W) - 1)
     distance = float(np.sqrt(((u - v) ** 2).sum() / size))
     return Step(distance, float((u * v).sum()) / size, float(gaps.max()))
 
@@ -148,14 +166,12 @@ def _refuse(pieces: Pieces, models: Mapping[str, FEModel], nonlinear: Geometric)
             if name not in pieces.joints}  # fmt: skip
     if unknown := [name for name in nonlinear.loads if name not in free]:
         raise ConfigError(f"the range names {named(unknown)}; the pieces have {offered(free)}.")
-    loads = nonlinear.components()
-    moments = [load.name for load in loads if not load.interface or load.component > 2]
-    if moments or nonlinear.fixed:
+    turning = [load.name for load in nonlinear.components() if not load.interface]
+    if turning or nonlinear.fixed:
         raise ConfigError(
-            f"pieces are certified for forces; the range has {named(moments)}, and holds "
-            f"{nonlinear.fixed!r}. A moment on pieces turns with its section, one on the whole is "
-            "a pair of dead forces.",
-            hint="Give a range of forces on interfaces that lead to like deflections.",
+            f"pieces are certified for loads on interfaces; the range has {named(turning)}, and "
+            f"holds {nonlinear.fixed!r}.",
+            hint="Give a range of loads on interfaces that lead to like deflections.",
         )
     (reference,) = {body.reference for body in pieces.bodies.values()} & set(free)
     return reference

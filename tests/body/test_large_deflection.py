@@ -406,6 +406,9 @@ def test_a_file_and_other_units_keep_the_energy(certified, tmp_path):
     assert_allclose(
         other.quartic.energy(same), 1e3 * body.quartic.energy(q)
     )  # 1 J is 1000 t mm^2/s^2
+    certified = other.certified_energy / body.certified_energy
+    back = other.in_units("SI").certified_energy
+    assert_allclose([certified, back], [1e3, body.certified_energy])
     turned = [b.marker("tip").covariance @ np.r_[1.0, x] for b, x in ((body, q), (other, same))]
     assert_allclose(*turned, atol=1e-12)
     cut = replace(body, quartic=replace(body.quartic, quartic=body.quartic.quartic[1:]))
@@ -445,6 +448,9 @@ def test_files_without_covariance_are_read_and_their_markers_turn_as_before(cert
         ({"interfaces": {"root": "rbe3", "tip": "rbe2"}}, InterfaceError, "'tip' is rigid"),
         ({"reference": "mean-axis"}, ConfigError, "seen from an interface"),
         ({"method": rom.FreeFree(n_modes=4)}, ConfigError, "no(ne| constraint)|has none"),
+        ({"method": rom.Rubin(n_modes=4)}, ConfigError, "this method has none"),
+        ({"method": rom.Herting(n_modes=4)}, ConfigError, "modes with the interfaces held"),
+        ({"method": rom.EnhancedCraigBampton(n_modes=4)}, ConfigError, "with the interfaces held"),
         ({"stiffening": True}, ConfigError, "small deflection"),
         ({"nonlinear": {"hub": (1, 0, 0, 0, 0, 0)}}, InterfaceError, "names 'hub'"),
         ({"nonlinear": {"root": (1, 0, 0, 0, 0, 0)}}, InterfaceError, "names 'root'"),

@@ -1,19 +1,73 @@
 """Full models at finite strain, motions of their interfaces held."""
 
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from scipy.sparse import bmat, csc_matrix, csr_matrix, identity, lil_matrix, vstack
-from scipy.sparse.linalg import LinearOperator, eigsh, splu
+from scipy.sparse.linalg import LinearOperator, eigs, eigsh, splu
 
 from rom.body.nonlinear.ranges import Load
 from rom.eigen.verbs import mean_motion
-from rom.model import Array, FEModel
+from rom.model import Array, FEModel, Index, Interface
 
 N_TANGENT = 3  # lowest frequencies compared there
 MAX_ITERATIONS = 30  # of Newton's method on the full model
 INCREMENT_RTOL = 1e-8  # last increment of it; the next one is its square
+COVARIANCE_STEP = 1e-6  # of differences [1]
 MIN_LOAD_STEP = 2.0**-8  # at which a path of the full model is given up
+
+
+@dataclass(frozen=True)
+class TurningSection:
+    """An interface that takes its moments with it as it turns, as markers of mechanisms do.
+
+    With B = sum x w^T = P R over its nodes, P = P^T, its angular velocity is
+    (tr P - P)^-1 sum R w x (rate of x), by which moments act.
+
+    Attributes:
+        dofs: (3 k,) of its nodes in the solid.
+        points: (k, 3) its nodes from their centre [m].
+        weights: (k, 3) w [1/m].
+    """
+
+    dofs: Index
+    points: Array
+    weights: Array
+
+    @classmethod
+    def of(cls, interface: Interface, dofs: Index) -> "TurningSection":
+        """That of an interface."""
+        area = np.asarray(interface.surface_mass.sum(axis=0)).ravel()
+        X = interface.points - area @ interface.points / area.sum()
+        weights = interface.surface_mass @ X
+        return cls(dofs, X, weights / float((X * weights).sum()))
+
+    def covariance(self, u: Array) -> Array:
+        """(3, 3) B at a displacement (n,) of the solid [1]."""
+        return (self.points + u[self.dofs].reshape(-1, 3)).T @ self.weights
+
+    def force(self, B: Array, moment: Array) -> Array:
+        """(3 k,) forces of a moment (3,), axes at rest, on the nodes [N]."""
+        U, _, Vt = np.linalg.svd(B)
+        R = U @ np.diag([1.0, 1.0, np.linalg.det(U @ Vt)]) @ Vt
+        P = B @ R.T
+        x = np.linalg.solve(np.trace(P) * np.eye(3) - P, moment)
+        return np.cross(x, self.weights @ R.T).ravel()
+
+    def stiffness(self, u: Array, moment: Array) -> tuple[Array, Array]:
+        """X and Y (n, 9), of which X Y^T is the derivative of the forces at a displacement [N/m].
+
+        They follow from B alone, and that is linear in u.
+        """
+        B, X, Y = self.covariance(u), np.zeros((u.size, 9)), np.zeros((u.size, 9))
+        for k, E in enumerate(COVARIANCE_STEP * np.eye(9).reshape(9, 3, 3)):
+            change = self.force(B + E, moment) - self.force(B - E, moment)
+            X[self.dofs, k] = change / (2 * COVARIANCE_STEP)
+            a, b = divmod(k, 3)
+            Y[self.dofs[a::3], k] = self.weights[:, b]
+        return X, Y
 
 
 class HeldSolid:
@@ -25,10 +79,15 @@ class HeldSolid:
         C: (h, n) motions that are held.
         T: (n, m) its displacements u = T a; None for the identity.
         comm: of the processes, every one of which has all of it.
+        sections: on which moments act that turn with them; a load (n + 3 s,) has their moments
+            behind the nodal forces.
     """
 
-    def __init__(self, solid: Any, M: Any, C: Any, T: Any = None, comm: Any = None):
-        self.solid, self.comm = solid, comm
+    def __init__(
+        self, solid: Any, M: Any, C: Any, T: Any = None, comm: Any = None,
+        sections: Sequence[TurningSection] = (),
+    ):  # fmt: skip
+        self.solid, self.comm, self.sections = solid, comm, sections
         self.T = csr_matrix(identity(M.shape[0]) if T is None else T)
         self.M, self.C = self.T.T @ M @ self.T, csr_matrix(C) @ self.T
         self.inside = splu(csc_matrix(self.T.T @ self.T))
@@ -53,7 +112,7 @@ class HeldSolid:
         return np.vstack(self.comm.allgather(E))
 
     def state(self, u: Array, W: Array) -> Array | None:
-        """(m,) equilibrium in a under nodal loads W (n,) [N] near u (n,); None if not found."""
+        """(m,) equilibrium in a under a load W [N, N m] near u (n,); None if not found."""
         near = self.inside.solve(self.T.T @ u)
         found = self._newton(near, W)
         return self._from_rest(W) if found is None else found
@@ -75,7 +134,8 @@ class HeldSolid:
     def _newton(self, a: Array, W: Array) -> Array | None:
         """The equilibrium near a (m,), None if Newton's method does not find it."""
         for _ in range(MAX_ITERATIONS):
-            gap = self.T.T @ (W - self.solid.force(self.T @ a))
+            u = self.T @ a
+            gap = self.T.T @ (self._pushed(u, W) - self.solid.force(u))
             step = self._bordered(a).solve(np.r_[gap, -self.C @ a])[: a.size]
             a = a + step
             size = np.linalg.norm(step)
@@ -84,6 +144,17 @@ class HeldSolid:
             if size <= INCREMENT_RTOL * np.linalg.norm(a):
                 return a
         return None
+
+    def _pushed(self, u: Array, W: Array) -> Array:
+        """(n,) nodal forces of a load at a displacement (n,)."""
+        found = W[: u.size].copy()
+        for section, moment in self._moments(u, W):
+            found[section.dofs] += section.force(section.covariance(u), moment)
+        return found
+
+    def _moments(self, u: Array, W: Array) -> Iterator[tuple[TurningSection, Array]]:
+        """Each section, and the moment on it."""
+        return zip(self.sections, W[u.size :].reshape(-1, 3), strict=True)
 
     def _bordered(self, a: Array) -> Any:
         """Factor of the stiffness at a (m,) with the interface held by multipliers."""
@@ -101,14 +172,37 @@ class HeldSolid:
         gap = self.inside.solve(self.T.T @ u) - a
         return float(np.sqrt((gap @ self.M @ gap) / (a @ self.M @ a)))
 
-    def frequencies(self, a: Array) -> Array:
-        """(k,) lowest frequencies about the state a (m,) [rad/s]."""
-        n, factor = a.size, self._bordered(a)
-        inverse = LinearOperator(
-            (n, n), matvec=lambda x: factor.solve(np.r_[x, np.zeros(self.C.shape[0])])[:n]
-        )
-        lam = eigsh(self.M, N_TANGENT, self.M, sigma=0.0, OPinv=inverse, return_eigenvectors=False)
-        return np.sqrt(np.sort(np.maximum(lam, 0.0)))
+    def frequencies(self, a: Array, W: Array | None = None) -> Array:
+        """(k,) lowest frequencies about the state a (m,) [rad/s].
+
+        Args:
+            a: the state.
+            W: the load that it bears, if that has moments: they have a stiffness, not symmetric.
+        """
+        n, factor, u = a.size, self._bordered(a), self.T @ a
+
+        def softened(F: Array) -> Array:
+            still = np.zeros((self.C.shape[0], F.shape[1]))
+            return factor.solve(np.vstack([F, still]))[:n]
+
+        turning = [] if W is None else [x for x in self._moments(u, W) if x[1].any()]
+        if not turning:
+            inverse = LinearOperator((n, n), matvec=lambda x: softened(x.reshape(-1, 1))[:, 0])
+            lam = eigsh(self.M, N_TANGENT, self.M, sigma=0.0, OPinv=inverse,
+                        return_eigenvectors=False)  # fmt: skip
+            return np.sqrt(np.sort(np.maximum(lam, 0.0)))
+        pairs = [section.stiffness(u, moment) for section, moment in turning]
+        X, Y = (self.T.T @ np.hstack(part) for part in zip(*pairs, strict=True))
+        soft = softened(X)  # Woodbury: K - X Y^T
+        small = np.linalg.inv(np.eye(X.shape[1]) - Y.T @ soft)
+
+        def answer(x: Array) -> Array:
+            y = softened(self.M @ x.reshape(-1, 1))
+            return np.asarray((y + soft @ (small @ (Y.T @ y)))[:, 0])
+
+        inverse = LinearOperator((n, n), matvec=answer)
+        squares = 1 / eigs(inverse, N_TANGENT, return_eigenvectors=False)
+        return np.sqrt(np.sort(np.maximum(squares.real, 0.0)))
 
 
 def rows_of(A: Any) -> csr_matrix:

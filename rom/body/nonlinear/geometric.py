@@ -43,6 +43,7 @@ N_MODES = 4  # about each state that a range leads to, for which shapes are kept
 MODE_SHARE = 1e-2
 N_TURNS = 4  # of moments with the section on which they act, each by what the last one left
 SNAPSHOT_SHARES = (0.5, 1.0)  # of the loads, at which the full model is solved
+HELD_RTOL = 1e-6  # of K on modes, by which those of held interfaces are known
 MAX_COORDINATES = 80
 TENSOR_COPIES = 11  # of the Gram matrix while it is ordered into tensors
 FLOP_RATE = 1e10  # of one core in a product of matrices [1/s]
@@ -139,8 +140,8 @@ def refuse(
     """Say what does not go together with large deflection.
 
     Raises:
-        ConfigError: for a model without finite elements, another method, or another frame, and
-            for a load where the body is held.
+        ConfigError: for a model without finite elements, a method without fixed-interface modes, or
+            another frame, and for a load where the body is held.
         InterfaceError: for an unknown interface, or a rigid one that turns relative to the frame.
     """
     if model.stresses is None:
@@ -151,6 +152,12 @@ def refuse(
     if basis.held is None:
         raise ConfigError(
             "large deflection takes constraint modes, and this method has none.",
+            hint="Use rom.CraigBampton or rom.Guyan.",
+        )
+    if not _held_modes(connection.ops, basis):
+        raise ConfigError(
+            "large deflection takes modes with the interfaces held, and those of this method are "
+            "others.",
             hint="Use rom.CraigBampton or rom.Guyan.",
         )
     if reference not in connection.parts:
@@ -179,6 +186,17 @@ def refuse(
                 "grows: at a slope of 0.03 the body would be several per cent too stiff.",
                 hint='Give it the kind "rbe3" or rom.Polynomial(1).',
             )
+
+
+def _held_modes(ops: Operators, basis: Basis) -> bool:
+    """Whether the last columns are modes with the interfaces held, orthonormal in the mass."""
+    K, expected = quadratic(ops, ops.apply_K, _normal(basis)), np.diag(basis.omega**2)
+    return bool(np.abs(K - expected).max(initial=0.0) <= HELD_RTOL * expected.max(initial=0.0))
+
+
+def _normal(basis: Basis) -> Array:
+    """(n_local, m) the modes of a basis, its last columns."""
+    return basis.Psi[:, basis.Psi.shape[1] - basis.omega.size :]
 
 
 def _with_derivatives(
@@ -214,7 +232,8 @@ def _with_derivatives(
     n_modes = min(geometric.n_modes, basis.omega.size)
     if n_modes:
         n_modes = whole_clusters(basis.omega**2, n_modes)
-    active = np.hstack([static, Psi[:, n_b : n_b + n_modes]])
+    normal = Psi[:, Psi.shape[1] - basis.omega.size :]
+    active = np.hstack([static, normal[:, :n_modes]])
     n_basis, n_active = moving.shape[1] + n_modes, active.shape[1]
     n_further = len(turning) + geometric.snapshots * 2 * len(geometric.load_cases())
     _refuse_many(n_basis + n_further + n_active * (n_active + 1) // 2, energy)
@@ -333,7 +352,7 @@ def _derivatives(
     for some in column_blocks(len(pairs)):
         theta[:, some] = -basis.held(ops.restrict(energy.second_forces(active, pairs[some])))
     theta = np.hstack([*further, theta])
-    normal = basis.Psi[:, basis.Psi.shape[1] - basis.omega.size :]
+    normal = _normal(basis)
     theta -= normal @ (ops.gram(normal, ops.apply_K(theta)) / basis.omega[:, None] ** 2)
     K = quadratic(ops, ops.apply_K, theta)
     *shares, share = np.split(np.diag(K), np.cumsum([X.shape[1] for X in further]))

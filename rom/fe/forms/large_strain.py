@@ -25,6 +25,7 @@ from rom.fe.compat import (
     assembled_vector,
     cell_name,
     compiled,
+    corner_points,
     evaluated,
     geometry_degree,
     quadrature_rule,
@@ -86,6 +87,23 @@ class LargeStrain:
         self.mesh.comm.Allreduce(MPI.IN_PLACE, least, MPI.MIN)
         return np.sqrt(np.maximum(least, 0.0))
 
+    def turns(self, U: Array) -> Array:
+        """(s,) largest turn [rad] within a cell for each displacement (n_local, s), on all ranks.
+
+        Between its corners and their mean, doubled; a small strain does not count.
+        """
+        corners, most = np.asarray(corner_points(self.mesh)), np.zeros(U.shape[1])
+        for H in self._slopes(U, self._blocks(27 * U.shape[1]), corners):
+            F = np.moveaxis(H, 3, 0) + np.eye(3)
+            F = F.reshape(len(most), -1, len(corners), 3, 3)
+            A = F.mean(axis=2, keepdims=True).swapaxes(-1, -2) @ F
+            sine = 0.5 * np.linalg.norm(
+                (A - A.swapaxes(-1, -2))[..., [2, 0, 1], [1, 2, 0]], axis=-1
+            )
+            most = np.maximum(most, sine.max(axis=(1, 2)))
+        self.mesh.comm.Allreduce(MPI.IN_PLACE, most, MPI.MAX)
+        return 2 * np.arcsin(np.minimum(most, 1.0))
+
     def at_points(self, E: Array) -> tuple[Array, Array, Array, Array]:
         """Of this process: gradients (p, 9, r), weights (p,), cells (p,) and stiffness (p, 6, 6).
 
@@ -133,28 +151,34 @@ class LargeStrain:
         return out
 
     def _gradients(self, E: Array, blocks: list[Integers]) -> Iterator[tuple[Array, ...]]:
-        """Gradients (p, 3, 3, r) [m/m], weights (p,) and C (p, 6, 6) of each block, at points."""
+        """Gradients (p, 3, 3, r) [1], weights (p,) and C (p, 6, 6) of each block, at points."""
+        x, p = ufl.SpatialCoordinate(self.mesh), len(self.points)
+        with compiling(self.mesh.comm):
+            volume = fem.Expression(ufl.JacobianDeterminant(self.mesh), self.points)
+            law = fem.Expression(stiffness(self.numbers, x), self.points[:1])
+        filled = [cells for cells in blocks if cells.size]
+        for cells, H in zip(filled, self._slopes(E, filled, self.points), strict=True):
+            w = np.abs(evaluated(volume, self.mesh, cells).reshape(-1, p)) * self.weights
+            C = evaluated(law, self.mesh, cells).reshape(-1, 6, 6)
+            yield H, w.ravel(), np.repeat(C, p, axis=0)
+
+    def _slopes(self, E: Array, blocks: list[Integers], points: Array) -> Iterator[Array]:
+        """Gradients (p, 3, 3, r) [1] of each block that has cells, at points of the cells."""
         u = fem.Function(self.V)
         columns = []
         for column in E.T:  # every rank exchanges all columns, however many blocks it has
             _set(u, column)
             columns.append(u.x.array.copy())
-        x = ufl.SpatialCoordinate(self.mesh)
         with compiling(self.mesh.comm):
-            grad = fem.Expression(ufl.grad(u), self.points)
-            volume = fem.Expression(ufl.JacobianDeterminant(self.mesh), self.points)
-            law = fem.Expression(stiffness(self.numbers, x), self.points[:1])
-        p = len(self.points)
+            grad = fem.Expression(ufl.grad(u), points)
         for cells in blocks:
             if not cells.size:
                 continue
-            H = np.empty((cells.size * p, 3, 3, E.shape[1]))
+            H = np.empty((cells.size * len(points), 3, 3, E.shape[1]))
             for k, column in enumerate(columns):
                 u.x.array[:] = column
                 H[..., k] = evaluated(grad, self.mesh, cells).reshape(-1, 3, 3)
-            w = np.abs(evaluated(volume, self.mesh, cells).reshape(-1, p)) * self.weights
-            C = evaluated(law, self.mesh, cells).reshape(-1, 6, 6)
-            yield H, w.ravel(), np.repeat(C, p, axis=0)
+            yield H
 
 
 def linear_strain(H: Array) -> Array:

@@ -17,6 +17,7 @@ from rom.mbs.equations.packing import Packed
 from rom.mbs.integrate.consistent_start import assembled, initial_state
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.results.state import State
+from rom.mbs.results.validity import warn_of_range
 from rom.model import Array
 
 MAX_PASSES = 300
@@ -70,7 +71,8 @@ def equilibrium(
             of them has ``error.solution``: the state reached, at the share of the loads before.
 
     Warns:
-        RomWarning: if the equilibrium at rest is unstable.
+        RomWarning: if the equilibrium at rest is unstable, or a body of large deflection is beyond
+            the range of its certificate.
 
     Source:
         Newton's method on the tangent space of the constraints, with the absolute values of the
@@ -94,6 +96,7 @@ def equilibrium(
         for at_load in search.loaded(found, steps) if nearby is None else (nearby,):
             found = at_load
         search.judge(found)
+    warn_of_range(mechanism, now.packed, found)
     return found
 
 

@@ -13,6 +13,7 @@ from rom.model import Array
 
 # of the size of the body: beyond a tenth, linear elasticity is no longer to be trusted
 MAX_DEFORMATION = 0.1
+ENERGY_RTOL = 1e-6  # of states on the very edge of a range
 # of an interface against the frame [rad]: there exp(sin x) falls short of the angle x by 1.5 %
 MAX_MARKER_TURN = 0.3
 
@@ -43,20 +44,37 @@ def warn_of_limits(solution: Solution) -> None:
             )
 
 
+def warn_of_range(mechanism: Any, packed: Any, state: Any) -> None:
+    """Warn of bodies of large deflection that are beyond their certificates at one instant."""
+    bodies = packed.system.bodies
+    for name, at in zip(packed.names, bodies.q_at, strict=True):
+        part = mechanism.parts[name]
+        if getattr(part.flexible, "quartic", None) is None:
+            continue
+        if said := _beyond_range(part.flexible, state.q[at + 7 : at + 7 + part.r][None]):
+            warn(f"body {name!r} is beyond the range of its certificate: {said[1]}")
+
+
 def _warn_of_range(solution: Solution, name: str) -> None:
     """Bodies of large deflection that store more energy than where they were compared."""
-    body: Any = solution.mechanism.parts[name].flexible
+    body = solution.mechanism.parts[name].flexible
+    if said := _beyond_range(body, solution.elastic(name)):
+        k, why = said
+        warn(f"body {name!r} left the range of its certificate at {solution.t[k]:.4g} s: {why}")
+
+
+def _beyond_range(body: Any, q: Array) -> tuple[int, str] | None:
+    """Which of the coordinates (t, r) are the first beyond the certificate, and why."""
     most = body.certified_energy
     if not np.isfinite(most):
-        return
-    energy = body.quartic.energies(solution.elastic(name))
-    if np.nanmax(energy, initial=0.0) > most:
-        k = int(np.nanargmax(energy > most))
-        warn(
-            f"body {name!r} left the range of its certificate at {solution.t[k]:.4g} s: its strain "
-            f"energy reached {np.nanmax(energy):.3g} J, and no load case of its range holds beyond "
-            f"{most:.3g} J. Reduce it for larger loads, or for more shapes."
-        )
+        return None
+    energy = body.quartic.energies(q)
+    if not np.nanmax(energy, initial=0.0) > (1 + ENERGY_RTOL) * most:
+        return None
+    return int(np.nanargmax(energy > (1 + ENERGY_RTOL) * most)), (
+        f"its strain energy is {np.nanmax(energy):.3g} J, and no load case of its range holds "
+        f"beyond {most:.3g} J. Reduce it for larger loads, or for more shapes."
+    )
 
 
 def _warn_of_turned_markers(solution: Solution, name: str) -> None:

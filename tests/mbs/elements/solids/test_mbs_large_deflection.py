@@ -175,6 +175,27 @@ def test_a_motion_that_leaves_the_range_of_the_certificate_says_so_with_body_and
         rom.simulate(mech, t_end=0.2, dt=0.01)
 
 
+def test_a_rest_beyond_the_range_of_the_certificate_says_so_with_the_body():
+    """Of two bodies, the one that is pulled; its energy is known from its own coordinates."""
+    body, still = truss(), truss()
+    mech = rom.Mechanism(gravity=(0, 0, 0))
+    for name, one, x in (("still", still, 0.0), ("pulled", body, 5.0)):
+        part = mech.add_flexible(name, one, at=(x, 0, 0))
+        mech.fixed(f"{name} held", mech.ground.marker((x, 0, 0)), part.marker("n0"))
+    mech.force("pull", part.marker("n3"), (2.0, -3.0, 4.0))
+    energy = float(body.quartic.energy(rom.equilibrium(mech).q[-6:]))
+    still.provenance["large deflection"] = {"n3 f_z": {"energy": 1e-9}}
+    body.provenance["large deflection"] = {"n3 f_z": {"energy": 0.9 * energy}}
+    says = rf"body 'pulled' is beyond the range .* energy is {energy:.3g} J.* {0.9 * energy:.3g} J"
+    with pytest.warns(RomWarning, match=says) as said:
+        rom.equilibrium(mech)
+    assert len(said) == 1
+    body.provenance["large deflection"] = {"n3 f_z": {"energy": energy}}
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        rom.equilibrium(mech)
+
+
 def test_interfaces_that_turn_far_are_told_with_body_and_time():
     body = truss()
     turning = replace(body.markers["n3"], rotation=np.eye(3, 6))

@@ -1,0 +1,143 @@
+"""A leaf that guides a stage: its elastica, and mistakes in the tensors, which it must notice.
+
+A body of large deflection relies on two sets of numbers, those of third and of fourth order. Every
+factor and every index of the few lines that make and contract them is changed here, one at a time.
+"""
+
+import ast
+import inspect
+import textwrap
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.optimize import brentq
+from scipy.special import ellipe, ellipeinc, ellipk, ellipkinc
+
+from cases.mbs.slender import reduced, slender
+from rom.body.nonlinear import quartic
+from rom.body.nonlinear.quartic import Quartic
+from rom.body.nonlinear.statics import follow
+from rom.errors import ModelError
+
+pytest.importorskip("dolfinx", reason="dolfinx is not installed")
+pytestmark = [
+    pytest.mark.fenicsx,
+    pytest.mark.once,
+    pytest.mark.filterwarnings("ignore:Number of integration points"),
+    pytest.mark.filterwarnings("ignore::rom.errors.RomWarning"),
+]
+GUIDED = {"tip": "rxryrz"}
+STEEPEST = 0.5  # slope half way [rad]
+RTOL = 3e-3
+
+
+def elastica(slope):
+    """Force times L^2 / EI, deflection and shortening over L of a guided leaf, by its slope.
+
+    Half of it is a cantilever under a force across its end.
+    """
+    m = (1 + np.sin(slope)) / 2
+    start = np.arcsin(np.sqrt(0.5 / m))
+    c = ellipk(m) - ellipkinc(start, m)
+    across = 1 - 2 * (ellipe(m) - ellipeinc(start, m)) / c
+    return 4 * c**2, across, 1 - 2 * np.sqrt(m) * np.cos(start) / c
+
+
+@pytest.fixture(scope="module")
+def leaf():
+    """The body, what its energy was made from, and forces and known motions at two slopes."""
+    model, EI = slender(50, 16)
+    made = []
+    whole = Quartic.from_gram.__func__
+
+    def kept(cls, G, r):
+        made.append((G, r))
+        return whole(cls, G, r)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Quartic, "from_gram", classmethod(kept))
+        known = np.array([elastica(slope) for slope in (STEEPEST / 2, STEEPEST)])
+        body = reduced(model, (0, known[-1, 0] * EI, 0, 0, 0, 0), n_modes=2, active=2,
+                       fixed=GUIDED, tol=1e-5)  # fmt: skip
+    return body, made[-1], known[:, 0] * EI, known[:, 1:]
+
+
+def guided(leaf, law):
+    """(2, 2) deflection and shortening at rest, the energy by a class."""
+    body, gram, forces, _ = leaf
+    energy = law.from_gram(*gram)
+    along, across = body.marker("tip").translation[:2]
+    q = follow(energy, np.outer(forces, across), body.mean_rows(GUIDED))
+    return np.column_stack([q @ across, -(q @ along)])
+
+
+def test_a_guided_leaf_hardens_and_comes_back_as_its_elastica_says(leaf):
+    found = guided(leaf, Quartic)
+    assert_allclose(found, leaf[3], rtol=RTOL)
+    linear = leaf[2] / 12 / leaf[2][0] * elastica(STEEPEST / 2)[0]
+    assert linear[1] / found[1, 0] > 1.08  # a linear leaf is softer
+    slope = brentq(lambda s: elastica(s)[1] - 1e-3, 1e-4, 0.1)
+    assert_allclose(elastica(slope)[2], 0.6e-6, rtol=1e-4)
+
+
+class Change(ast.NodeTransformer):
+    """Changes one place: a factor is multiplied, or an index takes the place of its neighbour."""
+
+    def __init__(self, which, times):
+        self.left, self.times, self.inside = which, times, 0
+
+    def visit_Subscript(self, node):
+        self.inside += 1
+        node.slice = self.visit(node.slice)
+        self.inside -= 1
+        return node
+
+    def visit_Name(self, node):
+        if self.inside and node.id in "ijkl" and self._here():
+            node.id = "ijkli"["ijkl".index(node.id) + 1]
+        return node
+
+    def visit_Constant(self, node):
+        number = isinstance(node.value, int | float) and not isinstance(node.value, bool)
+        if number and not self.inside and node.value and self.times and self._here():
+            node.value *= self.times
+        return node
+
+    def _here(self):
+        self.left -= 1
+        return self.left == -1
+
+
+def mutants(name):
+    """Laws in which one place of a method is changed, and what that reads like."""
+    text = textwrap.dedent(
+        inspect.getsource(
+            inspect.getattr_static(Quartic, name).__func__
+            if name == "from_gram"
+            else getattr(Quartic, name)
+        )
+    )
+    for times in (2, 3):
+        for which in range(200):
+            change = Change(which, times)
+            tree = change.visit(ast.parse(text))
+            if change.left >= 0:
+                break
+            scope = dict(vars(quartic))
+            exec(compile(ast.fix_missing_locations(tree), name, "exec"), scope)
+            yield type("Changed", (Quartic,), {name: scope[name]}), ast.unparse(tree)
+
+
+@pytest.mark.parametrize("name", ["from_gram", "expansion"])
+def test_any_factor_or_index_that_is_wrong_is_noticed(leaf, name):
+    """Newton's method finds other states then, or none."""
+    survived = []
+    for law, text in mutants(name):
+        try:
+            found = guided(leaf, law)
+        except (ModelError, IndexError, NameError, np.linalg.LinAlgError):
+            continue
+        if np.allclose(found, leaf[3], rtol=RTOL, atol=0):
+            survived.append(text)
+    assert not survived, "\n\n".join(survived)
