@@ -8,6 +8,7 @@ from scipy.sparse.linalg import LinearOperator, eigsh, splu
 
 from rom.body.nonlinear.ranges import Load
 from rom.eigen.verbs import mean_motion
+from rom.eigen.workers import ONE_PROCESS, Workers
 from rom.model import Array, FEModel
 
 N_TANGENT = 3  # lowest frequencies compared there
@@ -25,10 +26,14 @@ class HeldSolid:
         C: (h, n) motions that are held.
         T: (n, m) its displacements u = T a; None for the identity.
         comm: of the processes, every one of which has all of it.
+        workers: who factors its stiffness.
     """
 
-    def __init__(self, solid: Any, M: Any, C: Any, T: Any = None, comm: Any = None):
-        self.solid, self.comm = solid, comm
+    def __init__(
+        self, solid: Any, M: Any, C: Any, T: Any = None, comm: Any = None,
+        workers: Workers = ONE_PROCESS,
+    ):  # fmt: skip
+        self.solid, self.comm, self.workers = solid, comm, workers
         self.T = csr_matrix(identity(M.shape[0]) if T is None else T)
         self.M, self.C = self.T.T @ M @ self.T, csr_matrix(C) @ self.T
         self.inside = splu(csc_matrix(self.T.T @ self.T))
@@ -46,7 +51,7 @@ class HeldSolid:
         T = None if ops.T is None else rows_of(ops.T)
         solid = model.stresses.finite_strain(neo_hookean=neo_hookean)
         M = ops.gathered(model.operators.M)
-        return cls(solid, M, C, T, ops.comm)
+        return cls(solid, M, C, T, ops.comm, model.operators.workers)
 
     def whole(self, E: Array) -> Array:
         """(n, r) all rows of shapes (n_local, r)."""
@@ -76,7 +81,10 @@ class HeldSolid:
         """The equilibrium near a (m,), None if Newton's method does not find it."""
         for _ in range(MAX_ITERATIONS):
             gap = self.T.T @ (W - self.solid.force(self.T @ a))
-            step = self._bordered(a).solve(np.r_[gap, -self.C @ a])[: a.size]
+            factor = self._bordered(a)
+            if factor is None:
+                return None
+            step = factor.solve(np.r_[gap, -self.C @ a])[: a.size]
             a = a + step
             size = np.linalg.norm(step)
             if not np.isfinite(size):
@@ -86,10 +94,11 @@ class HeldSolid:
         return None
 
     def _bordered(self, a: Array) -> Any:
-        """Factor of the stiffness at a (m,) with the interface held by multipliers."""
+        """Factor of the stiffness at a (m,) with the interface held by multipliers, if any."""
         K = self.T.T @ self.solid.tangent(self.T @ a) @ self.T
         scale = np.abs(K.diagonal()).mean() / abs(self.C).max()
-        return splu(csc_matrix(bmat([[K, scale * self.C.T], [scale * self.C, None]])))
+        bordered = bmat([[K, scale * self.C.T], [scale * self.C, None]])
+        return self.workers.factor(bordered, pivoting=True)
 
     def reached(self, u: Array, a: Array) -> float:
         """Part of a displacement (n,) along the state a, as a share of it."""
@@ -107,7 +116,11 @@ class HeldSolid:
         inverse = LinearOperator(
             (n, n), matvec=lambda x: factor.solve(np.r_[x, np.zeros(self.C.shape[0])])[:n]
         )
-        lam = eigsh(self.M, N_TANGENT, self.M, sigma=0.0, OPinv=inverse, return_eigenvectors=False)
+        start = np.sin(1.0 + np.arange(n))  # the same on all ranks, which solve together
+        lam = eigsh(
+            self.M, N_TANGENT, self.M, sigma=0.0, OPinv=inverse, v0=start,
+            return_eigenvectors=False,
+        )  # fmt: skip
         return np.sqrt(np.sort(np.maximum(lam, 0.0)))
 
 
