@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from rom.cyclic.modes import cyclic_modes, wheel_modes
-from rom.cyclic.sector import CyclicSector
+from rom.cyclic.sector import CyclicSector, each_diameter
 from rom.model import Array, Report, Row
 from rom.rows import FREQUENCY_RTOL, N_COMPARED, frequency_rows
 
@@ -25,7 +25,7 @@ def sector_certificate(small: CyclicSector, full: CyclicSector) -> Report:
         reduced, exact = (cyclic_modes(sector, d, n).frequencies for sector in (small, full))
         return _rows(f"{d} nodal diameters", reduced, exact)
 
-    found = full.each_diameter(rows, chosen)
+    found = each_diameter(full, rows, chosen)
     return Report("certificate of the sector", tuple(chain.from_iterable(found)))
 
 

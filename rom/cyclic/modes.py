@@ -9,7 +9,7 @@ from scipy.sparse import bmat, csr_matrix
 
 from rom.arguments import typed, whole
 from rom.cyclic.rotation import divergence_speed
-from rom.cyclic.sector import Complex, CyclicSector
+from rom.cyclic.sector import Complex, CyclicSector, each_diameter
 from rom.eigen.scipy import negative_count
 from rom.eigen.workers import Workers
 from rom.errors import ConfigError, ModelError
@@ -131,7 +131,7 @@ def wheel_modes(
         modes = cyclic_modes(sector, diameter, n, speed=speed)
         return modes.omega, modes.shapes
 
-    each = zip(chosen, sector.each_diameter(found, chosen), strict=True)
+    each = zip(chosen, each_diameter(sector, found, chosen), strict=True)
     return tuple(CyclicModes(*pair, sector=sector, diameter=d) for d, pair in each)
 
 

@@ -203,22 +203,6 @@ class CyclicSector:
         """
         return 2 * self.checked(diameter) % self.n_sectors == 0
 
-    def each_diameter(
-        self, function: Callable[[int], Value], diameters: Sequence[int] | None = None
-    ) -> list[Value]:
-        """Values of a function of each number of nodal diameters, on all ranks, shared by them.
-
-        Args:
-            function: must not wait for other ranks.
-            diameters: all the wheel can have, unless given.
-
-        Raises:
-            ConfigError: if the wheel cannot have one of them.
-        """
-        every = [self.checked(n) for n in (self.diameters if diameters is None else diameters)]
-        costs = [1.0 if self.standing(n) else PAIR_COST for n in every]
-        return self.workers.each(function, every, costs)
-
     def checked(self, diameter: int) -> int:
         """The number of nodal diameters, if the wheel can have it.
 
@@ -308,6 +292,26 @@ class CyclicSector:
         turns = np.array([turned(self.axis, k * self.angle) for k in j])
         nodal = U.reshape(self.n_sectors, -1, 3, shapes.shape[1])
         return np.einsum("jab,jpbm->jpam", turns, nodal).reshape(U.shape)
+
+
+def each_diameter(
+    sector: CyclicSector,
+    function: Callable[[int], Value],
+    diameters: Sequence[int] | None = None,
+) -> list[Value]:
+    """Values of a function of each number of nodal diameters, on all ranks, shared by them.
+
+    Args:
+        sector: whose workers share.
+        function: must not wait for other ranks.
+        diameters: all the wheel can have, unless given.
+
+    Raises:
+        ConfigError: if the wheel cannot have one of them.
+    """
+    every = [sector.checked(n) for n in (sector.diameters if diameters is None else diameters)]
+    costs = [1.0 if sector.standing(n) else PAIR_COST for n in every]
+    return sector.workers.each(function, every, costs)
 
 
 def region(model: FEModel, name: str) -> tuple[csr_matrix, csr_matrix]:

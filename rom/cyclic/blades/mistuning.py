@@ -29,7 +29,7 @@ from scipy.linalg import eigh
 from rom.arguments import lowest, matrix, rows_at, typed, vector
 from rom.cyclic.certificate import mistuned_certificate
 from rom.cyclic.modes import cyclic_modes, spinning
-from rom.cyclic.sector import Complex, CyclicSector
+from rom.cyclic.sector import Complex, CyclicSector, each_diameter
 from rom.errors import ConfigError, ModelError
 from rom.model import Array, Index, Modes, Report
 from rom.plausible import check_damping_ratio
@@ -253,7 +253,7 @@ def mistuned_wheel(
     N = sector.n_sectors
     harmonics: list[int] = []
     omega, shapes = [], []
-    tuned = sector.each_diameter(lambda d: _tuned(sector, K_blade, d, n, speed))
+    tuned = each_diameter(sector, lambda d: _tuned(sector, K_blade, d, n, speed))
     for d, (lam, U) in zip(sector.diameters, tuned, strict=True):
         for sign in (1,) if sector.standing(d) else (1, -1):
             harmonics += [sign * d] * lam.size

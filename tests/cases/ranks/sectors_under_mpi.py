@@ -9,6 +9,7 @@ from mpi4py import MPI
 import numpy as np
 
 import rom
+from rom.cyclic.sector import each_diameter
 from rom.errors import ModesMissedError, RomError
 
 
@@ -49,11 +50,11 @@ def wheel():
         "region": said(lambda: rom.CyclicSector.from_model(model, regions=("rim",))),
         "memory": said(lambda: _in_a_megabyte(model)),
         "diameter": said(lambda: rom.wheel_modes(plain, 2, diameters=(1, 99))),
-        "one rank": said(lambda: plain.each_diameter(_alone)),
-        "bug": said(lambda: plain.each_diameter([0.0].__getitem__)),
+        "one rank": said(lambda: each_diameter(plain, _alone)),
+        "bug": said(lambda: each_diameter(plain, [0.0].__getitem__)),
     }
     mine = []
-    plain.each_diameter(mine.append)
+    each_diameter(plain, mine.append)
     return {name: np.asarray(f).tolist() for name, f in found.items()}, errors, mine
 
 
