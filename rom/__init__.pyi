@@ -45,6 +45,7 @@ from rom.cyclic.campbell import WheelCampbell as WheelCampbell
 from rom.cyclic.campbell import wheel_campbell as wheel_campbell
 from rom.cyclic.modes import CyclicModes as CyclicModes
 from rom.cyclic.modes import cyclic_modes as cyclic_modes
+from rom.cyclic.modes import wheel_modes as wheel_modes
 from rom.cyclic.reduced import reduce_sector as reduce_sector
 from rom.cyclic.rotation import rotating_sector as rotating_sector
 from rom.cyclic.sector import CyclicSector as CyclicSector

@@ -7,7 +7,7 @@ from time import process_time
 import numpy as np
 
 from rom.bench.models import TITANIUM
-from rom.cyclic.modes import cyclic_modes
+from rom.cyclic.modes import wheel_modes
 from rom.cyclic.reduced import reduce_sector
 from rom.cyclic.sector import CyclicSector
 from rom.eigen.scipy import SciPyOperators
@@ -63,7 +63,7 @@ def measured(
 
 def _waves(sector: CyclicSector, families: int) -> Array:
     """(diameters, families) circular frequencies [rad/s]."""
-    return np.array([cyclic_modes(sector, n, families).omega for n in sector.diameters])
+    return np.array([modes.omega for modes in wheel_modes(sector, families)])
 
 
 def _whole(sector: CyclicSector, m: int) -> Array:

@@ -13,6 +13,7 @@ from rom.cyclic.gyroscopic import GyroscopicModes as GyroscopicModes
 from rom.cyclic.gyroscopic import gyroscopic_modes as gyroscopic_modes
 from rom.cyclic.modes import CyclicModes as CyclicModes
 from rom.cyclic.modes import cyclic_modes as cyclic_modes
+from rom.cyclic.modes import wheel_modes as wheel_modes
 from rom.cyclic.reduced import ReducedSector as ReducedSector
 from rom.cyclic.reduced import reduce_sector as reduce_sector
 from rom.cyclic.rotation import centrifugal_displacement as centrifugal_displacement

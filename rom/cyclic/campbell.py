@@ -1,5 +1,6 @@
 """Waves of a wheel followed over its speed, by their shapes and not by their order."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +15,7 @@ from rom.errors import ConfigError
 from rom.model import Array
 
 N_SPARE_WAVES = 4  # beyond those followed: waves from above may cross them
+SPEEDS_AT_ONCE = 8  # whose waves are kept until they are followed
 
 
 @typed
@@ -61,7 +63,7 @@ def wheel_campbell(
 
     From speed to speed each wave takes the one of its direction that is most like it, no two the
     same: the modal assurance criterion |a^H M b|^2 of mass-normalised shapes, summed over all, is
-    the largest there is.
+    the largest there is. Under mpirun the ranks share the speeds, and all must call.
 
     Args:
         sector: with matrices of rotation, see `rom.rotating_sector`; full or reduced.
@@ -83,8 +85,7 @@ def wheel_campbell(
     omega, direction, shapes = _waves(sector, diameter, n, Omega[0])
     omega, direction, shapes = omega[:n], direction[:n], shapes[:, :n]
     found, likeness = [omega], [np.ones(n)]
-    for speed in Omega[1:]:
-        w, sides, U = _waves(sector, diameter, n, speed)
+    for w, sides, U in _followed(sector, diameter, n, Omega[1:]):
         mac = np.abs(shapes.conj().T @ (sector.M @ U)) ** 2
         mac[direction[:, None] != sides] = -1.0
         kept = linear_sum_assignment(-mac)[1]
@@ -92,6 +93,17 @@ def wheel_campbell(
         likeness.append(mac[np.arange(n), kept])
         shapes = U[:, kept]
     return WheelCampbell(Omega, diameter, np.array(found), direction, np.array(likeness))
+
+
+def _followed(
+    sector: CyclicSector, diameter: int, n: int, speeds: Array
+) -> Iterator[tuple[Array, Array, Complex]]:
+    """The waves at one speed after the other; ranks share a few speeds at a time."""
+    for first in range(0, speeds.size, SPEEDS_AT_ONCE):
+        some = speeds[first : first + SPEEDS_AT_ONCE].tolist()
+        yield from sector.workers.each(
+            lambda speed: _waves(sector, diameter, n, speed), some, [1.0] * len(some)
+        )
 
 
 def _waves(

@@ -1,12 +1,13 @@
 """What shows that a reduced sector, or a wheel made of it, stands for the full sector."""
 
 from dataclasses import replace
+from itertools import chain
 from typing import Any
 
 import numpy as np
 
-from rom.cyclic.modes import cyclic_modes
-from rom.cyclic.sector import CyclicSector
+from rom.cyclic.modes import cyclic_modes, wheel_modes
+from rom.cyclic.sector import CyclicSector, each_diameter
 from rom.model import Array, Report, Row
 from rom.rows import FREQUENCY_RTOL, N_COMPARED, frequency_rows
 
@@ -18,12 +19,14 @@ def sector_certificate(small: CyclicSector, full: CyclicSector) -> Report:
     """Frequencies of a reduced sector against the full one, for a few numbers of diameters."""
     diameters = list(small.diameters)
     chosen = sorted({0, 1, len(diameters) // 2, diameters[-1]} & set(diameters))
-    rows: list[Row] = []
-    for d in chosen:
+
+    def rows(d: int) -> list[Row]:
         n = min(N_COMPARED, small.harmonic(d).shape[1])
         reduced, exact = (cyclic_modes(sector, d, n).frequencies for sector in (small, full))
-        rows += _rows(f"{d} nodal diameters", reduced, exact)
-    return Report("certificate of the sector", tuple(rows))
+        return _rows(f"{d} nodal diameters", reduced, exact)
+
+    found = each_diameter(full, rows, chosen)
+    return Report("certificate of the sector", tuple(chain.from_iterable(found)))
 
 
 def wheel_certificate(frequencies: Array, full: CyclicSector) -> Report:
@@ -48,8 +51,7 @@ def mistuned_certificate(wheel: Any) -> Report:
 def _of_wheel(what: str, found: Array, sector: CyclicSector, speed: float = 0.0) -> list[Row]:
     """The lowest frequencies of a wheel against the union of those of its sector."""
     exact, complete = [], np.inf
-    for d in sector.diameters:
-        modes = cyclic_modes(sector, d, N_FAMILIES, speed=speed)
+    for modes in wheel_modes(sector, N_FAMILIES, speed=speed):
         exact += [*modes.frequencies] * modes.multiplicity
         complete = min(complete, modes.frequencies[-1])  # above it some diameters miss theirs
     union = np.sort([f for f in exact if f <= complete * (1 + FREQUENCY_RTOL)])

@@ -1,5 +1,6 @@
 """Modes of a wheel by nodal diameters, from a real system of twice the size of a sector."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,8 +9,9 @@ from scipy.sparse import bmat, csr_matrix
 
 from rom.arguments import typed, whole
 from rom.cyclic.rotation import divergence_speed
-from rom.cyclic.sector import Complex, CyclicSector
-from rom.eigen.scipy import SciPyOperators, negative_count
+from rom.cyclic.sector import Complex, CyclicSector, each_diameter
+from rom.eigen.scipy import negative_count
+from rom.eigen.workers import Workers
 from rom.errors import ConfigError, ModelError
 from rom.model import Array, Modes
 
@@ -83,15 +85,54 @@ def cyclic_modes(sector: CyclicSector, diameter: int, n: int, *, speed: float = 
     R = sector.rigid(diameter) if speed == 0.0 else np.zeros((sector.n, 0), dtype=complex)
     R, held = R[sector.free], sector.supported
     if sector.standing(diameter):
-        omega, real = _real(T.T @ K @ T, T.T @ sector.M @ T, real_span(R), n, held=held)
+        A, B = (T.T @ matrix @ T for matrix in (K, sector.M))
+        omega, real = _real(sector.workers, A, B, real_span(R), n, held=held)
         shapes = (T @ real).astype(complex)
         return CyclicModes(omega, shapes, sector=sector, diameter=diameter)
     parts = real_form(T)
     K_2, M_2 = (parts.T @ _twice(A) @ parts for A in (K, sector.M))
     rigid = np.hstack([_stacked(R), _stacked(1j * R)])
-    _, pairs = _real(K_2, M_2, rigid, 2 * (n + N_SPARE_MODES), held=held)
+    _, pairs = _real(sector.workers, K_2, M_2, rigid, 2 * (n + N_SPARE_MODES), held=held)
     omega, shapes = _waves(T, K, sector.M, pairs, rigid.shape[1], n)
     return CyclicModes(omega, T @ shapes, sector=sector, diameter=diameter)
+
+
+@typed
+def wheel_modes(
+    sector: CyclicSector,
+    n: int,
+    *,
+    diameters: Sequence[int] | None = None,
+    speed: float = 0.0,
+) -> tuple[CyclicModes, ...]:
+    """Lowest modes of a wheel with each number of nodal diameters.
+
+    Under mpirun the numbers are shared among the ranks, each of which finds the modes of its own;
+    all ranks must call, and all get all modes.
+
+    Args:
+        sector: one sector.
+        n: number of modes with each number of nodal diameters.
+        diameters: numbers of nodal diameters; all the wheel can have, 0 to N / 2, unless given.
+        speed: angular speed [rad/s], see `cyclic_modes`.
+
+    Returns:
+        CyclicModes for each number, in the order given.
+
+    Raises:
+        ConfigError, ModelError, ModesMissedError: on all ranks, see `cyclic_modes`.
+
+    Source:
+        Thomas, Dynamics of rotationally periodic structures, Int. J. Numer. Meth. Engng. 14 (1979).
+    """
+    chosen = list(sector.diameters if diameters is None else diameters)
+
+    def found(diameter: int) -> tuple[Array, Complex]:
+        modes = cyclic_modes(sector, diameter, n, speed=speed)
+        return modes.omega, modes.shapes
+
+    each = zip(chosen, each_diameter(sector, found, chosen), strict=True)
+    return tuple(CyclicModes(*pair, sector=sector, diameter=d) for d, pair in each)
 
 
 def _refuse_divergence(sector: CyclicSector, diameter: int, speed: float) -> None:
@@ -146,12 +187,14 @@ def real_span(R: Complex) -> Array:
     return U[:, s > 1e-9 * s.max(initial=0.0)] if s.size else R.real
 
 
-def _real(K: csr_matrix, M: csr_matrix, rigid: Array, m: int, *, held: bool) -> tuple[Array, Array]:
+def _real(
+    workers: Workers, K: csr_matrix, M: csr_matrix, rigid: Array, m: int, *, held: bool
+) -> tuple[Array, Array]:
     """Lowest modes of a real symmetric system, held or with known motions without stiffness."""
     K, M = (0.5 * (A + A.T) for A in (K, M))
     m = min(m, K.shape[0])
-    ops = SciPyOperators(K, M, rigid)
-    return ops.modes(ops.hold([]) if held else [], m)
+    ops = workers.operators(K, M, None if held else rigid)
+    return ops.modes(ops.hold([]) if held else [], m, finished=True)
 
 
 def _waves(

@@ -12,7 +12,6 @@ from scipy.spatial import cKDTree
 from rom.arguments import typed
 from rom.cyclic.certificate import sector_certificate
 from rom.cyclic.sector import Complex, CyclicSector
-from rom.eigen.scipy import SciPyOperators
 from rom.eigen.verbs import DEPENDENT_RTOL, orthonormal_in
 from rom.errors import ConfigError, InterfaceError
 from rom.model import Array, Interface, Report
@@ -108,9 +107,9 @@ def reduce_sector(
     E[sector.master, :q] = W
     E[sector.slave, q:] = sector.coupling @ W
     E[sector.held] = 0.0
-    ops = SciPyOperators(sector.K, sector.M)
+    ops = sector.workers.operators(sector.K, sector.M)
     inner = ops.hold(np.union1d(np.union1d(sector.slave, sector.master), sector.held))
-    omega, Phi = ops.modes(inner, n_modes)
+    omega, Phi = ops.modes(inner, n_modes)  # then solutions with the same factor
     Psi = np.hstack([E - inner(ops.apply_K(E)), Phi])
     return projected(sector, Psi, q, omega)
 

@@ -13,8 +13,9 @@ Source:
     Thomas, Dynamics of rotationally periodic structures, Int. J. Numer. Meth. Engng. 14 (1979) 81.
 """
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -25,12 +26,15 @@ from rom.cyclic.faces import paired, refuse_all_around, turned, unit_axis
 from rom.eigen.attachments import added_mass
 from rom.eigen.supports import Fixed, held_dofs
 from rom.eigen.verbs import rigid_motions
+from rom.eigen.workers import ONE_PROCESS, Workers
 from rom.errors import ConfigError, InterfaceError
 from rom.model import Array, FEModel, Index, Interface
 from rom.names import named, offered
 
 Complex = npt.NDArray[np.complex128]
+Value = TypeVar("Value")
 NO_DOFS = np.zeros(0, dtype=np.int64)
+PAIR_COST = 4.0  # of waves that travel, in real numbers of twice the size, over those that stand
 
 
 @typed
@@ -59,6 +63,8 @@ class CyclicSector:
             centrifugal stress less spin softening; None for a wheel at rest.
         regions: {region: (n, n) stiffness of its elements alone}.
         sprung: True when K has springs to the ground, see `supported_sector`.
+        workers: who solves with these matrices, and shares what is independent: ranks that all
+            have the sector, or one process.
 
     Raises:
         ConfigError: for fewer than two sectors, or a coupling that does not fit the faces.
@@ -83,6 +89,7 @@ class CyclicSector:
     centrifugal: Any = None
     regions: dict[str, Any] = field(default_factory=dict)
     sprung: bool = False
+    workers: Workers = field(default=ONE_PROCESS, repr=False)
 
     def __post_init__(self) -> None:
         whole("n_sectors", self.n_sectors, 2)
@@ -108,9 +115,10 @@ class CyclicSector:
     ) -> "CyclicSector":
         """Sector of a finite element model; the number of sectors follows from its faces.
 
-        Under mpirun all ranks call, each gets all rows of the sector, and whatever is computed
-        from it is computed on each of them alike: the mesh and its matrices are made in parallel,
-        the waves are not.
+        Under mpirun all ranks call, and each gets all rows of the sector. The mesh and its
+        matrices are made in parallel. What is computed from the sector is computed on each rank
+        alike, but for what falls into numbers of nodal diameters, `rom.wheel_modes`,
+        `rom.mistuned_wheel` and certificates: the ranks share these, and all must ask.
 
         Faces with different nodes are tied by interpolation: the finer one follows the coarser.
 
@@ -154,6 +162,7 @@ class CyclicSector:
             at=at,
             matching=pair.matching,
             regions={name: region(model, name)[0] for name in regions},
+            workers=workers_of(model),
         )
 
     @property
@@ -285,6 +294,26 @@ class CyclicSector:
         return np.einsum("jab,jpbm->jpam", turns, nodal).reshape(U.shape)
 
 
+def each_diameter(
+    sector: CyclicSector,
+    function: Callable[[int], Value],
+    diameters: Sequence[int] | None = None,
+) -> list[Value]:
+    """Values of a function of each number of nodal diameters, on all ranks, shared by them.
+
+    Args:
+        sector: whose workers share.
+        function: must not wait for other ranks.
+        diameters: all the wheel can have, unless given.
+
+    Raises:
+        ConfigError: if the wheel cannot have one of them.
+    """
+    every = [sector.checked(n) for n in (sector.diameters if diameters is None else diameters)]
+    costs = [1.0 if sector.standing(n) else PAIR_COST for n in every]
+    return sector.workers.each(function, every, costs)
+
+
 def region(model: FEModel, name: str) -> tuple[csr_matrix, csr_matrix]:
     """(n, n) stiffness [N/m] and mass [kg] of one region, on every rank.
 
@@ -298,6 +327,11 @@ def region(model: FEModel, name: str) -> tuple[csr_matrix, csr_matrix]:
         )
     share = model.regions[name]
     return all_rows(model, share.K), all_rows(model, share.M)
+
+
+def workers_of(model: FEModel) -> Workers:
+    """Who solves with matrices that `all_rows` has given."""
+    return ONE_PROCESS if model.operators is None else model.operators.workers
 
 
 def all_rows(model: FEModel, A: Any) -> csr_matrix:

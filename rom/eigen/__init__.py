@@ -4,7 +4,7 @@
 `condensed` solves in every support with one factor, `completeness` says how surely no mode was
 missed, `lanczos` searches in blocks, `substructuring` finds all modes up to a frequency, on
 `fronts` of a tree that `dissection` cuts, `attachments` adds masses and springs at nodes,
-`supports` says what is held.
+`supports` says what is held, `workers` who solves with matrices that are whole in a process.
 """
 
 from rom.lazy import front

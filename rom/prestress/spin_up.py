@@ -10,7 +10,7 @@ from rom.arguments import positive, typed, whole
 from rom.cyclic.faces import unit_axis
 from rom.cyclic.modes import cyclic_modes
 from rom.cyclic.rotation import rotation_matrices
-from rom.cyclic.sector import NO_DOFS, CyclicSector
+from rom.cyclic.sector import NO_DOFS, CyclicSector, all_rows, workers_of
 from rom.eigen.supports import Fixed, held_dofs
 from rom.errors import ConfigError, ModelError, reached
 from rom.model import Array, FEModel
@@ -34,7 +34,7 @@ def spin_up(
     Args:
         sector: made from the model by `rom.CyclicSector.from_model` or `rom.held_solid`, cold and
             without matrices of rotation.
-        model: its finite elements, on one process.
+        model: its finite elements; under mpirun all ranks call, and share elements and factors.
         speed: highest angular speed [rad/s].
         n_states: number of tabulated states, rest and the highest speed included;
             between them full models find their own state, reduced ones interpolate.
@@ -45,7 +45,7 @@ def spin_up(
             speed or number of states.
         ModelError: if the solid passes an instability on its way; the message says where, and
             ``error.solution`` holds the states below.
-        ParallelError: on several processes.
+        ParallelError: for heat on several processes.
 
     Source:
         St. Venant-Kirchhoff solid with forces that follow, Newton's method along the speed:
@@ -92,23 +92,22 @@ def held_solid(
     stress of the linear solid, `rom.spin_up` that at large displacement.
 
     Args:
-        model: the solid, on one process.
+        model: the solid; under mpirun all ranks call, and each gets all rows.
         fixed: names of the interfaces that are held.
         axis: (3,) direction of the axis of rotation [1].
         at: (3,) a point of it [m].
 
     Raises:
-        ConfigError: if nothing is held, or the matrices are distributed.
+        ConfigError: if nothing is held.
         InterfaceError: if an interface is unknown.
+        ResourceError: on all ranks, if the solid does not fit on each of them.
     """
     if not fixed:
         raise ConfigError("a solid that turns needs a support: name the interfaces in fixed=(...).")
-    if not hasattr(model.K, "tocsr"):
-        raise ConfigError("a solid that turns needs its matrices on one process.")
     return CyclicSector(
         n_sectors=2,  # with 0 diameters any number does
-        K=csr_matrix(model.K),
-        M=csr_matrix(model.M),
+        K=all_rows(model, model.K),
+        M=all_rows(model, model.M),
         slave=NO_DOFS,
         master=NO_DOFS,
         coupling=csr_matrix((0, 0)),
@@ -116,6 +115,7 @@ def held_solid(
         points=model.points,
         axis=unit_axis(axis),
         at=np.asarray(at, dtype=float),
+        workers=workers_of(model),
     )
 
 

@@ -11,12 +11,10 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from scipy.sparse import csc_matrix, csr_matrix
-from scipy.sparse.linalg import splu
+from scipy.sparse import csr_matrix
 
 from rom.cyclic.rotation import axial_pins, rotation_matrices
 from rom.cyclic.sector import CyclicSector
-from rom.eigen.scipy import SYMMETRIC_LU
 from rom.model import Array
 
 MAX_ITERATIONS = 25
@@ -39,7 +37,7 @@ class SteadyRotation:
     """
 
     def __init__(self, sector: CyclicSector, solid: Any):
-        self.solid, self.square = solid, 0.0
+        self.solid, self.square, self.workers = solid, 0.0, sector.workers
         self.T, self.kept = sector.harmonic(0), sector.free
         self.free = np.setdiff1d(np.arange(self.T.shape[1]), axial_pins(sector))
         self.softening = rotation_matrices(sector.M, sector.axis)[1]
@@ -76,17 +74,17 @@ class SteadyRotation:
     def newton(self, a: Array) -> Array | None:
         """(f,) the equilibrium near a displacement [m]; None if it is not found or not stable."""
         for _ in range(MAX_ITERATIONS):
-            lu = _factor(self.tangent(a)[self.free][:, self.free])
-            if lu is None:
+            factor = self.workers.factor(self.tangent(a)[self.free][:, self.free])
+            if factor is None:
                 return None
-            step = -lu.solve(self.residual(a)[self.free])
+            step = -factor.solve(self.residual(a)[self.free])
             a = a.copy()
             a[self.free] += step
             size, whole = np.linalg.norm(step), np.linalg.norm(a)
             if not np.isfinite(size):
                 return None
             if size <= INCREMENT_RTOL * whole + self.noise:
-                return a if (lu.U.diagonal() > 0).all() else None
+                return a if factor.definite else None
         return None
 
     def follow(
@@ -116,11 +114,3 @@ class SteadyRotation:
                 load(now)
                 break
         return a, now
-
-
-def _factor(K: csr_matrix) -> Any:
-    """Symmetric factor whose pivots tell stability; None where the matrix is singular."""
-    try:
-        return splu(csc_matrix(K), options={"SymmetricMode": True}, **SYMMETRIC_LU)
-    except RuntimeError:
-        return None

@@ -125,15 +125,15 @@ def finite_solid(model: FEModel, heat: Heat | None = None) -> Any:
 
     Raises:
         ConfigError: if the model has no finite elements.
-        ParallelError: on several processes.
+        ParallelError: for heat on several processes.
     """
     if model.stresses is None:
         raise ConfigError(
             "the model has no finite elements, from which alone its stress follows.",
             hint="Make it with rom.fe.model.",
         )
-    if model.operators.comm.size > 1:
-        raise ParallelError("large motion and heat of a solid are computed on one process.")
+    if heat is not None and model.operators.comm.size > 1:
+        raise ParallelError("heat of a solid is computed on one process.")
     solid = model.stresses.finite_strain()
     if heat is not None:
         solid.heat(*heat.on(model))

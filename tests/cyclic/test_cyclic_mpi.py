@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+from itertools import chain
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from rom.process.mpirun import mpirun
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")
 from cases.ranks.environment import ENVIRONMENT
 from cases.ranks.sectors_under_mpi import wheel
+from rom.fe.operators.workers import shared_out
 
 pytestmark = [
     pytest.mark.fenicsx, pytest.mark.mpi,
@@ -22,11 +24,11 @@ pytestmark = [
 SCRIPT = RANKS / "sectors_under_mpi.py"
 
 
-@pytest.fixture(scope="module")
-def every(tmp_path_factory):
+@pytest.fixture(scope="module", params=[2, 3])
+def every(tmp_path_factory, request):
     file = tmp_path_factory.mktemp("sectors") / "ranks.json"
     done = subprocess.run(
-        [*mpirun(3), sys.executable, str(SCRIPT), str(file)],
+        [*mpirun(request.param), sys.executable, str(SCRIPT), str(file)],
         env=ENVIRONMENT, timeout=600, capture_output=True, text=True, check=False,
         cwd=ROOT,
     )  # fmt: skip
@@ -34,12 +36,17 @@ def every(tmp_path_factory):
     return json.loads(file.read_text())
 
 
+@pytest.fixture(scope="module")
+def one():
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(ROOT)
+        return wheel()[0]
+
+
 @pytest.mark.long
-def test_three_ranks_find_the_waves_of_one_process(every, monkeypatch):
-    monkeypatch.chdir(ROOT)
-    one, _ = wheel()
-    assert len(every) == 3 and len(one) == 8
-    for found, _ in every:
+def test_ranks_find_the_waves_of_one_process(every, one):
+    assert len(one) == 13
+    for found, *_ in every:
         assert set(found) == set(one)
         for name, values in one.items():
             assert_allclose(found[name], values, rtol=1e-9, err_msg=name)
@@ -47,9 +54,27 @@ def test_three_ranks_find_the_waves_of_one_process(every, monkeypatch):
 
 
 @pytest.mark.long
+def test_each_number_of_diameters_is_of_one_rank(every):
+    shares = [mine for _, _, mine in every]
+    together = sorted(chain.from_iterable(shares))
+    assert all(shares) and together == list(range(len(together))) and len(together) > 4
+
+
+@pytest.mark.long
 def test_all_ranks_refuse_alike(every):
-    said = [errors for _, errors in every]
-    assert said[0] == said[1] == said[2]
+    said = [errors for _, errors, _ in every]
+    assert all(other == said[0] for other in said)
     assert said[0]["interface"].startswith("InterfaceError: the model has no interface 'rim'")
     assert said[0]["region"].startswith("ConfigError: the sector has no region 'rim'")
-    assert said[0]["memory"].startswith("ResourceError: each of 3 ranks needs all")
+    assert said[0]["memory"].startswith(f"ResourceError: each of {len(said)} ranks needs all")
+    assert said[0]["diameter"].startswith("ConfigError: 99 nodal diameters")
+    assert said[0]["one rank"] == "ModesMissedError: 3 modes were found."
+    assert "IndexError" in said[0]["bug"]
+
+
+@pytest.mark.parametrize("n_ranks", [1, 2, 3, 7])
+def test_every_item_has_one_rank_and_none_works_much_longer_than_another(n_ranks):
+    costs = [1.0, 4.0, 4.0, 4.0, 4.0, 4.0, 1.0]
+    work = np.bincount(shared_out(costs, n_ranks), costs, minlength=n_ranks)
+    assert work.sum() == sum(costs)
+    assert work.max() <= 4 / 3 * max(4.0, sum(costs) / n_ranks)

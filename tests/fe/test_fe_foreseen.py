@@ -2,6 +2,8 @@
 
 import gc
 import os
+import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -10,8 +12,10 @@ import pytest
 
 import rom
 from cases.long import ROM_LONG
+from cases.paths import RANKS, ROOT
 from cases.ranks.environment import ENVIRONMENT
 from rom.errors import ResourceError
+from rom.process.mpirun import mpirun
 from rom.workflow import operators
 
 pytestmark = pytest.mark.fenicsx
@@ -27,6 +31,7 @@ SHAPES = {  # length, width, height, size of elements [m]
 }
 TRIED = list(SHAPES) if ROM_LONG else ["plate", "rod"]
 GIB = 2.0**30
+DISK_BYTES = 100_000_000  # of one on which a factor is tried that takes a fifth
 
 
 def bar(size, solver="auto"):
@@ -213,6 +218,26 @@ def test_a_process_that_waits_for_a_full_disk_is_ended_and_says_so(tmp_path, mon
     ran = subprocess.run([sys.executable, "-c", DEAF_PROCESS], capture_output=True, timeout=60)
     assert ran.returncode < 0
     assert f"ResourceError: the disk of {tmp_path} filled while a".encode() in ran.stderr
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("n_ranks", [1, 2])
+def test_a_disk_that_another_fills_ends_all_ranks_by_name(tmp_path, n_ranks):
+    """MUMPS complains, or waits for its writer for ever, and other ranks for that one."""
+    mount = f'mount -t tmpfs -o size={DISK_BYTES} none "{tmp_path}" && exec "$@"'
+    own_mounts = ["unshare", "--mount", "sh", "-c", mount, "sh"]
+    if not shutil.which("unshare") or subprocess.run([*own_mounts, "true"], check=False).returncode:
+        pytest.skip("a small disk of its own needs the right to mount one")
+    script = RANKS / "full_disk_under_mpi.py"
+    ran = subprocess.run(
+        [*own_mounts, *mpirun(n_ranks), sys.executable, str(script), "0.08", "100000"],
+        env=ENVIRONMENT | {"MUMPS_OOC_TMPDIR": str(tmp_path)}, timeout=120, capture_output=True,
+        text=True, check=False, cwd=ROOT,
+    )  # fmt: skip
+    assert ran.returncode != 0 and "begins" in ran.stdout, ran.stderr
+    assert "has a factor" not in ran.stdout
+    named = rf"ResourceError: the (disk of|factor of \d+ dofs takes .* kept in) {tmp_path}"
+    assert re.search(named, ran.stderr), ran.stderr
 
 
 @pytest.mark.parametrize("kind", ["direct", "out-of-core"])

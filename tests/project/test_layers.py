@@ -175,6 +175,7 @@ ORDER = {
         "iterative",
         "counting",
         "krylov_schur",
+        "workers",
         "petsc",
     ),
     "fe.mesh": (

@@ -10,6 +10,7 @@ from scipy.sparse.linalg import LinearOperator, eigs, eigsh, splu
 
 from rom.body.nonlinear.ranges import Load
 from rom.eigen.verbs import mean_motion
+from rom.eigen.workers import ONE_PROCESS, Workers
 from rom.model import Array, FEModel, Index, Interface
 
 N_TANGENT = 3  # lowest frequencies compared there
@@ -81,13 +82,14 @@ class HeldSolid:
         comm: of the processes, every one of which has all of it.
         sections: on which moments act that turn with them; a load (n + 3 s,) has their moments
             behind the nodal forces.
+        workers: who factors its stiffness.
     """
 
     def __init__(
         self, solid: Any, M: Any, C: Any, T: Any = None, comm: Any = None,
-        sections: Sequence[TurningSection] = (),
+        sections: Sequence[TurningSection] = (), workers: Workers = ONE_PROCESS,
     ):  # fmt: skip
-        self.solid, self.comm, self.sections = solid, comm, sections
+        self.solid, self.comm, self.sections, self.workers = solid, comm, sections, workers
         self.T = csr_matrix(identity(M.shape[0]) if T is None else T)
         self.M, self.C = self.T.T @ M @ self.T, csr_matrix(C) @ self.T
         self.inside = splu(csc_matrix(self.T.T @ self.T))
@@ -105,7 +107,7 @@ class HeldSolid:
         T = None if ops.T is None else rows_of(ops.T)
         solid = model.stresses.finite_strain(neo_hookean=neo_hookean)
         M = ops.gathered(model.operators.M)
-        return cls(solid, M, C, T, ops.comm)
+        return cls(solid, M, C, T, ops.comm, workers=model.operators.workers)
 
     def whole(self, E: Array) -> Array:
         """(n, r) all rows of shapes (n_local, r)."""
@@ -135,8 +137,10 @@ class HeldSolid:
         """The equilibrium near a (m,), None if Newton's method does not find it."""
         for _ in range(MAX_ITERATIONS):
             u = self.T @ a
-            gap = self.T.T @ (self._pushed(u, W) - self.solid.force(u))
-            step = self._bordered(a).solve(np.r_[gap, -self.C @ a])[: a.size]
+            gap, factor = self.T.T @ (self._pushed(u, W) - self.solid.force(u)), self._bordered(a)
+            if factor is None:
+                return None
+            step = factor.solve(np.r_[gap, -self.C @ a])[: a.size]
             a = a + step
             size = np.linalg.norm(step)
             if not np.isfinite(size):
@@ -157,10 +161,11 @@ class HeldSolid:
         return zip(self.sections, W[u.size :].reshape(-1, 3), strict=True)
 
     def _bordered(self, a: Array) -> Any:
-        """Factor of the stiffness at a (m,) with the interface held by multipliers."""
+        """Factor of the stiffness at a (m,) with the interface held by multipliers, if any."""
         K = self.T.T @ self.solid.tangent(self.T @ a) @ self.T
         scale = np.abs(K.diagonal()).mean() / abs(self.C).max()
-        return splu(csc_matrix(bmat([[K, scale * self.C.T], [scale * self.C, None]])))
+        bordered = bmat([[K, scale * self.C.T], [scale * self.C, None]])
+        return self.workers.factor(bordered, pivoting=True)
 
     def reached(self, u: Array, a: Array) -> float:
         """Part of a displacement (n,) along the state a, as a share of it."""
@@ -180,28 +185,30 @@ class HeldSolid:
             W: the load that it bears, if that has moments: they have a stiffness, not symmetric.
         """
         n, factor, u = a.size, self._bordered(a), self.T @ a
+        if factor is None:  # where a path branches, a motion has no stiffness
+            return np.zeros(N_TANGENT)
+        still, start = np.zeros(self.C.shape[0]), np.sin(1.0 + np.arange(n))  # alike on all ranks
 
-        def softened(F: Array) -> Array:
-            still = np.zeros((self.C.shape[0], F.shape[1]))
-            return factor.solve(np.vstack([F, still]))[:n]
+        def softened(f: Array) -> Array:
+            return np.asarray(factor.solve(np.r_[f, still])[:n])
 
         turning = [] if W is None else [x for x in self._moments(u, W) if x[1].any()]
         if not turning:
-            inverse = LinearOperator((n, n), matvec=lambda x: softened(x.reshape(-1, 1))[:, 0])
-            lam = eigsh(self.M, N_TANGENT, self.M, sigma=0.0, OPinv=inverse,
+            inverse = LinearOperator((n, n), matvec=softened)
+            lam = eigsh(self.M, N_TANGENT, self.M, sigma=0.0, OPinv=inverse, v0=start,
                         return_eigenvectors=False)  # fmt: skip
             return np.sqrt(np.sort(np.maximum(lam, 0.0)))
         pairs = [section.stiffness(u, moment) for section, moment in turning]
         X, Y = (self.T.T @ np.hstack(part) for part in zip(*pairs, strict=True))
-        soft = softened(X)  # Woodbury: K - X Y^T
+        soft = np.column_stack([softened(x) for x in X.T])  # Woodbury: K - X Y^T
         small = np.linalg.inv(np.eye(X.shape[1]) - Y.T @ soft)
 
         def answer(x: Array) -> Array:
-            y = softened(self.M @ x.reshape(-1, 1))
-            return np.asarray((y + soft @ (small @ (Y.T @ y)))[:, 0])
+            y = softened(self.M @ x)
+            return np.asarray(y + soft @ (small @ (Y.T @ y)))
 
         inverse = LinearOperator((n, n), matvec=answer)
-        squares = 1 / eigs(inverse, N_TANGENT, return_eigenvectors=False)
+        squares = 1 / eigs(inverse, N_TANGENT, v0=start, return_eigenvectors=False)
         return np.sqrt(np.sort(np.maximum(squares.real, 0.0)))
 
 

@@ -29,7 +29,7 @@ from scipy.linalg import eigh
 from rom.arguments import lowest, matrix, rows_at, typed, vector
 from rom.cyclic.certificate import mistuned_certificate
 from rom.cyclic.modes import cyclic_modes, spinning
-from rom.cyclic.sector import Complex, CyclicSector
+from rom.cyclic.sector import Complex, CyclicSector, each_diameter
 from rom.errors import ConfigError, ModelError
 from rom.model import Array, Index, Modes, Report
 from rom.plausible import check_damping_ratio
@@ -227,6 +227,8 @@ def mistuned_wheel(
 ) -> MistunedWheel:
     """Tuned modes of a wheel, to which blades that differ are then added.
 
+    Under mpirun the ranks share the numbers of nodal diameters, and all must call.
+
     Args:
         sector: full or reduced.
         n: number of families: modes per number of nodal diameters, as many as the band has.
@@ -251,8 +253,8 @@ def mistuned_wheel(
     N = sector.n_sectors
     harmonics: list[int] = []
     omega, shapes = [], []
-    for d in sector.diameters:
-        lam, U = _tuned(sector, K_blade, d, n, speed)
+    tuned = each_diameter(sector, lambda d: _tuned(sector, K_blade, d, n, speed))
+    for d, (lam, U) in zip(sector.diameters, tuned, strict=True):
         for sign in (1,) if sector.standing(d) else (1, -1):
             harmonics += [sign * d] * lam.size
             omega.append(np.sqrt(np.maximum(lam, 0.0)))
@@ -260,8 +262,8 @@ def mistuned_wheel(
     Phi = np.hstack(shapes) / np.sqrt(N)
     numbers = np.array(harmonics, dtype=np.int64)
     B = N * (Phi.conj().T @ (K_blade @ Phi))
-    tuned = (sector, numbers, np.concatenate(omega), Phi)
-    return MistunedWheel(*tuned, 0.5 * (B + B.conj().T), K_blade, speed)
+    waves = (sector, numbers, np.concatenate(omega), Phi)
+    return MistunedWheel(*waves, 0.5 * (B + B.conj().T), K_blade, speed)
 
 
 def _tuned(

@@ -17,7 +17,6 @@ from rom.cyclic.blades.records import SubstructuredSector
 from rom.cyclic.reduced import ReducedSector, face_functions, projected
 from rom.cyclic.rotation import centrifugal_displacement
 from rom.cyclic.sector import CyclicSector, all_rows, region
-from rom.eigen.scipy import SciPyOperators
 from rom.eigen.verbs import dofs_of
 from rom.errors import ConfigError, InterfaceError
 from rom.model import Array, FEModel
@@ -84,7 +83,7 @@ def substructured_sector(
     E[sector.slave, q : 2 * q] = sector.coupling @ E[sector.master, :q]
     E[shared, 2 * q :] = np.kron(Q_root, np.eye(3))
     E[sector.held] = 0.0
-    ops, cuts = SciPyOperators(sector.K, sector.M), np.union1d(faces, sector.held)
+    ops, cuts = sector.workers.operators(sector.K, sector.M), np.union1d(faces, sector.held)
     cuts = np.union1d(cuts, shared)
     static = E - ops.hold(cuts)(ops.apply_K(E))
     omega, disk = ops.modes(np.union1d(cuts, inner), n_modes)

@@ -37,6 +37,7 @@ from rom.fe.operators.place import moves_most
 from rom.fe.operators.solver import DIRECT_SOLVER, Solver
 from rom.fe.operators.spectrum import first_elastic, fixed_vector, gaussian_block, settled, signed
 from rom.fe.operators.substructures.shared import substructured
+from rom.fe.operators.workers import AllRanks
 from rom.model import Array, Index
 from rom.process.stopwatch import SEARCH_PIECE, piece
 
@@ -170,6 +171,16 @@ class PETScOperators:
         K = self.K.copy()
         K.axpy(1.0, aij(csr_matrix(dK), sizes, self.comm))
         return self._like(K, self.M, None)
+
+    @property
+    def geometric(self) -> bool:
+        """Whether the rigid motions tell where the nodes are."""
+        return self.rigid is not None
+
+    @property
+    def workers(self) -> AllRanks:
+        """Who solves with matrices that `gathered` has given to all ranks."""
+        return AllRanks(self.comm.size, WholeOperators)
 
     def gathered(self, A: PETSc.Mat) -> csr_matrix:
         """All rows of a matrix with the layout of K, on every rank."""
@@ -384,6 +395,18 @@ class PETScOperators:
         K, M = (self.rows(apply(E), np.arange(self.n)) for apply in (self.apply_K, self.apply_M))
         lam, Phi = eigh(K, M)
         return lam, Phi[self.first : self.first + self.n_local]
+
+
+class WholeOperators(PETScOperators):
+    """All rows on one rank, in coordinates of any kind; all eigenvalues may be double."""
+
+    geometric = False
+
+    def lowest(
+        self, k: int, sigma: float, factor: Inverse | Corrected, deflated: Array
+    ) -> tuple[Array, Array]:
+        """By blocks, which find equal eigenvalues together."""
+        return self.by_blocks(k - N_SPARE_MODES, sigma, factor, deflated)[:2]
 
 
 class TiedOperators(PETScOperators):

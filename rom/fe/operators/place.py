@@ -21,7 +21,7 @@ def moves_most(ops: Any, X: Array, rows: Index | None = None) -> str:
         X: (n_local, k) motions on the rows of this rank.
         rows: (n_local,) which rows of ``ops`` these are; all if not given.
     """
-    if ops.rigid is None:
+    if not ops.geometric:
         return ""
     rows = np.arange(X.shape[0]) if rows is None else rows
     size = np.abs(np.where(np.isfinite(X), X, 0.0)).max(axis=1, initial=0.0)

@@ -95,7 +95,7 @@ def first_elastic(ops: Any) -> float:
     """
     if ops.parent is not None:
         return first_elastic(ops.parent)
-    return _by_polynomials(ops) if ops.rigid is not None else _by_inverse_iteration(ops)
+    return _by_polynomials(ops) if ops.geometric else _by_inverse_iteration(ops)
 
 
 def _by_polynomials(ops: Any) -> float:

@@ -312,6 +312,7 @@ GIVEN = {  # callable -> legal values of its own
     "check_law": {"mechanism": lawful, "name": lambda: "law"},
     "craig_bampton": {"K": lambda: model().K, "M": lambda: model().M},
     "cyclic_modes": {"sector": ring, "diameter": lambda: 1},
+    "wheel_modes": {"sector": ring},
     "continuation": {"span": lambda: (0.0, 1e-3)},
     "equilibrium_sensitivity": {
         "build": lambda: spring,

@@ -9,11 +9,12 @@ from mpi4py import MPI
 import numpy as np
 
 import rom
-from rom.errors import RomError
+from rom.cyclic.sector import each_diameter
+from rom.errors import ModesMissedError, RomError
 
 
 def wheel():
-    """Frequencies at rest, at speed and reduced, stiffness of the blade, and errors by name."""
+    """Frequencies and other numbers by name, errors by name, and diameters this rank has had."""
     model = rom.fe.model(
         "meshes/bladed_disk.geo", material=rom.Material(E=114e9, nu=0.33, rho=4430.0),
         parameters={"lc": 0.018, "lc_blade": 0.015},
@@ -27,14 +28,20 @@ def wheel():
     heavy = rom.CyclicSector.from_model(loaded, fixed=("bore",))
     parts = rom.substructured_sector(sector, model, n_modes=8, n_blade_modes=4)
     blades = [rom.reduced_blade(parts, model, n_modes=4)] * sector.n_sectors
+    small, N = rom.reduce_sector(plain, n_modes=8), plain.n_sectors
     x = np.sin(plain.points).ravel()
     found = {
         "at rest": rom.cyclic_modes(plain, 2, 5).omega,
         "standing": rom.cyclic_modes(plain, 0, 5).omega,
         "at speed": rom.travelling_modes(sector, 2, 6, speed=2000.0).omega,
-        "reduced": rom.cyclic_modes(rom.reduce_sector(plain, n_modes=8), 2, 5).omega,
+        "reduced": rom.cyclic_modes(small, 2, 5).omega,
         "blades": rom.bladed_wheel(parts, 2, n_root=4).waves(blades, speed=2000.0)[0][:6],
         "loaded": rom.cyclic_modes(heavy, 2, 5).omega,
+        "families": np.ravel([modes.omega for modes in rom.wheel_modes(plain, 3)]),
+        "some": np.ravel([modes.omega for modes in rom.wheel_modes(plain, 2, diameters=(4, 1))]),
+        "mistuned": rom.mistuned_wheel(plain, 2, blade="blade").modes(np.full(N, 0.1)).omega[:6],
+        "over the speed": rom.wheel_campbell(sector, 2, 4, speeds=[0.0, 1000.0, 2000.0]).omega[-1],
+        "certificate": [1.0 + row.value for row in small.certificate.rows],
         "blade": [x @ plain.regions["blade"] @ x],
         "stress": [x @ sector.centrifugal @ x],
     }
@@ -42,8 +49,13 @@ def wheel():
         "interface": said(lambda: rom.CyclicSector.from_model(model, fixed=("rim",))),
         "region": said(lambda: rom.CyclicSector.from_model(model, regions=("rim",))),
         "memory": said(lambda: _in_a_megabyte(model)),
+        "diameter": said(lambda: rom.wheel_modes(plain, 2, diameters=(1, 99))),
+        "one rank": said(lambda: each_diameter(plain, _alone)),
+        "bug": said(lambda: each_diameter(plain, [0.0].__getitem__)),
     }
-    return {name: np.asarray(f).tolist() for name, f in found.items()}, errors
+    mine = []
+    each_diameter(plain, mine.append)
+    return {name: np.asarray(f).tolist() for name, f in found.items()}, errors, mine
 
 
 def _in_a_megabyte(model):
@@ -56,11 +68,17 @@ def _in_a_megabyte(model):
         aij.allowed_bytes = plenty
 
 
+def _alone(diameter):
+    if diameter == 3:
+        raise ModesMissedError("3 modes were found.")
+    return diameter
+
+
 def said(call):
     """Kind and text of the error of a call."""
     try:
         call()
-    except RomError as error:
+    except (RomError, IndexError) as error:
         return f"{type(error).__name__}: {error}"
     return ""
 

@@ -1,0 +1,96 @@
+"""Who solves with matrices that are whole in a process, and who shares parts of a task."""
+
+from collections.abc import Callable, Sequence
+from typing import Any, Protocol, TypeVar
+
+import numpy as np
+from scipy.sparse import csc_matrix
+from scipy.sparse.linalg import SuperLU, splu
+
+from rom.eigen.scipy import SYMMETRIC_LU, SciPyOperators
+from rom.model import Array
+
+Item = TypeVar("Item")
+Value = TypeVar("Value")
+
+
+class Factored(Protocol):
+    """A symmetric matrix that has been factored.
+
+    Attributes:
+        definite: whether all its eigenvalues are positive.
+    """
+
+    definite: bool
+
+    def solve(self, f: Array) -> Array:
+        """A^-1 f, (n,), of f (n,), both on all ranks, in units of f over those of A."""
+
+
+class Workers(Protocol):
+    """One process, or ranks that all have the same matrices."""
+
+    def operators(self, K: Any, M: Any, rigid: Array | None = None) -> Any:
+        """`rom.eigen.verbs.Operators` of matrices (n, n) of SciPy, by this process alone.
+
+        Args:
+            K: (n, n) stiffness, symmetric.
+            M: (n, n) mass, symmetric positive definite.
+            rigid: (n, r) motions without stiffness, or None.
+        """
+
+    def factor(self, A: Any, *, pivoting: bool = False) -> Factored | None:
+        """A factor that all ranks make together and all must ask; None if A is singular.
+
+        Args:
+            A: (n, n) symmetric, the same on all ranks.
+            pivoting: where its diagonal has zeros; ``definite`` is not known then.
+        """
+
+    def each(
+        self, function: Callable[[Item], Value], items: Sequence[Item], costs: Sequence[float]
+    ) -> list[Value]:
+        """Values of a function of some items, in their order, on all ranks.
+
+        Each is found by one rank, so that the function must not wait for others; what it raises
+        is raised on all of them.
+
+        Args:
+            function: called once for each item.
+            items: (k,) the same on all ranks, which all must call.
+            costs: (k,) work that each of them makes, in a unit of any kind.
+        """
+
+
+class OneProcess:
+    """SciPy, and one thing after another."""
+
+    def factor(self, A: Any, *, pivoting: bool = False) -> Factored | None:
+        """By SuperLU."""
+        options = {} if pivoting else {"options": {"SymmetricMode": True}, **SYMMETRIC_LU}
+        try:
+            return _Factored(splu(csc_matrix(A), **options))
+        except RuntimeError:
+            return None
+
+    def operators(self, K: Any, M: Any, rigid: Array | None = None) -> Any:
+        """The verbs by SciPy."""
+        return SciPyOperators(K, M, rigid)
+
+    def each(
+        self, function: Callable[[Item], Value], items: Sequence[Item], costs: Sequence[float]
+    ) -> list[Value]:
+        """Value after value."""
+        return [function(item) for item in items]
+
+
+class _Factored:
+    def __init__(self, lu: SuperLU):
+        self.lu = lu
+        self.definite = bool((lu.U.diagonal() > 0).all())
+
+    def solve(self, f: Array) -> Array:
+        return np.asarray(self.lu.solve(f))
+
+
+ONE_PROCESS = OneProcess()

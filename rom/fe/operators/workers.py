@@ -1,0 +1,100 @@
+"""Ranks that all have the same matrices: each solves alone, and they share parts of a task."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+from mpi4py import MPI
+
+import numpy as np
+from scipy.sparse import csr_matrix
+
+from rom.eigen.scipy import SciPyOperators
+from rom.fe.operators.aij import aij
+from rom.fe.operators.factor import Factor
+from rom.fe.operators.memory import collect
+from rom.fe.parallel import collective
+from rom.model import Array, Index
+
+Item = TypeVar("Item")
+Value = TypeVar("Value")
+
+
+@dataclass(frozen=True)
+class AllRanks:
+    """The `rom.eigen.workers.Workers` of finite elements: MUMPS, each matrix by one rank.
+
+    Attributes:
+        n_ranks: that have the matrices; tasks are shared where these are all there are.
+        kind: `PETScOperators` of a matrix without geometry.
+    """
+
+    n_ranks: int
+    kind: Callable[..., Any]
+
+    def operators(self, K: Any, M: Any, rigid: Array | None = None) -> Any:
+        """The verbs by PETSc on this rank alone."""
+        collect(MPI.COMM_SELF)  # what the last ones have left
+        checked = SciPyOperators(K, M)
+        n = checked.n
+        A, B = (_alone(part) for part in (checked.K, checked.M))
+        return self.kind(A, B, rigid, fixed=np.sin(1.0 + np.arange(n)))
+
+    def factor(self, A: Any, *, pivoting: bool = False) -> "SharedFactor | None":
+        """By MUMPS over the ranks, which pivots where it must."""
+        comm = MPI.COMM_SELF if self.n_ranks == 1 else MPI.COMM_WORLD
+        factor = SharedFactor(csr_matrix(A), comm)
+        return factor if factor.factor.ok else None
+
+    def each(
+        self, function: Callable[[Item], Value], items: Sequence[Item], costs: Sequence[float]
+    ) -> list[Value]:
+        """Values that ranks find side by side, on all of them."""
+        comm = MPI.COMM_WORLD
+        if self.n_ranks == 1 or self.n_ranks != comm.size:
+            return [function(item) for item in items]
+        owners = shared_out(costs, comm.size)
+        found: dict[int, Value] = {}
+        with collective(comm):
+            found = {int(k): function(items[k]) for k in np.flatnonzero(owners == comm.rank)}
+        return [comm.bcast(found.get(k), root=int(owner)) for k, owner in enumerate(owners)]
+
+
+class SharedFactor:
+    """A symmetric matrix (n, n) that all ranks have, factored by MUMPS over them."""
+
+    def __init__(self, A: csr_matrix, comm: MPI.Comm):
+        n = A.shape[0]
+        self.comm = comm
+        self.first, end = (n * (comm.rank + k) // comm.size for k in (0, 1))
+        self.end, sizes = end, ((end - self.first, n),) * 2
+        self.factor = Factor(aij(A[self.first : end], sizes, comm), definite=False)
+
+    @property
+    def definite(self) -> bool:
+        """Whether no pivot is negative."""
+        return self.factor.negative_pivots() == 0
+
+    def solve(self, f: Array) -> Array:
+        """A^-1 f on all ranks."""
+        x = self.factor.solve(f[self.first : self.end, None])[:, 0]
+        return np.concatenate(self.comm.allgather(x))
+
+
+def shared_out(costs: Sequence[float], n_ranks: int) -> Index:
+    """(k,) the rank of each of some items: dearest first, to the rank that has least to do.
+
+    Source:
+        Graham, Bounds on multiprocessing timing anomalies, SIAM J. Appl. Math. 17 (1969) 416: no
+        rank then works longer than 4/3 of what is possible.
+    """
+    owners, work = np.zeros(len(costs), dtype=np.int64), np.zeros(n_ranks)
+    for k in np.argsort(-np.asarray(costs, dtype=float), kind="stable"):
+        owners[k] = work.argmin()
+        work[owners[k]] += costs[k]
+    return owners
+
+
+def _alone(A: csr_matrix) -> Any:
+    n = A.shape[0]
+    return aij(A, ((n, n), (n, n)), MPI.COMM_SELF)
