@@ -150,8 +150,8 @@ def case_rows(name: str, steps: list[Step]) -> list[Row]:
 def load_cases(geometric: Geometric) -> dict[str, Array]:
     """{name: share of each component of the range (l,)}.
 
-    Where there are several components, all of them act as given; and in two cases in proportions
-    that no shape was made for, falling, and rising with alternating signs.
+    Where there are several components, two cases have all of them, in falling proportion and in
+    rising proportion with alternating signs.
     """
     components = geometric.components()
     units = np.eye(len(components))
@@ -160,7 +160,6 @@ def load_cases(geometric: Geometric) -> dict[str, Array]:
              for sign in load.signs}  # fmt: skip
     n = len(components)
     if n > 1:
-        cases["all as given"] = geometric.given()
         falling = UNTRAINED_RATIO ** np.arange(n)
         falling /= np.linalg.norm(falling)
         signs = [(-1.0) ** k if -1 in load.signs else 1.0 for k, load in enumerate(components)]

@@ -8,7 +8,7 @@ from itertools import combinations_with_replacement, cycle
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_allclose
 from scipy.integrate import quad
 from scipy.linalg import eigh
 from scipy.spatial.transform import Rotation
@@ -254,8 +254,7 @@ def test_the_certificate_compares_with_the_full_model_at_large_deflection(certif
         deflections_compared(body)
     )
     assert set(body.provenance["large deflection"]) == {
-        "tip f_y", "-tip f_y", "tip f_z", "-tip f_z", "all as given", "all, the first most",
-        "all, the last most",
+        "tip f_y", "-tip f_y", "tip f_z", "-tip f_z", "all, the first most", "all, the last most"
     }  # fmt: skip
 
 
@@ -276,7 +275,7 @@ def test_no_load_of_the_certificate_together_with_others_is_one_of_the_shapes():
     """Neither sums nor differences of two: each makes an angle with every load that was borne."""
     for n, spin in ((2, 0.0), (3, 0.0), (1, 2.0), (2, 2.0)):
         geometric = rom.Geometric(loads={"tip": (1.0,) * n + (0,) * (6 - n)}, spin=(0, 0, spin))
-        cases = {k: v for k, v in load_cases(geometric).items() if k.startswith("all,")}
+        cases = {k: v for k, v in load_cases(geometric).items() if k.startswith("all")}
         assert len(cases) == 2
         cosines = np.abs(geometric.load_cases() @ np.array(list(cases.values())).T)
         assert cosines.max() < 0.93
@@ -300,7 +299,7 @@ def test_centrifugal_force_is_a_load_that_is_certified_and_never_pushes():
     assert not [name for name in rows if "-omega" in name]
     geometric = rom.Geometric(loads={}, spin=(1, 2, 3))
     assert [x.name for x in geometric.components()][:2] == ["omega_x^2", "omega_y^2"]
-    assert len(geometric.load_cases()) == 3 + 2 * 3 + 3 + 2 * 9 + 4 * 3 + 1
+    assert len(geometric.load_cases()) == 3 + 2 * 3 + 3 + 2 * 9 + 4 * 3
     about, loads = np.array([0.1, -0.2, 0.3]), geometric.components()
     F = nodal_forces(loads, model, model.operators, about).sum(axis=1)
     arms = model.points - about
@@ -374,18 +373,7 @@ def test_the_range_says_how_far_an_interface_turns_and_who_leaves_it_is_told(cer
     row = next(r for r in body.certificate.rows if "turn" in r.quantity)
     assert_allclose(row.value, max(turns.values()))
     with pytest.warns(RomWarning, match=r"leaves the range of its certificate at 1\.04 of these"):
-        body.equilibria({"tip": (0, *loads[1:3], 0, 0, 0)}, shares=(1.0, 1.04, 1.4))
-
-
-def test_all_components_at_once_as_they_are_given_belong_to_the_range():
-    """Those of a rotation about a skew axis are its centrifugal force."""
-    geometric = rom.Geometric(loads={"tip": (2.0, 0, -3.0, 0, 0, 0)}, spin=(1.0, -2.0, 0))
-    largest = [load.largest for load in geometric.components()]
-    assert_array_equal(geometric.given() * largest, [2, -3, 1, 4, -2])
-    assert_array_equal(geometric.load_cases()[-1], geometric.given())
-    assert_array_equal(load_cases(geometric)["all as given"], geometric.given())
-    alone = rom.Geometric(loads={"tip": (2.0, 0, 0, 0, 0, 0)})
-    assert_array_equal(alone.load_cases(), [[1], [-1]])
+        body.equilibria({"tip": (0, loads[1], 0, 0, 0, 0)}, shares=(1.0, 1.04, 1.4))
 
 
 def test_the_linear_part_is_that_of_the_linear_body(certified):

@@ -53,7 +53,8 @@ class Geometric:
     Attributes:
         loads: {interface: (6,) largest force [N] and moment [N m] of either sign, axes of the
             geometry}; they keep their direction, a moment as a pair of forces. Each component
-            alone, each two together, and all of them as given belong to the range.
+            alone reaches its largest; of several at once the squares of their shares add up to
+            one, so that for a skew load of two equal ones each is given 1.41 times as large.
         n_modes: how many of the lowest fixed-interface modes drag others along, beside the
             static shapes of the loads; a repeated frequency counts as a whole.
         tol: how much of the energy of the states reached may be left out, as the root of its
@@ -126,21 +127,15 @@ class Geometric:
         squares = [abs(float(self.spin[i] * self.spin[j])) for i, j in PRODUCTS]
         return of_interfaces + [Load("", k, x) for k, x in enumerate(squares) if x]
 
-    def given(self) -> Array:
-        """(l,) the signs with which the components are given, all at once [1]."""
-        forces = [x for load in self.loads.values() for x in load if x]
-        squares = [self.spin[i] * self.spin[j] for i, j in PRODUCTS]
-        return np.sign([float(x) for x in forces + squares if x])
-
     def load_cases(self) -> Array:
-        """(c, l) shares of the components: each alone, each two of them, all as given."""
+        """(c, l) directions of the components together, each alone and each two of them [1]."""
         components = self.components()
         units = np.eye(len(components))
         alone = [s * unit for unit, load in zip(units, components, strict=True) for s in load.signs]
         skew = [(a * units[i] + b * units[j]) / np.sqrt(2)
                 for i, j in combinations(range(len(units)), 2)
                 for a, b in product(components[i].signs, components[j].signs)]  # fmt: skip
-        return np.array(alone + skew + [self.given()] * (len(units) > 1))
+        return np.array(alone + skew)
 
 
 def held_motions(geometric: Geometric, known: Any) -> list[Load]:
