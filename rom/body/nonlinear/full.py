@@ -1,6 +1,6 @@
 """Full models at finite strain, motions of their interfaces held."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -136,7 +136,7 @@ class HeldSolid:
         for _ in range(MAX_ITERATIONS):
             u = self.T @ a
             gap = self.T.T @ (self._pushed(u, W) - self.solid.force(u))
-            step = self._bordered(a).solve(np.r_[gap, -self.C @ a])[: a.size]
+            step = self._softness(a, W)(np.r_[gap, -self.C @ a][:, None])[:, 0]
             a = a + step
             size = np.linalg.norm(step)
             if not np.isfinite(size):
@@ -154,6 +154,8 @@ class HeldSolid:
 
     def _moments(self, u: Array, W: Array) -> Iterator[tuple[TurningSection, Array]]:
         """Each section, and the moment on it."""
+        if W.size == u.size:
+            return iter(())
         return zip(self.sections, W[u.size :].reshape(-1, 3), strict=True)
 
     def _bordered(self, a: Array) -> Any:
@@ -172,37 +174,55 @@ class HeldSolid:
         gap = self.inside.solve(self.T.T @ u) - a
         return float(np.sqrt((gap @ self.M @ gap) / (a @ self.M @ a)))
 
+    def _softness(self, a: Array, W: Array) -> Callable[[Array], Array]:
+        """Displacements (m, k) by forces and motions of what is held (m + h, k), about a state.
+
+        Moments that turn have a stiffness of low rank, X Y^T, which is not symmetric.
+
+        Source:
+            Woodbury's formula, Golub and Van Loan, Matrix Computations (2013), section 2.1.4.
+        """
+        factor, u = self._bordered(a), self.T @ a
+
+        def still(F: Array) -> Array:
+            return factor.solve(F)[: a.size]
+
+        pairs = [section.stiffness(u, moment) for section, moment in self._moments(u, W)
+                 if moment.any()]  # fmt: skip
+        if not pairs:
+            return still
+        X, Y = (self.T.T @ np.hstack(part) for part in zip(*pairs, strict=True))
+        soft = still(np.vstack([X, np.zeros((self.C.shape[0], X.shape[1]))]))
+        small = np.linalg.inv(np.eye(X.shape[1]) - Y.T @ soft)
+
+        def turning(F: Array) -> Array:
+            x = still(F)
+            return np.asarray(x + soft @ (small @ (Y.T @ x)))
+
+        return turning
+
     def frequencies(self, a: Array, W: Array | None = None) -> Array:
         """(k,) lowest frequencies about the state a (m,) [rad/s].
 
         Args:
             a: the state.
-            W: the load that it bears, if that has moments: they have a stiffness, not symmetric.
+            W: the load that it bears, if that has moments.
         """
-        n, factor, u = a.size, self._bordered(a), self.T @ a
+        n, W = a.size, np.zeros(self.T.shape[0]) if W is None else W
+        soft, held = self._softness(a, W), np.zeros((self.C.shape[0], 1))
 
-        def softened(F: Array) -> Array:
-            still = np.zeros((self.C.shape[0], F.shape[1]))
-            return factor.solve(np.vstack([F, still]))[:n]
+        def inverse(of: Any) -> LinearOperator:
+            def answer(x: Array) -> Array:
+                return soft(np.vstack([of(x.reshape(-1, 1)), held]))[:, 0]
 
-        turning = [] if W is None else [x for x in self._moments(u, W) if x[1].any()]
-        if not turning:
-            inverse = LinearOperator((n, n), matvec=lambda x: softened(x.reshape(-1, 1))[:, 0])
-            lam = eigsh(self.M, N_TANGENT, self.M, sigma=0.0, OPinv=inverse,
-                        return_eigenvectors=False)  # fmt: skip
-            return np.sqrt(np.sort(np.maximum(lam, 0.0)))
-        pairs = [section.stiffness(u, moment) for section, moment in turning]
-        X, Y = (self.T.T @ np.hstack(part) for part in zip(*pairs, strict=True))
-        soft = softened(X)  # Woodbury: K - X Y^T
-        small = np.linalg.inv(np.eye(X.shape[1]) - Y.T @ soft)
+            return LinearOperator((n, n), matvec=answer)
 
-        def answer(x: Array) -> Array:
-            y = softened(self.M @ x.reshape(-1, 1))
-            return np.asarray((y + soft @ (small @ (Y.T @ y)))[:, 0])
-
-        inverse = LinearOperator((n, n), matvec=answer)
-        squares = 1 / eigs(inverse, N_TANGENT, return_eigenvectors=False)
-        return np.sqrt(np.sort(np.maximum(squares.real, 0.0)))
+        if W[self.T.shape[0] :].any():
+            squares = 1 / eigs(inverse(self.M.dot), N_TANGENT, return_eigenvectors=False).real
+        else:
+            squares = eigsh(self.M, N_TANGENT, self.M, sigma=0.0, OPinv=inverse(lambda x: x),
+                            return_eigenvectors=False)  # fmt: skip
+        return np.sqrt(np.sort(np.maximum(squares, 0.0)))
 
 
 def rows_of(A: Any) -> csr_matrix:
