@@ -53,7 +53,7 @@ def test_the_deflection_of_a_beam_is_read_from_the_places_of_its_tip(monkeypatch
     monkeypatch.setattr(spin_up, "interpreter", lambda: "python")
     monkeypatch.setattr(spin_up, "answer_of", answer)
     assert_allclose(spin_up.by_exudyn(4)[1], 1 - 0.2 / 0.57379)
-    assert described["steps"] == described["samples"] == 1500 and described["final"] == 6.0
+    assert described["steps"] == described["samples"] == 3000 and described["final"] == 6.0
 
 
 def test_a_rod_spins_up_as_the_exact_beam_does():

@@ -44,10 +44,16 @@ def elastica(slope):
     return 4 * c**2, across, 1 - 2 * np.sqrt(m) * np.cos(start) / c
 
 
+def stored(slope):
+    """Work of the force on the way, over EI / L."""
+    F, across, _ = np.array([elastica(x) for x in np.linspace(1e-6, slope, 200)]).T
+    return np.sum(0.5 * (F[1:] + F[:-1]) * np.diff(across))
+
+
 @pytest.fixture(scope="module")
 def leaf():
     """The body, what its energy was made from, and forces and known motions at two slopes."""
-    model, EI = slender(50, 16)
+    model, EI = slender(50, 32)
     made = []
     whole = Quartic.from_gram.__func__
 
@@ -58,18 +64,19 @@ def leaf():
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Quartic, "from_gram", classmethod(kept))
         known = np.array([elastica(slope) for slope in (STEEPEST / 2, STEEPEST)])
-        body = reduced(model, (0, known[-1, 0] * EI, 0, 0, 0, 0), n_modes=2, active=2,
+        work = [EI * stored(slope) for slope in (STEEPEST / 2, STEEPEST)]
+        body = reduced(model, (0, known[-1, 0] * EI, 0, 0, 0, 0), n_modes=4, active=4,
                        fixed=GUIDED, tol=1e-5)  # fmt: skip
-    return body, made[-1], known[:, 0] * EI, known[:, 1:]
+    return body, made[-1], known[:, 0] * EI, np.column_stack([known[:, 1:], work])
 
 
 def guided(leaf, law):
-    """(2, 2) deflection and shortening at rest, the energy by a class."""
+    """(2, 3) deflection, shortening and energy at rest, the energy by a class."""
     body, gram, forces, _ = leaf
     energy = law.from_gram(*gram)
     along, across = body.marker("tip").translation[:2]
     q = follow(energy, np.outer(forces, across), body.mean_rows(GUIDED))
-    return np.column_stack([q @ across, -(q @ along)])
+    return np.column_stack([q @ across, -(q @ along), [energy.energy(x) for x in q]])
 
 
 def test_a_guided_leaf_hardens_and_comes_back_as_its_elastica_says(leaf):
@@ -92,6 +99,10 @@ class Change(ast.NodeTransformer):
         node.slice = self.visit(node.slice)
         self.inside -= 1
         return node
+
+    def visit_Call(self, node):
+        """Sizes of arrays are left as they are."""
+        return node if getattr(node.func, "id", "") == "entries" else self.generic_visit(node)
 
     def visit_Name(self, node):
         if self.inside and node.id in "ijkl" and self._here():
@@ -136,7 +147,7 @@ def test_any_factor_or_index_that_is_wrong_is_noticed(leaf, name):
     for law, text in mutants(name):
         try:
             found = guided(leaf, law)
-        except (ModelError, IndexError, NameError, np.linalg.LinAlgError):
+        except (ModelError, ArithmeticError, LookupError, NameError, ValueError):
             continue
         if np.allclose(found, leaf[3], rtol=RTOL, atol=0):
             survived.append(text)

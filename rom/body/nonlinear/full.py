@@ -1,6 +1,6 @@
 """Full models at finite strain, motions of their interfaces held."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -137,10 +137,11 @@ class HeldSolid:
         """The equilibrium near a (m,), None if Newton's method does not find it."""
         for _ in range(MAX_ITERATIONS):
             u = self.T @ a
-            gap, factor = self.T.T @ (self._pushed(u, W) - self.solid.force(u)), self._bordered(a)
-            if factor is None:
+            gap = self.T.T @ (self._pushed(u, W) - self.solid.force(u))
+            soft = self._softness(a, W)
+            if soft is None:
                 return None
-            step = factor.solve(np.r_[gap, -self.C @ a])[: a.size]
+            step = soft(np.r_[gap, -self.C @ a])
             a = a + step
             size = np.linalg.norm(step)
             if not np.isfinite(size):
@@ -158,6 +159,8 @@ class HeldSolid:
 
     def _moments(self, u: Array, W: Array) -> Iterator[tuple[TurningSection, Array]]:
         """Each section, and the moment on it."""
+        if W.size == u.size:
+            return iter(())
         return zip(self.sections, W[u.size :].reshape(-1, 3), strict=True)
 
     def _bordered(self, a: Array) -> Any:
@@ -177,39 +180,60 @@ class HeldSolid:
         gap = self.inside.solve(self.T.T @ u) - a
         return float(np.sqrt((gap @ self.M @ gap) / (a @ self.M @ a)))
 
+    def _softness(self, a: Array, W: Array) -> Callable[[Array], Array] | None:
+        """Displacement (m,) by forces and motions of what is held (m + h,), about a state.
+
+        Moments that turn have a stiffness of low rank, X Y^T, which is not symmetric. None where
+        there is no stiffness.
+
+        Source:
+            Woodbury's formula, Golub and Van Loan, Matrix Computations (2013), section 2.1.4.
+        """
+        factor, u = self._bordered(a), self.T @ a
+        if factor is None:
+            return None
+
+        def still(f: Array) -> Array:
+            return np.asarray(factor.solve(f)[: a.size])
+
+        pairs = [section.stiffness(u, moment) for section, moment in self._moments(u, W)
+                 if moment.any()]  # fmt: skip
+        if not pairs:
+            return still
+        X, Y = (self.T.T @ np.hstack(part) for part in zip(*pairs, strict=True))
+        held = np.zeros(self.C.shape[0])
+        soft = np.column_stack([still(np.r_[x, held]) for x in X.T])
+        small = np.linalg.inv(np.eye(X.shape[1]) - Y.T @ soft)
+
+        def turning(f: Array) -> Array:
+            x = still(f)
+            return np.asarray(x + soft @ (small @ (Y.T @ x)))
+
+        return turning
+
     def frequencies(self, a: Array, W: Array | None = None) -> Array:
         """(k,) lowest frequencies about the state a (m,) [rad/s].
 
         Args:
             a: the state.
-            W: the load that it bears, if that has moments: they have a stiffness, not symmetric.
+            W: the load that it bears, if that has moments.
         """
-        n, factor, u = a.size, self._bordered(a), self.T @ a
-        if factor is None:  # where a path branches, a motion has no stiffness
+        n, W = a.size, np.zeros(self.T.shape[0]) if W is None else W
+        soft, held = self._softness(a, W), np.zeros(self.C.shape[0])
+        if soft is None:
             return np.zeros(N_TANGENT)
-        still, start = np.zeros(self.C.shape[0]), np.sin(1.0 + np.arange(n))  # alike on all ranks
 
-        def softened(f: Array) -> Array:
-            return np.asarray(factor.solve(np.r_[f, still])[:n])
+        def inverse(of: Callable[[Array], Array]) -> LinearOperator:
+            return LinearOperator((n, n), matvec=lambda x: soft(np.r_[of(x), held]))
 
-        turning = [] if W is None else [x for x in self._moments(u, W) if x[1].any()]
-        if not turning:
-            inverse = LinearOperator((n, n), matvec=softened)
-            lam = eigsh(self.M, N_TANGENT, self.M, sigma=0.0, OPinv=inverse, v0=start,
-                        return_eigenvectors=False)  # fmt: skip
-            return np.sqrt(np.sort(np.maximum(lam, 0.0)))
-        pairs = [section.stiffness(u, moment) for section, moment in turning]
-        X, Y = (self.T.T @ np.hstack(part) for part in zip(*pairs, strict=True))
-        soft = np.column_stack([softened(x) for x in X.T])  # Woodbury: K - X Y^T
-        small = np.linalg.inv(np.eye(X.shape[1]) - Y.T @ soft)
-
-        def answer(x: Array) -> Array:
-            y = softened(self.M @ x)
-            return np.asarray(y + soft @ (small @ (Y.T @ y)))
-
-        inverse = LinearOperator((n, n), matvec=answer)
-        squares = 1 / eigs(inverse, N_TANGENT, v0=start, return_eigenvectors=False)
-        return np.sqrt(np.sort(np.maximum(squares.real, 0.0)))
+        start = np.sin(1.0 + np.arange(n))  # the same on all ranks, which solve together
+        options: dict[str, Any] = {"v0": start, "return_eigenvectors": False}
+        if W[self.T.shape[0] :].any():
+            squares = 1 / eigs(inverse(self.M.dot), N_TANGENT, **options).real
+        else:
+            squares = eigsh(self.M, N_TANGENT, self.M, sigma=0.0, OPinv=inverse(lambda x: x),
+                            **options)  # fmt: skip
+        return np.sqrt(np.sort(np.maximum(squares, 0.0)))
 
 
 def rows_of(A: Any) -> csr_matrix:

@@ -21,6 +21,7 @@ from typing import Any
 
 import numpy as np
 from scipy.linalg import eigh
+from scipy.sparse import issparse
 
 from rom import rotation
 from rom.body.nonlinear.full import HeldSolid
@@ -29,7 +30,7 @@ from rom.body.nonlinear.ranges import Geometric, Load, axis_point, held_motions,
 from rom.body.nonlinear.statics import Held, free_motions, newton, passages
 from rom.eigen.verbs import Operators, column_blocks, mean_motion, quadratic, whole_clusters
 from rom.errors import ConfigError, InterfaceError, ModelError, ResourceError
-from rom.model import Array, Basis, FEModel, Index
+from rom.model import Array, Basis, FEModel, Index, Interface
 from rom.names import offered
 
 DEPENDENT_RTOL = 1e-10  # energy of a derivative, of the largest, that the others explain
@@ -43,6 +44,7 @@ N_MODES = 4  # about each state that a range leads to, for which shapes are kept
 MODE_SHARE = 1e-2
 N_TURNS = 4  # of moments with the section on which they act, each by what the last one left
 SNAPSHOT_SHARES = (0.5, 1.0)  # of the loads, at which the full model is solved
+AFFINE_RTOL = 1e-6  # of affine motions of a section that its functions may miss
 HELD_RTOL = 1e-6  # of K on modes, by which those of held interfaces are known
 MAX_COORDINATES = 80
 TENSOR_COPIES = 11  # of the Gram matrix while it is ordered into tensors
@@ -122,7 +124,7 @@ def enriched(
     refuse(geometric, model, connection, basis, reference)
     energy = model.stresses.large_strain()
     shapes, theta = _with_derivatives(geometric, model, ops, connection, basis, reference, energy)
-    quartic = Quartic.from_gram(energy.gram(shapes.E), shapes.E.shape[1])
+    quartic = Quartic.from_gram(energy.gram(shapes.E, exact=False), shapes.E.shape[1])
     passed = _states(geometric, quartic, shapes)
     states = np.vstack(passed)
     _refuse_collapse(geometric, energy.least_stretch(shapes.E @ states.T), list(map(len, passed)))
@@ -180,18 +182,34 @@ def refuse(
                 hint="Leave the load out, or that direction of fixed.",
             )
     for name, tie in connection.ties.items():
-        if tie.label == "rbe2" and name != reference:
+        if name != reference and not _turns(tie, model.interfaces[name]):
+            what = (
+                "is rigid" if tie.label == "rbe2" else f"has functions ({tie.label}) that hold it"
+            )
             raise InterfaceError(
-                f"interface {name!r} is rigid, and a section that turns by a linear rotation "
+                f"interface {name!r} {what}, and a section that turns by a linear rotation "
                 "grows: at a slope of 0.03 the body would be several per cent too stiff.",
                 hint='Give it the kind "rbe3" or rom.Polynomial(1).',
             )
 
 
+def _turns(tie: Any, interface: Interface) -> bool:
+    """Whether a section can turn far: it averages, has all dofs, or any affine motion."""
+    if not tie.removed.size or tie.kept.size:
+        return True
+    X = interface.points - interface.origin
+    affine = np.einsum("ac,nb->ncab", np.eye(3), X).reshape(-1, 9)
+    shapes = tie.by_masters.toarray() if issparse(tie.by_masters) else np.asarray(tie.by_masters)
+    missed = affine - shapes @ np.linalg.lstsq(shapes, affine, rcond=None)[0]
+    return bool(np.linalg.norm(missed) <= AFFINE_RTOL * np.linalg.norm(affine))
+
+
 def _held_modes(ops: Operators, basis: Basis) -> bool:
     """Whether the last columns are modes with the interfaces held, orthonormal in the mass."""
+    if not basis.omega.size:
+        return True
     K, expected = quadratic(ops, ops.apply_K, _normal(basis)), np.diag(basis.omega**2)
-    return bool(np.abs(K - expected).max(initial=0.0) <= HELD_RTOL * expected.max(initial=0.0))
+    return bool(np.abs(K - expected).max() <= HELD_RTOL * expected.max())
 
 
 def _normal(basis: Basis) -> Array:

@@ -48,20 +48,23 @@ class LargeStrain:
 
     def __init__(self, V: Any, numbers: dict[str, Any], degree: int):
         self.V, self.mesh, self.numbers = V, V.mesh, numbers
-        self.order = exact_degree(V.mesh, degree)
+        self.order, self.few = exact_degree(V.mesh, degree), few_degree(V.mesh, degree)
         self.points, self.weights = quadrature_rule(self.mesh, self.order)
         self.n_cells = self.mesh.topology.index_map(3).size_local
 
     @property
     def n_points(self) -> int:
-        """Number of quadrature points, of all ranks."""
-        return len(self.weights) * int(self.mesh.topology.index_map(3).size_global)
+        """Number of quadrature points to choose shapes by, of all ranks."""
+        n_cells = int(self.mesh.topology.index_map(3).size_global)
+        return len(quadrature_rule(self.mesh, self.few)[1]) * n_cells
 
-    def gram(self, E: Array) -> Array:
+    def gram(self, E: Array, *, exact: bool = True) -> Array:
         """(N, N) integrals of Z^T C Z, with the columns L_i, then Q_jk for j <= k [N m].
 
         Args:
             E: (n_local, r) shapes [m]; N = r + r (r + 1) / 2.
+            exact: with points enough for fourth order; otherwise for linear stiffness, which does
+                to choose shapes by, as rotations still strain nothing.
 
         Returns:
             The matrix, equal on all ranks; row by row of the upper triangle for the pairs.
@@ -69,7 +72,8 @@ class LargeStrain:
         r = E.shape[1]
         N = r + r * (r + 1) // 2
         G = np.zeros((N, N))
-        for H, w, C in self._gradients(E, self._blocks(6 * N + 9 * r * r)):
+        order = self.order if exact else self.few
+        for H, w, C in self._gradients(E, self._blocks(6 * N + 9 * r * r), order):
             Z = np.concatenate([linear_strain(H), quadratic_strain(H)], axis=2)
             root = np.sqrt(w)[:, None, None] * np.linalg.cholesky(C).transpose(0, 2, 1)
             Z = np.matmul(root, Z).reshape(-1, N)
@@ -80,7 +84,7 @@ class LargeStrain:
     def least_stretch(self, U: Array) -> Array:
         """(s,) least principal stretch [1] of each displacement (n_local, s), on all ranks."""
         least = np.full(U.shape[1], np.inf)
-        for H, *_ in self._gradients(U, self._blocks(27 * U.shape[1])):
+        for H in self._slopes(U, self._blocks(27 * U.shape[1]), self.points):
             F = np.moveaxis(H, 3, 0) + np.eye(3)
             squares = np.linalg.eigvalsh(F.swapaxes(-1, -2) @ F)[..., 0]
             least = np.minimum(least, squares.min(axis=1))
@@ -110,7 +114,8 @@ class LargeStrain:
         Args:
             E: (n_local, r) shapes [m].
         """
-        blocks = list(self._gradients(E, [np.arange(self.n_cells, dtype=np.int32)]))
+        every = [np.arange(self.n_cells, dtype=np.int32)]
+        blocks = list(self._gradients(E, every, self.order))
         H, w, C = (np.concatenate(parts) for parts in zip(*blocks, strict=True))
         cells = np.repeat(np.arange(self.n_cells), len(self.points))
         return H.reshape(len(w), 9, -1), w, cells, C
@@ -150,15 +155,18 @@ class LargeStrain:
             out[:, k] = assembled_vector(form)
         return out
 
-    def _gradients(self, E: Array, blocks: list[Integers]) -> Iterator[tuple[Array, ...]]:
+    def _gradients(
+        self, E: Array, blocks: list[Integers], order: int
+    ) -> Iterator[tuple[Array, ...]]:
         """Gradients (p, 3, 3, r) [1], weights (p,) and C (p, 6, 6) of each block, at points."""
-        x, p = ufl.SpatialCoordinate(self.mesh), len(self.points)
+        points, weights = quadrature_rule(self.mesh, order)
+        x, p = ufl.SpatialCoordinate(self.mesh), len(points)
         with compiling(self.mesh.comm):
-            volume = fem.Expression(ufl.JacobianDeterminant(self.mesh), self.points)
-            law = fem.Expression(stiffness(self.numbers, x), self.points[:1])
+            volume = fem.Expression(ufl.JacobianDeterminant(self.mesh), points)
+            law = fem.Expression(stiffness(self.numbers, x), points[:1])
         filled = [cells for cells in blocks if cells.size]
-        for cells, H in zip(filled, self._slopes(E, filled, self.points), strict=True):
-            w = np.abs(evaluated(volume, self.mesh, cells).reshape(-1, p)) * self.weights
+        for cells, H in zip(filled, self._slopes(E, filled, points), strict=True):
+            w = np.abs(evaluated(volume, self.mesh, cells).reshape(-1, p)) * weights
             C = evaluated(law, self.mesh, cells).reshape(-1, 6, 6)
             yield H, w.ravel(), np.repeat(C, p, axis=0)
 
@@ -208,6 +216,14 @@ def exact_degree(mesh: Any, degree: int) -> int:
     if cell_name(mesh) == "tetrahedron":
         return max(4 * (degree - 1) + 3 * curved, 1)
     return 4 * degree + 2 * curved
+
+
+def few_degree(mesh: Any, degree: int) -> int:
+    """Quadrature degree of the linear stiffness on straight cells."""
+    curved = geometry_degree(mesh) - 1
+    if cell_name(mesh) == "tetrahedron":
+        return max(2 * (degree - 1) + 3 * curved, 1)
+    return 2 * degree + 2 * curved
 
 
 def _set(u: Any, column: Array) -> None:

@@ -1,0 +1,130 @@
+"""What a body of large deflection cannot be made of, or asked for: refused by name, or right."""
+
+from itertools import product
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import rom
+import rom.body.nonlinear.ranges
+from cases.mbs.slender import Full, assembled, slender
+from rom.errors import ConfigError, InterfaceError, ModelError, RomError
+
+pytest.importorskip("dolfinx", reason="dolfinx is not installed")
+pytestmark = [
+    pytest.mark.fenicsx,
+    pytest.mark.once,
+    pytest.mark.filterwarnings("ignore:Number of integration points"),
+    pytest.mark.filterwarnings("ignore::rom.errors.RomWarning"),
+]
+
+
+@pytest.fixture(scope="module")
+def beam():
+    """A cantilever, its load, and where its finite elements are under it."""
+    model, EI = slender(20, 6)
+    load = np.array([0, EI, 0, 0, 0, 0])
+    return model, load, Full(model).under(load)[6:9]
+
+
+def snapshots(model):
+    """Functions found from one state of bending, in which the section turns."""
+    X = model.interfaces["tip"].points - model.interfaces["tip"].origin
+    return rom.Snapshots(np.cross([0, 0, 0.1], X).reshape(-1, 1), n=6)
+
+
+KINDS = {
+    "rbe3": "rbe3",
+    "full": "full",
+    "affine": rom.Polynomial(1),
+    "square": rom.Polynomial(2),
+    "rigid": "rbe2",
+    "found": snapshots,
+}
+METHODS = {
+    "craig-bampton": rom.CraigBampton(n_modes=4),
+    "guyan": rom.Guyan(),
+    "balanced": rom.BalancedTruncation(n_modes=4),
+    "moments": rom.MomentMatching(order=1),
+    "herting": rom.Herting(n_modes=4),
+    "rubin": rom.Rubin(n_modes=4),
+    "enhanced": rom.EnhancedCraigBampton(n_modes=4),
+    "free": rom.FreeFree(n_modes=4),
+    "assumed": rom.AssumedModes(n_modes=4),
+}
+FEW = {("rbe3", name) for name in METHODS} | {(name, "craig-bampton") for name in KINDS}
+
+
+@pytest.mark.parametrize("kind, method", sorted(FEW))
+def test_any_kind_of_interface_and_method_is_right_or_refused_by_name(beam, kind, method):
+    model, load, known = beam
+    of = KINDS[kind](model) if callable(KINDS[kind]) else KINDS[kind]
+    try:
+        body = rom.reduce(
+            model, method=METHODS[method], interfaces={"root": "rbe3", "tip": of},
+            reference="root", certify=False,
+            nonlinear=rom.Geometric(loads={"tip": load}, n_modes=2, n_steps=2),
+        )  # fmt: skip
+    except RomError as error:
+        assert any(word in str(error) for word in ("interface", "method", "coordinates")), error
+        assert "equilibrium" not in str(error)
+        assert (kind, method) not in {("rbe3", "craig-bampton"), ("affine", "craig-bampton")}
+        return
+    (q,) = body.equilibria({"tip": load})
+    assert_allclose(body.marker("tip").translation @ q, known, rtol=0, atol=1e-2)
+
+
+REFERENCES = ("free", "mean-axis", "buckens", ("root", "tip"), "hub", "")
+
+
+@pytest.mark.parametrize("reference", REFERENCES)
+def test_frames_that_are_no_interface_are_refused(beam, reference):
+    model, load, _ = beam
+    with pytest.raises((ConfigError, InterfaceError), match=r"reference|seen from|hub"):
+        rom.reduce(
+            model, method=rom.Guyan(), interfaces={"root": "rbe3", "tip": "rbe3"},
+            reference=reference, nonlinear=rom.Geometric(loads={"tip": load}),
+        )  # fmt: skip
+
+
+@pytest.mark.parametrize("component, size", list(product(range(6), (30.0, 1e3, 1e5))))
+def test_a_load_beyond_what_one_body_carries_is_refused_or_fails_its_certificate(component, size):
+    """Whatever it is, the load is named, and what helps; nothing is borne that is not certified."""
+    model, EI = slender(20, 4)
+    load = np.zeros(6)
+    load[component] = size * EI
+    try:
+        body = rom.reduce(
+            model, method=rom.Guyan(), interfaces={"root": "rbe3", "tip": "rbe3"},
+            reference="root",
+            nonlinear=rom.Geometric(loads={"tip": load}, n_modes=0, n_steps=2, n_shapes=6),
+        )  # fmt: skip
+    except ModelError as error:
+        assert "of the range" in str(error) and "smaller loads" in str(error)
+        return
+    name = rom.body.nonlinear.ranges.FORCES[component]
+    failed = [row.quantity for row in body.certificate.failures if f"tip {name}" in row.quantity]
+    assert failed
+    table = body.provenance["large deflection"]
+    assert min(case["holds to"] for case in table.values()) < 1.0
+
+
+def test_families_say_no_by_name(beam):
+    model, load, _ = beam
+    wide = rom.Geometric(loads={"tip": load})
+    with pytest.raises(TypeError, match="nonlinear"):
+        rom.reduce_parametric(
+            model, parameters={"E": rom.YoungsModulus(None, 0.5, 2.0)}, method=rom.Guyan(),
+            interfaces={"root": "rbe3", "tip": "rbe3"}, nonlinear=wide,
+        )  # fmt: skip
+
+
+def test_models_without_finite_elements_are_refused():
+    model = assembled(cells=(2, 1, 1))
+    bare = rom.FEModel(model.K, model.M, model.points, model.interfaces)
+    with pytest.raises(ConfigError, match="no finite elements"):
+        rom.reduce(
+            bare, method=rom.Guyan(), interfaces={"root": "rbe3", "tip": "rbe3"},
+            reference="root", nonlinear=rom.Geometric(loads={"tip": (0, 1.0, 0, 0, 0, 0)}),
+        )  # fmt: skip
