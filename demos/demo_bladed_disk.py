@@ -25,8 +25,7 @@ options = argparse.ArgumentParser(description="waves, Campbell and SAFE diagram 
 options.add_argument("--out", type=Path, default=Path("out"), help="folder, made if missing")
 options.add_argument("-q", "--quiet", action="store_true", help="no tables")
 options = options.parse_args()
-comm = MPI.COMM_WORLD
-first = comm.rank == 0
+first = MPI.COMM_WORLD.rank == 0
 say = print if first and not options.quiet else lambda *_: None
 
 # ## The sector
@@ -54,11 +53,9 @@ say(f"{full.n_sectors} sectors of {full.n} dofs, wheel of {full.n_wheel}; reduce
 # the diameters.
 
 F, TEN = 4, 10
-ten = np.array([rom.cyclic_modes(sector, n, TEN).frequencies for n in sector.diameters])
-at_rest, ratio = ten[:, :F], np.ones(ten.shape)
-for n in sector.diameters[comm.rank :: comm.size]:
-    ratio[n] = ten[n] / rom.cyclic_modes(full, n, TEN).frequencies
-ratio = comm.allreduce(ratio - 1) + 1
+ten = np.array([modes.frequencies for modes in rom.wheel_modes(sector, TEN)])
+at_rest = ten[:, :F]
+ratio = ten / [modes.frequencies for modes in rom.wheel_modes(full, TEN)]
 worst, lowest = ratio.max(), ratio.min()
 say("diameters  frequencies at rest [Hz]          error of the reduction, ten families")
 for n in sector.diameters:
@@ -91,8 +88,7 @@ spinning = np.abs(small.omega / whole.omega - 1).max()
 
 RUN = 2 * np.pi * 180
 N, half = full.n_sectors, full.n_sectors // 2
-running = np.array([rom.cyclic_modes(sector, n, F, speed=RUN).frequencies
-                    for n in sector.diameters])  # fmt: skip
+running = np.array([modes.frequencies for modes in rom.wheel_modes(sector, F, speed=RUN)])
 orders = np.arange(N + 1)
 folded = half - np.abs(half - orders)
 gap = running[folded, :] / np.maximum(orders * RUN / (2 * np.pi), 1e-9)[:, None] - 1

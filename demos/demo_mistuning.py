@@ -44,7 +44,7 @@ model = rom.fe.model(
 full = rom.CyclicSector.from_model(model, fixed=("bore",), regions=("blade",))
 sector = rom.reduce_sector(full, n_modes=20, functions=rom.Polynomial(4))
 say(f"sector of {full.n} dofs, reduced to {sector.free.size}; wheel of {full.n_wheel} dofs")
-families = np.array([rom.cyclic_modes(sector, n, 3).frequencies for n in sector.diameters])
+families = np.array([modes.frequencies for modes in rom.wheel_modes(sector, 3)])
 say("nodal diameters and first frequencies [Hz]")
 for n, row in enumerate(families):
     say(f"{n:4d}", *(f"{f:9.2f}" for f in row))

@@ -124,6 +124,14 @@ def wheel_modes(
 
     Source:
         Thomas, Dynamics of rotationally periodic structures, Int. J. Numer. Meth. Engng. 14 (1979).
+
+    Example:
+        >>> K, M = csr_matrix([[2.0, -1.0], [-1.0, 2.0]]), csr_matrix(np.eye(2) / 2)
+        >>> one = csr_matrix([[1.0]])  # a ring of masses m = 1, to the ground k = 2, between c = 1
+        >>> slave, master = np.array([1]), np.array([0])
+        >>> ring = rom.CyclicSector(6, K, M, slave=slave, master=master, coupling=one)
+        >>> [round(float(m.omega[0]) ** 2, 6) for m in rom.wheel_modes(ring, 1)]
+        [2.0, 3.0, 5.0, 6.0]
     """
     chosen = list(sector.diameters if diameters is None else diameters)
 

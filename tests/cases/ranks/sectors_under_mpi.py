@@ -29,6 +29,8 @@ def wheel():
     parts = rom.substructured_sector(sector, model, n_modes=8, n_blade_modes=4)
     blades = [rom.reduced_blade(parts, model, n_modes=4)] * sector.n_sectors
     small, N = rom.reduce_sector(plain, n_modes=8), plain.n_sectors
+    steady = rom.spin_up(plain, model, speed=2000.0, n_states=3)
+    held = rom.held_solid(model, fixed=("bore",))
     x = np.sin(plain.points).ravel()
     found = {
         "at rest": rom.cyclic_modes(plain, 2, 5).omega,
@@ -42,6 +44,9 @@ def wheel():
         "mistuned": rom.mistuned_wheel(plain, 2, blade="blade").modes(np.full(N, 0.1)).omega[:6],
         "over the speed": rom.wheel_campbell(sector, 2, 4, speeds=[0.0, 1000.0, 2000.0]).omega[-1],
         "certificate": [1.0 + row.value for row in small.certificate.rows],
+        "steady": [x @ steady.displacements[:, -1]],
+        "about it": steady.modes(3, speed=1500.0, diameter=2).omega,
+        "solid": rom.cyclic_modes(held, 0, 3).omega,
         "blade": [x @ plain.regions["blade"] @ x],
         "stress": [x @ sector.centrifugal @ x],
     }
