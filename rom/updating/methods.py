@@ -276,8 +276,9 @@ def solved(
     """Least squares that are linear in p and ln zeta in each step, none longer than 0.2.
 
     Args:
-        triangle: the function of p and zeta that gives the triangle (n + 1, n + 1) of derivatives
-            and residual, see `folded`.
+        triangle: the function of p and zeta that gives the triangle, see `folded`, of derivatives
+            and residual, n + 1 columns; or of n instruments before them, which noise of the
+            derivatives leaves alone: the residual is made normal to these.
         start: p (n_p,) [1] and zeta (m,) [1].
         n_values: number of residuals.
         limits: of p [1].
@@ -292,20 +293,20 @@ def solved(
     precision, n = np.diag(1.0 / sigma), sigma.size
     for _ in range(MAX_STEPS):
         R = triangle(x, ratios)
-        left = R[:, n] @ R[:, n]
+        left = R[:, -1] @ R[:, -1]
         noise = np.sqrt(left / max(n_values - n, 1)) or 1.0
-        J = np.vstack([R[:, :n] / noise, precision])
-        r = np.r_[R[:, n] / noise, precision @ (np.r_[x, np.log(ratios)] - before)]
-        step = np.clip(
-            -np.linalg.lstsq(J, r, rcond=None)[0], -MAX_PARAMETER_CHANGE, MAX_PARAMETER_CHANGE
-        )
+        normal_to, J = (np.vstack([A / noise, precision]) for A in (R[:, :n], R[:, -n - 1 : -1]))
+        r = np.r_[R[:, -1] / noise, precision @ (np.r_[x, np.log(ratios)] - before)]
+        Q = np.linalg.qr(normal_to)[0]
+        step = -np.linalg.lstsq(Q.T @ J, Q.T @ r, rcond=None)[0]
+        step = np.clip(step, -MAX_PARAMETER_CHANGE, MAX_PARAMETER_CHANGE)
         ratios = ratios * np.exp(step[x.size :])
         step[: x.size] = np.clip(x + step[: x.size], *limits) - x
         x = x + step[: x.size]
         path.append(x)
-        if np.linalg.norm(J @ step) < enough:
+        if np.linalg.norm(normal_to @ step) < enough:
             break
-    covariance = np.linalg.pinv(J.T @ J, hermitian=True)
+    covariance = np.linalg.pinv(normal_to.T @ normal_to, hermitian=True)
     return Update(x, ratios, covariance, np.array(path), np.sqrt(left / n_values))
 
 

@@ -89,8 +89,8 @@ def test_the_verb_finds_what_the_function_finds_and_writes_the_body(capsys):
 
 
 def test_noise_of_forces_is_taken(capsys):
-    found = answered(["--force-noise", "0.03"], capsys)
-    test = replace(rom.io.read_responses("test.h5"), force_noise=0.03)
+    found = answered(["--force-noise", "0.03", "--estimator", "H1"], capsys)
+    test = replace(rom.io.read_responses("test.h5"), force_noise=0.03, estimator="H1")
     same = rom.update(rom.load("family.rom.npz"), test, fixed=("root",), damping=0.02)
     assert found["factors"] == same.factors and found["deviations"] == same.deviations
 
@@ -205,9 +205,12 @@ def test_what_is_wrong_with_the_options_is_said(capsys):
 
     refused(["--spring", "soil=tip:2e5:0.1"], "is not INTERFACE:VALUE:LOW:HIGH")
     refused(["--mass", "cable=tip:heavy:0.1:10"], "--mass: 'heavy' is not a number")
-    refused([*ATTACHED[:2], "--mass", "soil=tip:1:0.1:10"], "soil is a --spring and a --mass")
+    same = "--mass soil has the name of another one"
+    refused([*ATTACHED[:2], "--mass", "soil=tip:1:0.1:10"], same)
     refused(["--rank", "3"], "rank belongs to the residual of equations")
     refused(["--residual", "equations"], "input 0 has no sensor at its point")
-    refused(["--candidate", "cable"], "--candidate cable is neither")
-    refused(["--family", "body.rom.npz"], "holds one body, without parameters")
+    refused(["--candidate", "cable"], "--candidate cable is no --spring, --joint or --mass")
+    refused(["--family", "body.rom.npz"], "--family family.rom.npz, body.rom.npz: of several each")
+    refused(["--joint", "j=a.tip,b.tip:1,1,1:0.1:1"], "belong to an assembly")
+    refused(["--force-noise", "0.1"], "the estimator of H is not named")
     refused(["-o", "family.rom.npz"], "family.rom.npz")
