@@ -190,6 +190,8 @@ def _outputs(args: argparse.Namespace, family: "Family") -> dict[str, Path]:
 
     if args.output is None:
         return {}
+    if not args.output.name:
+        raise ConfigError("-o names no file.")
     stem, paths = args.output.name.removesuffix(".npz").removesuffix(".rom"), {}
     for name in Parts.of(family).bodies:
         path = args.output.with_name(f"{stem}.{name}.rom.npz") if name else args.output
