@@ -13,8 +13,8 @@ from cases.solid import STEEL, composite
 from rom.errors import ConfigError
 from rom.updating import Channels, Responses
 from rom.updating.family_model import family_model
-from rom.updating.frf_data import estimators
-from rom.updating.normal_equations import responses_at, white
+from rom.updating.frf_data import estimators, pooled
+from rom.updating.normal_equations import responses_at, unsure, white
 
 PARAMETERS = {
     "E_inner": rom.YoungsModulus("inner", 0.4, 2.5),
@@ -189,6 +189,102 @@ def test_estimated_coherence_has_the_expectation_of_its_averages():
     test = Responses(np.arange(1.0, 60_001), H[:, None, None], one(), one(), c[:, None, None], n)
     error = test.errors().own
     assert_allclose(np.mean(np.abs(np.log(H) / error[:, 0, 0]) ** 2) / 2, 1.0, atol=0.015)
+
+
+def test_errors_over_the_model_leave_the_mean_of_logarithms_where_it_is():
+    """Over the measured level values that are too large count more: twice the variance."""
+    rng, n = np.random.default_rng(5), 12
+    f = gauss(rng, (n, 60_000))
+    H, _, _, c = estimators(f + 0.2 * gauss(rng, f.shape), f)
+    test = Responses(np.arange(1.0, 60_001), H[:, None, None], one(), one(), c[:, None, None], n)
+    level, variance = np.log(np.abs(H))[:, None, None], 0.2**2 / (2 * (n - 1))
+    for excess, bias in ((0.0, 2 * variance), (-level, 0.0)):
+        weight = test.errors(excess).own ** -2.0
+        found = (weight * level).sum() / weight.sum()
+        assert_allclose(found, bias, atol=4 * np.sqrt(variance / 60_000) + 0.1 * bias)
+
+
+def test_an_update_weighs_by_the_model_it_found(family, exact):
+    """Eight hundred lines of twenty averages: over the measured levels 2 s^2 would be 9 deviations.
+
+    All factors at once scale H: stiffness and mass would be too small by 0.0045.
+    """
+    rng, n = np.random.default_rng(9), 20
+    lines = np.linspace(40, 160, 800)
+    rows = (SENSORS.rows(family.body, "sensor"), INPUTS.rows(family.body, "input"))
+    model = family_model(family, rows, {}, {}, HELD)
+    x = np.log([TRUE[name] for name in model.names])
+    H = responses_at(model, x, np.array([0.02]), 2 * np.pi * lines)
+    f = np.broadcast_to(gauss(rng, (n, 800, 1, 2)), (n, *H.shape))
+    H1, _, _, c = estimators(H * (f + 0.3 * gauss(rng, f.shape)), f)
+    found = rom.update(family, Responses(lines, H1, SENSORS, INPUTS, c, n), fixed=HELD)
+    for name in ("E_inner", "rho"):
+        assert abs(np.log(found.factors[name] / TRUE[name])) < 3.3 * found.deviations[name]
+        assert found.deviations[name] < 0.0045 / 4
+
+
+def test_what_estimated_weights_cost_is_that_of_dense_matrices():
+    """Q = J^T V^-1 diag(V^-1) v^2 d^2 V^-1 J of one line, written out; a sensor stays out."""
+    rng, c = np.random.default_rng(0), 0.05
+    weight, varied = np.array([30.0, 0.0, 80.0, 10.0]), np.array([0.2, 0.3, 0.4, 0.1])
+    J = gauss(rng, (4, 2))
+    at = weight[None, :, None]
+    A = unsure(white(J[None, :, None], at, c), at, c, varied[None, :, None])[0, :, 0]
+    used = weight > 0
+    V = np.diag(weight[used] ** -2.0) + c**2
+    inverse, d = np.linalg.inv(V), weight[used] ** -2.0
+    Q = inverse @ np.diag(np.diag(inverse) * varied[used] ** 2 * d**2) @ inverse
+    assert_allclose(A.conj().T @ A, J[used].conj().T @ Q @ J[used], rtol=1e-10)
+
+
+def test_sensors_share_what_their_lines_tell_of_their_noise():
+    """Twenty lines that are alike but for chance take their mean; others stay what they are."""
+    rng, n = np.random.default_rng(0), 100
+    alike = 0.1 + 1.1 * rng.standard_normal((20, 3, 1)) / np.sqrt(n - 2)
+    ratio = np.vstack([alike, np.full((4, 3, 1), 50.0)])
+    used = np.ones(ratio.shape, bool)
+    found, variance, shared = pooled(ratio, used, n)
+    assert_allclose(found[20:], 50.0)
+    assert np.abs(found[:20] - 0.1).max() < np.abs(alike - 0.1).max() / 2
+    assert_allclose(found[:20].mean(axis=0), alike.mean(axis=0))
+    assert (shared[20:] == 0).all() and (shared[:20] <= variance[:20]).all()
+    wide = 0.1 + np.linspace(0, 1.2, 20)[:, None, None]  # lines that differ by more than chance
+    kept = pooled(wide, used[:20, :1], n)[0]
+    assert np.ptp(kept) > 0.6
+    nothing = pooled(ratio, np.zeros(ratio.shape, bool), n)
+    assert all(np.isfinite(A).all() for A in nothing)
+
+
+def test_the_limit_is_kept_where_averages_are_few():
+    """Chi-square of 120 numbers over variances of 12 averages: one in a hundred is beyond 1 %."""
+    rng, n, trials, lines = np.random.default_rng(8), 12, 2000, 60
+    f = gauss(rng, (n, trials * lines))
+    H, _, _, c = estimators(f + 0.1 * gauss(rng, f.shape), f)
+    shape = (trials * lines, 1, 1)
+    test = Responses(np.arange(1.0, shape[0] + 1), H.reshape(shape), one(), one(),
+                     c.reshape(shape), n)  # fmt: skip
+    e = test.errors()
+    value = (np.abs(np.log(H) / e.own[:, 0, 0]) ** 2).reshape(trials, lines).sum(axis=1)
+    own = e.known * 2 * lines
+    share = np.mean(value / (2 * lines) > chi2.isf(0.01, own) / own)
+    assert 0.004 < share < 0.02
+    assert np.mean(value > chi2.isf(0.01, 2 * lines)) > 1.5 * share
+
+
+def test_noise_of_forces_may_differ_between_lines(exact, tmp_path):
+    test = measured(exact, "Hv", 0.1, 0.1, np.random.default_rng(0))
+    same = replace(test, force_noise=np.full((LINES.size, 2), 0.1))
+    assert_allclose(same.logarithm(), test.logarithm())
+    assert_allclose(same.errors().own, test.errors().own)
+    noise = np.linspace(0.05, 0.1, LINES.size)[:, None] * [1.0, 0.5]
+    other = replace(test, force_noise=noise)
+    gain = (other.logarithm() - test.logarithm())[:, 0]
+    assert_allclose(gain, np.log1p(noise**2) - np.log1p(0.1**2), atol=1e-12)
+    assert_allclose(other.errors().common[:, 0], noise / np.sqrt(2 * (AVERAGES - 1)))
+    pytest.importorskip("h5py", reason="h5py is not installed")
+    read = rom.io.read_responses(rom.io.write_responses(other, tmp_path / "test.h5"))
+    assert_allclose(read.force_noise, noise)
+    assert read.estimator == "Hv"
 
 
 def test_large_errors_have_the_variance_of_their_logarithm():
