@@ -1,5 +1,6 @@
 """Assemblies of families with an unknown joint, updated."""
 
+import importlib
 from dataclasses import replace
 
 import numpy as np
@@ -232,6 +233,27 @@ def test_an_assembly_of_one_is_tracked_as_a_body(families):
     for name in ("values", "forces", "factors", "surprise"):
         scale = np.abs(getattr(a, name)).max(axis=0)
         assert_allclose(getattr(b, name) / scale, getattr(a, name) / scale, atol=1e-8)
+
+
+def test_the_fmu_of_an_assembly_follows_as_python_does(bolted, tmp_path):
+    """Bolts and the modulus of one body; names of parameters carry that of the body."""
+    fmus = importlib.import_module("cases.mbs.fmu_instance")  # skips where fmpy is not installed
+    drifts = {"arm.E": Drift(0.05, 0.05), "bolts": Drift(0.05, 0.05)}
+    t = parameter_tracker(bolted, *watched("arm"), parameters=drifts, fixed=HELD,
+                          attached={"bolts": BOLTS}, **TRACKED)  # fmt: skip
+    y = 30 * np.sqrt(t.R) * np.sin(np.arange(60)[:, None] * [0.5, 0.9, 0.2])
+    expected = t.run(y)
+    one = fmus.Instance(rom.io.write_observer_fmu(t, tmp_path / "bolted.fmu"), tmp_path).begin()
+    wanted = ("velocity[1]", "force[1]", "factor.'arm.E'", "factor.bolts")
+    found = []
+    for k, sample in enumerate(y):
+        for name, value in zip(("strain", "acceleration", "displacement"), sample, strict=True):
+            one.set(f"sensor.{name}[1]", value)
+        one.fmu.doStep(k * TRACKED["dt"], TRACKED["dt"])
+        found.append(one.get(*(f"estimate.{name}" for name in wanted)))
+    same = np.hstack([expected.values, expected.forces, expected.factors])
+    scale = np.abs(same).max(axis=0)
+    assert_allclose(np.array(found) / scale, same / scale, rtol=0, atol=1e-10)
 
 
 def test_a_joint_that_loosens_is_followed(bolted):
