@@ -117,8 +117,8 @@ shaking = on_response * np.abs(exact) + floor * np.median(np.abs(exact), axis=0)
 moved = exact * force + shaking * gauss(averages, *exact.shape).reshape(averages, *exact.shape)
 force = force + on_force * gauss(*force.shape).reshape(force.shape)
 H1, *_, coherence = estimators(moved, np.broadcast_to(force, moved.shape))
-measured = H1 * (1 + on_force**2)
-test = Responses(f, measured, sensors, inputs, coherence, averages, force_noise=on_force)
+known = {"force_noise": on_force, "estimator": "H1"}
+test = Responses(f, H1, sensors, inputs, coherence, averages, **known)
 
 # ## The update, and its verdict
 #
@@ -199,7 +199,7 @@ view.plane(
         view.Scene("The frame, bolted at its corners", things, view=(0.5, -1.0, 0.4), up=(0, 0, 1)),
         view.Drawing(
             "One of 28 measured responses", hertz, size, equal=False,
-            points={"_test": over(f, level(measured[:, c, 0]))[0]},
+            points={"_test": over(f, level(H1[:, c, 0]))[0]},
             curves={
                 "mended model": over(fine, level(second.responses(fine)[:, c, 0])), "_": [],
                 "refused model": over(fine, level(first.responses(fine)[:, c, 0])),

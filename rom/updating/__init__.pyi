@@ -1,6 +1,5 @@
 from rom.updating.comparison import Comparison as Comparison
 from rom.updating.comparison import compare as compare
-from rom.updating.estimate import Updated as Updated
 from rom.updating.family_model import AddedMass as AddedMass
 from rom.updating.family_model import GroundSpring as GroundSpring
 from rom.updating.family_model import JointSpring as JointSpring
@@ -19,3 +18,4 @@ from rom.updating.tracking import Observer as Observer
 from rom.updating.tracking import Track as Track
 from rom.updating.tracking import Tracker as Tracker
 from rom.updating.tracking import tracker as tracker
+from rom.updating.verdict import Updated as Updated

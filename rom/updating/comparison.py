@@ -14,10 +14,11 @@ import numpy as np
 from rom.arguments import typed, whole
 from rom.errors import ConfigError
 from rom.model import Array, Index
-from rom.updating.estimate import Updated, update
+from rom.updating.estimate import update
 from rom.updating.family_model import Family
 from rom.updating.measured import Responses
 from rom.updating.normal_equations import Data, sums
+from rom.updating.verdict import Updated
 
 MAX_WORSE = 2.0  # standard deviations by which a smaller set may foretell worse than the best
 
@@ -114,12 +115,13 @@ def compare(
 
 
 def _some(test: Responses, lines: Index) -> Responses:
-    c = np.asarray(test.coherence)
+    c, noise = np.asarray(test.coherence), np.asarray(test.force_noise)
     return replace(
         test,
         frequencies=test.frequencies[lines],
         H=test.H[lines],
         coherence=c[lines] if c.ndim else test.coherence,
+        force_noise=noise[lines] if noise.ndim else test.force_noise,
     )
 
 

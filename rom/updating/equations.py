@@ -23,7 +23,7 @@ from rom.updating.methods import (
     weighted,
 )
 from rom.updating.models import AtSensors, Measurement, ParametricModel, modal
-from rom.updating.normal_equations import Data, shared, through_shared
+from rom.updating.normal_equations import Data, shared, through_shared, white
 
 SENSOR_RTOL = 1e-8  # singular value of sensors that follow others, over the largest
 LAST_STEP = 1e-3  # in standard deviations
@@ -137,7 +137,9 @@ def by_response_functions(
     """Logarithms of factors, and damping ratios, by H - H_test = H dZ H_test, linear in each step.
 
     What is not measured of H_test follows its sensors as the model at the last step says, so that
-    nothing is condensed; inputs need no sensors. Noise of H_test is in the derivatives too.
+    nothing is condensed; inputs need no sensors. Noise of H_test is in these derivatives too: they
+    lead, and those of the model, which have none, say where the end is. All is divided by H_test,
+    as the mean of H / H_test is one where errors are circular.
 
     Args:
         model: see `by_equations`.
@@ -153,31 +155,34 @@ def by_response_functions(
 
     Source:
         Lin and Ewins, Analytical model improvement using frequency response functions, Mech. Syst.
-        Signal Process. 8 (1994) 437.
+        Signal Process. 8 (1994) 437; instruments: Soderstrom and Stoica, System identification
+        (1989), chapter 8.
     """
-    lines = _whole_lines(data)
-    inside, omega = InSensors.of(model, x, free), data.omega[lines]
-    n_s = len(model.seen)
-    H, F = np.exp(data.logarithm[lines]), inside.basis.T @ model.driven.T
-    weights = data.weight[lines] / np.abs(H)
+    used = data.lines(_whole_lines(data))
+    inside, n_s = InSensors.of(model, x, free), len(model.seen)
+    F = inside.basis.T @ model.driven.T
 
     def triangle(x: Array, ratios: Array) -> Array:
         here = inside.at(x)
         modes = modal(here, shared(ratios, model.n_elastic))
         change, MPhi = through_shared(here, modes, ratios.size), here.M @ modes.Phi
-        C, R = (MPhi * modes.d) @ MPhi.T, np.zeros((0, x.size + ratios.size + 1))
-        for block in blocks(omega.size):
-            w, test = omega[block], H[block]
+        driven, n = modes.Phi.T @ F, x.size + ratios.size
+        C, R = (MPhi * modes.d) @ MPhi.T, np.zeros((0, 2 * n + 1))
+        for block in blocks(used.omega.size):
+            some = used.lines(block)
+            w, test, g = some.omega, np.exp(some.logarithm), modes.g(some.omega)
             Z = here.K - w[:, None, None] ** 2 * here.M + 1j * w[:, None, None] * C
             unseen = np.linalg.solve(Z[:, n_s:, n_s:], F[n_s:] - Z[:, n_s:, :n_s] @ test)
-            left = modes.Phi[:n_s] * modes.g(w)[:, None, :]
-            J = change(left, MPhi.T @ np.concatenate([test, unseen], axis=1), w)
-            r = test - left @ (modes.Phi.T @ F)
-            R = folded(R, np.column_stack([weighted(weights[block], A) for A in (J, r)]))
+            left = modes.Phi[:n_s] * g[:, None, :]
+            H = left @ driven
+            instruments = change(left, g[:, :, None] * driven, w) / H[..., None]
+            J = change(left, MPhi.T @ np.concatenate([test, unseen], axis=1), w) / test[..., None]
+            columns = np.concatenate([instruments, J, (1 - H / test)[..., None]], axis=-1)
+            R = folded(R, weighted(1.0, white(columns, some.weight, some.common)))
         return R
 
     limits = np.log(model.low[free]), np.log(model.high[free])
-    options = 2 * H.size, limits, prior[free], prior_damping
+    options = 2 * used.logarithm.size, limits, prior[free], prior_damping
     return solved(triangle, (x[free], ratios), *options, enough=LAST_STEP)
 
 

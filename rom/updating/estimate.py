@@ -12,24 +12,22 @@ from typing import Any
 import numpy as np
 from scipy.linalg import block_diag
 
-from rom.arguments import finite, one_of, typed, whole
-from rom.assembly.assembly import Assembly
-from rom.body.flexible import FlexibleBody
+from rom.arguments import one_of, positive, typed
 from rom.errors import ConfigError, ParameterError, SolverError
-from rom.model import Array, Mask, Report, Row
+from rom.model import Array, Mask, Row
 from rom.names import named
-from rom.parametric.assembled import FamilyAssembly
 from rom.plausible import check_damping_ratio
 from rom.rows import row
 from rom.updating.equations import by_equations, by_response_functions
 from rom.updating.family_model import Attached, Family, FamilyModel, Parts, family_model
-from rom.updating.frf_data import Complex
-from rom.updating.measured import Channels, Responses
+from rom.updating.frf_data import Complex, beside_poles
+from rom.updating.measured import Responses
 from rom.updating.methods import Update
 from rom.updating.models import modal
 from rom.updating.normal_equations import Data, Sums, responses_at, sums
 from rom.updating.verdict import (
     LEFT_LOG_LEVEL,
+    Updated,
     band,
     check_channels,
     chi_row,
@@ -54,150 +52,6 @@ RESIDUALS = ("responses", "equations", "response-function")
 DAMPING_RANGE = (1e-6, 0.9)  # ratios that are tried
 
 
-@dataclass(frozen=True, slots=True)
-class Updated:
-    """What a test says about a family.
-
-    Attributes:
-        family: that was updated, or the assembly of families.
-        factors: all parameters, also those that were kept [1].
-        zeta: (m,) damping ratios of the lowest elastic modes, the last one of all others too [1].
-        names: (n,) of the unknowns, damping ratios last.
-        covariance: (n, n) of the logarithms of the unknowns [1].
-        verdict: whether noise alone explains what is left, and where it does not.
-        by_sensor: (n_s,) mean squared residual over its expectation [1].
-        by_line: (n_f,) likewise [1]; NaN for lines that were not used.
-        scores: {name: by how many standard deviations the data ask for a parameter that was not
-            updated [1]}; beyond four it is missing, with the sign of its change.
-        unseen: directions, {name: share [1]} in the parameters, that the data do not see.
-        at_bound: names of parameters that lie at an end of their range.
-        model: the family at the sensors and inputs of the test.
-    """
-
-    family: Family
-    factors: dict[str, float]
-    zeta: Array
-    names: tuple[str, ...]
-    covariance: Array
-    verdict: Report
-    by_sensor: Array
-    by_line: Array
-    scores: dict[str, float]
-    unseen: tuple[dict[str, float], ...]
-    at_bound: tuple[str, ...]
-    model: FamilyModel
-
-    @property
-    def deviations(self) -> dict[str, float]:
-        """Relative standard deviation of each unknown [1]."""
-        return dict(zip(self.names, np.sqrt(np.diag(self.covariance)).tolist(), strict=True))
-
-    @property
-    def correlations(self) -> Array:
-        """(n, n) correlation of the unknowns [1]."""
-        d = np.sqrt(np.diag(self.covariance))
-        return self.covariance / np.outer(d, d)
-
-    @property
-    def logarithms(self) -> Array:
-        """(n_p,) of all factors; zero for parameters that are not in the model [1]."""
-        return np.log(np.where(self.model.present, list(self.factors.values()), 1.0))
-
-    @property
-    def body(self) -> FlexibleBody:
-        """The body at the factors found; its provenance says by which data, and how surely.
-
-        Raises:
-            ConfigError: if an assembly was updated.
-        """
-        if isinstance(self.family, FamilyAssembly):
-            raise ConfigError("an assembly has several bodies.", hint="Take Updated.assembly.")
-        return self._signed(self.family.at(**self._own))
-
-    @property
-    def assembly(self) -> Assembly:
-        """The assembly at the factors found, without what is attached; bodies as `body`.
-
-        Raises:
-            ConfigError: if a body alone was updated.
-        """
-        if not isinstance(self.family, FamilyAssembly):
-            raise ConfigError("one body was updated, no assembly.", hint="Take Updated.body.")
-        found = self.family.at(**self._own)
-        bodies = {name: self._signed(body) for name, body in found.bodies.items()}
-        return replace(found, bodies=bodies)
-
-    @property
-    def _own(self) -> dict[str, Any]:
-        return {name: self.factors[name] for name in self.family.parameters}
-
-    def _signed(self, body: FlexibleBody) -> FlexibleBody:
-        data = {
-            "factors": self.factors,
-            "deviations": self.deviations,
-            "damping": self.zeta.tolist(),
-            "lines": int(np.count_nonzero(np.isfinite(self.by_line))),
-            "sensors": self.by_sensor.size,
-            "verdict holds": self.verdict.ok,
-        }
-        return replace(body, provenance=body.provenance | {"updating": data})
-
-    def responses(self, frequencies: Any) -> Complex:
-        """(n_f, n_s, n_e) displacement per force of the updated model at lines [Hz] [m/N].
-
-        Raises:
-            ConfigError: for lines that are not finite.
-        """
-        omega = 2 * np.pi * finite("frequencies", frequencies, None)
-        return responses_at(self.model, self.logarithms, self.zeta, omega)
-
-    def drawn(
-        self, frequencies: Any, sensors: Channels, inputs: Channels, *, n: int, seed: int = 0
-    ) -> Complex:
-        """Responses, also where nothing was measured, at factors that the test leaves possible.
-
-        Logarithms of the unknowns are normal about what was found, with its covariance. The spread
-        of the responses is what is not known of them if the model is right.
-
-        Args:
-            frequencies: (n_f,) lines [Hz].
-            sensors: anywhere on the body.
-            inputs: likewise.
-            n: number of draws.
-            seed: of the random numbers.
-
-        Returns:
-            (n, n_f, n_s, n_e) displacement per force [m/N].
-
-        Raises:
-            ConfigError: for lines that are not finite, channels off the body, or no draw.
-        """
-        whole("n", n, 1, None)
-        seen, driven = (
-            channels.rows(Parts.of(self.family).bodies, what) @ self.model.motions
-            for channels, what in ((sensors, "sensor"), (inputs, "input"))
-        )
-        model = replace(self.model, seen=seen, driven=driven)
-        x = self.logarithms
-        labels = (*model.names, *(f"zeta {k + 1}" for k in range(self.zeta.size)))
-        unknown = [labels.index(name) for name in self.names]
-        theta = np.tile(np.r_[x, np.log(self.zeta)], (n, 1))
-        rng = np.random.default_rng(seed)
-        theta[:, unknown] += rng.multivariate_normal(np.zeros(len(unknown)), self.covariance, n)
-        omega = 2 * np.pi * finite("frequencies", frequencies, None)
-        return np.array(
-            [responses_at(model, row[: x.size], np.exp(row[x.size :]), omega) for row in theta]
-        )
-
-    def __str__(self) -> str:
-        d = self.deviations
-        lines = [
-            f"  {name} = {self.factors.get(name, np.nan):.5g} +- {100 * d[name]:.2g} %"
-            for name in self.names if name in self.factors
-        ]  # fmt: skip
-        return "\n".join(["updated factors", *lines, str(self.verdict)])
-
-
 @typed
 def update(  # noqa: PLR0913  keywords of one call
     family: Family,
@@ -212,6 +66,7 @@ def update(  # noqa: PLR0913  keywords of one call
     tolerance: float | None = None,
     residual: str = "responses",
     rank: int | None = None,
+    beside_poles: float | None = None,
 ) -> Updated:
     """Find the factors of a family, and damping ratios, that explain measured responses.
 
@@ -238,6 +93,9 @@ def update(  # noqa: PLR0913  keywords of one call
             H dZ H_test, linear too, and without condensation, from where few responses lead. The
             verdict is that of responses; a prior weighs against what they leave.
         rank: of the basis of equations; None for one direction per mode up to the highest line.
+        beside_poles: number of half bandwidths of the poles of the model, once it is near, within
+            which lines count less, where damping is hardly known or not that of modes; None to
+            count all fully. Their errors are taken for larger, so that deviations are safe.
 
     Returns:
         `rom.updating.Updated`.
@@ -269,23 +127,27 @@ def update(  # noqa: PLR0913  keywords of one call
     rows = test.rows(bodies, tolerance)
     model = family_model(family, rows, attached, candidates, fixed)
     unknown = _unknown(model, free, attached, candidates)
-    data = Data.of(test)
     if isinstance(prior, Updated) and residual != "responses":
         raise ConfigError("the update by another test is a prior for the residual of responses.")
     before = _Before.of(prior or {}, model)
-    search = _Search.begun(model, data, unknown, damping, before)
+    search = _Search.begun(model, test, unknown, damping, before)
     check_channels(search.extremes(), search.data.roughly())
+    if beside_poles is not None:
+        search = search.near().beside(positive("beside_poles", beside_poles))
     if residual == "responses":
         return _found(family, search.run())
     root = np.sqrt(np.diag(before.precision))
     sigma = np.divide(1.0, root, out=np.full(root.size, np.inf), where=root > 0)
     if residual == "equations":
-        found = by_equations(model, data, search.x, unknown, damping, prior=sigma, rank=rank)
-    else:
-        start, ratios = search.near().x, (damping, DAMPING_LOG_DEVIATION)
+        found = by_equations(model, search.data, search.x, unknown, damping, prior=sigma, rank=rank)
+        return replace(_found(family, search.moved(found)), covariance=found.covariance)
+    ratios = (damping, DAMPING_LOG_DEVIATION)
+    search.near()
+    for _ in range(2):  # the second time with errors by the model found
         found = by_response_functions(
-            model, data, start, unknown, search.zeta, prior=sigma, prior_damping=ratios
+            model, search.data, search.x, unknown, search.zeta, prior=sigma, prior_damping=ratios
         )
+        search.moved(found).weigh()
     return replace(_found(family, search.moved(found)), covariance=found.covariance)
 
 
@@ -343,6 +205,7 @@ class _Search:
     """The least squares problem and where its search has come to."""
 
     model: FamilyModel
+    test: Responses
     data: Data
     theta: Array
     free: Mask
@@ -351,11 +214,13 @@ class _Search:
     n_known: int
     sums: Sums = field(init=False)
     settled: bool = False
+    count: Any = 1.0  # by which lines count less
 
     @staticmethod
     def begun(
-        model: FamilyModel, data: Data, unknown: Mask, damping: float, prior: _Before
+        model: FamilyModel, test: Responses, unknown: Mask, damping: float, prior: _Before
     ) -> "_Search":
+        data = Data.of(test)
         x = np.clip(prior.x, np.log(model.low), np.log(model.high))
         lam = modal(model.at(x), ()).lam[model.n_rigid :]
         m = min(int(np.count_nonzero(lam < (BAND_RATIO * data.omega[-1]) ** 2)) + 1, lam.size)
@@ -367,7 +232,7 @@ class _Search:
             )
         precision = block_diag(prior.precision, np.eye(m) * DAMPING_LOG_DEVIATION**-2.0)
         before, theta = (np.r_[y, np.full(m, np.log(damping))] for y in (prior.x, x))
-        return _Search(model, data, theta, free, precision, before, prior.n_known)
+        return _Search(model, test, data, theta, free, precision, before, prior.n_known)
 
     def extremes(self) -> Iterator[Complex]:
         """Responses where the search begins, then with each factor at both ends of its range."""
@@ -421,18 +286,44 @@ class _Search:
         self.theta = few.theta
         return self
 
+    def beside(self, width: float) -> "_Search":
+        """Where it is, with lines that count less close to its poles."""
+        poles = np.sqrt(modal(self.model.at(self.x), ()).lam[self.model.n_rigid :])
+        self.count = beside_poles(self.data.omega, poles[: self.zeta.size], self.zeta, width)
+        self.data = replace(self.data, weight=self.data.weight * self.count)
+        return self
+
+    def weigh(self) -> None:
+        """Take estimated errors over the responses of the model instead of those measured."""
+        H = responses_at(self.model, self.x, self.zeta, self.data.omega)
+        data = Data.of(self.test, np.log(np.abs(H)) - self.data.logarithm.real)
+        self.data = replace(data, weight=data.weight * self.count)
+
     def run(self) -> "_Search":
-        """Approach, then descend on all lines."""
-        cost = self.near()._descend(NEAR_STIFFNESS)
-        if self.settled or cost > MAX_MISFIT * self.data.n_values:
-            return self
-        raise SolverError(
-            f"updating did not settle in {MAX_STEPS} steps.",
-            hint="Start from better values, or give a prior; see which parameters are correlated.",
-        )
+        """Approach, then descend on all lines, once more with errors by the model found."""
+        self.near()._end()
+        if np.any(self.data.varied):
+            self.weigh()
+            self._end()
+        return self
+
+    def _end(self) -> None:
+        """Descend on all lines.
+
+        Raises:
+            SolverError: if that does not end though the model fits.
+        """
+        cost = self._descend(NEAR_STIFFNESS)
+        if not self.settled and cost <= MAX_MISFIT * self.data.n_values:
+            raise SolverError(
+                f"updating did not settle in {MAX_STEPS} steps.",
+                hint="Start from better values, or give a prior; see which parameters are "
+                "correlated.",
+            )
 
     def _descend(self, mu: float) -> float:
         """Levenberg-Marquardt until the expected gain vanishes; the cost there."""
+        self.settled = False
         self.sums, cost = self.at(self.theta)
         low, high = self.bounds
         for _ in range(MAX_STEPS):
@@ -480,12 +371,15 @@ def _found(family: Family, search: _Search) -> Updated:
     missing = scores(N, g, free, model.names)
     factors = np.where(model.present, np.exp(search.x), 0.0)
     own = N[np.ix_(free, free)]
+    covariance = np.linalg.pinv(own, hermitian=True)
+    if np.any(s.varied):
+        covariance += covariance @ s.varied[np.ix_(free, free)] @ covariance
     return Updated(
         family=family,
         factors=dict(zip(model.names, factors.tolist(), strict=True)),
         zeta=search.zeta,
         names=labels,
-        covariance=np.linalg.pinv(own, hermitian=True),
+        covariance=covariance,
         verdict=verdict(s, data, free.size, missing, _doubts(search, at_bound)),
         by_sensor=_mean(s.squares, data, (0, 2)),
         by_line=_mean(s.squares, data, (1, 2)),

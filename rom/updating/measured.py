@@ -16,10 +16,10 @@ from rom.arguments import finite, one_of
 from rom.body.flexible import FlexibleBody
 from rom.body.surface import strain_rows, surface_of
 from rom.errors import ConfigError
-from rom.model import Array
+from rom.model import Array, Index
 from rom.names import named
 from rom.rotation import skew
-from rom.updating.frf_data import Complex, random_error
+from rom.updating.frf_data import Complex, pooled, random_error
 
 DERIVATIVES = {"displacement": 0, "velocity": 1, "acceleration": 2}
 LENGTHS = {  # factors by which points that are off a body may all lie on it
@@ -33,7 +33,10 @@ SAME_RTOL = 1e-6  # distance of surfaces that touch, of the size of all
 MAX_RELATIVE_ERROR = 0.3  # of a value; beyond it the logarithm of noise is no longer normal
 MAX_LINES_NAMED = 5  # in a message
 FREEDOM_LOST = 2  # averages, by a variance that is estimated from the same records as the response
-MIN_OWN_SHARE = 0.1  # of the variance of a response that is left to its sensor
+MIN_OWN_SHARE = 0.02  # of the variance of a response that is left to its sensor
+MAX_EXCESS = 3.0  # standard deviations by which a model corrects the level of a response
+MAX_FORCE_SHARE = 1.2  # of the incoherent power in that of forces, at half of all values
+POWERS = {"H1": 0.0, "Hv": 0.5, "H2": 1.0}  # of one over the coherence, by which they exceed H1
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,13 +46,17 @@ class Channels:
     Attributes:
         points: (k, 3) points in the axes of the geometry [m].
         directions: (k, 3) directions; their length does not matter [1].
+        bodies: name of the body of an assembly on which all lie, or (k,) of each; None for the
+            nearest one.
 
     Raises:
-        ConfigError: unless both are k rows of three numbers, and all directions have a length.
+        ConfigError: unless both are k rows of three numbers, all directions have a length, and as
+            many bodies are named.
     """
 
     points: npt.ArrayLike
     directions: npt.ArrayLike
+    bodies: str | tuple[str, ...] | None = None
 
     def __post_init__(self) -> None:
         for name in ("points", "directions"):
@@ -60,6 +67,46 @@ class Channels:
             raise ConfigError(f"points {shapes[0]}, directions {shapes[1]}: (k, 3) of both.")
         if not np.linalg.norm(self.directions, axis=1).all():
             raise ConfigError("a channel has a direction of length zero.")
+        if isinstance(self.bodies, str):
+            object.__setattr__(self, "bodies", (self.bodies,) * shapes[0][0])
+        if self.bodies is not None and len(self.bodies) != shapes[0][0]:
+            raise ConfigError(f"{len(self.bodies)} bodies are named for {shapes[0][0]} channels.")
+
+    def some(self, chosen: Any) -> "Channels":
+        """Those with chosen numbers (j,)."""
+        bodies = None if self.bodies is None else tuple(self.bodies[k] for k in chosen)
+        return Channels(
+            np.asarray(self.points)[chosen], np.asarray(self.directions)[chosen], bodies
+        )
+
+    def _elsewhere(self, names: tuple[str, ...], what: str) -> Array:
+        """(n_b, k) zero for a body on which a channel may lie, infinite for another one."""
+        if self.bodies is None:
+            return np.zeros((len(names), 1))
+        if unknown := set(self.bodies) - set(names):
+            k = next(k for k, name in enumerate(self.bodies) if name in unknown)
+            known = f"bodies are {named(names)}" if names != ("",) else "this is one body alone"
+            raise ConfigError(f"{what} {k} lies on {self.bodies[k]!r}: {known}.")
+        other = np.array([[name != own for own in self.bodies] for name in names])
+        return np.where(other, np.inf, 0.0)
+
+    def owners(
+        self, bodies: Mapping[str, FlexibleBody], what: str, tolerance: float | None = None
+    ) -> list[str]:
+        """(k,) the body on which each channel lies: that named, or the nearest one.
+
+        Args:
+            bodies: with their outer surfaces; of one alone none is needed.
+            what: they are, for messages.
+            tolerance: see `rows` [m].
+
+        Raises:
+            ConfigError, ModelError: see `rows`.
+        """
+        names, k = list(bodies), len(np.asarray(self.points))
+        if len(names) == 1 and self.bodies is None:
+            return names * k
+        return [names[own] for own in self._placed(bodies, what, tolerance, False)[0]]
 
     def rows(
         self,
@@ -83,6 +130,27 @@ class Channels:
             ModelError: if a body carries no surface.
         """
         bodies = {"": body} if isinstance(body, FlexibleBody) else body
+        strains = np.broadcast_to(gauges, len(np.asarray(self.points)))
+        owners, nearest = self._placed(bodies, what, tolerance, strains)
+        ends = np.cumsum([6 + one.n_modes for one in bodies.values()])
+        found = np.zeros((strains.size, ends[-1]))
+        each = zip(np.asarray(self.points), np.asarray(self.directions), owners, strict=True)
+        for k, (x, d, own) in enumerate(each):
+            part = list(bodies.values())[own]
+            if strains[k]:
+                motion = strain_rows(part, [x], [d], what, [k])[0]
+            else:
+                surface, n = surface_of(part), int(nearest[k])
+                shape = surface.shape[3 * n : 3 * n + 3]
+                motion = np.hstack([np.eye(3), -skew(surface.points[n]), shape])
+                motion = d / np.linalg.norm(d) @ motion
+            found[k, ends[own] - motion.size : ends[own]] = motion
+        return found
+
+    def _placed(
+        self, bodies: Mapping[str, FlexibleBody], what: str, tolerance: float | None, gauges: Any
+    ) -> tuple[Index, Index]:
+        """(k,) number of the body of each channel, and (k,) of the nearest point of its surface."""
         surfaces, points = [surface_of(one) for one in bodies.values()], np.asarray(self.points)
         everywhere = np.vstack([surface.points for surface in surfaces])
         size = np.ptp(everywhere, axis=0).max()
@@ -90,13 +158,13 @@ class Channels:
         _check_lengths(points, cKDTree(everywhere), reach, what)
         asked = [cKDTree(surface.points).query(points) for surface in surfaces]
         far, nearest = (np.array([pair[i] for pair in asked]) for i in (0, 1))
-        ends = np.cumsum([6 + one.n_modes for one in bodies.values()])
-        found, strains = np.zeros((len(points), ends[-1])), np.broadcast_to(gauges, len(points))
-        for k, d in enumerate(np.asarray(self.directions)):
-            own = int(far[:, k].argmin())
+        far = far + self._elsewhere(tuple(bodies), what)
+        owners, strains = far.argmin(axis=0), np.broadcast_to(gauges, len(points))
+        for k, own in enumerate(owners):
             if far[own, k] > reach and not strains[k]:  # a gauge lies in a face, between nodes
+                whose = "the body" if self.bodies is None else f"{self.bodies[k]!r}"
                 raise ConfigError(
-                    f"{what} {k} at {points[k].tolist()} is {far[own, k]:.3g} m off the body; "
+                    f"{what} {k} at {points[k].tolist()} is {far[own, k]:.3g} m off {whose}; "
                     f"{reach:.3g} m is taken.",
                     hint="Compare the units and axes of the test with those of the geometry.",
                 )
@@ -104,18 +172,9 @@ class Channels:
                 raise ConfigError(
                     f"{what} {k} at {points[k].tolist()} is as near to one as to another of "
                     f"{named(list(bodies)[j] for j in near)}.",
-                    hint="Give a point of the body that is meant, beside its joint.",
+                    hint="Name the bodies of the channels, or give points beside the joint.",
                 )
-            surface, n = surfaces[own], int(nearest[own, k])
-            if strains[k]:
-                part = list(bodies.values())[own]
-                elastic = strain_rows(part, points[[k]], [d], what, [k])[0]
-                found[k, ends[own] - elastic.size : ends[own]] = elastic
-                continue
-            shape = surface.shape[3 * n : 3 * n + 3]
-            motion = np.hstack([np.eye(3), -skew(surface.points[n]), shape])
-            found[k, ends[own] - motion.shape[1] : ends[own]] = d / np.linalg.norm(d) @ motion
-        return found
+        return owners, nearest[owners, np.arange(len(points))]
 
 
 def _check_lengths(points: Array, surface: cKDTree, reach: float, what: str) -> None:
@@ -149,8 +208,11 @@ class Responses:
         averages: number of averages behind H and the coherence.
         quantity: "displacement", "velocity", "acceleration" or "strain" in the surface, of all
             sensors or (n_s,) of each.
-        force_noise: noise on the signal of a force over the force itself [1]. All sensors that were
-            measured at the same time have the error in common that comes of it.
+        force_noise: noise on the signal of a force over the force itself, one number or (n_f, n_e)
+            [1]. All sensors that were measured at the same time have the error in common that
+            comes of it.
+        estimator: "H1", "H2" or "Hv", which H is: its bias by the noise of forces and responses is
+            taken out. None where neither is noisy enough to matter.
 
     Raises:
         ConfigError: if these do not fit each other, or values are not finite.
@@ -163,7 +225,8 @@ class Responses:
     coherence: Any
     averages: int
     quantity: str | tuple[str, ...] = "displacement"
-    force_noise: float = 0.0
+    force_noise: Any = 0.0
+    estimator: str | None = None
 
     def __post_init__(self) -> None:
         f = finite("frequencies", self.frequencies, None)
@@ -192,9 +255,37 @@ class Responses:
                 f"coherence estimated from {self.averages} averages says nothing of the noise.",
                 hint="Average more, or give one number that is known.",
             )
-        if not finite("force_noise", self.force_noise, ()) >= 0:
-            raise ConfigError(f"force_noise = {self.force_noise}: zero or more.")
+        self._check_forces()
         self._check_values()
+
+    def _check_forces(self) -> None:
+        """See that noise of forces and the estimator are such."""
+        noise, one = finite("force_noise", self.force_noise, None), np.ndim(self.force_noise) == 0
+        if not one and noise.shape != self.H.shape[::2]:
+            raise ConfigError(f"force_noise {noise.shape}: one number or {self.H.shape[::2]}.")
+        if not (noise >= 0).all():
+            least = self.force_noise if one else float(noise.min())
+            raise ConfigError(f"force_noise = {least}: zero or more.")
+        if self.estimator is not None:
+            one_of("estimator", self.estimator, tuple(POWERS))
+
+    def _check_estimator(self) -> None:
+        """See that the bias by noisy forces can be taken out."""
+        if not np.any(self.force_noise):
+            return
+        if self.estimator is None:
+            raise ConfigError(
+                "forces are noisy, and the estimator of H is not named: H1 is too small by it, H2 "
+                "too large by that of responses.",
+                hint='Give estimator="H1", "H2" or "Hv"; analysers write H1 unless told otherwise.',
+            )
+        used = self.relative_error() <= MAX_RELATIVE_ERROR
+        share = (self._force_variance() / self._incoherent())[used]
+        if share.size and (middle := float(np.median(share))) > MAX_FORCE_SHARE:
+            raise ConfigError(
+                f"force_noise alone has {middle:.3g} times the power of all that is incoherent.",
+                hint="Give noise over force, not a percentage or power; compare the coherence.",
+            )
 
     def _check_values(self) -> None:
         used = self.relative_error() <= MAX_RELATIVE_ERROR
@@ -241,36 +332,101 @@ class Responses:
         Source:
             Bendat and Piersol, Random data, F-distribution of 2 and 2 n - 2 freedoms.
         """
+        n = self.averages - FREEDOM_LOST * self._estimated
+        return np.sqrt(self._incoherent() / (2 * n))
+
+    @property
+    def _estimated(self) -> bool:
+        """Whether the coherence is of the same records as H."""
+        return np.ndim(self.coherence) > 0
+
+    def _incoherent(self) -> Array:
+        """(n_f, n_s, n_e) incoherent over coherent power, (1 - c) / c [1]."""
         c = np.maximum(np.asarray(self.coherence, dtype=float), 1e-12)
-        n = self.averages - FREEDOM_LOST * bool(c.ndim)
-        return np.broadcast_to(random_error(c, n), self.H.shape)
+        return np.broadcast_to((1 - c) / c, self.H.shape)
 
-    def errors(self) -> tuple[Array, float]:
-        """Of ln H: (n_f, n_s, n_e) errors of the sensors, and the one that they have in common [1].
+    def _force_variance(self) -> Array:
+        """(n_f, 1, n_e) power of the noise of a force over that of the force [1]."""
+        noise = np.broadcast_to(np.asarray(self.force_noise, dtype=float), self.H.shape[::2])
+        return np.asarray(noise[:, None] ** 2, dtype=float)
 
-        The first is infinite where a value is not used. Of circular errors with the variance
-        s^2 in each part the logarithm has s^2 (1 + s^2 + ...). An estimated variance v of n
-        averages varies by v^2 / (n - 1); what is left of it without the common part varies as
-        much, so that one over it is too large by (v / left)^2 / (n - 2), to first order.
+    def errors(self, excess: Any = 0.0) -> "Errors":
+        """Of ln H, and what is known of them.
+
+        Args:
+            excess: (n_f, n_s, n_e) ln |H| of a model less that measured. An estimated variance is
+                that of H itself over the measured |H|^2: errors that make H larger make it
+                smaller, and H too large by twice the variance in the mean of ln H that is weighted
+                by it. Over that of a model it is free of them. Beyond three deviations it is a
+                wrong model.
+
+        Of circular errors with the variance s^2 in each part the logarithm has
+        s^2 (1 + s^2 + ...). One over an estimated variance that varies by d^2 of its square is too
+        large by d^2, to first order: 1 / (n - 2) of n averages, more where a common part is taken
+        off, see `rom.updating.frf_data.pooled`.
         """
-        error, n = self.relative_error(), self.averages
-        common = self.force_noise / np.sqrt(2 * n)
-        estimated = np.ndim(self.coherence) > 0
-        total = error**2 * ((n - FREEDOM_LOST) / (n - 1) if estimated else 1.0)
-        least = MIN_OWN_SHARE * total
-        own = np.maximum(total - common**2, least)
+        error, n, estimated = self.relative_error(), self.averages, self._estimated
+        freedom = n - 1 if estimated else n
+        total, common = (v / (2 * freedom) for v in (self._incoherent(), self._force_variance()))
         if estimated:
-            varied = (total / own) ** 2 / (n - FREEDOM_LOST)
-            own = own * (1 + np.where(own > least, varied, 0.0))
-        used = error <= MAX_RELATIVE_ERROR
-        return np.sqrt(np.where(used, own * (1 + error**2), np.inf)), common
+            total = total * np.exp(-2 * np.clip(excess, -MAX_EXCESS * error, MAX_EXCESS * error))
+        used, own = error <= MAX_RELATIVE_ERROR, total - common
+        varied, scale = np.full((), 1 / (n - FREEDOM_LOST) if estimated else 0.0), 0.0
+        if estimated and common.any():
+            over = np.where(common > 0, common, np.inf)
+            share, spread, alike = pooled(own / over, used & (common > 0), n)
+            own = np.where(common > 0, share * common, own)
+            size = np.maximum(share, 1e-12) ** 2
+            varied = np.where(common > 0, spread / size, varied)
+            counted = used & (own > MIN_OWN_SHARE * total)
+            scale = float((alike / size)[counted].sum() / max(counted.sum(), 1))
+        least = MIN_OWN_SHARE * total
+        varied = np.where(own > least, varied, 0.0)
+        own = np.maximum(own, least) * (1 + varied)
+        own = np.sqrt(np.where(used, own * (1 + error**2), np.inf))
+        known = max(n - 3, 0.5) / (n - 1) if estimated else 1.0
+        return Errors(own, np.sqrt(common), np.sqrt(varied), known, scale)
 
     def logarithm(self) -> Complex:
-        """(n_f, n_s, n_e) ln of displacement [m/N] or strain [1/N]; zero where H is not used."""
+        """(n_f, n_s, n_e) ln of displacement [m/N] or strain [1/N]; zero where H is not used.
+
+        Without the bias of its estimator: those of H1, Hv and H2 exceed it by -ln (1 + v)
+        and by none, half and all of -ln c, with the coherence c and the power v of the noise of a
+        force over that of the force.
+
+        Raises:
+            ConfigError: if forces are noisy and the estimator is not named, or if they are noisier
+                than the coherence allows.
+        """
+        self._check_estimator()
         s = 2j * np.pi * self.frequencies[:, None, None]
         used = self.relative_error() <= MAX_RELATIVE_ERROR
         orders = np.array([DERIVATIVES.get(quantity, 0) for quantity in self.quantities])
-        return np.log(np.where(used, self.H / s ** orders[:, None], 1.0))
+        found = np.log(np.where(used, self.H / s ** orders[:, None], 1.0))
+        if self.estimator is None:
+            return found
+        bias = POWERS[self.estimator] * np.log1p(self._incoherent())
+        return np.where(used, found + np.log1p(self._force_variance()) - bias, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Errors:
+    """Standard deviations of real and imaginary part of ln H.
+
+    Attributes:
+        own: (n_f, n_s, n_e) of the sensors; infinite where a value is not used [1].
+        common: (n_f, 1, n_e) what the sensors have in common [1].
+        varied: (n_f, n_s, n_e) or a zero: standard deviation of the square of the own one, over
+            it, where it is estimated [1].
+        known: chi-square of all residuals has so many degrees of freedom for each [1].
+        scale: variance of the squares of all own ones together, over these squares [1].
+    """
+
+    own: Array
+    common: Array
+    varied: Array
+    known: float
+    scale: float
 
 
 @dataclass(frozen=True, slots=True)

@@ -32,6 +32,9 @@ BLOCK_LINES = 256  # at once: some ten megabytes of derivatives for sixty channe
 MAX_STEPS = 40  # linear solutions
 STEP_ATOL = 1e-8  # in standard deviations, below which equations are solved
 MAX_PARAMETER_CHANGE = 0.2  # in one step
+SHRINKING_RATIO = (
+    0.5  # of a step, over the one before, from which on noise of derivatives does not lead
+)
 MIN_PARAMETER = -0.95  # change that leaves a twentieth of the stiffness or mass
 EQUAL_EIGENVALUE_RTOL = 1e-12  # distance of eigenvalues whose modes have no derivative
 
@@ -276,8 +279,10 @@ def solved(
     """Least squares that are linear in p and ln zeta in each step, none longer than 0.2.
 
     Args:
-        triangle: the function of p and zeta that gives the triangle (n + 1, n + 1) of derivatives
-            and residual, see `folded`.
+        triangle: the function of p and zeta that gives the triangle, see `folded`, of derivatives
+            and residual, n + 1 columns; or of n instruments before them, which noise of the
+            derivatives leaves alone: the residual is made normal to these, and they take the place
+            of the derivatives as soon as a step is not half as long as the one before.
         start: p (n_p,) [1] and zeta (m,) [1].
         n_values: number of residuals.
         limits: of p [1].
@@ -289,23 +294,26 @@ def solved(
     (x, ratios), path = start, []
     before = np.r_[np.zeros(x.size), np.full(ratios.size, np.log(prior_damping[0]))]
     sigma = np.r_[np.broadcast_to(prior, x.shape), np.full(ratios.size, prior_damping[1])]
-    precision, n = np.diag(1.0 / sigma), sigma.size
+    precision, n, last = np.diag(1.0 / sigma), sigma.size, np.inf
     for _ in range(MAX_STEPS):
         R = triangle(x, ratios)
-        left = R[:, n] @ R[:, n]
+        left = R[:, -1] @ R[:, -1]
         noise = np.sqrt(left / max(n_values - n, 1)) or 1.0
-        J = np.vstack([R[:, :n] / noise, precision])
-        r = np.r_[R[:, n] / noise, precision @ (np.r_[x, np.log(ratios)] - before)]
-        step = np.clip(
-            -np.linalg.lstsq(J, r, rcond=None)[0], -MAX_PARAMETER_CHANGE, MAX_PARAMETER_CHANGE
-        )
+        lead = R[:, -n - 1 : -1] if last else R[:, :n]
+        normal_to, J = (np.vstack([A / noise, precision]) for A in (R[:, :n], lead))
+        r = np.r_[R[:, -1] / noise, precision @ (np.r_[x, np.log(ratios)] - before)]
+        Q = np.linalg.qr(normal_to)[0]
+        step = -np.linalg.lstsq(Q.T @ J, Q.T @ r, rcond=None)[0]
+        step = np.clip(step, -MAX_PARAMETER_CHANGE, MAX_PARAMETER_CHANGE)
         ratios = ratios * np.exp(step[x.size :])
         step[: x.size] = np.clip(x + step[: x.size], *limits) - x
         x = x + step[: x.size]
         path.append(x)
-        if np.linalg.norm(J @ step) < enough:
+        moved = float(np.linalg.norm(normal_to @ step))
+        if moved < enough:
             break
-    covariance = np.linalg.pinv(J.T @ J, hermitian=True)
+        last = moved if moved < SHRINKING_RATIO * last else 0.0
+    covariance = np.linalg.pinv(normal_to.T @ normal_to, hermitian=True)
     return Update(x, ratios, covariance, np.array(path), np.sqrt(left / n_values))
 
 

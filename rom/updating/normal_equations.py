@@ -30,33 +30,43 @@ class Data:
         logarithm: (n_f, n_s, n_e) ln of displacement per force.
         weight: (n_f, n_s, n_e) one over the standard deviation of both its parts; 0 for values
             that are not used.
-        common: standard deviation of the error that all sensors of a line and an input share.
+        common: (n_f, 1, n_e) or one standard deviation of the error that all sensors of a line and
+            an input share.
+        varied: (n_f, n_s, n_e) or one standard deviation of the squared errors of sensors over
+            themselves, where they are estimated.
+        known: degrees of freedom of chi-square for each residual.
+        scale: relative variance of all squared errors of sensors together.
     """
 
     omega: Array
     logarithm: Complex
     weight: Array
-    common: float = 0.0
+    common: Any = 0.0
+    varied: Any = 0.0
+    known: float = 1.0
+    scale: float = 0.0
 
     @staticmethod
-    def of(test: Responses) -> "Data":
-        """What a test says."""
-        own, common = test.errors()
-        return Data(2 * np.pi * test.frequencies, test.logarithm(), 1.0 / own, common)
+    def of(test: Responses, excess: Any = 0.0) -> "Data":
+        """What a test says; by the level of a model beside it, see `Responses.errors`."""
+        e, omega = test.errors(excess), 2 * np.pi * test.frequencies
+        return Data(omega, test.logarithm(), 1.0 / e.own, e.common, e.varied, e.known, e.scale)
 
-    def lines(self, chosen: Index) -> "Data":
+    def lines(self, chosen: Index | slice) -> "Data":
         """Some of the lines."""
         return replace(
             self,
             omega=self.omega[chosen],
             logarithm=self.logarithm[chosen],
             weight=self.weight[chosen],
+            common=self.common[chosen] if np.ndim(self.common) else self.common,
+            varied=self.varied[chosen] if np.ndim(self.varied) else self.varied,
         )
 
     def roughly(self) -> "Data":
         """Lines at even distances, with errors that are large enough to start from afar."""
         few = self.lines(np.arange(0, self.omega.size, -(-self.omega.size // ROUGH_LINES)))
-        return replace(few, weight=np.minimum(few.weight, 1 / ROUGH_ERROR), common=0.0)
+        return replace(few, weight=np.minimum(few.weight, 1 / ROUGH_ERROR), common=0.0, varied=0.0)
 
     @property
     def n_values(self) -> int:
@@ -72,11 +82,13 @@ class Sums:
         normal: (n_q, n_q) J^T J.
         gradient: (n_q,) J^T r.
         squares: (n_f, n_s, n_e) squared residuals, of real and imaginary part together.
+        varied: (n_q, n_q) what the information is worth less as weights are estimated.
     """
 
     normal: Array
     gradient: Array
     squares: Array
+    varied: Any = 0.0
 
     @property
     def chi_square(self) -> float:
@@ -158,22 +170,53 @@ def sums(model: FamilyModel, x: Array, ratios: Array, data: Data) -> Sums:
         data: what was measured.
     """
     n = x.size + ratios.size
-    normal, gradient = np.zeros((n, n)), np.zeros(n)
+    normal, varied, gradient = np.zeros((n, n)), np.zeros((n, n)), np.zeros(n)
     squares = np.zeros(data.weight.shape)
     at = sensitivity(model, x, ratios)
     for block in blocks(data.omega.size):
-        w = data.weight[block]
-        H, J = at(data.omega[block])
-        log = wrapped(np.log(H) - data.logarithm[block]) * (w > 0)
-        J = white(J / H[..., None], w, data.common).reshape(-1, n)
-        r = white(log[..., None], w, data.common)[..., 0]
-        normal += (J.conj().T @ J).real
-        gradient += (J.conj().T @ r.ravel()).real
+        some = data.lines(block)
+        w = some.weight
+        H, J = at(some.omega)
+        log = wrapped(np.log(H) - some.logarithm) * (w > 0)
+        J = white(J / H[..., None], w, some.common)
+        r = white(log[..., None], w, some.common)[..., 0]
+        normal += _gram(J, n)
+        gradient += (J.reshape(-1, n).conj().T @ r.ravel()).real
         squares[block] = np.abs(r) ** 2
-    return Sums(normal, gradient, squares)
+        if np.any(some.varied):
+            varied += _gram(unsure(J, w, some.common, some.varied), n)
+    return Sums(normal, gradient, squares, varied)
 
 
-def white(log: Complex, weight: Array, common: float) -> Complex:
+def _gram(J: Complex, n: int) -> Array:
+    flat = J.reshape(-1, n)
+    return np.asarray((flat.conj().T @ flat).real)
+
+
+def unsure(J: Complex, weight: Array, common: Any, varied: Any) -> Complex:
+    """(n_f, n_s, n_e, n) derivatives of which J^H J is what estimated weights cost.
+
+    With V = D^-1 + c^2 1 1^T and own variances d = 1 / D that vary by (v d)^2, estimates by
+    weights that vary have the covariance N^-1 + N^-1 Q N^-1, to second order, where
+    Q = J^T V^-1 diag(V^-1) v^2 d^2 V^-1 J.
+
+    Args:
+        J: (n_f, n_s, n_e, n) of residuals that are white.
+        weight: see `white`.
+        common: see `white`.
+        varied: (n_f, n_s, n_e) relative standard deviation of own variances.
+
+    Source:
+        Kackar and Harville, Approximations for standard errors of estimators of fixed and random
+        effects in mixed linear models, J. Am. Stat. Assoc. 79 (1984) 853.
+    """
+    w, d = np.where(weight > 0, weight, 1.0), weight**2
+    c = common**2
+    own = 1 - c * d / (1 + c * d.sum(axis=1, keepdims=True))
+    return white(J / w[..., None], weight, common) * (varied * np.sqrt(own))[..., None]
+
+
+def white(log: Complex, weight: Array, common: Any) -> Complex:
     """(n_f, n_s, n_e, n) logarithms whose errors become independent and of the variance one.
 
     Errors have the covariance D^-1 + c^2 1 1^T over the sensors, D = weight^2. With s the
@@ -182,12 +225,12 @@ def white(log: Complex, weight: Array, common: float) -> Complex:
     Args:
         log: (n_f, n_s, n_e, n) logarithms.
         weight: (n_f, n_s, n_e) one over the errors of the sensors.
-        common: error that they share.
+        common: (n_f, 1, n_e) or one error that they share.
     """
-    if common:
+    if np.any(common):
         d = weight[..., None] ** 2
         s = np.maximum(d.sum(axis=1, keepdims=True), np.finfo(float).tiny)
-        share = 1 - 1 / np.sqrt(1 + common**2 * s)
+        share = 1 - 1 / np.sqrt(1 + np.asarray(common)[..., None] ** 2 * s)
         log = log - share * (d * log).sum(axis=1, keepdims=True) / s
     return weight[..., None] * log
 

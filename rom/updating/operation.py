@@ -23,12 +23,10 @@ from scipy.linalg import eigh, expm, expm_frechet
 from rom.arguments import finite, one_of
 from rom.body.flexible import FlexibleBody
 from rom.body.recovery import StressRecovery
-from rom.body.surface import strain_rows
 from rom.errors import ConfigError, ModelError
 from rom.model import Array
 from rom.names import named
-from rom.parametric.family import BodyFamily
-from rom.updating.family_model import Attached, family_model
+from rom.updating.family_model import Attached, Family, Parts, families_of, family_model
 from rom.updating.measured import POINT_RTOL, Channels
 
 UNITS = {
@@ -190,13 +188,13 @@ def of_body(
         ModelError: if the body has no surface or stress where they are needed.
     """
     omega, V = body.modes(fixed=fixed)
-    m, none = omega.size, np.zeros(0)
+    m, none, parts = omega.size, np.zeros(0), Parts.of(body)
     if not m:
         raise ConfigError(f"body {body.name!r} cannot move with {fixed!r} held.")
     XI = V[6:].T @ body.D @ V[6:]
     XI[omega == 0], XI[:, omega == 0] = 0.0, 0.0  # rigid motion is not damped
     groups = [
-        _rows(body, _stress(body, several), V, several, what)
+        _rows(parts, [("", body)], V, several, what)
         for several, what in ((sensors, "sensor"), (wanted, "wanted value"))
     ]
     return Operation(
@@ -209,7 +207,7 @@ def of_body(
 
 
 def of_family(
-    family: BodyFamily,
+    family: Family,
     names: Sequence[str],
     attached: Attached,
     channels: tuple[Sequence[Sensors], Channels, Sequence[Sensors]],
@@ -219,7 +217,7 @@ def of_family(
     """The equations of a family; parameters that are not named stay at factors of one.
 
     Args:
-        family: without parameters of thickness.
+        family: without parameters of thickness; or several, coupled or on springs.
         names: of parameters that change.
         attached: springs and masses, by name.
         channels: sensors, forces and what is wanted.
@@ -229,79 +227,81 @@ def of_family(
     Raises:
         ConfigError, ModelError: as `of_body`; ConfigError for a name that is not known.
     """
-    body, nothing = family.body, np.zeros((0, 6 + family.body.n_modes))
-    model = family_model(family, (np.eye(6 + body.n_modes), nothing), attached, {}, fixed)
+    parts = Parts.of(family)
+    model = family_model(family, (np.eye(parts.n), np.zeros((0, parts.n))), attached, {}, fixed)
     if wrong := set(names) - set(model.names):
         raise ConfigError(
             f"there is no parameter {named(sorted(wrong))}.",
             hint=f"The family and what is attached have {named(model.names)}.",
         )
     if not model.K.shape[1]:
-        raise ConfigError(f"body {body.name!r} cannot move with {fixed!r} held.")
+        what = named(body.name for body in parts.bodies.values())
+        raise ConfigError(f"body {what} cannot move with {fixed!r} held.")
     lam, U = eigh(model.K.sum(axis=0), model.M.sum(axis=0))
     omega, V = np.sqrt(np.maximum(lam, 0.0)), model.seen @ U
     omega[: model.n_rigid] = 0.0
     chosen = [model.names.index(name) for name in names]
     sensors, forces, wanted = channels
-    parts = [share.stress for share in family.shares] + [None] * len(attached)
+    terms = _terms(family)
     groups = [
-        _rows(body, _stress(body, several, parts), V, several, what)
+        _rows(parts, terms, V, several, what, len(attached))
         for several, what in ((sensors, "sensor"), (wanted, "wanted value"))
     ]
     return Operation(
         tuple(names), np.log(model.low[chosen]), np.log(model.high[chosen]), omega,
         K=U.T @ model.K @ U, M=U.T @ model.M @ U,
         k_powers=model.k_powers[:, chosen], m_powers=model.m_powers[:, chosen],
-        XI=np.diag(2 * damping * omega), driven=(forces.rows(body, "force") @ V).T,
+        XI=np.diag(2 * damping * omega), driven=(forces.rows(parts.bodies, "force") @ V).T,
         seen=groups[0], wanted=groups[1],
     )  # fmt: skip
 
 
-def _stress(
-    body: FlexibleBody, several: Sequence[Sensors], parts: Sequence[Array | None] = ()
-) -> list[FlexibleBody]:
-    """The body with the stress of each term, where stress is asked for.
-
-    Raises:
-        ModelError: if the body knows no stress.
-    """
-    if all(s.quantity != "stress" for s in several):
-        return [body] * max(len(parts), 1)
-    recovery = _linear_stress(body)
-    if not parts:
-        return [body]
-    none = np.zeros_like(recovery.operator)
-    return [
-        replace(body, stress=StressRecovery(recovery.points, none if A is None else A))
-        for A in parts
-    ]
+def _terms(family: Family) -> list[tuple[str, FlexibleBody]]:
+    """For each term of a family the name of its body, and that with the stress of the term."""
+    found = []
+    for name, one in families_of(family).items():
+        for share in one.shares:
+            stress = one.body.stress
+            if isinstance(stress, StressRecovery):
+                own = np.zeros_like(stress.operator) if share.stress is None else share.stress
+                stress = StressRecovery(stress.points, own)
+            found.append((name, replace(one.body, stress=stress)))
+    return found
 
 
 def _rows(
-    body: FlexibleBody, terms: list[FlexibleBody], V: Array, several: Sequence[Sensors], what: str
+    parts: Parts,
+    terms: list[tuple[str, FlexibleBody]],
+    V: Array,
+    several: Sequence[Sensors],
+    what: str,
+    n_attached: int = 0,
 ) -> Rows:
     """Rows of channels, one below the other."""
     k, m, order = sum(len(s.names) for s in several), V.shape[1], ("displacement", "velocity")
-    parts = {name: np.zeros((k, m)) for name in (*order, "acceleration")}
-    carried, first = np.zeros((len(terms), k, m)), 0
+    rows = {name: np.zeros((k, m)) for name in (*order, "acceleration")}
+    carried, first = np.zeros((len(terms) + n_attached, k, m)), 0
     for s in several:
-        own = slice(first, first + len(s.names))
-        first = own.stop
-        if s.quantity == "stress":
-            for t, term in enumerate(terms):
-                static, inertial = stress_rows(term, s.channels, what)
-                carried[t, own] = static @ V[6:]
-                parts["acceleration"][own] += inertial @ V
-        elif s.quantity == "strain":
-            parts["displacement"][own] = (
-                strain_rows(body, s.channels.points, s.channels.directions, what) @ V[6:]
-            )
-        else:
-            parts[s.quantity][own] = s.channels.rows(body, what) @ V
-    return Rows(parts["displacement"], carried, parts["velocity"], parts["acceleration"])
+        own = np.arange(first, first + len(s.names))
+        first += own.size
+        if s.quantity != "stress":
+            seen = s.channels.rows(parts.bodies, what, gauges=s.quantity == "strain") @ V
+            rows["displacement" if s.quantity == "strain" else s.quantity][own] = seen
+            continue
+        owners = np.array(s.channels.owners(parts.bodies, what))
+        for t, (name, term) in enumerate(terms):
+            lies, here = np.flatnonzero(owners == name), V[parts.columns[name]]
+            if not lies.size:
+                continue
+            static, inertial = stress_rows(term, s.channels, what, lies)
+            carried[t, own[lies]] = static @ here[6:]
+            rows["acceleration"][own[lies]] += inertial @ here
+    return Rows(rows["displacement"], carried, rows["velocity"], rows["acceleration"])
 
 
-def stress_rows(body: FlexibleBody, channels: Channels, what: str) -> tuple[Array, Array]:
+def stress_rows(
+    body: FlexibleBody, channels: Channels, what: str, chosen: Any = None
+) -> tuple[Array, Array]:
     """Normal stress along channels by elastic coordinates (k, r) [Pa], and by accelerations.
 
     The latter (k, 6 + r), of rigid and elastic coordinates, is that of modes left out.
@@ -310,6 +310,7 @@ def stress_rows(body: FlexibleBody, channels: Channels, what: str) -> tuple[Arra
         body: with stress on its surface.
         channels: where, and along which direction.
         what: they are, for messages.
+        chosen: (k,) numbers of channels; None for all.
 
     Raises:
         ConfigError: if a channel is off the body.
@@ -322,18 +323,18 @@ def stress_rows(body: FlexibleBody, channels: Channels, what: str) -> tuple[Arra
     left_out = np.zeros((len(recovery.operator), 6 + n_r))
     if extra is not None:
         left_out = np.hstack([extra[:, :6], extra[:, -n_r:]])
-    static, inertial = [], []
-    directions = np.asarray(channels.directions)
-    for k, (x, d) in enumerate(zip(np.asarray(channels.points), directions, strict=True)):
+    static, inertial = [np.zeros((0, n_r))], [np.zeros((0, 6 + n_r))]
+    for k in range(len(np.asarray(channels.points))) if chosen is None else chosen:
+        x, d = np.asarray(channels.points)[k], np.asarray(channels.directions)[k]
         far = np.linalg.norm(recovery.points - x, axis=1)
         n = int(far.argmin())
         if far[n] > reach:
             raise ConfigError(f"{what} {k} at {x.tolist()} is {far[n]:.3g} m off the body.")
         a, b, c = d / np.linalg.norm(d)
         along = np.array([a * a, b * b, c * c, 2 * b * c, 2 * a * c, 2 * a * b])
-        static.append(along @ recovery.operator[6 * n : 6 * n + 6])
-        inertial.append(along @ left_out[6 * n : 6 * n + 6])
-    return np.array(static), np.array(inertial)
+        static.append(along @ recovery.operator[None, 6 * n : 6 * n + 6])
+        inertial.append(along @ left_out[None, 6 * n : 6 * n + 6])
+    return np.vstack(static), np.vstack(inertial)
 
 
 def _linear_stress(body: FlexibleBody) -> StressRecovery:

@@ -21,9 +21,8 @@ from rom.arguments import finite, positive, typed
 from rom.errors import ConfigError, ParameterError, SolverError
 from rom.model import Array
 from rom.names import named
-from rom.parametric.family import BodyFamily
 from rom.plausible import check_damping_ratio
-from rom.updating.family_model import Attached
+from rom.updating.family_model import Attached, Family, Parts
 from rom.updating.measured import Channels
 from rom.updating.operation import (
     Linear,
@@ -148,7 +147,7 @@ class ParameterTracker:
 
 @typed
 def parameter_tracker(  # noqa: PLR0913  keywords of one call
-    family: BodyFamily,
+    family: Family,
     sensors: Sequence[Sensors],
     forces: Channels,
     wanted: Sequence[Sensors],
@@ -165,7 +164,8 @@ def parameter_tracker(  # noqa: PLR0913  keywords of one call
     """A filter that also follows parameters: a joint that loosens, a mass that grows.
 
     Args:
-        family: from `rom.reduce_parametric`, with moduli and densities, in SI units.
+        family: from `rom.reduce_parametric`, with moduli and densities, in SI units; or several, as
+            a `rom.parametric.FamilyAssembly`, whose parameters are called "body.parameter".
         sensors: see `tracker`.
         forces: see `tracker`.
         wanted: see `tracker`.
@@ -173,7 +173,7 @@ def parameter_tracker(  # noqa: PLR0913  keywords of one call
         dt: see `tracker` [s].
         walk: see `tracker` [N/s^(1/2)].
         damping: ratio of all modes at factors of one [1].
-        attached: {name: `GroundSpring` or `AddedMass`}.
+        attached: {name: `GroundSpring`, `AddedMass` or `JointSpring`}.
         fixed: see `tracker`.
         unmodelled: see `tracker` [m kg^(1/2)/s^(3/2)].
         first: see `tracker` [N].
@@ -184,8 +184,8 @@ def parameter_tracker(  # noqa: PLR0913  keywords of one call
         ParameterError: for a name that is taken.
         InterfaceError: if an interface is unknown.
     """
-    if family.body.units != "SI":
-        raise ConfigError(f"the family is in {family.body.units}; track it in SI units.")
+    if other := {body.units for body in Parts.of(family).bodies.values()} - {"SI"}:
+        raise ConfigError(f"the family is in {other.pop()}; track it in SI units.")
     if not parameters:
         raise ConfigError("no parameter changes.", hint="Use tracker for a body that stays.")
     check_damping_ratio(damping)

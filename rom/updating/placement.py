@@ -93,13 +93,13 @@ class Plan:
 
 
 @typed
-def candidates(body: FlexibleBody, n: int, *, fixed: Any = ()) -> Channels:
+def candidates(body: FlexibleBody | Family, n: int, *, fixed: Any = ()) -> Channels:
     """Points spread over the surface of a body, each with the three axes as directions.
 
     Each next point is the one farthest from those before. Points that supports hold are left out.
 
     Args:
-        body: with its outer surface.
+        body: with its outer surface; a family of bodies, or several in an assembly: all surfaces.
         n: number of points.
         fixed: what is held in the test, see `FlexibleBody.frequencies`.
 
@@ -108,12 +108,20 @@ def candidates(body: FlexibleBody, n: int, *, fixed: Any = ()) -> Channels:
 
     Raises:
         ConfigError: if the surface has fewer points that move.
-        ModelError: if the body carries no surface.
+        ModelError: if a body carries no surface.
     """
-    points = surface_of(body).points
-    everywhere = Channels(np.repeat(points, 3, axis=0), np.tile(np.eye(3), (len(points), 1)))
-    _, V = body.modes(fixed=fixed)
-    motion = np.linalg.norm(everywhere.rows(body, "candidate") @ V, axis=1).reshape(-1, 3)
+    parts = Parts.of(body)
+    points = np.vstack([surface_of(one).points for one in parts.bodies.values()])
+    counts = [len(surface_of(one).points) for one in parts.bodies.values()]
+    owners = np.repeat(np.array(list(parts.bodies)), counts)
+    alone = parts.bodies.get("")
+    everywhere = Channels(
+        np.repeat(points, 3, axis=0),
+        np.tile(np.eye(3), (len(points), 1)),
+        None if alone else tuple(np.repeat(owners, 3).tolist()),
+    )
+    V = _motions(body, parts, fixed)
+    motion = np.linalg.norm(everywhere.rows(parts.bodies, "candidate") @ V, axis=1).reshape(-1, 3)
     moving = np.flatnonzero(motion.max(axis=1) > INDEPENDENCE_RTOL * motion.max())
     whole("n", n, 1, len(moving), reason="points of the surface that move")
     points = points[moving]
@@ -121,7 +129,15 @@ def candidates(body: FlexibleBody, n: int, *, fixed: Any = ()) -> Channels:
     while len(chosen) < n:
         far = np.minimum(far, np.linalg.norm(points - points[chosen[-1]], axis=1))
         chosen.append(int(far.argmax()))
-    return Channels(np.repeat(points[chosen], 3, axis=0), np.tile(np.eye(3), (n, 1)))
+    return everywhere.some((3 * moving[chosen][:, None] + np.arange(3)).ravel())
+
+
+def _motions(body: FlexibleBody | Family, parts: Parts, fixed: Any) -> Array:
+    """(n, m) what supports leave to all coordinates."""
+    if isinstance(body, FlexibleBody):
+        return body.modes(fixed=fixed)[1]
+    nothing = np.zeros((0, parts.n))
+    return family_model(body, (nothing, nothing), {}, {}, fixed).motions
 
 
 @typed
@@ -238,8 +254,8 @@ def place(  # noqa: PLR0913  keywords of one call
     width = np.r_[np.log(model.high / model.low), np.ones(len(names) - len(model.names))]
     assumed = np.array([name in model.names and name not in (prior or {}) for name in names])
     return Plan(
-        sensors=_some(sensors, s),
-        inputs=_some(inputs, e),
+        sensors=sensors.some(s),
+        inputs=inputs.some(e),
         sensor_numbers=s,
         input_numbers=e,
         names=names,
@@ -359,7 +375,3 @@ def _exchanged(known: Array, blocks: Array, chosen: list[int], n_p: int) -> list
         if same:
             break
     return chosen
-
-
-def _some(channels: Channels, numbers: Index) -> Channels:
-    return Channels(np.asarray(channels.points)[numbers], np.asarray(channels.directions)[numbers])

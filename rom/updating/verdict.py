@@ -1,4 +1,6 @@
-"""What the data say: channels that cannot be right, whether noise explains what is left, and where.
+"""What the data say: the record of an update, channels that cannot be right, and the verdict.
+
+It says whether noise explains what is left, and where it does not.
 
 Source:
     Score test: Rao, Large sample tests of statistical hypotheses, Proc. Cambridge Philos. Soc. 44
@@ -6,16 +8,25 @@ Source:
 """
 
 from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from scipy.stats import chi2
+from scipy.stats import f as f_ratio
 
+from rom.arguments import finite, whole
+from rom.assembly.assembly import Assembly
+from rom.body.flexible import FlexibleBody
 from rom.errors import ConfigError
 from rom.model import Array, Index, Mask, Report, Row
+from rom.parametric.assembled import FamilyAssembly
 from rom.rows import row
+from rom.updating.family_model import Family, FamilyModel, Parts
 from rom.updating.frf_data import Complex, frac
+from rom.updating.measured import Channels
 from rom.updating.models import DEAD_RATIO
-from rom.updating.normal_equations import Data, Sums, wrapped
+from rom.updating.normal_equations import Data, Sums, responses_at, wrapped
 
 KNOWN_FACTORS = {
     9.80665: "acceleration in g",
@@ -29,10 +40,155 @@ FACTOR_LOG_ATOL = 0.7  # within which a known factor is named
 MIN_PHASE_COSINE = -0.4  # mean over the lines: a sensor of which measures the other direction
 MIN_OTHERS_COSINE = 0.2  # mean over the other sensors, without which phases say nothing
 MAX_FALSE_REFUSAL = 1e-3  # probability that a row refuses a right model
+MIN_SCALE = 1e-8  # variance of a scale that is worth a thought
 MAX_SCORE = 4.0  # standard deviations
 N_BANDS = 8  # of lines, in which the misfit is looked for
 MAX_UNLIKE = 0.5  # one less the median FRAC: more is another body
 UNSEEN_RTOL = 0.5  # of a parameter's range: a wider standard deviation says nothing new
+
+
+@dataclass(frozen=True, slots=True)
+class Updated:
+    """What a test says about a family.
+
+    Attributes:
+        family: that was updated, or the assembly of families.
+        factors: all parameters, also those that were kept [1].
+        zeta: (m,) damping ratios of the lowest elastic modes, the last one of all others too [1].
+        names: (n,) of the unknowns, damping ratios last.
+        covariance: (n, n) of the logarithms of the unknowns [1].
+        verdict: whether noise alone explains what is left, and where it does not.
+        by_sensor: (n_s,) mean squared residual over its expectation [1].
+        by_line: (n_f,) likewise [1]; NaN for lines that were not used.
+        scores: {name: by how many standard deviations the data ask for a parameter that was not
+            updated [1]}; beyond four it is missing, with the sign of its change.
+        unseen: directions, {name: share [1]} in the parameters, that the data do not see.
+        at_bound: names of parameters that lie at an end of their range.
+        model: the family at the sensors and inputs of the test.
+    """
+
+    family: Family
+    factors: dict[str, float]
+    zeta: Array
+    names: tuple[str, ...]
+    covariance: Array
+    verdict: Report
+    by_sensor: Array
+    by_line: Array
+    scores: dict[str, float]
+    unseen: tuple[dict[str, float], ...]
+    at_bound: tuple[str, ...]
+    model: FamilyModel
+
+    @property
+    def deviations(self) -> dict[str, float]:
+        """Relative standard deviation of each unknown [1]."""
+        return dict(zip(self.names, np.sqrt(np.diag(self.covariance)).tolist(), strict=True))
+
+    @property
+    def correlations(self) -> Array:
+        """(n, n) correlation of the unknowns [1]."""
+        d = np.sqrt(np.diag(self.covariance))
+        return self.covariance / np.outer(d, d)
+
+    @property
+    def logarithms(self) -> Array:
+        """(n_p,) of all factors; zero for parameters that are not in the model [1]."""
+        return np.log(np.where(self.model.present, list(self.factors.values()), 1.0))
+
+    @property
+    def body(self) -> FlexibleBody:
+        """The body at the factors found; its provenance says by which data, and how surely.
+
+        Raises:
+            ConfigError: if an assembly was updated.
+        """
+        if isinstance(self.family, FamilyAssembly):
+            raise ConfigError("an assembly has several bodies.", hint="Take Updated.assembly.")
+        return self._signed(self.family.at(**self._own))
+
+    @property
+    def assembly(self) -> Assembly:
+        """The assembly at the factors found, without what is attached; bodies as `body`.
+
+        Raises:
+            ConfigError: if a body alone was updated.
+        """
+        if not isinstance(self.family, FamilyAssembly):
+            raise ConfigError("one body was updated, no assembly.", hint="Take Updated.body.")
+        found = self.family.at(**self._own)
+        bodies = {name: self._signed(body) for name, body in found.bodies.items()}
+        return replace(found, bodies=bodies)
+
+    @property
+    def _own(self) -> dict[str, Any]:
+        return {name: self.factors[name] for name in self.family.parameters}
+
+    def _signed(self, body: FlexibleBody) -> FlexibleBody:
+        data = {
+            "factors": self.factors,
+            "deviations": self.deviations,
+            "damping": self.zeta.tolist(),
+            "lines": int(np.count_nonzero(np.isfinite(self.by_line))),
+            "sensors": self.by_sensor.size,
+            "verdict holds": self.verdict.ok,
+        }
+        return replace(body, provenance=body.provenance | {"updating": data})
+
+    def responses(self, frequencies: Any) -> Complex:
+        """(n_f, n_s, n_e) displacement per force of the updated model at lines [Hz] [m/N].
+
+        Raises:
+            ConfigError: for lines that are not finite.
+        """
+        omega = 2 * np.pi * finite("frequencies", frequencies, None)
+        return responses_at(self.model, self.logarithms, self.zeta, omega)
+
+    def drawn(
+        self, frequencies: Any, sensors: Channels, inputs: Channels, *, n: int, seed: int = 0
+    ) -> Complex:
+        """Responses, also where nothing was measured, at factors that the test leaves possible.
+
+        Logarithms of the unknowns are normal about what was found, with its covariance. The spread
+        of the responses is what is not known of them if the model is right.
+
+        Args:
+            frequencies: (n_f,) lines [Hz].
+            sensors: anywhere on the body.
+            inputs: likewise.
+            n: number of draws.
+            seed: of the random numbers.
+
+        Returns:
+            (n, n_f, n_s, n_e) displacement per force [m/N].
+
+        Raises:
+            ConfigError: for lines that are not finite, channels off the body, or no draw.
+        """
+        whole("n", n, 1, None)
+        seen, driven = (
+            channels.rows(Parts.of(self.family).bodies, what) @ self.model.motions
+            for channels, what in ((sensors, "sensor"), (inputs, "input"))
+        )
+        model = replace(self.model, seen=seen, driven=driven)
+        x = self.logarithms
+        labels = (*model.names, *(f"zeta {k + 1}" for k in range(self.zeta.size)))
+        unknown = [labels.index(name) for name in self.names]
+        theta = np.tile(np.r_[x, np.log(self.zeta)], (n, 1))
+        rng = np.random.default_rng(seed)
+        theta[:, unknown] += rng.multivariate_normal(np.zeros(len(unknown)), self.covariance, n)
+        omega = 2 * np.pi * finite("frequencies", frequencies, None)
+        return np.array(
+            [responses_at(model, row[: x.size], np.exp(row[x.size :]), omega) for row in theta]
+        )
+
+    def __str__(self) -> str:
+        d = self.deviations
+        lines = [
+            f"  {name} = {self.factors.get(name, np.nan):.5g} +- {100 * d[name]:.2g} %"
+            for name in self.names if name in self.factors
+        ]  # fmt: skip
+        return "\n".join(["updated factors", *lines, str(self.verdict)])
 
 
 def check_channels(models: Iterable[Complex], data: Data) -> None:
@@ -191,17 +347,18 @@ def verdict(s: Sums, data: Data, n: int, missing: dict[str, float], doubts: list
     """
     freedom = data.n_values - n
     counted = 2.0 * (data.weight > 0)
-    rows = [chi_row("chi-square of all residuals", s.chi_square, freedom, 1)]
+    rows = [chi_row("chi-square of all residuals", s.chi_square, freedom, 1, data)]
     n_s = s.squares.shape[1]
     worst = [(_deviation(s.squares[:, k].sum(), counted[:, k].sum()), k) for k in range(n_s)]
     k = max(worst)[1]
-    rows.append(chi_row(f"worst sensor, {k}", s.squares[:, k].sum(), counted[:, k].sum(), n_s))
+    name = f"worst sensor, {k}"
+    rows.append(chi_row(name, s.squares[:, k].sum(), counted[:, k].sum(), n_s, data))
     blocks = np.array_split(np.arange(data.omega.size), min(N_BANDS, data.omega.size))
     worst = [(_deviation(s.squares[b].sum(), counted[b].sum()), j) for j, b in enumerate(blocks)]
     b = blocks[max(worst)[1]]
     hz = data.omega[b[[0, -1]]] / (2 * np.pi)
     name = f"worst band, {hz[0]:.4g} to {hz[1]:.4g} Hz"
-    rows.append(chi_row(name, s.squares[b].sum(), counted[b].sum(), len(blocks)))
+    rows.append(chi_row(name, s.squares[b].sum(), counted[b].sum(), len(blocks), data))
     if missing:
         worst_name = max(missing, key=lambda name: abs(missing[name]))
         quantity = f"largest score, {worst_name} [deviations]"
@@ -244,8 +401,15 @@ def _deviation(value: float, freedom: float) -> float:
     return float((value - freedom) / np.sqrt(2 * max(freedom, 1.0)))
 
 
-def chi_row(name: str, value: float, freedom: float, trials: int) -> Row:
-    """Chi-square over its expectation; the limit is kept by a right model but for one in 1000."""
+def chi_row(name: str, value: float, freedom: float, trials: int, data: Data | None = None) -> Row:
+    """Chi-square over its expectation; the limit is kept by a right model but for one in 1000.
+
+    Squares over estimated variances vary more, as if they had less freedom; what is not known of
+    the scale of all makes the quotient one of F, whose denominator has the freedom 2 / variance.
+    """
     freedom = max(freedom, 1.0)
-    limit = chi2.isf(MAX_FALSE_REFUSAL / trials, freedom) / freedom
+    own, scale = (freedom, 0.0) if data is None else (data.known * freedom, data.scale)
+    limit = chi2.isf(MAX_FALSE_REFUSAL / trials, own) / own
+    if scale > MIN_SCALE:
+        limit = f_ratio.isf(MAX_FALSE_REFUSAL / trials, own, 2 / scale)
     return row(f"{name}, over its expectation", value / freedom, float(limit))

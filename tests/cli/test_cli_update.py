@@ -13,8 +13,19 @@ from cases.files.schema import errors
 from cases.solid import STEEL, composite
 from rom.cli.main import main
 from rom.cli.schemas import schema
-from rom.updating import AddedMass, Channels, GroundSpring, Responses, candidates, place
+from rom.parametric import FamilyAssembly
+from rom.updating import (
+    AddedMass,
+    Channels,
+    GroundSpring,
+    JointSpring,
+    Responses,
+    candidates,
+    place,
+)
+from rom.updating.family_model import Parts, family_model
 from rom.updating.frf_data import noisy
+from rom.updating.normal_equations import responses_at
 
 pytestmark = pytest.mark.once  # the environment without FEniCSx has no h5py
 SIZE, CELLS = (1.0, 0.1, 0.08), (8, 1, 1)
@@ -89,8 +100,8 @@ def test_the_verb_finds_what_the_function_finds_and_writes_the_body(capsys):
 
 
 def test_noise_of_forces_is_taken(capsys):
-    found = answered(["--force-noise", "0.03"], capsys)
-    test = replace(rom.io.read_responses("test.h5"), force_noise=0.03)
+    found = answered(["--force-noise", "0.03", "--estimator", "H1"], capsys)
+    test = replace(rom.io.read_responses("test.h5"), force_noise=0.03, estimator="H1")
     same = rom.update(rom.load("family.rom.npz"), test, fixed=("root",), damping=0.02)
     assert found["factors"] == same.factors and found["deviations"] == same.deviations
 
@@ -205,9 +216,117 @@ def test_what_is_wrong_with_the_options_is_said(capsys):
 
     refused(["--spring", "soil=tip:2e5:0.1"], "is not INTERFACE:VALUE:LOW:HIGH")
     refused(["--mass", "cable=tip:heavy:0.1:10"], "--mass: 'heavy' is not a number")
-    refused([*ATTACHED[:2], "--mass", "soil=tip:1:0.1:10"], "soil is a --spring and a --mass")
+    same = "--mass soil has the name of another one"
+    refused([*ATTACHED[:2], "--mass", "soil=tip:1:0.1:10"], same)
     refused(["--rank", "3"], "rank belongs to the residual of equations")
     refused(["--residual", "equations"], "input 0 has no sensor at its point")
-    refused(["--candidate", "cable"], "--candidate cable is neither")
-    refused(["--family", "body.rom.npz"], "holds one body, without parameters")
+    refused(["--candidate", "cable"], "--candidate cable is no --spring, --joint or --mass")
+    refused(["--family", "body.rom.npz"], "--family family.rom.npz, body.rom.npz: of several each")
+    refused(["--joint", "j=a.tip,b.tip:1,1,1:0.1:1"], "belong to an assembly")
+    refused(["--force-noise", "0.1"], "the estimator of H is not named")
     refused(["-o", "family.rom.npz"], "family.rom.npz")
+
+
+BOLTS = JointSpring(("frame", "tip"), ("arm", "root"), (4e8, 4e8, 4e8, 2e5, 1e5, 1e5), 0.1, 10.0)
+HALVES = ["--family", "frame=frame.rom.npz", "--family", "arm=arm.rom.npz",
+          "--fixed", "frame.root", "--damping", "0.02"]  # fmt: skip
+JOINT = ["--joint", "bolts=frame.tip,arm.root:4e8,4e8,4e8,2e5,1e5,1e5:0.1:10"]
+
+
+@pytest.fixture(scope="module")
+def bolted(folder):
+    """Two families in files, their assembly, and a test of it in which a sensor names its body."""
+    families = {}
+    for name, x in (("frame", 0.0), ("arm", 0.5)):
+        half = composite({name: STEEL}, lambda c, n=name: n, (0.5, 0.1, 0.08), (4, 1, 1), (x, 0, 0))
+        families[name] = rom.reduce_parametric(
+            half, parameters={"E": rom.YoungsModulus(name, 0.3, 3.0)},
+            method=rom.CraigBampton(8), interfaces={"root": "rbe2", "tip": "rbe2"}, certify=False,
+        )  # fmt: skip
+        rom.save(families[name], folder / f"{name}.rom.npz")
+    points = [[x, y, 0.08] for x in (0.25, 0.5, 0.75, 1.0) for y in (0.0, 0.1)]
+    sensors = Channels(
+        np.repeat(points, 2, axis=0), np.tile([[0, 1, 0], [0, 0, 1]], (8, 1)),
+        ("frame",) * 8 + ("arm",) * 8,
+    )  # fmt: skip
+    force = Channels([[0.75, 0.1, 0.0]], [[0, 1, 2]])
+    whole, f = FamilyAssembly(families), np.linspace(20, 900, 100)
+    rows = [c.rows(Parts.of(whole).bodies, "channel") for c in (sensors, force)]
+    model = family_model(whole, rows, {"bolts": BOLTS}, {}, (("frame", "root"),))
+    H = responses_at(model, np.log([1.2, 0.9, 0.5]), np.array([0.02]), 2 * np.pi * f)
+    H = noisy(H, 0.03, np.random.default_rng(4))
+    test = Responses(f, H, sensors, force, 1 / (1 + 50 * 0.03**2), 50)
+    rom.io.write_responses(test, folder / "bolted.h5")
+    return whole
+
+
+def halves(words, capsys, code=0):
+    capsys.readouterr()
+    assert main(["update", *words, "--json"]) == code
+    return json.loads(capsys.readouterr().out)
+
+
+def test_families_on_a_joint_are_updated_and_written_one_by_one(bolted, capsys):
+    found = halves(["bolted.h5", *HALVES, *JOINT, "-o", "new.rom.npz"], capsys)
+    assert errors(found, schema("update")) == []
+    test = rom.io.read_responses("bolted.h5")
+    assert test.sensors.bodies == ("frame",) * 8 + ("arm",) * 8 and test.inputs.bodies is None
+    same = rom.update(bolted, test, fixed=(("frame", "root"),), attached={"bolts": BOLTS},
+                      damping=0.02)  # fmt: skip
+    assert found["factors"] == same.factors and found["deviations"] == same.deviations
+    for name, value in (("frame.E", 1.2), ("arm.E", 0.9), ("bolts", 0.5)):
+        assert abs(np.log(found["factors"][name] / value)) < 4 * found["deviations"][name]
+    for name, body in same.assembly.bodies.items():
+        written = rom.load(f"new.{name}.rom.npz")
+        assert_allclose(written.frequencies(4), body.frequencies(4), rtol=1e-12)
+
+
+def test_a_coupled_assembly_is_planned(bolted, capsys):
+    words = ["--plan", "4,1", "--lines", "20:900", "--couple", "frame.tip=arm.root", *HALVES]
+    found = halves(words, capsys)
+    assert errors(found, schema("update")) == []
+    assert {"frame.E", "arm.E"} <= set(found["deviations"])
+
+
+WRONG = ("", "nan", "-1", "0", "1e400", "x", "1:2", "a=b", "a=b:c:d:e", "tip:1:1:1", "no.npz",
+         "frame.knee", "leg.tip", "q=frame.tip:1,1,1:0:1", "q=frame.tip:1,1,1:2:1",
+         "q=frame.tip,arm.root:1,1:1:2", "q=frame.tip:1,1,1:1:2")  # fmt: skip
+OPTIONS = (
+    "--family", "--averages", "--coherence", "--force-noise", "--estimator", "--points", "--fixed",
+    "--free", "--spring", "--mass", "--joint", "--couple", "--candidate", "--prior", "--residual",
+    "--rank", "--beside-poles", "--damping", "--tolerance", "--picture", "--plan", "--lines",
+    "--noise", "--floor", "-o",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("option", OPTIONS)
+def test_a_wrong_value_of_an_option_is_named(bolted, capsys, option):
+    """Each option with each wrong value, also of other options: an error of the user, or right."""
+    for value in WRONG:
+        words = ["update", "bolted.h5", *HALVES, *JOINT, option, value]
+        capsys.readouterr()
+        try:
+            code = main(words)
+        except SystemExit as end:
+            code = end.code
+        out, err = capsys.readouterr()
+        assert code in (0, 2, 3, 4, 5), f"{words}: {code}\n{err}"
+        assert "Traceback" not in out + err
+        if code:
+            assert err.startswith(("error:", "usage:")), err
+        else:
+            assert option == "-o" or value not in ("nan", "1e400"), f"{words}: {out}"
+
+
+def test_families_that_are_no_assembly_are_named(bolted, capsys):
+    def refused(words, message):
+        capsys.readouterr()
+        assert main(["update", "bolted.h5", *words]) == 2
+        assert message in capsys.readouterr().err
+
+    refused(HALVES[:2] * 2, "--family frame is given twice")
+    refused([*HALVES, *JOINT, "--spring", "q=tip:1,1,1:1:2"], "--spring 'tip' is no BODY.INTERFACE")
+    refused([*HALVES[:4], "--fixed", "root"], "--fixed 'root' is no BODY.INTERFACE; bodies are")
+    refused([*HALVES, "--joint", "q=frame.tip:1,1,1:1:2"], "lies between 1 places")
+    refused([*HALVES, "--mass", "q=frame.tip:1,1:1:2"], "a mass is one number")
+    refused(["--family", "a=body.rom.npz"], "body.rom.npz holds one body, without parameters")

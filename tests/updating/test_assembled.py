@@ -1,5 +1,6 @@
 """Assemblies of families with an unknown joint, updated."""
 
+import importlib
 from dataclasses import replace
 
 import numpy as np
@@ -14,16 +15,20 @@ from rom.parametric.parameters import centre
 from rom.updating import (
     AddedMass,
     Channels,
+    Drift,
     GroundSpring,
     JointSpring,
     Responses,
+    Sensors,
     candidates,
+    parameter_tracker,
     place,
 )  # fmt: skip
 from rom.updating.family_model import Parts, family_model
 from rom.updating.frf_data import noisy
 from rom.updating.models import modal
 from rom.updating.normal_equations import responses_at
+from rom.updating.operation import discrete
 
 BOLTS = JointSpring(
     ("frame", "tip"), ("arm", "root"), (4e8, 4e8, 4e8, 2e5, 1e5, 1e5), 0.1, 10.0
@@ -174,6 +179,114 @@ def test_an_assembly_of_one_is_planned_as_a_body(families):
                  attached={"load": replace(load, at=("frame", "tip"))}, **options)  # fmt: skip
     assert alone.names[:2] == ("E", "load") and same.names[:2] == ("frame.E", "load")
     assert_allclose(same.covariance, alone.covariance, rtol=1e-8)
+
+
+def test_channels_name_the_body_on_which_they_lie(bolted):
+    """Points of the joint are on both; each body has motions of its own there."""
+    bodies, parts = Parts.of(bolted).bodies, Parts.of(bolted)
+    at = [[0.5, 0.1, 0.08]] * 2, [[0, 0, 1]] * 2
+    both = Channels(*at, ("arm", "frame"))
+    rows = both.rows(bodies, "sensor")
+    for row, name in zip(rows, both.bodies, strict=True):
+        alone = Channels(at[0][:1], at[1][:1]).rows(bodies[name], "sensor")[0]
+        assert_allclose(row[parts.columns[name]], alone)
+        assert np.count_nonzero(row) == np.count_nonzero(alone)
+    assert both.owners(bodies, "sensor") == ["arm", "frame"]
+    assert both.some([1]).bodies == ("frame",) and Channels(*at, "arm").bodies == ("arm", "arm")
+    for bad, words in (
+        (Channels(*at, "leg"), "sensor 0 lies on 'leg': bodies are 'frame', 'arm'"),
+        (Channels([[0.1, 0.1, 0.08]], [[0, 0, 1]], "arm"), "sensor 0 at .* m off 'arm'"),
+    ):
+        with pytest.raises(ConfigError, match=words):
+            bad.rows(bodies, "sensor")
+    with pytest.raises(ConfigError, match="lies on 'arm': this is one body alone"):
+        both.rows(bodies["arm"], "sensor")
+    with pytest.raises(ConfigError, match="1 bodies are named for 2 channels"):
+        Channels(*at, ("arm",))
+    offered = candidates(bolted, 12, fixed=HELD)
+    assert set(offered.bodies) == {"frame", "arm"} and len(offered.points) == 36
+
+
+TRACKED = {"dt": 1e-3, "walk": 100.0, "unmodelled": 1e-3, "damping": 0.02}
+
+
+def watched(body=None):
+    up, ends = [[0.0, 0.0, 1.0]], [[0.5, 0.1, 0.08]]
+    sensors = (
+        Sensors(Channels([[0.125, 0.05, 0.08]], [[1, 0, 0]]), "strain", 1e-8),
+        Sensors(Channels(ends, up, body), "acceleration", 0.1),
+        Sensors(Channels(ends, up, body), "displacement", 1e-6),
+    )
+    return sensors, Channels([[0.375, 0.1, 0.08]], up), (Sensors(Channels(ends, up, body),
+                                                                 "velocity"),)  # fmt: skip
+
+
+def test_an_assembly_of_one_is_tracked_as_a_body(families):
+    family, one = families["frame"], FamilyAssembly({"frame": families["frame"]})
+    drift = Drift(0.1, 0.02)
+    alone = parameter_tracker(family, *watched(), parameters={"E": drift}, fixed=("root",),
+                              **TRACKED)  # fmt: skip
+    same = parameter_tracker(one, *watched("frame"), parameters={"frame.E": drift}, fixed=HELD,
+                             **TRACKED)  # fmt: skip
+    y = np.sqrt(alone.R) * np.random.default_rng(0).standard_normal((200, 3))
+    a, b = alone.run(y), same.run(y)
+    for name in ("values", "forces", "factors", "surprise"):
+        scale = np.abs(getattr(a, name)).max(axis=0)
+        assert_allclose(getattr(b, name) / scale, getattr(a, name) / scale, atol=1e-8)
+
+
+def test_the_fmu_of_an_assembly_follows_as_python_does(bolted, tmp_path):
+    """Bolts and the modulus of one body; names of parameters carry that of the body."""
+    fmus = importlib.import_module("cases.mbs.fmu_instance")  # skips where fmpy is not installed
+    drifts = {"arm.E": Drift(0.05, 0.05), "bolts": Drift(0.05, 0.05)}
+    t = parameter_tracker(bolted, *watched("arm"), parameters=drifts, fixed=HELD,
+                          attached={"bolts": BOLTS}, **TRACKED)  # fmt: skip
+    y = 30 * np.sqrt(t.R) * np.sin(np.arange(60)[:, None] * [0.5, 0.9, 0.2])
+    expected = t.run(y)
+    one = fmus.Instance(rom.io.write_observer_fmu(t, tmp_path / "bolted.fmu"), tmp_path).begin()
+    wanted = ("velocity[1]", "force[1]", "factor.'arm.E'", "factor.bolts")
+    found = []
+    for k, sample in enumerate(y):
+        for name, value in zip(("strain", "acceleration", "displacement"), sample, strict=True):
+            one.set(f"sensor.{name}[1]", value)
+        one.fmu.doStep(k * TRACKED["dt"], TRACKED["dt"])
+        found.append(one.get(*(f"estimate.{name}" for name in wanted)))
+    same = np.hstack([expected.values, expected.forces, expected.factors])
+    scale = np.abs(same).max(axis=0)
+    assert_allclose(np.array(found) / scale, same / scale, rtol=0, atol=1e-10)
+
+
+def test_a_joint_that_loosens_is_followed(bolted):
+    """A record of what the filter assumes: the stiffness of the bolts walks."""
+    up = [[0.0, 0.0, 1.0]]
+    sensors = tuple(
+        Sensors(Channels([[0.5, 0.1, 0.08]], up, name), "displacement", 1e-8)
+        for name in bolted.families
+    )
+    force, wanted = Channels([[1.0, 0.1, 0.08]], up), (Sensors(
+        Channels([[1.0, 0.1, 0.08]], up), "displacement"),)  # fmt: skip
+    options = dict(TRACKED, dt=2e-4, walk=1e4, first=10.0, attached={"bolts": BOLTS}, fixed=HELD)
+    t = parameter_tracker(bolted, sensors, force, wanted,
+                          parameters={"bolts": Drift(0.02, 0.05)}, **options)  # fmt: skip
+    rng, n = np.random.default_rng(3), 3000
+    x, y, true = np.zeros(len(t.assumed.before(t.operation))), np.zeros((n, 2)), np.zeros(n)
+    p = 0.02 * rng.standard_normal(1)
+    for k in range(n):
+        if k % 100 == 0:
+            p = p + 0.05 * np.sqrt(100 * t.assumed.dt) * rng.standard_normal(1)
+            at = t.operation.at(p)
+            step, Q = discrete(at.A, t.assumed.white(t.operation), t.assumed.dt)
+            root = np.linalg.cholesky(Q + 1e-13 * np.diag(np.diag(Q)))
+        y[k] = at.C @ x + np.sqrt(t.R) * rng.standard_normal(2)
+        true[k] = np.exp(p[0])
+        x = step @ x + root @ rng.standard_normal(len(x))
+    found = t.run(y)
+    off = np.log(found.factors[:, 0] / true) / found.factor_deviations[:, 0]
+    assert found.factor_deviations[-1, 0] < 0.03
+    assert np.mean(np.abs(off[500:]) < 2.5) > 0.9
+    assert_allclose(found.surprise[500:].mean(), 2.0, rtol=0.12)
+    held = t.held(bolts=0.9).run(y[:50])
+    assert held.values.shape == (50, 1)
 
 
 def test_what_does_not_fit_an_assembly_is_named(families, bolted):

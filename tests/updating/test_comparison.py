@@ -67,6 +67,16 @@ def test_lines_are_foretold_by_the_update_of_all_others(family):
     assert_allclose(found.misfit["one modulus"], found.by_line.mean() / 12)
 
 
+def test_noise_of_forces_follows_its_lines(family):
+    test = replace(measured(family, 0, {"E_inner": 1.2}), force_noise=0.01, estimator="H1")
+    each = replace(test, force_noise=np.full((LINES.size, test.H.shape[2]), 0.01))
+    one, other = (
+        compare(family, t, {"one modulus": SETS["one modulus"]}, folds=2, **COMMON)
+        for t in (test, each)
+    )
+    assert_allclose(other.by_line, one.by_line, rtol=1e-9)
+
+
 @pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize(
     ("true", "there", "best"),

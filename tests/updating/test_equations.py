@@ -84,7 +84,7 @@ def test_equations_find_what_they_find_on_dense_matrices(family, model, dense, s
     test = measured(family, model, level=0.01, sign=sign)
     found = rom.update(family, test, fixed=("root",), residual="equations", damping=0.02)
     m = found.covariance.shape[0] - 3
-    weights = 1 / test.errors()[0]
+    weights = 1 / test.errors().own
     there = Measurement(2 * np.pi * LINES, sign * test.H, (DRIVEN,), weights)
     same = update_by_input(AtSensors(dense), there, np.zeros(3), np.full(m, 0.02), rank=m)
     factors = np.array(list(found.factors.values()))
@@ -211,6 +211,20 @@ def test_the_response_function_method_errs_as_much_as_it_says(family, model):
         errors.append(off / [found.deviations[name] for name in PARAMETERS])
         assert found.verdict.ok, found
     assert_allclose(np.sqrt(np.mean(np.square(errors))), 1.0, atol=0.28)
+
+
+def test_the_response_function_method_has_no_bias_at_strong_noise(family, model):
+    """Twenty lines with noise of 5 % in its derivatives: the mean of 40 draws is that of chance."""
+    errors = []
+    for seed in range(40):
+        test = measured(family, model, level=0.05, seed=seed)
+        test = replace(test, frequencies=LINES[::6], H=test.H[::6],
+                       coherence=1 / (1 + AVERAGES * 0.05**2))  # fmt: skip
+        found = rom.update(family, test, fixed=("root",), residual="response-function")
+        off = np.log(np.array(list(found.factors.values())) / TRUE)
+        errors.append(off / [found.deviations[name] for name in PARAMETERS])
+    assert np.abs(np.mean(errors, axis=0)).max() < 3.3 / np.sqrt(40)
+    assert_allclose(np.sqrt(np.mean(np.square(errors))), 1.0, atol=0.2)
 
 
 def test_the_bias_of_the_condensation_is_seen_by_the_verdict(family, model):

@@ -7,7 +7,7 @@ import rom
 from cases.solid import STEEL, composite
 from rom.updating import AddedMass, Channels, GroundSpring, Responses
 from rom.updating.family_model import family_model
-from rom.updating.frf_data import noisy
+from rom.updating.frf_data import estimators, noisy
 from rom.updating.normal_equations import responses_at
 
 REGIONS = ("inner", "middle", "outer")
@@ -38,30 +38,61 @@ def family():
     )  # fmt: skip
 
 
-def found(family, true, seed, **there):
+def found(family, true, seed, on_force=0.0, **there):
     """Update of moduli alone, by a test of a structure that has more to it."""
     rows = (SENSORS.rows(family.body, "sensor"), INPUTS.rows(family.body, "input"))
     model = family_model(family, rows, {"clamp": CLAMP} | there, {}, HINGE)
     x = np.log([true.get(name, 1.0) for name in model.names])
     H = responses_at(model, x, np.array([0.02]), 2 * np.pi * LINES)
-    H = noisy(H, 0.03, np.random.default_rng(seed))
-    test = Responses(LINES, H, SENSORS, INPUTS, 1 / (1 + 100 * 0.03**2), 100)
+    rng = np.random.default_rng(seed)
+    test = Responses(LINES, noisy(H, 0.03, rng), SENSORS, INPUTS, 1 / (1 + 100 * 0.03**2), 100)
+    if on_force:
+        test = averaged(H, on_force, rng)
     return rom.update(
         family, test, free=FREE, fixed=HINGE, attached={"clamp": CLAMP}, candidates=OFFERED,
         prior={"clamp": 1e-4}, damping=0.02,
     )  # fmt: skip
 
 
+def averaged(H, on_force, rng, n=50):
+    """H1 of noisy forces, and responses with ten per cent; its coherence is of the same records."""
+
+    def gauss(shape):
+        return rng.standard_normal((*shape, 2)) @ [1, 1j] / np.sqrt(2)
+
+    f = gauss((n, LINES.size, 1, 2))
+    x = H * (f + 0.1 * gauss((n, *H.shape)))
+    f = f + on_force * gauss(f.shape)
+    H1, _, _, coherence = estimators(x, np.broadcast_to(f, x.shape))
+    return Responses(LINES, H1, SENSORS, INPUTS, coherence, n, force_noise=on_force, estimator="H1")
+
+
+WRONG = [
+    ({"joint": 0.3}, {"joint": OFFERED["joint at the tip"]}, "joint at the tip", 1),
+    ({"clamp": 0.85}, {}, "turn at the root", -1),
+    ({"rho_middle": 1.03}, {}, "rho_middle", 1),
+    ({"mass": 0.15}, {"mass": OFFERED["mass at the tip"]}, "mass at the tip", 1),
+]
+
+
+@pytest.mark.parametrize("on_force", [0.1, 0.3])
+@pytest.mark.parametrize(("true", "there", "name", "sign"), WRONG)
+def test_what_is_wrong_is_named_where_forces_are_noisy(family, true, there, name, sign, on_force):
+    """Noise that sensors share, as large as their own and three times: limits are wider then."""
+    update = found(family, true, 1, on_force, **there)
+    assert not update.verdict.ok
+    assert max(update.scores, key=lambda k: abs(update.scores[k])) == name, update.scores
+    assert sign * update.scores[name] > 6
+
+
+@pytest.mark.parametrize("on_force", [0.1, 0.3])
+def test_of_a_right_model_nothing_is_named_where_forces_are_noisy(family, on_force):
+    update = found(family, {"E_middle": 1.1}, 1, on_force)
+    assert update.verdict.ok, str(update.verdict)
+
+
 @pytest.mark.parametrize("seed", range(3))
-@pytest.mark.parametrize(
-    ("true", "there", "name", "sign"),
-    [
-        ({"joint": 0.3}, {"joint": OFFERED["joint at the tip"]}, "joint at the tip", 1),
-        ({"clamp": 0.85}, {}, "turn at the root", -1),
-        ({"rho_middle": 1.03}, {}, "rho_middle", 1),
-        ({"mass": 0.15}, {"mass": OFFERED["mass at the tip"]}, "mass at the tip", 1),
-    ],
-)
+@pytest.mark.parametrize(("true", "there", "name", "sign"), WRONG)
 def test_the_largest_score_is_that_of_what_is_wrong(family, true, there, name, sign, seed):
     """Of a joint, a support, the mass of a region and one that was added; of seven offered."""
     update = found(family, true, seed, **there)

@@ -403,9 +403,9 @@ def test_a_prior_as_sure_as_the_data_halves_what_they_find(family):
 def test_the_gradient_is_that_of_the_cost_with_its_prior(family):
     """Differences of half the cost, away from the prior; 8 modes lie below 2100 Hz."""
     test = synthetic(family, lines=LINES[::5], sensors=FEW)
-    model, data = model_of(family, sensors=FEW), Data.of(test)
+    model = model_of(family, sensors=FEW)
     before = _Before.of({"E_inner": 1e-3, "rho_outer": 0.1}, model)
-    search = _Search.begun(model, data, np.ones(3, bool), 0.01, before)
+    search = _Search.begun(model, test, np.ones(3, bool), 0.01, before)
     assert search.zeta.size == 9
     search.theta = search.theta + 0.1 * np.random.default_rng(0).standard_normal(12)
     search.sums, _ = search.at(search.theta)

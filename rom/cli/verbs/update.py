@@ -2,10 +2,12 @@
 
 The family comes from `rom.reduce_parametric` and a file of `rom.save`. With -o the body at the
 factors found is written. With --plan and no test, the sensors and forces that will tell most are
-chosen, and written with -o.
+chosen, and written with -o. Several families NAME=FILE are an assembly: its places are
+BODY.INTERFACE, and -o writes one body of each, with its name before the ending.
 """
 
 import argparse
+from collections.abc import Collection
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -23,10 +25,11 @@ from rom.cli.options import (
 )
 from rom.cli.output import add_force, checked
 from rom.errors import ConfigError
+from rom.names import named
 
 if TYPE_CHECKING:
-    from rom.parametric.family import BodyFamily
-    from rom.updating import AddedMass, Channels, GroundSpring, Responses, Updated
+    from rom.updating import Channels, Responses, Updated
+    from rom.updating.family_model import Attached, Family
 
 SUMMARY = "update a family of bodies by a vibration test"
 EXAMPLES = """\
@@ -37,6 +40,8 @@ EXAMPLES = """\
       --spring clamp=root:1e8,1e8,1e8:0.1:10 --mass cable=tip:0.05:0.1:10 --candidate cable \\
       -o updated.rom.npz
   rom update test.uff --family panel.rom.npz --averages 50 --residual equations --prior core=0.3
+  rom update test.h5 --family frame=frame.rom.npz --family arm=arm.rom.npz --fixed frame.root \
+      --joint bolts=frame.tip,arm.root:4e8,4e8,4e8,2e5,1e5,1e5:0.1:10
   rom update --plan 8,1 --lines 20:800 --family panel.rom.npz --fixed root -o plan.csv
   rom update --plan --lines 20:800 --family panel.rom.npz --fixed root -o plan.png
 """
@@ -52,11 +57,21 @@ FACTOR_HELP = "by a factor from LOW to HIGH that is sought; may be repeated"
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Options of the verb."""
     parser.add_argument("file", type=Path, nargs="?", help="test: .uff, .unv, .csv, .txt or .h5")
-    parser.add_argument("--family", type=Path, required=True, help="family file, .rom.npz")
+    parser.add_argument(
+        "--family", metavar="FILE or NAME=FILE", action="append", required=True,
+        help="family file, .rom.npz; of several, repeated, each with a name: an assembly",
+    )  # fmt: skip
+    parser.add_argument(
+        "--couple", metavar="BODY.INTERFACE=BODY.INTERFACE", type=assignment, action="append",
+        default=[], help="of an assembly: they move together; may be repeated",
+    )  # fmt: skip
     parser.add_argument("--averages", type=count, help="number of them behind each function")
     parser.add_argument("--coherence", type=number, help="of all values, where the file has none")
     parser.add_argument(
         "--force-noise", type=positive, help="on the signal of a force, over the force itself"
+    )
+    parser.add_argument(
+        "--estimator", choices=("H1", "H2", "Hv"), help="that the functions are, where it matters"
     )
     parser.add_argument("--points", type=Path, help="another file with the nodes of the test")
     parser.add_argument("--fixed", metavar="NAME,...", type=names, default=(), help="what was held")
@@ -67,6 +82,10 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--spring", metavar="NAME=INTERFACE:KX,KY,KZ:LOW:HIGH", type=assignment, action="append",
         default=[], help=f"between an interface and the ground [N/m, N m/rad], {FACTOR_HELP}",
+    )  # fmt: skip
+    parser.add_argument(
+        "--joint", metavar="NAME=BODY.INTERFACE,BODY.INTERFACE:KX,KY,KZ:LOW:HIGH", type=assignment,
+        action="append", default=[], help=f"between bodies [N/m, N m/rad], {FACTOR_HELP}",
     )  # fmt: skip
     parser.add_argument(
         "--mass", metavar="NAME=INTERFACE:KG:LOW:HIGH", type=assignment, action="append",
@@ -88,6 +107,10 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--rank", type=count, help="of the basis of equations (default: one per mode of the band)"
     )
+    parser.add_argument(
+        "--beside-poles", metavar="WIDTH", type=positive,
+        help="half bandwidths of the poles within which lines count less",
+    )  # fmt: skip
     parser.add_argument(
         "--damping", type=positive, default=0.01, help="to start from (default 1 %%)"
     )
@@ -125,45 +148,122 @@ def run(args: argparse.Namespace) -> Answer:
     if args.plan is not None:
         return _plan(args)
     require({"file": args.file}, hint="A test, or --plan for one that is to be made.")
-    output = args.output and checked(args, args.output, "npz")
     family = _family(args)
+    outputs = _outputs(args, family)
     test = read_responses(
         args.file, averages=args.averages, coherence=args.coherence, points=args.points
     )
     if args.picture is not None:
         _match(args, family, test)
-    if args.force_noise is not None:
-        test = replace(test, force_noise=args.force_noise)
-    outside = _outside(args)
+    noise = {"force_noise": args.force_noise, "estimator": args.estimator}
+    test = replace(test, **{name: value for name, value in noise.items() if value is not None})
+    outside = _outside(args, family)
     if wrong := sorted(set(args.candidate) - set(outside)):
-        raise ConfigError(f"--candidate {wrong[0]} is neither a --spring nor a --mass.")
+        raise ConfigError(f"--candidate {wrong[0]} is no --spring, --joint or --mass.")
     prior = unique(args.prior, "--prior")
     prior = {name: typed_number("--prior", text) for name, text in prior.items()}
     found = update(
-        family, test, free=args.free, fixed=args.fixed, damping=args.damping,
+        family, test, free=args.free, fixed=_held(args, family), damping=args.damping,
         attached={name: part for name, part in outside.items() if name not in args.candidate},
         candidates={name: outside[name] for name in args.candidate},
         prior=prior,
         tolerance=args.tolerance,
         residual=args.residual,
         rank=args.rank,
+        beside_poles=args.beside_poles,
     )  # fmt: skip
-    write = None if output is None else lambda: save(found.body, output)
+
+    def write() -> None:
+        bodies = {"": found.body} if "" in outputs else found.assembly.bodies
+        for name, path in outputs.items():
+            save(bodies[name], path)
+
     text = f"{args.file}: {test.H.shape[1]} sensors, {test.H.shape[2]} forces, {len(test.H)} lines"
-    return Answer(_data(args, found), f"{text}\n{found}", write, failures(found.verdict))
+    return Answer(
+        _data(args, found), f"{text}\n{found}", write if outputs else None, failures(found.verdict)
+    )
 
 
-def _family(args: argparse.Namespace) -> "BodyFamily":
+def _outputs(args: argparse.Namespace, family: "Family") -> dict[str, Path]:
+    """{name: file} of the bodies that are written; one alone has no name."""
+    from rom.updating.family_model import Parts
+
+    if args.output is None:
+        return {}
+    if not args.output.name:
+        raise ConfigError("-o names no file.")
+    stem, paths = args.output.name.removesuffix(".npz").removesuffix(".rom"), {}
+    for name in Parts.of(family).bodies:
+        path = args.output.with_name(f"{stem}.{name}.rom.npz") if name else args.output
+        paths[name] = checked(args, path, "npz", inputs=_files(args).values())
+    return paths
+
+
+def _files(args: argparse.Namespace) -> dict[str, Path]:
+    """{name: file} of the families; one alone has no name.
+
+    Raises:
+        ConfigError: for several of which one has no name, or two the same.
+    """
+    pairs = []
+    for text in args.family:
+        name, _, file = text.partition("=")
+        pairs.append(("", text) if not file or Path(text).exists() else (name, file))
+    if len(pairs) > 1 and not all(name for name, _ in pairs):
+        given = ", ".join(file for name, file in pairs if not name)
+        raise ConfigError(
+            f"--family {given}: of several each has a name.", hint="Write --family NAME=FILE."
+        )
+    return {name: Path(file) for name, file in unique(pairs, "--family").items()}
+
+
+def _family(args: argparse.Namespace) -> "Family":
+    """The family, or the assembly of several.
+
+    Raises:
+        ConfigError: for a file of one body, or couplings of one family alone.
+    """
     from rom.io.family import load
+    from rom.parametric.assembled import FamilyAssembly
     from rom.parametric.family import BodyFamily
 
-    family = load(args.family)
-    if not isinstance(family, BodyFamily):
-        raise ConfigError(
-            f"{args.family} holds one body, without parameters.",
-            hint="Make a family with rom.reduce_parametric and write it with rom.save.",
-        )
-    return family
+    families = {name: load(file) for name, file in _files(args).items()}
+    for name, family in families.items():
+        if not isinstance(family, BodyFamily):
+            raise ConfigError(
+                f"{_files(args)[name]} holds one body, without parameters.",
+                hint="Make a family with rom.reduce_parametric and write it with rom.save.",
+            )
+    if "" in families:
+        if args.couple or args.joint:
+            raise ConfigError("--couple and --joint belong to an assembly of several families.")
+        return families[""]
+    pairs = [
+        (_place("--couple", one, families), _place("--couple", other, families))
+        for one, other in args.couple
+    ]
+    return FamilyAssembly(families, tuple(pairs))
+
+
+def _place(option: str, text: str, bodies: Collection[str]) -> Any:
+    """The interface of a body alone, (body, interface) of an assembly.
+
+    Raises:
+        ConfigError: for a place without its body.
+    """
+    if "" in bodies:
+        return text
+    for name in bodies:
+        if text.startswith(f"{name}."):
+            return name, text.removeprefix(f"{name}.")
+    raise ConfigError(f"{option} {text!r} is no BODY.INTERFACE; bodies are {named(bodies)}.")
+
+
+def _held(args: argparse.Namespace, family: "Family") -> tuple[Any, ...]:
+    """What was held, as the family wants it."""
+    from rom.updating.family_model import Parts
+
+    return tuple(_place("--fixed", text, Parts.of(family).bodies) for text in args.fixed)
 
 
 def _plan(args: argparse.Namespace) -> Answer:
@@ -183,14 +283,15 @@ def _plan(args: argparse.Namespace) -> Answer:
     if output and output.suffix.lower() not in PLAN_ENDINGS:
         raise ConfigError(f"-o {output}: a plan is written as {', '.join(PLAN_ENDINGS)}.")
     family = _family(args)
-    offered = candidates(family.body, PLAN_POINTS, fixed=args.fixed)
+    held = _held(args, family)
+    offered = candidates(family, PLAN_POINTS, fixed=held)
     n_sensors, n_inputs = args.plan
     low, high = args.lines
     prior = unique(args.prior, "--prior")
     plan = place(
         family, offered, offered, np.linspace(low, high, PLAN_LINES), n_sensors=n_sensors,
-        n_inputs=n_inputs, noise=args.noise, floor=args.floor, fixed=args.fixed,
-        attached=_outside(args), damping=args.damping,
+        n_inputs=n_inputs, noise=args.noise, floor=args.floor, fixed=held,
+        attached=_outside(args, family), damping=args.damping,
         prior={name: typed_number("--prior", text) for name, text in prior.items()},
     )  # fmt: skip
     channels = (("sensors", plan.sensors), ("inputs", plan.inputs))
@@ -200,7 +301,7 @@ def _plan(args: argparse.Namespace) -> Answer:
         for name, c in channels
     }  # fmt: skip
     data = {
-        "family": str(args.family),
+        "family": ", ".join(args.family),
         "plan": placed,
         "deviations": plan.deviations,
         "unseen": list(plan.unseen),
@@ -221,7 +322,7 @@ def _plan(args: argparse.Namespace) -> Answer:
     )
 
 
-def _match(args: argparse.Namespace, family: "BodyFamily", test: "Responses") -> None:
+def _match(args: argparse.Namespace, family: "Family", test: "Responses") -> None:
     """Draw where the points of a test are, also of one that does not belong to the body.
 
     Raises:
@@ -231,13 +332,11 @@ def _match(args: argparse.Namespace, family: "BodyFamily", test: "Responses") ->
     import numpy as np
     from scipy.spatial import cKDTree
 
-    from rom.body.surface import surface_of
-
-    path = checked(args, args.picture)
+    path = checked(args, args.picture, inputs=_files(args).values())
     if path.suffix.lower() != ".png":
         raise ConfigError(f"--picture {path}: it is written as .png.")
     points = np.vstack([test.sensors.points, test.inputs.points])
-    far = cKDTree(surface_of(family.body).points).query(points)[0]
+    far = cKDTree(_surface(family)[0]).query(points)[0]
     _drawn(
         family, (test.sensors, test.inputs), path, "Points of a vibration test",
         f"Largest distance of the {len(points)} points from one of the surface: {far.max():.3g} m.",
@@ -245,7 +344,7 @@ def _match(args: argparse.Namespace, family: "BodyFamily", test: "Responses") ->
 
 
 def _drawn(
-    family: "BodyFamily",
+    family: "Family",
     channels: "tuple[Channels, Channels]",
     path: Path,
     title: str,
@@ -255,12 +354,11 @@ def _drawn(
     import numpy as np
 
     from rom import view
-    from rom.body.surface import surface_of
 
-    surface = surface_of(family.body)
-    length = PIN_RATIO * float(np.ptp(surface.points, axis=0).max())
+    surface = _surface(family)
+    length = PIN_RATIO * float(np.ptp(surface[0], axis=0).max())
     thick = length / PIN_SLENDERNESS
-    things = {"body": (surface.points, surface.triangles)}
+    things = {"body": surface}
     for name, several in zip(("sensors", "forces"), channels, strict=True):
         pins = []
         for x, d in zip(np.asarray(several.points), np.asarray(several.directions), strict=True):
@@ -274,6 +372,20 @@ def _drawn(
         caption="A ball marks a point, its pin the direction, in the axes of the geometry; a "
         f"point may carry several. {more}",
     )  # fmt: skip
+
+
+def _surface(family: "Family") -> Any:
+    """Points (n, 3) [m] and triangles of all bodies together.
+
+    Raises:
+        ModelError: if a body carries no surface.
+    """
+    from rom import view
+    from rom.body.surface import surface_of
+    from rom.updating.family_model import Parts
+
+    surfaces = [surface_of(body) for body in Parts.of(family).bodies.values()]
+    return view.joined([(surface.points, surface.triangles) for surface in surfaces])
 
 
 def _two_counts(text: str) -> tuple[int, int]:
@@ -297,7 +409,7 @@ def _data(args: argparse.Namespace, found: "Updated") -> dict[str, Any]:
     deviations = found.deviations
     data = {
         "file": str(args.file),
-        "family": str(args.family),
+        "family": ", ".join(args.family),
         "factors": found.factors,
         "damping": found.zeta.tolist(),
         "deviations": deviations,
@@ -310,24 +422,34 @@ def _data(args: argparse.Namespace, found: "Updated") -> dict[str, Any]:
     return data | ({} if args.output is None else {"output": str(args.output)})
 
 
-def _outside(args: argparse.Namespace) -> dict[str, "GroundSpring | AddedMass"]:
-    """Springs and masses by their names.
+def _outside(args: argparse.Namespace, family: "Family") -> "Attached":
+    """Springs, joints and masses by their names.
 
     Raises:
         ConfigError: naming the option that is not as it is shown.
     """
-    from rom.updating.family_model import AddedMass, GroundSpring
+    from rom.updating.family_model import AddedMass, GroundSpring, JointSpring, Parts
 
-    found: dict[str, GroundSpring | AddedMass] = {}
-    for name, text in unique(args.spring, "--spring").items():
-        at, stiffness, low, high = _parts("--spring", text)
-        k = [typed_number("--spring", part) for part in stiffness.split(",")]
-        found[name] = GroundSpring(at, k, low, high)
-    for name, text in unique(args.mass, "--mass").items():
-        if name in found:
-            raise ConfigError(f"{name} is a --spring and a --mass.")
-        at, mass, low, high = _parts("--mass", text)
-        found[name] = AddedMass(at, typed_number("--mass", mass), low, high)
+    bodies = Parts.of(family).bodies
+    found: dict[str, GroundSpring | JointSpring | AddedMass] = {}
+    for option, several in (("--spring", args.spring), ("--joint", args.joint),
+                            ("--mass", args.mass)):  # fmt: skip
+        for name, text in unique(several, option).items():
+            if name in found:
+                raise ConfigError(f"{option} {name} has the name of another one.")
+            at, value, low, high = _parts(option, text)
+            places = [_place(option, part, bodies) for part in at.split(",")]
+            if len(places) != 1 + (option == "--joint"):
+                raise ConfigError(f"{option} {text!r} lies between {len(places)} places.")
+            numbers = [typed_number(option, part) for part in value.split(",")]
+            if option == "--spring":
+                found[name] = GroundSpring(places[0], numbers, low, high)
+            elif option == "--joint":
+                found[name] = JointSpring(places[0], places[1], numbers, low, high)
+            elif len(numbers) == 1:
+                found[name] = AddedMass(places[0], numbers[0], low, high)
+            else:
+                raise ConfigError(f"{option} {text!r}: a mass is one number.")
     return found
 
 

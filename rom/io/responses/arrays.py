@@ -2,8 +2,10 @@
 
 Data sets are frequencies (n_f,), H (n_f, n_s, n_e) complex, coherence (one number or as H), and
 sensors and inputs, groups with points and directions (k, 3); attributes of the file are averages,
-quantity (of all sensors, or of each with commas between), force_noise (zero where it is missing),
-units, always SI, and checksum, SHA-256 of the data sets, which is compared where it is there.
+quantity (of all sensors, or of each with commas between), force_noise (zero where it is missing; of
+lines and inputs (n_f, n_e) a data set), estimator (H1, H2 or Hv) and bodies of sensors and inputs
+(one name a line) where they are named, units, always SI, and checksum, SHA-256 of the data sets,
+which is compared where it is there.
 Headers of HDF5 1.8 have checksums of their own: without them, and by texts in its heap, a byte that
 is wrong can end the process.
 """
@@ -26,6 +28,7 @@ KINDS = {"fiu": "real numbers", "fciu": "numbers"}  # by the letters of NumPy
 MAX_ARRAY_BYTES = 2**32  # of all arrays of a test
 DATA_SETS = ("frequencies", "H", "coherence", "sensors/points", "sensors/directions",
           "inputs/points", "inputs/directions")  # fmt: skip
+FORCE_NOISE = "force_noise"  # a data set where it differs between lines
 
 
 def written(test: Responses, path: Path) -> Path:
@@ -35,6 +38,7 @@ def written(test: Responses, path: Path) -> Path:
         ConfigError: if the folder is missing or not writable.
         ResourceError: if the disk is full, or h5py is missing.
     """
+    values: tuple[Any, ...]
     values = (test.frequencies, test.H, test.coherence, test.sensors.points,
               test.sensors.directions, test.inputs.points, test.inputs.directions)  # fmt: skip
     data = io.BytesIO()
@@ -42,14 +46,23 @@ def written(test: Responses, path: Path) -> Path:
         for name, value in zip(DATA_SETS, values, strict=True):
             file[name] = np.asarray(value)
         file.attrs["averages"] = test.averages
-        file.attrs["force_noise"] = test.force_noise
+        if np.ndim(test.force_noise):
+            file[FORCE_NOISE] = np.asarray(test.force_noise)
+            values = (*values, test.force_noise)
+        else:
+            file.attrs[FORCE_NOISE] = test.force_noise
         texts = {
             "quantity": ",".join(test.quantities),
             "units": "SI",
             "checksum": _checksum(values),
         }
+        for side, channels in (("sensors", test.sensors), ("inputs", test.inputs)):
+            if channels.bodies is not None:
+                texts[f"bodies of {side}"] = "\n".join(channels.bodies)
+        if test.estimator is not None:
+            texts["estimator"] = test.estimator
         for name, text in texts.items():
-            file.attrs[name] = np.bytes_(text)
+            file.attrs[name] = np.bytes_(text.encode())
     write_whole(path, lambda out: out.write(data.getvalue()))
     return path
 
@@ -78,25 +91,35 @@ def _test(path: Path, file: Any) -> Responses:
         raise FileFormatError(f"the file has no attribute {missing[0]!r}.", where=str(path))
     if (units := _text(file.attrs["units"])) != "SI":
         raise FileFormatError(f"units are {units!r}, not 'SI'.", where=str(path))
-    if sum(file[name].nbytes for name in DATA_SETS) > MAX_ARRAY_BYTES:
+    names = (*DATA_SETS, *[FORCE_NOISE] * isinstance(file.get(FORCE_NOISE), h5.Dataset))
+    if sum(file[name].nbytes for name in names) > MAX_ARRAY_BYTES:
         raise UnsafeFileError("its arrays take more than 4 GiB.", where=str(path))
-    for name in DATA_SETS:
+    for name in names:
         kinds = "fciu" if name == "H" else "fiu"
         if file[name].dtype.kind not in kinds:
             raise FileFormatError(f"{name!r} holds no {KINDS[kinds]}.", where=str(path))
-    f, H, c, *where = values = [file[name][()] for name in DATA_SETS]
+    f, H, c, *where = values = [file[name][()] for name in names]
     if "checksum" in file.attrs and _text(file.attrs["checksum"]) != _checksum(values):
         raise FileFormatError(
             "the arrays are not those of its checksum: it was damaged or changed.", where=str(path)
         )
-    sensors, inputs = Channels(*where[:2]), Channels(*where[2:])
+    bodies = [_bodies(file, side) for side in ("sensors", "inputs")]
+    sensors = Channels(where[0], where[1], bodies[0])
+    inputs = Channels(where[2], where[3], bodies[1])
     averages = _number(path, file, "averages")
     if averages != int(averages):
         raise FileFormatError(f"averages = {averages} is no whole number.", where=str(path))
-    noise = _number(path, file, "force_noise") if "force_noise" in file.attrs else 0.0
+    noise = (
+        _number(path, file, FORCE_NOISE)
+        if FORCE_NOISE in file.attrs
+        else where[4]
+        if where[4:]
+        else 0.0
+    )
+    estimator = _text(file.attrs["estimator"]) if "estimator" in file.attrs else None
     text = _text(file.attrs["quantity"])
     quantity = tuple(text.split(",")) if "," in text else text
-    return Responses(f, H, sensors, inputs, c, int(averages), quantity, noise)
+    return Responses(f, H, sensors, inputs, c, int(averages), quantity, noise, estimator)
 
 
 def _checksum(values: Sequence[Any]) -> str:
@@ -107,9 +130,15 @@ def _checksum(values: Sequence[Any]) -> str:
     return whole.hexdigest()
 
 
+def _bodies(file: Any, side: str) -> tuple[str, ...] | None:
+    """Names of the bodies of channels, where they are given."""
+    name = f"bodies of {side}"
+    return tuple(_text(file.attrs[name]).split("\n")) if name in file.attrs else None
+
+
 def _text(value: Any) -> str:
     """An attribute of fixed or free length."""
-    return value.decode("ascii", "replace") if isinstance(value, bytes) else str(value)
+    return value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
 
 
 def _number(path: Path, file: Any, name: str) -> float:

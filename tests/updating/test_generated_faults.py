@@ -1,0 +1,201 @@
+"""Tests with faults drawn at random: each is refused, or fails its verdict, by name and place."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import rom
+from cases.solid import STEEL, composite
+from rom.errors import ConfigError, RomError
+from rom.updating import Channels, Responses
+from rom.updating.family_model import family_model
+from rom.updating.frf_data import noisy
+from rom.updating.normal_equations import responses_at
+
+PARAMETERS = {name: rom.YoungsModulus(name, 0.5, 2.0) for name in ("inner", "outer")}
+GRID = [[k / 6, y, 0.08] for k in (2, 3, 4, 5) for y in (0.0, 0.1)]
+SENSORS = Channels(np.repeat(GRID, 2, axis=0), np.tile([[0, 1, 0], [0, 0, 1]], (8, 1)))
+INPUTS = Channels([[1.0, 0.0, 0.0], [0.5, 0.1, 0.08]], [[0, 1, 1], [0, 1, -0.5]])
+LINES = np.linspace(20, 700, 80)
+AVERAGES, LEVEL, HELD = 50, 0.05, ("root",)
+COHERENCE = 1 / (1 + AVERAGES * LEVEL**2)
+
+
+def reduced(length=1.0):
+    model = composite(
+        dict.fromkeys(PARAMETERS, STEEL), lambda c: "inner" if c[0] < 3 else "outer",
+        (length, 0.1, 0.08), (6, 1, 1),
+    )  # fmt: skip
+    return rom.reduce_parametric(
+        model, parameters=PARAMETERS, method=rom.CraigBampton(16),
+        interfaces={"root": "rbe2", "tip": "rbe2"}, certify=False,
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def family():
+    return reduced()
+
+
+def measured(family, rng, lines=LINES, factor=None):
+    """A test of the family at factors near one, or of which one is given."""
+    rows = (SENSORS.rows(family.body, "sensor", 0.5), INPUTS.rows(family.body, "input", 0.5))
+    model = family_model(family, rows, {}, {}, HELD)
+    x = rng.uniform(-0.2, 0.2, 2)
+    if factor:
+        x[0] = np.log(factor)
+    H = noisy(responses_at(model, x, np.array([0.02]), 2 * np.pi * lines), LEVEL, rng)
+    return Responses(lines, H, SENSORS, INPUTS, COHERENCE, AVERAGES)
+
+
+def moved_off(family, test, rng):
+    k, points = rng.integers(16), np.array(SENSORS.points)
+    points[k] += [0, *rng.choice([-1, 1], 2) * rng.uniform(0.15, 3.0, 2)]
+    return replace(test, sensors=Channels(points, SENSORS.directions)), [f"sensor {k} at"]
+
+
+def in_millimetres(family, test, rng):
+    factor = rng.choice([1000.0, 100.0])
+    points = factor * np.asarray(SENSORS.points)
+    return replace(test, sensors=Channels(points, SENSORS.directions)), [
+        "millimetres taken", "centimetres taken",
+    ]  # fmt: skip
+
+
+def of_another_scale(family, test, rng):
+    k, factor = rng.integers(16), rng.choice([9.80665, 1 / 9.80665, 1000.0, 0.001])
+    H = test.H.copy()
+    H[:, k] *= factor
+    return replace(test, H=H), [f"sensor {k} gives {factor:.1g}"[:-3], f"sensor {k} gives"]
+
+
+def all_of_another_scale(family, test, rng):
+    factor = rng.choice([9.80665, 1 / 9.80665, 1000.0, 0.001])
+    return replace(test, H=factor * test.H), ["all responses are"]
+
+
+def turned(family, test, rng):
+    k, H = rng.integers(16), test.H.copy()
+    H[:, k] *= -1
+    return replace(test, H=H), [f"sensor {k} moves against"]
+
+
+def input_turned(family, test, rng):
+    e, H = rng.integers(2), test.H.copy()
+    H[:, :, e] *= -1
+    return replace(test, H=H), [f"input {e} moves against"]
+
+
+def along_another_axis(family, test, rng):
+    k, d = rng.integers(16), np.array(SENSORS.directions, dtype=float)
+    d[k] = d[k][[0, 2, 1]]
+    return replace(test, sensors=Channels(SENSORS.points, d)), [
+        f"sensor {k}", f"sensors {k} of", f"sensors {k ^ 1} of", f"sensor, {k}",
+    ]  # fmt: skip
+
+
+def exchanged(family, test, rng):
+    """Two cables: one sensor along y and one along z."""
+    k, m = 2 * rng.integers(8), 2 * rng.integers(8) + 1
+    order = np.arange(16)
+    order[[k, m]] = m, k
+    some = [f"sensor{comma} {n}" for n in (k, m) for comma in ("", ",")]
+    return replace(test, H=test.H[:, order]), some
+
+
+def above_the_band(family, test, rng):
+    f = LINES * rng.uniform(20, 60)
+    return replace(measured(family, rng, f), frequencies=f), ["the band of the basis"]
+
+
+def too_few(family, test, rng):
+    one = test.sensors.some([3]), test.inputs.some([0])
+    few = Responses(LINES[:1], test.H[:1, 3:4, :1], *one, COHERENCE, AVERAGES)
+    return few, ["usable numbers for"]
+
+
+def with_gaps(family, test, rng):
+    line, H = rng.integers(LINES.size), test.H.copy()
+    H[line, rng.integers(16), rng.integers(2)] = rng.choice([np.nan, np.inf, 0.0])
+    return (lambda: replace(test, H=H)), [f"{LINES[line]:.5g} Hz"]
+
+
+def out_of_range(family, test, rng):
+    return measured(family, rng, factor=rng.choice([0.3, 3.5])), [
+        "inner inside its range",
+        "chi-square of all",
+    ]
+
+
+def of_another_body(family, test, rng):
+    other = measured(reduced(rng.uniform(1.4, 2.0)), rng)
+    return other, ["chi-square of all", "FRAC", "responses are", "gives"]
+
+
+def of_a_wrong_coherence(family, test, rng):
+    c = rng.choice([-0.1, 1.0, 1.3, np.nan])
+    return (lambda: replace(test, coherence=c)), ["coherence"]
+
+
+def noisier_forces_than_all(family, test, rng):
+    noise = rng.uniform(3, 40) * LEVEL * np.sqrt(AVERAGES)  # a percentage taken for a ratio
+    return replace(test, force_noise=noise, estimator="H1"), ["force_noise alone has"]
+
+
+def lines_out_of_order(family, test, rng):
+    order = np.arange(LINES.size)
+    order[[4, 40]] = 40, 4
+    return (lambda: replace(test, frequencies=LINES[order])), ["must ascend"]
+
+
+FAULTS = (
+    moved_off, in_millimetres, of_another_scale, all_of_another_scale, turned, input_turned,
+    along_another_axis, exchanged, above_the_band, too_few, with_gaps, out_of_range,
+    of_another_body, of_a_wrong_coherence, noisier_forces_than_all, lines_out_of_order,
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("residual", ["responses", "response-function"])
+@pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: fault.__name__)
+def test_a_fault_is_named_with_its_place(family, fault, residual):
+    for seed in range(4):
+        rng = np.random.default_rng([seed, FAULTS.index(fault)])
+        test, words = fault(family, measured(family, rng), rng)
+        try:
+            found = rom.update(family, test() if callable(test) else test, fixed=HELD,
+                               damping=0.02, residual=residual)  # fmt: skip
+        except RomError as error:
+            message = str(error)
+        else:
+            assert not found.verdict.ok, f"{fault.__name__}, seed {seed}: {found}"
+            message = str(found)
+        assert any(word in message for word in words), f"{words}, seed {seed}: {message}"
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_without_a_fault_nothing_is_refused(family, seed):
+    assert rom.update(family, measured(family, np.random.default_rng(seed)), fixed=HELD).verdict.ok
+
+
+def leaky(test, poles, depth=0.4, reach=4.0):
+    """A record too short: resonances too low within some half bandwidths of 2 %."""
+    far = (LINES[:, None] - poles) / (0.02 * poles)
+    lost = 1 - depth * np.exp(-0.5 * (far / (reach / 2)) ** 2).sum(axis=1)
+    return replace(test, H=test.H * np.clip(lost, 0.2, 1.0)[:, None, None])
+
+
+def test_lines_beside_poles_that_are_wrong_can_count_less(family):
+    """What is lost at resonances is refused; beside them the model is right, and is found."""
+    rng = np.random.default_rng(5)
+    test = measured(family, rng, factor=1.15)
+    poles = rom.update(family, test, fixed=HELD).body.frequencies(6, fixed=HELD)
+    lost = leaky(test, poles)
+    assert not rom.update(family, lost, fixed=HELD, damping=0.02).verdict.ok
+    found = rom.update(family, lost, fixed=HELD, damping=0.02, beside_poles=60.0)
+    assert found.verdict.ok, found
+    right = rom.update(family, test, fixed=HELD, damping=0.02, beside_poles=60.0)
+    assert abs(np.log(right.factors["inner"] / 1.15)) < 4 * right.deviations["inner"]
+    assert right.deviations["inner"] > rom.update(family, test, fixed=HELD).deviations["inner"]
+    with pytest.raises(ConfigError, match="beside_poles"):
+        rom.update(family, test, fixed=HELD, beside_poles=-1.0)
