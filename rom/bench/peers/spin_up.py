@@ -69,7 +69,7 @@ def rod(segments: int) -> Held:
     """The bar as a rod of so many segments."""
 
     def held(mech: Mechanism) -> tuple[Any, Any]:
-        section = {"stretch": [GA, GA, EA], "bend": [EI, EI, GJ], "mass": LINE_MASS,
+        section: dict[str, Any] = {"stretch": [GA, GA, EA], "bend": [EI, EI, GJ], "mass": LINE_MASS,
                    "inertia": [LINE_INERTIA, LINE_INERTIA, 2 * LINE_INERTIA]}  # fmt: skip
         one = body(straight(LENGTH, segments, frame=ALONG, **section))
         part = mech.add_nonlinear("bar", one)
