@@ -26,7 +26,7 @@ DISPLACEMENT_RTOL = 5e-3  # of the largest load, in the mean square over the mas
 TANGENT_RTOL = 2e-2  # small errors of stress are large ones of the stiffness it gives a thin body
 STRESS_RTOL = 5e-2  # over all of the surface, of the mean square; it has the errors of slopes
 MESH_RTOL = 5e-3  # of the energy; a bent line is then stiffer by half as much again
-SMALL_SHARE = 1e-3  # of displacements at which nothing turns
+SMALL_SHARE = 1e-3  # of the largest load, under which nothing turns
 STEP_SHARES = (0.35, 0.7, 1.0)  # of the largest load
 UNTRAINED_RATIO = np.sqrt(2) - 1  # of a component to the one before, as trained nowhere
 
@@ -57,15 +57,15 @@ def deflection_rows(
     )  # fmt: skip
     quartic, still = body.energy(), body.mean_rows(geometric.fixed)
     tangent = Tangent(body, still)
-    E_local, farthest = E, list[Array]()
+    E_local, ends = E, list[Array]()
     E = full.whole(E)
     about = axis_point(geometric, model, body.reference)
     units = full.whole(nodal_forces(geometric.components(), model, ops, about))
     rows, table = list[Row](), dict[str, Any]()
     for name, case in load_cases(geometric).items():
         W = units @ case
-        path = follow(quartic, np.outer(STEP_SHARES, W @ E), still)
-        farthest.append(path[-1])
+        straight, *path = follow(quartic, np.outer((SMALL_SHARE, *STEP_SHARES), W @ E), still)
+        ends += [straight, path[-1]]
         steps = []
         for share, q in zip(STEP_SHARES, path, strict=True):
             u = E @ q
@@ -90,7 +90,7 @@ def deflection_rows(
             "energy": quartic.energy(path[held - 1]) if held else 0.0,
             "turn": _turn(body, path[held - 1]) if held else 0.0,
         }
-    coarse = _added_by_cells(model, E_local @ np.array(farthest).T)
+    coarse = _added_by_cells(model, E_local @ np.array(ends).T)
     rows.append(row("energy that cells add, too coarse to bend so far", coarse, MESH_RTOL))
     most = np.degrees(max(case["turn"] for case in table.values()))
     rows.append(Row("turn of an interface that holds [degrees]", most, "information", True))
@@ -98,14 +98,17 @@ def deflection_rows(
 
 
 def _added_by_cells(model: FEModel, U: Array) -> float:
-    """Largest share of energy not resolved in displacements (n_local, s), less that in small ones.
+    """Largest share of energy that is not resolved, less that under small loads.
 
     A mesh that is too coarse for a turn stiffens, and so does the full model.
+
+    Args:
+        model: its mesh.
+        U: (n_local, 2 c) displacements under small and largest loads in turn.
     """
     stresses: Any = model.stresses
-    shares = stresses.large_strain().unresolved(np.hstack([U, SMALL_SHARE * U]))
-    bent, straight = np.split(shares, 2)
-    return float((bent - straight).max(initial=0.0))
+    straight, bent = stresses.large_strain().unresolved(U).reshape(-1, 2).T
+    return float((bent - straight).max())
 
 
 def _turn(body: FlexibleBody, q: Array) -> float:
