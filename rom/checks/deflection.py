@@ -19,6 +19,7 @@ from rom.body.nonlinear.ranges import Geometric, axis_point, held_motions, nodal
 from rom.body.nonlinear.statics import follow, free_motions
 from rom.body.projection import cauchy_recovery
 from rom.eigen.verbs import Operators
+from rom.errors import ModelError
 from rom.model import Array, FEModel, Row
 from rom.rows import row
 
@@ -50,6 +51,9 @@ def deflection_rows(
         connection: the same in interface coordinates, so that like is compared with like.
         body: the reduced body, seen from its reference interface.
         E: (n_local, r) its nodal shapes.
+
+    Raises:
+        ModelError: naming a load under which the body has no stable equilibrium.
     """
     full = HeldSolid.of(
         model, connection, body.reference, held_motions(geometric, model.interfaces),
@@ -64,7 +68,11 @@ def deflection_rows(
     rows, table = list[Row](), dict[str, Any]()
     for name, case in load_cases(geometric).items():
         W = units @ case
-        straight, *path = follow(quartic, np.outer((SMALL_SHARE, *STEP_SHARES), W @ E), still)
+        try:
+            straight, *path = follow(quartic, np.outer((SMALL_SHARE, *STEP_SHARES), W @ E), still)
+        except ModelError as error:
+            error.where = f"load {name!r} of the range"
+            raise
         ends += [straight, path[-1]]
         steps = []
         for share, q in zip(STEP_SHARES, path, strict=True):

@@ -116,7 +116,7 @@ class LargeStrain:
         Args:
             E: (n_local, r) shapes [m].
         """
-        every = [np.arange(self.n_cells, dtype=np.int32)]
+        every: list[Integers] = [np.arange(self.n_cells, dtype=np.int32)]
         blocks = list(self._gradients(E, every, self.order))
         H, w, C = (np.concatenate(parts) for parts in zip(*blocks, strict=True))
         cells = np.repeat(np.arange(self.n_cells), len(self.points))
