@@ -19,12 +19,15 @@ from rom.body.nonlinear.ranges import Geometric, axis_point, held_motions, nodal
 from rom.body.nonlinear.statics import follow, free_motions
 from rom.body.projection import cauchy_recovery
 from rom.eigen.verbs import Operators
+from rom.errors import ModelError
 from rom.model import Array, FEModel, Row
 from rom.rows import row
 
 DISPLACEMENT_RTOL = 5e-3  # of the largest load, in the mean square over the mass
 TANGENT_RTOL = 2e-2  # small errors of stress are large ones of the stiffness it gives a thin body
 STRESS_RTOL = 5e-2  # over all of the surface, of the mean square; it has the errors of slopes
+MESH_RTOL = 5e-3  # of the energy; a bent line is then stiffer by half as much again
+SMALL_SHARE = 1e-3  # of the largest load, under which nothing turns
 STEP_SHARES = (0.35, 0.7, 1.0)  # of the largest load
 UNTRAINED_RATIO = np.sqrt(2) - 1  # of a component to the one before, as trained nowhere
 
@@ -38,7 +41,8 @@ def deflection_rows(
     The table has for each case "case", the share of each component of the range; "share" of the
     load at the steps compared, and there "displacement" and "frequencies", relative errors;
     "holds to", the share up to which all steps hold; "energy" [J] of the body there, and "turn"
-    [rad] of the interface that has turned most.
+    [rad] of the interface that has turned most. One row more is about the mesh itself, which
+    no comparison with the full model judges.
 
     Args:
         geometric: the range of loads.
@@ -47,6 +51,9 @@ def deflection_rows(
         connection: the same in interface coordinates, so that like is compared with like.
         body: the reduced body, seen from its reference interface.
         E: (n_local, r) its nodal shapes.
+
+    Raises:
+        ModelError: naming a load under which the body has no stable equilibrium.
     """
     full = HeldSolid.of(
         model, connection, body.reference, held_motions(geometric, model.interfaces),
@@ -54,13 +61,19 @@ def deflection_rows(
     )  # fmt: skip
     quartic, still = body.energy(), body.mean_rows(geometric.fixed)
     tangent = Tangent(body, still)
+    E_local, ends = E, list[Array]()
     E = full.whole(E)
     about = axis_point(geometric, model, body.reference)
     units = full.whole(nodal_forces(geometric.components(), model, ops, about))
     rows, table = list[Row](), dict[str, Any]()
     for name, case in load_cases(geometric).items():
         W = units @ case
-        path = follow(quartic, np.outer(STEP_SHARES, W @ E), still)
+        try:
+            straight, *path = follow(quartic, np.outer((SMALL_SHARE, *STEP_SHARES), W @ E), still)
+        except ModelError as error:
+            error.where = f"load {name!r} of the range"
+            raise
+        ends += [straight, path[-1]]
         steps = []
         for share, q in zip(STEP_SHARES, path, strict=True):
             u = E @ q
@@ -85,9 +98,25 @@ def deflection_rows(
             "energy": quartic.energy(path[held - 1]) if held else 0.0,
             "turn": _turn(body, path[held - 1]) if held else 0.0,
         }
+    coarse = _added_by_cells(model, E_local @ np.array(ends).T)
+    rows.append(row("energy that cells add, too coarse to bend so far", coarse, MESH_RTOL))
     most = np.degrees(max(case["turn"] for case in table.values()))
     rows.append(Row("turn of an interface that holds [degrees]", most, "information", True))
     return rows, table
+
+
+def _added_by_cells(model: FEModel, U: Array) -> float:
+    """Largest share of energy that is not resolved, less that under small loads.
+
+    A mesh that is too coarse for a turn stiffens, and so does the full model.
+
+    Args:
+        model: its mesh.
+        U: (n_local, 2 c) displacements under small and largest loads in turn.
+    """
+    stresses: Any = model.stresses
+    straight, bent = stresses.large_strain().unresolved(U).reshape(-1, 2).T
+    return float((bent - straight).max())
 
 
 def _turn(body: FlexibleBody, q: Array) -> float:

@@ -242,11 +242,6 @@ def quadrature_rule(mesh: Any, degree: int) -> tuple[Array, Array]:
     return np.asarray(points), np.asarray(weights)
 
 
-def corner_points(mesh: Any) -> Array:
-    """(k, 3) corners of the reference cell."""
-    return np.asarray(basix.geometry(getattr(basix.CellType, cell_name(mesh))))
-
-
 def evaluated(expression: Any, mesh: Any, cells: Integers) -> Array:
     """Values of an expression at its points in some cells."""
     parameters = inspect.signature(expression.eval).parameters

@@ -69,8 +69,10 @@ def rod(segments: int) -> Held:
     """The bar as a rod of so many segments."""
 
     def held(mech: Mechanism) -> tuple[Any, Any]:
-        section: dict[str, Any] = {"stretch": [GA, GA, EA], "bend": [EI, EI, GJ], "mass": LINE_MASS,
-                   "inertia": [LINE_INERTIA, LINE_INERTIA, 2 * LINE_INERTIA]}  # fmt: skip
+        section: dict[str, Any] = {
+            "stretch": [GA, GA, EA], "bend": [EI, EI, GJ], "mass": LINE_MASS,
+            "inertia": [LINE_INERTIA, LINE_INERTIA, 2 * LINE_INERTIA],
+        }  # fmt: skip
         one = body(straight(LENGTH, segments, frame=ALONG, **section))
         part = mech.add_nonlinear("bar", one)
         return part.marker("start"), part.marker("end")
@@ -84,8 +86,8 @@ def spun_up(held: Held, t_end: float = RISE_TIME) -> Run:
     root, tip = held(mech)
     place = mech.design_point(root)
     mech.revolute("base", mech.ground.marker(place), root, axis=(0, 0, 1))
-    speed, angle = ramp(SPEED, RISE_TIME)
-    mech.drive("motor", "base", angle, rate=speed)
+    angle = ramp(SPEED, RISE_TIME)[1]
+    mech.drive("motor", "base", angle)
     options: dict[str, Any] = {"dt": TIME_STEP, "rho_inf": RHO_INF, "progress": False}
     simulate(mech, t_end=2 * TIME_STEP, **options)
     start = process_time()

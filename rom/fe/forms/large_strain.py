@@ -25,7 +25,6 @@ from rom.fe.compat import (
     assembled_vector,
     cell_name,
     compiled,
-    corner_points,
     evaluated,
     geometry_degree,
     quadrature_rule,
@@ -91,22 +90,25 @@ class LargeStrain:
         self.mesh.comm.Allreduce(MPI.IN_PLACE, least, MPI.MIN)
         return np.sqrt(np.maximum(least, 0.0))
 
-    def turns(self, U: Array) -> Array:
-        """(s,) largest turn [rad] within a cell for each displacement (n_local, s), on all ranks.
+    def unresolved(self, U: Array) -> Array:
+        """(s,) share of the strain energy of displacements (n_local, s) not linear in cells.
 
-        Between its corners and their mean, doubled; a small strain does not count.
+        Quadratic cells bear bending, whose strain is linear, and cannot help more than that: one
+        that turns by the angle a is strained along by a^2 (x^2 / l^2 - 1 / 12) / 2 although a bent
+        line keeps its length. Where that matters the mesh is too coarse for the turn.
         """
-        corners, most = np.asarray(corner_points(self.mesh)), np.zeros(U.shape[1])
-        for H in self._slopes(U, self._blocks(27 * U.shape[1]), corners):
-            F = np.moveaxis(H, 3, 0) + np.eye(3)
-            F = F.reshape(len(most), -1, len(corners), 3, 3)
-            A = F.mean(axis=2, keepdims=True).swapaxes(-1, -2) @ F
-            sine = 0.5 * np.linalg.norm(
-                (A - A.swapaxes(-1, -2))[..., [2, 0, 1], [1, 2, 0]], axis=-1
-            )
-            most = np.maximum(most, sine.max(axis=(1, 2)))
-        self.mesh.comm.Allreduce(MPI.IN_PLACE, most, MPI.MAX)
-        return 2 * np.arcsin(np.minimum(most, 1.0))
+        linear = np.column_stack([np.ones(len(self.points)), self.points])
+        weighted = linear * self.weights[:, None]
+        fit = linear @ np.linalg.solve(linear.T @ weighted, weighted.T)
+        sums = np.zeros((2, U.shape[1]))
+        for H, w, C in self._gradients(U, self._blocks(27 * U.shape[1]), self.order):
+            whole = linear_strain(H + 0.5 * np.einsum("pmas,pmbs->pabs", H, H))
+            in_cells = whole.reshape(-1, len(fit), 6 * U.shape[1])
+            beyond = (in_cells - fit @ in_cells).reshape(whole.shape)
+            for total, strain in zip(sums, (whole, beyond), strict=True):
+                total += np.einsum("p,pis,pij,pjs->s", w, strain, C, strain, optimize=True)
+        self.mesh.comm.Allreduce(MPI.IN_PLACE, sums)
+        return np.asarray(sums[1] / np.maximum(sums[0], 1e-300))
 
     def at_points(self, E: Array) -> tuple[Array, Array, Array, Array]:
         """Of this process: gradients (p, 9, r), weights (p,), cells (p,) and stiffness (p, 6, 6).

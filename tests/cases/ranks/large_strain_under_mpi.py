@@ -18,7 +18,7 @@ fields = [(y * x, x * z, x**2), (np.sin(x), y**2, x * y), (z, x * y * z, np.cos(
 E = np.column_stack([np.column_stack(field).ravel() for field in fields])
 G = energy.gram(E)
 F = ops.gram(E, energy.second_forces(E, np.array([[0, 1], [2, 2]])))
-least = energy.least_stretch(E)
+least, unresolved = energy.least_stretch(E), energy.unresolved(E)
 solid, whole = model.stresses.finite_strain(), np.vstack(ops.comm.allgather(E))
 far = whole @ [0.3, -0.2, 0.5]
 resisted = np.column_stack([whole.T @ solid.force(far), whole.T @ (solid.tangent(far) @ whole)])
@@ -37,5 +37,6 @@ errors = [[case[of] for of in ("displacement", "frequencies")] for case in table
 if ops.first == 0:
     tip = body.marker("tip").translation @ q
     order = np.lexsort(body.stress.points.T.round(9))
-    arrays = {"G": G, "F": F, "resisted": resisted, "least": least, "errors": errors}
+    arrays = {"G": G, "F": F, "resisted": resisted, "least": least, "errors": errors,
+              "unresolved": unresolved}  # fmt: skip
     np.savez(sys.argv[1], tip=tip, stress=body.stress.field(q)[order], **arrays)
