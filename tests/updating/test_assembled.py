@@ -9,6 +9,7 @@ from numpy.testing import assert_allclose
 
 import rom
 from cases.solid import STEEL, composite
+from rom.body.recovery import StressRecovery
 from rom.errors import ConfigError, InterfaceError
 from rom.parametric import FamilyAssembly
 from rom.parametric.parameters import centre
@@ -231,6 +232,27 @@ def test_an_assembly_of_one_is_tracked_as_a_body(families):
     y = np.sqrt(alone.R) * np.random.default_rng(0).standard_normal((200, 3))
     a, b = alone.run(y), same.run(y)
     for name in ("values", "forces", "factors", "surprise"):
+        scale = np.abs(getattr(a, name)).max(axis=0)
+        assert_allclose(getattr(b, name) / scale, getattr(a, name) / scale, atol=1e-8)
+
+
+def test_a_body_beside_one_that_it_does_not_touch_is_tracked_as_alone(families):
+    """Stress too, which is of the coordinates of its body; bricks recover none, any will do."""
+    rng, family = np.random.default_rng(2), families["frame"]
+    shares = [replace(s, stress=rng.normal(size=(6, family.body.n_modes))) for s in family.shares]
+    at = [[0.125, 0.1, 0.08]]
+    stress = StressRecovery(np.array(at), sum(s.stress for s in shares))
+    family = replace(family, shares=tuple(shares), body=replace(family.body, stress=stress))
+    sensors, force, _ = watched("frame")
+    options = dict(TRACKED, parameters={"E": Drift(0.1, 0.02)})
+    wanted = (Sensors(Channels(at, [[1, 0, 0]]), "stress"),)
+    alone = parameter_tracker(family, watched()[0], force, wanted, fixed=("root",), **options)
+    options["parameters"] = {"frame.E": Drift(0.1, 0.02)}
+    two = FamilyAssembly({"arm": families["arm"], "frame": family})
+    same = parameter_tracker(two, sensors, force, wanted, fixed=(("arm", "root"), *HELD), **options)
+    y = np.sqrt(alone.R) * rng.standard_normal((200, 3))
+    a, b = alone.run(y), same.run(y)
+    for name in ("values", "deviations", "factors"):
         scale = np.abs(getattr(a, name)).max(axis=0)
         assert_allclose(getattr(b, name) / scale, getattr(a, name) / scale, atol=1e-8)
 

@@ -12,9 +12,10 @@ import rom
 from cases.solid import STEEL, composite
 from rom.errors import ConfigError
 from rom.updating import Channels, Responses
+from rom.updating.estimate import DAMPING_LOG_DEVIATION
 from rom.updating.family_model import family_model
 from rom.updating.frf_data import estimators, pooled
-from rom.updating.normal_equations import responses_at, unsure, white
+from rom.updating.normal_equations import Data, responses_at, sums, unsure, white
 
 PARAMETERS = {
     "E_inner": rom.YoungsModulus("inner", 0.4, 2.5),
@@ -53,15 +54,15 @@ def gauss(rng, shape):
     return (rng.standard_normal(shape) + 1j * rng.standard_normal(shape)) / np.sqrt(2)
 
 
-def measured(exact, name, on_force, on_response, rng):
+def measured(exact, name, on_force, on_response, rng, averages=AVERAGES):
     """One force drives all sensors; its noise is in all of their responses."""
-    f = gauss(rng, (AVERAGES, LINES.size, 1, 2))
-    x = exact * (f + on_response * gauss(rng, (AVERAGES, *exact.shape)))
+    f = gauss(rng, (averages, LINES.size, 1, 2))
+    x = exact * (f + on_response * gauss(rng, (averages, *exact.shape)))
     f = f + on_force * gauss(rng, f.shape)
     *H, coherence = estimators(x, np.broadcast_to(f, x.shape))
     H = H[("H1", "H2", "Hv").index(name)]
     return Responses(
-        LINES, H, SENSORS, INPUTS, coherence, AVERAGES, force_noise=on_force, estimator=name
+        LINES, H, SENSORS, INPUTS, coherence, averages, force_noise=on_force, estimator=name
     )
 
 
@@ -221,6 +222,20 @@ def test_an_update_weighs_by_the_model_it_found(family, exact):
     for name in ("E_inner", "rho"):
         assert abs(np.log(found.factors[name] / TRUE[name])) < 3.3 * found.deviations[name]
         assert found.deviations[name] < 0.0045 / 4
+
+
+def test_deviations_say_what_estimated_weights_cost(family, exact):
+    """N^-1 + N^-1 Q N^-1 where the search ended; of eight averages by more than a twentieth."""
+    test = measured(exact, "H1", 0.0, 0.1, np.random.default_rng(3), averages=8)
+    found = rom.update(family, test, fixed=HELD, damping=0.02)
+    level = np.log(np.abs(found.responses(LINES))) - test.logarithm().real
+    at = sums(found.model, found.logarithms, found.zeta, Data.of(test, level))
+    prior = np.diag(np.r_[np.zeros(3), np.full(found.zeta.size, DAMPING_LOG_DEVIATION**-2.0)])
+    C = np.linalg.inv(at.normal + prior)
+    expected = C + C @ at.varied @ C
+    size = np.sqrt(np.outer(*[np.diag(expected)] * 2))
+    assert_allclose(found.covariance / size, expected / size, atol=6e-3)
+    assert (np.diag(found.covariance)[:3] > 1.05 * np.diag(C)[:3]).all()
 
 
 def test_what_estimated_weights_cost_is_that_of_dense_matrices():

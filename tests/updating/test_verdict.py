@@ -1,12 +1,14 @@
 """What the data say, against least squares on numbers of their own; one mistake turns one red."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
 import rom.updating.frf_data as frf
 from rom.updating.normal_equations import Data, Sums
-from rom.updating.verdict import scores, unseen_directions, verdict
+from rom.updating.verdict import chi_row, scores, unseen_directions, verdict
 
 SHAPE = (6, 2, 1)
 
@@ -67,6 +69,15 @@ def test_the_limit_is_that_of_all_trials_together():
     weight[0] = 1.0
     report = verdict(Sums(np.eye(1), np.zeros(1), 2 * weight), data_of(weight), 0, {}, [])
     assert report.rows[1].limit == f"<= {-np.log(0.0005):g}"
+
+
+def test_limits_allow_for_what_is_not_known_of_variances():
+    """Half the freedom: chi-square of two. A scale that varies by a half: F of two and four."""
+    data = data_of(np.ones(SHAPE))
+    half = chi_row("x", 1.0, 4.0, 1, replace(data, known=0.5))
+    assert half.limit == f"<= {-np.log(0.001):g}"
+    scaled = chi_row("x", 1.0, 2.0, 1, replace(data, scale=0.5))
+    assert scaled.limit == f"<= {2 * (0.001**-0.5 - 1):g}"
 
 
 def test_estimators_keep_the_phase_and_assurance_is_of_conjugates():
