@@ -12,7 +12,7 @@ from rom.components.gear_mesh import Hertz, Mesh
 from rom.mbs.integrate.simulation import simulate
 
 TIME_STEP = 1e-5  # [s]
-VARIANTS: dict[str, dict[str, Any]] = {
+MESH_VARIANTS: dict[str, dict[str, Any]] = {
     "": {},
     ", along involutes": {"conservative": False},
     ", slices coupled": {"coupling": 2e-3},
@@ -28,7 +28,7 @@ def measured(steps: int) -> Iterator[Row]:
         steps: of the plain train; a fifth of them in its variants.
     """
     case = "planetary train, 6 meshes of 21 slices"
-    for name, more in VARIANTS.items():
+    for name, more in MESH_VARIANTS.items():
         mech, pair, stiffness = planetary_train(**more)
         each = _seconds_per_step(mech, steps if not name else steps // 5)
         speed = 1 / each

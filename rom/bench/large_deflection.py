@@ -15,12 +15,12 @@ from numba import njit
 
 from rom.bench.models import KINDS, STEEL, bar, geometry
 from rom.bench.peers.spin_up import (
-    EA,
-    LENGTH,
+    AXIAL_STIFFNESS,
+    BAR_LENGTH,
+    BAR_SIDE,
+    FINAL_SPEED,
     LINE_MASS,
     RISE_TIME,
-    SIDE,
-    SPEED,
     TIME_STEP,
     Run,
     by_exudyn,
@@ -41,19 +41,19 @@ from rom.workflow import reduce
 
 N_COORDINATES = 30
 MOST_SECONDS = {16: 50e-6, 30: 200e-6}  # for force with tangent, by number of coordinates
-COARSE, FINE = (40, 1), (205, 4)  # hexahedra along and across the bar
-SEGMENTS = (40, 80, 160)  # of rods, and elements of Exudyn, beside the body
+COARSE_CELLS, FINE_CELLS = (40, 1), (205, 4)  # hexahedra along and across the bar
+SEGMENT_COUNTS = (40, 80, 160)  # of rods, and elements of Exudyn, beside the body
 TIP_FORCE = 60.0  # for which the bar has shapes [N]
-SEED = 0
+RANDOM_SEED = 0
 Row = tuple[str, str, float, str, str]
 
 
 def measured(
     stocky: dict[str, float],
-    coarse: tuple[int, int] = COARSE,
-    fine: tuple[int, int] = FINE,
-    segments: tuple[int, ...] = SEGMENTS,
-    elements: tuple[int, ...] = SEGMENTS,
+    coarse: tuple[int, int] = COARSE_CELLS,
+    fine: tuple[int, int] = FINE_CELLS,
+    segments: tuple[int, ...] = SEGMENT_COUNTS,
+    elements: tuple[int, ...] = SEGMENT_COUNTS,
 ) -> Iterator[Row]:
     """Case, quantity, value, unit and aim; times are those of the processor.
 
@@ -88,15 +88,16 @@ def bar_of_hexahedra(along: int, across: int) -> FEModel:
     """The bar of the spin-up as a solid, without Poisson effect as in beam theory."""
     from rom.fe import model as read_model
 
-    material = Material(E=EA / SIDE**2, nu=0.0, rho=LINE_MASS / SIDE**2)
-    size = {"L": LENGTH, "b": SIDE, "h": SIDE, "hex": 1, "nx": along, "ny": across, "nz": across}
+    material = Material(E=AXIAL_STIFFNESS / BAR_SIDE**2, nu=0.0, rho=LINE_MASS / BAR_SIDE**2)
+    section = {"b": BAR_SIDE, "h": BAR_SIDE, "ny": across, "nz": across}
+    size = {"L": BAR_LENGTH, "hex": 1, "nx": along} | section
     return read_model(geometry("beam"), material=material, parameters=size)
 
 
 def seconds_of_tensors(model: FEModel, r: int) -> float:
     """Processor time of the tensors of r displacements, whose numbers do not matter to it [s]."""
     energy: Any = model.stresses
-    E = np.random.default_rng(SEED).standard_normal((model.operators.n_local, r))
+    E = np.random.default_rng(RANDOM_SEED).standard_normal((model.operators.n_local, r))
     energy.large_strain().gram(E[:, :1])  # compiles the forms
     start = process_time()
     found = Quartic.from_gram(energy.large_strain().gram(E), r)
@@ -115,7 +116,7 @@ def seconds_of_force(r: int, times: int = 2000) -> tuple[float, float]:
     """
     linear = reduce(bar((1.0, 0.1, 0.07), (r, 1, 1)), method=CraigBampton(r - 6), certify=False,
                     interfaces=dict(KINDS), reference="root")  # fmt: skip
-    rng = np.random.default_rng(SEED)
+    rng = np.random.default_rng(RANDOM_SEED)
     cubic, quartic = (rng.standard_normal(n_entries(r, order)) for order in (3, 4))
     energy = Quartic(linear.K, cubic, quartic)
     mech = Mechanism()
@@ -144,7 +145,7 @@ def seconds_of_force(r: int, times: int = 2000) -> tuple[float, float]:
 def spin_ups(model: FEModel, aim: str) -> Generator[Row, None, Run]:
     """Rows of a body made from a mesh beside the mesh itself; its run."""
     geometric = Geometric(loads={"tip": (0, TIP_FORCE, TIP_FORCE, 0, 0, 0)}, n_modes=2,
-                          spin=(0, 0, SPEED), n_shapes=8)  # fmt: skip
+                          spin=(0, 0, FINAL_SPEED), n_shapes=8)  # fmt: skip
     start = process_time()
     made = reduce(model, method=CraigBampton(8), interfaces={"root": "rbe3", "tip": "rbe3"},
                   reference="root", nonlinear=geometric, certify=False)  # fmt: skip

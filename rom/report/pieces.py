@@ -104,8 +104,8 @@ class _AtRest:
         self.mech.fixed("support", self.mech.ground.marker(support[1]), markers[support[0]])
         for k, (load, x) in enumerate(zip(components, case, strict=True)):
             most = x * load.largest * np.eye(3)[load.component % 3]
-            push = self.mech.torque if load.component > 2 else self.mech.force
-            push(f"load {k}", markers[load.interface], lambda t, most=most: t * most)
+            act = self.mech.torque if load.component > 2 else self.mech.force
+            act(f"load {k}", markers[load.interface], lambda t, most=most: t * most)
 
     def moved_to(self, share: float) -> bool:
         """Whether there is an equilibrium at a share of the load; it is the state from then on."""

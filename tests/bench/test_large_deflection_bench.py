@@ -39,7 +39,7 @@ def test_rods_and_their_beams_are_the_bar_of_the_paper(monkeypatch):
 
 def test_the_deflection_of_a_beam_is_read_from_the_places_of_its_tip(monkeypatch):
     """A stiff bar has none; one that lags by 0.2 m has that."""
-    angle = ramp(spin_up.SPEED, spin_up.RISE_TIME)[1]
+    angle = ramp(spin_up.FINAL_SPEED, spin_up.RISE_TIME)[1]
     t = np.linspace(0.0, spin_up.RISE_TIME, 31)
     turned = [rotation.matrix(rotation.exp([angle(s), 0, 0])) for s in t]
     tip = np.array([A @ [0, 10.0, -0.2] for A in turned])

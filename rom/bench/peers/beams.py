@@ -12,7 +12,7 @@ axis of the world, whose origin is the hub, by the angle of `angle`.
 import json
 import sys
 from itertools import pairwise
-from math import cos, pi
+from math import pi, sin
 from pathlib import Path
 from time import process_time
 from typing import Any
@@ -29,7 +29,7 @@ def angle(t: float, final: float, rise: float) -> float:
     if t >= rise:
         return final * (t - rise / 2)
     k = 2 * pi / rise
-    return final * (t * t / (2 * rise) + (cos(k * t) - 1) / (2 * pi * k))
+    return final * (t * t / (2 * rise) - sin(k * t / 2) ** 2 / (pi * k))
 
 
 def section(one: dict[str, Any], k: int) -> Any:

@@ -27,14 +27,19 @@ from rom.mbs.mechanism import Mechanism
 from rom.model import Array
 from rom.process.child import scratch
 
-LENGTH, EA, EI, LINE_MASS = 10.0, 2.8e7, 1.4e4, 1.2  # [m, N, N m^2, kg/m]
-SIDE = (12 * EI / EA) ** 0.5  # of its square section [m]
-GA, GJ = EA / 2.4, EI  # as cells of one layer without Poisson effect have it, 5/6 for shear
-LINE_INERTIA = LINE_MASS * SIDE**2 / 12  # [kg m]
-SPEED, RISE_TIME, TIME_STEP, RHO_INF = 6.0, 15.0, 0.005, 0.9
-DEEPEST = -0.57379  # deflection of the tip of the exact beam, at 6.76 s [m]
+BAR_LENGTH, LINE_MASS = 10.0, 1.2  # [m, kg/m]
+AXIAL_STIFFNESS, BENDING_STIFFNESS = 2.8e7, 1.4e4  # EA, EI [N, N m^2]
+BAR_SIDE = (12 * BENDING_STIFFNESS / AXIAL_STIFFNESS) ** 0.5  # of its square section [m]
+LINE_INERTIA = LINE_MASS * BAR_SIDE**2 / 12  # [kg m]
+# along the bar, then across: without Poisson effect, and five sixths of the section for shear
+SECTION_STRETCH = [AXIAL_STIFFNESS, AXIAL_STIFFNESS / 2.4, AXIAL_STIFFNESS / 2.4]
+SECTION_BEND = [BENDING_STIFFNESS] * 3
+SECTION_INERTIA = [2 * LINE_INERTIA, LINE_INERTIA, LINE_INERTIA]
+TO_ROD = [1, 2, 0]  # whose third axis is along it
+FINAL_SPEED, RISE_TIME, TIME_STEP, RHO_INF = 6.0, 15.0, 0.005, 0.9
+LARGEST_LAG = -0.57379  # deflection of the tip of the exact beam, at 6.76 s [m]
 ORIGIN = (0.0, 0.0, 0.0)
-ALONG = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]])  # third axis of a rod along x
+ROD_AXES = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]])  # third axis of a rod along x
 
 Held = Callable[[Mechanism], tuple[Any, Any]]
 
@@ -69,11 +74,12 @@ def rod(segments: int) -> Held:
     """The bar as a rod of so many segments."""
 
     def held(mech: Mechanism) -> tuple[Any, Any]:
+        stretch, bend, inertia = (np.array(x)[TO_ROD] for x in
+                                  (SECTION_STRETCH, SECTION_BEND, SECTION_INERTIA))  # fmt: skip
         section: dict[str, Any] = {
-            "stretch": [GA, GA, EA], "bend": [EI, EI, GJ], "mass": LINE_MASS,
-            "inertia": [LINE_INERTIA, LINE_INERTIA, 2 * LINE_INERTIA],
+            "stretch": stretch, "bend": bend, "inertia": inertia, "mass": LINE_MASS,
         }  # fmt: skip
-        one = body(straight(LENGTH, segments, frame=ALONG, **section))
+        one = body(straight(BAR_LENGTH, segments, frame=ROD_AXES, **section))
         part = mech.add_nonlinear("bar", one)
         return part.marker("start"), part.marker("end")
 
@@ -86,8 +92,8 @@ def spun_up(held: Held, t_end: float = RISE_TIME) -> Run:
     root, tip = held(mech)
     place = mech.design_point(root)
     mech.revolute("base", mech.ground.marker(place), root, axis=(0, 0, 1))
-    angle = ramp(SPEED, RISE_TIME)[1]
-    mech.drive("motor", "base", angle)
+    speed, angle = ramp(FINAL_SPEED, RISE_TIME)
+    mech.drive("motor", "base", angle, rate=speed)
     options: dict[str, Any] = {"dt": TIME_STEP, "rho_inf": RHO_INF, "progress": False}
     simulate(mech, t_end=2 * TIME_STEP, **options)
     start = process_time()
@@ -97,13 +103,13 @@ def spun_up(held: Held, t_end: float = RISE_TIME) -> Run:
     across = np.array([(rotation.matrix(rotation.exp([0, 0, -angle(t)])) @ x)[1]
                        for t, x in zip(sol.t, seen, strict=True)])  # fmt: skip
     done = sol.statistics
-    return Run(seconds, abs(across.min() / DEEPEST - 1), done["steps"], done["iterations"])
+    return Run(seconds, abs(across.min() / LARGEST_LAG - 1), done["steps"], done["iterations"])
 
 
 def by_exudyn(elements: int) -> tuple[float, float, str]:
     """Processor time [s] and error of the same by Exudyn, and its version."""
     steps = round(RISE_TIME / TIME_STEP)
-    described = {"blades": [beams(elements)], "final": SPEED, "rise": RISE_TIME,
+    described = {"blades": [beams(elements)], "final": FINAL_SPEED, "rise": RISE_TIME,
                  "t_end": RISE_TIME, "steps": steps, "samples": steps,
                  "rho_inf": RHO_INF}  # fmt: skip
     with scratch("peers") as folder:
@@ -111,22 +117,22 @@ def by_exudyn(elements: int) -> tuple[float, float, str]:
         file.write_text(json.dumps(described))
         found = answer_of([interpreter(), str(SCRIPT_FILE), str(file)])
     deepest = lag(np.array(found["tips"])[:, 0]).min()
-    return found["seconds"], abs(deepest / DEEPEST - 1), found["version"]
+    return found["seconds"], abs(deepest / LARGEST_LAG - 1), found["version"]
 
 
 def beams(elements: int) -> dict[str, Any]:
     """Nodes and sections of the bar along y, which Exudyn's script turns about x."""
     n = elements
     quarter = rotation.quaternion(rotation.matrix(rotation.exp([0, 0, np.pi / 2])))
-    nodes = [[0.0, y, 0.0, *quarter] for y in np.linspace(0.0, LENGTH, n + 1)]
-    return {"nodes": nodes, "length": [LENGTH / n] * n, "mass": [LINE_MASS] * n,
-            "stiffness": [[EA, GA, GA, GJ, EI, EI]] * n, "damping": [[0.0] * 6] * n,
-            "inertia": [[2 * LINE_INERTIA, LINE_INERTIA, LINE_INERTIA]] * n}  # fmt: skip
+    nodes = [[0.0, y, 0.0, *quarter] for y in np.linspace(0.0, BAR_LENGTH, n + 1)]
+    return {"nodes": nodes, "length": [BAR_LENGTH / n] * n, "mass": [LINE_MASS] * n,
+            "stiffness": [SECTION_STRETCH + SECTION_BEND] * n, "damping": [[0.0] * 6] * n,
+            "inertia": [SECTION_INERTIA] * n}  # fmt: skip
 
 
 def lag(tip: Array) -> Array:
     """(k,) deflection across a bar along y that turns about x, from (k, 3) places of its tip."""
-    angle = ramp(SPEED, RISE_TIME)[1]
+    angle = ramp(FINAL_SPEED, RISE_TIME)[1]
     t = np.linspace(0.0, RISE_TIME, len(tip))
     return np.array([(rotation.matrix(rotation.exp([-angle(s), 0, 0])) @ x)[2]
                      for s, x in zip(t, tip, strict=True)])  # fmt: skip

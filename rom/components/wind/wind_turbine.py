@@ -140,7 +140,7 @@ def ramp(final: float, rise: float) -> tuple[Callable[[float], float], Callable[
     def angle(t: float) -> float:
         if t >= rise:
             return final * (t - rise / 2)
-        return final * (t * t / (2 * rise) + (np.cos(k * t) - 1) / (2 * np.pi * k))
+        return final * (t * t / (2 * rise) - np.sin(k * t / 2) ** 2 / (np.pi * k))
 
     return speed, angle
 

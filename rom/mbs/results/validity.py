@@ -51,15 +51,15 @@ def warn_of_range(mechanism: Any, packed: Any, state: Any) -> None:
         part = mechanism.parts[name]
         if getattr(part.flexible, "quartic", None) is None:
             continue
-        if said := _beyond_range(part.flexible, state.q[at + 7 : at + 7 + part.r][None]):
-            warn(f"body {name!r} is beyond the range of its certificate: {said[1]}")
+        if found := _beyond_range(part.flexible, state.q[at + 7 : at + 7 + part.r][None]):
+            warn(f"body {name!r} is beyond the range of its certificate: {found[1]}")
 
 
 def _warn_of_range(solution: Solution, name: str) -> None:
     """Bodies of large deflection that store more energy than where they were compared."""
     body = solution.mechanism.parts[name].flexible
-    if said := _beyond_range(body, solution.elastic(name)):
-        k, why = said
+    if found := _beyond_range(body, solution.elastic(name)):
+        k, why = found
         warn(f"body {name!r} left the range of its certificate at {solution.t[k]:.4g} s: {why}")
 
 
