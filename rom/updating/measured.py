@@ -12,14 +12,14 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial import cKDTree
 
-from rom.arguments import finite, one_of
+from rom.arguments import finite, one_of, typed, whole
 from rom.body.flexible import FlexibleBody
 from rom.body.surface import strain_rows, surface_of
 from rom.errors import ConfigError
 from rom.model import Array, Index
 from rom.names import named
 from rom.rotation import skew
-from rom.updating.frf_data import Complex, pooled, random_error
+from rom.updating.frf_data import Complex, pooled
 
 DERIVATIVES = {"displacement": 0, "velocity": 1, "acceleration": 2}
 LENGTHS = {  # factors by which points that are off a body may all lie on it
@@ -67,10 +67,19 @@ class Channels:
             raise ConfigError(f"points {shapes[0]}, directions {shapes[1]}: (k, 3) of both.")
         if not np.linalg.norm(self.directions, axis=1).all():
             raise ConfigError("a channel has a direction of length zero.")
-        if isinstance(self.bodies, str):
-            object.__setattr__(self, "bodies", (self.bodies,) * shapes[0][0])
-        if self.bodies is not None and len(self.bodies) != shapes[0][0]:
-            raise ConfigError(f"{len(self.bodies)} bodies are named for {shapes[0][0]} channels.")
+        self._name_bodies(shapes[0][0])
+
+    def _name_bodies(self, k: int) -> None:
+        """Keep a name of each of k channels, where there are any."""
+        given: Any = self.bodies
+        if given is None:
+            return
+        each = (given,) * k if isinstance(given, str) else given
+        if not isinstance(each, list | tuple) or not all(isinstance(name, str) for name in each):
+            raise ConfigError(f"bodies = {given!r}: a name, or one of each channel.")
+        if len(each) != k:
+            raise ConfigError(f"{len(each)} bodies are named for {k} channels.")
+        object.__setattr__(self, "bodies", tuple(each))
 
     def some(self, chosen: Any) -> "Channels":
         """Those with chosen numbers (j,)."""
@@ -177,6 +186,18 @@ class Channels:
         return owners, nearest[owners, np.arange(len(points))]
 
 
+def _complex(H: Any) -> Complex:
+    """Responses as complex numbers, which may be NaN.
+
+    Raises:
+        ConfigError: for anything else.
+    """
+    try:
+        return np.asarray(H, dtype=complex)
+    except (TypeError, ValueError) as error:
+        raise ConfigError("H holds no numbers.") from error
+
+
 def _check_lengths(points: Array, surface: cKDTree, reach: float, what: str) -> None:
     """Refuse points that are off a body, or all in one spot, and on it by another unit."""
     spread, now = np.ptp(points, axis=0).max(), surface.query(points)[0]
@@ -193,6 +214,7 @@ def _check_lengths(points: Array, surface: cKDTree, reach: float, what: str) -> 
             )
 
 
+@typed
 @dataclass(frozen=True, slots=True)
 class Responses:
     """Measured frequency responses.
@@ -231,7 +253,7 @@ class Responses:
     def __post_init__(self) -> None:
         f = finite("frequencies", self.frequencies, None)
         object.__setattr__(self, "frequencies", f)
-        object.__setattr__(self, "H", np.asarray(self.H, dtype=complex))
+        object.__setattr__(self, "H", _complex(self.H))
         for one in self.quantities:
             one_of("quantity", one, (*DERIVATIVES, "strain"))
         if f.ndim != 1 or not f.size or f[0] <= 0 or (np.diff(f) <= 0).any():
@@ -243,13 +265,13 @@ class Responses:
             )
         if len(self.quantities) != wanted[1]:
             raise ConfigError(f"{len(self.quantities)} quantities of {wanted[1]} sensors.")
-        c = np.asarray(self.coherence, dtype=float)
+        c = finite("coherence", self.coherence, None)
         if c.shape not in ((), wanted) or not ((c >= 0) & (c < 1)).all():
             raise ConfigError(
                 f"coherence {c.shape} must be one number or {wanted}, from 0 up to below 1.",
                 hint="A coherence of exactly one comes of a single average: it says nothing.",
             )
-        random_error(0.5, self.averages)
+        whole("averages", self.averages, 1, None)
         if c.shape and self.averages <= FREEDOM_LOST:
             raise ConfigError(
                 f"coherence estimated from {self.averages} averages says nothing of the noise.",

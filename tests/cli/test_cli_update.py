@@ -283,9 +283,10 @@ def test_families_on_a_joint_are_updated_and_written_one_by_one(bolted, capsys):
 
 def test_a_coupled_assembly_is_planned(bolted, capsys):
     words = ["--plan", "4,1", "--lines", "20:900", "--couple", "frame.tip=arm.root", *HALVES]
-    found = halves(words, capsys)
+    found = halves([*words, "-o", "halves.png", "--force"], capsys)
     assert errors(found, schema("update")) == []
     assert {"frame.E", "arm.E"} <= set(found["deviations"])
+    assert Path("halves.png").read_bytes()[:4] == b"\x89PNG"
 
 
 WRONG = ("", "nan", "-1", "0", "1e400", "x", "1:2", "a=b", "a=b:c:d:e", "tip:1:1:1", "no.npz",

@@ -1,6 +1,6 @@
 """Tests with faults drawn at random: each is refused, or fails its verdict, by name and place."""
 
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -171,6 +171,35 @@ def test_a_fault_is_named_with_its_place(family, fault, residual):
             assert not found.verdict.ok, f"{fault.__name__}, seed {seed}: {found}"
             message = str(found)
         assert any(word in message for word in words), f"{words}, seed {seed}: {message}"
+
+
+JUNK = (
+    None, "a", "", [], {}, [[1, 2]], np.nan, np.inf, -1, 0, 1.5, True, object(), ("a", 1),
+    np.zeros((2, 3)), np.array(["x"]), 1j, [None] * 16,
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("name", [f.name for f in fields(Responses)])
+def test_what_is_no_test_is_named(family, name):
+    """Each field with each thing that it is not: an error that names it, or a verdict."""
+    test = measured(family, np.random.default_rng(0))
+    for thing in JUNK:
+        try:
+            rom.update(family, replace(test, **{name: thing}), fixed=HELD)
+        except RomError as error:
+            told = str(error).replace("_", " ")
+            assert any(
+                word in told for word in (name.replace("_", " "), "H is", "forces", name[:7])
+            )
+
+
+@pytest.mark.parametrize("name", [f.name for f in fields(Channels)])
+def test_what_are_no_channels_is_named(family, name):
+    for thing in JUNK:
+        try:
+            replace(SENSORS, **{name: thing}).rows(family.body, "sensor")
+        except RomError as error:
+            assert any(word in str(error) for word in (name, "(k, 3)", "body alone", "direction"))
 
 
 @pytest.mark.parametrize("seed", range(4))
