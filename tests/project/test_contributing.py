@@ -26,6 +26,7 @@ ELSEWHERE = {  # where the word means something else, or the member is used and 
     "a kind of interface": ("rom/cyclic/", "rom/prestress/"),
     "a joint": ("rom/io/",),
     "a verb of the command line": ("rom/mbs/",),
+    "a picture": ("rom/cyclic/", "rom/__init__.pyi"),
 }
 
 
