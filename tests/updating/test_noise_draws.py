@@ -286,6 +286,7 @@ def test_the_limit_is_kept_where_averages_are_few():
     assert np.mean(value > chi2.isf(0.01, 2 * lines)) > 1.5 * share
 
 
+@pytest.mark.once
 def test_noise_of_forces_may_differ_between_lines(exact, tmp_path):
     test = measured(exact, "Hv", 0.1, 0.1, np.random.default_rng(0))
     same = replace(test, force_noise=np.full((LINES.size, 2), 0.1))
