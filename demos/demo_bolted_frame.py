@@ -246,9 +246,9 @@ view.plane(
 
 errors = [np.log(second.factors[n] / true[n]) / second.deviations[n] for n in wanted["free"]]
 results = {
-    "refused model: chi-square over its limit, at least 2": (
+    "refused model, chi-square over its limit, at least 2": (
         min(first.verdict.rows[0].value, 2.0), 2.0, 1e-12),
-    "mended model: chi-square over its expectation": (second.verdict.rows[0].value, 1.0, 0.07),
+    "mended model, chi-square over its expectation": (second.verdict.rows[0].value, 1.0, 0.07),
     "mass of the instrument [kg]": (mass, carried, 0.02),
     "errors in standard deviations, at most 4": (max(np.abs(errors).max(), 4.0), 4.0, 1e-12),
     "frequencies foretold over those of the bare frame": (1 + off["second"], 1.0, 0.003),
