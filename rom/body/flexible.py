@@ -286,15 +286,30 @@ class FlexibleBody(BodyData):
         """
         rising, energy = finite("shares", shares, None).reshape(-1), self.energy()
         found = follow(energy, np.outer(rising, self.forces_on(loads)), self.mean_rows(fixed))
-        beyond = energy.energies(found) > (1 + ENERGY_RTOL) * self.certified_energy
-        if beyond.any():
+        if beyond := self.beyond_range(found):
+            k, why = beyond
             warn(
-                f"body {self.name!r} leaves the range of its certificate at "
-                f"{rising[np.argmax(beyond)]:.4g} of these loads: no load case of its range holds "
-                f"beyond {self.certified_energy:.3g} J. Reduce it for larger loads, or for more "
-                "shapes."
+                f"body {self.name!r} leaves the range of its certificate at {rising[k]:.4g} of "
+                f"these loads: {why}"
             )
         return found
+
+    def beyond_range(self, q: Array) -> tuple[int, str] | None:
+        """Which of states q (s, r) is the first beyond the certificate, and why; None if none is.
+
+        States at large deflection that store more energy than those compared with the full model.
+        """
+        most = self.certified_energy
+        if not np.isfinite(most):
+            return None
+        energy = self.energy().energies(q)
+        beyond = energy > (1 + ENERGY_RTOL) * most
+        if not beyond.any():
+            return None
+        return int(np.argmax(beyond)), (
+            f"its strain energy is {np.nanmax(energy):.3g} J, and no load case of its range holds "
+            f"beyond {most:.3g} J. Reduce it for larger loads, or for more shapes."
+        )
 
     def critical_loads(self, loads: Mapping[str, Any], *, fixed: Fixed = ()) -> Array:
         """(k,) shares of dead loads at which a stiffness vanishes: the body buckles or snaps [1].

@@ -13,7 +13,6 @@ from rom.model import Array
 
 # of the size of the body: beyond a tenth, linear elasticity is no longer to be trusted
 MAX_DEFORMATION = 0.1
-ENERGY_RTOL = 1e-6  # of states on the very edge of a range
 # of an interface against the frame [rad]: there exp(sin x) falls short of the angle x by 1.5 %
 MAX_MARKER_TURN = 0.3
 
@@ -51,30 +50,16 @@ def warn_of_range(mechanism: Any, packed: Any, state: Any) -> None:
         part = mechanism.parts[name]
         if getattr(part.flexible, "quartic", None) is None:
             continue
-        if found := _beyond_range(part.flexible, state.q[at + 7 : at + 7 + part.r][None]):
+        if found := part.flexible.beyond_range(state.q[at + 7 : at + 7 + part.r][None]):
             warn(f"body {name!r} is beyond the range of its certificate: {found[1]}")
 
 
 def _warn_of_range(solution: Solution, name: str) -> None:
     """Bodies of large deflection that store more energy than where they were compared."""
-    body = solution.mechanism.parts[name].flexible
-    if found := _beyond_range(body, solution.elastic(name)):
+    body: Any = solution.mechanism.parts[name].flexible
+    if found := body.beyond_range(solution.elastic(name)):
         k, why = found
         warn(f"body {name!r} left the range of its certificate at {solution.t[k]:.4g} s: {why}")
-
-
-def _beyond_range(body: Any, q: Array) -> tuple[int, str] | None:
-    """Which of the coordinates (t, r) are the first beyond the certificate, and why."""
-    most = body.certified_energy
-    if not np.isfinite(most):
-        return None
-    energy = body.quartic.energies(q)
-    if not np.nanmax(energy, initial=0.0) > (1 + ENERGY_RTOL) * most:
-        return None
-    return int(np.nanargmax(energy > (1 + ENERGY_RTOL) * most)), (
-        f"its strain energy is {np.nanmax(energy):.3g} J, and no load case of its range holds "
-        f"beyond {most:.3g} J. Reduce it for larger loads, or for more shapes."
-    )
 
 
 def _warn_of_turned_markers(solution: Solution, name: str) -> None:
