@@ -20,7 +20,7 @@ from rom.body.rotating import rotating_frequencies
 from rom.body.stiffening import SecondOrder
 from rom.body.surface import Where, point_areas
 from rom.eigen.supports import Fixed, Springs, spring_matrices
-from rom.errors import ModelError, warn
+from rom.errors import ConfigError, ModelError, warn
 from rom.model import Array, Modes
 from rom.notebook import html_table, listed
 from rom.units import unit_system
@@ -298,7 +298,13 @@ class FlexibleBody(BodyData):
         """Which of states q (s, r) is the first beyond the certificate, and why; None if none is.
 
         States at large deflection that store more energy than those compared with the full model.
+
+        Raises:
+            ConfigError: if q has not r columns.
         """
+        q = np.asarray(q)
+        if q.ndim != 2 or q.shape[1] != self.n_modes:
+            raise ConfigError(f"q of shape {q.shape} must have the shape (s, {self.n_modes})")
         most = self.certified_energy
         if not np.isfinite(most):
             return None

@@ -424,6 +424,7 @@ GIVEN = {  # callable -> legal values of its own
     "FlexibleBody.rotating_frequencies": {"speed": lambda: 1.0, "axis": lambda: Z},
     "FlexibleBody.marker": {"name": lambda: "root"},
     "FlexibleBody.equilibria": {"loads": lambda: {"tip": (1.0, 0, 0, 0, 0, 0)}},
+    "FlexibleBody.beyond_range": {"q": lambda: np.zeros((1, body().n_modes))},
     "FlexibleBody.critical_loads": {"loads": lambda: {"tip": (1.0, 0, 0, 0, 0, 0)}},
     "FlexibleBody.forces_on": {"loads": lambda: {"tip": (1.0, 0, 0, 0, 0, 0)}},
     "FlexibleBody.mean_rows": {"fixed": lambda: {"tip": "x"}},
