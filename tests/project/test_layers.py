@@ -17,16 +17,7 @@ LIGHT = {"assembly", "body", "cyclic", "eigen", "errors", "io", "mbs", "model", 
          "paths", "reduction", "rotation", "units"}  # fmt: skip
 ANYTHING = {"__init__", "__main__", "bench", "cli", "doctor"}  # they stand in front
 # what every part stands on, none of it above another
-GROUND = {
-    "arguments",
-    "deprecated",
-    "lazy",
-    "moved",
-    "names",
-    "places",
-    "plausible",
-    "process",
-}
+GROUND = {*"arguments deprecated lazy moved names places plausible process".split()}
 MAY_IMPORT = {  # module or package below rom/ -> what it may import from rom beside GROUND
     **{part: {"places", "errors", "model", "rotation"} for part in GROUND},
     "errors": set(),
@@ -46,17 +37,7 @@ MAY_IMPORT = {  # module or package below rom/ -> what it may import from rom be
     "workflow": LIGHT | {"checks"},
     "prestress": {"model", "rows", "eigen", "rotation", "cyclic", "reduction", "errors"},
     "parametric": LIGHT | {"checks", "rows", "workflow"},
-    "updating": {
-        "model",
-        "rows",
-        "body",
-        "eigen",
-        "assembly",
-        "parametric",
-        "reduction",
-        "rotation",
-        "errors",
-    },
+    "updating": {*"model rows body eigen assembly parametric reduction rotation errors".split()},
     "fe": {"model", "eigen", "units", "errors"},
     "components": LIGHT | {"updating"},
     "view": {"model", "mbs", "rotation", "io", "errors"},
@@ -69,237 +50,60 @@ MAY_IMPORT = {  # module or package below rom/ -> what it may import from rom be
 # inside each folder that has folders, what lies lower stands first; a file imports its own folder
 # or a lower one
 ORDER = {
-    "": (
-        "errors",
-        "notebook",
-        "rotation",
-        "places",
-        "lazy",
-        "moved",
-        "names",
-        "process",
-        "arguments",
-        "units",
-        "deprecated",
-        "plausible",
-        "material",
-        "model",
-        "rows",
-        "paths",
-        "eigen",
-        "reduction",
-        "body",
-        "fe",
-        "doctor",
-        "checks",
-        "assembly",
-        "cyclic",
-        "workflow",
-        "parametric",
-        "updating",
-        "prestress",
-        "io",
-        "mbs",
-        "fmu",
-        "view",
-        "config",
-        "report",
-        "components",
-        "bench",
-        "cli",
-        "__main__",
-    ),
-    "bench": (
-        "models",
-        "units",
-        "two_stages",
-        "peers",
-        "updating",
-        "large_deflection",
-        "loops",
-        "gears",
-        "oil_films",
-        "first_use",
-        "wheel",
-        "many_modes",
-        "benchmarks",
-    ),
-    "cli": (
-        "answer",
-        "speech",
-        "schemas",
-        "options",
-        "described",
-        "method",
-        "ranks",
-        "matrices",
-        "model",
-        "output",
-        "verbs",
-        "parser",
-        "main",
-    ),
-    "cyclic": (
-        "faces",
-        "sector",
-        "rotation",
-        "modes",
-        "gyroscopic",
-        "travelling",
-        "supports",
-        "campbell",
-        "certificate",
-        "reduced",
-        "blades",
-    ),
-    "fe": (
-        "costs",
-        "parallel",
-        "jit",
-        "compat",
-        "operators",
-        "forms",
-        "mesh",
-        "elasticity",
-        "probe",
-    ),
-    "fe.operators": (
-        "solver",
-        "memory",
-        "disk",
-        "aij",
-        "foreseen",
-        "factor",
-        "corrected",
-        "substructures",
-        "place",
-        "held",
-        "spectrum",
-        "iterative",
-        "counting",
-        "krylov_schur",
-        "workers",
-        "petsc",
-    ),
-    "fe.mesh": (
-        "cell_types",
-        "topology",
-        "picks",
-        "cad",
-        "solid",
-        "sources",
-        "child",
-        "curving",
-        "quality",
-        "repair",
-        "validate",
-        "cut",
-        "distribute",
-        "read",
-        "summary",
-        "input_deck",
-    ),
-    "io": (
-        "files",
-        "hdf5",
-        "archive",
-        "native",
-        "fields",
-        "responses",
-        "matrices",
-        "sid",
-        "programs",
-        "fmu",
-        "family",
-        "history",
-        "export",
-        "claim",
-        "ours",
-    ),
-    "mbs": (
-        "compiler",
-        "kernels",
-        "parts",
-        "connections",
-        "elements",
-        "mechanism",
-        "equations",
-        "results",
-        "integrate",
-        "analysis",
-    ),
-    "mbs.analysis": (
-        "quadratic_eigen",
-        "local_equations",
-        "rotors",
-        "few_modes",
-        "tangent",
-        "sparse_tangent",
-        "equilibrium",
-        "linearize",
-        "campbell",
-        "response",
-        "snapshot",
-        "steady_motion",
-        "sensitivity",
-        "inverse_dynamics",
-        "law_check",
-        "continuation",
-        "periodic",
-    ),
-    "mbs.elements": (
-        "family",
-        "pair_motion",
-        "cylinders",
-        "springs",
-        "rotational_springs",
-        "loads",
-        "law_calls",
-        "laws_in_python",
-        "laws",
-        "formulas",
-        "motors",
-        "frictions",
-        "contact",
-        "stops",
-        "bushings",
-        "spread_loads",
-        "nonlinear",
-        "rods",
-        "tendons",
-        "gears",
-        "rolling",
-        "films",
-        "round_bodies",
-        "solids",
-    ),
-    "body": (
-        "recovery",
-        "nonlinear",
-        "records",
-        "inertia",
-        "reference",
-        "stiffening",
-        "conversion",
-        "frame",
-        "rotating",
-        "surface",
-        "flexible",
-        "prestress",
-        "projection",
-        "correction",
-        "damping",
-        "spread",
-    ),
-    "reduction": (
-        "bases",
-        "interfaces",
-    ),
-    "view": (
-        "canvas",
-        "figures",
-        "scenes",
-    ),
+    level: tuple(names.split())
+    for level, names in {
+        "": (
+            "errors notebook rotation places lazy moved names process arguments units deprecated "
+            "plausible material model rows paths eigen reduction body fe doctor checks assembly "
+            "cyclic workflow parametric updating prestress io mbs fmu view config report "
+            "components bench cli __main__"
+        ),
+        "bench": (
+            "models units two_stages peers updating large_deflection loops gears oil_films "
+            "first_use wheel many_modes benchmarks"
+        ),
+        "cli": (
+            "answer speech schemas options described method ranks matrices model output verbs "
+            "parser main"
+        ),
+        "cyclic": (
+            "faces sector rotation modes gyroscopic travelling supports campbell certificate "
+            "reduced blades"
+        ),
+        "fe": "costs parallel jit compat operators forms mesh elasticity probe",
+        "fe.operators": (
+            "solver memory disk aij foreseen factor corrected substructures place held spectrum "
+            "iterative counting krylov_schur workers petsc"
+        ),
+        "fe.mesh": (
+            "cell_types topology picks cad solid sources child curving quality repair validate "
+            "cut distribute read summary input_deck"
+        ),
+        "io": (
+            "files hdf5 archive native fields responses matrices sid programs fmu family history "
+            "export claim ours"
+        ),
+        "mbs": (
+            "compiler kernels parts connections elements mechanism equations results integrate "
+            "analysis"
+        ),
+        "mbs.analysis": (
+            "quadratic_eigen local_equations rotors few_modes tangent sparse_tangent equilibrium "
+            "linearize campbell response snapshot steady_motion sensitivity inverse_dynamics "
+            "law_check continuation periodic"
+        ),
+        "mbs.elements": (
+            "family pair_motion cylinders springs rotational_springs loads law_calls "
+            "laws_in_python laws formulas motors frictions contact stops bushings spread_loads "
+            "nonlinear rods tendons gears rolling films round_bodies solids"
+        ),
+        "body": (
+            "recovery nonlinear records inertia reference stiffening conversion frame rotating "
+            "surface flexible prestress projection correction damping spread"
+        ),
+        "reduction": "bases interfaces",
+        "view": "canvas figures scenes",
+    }.items()
 }
 MODULES = sorted((ROOT / "rom").rglob("*.py"))
 
