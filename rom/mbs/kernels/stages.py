@@ -27,49 +27,15 @@ REAL_BLOCK = types.Array(types.float64, 2, "A")  # rows and columns of a matrix
 THREE_FACTORS = types.UniTuple(types.float64, 3)
 # Compiled code knows a stage by its place here, whatever is imported first.
 STAGE_NAMES = (
-    "evaluate",
-    "residual",
-    "tangents",
-    "constraint_gradient",
-    "factorise_bordered",
-    "solve_bordered",
-    "gradient_times",
-    "factorise_motion",
-    "accelerate",
-    "advance",
-    "factorise_blocks",
-    "fill_from_blocks",
-    "solve_blocks",
-    "solve_sharing",
-    "remove_undecided",
-    "constraint_range",
-    "least_multipliers",
-    "elastic_damping",
-    "elastic_stiffness",
-    "bent_coordinates",
-    "bent_integrals",
-    "bent_mass",
-    "bent_damping",
-    "bent_motion",
-    "bent_stiffness",
-    "bent_wrench_stiffness",
-    "coordinate_states",
-    "coupling_row",
-    "coupling_stiffness",
-    "velocity_gaps",
-    "close_gaps",
-    "fit_velocities",
-    "predict_multistep",
-    "follow_increment",
-    "keep_past",
-    "rolling_row",
-    "rolling_stiffness",
-    "keep_pair_tangents",
-    "renew_pair_tangents",
-    "add_renewed",
-    "fitted_motion",
-    "fitted_wrench_stiffness",
-)
+    "evaluate residual tangents constraint_gradient factorise_bordered solve_bordered "
+    "gradient_times factorise_motion accelerate advance factorise_blocks fill_from_blocks "
+    "solve_blocks solve_sharing remove_undecided constraint_range least_multipliers "
+    "elastic_damping elastic_stiffness bent_coordinates bent_integrals bent_mass bent_damping "
+    "bent_motion bent_stiffness bent_wrench_stiffness coordinate_states coupling_row "
+    "coupling_stiffness velocity_gaps close_gaps fit_velocities predict_multistep follow_increment "
+    "keep_past rolling_row rolling_stiffness keep_pair_tangents renew_pair_tangents add_renewed "
+    "fitted_motion fitted_wrench_stiffness"
+).split()
 STAGE_KERNELS: dict[str, "Stage"] = {}
 STAGE_ADDRESSES = np.zeros(len(STAGE_NAMES), dtype=np.int64)  # 0 until a stage is linked
 
