@@ -4,5 +4,5 @@
 `mechanism` read by those of `component_keys` and `mechanism_keys`, with `methods` and `laws` by
 name; `mechanism_fmu` packs a mechanism with its bodies, `page` is their documentation. In mechanism
 files, `expressions` reads formulas, `python_files` runs functions if they are trusted, `rods` and
-`conditions` make rods and events, `connections` calls the methods of a mechanism.
+`machines` make rods, gears and bearings, `connections` calls the methods of a mechanism.
 """

@@ -21,12 +21,12 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True)
-class Component:
-    """A component as its file describes it.
+class Described:
+    """What a file describes.
 
     Attributes:
         document: the file.
-        values: its values in SI, by the keys of `rom.config.component_keys.TABLE`.
+        values: its values in SI, by the keys of its table.
         meshing: ``trust`` and limits of `rom.fe.mesh.read.read_mesh`, which no file can say.
     """
 
@@ -36,8 +36,18 @@ class Component:
 
     @property
     def name(self) -> str:
-        """Name of the body."""
+        """Name of the body or mechanism."""
         return str(self.values.get("name") or self.document.path.stem)
+
+    def at(self, *path: str) -> "Located":
+        """Context that tells the line of a key in errors raised below it."""
+        return Located(self.document, path)
+
+
+class Component(Described):
+    """A component as its file describes it, by the keys of `rom.config.component_keys.TABLE`."""
+
+    __slots__ = ()
 
     @property
     def output(self) -> Path | None:
@@ -164,10 +174,6 @@ class Component:
                 about=tuple(values["about"]) if "about" in values else None,
                 snapshots=values["snapshots"], sampling=values.get("sampling"),
             )  # fmt: skip
-
-    def at(self, *path: str) -> "Located":
-        """Context that tells the line of a key in errors raised below it."""
-        return Located(self.document, path)
 
     def _section(self, name: str) -> dict[str, Any]:
         if name not in self.values:

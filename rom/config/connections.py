@@ -5,15 +5,17 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
-from rom.config.conditions import condition_of
 from rom.config.keys import Place, nearest
 from rom.config.laws import Law, law_of
+from rom.config.machines import correction, gear_pair, journal_bearing, oil, rolling_bearing
 from rom.config.mechanism_keys import IMPACT
 from rom.config.python_files import function_of, plain_function_of
 from rom.errors import ConfigError
 
 if TYPE_CHECKING:
     from rom.mbs.elements.contact.impact import Impact
+    from rom.mbs.elements.formulas.programs import Formula
+    from rom.mbs.integrate.events import Instant
     from rom.mbs.mechanism import Mechanism
     from rom.mbs.parts.bodies import Part
 
@@ -23,6 +25,7 @@ METHODS = {  # section: method of a mechanism; in the others the kind of the ent
     "bushings": "bushing",
     "frictions": "friction",
 }
+Measured = tuple[float, float]  # value and rate
 DIRECTIONS = {"rising": 1, "falling": -1, "both": 0}
 
 
@@ -167,65 +170,25 @@ def _contact(entry: Entry) -> None:
 
 
 def _gear_mesh(entry: Entry) -> None:
-    from rom.mbs.elements.gears.corrections import Correction, flank_map
-    from rom.mbs.elements.gears.geometry import GearPair
     from rom.mbs.elements.gears.hertz import Hertz
-    from rom.mbs.elements.gears.racks import RackPair
 
-    pair: Any = {key: value for key, value in entry.values.pop("pair").items() if value is not None}
-    for key in ("teeth", "shift"):
-        pair[key] = tuple(pair[key])
-    correction, hertz = entry.values.pop("correction"), entry.values.pop("hertz", None)
-    for kind in ("maps", "back_maps"):
-        files = [correction.pop(f"{wheel}_{kind[:-1]}", None) for wheel in ("pinion", "gear")]
-        correction[kind] = tuple(None if path is None else flank_map(path) for path in files)
-    amounts, turns = (correction.pop(key, [0.0, 0.0]) for key in ("run_out", "run_out_direction"))
-    correction["run_out"] = tuple(zip(amounts, turns, strict=True))
-    pitch = [correction.pop(f"{wheel}_pitch", None) for wheel in ("pinion", "gear")]
-    correction["pitch"] = tuple(() if errors is None else errors for errors in pitch)
-    correction |= {key: tuple(correction[key]) for key in ("relief", "extent") if key in correction}
-    if pair["teeth"][1] == 0:
-        _make_rack(entry.name, pair)
-    made: Any = RackPair if "pinion_teeth" in pair else GearPair
-    entry.values["pair"], entry.values["correction"] = made(**pair), Correction(**correction)
-    entry.values["hertz"] = None if hertz is None else Hertz(**hertz)
-    entry.made.gear_mesh(entry.name, *entry.ends, **entry.values)
-
-
-def _make_rack(name: str, pair: dict[str, Any]) -> None:
-    """Let the sizes of a pair be those of a pinion and a rack."""
-    (pinion, _), (shift, of_rack) = pair.pop("teeth"), pair["shift"]
-    if of_rack != 0.0:
-        raise ConfigError(
-            f"the rack of {name!r} has a profile shift of {of_rack:g}: where its reference line is "
-            "says centre_distance."
-        )
-    pair["pinion_teeth"], pair["shift"] = pinion, shift
+    values = entry.values
+    values["pair"] = gear_pair(entry.name, values["pair"])
+    values["correction"] = correction(values["correction"])
+    if "hertz" in values:
+        values["hertz"] = Hertz(**values["hertz"])
+    entry.made.gear_mesh(entry.name, *entry.ends, **values)
 
 
 def _rolling_bearing(entry: Entry) -> None:
-    from rom.mbs.elements.rolling.races import BallBearing, RollerBearing
-
-    values = entry.values
-    how = {key: values.pop(key) for key in ("axis", "damping", "phase")}
-    made = {"balls": BallBearing, "rollers": RollerBearing}[values.pop("kind")]
-    if "conformity" in values:
-        values["conformity"] = tuple(values["conformity"])
-    entry.made.rolling_bearing(entry.name, *entry.ends, bearing=made(**values), **how)
+    how = {key: entry.values.pop(key) for key in ("axis", "damping", "phase")}
+    bearing = rolling_bearing(entry.values)
+    entry.made.rolling_bearing(entry.name, *entry.ends, bearing=bearing, **how)
 
 
 def _journal_bearing(entry: Entry) -> None:
-    from rom.mbs.elements.films.bearing import Groove, JournalBearing, multilobe
-    from rom.mbs.elements.films.oil import Oil, iso_vg
-
-    values, sizes, oil = entry.values, entry.values.pop("bearing"), entry.values.pop("oil")
-    sizes["grooves"] = [Groove(**groove) for groove in sizes["grooves"].values()]
-    sizes["cells"] = tuple(sizes.pop(f"cells_{axis}") for axis in ("around", "along"))
-    lobes, preload, first = (sizes.pop(key) for key in ("lobes", "preload", "first_lobe"))
-    sizes["bore"] = multilobe(lobes, preload, first=first) if preload else None
-    oil |= {key: 1e6 * oil[key] for key in ("nu_40", "nu_100") if key in oil}  # [mm^2/s]
-    makes: dict[str, Any] = {"constant": lambda viscosity: viscosity, "grade": iso_vg, "oil": Oil}
-    values |= {"bearing": JournalBearing(**sizes), "oil": makes[oil.pop("kind")](**oil)}
+    values = entry.values
+    values |= {"bearing": journal_bearing(values["bearing"]), "oil": oil(values["oil"])}
     entry.made.journal_bearing(entry.name, *entry.ends, **values)
 
 
@@ -291,6 +254,76 @@ def _user_force(entry: Entry) -> None:
             'More of them may have kind = "python".',
         )
     entry.made.user_force(entry.name, function, *entry.ends)
+
+
+@dataclass(frozen=True)
+class Condition:
+    """A measured value x with its rate v, and what of it must be zero.
+
+    Attributes:
+        kind: "coordinate", "position" or "distance".
+        follow: the joint with its coordinate, or the markers.
+        axis: (3,) unit vector, for a position.
+        value: that x passes.
+        formula: of t, x and v, in place of a value.
+    """
+
+    kind: str
+    follow: tuple[Any, ...]
+    axis: Any
+    value: float
+    formula: "Formula | None"
+
+    def __call__(self, t: float, instant: "Instant") -> float:
+        """What passes through zero."""
+        x, v = getattr(self, self.kind)(instant)
+        return x - self.value if self.formula is None else self.formula(t, x, v)
+
+    def coordinate(self, instant: "Instant") -> Measured:
+        """Of a joint."""
+        (joint,) = self.follow
+        return instant.joint(joint) if isinstance(joint, str) else instant.joint(*joint)
+
+    def position(self, instant: "Instant") -> Measured:
+        """Of a marker along the axis."""
+        (marker,) = self.follow
+        place = instant.position(marker.body, marker)
+        return float(self.axis @ place), float(self.axis @ instant.velocity(marker.body, marker))
+
+    def distance(self, instant: "Instant") -> Measured:
+        """Of two markers."""
+        import numpy as np
+
+        one, two = self.follow
+        gap = instant.position(two.body, two) - instant.position(one.body, one)
+        slide = instant.velocity(two.body, two) - instant.velocity(one.body, one)
+        x = float(np.linalg.norm(gap))
+        return x, float(gap @ slide) / x if x > 0.0 else 0.0
+
+
+def condition_of(ends: list[Any], values: dict[str, Any], place: Place) -> Condition:
+    """The condition of an entry of [events].
+
+    Raises:
+        ConfigError: for a value and a formula, or neither; or an axis of length zero.
+    """
+    if ("value" in values) == ("expression" in values):
+        what = "both a value and an expression" if "value" in values else "no value it passes"
+        raise place.error(f"{place.name} has {what}.", "Give one of value and expression.")
+    follow: tuple[Any, ...] = tuple(ends)
+    if "coordinate" in values:
+        follow = ((ends[0], values["coordinate"]),)
+    axis = None
+    if "axis" in values:
+        from rom.arguments import unit_vector
+
+        axis = unit_vector(f"axis of {place.path[-1]}", values["axis"])
+    formula = None
+    if "expression" in values:
+        from rom.mbs.elements.formulas.programs import formula as made
+
+        formula = made(values["expression"])
+    return Condition(values["kind"], follow, axis, values.get("value", 0.0), formula)
 
 
 def _event(entry: Entry) -> None:

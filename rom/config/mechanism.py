@@ -1,14 +1,13 @@
 """The mechanism file: bodies, joints, forces, and how they are moved."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rom.arguments import typed
-from rom.config.component import Located, change, read_component
+from rom.config.component import Described, change, read_component
 from rom.config.connections import Entry, check_name
-from rom.config.document import Document, read_document
+from rom.config.document import read_document
 from rom.config.keys import Place, nearest, raise_mistakes, read_table
 from rom.config.laws import Pending
 from rom.config.mechanism_keys import SECTIONS, TABLE
@@ -29,24 +28,10 @@ JOINT_KEYS = ("joint", "joint1", "joint2")
 MassProperties = tuple[float, Any, Any, dict[str, Any]]  # mass, centre, inertia, markers
 
 
-@dataclass(frozen=True, slots=True)
-class MechanismFile:
-    """A mechanism as its file describes it.
+class MechanismFile(Described):
+    """A mechanism as its file describes it, by the keys of `rom.config.mechanism_keys.TABLE`."""
 
-    Attributes:
-        document: the file.
-        values: its values in SI, by the keys of `rom.config.mechanism_keys.TABLE`.
-        meshing: keywords of `rom.read_component` for component files in it.
-    """
-
-    document: Document
-    values: dict[str, Any]
-    meshing: dict[str, Any] = field(default_factory=dict)
-
-    @property
-    def name(self) -> str:
-        """Its name."""
-        return str(self.values.get("name") or self.document.path.stem)
+    __slots__ = ()
 
     def mechanism(self) -> "Mechanism":
         """The mechanism, ready to move; component files in it are meshed and reduced.
@@ -95,10 +80,6 @@ class MechanismFile:
         made = self.mechanism() if made is None else made
         with self.at("simulation"):
             return simulate(made, progress=progress, keep=keep, **self.values["simulation"])
-
-    def at(self, *path: str) -> Located:
-        """Context that tells the line of a key in errors raised below it."""
-        return Located(self.document, path)
 
     def _connections(self) -> list[tuple[str, str, dict[str, Any]]]:
         """Section, name and values; gears behind the joints they couple."""

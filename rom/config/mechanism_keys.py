@@ -22,6 +22,7 @@ from rom.config.keys import (
     as_text,
 )
 from rom.config.laws import ByCoordinate, law_kind
+from rom.config.machines import CORRECTION, GEAR_PAIR, HERTZ, JOURNAL_BEARING, OILS, ROLLING
 from rom.config.python_files import PYTHON_KEYS
 from rom.config.rods import ROD_KEYS
 
@@ -51,28 +52,22 @@ class MarkerName:
 
 
 @dataclass(frozen=True, slots=True)
-class Two:
-    """Two markers of different bodies."""
+class Markers:
+    """Markers of any bodies, at least one; or two of different bodies."""
 
-    summary: str = 'list of two markers, each "body.marker" or { body = [x, y, z] }'
+    two: bool = False
 
-    def read(self, value: Any, place: Place) -> list[tuple[str, Any]]:
-        """The two."""
-        if not isinstance(value, list) or len(value) != 2:
-            raise place.error(f"{place.name} = {as_text(value)}: two markers are needed.")
-        return [MarkerName().read(item, place) for item in value]
-
-
-@dataclass(frozen=True, slots=True)
-class Several:
-    """Markers of any bodies."""
-
-    summary: str = 'list of markers, each "body.marker" or { body = [x, y, z] }'
+    @property
+    def summary(self) -> str:
+        """How they are written."""
+        many = "list of two markers" if self.two else "list of markers"
+        return many + ', each "body.marker" or { body = [x, y, z] }'
 
     def read(self, value: Any, place: Place) -> list[tuple[str, Any]]:
-        """At least one of them."""
-        if not isinstance(value, list) or not value:
-            raise place.error(f"{place.name} = {as_text(value)}: a list of markers is needed.")
+        """All of them."""
+        if not isinstance(value, list) or not value or (self.two and len(value) != 2):
+            what = "two markers are" if self.two else "a list of markers is"
+            raise place.error(f"{place.name} = {as_text(value)}: {what} needed.")
         return [MarkerName().read(item, place) for item in value]
 
 
@@ -128,7 +123,12 @@ class Body:
         return (FROM_FILE if from_file else RIGID).read(value, place)
 
 
-BETWEEN = Key("between", Two(), "Its markers; forces and coordinates are those of the second.", ...)
+BETWEEN = Key(
+    "between",
+    Markers(two=True),
+    "Its markers; forces and coordinates are those of the second.",
+    ...,
+)
 AXIS = Key("axis", DIRECTION, "In the world at the start.", ...)
 NORMAL = Key("normal", DIRECTION, "In the world at the start.", ...)
 COORDINATES = ("angle", "displacement", "way")  # the last is the earlier name of the second
@@ -248,7 +248,7 @@ SPREAD_KEYS = (
     FACTOR,
     Key("frame", Text(("body", "world")), "Axes in which it keeps its direction.", "body"),
 )
-MANY = Key("markers", Several(), "On which it acts.", ...)
+MANY = Key("markers", Markers(), "On which it acts.", ...)
 PULLEY = Table("A pulley in place of an eyelet.", (
     Key("radius", RADIUS, "Of the cable.", ...),
     Key("axis", DIRECTION, "In the world at the start; the cable goes around it in the positive "
@@ -297,101 +297,9 @@ EVENTS = {
         BETWEEN, Key("value", Quantity("m"), "Distance."), *PASSES, *WHEN,
     ), MOTION),
     "python": Table("A function of (t, instant) in Python, as `mechanism.event` takes it.", (
-        Key("markers", Several(), "It asks for, beyond those with names."), *PYTHON_KEYS, *WHEN,
+        Key("markers", Markers(), "It asks for, beyond those with names."), *PYTHON_KEYS, *WHEN,
     )),
 }  # fmt: skip
-TWO = ((2,),)
-GEAR_PAIR = Table("A pair of involute wheels.", (
-    Key("teeth", Quantity("1", TWO), "Of pinion and gear; below zero inside a ring, 0 of a rack.",
-        ...),
-    Key("module", Quantity("m", positive=True), "Normal module.", ...),
-    Key("width", Quantity("m", positive=True), "Common width of the faces.", ...),
-    Key("helix", Quantity("rad"), "At the reference circle, positive for a right-handed pinion.",
-        0.0),
-    Key("gear_helix", Quantity("rad"), "That of the gear, to check its hand."),
-    Key("pressure_angle", Quantity("rad"), "Normal one; 20 degrees if missing."),
-    Key("shift", Quantity("1", TWO), "Profile shifts in modules.", [0.0, 0.0]),
-    Key("centre_distance", Quantity("m", positive=True), "None leaves no backlash if missing."),
-    Key("thinning", Quantity("m"), "Transverse backlash from thinner teeth.", 0.0),
-    Key("addendum", Quantity(positive=True), "Height above the reference circle in modules.", 1.0),
-    Key("dedendum", Quantity(positive=True), "Depth below it in modules.", 1.25),
-))  # fmt: skip
-CORRECTION = Table("What is taken off the flanks, and what was measured on them.", (
-    Key("relief", Quantity("m", TWO), "Depth at the tips of pinion and gear.", [0.0, 0.0]),
-    Key("extent", Quantity("m", TWO), "Its length along the path of contact.", [0.0, 0.0]),
-    Key("power", Quantity("1", positive=True), "1 for linear, 2 for parabolic relief.", 1.0),
-    Key("crowning", Quantity("m"), "At both ends of the face.", 0.0),
-    Key("slope", Quantity("m"), "Of the lead over the face.", 0.0),
-    Key("pinion_pitch", Quantity("m", ((None,),)), "Errors of its teeth; positive leaves a gap."),
-    Key("gear_pitch", Quantity("m", ((None,),)), "Those of the gear."),
-    *(Key(f"{wheel}_{kind}", FilePath(), f"Of the {which} flanks of the {wheel} [m]: a line of "
-          "numbers with commas for each place of the profile, empty lines between teeth.")
-      for kind, which in (("map", "working"), ("back_map", "back"))
-      for wheel in ("pinion", "gear")),
-    Key("run_out", Quantity("m", TWO), "By which the teeth stand off the axes.", [0.0, 0.0]),
-    Key("run_out_direction", Quantity("rad", TWO), "From where the wheels mesh.", [0.0, 0.0]),
-))  # fmt: skip
-HERTZ = Table("Contact of teeth that gives way by its load.", (
-    Key("depths", Quantity("m", (*TWO, (None, 2))), "From the flanks of pinion and gear to the "
-        "axes of their teeth; one pair, or from first to last contact.", ...),
-    Key("E", Quantity("Pa", positive=True), "Young's modulus.", 206e9),
-    Key("nu", Quantity(), "Poisson's ratio.", 0.3),
-))  # fmt: skip
-ROLLING = {
-    "balls": Table("A row of balls.", (
-        Key("balls", Whole(3), "Number.", ...),
-        Key("ball_diameter", Quantity("m", positive=True), "Of a ball.", ...),
-        Key("pitch_diameter", Quantity("m", positive=True), "Of the circle of balls.", ...),
-        Key("conformity", Quantity("1", TWO), "Radius of the grooves of inner and outer race over "
-            "the diameter of the ball.", [0.52, 0.52]),
-        Key("contact_angle", Quantity("rad"), "Without load.", 0.0),
-        Key("clearance", Quantity("m"), "Radial play; negative for one that is pressed.", 0.0),
-        Key("E", Quantity("Pa", positive=True), "Young's modulus.", 206e9),
-        Key("nu", Quantity(), "Poisson's ratio.", 0.3),
-    )),
-    "rollers": Table("A row of cylindrical steel rollers.", (
-        Key("rollers", Whole(3), "Number.", ...),
-        Key("roller_diameter", Quantity("m", positive=True), "Of a roller.", ...),
-        Key("length", Quantity("m", positive=True), "Of a roller.", ...),
-        Key("pitch_diameter", Quantity("m", positive=True), "Of the circle of rollers.", ...),
-        Key("clearance", Quantity("m"), "Radial play; negative for one that is pressed.", 0.0),
-    )),
-}  # fmt: skip
-OILS = {
-    "constant": Table("A viscosity that stays.", (
-        Key("viscosity", Quantity("Pa s", positive=True), "Dynamic.", ...),
-    )),
-    "grade": Table("A usual mineral oil.", (
-        Key("grade", Whole(1), "ISO VG 32, 46 or 68.", ...),
-    )),
-    "oil": Table("Any mineral oil.", (
-        Key("nu_40", Quantity("m^2/s", positive=True), "Kinematic at 40 degrees Celsius.", ...),
-        Key("nu_100", Quantity("m^2/s", positive=True), "At 100 degrees Celsius.", ...),
-        Key("density", Quantity("kg/m^3", positive=True), "Density.", 870.0),
-        Key("heat", Quantity("J/(kg K)", positive=True), "Specific heat.", 2000.0),
-    )),
-}  # fmt: skip
-GROOVE = Table("An axial groove full of oil.", (
-    Key("angle", Quantity("rad"), "Of its middle.", ...),
-    Key("width", Quantity("rad"), "How far it extends around the bush.", 0.0),
-    Key("pressure", Quantity("Pa"), "Of its oil.", 0.0),
-    Key("share", Quantity("1", positive=True), "Of the width of the bearing.", 1.0),
-))  # fmt: skip
-JOURNAL_BEARING = Table("An oil film.", (
-    Key("diameter", Quantity("m", positive=True), "Of the journal.", ...),
-    Key("length", Quantity("m", positive=True), "Of the bush.", ...),
-    Key("clearance", Quantity("m", positive=True), "Radius of the bush less that of the journal.",
-        ...),
-    Key("grooves", Named(GROOVE, "grooves"), "Inlets of oil.", {}),
-    Key("cavitation", Text(("none", "reynolds", "jfo")), "What happens where oil would have to "
-        "pull: it does, it ends, it is conserved.", "reynolds"),
-    Key("preload", Quantity(), "Of a lobed bore, in clearances.", 0.0),
-    Key("lobes", Whole(2), "Number of arcs of such a bore.", 2),
-    Key("first_lobe", Quantity("rad"), "Middle of one of them.", 0.0),
-    Key("cells_around", Whole(12), "Of the film.", 120),
-    Key("cells_along", Whole(2), "Of its width, or of half of it.", 8),
-    Key("aligned", Flag(), "The journal never tilts: cells on half the width.", False),
-))  # fmt: skip
 ROLLING_KEYS = (
     BETWEEN, AXIS,
     Key("damping", Quantity("s/m"), "Force on a ball grows by this factor of its speed.", 0.0),
@@ -429,7 +337,7 @@ SECTIONS: dict[str, tuple[str, Kind]] = {  # connections and forces: what, and h
         Key("axes", Quantity("1", ((4,), (3, 3))), "Axes to world at the start; world if missing."),
     ))),
     "tendons": ("cables", Table("A cable through eyelets and over pulleys, which goes slack.", (
-        Key("path", Several(), "Markers in the order in which it passes them.", ...),
+        Key("path", Markers(), "Markers in the order in which it passes them.", ...),
         Key("pulleys", Named(PULLEY, "pulleys"), "Which of these markers are pulleys.", {}),
         Key("EA", Quantity("N", positive=True), "Force per strain; none if it is pulled."),
         Key("damping", Quantity("N s"), "Tension per rate of strain.", 0.0),
@@ -442,7 +350,7 @@ SECTIONS: dict[str, tuple[str, Kind]] = {  # connections and forces: what, and h
             "Of the sliding cable, over which friction turns."),
     ))),
     "gear_meshes": ("gear meshes", Table("Involute teeth of two wheels in contact.", (
-        Key("between", Two(), "Middle of the faces of pinion and gear.", ...),
+        Key("between", Markers(two=True), "Middle of the faces of pinion and gear.", ...),
         Key("axis", DIRECTION, "Of the pinion, in the world at the start.", ...),
         Key("pair", GEAR_PAIR, "The wheels.", ...),
         Key("stiffness", Quantity("N/m^2", ((), (None,))), "Of one pair of teeth per length of "
@@ -463,7 +371,8 @@ SECTIONS: dict[str, tuple[str, Kind]] = {  # connections and forces: what, and h
         kind: Table(table.about, (*ROLLING_KEYS, *table.keys)) for kind, table in ROLLING.items()
     }, {kind: kind for kind in ROLLING})),
     "journal_bearings": ("journal bearings", Table("An oil film between journal and bush.", (
-        Key("between", Two(), "On the axis of the journal, and the middle of the bush.", ...),
+        Key("between", Markers(two=True), "On the axis of the journal, and in the middle of the "
+            "bush.", ...),
         Key("axis", DIRECTION, "Of both, in the world at the start.", ...),
         Key("reference", DIRECTION, "From where angles count, across the axis; X if missing."),
         Key("bearing", JOURNAL_BEARING, "Its sizes.", ...),

@@ -2,6 +2,7 @@
 
 from typing import TYPE_CHECKING, Any
 
+from rom.config.component_keys import ISOTROPIC
 from rom.config.keys import Key, Place, Quantity, Table, Variants, Whole
 from rom.errors import RomError
 
@@ -27,17 +28,12 @@ SECTION_KINDS = {
         Key("inertia", Quantity("kg m", ((3,),)), "Per length, about the axes.", ...),
     )),
 }  # fmt: skip
-MATERIAL_TABLE = Table("An isotropic solid.", (
-    Key("E", Quantity("Pa"), "Young's modulus.", ...),
-    Key("nu", Quantity(), "Poisson's ratio.", ...),
-    Key("rho", Quantity("kg/m^3"), "Density.", ...),
-))  # fmt: skip
 ROD_KEYS = (
     Key("points", Quantity("m", ((None, 3),)),
         "Its axis without stress, in its own frame: the line through two, a smooth curve through "
         "more.", ...),
     Key("section", Variants(SECTION_KINDS), "Its section.", ...),
-    Key("material", MATERIAL_TABLE, "What it is made of."),
+    Key("material", ISOTROPIC, "What it is made of."),
     Key("elements", Whole(1, 10000), "Number of segments, about equally long.", 20),
     Key("normal", Quantity("1", ((3,),)),
         "First axis of the section at the start, in its own frame; from there on it turns no more "

@@ -45,8 +45,8 @@ CLEAR = {
 OF_VERBS = {"SUMMARY", "EXAMPLES"}
 OF_TYPES = {"ParamSpec", "TypeVar"}
 DESCRIPTIONS = {
-    "cli/schemas.py", "config/component_keys.py", "config/mechanism_keys.py", "plausible.py",
-    "units.py",
+    "cli/schemas.py", "config/component_keys.py", "config/machines.py", "config/mechanism_keys.py",
+    "plausible.py", "units.py",
 }  # fmt: skip
 # words for which there is a better one: the word, what to say, and the folders and modules it is
 # looked for in; elsewhere it may be the right one, as the lift of a wing
