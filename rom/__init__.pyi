@@ -140,6 +140,8 @@ from rom.reduction.bases.krylov import MomentMatching as MomentMatching
 from rom.reduction.bases.loads import WithLoads as WithLoads
 from rom.reduction.bases.method import CraigBampton as CraigBampton
 from rom.reduction.bases.method import Guyan as Guyan
+from rom.reduction.full_model import mass_properties as mass_properties
+from rom.reduction.full_model import modes as modes
 from rom.reduction.interfaces.characteristic import Characteristic as Characteristic
 from rom.reduction.interfaces.polynomial import FourierLegendre as FourierLegendre
 from rom.reduction.interfaces.polynomial import Polynomial as Polynomial
@@ -148,8 +150,6 @@ from rom.report.html import write_report as write_report
 from rom.report.pieces import certify_pieces as certify_pieces
 from rom.updating.estimate import update as update
 from rom.view.scenes.animation_files import write_animation as write_animation
-from rom.workflow import mass_properties as mass_properties
-from rom.workflow import modes as modes
 from rom.workflow import reduce as reduce
 from rom.workflow import reduce_pieces as reduce_pieces
 from rom.workflow import substructure as substructure

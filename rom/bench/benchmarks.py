@@ -31,8 +31,9 @@ from rom.model import FEModel
 from rom.process.memory import peak_bytes
 from rom.process.stopwatch import stage_rows
 from rom.reduction.bases.method import CraigBampton
+from rom.reduction.full_model import operators
 from rom.reduction.interfaces.connection import connect
-from rom.workflow import operators, reduce
+from rom.workflow import reduce
 
 BED_STIFFNESS = TITANIUM.E / 0.010  # as soft as 10 mm of the same metal [N/m^3]
 

@@ -7,7 +7,7 @@ from time import process_time
 from rom.eigen.substructuring import modes_up_to
 from rom.eigen.verbs import dofs_of
 from rom.model import FEModel
-from rom.workflow import operators
+from rom.reduction.full_model import operators
 
 CERTAIN_RTOL = 1e-9  # of frequencies by Lanczos
 ALLOWED_RTOL = 1e-3  # of those by substructuring, by their bounds

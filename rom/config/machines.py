@@ -114,7 +114,7 @@ def gear_pair(name: str, pair: dict[str, Any]) -> Any:
     from rom.mbs.elements.gears.geometry import GearPair
     from rom.mbs.elements.gears.racks import RackPair
 
-    given = {key: tuple(x) if isinstance(x, list) else x for key, x in pair.items()}
+    given: Any = {key: tuple(x) if isinstance(x, list) else x for key, x in pair.items()}
     if given["teeth"][1] != 0:
         return GearPair(**given)
     (pinion, _), (shift, of_rack) = given.pop("teeth"), given.pop("shift")

@@ -263,7 +263,7 @@ def _mass_of(file: Path, meshing: dict[str, Any]) -> MassProperties:
     from rom.io.native import load
 
     if file.suffix == ".toml":
-        from rom.workflow import mass_properties
+        from rom.reduction.full_model import mass_properties
 
         model = read_component(file, **meshing).model()
         found = mass_properties(model)

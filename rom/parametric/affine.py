@@ -17,7 +17,7 @@ from rom.names import offered
 from rom.parametric.family import Share
 from rom.parametric.layers import Stretch
 from rom.parametric.parameters import Density, Parameter, Point, factors
-from rom.workflow import mesh_operators
+from rom.reduction.full_model import mesh_operators
 
 REMAINDER_RTOL = 1e-12  # share of mass and stiffness below which all belongs to named regions
 

@@ -55,6 +55,8 @@ PLAIN = {  # of these folders, and no published method
     "rom.mbs.integrate.simulation.release": "a state",
     "rom.prestress.spin_up.held_solid": "a sector",
     "rom.reduction.bases.method.Method": "what methods have in common",
+    "rom.reduction.full_model.mass_properties": "a definition",
+    "rom.reduction.full_model.modes": "a definition",
 }
 
 NUMBERS = re.compile(r"\b(float|complex|Complex|Array|ArrayLike|NDArray|ndarray|Temperature)\b")

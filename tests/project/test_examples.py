@@ -29,7 +29,7 @@ USED_METHODS = {  # which the same count cannot tell from others of the same nam
 USED_FUNCTIONS = {
     "rom.fe.model", "rom.io.export.export", "rom.io.family.save",
     "rom.reduction.bases.fixed_interface.craig_bampton", "rom.view.figures.panels.Panel",
-    "rom.workflow.mass_properties",
+    "rom.reduction.full_model.mass_properties",
 }  # fmt: skip
 MAX_LINES = 7
 

@@ -101,7 +101,7 @@ ORDER = {
             "recovery nonlinear records inertia reference stiffening conversion frame rotating "
             "surface flexible prestress projection correction damping spread"
         ),
-        "reduction": "bases interfaces",
+        "reduction": "bases interfaces full_model",
         "view": "canvas figures scenes",
     }.items()
 }

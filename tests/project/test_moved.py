@@ -56,10 +56,10 @@ def test_names_are_found_where_they_were():
 
 NEW_IN_FRONTS = {
     *(
-        "in_late_wind read_modes read_responses write_responses Limit Rock modes motion arch drawn "
-        "minimum_thickness stands wall BaseMotion MovingLoad PointLoad SupportMotion Wind facing Table "
-        "ramp read_record recorded rectangle sine Joint read_joints load_factor Motion simulate "
-        "substructured_modes"
+        "in_late_wind read_modes read_responses write_responses Limit Rock modes motion arch "
+        "drawn minimum_thickness stands wall BaseMotion MovingLoad PointLoad SupportMotion Wind "
+        "facing Table ramp read_record recorded rectangle sine Joint read_joints load_factor "
+        "Motion simulate substructured_modes"
     ).split()
 }
 FRONTS = {

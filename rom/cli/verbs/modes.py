@@ -58,7 +58,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> Answer:
     """Assemble and solve."""
-    from rom.workflow import modes
+    from rom.reduction.full_model import modes
 
     if described(args):
         part = component(args)

@@ -25,7 +25,7 @@ from rom.names import inside
 if TYPE_CHECKING:
     from rom.body.flexible import FlexibleBody
     from rom.mbs.mechanism import Mechanism
-    from rom.workflow import MassProperties
+    from rom.reduction.full_model import MassProperties
 
 log = logging.getLogger("rom")
 SUMMARY = "show a part of yours, reduced and swinging, in one go"
@@ -132,8 +132,9 @@ def _reduced(
     from rom.fe.elasticity import model
     from rom.model import Material
     from rom.reduction.bases.method import CraigBampton
+    from rom.reduction.full_model import mass_properties
     from rom.reduction.interfaces.connection import found
-    from rom.workflow import mass_properties, reduce
+    from rom.workflow import reduce
 
     E, nu, rho = MATERIALS[args.material]
     full = model(args.file, material=Material(E=E, nu=nu, rho=rho), **how)
