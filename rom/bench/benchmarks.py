@@ -7,7 +7,7 @@ them.
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from math import pi
-from time import perf_counter, process_time
+from time import perf_counter
 from typing import Any
 
 import numpy as np
@@ -27,6 +27,7 @@ from rom.bench.models import (
     slider_crank,
     top,
 )
+from rom.bench.timing import timed
 from rom.model import FEModel
 from rom.process.memory import peak_bytes
 from rom.process.stopwatch import stage_rows
@@ -183,18 +184,16 @@ def adaptive(
         speeds = []
         for step in (dt, None):
             simulate(mechanism, t_end=t_end / 100, dt=step)
-            start = process_time()
-            run = simulate(mechanism, t_end=t_end, dt=step)
-            speeds.append(run.statistics["steps"] / (process_time() - start))
+            taken, run = timed(simulate, mechanism, t_end=t_end, dt=step)
+            speeds.append(run.statistics["steps"] / taken)
         yield Figure("adaptive", case, "steps per second, one length", speeds[0], "1/s")
         yield Figure("adaptive", case, "steps per second, chosen length", speeds[1], "1/s")
         yield Figure(
             "adaptive", case, "chosen over one length", speeds[1] / speeds[0], "", "above 1/3"
         )
-    start = process_time()
-    run = simulate(top(), t_end=top_time, rtol=1e-6)
+    taken, run = timed(simulate, top(), t_end=top_time, rtol=1e-6)
     case = f"top, rtol 1e-6, {run.statistics['steps']} steps"
-    yield Figure("adaptive", case, "processor time", process_time() - start, "s", "below 30")
+    yield Figure("adaptive", case, "processor time", taken, "s", "below 30")
 
 
 def peers(meshes: tuple[float, ...] = (0.0047, 0.00257)) -> Iterator[Figure]:

@@ -2,12 +2,12 @@
 
 from collections.abc import Iterator
 from math import pi
-from time import process_time
 from typing import Any
 
 import numpy as np
 
 from rom.bench.models import planetary_train
+from rom.bench.timing import Row, timed
 from rom.components.gear_mesh import Hertz, Mesh
 from rom.mbs.integrate.simulation import simulate
 
@@ -18,7 +18,6 @@ MESH_VARIANTS: dict[str, dict[str, Any]] = {
     ", slices coupled": {"coupling": 2e-3},
     ", contact by Hertz": {"hertz": Hertz((2e-3, 2e-3))},
 }
-Row = tuple[str, str, float, str, str]
 
 
 def measured(steps: int) -> Iterator[Row]:
@@ -37,16 +36,13 @@ def measured(steps: int) -> Iterator[Row]:
             whole = each
     plane, motion = Mesh(pair, stiffness), np.zeros(12)
     motion[5] = 1e-4
-    start = process_time()
-    for angle in np.linspace(0, 2 * pi, 200):
-        plane.forces(motion, float(angle))
-    share = 6 * (process_time() - start) / 200 / whole
+    angles = np.linspace(0, 2 * pi, 200).tolist()
+    share = 6 * timed(lambda: [plane.forces(motion, angle) for angle in angles])[0] / 200 / whole
     yield case, "six meshes by the plane model, over a step", share, "", "above 0.5"
 
 
 def _seconds_per_step(mech: Any, steps: int) -> float:
     """Processor time, the kernels compiled."""
-    simulate(mech, t_end=100 * TIME_STEP, dt=TIME_STEP, save_every=100, progress=False)
-    start = process_time()
-    simulate(mech, t_end=TIME_STEP * steps, dt=TIME_STEP, save_every=100, progress=False)
-    return (process_time() - start) / steps
+    how: dict[str, Any] = {"dt": TIME_STEP, "save_every": 100, "progress": False}
+    simulate(mech, t_end=100 * TIME_STEP, **how)
+    return timed(simulate, mech, t_end=TIME_STEP * steps, **how)[0] / steps

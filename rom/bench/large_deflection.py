@@ -5,6 +5,7 @@ The bar of Kane, Ryan and Banerjee spins up as one body made from two meshes, se
 least there can be: forces and tangent assembled, factored, solved once.
 """
 
+from collections import deque
 from collections.abc import Generator, Iterator
 from dataclasses import replace
 from time import process_time
@@ -28,6 +29,7 @@ from rom.bench.peers.spin_up import (
     solid,
     spun_up,
 )
+from rom.bench.timing import Row, timed
 from rom.body.nonlinear.quartic import Quartic, n_entries
 from rom.body.nonlinear.ranges import Geometric
 from rom.eigen.verbs import dofs_of
@@ -45,7 +47,6 @@ COARSE_CELLS, FINE_CELLS = (40, 1), (205, 4)  # hexahedra along and across the b
 SEGMENT_COUNTS = (40, 80, 160)  # of rods, and elements of Exudyn, beside the body
 TIP_FORCE = 60.0  # for which the bar has shapes [N]
 RANDOM_SEED = 0
-Row = tuple[str, str, float, str, str]
 
 
 def measured(
@@ -99,10 +100,9 @@ def seconds_of_tensors(model: FEModel, r: int) -> float:
     energy: Any = model.stresses
     E = np.random.default_rng(RANDOM_SEED).standard_normal((model.operators.n_local, r))
     energy.large_strain().gram(E[:, :1])  # compiles the forms
-    start = process_time()
-    found = Quartic.from_gram(energy.large_strain().gram(E), r)
+    taken, found = timed(lambda: Quartic.from_gram(energy.large_strain().gram(E), r))
     assert found.by_pairs
-    return process_time() - start
+    return taken
 
 
 def seconds_of_force(r: int, times: int = 2000) -> tuple[float, float]:
@@ -134,22 +134,19 @@ def seconds_of_force(r: int, times: int = 2000) -> tuple[float, float]:
                 tangents(s, k, W, lam, 1.0, 0.0)
 
     expanded(packed.system, W, q, v, lam, 1)
-    start = process_time()
-    expanded(packed.system, W, q, v, lam, times)
-    between = process_time()
-    for _ in range(times):
-        energy.expansion(q[7:])
-    return (between - start) / times, (process_time() - between) / times
+    compiled, _ = timed(expanded, packed.system, W, q, v, lam, times)
+    plain, _ = timed(lambda: deque((energy.expansion(q[7:]) for _ in range(times)), maxlen=0))
+    return compiled / times, plain / times
 
 
 def spin_ups(model: FEModel, aim: str) -> Generator[Row, None, Run]:
     """Rows of a body made from a mesh beside the mesh itself; its run."""
     geometric = Geometric(loads={"tip": (0, TIP_FORCE, TIP_FORCE, 0, 0, 0)}, n_modes=2,
                           spin=(0, 0, FINAL_SPEED), n_shapes=8)  # fmt: skip
-    start = process_time()
-    made = reduce(model, method=CraigBampton(8), interfaces={"root": "rbe3", "tip": "rbe3"},
-                  reference="root", nonlinear=geometric, certify=False)  # fmt: skip
-    taken, run = process_time() - start, spun_up(solid(made))
+    kinds = {"root": "rbe3", "tip": "rbe3"}
+    taken, made = timed(reduce, model, method=CraigBampton(8), interfaces=kinds, reference="root",
+                        nonlinear=geometric, certify=False)  # fmt: skip
+    run = spun_up(solid(made))
     case = f"spin-up, {model.n_dofs} dofs by {made.n_modes} coordinates"
     yield case, "reduction", taken, "s", ""
     yield case, f"{run.steps} steps of {RISE_TIME:g} s", run.seconds, "s", ""

@@ -1,11 +1,11 @@
 """Compiled loops of discrete components, in time of the processor."""
 
-from collections.abc import Callable, Iterator
-from time import process_time
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
+from rom.bench.timing import Row, timed
 from rom.components.assumed_strain import Flight, Metal, fly, rectangle, sheet
 from rom.components.histories import sine
 from rom.components.linkages.dynamic_isotropy import angle_grid, isotropy_index
@@ -41,7 +41,7 @@ WIND_SPEEDS = np.linspace(4.0, 25.0, 20)  # m/s
 
 def measured(
     blocks: int = 40, steps: int = 10_000, cells: int = 400, height: int = 50
-) -> Iterator[tuple[str, str, float, str, str]]:
+) -> Iterator[Row]:
     """Case, quantity, value, unit and aim: an arch, isotropy, Taylor's bar, a gallery, wind.
 
     Args:
@@ -52,23 +52,23 @@ def measured(
     """
     stones = arch(blocks, 5.0, 0.6)
     _still(stones, 10)  # compiles
-    taken, motion = _timed(_still, stones, steps)
+    taken, motion = timed(_still, stones, steps)
     case = f"arch of {blocks} blocks, {steps} steps"
     yield case, "processor time", taken, "s", "below 30"
     yield case, "fastest stone", float(np.abs(motion.v[-1]).max()), "m/s", "below 1e-06"
     shaking = BaseMotion(sine(SHAKING_ACCELERATION, 0.5))
-    taken, motion = _timed(_still, stones, steps, 1.0, (shaking,))
+    taken, motion = timed(_still, stones, steps, 1.0, (shaking,))
     case = f"arch of {blocks} blocks on shaking ground, {steps} steps"
     yield case, "processor time", taken, "s", "below 5"
     crown = abs(motion.q[-1, blocks // 2, 0] - motion.q[0, blocks // 2, 0])
     yield case, "how far the crown has gone", 1e3 * float(crown), "mm", "below 30"
     five = FiveBar(0.7, (rod(2.0, 0.3),) * 2, (rod(1.0, 0.8),) * 2, payload=0.5)
-    taken, index = _timed(lambda: isotropy_index(five.inertia(*angle_grid(cells))))
+    taken, index = timed(lambda: isotropy_index(five.inertia(*angle_grid(cells))))
     case = f"five-bar linkage, {cells} x {cells} postures"
     yield case, "processor time", taken, "s", "below 2"
     yield case, "best index of isotropy", float(index.max()), "", "above 0.999"
     _struck(2, 1e-8)
-    taken, flight = _timed(_struck, height, 80e-6)
+    taken, flight = timed(_struck, height, 80e-6)
     case = f"Taylor's bar, {flight.steps} steps"
     yield case, "processor time", taken, "s", "below 20"
     yield case, "radius of its foot", 1e3 * float(flight.x[-1, :, 0].max()), "mm", "below 7.1"
@@ -79,11 +79,11 @@ def measured(
         name: History(SENSOR_TIMES, np.interp(SENSOR_TIMES, got.t, CHANNELS[name](true, got)))
         for name in SENSOR_CHANNELS
     }
-    taken, found = _timed(calibrate, FIRST_GALLERY, seen)
+    taken, found = timed(calibrate, FIRST_GALLERY, seen)
     yield case, "processor time", taken, "s", "below 30"
     off = max(abs(found.factors[name] / x - 1) for name, x in TRUE_FACTORS.items())
     yield case, "largest error of them", off, "", "below 0.01"
-    taken, curve = _timed(power_curve, WIND_SPEEDS)
+    taken, curve = timed(power_curve, WIND_SPEEDS)
     case = f"power curve of the 5 MW turbine, {WIND_SPEEDS.size} winds"
     yield case, "processor time", taken, "s", "below 60"
     yield case, "largest power", float(curve["power"].max()) / 1e6, "MW", "below 5.001"
@@ -105,9 +105,3 @@ def _struck(height: int, t_end: float) -> Flight:
     v = np.zeros_like(X)
     v[:, 1] = -IMPACT_SPEED
     return fly(body, COPPER, v, np.concatenate([axis, wall]), t_end)
-
-
-def _timed(work: Callable[..., Any], *arguments: Any) -> tuple[float, Any]:
-    start = process_time()
-    result = work(*arguments)
-    return process_time() - start, result

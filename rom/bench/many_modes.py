@@ -2,8 +2,8 @@
 
 from collections.abc import Iterator
 from math import pi
-from time import process_time
 
+from rom.bench.timing import Row, timed
 from rom.eigen.substructuring import modes_up_to
 from rom.eigen.verbs import dofs_of
 from rom.model import FEModel
@@ -11,7 +11,6 @@ from rom.reduction.full_model import operators
 
 CERTAIN_RTOL = 1e-9  # of frequencies by Lanczos
 ALLOWED_RTOL = 1e-3  # of those by substructuring, by their bounds
-Row = tuple[str, str, float, str, str]
 
 
 def measured(model: FEModel, counts: tuple[int, ...]) -> Iterator[Row]:
@@ -23,11 +22,8 @@ def measured(model: FEModel, counts: tuple[int, ...]) -> Iterator[Row]:
     """
     ops, root = operators(model), dofs_of(model.interfaces["root"].nodes)
     for n in counts:
-        start = process_time()
-        omega = ops.modes(ops.hold(root), n, finished=True)[0]
-        middle = process_time()
-        found = modes_up_to(ops, root, omega[-1] / (2 * pi), ALLOWED_RTOL)
-        lanczos, here = middle - start, process_time() - middle
+        lanczos, (omega, _) = timed(lambda n=n: ops.modes(ops.hold(root), n, finished=True))
+        here, found = timed(modes_up_to, ops, root, omega[-1] / (2 * pi), ALLOWED_RTOL)
         error, bound = found.omega[:n] / omega - 1, found.error[:n]
         beyond = (error / (bound + CERTAIN_RTOL)).max()
         case = f"{model.n_dofs} dofs, {n} modes"

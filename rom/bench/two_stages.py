@@ -1,12 +1,12 @@
 """Two stages of gears between three shafts, on six oil films in a housing: solids from gmsh."""
 
 from collections.abc import Iterator
-from time import process_time
 from typing import Any
 
 import numpy as np
 
 from rom.bench.models import STEEL, geometry
+from rom.bench.timing import Row, timed
 from rom.mbs.analysis.equilibrium import equilibrium
 from rom.mbs.elements.films.bearing import Groove, JournalBearing
 from rom.mbs.elements.gears.geometry import GearPair
@@ -15,8 +15,6 @@ from rom.mbs.mechanism import Mechanism
 from rom.reduction.bases.method import CraigBampton
 from rom.reduction.interfaces.polynomial import FourierLegendre
 from rom.workflow import reduce
-
-Row = tuple[str, str, float, str, str]
 
 SHAFT_HEIGHT, MIDDLE_DISTANCE, SHAFT_SPEED, INPUT_TORQUE, OIL_VISCOSITY = (
     0.15,
@@ -117,13 +115,12 @@ def stages_run(cells: tuple[int, int] = (60, 4)) -> Iterator[Row]:
 
 def _steps(mech: Mechanism, label: str) -> Iterator[Row]:
     dt = 2 * np.pi / (SHAFT_SPEED * 25) / STEPS_PER_TOOTH
-    start = process_time()
-    rest = equilibrium(mech)
+    taken, rest = timed(equilibrium, mech)
     case = f"two stages, {rest.v.size} velocities, {label}"
-    yield case, "equilibrium", process_time() - start, "s of the processor", ""
+    yield case, "equilibrium", taken, "s of the processor", ""
     warm = simulate(mech, state=rest, t_end=2 * dt, dt=dt).final
-    start, n = process_time(), N_TEETH * STEPS_PER_TOOTH
-    run = simulate(mech, state=warm, t_end=(2 + n) * dt, dt=dt)
-    yield case, "steps", n / (process_time() - start), "1/s of the processor", "above 1000"
+    n = N_TEETH * STEPS_PER_TOOTH
+    taken, run = timed(simulate, mech, state=warm, t_end=(2 + n) * dt, dt=dt)
+    yield case, "steps", n / taken, "1/s of the processor", "above 1000"
     for name in ("iterations", "factorisations"):
         yield case, f"{name} per step", run.statistics[name] / n, "", ""

@@ -8,6 +8,7 @@ from scipy.sparse import csc_matrix
 from scipy.sparse.linalg import splu
 
 from rom.bench.models import KINDS
+from rom.bench.timing import Row, timed
 from rom.body.surface import surface_of
 from rom.model import Array, FEModel
 from rom.parametric.parameters import Density, YoungsModulus
@@ -32,7 +33,6 @@ ATTACHED_PARTS: dict[str, GroundSpring | AddedMass] = {
     "pull at the tip": GroundSpring("tip", (1e6, 1e6, 1e6), 0.1, 10.0),
     "mass at the tip": AddedMass("tip", 2.0, 0.1, 10.0),
 }
-Row = tuple[str, str, float, str, str]
 
 
 def measured(model: FEModel, n_lines: int = N_LINES) -> Iterator[Row]:
@@ -58,9 +58,7 @@ def measured(model: FEModel, n_lines: int = N_LINES) -> Iterator[Row]:
     H = responses_at(true, np.array(TRUE_LOGS), np.array([DAMPING_RATIO]), 2 * np.pi * lines)
     coherence = 1 / (1 + N_AVERAGES * RELATIVE_NOISE**2)
     test = Responses(lines, noisy(H, RELATIVE_NOISE, rng), sensors, inputs, coherence, N_AVERAGES)
-    start = process_time()
-    found = update(family, test, attached=ATTACHED_PARTS)
-    spent = process_time() - start
+    spent, found = timed(update, family, test, attached=ATTACHED_PARTS)
     off = np.log(list(found.factors.values())) - TRUE_LOGS
     worst = np.abs(off / [found.deviations[name] for name in found.factors]).max()
     case = f"{model.n_dofs} dofs, {H.size} responses"
@@ -69,9 +67,7 @@ def measured(model: FEModel, n_lines: int = N_LINES) -> Iterator[Row]:
     yield case, "largest error over its deviation", float(worst), "", "below 4"
     if model.n_dofs <= MAX_FACTORED_DOFS:
         x, zeta = found.logarithms, found.zeta
-        start = process_time()
-        sums(found.model, x, zeta, Data.of(test))
-        step = process_time() - start
+        step, _ = timed(sums, found.model, x, zeta, Data.of(test))
         whole = factored(model, 2 * np.pi * lines) * len(lines) * (1 + x.size)
         what = "work of a step by differences on the mesh, over it"
         yield case, what, whole / step, "times", "above 100"

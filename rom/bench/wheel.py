@@ -2,11 +2,11 @@
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from time import process_time
 
 import numpy as np
 
 from rom.bench.models import TITANIUM
+from rom.bench.timing import Row, timed
 from rom.cyclic.modes import wheel_modes
 from rom.cyclic.reduced import reduce_sector
 from rom.cyclic.sector import CyclicSector
@@ -23,7 +23,7 @@ WHEEL_SIZES = {
 
 def measured(
     geometry: Path, families: int, parameters: dict[str, float] | None = None
-) -> Iterator[tuple[str, str, float, str, str]]:
+) -> Iterator[Row]:
     """Case, quantity, value, unit and aim.
 
     Args:
@@ -46,9 +46,7 @@ def measured(
         "wheel": lambda: _whole(sector, families * N),
     }
     for name, compute in ways.items():
-        start = process_time()
-        f[name] = compute()
-        taken[name] = process_time() - start
+        taken[name], f[name] = timed(compute)
         yield case, f"{name}: processor time", taken[name], "s", ""
         yield case, f"{name}: peak memory so far", _peak(), "GiB", ""
     for name in ("reduced sector", "sector"):

@@ -9,7 +9,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from rom import rotation
-from rom.bench.peers import rods
+from rom.bench.peers import compare, rods
 from rom.components.cosserat import body, straight
 from rom.components.wind.wind_turbine import RATED_SPEED, blade, ramp, run_up
 
@@ -74,8 +74,10 @@ def test_the_cantilever_is_the_elastica_and_the_one_handed_over(monkeypatch):
     assert_allclose(ours["tip"], (1 - 0.16064, 0.0, -0.49346), atol=3e-4)
     twist = np.sqrt(100.0 / 1e-3) / 4  # Hz, a bar clamped at one end
     assert np.abs(ours["frequencies"] / twist - 1).min() < 1e-3
-    monkeypatch.setattr(rods, "interpreter", lambda: "python")
-    monkeypatch.setattr(rods, "answer_of", lambda command: json.loads(Path(command[2]).read_text()))
+    monkeypatch.setattr(compare, "interpreter", lambda: "python")
+    monkeypatch.setattr(
+        compare, "answer_of", lambda command: json.loads(Path(command[2]).read_text())
+    )
     given = rods.bent_by_exudyn(100)
     one = straight(1.0, 100, **rods.CANTILEVER_SECTION)
     assert_allclose(given["stiffness"], np.concatenate([one.stretch[50], one.bend[50]]))

@@ -59,7 +59,7 @@ ORDER = {
             "components bench cli __main__"
         ),
         "bench": (
-            "models units two_stages peers updating large_deflection loops gears oil_films "
+            "timing models units two_stages peers updating large_deflection loops gears oil_films "
             "first_use wheel many_modes benchmarks"
         ),
         "cli": (

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from rom.bench.timing import Row
 from rom.errors import ResourceError
 from rom.process import child
 from rom.process.mpirun import mpirun
@@ -27,7 +28,7 @@ FREQUENCY_RTOL = 1e-6  # difference of frequencies of the same model
 SCRIPT_FILE = Path(__file__).with_name("craig_bampton.py")
 
 
-def compared(lc: float) -> Iterator[tuple[str, str, float, str, str]]:
+def compared(lc: float) -> Iterator[Row]:
     """Case, quantity, value, unit and aim of each figure for one mesh.
 
     Raises:
@@ -117,3 +118,15 @@ def answer_of(command: list[str]) -> dict[str, Any]:
     if done.code:
         raise ResourceError(f"{' '.join(command[:4])} ended with {done.code}: {done.last}.")
     return json.loads(done.out.strip().splitlines()[-1])
+
+
+def answer_to(script: Path, described: dict[str, Any]) -> dict[str, Any]:
+    """The answer of a script of another program to what is described for it.
+
+    Raises:
+        ResourceError: if it fails.
+    """
+    with child.scratch("peers") as folder:
+        file = folder / "described.json"
+        file.write_text(json.dumps(described))
+        return answer_of([interpreter(), str(script), str(file)])

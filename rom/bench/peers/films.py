@@ -9,12 +9,12 @@ import json
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from time import process_time
 from typing import Any
 
 import numpy as np
 
 from rom.bench.peers.compare import CACHE_FOLDER, answer_of, interpreter
+from rom.bench.timing import Row, timed
 from rom.bench.units import RigidShaft, as_mechanism, with_shafts
 from rom.components.gear_mesh import GearPair, Mesh, stiffness_table
 from rom.components.journal_bearing import (
@@ -43,8 +43,6 @@ FILM_CASE: dict[str, Any] = {
 SOMMERFELD_NUMBER, N_REPEATS = 0.580, 20
 STEPS_PER_TOOTH = 60
 
-Row = tuple[str, str, float, str, str]
-
 
 def two_groove() -> tuple[JournalBearing, float]:
     """The bearing of the row and its load [N], which points against Y."""
@@ -64,11 +62,9 @@ def coefficients_compared() -> Iterator[Row]:
     (bearing, load), case = two_groove(), "two-groove bearing, 120 x 8 cells"
     kept = {"speed": FILM_CASE["speed"], "viscosity": FILM_CASE["viscosity"]}
     equilibrium(bearing, (0.0, -load), **kept)
-    start = process_time()
-    for _ in range(N_REPEATS):
-        film = equilibrium(bearing, (0.0, -load), **kept)
-        K, C = coefficients(film)
-    ours = (process_time() - start) / N_REPEATS
+    ours, found = timed(lambda: [coefficients(equilibrium(bearing, (0.0, -load), **kept))
+                                 for _ in range(N_REPEATS)])  # fmt: skip
+    ours, (K, C) = ours / N_REPEATS, found[-1]
     yield case, "rom, rest and coefficients", 1e3 * ours, "ms of the processor", ""
     yield case, "rom, coefficients off Lund and Thomsen", off(K, C), "", "below 0.03"
     command = [
@@ -131,13 +127,13 @@ def programs_compared(n: int, cells: tuple[int, int]) -> Iterator[Row]:
     unit = with_shafts(unit, (RigidShaft.of(shafts[0]), RigidShaft.of(shafts[1])))
     case = f"rigid shafts, 4 films of {cells[0]} x {cells[1]} cells"
     units = [replace(unit, speed=float(w)) for w in np.linspace(2000, 6000, n) * np.pi / 30]
-    one, own = _timed(rest, units[0])
-    two, mechanism = _timed(mechanism_at_rest, as_mechanism(units[0]))
+    one, own = timed(rest, units[0])
+    two, mechanism = timed(mechanism_at_rest, as_mechanism(units[0]))
     yield case, "rest by its own program", 1e3 * one, "ms of the processor", ""
     yield case, "rest as a mechanism", 1e3 * two, "ms of the processor", ""
     taken, apart = np.zeros(2), np.zeros(n)
     for k, unit in enumerate(units):
-        one, own = _timed(steady, replace(own, unit=unit), steps=STEPS_PER_TOOTH)
+        one, own = timed(steady, replace(own, unit=unit), steps=STEPS_PER_TOOTH)
         two, mechanism, factor = _repeating(unit, mechanism)
         taken += one, two
         apart[k] = abs(factor / own.load_factor - 1.0)
@@ -151,16 +147,16 @@ def programs_compared(n: int, cells: tuple[int, int]) -> Iterator[Row]:
 def _repeating(unit: Transmission, start: Any, **films: Any) -> tuple[float, Any, float]:
     """Seconds for the motion of the unit as a mechanism that repeats, it, and its load factor."""
     how = {"period": unit.mesh_period, "start": start, "steps": STEPS_PER_TOOTH}
-    seconds, found = _timed(periodic_motion, as_mechanism(unit, **films), **how)
+    seconds, found = timed(periodic_motion, as_mechanism(unit, **films), **how)
     teeth = [x.force.sum() for x in tooth_loads(found.solution, "mesh")]
     return seconds, found, float(np.max(teeth) / np.mean(teeth[1:]))
 
 
 def _read_from_tables(units: list[Transmission], case: str) -> Iterator[Row]:
     """The mechanism once more with films from tables, which are made first."""
-    made, first = _timed(as_mechanism, units[0], tabulated=True)
+    made, first = timed(as_mechanism, units[0], tabulated=True)
     yield case, "to make the tables", made, "s of the processor", ""
-    rest_time, found = _timed(mechanism_at_rest, first)
+    rest_time, found = timed(mechanism_at_rest, first)
     factors, taken = [], rest_time
     for unit in units:
         one, found, factor = _repeating(unit, found, tabulated=True)
@@ -171,20 +167,11 @@ def _read_from_tables(units: list[Transmission], case: str) -> Iterator[Row]:
     yield case, "largest load factor", max(factors), "", ""
 
 
-def _timed(work: Any, *arguments: Any, **named: Any) -> tuple[float, Any]:
-    """Processor time [s], and what came of it."""
-    start = process_time()
-    found = work(*arguments, **named)
-    return process_time() - start, found
-
-
 def speeds_run_through(n: int, cells: tuple[int, int]) -> Iterator[Row]:
     """Case, quantity, value, unit and aim of each figure for n speeds, up and down."""
     unit, speeds = gear_unit(cells), np.linspace(500, 6000, n) * np.pi / 30
     case = f"{n} speeds, 4 films of {cells[0]} x {cells[1]} cells"
-    start = process_time()
-    up = sweep(unit, speeds)
-    taken = process_time() - start
+    taken, up = timed(sweep, unit, speeds)
     yield case, "steady motion at all", taken / 60, "min of the processor", "below 15"
     yield case, "mesh periods run through per speed", sum(s.passes for s in up) / n, "", ""
     yield case, "largest load factor", max(s.load_factor for s in up), "", ""

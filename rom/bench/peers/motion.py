@@ -9,7 +9,6 @@ import json
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
-from time import process_time
 from typing import Any
 
 import numpy as np
@@ -18,11 +17,11 @@ from rom.bench.models import KINDS, STEEL, geometry
 from rom.bench.peers.compare import answer_of, interpreter
 from rom.bench.peers.mechanisms import Described, built, chain, slider_crank
 from rom.bench.peers.ours import save_matrices
+from rom.bench.timing import Row, timed
 from rom.body.flexible import FlexibleBody
 from rom.errors import ConfigError
 from rom.io.native import save
 from rom.mbs.integrate.simulation import simulate
-from rom.mbs.mechanism import Mechanism
 from rom.model import Array, FEModel, SurfaceMesh
 from rom.process.child import scratch
 from rom.reduction.bases.method import CraigBampton
@@ -122,20 +121,13 @@ def by_rom(body: FlexibleBody, run: Run) -> Moved:
     path = simulate(mech, t_end=run.t_end, **options).position(*run.mechanism["watch"])
     steps = max(run.steps, N_TIMED_STEPS // len(run.mechanism["bodies"]))
     setup, whole = (
-        min(_seconds(mech, n * dt, options) for _ in range(run.times)) for n in (1, steps)
+        min(timed(simulate, mech, t_end=n * dt, **options)[0] for _ in range(run.times))
+        for n in (1, steps)
     )
     return Moved((steps - 1) / max(whole - setup, 1e-9), path)
 
 
-def _seconds(mech: Mechanism, t_end: float, options: dict[str, Any]) -> float:
-    start = process_time()
-    simulate(mech, t_end=t_end, **options)
-    return process_time() - start
-
-
-def measured(
-    meshes: tuple[float, ...], links: tuple[int, ...]
-) -> Iterator[tuple[str, str, float, str, str]]:
+def measured(meshes: tuple[float, ...], links: tuple[int, ...]) -> Iterator[Row]:
     """Case, quantity, value, unit and aim of each figure; see `rom.bench.benchmarks.motion`."""
     for lc in meshes:
         model = with_all_nodes(rod(lc))
@@ -163,9 +155,7 @@ def reduced(model: FEModel, n_modes: int = 8) -> FlexibleBody:
     return reduce(model, method=CraigBampton(n_modes), interfaces=dict(KINDS), certify=False)
 
 
-def _compared(
-    model: FEModel, body: FlexibleBody, runs: dict[str, Run]
-) -> Iterator[tuple[str, str, float, str, str]]:
+def _compared(model: FEModel, body: FlexibleBody, runs: dict[str, Run]) -> Iterator[Row]:
     for (name, run), theirs in zip(
         runs.items(), by_exudyn(model, body, list(runs.values())), strict=True
     ):

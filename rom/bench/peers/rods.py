@@ -4,16 +4,15 @@ The same sections, numbers of segments and elements; for the rotor the same law 
 and spectral radius. Processor time, one thread, without set-up.
 """
 
-import json
 from collections.abc import Iterator
 from pathlib import Path
-from time import process_time
 from typing import Any
 
 import numpy as np
 
 from rom import rotation
-from rom.bench.peers.compare import answer_of, interpreter
+from rom.bench.peers.compare import answer_to
+from rom.bench.timing import Row, timed
 from rom.components.cosserat import Rod, body, straight
 from rom.components.wind.wind_turbine import (
     N_BLADES,
@@ -29,7 +28,6 @@ from rom.mbs.analysis.linearize import linearize
 from rom.mbs.integrate.simulation import simulate
 from rom.mbs.mechanism import Mechanism
 from rom.model import Array
-from rom.process.child import scratch
 
 SCRIPT_FILE = Path(__file__).with_name("beams.py")
 CANTILEVER_FILE = Path(__file__).with_name("cantilever.py")
@@ -61,18 +59,12 @@ def by_rom(segments: int) -> tuple[float, Array]:
     """Processor time of the steps [s], and (samples + 1, 3) deflection of the first tip."""
     mech, every = rotor(segments), round(RISE_TIME / TIME_STEP) // N_SAMPLES
     options: dict[str, Any] = {"dt": TIME_STEP, "rho_inf": RHO_INF, "save_every": every}
-    _timed(mech, every * TIME_STEP, options)  # reads the compiled kernels
-    setup, _ = _timed(mech, every * TIME_STEP, options)
-    seconds, sol = _timed(mech, RISE_TIME, options)
+    simulate(mech, t_end=every * TIME_STEP, **options)  # reads the compiled kernels
+    setup, _ = timed(simulate, mech, t_end=every * TIME_STEP, **options)
+    seconds, sol = timed(simulate, mech, t_end=RISE_TIME, **options)
     last = max(mech.nonlinear["blade 0"].parts, key=lambda part: float(part.at[2]))
     seen = deflection(sol.position(last.name), last.at)
     return (seconds - setup) * N_SAMPLES / (N_SAMPLES - 1), seen
-
-
-def _timed(mech: Mechanism, t_end: float, options: dict[str, Any]) -> tuple[float, Any]:
-    start = process_time()
-    sol = simulate(mech, t_end=t_end, **options)
-    return process_time() - start, sol
 
 
 def deflection(tip: Array, home: Array) -> Array:
@@ -92,10 +84,7 @@ def by_exudyn(segments: int) -> tuple[float, Array, str]:
         "final": RATED_SPEED, "rise": RISE_TIME, "t_end": RISE_TIME,
         "steps": round(RISE_TIME / TIME_STEP), "samples": N_SAMPLES, "rho_inf": RHO_INF,
     }  # fmt: skip
-    with scratch("peers") as folder:
-        file = folder / "rotor.json"
-        file.write_text(json.dumps(described))
-        found = answer_of([interpreter(), str(SCRIPT_FILE), str(file)])
+    found = answer_to(SCRIPT_FILE, described)
     tip = np.array(found["tips"])[:, 0]
     return found["seconds"], deflection(tip, tip[0]), found["version"]
 
@@ -130,7 +119,7 @@ def _segment_masses(rod: Rod) -> list[float]:
     return masses
 
 
-def measured(segments: int = 48) -> Iterator[tuple[str, str, float, str, str]]:
+def measured(segments: int = 48) -> Iterator[Row]:
     """Case, quantity, value, unit and aim of each figure; see `rom.bench.benchmarks.rods`."""
     case = f"run-up, {N_BLADES} blades, {round(RISE_TIME / TIME_STEP)} steps"
     fine = (
@@ -152,7 +141,7 @@ def measured(segments: int = 48) -> Iterator[tuple[str, str, float, str, str]]:
     yield case, "difference of the tips", apart, "of the deflection", "below 0.01"
 
 
-def bent(segments: int = 400) -> Iterator[tuple[str, str, float, str, str]]:
+def bent(segments: int = 400) -> Iterator[Row]:
     """Case, quantity, value, unit and aim of each figure: statics of a cantilever, modes about it.
 
     Args:
@@ -164,13 +153,8 @@ def bent(segments: int = 400) -> Iterator[tuple[str, str, float, str, str]]:
     case = f"{segments} segments, bent"
     for what in ("equilibrium", "modes"):
         yield case, what, ours[what], "s of the processor", "both below 1"
-        yield (
-            case,
-            f"Exudyn {theirs['version']} over rom, {what}",
-            theirs[what] / ours[what],
-            "",
-            "",
-        )
+        ratio = theirs[what] / ours[what]
+        yield case, f"Exudyn {theirs['version']} over rom, {what}", ratio, "", ""
         yield f"to {4 * segments} segments", what, many[what] / ours[what], "", "below 6"
     apart = np.abs(np.array(theirs["tip"]) - ours["tip"]).max()
     yield case, "difference of the tips", float(apart), "of the length", "below 1e-4"
@@ -187,12 +171,9 @@ def bent_by_rom(segments: int) -> dict[str, Any]:
     )
     mech.fixed("clamp", mech.ground.marker(ORIGIN), rod.marker("start"))
     mech.force("tip", rod.marker("end"), (0.0, 0.0, -TIP_FORCE))
-    start = process_time()
-    state = equilibrium(mech)
-    between = process_time()
-    f = linearize(mech, state, n=N_BENT_MODES).frequencies
-    return {"equilibrium": between - start, "modes": process_time() - between,
-            "tip": state.q[-7:-4], "frequencies": f}  # fmt: skip
+    statics, state = timed(equilibrium, mech)
+    modes, f = timed(lambda: linearize(mech, state, n=N_BENT_MODES).frequencies)
+    return {"equilibrium": statics, "modes": modes, "tip": state.q[-7:-4], "frequencies": f}
 
 
 def bent_by_exudyn(segments: int) -> dict[str, Any]:
@@ -203,7 +184,4 @@ def bent_by_exudyn(segments: int) -> dict[str, Any]:
         "stiffness": [section["stretch"]] * 3 + [section["bend"]] * 3,
         "inertia": [section["inertia"]] * 3, "mass": section["mass"],
     }  # fmt: skip
-    with scratch("peers") as folder:
-        file = folder / "cantilever.json"
-        file.write_text(json.dumps(described))
-        return answer_of([interpreter(), str(CANTILEVER_FILE), str(file)])
+    return answer_to(CANTILEVER_FILE, described)

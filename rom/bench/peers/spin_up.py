@@ -9,23 +9,21 @@ Source:
     Control and Dynamics 10 (1987) 139.
 """
 
-import json
 from collections.abc import Callable
 from dataclasses import dataclass
-from time import process_time
 from typing import Any
 
 import numpy as np
 
 from rom import rotation
-from rom.bench.peers.compare import answer_of, interpreter
+from rom.bench.peers.compare import answer_to
 from rom.bench.peers.rods import SCRIPT_FILE
+from rom.bench.timing import timed
 from rom.components.cosserat import body, straight
 from rom.components.wind.wind_turbine import ramp
 from rom.mbs.integrate.simulation import simulate
 from rom.mbs.mechanism import Mechanism
 from rom.model import Array
-from rom.process.child import scratch
 
 BAR_LENGTH, LINE_MASS = 10.0, 1.2  # [m, kg/m]
 AXIAL_STIFFNESS, BENDING_STIFFNESS = 2.8e7, 1.4e4  # EA, EI [N, N m^2]
@@ -96,9 +94,7 @@ def spun_up(held: Held, t_end: float = RISE_TIME) -> Run:
     mech.drive("motor", "base", angle, rate=speed)
     options: dict[str, Any] = {"dt": TIME_STEP, "rho_inf": RHO_INF, "progress": False}
     simulate(mech, t_end=2 * TIME_STEP, **options)
-    start = process_time()
-    sol = simulate(mech, t_end=t_end, **options)
-    seconds = process_time() - start
+    seconds, sol = timed(simulate, mech, t_end=t_end, **options)
     seen = sol.position(tip.body, tip.place) - place
     across = np.array([(rotation.matrix(rotation.exp([0, 0, -angle(t)])) @ x)[1]
                        for t, x in zip(sol.t, seen, strict=True)])  # fmt: skip
@@ -112,10 +108,7 @@ def by_exudyn(elements: int) -> tuple[float, float, str]:
     described = {"blades": [beams(elements)], "final": FINAL_SPEED, "rise": RISE_TIME,
                  "t_end": RISE_TIME, "steps": steps, "samples": steps,
                  "rho_inf": RHO_INF}  # fmt: skip
-    with scratch("peers") as folder:
-        file = folder / "bar.json"
-        file.write_text(json.dumps(described))
-        found = answer_of([interpreter(), str(SCRIPT_FILE), str(file)])
+    found = answer_to(SCRIPT_FILE, described)
     deepest = lag(np.array(found["tips"])[:, 0]).min()
     return found["seconds"], abs(deepest / LARGEST_LAG - 1), found["version"]
 
