@@ -88,6 +88,11 @@ def integers(values: Any) -> Index:
     return np.array(list(values), dtype=np.int64)
 
 
+def starts(lengths: Any) -> Index:
+    """Positions of pieces that follow each other, and the end."""
+    return np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64)
+
+
 def rows_of(values: Any, *shape: int) -> Array:
     """Numbers as an array of rows of this shape, empty ones too."""
     return np.array(list(values), dtype=float).reshape(-1, *shape)

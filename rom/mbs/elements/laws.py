@@ -27,17 +27,16 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
 from rom.arguments import finite, shortened
 from rom.errors import ConfigError
-from rom.mbs.elements.family import Family, Places, integers
+from rom.mbs.elements.family import Family, Places, integers, starts
 from rom.mbs.elements.law_calls import ENERGY_SIZE, MOTION_SIZE, entries
 from rom.mbs.elements.laws_in_python import AskedForce, AskedLaw
 from rom.mbs.kernels.algebra import add, cross, scale, unit
-from rom.mbs.kernels.compiled import inner
+from rom.mbs.kernels.compiled import called, inner
 from rom.mbs.kernels.constraints import pair_stiffness
 from rom.mbs.kernels.element_calls import energy, residuals, tangents
 from rom.mbs.kernels.tables import (
@@ -213,9 +212,9 @@ def pack(laws: Mapping[str, Law], places: Places) -> Laws:
         *(integers(_address(law.compiled[k]) for law in found) for k in (0, 1)),
         integers(len(law.markers) for law in found),
         marker,
-        _starts([law.parameters.size for law in found]),
-        _starts(sizes),
-        places.memory("laws", np.concatenate([law.memory for law in found])) + _starts(remembered),
+        starts([law.parameters.size for law in found]),
+        starts(sizes),
+        places.memory("laws", np.concatenate([law.memory for law in found])) + starts(remembered),
         np.concatenate([law.parameters for law in found]),
         np.concatenate([law.memory for law in found]),
         integers(law.stores and law.compiled[0] is not None for law in found),
@@ -231,27 +230,10 @@ def _address(entry: Any) -> int:
     return 0 if entry is None else int(entry.address)
 
 
-def _starts(lengths: Sequence[int]) -> Index:
-    return np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64)
-
-
 @intrinsic
-def call(context, address, time, parameters, motion, memory, out):
+def call(_context, address, time, parameters, motion, memory, out):
     """Call a law, or its tangents, at an address."""
-    arrays = parameters, motion, memory, out
-    signature = types.void(address, time, *arrays)
-
-    def build(context, builder, signature, arguments):
-        def data(k):
-            return context.make_array(signature.args[k])(context, builder, arguments[k]).data
-
-        double, pointer = ir.DoubleType(), ir.DoubleType().as_pointer()
-        kind = ir.FunctionType(ir.VoidType(), [double, *[pointer] * 4])
-        law = builder.inttoptr(arguments[0], kind.as_pointer())
-        builder.call(law, [arguments[1], *map(data, range(2, 6))])
-        return context.get_dummy_value()
-
-    return (signature, build) if all(isinstance(a, types.Array) for a in arrays) else None
+    return called(types.void(address, time, parameters, motion, memory, out))
 
 
 @inner

@@ -6,13 +6,12 @@ from typing import Any
 
 import numba
 import numpy as np
-from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
-from rom.mbs.elements.family import Family, Places, apart, integers, on_joint
+from rom.mbs.elements.family import Family, Places, apart, integers, on_joint, starts
 from rom.mbs.elements.formulas.programs import Formula
-from rom.mbs.kernels.compiled import inner
+from rom.mbs.kernels.compiled import called, inner
 from rom.mbs.kernels.coordinates import coordinate_tangent, push_coordinate
 from rom.mbs.kernels.element_calls import residuals, tangents
 from rom.mbs.kernels.tables import Address1, Array1, Index1, Scratch1, Table, table
@@ -114,7 +113,7 @@ def pack(motors: Any, places: Places) -> Motors:
     return Motors(
         integers(places.coordinate(m.joint, m.row) for m in found),
         integers(m.address for m in found),
-        np.cumsum([0, *(program.size for program in programs)]),
+        starts([program.size for program in programs]),
         np.concatenate(programs),
         integers([places.clock()]),
         np.zeros(3),
@@ -150,33 +149,13 @@ def asked(motors: Mapping[str, Motor], packed: Motors, _followed: int) -> Sequen
 @intrinsic
 def call(_context, address, time, x, rate):
     """Value of the compiled law at an address: double (double, double, double)."""
-    signature = types.float64(types.int64, types.float64, types.float64, types.float64)
-
-    def build(_context, builder, _signature, arguments):
-        double = ir.DoubleType()
-        kind = ir.FunctionType(double, [double, double, double])
-        return builder.call(builder.inttoptr(arguments[0], kind.as_pointer()), arguments[1:])
-
-    return signature, build
+    return called(types.float64(address, time, x, rate))
 
 
 @intrinsic
-def call_formula(context, address, t, x, rate, program, answer):
+def call_formula(_context, address, t, x, rate, program, answer):
     """Let the compiled code at an address run a program."""
-    arrays = program, answer
-    signature = types.void(address, t, x, rate, program, answer)
-
-    def build(context, builder, signature, arguments):
-        def data(k):
-            return context.make_array(signature.args[k])(context, builder, arguments[k]).data
-
-        double, pointer = ir.DoubleType(), ir.DoubleType().as_pointer()
-        kind = ir.FunctionType(ir.VoidType(), [double] * 3 + [pointer] * 2)
-        code = builder.inttoptr(arguments[0], kind.as_pointer())
-        builder.call(code, [*arguments[1:4], data(4), data(5)])
-        return context.get_dummy_value()
-
-    return (signature, build) if all(isinstance(a, types.Array) for a in arrays) else None
+    return called(types.void(address, t, x, rate, program, answer))
 
 
 @inner

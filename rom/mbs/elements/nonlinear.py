@@ -26,7 +26,6 @@ from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
-from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
@@ -35,7 +34,7 @@ from rom.arguments import finite, start_pose, typed
 from rom.errors import ConfigError, ModelError
 from rom.mbs.elements.family import Family, Places, integers, on_joint
 from rom.mbs.elements.law_calls import compiled_entry
-from rom.mbs.kernels.compiled import inner
+from rom.mbs.kernels.compiled import called, inner
 from rom.mbs.kernels.constraints import block_of
 from rom.mbs.kernels.element_calls import energy, residuals, tangents
 from rom.mbs.kernels.tables import (
@@ -303,23 +302,9 @@ def pack(bodies: Any, places: Places) -> Nonlinear:
 
 
 @intrinsic
-def ask(context, address, numbers, pose, wanted, answer, space):
+def ask(_context, address, numbers, pose, wanted, answer, space):
     """Call the law at an address with arrays; its signature is told above."""
-    arrays = numbers, pose, answer, space
-    signature = types.void(address, numbers, pose, wanted, answer, space)
-
-    def build(context, builder, signature, arguments):
-        def data(k):
-            return context.make_array(signature.args[k])(context, builder, arguments[k]).data
-
-        whole = ir.IntType(64)
-        numbers = ir.DoubleType().as_pointer()
-        kind = ir.FunctionType(ir.VoidType(), [numbers, numbers, whole, numbers, numbers])
-        law = builder.inttoptr(arguments[0], kind.as_pointer())
-        builder.call(law, [data(1), data(2), arguments[3], data(4), data(5)])
-        return context.get_dummy_value()
-
-    return (signature, build) if all(isinstance(a, types.Array) for a in arrays) else None
+    return called(types.void(address, numbers, pose, wanted, answer, space))
 
 
 @inner

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from rom.mbs.elements.family import integers, starts
 from rom.mbs.equations.ordering import Group, Ordering, forest
 from rom.mbs.kernels.plan import Graph, Plan
 from rom.model import Index
@@ -29,18 +30,18 @@ def graph_of(system: Any, coupled: Sequence[Any], *, whole: bool = False) -> Gra
     plan = None if whole else _plan(system, neighbours, groups)
     compact = plan is not None
     width, bodies = 6 + system.bodies.r, system.bodies
-    first = _starts([len(others) for others in neighbours])
-    other = _integers([c for others in neighbours for c in others])
+    first = starts([len(others) for others in neighbours])
+    other = integers([c for others in neighbours for c in others])
     body = np.repeat(np.arange(width.size), np.diff(first))
     x, y = bodies.v_at[body], bodies.v_at[other]
     if compact:
-        x, y = _starts(width[body])[:-1], np.zeros_like(other)
-    own = _integers([first[b] + others.index(b) for b, others in enumerate(neighbours)])
+        x, y = starts(width[body])[:-1], np.zeros_like(other)
+    own = integers([first[b] + others.index(b) for b, others in enumerate(neighbours)])
     touched, at = _touched(system, compact)
     rows = [group.rows for group in groups]
     return Graph(
         int(compact), 0, *(first, other, x, y, own, touched, at),
-        _starts([len(r) for r in rows]), _integers([k for r in rows for k in r]),
+        starts([len(r) for r in rows]), integers([k for r in rows for k in r]),
         plan or NO_PLAN,
     )  # fmt: skip
 
@@ -85,8 +86,8 @@ def _touched(system: Any, compact: bool) -> tuple[Index, Index]:
     for k in range(m):
         moved = _bodies_of(system, k)
         body[k, : len(moved)] = moved
-        starts = _starts(6 + bodies.r[moved])[:-1] if compact else bodies.v_at[moved]
-        at[k, : len(moved)] = starts
+        own = starts(6 + bodies.r[moved])[:-1] if compact else bodies.v_at[moved]
+        at[k, : len(moved)] = own
     return body, at
 
 
@@ -110,9 +111,9 @@ def _tables(
     place = {node: k for k, node in enumerate(sequence)}
     later = [sorted(place[other] for other in ordering.later[node]) for node in sequence]
     d = np.array([ordering.size[node] for node in sequence], dtype=np.int64)
-    shift = [_starts(d[others]) for others in later]
+    shift = [starts(d[others]) for others in later]
     c = np.array([s[-1] for s in shift], dtype=np.int64)
-    begin = _starts(d * d + 2 * d * c)
+    begin = starts(d * d + 2 * d * c)
     pivot, right = begin[:-1], begin[:-1] + d * d
     below = right + d * c
     column = [dict(zip(o, s, strict=False)) for o, s in zip(later, shift, strict=True)]
@@ -127,7 +128,7 @@ def _tables(
 
     pairs = [where(p, q) for others in later for p in others for q in others]
     blocks = [where(place[b], place[o]) for b, others in enumerate(neighbours) for o in others]
-    start = _starts(d)
+    start = starts(d)
     width, v_at = 6 + system.bodies.r, system.bodies.v_at
     m, n = system.rows.kind.size, int(width.sum())
     position = np.zeros(n + m, dtype=np.int64)
@@ -147,9 +148,9 @@ def _tables(
                 back[k, side] = to + i
     return Plan(
         *(position, d, c, start[:-1], pivot, right, below),
-        *(_starts([len(o) for o in later]), _integers([q for o in later for q in o])),
-        _integers([x for s in shift for x in s[:-1]]),
-        *(_starts([len(o) ** 2 for o in later])[:-1], *_columns(pairs), *_columns(blocks)),
+        *(starts([len(o) for o in later]), integers([q for o in later for q in o])),
+        integers([x for s in shift for x in s[:-1]]),
+        *(starts([len(o) ** 2 for o in later])[:-1], *_columns(pairs), *_columns(blocks)),
         *(corner, row_to, back, stride, begin[-1:]),
     )
 
@@ -163,9 +164,7 @@ def elimination_order(system: Any, coupled: Sequence[Any]) -> list[Index]:
     ordering.run(np.inf)
     n, total = len(width), int(width.sum())
     found = [
-        v_at[node] + np.arange(width[node])
-        if node < n
-        else total + _integers(groups[node - n].rows)
+        v_at[node] + np.arange(width[node]) if node < n else total + integers(groups[node - n].rows)
         for node in ordering.sequence
     ]
     return [unknowns for unknowns in found if unknowns.size]
@@ -174,15 +173,6 @@ def elimination_order(system: Any, coupled: Sequence[Any]) -> list[Index]:
 def _columns(pairs: list[tuple[int, int]]) -> Any:
     """Two vectors from a list of pairs of numbers."""
     return np.ascontiguousarray(np.array(pairs, dtype=np.int64).reshape(-1, 2).T)
-
-
-def _starts(lengths: Any) -> Index:
-    """Positions of pieces that follow each other, and the end."""
-    return np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64)
-
-
-def _integers(values: Any) -> Index:
-    return np.array(values, dtype=np.int64)
 
 
 NO_PLAN = Plan(

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from rom.errors import ConfigError, warn
-from rom.mbs.elements.family import Asked, Family, Places, integers, rows_of
+from rom.mbs.elements.family import Asked, Family, Places, integers, rows_of, starts
 from rom.mbs.equations import renewal
 from rom.mbs.equations.graph import graph_of
 from rom.mbs.kernels.element_calls import ROW_WORDS
@@ -315,8 +315,8 @@ def _bodies(parts: tuple[Part, ...], R: int, gravity: Array) -> Bodies:
     flexible = list(kinds.values())
     tables = _flexible_tables(flexible, max(len(flexible), 1), R)
     return Bodies(
-        _starts(7 + r),
-        _starts(6 + r),
+        starts(7 + r)[:-1],
+        starts(6 + r)[:-1],
         r,
         flex,
         np.array([part.mass for part in parts]),
@@ -327,10 +327,6 @@ def _bodies(parts: tuple[Part, ...], R: int, gravity: Array) -> Bodies:
         *_second_order(flexible, max(len(flexible), 1), R),
         gravity,
     )
-
-
-def _starts(lengths: Any) -> Any:
-    return np.concatenate([[0], np.cumsum(lengths)[:-1]]).astype(np.int64)
 
 
 def _flexible_tables(parts: list[Part], n: int, R: int) -> tuple[Array, ...]:

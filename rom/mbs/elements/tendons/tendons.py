@@ -10,7 +10,7 @@ import numpy as np
 
 from rom.arguments import finite, number, positive, typed
 from rom.errors import ConfigError
-from rom.mbs.elements.family import Family, Places, integers, rows_of
+from rom.mbs.elements.family import Family, Places, integers, rows_of, starts
 from rom.mbs.elements.pair_motion import followed_angle
 from rom.mbs.elements.tendons.paths import Place, path_through
 from rom.mbs.elements.tendons.routing import (
@@ -292,7 +292,7 @@ def pack(tendons: Mapping[str, Tendon], places: Places) -> Tendons:
     p, m = len(stations), max(sizes)
     radius = np.array([one.radius for one in stations])
     return Tendons(
-        np.cumsum([0, *sizes]),
+        starts(sizes),
         rows_of((tendon.numbers for tendon in tendons.values()), 4),
         integers(_signal(name, tendon, places) for name, tendon in tendons.items()),
         integers(tendon.pulled for tendon in tendons.values()),
