@@ -79,6 +79,23 @@ def caption(text: str, width: int) -> tuple[str, int]:
     return "\n".join(lines), LINE_HEIGHT * len(lines)
 
 
+def titled(width: int, height: int, title: str, below: str) -> "Picture":
+    """A sheet with its heading, and a caption below so many pixels of room for pictures."""
+    text, more = caption(below, width - 60)
+    figure = sheet(width, height + more + 20)
+    words(figure, title, 30, 25, size=TITLE_SIZE, weight="bold")
+    words(figure, text, 30, height, size=SMALL_SIZE)
+    return figure
+
+
+def strips(texts: Sequence[str], width: int, height: int) -> Image:
+    """(n, height, width, 3) strips with a text each, such as the time above pictures of a film."""
+    made = [sheet(width, height) for _ in texts]
+    for strip, text in zip(made, texts, strict=True):
+        words(strip, text, 20, 8)
+    return np.stack([pixels(strip) for strip in made])
+
+
 def packed(names: Sequence[str], width: float) -> list[tuple[int, float]]:
     """Row and left end [pixel] of small names with a square each, in rows of that width."""
     places, row, left = [], 0, 15.0

@@ -416,19 +416,15 @@ def _panels(
         for axes, scene in zip(areas[n:], scenes, strict=True):
             draw_scene(figure, axes, scene)
         return figure, areas[:n]
-    text, below = page.caption(words.caption, PAGE_WIDTH - 60)
     width = PAGE_WIDTH - 190 - (BESIDE_WIDTH + 30 if scenes else 0)
     rows = np.array([page.legend_shape(names, width)[0] for names in _once(legends)])
     feet = 60 + np.cumsum(PANEL_HEIGHT + 25 + page.ROW_HEIGHT * rows)
-    height = int(feet[-1]) + 80 + below + 25
-    figure = page.sheet(PAGE_WIDTH, height)
-    page.words(figure, words.title, 30, 25, size=page.TITLE_SIZE, weight="bold")
+    figure = page.titled(PAGE_WIDTH, int(feet[-1]) + 85, words.title, words.caption)
     areas = [page.area(figure, 150, foot - PANEL_HEIGHT, width, PANEL_HEIGHT) for foot in feet]
     tall = (feet[-1] - 45 + SCENE_GAP) / max(1, len(scenes))
     for k, scene in enumerate(scenes):
         left, top = PAGE_WIDTH - BESIDE_WIDTH - 20, 105 + k * tall
         draw_scene(figure, page.area(figure, left, top, BESIDE_WIDTH, tall - SCENE_GAP), scene)
-    page.words(figure, text, 30, height - below - 20, size=page.SMALL_SIZE)
     return figure, areas
 
 

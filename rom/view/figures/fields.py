@@ -107,19 +107,15 @@ def plane(
         return page.save(figure, path)
     rows = -(-len(drawings) // columns)
     gap = ROW_GAP if any(map(_named, drawings)) else BARE_GAP
-    text, below = page.caption(caption, PAGE_WIDTH - 60)
     width = (PAGE_WIDTH - 30) // columns - COLUMN_GAP
     with page.styled():
-        tall = 110 + rows * (height + gap) + below + 10
-        figure = page.sheet(PAGE_WIDTH, tall)
-        page.words(figure, title, 30, 25, size=page.TITLE_SIZE, weight="bold")
+        figure = page.titled(PAGE_WIDTH, 100 + rows * (height + gap), title, caption)
         for k, drawing in enumerate(drawings):
             row, column = divmod(k, columns)
             left = 95 + column * (width + COLUMN_GAP)
             narrow = BAR_WIDTH if isinstance(drawing, Drawing) and drawing.label else 0
             axes = page.area(figure, left, 110 + row * (height + gap), width - narrow, height)
             _draw(figure, axes, drawing)
-        page.words(figure, text, 30, tall - below - 20, size=page.SMALL_SIZE)
         return page.save(figure, path)
 
 

@@ -96,12 +96,9 @@ def panels(
                 _draw(area, panel, alone=True)
         return page.save(figure, path)
     with page.styled():
-        text, below = page.caption(caption, PAGE_WIDTH - 60)
         legends = [_legend_height(row) for row in rows]
         feet = 65 + np.cumsum([legend + ROW_STEP for legend in legends])
-        total = int(feet[-1]) + below + 25
-        figure = page.sheet(PAGE_WIDTH, total)
-        page.words(figure, title, 30, 25, size=page.TITLE_SIZE, weight="bold")
+        figure = page.titled(PAGE_WIDTH, int(feet[-1]) + 5, title, caption)
         for row, legend, foot in zip(rows, legends, feet, strict=True):
             top = foot - BOTTOM_MARGIN - PANEL_HEIGHT
             for panel, (left, width) in zip(row, _columns(row), strict=True):
@@ -113,7 +110,6 @@ def panels(
                     axes = page.area(figure, left, top, width, PANEL_HEIGHT)
                     _draw(axes, panel, alone=False)
                     page.legend_above(axes, width, legend)
-        page.words(figure, text, 30, total - below - 20, size=page.SMALL_SIZE)
         return page.save(figure, path)
 
 

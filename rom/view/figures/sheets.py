@@ -100,10 +100,7 @@ def deformed(  # noqa: PLR0913  keywords of one picture
     if left < 400:
         raise ConfigError(f"{len(shapes)} shapes leave {left} pixels for the curves.")
     with page.styled():
-        text, below = page.caption(caption, PAGE_WIDTH - 60)
-        height = 135 + PANEL_HEIGHT + 110 + below
-        figure = page.sheet(PAGE_WIDTH, height)
-        page.words(figure, title, 30, 25, size=page.TITLE_SIZE, weight="bold")
+        figure = page.titled(PAGE_WIDTH, 225 + PANEL_HEIGHT, title, caption)
         axes = page.area(figure, 110, 120, left - 140, PANEL_HEIGHT)
         _tending(axes, curves, limit, (xlabel, ylabel))
         for shape in shapes:
@@ -114,7 +111,6 @@ def deformed(  # noqa: PLR0913  keywords of one picture
                 limits = (0.0, float(shape.values.max()))
                 page.colour_bar(figure, limits, shape.label, bar)
             left += shape.width + 30
-        page.words(figure, text, 30, height - below - 15, size=page.SMALL_SIZE)
         return page.save(figure, path)
 
 

@@ -14,7 +14,7 @@ from rom.model import Array, Index
 from rom.view.canvas import page
 from rom.view.canvas.corner import BAR_SIZE, STRIP_HEIGHT, TRIAD_SIZE, corner
 from rom.view.canvas.films import Film, finished, wanted
-from rom.view.canvas.offscreen import Image, render
+from rom.view.canvas.offscreen import render
 from rom.view.canvas.scales import clock_texts
 from rom.view.canvas.scene import Actor, Camera, aimed, sharp_edges
 from rom.view.canvas.solids import Mesh, extruded, joined
@@ -161,7 +161,7 @@ def film(
         _below(figure, scene, camera, limits, (0, FILM_WIDTH, top + height))
         page.words(figure, text, 20, foot + 5, size=page.SMALL_SIZE)
         pages = np.repeat(page.pixels(figure)[None], frames, axis=0)
-        clocks = np.stack([_clock(text) for text in clock_texts(t)])
+        clocks = page.strips(clock_texts(t), FILM_WIDTH // 4, CLOCK_HEIGHT)
     pages[:, top : top + height] = images
     pages[:, :top, : FILM_WIDTH // 4] = clocks
     return finished(pages, seconds / frames, path)
@@ -299,10 +299,3 @@ def _below(
         at, level = left + at, top + STRIP_HEIGHT + ROW_HEIGHT * row
         page.words(figure, "\u25a0", at, level - 3, color=colours[name], size=page.TITLE_SIZE)
         page.words(figure, name, at + 26, level, size=page.SMALL_SIZE)
-
-
-def _clock(text: str) -> Image:
-    """The strip above a picture of the film, with the time."""
-    strip = page.sheet(FILM_WIDTH // 4, CLOCK_HEIGHT)
-    page.words(strip, text, 20, 8)
-    return page.pixels(strip)

@@ -75,18 +75,14 @@ def updating(  # noqa: PLR0913  keywords of one picture
         draw_scene(figure, seen, scene)
         return page.save(figure, path)
     with page.styled():
-        text, below = page.caption(caption, PAGE_WIDTH - 60)
         top = 85 + TOP_HEIGHT + 145
-        height = top + BOTTOM_HEIGHT + 95 + below
-        figure = page.sheet(PAGE_WIDTH, height)
-        page.words(figure, title, 30, 25, size=page.TITLE_SIZE, weight="bold")
+        figure = page.titled(PAGE_WIDTH, top + BOTTOM_HEIGHT + 75, title, caption)
         _responses(page.area(figure, 130, 85, PAGE_WIDTH - 170, TOP_HEIGHT), f, lines, label)
         areas = [page.area(figure, left, top, 270, BOTTOM_HEIGHT) for left in (250, 560)]
         _changes(areas[0], areas[1], changes)
         for axes in areas:
             page.legend_above(axes, 270)
         draw_scene(figure, page.area(figure, 880, top - 10, 590, BOTTOM_HEIGHT + 85), scene)
-        page.words(figure, text, 30, height - below - 15, size=page.SMALL_SIZE)
         return page.save(figure, path)
 
 

@@ -178,17 +178,13 @@ def _words(x: Array, triangles: Mapping[str, Index], placed: list[Labels]) -> st
 
 def _sheet(images: Image, placed: list[Labels], words: str, title: str) -> Any:
     _, height, width, _ = images.shape
-    text, lines = page.caption(words, PAGE_WIDTH - 60)
-    total = HEADER_HEIGHT + 2 * (height + GAP)
-    figure = page.sheet(PAGE_WIDTH, total + lines + 20)
-    page.words(figure, title, 30, 25, size=page.TITLE_SIZE, weight="bold")
+    figure = page.titled(PAGE_WIDTH, HEADER_HEIGHT + 2 * (height + GAP), title, words)
     for k, side in enumerate(placed):
         axes = page.area(figure, 0, HEADER_HEIGHT + k * (height + GAP), width, height)
         axes.set_axis_off()
         axes.imshow(images[k], aspect="auto", interpolation="nearest")
         for spot, at in side:
             _write(axes, spot, at)
-    page.words(figure, text, 30, total, size=page.SMALL_SIZE, color=TEXT_COLOUR)
     return figure
 
 

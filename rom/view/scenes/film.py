@@ -88,7 +88,7 @@ def animate(  # noqa: PLR0913  keywords of one picture, all with defaults
     images = render(stage.actors, camera, limits=stage.limits, oversampling=1)
     with page.styled():
         blank = _film_sheet(stage, camera, images.shape[1], magnify)
-        clocks = np.stack([_clock(text) for text in clock_texts(solution.t[steps])])
+        clocks = page.strips(clock_texts(solution.t[steps]), FILM_WIDTH, CLOCK_HEIGHT)
     pages = np.repeat(blank[None], len(images), axis=0)
     pages[:, CLOCK_HEIGHT : CLOCK_HEIGHT + images.shape[1]] = images
     pages[:, :CLOCK_HEIGHT] = clocks
@@ -337,13 +337,6 @@ def _words(stage: Stage, magnify: float) -> str:
         f"Motion of the mechanism, deformation of {stage.name} drawn {how}. Colours: "
         f"displacement relative to the floating frame, in {stage.unit}; grey are {stage.grey}."
     )
-
-
-def _clock(text: str) -> Image:
-    """The strip above a picture of the film, with the time."""
-    strip = page.sheet(FILM_WIDTH, CLOCK_HEIGHT)
-    page.words(strip, text, 20, 8)
-    return page.pixels(strip)
 
 
 def _film_sheet(stage: Stage, camera: Camera, height: int, magnify: float) -> Image:

@@ -10,7 +10,7 @@ from rom.arguments import AnyMechanism, typed
 from rom.view.canvas import page
 from rom.view.canvas.corner import STRIP_HEIGHT, corner
 from rom.view.canvas.offscreen import render
-from rom.view.canvas.scene import TEXT_COLOUR, Actor, Camera, aimed, sharp_edges
+from rom.view.canvas.scene import Actor, Camera, aimed, sharp_edges
 from rom.view.scenes.film import Look, symbols_of, together, upright
 from rom.view.scenes.places import at_start, placed
 from rom.view.scenes.rigid import BLOCK_OPACITY, BOX_OPACITY, bars, ends_of, shadow
@@ -83,18 +83,15 @@ def _sheet(mechanism: Any, camera: Camera, image: Any, title: str) -> Any:
         "Flexible bodies are drawn by their surface, rigid ones as tubes from the mass centre to "
         "their markers, in a block of the same mass and inertia."
     )
-    text, below = page.caption(words, PAGE_WIDTH - 60)
     names = list(mechanism.parts)[:MAX_LEGEND_BODIES]
     rows = page.packed(names, PAGE_WIDTH - 45)
     row = max((line for line, _ in rows), default=0)
     top = image.shape[0] + STRIP_HEIGHT + 90
-    figure = page.sheet(PAGE_WIDTH, top + 35 * (row + 1) + 15 + below + 20)
-    page.words(figure, title, 30, 25, size=page.TITLE_SIZE, weight="bold")
+    figure = page.titled(PAGE_WIDTH, top + 35 * (row + 1) + 15, title, words)
     page.place(figure, image, 0, 80)
     corner(figure, camera, 20, PAGE_WIDTH - 20, image.shape[0] + 80)
     for k, (name, (line, at)) in enumerate(zip(names, rows, strict=True)):
         colour = COLOURS[k % len(COLOURS)]
         page.words(figure, "\u25a0", at + 15, top + 35 * line, color=colour, size=page.TITLE_SIZE)
         page.words(figure, name, at + 41, top + 35 * line + 3, size=page.SMALL_SIZE)
-    page.words(figure, text, 30, top + 35 * (row + 1) + 10, size=page.SMALL_SIZE, color=TEXT_COLOUR)
     return figure

@@ -12,7 +12,7 @@ from rom.model import FEModel
 from rom.view.canvas import page
 from rom.view.canvas.corner import STRIP_HEIGHT, corner
 from rom.view.canvas.offscreen import render
-from rom.view.canvas.scene import TEXT_COLOUR, Actor, Camera, aimed, directed_edges
+from rom.view.canvas.scene import Actor, Camera, aimed, directed_edges
 from rom.view.figures.things import Scene, Thing, actors_of
 
 if TYPE_CHECKING:
@@ -106,10 +106,8 @@ def _sheet(model: FEModel, camera: Camera, image: Any, title: str) -> Any:
         "the outer surface; coloured surfaces are the interfaces, through which the body touches "
         "the rest of the mechanism."
     )
-    text, height = page.caption(words, PAGE_WIDTH - 60)
     top = image.shape[0] + STRIP_HEIGHT + 90
-    figure = page.sheet(PAGE_WIDTH, top + 50 + height + 20)
-    page.words(figure, title, 30, 25, size=page.TITLE_SIZE, weight="bold")
+    figure = page.titled(PAGE_WIDTH, top + 50, title, words)
     page.place(figure, image, 0, 80)
     corner(figure, camera, 20, PAGE_WIDTH - 20, image.shape[0] + 80)
     left = 30
@@ -119,5 +117,4 @@ def _sheet(model: FEModel, camera: Camera, image: Any, title: str) -> Any:
         note = "" if in_sight(model, name, camera) else " (turned away)"
         page.words(figure, name + note, left + 30, top + 3, size=page.BODY_SIZE)
         left += 60 + 16 * len(name + note)
-    page.words(figure, text, 30, top + 45, size=page.SMALL_SIZE, color=TEXT_COLOUR)
     return figure

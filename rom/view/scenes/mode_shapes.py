@@ -100,13 +100,11 @@ def sheet(images: Any, camera: Camera, names: list[str], title: str, words: str,
     columns = min(2, len(images))
     width = columns * (PANEL_WIDTH + 20) + 20
     rows, height = -(-len(images) // columns), images[0].shape[0] + 50
-    text, below = page.caption(
+    caption = (
         f"{words} The largest displacement is drawn as {100 * AMPLITUDE_RATIO:g} % of the size of "
-        f"the {what}; grey lines show the undeformed edges.",
-        width - 60,
+        f"the {what}; grey lines show the undeformed edges."
     )
-    figure = page.sheet(width, 80 + rows * height + 110 + below + 20)
-    page.words(figure, title, 30, 25, size=page.TITLE_SIZE, weight="bold")
+    figure = page.titled(width, 80 + rows * height + 110, title, caption)
     for k, (image, name) in enumerate(zip(images, names, strict=True)):
         left, top = 20 + (k % columns) * (PANEL_WIDTH + 20), 80 + (k // columns) * height
         page.words(figure, name, left + 10, top + 10)
@@ -116,5 +114,4 @@ def sheet(images: Any, camera: Camera, names: list[str], title: str, words: str,
     wide = min(500, width - 320)
     page.colour_bar(figure, (0.0, 1.0), label, ((width - wide) / 2, top + 35, wide, 18))
     corner(figure, camera, 15, width - 15, top)
-    page.words(figure, text, 30, top + 110, size=page.SMALL_SIZE)
     return figure
