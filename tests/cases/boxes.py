@@ -2,6 +2,12 @@
 
 import numpy as np
 
+BOX_GEO = """SetFactory("OpenCASCADE");
+Box(1) = {0, 0, 0, 1, 1, 1};
+Physical Volume("body", 1) = {1};
+Physical Surface("root", 11) = {1};
+Mesh.MeshSizeMin = 1; Mesh.MeshSizeMax = 1;
+"""  # a cube that gmsh meshes, one face of which is named
 FACES = {"x0": (0, 0), "x1": (0, 1), "y0": (1, 0), "y1": (1, 1), "z0": (2, 0), "z1": (2, 1)}
 
 

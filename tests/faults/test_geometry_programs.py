@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 
+from cases.boxes import BOX_GEO as BOX
 from cases.command import rom as command
 from cases.long import few
 from rom.errors import (
@@ -31,12 +32,6 @@ from rom.process.memory import total_bytes
 pytest.importorskip("gmsh", reason="gmsh is not installed")
 pytestmark = pytest.mark.fenicsx
 LINUX = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="what Linux offers")
-BOX = """SetFactory("OpenCASCADE");
-Box(1) = {0, 0, 0, 1, 1, 1};
-Physical Volume("body", 1) = {1};
-Physical Surface("root", 11) = {1};
-Mesh.MeshSizeMin = 1; Mesh.MeshSizeMax = 1;
-"""
 TOUCH = 'SystemCall "touch pwned";\n'
 STEP = "ISO-10303-21;\n"
 # name: what the geometry and the files beside it say

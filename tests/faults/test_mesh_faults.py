@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from cases.boxes import BOX_GEO as GEO
 from cases.files.cells import blocks_of, solid, write_msh
 from cases.long import ROM_LONG, few
 from rom.errors import (
@@ -35,12 +36,6 @@ MUTANTS = 60 if ROM_LONG else 10
 
 BOX = solid()
 BLOCKS, NAMES = blocks_of(BOX)
-GEO = """SetFactory("OpenCASCADE");
-Box(1) = {0, 0, 0, 1, 1, 1};
-Physical Volume("body", 1) = {1};
-Physical Surface("root", 11) = {1};
-Mesh.MeshSizeMin = 1; Mesh.MeshSizeMax = 1;
-"""
 
 
 def text(content):

@@ -23,6 +23,7 @@ import numpy as np
 import pytest
 
 import rom
+from cases.boxes import BOX_GEO
 from cases.command import ROOT, environment
 from cases.long import ROM_LONG, few
 from cases.solid import block
@@ -36,12 +37,6 @@ MODULES = (
     "pkgutil functools resource struct warnings collections enum contextlib pathlib signal "
     "threading dolfinx petsc4py slepc4py mpi4py ufl ffcx basix cffi pip venv imageio PIL __main__"
 ).split()
-GEOMETRY = """SetFactory("OpenCASCADE");
-Box(1) = {0, 0, 0, 1, 1, 1};
-Physical Volume("body", 1) = {1};
-Physical Surface("root", 11) = {1};
-Mesh.MeshSizeMin = 1; Mesh.MeshSizeMax = 1;
-"""
 STEEL = ("--E", "210e9", "--nu", "0.3", "--rho", "7850")
 REDUCE = ("box.geo", *STEEL, "-i", "root=rbe2", "-m", "4", "--reference", "root")
 VERBS = {  # verb: a line that does what the verb is for
@@ -91,7 +86,7 @@ def planted(tmp_path, monkeypatch, body):
     for name in ("dolfinx_jit_parameters.json", "ffcx_parameters.json"):
         (folder / name).write_text("trapped")
     (folder / ".numba_config.yaml").write_text(f"cache_dir: {marks}\n")
-    (folder / "box.geo").write_text(GEOMETRY)
+    (folder / "box.geo").write_text(BOX_GEO)
     shutil.copy(body, folder / "bar.rom.npz")
     monkeypatch.chdir(folder)
     return marks
