@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 
 from rom import rotation
 from rom.bench import large_deflection as bench
-from rom.bench.peers import spin_up
+from rom.bench.peers import compare, spin_up
 from rom.components.cosserat import straight
 from rom.components.wind.wind_turbine import ramp
 
@@ -50,8 +50,8 @@ def test_the_deflection_of_a_beam_is_read_from_the_places_of_its_tip(monkeypatch
         described.update(json.loads(Path(command[2]).read_text()))
         return {"tips": tip[:, None].tolist(), "seconds": 2.0, "version": "1"}
 
-    monkeypatch.setattr(spin_up, "interpreter", lambda: "python")
-    monkeypatch.setattr(spin_up, "answer_of", answer)
+    monkeypatch.setattr(compare, "interpreter", lambda: "python")
+    monkeypatch.setattr(compare, "answer_of", answer)
     assert_allclose(spin_up.by_exudyn(4)[1], 1 - 0.2 / 0.57379)
     assert described["steps"] == described["samples"] == 3000 and described["final"] == 6.0
 
