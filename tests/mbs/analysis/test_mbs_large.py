@@ -50,8 +50,11 @@ def flexible_pair(seed=3):
     return mech
 
 
-def links(n, *, slopes, ends=True):
-    """A chain of total length and mass one in the x-z plane, hinged by universal joints."""
+def links(n, *, slopes, ends=True, planar=False):
+    """A chain of total length and mass one in the x-z plane, hinged by universal joints.
+
+    A closed one of revolute joints has three constraints that repeat others.
+    """
     mech, l = Mechanism(gravity=(0, 0, -9.81)), 1.0 / n
     marks = {"a": (-l / 2, 0, 0), "b": (l / 2, 0, 0)}
     last, corner = mech.ground.marker((0, 0, 0)), np.zeros(3)
@@ -61,27 +64,20 @@ def links(n, *, slopes, ends=True):
         link = mech.add_rigid(f"link {k}", mass=l, inertia=(l**3 / 12,) * 3, markers=marks,
                               at=corner + way / 2, orientation=turned)  # fmt: skip
         up = (np.sin(slope), 0, np.cos(slope))
-        mech.universal(f"pin {k}", last, link.marker("a"), axis1=Y, axis2=up)
+        if planar:
+            mech.revolute(f"pin {k}", last, link.marker("a"), axis=Y)
+        else:
+            mech.universal(f"pin {k}", last, link.marker("a"), axis1=Y, axis2=up)
         last, corner = link.marker("b"), corner + way
-    if ends:
+    if planar:
+        mech.revolute("end", last, mech.ground.marker(tuple(corner)), axis=Y)
+    elif ends:
         mech.spherical("end", last, mech.ground.marker(tuple(corner)))
     return mech, corner
 
 
 def planar_links(n):
-    """A closed chain of revolute joints, three constraints of which repeat others."""
-    mech, l, slopes = Mechanism(gravity=(0, 0, -9.81)), 1.0 / n, np.linspace(0.9, -0.9, n)
-    marks = {"a": (-l / 2, 0, 0), "b": (l / 2, 0, 0)}
-    last, corner = mech.ground.marker((0, 0, 0)), np.zeros(3)
-    for k, slope in enumerate(slopes):
-        way = l * np.array([np.cos(slope), 0, -np.sin(slope)])
-        turned = (np.cos(slope / 2), 0, np.sin(slope / 2), 0)
-        link = mech.add_rigid(f"link {k}", mass=l, inertia=(l**3 / 12,) * 3, markers=marks,
-                              at=corner + way / 2, orientation=turned)  # fmt: skip
-        mech.revolute(f"pin {k}", last, link.marker("a"), axis=Y)
-        last, corner = link.marker("b"), corner + way
-    mech.revolute("end", last, mech.ground.marker(tuple(corner)), axis=Y)
-    return mech
+    return links(n, slopes=np.linspace(0.9, -0.9, n), planar=True)[0]
 
 
 @pytest.fixture
