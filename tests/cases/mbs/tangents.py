@@ -3,11 +3,11 @@
 import numpy as np
 from numpy.testing import assert_allclose
 
-from cases.mbs.mechanisms import residual_at, stored_at, tangents_at
+from cases.mbs.mechanisms import random_state, residual_at, stored_at, tangents_at
 from rom.mbs.elements import rotational_springs, springs
-from rom.mbs.equations.equations import retract
+from rom.mbs.equations.equations import evaluate, linearize_constraints, retract
 
-GRAVITY = np.array([0.3, -9.0, 2.0])
+GRAVITY, NONE = np.array([0.3, -9.0, 2.0]), np.zeros(0)
 
 
 def difference(f, n, step=1e-6):
@@ -22,15 +22,47 @@ def shifted(packed, q, delta):
     return out
 
 
-def assert_forces_are_the_gradient(packed, W, mesh, q):
-    """The forces of one mesh of two bodies follow from its energy, and leave nothing over."""
-    none = np.zeros(12)
+def forces_at(packed, W, q, v, a=None, lam=None):
+    """The residual; at rest and without multipliers where they are not given."""
+    residual_at(packed.system, W, q, v, 0 * v if a is None else a, NONE if lam is None else lam)
+    return W.residual.copy()
+
+
+def energy_gradient(packed, W, q, step=1e-6):
+    """Differences of the stored energy by the motions from a position."""
+    none = 0 * packed.v
 
     def energy(delta):
         return np.array([stored_at(packed.system, W, shifted(packed, q, delta), none)])
 
-    gradient = difference(energy, 12, 1e-8)[0]
-    residual_at(packed.system, W, q, none, none, np.zeros(0))
+    return difference(energy, none.size, step)[0]
+
+
+def near(rng, packed, size):
+    """A state that is not far from the start, and moves at random."""
+    q, v, a, lam = random_state(rng, packed)
+    q[:] = shifted(packed, packed.q, size * rng.normal(size=packed.v.size))
+    return q, v, a, lam
+
+
+def constraint_derivatives(packed, W, q, v):
+    """Differences of the gaps by the motions (m, n), and of their rates along the velocity (m,)."""
+
+    def value(delta):
+        evaluate(packed.system, W, shifted(packed, q, delta), v)
+        return W.value.copy()
+
+    def rate(time):
+        linearize_constraints(packed.system, W, shifted(packed, q, time * v), v)
+        return W.G @ v
+
+    return difference(value, v.size), difference(lambda x: rate(x[0]), 1)[:, 0]
+
+
+def assert_forces_are_the_gradient(packed, W, mesh, q):
+    """The forces of one mesh of two bodies follow from its energy, and leave nothing over."""
+    gradient = energy_gradient(packed, W, q, 1e-8)
+    forces_at(packed, W, q, np.zeros(12))
     assert mesh.load[0] > 1e3
     assert_allclose(W.residual, gradient, atol=1e-6 * np.abs(gradient).max())
     one, two = W.wrench[mesh.i[0]], W.wrench[mesh.j[0]]
@@ -42,27 +74,15 @@ def assert_forces_are_the_gradient(packed, W, mesh, q):
 
 def by_position(packed, W, q, v):
     """Derivatives of the forces by the position: as the tangent has them, and by differences."""
-    zero, none = np.zeros(v.size), np.zeros(0)
-
-    def force(delta):
-        residual_at(packed.system, W, shifted(packed, q, delta), v, zero, none)
-        return W.residual.copy()
-
-    wanted = difference(force, v.size, 1e-9)
-    tangents_at(packed.system, W, q, v, zero, none, (0.0, 0.0, 1.0))
+    wanted = difference(lambda x: forces_at(packed, W, shifted(packed, q, x), v), v.size, 1e-9)
+    tangents_at(packed.system, W, q, v, 0 * v, NONE, (0.0, 0.0, 1.0))
     return W.Kt.copy(), wanted
 
 
 def by_velocity(packed, W, q, v):
     """Derivatives of the forces by the velocity: as the tangent has them, and by differences."""
-    zero, none = np.zeros(v.size), np.zeros(0)
-
-    def force(delta):
-        residual_at(packed.system, W, q, v + delta, zero, none)
-        return W.residual.copy()
-
-    wanted = difference(force, v.size)
-    tangents_at(packed.system, W, q, v, zero, none, (0.0, 1.0, 0.0))
+    wanted = difference(lambda x: forces_at(packed, W, q, v + x), v.size)
+    tangents_at(packed.system, W, q, v, 0 * v, NONE, (0.0, 1.0, 0.0))
     return W.S.copy(), wanted
 
 
@@ -76,8 +96,7 @@ def check_tangents(packed, W, state, motions, tolerance):
     zero = np.zeros(v.size)
 
     def at(dq, dv, da):
-        residual_at(s, W, shifted(packed, q, dq), v + dv, a + da, lam)
-        return W.residual.copy()
+        return forces_at(packed, W, shifted(packed, q, dq), v + dv, a + da, lam)
 
     C = difference(lambda x: at(zero, x, zero), v.size)
     tangents_at(s, W, q, v, a, lam, (0.0, 1.0, 0.0))

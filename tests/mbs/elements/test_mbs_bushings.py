@@ -8,12 +8,9 @@ from cases.mbs.mechanisms import (
     prepared,
     random_body,
     random_pose,
-    random_state,
-    residual_at,
-    stored_at,
     tangents_at,
 )
-from cases.mbs.tangents import check_tangents, difference, shifted
+from cases.mbs.tangents import check_tangents, difference, energy_gradient, forces_at, near
 from rom import rotation
 from rom.errors import ConfigError
 from rom.mbs.elements import bushings
@@ -42,11 +39,7 @@ def bushed(rng, damped=False):
     return mech
 
 
-def near(rng, packed):
-    """A state not far from the start: rotations of the bushing well below half a turn."""
-    q, v, a, lam = random_state(rng, packed)
-    q[:] = shifted(packed, packed.q, 0.4 * rng.normal(size=packed.v.size))
-    return q, v, a, lam
+NEAR_SIZE = 0.4  # rotations of the bushing stay well below half a turn
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -54,19 +47,12 @@ def test_forces_are_the_gradient_of_the_energy(seed):
     rng = np.random.default_rng(seed)
     packed, W = prepared(bushed(rng))
     packed.system.markers.twist[:] *= 1e-3  # of the marker Jacobian, see `wrench_stiffness`
-    s, (q, v, _, lam) = packed.system, near(rng, packed)
-    none = 0 * v
-
-    def energy(delta):
-        return np.array([stored_at(s, W, shifted(packed, q, delta), none)])
-
-    gradient = difference(energy, v.size)[0]
-    residual_at(s, W, q, none, none, lam)
-    body = W.residual.copy()
+    q, v, _, lam = near(rng, packed, NEAR_SIZE)
+    gradient, body = energy_gradient(packed, W, q), forces_at(packed, W, q, 0 * v, lam=lam)
     packed.elements[bushings.BUSHINGS_FAMILY].stiffness[:] = 0.0
     packed.elements[bushings.BUSHINGS_FAMILY].curve[:] = -1
-    residual_at(s, W, q, none, none, lam)
-    assert_allclose(body - W.residual, gradient, atol=1e-7 * np.abs(gradient).max())
+    found = body - forces_at(packed, W, q, 0 * v, lam=lam)
+    assert_allclose(found, gradient, atol=1e-7 * np.abs(gradient).max())
 
 
 @pytest.mark.parametrize("seed", range(2))
@@ -74,19 +60,12 @@ def test_tangents_are_derivatives_of_the_forces(seed):
     rng = np.random.default_rng(seed)
     packed, W = prepared(bushed(rng, damped=True))
     packed.system.markers.twist[:] *= 1e-3
-    state = near(rng, packed)
-    s, (q, v, a, lam) = packed.system, state
-    zero = 0 * v
-    C = difference(lambda x: _residual(packed, W, q, v + x, a, lam), v.size)
-    tangents_at(s, W, q, v, a, lam, (0.0, 1.0, 0.0))
+    q, v, a, lam = state = near(rng, packed, NEAR_SIZE)
+    C = difference(lambda x: forces_at(packed, W, q, v + x, a, lam), v.size)
+    tangents_at(packed.system, W, q, v, a, lam, (0.0, 1.0, 0.0))
     assert_allclose(W.S, C, atol=1e-7 * np.abs(C).max())
     packed.elements[bushings.BUSHINGS_FAMILY].damping[:] = 0.0
-    check_tangents(packed, W, state, np.eye(zero.size), 1e-6)
-
-
-def _residual(packed, W, q, v, a, lam):
-    residual_at(packed.system, W, q, v, a, lam)
-    return W.residual.copy()
+    check_tangents(packed, W, state, np.eye(v.size), 1e-6)
 
 
 def box(mech, name="box", **more):

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from numba import njit
 from numpy.testing import assert_allclose
 from scipy.integrate import quad, solve_ivp
 from scipy.special import gamma
@@ -13,13 +12,13 @@ from cases.mbs.mechanisms import (
     random_pose,
     random_state,
     residual_at,
+    stored_at,
     tangents_at,
 )
-from cases.mbs.tangents import difference, shifted
+from cases.mbs.tangents import difference, energy_gradient, forces_at, shifted
 from rom.errors import ConfigError
 from rom.mbs.elements.contact import points
 from rom.mbs.elements.contact.impact import Impact, damping_of, hertz_stiffness
-from rom.mbs.equations.equations import element_energy, evaluate
 from rom.mbs.integrate.simulation import simulate
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.results.audit import audit
@@ -28,12 +27,6 @@ X, Y, Z = np.eye(3)
 TILTED = np.array([1.0, 2.0, 2.0]) / 3
 g = 9.81
 KINDS = ("plane", "disc", "sphere", "cylinder", "bore", "capsules", "ends")
-
-
-@njit
-def stored_at(s, W, q, v):
-    evaluate(s, W, q, v)
-    return element_energy(s, W, q, v)
 
 
 def touching(kind, mech, m1, m2, law):
@@ -70,16 +63,11 @@ def random_contact(kind, law):
 @pytest.mark.parametrize("kind", KINDS)
 def test_forces_without_loss_are_the_gradient_of_the_energy(kind):
     packed, W, (q, v, _, lam) = random_contact(kind, Impact(3.0))
-    s, none = packed.system, 0 * v
-    gradient = difference(
-        lambda x: np.array([stored_at(s, W, shifted(packed, q, x), none)]), v.size
-    )[0]
-    residual_at(s, W, q, none, none, lam)
-    with_contact = W.residual.copy()
+    gradient, touched = energy_gradient(packed, W, q), forces_at(packed, W, q, 0 * v, lam=lam)
     packed.elements[points.CONTACTS_FAMILY].law[:, 0] = 0.0
-    residual_at(s, W, q, none, none, lam)
+    found = touched - forces_at(packed, W, q, 0 * v, lam=lam)
     assert np.abs(gradient).max() > 0.1
-    assert_allclose(with_contact - W.residual, gradient, atol=2e-7 * np.abs(gradient).max())
+    assert_allclose(found, gradient, atol=2e-7 * np.abs(gradient).max())
 
 
 BRISTLES = {"slides": {}, "holds": {"tangential_stiffness": 0.5, "tangential_damping": 0.05},
@@ -93,20 +81,14 @@ def test_tangents_are_derivatives_of_the_forces(kind, how):
     law = Impact(3.0, damping=0.02, mu=0.4, transition_speed=0.5, **BRISTLES[how])
     packed, W, (q, v, a, lam) = random_contact(kind, law)
     s = packed.system
-    residual_at(s, W, q, v, a, lam)
+    forces_at(packed, W, q, v, a, lam)
     W.base[:] = W.fresh  # it touched there before
     q = shifted(packed, q, 0.01 * np.random.default_rng(7).normal(size=v.size))
-
-    def at(dq, dv):
-        residual_at(s, W, shifted(packed, q, dq), v + dv, a, lam)
-        return W.residual.copy()
-
-    zero = 0 * v
-    C = difference(lambda x: at(zero, x), v.size)
+    C = difference(lambda x: forces_at(packed, W, q, v + x, a, lam), v.size)
     tangents_at(s, W, q, v, a, lam, (0.0, 1.0, 0.0))
     assert_allclose(W.S, C, atol=1e-7 * np.abs(C).max())
     v[:] = 0.0  # then nothing is left out
-    K = difference(lambda x: at(x, zero), v.size)
+    K = difference(lambda x: forces_at(packed, W, shifted(packed, q, x), v, a, lam), v.size)
     tangents_at(s, W, q, v, a, lam, (0.0, 0.0, 1.0))
     assert_allclose(W.Kt, K, atol=1e-6 * np.abs(K).max())
 
@@ -118,11 +100,9 @@ def test_what_is_lost_is_what_the_forces_take(kind):
     packed, W, (q, v, a, lam) = random_contact(kind, law)
     s = packed.system
     rate = difference(lambda t: np.array([stored_at(s, W, shifted(packed, q, t * v), v)]), 1)[0, 0]
-    residual_at(s, W, q, v, a, lam)
-    force, lost = W.residual.copy(), W.power[2]
+    force, lost = forces_at(packed, W, q, v, a, lam), W.power[2]
     packed.elements[points.CONTACTS_FAMILY].law[:, 0] = 0.0
-    residual_at(s, W, q, v, a, lam)
-    force, lost = W.residual - force, lost - W.power[2]
+    force, lost = forces_at(packed, W, q, v, a, lam) - force, lost - W.power[2]
     assert lost > 0.0
     assert_allclose(force @ v, -rate - lost, rtol=1e-6)
 

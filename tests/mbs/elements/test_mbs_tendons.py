@@ -9,12 +9,10 @@ from cases.mbs.mechanisms import (
     prepared,
     random_body,
     random_pose,
-    random_state,
-    residual_at,
     stored_at,
     tangents_at,
 )
-from cases.mbs.tangents import check_tangents, difference, shifted
+from cases.mbs.tangents import check_tangents, difference, energy_gradient, forces_at, near
 from rom.errors import ConfigError, RomWarning, SolverError
 from rom.mbs import Pulley
 from rom.mbs.elements.tendons.tendons import TENDONS_FAMILY
@@ -41,34 +39,16 @@ def strung(rng, pulleys, **more):
     return mech
 
 
-def near(rng, packed):
-    """A state not far from the start."""
-    q, v, a, lam = random_state(rng, packed)
-    q[:] = shifted(packed, packed.q, 0.02 * rng.normal(size=packed.v.size))
-    return q, v, a, lam
-
-
-def _residual(packed, W, q, v, a, lam):
-    residual_at(packed.system, W, q, v, a, lam)
-    return W.residual.copy()
-
-
 @pytest.mark.parametrize("pulleys", ["none", "one", "pair"])
 @pytest.mark.parametrize("seed", range(3))
 def test_forces_are_the_gradient_of_the_energy(seed, pulleys):
     rng = np.random.default_rng(seed)
     packed, W = prepared(strung(rng, pulleys, EA=30.0, pretension=5.0))
     packed.system.markers.twist[:] *= 1e-3  # of the marker Jacobian, see `wrench_stiffness`
-    s, (q, v, _, lam) = packed.system, near(rng, packed)
-    none = 0 * v
-
-    def energy(delta):
-        return np.array([stored_at(s, W, shifted(packed, q, delta), none)])
-
-    gradient = difference(energy, v.size)[0]
-    body = _residual(packed, W, q, none, none, lam)
+    q, v, _, lam = near(rng, packed, 0.02)
+    gradient, body = energy_gradient(packed, W, q), forces_at(packed, W, q, 0 * v, lam=lam)
     packed.elements[TENDONS_FAMILY].law[:, 0] = 0.0
-    gained = body - _residual(packed, W, q, none, none, lam)
+    gained = body - forces_at(packed, W, q, 0 * v, lam=lam)
     assert np.abs(gradient).max() > 1.0
     assert_allclose(gained, gradient, atol=1e-7 * np.abs(gradient).max())
 
@@ -100,11 +80,11 @@ def test_a_second_cable_is_like_the_first():
         packed, W = prepared(mech)
         packed.system.markers.twist[:] *= 1e-3
         mech.elements.update(elements)
-        state = near(rng, packed) if state is None else state
+        state = near(rng, packed, 0.02) if state is None else state
         q, v, a_, lam = state
         tangents_at(packed.system, W, q, v, a_, lam, (0.0, 1.0, 1.0))
         K.append(W.S + W.Kt)
-        forces.append(_residual(packed, W, q, v, a_, lam))
+        forces.append(forces_at(packed, W, q, v, a_, lam))
     for both, one, two, none in (K, forces):
         assert_allclose(both - none, one + two - 2 * none, atol=1e-12 * np.abs(both).max())
         assert np.abs(two - none).max() > 1e-3 * np.abs(both).max()
@@ -117,9 +97,9 @@ def test_tangents_are_derivatives_of_the_forces(kind, pulleys):
     packed, W = prepared(strung(rng, pulleys, **KINDS[kind]))
     packed.system.markers.twist[:] *= 1e-3
     W.signal[:, 0], W.signal[:, 1] = 8.0, -0.5
-    state = near(rng, packed)
-    s, (q, v, a, lam) = packed.system, state
-    C = difference(lambda x: _residual(packed, W, q, v + x, a, lam), v.size)
+    s, state = packed.system, near(rng, packed, 0.02)
+    q, v, a, lam = state
+    C = difference(lambda x: forces_at(packed, W, q, v + x, a, lam), v.size)
     tangents_at(s, W, q, v, a, lam, (0.0, 1.0, 0.0))
     assert_allclose(W.S, C, atol=1e-7 * np.abs(C).max())
     for at, r in zip(s.bodies.v_at, s.bodies.r, strict=True):

@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from cases.mbs.mechanisms import prepared, random_body, random_pose, random_state, simulate_quietly
-from cases.mbs.tangents import GRAVITY, check_tangents, difference, shifted
+from cases.mbs.tangents import GRAVITY, check_tangents, constraint_derivatives
 from rom.errors import ConfigError, ModelError, SolverError
 from rom.mbs.equations.equations import evaluate, linearize_constraints
 from rom.mbs.integrate.simulation import simulate
@@ -45,19 +45,9 @@ def test_gradient_and_convective_term_are_derivatives(seed):
     packed, W = prepared(everything(rng))
     s, (q, v, _, _) = packed.system, random_state(rng, packed)
     rolls = s.rows.kind == ROLL
-
-    def value(delta):
-        evaluate(s, W, shifted(packed, q, delta), v)
-        return W.value.copy()
-
-    def rate(time):
-        linearize_constraints(s, W, shifted(packed, q, time * v), v)
-        return W.G @ v
-
     evaluate(s, W, q, v)
     W.base[:] = W.x
-    G = difference(value, v.size)
-    convective = difference(lambda x: rate(x[0]), 1)[:, 0]
+    G, convective = constraint_derivatives(packed, W, q, v)
     linearize_constraints(s, W, q, v)
     assert_allclose(W.G[~rolls], G[~rolls], atol=2e-8 * np.abs(G).max())
     assert_allclose(W.value[rolls], (W.G @ v)[rolls], atol=1e-12 * np.abs(v).max())

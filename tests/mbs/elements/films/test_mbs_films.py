@@ -7,8 +7,8 @@ from scipy.integrate import quad
 
 import rom
 from cases.mbs.films import MOTION, NONE, ORIGIN, RATE, SPEED, VISCOSITY, Pair, held_rotor
-from cases.mbs.mechanisms import prepared, random_body, residual_at, tangents_at
-from cases.mbs.tangents import difference, shifted
+from cases.mbs.mechanisms import prepared, random_body, tangents_at
+from cases.mbs.tangents import difference, forces_at, shifted
 from rom.components.journal_bearing import film
 from rom.errors import ConfigError, ModelError, SolverError
 from rom.mbs import Groove, JournalBearing, iso_vg
@@ -191,8 +191,7 @@ def test_tangents_are_the_derivatives(law, spin, passed):
     W.base[first + FIRST_CONTENT :] *= 0.97
 
     def force(dq, dv):
-        residual_at(packed.system, W, shifted(packed, packed.q, dq), v + dv, 0 * v, NONE)
-        return W.residual.copy()
+        return forces_at(packed, W, shifted(packed, packed.q, dq), v + dv)
 
     step = np.tile([1e-10, 1e-10, 1e-10, 1e-9, 1e-9, 1e-9], 2)
     stiff = np.array([(force(e, 0 * v) - force(-e, 0 * v)) / (2 * d)
@@ -223,8 +222,7 @@ def test_tangents_of_bodies_that_bend_are_the_derivatives(side):
     K = W.Kt.copy()
 
     def force(dq):
-        residual_at(packed.system, W, shifted(packed, packed.q, dq), v, 0 * v, NONE)
-        return W.residual.copy()
+        return forces_at(packed, W, shifted(packed, packed.q, dq), v)
 
     found = np.array([(force(d) - force(-d)) / 2e-10 for d in 1e-10 * np.eye(v.size)]).T
     assert_allclose(K, found, atol=2e-6 * np.abs(found).max())

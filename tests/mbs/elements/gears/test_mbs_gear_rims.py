@@ -10,8 +10,14 @@ from numpy.testing import assert_allclose
 from scipy.sparse.linalg import splu
 
 import rom
-from cases.mbs.mechanisms import prepared, residual_at, stored_at
-from cases.mbs.tangents import by_position, by_velocity, difference, shifted
+from cases.mbs.mechanisms import prepared, residual_at
+from cases.mbs.tangents import (
+    by_position,
+    by_velocity,
+    energy_gradient,
+    forces_at,
+    shifted,
+)
 from cases.mbs.tubes import tube
 from rom.components.gear_mesh import GearPair, RackPair
 from rom.errors import ConfigError, RomWarning
@@ -199,19 +205,9 @@ def pressed(damping=0.0, friction=0.0):
 
 def test_forces_on_rims_are_the_gradient_of_the_energy():
     _, packed, W, q, v = pressed()
-    none, table = 0 * v, packed.elements[GEAR_MESHES_FAMILY]
-
-    def energy(delta):
-        return np.array([stored_at(packed.system, W, shifted(packed, q, delta), none)])
-
-    def force():
-        residual_at(packed.system, W, q, none, none, np.zeros(0))
-        return W.residual.copy()
-
-    gradient = difference(energy, v.size, 1e-8)[0]
-    whole = force()
-    table.stiffness[:] = 0.0
-    found, r = whole - force(), packed.system.bodies.r[0]
+    gradient, whole = energy_gradient(packed, W, q, 1e-8), forces_at(packed, W, q, 0 * v)
+    packed.elements[GEAR_MESHES_FAMILY].stiffness[:] = 0.0
+    found, r = whole - forces_at(packed, W, q, 0 * v), packed.system.bodies.r[0]
     assert np.abs(gradient).max() > 1e3
     for part in (slice(6, 6 + r), slice(12 + r, None)):
         assert_allclose(found[part], gradient[part], atol=1e-5 * np.abs(gradient[part]).max())

@@ -6,8 +6,14 @@ from numpy.testing import assert_allclose
 from scipy.optimize import root
 
 import rom
-from cases.mbs.mechanisms import prepared, random_body, residual_at, stored_at, tangents_at
-from cases.mbs.tangents import by_position, by_velocity, difference, shifted
+from cases.mbs.mechanisms import prepared, random_body, residual_at, tangents_at
+from cases.mbs.tangents import (
+    by_position,
+    by_velocity,
+    energy_gradient,
+    forces_at,
+    shifted,
+)
 from rom import rotation
 from rom.components.gear_mesh import Correction, GearPair, Mesh, stiffness_table
 from rom.errors import ConfigError, ModelError, SolverError
@@ -619,22 +625,12 @@ def test_flexible_wheels_feel_their_teeth_in_all_their_shapes():
     )
     packed, W = prepared(mech)
     q = shifted(packed, packed.q, 1e-7 * rng.normal(size=packed.v.size))
-    none = 0 * packed.v
     turned = np.zeros(packed.v.size)
     turned[5] = 1e-4  # working flanks close by the turn of the pinion
     q = shifted(packed, q, turned)
-
-    def energy(delta):
-        return np.array([stored_at(packed.system, W, shifted(packed, q, delta), none)])
-
-    def force():
-        residual_at(packed.system, W, q, none, none, np.zeros(0))
-        return W.residual.copy()
-
-    gradient = difference(energy, none.size, 1e-8)[0]
-    body = force()
+    gradient, body = energy_gradient(packed, W, q, 1e-8), forces_at(packed, W, q, 0 * packed.v)
     packed.elements[GEAR_MESHES_FAMILY].stiffness[:] = 0.0
-    found = body - force()
+    found = body - forces_at(packed, W, q, 0 * packed.v)
     assert np.abs(gradient[6:9]).max() > 1e-2 * np.abs(gradient).max()
     assert_allclose(found, gradient, atol=1e-4 * np.abs(gradient).max())
 
