@@ -6,6 +6,8 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 SECONDS = 60.0  # a case may take, on a machine that does other things too
 
 CLASSES = {  # number of the class: what it is about, and its modules
@@ -90,6 +92,38 @@ def write(name: str, content: str | bytes) -> Callable[[Path], object]:
     """Writes a file."""
     data = content if isinstance(content, bytes) else content.encode()
     return lambda folder: (folder / name).write_bytes(data)
+
+
+def changed(name: str, change: Callable[[bytes], bytes]) -> Callable[[Path], object]:
+    """Replaces the bytes of a file by what a function makes of them."""
+    return lambda folder: (folder / name).write_bytes(change((folder / name).read_bytes()))
+
+
+def cut(name: str, share: float) -> Callable[[Path], object]:
+    """A file of which only this share is there."""
+    return changed(name, lambda data: data[: int(share * len(data))])
+
+
+def mutated(name: str, way: Any, seed: int) -> Callable[[Path], object]:
+    """A file damaged at random."""
+    return changed(name, lambda data: way(data, np.random.default_rng(seed)))
+
+
+def arrays_changed(name: str, change: Callable[[dict[str, Any]], object]) -> Any:
+    """Changes arrays of a body file behind the back of its checksums, as another program would."""
+
+    def prepare(folder: Path) -> None:
+        with np.load(folder / name) as found:
+            arrays = dict(found)
+        change(arrays)
+        np.savez(folder / name, **arrays)
+
+    return prepare
+
+
+def geometry(line: str) -> Callable[[Path], object]:
+    """One more statement in the geometry of the stock."""
+    return edit("box.geo", "Mesh.MeshSizeMin", f"{line}\nMesh.MeshSizeMin")
 
 
 def by_id(letter: str, cases: Iterable[Case]) -> dict[str, Case]:

@@ -9,7 +9,17 @@ from importlib.util import find_spec
 import numpy as np
 
 import rom
-from generated.case import Silent, Warned, Works, case, edit, require, write
+from generated.case import (
+    Silent,
+    Warned,
+    Works,
+    arrays_changed,
+    case,
+    edit,
+    geometry,
+    require,
+    write,
+)
 from generated.stock import PLANTED, STEEL
 from rom.errors import ConfigError, FileFormatError, ResourceError, UnsafeFileError
 
@@ -51,11 +61,6 @@ def planted(*modules):
     return prepare
 
 
-def geometry(line):
-    """One more statement in the geometry of the stock."""
-    return edit("box.geo", "Mesh.MeshSizeMin", f"{line}\nMesh.MeshSizeMin")
-
-
 def home(folder):
     """The folder as the home of the user, where gmsh looks for its options."""
     os.environ["HOME"] = str(folder)
@@ -63,13 +68,8 @@ def home(folder):
 
 def pickled(member):
     """An object array in the body file."""
-
-    def prepare(folder):
-        with np.load(folder / "good.npz") as found:
-            arrays = dict(found) | {member: np.array([{"a": 1}], dtype=object)}
-        np.savez(folder / "good.npz", **arrays)
-
-    return prepare
+    objects = np.array([{"a": 1}], dtype=object)
+    return arrays_changed("good.npz", lambda arrays: arrays.update({member: objects}))
 
 
 def renamed(member):

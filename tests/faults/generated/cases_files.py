@@ -6,7 +6,7 @@ import numpy as np
 
 import rom
 from cases.files.damage import HOSTILE, WAYS
-from generated.case import Silent, Warned, case, edit, write
+from generated.case import Silent, Warned, arrays_changed, case, changed, cut, edit, mutated, write
 from generated.stock import MATRICES, STEEL
 from rom.errors import (
     ConfigError,
@@ -244,24 +244,6 @@ BYTES = {  # whole documents
 }
 
 
-def cut(name, share):
-    def prepare(folder):
-        data = (folder / name).read_bytes()
-        (folder / name).write_bytes(data[: int(share * len(data))])
-
-    return prepare
-
-
-def mutated(name, k):
-    """Damaged at random, in the way of this number."""
-
-    def prepare(folder):
-        data = (folder / name).read_bytes()
-        (folder / name).write_bytes(WAYS[k % len(WAYS)](data, np.random.default_rng(k)))
-
-    return prepare
-
-
 def repacked(change):
     """The body file with another manifest or other arrays, and right checksums."""
 
@@ -285,30 +267,11 @@ def array(name, f):
 
 
 def raw(name, f):
-    """An array changed behind the back of the checksums, as by another program."""
-
-    def prepare(folder):
-        with np.load(folder / BODY) as found:
-            arrays = dict(found)
-        arrays[name] = f(arrays[name])
-        np.savez(folder / BODY, **arrays)
-
-    return prepare
+    return arrays_changed(BODY, lambda arrays: arrays.update({name: f(arrays[name])}))
 
 
 def reading(name):
     return lambda folder: READERS[name](folder / name)
-
-
-def numbered(name, old, value):
-    """A number of a text file replaced by one of the hostile ones."""
-
-    def prepare(folder):
-        data = (folder / name).read_bytes()
-        assert old in data
-        (folder / name).write_bytes(data.replace(old, value, 1))
-
-    return prepare
 
 
 CASES = [
@@ -328,7 +291,7 @@ CASES = [
     *(case(f"{share:.0%} of {name}", reading(name), READ, name, given=cut(name, share))
       for name in READERS for share in SHARES),
     *(case(f"damaged {name}, {k}", reading(name), (*READ, ConfigError, Silent, Warned), name,
-           given=mutated(name, k)) for name in READERS for k in range(10)),
+           given=mutated(name, WAYS[k % len(WAYS)], k)) for name in READERS for k in range(10)),
     *(case(f"{a} read as {b}", lambda folder, a=a, b=b: READERS[b](folder / a), (*READ, ConfigError), a)
       for a in READERS for b in READERS if READERS[a] is not READERS[b]),
     *(case(f"{name} = {value!r} in a body", f"check {BODY}", READ, BODY, given=entry(name, value))
@@ -352,7 +315,8 @@ CASES = [
           ("another name", edit(f"both.{form}", "KAA", "KXX"), ("KAA", "KXX")),
       )),
     *(case(f"a matrix with a size of {value[:12].decode('latin1')}", LINE, (*FOREIGN, Silent, Warned), "K.mtx",
-           given=numbered("K.mtx", b"36 36", b"36 " + value)) for value in HOSTILE),
+           given=changed("K.mtx", lambda data, value=value: data.replace(b"36 36", b"36 " + value, 1)))
+      for value in HOSTILE),
     case("a matrix of no name", NASTRAN.format("op4").replace(":KAA", ""), FOREIGN, ("KAA", "MAA")),
     case("a mass as stiffness", LINE.replace("K.mtx --mass M.mtx", "M.mtx --mass K.mtx"), FOREIGN,
          ("mass", "K.mtx", "M.mtx")),

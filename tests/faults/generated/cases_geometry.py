@@ -4,7 +4,7 @@ import numpy as np
 
 from cases.files.cells import blocks_of, solid, write_msh
 from cases.files.damage import WAYS
-from generated.case import Silent, Warned, Works, case, edit, require, write
+from generated.case import Silent, Warned, Works, case, cut, edit, geometry, mutated, require, write
 from generated.stock import GEO, deck
 from rom.errors import (
     ConfigError,
@@ -88,11 +88,6 @@ PARAMETERS = {
 }
 
 
-def geometry(line):
-    """One more statement in the geometry."""
-    return edit("box.geo", "Mesh.MeshSizeMin", f"{line}\nMesh.MeshSizeMin")
-
-
 def within(**limits):
     """A mesh within a limit given in Python."""
     return lambda folder: read_mesh(folder / "box.geo", **limits)
@@ -143,26 +138,6 @@ def moved(node, x):
     points = BOX.points.copy()
     points[node] = x
     return msh(points)
-
-
-def mutated(name, way, seed):
-    """A file of the stock, damaged at random."""
-
-    def prepare(folder):
-        data = (folder / name).read_bytes()
-        (folder / name).write_bytes(way(data, np.random.default_rng(seed)))
-
-    return prepare
-
-
-def cut(name, share):
-    """A file of which only this share is there."""
-
-    def prepare(folder):
-        data = (folder / name).read_bytes()
-        (folder / name).write_bytes(data[: int(share * len(data))])
-
-    return prepare
 
 
 def rewritten(version, binary):

@@ -13,7 +13,7 @@ import numpy as np
 
 import rom
 from cases.solid import block
-from generated.case import Silent, Warned, Works, case, edit, require
+from generated.case import Silent, Warned, Works, arrays_changed, case, cut, edit, require
 from generated.stock import KINDS, STEEL, body, model, on_ranks, origin, pendulum
 from rom.errors import (
     ConfigError,
@@ -87,14 +87,6 @@ def complete(folder):
     )
 
 
-def cut(share):
-    def prepare(folder):
-        data = (folder / "good.npz").read_bytes()
-        (folder / "good.npz").write_bytes(data[: int(share * len(data))])
-
-    return prepare
-
-
 def flipped(folder):
     """One bit of the stiffness; one of a date in the archive would harm nothing."""
     with ZipFile(folder / "good.npz") as archive:
@@ -102,16 +94,6 @@ def flipped(folder):
     data = bytearray((folder / "good.npz").read_bytes())
     data[entry.header_offset + 128 + entry.compress_size // 2] ^= 8
     (folder / "good.npz").write_bytes(bytes(data))
-
-
-def repacked(f):
-    def prepare(folder):
-        with np.load(folder / "good.npz") as found:
-            arrays = dict(found)
-        f(arrays)
-        np.savez(folder / "good.npz", **arrays)
-
-    return prepare
 
 
 def relabelled(folder):
@@ -285,16 +267,16 @@ CASES = [
     case("F11 tiny", lambda folder: rom.simulate(pendulum(), t_end=0.1, dt=0.01, tolerance=1e-300),
          (ConfigError, SolverError), "tolerance"),
     case("F11 one", lambda folder: rom.simulate(pendulum(), t_end=0.1, dt=0.01, tolerance=10.0), ConfigError, "tolerance"),
-    *(case(f"G01 {share:.0%}", "check good.npz", FileFormatError, "good.npz", given=cut(share))
+    *(case(f"G01 {share:.0%}", "check good.npz", FileFormatError, "good.npz", given=cut("good.npz", share))
       for share in (0.0, 0.5, 0.999)),
     case("G03", "check good.npz", FileFormatError, "good.npz", given=flipped),
     case("G05", "check good.npz", UnsafeFileError, "good.npz",
-         given=repacked(lambda arrays: arrays.update(K=np.array([{}], dtype=object)))),
+         given=arrays_changed("good.npz", lambda arrays: arrays.update(K=np.array([{}], dtype=object)))),
     case("G11", "check good.npz", Silent, given=relabelled),
     case("G13", "check good.npz", (QualityGateError, FileFormatError), "good.npz",
-         given=repacked(lambda arrays: arrays.update(K=arrays["K"] + np.triu(np.ones_like(arrays["K"]), 1) * 1e9))),
+         given=arrays_changed("good.npz", lambda arrays: arrays.update(K=arrays["K"] + np.triu(np.ones_like(arrays["K"]), 1) * 1e9))),
     case("G15", "check good.npz", (FileFormatError, UnsafeFileError, Warned), "good.npz",
-         given=repacked(lambda arrays: arrays.update(K=arrays["K"].astype(">f8")))),
+         given=arrays_changed("good.npz", lambda arrays: arrays.update(K=arrays["K"].astype(">f8")))),
     case("G17", full_disk, ResourceError, "a.npz"),
     case("G21", "export good.npz a.npz", (Works, ConfigError), "a.npz",
          given=lambda folder: (folder / "a.npz").symlink_to("none.npz")),
