@@ -303,161 +303,134 @@ DEFAULTS = {  # argument -> legal value
     "caption": lambda: "caption",
     "blades": lambda: [blade()] * 6,
 }
-ONE = {"diameter": lambda: 1}
-WHEEL = {"model": lambda: wheel().model}
+
+
+def of_wheel():
+    return {"model": wheel().model}
+
+
 GIVEN = {  # callable -> legal values of its own
-    "bladed_wheel": {"sector": lambda: wheel().parts, "n_waves": lambda: 2},
-    "campbell": {"mechanism": lambda: lambda speed: rotor(speed), "speeds": lambda: [1.0, 2.0]},
-    "check": {"record": body},
-    "check_law": {"mechanism": lawful, "name": lambda: "law"},
-    "craig_bampton": {"K": lambda: model().K, "M": lambda: model().M},
-    "cyclic_modes": {"sector": ring, "diameter": lambda: 1},
-    "wheel_modes": {"sector": ring},
-    "continuation": {"span": lambda: (0.0, 1e-3)},
-    "equilibrium_sensitivity": {
-        "build": lambda: spring,
-        "parameters": lambda: {"stiffness": 2.0},
-        "output": lambda: lambda mech, state: state.q[0],
+    "bladed_wheel": lambda: {"sector": wheel().parts, "n_waves": 2},
+    "campbell": lambda: {"mechanism": lambda speed: rotor(speed), "speeds": [1.0, 2.0]},
+    "check": lambda: {"record": body()},
+    "check_law": lambda: {"mechanism": lawful(), "name": "law"},
+    "craig_bampton": lambda: {"K": model().K, "M": model().M},
+    "cyclic_modes": lambda: {"sector": ring(), "diameter": 1},
+    "wheel_modes": lambda: {"sector": ring()},
+    "continuation": lambda: {"span": (0.0, 1e-3)},
+    "equilibrium_sensitivity": lambda: {
+        "build": spring, "parameters": {"stiffness": 2.0}, "output": lambda mech, state: state.q[0],
     },
-    "export": {"path": lambda: "out.SID_FEM"},
-    "frequency_response": {
-        "frequencies": lambda: [1.0],
-        "force": lambda: marked()[1],
-        "motion": lambda: marked()[1],
+    "export": lambda: {"path": "out.SID_FEM"},
+    "frequency_response": lambda: {
+        "frequencies": [1.0], "force": marked()[1], "motion": marked()[1],
     },
-    "frequency_sensitivity": {"build": lambda: spring, "parameters": lambda: {"stiffness": 2.0}},
-    "heated": WHEEL | {"fixed": lambda: ("bore",)},
-    "heated_sector": WHEEL,
-    "held_solid": WHEEL | {"fixed": lambda: ("bore",)},
-    "inverse_dynamics": {"mechanism": lambda: driven(free=False), "t": lambda: [0.0, 1e-3]},
-    "linearize": {},
-    "periodic_motion": {"period": lambda: 1.0, "steps": lambda: 10},
-    "periodic_path": {
-        "build": lambda: spring,
-        "span": lambda: (1.0, 1.1),
-        "period": lambda: 1.0,
-        "steps": lambda: 10,
+    "frequency_sensitivity": lambda: {"build": spring, "parameters": {"stiffness": 2.0}},
+    "heated": lambda: of_wheel() | {"fixed": ("bore",)},
+    "heated_sector": of_wheel,
+    "held_solid": lambda: of_wheel() | {"fixed": ("bore",)},
+    "inverse_dynamics": lambda: {"mechanism": driven(free=False), "t": [0.0, 1e-3]},
+    "linearize": dict,
+    "periodic_motion": lambda: {"period": 1.0, "steps": 10},
+    "periodic_path": lambda: {"build": spring, "span": (1.0, 1.1), "period": 1.0, "steps": 10},
+    "load": lambda: {"path": "body.rom.npz"},
+    "load_state": lambda: {"path": "state.npz"},
+    "mistuned_wheel": lambda: {"sector": ring()},
+    "modes": lambda: {"n": 1},
+    "motion_sensitivity": lambda: {
+        "result": lambda stiffness: 2 * stiffness, "parameters": {"stiffness": 2.0},
     },
-    "load": {"path": lambda: "body.rom.npz"},
-    "load_state": {"path": lambda: "state.npz"},
-    "mistuned_wheel": {"sector": ring},
-    "modes": {"n": lambda: 1},
-    "motion_sensitivity": {
-        "result": lambda: lambda stiffness: 2 * stiffness,
-        "parameters": lambda: {"stiffness": 2.0},
+    "read_component": lambda: {"path": "body.toml"},
+    "read_mechanism": lambda: {"path": "mechanism.toml"},
+    "read_model": lambda: {
+        "K": "K.mtx", "M": "M.mtx", "nodes": (np.arange(1, 17), model().points),
+        "interfaces": {"root": [1, 2, 3, 4]},
     },
-    "read_component": {"path": lambda: "body.toml"},
-    "read_mechanism": {"path": lambda: "mechanism.toml"},
-    "read_model": {
-        "K": lambda: "K.mtx",
-        "M": lambda: "M.mtx",
-        "nodes": lambda: (np.arange(1, 17), model().points),
-        "interfaces": lambda: {"root": [1, 2, 3, 4]},
+    "read_sid": lambda: {"path": "body.SID_FEM"},
+    "reduce_parametric": lambda: {
+        "model": regions(), "parameters": {"E": rom.YoungsModulus("web", 0.9, 1.1)},
     },
-    "read_sid": {"path": lambda: "body.SID_FEM"},
-    "reduce_parametric": {
-        "model": regions,
-        "parameters": lambda: {"E": rom.YoungsModulus("web", 0.9, 1.1)},
+    "certify_pieces": lambda: {
+        "pieces": pieces(), "models": models_in_a_row(),
+        "nonlinear": rom.Geometric(loads={"tip": (0, 1.0, 0, 0, 0, 0)}),
     },
-    "certify_pieces": {
-        "pieces": pieces, "models": models_in_a_row,
-        "nonlinear": lambda: rom.Geometric(loads={"tip": (0, 1.0, 0, 0, 0, 0)}),
+    "reduce_pieces": lambda: {"models": models_in_a_row(), "reference": "root"},
+    "reduced_blade": lambda: of_wheel() | {"sector": wheel().parts},
+    "release": lambda: {"state": rom.equilibrium(driven())},
+    "rotating_sector": of_wheel,
+    "save": lambda: {"path": "out.rom.npz"},
+    "save_state": lambda: {"path": "out.npz", "state": solution().final},
+    "second_order_balanced_truncation": lambda: {
+        "K": np.diag([1.0, 2.0]), "M": np.eye(2), "D": 0.1 * np.eye(2), "B": np.ones((2, 1)),
+        "C": np.ones((1, 2)), "r": 1,
     },
-    "reduce_pieces": {"models": models_in_a_row, "reference": lambda: "root"},
-    "reduced_blade": WHEEL | {"sector": lambda: wheel().parts},
-    "release": {"state": lambda: rom.equilibrium(driven())},
-    "rotating_sector": WHEEL,
-    "save": {"path": lambda: "out.rom.npz"},
-    "save_state": {"path": lambda: "out.npz", "state": lambda: solution().final},
-    "second_order_balanced_truncation": {
-        "K": lambda: np.diag([1.0, 2.0]),
-        "M": lambda: np.eye(2),
-        "D": lambda: 0.1 * np.eye(2),
-        "B": lambda: np.ones((2, 1)),
-        "C": lambda: np.ones((1, 2)),
-        "r": lambda: 1,
-    },
-    "simulate": {"t_end": lambda: 1e-3, "dt": lambda: 1e-3},
-    "snapshot": {"state": lambda: rom.equilibrium(driven())},
-    "spin_up": WHEEL | {"speed": lambda: 10.0, "n_states": lambda: 2},
-    "substructured_sector": WHEEL,
-    "supported_sector": {
-        "face": lambda: wheel().model.interfaces["bore"], "across": lambda: 1.0
-    },
-    "surface_load": {"pressure": lambda: 1.0},
-    "thermal_buckling": WHEEL | {"fixed": lambda: ("bore",)},
-    "transmissibility": {
-        "frequencies": lambda: [1.0], "drive": lambda: "shaker", "motion": lambda: marked()[1]
-    },
-    "travelling_modes": {"sector": spinning, "diameter": lambda: 2, "speed": lambda: 0.1},
-    "update": {"family": family, "test": measured},
-    "wheel_campbell": {"sector": spinning, "diameter": lambda: 2, "speeds": lambda: [0.1, 0.2]},
-    "write_animation": {"path": lambda: "out.glb", "frames": lambda: 2},
-    "write_body_fmu": {"path": lambda: "nowhere/out.fmu"},
-    "write_fmu": {"path": lambda: "out.fmu", "script": lambda: "none.py", "dt": lambda: 1e-3},
-    "write_mechanism_fmu": {
-        "file": mechanism_file,
-        "path": lambda: "out.fmu",
-    },
-    "write_history": {"path": lambda: "out.csv"},
-    "write_report": {"path": lambda: "out.html", "sections": lambda: {"numbers": ["text"]}},
-    "write_stress": {"path": lambda: "out.vtu", "q": lambda: np.zeros(body().n_modes)},
-    "write_stress_history": {"path": lambda: "out.pvd", "body": lambda: "beam"},
+    "simulate": lambda: {"t_end": 1e-3, "dt": 1e-3},
+    "snapshot": lambda: {"state": rom.equilibrium(driven())},
+    "spin_up": lambda: of_wheel() | {"speed": 10.0, "n_states": 2},
+    "substructured_sector": of_wheel,
+    "supported_sector": lambda: {"face": wheel().model.interfaces["bore"], "across": 1.0},
+    "surface_load": lambda: {"pressure": 1.0},
+    "thermal_buckling": lambda: of_wheel() | {"fixed": ("bore",)},
+    "transmissibility": lambda: {"frequencies": [1.0], "drive": "shaker", "motion": marked()[1]},
+    "travelling_modes": lambda: {"sector": spinning(), "diameter": 2, "speed": 0.1},
+    "update": lambda: {"family": family(), "test": measured()},
+    "wheel_campbell": lambda: {"sector": spinning(), "diameter": 2, "speeds": [0.1, 0.2]},
+    "write_animation": lambda: {"path": "out.glb", "frames": 2},
+    "write_body_fmu": lambda: {"path": "nowhere/out.fmu"},
+    "write_fmu": lambda: {"path": "out.fmu", "script": "none.py", "dt": 1e-3},
+    "write_mechanism_fmu": lambda: {"file": mechanism_file(), "path": "out.fmu"},
+    "write_history": lambda: {"path": "out.csv"},
+    "write_report": lambda: {"path": "out.html", "sections": {"numbers": ["text"]}},
+    "write_stress": lambda: {"path": "out.vtu", "q": np.zeros(body().n_modes)},
+    "write_stress_history": lambda: {"path": "out.pvd", "body": "beam"},
     # methods
-    "Assembly.reduced": {"n_interface": lambda: 3},
-    "Basis.project": {"A": lambda: np.eye(2)},
-    "BladedWheel.of_blades": {"Phi": lambda: bladed().modes([blade()] * 6)[1]},
-    "BladedWheel.waves": {"speed": lambda: 0.0},
-    "BladedWheel.response": {
-        "force": lambda: np.zeros(blade().Psi.shape[0]), "engine_order": lambda: 1,
-        "omega": lambda: [1.0], "damping": lambda: 0.01, "at": lambda: [0],
+    "Assembly.reduced": lambda: {"n_interface": 3},
+    "Basis.project": lambda: {"A": np.eye(2)},
+    "BladedWheel.of_blades": lambda: {"Phi": bladed().modes([blade()] * 6)[1]},
+    "BladedWheel.waves": lambda: {"speed": 0.0},
+    "BladedWheel.response": lambda: {
+        "force": np.zeros(blade().Psi.shape[0]), "engine_order": 1, "omega": [1.0], "damping": 0.01,
+        "at": [0],
     },
-    "BladedWheel.amplification": {
-        "force": lambda: np.ones(blade().Psi.shape[0]), "engine_order": lambda: 1,
-        "omega": lambda: [1.0], "damping": lambda: 0.01, "at": lambda: [0],
+    "BladedWheel.amplification": lambda: {
+        "force": np.ones(blade().Psi.shape[0]), "engine_order": 1, "omega": [1.0], "damping": 0.01,
+        "at": [0],
     },
-    "BodyFamily.with_reference": {"reference": lambda: "root"},
-    "Characteristic.kinds": {"connection": lambda: connect(operators(), model(), {"root": "full"})},
-    "CyclicSector.from_model": WHEEL,
-    "CyclicSector.*": {"diameter": lambda: 1, "shapes": lambda: waves().shapes},
-    "FlexibleBody.with_reference": {"reference": lambda: "root"},
-    "FlexibleBody.rotating_frequencies": {"speed": lambda: 1.0, "axis": lambda: Z},
-    "FlexibleBody.marker": {"name": lambda: "root"},
-    "FlexibleBody.equilibria": {"loads": lambda: {"tip": (1.0, 0, 0, 0, 0, 0)}},
-    "FlexibleBody.beyond_range": {"q": lambda: np.zeros((1, body().n_modes))},
-    "FlexibleBody.critical_loads": {"loads": lambda: {"tip": (1.0, 0, 0, 0, 0, 0)}},
-    "FlexibleBody.forces_on": {"loads": lambda: {"tip": (1.0, 0, 0, 0, 0, 0)}},
-    "FlexibleBody.mean_rows": {"fixed": lambda: {"tip": "x"}},
-    "FlexibleBody.in_units": {"units": lambda: "mm-t-s"},
-    "Material.from_units": {
-        "units": lambda: "mm-t-s", "E": lambda: 210e3, "nu": lambda: 0.3, "rho": lambda: 7.85e-9
+    "BodyFamily.with_reference": lambda: {"reference": "root"},
+    "Characteristic.kinds": lambda: {"connection": connect(operators(), model(), {"root": "full"})},
+    "CyclicSector.from_model": of_wheel,
+    "CyclicSector.*": lambda: {"diameter": 1, "shapes": waves().shapes},
+    "FlexibleBody.with_reference": lambda: {"reference": "root"},
+    "FlexibleBody.rotating_frequencies": lambda: {"speed": 1.0, "axis": Z},
+    "FlexibleBody.marker": lambda: {"name": "root"},
+    "FlexibleBody.equilibria": lambda: {"loads": {"tip": (1.0, 0, 0, 0, 0, 0)}},
+    "FlexibleBody.beyond_range": lambda: {"q": np.zeros((1, body().n_modes))},
+    "FlexibleBody.critical_loads": lambda: {"loads": {"tip": (1.0, 0, 0, 0, 0, 0)}},
+    "FlexibleBody.forces_on": lambda: {"loads": {"tip": (1.0, 0, 0, 0, 0, 0)}},
+    "FlexibleBody.mean_rows": lambda: {"fixed": {"tip": "x"}},
+    "FlexibleBody.in_units": lambda: {"units": "mm-t-s"},
+    "Material.from_units": lambda: {"units": "mm-t-s", "E": 210e3, "nu": 0.3, "rho": 7.85e-9},
+    "Orthotropic.from_units": lambda: {
+        "units": "mm-t-s", "E": (1e3,) * 3, "nu": (0.3,) * 3, "G": (4e2,) * 3, "rho": 1e-9,
     },
-    "Orthotropic.from_units": {
-        "units": lambda: "mm-t-s", "E": lambda: (1e3,) * 3, "nu": lambda: (0.3,) * 3,
-        "G": lambda: (4e2,) * 3, "rho": lambda: 1e-9,
+    "FourierLegendre.functions": lambda: {"interface": model().interfaces["root"]},
+    "Pieces.add_to": lambda: {"mech": rom.Mechanism(), "name": "beam"},
+    "Polynomial.functions": lambda: {"interface": model().interfaces["root"]},
+    "Heat.on": of_wheel,
+    "Heat.described": lambda: {"share": 0.5},
+    "MistunedWheel.*": lambda: {
+        "deviations": np.zeros(4), "force": [0.0, 1.0, 0.0], "engine_order": 1, "omega": [1.0],
+        "damping": 0.01, "at": [1],
     },
-    "FourierLegendre.functions": {"interface": lambda: model().interfaces["root"]},
-    "Pieces.add_to": {"mech": rom.Mechanism, "name": lambda: "beam"},
-    "Polynomial.functions": {"interface": lambda: model().interfaces["root"]},
-    "Heat.on": WHEEL,
-    "Heat.described": {"share": lambda: 0.5},
-    "MistunedWheel.*": {
-        "deviations": lambda: np.zeros(4), "force": lambda: [0.0, 1.0, 0.0],
-        "engine_order": lambda: 1, "omega": lambda: [1.0], "damping": lambda: 0.01,
-        "at": lambda: [1],
-    },
-    "ModalDamping.matrix": {},
-    "ReducedSpinUp.at": {"speed": lambda: 5.0},
-    **{f"{kind}.{name}": {"speed": lambda: 5.0} | diameter
+    "ModalDamping.matrix": dict,
+    "ReducedSpinUp.at": lambda: {"speed": 5.0},
+    **{f"{kind}.{name}": lambda more=more: {"speed": 5.0} | more
        for kind in ("SpinUp", "ReducedSpinUp")
-       for name, diameter in (("modes", ONE), ("waves", ONE), ("weights", {}))},
-    "SpinUp.at": {"speed": lambda: 5.0},
-    "SpinUp.displacement": {"speed": lambda: 5.0},
-    "Solution.*": {
-        "body": lambda: "arm", "t": lambda: 1e-3, "marker": lambda: "a", "instant": lambda: 0,
-        "name": lambda: "hinge",
-    },
-    "Solution.drive_load": {"name": lambda: "shaker"},
+       for name, more in (("modes", {"diameter": 1}), ("waves", {"diameter": 1}), ("weights", {}))},
+    "SpinUp.at": lambda: {"speed": 5.0},
+    "SpinUp.displacement": lambda: {"speed": 5.0},
+    "Solution.*": lambda: {"body": "arm", "t": 1e-3, "marker": "a", "instant": 0, "name": "hinge"},
+    "Solution.drive_load": lambda: {"name": "shaker"},
 }  # fmt: skip
 READERS = {"load", "load_state", "read_model", "read_sid"}  # of files that must be there
 NEEDS = {  # callables whose arguments only finite elements can make
@@ -584,13 +557,10 @@ def parameters(function):
 
 def given(label, function):
     """Legal arguments of a function."""
-    owner = label.partition(".")[0]
-    own = {**GIVEN.get(f"{owner}.*", {}), **GIVEN.get(label, {})}
+    own = GIVEN.get(label, dict)()
+    known = GIVEN.get(f"{label.partition('.')[0]}.*", dict)() | own
     needed = [p.name for p in parameters(function) if p.default is p.empty]
-    return {
-        name: (own[name] if name in own else DEFAULTS[name])()
-        for name in {*needed, *GIVEN.get(label, ())}
-    }
+    return {name: known[name] if name in known else DEFAULTS[name]() for name in {*needed, *own}}
 
 
 @cache
