@@ -212,7 +212,8 @@ def _path(build: Builder, values: dict[str, float], name: str, state: State) -> 
         sides.append((sign, mechanism, now))
     tangent = Tangent.of(instant(build(**values), state.t), state, AT_REST)
     forces, gaps = ([f(now) for _, _, now in sides] for f in _balance_of(state))
-    change = _answer(tangent, (forces[1] - forces[0]) / 2, (gaps[1] - gaps[0]) / 2)
+    force, gap = tangent.T.T @ (forces[1] - forces[0]) / 2, (gaps[1] - gaps[0]) / 2
+    change = replace(tangent, r=force, gap=gap).balanced()
     moved = []
     for sign, mechanism, now in sides:
         q = now.shifted(state.q, sign * change[0])
@@ -226,19 +227,6 @@ def _balance_of(state: State) -> tuple[Callable[[Instant], Array], Callable[[Ins
         lambda now: now.residual(state.q, state.v, state.a, state.lam),
         lambda now: now.gradient(state.q, state.v)[0],
     )
-
-
-def _answer(tangent: Tangent, force: Array, gap: Array) -> tuple[Array, Array]:
-    """Change of coordinates (n,) and multipliers (m,) that balances a force and closes a gap."""
-    scale = tangent.now.probe()
-    A = tangent.G * scale
-    rows = np.maximum(np.linalg.norm(A, axis=1), 1e-300)
-    shift = np.linalg.lstsq(A / rows[:, None], -gap / rows, rcond=1e-9)[0] * scale
-    force = tangent.T.T @ force
-    K = tangent.Z.T @ tangent.K @ tangent.Z
-    shift = shift - tangent.Z @ np.linalg.solve(K, tangent.Z.T @ (force + tangent.K @ shift))
-    reaction = np.linalg.lstsq(A.T, -(force + tangent.K @ shift) * scale, rcond=1e-9)[0]
-    return tangent.T @ shift, reaction
 
 
 def _matrices(_: Mechanism, now: Instant, state: State) -> Array:

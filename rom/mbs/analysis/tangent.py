@@ -90,6 +90,10 @@ class Tangent:
             return self.newton
         return self._answered(self._downhill)
 
+    def balanced(self) -> tuple[Array, Array]:
+        """(n,), (m,) variations that balance the forces and close the gaps."""
+        return self._answered(lambda force: -np.linalg.solve(self.Z.T @ self.K @ self.Z, force))
+
     @cached_property
     def newton(self) -> tuple[Array, Array] | None:
         """Newton's correction, upwards or downhill; None where a motion has no stiffness."""
@@ -97,7 +101,7 @@ class Tangent:
         if np.abs(squares).min(initial=np.inf) <= self.none(squares):
             return None
         try:
-            return self._answered(lambda force: -np.linalg.solve(self.Z.T @ self.K @ self.Z, force))
+            return self.balanced()
         except np.linalg.LinAlgError:  # films that start to fill: forces without a potential
             return None
 
