@@ -3,6 +3,8 @@
 import hashlib
 import json
 import zipfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from tokenize import TokenError
 from typing import Any, NamedTuple
@@ -10,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.lib import format as npy
 
-from rom.errors import FileFormatError, QualityGateError, UnsafeFileError
+from rom.errors import ConfigError, FileFormatError, QualityGateError, UnsafeFileError
 from rom.io.files import MAX_FILE_BYTES, check_readable, write_whole
 from rom.model import Array
 from rom.names import named
@@ -106,6 +108,19 @@ def read_archive(
         if manifest["sha256"][name] != digest(A):
             raise FileFormatError(f"the array {name!r} was changed after writing.", where=str(path))
     return manifest, arrays
+
+
+@contextmanager
+def stated(path: str | Path) -> Iterator[None]:
+    """Turn what a wrong manifest causes into an error that names the file."""
+    try:
+        yield
+    except ConfigError as error:
+        raise FileFormatError(error.message, where=str(path), hint=error.hint) from error
+    except (KeyError, TypeError, ValueError, AttributeError, IndexError) as error:
+        raise FileFormatError(
+            f"the manifest lacks or misstates {error}.", where=str(path)
+        ) from error
 
 
 def digest(A: Array) -> str:

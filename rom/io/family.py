@@ -13,7 +13,7 @@ from rom.body.inertia import InertiaIntegrals
 from rom.body.recovery import StressRecovery
 from rom.errors import FileFormatError
 from rom.io import native
-from rom.io.archive import MAX_BYTES, Kind, write_archive
+from rom.io.archive import MAX_BYTES, Kind, stated, write_archive
 from rom.model import Array, Report, Row
 from rom.parametric.family import BodyFamily, Share
 from rom.parametric.layers import Stretch
@@ -94,12 +94,12 @@ def load(path: str | Path, *, limit: int = MAX_BYTES) -> Any:
         {native.SCHEMA_NAME: native.VERSION, SCHEMA_NAME: VERSION}, "body file", native.FIELDS
     )
     manifest, arrays = native.read_finite(path, known, limit)
-    with native.stated(path):
+    with stated(path):
         body = native.body_of(manifest, arrays)
     native.verify(body, path)
     if manifest["schema"] == native.SCHEMA_NAME:
         return body
-    with native.stated(path):
+    with stated(path):
         family = _family(manifest, arrays, body)
     _verify(family, path)
     return family

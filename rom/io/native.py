@@ -4,8 +4,6 @@ The manifest is a JSON text stored as bytes: schema and version, units, names, p
 certificate, and the SHA-256 of every array. A reader needs NumPy and this page only.
 """
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -20,7 +18,7 @@ from rom.body.nonlinear.sampled import Sampled
 from rom.body.records import Marker, Patch, Surface
 from rom.body.recovery import StressRecovery
 from rom.errors import ConfigError, FileFormatError, QualityGateError
-from rom.io.archive import MAX_BYTES, Kind, read_archive, write_archive
+from rom.io.archive import MAX_BYTES, Kind, read_archive, stated, write_archive
 from rom.model import Array, Report, Row
 from rom.names import named
 from rom.units import SYSTEMS
@@ -81,19 +79,6 @@ def read_finite(path: Path, kind: Kind, limit: int) -> tuple[dict[str, Any], dic
         if not np.isfinite(A).all():
             raise QualityGateError(f"{name} holds a number that is not finite.", where=str(path))
     return manifest, arrays
-
-
-@contextmanager
-def stated(path: Path) -> Iterator[None]:
-    """Turn what a wrong manifest causes into an error that names the file."""
-    try:
-        yield
-    except ConfigError as error:
-        raise FileFormatError(error.message, where=str(path), hint=error.hint) from error
-    except (KeyError, TypeError, ValueError, AttributeError, IndexError) as error:
-        raise FileFormatError(
-            f"the manifest lacks or misstates {error}.", where=str(path)
-        ) from error
 
 
 def body_arrays(body: FlexibleBody) -> dict[str, Array]:

@@ -16,7 +16,7 @@ import numpy as np
 
 from rom.arguments import typed
 from rom.errors import ConfigError, FileFormatError
-from rom.io.archive import Kind, digest, read_archive, write_archive
+from rom.io.archive import Kind, digest, read_archive, stated, write_archive
 from rom.mbs.equations.packing import Packed
 from rom.mbs.integrate.events import Noted
 from rom.mbs.kernels.tables import Table
@@ -119,15 +119,11 @@ class Keeping:
             FileFormatError: if a file is damaged.
         """
         manifest, arrays = read_archive(self.state, STATE)
-        try:
+        with stated(self.state):
             digests, (origin, taken) = manifest["digests"], manifest["counted"]
             self._parts = int(manifest["parts"])
             origin = None if origin is None else float.fromhex(origin)
             noted = _noted(manifest["signs"], arrays)
-        except (KeyError, TypeError, ValueError, AttributeError) as error:
-            raise FileFormatError(
-                f"the manifest lacks or misstates {error}.", where=str(self.state)
-            ) from error
         self._refuse_others(digests)
         state = unpacked_state(manifest, arrays, self.state)
         if state.memory is None:

@@ -4,8 +4,8 @@ from pathlib import Path
 from typing import Any
 
 from rom.arguments import typed
-from rom.errors import ConfigError, FileFormatError
-from rom.io.archive import MAX_BYTES, Kind, read_archive, write_archive
+from rom.errors import ConfigError
+from rom.io.archive import MAX_BYTES, Kind, read_archive, stated, write_archive
 from rom.mbs.results.state import Memory, State
 from rom.model import Array
 
@@ -71,20 +71,12 @@ def unpacked_state(manifest: dict[str, Any], arrays: dict[str, Array], path: str
     Raises:
         FileFormatError: if something is missing.
     """
-    try:
+    with stated(path):
         fields: dict[str, Any] = {name: arrays[name] for name in NEEDED_FIELDS}
         fields |= {name: arrays.get(name) for name in OPTIONAL_FIELDS}
         memory = _memory(manifest.get("memory"), arrays)
         t, rank = float.fromhex(manifest["t"]), int(manifest["rank"])
         return State(t=t, rank=rank, **fields, memory=memory)
-    except ConfigError as error:  # of the state itself, which knows of no file
-        raise FileFormatError(
-            f"the manifest lacks or misstates it: {error.message}", where=str(path)
-        ) from error
-    except (KeyError, TypeError, ValueError) as error:
-        raise FileFormatError(
-            f"the manifest lacks or misstates {error}.", where=str(path)
-        ) from error
 
 
 def _memory(manifest: dict[str, Any] | None, arrays: dict[str, Array]) -> Memory | None:
