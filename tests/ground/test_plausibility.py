@@ -113,6 +113,7 @@ DAMPING = {
     "negative": (-0.01, ConfigError, "-0.01 is negative"),
     "no number": (float("nan"), ConfigError, "must be finite numbers"),
     "infinite": (float("inf"), ConfigError, "must be finite numbers"),
+    "just beyond one": (1.01, ConfigError, "1.01 per cent write 0.0101"),
     "strong": (0.5, None, "0.5"),
 }
 
