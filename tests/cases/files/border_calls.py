@@ -347,6 +347,7 @@ GIVEN = {  # callable -> legal values of its own
         "interfaces": {"root": [1, 2, 3, 4]},
     },
     "read_sid": lambda: {"path": "body.SID_FEM"},
+    "reduce": lambda: {"method": rom.Guyan(), "interfaces": KINDS, "certify": False},
     "reduce_parametric": lambda: {
         "model": regions(), "parameters": {"E": rom.YoungsModulus("web", 0.9, 1.1)},
     },
