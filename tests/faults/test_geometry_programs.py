@@ -45,6 +45,8 @@ STARTERS = {
     "with a text kept": {"box.geo": BOX + 'c = "touch pwned";\nSystemCall Str(c);\n'},
     "spelt from texts": {"box.geo": BOX + 'S2N[StrCat("System", "Call")] "touch pwned";\n'},
     "spelt at length": {"box.geo": BOX + 'StringToName["SystemCall"] "touch pwned";\n'},
+    "in brackets": {"box.geo": BOX + 'SystemCall("touch pwned");\n'},
+    "behind a text of slashes": {"box.geo": BOX + 'Printf("a // b"); ' + TOUCH},
     "in a branch": {"box.geo": BOX + f"If (1)\n{TOUCH}EndIf\n"},
     "in a loop": {"box.geo": BOX + f"For i In {{1:2}}\n{TOUCH}EndFor\n"},
     "in a macro": {"box.geo": BOX + f"Macro go\n{TOUCH}Return\nCall go;\n"},

@@ -4,7 +4,6 @@ import io
 import json
 import os
 import zipfile
-from importlib.util import find_spec
 
 import numpy as np
 
@@ -20,45 +19,11 @@ from generated.case import (
     require,
     write,
 )
-from generated.stock import PLANTED, STEEL
-from rom.errors import ConfigError, FileFormatError, ResourceError, UnsafeFileError
+from generated.stock import STEEL
+from rom.errors import ConfigError, FileFormatError, UnsafeFileError
 
-PLANT = (
-    f"import os\nopen(os.path.join({{folder!r}}, {PLANTED!r}), 'w').close()\nraise SystemExit(9)"
-)
-MESHING = ("numpy", "json", "resource", "signal", "tempfile", "gmsh", "random", "struct", "rom",
-           "sitecustomize", "usercustomize", "logging", "re", "ctypes")  # fmt: skip
-DRAWING = ("numpy", "pyvista", "vtk", "matplotlib", "json", "rom")
-SHELLS = {  # how a geometry of gmsh runs a program, or writes a file
-    "SystemCall": 'SystemCall "touch pwned";',
-    "NonBlockingSystemCall": 'NonBlockingSystemCall "touch pwned";',
-    "SystemCall in brackets": 'SystemCall("touch pwned");',
-    "SystemCall in a branch": 'If (1)\n  SystemCall "touch pwned";\nEndIf',
-    "SystemCall after a comment": '/* a */ SystemCall "touch pwned"; // b',
-    "SystemCall in a macro": 'Macro m\n  SystemCall "touch pwned";\nReturn\nCall m;',
-    "SystemCall over two lines": 'SystemCall\n  "touch pwned";',
-    "SystemCall behind a string": 'Printf("a // b"); SystemCall "touch pwned";',
-    "SystemCall from a string": 's = Str("touch pwned"); SystemCall s;',
-    "OnelabRun": 'OnelabRun("touch", "touch pwned");',
-}
-WRITES = {
-    "Printf into a file": 'Printf("a") > "pwned";',
-    "Printf behind a file": 'Printf("a") >> "pwned";',
-    "Save": 'Save "pwned.msh";',
-    "Print": 'Print "pwned.msh";',
-    "CreateDir": 'CreateDir "pwned";',
-}
+SHELL = 'SystemCall "touch pwned";'
 OPENED = (UnsafeFileError, FileFormatError)
-
-
-def planted(*modules):
-    """Modules of these names that leave a file when they are imported."""
-
-    def prepare(folder):
-        for name in modules:
-            (folder / f"{name}.py").write_text(PLANT.format(folder=str(folder)))
-
-    return prepare
 
 
 def home(folder):
@@ -104,28 +69,10 @@ def compiled(folder):
 
 TRUST = ("trust",)
 CASES = [
-    *(case(f"{len(names)} modules beside {name}", f"mesh {name}", Silent, given=planted(*names), fe=True)
-      for name, names in {"box.msh": MESHING, "box.inp": (*MESHING, "meshio"), "box.geo": MESHING}.items()),
-    *(case(f"{name}.py beside a mesh", "mesh box.msh", Silent, given=planted(name), fe=True)
-      for name in ("numpy", "gmsh", "rom", "sitecustomize")),
-    case("all of them beside a picture", "view good.npz -o a.png",
-         Silent if find_spec("pyvista") else ResourceError, given=planted(*DRAWING), seconds=40),
-    case("all of them beside a report", "report good.npz -o a.html", Silent,
-         given=planted(*DRAWING), seconds=40),
-    *(case(f"{name} in a geometry", "mesh box.geo", UnsafeFileError, name.split()[0],
-           given=geometry(line), fe=True) for name, line in SHELLS.items()),
-    *(case(f"{name} in a geometry", "mesh box.geo", (UnsafeFileError, Works), name.split()[0],
-           given=geometry(line), fe=True) for name, line in WRITES.items()),
-    case("a geometry that speaks of SystemCall in a comment", "mesh box.geo", Silent,
-         given=geometry("// SystemCall is refused"), fe=True),
-    case("SystemCall in an included file", "mesh box.geo", UnsafeFileError, "SystemCall",
-         given=(geometry('Include "more.geo";'), write("more.geo", SHELLS["SystemCall"] + "\n")),
-         fe=True),
-    case("SystemCall in a merged file", "mesh box.geo", UnsafeFileError, ("SystemCall", "Merge"),
-         given=(geometry('Merge "more.geo";'), write("more.geo", SHELLS["SystemCall"] + "\n")),
-         fe=True),
+    case("SystemCall in a geometry", "mesh box.geo", UnsafeFileError, "SystemCall",
+         given=geometry(SHELL), fe=True),
     *(case(f"{name} beside a mesh", "mesh box.msh", Silent, fe=True,
-           given=(home, write(name, SHELLS["SystemCall"] + "\n")))
+           given=(home, write(name, f"{SHELL}\n")))
       for name in ("box.msh.opt", ".gmshrc", ".gmsh-options")),
     case("a builder, rom mesh", "mesh build.py", UnsafeFileError, *TRUST, fe=True),
     case("a builder, rom modes", f"modes build.py {STEEL}", UnsafeFileError, *TRUST, fe=True),

@@ -17,14 +17,7 @@ from rom.errors import (
 )
 from rom.fe.mesh.read import read_mesh
 
-ENDLESS = {
-    "a loop": "For i In {1 : 1e9}\n  x = Sqrt(i);\nEndFor",
-    "loops in loops": "For i In {1 : 1e5}\nFor j In {1 : 1e5}\n  x = i + j;\nEndFor\nEndFor",
-    "a macro that calls itself": "Macro m\n  x = 1;\n  Call m;\nReturn\nCall m;",
-    "a file that includes itself": 'Include "box.geo";',
-}
 LARGE = {
-    "a tiny element size": "lc = 1e-4;",
     "a list that grows": "x() = {1 : 1e5};\nFor i In {1 : 1e5}\n  x() = {x(), x()};\nEndFor",
     "a huge list": "x() = {1 : 4e9};",
 }
@@ -182,8 +175,6 @@ def valid(name):
 FORMS = {"2.2 in ASCII": (2.2, 0), "2.2 binary": (2.2, 1), "4.1 in ASCII": (4.1, 0),
          "4.1 binary": (4.1, 1)}  # fmt: skip
 CASES = [
-    *(case(name, "mesh box.geo --time-limit 1", (ResourceError, FileFormatError), "box.geo", fe=True,
-           given=geometry(line)) for name, line in ENDLESS.items()),
     *(case(f"{name} within time", "mesh box.geo --time-limit 1", (ResourceError, FileFormatError),
            "box.geo", fe=True, given=geometry(line)) for name, line in LARGE.items()),
     case("a huge list within memory", "mesh box.geo --memory-limit 0.7 --time-limit 5",
