@@ -22,8 +22,12 @@ def skew(a: npt.ArrayLike) -> Array:
 
 def axial(S: npt.ArrayLike) -> Array:
     """(3,) vector of the skew part of a (3, 3) matrix, in the units of it; inverse of `skew`."""
-    S = np.asarray(S, dtype=float)
-    return 0.5 * np.array([S[2, 1] - S[1, 2], S[0, 2] - S[2, 0], S[1, 0] - S[0, 1]])
+    return 0.5 * crossed(np.asarray(S, dtype=float).T)
+
+
+def crossed(S: Array) -> Array:
+    """(3, ...) integral of u x v from the (3, 3, ...) integrals of u_a v_b, in their units."""
+    return np.array([S[1, 2] - S[2, 1], S[2, 0] - S[0, 2], S[0, 1] - S[1, 0]])
 
 
 def matrix(p: npt.ArrayLike) -> Array:
@@ -52,7 +56,7 @@ def quaternion(A: npt.ArrayLike) -> Array:
     p = np.empty(4)
     if k == 0:
         p[0] = 1 + squares[0]
-        p[1:] = A[2, 1] - A[1, 2], A[0, 2] - A[2, 0], A[1, 0] - A[0, 1]
+        p[1:] = crossed(A.T)
     else:
         i = k - 1
         j, m = (i + 1) % 3, (i + 2) % 3

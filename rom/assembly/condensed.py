@@ -22,6 +22,7 @@ from scipy.linalg import block_diag, eigh
 from rom.arguments import lowest, whole
 from rom.eigen.verbs import whole_clusters
 from rom.model import Array, Modes, Report
+from rom.reduction.bases.selection import reduced_modes
 
 RANK_RTOL = 1e-10  # singular value, of the largest one, below which rows or functions are dependent
 RIGID_RTOL = 1e-13  # eigenvalue of a motion without stiffness, of the largest one
@@ -88,11 +89,10 @@ def natural_modes(M: Array, K: Array, n_rigid: int) -> tuple[Array, Array]:
     """Frequencies (m,) [rad/s], exactly zero for rigid motions, and mass-normalised shapes."""
     if not M.size:
         return np.zeros(0), M
-    scale = 1 / np.sqrt(np.diag(M))
-    lam, V = eigh(scale[:, None] * K * scale, scale[:, None] * M * scale)
+    lam, V = reduced_modes(K, M)
     omega = np.sqrt(np.maximum(lam, 0.0))
     omega[:n_rigid] = 0.0
-    return omega, scale[:, None] * V
+    return omega, V
 
 
 def per_body(widths: dict[str, int], shapes: Array) -> dict[str, Array]:

@@ -20,7 +20,7 @@ from rom.body.records import Body, BodyData, Marker
 from rom.errors import ConfigError, ModelError
 from rom.model import Array
 from rom.plausible import far_doubt
-from rom.rotation import skew
+from rom.rotation import crossed, skew
 
 # The frame of Tisserand carries no momentum of the deformation, that of Buckens keeps its mean
 # square smallest; linearised, both say that the shapes are orthogonal to rigid motion in the mass.
@@ -110,9 +110,7 @@ def rigid_mass(body: BodyData) -> Array:
 
 def rigid_elastic(body: BodyData) -> Array:
     """(6, r) coupling of rigid and elastic coordinates: momentum and angular momentum of shapes."""
-    X = body.Ibar_kl
-    angular = np.array([X[1, 2] - X[2, 1], X[2, 0] - X[0, 2], X[0, 1] - X[1, 0]])
-    return np.vstack([body.S, angular])
+    return np.vstack([body.S, crossed(body.Ibar_kl)])
 
 
 def moved_frame(body: Body, X: Array) -> Body:

@@ -11,6 +11,7 @@ from rom.body.stiffening import SecondOrder
 from rom.eigen.supports import Fixed, held_coordinates, supports
 from rom.errors import ConfigError, ModelError, warn
 from rom.model import Array
+from rom.rotation import crossed
 
 GROWTH_RATE_RTOL = 1e-6  # growth rate of an unstable motion, of the largest frequency
 
@@ -95,9 +96,7 @@ def rotating_matrices(
     load = a_origin @ body.S + _centrifugal(body.Ibar_kl, w)
     for name, wrench in _reactions(body, load, held or {}).items():
         K -= np.einsum("p,pkl->kl", wrench, psi.markers[name])
-    S = body.S_kl
-    dual = np.array([S[1, 2] - S[2, 1], S[2, 0] - S[0, 2], S[0, 1] - S[1, 0]])
-    return 0.5 * (K + K.T), 2 * np.einsum("c,clk->kl", w, dual)
+    return 0.5 * (K + K.T), 2 * np.einsum("c,clk->kl", w, crossed(body.S_kl))
 
 
 def _centrifugal(S: Array, w: Array) -> Array:

@@ -33,6 +33,7 @@ from rom.body.recovery import AXIS_NAMES, CENTRIFUGAL_LOADS, PRODUCTS
 from rom.body.reference import moved_integrals, moved_marker, reference_motion, skew_tensor
 from rom.errors import ConfigError
 from rom.model import Array
+from rom.rotation import crossed
 
 ROUND_OFF = 1e-11  # of the largest displacement of second order
 ANGULAR_LOADS = tuple(f"domega_{axis}" for axis in AXIS_NAMES)
@@ -119,8 +120,7 @@ class SecondOrder:
             load: _product(X, i, j)
             for (i, j), load in zip(PRODUCTS, CENTRIFUGAL_LOADS, strict=True)
         }
-        twist = (X[1, 2] - X[2, 1], X[2, 0] - X[0, 2], X[0, 1] - X[1, 0])
-        K |= dict(zip(ANGULAR_LOADS, twist, strict=True))
+        K |= dict(zip(ANGULAR_LOADS, crossed(X), strict=True))
         for name, motion in self.markers.items():
             K |= dict(zip(interface_loads(name), -motion, strict=True))
         return {load: 0.5 * (A + A.T) for load, A in K.items() if np.any(A)}

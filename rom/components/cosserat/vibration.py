@@ -32,11 +32,6 @@ class Vibrations(Modes):
         shapes: (6 N + 9, n) increments, complex in rotation; order of `statics.clamped`.
     """
 
-    def translations(self) -> Array:
-        """(N + 1, 3, m) displacements of the vertices in world axes, in units of the shapes."""
-        padded = np.concatenate([self.shapes, np.zeros_like(self.shapes[:3])])
-        return padded.reshape(-1, 6, padded.shape[1])[:-1, 3:]
-
 
 def lumped_mass(rod: Rod) -> Array:
     """(6 N + 9,) diagonal of the mass matrix, section axes for rotations [kg], [kg m^2]."""

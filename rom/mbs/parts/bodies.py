@@ -274,13 +274,11 @@ def _check_mass(part: Part) -> None:
 
 def mass_at_rest(part: Part) -> Array:
     """(6 + r, 6 + r) mass matrix of the undeformed body in its frame."""
-    x, y, z = part.first
-    d = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    d = rotation.skew(part.first)
     J = np.trace(part.second) * np.eye(3) - part.second
     rigid = np.block([[part.mass * np.eye(3), -d], [d, J]])
     if part.flexible is None:
         return rigid
-    B = np.asarray(part.moving.Ibar_kl)
-    Cr = np.array([B[1, 2] - B[2, 1], B[2, 0] - B[0, 2], B[0, 1] - B[1, 0]])
+    Cr = rotation.crossed(np.asarray(part.moving.Ibar_kl))
     coupling = np.vstack([np.asarray(part.moving.S), Cr])
     return np.block([[rigid, coupling], [coupling.T, np.asarray(part.moving.M)]])
