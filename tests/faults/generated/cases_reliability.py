@@ -6,7 +6,6 @@ import numpy as np
 
 from cases.files.cells import blocks_of, solid, write_msh
 from generated.case import Silent, Warned, Works, case, changed, edit, require, write
-from generated.cases_code import compiled
 from generated.cases_reliability_models import MODES, one_thread, scaled
 from generated.stock import STEEL
 from rom.cli.main import main
@@ -100,9 +99,6 @@ CASES = [
     case("A11", elsewhere, Works),
     case("A13", "reduce part.toml -o a.npz", (ConfigError, FileFormatError), ("part.toml",),
          given=write("part.toml", b"\x7fELF" + bytes(99))),
-    case("A15", "reduce part.toml -o a.npz", (ConfigError, FileFormatError), "deck.inp",
-         given=edit("deck.inp", "*NSET", "*INCLUDE, INPUT=deck.inp\n*NSET")),
-    case("A17", MODES, (Works, Warned), "dolfinx_jit", given=compiled, fe=True),
     case("B01", "mesh nope.msh", FileFormatError, "nope.msh", fe=True),
     case("B03", "mesh box.msh", FILES, "box.msh", fe=True,
          given=changed("box.msh", lambda data: data[:1300])),

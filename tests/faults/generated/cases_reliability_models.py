@@ -1,4 +1,7 @@
-"""The odd cases of the table of faults from materials on, each by its number there."""
+"""The odd cases of the table of faults from materials on, each by its number there.
+
+Those that stand in another class as well are left to it.
+"""
 
 import json
 import os
@@ -13,8 +16,7 @@ import numpy as np
 
 import rom
 from cases.solid import block
-from generated.case import Silent, Warned, Works, arrays_changed, case, cut, edit, require
-from generated.cases_motion import loaded
+from generated.case import Silent, Warned, Works, arrays_changed, case, edit, require
 from generated.stock import KINDS, STEEL, body, model, on_ranks, origin, pendulum
 from rom.errors import (
     ConfigError,
@@ -23,7 +25,6 @@ from rom.errors import (
     MaterialError,
     ModelError,
     QualityGateError,
-    ResourceError,
     SolverError,
     UnsafeFileError,
 )
@@ -107,16 +108,6 @@ def relabelled(folder):
     del manifest["sha256"]
     manifest["version"] = [1, 0]
     write_archive(folder / "good.npz", manifest, arrays, "it")
-
-
-def full_disk(folder):
-    """Half a body is no body."""
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (5000, before[1]))
-    try:
-        rom.save(body(), folder / "a.npz")
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
 
 def memory(folder):
@@ -251,23 +242,15 @@ CASES = [
     case("E11", unresolved, Works),
     case("E13", interface([0, 1], rom.Polynomial(1), reference="free"), (InterfaceError, Warned, ConfigError), "root"),
     case("E17", matrices(K=lambda A: A - 1e3 * abs(A).max() * model().M / abs(model().M).max()), NEGATIVE, "negative"),
-    case("F01", complete, Works),
     case("F03", matrices(K=spoilt), (SolverError, QualityGateError, ModelError), "K"),
     case("F05", matrices(K=skewed), QualityGateError, "K", "symmetric"),
     case("F11 tiny", lambda folder: rom.simulate(pendulum(), t_end=0.1, dt=0.01, tolerance=1e-300),
          (ConfigError, SolverError), "tolerance"),
     case("F11 one", lambda folder: rom.simulate(pendulum(), t_end=0.1, dt=0.01, tolerance=10.0), ConfigError, "tolerance"),
-    *(case(f"G01 {share:.0%}", "check good.npz", FileFormatError, "good.npz", given=cut("good.npz", share))
-      for share in (0.0, 0.5, 0.999)),
     case("G03", "check good.npz", FileFormatError, "good.npz", given=flipped),
-    case("G05", "check good.npz", UnsafeFileError, "good.npz",
-         given=arrays_changed("good.npz", lambda arrays: arrays.update(K=np.array([{}], dtype=object)))),
     case("G11", "check good.npz", Silent, given=relabelled),
-    case("G13", "check good.npz", (QualityGateError, FileFormatError), "good.npz",
-         given=arrays_changed("good.npz", lambda arrays: arrays.update(K=arrays["K"] + np.triu(np.ones_like(arrays["K"]), 1) * 1e9))),
     case("G15", "check good.npz", (FileFormatError, UnsafeFileError, Warned), "good.npz",
          given=arrays_changed("good.npz", lambda arrays: arrays.update(K=arrays["K"].astype(">f8")))),
-    case("G17", full_disk, ResourceError, "a.npz"),
     case("G21", "export good.npz a.npz", (Works, ConfigError), "a.npz",
          given=lambda folder: (folder / "a.npz").symlink_to("none.npz")),
     case("H03", one_thread(2), Works, fe=True, seconds=60),
@@ -275,7 +258,6 @@ CASES = [
     case("H11", drawn, Works, fe=True, seconds=60),
     case("H13", memory, Works),
     case("I01", explicit, (SolverError, Silent), "bob"),
-    case("I03", loaded(lambda: np.nan), SolverError, "gust"),
     case("I05", redundant, Warned, ("hinge", "weld")),
     case("I07", rigid_modes, (ConfigError, ModelError), "rod"),
     case("I09 near", turned((1.0005, 0, 0, 0)), (Works, Warned)),
