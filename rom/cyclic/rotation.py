@@ -19,7 +19,8 @@ from scipy.sparse.linalg import LinearOperator, eigsh, splu
 
 from rom.arguments import typed
 from rom.cyclic.sector import NO_DOFS, CyclicSector
-from rom.eigen.scipy import MAX_DENSE_DOFS, SciPyOperators
+from rom.eigen.scipy import SciPyOperators
+from rom.eigen.search import MAX_DENSE_DOFS
 from rom.errors import ConfigError, ModelError
 from rom.model import Array, FEModel, Index
 from rom.rotation import skew

@@ -218,7 +218,8 @@ def count_shift(lam: Array, m: int) -> tuple[int, float]:
         The number of eigenvalues below the gap and a shift inside it [rad^2/s^2].
     """
     upper, lower = lam[m:], lam[m - 1 : -1]
-    j = int(np.argmax((upper - lower) / np.maximum(np.abs(upper), np.abs(lam[-1]) * 1e-12)))
+    least = max(np.abs(lam[-1]) * 1e-12, np.finfo(float).tiny)
+    j = int(np.argmax((upper - lower) / np.maximum(np.abs(upper), least)))
     return m + j, float(0.5 * (upper[j] + lower[j]))
 
 

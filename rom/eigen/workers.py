@@ -3,11 +3,7 @@
 from collections.abc import Callable, Sequence
 from typing import Any, Protocol, TypeVar
 
-import numpy as np
-from scipy.sparse import csc_matrix
-from scipy.sparse.linalg import SuperLU, splu
-
-from rom.eigen.scipy import SYMMETRIC_LU, SciPyOperators
+from rom.eigen.scipy import SciPyOperators, SymmetricLU
 from rom.model import Array
 
 Item = TypeVar("Item")
@@ -67,9 +63,8 @@ class OneProcess:
 
     def factor(self, A: Any, *, pivoting: bool = False) -> Factored | None:
         """By SuperLU."""
-        options = {} if pivoting else {"options": {"SymmetricMode": True}, **SYMMETRIC_LU}
         try:
-            return _Factored(splu(csc_matrix(A), **options))
+            return SymmetricLU(A, pivoting=pivoting)
         except RuntimeError:
             return None
 
@@ -82,15 +77,6 @@ class OneProcess:
     ) -> list[Value]:
         """Value after value."""
         return [function(item) for item in items]
-
-
-class _Factored:
-    def __init__(self, lu: SuperLU):
-        self.lu = lu
-        self.definite = bool((lu.U.diagonal() > 0).all())
-
-    def solve(self, f: Array) -> Array:
-        return np.asarray(self.lu.solve(f))
 
 
 ONE_PROCESS = OneProcess()
