@@ -6,14 +6,13 @@ over. What a count by inertia finds missing is sought beside what was found, unt
 
 from collections.abc import Callable
 from itertools import pairwise
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
-import numpy.typing as npt
 
 from rom.eigen.condensed import Supported
 from rom.eigen.lanczos import BLOCK_SIZE, EIGENVALUE_RTOLS, BlockLanczos, capacity
-from rom.eigen.verbs import count_shift, orthonormal
+from rom.eigen.verbs import Mass, count_shift, orthonormal
 from rom.errors import ConfigError, ModelError, ModesMissedError, SolverError
 from rom.model import Array, Index
 from rom.process.stopwatch import SEARCH_PIECE, piece
@@ -91,6 +90,7 @@ class ModeSearch:
     rigid: Array | None
     fixed: Array
     hold: Any
+    gram: Callable[[Array, Array], Array]
     all_modes: Callable[[], tuple[Array, Array]]
     signed: Callable[[Array], Array]
     shift_inverse: Callable[[float], Any]
@@ -102,7 +102,7 @@ class ModeSearch:
 
     def modes(
         self,
-        held: npt.ArrayLike | HeldBody | Supported,
+        held: Any,
         m: int,
         sigma: float | None = None,
         *,
@@ -176,7 +176,7 @@ class ModeSearch:
         """M-orthonormal rigid motions, from the geometry or, without one, none."""
         if self.rigid is None:
             return np.zeros((self.n_local, 0))
-        return orthonormal(self, self.rigid)
+        return orthonormal(cast(Mass, self), self.rigid)
 
     def _elastic_modes(self, R: Array, m: int, sigma: float | None) -> tuple[Array, Array]:
         """The m modes above the rigid ones."""
@@ -194,31 +194,30 @@ class ModeSearch:
                     k, shift, inverse, found, blocks=found.shape[1] > n_rigid
                 )
                 inverse.release()  # counting needs its memory
-                return self._at_rest(lam, Phi, n_rigid), Phi, False
+                self._refuse_mechanisms(lam, Phi, n_rigid)
+                return np.where(self._at_rest(Phi, lam), 0.0, lam), Phi, False
 
             def count(sigma: float) -> int | None:
                 number = self.count_below(sigma)
                 return None if number is None else number - n_rigid
 
             lam, Phi = self._complete(m, R, seek, count)
-        lam = self._at_rest(lam, Phi, n_rigid)
+        lam = np.where(self._at_rest(Phi, lam), 0.0, lam)
         return lam[:m], settled(self, lam, Phi)[:, :m]
 
-    def _at_rest(self, lam: Array, Phi: Array, n_rigid: int) -> Array:
-        """Eigenvalues with exact zeros for motions without stiffness.
+    def _at_rest(self, Phi: Array, lam: Array) -> Any:
+        """(m,) True for mass-normalised motions without stiffness."""
+        alone = self.gram(Phi, self.stiffness_diagonal[:, None] * Phi)
+        return lam < RIGID_RTOL * np.diag(alone)
 
-        Raises:
-            ModelError: if there are some beside the rigid motions of the geometry.
-        """
-        alone = self.gram(Phi, self.stiffness_diagonal[:, None] * Phi)  # type: ignore[attr-defined]
-        loose = lam < RIGID_RTOL * np.diag(alone)
+    def _refuse_mechanisms(self, lam: Array, Phi: Array, n_rigid: int) -> None:
+        loose = self._at_rest(Phi, lam)
         if n_rigid and loose.any():
             raise ModelError(
                 f"at least {loose.sum()} more motions without stiffness than the six of a "
                 f"connected body.{self.where(Phi[:, loose])}",
                 hint="Parts of the mesh are not connected, or joined at a point or an edge only.",
             )
-        return np.where(loose, 0.0, lam)
 
     def _all_at_once(self, m: int, beside: int) -> bool:
         """Whether a space for m modes would be the whole of a small body."""
@@ -267,7 +266,8 @@ class ModeSearch:
             if proven:
                 return lam, Phi
             found, sigma = count_shift(lam, m)
-            number, lacking = found, lam.size  # without a gap the cluster goes on
+            number: int | None = found
+            lacking = lam.size  # without a gap the cluster goes on
             if lam[found] - lam[found - 1] > CLUSTER_RTOL * lam[found]:
                 number = count(sigma)
                 if number is None or number == found:
