@@ -335,6 +335,16 @@ def _length(x: Array, product: Product) -> float:
     return float(np.sqrt(max(product(x, x).item(), 0.0)))
 
 
+def own_rows(ops: Operators, X: Array) -> Array:
+    """(n_local, k) rows of this rank, of all (n, k) of any units."""
+    return X[ops.first : ops.first + ops.n_local]
+
+
+def every_row(ops: Operators, X: Array) -> Array:
+    """(n, k) rows of all ranks, on each of them, of (n_local, k) of any units."""
+    return ops.rows(X, np.arange(ops.n))
+
+
 def given_rigid_motions(ops: Operators) -> Array:
     """The (n_local, 6) rigid motions of a body: translations [1] and rotations [m].
 
