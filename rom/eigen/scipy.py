@@ -5,12 +5,19 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.linalg import LinAlgError, eigh, eigvalsh
+from scipy.linalg import eigvalsh
 from scipy.sparse import csc_matrix, csr_matrix
 from scipy.sparse.linalg import splu
 
 from rom.arguments import matrix
-from rom.eigen.search import ESTIMATE_SHIFT, HeldBody, ModeSearch, estimated_by_iteration
+from rom.eigen.search import (
+    ESTIMATE_SHIFT,
+    NO_INERTIA,
+    HeldBody,
+    ModeSearch,
+    estimated_by_iteration,
+    indefinite,
+)
 from rom.eigen.verbs import Weighted, canonical_signs
 from rom.errors import (
     ConfigError,
@@ -180,14 +187,6 @@ class SciPyOperators(ModeSearch):
         some.fixed, some.rigid, some.T = self.fixed[rows], None, None
         return some
 
-    def all_modes(self) -> tuple[Array, Array]:
-        """All eigenpairs, solved densely."""
-        try:
-            return eigh(self.K.toarray(), self.M.toarray())
-        except LinAlgError:
-            self.refuse_wrong_mass()
-            raise
-
     def shift_inverse(self, sigma: float) -> SymmetricLU:
         """(K - sigma M)^-1."""
         return SymmetricLU(self.K - sigma * self.M)
@@ -203,7 +202,7 @@ class SciPyOperators(ModeSearch):
             QualityGateError: with the number of such motions.
         """
         if n_negative := negative_count(self.M):
-            raise _indefinite("M", n_negative, "some motion would have no inertia")
+            raise indefinite("M", n_negative, NO_INERTIA)
 
     def signed(self, Phi: Array) -> Array:
         """Columns with their largest entry positive."""
@@ -282,7 +281,7 @@ def _factor(K_ii: csr_matrix, n_held: int) -> SymmetricLU:
         raise InterfaceError(f"{advice[:-1]} (pivot ratio {ratio:.1e}).", hint=cure + digits)
     if not lu.definite and lu.on_diagonal:
         meaning = "with the boundary held, deformation would give energy"
-        raise _indefinite("K", lu.negative_pivots(), meaning)
+        raise indefinite("K", lu.negative_pivots(), meaning)
     return lu
 
 
@@ -302,13 +301,6 @@ def _refuse_massless(M: csr_matrix) -> None:
             "positive mass.",
             hint="Condense dofs without mass statically before you reduce.",
         )
-
-
-def _indefinite(name: str, n_negative: int, meaning: str) -> QualityGateError:
-    return QualityGateError(
-        f"{name} has {n_negative} negative eigenvalues: {meaning}.",
-        hint="Check signs and supports where the matrix was made.",
-    )
 
 
 def negative_count(A: Any) -> int:

@@ -9,11 +9,12 @@ from itertools import pairwise
 from typing import Any, cast
 
 import numpy as np
+from scipy.linalg import LinAlgError, eigh, eigvalsh
 
 from rom.eigen.condensed import Supported
 from rom.eigen.lanczos import BLOCK_SIZE, EIGENVALUE_RTOLS, BlockLanczos, capacity
-from rom.eigen.verbs import Mass, count_shift, orthonormal
-from rom.errors import ConfigError, ModelError, ModesMissedError, SolverError
+from rom.eigen.verbs import Operators, count_shift, every_row, orthonormal, own_rows
+from rom.errors import ConfigError, ModelError, ModesMissedError, QualityGateError, SolverError
 from rom.model import Array, Index
 from rom.process.stopwatch import SEARCH_PIECE, piece
 
@@ -27,6 +28,7 @@ CLUSTER_RTOL = 1e-7  # distance of eigenvalues whose modes are only defined as a
 ESTIMATE_SHIFT = 1e-6  # of the largest eigenvalue, below zero, with which the first is estimated
 ESTIMATE_STEPS = 4  # of inverse iteration, on eight columns
 ALL_LOOSE_RATIO = 1e5  # estimate over round-off where all columns have found motions at rest
+NO_INERTIA = "some motion would have no inertia"
 PLACE_SCALE = 2.0**40  # places that differ by less are one
 COUNTER_STEP = np.uint64(0x9E3779B97F4A7C15)  # 2^64 over the golden ratio: steps of the counter
 MIXING_STEPS = (  # Steele, Lea and Flood, OOPSLA 2014, with the constants of Stafford
@@ -91,7 +93,6 @@ class ModeSearch:
     fixed: Array
     hold: Any
     gram: Callable[[Array, Array], Array]
-    all_modes: Callable[[], tuple[Array, Array]]
     signed: Callable[[Array], Array]
     shift_inverse: Callable[[float], Any]
     first_elastic: Callable[[Array], float]
@@ -176,7 +177,7 @@ class ModeSearch:
         """M-orthonormal rigid motions, from the geometry or, without one, none."""
         if self.rigid is None:
             return np.zeros((self.n_local, 0))
-        return orthonormal(cast(Mass, self), self.rigid)
+        return orthonormal(cast(Operators, self), self.rigid)
 
     def _elastic_modes(self, R: Array, m: int, sigma: float | None) -> tuple[Array, Array]:
         """The m modes above the rigid ones."""
@@ -285,6 +286,21 @@ class ModeSearch:
             hint="Ask for more modes, or give another shift sigma.",
         )
 
+    def all_modes(self) -> tuple[Array, Array]:
+        """All eigenpairs of a small body, solved densely on every rank.
+
+        Raises:
+            QualityGateError: if its mass is not positive definite.
+        """
+        ops, E = cast(Operators, self), np.eye(self.n)
+        K, M = (every_row(ops, apply(own_rows(ops, E))) for apply in (ops.apply_K, ops.apply_M))
+        try:
+            lam, Phi = eigh(K, M)
+        except LinAlgError as error:
+            n_negative = int(np.count_nonzero(eigvalsh(M) <= 0.0))
+            raise indefinite("M", n_negative, NO_INERTIA) from error
+        return lam, own_rows(ops, Phi)
+
     def refuse_wrong_mass(self) -> None:
         """Say so where the mass is why search and count differ."""
 
@@ -305,6 +321,14 @@ class ModeSearch:
             space.solve()
             proven = space.prove(m)
             return *space.pairs(), proven
+
+
+def indefinite(name: str, n_negative: int, meaning: str) -> QualityGateError:
+    """The error of a matrix that should be positive definite, and what it means that it is not."""
+    return QualityGateError(
+        f"{name} has {n_negative} negative eigenvalues: {meaning}.",
+        hint="Check signs and supports where the matrix was made.",
+    )
 
 
 def gaussian_block(ops: Any, k: int, n_before: int = 0) -> Array:

@@ -13,7 +13,6 @@ from petsc4py import PETSc
 
 import numpy as np
 import numpy.typing as npt
-from scipy.linalg import eigh
 from scipy.sparse import csr_matrix
 
 from rom.eigen.scipy import dof_set
@@ -301,13 +300,6 @@ class PETScOperators(ModeSearch):
     def mass_diagonal(self) -> Array:
         """(n_local,) diagonal of M."""
         return self.M.getDiagonal().array.copy()
-
-    def all_modes(self) -> tuple[Array, Array]:
-        """All eigenpairs of a small model, solved densely on every rank."""
-        E = np.eye(self.n)[self.first : self.first + self.n_local]
-        K, M = (self.rows(apply(E), np.arange(self.n)) for apply in (self.apply_K, self.apply_M))
-        lam, Phi = eigh(K, M)
-        return lam, Phi[self.first : self.first + self.n_local]
 
 
 class WholeOperators(PETScOperators):
