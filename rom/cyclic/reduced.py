@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 from rom.arguments import typed
 from rom.cyclic.certificate import sector_certificate
 from rom.cyclic.sector import Complex, CyclicSector
-from rom.eigen.verbs import DEPENDENT_RTOL, orthonormal_in
+from rom.eigen.verbs import DEPENDENT_RTOL, every_row, orthonormal_in, own_rows
 from rom.errors import ConfigError, InterfaceError
 from rom.model import Array, Interface, Report
 from rom.reduction.bases.method import CraigBampton
@@ -107,10 +107,11 @@ def reduce_sector(
     E[sector.master, :q] = W
     E[sector.slave, q:] = sector.coupling @ W
     E[sector.held] = 0.0
-    ops = sector.workers.operators(sector.K, sector.M)
+    ops = sector.workers.operators(sector.K, sector.M, together=True)
     inner = ops.hold(np.union1d(np.union1d(sector.slave, sector.master), sector.held))
     omega, Phi = ops.modes(inner, n_modes)  # then solutions with the same factor
-    Psi = np.hstack([E - inner(ops.apply_K(E)), Phi])
+    E = own_rows(ops, E)
+    Psi = every_row(ops, np.hstack([E - inner(ops.apply_K(E)), Phi]))
     return projected(sector, Psi, q, omega)
 
 

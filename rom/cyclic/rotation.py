@@ -19,7 +19,8 @@ from scipy.sparse.linalg import LinearOperator, eigsh, splu
 
 from rom.arguments import typed
 from rom.cyclic.sector import NO_DOFS, CyclicSector
-from rom.eigen.scipy import MAX_DENSE_DOFS, SciPyOperators
+from rom.eigen.search import MAX_DENSE_DOFS
+from rom.eigen.workers import held_solution
 from rom.errors import ConfigError, ModelError
 from rom.model import Array, FEModel, Index
 from rom.rotation import skew
@@ -88,8 +89,8 @@ def centrifugal_displacement(sector: CyclicSector) -> Array:
     """
     T = sector.harmonic(0)
     load = sector.M @ arms(sector, sector.points).ravel()
-    ops = SciPyOperators(T.T @ sector.K @ T, T.T @ sector.M @ T)
-    return T @ ops.hold(axial_pins(sector))((T.T @ load)[:, None])[:, 0]
+    return T @ held_solution(sector.workers, (T.T @ sector.K @ T, T.T @ sector.M @ T),
+                             axial_pins(sector), T.T @ load)  # fmt: skip
 
 
 def arms(sector: CyclicSector, points: Array) -> Array:

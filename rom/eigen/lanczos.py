@@ -19,6 +19,8 @@ BLOCK_SIZE = 8  # columns solved together: fewer make solving dearer, more make 
 MAX_EXTRA_BLOCKS = 20  # beside the modes sought before a restart; twenty are seldom used
 MAX_RESTARTS = 20  # after which the method has failed
 MAX_FURTHER_BLOCKS = 6  # beyond convergence, for a proof; more cost as much as a count
+SPENT_RTOL = 1e-14  # length of a column beside the space, of all of it, that is round-off
+CANCELLED_RTOL = 1e-6  # the same, below which it is no longer orthogonal to the last digits
 EIGENVALUE_RTOLS = 1e-9, 1e-5  # of modes sought and spare ones, whose error is its square
 
 
@@ -94,24 +96,52 @@ class BlockLanczos:
     def _orthonormal(self, W: Array) -> tuple[Array, Array, Array, Array]:
         """W made M-orthonormal to the space, M W, its components in the space, and the rest.
 
-        The first pass goes over what the recurrence couples it with, the second over all. When the
-        space holds W already, round-off is left, orthogonal to it after the second pass: a random
-        block with which the search goes on.
+        The first pass goes over what the recurrence couples it with, the second over all. Where
+        the space holds a column already, round-off is left: a random one takes its place, with
+        which the search goes on to eigenvalues that are repeated more often than W has columns.
         """
         H, R = np.zeros((self.size, W.shape[1])), np.eye(W.shape[1])
         W = np.asfortranarray(W)
         for first in (self.coupled, 0):
-            with_these = slice(first, self.size)
-            G = self.ops.gram(self.MV[:, with_these], W)
-            W = _less(W, self.V[:, with_these], G)
-            H[with_these] += G
-        MW = self.ops.apply_M(W)
-        for _ in range(2):
-            g, U = np.linalg.eigh(self.ops.gram(W, MW))
-            root = np.sqrt(np.maximum(g, 1e-30 * max(g[-1], np.finfo(float).tiny)))
-            W, MW = _combined(W, U / root), _combined(MW, U / root)
-            R = (U * root).T @ R
+            W = self._beside(W, H, R, first)
+        length = np.sqrt(np.square(H).sum(axis=0).max(initial=0.0))
+        W, MW, R, share = self._normalised(W, self.ops.apply_M(W), R, length)
+        if share.min() < CANCELLED_RTOL:
+            spent = share == 0.0
+            W[:, spent] = self._random(np.count_nonzero(spent))
+            for _ in range(2):
+                W = self._beside(W, H, R)
+            MW = self.ops.apply_M(W)
+        W, MW, R, _ = self._normalised(W, MW, R, 0.0)
         return W, MW, H, R
+
+    def _beside(self, W: Array, H: Array, R: Array, first: int = 0) -> Array:
+        """W without its components in the columns of the space from one on; W R's go to H."""
+        these = slice(first, self.size)
+        G = self.ops.gram(self.MV[:, these], W)
+        H[these] += G @ R
+        return _less(np.asfortranarray(W), self.V[:, these], G)
+
+    def _normalised(
+        self, W: Array, MW: Array, R: Array, length: float
+    ) -> tuple[Array, Array, Array, Array]:
+        """W made M-orthonormal, M W, R with W R as it was, and what of a length was left of W.
+
+        What is round-off counts as nothing.
+        """
+        g, U = np.linalg.eigh(self.ops.gram(W, MW))
+        root = np.sqrt(np.maximum(g, 0.0))
+        whole = max(np.hypot(length, root[-1]), np.finfo(float).tiny)
+        root[root < SPENT_RTOL * whole] = 0.0
+        T = U / np.where(root > 0.0, root, whole)
+        return _combined(W, T), _combined(MW, T), (U * root).T @ R, root / whole
+
+    def _random(self, k: int) -> Array:
+        """(n_local, k) random columns, zero where a support holds."""
+        rng = np.random.default_rng((self.size, getattr(self.ops, "first", 0)))
+        X = rng.standard_normal((self.V.shape[0], k))
+        X = np.asfortranarray(self.factor.solve(self.ops.apply_M(X)))
+        return X / np.sqrt(np.diag(self.ops.gram(X, self.ops.apply_M(X))))
 
     def prove(self, m: int) -> bool:
         """Go on until surely none of the lowest m modes is missing; False if that stays open."""

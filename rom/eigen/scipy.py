@@ -1,57 +1,99 @@
 """The operator verbs on SciPy matrices, for people who bring matrices of their own."""
 
+from copy import copy
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.linalg import LinAlgError, eigh, eigvalsh
+from scipy.linalg import eigvalsh
 from scipy.sparse import csc_matrix, csr_matrix
-from scipy.sparse.linalg import LinearOperator, SuperLU, eigsh, splu
+from scipy.sparse.linalg import splu
 
 from rom.arguments import matrix
-from rom.eigen.condensed import Supported
-from rom.eigen.verbs import Weighted, canonical_signs, count_shift, orthonormal
+from rom.eigen.search import (
+    ESTIMATE_SHIFT,
+    NO_INERTIA,
+    HeldBody,
+    ModeSearch,
+    estimated_by_iteration,
+    indefinite,
+)
+from rom.eigen.verbs import Weighted, canonical_signs
 from rom.errors import (
     ConfigError,
     InterfaceError,
-    ModelError,
-    ModesMissedError,
     QualityGateError,
     SolverError,
 )
 from rom.model import Array, Index
 from rom.names import named
-from rom.process.stopwatch import FACTORISATION_PIECE, SEARCH_PIECE, piece
+from rom.process.stopwatch import FACTORISATION_PIECE, piece
 
 PIVOT_RTOL = 1e-13  # smallest over largest pivot below which K_ii counts as singular
-RIGID_RTOL = 1e-13  # eigenvalue of a motion without stiffness, of the largest one
-SYMMETRIC_LU = {"permc_spec": "MMD_AT_PLUS_A", "diag_pivot_thresh": 0.0}
-MAX_DENSE_DOFS = 300  # all eigenvalues are computed at once up to here
-N_SPARE_MODES = 3  # beyond the ones asked for, so that a gap for counting is found
+SYMMETRIC_LU = {
+    "permc_spec": "MMD_AT_PLUS_A", "diag_pivot_thresh": 0.0, "options": {"SymmetricMode": True}
+}  # fmt: skip
 
 
-class HeldSciPy:
+class SymmetricLU:
+    """L D L^T of a symmetric matrix by SuperLU, with pivots on its diagonal where that is possible.
+
+    Args:
+        A: (n, n) symmetric.
+        pivoting: where its diagonal has zeros.
+
+    Raises:
+        RuntimeError: if the matrix is singular.
+    """
+
+    def __init__(self, A: Any, *, pivoting: bool = False):
+        self.A, kind = csc_matrix(A), {} if pivoting else SYMMETRIC_LU
+        with piece(FACTORISATION_PIECE):
+            self.lu = splu(self.A, **kind)
+        self.pivots = self.lu.U.diagonal()
+
+    @property
+    def on_diagonal(self) -> bool:
+        """Whether all pivots are of the diagonal, so that their signs are those of eigenvalues."""
+        return np.array_equal(self.lu.perm_r, self.lu.perm_c)
+
+    @property
+    def definite(self) -> bool:
+        """Whether no pivot is negative."""
+        return bool((self.pivots > 0).all())
+
+    def negative_pivots(self) -> int:
+        """Number of negative eigenvalues (Sylvester)."""
+        if not self.on_diagonal:
+            return int(np.count_nonzero(eigvalsh(self.A.toarray()) < 0))
+        return int(np.count_nonzero(self.pivots < 0))
+
+    def solve(self, F: Array) -> Array:
+        """A^-1 F of (n,) or (n, k)."""
+        return np.asarray(self.lu.solve(np.ascontiguousarray(F)))
+
+    def release(self) -> None:
+        """Give the memory back."""
+        del self.lu
+
+
+class HeldSciPy(HeldBody):
     """K with the held dofs eliminated, factored once; call it to solve."""
 
-    def __init__(self, K: csr_matrix, M: csr_matrix, held: Index, shift: float = 0.0):
-        self.held = held
-        self.free = np.setdiff1d(np.arange(K.shape[0]), held)
-        self.n_free = self.free.size
-        self.K, self.M = K[self.free][:, self.free], M[self.free][:, self.free]
-        self.lu = None
+    def __init__(self, ops: "SciPyOperators", held: Index, shift: float = 0.0):
+        super().__init__(ops, held, shift)
         if self.n_free:
-            held_still = shift == 0.0
-            self.lu = _factor(self.K, held.size) if held_still else _shifted(self.K, self.M, shift)
+            self.make()
 
-    def __call__(self, F: Array) -> Array:
-        """Solve K_ii X_i = F_i; rows of held dofs come back zero."""
-        X = np.zeros(F.shape)
-        if self.lu is not None:
-            X[self.free] = self.lu.solve(np.ascontiguousarray(F[self.free]))
-        return X
+    def make(self) -> None:
+        """Factor the stiffness, or K - shift M."""
+        if self.shift:
+            self.factor = _shifted(self.inner.K, self.inner.M, self.shift)
+        else:
+            self.factor = _factor(self.inner.K, self.held.size)
 
 
-class SciPyOperators:
+class SciPyOperators(ModeSearch):
     """Stiffness and mass of one body, all rows in this process.
 
     Args:
@@ -76,7 +118,7 @@ class SciPyOperators:
             raise ConfigError(f"K is {self.K.shape} and M is {self.M.shape}; they must be equal.")
         _refuse_massless(self.M)
         self.n = self.n_local = self.K.shape[0]
-        self.rigid, self.T = rigid, T
+        self.rigid, self.T, self.fixed = rigid, T, np.sin(1.0 + np.arange(self.n))
 
     def comparison_pays(self, n_supports: int, n_interface: int, n_modes: int) -> bool:
         """Always: matrices whose origin is unknown are compared in every support."""
@@ -100,7 +142,7 @@ class SciPyOperators:
 
     def hold(self, dofs: npt.ArrayLike, shift: float = 0.0) -> HeldSciPy:
         """Eliminate the held dofs and factor the rest of K - shift M."""
-        return HeldSciPy(self.K, self.M, dof_set(dofs, self.n), shift)
+        return HeldSciPy(self, dof_set(dofs, self.n), shift)
 
     def transform(self, T: Any, rigid: Array) -> "SciPyOperators":
         """The same body in the coordinates a of u = T a."""
@@ -137,93 +179,53 @@ class SciPyOperators:
         )
         return SciPyOperators(K, M, self.rigid if rigid is None else rigid, self.T)
 
-    def modes(
-        self,
-        held: npt.ArrayLike | HeldSciPy | Supported,
-        m: int,
-        sigma: float | None = None,
-        *,
-        finished: bool = False,
-    ) -> tuple[Array, Array]:
-        """Lowest m modes, mass-normalised: omega (m,) [rad/s] and Phi (n, m)."""
-        if not isinstance(held, HeldSciPy):
-            held_dofs = dof_set(held.dofs if isinstance(held, Supported) else held, self.n)
-            if held_dofs.size == 0:
-                return self._free_modes(m, sigma)
-            held = HeldSciPy(self.K, self.M, held_dofs)
-        if not 0 <= m <= held.n_free:
-            raise ConfigError(
-                f"n_modes={m}, but {self.n} dofs minus {held.held.size} boundary dofs leave "
-                f"{held.n_free} interior dofs; ask for 0 to {held.n_free} modes."
-            )
-        lam, Phi_i = _lowest(held.K, held.M, held.lu, m)
-        Phi = np.zeros((self.n, m))
-        Phi[held.free] = Phi_i
-        return np.sqrt(lam), canonical_signs(Phi)
+    def part(self, rows: Index) -> "SciPyOperators":
+        """The body with all dofs held but these."""
+        some = copy(self)
+        some.K, some.M = (A[rows][:, rows] for A in (self.K, self.M))
+        some.n = some.n_local = rows.size
+        some.fixed, some.rigid, some.T = self.fixed[rows], None, None
+        return some
 
-    def _free_modes(self, m: int, sigma: float | None) -> tuple[Array, Array]:
-        if not 0 <= m <= self.n:
-            raise ConfigError(f"n_modes={m}, but the model has {self.n} dofs.")
-        R = self._zero_modes()
-        n_elastic = max(m - R.shape[1], 0)
-        if self.n <= MAX_DENSE_DOFS:
-            lam, Phi = _dense_modes(self.K, self.M, self.n)
-            lam, Phi = lam[R.shape[1] :][:n_elastic], Phi[:, R.shape[1] :][:, :n_elastic]
-        else:
-            lam, Phi = self._elastic_modes(R, n_elastic, sigma)
-        omega = np.concatenate([np.zeros(R.shape[1]), np.sqrt(np.maximum(lam, 0.0))])
-        return omega[:m], np.hstack([R, canonical_signs(Phi)])[:, :m]
+    def shift_inverse(self, sigma: float) -> SymmetricLU:
+        """(K - sigma M)^-1."""
+        return SymmetricLU(self.K - sigma * self.M)
 
-    def _zero_modes(self) -> Array:
-        """M-orthonormal rigid motions, from the geometry or, without one, none."""
-        if self.rigid is None:
-            return np.zeros((self.n, 0))
-        return orthonormal(self, self.rigid)
+    def count_below(self, sigma: float, spent: Any = None) -> int:
+        """Number of eigenvalues below sigma, by the inertia of K - sigma M (Sylvester)."""
+        return negative_count(self.K - sigma * self.M)
 
-    def _elastic_modes(self, R: Array, m: int, sigma: float | None) -> tuple[Array, Array]:
-        if m == 0:
-            return np.zeros(0), np.zeros((self.n, 0))
-        if sigma is None:
-            sigma = -0.05 * self._first_elastic(R)
-        lu = _symmetric_lu(self.K - sigma * self.M)
-        MR = self.M @ R
+    def refuse_wrong_mass(self) -> None:
+        """Say so where a motion has no inertia.
 
-        def inverse(x: Array) -> Array:
-            y = lu.solve(x - MR @ (R.T @ x))
-            return y - R @ (MR.T @ y)
+        Raises:
+            QualityGateError: with the number of such motions.
+        """
+        if n_negative := negative_count(self.M):
+            raise indefinite("M", n_negative, NO_INERTIA)
 
-        k = min(m + N_SPARE_MODES, self.n - R.shape[1] - 1)
-        start = np.sin(1.0 + np.arange(self.n))
-        operator = LinearOperator(self.K.shape, matvec=inverse)
-        with piece(SEARCH_PIECE):
-            lam, Phi = eigsh(
-                self.K, k, self.M, sigma, OPinv=operator, v0=start - R @ (MR.T @ start), tol=0.0
-            )
-        order = np.argsort(lam)
-        lam, Phi = lam[order], Phi[:, order]
-        lam[np.abs(lam) < RIGID_RTOL * self.largest()] = 0.0
-        if R.shape[1] and lam[0] == 0.0:
-            raise ModelError(
-                f"at least {np.count_nonzero(lam == 0.0)} more motions without stiffness than the "
-                "six of a connected body.",
-                hint="Parts of the mesh are not connected, or joined at a point or an edge only.",
-            )
-        _verify_count(self.K, self.M, np.concatenate([np.zeros(R.shape[1]), lam]), m + R.shape[1])
-        return lam[:m], Phi[:, :m]
+    def signed(self, Phi: Array) -> Array:
+        """Columns with their largest entry positive."""
+        return canonical_signs(Phi)
 
-    def _first_elastic(self, R: Array) -> float:
+    def where(self, Phi: Array) -> str:
+        """Nothing: plain matrices do not know where their dofs are."""
+        return ""
+
+    def first_elastic(self, R: Array) -> float:
         """Estimate of the first elastic eigenvalue by inverse iteration on a small block."""
-        shift = 1e-6 * self.largest()
-        lu = _symmetric_lu(self.K + shift * self.M)
-        X = np.sin(np.outer(1.0 + np.arange(self.n), 1.0 + np.arange(8.0)))
-        for _ in range(4):
-            X = lu.solve(np.ascontiguousarray(self.M @ (X - R @ (R.T @ (self.M @ X)))))
-            X = np.linalg.qr(X)[0]
-        X -= R @ (R.T @ (self.M @ X))
-        lam = eigh(X.T @ (self.K @ X), X.T @ (self.M @ X), eigvals_only=True)
-        return float(
-            max(lam[np.argmax(lam > RIGID_RTOL * self.largest())], RIGID_RTOL * self.largest())
-        )
+        lu = self.shift_inverse(-ESTIMATE_SHIFT * self.largest())
+        return estimated_by_iteration(self, lu, R)
+
+    @property
+    def stiffness_diagonal(self) -> Array:
+        """(n,) diagonal of K."""
+        return np.asarray(self.K.diagonal())
+
+    @property
+    def mass_diagonal(self) -> Array:
+        """(n,) diagonal of M."""
+        return np.asarray(self.M.diagonal())
 
     def largest(self) -> float:
         """Estimate of the largest eigenvalue from the diagonals."""
@@ -263,33 +265,29 @@ def _symmetric(name: str, A: Any) -> csr_matrix:
     return A
 
 
-def _symmetric_lu(A: Any) -> SuperLU:
-    """Factors of a symmetric matrix with pivots on its diagonal where that is possible."""
-    with piece(FACTORISATION_PIECE):
-        return splu(csc_matrix(A), options={"SymmetricMode": True}, **SYMMETRIC_LU)
-
-
-def _factor(K_ii: csr_matrix, n_held: int) -> SuperLU:
+def _factor(K_ii: csr_matrix, n_held: int) -> SymmetricLU:
     advice = f"K_ii is singular: the {n_held} boundary dofs leave a rigid motion free."
     cure = "Fix at least three nodes that do not lie on one line, or use a free-interface basis."
     try:
-        lu = _symmetric_lu(K_ii)
+        lu = SymmetricLU(K_ii)
     except RuntimeError as error:
         raise InterfaceError(advice, hint=cure) from error
-    pivots = np.abs(lu.U.diagonal())
+    pivots = np.abs(lu.pivots)
     ratio = pivots.min() / pivots.max()
     if ratio < PIVOT_RTOL:
-        raise InterfaceError(f"{advice[:-1]} (pivot ratio {ratio:.1e}).", hint=cure)
-    n_negative = int(np.count_nonzero(lu.U.diagonal() < 0))
-    if n_negative and np.array_equal(lu.perm_r, lu.perm_c):
-        raise _indefinite("K", n_negative, "with the boundary held, deformation would give energy")
+        digits = (
+            " Stiffnesses that differ by more than thirteen digits leave none of the small ones."
+        )
+        raise InterfaceError(f"{advice[:-1]} (pivot ratio {ratio:.1e}).", hint=cure + digits)
+    if not lu.definite and lu.on_diagonal:
+        meaning = "with the boundary held, deformation would give energy"
+        raise indefinite("K", lu.negative_pivots(), meaning)
     return lu
 
 
-def _shifted(K_ii: csr_matrix, M_ii: csr_matrix, shift: float) -> SuperLU:
+def _shifted(K_ii: csr_matrix, M_ii: csr_matrix, shift: float) -> SymmetricLU:
     try:
-        with piece(FACTORISATION_PIECE):
-            return splu(csc_matrix(K_ii - shift * M_ii))  # indefinite: with pivoting
+        return SymmetricLU(K_ii - shift * M_ii, pivoting=True)
     except RuntimeError as error:
         raise SolverError(f"K - {shift:.6g} M is singular: the shift is an eigenvalue.") from error
 
@@ -305,54 +303,6 @@ def _refuse_massless(M: csr_matrix) -> None:
         )
 
 
-def _indefinite(name: str, n_negative: int, meaning: str) -> QualityGateError:
-    return QualityGateError(
-        f"{name} has {n_negative} negative eigenvalues: {meaning}.",
-        hint="Check signs and supports where the matrix was made.",
-    )
-
-
-def _dense_modes(K: csr_matrix, M: csr_matrix, m: int) -> tuple[Array, Array]:
-    try:
-        return eigh(K.toarray(), M.toarray(), subset_by_index=(0, m - 1))
-    except LinAlgError as error:
-        n_negative = int(np.count_nonzero(eigvalsh(M.toarray()) < 0))
-        raise _indefinite("M", n_negative, "some motion would have no inertia") from error
-
-
-def _lowest(K: csr_matrix, M: csr_matrix, lu: SuperLU, m: int) -> tuple[Array, Array]:
-    n = K.shape[0]
-    if m == 0:
-        return np.zeros(0), np.zeros((n, 0))
-    if n <= MAX_DENSE_DOFS or m + N_SPARE_MODES >= n:  # Lanczos cannot return all modes
-        return _dense_modes(K, M, m)
-    inverse = LinearOperator(K.shape, matvec=lu.solve)
-    start = np.sin(1.0 + np.arange(n))
-    with piece(SEARCH_PIECE):
-        lam, Phi = eigsh(K, m + N_SPARE_MODES, M, sigma=0.0, OPinv=inverse, v0=start, tol=0.0)
-    order = np.argsort(lam)
-    lam, Phi = lam[order], Phi[:, order]
-    _verify_count(K, M, lam, m)
-    return lam[:m], Phi[:, :m]
-
-
-def _verify_count(K: csr_matrix, M: csr_matrix, lam: Array, m: int) -> None:
-    """Compare the number of modes found with the inertia of K - sigma M (Sylvester)."""
-    found, sigma = count_shift(lam, m)
-    count = negative_count(K - sigma * M)
-    if count != found and (n_negative := negative_count(M)):
-        raise _indefinite("M", n_negative, "some motion would have no inertia")
-    if count != found:
-        raise ModesMissedError(
-            f"{found} modes were found below {np.sqrt(sigma) / (2 * np.pi):.6g} Hz, "
-            f"but the inertia of K - sigma M counts {count}.",
-            hint="Ask for more modes, or give another shift sigma.",
-        )
-
-
 def negative_count(A: Any) -> int:
     """Number of negative eigenvalues of a symmetric matrix, from its pivots (Sylvester)."""
-    lu = _symmetric_lu(A)
-    if not np.array_equal(lu.perm_r, lu.perm_c):
-        return int(np.count_nonzero(eigvalsh(A.toarray()) < 0))
-    return int(np.count_nonzero(lu.U.diagonal() < 0))
+    return SymmetricLU(A).negative_pivots()

@@ -218,7 +218,8 @@ def count_shift(lam: Array, m: int) -> tuple[int, float]:
         The number of eigenvalues below the gap and a shift inside it [rad^2/s^2].
     """
     upper, lower = lam[m:], lam[m - 1 : -1]
-    j = int(np.argmax((upper - lower) / np.maximum(np.abs(upper), np.abs(lam[-1]) * 1e-12)))
+    least = max(np.abs(lam[-1]) * 1e-12, np.finfo(float).tiny)
+    j = int(np.argmax((upper - lower) / np.maximum(np.abs(upper), least)))
     return m + j, float(0.5 * (upper[j] + lower[j]))
 
 
@@ -332,6 +333,16 @@ def new_part(Q: Array, x: Array, product: Product) -> tuple[Array, float]:
 
 def _length(x: Array, product: Product) -> float:
     return float(np.sqrt(max(product(x, x).item(), 0.0)))
+
+
+def own_rows(ops: Operators, X: Array) -> Array:
+    """(n_local, k) rows of this rank, of all (n, k) of any units."""
+    return X[ops.first : ops.first + ops.n_local]
+
+
+def every_row(ops: Operators, X: Array) -> Array:
+    """(n, k) rows of all ranks, on each of them, of (n_local, k) of any units."""
+    return ops.rows(X, np.arange(ops.n))
 
 
 def given_rigid_motions(ops: Operators) -> Array:

@@ -3,25 +3,20 @@
 from collections.abc import Callable, Sequence
 from typing import Any, Protocol, TypeVar
 
-import numpy as np
-from scipy.sparse import csc_matrix
-from scipy.sparse.linalg import SuperLU, splu
-
-from rom.eigen.scipy import SYMMETRIC_LU, SciPyOperators
-from rom.model import Array
+from rom.eigen.scipy import SciPyOperators, SymmetricLU
+from rom.eigen.verbs import every_row, own_rows
+from rom.model import Array, Index
 
 Item = TypeVar("Item")
 Value = TypeVar("Value")
 
 
 class Factored(Protocol):
-    """A symmetric matrix that has been factored.
+    """A symmetric matrix that has been factored."""
 
-    Attributes:
-        definite: whether all its eigenvalues are positive.
-    """
-
-    definite: bool
+    @property
+    def definite(self) -> bool:
+        """Whether all its eigenvalues are positive."""
 
     def solve(self, f: Array) -> Array:
         """A^-1 f, (n,), of f (n,), both on all ranks, in units of f over those of A."""
@@ -30,13 +25,16 @@ class Factored(Protocol):
 class Workers(Protocol):
     """One process, or ranks that all have the same matrices."""
 
-    def operators(self, K: Any, M: Any, rigid: Array | None = None) -> Any:
+    def operators(
+        self, K: Any, M: Any, rigid: Array | None = None, *, together: bool = False
+    ) -> Any:
         """`rom.eigen.verbs.Operators` of matrices (n, n) of SciPy, by this process alone.
 
         Args:
             K: (n, n) stiffness, symmetric.
             M: (n, n) mass, symmetric positive definite.
             rigid: (n, r) motions without stiffness, or None.
+            together: ranks share the rows, and all of them must ask.
         """
 
     def factor(self, A: Any, *, pivoting: bool = False) -> Factored | None:
@@ -67,13 +65,14 @@ class OneProcess:
 
     def factor(self, A: Any, *, pivoting: bool = False) -> Factored | None:
         """By SuperLU."""
-        options = {} if pivoting else {"options": {"SymmetricMode": True}, **SYMMETRIC_LU}
         try:
-            return _Factored(splu(csc_matrix(A), **options))
+            return SymmetricLU(A, pivoting=pivoting)
         except RuntimeError:
             return None
 
-    def operators(self, K: Any, M: Any, rigid: Array | None = None) -> Any:
+    def operators(
+        self, K: Any, M: Any, rigid: Array | None = None, *, together: bool = False
+    ) -> Any:
         """The verbs by SciPy."""
         return SciPyOperators(K, M, rigid)
 
@@ -84,13 +83,21 @@ class OneProcess:
         return [function(item) for item in items]
 
 
-class _Factored:
-    def __init__(self, lu: SuperLU):
-        self.lu = lu
-        self.definite = bool((lu.U.diagonal() > 0).all())
+def held_solution(workers: Workers, matrices: tuple[Any, Any], held: Index, f: Array) -> Array:
+    """(n,) K^-1 f on all ranks with some dofs at rest.
 
-    def solve(self, f: Array) -> Array:
-        return np.asarray(self.lu.solve(f))
+    Args:
+        workers: ranks that all have the same matrices, and all ask.
+        matrices: stiffness and mass (n, n); the mass tells a motion that nothing holds.
+        held: dofs at rest.
+        f: (n,) loads, in units of the displacement times those of K.
+
+    Raises:
+        InterfaceError: if a rigid motion stays free.
+    """
+    ops = workers.operators(*matrices, together=True)
+    solution: Array = every_row(ops, ops.hold(held)(own_rows(ops, f[:, None])))[:, 0]
+    return solution
 
 
 ONE_PROCESS = OneProcess()

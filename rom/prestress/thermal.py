@@ -20,10 +20,10 @@ from scipy.sparse import block_diag, csr_matrix, identity
 from rom.arguments import typed
 from rom.cyclic.modes import real_form
 from rom.cyclic.rotation import axial_pins, largest_ratio
-from rom.cyclic.sector import CyclicSector
-from rom.eigen.scipy import SciPyOperators, negative_count
+from rom.cyclic.sector import CyclicSector, workers_of
 from rom.eigen.supports import Fixed, held_dofs
 from rom.eigen.verbs import dofs_of, rigid_motions
+from rom.eigen.workers import Workers, held_solution
 from rom.errors import ConfigError, ModelError, ParallelError
 from rom.model import Array, FEModel, Index
 from rom.prestress.heat import Heat
@@ -56,7 +56,7 @@ def heated(model: FEModel, heat: Heat, *, fixed: Fixed = ()) -> FEModel:
         and stress stiffening; see docs/theory/rotating_solids.md.
     """
     solid, K, K_geo, held = _stressed(model, heat, fixed)
-    _refuse_buckled([_loose(held, K, K_geo)], heat)
+    _refuse_buckled([_loose(held, K, K_geo)], heat, workers_of(model))
     if fixed:
         K_geo = csr_matrix(K_geo + _carried_along(K_geo, held, rigid_motions(model.points)))
     operators = model.operators
@@ -91,8 +91,9 @@ def heated_sector(sector: CyclicSector, model: FEModel, heat: Heat) -> CyclicSec
         See docs/theory/rotating_solids.md for heat and rotation of wheels.
     """
     solid = finite_solid(model, heat)
-    _, K_geo = _thermal(solid, sector.harmonic(0), axial_pins(sector), sector.M)
-    _refuse_buckled((_waves(sector, n, sector.K, K_geo) for n in sector.diameters), heat)
+    _, K_geo = _thermal(solid, sector.harmonic(0), axial_pins(sector), sector.M, sector.workers)
+    each = (_waves(sector, n, sector.K, K_geo) for n in sector.diameters)
+    _refuse_buckled(each, heat, sector.workers)
     return replace(sector, K=csr_matrix(sector.K + K_geo))
 
 
@@ -157,18 +158,22 @@ def _stressed(
     """The solid, its stiffness, that of its thermal stress, and the dofs held."""
     solid = finite_solid(model, heat)
     held = held_dofs(model.interfaces, fixed) if fixed else _six_dofs(model.points)
-    K, K_geo = _thermal(solid, identity(model.n_dofs, format="csr"), held, model.M)
+    K, K_geo = _thermal(
+        solid, identity(model.n_dofs, format="csr"), held, model.M, workers_of(model)
+    )
     return solid, K, K_geo, held
 
 
-def _thermal(solid: Any, T: csr_matrix, held: Index, M: Any) -> tuple[csr_matrix, csr_matrix]:
+def _thermal(
+    solid: Any, T: csr_matrix, held: Index, M: Any, workers: Workers
+) -> tuple[csr_matrix, csr_matrix]:
     """Stiffness of the cold solid and of the stress of its heat, with u = T a."""
     at_rest = np.zeros(T.shape[0])
     solid.warm(0.0)
     K = solid.tangent(at_rest)
     solid.warm(1.0)
-    expands = -(T.T @ solid.force(at_rest))[:, None]
-    u = T @ SciPyOperators(T.T @ K @ T, T.T @ M @ T).hold(held)(expands)[:, 0]
+    expands = -(T.T @ solid.force(at_rest))
+    u = T @ held_solution(workers, (T.T @ K @ T, T.T @ M @ T), held, expands)
     return K, solid.geometric(u)
 
 
@@ -222,14 +227,19 @@ def _waves(sector: CyclicSector, diameter: int, *matrices: Any) -> tuple[csr_mat
     return _loose(_pins(R), *(csr_matrix(0.5 * (A + A.T)) for A in whole))
 
 
-def _refuse_buckled(parts: Iterable[tuple[csr_matrix, ...]], heat: Heat) -> None:
+def _refuse_buckled(parts: Iterable[tuple[csr_matrix, ...]], heat: Heat, workers: Workers) -> None:
     """Raise if a part of the solid has K + K_geo with negative eigenvalues, naming the worst."""
-    share = min(
-        (critical_factor(K, K_geo) for K, K_geo in parts if negative_count(K + K_geo)), default=None
-    )
+    shares = [critical_factor(*part) for part in parts if not _stiff(sum(part), workers)]
+    share = min(shares, default=None)
     if share is not None:
         raise ModelError(
             f"the heated solid buckles at {heat.described(share)}: thermal stress has then used up "
             "its stiffness.",
             hint="Hold it more loosely, or follow its bent shape with rom.spin_up.",
         )
+
+
+def _stiff(K: csr_matrix, workers: Workers) -> bool:
+    """Whether a stiffness is positive definite."""
+    factor = workers.factor(K)
+    return factor is not None and factor.definite

@@ -7,8 +7,13 @@ from rom.eigen.scipy import SciPyOperators
 from rom.eigen.verbs import rigid_motions
 
 
+def _rigid(model):
+    """Without points there is no geometry."""
+    return None if model.points is None else rigid_motions(model.points)
+
+
 def scipy_operators(model):
-    return SciPyOperators(model.K, model.M, rigid_motions(model.points))
+    return SciPyOperators(model.K, model.M, _rigid(model))
 
 
 def petsc_operators(model):
@@ -21,7 +26,7 @@ def petsc_operators(model):
         A = csr_matrix(A)
         return PETSc.Mat().createAIJ(A.shape, csr=(A.indptr, A.indices, A.data))
 
-    return PETScOperators(aij(model.K), aij(model.M), rigid_motions(model.points))
+    return PETScOperators(aij(model.K), aij(model.M), _rigid(model))
 
 
 KINDS = [

@@ -15,10 +15,10 @@ pytestmark = pytest.mark.fenicsx
 
 import dolfinx.mesh as dm  # noqa: E402
 
+from rom.eigen import search  # noqa: E402
 from rom.eigen.condensed import condensed  # noqa: E402
 from rom.eigen.verbs import constraint_modes  # noqa: E402
 from rom.fe.elasticity import assemble  # noqa: E402
-from rom.fe.operators import petsc  # noqa: E402
 from rom.reduction.interfaces.connection import connect  # noqa: E402
 from rom.workflow import operators  # noqa: E402
 
@@ -29,7 +29,7 @@ KINDS = ("rbe2", "rbe3", rom.Polynomial(1), "full")
 @pytest.fixture(autouse=True)
 def searched(monkeypatch):
     """Small models, too, are searched by Lanczos."""
-    monkeypatch.setattr(petsc, "MAX_DENSE_DOFS", 0)
+    monkeypatch.setattr(search, "MAX_DENSE_DOFS", 0)
 
 
 def cut(size, cells, kept, material=STEEL, kind="hexahedron"):

@@ -1,16 +1,20 @@
 """The operator verbs: one test file over both implementations."""
 
+from itertools import product
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.linalg import eigh
 from scipy.optimize import brentq
-from scipy.sparse import csr_matrix, random
+from scipy.sparse import csr_matrix, identity, random
 
 import rom
 from cases.operators import KINDS
 from cases.solid import block
 from rom.bench.models import bar
+from rom.eigen import lanczos, search
 from rom.eigen.scipy import SciPyOperators
 from rom.eigen.supports import refuse_loose
 from rom.eigen.verbs import count_shift, mac, orthonormal, rigid_motions
@@ -76,41 +80,75 @@ def test_no_shift_loses_a_mode(make, model, exact, shift):
     assert_allclose(omega[6:], np.sqrt(exact[0][6:10]), rtol=1e-8)
 
 
-def test_a_mode_that_was_skipped_is_noticed(make, model, monkeypatch):
+def forgetful(function, searches):
+    """The same search without the third of its modes."""
+
+    def without_one(*arguments):
+        lam, Phi, *proven = function(*arguments)
+        searches.append(lam.size)
+        return np.delete(lam, 2), np.delete(Phi, 2, axis=1), *(False for _ in proven)
+
+    return without_one
+
+
+def test_a_mode_that_was_skipped_is_sought_again(make, model, exact, monkeypatch):
     """The solver is made to overlook one mode; the inertia count must tell."""
-    ops = make(model)
-    if isinstance(ops, SciPyOperators):
-        import rom.eigen.scipy as module
+    ops, root, searches = make(model), model.interfaces["root"].dofs, []
+    for name in ("by_blocks",) if isinstance(ops, SciPyOperators) else ("by_blocks", "lowest"):
+        whole = forgetful(getattr(type(ops), name), searches)
+        monkeypatch.setattr(type(ops), name, whole)
+    free = np.setdiff1d(np.arange(model.n_dofs), root)
+    K, M = (A.toarray()[np.ix_(free, free)] for A in (model.K, model.M))
+    held = eigh(K, M, eigvals_only=True)
+    for support, lam in ((root, held), (ops.hold(root), held), ((), exact[0])):
+        searches.clear()
+        omega, _ = ops.modes(support, 12)
+        assert_allclose(omega[6:] ** 2, lam[6:12], rtol=1e-9)
+        assert len(searches) == 2
 
-        whole = module.eigsh
 
-        def forgetful(*args, **kwargs):
-            lam, Phi = whole(*args, **kwargs)
-            keep = np.delete(np.argsort(lam), 2)
-            return lam[keep], Phi[:, keep]
-
-        monkeypatch.setattr(module, "eigsh", forgetful)
-    else:
-        whole_petsc = type(ops).lowest
-
-        def forgetful_petsc(self, *args, **kwargs):
-            lam, Phi = whole_petsc(self, *args, **kwargs)
-            return np.delete(lam, 2), np.delete(Phi, 2, axis=1)
-
-        blocks = type(ops).by_blocks
-
-        def forgetful_blocks(self, *args):
-            lam, Phi, _ = blocks(self, *args)
-            return np.delete(lam, 2), np.delete(Phi, 2, axis=1), False
-
-        monkeypatch.setattr(type(ops), "lowest", forgetful_petsc)
-        monkeypatch.setattr(type(ops), "by_blocks", forgetful_blocks)
-    root = model.interfaces["root"].dofs
+def test_modes_that_never_agree_with_the_count_are_missed(make, model, monkeypatch):
+    ops, root = make(model), model.interfaces["root"].dofs
+    monkeypatch.setattr(search, "MAX_LAST_DOFS", 0)
+    monkeypatch.setattr(lanczos.BlockLanczos, "prove", lambda *arguments: False)
+    count = type(ops).count_below
+    monkeypatch.setattr(type(ops), "count_below", lambda *arguments: 1 + count(*arguments))
     for held in (root, ops.hold(root), ()):
-        with pytest.raises(
-            ModesMissedError, match=r"modes were found below .* Hz, but the inertia"
-        ):
+        with pytest.raises(ModesMissedError, match=r"modes were found below .* but the inertia"):
             ops.modes(held, 12)
+
+
+def springs(n, i, j):
+    """(n, n) stiffness of unit springs between masses i and j, and as many unit masses."""
+    ends = np.concatenate([i, j, i, j]), np.concatenate([j, i, i, j])
+    values = np.repeat([-1.0, 1.0], 2 * len(i))
+    return SimpleNamespace(K=csr_matrix((values, ends), (n, n)), M=identity(n), points=None)
+
+
+def hypercube(d):
+    """2^d masses; the eigenvalue 2 k is there d! / k! / (d - k)! times."""
+    corner = np.arange(2**d)
+    i = np.concatenate([corner[corner >> b & 1 == 0] for b in range(d)])
+    return springs(2**d, i, i | np.repeat(2 ** np.arange(d), 2 ** (d - 1)))
+
+
+def equal_chains(k, n):
+    """Parts that nothing joins: k times as many equal frequencies, and motions at rest."""
+    i = np.arange(k * n).reshape(k, n)
+    return springs(k * n, i[:, :-1].ravel(), i[:, 1:].ravel())
+
+
+@pytest.mark.parametrize("body", [
+    hypercube(9), springs(400, np.zeros(399, dtype=int), np.arange(1, 400)), equal_chains(15, 40)
+], ids=["hypercube", "star", "chains"])  # fmt: skip
+def test_frequencies_are_found_as_often_as_they_are_there(make, body):
+    """Nine, 398 and 15 times, which no block of columns holds at once."""
+    ops, dense = make(body), body.K.toarray()
+    for held, m in product(([], np.arange(0, len(dense), 40)), (3, 30)):
+        exact = np.linalg.eigvalsh(np.delete(np.delete(dense, held, 0), held, 1))
+        omega, Phi = ops.modes(held, m)
+        assert_allclose(omega**2, exact[:m], rtol=1e-8, atol=1e-12)
+        assert_allclose(Phi.T @ Phi, np.eye(m), atol=1e-8)
 
 
 def test_new_coordinates_transform_both_matrices(make, model):

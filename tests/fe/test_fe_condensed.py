@@ -7,7 +7,7 @@ from scipy.linalg import eigh
 
 import rom
 from cases.boxes import box
-from rom.eigen import lanczos
+from rom.eigen import lanczos, search
 from rom.errors import InterfaceError
 
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")
@@ -17,7 +17,7 @@ from rom.eigen.completeness import LEAST_SHARE  # noqa: E402
 from rom.eigen.condensed import condensed  # noqa: E402
 from rom.eigen.verbs import constraint_modes  # noqa: E402
 from rom.fe.elasticity import assemble  # noqa: E402
-from rom.fe.operators import factor, petsc, spectrum  # noqa: E402
+from rom.fe.operators import factor, petsc  # noqa: E402
 from rom.reduction.interfaces.connection import connect  # noqa: E402
 from rom.workflow import operators  # noqa: E402
 
@@ -47,7 +47,7 @@ def matrices(ops):
 @pytest.mark.parametrize("kind", KINDS, ids=str)
 @pytest.mark.parametrize("fixed", [(), ("x0",), ("x0", "x1"), {"x0": "xyz", "x1": "xyz"}])
 def test_modes_in_every_support_are_those_of_the_matrices(kind, fixed, monkeypatch):
-    monkeypatch.setattr(petsc, "MAX_DENSE_DOFS", 0)
+    monkeypatch.setattr(search, "MAX_DENSE_DOFS", 0)
     monkeypatch.setattr(lanczos, "MAX_EXTRA_BLOCKS", 14)
     connection, parts = parts_of(beam((12, 3, 2)), {"x0": kind, "x1": kind})
     if isinstance(fixed, dict) and kind in ("rbe2", "rbe3"):
@@ -127,7 +127,7 @@ def test_random_columns_see_every_mode(kind, degree):
 
 def test_random_columns_are_normal_and_independent():
     ops = beam((24, 6, 5)).operators
-    X = spectrum.gaussian_block(ops, 6) * np.sqrt(ops.mass_diagonal)[:, None]
+    X = search.gaussian_block(ops, 6) * np.sqrt(ops.mass_diagonal)[:, None]
     n = X.size
     assert abs(X.mean()) < 4 / np.sqrt(n)
     assert abs(X.var() - 1) < 4 * np.sqrt(2 / n)
@@ -163,8 +163,8 @@ def test_shapes_that_are_not_static_are_replaced():
 def test_a_search_that_was_restarted_is_counted(monkeypatch):
     """What is left of the start after a restart proves nothing."""
     model, counted = beam((14, 4, 3)), []
-    monkeypatch.setattr(petsc, "MAX_DENSE_DOFS", 0)
-    monkeypatch.setattr(petsc, "verify_count", lambda *a: counted.append(1))
+    monkeypatch.setattr(search, "MAX_DENSE_DOFS", 0)
+    monkeypatch.setattr(petsc, "count_below", lambda *a: counted.append(1))
     held = model.operators.hold(model.interfaces["x0"].dofs)
     expected, _ = model.operators.modes(held, 10)
     assert not counted

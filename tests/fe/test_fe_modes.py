@@ -9,8 +9,8 @@ from scipy.linalg import eigh
 
 import rom
 from cases.boxes import box, faces_held
-from rom.eigen import lanczos
-from rom.errors import ConfigError, InterfaceError, ModelError, ModesMissedError, ResourceError
+from rom.eigen import lanczos, search
+from rom.errors import ConfigError, InterfaceError, ModelError, ResourceError
 
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")
 pytestmark = pytest.mark.fenicsx
@@ -39,7 +39,7 @@ def exact(small):
 @pytest.mark.parametrize("shift", [-1e4, -1e6, -2.6e7, -1e8])
 def test_the_297_dof_beam_keeps_its_six_rigid_motions(small, exact, shift, monkeypatch):
     """Without deflation Krylov-Schur finds 5, 3 or 2 of the six at these shifts, and is content."""
-    monkeypatch.setattr(petsc, "MAX_DENSE_DOFS", 0)
+    monkeypatch.setattr(search, "MAX_DENSE_DOFS", 0)
     assert small.n_dofs == 297
     omega, _ = small.operators.modes((), 8, sigma=shift)
     assert_allclose(omega[:6], 0.0, atol=0.0)
@@ -54,7 +54,7 @@ def test_inertia_counts_the_modes_below_a_shift(small, exact, sigma, count):
 
 
 def test_free_modes_are_those_of_the_dense_solver_and_clean(monkeypatch):
-    monkeypatch.setattr(petsc, "MAX_DENSE_DOFS", 0)
+    monkeypatch.setattr(search, "MAX_DENSE_DOFS", 0)
     model = beam((12, 3, 2))
     lam = eigh(model.K.toarray(), model.M.toarray(), eigvals_only=True)
     omega, Phi = model.operators.modes((), 20)
@@ -67,7 +67,7 @@ def test_free_modes_are_those_of_the_dense_solver_and_clean(monkeypatch):
 def test_a_restart_of_the_krylov_space_loses_nothing(monkeypatch):
     model = beam((14, 4, 3))
     held = model.operators.hold(model.interfaces["x0"].dofs)
-    monkeypatch.setattr(petsc, "MAX_DENSE_DOFS", 0)
+    monkeypatch.setattr(search, "MAX_DENSE_DOFS", 0)
     expected, _ = model.operators.modes(held, 30)
     monkeypatch.setattr(lanczos, "MAX_EXTRA_BLOCKS", 6)
     found, _ = model.operators.modes(held, 30)
@@ -77,10 +77,10 @@ def test_a_restart_of_the_krylov_space_loses_nothing(monkeypatch):
 def test_slepc_and_our_block_lanczos_find_the_same_modes(monkeypatch):
     """Dofs held go to SLEPc, a stiffness factored before to blocks; shapes and signs agree."""
     model, called = beam((14, 4, 3)), []
-    for name in ("krylov_schur", "BlockLanczos"):
-        real = getattr(petsc, name)
-        monkeypatch.setattr(petsc, name, lambda *a, _n=name, _r=real: called.append(_n) or _r(*a))
-    monkeypatch.setattr(petsc, "MAX_DENSE_DOFS", 0)
+    for module, name in ((petsc, "krylov_schur"), (search, "BlockLanczos")):
+        real = getattr(module, name)
+        monkeypatch.setattr(module, name, lambda *a, _n=name, _r=real: called.append(_n) or _r(*a))
+    monkeypatch.setattr(search, "MAX_DENSE_DOFS", 0)
     dofs = model.interfaces["x0"].dofs
     omega, Phi = model.operators.modes(dofs, 25)
     block_omega, block_Phi = model.operators.modes(model.operators.hold(dofs), 25)
@@ -91,7 +91,7 @@ def test_slepc_and_our_block_lanczos_find_the_same_modes(monkeypatch):
 
 def test_counting_in_the_place_of_the_factor_leaves_the_stiffness_as_it_was(monkeypatch):
     model = beam((10, 3, 3))
-    monkeypatch.setattr(petsc, "MAX_DENSE_DOFS", 0)
+    monkeypatch.setattr(search, "MAX_DENSE_DOFS", 0)
     held = model.operators.hold(model.interfaces["x0"].dofs)
     before = held.inner.K.norm()
     first, _ = model.operators.modes(held, 12, finished=True)
@@ -113,21 +113,15 @@ def diagonal_operators(lam):
     return petsc.PETScOperators(K, M)
 
 
-def test_a_krylov_space_that_closes_early_is_left_for_another():
+@pytest.mark.parametrize("copies", [2 * lanczos.BLOCK_SIZE, 350])
+def test_a_krylov_space_that_closes_early_is_left_for_another(copies):
     """Two eigenvalues: a block finds as many vectors of each as it has, and then nothing new."""
-    m = 2 * lanczos.BLOCK_SIZE
-    lam = np.repeat([1.0, 4.0], [m, 700 - m])
+    m = 2 * lanczos.BLOCK_SIZE + 1
+    lam = np.repeat([1.0, 4.0], [copies, 700 - copies])
     ops = diagonal_operators(lam)
     omega, Phi = ops.modes(ops.hold([699]), m)
     assert_allclose(omega**2, lam[:m], rtol=1e-10)
     assert_allclose(Phi.T @ Phi, np.eye(m), atol=1e-9)
-
-
-def test_more_equal_modes_than_a_block_has_columns_are_noticed():
-    lam = np.repeat([1.0, 4.0], 350)
-    ops = diagonal_operators(lam)
-    with pytest.raises(ModesMissedError, match=r"inertia of K - sigma M counts [36]"):
-        ops.modes(ops.hold([699]), 2 * lanczos.BLOCK_SIZE + 1)
 
 
 def test_the_shift_comes_from_the_model(small, exact):
@@ -149,7 +143,7 @@ def test_modes_of_equal_frequency_do_not_depend_on_the_way_they_were_found():
     assert_allclose(omega[0], omega[1], rtol=1e-9)
     Q, _ = np.linalg.qr(np.random.default_rng(0).normal(size=(2, 2)))
     turned = np.hstack([Phi[:, :2] @ Q, Phi[:, 2:]])
-    again = spectrum.signed(ops, spectrum.settled(ops, omega**2, turned))
+    again = spectrum.signed(ops, search.settled(ops, omega**2, turned))
     assert_allclose(again, Phi, atol=1e-9 * np.abs(Phi).max())
 
 
@@ -255,20 +249,6 @@ def test_everything_held_leaves_the_identity(small):
     assert small.operators.modes(held, 0)[0].size == 0
     with pytest.raises(ConfigError, match="ask for 0 to 0 modes"):
         small.operators.modes(held, 1)
-
-
-def test_a_forgotten_mode_is_missed(monkeypatch):
-    model = beam((14, 4, 3))
-    monkeypatch.setattr(petsc, "MAX_DENSE_DOFS", 0)
-    whole = petsc.krylov_schur
-
-    def forgetful(*arguments):
-        lam, Phi = whole(*arguments)
-        return np.delete(lam, 1), np.delete(Phi, 1, axis=1)
-
-    monkeypatch.setattr(petsc, "krylov_schur", forgetful)
-    with pytest.raises(ModesMissedError, match="inertia of K - sigma M counts"):
-        model.operators.modes((), 12)
 
 
 def test_the_memory_law_follows_the_measured_factors():

@@ -24,8 +24,7 @@ from rom.cyclic.blades.records import ReducedBlade
 from rom.cyclic.faces import interpolation
 from rom.cyclic.rotation import arms, rotation_matrices
 from rom.cyclic.sector import all_rows, region
-from rom.eigen.scipy import SciPyOperators
-from rom.eigen.verbs import dofs_of
+from rom.eigen.verbs import dofs_of, every_row, own_rows
 from rom.errors import ConfigError, InterfaceError
 from rom.model import Array, FEModel, Index, Interface
 from rom.names import offered
@@ -83,18 +82,20 @@ def reduced_blade(
     E = np.zeros((K.shape[0], 3 * Q.shape[1]))
     E[dofs] = np.kron(Q, np.eye(3))
     mine = np.union1d(inner, dofs)
-    ops = SciPyOperators(K[mine][:, mine], M[mine][:, mine])
+    ops = sector.workers.operators(K[mine][:, mine], M[mine][:, mine], together=True)
     held = ops.hold(np.searchsorted(mine, dofs))
     _, Phi = ops.modes(held, n_modes)
     Psi = np.zeros((K.shape[0], E.shape[1] + n_modes))
-    Psi[mine] = np.hstack([E[mine] - held(ops.apply_K(E[mine])), Phi])
+    E = own_rows(ops, E[mine])
+    Psi[mine] = every_row(ops, np.hstack([E - held(ops.apply_K(E)), Phi]))
     found = blade_in(K, M, Psi, E.shape[1])
     if sector.root_moved is None:
         return found
     u = np.zeros((K.shape[0], 1))
     u[dofs, 0] = (like @ sector.root_moved).ravel()
     pull = (M @ arms(sector, model.points).ravel())[:, None]
-    u[mine] += held(pull[mine] - ops.apply_K(u[mine]))
+    pull = own_rows(ops, pull[mine]) - ops.apply_K(own_rows(ops, u[mine]))
+    u[mine] += every_row(ops, held(pull))
     return turning(found, M, stresses_of(model, blade), sector.axis, u[:, 0])
 
 

@@ -17,7 +17,7 @@ from rom.cyclic.blades.records import SubstructuredSector
 from rom.cyclic.reduced import ReducedSector, face_functions, projected
 from rom.cyclic.rotation import centrifugal_displacement
 from rom.cyclic.sector import CyclicSector, all_rows, region
-from rom.eigen.verbs import dofs_of
+from rom.eigen.verbs import dofs_of, every_row, own_rows
 from rom.errors import ConfigError, InterfaceError
 from rom.model import Array, FEModel
 from rom.reduction.interfaces.polynomial import FourierLegendre, Polynomial, interface_functions
@@ -83,12 +83,13 @@ def substructured_sector(
     E[sector.slave, q : 2 * q] = sector.coupling @ E[sector.master, :q]
     E[shared, 2 * q :] = np.kron(Q_root, np.eye(3))
     E[sector.held] = 0.0
-    ops, cuts = sector.workers.operators(sector.K, sector.M), np.union1d(faces, sector.held)
-    cuts = np.union1d(cuts, shared)
+    ops = sector.workers.operators(sector.K, sector.M, together=True)
+    cuts, E = np.union1d(np.union1d(faces, sector.held), shared), own_rows(ops, E)
     static = E - ops.hold(cuts)(ops.apply_K(E))
     omega, disk = ops.modes(np.union1d(cuts, inner), n_modes)
     _, cantilever = ops.modes(np.setdiff1d(np.arange(sector.n), inner), n_blade_modes)
-    small = projected(sector, np.hstack([static, disk, cantilever]), q, omega)
+    Psi = every_row(ops, np.hstack([static, disk, cantilever]))
+    small = projected(sector, Psi, q, omega)
     root_at = 2 * q + np.arange(r)
     modes_at = 2 * q + r + n_modes + np.arange(n_blade_modes)
     Psi = np.zeros((sector.n, r + n_blade_modes))

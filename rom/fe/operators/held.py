@@ -4,53 +4,26 @@ from typing import Any
 
 import numpy as np
 
+from rom.eigen.search import RIGID_RTOL, HeldBody
 from rom.errors import InterfaceError
 from rom.fe.operators.place import moves_most
 from rom.model import Array, Index
 
-RIGID_RTOL = 1e-13  # eigenvalue of a motion without stiffness, of the largest one
 COARSE_RTOL = 1e-2  # residual of solutions that only show whether there is stiffness
 SHIFT_RTOL = 1e-9  # of the largest eigenvalue: below zero, where a singular stiffness has a factor
 
 
-class HeldPETSc:
-    """K with the held dofs eliminated, factored once by MUMPS; call it to solve.
-
-    Attributes:
-        held: the dofs held, global numbers.
-        n_free: number of the others.
-        inner: operators on the others, None when there are none.
-        factor: of their stiffness.
-    """
+class HeldPETSc(HeldBody):
+    """K with the held dofs eliminated, factored once by MUMPS; call it to solve."""
 
     def __init__(self, ops: Any, held: Index, shift: float = 0.0):
-        self.ops, self.held, self.shift = ops, held, shift
-        mine = np.arange(ops.first, ops.first + ops.n_local)
-        self.mine = np.flatnonzero(~np.isin(mine, held))
-        self.n_free = ops.n - held.size
-        self.inner: Any = None
-        self.factor: Any = None
+        super().__init__(ops, held, shift)
         if self.n_free:
-            self.inner = ops.part(self.mine)
             if ops.solver.iterative:
                 self._refuse_loose()
             self.make()
             if not shift:
                 self._refuse_free_motion()
-
-    def __call__(self, F: Array) -> Array:
-        """Solve K_ii X_i = F_i; rows of held dofs come back zero."""
-        X = np.zeros(F.shape)
-        if self.inner is not None:
-            if self.factor is None:
-                self.make()
-            X[self.mine] = self.factor.solve(F[self.mine])
-        return X
-
-    def release(self) -> None:
-        """Give the memory of the factor back; it is made again if it is needed."""
-        self.factor.release()
-        self.factor = None
 
     def make(self) -> None:
         """Factor the stiffness, or K - shift M."""
@@ -85,15 +58,15 @@ class HeldPETSc:
 
     def _refuse_free_motion(self) -> None:
         """A rigid motion that is not held has, after one inverse iteration, no stiffness."""
-        ops, stiffness, X = self.ops, 0.0, np.zeros((self.mine.size, 1))
+        ops, stiff, X = self.ops, False, np.zeros((self.mine.size, 1))
         if self.factor.ok:
             R = np.column_stack([ops.fixed]) if ops.rigid is None else ops.rigid
             X = self._coarsely_solved(ops.apply_M(R)[self.mine])
             if ops.all_finite(X):
-                K = self.inner.gram(X, self.inner.apply_K(X))
-                M = self.inner.gram(X, self.inner.apply_M(X))
-                stiffness = (np.diag(K) / np.diag(M)).min()
-        if not stiffness > RIGID_RTOL * self.inner.largest():
+                together = np.diag(self.inner.gram(X, self.inner.apply_K(X)))
+                alone = self.inner.gram(X, self.inner.stiffness_diagonal[:, None] * X)
+                stiff = bool((together > RIGID_RTOL * np.diag(alone)).all())
+        if not stiff:
             if not self.factor.ok and not ops.solver.out_of_core:
                 X = self._loose()
             raise self._singular(moves_most(ops, X, self.mine))

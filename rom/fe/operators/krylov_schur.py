@@ -15,6 +15,7 @@ from rom.model import Array
 from rom.process.stopwatch import SEARCH_PIECE, piece
 
 EIGENVALUE_RTOL = 1e-11  # SLEPc's residual, of the eigenvalue
+QUOTIENT_RTOL = 1e-6  # of a Rayleigh quotient's distance from the shift: what an error leaves
 MAX_RESTARTS = 500
 
 
@@ -59,7 +60,7 @@ def krylov_schur(
         solver.setDeflationSpace([vector(ops.K, column) for column in deflated.T])
     with piece(SEARCH_PIECE):
         solver.solve()
-    pairs = mode_pairs(ops, solver, k)
+    pairs = mode_pairs(ops, solver, k, sigma)
     solver.destroy()  # it refers to the factor, which could not be freed
     return pairs
 
@@ -95,8 +96,13 @@ def vector(A: Any, values: Array) -> Any:
     return x
 
 
-def mode_pairs(ops: Any, solver: SLEPc.EPS, k: int) -> tuple[Array, Array]:
-    """The k lowest eigenvalues a solver has found, and their mass-normalised modes."""
+def mode_pairs(ops: Any, solver: SLEPc.EPS, k: int, sigma: float) -> tuple[Array, Array]:
+    """The k lowest eigenvalues a solver has found, and their mass-normalised modes.
+
+    Raises:
+        SolverError: if there are less, or the modes have other Rayleigh quotients: with a factor
+            that is round-off a space looks converged and is not.
+    """
     n_found = solver.getConverged()
     if n_found < k:
         raise SolverError(
@@ -109,5 +115,14 @@ def mode_pairs(ops: Any, solver: SLEPc.EPS, k: int) -> tuple[Array, Array]:
         solver.getEigenvector(i, x)
         Phi[:, i] = x.array
     order = np.argsort(lam)[:k]
-    Phi = Phi[:, order]
-    return lam[order], Phi / np.sqrt(np.diag(ops.gram(Phi, ops.apply_M(Phi))))
+    lam, Phi = lam[order], Phi[:, order]
+    Phi = Phi / np.sqrt(np.diag(ops.gram(Phi, ops.apply_M(Phi))))
+    quotients = np.diag(ops.gram(Phi, ops.apply_K(Phi)))
+    worst = (np.abs(quotients - lam) / np.abs(quotients - sigma)).max()
+    if worst > QUOTIENT_RTOL:
+        raise SolverError(
+            f"modes that look converged differ from their Rayleigh quotients by {worst:.1e}.",
+            hint="Stiffness or mass may span more than thirteen digits; hold the body, or name "
+            "another shift sigma.",
+        )
+    return lam, Phi

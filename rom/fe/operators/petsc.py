@@ -13,21 +13,19 @@ from petsc4py import PETSc
 
 import numpy as np
 import numpy.typing as npt
-from scipy.linalg import eigh
 from scipy.sparse import csr_matrix
 
-from rom.eigen.condensed import Supported
-from rom.eigen.lanczos import BLOCK_SIZE, EIGENVALUE_RTOLS, BlockLanczos, capacity
 from rom.eigen.scipy import dof_set
-from rom.eigen.verbs import Weighted, orthonormal
-from rom.errors import ConfigError, ModelError, SolverError
+from rom.eigen.search import N_SPARE_MODES, ModeSearch
+from rom.eigen.verbs import Weighted
+from rom.errors import ConfigError, SolverError
 from rom.fe.costs import comparison_pays, cost_of
 from rom.fe.operators.aij import aij, chosen, gathered, symmetrized, weighted
 from rom.fe.operators.corrected import Corrected
-from rom.fe.operators.counting import verify_count
+from rom.fe.operators.counting import count_below
 from rom.fe.operators.factor import Factor, dense_rows
 from rom.fe.operators.foreseen import check_factor_memory
-from rom.fe.operators.held import RIGID_RTOL, HeldPETSc
+from rom.fe.operators.held import HeldPETSc
 from rom.fe.operators.iterative.gradients import ConjugateGradients, Inverse, refined
 from rom.fe.operators.iterative.multigrid import multigrid
 from rom.fe.operators.iterative.search import lowest_modes
@@ -35,19 +33,15 @@ from rom.fe.operators.krylov_schur import krylov_schur
 from rom.fe.operators.memory import give_back
 from rom.fe.operators.place import moves_most
 from rom.fe.operators.solver import DIRECT_SOLVER, Solver
-from rom.fe.operators.spectrum import first_elastic, fixed_vector, gaussian_block, settled, signed
+from rom.fe.operators.spectrum import first_elastic, fixed_vector, signed
 from rom.fe.operators.substructures.shared import substructured
 from rom.fe.operators.workers import AllRanks
 from rom.model import Array, Index
-from rom.process.stopwatch import SEARCH_PIECE, piece
 
-N_SPARE_MODES = 3  # beyond the ones asked for, so that a gap for counting is found
 MAX_CARRIED_DOFS = 100  # each costs two solutions; more are worked into the matrix
-MAX_DENSE_DOFS = 300  # all eigenvalues are computed at once up to here
-SHIFT_RATIO = 0.02  # of the first elastic eigenvalue, below zero: K - sigma M is positive definite
 
 
-class PETScOperators:
+class PETScOperators(ModeSearch):
     """Stiffness and mass of one body, rows distributed over the ranks.
 
     Args:
@@ -125,7 +119,7 @@ class PETScOperators:
 
     def largest(self) -> float:
         """Estimate of the largest eigenvalue from the diagonals."""
-        ratio = self.K.getDiagonal().array / self.M.getDiagonal().array
+        ratio = self.stiffness_diagonal / self.mass_diagonal
         return float(self.comm.allreduce(ratio.max(initial=0.0), op=MPI.MAX))
 
     def hold(self, dofs: npt.ArrayLike, shift: float = 0.0) -> HeldPETSc:
@@ -208,121 +202,6 @@ class PETScOperators:
         fields: dict[str, Any] = {"T": self.T, "fixed": self.fixed, "parent": self.parent}
         return PETScOperators(K, M, rigid, **fields, solver=solver or self.solver)
 
-    def modes(
-        self,
-        held: npt.ArrayLike | HeldPETSc | Supported,
-        m: int,
-        sigma: float | None = None,
-        *,
-        finished: bool = False,
-    ) -> tuple[Array, Array]:
-        """Lowest m modes, mass-normalised: omega (m,) [rad/s] and Phi (n_local, m)."""
-        if isinstance(held, Supported):
-            return self._condensed_modes(held, m)
-        in_blocks = isinstance(held, HeldPETSc)
-        if not isinstance(held, HeldPETSc):
-            if np.size(held) == 0:
-                return self._free_modes(m, sigma)
-            held, finished = self.hold(held), True
-        elif held.factor is None and held.n_free:
-            held.make()
-        if not 0 <= m <= held.n_free:
-            raise ConfigError(
-                f"n_modes={m}, but {self.n} dofs minus {held.held.size} boundary dofs leave "
-                f"{held.n_free} interior dofs; ask for 0 to {held.n_free} modes."
-            )
-        lam, Phi = np.zeros(0), np.zeros((self.n_local, m))
-        if m:
-            how = {"in_blocks": in_blocks, "finished": finished}
-            lam, Phi[held.mine] = held.inner.supported_modes(m, held, **how)
-        return np.sqrt(lam), signed(self, Phi)
-
-    def supported_modes(
-        self, m: int, held: HeldPETSc, *, in_blocks: bool, finished: bool
-    ) -> tuple[Array, Array]:
-        """Lowest m eigenpairs of a body that cannot move as a whole, K factored."""
-        if self.n <= max(MAX_DENSE_DOFS, capacity(m + N_SPARE_MODES)):
-            lam, Phi = self.all_modes()
-        else:
-            none = np.zeros((self.n_local, 0))
-            if in_blocks and not self.solver.iterative:
-                lam, Phi, proven = self.by_blocks(m, 0.0, held.factor, none)
-            else:
-                lam, Phi = self.lowest(m + N_SPARE_MODES, 0.0, held.factor, none)
-                proven = False
-            if not proven:
-                verify_count(self, lam, m, 0, held.factor if finished else None)
-            if finished and not proven:
-                held.release()
-        return lam[:m], settled(self, lam, Phi)[:, :m]
-
-    def _condensed_modes(self, support: Supported, m: int) -> tuple[Array, Array]:
-        """Lowest m modes with the factor of the inside alone; where they leave a doubt, with all.
-
-        The other path factors the whole body anew, searches by SLEPc and counts.
-        """
-        free = not support.dofs.size
-        R = orthonormal(self, self.rigid) if free and self.rigid is not None else None
-        R = np.zeros((self.n_local, 0)) if R is None else R
-        n_elastic = m - R.shape[1]
-        room = capacity(n_elastic + N_SPARE_MODES) + R.shape[1] + support.dofs.size
-        if n_elastic <= 0 or self.n <= max(MAX_DENSE_DOFS, room):
-            return self.modes(support.dofs, m)
-        lam, Phi, proven = self.by_blocks(n_elastic, 0.0, support, R)
-        if not proven:
-            return self.modes(support.dofs, m)
-        lam, Phi = lam[:n_elastic], settled(self, lam, Phi)[:, :n_elastic]
-        omega = np.concatenate([np.zeros(R.shape[1]), np.sqrt(lam)])
-        return omega, np.hstack([R, signed(self, Phi)])
-
-    def by_blocks(
-        self, m: int, sigma: float, inverse: Any, deflated: Array
-    ) -> tuple[Array, Array, bool]:
-        """Some more than m eigenvalues above sigma, modes, and whether surely none is missing."""
-        with piece(SEARCH_PIECE):
-            k = min(m + N_SPARE_MODES, self.n - deflated.shape[1])
-            start = gaussian_block(self, BLOCK_SIZE)
-            start[getattr(inverse, "mine", [])] = 0.0  # rows that a support holds
-            sought = np.repeat(EIGENVALUE_RTOLS, [max(m, 1), k - max(m, 1)])
-            space = BlockLanczos(self, inverse, sigma, deflated, start, sought)
-            space.solve()
-            proven = space.prove(m)
-            return *space.pairs(), proven
-
-    def _free_modes(self, m: int, sigma: float | None) -> tuple[Array, Array]:
-        if not 0 <= m <= self.n:
-            raise ConfigError(f"n_modes={m}, but the model has {self.n} dofs.")
-        R = np.zeros((self.n_local, 0)) if self.rigid is None else orthonormal(self, self.rigid)
-        n_elastic = max(m - R.shape[1], 0)
-        lam, Phi = self._elastic_modes(R, n_elastic, sigma)
-        omega = np.concatenate([np.zeros(R.shape[1]), np.sqrt(np.maximum(lam, 0.0))])
-        return omega[:m], np.hstack([R, signed(self, Phi)])[:, :m]
-
-    def _elastic_modes(self, R: Array, m: int, sigma: float | None) -> tuple[Array, Array]:
-        """The m modes above the rigid ones."""
-        n_rigid = R.shape[1]
-        if m == 0:
-            return np.zeros(0), np.zeros((self.n_local, 0))
-        if self.n <= max(MAX_DENSE_DOFS, capacity(m + N_SPARE_MODES) + n_rigid):
-            lam, Phi = (part[..., n_rigid:] for part in self.all_modes())
-        else:
-            sigma = -SHIFT_RATIO * first_elastic(self) if sigma is None else sigma
-            inverse = self.inverse(self.shifted(sigma), self.rigid)
-            lam, Phi = self.lowest(m + N_SPARE_MODES, sigma, inverse, R)
-            inverse.release()  # counting needs its memory
-            self._refuse_mechanisms(lam, Phi, n_rigid)
-            verify_count(self, lam, m, n_rigid)
-        return lam[:m], settled(self, lam, Phi)[:, :m]
-
-    def _refuse_mechanisms(self, lam: Array, Phi: Array, n_rigid: int) -> None:
-        loose = np.abs(lam) < RIGID_RTOL * self.largest()
-        if n_rigid and loose.any():
-            raise ModelError(
-                f"at least {loose.sum()} more motions without stiffness than the six of a "
-                f"connected body.{moves_most(self, Phi[:, loose])}",
-                hint="Parts of the mesh are not connected, or joined at a point or an edge only.",
-            )
-
     def inverse(self, A: PETSc.Mat, near_null: Array | None, n_columns: int = 0) -> Inverse:
         """A^-1 of a positive definite matrix by the solver chosen.
 
@@ -373,40 +252,61 @@ class PETScOperators:
         A.axpy(-sigma, self.M, PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
         return A
 
+    def shift_inverse(self, sigma: float) -> Inverse:
+        """(K - sigma M)^-1 for a shift below all eigenvalues, see `inverse`."""
+        return self.inverse(self.shifted(sigma), self.rigid)
+
     def lowest(
-        self, k: int, sigma: float, factor: Inverse | Corrected, deflated: Array
+        self, k: int, sigma: float, inverse: Inverse | Corrected, deflated: Array
     ) -> tuple[Array, Array]:
         """The k eigenvalues above sigma beside the deflated columns, and their modes."""
-        if self.solver.iterative and isinstance(factor, ConjugateGradients):
+        if self.solver.iterative and isinstance(inverse, ConjugateGradients):
             spare = min(N_SPARE_MODES, k - 1)
-            return lowest_modes(self, factor, sigma, deflated, k - spare, spare)
-        if isinstance(factor, ConjugateGradients):
-            return self.by_blocks(k - N_SPARE_MODES, sigma, factor, deflated)[:2]
-        return krylov_schur(self, factor, sigma, deflated, k)
+            return lowest_modes(self, inverse, sigma, deflated, k - spare, spare)
+        if isinstance(inverse, ConjugateGradients):
+            return super().lowest(k, sigma, inverse, deflated)
+        return krylov_schur(self, inverse, sigma, deflated, k)
+
+    def by_blocks(
+        self, m: int, sigma: float, inverse: Any, deflated: Array
+    ) -> tuple[Array, Array, bool]:
+        """Some more than m eigenpairs; without a factor, by another search of blocks."""
+        if self.solver.iterative and isinstance(inverse, ConjugateGradients):
+            return *self.lowest(m + N_SPARE_MODES, sigma, inverse, deflated), False
+        return super().by_blocks(m, sigma, inverse, deflated)
+
+    def first_elastic(self, R: Array) -> float:
+        """Estimate of the first elastic eigenvalue, for the choice of a shift."""
+        return first_elastic(self)
+
+    def count_below(self, sigma: float, spent: Any = None) -> int | None:
+        """Number of eigenvalues below sigma, see `counting`."""
+        return count_below(self, sigma, spent)
+
+    def signed(self, Phi: Array) -> Array:
+        """Columns with their largest entry, over all ranks, positive."""
+        return signed(self, Phi)
+
+    def where(self, Phi: Array) -> str:
+        """Words for the place that moves most."""
+        return moves_most(self, Phi)
+
+    @cached_property
+    def stiffness_diagonal(self) -> Array:
+        """(n_local,) diagonal of K."""
+        return self.K.getDiagonal().array.copy()
 
     @cached_property
     def mass_diagonal(self) -> Array:
         """(n_local,) diagonal of M."""
         return self.M.getDiagonal().array.copy()
 
-    def all_modes(self) -> tuple[Array, Array]:
-        """All eigenpairs of a small model, solved densely on every rank."""
-        E = np.eye(self.n)[self.first : self.first + self.n_local]
-        K, M = (self.rows(apply(E), np.arange(self.n)) for apply in (self.apply_K, self.apply_M))
-        lam, Phi = eigh(K, M)
-        return lam, Phi[self.first : self.first + self.n_local]
-
 
 class WholeOperators(PETScOperators):
     """All rows on one rank, in coordinates of any kind; all eigenvalues may be double."""
 
     geometric = False
-
-    def lowest(
-        self, k: int, sigma: float, factor: Inverse | Corrected, deflated: Array
-    ) -> tuple[Array, Array]:
-        """By blocks, which find equal eigenvalues together."""
-        return self.by_blocks(k - N_SPARE_MODES, sigma, factor, deflated)[:2]
+    lowest = ModeSearch.lowest  # by blocks, which find equal eigenvalues together
 
 
 class TiedOperators(PETScOperators):
@@ -527,9 +427,10 @@ class CarryingOperators(TiedOperators):
         self.own_rows, self.carried, self.bare = own, carried, self.parent.part(own)
         self.own, self.fixed = np.full(own.size, -1), self.bare.fixed
 
-    def largest(self) -> float:
-        """Estimate of the largest eigenvalue from the diagonals, without what is carried."""
-        return self.bare.largest()
+    @property
+    def stiffness_diagonal(self) -> Array:
+        """(n_local,) diagonal of K, without what is carried."""
+        return self.bare.stiffness_diagonal
 
     def stiffness_inverse(self, near_null: Array | None, n_columns: int = 0) -> Inverse | Corrected:
         """K^-1 by the factor of P^T K P and a correction of low rank."""

@@ -1,6 +1,5 @@
 """What makes modes the same for any number of ranks, and the shift with which they are sought."""
 
-from itertools import pairwise
 from typing import Any
 
 from mpi4py import MPI
@@ -8,18 +7,11 @@ from mpi4py import MPI
 import numpy as np
 from scipy.linalg import eigh
 
+from rom.eigen.search import ESTIMATE_SHIFT, estimated_by_iteration
 from rom.fe.operators.factor import Factor
-from rom.fe.operators.held import RIGID_RTOL
 from rom.model import Array
 
-CLUSTER_RTOL = 1e-7  # distance of eigenvalues whose modes are only defined as a plane
 EQUAL_ENTRY_RTOL = 1e-6  # difference of entries that count as equally large
-PLACE_SCALE = 2.0**40  # places that differ by less are one
-COUNTER_STEP = np.uint64(0x9E3779B97F4A7C15)  # 2^64 over the golden ratio: steps of the counter
-MIXING_STEPS = (  # Steele, Lea and Flood, OOPSLA 2014, with the constants of Stafford
-    (np.uint64(30), np.uint64(0xBF58476D1CE4E5B9)),
-    (np.uint64(27), np.uint64(0x94D049BB133111EB)),
-)
 DIRECTIONS = np.array([[3.1, 1.7, 2.3], [1.3, 3.7, 1.9], [2.1, 1.1, 3.3]])  # no symmetry
 
 
@@ -36,27 +28,6 @@ def fixed_vector(comm: MPI.Comm, rigid: Array | None, first: int, n_local: int) 
     high = comm.allreduce(points.max(axis=0, initial=-np.inf), op=MAXIMUM_OP)
     size = (high - low).max()
     return np.sin((points - low) / size @ DIRECTIONS + np.arange(1.0, 4.0)).ravel()
-
-
-def gaussian_block(ops: Any, k: int, n_before: int = 0) -> Array:
-    """(n_local, k) Gaussian columns with components of about one in all modes.
-
-    The numbers depend on the place of a dof, mixed beyond recognition, and not on its rank. Blocks
-    are independent when each is given how many columns were drawn before it.
-    """
-    key = np.round(ops.fixed * PLACE_SCALE).astype(np.int64).view(np.uint64)
-    numbers = np.arange(1 + 2 * n_before, 1 + 2 * (n_before + k), dtype=np.uint64)
-    counter = key[:, None] + COUNTER_STEP * numbers
-    u = (_mixed(counter) >> np.uint64(11)).astype(float) * 2.0**-53 + 2.0**-54
-    normal = np.sqrt(-2.0 * np.log(u[:, :k])) * np.cos(2.0 * np.pi * u[:, k:])  # Box and Muller
-    return normal / np.sqrt(np.maximum(ops.mass_diagonal, np.finfo(float).tiny))[:, None]
-
-
-def _mixed(x: Any) -> Any:
-    """64 bits of which each depends on all those given: the finaliser of SplitMix64."""
-    for shift, factor in MIXING_STEPS:
-        x = (x ^ (x >> shift)) * factor
-    return x ^ (x >> np.uint64(31))
 
 
 def points_of(rigid: Array) -> Array:
@@ -111,33 +82,11 @@ def _by_polynomials(ops: Any) -> float:
 
 def _by_inverse_iteration(ops: Any) -> float:
     """Smallest eigenvalue that is not zero, estimated without geometry."""
-    floor = RIGID_RTOL * ops.largest()
-    factor = Factor(ops.shifted(-1e-6 * ops.largest()), definite=True, solver=ops.solver)
-    X = ops.fixed[:, None] ** np.arange(1.0, 9.0)
-    for _ in range(4):
-        X = factor.solve(ops.apply_M(X))
-        X = np.linalg.solve(np.linalg.cholesky(ops.gram(X, X)), X.T).T
-    lam = eigh(ops.gram(X, ops.apply_K(X)), ops.gram(X, ops.apply_M(X)), eigvals_only=True)
-    return float(max(lam[np.argmax(lam > floor)], floor))
-
-
-def settled(ops: Any, lam: Array, Phi: Array) -> Array:
-    """Modes with equal frequencies turned within their plane to the same place on any machine.
-
-    Args:
-        ops: the operators the modes belong to.
-        lam: (m,) ascending eigenvalues.
-        Phi: (n_local, m) mass-normalised modes.
-    """
-    Phi = Phi.copy()
-    apart = np.diff(lam) > CLUSTER_RTOL * np.abs(lam[1:])
-    edges = np.concatenate([[0], np.flatnonzero(apart) + 1, [lam.size]])
-    for start, end in pairwise(edges):
-        if end - start > 1:
-            probes = ops.fixed[:, None] ** np.arange(1, end - start + 1)
-            Q, _ = np.linalg.qr(ops.gram(Phi[:, start:end], probes))
-            Phi[:, start:end] = Phi[:, start:end] @ Q
-    return Phi
+    shifted = ops.shifted(-ESTIMATE_SHIFT * ops.largest())
+    factor = Factor(shifted, definite=True, solver=ops.solver)
+    found = estimated_by_iteration(ops, factor, np.zeros((ops.n_local, 0)))
+    factor.release()
+    return found
 
 
 def signed(ops: Any, Phi: Array) -> Array:

@@ -32,18 +32,26 @@ class AllRanks:
     n_ranks: int
     kind: Callable[..., Any]
 
-    def operators(self, K: Any, M: Any, rigid: Array | None = None) -> Any:
-        """The verbs by PETSc on this rank alone."""
-        collect(MPI.COMM_SELF)  # what the last ones have left
+    def operators(
+        self, K: Any, M: Any, rigid: Array | None = None, *, together: bool = False
+    ) -> Any:
+        """The verbs by PETSc, on this rank alone or by rows."""
+        comm = self.comm if together else MPI.COMM_SELF
+        collect(comm)  # what the last ones have left
         checked = SciPyOperators(K, M)
-        n = checked.n
-        A, B = (_alone(part) for part in (checked.K, checked.M))
-        return self.kind(A, B, rigid, fixed=np.sin(1.0 + np.arange(n)))
+        mine = share(checked.n, comm)
+        A, B = (some_rows(part, comm) for part in (checked.K, checked.M))
+        some = None if rigid is None else rigid[mine]
+        return self.kind(A, B, some, fixed=checked.fixed[mine])
+
+    @property
+    def comm(self) -> MPI.Comm:
+        """The ranks that have the matrices."""
+        return MPI.COMM_SELF if self.n_ranks == 1 else MPI.COMM_WORLD
 
     def factor(self, A: Any, *, pivoting: bool = False) -> "SharedFactor | None":
         """By MUMPS over the ranks, which pivots where it must."""
-        comm = MPI.COMM_SELF if self.n_ranks == 1 else MPI.COMM_WORLD
-        factor = SharedFactor(csr_matrix(A), comm)
+        factor = SharedFactor(csr_matrix(A), self.comm)
         return factor if factor.factor.ok else None
 
     def each(
@@ -64,11 +72,8 @@ class SharedFactor:
     """A symmetric matrix (n, n) that all ranks have, factored by MUMPS over them."""
 
     def __init__(self, A: csr_matrix, comm: MPI.Comm):
-        n = A.shape[0]
-        self.comm = comm
-        self.first, end = (n * (comm.rank + k) // comm.size for k in (0, 1))
-        self.end, sizes = end, ((end - self.first, n),) * 2
-        self.factor = Factor(aij(A[self.first : end], sizes, comm), definite=False)
+        self.comm, self.mine = comm, share(A.shape[0], comm)
+        self.factor = Factor(some_rows(A, comm), definite=False)
 
     @property
     def definite(self) -> bool:
@@ -77,7 +82,7 @@ class SharedFactor:
 
     def solve(self, f: Array) -> Array:
         """A^-1 f on all ranks."""
-        x = self.factor.solve(f[self.first : self.end, None])[:, 0]
+        x = self.factor.solve(f[self.mine, None])[:, 0]
         return np.concatenate(self.comm.allgather(x))
 
 
@@ -95,6 +100,12 @@ def shared_out(costs: Sequence[float], n_ranks: int) -> Index:
     return owners
 
 
-def _alone(A: csr_matrix) -> Any:
-    n = A.shape[0]
-    return aij(A, ((n, n), (n, n)), MPI.COMM_SELF)
+def share(n: int, comm: MPI.Comm) -> slice:
+    """Rows of this rank, of n that ranks share equally."""
+    return slice(*(n * (comm.rank + k) // comm.size for k in (0, 1)))
+
+
+def some_rows(A: csr_matrix, comm: MPI.Comm) -> Any:
+    """A PETSc matrix of ranks that all have the whole of it."""
+    n, mine = A.shape[0], share(A.shape[0], comm)
+    return aij(A[mine], ((mine.stop - mine.start, n),) * 2, comm)

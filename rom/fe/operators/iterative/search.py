@@ -5,11 +5,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from rom.eigen.search import gaussian_block
 from rom.errors import ModesMissedError, SolverError
 from rom.fe.operators.factor import dense_rows
 from rom.fe.operators.iterative.definite import GAP_SHARE, N_COLUMNS, searched, spectral_bounds
 from rom.fe.operators.iterative.gradients import ConjugateGradients
-from rom.fe.operators.spectrum import gaussian_block
 from rom.model import Array
 from rom.process.stopwatch import MISS_NOTE, RESIDUAL_NOTE, SEARCH_PIECE, note, piece
 

@@ -1,0 +1,390 @@
+"""The lowest modes of a body, free or held, whoever factors and wherever its rows live.
+
+A Krylov space that begins with p columns holds p of equal frequencies, and any search may pass one
+over. What a count by inertia finds missing is sought beside what was found, until they agree.
+"""
+
+from collections.abc import Callable
+from itertools import pairwise
+from typing import Any, cast
+
+import numpy as np
+from scipy.linalg import LinAlgError, eigh, eigvalsh
+
+from rom.eigen.condensed import Supported
+from rom.eigen.lanczos import BLOCK_SIZE, EIGENVALUE_RTOLS, BlockLanczos, capacity
+from rom.eigen.verbs import Operators, count_shift, every_row, orthonormal, own_rows
+from rom.errors import ConfigError, ModelError, ModesMissedError, QualityGateError, SolverError
+from rom.model import Array, Index
+from rom.process.stopwatch import SEARCH_PIECE, piece
+
+N_SPARE_MODES = 3  # beyond the ones asked for, so that a gap for counting is found
+MAX_DENSE_DOFS = 300  # all eigenvalues are computed at once up to here
+MAX_SEARCHES = 12  # for what a count misses; a cluster seen in part doubles what is sought
+MAX_LAST_DOFS = 2000  # the same where a search does not come to an end: some seconds
+SHIFT_RATIO = 0.02  # of the first elastic eigenvalue, below zero: K - sigma M is positive definite
+RIGID_RTOL = 1e-13  # energy of a motion over that of its dofs alone, below which it has none
+CLUSTER_RTOL = 1e-7  # distance of eigenvalues whose modes are only defined as a plane
+ESTIMATE_SHIFT = 1e-6  # of the largest eigenvalue, below zero, with which the first is estimated
+ESTIMATE_STEPS = 4  # of inverse iteration, on eight columns
+ALL_LOOSE_RATIO = 1e5  # estimate over round-off where all columns have found motions at rest
+NO_INERTIA = "some motion would have no inertia"
+PLACE_SCALE = 2.0**40  # places that differ by less are one
+COUNTER_STEP = np.uint64(0x9E3779B97F4A7C15)  # 2^64 over the golden ratio: steps of the counter
+MIXING_STEPS = (  # Steele, Lea and Flood, OOPSLA 2014, with the constants of Stafford
+    (np.uint64(30), np.uint64(0xBF58476D1CE4E5B9)),
+    (np.uint64(27), np.uint64(0x94D049BB133111EB)),
+)
+Seek = Callable[[int, Array], tuple[Array, Array, bool]]
+
+
+class HeldBody:
+    """A body with some dofs held, its stiffness factored for many answers; call it to solve.
+
+    Attributes:
+        held: the dofs held, global numbers.
+        mine: rows of this rank that are free.
+        n_free: number of free dofs.
+        inner: operators on them, None when there are none.
+        factor: of their stiffness, or of K - shift M; None while nobody needs it.
+    """
+
+    def __init__(self, ops: Any, held: Index, shift: float = 0.0):
+        self.ops, self.held, self.shift = ops, held, shift
+        self.mine = np.flatnonzero(~np.isin(np.arange(ops.first, ops.first + ops.n_local), held))
+        self.n_free = ops.n - held.size
+        self.inner: Any = ops.part(self.mine) if self.n_free else None
+        self.factor: Any = None
+
+    def __call__(self, F: Array) -> Array:
+        """Solve K_ii X_i = F_i; rows of held dofs come back zero."""
+        X = np.zeros(F.shape)
+        if self.inner is not None:
+            X[self.mine] = self.made().solve(F[self.mine])
+        return X
+
+    def made(self) -> Any:
+        """The factor, made again if its memory was given back."""
+        if self.factor is None:
+            self.make()
+        return self.factor
+
+    def make(self) -> None:
+        """Factor the stiffness, or K - shift M."""
+        raise NotImplementedError
+
+    def release(self) -> None:
+        """Give the memory of the factor back; it is made again if it is needed."""
+        if self.factor is not None:
+            self.factor.release()
+        self.factor = None
+
+
+class ModeSearch:
+    """What operators search by: `rom.eigen.scipy.SciPyOperators` and those of PETSc.
+
+    Beside the verbs they know ``fixed``, (n_local,) numbers that depend on the place of a dof,
+    and the diagonals of their matrices, ``stiffness_diagonal`` and ``mass_diagonal``.
+    """
+
+    n: int
+    n_local: int
+    rigid: Array | None
+    fixed: Array
+    hold: Any
+    gram: Callable[[Array, Array], Array]
+    signed: Callable[[Array], Array]
+    shift_inverse: Callable[[float], Any]
+    first_elastic: Callable[[Array], float]
+    count_below: Callable[..., int | None]
+    where: Callable[[Array], str]
+    stiffness_diagonal: Any
+    mass_diagonal: Any
+
+    def modes(
+        self,
+        held: Any,
+        m: int,
+        sigma: float | None = None,
+        *,
+        finished: bool = False,
+    ) -> tuple[Array, Array]:
+        """Lowest m modes, mass-normalised: omega (m,) [rad/s] and Phi (n_local, m)."""
+        if isinstance(held, Supported):
+            return self._condensed_modes(held, m)
+        in_blocks = isinstance(held, HeldBody)
+        if not isinstance(held, HeldBody):
+            if np.size(held) == 0:
+                return self._free_modes(m, sigma)
+            held, finished = self.hold(held), True
+        if not 0 <= m <= held.n_free:
+            raise ConfigError(
+                f"n_modes={m}, but {self.n} dofs minus {held.held.size} boundary dofs leave "
+                f"{held.n_free} interior dofs; ask for 0 to {held.n_free} modes."
+            )
+        lam, Phi = np.zeros(0), np.zeros((self.n_local, m))
+        if m:
+            how = {"in_blocks": in_blocks, "finished": finished}
+            lam, Phi[held.mine] = held.inner.supported_modes(m, held, **how)
+        return np.sqrt(lam), self.signed(Phi)
+
+    def supported_modes(
+        self, m: int, held: HeldBody, *, in_blocks: bool, finished: bool
+    ) -> tuple[Array, Array]:
+        """Lowest m eigenpairs of a body that cannot move as a whole, K factored."""
+
+        def seek(k: int, found: Array) -> tuple[Array, Array, bool]:
+            blocks = in_blocks or found.shape[1] > 0
+            return self._sought(k, 0.0, held.made(), found, blocks=blocks)
+
+        def count(sigma: float) -> int | None:
+            number = self.count_below(sigma, held.factor if finished else None)
+            if finished:
+                held.release()
+            return number
+
+        if self._all_at_once(m, 0):
+            lam, Phi = self.all_modes()
+        else:
+            lam, Phi = self._complete(m, np.zeros((self.n_local, 0)), seek, count)
+        return lam[:m], settled(self, lam, Phi)[:, :m]
+
+    def _condensed_modes(self, support: Supported, m: int) -> tuple[Array, Array]:
+        """Lowest m modes with the factor of the inside alone; where they leave a doubt, with all.
+
+        The other path factors the whole body anew, and counts.
+        """
+        R = np.zeros((self.n_local, 0)) if support.dofs.size else self._rigid_modes()
+        n_elastic = m - R.shape[1]
+        if n_elastic <= 0 or self._all_at_once(n_elastic, R.shape[1] + support.dofs.size):
+            return self.modes(support.dofs, m)
+        lam, Phi, proven = self.by_blocks(n_elastic, 0.0, support, R)
+        if not proven:
+            return self.modes(support.dofs, m)
+        lam, Phi = lam[:n_elastic], settled(self, lam, Phi)[:, :n_elastic]
+        omega = np.concatenate([np.zeros(R.shape[1]), np.sqrt(lam)])
+        return omega, np.hstack([R, self.signed(Phi)])
+
+    def _free_modes(self, m: int, sigma: float | None) -> tuple[Array, Array]:
+        if not 0 <= m <= self.n:
+            raise ConfigError(f"n_modes={m}, but the model has {self.n} dofs.")
+        R = self._rigid_modes()
+        lam, Phi = self._elastic_modes(R, max(m - R.shape[1], 0), sigma)
+        omega = np.concatenate([np.zeros(R.shape[1]), np.sqrt(lam)])
+        return omega[:m], np.hstack([R, self.signed(Phi)])[:, :m]
+
+    def _rigid_modes(self) -> Array:
+        """M-orthonormal rigid motions, from the geometry or, without one, none."""
+        if self.rigid is None:
+            return np.zeros((self.n_local, 0))
+        return orthonormal(cast(Operators, self), self.rigid)
+
+    def _elastic_modes(self, R: Array, m: int, sigma: float | None) -> tuple[Array, Array]:
+        """The m modes above the rigid ones."""
+        n_rigid = R.shape[1]
+        if m == 0:
+            return np.zeros(0), np.zeros((self.n_local, 0))
+        if self._all_at_once(m, n_rigid):
+            lam, Phi = (part[..., n_rigid:] for part in self.all_modes())
+        else:
+            shift = -SHIFT_RATIO * self.first_elastic(R) if sigma is None else sigma
+
+            def seek(k: int, found: Array) -> tuple[Array, Array, bool]:
+                inverse = self.shift_inverse(shift)
+                lam, Phi, _ = self._sought(
+                    k, shift, inverse, found, blocks=found.shape[1] > n_rigid
+                )
+                inverse.release()  # counting needs its memory
+                self._refuse_mechanisms(lam, Phi, n_rigid)
+                return np.where(self._at_rest(Phi, lam), 0.0, lam), Phi, False
+
+            def count(sigma: float) -> int | None:
+                number = self.count_below(sigma)
+                return None if number is None else number - n_rigid
+
+            lam, Phi = self._complete(m, R, seek, count)
+        lam = np.where(self._at_rest(Phi, lam), 0.0, lam)
+        return lam[:m], settled(self, lam, Phi)[:, :m]
+
+    def _at_rest(self, Phi: Array, lam: Array) -> Any:
+        """(m,) True for mass-normalised motions without stiffness."""
+        alone = self.gram(Phi, self.stiffness_diagonal[:, None] * Phi)
+        return lam < RIGID_RTOL * np.diag(alone)
+
+    def _refuse_mechanisms(self, lam: Array, Phi: Array, n_rigid: int) -> None:
+        loose = self._at_rest(Phi, lam)
+        if n_rigid and loose.any():
+            raise ModelError(
+                f"at least {loose.sum()} more motions without stiffness than the six of a "
+                f"connected body.{self.where(Phi[:, loose])}",
+                hint="Parts of the mesh are not connected, or joined at a point or an edge only.",
+            )
+
+    def _all_at_once(self, m: int, beside: int) -> bool:
+        """Whether a space for m modes would be the whole of a small body."""
+        return self.n <= max(MAX_DENSE_DOFS, capacity(m + N_SPARE_MODES) + beside)
+
+    def _sought(
+        self, k: int, sigma: float, inverse: Any, found: Array, *, blocks: bool
+    ) -> tuple[Array, Array, bool]:
+        """The k lowest eigenpairs and some more beside those found, and whether surely all."""
+        if blocks:
+            return self.by_blocks(k, sigma, inverse, found)
+        return *self.lowest(k + N_SPARE_MODES, sigma, inverse, found), False
+
+    def _complete(
+        self, m: int, deflated: Array, seek: Seek, count: Callable[[float], int | None]
+    ) -> tuple[Array, Array]:
+        """At least m eigenpairs, ascending, none of the lowest missing.
+
+        What does not come to an end is left, for a small body, to a dense solution.
+
+        Args:
+            m: number of modes wanted.
+            deflated: (n_local, d) modes known before, which the count leaves out.
+            seek: finds so many eigenpairs beside those given, some more, and whether surely all.
+            count: number of eigenvalues below a shift; None where nothing can be counted.
+
+        Raises:
+            ModesMissedError: if search and count do not come to agree.
+            SolverError: if a search does not converge.
+        """
+        try:
+            return self._counted(m, deflated, seek, count)
+        except (ModesMissedError, SolverError):
+            self.refuse_wrong_mass()
+            if self.n > MAX_LAST_DOFS:
+                raise
+        lam, Phi = self.all_modes()
+        return lam[deflated.shape[1] :], Phi[:, deflated.shape[1] :]
+
+    def _counted(
+        self, m: int, deflated: Array, seek: Seek, count: Callable[[float], int | None]
+    ) -> tuple[Array, Array]:
+        """Search and count until they agree, see `_complete`."""
+        lam, Phi, proven = seek(m, deflated)
+        for _ in range(MAX_SEARCHES):
+            if proven:
+                return lam, Phi
+            found, sigma = count_shift(lam, m)
+            number: int | None = found
+            lacking = lam.size  # without a gap the cluster goes on
+            if lam[found] - lam[found - 1] > CLUSTER_RTOL * lam[found]:
+                number = count(sigma)
+                if number is None or number == found:
+                    return lam, Phi
+                lacking = number - found
+            if lacking < 0 or self._all_at_once(lam.size + lacking, deflated.shape[1]):
+                break
+            more, Psi, _ = seek(lacking, np.hstack([deflated, Phi]))
+            lam, Phi = np.concatenate([lam, more]), np.hstack([Phi, Psi])
+            order = np.argsort(lam, kind="stable")
+            lam, Phi = lam[order], Phi[:, order]
+        raise ModesMissedError(
+            f"{found} modes were found below {np.sqrt(sigma) / (2 * np.pi):.6g} Hz, "
+            f"but the inertia of K - sigma M counts {number}.",
+            hint="Ask for more modes, or give another shift sigma.",
+        )
+
+    def all_modes(self) -> tuple[Array, Array]:
+        """All eigenpairs of a small body, solved densely on every rank.
+
+        Raises:
+            QualityGateError: if its mass is not positive definite.
+        """
+        ops, E = cast(Operators, self), np.eye(self.n)
+        K, M = (every_row(ops, apply(own_rows(ops, E))) for apply in (ops.apply_K, ops.apply_M))
+        try:
+            lam, Phi = eigh(K, M)
+        except LinAlgError as error:
+            n_negative = int(np.count_nonzero(eigvalsh(M) <= 0.0))
+            raise indefinite("M", n_negative, NO_INERTIA) from error
+        return lam, own_rows(ops, Phi)
+
+    def refuse_wrong_mass(self) -> None:
+        """Say so where the mass is why search and count differ."""
+
+    def lowest(self, k: int, sigma: float, inverse: Any, deflated: Array) -> tuple[Array, Array]:
+        """The k eigenvalues above sigma beside the deflated columns, and their modes."""
+        return self.by_blocks(k - N_SPARE_MODES, sigma, inverse, deflated)[:2]
+
+    def by_blocks(
+        self, m: int, sigma: float, inverse: Any, deflated: Array
+    ) -> tuple[Array, Array, bool]:
+        """Some more than m eigenvalues above sigma, modes, and whether surely none is missing."""
+        with piece(SEARCH_PIECE):
+            k = min(m + N_SPARE_MODES, self.n - deflated.shape[1])
+            start = gaussian_block(self, BLOCK_SIZE, BLOCK_SIZE * deflated.shape[1])
+            start[getattr(inverse, "mine", [])] = 0.0  # rows that a support holds
+            sought = np.repeat(EIGENVALUE_RTOLS, [max(m, 1), k - max(m, 1)])
+            space = BlockLanczos(self, inverse, sigma, deflated, start, sought)
+            space.solve()
+            proven = space.prove(m)
+            return *space.pairs(), proven
+
+
+def indefinite(name: str, n_negative: int, meaning: str) -> QualityGateError:
+    """The error of a matrix that should be positive definite, and what it means that it is not."""
+    return QualityGateError(
+        f"{name} has {n_negative} negative eigenvalues: {meaning}.",
+        hint="Check signs and supports where the matrix was made.",
+    )
+
+
+def gaussian_block(ops: Any, k: int, n_before: int = 0) -> Array:
+    """(n_local, k) Gaussian columns with components of about one in all modes.
+
+    The numbers depend on the place of a dof, mixed beyond recognition, and not on its rank. Blocks
+    are independent when each is given how many columns were drawn before it.
+    """
+    key = np.round(ops.fixed * PLACE_SCALE).astype(np.int64).view(np.uint64)
+    numbers = np.arange(1 + 2 * n_before, 1 + 2 * (n_before + k), dtype=np.uint64)
+    counter = key[:, None] + COUNTER_STEP * numbers
+    u = (_mixed(counter) >> np.uint64(11)).astype(float) * 2.0**-53 + 2.0**-54
+    normal = np.sqrt(-2.0 * np.log(u[:, :k])) * np.cos(2.0 * np.pi * u[:, k:])  # Box and Muller
+    return normal / np.sqrt(np.maximum(ops.mass_diagonal, np.finfo(float).tiny))[:, None]
+
+
+def _mixed(x: Any) -> Any:
+    """64 bits of which each depends on all those given: the finaliser of SplitMix64."""
+    for shift, factor in MIXING_STEPS:
+        x = (x ^ (x >> shift)) * factor
+    return x ^ (x >> np.uint64(31))
+
+
+def settled(ops: Any, lam: Array, Phi: Array) -> Array:
+    """Modes with equal frequencies turned within their plane to the same place on any machine.
+
+    Args:
+        ops: the operators the modes belong to.
+        lam: (m,) ascending eigenvalues.
+        Phi: (n_local, m) mass-normalised modes.
+    """
+    Phi = Phi.copy()
+    apart = np.diff(lam) > CLUSTER_RTOL * np.abs(lam[1:])
+    edges = np.concatenate([[0], np.flatnonzero(apart) + 1, [lam.size]])
+    for start, end in pairwise(edges):
+        if end - start > 1:
+            probes = ops.fixed[:, None] ** np.arange(1, end - start + 1)
+            Q, _ = np.linalg.qr(ops.gram(Phi[:, start:end], probes))
+            Phi[:, start:end] = Phi[:, start:end] @ Q
+    return Phi
+
+
+def estimated_by_iteration(ops: Any, factor: Any, R: Array) -> float:
+    """The least eigenvalue that is not zero, estimated without geometry.
+
+    Args:
+        ops: the operators of the body.
+        factor: of its stiffness with a little mass, `ESTIMATE_SHIFT`.
+        R: (n_local, r) M-orthonormal motions to leave out.
+    """
+    X = gaussian_block(ops, BLOCK_SIZE)
+    for _ in range(ESTIMATE_STEPS):
+        X = X - R @ ops.gram(R, ops.apply_M(X))
+        X = orthonormal(ops, factor.solve(ops.apply_M(X)))
+    lam, U = np.linalg.eigh(ops.gram(X, ops.apply_K(X)))
+    X = X @ U
+    floor = RIGID_RTOL * np.diag(ops.gram(X, ops.stiffness_diagonal[:, None] * X))
+    elastic = lam[lam > floor]
+    return float(elastic.min() if elastic.size else ALL_LOOSE_RATIO * floor.max())
