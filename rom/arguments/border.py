@@ -25,7 +25,8 @@ def typed(public: Public) -> Public:
     Booleans are no numbers, numbers are finite, whole numbers fit eight bytes, paths are no
     numbers and no bytes. What stands for the same thing becomes it: scalars of NumPy, one name
     where names are wanted, any iterable for a tuple, lists for arrays. Missing and unknown
-    arguments remain a TypeError of Python.
+    arguments remain a TypeError of Python; a record that says in ``TAKEN_BY`` who takes it is
+    refused by all others in these words.
 
     Annotations are read at the first call. A class that is imported for type checks alone is known
     by its name: an object of it cannot exist unless somebody else has imported it.
@@ -83,6 +84,11 @@ class _Border:
         Raises:
             ConfigError: naming the one that it does not take.
         """
+        for name, value in named.items():
+            owners = getattr(type(value), "TAKEN_BY", None)
+            if owners and name not in self.takes and not self.more:
+                text = f"{name} = {shortened(value)} is for {owners} alone."
+                raise ConfigError(text, where=self._label(args, named), hint=f"Leave {name} out.")
         given = zip(self._places(len(args)), args, strict=True)
         try:
             return (

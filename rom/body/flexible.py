@@ -249,7 +249,8 @@ class FlexibleBody(BodyData):
         Raises:
             ConfigError: if no interface is held, or the axis has no direction.
             InterfaceError: if an interface is unknown.
-            ModelError: if an interface of a basis of free-free modes alone is held.
+            ModelError: for a body of large deflection, and if an interface of a basis of free-free
+                modes alone is held.
 
         Warns:
             RomWarning: if the body has no geometric stiffness, or rotation makes it unstable.

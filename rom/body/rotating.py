@@ -37,8 +37,15 @@ def rotating_frequencies(
     Raises:
         ConfigError: if no interface is held, or the first in part; if the axis has no direction.
         InterfaceError: if an interface is unknown.
-        ModelError: if an interface of a basis of free-free modes alone is held.
+        ModelError: for a body of large deflection, and if an interface of a basis of free-free
+            modes alone is held.
     """
+    if body.quartic is not None:
+        raise ModelError(
+            f"body {body.name!r} is one of large deflection, which rotation bends and stretches "
+            "far: its frequencies are those about the state that it turns in.",
+            hint="Put it into a mechanism: rom.linearize(mech, rom.equilibrium(mech, spin=...)).",
+        )
     w, arm = speed * unit_vector("axis", axis), finite("at", at, (3,))
     if not fixed:
         raise ConfigError("a rotating body needs a support: name the interfaces in fixed=(...).")

@@ -2,7 +2,7 @@
 
 Each component of the load range alone, of either sign, and several together in proportions that no
 shape was made for: at steps of the load the state of the full model, its displacement, and its
-frequencies about that state.
+frequencies about that state, and how far each interface yields there to what else acts on it.
 """
 
 from dataclasses import dataclass, replace
@@ -15,7 +15,7 @@ from scipy.linalg import eigh
 from rom.body.flexible import FlexibleBody
 from rom.body.nonlinear.cauchy import CauchyRecovery
 from rom.body.nonlinear.full import N_TANGENT, HeldSolid
-from rom.body.nonlinear.ranges import Geometric, axis_point, held_motions, nodal_forces
+from rom.body.nonlinear.ranges import Geometric, Load, axis_point, held_motions, nodal_forces
 from rom.body.nonlinear.statics import follow, free_motions
 from rom.body.projection import cauchy_recovery
 from rom.eigen.verbs import Operators
@@ -25,6 +25,7 @@ from rom.rows import row
 
 DISPLACEMENT_RTOL = 5e-3  # of the largest load, in the mean square over the mass
 TANGENT_RTOL = 2e-2  # small errors of stress are large ones of the stiffness it gives a thin body
+COMPLIANCE_RTOL = 5e-2  # to forces and moments of all directions, beside the range as well
 STRESS_RTOL = 5e-2  # over all of the surface, of the mean square; it has the errors of slopes
 MESH_RTOL = 5e-3  # of the energy; a bent line is then stiffer by half as much again
 SMALL_SHARE = 1e-3  # of the largest load, under which nothing turns
@@ -60,11 +61,15 @@ def deflection_rows(
         neo_hookean=geometric.sampling is not None,
     )  # fmt: skip
     quartic, still = body.energy(), body.mean_rows(geometric.fixed)
-    tangent = Tangent(body, still)
     E_local, ends = E, list[Array]()
     E = full.whole(E)
     about = axis_point(geometric, model, body.reference)
     units = full.whole(nodal_forces(geometric.components(), model, ops, about))
+    held = held_motions(geometric, model.interfaces)
+    further = [load for name in geometric.loads for k in range(6)
+               if (load := Load(name, k)) not in held]  # fmt: skip
+    F = full.whole(nodal_forces(further, model, ops, about))
+    tangent = Tangent(body, still, E.T @ F)
     rows, table = list[Row](), dict[str, Any]()
     for name, case in load_cases(geometric).items():
         W = units @ case
@@ -80,7 +85,7 @@ def deflection_rows(
             a = full.state(u, share * W)
             if a is None:
                 break
-            step = _compared(full, tangent, u, q, a)
+            step = _compared(full, tangent, F, (u, q, a))
             if isinstance(body.stress, CauchyRecovery):
                 mine = slice(ops.first, ops.first + ops.n_local)
                 known = cauchy_recovery(model, (full.T @ a)[mine, None]).field(np.ones(1))
@@ -88,15 +93,15 @@ def deflection_rows(
                 step = replace(step, stress=float(gap))
             steps.append(step)
         rows += case_rows(name, steps)
-        held = len(list(takewhile(_holds, steps)))
+        n_held = len(list(takewhile(_holds, steps)))
         table[name] = {
             "case": case.tolist(),
             "share": list(STEP_SHARES[: len(steps)]),
             "displacement": [step.displacement for step in steps],
             "frequencies": [step.frequencies for step in steps],
-            "holds to": STEP_SHARES[held - 1] if held else 0.0,
-            "energy": quartic.energy(path[held - 1]) if held else 0.0,
-            "turn": _turn(body, path[held - 1]) if held else 0.0,
+            "holds to": STEP_SHARES[n_held - 1] if n_held else 0.0,
+            "energy": quartic.energy(path[n_held - 1]) if n_held else 0.0,
+            "turn": _turn(body, path[n_held - 1]) if n_held else 0.0,
         }
     coarse = _added_by_cells(model, E_local @ np.array(ends).T)
     rows.append(row("energy that cells add, too coarse to bend so far", coarse, MESH_RTOL))
@@ -138,20 +143,32 @@ class Step:
         displacement: distance of the two, relative, in the mean square over the mass [1].
         reached: displacement of the body along that of the full model, as a share of it [1].
         frequencies: largest relative error of the lowest frequencies about it [1].
+        compliance: the same of displacements of the interfaces of the range, each by a small
+            further force or moment along itself [1].
         stress: distance of the stress on the surface, relative, in the mean square [1].
     """
 
     displacement: float
     reached: float
     frequencies: float
+    compliance: float = 0.0
     stress: float | None = None
 
 
-def _compared(full: HeldSolid, body: "Tangent", u: Array, q: Array, a: Array) -> Step:
-    """The body at u (n,) against the full model in equilibrium at a (m,)."""
+def _compared(
+    full: HeldSolid, body: "Tangent", F: Array, at: tuple[Array, Array, Array]
+) -> Step:  # fmt: skip
+    """The body at u (n,), q (r,) against the full model in equilibrium at a (m,).
+
+    F: (n, k) forces under which both yield.
+    """
+    u, q, a = at
+    soft = full.softness(a)
     with np.errstate(divide="ignore", invalid="ignore"):  # the full model may have no stiffness
-        gaps = np.abs(body.frequencies(q) / full.frequencies(a) - 1)
-    return Step(full.distance(u, a), full.reached(u, a), float(gaps.max()))
+        gaps = np.abs(body.frequencies(q) / full.frequencies(soft) - 1)
+        yields = np.abs(body.compliances(q) / full.compliances(soft, F) - 1)
+    worst = float(gaps.max()), float(yields.max(initial=0.0))
+    return Step(full.distance(u, a), full.reached(u, a), *worst)
 
 
 def _holds(step: Step) -> bool:
@@ -168,6 +185,8 @@ def case_rows(name: str, steps: list[Step]) -> list[Row]:
     rows.append(row(f"{name}: displacement", displacement, DISPLACEMENT_RTOL))
     frequencies = max(step.frequencies for step in steps)
     rows.append(row(f"{name}: frequencies about it", frequencies, TANGENT_RTOL))
+    compliance = max(step.compliance for step in steps)
+    rows.append(row(f"{name}: compliance of interfaces about it", compliance, COMPLIANCE_RTOL))
     if stresses := [step.stress for step in steps if step.stress is not None]:
         rows.append(row(f"{name}: stress", max(stresses), STRESS_RTOL))
     reached = min(step.reached for step in steps)
@@ -204,10 +223,11 @@ class Tangent:
     Args:
         body: of large deflection.
         held: (h, r) motions that vanish.
+        F: (r, k) forces under which it yields.
     """
 
-    def __init__(self, body: FlexibleBody, held: Array):
-        self.energy = body.energy()
+    def __init__(self, body: FlexibleBody, held: Array, F: Array):
+        self.energy, self.F = body.energy(), F
         self.N = free_motions(held)
         self.M = self.N.T @ body.M @ self.N
 
@@ -216,3 +236,8 @@ class Tangent:
         K = self.N.T @ self.energy.tangent(q) @ self.N
         lam = eigh(K, self.M, eigvals_only=True)[:N_TANGENT]
         return np.sqrt(np.maximum(lam, 0.0))
+
+    def compliances(self, q: Array) -> Array:
+        """(k,) displacements of unit forces along themselves about the state q (r,) [m/N]."""
+        F, K = self.N.T @ self.F, self.N.T @ self.energy.tangent(q) @ self.N
+        return np.asarray((F * np.linalg.solve(K, F)).sum(axis=0))

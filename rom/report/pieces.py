@@ -144,7 +144,8 @@ def _compared(
     u, v = np.vstack(found), np.vstack(known)
     size = float((v * v).sum())
     omega = 2 * np.pi * linearize(rest.mech, rest.state, n=N_TANGENT).frequencies[:N_TANGENT]
-    gaps = np.abs(omega / full.frequencies(a, W) - 1)
+    turning = bool(W[a.size :].any())
+    gaps = np.abs(omega / full.frequencies(full.softness(a, W), symmetric=not turning) - 1)
     distance = float(np.sqrt(((u - v) ** 2).sum() / size))
     return Step(distance, float((u * v).sum()) / size, float(gaps.max()))
 

@@ -273,6 +273,14 @@ def test_missing_arguments_are_a_type_error_of_python(given):
         rom.save(body(), "x", ending=".npz")
 
 
+@pytest.mark.parametrize("function", [rom.reduce_parametric, rom.reduce_sector, rom.linearize])
+def test_large_deflection_is_refused_by_name_where_it_is_not_taken(function):
+    with pytest.raises(
+        rom.ConfigError, match=rf"{function.__name__}: .* is for rom\.reduce, .*out"
+    ):
+        function(nonlinear=rom.Geometric({"tip": (0, 1.0, 0, 0, 0, 0)}))
+
+
 def drawn():
     """Functions that draw, argument by argument."""
     for name in rom.view.__all__:

@@ -138,7 +138,7 @@ class HeldSolid:
         for _ in range(MAX_ITERATIONS):
             u = self.T @ a
             gap = self.T.T @ (self._pushed(u, W) - self.solid.force(u))
-            soft = self._softness(a, W)
+            soft = self.softness(a, W)
             if soft is None:
                 return None
             step = soft(np.r_[gap, -self.C @ a])
@@ -157,9 +157,9 @@ class HeldSolid:
             found[section.dofs] += section.force(section.covariance(u), moment)
         return found
 
-    def _moments(self, u: Array, W: Array) -> Iterator[tuple[TurningSection, Array]]:
+    def _moments(self, u: Array, W: Array | None) -> Iterator[tuple[TurningSection, Array]]:
         """Each section, and the moment on it."""
-        if W.size == u.size:
+        if W is None or W.size == u.size:
             return iter(())
         return zip(self.sections, W[u.size :].reshape(-1, 3), strict=True)
 
@@ -180,11 +180,11 @@ class HeldSolid:
         gap = self.inside.solve(self.T.T @ u) - a
         return float(np.sqrt((gap @ self.M @ gap) / (a @ self.M @ a)))
 
-    def _softness(self, a: Array, W: Array) -> Callable[[Array], Array] | None:
-        """Displacement (m,) by forces and motions of what is held (m + h,), about a state.
+    def softness(self, a: Array, W: Array | None = None) -> Callable[[Array], Array] | None:
+        """Displacement (m,) by forces and motions of what is held (m + h,), about a state (m,).
 
-        Moments that turn have a stiffness of low rank, X Y^T, which is not symmetric. None where
-        there is no stiffness.
+        Moments that turn, of the load W that the state bears, have a stiffness of low rank, X Y^T,
+        which is not symmetric. None where there is no stiffness.
 
         Source:
             Woodbury's formula, Golub and Van Loan, Matrix Computations (2013), section 2.1.4.
@@ -211,15 +211,16 @@ class HeldSolid:
 
         return turning
 
-    def frequencies(self, a: Array, W: Array | None = None) -> Array:
-        """(k,) lowest frequencies about the state a (m,) [rad/s].
+    def frequencies(
+        self, soft: Callable[[Array], Array] | None, *, symmetric: bool = True
+    ) -> Array:
+        """(k,) lowest frequencies about the state with this softness [rad/s].
 
         Args:
-            a: the state.
-            W: the load that it bears, if that has moments.
+            soft: see `softness`.
+            symmetric: whether the state bears no moments that turn.
         """
-        n, W = a.size, np.zeros(self.T.shape[0]) if W is None else W
-        soft, held = self._softness(a, W), np.zeros(self.C.shape[0])
+        n, held = self.M.shape[0], np.zeros(self.C.shape[0])
         if soft is None:
             return np.zeros(N_TANGENT)
 
@@ -228,12 +229,19 @@ class HeldSolid:
 
         start = np.sin(1.0 + np.arange(n))  # the same on all ranks, which solve together
         options: dict[str, Any] = {"v0": start, "return_eigenvectors": False}
-        if W[self.T.shape[0] :].any():
+        if not symmetric:
             squares = 1 / eigs(inverse(self.M.dot), N_TANGENT, **options).real
         else:
             squares = eigsh(self.M, N_TANGENT, self.M, sigma=0.0, OPinv=inverse(lambda x: x),
                             **options)  # fmt: skip
         return np.sqrt(np.sort(np.maximum(squares, 0.0)))
+
+    def compliances(self, soft: Callable[[Array], Array] | None, F: Array) -> Array:
+        """(k,) displacements of unit forces F (n, k) along themselves about a state [m/N]."""
+        if soft is None:
+            return np.full(F.shape[1], np.inf)
+        held, forces = np.zeros(self.C.shape[0]), self.T.T @ F
+        return np.array([f @ soft(np.r_[f, held]) for f in forces.T])
 
 
 def rows_of(A: Any) -> csr_matrix:

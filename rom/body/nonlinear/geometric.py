@@ -61,6 +61,7 @@ class Shapes:
     Attributes:
         E: (n_local, r) nodal shapes, those that move an interface first.
         loads: (r, l) forces of the components of the load range at their largest [N].
+        further: (r, k) the same of all unit forces and moments on the interfaces of the range.
         held: (h, r) motions that supports let vanish.
         n_basis: how many of them the basis has already.
         sections: of the interfaces with moments.
@@ -68,6 +69,7 @@ class Shapes:
 
     E: Array
     loads: Array
+    further: Array
     held: Array
     n_basis: int
     sections: list["Section"]
@@ -128,7 +130,7 @@ def enriched(
     passed = _states(geometric, quartic, shapes)
     states = np.vstack(passed)
     _refuse_collapse(geometric, energy.least_stretch(shapes.E @ states.T), list(map(len, passed)))
-    modes = _modes_about(states, quartic, quadratic(ops, ops.apply_M, shapes.E), shapes.held)
+    modes = _small_motions(states, quartic, quadratic(ops, ops.apply_M, shapes.E), shapes)
     added = theta @ _principal(
         geometric, states[:, shapes.n_basis :].T, modes[:, shapes.n_basis :].T
     )
@@ -264,7 +266,10 @@ def _with_derivatives(
     components = geometric.components()
     sections = [Section.of(ops, F, E, _moments(name, components))
                 for name, F in zip(bent, units, strict=True)]  # fmt: skip
-    return Shapes(E, forces(components, E), forces(held, E).T, n_basis, sections), theta
+    loads, still = forces(components, E), forces(held, E).T
+    # a given number of shapes is spent on the loads of the range alone
+    further = forces(every if geometric.n_shapes is None else [], E)
+    return Shapes(E, loads, further, still, n_basis, sections), theta
 
 
 def _snapshots(
@@ -418,20 +423,23 @@ def _turned(quartic: Quartic, shapes: Shapes, case: Array, states: Array) -> Arr
     return np.vstack([q, states])
 
 
-def _modes_about(states: Array, quartic: Quartic, M: Array, held: Array) -> Array:
-    """(s m, r) lowest modes about each state (s, r), of the energy 1/2.
+def _small_motions(states: Array, quartic: Quartic, M: Array, shapes: Shapes) -> Array:
+    """(s m, r) about each state (s, r) the lowest modes, and what further loads do, of energy 1/2.
 
-    A beam that is bent in one plane needs companions of bending in the other one as well, however
-    small that is. Without stiffness, at the load that makes it snap, a mode is no larger than at
-    rest.
+    A beam that is bent in one plane needs companions of bending in the other one and of twisting
+    as well, however small these are. Without stiffness, at the load that makes it snap, a mode is
+    no larger than at rest.
     """
-    N = free_motions(held)
+    N = free_motions(shapes.held)
     mass = N.T @ M @ N
     softest = eigh(N.T @ quartic.K @ N, mass, eigvals_only=True, subset_by_index=(0, 0))[0]
     found = []
     for q in states:
         lam, V = eigh(N.T @ quartic.tangent(q) @ N, mass)
-        found.append((N @ V[:, :N_MODES] / np.sqrt(np.maximum(lam[:N_MODES], 0.1 * softest))).T)
+        lam = np.maximum(lam, 0.1 * softest)
+        amplitudes = (V / lam).T @ (N.T @ shapes.further)
+        found.append((N @ V[:, :N_MODES] / np.sqrt(lam[:N_MODES])).T)
+        found.append((N @ V @ (amplitudes / np.sqrt(lam @ amplitudes**2))).T)
     return np.vstack(found)
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import combinations, product
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -59,7 +59,9 @@ class Geometric:
             static shapes of the loads; a repeated frequency counts as a whole.
         tol: how much of the energy of the states reached may be left out, as the root of its
             share [1].
-        n_shapes: alternatively, the number of shapes added to the basis.
+        n_shapes: alternatively, the number of shapes added to the basis. All are spent on the
+            loads of the range: without it there are some for what else acts on their interfaces,
+            as a torque on a beam that is bent.
         n_steps: of load on the way to its largest value, at each of which a state is taken.
         fixed: interfaces held in the mean beside the reference while the loads act, or
             {name: directions}: the far end of an arch, {"crown": "x rx ry rz"} at half of one.
@@ -81,6 +83,8 @@ class Geometric:
         >>> rom.Geometric(loads={"tip": (0, 200.0, 0, 0, 0, 0)}).n_steps
         4
     """
+
+    TAKEN_BY: ClassVar[str] = "rom.reduce, rom.reduce_pieces and rom.certify_pieces"
 
     loads: Mapping[str, Any]
     n_modes: int = 4

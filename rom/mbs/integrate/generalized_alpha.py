@@ -169,7 +169,10 @@ def factorise_step(s, W, step, rank):
     for b in range(s.bodies.mass.size):
         x, y = own_corner(s, b)
         for i in range(6 + s.bodies.r[b]):
-            W.weight[s.bodies.v_at[b] + i] = W.S[x + i, y + i] / (mass_factor(step) * step.size[3])
+            # what grows with speed as fast as inertia, or a moment of inertia that falls within a
+            # step, leaves it negative; a length has no imaginary parts
+            size = abs(W.S[x + i, y + i])
+            W.weight[s.bodies.v_at[b] + i] = size / (mass_factor(step) * step.size[3])
     if rank < step.lam.size:
         constraint_range(s, W, rank, W.U_lu)
     border(W, rank)
@@ -285,7 +288,7 @@ def imbalance(s, W, step):
     """
     total, gap, bh2 = 0.0, 0.0, step.method[1] * step.method[0] ** 2
     for i in range(W.residual.size):
-        if W.weight[i] > 0.0:  # forces may take energy up as fast as inertia
+        if W.weight[i] > 0.0:
             total += W.residual[i] ** 2 / W.weight[i]
     for k in range(step.lam.size):
         gap = max(gap, row_gap(s, W, step, k))

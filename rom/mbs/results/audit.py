@@ -16,6 +16,7 @@ GAP_RTOL = 1e-9
 QUATERNION_ATOL = 1e-12
 MOMENTUM_RTOL = 1e-5  # a second-order method conserves it to the error of its steps, not exactly
 MAX_MEAN_CORRECTIONS = 8.0
+CERTIFIED_RTOL = 1e-6  # of energy on the very edge of a range
 
 
 @typed
@@ -26,7 +27,8 @@ def audit(solution: Solution) -> Report:
     the mechanism, length of the quaternions, Newton corrections per step, and the largest elastic
     displacement relative to the size of its body: beyond a tenth, linear elasticity in a floating
     frame is no longer to be trusted. A body without geometric stiffness may not turn so fast that
-    centrifugal force uses up its stiffness.
+    centrifugal force uses up its stiffness. A body of large deflection may store as much energy as
+    the load cases to which its certificate holds.
 
     Geometric stiffness enters through the kinetic energy and the work of forces, see
     `rom.mbs.kernels.second_order`: the balance of energy holds with it as it does without.
@@ -108,10 +110,23 @@ def _numbers(solution: Solution) -> list[Row]:
         mean = statistics["iterations"] / max(statistics["steps"], 1)
         rows.append(_row("Newton corrections per step", mean, MAX_MEAN_CORRECTIONS))
     for name, part in solution.mechanism.parts.items():
-        if not part.r:
-            continue
-        bent, share = deformation(solution, name), softening(solution, name)
-        rows.append(_row(f"largest deformation of {name} / size", bent, MAX_DEFORMATION))
-        if share:
-            rows.append(_row(f"speed of {name} / speed that softens it to nothing", share, 1.0))
+        if part.r:
+            rows += _limits(solution, name, part.flexible)
+    return rows
+
+
+def _limits(solution: Solution, name: str, body: Any) -> list[Row]:
+    """Whether a body stays within what it was made for."""
+    bent = deformation(solution, name)
+    if getattr(body, "quartic", None) is not None:
+        rows = [Row(f"largest deformation of {name} / size", bent, "information", True)]
+        most = body.certified_energy
+        if np.isfinite(most):
+            share = np.nanmax(body.energy().energies(solution.elastic(name))) / max(most, 1e-300)
+            what = f"strain energy of {name} / most to which its certificate holds"
+            rows.append(_row(what, share, 1 + CERTIFIED_RTOL))
+        return rows
+    rows = [_row(f"largest deformation of {name} / size", bent, MAX_DEFORMATION)]
+    if share := softening(solution, name):
+        rows.append(_row(f"speed of {name} / speed that softens it to nothing", share, 1.0))
     return rows

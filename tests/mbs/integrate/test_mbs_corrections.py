@@ -51,6 +51,19 @@ def test_a_steep_motor_is_found_at_the_speed_at_which_it_balances_a_load(method)
     assert sol.velocity("block")[-1, 0] == pytest.approx(wanted, rel=1e-3)
 
 
+@pytest.mark.parametrize("method", METHODS)
+def test_a_light_rotor_is_led_against_a_torque_that_grows_with_speed_faster_than_inertia(method):
+    """Torque of the drive is I alpha - c omega."""
+    mech, inertia, c = rom.Mechanism(gravity=ORIGIN), 1e-4, 1.0
+    rotor = mech.add_rigid("rotor", mass=1.0, inertia=(inertia,) * 3, at=ORIGIN)
+    mech.revolute("shaft", mech.ground.marker(ORIGIN), rotor.marker(ORIGIN), axis=(0, 0, 1))
+    mech.motor("machine", "shaft", lambda t, x, v: c * v, compiled=True)
+    mech.drive("brake", "shaft", np.sin, rate=np.cos, acceleration=lambda t: -np.sin(t))
+    sol = rom.simulate(mech, t_end=1.0, dt=1e-2, method=method)
+    torque = -inertia * np.sin(sol.t) - c * np.cos(sol.t)
+    assert_allclose(sol.drive_load("brake")[1:], torque[1:], rtol=1e-3)
+
+
 def test_laws_in_python_are_asked_again_for_every_part_of_a_correction():
     """A brake that is asked for a constant force stops the block together with friction."""
     mech, h, brake = block(), 1e-2, 1.5
