@@ -120,7 +120,8 @@ def candidates(body: FlexibleBody | Family, n: int, *, fixed: Any = ()) -> Chann
         np.tile(np.eye(3), (len(points), 1)),
         None if alone else tuple(np.repeat(owners, 3).tolist()),
     )
-    V = _motions(body, parts, fixed)
+    nothing = np.zeros((0, parts.n))
+    V = family_model(body, (nothing, nothing), {}, {}, fixed).motions
     motion = np.linalg.norm(everywhere.rows(parts.bodies, "candidate") @ V, axis=1).reshape(-1, 3)
     moving = np.flatnonzero(motion.max(axis=1) > INDEPENDENCE_RTOL * motion.max())
     whole("n", n, 1, len(moving), reason="points of the surface that move")
@@ -130,14 +131,6 @@ def candidates(body: FlexibleBody | Family, n: int, *, fixed: Any = ()) -> Chann
         far = np.minimum(far, np.linalg.norm(points - points[chosen[-1]], axis=1))
         chosen.append(int(far.argmax()))
     return everywhere.some((3 * moving[chosen][:, None] + np.arange(3)).ravel())
-
-
-def _motions(body: FlexibleBody | Family, parts: Parts, fixed: Any) -> Array:
-    """(n, m) what supports leave to all coordinates."""
-    if isinstance(body, FlexibleBody):
-        return body.modes(fixed=fixed)[1]
-    nothing = np.zeros((0, parts.n))
-    return family_model(body, (nothing, nothing), {}, {}, fixed).motions
 
 
 @typed
