@@ -181,7 +181,8 @@ class Channels:
                 raise ConfigError(
                     f"{what} {k} at {points[k].tolist()} is as near to one as to another of "
                     f"{named(list(bodies)[j] for j in near)}.",
-                    hint="Name the bodies of the channels, or give points beside the joint.",
+                    hint="Name the bodies of the channels, in a table of points by a column body, "
+                    "or give points beside the joint.",
                 )
         return owners, nearest[owners, np.arange(len(points))]
 

@@ -65,13 +65,14 @@ class Plan:
         return dict(zip(self.names, np.sqrt(np.diag(self.covariance)).tolist(), strict=True))
 
     def csv(self) -> str:
-        """The channels as a table: kind, number, x, y, z [m] and direction [1]."""
-        rows = ["kind,number,x,y,z,dx,dy,dz"]
+        """The channels as a table: kind, number, x, y, z [m], direction [1]; bodies if several."""
+        rows = ["kind,number,x,y,z,dx,dy,dz" + ",body" * (self.sensors.bodies is not None)]
         for kind, channels in (("sensor", self.sensors), ("input", self.inputs)):
             d = np.asarray(channels.directions)
             unit = d / np.linalg.norm(d, axis=1, keepdims=True)
             for k, values in enumerate(np.hstack([channels.points, unit]), 1):
-                rows.append(",".join([kind, str(k), *(f"{x:.9g}" for x in values)]))
+                own = () if channels.bodies is None else channels.bodies[k - 1 : k]
+                rows.append(",".join([kind, str(k), *(f"{x:.9g}" for x in values), *own]))
         return "\n".join(rows) + "\n"
 
     def uff(self) -> str:

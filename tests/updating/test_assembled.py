@@ -177,10 +177,13 @@ def test_an_assembly_of_one_is_planned_as_a_body(families):
     options = {"n_sensors": 2, "noise": 0.05}
     alone = place(family, offered, offered, LINES[::5], fixed=("root",),
                   attached={"load": load}, **options)  # fmt: skip
-    same = place(one, offered, offered, LINES[::5], fixed=HELD,
+    named = replace(offered, bodies="frame")
+    same = place(one, named, named, LINES[::5], fixed=HELD,
                  attached={"load": replace(load, at=("frame", "tip"))}, **options)  # fmt: skip
     assert alone.names[:2] == ("E", "load") and same.names[:2] == ("frame.E", "load")
     assert_allclose(same.covariance, alone.covariance, rtol=1e-8)
+    for line, own in zip(same.csv().split(), alone.csv().split(), strict=True):
+        assert line == f"{own},{'body' if own.startswith('kind') else 'frame'}"
 
 
 def test_channels_name_the_body_on_which_they_lie(bolted):

@@ -73,7 +73,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--estimator", choices=("H1", "H2", "Hv"), help="that the functions are, where it matters"
     )
-    parser.add_argument("--points", type=Path, help="another file with the nodes of the test")
+    parser.add_argument(
+        "--points", type=Path, help="another file with nodes, and bodies of an assembly"
+    )
     parser.add_argument("--fixed", metavar="NAME,...", type=names, default=(), help="what was held")
     parser.add_argument(
         "--free", metavar="NAME,...", type=names,
@@ -144,6 +146,7 @@ def run(args: argparse.Namespace) -> Answer:
     from rom.io.family import save
     from rom.io.responses.reading import read_responses
     from rom.updating.estimate import update
+    from rom.updating.family_model import Parts
 
     if args.plan is not None:
         return _plan(args)
@@ -151,8 +154,9 @@ def run(args: argparse.Namespace) -> Answer:
     family = _family(args)
     outputs = _outputs(args, family)
     test = read_responses(
-        args.file, averages=args.averages, coherence=args.coherence, points=args.points
-    )
+        args.file, averages=args.averages, coherence=args.coherence, points=args.points,
+        bodies=[name for name in Parts.of(family).bodies if name],
+    )  # fmt: skip
     if args.picture is not None:
         _match(args, family, test)
     noise = {"force_noise": args.force_noise, "estimator": args.estimator}
