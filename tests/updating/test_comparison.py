@@ -52,7 +52,7 @@ def measured(family, seed, true, **there):
 
 
 def test_lines_are_foretold_by_the_update_of_all_others(family):
-    """By hand, in thirds: |ln H - ln H_test|^2 over the variance, one over a random force's power."""
+    """By hand, in thirds: |ln H - ln H_test|^2 over the variance of an average."""
     test = measured(family, 0, {"E_inner": 1.2})
     found = compare(family, test, {"one modulus": SETS["one modulus"]}, folds=3, **COMMON)
     for first in range(3):
