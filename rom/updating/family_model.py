@@ -1,5 +1,7 @@
 """A family of bodies as a model with parameters: sums of small matrices, in its own modes.
 
+A body, or an assembly of bodies, is a family without parameters.
+
 All parameters are factors and enter by their logarithm. Rigid coordinates come first, then the
 elastic ones of the family; what is held is eliminated.
 """
@@ -13,8 +15,10 @@ import numpy.typing as npt
 from scipy.linalg import block_diag
 
 from rom.arguments import finite
+from rom.assembly.assembly import Assembly
 from rom.body.flexible import FlexibleBody
 from rom.body.records import Marker, still_motions
+from rom.body.recovery import StressRecovery
 from rom.body.reference import marker_motion
 from rom.eigen.supports import spring_matrices
 from rom.errors import ConfigError, ParameterError
@@ -29,6 +33,7 @@ from rom.updating.models import ParametricModel
 HELD_RTOL = 1e-9  # singular value of a motion that nothing holds
 MASS_DOFS = 3  # translations, which a point mass resists
 Family = BodyFamily | FamilyAssembly
+Structure = Family | FlexibleBody | Assembly
 Place = str | tuple[str, str]  # interface of a body alone; body and interface of an assembly
 
 
@@ -43,13 +48,14 @@ class Parts:
     bodies: dict[str, FlexibleBody]
 
     @staticmethod
-    def of(structure: "Family | FlexibleBody | Parts") -> "Parts":
+    def of(structure: "Structure | Parts") -> "Parts":
         """Those of an assembly, or of a body alone."""
         if isinstance(structure, Parts):
             return structure
-        if isinstance(structure, FlexibleBody):
-            return Parts({"": structure})
-        return Parts({name: part.body for name, part in families_of(structure).items()})
+        found = parts_of(structure)
+        return Parts(
+            {k: one if isinstance(one, FlexibleBody) else one.body for k, one in found.items()}
+        )
 
     @property
     def columns(self) -> dict[str, slice]:
@@ -99,9 +105,30 @@ class Parts:
         return H
 
 
-def families_of(family: Family) -> dict[str, BodyFamily]:
-    """{name: family} of an assembly; of one alone, without a name."""
-    return family.families if isinstance(family, FamilyAssembly) else {"": family}
+def parts_of(structure: Structure) -> dict[str, BodyFamily] | dict[str, FlexibleBody]:
+    """{name: family or body} of an assembly; of one alone, without a name."""
+    if isinstance(structure, BodyFamily):
+        return {"": structure}
+    if isinstance(structure, FlexibleBody):
+        return {"": structure}
+    return structure.families if isinstance(structure, FamilyAssembly) else structure.bodies
+
+
+def terms_of(structure: Structure) -> list[tuple[str, FlexibleBody]]:
+    """For each term of a sum its body by name, with the mass, stiffness and stress of the term."""
+    found = []
+    for name, one in parts_of(structure).items():
+        if isinstance(one, FlexibleBody):
+            found.append((name, one))
+            continue
+        for share in one.shares:
+            mass = {key: getattr(share.integrals, key) for key in share.integrals.__slots__}
+            stress = one.body.stress
+            if isinstance(stress, StressRecovery):
+                own = np.zeros_like(stress.operator) if share.stress is None else share.stress
+                stress = StressRecovery(stress.points, own)
+            found.append((name, replace(one.body, **mass, K=share.K, stress=stress)))
+    return found
 
 
 @dataclass(frozen=True, slots=True)
@@ -283,13 +310,13 @@ class FamilyModel:
 
 
 def family_model(
-    family: Family,
+    family: Structure,
     rows: tuple[Array, Array],
     attached: Attached,
     candidates: Attached,
     fixed: Any,
 ) -> FamilyModel:
-    """A family seen at sensors and driven at inputs.
+    """A family, body or assembly seen at sensors and driven at inputs.
 
     Args:
         family: without parameters of thickness.
@@ -303,26 +330,26 @@ def family_model(
         ConfigError: for a parameter of thickness, or a name that is taken.
         InterfaceError: if an interface is unknown.
     """
-    families, parts = families_of(family), Parts.of(family)
-    if any(one.stretch is not None for one in families.values()):
+    parts = Parts.of(family)
+    if any(isinstance(p, BodyFamily) and p.stretch is not None for p in parts_of(family).values()):
         raise ConfigError(
             "a family with a parameter of thickness cannot be updated.",
             hint="Reduce a family with moduli and densities alone.",
         )
     outside = {**attached, **candidates}
-    if len(outside) < len(attached) + len(candidates) or set(outside) & set(family.parameters):
+    own: dict[str, Any] = {} if isinstance(family, FlexibleBody | Assembly) else family.parameters
+    if len(outside) < len(attached) + len(candidates) or set(outside) & set(own):
         raise ParameterError(f"one of {named(outside)} names two parameters.")
     pairs = [
-        tuple(_placed(A, columns, parts.n) for A in _term(one.body, share))
-        for one, columns in zip(families.values(), parts.columns.values(), strict=True)
-        for share in one.shares
+        [_placed(A, parts.columns[name], parts.n) for A in term.full_matrices()]
+        for name, term in terms_of(family)
     ]
     added = [item.term(parts) for item in outside.values()]
-    K, M = (np.array([t[i] for t in pairs + added]) for i in (0, 1))
+    M, K = (np.array([p[i] for p in pairs] + [p[1 - i] for p in added]) for i in (0, 1))
     held = _conditions(family, fixed)
     N = still_motions(held)
-    known: dict[str, Any] = {**family.parameters, **outside}
-    powers = _powers(families, tuple(outside))
+    known = {**own, **outside}
+    powers = _powers(family, tuple(outside))
     return FamilyModel(
         K=N.T @ K @ N,
         M=N.T @ M @ N,
@@ -339,13 +366,6 @@ def family_model(
     )
 
 
-def _term(body: FlexibleBody, share: Any) -> tuple[Array, Array]:
-    names = share.integrals.__slots__
-    part = replace(body, **{name: getattr(share.integrals, name) for name in names}, K=share.K)
-    M, K = part.full_matrices()
-    return K, M
-
-
 def _placed(A: Array, columns: slice, n: int) -> Array:
     """A matrix of one body among the coordinates (n, n) of all."""
     whole = np.zeros((n, n))
@@ -353,14 +373,16 @@ def _placed(A: Array, columns: slice, n: int) -> Array:
     return whole
 
 
-def _powers(families: dict[str, BodyFamily], outside: tuple[str, ...]) -> tuple[Array, Array]:
+def _powers(family: Structure, outside: tuple[str, ...]) -> tuple[Array, Array]:
     """Which parameters multiply which terms."""
-    own = [_own_powers(family) for family in families.values()] + [(np.eye(len(outside)),) * 2]
+    own = [_own_powers(one) for one in parts_of(family).values()] + [(np.eye(len(outside)),) * 2]
     k, m = (block_diag(*(pair[i] for pair in own)) for i in (0, 1))
     return k, m
 
 
-def _own_powers(family: BodyFamily) -> tuple[Array, Array]:
+def _own_powers(family: BodyFamily | FlexibleBody) -> tuple[Array, Array]:
+    if isinstance(family, FlexibleBody):
+        return (np.zeros((1, 0)),) * 2
     k, m = np.zeros((2, len(family.shares), len(family.parameters)))
     for i, share in enumerate(family.shares):
         for j, p in enumerate(family.parameters.values()):
@@ -373,14 +395,17 @@ def _acts(parameter: Parameter, kind: type, region: str | None) -> bool:
     return isinstance(parameter, kind) and parameter.region in (None, region)
 
 
-def _conditions(family: Family, fixed: Any) -> Array:
+def _conditions(family: Structure, fixed: Any) -> Array:
     """(c, n) coordinates that supports and couplings keep zero."""
-    if isinstance(family, FamilyAssembly):
+    parts = Parts.of(family)
+    if isinstance(family, FamilyAssembly | Assembly):
         for place in fixed:
-            Parts.of(family).marker(place)
-        return family.nominal.conditions(tuple(fixed))
-    family.body.check_support(fixed)
-    return family.body.held_rows(fixed)
+            parts.marker(place)
+        whole = family if isinstance(family, Assembly) else family.nominal
+        return whole.conditions(tuple(fixed))
+    body = parts.bodies[""]
+    body.check_support(fixed)
+    return body.held_rows(fixed)
 
 
 def _count_free(parts: Parts, attached: Attached, held: Array) -> int:

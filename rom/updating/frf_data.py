@@ -1,4 +1,4 @@
-"""Frequency responses as a test gives them: noise, estimators, weights, comparison.
+"""Frequency responses as a test gives them: estimators, errors, weights, comparison.
 
 Source:
     Bendat and Piersol, Random Data (2010), for estimators and their errors; Heylen and Lammens,
@@ -8,17 +8,29 @@ Source:
 """
 
 import warnings
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from scipy.special import erfcx
+from scipy.stats import f as f_ratio
 
 from rom.arguments import finite
 from rom.errors import ConfigError
 from rom.model import Array, Mask
 
 Complex = npt.NDArray[np.complex128]
-POOL_DEVIATIONS = 3.0  # by which lines may differ that are alike
+MAX_RELATIVE_ERROR = 0.3  # of a value; beyond it the logarithm of noise is no longer normal
+FREEDOM_LOST = 2  # averages, by a variance that is estimated from the same records as the response
+MIN_OWN_SHARE = 0.02  # of a variance that is known, left to its sensor: coherence is rounded
+MAX_EXCESS = 3.0  # standard deviations by which a model corrects the level of a response
+MAX_FORCE_SHARE = 1.2  # of the incoherent power in that of forces
+FORCE_DEVIATIONS = 4.0  # by which that of a sensor may exceed it by chance
+POWERS = {"H1": 0.0, "Hv": 0.5, "H2": 1.0}  # of one over the coherence, by which they exceed H1
 POOL_STEPS = 4  # until the lines that are alike are those about their mean
+POOL_RISK = 5e-4  # that one of all lines that are alike is too far above the others, or below
+SPREAD_DEVIATIONS = 3.0  # of what chance makes of the spread of lines, beyond which they differ
 COHERENCE_ATOL = 1e-6  # distance of the coherence from 0 and 1, which no measurement reaches
 
 
@@ -100,13 +112,145 @@ def random_error(coherence: npt.ArrayLike, n_averages: int) -> Array:
     return np.sqrt((1 - g2) / (2 * n_averages * g2))
 
 
+@dataclass(frozen=True, slots=True)
+class Errors:
+    """Standard deviations of real and imaginary part of ln H.
+
+    Attributes:
+        own: (n_f, n_s, n_e) of the sensors; infinite where a value is not used [1].
+        common: (n_f, 1, n_e) what the sensors have in common [1].
+        varied: (n_f, n_s, n_e) or a zero: standard deviation of the square of the own one, over
+            it, where it is estimated [1].
+        known: chi-square of all residuals has so many degrees of freedom for each [1].
+        scale: variance of the squares of all own ones together, over these squares [1].
+    """
+
+    own: Array
+    common: Array
+    varied: Array
+    known: float
+    scale: float
+
+
+@dataclass(frozen=True, slots=True)
+class Noise:
+    """Powers of noise in a test.
+
+    Attributes:
+        incoherent: (n_f, n_s, n_e) incoherent over coherent power, (1 - c) / c [1].
+        force: (n_f, 1, n_e) power of the noise of a force over that of the force [1].
+        averages: number of averages behind them.
+        estimated: whether the coherence is of the same records as the responses.
+    """
+
+    incoherent: Array
+    force: Array
+    averages: int
+    estimated: bool
+
+    @property
+    def relative_error(self) -> Array:
+        """(n_f, n_s, n_e) standard deviation of real and imaginary part, over |H| [1].
+
+        Squared residuals over estimated variances have the mean n / (n - 2) for n averages.
+
+        Source:
+            Bendat and Piersol, Random data, F-distribution of 2 and 2 n - 2 freedoms.
+        """
+        n = self.averages - FREEDOM_LOST * self.estimated
+        return np.asarray(np.sqrt(self.incoherent / (2 * n)))
+
+    @property
+    def used(self) -> Mask:
+        """(n_f, n_s, n_e) values whose errors are small enough to count."""
+        return self.relative_error <= MAX_RELATIVE_ERROR
+
+    def bias(self, estimator: str | None) -> Array:
+        """(n_f, n_s, n_e) what ln |H| has too much by its estimator.
+
+        Those of H1, Hv and H2 exceed it by -ln (1 + v) and by none, half and all of -ln c, with
+        the coherence c and the power v of the noise of a force over that of the force.
+
+        Raises:
+            ConfigError: if forces are noisy and the estimator is not named, or if they are noisier
+                than the coherence allows.
+        """
+        if self.force.any():
+            self._check_forces(estimator)
+        if estimator is None:
+            return np.zeros(self.incoherent.shape)
+        return np.asarray(POWERS[estimator] * np.log1p(self.incoherent) - np.log1p(self.force))
+
+    def _check_forces(self, estimator: str | None) -> None:
+        if estimator is None:
+            raise ConfigError(
+                "forces are noisy, and the estimator of H is not named: H1 is too small by it, H2 "
+                "too large by that of responses.",
+                hint='Give estimator="H1", "H2" or "Hv"; analysers write H1 unless told otherwise.',
+            )
+        used = self.used & (self.force > 0)
+        count = np.maximum(used.sum(axis=0), 1)
+        share = np.where(used, self.incoherent / np.where(used, self.force, 1.0), 0.0)
+        share = np.where(used.any(axis=0), share.sum(axis=0) / count, np.inf)
+        least = 1 / MAX_FORCE_SHARE
+        if self.estimated:
+            chance = np.sqrt(2 / (max(self.averages - FREEDOM_LOST, 1) * count))
+            least = 1 - FORCE_DEVIATIONS * chance
+        if (share < least).any():
+            s, e = np.unravel_index((share - least).argmin(), share.shape)
+            raise ConfigError(
+                f"force_noise alone has {1 / share[s, e]:.4g} times the power of all that is "
+                f"incoherent in sensor {s} by input {e}.",
+                hint=f"Give at most {np.sqrt(share[s, e]):.3g} of it: noise over force, not a "
+                "percentage or power; compare the coherence.",
+            )
+
+    def errors(self, excess: Any = 0.0) -> Errors:
+        """Of ln H, and what is known of them.
+
+        Args:
+            excess: (n_f, n_s, n_e) ln |H| of a model less that measured. An estimated variance is
+                that of H itself over the measured |H|^2: errors that make H larger make it
+                smaller, and H too large by twice the variance in the mean of ln H that is weighted
+                by it. Over that of a model it is free of them. Beyond three deviations it is a
+                wrong model.
+
+        Powers of random forces vary too: one over them has the mean n / (n - 1) of n averages. Of
+        circular errors with the variance s^2 in each part the logarithm has s^2 (1 + s^2 + ...).
+        Weights are one over variances without bias: of an estimated one by the factor
+        (n - 2) / (n - 1), of what is left of it when a common part is taken off by `inverse`.
+        """
+        error, n = self.relative_error, self.averages
+        freedom = 2 * max(n - 1, 1)
+        total, common = self.incoherent / freedom, self.force / freedom
+        own, varied, scale = total - common, np.zeros(()), 0.0
+        if self.estimated:
+            total = total * np.exp(-2 * np.clip(excess, -MAX_EXCESS * error, MAX_EXCESS * error))
+            varied = np.full((), 1 / (n - FREEDOM_LOST))
+            own = total * (1 + varied)
+        else:
+            own = np.maximum(own, MIN_OWN_SHARE * total)
+        if self.estimated and common.any():
+            over, shared = np.where(common > 0, common, np.inf), common > 0
+            share, spread, alike = pooled(total / over - shared, self.used & shared, n)
+            weight = inverse(share, spread)
+            own = np.where(shared, common / weight, own)
+            varied = np.where(shared, spread * weight**2, varied)
+            counted = self.used & shared
+            scale = float((alike * weight**2)[counted].sum() / max(counted.sum(), 1))
+        own = np.sqrt(np.where(self.used, own * (1 + error**2), np.inf))
+        known = max(n - 3, 0.5) / (n - 1) if self.estimated else 1.0
+        return Errors(own, np.sqrt(common), np.sqrt(varied), known, scale)
+
+
 def pooled(ratio: Array, used: Mask, n_averages: int) -> tuple[Array, Array, Array]:
     """Noise of sensors over that of a force, better known where it is much alike at many lines.
 
-    One line tells the ratio x up to the variance (1 + x)^2 / (n - 2) + 1 / n for n averages of
-    random forces: nearly nothing where the noise of the force is the larger one. Lines of a sensor
-    that differ from their mean by no more than three deviations are drawn towards it, by as much
-    as they vary no more than chance lets them.
+    One more than the ratio, over its mean, is (n - 1) / n of an F of 2 n - 2 and 2 n degrees of
+    freedom for n averages of random forces, as powers of what is incoherent and of the force both
+    vary: one line tells nearly nothing where the noise of the force is the larger one. Lines of a
+    sensor that are as far from their mean as chance takes one line in a thousand tests at most are
+    drawn towards it, by as much as they vary no more than chance lets them.
 
     Args:
         ratio: (n_f, n_s, n_e) estimated powers, also negative ones [1].
@@ -120,23 +264,42 @@ def pooled(ratio: Array, used: Mask, n_averages: int) -> tuple[Array, Array, Arr
         Efron and Morris, Stein's estimation rule and its competitors: an empirical Bayes approach,
         J. Am. Stat. Assoc. 68 (1973) 117.
     """
-
-    def variance(x: Array) -> Array:
-        return (1 + np.maximum(x, 0.0)) ** 2 / max(n_averages - 2, 1) + 1 / n_averages
-
+    n = max(n_averages, 3)
+    count = np.maximum(used.sum(axis=0), 1)
+    law = f_ratio(2 * n - 2, 2 * n)
+    low, high = (law.ppf(p) * (n - 1) / n for p in (POOL_RISK / count, 1 - POOL_RISK / count))
     with np.errstate(invalid="ignore"), warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # of a sensor without lines
         mean = np.nan_to_num(np.nanmedian(np.where(used, ratio, np.nan), axis=0))
     for _ in range(POOL_STEPS):
-        alike = used & ((ratio - mean) ** 2 <= POOL_DEVIATIONS**2 * variance(mean))
+        most = 1 + np.maximum(mean, 0.0)
+        alike = used & (1 + ratio >= low * most) & (1 + ratio <= high * most)
         count = np.maximum(alike.sum(axis=0), 1)
         mean = np.where(alike, ratio, 0.0).sum(axis=0) / count
-    chance = variance(mean)
-    spread = np.where(alike, (ratio - mean) ** 2, 0.0).sum(axis=0) / np.maximum(count - 1, 1)
-    kept = np.where(count > 1, np.maximum(1 - chance / np.maximum(spread, 1e-300), 0.0), 1.0)
+    chance = 2 * (1 + np.maximum(mean, 0.0)) ** 2 / (n - 2)
+    freedom = np.maximum(count - 1, 1)
+    spread = np.where(alike, (ratio - mean) ** 2, 0.0).sum(axis=0) / freedom
+    least = chance * (1 + SPREAD_DEVIATIONS * np.sqrt(2 / freedom))
+    kept = np.where(spread > least, 1 - chance / np.maximum(spread, least), 0.0)
+    kept = np.where(count > 1, kept, 1.0)
     found = np.where(alike, mean + kept * (ratio - mean), ratio)
     shared = np.where(alike, (1 - kept) ** 2 * chance / count, 0.0)
-    return found, np.where(alike, kept * chance + shared, variance(ratio)), shared
+    alone = (1 + np.maximum(ratio, 0.0)) ** 2 / (n - 2) + 1 / n
+    return found, np.where(alike, kept * chance + shared, alone), shared
+
+
+def inverse(x: Array, variance: Array) -> Array:
+    """(...) 1 / x without bias by the normal errors of x (...) > 0: Mills' ratio over a deviation.
+
+    1 / x has the bias variance / x^3 + ..., whose series does not end. Values below zero, of which
+    Mills' ratio makes anything, count as zero.
+
+    Source:
+        Voinov, Unbiased estimation of powers of the inverse of mean and related problems, Sankhya B
+        47 (1985) 354: the mean of (1 - Phi(x)) / phi(x) is one over that of x.
+    """
+    s = np.sqrt(2 * variance)
+    return np.asarray(np.sqrt(np.pi) * erfcx(np.maximum(x, 0.0) / s) / s)
 
 
 def weights(coherence: npt.ArrayLike, n_averages: int) -> Array:

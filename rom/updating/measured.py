@@ -1,8 +1,4 @@
-"""Measured responses with their points, directions and random errors.
-
-Source:
-    Bendat and Piersol, Random data (2010): var |H| / |H|^2 = (1 - c) / (2 n c).
-"""
+"""Measured responses with their points and directions."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -19,7 +15,7 @@ from rom.errors import ConfigError
 from rom.model import Array, Index
 from rom.names import named
 from rom.rotation import skew
-from rom.updating.frf_data import Complex, pooled
+from rom.updating.frf_data import FREEDOM_LOST, POWERS, Complex, Noise
 
 DERIVATIVES = {"displacement": 0, "velocity": 1, "acceleration": 2}
 LENGTHS = {  # factors by which points that are off a body may all lie on it
@@ -30,13 +26,7 @@ LENGTHS = {  # factors by which points that are off a body may all lie on it
 }
 POINT_RTOL = 0.02  # distance of a sensor from the nearest point of the surface, of the body's size
 SAME_RTOL = 1e-6  # distance of surfaces that touch, of the size of all
-MAX_RELATIVE_ERROR = 0.3  # of a value; beyond it the logarithm of noise is no longer normal
 MAX_LINES_NAMED = 5  # in a message
-FREEDOM_LOST = 2  # averages, by a variance that is estimated from the same records as the response
-MIN_OWN_SHARE = 0.02  # of the variance of a response that is left to its sensor
-MAX_EXCESS = 3.0  # standard deviations by which a model corrects the level of a response
-MAX_FORCE_SHARE = 1.2  # of the incoherent power in that of forces, at half of all values
-POWERS = {"H1": 0.0, "Hv": 0.5, "H2": 1.0}  # of one over the coherence, by which they exceed H1
 
 
 @dataclass(frozen=True, slots=True)
@@ -181,7 +171,8 @@ class Channels:
                 raise ConfigError(
                     f"{what} {k} at {points[k].tolist()} is as near to one as to another of "
                     f"{named(list(bodies)[j] for j in near)}.",
-                    hint="Name the bodies of the channels, or give points beside the joint.",
+                    hint="Name the bodies of the channels, in a table of points by a column body, "
+                    "or give points beside the joint.",
                 )
         return owners, nearest[owners, np.arange(len(points))]
 
@@ -291,27 +282,8 @@ class Responses:
         if self.estimator is not None:
             one_of("estimator", self.estimator, tuple(POWERS))
 
-    def _check_estimator(self) -> None:
-        """See that the bias by noisy forces can be taken out."""
-        if not np.any(self.force_noise):
-            return
-        if self.estimator is None:
-            raise ConfigError(
-                "forces are noisy, and the estimator of H is not named: H1 is too small by it, H2 "
-                "too large by that of responses.",
-                hint='Give estimator="H1", "H2" or "Hv"; analysers write H1 unless told otherwise.',
-            )
-        used = self.relative_error() <= MAX_RELATIVE_ERROR
-        share = (self._force_variance() / self._incoherent())[used]
-        if share.size and (middle := float(np.median(share))) > MAX_FORCE_SHARE:
-            raise ConfigError(
-                f"force_noise alone has {middle:.3g} times the power of all that is incoherent.",
-                hint="Give noise over force, not a percentage or power; compare the coherence.",
-            )
-
     def _check_values(self) -> None:
-        used = self.relative_error() <= MAX_RELATIVE_ERROR
-        bad = (~np.isfinite(self.H) | (self.H == 0)) & used
+        bad = (~np.isfinite(self.H) | (self.H == 0)) & self.noise.used
         if bad.any():
             lines = np.flatnonzero(bad.any(axis=(1, 2)))
             some = ", ".join(f"{x:.5g}" for x in self.frequencies[lines[:MAX_LINES_NAMED]])
@@ -346,109 +318,28 @@ class Responses:
             self.inputs.rows(bodies, "input", tolerance),
         )
 
-    def relative_error(self) -> Array:
-        """(n_f, n_s, n_e) standard deviation of real and imaginary part, over |H| [1].
-
-        Squared residuals over estimated variances have the mean n / (n - 2) for n averages.
-
-        Source:
-            Bendat and Piersol, Random data, F-distribution of 2 and 2 n - 2 freedoms.
-        """
-        n = self.averages - FREEDOM_LOST * self._estimated
-        return np.sqrt(self._incoherent() / (2 * n))
-
     @property
-    def _estimated(self) -> bool:
-        """Whether the coherence is of the same records as H."""
-        return np.ndim(self.coherence) > 0
-
-    def _incoherent(self) -> Array:
-        """(n_f, n_s, n_e) incoherent over coherent power, (1 - c) / c [1]."""
+    def noise(self) -> Noise:
+        """Its powers."""
         c = np.maximum(np.asarray(self.coherence, dtype=float), 1e-12)
-        return np.broadcast_to((1 - c) / c, self.H.shape)
-
-    def _force_variance(self) -> Array:
-        """(n_f, 1, n_e) power of the noise of a force over that of the force [1]."""
-        noise = np.broadcast_to(np.asarray(self.force_noise, dtype=float), self.H.shape[::2])
-        return np.asarray(noise[:, None] ** 2, dtype=float)
-
-    def errors(self, excess: Any = 0.0) -> "Errors":
-        """Of ln H, and what is known of them.
-
-        Args:
-            excess: (n_f, n_s, n_e) ln |H| of a model less that measured. An estimated variance is
-                that of H itself over the measured |H|^2: errors that make H larger make it
-                smaller, and H too large by twice the variance in the mean of ln H that is weighted
-                by it. Over that of a model it is free of them. Beyond three deviations it is a
-                wrong model.
-
-        Of circular errors with the variance s^2 in each part the logarithm has
-        s^2 (1 + s^2 + ...). One over an estimated variance that varies by d^2 of its square is too
-        large by d^2, to first order: 1 / (n - 2) of n averages, more where a common part is taken
-        off, see `rom.updating.frf_data.pooled`.
-        """
-        error, n, estimated = self.relative_error(), self.averages, self._estimated
-        freedom = n - 1 if estimated else n
-        total, common = (v / (2 * freedom) for v in (self._incoherent(), self._force_variance()))
-        if estimated:
-            total = total * np.exp(-2 * np.clip(excess, -MAX_EXCESS * error, MAX_EXCESS * error))
-        used, own = error <= MAX_RELATIVE_ERROR, total - common
-        varied, scale = np.full((), 1 / (n - FREEDOM_LOST) if estimated else 0.0), 0.0
-        if estimated and common.any():
-            over = np.where(common > 0, common, np.inf)
-            share, spread, alike = pooled(own / over, used & (common > 0), n)
-            own = np.where(common > 0, share * common, own)
-            size = np.maximum(share, 1e-12) ** 2
-            varied = np.where(common > 0, spread / size, varied)
-            counted = used & (own > MIN_OWN_SHARE * total)
-            scale = float((alike / size)[counted].sum() / max(counted.sum(), 1))
-        least = MIN_OWN_SHARE * total
-        varied = np.where(own > least, varied, 0.0)
-        own = np.maximum(own, least) * (1 + varied)
-        own = np.sqrt(np.where(used, own * (1 + error**2), np.inf))
-        known = max(n - 3, 0.5) / (n - 1) if estimated else 1.0
-        return Errors(own, np.sqrt(common), np.sqrt(varied), known, scale)
+        force = np.broadcast_to(np.asarray(self.force_noise, dtype=float), self.H.shape[::2])
+        return Noise(
+            np.broadcast_to((1 - c) / c, self.H.shape),
+            force[:, None] ** 2,
+            self.averages,
+            np.ndim(self.coherence) > 0,
+        )
 
     def logarithm(self) -> Complex:
         """(n_f, n_s, n_e) ln of displacement [m/N] or strain [1/N]; zero where H is not used.
 
-        Without the bias of its estimator: those of H1, Hv and H2 exceed it by -ln (1 + v)
-        and by none, half and all of -ln c, with the coherence c and the power v of the noise of a
-        force over that of the force.
-
         Raises:
-            ConfigError: if forces are noisy and the estimator is not named, or if they are noisier
-                than the coherence allows.
+            ConfigError: see `Noise.bias`, which is taken off.
         """
-        self._check_estimator()
-        s = 2j * np.pi * self.frequencies[:, None, None]
-        used = self.relative_error() <= MAX_RELATIVE_ERROR
+        s, noise = 2j * np.pi * self.frequencies[:, None, None], self.noise
         orders = np.array([DERIVATIVES.get(quantity, 0) for quantity in self.quantities])
-        found = np.log(np.where(used, self.H / s ** orders[:, None], 1.0))
-        if self.estimator is None:
-            return found
-        bias = POWERS[self.estimator] * np.log1p(self._incoherent())
-        return np.where(used, found + np.log1p(self._force_variance()) - bias, 0.0)
-
-
-@dataclass(frozen=True, slots=True)
-class Errors:
-    """Standard deviations of real and imaginary part of ln H.
-
-    Attributes:
-        own: (n_f, n_s, n_e) of the sensors; infinite where a value is not used [1].
-        common: (n_f, 1, n_e) what the sensors have in common [1].
-        varied: (n_f, n_s, n_e) or a zero: standard deviation of the square of the own one, over
-            it, where it is estimated [1].
-        known: chi-square of all residuals has so many degrees of freedom for each [1].
-        scale: variance of the squares of all own ones together, over these squares [1].
-    """
-
-    own: Array
-    common: Array
-    varied: Array
-    known: float
-    scale: float
+        bias = np.where(noise.used, noise.bias(self.estimator), 0.0)
+        return np.log(np.where(noise.used, self.H / s ** orders[:, None], 1.0)) - bias
 
 
 @dataclass(frozen=True, slots=True)

@@ -48,8 +48,8 @@ class Data:
 
     @staticmethod
     def of(test: Responses, excess: Any = 0.0) -> "Data":
-        """What a test says; by the level of a model beside it, see `Responses.errors`."""
-        e, omega = test.errors(excess), 2 * np.pi * test.frequencies
+        """What a test says; by the level of a model beside it, see `Noise.errors`."""
+        e, omega = test.noise.errors(excess), 2 * np.pi * test.frequencies
         return Data(omega, test.logarithm(), 1.0 / e.own, e.common, e.varied, e.known, e.scale)
 
     def lines(self, chosen: Index | slice) -> "Data":

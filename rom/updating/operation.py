@@ -14,7 +14,7 @@ Source:
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -26,7 +26,7 @@ from rom.body.recovery import StressRecovery
 from rom.errors import ConfigError, ModelError
 from rom.model import Array
 from rom.names import named
-from rom.updating.family_model import Attached, Family, Parts, families_of, family_model
+from rom.updating.family_model import Attached, Parts, Structure, family_model, terms_of
 from rom.updating.measured import POINT_RTOL, Channels
 
 UNITS = {
@@ -174,61 +174,31 @@ class Operation:
         return acc, np.linalg.solve(M, right)
 
 
-def of_body(
-    body: FlexibleBody,
-    sensors: Sequence[Sensors],
-    forces: Channels,
-    wanted: Sequence[Sensors],
-    fixed: Any,
-) -> Operation:
-    """The equations of one body, without parameters.
-
-    Raises:
-        ConfigError: if nothing can move, or for channels off the body.
-        ModelError: if the body has no surface or stress where they are needed.
-    """
-    omega, V = body.modes(fixed=fixed)
-    m, none, parts = omega.size, np.zeros(0), Parts.of(body)
-    if not m:
-        raise ConfigError(f"body {body.name!r} cannot move with {fixed!r} held.")
-    XI = V[6:].T @ body.D @ V[6:]
-    XI[omega == 0], XI[:, omega == 0] = 0.0, 0.0  # rigid motion is not damped
-    groups = [
-        _rows(parts, [("", body)], V, several, what)
-        for several, what in ((sensors, "sensor"), (wanted, "wanted value"))
-    ]
-    return Operation(
-        (), none, none, omega,
-        K=np.diag(omega**2)[None], M=np.eye(m)[None],
-        k_powers=np.zeros((1, 0)), m_powers=np.zeros((1, 0)),
-        XI=XI, driven=(forces.rows(body, "force") @ V).T,
-        seen=groups[0], wanted=groups[1],
-    )  # fmt: skip
-
-
-def of_family(
-    family: Family,
+def operation(
+    structure: Structure,
     names: Sequence[str],
     attached: Attached,
     channels: tuple[Sequence[Sensors], Channels, Sequence[Sensors]],
-    damping: float,
+    damping: float | None,
     fixed: Any,
 ) -> Operation:
-    """The equations of a family; parameters that are not named stay at factors of one.
+    """The equations of a body, an assembly or a family.
 
     Args:
-        family: without parameters of thickness; or several, coupled or on springs.
-        names: of parameters that change.
+        structure: families are without parameters of thickness.
+        names: of parameters that change; others stay at factors of one.
         attached: springs and masses, by name.
         channels: sensors, forces and what is wanted.
-        damping: ratio of all modes at factors of one [1].
+        damping: ratio of all modes at factors of one [1]; None for that of the bodies.
         fixed: what is held, see `FlexibleBody.frequencies`.
 
     Raises:
-        ConfigError, ModelError: as `of_body`; ConfigError for a name that is not known.
+        ConfigError: if nothing can move, for channels off the body, or an unknown name.
+        ModelError: if a body has no surface or stress where they are needed.
     """
-    parts = Parts.of(family)
-    model = family_model(family, (np.eye(parts.n), np.zeros((0, parts.n))), attached, {}, fixed)
+    parts = Parts.of(structure)
+    nothing = np.eye(parts.n), np.zeros((0, parts.n))
+    model = family_model(structure, nothing, attached, {}, fixed)
     if wrong := set(names) - set(model.names):
         raise ConfigError(
             f"there is no parameter {named(sorted(wrong))}.",
@@ -240,9 +210,15 @@ def of_family(
     lam, U = eigh(model.K.sum(axis=0), model.M.sum(axis=0))
     omega, V = np.sqrt(np.maximum(lam, 0.0)), model.seen @ U
     omega[: model.n_rigid] = 0.0
+    XI = np.diag(2 * (damping or 0.0) * omega)
+    if damping is None:
+        for name, body in parts.bodies.items():
+            elastic = V[parts.columns[name]][6:]
+            XI += elastic.T @ body.D @ elastic
+        XI[: model.n_rigid], XI[:, : model.n_rigid] = 0.0, 0.0  # rigid motion is not damped
     chosen = [model.names.index(name) for name in names]
     sensors, forces, wanted = channels
-    terms = _terms(family)
+    terms = terms_of(structure)
     groups = [
         _rows(parts, terms, V, several, what, len(attached))
         for several, what in ((sensors, "sensor"), (wanted, "wanted value"))
@@ -251,22 +227,9 @@ def of_family(
         tuple(names), np.log(model.low[chosen]), np.log(model.high[chosen]), omega,
         K=U.T @ model.K @ U, M=U.T @ model.M @ U,
         k_powers=model.k_powers[:, chosen], m_powers=model.m_powers[:, chosen],
-        XI=np.diag(2 * damping * omega), driven=(forces.rows(parts.bodies, "force") @ V).T,
+        XI=XI, driven=(forces.rows(parts.bodies, "force") @ V).T,
         seen=groups[0], wanted=groups[1],
     )  # fmt: skip
-
-
-def _terms(family: Family) -> list[tuple[str, FlexibleBody]]:
-    """For each term of a family the name of its body, and that with the stress of the term."""
-    found = []
-    for name, one in families_of(family).items():
-        for share in one.shares:
-            stress = one.body.stress
-            if isinstance(stress, StressRecovery):
-                own = np.zeros_like(stress.operator) if share.stress is None else share.stress
-                stress = StressRecovery(stress.points, own)
-            found.append((name, replace(one.body, stress=stress)))
-    return found
 
 
 def _rows(
@@ -275,7 +238,7 @@ def _rows(
     V: Array,
     several: Sequence[Sensors],
     what: str,
-    n_attached: int = 0,
+    n_attached: int,
 ) -> Rows:
     """Rows of channels, one below the other."""
     k, m, order = sum(len(s.names) for s in several), V.shape[1], ("displacement", "velocity")

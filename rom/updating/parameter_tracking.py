@@ -22,20 +22,21 @@ from rom.errors import ConfigError, ParameterError, SolverError
 from rom.model import Array
 from rom.names import named
 from rom.plausible import check_damping_ratio
-from rom.updating.family_model import Attached, Family, Parts
+from rom.updating.family_model import Attached, Family
 from rom.updating.measured import Channels
 from rom.updating.operation import (
     Linear,
     Operation,
     Sensors,
     discrete,
-    of_family,
+    operation,
     step_derivatives,
 )  # fmt: skip
 from rom.updating.tracking import (
     Assumed,
     Track,
     Tracker,
+    check_units,
     checked_record,
     linear_tracker,
     recorded,
@@ -184,16 +185,15 @@ def parameter_tracker(  # noqa: PLR0913  keywords of one call
         ParameterError: for a name that is taken.
         InterfaceError: if an interface is unknown.
     """
-    if other := {body.units for body in Parts.of(family).bodies.values()} - {"SI"}:
-        raise ConfigError(f"the family is in {other.pop()}; track it in SI units.")
+    check_units(family)
     if not parameters:
         raise ConfigError("no parameter changes.", hint="Use tracker for a body that stays.")
     check_damping_ratio(damping)
     channels = sensors, forces, wanted
-    operation = of_family(family, tuple(parameters), dict(attached or {}), channels, damping, fixed)
+    motion = operation(family, tuple(parameters), dict(attached or {}), channels, damping, fixed)
     assumed = Assumed(dt, walk, unmodelled, first)
     start = np.zeros(len(parameters))
-    checked = linear_tracker(operation, start, assumed, sensors, wanted)
+    checked = linear_tracker(motion, start, assumed, sensors, wanted)
     return ParameterTracker(
-        operation, assumed, dict(parameters), checked.R, tuple(sensors), tuple(wanted)
+        motion, assumed, dict(parameters), checked.R, tuple(sensors), tuple(wanted)
     )

@@ -65,13 +65,14 @@ class Plan:
         return dict(zip(self.names, np.sqrt(np.diag(self.covariance)).tolist(), strict=True))
 
     def csv(self) -> str:
-        """The channels as a table: kind, number, x, y, z [m] and direction [1]."""
-        rows = ["kind,number,x,y,z,dx,dy,dz"]
+        """The channels as a table: kind, number, x, y, z [m], direction [1]; bodies if several."""
+        rows = ["kind,number,x,y,z,dx,dy,dz" + ",body" * (self.sensors.bodies is not None)]
         for kind, channels in (("sensor", self.sensors), ("input", self.inputs)):
             d = np.asarray(channels.directions)
             unit = d / np.linalg.norm(d, axis=1, keepdims=True)
             for k, values in enumerate(np.hstack([channels.points, unit]), 1):
-                rows.append(",".join([kind, str(k), *(f"{x:.9g}" for x in values)]))
+                own = () if channels.bodies is None else channels.bodies[k - 1 : k]
+                rows.append(",".join([kind, str(k), *(f"{x:.9g}" for x in values), *own]))
         return "\n".join(rows) + "\n"
 
     def uff(self) -> str:
@@ -120,7 +121,8 @@ def candidates(body: FlexibleBody | Family, n: int, *, fixed: Any = ()) -> Chann
         np.tile(np.eye(3), (len(points), 1)),
         None if alone else tuple(np.repeat(owners, 3).tolist()),
     )
-    V = _motions(body, parts, fixed)
+    nothing = np.zeros((0, parts.n))
+    V = family_model(body, (nothing, nothing), {}, {}, fixed).motions
     motion = np.linalg.norm(everywhere.rows(parts.bodies, "candidate") @ V, axis=1).reshape(-1, 3)
     moving = np.flatnonzero(motion.max(axis=1) > INDEPENDENCE_RTOL * motion.max())
     whole("n", n, 1, len(moving), reason="points of the surface that move")
@@ -130,14 +132,6 @@ def candidates(body: FlexibleBody | Family, n: int, *, fixed: Any = ()) -> Chann
         far = np.minimum(far, np.linalg.norm(points - points[chosen[-1]], axis=1))
         chosen.append(int(far.argmax()))
     return everywhere.some((3 * moving[chosen][:, None] + np.arange(3)).ravel())
-
-
-def _motions(body: FlexibleBody | Family, parts: Parts, fixed: Any) -> Array:
-    """(n, m) what supports leave to all coordinates."""
-    if isinstance(body, FlexibleBody):
-        return body.modes(fixed=fixed)[1]
-    nothing = np.zeros((0, parts.n))
-    return family_model(body, (nothing, nothing), {}, {}, fixed).motions
 
 
 @typed

@@ -17,12 +17,22 @@ from typing import Any
 import numpy as np
 
 from rom.arguments import finite, positive, typed
+from rom.assembly.assembly import Assembly
 from rom.body.flexible import FlexibleBody
 from rom.errors import ConfigError, SolverError
 from rom.model import Array
+from rom.updating.family_model import Parts, Structure
 from rom.updating.filter_steps import filtered
 from rom.updating.measured import Channels
-from rom.updating.operation import UNITS, Linear, Operation, Sensors, check_seen, discrete, of_body
+from rom.updating.operation import (
+    UNITS,
+    Linear,
+    Operation,
+    Sensors,
+    check_seen,
+    discrete,
+    operation,
+)  # fmt: skip
 
 TIME_RTOL = 1e-6  # of steps that count as equal
 SETTLED_RTOL = 1e-12  # change of variances from one doubling to the next
@@ -338,7 +348,7 @@ def linear_tracker(
 
 @typed
 def tracker(  # noqa: PLR0913  keywords of one call
-    body: FlexibleBody,
+    body: FlexibleBody | Assembly,
     sensors: Sequence[Sensors],
     forces: Channels,
     wanted: Sequence[Sensors],
@@ -352,7 +362,7 @@ def tracker(  # noqa: PLR0913  keywords of one call
     """A filter that estimates forces, and motion and stress anywhere, from a few sensors.
 
     Args:
-        body: with its outer surface, damped, in SI units.
+        body: with its outer surface, damped, in SI units; or several, as an assembly.
         sensors: what is measured, with its noise.
         forces: where unknown forces act.
         wanted: what is to be estimated.
@@ -370,8 +380,17 @@ def tracker(  # noqa: PLR0913  keywords of one call
         ModelError: if the body has no surface or stress where they are needed, or if sensors do
             not see a force or a motion that lasts, which is named.
     """
-    if body.units != "SI":
-        raise ConfigError(f"the body is in {body.units}; track it in SI units.")
+    check_units(body)
     assumed = Assumed(dt, walk, unmodelled, first)
-    operation = of_body(body, sensors, forces, wanted, fixed)
-    return linear_tracker(operation, np.zeros(0), assumed, sensors, wanted)
+    motion = operation(body, (), {}, (sensors, forces, wanted), None, fixed)
+    return linear_tracker(motion, np.zeros(0), assumed, sensors, wanted)
+
+
+def check_units(structure: Structure) -> None:
+    """Refuse bodies in other units than those of samples.
+
+    Raises:
+        ConfigError: if they are not in SI units.
+    """
+    if other := {body.units for body in Parts.of(structure).bodies.values()} - {"SI"}:
+        raise ConfigError(f"the body is in {other.pop()}; track it in SI units.")

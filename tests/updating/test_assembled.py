@@ -24,6 +24,7 @@ from rom.updating import (
     candidates,
     parameter_tracker,
     place,
+    tracker,
 )  # fmt: skip
 from rom.updating.family_model import Parts, family_model
 from rom.updating.frf_data import noisy
@@ -176,10 +177,13 @@ def test_an_assembly_of_one_is_planned_as_a_body(families):
     options = {"n_sensors": 2, "noise": 0.05}
     alone = place(family, offered, offered, LINES[::5], fixed=("root",),
                   attached={"load": load}, **options)  # fmt: skip
-    same = place(one, offered, offered, LINES[::5], fixed=HELD,
+    named = replace(offered, bodies="frame")
+    same = place(one, named, named, LINES[::5], fixed=HELD,
                  attached={"load": replace(load, at=("frame", "tip"))}, **options)  # fmt: skip
     assert alone.names[:2] == ("E", "load") and same.names[:2] == ("frame.E", "load")
     assert_allclose(same.covariance, alone.covariance, rtol=1e-8)
+    for line, own in zip(same.csv().split(), alone.csv().split(), strict=True):
+        assert line == f"{own},{'body' if own.startswith('kind') else 'frame'}"
 
 
 def test_channels_name_the_body_on_which_they_lie(bolted):
@@ -234,6 +238,27 @@ def test_an_assembly_of_one_is_tracked_as_a_body(families):
     for name in ("values", "forces", "factors", "surprise"):
         scale = np.abs(getattr(a, name)).max(axis=0)
         assert_allclose(getattr(b, name) / scale, getattr(a, name) / scale, atol=1e-8)
+
+
+def test_bodies_that_are_coupled_are_tracked_with_their_own_damping(families):
+    """D = beta K of each is beta omega^2 of each mode of the whole; a force that lasts bends it."""
+    beta, dt, couplings = 1e-5, 1e-5, ((("frame", "tip"), ("arm", "root")),)
+    bodies = {name: replace(one.body, D=beta * one.body.K) for name, one in families.items()}
+    whole = rom.Assembly(bodies, couplings)
+    sensors, force, _ = watched("arm")
+    t = tracker(whole, sensors, force, sensors[2:], dt=dt, walk=1.0, fixed=HELD)
+    modes = whole.modes(fixed=HELD)
+    damped = np.array([np.roots([1.0, beta * w**2, w**2]) for w in modes.omega]).ravel()
+    found, expected = np.linalg.eigvals(t.A), np.r_[np.exp(damped * dt), 1.0]
+    assert found.size == expected.size
+    assert max(np.abs(found - one).min() for one in expected) < 1e-7
+    motion = np.linalg.solve(np.eye(len(t.A) - 1) - t.A[:-1, :-1], t.A[:-1, -1])
+    ends = (sensors[2].channels, "arm"), (force, "frame")
+    tip, driven = (
+        replace(c, bodies=None).rows(bodies[name], "channel") @ modes.shapes[name]
+        for c, name in ends
+    )
+    assert_allclose(t.W[0, :-1] @ motion, np.sum(tip * driven / modes.omega**2), rtol=1e-6)
 
 
 def test_a_body_beside_one_that_it_does_not_touch_is_tracked_as_alone(families):

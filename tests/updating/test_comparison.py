@@ -60,7 +60,7 @@ def test_lines_are_foretold_by_the_update_of_all_others(family):
         part = replace(test, frequencies=LINES[~aside], H=test.H[~aside])
         own = rom.update(family, part, free=("E_inner",), **COMMON)
         log = np.log(own.responses(LINES[aside]) / test.H[aside])
-        variance = LEVEL**2 / 2 * (1 + LEVEL**2 / 2)
+        variance = LEVEL**2 / 2 * AVERAGES / (AVERAGES - 1) * (1 + LEVEL**2 / 2)
         assert_allclose(found.by_line[0, aside], (np.abs(log) ** 2).sum(axis=(1, 2)) / variance,
                         rtol=1e-6)  # fmt: skip
     assert_allclose(found.expected, 2 * 6)

@@ -84,7 +84,7 @@ def test_equations_find_what_they_find_on_dense_matrices(family, model, dense, s
     test = measured(family, model, level=0.01, sign=sign)
     found = rom.update(family, test, fixed=("root",), residual="equations", damping=0.02)
     m = found.covariance.shape[0] - 3
-    weights = 1 / test.errors().own
+    weights = 1 / test.noise.errors().own
     there = Measurement(2 * np.pi * LINES, sign * test.H, (DRIVEN,), weights)
     same = update_by_input(AtSensors(dense), there, np.zeros(3), np.full(m, 0.02), rank=m)
     factors = np.array(list(found.factors.values()))

@@ -6,6 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scipy.integrate import quad
 from scipy.stats import binom, chi2, kstest, norm
 
 import rom
@@ -14,7 +15,7 @@ from rom.errors import ConfigError
 from rom.updating import Channels, Responses
 from rom.updating.estimate import DAMPING_LOG_DEVIATION
 from rom.updating.family_model import family_model
-from rom.updating.frf_data import estimators, pooled
+from rom.updating.frf_data import estimators, inverse, pooled
 from rom.updating.normal_equations import Data, responses_at, sums, unsure, white
 
 PARAMETERS = {
@@ -188,7 +189,7 @@ def test_estimated_coherence_has_the_expectation_of_its_averages():
     f = gauss(rng, (n, 60_000))
     H, _, _, c = estimators(f + 0.2 * gauss(rng, f.shape), f)
     test = Responses(np.arange(1.0, 60_001), H[:, None, None], one(), one(), c[:, None, None], n)
-    error = test.errors().own
+    error = test.noise.errors().own
     assert_allclose(np.mean(np.abs(np.log(H) / error[:, 0, 0]) ** 2) / 2, 1.0, atol=0.015)
 
 
@@ -200,7 +201,7 @@ def test_errors_over_the_model_leave_the_mean_of_logarithms_where_it_is():
     test = Responses(np.arange(1.0, 60_001), H[:, None, None], one(), one(), c[:, None, None], n)
     level, variance = np.log(np.abs(H))[:, None, None], 0.2**2 / (2 * (n - 1))
     for excess, bias in ((0.0, 2 * variance), (-level, 0.0)):
-        weight = test.errors(excess).own ** -2.0
+        weight = test.noise.errors(excess).own ** -2.0
         found = (weight * level).sum() / weight.sum()
         assert_allclose(found, bias, atol=4 * np.sqrt(variance / 60_000) + 0.1 * bias)
 
@@ -247,9 +248,31 @@ def test_what_estimated_weights_cost_is_that_of_dense_matrices():
     A = unsure(white(J[None, :, None], at, c), at, c, varied[None, :, None])[0, :, 0]
     used = weight > 0
     V = np.diag(weight[used] ** -2.0) + c**2
-    inverse, d = np.linalg.inv(V), weight[used] ** -2.0
-    Q = inverse @ np.diag(np.diag(inverse) * varied[used] ** 2 * d**2) @ inverse
+    N, d = np.linalg.inv(V), weight[used] ** -2.0
+    Q = N @ np.diag(np.diag(N) * varied[used] ** 2 * d**2) @ N
     assert_allclose(A.conj().T @ A, J[used].conj().T @ Q @ J[used], rtol=1e-10)
+
+
+def test_one_over_what_is_left_of_a_variance_has_no_bias():
+    """Of normal errors by quadrature; one over the value itself is too large by a ninth."""
+    for mean in (3.0, 8.0):
+        found, _ = quad(lambda x, m=mean: norm.pdf(x - m) * inverse(x, 1.0), mean - 8, mean + 8)
+        assert_allclose(found, 1 / mean, rtol=4e-3)
+
+
+def test_noise_of_a_force_leaves_chi_square_where_it_is():
+    """A fifth of the variance is left for sensors: the lines of all inputs know it to 1 %."""
+    rng, n, shape = np.random.default_rng(20261127), 60, (2000, 3, 4)
+    f = gauss(rng, (n, shape[0], 1, shape[2]))
+    x = f + 0.05 * gauss(rng, (n, *shape))
+    f = f + 0.1 * gauss(rng, f.shape)
+    H, _, _, c = estimators(x, np.broadcast_to(f, x.shape))
+    channels = [Channels(np.zeros((k, 3)), np.ones((k, 3))) for k in shape[1:]]
+    test = Responses(np.arange(1.0, 2001), H, *channels, c, n, force_noise=0.1, estimator="H1")
+    log = test.logarithm()
+    e = test.noise.errors(-log.real)
+    left = white(log[..., None], 1 / e.own, e.common)
+    assert_allclose(np.mean(np.abs(left) ** 2) / 2, 1.0, atol=0.02)
 
 
 def test_sensors_share_what_their_lines_tell_of_their_noise():
@@ -278,7 +301,7 @@ def test_the_limit_is_kept_where_averages_are_few():
     shape = (trials * lines, 1, 1)
     test = Responses(np.arange(1.0, shape[0] + 1), H.reshape(shape), one(), one(),
                      c.reshape(shape), n)  # fmt: skip
-    e = test.errors()
+    e = test.noise.errors()
     value = (np.abs(np.log(H) / e.own[:, 0, 0]) ** 2).reshape(trials, lines).sum(axis=1)
     own = e.known * 2 * lines
     share = np.mean(value / (2 * lines) > chi2.isf(0.01, own) / own)
@@ -291,12 +314,12 @@ def test_noise_of_forces_may_differ_between_lines(exact, tmp_path):
     test = measured(exact, "Hv", 0.1, 0.1, np.random.default_rng(0))
     same = replace(test, force_noise=np.full((LINES.size, 2), 0.1))
     assert_allclose(same.logarithm(), test.logarithm())
-    assert_allclose(same.errors().own, test.errors().own)
+    assert_allclose(same.noise.errors().own, test.noise.errors().own)
     noise = np.linspace(0.05, 0.1, LINES.size)[:, None] * [1.0, 0.5]
     other = replace(test, force_noise=noise)
     gain = (other.logarithm() - test.logarithm())[:, 0]
     assert_allclose(gain, np.log1p(noise**2) - np.log1p(0.1**2), atol=1e-12)
-    assert_allclose(other.errors().common[:, 0], noise / np.sqrt(2 * (AVERAGES - 1)))
+    assert_allclose(other.noise.errors().common[:, 0], noise / np.sqrt(2 * (AVERAGES - 1)))
     pytest.importorskip("h5py", reason="h5py is not installed")
     read = rom.io.read_responses(rom.io.write_responses(other, tmp_path / "test.h5"))
     assert_allclose(read.force_noise, noise)
@@ -308,7 +331,7 @@ def test_large_errors_have_the_variance_of_their_logarithm():
     H = 1 + level * gauss(rng, (60_000,))
     c = 1 / (1 + n * level**2)
     test = Responses(np.arange(1.0, 60_001), H[:, None, None], one(), one(), c, n)
-    error = test.errors().own
+    error = test.noise.errors().own
     assert_allclose(np.mean(np.abs(np.log(H) / error[:, 0, 0]) ** 2) / 2, 1.0, atol=0.03)
 
 

@@ -257,3 +257,30 @@ def test_what_a_table_lacks_is_named(tmp_path):
     refused("a\nb\n", "no column is named")
     (tmp_path / "points.csv").write_text(POINTS.replace("x [mm]", "x"))
     refused(whole, "columns .* node, x")
+
+
+def test_bodies_of_an_assembly_are_named_by_entities_or_by_a_table_of_points(tmp_path):
+    """Node 7 is on both sides of a joint; ten characters of a name are kept in universal files."""
+    of = {"bodies": ("frame", "counterweight"), "averages": 5, "coherence": 0.9}
+
+    def written(*owners, force="frame"):
+        functions = [dataset(6, 1, [RE, IM], entities=(own, force)) for own in owners]
+        nodes = two().split(f"{58:6d}")[0].removesuffix(f"{-1:6d}\n")
+        (tmp_path / "x.unv").write_text(nodes + "".join(functions))
+        return tmp_path / "x.unv"
+
+    test = rom.io.read_responses(written("FRAME", "counterwei"), **of)
+    assert test.sensors.bodies == ("counterweight", "frame") and test.inputs.bodies == ("frame",)
+    assert_array_equal(test.sensors.points[0], test.sensors.points[1])
+    for wrong, words in (("wing", "node 7 is of 'wing'; bodies are 'frame'"), ("NONE", "no body")):
+        with pytest.raises(FileFormatError, match=words):
+            rom.io.read_responses(written("frame", wrong), **of)
+    test = rom.io.read_responses(written("left", force="left"), **of)
+    assert test.sensors.bodies is None
+
+    (tmp_path / "test.csv").write_text(table())
+    lines, owners = POINTS.splitlines(), ("body", "frame", "counterweight", "frame")
+    text = "\n".join(f"{line},{own}" for line, own in zip(lines, owners, strict=True))
+    (tmp_path / "points.csv").write_text(text)
+    test = rom.io.read_responses(tmp_path / "test.csv", averages=20, points=tmp_path / "points.csv")
+    assert test.sensors.bodies == owners[1:3] and test.inputs.bodies == ("frame",)

@@ -56,15 +56,17 @@ FACTOR_HELP = "by a factor from LOW to HIGH that is sought; may be repeated"
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Options of the verb."""
+    for part in (_structure, _test, _search, _plan_options):
+        part(parser)
+    parser.add_argument(
+        "-o", "--output", type=Path, help="updated body, .rom.npz; plan, .csv, .uff or .png"
+    )
+    add_force(parser)
+
+
+def _test(parser: argparse.ArgumentParser) -> None:
+    """What was measured."""
     parser.add_argument("file", type=Path, nargs="?", help="test: .uff, .unv, .csv, .txt or .h5")
-    parser.add_argument(
-        "--family", metavar="FILE or NAME=FILE", action="append", required=True,
-        help="family file, .rom.npz; of several, repeated, each with a name: an assembly",
-    )  # fmt: skip
-    parser.add_argument(
-        "--couple", metavar="BODY.INTERFACE=BODY.INTERFACE", type=assignment, action="append",
-        default=[], help="of an assembly: they move together; may be repeated",
-    )  # fmt: skip
     parser.add_argument("--averages", type=count, help="number of them behind each function")
     parser.add_argument("--coherence", type=number, help="of all values, where the file has none")
     parser.add_argument(
@@ -73,7 +75,25 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--estimator", choices=("H1", "H2", "Hv"), help="that the functions are, where it matters"
     )
-    parser.add_argument("--points", type=Path, help="another file with the nodes of the test")
+    parser.add_argument(
+        "--points", type=Path, help="another file with nodes, and bodies of an assembly"
+    )
+    parser.add_argument("--tolerance", type=positive, help="of points off the body [m]")
+    parser.add_argument(
+        "--picture", type=Path, help="of the points of a test on the body, .png, drawn first"
+    )
+
+
+def _structure(parser: argparse.ArgumentParser) -> None:
+    """What the model is, and what of it is unknown."""
+    parser.add_argument(
+        "--family", metavar="FILE or NAME=FILE", action="append", required=True,
+        help="family file, .rom.npz; of several, repeated, each with a name: an assembly",
+    )  # fmt: skip
+    parser.add_argument(
+        "--couple", metavar="BODY.INTERFACE=BODY.INTERFACE", type=assignment, action="append",
+        default=[], help="of an assembly: they move together; may be repeated",
+    )  # fmt: skip
     parser.add_argument("--fixed", metavar="NAME,...", type=names, default=(), help="what was held")
     parser.add_argument(
         "--free", metavar="NAME,...", type=names,
@@ -99,6 +119,10 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--prior", metavar="NAME=DEVIATION", type=assignment, action="append", default=[],
         help="relative standard deviation of a factor about one, before the test",
     )  # fmt: skip
+
+
+def _search(parser: argparse.ArgumentParser) -> None:
+    """How the unknowns are sought."""
     parser.add_argument(
         "--residual", choices=("responses", "equations", "response-function"), default="responses",
         help="what is made small: responses (default), equations of motion at the sensors, or what "
@@ -114,10 +138,10 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--damping", type=positive, default=0.01, help="to start from (default 1 %%)"
     )
-    parser.add_argument("--tolerance", type=positive, help="of points off the body [m]")
-    parser.add_argument(
-        "--picture", type=Path, help="of the points of a test on the body, .png, drawn first"
-    )
+
+
+def _plan_options(parser: argparse.ArgumentParser) -> None:
+    """What a test to be should tell."""
     parser.add_argument(
         "--plan", metavar="SENSORS,FORCES", type=_two_counts, nargs="?", const=PLAN_SIZE,
         help="choose so many for a test to be (8,1 where they are left out)",
@@ -133,10 +157,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         help="noise of what is planned where nothing moves [m/s^2 per N] (default: a thousandth of "
         "the largest response)",
     )  # fmt: skip
-    parser.add_argument(
-        "-o", "--output", type=Path, help="updated body, .rom.npz; plan, .csv, .uff or .png"
-    )
-    add_force(parser)
 
 
 def run(args: argparse.Namespace) -> Answer:
@@ -144,6 +164,7 @@ def run(args: argparse.Namespace) -> Answer:
     from rom.io.family import save
     from rom.io.responses.reading import read_responses
     from rom.updating.estimate import update
+    from rom.updating.family_model import Parts
 
     if args.plan is not None:
         return _plan(args)
@@ -151,8 +172,9 @@ def run(args: argparse.Namespace) -> Answer:
     family = _family(args)
     outputs = _outputs(args, family)
     test = read_responses(
-        args.file, averages=args.averages, coherence=args.coherence, points=args.points
-    )
+        args.file, averages=args.averages, coherence=args.coherence, points=args.points,
+        bodies=[name for name in Parts.of(family).bodies if name],
+    )  # fmt: skip
     if args.picture is not None:
         _match(args, family, test)
     noise = {"force_noise": args.force_noise, "estimator": args.estimator}

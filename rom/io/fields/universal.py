@@ -40,6 +40,7 @@ class Function:
         denominator: type of what it is divided by.
         labels: the first five lines, stripped.
         units: labels of the units of numerator and denominator, stripped.
+        entities: names of what response and reference belong to, stripped; "NONE" without one.
     """
 
     kind: int
@@ -51,6 +52,7 @@ class Function:
     denominator: int
     labels: tuple[str, ...]
     units: tuple[str, str] = ("", "")
+    entities: tuple[str, str] = ("", "")
 
     def receptance(self) -> npt.NDArray[np.complex128]:
         """(n,) displacement per force [m/N], whatever was measured.
@@ -222,6 +224,7 @@ def _function(lines: list[str], values: Array, spacing: int, parts: int) -> Func
         denominator=int(lines[9][:10]),
         labels=tuple(line.strip() for line in lines[:5]),
         units=(lines[8][UNIT_LABEL].strip(), lines[9][UNIT_LABEL].strip()),
+        entities=(dof[31:41].strip(), dof[56:66].strip()),
     )
 
 

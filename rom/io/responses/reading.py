@@ -1,12 +1,12 @@
 """Tests of vibration from files: the reader is chosen by the ending."""
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from rom.arguments import typed
 from rom.errors import ConfigError, FileFormatError
-from rom.io.responses.grid import side_by_side
+from rom.io.responses.grid import Bodies, side_by_side
 from rom.model import Array
 from rom.updating.measured import MeasuredModes, Responses
 
@@ -24,6 +24,7 @@ def read_responses(
     averages: int | None = None,
     coherence: float | None = None,
     points: str | Path | None = None,
+    bodies: Collection[str] = (),
 ) -> Responses:
     """Measured frequency responses, with their points and units.
 
@@ -33,7 +34,11 @@ def read_responses(
             ``12+Z/3-Y real [m/s^2/N]``; or .h5 of `write_responses`.
         averages: number of them behind all functions; .h5 says so itself.
         coherence: of all values [1]; None where the file has it.
-        points: another file with the nodes, universal or a table ``node, x [m], y [m], z [m]``.
+        points: another file with the nodes, universal or a table ``node, x [m], y [m], z [m]``;
+            a last column ``body`` names bodies of an assembly.
+        bodies: of an assembly: names to which the entities belong that universal files give with
+            the nodes of a function, in their first ten characters. Where no entity is one of them
+            each channel belongs to the nearest body. A table of points and .h5 say so themselves.
 
     Raises:
         FileFormatError: naming function, column or node that is missing or contradicts another.
@@ -68,9 +73,10 @@ def read_responses(
         functions = functions_of(path)
     else:
         functions, nodes = functions_and_points(path)
-    nodes |= _points(points)
+    more, owners = _points(points)
     with _of(path):
-        return side_by_side(path, functions, nodes, averages, coherence)
+        where = nodes | more
+        return side_by_side(path, functions, where, averages, coherence, Bodies(owners, bodies))
 
 
 @typed
@@ -90,7 +96,7 @@ def read_modes(path: str | Path, *, points: str | Path | None = None) -> Measure
     """
     from rom.io.responses.universal_test import modes_of
 
-    places = _points(points)
+    places, _ = _points(points)
     with _of(Path(path)):
         return modes_of(Path(path), places)
 
@@ -123,16 +129,16 @@ def _of(path: Path) -> Iterator[None]:
         raise FileFormatError(error.message, where=str(path), hint=error.hint) from error
 
 
-def _points(path: str | Path | None) -> dict[int, Array]:
+def _points(path: str | Path | None) -> tuple[dict[int, Array], dict[int, str]]:
     from rom.io.responses.tables import points_of
     from rom.io.responses.universal_test import functions_and_points
 
     if path is None:
-        return {}
+        return {}, {}
     path = Path(path)
-    return (
-        points_of(path) if path.suffix.lower() in TABLE_ENDINGS else functions_and_points(path)[1]
-    )
+    if path.suffix.lower() in TABLE_ENDINGS:
+        return points_of(path)
+    return functions_and_points(path)[1], {}
 
 
 def _unknown(path: Path, known: tuple[str, ...]) -> ConfigError:

@@ -39,7 +39,8 @@ def functions_of(path: Path) -> tuple[Function, ...]:
     Raises:
         FileFormatError: naming line or column that is not as described.
     """
-    names, values = _table(path, re.compile(r"freq", re.IGNORECASE))
+    names, rows, separator = _cells(path, re.compile(r"freq", re.IGNORECASE))
+    values = _numbers(path, rows, separator)
     if "[khz]" in names[0].lower() or "(khz)" in names[0].lower():
         values[:, 0] *= 1e3
     parts: dict[tuple[Dof, Dof], dict[str, tuple[str, Array]]] = {}
@@ -60,17 +61,26 @@ def functions_of(path: Path) -> tuple[Function, ...]:
     )
 
 
-def points_of(path: Path) -> dict[int, Array]:
-    """{node: point [m]} of a table with the columns node, x [m], y [m] and z [m].
+def points_of(path: Path) -> tuple[dict[int, Array], dict[int, str]]:
+    """{node: point [m]} of a table with the columns node, x [m], y [m] and z [m]; {node: body}.
+
+    The latter where there is a last column, body.
 
     Raises:
         FileFormatError: naming line or column that is not as described.
     """
-    names, values = _table(path, re.compile(r"node", re.IGNORECASE))
+    names, rows, separator = _cells(path, re.compile(r"node", re.IGNORECASE))
+    named = names[-1].lower() == "body"
+    owners = [cells.pop().strip().strip('"') for _, cells in rows] if named else []
+    names = names[:-1] if named else names
+    values = _numbers(path, rows, separator)
     found = [POINT_COLUMN.fullmatch(name) for name in names[1:]]
     axes = [m.group(1).lower() for m in found if m]
     if axes != ["x", "y", "z"] or len(names) != 4:
-        raise FileFormatError(f"columns {names}: node, x [m], y [m], z [m].", where=str(path))
+        raise FileFormatError(
+            f"columns {names}: node, x [m], y [m], z [m], and body if there are several.",
+            where=str(path),
+        )
     try:
         factors = np.array([length_of(m.group(2)) for m in found if m])
     except ConfigError as error:
@@ -78,7 +88,8 @@ def points_of(path: Path) -> dict[int, Array]:
     nodes = values[:, 0]
     if len(set(nodes)) < len(nodes) or (nodes != np.floor(nodes)).any():
         raise FileFormatError("nodes are whole numbers, each one once.", where=str(path))
-    return {int(row[0]): row[1:] * factors for row in values}
+    places = {int(row[0]): row[1:] * factors for row in values}
+    return places, dict(zip(places, owners, strict=True)) if named else {}
 
 
 def _axis(sign: str, axis: str) -> int:
@@ -123,8 +134,8 @@ def _function(kind: int, pair: tuple[Dof, Dof], x: Array, y: Any, numerator: int
     return Function(kind, x, y, *pair, numerator, FORCE_TYPE, ())
 
 
-def _table(path: Path, first: re.Pattern[str]) -> tuple[Row, Array]:
-    """Names of columns, the first of which is like a pattern, and numbers (n, columns)."""
+def _cells(path: Path, first: re.Pattern[str]) -> tuple[Row, list[tuple[int, Row]], str]:
+    """Names of columns, the first of which is like a pattern; cells of each line by its number."""
     text = check_readable(path, MAX_TABLE_BYTES).read_text("utf-8-sig", "replace").splitlines()
     for above, line in enumerate(text, 1):
         separator = max("\t;,", key=line.count)
@@ -139,17 +150,25 @@ def _table(path: Path, first: re.Pattern[str]) -> tuple[Row, Array]:
         if not line.strip():
             continue
         cells = line.split(separator)
-        try:
-            rows.append([_number(cell, separator) for cell in cells])
-        except ValueError as error:
-            raise FileFormatError(f"line {number}: {error}.", where=str(path)) from error
+        rows.append((number, cells))
         if len(cells) != len(names):
             raise FileFormatError(
                 f"line {number} has {len(cells)} numbers under {len(names)} names.", where=str(path)
             )
     if not rows:
         raise FileFormatError("there are no numbers under the names.", where=str(path))
-    return names, np.array(rows)
+    return names, rows, separator
+
+
+def _numbers(path: Path, rows: list[tuple[int, Row]], separator: str) -> Array:
+    """(n, columns) numbers of cells."""
+    found = []
+    for number, cells in rows:
+        try:
+            found.append([_number(cell, separator) for cell in cells])
+        except ValueError as error:
+            raise FileFormatError(f"line {number}: {error}.", where=str(path)) from error
+    return np.array(found)
 
 
 def _number(cell: str, separator: str) -> float:

@@ -48,13 +48,14 @@ left, upper,
 """
 
 
-def header(kind, n, spacing, *, response=(7, 3), reference=(11, -3), numerator=12):
+def header(kind, n, spacing, *, response=(7, 3), reference=(11, -3), numerator=12, entities=None):
     """Records 1 to 11 of a dataset 58, written by the columns of the format."""
     low, step = (2.0, 0.5) if spacing else (0.0, 0.0)
+    own = entities or ("NONE", "NONE")
     lines = ["wing tip", "run 3", "12-MAY-26", "NONE", "NONE"]
     lines += [
-        f"{4:5d}{1:10d}{0:5d}{0:10d} {'NONE':<10}{response[0]:10d}{response[1]:4d}"
-        f" {'NONE':<10}{reference[0]:10d}{reference[1]:4d}",
+        f"{4:5d}{1:10d}{0:5d}{0:10d} {own[0]:<10}{response[0]:10d}{response[1]:4d}"
+        f" {own[1]:<10}{reference[0]:10d}{reference[1]:4d}",
         f"{kind:10d}{n:10d}{spacing:10d}{low:13.5e}{step:13.5e}{0:13.5e}",
     ]
     for what in (18, numerator, 13, 0):
