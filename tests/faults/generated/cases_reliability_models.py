@@ -223,9 +223,7 @@ def unresolved(folder):
 
 NEGATIVE = (QualityGateError, ModelError, SolverError)
 CASES = [
-    case("D01", f"modes box.msh {STEEL.replace('7850', '0')}", MaterialError, "rho", fe=True),
-    case("D03 none", f"modes box.msh {STEEL.replace('210e9', '0')}", MaterialError, "E", fe=True),
-    case("D03 negative", f"modes box.msh {STEEL.replace('210e9', '-1')}", MaterialError, "E", fe=True),
+    case("D03", f"modes box.msh {STEEL.replace('210e9', '0')}", MaterialError, "E", fe=True),
     case("D05", MODES.replace("0.3", "0.4999999"), (Warned, MaterialError), "nu", fe=True),
     case("D07", lambda folder: rom.Orthotropic(E=(1e9,) * 3, nu=(0.9,) * 3, G=(1e9,) * 3, rho=1e3),
          MaterialError, "eigenvalue"),
