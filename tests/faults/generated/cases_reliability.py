@@ -10,14 +10,13 @@ import subprocess
 import sys
 import warnings
 from dataclasses import replace
-from zipfile import ZipFile
 
 import numpy as np
 
 import rom
 from cases.files.cells import blocks_of, solid, write_msh
 from cases.solid import block
-from generated.case import Silent, Warned, Works, arrays_changed, case, edit, require, write
+from generated.case import Silent, Warned, Works, case, edit, require, write
 from generated.stock import KINDS, STEEL, body, model, on_ranks, origin, pendulum
 from rom.cli.main import main
 from rom.errors import (
@@ -29,7 +28,6 @@ from rom.errors import (
     QualityGateError,
     SolverError,
     TagError,
-    UnsafeFileError,
 )
 from rom.fe.mesh.read import read_mesh
 
@@ -131,27 +129,6 @@ def complete(folder):
     )
 
 
-def flipped(folder):
-    """One bit of the stiffness; one of a date in the archive would harm nothing."""
-    with ZipFile(folder / "good.npz") as archive:
-        entry = archive.getinfo("K.npy")
-    data = bytearray((folder / "good.npz").read_bytes())
-    data[entry.header_offset + 128 + entry.compress_size // 2] ^= 8
-    (folder / "good.npz").write_bytes(bytes(data))
-
-
-def relabelled(folder):
-    """The version before this one."""
-    from rom.io.archive import write_archive
-
-    with np.load(folder / "good.npz") as found:
-        arrays = {name: found[name] for name in found.files}
-    manifest = json.loads(arrays.pop("manifest").tobytes())
-    del manifest["sha256"]
-    manifest["version"] = [1, 0]
-    write_archive(folder / "good.npz", manifest, arrays, "it")
-
-
 def memory(folder):
     """A limit of memory is told as such."""
     code = (
@@ -192,13 +169,6 @@ def explicit(folder):
     require(np.abs(sol.position("bob")).max() < 2, "it grew")
 
 
-def redundant(folder):
-    """One weld more than needed."""
-    mech = pendulum()
-    mech.fixed("weld", origin(mech), mech.part("bob").marker("pin"))
-    return rom.simulate(mech, t_end=0.05, dt=0.01)
-
-
 def rigid_modes(folder):
     """A body whose elastic coordinates can move it as a whole."""
     made = body()
@@ -222,14 +192,6 @@ def rigid_modes(folder):
 
 def turned(q):
     return lambda folder: pendulum(orientation=q)
-
-
-def restarted(folder):
-    """Half and half is the whole, bit by bit."""
-    whole = rom.simulate(pendulum(), t_end=0.4, dt=0.01)
-    half = rom.simulate(pendulum(), t_end=0.2, dt=0.01)
-    rest = rom.simulate(pendulum(), t_end=0.4, dt=0.01, state=half.final)
-    require(np.array_equal(whole.q[-1], rest.q[-1]), "other bits")
 
 
 def growth(folder):
@@ -263,7 +225,6 @@ def unresolved(folder):
     require(made.n_modes == 12 and np.linalg.eigvalsh(made.K)[0] > 0, "more shapes than dofs")
 
 
-NEGATIVE = (QualityGateError, ModelError, SolverError)
 CASES = [
     case("A01", "reduce part.toml -o a.npz", ConfigError, "certificat", "Did you mean certificate?",
          given=edit("part.toml", "certificate =", "certificat =")),
@@ -284,30 +245,21 @@ CASES = [
          given=lambda folder: write_msh(folder / "box.msh", THIN.points, *blocks_of(THIN))),
     case("D03", f"modes box.msh {STEEL.replace('210e9', '0')}", MaterialError, "E", fe=True),
     case("D05", MODES.replace("0.3", "0.4999999"), (Warned, MaterialError), "nu", fe=True),
-    case("D07", lambda folder: rom.Orthotropic(E=(1e9,) * 3, nu=(0.9,) * 3, G=(1e9,) * 3, rho=1e3),
-         MaterialError, "eigenvalue"),
     case("D13 scalar", "simulate pendulum.toml -o out", ConfigError, "gravity",
          given=edit("pendulum.toml", "[0, -9.81, 0]", "9.81")),
     case("D13 millimetres", "simulate pendulum.toml -o out", (Warned, ConfigError), ("9810", "gravity"), leaves=True,
          given=(edit("pendulum.toml", "-9.81", "-9810"), edit("pendulum.toml", "dt = 0.01", "dt = 1e-4"))),
-    case("E01", lambda folder: rom.reduce(model(), method=rom.Guyan(), interfaces={"rot": "rbe2"}),
-         InterfaceError, "rot", "root"),
     case("E03", interface(None, "full"), (Silent, Warned), "interior"),
     case("E05", interface([0], "full"), (InterfaceError, Silent, Warned), "root"),
     case("E07", interface([0], "full", method=rom.CraigBampton(2)), (InterfaceError, Warned), "root"),
     case("E09", complete, Works),
     case("E11", unresolved, Works),
     case("E13", interface([0, 1], rom.Polynomial(1), reference="free"), (InterfaceError, Warned, ConfigError), "root"),
-    case("E17", matrices(K=lambda A: A - 1e3 * abs(A).max() * model().M / abs(model().M).max()), NEGATIVE, "negative"),
     case("F03", matrices(K=spoilt), (SolverError, QualityGateError, ModelError), "K"),
     case("F05", matrices(K=skewed), QualityGateError, "K", "symmetric"),
     case("F11 tiny", lambda folder: rom.simulate(pendulum(), t_end=0.1, dt=0.01, tolerance=1e-300),
          (ConfigError, SolverError), "tolerance"),
     case("F11 one", lambda folder: rom.simulate(pendulum(), t_end=0.1, dt=0.01, tolerance=10.0), ConfigError, "tolerance"),
-    case("G03", "check good.npz", FileFormatError, "good.npz", given=flipped),
-    case("G11", "check good.npz", Silent, given=relabelled),
-    case("G15", "check good.npz", (FileFormatError, UnsafeFileError, Warned), "good.npz",
-         given=arrays_changed("good.npz", lambda arrays: arrays.update(K=arrays["K"].astype(">f8")))),
     case("G21", "export good.npz a.npz", (Works, ConfigError), "a.npz",
          given=lambda folder: (folder / "a.npz").symlink_to("none.npz")),
     case("H03", one_thread(2), Works, fe=True, seconds=60),
@@ -315,10 +267,8 @@ CASES = [
     case("H11", drawn, Works, fe=True, seconds=60),
     case("H13", memory, Works),
     case("I01", explicit, (SolverError, Silent), "bob"),
-    case("I05", redundant, Warned, ("hinge", "weld")),
     case("I07", rigid_modes, (ConfigError, ModelError), "rod"),
     case("I09 near", turned((1.0005, 0, 0, 0)), (Works, Warned)),
     case("I09 far", turned((1.1, 0, 0, 0)), (ConfigError, ModelError), ("orientation", "quaternion")),
-    case("I11", restarted, Works),
     case("I13", growth, Works, seconds=60),
 ]  # fmt: skip
