@@ -162,6 +162,7 @@ def refused(capsys, code, arguments, *words):
     out, err = capsys.readouterr()
     lines = [line for line in err.splitlines() if line[:6] in ("error:", "hint: ")]
     assert out == "" and "Traceback" not in err
+    assert err.rstrip().endswith((".", "?")), err
     assert [line[:6] for line in lines] in (["error:"], ["error:", "hint: "])
     assert not [word for word in words if word not in err], err
     return lines

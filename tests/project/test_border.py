@@ -69,7 +69,8 @@ MUST_REFUSE = {  # what is no value of a kind, whatever it is for
 }
 KINDS = {  # callable -> kinds of its arguments, whose values are refused and not only survived
     "simulate": "mechanism=record t_end=positive dt=positive rho_inf=number tolerance=positive "
-    "rtol=positive save_every=count method=word t_start=number order=count state=record",
+    "rtol=positive save_every=count method=word t_start=number order=count state=record "
+    "keep=record progress=flag stabilised=flag",
     "reduce": "model=record method=record interfaces=table reference=word stress=flag "
     "damping=record",
     "modes": "model=record n=count fixed=word",
@@ -119,9 +120,9 @@ KINDS = {  # callable -> kinds of its arguments, whose values are refused and no
     "Density": "low=positive",
 }
 LEGAL = {  # what some of these take all the same
-    ("simulate", "state", "None"), ("reduce", "damping", "None"), ("reduce", "reference", "None"),
-    ("modes", "fixed", "None"), ("export", "to", "None"), ("ModalDamping", "ratio", "five numbers"),
-    ("FlexibleBody.frequencies", "fixed", "None"),
+    ("simulate", "state", "None"), ("simulate", "keep", "None"), ("reduce", "damping", "None"),
+    ("reduce", "reference", "None"), ("modes", "fixed", "None"), ("export", "to", "None"),
+    ("ModalDamping", "ratio", "five numbers"), ("FlexibleBody.frequencies", "fixed", "None"),
     ("FlexibleBody.with_reference", "reference", "None"),
 }  # fmt: skip
 MISSING_FILES = {"read_component"}  # is refused in any case

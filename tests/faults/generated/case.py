@@ -19,7 +19,7 @@ CLASSES = {  # number of the class: what it is about, and its modules
     "6": ("blame", ("cases_calls", "cases_files")),
     "7": ("bounds", ("cases_bounds",)),
     "8": ("alone and together", ("cases_together",)),
-    "R": ("odd cases of the reliability table", ("cases_reliability", "cases_reliability_models")),
+    "R": ("odd cases of the reliability table", ("cases_reliability",)),
 }
 
 

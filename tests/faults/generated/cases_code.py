@@ -73,7 +73,7 @@ CASES = [
          given=geometry(SHELL), fe=True),
     *(case(f"{name} beside a mesh", "mesh box.msh", Silent, fe=True,
            given=(home, write(name, f"{SHELL}\n")))
-      for name in ("box.msh.opt", ".gmshrc", ".gmsh-options")),
+      for name in (".gmshrc", ".gmsh-options")),
     case("a builder, rom mesh", "mesh build.py", UnsafeFileError, *TRUST, fe=True),
     case("a builder, rom modes", f"modes build.py {STEEL}", UnsafeFileError, *TRUST, fe=True),
     case("a builder, rom reduce", f"reduce build.py {STEEL} -i root=rbe2 -o a.npz",

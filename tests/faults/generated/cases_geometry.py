@@ -4,7 +4,7 @@ import numpy as np
 
 from cases.files.cells import blocks_of, solid, write_msh
 from cases.files.damage import WAYS
-from generated.case import Silent, Warned, Works, case, cut, edit, geometry, mutated, require, write
+from generated.case import Silent, Warned, Works, case, edit, geometry, mutated, require, write
 from generated.stock import GEO, deck
 from rom.errors import (
     ConfigError,
@@ -22,14 +22,7 @@ LARGE = {
     "a huge list": "x() = {1 : 4e9};",
 }
 STATEMENTS = {  # one statement more, and what is told
-    "no brace": ("Box(2) = {0, 0, 0;", (FileFormatError,), "box.geo"),
-    "an unknown variable": ("x = yy + 1;", (FileFormatError,), "yy"),
     "a box twice": ("Box(1) = {0, 0, 0, 1, 1, 1};", (FileFormatError, MeshError), "box.geo"),
-    "a box without volume": (
-        "Box(2) = {0, 0, 0, 0, 1, 1};",
-        (FileFormatError, MeshError),
-        "box.geo",
-    ),
     "a surface that is not there": (
         'Physical Surface("a", 12) = {99};',
         (FileFormatError, TagError, MeshError),
@@ -40,20 +33,12 @@ STATEMENTS = {  # one statement more, and what is told
         (FileFormatError, TagError, MeshError),
         "'a'",
     ),
-    "an empty surface": ('Physical Surface("pin", 12) = {};', (TagError, FileFormatError), "pin"),
-    "a name twice": (
-        'Physical Surface("root", 12) = {2};',
-        (TagError, FileFormatError),
-        ("root", "surface 11"),
-    ),
     "a file that is not there": ('Include "nope.geo";', (FileFormatError,), "nope.geo"),
     "a merged file that is not there": (
         'Merge "nope.step";',
         (FileFormatError, UnsafeFileError),
         ("nope.step", "Merge"),
     ),
-    "an error of its own": ('Error("too thin");', (FileFormatError,), "too thin"),
-    "the end": ("Exit;", (FileFormatError, MeshError, TagError, Silent, Warned), "box.geo"),
     "a division by zero": (
         "x = 1/0; Box(2) = {5, 0, 0, x, 1, 1};",
         (FileFormatError, MeshError),
@@ -69,7 +54,6 @@ STATEMENTS = {  # one statement more, and what is told
     ),
 }
 PARAMETERS = {
-    "unknown": ("-p lcc=1", ConfigError, "lcc"),
     "text for a number": ("-p lc=small", ConfigError, "lc"),
     "zero": ("-p lc=0", (ConfigError, MeshError, FileFormatError, Silent, Warned), "lc"),
     "negative": ("-p lc=-1", (ConfigError, MeshError, FileFormatError, Silent, Warned), "lc"),
@@ -102,18 +86,14 @@ FILE = (FileFormatError, MeshError, TagError, UnsafeFileError)
 MUTANTS = 3  # of each format
 TEXTS = {  # text of the mesh of the stock, another one, and what it is
     "no format": ("$MeshFormat", "$MshFormat"),
-    "version 9": ("2.2 0 8", "9.9 0 8"),
     "no end": ("$EndElements", ""),
     "no nodes": ("$Nodes", "$Notes"),
     "a node too many": ("$Nodes\n36", "$Nodes\n37"),
     "nodes without number": ("$Nodes\n36", "$Nodes\nmany"),
     "a negative number of nodes": ("$Nodes\n36", "$Nodes\n-36"),
-    "a huge number of nodes": ("$Nodes\n36", "$Nodes\n999999999999"),
-    "a word for a coordinate": ("1 0.0 0.0 0.0", "1 0.0 zero 0.0"),
     "a decimal comma": ("1 0.0 0.0 0.0", "1 0,0 0,0 0,0"),
 }
 ROWS = {  # cells in place of those of the box
-    "a node twice in a cell": (np.vstack([CELLS, [[0, 1, 1, 9]]]), "73"),
     "one cell less, below a named facet": (np.delete(CELLS, BELOW, axis=0), "root"),
     "an inverted cell": (np.vstack([CELLS[:-1], CELLS[-1:, [1, 0, 2, 3]]]), "box.msh"),
 }
@@ -201,25 +181,17 @@ CASES = [
          given=write("box.geo", GEO[:60])),
     case("a geometry of zeros", "mesh box.geo", (FileFormatError, MeshError), "box.geo", fe=True,
          given=write("box.geo", b"\0" * 1000)),
-    case("an empty geometry", "mesh box.geo", (FileFormatError, MeshError), "box.geo", fe=True,
-         given=write("box.geo", "")),
     *(case(name, "mesh box.msh", FILE, "box.msh", given=edit("box.msh", *texts), fe=True)
       for name, texts in TEXTS.items()),
     *(case(name, "mesh box.msh", (MeshError, FileFormatError, TagError), word, given=cells(rows),
            fe=True) for name, (rows, word) in ROWS.items() if name != "an inverted cell"),
     case("an inverted cell", "mesh box.msh", (MeshError, Silent, Warned), "box.msh",
          given=cells(ROWS["an inverted cell"][0]), fe=True),
-    *(case(f"a coordinate of {x}", "mesh box.msh", FILE, "box.msh", given=moved(9, [x, 0, 0]), fe=True)
-      for x in (np.nan, np.inf, 1e308)),
+    case("a coordinate of 1e308", "mesh box.msh", FILE, "box.msh", given=moved(9, [1e308, 0, 0]), fe=True),
     *(case(f"read as it is: {name}", same("mutant.msh"), Silent, given=rewritten(*form), fe=True)
       for name, form in FORMS.items()),
-    *(case(f"damaged {name}, {k}", valid("mutant.msh"), (*FILE, Silent, Warned), "mutant.msh", fe=True,
-           given=(rewritten(*form), mutated("mutant.msh", WAYS[k % 3], 10 * n + k)))
-      for n, (name, form) in enumerate(FORMS.items()) for k in range(MUTANTS)),
     *(case(f"damaged deck, {k}", valid("box.inp"), (*FILE, Silent, Warned, ConfigError), "box.inp",
            given=mutated("box.inp", WAYS[k % 5], k), fe=True) for k in range(MUTANTS)),
-    *(case(f"{share:.0%} of a mesh", "mesh box.msh", FILE, "box.msh", given=cut("box.msh", share),
-           fe=True) for share in (0.0, 0.3, 0.99)),
     case("a deck as a mesh", "mesh box.msh", FILE, "box.msh", fe=True,
          given=lambda folder: deck(folder / "box.msh", BOX)),
     case("text as a step", "mesh a.step", FILE, "a.step", given=write("a.step", "hello\n"), fe=True),

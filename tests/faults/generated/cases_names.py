@@ -5,7 +5,7 @@ import csv
 
 import rom
 from generated.case import Case, Works, case, edit, require
-from generated.stock import MATRICES, STEEL, body, model, origin, pendulum
+from generated.stock import STEEL, body, model, origin, pendulum
 from rom.errors import ConfigError, InterfaceError, ModelError, ParameterError
 from rom.report.html import paragraph
 
@@ -30,17 +30,6 @@ HOSTILE = {
 }
 REFUSED = (ConfigError, ModelError, InterfaceError)
 FORMATS = ("exudyn", "fmu", "vtu", "mbdyn", "abaqus", "sid")
-EXISTING = {  # a verb that would replace a file, and the file
-    "export": ("export good.npz old.vtu", "old.vtu"),
-    "reduce": ("reduce part.toml -o old.npz", "old.npz"),
-    "report": ("report good.npz -o old.html", "old.html"),
-    "view": ("view good.npz -o old.png", "old.png"),
-}
-INPUTS = {
-    "export": ("export good.npz good.npz", "good.npz"),
-    "reduce": ("reduce part.toml -o part.toml", "part.toml"),
-    "reduce matrices": (f"reduce {MATRICES} -o K.mtx", "K.mtx"),
-}
 MISSING = {  # command lines that lack several things, and all of them
     "modes": ("modes box.msh --nu 0.3", ("--E", "--rho")),
     "reduce": (f"reduce box.msh {STEEL}", ("-i", "-o")),
@@ -138,11 +127,6 @@ def each(what, act, names=tuple(HOSTILE)) -> list[Case]:
                  ) for n in names]  # fmt: skip
 
 
-def old(name):
-    """A file that is there already."""
-    return lambda folder: (folder / name).write_text("mine")
-
-
 def two_wrong(**names):
     """Two interfaces that are not there."""
     return lambda folder: rom.reduce(
@@ -158,13 +142,6 @@ CASES = [
     *(one for to in FORMATS for one in each(to, lambda n, to=to: exported(n, to),
       ("two lines", "code", "code in quotes", "a path upwards", "a zero byte"))),
     *each("a report", reported, ("a tag", "a path upwards", "two lines")),
-    *(case(f"rom {verb} onto a file", line, ConfigError, name, given=old(name))
-      for verb, (line, name) in EXISTING.items()),
-    *(case(f"rom {verb} onto its own input", line, ConfigError, name)
-      for verb, (line, name) in INPUTS.items()),
-    case("rom export with --force", "export good.npz old.vtu --force", Works, given=old("old.vtu")),
-    case("rom simulate onto a motion", "simulate pendulum.toml -o out", ConfigError, "out",
-         given=lambda folder: (folder / "out").mkdir() or (folder / "out/motion.csv").write_text("mine")),
     *(case(f"rom {verb} without several things", line, ConfigError, *words)
       for verb, (line, words) in MISSING.items()),
     case("two interfaces that are not there", two_wrong(), InterfaceError, "rot", "tipp"),

@@ -5,7 +5,7 @@ import numpy as np
 import rom
 from cases.files.cells import blocks_of, solid, write_msh
 from generated.case import Silent, Warned, Works, case, edit, require
-from generated.cases_reliability_models import matrices, skewed, spoilt
+from generated.cases_reliability import matrices, skewed, spoilt
 from generated.stock import STEEL, model, origin, pendulum
 from rom.errors import (
     ConfigError,

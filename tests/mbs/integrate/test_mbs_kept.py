@@ -236,21 +236,6 @@ def test_more_than_can_be_computed_or_kept_is_refused_before_it_is_tried(
         rom.simulate(falling(), method=method, **{"t_end": 1.0} | options)
 
 
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        ({"state": "x"}, "state = 'x' must be of type State"),
-        ({"keep": "out"}, "keep = 'out' must be of type Keeping"),
-        ({"t_end": "1"}, "t_end = '1' must be a finite number"),
-        ({"t_end": 10**400}, "t_end = 1.* must be a finite number"),
-        ({"progress": 3}, "progress = 3 must be True or False"),
-    ],
-)
-def test_wrong_arguments_are_named(options, words):
-    with pytest.raises(ConfigError, match=words):
-        rom.simulate(falling(), **{"t_end": 1.0, "dt": 0.1} | options)
-
-
 def test_a_short_run_leaves_no_folder_and_a_long_one_writes_parts(tmp_path, monkeypatch):
     monkeypatch.setattr(keeping, "MIN_INTERVAL", 60.0)
     run("force", Broken(), METHODS["alpha"], keep=rom.Keeping(tmp_path / "short"))

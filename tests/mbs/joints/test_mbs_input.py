@@ -138,15 +138,6 @@ def test_a_state_of_another_mechanism_is_refused():
         simulate(mechanism()[0], t_end=1.0, dt=0.1, state=state)
 
 
-def test_what_is_no_body_and_no_mechanism_is_refused():
-    with pytest.raises(ConfigError, match="'x': body = None must be of type FlexibleBody"):
-        Mechanism().add_flexible("x", None)
-    with pytest.raises(ConfigError, match="mechanism = 'x' must be of type Mechanism"):
-        simulate("x", **GOOD)
-    with pytest.raises(ConfigError, match=r"method = .* must be a text"):
-        simulate(slider_crank(), **GOOD, method=["dop853"])
-
-
 def test_an_empty_mechanism_is_refused():
     with pytest.raises(ConfigError, match="bod"):
         simulate(Mechanism(), **GOOD)
