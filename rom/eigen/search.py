@@ -24,6 +24,7 @@ MAX_SEARCHES = 12  # for what a count misses; a cluster seen in part doubles wha
 MAX_LAST_DOFS = 2000  # the same where a search does not come to an end: some seconds
 SHIFT_RATIO = 0.02  # of the first elastic eigenvalue, below zero: K - sigma M is positive definite
 RIGID_RTOL = 1e-13  # energy of a motion over that of its dofs alone, below which it has none
+CANCELLING_RTOL = 1e-10  # the same, below which products with K have lost too many digits
 CLUSTER_RTOL = 1e-7  # distance of eigenvalues whose modes are only defined as a plane
 ESTIMATE_SHIFT = 1e-6  # of the largest eigenvalue, below zero, with which the first is estimated
 ESTIMATE_STEPS = 4  # of inverse iteration, on eight columns
@@ -320,7 +321,20 @@ class ModeSearch:
             space = BlockLanczos(self, inverse, sigma, deflated, start, sought)
             space.solve()
             proven = space.prove(m)
-            return *space.pairs(), proven
+            lam, Phi = space.pairs()
+            lam = refined(self, lam, Phi)
+            order = np.argsort(lam, kind="stable")
+            return lam[order], Phi[:, order], proven
+
+
+def refined(ops: Any, lam: Array, Phi: Array) -> Array:
+    """(m,) eigenvalues lam as Rayleigh quotients of their modes, free of the round-off of a factor.
+
+    Where a body hangs almost free, energies cancel, and lam is better.
+    """
+    found = np.diag(ops.gram(Phi, ops.apply_K(Phi))) / np.diag(ops.gram(Phi, ops.apply_M(Phi)))
+    alone = np.diag(ops.gram(Phi, ops.stiffness_diagonal[:, None] * Phi))
+    return np.where(found > CANCELLING_RTOL * alone, found, lam)
 
 
 def indefinite(name: str, n_negative: int, meaning: str) -> QualityGateError:

@@ -370,14 +370,23 @@ class TiedOperators(PETScOperators):
         return CarryingOperators(self, T, own, np.flatnonzero(others))
 
     @cached_property
+    def stiffness_diagonal(self) -> Array:
+        """(n_local,) diagonal of T^T diag(K) T: near that of the stiffness, which is not formed."""
+        return self._squared(self.parent.stiffness_diagonal)
+
+    @cached_property
     def mass_diagonal(self) -> Array:
-        """(n_local,) diagonal of T^T diag(M) T: near that of the mass, which is not formed."""
+        """(n_local,) the same of the mass."""
+        return self._squared(self.parent.mass_diagonal)
+
+    def _squared(self, diagonal: Array) -> Array:
+        """(n_local,) diagonal of T^T D T, of a diagonal D of the parent."""
         squares = self.T.copy()
         starts, columns, values = squares.getValuesCSR()
         squares.setValuesCSR(starts, columns, values**2)
         squares.assemble()
         x, y = self.T.createVecs()
-        y.array[:] = self.parent.mass_diagonal
+        y.array[:] = diagonal
         squares.multTranspose(y, x)
         squares.destroy()
         return x.array.copy()
@@ -427,7 +436,7 @@ class CarryingOperators(TiedOperators):
         self.own_rows, self.carried, self.bare = own, carried, self.parent.part(own)
         self.own, self.fixed = np.full(own.size, -1), self.bare.fixed
 
-    @property
+    @cached_property
     def stiffness_diagonal(self) -> Array:
         """(n_local,) diagonal of K, without what is carried."""
         return self.bare.stiffness_diagonal
