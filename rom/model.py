@@ -304,6 +304,7 @@ class Modes:
 # What a row that fails costs the user, and the cure, by words of its quantity
 MORE_MODES = "Leave n_modes (-m) out, and as many are kept as are needed; or give a larger one."
 MORE_SHAPES = "Leave n_shapes out, or ask for a smaller tol, snapshots=True or smaller loads."
+SMALLER_TOL = "Leave n_shapes out, or ask for a smaller tol (1e-5), or smaller loads."
 SMALLER_STEPS = "Take smaller steps, dt or rtol."
 FAILURE_COSTS = {
     "worst error of": f"Motions at these frequencies are off by as much. {MORE_MODES}",
@@ -326,7 +327,9 @@ FAILURE_COSTS = {
     "into several, or take a rod that bends far.",
     "full states found": "No equilibrium of the full model is found there: ask for smaller loads.",
     ": displacement": f"Under these loads it bends wrongly by as much. {MORE_SHAPES}",
-    "frequencies about it": f"Bent so far it vibrates wrongly by as much. {MORE_SHAPES}",
+    "frequencies about it": f"Bent so far it vibrates wrongly by as much. {SMALLER_TOL}",
+    "compliance of interfaces": "Bent so far it yields wrongly by as much to what else acts there, "
+    f"as a torque. {SMALLER_TOL}",
     ": stress": f"Bent so far its stress is wrong by as much. {MORE_SHAPES}",
     "energy that cells add": "Cells are strained where they only turn. Mesh more finely along the "
     "body, or ask for smaller loads.",

@@ -142,7 +142,7 @@ def seconds_of_force(r: int, times: int = 2000) -> tuple[float, float]:
 def spin_ups(model: FEModel, aim: str) -> Generator[Row, None, Run]:
     """Rows of a body made from a mesh beside the mesh itself; its run."""
     geometric = Geometric(loads={"tip": (0, TIP_FORCE, TIP_FORCE, 0, 0, 0)}, n_modes=2,
-                          spin=(0, 0, FINAL_SPEED), n_shapes=8)  # fmt: skip
+                          spin=(0, 0, FINAL_SPEED))  # fmt: skip
     kinds = {"root": "rbe3", "tip": "rbe3"}
     taken, made = timed(reduce, model, method=CraigBampton(8), interfaces=kinds, reference="root",
                         nonlinear=geometric, certify=False)  # fmt: skip

@@ -1,5 +1,6 @@
 """What a body of large deflection cannot be made of, or asked for: refused by name, or right."""
 
+import warnings
 from itertools import product
 
 import numpy as np
@@ -9,7 +10,7 @@ from numpy.testing import assert_allclose
 import rom
 import rom.body.nonlinear.ranges
 from cases.mbs.slender import Full, assembled, slender
-from rom.errors import ConfigError, InterfaceError, ModelError, RomError
+from rom.errors import ConfigError, InterfaceError, ModelError, RomError, RomWarning
 
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")
 pytestmark = [
@@ -110,14 +111,23 @@ def test_a_load_beyond_what_one_body_carries_is_refused_or_fails_its_certificate
     assert min(case["holds to"] for case in table.values()) < 1.0
 
 
-def test_families_say_no_by_name(beam):
-    model, load, _ = beam
-    wide = rom.Geometric(loads={"tip": load})
-    with pytest.raises(TypeError, match="nonlinear"):
-        rom.reduce_parametric(
-            model, parameters={"E": rom.YoungsModulus(None, 0.5, 2.0)}, method=rom.Guyan(),
-            interfaces={"root": "rbe3", "tip": "rbe3"}, nonlinear=wide,
+FAR = [((0, 0, 0, 0, 0, 3.0), 172), ((0, 25.0, 0, 0, 0, 0), 90), ((0, 0, 0, 0, 0, 1.3), 0)]
+
+
+@pytest.mark.parametrize("load, degrees", [*FAR, ((0, 2.0, 0, 0, 0, 0), 0)])
+def test_a_range_that_turns_farther_than_one_body_carries_names_pieces(load, degrees):
+    """A moment as far as M L / EI, a force towards a right angle as the elastica does."""
+    model, EI = slender(40, 5)
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always", RomWarning)
+        rom.reduce(
+            model, method=rom.CraigBampton(n_modes=2), interfaces={"root": "rbe3", "tip": "rbe3"},
+            reference="root", nonlinear=rom.Geometric({"tip": EI * np.array(load)}, n_modes=2),
+            certify=False,
         )  # fmt: skip
+    turns = [str(w.message) for w in said if "turns by" in str(w.message)]
+    assert bool(turns) == bool(degrees)
+    assert all(f"turns by {degrees} degrees" in x and "rom.reduce_pieces" in x for x in turns)
 
 
 def test_models_without_finite_elements_are_refused():

@@ -29,7 +29,7 @@ from rom.body.nonlinear.quartic import Quartic
 from rom.body.nonlinear.ranges import Geometric, Load, axis_point, held_motions, nodal_forces
 from rom.body.nonlinear.statics import Held, free_motions, newton, passages
 from rom.eigen.verbs import Operators, column_blocks, mean_motion, quadratic, whole_clusters
-from rom.errors import ConfigError, InterfaceError, ModelError, ResourceError
+from rom.errors import ConfigError, InterfaceError, ModelError, ResourceError, warn
 from rom.model import Array, Basis, FEModel, Index, Interface
 from rom.names import offered
 
@@ -46,6 +46,7 @@ N_TURNS = 4  # of moments with the section on which they act, each by what the l
 SNAPSHOT_SHARES = (0.5, 1.0)  # of the loads, at which the full model is solved
 AFFINE_RTOL = 1e-6  # of affine motions of a section that its functions may miss
 HELD_RTOL = 1e-6  # of K on modes, by which those of held interfaces are known
+MOST_TURN_RAD = 1.4  # linear rotations are sines, which say little beyond
 MAX_COORDINATES = 80
 TENSOR_COPIES = 11  # of the Gram matrix while it is ordered into tensors
 FLOP_RATE = 1e10  # of one core in a product of matrices [1/s]
@@ -62,6 +63,7 @@ class Shapes:
         E: (n_local, r) nodal shapes, those that move an interface first.
         loads: (r, l) forces of the components of the load range at their largest [N].
         further: (r, k) the same of all unit forces and moments on the interfaces of the range.
+        turns: {interface: (3, r)} rotations of those of the range, of small angles [1/m].
         held: (h, r) motions that supports let vanish.
         n_basis: how many of them the basis has already.
         sections: of the interfaces with moments.
@@ -70,6 +72,7 @@ class Shapes:
     E: Array
     loads: Array
     further: Array
+    turns: dict[str, Array]
     held: Array
     n_basis: int
     sections: list["Section"]
@@ -122,6 +125,9 @@ def enriched(
         ConfigError, InterfaceError, ResourceError: see `refuse`.
         ModelError: if the body has no stable equilibrium within the range, or its material is
             compressed until it loses ellipticity.
+
+    Warns:
+        RomWarning: of an interface that turns farther than one body carries.
     """
     refuse(geometric, model, connection, basis, reference)
     energy = model.stresses.large_strain()
@@ -130,6 +136,7 @@ def enriched(
     passed = _states(geometric, quartic, shapes)
     states = np.vstack(passed)
     _refuse_collapse(geometric, energy.least_stretch(shapes.E @ states.T), list(map(len, passed)))
+    _warn_of_turns(geometric, quartic, shapes, states)
     modes = _small_motions(states, quartic, quadratic(ops, ops.apply_M, shapes.E), shapes)
     added = theta @ _principal(
         geometric, states[:, shapes.n_basis :].T, modes[:, shapes.n_basis :].T
@@ -269,7 +276,9 @@ def _with_derivatives(
     loads, still = forces(components, E), forces(held, E).T
     # a given number of shapes is spent on the loads of the range alone
     further = forces(every if geometric.n_shapes is None else [], E)
-    return Shapes(E, loads, further, still, n_basis, sections), theta
+    turns = {name: mean_motion(one)[3:] @ ops.rows(E, one.dofs)
+             for name, one in model.interfaces.items() if name in geometric.loads}  # fmt: skip
+    return Shapes(E, loads, further, turns, still, n_basis, sections), theta
 
 
 def _snapshots(
@@ -421,6 +430,30 @@ def _turned(quartic: Quartic, shapes: Shapes, case: Array, states: Array) -> Arr
             return states
         q = body.N @ near
     return np.vstack([q, states])
+
+
+def _warn_of_turns(geometric: Geometric, quartic: Quartic, shapes: Shapes, states: Array) -> None:
+    """Say which interface turns farther than one frame carries.
+
+    Dead forces turn a section as far as its states say, by their sine. Moments of a mechanism turn
+    with it, at constant curvature as far as small ones of the same size would. Beside forces they
+    are bounds, as at the cuts of pieces, whose arms become shorter as they bend.
+    """
+    N = free_motions(shapes.held)
+    small = N @ np.linalg.solve(N.T @ quartic.K @ N, N.T @ shapes.loads)
+    moments = [bool(load.interface) and not np.any(geometric.loads[load.interface][:3])
+               for load in geometric.components()]  # fmt: skip
+    for name, turn in shapes.turns.items():
+        sines = np.linalg.norm(turn @ states.T, axis=0)
+        by_moments = np.linalg.norm(turn @ small[:, moments], axis=0)
+        most = max(np.arcsin(min(sines.max(), 1.0)), by_moments.max(initial=0.0))
+        if most > MOST_TURN_RAD:
+            warn(
+                f"interface {name!r} turns by {np.degrees(most):.0f} degrees against the reference "
+                f"under the loads of the range; one body is for {np.degrees(MOST_TURN_RAD):.0f}. "
+                "Cut the body: rom.fe.pieces with rom.reduce_pieces, the pieces of which share the "
+                "turning; or ask for smaller loads."
+            )
 
 
 def _small_motions(states: Array, quartic: Quartic, M: Array, shapes: Shapes) -> Array:
