@@ -274,7 +274,7 @@ CHANGES = {
     "units are 'mm'": lambda file: file.attrs.__setitem__("units", "mm"),
     "not those of its checksum": lambda file: file["H"].__setitem__((0, 0, 0), 1.0),
     "'frequencies' holds no real": lambda file: other(file, "frequencies", [1j, 2j]),
-    "'H' holds no numbers": lambda file: other(file, "H", np.bytes_("H")),
+    "'H' holds no complex numbers": lambda file: other(file, "H", np.bytes_("H")),
     r"H is \(6, 2, 1\); lines": lambda file: other(file, "frequencies", [1.0, 2.0], True),
     "quantity": lambda file: file.attrs.__setitem__("quantity", "force"),
 }
