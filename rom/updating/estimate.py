@@ -13,7 +13,7 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from rom.arguments import one_of, positive, typed
-from rom.errors import ConfigError, ParameterError, SolverError
+from rom.errors import ConfigError, ParameterError, SolverError, warn
 from rom.model import Array, Mask, Row
 from rom.names import named
 from rom.plausible import check_damping_ratio
@@ -40,6 +40,7 @@ from rom.updating.verdict import (
 
 MAX_STEPS = 60  # of the search; ten are usual
 MAX_MISFIT = 2.0  # chi-square over its expectation: what did not settle here is a wrong model
+MIN_MISFIT = 0.5  # likewise: what is less is no noise as it was said to be
 MAX_LOG_STEP = 0.5  # of a factor in one step
 DECREMENT_TOL = 1e-4  # expected gain of chi-square: a hundredth of a standard deviation
 START_STIFFNESS = 1e-3  # of a step, over the information of each unknown
@@ -372,6 +373,12 @@ def _found(family: Family, search: _Search) -> Updated:
     factors = np.where(model.present, np.exp(search.x), 0.0)
     own = N[np.ix_(free, free)]
     covariance = np.linalg.pinv(own, hermitian=True)
+    left = s.chi_square / data.n_values
+    if left < MIN_MISFIT and not np.any(data.common) and not np.ndim(search.count):
+        warn(
+            f"what is left is {left:.3g} of the noise: errors are smaller than said, and a wrong "
+            "model may pass. Compare coherence and number of averages."
+        )
     if np.any(s.varied):
         covariance += covariance @ s.varied[np.ix_(free, free)] @ covariance
     return Updated(

@@ -283,7 +283,8 @@ class Responses:
             one_of("estimator", self.estimator, tuple(POWERS))
 
     def _check_values(self) -> None:
-        bad = (~np.isfinite(self.H) | (self.H == 0)) & self.noise.used
+        used = self.noise.used
+        bad = (~np.isfinite(self.H) | (self.H == 0)) & used
         if bad.any():
             lines = np.flatnonzero(bad.any(axis=(1, 2)))
             some = ", ".join(f"{x:.5g}" for x in self.frequencies[lines[:MAX_LINES_NAMED]])
@@ -292,6 +293,11 @@ class Responses:
             raise ConfigError(
                 f"H{where} is zero or not finite at {lines.size} lines, e.g. at {some} Hz.",
                 hint="Give these lines the coherence 0.",
+            )
+        if used.any() and not self.H[used].imag.any():
+            raise ConfigError(
+                "H is real at all lines: magnitudes or real parts alone are no responses.",
+                hint="Read phases or imaginary parts too.",
             )
 
     @property

@@ -34,6 +34,12 @@ KNOWN_FACTORS = {
     1e3: "millimetres or millivolts",
     1e-3: "metres taken for millimetres",
 }
+DERIVED = {  # powers of the frequency that one quantity has more than another
+    -2: "displacements taken for accelerations",
+    -1: "a velocity taken for its derivative, or a displacement for a velocity",
+    1: "an acceleration taken for a velocity, or a velocity for a displacement",
+    2: "accelerations taken for displacements",
+}
 MAX_LOG_LEVEL = 1.5  # of all responses: a factor of 4.5, which no range of moduli explains
 LEFT_LOG_LEVEL = 0.7  # of a sensor at the end of the search: a factor of two
 FACTOR_LOG_ATOL = 0.7  # within which a known factor is named
@@ -232,11 +238,19 @@ def suspects(
             "Leave it out, or give it the coherence 0.",
         )
     log = wrapped(data.logarithm - np.log(H))
-    return found or _levels(log.real, used, most) | _turned(np.cos(log.imag), used, unsure)
+    levels = _levels(log.real, used, most, np.log(data.omega))
+    return found or levels | _turned(np.cos(log.imag), used, unsure)
 
 
-def _levels(log: Array, used: Mask, most: float) -> dict[str, tuple[str, str]]:
-    """Sensors beside all of them, inputs beside the other ones, and all beside the model."""
+def _levels(log: Array, used: Mask, most: float, lines: Array) -> dict[str, tuple[str, str]]:
+    """Sensors beside all of them, inputs beside the other ones, and all beside the model.
+
+    Args:
+        log: (n_f, n_s, n_e) logarithms of levels over those of the model.
+        used: (n_f, n_s, n_e) which count.
+        most: see `suspects`.
+        lines: (n_f,) logarithms of frequencies.
+    """
     found = {}
     sensors, inputs = (_medians(log, used, axis) for axis in (1, 2))
     for e, level in enumerate(inputs):
@@ -250,13 +264,16 @@ def _levels(log: Array, used: Mask, most: float) -> dict[str, tuple[str, str]]:
     common = float(np.median(sensors))
     if abs(common) > most and not found:
         found["level of all"] = (
-            f"all responses are {np.exp(common):.3g} times those of the model{_reason(common)}.",
-            "Check units, quantity, and whether the data are of this body.",
+            f"all responses are {np.exp(common):.3g} times those of the model"
+            f"{_derived(log, used, lines) or _reason(common)}.",
+            "Check units, also of the lines (Hz, not rad/s), quantity, and whether the data are of "
+            "this body.",
         )
     for s in np.flatnonzero(np.abs(sensors - common) > most):
         found[f"level {s}"] = (
-            f"sensor {s} gives {np.exp(sensors[s]):.3g} times the model{_reason(sensors[s])}, the "
-            f"others {np.exp(common):.3g} times.",
+            f"sensor {s} gives {np.exp(sensors[s]):.3g} times the model"
+            f"{_derived(log[:, [s]], used[:, [s]], lines) or _reason(sensors[s])}, the others "
+            f"{np.exp(common):.3g} times.",
             "Check its scale, its direction and its place.",
         )
     return found
@@ -273,6 +290,18 @@ def _reason(level: float) -> str:
         if abs(level - np.log(factor)) < FACTOR_LOG_ATOL:
             return f" (about {factor:.4g}: {what}?)"
     return ""
+
+
+def _derived(log: Array, used: Mask, lines: Array) -> str:
+    """By which power of the frequency responses differ from a model, where it is one or two."""
+    x = np.broadcast_to(lines[:, None, None], log.shape)[used]
+    if not np.ptp(x):
+        return ""
+    level = np.polyfit(x - x.mean(), log[used], 1)
+    order = int(np.round(level[0]))
+    if order not in DERIVED or abs(level[1] - order * x.mean()) > MAX_LOG_LEVEL:
+        return ""
+    return f" (about (2 pi f)^{order}: {DERIVED[order]}?)"
 
 
 def _turned(cosine: Array, used: Mask, unsure: bool) -> dict[str, tuple[str, str]]:

@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 import rom
 from cases.paths import TESTS
 from cases.solid import STEEL, composite
-from rom.errors import FileFormatError, RomError
+from rom.errors import FileFormatError, RomError, RomWarning
 from rom.updating import Channels
 
 HERE = TESTS / "reference" / "foreign"
@@ -68,9 +68,9 @@ def written(folder, H, *, nodes=None, unit="m/s^2/N", length="m", force=FORCE):
     return folder
 
 
-def updated(family, folder):
+def updated(family, folder, averages=50):
     test = rom.io.read_responses(
-        folder / "test.csv", averages=50, coherence=1 / (1 + 2 * 50 * 0.02**2),
+        folder / "test.csv", averages=averages, coherence=1 / (1 + 2 * 50 * 0.02**2),
         points=folder / "points.csv",
     )  # fmt: skip
     return rom.update(family, test, fixed=("root",))
@@ -81,6 +81,12 @@ def test_a_whole_file_is_updated(family, responses, tmp_path):
     assert found.verdict.ok
     for name, value in TRUE.items():
         assert abs(np.log(found.factors[name] / value)) < 4 * found.deviations[name]
+
+
+def test_errors_that_are_taken_for_larger_are_warned_of(family, responses, tmp_path):
+    """Of a tenth of the averages chi-square is a tenth, and a wrong model passes more easily."""
+    with pytest.warns(RomWarning, match=r"what is left is 0\.\d+ of the noise"):
+        updated(family, written(tmp_path, responses), averages=5)
 
 
 def scaled(factor, sensor=None):
@@ -115,6 +121,10 @@ DAMAGES = {
     "a sensor is in g": (scaled(1 / 9.80665, 4), {}, "sensor 4.*taken for g|sensor 4.*in g"),
     "all are in millimetres": (scaled(1e3), {}, "all responses .*millimetres"),
     "units of the header are wrong": (scaled(1.0), {"unit": "mm/s^2/N"}, "all responses"),
+    "accelerations are said to be displacements": (
+        scaled(1.0), {"unit": "m/N"}, r"\(2 pi f\)\^2: accelerations taken for displacements"),
+    "accelerations are said to be velocities": (
+        scaled(1.0), {"unit": "m/s/N"}, r"\(2 pi f\)\^1: an acceleration taken for a velocity"),
     "volts are not calibrated": (scaled(1.0), {"unit": "V/N"}, "'v' is no motion.*calibrate"),
     "the force is off the body": (
         scaled(1.0), {"force": (9, "Z"), "nodes": {**NODES, 9: (2.0, 0.0, 0.0)}},
@@ -264,7 +274,7 @@ CHANGES = {
     "units are 'mm'": lambda file: file.attrs.__setitem__("units", "mm"),
     "not those of its checksum": lambda file: file["H"].__setitem__((0, 0, 0), 1.0),
     "'frequencies' holds no real": lambda file: other(file, "frequencies", [1j, 2j]),
-    "'H' holds no numbers": lambda file: other(file, "H", np.bytes_("H")),
+    "'H' holds no complex numbers": lambda file: other(file, "H", np.bytes_("H")),
     r"H is \(6, 2, 1\); lines": lambda file: other(file, "frequencies", [1.0, 2.0], True),
     "quantity": lambda file: file.attrs.__setitem__("quantity", "force"),
 }

@@ -259,6 +259,41 @@ def test_what_a_table_lacks_is_named(tmp_path):
     refused(whole, "columns .* node, x")
 
 
+def test_lines_in_other_units_and_texts_in_other_alphabets_are_read(tmp_path):
+    """Radians per second are not hertz, whichever of two kinds of file says so."""
+    (tmp_path / "points.csv").write_text(POINTS)
+    path, options = tmp_path / "x.csv", {"averages": 5, "points": tmp_path / "points.csv"}
+    whole = table(unit="m/s\u00b2/N", separator=";", comma=True)
+    for text, code in ((whole, "cp1252"), (whole, "utf-16"), (whole, "utf-8")):
+        path.write_bytes(text.encode(code))
+        assert_allclose(rom.io.read_responses(path, **options).frequencies, F)
+    path.write_text(whole.replace("[Hz]", "[rad/s]"))
+    assert_allclose(rom.io.read_responses(path, **options).frequencies, F / (2 * np.pi))
+    for new, words in (("[rpm]", "the unit 'rpm' is no frequency"), ("[Hz]", "of thousands")):
+        path.write_text(whole.replace("[Hz]", new).replace("0,02", "0.02", new == "[Hz]"))
+        with pytest.raises(FileFormatError, match=words):
+            rom.io.read_responses(path, **options)
+    path, label = tmp_path / "x.unv", f"{18:10d}{0:5d}{0:5d}{0:5d} {'NONE':<20} {'NONE':<20}"
+    options = {"averages": 5, "coherence": 0.9}
+    path.write_text(two().replace(label, label[:-20] + f"{'rad/s':<20}"))
+    assert_allclose(rom.io.read_responses(path, **options).frequencies, X / (2 * np.pi))
+    path.write_text(two().replace(label, label[:-20] + f"{'rpm':<20}"))
+    with pytest.raises(FileFormatError, match="the unit 'rpm' is no frequency"):
+        rom.io.read_responses(path, **options)
+
+
+def test_values_that_are_no_responses_are_refused(tmp_path):
+    """Magnitudes alone, and bytes in the other order than their head says."""
+    test = rom.io.read_responses(HERE / "pyuff_test.uff", averages=20)
+    with pytest.raises(ConfigError, match="H is real at all lines"):
+        replace(test, H=np.abs(test.H))
+    data = (HERE / "pyuff_test.uff").read_bytes()
+    assert b"58b     1     2" in data
+    (tmp_path / "x.uff").write_bytes(data.replace(b"58b     1     2", b"58b     2     2"))
+    with pytest.raises(FileFormatError, match="the order of bytes is not that said"):
+        rom.io.read_responses(tmp_path / "x.uff", averages=20)
+
+
 def test_bodies_of_an_assembly_are_named_by_entities_or_by_a_table_of_points(tmp_path):
     """Node 7 is on both sides of a joint; ten characters of a name are kept in universal files."""
     of = {"bodies": ("frame", "counterweight"), "averages": 5, "coherence": 0.9}

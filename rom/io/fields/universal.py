@@ -23,6 +23,7 @@ FREQUENCY_RESPONSE = 4
 PER_RECEPTANCE = {8: 0, 11: 1, 12: 2}  # displacement, velocity, acceleration: powers of i omega
 FORCE_TYPE = 13
 UNIT_LABEL = slice(47, 67)  # columns of records 8 to 11
+MAX_MEASURED = 1e30  # in units of any kind
 COMPLEX_TYPES, DOUBLE_TYPES = (5, 6), (4, 6)  # types of ordinate
 
 
@@ -41,6 +42,7 @@ class Function:
         labels: the first five lines, stripped.
         units: labels of the units of numerator and denominator, stripped.
         entities: names of what response and reference belong to, stripped; "NONE" without one.
+        abscissa: label of the unit of the abscissa, stripped.
     """
 
     kind: int
@@ -53,6 +55,7 @@ class Function:
     labels: tuple[str, ...]
     units: tuple[str, str] = ("", "")
     entities: tuple[str, str] = ("", "")
+    abscissa: str = ""
 
     def receptance(self) -> npt.NDArray[np.complex128]:
         """(n,) displacement per force [m/N], whatever was measured.
@@ -225,6 +228,7 @@ def _function(lines: list[str], values: Array, spacing: int, parts: int) -> Func
         labels=tuple(line.strip() for line in lines[:5]),
         units=(lines[8][UNIT_LABEL].strip(), lines[9][UNIT_LABEL].strip()),
         entities=(dof[31:41].strip(), dof[56:66].strip()),
+        abscissa=lines[7][UNIT_LABEL].strip(),
     )
 
 
@@ -257,7 +261,10 @@ def _binary(data: bytes, place: int, head: list[bytes], kind: int, count: int) -
     needed = count * size
     if fields[3] < needed and _closing(data, place + needed) < 0:
         raise ValueError(f"{fields[3]} bytes for {count} numbers of {size}")
-    values = np.frombuffer(data, f"{order}f{size}", count, place).astype(float)
+    with np.errstate(invalid="ignore"):
+        values = np.frombuffer(data, f"{order}f{size}", count, place).astype(float)
+    if (np.abs(values) > MAX_MEASURED).any():
+        raise ValueError("numbers beyond all that is measured: the order of bytes is not that said")
     return values, place + max(fields[3], needed)
 
 

@@ -24,7 +24,7 @@ from rom.io.hdf5 import h5py
 from rom.updating.measured import Channels, Responses
 
 HEADERS = ("v108", "v108")  # oldest and newest version of HDF5 that is written
-KINDS = {"fiu": "real numbers", "fciu": "numbers"}  # by the letters of NumPy
+KINDS = {"fiu": "real numbers", "c": "complex numbers"}  # by the letters of NumPy
 MAX_ARRAY_BYTES = 2**32  # of all arrays of a test
 DATA_SETS = ("frequencies", "H", "coherence", "sensors/points", "sensors/directions",
           "inputs/points", "inputs/directions")  # fmt: skip
@@ -95,7 +95,7 @@ def _test(path: Path, file: Any) -> Responses:
     if sum(file[name].nbytes for name in names) > MAX_ARRAY_BYTES:
         raise UnsafeFileError("its arrays take more than 4 GiB.", where=str(path))
     for name in names:
-        kinds = "fciu" if name == "H" else "fiu"
+        kinds = "c" if name == "H" else "fiu"
         if file[name].dtype.kind not in kinds:
             raise FileFormatError(f"{name!r} holds no {KINDS[kinds]}.", where=str(path))
     f, H, c, *where = values = [file[name][()] for name in names]

@@ -5,6 +5,7 @@ the part (real, imag, magnitude, phase or coherence) and its unit. Lines above t
 over. Columns stand between commas, semicolons or tabs; with these two, numbers may have a comma.
 """
 
+import codecs
 import re
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,7 @@ from rom.errors import ConfigError, FileFormatError
 from rom.io.fields.universal import FORCE_TYPE, FREQUENCY_RESPONSE, Function
 from rom.io.files import check_readable
 from rom.io.responses.grid import COHERENCE_KIND, Dof
-from rom.io.responses.unit_labels import length_of, motion_per_force
+from rom.io.responses.unit_labels import length_of, lines_of, motion_per_force
 from rom.model import Array
 
 MAX_TABLE_BYTES = 2**29
@@ -41,8 +42,11 @@ def functions_of(path: Path) -> tuple[Function, ...]:
     """
     names, rows, separator = _cells(path, re.compile(r"freq", re.IGNORECASE))
     values = _numbers(path, rows, separator)
-    if "[khz]" in names[0].lower() or "(khz)" in names[0].lower():
-        values[:, 0] *= 1e3
+    if unit := re.search(r"[\[(]([^\])]+)[\])]", names[0]):
+        try:
+            values[:, 0] *= lines_of(unit.group(1))
+        except ConfigError as error:
+            raise FileFormatError(error.message, where=str(path)) from error
     parts: dict[tuple[Dof, Dof], dict[str, tuple[str, Array]]] = {}
     for k, name in enumerate(names[1:], 1):
         found = COLUMN_NAME.fullmatch(name)
@@ -136,7 +140,7 @@ def _function(kind: int, pair: tuple[Dof, Dof], x: Array, y: Any, numerator: int
 
 def _cells(path: Path, first: re.Pattern[str]) -> tuple[Row, list[tuple[int, Row]], str]:
     """Names of columns, the first of which is like a pattern; cells of each line by its number."""
-    text = check_readable(path, MAX_TABLE_BYTES).read_text("utf-8-sig", "replace").splitlines()
+    text = _decoded(check_readable(path, MAX_TABLE_BYTES).read_bytes()).splitlines()
     for above, line in enumerate(text, 1):
         separator = max("\t;,", key=line.count)
         names = [cell.strip().strip('"') for cell in line.split(separator)]
@@ -160,9 +164,24 @@ def _cells(path: Path, first: re.Pattern[str]) -> tuple[Row, list[tuple[int, Row
     return names, rows, separator
 
 
+def _decoded(data: bytes) -> str:
+    """Text in Unicode, or as Windows writes it in the west."""
+    if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        return data.decode("utf-16", "replace")
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return data.decode("cp1252", "replace")
+
+
 def _numbers(path: Path, rows: list[tuple[int, Row]], separator: str) -> Array:
     """(n, columns) numbers of cells."""
     found = []
+    if separator != "," and all(any(c in x for _, cells in rows for x in cells) for c in ",."):
+        raise FileFormatError(
+            "numbers have commas and points: one of them is of thousands.", where=str(path),
+            hint="Write numbers without separators of thousands.",
+        )  # fmt: skip
     for number, cells in rows:
         try:
             found.append([_number(cell, separator) for cell in cells])

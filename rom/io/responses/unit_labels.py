@@ -5,6 +5,7 @@ Source:
     9.80665 m/s^2 of the third general conference on weights and measures, 1901.
 """
 
+import math
 import re
 
 from rom.errors import ConfigError
@@ -16,7 +17,8 @@ FORCES = {
 }  # fmt: skip
 MOTIONS = {"": 8, "/s": 11, "/s^2": 12}  # types of ordinate in universal files
 SPELLINGS = {"\u00b2": "^2", "\u00b5": "u", "\u03bc": "u", "**": "^", "s2": "s^2", "inch": "in"}
-IN_G = ("g", "gn")
+IN_G = ("g", "gn", "g's")
+LINES = {"hz": 1.0, "khz": 1e3, "1/s": 1.0, "cps": 1.0, "rad/s": 1 / (2 * math.pi)}  # [Hz]
 NO_UNITS = ("", "none", "unknown", "unkn", "si")
 
 
@@ -69,6 +71,17 @@ def force_of(text: str) -> float:
             hint=f"Known are {', '.join(FORCES)}; calibrate volts.",
         )
     return FORCES[plain(text)]
+
+
+def lines_of(text: str) -> float:
+    """Hertz of a unit of frequency.
+
+    Raises:
+        ConfigError: for another word.
+    """
+    if plain(text) not in LINES:
+        raise ConfigError(f"the unit {text!r} is no frequency; known are {', '.join(LINES)}.")
+    return LINES[plain(text)]
 
 
 def motion_per_force(text: str) -> tuple[int, float]:

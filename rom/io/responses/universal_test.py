@@ -12,7 +12,15 @@ import numpy as np
 
 from rom.errors import ConfigError, FileFormatError
 from rom.io.fields.universal import FREQUENCY_RESPONSE, Function, scan
-from rom.io.responses.unit_labels import IN_G, NO_UNITS, force_of, motion_of_unit, plain
+from rom.io.responses.grid import COHERENCE_KIND
+from rom.io.responses.unit_labels import (
+    IN_G,
+    NO_UNITS,
+    force_of,
+    lines_of,
+    motion_of_unit,
+    plain,
+)  # fmt: skip
 from rom.model import Array
 from rom.updating.measured import MeasuredModes
 
@@ -111,9 +119,13 @@ def _pairs(path: Path, lines: list[str]) -> list[tuple[str, str]]:
 
 def _in_si(path: Path, f: Function, factors: tuple[float, float] | None) -> Function:
     """The function in SI units, by the labels at its axis, else by the units of the file."""
-    if f.kind != FREQUENCY_RESPONSE:
+    if f.kind not in (FREQUENCY_RESPONSE, COHERENCE_KIND):
         return f
     try:
+        if plain(f.abscissa) not in NO_UNITS:
+            f = replace(f, x=f.x * lines_of(f.abscissa))
+        if f.kind == COHERENCE_KIND:
+            return f
         replace(f, x=np.ones(1), y=np.ones(1)).receptance()  # refuses what is no response
         motion, force = (1 / k for k in factors or (1.0, 1.0))
         if plain(f.units[0]) not in NO_UNITS:
