@@ -189,8 +189,8 @@ class _Before:
             if wrong := set(prior) - set(names):
                 raise ParameterError(f"prior: there is no parameter {named(wrong)}.")
             sigma = np.array([prior.get(name, np.inf) for name in names])
-            if not (sigma > 0).all():
-                raise ConfigError("prior: a standard deviation is positive.")
+            for name in prior:
+                positive(f"prior of {name}", prior[name])
             return _Before(np.zeros(len(names)), np.diag(sigma**-2.0))
         known = [name for name in prior.names if name in names]
         if not known:

@@ -192,7 +192,7 @@ class Noise:
         count = np.maximum(used.sum(axis=0), 1)
         share = np.where(used, self.incoherent / np.where(used, self.force, 1.0), 0.0)
         share = np.where(used.any(axis=0), share.sum(axis=0) / count, np.inf)
-        least = 1 / MAX_FORCE_SHARE
+        least: Any = 1 / MAX_FORCE_SHARE
         if self.estimated:
             chance = np.sqrt(2 / (max(self.averages - FREEDOM_LOST, 1) * count))
             least = 1 - FORCE_DEVIATIONS * chance

@@ -248,7 +248,7 @@ def test_what_equations_need_is_named(family, model):
     refused("residual = 'force'", residual="force")
     refused("rank belongs", rank=3, residual="responses")
     refused("rank belongs", rank=3, residual="response-function")
-    refused("a standard deviation is positive", prior={"E_inner": -0.1})
+    refused("prior of E_inner = -0.1 must be positive", prior={"E_inner": -0.1})
     refused("rank = 99", rank=99)
     refused("rank = 1.5", rank=1.5)
     away = Channels([[1.0, 0.1, 0.08]], [[0, 1, 1]])

@@ -296,6 +296,7 @@ def _plan(args: argparse.Namespace) -> Answer:
     """
     import numpy as np
 
+    from rom.io.files import write_whole
     from rom.updating.placement import candidates, place
 
     if args.file is not None or args.candidate:
@@ -340,7 +341,9 @@ def _plan(args: argparse.Namespace) -> Answer:
         )  # fmt: skip
     text = plan.uff() if output.suffix.lower() == ".uff" else plan.csv()
     return Answer(
-        data | {"output": str(output)}, str(plan), lambda: output.write_text(text, "ascii")
+        data | {"output": str(output)},
+        str(plan),
+        lambda: write_whole(output, lambda out: out.write(text.encode())),
     )
 
 

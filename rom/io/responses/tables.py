@@ -15,7 +15,7 @@ import numpy as np
 from rom.errors import ConfigError, FileFormatError
 from rom.io.fields.universal import FORCE_TYPE, FREQUENCY_RESPONSE, Function
 from rom.io.files import check_readable
-from rom.io.responses.grid import COHERENCE_KIND, Dof
+from rom.io.responses.grid import COHERENCE_KIND
 from rom.io.responses.unit_labels import length_of, lines_of, motion_per_force
 from rom.model import Array
 
@@ -32,6 +32,7 @@ NAME_HINT = (
 )
 NAME_HINT += "and phase [deg], and coherence."
 Row = list[str]
+Pair = tuple[tuple[int, int], tuple[int, int]]  # node and direction of sensor and force
 
 
 def functions_of(path: Path) -> tuple[Function, ...]:
@@ -42,12 +43,12 @@ def functions_of(path: Path) -> tuple[Function, ...]:
     """
     names, rows, separator = _cells(path, re.compile(r"freq", re.IGNORECASE))
     values = _numbers(path, rows, separator)
-    if unit := re.search(r"[\[(]([^\])]+)[\])]", names[0]):
+    if label := re.search(r"[\[(]([^\])]+)[\])]", names[0]):
         try:
-            values[:, 0] *= lines_of(unit.group(1))
+            values[:, 0] *= lines_of(label.group(1))
         except ConfigError as error:
             raise FileFormatError(error.message, where=str(path)) from error
-    parts: dict[tuple[Dof, Dof], dict[str, tuple[str, Array]]] = {}
+    parts: dict[Pair, dict[str, tuple[str, Array]]] = {}
     for k, name in enumerate(names[1:], 1):
         found = COLUMN_NAME.fullmatch(name)
         if not found:
@@ -101,7 +102,7 @@ def _axis(sign: str, axis: str) -> int:
 
 
 def _functions(
-    path: Path, pair: tuple[Dof, Dof], own: dict[str, tuple[str, Array]], x: Array
+    path: Path, pair: Pair, own: dict[str, tuple[str, Array]], x: Array
 ) -> list[Function]:
     """The response and the coherence of one pair."""
     response = set(own) - {"coherence"}
@@ -134,7 +135,7 @@ def _functions(
     return found
 
 
-def _function(kind: int, pair: tuple[Dof, Dof], x: Array, y: Any, numerator: int) -> Function:
+def _function(kind: int, pair: Pair, x: Array, y: Any, numerator: int) -> Function:
     return Function(kind, x, y, *pair, numerator, FORCE_TYPE, ())
 
 
