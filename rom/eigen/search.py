@@ -50,6 +50,8 @@ class HeldBody:
         factor: of their stiffness, or of K - shift M; None while nobody needs it.
     """
 
+    make: Callable[[], None]
+
     def __init__(self, ops: Any, held: Index, shift: float = 0.0):
         self.ops, self.held, self.shift = ops, held, shift
         self.mine = np.flatnonzero(~np.isin(np.arange(ops.first, ops.first + ops.n_local), held))
@@ -69,10 +71,6 @@ class HeldBody:
         if self.factor is None:
             self.make()
         return self.factor
-
-    def make(self) -> None:
-        """Factor the stiffness, or K - shift M."""
-        raise NotImplementedError
 
     def release(self) -> None:
         """Give the memory of the factor back; it is made again if it is needed."""
