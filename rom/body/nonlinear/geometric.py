@@ -275,10 +275,10 @@ def _with_derivatives(
                 for name, F in zip(bent, units, strict=True)]  # fmt: skip
     loads, still = forces(components, E), forces(held, E).T
     # a given number of shapes is spent on the loads of the range alone
-    further = forces(every if geometric.n_shapes is None else [], E)
+    beside = forces(every if geometric.n_shapes is None else [], E)
     turns = {name: mean_motion(one)[3:] @ ops.rows(E, one.dofs)
              for name, one in model.interfaces.items() if name in geometric.loads}  # fmt: skip
-    return Shapes(E, loads, further, turns, still, n_basis, sections), theta
+    return Shapes(E, loads, beside, turns, still, n_basis, sections), theta
 
 
 def _snapshots(
