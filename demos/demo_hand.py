@@ -56,6 +56,7 @@ options = argparse.ArgumentParser(description="fingers of springs, their stiffne
 options.add_argument("--out", type=Path, default=Path("out"), help="folder, made if missing")
 options.add_argument("-q", "--quiet", action="store_true", help="no tables")
 options = options.parse_args()
+finite_elements = rom.fe.model  # PETSc starts here, on all processes together
 if MPI.COMM_WORLD.rank > 0:
     raise SystemExit  # this is work for one process
 options.out.mkdir(parents=True, exist_ok=True)
@@ -142,8 +143,8 @@ columns = {"40 mm long": (100 * share[within], column.lateral_stiffness(share[wi
 
 polyamide = rom.Material(E=1.7e9, nu=0.4, rho=1010.0)
 BONE = Path(__file__).parents[1] / "meshes" / "phalanx.geo"
-solids = [rom.fe.model(BONE, degree=2, material=polyamide, parameters={"L": link},
-                       comm=MPI.COMM_SELF) for link in INDEX_LENGTHS]  # fmt: skip
+solids = [finite_elements(BONE, degree=2, material=polyamide, parameters={"L": link},
+                          comm=MPI.COMM_SELF) for link in INDEX_LENGTHS]  # fmt: skip
 bones = [rom.reduce(solid, interfaces={"proximal": "rbe2", "distal": "rbe2"}, certify=False,
                     method=rom.CraigBampton(n_modes=3)) for solid in solids]  # fmt: skip
 springs = (HAND_SPRING,) * 3
