@@ -331,7 +331,7 @@ class Responses:
         force = np.broadcast_to(np.asarray(self.force_noise, dtype=float), self.H.shape[::2])
         return Noise(
             np.broadcast_to((1 - c) / c, self.H.shape),
-            force[:, None] ** 2,
+            np.square(force[:, None]),
             self.averages,
             np.ndim(self.coherence) > 0,
         )

@@ -34,7 +34,7 @@ KNOWN_FACTORS = {
     1e3: "millimetres or millivolts",
     1e-3: "metres taken for millimetres",
 }
-DERIVED = {  # powers of the frequency that one quantity has more than another
+DERIVED_KINDS = {  # powers of the frequency that one quantity has more than another
     -2: "displacements taken for accelerations",
     -1: "a velocity taken for its derivative, or a displacement for a velocity",
     1: "an acceleration taken for a velocity, or a velocity for a displacement",
@@ -299,9 +299,9 @@ def _derived(log: Array, used: Mask, lines: Array) -> str:
         return ""
     level = np.polyfit(x - x.mean(), log[used], 1)
     order = int(np.round(level[0]))
-    if order not in DERIVED or abs(level[1] - order * x.mean()) > MAX_LOG_LEVEL:
+    if order not in DERIVED_KINDS or abs(level[1] - order * x.mean()) > MAX_LOG_LEVEL:
         return ""
-    return f" (about (2 pi f)^{order}: {DERIVED[order]}?)"
+    return f" (about (2 pi f)^{order}: {DERIVED_KINDS[order]}?)"
 
 
 def _turned(cosine: Array, used: Mask, unsure: bool) -> dict[str, tuple[str, str]]:
