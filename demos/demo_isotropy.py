@@ -37,6 +37,9 @@ options = argparse.ArgumentParser(description="isotropic postures of linkages")
 options.add_argument("--out", type=Path, default=Path("out"), help="folder, made if missing")
 options.add_argument("-q", "--quiet", action="store_true", help="no tables")
 options = options.parse_args()
+finite_elements = rom.fe.model  # PETSc starts here, on all processes together
+if MPI.COMM_WORLD.rank > 0:
+    raise SystemExit  # this is work for one process
 say = (lambda *_: None) if options.quiet else print
 
 # ## The linkage
@@ -51,7 +54,7 @@ rigid = FiveBar(0.7, (crank, crank), (coupler, coupler), tool)
 # towards the crank: meshed, assembled with dolfinx and reduced to both bores and four modes. Their
 # elastic coordinates are held, what slow motors feel, or vibrate with torques of some frequency.
 
-model = rom.fe.model(
+model = finite_elements(
     Path(__file__).parents[1] / "meshes" / "connecting_rod.geo",
     material=rom.Material(E=70e9, nu=0.33, rho=2700.0), parameters={"L": 0.8, "lc": 0.02},
     comm=MPI.COMM_SELF,

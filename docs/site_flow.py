@@ -20,7 +20,7 @@ SOURCE = Path(rom.__file__).parent
 STAGES = {  # what lies on the way, and the folders and files in which it lies
     "geometry": ("fe.mesh",),
     "matrices": ("fe.forms", "fe.operators", "fe"),
-    "modes": ("eigen", "reduction.interfaces", "reduction.bases"),
+    "modes": ("eigen", "reduction.interfaces", "reduction.bases", "reduction.full_model"),
     "body": (
         *("body", "checks", "workflow", "io"),
         *("assembly", "parametric", "updating", "cyclic", "prestress"),
@@ -30,7 +30,7 @@ STAGES = {  # what lies on the way, and the folders and files in which it lies
     "results": ("mbs.analysis", "view", "fmu"),
 }
 COMPONENTS, FRONT, GROUND = "components", "front", "ground"
-GROUND_FOLDERS = ("arguments", "process")  # beside the single files at the top
+GROUND_FOLDERS = ("arguments", "paths", "process")  # beside the single files at the top
 FRONTS = ("cli", "config", "report", "bench", "doctor", "__main__")
 HANDED_ON = ("SolidMesh", "FEModel", "Basis", "FlexibleBody", "Mechanism", "Solution")
 WIDTH, MARGIN, BOX = 1500, 30, 158  # of the sheet, around it, of a stage [pixel]

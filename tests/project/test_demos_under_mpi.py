@@ -29,6 +29,6 @@ def test_demo_runs_unchanged_on_two_processes(demo, tmp_path):
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     results = json.loads(file.read_text())
-    said = [line.split(": ")[0] for line in done.stdout.splitlines()]
+    said = [line.rpartition(": ")[0] for line in done.stdout.splitlines()]
     assert [said.count(name) for name in results] == [1] * len(results)
     check(demo, results, out)

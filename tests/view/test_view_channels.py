@@ -32,6 +32,7 @@ def test_a_point_off_the_body_is_led_to_the_one_that_is_taken():
 
 @pytest.mark.once
 def test_the_scene_is_drawn(tmp_path):
+    pytest.importorskip("matplotlib", reason="a picture is drawn")
     scene = view.channels(
         BOX, {"sensors": (BOX[0][:3], np.eye(3)), "forces": (BOX[0][4:5], [[0, 0, 1]])}
     )

@@ -137,10 +137,8 @@ def enriched(
     states = np.vstack(passed)
     _refuse_collapse(geometric, energy.least_stretch(shapes.E @ states.T), list(map(len, passed)))
     _warn_of_turns(geometric, quartic, shapes, states)
-    modes = _small_motions(states, quartic, quadratic(ops, ops.apply_M, shapes.E), shapes)
-    added = theta @ _principal(
-        geometric, states[:, shapes.n_basis :].T, modes[:, shapes.n_basis :].T
-    )
+    small = _small_motions(states, quartic, quadratic(ops, ops.apply_M, shapes.E), shapes)
+    added = theta @ _principal(geometric, *(q[:, shapes.n_basis :].T for q in (states, *small)))
     labels = tuple(f"deflection {k + 1}" for k in range(added.shape[1]))
     return replace(basis, Psi=np.hstack([basis.Psi, added]), labels=(*basis.labels, *labels))
 
@@ -456,8 +454,10 @@ def _warn_of_turns(geometric: Geometric, quartic: Quartic, shapes: Shapes, state
             )
 
 
-def _small_motions(states: Array, quartic: Quartic, M: Array, shapes: Shapes) -> Array:
-    """(s m, r) about each state (s, r) the lowest modes, and what further loads do, of energy 1/2.
+def _small_motions(
+    states: Array, quartic: Quartic, M: Array, shapes: Shapes
+) -> tuple[Array, Array]:
+    """(s m, r) lowest modes about each state (s, r), (s l, r) what further loads do, of energy 1/2.
 
     A beam that is bent in one plane needs companions of bending in the other one and of twisting
     as well, however small these are. Without stiffness, at the load that makes it snap, a mode is
@@ -466,28 +466,35 @@ def _small_motions(states: Array, quartic: Quartic, M: Array, shapes: Shapes) ->
     N = free_motions(shapes.held)
     mass = N.T @ M @ N
     softest = eigh(N.T @ quartic.K @ N, mass, eigvals_only=True, subset_by_index=(0, 0))[0]
-    found = []
+    modes, yielding = [], []
     for q in states:
         lam, V = eigh(N.T @ quartic.tangent(q) @ N, mass)
         lam = np.maximum(lam, 0.1 * softest)
         amplitudes = (V / lam).T @ (N.T @ shapes.further)
-        found.append((N @ V[:, :N_MODES] / np.sqrt(lam[:N_MODES])).T)
-        found.append((N @ V @ (amplitudes / np.sqrt(lam @ amplitudes**2))).T)
-    return np.vstack(found)
+        modes.append((N @ V[:, :N_MODES] / np.sqrt(lam[:N_MODES])).T)
+        yielding.append((N @ V @ (amplitudes / np.sqrt(lam @ amplitudes**2))).T)
+    return np.vstack(modes), np.vstack(yielding)
 
 
-def _principal(geometric: Geometric, Y: Array, modes: Array) -> Array:
-    """(p, k) directions of most energy in states (p, s) and modes (p, m) about them.
+def _principal(geometric: Geometric, Y: Array, modes: Array, yielding: Array) -> Array:
+    """(p, k) directions of most energy in states (p, s), modes (p, m) and what further loads do.
 
-    The coordinates have the energy 1/2. A mode weighs `MODE_SHARE` of all states together.
+    The coordinates have the energy 1/2. A mode weighs `MODE_SHARE` of all states together. What
+    further loads (p, l) do comes on top: among the others it would take the place of modes.
     """
-    Y = np.hstack([Y, MODE_SHARE * np.linalg.norm(Y) * modes])
+    share = MODE_SHARE * np.linalg.norm(Y)
+    Y = np.hstack([Y, share * modes])
+    least = geometric.tol * np.linalg.norm(Y)
+    U = _leading(Y, least, geometric.n_shapes)
+    left = share * (yielding - U @ (U.T @ yielding))
+    return np.hstack([U, _leading(left, least)])
+
+
+def _leading(Y: Array, least: float, k: int | None = None) -> Array:
+    """(p, k) leading directions of columns (p, s), as many as leave no more than the least out."""
     U, s, _ = np.linalg.svd(Y, full_matrices=False)
-    if geometric.n_shapes is not None:
-        k = min(geometric.n_shapes, s.size)
-    else:
-        missed = np.sqrt(np.cumsum(s[::-1] ** 2)[::-1])  # with those from k on left out
-        k = int(np.count_nonzero(missed > geometric.tol * missed[0]))
-    while k < s.size and s[k] > (1 - EQUAL_RTOL) * s[k - 1]:
+    missed = np.sqrt(np.cumsum(s[::-1] ** 2)[::-1])  # with those from k on left out
+    k = int(np.count_nonzero(missed > least)) if k is None else min(k, s.size)
+    while 0 < k < s.size and s[k] > (1 - EQUAL_RTOL) * s[k - 1]:
         k += 1
     return np.asarray(U[:, :k])

@@ -364,7 +364,8 @@ def _covered(body: Sheet, places: Array) -> int:
     """Number of a place inside a triangle by more than a touch; -1 if there is none."""
     a, b, c = (body.points[body.triangles[:, k]] for k in range(3))
     for k, p in enumerate(places):
-        parts = [np.cross(v - u, p - u) for u, v in ((a, b), (b, c), (c, a))]
+        parts = [np.linalg.det(np.stack([v - u, p - u], axis=-1))
+                 for u, v in ((a, b), (b, c), (c, a))]  # fmt: skip
         if np.any(np.min(parts, axis=0) > 2 * 1e-3 * body.area):
             return k
     return -1

@@ -122,28 +122,29 @@ def root_between(strip, table, k, theta, flow, low, high):
 
 @inner
 def flow_angle(strip, table, k, theta, axial, tangential):
-    """The angle of flow of a strip in wind from the front that turns forward.
+    """The angle of flow of a strip in wind from the front.
 
-    Intervals in the order of the source: windmill, a rotor that drives the air, flow from behind.
+    Intervals of the source: windmill, a rotor that drives the air, and flow from behind, which is
+    sought where the air on a blade that hardly turns, or backward, comes past a right angle. So
+    forces do not jump where a rotor starts.
     """
     e, flow, right = SMALLEST_ANGLE, (axial, tangential), 0.5 * math.pi
-    start = residual(strip, table, k, e, theta, axial, tangential)
-    if start * residual(strip, table, k, right - e, theta, axial, tangential) <= 0.0:
-        return root_between(strip, table, k, theta, flow, e, right - e)
+    end = residual(strip, table, k, right, theta, axial, tangential)
+    if residual(strip, table, k, e, theta, axial, tangential) * end <= 0.0:
+        return root_between(strip, table, k, theta, flow, e, right)
     start = residual(strip, table, k, -0.5 * right, theta, axial, tangential)
-    if start * residual(strip, table, k, -e, theta, axial, tangential) < 0.0:
+    if end > 0.0 and start * residual(strip, table, k, -e, theta, axial, tangential) < 0.0:
         return root_between(strip, table, k, theta, flow, -0.5 * right, -e)
-    return root_between(strip, table, k, theta, flow, right + e, math.pi - e)
+    return root_between(strip, table, k, theta, flow, right, math.pi - e)
 
 
 @inner
 def induced(strip, table, k, theta, axial, tangential):
     """Air that reaches the strip: along the axis, against the motion, and the angle of flow.
 
-    Wind from behind, or a blade that turns backward or not at all, has no balance of momentum here
-    and is not slowed.
+    Wind from behind has no balance of momentum here and is not slowed.
     """
-    if axial <= 0.0 or tangential <= 0.0:
+    if axial <= 0.0:
         return axial, tangential, math.atan2(axial, tangential)
     phi = flow_angle(strip, table, k, theta, axial, tangential)
     ratio, driving = balance(strip, table, k, phi, theta)

@@ -349,7 +349,8 @@ def test_two_links_of_the_core_are_isotropic_where_the_elbow_has_its_closed_form
     bend = np.arccos(-c / b) - 2.8
     found = isotropic_set(core.inertia, ((-0.2, 0.2), (bend - 0.11, bend + 0.17)), n=6)
     assert found.kind == "curves" and not found.winding.any()
-    assert_allclose(found.q[:, 1], bend, atol=1e-7)
+    # the anisotropy is (q2 - bend)^2 / 2, whose round-off leaves the root of a root open
+    assert_allclose(found.q[:, 1], bend, atol=1e-6)
 
 
 def test_two_slides_of_the_core_are_isotropic_at_one_spread():
