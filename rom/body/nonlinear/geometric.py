@@ -484,7 +484,7 @@ def _principal(geometric: Geometric, Y: Array, modes: Array, yielding: Array) ->
     """
     share = MODE_SHARE * np.linalg.norm(Y)
     Y = np.hstack([Y, share * modes])
-    least = geometric.tol * np.linalg.norm(Y)
+    least = float(geometric.tol * np.linalg.norm(Y))
     U = _leading(Y, least, geometric.n_shapes)
     left = share * (yielding - U @ (U.T @ yielding))
     return np.hstack([U, _leading(left, least)])
