@@ -228,7 +228,7 @@ def test_a_read_only_folder_is_found_before_the_computation(folder, capsys, monk
         (PermissionError(13, "Permission denied", "x.op4"), 3, ["x.op4: Permission denied."]),
         (RecursionError("too deep"), 1, ["RecursionError: too deep", "please report"]),
         (AssertionError("a\nb"), 1, ["AssertionError: a b (test_cli_faults.py, line"]),
-        (rom.RomError("several\n lines", where="x.npz"), 1, ["error: x.npz: several lines\n"]),
+        (rom.RomError("several\n lines.", where="x.npz"), 1, ["error: x.npz: several lines.\n"]),
     ],
 )  # fmt: skip
 def test_every_exception_becomes_one_line(raised, code, words, monkeypatch, capsys):
