@@ -36,9 +36,7 @@ def length_of(text: str) -> float:
     Raises:
         ConfigError: for another word.
     """
-    if plain(text) not in LENGTHS:
-        raise ConfigError(f"the unit {text!r} is no length; known are {', '.join(LENGTHS)}.")
-    return LENGTHS[plain(text)]
+    return _known(text, LENGTHS, "length")
 
 
 def motion_of_unit(text: str) -> tuple[int, float]:
@@ -79,9 +77,13 @@ def lines_of(text: str) -> float:
     Raises:
         ConfigError: for another word.
     """
-    if plain(text) not in LINES:
-        raise ConfigError(f"the unit {text!r} is no frequency; known are {', '.join(LINES)}.")
-    return LINES[plain(text)]
+    return _known(text, LINES, "frequency")
+
+
+def _known(text: str, units: dict[str, float], quantity: str) -> float:
+    if plain(text) not in units:
+        raise ConfigError(f"the unit {text!r} is no {quantity}; known are {', '.join(units)}.")
+    return units[plain(text)]
 
 
 def motion_per_force(text: str) -> tuple[int, float]:
