@@ -14,7 +14,7 @@ from rom.errors import InterfaceError
 from rom.model import Array, Basis, Report, Row
 from rom.process.progress import MANY_DOFS, stages
 from rom.reduction.interfaces.records import Connection
-from rom.rows import FREQUENCY_RTOL, N_COMPARED, frequency_rows, row
+from rom.rows import BELOW_FULL_RTOL, FREQUENCY_RTOL, N_COMPARED, frequency_rows, row
 
 # Relative to the diagonals it bounds the error of squared frequencies; round-off of a fine mesh on
 # rbe3 interfaces reaches 3e-9, a wrong matrix is asymmetric by per cents.
@@ -80,14 +80,26 @@ def certify_body(
     elif not known:
         words = "supports estimated only; full modes cost more than the reduction"
         rows.append(Row(words, len(supports) - 1, "--", True))
+    rigid = rigid_rows(ops, body, elastic)
     for support, table in comparison.items():
-        rows += frequency_rows(support, table) if table["full"] else []
+        if table["full"]:
+            round_off = _round_off(rigid[-1].value, body, table["full"])
+            rows += frequency_rows(support, table, round_off=round_off)
         rows += _estimate_rows(support, table)
     rows += static
-    rows += rigid_rows(ops, body, elastic)
+    rows += rigid
     rows += _matrix_rows(connection, basis, body, matrices)
     rows += _effective_mass(body, tuple(connection.parts)) if statics else []
     return Report(f"certificate of {body.name}", tuple(rows)), comparison
+
+
+def _round_off(rigid_energy: Any, body: FlexibleBody, full: list[float]) -> float:
+    """By which frequencies may differ where rigid motions have energy, over that of the first mode.
+
+    A slender body that is held bends with far less energy than when it is free.
+    """
+    softer = (body.omega[0] / (2 * np.pi * min(full))) ** 2
+    return max(BELOW_FULL_RTOL, float(0.5 * rigid_energy * softer))
 
 
 def compared(

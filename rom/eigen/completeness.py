@@ -9,7 +9,8 @@ largest Ritz value beside those found: every polynomial p of the degree at hand 
 with c the least length that the components of W in the space of theta_i can have beside the
 modes found there. As W knows nothing of the body, so small a c is improbable: of three rows of W
 the least singular value falls below c with at most 3 P(chi^2_(b-2) <= 3 c^2). Three members of one
-frequency or more are left to a count. p is theta^a times Chebyshev's polynomial on [0, s].
+frequency or more are left to a count. p is theta^a times Chebyshev's polynomial on [0, s]. Modes
+found are known up to an angle, and no c below that is believed.
 
 Source:
     Kuczynski and Wozniakowski, SIAM J. Matrix Anal. Appl. 13 (1992) 1094, for one vector; Saad,
@@ -23,7 +24,7 @@ from rom.model import Array
 
 N_TOGETHER = 3  # members of one frequency that are left to a count
 CLUSTER_RTOL = 1e-4  # relative distance of eigenvalues that count as one frequency
-ACCURATE_RTOL = 1e-7  # residual of a Ritz value that counts as found
+ACCURATE_RTOL = 1e-3  # angle between a mode found and one that might be missed beside it
 LEAST_SHARE = 0.05  # variance of a component of W: eigenvalues of diag(M)^-1 M are larger
 MAX_MISS_PROBABILITY = 1e-9  # beyond it a search goes on, or modes are counted
 SAFETY_FACTOR = 100.0  # on c^2, for Ritz vectors that are not exact
@@ -39,24 +40,36 @@ def miss_probability(T: Array, start: Array, residual: Array, m: int) -> float:
         residual: (N,) of its Ritz values, the largest first, over them.
         m: number of modes asked for, the lowest.
     """
+    k, c2 = unseen_part(T, start, residual, m)
+    b = start.shape[0]
+    c2 = max(SAFETY_FACTOR * c2, ACCURATE_RTOL**2) / LEAST_SHARE
+    chance = N_TOGETHER * gammainc(0.5 * (b - N_TOGETHER + 1), 0.5 * N_TOGETHER * c2)
+    return float(min(1.0, (k + 1) * chance))
+
+
+def unseen_part(T: Array, start: Array, residual: Array, m: int) -> tuple[int, float]:
+    """How many modes are found, and c^2 of the largest part that one missed had; see above.
+
+    Arguments as in `miss_probability`; c^2 is infinite where the bound has nothing to say.
+    """
     theta, S = np.linalg.eigh(T)
     theta, S = theta[::-1], S[:, ::-1]
     b, n_blocks = start.shape[0], theta.size // start.shape[0]
-    inaccurate = np.flatnonzero(residual > ACCURATE_RTOL)
+    # a residual over the distance of the eigenvalues bounds the angle; nearer ones are one cluster
+    apart = np.maximum(theta[m - 1] - theta, CLUSTER_RTOL * theta)
+    inaccurate = np.flatnonzero(residual * theta > ACCURATE_RTOL * apart)
     k = int(inaccurate[0]) if inaccurate.size else theta.size
     if not m <= k < theta.size or theta[k] <= 0.0 or _repeated(theta[:k]):
-        return 1.0
+        return k, np.inf
     ratio = float(theta[m - 1] / theta[k])
     if ratio <= 1.0 + CLUSTER_RTOL:
-        return 1.0
+        return k, np.inf
     W = S[:b].T @ start  # in Ritz vectors
     powers = np.arange(float(min(MAX_POWER, n_blocks)))
     left = [np.linalg.norm((theta[k:] / theta[m - 1])[:, None] ** a * W[k:], 2) for a in powers]
     growth = log_chebyshev(n_blocks - 1 - powers, 2.0 * ratio - 1.0)
     log_c2 = np.min(2.0 * np.log(left) - 2.0 * growth) - np.log(ratio - 1.0)
-    c2 = SAFETY_FACTOR * np.exp(min(log_c2, 0.0)) / LEAST_SHARE
-    chance = N_TOGETHER * gammainc(0.5 * (b - N_TOGETHER + 1), 0.5 * N_TOGETHER * c2)
-    return float(min(1.0, (k + 1) * chance))
+    return k, float(np.exp(min(log_c2, 0.0)))
 
 
 def _repeated(theta: Array) -> bool:

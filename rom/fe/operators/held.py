@@ -57,11 +57,10 @@ class HeldPETSc(HeldBody):
         return np.asarray(self.factor.solve(F))
 
     def _refuse_free_motion(self) -> None:
-        """A rigid motion that is not held has, after one inverse iteration, no stiffness."""
+        """What is not held moves, after one inverse iteration from anywhere, without stiffness."""
         ops, stiff, X = self.ops, False, np.zeros((self.mine.size, 1))
         if self.factor.ok:
-            R = np.column_stack([ops.fixed]) if ops.rigid is None else ops.rigid
-            X = self._coarsely_solved(ops.apply_M(R)[self.mine])
+            X = self._coarsely_solved(ops.apply_M(ops.fixed[:, None])[self.mine])
             if ops.all_finite(X):
                 together = np.diag(self.inner.gram(X, self.inner.apply_K(X)))
                 alone = self.inner.gram(X, self.inner.stiffness_diagonal[:, None] * X)

@@ -23,15 +23,16 @@ def moves_most(ops: Any, X: Array, rows: Index | None = None) -> str:
     """
     if not ops.geometric:
         return ""
-    rows = np.arange(X.shape[0]) if rows is None else rows
-    size = np.abs(np.where(np.isfinite(X), X, 0.0)).max(axis=1, initial=0.0)
-    at = int(np.argmax(size)) if size.size else 0
-    largest = float(size[at]) if size.size else -1.0
-    point = _point(ops.rigid, 3 * (int(rows[at]) // 3)) if largest > 0.0 else None
+    node = (np.arange(X.shape[0]) if rows is None else rows) // 3
+    square = np.square(np.where(np.isfinite(X), X, 0.0)).max(axis=1, initial=0.0)
+    size = np.sqrt(np.bincount(node, square, minlength=1))
+    at = int(np.argmax(size))
+    largest = float(size[at])
+    point = _point(ops.rigid, 3 * at) if largest > 0.0 else None
     largest, found = max(ops.comm.allgather((largest, point)), key=lambda pair: pair[0])
     if found is None:
         return ""
-    loose = np.unique(rows[size > MOVING_RATIO * largest] // 3)
+    loose = np.flatnonzero(size > MOVING_RATIO * largest)
     return f" It moves most at {_words(found)}, {_part(ops, loose)}."
 
 

@@ -62,7 +62,7 @@ def test_iteration_without_success_is_an_error(monkeypatch):
     from rom.fe.operators.iterative import gradients
 
     monkeypatch.setattr(gradients, "MAX_ITERATIONS", 3)
-    with pytest.raises(SolverError, match="6 of 6 static solutions did not converge in 3"):
+    with pytest.raises(SolverError, match="1 of 1 static solutions did not converge in 3"):
         reduced(beam("iterative"))
 
 
