@@ -11,6 +11,7 @@ import numpy as np
 from scipy.linalg.blas import dgemm
 
 from rom.eigen.completeness import MAX_MISS_PROBABILITY, miss_probability
+from rom.eigen.gaussian import gaussian_block
 from rom.errors import SolverError
 from rom.model import Array
 from rom.process.stopwatch import MISS_NOTE, note
@@ -28,7 +29,7 @@ class BlockLanczos:
     """Krylov space of (K - sigma M)^-1 M, orthogonal to deflated columns.
 
     Args:
-        ops: operators of the body.
+        ops: operators of the body, as `gaussian_block` wants them.
         factor: solves with K - sigma M.
         sigma: the shift, below all eigenvalues sought.
         deflated: (n_local, d) M-orthonormal modes to leave out.
@@ -148,8 +149,7 @@ class BlockLanczos:
 
     def _random(self, k: int) -> Array:
         """(n_local, k) random columns, zero where a support holds."""
-        rng = np.random.default_rng((self.size, getattr(self.ops, "first", 0)))
-        X = rng.standard_normal((self.V.shape[0], k))
+        X = gaussian_block(self.ops, k, self.width * self.n_deflated + self.size)
         X = np.asfortranarray(self.factor.solve(self.ops.apply_M(X)))
         return X / np.sqrt(np.diag(self.ops.gram(X, self.ops.apply_M(X))))
 

@@ -12,6 +12,7 @@ import numpy as np
 from scipy.linalg import LinAlgError, eigh, eigvalsh
 
 from rom.eigen.condensed import Supported
+from rom.eigen.gaussian import gaussian_block
 from rom.eigen.lanczos import BLOCK_SIZE, EIGENVALUE_RTOLS, BlockLanczos, capacity
 from rom.eigen.verbs import Operators, count_shift, every_row, orthonormal, own_rows
 from rom.errors import ConfigError, ModelError, ModesMissedError, QualityGateError, SolverError
@@ -30,12 +31,6 @@ ESTIMATE_SHIFT = 1e-6  # of the largest eigenvalue, below zero, with which the f
 ESTIMATE_STEPS = 4  # of inverse iteration, on eight columns
 ALL_LOOSE_RATIO = 1e5  # estimate over round-off where all columns have found motions at rest
 NO_INERTIA = "some motion would have no inertia"
-PLACE_SCALE = 2.0**40  # places that differ by less are one
-COUNTER_STEP = np.uint64(0x9E3779B97F4A7C15)  # 2^64 over the golden ratio: steps of the counter
-MIXING_STEPS = (  # Steele, Lea and Flood, OOPSLA 2014, with the constants of Stafford
-    (np.uint64(30), np.uint64(0xBF58476D1CE4E5B9)),
-    (np.uint64(27), np.uint64(0x94D049BB133111EB)),
-)
 Seek = Callable[[int, Array], tuple[Array, Array, bool]]
 
 
@@ -341,27 +336,6 @@ def indefinite(name: str, n_negative: int, meaning: str) -> QualityGateError:
         f"{name} has {n_negative} negative eigenvalues: {meaning}.",
         hint="Check signs and supports where the matrix was made.",
     )
-
-
-def gaussian_block(ops: Any, k: int, n_before: int = 0) -> Array:
-    """(n_local, k) Gaussian columns with components of about one in all modes.
-
-    The numbers depend on the place of a dof, mixed beyond recognition, and not on its rank. Blocks
-    are independent when each is given how many columns were drawn before it.
-    """
-    key = np.round(ops.fixed * PLACE_SCALE).astype(np.int64).view(np.uint64)
-    numbers = np.arange(1 + 2 * n_before, 1 + 2 * (n_before + k), dtype=np.uint64)
-    counter = key[:, None] + COUNTER_STEP * numbers
-    u = (_mixed(counter) >> np.uint64(11)).astype(float) * 2.0**-53 + 2.0**-54
-    normal = np.sqrt(-2.0 * np.log(u[:, :k])) * np.cos(2.0 * np.pi * u[:, k:])  # Box and Muller
-    return normal / np.sqrt(np.maximum(ops.mass_diagonal, np.finfo(float).tiny))[:, None]
-
-
-def _mixed(x: Any) -> Any:
-    """64 bits of which each depends on all those given: the finaliser of SplitMix64."""
-    for shift, factor in MIXING_STEPS:
-        x = (x ^ (x >> shift)) * factor
-    return x ^ (x >> np.uint64(31))
 
 
 def settled(ops: Any, lam: Array, Phi: Array) -> Array:

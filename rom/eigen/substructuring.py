@@ -15,6 +15,7 @@ from scipy.sparse import csr_matrix, issparse
 
 from rom.arguments import positive
 from rom.eigen.fronts import SubstructuredBody, refuse_beyond
+from rom.eigen.gaussian import gaussian_block
 from rom.eigen.lanczos import BlockLanczos, capacity
 from rom.eigen.scipy import SciPyOperators, dof_set
 from rom.eigen.search import RIGID_RTOL
@@ -247,6 +248,7 @@ class _Kept:
     def __init__(self, body: SubstructuredBody):
         self.n = self.n_local = body.n_kept
         self.solve = body.apply_mass
+        self.fixed, self.mass_diagonal = np.arange(float(self.n)), np.ones(self.n)
 
     def apply_M(self, X: Array) -> Array:
         """X."""
@@ -261,8 +263,8 @@ def _kept_modes(body: SubstructuredBody, limit: float, k: int) -> Array:
     """(r, about k) modes of all substructures together up to a limit, M-orthonormal, ascending."""
     r = body.n_kept
     while 2 * capacity(k) < r:
-        start = np.random.default_rng(1).normal(size=(r, LANCZOS_WIDTH))
         kept = _Kept(body)
+        start = gaussian_block(kept, LANCZOS_WIDTH)
         allowed = np.where(np.arange(k) < (1.0 - LOOSE_SHARE) * k, LANCZOS_RTOL, np.inf)
         space = BlockLanczos(kept, kept, 0.0, start[:, :0], start, allowed)
         space.solve()

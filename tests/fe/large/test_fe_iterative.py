@@ -236,7 +236,7 @@ def test_the_smoother_is_the_polynomial_of_the_fourth_kind(problem):
 
 
 def test_loads_are_independent_of_the_search_and_as_heavy_as_the_mass(problem, monkeypatch):
-    from rom.eigen.search import gaussian_block
+    from rom.eigen.gaussian import gaussian_block
     from rom.fe.operators.iterative import search as module
 
     seen, said = [], module.searched

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rom.eigen.search import gaussian_block
+from rom.eigen.gaussian import gaussian_block
 from rom.errors import ModesMissedError, SolverError
 from rom.fe.operators.factor import dense_rows
 from rom.fe.operators.iterative.definite import GAP_SHARE, N_COLUMNS, searched, spectral_bounds
