@@ -1,6 +1,7 @@
 """The operator verbs on SciPy matrices, for people who bring matrices of their own."""
 
 from copy import copy
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -10,10 +11,11 @@ from scipy.sparse import csc_matrix, csr_matrix
 from scipy.sparse.linalg import splu
 
 from rom.arguments import matrix
+from rom.eigen.held import HeldBody
+from rom.eigen.place import moves_most
 from rom.eigen.search import (
     ESTIMATE_SHIFT,
     NO_INERTIA,
-    HeldBody,
     ModeSearch,
     estimated_by_iteration,
     indefinite,
@@ -21,7 +23,6 @@ from rom.eigen.search import (
 from rom.eigen.verbs import Weighted, canonical_signs
 from rom.errors import (
     ConfigError,
-    InterfaceError,
     QualityGateError,
     SolverError,
 )
@@ -29,7 +30,7 @@ from rom.model import Array, Index
 from rom.names import named
 from rom.process.stopwatch import FACTORISATION_PIECE, piece
 
-PIVOT_RTOL = 1e-13  # smallest over largest pivot below which K_ii counts as singular
+NO_FACTOR = SimpleNamespace(ok=False, release=lambda: None)  # of a singular stiffness
 SYMMETRIC_LU = {
     "permc_spec": "MMD_AT_PLUS_A", "diag_pivot_thresh": 0.0, "options": {"SymmetricMode": True}
 }  # fmt: skip
@@ -51,6 +52,7 @@ class SymmetricLU:
         with piece(FACTORISATION_PIECE):
             self.lu = splu(self.A, **kind)
         self.pivots = self.lu.U.diagonal()
+        self.ok = True
 
     @property
     def on_diagonal(self) -> bool:
@@ -84,13 +86,24 @@ class HeldSciPy(HeldBody):
         super().__init__(ops, held, shift)
         if self.n_free:
             self.make()
+            if not shift:
+                self.refuse_free_motion()
+                self._refuse_negative()
 
     def make(self) -> None:
         """Factor the stiffness, or K - shift M."""
         if self.shift:
-            self.factor = _shifted(self.inner.K, self.inner.M, self.shift)
-        else:
-            self.factor = _factor(self.inner.K, self.held.size)
+            self.factor = self.inner.indefinite(self.shift)
+            return
+        try:
+            self.factor = SymmetricLU(self.inner.K)
+        except RuntimeError:
+            self.factor = NO_FACTOR
+
+    def _refuse_negative(self) -> None:
+        if not self.factor.definite and self.factor.on_diagonal:
+            meaning = "with the boundary held, deformation would give energy"
+            raise indefinite("K", self.factor.negative_pivots(), meaning)
 
 
 class SciPyOperators(ModeSearch):
@@ -191,6 +204,18 @@ class SciPyOperators(ModeSearch):
         """(K - sigma M)^-1."""
         return SymmetricLU(self.K - sigma * self.M)
 
+    def indefinite(self, shift: float) -> SymmetricLU:
+        """(K - shift M)^-1 for a shift among the eigenvalues.
+
+        Raises:
+            SolverError: if the shift is an eigenvalue.
+        """
+        try:
+            return SymmetricLU(self.K - shift * self.M, pivoting=True)
+        except RuntimeError as error:
+            message = f"K - {shift:.6g} M is singular: the shift is an eigenvalue."
+            raise SolverError(message) from error
+
     def count_below(self, sigma: float, spent: Any = None) -> int:
         """Number of eigenvalues below sigma, by the inertia of K - sigma M (Sylvester)."""
         return negative_count(self.K - sigma * self.M)
@@ -208,9 +233,21 @@ class SciPyOperators(ModeSearch):
         """Columns with their largest entry positive."""
         return canonical_signs(Phi)
 
-    def where(self, Phi: Array) -> str:
-        """Nothing: plain matrices do not know where their dofs are."""
-        return ""
+    def where(self, Phi: Array, rows: Index | None = None) -> str:
+        """Words for the place that moves most; without geometry, for its dof."""
+        place = "" if self.rigid is None else moves_most(self, Phi, rows)
+        if place or not Phi.any():
+            return place
+        at = int(np.abs(Phi).max(axis=1, initial=0.0).argmax())
+        return f" Dof {at if rows is None else rows[at]} moves most."
+
+    def from_all(self, mine: Any) -> list[Any]:
+        """What each process has: this one alone."""
+        return [mine]
+
+    def all_finite(self, X: Array) -> bool:
+        """True when X is finite."""
+        return bool(np.isfinite(X).all())
 
     def first_elastic(self, R: Array) -> float:
         """Estimate of the first elastic eigenvalue by inverse iteration on a small block."""
@@ -263,33 +300,6 @@ def _symmetric(name: str, A: Any) -> csr_matrix:
             hint="Symmetric reduction would give wrong frequencies; symmetrise it first.",
         )
     return A
-
-
-def _factor(K_ii: csr_matrix, n_held: int) -> SymmetricLU:
-    advice = f"K_ii is singular: the {n_held} boundary dofs leave a rigid motion free."
-    cure = "Fix at least three nodes that do not lie on one line, or use a free-interface basis."
-    try:
-        lu = SymmetricLU(K_ii)
-    except RuntimeError as error:
-        raise InterfaceError(advice, hint=cure) from error
-    pivots = np.abs(lu.pivots)
-    ratio = pivots.min() / pivots.max()
-    if ratio < PIVOT_RTOL:
-        digits = (
-            " Stiffnesses that differ by more than thirteen digits leave none of the small ones."
-        )
-        raise InterfaceError(f"{advice[:-1]} (pivot ratio {ratio:.1e}).", hint=cure + digits)
-    if not lu.definite and lu.on_diagonal:
-        meaning = "with the boundary held, deformation would give energy"
-        raise indefinite("K", lu.negative_pivots(), meaning)
-    return lu
-
-
-def _shifted(K_ii: csr_matrix, M_ii: csr_matrix, shift: float) -> SymmetricLU:
-    try:
-        return SymmetricLU(K_ii - shift * M_ii, pivoting=True)
-    except RuntimeError as error:
-        raise SolverError(f"K - {shift:.6g} M is singular: the shift is an eigenvalue.") from error
 
 
 def _refuse_massless(M: csr_matrix) -> None:

@@ -13,10 +13,11 @@ from scipy.linalg import LinAlgError, eigh, eigvalsh
 
 from rom.eigen.condensed import Supported
 from rom.eigen.gaussian import gaussian_block
+from rom.eigen.held import RIGID_RTOL, HeldBody
 from rom.eigen.lanczos import BLOCK_SIZE, EIGENVALUE_RTOLS, BlockLanczos, capacity
 from rom.eigen.verbs import Operators, count_shift, every_row, orthonormal, own_rows
 from rom.errors import ConfigError, ModelError, ModesMissedError, QualityGateError, SolverError
-from rom.model import Array, Index
+from rom.model import Array
 from rom.process.stopwatch import SEARCH_PIECE, piece
 
 N_SPARE_MODES = 3  # beyond the ones asked for, so that a gap for counting is found
@@ -24,7 +25,6 @@ MAX_DENSE_DOFS = 300  # all eigenvalues are computed at once up to here
 MAX_SEARCHES = 12  # for what a count misses; a cluster seen in part doubles what is sought
 MAX_LAST_DOFS = 2000  # the same where a search does not come to an end: some seconds
 SHIFT_RATIO = 0.02  # of the first elastic eigenvalue, below zero: K - sigma M is positive definite
-RIGID_RTOL = 1e-13  # energy of a motion over that of its dofs alone, below which it has none
 CANCELLING_RTOL = 1e-10  # the same, below which products with K have lost too many digits
 CLUSTER_RTOL = 1e-7  # distance of eigenvalues whose modes are only defined as a plane
 ESTIMATE_SHIFT = 1e-6  # of the largest eigenvalue, below zero, with which the first is estimated
@@ -32,46 +32,6 @@ ESTIMATE_STEPS = 4  # of inverse iteration, on eight columns
 ALL_LOOSE_RATIO = 1e5  # estimate over round-off where all columns have found motions at rest
 NO_INERTIA = "some motion would have no inertia"
 Seek = Callable[[int, Array], tuple[Array, Array, bool]]
-
-
-class HeldBody:
-    """A body with some dofs held, its stiffness factored for many answers; call it to solve.
-
-    Attributes:
-        held: the dofs held, global numbers.
-        mine: rows of this rank that are free.
-        n_free: number of free dofs.
-        inner: operators on them, None when there are none.
-        factor: of their stiffness, or of K - shift M; None while nobody needs it.
-    """
-
-    make: Callable[[], None]
-
-    def __init__(self, ops: Any, held: Index, shift: float = 0.0):
-        self.ops, self.held, self.shift = ops, held, shift
-        self.mine = np.flatnonzero(~np.isin(np.arange(ops.first, ops.first + ops.n_local), held))
-        self.n_free = ops.n - held.size
-        self.inner: Any = ops.part(self.mine) if self.n_free else None
-        self.factor: Any = None
-
-    def __call__(self, F: Array) -> Array:
-        """Solve K_ii X_i = F_i; rows of held dofs come back zero."""
-        X = np.zeros(F.shape)
-        if self.inner is not None:
-            X[self.mine] = self.made().solve(F[self.mine])
-        return X
-
-    def made(self) -> Any:
-        """The factor, made again if its memory was given back."""
-        if self.factor is None:
-            self.make()
-        return self.factor
-
-    def release(self) -> None:
-        """Give the memory of the factor back; it is made again if it is needed."""
-        if self.factor is not None:
-            self.factor.release()
-        self.factor = None
 
 
 class ModeSearch:

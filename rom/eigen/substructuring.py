@@ -16,9 +16,9 @@ from scipy.sparse import csr_matrix, issparse
 from rom.arguments import positive
 from rom.eigen.fronts import SubstructuredBody, refuse_beyond
 from rom.eigen.gaussian import gaussian_block
+from rom.eigen.held import RIGID_RTOL
 from rom.eigen.lanczos import BlockLanczos, capacity
 from rom.eigen.scipy import SciPyOperators, dof_set
-from rom.eigen.search import RIGID_RTOL
 from rom.eigen.verbs import canonical_signs, orthonormal
 from rom.errors import ConfigError, ModelError, ModesMissedError, ParallelError, SolverError
 from rom.model import Array, Modes

@@ -187,16 +187,36 @@ def test_a_hinge_is_not_a_support(make, model):
         make(model).hold(dofs)
 
 
-def test_two_separate_bodies_are_a_mechanism(make, model):
+def side_by_side(model):
+    """The body twice, the second five metres along y."""
     from scipy.sparse import block_diag
 
-    two = rom.FEModel(
+    return rom.FEModel(
         block_diag([model.K, model.K], "csr"),
         block_diag([model.M, model.M], "csr"),
         np.vstack([model.points, model.points + np.array([0.0, 5.0, 0.0])]),
     )
+
+
+def test_the_part_that_is_loose_is_named_by_its_place(make, model):
+    n = len(model.points)
+    with pytest.raises(InterfaceError, match=f"{n} of {2 * n} nodes move") as raised:
+        make(side_by_side(model)).hold(model.interfaces["root"].dofs)
+    place = raised.value.message.split("moves most at (")[1].split(")")[0]
+    assert float(place.split(",")[1]) >= 5.0
+
+
+def test_without_points_the_dof_is_named():
+    """A chain of three masses, held in its middle, and a fourth mass that nothing holds."""
+    K = np.diag([1.0, 2.0, 1.0, 0.0])
+    K[0, 1] = K[1, 0] = K[1, 2] = K[2, 1] = -1.0
+    with pytest.raises(InterfaceError, match=r"rigid motion free\. Dof 3 moves most\."):
+        SciPyOperators(K, np.eye(4)).hold([1])
+
+
+def test_two_separate_bodies_are_a_mechanism(make, model):
     with pytest.raises(ModelError, match="more motions without stiffness than the six"):
-        make(two).modes((), 9)
+        make(side_by_side(model)).modes((), 9)
 
 
 def test_messages_for_too_many_modes_and_broken_numbers(make, model):

@@ -72,7 +72,7 @@ ORDER = {
         ),
         "fe": "costs parallel jit compat operators forms mesh elasticity probe",
         "fe.operators": (
-            "solver memory disk aij foreseen factor corrected substructures place held spectrum "
+            "solver memory disk aij foreseen factor corrected substructures held spectrum "
             "iterative counting krylov_schur workers petsc"
         ),
         "fe.mesh": (

@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.sparse import csr_matrix
 
+from rom.eigen.place import moves_most
 from rom.eigen.scipy import dof_set
 from rom.eigen.search import N_SPARE_MODES, ModeSearch
 from rom.eigen.verbs import Weighted
@@ -31,7 +32,6 @@ from rom.fe.operators.iterative.multigrid import multigrid
 from rom.fe.operators.iterative.search import lowest_modes
 from rom.fe.operators.krylov_schur import krylov_schur
 from rom.fe.operators.memory import give_back
-from rom.fe.operators.place import moves_most
 from rom.fe.operators.solver import DIRECT_SOLVER, Solver
 from rom.fe.operators.spectrum import first_elastic, fixed_vector, signed
 from rom.fe.operators.substructures.shared import substructured
@@ -287,9 +287,13 @@ class PETScOperators(ModeSearch):
         """Columns with their largest entry, over all ranks, positive."""
         return signed(self, Phi)
 
-    def where(self, Phi: Array) -> str:
+    def where(self, Phi: Array, rows: Index | None = None) -> str:
         """Words for the place that moves most."""
-        return moves_most(self, Phi)
+        return moves_most(self, Phi, rows) if self.geometric else ""
+
+    def from_all(self, mine: Any) -> list[Any]:
+        """What each rank has."""
+        return self.comm.allgather(mine)
 
     @cached_property
     def stiffness_diagonal(self) -> Array:

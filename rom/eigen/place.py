@@ -14,22 +14,18 @@ MOVING_RATIO = 1e-3  # of the largest motion: less is that of a part at rest
 def moves_most(ops: Any, X: Array, rows: Index | None = None) -> str:
     """Words for the node that moves most in the columns X, and for the part that moves with it.
 
-    Empty where nodes are not known.
-
     Args:
-        ops: `PETScOperators`, whose rigid motions tell where their nodes are.
+        ops: operators whose rigid motions tell where their nodes are.
         X: (n_local, k) motions on the rows of this rank.
         rows: (n_local,) which rows of ``ops`` these are; all if not given.
     """
-    if not ops.geometric:
-        return ""
     node = (np.arange(X.shape[0]) if rows is None else rows) // 3
     square = np.square(np.where(np.isfinite(X), X, 0.0)).max(axis=1, initial=0.0)
     size = np.sqrt(np.bincount(node, square, minlength=1))
     at = int(np.argmax(size))
     largest = float(size[at])
     point = _point(ops.rigid, 3 * at) if largest > 0.0 else None
-    largest, found = max(ops.comm.allgather((largest, point)), key=lambda pair: pair[0])
+    largest, found = max(ops.from_all((largest, point)), key=lambda pair: pair[0])
     if found is None:
         return ""
     loose = np.flatnonzero(size > MOVING_RATIO * largest)
@@ -40,7 +36,7 @@ def _part(ops: Any, loose: Index) -> str:
     """Words for some nodes of this rank and those of the others: how many, and where."""
     points = [_point(ops.rigid, 3 * int(node)) for node in loose]
     there = np.array([point for point in points if point is not None]).reshape(-1, 3)
-    there = np.vstack(ops.comm.allgather(there))
+    there = np.vstack(ops.from_all(there))
     share = f"{len(there)} of {ops.n // 3} nodes move"
     return f"and {share}, between {_words(there.min(axis=0))} and {_words(there.max(axis=0))}"
 
