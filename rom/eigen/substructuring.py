@@ -232,11 +232,12 @@ class _Search:
         )
 
     def _refuse_loose(self, lam: Array, largest: float) -> None:
-        n_loose = int(np.count_nonzero(lam < RIGID_RTOL * largest))
-        if n_loose:
+        loose = np.flatnonzero(lam < RIGID_RTOL * largest)
+        if loose.size:
             raise ModelError(
-                f"{n_loose} motions without stiffness"
-                + (" more than the six of a connected body." if self.R.size else "."),
+                f"{loose.size} motions without stiffness"
+                + (" more than the six of a connected body." if self.R.size else ".")
+                + self.ops.where(self.X[:, loose]),
                 hint="Hold the body, or give the rigid motions of a free one; parts of the mesh "
                 "may not be connected, or joined at a point or an edge only.",
             )
