@@ -45,7 +45,6 @@ def spin_up(
             speed or number of states.
         ModelError: if the solid passes an instability on its way; the message says where, and
             ``error.solution`` holds the states below.
-        ParallelError: for heat on several processes.
 
     Source:
         St. Venant-Kirchhoff solid with forces that follow, Newton's method along the speed:

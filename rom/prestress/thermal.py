@@ -20,11 +20,11 @@ from scipy.sparse import block_diag, csr_matrix, identity
 from rom.arguments import typed
 from rom.cyclic.modes import real_form
 from rom.cyclic.rotation import axial_pins, largest_ratio
-from rom.cyclic.sector import CyclicSector, workers_of
+from rom.cyclic.sector import CyclicSector, all_rows, workers_of
 from rom.eigen.supports import Fixed, held_dofs
 from rom.eigen.verbs import dofs_of, rigid_motions
 from rom.eigen.workers import Workers, held_solution
-from rom.errors import ConfigError, ModelError, ParallelError
+from rom.errors import ConfigError, ModelError
 from rom.model import Array, FEModel, Index
 from rom.prestress.heat import Heat
 
@@ -40,7 +40,7 @@ def heated(model: FEModel, heat: Heat, *, fixed: Fixed = ()) -> FEModel:
     supports may move as it likes.
 
     Args:
-        model: finite elements, on one process.
+        model: finite elements.
         heat: expansion and temperature.
         fixed: names of the interfaces that are held while it is heated; none for a free body.
 
@@ -48,7 +48,6 @@ def heated(model: FEModel, heat: Heat, *, fixed: Fixed = ()) -> FEModel:
         ConfigError: if the model has no finite elements, or a region is unknown.
         InterfaceError: if an interface is unknown, or the supports leave a rigid motion.
         ModelError: if the solid buckles below this temperature; the message says where.
-        ParallelError: on several processes.
 
     Source:
         Initial stress by temperature and its geometric stiffness: Cook, Malkus, Plesha and
@@ -59,9 +58,8 @@ def heated(model: FEModel, heat: Heat, *, fixed: Fixed = ()) -> FEModel:
     _refuse_buckled([_loose(held, K, K_geo)], heat, workers_of(model))
     if fixed:
         K_geo = csr_matrix(K_geo + _carried_along(K_geo, held, rigid_motions(model.points)))
-    operators = model.operators
-    if operators is not None:
-        operators = operators.varied((1.0, [(1.0, solid.layout(K_geo))]), (1.0, []))
+    operators = model.operators.varied((1.0, [(1.0, solid.layout(K_geo))]), (1.0, []))
+    K_hot = csr_matrix(model.K + K_geo) if hasattr(model.K, "tocsr") else operators.K
     given = heat.temperature
     plain = isinstance(given, Mapping) or np.isscalar(given)
     note = {
@@ -69,7 +67,6 @@ def heated(model: FEModel, heat: Heat, *, fixed: Fixed = ()) -> FEModel:
         "temperature change [K]": repr(given) if plain else "a field",
         "held while heated": list(fixed),
     }
-    K_hot = csr_matrix(model.K + K_geo)
     return replace(model, K=K_hot, operators=operators, provenance=model.provenance | note)
 
 
@@ -105,7 +102,7 @@ def thermal_buckling(model: FEModel, heat: Heat, *, fixed: Fixed = ()) -> float:
     strains beyond Hooke's law would make it singular, it never buckles.
 
     Args:
-        model: finite elements, on one process.
+        model: finite elements.
         heat: expansion and temperature.
         fixed: names of the interfaces that are held.
 
@@ -126,15 +123,12 @@ def finite_solid(model: FEModel, heat: Heat | None = None) -> Any:
 
     Raises:
         ConfigError: if the model has no finite elements.
-        ParallelError: for heat on several processes.
     """
     if model.stresses is None:
         raise ConfigError(
             "the model has no finite elements, from which alone its stress follows.",
             hint="Make it with rom.fe.model.",
         )
-    if heat is not None and model.operators.comm.size > 1:
-        raise ParallelError("heat of a solid is computed on one process.")
     solid = model.stresses.finite_strain()
     if heat is not None:
         solid.heat(*heat.on(model))
@@ -158,9 +152,8 @@ def _stressed(
     """The solid, its stiffness, that of its thermal stress, and the dofs held."""
     solid = finite_solid(model, heat)
     held = held_dofs(model.interfaces, fixed) if fixed else _six_dofs(model.points)
-    K, K_geo = _thermal(
-        solid, identity(model.n_dofs, format="csr"), held, model.M, workers_of(model)
-    )
+    M = all_rows(model, model.M)
+    K, K_geo = _thermal(solid, identity(model.n_dofs, format="csr"), held, M, workers_of(model))
     return solid, K, K_geo, held
 
 

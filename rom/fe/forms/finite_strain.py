@@ -28,7 +28,7 @@ from rom.fe.compat import (
 from rom.fe.forms.material import geometric_stiffness, stress
 from rom.fe.forms.nodes import gathered as gathered_rows
 from rom.fe.jit import compiling
-from rom.fe.operators.aij import gathered, symmetric, wrapped
+from rom.fe.operators.aij import aij, gathered, symmetric, wrapped
 from rom.model import Array
 
 
@@ -81,7 +81,7 @@ class FiniteStrain:
             for name, tag in self.names.items():
                 values[self.tags == tag] = table[name]
             function.x.array[:] = per_cell(self.mesh, values).x.array
-        self.at_nodes.x.array[::3] = nodes
+        self._give(self.at_nodes, np.repeat(nodes, 3))
 
     def force(self, u: Array) -> Array:
         """(n,) forces that hold the solid at a displacement (n,) [N]."""
@@ -100,13 +100,26 @@ class FiniteStrain:
 
     def layout(self, A: csr_matrix) -> Any:
         """The same matrix for the operators of the model."""
-        return wrapped(A)
+        if self.mesh.comm.size == 1:
+            return wrapped(A)
+        rows, n = slice(*self._own), A.shape[0]
+        own = rows.stop - rows.start
+        return aij(A[rows], ((own, n), (own, n)), self.mesh.comm, 3)
+
+    @property
+    def _own(self) -> tuple[int, int]:
+        """First dof of this rank, and the first of the next."""
+        first, end = self.V.dofmap.index_map.local_range
+        return 3 * first, 3 * end
 
     def _set(self, u: Array) -> None:
-        rows = self.V.dofmap.index_map
-        first, end = 3 * np.array(rows.local_range)
-        self.u.x.array[: end - first] = u[first:end]
-        self.u.x.scatter_forward()
+        self._give(self.u, u)
+
+    def _give(self, function: Any, u: Array) -> None:
+        """Let a function of the displacement's space have the values (n,) of the whole solid."""
+        first, end = self._own
+        function.x.array[: end - first] = u[first:end]
+        function.x.scatter_forward()
 
     def _matrix(self, form: Any) -> csr_matrix:
         A = assemble_matrix(form)

@@ -31,6 +31,8 @@ def wheel():
     small, N = rom.reduce_sector(plain, n_modes=8), plain.n_sectors
     steady = rom.spin_up(plain, model, speed=2000.0, n_states=3)
     held = rom.held_solid(model, fixed=("bore",))
+    hot = rom.Heat(9e-6, lambda x: 400.0 * np.hypot(x[:, 0], x[:, 1]) ** 2 / 0.04)
+    warm = rom.spin_up(plain, model, speed=1000.0, n_states=2, heat=hot)
     x = np.sin(plain.points).ravel()
     found = {
         "at rest": rom.cyclic_modes(plain, 2, 5).omega,
@@ -46,6 +48,9 @@ def wheel():
         "certificate": [1.0 + row.value for row in small.certificate.rows],
         "steady": [x @ steady.displacements[:, -1]],
         "about it": steady.modes(3, speed=1500.0, diameter=2).omega,
+        "heated": rom.cyclic_modes(rom.heated_sector(plain, model, hot), 2, 3).omega,
+        "heated and held": _heated(model, hot),
+        "warm": [x @ warm.displacements[:, -1]],
         "solid": rom.cyclic_modes(held, 0, 3).omega,
         "blade": [x @ plain.regions["blade"] @ x],
         "stress": [x @ sector.centrifugal @ x],
@@ -61,6 +66,10 @@ def wheel():
     mine = []
     each_diameter(plain, mine.append)
     return {name: np.asarray(f).tolist() for name, f in found.items()}, errors, mine
+
+
+def _heated(model, hot):
+    return rom.modes(rom.heated(model, hot, fixed=("bore",)), 3, fixed=("bore",)).omega
 
 
 def _in_a_megabyte(model):
