@@ -246,15 +246,7 @@ def _reduced_body(  # noqa: PLR0913  those of `reduce`
     watch.begin("interfaces")
     bare, ops = mesh_operators(model), operators(model)
     interfaces, method = with_orders(ops, model, by_name(interfaces), method)
-    connection = connect(ops, model, interfaces)
-    say = log.info if ops.first == 0 else log.debug
-    say("reduce %d dofs to %d interface coordinates", ops.n, connection.boundary.size)
-    described = repr(method)
-    if isinstance(method, Characteristic):
-        connection = connect(ops, model, method.kinds(connection, interfaces))
-        method = method.method
-        say("full interfaces follow %d coordinates", connection.boundary.size)
-    chosen = _chosen(method, model, connection, reference)
+    connection, chosen = _connected(ops, model, interfaces, method, reference)
     with _on_interfaces(interfaces), stages(2, long=ops.n > MANY_DOFS) as begin:
         watch.begin("shapes")
         begin(f"shapes of {ops.n} dofs")
@@ -279,7 +271,7 @@ def _reduced_body(  # noqa: PLR0913  those of `reduce`
         name=name,
         stress=_left_out(model, ops, connection, basis) if stress and not nonlinear else None,
         stiffening=UnitLoads(model, bare, ops, connection) if stiffening else None,
-        provenance=model.provenance | {"reduction": _described(described, basis, ops.n)},
+        provenance=model.provenance | {"reduction": _described(method, basis, ops.n)},
     )
     if nonlinear is None:
         body, E = body.with_reference(reference), None
@@ -294,7 +286,7 @@ def _reduced_body(  # noqa: PLR0913  those of `reduce`
     if not certify:
         return body
     watch.begin("comparison")
-    say("compare the reduced body with the full model")
+    _say(ops, "compare the reduced body with the full model")
     certificate, comparison = certify_body(
         connection, ops, body, basis, elastic, everywhere=certify == "full"
     )
@@ -305,6 +297,24 @@ def _reduced_body(  # noqa: PLR0913  those of `reduce`
     return replace(
         body, certificate=certificate, provenance=body.provenance | {"comparison": comparison}
     )
+
+
+def _connected(
+    ops: Operators, model: FEModel, interfaces: dict[str, Any], method: Any, reference: Any
+) -> tuple[Connection, Any]:
+    """The model in interface coordinates, and the method that finds its shapes there."""
+    connection = connect(ops, model, interfaces)
+    _say(ops, "reduce %d dofs to %d interface coordinates", ops.n, connection.boundary.size)
+    if isinstance(method, Characteristic):
+        connection = connect(ops, model, method.kinds(connection, interfaces))
+        method = method.method
+        _say(ops, "full interfaces follow %d coordinates", connection.boundary.size)
+    return connection, _chosen(method, model, connection, reference)
+
+
+def _say(ops: Operators, message: str, *numbers: int) -> None:
+    """Progress, aloud on one process only."""
+    log.log(logging.INFO if ops.first == 0 else logging.DEBUG, message, *numbers)
 
 
 def _left_out(
@@ -391,10 +401,10 @@ def substructure(
     return with_certificate(body, connection) if certify else body
 
 
-def _described(method: str, basis: Any, n: int) -> dict[str, Any]:
+def _described(method: Any, basis: Any, n: int) -> dict[str, Any]:
     alone = all(re.fullmatch(r"(rigid|free) \d+", label) for label in basis.labels)
     return {
-        "method": method,
+        "method": repr(method),
         "full dofs": n,
         "columns": list(basis.labels),
         "static shapes": not alone,
