@@ -22,6 +22,7 @@ ASYMMETRY_RTOL = 1e-6
 MIN_JUDGED_ERROR = 1e-6  # frequency error above which the estimate is compared with it
 MAX_ERROR_RATIO = 2.0  # frequency error over its estimate
 ROUND_OFF = 1e-9  # Rayleigh quotient, of the largest one of a basis, that is none
+SHAPES_RATIO = 10.0  # round-off of the energy of shapes over that of rigid motions, at most
 CLUSTER_RTOL = 1e-3  # relative distance of modes that are compared as one subspace
 
 
@@ -96,10 +97,11 @@ def certify_body(
 def _round_off(rigid_energy: Any, body: FlexibleBody, full: list[float]) -> float:
     """By which frequencies may differ where rigid motions have energy, over that of the first mode.
 
-    A slender body that is held bends with far less energy than when it is free.
+    That energy is round-off, of which shapes have more. A slender body that is held bends with far
+    less energy than when it is free.
     """
     softer = (body.omega[0] / (2 * np.pi * min(full))) ** 2
-    return max(BELOW_FULL_RTOL, float(0.5 * rigid_energy * softer))
+    return max(BELOW_FULL_RTOL, float(SHAPES_RATIO * rigid_energy * softer))
 
 
 def compared(
