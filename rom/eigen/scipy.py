@@ -11,7 +11,7 @@ from scipy.sparse import csc_matrix, csr_matrix
 from scipy.sparse.linalg import splu
 
 from rom.arguments import matrix
-from rom.eigen.held import HeldBody
+from rom.eigen.held import RIGID_RTOL, HeldBody
 from rom.eigen.place import moves_most
 from rom.eigen.search import (
     ESTIMATE_SHIFT,
@@ -87,8 +87,9 @@ class HeldSciPy(HeldBody):
         if self.n_free:
             self.make()
             if not shift:
+                self._refuse_negative(RIGID_RTOL)
                 self.refuse_free_motion()
-                self._refuse_negative()
+                self._refuse_negative(0.0)  # now that none is round-off
 
     def make(self) -> None:
         """Factor the stiffness, or K - shift M."""
@@ -100,8 +101,12 @@ class HeldSciPy(HeldBody):
         except RuntimeError:
             self.factor = NO_FACTOR
 
-    def _refuse_negative(self) -> None:
-        if not self.factor.definite and self.factor.on_diagonal:
+    def _refuse_negative(self, tolerance: float) -> None:
+        """Refuse pivots below zero by more than a part of the largest."""
+        if not (self.factor.ok and self.factor.on_diagonal):
+            return
+        pivots = self.factor.pivots
+        if pivots.min() < -tolerance * pivots.max():
             meaning = "with the boundary held, deformation would give energy"
             raise indefinite("K", self.factor.negative_pivots(), meaning)
 
