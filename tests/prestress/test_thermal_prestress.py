@@ -13,6 +13,7 @@ from scipy.sparse.linalg import eigsh
 import rom
 from cases.wheels import bladed_model
 from rom.eigen.verbs import rigid_motions
+from rom.eigen.workers import ONE_PROCESS
 from rom.errors import ConfigError, InterfaceError, ModelError
 from rom.prestress.thermal import _stressed, _thermal, finite_solid
 
@@ -64,7 +65,7 @@ def test_a_pinned_bar_softens_as_the_beam_does(bar, share):
     on_axis = ends[np.abs(x[ends, 2]) < 1e-9]
     guided = np.r_[3 * ends, 3 * on_axis[:3] + 2, 3 * on_axis[0] + 1]
     solid = finite_solid(bar, heat(share * EULER))
-    K, K_geo = _thermal(solid, identity(bar.n_dofs, format="csr"), np.unique(guided), bar.M)
+    K, K_geo = _thermal(solid, identity(bar.n_dofs, format="csr"), np.unique(guided), bar.M, ONE_PROCESS)
     held = np.concatenate([3 * on_axis, 3 * ends + 1, 3 * ends + 2])  # ends turn about y
     loose = np.setdiff1d(np.arange(bar.n_dofs), held)
     lowest = [
