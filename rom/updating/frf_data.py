@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.special import erfcx
-from scipy.stats import f as f_ratio
+from scipy.special import digamma, erfcx, polygamma
+from scipy.stats import norm
 
 from rom.arguments import finite
 from rom.errors import ConfigError
@@ -30,7 +30,6 @@ FORCE_DEVIATIONS = 4.0  # by which that of a sensor may exceed it by chance
 POWERS = {"H1": 0.0, "Hv": 0.5, "H2": 1.0}  # of one over the coherence, by which they exceed H1
 POOL_STEPS = 4  # until the lines that are alike are those about their mean
 POOL_RISK = 5e-4  # that one of all lines that are alike is too far above the others, or below
-SPREAD_DEVIATIONS = 3.0  # of what chance makes of the spread of lines, beyond which they differ
 COHERENCE_ATOL = 1e-6  # distance of the coherence from 0 and 1, which no measurement reaches
 
 
@@ -218,7 +217,7 @@ class Noise:
         Powers of random forces vary too: one over them has the mean n / (n - 1) of n averages. Of
         circular errors with the variance s^2 in each part the logarithm has s^2 (1 + s^2 + ...).
         Weights are one over variances without bias: of an estimated one by the factor
-        (n - 2) / (n - 1), of what is left of it when a common part is taken off by `inverse`.
+        (n - 2) / (n - 1), of what is left of it when a common part is taken off by `pooled`.
         """
         error, n = self.relative_error, self.averages
         freedom = 2 * max(n - 1, 1)
@@ -232,74 +231,87 @@ class Noise:
             own = np.maximum(own, MIN_OWN_SHARE * total)
         if self.estimated and common.any():
             over, shared = np.where(common > 0, common, np.inf), common > 0
-            share, spread, alike = pooled(total / over - shared, self.used & shared, n)
-            weight = inverse(share, spread)
-            own = np.where(shared, common / weight, own)
-            varied = np.where(shared, spread * weight**2, varied)
+            share, spread, alike = pooled(total / over, self.used & shared, n)
+            own = np.where(shared, common * share, own)
+            varied = np.where(shared, spread / share**2, varied)
             counted = self.used & shared
-            scale = float((alike * weight**2)[counted].sum() / max(counted.sum(), 1))
+            scale = float((alike / share**2)[counted].sum() / max(counted.sum(), 1))
         own = np.sqrt(np.where(self.used, own * (1 + error**2), np.inf))
         known = max(n - 3, 0.5) / (n - 1) if self.estimated else 1.0
         return Errors(own, np.sqrt(common), np.sqrt(varied), known, scale)
 
 
-def pooled(ratio: Array, used: Mask, n_averages: int) -> tuple[Array, Array, Array]:
-    """Noise of sensors over that of a force, better known where it is much alike at many lines.
+def pooled(total: Array, used: Mask, n_averages: int) -> tuple[Array, Array, Array]:
+    """Noise of sensors over that of a force, better known where lines of a sensor are alike.
 
-    One more than the ratio, over its mean, is (n - 1) / n of an F of 2 n - 2 and 2 n degrees of
-    freedom for n averages of random forces, as powers of what is incoherent and of the force both
-    vary: one line tells nearly nothing where the noise of the force is the larger one. Lines of a
-    sensor that are as far from their mean as chance takes one line in a thousand tests at most are
-    drawn towards it, by as much as they vary no more than chance lets them.
+    The power of all that is incoherent, over what the noise of the force is in the mean, is
+    (1 + x) p e, with x the ratio asked for, and p and e powers of random forces and errors of n
+    averages. Of lines of a sensor, ln (1 + x) is taken for normal, with their mean and as much
+    spread as p and e do not explain, and so are the logarithms of p and e; lines far out in that
+    distribution are left to themselves. The noise of the sensor is x p of that line.
 
     Args:
-        ratio: (n_f, n_s, n_e) estimated powers, also negative ones [1].
+        total: (n_f, n_s, n_e) estimated powers (1 + x) p e [1].
         used: (n_f, n_s, n_e) which count.
         n_averages: number of them.
 
     Returns:
-        (n_f, n_s, n_e) ratios, their variances, and what lines have of these in common [1].
+        (n_f, n_s, n_e) means of x p by what is measured, their variances, and what lines have of
+        these in common [1].
 
     Source:
         Efron and Morris, Stein's estimation rule and its competitors: an empirical Bayes approach,
-        J. Am. Stat. Assoc. 68 (1973) 117.
+        J. Am. Stat. Assoc. 68 (1973) 117, for the spread; logarithms of chi-square as normal by
+        digamma and trigamma functions.
     """
     n = max(n_averages, 3)
-    count = np.maximum(used.sum(axis=0), 1)
-    law = f_ratio(2 * n - 2, 2 * n)
-    low, high = (law.ppf(p) * (n - 1) / n for p in (POOL_RISK / count, 1 - POOL_RISK / count))
+    P, E = float(polygamma(1, n)), float(polygamma(1, n - 1))  # variances of ln p and ln e
+    mean_p, mean_e = np.log(n - 1) - digamma(n), digamma(n - 1) - np.log(n - 1)
+    level = np.log(np.maximum(total, np.finfo(float).tiny)) - mean_p - mean_e
+    mean, spread, alike = _normal_part(level, used, P + E)
+    T = np.maximum(spread - P - E, 0.0)  # of ln (1 + x)
+    V, count = T + P + E, np.maximum(alike.sum(axis=0), 1)
+    kept, kept_p = np.where(alike, (T + P) / V, 1.0), np.where(alike, P / V, 0.0)
+    beyond = level - mean
+    both = mean_p + np.where(alike, np.maximum(mean, 0.0) + kept * beyond, level)
+    force = mean_p + kept_p * beyond
+    var_both, var_force = np.where(alike, (T + P) * (1 - kept), E), P * (1 - kept_p)
+    a, b = np.exp(both + var_both / 2), np.exp(force + var_force / 2)
+    cov = P * (1 - kept)
+    variance = a**2 * np.expm1(var_both) - 2 * a * b * np.expm1(cov) + b**2 * np.expm1(var_force)
+    shared = np.where(alike, ((1 - kept) * a + kept_p * b) ** 2 * V / count, 0.0)
+    return positive_mean(a - b, variance + shared), variance + shared, shared
+
+
+def _normal_part(level: Array, used: Mask, least: float) -> tuple[Array, Array, Mask]:
+    """Mean and variance (1, n_s, n_e) of lines (n_f, n_s, n_e) without those that lie far out.
+
+    Args:
+        level: of each line [1].
+        used: which count.
+        least: variance that chance alone makes [1].
+    """
+    risk = norm.isf(POOL_RISK / np.maximum(used.sum(axis=0, keepdims=True), 1))
     with np.errstate(invalid="ignore"), warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # of a sensor without lines
-        mean = np.nan_to_num(np.nanmedian(np.where(used, ratio, np.nan), axis=0))
+        known = np.where(used, level, np.nan)
+        mean = np.nan_to_num(np.nanmedian(known, axis=0, keepdims=True))
+        off = np.nan_to_num(np.nanmedian(np.abs(known - mean), axis=0, keepdims=True))
+    spread = np.maximum(least, (off / norm.ppf(0.75)) ** 2)
     for _ in range(POOL_STEPS):
-        most = 1 + np.maximum(mean, 0.0)
-        alike = used & (1 + ratio >= low * most) & (1 + ratio <= high * most)
-        count = np.maximum(alike.sum(axis=0), 1)
-        mean = np.where(alike, ratio, 0.0).sum(axis=0) / count
-    chance = 2 * (1 + np.maximum(mean, 0.0)) ** 2 / (n - 2)
-    freedom = np.maximum(count - 1, 1)
-    spread = np.where(alike, (ratio - mean) ** 2, 0.0).sum(axis=0) / freedom
-    least = chance * (1 + SPREAD_DEVIATIONS * np.sqrt(2 / freedom))
-    kept = np.where(spread > least, 1 - chance / np.maximum(spread, least), 0.0)
-    kept = np.where(count > 1, kept, 1.0)
-    found = np.where(alike, mean + kept * (ratio - mean), ratio)
-    shared = np.where(alike, (1 - kept) ** 2 * chance / count, 0.0)
-    alone = (1 + np.maximum(ratio, 0.0)) ** 2 / (n - 2) + 1 / n
-    return found, np.where(alike, kept * chance + shared, alone), shared
+        alike = used & ((level - mean) ** 2 <= risk**2 * spread)
+        count = np.maximum(alike.sum(axis=0, keepdims=True), 1)
+        mean = np.where(alike, level, 0.0).sum(axis=0, keepdims=True) / count
+        square = np.where(alike, (level - mean) ** 2, 0.0).sum(axis=0, keepdims=True)
+        spread = np.maximum(least, square / np.maximum(count - 1, 1))
+    return mean, spread, alike
 
 
-def inverse(x: Array, variance: Array) -> Array:
-    """(...) 1 / x without bias by the normal errors of x (...) > 0: Mills' ratio over a deviation.
-
-    1 / x has the bias variance / x^3 + ..., whose series does not end. Values below zero, of which
-    Mills' ratio makes anything, count as zero.
-
-    Source:
-        Voinov, Unbiased estimation of powers of the inverse of mean and related problems, Sankhya B
-        47 (1985) 354: the mean of (1 - Phi(x)) / phi(x) is one over that of x.
-    """
-    s = np.sqrt(2 * variance)
-    return np.asarray(np.sqrt(np.pi) * erfcx(np.maximum(x, 0.0) / s) / s)
+def positive_mean(mean: Array, variance: Array) -> Array:
+    """(...) mean of what is normal and known to be positive: that of the truncated distribution."""
+    s = np.sqrt(variance)
+    hazard = np.sqrt(2 / np.pi) / erfcx(-mean / np.maximum(s, 1e-300) / np.sqrt(2))
+    return np.where(s > 0, mean + s * hazard, mean)
 
 
 def weights(coherence: npt.ArrayLike, n_averages: int) -> Array:

@@ -65,7 +65,9 @@ def test_a_pinned_bar_softens_as_the_beam_does(bar, share):
     on_axis = ends[np.abs(x[ends, 2]) < 1e-9]
     guided = np.r_[3 * ends, 3 * on_axis[:3] + 2, 3 * on_axis[0] + 1]
     solid = finite_solid(bar, heat(share * EULER))
-    K, K_geo = _thermal(solid, identity(bar.n_dofs, format="csr"), np.unique(guided), bar.M, ONE_PROCESS)
+    K, K_geo = _thermal(
+        solid, identity(bar.n_dofs, format="csr"), np.unique(guided), bar.M, ONE_PROCESS
+    )
     held = np.concatenate([3 * on_axis, 3 * ends + 1, 3 * ends + 2])  # ends turn about y
     loose = np.setdiff1d(np.arange(bar.n_dofs), held)
     lowest = [

@@ -6,8 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from scipy.integrate import quad
-from scipy.stats import binom, chi2, kstest, norm
+from scipy.stats import binom, chi2, kstest, norm, truncnorm
 
 import rom
 from cases.solid import STEEL, composite
@@ -15,7 +14,7 @@ from rom.errors import ConfigError
 from rom.updating import Channels, Responses
 from rom.updating.estimate import DAMPING_LOG_DEVIATION
 from rom.updating.family_model import family_model
-from rom.updating.frf_data import estimators, inverse, pooled
+from rom.updating.frf_data import estimators, pooled, positive_mean
 from rom.updating.normal_equations import Data, responses_at, sums, unsure, white
 
 PARAMETERS = {
@@ -253,11 +252,11 @@ def test_what_estimated_weights_cost_is_that_of_dense_matrices():
     assert_allclose(A.conj().T @ A, J[used].conj().T @ Q @ J[used], rtol=1e-10)
 
 
-def test_one_over_what_is_left_of_a_variance_has_no_bias():
-    """Of normal errors by quadrature; one over the value itself is too large by a ninth."""
-    for mean in (3.0, 8.0):
-        found, _ = quad(lambda x, m=mean: norm.pdf(x - m) * inverse(x, 1.0), mean - 8, mean + 8)
-        assert_allclose(found, 1 / mean, rtol=4e-3)
+def test_what_is_positive_has_the_mean_of_the_truncated_distribution():
+    mean, s = np.array([-3.0, 0.0, 0.2, 4.0]), np.array([0.5, 1.0, 2.0, 0.1])
+    found = positive_mean(mean, s**2)
+    assert_allclose(found, truncnorm.mean(-mean / s, np.inf, loc=mean, scale=s), rtol=1e-9)
+    assert positive_mean(np.array(2.0), np.array(0.0)) == 2.0
 
 
 def test_noise_of_a_force_leaves_chi_square_where_it_is():
@@ -275,21 +274,38 @@ def test_noise_of_a_force_leaves_chi_square_where_it_is():
     assert_allclose(np.mean(np.abs(left) ** 2) / 2, 1.0, atol=0.02)
 
 
+def incoherent(x, n, rng):
+    """Power of all that is incoherent over that of the force's noise, and of the sensor's own."""
+    p = (n - 1) / rng.gamma(n, size=(len(x), 1, 1))
+    return (1 + x) * p * rng.gamma(n - 1, size=x.shape) / (n - 1), x * p
+
+
+@pytest.mark.parametrize("n", [12, 20, 100])
+@pytest.mark.parametrize("spread", [0.0, 0.3, 1.0])
+@pytest.mark.parametrize("level", [0.3, 2.0, 30.0])
+def test_sensors_know_their_noise_without_bias(level, spread, n):
+    """Lines alike and lines that differ by a factor: own noise over what is found of it is one."""
+    rng, ratios = np.random.default_rng([n, int(10 * spread), int(10 * level)]), []
+    for _ in range(40):
+        x = level * np.exp(spread * rng.standard_normal((100, 3, 1)))
+        total, own = incoherent(x, n, rng)
+        found, variance, shared = pooled(total, np.ones(x.shape, bool), n)
+        assert (shared <= variance).all() and (found > 0).all()
+        ratios.append((own / found).mean())
+    assert_allclose(np.mean(ratios), 1.0, atol=0.2 if level < 1 else 0.02)  # a fifth of it all
+
+
 def test_sensors_share_what_their_lines_tell_of_their_noise():
-    """Twenty lines that are alike but for chance take their mean; others stay what they are."""
+    """Twenty lines that are alike but for chance know it well; others stay what they are."""
     rng, n = np.random.default_rng(0), 100
-    alike = 0.1 + 1.1 * rng.standard_normal((20, 3, 1)) / np.sqrt(n - 2)
-    ratio = np.vstack([alike, np.full((4, 3, 1), 50.0)])
-    used = np.ones(ratio.shape, bool)
-    found, variance, shared = pooled(ratio, used, n)
-    assert_allclose(found[20:], 50.0)
-    assert np.abs(found[:20] - 0.1).max() < np.abs(alike - 0.1).max() / 2
-    assert_allclose(found[:20].mean(axis=0), alike.mean(axis=0))
+    total, own = incoherent(np.full((20, 3, 1), 0.1), n, rng)
+    total = np.vstack([total, np.full((4, 3, 1), 50.0)])
+    used = np.ones(total.shape, bool)
+    found, variance, shared = pooled(total, used, n)
+    assert_allclose(found[20:], 50.0 * (n - 1) / (n - 2) - 1.0, rtol=1e-3)
+    assert np.abs(found[:20] - own).max() < np.abs(total[:20] - 1 - own).max() / 2
     assert (shared[20:] == 0).all() and (shared[:20] <= variance[:20]).all()
-    wide = 0.1 + np.linspace(0, 1.2, 20)[:, None, None]  # lines that differ by more than chance
-    kept = pooled(wide, used[:20, :1], n)[0]
-    assert np.ptp(kept) > 0.6
-    nothing = pooled(ratio, np.zeros(ratio.shape, bool), n)
+    nothing = pooled(total, np.zeros(total.shape, bool), n)
     assert all(np.isfinite(A).all() for A in nothing)
 
 

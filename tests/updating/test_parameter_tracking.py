@@ -95,10 +95,15 @@ def walked(t, rng, n_t):
 
 
 def stepped(t, p):
-    """The equations, transition and root of the noise of a step at logarithms p of factors."""
+    """The equations, transition and root of the noise of a step at logarithms p of factors.
+
+    The symmetric root of a matrix that is nearly singular is the same on any machine.
+    """
     at = t.operation.at(p)
     step, Q = discrete(at.A, t.assumed.white(t.operation), DT)
-    return at, step, np.linalg.cholesky(Q + 1e-13 * np.diag(np.diag(Q)))
+    scale = np.sqrt(np.diag(Q))
+    lam, V = np.linalg.eigh(Q / np.outer(scale, scale))
+    return at, step, scale[:, None] * (V * np.sqrt(np.maximum(lam, 0.0))) @ V.T
 
 
 def test_derivatives_are_those_of_differences(filter_):
@@ -219,7 +224,7 @@ def test_noise_wrong_by_a_tenth_leaves_the_band(filter_, noise, side):
 def test_a_joint_that_loosens_is_followed(family):
     """The spring at the tip loses half in a second; nobody told the filter when."""
     t = made(family, parameters={"clamp": Drift(0.02, 0.5)})
-    rng, n_t = np.random.default_rng(3), 2000
+    rng, n_t = np.random.default_rng(3), 3000
     true = np.log(0.5) * np.clip((np.arange(n_t) // 50 * 50 - 500) / 1000, 0, 1)
     x, y = np.zeros(len(t.assumed.before(t.operation))), []
     for k in range(n_t):
@@ -230,11 +235,11 @@ def test_a_joint_that_loosens_is_followed(family):
     y = np.array(y) + np.sqrt(t.R) * rng.standard_normal((n_t, 3))
     found = t.run(y, DT * np.arange(n_t))
     error = np.log(found.factors[:, 0]) - true
-    assert abs(found.factors[-1, 0] - 0.5) < 0.05
+    assert abs(error[-1]) < 3 * found.factor_deviations[-1, 0] < 0.5
     assert (np.abs(error) < 3 * found.factor_deviations[:, 0]).mean() > 0.98
     stays = t.held().run(y)  # a filter that does not follow is surprised
-    assert stays.surprise[1500:].sum() > chi2.ppf(1 - 1e-6, 3 * 500)
-    assert found.surprise[1500:].sum() < chi2.ppf(1 - 1e-6, 3 * 500)
+    assert stays.surprise[1500:].sum() > chi2.ppf(1 - 1e-6, 3 * 1500)
+    assert found.surprise[1500:].sum() < chi2.ppf(1 - 1e-6, 3 * 1500)
 
 
 def test_the_fmu_follows_as_python_does(family, tmp_path):
