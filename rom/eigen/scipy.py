@@ -89,7 +89,7 @@ class HeldSciPy(HeldBody):
             if not shift:
                 self._refuse_negative(RIGID_RTOL)
                 self.refuse_free_motion()
-                self._refuse_negative(0.0)  # now that none is round-off
+                self._refuse_negative(0.0)  # whatever their size, as no motion is free
 
     def make(self) -> None:
         """Factor the stiffness, or K - shift M."""
@@ -101,12 +101,12 @@ class HeldSciPy(HeldBody):
         except RuntimeError:
             self.factor = NO_FACTOR
 
-    def _refuse_negative(self, tolerance: float) -> None:
-        """Refuse pivots below zero by more than a part of the largest."""
+    def _refuse_negative(self, least: float) -> None:
+        """Refuse pivots below zero, where none is as small as round-off of the largest."""
         if not (self.factor.ok and self.factor.on_diagonal):
             return
         pivots = self.factor.pivots
-        if pivots.min() < -tolerance * pivots.max():
+        if pivots.min() < 0.0 and np.abs(pivots).min() >= least * np.abs(pivots).max():
             meaning = "with the boundary held, deformation would give energy"
             raise indefinite("K", self.factor.negative_pivots(), meaning)
 
