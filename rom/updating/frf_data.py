@@ -216,6 +216,8 @@ class Noise:
 
         Powers of random forces vary too: one over them has the mean n / (n - 1) of n averages. Of
         circular errors with the variance s^2 in each part the logarithm has s^2 (1 + s^2 + ...).
+        A weight that is one over the mean of what a variance may be costs nothing, see `pooled`; what
+        lines have in common, and lines of which nothing else is known, vary.
         Weights are one over variances without bias: of an estimated one by the factor
         (n - 2) / (n - 1), of what is left of it when a common part is taken off by `pooled`.
         """
@@ -233,7 +235,7 @@ class Noise:
             over, shared = np.where(common > 0, common, np.inf), common > 0
             share, spread, alike = pooled(total / over, self.used & shared, n)
             own = np.where(shared, common * share, own)
-            varied = np.where(shared, spread / share**2, varied)
+            varied = np.where(shared, np.where(alike > 0, alike, spread) / share**2, varied)
             counted = self.used & shared
             scale = float((alike / share**2)[counted].sum() / max(counted.sum(), 1))
         own = np.sqrt(np.where(self.used, own * (1 + error**2), np.inf))
