@@ -216,10 +216,10 @@ class Noise:
 
         Powers of random forces vary too: one over them has the mean n / (n - 1) of n averages. Of
         circular errors with the variance s^2 in each part the logarithm has s^2 (1 + s^2 + ...).
-        A weight that is one over the mean of what a variance may be costs nothing, see `pooled`; what
-        lines have in common, and lines of which nothing else is known, vary.
-        Weights are one over variances without bias: of an estimated one by the factor
-        (n - 2) / (n - 1), of what is left of it when a common part is taken off by `pooled`.
+        A weight that is one over the mean of what a variance may be costs nothing, see `pooled`;
+        what lines have in common varies, and lines of which nothing else is known. Weights are one
+        over variances without bias: of an estimated one by the factor (n - 2) / (n - 1), of what is
+        left of it when a common part is taken off by `pooled`.
         """
         error, n = self.relative_error, self.averages
         freedom = 2 * max(n - 1, 1)
