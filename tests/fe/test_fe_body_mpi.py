@@ -45,12 +45,9 @@ def bodies(request, tmp_path_factory):
 
 
 def contents(body):
-    """(name, array, size against which it counts); a frame makes parts of markers zero.
-
-    The frame turns with a small eye, and the far end moves by that turn times the body's size.
-    """
+    """(name, array, size against which it counts); a frame makes parts of markers zero."""
+    shape = np.abs(body.surface.shape).max()
     turn = max(np.abs(marker.rotation).max() for marker in body.markers.values())
-    shape = max(np.abs(body.surface.shape).max(), turn * body.size)
     for name in ("mass", "first_moment", "inertia", "S", "Ibar_kl", "S_kl", "K", "omega"):
         array = np.asarray(getattr(body, name))
         yield name, array, np.abs(array).max()
