@@ -259,7 +259,7 @@ def _static_row(connection: Connection, body: FlexibleBody, held: Any) -> list[R
 
 
 def rigid_rows(ops: Operators, body: FlexibleBody, elastic: Elastic) -> list[Row]:
-    """Rigid motions of the body against those of the full model."""
+    """Rigid motions of the body against those of the full model, their energy in the last row."""
     R = given_rigid_motions(ops)
     KR, MR = ops.apply_K(R), ops.apply_M(R)
     full = ops.gram(R, MR)

@@ -52,6 +52,12 @@ def per_cell(mesh: Any, values: Array) -> Any:
     return function
 
 
+def give_own(function: Any, own: Array) -> None:
+    """Let a function have these values at the dofs of this rank, and those of others at ghosts."""
+    function.x.array[: own.size] = own
+    function.x.scatter_forward()
+
+
 def cell_dofs(space: Any) -> Integers:
     """(cells, k) node numbers of each cell on this rank, ghosts included."""
     table = space.dofmap.list

@@ -216,10 +216,10 @@ class Noise:
 
         Powers of random forces vary too: one over them has the mean n / (n - 1) of n averages. Of
         circular errors with the variance s^2 in each part the logarithm has s^2 (1 + s^2 + ...).
-        A weight that is one over the mean of what a variance may be costs nothing, see `pooled`;
-        what lines have in common varies, and lines of which nothing else is known. Weights are one
-        over variances without bias: of an estimated one by the factor (n - 2) / (n - 1), of what is
-        left of it when a common part is taken off by `pooled`.
+        Weights are one over variances without bias: of an estimated one by the factor
+        (n - 2) / (n - 1), of what is left of it when a common part is taken off by `pooled`. One
+        over the mean of what a variance may be costs nothing; what lines have in common does, and
+        that of a line of which nothing else is known.
         """
         error, n = self.relative_error, self.averages
         freedom = 2 * max(n - 1, 1)
@@ -235,7 +235,7 @@ class Noise:
             over, shared = np.where(common > 0, common, np.inf), common > 0
             share, spread, alike = pooled(total / over, self.used & shared, n)
             own = np.where(shared, common * share, own)
-            varied = np.where(shared, np.where(alike > 0, alike, spread) / share**2, varied)
+            varied = np.where(shared, spread / share**2, varied)
             counted = self.used & shared
             scale = float((alike / share**2)[counted].sum() / max(counted.sum(), 1))
         own = np.sqrt(np.where(self.used, own * (1 + error**2), np.inf))
@@ -258,8 +258,8 @@ def pooled(total: Array, used: Mask, n_averages: int) -> tuple[Array, Array, Arr
         n_averages: number of them.
 
     Returns:
-        (n_f, n_s, n_e) means of x p by what is measured, their variances, and what lines have of
-        these in common [1].
+        (n_f, n_s, n_e) means of x p by what is measured, the variances of them that cost, and what
+        lines have of these in common [1].
 
     Source:
         Efron and Morris, Stein's estimation rule and its competitors: an empirical Bayes approach,
@@ -282,7 +282,8 @@ def pooled(total: Array, used: Mask, n_averages: int) -> tuple[Array, Array, Arr
     cov = P * (1 - kept)
     variance = a**2 * np.expm1(var_both) - 2 * a * b * np.expm1(cov) + b**2 * np.expm1(var_force)
     shared = np.where(alike, ((1 - kept) * a + kept_p * b) ** 2 * V / count, 0.0)
-    return positive_mean(a - b, variance + shared), variance + shared, shared
+    found = positive_mean(a - b, variance + shared)
+    return found, np.where(alike, shared, variance), shared
 
 
 def _normal_part(level: Array, used: Mask, least: float) -> tuple[Array, Array, Mask]:

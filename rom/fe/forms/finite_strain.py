@@ -23,6 +23,7 @@ from rom.fe.compat import (
     cell_name,
     compiled,
     geometry_degree,
+    give_own,
     per_cell,
 )
 from rom.fe.forms.material import geometric_stiffness, stress
@@ -102,9 +103,9 @@ class FiniteStrain:
         """The same matrix for the operators of the model."""
         if self.mesh.comm.size == 1:
             return wrapped(A)
-        rows, n = slice(*self._own), A.shape[0]
-        own = rows.stop - rows.start
-        return aij(A[rows], ((own, n), (own, n)), self.mesh.comm, 3)
+        rows, n = A[slice(*self._own)], A.shape[0]
+        size = (rows.shape[0], n)
+        return aij(rows, (size, size), self.mesh.comm, 3)
 
     @property
     def _own(self) -> tuple[int, int]:
@@ -117,9 +118,7 @@ class FiniteStrain:
 
     def _give(self, function: Any, u: Array) -> None:
         """Let a function of the displacement's space have the values (n,) of the whole solid."""
-        first, end = self._own
-        function.x.array[: end - first] = u[first:end]
-        function.x.scatter_forward()
+        give_own(function, u[slice(*self._own)])
 
     def _matrix(self, form: Any) -> csr_matrix:
         A = assemble_matrix(form)

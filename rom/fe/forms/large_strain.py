@@ -27,6 +27,7 @@ from rom.fe.compat import (
     compiled,
     evaluated,
     geometry_degree,
+    give_own,
     quadrature_rule,
 )
 from rom.fe.forms.material import stiffness, stress
@@ -152,8 +153,8 @@ class LargeStrain:
             form = compiled(density * dx)
         out = np.empty((U.shape[0], len(pairs)))
         for k, (i, j) in enumerate(pairs):
-            _set(a, U[:, i])
-            _set(b, U[:, j])
+            give_own(a, U[:, i])
+            give_own(b, U[:, j])
             out[:, k] = assembled_vector(form)
         return out
 
@@ -177,7 +178,7 @@ class LargeStrain:
         u = fem.Function(self.V)
         columns = []
         for column in E.T:  # every rank exchanges all columns, however many blocks it has
-            _set(u, column)
+            give_own(u, column)
             columns.append(u.x.array.copy())
         with compiling(self.mesh.comm):
             grad = fem.Expression(ufl.grad(u), points)
@@ -226,8 +227,3 @@ def few_degree(mesh: Any, degree: int) -> int:
     if cell_name(mesh) == "tetrahedron":
         return max(2 * (degree - 1) + 3 * curved, 1)
     return 2 * degree + 2 * curved
-
-
-def _set(u: Any, column: Array) -> None:
-    u.x.array[: column.size] = column
-    u.x.scatter_forward()

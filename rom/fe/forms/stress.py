@@ -15,6 +15,7 @@ from rom.fe.compat import (
     cell_name,
     evaluated,
     geometry_degree,
+    give_own,
     quadrature_points,
     reference_points,
     to_global,
@@ -164,8 +165,7 @@ class Stresses:
         form = self._second_variation(load)
         out = np.empty((U.shape[1], Psi.shape[1], Psi.shape[1]))
         for k, column in enumerate(U.T):
-            load.x.array[: column.size] = column
-            load.x.scatter_forward()
+            give_own(load, column)
             with compiling(self.mesh.comm):
                 A = assemble_matrix(form)
             out[k] = Psi.T @ dense_rows(A, Psi)
@@ -182,9 +182,7 @@ class Stresses:
         """
         load = fem.Function(self.V)
         rows, per_node = self.V.dofmap.index_map.local_range, self.V.dofmap.index_map_bs
-        own = u[rows[0] * per_node : rows[1] * per_node]
-        load.x.array[: own.size] = own
-        load.x.scatter_forward()
+        give_own(load, u[rows[0] * per_node : rows[1] * per_node])
         with compiling(self.mesh.comm):
             A = assemble_matrix(self._second_variation(load))
         K_geo = gathered(A)
@@ -224,8 +222,7 @@ class Stresses:
         with compiling(self.mesh.comm):
             expression = fem.Expression(of(u), X)
         for column in U.T:
-            u.x.array[: column.size] = column
-            u.x.scatter_forward()
+            give_own(u, column)
             yield evaluated(expression, self.mesh, cells).reshape(cells.size, len(X), width)
 
     def _cells_at(self, nodes: Index) -> tuple[Integers, Index]:
