@@ -154,6 +154,7 @@ view.deformed(
     xlabel="divisions under half the punch",
     ylabel="pressure over shear strength [1]",
     title="Metal between tools",
+    heading="Pressure of a punch, by mesh",
     caption="Left: pressure of a rough flat punch that has sunk by 1.5 % of its width; ordinary "
     "triangles lock and go on rising. Middle: the plastic wedge and fans below the punch. Right: "
     "section of a block, 20 mm wide and 20 mm high, upset to 12 mm between platens; dashed: "

@@ -273,7 +273,7 @@ if first:
     around = np.array([x for x, _ in loaded[1].joints().values()])
     around = around[np.argsort(around[:, 0])]
     plain = [o for k, o in enumerate(loaded[1].outlines()) if k not in (0, CROWN)]
-    base = view.box((18.0, 0.4, 1.4), (0.0, -0.2, 0.0))
+    base = view.box((13.0, 0.4, 1.4), (0.0, -0.2, 0.0))
     stone_in_space = (body.surface.points, body.surface.triangles)
     arrow = np.array([(0, 0.1, 0), (0, 2, 0), (-0.3, 0.6, 0), (0.3, 0.6, 0)], dtype=float)
     arrow[:, 1] += HIGH + R + THICK / 2
@@ -285,23 +285,23 @@ if first:
                          "ground": view.Thing(*base, "#9aa5b1"),
                          "line of thrust": in_front(around, DEEP),
                          "load": view.Thing(arrow, [(0, 1), (0, 2), (0, 3)], "#edae49", width=5.0)},
-                        **seen)],
-            [view.Scene("The stone left of the crown, reduced",
+                        **seen),
+             view.Scene("The stone left of the crown, reduced",
                         {"stone": view.Thing(*stone_in_space, values=felt)},
                         "horizontal pressure [MPa]",
-                        limits=tuple(np.percentile(felt, (0, 95))), **seen),
-             view.Panel("What the vault bears on its crown", "width of the buttresses [m]",
+                        limits=tuple(np.percentile(felt, (0, 95))), **seen)],
+            [view.Panel("What the vault bears on its crown", "width of the buttresses [m]",
                         "load [kN]", {"linear programming": (widths, borne)},
                         {"virtual work, without load": ([narrowest()], [0.0])})],
         ],
         options.out / "masonry_vault.png",
         title="A vault drawn in gmsh, one stone of it with its stress",
-        caption="Above: section of a half circle of sixteen voussoirs on two buttresses of "
+        caption="Left: section of a half circle of sixteen voussoirs on two buttresses of "
         "courses, one metre deep, with half the load that it bears (arrow); the line joins the "
-        "centres of pressure of the joints. Below left: the stone left of the crown is a solid of "
+        "centres of pressure of the joints. Right: the stone left of the crown is a solid of "
         "finite elements, reduced to 20 coordinates. Its neighbours touch it along its edges, "
         "where the thrust enters; one node in twenty presses more than the colours show. "
-        "Below right: the wider the buttresses, the more the vault bears, until hinges in the "
+        "Below: the wider the buttresses, the more the vault bears, until hinges in the "
         "vault alone decide.",
     )  # fmt: skip
     view.film(

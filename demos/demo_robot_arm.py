@@ -197,7 +197,8 @@ view.history(
     f"paths of motor and tool. The tool hangs {1e3 * abs(sag[1]):.0f} mm too low in the end, and "
     f"swings at {frequency:.2f} Hz although its joints stand almost still.",
 )  # fmt: skip
-view.animate(robot(True), sol, options.out / "robot_arm.gif", frames=75, seconds=6.0, **look)
+view.animate(robot(True), sol, options.out / "robot_arm.gif", frames=75, seconds=6.0,
+             title="A robot arm with two flexible links", **look)  # fmt: skip
 
 # ## What to remember
 #

@@ -182,7 +182,8 @@ view.history(
     f"the panels swing against each other at {floating[1]:.2f} Hz, faster than at {clamped:.2f} Hz "
     "on a wall, because the hub turns the other way.",
 )  # fmt: skip
-view.animate(satellite(True), sol, options.out / "satellite.gif", frames=72, seconds=6.0, **look)
+view.animate(satellite(True), sol, options.out / "satellite.gif", frames=72, seconds=6.0,
+             title="A satellite turns by its wheel", **look)  # fmt: skip
 
 # ## What to remember
 #

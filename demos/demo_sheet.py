@@ -138,7 +138,8 @@ def whole(k):
     """Both halves of the bar in picture k."""
     half, mirror = flight.x[k], np.array([-1.0, 1.0])
     return view.Shape(
-        "Taylor's bar after 80 \u00b5s", np.vstack([half, half * mirror]), np.vstack([T, other[T]]),
+        f"Taylor's bar after {1e6 * flight.t[k]:.0f} \u00b5s",
+        np.vstack([half, half * mirror]), np.vstack([T, other[T]]),
         np.vstack([X, X * mirror]), np.tile(strain[k], 2), "plastic strain", 300,
     )  # fmt: skip
 
@@ -165,6 +166,7 @@ view.deformed(
     xlabel="divisions of each side",
     ylabel="deflection of the tip [unit of length]",
     title="Triangles that ask their neighbours",
+    heading="Deflection of Cook's membrane, by mesh",
     caption="Left: deflection of a tapered panel, 48 units of length wide, held on its left and "
     "sheared by a unit force on its right, for the same unknowns; ordinary triangles are far too "
     "stiff on coarse meshes. Middle: that panel, drawn to scale; dashed: before. Right: the "

@@ -242,7 +242,14 @@ view.instants(flexible, moved, out / "instants.png", times=instants, **scene)
 last = rom.simulate(
     flexible, t_end=(turns + 1) * turn, dt=turn / 1000, rho_inf=0.8, state=moved.final
 )
-view.animate(flexible, last, out / "slider_crank.gif", frames=60, **scene)
+view.animate(
+    flexible,
+    last,
+    out / "slider_crank.gif",
+    frames=60,
+    title="A slider-crank whose rod bends",
+    **scene,
+)
 done("draw")
 frequencies = [
     (support, k + 1, full, reduced, f"{reduced / full - 1:.1e}", mac)

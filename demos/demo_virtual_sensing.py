@@ -119,8 +119,14 @@ things = {"rod": (surface, body.surface.triangles)} | {
 ms = 1e3 * t
 
 
-def curves(*several):
-    return [np.column_stack([ms, values]) for values in several]
+def curves(values):
+    return [np.column_stack([ms, values])]
+
+
+def within(middle, bound):
+    """The area within a bound about a curve."""
+    low, high = (curves(middle + sign * bound)[0] for sign in (-1, 1))
+    return [np.vstack([low, high[::-1]])]
 
 
 force_found, force_bound = track.forces[:, 0], 2 * track.force_deviations[:, 0]
@@ -131,26 +137,25 @@ view.plane(
         view.Scene("The rod, held in its big eye", things, view=(0.4, -0.7, 1.0), up=(0, 0, 1)),
         view.Drawing(
             "Force on the small eye", "time [ms]", "force [N]", equal=False,
-            curves={"estimated, two deviations about it": curves(
-                force_found, force_found - force_bound, force_found + force_bound),
-                "true": curves(f)},
+            polygons=within(force_found, force_bound),
+            curves={"estimated": curves(force_found), "true": curves(f)},
         ),
         view.Drawing(
             "Stress in the shank, where there is no sensor", "time [ms]", "stress [MPa]",
             equal=False,
-            curves={"estimated, two deviations about it": curves(
-                stress, stress - bound, stress + bound), "true": curves(true)},
+            polygons=within(stress, bound),
+            curves={"estimated": curves(stress), "true": curves(true)},
         ),
         view.Drawing(
             "Error of that stress and its bounds", "time [ms]", "stress [MPa]", equal=False,
-            curves={"error": curves(stress - true), "two deviations": curves(bound, -bound)},
+            polygons=within(0.0, bound), curves={"error": curves(stress - true)},
         ),
     ],
     options.out / "virtual_sensing.png",
     title="A displacement, two accelerations, and the stress elsewhere",
     caption="Sensors are where effective independence keeps three of 75 candidates. A Kalman "
     "filter with the reduced rod and a force of unknown history, a random walk, gives force and "
-    "stress with two standard deviations about them. A richer basis made the record.",
+    "stress; shaded: two standard deviations about them. A richer basis made the record.",
 )  # fmt: skip
 
 # ## What to remember

@@ -163,7 +163,13 @@ view.history(
 # ## The film
 
 view.animate(
-    plant.mechanism, motion, options.out / "whole_turbine.gif", frames=80, seconds=8.0, **look
+    plant.mechanism,
+    motion,
+    options.out / "whole_turbine.gif",
+    frames=80,
+    seconds=8.0,
+    title="A whole wind turbine",
+    **look,
 )
 
 # ## What to remember

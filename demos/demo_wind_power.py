@@ -123,7 +123,7 @@ softened = at_rest(hub) / at_rest(None)
 
 MN = 1e6
 view.panels(
-    [[Panel("Power coefficient", "speed of the tip / wind", "",
+    [[Panel("Power coefficient", "speed of the tip / wind", "power coefficient [1]",
             {f"pitch {int(p)} degrees": (ratios, np.where(np.array(x) > -0.1, x, np.nan))
              for p, x in shares.items()}
             | {"limit of Betz": ([2, 14], [BETZ_LIMIT] * 2)},
@@ -147,7 +147,7 @@ view.panels(
             {"all strips": (blades.radius, design.strip[0, :, 5]),
              "of the best disc": ([3, 63], [1 / 3, 1 / 3])}),
       Panel("Angle of attack at 8 m/s", "from the axis [m]", "angle [degrees]",
-            {"_all strips": (blades.radius[3:], np.degrees(design.strip[0, 3:, 4]))})]],
+            {"_strips": (blades.radius[3:], np.degrees(design.strip[0, 3:, 4]))})]],
     options.out / "wind_power.png", title="Power of the NREL 5 MW turbine",
     caption="Lines: balance of momentum strip by strip, with losses at tip and hub, tilt and cone, "
     "under the published control. Rings: the report of the machine and a run of OpenFAST. A blade "

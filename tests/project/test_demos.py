@@ -7,6 +7,8 @@ import pytest
 
 from cases.files.demos import DEMOS, LONG_DEMOS, check
 from cases.long import ROM_LONG
+from cases.pictures import faults
+from rom.view.canvas.picture import Picture
 
 pytest.importorskip("dolfinx", reason="demos start from finite elements")
 pytestmark = [pytest.mark.fenicsx, pytest.mark.slow]
@@ -17,7 +19,15 @@ ALONE = [demo for demo in DEMOS if ROM_LONG or demo.stem not in LONG_DEMOS]
 @pytest.mark.parametrize("demo", ALONE, ids=lambda path: path.stem)
 def test_demo_ends_in_the_numbers_expected(demo, tmp_path, monkeypatch):
     monkeypatch.setattr(sys, "argv", [str(demo), "--quiet", "--out", str(tmp_path)])
+    found, save = [], Picture.save
+
+    def looked_at(picture, path):
+        found.extend(f"{path}: {fault}" for fault in faults(picture))
+        return save(picture, path)
+
+    monkeypatch.setattr(Picture, "save", looked_at)
     check(demo, runpy.run_path(str(demo), run_name="__main__")["results"], tmp_path)
+    assert not found
 
 
 def test_what_is_left_to_make_long_exists():

@@ -17,6 +17,7 @@ from matplotlib.figure import Figure
 from cases.long import few
 from cases.mbs.drawn import lattice_bar, squeezed, swinging
 from cases.paths import ROOT
+from cases.pictures import faults
 from cases.solid import block
 from rom import view
 from rom.errors import ConfigError
@@ -118,6 +119,7 @@ def test_a_picture_is_the_same_seen_and_written_in_both_orders(name, tmp_path):
     (things, words), draw, file = PICTURES[name](), getattr(view, name), tmp_path / "a.png"
     seen = draw(*things, **words)
     assert isinstance(seen, Figure) and seen.path is None and not list(tmp_path.iterdir())
+    assert not faults(seen)
     written = draw(*things, file, **words)
     assert isinstance(written, Figure) and Path(written) == written.path == file
     assert file.read_bytes()[:4] == b"\x89PNG"

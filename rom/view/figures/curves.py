@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 PAGE_WIDTH, PANEL_HEIGHT, BESIDE_WIDTH, SCENE_GAP = 1400, 330, 440, 45  # pixel
 LINES = ("#2f7f9f", "#d1495b", "#edae49", "#66a182", "#8d6a9f", "#5c636e")
+DASHES = ("-", "--", "-.", ":")
 # one more than colours, so that series beyond these look different, too
 MARKERS = ("o", "s", "^", "D", "v", "x", "P")
 GREY = "#5c636e"
@@ -110,11 +111,16 @@ def _histories(axes: Any, t: Array, curves: dict[str, Any], numbers: Sequence[in
     flat = without_round_off([y for _, y in lines])
     for k, (name, (x, _), y) in enumerate(zip(curves, lines, flat, strict=True)):
         number = numbers[k]
-        look: dict[str, Any] = {"color": LINES[number % len(LINES)], "lw": 1.4}
-        look |= {"ls": "--" if number % 2 else "-"}
+        look = line_look(number)
         look |= {"ls": "none", "marker": "o", "ms": 7, "clip_on": False} if pairs[k] else {}
         look |= LEVEL_STYLE if levels[k] else {}
         axes.plot(x, y, label=name, **look)
+
+
+def line_look(k: int) -> dict[str, Any]:
+    """Colour and dashes of curve number k; no two of the first 24 look alike."""
+    again, colour = divmod(k, len(LINES))
+    return {"color": LINES[colour], "ls": DASHES[(k + again) % 2 + 2 * (again // 2 % 2)], "lw": 1.4}
 
 
 def _rows(axes: Any, words: Any) -> Array:
@@ -182,9 +188,8 @@ def frequencies(
             full, reduced = (np.array(table[key]) for key in ("full", "reduced"))
             error = np.maximum(np.abs(reduced / full - 1), MIN_ERROR)
             longest = max(longest, full.size)
-            look: dict[str, Any] = {"color": LINES[k % len(LINES)]}
-            look["marker"] = MARKERS[k % len(MARKERS)]
-            look |= {"ls": "--" if k % 2 else "-", "ms": max(4, 10 - 2 * k)}  # curves may coincide
+            look = line_look(k) | {"marker": MARKERS[k % len(MARKERS)]}
+            look |= {"ms": max(4, 10 - 2 * k)}  # curves may coincide
             axes.semilogy(np.arange(1, full.size + 1), error, label=support, **look)
         axes.axhline(1e-3, color="#5c636e", lw=1.0, ls="--")
         axes.set_xticks(range(1, longest + 1))
@@ -300,7 +305,7 @@ def campbell(  # noqa: PLR0913  keywords of one picture
         legends += [[*labels, *(marks or {})]] if damped else []
         figure, areas = _panels(ax, legends, "campbell", Words(title, caption, beside))
         for k, label in enumerate(labels):
-            look = {"color": LINES[k % len(LINES)], "ls": "--" if k % 2 else "-", "lw": 1.6}
+            look = line_look(k)
             areas[0].plot(turns, f[:, k], label=label, **look)
             if damped:
                 areas[1].plot(turns, damping[:, k], label=label, **look)
@@ -325,11 +330,9 @@ def _multiples(axes: Any, diagram: Any, turns: Any, orders: Sequence[float]) -> 
         label = RAYS_LABEL if k == 0 else None
         axes.plot([turns[0], end], [order * turns[0] / 60, order * end / 60], color=GREY, lw=0.9,
                   label=label)  # fmt: skip
-        where = {"xytext": (5, 0), "ha": "left", "va": "center"}
-        if end < turns[-1]:
-            where = {"xytext": (0, 3), "ha": "center", "va": "bottom"}
-        axes.annotate(f"{order:g}x", (end, order * end / 60), textcoords="offset points",
-                      color=GREY, size=page.SMALL_SIZE, **where)  # fmt: skip
+        name, place = f"{order:g}x", (end, order * end / 60)
+        axes.annotate(name, place, (-5, -4), textcoords="offset points", ha="right", va="top",
+                      color=GREY, size=page.SMALL_SIZE)  # fmt: skip
         for _, speed in diagram.crossings(order):
             at = 30 * speed / np.pi
             axes.plot(at, order * at / 60, "o", ms=11, mfc="none", mec="#1d2733", mew=1.3)

@@ -14,7 +14,7 @@ from rom.model import Array
 from rom.view.canvas import page
 from rom.view.canvas.offscreen import COLOUR_MAP
 from rom.view.canvas.scales import readable
-from rom.view.figures.curves import LINES, MARKERS
+from rom.view.figures.curves import LINES, MARKERS, line_look
 from rom.view.figures.things import Scene, draw_scene
 
 if TYPE_CHECKING:
@@ -134,8 +134,9 @@ def _draw(figure: Any, axes: Any, drawing: Drawing | Scene) -> None:
     axes.tick_params(labelsize=page.SMALL_SIZE)
     if drawing.shade is not None:
         image = axes.imshow(
-            drawing.shade.T, origin="lower", extent=drawing.extent, cmap=COLOUR_MAP, aspect="auto"
-        )
+            drawing.shade.T, origin="lower", extent=drawing.extent, cmap=COLOUR_MAP,
+            aspect="auto", interpolation="bilinear",
+        )  # fmt: skip
         image.set_clim(drawing.limits)
         bar = figure.colorbar(image, ax=axes, fraction=0.05, pad=0.03)
         bar.set_label(drawing.label, size=page.SMALL_SIZE)
@@ -143,9 +144,9 @@ def _draw(figure: Any, axes: Any, drawing: Drawing | Scene) -> None:
     _fill(figure, axes, drawing)
     for k, (label, curves) in enumerate(drawing.curves.items()):
         for n, curve in enumerate(curves):
-            colour = "white" if drawing.shade is not None else LINES[k % len(LINES)]
-            look = {"color": colour, "lw": 1.0 if drawing.shade is not None else 2.0, "zorder": 3}
-            axes.plot(*curve.T, label=label if n == 0 else f"_{label}", **look)
+            look = line_look(k) | {"lw": 2.0}
+            look |= {"color": "white", "lw": 1.0} if drawing.shade is not None else {}
+            axes.plot(*curve.T, label=label if n == 0 else f"_{label}", zorder=3, **look)
     _draw_levels(axes, drawing)
     over = drawing.shade is not None
     for k, (label, points) in enumerate(drawing.points.items()):

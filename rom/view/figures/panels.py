@@ -13,7 +13,7 @@ from rom.errors import ConfigError
 from rom.view.canvas import page
 from rom.view.canvas.scales import without_round_off
 from rom.view.canvas.scene import TEXT_COLOUR
-from rom.view.figures.curves import LINES, PAGE_WIDTH, finish, near_ticks
+from rom.view.figures.curves import LINES, PAGE_WIDTH, finish, line_look, near_ticks
 from rom.view.figures.things import Scene, draw_scene
 
 if TYPE_CHECKING:
@@ -39,6 +39,7 @@ class Panel:
         points: {name: (x (n,), y (n,))} drawn as small circles over them.
         bars: {name: (low, high)} horizontal bars from low to high in units of the axis, from top to
             bottom.
+        ends: what the two ends of the bars are; each then has a colour of its own from zero on.
         notes: {words: (x, y)} written beside that place.
         equal: the same scale along both axes.
         log: logarithmic scales along both axes.
@@ -55,6 +56,7 @@ class Panel:
     curves: Mapping[str, Line] = field(default_factory=dict)
     points: Mapping[str, Line] = field(default_factory=dict)
     bars: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    ends: tuple[str, str] | None = None
     notes: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     equal: bool = False
     log: bool = False
@@ -135,7 +137,8 @@ def _legend_height(row: Sequence[Panel | Scene]) -> int:
 
 
 def _named(panel: Panel) -> list[str]:
-    return [name for name in (*panel.curves, *panel.points) if not name.startswith("_")]
+    names = (*panel.curves, *panel.points, *(panel.ends or ()))
+    return [name for name in names if not name.startswith("_")]
 
 
 def _draw(axes: Any, panel: Panel, *, alone: bool) -> None:
@@ -144,14 +147,13 @@ def _draw(axes: Any, panel: Panel, *, alone: bool) -> None:
     named = _named(panel)
     for name, line in curves.items():
         k = named.index(name) if name in named else 0
-        look = {"color": LINES[k % len(LINES)], "lw": 1.4, "ls": "--" if k % 2 else "-"}
-        look = look if name in named else GUIDE_STYLE
-        axes.plot(*line, label=name, **look)
+        guide = name not in named and (len(curves) > 1 or bool(points))
+        axes.plot(*line, label=name, **(GUIDE_STYLE if guide else line_look(k)))
     for name, line in points.items():
         look = {"mec": "#22262b", "mfc": "none", "ms": 4.0, "mew": 0.8}
         axes.plot(*line, "o", label=name, **look)
     if panel.bars:
-        _draw_bars(axes, panel.bars)
+        _draw_bars(axes, panel.bars, panel.ends)
     for words, place in panel.notes.items():
         axes.annotate(words, place, (6, 0), textcoords="offset points", va="center",
                       size=page.SMALL_SIZE, color=TEXT_COLOUR,
@@ -194,9 +196,13 @@ def _same_scale(axes: Any, shape: tuple[float, float]) -> None:
     axes.set_ylim(y - half[1], y + half[1])
 
 
-def _draw_bars(axes: Any, bars: Mapping[str, tuple[float, float]]) -> None:
+def _draw_bars(axes: Any, bars: Mapping[str, tuple[float, float]], ends: Any) -> None:
     low, high = np.array(list(bars.values()), dtype=float).T
-    axes.barh(np.arange(len(bars)), high - low, left=low, height=0.6, color=LINES[0])
+    parts = (
+        [(low, high - low, None)] if ends is None else [(0.0, low, ends[0]), (0.0, high, ends[1])]
+    )
+    for k, (left, width, name) in enumerate(parts):
+        axes.barh(np.arange(len(bars)), width, left=left, height=0.6, color=LINES[k], label=name)
     axes.axvline(0.0, color="#22262b", lw=0.8)
     axes.set_yticks(np.arange(len(bars)), list(bars))
     axes.use_sticky_edges = False

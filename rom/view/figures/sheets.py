@@ -63,6 +63,7 @@ def deformed(  # noqa: PLR0913  keywords of one picture
     xlabel: str,
     ylabel: str,
     title: str = "",
+    heading: str = "",
     caption: str = "",
     ax: Any = None,
 ) -> "Figure":
@@ -75,7 +76,8 @@ def deformed(  # noqa: PLR0913  keywords of one picture
         limit: name and value of a horizontal line, in units of y.
         xlabel: of the curves.
         ylabel: of the curves.
-        title: heading.
+        title: heading of the page.
+        heading: of the diagram of the curves.
         caption: what a stranger has to know; not written into axes of yours.
         ax: Axes of matplotlib, one for the curves and one for each shape; None for a page of its
             own.
@@ -90,6 +92,7 @@ def deformed(  # noqa: PLR0913  keywords of one picture
     if ax is not None:
         figure, (axes, *areas) = page.taken(ax, 1 + len(shapes), "deformed")
         _tending(axes, curves, limit, (xlabel, ylabel))
+        axes.set_title(heading, size=page.BODY_SIZE, loc="left")
         for area, shape in zip(areas, shapes, strict=True):
             area.set_title(shape.title, size=page.BODY_SIZE)
             drawn = _shape(area, shape)
@@ -103,6 +106,7 @@ def deformed(  # noqa: PLR0913  keywords of one picture
         figure = page.titled(PAGE_WIDTH, 225 + PANEL_HEIGHT, title, caption)
         axes = page.area(figure, 110, 120, left - 140, PANEL_HEIGHT)
         _tending(axes, curves, limit, (xlabel, ylabel))
+        page.words(figure, heading, 110, 80, size=page.BODY_SIZE)
         for shape in shapes:
             page.words(figure, shape.title, left + 10, 80, size=page.BODY_SIZE)
             _shape(page.area(figure, left, 120, shape.width, PANEL_HEIGHT), shape)
@@ -171,6 +175,7 @@ def flow(
         for clock, shape in zip(clock_texts(times), shapes, strict=True):
             figure = page.sheet(width, height + 155 + below)
             page.words(figure, clock, 20, 12)
+            page.words(figure, shape.title, width - 20, 12, ha="right")
             axes = page.area(figure, 10, 45, width - 20, height)
             _shape(axes, shape, highest=highest, frame=frame)
             bar = (width / 2 - 200, height + 80, 400, 14)

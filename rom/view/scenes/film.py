@@ -52,6 +52,7 @@ def animate(  # noqa: PLR0913  keywords of one picture, all with defaults
     traces: tuple[str, ...] = (),
     view: npt.ArrayLike | None = None,
     up: npt.ArrayLike | None = None,
+    title: str = "Motion of the mechanism",
 ) -> Film:
     """Film of the mechanism, flexible bodies deformed and coloured by their deformation.
 
@@ -70,6 +71,7 @@ def animate(  # noqa: PLR0913  keywords of one picture, all with defaults
         traces: bodies whose origin leaves a line behind, all of its way.
         view: (3,) direction from the things to the eye [1]; None: mainly along the shortest extent.
         up: (3,) upright direction [1]; None: against gravity, or across the longest extent without.
+        title: what is seen.
 
     Returns:
         The film.
@@ -87,11 +89,11 @@ def animate(  # noqa: PLR0913  keywords of one picture, all with defaults
     # many small pictures: as large as they are, the smooth edges that the driver has will do
     images = render(stage.actors, camera, limits=stage.limits, oversampling=1)
     with page.styled():
-        blank = _film_sheet(stage, camera, images.shape[1], magnify)
-        clocks = page.strips(clock_texts(solution.t[steps]), FILM_WIDTH, CLOCK_HEIGHT)
+        blank = _film_sheet(stage, camera, images.shape[1], magnify, title)
+        clocks = page.strips(clock_texts(solution.t[steps]), FILM_WIDTH // 4, CLOCK_HEIGHT)
     pages = np.repeat(blank[None], len(images), axis=0)
     pages[:, CLOCK_HEIGHT : CLOCK_HEIGHT + images.shape[1]] = images
-    pages[:, :CLOCK_HEIGHT] = clocks
+    pages[:, :CLOCK_HEIGHT, : FILM_WIDTH // 4] = clocks
     return finished(pages, seconds / len(images), path)
 
 
@@ -339,11 +341,12 @@ def _words(stage: Stage, magnify: float) -> str:
     )
 
 
-def _film_sheet(stage: Stage, camera: Camera, height: int, magnify: float) -> Image:
+def _film_sheet(stage: Stage, camera: Camera, height: int, magnify: float, title: str) -> Image:
     """What stays around the pictures of a film."""
     text, below = page.caption(_words(stage, magnify), FILM_WIDTH - 40)
     top = CLOCK_HEIGHT + height
     figure = page.sheet(FILM_WIDTH, top + STRIP_HEIGHT + below + 20)
+    page.words(figure, title, FILM_WIDTH - 20, 8, ha="right")
     _below(figure, stage, camera, FILM_WIDTH, top)
     page.words(figure, text, 20, top + STRIP_HEIGHT, size=page.SMALL_SIZE)
     return page.pixels(figure)
