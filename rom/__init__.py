@@ -8,7 +8,6 @@ lives in ``rom.fe`` and is imported when it is first used.
 # `rom.__main__` can take the working folder off the path, and a typing.py may lie in it.
 import os
 
-import rom.moved  # noqa: F401  old paths of modules
 from rom.lazy import front as _front
 from rom.process.launcher import share_the_machine as _share_the_machine
 

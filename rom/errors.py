@@ -45,14 +45,6 @@ class RomError(Exception):
         return _rebuild, (type(self), self.message, self.where, self.hint)
 
 
-def _put_solution(error: RomError, found: Any) -> None:
-    error.solution = found
-
-
-for _name in ("motion", "posture", "shape"):  # what components called the solution once
-    setattr(RomError, _name, property(lambda error: error.solution, _put_solution))
-
-
 @contextmanager
 def reached(found: Callable[[], Any]) -> Iterator[None]:
     """Errors from within carry what was found before, as ``error.solution``.

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 from rom.arguments import typed
-from rom.deprecated import path_came_first
 from rom.errors import ConfigError
 from rom.fmu.server import SETTINGS_FILE
 from rom.io.files import check_writable
@@ -21,7 +20,6 @@ MODEL_FOLDER = "model"  # of the Python file, below the resources
 BUILD_TIME_LIMIT = 600  # [s] for the mechanism, its compilation included
 
 
-@path_came_first(1, 0, suffix=".fmu")
 @typed
 def write_fmu(
     script: str | Path,

@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 
 from rom.arguments import typed, whole
-from rom.deprecated import renamed
 from rom.eigen.attachments import added_mass
 from rom.eigen.scipy import SciPyOperators
 from rom.eigen.substructuring import modes_up_to
@@ -73,7 +72,6 @@ def mass_properties(model: FEModel) -> MassProperties:
     return MassProperties(mass, centre, 0.5 * (M[3:, 3:] + M[3:, 3:].T) - steiner)
 
 
-@renamed(m="n")
 @typed
 def modes(
     model: FEModel,

@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from rom.arguments import typed
-from rom.deprecated import path_came_first
 from rom.errors import ConfigError
 from rom.io.files import write_whole
 from rom.model import Report
@@ -95,7 +94,6 @@ def image(path: str | Path, words: str) -> str:
     return f"<img alt='{html.escape(words, quote=True)}' src='data:{kind};base64,{code}'>"
 
 
-@path_came_first(2, 0, 1)
 @typed
 def write_report(sections: dict[str, Sequence[str]], path: str | Path, title: str) -> Path:
     """Write a report.

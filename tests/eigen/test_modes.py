@@ -4,7 +4,6 @@ import inspect
 
 import numpy as np
 import pytest
-from numpy.testing import assert_array_equal
 
 import rom
 from cases.files import border_calls as made
@@ -52,13 +51,3 @@ def test_the_count_is_called_n_and_the_record_is_one(way):
     np.testing.assert_allclose(more[:2], omega, rtol=1e-6, atol=1e-6 * more[-1])
     with pytest.raises(ConfigError, match="n = -1 must be a whole number"):
         function(*before, -1, **words)
-
-
-@pytest.mark.parametrize("way", ["modes", "cosserat"])
-def test_the_earlier_name_of_the_count_warns_and_gives_the_same(way):
-    function, before, words = WAYS[way]()
-    with pytest.warns(DeprecationWarning, match="argument m of modes is called n now"):
-        earlier = function(*before, m=3, **words)
-    assert_array_equal(earlier.omega, function(*before, 3, **words).omega)
-    with pytest.warns(DeprecationWarning), pytest.raises(TypeError, match="multiple values"):
-        function(*before, 3, m=3, **words)

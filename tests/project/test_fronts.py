@@ -54,7 +54,7 @@ def test_a_front_says_what_it_does_not_have(package):
         import_module(package).nothing  # noqa: B018
 
 
-NAMESAKES = [  # names that are also those of modules in the same folder, today or by an old path
+NAMESAKES = [  # names that are also those of modules in the same folder
     (package, name, place)
     for package in STUBS
     for name, place in import_module(package).MODULES.items()
@@ -65,7 +65,7 @@ NAMESAKES = [  # names that are also those of modules in the same folder, today 
 @pytest.mark.parametrize("first", ["the name", "the module"])
 def test_a_name_is_never_the_module_of_the_same_name(first):
     found = {f"{package}.{name}" for package, name, _ in NAMESAKES}
-    assert {"rom.prestress.spin_up", "rom.io.export", "rom.mbs.campbell"} < found
+    assert {"rom.prestress.spin_up", "rom.io.export"} < found
     code = f"""
 from importlib import import_module
 for package, name, place in {NAMESAKES}:

@@ -17,7 +17,7 @@ LIGHT = {"assembly", "body", "cyclic", "eigen", "errors", "io", "mbs", "model", 
          "paths", "reduction", "rotation", "units"}  # fmt: skip
 ANYTHING = {"__init__", "__main__", "bench", "cli", "doctor"}  # they stand in front
 # what every part stands on, none of it above another
-GROUND = {*"arguments deprecated lazy moved names places plausible process".split()}
+GROUND = {*"arguments lazy names places plausible process".split()}
 MAY_IMPORT = {  # module or package below rom/ -> what it may import from rom beside GROUND
     **{part: {"places", "errors", "model", "rotation"} for part in GROUND},
     "errors": set(),
@@ -53,7 +53,7 @@ ORDER = {
     level: tuple(names.split())
     for level, names in {
         "": (
-            "errors notebook rotation places lazy moved names process arguments units deprecated "
+            "errors notebook rotation places lazy names process arguments units "
             "plausible material model rows paths eigen reduction body fe doctor checks assembly "
             "cyclic workflow parametric updating prestress io mbs fmu view config report "
             "components bench cli __main__"
@@ -304,9 +304,7 @@ def test_fronts_load_nothing_but_fronts():
     done = run_blocked(f"import sys, {', '.join(fronts)}; print(*sys.modules)", blocked=())
     loaded = set(done.stdout.split())
     own = {name for name in loaded if name.split(".")[0] == "rom"}
-    assert own == {*fronts, "rom.lazy", "rom.process", "rom.process.launcher", "rom.moved"}, (
-        done.stderr
-    )
+    assert own == {*fronts, "rom.lazy", "rom.process", "rom.process.launcher"}, done.stderr
     assert not {"numpy", "scipy", "numba"} & loaded
 
 

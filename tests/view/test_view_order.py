@@ -85,8 +85,6 @@ FILMS = {
 DRAWN_BY_A_CHILD = {
     "faces", "instants", "mesh", "mode_shapes", "start", "updating", "wheel_modes"
 }  # fmt: skip
-PATH_CAME_FIRST = {"campbell", "convergence", "deformed", "flow", "frequencies", "history",
-                   "panels", "plane", "updating", "wheel_modes"}  # fmt: skip
 WRITERS = ("io/programs", "io/matrices", "io/sid", "io/fields", "io/native.py", "io/family.py",
            "io/export.py", "io/history.py", "io/fmu/body.py", "fmu/export.py", "report/html.py",
            "mbs/results/checkpoint.py", "view/scenes")  # fmt: skip
@@ -115,7 +113,7 @@ def test_things_come_first_then_the_path_then_words_by_name(name):
 @pytest.mark.parametrize(
     "name", [pytest.param(n, marks=[pytest.mark.long] * (n in DRAWN_BY_A_CHILD)) for n in PICTURES]
 )
-def test_a_picture_is_the_same_seen_and_written_in_both_orders(name, tmp_path):
+def test_a_picture_is_the_same_seen_and_written(name, tmp_path):
     (things, words), draw, file = PICTURES[name](), getattr(view, name), tmp_path / "a.png"
     seen = draw(*things, **words)
     assert isinstance(seen, Figure) and seen.path is None and not list(tmp_path.iterdir())
@@ -124,11 +122,6 @@ def test_a_picture_is_the_same_seen_and_written_in_both_orders(name, tmp_path):
     assert isinstance(written, Figure) and Path(written) == written.path == file
     assert file.read_bytes()[:4] == b"\x89PNG"
     assert seen._repr_png_() == seen.save(tmp_path / "b.png").read_bytes() == file.read_bytes()
-    if name in PATH_CAME_FIRST:
-        with pytest.warns(DeprecationWarning, match=f"{name} takes the path behind") as caught:
-            earlier = draw(tmp_path / "c.png", *things, **words)
-        assert caught[0].filename == __file__
-        assert Path(earlier).read_bytes() == file.read_bytes()
 
 
 @pytest.mark.parametrize(
@@ -156,7 +149,7 @@ def test_whatever_draws_curves_takes_axes():
 
 
 @pytest.mark.parametrize("name", few(0, FILMS))
-def test_a_film_is_the_same_seen_and_written_in_both_orders(name, tmp_path):
+def test_a_film_is_the_same_seen_and_written(name, tmp_path):
     (things, words), draw, file = FILMS[name](), getattr(view, name), tmp_path / "a.gif"
     seen = draw(*things, **words)
     assert isinstance(seen, view.Film) and seen.path is None and not list(tmp_path.iterdir())
@@ -164,10 +157,6 @@ def test_a_film_is_the_same_seen_and_written_in_both_orders(name, tmp_path):
     assert file.read_bytes()[:3] == b"GIF"
     assert seen.save(tmp_path / "c.gif").read_bytes() == file.read_bytes()
     assert b64encode(file.read_bytes()).decode() in seen._repr_html_()
-    if name in PATH_CAME_FIRST:
-        with pytest.warns(DeprecationWarning, match=f"{name} takes the path behind"):
-            earlier = draw(tmp_path / "b.gif", *things, **words)
-        assert Path(earlier).read_bytes() == file.read_bytes()
 
 
 def test_what_was_not_written_stands_for_no_path():

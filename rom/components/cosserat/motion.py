@@ -234,7 +234,7 @@ def simulate(  # noqa: PLR0913  keywords of one run, all with defaults
 
     Raises:
         ConfigError: for a step or an end that is not positive, or damping outside 0 to 1.
-        SolverError: if a step has no solution; its attribute ``motion`` is what came before.
+        SolverError: if a step has no solution; its ``solution`` is what came before.
     """
     if not (dt > 0 and t_end > 0 and 0 <= rho_inf <= 1):
         raise ConfigError(f"dt={dt:g}, t_end={t_end:g}, rho_inf={rho_inf:g} is no run.",
@@ -254,10 +254,9 @@ def simulate(  # noqa: PLR0913  keywords of one run, all with defaults
             _put(new, root(step * dt))
         done = advance(rod, S, point, loads(step * dt), kinds, new, W)
         if done[0] < 0:
-            error = SolverError(f"step {step} at {step * dt:g} s did not converge.",
-                                hint="Halve dt, or the load leaves the rod no way.")  # fmt: skip
-            error.motion = _motion(rod, kept, total)  # type: ignore[attr-defined]
-            raise error
+            raise SolverError(f"step {step} at {step * dt:g} s did not converge.",
+                              hint="Halve dt, or the load leaves the rod no way.",
+                              solution=_motion(rod, kept, total))  # fmt: skip
         total += done
         point = new
         if step % save_every == 0 or step == steps:

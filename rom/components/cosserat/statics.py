@@ -176,8 +176,8 @@ def equilibrium(
 
     Raises:
         ConfigError: if shapes of arrays differ from those of the rod.
-        SolverError: if no equilibrium was found; its attribute ``shape`` is the last good one and
-            ``share`` the part of the load it carries.
+        SolverError: if no equilibrium was found; its ``solution`` is the last good shape and
+            its ``share`` the part of the load it carries.
     """
     shape = reference(rod) if start is None else Shape(start.x.copy(), start.p.copy())
     free = clamped(rod) if free is None else np.asarray(free, dtype=bool)
@@ -204,9 +204,9 @@ def equilibrium(
 
 
 def _stuck(shape: Shape, share: float) -> SolverError:
-    error = SolverError(f"no equilibrium beyond {100 * share:.4g} % of the load.",
+    error = SolverError(f"no equilibrium beyond {100 * share:.4g} % of the load.", solution=shape,
                         hint="The rod buckles or a mechanism is left free.")  # fmt: skip
-    error.shape, error.share = shape, share  # type: ignore[attr-defined]
+    error.share = share  # type: ignore[attr-defined]
     return error
 
 

@@ -16,7 +16,6 @@ from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh
 from rom import rotation
 from rom.arguments import whole
 from rom.components.cosserat.statics import clamped, linearised
-from rom.deprecated import renamed
 from rom.errors import SolverError
 from rom.mbs.elements.rods.energy import Rod
 from rom.mbs.elements.rods.shapes import Shape
@@ -55,7 +54,6 @@ def gyroscopic(rod: Rod, shape: Shape, spin: npt.ArrayLike) -> csc_matrix:
     return csc_matrix((G.ravel(), (i, j)))[:n, :n]
 
 
-@renamed(m="n")
 def modes(
     rod: Rod,
     shape: Shape,

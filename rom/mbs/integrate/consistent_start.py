@@ -16,7 +16,7 @@ from rom.mbs.equations.sparse_solve import Constrained, unit_rows
 from rom.mbs.kernels.system import ROLL
 from rom.mbs.kernels.work import Work, workspace
 from rom.mbs.parts.signals import first_failure, sample_all
-from rom.mbs.results.state import Memory, State  # noqa: F401  under its old name
+from rom.mbs.results.state import State
 from rom.model import Array, Integers
 from rom.notebook import listed
 

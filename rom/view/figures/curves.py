@@ -9,7 +9,6 @@ import numpy as np
 import numpy.typing as npt
 
 from rom.arguments import typed
-from rom.deprecated import path_came_first
 from rom.errors import ConfigError
 from rom.model import Array
 from rom.view.canvas import page
@@ -32,7 +31,6 @@ TICK_DISTANCE = 0.03  # least distance of words of ticks, of a logarithmic axis
 MIN_ERROR = 1e-12  # errors below are drawn there: round-off has no meaning
 
 
-@path_came_first(1, 2, 0)
 @typed
 def history(  # noqa: PLR0913  keywords of one picture
     t: npt.ArrayLike,
@@ -146,7 +144,6 @@ def _shared(areas: Sequence[Any], ax: Any) -> None:
         axes.tick_params(labelbottom=False)
 
 
-@path_came_first(1, 0)
 @typed
 def frequencies(
     comparison: dict[str, Any],
@@ -200,7 +197,6 @@ def frequencies(
         return page.save(figure, path)
 
 
-@path_came_first(1, 0)
 @typed
 def convergence(
     panels: Sequence[tuple[str, dict[str, tuple[Any, Any]]]],
@@ -252,7 +248,6 @@ def convergence(
         return page.save(figure, path)
 
 
-@path_came_first(1, 0)
 @typed
 def campbell(  # noqa: PLR0913  keywords of one picture
     diagram: Any,

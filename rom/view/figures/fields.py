@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rom.arguments import typed
-from rom.deprecated import path_came_first
 from rom.errors import ConfigError
 from rom.model import Array
 from rom.view.canvas import page
@@ -68,7 +67,6 @@ class Drawing:
     equal: bool = True
 
 
-@path_came_first(1, 0)
 @typed
 def plane(
     drawings: Sequence[Drawing | Scene],

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rom.arguments import typed
-from rom.deprecated import path_came_first
 from rom.errors import ConfigError
 from rom.view.canvas import page
 from rom.view.canvas.scales import without_round_off
@@ -62,7 +61,6 @@ class Panel:
     log: bool = False
 
 
-@path_came_first(1, 0)
 @typed
 def panels(
     rows: Sequence[Sequence[Panel | Scene]],

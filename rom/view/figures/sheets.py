@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rom.arguments import typed
-from rom.deprecated import path_came_first
 from rom.errors import ConfigError
 from rom.model import Array, Index
 from rom.view.canvas import page
@@ -52,7 +51,6 @@ class Shape:
     tools: tuple[Array, ...] = ()
 
 
-@path_came_first(1, 2, 0)
 @typed
 def deformed(  # noqa: PLR0913  keywords of one picture
     curves: dict[str, tuple[Any, Any]],
@@ -137,7 +135,6 @@ def _tending(
     finish(axes, legend=True)
 
 
-@path_came_first(1, 2, 0)
 @typed
 def flow(
     times: Array,

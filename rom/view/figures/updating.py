@@ -7,7 +7,6 @@ import numpy as np
 import numpy.typing as npt
 
 from rom.arguments import typed
-from rom.deprecated import path_came_first
 from rom.errors import ConfigError
 from rom.model import Array, Index
 from rom.view.canvas import page
@@ -21,7 +20,6 @@ PAGE_WIDTH, TOP_HEIGHT, BOTTOM_HEIGHT = 1500, 430, 430  # pixel
 DOT_COLOUR, LINE_COLOUR = "#8b929c", "#6b7480"
 
 
-@path_came_first(1, 2, 3, 0)
 @typed
 def updating(  # noqa: PLR0913  keywords of one picture
     f: npt.ArrayLike,

@@ -11,7 +11,6 @@ import numpy.typing as npt
 
 from rom import rotation
 from rom.arguments import typed
-from rom.deprecated import path_came_first
 from rom.errors import ConfigError
 from rom.model import Array, FEModel, Index
 from rom.view.canvas import page
@@ -24,7 +23,6 @@ if TYPE_CHECKING:
 COINCIDENT_RTOL = 1e-6  # of the wheel's size: nodes of neighbouring sectors
 
 
-@path_came_first(1, 2, 0)
 @typed
 def wheel_modes(  # noqa: PLR0913  keywords of one picture
     model: FEModel,

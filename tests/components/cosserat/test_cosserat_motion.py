@@ -270,7 +270,7 @@ def test_bad_runs_are_refused_and_lost_ones_kept():
         simulate(one, 1.0, 0.1, rho_inf=1.5)
     with pytest.raises(SolverError, match="step 1 at 10 s did not converge") as error:
         simulate(one, 100.0, 10.0, load=loads(one, tip=(1e4, 0, 0)))
-    assert len(error.value.motion.t) == 1
+    assert len(error.value.solution.t) == 1
     unstable = straight(1.0, 20, stretch=1e4, bend=1.0, mass=1.0, inertia=1e-3)
     load = loads(unstable, tip=(0, 0, -3.0))
     with pytest.raises(SolverError, match="the shape is not stable"):

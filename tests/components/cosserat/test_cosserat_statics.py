@@ -366,4 +366,4 @@ def test_without_equilibrium_the_last_shape_is_kept():
     free = np.ones_like(clamped(one))
     with pytest.raises(SolverError, match="no equilibrium beyond 0 % of the load") as error:
         equilibrium(one, loads(one, tip=(1.0, 0, 0)), free=free)
-    assert error.value.share == 0.0 and np.isfinite(error.value.shape.x).all()
+    assert error.value.share == 0.0 and np.isfinite(error.value.solution.x).all()

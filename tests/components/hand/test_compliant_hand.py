@@ -236,7 +236,7 @@ def test_what_no_finger_can_do_is_named():
 
     with pytest.raises(SolverError, match="no posture beyond") as error:
         close(finger, tension=2.0, extra=lost)
-    assert 0 < error.value.posture.tip[0] < 5 * MM
+    assert 0 < error.value.solution.tip[0] < 5 * MM
 
 
 def test_a_stiffener_leaves_flexion_alone():
