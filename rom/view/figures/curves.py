@@ -116,9 +116,10 @@ def _histories(axes: Any, t: Array, curves: dict[str, Any], numbers: Sequence[in
 
 
 def line_look(k: int) -> dict[str, Any]:
-    """Colour and dashes of curve number k; no two of the first 24 look alike."""
+    """Colour and dashes of curve number k, no two of the first 24 alike; dashes lie on top."""
     again, colour = divmod(k, len(LINES))
-    return {"color": LINES[colour], "ls": DASHES[(k + again) % 2 + 2 * (again // 2 % 2)], "lw": 1.4}
+    dash = (k + again) % 2 + 2 * (again // 2 % 2)
+    return {"color": LINES[colour], "ls": DASHES[dash], "lw": 1.4, "zorder": 2.0 + 0.1 * dash}
 
 
 def _rows(axes: Any, words: Any) -> Array:

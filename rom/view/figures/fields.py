@@ -142,9 +142,10 @@ def _draw(figure: Any, axes: Any, drawing: Drawing | Scene) -> None:
     _fill(figure, axes, drawing)
     for k, (label, curves) in enumerate(drawing.curves.items()):
         for n, curve in enumerate(curves):
-            look = line_look(k) | {"lw": 2.0}
+            look = line_look(k)
+            look |= {"lw": 2.0, "zorder": look["zorder"] + 1.0}
             look |= {"color": "white", "lw": 1.0} if drawing.shade is not None else {}
-            axes.plot(*curve.T, label=label if n == 0 else f"_{label}", zorder=3, **look)
+            axes.plot(*curve.T, label=label if n == 0 else f"_{label}", **look)
     _draw_levels(axes, drawing)
     over = drawing.shade is not None
     for k, (label, points) in enumerate(drawing.points.items()):
