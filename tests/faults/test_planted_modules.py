@@ -145,8 +145,8 @@ STARTERS = {
     "FMU": "import rom; open('empty.py', 'w').write('import rom\\ndef mechanism():\\n"
     "    return rom.Mechanism()\\n'); rom.write_fmu('m.fmu', 'empty.py', dt=1e-3)",
     "probes": "from rom.doctor.probes import start; print(start('rom.doctor.libraries').answer())",
-    "peers": "from rom.process import child; from rom.bench.peers.compare import answer_of; "
-    "answer_of(child.python('rom.bench.peers.ours', '1'))",
+    "peers": "from rom.process import child; from benchmarks.peers.compare import answer_of; "
+    "answer_of(child.python('benchmarks.peers.ours', '1'))",
 }
 
 

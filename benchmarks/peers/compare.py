@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from rom.bench.timing import Row
+from benchmarks.timing import Row
 from rom.errors import ResourceError
 from rom.process import child
 from rom.process.mpirun import mpirun
@@ -37,7 +37,7 @@ def compared(lc: float) -> Iterator[Row]:
     python = interpreter()
     with child.scratch("peers") as folder:
         file = str(folder / "matrices.npz")
-        rod = child.python("rom.bench.peers.ours", str(lc))
+        rod = child.python("benchmarks.peers.ours", str(lc))
         ours = answer_of([*rod, "rbe2", str(N_MODES), file])
         case = f"{ours['dofs']} dofs, rbe2"
         yield case, "rom, one process", ours["processor"], "s of the processor", ""
@@ -69,7 +69,7 @@ def machine_gain() -> dict[str, float]:
     Raises:
         ResourceError: if a process fails.
     """
-    probe = child.python("rom.bench.peers.machine")
+    probe = child.python("benchmarks.peers.machine")
     one = answer_of(probe)
     with ThreadPoolExecutor() as side_by_side:
         two = list(side_by_side.map(answer_of, [probe, probe]))

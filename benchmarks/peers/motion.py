@@ -13,11 +13,11 @@ from typing import Any
 
 import numpy as np
 
-from rom.bench.models import KINDS, STEEL, geometry
-from rom.bench.peers.compare import answer_of, interpreter
-from rom.bench.peers.mechanisms import Described, built, chain, slider_crank
-from rom.bench.peers.ours import save_matrices
-from rom.bench.timing import Row, timed
+from benchmarks.models import KINDS, STEEL, geometry
+from benchmarks.peers.compare import answer_of, interpreter
+from benchmarks.peers.mechanisms import Described, built, chain, slider_crank
+from benchmarks.peers.ours import save_matrices
+from benchmarks.timing import Row, timed
 from rom.body.flexible import FlexibleBody
 from rom.errors import ConfigError
 from rom.io.native import save
@@ -39,7 +39,7 @@ class Run:
     """One mechanism with one step.
 
     Attributes:
-        mechanism: see `rom.bench.peers.mechanisms`.
+        mechanism: see `benchmarks.peers.mechanisms`.
         t_end: duration [s].
         steps: number of steps.
         samples: how many instants are compared; divides the number of steps.
@@ -128,7 +128,7 @@ def by_rom(body: FlexibleBody, run: Run) -> Moved:
 
 
 def measured(meshes: tuple[float, ...], links: tuple[int, ...]) -> Iterator[Row]:
-    """Case, quantity, value, unit and aim of each figure; see `rom.bench.benchmarks.motion`."""
+    """Case, quantity, value, unit and aim of each figure; see `benchmarks.benchmarks.motion`."""
     for lc in meshes:
         model = with_all_nodes(rod(lc))
         body = reduced(model)
