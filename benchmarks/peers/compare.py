@@ -5,6 +5,7 @@ Processor time, which a busy machine changes little; one process against two by 
 
 import json
 import os
+import sys
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -107,14 +108,15 @@ def interpreter(environment: Path | None = None, packages: tuple[str, ...] = ())
 
 
 def answer_of(command: list[str]) -> dict[str, Any]:
-    """The answer of a process with one thread.
+    """The answer of a process with one thread; scripts of other programs find each other.
 
     Raises:
         ResourceError: if it fails.
     """
     one = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
     allow = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
-    done = child.run(command, variables=one | allow)
+    foreign = {} if sys.executable in command else {"PYTHONPATH": str(SCRIPT_FILE.parent)}
+    done = child.run(command, variables=one | allow | foreign)
     if done.code:
         raise ResourceError(f"{' '.join(command[:4])} ended with {done.code}: {done.last}.")
     return json.loads(done.out.strip().splitlines()[-1])
