@@ -89,9 +89,13 @@ def reduction(sizes: tuple[float, ...] = (30e3, 100e3)) -> Iterator[Figure]:
         yield Figure("reduction", case, "peak memory of the process", peak, "GiB", "below 12")
 
 
-def large_reduction() -> Iterator[Figure]:
-    """The same at 300 000 dofs, in one process."""
-    yield from reduction((300e3,))
+def large_reduction(size: float = 300e3) -> Iterator[Figure]:
+    """The same at 300 000 dofs, in one process.
+
+    Args:
+        size: number of dofs aimed at.
+    """
+    yield from reduction((size,))
 
 
 def many_modes(size: float = 30e3, counts: tuple[int, ...] = (100, 300)) -> Iterator[Figure]:
@@ -337,14 +341,12 @@ def transmission(
     )
     from benchmarks.two_stages import stages_run
 
-    if ross:
-        for row in coefficients_compared():
-            yield Figure("transmission", *row)
     for rows in (speeds_run_through, programs_compared):
         for row in rows(speeds, cells):
             yield Figure("transmission", *row)
-    for row in stages_run():
-        yield Figure("transmission", *row)
+    for rows in (stages_run, coefficients_compared)[: 1 + ross]:
+        for row in rows():
+            yield Figure("transmission", *row)
 
 
 def wheel(families: int = 10, parameters: dict[str, float] | None = None) -> Iterator[Figure]:
