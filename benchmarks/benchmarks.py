@@ -344,8 +344,10 @@ def transmission(
     for rows in (speeds_run_through, programs_compared):
         for row in rows(speeds, cells):
             yield Figure("transmission", *row)
-    for rows in (stages_run, coefficients_compared)[: 1 + ross]:
-        for row in rows():
+    for row in stages_run():
+        yield Figure("transmission", *row)
+    if ross:
+        for row in coefficients_compared():
             yield Figure("transmission", *row)
 
 
@@ -365,7 +367,7 @@ def wheel(families: int = 10, parameters: dict[str, float] | None = None) -> Ite
         yield Figure("wheel", *row)
 
 
-def loops(*sizes: int) -> Iterator[Figure]:
+def loops(**sizes: int) -> Iterator[Figure]:
     """Stones, postures, a bar that flows, boulders, wind: compiled loops on one processor.
 
     Args:
@@ -373,7 +375,7 @@ def loops(*sizes: int) -> Iterator[Figure]:
     """
     from benchmarks.loops import measured
 
-    for case, quantity, value, unit, aim in measured(*sizes):
+    for case, quantity, value, unit, aim in measured(**sizes):
         yield Figure("loops", case, quantity, value, unit, aim)
 
 

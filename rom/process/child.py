@@ -21,7 +21,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rom.errors import ResourceError
-from rom.places import FOLDER_ABOVE
+from rom.places import FOLDER_ABOVE, PACKAGE
 from rom.process.interruption import terminable, uninterrupted
 
 ENTRY_FILE = Path(__file__).with_name("child_entry.py")
@@ -264,6 +264,22 @@ def _remove_abandoned(path: Path) -> None:
             shutil.rmtree(path)
     finally:
         os.close(descriptor)
+
+
+def trusted(path: Path) -> bool:
+    """Whether what lies there may be loaded as code: nobody can have written it who writes no code.
+
+    That is this user, the administrator, and whoever owns the package, whose code runs anyway; what
+    is not there is nobody's.
+    """
+    try:
+        about = path.stat()
+    except OSError:
+        return True
+    package = PACKAGE.stat()
+    group = not about.st_mode & stat.S_IWGRP or about.st_gid in (os.getegid(), package.st_gid)
+    owner = about.st_uid in (os.geteuid(), 0, package.st_uid)
+    return owner and group and not about.st_mode & stat.S_IWOTH
 
 
 def _ours(descriptor: int) -> bool:

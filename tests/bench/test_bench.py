@@ -204,7 +204,8 @@ def test_an_update_is_timed_that_finds_the_truth():
 def test_compiled_loops_are_timed_on_motions_that_are_right():
     """A short arch that rests on its abutments, postures near an isotropic one, a coarse bar."""
     figures = {
-        f"{f.case.split(',')[0]}: {f.quantity}": f for f in benchmarks.loops(10, 400, 120, 10)
+        f"{f.case.split(',')[0]}: {f.quantity}": f
+        for f in benchmarks.loops(blocks=10, steps=400, cells=120, height=10)
     }
     aims = [f.aim for f in figures.values()][::2]
     assert aims == ["below 30", "below 5", "below 2", "below 20", "below 30", "below 60"]

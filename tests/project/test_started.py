@@ -123,9 +123,8 @@ def commands(page):
     """Lines of the blocks of a page, with what goes over several in one."""
     blocks = re.findall(r"^```(?:sh|bash|console)\n(.*?)^```$", page.read_text(), re.M | re.S)
     text = "".join(blocks).replace("\\\n", " ")
-    return [
-        " ".join(shlex.split(line, comments=True)) for line in text.splitlines() if line.strip()
-    ]
+    words = (shlex.split(line, comments=True) for line in text.splitlines())
+    return [shlex.join(line) for line in words if line]
 
 
 def kind(line):
