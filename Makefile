@@ -7,6 +7,7 @@
 # make docs    the site, in build/site/; runs its notebooks; pictures of demos that have run stand in it
 # make pictures  run every demo, for the site; takes minutes
 # make thumbnails  small copies of these pictures, kept in docs/thumbnails/
+# make bench   measure speed and memory, NAME=motion for one of what `rom bench --list` names
 # make clean   remove what the others have left, but not the environments
 PYTHON = .venv/bin/python
 # tests that try more where there is time
@@ -17,7 +18,7 @@ LIGHT = .venv-light/bin/python
 # what Python compiles of sources is kept even where the system would not
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: setup demo test long docs pictures thumbnails clean
+.PHONY: setup demo test long docs pictures thumbnails bench clean
 setup:
 	@.ci/setup.sh
 
@@ -46,7 +47,10 @@ pictures: setup
 thumbnails:
 	$(PYTHON) docs/site_thumbnails.py
 
+bench: setup
+	$(PYTHON) -m rom bench $(NAME)
+
 clean:
 	rm -rf out build/site build/notebooks build/jupyter_execute docs/generated docs/notebooks/*.npz
 	rm -rf .pytest_cache .ruff_cache .mypy_cache .hypothesis
-	find rom tests demos meshes -name __pycache__ -prune -exec rm -rf {} +
+	find rom benchmarks tests demos meshes -name __pycache__ -prune -exec rm -rf {} +

@@ -31,7 +31,7 @@ STAGES = {  # what lies on the way, and the folders and files in which it lies
 }
 COMPONENTS, FRONT, GROUND = "components", "front", "ground"
 GROUND_FOLDERS = ("arguments", "paths", "process")  # beside the single files at the top
-FRONTS = ("cli", "config", "report", "bench", "doctor", "__main__")
+FRONTS = ("cli", "config", "report", "doctor", "__main__")
 HANDED_ON = ("SolidMesh", "FEModel", "Basis", "FlexibleBody", "Mechanism", "Solution")
 WIDTH, MARGIN, BOX = 1500, 30, 158  # of the sheet, around it, of a stage [pixel]
 STEP = (WIDTH - 2 * MARGIN - BOX) / (len(STAGES) - 1)  # from stage to stage [pixel]

@@ -22,8 +22,10 @@ def leave_working_folder() -> None:
 leave_working_folder()
 
 from rom.process.interruption import heed_lost_signals  # noqa: E402
+from rom.process.seclusion import leave_working_folder_alone  # noqa: E402
 
 heed_lost_signals()
+leave_working_folder_alone()
 
 from rom.cli.main import main  # noqa: E402
 

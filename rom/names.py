@@ -23,6 +23,7 @@ MAX_DIGITS = 18  # of whole numbers in texts
 MAX_NAMED = 20  # names in one message
 MAX_OFFERED = 8  # of them, where there are more
 TEMPORARY_BYTES = 20  # that a file being written adds to its name
+FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r")  # of a cell that spreadsheets calculate
 FOLDER_SEPARATORS = "/\\"
 INVISIBLE_CATEGORIES = {"Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp"}  # categories of Unicode
 NAME_ALPHABET = (
@@ -95,6 +96,12 @@ def file_name(name: str, ending: str = "") -> str:
             hint="Give the body a shorter name.",
         )
     return found
+
+
+def csv_cell(text: str) -> str:
+    """A text in a table with commas, which no spreadsheet takes for a formula or two cells."""
+    text = f"'{text}" if text.startswith(FORMULA_STARTS) else text
+    return '"' + text.replace('"', '""') + '"' if any(c in text for c in ',"\r\n') else text
 
 
 def inside(folder: str | Path, name: str, ending: str = "") -> Path:

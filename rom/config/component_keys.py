@@ -11,6 +11,7 @@ from rom.config.keys import (
     Flag,
     Key,
     Named,
+    OutputPath,
     Place,
     Quantity,
     Table,
@@ -175,6 +176,6 @@ TABLE = Table("A component.", (
         Key("spring", Words(), "Stiffness to the ground, `name=kx,ky,kz` or six numbers.", ()),
     )), "What `rom modes` computes.", {}),
     Key("output", Table("What `rom reduce` writes.", (
-        Key("file", FilePath(), "The body file, `.rom.npz`.", ...),
+        Key("file", OutputPath(), "The body file, `.rom.npz`.", ...),
     )), "What `rom reduce` writes."),
 ))  # fmt: skip

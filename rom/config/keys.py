@@ -202,6 +202,23 @@ class FilePath:
 
 
 @dataclass(frozen=True, slots=True)
+class OutputPath:
+    """A file that is written, in the folder of the document or one below it."""
+
+    summary: str = "file"
+
+    def read(self, value: Any, place: Place) -> Path:
+        """The path."""
+        path, folder = FilePath().read(value, place), place.document.path.parent
+        if not path.resolve().is_relative_to(folder.resolve()):
+            raise place.error(
+                f"{place.name} = {as_text(value)} leads out of the folder of its file, "
+                f"{folder.resolve()}; -o on the command line may name any place."
+            )
+        return path
+
+
+@dataclass(frozen=True, slots=True)
 class Anything:
     """Left to whoever uses it."""
 

@@ -18,7 +18,7 @@ import dolfinx.jit
 
 from rom.errors import ResourceError, RomError, warn
 from rom.fe.parallel import on_root
-from rom.process.child import lasting_scratch
+from rom.process.child import lasting_scratch, trusted
 
 JIT_OPTIONS = {"cffi_extra_compile_args": ["-O2", "-g0"], "cffi_libraries": None, "timeout": 60}
 # what dolfinx and FFCx call the function that reads option files, from version to version
@@ -90,15 +90,17 @@ def cache_directory() -> Path:
 
 
 def usable_cache() -> Path:
-    """The cache of dolfinx, or a temporary one when that cannot be written."""
-    path = cache_directory()
+    """The cache of dolfinx, or a temporary one when that cannot be written, or others can."""
+    path, why = cache_directory(), "cannot be written"
     try:
         path.mkdir(parents=True, exist_ok=True)
         if os.access(path, os.W_OK):
-            return path
+            if trusted(path):
+                return path
+            why = "belongs to somebody else, or others may write there"
     except OSError:
         pass
-    warn(f"{path} cannot be written; forms are compiled anew for this run.")
+    warn(f"{path} {why}; forms are compiled anew for this run.")
     return lasting_scratch("jit")
 
 

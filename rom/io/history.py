@@ -1,6 +1,5 @@
 """Histories of a motion: a table (CSV, pandas), a tree of arrays (HDF5), a data set (xarray)."""
 
-import csv
 import io
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -15,6 +14,7 @@ from rom.errors import ConfigError, ResourceError
 from rom.io.files import check_writable, write_whole
 from rom.io.hdf5 import h5py
 from rom.model import Array
+from rom.names import csv_cell
 
 AXIS_LETTERS = ("x", "y", "z")
 QUATERNION_PARTS = ("p0", "p1", "p2", "p3")
@@ -205,7 +205,7 @@ def table(head: list[str], values: Array, number: str) -> bytes:
         number: how one is written, e.g. "%.10g".
     """
     text = io.StringIO()
-    csv.writer(text, lineterminator="\n").writerow(head)
+    text.write(",".join(map(csv_cell, head)) + "\n")
     np.savetxt(text, values, number, ",")
     return text.getvalue().encode()
 

@@ -4,6 +4,7 @@
 `child` starts every other process by way of `child_entry`, `memory` says what may be taken,
 `disk_watch` ends what waits for a full disk.
 Processes that would make the same file take `turns`, `patience` says how long a user waits,
-`progress` how far work is and `stopwatch` where its time goes.
+`progress` how far work is, `stopwatch` where its time goes; `seclusion` keeps libraries from the
+files of the working folder.
 Nothing is imported here: the package comes by before the working folder is off the path of modules.
 """

@@ -6,6 +6,7 @@ behind: those of processes killed by SIGKILL are removed by the next one.
 """
 
 import atexit
+import errno
 import fcntl
 import os
 import shutil
@@ -19,13 +20,16 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from rom.places import FOLDER_ABOVE
+from rom.errors import ResourceError
+from rom.places import FOLDER_ABOVE, PACKAGE
 from rom.process.interruption import terminable, uninterrupted
 
 ENTRY_FILE = Path(__file__).with_name("child_entry.py")
 ROOT_FOLDER = str(FOLDER_ABOVE)
 INSTALL_FOLDERS = ("site-packages", "dist-packages")  # on the path of every child anyway
 FOLDER_PREFIX, FOLDER_SUFFIX = "rom-", ".scratch"  # of scratch folders; who else would use both?
+FULL_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+LEAST_ROOM = 2**16  # [bytes] with less than that a temporary folder counts as full
 GRACE_PERIOD = 1.0  # [s] between SIGTERM and SIGKILL
 # The launcher of MPI recognises its processes by these; a child is none of them.
 MPI_VARIABLES = ("OMPI_", "PMIX_", "PMI_", "MPI_", "PRTE_", "HYDRA_", "SLURM_")
@@ -182,14 +186,18 @@ def scratch(kind: str) -> Iterator[Path]:
 
     Args:
         kind: one word of its name.
+
+    Raises:
+        ResourceError: whatever failed inside, if the temporary folder is full.
     """
     made: tuple[Path, int] | None = None
     with terminable():
         try:
-            with uninterrupted():
-                sweep()
-                made = _locked(kind)
-            yield made[0]
+            with _room():
+                with uninterrupted():
+                    sweep()
+                    made = _locked(kind)
+                yield made[0]
         finally:
             with uninterrupted():
                 if made is not None:
@@ -199,9 +207,27 @@ def scratch(kind: str) -> Iterator[Path]:
 
 def lasting_scratch(kind: str) -> Path:
     """The same for as long as this process lives."""
-    path, _ = _locked(kind)
+    with _room():
+        path, _ = _locked(kind)
     atexit.register(shutil.rmtree, path, ignore_errors=True)
     return path
+
+
+@contextmanager
+def _room() -> Iterator[None]:
+    """What fails inside for want of room, here or in a child, is said to."""
+    try:
+        yield
+    except Exception as error:
+        folder = tempfile.tempdir  # None where Python has found no place that takes a file
+        lost = isinstance(error, FileNotFoundError) and folder is None
+        if not lost and getattr(error, "errno", None) not in FULL_ERRORS:
+            if folder is None or shutil.disk_usage(folder).free >= LEAST_ROOM:
+                raise
+        raise ResourceError(
+            f"the temporary folder {folder or os.environ.get('TMPDIR', '')} has no room for files.",
+            hint="Let the variable TMPDIR name a folder on a disk that has.",
+        ) from error
 
 
 def _locked(kind: str) -> tuple[Path, int]:
@@ -238,6 +264,22 @@ def _remove_abandoned(path: Path) -> None:
             shutil.rmtree(path)
     finally:
         os.close(descriptor)
+
+
+def trusted(path: Path) -> bool:
+    """Whether what lies there may be loaded as code: nobody can have written it who writes no code.
+
+    That is this user, the administrator, and whoever owns the package, whose code runs anyway; what
+    is not there is nobody's.
+    """
+    try:
+        about = path.stat()
+    except OSError:
+        return True
+    package = PACKAGE.stat()
+    group = not about.st_mode & stat.S_IWGRP or about.st_gid in (os.getegid(), package.st_gid)
+    owner = about.st_uid in (os.geteuid(), 0, package.st_uid)
+    return owner and group and not about.st_mode & stat.S_IWOTH
 
 
 def _ours(descriptor: int) -> bool:

@@ -26,6 +26,9 @@ def main(parent: int, seconds: int, size: int, command: list[str]) -> None:
         _limit(resource.RLIMIT_AS, size)
     if not module:
         os.execvp(command[0], command)
+    from rom.process.seclusion import leave_working_folder_alone
+
+    leave_working_folder_alone()
     sys.argv = command[3:]
     runpy.run_module(command[3], run_name="__main__", alter_sys=True)
 

@@ -8,10 +8,16 @@ Source:
     another: Bierman, Factorization methods for discrete sequential estimation (1977).
 """
 
+import os
+from pathlib import Path
+
 import numba
 
+from rom.process.child import trusted
+
+CODE_FOLDER = Path(os.environ.get("NUMBA_CACHE_DIR") or Path(__file__).with_name("__pycache__"))
 # without a count of references no array can be made
-kernel = numba.njit(cache=True, _nrt=False, error_model="numpy")
+kernel = numba.njit(cache=trusted(CODE_FOLDER), _nrt=False, error_model="numpy")
 
 
 @kernel

@@ -20,7 +20,7 @@ from rom.body.flexible import FlexibleBody
 from rom.body.surface import surface_of
 from rom.errors import ConfigError, ModelError, ParameterError
 from rom.model import Array, Index
-from rom.names import named
+from rom.names import csv_cell, named
 from rom.plausible import check_damping_ratio
 from rom.updating.estimate import BAND_RATIO, DAMPING_LOG_DEVIATION
 from rom.updating.family_model import Attached, Family, FamilyModel, Parts, family_model
@@ -71,7 +71,7 @@ class Plan:
             d = np.asarray(channels.directions)
             unit = d / np.linalg.norm(d, axis=1, keepdims=True)
             for k, values in enumerate(np.hstack([channels.points, unit]), 1):
-                own = () if channels.bodies is None else channels.bodies[k - 1 : k]
+                own = () if channels.bodies is None else map(csv_cell, channels.bodies[k - 1 : k])
                 rows.append(",".join([kind, str(k), *(f"{x:.9g}" for x in values), *own]))
         return "\n".join(rows) + "\n"
 

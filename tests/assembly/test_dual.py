@@ -126,7 +126,7 @@ def test_all_modes_are_the_whole():
 
 def test_a_slender_beam_of_two_halves_bends_as_euler_and_bernoulli_say():
     """Free: (4.730041)^2 sqrt(E I / (rho A L^4)) for the thin side, from two bodies."""
-    from rom.bench.models import bar
+    from benchmarks.models import bar
 
     left, right = bar((0.5, 0.02, 0.01), (8, 1, 1)), bar((0.5, 0.02, 0.01), (8, 1, 1))
     kinds = {"root": "full", "tip": "full"}

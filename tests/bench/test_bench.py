@@ -11,10 +11,10 @@ from numpy.testing import assert_allclose
 from scipy.linalg import eigh
 
 import rom
+from benchmarks import benchmarks, many_modes, updating, wheel
+from benchmarks.models import planetary_train, shaft_in_films
 from cases.paths import ROOT
 from cases.solid import block
-from rom.bench import benchmarks, many_modes, updating, wheel
-from rom.bench.models import planetary_train, shaft_in_films
 from rom.eigen.verbs import rigid_motions
 from rom.errors import ResourceError
 
@@ -84,7 +84,7 @@ def test_the_integrator_is_measured_without_fenicsx():
     """After one turn of 1000 steps that compiles, and on a rod of twenty normal modes."""
     code = (
         "import sys; sys.modules.update(dict.fromkeys(['dolfinx', 'petsc4py', 'gmsh', 'mpi4py']))\n"
-        "from rom.bench.benchmarks import integrator\n"
+        "from benchmarks.benchmarks import integrator\n"
         "for figure in integrator(turns=2): print(figure.case, figure.quantity, figure.value > 0)"
     )
     done = subprocess.run(
@@ -136,8 +136,8 @@ def test_steps_of_chosen_length_are_measured_against_those_of_one_length():
 
 def test_other_programs_reduce_the_same_model(bar, tmp_path):
     """The script that other programs run, here with SciPy: its body has our frequencies."""
-    from rom.bench.peers.compare import SCRIPT_FILE
-    from rom.bench.peers.ours import save_matrices
+    from benchmarks.peers.compare import SCRIPT_FILE
+    from benchmarks.peers.ours import save_matrices
 
     file = tmp_path / "matrices.npz"
     save_matrices(bar, str(file), tuple(benchmarks.KINDS))
@@ -161,7 +161,7 @@ def test_many_modes_are_the_same_both_ways(bar):
 
 @pytest.mark.long
 def test_an_environment_that_cannot_be_made_is_named(tmp_path, monkeypatch):
-    from rom.bench.peers import compare
+    from benchmarks.peers import compare
 
     monkeypatch.setattr(compare, "PEER_FOLDER", tmp_path / "peers")
     monkeypatch.setattr(compare, "PACKAGES", ("no-such-package-anywhere==0",))
@@ -204,7 +204,8 @@ def test_an_update_is_timed_that_finds_the_truth():
 def test_compiled_loops_are_timed_on_motions_that_are_right():
     """A short arch that rests on its abutments, postures near an isotropic one, a coarse bar."""
     figures = {
-        f"{f.case.split(',')[0]}: {f.quantity}": f for f in benchmarks.loops(10, 400, 120, 10)
+        f"{f.case.split(',')[0]}: {f.quantity}": f
+        for f in benchmarks.loops(blocks=10, steps=400, cells=120, height=10)
     }
     aims = [f.aim for f in figures.values()][::2]
     assert aims == ["below 30", "below 5", "below 2", "below 20", "below 30", "below 60"]

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from benchmarks import large_deflection as bench
+from benchmarks.peers import compare, spin_up
 from rom import rotation
-from rom.bench import large_deflection as bench
-from rom.bench.peers import compare, spin_up
 from rom.components.cosserat import straight
 from rom.components.wind.wind_turbine import ramp
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from rom.bench.peers import films
-from rom.bench.units import RigidShaft
+from benchmarks.peers import films
+from benchmarks.units import RigidShaft
 from rom.components.journal_bearing import equilibrium
 from rom.components.transmission import Shaft, rest
 

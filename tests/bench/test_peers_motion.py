@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from benchmarks.benchmarks import motion
+from benchmarks.models import bar
+from benchmarks.peers import motion as peer
+from benchmarks.peers import reference
+from benchmarks.peers.mechanisms import built, pendulum
 from cases.paths import TESTS
-from rom.bench.benchmarks import motion
-from rom.bench.models import bar
-from rom.bench.peers import motion as peer
-from rom.bench.peers import reference
-from rom.bench.peers.mechanisms import built, pendulum
 from rom.errors import ConfigError
 from rom.mbs.integrate.simulation import simulate
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from benchmarks.peers import compare, rods
 from rom import rotation
-from rom.bench.peers import compare, rods
 from rom.components.cosserat import body, straight
 from rom.components.wind.wind_turbine import RATED_SPEED, blade, ramp, run_up
 

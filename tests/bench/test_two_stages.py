@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import rom
-from rom.bench import two_stages
+from benchmarks import two_stages
 
 pytestmark = [pytest.mark.fenicsx, pytest.mark.long]
 

@@ -182,13 +182,13 @@ def test_simulate_lets_the_body_fall_about_its_hinge(file, tmp_path, capsys):
 
 
 def test_bench_lists_its_benchmarks(capsys):
-    from rom.bench.benchmarks import BENCHMARKS
+    from benchmarks.benchmarks import BENCHMARKS
 
     assert list(answer(capsys, "bench", "--list")["benchmarks"]) == list(BENCHMARKS)
 
 
 def test_bench_prints_figures_with_their_aims(capsys, monkeypatch):
-    from rom.bench import benchmarks
+    from benchmarks import benchmarks
 
     def one():
         """One."""

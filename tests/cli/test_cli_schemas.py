@@ -6,10 +6,10 @@ from dataclasses import asdict
 import pytest
 
 import rom
+from benchmarks.benchmarks import Figure
 from cases.files.schema import errors
 from cases.files.toml_files import PENDULUM
 from cases.solid import block
-from rom.bench.benchmarks import Figure
 from rom.cli.main import main
 from rom.cli.parser import VERBS
 from rom.cli.schemas import schema

@@ -11,9 +11,9 @@ from scipy.optimize import brentq
 from scipy.sparse import csr_matrix, identity, random
 
 import rom
+from benchmarks.models import bar
 from cases.operators import KINDS
 from cases.solid import block
-from rom.bench.models import bar
 from rom.eigen import lanczos, search
 from rom.eigen.scipy import SciPyOperators
 from rom.eigen.supports import refuse_loose

@@ -9,7 +9,7 @@ from scipy.linalg import eigh
 from scipy.sparse import block_diag, csr_matrix, diags, random
 
 import rom
-from rom.bench.models import bar
+from benchmarks.models import bar
 from rom.eigen import dissection, fronts, substructuring
 from rom.eigen.scipy import SciPyOperators
 from rom.eigen.substructuring import lehmann_bounds, substructured_modes

@@ -86,6 +86,8 @@ def planted(tmp_path, monkeypatch, body):
     for name in ("dolfinx_jit_parameters.json", "ffcx_parameters.json"):
         (folder / name).write_text("trapped")
     (folder / ".numba_config.yaml").write_text(f"cache_dir: {marks}\n")
+    (folder / "matplotlibrc").write_text("text.usetex: True\n")
+    (folder / "petsc.cfg").write_text("PETSC_DIR = trapped\nPETSC_ARCH = trapped\n")
     (folder / "box.geo").write_text(BOX_GEO)
     shutil.copy(body, folder / "bar.rom.npz")
     monkeypatch.chdir(folder)
@@ -130,6 +132,47 @@ def loaded_by_python():
     return frozenset(done.stdout.split())
 
 
+LIBRARIES = ("matplotlib", "numba", "petsc4py.PETSc", "pyvista", "gmsh", "dolfinx.jit", "meshio")
+LOADED = f"""
+import importlib, importlib.util, os, sys
+def heard(event, given):
+    if event == "open" and isinstance(given[0], str):
+        place = os.path.abspath(given[0])
+        if place.startswith({{folder!r}}) and os.path.isfile(place):
+            print("read", given[0])
+sys.addaudithook(heard)
+{{entry}}
+for name in {LIBRARIES}:
+    if importlib.util.find_spec(name.split(".")[0]):
+        importlib.import_module(name)
+print("end")
+"""
+ENTRIES = {
+    "verb": "import rom.__main__",
+    "child": "from rom.process import seclusion; seclusion.leave_working_folder_alone()",
+}
+
+
+@pytest.mark.parametrize("entry", ENTRIES)
+def test_no_library_reads_a_file_of_the_folder(entry, planted):
+    """Whatever it is called: all that is opened is looked at."""
+    code = LOADED.format(folder=os.getcwd(), entry=ENTRIES[entry])
+    env = environment(MPLCONFIGDIR="settings", MATPLOTLIBRC=".", NUMBA_CACHE_DIR=".")
+    done = subprocess.run([sys.executable, "-P", "-c", code], env=env, capture_output=True,
+                          text=True, timeout=120, check=False)  # fmt: skip
+    assert done.stdout.split() == ["end"], done.stdout + done.stderr
+    assert left(planted) == [] and not Path("settings").exists()
+
+
+def test_a_child_imports_where_no_settings_lie(planted, tmp_path):
+    """Those of the folder would let matplotlib start LaTeX."""
+    module = tmp_path / "shown.py"
+    module.write_text("import matplotlib as m\nprint(m.rcParams['text.usetex'])\n")
+    pytest.importorskip("matplotlib", reason="matplotlib is not installed")
+    done = child.run(child.python("shown"), variables={"PYTHONPATH": f"{ROOT}:{tmp_path}"})
+    assert (done.code, done.out) == (0, "False\n"), done.err
+
+
 def test_the_traps_work(planted):
     subprocess.run([sys.executable, "-c", "import gmsh"], check=False, capture_output=True)
     assert left(planted) == ["gmsh"]
@@ -145,8 +188,8 @@ STARTERS = {
     "FMU": "import rom; open('empty.py', 'w').write('import rom\\ndef mechanism():\\n"
     "    return rom.Mechanism()\\n'); rom.write_fmu('m.fmu', 'empty.py', dt=1e-3)",
     "probes": "from rom.doctor.probes import start; print(start('rom.doctor.libraries').answer())",
-    "peers": "from rom.process import child; from rom.bench.peers.compare import answer_of; "
-    "answer_of(child.python('rom.bench.peers.ours', '1'))",
+    "peers": "from rom.process import child; from benchmarks.peers.compare import answer_of; "
+    "answer_of(child.python('benchmarks.peers.ours', '1'))",
 }
 
 

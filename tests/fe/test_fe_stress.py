@@ -128,7 +128,7 @@ def test_messages(model):
         rom.write_stress(replace(body, stress=None), np.zeros(8), "x.vtu")
     with pytest.raises(ConfigError, match=r"q has the shape \(3,\)"):
         body.stress.field(np.zeros(3))
-    from rom.bench.models import bar
+    from benchmarks.models import bar
 
     with pytest.raises(ConfigError, match="has no finite elements"):
         rom.reduce(

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 import rom
+from benchmarks.models import KINDS
+from benchmarks.models import bar as bar_of
 from cases.paths import TESTS
-from rom.bench.models import KINDS
-from rom.bench.models import bar as bar_of
 from rom.eigen.verbs import rigid_motions
 from rom.reduction.interfaces.connection import connect
 from rom.workflow import operators

@@ -9,10 +9,10 @@ import pytest
 from numpy.testing import assert_allclose
 
 import rom
+from benchmarks.peers.compare import PEER_FOLDER
 from cases.mbs.mechanisms import nodal_body, random_nodes, simulate_quietly
 from cases.paths import ROOT
 from cases.solid import block
-from rom.bench.peers.compare import PEER_FOLDER
 from rom.io.programs.exudyn import arrays
 
 PEER = ROOT / PEER_FOLDER / "bin" / "python"

@@ -7,8 +7,8 @@ import pytest
 from scipy.sparse import csr_matrix
 
 import rom
-from rom.bench.models import KINDS
-from rom.bench.models import bar as bar_of
+from benchmarks.models import KINDS
+from benchmarks.models import bar as bar_of
 from rom.errors import QualityGateError, RomWarning
 
 

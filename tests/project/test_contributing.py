@@ -68,7 +68,7 @@ def test_the_table_answers_for_eight_things():
 def test_a_row_names_all_files_that_know_a_member(what):
     member, row = re.compile(MEMBERS[what]), rows()[what]
     sources = [*(ROOT / "rom").rglob("*.py"), *(ROOT / "rom").rglob("*.pyi")]
-    apart = ("rom/components/", "rom/bench/", *ELSEWHERE.get(what, ()))
+    apart = ("rom/components/", *ELSEWHERE.get(what, ()))
     files = {str(path.relative_to(ROOT)): path for path in sources}
     know = {
         name for name, path in files.items()

@@ -15,7 +15,7 @@ HEAVY = {"dolfinx", "ufl", "basix", "ffcx", "petsc4py", "slepc4py", "mpi4py", "g
 DRAWING = {"pyvista", "vtk", "vtkmodules", "matplotlib"}
 LIGHT = {"assembly", "body", "cyclic", "eigen", "errors", "io", "mbs", "model", "parametric",
          "paths", "reduction", "rotation", "units"}  # fmt: skip
-ANYTHING = {"__init__", "__main__", "bench", "cli", "doctor"}  # they stand in front
+ANYTHING = {"__init__", "__main__", "cli", "doctor"}  # they stand in front
 # what every part stands on, none of it above another
 GROUND = {*"arguments lazy names places plausible process".split()}
 MAY_IMPORT = {  # module or package below rom/ -> what it may import from rom beside GROUND
@@ -54,13 +54,9 @@ ORDER = {
     for level, names in {
         "": (
             "errors notebook rotation places lazy names process arguments units "
-            "plausible material model rows paths eigen reduction body fe doctor checks assembly "
+            "plausible material model rows paths eigen reduction body fe checks assembly "
             "cyclic workflow parametric updating prestress io mbs fmu view config report "
-            "components bench cli __main__"
-        ),
-        "bench": (
-            "timing models units two_stages peers updating large_deflection loops gears oil_films "
-            "first_use wheel many_modes benchmarks"
+            "components doctor cli __main__"
         ),
         "cli": (
             "answer speech schemas options described method ranks matrices model output verbs "
@@ -211,9 +207,9 @@ def test_an_upward_import_is_found_on_each_level(level):
 
 
 def test_components_do_not_know_who_uses_them():
-    """They could leave as a package of their own; benchmarks measure them."""
+    """They could leave as a package of their own; the doctor compiles them ahead."""
     for path in MODULES:
-        if part_of(path) not in ("components", "bench"):
+        if part_of(path) not in ("components", "doctor"):
             bad = [name for _, name in imports(path) if name.startswith("rom.components")]
             assert not bad, f"{path}: {bad}"
 

@@ -58,7 +58,8 @@ def shipped(tmp_path_factory):
     tree.mkdir()
     for name in ("pyproject.toml", "README.md", "LICENSE"):
         shutil.copy(ROOT / name, tree)
-    shutil.copytree(ROOT / "rom", tree / "rom", ignore=shutil.ignore_patterns("__pycache__"))
+    for name in ("rom", "benchmarks"):
+        shutil.copytree(ROOT / name, tree / name, ignore=shutil.ignore_patterns("__pycache__"))
     sdist = hook("build_sdist", tree, folder)
     shutil.unpack_archive(sdist, folder / "unpacked")
     wheel = hook("build_wheel", next((folder / "unpacked").iterdir()), folder)
@@ -97,6 +98,19 @@ def test_the_wheel_asks_pip_for_three_libraries(shipped):
     needed = [r for r in metadata.get_all("Requires-Dist") if "extra" not in r]
     assert {re.match(r"\w+", r).group() for r in needed} == {"numpy", "scipy", "numba"}
     assert metadata["Version"] == rom.__version__
+
+
+def test_benchmarks_are_in_the_source_and_said_to_be_where_they_are_not(installed, tmp_path):
+    """The verb stays in both: one sentence and exit code 2, or what there is to measure."""
+    said = {}
+    for place in (installed, ROOT):
+        command = [sys.executable, "-P", "-m", "rom", "bench", "--list"]
+        said[place] = subprocess.run(command, cwd=tmp_path, text=True, capture_output=True,
+                                     env=environment(place), timeout=120, check=False)  # fmt: skip
+    assert said[installed].returncode == 2
+    assert "Benchmarks come with the source of rom" in said[installed].stderr
+    assert "make bench NAME=motion" in said[installed].stderr
+    assert said[ROOT].returncode == 0 and "motion " in said[ROOT].stdout
 
 
 def test_a_saved_slider_crank_runs_from_the_wheel_alone(installed, tmp_path):

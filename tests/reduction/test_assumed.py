@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import rom
-from rom.bench.models import KINDS, bar
+from benchmarks.models import KINDS, bar
 from rom.errors import ConfigError, InterfaceError, ModelError
 
 SIZE = (1.0, 0.03, 0.01)

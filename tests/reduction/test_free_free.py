@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import rom
-from rom.bench.models import KINDS
-from rom.bench.models import bar as bar_of
+from benchmarks.models import KINDS
+from benchmarks.models import bar as bar_of
 from rom.errors import ModelError
 
 SIZE = (1.0, 0.02, 0.01)

@@ -8,9 +8,9 @@ from numpy.testing import assert_allclose
 from scipy.sparse import diags
 
 import rom
+from benchmarks.models import bar
 from cases.solid import block
 from cases.surfaces import TURN, surface
-from rom.bench.models import bar
 from rom.eigen.scipy import HeldSciPy
 from rom.eigen.verbs import constraint_modes, quadratic, rigid_motions
 from rom.errors import ConfigError, InterfaceError

@@ -8,9 +8,9 @@ import pytest
 from numpy.testing import assert_allclose
 
 import rom
+from benchmarks.units import as_mechanism
 from cases.mbs.geared_rotors import rigid_unit
 from rom import view
-from rom.bench.units import as_mechanism
 from rom.components.gear_mesh import GearPair
 from rom.components.journal_bearing import film, iso_vg
 from rom.errors import ConfigError

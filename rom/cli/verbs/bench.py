@@ -1,17 +1,19 @@
 """Measure speed and memory as ratios within one run, so that the speed of the machine cancels."""
 
 import argparse
+import importlib
 import logging
+import sys
 from collections.abc import Iterator
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rom.cli.answer import Answer, table
-
-if TYPE_CHECKING:
-    from rom.bench.benchmarks import Figure
+from rom.errors import ConfigError
+from rom.places import FOLDER_ABOVE
 
 log = logging.getLogger("rom")
+SOURCE_FILES = ("pyproject.toml", "benchmarks/benchmarks.py")  # beside the package
 SUMMARY = "measure speed and memory"
 EXAMPLES = """\
   rom bench --list
@@ -27,23 +29,36 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> Answer:
     """Run the benchmarks named, or list them."""
-    from rom.bench.benchmarks import BENCHMARKS
-    from rom.bench.benchmarks import run as measure
-
+    known = _of_the_source()
     if args.list:
-        about = {name: (f.__doc__ or "").split("\n")[0] for name, f in BENCHMARKS.items()}
+        about = {name: (f.__doc__ or "").split("\n")[0] for name, f in known.BENCHMARKS.items()}
         return Answer({"benchmarks": about}, table(("benchmark", ""), about.items()))
-    return _answer(list(_told(measure(tuple(args.names)))))
+    return _answer(list(_told(known.run(tuple(args.names)))))
 
 
-def _told(figures: "Iterator[Figure]") -> "Iterator[Figure]":
+def _of_the_source() -> Any:
+    """The module of all benchmarks, which stand beside the package and are not installed with it.
+
+    Raises:
+        ConfigError: where there is the package alone.
+    """
+    if not all((FOLDER_ABOVE / file).is_file() for file in SOURCE_FILES):
+        raise ConfigError(
+            "Benchmarks come with the source of rom, not with the installed package.",
+            hint="In a checkout of it, `make bench NAME=motion` sets up what they need.",
+        )
+    sys.path.insert(0, str(FOLDER_ABOVE))
+    return importlib.import_module("benchmarks.benchmarks")
+
+
+def _told(figures: Iterator[Any]) -> Iterator[Any]:
     """The figures, each said as soon as it is measured: a benchmark takes minutes."""
     for figure in figures:
         log.info("%s: %s %.4g %s", figure.case, figure.quantity, figure.value, figure.unit)
         yield figure
 
 
-def _answer(figures: "list[Figure]") -> Answer:
+def _answer(figures: list[Any]) -> Answer:
     rows = [
         (f"{f.benchmark}, {f.case}: {f.quantity}", f"{f.value:.4g} {f.unit}".strip(), f.aim)
         for f in figures

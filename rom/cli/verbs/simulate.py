@@ -4,6 +4,7 @@ The motion is written as a table, with pictures and films when they are asked fo
 """
 
 import argparse
+import logging
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -16,7 +17,7 @@ from rom.cli.options import OUTPUT_FLAG, add_meshing, positive, require, vector
 from rom.cli.output import add_force, checked, claim, files_in
 from rom.cli.ranks import ranks
 from rom.cli.verbs.swing import pendulum
-from rom.errors import ConfigError, RomError
+from rom.errors import ConfigError, ResourceError, RomError
 from rom.names import inside
 
 if TYPE_CHECKING:
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from rom.mbs.integrate.keeping import Keeping
     from rom.model import Report
 
+log = logging.getLogger("rom")
 PARTS_FOLDER = "motion.parts"  # where the motion is kept while the run lasts
 MOST_TIMES = 10  # of an event that are told; all of them are in the record
 SUMMARY = "move a mechanism, or let a body swing as a pendulum"
@@ -95,8 +97,8 @@ def _mechanism(args: argparse.Namespace) -> Answer:
         done = move(file, **origin, progress=_aloud(args), keep=keep)
 
     def write() -> None:
-        done.write(args.output)
-        _finish(keep)
+        with _finishing(args, keep):
+            done.write(args.output)
 
     return _answer(done.solution, done.audit, done.paths(args.output), write)
 
@@ -119,11 +121,6 @@ def _keeping(args: argparse.Namespace, made_from: dict[str, str]) -> "Keeping | 
     return keep if ranks()[0] == 0 else None
 
 
-def _finish(keep: "Keeping | None") -> None:
-    if keep is not None:
-        keep.remove()
-
-
 @contextmanager
 def _rescuing(
     args: argparse.Namespace, keep: "Keeping | None", write: Callable[[Any, "Report"], Path]
@@ -138,17 +135,38 @@ def _rescuing(
         from rom.mbs.parts.foreign import KEPT_HINT
         from rom.mbs.results.audit import audit
 
-        path = write(solution, audit(solution))
+        if _aloud(args):
+            words = "checking and writing the motion up to t = %.6g s; Ctrl-C leaves that out"
+            log.info(words, solution.t[-1])
+        try:
+            place = f"is in {write(solution, audit(solution))}"
+        except ResourceError as full:
+            place = f"could not be written: {full.message.rstrip('.')}"
         if isinstance(error, RomError):
-            hints = [
-                error.hint.replace(KEPT_HINT, "").strip(),
-                f"The motion up to there is in {path}.",
-            ]
-            if keep.state.exists():
-                resume = "" if args.resume else " --resume"
-                hints.append(f"To go on: {_command(args)}{resume}.")
+            own = error.hint.replace(KEPT_HINT, "").strip()
+            hints = (own, f"The motion up to there {place}.", _to_go_on(args, keep))
             error.hint = " ".join(hint for hint in hints if hint)
         raise
+
+
+def _to_go_on(args: argparse.Namespace, keep: "Keeping | None") -> str:
+    """What to type after an end that was none of the motion's, if something of it is kept."""
+    if keep is None or not keep.state.exists():
+        return ""
+    return f"To go on: {_command(args)}{'' if args.resume else ' --resume'}."
+
+
+@contextmanager
+def _finishing(args: argparse.Namespace, keep: "Keeping | None") -> Iterator[None]:
+    """Write results inside; what was kept of the motion goes with that, and stays if it fails."""
+    try:
+        yield
+    except ResourceError as error:
+        if hint := _to_go_on(args, keep):
+            error.hint = f"The motion is kept in {args.output / PARTS_FOLDER}. Make room. {hint}"
+        raise
+    if keep is not None:
+        keep.remove()
 
 
 def _answer(solution: Any, audit: "Report", paths: list[Path], write: Any) -> Answer:
@@ -211,11 +229,11 @@ def _pendulum(args: argparse.Namespace) -> Answer:
         solution, audit = _swing(body, args, keep)
 
     def write() -> None:
-        _write_motion(path, tables, body, solution)
-        record.write(paths, solution, audit)
-        _write_films(films, solution)
-        _write_scene(paths[-2], body, solution)
-        _finish(keep)
+        with _finishing(args, keep):
+            _write_motion(path, tables, body, solution)
+            record.write(paths, solution, audit)
+            _write_films(films, solution)
+            _write_scene(paths[-2], body, solution)
 
     return _answer(solution, audit, paths, write)
 

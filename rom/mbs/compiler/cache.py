@@ -21,7 +21,7 @@ from numba.core.caching import IndexDataCacheFile
 from numba.core.compiler_lock import global_compiler_lock
 
 from rom.places import PACKAGE
-from rom.process.child import lasting_scratch
+from rom.process.child import lasting_scratch, trusted
 from rom.process.patience import Patience
 from rom.process.turns import Turns
 
@@ -51,6 +51,15 @@ class CodeFiles(IndexDataCacheFile):  # type: ignore[misc]
         super().__init__(cache._cache_path, name, made_of)
         self._version = made_of  # compared before anything else is read
         self.path, self.function = Path(self._index_path), function
+
+    def _load_index(self) -> dict[Any, str]:
+        safe = trusted(self.path.parent) and trusted(self.path)
+        return super()._load_index() if safe else {}
+
+    def _load_data(self, name: str) -> Any:
+        if not trusted(self.path.parent / name):
+            raise PermissionError(f"others may have written {name}")  # Numba compiles it anew
+        return super()._load_data(name)
 
     def load(self, key: Any) -> Any:
         """Compiled code, if need be of a process that makes it just now; None to make it."""
@@ -119,9 +128,12 @@ def kept(compiler: Callable[[Any], Any], *, entry: bool = False) -> Callable[[An
 
 
 def _with_a_place(compiler: Callable[[Any], Any], function: Any) -> Any:
-    """What Numba compiles a function by; where no folder can be written, its code is not kept."""
+    """What Numba compiles a function by; where no safe folder can be written, code is not kept."""
     try:
-        return compiler(function)
+        made = compiler(function)
+        if numba.config.DISABLE_JIT or trusted(Path(made._cache._cache_path)):
+            return made
+        raise RuntimeError("others may write where code is kept")
     except RuntimeError:
         numba.config.CACHE_DIR = str(lasting_scratch("code"))
         return compiler(function)

@@ -16,7 +16,7 @@ from rom import errors
 
 # fronts that only other packages read, for they hold parts of what others show
 INSIDE = {
-    "rom.bench", "rom.cyclic.blades", "rom.fe.mesh", "rom.io.sid", "rom.mbs.integrate",
+    "rom.cyclic.blades", "rom.fe.mesh", "rom.io.sid", "rom.mbs.integrate",
     "rom.mbs.parts", "rom.report",
 }  # fmt: skip
 MODULES = ("rom.rotation", "rom.units")  # whose functions are public without a front

@@ -9,9 +9,9 @@ from numba import carray, cfunc
 from numpy.testing import assert_allclose
 
 import rom
+from benchmarks.models import bar
 from cases.mbs.mechanisms import residual_at, tangents_at
 from rom import rotation, view
-from rom.bench.models import bar
 from rom.components import cosserat
 from rom.components.cosserat import body, shape_of
 from rom.errors import ConfigError, ModelError

@@ -5,9 +5,9 @@ import pytest
 from numpy.testing import assert_allclose
 
 import rom
+from benchmarks.models import bar
 from cases.paths import ROOT
 from rom import rotation
-from rom.bench.models import bar
 from rom.components.cosserat.helical_spring import HelicalSpring
 from rom.components.hand.compliant_hand import HAND_SPRING, INDEX_LENGTHS, Finger, rest
 from rom.components.hand.solid_finger import (

@@ -7,8 +7,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 import rom
+from benchmarks.models import KINDS, STEEL, bar
 from cases.gear_unit import unit
-from rom.bench.models import KINDS, STEEL, bar
 from rom.components.transmission import Housing, linearised, mesh_response, rest, simulate
 from rom.errors import ModelError
 

@@ -8,8 +8,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 import rom
+from benchmarks.units import as_mechanism
 from cases.mbs.geared_rotors import SIZES, SPAN, rigid_unit
-from rom.bench.units import as_mechanism
 from rom.components.journal_bearing import Groove
 from rom.components.transmission import rest, steady, whirl
 from rom.rotation import log

@@ -8,8 +8,8 @@ from numpy.testing import assert_allclose
 from scipy.linalg import block_diag
 
 import rom
+from benchmarks.units import as_mechanism
 from cases.mbs.geared_rotors import rigid_unit
-from rom.bench.units import as_mechanism
 from rom.components.journal_bearing import iso_vg
 from rom.errors import ModelError
 from rom.mbs.analysis.periodic import search

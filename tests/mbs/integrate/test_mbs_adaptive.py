@@ -7,6 +7,7 @@ from scipy.integrate import solve_ivp
 from scipy.special import ellipj, ellipk
 
 import rom
+from benchmarks.models import rigid_chain
 from cases.mbs.mechanisms import simulate_quietly, slider_crank
 from cases.mbs.motions import (
     PARTS,
@@ -19,7 +20,6 @@ from cases.mbs.motions import (
     swing,
     wound_drive,
 )
-from rom.bench.models import rigid_chain
 from rom.errors import ModelError, SolverError
 from rom.mbs.integrate import adaptive_step
 from rom.mbs.integrate.run import Record

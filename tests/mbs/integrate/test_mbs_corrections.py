@@ -5,8 +5,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 import rom
+from benchmarks.units import as_mechanism
 from cases.mbs.geared_rotors import rigid_unit
-from rom.bench.units import as_mechanism
 from rom.errors import SolverError
 from rom.mbs import Impact
 

@@ -8,10 +8,10 @@ from numba import njit
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import solve_ivp
 
+from benchmarks.models import rigid_chain
 from cases.mbs.mechanisms import simulate_quietly, slider_crank
 from cases.mbs.motions import G, errors, falling, free_crank, heavy_top, pendulum
 from rom import rotation
-from rom.bench.models import rigid_chain
 from rom.errors import SolverError
 from rom.mbs.equations.packing import pack
 from rom.mbs.integrate.adaptive_step import _Run

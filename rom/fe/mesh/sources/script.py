@@ -1,8 +1,9 @@
 """What the text of a gmsh script says it would do to the machine, told before gmsh runs it.
 
 A ``.geo`` is a program. It may build geometry and read files; it may not start programs, nor write
-or remove files, and neither may the scripts it includes. The text is read as gmsh reads it; where
-gmsh could read it in two ways, it is refused.
+or remove files, and neither may the scripts it includes. What may stand there is listed: any other
+word is refused, except names of the script's own where no command can stand. The text is read as
+gmsh reads it; where gmsh could read it in two ways, it is refused.
 """
 
 import re
@@ -12,11 +13,42 @@ from pathlib import Path
 
 from rom.errors import FileFormatError, UnsafeFileError
 
-STARTS = {"SystemCall", "NonBlockingSystemCall", "OnelabRun", "SendToServer"}
-STARTS |= {"ExternalProcess", "CommandLine"}  # a field of mesh sizes by another program
-COMMANDS = {"System", "Print", "Save", "CreateDir"}  # words one may also call a variable by
-PLUGINS_THAT_WRITE = {"Bubbles", "NearToFarField", "VoroMetal"}
-NAMES_FROM_TEXT = {"StringToName", "S2N"}  # with which a command can be spelt
+# What may stand before a bracket, a text or another word: geometry, control, functions, mesh sizes
+VOCABULARY = frozenset("""
+Point Line Curve Circle Ellipse Ellipsis Conic Spline BSpline Bezier Nurbs Wire Loop Compound Plane
+Surface Ruled Bezier Volume Sphere Block Box Cylinder Cone Torus Wedge Disk Rectangle Physical
+Parametric In Extrude Layers Recombine RecombLaterals ScaleLastLayer Hole Alias AliasWithOptions
+Using Index View ThruSections Pipe Fillet Chamfer Translate Rotate Symmetry Affine Dilate Duplicata
+Delete Recursive Coherence Split Intersect Unique Boundary CombinedBoundary PointsOf Closest
+BooleanUnion BooleanIntersection BooleanDifference BooleanFragments Object Tool BoundingBox
+CenterOfMass MatrixOfInertia Mass Parent Fuzzy Transfinite Progression Bump Beta Left Right
+Alternate AlternateLeft AlternateRight Periodic Reverse ReverseMesh RelocateMesh Smoother
+Characteristic Length MeshSize SizeField Field Background BoundaryLayer MeshAlgorithm
+MeshSizeFromBoundary Embed Elliptic Quad TransfQuadTri QuadTriAddVerts QuadTriNoNewVerts
+QuadTriDbl QuadTriSngl Levelset Color Show Hide Homology Cohomology SetFactory SetMaxTag SetOrder
+OptimizeMesh RefineMesh RecombineMesh PartitionMesh CreateTopology CreateGeometry ClassifySurfaces
+RenumberMeshNodes RenumberMeshElements Mesh Knots Weights Order Coordinates SyncModel
+If ElseIf Else EndIf For EndFor Macro Function Return Call Abort Exit Error Warning Printf
+DefineConstant DefineNumber DefineString UndefineConstant DefineStruct Struct Append AppendUnique
+Name Min Max Step Range Choices Visible ReadOnly ReadOnlyRange Help Label Highlight Closed Units
+Graph AutoCheck Loop Kind
+Exp Log Log10 Sqrt Sin Asin Cos Acos Tan Atan Atan2 Sinh Cosh Tanh Abs Fabs Floor Ceil Round Fmod
+Modulo Hypot Rand Step Sign Exists FileExists GetNumber GetString GetForced ForceNumber LinSpace
+LogSpace ListFromFile Find List ListAlt Cross Dot Norm Str StrCat StrPrefix StrRelative StrReplace
+StrSub StrLen StrCmp StrFind StrChoice UpperCase LowerCase LowerCaseIn Sprintf NameFromString
+CurrentDirectory CurrentDir CurrentFileName AbsolutePath DirName Include Merge MergeWithBoundingBox
+Nurb Bounding NewModel Today TestLevel DimNameSpace NameStruct Text2D Text3D TIME T2 T3
+INTERPOLATION_SCHEME SP VP TP SL VL TL ST VT TT SQ VQ TQ SS VS TS SH VH TH SI VI TI SY VY TY
+""".split())  # fmt: skip
+FIELDS = frozenset("""
+Attractor AttractorAnisoCurve AutomaticMeshSizeField Ball BoundaryLayer Box Centerline Constant
+Curvature Cylinder Distance Extend Frustum Gradient IntersectAniso Laplacian LonLat MathEval
+MathEvalAniso Max MaxEigenHessian Mean Min MinAniso Octree Param PostView Restrict Sphere
+Structured Threshold
+""".split())  # fmt: skip
+OPTION_GROUPS = {"Mesh", "Geometry", "Print"}  # whose options say how, and never where or by whom
+GENERAL_OPTIONS = {"Terminal", "Verbosity", "ExpertMode", "NumThreads", "AbortOnError"}
+OPERATORS = "=.,;+-*/^<>!&|?:)]}~%"  # behind a variable; no command has one behind it
 INCLUDE_COMMAND, MERGE_COMMANDS = "Include", ("Merge", "MergeWithBoundingBox")
 # endings, in these letters only, of files that gmsh gives to readers which run nothing
 SHAPES = (".step", ".STEP", ".stp", ".STP", ".iges", ".IGES", ".igs", ".IGS", ".brep", ".brp",
@@ -151,7 +183,7 @@ def _tokens(path: Path, where: str) -> Iterator[Token]:
 def _refusals(tokens: list[Token]) -> Iterator[tuple[int, str]]:
     """Lines that do more than make a geometry, and what they do."""
     printing, depth = False, 0
-    for token, after in zip(tokens, [*tokens[1:], END_TOKEN][: len(tokens)], strict=True):
+    for k, token in enumerate(tokens):
         if token.kind == "sign":
             depth += (token.value == "(") - (token.value == ")")
             if token.value in (">", ">>") and printing and depth <= 0:
@@ -161,18 +193,44 @@ def _refusals(tokens: list[Token]) -> Iterator[tuple[int, str]]:
             continue
         if token.value == "Printf":
             printing, depth = True, 0
-        starts = token.value in STARTS or (token.value == "System" and _commands(after))
-        if starts:
-            yield token.line, f"{token.value} starts a program, which a geometry may not"
-        if token.value in NAMES_FROM_TEXT:
-            yield token.line, f"{token.value} makes names from text, also those of commands"
-        if token.value in PLUGINS_THAT_WRITE or (token.value in COMMANDS and _commands(after)):
-            yield token.line, f"{token.value} writes to the disk, which a geometry may not"
+        if not _allowed(
+            tokens[k - 1] if k else END_TOKEN, token, [*tokens[k + 1 : k + 3], END_TOKEN]
+        ):
+            yield token.line, f"{token.value} is none of the commands with which a geometry is made"
+        field = _kind_of_field(tokens, k) if token.value == "Field" else None
+        if field is not None and field.value not in FIELDS:
+            yield (
+                field.line,
+                f"{field.value} is none of the fields that say mesh sizes by themselves",
+            )
 
 
-def _commands(after: Token) -> bool:
-    """Whether a word before this token is a command, and no variable or group of options."""
-    return not (after.kind == "sign" and after.value in "=.,;+-*/^<>!&|?:)]}~")
+def _allowed(before: Token, word: Token, behind: list[Token]) -> bool:
+    """Whether a word is known, an option, or stands where only the script's own names can stand.
+
+    No word of gmsh outside the vocabulary begins with a small letter or has one or two characters;
+    so such names may have brackets. Other ones are variables where an operator is behind them.
+    """
+    after = behind[0]
+    if before.value == ".":  # an option, whose group was asked before
+        return True
+    if before.value in ("Macro", "Function") or (before.value == "For" and after.value == "In"):
+        return after.kind == "word"
+    if after.value == "." and word.value[0].isupper():
+        general = word.value == "General" and behind[1].value in GENERAL_OPTIONS
+        return general or word.value in OPTION_GROUPS
+    if word.value in VOCABULARY:
+        return True
+    own = not word.value[0].isupper() or len(word.value) <= 2 or "_" in word.value
+    return after.kind == "sign" and after.value in (OPERATORS + "([{" if own else OPERATORS)
+
+
+def _kind_of_field(tokens: list[Token], k: int) -> Token | None:
+    """What a field is said to be: the word behind ``Field[...] =``."""
+    if tokens[k + 1 : k + 2] and tokens[k + 1].value != "[":
+        return None
+    end = next((j for j in range(k, len(tokens)) if tokens[j].value in "=;."), len(tokens))
+    return tokens[end + 1] if end + 1 < len(tokens) and tokens[end].value == "=" else None
 
 
 def _read_files(tokens: list[Token], where: str) -> Iterator[tuple[str, str]]:

@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.peers.compare import answer_to
+from benchmarks.timing import Row, timed
 from rom import rotation
-from rom.bench.peers.compare import answer_to
-from rom.bench.timing import Row, timed
 from rom.components.cosserat import Rod, body, straight
 from rom.components.wind.wind_turbine import (
     N_BLADES,
@@ -120,7 +120,7 @@ def _segment_masses(rod: Rod) -> list[float]:
 
 
 def measured(segments: int = 48) -> Iterator[Row]:
-    """Case, quantity, value, unit and aim of each figure; see `rom.bench.benchmarks.rods`."""
+    """Case, quantity, value, unit and aim of each figure; see `benchmarks.benchmarks.rods`."""
     case = f"run-up, {N_BLADES} blades, {round(RISE_TIME / TIME_STEP)} steps"
     fine = (
         run_up(blade(N_REFERENCE_SEGMENTS, damped=True), t_end=RISE_TIME, dt=TIME_STEP)

@@ -1,6 +1,6 @@
 """The same reduction by rom, in a process of its own or under mpirun.
 
-``python -m rom.bench.peers.ours LC KIND N_MODES [matrices.npz]`` prints {"seconds", "processor",
+``python -m benchmarks.peers.ours LC KIND N_MODES [matrices.npz]`` prints {"seconds", "processor",
 "dofs", "frequencies"}, time by the clock and of the processor. With a file name it leaves the
 matrices there.
 """
@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from rom.bench.models import STEEL, geometry
+from benchmarks.models import STEEL, geometry
 from rom.model import FEModel
 from rom.reduction.bases.method import CraigBampton
 from rom.workflow import reduce

@@ -5,6 +5,7 @@ Processor time, which a busy machine changes little; one process against two by 
 
 import json
 import os
+import sys
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -12,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from rom.bench.timing import Row
+from benchmarks.timing import Row
 from rom.errors import ResourceError
 from rom.process import child
 from rom.process.mpirun import mpirun
@@ -37,7 +38,7 @@ def compared(lc: float) -> Iterator[Row]:
     python = interpreter()
     with child.scratch("peers") as folder:
         file = str(folder / "matrices.npz")
-        rod = child.python("rom.bench.peers.ours", str(lc))
+        rod = child.python("benchmarks.peers.ours", str(lc))
         ours = answer_of([*rod, "rbe2", str(N_MODES), file])
         case = f"{ours['dofs']} dofs, rbe2"
         yield case, "rom, one process", ours["processor"], "s of the processor", ""
@@ -69,7 +70,7 @@ def machine_gain() -> dict[str, float]:
     Raises:
         ResourceError: if a process fails.
     """
-    probe = child.python("rom.bench.peers.machine")
+    probe = child.python("benchmarks.peers.machine")
     one = answer_of(probe)
     with ThreadPoolExecutor() as side_by_side:
         two = list(side_by_side.map(answer_of, [probe, probe]))
@@ -107,14 +108,15 @@ def interpreter(environment: Path | None = None, packages: tuple[str, ...] = ())
 
 
 def answer_of(command: list[str]) -> dict[str, Any]:
-    """The answer of a process with one thread.
+    """The answer of a process with one thread; scripts of other programs find each other.
 
     Raises:
         ResourceError: if it fails.
     """
     one = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
     allow = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
-    done = child.run(command, variables=one | allow)
+    foreign = {} if sys.executable in command else {"PYTHONPATH": str(SCRIPT_FILE.parent)}
+    done = child.run(command, variables=one | allow | foreign)
     if done.code:
         raise ResourceError(f"{' '.join(command[:4])} ended with {done.code}: {done.last}.")
     return json.loads(done.out.strip().splitlines()[-1])

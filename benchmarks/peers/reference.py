@@ -1,15 +1,15 @@
 """Paths by Exudyn of three mechanisms of one soft bar, for tests where it cannot be installed.
 
-``python -m rom.bench.peers.reference FILE.json`` writes them, each with two steps.
+``python -m benchmarks.peers.reference FILE.json`` writes them, each with two steps.
 """
 
 import json
 import sys
 from pathlib import Path
 
-from rom.bench.models import bar
-from rom.bench.peers.mechanisms import chain, pendulum, slider_crank
-from rom.bench.peers.motion import Run, by_exudyn, reduced, with_all_nodes
+from benchmarks.models import bar
+from benchmarks.peers.mechanisms import chain, pendulum, slider_crank
+from benchmarks.peers.motion import Run, by_exudyn, reduced, with_all_nodes
 from rom.body.flexible import FlexibleBody
 from rom.model import FEModel, Material
 

@@ -1,25 +1,24 @@
 """Small cases of everything that is compiled when it is used first.
 
-``python -m rom.bench.first_use NAME ...`` does some of them, one after the other, and writes for
+``python -m rom.doctor.first_use NAME ...`` does some of them, one after the other, and writes for
 each how many functions were compiled and how much time of the processor it took.
 """
 
 import json
-import os
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable
+from itertools import combinations
 from time import process_time
 from typing import Any
 
 import numpy as np
+from scipy.sparse import csr_matrix, identity
 
-from rom.bench.models import KINDS, bar, rigid_chain, slider_crank
-from rom.errors import SolverError
-from rom.process import child
+from rom.model import FEModel, Interface
 from rom.reduction.bases.method import CraigBampton
 from rom.workflow import reduce
 
-MODULE_NAME = "rom.bench.first_use"  # also where it is run as a program
+MODULE_NAME = "rom.doctor.first_use"  # also where it is run as a program
 ORIGIN, Z_AXIS = (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)
 STEPS = {"t_end": 2e-4, "dt": 1e-4}
 
@@ -35,10 +34,23 @@ def pendulum() -> Any:
     return mech
 
 
-def _beam() -> Any:
-    straight = bar((0.16, 0.02, 0.012), (4, 1, 1))
-    return reduce(straight, method=CraigBampton(4), interfaces=KINDS, reference="root",
-                  certify=False)  # fmt: skip
+def _lattice() -> Any:
+    """A reduced bar of springs between points of a grid, 160 mm long along x."""
+    grid = np.meshgrid(np.linspace(0.0, 0.16, 5), (-0.01, 0.01), (-0.01, 0.01), indexing="ij")
+    x = np.array(grid).reshape(3, -1).T
+    K = np.zeros((x.size,) * 2)
+    for i, j in combinations(range(len(x)), 2):
+        d = x[j] - x[i]
+        if d @ d < 0.06**2:
+            row = np.kron(np.eye(len(x))[j] - np.eye(len(x))[i], d / np.linalg.norm(d))
+            K += 1e8 * np.outer(row, row)
+    ends = {
+        name: Interface(name, nodes, x[nodes], identity(4, format="csr"), x[nodes].mean(axis=0))
+        for name, nodes in (("root", np.arange(4)), ("tip", np.arange(len(x))[-4:]))
+    }
+    model = FEModel(csr_matrix(K), 0.01 * identity(x.size, format="csr"), x, ends)
+    return reduce(model, method=CraigBampton(4), interfaces=dict.fromkeys(ends, "rbe2"),
+                  reference="root", certify=False)  # fmt: skip
 
 
 def _move(mechanism: Any, **how: Any) -> Any:
@@ -58,13 +70,38 @@ def _first_motion() -> None:
 
 def _slider_crank() -> None:
     """What the main job asks for: a flexible rod, reactions, and a motion that goes on."""
+    from rom.mbs.mechanism import Mechanism
     from rom.mbs.results.audit import audit
 
-    mech = slider_crank(_beam())
+    mech, radius, speed = Mechanism(gravity=(0.0, -9.81, 0.0)), 0.04, 300.0
+    crank = mech.add_rigid("crank", mass=1.0, inertia=(1e-3,) * 3, at=ORIGIN,
+                           omega=(0.0, 0.0, speed))  # fmt: skip
+    rod = mech.add_flexible("rod", _lattice(), at=(radius, 0, 0), velocity=(0, speed * radius, 0))
+    end = (0.16 + radius, 0.0, 0.0)
+    slider = mech.add_rigid("slider", mass=0.3, inertia=(1e-4,) * 3, at=end)
+    mech.revolute("main", mech.ground.marker(ORIGIN), crank.marker(ORIGIN), axis=Z_AXIS)
+    pin = crank.marker((radius, 0.0, 0.0))
+    mech.revolute("crank pin", pin, rod.marker("root"), axis=Z_AXIS)
+    mech.revolute("wrist pin", rod.marker("tip"), slider.marker(ORIGIN), axis=Z_AXIS)
+    mech.prismatic("guide", mech.ground.marker(end), slider.marker(ORIGIN), axis=(1, 0, 0))
+    mech.drive("motor", "main", lambda t: speed * t)
     moved = _move(mech)
     moved.reaction("crank pin")
     audit(moved)
     _move(mech, t_end=4e-4, state=moved.final)
+
+
+def _chain() -> None:
+    """Enough hinges that equations are eliminated part by part."""
+    from rom.mbs.mechanism import Mechanism
+
+    mech = Mechanism(gravity=(0.0, -9.81, 0.0))
+    before = mech.ground.marker(ORIGIN)
+    for k in range(12):
+        link = mech.add_rigid(f"link {k}", mass=1.0, inertia=(1e-2,) * 3, at=(k + 0.5, 0.0, 0.0))
+        mech.revolute(f"pin {k}", before, link.marker((-0.5, 0.0, 0.0)), axis=Z_AXIS)
+        before = link.marker((0.5, 0.0, 0.0))
+    _move(mech)
 
 
 def _elements() -> None:
@@ -161,14 +198,24 @@ def _oil_film() -> None:
 
 
 def _loops() -> None:
-    """Stones and metal, see `rom.bench.loops`."""
-    from rom.bench.loops import COPPER, measured
-    from rom.components.assumed_strain import rectangle, sheet, tangent
+    """Stones, postures of a linkage, and metal that flows or stretches."""
+    from rom.components.assumed_strain import Metal, fly, rectangle, sheet, tangent
+    from rom.components.histories import sine
+    from rom.components.linkages.dynamic_isotropy import angle_grid, isotropy_index
+    from rom.components.linkages.two_dof_linkages import FiveBar, rod
+    from rom.components.masonry.actions import BaseMotion
+    from rom.components.masonry.limits import arch
+    from rom.components.masonry.motion import simulate
 
-    for _ in measured(3, 2, 4, 2):
-        pass
+    for actions in ((), (BaseMotion(sine(1.0, 0.5)),)):
+        simulate(arch(3, 5.0, 0.6), t_end=2e-3, dt=1e-3, actions=actions, damping=30.0)
+    five = FiveBar(0.7, (rod(2.0, 0.3),) * 2, (rod(1.0, 0.8),) * 2, payload=0.5)
+    isotropy_index(five.inertia(*angle_grid(4)))
+    copper = Metal(117e9, 0.35, 8930.0, yield_stress=400e6, hardening=100e6)
     X, triangles = rectangle((1, 1), [(0, 0), (1, 0), (1, 1), (0, 1)])
-    tangent(sheet(X, triangles), COPPER, X)
+    bar = sheet(X, triangles, element="F1", state="axisymmetric")
+    fly(bar, copper, np.full(X.shape, -1.0), np.array([0, 1]), 1e-8)
+    tangent(sheet(X, triangles), copper, X)
 
 
 def _rockfall() -> None:
@@ -200,7 +247,7 @@ CASES: dict[str, Callable[[], object]] = {
     "dop853": lambda: _move(pendulum(), method="dop853"),
     "elements": _elements,
     "formulas": _formulas,
-    "chain": lambda: _move(rigid_chain(12)),
+    "chain": _chain,
     "rod": _rod,
     "wind": _wind,
     "rod alone": _rod_alone,
@@ -210,41 +257,6 @@ CASES: dict[str, Callable[[], object]] = {
     "three bodies": _three_bodies,
 }
 DEMO_CASES = ("pendulum", "slider-crank")  # what `make demo` and the first page need
-
-
-def started(
-    cases: Sequence[str] = tuple(CASES), again: Sequence[str] = DEMO_CASES
-) -> Iterator[tuple[str, str, float, str, str]]:
-    """Case, quantity, value, unit and aim: each case in a process of its own.
-
-    Args:
-        cases: done first with nothing compiled, each over what those before it have left.
-        again: done once more at the end, as after the set-up.
-    """
-    with child.scratch("start") as folder:
-        variables = {"NUMBA_CACHE_DIR": str(folder), "OMP_NUM_THREADS": "1"}
-        for name in cases:
-            count, seconds = _of_process(name, variables)
-            yield name, "functions compiled", count, "", ""
-            yield name, "processor time", seconds, "s", ""
-        for name in again:
-            count, seconds = _of_process(name, variables)
-            yield f"{name}, compiled before", "functions compiled", count, "", "0"
-            yield f"{name}, compiled before", "processor time", seconds, "s", "below 3"
-        yield "machine", "load", os.getloadavg()[0], "", ""
-
-
-def _of_process(name: str, variables: Mapping[str, str]) -> tuple[int, float]:
-    """Functions compiled and seconds of the processor.
-
-    Raises:
-        SolverError: if the process does not come to its end.
-    """
-    ended = child.run(child.python(MODULE_NAME, name), variables=variables)
-    if ended.code:
-        raise SolverError(f"{name}: {ended.last}")
-    found = json.loads(ended.out)
-    return found["functions"], found["seconds"]
 
 
 def measured(name: str) -> dict[str, Any]:

@@ -1,7 +1,7 @@
 """Bodies of large deflection: cost of tensors, forces and steps, beside finite elements and rods.
 
 The bar of Kane, Ryan and Banerjee spins up as one body made from two meshes, see
-`rom.bench.peers.spin_up`. A step of its finite elements is one correction of Newton's method, the
+`benchmarks.peers.spin_up`. A step of its finite elements is one correction of Newton's method, the
 least there can be: forces and tangent assembled, factored, solved once.
 """
 
@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from rom.bench.models import KINDS, STEEL, bar, geometry
-from rom.bench.peers.spin_up import (
+from benchmarks.models import KINDS, STEEL, bar, geometry
+from benchmarks.peers.spin_up import (
     AXIAL_STIFFNESS,
     BAR_LENGTH,
     BAR_SIDE,
@@ -29,7 +29,7 @@ from rom.bench.peers.spin_up import (
     solid,
     spun_up,
 )
-from rom.bench.timing import Row, timed
+from benchmarks.timing import Row, timed
 from rom.body.nonlinear.quartic import Quartic, n_entries
 from rom.body.nonlinear.ranges import Geometric
 from rom.eigen.verbs import dofs_of

@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from rom.bench.peers.compare import CACHE_FOLDER, answer_of, interpreter
-from rom.bench.timing import Row, timed
-from rom.bench.units import RigidShaft, as_mechanism, with_shafts
+from benchmarks.peers.compare import CACHE_FOLDER, answer_of, interpreter
+from benchmarks.timing import Row, timed
+from benchmarks.units import RigidShaft, as_mechanism, with_shafts
 from rom.components.gear_mesh import GearPair, Mesh, stiffness_table
 from rom.components.journal_bearing import (
     Groove,

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from math import pi
 
-from rom.bench.timing import Row, timed
+from benchmarks.timing import Row, timed
 from rom.eigen.substructuring import modes_up_to
 from rom.eigen.verbs import dofs_of
 from rom.model import FEModel

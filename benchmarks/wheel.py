@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
-from rom.bench.models import TITANIUM
-from rom.bench.timing import Row, timed
+from benchmarks.models import TITANIUM
+from benchmarks.timing import Row, timed
 from rom.cyclic.modes import wheel_modes
 from rom.cyclic.reduced import reduce_sector
 from rom.cyclic.sector import CyclicSector

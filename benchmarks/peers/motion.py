@@ -13,16 +13,16 @@ from typing import Any
 
 import numpy as np
 
-from rom.bench.models import KINDS, STEEL, geometry
-from rom.bench.peers.compare import answer_of, interpreter
-from rom.bench.peers.mechanisms import Described, built, chain, slider_crank
-from rom.bench.peers.ours import save_matrices
-from rom.bench.timing import Row, timed
+from benchmarks.models import KINDS, STEEL, geometry
+from benchmarks.peers.compare import answer_of, interpreter
+from benchmarks.peers.mechanisms import Described, built, chain, slider_crank
+from benchmarks.peers.ours import save_matrices
+from benchmarks.timing import Row, timed
 from rom.body.flexible import FlexibleBody
 from rom.errors import ConfigError
 from rom.io.native import save
 from rom.mbs.integrate.simulation import simulate
-from rom.model import Array, FEModel, SurfaceMesh
+from rom.model import Array, FEModel, Interface, SurfaceMesh
 from rom.process.child import scratch
 from rom.reduction.bases.method import CraigBampton
 from rom.workflow import reduce
@@ -39,7 +39,7 @@ class Run:
     """One mechanism with one step.
 
     Attributes:
-        mechanism: see `rom.bench.peers.mechanisms`.
+        mechanism: see `benchmarks.peers.mechanisms`.
         t_end: duration [s].
         steps: number of steps.
         samples: how many instants are compared; divides the number of steps.
@@ -105,9 +105,14 @@ def save_for_exudyn(model: FEModel, path: str) -> None:
     with np.load(path) as data:
         arrays = dict(data)
     for k, name in enumerate(ENDS):
-        area = np.asarray(model.interfaces[name].surface_mass.sum(axis=1)).ravel()
-        arrays[f"weights_{k}"] = area / area.sum()
+        arrays[f"weights_{k}"] = _weights(model.interfaces[name])
     np.savez(path, names=np.array(ENDS), **arrays)
+
+
+def _weights(face: Interface) -> Array:
+    """(k,) shares of the nodes in the area of a face [1]."""
+    area = np.asarray(face.surface_mass.sum(axis=1)).ravel()
+    return area / area.sum()
 
 
 def by_rom(body: FlexibleBody, run: Run) -> Moved:
@@ -128,7 +133,7 @@ def by_rom(body: FlexibleBody, run: Run) -> Moved:
 
 
 def measured(meshes: tuple[float, ...], links: tuple[int, ...]) -> Iterator[Row]:
-    """Case, quantity, value, unit and aim of each figure; see `rom.bench.benchmarks.motion`."""
+    """Case, quantity, value, unit and aim of each figure; see `benchmarks.benchmarks.motion`."""
     for lc in meshes:
         model = with_all_nodes(rod(lc))
         body = reduced(model)
@@ -141,12 +146,19 @@ def measured(meshes: tuple[float, ...], links: tuple[int, ...]) -> Iterator[Row]
 
 
 def rod(lc: float) -> FEModel:
-    """A connecting rod of steel with the element size lc [m], its bores called root and tip."""
+    """A connecting rod of steel with the element size lc [m], its bores called root and tip.
+
+    Their points are the averages of their nodes, the only ones that Exudyn's markers know: those of
+    a coarse mesh lie beside the axes of the bores, where the geometry has them.
+    """
     from rom.fe import model as read_model
 
     model = read_model(geometry("connecting_rod"), material=STEEL, parameters={"lc": lc})
     bores = dict(zip(ENDS, ("pin_a", "pin_b"), strict=True))
-    faces = {end: replace(model.interfaces[bore], name=end) for end, bore in bores.items()}
+    faces = {}
+    for end, bore in bores.items():
+        face = model.interfaces[bore]
+        faces[end] = replace(face, name=end, origin=_weights(face) @ model.points[face.nodes])
     return replace(model, interfaces=faces)
 
 

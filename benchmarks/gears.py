@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from rom.bench.models import planetary_train
-from rom.bench.timing import Row, timed
+from benchmarks.models import planetary_train
+from benchmarks.timing import Row, timed
 from rom.components.gear_mesh import Hertz, Mesh
 from rom.mbs.integrate.simulation import simulate
 

@@ -7,8 +7,8 @@ import numpy as np
 from scipy.sparse import csc_matrix
 from scipy.sparse.linalg import splu
 
-from rom.bench.models import KINDS
-from rom.bench.timing import Row, timed
+from benchmarks.models import KINDS
+from benchmarks.timing import Row, timed
 from rom.body.surface import surface_of
 from rom.model import Array, FEModel
 from rom.parametric.parameters import Density, YoungsModulus

@@ -3,7 +3,7 @@
 Two processors of a cloud are often two threads of one core: what they do together is then hardly
 more than what one does alone, whatever the program.
 
-``python -m rom.bench.peers.machine`` prints {work: how often one process does it in a second}.
+``python -m benchmarks.peers.machine`` prints {work: how often one process does it in a second}.
 """
 
 import json

@@ -7,17 +7,17 @@ import sys
 
 import pytest
 
+from benchmarks.benchmarks import start
 from cases.command import environment
 from cases.command import rom as command
 from cases.long import few
-from rom.bench import first_use
-from rom.bench.benchmarks import start
+from rom.doctor import first_use
 from rom.doctor.compilation import compiled
 
 USED = """
 import importlib, pkgutil
 import rom.components, rom.mbs
-from rom.bench.first_use import CASES
+from rom.doctor.first_use import CASES
 from rom.mbs.compiler.cache import CODE_FILES
 modules = [importlib.import_module(module.name) for package in (rom.mbs, rom.components)
            for module in pkgutil.walk_packages(package.__path__, package.__name__ + ".")]
@@ -47,7 +47,7 @@ FIRST_MOTIONS = """
 import numba, numpy as np
 from numba.core import event
 import rom
-from rom.bench.models import KINDS, bar, slider_crank
+from benchmarks.models import KINDS, bar, slider_crank
 
 class Compiled(event.Listener):
     names = []

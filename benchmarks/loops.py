@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from rom.bench.timing import Row, timed
+from benchmarks.timing import Row, timed
 from rom.components.assumed_strain import Flight, Metal, fly, rectangle, sheet
 from rom.components.histories import sine
 from rom.components.linkages.dynamic_isotropy import angle_grid, isotropy_index

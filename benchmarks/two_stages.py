@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from rom.bench.models import STEEL, geometry
-from rom.bench.timing import Row, timed
+from benchmarks.models import STEEL, geometry
+from benchmarks.timing import Row, timed
 from rom.mbs.analysis.equilibrium import equilibrium
 from rom.mbs.elements.films.bearing import Groove, JournalBearing
 from rom.mbs.elements.gears.geometry import GearPair

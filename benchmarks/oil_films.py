@@ -6,8 +6,8 @@ from time import perf_counter
 
 import numpy as np
 
-from rom.bench.models import shaft_in_films
-from rom.bench.timing import Row, timed
+from benchmarks.models import shaft_in_films
+from benchmarks.timing import Row, timed
 from rom.components.journal_bearing import Groove, JournalBearing, film
 from rom.mbs.integrate.simulation import simulate
 

@@ -14,8 +14,7 @@ import numpy as np
 from scipy.linalg import eigh
 from scipy.sparse import identity, kron
 
-from rom.arguments import one_of
-from rom.bench.models import (
+from benchmarks.models import (
     CRANK_SPEED,
     KINDS,
     STEEL,
@@ -27,7 +26,8 @@ from rom.bench.models import (
     slider_crank,
     top,
 )
-from rom.bench.timing import timed
+from benchmarks.timing import timed
+from rom.arguments import one_of
 from rom.model import FEModel
 from rom.process.memory import peak_bytes
 from rom.process.stopwatch import stage_rows
@@ -89,9 +89,13 @@ def reduction(sizes: tuple[float, ...] = (30e3, 100e3)) -> Iterator[Figure]:
         yield Figure("reduction", case, "peak memory of the process", peak, "GiB", "below 12")
 
 
-def large_reduction() -> Iterator[Figure]:
-    """The same at 300 000 dofs, in one process."""
-    yield from reduction((300e3,))
+def large_reduction(size: float = 300e3) -> Iterator[Figure]:
+    """The same at 300 000 dofs, in one process.
+
+    Args:
+        size: number of dofs aimed at.
+    """
+    yield from reduction((size,))
 
 
 def many_modes(size: float = 30e3, counts: tuple[int, ...] = (100, 300)) -> Iterator[Figure]:
@@ -101,7 +105,7 @@ def many_modes(size: float = 30e3, counts: tuple[int, ...] = (100, 300)) -> Iter
         size: number of dofs aimed at.
         counts: numbers of modes; Lanczos takes a minute for a thousand.
     """
-    from rom.bench.many_modes import measured
+    from benchmarks.many_modes import measured
     from rom.fe import model as read_model
 
     model = read_model(geometry("beam"), material=STEEL, parameters=_beam(size))
@@ -205,7 +209,7 @@ def peers(meshes: tuple[float, ...] = (0.0047, 0.00257)) -> Iterator[Figure]:
     Args:
         meshes: element sizes [m]; about 29 000 and 105 000 dofs.
     """
-    from rom.bench.peers.compare import compared
+    from benchmarks.peers.compare import compared
 
     for lc in meshes:
         for case, quantity, value, unit, aim in compared(lc):
@@ -225,7 +229,7 @@ def motion(
             Slider-crank and chains have the first.
         links: lengths of the chains.
     """
-    from rom.bench.peers.motion import measured
+    from benchmarks.peers.motion import measured
 
     for case, quantity, value, unit, aim in measured(meshes, links):
         yield Figure("motion", case, quantity, value, unit, aim)
@@ -239,7 +243,7 @@ def rods(lengths: tuple[int, ...] = (100, 1000, 10_000)) -> Iterator[Figure]:
     Args:
         lengths: numbers of segments of the one rod, which hangs on a ball joint.
     """
-    from rom.bench.peers.rods import bent, measured
+    from benchmarks.peers.rods import bent, measured
     from rom.components.cosserat import body, straight
     from rom.mbs.integrate.simulation import simulate
     from rom.mbs.mechanism import Mechanism
@@ -299,7 +303,7 @@ def film(solves: int = 400) -> Iterator[Figure]:
     Args:
         solves: films around the orbit, each started from the one before.
     """
-    from rom.bench.oil_films import measured
+    from benchmarks.oil_films import measured
 
     for case, quantity, value, unit, aim in measured(solves):
         yield Figure("film", case, quantity, value, unit, aim)
@@ -311,7 +315,7 @@ def geared(steps: int = 20000) -> Iterator[Figure]:
     Args:
         steps: of 1e-5 s.
     """
-    from rom.bench.gears import measured
+    from benchmarks.gears import measured
 
     for case, quantity, value, unit, aim in measured(steps):
         yield Figure("geared", case, quantity, value, unit, aim)
@@ -330,21 +334,21 @@ def transmission(
         cells: of each film.
         ross: compare with ROSS, which is installed from the package index.
     """
-    from rom.bench.peers.films import (
+    from benchmarks.peers.films import (
         coefficients_compared,
         programs_compared,
         speeds_run_through,
     )
-    from rom.bench.two_stages import stages_run
+    from benchmarks.two_stages import stages_run
 
-    if ross:
-        for row in coefficients_compared():
-            yield Figure("transmission", *row)
     for rows in (speeds_run_through, programs_compared):
         for row in rows(speeds, cells):
             yield Figure("transmission", *row)
     for row in stages_run():
         yield Figure("transmission", *row)
+    if ross:
+        for row in coefficients_compared():
+            yield Figure("transmission", *row)
 
 
 def wheel(families: int = 10, parameters: dict[str, float] | None = None) -> Iterator[Figure]:
@@ -357,21 +361,21 @@ def wheel(families: int = 10, parameters: dict[str, float] | None = None) -> Ite
         families: modes for each number of nodal diameters.
         parameters: of the geometry.
     """
-    from rom.bench.wheel import measured
+    from benchmarks.wheel import measured
 
     for row in measured(geometry("bladed_disk"), families, parameters):
         yield Figure("wheel", *row)
 
 
-def loops(*sizes: int) -> Iterator[Figure]:
+def loops(**sizes: int) -> Iterator[Figure]:
     """Stones, postures, a bar that flows, boulders, wind: compiled loops on one processor.
 
     Args:
-        sizes: as `rom.bench.loops.measured` takes them.
+        sizes: as `benchmarks.loops.measured` takes them.
     """
-    from rom.bench.loops import measured
+    from benchmarks.loops import measured
 
-    for case, quantity, value, unit, aim in measured(*sizes):
+    for case, quantity, value, unit, aim in measured(**sizes):
         yield Figure("loops", case, quantity, value, unit, aim)
 
 
@@ -379,9 +383,9 @@ def start(**cases: tuple[str, ...]) -> Iterator[Figure]:
     """Processor time of first uses with nothing compiled, and of first motions after set-up.
 
     Args:
-        cases: as `rom.bench.first_use.started` takes them.
+        cases: as `benchmarks.starts.started` takes them.
     """
-    from rom.bench.first_use import started
+    from benchmarks.starts import started
 
     for case, quantity, value, unit, aim in started(**cases):
         yield Figure("start", case, quantity, value, unit, aim)
@@ -393,7 +397,7 @@ def updating(sizes: tuple[float, ...] = (2e3, 25e3)) -> Iterator[Figure]:
     Args:
         sizes: numbers of dofs aimed at.
     """
-    from rom.bench.updating import measured
+    from benchmarks.updating import measured
     from rom.fe import model as read_model
 
     for size in sizes:
@@ -409,9 +413,9 @@ def large_deflection(size: float = 100e3, **more: Any) -> Iterator[Figure]:
 
     Args:
         size: number of dofs aimed at, of tetrahedra.
-        more: as `rom.bench.large_deflection.measured` takes it.
+        more: as `benchmarks.large_deflection.measured` takes it.
     """
-    from rom.bench.large_deflection import measured
+    from benchmarks.large_deflection import measured
 
     for case, quantity, value, unit, aim in measured(_beam(size), **more):
         yield Figure("large-deflection", case, quantity, value, unit, aim)

@@ -15,10 +15,10 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.peers.compare import answer_to
+from benchmarks.peers.rods import SCRIPT_FILE
+from benchmarks.timing import timed
 from rom import rotation
-from rom.bench.peers.compare import answer_to
-from rom.bench.peers.rods import SCRIPT_FILE
-from rom.bench.timing import timed
 from rom.components.cosserat import body, straight
 from rom.components.wind.wind_turbine import ramp
 from rom.mbs.integrate.simulation import simulate

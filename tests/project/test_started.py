@@ -1,0 +1,184 @@
+"""Whatever can be started is started: benchmarks, targets of make, commands of pages.
+
+In short forms, small sizes and coarse meshes. What is not in a table here is named.
+"""
+
+import importlib.util
+import re
+import shlex
+import shutil
+import subprocess
+
+import pytest
+
+import rom
+from benchmarks import two_stages
+from benchmarks.benchmarks import BENCHMARKS
+from cases import command
+from cases.paths import ROOT
+from cases.solid import block
+from rom.errors import ResourceError
+
+pytestmark = pytest.mark.once
+
+COARSE_WHEEL = {"lc": 0.02, "lc_blade": 0.02}
+BRIEF = {  # benchmark: arguments with which it takes seconds
+    "blade": {"parameters": {"lc": 0.02, "lc_flank": 0.01}},
+    "film": {"solves": 4},
+    "transmission": {"speeds": 2, "cells": (24, 4)},
+    "geared": {"steps": 50},
+    "integrator": {"turns": 1},
+    "chain": {"lengths": (2, 4)},
+    "adaptive": {"duration": 0.2, "links": 2, "turns": 1, "top_time": 0.005},
+    "loops": {"blocks": 3, "steps": 2, "cells": 4, "height": 2},
+    "reduction": {"sizes": (3e3,)},
+    "large-reduction": {"size": 3e3},
+    "many-modes": {"size": 3e3, "counts": (10,)},
+    "wheel": {"families": 2, "parameters": COARSE_WHEEL},
+    "peers": {"meshes": (0.024,)},
+    "motion": {"meshes": (0.024,), "links": (2,)},
+    "rods": {"lengths": (10, 20)},
+    "start": {"cases": ("three bodies",), "again": ("three bodies",)},
+    "updating": {"sizes": (2e3,)},
+    "large-deflection": {
+        "size": 2e3, "coarse": (10, 1), "fine": (12, 1), "segments": (10,), "elements": (10,)},
+}  # fmt: skip
+LIGHT = ("film", "integrator", "chain", "adaptive", "loops", "start", "geared")  # without FEniCSx
+
+
+def test_every_benchmark_has_a_brief_form():
+    assert [*BRIEF] == [*BENCHMARKS]
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", BRIEF)
+def test_a_benchmark_runs_from_its_beginning_to_its_end(name, monkeypatch):
+    """Programs to compare with come from the package index; where that is not, the rest has run."""
+    if name not in LIGHT:
+        pytest.importorskip("dolfinx", reason="what is measured is meshed")
+    monkeypatch.setattr(two_stages, "N_TEETH", 1)
+    figures = []
+    try:
+        figures.extend(BENCHMARKS[name](**BRIEF[name]))
+    except ResourceError as error:
+        if "could not be made" not in str(error):
+            raise
+        pytest.skip(str(error))
+    assert figures and all(figure.value == figure.value for figure in figures)
+    apart = [f for f in figures if f.quantity == "difference of paths"]
+    assert all(figure.value < 1e-5 for figure in apart), apart
+    assert len(apart) == (3 if name == "motion" else 0)
+
+
+TARGETS = re.findall(r"^(\w+):", (ROOT / "Makefile").read_text(), re.M)
+STUB = '#!/bin/sh\nprintf "%s\\n" "$*" >> "{log}"\n'
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_a_target_of_make_starts_modules_and_files_that_are_there(target, tmp_path):
+    """Every line of it, with programs that only write down what they are given."""
+    if shutil.which("make") is None:
+        pytest.skip("make is not installed")
+    for name in ("rom", "tests", "demos", "docs", "benchmarks", "meshes", "pyproject.toml"):
+        (tmp_path / name).symlink_to(ROOT / name)
+    shutil.copy(ROOT / "Makefile", tmp_path)
+    log = tmp_path / "log"
+    (tmp_path / ".ci").mkdir()
+    for program in ("python", ".ci/setup.sh"):
+        (tmp_path / program).write_text(STUB.format(log=log))
+        (tmp_path / program).chmod(0o755)
+    given = [f"PYTHON={tmp_path}/python", f"LIGHT={tmp_path}/python", "NAME=motion"]
+    done = subprocess.run(["make", "-C", tmp_path, target, *given], capture_output=True, text=True,
+                          timeout=120, check=False)  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    lines = log.read_text().splitlines() if log.exists() else []
+    assert lines or target == "clean"
+    for line in lines:
+        for module in re.findall(r"-m ([a-z_]+)\b", line)[:1]:
+            assert importlib.util.find_spec(module), line
+        for file in re.findall(r"\b(?:tests|demos|docs)/\S+\.py", line):
+            assert (ROOT / file).is_file(), line
+    assert (ROOT / "rom" / "__init__.py").exists()
+
+
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+OTHERS = (  # ways to install, which `.ci/other_systems.sh` goes on systems of their own
+    "sudo apt-get install", "/usr/bin/python3 -m venv", "python3 -m venv", ".venv/bin/pip install",
+    "conda ", "docker ",
+)  # fmt: skip
+SHORTER = (  # what a command of a page gets instead, so that it takes seconds and needs no window
+    (r"--hinge \d+", "--hinge radius:0.006 -p lc=0.01 -m 4"),
+    (r"lc=4e-3", "lc=8e-3"),
+    (r"(rom reduce meshes/connecting_rod.geo.*)", r"\1 -p lc=0.012"),
+    (r"(rom simulate demos/slider_crank.toml.*)", r"\1 --t-end 0.001"),
+    (r"(rom report demos/slider_crank.toml) --move", r"\1"),
+    (r"--t-end 1 ", "--t-end 0.01 "),
+    (r"^(rom view \S+)$", r"\1 -o view.png"),
+    (r"--held foot", "--held root"),
+)
+NOTHING_TO_RESUME = "there is nothing to resume"
+
+
+def commands(page):
+    """Lines of the blocks of a page, with what goes over several in one."""
+    blocks = re.findall(r"^```(?:sh|bash|console)\n(.*?)^```$", page.read_text(), re.M | re.S)
+    text = "".join(blocks).replace("\\\n", " ")
+    words = (shlex.split(line, comments=True) for line in text.splitlines())
+    return [shlex.join(line) for line in words if line]
+
+
+def kind(line):
+    """By what a command is started here."""
+    if line.startswith("make "):
+        return "make" if line.split()[1] in TARGETS else None
+    if line.startswith(OTHERS):
+        return "other systems"
+    return "rom" if re.match(r"(\.venv/bin/|mpirun -n \d+ )?rom \w", line) else None
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_every_command_of_a_page_is_started_by_something(page):
+    assert [line for line in commands(page) if kind(line) is None] == []
+
+
+SHOWN = [page for page in PAGES if page.name != "step_part.md" and
+         "rom" in map(kind, commands(page))]  # fmt: skip
+
+
+def part(folder):
+    """A plate with a bore of 6 mm and a foot that looks down."""
+    import gmsh
+
+    gmsh.initialize()
+    plate = gmsh.model.occ.addBox(-0.02, -0.02, 0, 0.08, 0.04, 0.01)
+    bore = gmsh.model.occ.addCylinder(0, 0, -0.01, 0, 0, 0.03, 0.006)
+    gmsh.model.occ.cut([(3, plate)], [(3, bore)])
+    gmsh.model.occ.synchronize()
+    gmsh.write(str(folder / "part.step"))
+    gmsh.finalize()
+
+
+@pytest.mark.long
+@pytest.mark.fenicsx
+@pytest.mark.parametrize("page", SHOWN, ids=lambda page: page.name)
+def test_commands_of_a_page_run_one_after_the_other(page, tmp_path):
+    pytest.importorskip("dolfinx", reason="most of them mesh")
+    for name in ("meshes", "demos"):
+        shutil.copytree(ROOT / name, tmp_path / name, ignore=shutil.ignore_patterns("__pycache__"))
+    part(tmp_path)
+    kinds = {"root": "rbe2", "tip": "rbe2"}
+    made = rom.reduce(block(), method=rom.CraigBampton(4), interfaces=kinds, reference="root",
+                      certify=False)  # fmt: skip
+    rom.save(made, tmp_path / "jacket.rom.npz")
+    for line in commands(page):
+        if kind(line) != "rom" or "rod.sti" in line:  # matrices of another program
+            continue
+        brief = line.removeprefix(".venv/bin/")
+        for before, now in SHORTER:
+            brief = re.sub(before, now, brief)
+        words = shlex.split(brief)
+        ranks = int(words[2]) if words[0] == "mpirun" else 1
+        done = command.rom(*words[words.index("rom") + 1 :], *["--force"] * ("-o" in words),
+                           cwd=tmp_path, timeout=300, n=ranks)  # fmt: skip
+        resumed = "--resume" in words and NOTHING_TO_RESUME in done.stderr
+        assert done.returncode in (0, 5) or resumed, (brief, done.stderr)
