@@ -56,6 +56,7 @@ def inverse_dynamics(mechanism: Mechanism, t: npt.ArrayLike) -> Solution:
     packed = pack(mechanism)
     span, spacing = (times[0], times[-1]), DIFFERENCE_SPACING * (times[-1] - times[0])
     state = initial_state(packed, times[0], spacing)
+    packed = packed.of_rank(state.rank)
     _refuse_free(packed, state)
     signals = sample_all(packed.signals, times, span, spacing)
     good, failure = first_failure(packed.signals, times, signals, span, spacing)

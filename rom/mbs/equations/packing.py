@@ -185,6 +185,11 @@ class Packed:
         graph = self.system.graph.replace(shares=1)
         return replace(self, system=self.system.replace(graph=graph))
 
+    def of_rank(self, rank: int) -> "Packed":
+        """The same, ready for as many independent constraints as a start has found."""
+        surely = not self.by_blocks or self.shares or rank == self.system.rows.kind.size
+        return self if surely else self.sharing()
+
     def rows_solved(self, rank: int) -> int:
         """Number of constraints in the equations: in blocks all, whole the independent ones."""
         return int(self.system.rows.kind.size) if self.by_blocks else rank

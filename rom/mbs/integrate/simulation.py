@@ -175,8 +175,7 @@ def _moved(record: Record, t_start: float) -> Solution:
         record.given = initial_state(packed, t_start, settings.spacing)
     state = record.given
     _check_fit(state, packed, record.mechanism)
-    if packed.by_blocks and state.rank < state.lam.size:
-        record.packed = packed = packed.sharing()
+    record.packed = packed = packed.of_rank(state.rank)
     record.watch = watch_of(record.mechanism, packed, t_start)
     run = METHODS[settings.method]
     if settings.dt is None and run is run_implicit:

@@ -129,8 +129,9 @@ class Flow:
         Raises:
             ModelError: if the state does not satisfy the joints.
         """
-        if self.packed.by_blocks and state.rank < state.lam.size:
-            self._take(self.packed.sharing())
+        ready = self.packed.of_rank(state.rank)
+        if ready is not self.packed:
+            self._take(ready)
         state = replace(state, t=self.t0, memory=None, algorithmic=None)
         state = self._fitted(state.q, state.v, state)
         self.step, found = begin(self.record, self.W, state, self.packed.asked, self.settings.h)
