@@ -153,13 +153,13 @@ def test_motions_that_nothing_prescribes_are_refused():
 
 
 def linkage(n, seed):
-    """n bars on hinges: cranks and pairs of bars from a moving hinge to the ground, see `torque`."""
+    """n bars on hinges: a crank, and pairs of bars from a moving hinge to the ground."""
     rng = np.random.default_rng(seed)
     hinges, bars, feet = [(0.06, 0.08)], [(None, 0)], [(0.0, 0.0)]  # a bar: from, to a hinge
     pairs = []
     for _ in range((n - 1) // 2):
-        start, foot = int(rng.integers(len(hinges))), rng.uniform(-0.1, 0.1, 2) + (0.35, 0.0)
-        hinges.append(tuple(foot + rng.uniform(-0.05, 0.05, 2) + (0.0, 0.25)))
+        start, foot = int(rng.integers(len(hinges))), rng.uniform((0.25, -0.1), (0.45, 0.1))
+        hinges.append(tuple(foot + rng.uniform((-0.05, 0.2), (0.05, 0.3))))
         new = len(hinges) - 1
         pairs.append((start, tuple(foot), new))
         bars += [(start, new), (None, new)]
@@ -206,7 +206,9 @@ def torque(hinges, bars, feet, pairs, t):
             along = (ra**2 - rb**2 + d @ d) / 2 / (d @ d)
             up = side * np.sqrt(ra**2 / (d @ d) - along**2)
             found.append(a + along * d + up * np.array([-d[1], d[0]]))
-        at = [found[i] if i is not None else np.array(f) for (i, _), f in zip(bars, feet, strict=True)]
+        at = [
+            found[i] if i is not None else np.array(f) for (i, _), f in zip(bars, feet, strict=True)
+        ]
         return np.array(at), np.array([found[j] for _, j in bars])
 
     def energy(t, h=1e-5):

@@ -192,7 +192,8 @@ class Flow:
             answer = alpha.advance(self.packed.system, self.W, step, rank, signals, self.steps, out)
             taken = int(step.count[alpha.STEPS])
             if answer == alpha.NEEDS_LAWS:
-                apply_laws(self.packed.asked, self.W, float(self.t[1 + taken]))
+                slopes, t = not step.count[alpha.HAS_FACTOR], float(self.t[1 + taken])
+                apply_laws(self.packed.asked, self.W, t, slopes=slopes)
         if answer != alpha.CONVERGED:
             self.failed[0] += 1
             raise failed_step(self.record, self.W, step, answer, float(self.t[1 + taken]))
