@@ -23,6 +23,9 @@ from rom.notebook import listed
 # relative singular value below which a constraint counts as a copy of others: assembled
 # mechanisms show 1e-12 and less, independent constraints 1e-4 and more
 RANK_TOLERANCE = 1e-8
+# the same of pivots, which are squares, where rows of length one are eliminated by blocks: copies
+# leave 1e-11 in linkages of dozens of bodies
+RANK_PIVOT_RTOL = 1e-9
 # a gap that rigid motion can close is not closed by deformation: elastic coordinates weigh more
 ELASTIC_WEIGHT = 1e8
 GAP_TOLERANCE = 1e-9
@@ -297,7 +300,7 @@ def _by_blocks(packed: Packed, W: Work, weight: Array) -> _Constraints:
     A, _ = unit_rows(pattern.gradient(W.G) @ diags(weight))
     m, n = A.shape
     whole = bmat([[identity(n), A.T], [A, csr_matrix((m, m))]], format="csc")
-    rank = m - signature(whole, pattern.groups, RANK_TOLERANCE**1.5).zero
+    rank = m - signature(whole, pattern.groups, RANK_PIVOT_RTOL).zero
     equations = Constrained(identity(n), A, redundant=True)
     gaps = np.sin(np.outer(1.0 + np.arange(m), 1.0 + np.arange(N_PROBES)))
     closing = equations.solve(np.zeros((n, N_PROBES)), gaps)[0]
