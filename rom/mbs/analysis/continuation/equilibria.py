@@ -11,7 +11,7 @@ from scipy.linalg import eig, eigh, null_space
 from rom.arguments import finite, positive, typed, whole
 from rom.errors import ConfigError, RomWarning, SolverError, reached
 from rom.mbs.analysis.equilibrium import equilibrium
-from rom.mbs.analysis.few_modes import RANK_RTOL, Pencil
+from rom.mbs.analysis.few_modes import Pencil
 from rom.mbs.analysis.local_equations import DIFFERENCE_STEP, MAX_DENSE, Instant, instant
 from rom.mbs.analysis.rotors.moving_axes import IN_BODIES, small_motions
 from rom.mbs.analysis.tangent import LOAD_STIFFNESS_RTOL, load_stiffness, sizes
@@ -264,7 +264,7 @@ def _nearest(pencil: Pencil, shift: float) -> tuple[Array, Array]:
 def _all(pencil: Pencil) -> tuple[Array, Array]:
     """Stiffness (f,) [1/s^2] of all free motions (n, f), ascending."""
     G, K, M = (A.toarray() for A in (pencil.G, pencil.K, pencil.M))
-    Z = null_space(G, RANK_RTOL) if G.size else np.eye(len(K))
+    Z = null_space(G, RANK_PIVOT_RTOL) if G.size else np.eye(len(K))
     K, M = Z.T @ K @ Z, Z.T @ M @ Z
     if not K.size:
         return np.zeros(0), Z
