@@ -16,7 +16,12 @@ from rom.mbs.equations.equations import (
 from rom.mbs.equations.packing import Packed, pack
 from rom.mbs.equations.pattern import Pattern
 from rom.mbs.equations.python_laws import Laws, apply_laws
-from rom.mbs.integrate.consistent_start import fitting_velocity, independent, with_accelerations
+from rom.mbs.integrate.consistent_start import (
+    fitting_velocity,
+    independent,
+    initial_state,
+    with_accelerations,
+)
 from rom.mbs.kernels.system import ROLL
 from rom.mbs.kernels.work import Work, workspace
 from rom.mbs.mechanism import Mechanism
@@ -229,14 +234,21 @@ def instant(mechanism: Any, t: float, *, sparse: bool | None = False) -> Instant
     return Instant(packed, W, float(t), packed.asked, pattern=pattern).at(float(t))
 
 
-def consistent(now: Instant, state: Any) -> State:
+def consistent(now: Instant, state: Any, assemble: bool = False) -> State:
     """The state with velocities, accelerations and multipliers that belong together.
+
+    Args:
+        now: the mechanism.
+        state: the state, None for the start.
+        assemble: see `rom.simulate`.
 
     Raises:
         ConfigError: if the state belongs to another mechanism.
         ModelError: naming the joint that is open, or whose velocity contradicts it.
     """
     packed, W = now.packed, now.W
+    if state is None:
+        state = initial_state(packed, now.t, assemble=assemble)
     sizes = tuple(np.size(getattr(state, x, 0.0)) for x in ("q", "v", "lam"))
     needed = (packed.q.size, packed.v.size, W.value.size)
     if not isinstance(state, State) or sizes != needed:

@@ -15,6 +15,7 @@ from rom.mbs.analysis.few_modes import Pencil
 from rom.mbs.analysis.local_equations import DIFFERENCE_STEP, MAX_DENSE, Instant, instant
 from rom.mbs.analysis.rotors.moving_axes import IN_BODIES, small_motions
 from rom.mbs.analysis.tangent import LOAD_STIFFNESS_RTOL, load_stiffness, sizes
+from rom.mbs.integrate.consistent_start import RANK_PIVOT_RTOL
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.parts.bodies import Marker
 from rom.mbs.results.state import State
@@ -183,7 +184,7 @@ class _Equilibria:
         """Masses and stiffness in motions that turn with the bodies."""
         now = self.now.at(state.t)
         now.W.base[:] = state.base
-        return Pencil.of(now, state, small_motions(now.packed.system, state, IN_BODIES))
+        return Pencil.of(now, state, small_motions(now.packed, state, IN_BODIES))
 
     def corrections(self, at: State, p: float) -> tuple[Array, Array]:
         """Newton's correction, and the change per time, of coordinates and multipliers."""
