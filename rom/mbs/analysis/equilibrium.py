@@ -125,7 +125,7 @@ class _Search:
     def start(self, state: State | None, assemble: bool = True) -> State:
         """The state to start from, its joints closed."""
         packed, W = self.now.packed, self.now.W
-        first = initial_state(packed, self.now.t, assemble=assemble)
+        first = initial_state(packed, self.now.t, assemble=assemble, placing=True)
         if first.base is not None:
             first = replace(first, base=packed.places.settled(first.base))
         if state is None:

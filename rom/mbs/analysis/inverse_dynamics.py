@@ -56,7 +56,7 @@ def inverse_dynamics(mechanism: Mechanism, t: npt.ArrayLike, *, assemble: bool =
         raise ConfigError(f"t must hold at least two ascending times, got {np.shape(t)}.")
     packed = pack(mechanism)
     span, spacing = (times[0], times[-1]), DIFFERENCE_SPACING * (times[-1] - times[0])
-    state = initial_state(packed, times[0], spacing, assemble=assemble)
+    state = initial_state(packed, times[0], spacing, assemble=assemble, placing=True)
     packed = packed.of_rank(state.rank)
     _refuse_free(packed, state)
     signals = sample_all(packed.signals, times, span, spacing)

@@ -70,6 +70,8 @@ def bushing(  # noqa: PLR0913  one keyword per property
 ) -> None:
     """Elastic and damped connection in six directions, without force at the start.
 
+    Rotations count up to half a turn; a rotational spring about a joint counts whole turns.
+
     Args:
         name: name of the bushing.
         m1: marker that carries the axes.

@@ -38,7 +38,12 @@ N_PROBES = 4  # gaps by which constraints that repeat others are found
 
 
 def initial_state(
-    packed: Packed, t: float = 0.0, spacing: float = 1e-6, *, assemble: bool = False
+    packed: Packed,
+    t: float = 0.0,
+    spacing: float = 1e-6,
+    *,
+    assemble: bool = False,
+    placing: bool = False,
 ) -> State:
     """Positions and velocities nearest to the given ones that satisfy all joints and drives.
 
@@ -49,6 +54,7 @@ def initial_state(
         t: start time [s].
         spacing: of finite differences of drives [s].
         assemble: close gaps of any size, and change given velocities by as much as it takes.
+        placing: drives say where bodies are; where these were added is no contradiction.
 
     Raises:
         ModelError: naming the joint that cannot be satisfied, or that contradicts what was given.
@@ -58,35 +64,36 @@ def initial_state(
     good, failure = first_failure(packed.signals, np.array([t]), table)
     if not good:
         raise failure
-    return _start(packed, table[0], t, assemble)
+    return _start(packed, table[0], t, (assemble, placing))
 
 
-def _start(packed: Packed, signal: Array, t: float, assemble: bool) -> State:
+def _start(packed: Packed, signal: Array, t: float, asked: tuple[bool, bool]) -> State:
     """The state at the start, by whole matrices if the rank of the constraints needs them."""
     W = workspace(packed.system, len(packed.signals))
     W.signal[:] = signal
     surely = packed.by_blocks and not packed.shares
     if surely and not _independent(packed, W, packed.q):
-        return _start(packed.sharing(), signal, t, assemble)
+        return _start(packed.sharing(), signal, t, asked)
     q = assembled(packed, W, packed.q)
     if surely and not _independent(packed, W, q):
-        return _start(packed.sharing(), signal, t, assemble)
+        return _start(packed.sharing(), signal, t, asked)
     rank = W.value.size if surely else _rank(packed, W, q)
     _check_start(packed, W, q, rank)
     v = fitting_velocity(packed, W, q, packed.v)
-    closed, lam = _told(packed, W, q, v, assemble), np.zeros(W.value.size)
+    closed, lam = _told(packed, W, q, v, *asked), np.zeros(W.value.size)
     return with_accelerations(packed, W, State(t, q, v, v * 0, lam, rank, closed=closed))
 
 
-def _told(packed: Packed, W: Work, q: Array, v: Array, assemble: bool) -> float:
+def _told(packed: Packed, W: Work, q: Array, v: Array, assemble: bool, placing: bool) -> float:
     """Largest change of what was given, of the size or of velocities, after telling it.
 
     Velocities are told only: they are the nearest ones, and those of bodies that were given none
     are what joints and drives make them.
     """
     evaluate(packed.system, W, packed.q, packed.v)
-    rolls = packed.system.rows.kind == ROLL
-    gap, where, size = _largest(packed, np.where(rolls, 0.0, W.value / packed.row_scale))
+    rows = packed.system.rows
+    free = (rows.kind == ROLL) | (placing & (rows.signal >= 0))
+    gap, where, size = _largest(packed, np.where(free, 0.0, W.value / packed.row_scale))
     if gap > REFUSED and not assemble:
         raise ModelError(
             f"the start does not fit: where bodies are added it is open by {size}.",
