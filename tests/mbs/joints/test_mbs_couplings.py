@@ -147,7 +147,7 @@ def test_a_pinion_drives_its_rack(ratio):
     pinion = mech.add_rigid("pinion", mass=1.0, inertia=(J, J, J), at=(0, 0, 0))
     rack = mech.add_rigid("rack", mass=m, inertia=(1, 1, 1), at=(0, -0.05, 0))
     mech.revolute("axle", mech.ground.marker((0, 0, 0)), pinion.marker((0, 0, 0)), axis=Z)
-    mech.prismatic("rail", mech.ground.marker((0, 0, 0)), rack.marker((0, 0, 0)), axis=X)
+    mech.prismatic("rail", mech.ground.marker((0, -0.05, 0)), rack.marker((0, 0, 0)), axis=X)
     mech.gear("teeth", "axle", "rail", ratio=ratio)
     mech.torque("engine", pinion.marker((0, 0, 0)), (0, 0, torque))
     sol = simulate(mech, t_end=1.0, dt=1e-2)
