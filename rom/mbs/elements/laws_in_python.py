@@ -1,14 +1,16 @@
 """Laws of force that are not compiled: asked between two calls of compiled code."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import product
 from typing import Any
 
 import numpy as np
 
+from rom import rotation
 from rom.mbs.elements.law_calls import DIFFERENCE_STEP, Answer, Motion, answer_of
 from rom.mbs.parts.foreign import ask, numbers
 from rom.model import Array
-from rom.rotation import skew
 
 PAIR_TEXT = "two vectors of three numbers: force and moment"
 
@@ -61,8 +63,8 @@ class AskedLaw:
         motion = Motion(W.P[at], W.E[at], W.V[at, :3], W.V[at, 3:])
         laws.answer[laws.answer_at[e] : laws.answer_at[e + 1]] = self.ask(t, motion, memory)
         if slopes:
-            K, C = laws.told[laws.told_at[e] : laws.told_at[e + 1]].reshape(2, 6 * n, 6 * n)
-            self.differentiate(t, motion, memory, K, C)
+            told = laws.told[laws.told_at[e] : laws.told_at[e + 1]]
+            told[:] = self.slopes(t, motion, memory).ravel()
 
     def ask(self, t: float, motion: Motion, memory: Array) -> Array:
         """All that it says."""
@@ -78,49 +80,46 @@ class AskedLaw:
         """Write its answer."""
         ask(self.what, t, self.law.function, t, self.law.parameters.copy(), motion, memory, out)
 
-    def differentiate(self, t: float, motion: Motion, memory: Array, K: Array, C: Array) -> None:
-        """Derivatives (6 n, 6 n) by motions and velocities: the user's, or central differences."""
-        if self.law.tangents is not None:
-            K[:], C[:] = 0.0, 0.0
-            given = self.law.parameters.copy(), motion, memory, K, C
-            ask(f"tangents of {self.what}", t, self.law.tangents, t, *given)
-            return
-        for k in range(len(K)):
-            for D, moved in ((K, _displaced), (C, _faster)):
-                sides, h = moved(motion, *divmod(k, 6))
-                one, other = (_wrenches(self.ask(t, side, memory), len(K)) for side in sides)
-                D[:, k] = 0.5 * (one - other) / h
+    def slopes(self, t: float, motion: Motion, memory: Array) -> Array:
+        """(2, 6 n, 6 n) derivatives by motions and velocities: the user's, or differences."""
+        if self.law.tangents is None:
+            return differences(lambda moved: self.ask(t, moved, memory), motion)
+        D = np.zeros((2, 6 * len(self.law.markers), 6 * len(self.law.markers)))
+        what, given = f"tangents of {self.what}", (self.law.parameters.copy(), motion, memory)
+        ask(what, t, self.law.tangents, t, *given, D[0], D[1])
+        return D
 
 
-def _wrenches(answer: Array, size: int) -> Array:
-    """Force and moment of each marker in turn."""
-    return np.hstack(answer[:size].reshape(2, -1, 3)).ravel()
+def differences(answer: Callable[[Motion], Array], motion: Motion) -> Array:
+    """(2, 6 n, 6 n) central differences of wrenches by motions and by velocities of n markers."""
+    n = len(motion.position)
+    D = np.zeros((2, 6 * n, 6 * n))
+    for by_velocity, p in product((0, 1), range(6 * n)):
+        field = _moved(motion, p, by_velocity)
+        h = DIFFERENCE_STEP * (1.0 + np.abs(field[p // 6]).max())
+        one, other = (
+            answer(shifted(motion, p, side, by_velocity))[: 6 * n].reshape(2, n, 3)
+            for side in (h, -h)
+        )
+        D[by_velocity, :, p] = np.concatenate(one - other, axis=1).ravel() / (2 * h)
+    return D
 
 
-def _displaced(motion: Motion, b: int, p: int) -> tuple[tuple[Motion, Motion], float]:
-    """The motion with marker b displaced or turned by a step, and back by one."""
-    if p < 3:
-        return _changed(motion, "position", b, p)
-    turn = DIFFERENCE_STEP * skew(np.eye(3)[p - 3])
-    sides = []
-    for R in (turn, -turn):  # to second order, so that central differences are exact to that order
-        axes = motion.axes.copy()
-        axes[b] += (R + 0.5 * R @ R) @ axes[b]
-        sides.append(motion._replace(axes=axes))
-    return (sides[0], sides[1]), DIFFERENCE_STEP
+def shifted(motion: Motion, p: int, h: float, by_velocity: int) -> Motion:
+    """The motion with marker p // 6 displaced, turned or quickened by h."""
+    out, (b, a) = Motion(*(x.copy() for x in motion)), divmod(p, 6)
+    field = _moved(out, p, by_velocity)
+    if field is out.axes:
+        field[b] = rotation.matrix(rotation.exp(h * np.eye(3)[a - 3])) @ field[b]
+    else:
+        field[b, a % 3] += h
+    return out
 
 
-def _faster(motion: Motion, b: int, p: int) -> tuple[tuple[Motion, Motion], float]:
-    """The motion with marker b faster by a step, and slower by one."""
-    return _changed(motion, "velocity" if p < 3 else "omega", b, p % 3)
-
-
-def _changed(motion: Motion, field: str, b: int, p: int) -> tuple[tuple[Motion, Motion], float]:
-    up, down = getattr(motion, field).copy(), getattr(motion, field).copy()
-    h = DIFFERENCE_STEP * (1.0 + abs(up[b, p]))
-    up[b, p] += h
-    down[b, p] -= h
-    return (motion._replace(**{field: up}), motion._replace(**{field: down})), h
+def _moved(motion: Motion, p: int, by_velocity: int) -> Array:
+    """What a motion or velocity of a marker changes."""
+    kinds = (motion.velocity, motion.omega) if by_velocity else (motion.position, motion.axes)
+    return np.asarray(kinds[p % 6 // 3])
 
 
 class AskedForce(AskedLaw):
