@@ -427,6 +427,7 @@ SIMULATION = Table("How it is moved.", (
     Key("save_every", Whole(1), "Keep every so many steps.", 1),
     Key("order", Whole(1, 5), "Of bdf.", 2),
     Key("stabilised", Flag(), "Keep constraints of the velocities, too.", False),
+    Key("assemble", Flag(), "Move the start to where joints and drives want it.", False),
 ))  # fmt: skip
 OUTPUT = Table("What `rom simulate` writes beside the table `motion.csv`.", (
     Key("history", Text(("csv", "h5")), "Form of the table of all motions, loads and energies.",

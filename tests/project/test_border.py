@@ -70,7 +70,7 @@ MUST_REFUSE = {  # what is no value of a kind, whatever it is for
 KINDS = {  # callable -> kinds of its arguments, whose values are refused and not only survived
     "simulate": "mechanism=record t_end=positive dt=positive rho_inf=number tolerance=positive "
     "rtol=positive save_every=count method=word t_start=number order=count state=record "
-    "keep=record progress=flag stabilised=flag",
+    "keep=record progress=flag stabilised=flag assemble=flag",
     "reduce": "model=record method=record interfaces=table reference=word stress=flag "
     "damping=record",
     "modes": "model=record n=count fixed=word",

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from scipy.optimize import linear_sum_assignment
 
 from rom.arguments import typed, unit_vector, whole
-from rom.errors import ConfigError
+from rom.errors import ConfigError, warn
 from rom.mbs.analysis.equilibrium import equilibrium
 from rom.mbs.analysis.linearize import Linearization, linearize
 from rom.mbs.analysis.local_equations import MAX_DENSE
@@ -19,6 +19,7 @@ from rom.mbs.mechanism import Mechanism
 from rom.model import Array
 
 N_SPARE = 6  # modes computed beyond twice those followed
+SPEED_RTOL = 1e-3  # by which the body nearest to a speed may miss it
 FREQUENCY_WEIGHT = 0.1  # weight of the relative change of frequency beside that of the shape
 
 
@@ -98,6 +99,9 @@ def campbell(
     Raises:
         ConfigError: for wrong speeds or a wrong mechanism.
         ModelError, SolverError: see `equilibrium` and `linearize`.
+
+    Warns:
+        RomWarning: where no body turns at the speed, as when a drive prescribes another one.
     """
     speeds = np.asarray(speeds, dtype=float)
     if speeds.ndim != 1 or speeds.size < 2 or not np.all(np.diff(speeds) > 0):
@@ -137,10 +141,17 @@ def _at(
     else:
         made = mechanism(float(speed))
         one, state = made if isinstance(made, tuple) else (made, None)
-    if n is None or state is None or state.v.size <= MAX_DENSE:
-        return linearize(one, state, **axes)
-    motions = state.v.size - state.rank
-    return linearize(one, state, **axes, n=min(2 * n + N_SPARE, motions))
+    if n is not None and state is not None and state.v.size > MAX_DENSE:
+        axes = axes | {"n": min(2 * n + N_SPARE, state.v.size - state.rank)}
+    found = linearize(one, state, **axes)
+    turns = found.state.v[found.packed.system.bodies.v_at[:, None] + np.arange(3, 6)]
+    rates = np.linalg.norm(turns, axis=1)
+    if np.abs(rates - abs(speed)).min() > SPEED_RTOL * max(rates.max(), abs(speed)):
+        warn(
+            f"no body turns at the speed {speed:.4g} rad/s of the diagram, the fastest at "
+            f"{rates.max():.4g} rad/s: its frequencies are those of another speed."
+        )
+    return found
 
 
 def _follow(one: Linearization, two: Linearization, order: Array) -> tuple[Array, Array]:

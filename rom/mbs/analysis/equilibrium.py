@@ -14,7 +14,7 @@ from rom.mbs.analysis.rotors.spins import Spins
 from rom.mbs.analysis.sparse_tangent import Loan, SparseTangent
 from rom.mbs.analysis.tangent import Tangent, faint_force, sizes
 from rom.mbs.equations.packing import Packed
-from rom.mbs.integrate.consistent_start import assembled, initial_state
+from rom.mbs.integrate.consistent_start import assembled, check_velocity, initial_state
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.results.state import State
 from rom.mbs.results.validity import warn_of_range
@@ -41,6 +41,7 @@ def equilibrium(
     steps: int = 1,
     spin: npt.ArrayLike | Mapping[str, float] | None = None,
     about: npt.ArrayLike = (0.0, 0.0, 0.0),
+    assemble: bool = False,
 ) -> State:
     """Find where forces, reactions and the inertia of a steady rotation balance.
 
@@ -59,14 +60,15 @@ def equilibrium(
             speed [rad/s] for some revolute joints, {joint: speed}, about whose axes the bodies
             behind them turn while the others rest.
         about: (3,) a point on the axis of the spin [m].
+        assemble: see `rom.simulate`.
 
     Returns:
         A state for `linearize` and for ``simulate(..., state=...)``, with the reactions.
 
     Raises:
         ConfigError: for a wrong argument.
-        ModelError: naming the body that can still move although no force opposes, or the joint
-            that cannot be closed.
+        ModelError: naming the body that can still move although no force opposes, the joint that
+            cannot be closed, or the joint or drive that turns at another speed than ``spin``.
         SolverError: naming the body out of balance, or the open joint, where Newton failed. Either
             of them has ``error.solution``: the state reached, at the share of the loads before.
 
@@ -90,12 +92,15 @@ def equilibrium(
     time = (0.0 if state is None else state.t) if t is None else t
     now = instant(mechanism, time, sparse=None)
     search = _Search(now, Spins.of(mechanism, now, spin, about))
-    found = search.start(state)
+    found = search.start(state, assemble or state is not None)
     with reached(lambda: found):
         nearby = search.eased(found, steps) if state is None else None
         for at_load in search.loaded(found, steps) if nearby is None else (nearby,):
             found = at_load
         search.judge(found)
+    if search.spins.any and found.lam.size:
+        now.gradient(found.q, found.v)
+        check_velocity(now.packed, now.W, found.v)
     warn_of_range(mechanism, now.packed, found)
     return found
 
@@ -117,10 +122,10 @@ class _Search:
             return Tangent.of(now, state, self.spins)
         return SparseTangent.of(now, state, self.spins, self.loan)
 
-    def start(self, state: State | None) -> State:
+    def start(self, state: State | None, assemble: bool = True) -> State:
         """The state to start from, its joints closed."""
         packed, W = self.now.packed, self.now.W
-        first = initial_state(packed, self.now.t)
+        first = initial_state(packed, self.now.t, assemble=assemble, placing=True)
         if first.base is not None:
             first = replace(first, base=packed.places.settled(first.base))
         if state is None:

@@ -18,6 +18,7 @@ from rom.errors import ConfigError, ModelError, ModesMissedError, SolverError
 from rom.mbs.analysis.local_equations import Instant
 from rom.mbs.equations.signature import signature
 from rom.mbs.equations.sparse_solve import Constrained, bordered, unit_rows
+from rom.mbs.integrate.consistent_start import RANK_PIVOT_RTOL
 from rom.mbs.results.state import State
 from rom.model import Array, Index
 
@@ -25,7 +26,6 @@ SHIFT_SHARE = 1e-6  # of the stiffest square, where the search for the lowest mo
 N_SPARE = 3  # modes beyond those asked for, so that a gap for counting is found
 N_PROBES, N_PASSES = 12, 3  # of the inverse iteration that looks for the lowest eigenvalue
 MAX_SHIFTS = 12  # each a thousandth of the last
-RANK_RTOL = 1e-12  # of unit masses and gradients, below which a constraint repeats others
 ROUND_OFF = 32 * np.finfo(float).eps  # of the terms that add up to an eigenvalue
 MIN_GAP = 1e-6  # between neighbouring eigenvalues in which modes are counted, relative
 SYMMETRY_RTOL = 1e-9
@@ -142,7 +142,7 @@ class Pencil:
         if self.independent or not self.G.shape[0]:
             return 0
         A = bmat([[identity(self.M.shape[0]), self.G.T], [self.G, None]], format="csc")
-        return signature(A, self.groups, RANK_RTOL).zero
+        return signature(A, self.groups, RANK_PIVOT_RTOL).zero
 
     @property
     def n_free(self) -> int:

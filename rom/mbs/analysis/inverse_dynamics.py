@@ -29,7 +29,7 @@ DIFFERENCE_SPACING = 1e-4  # of drives without derivatives, relative to the dura
 
 
 @typed
-def inverse_dynamics(mechanism: Mechanism, t: npt.ArrayLike) -> Solution:
+def inverse_dynamics(mechanism: Mechanism, t: npt.ArrayLike, *, assemble: bool = False) -> Solution:
     """Positions, velocities, accelerations and all loads of a mechanism that is driven entirely.
 
     At each time the joints and drives give the position, their derivatives velocities and
@@ -38,6 +38,7 @@ def inverse_dynamics(mechanism: Mechanism, t: npt.ArrayLike) -> Solution:
     Args:
         mechanism: rigid bodies with as many drives as the joints leave free motions.
         t: (n_t,) times [s], ascending and so close that each position is nearest to the one before.
+        assemble: see `rom.simulate`.
 
     Returns:
         The motion, to be asked like one that was simulated: ``reaction``, ``drive_load``,
@@ -55,7 +56,8 @@ def inverse_dynamics(mechanism: Mechanism, t: npt.ArrayLike) -> Solution:
         raise ConfigError(f"t must hold at least two ascending times, got {np.shape(t)}.")
     packed = pack(mechanism)
     span, spacing = (times[0], times[-1]), DIFFERENCE_SPACING * (times[-1] - times[0])
-    state = initial_state(packed, times[0], spacing)
+    state = initial_state(packed, times[0], spacing, assemble=assemble, placing=True)
+    packed = packed.of_rank(state.rank)
     _refuse_free(packed, state)
     signals = sample_all(packed.signals, times, span, spacing)
     good, failure = first_failure(packed.signals, times, signals, span, spacing)
@@ -117,7 +119,7 @@ def _solution(
 
     t, work = rows("t"), np.zeros_like(powers)
     work[1:] = np.cumsum(0.5 * np.diff(t)[:, None] * (powers[1:] + powers[:-1]), axis=0)
-    statistics = {"steps": t.size - 1, "rank": states[0].rank}
+    statistics = {"steps": t.size - 1, "rank": states[0].rank, "closed": states[0].closed}
     status = f"Prescribed from t = {t[0]:g} s to {t[-1]:g} s."
     q, v, a, lam = (rows(name) for name in ("q", "v", "a", "lam"))
     moved = mechanism, packed, t, q, v, a, lam

@@ -11,6 +11,7 @@ from rom.arguments import typed, whole
 from rom.errors import ConfigError
 from rom.mbs.elements.law_calls import ENERGY_SIZE, MOTION_SIZE, answer_of, motion_of
 from rom.mbs.elements.laws import Law, UserForce
+from rom.mbs.elements.laws_in_python import differences
 from rom.mbs.mechanism import Mechanism
 from rom.model import Array, Mask, Report, Row
 
@@ -145,18 +146,11 @@ def _motions(mechanism: Mechanism, law: Law, samples: int, rng: np.random.Genera
     size = max(float(np.ptp(points, axis=0).max()), 1.0)
     for _ in range(samples):
         n = len(points)
-        turns = [_turned(TURN_SPREAD * rng.normal(size=3)) for _ in range(n)]
+        turns = [rotation.matrix(rotation.exp(TURN_SPREAD * rng.normal(size=3))) for _ in range(n)]
         moved = points + SPREAD_SHARE * size * rng.normal(size=(n, 3))
         yield np.concatenate([
             moved.ravel(), (np.array(turns) @ axes).ravel(), rng.normal(size=6 * n)
         ])  # fmt: skip
-
-
-def _turned(x: Array) -> Array:
-    """(3, 3) rotation by a vector."""
-    angle = float(np.linalg.norm(x))
-    half = np.sinc(angle / (2 * np.pi)) / 2
-    return rotation.matrix(np.r_[np.cos(angle / 2), half * x])
 
 
 def _looked(asked: _Asked, motion: Array) -> list[_Finding]:
@@ -190,41 +184,19 @@ def _first(which: Mask, names: list[str]) -> str:
 def _slopes(asked: _Asked, motion: Array) -> list[_Finding]:
     """Tangents of the law against central differences, the worst entry named."""
     own, found = asked.tangents(motion), []
+    moved = motion_of(motion, len(asked.law.markers))
+    other = differences(lambda x: asked.answer(np.concatenate([*map(np.ravel, x)])), moved)
     for k, what in enumerate(("stiffness", "damping")):
         n = own.shape[1]
-        columns = [_change(asked, motion, p, k) for p in range(n)]
-        miss = np.abs(own[k] - np.array(columns).T)
-        scale = max(np.abs(columns).max(), np.abs(own[k]).max(), 1e-300)
+        miss = np.abs(own[k] - other[k])
+        scale = max(np.abs(other[k]).max(), np.abs(own[k]).max(), 1e-300)
         i, j = np.unravel_index(np.argmax(miss), miss.shape)
         n_force = 3 * (n // 6)
         field = asked.fields[(i // 3 % 2) * n_force + 3 * (i // 6) + i % 3]
-        where = f"{field}, by {asked.motions[j]}: {own[k][i, j]:.6g}, not {columns[j][i]:.6g}"
+        where = f"{field}, by {asked.motions[j]}: {own[k][i, j]:.6g}, not {other[k][i, j]:.6g}"
         text = f"error of the {what} / largest"
         found.append(_Finding(text, where, float(miss.max() / scale), TANGENT_RTOL))
     return found
-
-
-def _change(asked: _Asked, motion: Array, p: int, by_velocity: int) -> Array:
-    """(6 K,) derivative of all wrenches by one motion or velocity of a marker."""
-    sides = [asked.answer(_shifted(motion, p, h, by_velocity))
-             for h in (DIFFERENCE_STEP, -DIFFERENCE_STEP)]  # fmt: skip
-    n = motion.size // MOTION_SIZE
-    force, moment = ((sides[0] - sides[1])[: 6 * n] / (2 * DIFFERENCE_STEP)).reshape(2, n, 3)
-    return np.concatenate([force, moment], axis=1).ravel()
-
-
-def _shifted(motion: Array, p: int, h: float, by_velocity: int) -> Array:
-    """The motion with marker p // 6 displaced, turned or quickened by h."""
-    n, k, a = motion.size // MOTION_SIZE, p // 6, p % 6
-    out = motion.copy()
-    moved = motion_of(out, n)
-    if by_velocity:
-        (moved.velocity if a < 3 else moved.omega)[k, a % 3] += h
-    elif a < 3:
-        moved.position[k, a] += h
-    else:
-        moved.axes[k] = _turned(h * np.eye(3)[a - 3]) @ moved.axes[k]
-    return out
 
 
 def _balance(asked: _Asked, motion: Array, answer: Array) -> _Finding:
@@ -249,5 +221,5 @@ def _later(motion: Array, h: float) -> Array:
     moved = motion_of(out, n)
     moved.position[:] += h * moved.velocity
     for k in range(n):
-        moved.axes[k] = _turned(h * moved.omega[k]) @ moved.axes[k]
+        moved.axes[k] = rotation.matrix(rotation.exp(h * moved.omega[k])) @ moved.axes[k]
     return out

@@ -22,7 +22,7 @@ from rom.mbs.analysis.rotors.blades import Blades
 from rom.mbs.analysis.rotors.moving_axes import Axes, chosen, small_motions
 from rom.mbs.analysis.tangent import load_stiffness, sizes
 from rom.mbs.equations.packing import Packed
-from rom.mbs.integrate.consistent_start import fitting_velocity, initial_state, with_accelerations
+from rom.mbs.integrate.consistent_start import fitting_velocity, with_accelerations
 from rom.mbs.kernels.system import ROLL
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.parts.bodies import Marker
@@ -159,7 +159,7 @@ def jacobian(packed: Packed, H: Array, marker: Marker) -> Array:
 
 
 @typed
-def linearize(
+def linearize(  # noqa: PLR0913  keywords of the one entry, all have defaults
     mechanism: Mechanism,
     state: State | None = None,
     *,
@@ -168,6 +168,7 @@ def linearize(
     n: int | None = None,
     band: tuple[float, float] | None = None,
     blades: Any = None,
+    assemble: bool = False,
 ) -> Linearization:
     """Linearise the equations of motion around a state, at rest or moving.
 
@@ -182,7 +183,8 @@ def linearize(
             accelerations and reactions are computed.
         t: time at which drives and loads are taken [s]; None for that of the state.
         frame: axes in which small motions of a body are counted: "body" for what turns as a whole
-            (blades), "world" for axisymmetric rotors that spin in bearings; or {body: frame}.
+            (blades), "world" for axisymmetric rotors of rigid bodies or rods that spin in bearings,
+            not of reduced bodies, whose shapes turn with them; or {body: frame}.
         n: number of modes, the lowest; None for all. Cost and memory are then those of some steps
             in time, for thousands of bodies too, and M, C, K are those of these modes.
         band: (2,) modes between two frequencies [Hz] instead.
@@ -190,6 +192,7 @@ def linearize(
             its axis: each a body, a list of bodies or a non-linear body, by name or as added. What
             they do is counted together, in axes that do not turn (multi-blade coordinates), so
             that the coefficients are constant; what else turns needs the frame "world".
+        assemble: see `rom.simulate`.
 
     Undamped modes asked for by ``n`` or ``band`` are counted by the signature of the stiffness, so
     that none is missed; damped and gyroscopic ones are those nearest to zero, or to the middle of
@@ -222,7 +225,7 @@ def linearize(
     wanted = Wanted.of(n, band)
     now = instant(mechanism, time, sparse=wanted is not None)
     axes = chosen(frame, now.packed.names)
-    state = consistent(now, initial_state(now.packed, now.t) if state is None else state)
+    state = consistent(now, state, assemble)
     refuse_rolling(now.packed, state)
     if blades is not None:
         axes = replace(axes, blades=Blades.of(blades, now.packed, state))
@@ -269,7 +272,7 @@ def sparse_equations(now: Instant, state: State, axes: Axes) -> Any:
 
 
 def _pencil(now: Instant, state: State, axes: Axes) -> Pencil:
-    return Pencil.of(now, state, small_motions(now.packed.system, state, axes))
+    return Pencil.of(now, state, small_motions(now.packed, state, axes))
 
 
 def _rests(now: Instant, state: State, pencil: Pencil) -> bool:
@@ -296,7 +299,7 @@ def _part(around: Linearization, wanted: Wanted) -> Linearization:
 
 def _reduced(now: Instant, state: State, axes: Axes) -> Linearization:
     """Matrices for the motions the joints leave, and a warning if they change with time."""
-    T, scale = small_motions(now.packed.system, state, axes)[0], now.probe()
+    T, scale = small_motions(now.packed, state, axes)[0], now.probe()
     _, G, M = now.gradient(state.q, state.v)
     Z = of_unit_mass(free_motions(G @ T, scale, state.rank), T.T @ M @ T)
     path = _Path(now, state, axes, Z)
@@ -348,7 +351,7 @@ class _Path:
         q = self.ahead(h)
         _, G, M = self.now.gradient(q, self.state.v)
         there = replace(self.state, q=q)
-        T = small_motions(self.now.packed.system, there, self.axes)[0]
+        T = small_motions(self.now.packed, there, self.axes)[0]
         mass = T.T @ M @ T
         N = of_unit_mass(free_motions(G @ T, self.now.probe(), self.state.rank), mass)
         U, _, V = np.linalg.svd(N.T @ mass @ self.Z)
@@ -377,7 +380,7 @@ class _Path:
 
 
 def _matrices(now: Instant, state: State, axes: Axes, path: _Path) -> Linearization:
-    T, T1, T2, T3 = small_motions(now.packed.system, state, axes)
+    T, T1, T2, T3 = small_motions(now.packed, state, axes)
     Z, (Zd, Zdd) = path.Z, path.rates()
     M, Cv, Kq = now.matrices(state)
     H, basis = now.W.H.copy(), T @ Z

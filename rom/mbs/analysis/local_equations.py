@@ -16,7 +16,12 @@ from rom.mbs.equations.equations import (
 from rom.mbs.equations.packing import Packed, pack
 from rom.mbs.equations.pattern import Pattern
 from rom.mbs.equations.python_laws import Laws, apply_laws
-from rom.mbs.integrate.consistent_start import fitting_velocity, independent, with_accelerations
+from rom.mbs.integrate.consistent_start import (
+    fitting_velocity,
+    independent,
+    initial_state,
+    with_accelerations,
+)
 from rom.mbs.kernels.system import ROLL
 from rom.mbs.kernels.work import Work, workspace
 from rom.mbs.mechanism import Mechanism
@@ -110,9 +115,8 @@ class Instant:
     def damping(self, state: State) -> Any:
         """(n, n) derivative of the residual by the velocities."""
         q, v, a, lam = state.q, state.v, state.a, state.lam
-        if self.laws:
-            return self.difference(lambda dv: self.residual(q, v + dv, a, lam))
         self.residual(q, v, a, lam)
+        apply_laws(self.laws, self.W, self.t, slopes=True)
         tangents(self.system, self.W, v, a, lam, (0.0, 1.0, 0.0))
         return self.W.S.copy() if self.pattern is None else self.pattern.matrix(self.W.S)
 
@@ -122,6 +126,7 @@ class Instant:
         if not self.exact(state):
             return self.difference(lambda dq: self.residual(self.shifted(q, dq), v, a, lam))
         self.residual(q, v, a, lam)
+        apply_laws(self.laws, self.W, self.t, slopes=True)
         tangents(self.system, self.W, v, a, lam, (0.0, 0.0, 1.0))
         return self.W.Kt.copy() if self.pattern is None else self.pattern.matrix(self.W.Kt)
 
@@ -134,17 +139,15 @@ class Instant:
     def exact(self, state: State) -> bool:
         """Whether the tangents of the time integration are exact enough at this state.
 
-        They leave out how laws in Python change, how the rates that forces depend on change with
-        the position, and what finite elastic rotations of markers do to moments. Differences span
-        micrometres, and are worse where films are a few of them thick.
+        They leave out how the rates that forces depend on change with the position, and what
+        finite elastic rotations of markers do to moments. Differences span micrometres, and are
+        worse where films are a few of them thick.
         """
         self.evaluate(state.q, state.v)
         if self.packed.room and not self.packed.has_potential:
-            return not self.laws
+            return True
         rests = not state.v.any() or not self.packed.by_rate
-        return bool(
-            not self.laws and rests and np.abs(self.W.theta).max(initial=0.0) < ELASTIC_TURN
-        )
+        return bool(rests and np.abs(self.W.theta).max(initial=0.0) < ELASTIC_TURN)
 
     def matrices(self, state: State) -> tuple[Any, Any, Any]:
         """(n, n) derivatives of the residual by accelerations, velocities, coordinates."""
@@ -231,14 +234,21 @@ def instant(mechanism: Any, t: float, *, sparse: bool | None = False) -> Instant
     return Instant(packed, W, float(t), packed.asked, pattern=pattern).at(float(t))
 
 
-def consistent(now: Instant, state: Any) -> State:
+def consistent(now: Instant, state: Any, assemble: bool = False) -> State:
     """The state with velocities, accelerations and multipliers that belong together.
+
+    Args:
+        now: the mechanism.
+        state: the state, None for the start.
+        assemble: see `rom.simulate`.
 
     Raises:
         ConfigError: if the state belongs to another mechanism.
         ModelError: naming the joint that is open, or whose velocity contradicts it.
     """
     packed, W = now.packed, now.W
+    if state is None:
+        state = initial_state(packed, now.t, assemble=assemble)
     sizes = tuple(np.size(getattr(state, x, 0.0)) for x in ("q", "v", "lam"))
     needed = (packed.q.size, packed.v.size, W.value.size)
     if not isinstance(state, State) or sizes != needed:

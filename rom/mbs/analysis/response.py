@@ -21,7 +21,6 @@ from rom.mbs.analysis.linearize import (
 from rom.mbs.analysis.local_equations import Instant, consistent, instant
 from rom.mbs.analysis.rotors.moving_axes import chosen
 from rom.mbs.equations.sparse_solve import Constrained
-from rom.mbs.integrate.consistent_start import initial_state
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.parts.bodies import Marker
 from rom.mbs.results.state import State
@@ -67,6 +66,7 @@ def frequency_response(
     force: Marker,
     motion: Marker,
     frame: Any = "body",
+    assemble: bool = False,
 ) -> FrequencyResponse:
     """Respond to a harmonic force, linearly around a state.
 
@@ -77,17 +77,18 @@ def frequency_response(
         force: marker on which force and moment act, in the world.
         motion: marker whose motion is wanted.
         frame: see `linearize`.
+        assemble: see `rom.simulate`.
 
     Raises:
         ConfigError: for an unknown marker or a wrong frequency.
         SolverError: naming the frequency at which the response is infinite.
     """
     f = _checked(frequencies)
-    large = _Large.of(mechanism, state, frame)
+    large = _Large.of(mechanism, state, frame, assemble)
     if large:
         load = large.motion(force).T
         return FrequencyResponse(f, large.motions(f, lambda s: load, large.motion(motion)))
-    around = linearize(mechanism, state, frame=frame)
+    around = linearize(mechanism, state, frame=frame, assemble=assemble)
     load = (around.jacobian(force) @ around.test).T
     found = around.motion(motion) @ _solved(around, f, np.broadcast_to(load, (f.size, *load.shape)))
     return FrequencyResponse(f, found)
@@ -101,6 +102,7 @@ def transmissibility(
     *,
     drive: str,
     motion: Marker,
+    assemble: bool = False,
 ) -> Array:
     """Motion of a marker while a drive shakes the mechanism around a state of rest.
 
@@ -110,6 +112,7 @@ def transmissibility(
         frequencies: (f,) of the drive [Hz].
         drive: name of the drive.
         motion: marker whose motion is wanted.
+        assemble: see `rom.simulate`.
 
     Returns:
         (f, 6) complex; translation and rotation of the marker, world, per unit of the drive.
@@ -124,11 +127,11 @@ def transmissibility(
         raise ConfigError(
             f"no drive {drive!r}; the mechanism has {offered(mechanism.drives, drive)}."
         )
-    large = _Large.of(mechanism, state, "body")
+    large = _Large.of(mechanism, state, "body", assemble)
     if large:
         _refuse_moving(large.state)
         return large.shaken(f, drive, motion)
-    around = linearize(mechanism, state)
+    around = linearize(mechanism, state, assemble=assemble)
     _refuse_moving(around.state)
     now = instant(mechanism, around.state.t)
     now.W.base[:] = around.state.base
@@ -163,12 +166,14 @@ class _Large:
     H: Array
 
     @classmethod
-    def of(cls, mechanism: Mechanism, state: State | None, frame: Any) -> "_Large | None":
+    def of(
+        cls, mechanism: Mechanism, state: State | None, frame: Any, assemble: bool
+    ) -> "_Large | None":
         """The equations; None where whole matrices are cheaper, or needed."""
         now = instant(mechanism, 0.0 if state is None else state.t, sparse=None)
         if now.pattern is None:
             return None
-        state = consistent(now, initial_state(now.packed, now.t) if state is None else state)
+        state = consistent(now, state, assemble)
         refuse_rolling(now.packed, state)
         pencil = sparse_equations(now, state, chosen(frame, now.packed.names))[0]
         now.evaluate(state.q, state.v)

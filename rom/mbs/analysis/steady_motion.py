@@ -16,7 +16,7 @@ from rom.mbs.analysis.local_equations import (
     instant,
 )
 from rom.mbs.analysis.rotors.moving_axes import chosen, small_motions
-from rom.mbs.integrate.consistent_start import initial_state, with_accelerations
+from rom.mbs.integrate.consistent_start import with_accelerations
 from rom.mbs.kernels.system import ROLL
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.results.state import State
@@ -58,6 +58,7 @@ def steady_motion(
     *,
     t: float | None = None,
     frame: Any = "world",
+    assemble: bool = False,
 ) -> SteadyMotion:
     """Linearise a steady motion in which wheels or balls may roll.
 
@@ -76,6 +77,7 @@ def steady_motion(
         frame: axes in which the deviations of a body are counted so that their equations have
             constant coefficients: "world" for what spins and looks the same from all sides, as
             wheels do, "body" for what turns as a whole; or {body: frame}.
+        assemble: see `rom.simulate`.
 
     Raises:
         ConfigError: for a state of another mechanism or a wrong frame.
@@ -90,11 +92,11 @@ def steady_motion(
     """
     now = instant(mechanism, (0.0 if state is None else state.t) if t is None else t)
     axes = chosen(frame, now.packed.names)
-    state = consistent(now, initial_state(now.packed, now.t) if state is None else state)
+    state = consistent(now, state, assemble)
     size = now.probe() / DIFFERENCE_STEP
     rate = _rate(state, size)
     both = np.concatenate([size, size * rate])
-    motions = tuple(T.toarray() for T in small_motions(now.packed.system, state, axes))
+    motions = tuple(T.toarray() for T in small_motions(now.packed, state, axes))
     A = _first_order(now, state, motions, rate) * both / both[:, None]
     B = _bound(now, state, motions) * both
     N = _null_space(B)

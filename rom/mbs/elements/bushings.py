@@ -70,6 +70,8 @@ def bushing(  # noqa: PLR0913  one keyword per property
 ) -> None:
     """Elastic and damped connection in six directions, without force at the start.
 
+    Rotations count up to half a turn; a rotational spring about a joint counts whole turns.
+
     Args:
         name: name of the bushing.
         m1: marker that carries the axes.
@@ -103,7 +105,11 @@ def _matrix66(name: str, value: Any) -> Array:
     A = finite(name, value, (6, 6)) if A is None else A
     size = np.abs(A).max()
     if np.abs(A - A.T).max() > 1e-9 * size:
-        raise ConfigError(f"{name} is not symmetric by {np.abs(A - A.T).max():.3g}: no energy.")
+        raise ConfigError(
+            f"{name} is not symmetric by {np.abs(A - A.T).max():.3g}: no energy.",
+            hint="Forces that go around, as of a bearing given by eight coefficients, are a law: "
+            "mech.law, of which docs/laws.md has this one.",
+        )
     if np.linalg.eigvalsh(A)[0] < -1e-9 * size:
         raise ConfigError(f"{name} is negative in some direction: it would drive the motion.")
     return 0.5 * (A + A.T)

@@ -29,8 +29,8 @@ NO_ROWS = np.zeros(0, dtype=np.int64)
 class Asked(Protocol):
     """A law that stays in Python, asked whenever the forces are."""
 
-    def apply(self, W: Any, t: float) -> None:
-        """Put the answer at time t where the kernels of its family look for it."""
+    def apply(self, W: Any, t: float, *, slopes: bool) -> None:
+        """Put the answer at time t, and its derivatives, where the kernels of its family look."""
 
 
 def between(element: Any) -> tuple[Marker, ...]:

@@ -13,6 +13,8 @@ from rom.mbs.parts.foreign import compiled_function
 
 MOTION_SIZE = 18  # numbers of the motion of a marker
 ENERGY_SIZE = 2  # stored energy, lost power
+# steps of the differences of laws [m and rad], [m/s and rad/s], both relative to one plus the value
+DIFFERENCE_STEP = 1e-6
 # as numba.cfunc takes it
 LAW_TYPES = "void(f8, CPointer(f8), CPointer(f8), CPointer(f8), CPointer(f8))"
 

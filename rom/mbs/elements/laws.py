@@ -33,7 +33,7 @@ from numba.extending import intrinsic
 from rom.arguments import finite, shortened
 from rom.errors import ConfigError
 from rom.mbs.elements.family import Family, Places, integers, starts
-from rom.mbs.elements.law_calls import ENERGY_SIZE, MOTION_SIZE, entries
+from rom.mbs.elements.law_calls import DIFFERENCE_STEP, ENERGY_SIZE, MOTION_SIZE, entries
 from rom.mbs.elements.laws_in_python import AskedForce, AskedLaw
 from rom.mbs.kernels.algebra import add, cross, scale, unit
 from rom.mbs.kernels.compiled import called, inner
@@ -52,9 +52,6 @@ from rom.mbs.kernels.tables import (
 from rom.mbs.parts.bodies import Marker
 from rom.mbs.parts.whole import Whole
 from rom.model import Array, Index
-
-# steps of the differences of laws [m and rad], [m/s and rad/s], both relative to one plus the value
-DIFFERENCE_STEP = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
@@ -180,6 +177,7 @@ class Laws(Table):
         motion: (18 K,) of the markers of the law at hand.
         answer: (a,) of all; probe: likewise, of one at moved markers.
         D: (72 K^2,) derivatives of the law at hand by motions and by velocities, row by row.
+        told_at: (e + 1,) where those that laws in Python told begin; told: (d,) of all.
     """
 
     address: Address1
@@ -197,6 +195,8 @@ class Laws(Table):
     answer: Scratch1
     probe: Scratch2
     D: Scratch1
+    told_at: Index1
+    told: Scratch1
 
 
 def pack(laws: Mapping[str, Law], places: Places) -> Laws:
@@ -208,6 +208,7 @@ def pack(laws: Mapping[str, Law], places: Places) -> Laws:
         marker[e, : len(law.markers)] = [places.marker[m] for m in law.markers]
     sizes = [6 * n + ENERGY_SIZE + m + o for n, m, o in (law.sizes for law in found)]
     remembered = [law.memory.size for law in found]
+    told = starts([72 * len(x.markers) ** 2 if x.compiled[0] is None else 0 for x in found])
     return Laws(
         *(integers(_address(law.compiled[k]) for law in found) for k in (0, 1)),
         integers(len(law.markers) for law in found),
@@ -223,6 +224,8 @@ def pack(laws: Mapping[str, Law], places: Places) -> Laws:
         np.zeros(sum(sizes)),
         np.zeros((2, max(sizes))),
         np.zeros(72 * most * most),
+        told,
+        np.zeros(told[-1]),
     )
 
 
@@ -295,10 +298,8 @@ def law_wrenches(s, W, laws, _q, _v, _lam):
 
 @tangents.of(Laws)
 def law_tangents(s, W, laws, _lam, ck, cc):
-    """Add ck times the stiffness to W.Kt and cc times the damping to W.S; none of Python's laws."""
+    """Add ck times the stiffness to W.Kt and cc times the damping to W.S."""
     for e in range(laws.address.size):
-        if laws.address[e] == 0:
-            continue
         take_motion(laws, e, W)
         factor = 1.0 if laws.stores[e] == 1 else W.load[0]
         set_derivatives(s, W, laws, e)
@@ -325,6 +326,10 @@ def place_block(s, W, laws, place, factor, S):
 def set_derivatives(s, W, laws, e):
     """Set laws.D to the derivatives of the wrenches of law e."""
     n = laws.count[e]
+    if laws.address[e] == 0:
+        for k in range(72 * n * n):
+            laws.D[k] = laws.told[laws.told_at[e] + k]
+        return
     if laws.slopes[e] != 0:
         for k in range(72 * n * n):
             laws.D[k] = 0.0

@@ -11,10 +11,11 @@ from numba.extending import intrinsic
 
 from rom.mbs.elements.family import Family, Places, apart, integers, on_joint, starts
 from rom.mbs.elements.formulas.programs import Formula
+from rom.mbs.elements.law_calls import DIFFERENCE_STEP
 from rom.mbs.kernels.compiled import called, inner
 from rom.mbs.kernels.coordinates import coordinate_tangent, push_coordinate
 from rom.mbs.kernels.element_calls import residuals, tangents
-from rom.mbs.kernels.tables import Address1, Array1, Index1, Scratch1, Table, table
+from rom.mbs.kernels.tables import Address1, Array1, Index1, Scratch1, Scratch2, Table, table
 from rom.mbs.parts.foreign import ask, compiled_function, numbers
 from rom.mbs.parts.joints import Row, coordinate_of
 from rom.mbs.parts.whole import Whole
@@ -95,6 +96,7 @@ class Motors(Table):
         clock: (1,) function that tells the time.
         formula: (3,) what the formula at hand gives: force, and its derivatives.
         answer: (k,) forces at the last residual; those of laws in Python before it.
+        slope: (k, 2) derivatives of laws in Python by coordinate and rate.
     """
 
     at: Index1
@@ -104,6 +106,7 @@ class Motors(Table):
     clock: Index1
     formula: Scratch1
     answer: Scratch1
+    slope: Scratch2
 
 
 def pack(motors: Any, places: Places) -> Motors:
@@ -118,6 +121,7 @@ def pack(motors: Any, places: Places) -> Motors:
         integers([places.clock()]),
         np.zeros(3),
         np.zeros(len(found)),
+        np.zeros((len(found), 2)),
     )
 
 
@@ -130,11 +134,19 @@ class MotorLaw:
     k: int
     motors: Motors
 
-    def apply(self, W: Any, t: float) -> None:
-        """Set the force of the motor."""
-        what, at = f"the law of motor {self.name!r}", self.motors.at[self.k]
-        answer = ask(what, t, self.law, t, float(W.x[at]), float(W.xd[at]))
-        self.motors.answer[self.k] = numbers(what, t, answer, (), "a number")
+    def apply(self, W: Any, t: float, *, slopes: bool) -> None:
+        """Set the force of the motor, and its slopes."""
+        at, motors, what = self.motors.at[self.k], self.motors, f"the law of motor {self.name!r}"
+        x, rate = float(W.x[at]), float(W.xd[at])
+
+        def force(x: float, rate: float) -> Any:
+            return numbers(what, t, ask(what, t, self.law, t, x, rate), (), "a number")
+
+        motors.answer[self.k] = force(x, rate)
+        if slopes:
+            dx, dv = DIFFERENCE_STEP * (1.0 + abs(x)), DIFFERENCE_STEP * (1.0 + abs(rate))
+            by_x = (force(x + dx, rate) - force(x - dx, rate)) / dx
+            motors.slope[self.k] = by_x / 2, (force(x, rate + dv) - force(x, rate - dv)) / dv / 2
 
 
 def asked(motors: Mapping[str, Motor], packed: Motors, _followed: int) -> Sequence[MotorLaw]:
@@ -182,9 +194,11 @@ def motor_force(motors, W, k, x, rate):
 @inner
 def motor_slopes(motors, W, k, x, rate):
     """Derivatives of a motor law by coordinate and rate; of a formula, or central differences."""
+    if motors.address[k] == 0:
+        return motors.slope[k, 0], motors.slope[k, 1]
     if ask_formula(motors, W, k, x, rate):
         return motors.formula[1], motors.formula[2]
-    dx, dv = 1e-6 * (1.0 + abs(x)), 1e-6 * (1.0 + abs(rate))
+    dx, dv = DIFFERENCE_STEP * (1.0 + abs(x)), DIFFERENCE_STEP * (1.0 + abs(rate))
     by_x = motor_force(motors, W, k, x + dx, rate) - motor_force(motors, W, k, x - dx, rate)
     by_rate = motor_force(motors, W, k, x, rate + dv) - motor_force(motors, W, k, x, rate - dv)
     return 0.5 * by_x / dx, 0.5 * by_rate / dv

@@ -85,13 +85,24 @@ class Packed:
         rows = [family.loaded_rows(table) for family, table in self.elements.items()]
         return np.concatenate([np.zeros(0, dtype=np.int64), *rows])
 
+    def answers(self) -> dict[tuple[Family, str], Array]:
+        """What each law of a user, by family and name, answered last."""
+        return {
+            (family, name): np.array(answer, dtype=float)
+            for family, table in self.elements.items()
+            for name, answer in zip(self.element_names[family], family.answers(table), strict=False)
+        }
+
     @property
     def broken_laws(self) -> str:
         """In words, the elements that gave no finite number when asked last."""
         message = ""
-        for family, table in self.elements.items():
-            answers = zip(self.element_names[family], family.answers(table), strict=False)
-            names = [repr(name) for name, answer in answers if not np.isfinite(answer).all()]
+        for family in self.elements:
+            names = [
+                repr(name)
+                for (own, name), answer in self.answers().items()
+                if own is family and not np.isfinite(answer).all()
+            ]
             message += f"; {family.lost.format(', '.join(names))}" if names else ""
         return message
 
@@ -184,6 +195,11 @@ class Packed:
             return self.whole()
         graph = self.system.graph.replace(shares=1)
         return replace(self, system=self.system.replace(graph=graph))
+
+    def of_rank(self, rank: int) -> "Packed":
+        """The same, ready for as many independent constraints as a start has found."""
+        surely = not self.by_blocks or self.shares or rank == self.system.rows.kind.size
+        return self if surely else self.sharing()
 
     def rows_solved(self, rank: int) -> int:
         """Number of constraints in the equations: in blocks all, whole the independent ones."""

@@ -144,7 +144,8 @@ class _Run:
 
     def apply_laws(self, W: Work) -> None:
         """Ask for the forces in Python at the time of the step."""
-        apply_laws(self.forces, W, float(self.now.number[control.REACHED]))
+        slopes = W is self.W and not self.T.count[alpha.HAS_FACTOR]
+        apply_laws(self.forces, W, float(self.now.number[control.REACHED]), slopes=slopes)
 
     def sample(self) -> None:
         """Sample signals at the time of the step, and at those to come if its length stays.

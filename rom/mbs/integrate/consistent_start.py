@@ -23,48 +23,109 @@ from rom.notebook import listed
 # relative singular value below which a constraint counts as a copy of others: assembled
 # mechanisms show 1e-12 and less, independent constraints 1e-4 and more
 RANK_TOLERANCE = 1e-8
-# a gap that rigid motion can close is not closed by deformation: elastic coordinates weigh more
-ELASTIC_WEIGHT = 1e8
+# the same of pivots, which are squares, where rows of length one are eliminated by blocks: copies
+# leave 1e-11 in linkages of dozens of bodies
+RANK_PIVOT_RTOL = 1e-9
+# a gap that rigid motion can close is not closed by deformation: elastic coordinates weigh so much
+# that they do not move, and only where a gap stays open, less
+ELASTIC_WEIGHTS = (1e24, 1e8)
+# change of the start by joints and drives, of the size and of given velocities, from which it is
+# told, and of the size, from which it is refused
+TOLD, REFUSED = 1e-6, 1e-2
 GAP_TOLERANCE = 1e-9
 MAX_ASSEMBLY = 60
 N_PROBES = 4  # gaps by which constraints that repeat others are found
 
 
-def initial_state(packed: Packed, t: float = 0.0, spacing: float = 1e-6) -> State:
+def initial_state(
+    packed: Packed,
+    t: float = 0.0,
+    spacing: float = 1e-6,
+    *,
+    assemble: bool = False,
+    placing: bool = False,
+) -> State:
     """Positions and velocities nearest to the given ones that satisfy all joints and drives.
 
-    Rigid motions are corrected before deformations.
+    Bodies are moved as they are, and strained where that does not suffice.
 
     Args:
         packed: the mechanism.
         t: start time [s].
         spacing: of finite differences of drives [s].
+        assemble: close gaps of any size, and change given velocities by as much as it takes.
+        placing: drives say where bodies are; where these were added is no contradiction.
 
     Raises:
-        ModelError: naming the joint that cannot be satisfied.
+        ModelError: naming the joint that cannot be satisfied, or that contradicts what was given.
         SolverError: if a drive or load is not finite at the start.
     """
     table = sample_all(packed.signals, np.array([t]), (t, np.inf), spacing)
     good, failure = first_failure(packed.signals, np.array([t]), table)
     if not good:
         raise failure
-    return _start(packed, table[0], t)
+    return _start(packed, table[0], t, (assemble, placing))
 
 
-def _start(packed: Packed, signal: Array, t: float) -> State:
+def _start(packed: Packed, signal: Array, t: float, asked: tuple[bool, bool]) -> State:
     """The state at the start, by whole matrices if the rank of the constraints needs them."""
     W = workspace(packed.system, len(packed.signals))
     W.signal[:] = signal
     surely = packed.by_blocks and not packed.shares
     if surely and not _independent(packed, W, packed.q):
-        return _start(packed.sharing(), signal, t)
+        return _start(packed.sharing(), signal, t, asked)
     q = assembled(packed, W, packed.q)
     if surely and not _independent(packed, W, q):
-        return _start(packed.sharing(), signal, t)
+        return _start(packed.sharing(), signal, t, asked)
     rank = W.value.size if surely else _rank(packed, W, q)
     _check_start(packed, W, q, rank)
     v = fitting_velocity(packed, W, q, packed.v)
-    return with_accelerations(packed, W, State(t, q, v, v * 0, np.zeros(W.value.size), rank))
+    closed, lam = _told(packed, W, q, v, *asked), np.zeros(W.value.size)
+    return with_accelerations(packed, W, State(t, q, v, v * 0, lam, rank, closed=closed))
+
+
+def _told(packed: Packed, W: Work, q: Array, v: Array, assemble: bool, placing: bool) -> float:
+    """Largest change of what was given, of the size or of velocities, after telling it.
+
+    Velocities are told only: they are the nearest ones, and those of bodies that were given none
+    are what joints and drives make them.
+    """
+    evaluate(packed.system, W, packed.q, packed.v)
+    rows = packed.system.rows
+    free = (rows.kind == ROLL) | (placing & (rows.signal >= 0))
+    gap, where, size = _largest(packed, np.where(free, 0.0, W.value / packed.row_scale))
+    if gap > REFUSED and not assemble:
+        raise ModelError(
+            f"the start does not fit: where bodies are added it is open by {size}.",
+            where=where,
+            hint="Draw the bodies so that joints are closed and drives begin where they are, or "
+            "let the start be moved (assemble=True).",
+        )
+    linearize_constraints(packed.system, W, q, v)
+    weight, changes = _weights(packed, W), {f"{where!r} was open by {size}": gap}
+    bodies = packed.system.bodies
+    places = bodies.q_at, bodies.v_at, bodies.r
+    for name, a, b, r in zip(packed.names, *places, strict=True):
+        bent = (q - packed.q)[a + 7 : a + 7 + r] / weight[b + 6 : b + 6 + r]
+        change = float(np.linalg.norm(bent)) / np.sqrt(ELASTIC_WEIGHTS[-1] * packed.mass)
+        changes[f"it bends {name!r} by {change:.2g} of the size"] = change / packed.length
+        given, fitted = (x[b : b + 6 + r] / weight[b : b + 6 + r] for x in (packed.v, v))
+        change = float(np.linalg.norm(fitted - given) / (np.linalg.norm(given) or np.inf))
+        changes[f"the velocity of {name!r} changes by {change:.2g} of the given one"] = change
+    told = [what for what, change in changes.items() if change > TOLD]
+    if told and not assemble:
+        warn(f"the start was moved to fit joints and drives: {'; '.join(told)}.")
+    return max(changes.values())
+
+
+def _largest(packed: Packed, gaps: Array) -> tuple[float, str, str]:
+    """Largest gap, over the size, whose joint it is, and its size in words."""
+    if not gaps.size:
+        return 0.0, "", ""
+    k = int(np.argmax(np.abs(gaps)))
+    gap = float(abs(gaps[k]))
+    size = f"{gap * packed.length:.3g} m (size {packed.length:.3g} m), or as a rotation"
+    return gap, packed.row_owner[k], f"{size} by {gap:.3g} rad"
 
 
 def _independent(packed: Packed, W: Work, q: Array) -> bool:
@@ -100,14 +161,25 @@ def assembled(packed: Packed, W: Work, q: Array) -> Array:
     Raises:
         ModelError: naming the joint with the largest gap that remains.
     """
-    q, v = q.copy(), np.zeros(packed.v.size)
     if not W.value.size:
-        return q
+        return q.copy()
+    for elastic in ELASTIC_WEIGHTS:
+        closed = _closed(packed, W, q.copy(), elastic)
+        evaluate(packed.system, W, closed, np.zeros(packed.v.size))
+        gap = W.value / packed.row_scale
+        if np.abs(gap).max() <= GAP_TOLERANCE or not packed.system.bodies.r.any():
+            break
+    _check_gap(packed, gap)
+    return closed
+
+
+def _closed(packed: Packed, W: Work, q: Array, elastic: float) -> Array:
+    """Coordinates with the least gaps, elastic ones weighing so much more."""
     scale, held = packed.row_scale, np.flatnonzero(packed.system.rows.kind != ROLL)
-    weight = None
+    weight, v = None, np.zeros(packed.v.size)
     for _ in range(MAX_ASSEMBLY):
         linearize_constraints(packed.system, W, q, v)
-        weight = _weights(packed, W) if weight is None else weight
+        weight = _weights(packed, W, elastic) if weight is None else weight
         step = -_least_change(packed, W, W.value, weight, held)
         largest = np.abs(step / weight).max() / np.sqrt(packed.mass) / packed.length
         retract(packed.system, q.copy(), _limited(packed, step), q)
@@ -115,8 +187,6 @@ def assembled(packed: Packed, W: Work, q: Array) -> Array:
             break
         if largest < 1e-12 and np.abs(W.value / scale).max() < 1e-14:
             break
-    evaluate(packed.system, W, q, v)
-    _check_gap(packed, W.value / scale)
     return q
 
 
@@ -129,25 +199,23 @@ def _limited(packed: Packed, step: Array) -> Array:
     return step / max(largest, 1.0)
 
 
-def _check_gap(packed: Packed, gap: Array) -> None:
-    k = int(np.argmax(np.abs(gap)))
-    if not np.isfinite(gap).all() or abs(gap[k]) > GAP_TOLERANCE:
+def _check_gap(packed: Packed, gaps: Array) -> None:
+    gap, where, size = _largest(packed, gaps)
+    if not np.isfinite(gaps).all() or gap > GAP_TOLERANCE:
         raise ModelError(
-            f"the mechanism cannot be assembled: {packed.row_owner[k]!r} stays open by "
-            f"{abs(gap[k]) * packed.length:.3g} m (size {packed.length:.3g} m), or as a rotation "
-            f"by {abs(gap[k]):.3g} rad.",
-            where=packed.row_owner[k],
+            f"the mechanism cannot be assembled: {where!r} stays open by {size}.",
+            where=where,
             hint="Joints contradict each other: check positions, axes and drives.",
         )
 
 
-def _weights(packed: Packed, W: Work) -> Array:
+def _weights(packed: Packed, W: Work, elastic: float = ELASTIC_WEIGHTS[-1]) -> Array:
     """(n,) inverse square root of what a unit of each velocity coordinate costs."""
     bodies = packed.system.bodies
     mass: Array = W.S[_diagonal(packed.system)]
     for b, t in enumerate(bodies.v_at):
         mass[t + 3 : t + 6] = np.maximum(mass[t + 3 : t + 6], 1e-3 * np.trace(W.J[b]))
-        mass[t + 6 : t + 6 + bodies.r[b]] *= ELASTIC_WEIGHT
+        mass[t + 6 : t + 6 + bodies.r[b]] *= elastic
     return 1 / np.sqrt(mass)
 
 
@@ -251,6 +319,7 @@ def check_velocity(packed: Packed, W: Work, v: Array, given: Array | None = None
             f"the velocities of joints and drives contradict each other: "
             f"{packed.row_owner[k]!r} misses {miss[k]:.3g}.",
             where=packed.row_owner[k],
+            hint="Let drives go as fast as what was given, or leave them out.",
         )
 
 
@@ -297,7 +366,7 @@ def _by_blocks(packed: Packed, W: Work, weight: Array) -> _Constraints:
     A, _ = unit_rows(pattern.gradient(W.G) @ diags(weight))
     m, n = A.shape
     whole = bmat([[identity(n), A.T], [A, csr_matrix((m, m))]], format="csc")
-    rank = m - signature(whole, pattern.groups, RANK_TOLERANCE**1.5).zero
+    rank = m - signature(whole, pattern.groups, RANK_PIVOT_RTOL).zero
     equations = Constrained(identity(n), A, redundant=True)
     gaps = np.sin(np.outer(1.0 + np.arange(m), 1.0 + np.arange(N_PROBES)))
     closing = equations.solve(np.zeros((n, N_PROBES)), gaps)[0]

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rom.errors import RomError, SolverError
-from rom.mbs.equations.equations import evaluate
+from rom.mbs.equations.equations import evaluate, residual
 from rom.mbs.equations.python_laws import Laws, apply_laws
 from rom.mbs.integrate import generalized_alpha as alpha
 from rom.mbs.integrate.event_end import kept_before_the_end
@@ -24,6 +24,9 @@ from rom.model import Array
 # seconds between looks at the keyboard and the progress line
 CHUNK_SECONDS = 0.2
 LARGEST_CHUNK = 4096
+RESTLESS = (
+    1e-2  # change of a law by the last correction, of its size, that keeps a step from ending
+)
 LOSING_SHARE = 0.9  # of half a turn a step, from where on one that gains speed may exceed it
 
 
@@ -143,9 +146,8 @@ def _advance(record: Record, W: Work, step: Step, forces: Laws, chunk: tuple[Any
         answer = alpha.advance(system, W, step, rank, table, every, out)
         record.compiled += perf_counter() - clock
         if answer == alpha.NEEDS_LAWS:
-            apply_laws(
-                forces, W, float(times[step.count[alpha.STEPS] - step.count[alpha.STEPS_BEFORE]])
-            )
+            t = times[step.count[alpha.STEPS] - step.count[alpha.STEPS_BEFORE]]
+            apply_laws(forces, W, float(t), slopes=not step.count[alpha.HAS_FACTOR])
     return answer
 
 
@@ -193,6 +195,7 @@ def failed_step(record: Record, W: Work, step: Step, answer: int, t: float) -> S
         k = int(np.nanargmax(np.abs(W.value)))
         culprit = f"; the largest gap is {abs(W.value[k]):.3g} in {record.packed.row_owner[k]!r}"
     culprit += record.packed.broken_laws
+    culprit += _restless_law(record, W, step, t) if answer == alpha.FAILED else ""
     cure = (
         f"Take a smaller step than {step.method[0]:.3g} s; if that does not help, the "
         "mechanism is near a singular position or a force is too stiff."
@@ -202,6 +205,24 @@ def failed_step(record: Record, W: Work, step: Step, answer: int, t: float) -> S
         hint=f"{_lost_turn(record, W, float(step.method[0])) or cure} The motion up to there is "
         "kept in error.solution.",
     )
+
+
+def _restless_law(record: Record, W: Work, step: Step, t: float) -> str:
+    """Names the law that the last correction changed most, if that is much; empty otherwise."""
+    packed = record.packed
+    before = packed.answers()
+    evaluate(packed.system, W, step.q1, step.v1)
+    apply_laws(packed.asked, W, t)
+    residual(packed.system, W, step.q1, step.v1, step.vd1, step.lam1)
+    changes = {
+        name: np.abs(now - before[_, name]).max() / np.abs([now, before[_, name]]).max()
+        for (_, name), now in packed.answers().items()
+        if now.any()
+    }
+    name = max(changes, key=lambda name: changes[name], default="")
+    if not name or not changes[name] > RESTLESS:
+        return ""
+    return f"; the law of {name!r} still changes by {changes[name]:.2g} of itself"
 
 
 def _lost_turn(record: Record, W: Work, h: float) -> str:

@@ -240,6 +240,7 @@ class Record:
         watch: over the events of the mechanism, None if it has none.
         noted: what the watch knew at ``final``.
         keeping: folder that is written while the run lasts, or None.
+        assemble: see `rom.simulate`.
     """
 
     mechanism: Mechanism
@@ -257,6 +258,7 @@ class Record:
     watch: Watch | None = None
     noted: Noted | None = None
     keeping: Keeping | None = None
+    assemble: bool = False
 
     def keep(self, t: Array | float, *arrays: Array) -> None:
         """Add saved instants."""
@@ -349,6 +351,7 @@ class Record:
             **self.counts,
             "rank": self.final.rank,
             "redundant": self.final.lam.size - self.final.rank,
+            "closed": 0.0 if self.given is None else self.given.closed,
             "seconds": total,
             "seconds_compiled": self.compiled,
             "share_outside": 1.0 - self.compiled / total,

@@ -47,6 +47,7 @@ def simulate(  # noqa: PLR0913  keywords of the one entry, most have defaults
     order: int = 2,
     stabilised: bool = False,
     keep: Keeping | None = None,
+    assemble: bool = False,
 ) -> Solution:
     """Move the mechanism from the start to ``t_end``.
 
@@ -85,13 +86,16 @@ def simulate(  # noqa: PLR0913  keywords of the one entry, most have defaults
             from which a run that was ended by anything goes on to the same bits:
             ``keep=rom.Keeping("run.parts")``, then ``rom.Keeping("run.parts", resume=True)``. With
             ``t_end`` before the time reached this reads the motion without moving on.
+        assemble: move the start as far as joints and drives ask for it, without a word. Else a
+            change from 1e-6 of the size, or of given velocities, is told, and gaps from 1e-2 of
+            the size are refused. ``statistics["closed"]`` is the largest change.
 
     Returns:
         The motion, start and end included.
 
     Raises:
         ConfigError: for a wrong argument, or a function that takes or gives the wrong thing.
-        ModelError: if joints contradict each other.
+        ModelError: if joints contradict each other, or the start.
         SolverError: naming time and culprit, a function of the user too, whatever it raised.
         ResourceError: if what would be kept exceeds the memory, or the memory ran out.
         InterruptedRun: after Ctrl-C or SIGTERM; the caller decides what then. This and every
@@ -99,8 +103,8 @@ def simulate(  # noqa: PLR0913  keywords of the one entry, most have defaults
             it never started. ``error.solution.final`` is the state to go on from.
 
     Warns:
-        RomWarning: if a body left the range of small elastic deformation, or turned faster than
-            it can without geometric stiffness.
+        RomWarning: if joints or drives moved the start, a body left the range of small elastic
+            deformation, or turned faster than it can without geometric stiffness.
 
     Source:
         Bruels, Cardona and Arnold, Lie group generalized-alpha time integration of constrained
@@ -121,9 +125,16 @@ def simulate(  # noqa: PLR0913  keywords of the one entry, most have defaults
     rtol = METHOD_RTOL[method] if rtol is None else rtol
     numbers = (t_start, t_end, dt, save_every, rho_inf, tolerance, rtol, atol)
     settings = Settings(*numbers, progress, method, order=order, stabilised=stabilised)
+    if state is None and dt is not None and dt > (t_end - t_start) * (1 + 1e-9):
+        raise ConfigError(
+            f"dt = {dt:g} s is longer than the motion of {t_end - t_start:g} s.",
+            hint="Take a shorter step, or leave dt out: steps are then chosen by rtol.",
+        )
     settings, packed = settings.after(state), pack(mechanism)
     settings.check_room(packed)
-    record = Record(mechanism, packed, settings, perf_counter(), given=state, keeping=keep)
+    record = Record(
+        mechanism, packed, settings, perf_counter(), given=state, keeping=keep, assemble=assemble
+    )
     with terminable():
         try:
             return _moved(record, t_start)
@@ -136,7 +147,7 @@ def simulate(  # noqa: PLR0913  keywords of the one entry, most have defaults
 
 
 @typed
-def release(mechanism: Mechanism, state: State) -> State:
+def release(mechanism: Mechanism, state: State, *, assemble: bool = False) -> State:
     """State of a mechanism in the position and motion of another one with the same bodies.
 
     What follows when a brake is let go, a latch closes or a drive gives way to a motor: positions
@@ -146,6 +157,7 @@ def release(mechanism: Mechanism, state: State) -> State:
     Args:
         mechanism: what moves on; the same bodies added in the same order.
         state: of the other mechanism, e.g. from `rom.equilibrium` or ``solution.final``.
+        assemble: see `simulate`.
 
     Returns:
         State to go on from: ``rom.simulate(mechanism, state=..., ...)``.
@@ -163,7 +175,8 @@ def release(mechanism: Mechanism, state: State) -> State:
             f"the state has {sizes[0]} coordinates and {sizes[1]} velocities, this mechanism "
             f"{packed.q.size} and {packed.v.size}: their bodies differ."
         )
-    return initial_state(replace(packed, q=state.q.copy(), v=state.v.copy()), state.t)
+    placed = replace(packed, q=state.q.copy(), v=state.v.copy())
+    return initial_state(placed, state.t, assemble=assemble)
 
 
 def _moved(record: Record, t_start: float) -> Solution:
@@ -172,11 +185,10 @@ def _moved(record: Record, t_start: float) -> Solution:
         _go_on(record, record.keeping)
     settings, packed = record.settings, record.packed
     if record.given is None:
-        record.given = initial_state(packed, t_start, settings.spacing)
+        record.given = initial_state(packed, t_start, settings.spacing, assemble=record.assemble)
     state = record.given
     _check_fit(state, packed, record.mechanism)
-    if packed.by_blocks and state.rank < state.lam.size:
-        record.packed = packed = packed.sharing()
+    record.packed = packed = packed.of_rank(state.rank)
     record.watch = watch_of(record.mechanism, packed, t_start)
     run = METHODS[settings.method]
     if settings.dt is None and run is run_implicit:

@@ -44,6 +44,8 @@ class State:
         base: (c,) joint coordinates that forces or couplings act on [m, rad], angles counted over
             whole turns; None: as measured.
         memory: of the method that arrived here; None at a fresh start.
+        closed: largest change of what was given by joints and drives at a fresh start, of the size
+            of the mechanism or of given velocities [1].
     """
 
     t: float
@@ -55,3 +57,4 @@ class State:
     algorithmic: Array | None = None
     base: Array | None = None
     memory: Memory | None = None
+    closed: float = 0.0

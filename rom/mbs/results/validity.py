@@ -8,6 +8,7 @@ from scipy.linalg import eigh
 from rom import rotation
 from rom.errors import warn
 from rom.mbs.kernels.system import ANGLE
+from rom.mbs.parts.bodies import GROUND
 from rom.mbs.results.solution import Solution
 from rom.model import Array
 
@@ -15,11 +16,14 @@ from rom.model import Array
 MAX_DEFORMATION = 0.1
 # of an interface against the frame [rad]: there exp(sin x) falls short of the angle x by 1.5 %
 MAX_MARKER_TURN = 0.3
+MAX_BUSHING_TURN = 0.95 * np.pi  # [rad]
 
 
 def warn_of_limits(solution: Solution) -> None:
     """Warn of bodies that left small deformations, or turned too fast for stiffness or step."""
     _warn_of_lost_turns(solution)
+    for name, bushing in solution.mechanism.bushings.items():
+        _warn_of_turned_bushing(solution, name, bushing)
     for name, part in solution.mechanism.parts.items():
         if not part.r:
             continue
@@ -101,6 +105,30 @@ def _warn_of_lost_turns(solution: Solution) -> None:
             )
 
 
+def _warn_of_turned_bushing(solution: Solution, name: str, bushing: Any) -> None:
+    """The rotation vector of a bushing ends at half a turn, and begins anew on the other side."""
+    if not (np.any(bushing.stiffness[3:]) or any(at > 2 for at, _ in bushing.curves)):
+        return
+    one, other = (
+        _axes(solution, marker.body) @ frame
+        for marker, frame in zip((bushing.i, bushing.j), bushing.frames, strict=True)
+    )
+    turn = np.arccos(np.clip((np.einsum("tij,tij->t", one, other) - 1) / 2, -1, 1))
+    if np.nanmax(turn) > MAX_BUSHING_TURN:
+        k = int(np.nanargmax(turn > MAX_BUSHING_TURN))
+        warn(
+            f"bushing {name!r} was turned by {turn[k]:.3g} rad at {solution.t[k]:.4g} s: its "
+            "moment jumps to the other side at half a turn. A rotational spring counts whole turns."
+        )
+
+
+def _axes(solution: Solution, body: str) -> Array:
+    """(n_t, 3, 3) axes of a body in the world."""
+    if body == GROUND:
+        return np.broadcast_to(np.eye(3), (solution.t.size, 3, 3))
+    return np.moveaxis(rotation.matrix(solution.orientation(body).T), -1, 0)
+
+
 def _top(solution: Solution, body: int) -> float:
     """Largest angular speed of a body, -1 for the ground."""
     if body < 0:
@@ -114,8 +142,7 @@ def _spin(solution: Solution, body: int) -> Array:
     if body < 0:
         return np.zeros((solution.t.size, 3))
     name = solution.packed.names[body]
-    axes = (rotation.matrix(p) for p in solution.orientation(name))
-    return np.array([A @ w for A, w in zip(axes, solution.omega(name), strict=True)])
+    return np.einsum("tij,tj->ti", _axes(solution, name), solution.omega(name))
 
 
 def softening(solution: Solution, name: str) -> float:

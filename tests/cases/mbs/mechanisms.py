@@ -253,7 +253,8 @@ def simulate_quietly(mechanism, **options):
 def slider_crank(l1=0.1, l2=0.3, speed=50.0, gravity=0.0, rod=None):
     """Driven slider-crank in the xy plane with a rigid rod, or a flexible one in the rod frame."""
     mech = Mechanism(gravity=(0, -gravity, 0))
-    start, z, o = {"velocity": (0, speed * l1, 0)}, (0, 0, 1), mech.ground.marker((0, 0, 0))
+    start = {"velocity": (0, speed * l1, 0), "omega": (0, 0, -speed * l1 / l2)}
+    z, o = (0, 0, 1), mech.ground.marker((0, 0, 0))
     crank = mech.add_rigid(
         "crank",
         mass=1.0,
@@ -269,10 +270,12 @@ def slider_crank(l1=0.1, l2=0.3, speed=50.0, gravity=0.0, rod=None):
             inertia=(1e-4, 4e-3, 4e-3),
             at=(l1 + l2 / 2, 0, 0),
             markers={"a": (-l2 / 2, 0, 0), "b": (l2 / 2, 0, 0)},
-            **start,
+            velocity=(0, speed * l1 / 2, 0),
+            omega=(0, 0, -speed * l1 / l2),
         )
     else:
-        rod = mech.add_flexible("rod", rod, at=(l1, 0, 0), **start)
+        at = np.array([l1, 0, 0]) - rod.marker("a").point  # whatever its frame is
+        rod = mech.add_flexible("rod", rod, at=at, **start)
     slider = mech.add_rigid(
         "slider", mass=0.4, inertia=(1e-4, 1e-4, 1e-4), at=(l1 + l2, 0, 0), markers={"b": (0, 0, 0)}
     )

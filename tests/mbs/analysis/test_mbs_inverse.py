@@ -150,3 +150,80 @@ def test_motions_that_nothing_prescribes_are_refused():
         sol.drive_load("hinge")
     with pytest.raises(ConfigError, match="frame = 'marker' is none of 'body', 'world'"):
         sol.interface_loads("bar", frame="marker")
+
+
+def linkage(n, seed):
+    """n bars on hinges: a crank, and pairs of bars from a moving hinge to the ground."""
+    rng = np.random.default_rng(seed)
+    hinges, bars, feet = [(0.06, 0.08)], [(None, 0)], [(0.0, 0.0)]  # a bar: from, to a hinge
+    pairs = []
+    for _ in range((n - 1) // 2):
+        start, foot = int(rng.integers(len(hinges))), rng.uniform((0.25, -0.1), (0.45, 0.1))
+        hinges.append(tuple(foot + rng.uniform((-0.05, 0.2), (0.05, 0.3))))
+        new = len(hinges) - 1
+        pairs.append((start, tuple(foot), new))
+        bars += [(start, new), (None, new)]
+        feet += [None, tuple(foot)]
+    return hinges, bars, feet, pairs
+
+
+def as_mechanism(n, hinges, bars, feet):
+    mech, owner = rom.Mechanism(gravity=(0, -G, 0)), {}
+    for k, ((start, end), foot) in enumerate(zip(bars, feet, strict=True)):
+        a = np.array([*(foot if start is None else hinges[start]), 0.0])
+        b = np.array([*hinges[end], 0.0])
+        length, x = np.linalg.norm(b - a), (b - a) / np.linalg.norm(b - a)
+        turned = np.column_stack([x, np.cross((0, 0, 1), x), (0, 0, 1)])
+        ends = {"a": (-length / 2, 0, 0), "b": (length / 2, 0, 0)}
+        inertia = (1e-3 * length**2, length**2 / 12, length**2 / 12)
+        where = {"at": (a + b) / 2, "orientation": turned}
+        bar = mech.add_rigid(f"bar {k}", mass=1.0, inertia=inertia, markers=ends, **where)
+        before = mech.ground.marker(a) if start is None else owner[start]
+        mech.revolute(f"foot {k}", before, bar.marker("a"), axis=(0, 0, 1))
+        if end in owner:
+            mech.revolute(f"head {k}", owner[end], bar.marker("b"), axis=(0, 0, 1))
+        owner.setdefault(end, bar.marker("b"))
+    mech.drive("turn", "foot 0", lambda t: t)
+    if n % 2 == 0:  # a bar more that another drive holds
+        bar = mech.add_rigid("held", mass=1.0, inertia=(1, 1, 1), at=(1, 0, 0))
+        mech.revolute("arm", mech.ground.marker((1, 1, 0)), bar.marker((0, 1, 0)), axis=(0, 0, 1))
+        mech.drive("hold", "arm", lambda t: 0.0)
+    return mech
+
+
+def torque(hinges, bars, feet, pairs, t):
+    """Change of the energy of the bars per radian of the crank, hinges where circles intersect."""
+
+    def ends(t):
+        c, s = np.cos(t), np.sin(t)
+        x, y = hinges[0]
+        found = [np.array([c * x - s * y, s * x + c * y])]
+        for start, foot, new in pairs:
+            drawn = [np.array(p) for p in (hinges[start], foot, hinges[new])]
+            ra, rb = (np.linalg.norm(drawn[2] - p) for p in drawn[:2])
+            side = np.sign(np.linalg.det([drawn[1] - drawn[0], drawn[2] - drawn[0]]))
+            a, d = found[start], foot - found[start]
+            along = (ra**2 - rb**2 + d @ d) / 2 / (d @ d)
+            up = side * np.sqrt(ra**2 / (d @ d) - along**2)
+            found.append(a + along * d + up * np.array([-d[1], d[0]]))
+        at = [
+            found[i] if i is not None else np.array(f) for (i, _), f in zip(bars, feet, strict=True)
+        ]
+        return np.array(at), np.array([found[j] for _, j in bars])
+
+    def energy(t, h=1e-5):
+        va, vb = ((p - m) / 2 / h for p, m in zip(ends(t + h), ends(t - h), strict=True))
+        a, b = ends(t)
+        return (va**2 + vb**2 + va * vb).sum() / 6 + G * (a + b)[:, 1].sum() / 2
+
+    return (energy(t + 1e-4) - energy(t - 1e-4)) / 2e-4
+
+
+@pytest.mark.filterwarnings("ignore::rom.errors.RomWarning")
+@pytest.mark.parametrize("n", [4, 5, 6, 7, 8, 9, 10, 21])
+def test_linkages_of_many_bars_need_the_torque_of_their_energy(n):
+    """Hinges about parallel axes repeat each other, which bodies in blocks must know."""
+    parts = linkage(n, n)
+    sol = rom.inverse_dynamics(as_mechanism(n, *parts[:3]), np.linspace(0, 0.05, 6))
+    wanted = torque(*parts, sol.t[3])
+    assert_allclose(sol.drive_load("turn")[3], wanted, rtol=1e-5)

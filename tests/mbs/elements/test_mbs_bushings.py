@@ -1,9 +1,12 @@
 """Bushings: an energy whatever the rotation, closed forms, curves, exact tangents."""
 
+import warnings
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+import rom
 from cases.mbs.mechanisms import (
     prepared,
     random_body,
@@ -177,3 +180,17 @@ def test_wrong_bushings_are_refused_by_name(case):
         mech.bushing("s", mech.ground.marker((0, 0, 0)), part.marker((0, 0, 0)), **arguments)
     assert words in str(caught.value)
     assert not mech.bushings
+
+
+@pytest.mark.parametrize(("end", "told"), [(0.45, False), (0.6, True)])
+def test_a_bushing_turned_by_half_a_turn_is_told(end, told):
+    mech = rom.Mechanism(gravity=(0, 0, 0))
+    rod = mech.add_rigid("rod", mass=1.0, inertia=(1, 1, 1), at=(0, 0, 0), omega=(0, 0, 2 * np.pi))
+    pin, hub = mech.ground.marker((0, 0, 0)), rod.marker((0, 0, 0))
+    mech.revolute("pin", pin, hub, axis=(0, 0, 1))
+    mech.bushing("rubber", pin, hub, stiffness=(0, 0, 0, 0, 0, 10.0))
+    mech.drive("turn", "pin", lambda t: 2 * np.pi * t)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        rom.simulate(mech, t_end=end, dt=1e-2)
+    assert ["bushing 'rubber' was turned by" in str(w.message) for w in caught] == [True] * told

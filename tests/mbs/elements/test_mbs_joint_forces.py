@@ -7,6 +7,8 @@ from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 
 from cases.mbs.mechanisms import (
+    lattice,
+    lattice_body,
     prepared,
     random_body,
     random_pose,
@@ -17,6 +19,8 @@ from cases.mbs.mechanisms import (
 )
 from cases.mbs.tangents import difference, forces_at, shifted
 from rom.errors import ConfigError, ModelError, SolverError
+from rom.mbs.analysis.equilibrium import equilibrium
+from rom.mbs.analysis.linearize import linearize
 from rom.mbs.elements import motors
 from rom.mbs.elements.contact.impact import Impact
 from rom.mbs.equations.equations import load_columns
@@ -81,6 +85,83 @@ def test_a_law_of_time_and_angle_is_compiled_when_it_can_be_and_agrees_with_pyth
                       rtol=1e-10, atol=1e-12).y  # fmt: skip
     assert_allclose(runs[0].base[:, 0], exact[0], atol=1e-4)
     assert runs[0].statistics["iterations"] < 3 * runs[0].statistics["steps"]
+
+
+class Controller:
+    """A control law with a state of its own: the target it last gave."""
+
+    def __call__(self, t, angle, rate):
+        self.target = 0.5 * t
+        return -50.0 * (angle - self.target) - 1.0 * rate
+
+    def about_z(self, t, _parameters, motion, _memory, out):
+        """The same as a law between the markers of the joint."""
+        (a, b), (one, other) = motion.axes[:, :2, 0], motion.omega[:, 2]
+        moment = self(t, np.arctan2(a[0] * b[1] - a[1] * b[0], a @ b), other - one)
+        out.moment[:, 2] = -moment, moment
+
+    def pair(self, t, b, a):
+        """The same as a force on the second marker, back on the first."""
+        angle = np.arctan2(a.axes[0, 0] * b.axes[1, 0] - a.axes[1, 0] * b.axes[0, 0],
+                           a.axes[:, 0] @ b.axes[:, 0])  # fmt: skip
+        return np.zeros(3), (0.0, 0.0, self(t, angle, b.omega[2] - a.omega[2]))
+
+
+WAYS = {
+    "compiled": lambda m, name, joint, _: m.motor(
+        name, joint, lambda t, x, v: -50.0 * (x - 0.5 * t) - 1.0 * v, compiled=True
+    ),
+    "motor": lambda m, name, joint, _: m.motor(name, joint, Controller()),
+    "law": lambda m, name, _, ends: m.law(name, Controller().about_z, *ends, compiled=False),
+    "force": lambda m, name, _, ends: m.user_force(name, Controller().pair, *ends[::-1]),
+}
+
+
+def controlled_arm(way):
+    """Two light links that bend, hinged to the ground and to each other, both hinges controlled."""
+    body = lattice_body(lattice(stiffness=4e4, length=0.4, mass=0.02))
+    mech = Mechanism(gravity=(0, -g, 0))
+    upper = mech.add_flexible("upper", body)
+    lower = mech.add_flexible("lower", body, at=(0.4, 0, 0))
+    pin = mech.ground.marker(mech.design_point(upper.marker("n0")))
+    for joint, ends in (
+        ("shoulder", (pin, upper.marker("n0"))),
+        ("elbow", (upper.marker("n12"), lower.marker("n0"))),
+    ):
+        mech.revolute(joint, *ends, axis=Z)
+        WAYS[way](mech, f"control of {joint}", joint, ends)
+    return mech
+
+
+@pytest.mark.parametrize("dt", [1e-3, 1e-4])
+@pytest.mark.parametrize("way", ["motor", "law", "force"])
+def test_controllers_in_python_step_as_compiled_ones_do(way, dt):
+    """Their derivatives are in Newton's matrix: stiff ones diverged, weak ones took many."""
+    runs = [simulate(controlled_arm(one), t_end=50 * dt, dt=dt) for one in ("compiled", way)]
+    assert_allclose(runs[0].q, runs[1].q, atol=1e-9)
+    for count in ("steps", "iterations", "factorisations"):
+        assert runs[0].statistics[count] == runs[1].statistics[count]
+
+
+def test_controllers_in_python_choose_steps_and_small_motions_as_compiled_ones_do():
+    sizes, modes = [], []
+    for way in WAYS:
+        mech = controlled_arm(way)
+        sizes.append(simulate(mech, t_end=0.01).statistics["steps"])
+        around = linearize(mech, equilibrium(mech, t=0.0))
+        modes.append(around.eigenvalues)
+    assert len(set(sizes)) == 1
+    for found in modes[1:]:
+        assert_allclose(found, modes[0], rtol=1e-6, atol=1e-6 * np.abs(modes[0]).max())
+
+
+def test_a_law_that_keeps_newton_from_ending_is_named():
+    noise = np.random.default_rng(0)
+    mech = wheel(J=1e-3)
+    mech.motor("calm", "axle", lambda t, x, v: 1.0)
+    mech.motor("servo", "axle", lambda t, x, v: noise.normal(), compiled=False)
+    with pytest.raises(SolverError, match="the law of 'servo' still changes by"):
+        simulate(mech, t_end=1.0, dt=1e-2)
 
 
 def test_a_law_with_a_memory_is_left_to_python():

@@ -147,7 +147,7 @@ def test_a_pinion_drives_its_rack(ratio):
     pinion = mech.add_rigid("pinion", mass=1.0, inertia=(J, J, J), at=(0, 0, 0))
     rack = mech.add_rigid("rack", mass=m, inertia=(1, 1, 1), at=(0, -0.05, 0))
     mech.revolute("axle", mech.ground.marker((0, 0, 0)), pinion.marker((0, 0, 0)), axis=Z)
-    mech.prismatic("rail", mech.ground.marker((0, 0, 0)), rack.marker((0, 0, 0)), axis=X)
+    mech.prismatic("rail", mech.ground.marker((0, -0.05, 0)), rack.marker((0, 0, 0)), axis=X)
     mech.gear("teeth", "axle", "rail", ratio=ratio)
     mech.torque("engine", pinion.marker((0, 0, 0)), (0, 0, torque))
     sol = simulate(mech, t_end=1.0, dt=1e-2)
@@ -287,8 +287,8 @@ def test_a_thrown_hoop_wobbles_without_loss_and_touches_the_plane():
     mech = Mechanism()
     J = 0.5 * 0.3**2
     tilt = np.array([np.cos(0.1), np.sin(0.1), 0, 0])
-    hoop = mech.add_rigid("hoop", mass=1.0, inertia=(J, 2 * J, J), at=(0, 0, 0.3),
-                          orientation=tilt, velocity=(2.0, 0, 0), omega=(0.2, 6.0, 0.5),
+    hoop = mech.add_rigid("hoop", mass=1.0, inertia=(J, 2 * J, J), orientation=tilt,
+                          at=(0, 0, 0.3 * np.cos(0.2)), velocity=(2.0, 0, 0), omega=(0.2, 6.0, 0.5),
                           markers={"o": (0, 0, 0)})  # fmt: skip
     axle = np.array([0, np.cos(0.2), np.sin(0.2)])
     mech.rolling("roll", mech.ground.marker((0, 0, 0)), hoop.marker("o"), normal=Z, radius=0.3,

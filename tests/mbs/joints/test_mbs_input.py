@@ -21,7 +21,8 @@ UNIT = {"mass": 1.0, "inertia": (1.0, 1.0, 1.0), "at": (0, 0, 0)}
 def mechanism():
     mech = Mechanism(gravity=(0, 0, -9.81))
     box = mech.add_rigid("box", **UNIT, markers={"a": (0, 0, 0), "b": (1, 0, 0)})
-    bar = mech.add_flexible("bar", random_body(np.random.default_rng(1)))
+    body = random_body(np.random.default_rng(1))
+    bar = mech.add_flexible("bar", body, at=(1, 0, 0) - body.marker("a").point)
     mech.revolute("hinge", mech.ground.marker((0, 0, 0)), box.marker("a"), axis=Z)
     mech.spherical("ball", box.marker("b"), bar.marker("a"))
     return mech, box, bar

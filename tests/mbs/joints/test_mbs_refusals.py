@@ -23,7 +23,7 @@ def parts():
     """A mechanism with a hinge, its rigid box and its flexible bar."""
     mech = Mechanism()
     box = mech.add_rigid("box", **UNIT, markers={"a": (0, 0, 0), "b": (1, 0, 0)})
-    bar = mech.add_flexible("bar", body())
+    bar = mech.add_flexible("bar", body(), at=(1, 0, 0) - body().marker("a").point)
     mech.revolute("hinge", mech.ground.marker((0, 0, 0)), box.marker("a"), axis=Z)
     mech.spherical("ball", box.marker("b"), bar.marker("a"))
     return mech, box, bar

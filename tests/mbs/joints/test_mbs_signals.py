@@ -55,7 +55,7 @@ def test_nobody_asks_a_function_for_times_outside_the_run(method, dt):
 
     mech, body = wheel(angle)
     mech.force("push", body.marker((0, 0, 0)), lambda t: (angle(t), 0, 0))
-    simulate(mech, t_start=0.3, t_end=1.0, dt=dt, method=method)
+    simulate(mech, t_start=0.3, t_end=1.0, dt=dt, method=method, assemble=True)
     assert min(asked) == 0.3
     assert max(asked) == 1.0
 

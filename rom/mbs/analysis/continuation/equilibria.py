@@ -11,10 +11,11 @@ from scipy.linalg import eig, eigh, null_space
 from rom.arguments import finite, positive, typed, whole
 from rom.errors import ConfigError, RomWarning, SolverError, reached
 from rom.mbs.analysis.equilibrium import equilibrium
-from rom.mbs.analysis.few_modes import RANK_RTOL, Pencil
+from rom.mbs.analysis.few_modes import Pencil
 from rom.mbs.analysis.local_equations import DIFFERENCE_STEP, MAX_DENSE, Instant, instant
 from rom.mbs.analysis.rotors.moving_axes import IN_BODIES, small_motions
 from rom.mbs.analysis.tangent import LOAD_STIFFNESS_RTOL, load_stiffness, sizes
+from rom.mbs.integrate.consistent_start import RANK_PIVOT_RTOL
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.parts.bodies import Marker
 from rom.mbs.results.state import State
@@ -183,7 +184,7 @@ class _Equilibria:
         """Masses and stiffness in motions that turn with the bodies."""
         now = self.now.at(state.t)
         now.W.base[:] = state.base
-        return Pencil.of(now, state, small_motions(now.packed.system, state, IN_BODIES))
+        return Pencil.of(now, state, small_motions(now.packed, state, IN_BODIES))
 
     def corrections(self, at: State, p: float) -> tuple[Array, Array]:
         """Newton's correction, and the change per time, of coordinates and multipliers."""
@@ -264,7 +265,7 @@ def _nearest(pencil: Pencil, shift: float) -> tuple[Array, Array]:
 def _all(pencil: Pencil) -> tuple[Array, Array]:
     """Stiffness (f,) [1/s^2] of all free motions (n, f), ascending."""
     G, K, M = (A.toarray() for A in (pencil.G, pencil.K, pencil.M))
-    Z = null_space(G, RANK_RTOL) if G.size else np.eye(len(K))
+    Z = null_space(G, RANK_PIVOT_RTOL) if G.size else np.eye(len(K))
     K, M = Z.T @ K @ Z, Z.T @ M @ Z
     if not K.size:
         return np.zeros(0), Z

@@ -121,7 +121,7 @@ class Flow:
 
     def initial(self) -> State:
         """Where the bodies were added."""
-        return initial_state(self.packed, self.t0, self.settings.spacing)
+        return initial_state(self.packed, self.t0, self.settings.spacing, assemble=True)
 
     def begun(self, state: State) -> Start:
         """A state as the start of a run would have it.
@@ -129,8 +129,9 @@ class Flow:
         Raises:
             ModelError: if the state does not satisfy the joints.
         """
-        if self.packed.by_blocks and state.rank < state.lam.size:
-            self._take(self.packed.sharing())
+        ready = self.packed.of_rank(state.rank)
+        if ready is not self.packed:
+            self._take(ready)
         state = replace(state, t=self.t0, memory=None, algorithmic=None)
         state = self._fitted(state.q, state.v, state)
         self.step, found = begin(self.record, self.W, state, self.packed.asked, self.settings.h)
@@ -191,7 +192,8 @@ class Flow:
             answer = alpha.advance(self.packed.system, self.W, step, rank, signals, self.steps, out)
             taken = int(step.count[alpha.STEPS])
             if answer == alpha.NEEDS_LAWS:
-                apply_laws(self.packed.asked, self.W, float(self.t[1 + taken]))
+                slopes, t = not step.count[alpha.HAS_FACTOR], float(self.t[1 + taken])
+                apply_laws(self.packed.asked, self.W, t, slopes=slopes)
         if answer != alpha.CONVERGED:
             self.failed[0] += 1
             raise failed_step(self.record, self.W, step, answer, float(self.t[1 + taken]))

@@ -4,15 +4,17 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.linalg import eigvalsh
 from scipy.sparse import csc_matrix, diags
 
 from rom import rotation
 from rom.arguments import one_of
-from rom.errors import ConfigError
+from rom.errors import ConfigError, ModelError
 from rom.mbs.analysis.rotors.blades import Blades
 from rom.mbs.results.state import State
 
 FRAMES = ("body", "world")
+SPIN_RTOL = 1e-3  # of the first frequency of a body, from which on it counts as spinning
 
 
 @dataclass(frozen=True)
@@ -45,7 +47,7 @@ def chosen(frame: Any, names: tuple[str, ...]) -> Axes:
     return Axes(tuple(word == "world" for word in words))
 
 
-def small_motions(system: Any, state: State, axes: Axes) -> tuple[Any, ...]:
+def small_motions(packed: Any, state: State, axes: Axes) -> tuple[Any, ...]:
     """Matrices T, T1, T2, T3 (n, n) from small motions p, counted in moving axes, to variations.
 
     The coordinates vary by T p, the velocities by T dp/dt + T1 p, the accelerations by
@@ -53,12 +55,18 @@ def small_motions(system: Any, state: State, axes: Axes) -> tuple[Any, ...]:
     rotating blade has constant p. In world axes p stays: what a spinning disc, which looks the
     same from all sides, does in its bearings has constant coefficients. All are sparse.
     Blades are counted together, see `rom.mbs.analysis.rotors.blades`.
+
+    Raises:
+        ModelError: naming a body that deforms and spins in axes of the world: its elastic
+            coordinates turn with it.
     """
-    bodies, n = system.bodies, state.v.size
+    bodies, n = packed.system.bodies, state.v.size
     at = bodies.v_at[:, None]
     seen = np.array(axes.world or [False] * len(at))
     if axes.blades is not None:
         seen[axes.blades.bodies] = False
+    for b in np.flatnonzero(seen & (bodies.r > 0)):
+        _refuse_spinning_shapes(packed, state, b)
     p = state.q[bodies.q_at[:, None] + np.arange(3, 7)]
     A = np.moveaxis(rotation.matrix(p.T), -1, 0)
     w, dw = (np.cross(np.eye(3), x[at + np.arange(3, 6)][:, None]) for x in (state.v, state.a))
@@ -79,3 +87,18 @@ def small_motions(system: Any, state: State, axes: Axes) -> tuple[Any, ...]:
         return T, T1, T2, T3
     B, B1, B2 = axes.blades.motions(state)
     return T @ B, T1 @ B + T @ B1, T2 @ B + 2 * T @ B1, T3 @ B + T2 @ B1 + T @ B2
+
+
+def _refuse_spinning_shapes(packed: Any, state: State, b: int) -> None:
+    bodies, r = packed.system.bodies, packed.system.bodies.r[b]
+    speed = np.linalg.norm(state.v[bodies.v_at[b] + np.arange(3, 6)])
+    K, M = (A[bodies.flex[b], :r, :r] for A in (bodies.K, bodies.M))
+    if speed > SPIN_RTOL * np.sqrt(eigvalsh(K, M)[0].clip(0.0)):
+        raise ModelError(
+            f"it spins at {speed:.4g} rad/s and its shapes turn with it: in axes of the world the "
+            "linear equations of a body that deforms are not constant.",
+            where=packed.names[b],
+            hint='Take frame="body", whose frequencies are those seen from the body: where '
+            "bearings are the same in all directions, from outside they differ by the speed. Or "
+            "make the rotor of rods, or of rigid bodies on springs.",
+        )

@@ -105,7 +105,7 @@ class Spins:
         Bodies that turn carry their p with them; where p moves what carries a joint, its axis goes
         along.
         """
-        T, T1, _, T3 = small_motions(now.packed.system, state, IN_BODIES)
+        T, T1, _, T3 = small_motions(now.packed, state, IN_BODIES)
         if not self.turning:
             return T, T1, T3
         V, A = self._carried(now, state)

@@ -1,0 +1,144 @@
+"""A start that joints or drives move: told, refused where it is wrong, without a strain."""
+
+import warnings
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import rom
+from cases.mbs.mechanisms import lattice, lattice_body
+from rom.errors import ConfigError, ModelError, RomWarning
+
+Z = (0, 0, 1)
+
+
+def rod_on_a_pin(gap=0.0, angle=0.0, omega=0.0, rate=None):
+    """A rod of 1 m, whose hinge is drawn open, and a drive that begins elsewhere."""
+    mech = rom.Mechanism(gravity=(0, -9.81, 0))
+    inertia, ends = (1e-3, 1 / 12, 1 / 12), {"a": (-0.5, 0, 0), "b": (0.5, 0, 0)}
+    rod = mech.add_rigid("rod", mass=1.0, inertia=inertia, at=(0.5 + gap, 0, 0), markers=ends,
+                         velocity=(0, 0.5 * omega, 0), omega=(0, 0, omega))  # fmt: skip
+    mech.revolute("pin", mech.ground.marker((0, 0, 0)), rod.marker("a"), axis=Z)
+    if angle or rate is not None:
+        mech.drive("turn", "pin", lambda t: angle + (rate or 0.0) * t)
+    return mech
+
+
+def moved(mech, **options):
+    return rom.simulate(mech, t_end=1e-3, dt=1e-4, **options)
+
+
+ASKED = {
+    "simulate": moved,
+    "linearize": rom.linearize,
+    "steady motion": rom.steady_motion,
+    "response": lambda mech, **options: rom.frequency_response(
+        mech, None, [1.0], force=mech.part("rod").marker("b"), motion=mech.part("rod").marker("b"),
+        **options),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("asked", ASKED)
+def test_a_start_far_from_joints_or_drives_is_refused_unless_asked_for(asked):
+    for fault, name in (({"gap": 0.05}, "pin"), ({"angle": 0.3}, "turn")):
+        with pytest.raises(ModelError, match=f"^{name}: the start does not fit"):
+            ASKED[asked](rod_on_a_pin(**fault))
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", RomWarning)
+            ASKED[asked](rod_on_a_pin(**fault | {"rate": 0.0}), assemble=True)
+
+
+@pytest.mark.parametrize(("gap", "told"), [(1e-9, False), (1e-4, True)])
+def test_a_small_gap_is_told_and_recorded(gap, told):
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        sol = moved(rod_on_a_pin(gap))
+    assert [("'pin' was open by" in str(w.message)) for w in caught] == [True] * told
+    assert_allclose(sol.statistics["closed"], gap / 0.5, rtol=1e-6)
+
+
+def test_statics_begin_where_drives_say_and_not_where_joints_are_open():
+    state = rom.equilibrium(rod_on_a_pin(angle=0.3))
+    assert_allclose(state.q[:2], 0.5 * np.array([np.cos(0.3), np.sin(0.3)]), atol=1e-12)
+    sol = rom.inverse_dynamics(rod_on_a_pin(angle=0.3), [0.0, 1e-3])
+    assert_allclose(sol.drive_load("turn")[0], 9.81 * 0.5 * np.cos(0.3), rtol=1e-6)
+    for asked in (rom.equilibrium, lambda mech: rom.inverse_dynamics(mech, [0.0, 1.0])):
+        with pytest.raises(ModelError, match=r"^pin: the start does not fit"):
+            asked(rod_on_a_pin(gap=0.05, angle=0.3))
+
+
+@pytest.mark.parametrize(("rate", "told"), [(3.0, True), (4.0, False)])
+def test_a_given_velocity_that_a_drive_contradicts_is_told(rate, told):
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        sol = moved(rod_on_a_pin(omega=4.0, rate=rate))
+    said = "the velocity of 'rod' changes by 0.25 of the given one"
+    assert [(said in str(w.message)) for w in caught] == [True] * told
+    assert_allclose(sol.omega("rod")[0, 2], rate, rtol=1e-6)
+
+
+def flexible(gaps, fixed=("n0",)):
+    body = lattice_body(lattice(stiffness=4e4))
+    mech = rom.Mechanism(gravity=(0, -9.81, 0))
+    rod = mech.add_flexible("rod", body)
+    for name, gap in zip(fixed, gaps, strict=True):
+        place = mech.design_point(rod.marker(name)) + np.array([gap, 0, 0])
+        mech.spherical(name, mech.ground.marker(place), rod.marker(name))
+    return mech
+
+
+def test_closing_a_gap_does_not_strain_a_body_that_can_follow():
+    """The load on the hinge is that of the rod drawn where it belongs."""
+    drawn, opened = (moved(flexible([gap]), assemble=True) for gap in (0.0, 0.1))
+    assert np.abs(opened.elastic("rod")[0]).max() < 1e-15
+    assert_allclose(opened.reaction("n0")[0, :3], drawn.reaction("n0")[0, :3], atol=1e-9)
+
+
+def test_a_strain_that_closing_needs_is_told():
+    held, gaps = ("n0", "n1", "n12"), (0.0, 0.0, 1e-3)
+    with pytest.warns(RomWarning, match="it bends 'rod' by"):
+        sol = moved(flexible(gaps, held))
+    assert_allclose(sol.position("rod", "n12")[0, 0], 1.0 + 1e-3, atol=1e-12)
+
+
+def test_a_step_longer_than_the_motion_is_refused():
+    with pytest.raises(ConfigError, match=r"dt = 5 s is longer than the motion of 0\.02 s"):
+        rom.simulate(rod_on_a_pin(), t_end=0.02, dt=5.0)
+
+
+def geared_disc(speed, rate=None, body=None):
+    """A disc that turns in a ring on springs, by a drive if it has a rate."""
+    mech = rom.Mechanism(gravity=(0, 0, 0))
+    if body is None:
+        inertia = (0.2, 0.2, 0.3)
+        disc = mech.add_rigid("disc", mass=9, inertia=inertia, at=(0, 0, 0), omega=(0, 0, speed))
+    else:
+        disc = mech.add_flexible("disc", body, omega=(speed, 0, 0))
+    pin = disc.marker((0, 0, 0)) if body is None else disc.marker("n0")
+    place = mech.design_point(pin)
+    ring = mech.add_rigid("ring", mass=1, inertia=(0.1,) * 3, at=place)
+    spring = {"stiffness": (1e6, 2e6, 1e6, 1e4, 2e4, 1e4)}
+    mech.bushing("springs", mech.ground.marker(place), ring.marker((0, 0, 0)), **spring)
+    axis = Z if body is None else (1, 0, 0)
+    mech.revolute("axle", ring.marker((0, 0, 0)), pin, axis=axis)
+    if rate is not None:
+        mech.drive("motor", "axle", lambda t: rate * t)
+    return mech
+
+
+def test_speeds_of_spins_and_diagrams_are_those_that_drives_prescribe():
+    for spin in ({"axle": 50.0}, (0.0, 0.0, 50.0)):
+        with pytest.raises(ModelError, match=r"^motor: the velocities of joints and drives contra"):
+            rom.equilibrium(geared_disc(0.0, 100.0), spin=spin)
+    assert rom.equilibrium(geared_disc(0.0, 50.0), spin={"axle": 50.0}).v[5] == 50.0
+    with pytest.warns(RomWarning, match="no body turns at the speed 50 rad/s"):
+        rom.campbell(lambda speed: geared_disc(100.0), [50.0, 100.0], frame="world")
+
+
+@pytest.mark.parametrize("asked", [rom.linearize, rom.steady_motion])
+def test_a_reduced_body_that_spins_is_not_counted_in_axes_of_the_world(asked):
+    """Its shapes turn: 443.6 and 557.5 Hz were said of a shaft of 511.4 and 512.0 Hz."""
+    mech = geared_disc(50.0, body=lattice_body(lattice(stiffness=4e4)))
+    with pytest.raises(ModelError, match=r"^disc: it spins at .* rad.s and its shapes turn"):
+        asked(mech, frame="world", assemble=True)
