@@ -144,10 +144,13 @@ def warn_outside(limits: Range, value: float, of: str = "") -> None:
     warn(limits.doubt(value, of))
 
 
-def check_damping_ratio(ratio: Any, of: str = "") -> None:
+def check_damping_ratio(ratio: Any, of: str = "", *, stilled: bool = False) -> None:
     """Take a share of critical damping at the border.
 
-    One is taken at its word: so are residual shapes stilled.
+    Args:
+        ratio: damping over critical damping [1].
+        of: whose it is.
+        stilled: take one at its word: so are residual shapes stilled.
 
     Raises:
         ConfigError: for no number, one below zero, or one above one, which is per cent.
@@ -163,7 +166,7 @@ def check_damping_ratio(ratio: Any, of: str = "") -> None:
             hint=f"For {ratio:g} per cent write {ratio / 100:g}; to damp beyond one on purpose, "
             "use Rayleigh.",
         )
-    if ratio < 1.0:
+    if ratio < 1.0 or not stilled:
         warn_outside(DAMPING_RATIO, ratio, of)
 
 

@@ -35,6 +35,8 @@ PLACES: dict[str, tuple[str, ...]] = {  # option: key
     "reference": ("reduction", "reference"),
     "stiffening": ("reduction", "stiffening"),
     "stress": ("reduction", "stress"),
+    "damping_ratio": ("damping", "ratio"),
+    "damping_fixed": ("damping", "fixed"),
     "name": ("name",),
     "number": ("modes", "number"),
     "fixed": ("modes", "fixed"),
@@ -51,6 +53,7 @@ REPLACED_KEYS = {  # an option takes the place of what contradicts it
     "modes": (("reduction", "f_max"), ("reduction", "tol")),
     "f_max": (("reduction", "modes"),),
     "tol": (("reduction", "modes"),),
+    "damping_ratio": (("damping", "alpha"), ("damping", "beta")),
 }
 
 
@@ -133,7 +136,6 @@ SPECIAL_KEYS: dict[str, Callable[[Any], Changes]] = {
     "parameter": _parameters,
     "interface": _interfaces,
     "face": _faces,
-    "damping_ratio": lambda ratio: {("damping",): {"ratio": ratio}},
     "rayleigh": _rayleigh,
     "no_certificate": lambda _: {("reduction", "certificate"): False},
     "full_certificate": lambda _: {("reduction", "certificate"): "full"},

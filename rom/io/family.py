@@ -20,7 +20,7 @@ from rom.parametric.layers import Stretch
 from rom.parametric.parameters import read, written
 
 SCHEMA_NAME = "rom-family"
-VERSION = (1, 0)  # counts like that of the body file
+VERSION = (1, 1)  # counts like that of the body file
 INTEGRALS = InertiaIntegrals.__slots__
 
 
@@ -151,7 +151,9 @@ def _damping(
     if isinstance(damping, Rayleigh):
         return {"kind": "Rayleigh", **asdict(damping)}, {}
     if isinstance(damping, ModalDamping):
-        return {"kind": "modal"}, {"damping/ratio": np.asarray(damping.ratio, dtype=float)}
+        fixed = damping.fixed  # from 1.1 on
+        words = {"kind": "modal", "fixed": dict(fixed) if isinstance(fixed, dict) else list(fixed)}
+        return words, {"damping/ratio": np.asarray(damping.ratio, dtype=float)}
     return None, {}
 
 
@@ -162,8 +164,9 @@ def _damping_of(
         return None
     if entry["kind"] == "Rayleigh":
         return Rayleigh(entry["alpha"], entry["beta"])
-    ratio = arrays["damping/ratio"]
-    return ModalDamping(ratio.item() if ratio.size == 1 else ratio)
+    ratio, fixed = arrays["damping/ratio"], entry.get("fixed", ())
+    fixed = fixed if isinstance(fixed, dict) else tuple(fixed)
+    return ModalDamping(ratio.item() if ratio.size == 1 else ratio, fixed)
 
 
 def _verify(family: BodyFamily, path: Path) -> None:

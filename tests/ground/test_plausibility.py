@@ -116,6 +116,7 @@ DAMPING = {
     "just beyond one": (1.01, ConfigError, "1.01 per cent write 0.0101"),
     "strong": (0.5, None, "0.5"),
 }
+ONE_PER_CENT = {"whole": 1, "real": 1.0, "of each": [1.0, 1.0]}
 
 
 @pytest.mark.parametrize("many", [False, True], ids=["one", "list"])
@@ -131,8 +132,13 @@ def test_damping_that_no_structure_has_is_refused_or_doubted(case, many):
         assert [words in text for text in said(lambda: rom.ModalDamping(given))] == [True]
 
 
-@pytest.mark.parametrize("ratio", [0.0, 1e-4, 0.02, 0.3, 1.0, [0.01, 1.0]])
-def test_damping_of_structures_and_critical_damping_on_purpose_are_silent(ratio):
+@pytest.mark.parametrize("ratio", ONE_PER_CENT.values(), ids=ONE_PER_CENT)
+def test_a_ratio_of_one_for_every_mode_is_doubted_as_per_cent(ratio):
+    assert ["per cent as 0.02" in text for text in said(lambda: rom.ModalDamping(ratio))] == [True]
+
+
+@pytest.mark.parametrize("ratio", [0.0, 1e-4, 0.02, 0.3, [0.01, 1.0]])
+def test_damping_of_structures_and_residual_shapes_stilled_are_silent(ratio):
     assert said(lambda: rom.ModalDamping(ratio)) == []
 
 
@@ -144,8 +150,8 @@ def test_factors_of_rayleigh_are_finite_and_not_negative(name, value):
 
 
 @pytest.mark.parametrize(("share", "n"), [(0.2, 0), (0.5, 1), (3.0, 1)])
-def test_rayleigh_is_doubted_by_its_lowest_coordinate(part, share, n):
-    beta = 2 * share / part.omega.min()
+def test_rayleigh_is_doubted_by_its_lowest_mode(part, share, n):
+    beta = 2 * share / (2 * np.pi * part.frequencies()[6])
     found = said(lambda: rom.Rayleigh(beta=beta).matrix(part))
     assert len(found) == n and all(f"{share:.4g};" in text for text in found)
 
