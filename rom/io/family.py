@@ -14,7 +14,7 @@ from rom.body.recovery import StressRecovery
 from rom.errors import FileFormatError
 from rom.io import native
 from rom.io.archive import MAX_BYTES, Kind, stated, write_archive
-from rom.model import Array, Report, Row
+from rom.model import Array
 from rom.parametric.family import BodyFamily, Share
 from rom.parametric.layers import Stretch
 from rom.parametric.parameters import read, written
@@ -106,9 +106,7 @@ def load(path: str | Path, *, limit: int = MAX_BYTES) -> Any:
 
 
 def _family(manifest: dict[str, Any], arrays: dict[str, Array], body: FlexibleBody) -> BodyFamily:
-    report, frame = manifest["certificate"], manifest["frame"]
-    if report is not None:
-        report = Report(report["title"], tuple(Row(**row) for row in report["rows"]))
+    frame = manifest["frame"]
     return BodyFamily(
         body,
         read(manifest["parameters"]),
@@ -116,7 +114,7 @@ def _family(manifest: dict[str, Any], arrays: dict[str, Array], body: FlexibleBo
         reference=frame if isinstance(frame, str) else tuple(frame),
         damping=_damping_of(manifest["damping"], arrays),
         provenance=manifest["provenance"],
-        certificate=report,
+        certificate=native.report_of(manifest["certificate"]),
         stretch=_stretch(manifest["stretch"], arrays),
     )
 

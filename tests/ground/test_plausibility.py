@@ -58,12 +58,18 @@ WRONG = {  # E, rho: what is said
     "mm, kg, ms": (210.0, 7.85e-6, "from_units('mm-kg-ms'"),
     "kPa and t/m^3": (210e6, 7.85, "7.85 kg/m^3"),
     "rho in g/m^3": (210e9, 7.85e6, "7.85e+06 kg/m^3"),
+    "MPa and g/cm^3": (2.1e5, 7.85, "7.85 kg/m^3"),
+    "MPa and g/cm^3, aluminium": (7e4, 2.7, "2.7 kg/m^3"),
+    "E in kPa": (2.1e8, 7850.0, "163.6 m/s"),
+    "E in psi": (3.05e7, 7850.0, "62.33 m/s"),
+    "ksi and lb/in^3": (3.05e4, 0.284, "0.284 kg/m^3"),
 }
 RIGHT = {  # E, rho
     "steel": (210e9, 7850.0), "diamond": (1.2e12, 3510.0), "beryllium": (3.03e11, 1850.0),
     "rubber": (1e6, 1100.0), "gel": (2e5, 1000.0), "soft foam": (3e4, 30.0),
     "honeycomb": (1e9, 50.0), "aerogel": (1e4, 2.0), "tungsten": (4e11, 19300.0),
-    "balsa": (3e9, 120.0), "osmium": (5.6e11, 22590.0), "concrete": (3e10, 2400.0),
+    "balsa": (3e9, 120.0), "osmium": (5.6e11, 22590.0), "lead": (1.6e10, 11340.0),
+    "gold": (7.8e10, 19300.0), "polystyrene foam": (3e6, 15.0), "concrete": (3e10, 2400.0),
 }  # fmt: skip
 
 
