@@ -14,7 +14,6 @@ from rom.eigen.supports import Fixed
 from rom.errors import ConfigError
 from rom.model import Array, Row
 from rom.plausible import DAMPING_RATIO, check_damping_ratio, refuse_negative, warn_outside
-from rom.rows import N_COMPARED
 
 
 @typed
@@ -134,8 +133,8 @@ def _with_statics(body: FlexibleBody, omega: Array, B: Array) -> tuple[Array, Ar
     return np.concatenate([omega, np.sqrt(lam)]), np.hstack([B, C @ W])
 
 
-def damping_rows(body: FlexibleBody, n: int = N_COMPARED) -> list[Row]:
-    """The damping ratio of each of n elastic modes, free and held by each interface in turn."""
+def damping_rows(body: FlexibleBody, n: int) -> list[Row]:
+    """The damping ratio of the n lowest elastic modes each, free and held by each interface."""
     if not body.D.any():
         return []
     held = body.markers if body.has_static_shapes else ()

@@ -92,7 +92,7 @@ def certify_body(
     rows += rigid
     rows += _matrix_rows(connection, basis, body, matrices)
     rows += _effective_mass(body, tuple(connection.parts)) if statics else []
-    rows += damping_rows(body)
+    rows += damping_rows(body, N_COMPARED)
     return Report(f"certificate of {body.name}", tuple(rows)), comparison
 
 

@@ -72,15 +72,6 @@ def test_a_law_of_damping_says_the_same_in_every_frame(seed):
                 assert_allclose(roots, by_imaginary_part(exact), rtol=1e-6)
 
 
-def test_a_rigid_motion_is_not_damped_by_the_mass():
-    """A free body that flies has no structure that could stop it."""
-    body = damped(random_body(np.random.default_rng(1)), rom.Rayleigh(alpha=50.0))
-    mech = rom.Mechanism(gravity=(0, 0, 0))
-    mech.add_flexible("part", body.with_reference("root"), velocity=(1.0, 2.0, 3.0))
-    sol = rom.simulate(mech, t_end=0.1, dt=1e-3)
-    assert_allclose(sol.velocity("part")[-1], (1.0, 2.0, 3.0), rtol=1e-9)
-
-
 def test_the_certificate_has_the_ratio_of_each_mode_in_each_support():
     """Two per cent of the cantilever are other ratios of the free body, and that is told."""
     model = block(size=(0.6, 0.03, 0.04), cells=(6, 1, 1))

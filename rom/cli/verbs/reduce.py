@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rom.cli.answer import Answer, failures, report_data
-from rom.cli.described import component, described
+from rom.cli.described import component, described, rayleigh
 from rom.cli.matrices import add_matrices, solid_options
 from rom.cli.method import add_method, method
 from rom.cli.model import read_model
@@ -147,15 +147,7 @@ def _damping(args: argparse.Namespace) -> "Rayleigh | ModalDamping | None":
         return ModalDamping(args.damping_ratio, args.damping_fixed)
     if args.damping_fixed:
         raise ConfigError("--damping-fixed says where --damping-ratio is meant, which is missing.")
-    if args.rayleigh is None:
-        return None
-    try:
-        alpha, beta = map(float, args.rayleigh.split(","))
-    except ValueError:
-        raise ConfigError(
-            f"--rayleigh {args.rayleigh} is not two numbers, as in 0.1,1e-6."
-        ) from None
-    return Rayleigh(alpha, beta)
+    return None if args.rayleigh is None else Rayleigh(**rayleigh(args.rayleigh))
 
 
 def _data(body: "FlexibleBody", output: Path) -> dict[str, Any]:
