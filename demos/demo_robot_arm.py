@@ -41,7 +41,8 @@ models = [
 links = [
     rom.reduce(
         model, method=rom.CraigBampton(n_modes=3), interfaces={"root": "rbe2", "tip": "rbe2"},
-        reference="root", damping=rom.ModalDamping(0.01), name="link", certify=False,
+        reference="root", damping=rom.ModalDamping(0.01, fixed=("root",)), name="link",
+        certify=False,
     )
     for model in models
 ]  # fmt: skip

@@ -64,7 +64,7 @@ rod = rom.reduce(
     method=rom.CraigBampton(n_modes=20),
     interfaces=dict.fromkeys(pins, "rbe2"),
     reference=pins,
-    damping=rom.ModalDamping(0.01),
+    damping=rom.ModalDamping(0.01, fixed=("pin_a:xyz rx", "pin_b:yz")),
     name="rod",
 )
 comparison = rod.provenance["comparison"]

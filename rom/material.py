@@ -10,7 +10,15 @@ import numpy.typing as npt
 
 from rom.arguments import finite, is_number, shortened
 from rom.errors import MaterialError, warn
-from rom.plausible import FOAM_SPEED, SOLID_DENSITY, STIFF_DENSITY, WAVE_SPEED
+from rom.plausible import (
+    FOAM_SPEED,
+    HEAVY_DENSITY,
+    HEAVY_SPEED,
+    LIGHT_SPEED,
+    SOLID_DENSITY,
+    STIFF_DENSITY,
+    WAVE_SPEED,
+)
 from rom.units import SYSTEMS, UnitSystem, unit_system
 
 Array = npt.NDArray[np.float64]
@@ -192,8 +200,10 @@ class Orthotropic:
 def _solid_doubt(solid: Material | Orthotropic) -> str:
     """Speed of sound or density that no solid has, and the unit system that may be meant."""
     numbers = f"the solid with E = {solid.E}, rho = {solid.rho:g}"
-    density = STIFF_DENSITY if solid.wave_speed > FOAM_SPEED else SOLID_DENSITY
+    density = STIFF_DENSITY if solid.wave_speed > LIGHT_SPEED else SOLID_DENSITY
     message = WAVE_SPEED.doubt(solid.wave_speed, numbers) or density.doubt(solid.rho, numbers)
+    if not message and solid.rho > HEAVY_DENSITY:
+        message = HEAVY_SPEED.doubt(solid.wave_speed, numbers)
     if not message:
         return ""
     meant = [name for name, unit in SYSTEMS.items() if _is_stiff(solid, unit)]

@@ -1,14 +1,16 @@
 """The records passed between the stages. Frozen, array-valued, without solvers."""
 
+import operator
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
+from weakref import WeakSet
 
 import numpy as np
 import numpy.typing as npt
 
 from rom.arguments import matrix, typed
-from rom.errors import InterfaceError
+from rom.errors import InterfaceError, warn
 from rom.material import PAIRS as PAIRS
 from rom.material import Material as Material
 from rom.material import Orthotropic as Orthotropic
@@ -356,6 +358,9 @@ FAILURE_COSTS = {
     "wrong.",
     "Newton corrections": f"Steps are hard to solve: something is stiff. {SMALLER_STEPS}",
 }
+RELATIONS = {"<=": operator.le, ">": operator.gt, "==": operator.eq}  # of a value to its limit
+UNLIMITED = ("information", "--", "")  # limits of values that are told, not judged
+_TOLD = WeakSet["Report"]()  # of whose failures a user was warned
 
 
 @dataclass(frozen=True, slots=True)
@@ -367,9 +372,24 @@ class Row:
     limit: str
     ok: bool
 
+    @property
+    def limited(self) -> bool:
+        """Whether the limit is one: a relation and a number, or words of what is not judged."""
+        return self.limit in UNLIMITED or self.limit.partition(" ")[0] in RELATIONS
+
+    @property
+    def excess(self) -> float:
+        """How far the value is beyond its limit, over the limit; 0 within, infinite for NaN."""
+        relation, _, number = self.limit.partition(" ")
+        if np.isnan(self.value):
+            return np.inf
+        if self.limit in UNLIMITED or RELATIONS[relation](self.value, limit := float(number)):
+            return 0.0
+        return abs((self.value - limit) / limit) if limit else np.inf
+
 
 @typed
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, weakref_slot=True)
 class Report:
     """Outcome of a set of checks; prints as a table.
 
@@ -390,6 +410,30 @@ class Report:
     def failures(self) -> tuple[Row, ...]:
         """The rows that do not hold."""
         return tuple(row for row in self.rows if not row.ok)
+
+    @property
+    def worst(self) -> Row:
+        """The row that is farthest beyond its limit, of those that fail if any does."""
+        return max(self.failures or self.rows, key=lambda row: row.excess)
+
+    def warn_of_failures(self, of: str) -> None:
+        """Warn of rows that do not hold, once of each report.
+
+        Args:
+            of: what was checked, e.g. "the certificate of body 'rod'".
+
+        Warns:
+            RomWarning: with the worst row, what it costs, and what helps.
+        """
+        if self.ok or self in _TOLD:
+            return
+        worst = self.worst
+        warn(
+            f"{of} fails in {len(self.failures)} of {len(self.rows)} rows; worst is "
+            f"{worst.quantity!r}: {worst.value:.3g}, limit {worst.limit}. "
+            + " ".join(Report("", (worst,)).advice)
+        )
+        _TOLD.add(self)
 
     @property
     def advice(self) -> tuple[str, ...]:

@@ -53,6 +53,13 @@ MATRIX_SPEED = Range(
     "Check units='...' of the matrices and nodes.",
 )  # fmt: skip
 FOAM_SPEED = 1000.0  # m/s; no foam is faster
+LIGHT_SPEED = 100.0  # m/s; nothing lighter than honeycomb is faster
+HEAVY_DENSITY = 5000.0  # kg/m^3; beyond are metals, the slowest of them lead with 1190 m/s
+HEAVY_SPEED = Range(
+    "the speed of sound sqrt(E/rho)", 600.0, 2.0e4, "m/s",
+    "solids as heavy have 1190 m/s (lead) to 7000 m/s (ceramics)",
+    "Check the units: E in Pa, rho in kg/m^3.",
+)  # fmt: skip
 SOLID_DENSITY = Range(
     "the density", 0.1, 3.0e4, "kg/m^3", "solids have 0.1 kg/m^3 (aerogel) to 22600 (osmium)",
     "Check the units: E in Pa, rho in kg/m^3.",
@@ -144,10 +151,13 @@ def warn_outside(limits: Range, value: float, of: str = "") -> None:
     warn(limits.doubt(value, of))
 
 
-def check_damping_ratio(ratio: Any, of: str = "") -> None:
+def check_damping_ratio(ratio: Any, of: str = "", *, stilled: bool = False) -> None:
     """Take a share of critical damping at the border.
 
-    One is taken at its word: so are residual shapes stilled.
+    Args:
+        ratio: damping over critical damping [1].
+        of: whose it is.
+        stilled: take one at its word: so are residual shapes stilled.
 
     Raises:
         ConfigError: for no number, one below zero, or one above one, which is per cent.
@@ -163,7 +173,7 @@ def check_damping_ratio(ratio: Any, of: str = "") -> None:
             hint=f"For {ratio:g} per cent write {ratio / 100:g}; to damp beyond one on purpose, "
             "use Rayleigh.",
         )
-    if ratio < 1.0:
+    if ratio < 1.0 or not stilled:
         warn_outside(DAMPING_RATIO, ratio, of)
 
 

@@ -294,6 +294,7 @@ def _reduced_body(  # noqa: PLR0913  those of `reduce`
         rows, deflections = deflection_rows(nonlinear, model, ops, connection, body, E)
         certificate = replace(certificate, rows=(*certificate.rows, *rows))
         body.provenance["large deflection"] = deflections
+    certificate.warn_of_failures(f"the certificate of body {name!r}")
     return replace(
         body, certificate=certificate, provenance=body.provenance | {"comparison": comparison}
     )

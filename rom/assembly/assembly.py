@@ -23,13 +23,18 @@ from rom.assembly.condensed import (
 from rom.assembly.coupling import coupled_rows
 from rom.body.flexible import FlexibleBody
 from rom.body.records import Marker, still_motions
-from rom.errors import ConfigError
+from rom.errors import ConfigError, warn
 from rom.model import Array, Modes, Report, Row
 from rom.names import named, offered
 from rom.rows import N_COMPARED, frequency_rows, row
 
 Place = tuple[str, str]  # body, interface
 GAP_RTOL = 1e-9  # of the motion of the coupled interfaces
+
+
+def _corrected_alone(body: FlexibleBody) -> bool:
+    """Whether the shapes of a body hold a correction made for itself, interfaces free."""
+    return "EnhancedCraigBampton" in str(body.provenance.get("reduction", {}).get("method"))
 
 
 @typed
@@ -52,6 +57,9 @@ class Assembly:
         ConfigError: if a body is unknown or a coupling is no pair of places.
         InterfaceError: if two interfaces are of different kind or size, lie apart, or need a
             projection.
+
+    Warns:
+        RomWarning: of bodies by `rom.EnhancedCraigBampton`, which is for bodies that stay alone.
     """
 
     bodies: dict[str, FlexibleBody]
@@ -68,6 +76,12 @@ class Assembly:
             raise ConfigError(
                 f"{named(far)} has the energy of large deflection, and an assembly is linear.",
                 hint="Reduce without nonlinear.",
+            )
+        if own := [name for name, body in self.bodies.items() if _corrected_alone(body)]:
+            warn(
+                f"{named(own)} has enhanced Craig-Bampton modes, whose correction takes the "
+                "interfaces for free: frequencies of an assembly are off by per cents. Take "
+                "CraigBampton with a few modes more, or MomentMatching((0.0,), 2)."
             )
         in_si = {name: body.in_units("SI") for name, body in self.bodies.items()}
         object.__setattr__(self, "bodies", in_si)

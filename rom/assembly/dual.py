@@ -298,4 +298,6 @@ def with_certificate(body: FreeSubstructure, connection: Connection) -> FreeSubs
         full = connection.ops.modes(held, n_rigid + reduced.size)[0][n_rigid:] / (2 * np.pi)
         table = {"reduced": reduced.tolist(), "full": full.tolist()}
         rows += frequency_rows(f"{name} held", table) if reduced.size else []
-    return replace(body, certificate=Report("certificate of the substructure", tuple(rows)))
+    report = Report("certificate of the substructure", tuple(rows))
+    report.warn_of_failures("the certificate of the substructure")
+    return replace(body, certificate=report)

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 from scipy.linalg import eigh, null_space
 
+from rom.body.damping import damping_rows
 from rom.body.flexible import FlexibleBody
 from rom.body.projection import Elastic
 from rom.body.reference import rigid_mass
@@ -91,6 +92,7 @@ def certify_body(
     rows += rigid
     rows += _matrix_rows(connection, basis, body, matrices)
     rows += _effective_mass(body, tuple(connection.parts)) if statics else []
+    rows += damping_rows(body, N_COMPARED)
     return Report(f"certificate of {body.name}", tuple(rows)), comparison
 
 

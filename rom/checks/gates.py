@@ -3,10 +3,11 @@
 from typing import Any
 
 import numpy as np
+from scipy.linalg import eigvalsh
 
 from rom.arguments import typed
 from rom.body.flexible import FlexibleBody
-from rom.body.reference import rigid_elastic, rigid_mass
+from rom.body.reference import marker_motion, reference_motion, rigid_elastic, rigid_mass
 from rom.eigen.scipy import SciPyOperators
 from rom.eigen.verbs import given_rigid_motions, rigid_motions
 from rom.errors import ConfigError
@@ -100,8 +101,14 @@ def _body_rows(body: FlexibleBody) -> list[Row]:
         row("asymmetry of K", _asymmetry(body.K), 1e-12),
         row("asymmetry of D", _asymmetry(body.D), 1e-12),
         row("asymmetry of the inertia integrals", _swapped(body.S_kl), 1e-12),
-        row("smallest over largest stiffness", lam[0] / lam[-1], 0.0, above=True),
-        row("smallest damping", np.linalg.eigvalsh(body.D)[0], -1e-9 * lam[-1] ** 0.5, above=True),
+        row("smallest over largest stiffness", lam[0] / np.abs(lam).max(), 0.0, above=True),
+        row("frequencies of the coordinates against stiffness and mass", _detuned(body), 1e-6),
+        row(
+            "smallest damping",
+            np.linalg.eigvalsh(body.D)[0],
+            -1e-9 * np.abs(lam).max() ** 0.5,
+            above=True,
+        ),
         row("smallest eigenvalue of M", np.linalg.eigvalsh(M)[0], 0.0, above=True),
         row(
             "frame and shapes together: smallest scaled mass",
@@ -110,7 +117,29 @@ def _body_rows(body: FlexibleBody) -> list[Row]:
             above=True,
         ),
         row("momentum of the shapes within Schwarz' bound", _schwarz(body), 1 + 1e-9),
+        *_marker_rows(body),
     ]
+
+
+def _detuned(body: FlexibleBody) -> float:
+    """Largest difference of the squared frequencies it has from those it says, of the largest."""
+    found = eigvalsh(body.K, body.M) if np.linalg.eigvalsh(body.M)[0] > 0 else np.array(np.nan)
+    return float(np.abs(found - body.omega**2).max() / np.abs(found).max())
+
+
+def _marker_rows(body: FlexibleBody) -> list[Row]:
+    """Interfaces of six coordinates move as their markers, and the frame moves with none."""
+    size, gaps = np.r_[np.ones(3), np.full(3, body.size)][:, None], [0.0]
+    scale = np.r_[1 / size[:, 0], np.full(body.n_modes, np.sqrt(body.mass))]
+    for marker in body.markers.values():
+        if marker.kind in ("rbe2", "rbe3"):
+            moved = np.hstack(marker_motion(marker, body.n_modes))
+            gaps.append(np.abs((marker.hold - moved) * size * scale).max())
+    rows = [row("coordinates of interfaces against their markers", max(gaps), 1e-6)]
+    if body.quartic is None and body.reference in ("mean-axis", "buckens", *body.markers):
+        drift = np.abs(reference_motion(body, body.reference) * size).max() * np.sqrt(body.mass)
+        rows.append(row("motion of the frame in the shapes", drift, 1e-6))
+    return rows
 
 
 def _asymmetry(A: Array) -> float:

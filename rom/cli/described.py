@@ -35,6 +35,8 @@ PLACES: dict[str, tuple[str, ...]] = {  # option: key
     "reference": ("reduction", "reference"),
     "stiffening": ("reduction", "stiffening"),
     "stress": ("reduction", "stress"),
+    "damping_ratio": ("damping", "ratio"),
+    "damping_fixed": ("damping", "fixed"),
     "name": ("name",),
     "number": ("modes", "number"),
     "fixed": ("modes", "fixed"),
@@ -51,6 +53,7 @@ REPLACED_KEYS = {  # an option takes the place of what contradicts it
     "modes": (("reduction", "f_max"), ("reduction", "tol")),
     "f_max": (("reduction", "modes"),),
     "tol": (("reduction", "modes"),),
+    "damping_ratio": (("damping", "alpha"), ("damping", "beta")),
 }
 
 
@@ -121,20 +124,24 @@ def _faces(pairs: list[tuple[str, str]]) -> Changes:
     return {("geometry", "faces", name): text for name, text in faces(pairs).items()}
 
 
-def _rayleigh(text: str) -> Changes:
+def rayleigh(text: str) -> dict[str, float]:
+    """The factors of D = alpha M + beta K.
+
+    Raises:
+        ConfigError: for what is not two numbers.
+    """
     try:
         alpha, beta = map(float, text.split(","))
     except ValueError:
         raise ConfigError(f"--rayleigh {text} is not two numbers, as in 0.1,1e-6.") from None
-    return {("damping",): {"alpha": alpha, "beta": beta}}
+    return {"alpha": alpha, "beta": beta}
 
 
 SPECIAL_KEYS: dict[str, Callable[[Any], Changes]] = {
     "parameter": _parameters,
     "interface": _interfaces,
     "face": _faces,
-    "damping_ratio": lambda ratio: {("damping",): {"ratio": ratio}},
-    "rayleigh": _rayleigh,
+    "rayleigh": lambda text: {("damping",): rayleigh(text)},
     "no_certificate": lambda _: {("reduction", "certificate"): False},
     "full_certificate": lambda _: {("reduction", "certificate"): "full"},
 }

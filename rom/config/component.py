@@ -148,15 +148,19 @@ class Component(Described):
         """Damping for `rom.reduce`."""
         from rom.body.damping import ModalDamping, Rayleigh
 
-        values = self.values.get("damping")
-        if values is None:
+        if "damping" not in self.values:
             return None
-        if ("ratio" in values) == bool({"alpha", "beta"} & set(values)):
+        values = dict(self.values["damping"])
+        fixed = tuple(values.pop("fixed"))
+        if ("ratio" in values) == bool({"alpha", "beta"} & set(values)) or (
+            fixed and "ratio" not in values
+        ):
             raise Place(self.document, ("damping",)).error(
-                "[damping] needs either ratio, or alpha and beta."
+                "[damping] needs either ratio, and fixed if it is meant in a support, or alpha and "
+                "beta."
             )
         with self.at("damping"):
-            return ModalDamping(values["ratio"]) if "ratio" in values else Rayleigh(**values)
+            return ModalDamping(values["ratio"], fixed) if "ratio" in values else Rayleigh(**values)
 
     def nonlinear(self) -> "Geometric | None":
         """Loads of large deflection for `rom.reduce`; None for a body of small deflection."""

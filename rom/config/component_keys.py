@@ -167,6 +167,8 @@ TABLE = Table("A component.", (
     )), "How it is reduced.", {}),
     Key("damping", Table("Structural damping: a ratio, or alpha and beta.", (
         Key("ratio", Quantity(), "Damping ratio of every mode."),
+        Key("fixed", Words(), "Interfaces held where the ratio is meant, wholly or as `name:yz`; "
+            "those of the free body without it.", ()),
         Key("alpha", Quantity("1/s"), "D = alpha M + beta K."),
         Key("beta", Quantity("s"), "D = alpha M + beta K."),
     )), "Structural damping; none if missing."),

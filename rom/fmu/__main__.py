@@ -7,11 +7,12 @@ import json
 import os
 import socket
 import sys
+import warnings
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from rom.errors import RomError
+from rom.errors import RomError, RomWarning
 from rom.fmu.server import driven, serve
 
 
@@ -23,10 +24,14 @@ def main(resources: Path, *description: str) -> int:
             serve(connection, lambda: driven(resources))
         return 0
     found: Any
-    try:
-        found = [asdict(variable) for variable in driven(resources).variables]
-    except RomError as error:
-        found = {"error": str(error)}
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always", RomWarning)
+        try:
+            found = {"variables": [asdict(variable) for variable in driven(resources).variables]}
+        except RomError as error:
+            found = {"error": str(error)}
+    found["warnings"] = [str(warning.message) for warning in told
+                         if issubclass(warning.category, RomWarning)]  # fmt: skip
     Path(description[0]).write_text(json.dumps(found))
     return 0
 

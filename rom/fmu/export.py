@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from rom.arguments import typed
-from rom.errors import ConfigError
+from rom.errors import ConfigError, warn
 from rom.fmu.server import SETTINGS_FILE
 from rom.io.files import check_writable
 from rom.io.fmu.archive import Content, write_archive
@@ -100,9 +100,11 @@ def _variables(resources: dict[str, bytes], script: Path) -> list[Variable]:
                 hint="Name all files it needs, and let it look for them beside itself.",
             )
         found = json.loads(out.read_text())
-    if isinstance(found, dict):
+    for sentence in found["warnings"]:
+        warn(sentence)
+    if "error" in found:
         raise ConfigError(found["error"], where=script.name)
-    return [Variable(**one) for one in found]
+    return [Variable(**one) for one in found["variables"]]
 
 
 def _description(

@@ -196,13 +196,16 @@ def _read_manifest(archive: zipfile.ZipFile, path: Path, kind: Kind) -> dict[str
         )
     try:
         manifest = json.loads(_read(archive, "manifest", path).tobytes())
-        schema, (major, _) = manifest["schema"], manifest["version"]
+        schema, (major, minor) = manifest["schema"], manifest["version"]
     except (ValueError, KeyError, TypeError, RecursionError) as error:
         raise FileFormatError(f"the manifest cannot be read: {error}.", where=str(path)) from error
     if (
         not isinstance(schema, str)
         or schema not in kind.schemas
         or major != kind.schemas[schema][0]
+        or type(major) is not int
+        or type(minor) is not int
+        or minor < 0
     ):
         known = " or ".join(f"{name!r} {list(version)}" for name, version in kind.schemas.items())
         raise FileFormatError(

@@ -113,6 +113,8 @@ def export(
             "deflection.",
             hint="Write the native file, or reduce without nonlinear.",
         )
+    if body.certificate is not None:
+        body.certificate.warn_of_failures(f"the certificate of body {body.name!r}")
     options = {"held": tuple(held)} if held else {}
     body = body if kind in OWN_UNITS else body.in_units("SI")
     return FORMATS[kind][1](body, path, **options)

@@ -14,13 +14,13 @@ from rom.body.recovery import StressRecovery
 from rom.errors import FileFormatError
 from rom.io import native
 from rom.io.archive import MAX_BYTES, Kind, stated, write_archive
-from rom.model import Array, Report, Row
+from rom.model import Array
 from rom.parametric.family import BodyFamily, Share
 from rom.parametric.layers import Stretch
 from rom.parametric.parameters import read, written
 
 SCHEMA_NAME = "rom-family"
-VERSION = (1, 0)  # counts like that of the body file
+VERSION = (1, 1)  # counts like that of the body file
 INTEGRALS = InertiaIntegrals.__slots__
 
 
@@ -106,9 +106,7 @@ def load(path: str | Path, *, limit: int = MAX_BYTES) -> Any:
 
 
 def _family(manifest: dict[str, Any], arrays: dict[str, Array], body: FlexibleBody) -> BodyFamily:
-    report, frame = manifest["certificate"], manifest["frame"]
-    if report is not None:
-        report = Report(report["title"], tuple(Row(**row) for row in report["rows"]))
+    frame = manifest["frame"]
     return BodyFamily(
         body,
         read(manifest["parameters"]),
@@ -116,7 +114,7 @@ def _family(manifest: dict[str, Any], arrays: dict[str, Array], body: FlexibleBo
         reference=frame if isinstance(frame, str) else tuple(frame),
         damping=_damping_of(manifest["damping"], arrays),
         provenance=manifest["provenance"],
-        certificate=report,
+        certificate=native.report_of(manifest["certificate"]),
         stretch=_stretch(manifest["stretch"], arrays),
     )
 
@@ -151,7 +149,9 @@ def _damping(
     if isinstance(damping, Rayleigh):
         return {"kind": "Rayleigh", **asdict(damping)}, {}
     if isinstance(damping, ModalDamping):
-        return {"kind": "modal"}, {"damping/ratio": np.asarray(damping.ratio, dtype=float)}
+        fixed = damping.fixed  # from 1.1 on
+        words = {"kind": "modal", "fixed": dict(fixed) if isinstance(fixed, dict) else list(fixed)}
+        return words, {"damping/ratio": np.asarray(damping.ratio, dtype=float)}
     return None, {}
 
 
@@ -162,8 +162,9 @@ def _damping_of(
         return None
     if entry["kind"] == "Rayleigh":
         return Rayleigh(entry["alpha"], entry["beta"])
-    ratio = arrays["damping/ratio"]
-    return ModalDamping(ratio.item() if ratio.size == 1 else ratio)
+    ratio, fixed = arrays["damping/ratio"], entry.get("fixed", ())
+    fixed = fixed if isinstance(fixed, dict) else tuple(fixed)
+    return ModalDamping(ratio.item() if ratio.size == 1 else ratio, fixed)
 
 
 def _verify(family: BodyFamily, path: Path) -> None:

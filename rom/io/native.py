@@ -4,7 +4,7 @@ The manifest is a JSON text stored as bytes: schema and version, units, names, p
 certificate, and the SHA-256 of every array. A reader needs NumPy and this page only.
 """
 
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +29,10 @@ FIELDS = ("first_moment", "inertia", "S", "Ibar_kl", "S_kl", "K", "D", "omega")
 MARKER_ARRAYS = ("point", "translation", "rotation", "hold")  # arrays of each
 SURFACE_ARRAYS = ("points", "triangles", "shape")
 QUARTIC_ARRAYS = ("cubic", "quartic")
+SIX_KINDS = ("rbe2", "rbe3")  # interfaces of six coordinates
+KINDS = (*SIX_KINDS, "full", "polynomial", "fourier", "snapshots", "characteristic")
+FRAMES = ("mean-axis", "buckens", "as in its SID")  # beside interfaces, pins and 3-2-1
+LIMIT_DIGITS = 1e-5  # to which limits are written
 CAUCHY_ARRAYS = ("points", "gradient", "stiffness", "node", "material", "share")
 
 
@@ -76,8 +80,11 @@ def read_finite(path: Path, kind: Kind, limit: int) -> tuple[dict[str, Any], dic
             where=str(path),
         )
     for name, A in arrays.items():
-        if not np.isfinite(A).all():
-            raise QualityGateError(f"{name} holds a number that is not finite.", where=str(path))
+        with np.errstate(over="ignore"):
+            squares = np.square(A, dtype=float)
+        if not np.isfinite(squares).all():
+            what = "whose square is not" if np.isfinite(A).all() else "that is not"
+            raise QualityGateError(f"{name} holds a number {what} finite.", where=str(path))
     return manifest, arrays
 
 
@@ -168,9 +175,6 @@ def body_of(manifest: dict[str, Any], arrays: dict[str, Array]) -> FlexibleBody:
     quartic = None  # bodies of small deflection have none, and so have older files
     if "quartic/cubic" in arrays:
         quartic = Quartic(arrays["K"], *(arrays[f"quartic/{part}"] for part in QUARTIC_ARRAYS))
-    report = manifest["certificate"]
-    if report is not None:
-        report = Report(report["title"], tuple(Row(**row) for row in report["rows"]))
     return FlexibleBody(
         name=manifest["name"],
         mass=arrays["mass"].item(),
@@ -184,8 +188,26 @@ def body_of(manifest: dict[str, Any], arrays: dict[str, Array]) -> FlexibleBody:
         reference=manifest["reference"],
         units=manifest["units"],
         provenance=manifest["provenance"],
-        certificate=report,
+        certificate=report_of(manifest["certificate"]),
     )
+
+
+def report_of(entry: dict[str, Any] | None) -> Report | None:
+    """The report of a manifest, each row judged anew by its value and its limit.
+
+    Raises:
+        ValueError: for a row that is none, see `stated`.
+    """
+    if entry is None:
+        return None
+    rows = tuple(Row(**row) for row in entry["rows"])
+    for row in rows:
+        words = row.quantity, row.limit, entry["title"]
+        plain = all(isinstance(word, str) for word in words) and isinstance(row.ok, bool)
+        if not plain or type(row.value) not in (int, float) or not row.limited:
+            raise ValueError(f"the row {row.quantity!r:.60}: {row.value!r:.30}, {row.limit!r:.30}")
+    judged = (replace(row, ok=row.ok and row.excess <= LIMIT_DIGITS) for row in rows)
+    return Report(entry["title"], tuple(judged))
 
 
 def _stress(arrays: dict[str, Array]) -> StressRecovery | CauchyRecovery | None:
@@ -213,12 +235,38 @@ def _refuse_missing(manifest: dict[str, Any], arrays: dict[str, Array]) -> None:
 
 def _check_words(manifest: dict[str, Any], r: int) -> None:
     """Types of what the manifest says in words, r labels among them; see `stated`."""
-    wanted = {"name": str, "reference": str, "labels": list, "surface": bool}
+    wanted = {"name": str, "reference": str, "labels": list, "surface": bool, "provenance": dict}
     wrong = [name for name, kind in wanted.items() if not isinstance(manifest[name], kind)]
     labels = manifest["labels"]
     if wrong or len(labels) != r or not all(isinstance(label, str) for label in labels):
         name = (wrong or ["labels"])[0]
         raise ValueError(f"{name} = {manifest[name]!r}")
+    made = manifest["provenance"].get("reduction", {})
+    if type(made.get("static shapes", True)) is not bool:
+        raise ValueError(f"static shapes = {made['static shapes']!r}")
+    names, reference = [m["name"] for m in manifest["markers"]], manifest["reference"]
+    loads = manifest["geometric_stiffness"]
+    for known in (names, loads):
+        if len(set(known)) < len(known) or not all(isinstance(name, str) for name in known):
+            raise ValueError(f"names {known!r}")
+    if reference not in (*FRAMES, *names) and not any(
+        reference.startswith(word) and _are_names(reference.removeprefix(word), n, names)
+        for word, n in (("pins ", 2), ("3-2-1 ", 3))
+    ):
+        raise ConfigError(f"reference = {reference!r} is no frame of a body with {named(names)}.")
+    if wrong := [m["kind"] for m in manifest["markers"] if m["kind"].split(":")[0] not in KINDS]:
+        raise ConfigError(f"the kind of interface {named(wrong)} is none of {', '.join(KINDS)}.")
+
+
+def _are_names(text: str, n: int, names: list[str]) -> bool:
+    """Whether a text is n of the names, which may have blanks themselves."""
+    if n == 1:
+        return text in names
+    return any(
+        _are_names(text.removeprefix(f"{name} "), n - 1, names)
+        for name in names
+        if text.startswith(f"{name} ")
+    )
 
 
 def verify(body: FlexibleBody, path: Path) -> None:
@@ -236,7 +284,8 @@ def verify(body: FlexibleBody, path: Path) -> None:
             )
     for m in body.markers.values():
         parts = (m.point.shape, m.translation.shape, m.rotation.shape, m.hold.shape[1:])
-        if parts != ((3,), (3, r), (3, r), (6 + r,)):
+        six = m.kind not in SIX_KINDS or len(m.hold) == 6
+        if not six or parts != ((3,), (3, r), (3, r), (6 + r,)):
             raise FileFormatError(
                 f"marker {m.name!r} does not fit {r} coordinates.", where=str(path)
             )
@@ -247,7 +296,7 @@ def verify(body: FlexibleBody, path: Path) -> None:
     if body.surface is not None:
         n = body.surface.points.shape[0]
         triangles = body.surface.triangles
-        if body.surface.shape.shape != (3 * n, r) or not (
+        if (body.surface.shape.shape, triangles.shape[1:]) != ((3 * n, r), (3,)) or not (
             triangles.size == 0 or (triangles.min() >= 0 and triangles.max() < n)
         ):
             raise FileFormatError("the surface does not fit the body.", where=str(path))
@@ -255,6 +304,8 @@ def verify(body: FlexibleBody, path: Path) -> None:
     for name, A in (("K", body.K), ("D", body.D), ("inertia", body.inertia)):
         if np.abs(A - A.T).max(initial=0.0) > 1e-10 * np.abs(A).max(initial=1e-300):
             raise QualityGateError(f"{name} is not symmetric.", where=str(path))
+    if body.omega.min(initial=0.0) < 0.0:
+        raise QualityGateError("a frequency of the coordinates is negative.", where=str(path))
     if body.mass <= 0 or (r and np.linalg.eigvalsh(body.M)[0] <= 0):
         raise QualityGateError("the mass is not positive definite.", where=str(path))
 

@@ -320,6 +320,8 @@ class Mechanism:
             11.775
         """
         quartics.refuse_stiffening_twice(body)
+        if getattr(body, "certificate", None) is not None:
+            body.certificate.warn_of_failures(f"the certificate of body {body.name!r}")
         body = body.in_units("SI") if getattr(body, "units", "SI") != "SI" else body
         r = body.K.shape[0]
         elastic = (

@@ -141,6 +141,7 @@ def reduce_parametric(  # noqa: PLR0913  one keyword per choice
         affine, family, connection, common.basis, interfaces, tol,
         first=1 + TRIALS_PER_PARAMETER * len(affine.moving),
     )  # fmt: skip
+    certificate.warn_of_failures(f"the certificate of family {name!r}")
     return replace(
         family, certificate=certificate, provenance=provenance | {"comparison": comparison}
     )

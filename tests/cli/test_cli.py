@@ -457,7 +457,8 @@ def test_reduce_then_check_then_export(geometry, tmp_path, capsys):
     path = tmp_path / "beam.rom.npz"
     found = answer(
         capsys, "reduce", geometry, *STEEL, "-i", "root=rbe2", "-i", "tip=rbe3", "-m", 24,
-        "--reference", "root,tip", "--damping-ratio", 0.01, "--name", "beam", "-o", path,
+        "--reference", "root,tip", "--damping-ratio", 0.01, "--damping-fixed", "root:xyz rx,tip:yz",
+        "--name", "beam", "-o", path,
     )  # fmt: skip
     body = rom.load(path)
     assert found["certificate"]["ok"] and answer(capsys, "check", path)["report"]["ok"]

@@ -40,6 +40,7 @@ reference = ["root", "tip"]
 
 [damping]
 ratio = "1 %"
+fixed = ["root:xyz rx", "tip:yz"]
 
 [output]
 file = "bar.rom.npz"
@@ -76,7 +77,8 @@ def test_the_body_is_that_of_python(folder, bar):
     body = read_component("bar.toml").body()
     same = rom.reduce(
         bar, method=rom.CraigBampton(6), interfaces={"root": "rbe2", "tip": "rbe2"},
-        reference=("root", "tip"), damping=rom.ModalDamping(0.01), name="bar",
+        reference=("root", "tip"), name="bar",
+        damping=rom.ModalDamping(0.01, fixed={"root": "xyz rx", "tip": "yz"}),
     )  # fmt: skip
     assert body.name == "bar" and body.reference == same.reference
     assert_allclose(body.omega, same.omega, rtol=1e-7)
@@ -90,6 +92,15 @@ def test_options_go_before_the_file(folder, capsys):
     found = json.loads(capsys.readouterr().out)
     assert found["name"] == "short" and found["output"] == "bar.rom.npz"
     assert rom.load("bar.rom.npz").n_modes == found["n_modes"] == 3 + 6
+    damped = [*"reduce bar.toml -o held.npz -q --reference tip --no-certificate".split()]
+    damped += ["--damping-ratio", "0.02", "--damping-fixed", "tip"]
+    assert main(damped) == 0
+    held = rom.load("held.npz")
+    assert_allclose(np.diag(held.D), 0.04 * held.omega, rtol=1e-9)
+    assert main(damped[:-2]) == 0  # as in the file, between the pins
+    pinned = rom.load("held.npz").with_reference(("root", "tip"))
+    capsys.readouterr()
+    assert_allclose(np.diag(pinned.D), 0.04 * pinned.omega, rtol=1e-9)
     assert main(["reduce", "bar.toml", "--f-max", "3e3", "--reference", "tip", "--no-certificate",
                  "-o", "other.npz", "--json", "-q"]) == 0  # fmt: skip
     found = json.loads(capsys.readouterr().out)
@@ -215,6 +226,8 @@ def test_missing_and_unreadable_files(tmp_path):
          "craig-bampton has f_max: leave modes out"),
         (SOLID + '[interfaces]\na = "rbe2"\n[damping]\nalpha = 1\nratio = 1\n',
          "part.toml:14: [damping] needs either ratio"),
+        (SOLID + '[interfaces]\na = "rbe2"\n[damping]\nalpha = 1\nfixed = ["a"]\n',
+         "part.toml:14: [damping] needs either ratio"),
         (SOLID.replace("nu = 0.3", "nu = 0.7") + '[interfaces]\na = "rbe2"\n',
          "part.toml:8: nu = 0.7 is outside"),
     ],
@@ -235,7 +248,8 @@ def test_the_sample_describes_the_rod_of_the_demo():
     assert part.material() == rom.Material(E=210e9, nu=0.3, rho=7850.0)
     assert part.kinds == {"pin_a": "rbe2", "pin_b": "rbe2"}
     assert part.values["reduction"]["reference"] == ("pin_a", "pin_b")
-    assert part.damping() == rom.ModalDamping(0.01) and part.name == "rod"
+    between_pins = ("pin_a:xyz rx", "pin_b:yz")
+    assert part.damping() == rom.ModalDamping(0.01, between_pins) and part.name == "rod"
 
 
 @pytest.mark.long

@@ -58,12 +58,18 @@ WRONG = {  # E, rho: what is said
     "mm, kg, ms": (210.0, 7.85e-6, "from_units('mm-kg-ms'"),
     "kPa and t/m^3": (210e6, 7.85, "7.85 kg/m^3"),
     "rho in g/m^3": (210e9, 7.85e6, "7.85e+06 kg/m^3"),
+    "MPa and g/cm^3": (2.1e5, 7.85, "7.85 kg/m^3"),
+    "MPa and g/cm^3, aluminium": (7e4, 2.7, "2.7 kg/m^3"),
+    "E in kPa": (2.1e8, 7850.0, "163.6 m/s"),
+    "E in psi": (3.05e7, 7850.0, "62.33 m/s"),
+    "ksi and lb/in^3": (3.05e4, 0.284, "0.284 kg/m^3"),
 }
 RIGHT = {  # E, rho
     "steel": (210e9, 7850.0), "diamond": (1.2e12, 3510.0), "beryllium": (3.03e11, 1850.0),
     "rubber": (1e6, 1100.0), "gel": (2e5, 1000.0), "soft foam": (3e4, 30.0),
     "honeycomb": (1e9, 50.0), "aerogel": (1e4, 2.0), "tungsten": (4e11, 19300.0),
-    "balsa": (3e9, 120.0), "osmium": (5.6e11, 22590.0), "concrete": (3e10, 2400.0),
+    "balsa": (3e9, 120.0), "osmium": (5.6e11, 22590.0), "lead": (1.6e10, 11340.0),
+    "gold": (7.8e10, 19300.0), "polystyrene foam": (3e6, 15.0), "concrete": (3e10, 2400.0),
 }  # fmt: skip
 
 
@@ -116,6 +122,7 @@ DAMPING = {
     "just beyond one": (1.01, ConfigError, "1.01 per cent write 0.0101"),
     "strong": (0.5, None, "0.5"),
 }
+ONE_PER_CENT = {"whole": 1, "real": 1.0, "of each": [1.0, 1.0]}
 
 
 @pytest.mark.parametrize("many", [False, True], ids=["one", "list"])
@@ -131,8 +138,13 @@ def test_damping_that_no_structure_has_is_refused_or_doubted(case, many):
         assert [words in text for text in said(lambda: rom.ModalDamping(given))] == [True]
 
 
-@pytest.mark.parametrize("ratio", [0.0, 1e-4, 0.02, 0.3, 1.0, [0.01, 1.0]])
-def test_damping_of_structures_and_critical_damping_on_purpose_are_silent(ratio):
+@pytest.mark.parametrize("ratio", ONE_PER_CENT.values(), ids=ONE_PER_CENT)
+def test_a_ratio_of_one_for_every_mode_is_doubted_as_per_cent(ratio):
+    assert ["per cent as 0.02" in text for text in said(lambda: rom.ModalDamping(ratio))] == [True]
+
+
+@pytest.mark.parametrize("ratio", [0.0, 1e-4, 0.02, 0.3, [0.01, 1.0]])
+def test_damping_of_structures_and_residual_shapes_stilled_are_silent(ratio):
     assert said(lambda: rom.ModalDamping(ratio)) == []
 
 
@@ -144,8 +156,8 @@ def test_factors_of_rayleigh_are_finite_and_not_negative(name, value):
 
 
 @pytest.mark.parametrize(("share", "n"), [(0.2, 0), (0.5, 1), (3.0, 1)])
-def test_rayleigh_is_doubted_by_its_lowest_coordinate(part, share, n):
-    beta = 2 * share / part.omega.min()
+def test_rayleigh_is_doubted_by_its_lowest_mode(part, share, n):
+    beta = 2 * share / (2 * np.pi * part.frequencies()[6])
     found = said(lambda: rom.Rayleigh(beta=beta).matrix(part))
     assert len(found) == n and all(f"{share:.4g};" in text for text in found)
 

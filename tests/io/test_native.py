@@ -19,6 +19,7 @@ from rom.errors import (
     RomError,
     UnsafeFileError,
 )
+from rom.io.archive import write_archive
 
 
 @pytest.fixture(scope="module")
@@ -188,3 +189,93 @@ def test_a_full_disk_leaves_the_old_file_and_nothing_else(body, file):
         write_whole(file, fail)
     assert file.read_bytes() == before
     assert [p.name for p in file.parent.iterdir()] == [file.name]
+
+
+WRONG = (None, -1, 1e308, float("nan"), "nonsense", [1], {"x": 1}, [1, -1])
+
+# a value that fails, by the relation to its limit
+FAILED_BY = {"<=": 1e308, ">": -1e308}
+
+
+def contents(file):
+    with np.load(file) as found:
+        arrays = {name: found[name] for name in found.files}
+    manifest = json.loads(arrays.pop("manifest").tobytes())
+    del manifest["sha256"]
+    return manifest, arrays
+
+
+def is_noticed(path, manifest, arrays):
+    """Whether a file with right checksums is refused, or `rom check` fails."""
+    write_archive(path, manifest, arrays, "it")
+    try:
+        return not rom.check(rom.load(path)).ok
+    except RomError:
+        return True
+
+
+@pytest.fixture(scope="module")
+def good(tmp_path_factory):
+    model = block(cells=(4, 1, 1), origin=(0.1, 0.2, 0.3))
+    kinds = {"root": "rbe2", "tip": "rbe3"}
+    body = rom.reduce(model, method=rom.CraigBampton(16), interfaces=kinds, reference="root")
+    assert rom.check(body).ok
+    return contents(rom.save(body, tmp_path_factory.mktemp("good") / "x.npz"))
+
+
+WORDS = ("version", "schema", "units", "name", "reference", "labels", "surface", "provenance",
+         "geometric_stiffness", "markers")  # fmt: skip
+
+
+@pytest.mark.parametrize("field", WORDS)
+def test_words_of_a_file_that_are_nonsense_are_refused(good, field, tmp_path, monkeypatch):
+    monkeypatch.setattr("os.fsync", lambda handle: None)
+    manifest, arrays = good
+    for value in WRONG:
+        if not (field == "name" and value == "nonsense") and not (
+            field == "provenance" and value == {"x": 1}
+        ):
+            assert is_noticed(tmp_path / "x.npz", manifest | {field: value}, arrays), value
+    twice = [manifest["markers"][0]] * 2
+    assert is_noticed(tmp_path / "x.npz", manifest | {"markers": twice}, arrays)
+    rigid = [manifest["markers"][0] | {"kind": "rbe4"}, manifest["markers"][1]]
+    assert is_noticed(tmp_path / "x.npz", manifest | {"markers": rigid}, arrays)
+    assert not is_noticed(tmp_path / "x.npz", manifest, arrays)
+
+
+@pytest.mark.parametrize("part", ["quantity", "value", "limit", "ok"])
+def test_a_row_of_a_certificate_is_judged_by_its_value(good, part, tmp_path, monkeypatch):
+    """Also where it says that it holds."""
+    monkeypatch.setattr("os.fsync", lambda handle: None)
+    manifest, arrays = good
+    report = manifest["certificate"]
+    for k in (0, 1, -1):
+        row = report["rows"][k]
+        beyond = FAILED_BY.get(row["limit"].split()[0], float("nan"))
+        for value in (beyond, float("nan"), "x", True) if part == "value" else WRONG:
+            if part == "quantity" and value == "nonsense":
+                continue
+            rows = report["rows"].copy()
+            rows[k] = row | {part: value}
+            changed = manifest | {"certificate": report | {"rows": rows}}
+            assert is_noticed(tmp_path / "x.npz", changed, arrays), (row, value)
+
+
+def test_arrays_that_contradict_each_other_are_noticed(good, tmp_path, monkeypatch):
+    """Twice the damping or another mass centre is another body; these are none."""
+    monkeypatch.setattr("os.fsync", lambda handle: None)
+    manifest, arrays = good
+    changes = {
+        "omega": (lambda A: -A, lambda A: 2 * A, lambda A: A[::-1]),
+        "K": (lambda A: -A, lambda A: 2 * A, lambda A: A[::-1]),
+        "S_kl": (lambda A: -A, lambda A: 2 * A), "mass": (lambda A: -A, lambda A: 0 * A),
+        "first_moment": (lambda A: 1e300 * A, lambda A: 1e3 * A + 1e3),
+        "inertia": (lambda A: -A, lambda A: A[::-1]),
+        "marker/0/point": (lambda A: 2 * A, lambda A: -A), "marker/0/hold": (lambda A: 2 * A,),
+        "marker/1/rotation": (lambda A: 2 * A,), "marker/1/translation": (lambda A: -A,),
+        "surface/triangles": (lambda A: A.ravel()[:-1], lambda A: A + 10**6),
+    }  # fmt: skip
+    for name, ways in changes.items():
+        for k, way in enumerate(ways):
+            wrong = arrays | {name: way(arrays[name])}
+            assert is_noticed(tmp_path / "x.npz", manifest, wrong), (name, k)

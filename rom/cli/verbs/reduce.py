@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rom.cli.answer import Answer, failures, report_data
-from rom.cli.described import component, described
+from rom.cli.described import component, described, rayleigh
 from rom.cli.matrices import add_matrices, solid_options
 from rom.cli.method import add_method, method
 from rom.cli.model import read_model
@@ -39,7 +39,7 @@ EXAMPLES = """\
   rom reduce meshes/connecting_rod.geo --E 210e9 --nu 0.3 --rho 7850 \\
       -i pin_a=rbe2 -i pin_b=rbe2 -m 20 --reference pin_a -o rod.rom.npz
   rom reduce meshes/beam.geo --E 70e9 --nu 0.33 --rho 2700 -i root=rbe2 -i tip=rbe3 \\
-      --f-max 3e3 --reference root,tip --damping-ratio 0.01 -o beam.rom.npz
+      --f-max 3e3 --reference root,tip --damping-ratio 0.01 --damping-fixed root -o beam.rom.npz
   rom reduce part.step --face bore=radius:0.006 --face foot=12 --E 210e9 --nu 0.3 --rho 7850 \\
       -i bore=rbe2 -i foot=rbe2 --reference foot -o part.rom.npz
   rom reduce rod.op4:KAA --mass rod.op4:MAA --nodes rod.bdf --units mm-t-s \\
@@ -63,8 +63,17 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         help="frame: mean-axis, an interface, or two interfaces A,B (default mean-axis)",
     )
     damping = parser.add_mutually_exclusive_group()
-    damping.add_argument("--damping-ratio", type=number, help="of every mode, e.g. 0.01")
+    damping.add_argument(
+        "--damping-ratio", type=number, help="of every mode of the free body, e.g. 0.01"
+    )
     damping.add_argument("--rayleigh", metavar="ALPHA,BETA", help="D = ALPHA M + BETA K [1/s], [s]")
+    parser.add_argument(
+        "--damping-fixed",
+        metavar="NAME,...",
+        type=names,
+        default=(),
+        help="of every mode with these interfaces held, wholly or as NAME:yz",
+    )
     parser.add_argument(
         "--stiffening",
         action="store_true",
@@ -135,16 +144,10 @@ def _damping(args: argparse.Namespace) -> "Rayleigh | ModalDamping | None":
     from rom.body.damping import ModalDamping, Rayleigh
 
     if args.damping_ratio is not None:
-        return ModalDamping(args.damping_ratio)
-    if args.rayleigh is None:
-        return None
-    try:
-        alpha, beta = map(float, args.rayleigh.split(","))
-    except ValueError:
-        raise ConfigError(
-            f"--rayleigh {args.rayleigh} is not two numbers, as in 0.1,1e-6."
-        ) from None
-    return Rayleigh(alpha, beta)
+        return ModalDamping(args.damping_ratio, args.damping_fixed)
+    if args.damping_fixed:
+        raise ConfigError("--damping-fixed says where --damping-ratio is meant, which is missing.")
+    return None if args.rayleigh is None else Rayleigh(**rayleigh(args.rayleigh))
 
 
 def _data(body: "FlexibleBody", output: Path) -> dict[str, Any]:

@@ -143,7 +143,7 @@ def _reduced(
     swing = planned(rigid, at.origin, args.gravity, args.t_end, axis=at.axis)
     body = reduce(
         full, method=CraigBampton(args.modes), interfaces={hinge: "rbe2"}, reference=hinge,
-        damping=ModalDamping(0.01), name=args.file.stem,
+        damping=ModalDamping(0.01, fixed=(hinge,)), name=args.file.stem,
     )  # fmt: skip
     return body, swing
 

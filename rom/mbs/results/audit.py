@@ -28,7 +28,7 @@ def audit(solution: Solution) -> Report:
     displacement relative to the size of its body: beyond a tenth, linear elasticity in a floating
     frame is no longer to be trusted. A body without geometric stiffness may not turn so fast that
     centrifugal force uses up its stiffness. A body of large deflection may store as much energy as
-    the load cases to which its certificate holds.
+    the load cases to which its certificate holds. No row of a certificate may fail.
 
     Geometric stiffness enters through the kinetic energy and the work of forces, see
     `rom.mbs.kernels.second_order`: the balance of energy holds with it as it does without.
@@ -115,18 +115,28 @@ def _numbers(solution: Solution) -> list[Row]:
     return rows
 
 
+def _certified(name: str, certificate: Report | None) -> list[Row]:
+    """Whether a body stands for its full model, with the worst row by name where it does not."""
+    if certificate is None:
+        return []
+    n = len(certificate.failures)
+    worst = f", worst: {certificate.worst.quantity}" if n else ""
+    return [_row(f"rows of the certificate of {name} that fail{worst}", n, 0)]
+
+
 def _limits(solution: Solution, name: str, body: Any) -> list[Row]:
     """Whether a body stays within what it was made for."""
     bent = deformation(solution, name)
+    certified = _certified(name, getattr(body, "certificate", None))
     if getattr(body, "quartic", None) is not None:
-        rows = [Row(f"largest deformation of {name} / size", bent, "information", True)]
+        rows = [*certified, Row(f"largest deformation of {name} / size", bent, "information", True)]
         most = body.certified_energy
         if np.isfinite(most):
             share = np.nanmax(body.energy().energies(solution.elastic(name))) / max(most, 1e-300)
             what = f"strain energy of {name} / most to which its certificate holds"
             rows.append(_row(what, share, 1 + CERTIFIED_RTOL))
         return rows
-    rows = [_row(f"largest deformation of {name} / size", bent, MAX_DEFORMATION)]
+    rows = [*certified, _row(f"largest deformation of {name} / size", bent, MAX_DEFORMATION)]
     if share := softening(solution, name):
         rows.append(_row(f"speed of {name} / speed that softens it to nothing", share, 1.0))
     return rows

@@ -1,9 +1,8 @@
-"""Craig-Bampton modes corrected by the residual modes left out, and what that says of the error."""
+"""Craig-Bampton modes corrected by the residual modes left out."""
 
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import eigh
 
 from rom.arguments import typed, whole
 from rom.eigen.verbs import Held, Operators, constraint_modes, quadratic
@@ -19,8 +18,10 @@ class EnhancedCraigBampton:
 
     With F_rs the flexibility of the fixed-interface modes left out and T_r = F_rs M Psi_b, the
     substitution of the eigenvalue by H = M_0^-1 K_0 gives T_1 = T_0 + T_r H. Low frequencies of
-    the body as it is coupled gain orders of magnitude; supports added later and statics under
-    interface loads lose, and the certificate says so: for modes of assemblies, not for joints.
+    the free body gain orders of magnitude; supports and statics under interface loads lose, and the
+    certificate says so. In an assembly or joints H had to be that of the whole, which a body made
+    by itself cannot know: its frequencies are off by per cents there, and `rom.Assembly` warns.
+    `MomentMatching` ``((0.0,), 2)`` has T_r as columns of their own, which serve everywhere.
 
     Attributes:
         n_modes: number of fixed-interface modes.
@@ -66,41 +67,3 @@ def projected(ops: Operators, T: Array) -> tuple[Array, Array]:
     """(r, r) stiffness and mass T^T K T and T^T M T, symmetric."""
     K, M = quadratic(ops, ops.apply_K, T), quadratic(ops, ops.apply_M, T)
     return 0.5 * (K + K.T), 0.5 * (M + M.T)
-
-
-def estimated_errors(
-    ops: Operators, basis: Basis, residual: Array, drop: Index, n: int
-) -> tuple[Array, Array]:
-    """Eigenvalues of a Craig-Bampton basis and how far they are above the exact ones.
-
-    eta = 2 t^T A d + d^T A d with A = M - K / lam, t the reduced mode and d = lam T_r v_b its
-    correction: an estimate of lam / lam_exact - 1, asymptotically exact, not a bound.
-
-    Args:
-        ops: operators in interface coordinates.
-        basis: of Craig and Bampton, interface columns first.
-        residual: (n_local, n_b) `residual_shapes` of the same basis.
-        drop: interface columns held.
-        n: number of modes.
-
-    Returns:
-        (k,) eigenvalues [rad^2/s^2] and (k,) relative errors; zero for rigid motions.
-
-    Source:
-        Kim, Lee and Lee, Comput. Struct. 139 (2014) 54; Boo, Kim and Lee (2016).
-    """
-    keep = np.setdiff1d(np.arange(basis.Psi.shape[1]), drop)
-    T = basis.Psi[:, keep]
-    K, M = projected(ops, T)
-    scale = 1 / np.sqrt(np.diag(M))
-    K, M = (scale[:, None] * A * scale for A in (K, M))
-    n = min(n, keep.size)
-    lam, V = eigh(K, M, subset_by_index=(0, n - 1))
-    V = scale[:, None] * V
-    t = T @ V
-    on_boundary = keep < residual.shape[1]
-    d = residual[:, keep[on_boundary]] @ V[on_boundary] * lam
-    At, Ad = (ops.apply_M(X) - ops.apply_K(X) / np.where(lam > 0, lam, np.inf) for X in (t, d))
-    eta = 2 * np.diag(ops.gram(d, At)) + np.diag(ops.gram(d, Ad))
-    rigid = lam < 1e-9 * lam[-1]
-    return lam, np.where(rigid, 0.0, eta)

@@ -38,8 +38,8 @@ def enough_modes(
 ) -> tuple[Array, Array]:
     """The fewest fixed-interface modes with which all frequencies wanted are accurate.
 
-    Accuracy is the a-posteriori estimate of `estimated_errors`; half the relative error of an
-    eigenvalue is that of a frequency.
+    Accuracy is estimated a posteriori, see `rom.eigen.residual_errors`; half the relative error of
+    an eigenvalue is that of a frequency.
 
     Args:
         ops: operators in interface coordinates.

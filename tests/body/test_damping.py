@@ -1,0 +1,96 @@
+"""Damping of the deformation: ratios in the support they are meant in, the same in every frame."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import rom
+from cases.long import few
+from cases.solid import block
+from rom.body.damping import damped
+from rom.errors import ConfigError, InterfaceError
+
+KINDS = {"root": "rbe2", "tip": "rbe3"}
+FRAMES = ["root", "tip", "mean-axis", ("root", "tip")]
+SUPPORTS = [(), ("root",), ("tip",), ("root", "tip"), ("root:xyz rx", "tip:yz")]
+
+
+def random_body(rng):
+    """A block of random size, away from the origin."""
+    size = rng.uniform(0.05, 0.5, 3)
+    model = block(size=size, cells=rng.integers(1, 4, 3), origin=rng.uniform(-1, 1, 3))
+    n = int(rng.integers(0, 7))
+    return rom.reduce(model, method=rom.CraigBampton(n), interfaces=KINDS, certify=False)
+
+
+def random_damping(rng, body):
+    """A law, and the ratios it means for modes omega in the support it names."""
+    fixed = SUPPORTS[rng.integers(len(SUPPORTS))]
+    kind = rng.integers(3)
+    if kind == 0:
+        low = 2 * np.pi * body.frequencies()[6]
+        alpha, beta = rng.uniform(0, 0.02, 2) * (low, 1 / low)
+        return rom.Rayleigh(alpha, beta), (), lambda w: (alpha / w + beta * w) / 2
+    ratio = rng.uniform(1e-4, 0.2, body.n_modes) if kind == 1 else float(rng.uniform(1e-4, 0.2))
+    return rom.ModalDamping(ratio, fixed), fixed, lambda w: np.full(body.n_modes, ratio)[: w.size]
+
+
+def in_motion(body, fixed):
+    """Eigenvalues of the elastic modes of a mechanism that holds the body."""
+    mech = rom.Mechanism(gravity=(0, 0, 0))
+    part = mech.add_flexible("part", body)
+    for name in fixed:
+        ground = mech.ground.marker(tuple(body.marker(name).point))
+        mech.fixed(f"wall {name}", ground, part.marker(name))
+    roots = rom.linearize(mech).eigenvalues
+    n = np.count_nonzero(body.frequencies(fixed=fixed))
+    return by_imaginary_part(roots[roots.imag > 0])[-n:] if n else roots[:0]
+
+
+def by_imaginary_part(roots):
+    return roots[np.argsort(roots.imag)]
+
+
+@pytest.mark.parametrize("seed", few(6, range(40)))
+def test_a_law_of_damping_says_the_same_in_every_frame(seed):
+    rng = np.random.default_rng(seed)
+    body = random_body(rng)
+    law, fixed, meant = random_damping(rng, body)
+    omega = 2 * np.pi * body.frequencies(fixed=fixed)
+    omega = omega[omega > 0]
+    zeta = meant(omega)
+    exact = omega * (-zeta + 1j * np.sqrt(1 - zeta**2))
+    everywhere = {}
+    for frame in FRAMES:
+        one = damped(body.with_reference(frame), law)
+        again = damped(body, law).with_reference(frame)
+        assert_allclose(one.D, again.D, atol=1e-7 * np.abs(again.D).max())
+        for support in SUPPORTS[:4]:
+            roots = in_motion(one, support)
+            assert_allclose(roots, everywhere.setdefault(support, roots), rtol=1e-7)
+            if support == fixed:
+                assert_allclose(roots, by_imaginary_part(exact), rtol=1e-6)
+
+
+def test_the_certificate_has_the_ratio_of_each_mode_in_each_support():
+    """Two per cent of the cantilever are other ratios of the free body, and that is told."""
+    model = block(size=(0.6, 0.03, 0.04), cells=(6, 1, 1))
+    damping = rom.ModalDamping(0.02, fixed=("root",))
+    body = rom.reduce(model, method=rom.CraigBampton(12), interfaces=KINDS, damping=damping)
+    rows = {row.quantity: row.value for row in body.certificate.rows}
+    for support, fixed in {"free": (), "root held": ("root",), "tip held": ("tip",)}.items():
+        roots = in_motion(body, fixed)[:3]
+        found = [rows[f"{support}: damping ratio of mode {k}"] for k in (1, 2, 3)]
+        expected = 0.02 if fixed == ("root",) else -roots.real / np.abs(roots)
+        assert_allclose(found, expected, rtol=1e-6 if fixed == ("root",) else 0.1)
+    assert rows["free: damping ratio of mode 1"] > 0.05
+    plain = rom.reduce(model, method=rom.CraigBampton(12), interfaces=KINDS)
+    assert not any("damping" in row.quantity for row in plain.certificate.rows)
+
+
+def test_an_interface_where_ratios_are_meant_must_exist():
+    body = random_body(np.random.default_rng(0))
+    with pytest.raises(InterfaceError, match="no interface 'wall'"):
+        rom.ModalDamping(0.02, fixed=("wall",)).matrix(body)
+    with pytest.raises(ConfigError, match="directions"):
+        rom.ModalDamping(0.02, fixed={"root": "q"}).matrix(body)
