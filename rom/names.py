@@ -106,7 +106,7 @@ def inside(folder: str | Path, name: str, ending: str = "") -> Path:
     folder = Path(folder)
     path = folder / file_name(name, ending)
     if path.parent.resolve() != folder.resolve():
-        raise ConfigError(f"{path} would lie outside of {folder}.")
+        raise ConfigError(f"{path} must lie within {folder}.")
     return path
 
 

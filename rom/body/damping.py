@@ -82,9 +82,7 @@ class ModalDamping:
         """
         zeta = np.asarray(self.ratio, dtype=float)
         if zeta.ndim > 1 or (zeta.ndim == 1 and zeta.size != body.n_modes):
-            raise ConfigError(
-                f"ModalDamping has {zeta.size} ratios for {body.n_modes} elastic coordinates."
-            )
+            raise ConfigError(f"ModalDamping has {zeta.size} ratios; {body.n_modes} are needed.")
         return np.diag(2 * zeta * body.omega)
 
 

@@ -38,7 +38,7 @@ def typed_number(option: str, text: str) -> float:
     try:
         return number(text)
     except argparse.ArgumentTypeError as error:
-        raise ConfigError(f"{option}: {error}.") from None
+        raise ConfigError(f"{option} must be one of those of its help: {error}.") from None
 
 
 def positive(text: str) -> float:

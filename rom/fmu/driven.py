@@ -144,7 +144,7 @@ class Driven:
         """
         if self.state is None or abs(t - self.state.t) > TIME_RTOL * max(h, 1e-3 * abs(t)):
             where = "not started" if self.state is None else f"at t = {self.state.t:.9g} s"
-            raise ConfigError(f"a step from t = {t:.9g} s is asked for, the mechanism is {where}.")
+            raise ConfigError(f"a step from t = {t:.9g} s is asked for, but the state is {where}.")
         if not (np.isfinite(h) and h > 0.0):
             raise ConfigError(f"the communication step {h} s must be positive.")
         n = max(1, int(np.ceil(h / float(self.parameters[0]) - 1e-6)))

@@ -76,7 +76,7 @@ class Inputs:
                     f"no input {name!r}; the loads, motors and drives are {offered(kinds, name)}."
                 )
             if list(names).count(name) > 1:
-                raise ConfigError(f"the input {name!r} is named twice.")
+                raise ConfigError(f"the input {name!r} is named twice; once is needed.")
         found = {name: kinds[name](mechanism, name) for name in names}
         self.variables = [variable for several in found.values() for variable in several]
         self.values = np.array([v.start for v in self.variables], dtype=float)

@@ -45,7 +45,7 @@ def driven(resources: Path) -> Driven:
     build = getattr(module, BUILD_FUNCTION, None)
     if not callable(build):
         raise ConfigError(
-            f"{script.name} has no function {BUILD_FUNCTION}() that builds the mechanism."
+            f"{script.name} needs a function {BUILD_FUNCTION}() that builds the mechanism."
         )
     mechanism = build()
     if not isinstance(mechanism, Mechanism):
@@ -115,7 +115,7 @@ class Server:
 
     def _recall(self, refs: Index, values: Array) -> Array:
         if int(values[0]) not in self.states:
-            raise ConfigError("this state has been freed, or is of another instance.")
+            raise ConfigError("this state has been freed, or is of another instance; use none.")
         self.model.recall(self.states[int(values[0])])
         return NO_VALUES
 

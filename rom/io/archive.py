@@ -17,6 +17,17 @@ from rom.io.files import MAX_FILE_BYTES, check_readable, write_whole
 from rom.model import Array
 from rom.names import named
 
+MESHED = "rom.fe.model reads geometries and meshes; rom.reduce makes a body of what it gives."
+MATRICES = (
+    "rom.read_model reads stiffness and mass with their nodes; rom.reduce makes a body of it."
+)
+READERS = {  # ending: what reads such a file
+    **dict.fromkeys((".geo", ".msh", ".step", ".stp", ".brep", ".inp", ".bdf", ".py"), MESHED),
+    **dict.fromkeys((".op4", ".mtx", ".mm", ".pch", ".dmig", ".dat", ".sti", ".mas"), MATRICES),
+    **dict.fromkeys((".unv", ".uff"), "rom.io.read_responses and rom.io.read_modes read tests."),
+    ".sid_fem": "rom.read_sid reads its blocks; rom export FILE.SID_FEM BODY.rom.npz makes a body.",
+    ".toml": "rom.read_mechanism reads mechanisms, rom.read_component reads components.",
+}
 MAX_BYTES = 4 * 1024**3  # that the arrays may have in memory before reading is refused
 
 
@@ -52,7 +63,7 @@ def write_archive(
     """
     for name, A in arrays.items():
         if not np.isfinite(A).all():
-            raise QualityGateError(f"{name} of {what} is not finite; nothing was written.")
+            raise QualityGateError(f"{name} of {what} must be finite; nothing was written.")
     manifest = manifest | {"sha256": {name: digest(A) for name, A in arrays.items()}}
     text = np.frombuffer(json.dumps(manifest, sort_keys=True).encode(), dtype=np.uint8)
 
@@ -99,10 +110,11 @@ def read_archive(
         RuntimeError,
         NotImplementedError,
     ) as e:
+        cut = "It may have been cut in a transfer; write or copy it again."
         raise FileFormatError(
             f"this is not a complete {kind.what} ({e}).",
             where=str(path),
-            hint="It may have been cut in a transfer; write or copy it again.",
+            hint=READERS.get(path.suffix.lower(), cut),
         ) from e
     for name, A in arrays.items():
         if manifest["sha256"][name] != digest(A):

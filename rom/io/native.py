@@ -208,7 +208,7 @@ def _refuse_missing(manifest: dict[str, Any], arrays: dict[str, Array]) -> None:
     needed += [f"K_geo/{name}" for name in manifest["geometric_stiffness"]]
     needed += [f"surface/{part}" for part in SURFACE_ARRAYS] if manifest["surface"] else []
     if missing := [name for name in needed if name not in arrays]:
-        raise ConfigError(f"the file lacks the array {named(missing)}.")
+        raise ConfigError(f"the file needs the array {named(missing)}.")
 
 
 def _check_words(manifest: dict[str, Any], r: int) -> None:

@@ -46,7 +46,7 @@ def table(header: Sequence[str], rows: Iterable[Sequence[Any]], caption: str) ->
     lines = []
     for row in rows:
         if len(row) != len(header):
-            raise ConfigError(f"a row of {len(row)} cells under a header of {len(header)}: {row}.")
+            raise ConfigError(f"a row of {len(row)} cells; the header needs {len(header)}: {row}.")
         lines.append("<tr>" + "".join(f"<td>{_cell(value)}</td>" for value in row) + "</tr>")
     head = "".join(f"<th>{html.escape(name)}</th>" for name in header)
     return (

@@ -339,7 +339,7 @@ def family_model(
     outside = {**attached, **candidates}
     own: dict[str, Any] = {} if isinstance(family, FlexibleBody | Assembly) else family.parameters
     if len(outside) < len(attached) + len(candidates) or set(outside) & set(own):
-        raise ParameterError(f"one of {named(outside)} names two parameters.")
+        raise ParameterError(f"one of {named(outside)} must name one parameter.")
     pairs = [
         [_placed(A, parts.columns[name], parts.n) for A in term.full_matrices()]
         for name, term in terms_of(family)

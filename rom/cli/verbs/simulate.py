@@ -141,7 +141,7 @@ def _rescuing(
         path = write(solution, audit(solution))
         if isinstance(error, RomError):
             hints = [
-                error.hint.replace(KEPT_HINT, "").strip(),
+                error.told_hint.replace(KEPT_HINT, "").strip(),
                 f"The motion up to there is in {path}.",
             ]
             if keep.state.exists():
@@ -187,7 +187,7 @@ def _pendulum(args: argparse.Namespace) -> Answer:
     if args.dt > args.t_end:
         raise ConfigError(f"--dt {args.dt:g} is longer than --t-end {args.t_end:g}.")
     if not any(args.axis):
-        raise ConfigError("--axis 0,0,0 has no direction.")
+        raise ConfigError("--axis 0,0,0 has no direction; give another one.")
     folder = claim(args)
     body = load(args.file)
     body.marker(args.hinge)

@@ -246,7 +246,7 @@ def transmission_error(mesh: Mesh, torque: float, theta: npt.ArrayLike) -> Array
         SolverError: if the teeth do not come to rest.
     """
     if not torque > 0:
-        raise ModelError(f"a torque of {torque} N m does not press the working flanks together.")
+        raise ModelError(f"a torque of {torque} N m must press the working flanks together.")
     return np.array([_closed(mesh, torque, t) for t in np.atleast_1d(theta)])
 
 

@@ -106,7 +106,9 @@ def generator_torque(speed: float, pitch: float = 0.0) -> float:
         ConfigError: for a speed or a pitch that is not finite.
     """
     if not (math.isfinite(speed) and math.isfinite(pitch)):
-        raise ConfigError(f"no generator turns at {speed:g} rad/s with a pitch of {pitch:g} rad.")
+        raise ConfigError(
+            f"a generator turns otherwise than at {speed:g} rad/s with a pitch of {pitch:g} rad."
+        )
     return float(torque_at(float(speed), float(pitch)))
 
 

@@ -305,7 +305,7 @@ class BladedWheel:
         tuned = self.response(alike, one, at=seen, **sweep)
         peak, reference = (float(np.linalg.norm(u, axis=-1).max()) for u in (found, tuned))
         if not reference > 0.0:
-            raise ConfigError("the force does not move the tuned wheel at the dofs wanted.")
+            raise ConfigError("the force does not move the tuned wheel there; choose other dofs.")
         return peak / reference
 
 
@@ -326,7 +326,7 @@ def _on(blade: ReducedBlade, force: npt.ArrayLike, j: int) -> Array:
     f = np.asarray(force)
     if f.shape != (blade.Psi.shape[0],):
         raise ConfigError(
-            f"the force on blade {j} has the shape {f.shape}, its model {blade.Psi.shape[0]} dofs."
+            f"the force on blade {j} has the shape {f.shape}, needed are {blade.Psi.shape[0]} dofs."
         )
     off = np.flatnonzero((f != 0.0) & ~blade.Psi.any(axis=1))
     if off.size:

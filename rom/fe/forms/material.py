@@ -39,7 +39,7 @@ def by_region(material: Any, regions: dict[str, int]) -> dict[int, Solid]:
         )
     for name, value in material.items():
         if not isinstance(value, Solid):
-            raise MaterialError(f"the material of region {name!r} is {value!r}.")
+            raise MaterialError(f"region {name!r} needs a rom.Material, got {value!r}.")
     if missing := sorted(set(regions) - set(material)):
         raise TagError(
             f"the region {named(missing)} has no material; materials are given for "

@@ -83,7 +83,7 @@ def _of_degree(mesh: SolidMesh, degree: int) -> SolidMesh:
     if degree not in (1, 2):
         raise ConfigError(f"degree = {degree!r}; decks have elements of degree 1 or 2.")
     if degree == 1 and mesh.cell_type == "tet10":
-        raise MeshError("the mesh has curved edges, which elements of degree 1 do not.")
+        raise MeshError("the mesh has curved edges, which needs elements of degree 2.")
     return _with_edges(mesh) if degree == 2 and mesh.cell_type == "tet4" else mesh
 
 

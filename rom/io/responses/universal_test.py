@@ -166,7 +166,7 @@ def _in_si(path: Path, f: Function, factors: tuple[float, float] | None) -> Func
             kind, own = motion_of_unit(f.units[0])
             if kind != f.numerator:
                 raise ConfigError(
-                    f"the type of its numerator is {f.numerator}, its unit {f.units[0]!r}."
+                    f"its numerator needs the unit of type {f.numerator}, got {f.units[0]!r}."
                 )
             motion = _agreed(own, motion if factors and plain(f.units[0]) not in IN_G else own)
         if plain(f.units[1]) not in NO_UNITS:

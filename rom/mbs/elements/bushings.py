@@ -86,7 +86,7 @@ def bushing(  # noqa: PLR0913  one keyword per property
         ConfigError: for matrices without an energy, or tables that do not ascend.
     """
     if m1.body == m2.body:
-        raise ConfigError(f"bushing {name!r} connects body {m1.body!r} with itself.")
+        raise ConfigError(f"bushing {name!r} connects body {m1.body!r} with itself; give two.")
     world = rotation.matrix(unit_quaternion(axes))
     A1, A2 = (rotation.matrix(self.part(m.body).p) for m in (m1, m2))
     gap = self.design_point(m2) - self.design_point(m1)
@@ -103,9 +103,9 @@ def _matrix66(name: str, value: Any) -> Array:
     A = finite(name, value, (6, 6)) if A is None else A
     size = np.abs(A).max()
     if np.abs(A - A.T).max() > 1e-9 * size:
-        raise ConfigError(f"{name} is not symmetric by {np.abs(A - A.T).max():.3g}: no energy.")
+        raise ConfigError(f"{name} is not symmetric by {np.abs(A - A.T).max():.3g}; it must be.")
     if np.linalg.eigvalsh(A)[0] < -1e-9 * size:
-        raise ConfigError(f"{name} is negative in some direction: it would drive the motion.")
+        raise ConfigError(f"{name} is negative in some direction; it must not be.")
     return 0.5 * (A + A.T)
 
 

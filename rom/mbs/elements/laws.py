@@ -132,7 +132,7 @@ def law(  # noqa: PLR0913  one keyword per property
     given = finite(f"parameters of {name}", parameters, (np.size(parameters),))
     kept = finite(f"memory of {name}", memory, (np.size(memory),))
     if not markers:
-        raise ConfigError(f"law {name!r} acts on no marker.")
+        raise ConfigError(f"law {name!r} acts on no marker; one is needed.")
     sizes = len(markers), kept.size, len(outputs)
     called = entries(name, (function, tangents), (given.size, *sizes), compiled)
     element = Law(function, tangents, markers, given, kept, tuple(outputs), energy, called)

@@ -259,7 +259,7 @@ def moving_start(part: Part) -> tuple[Array, Array]:
 def _check_mass(part: Part) -> None:
     M = mass_at_rest(part)
     if not np.isfinite(M).all() or np.diag(M).min() <= 0.0:
-        raise ModelError("the mass matrix has entries that no body has.", where=part.name)
+        raise ModelError("the mass matrix must be that of a body in its frame.", where=part.name)
     scale = 1 / np.sqrt(np.diag(M))
     spectrum = np.linalg.eigvalsh(M * scale * scale[:, None])
     if spectrum[0] < SINGULAR_MASS * spectrum[-1]:

@@ -442,7 +442,8 @@ class Solution:
         """An answer for one frame of a body of frames, or for all of them, (n_t, k, ...)."""
         whole = self.mechanism.nonlinear[body]
         if marker is not None:
-            return ask(whole.marker(marker).body)
+            given = marker if isinstance(marker, Marker) else whole.marker(marker)
+            return ask(_of_body(given, body, [part.name for part in whole.parts]).body)
         return np.stack([ask(part.name) for part in whole.parts], axis=1)
 
     def _frame(self, body: str) -> Marker | None:
@@ -461,10 +462,21 @@ class Solution:
 
     def _track(self, body: str, place: Any) -> Tracks:
         self._start_of(body)
-        marker = place if isinstance(place, Marker) else self.mechanism.part(body).marker(place)
+        given = place if isinstance(place, Marker) else self.mechanism.part(body).marker(place)
+        marker = _of_body(given, body, [body])
         if marker not in self.packed.markers:
             raise ConfigError(
                 f"the point {marker.place} of body {body!r} was not a marker of the run.",
                 hint="Name it when the body is added.",
             )
         return self._follow(self.packed.row(marker))
+
+
+def _of_body(marker: Marker, body: str, names: list[str]) -> Marker:
+    """The marker, if it is one of a body, whose frames have these names."""
+    if marker.body in names:
+        return marker
+    raise ConfigError(
+        f"the marker {marker.place!r} is of body {marker.body!r}, not of {body!r}.",
+        hint=f"Write ({marker.body!r}, {marker.place!r}), or the name of a marker of {body!r}.",
+    )

@@ -57,7 +57,7 @@ class MomentMatching:
             SolverError: if a frequency is a natural one of the body with its interfaces held.
         """
         if boundary.size == 0:
-            raise ConfigError("the method holds the interfaces of the body, and none is given.")
+            raise ConfigError("the method holds interfaces of the body, and needs one.")
         E, still = unit_motions(ops, boundary), ops.hold(boundary)
         blocks, Psi_b = [], E - still(ops.apply_K(E))
         for f in self.frequencies:

@@ -96,7 +96,7 @@ class CraigBampton:
 
         one_of("search", self.search, (LANCZOS_SEARCH, SUBSTRUCTURE_SEARCH))
         if self.search == SUBSTRUCTURE_SEARCH and (self.f_max is None or self.tol is not None):
-            raise ConfigError('search="substructures" finds modes up to f_max, without tol.')
+            raise ConfigError('search="substructures" needs f_max in place of tol.')
 
     @property
     def chooses(self) -> bool:
