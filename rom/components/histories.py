@@ -143,8 +143,8 @@ def sine(amplitude: float, period: float, *, cycles: float = np.inf, phase: floa
     """
     if not (0 < period < np.inf and cycles > 0 and np.isfinite([amplitude, phase]).all()):
         raise ConfigError(
-            f"a sine needs other than amplitude = {amplitude}, period = {period} s, "
-            f"cycles = {cycles}, phase = {phase}."
+            f"no sine has amplitude = {amplitude}, period = {period} s, "
+            f"cycles = {cycles}, phase = {phase}; period and cycles must be positive."
         )
 
     def values(t: Array) -> Array:
@@ -163,7 +163,7 @@ def rectangle(amplitude: float, duration: float) -> History:
     """
     if not (0 < duration < np.inf and np.isfinite(amplitude)):
         raise ConfigError(
-            f"a pulse needs other than amplitude = {amplitude}, duration = {duration} s."
+            f"no pulse has amplitude = {amplitude}, duration = {duration} s; it must be positive."
         )
     return lambda t: np.where(np.asarray(t) < duration, amplitude, 0.0)
 

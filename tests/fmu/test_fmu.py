@@ -456,7 +456,7 @@ def test_unknown_names_are_refused(inputs, outputs, message):
 
 
 def test_an_fmu_ends_in_fmu_and_needs_a_compiler(tmp_path, monkeypatch):
-    with pytest.raises(ConfigError, match=r"does not end in \.fmu"):
+    with pytest.raises(ConfigError, match=r"must end in \.fmu"):
         rom.write_fmu("m.py", tmp_path / "m.zip", dt=1.0)
     monkeypatch.setenv("PATH", str(tmp_path))
     with pytest.raises(ResourceError, match="needs a C compiler"):

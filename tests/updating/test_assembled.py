@@ -206,7 +206,7 @@ def test_channels_name_the_body_on_which_they_lie(bolted):
             bad.rows(bodies, "sensor")
     with pytest.raises(ConfigError, match="lies on 'arm': this is one body alone"):
         both.rows(bodies["arm"], "sensor")
-    with pytest.raises(ConfigError, match="1 bodies are named for 2 channels"):
+    with pytest.raises(ConfigError, match="1 bodies are named; 2 channels need"):
         Channels(*at, ("arm",))
     offered = candidates(bolted, 12, fixed=HELD)
     assert set(offered.bodies) == {"frame", "arm"} and len(offered.points) == 36

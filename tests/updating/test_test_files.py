@@ -212,7 +212,7 @@ def test_what_a_universal_file_lacks_is_named(tmp_path):
             "the unit 'V' is no motion.*calibrate")  # fmt: skip
     refused(whole.replace(f"{12:10d}{0:5d}{0:5d}{0:5d} {'NONE':<20} {'NONE':<20}",
                           f"{12:10d}{0:5d}{0:5d}{0:5d} {'NONE':<20} {'mm':<20}"),
-            "type of its numerator is 12, its unit 'mm'")  # fmt: skip
+            "numerator needs the unit of type 12, got 'mm'")  # fmt: skip
     refused(whole.replace(f"{2.0:13.5e}{0.5:13.5e}", f"{2.0:13.5e}{0.6:13.5e}", 1), "other lines")
     units = f"{-1:6d}\n{164:6d}\n{1:10d}{'SI':>20}{1:10d}\n" + 3 * f"{1.0:25.17e}" + f"\n{-1:6d}\n"
     labelled = whole.replace(f"{12:10d}{0:5d}{0:5d}{0:5d} {'NONE':<20} {'NONE':<20}",

@@ -57,7 +57,7 @@ def rigid_link(mass: float, length: float, centre: npt.ArrayLike, inertia: float
     x, y = np.asarray(centre, dtype=float)
     if not (mass > 0 and length > 0 and inertia >= 0 and np.isfinite([x, y]).all()):
         raise ModelError(
-            f"a link needs other than mass {mass} kg, length {length} m, inertia {inertia} kg m2."
+            f"no link has mass {mass} kg, length {length} m, inertia {inertia} kg m2; above 0."
         )
     J = inertia + mass * (x * x + y * y)
     M = np.array([[mass, 0, -mass * y], [0, mass, mass * x], [-mass * y, mass * x, J]])

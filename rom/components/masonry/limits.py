@@ -95,8 +95,8 @@ def arch(
     """
     if n < 2 or not 0 < thickness < 2 * radius or not 0 < half_angle < np.pi:
         raise ConfigError(
-            f"an arch needs other than {n} voussoirs, radius {radius}, thickness {thickness}, "
-            f"half angle {half_angle}."
+            f"no arch has {n} voussoirs, radius {radius}, thickness {thickness}, "
+            f"half angle {half_angle}; needed are n >= 2 and half angles below pi."
         )
     rock = rock or Rock()
     joints = np.linspace(-half_angle, half_angle, n + 1)
@@ -152,7 +152,7 @@ def wall(
     rock, (b, h) = rock or Rock(), brick
     if not (length > 0 and courses >= 1 and min(brick) > 0):
         raise ConfigError(
-            f"a wall needs other than {length} m long with {courses} courses of bricks {brick}."
+            f"no wall is {length} m long with {courses} courses of {brick}; all must be positive."
         )
     for opening in openings:
         left, right, low, top = opening

@@ -71,7 +71,7 @@ class Slab:
         """
         if not (mass > 0 and stiffness > 0):
             raise ModelError(
-                f"a slab needs other than the mass {mass} kg and the stiffness {stiffness} N/m."
+                f"no slab has mass {mass} kg, stiffness {stiffness} N/m; both must be positive."
             )
         return cls(np.array([mass**-0.5]), np.array([np.sqrt(stiffness / mass)]), **more)
 

@@ -76,10 +76,10 @@ class Shaft:
         d, hole = (np.asarray(x, dtype=float) for x in (self.diameter, self.bore))
         if z.size < 2 or np.any(np.diff(z) <= 0) or np.any(d <= 0):
             raise ModelError(
-                f"a shaft needs other than nodes at {z.tolist()} m and diameters {d.tolist()} m."
+                f"no shaft has nodes at {z.tolist()} m, diameters {d.tolist()} m > 0."
             )
         if np.any(hole < 0) or np.any(hole >= d):
-            raise ModelError(f"bores must be {hole.tolist()} m below shafts of {d.tolist()} m.")
+            raise ModelError(f"bores of {hole.tolist()} m must fit shafts of {d.tolist()} m.")
         if any(not 0 <= disc.node < z.size for disc in self.discs):
             raise ModelError(f"a disc must sit on one of {z.size} nodes.")
 

@@ -107,7 +107,7 @@ def generator_torque(speed: float, pitch: float = 0.0) -> float:
     """
     if not (math.isfinite(speed) and math.isfinite(pitch)):
         raise ConfigError(
-            f"a generator turns otherwise than at {speed:g} rad/s with a pitch of {pitch:g} rad."
+            f"no generator turns at {speed:g} rad/s with a pitch of {pitch:g} rad; give others."
         )
     return float(torque_at(float(speed), float(pitch)))
 
