@@ -19,14 +19,16 @@ RANKS = ("OMPI_COMM_WORLD_RANK", "PMI_RANK")  # as launchers of parallel program
 IN_ONE_CLAUSE = re.compile(
     r"\b(?:must|needs?|needed|takes|give|only|alone|either|neither|at most|at least|or more"
     r"|expected|instead|known|wanted|belongs? to|goes with|but|than|between|in place of"
-    r"|(?:is|are) (?:not|no|outside))\b"
-    r"|, not |[<>]=? "
+    r"|(?:is|are) (?:not|no|none|outside))\b"
+    r"|, not |[<>]=? ",
+    re.IGNORECASE,
 )
 IN_LAST_CLAUSE = re.compile(
     IN_ONE_CLAUSE.pattern
     + r"|\b(?:has|have|holds?|there|is|are|readable|reduce|condense|take|write|use|ask|leave|name"
     r"|choose|remove|cut|fit|move|save|simulate|up to|from|within|above|below|both|each|limit"
-    r"|numbers)\b|\(\w+, "
+    r"|numbers)\b|\(\w+, ",
+    re.IGNORECASE,
 )
 PACKAGE_FOLDER = str(Path(__file__).parent) + os.sep
 

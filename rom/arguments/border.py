@@ -7,6 +7,7 @@ about attributes and subscripts. The border is the public function, and there th
 import sys
 import types
 from collections.abc import Callable
+from difflib import get_close_matches
 from functools import wraps
 from inspect import Parameter, signature
 from typing import Any, NoReturn, TypeVar
@@ -14,11 +15,11 @@ from typing import Any, NoReturn, TypeVar
 from rom.arguments.kinds import Names, Taken, Unfit, call_of, taken_by
 from rom.arguments.values import shortened
 from rom.errors import ConfigError, UnknownNameError
-from rom.names import offered
 
 Public = TypeVar("Public", bound=Callable[..., Any])
+MAX_NEAR = 6  # names that are offered for an unknown one
 OF_STATES = "Ask rom.snapshot(mechanism, state), which has what motions have."
-ELSEWHERE = {  # class: {name that its objects do not have: what to write instead}
+NAMES_ELSEWHERE = {  # class: {name that its objects do not have: what to write instead}
     "State": dict.fromkeys(("position", "velocity", "reaction", "elastic", "axes"), OF_STATES),
     "FEModel": {"frequencies": "Write rom.modes(model, 12).frequencies."},
     "Mechanism": {"add_body": "Write add_rigid, or add_flexible with a body of rom.reduce."},
@@ -62,7 +63,8 @@ def _unknown(record: Any, name: str) -> NoReturn:
     if name.startswith("_"):
         raise AttributeError(text, name=name, obj=record)
     public = [known for known in dir(record) if not known.startswith("_")]
-    hint = ELSEWHERE.get(kind, {}).get(name) or f"Near are {offered(public, name)}."
+    near = f"Near are {get_close_matches(name, public, MAX_NEAR, cutoff=0.0)}."
+    hint = NAMES_ELSEWHERE.get(kind, {}).get(name, near)
     raise UnknownNameError(f"{text}.", hint=hint)
 
 

@@ -42,7 +42,7 @@ SOURCES = {  # class -> where its objects come from, for people who have somethi
     "State": "from rom.equilibrium or solution.final",
     "Solution": "from rom.simulate",
 }
-EXAMPLES = {"n_modes": 20, "order": 3}  # of arguments, in what a message proposes to write
+EXAMPLE_VALUES = {"n_modes": 20, "order": 3}  # of arguments, in what a message proposes to write
 ARRAY_LIKE = frozenset(typing.get_args(npt.ArrayLike))  # none from NumPy 2.5 on: a kind by itself
 
 
@@ -198,8 +198,8 @@ def _instance(kind: type) -> Taken:
 def call_of(kind: type) -> str:
     """What to write where a class was given in place of one of its objects."""
     names = [p.name for p in signature(kind).parameters.values() if p.default is Parameter.empty]
-    shown = names or list(signature(kind).parameters)[:1]
-    given = ", ".join(f"{name}={EXAMPLES.get(name, '...')}" for name in shown)
+    own = names or list(signature(kind).parameters)[:1]
+    given = ", ".join(f"{name}={EXAMPLE_VALUES.get(name, '...')}" for name in own)
     return f"{kind.__name__} is a class; write {kind.__name__}({given})."
 
 

@@ -163,7 +163,7 @@ def rectangle(amplitude: float, duration: float) -> History:
     """
     if not (0 < duration < np.inf and np.isfinite(amplitude)):
         raise ConfigError(
-            f"no pulse has amplitude = {amplitude}, duration = {duration} s; it must be positive."
+            f"no pulse has amplitude = {amplitude}, duration = {duration} s, only > 0."
         )
     return lambda t: np.where(np.asarray(t) < duration, amplitude, 0.0)
 

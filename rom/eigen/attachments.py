@@ -32,9 +32,7 @@ def point_masses(attachment: Attachment, origin: Array) -> tuple[Array, Array]:
     m, J = attachment.mass, np.asarray(attachment.inertia, dtype=float)
     at = origin if attachment.at is None else np.asarray(attachment.at, dtype=float)
     if not (np.isfinite(m) and m > 0):
-        raise MaterialError(
-            f"attachment on {attachment.interface!r} must have a mass, got {m:g} kg."
-        )
+        raise MaterialError(f"attachment on {attachment.interface!r} needs a mass, got {m:g} kg.")
     second, axes = np.linalg.eigh(0.5 * np.trace(J) * np.eye(3) - J)  # integral of rho x x^T
     if J.shape != (3, 3) or second.min() < -1e-9 * max(second.max(), 1e-300):
         raise MaterialError(

@@ -112,9 +112,7 @@ class Driven:
         count = len(self.variables)
         wrong = [int(ref) for ref in refs if not 0 <= ref < count]
         if wrong:
-            raise ConfigError(
-                f"no variable has the value reference {named(wrong)}; all are < {count}."
-            )
+            raise ConfigError(f"no variable has the reference {named(wrong)}; all are < {count}.")
         outputs = self._outputs() if (np.asarray(refs) >= first).any() else np.zeros(count - first)
         every = np.concatenate([self.parameters, self.inputs.values, outputs])
         return every[np.asarray(refs, dtype=int)]

@@ -17,13 +17,15 @@ from rom.io.files import MAX_FILE_BYTES, check_readable, write_whole
 from rom.model import Array
 from rom.names import named
 
-MESHED = "rom.fe.model reads geometries and meshes; rom.reduce makes a body of what it gives."
-MATRICES = (
+MESH_ADVICE = "rom.fe.model reads geometries and meshes; rom.reduce makes a body of what it gives."
+MATRIX_ADVICE = (
     "rom.read_model reads stiffness and mass with their nodes; rom.reduce makes a body of it."
 )
-READERS = {  # ending: what reads such a file
-    **dict.fromkeys((".geo", ".msh", ".step", ".stp", ".brep", ".inp", ".bdf", ".py"), MESHED),
-    **dict.fromkeys((".op4", ".mtx", ".mm", ".pch", ".dmig", ".dat", ".sti", ".mas"), MATRICES),
+READER_ADVICE = {  # ending: what reads such a file
+    **dict.fromkeys((".geo", ".msh", ".step", ".stp", ".brep", ".inp", ".bdf", ".py"), MESH_ADVICE),
+    **dict.fromkeys(
+        (".op4", ".mtx", ".mm", ".pch", ".dmig", ".dat", ".sti", ".mas"), MATRIX_ADVICE
+    ),
     **dict.fromkeys((".unv", ".uff"), "rom.io.read_responses and rom.io.read_modes read tests."),
     ".sid_fem": "rom.read_sid reads its blocks; rom export FILE.SID_FEM BODY.rom.npz makes a body.",
     ".toml": "rom.read_mechanism reads mechanisms, rom.read_component reads components.",
@@ -114,7 +116,7 @@ def read_archive(
         raise FileFormatError(
             f"this is not a complete {kind.what} ({e}).",
             where=str(path),
-            hint=READERS.get(path.suffix.lower(), cut),
+            hint=READER_ADVICE.get(path.suffix.lower(), cut),
         ) from e
     for name, A in arrays.items():
         if manifest["sha256"][name] != digest(A):
@@ -130,9 +132,7 @@ def stated(path: str | Path) -> Iterator[None]:
     except ConfigError as error:
         raise FileFormatError(error.message, where=str(path), hint=error.hint) from error
     except (KeyError, TypeError, ValueError, AttributeError, IndexError) as error:
-        raise FileFormatError(
-            f"the manifest lacks or misstates {error}.", where=str(path)
-        ) from error
+        raise FileFormatError(f"the manifest misstates {error}.", where=str(path)) from error
 
 
 def digest(A: Array) -> str:
@@ -179,9 +179,7 @@ def _read(archive: zipfile.ZipFile, name: str, path: Path) -> Array:
             else:
                 shape, fortran, dtype = npy.read_array_header_2_0(member)
     except (ValueError, SyntaxError, TypeError, TokenError) as error:
-        raise FileFormatError(
-            f"the array {name!r} has a broken header.", where=str(path)
-        ) from error
+        raise FileFormatError(f"array {name!r} has a broken header.", where=str(path)) from error
     if dtype.str not in ("<f8", "<i8", "|u1"):
         raise UnsafeFileError(
             f"the array {name!r} has the type {dtype.str}; such a file holds 8-byte numbers.",
@@ -196,9 +194,7 @@ def _read(archive: zipfile.ZipFile, name: str, path: Path) -> Array:
         try:
             return npy.read_array(member, allow_pickle=False)
         except ValueError as error:
-            raise FileFormatError(
-                f"the array {name!r} is cut: {error}.", where=str(path)
-            ) from error
+            raise FileFormatError(f"array {name!r} is cut: {error}.", where=str(path)) from error
 
 
 def _read_manifest(archive: zipfile.ZipFile, path: Path, kind: Kind) -> dict[str, Any]:

@@ -237,9 +237,7 @@ def verify(body: FlexibleBody, path: Path) -> None:
     for m in body.markers.values():
         parts = (m.point.shape, m.translation.shape, m.rotation.shape, m.hold.shape[1:])
         if parts != ((3,), (3, r), (3, r), (6 + r,)):
-            raise FileFormatError(
-                f"marker {m.name!r} does not fit {r} coordinates.", where=str(path)
-            )
+            raise FileFormatError(f"marker {m.name!r} must fit {r} coordinates.", where=str(path))
         _verify_covariance(m, r, path)
         _verify_patch(m, path)
     if body.stress is not None and not body.stress.fits(r):
@@ -281,8 +279,7 @@ def _verify_stiffening(body: FlexibleBody, path: Path) -> None:
 def _verify_covariance(m: Marker, r: int, path: Path) -> None:
     if m.covariance is not None and m.covariance.shape != (3, 3, 1 + r):
         raise FileFormatError(
-            f"the covariance of marker {m.name!r} does not fit {r} coordinates.",
-            where=str(path),
+            f"the covariance of marker {m.name!r} does not fit {r} coordinates.", where=str(path)
         )
 
 

@@ -178,9 +178,7 @@ class StretchedModel(AffineModel):
             np.sqrt(np.diag(ops.gram(A, ops.apply_M(A))).max()) for A in (R - Phi @ C, ops.rigid)
         )
         if gap > RIGID_RTOL * size:
-            raise ModelError(
-                f"the basis must have the rigid motions of a stretched body: {gap:.1e}."
-            )
+            raise ModelError(f"the basis must have rigid motions of a stretched body: {gap:.1e}.")
         return C
 
     def _refuse_more(self, E: Array, shares: list[Share]) -> None:

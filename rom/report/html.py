@@ -87,9 +87,7 @@ def image(path: str | Path, words: str) -> str:
         raise ConfigError(f"{path} is no picture of the kinds {', '.join(KINDS)}.")
     data = path.read_bytes()
     if len(data) > MAX_PICTURE_BYTES:
-        raise ConfigError(
-            f"{path} has {len(data)} bytes; pictures up to {MAX_PICTURE_BYTES} are embedded."
-        )
+        raise ConfigError(f"{path} has {len(data)} bytes; pictures have up to {MAX_PICTURE_BYTES}.")
     code = base64.b64encode(data).decode("ascii")
     kind = KINDS[path.suffix.lower()]
     return f"<img alt='{html.escape(words, quote=True)}' src='data:{kind};base64,{code}'>"

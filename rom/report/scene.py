@@ -172,9 +172,7 @@ def start_scene(
 def _meshes(shapes: dict[str, Mesh], mechanism: "Mechanism") -> dict[str, Mesh]:
     """The shapes of bodies, if the mechanism has these and the triangles have their corners."""
     if unknown := set(shapes) - set(mechanism.parts):
-        raise ConfigError(
-            f"shapes: no body {named(sorted(unknown))}; there are {offered(mechanism.parts)}."
-        )
+        raise ConfigError(f"no body {named(sorted(unknown))}; it has {offered(mechanism.parts)}.")
     found = {}
     for name, (points, triangles) in shapes.items():
         X, corner = np.asarray(points, dtype=float), np.asarray(triangles)

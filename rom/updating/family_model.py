@@ -88,9 +88,7 @@ class Parts:
             return "", self.bodies[""].marker(str(place))
         body, interface = place if isinstance(place, tuple) and len(place) == 2 else ("", "")
         if body not in self.bodies:
-            raise ConfigError(
-                f"{place!r} is no place (body, interface); bodies are {named(self.bodies)}."
-            )
+            raise ConfigError(f"{place!r} is no (body, interface); there are {named(self.bodies)}.")
         return body, self.bodies[body].marker(interface)
 
     def motion(self, place: Place) -> Array:

@@ -251,9 +251,7 @@ class Responses:
             raise ConfigError("frequencies must ascend and lie above zero.")
         wanted = (f.size, len(np.asarray(self.sensors.points)), len(np.asarray(self.inputs.points)))
         if self.H.shape != wanted:
-            raise ConfigError(
-                f"H is {self.H.shape}; lines, sensors and inputs are {wanted}.",
-            )
+            raise ConfigError(f"H is {self.H.shape}; lines, sensors and inputs are {wanted}.")
         if len(self.quantities) != wanted[1]:
             raise ConfigError(f"{len(self.quantities)} quantities, not {wanted[1]}.")
         c = finite("coherence", self.coherence, None)

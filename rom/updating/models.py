@@ -179,9 +179,7 @@ class Measurement:
         """
         full = model.full if isinstance(model, AtSensors) else model
         if len(full.sensors) != self.H.shape[1]:
-            raise ConfigError(
-                f"the model has {len(full.sensors)} sensors, but the test {self.H.shape[1]}."
-            )
+            raise ConfigError(f"the model has {len(full.sensors)} sensors, not {self.H.shape[1]}.")
         if not (np.asarray(zeta) > 0).all():
             raise ConfigError(f"zeta = {zeta!r}: damping ratios to start from must be positive.")
 

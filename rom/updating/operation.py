@@ -292,9 +292,7 @@ def stress_rows(
         far = np.linalg.norm(recovery.points - x, axis=1)
         n = int(far.argmin())
         if far[n] > reach:
-            raise ConfigError(
-                f"{what} {k} at {x.tolist()} must be on the body, not {far[n]:.3g} m off."
-            )
+            raise ConfigError(f"{what} {k} at {x.tolist()} must be on it, not {far[n]:.3g} m off.")
         a, b, c = d / np.linalg.norm(d)
         along = np.array([a * a, b * b, c * c, 2 * b * c, 2 * a * c, 2 * a * b])
         static.append(along @ recovery.operator[None, 6 * n : 6 * n + 6])

@@ -156,7 +156,7 @@ MISTAKES = {
     ),
     "misspelt key": (
         SOLID.replace("nu =", "nuu ="),
-        "part.toml: 2 mistakes. line 8: nu is missing in [material]. "
+        "part.toml:8: 2 mistakes. line 8: nu is missing in [material]. "
         "line 10: there is no key 'nuu' in [material].",
     ),
     "misspelt table": (

@@ -252,9 +252,7 @@ def nodal(name: str, values: npt.ArrayLike, body: Sheet) -> Array:
     """
     x = np.ascontiguousarray(finite(name, values, None))
     if x.shape != body.points.shape:
-        raise ConfigError(
-            f"{name} of the shape {x.shape}: {body.points.shape} finite numbers are needed."
-        )
+        raise ConfigError(f"{name} of shape {x.shape}: {body.points.shape} finite ones are needed.")
     return x
 
 

@@ -56,9 +56,7 @@ def rigid_link(mass: float, length: float, centre: npt.ArrayLike, inertia: float
     """
     x, y = np.asarray(centre, dtype=float)
     if not (mass > 0 and length > 0 and inertia >= 0 and np.isfinite([x, y]).all()):
-        raise ModelError(
-            f"no link has mass {mass} kg, length {length} m, inertia {inertia} kg m2; above 0."
-        )
+        raise ModelError(f"no link has mass {mass} kg, length {length} m, {inertia} kg m2 > 0.")
     J = inertia + mass * (x * x + y * y)
     M = np.array([[mass, 0, -mass * y], [0, mass, mass * x], [-mass * y, mass * x, J]])
     return Link(float(length), M, np.zeros((2, 0)), np.zeros((0, 0)))
@@ -407,6 +405,6 @@ class Driven:
         if (self._is_held and N.shape[1] != 2) or np.linalg.cond(mobility) > 1e12:
             raise ModelError(
                 f"with elastic coordinates held the joints leave {N.shape[1]} motions to the two "
-                f"drives {self.drives!r}: a singular position, or not a mechanism of two dof."
+                f"drives {self.drives!r}: it must not be singular, but a mechanism of two dof."
             )
         return np.linalg.inv(mobility)

@@ -360,9 +360,7 @@ def _vector(name: str, x: tuple[float, float]) -> Array:
 
 def _moving(name: str, stone: int, masonry: Masonry) -> int:
     if not 0 <= stone < len(masonry.stones):
-        raise ConfigError(
-            f"{name} acts on stone {stone} but stones are 0 to {len(masonry.stones) - 1}."
-        )
+        raise ConfigError(f"{name} acts on stone {stone}; it needs 0 to {len(masonry.stones) - 1}.")
     if stone in masonry.held:
         raise ConfigError(f"{name} acts on stone {stone}, which must not be held.")
     return stone

@@ -152,7 +152,7 @@ def wall(
     rock, (b, h) = rock or Rock(), brick
     if not (length > 0 and courses >= 1 and min(brick) > 0):
         raise ConfigError(
-            f"no wall is {length} m long with {courses} courses of {brick}; all must be positive."
+            f"no wall is {length} m long with {courses} courses of {brick}, only > 0."
         )
     for opening in openings:
         left, right, low, top = opening

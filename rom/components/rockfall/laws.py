@@ -177,9 +177,7 @@ class CushionForce:
 
     def __init__(self, cushion: Resistance, down: Any, gap: float, reach: float = np.inf):
         if not (0.0 <= gap < np.inf and reach > 0.0):
-            raise ConfigError(
-                f"gap = {gap} m, reach = {reach} m: needed are gap >= 0 and reach > 0."
-            )
+            raise ConfigError(f"gap = {gap} m, reach = {reach} m: needed are gap >= 0, reach > 0.")
         self.cushion, self.down = cushion, unit_vector("down", down)
         self.gap, self.reach = gap, reach
         self.t, self.trial, self.deepest = -np.inf, 0.0, 0.0

@@ -370,9 +370,7 @@ def _newton(
         residual = float(np.abs(R * scale).max() / np.abs(f * scale).max())
         if residual < RESIDUAL_RTOL:
             if not forces.mesh.load.any():
-                raise SolverError(
-                    "contact is lost: no teeth touch at rest.", hint="Raise the load."
-                )
+                raise SolverError("contact is lost: no teeth touch.", hint="Raise the load.")
             return q, forces, residual
         if not forces.mesh.stiffness.any():
             raise SolverError(

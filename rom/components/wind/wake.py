@@ -192,7 +192,5 @@ def over_time(wind: npt.ArrayLike) -> Array:
     if (np.diff(winds[:, 0]) <= 0.0).any():
         raise ConfigError("instants of a wind must ascend.")
     if (winds[:, 1] < 0.0).any():
-        raise ConfigError(
-            f"the wind of {winds[:, 1].min():g} m/s must not come from behind the rotor."
-        )
+        raise ConfigError(f"the wind of {winds[:, 1].min():g} m/s must not come from behind it.")
     return winds

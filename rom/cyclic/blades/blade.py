@@ -27,7 +27,7 @@ from rom.cyclic.sector import all_rows, region
 from rom.eigen.verbs import dofs_of, every_row, own_rows
 from rom.errors import ConfigError, InterfaceError
 from rom.model import Array, FEModel, Index, Interface
-from rom.names import offered
+from rom.names import check_known
 
 if TYPE_CHECKING:
     from rom.cyclic.blades.records import SubstructuredSector
@@ -68,10 +68,9 @@ def reduced_blade(
         and Maurici (2018); see docs/theory/cyclic_symmetry.md.
     """
     if blade is None:
-        if root not in model.interfaces:
-            raise InterfaceError(
-                f"the blade has no interface {root!r}; it has {offered(model.interfaces, root)}."
-            )
+        check_known(
+            root, model.interfaces, f"the blade has no interface {root!r}; it has", InterfaceError
+        )
         K, M = all_rows(model, model.K), all_rows(model, model.M)
         inner, nodes = np.arange(model.n_dofs), model.interfaces[root].nodes
     else:

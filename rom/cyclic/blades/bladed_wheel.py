@@ -260,9 +260,7 @@ class BladedWheel:
             ModelError: if a motion has no stiffness.
         """
         if not 0.0 < damping < 1.0:
-            raise ConfigError(
-                f"damping = {damping!r} must be a positive share of critical damping, below 1."
-            )
+            raise ConfigError(f"damping = {damping!r} must be a positive share of critical.")
         check_damping_ratio(damping, "the wheel")
         N, sweep = self.sector.n_sectors, vector("omega", omega)
         if speed:

@@ -186,9 +186,7 @@ class MistunedWheel:
         """(r,) force on each wave: N times that on its sector, if the harmonics agree."""
         f = np.asarray(force)
         if f.shape != (self.sector.n,):
-            raise ConfigError(
-                f"the force has the shape {f.shape}, needed are {self.sector.n} dofs."
-            )
+            raise ConfigError(f"the force has shape {f.shape}, needed are {self.sector.n} dofs.")
         N = self.sector.n_sectors
         met = (self.harmonics - engine_order) % N == 0
         return np.where(met, N * (self.shapes.conj().T @ f), 0.0)

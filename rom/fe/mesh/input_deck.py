@@ -62,9 +62,7 @@ def input_deck(
     """
     one_of("step", step, STEPS)
     if missing := sorted(set(fixed) - set(mesh.facets)):
-        raise InterfaceError(
-            f"{named(missing)} cannot be held; the interfaces are {offered(mesh.facets)}."
-        )
+        raise InterfaceError(f"{named(missing)} cannot be held; there are {offered(mesh.facets)}.")
     _check_names(mesh.region_names.values())
     _check_names(mesh.facets)
     mesh = _of_degree(mesh, degree)

@@ -58,9 +58,7 @@ def _refuse(mesh: SolidMesh, bad: Mask, text: Callable[[int], str], hint: str) -
 
 def _check_tables(mesh: SolidMesh) -> None:
     if mesh.cell_type not in CELL_TYPES:
-        raise MeshError(
-            f"cells of type {mesh.cell_type!r} are not supported; {sorted(CELL_TYPES)} are."
-        )
+        raise MeshError(f"cells of type {mesh.cell_type!r} are not read; {sorted(CELL_TYPES)} are.")
     kind, m = mesh.kind, mesh.cells.shape[0]
     if not m:
         raise MeshError("there are no volume cells: the geometry is not meshed.")

@@ -27,7 +27,7 @@ from rom.updating.measured import MeasuredModes
 SETS = dict[str, list[list[str]]]
 NODE_SETS = ("15", "2411")
 AXES_SETS = ("18", "2420")  # of local coordinate systems
-CARTESIAN = 0  # type of a coordinate system
+CARTESIAN_TYPE = 0  # type of a coordinate system
 N_SHAPE_RECORDS = 8  # before the values of a dataset 55
 NORMAL, COMPLEX = 2, 3  # analyses of a dataset 55
 UNITS_RTOL = 1e-3  # of factors that say the same
@@ -125,7 +125,7 @@ def _systems(others: SETS) -> tuple[dict[int, str], set[int]]:
                     is_same = reference in same | {number} and _along_axes(A)
                 else:
                     is_same = np.array_equal(A, np.eye(4, 3))
-                if is_same and shape == CARTESIAN:
+                if is_same and shape == CARTESIAN_TYPE:
                     same.add(number)
     return names, same
 
@@ -165,9 +165,7 @@ def _in_si(path: Path, f: Function, factors: tuple[float, float] | None) -> Func
         if plain(f.units[0]) not in NO_UNITS:
             kind, own = motion_of_unit(f.units[0])
             if kind != f.numerator:
-                raise ConfigError(
-                    f"its numerator needs the unit of type {f.numerator}, got {f.units[0]!r}."
-                )
+                raise ConfigError(f"its numerator needs unit {f.numerator}, got {f.units[0]!r}.")
             motion = _agreed(own, motion if factors and plain(f.units[0]) not in IN_G else own)
         if plain(f.units[1]) not in NO_UNITS:
             own = force_of(f.units[1])

@@ -57,11 +57,8 @@ class RawFile:
 
     def refuse(self, message: str, line: int) -> NoReturn:
         """Raise an error that names file and line."""
-        hint = "It may have been cut or edited; write it again."
         message = message if len(message) <= LONGEST_MESSAGE else f"{message[:LONGEST_MESSAGE]}..."
-        raise FileFormatError(
-            f"{message.rstrip('.')}.", where=f"{self.path}, line {line}", hint=hint
-        )
+        raise FileFormatError(f"{message.rstrip('.')}.", where=f"{self.path}, line {line}")
 
 
 class _Lines:

@@ -26,7 +26,7 @@ from rom.mbs.mechanism import Mechanism
 from rom.mbs.parts.bodies import Marker
 from rom.mbs.results.state import State
 from rom.model import Array
-from rom.names import offered
+from rom.names import check_known
 
 # reciprocal condition number of the dynamic stiffness from which a response counts as infinite
 RECIPROCAL_CONDITION_TOL = 1e-13
@@ -120,10 +120,7 @@ def transmissibility(
         SolverError: naming the frequency at which the response is infinite.
     """
     f = _checked(frequencies)
-    if drive not in mechanism.drives:
-        raise ConfigError(
-            f"no drive {drive!r}; the mechanism has {offered(mechanism.drives, drive)}."
-        )
+    check_known(drive, mechanism.drives, f"no drive {drive!r}; the mechanism has")
     large = _Large.of(mechanism, state, "body")
     if large:
         _refuse_moving(large.state)

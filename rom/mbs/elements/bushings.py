@@ -116,9 +116,7 @@ def _curve(name: str, direction: str, table: Any) -> tuple[int, Array]:
     n = np.size(table[0])
     x, force = (finite(f"curve {direction} of {name}", values, (n,)) for values in table)
     if n < 2 or np.diff(x).min() <= 0.0:
-        raise ConfigError(
-            f"curve {direction} of bushing {name!r} needs two or more ascending displacements."
-        )
+        raise ConfigError(f"curve {direction} of bushing {name!r} needs two or more that ascend.")
     cubic = PchipInterpolator(x, force)
     energy = cubic.antiderivative()
     slopes = cubic.derivative()(x[[0, -1]])

@@ -141,9 +141,7 @@ def law(  # noqa: PLR0913  one keyword per property
 
 def _check_function(what: str, function: Any, name: str) -> None:
     if not callable(function) and not hasattr(function, "address"):
-        raise ConfigError(
-            f"{what} = {shortened(function)} of law {name!r} is no function and has no address."
-        )
+        raise ConfigError(f"{what} = {shortened(function)} of law {name!r} is no function.")
 
 
 def user_force(

@@ -25,7 +25,7 @@ from rom.mbs.results.law_record import LawRecord, law_record
 from rom.mbs.results.recomputed import Tracks, follow
 from rom.mbs.results.state import State
 from rom.model import Array
-from rom.names import offered
+from rom.names import check_known, offered
 from rom.notebook import html_table, listed
 from rom.rotation import continuous, matrix, quaternion
 
@@ -330,10 +330,7 @@ class Solution:
         Raises:
             ConfigError: if there is no such drive.
         """
-        if name not in self.mechanism.drives:
-            raise ConfigError(
-                f"no drive {name!r}; there are {offered(self.mechanism.drives, name)}."
-            )
+        check_known(name, self.mechanism.drives, f"no drive {name!r}; there are")
         return -self.lam[:, self.packed.rows_of(name)[0]]
 
     def interface_loads(self, body: str, *, frame: str = "world") -> dict[Any, Array]:
@@ -452,10 +449,7 @@ class Solution:
         return self.mechanism.part(body).own_frame
 
     def _start_of(self, body: str, *, velocity: bool = False) -> int:
-        if body not in self.packed.names:
-            raise ConfigError(
-                f"no body {body!r}; the mechanism has {offered(self.packed.names, body)}."
-            )
+        check_known(body, self.packed.names, f"no body {body!r}; the mechanism has")
         bodies = self.packed.system.bodies
         starts = bodies.v_at if velocity else bodies.q_at
         return int(starts[self.packed.names.index(body)])

@@ -125,7 +125,7 @@ def second_order_balanced_truncation(
     n = K.shape[0]
     if any(A.shape != (n, n) for A in (K, M, D)) or B.shape[0] != n or C.shape[1] != n:
         raise ConfigError(
-            f"shapes must fit: K {K.shape}, M {M.shape}, D {D.shape}, B {B.shape}, C {C.shape}."
+            f"K, M, D, B, C {K.shape} {M.shape} {D.shape} must fit {B.shape} {C.shape}."
         )
     whole("r", r)
     if not 1 <= r <= n:

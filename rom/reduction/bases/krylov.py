@@ -44,9 +44,7 @@ class MomentMatching:
         if not f.size:
             raise ConfigError("MomentMatching needs a frequency.")
         if not (np.isfinite(f) & (f >= 0)).all() or np.unique(f).size < f.size:
-            raise ConfigError(
-                f"frequencies = {self.frequencies!r}: needed are different numbers from 0 Hz."
-            )
+            raise ConfigError(f"frequencies = {self.frequencies!r}: must differ, from 0 Hz on.")
 
     def basis(self, ops: Operators, boundary: Index, labels: tuple[str, ...]) -> Basis:
         """The basis: columns of the interface dofs (n_b,), then modes of the inner part.

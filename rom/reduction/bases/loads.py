@@ -68,7 +68,5 @@ class WithLoads:
         F = np.asarray(self.loads, dtype=float)
         n = ops.expand(np.zeros((ops.n_local, 1))).shape[0]
         if F.ndim != 2 or F.shape[0] != n or not np.isfinite(F).all():
-            raise ConfigError(
-                f"loads have the shape {F.shape}; needed are finite forces of the shape ({n}, k)."
-            )
+            raise ConfigError(f"loads have the shape {F.shape}; needed are finite ({n}, k).")
         return ops.restrict(F)

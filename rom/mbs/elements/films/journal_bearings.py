@@ -181,9 +181,7 @@ def _oil(name: str, oil: Oil | float, inlet: float | None) -> tuple[float, ...]:
         if inlet is None:
             raise ConfigError(f"bearing {name!r} has an oil, but no inlet temperature.")
         if not float(oil.viscosity(number("inlet", inlet))) > 0.0:
-            raise ConfigError(
-                f"inlet = {inlet} of bearing {name!r}must be below what boils its oil."
-            )
+            raise ConfigError(f"inlet = {inlet} of bearing {name!r} must not boil its oil.")
         return (0.0, *oil.law(), oil.density, oil.heat, float(inlet))
     if inlet is not None:
         raise ConfigError(

@@ -264,9 +264,7 @@ def _check_correction(name: str, pair: GearPair | RackPair, correction: Correcti
     """Refuse errors and maps of other wheels."""
     for errors, z in zip(correction.pitch, pair.teeth, strict=True):
         if len(errors) not in (0, abs(z)):
-            raise ConfigError(
-                f"{len(errors)} pitch errors of {name!r} for {z} teeth; one per tooth is needed."
-            )
+            raise ConfigError(f"{len(errors)} pitch errors of {name!r} for {z} teeth; give {z}.")
         if not np.isfinite(np.asarray(errors, dtype=float)).all():
             raise ConfigError(f"pitch errors of {name!r} are not all finite numbers.")
     if isinstance(pair, RackPair) and correction.run_out[1][0] != 0.0:

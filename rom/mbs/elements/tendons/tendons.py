@@ -163,9 +163,7 @@ def _station(whole: Whole, name: str, place: Any, friction: float) -> Station:
         return Station(place, np.eye(3)[:2], 0.0, mu, 0)
     whole.check_markers(name, place.marker)
     if not 0 <= place.turns <= MAX_TURNS:
-        raise ConfigError(
-            f"turns = {place.turns} of a pulley of {name!r}: it has from 0 to {MAX_TURNS}."
-        )
+        raise ConfigError(f"turns = {place.turns} of a pulley of {name!r}: from 0 to {MAX_TURNS}.")
     axis = finite("axis", place.axis, (3,))
     size = np.linalg.norm(axis)
     if size == 0.0:
