@@ -45,6 +45,7 @@ FURTHER_PARTS = ("eigen",)  # packages without a name that `rom` has itself
 WHOLE_MODULES = ("rom.rotation", "rom.units")
 CURES = {  # what to do about it, where no single message can tell
     "ConfigError": "Compare with `rom VERB --help` or the arguments of the function.",
+    "UnknownNameError": "Take one of the names that the message lists.",
     "ParameterError": "Keep to the range the family was reduced for, or reduce it for a wider one.",
     "FileFormatError": "Write the file again; bodies are checked whole by `rom check`.",
     "UnsafeFileError": "Do not open it: a body file holds plain arrays only.",

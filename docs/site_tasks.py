@@ -119,8 +119,8 @@ TASKS: dict[str, tuple[str, str]] = {
     ),
     "Errors": (
         "What is raised on purpose.",
-        """RomError ConfigError FileFormatError UnsafeFileError MeshError TagError MaterialError
-        InterfaceError ParameterError ModelError SolverError ModesMissedError QualityGateError
-        ResourceError ParallelError InterruptedRun RomWarning""",
+        """RomError ConfigError UnknownNameError FileFormatError UnsafeFileError MeshError TagError
+        MaterialError InterfaceError ParameterError ModelError SolverError ModesMissedError
+        QualityGateError ResourceError ParallelError InterruptedRun RomWarning""",
     ),
 }

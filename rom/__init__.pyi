@@ -68,6 +68,7 @@ from rom.errors import RomError as RomError
 from rom.errors import RomWarning as RomWarning
 from rom.errors import SolverError as SolverError
 from rom.errors import TagError as TagError
+from rom.errors import UnknownNameError as UnknownNameError
 from rom.errors import UnsafeFileError as UnsafeFileError
 from rom.fmu.export import write_fmu as write_fmu
 from rom.io.export import export as export

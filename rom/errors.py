@@ -6,6 +6,7 @@ quality gate, 6 resources, 7 interrupted; 1 is kept for our own bugs.
 """
 
 import os
+import re
 import sys
 import warnings
 from collections.abc import Callable, Iterator
@@ -14,6 +15,21 @@ from pathlib import Path
 from typing import Any
 
 RANKS = ("OMPI_COMM_WORLD_RANK", "PMI_RANK")  # as launchers of parallel programs name them
+# words by which a message of one clause, or the last clause of a message, says what is wanted
+IN_ONE_CLAUSE = re.compile(
+    r"\b(?:must|needs?|needed|takes|give|only|alone|either|neither|at most|at least|or more"
+    r"|expected|instead|known|wanted|belongs? to|goes with|but|than|between|in place of"
+    r"|(?:is|are) (?:not|no|none|outside))\b"
+    r"|, not |[<>]=? ",
+    re.IGNORECASE,
+)
+IN_LAST_CLAUSE = re.compile(
+    IN_ONE_CLAUSE.pattern
+    + r"|\b(?:has|have|holds?|there|is|are|readable|reduce|condense|take|write|use|ask|leave|name"
+    r"|choose|remove|cut|fit|move|save|simulate|up to|from|within|above|below|both|each|limit"
+    r"|numbers)\b|\(\w+, ",
+    re.IGNORECASE,
+)
 PACKAGE_FOLDER = str(Path(__file__).parent) + os.sep
 
 
@@ -23,26 +39,42 @@ class RomError(Exception):
     Args:
         message: what happened, with the number and the name of the culprit.
         where: file, body, joint or interface the message is about; printed in front.
-        hint: what to do; printed behind.
+        hint: what to do; printed behind. Without one it is the last clause of the message, where
+            that says what is wanted or what there is.
         solution: the part of a motion, or the last state, that was reached before it failed, as
             the function that failed would have returned it; None where nothing was reached.
     """
 
     exit_code = 1
+    advice = ""  # where neither a hint is given nor the message says what is wanted
     solution: Any = None
 
     def __init__(self, message: str, *, where: str = "", hint: str = "", solution: Any = None):
-        self.message, self.where, self.hint = message, where, hint
+        self.message, self.where, self.hint = message, where, hint or wish(message) or self.advice
         self.solution = solution
         super().__init__(message, where, hint)
 
     def __str__(self) -> str:
         head = f"{self.where}: " if self.where else ""
-        return f"{head}{self.message}" + (f" {self.hint}" if self.hint else "")
+        return f"{head}{self.message} {self.told_hint}".rstrip()
+
+    @property
+    def told_hint(self) -> str:
+        """The hint where it says more than the message."""
+        return "" if self.hint in self.message else self.hint
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Rebuild with keywords, so that an error survives a broadcast between ranks."""
         return _rebuild, (type(self), self.message, self.where, self.hint)
+
+
+def wish(message: str) -> str:
+    """What a message says to be wanted, or to be there: its last clause, all of it, or nothing."""
+    message = message.strip()
+    clause = re.split(r"(?<=[;.]) |(?<=:) (?![\[(.'])", message)[-1]
+    if clause != message and IN_LAST_CLAUSE.search(clause):
+        return clause
+    return message if IN_ONE_CLAUSE.search(message) else ""
 
 
 @contextmanager
@@ -69,6 +101,10 @@ class ConfigError(RomError):
     exit_code = 2
 
 
+class UnknownNameError(ConfigError, AttributeError):
+    """A name that a record does not have."""
+
+
 class ParameterError(ConfigError):
     """A parameter of a family of bodies that is unknown or outside its range."""
 
@@ -77,10 +113,13 @@ class FileFormatError(RomError):
     """A file that is missing, cut, or not what its name promises."""
 
     exit_code = 3
+    advice = "It may have been cut or edited; write it again."
 
 
 class UnsafeFileError(FileFormatError):
     """A file that could run code or exhaust the machine when read."""
+
+    advice = "No program writes such a file of this size; look at where it comes from."
 
 
 class MeshError(RomError):
@@ -117,6 +156,7 @@ class SolverError(RomError):
     """A linear, eigenvalue or time integration solver that did not deliver."""
 
     exit_code = 5
+    advice = "Look for a motion without inertia or stiffness, and for a joint too many."
 
 
 class ModesMissedError(SolverError):
@@ -133,6 +173,7 @@ class ResourceError(RomError):
     """Not enough memory or disk, predicted or met."""
 
     exit_code = 6
+    advice = "Free memory or disk, or choose another place."
 
 
 class ParallelError(RomError):

@@ -25,7 +25,13 @@ class Front(ModuleType):
             return importlib.import_module(f"{self.__name__}.{name}")
         if name in self.MODULES:
             return getattr(importlib.import_module(self.MODULES[name]), name)
-        raise AttributeError(f"module {self.__name__!r} has no attribute {name!r}")
+        text = f"module {self.__name__!r} has no attribute {name!r}"
+        if not name.startswith("_"):
+            from difflib import get_close_matches
+
+            near = get_close_matches(name, dir(self), cutoff=0.5)
+            text += f"; near are {near}" if near else ""
+        raise AttributeError(text)
 
     def __setattr__(self, name: str, value: object) -> None:
         """Keep a function's name when Python has loaded a module of the same name below."""

@@ -113,7 +113,7 @@ def inside(folder: str | Path, name: str, ending: str = "") -> Path:
     folder = Path(folder)
     path = folder / file_name(name, ending)
     if path.parent.resolve() != folder.resolve():
-        raise ConfigError(f"{path} would lie outside of {folder}.")
+        raise ConfigError(f"{path} must lie within {folder}.")
     return path
 
 
@@ -131,3 +131,21 @@ def offered(names: Iterable[object], wanted: object = "") -> str:
         return str(every)
     near = get_close_matches(str(wanted), every, MAX_OFFERED, cutoff=0.0)
     return f"{near} and {len(every) - len(near)} more"
+
+
+def check_known(
+    name: object, known: Iterable[object], text: str, error: type[RomError] = ConfigError
+) -> None:
+    """Refuse a name that is not among those known.
+
+    Args:
+        name: what was asked for.
+        known: the names there are.
+        text: what the error says before it lists them.
+        error: class of what is raised.
+
+    Raises:
+        RomError: of that class.
+    """
+    if name not in known:
+        raise error(f"{text} {offered(known, name)}.")

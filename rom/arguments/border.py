@@ -7,15 +7,23 @@ about attributes and subscripts. The border is the public function, and there th
 import sys
 import types
 from collections.abc import Callable
+from difflib import get_close_matches
 from functools import wraps
 from inspect import Parameter, signature
-from typing import Any, TypeVar
+from typing import Any, NoReturn, TypeVar
 
-from rom.arguments.kinds import Names, Taken, Unfit, taken_by
+from rom.arguments.kinds import Names, Taken, Unfit, call_of, taken_by
 from rom.arguments.values import shortened
-from rom.errors import ConfigError
+from rom.errors import ConfigError, UnknownNameError
 
 Public = TypeVar("Public", bound=Callable[..., Any])
+MAX_NEAR = 6  # names that are offered for an unknown one
+OF_STATES = "Ask rom.snapshot(mechanism, state), which has what motions have."
+NAMES_ELSEWHERE = {  # class: {name that its objects do not have: what to write instead}
+    "State": dict.fromkeys(("position", "velocity", "reaction", "elastic", "axes"), OF_STATES),
+    "FEModel": {"frequencies": "Write rom.modes(model, 12).frequencies."},
+    "Mechanism": {"add_body": "Write add_rigid, or add_flexible with a body of rom.reduce."},
+}
 BY_PLACE = (Parameter.POSITIONAL_ONLY, Parameter.POSITIONAL_OR_KEYWORD)
 
 
@@ -36,6 +44,8 @@ def typed(public: Public) -> Public:
     """
     if not isinstance(public, type):
         return _typed_function(public)  # type: ignore[return-value]
+    if not hasattr(public, "__getattr__"):
+        public.__getattr__ = _unknown  # type: ignore[attr-defined]
     for name, member in list(vars(public).items()):
         if name.startswith("_") and name != "__init__":
             continue
@@ -44,6 +54,18 @@ def typed(public: Public) -> Public:
         elif isinstance(member, classmethod | staticmethod):
             setattr(public, name, type(member)(_typed_function(member.__func__)))
     return public
+
+
+def _unknown(record: Any, name: str) -> NoReturn:
+    """Raise what Python would, with the names that are near."""
+    kind = type(record).__name__
+    text = f"{kind!r} object has no attribute {name!r}"
+    if name.startswith("_"):
+        raise AttributeError(text, name=name, obj=record)
+    public = [known for known in dir(record) if not known.startswith("_")]
+    near = f"Near are {get_close_matches(name, public, MAX_NEAR, cutoff=0.0)}."
+    hint = NAMES_ELSEWHERE.get(kind, {}).get(name, near)
+    raise UnknownNameError(f"{text}.", hint=hint)
 
 
 def _typed_function(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -96,8 +118,11 @@ class _Border:
                 {k: _taken(k, self.takes.get(k, *self.more), x) for k, x in named.items()},
             )
         except Unfit as unfit:
-            text = f"{unfit.place} = {shortened(unfit.value)} must be {unfit.wanted}."
-            raise ConfigError(text, where=self._label(args, named)) from unfit.__cause__
+            where, hint = self._label(args, named), f"must be {unfit.wanted}."
+            text = f"{unfit.place} = {shortened(unfit.value)} {hint}"
+            if isinstance(unfit.value, type):
+                text, hint = f"{unfit.place}: {call_of(unfit.value)}", ""
+            raise ConfigError(text, where=where, hint=hint) from unfit.__cause__
 
     def _places(self, n: int) -> list[tuple[str, Taken | None]]:
         beyond = n - len(self.places)

@@ -9,7 +9,7 @@ import types
 import typing
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from inspect import Parameter
+from inspect import Parameter, signature
 from numbers import Integral, Real
 from pathlib import Path
 from typing import Annotated, Any
@@ -42,6 +42,7 @@ SOURCES = {  # class -> where its objects come from, for people who have somethi
     "State": "from rom.equilibrium or solution.final",
     "Solution": "from rom.simulate",
 }
+EXAMPLE_VALUES = {"n_modes": 20, "order": 3}  # of arguments, in what a message proposes to write
 ARRAY_LIKE = frozenset(typing.get_args(npt.ArrayLike))  # none from NumPy 2.5 on: a kind by itself
 
 
@@ -183,6 +184,8 @@ def _instance(kind: type) -> Taken:
     verbs = _verbs(kind)
 
     def take(value: Any) -> Any:
+        if isinstance(value, type) and not issubclass(kind, type):
+            raise TypeError(value)  # it may have the verbs, but not the values
         fits = (hasattr(type(value), verb) or hasattr(value, verb) for verb in verbs)
         if not (all(fits) if verbs else isinstance(value, kind)):
             raise TypeError(kind)
@@ -190,6 +193,14 @@ def _instance(kind: type) -> Taken:
 
     source = SOURCES.get(kind.__name__)
     return Taken(f"of type {kind.__name__}" + (f" ({source})" if source else ""), take)
+
+
+def call_of(kind: type) -> str:
+    """What to write where a class was given in place of one of its objects."""
+    names = [p.name for p in signature(kind).parameters.values() if p.default is Parameter.empty]
+    own = names or list(signature(kind).parameters)[:1]
+    given = ", ".join(f"{name}={EXAMPLE_VALUES.get(name, '...')}" for name in own)
+    return f"{kind.__name__} is a class; write {kind.__name__}({given})."
 
 
 def _verbs(kind: type) -> set[str]:
@@ -323,6 +334,13 @@ def _function(value: Any) -> Any:
     return value
 
 
+def _text(value: Any) -> str:
+    if not isinstance(value, str):
+        name = getattr(value, "name", None)
+        raise Unfit(value, "a text" + (f": write {name!r}" if isinstance(name, str) else ""))
+    return value
+
+
 def _nothing(value: Any) -> None:
     if value is not None:
         raise TypeError(value)
@@ -330,7 +348,7 @@ def _nothing(value: Any) -> None:
 
 ANY_VALUE = Taken("anything", lambda value: value)
 NONE_ONLY = Taken("None", _nothing)
-ANY_TEXT = Taken("a text", _instance(str).take)
+ANY_TEXT = Taken("a text", _text)
 ANY_FUNCTION = Taken("a function", _function)
 PLAIN_KINDS: dict[Any, Taken | None] = {
     float: Taken("a finite number", _number),

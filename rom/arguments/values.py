@@ -98,7 +98,7 @@ def rows_at(name: str, at: Any, A: npt.NDArray[Any]) -> npt.NDArray[Any]:
     whole_numbers = wanted.ndim == 1 and wanted.size and not (wanted % 1).any()
     if not whole_numbers or wanted.min() < 0 or wanted.max() >= n:
         raise ConfigError(
-            f"{name} = {shortened(at)} must be places from 0 to {n - 1}, or rows of {n} numbers."
+            f"{name} = {shortened(at)} must be places from 0 to {n - 1}, or rows of {n}."
         )
     return A[wanted.astype(np.int64)]
 
@@ -162,7 +162,7 @@ def unit_vector(name: str, value: Any) -> Array:
     x = finite(name, value, (3,))
     length = np.linalg.norm(x)
     if length == 0.0:
-        raise ConfigError(f"{name} has length zero: it gives no direction.")
+        raise ConfigError(f"{name} has length zero; a direction needs a length.")
     return x / length
 
 
@@ -184,9 +184,7 @@ def unit_quaternion(value: Any) -> Array:
     if np.shape(value) == (4,):
         p = finite("orientation", value, (4,))
         if abs(np.linalg.norm(p) - 1.0) > 1e-3:
-            raise ConfigError(
-                f"the quaternion {p.tolist()} has length {np.linalg.norm(p):.6g}, not one."
-            )
+            raise ConfigError(f"quaternion {p.tolist()} has length {np.linalg.norm(p):.6g}, not 1.")
         return p / np.linalg.norm(p)
     A = finite("orientation", value, (3, 3))
     error = np.abs(A @ A.T - np.eye(3)).max()

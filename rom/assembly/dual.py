@@ -30,7 +30,7 @@ from rom.arguments import one_of, typed
 from rom.assembly.certificate import rows_of_parts
 from rom.errors import ConfigError, InterfaceError
 from rom.model import Array, Index, Report, Row
-from rom.names import offered
+from rom.names import check_known, offered
 from rom.reduction.bases.free_interface import free_modes, residual_flexibility
 from rom.reduction.interfaces.records import Connection
 from rom.rows import FREQUENCY_RTOL, N_COMPARED, frequency_rows, row
@@ -130,7 +130,9 @@ class DualAssembly:
                 )
             x, y = (self.bodies[body].origins[name] for body, name in (one, other))
             if np.linalg.norm(x - y) > SAME_PLACE * max(np.linalg.norm(x), np.linalg.norm(y)):
-                raise InterfaceError(f"{one} and {other} lie {np.linalg.norm(x - y):.3g} m apart.")
+                raise InterfaceError(
+                    f"{one} and {other} lie {np.linalg.norm(x - y):.3g} m apart, not at one place."
+                )
 
     @cached_property
     def certificate(self) -> Report:
@@ -272,11 +274,12 @@ class DualAssembly:
         body, interface = place
         if body not in self.bodies:
             raise ConfigError(f"no body {body!r}; the assembly has {offered(self.bodies, body)}.")
-        if interface not in self.bodies[body].parts:
-            raise InterfaceError(
-                f"body {body!r} has no interface {interface!r}; it has "
-                f"{offered(self.bodies[body].parts, interface)}."
-            )
+        check_known(
+            interface,
+            self.bodies[body].parts,
+            f"body {body!r} has no interface {interface!r}; it has",
+            InterfaceError,
+        )
         return self.bodies[body].parts[interface]
 
 

@@ -20,7 +20,7 @@ from rom.body.flexible import FlexibleBody
 from rom.body.nonlinear.ranges import Geometric
 from rom.errors import ConfigError, InterfaceError, ModelError
 from rom.model import Array, FEModel, Mask, Report
-from rom.names import check_name, named, offered
+from rom.names import check_known, check_name, named, offered
 
 SAME_RTOL = 1e-9  # of places and matrices of pieces that repeat each other
 
@@ -200,11 +200,12 @@ class Tree:
                     f"interface {interface!r} belongs to the pieces {named(keys)}; two meet there."
                 )
         free = [interface for interface, keys in owners.items() if len(keys) == 1]
-        if reference not in free:
-            raise InterfaceError(
-                f"reference = {reference!r} is no interface of one piece alone; they have "
-                f"{offered(free, reference)}."
-            )
+        check_known(
+            reference,
+            free,
+            f"reference = {reference!r} is no interface of one piece alone; they have",
+            InterfaceError,
+        )
         found, joints = {owners[reference][0]: reference}, dict[str, tuple[str, str]]()
         waiting = [owners[reference][0]]
         while waiting:
@@ -276,9 +277,7 @@ class Tree:
         owner = {interface: key for key, model in models.items() for interface in model.interfaces
                  if interface not in self.joints}  # fmt: skip
         if unknown := [name for name in geometric.loads if name not in owner]:
-            raise InterfaceError(
-                f"the range of loads names {named(unknown)}; the pieces have {offered(owner)}."
-            )
+            raise InterfaceError(f"loads name {named(unknown)}; the pieces have {offered(owner)}.")
         largest = {name: np.abs(np.asarray(x, dtype=float)) for name, x in geometric.loads.items()}
         loads: dict[str, dict[str, Array]] = {key: {} for key in self.reference}
         for name, load in largest.items():

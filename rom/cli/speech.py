@@ -64,8 +64,8 @@ def print_error(error: RomError, options: OutputOptions, rank: int = 0) -> None:
             )
         )
     print_to_stderr("error: " + (f"rank {rank}: " if rank else "") + cause)
-    if error.hint:
-        print_to_stderr(f"hint: {' '.join(error.hint.split())}")
+    if error.told_hint:
+        print_to_stderr(f"hint: {' '.join(error.told_hint.split())}")
 
 
 @contextmanager

@@ -99,8 +99,8 @@ class Component(Described):
         """
         given = [name for name in ("geometry", "matrices") if name in self.values]
         if len(given) != 1:
-            what = "both a geometry and matrices" if given else "neither a geometry nor matrices"
-            raise ConfigError(f"the component has {what}.", where=str(self.document.path))
+            what = "both geometry and matrices" if given else "neither geometry nor matrices"
+            raise ConfigError(f"the component must not have {what}.", where=str(self.document.path))
         if given == ["matrices"]:
             return self._matrices()
         (file, keywords), geometry = self.mesh, self.values["geometry"]
@@ -181,7 +181,7 @@ class Component(Described):
 
     def _section(self, name: str) -> dict[str, Any]:
         if name not in self.values:
-            raise ConfigError(f"[{name}] is missing.", where=str(self.document.path))
+            raise ConfigError(f"[{name}] is missing; it is needed.", where=str(self.document.path))
         return self.values[name]
 
     def _solid(self, values: dict[str, Any], *path: str) -> Any:

@@ -229,9 +229,7 @@ def _points(entry: Entry) -> None:
 
     x, values = entry.values["x"], entry.values["values"]
     if len(x) != len(values) or len(x) < 2:
-        raise entry.place.error(
-            f"{entry.place.name} has {len(x)} lengths and {len(values)} values."
-        )
+        raise entry.place.error(f"{entry.place.name} has {len(x)} lengths, {len(values)} values.")
     if any(b <= a for a, b in pairwise(x)):
         raise entry.place.at("x").error(f"the lengths of {entry.place.name} do not ascend.")
     one, two = entry.ends

@@ -33,11 +33,11 @@ class Document:
     lines: dict[KeyPath, int] = field(default_factory=dict)
 
     def where(self, path: KeyPath) -> str:
-        """File and line of a key, or of the table around it."""
+        """File and line of a key, of the table around it, or of the last key."""
         for n in range(len(path), 0, -1):
             if path[:n] in self.lines:
                 return f"{self.path}:{self.lines[path[:n]]}"
-        return str(self.path)
+        return f"{self.path}:{max(self.lines.values(), default=1)}"
 
 
 def read_document(path: str | Path) -> Document:
@@ -85,7 +85,8 @@ def _check_depth(text: str, path: Path) -> None:
     for token in TOKEN_PATTERN.finditer(text):
         depth += (token[0] in ("[", "{")) - (token[0] in ("]", "}"))
         if depth > MAX_DEPTH:
-            raise ConfigError(f"has more than {MAX_DEPTH} brackets in each other.", where=str(path))
+            where = f"{path}:{text.count(chr(10), 0, token.start()) + 1}"
+            raise ConfigError(f"has more than {MAX_DEPTH} brackets in each other.", where=where)
 
 
 def _refusal(message: str, found: list[tuple[KeyPath, int]], path: Path) -> ConfigError:
@@ -101,11 +102,11 @@ def _refusal(message: str, found: list[tuple[KeyPath, int]], path: Path) -> Conf
                 )
             seen[key] = line
     place = re.search(r" \(at (?:line (\d+), column \d+|end of document)\)", message)
-    line_number = f":{place[1]}" if place and place[1] else ""
+    line = place[1] if place and place[1] else max((n for _, n in found), default=1)
     reason = re.sub(r" \(at [^)]*\)", "", message).rstrip(".")
     return ConfigError(
         f"this is no TOML: {reason[0].lower()}{reason[1:]}.",
-        where=f"{path}{line_number}",
+        where=f"{path}:{line}",
         hint="Texts stand in quotes, and so do numbers with a unit.",
     )
 

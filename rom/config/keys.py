@@ -424,4 +424,5 @@ def raise_mistakes(place: Place) -> None:
         messages = [f"line {line}: {e.message}" if line else e.message for line, e in by_line]
         hint = by_line[0][1].hint
         more = f" And {count - len(found)} more." if count > len(found) else ""
-        raise ConfigError(f"{count} mistakes. {' '.join(messages)}{more}", where=file, hint=hint)
+        where = by_line[0][1].where
+        raise ConfigError(f"{count} mistakes. {' '.join(messages)}{more}", where=where, hint=hint)

@@ -300,12 +300,12 @@ def read_mechanism(
     document = read_document(path)
     if "bodies" not in document.data and {"geometry", "matrices"} & set(document.data):
         raise ConfigError(
-            "this is a component; a mechanism is needed.", where=str(path),
+            "this is a component; a mechanism is needed.", where=document.where(()),
             hint="A mechanism has [bodies], one of which may have this file.",
         )  # fmt: skip
     if not {"bodies", "rods"} & set(document.data):
         raise ConfigError(
-            "bodies is missing: nothing moves.", where=str(path), hint="Add [bodies.NAME].",
+            "bodies is missing.", where=document.where(()), hint="Add [bodies.NAME].",
         )  # fmt: skip
     for key, value in (changes or {}).items():
         change(document.data, key, value)

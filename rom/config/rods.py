@@ -128,9 +128,7 @@ def _curve(values: dict[str, Any], place: Place) -> tuple["Array", "Array"]:
 
     points = np.array(values["points"])
     if not 2 <= len(points) <= MAX_POINTS:
-        raise place.at("points").error(
-            f"{len(points)} points are no rod; 2 to {MAX_POINTS} are needed."
-        )
+        raise place.at("points").error(f"{len(points)} points are no rod; 2 to {MAX_POINTS} are.")
     chords = np.linalg.norm(np.diff(points, axis=0), axis=1)
     if chords.min() <= 0.0:
         k = int(np.argmin(chords))

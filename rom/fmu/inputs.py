@@ -12,7 +12,7 @@ from rom.mbs.connections.drives import Drive
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.parts.signals import drive_signal
 from rom.model import Array
-from rom.names import offered
+from rom.names import check_known
 
 INFINITE_SPAN = (-np.inf, np.inf)
 DIFFERENCE_SPACING = 1e-4  # of the differences for the speed of a drive at the start [s]
@@ -71,12 +71,9 @@ class Inputs:
             **dict.fromkeys(mechanism.drives, _drive),
         }
         for name in names:
-            if name not in kinds:
-                raise ConfigError(
-                    f"no input {name!r}; the loads, motors and drives are {offered(kinds, name)}."
-                )
+            check_known(name, kinds, f"no input {name!r}; the loads, motors and drives are")
             if list(names).count(name) > 1:
-                raise ConfigError(f"the input {name!r} is named twice.")
+                raise ConfigError(f"the input {name!r} is named twice; once is needed.")
         found = {name: kinds[name](mechanism, name) for name in names}
         self.variables = [variable for several in found.values() for variable in several]
         self.values = np.array([v.start for v in self.variables], dtype=float)

@@ -17,6 +17,19 @@ from rom.io.files import MAX_FILE_BYTES, check_readable, write_whole
 from rom.model import Array
 from rom.names import named
 
+MESH_ADVICE = "rom.fe.model reads geometries and meshes; rom.reduce makes a body of what it gives."
+MATRIX_ADVICE = (
+    "rom.read_model reads stiffness and mass with their nodes; rom.reduce makes a body of it."
+)
+READER_ADVICE = {  # ending: what reads such a file
+    **dict.fromkeys((".geo", ".msh", ".step", ".stp", ".brep", ".inp", ".bdf", ".py"), MESH_ADVICE),
+    **dict.fromkeys(
+        (".op4", ".mtx", ".mm", ".pch", ".dmig", ".dat", ".sti", ".mas"), MATRIX_ADVICE
+    ),
+    **dict.fromkeys((".unv", ".uff"), "rom.io.read_responses and rom.io.read_modes read tests."),
+    ".sid_fem": "rom.read_sid reads its blocks; rom export FILE.SID_FEM BODY.rom.npz makes a body.",
+    ".toml": "rom.read_mechanism reads mechanisms, rom.read_component reads components.",
+}
 MAX_BYTES = 4 * 1024**3  # that the arrays may have in memory before reading is refused
 
 
@@ -52,7 +65,7 @@ def write_archive(
     """
     for name, A in arrays.items():
         if not np.isfinite(A).all():
-            raise QualityGateError(f"{name} of {what} is not finite; nothing was written.")
+            raise QualityGateError(f"{name} of {what} must be finite; nothing was written.")
     manifest = manifest | {"sha256": {name: digest(A) for name, A in arrays.items()}}
     text = np.frombuffer(json.dumps(manifest, sort_keys=True).encode(), dtype=np.uint8)
 
@@ -99,10 +112,11 @@ def read_archive(
         RuntimeError,
         NotImplementedError,
     ) as e:
+        cut = "It may have been cut in a transfer; write or copy it again."
         raise FileFormatError(
             f"this is not a complete {kind.what} ({e}).",
             where=str(path),
-            hint="It may have been cut in a transfer; write or copy it again.",
+            hint=READER_ADVICE.get(path.suffix.lower(), cut),
         ) from e
     for name, A in arrays.items():
         if manifest["sha256"][name] != digest(A):
@@ -118,9 +132,7 @@ def stated(path: str | Path) -> Iterator[None]:
     except ConfigError as error:
         raise FileFormatError(error.message, where=str(path), hint=error.hint) from error
     except (KeyError, TypeError, ValueError, AttributeError, IndexError) as error:
-        raise FileFormatError(
-            f"the manifest lacks or misstates {error}.", where=str(path)
-        ) from error
+        raise FileFormatError(f"the manifest misstates {error}.", where=str(path)) from error
 
 
 def digest(A: Array) -> str:
@@ -167,9 +179,7 @@ def _read(archive: zipfile.ZipFile, name: str, path: Path) -> Array:
             else:
                 shape, fortran, dtype = npy.read_array_header_2_0(member)
     except (ValueError, SyntaxError, TypeError, TokenError) as error:
-        raise FileFormatError(
-            f"the array {name!r} has a broken header.", where=str(path)
-        ) from error
+        raise FileFormatError(f"array {name!r} has a broken header.", where=str(path)) from error
     if dtype.str not in ("<f8", "<i8", "|u1"):
         raise UnsafeFileError(
             f"the array {name!r} has the type {dtype.str}; such a file holds 8-byte numbers.",
@@ -184,9 +194,7 @@ def _read(archive: zipfile.ZipFile, name: str, path: Path) -> Array:
         try:
             return npy.read_array(member, allow_pickle=False)
         except ValueError as error:
-            raise FileFormatError(
-                f"the array {name!r} is cut: {error}.", where=str(path)
-            ) from error
+            raise FileFormatError(f"array {name!r} is cut: {error}.", where=str(path)) from error
 
 
 def _read_manifest(archive: zipfile.ZipFile, path: Path, kind: Kind) -> dict[str, Any]:

@@ -48,8 +48,6 @@ def mpirun(n: int) -> list[str]:
     """
     program = found()
     if not program:
-        raise ResourceError(
-            f"{PROGRAM_NAME} is not installed.", hint="`rom doctor` says what to type."
-        )
+        raise ResourceError(f"{PROGRAM_NAME} is not installed.", hint="See `rom doctor`.")
     crowded = ["--oversubscribe"] if version(program).startswith(OPEN_MPI) else []
     return [program, *crowded, "-n", str(n)]

@@ -167,7 +167,7 @@ MISTAKES = {
     ),
     "misspelt key": (
         SOLID.replace("nu =", "nuu ="),
-        "part.toml: 2 mistakes. line 8: nu is missing in [material]. "
+        "part.toml:8: 2 mistakes. line 8: nu is missing in [material]. "
         "line 10: there is no key 'nuu' in [material].",
     ),
     "misspelt table": (
@@ -216,8 +216,8 @@ def test_missing_and_unreadable_files(tmp_path):
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("", "neither a geometry nor matrices"),
-        (SOLID + '[matrices]\nstiffness="a"\nmass="b"\nnodes="c.csv"\n', "both a geometry and"),
+        ("", "neither geometry nor matrices"),
+        (SOLID + '[matrices]\nstiffness="a"\nmass="b"\nnodes="c.csv"\n', "both geometry and"),
         (SOLID, "the component has no interface"),
         (SOLID + '[interfaces]\na = "rbe4"\n', "part.toml:13: interface 'a' has the kind 'rbe4'"),
         (SOLID + '[interfaces]\na = "rbe2"\n[reduction]\nf_max = 10\nmethod = "rubin"\n',

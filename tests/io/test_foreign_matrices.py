@@ -159,7 +159,7 @@ def test_sets_of_nodes_in_the_deck_are_interfaces(brick, tmp_path):
             read_model(K, M, nodes=tmp_path / "b.inp", interfaces=wanted)
     with pytest.raises(ConfigError, match=r"read from \.inp, not from"):
         read_model(K, M, nodes=HERE / "brick.bdf", interfaces=["root"])
-    with pytest.raises(ConfigError, match=r"looked up in the \.inp file"):
+    with pytest.raises(ConfigError, match=r"need nodes from an \.inp file"):
         read_model(K, M, nodes=read_grids(HERE / "brick.bdf"), interfaces=["root"])
 
 
@@ -240,13 +240,13 @@ def test_what_does_not_fit_is_named(brick, tmp_path):
         given = {"K": K, "M": M, "nodes": nodes, "interfaces": SIDES} | other
         return read_model(given.pop("K"), given.pop("M"), **given)
 
-    with pytest.raises(ConfigError, match=r"holds \['KAA', 'MAA'\]; name one"):
+    with pytest.raises(ConfigError, match=r"2 matrices: KAA .*line 1\), MAA .*line 220\)"):
         read(K=HERE / "dense.op4")
     with pytest.raises(ConfigError, match="has no matrix 'KGG'"):
         read(K=(HERE / "dense.op4", "KGG"))
     with pytest.raises(ConfigError, match="unit system"):
         read(units="inch")
-    with pytest.raises(InterfaceError, match=r"'tip' has no nodes, or unknown ones: \[8\]"):
+    with pytest.raises(InterfaceError, match=r"'tip' needs known nodes, got \[8\]"):
         read(interfaces={"tip": [7, 8]})
     labels, points = read_grids(nodes)
     with pytest.raises(FileFormatError, match="24 rows are neither 3 nor 6 for each of 7"):
@@ -295,8 +295,8 @@ def test_hostile_sizes_take_no_memory(tmp_path):
     )
     with pytest.raises(FileFormatError, match=r"a\.op4, line 2: .*9999\d+ values"):
         read_op4(tmp_path / "a.op4")
-    (tmp_path / "a.op4").write_text(text.replace("       2KAA", "       4KAA", 1))
-    with pytest.raises(FileFormatError, match=r"KAA .*is complex"):
+    (tmp_path / "a.op4").write_text(text.replace("       2KAA", "       5KAA", 1))
+    with pytest.raises(FileFormatError, match=r"KAA .*unknown type 5"):
         read_op4(tmp_path / "a.op4")
 
 

@@ -223,6 +223,41 @@ def test_a_stiffened_file_is_no_body(stiffened, tmp_path):
         sid_body(read_sid(tmp_path / "b.SID_FEM"))
 
 
+def test_blocks_that_no_body_has_are_named_with_their_line(tmp_path):
+    """As a public program writes Oe1 of several modes: products depend on the order of modes."""
+    record = standard_input(random_body(RNG, r=3))
+    Oe = record.blocks["Oe"]
+    Oe1 = Oe.M1.copy()
+    Oe1[0, 1, 4] *= 2.0
+    bad = replace(record, blocks=record.blocks | {"Oe": Taylor(Oe.M0, Oe1)})
+    found = read_sid(write_sid(bad, tmp_path / "b.SID_FEM", dialect="pysid"))
+    lines = (tmp_path / "b.SID_FEM").read_text().splitlines()
+    at = next(k for k, line in enumerate(lines, 1) if line.split() == ["Oe"])
+    assert_allclose(found.blocks["Oe"].M1, Oe1, rtol=1e-11)  # the blocks are read as they are
+    (row,) = check_sid(found).failures
+    assert row.quantity == f"Oe1 symmetric, Oe (line {at})"
+    with pytest.raises(
+        ConfigError, match=rf"Oe \(line {at}\).* columns yz .*not symmetric"
+    ) as caught:
+        sid_body(found)
+    assert "rom.read_sid" in caught.value.hint
+
+
+def test_a_unit_block_may_have_its_entries(tmp_path):
+    """FEMBS writes AP with the structure of a unit matrix and its ones; other numbers are wrong."""
+    path = write_sid(standard_input(random_body(RNG, r=2)), tmp_path / "a.SID_FEM")
+    text, wanted = path.read_text(), read_sid(path)
+    order = re.compile(r"( AP\n.*?)order( *)= 1(.*?)structure( *)= \d\n.*?( +end AP)", re.S)
+    unit = order.sub(r"\1order\2= 0\3structure\4= 4\n m0(1,1) = 1.0\n m0(3,3) = 1D0\n\5", text)
+    assert unit.count("m0(3,3)") == len(wanted.nodes)
+    (tmp_path / "b.SID_FEM").write_text(unit)
+    for node in read_sid(tmp_path / "b.SID_FEM").nodes.values():
+        assert_array_equal(node["AP"].M0, np.eye(3))
+    (tmp_path / "b.SID_FEM").write_text(unit.replace("m0(3,3) = 1D0", "m0(3,3) = 2D0", 1))
+    with pytest.raises(FileFormatError, match=r"line \d+: AP has entries, but the structure 4"):
+        read_sid(tmp_path / "b.SID_FEM")
+
+
 def test_ge_with_stiffening_inside_is_cleaned_with_a_warning(tmp_path):
     """Files of a well-known program have it there; it would create energy."""
     record = standard_input(random_body(RNG, r=2))

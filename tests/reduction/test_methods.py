@@ -202,7 +202,7 @@ def test_modes_by_substructures_are_those_by_lanczos(ops, model):
     [
         ({"f_max": 1e3, "search": "arnoldi"}, "search"),
         ({"n_modes": 3, "search": "substructures"}, "up to f_max"),
-        ({"f_max": 1e3, "tol": 1e-3, "search": "substructures"}, "without tol"),
+        ({"f_max": 1e3, "tol": 1e-3, "search": "substructures"}, "in place of tol"),
     ],
 )
 def test_a_search_that_does_not_suit_is_refused(given, said):

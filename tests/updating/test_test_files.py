@@ -212,7 +212,7 @@ def test_what_a_universal_file_lacks_is_named(tmp_path):
             "the unit 'V' is no motion.*calibrate")  # fmt: skip
     refused(whole.replace(f"{12:10d}{0:5d}{0:5d}{0:5d} {'NONE':<20} {'NONE':<20}",
                           f"{12:10d}{0:5d}{0:5d}{0:5d} {'NONE':<20} {'mm':<20}"),
-            "type of its numerator is 12, its unit 'mm'")  # fmt: skip
+            "numerator needs the unit of type 12, got 'mm'")  # fmt: skip
     refused(whole.replace(f"{2.0:13.5e}{0.5:13.5e}", f"{2.0:13.5e}{0.6:13.5e}", 1), "other lines")
     units = f"{-1:6d}\n{164:6d}\n{1:10d}{'SI':>20}{1:10d}\n" + 3 * f"{1.0:25.17e}" + f"\n{-1:6d}\n"
     labelled = whole.replace(f"{12:10d}{0:5d}{0:5d}{0:5d} {'NONE':<20} {'NONE':<20}",
@@ -227,6 +227,70 @@ def test_what_a_universal_file_lacks_is_named(tmp_path):
         rom.io.read_modes(path)
     with pytest.raises(ConfigError, match="ending is not one of"):
         rom.io.read_responses("x.mat", averages=3)
+
+
+GLOBAL = (0, 0, 0, 1, 0, 0, 0, 0, 1)  # origin, a point on the x axis, one in the xz plane
+SYSTEMS_18 = {  # type, reference and nine numbers of system 3, and whether it is the global one
+    "as testers write it": (0, 0, GLOBAL, True),
+    "points farther out": (0, 3, (0, 0, 0, 2.5, 0, 0, -1, 0, 4), True),
+    "in system 2": (0, 2, GLOBAL, True),
+    "in a shifted system": (0, 4, GLOBAL, False),
+    "cylindrical": (1, 0, GLOBAL, False),
+    "shifted": (0, 0, (0, 0.1, 0, 1, 0.1, 0, 0, 0.1, 1), False),
+    "turned about z": (0, 0, (0, 0, 0, 0, 1, 0, 0, 0, 1), False),
+    "turned about x": (0, 0, (0, 0, 0, 1, 0, 0, 0, 1, 0), False),
+    "upside down": (0, 0, (0, 0, 0, 1, 0, 0, 0, 0, -1), False),
+}
+
+
+def systems(kind, number, shape, reference, values):
+    """A system as dataset 18 or 2420 writes it, name included."""
+    if kind == 18:
+        row = "".join(f"{x:13.5E}" for x in values)
+        rows = [f"{number:10d}{shape:10d}{reference:10d}{8:10d}{1:10d}", "HUB", row[:78], row[78:]]
+    else:
+        rows = [f"{number:10d}{shape:10d}{8:10d}", "HUB"]
+        rows += ["".join(f"{x:25.16E}".replace("E", "D") for x in r) for r in values]
+    return "\n".join(rows) + "\n"
+
+
+@pytest.mark.parametrize("case", SYSTEMS_18)
+def test_a_coordinate_system_that_is_the_global_one_is_no_obstacle(case, tmp_path):
+    """Programs write it beside nodes that they put there; another one is refused by its name."""
+    shape, reference, values, same = SYSTEMS_18[case]
+    others = systems(18, 2, 0, 0, GLOBAL) + systems(18, 4, 0, 0, (1, 0, 0, 2, 0, 0, 1, 0, 1))
+    given = others + systems(18, 3, shape, reference, values)
+    for place in (10, 20):  # where a node is given, and where it is measured
+        text = f"{8:10d}{0:10d}{0:10d}"
+        node = text[:place] + f"{3:10d}" + text[place + 10 :]
+        (tmp_path / "x.unv").write_text(
+            f"{-1:6d}\n{18:6d}\n{given}{-1:6d}\n" + two().replace(text, node)
+        )
+        if same:
+            test = rom.io.read_responses(tmp_path / "x.unv", averages=5, coherence=0.9)
+            (tmp_path / "y.unv").write_text(two())  # without systems
+            plain = rom.io.read_responses(tmp_path / "y.unv", averages=5, coherence=0.9)
+            assert_array_equal(test.sensors.points, plain.sensors.points)
+            continue
+        with pytest.raises(FileFormatError, match="node 8 is in the local coordinate system 3 HUB"):
+            rom.io.read_responses(tmp_path / "x.unv", averages=5, coherence=0.9)
+
+
+@pytest.mark.parametrize(("turned", "same"), [(0.0, True), (1e-3, False)])
+def test_a_coordinate_system_of_dataset_2420(turned, same, tmp_path):
+    A = np.eye(4, 3)
+    A[0, 1] = turned
+    given = f"{1:10d}\nPART\n" + systems(2420, 3, 0, 0, A)
+    node = two().replace(f"{8:10d}{0:10d}{0:10d}", f"{8:10d}{3:10d}{3:10d}")
+    (tmp_path / "x.unv").write_text(f"{-1:6d}\n{2420:6d}\n{given}{-1:6d}\n{node}")
+    if same:
+        rom.io.read_responses(tmp_path / "x.unv", averages=5, coherence=0.9)
+    else:
+        with pytest.raises(FileFormatError, match="node 8 is in the local coordinate system 3 HUB"):
+            rom.io.read_responses(tmp_path / "x.unv", averages=5, coherence=0.9)
+    (tmp_path / "x.unv").write_text(f"{-1:6d}\n{18:6d}\n{3:10d}\n{-1:6d}\n{node}")
+    with pytest.raises(FileFormatError, match="dataset 18 or 2420 is cut"):
+        rom.io.read_responses(tmp_path / "x.unv", averages=5, coherence=0.9)
 
 
 def test_pairs_that_were_not_measured_do_not_count(tmp_path):

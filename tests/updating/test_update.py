@@ -436,7 +436,7 @@ def test_two_tests_with_two_supports_say_more_than_one(family):
     assert any("distance from the test before" in row.quantity for row in torn.verdict.failures)
     kept = rom.update(family, loose, damping=0.02, prior=held, free=("E_outer",))
     assert kept.factors["E_inner"] == pytest.approx(held.factors["E_inner"])
-    with pytest.raises(ConfigError, match="prior for the residual of responses"):
+    with pytest.raises(ConfigError, match="prior of responses only"):
         rom.update(family, loose, prior=held, residual="equations")
     with pytest.raises(ConfigError, match="found none of 'E_inner'"):
         rom.update(family, loose, prior=replace(held, names=("zeta 1",)))
@@ -478,7 +478,7 @@ def test_wrong_data_are_named(family):
     refused("coherence", coherence=1.0)
     refused("no parameter 'E_web'", kind=ParameterError, free=("E_web",))
     refused("prior: there is no parameter 'E'", kind=ParameterError, prior={"E": 1.0})
-    refused("names two", kind=ParameterError, attached={"E_inner": AddedMass("tip", 1, 0.5, 2)})
+    refused("must name one", kind=ParameterError, attached={"E_inner": AddedMass("tip", 1, 0.5, 2)})
     refused("usable numbers for", coherence=0.01)
     with pytest.raises(ConfigError, match="H is"):
         replace(test, H=test.H[:, :3])

@@ -92,7 +92,7 @@ def test_a_film_of_a_plane_body_keeps_its_frame_and_colours(tmp_path):
     sizes = [int(colourful(pixels(path, frame)[:740]).sum()) for frame in range(3)]
     assert sizes[0] > sizes[1] > sizes[2]  # the area is 1 - amount^2
     assert sizes[2] == pytest.approx(0.75 * sizes[0], rel=0.1)
-    with pytest.raises(ConfigError, match="2 times for 3"):
+    with pytest.raises(ConfigError, match="2 times; 3 shapes"):
         view.flow(np.zeros(2), shapes, tmp_path / "s.gif", caption="")
 
 

@@ -152,7 +152,7 @@ def test_wrong_things_are_refused_by_name(thing, words):
 
 def test_a_film_needs_a_time_for_each_picture_and_something_to_draw():
     moving = view.Thing(BOX[0] + np.zeros((3, 1, 1)), BOX[1])
-    with pytest.raises(ConfigError, match="2 times for 3 pictures of 'S'"):
+    with pytest.raises(ConfigError, match="2 times, not 3 as 'S'"):
         view.film([0.0, 1.0], view.Scene("S", {"box": moving}))
     with pytest.raises(ConfigError, match="nothing to draw in 'S'"):
         view.film([0.0], view.Scene("S", {}))
@@ -187,7 +187,7 @@ def test_plates_are_their_outlines_made_thick_and_move_with_them():
     np.testing.assert_allclose(step[second], [(0.0, 0.3, 0.0)] * second.sum(), atol=1e-15)
     np.testing.assert_array_equal(step[~second], 0.0)
     assert np.ptp(thing.points[..., 2]) == pytest.approx(0.5)
-    with pytest.raises(ConfigError, match=r"2 plates have \(1,\) values"):
+    with pytest.raises(ConfigError, match=r"2 plates need one value each, got \(1,\)"):
         view.plates(frames, 0.5, values=[1.0])
     with pytest.raises(ConfigError, match="there is no plate"):
         view.plates([[square], [square, other]], 0.5)

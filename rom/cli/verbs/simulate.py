@@ -143,7 +143,7 @@ def _rescuing(
         except ResourceError as full:
             place = f"could not be written: {full.message.rstrip('.')}"
         if isinstance(error, RomError):
-            own = error.hint.replace(KEPT_HINT, "").strip()
+            own = error.told_hint.replace(KEPT_HINT, "").strip()
             hints = (own, f"The motion up to there {place}.", _to_go_on(args, keep))
             error.hint = " ".join(hint for hint in hints if hint)
         raise
@@ -205,7 +205,7 @@ def _pendulum(args: argparse.Namespace) -> Answer:
     if args.dt > args.t_end:
         raise ConfigError(f"--dt {args.dt:g} is longer than --t-end {args.t_end:g}.")
     if not any(args.axis):
-        raise ConfigError("--axis 0,0,0 has no direction.")
+        raise ConfigError("--axis 0,0,0 has no direction; give another one.")
     folder = claim(args)
     body = load(args.file)
     body.marker(args.hinge)

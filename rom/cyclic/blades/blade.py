@@ -27,7 +27,7 @@ from rom.cyclic.sector import all_rows, region
 from rom.eigen.verbs import dofs_of, every_row, own_rows
 from rom.errors import ConfigError, InterfaceError
 from rom.model import Array, FEModel, Index, Interface
-from rom.names import offered
+from rom.names import check_known
 
 if TYPE_CHECKING:
     from rom.cyclic.blades.records import SubstructuredSector
@@ -68,10 +68,9 @@ def reduced_blade(
         and Maurici (2018); see docs/theory/cyclic_symmetry.md.
     """
     if blade is None:
-        if root not in model.interfaces:
-            raise InterfaceError(
-                f"the blade has no interface {root!r}; it has {offered(model.interfaces, root)}."
-            )
+        check_known(
+            root, model.interfaces, f"the blade has no interface {root!r}; it has", InterfaceError
+        )
         K, M = all_rows(model, model.K), all_rows(model, model.M)
         inner, nodes = np.arange(model.n_dofs), model.interfaces[root].nodes
     else:
@@ -149,7 +148,7 @@ def cut(K: csr_matrix, K_blade: csr_matrix, name: str) -> tuple[Index, Index]:
     shared = (mine > 0.0) & (total - mine > SHARED_STIFFNESS_RTOL * total)
     nodes = np.flatnonzero(shared.reshape(-1, 3).any(axis=1))
     if nodes.size == 0:
-        raise InterfaceError(f"region {name!r} shares no node with the rest of the sector.")
+        raise InterfaceError(f"region {name!r} must share nodes with the rest of the sector.")
     return np.setdiff1d(np.flatnonzero(mine > 0.0), dofs_of(nodes)), nodes
 
 

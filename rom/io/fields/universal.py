@@ -144,7 +144,7 @@ def assemble(
     x = np.empty(0)
     for wanted in ((r, e) for r in responses for e in references):
         if wanted not in known:
-            raise ConfigError(f"no frequency response of {wanted[0]} to a force at {wanted[1]}.")
+            raise ConfigError(f"no frequency response of {wanted[0]} to {wanted[1]}; it is needed.")
         f = known[wanted]
         x = x if columns else f.x
         if f.x.shape != x.shape or not np.allclose(f.x, x, rtol=1e-5, atol=0):

@@ -12,7 +12,7 @@ from rom.io.files import check_last_line, check_readable, write_whole
 from rom.io.matrices.calculix import MATRIX_ENDINGS, read_stored_matrix
 from rom.io.matrices.dmig import Dofs, read_dmig, whole
 from rom.io.matrices.market import BANNER_TEXT, read_market
-from rom.io.matrices.op4 import read_op4
+from rom.io.matrices.op4 import Matrices, read_op4
 from rom.io.matrices.user_element import read_user_element
 from rom.names import offered
 
@@ -51,19 +51,18 @@ def read_matrix(source: Any) -> NamedMatrix:
     """
     path, name = source if isinstance(source, tuple) else (source, None)
     path = check_readable(path)
-    found = _all(path)
-    if name is None and len(found) > 1:
-        raise ConfigError(
-            f"{path} holds {sorted(found)}; name one.",
-            hint="Give (file, name), on the command line FILE:NAME.",
+    found, dofs = _all(path)
+    only = next(iter(found)) if len(found) == 1 else ""
+    key = only if name is None else name.upper()
+    A = found[key]
+    if A.shape[0] != A.shape[1] or np.iscomplexobj(A):
+        what = "complex" if np.iscomplexobj(A) else f"{A.shape[0]} x {A.shape[1]}"
+        raise FileFormatError(
+            f"the matrix {key} is {what}.",
+            where=str(path),
+            hint=f"Stiffness and mass are real and square; the file holds {offered(found, key)}.",
         )
-    key = next(iter(found)) if name is None else name.upper()
-    if key not in found:
-        raise ConfigError(f"{path} has no matrix {name!r}; it holds {offered(found, name)}.")
-    A, dofs = found[key]
-    if A.shape[0] != A.shape[1]:
-        raise FileFormatError(f"the matrix {key} is {A.shape[0]} x {A.shape[1]}.", where=str(path))
-    return NamedMatrix(f"{path} {key}".strip(), csr_matrix(A), dofs)
+    return NamedMatrix(f"{path} {key}".strip(), csr_matrix(A), dofs.get(key))
 
 
 def write_abaqus_matrix(A: Any, dofs: Dofs, path: str | Path) -> Path:
@@ -89,10 +88,17 @@ def write_abaqus_matrix(A: Any, dofs: Dofs, path: str | Path) -> Path:
     return Path(path)
 
 
-def _all(path: Path) -> dict[str, tuple[Any, Dofs | None]]:
+def _all(path: Path) -> tuple[Matrices, dict[str, Dofs]]:
+    """Matrices by name, and of those whose rows have labels these."""
+    if path.suffix.lower() == ".op4":
+        return read_op4(path), {}
+    pairs = _pairs(path)
+    dofs = {name: dofs for name, (_, dofs) in pairs.items() if dofs is not None}
+    return Matrices(str(path), {name: A for name, (A, _) in pairs.items()}), dofs
+
+
+def _pairs(path: Path) -> dict[str, tuple[Any, Dofs | None]]:
     ending = path.suffix.lower()
-    if ending == ".op4":
-        return {name: (A, None) for name, A in read_op4(path).items()}
     if ending in (".bdf", ".dat", ".pch", ".dmig"):
         return dict(read_dmig(path))
     if ending in MATRIX_ENDINGS:

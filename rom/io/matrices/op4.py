@@ -1,7 +1,8 @@
 """Matrices in Nastran's OUTPUT4 files: text and binary, dense and sparse.
 
 A matrix is a header (columns, rows, form, type, name) and strings of consecutive values of one
-column. A negative number of rows announces strings with long headers.
+column. A negative number of rows announces strings with long headers. Lengths count words, of four
+bytes or, in binary files whose headers have 48 bytes, of eight.
 
 Source:
     MSC Nastran 2012 DMAP Programmer's Guide, OUTPUT4, tables of formats.
@@ -9,21 +10,29 @@ Source:
 
 import re
 import struct
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NoReturn
 
 import numpy as np
+import numpy.typing as npt
 from scipy.sparse import csc_matrix, csr_matrix
 
-from rom.errors import FileFormatError, UnsafeFileError
+from rom.errors import ConfigError, FileFormatError, UnsafeFileError
 from rom.io.files import check_readable, write_whole
 from rom.model import Array
+from rom.names import MAX_NAMED
 
 MOST_ROWS = 10_000_000
 SYMMETRIC_FORM, RECTANGULAR_FORM = 6, 2
 DIGITS = re.compile(rb"[ \d-]{24}")
+FORMAT_PATTERN = re.compile(r"\(?(?:1P,?)?(\d+)[EDG](\d+)\.\d+(?:E\d)?\)?")
+BARE_EXPONENT = re.compile(r"(?<=\d)(?=[+-])")  # where Fortran leaves no place for the letter
+WIDE_MARK = "|I16"  # ends headers whose first two numbers have 16 columns
+COMPLEX_KINDS, DOUBLE_KINDS = (3, 4), (2, 4)
+Values = npt.NDArray[Any]
 
 
 @dataclass(slots=True)
@@ -31,13 +40,17 @@ class _Strings:
     """A matrix as it is read: values of consecutive rows of one column."""
 
     name: str
+    place: str
     rows: int
     columns: int
     long: bool
-    words: int  # of four bytes per value
-    found: list[tuple[int, int, Array]] = field(default_factory=list)
+    kind: int
+    found: list[tuple[int, int, Values]] = field(default_factory=list)
 
-    def add(self, column: int, row: int, values: Array) -> None:
+    def add(self, column: int, row: int, numbers: Array) -> None:
+        values: Values = numbers
+        if self.kind in COMPLEX_KINDS:
+            values = np.ascontiguousarray(numbers).view(np.complex128)
         if not (0 <= column < self.columns and 0 <= row <= self.rows - values.size):
             raise ValueError(f"a string of {self.name} reaches beyond {self.rows} rows")
         if not np.isfinite(values).all():
@@ -52,31 +65,75 @@ class _Strings:
         return csr_matrix((v, (i.astype(int), j.astype(int))), shape=(self.rows, self.columns))
 
 
-def read_op4(path: str | Path) -> dict[str, csr_matrix]:
-    """All real matrices of a file, by their names in capitals.
+class Matrices(dict[str, Any]):
+    """Matrices of a file by their names; ``NAME#1``, ``NAME#2`` where a name stands twice.
 
     Args:
-        path: a text or binary file, of either byte order.
+        where: the file.
+        found: {key: matrix}.
+        places: {key: where it stands in the file}.
+    """
+
+    def __init__(self, where: str, found: dict[str, Any], places: dict[str, str] | None = None):
+        super().__init__(found)
+        self.where, self.places = where, places or {}
+
+    def __missing__(self, key: str) -> NoReturn:
+        doubled = [k for k in self if k.rpartition("#")[0] == key] if key else []
+        what = f"{len(doubled)} matrices" if doubled else "no matrix"
+        each = ", ".join(map(self._described, sorted(doubled or self)[:MAX_NAMED]))
+        named = f"{what} {key!r}; there are" if key else f"{len(self)} matrices:"
+        raise ConfigError(
+            f"{self.where} has {named} {each}.",
+            hint=f"Name one, as in (file, {(doubled or [*self])[-1]!r}), on the command line "
+            "FILE:NAME.",
+        )
+
+    def _described(self, key: str) -> str:
+        rows, columns = self[key].shape
+        kind = " complex" if np.iscomplexobj(self[key]) else ""
+        at = f", {self.places[key]}" if key in self.places else ""
+        return f"{key} ({rows} x {columns}{kind}{at})"
+
+
+def read_op4(path: str | Path) -> Matrices:
+    """All matrices of a file, real and complex, by their names in capitals.
+
+    Where a name stands more than once, the keys are ``NAME#1``, ``NAME#2`` in the order of the
+    file, and the name alone raises an error that says where each stands.
+
+    Args:
+        path: a text or binary file, of either byte order and words of four or eight bytes.
 
     Raises:
-        FileFormatError: if the file is missing, cut, or holds a complex matrix.
+        FileFormatError: if the file is missing or cut.
         UnsafeFileError: if it is larger than 4 GiB, or a matrix has more than ten million rows.
     """
     path = check_readable(path)
     data = path.read_bytes()
     reader: Any = _Text(data) if DIGITS.match(data[:24]) else _Binary(data)
-    out: dict[str, csr_matrix] = {}
+    all_found: list[_Strings] = []
     try:
         while (found := reader.next()) is not None:
-            out[found.name] = found.matrix()
+            all_found.append(found)
     except UnsafeFileError as error:
         raise UnsafeFileError(error.message, where=f"{path}, {reader.place}") from error
     except (ValueError, IndexError, struct.error, OverflowError) as error:
         where = f"{path}, {reader.place}"
         raise FileFormatError(f"no OUTPUT4 matrix stands here: {error}.", where=where) from error
-    if not out:
+    if not all_found:
         raise FileFormatError("the file holds no matrix.", where=str(path))
-    return out
+    return _by_name(str(path), all_found)
+
+
+def _by_name(where: str, all_found: list[_Strings]) -> Matrices:
+    times, seen = Counter(found.name for found in all_found), Counter[str]()
+    keys = []
+    for name in (found.name for found in all_found):
+        seen[name] += 1
+        keys.append(name if times[name] == 1 else f"{name}#{seen[name]}")
+    matrices = {key: found.matrix() for key, found in zip(keys, all_found, strict=True)}
+    return Matrices(where, matrices, dict(zip(keys, (f.place for f in all_found), strict=True)))
 
 
 def write_op4(matrices: dict[str, Any], path: str | Path) -> Path:
@@ -116,14 +173,14 @@ def _packed(values: Array) -> Iterator[str]:
         yield "".join(f"{v:23.16E}" for v in values[k : k + 3])
 
 
-def _checked(columns: int, rows: int, kind: int, name: str) -> _Strings:
-    if kind not in (1, 2):
-        raise ValueError(f"{name} is complex or of the unknown type {kind}")
-    if not (0 < columns and rows):
+def _checked(columns: int, rows: int, kind: int, name: str, place: str) -> _Strings:
+    if not 1 <= kind <= 4:
+        raise ValueError(f"{name} is of the unknown type {kind}")
+    if not (columns and rows):
         raise ValueError(f"{name} has {rows} rows and {columns} columns")
-    if max(columns, abs(rows)) > MOST_ROWS:
+    if max(abs(columns), abs(rows)) > MOST_ROWS:
         raise UnsafeFileError(f"{name} has {abs(rows)} rows and {columns} columns.")
-    return _Strings(name.strip().upper(), abs(rows), columns, rows < 0, kind)
+    return _Strings(name.strip().upper(), place, abs(rows), abs(columns), rows < 0, kind)
 
 
 class _Text:
@@ -139,14 +196,18 @@ class _Text:
     def next(self) -> _Strings | None:
         if not any(line.strip() for line in self.lines[self.number :]):
             return None
-        line = self._line()
+        line = self._line().rstrip()
+        if line.endswith(WIDE_MARK):
+            line = f"{int(line[:16]):8d}{int(line[16:32]):8d}{line[32:].removesuffix(WIDE_MARK)}"
         columns, rows, _, kind = (int(line[8 * k : 8 * k + 8]) for k in range(4))
         self._set_format(line[40:].strip().upper())
-        matrix = _checked(columns, rows, kind, line[32:40])
+        matrix = _checked(columns, rows, kind, line[32:40], self.place)
+        self.words = 2 if kind in DOUBLE_KINDS else 1  # that a number counts in sparse columns
         while True:
             line = self._line()
-            column, row, n = (int(line[8 * k : 8 * k + 8]) for k in range(3))
-            if column > columns:
+            words = line.split() if len(line.split()) == 3 else re.findall(".{8}", line)
+            column, row, n = (int(word) for word in words[:3])
+            if column > matrix.columns:
                 self._values(n)
                 return matrix
             if row > 0:
@@ -163,11 +224,11 @@ class _Text:
         else:
             length, row = int(line) // 65536 - 1, int(line) % 65536
             head = 1
-        matrix.add(column, row - 1, self._values(length // matrix.words))
+        matrix.add(column, row - 1, self._values(length // self.words))
         return length + head
 
     def _set_format(self, text: str) -> None:
-        found = re.fullmatch(r"(?:1P,)?(\d+)[ED](\d+)\.\d+", text or "1P,5E16.9")
+        found = FORMAT_PATTERN.fullmatch(text or "1P,5E16.9")
         if found is None or not int(found[1]) or not int(found[2]):
             raise ValueError(f"the format {text!r} is unknown")
         self.per_line, self.width = int(found[1]), int(found[2])
@@ -177,8 +238,9 @@ class _Text:
             raise ValueError(f"{n} values are announced")
         out: list[float] = []
         while len(out) < n:
-            line, count = self._line().replace("D", "E"), min(self.per_line, n - len(out))
-            out += [float(line[self.width * k : self.width * (k + 1)]) for k in range(count)]
+            line, count = self._line().upper().replace("D", "E"), min(self.per_line, n - len(out))
+            cells = [line[self.width * k : self.width * (k + 1)] for k in range(count)]
+            out += [float(c if "E" in c else BARE_EXPONENT.sub("E", c)) for c in cells]
         return np.array(out)
 
     def _line(self) -> str:
@@ -193,7 +255,7 @@ class _Binary:
 
     def __init__(self, data: bytes):
         self.data, self.at = data, 0
-        self.order = "<" if data[:4] == struct.pack("<i", 24) else ">"
+        self.order = "<" if data[:4] in (struct.pack("<i", n) for n in (24, 48)) else ">"
 
     @property
     def place(self) -> str:
@@ -202,40 +264,48 @@ class _Binary:
     def next(self) -> _Strings | None:
         if self.at >= len(self.data):
             return None
-        head = self._record()
-        if len(head) != 24:
-            _refuse_header(len(head))
-        columns, rows, _, kind = struct.unpack(f"{self.order}4i", head[:16])
-        matrix = _checked(columns, rows, kind, head[16:].decode("ascii", "replace"))
+        place, head = self.place, self._record()
+        if len(head) not in (24, 48):
+            raise ValueError(f"a header has 24 or 48 bytes, not {len(head)}")
+        self.size = len(head) // 6  # bytes of a word
+        columns, rows, _, kind = self._integers(head, 0, 4)
+        name = head[4 * self.size :].decode("ascii", "replace")
+        matrix = _checked(columns, rows, kind, "".join(name.split()), place)
+        self.real = f"{self.order}f{max(self.size, 8 if kind in DOUBLE_KINDS else 4)}"
         while True:
             record = self._record()
-            column, row, words = struct.unpack(f"{self.order}3i", record[:12])
-            if column > columns:
+            column, row, words = self._integers(record, 0, 3)
+            if column > matrix.columns:
                 return matrix
+            values = record[3 * self.size :]
             if row > 0:
-                matrix.add(column - 1, row - 1, self._values(record[12:], words, matrix.words))
+                matrix.add(column - 1, row - 1, self._values(values, words))
             else:
-                self._strings(matrix, column - 1, record[12 : 12 + 4 * words])
+                self._strings(matrix, column - 1, values[: self.size * words])
 
     def _strings(self, matrix: _Strings, column: int, data: bytes) -> None:
         at = 0
         while at < len(data):
             if matrix.long:
-                length, row = struct.unpack_from(f"{self.order}2i", data, at)
-                length, at = length - 1, at + 8
+                length, row = self._integers(data, at, 2)
+                length, at = length - 1, at + 2 * self.size
             else:
-                (both,) = struct.unpack_from(f"{self.order}i", data, at)
-                length, row, at = both // 65536 - 1, both % 65536, at + 4
+                (both,) = self._integers(data, at, 1)
+                length, row, at = both // 65536 - 1, both % 65536, at + self.size
             if length <= 0:
                 raise ValueError(f"a string of {length} words")
-            matrix.add(column, row - 1, self._values(data[at:], length, matrix.words))
-            at += 4 * length
+            matrix.add(column, row - 1, self._values(data[at:], length))
+            at += self.size * length
 
-    def _values(self, data: bytes, words: int, per_value: int) -> Array:
-        if not 0 < 4 * words <= len(data) or words % per_value:
-            raise ValueError(f"{words} words are announced, {len(data) // 4} are there")
-        kind = f"{self.order}f{4 * per_value}"
-        return np.frombuffer(data, kind, words // per_value).astype(float)
+    def _integers(self, data: bytes, at: int, n: int) -> tuple[int, ...]:
+        kind = "i" if self.size == 4 else "q"
+        return struct.unpack_from(f"{self.order}{n}{kind}", data, at)
+
+    def _values(self, data: bytes, words: int) -> Array:
+        n, rest = divmod(self.size * words, int(self.real[-1]))
+        if not 0 < self.size * words <= len(data) or rest:
+            raise ValueError(f"{words} words are announced, {len(data) // self.size} are there")
+        return np.frombuffer(data, self.real, n).astype(float)
 
     def _record(self) -> bytes:
         (n,) = struct.unpack_from(f"{self.order}i", self.data, self.at)
@@ -244,8 +314,3 @@ class _Binary:
             raise ValueError(f"a record of {n} bytes does not close")
         record, self.at = self.data[self.at + 4 : end], end + 4
         return record
-
-
-def _refuse_header(n: int) -> NoReturn:
-    what = "the numbers have eight bytes; write it with BIGMAT=FALSE" if n == 48 else f"{n} bytes"
-    raise ValueError(f"a header has 24 bytes: {what}")

@@ -173,7 +173,7 @@ def _document(matrices: dict[str, Any], dofs: Dofs, nodes: dict[int, Array]) -> 
     labels = list(dict.fromkeys(dofs[:, 0].tolist()))
     components = {label: dofs[dofs[:, 0] == label, 1].tolist() for label in labels}
     if [label for label in labels for _ in components[label]] != dofs[:, 0].tolist():
-        raise ConfigError("the rows of a user element are ordered node by node.")
+        raise ConfigError("the rows of a user element must be ordered node by node.")
     yield f"** {ORIGIN_MARK}"
     yield "*NODE"
     yield from (f"{k}, " + _row(nodes.get(k, np.zeros(3))) for k in labels)

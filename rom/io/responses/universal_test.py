@@ -27,6 +27,7 @@ from rom.updating.measured import MeasuredModes
 SETS = dict[str, list[list[str]]]
 NODE_SETS = ("15", "2411")
 AXES_SETS = ("18", "2420")  # of local coordinate systems
+CARTESIAN_TYPE = 0  # type of a coordinate system
 N_SHAPE_RECORDS = 8  # before the values of a dataset 55
 NORMAL, COMPLEX = 2, 3  # analyses of a dataset 55
 UNITS_RTOL = 1e-3  # of factors that say the same
@@ -85,6 +86,10 @@ def _factors(path: Path, others: SETS) -> tuple[float, float] | None:
 def _points(path: Path, others: SETS, factors: tuple[float, float] | None) -> dict[int, Array]:
     length = factors[0] if factors else 1.0
     points: dict[int, Array] = {}
+    try:
+        names, same = _systems(others)
+    except (ValueError, IndexError) as error:
+        raise FileFormatError(f"a dataset 18 or 2420 is cut: {error}.", where=str(path)) from error
     local = any(name in others for name in AXES_SETS)
     for name in NODE_SETS:
         for lines in others.get(name, []):
@@ -92,14 +97,43 @@ def _points(path: Path, others: SETS, factors: tuple[float, float] | None) -> di
             width = 13 if name == "15" else 25
             for line in records:
                 node, system, turned, x = _node(path, name, line, width)
-                if local and (system or turned):
+                if local and (other := {system, turned} - same):
+                    named = [f"{k} {names.get(k, '')}".strip() for k in sorted(other)]
                     raise FileFormatError(
-                        f"node {node} is in the local coordinate system {system or turned}.",
+                        f"node {node} is in the local coordinate system {', '.join(named)}.",
                         where=str(path),
                         hint="Export the test in global axes; local ones are not read.",
                     )
                 points[node] = x / length
     return points
+
+
+def _systems(others: SETS) -> tuple[dict[int, str], set[int]]:
+    """Names of coordinate systems, and numbers of those that are the global one.
+
+    Dataset 18 gives the origin, a point on the x axis and one in the xz plane; dataset 2420 the
+    rows of a rotation and the origin.
+    """
+    names, same = dict[int, str](), {0}
+    for kind, first, size, width in (("18", 0, 4, 13), ("2420", 2, 6, 25)):
+        for lines in others.get(kind, []):
+            for head, name, *rows in (lines[k : k + size] for k in range(first, len(lines), size)):
+                number, shape, reference = (int(head[a : a + 10] or 0) for a in (0, 10, 20))
+                names[number] = name.strip()
+                A = np.array([x for row in rows for x in _columns(row, width)]).reshape(-1, 3)
+                if kind == "18":
+                    is_same = reference in same | {number} and _along_axes(A)
+                else:
+                    is_same = np.array_equal(A, np.eye(4, 3))
+                if is_same and shape == CARTESIAN_TYPE:
+                    same.add(number)
+    return names, same
+
+
+def _along_axes(A: Array) -> bool:
+    return bool(
+        A[1, 0] > 0 and A[2, 2] > 0 and not A[0].any() and not A[1:, 1].any() and not A[1, 2]
+    )
 
 
 def _node(path: Path, name: str, line: str, width: int) -> tuple[int, int, int, Array]:
@@ -131,9 +165,7 @@ def _in_si(path: Path, f: Function, factors: tuple[float, float] | None) -> Func
         if plain(f.units[0]) not in NO_UNITS:
             kind, own = motion_of_unit(f.units[0])
             if kind != f.numerator:
-                raise ConfigError(
-                    f"the type of its numerator is {f.numerator}, its unit {f.units[0]!r}."
-                )
+                raise ConfigError(f"its numerator needs unit {f.numerator}, got {f.units[0]!r}.")
             motion = _agreed(own, motion if factors and plain(f.units[0]) not in IN_G else own)
         if plain(f.units[1]) not in NO_UNITS:
             own = force_of(f.units[1])
@@ -187,7 +219,7 @@ def _values(lines: list[str], is_complex: bool) -> dict[int, Array]:
     return {n: (x[:6:2] + 1j * x[1:6:2] if is_complex else x[:3]) for n, x in found.items()}
 
 
-def _columns(line: str) -> list[float]:
-    ends = range(0, len(line.rstrip()) + 13, 13)
+def _columns(line: str, width: int = 13) -> list[float]:
+    ends = range(0, len(line.rstrip()) + width, width)
     cells = (line[a:b].strip() for a, b in pairwise(ends))
     return [float(cell.replace("D", "E")) for cell in cells if cell]

@@ -21,6 +21,8 @@ from rom.io.sid.format import StandardInput, Taylor
 from rom.model import Array
 
 EPS = -skew_tensor()  # of Levi-Civita
+PRODUCT_NAMES = ("xx", "yy", "zz", "xy", "yz", "xz")  # of angular velocities: columns of Oe
+UNEVEN_RTOL = 1e-6  # share of Oe1 below which its asymmetry is round-off of the writer
 STIFFENING_RTOL = 1e-9  # share of Me below which the trace of Oe1 counts as inertia alone
 
 
@@ -116,17 +118,11 @@ def sid_body(record: StandardInput) -> FlexibleBody:
     that take its blocks as they are.
 
     Raises:
-        ConfigError: if the blocks contain geometric stiffness.
+        ConfigError: if the blocks contain geometric stiffness, or are no integrals of shapes.
     """
     b, r = record.blocks, record.n_modes
     Me, Oe1, Cr1 = b["Me"].M0, first(b["Oe"], r), first(b["Cr"], r)
-    excess = np.abs(Oe1[:, :, :3].sum(axis=2) + 2 * Me).max(initial=0.0)
-    if excess > STIFFENING_RTOL * np.abs(Me).max(initial=0.0) or first(b["Ct"], r).any():
-        raise ConfigError(
-            f"the SID of {record.name!r} has geometric stiffness in Oe, where it cannot be told "
-            "from inertia.",
-            hint="Export it without geometric stiffness.",
-        )
+    _check_inertia(record, Me, Oe1)
     C4 = -0.5 * by_mode(b["Gr"].M0)
     trace = np.einsum("kaa->k", C4)
     odd = np.einsum("cab,jic->abji", EPS, 0.5 * (Cr1 - Cr1.swapaxes(0, 1)))
@@ -148,6 +144,31 @@ def sid_body(record: StandardInput) -> FlexibleBody:
         reference="as in its SID",
         provenance={"from": record.title},
     )
+
+
+def _check_inertia(record: StandardInput, Me: Array, Oe1: Array) -> None:
+    """Inertia alone has Oe1 xx + yy + zz = -2 Me and Oe1 symmetric, and no Ct1."""
+    what, size = record.place("Oe"), max(np.abs(Me).max(initial=0.0), np.abs(Oe1).max(initial=0.0))
+    uneven = np.abs(Oe1 - Oe1.swapaxes(0, 1)).max(axis=(0, 1), initial=0.0)
+    columns = [
+        name for name, x in zip(PRODUCT_NAMES, uneven, strict=True) if x > UNEVEN_RTOL * size
+    ]
+    if columns:
+        raise ConfigError(
+            f"{what} of the SID of {record.name!r} has in its columns {', '.join(columns)} a first "
+            f"order that is not symmetric, by {uneven.max():.3g} of {size:.3g}: it is no integral "
+            "of products of shapes, as files of PY_SID with several modes have it.",
+            hint="rom.read_sid gives the blocks as they are; write the body by another program.",
+        )
+    excess = np.abs(Oe1[:, :, :3].sum(axis=2) + 2 * Me).max(initial=0.0)
+    loaded = first(record.blocks["Ct"], record.n_modes).any()
+    if loaded or excess > STIFFENING_RTOL * np.abs(Me).max(initial=0.0):
+        raise ConfigError(
+            f"{what} of the SID of {record.name!r} holds more than the inertia of its Me, by "
+            f"{excess:.3g}: geometric stiffness in Oe, which cannot be told from inertia, or "
+            "another mass than that of Me.",
+            hint="Export without geometric stiffness; rom.read_sid gives the blocks as they are.",
+        )
 
 
 def _even(Oe1: Array, Me: Array) -> Array:

@@ -6,6 +6,7 @@ x~ phi~_j, J1_j = -(C4_j + C4_j^T) and Gr_j = -2 C4_j, while mdCM1_j is a row of
 Ge_j = 2 Cr1(:, j, :). Only the right order fulfils this.
 """
 
+import re
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -63,7 +64,7 @@ def read_sid(path: str | Path, *, ge: str = "antisymmetric") -> StandardInput:
 
 def check_sid(record: StandardInput) -> Report:
     """Residuals of the relations between the blocks, relative to their size."""
-    rows = [_row(what, found) for what, found in _relations(record)]
+    rows = [_row(_placed(record, what, x), x) for what, x in _relations(record)]
     for name in ("Me", "Ke", "De"):
         A = record.blocks[name].M0
         rows.append(_row(f"{name} symmetric", _relative(A, A.T, 0.0)))
@@ -71,6 +72,13 @@ def check_sid(record: StandardInput) -> Report:
     rows.append(Row("smallest eigenvalue of Me", lowest, "> 0", lowest > 0))
     title = f"SID {record.name}, {len(record.nodes)} nodes, {record.n_modes} modes"
     return Report(f"{title}, dialect {record.dialect or 'none'}", tuple(rows))
+
+
+def _placed(record: StandardInput, what: str, residual: float) -> str:
+    """What does not hold, with the lines of its blocks."""
+    named = re.findall(r"[A-Za-z]+(?=[01]*)", what) if residual > RESIDUAL_RTOL else []
+    lines = [record.place(name) for name in dict.fromkeys(named) if name in record.lines]
+    return ", ".join([what, *lines])
 
 
 def _row(what: str, residual: float) -> Row:
@@ -199,7 +207,8 @@ def _record(file: RawFile, mode_second: bool) -> StandardInput:
     dropped = sum(raw.dropped for raw in _all(file))
     if dropped:
         warn(f"{file.path}: {dropped} terms of second order are left out.")
-    return StandardInput(file.title, file.name, file.mass, coordinates, nodes, blocks)
+    lines = {name: raw.line for name, raw in file.blocks.items()}
+    return StandardInput(file.title, file.name, file.mass, coordinates, nodes, blocks, lines=lines)
 
 
 def _taylor(file: RawFile, raw: RawBlock, mode_second: bool) -> Taylor:

@@ -61,6 +61,7 @@ class StandardInput:
             columns of all coordinates for x, then y, then z; Oe r x 6 for the products xx, yy,
             zz, xy, yz, xz of angular velocities; ksigma r x 1.
         dialect: how the file was written, or "" for a record that was made here.
+        lines: {block: line of the file where it begins}.
     """
 
     title: str
@@ -70,6 +71,11 @@ class StandardInput:
     nodes: dict[str, dict[str, Taylor]]
     blocks: dict[str, Taylor]
     dialect: str = field(default="", compare=False)
+    lines: dict[str, int] = field(default_factory=dict, compare=False)
+
+    def place(self, block: str) -> str:
+        """A block for messages, such as "Oe (line 812)"; without a file its name alone."""
+        return block + (f" (line {self.lines[block]})" if block in self.lines else "")
 
     @property
     def n_modes(self) -> int:

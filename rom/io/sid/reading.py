@@ -10,7 +10,7 @@ import numpy as np
 
 from rom.errors import FileFormatError, UnsafeFileError
 from rom.io.files import check_readable
-from rom.io.sid.format import BLOCKS, GENERAL, NODE_BLOCKS, SYMMETRIC, UNIT, shape_of
+from rom.io.sid.format import BLOCKS, NODE_BLOCKS, SYMMETRIC, UNIT, ZERO, shape_of
 from rom.model import Array
 from rom.names import ORIGIN_MARK, is_whole
 
@@ -57,11 +57,8 @@ class RawFile:
 
     def refuse(self, message: str, line: int) -> NoReturn:
         """Raise an error that names file and line."""
-        hint = "It may have been cut or edited; write it again."
         message = message if len(message) <= LONGEST_MESSAGE else f"{message[:LONGEST_MESSAGE]}..."
-        raise FileFormatError(
-            f"{message.rstrip('.')}.", where=f"{self.path}, line {line}", hint=hint
-        )
+        raise FileFormatError(f"{message.rstrip('.')}.", where=f"{self.path}, line {line}")
 
 
 class _Lines:
@@ -209,7 +206,8 @@ def _check_sizes(file: RawFile, block: RawBlock) -> None:
     structure, order = block.sizes["structure"], block.sizes["order"]
     if structure not in range(5) or (structure in (SYMMETRIC, UNIT) and shape[0] != shape[1]):
         file.refuse(f"{block.name} has the structure {structure}", block.line)
-    if structure not in (SYMMETRIC, GENERAL, 1) and block.m0:
+    unfit = {place: x for place, x in block.m0.items() if x != (place[0] == place[1])}
+    if unfit if structure == UNIT else structure == ZERO and block.m0:
         file.refuse(f"{block.name} has entries, but the structure {structure}", block.line)
     if not 0 <= order <= 2 or (order == 0 and block.m1):
         file.refuse(f"{block.name} has the order {order}", block.line)

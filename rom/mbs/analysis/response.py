@@ -25,7 +25,7 @@ from rom.mbs.mechanism import Mechanism
 from rom.mbs.parts.bodies import Marker
 from rom.mbs.results.state import State
 from rom.model import Array
-from rom.names import offered
+from rom.names import check_known
 
 # reciprocal condition number of the dynamic stiffness from which a response counts as infinite
 RECIPROCAL_CONDITION_TOL = 1e-13
@@ -123,10 +123,7 @@ def transmissibility(
         SolverError: naming the frequency at which the response is infinite.
     """
     f = _checked(frequencies)
-    if drive not in mechanism.drives:
-        raise ConfigError(
-            f"no drive {drive!r}; the mechanism has {offered(mechanism.drives, drive)}."
-        )
+    check_known(drive, mechanism.drives, f"no drive {drive!r}; the mechanism has")
     large = _Large.of(mechanism, state, "body", assemble)
     if large:
         _refuse_moving(large.state)
@@ -147,7 +144,7 @@ def transmissibility(
 
 def _refuse_moving(state: State) -> None:
     if state.v.any():
-        raise ModelError("transmissibility is that of a mechanism at rest; this one moves.")
+        raise ModelError("transmissibility needs a mechanism at rest; this one moves.")
 
 
 @dataclass(frozen=True)
@@ -230,7 +227,7 @@ def _infinite(f: float) -> SolverError:
 
 
 def _blocked(drive: str) -> ModelError:
-    return ModelError("the other joints do not let this drive move.", where=drive)
+    return ModelError("the other joints must let this drive move.", where=drive)
 
 
 def _forced(G: Array, packed: Any, drive: str, scale: Array) -> Array:

@@ -88,7 +88,7 @@ def bushing(  # noqa: PLR0913  one keyword per property
         ConfigError: for matrices without an energy, or tables that do not ascend.
     """
     if m1.body == m2.body:
-        raise ConfigError(f"bushing {name!r} connects body {m1.body!r} with itself.")
+        raise ConfigError(f"bushing {name!r} connects body {m1.body!r} with itself; give two.")
     world = rotation.matrix(unit_quaternion(axes))
     A1, A2 = (rotation.matrix(self.part(m.body).p) for m in (m1, m2))
     gap = self.design_point(m2) - self.design_point(m1)
@@ -111,7 +111,7 @@ def _matrix66(name: str, value: Any) -> Array:
             "mech.law, of which docs/laws.md has this one.",
         )
     if np.linalg.eigvalsh(A)[0] < -1e-9 * size:
-        raise ConfigError(f"{name} is negative in some direction: it would drive the motion.")
+        raise ConfigError(f"{name} must not be negative in any direction: it drives the motion.")
     return 0.5 * (A + A.T)
 
 
@@ -122,9 +122,7 @@ def _curve(name: str, direction: str, table: Any) -> tuple[int, Array]:
     n = np.size(table[0])
     x, force = (finite(f"curve {direction} of {name}", values, (n,)) for values in table)
     if n < 2 or np.diff(x).min() <= 0.0:
-        raise ConfigError(
-            f"curve {direction} of bushing {name!r} needs two or more ascending displacements."
-        )
+        raise ConfigError(f"curve {direction} of bushing {name!r} needs two or more that ascend.")
     cubic = PchipInterpolator(x, force)
     energy = cubic.antiderivative()
     slopes = cubic.derivative()(x[[0, -1]])

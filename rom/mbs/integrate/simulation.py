@@ -173,7 +173,7 @@ def release(mechanism: Mechanism, state: State, *, assemble: bool = False) -> St
     if sizes != (packed.q.size, packed.v.size):
         raise ConfigError(
             f"the state has {sizes[0]} coordinates and {sizes[1]} velocities, this mechanism "
-            f"{packed.q.size} and {packed.v.size}: their bodies differ."
+            f"{packed.q.size} and {packed.v.size}: it must be of the same bodies."
         )
     placed = replace(packed, q=state.q.copy(), v=state.v.copy())
     return initial_state(placed, state.t, assemble=assemble)

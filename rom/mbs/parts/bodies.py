@@ -9,7 +9,7 @@ from rom import rotation
 from rom.arguments import finite, typed
 from rom.errors import ConfigError, ModelError
 from rom.model import OWN_FRAME, Array
-from rom.names import offered
+from rom.names import check_known
 from rom.notebook import listed
 from rom.plausible import GYRATION, SIZE, warn_outside
 
@@ -97,16 +97,10 @@ class Part:
             3.0
         """
         if isinstance(place, str):
-            if place not in self.names:
-                raise ConfigError(
-                    f"body {self.name!r} has no marker {place!r}; it has "
-                    f"{offered(self.names, place)}."
-                )
+            check_known(place, self.names, f"body {self.name!r} has no marker {place!r}; it has")
             return Marker(self.name, place)
         if self.flexible is not None:
-            raise ConfigError(
-                f"body {self.name!r} is flexible: its markers are {sorted(self.names)}."
-            )
+            raise ConfigError(f"body {self.name!r} is flexible: it has {sorted(self.names)}.")
         point = finite(f"marker of {self.name}", place, (3,))
         return Marker(self.name, (float(point[0]), float(point[1]), float(point[2])))
 
@@ -259,7 +253,7 @@ def moving_start(part: Part) -> tuple[Array, Array]:
 def _check_mass(part: Part) -> None:
     M = mass_at_rest(part)
     if not np.isfinite(M).all() or np.diag(M).min() <= 0.0:
-        raise ModelError("the mass matrix has entries that no body has.", where=part.name)
+        raise ModelError("the mass matrix must be that of a body in its frame.", where=part.name)
     scale = 1 / np.sqrt(np.diag(M))
     spectrum = np.linalg.eigvalsh(M * scale * scale[:, None])
     if spectrum[0] < SINGULAR_MASS * spectrum[-1]:

@@ -25,7 +25,7 @@ from rom.mbs.results.law_record import LawRecord, law_record
 from rom.mbs.results.recomputed import Tracks, follow
 from rom.mbs.results.state import State
 from rom.model import Array
-from rom.names import offered
+from rom.names import check_known, offered
 from rom.notebook import html_table, listed
 from rom.rotation import continuous, matrix, quaternion
 
@@ -330,10 +330,7 @@ class Solution:
         Raises:
             ConfigError: if there is no such drive.
         """
-        if name not in self.mechanism.drives:
-            raise ConfigError(
-                f"no drive {name!r}; there are {offered(self.mechanism.drives, name)}."
-            )
+        check_known(name, self.mechanism.drives, f"no drive {name!r}; there are")
         return -self.lam[:, self.packed.rows_of(name)[0]]
 
     def interface_loads(self, body: str, *, frame: str = "world") -> dict[Any, Array]:
@@ -442,7 +439,8 @@ class Solution:
         """An answer for one frame of a body of frames, or for all of them, (n_t, k, ...)."""
         whole = self.mechanism.nonlinear[body]
         if marker is not None:
-            return ask(whole.marker(marker).body)
+            given = marker if isinstance(marker, Marker) else whole.marker(marker)
+            return ask(_of_body(given, body, [part.name for part in whole.parts]).body)
         return np.stack([ask(part.name) for part in whole.parts], axis=1)
 
     def _frame(self, body: str) -> Marker | None:
@@ -451,20 +449,28 @@ class Solution:
         return self.mechanism.part(body).own_frame
 
     def _start_of(self, body: str, *, velocity: bool = False) -> int:
-        if body not in self.packed.names:
-            raise ConfigError(
-                f"no body {body!r}; the mechanism has {offered(self.packed.names, body)}."
-            )
+        check_known(body, self.packed.names, f"no body {body!r}; the mechanism has")
         bodies = self.packed.system.bodies
         starts = bodies.v_at if velocity else bodies.q_at
         return int(starts[self.packed.names.index(body)])
 
     def _track(self, body: str, place: Any) -> Tracks:
         self._start_of(body)
-        marker = place if isinstance(place, Marker) else self.mechanism.part(body).marker(place)
+        given = place if isinstance(place, Marker) else self.mechanism.part(body).marker(place)
+        marker = _of_body(given, body, [body])
         if marker not in self.packed.markers:
             raise ConfigError(
                 f"the point {marker.place} of body {body!r} was not a marker of the run.",
                 hint="Name it when the body is added.",
             )
         return self._follow(self.packed.row(marker))
+
+
+def _of_body(marker: Marker, body: str, names: list[str]) -> Marker:
+    """The marker, if it is one of a body, whose frames have these names."""
+    if marker.body in names:
+        return marker
+    raise ConfigError(
+        f"the marker {marker.place!r} is of body {marker.body!r}, not of {body!r}.",
+        hint=f"Write ({marker.body!r}, {marker.place!r}), or the name of a marker of {body!r}.",
+    )

@@ -489,7 +489,7 @@ def test_time_is_read_off_a_stack_of_pictures(janus):
         (lambda: match(np.ones(2), CORNERS, CORNERS), ConfigError, r"shape \(2,\) does not fit 9"),
         (lambda: match(MASS, CORNERS, CORNERS[:2]), ConfigError, "6 velocities do not fit 9"),
         (lambda: frame(MASS, line(0, 1, 3), line(0, 1, 3)), ModelError, "no rotation is better"),
-        (lambda: frame(MASS, CORNERS, CORNERS[:2]), ConfigError, "2 particles cannot be laid"),
+        (lambda: frame(MASS, CORNERS, CORNERS[:2]), ConfigError, "2 particles, not"),
         (lambda: match(MASS, np.nan * CORNERS, CORNERS), ConfigError, "entries that are not"),
         (lambda: stacked(MASS, CORNERS), ConfigError, r"a film has .* not \(3, 3\)"),
         (lambda: emergent_rate(MASS, CORNERS, CORNERS, -1.0), ModelError, "E - V = -1 J"),

@@ -431,7 +431,7 @@ def test_a_wing_alone_is_a_free_beam():
         (lambda: Measurement(OMEGA, EXACT, (2, 8)), r"inputs = \(2, 8\) of the sensors 0 to 7"),
         (lambda: measured(weights=np.ones(7)), r"weights \(7,\) fit neither"),
         (lambda: responses(BEAM, START, GUESS, OMEGA, (2, 99)), r"inputs = \(2, 99\)"),
-        (lambda: responses(BEAM, START, GUESS, OMEGA * np.nan, (2,)), "at finite omega"),
+        (lambda: responses(BEAM, START, GUESS, OMEGA * np.nan, (2,)), "omega finite"),
         (lambda: update_by_output(BEAM, measured(), START, -GUESS), "ratios to start from"),
         (lambda: update_by_output(BEAM, measured(), START[:3], GUESS), "9 of them"),
         (
@@ -444,7 +444,7 @@ def test_a_wing_alone_is_a_free_beam():
         (lambda: data.noisy(EXACT, -0.1, np.random.default_rng(0)), "level = -0.1"),
         (lambda: data.random_error(0.5, 0), "n_averages = 0"),
         (lambda: data.beside_poles(OMEGA, [1.0, 2.0], [0.1], 30.0), "2 poles"),
-        (lambda: data.frac(EXACT, EXACT[:3]), "cannot be compared"),
+        (lambda: data.frac(EXACT, EXACT[:3]), "must have one shape"),
     ],
 )
 def test_wrong_input_is_named(change, message):

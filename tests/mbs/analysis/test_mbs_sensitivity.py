@@ -191,7 +191,7 @@ def test_wrong_questions_are_refused():
     assert_allclose(found["x"], 12.0, rtol=1e-9)
     with pytest.raises(ConfigError, match=r"no parameter 'y'.*'x'"):
         found["y"]
-    with pytest.raises(ConfigError, match="other bodies or joints"):
+    with pytest.raises(ConfigError, match="bodies and joints must be the same"):
         rom.equilibrium_sensitivity(_sometimes_two, {"x": 1.0}, lambda mech, state: 0.0)
 
 

@@ -236,7 +236,7 @@ def test_damping_takes_energy_and_never_gives_any(damping):
     ({"clearance": 2e-3}, "no clearance"),
     ({"conformity": (0.5, 0.52)}, "a groove is a little wider"),
     ({"contact_angle": 25.0}, "not below 80 degrees"),
-    ({"E": -1.0}, "no balls have E"),
+    ({"E": -1.0}, "needed are E > 0"),
 ])  # fmt: skip
 def test_what_is_no_bearing_is_refused(numbers, message):
     with pytest.raises(ModelError, match=message):

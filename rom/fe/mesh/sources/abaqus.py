@@ -228,7 +228,7 @@ def _regions(deck: Deck, own: list[str], ids: Index) -> tuple[dict[int, str], In
         if (both := chosen & (regions > 0)).any():
             raise TagError(
                 f"element {ids[both][0]} is in the sections {names[regions[both][0]]!r} and "
-                f"{name!r}."
+                f"{name!r}; it must be in one."
             )
         regions[chosen] = number
     if not regions.all():

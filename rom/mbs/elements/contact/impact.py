@@ -57,7 +57,7 @@ class Impact:
                 raise ConfigError(f"{name} = {getattr(self, name):g} must not be negative.")
         warn_outside(FRICTION, self.mu)
         if self.exponent < 1.0:
-            raise ConfigError(f"exponent = {self.exponent:g} is below one: infinitely stiff.")
+            raise ConfigError(f"exponent = {self.exponent:g} is infinitely stiff; 1 is needed.")
         self._check_spring()
         if (self.restitution is None) != (self.impact_speed is None):
             raise ConfigError(
@@ -66,7 +66,7 @@ class Impact:
             )
         if self.restitution is not None:
             if self.damping:
-                raise ConfigError(f"damping = {self.damping:g} and restitution exclude each other.")
+                raise ConfigError(f"damping = {self.damping:g} and restitution: give only one.")
             factor = damping_of(self.restitution, positive("impact_speed", self.impact_speed))
             object.__setattr__(self, "damping", factor)
 
