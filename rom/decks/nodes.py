@@ -68,6 +68,7 @@ class Nodes:
         for inside, block in kept:
             if not inside and block.keyword in ("NODE", "ELEMENT"):
                 self.unread.add(f"*{block.keyword} outside of the part", block.place)
+                continue
             if names:
                 _rename(block, prefix, outside, inside=inside)
             yield block

@@ -101,13 +101,14 @@ def _element(deck: Deck, block: Block) -> None:
     kind = block.option("TYPE").upper()
     name = block.options.get("ELSET", "")
     digits = "".join(c for c in kind.removeprefix("C3D") if c.isdigit())
-    if kind.startswith(SKIN_TYPES):
+    if kind.startswith((*SKIN_TYPES, *LINE_TYPES)):
         rows = [[block.whole(r, k) for k, w in enumerate(row) if w]
                 for r, row in enumerate(block.rows)]  # fmt: skip
-        deck.skin |= {row[0]: row[1:] for row in rows}
         deck.cell_sets.add(name or kind, [row[0] for row in rows])
-    elif kind in LINE_TYPES:
-        deck.aside.add(f"*ELEMENT, TYPE={kind}", block.place)
+        if kind in LINE_TYPES:
+            deck.aside.add(f"*ELEMENT, TYPE={kind}", block.place)
+        else:
+            deck.skin |= {row[0]: row[1:] for row in rows}
     elif kind.startswith("C3D") and is_whole(digits) and int(digits) in SOLIDS:
         cell_type = SOLIDS[int(digits)]
         width = 1 + (QUADRATIC_HEX if cell_type == "hex20" else kind_of(cell_type).n_nodes)
