@@ -125,25 +125,19 @@ def _node(deck: Nodes, block: Block) -> None:
         deck.node_sets.add(block.option("NSET"), labels)
 
 
-def _instance(deck: Nodes, block: Block) -> None:
-    if block.rows:
-        deck.unread.add("moved *INSTANCE", block.place)
-
-
-def _set(deck: Nodes, block: Block) -> None:
-    deck.node_sets.add(block.option("NSET"), block.members())
-
-
 def _part(deck: Nodes, block: Block) -> None:
     deck.axes = BASIC
+    if block.rows:
+        deck.unread.add(f"moved *{block.keyword}", block.place)
 
 
 READ: Table = {
     "PART": (_part, ("NAME",)),
     "END PART": (_part, ()),
-    "INSTANCE": (_instance, ("NAME", "PART")),
+    "INSTANCE": (_part, ("NAME", "PART")),
     "END INSTANCE": (_part, ()),
     "SYSTEM": (_system, ()),
     "NODE": (_node, ("NSET", "SYSTEM")),
-    "NSET": (_set, ("NSET", *SET_OPTIONS)),
-}
+    "NSET": (lambda deck, block: deck.node_sets.add(block.option("NSET"), block.members()),
+             ("NSET", *SET_OPTIONS)),
+}  # fmt: skip

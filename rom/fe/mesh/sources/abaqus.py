@@ -9,7 +9,6 @@ Source:
     Abaqus Keywords Reference Guide; CalculiX CrunchiX user's manual.
 """
 
-from collections.abc import Iterable
 from dataclasses import dataclass, field
 from itertools import product
 from pathlib import Path
@@ -99,12 +98,11 @@ def read(path: str) -> Read:
 
 def _element(deck: Deck, block: Block) -> None:
     kind = block.option("TYPE").upper()
-    name = block.options.get("ELSET", "")
     digits = "".join(c for c in kind.removeprefix("C3D") if c.isdigit())
     if kind.startswith((*SKIN_TYPES, *LINE_TYPES)):
         rows = [[block.whole(r, k) for k, w in enumerate(row) if w]
                 for r, row in enumerate(block.rows)]  # fmt: skip
-        deck.cell_sets.add(name or kind, [row[0] for row in rows])
+        deck.cell_sets.add(block.options.get("ELSET", kind), [row[0] for row in rows])
         if kind in LINE_TYPES:
             deck.aside.add(f"*ELEMENT, TYPE={kind}", block.place)
         else:
@@ -112,7 +110,7 @@ def _element(deck: Deck, block: Block) -> None:
     elif kind.startswith("C3D") and is_whole(digits) and int(digits) in SOLIDS:
         cell_type = SOLIDS[int(digits)]
         width = 1 + (QUADRATIC_HEX if cell_type == "hex20" else kind_of(cell_type).n_nodes)
-        _new_cells(deck, block, name, ((cell_type, row) for row in _table(block, width)))
+        _new_cells(deck, block, cell_type, _table(block, width))
     else:
         deck.unread.add(f"*ELEMENT, TYPE={kind}", block.place)
 
@@ -126,17 +124,15 @@ def _table(block: Block, width: int) -> list[list[int]]:
     return [numbers[k : k + width] for k in range(0, len(numbers), width)]
 
 
-def _new_cells(deck: Deck, block: Block, name: str, rows: Iterable[tuple[str, list[int]]]) -> None:
+def _new_cells(deck: Deck, block: Block, cell_type: str, rows: list[list[int]]) -> None:
     """Solids, in a set that is a region where there are no sections."""
-    labels = []
-    for cell_type, (label, *nodes) in rows:
+    for label, *nodes in rows:
         if label in deck.solids:
             raise block.wrong(f"element {label} is defined twice")
         deck.solids[label] = cell_type, nodes
-        labels.append(label)
-    deck.cell_sets.add(name or "body", labels)
-    if (name or "body") not in deck.own:
-        deck.own.append(name or "body")
+    name = block.options.get("ELSET", "body")
+    deck.cell_sets.add(name, [row[0] for row in rows])
+    deck.own.append(name)
 
 
 def _copies(deck: Deck, block: Block) -> None:
@@ -155,15 +151,11 @@ def _copies(deck: Deck, block: Block) -> None:
             raise block.wrong(f"{counts} elements along its directions", r)
         steps = np.array(list(product(*map(range, counts))), dtype=np.int64)[1:]
         by_node, by_cell = (steps @ np.array([row[k] for row in given]) for k in (1, 2))
-        rows = ((cell_type, [master + c, *(n + node for node in nodes)])
-                for c, n in zip(by_cell.tolist(), by_node.tolist(), strict=True))  # fmt: skip
-        _new_cells(deck, block, block.options.get("ELSET", ""), rows)
+        rows = [[master + c, *(n + node for node in nodes)]
+                for c, n in zip(by_cell.tolist(), by_node.tolist(), strict=True)]  # fmt: skip
+        _new_cells(deck, block, cell_type, rows)
         if "ELSET" in block.options:
             deck.cell_sets.add(block.option("ELSET"), [master])
-
-
-def _cell_set(deck: Deck, block: Block) -> None:
-    deck.cell_sets.add(block.option("ELSET"), block.members())
 
 
 def _surface(deck: Deck, block: Block) -> None:
@@ -172,19 +164,17 @@ def _surface(deck: Deck, block: Block) -> None:
     rows.extend(block.rows)
 
 
-def _section(deck: Deck, block: Block) -> None:
-    deck.sections.append(block.option("ELSET"))
-
-
 READ: Table = {
     **READ_OF_NODES,
     "ELEMENT": (_element, ("TYPE", "ELSET")),
     "ELGEN": (_copies, ("ELSET",)),
-    "ELSET": (_cell_set, ("ELSET", *SET_OPTIONS)),
+    "ELSET": (lambda deck, block: deck.cell_sets.add(block.option("ELSET"), block.members()),
+              ("ELSET", *SET_OPTIONS)),
     "SURFACE": (_surface, ("NAME", "TYPE", "INTERNAL")),
-    "SOLID SECTION": (_section, ("ELSET", "MATERIAL", "ORIENTATION", "CONTROLS")),
+    "SOLID SECTION": (lambda deck, block: deck.sections.append(block.option("ELSET")),
+                      ("ELSET", "MATERIAL", "ORIENTATION", "CONTROLS")),
     "SURFACE SECTION": (lambda deck, block: None, ("ELSET",)),  # without a density
-}
+}  # fmt: skip
 SILENT = {  # materials are given here; output
     "HEADING", "PREPRINT", "ASSEMBLY", "END ASSEMBLY", "MATERIAL", "ELASTIC", "DENSITY",
     "EXPANSION", "CONDUCTIVITY", "SPECIFIC HEAT", "PLASTIC", "CYCLIC HARDENING", "CREEP",
