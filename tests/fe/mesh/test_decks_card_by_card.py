@@ -10,8 +10,9 @@ import pytest
 from numpy.testing import assert_allclose
 
 import rom
-from cases.files.random_decks import SIZE, random_deck
+from cases.files.random_decks import CARDS, KEYWORDS, SIZE, random_deck
 from cases.long import few
+from rom.decks.bulk import cards
 from rom.errors import FileFormatError, RomError
 from rom.fe.mesh.read import read_mesh
 from rom.fe.mesh.sources import abaqus, nastran
@@ -97,6 +98,41 @@ def test_systems_lead_where_the_manuals_say(tmp_path):
     z = -np.array([1, 1, 0]) / np.sqrt(2)
     x = np.array([0, -2, 5]) - (np.array([0, -2, 5]) @ z) * z
     assert_allclose(found[1], [1, 2, 0] + x / np.linalg.norm(x) + 2 * z)
+
+
+EIGHT = ["1", "2", "3", "4", "5", "6", "7", "8"]
+FORMS = {  # what is written, the fields it means
+    "narrow": ("CHEXA   1       2       3       4       5       6       7       8", EIGHT),
+    "right": (f"CHEXA   {1:8}{2:8}{3:8}{4:8}{5:8}{6:8}{7:8}{8:8}", EIGHT),
+    "free": ("chexa, 1,2 , 3,4,5,6,7,8", EIGHT),
+    "tabs": ("CHEXA\t1\t2\t3\t4\t5\t6\t7\t8", EIGHT),
+    "wide": (f"CHEXA*  {1:<16}{2:<16}{3:<16}{4:<16}*A\n*A      {5:16}{6:16}{7:16}{8:16}", EIGHT),
+    "wide and free": ("CHEXA*,1,2,3,4,*\n*,5,6,7,8", EIGHT),
+    "half a wide one": ("CHEXA*,1,2,3,4\n+,9", [*EIGHT[:4], "", "", "", "", "9"]),
+    "named": (
+        "CHEXA   1       2       3       4       5       6       7       8       +X1\n+X1,9",
+        [*EIGHT, "9"],
+    ),
+    "a comment": ("CHEXA,1,2,3,4,5,6,7,8 $ 9\n$ 10\n\n,9", [*EIGHT, "9"]),
+}
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_forms_of_cards_mean_the_same(form, tmp_path):
+    text, fields = FORMS[form]
+    (tmp_path / "a.bdf").write_text(f"{text}\nENDDATA\nafter the end\n")
+    (card,) = cards(tmp_path / "a.bdf")
+    n = len(fields)
+    assert (card.name, card.fields[:n]) == ("CHEXA", fields) and not any(card.fields[n:])
+
+
+@pytest.mark.parametrize("name", [*CARDS, *KEYWORDS])
+def test_every_card_that_would_be_lost_is_refused_by_name(name, tmp_path):
+    path = tmp_path / ("a.inp" if name in KEYWORDS else "a.bdf")
+    path.write_text(RING + KEYWORDS[name] if name in KEYWORDS else CUBE + CARDS[name])
+    with pytest.raises(FileFormatError) as caught:
+        READERS[path.suffix[1:]](str(path))
+    assert f"{name} (1, {path.name} line " in str(caught.value)
 
 
 def test_a_piece_of_a_ring_weighs_what_it_does(tmp_path):

@@ -31,7 +31,7 @@ EDGES = {"hex20": (*LOWER_EDGES, *BETWEEN, *UPPER_EDGES)}  # mid-edge nodes wher
 SKIN = {"CTRIA3": 3, "CTRIA6": 3, "CQUAD4": 4, "CQUAD8": 4}  # corners
 LINES = ("CBAR",)  # without a property, as gmsh writes curves
 READ = {*POINTS, *SOLIDS, *SKIN, "SPC", "SPC1"}
-SILENT = ("PARAM", "MAT", "EIG", "TABLE", "PSOLID", "SET1", "SET3", "PLOTEL", "ECHO")
+SILENT = ("PARAM", "MAT", "EIG", "TABLE", "PSOLID", "PLSOLID", "SET1", "SET3", "PLOTEL", "ECHO")
 # loads, supports, steps, and what a reduction there holds
 ASIDE = set(
     "FORCE FORCE1 FORCE2 MOMENT MOMENT1 MOMENT2 PLOAD PLOAD1 PLOAD2 PLOAD4 GRAV ACCEL ACCEL1 "
