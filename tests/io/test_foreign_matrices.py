@@ -17,6 +17,7 @@ import rom
 from cases.files.decks import DECK
 from cases.paths import TESTS
 from cases.solid import block
+from rom.decks.lines import real
 from rom.errors import (
     ConfigError,
     FileFormatError,
@@ -26,7 +27,7 @@ from rom.errors import (
     RomError,
     UnsafeFileError,
 )
-from rom.io.matrices.dmig import read_dmig, read_grids, real, write_dmig
+from rom.io.matrices.dmig import read_dmig, read_grids, write_dmig
 from rom.io.matrices.matrix_files import read_matrix, write_abaqus_matrix
 from rom.io.matrices.op4 import read_op4, write_op4
 from rom.io.matrices.read_model import read_model
