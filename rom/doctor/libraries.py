@@ -23,7 +23,6 @@ PACKAGES = {  # of Debian, and of pip
     "SLEPc": ("python3-slepc4py", "dolfinx-solver-real"),
     "dolfinx": ("python3-dolfinx", "dolfinx-solver-real"),
     "gmsh": ("python3-gmsh", "gmsh"),
-    "meshio": ("python3-meshio", "meshio"),
     "h5py": ("python3-h5py", "h5py"),
 }
 LAUNCHERS = ("openmpi-bin", "mpich")

@@ -100,7 +100,6 @@ LIBRARIES: dict[str, Callable[[], str]] = {
     "SLEPc": _slepc,
     "dolfinx": lambda: _package("dolfinx"),
     "gmsh": _gmsh,
-    "meshio": lambda: _package("meshio"),
     "h5py": lambda: _package("h5py"),
 }
 

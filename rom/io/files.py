@@ -2,16 +2,15 @@
 
 import os
 import shutil
-import stat
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import IO
 
-from rom.errors import ConfigError, FileFormatError, ResourceError, UnsafeFileError
+from rom.errors import ConfigError, FileFormatError, ResourceError
 from rom.names import MAX_FILE_NAME_BYTES, TEMPORARY_BYTES
-
-MAX_FILE_BYTES = 2**32  # of a file that is still read
+from rom.readable import MAX_FILE_BYTES as MAX_FILE_BYTES
+from rom.readable import check_readable as check_readable
 
 
 def write_whole(path: str | Path, write: Callable[[IO[bytes]], object]) -> None:
@@ -75,31 +74,6 @@ def _check_possible(path: Path) -> None:
             f"no file can have the name {path.name[:60]!a}, of {len(path.name)} characters.",
             hint=f"Up to {MAX_FILE_NAME_BYTES - TEMPORARY_BYTES} bytes of text can be written.",
         )
-
-
-def check_readable(path: str | Path, largest: int = MAX_FILE_BYTES) -> Path:
-    """The path, if it is a file that may be read and is not too large.
-
-    Raises:
-        FileFormatError: if it is missing, a folder, a pipe, a circle of links, or not for us.
-        UnsafeFileError: if it has more than the largest number of bytes.
-    """
-    path = Path(path)
-    try:
-        found = path.stat()
-    except (OSError, ValueError) as error:  # also names that no file can have
-        raise FileFormatError(
-            "there is no such file.", where=str(path), hint="Relative paths start where you are."
-        ) from error
-    if stat.S_ISDIR(found.st_mode):
-        raise FileFormatError("this is a folder, not a file.", where=str(path))
-    if not stat.S_ISREG(found.st_mode):
-        raise FileFormatError("there is no such file, but a pipe or device.", where=str(path))
-    if not os.access(path, os.R_OK):
-        raise FileFormatError("the file may not be read by you.", where=str(path))
-    if found.st_size > largest:
-        raise UnsafeFileError(f"the file is larger than {largest / 2**20:g} MiB.", where=str(path))
-    return path
 
 
 def check_last_line(path: Path) -> None:

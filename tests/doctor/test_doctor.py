@@ -21,7 +21,7 @@ OPENBLAS = "/usr/lib/x86_64-linux-gnu/openblas-pthread/libblas.so.3"
 REFERENCE = "/usr/lib/x86_64-linux-gnu/blas/libblas.so.3.11.0"
 WHEEL = "/x/site-packages/numpy.libs/libscipy_openblas64_-8fb3d286.so"
 MODULES = {"MPI": "mpi4py", "PETSc": "petsc4py", "SLEPc": "slepc4py", "dolfinx": "dolfinx",
-           "gmsh": "gmsh", "meshio": "meshio", "h5py": "h5py"}  # fmt: skip
+           "gmsh": "gmsh", "h5py": "h5py"}  # fmt: skip
 
 
 def examine(tmp_path, *options, fakes=None):

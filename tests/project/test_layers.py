@@ -17,12 +17,13 @@ LIGHT = {"assembly", "body", "cyclic", "eigen", "errors", "io", "mbs", "model", 
          "paths", "reduction", "rotation", "units"}  # fmt: skip
 ANYTHING = {"__init__", "__main__", "cli", "doctor"}  # they stand in front
 # what every part stands on, none of it above another
-GROUND = {*"arguments lazy names places plausible process".split()}
+GROUND = {*"arguments lazy names places plausible process readable".split()}
 MAY_IMPORT = {  # module or package below rom/ -> what it may import from rom beside GROUND
     **{part: {"places", "errors", "model", "rotation"} for part in GROUND},
     "errors": set(),
     "notebook": set(),
     "model": {"errors", "material", "notebook"},
+    "decks": {"model", "errors"},
     "units": {"errors"},
     "rotation": {"errors"},
     "paths": {"model", "errors"},
@@ -32,13 +33,13 @@ MAY_IMPORT = {  # module or package below rom/ -> what it may import from rom be
     "body": {"model", "eigen", "rotation", "notebook", "paths", "units", "errors"},
     "assembly": {"model", "rows", "eigen", "body", "reduction", "rotation", "errors"},
     "mbs": {"model", "rotation", "io", "notebook", "paths", "errors"},
-    "io": {"model", "units", "body", "parametric", "updating", "errors"},
+    "io": {"model", "units", "body", "parametric", "updating", "errors", "decks"},
     "checks": {"model", "rows", "eigen", "body", "reduction", "errors"},
     "workflow": LIGHT | {"checks"},
     "prestress": {"model", "rows", "eigen", "rotation", "cyclic", "reduction", "errors"},
     "parametric": LIGHT | {"checks", "rows", "workflow"},
     "updating": {*"model rows body eigen assembly parametric reduction rotation errors".split()},
-    "fe": {"model", "eigen", "units", "errors"},
+    "fe": {"model", "eigen", "units", "errors", "decks"},
     "components": LIGHT | {"updating"},
     "view": {"model", "mbs", "rotation", "io", "errors"},
     "fmu": {"model", "mbs", "rotation", "body", "io", "errors"},
@@ -53,8 +54,8 @@ ORDER = {
     level: tuple(names.split())
     for level, names in {
         "": (
-            "errors notebook rotation places lazy names process arguments units "
-            "plausible material model rows paths eigen reduction body fe checks assembly "
+            "errors notebook rotation places lazy names readable process arguments units "
+            "plausible material model rows paths decks eigen reduction body fe checks assembly "
             "cyclic workflow parametric updating prestress io mbs fmu view config report "
             "components doctor cli __main__"
         ),

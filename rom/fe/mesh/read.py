@@ -1,7 +1,8 @@
 """Meshes of solids: one record, whatever file they come from.
 
-A mesh is read and checked on one process as NumPy arrays, before dolfinx sees it. gmsh and meshio
-run in a process of their own (`rom.fe.mesh.child`), because hostile or broken files can crash them.
+A mesh is read and checked on one process as NumPy arrays, before dolfinx sees it. gmsh and the
+readers of decks run in a process of their own (`rom.fe.mesh.child`), which hostile or broken files
+can crash.
 """
 
 import hashlib
@@ -13,6 +14,8 @@ from typing import Any
 import numpy as np
 
 from rom.arguments import typed
+from rom.decks import bulk, keywords
+from rom.decks.lines import lines
 from rom.errors import (
     ConfigError,
     FileFormatError,
@@ -31,6 +34,7 @@ from rom.fe.mesh.validate import checked
 from rom.model import Array, Index
 from rom.names import check_text
 
+INCLUDES = {"abaqus": keywords.INCLUDE, "nastran": bulk.INCLUDE}
 LARGEST_FILE = 2**32  # bytes; some ten million nodes
 READERS = {
     ".geo": "geo",
@@ -102,12 +106,19 @@ def read_mesh(  # noqa: PLR0913  limits and trust beside what is read
     }
     _check_request(path, request, scale)
     _check_trust(path, reader, trust)
-    digest = _digest(path)
+    files = {path}  # a deck may include others
+    if reader in INCLUDES:
+        files |= {place[0] for place, _ in lines(path, INCLUDES[reader])}
     arrays, notes = read_apart(
-        request, where=str(path), size=path.stat().st_size,
+        request, where=str(path), size=sum(file.stat().st_size for file in files),
         time_limit=time_limit, memory_limit=memory_limit,
     )  # fmt: skip
-    provenance = {"path": str(path), "sha256": digest, "scale": scale, **notes["provenance"]}
+    provenance = {
+        "path": str(path),
+        "sha256": _digest(*sorted(files)),
+        "scale": scale,
+        **notes["provenance"],
+    }
     mesh, remarks = _solid(arrays, notes, provenance, scale), notes["warnings"]
     if request["reader"] in GEOMETRIES:
         mesh, straightened = straighten(repair(mesh))
@@ -318,10 +329,13 @@ def _check_trust(path: Path, reader: str, trust: bool) -> None:
         )
 
 
-def _digest(path: Path) -> str:
+def _digest(*files: Path) -> str:
+    digest = hashlib.sha256()
     try:
-        with path.open("rb") as stream:
-            return hashlib.file_digest(stream, "sha256").hexdigest()
+        for path in files:
+            with path.open("rb") as stream:
+                hashlib.file_digest(stream, lambda: digest)
+        return digest.hexdigest()
     except PermissionError as error:
         raise ResourceError(f"cannot be read: {error.strerror}.", where=str(path)) from error
     except OSError as error:

@@ -4,7 +4,6 @@ Source:
     MSC Nastran Quick Reference Guide, entries DMIG, GRID and SPOINT, formats of bulk data.
 """
 
-import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -12,13 +11,13 @@ from typing import Any
 import numpy as np
 from scipy.sparse import coo_matrix, csc_matrix
 
+from rom.decks.bulk import POINTS, Card, cards, grids
+from rom.decks.lines import at, real, whole
 from rom.errors import FileFormatError
-from rom.io.files import check_last_line, check_readable, write_whole
+from rom.io.files import check_last_line, write_whole
 from rom.model import Array, Index
-from rom.names import ORIGIN_MARK
+from rom.names import ORIGIN_MARK, named
 
-BARE_EXPONENT = re.compile(r"(?<=[\d.])([+-]\d+)$")
-WHOLE_PATTERN = re.compile(r"[+-]?\d{1,18}", re.ASCII)
 SYMMETRIC_FORM, SQUARE_FORM = 6, 1
 Dofs = Index  # (n, 2) label and component, 1 to 6, or 0 for a scalar point
 
@@ -35,12 +34,15 @@ def read_dmig(path: str | Path) -> dict[str, tuple[Any, Dofs]]:
     path = Path(path)
     check_last_line(path)
     entries: dict[str, list[tuple[int, int, int, int, float]]] = {}
-    for number, fields in cards(path, "DMIG"):
+    for card in cards(path):
+        if card.name != "DMIG":
+            continue
         try:
-            _enter(entries, fields)
+            _enter(entries, card.fields)
         except (ValueError, IndexError) as error:
-            where = f"{path}, line {number}"
-            raise FileFormatError(f"this is no DMIG card: {error}.", where=where) from error
+            raise FileFormatError(
+                f"this is no DMIG card: {error}.", where=at(card.place)
+            ) from error
     if not entries:
         raise FileFormatError("the file holds no DMIG matrix.", where=str(path))
     return {name: _matrix(rows) for name, rows in entries.items()}
@@ -50,19 +52,22 @@ def read_grids(path: str | Path) -> tuple[Index, Array]:
     """Labels (k,) and positions (k, 3) of GRID cards in the basic system, in units of the file.
 
     Raises:
-        FileFormatError: naming the line, for a card that is damaged or in another system.
+        FileFormatError: naming the line, for a card that is damaged; or where nodes move along the
+            axes of another system.
     """
-    labels, points = [], []
-    for number, fields in cards(path, "GRID"):
-        try:
-            if fields[1].strip("0") or (len(fields) > 5 and fields[5].strip("0")):
-                raise ValueError("its coordinate system is not the basic one")
-            labels.append(whole(fields[0]))
-            points.append([real(fields[k]) for k in (2, 3, 4)])
-        except (ValueError, IndexError) as error:
-            where = f"{path}, line {number}"
-            raise FileFormatError(f"this GRID is not read: {error}.", where=where) from error
-    return np.array(labels, dtype=np.int64), np.array(points).reshape(-1, 3)
+    found: dict[str, list[Card]] = {}
+    for card in cards(path):
+        if card.name in POINTS:
+            found.setdefault(card.name, []).append(card)
+    labels, points, turned = grids(found)
+    if (other := labels[turned != 0]).size:
+        raise FileFormatError(
+            f"the nodes {named(other.tolist())} move along axes of their own, and with them the "
+            "rows of the matrices.",
+            where=str(path),
+            hint="Leave field 7 of GRID empty and write the matrices again.",
+        )
+    return labels, points
 
 
 def write_dmig(
@@ -87,66 +92,6 @@ def write_dmig(
     text = "\n".join(lines) + "\n"
     write_whole(path, lambda file: file.write(text.encode("ascii")))
     return Path(path)
-
-
-def cards(path: str | Path, wanted: str) -> Iterator[tuple[int, list[str]]]:
-    """Line number and fields, without the name, of all cards of a kind.
-
-    Raises:
-        FileFormatError: if the file is missing.
-        UnsafeFileError: if it is larger than 4 GiB.
-    """
-    path = check_readable(path)
-    start, fields = 0, list[str]()
-    with path.open(encoding="ascii", errors="replace") as file:
-        for number, line in enumerate(file, 1):
-            line = line.partition("$")[0].rstrip()
-            if not line:
-                continue
-            continued = line[0] in "*+, " and bool(fields)
-            if not continued:
-                if fields:
-                    yield start, fields
-                name = line.split(",")[0][:8].strip().rstrip("*").upper()
-                start, fields = number, []
-                if name != wanted:
-                    continue
-            fields += _fields(line)
-    if fields:
-        yield start, fields
-
-
-def real(text: str) -> float:
-    """A number of bulk data, e.g. 1.5D+3, 1.5+3 or .5.
-
-    Raises:
-        ValueError: if it is none, or not finite.
-    """
-    word = text.strip().upper().replace("D", "E")
-    value = float(word if "E" in word else BARE_EXPONENT.sub(r"E\1", word))
-    if not np.isfinite(value):
-        raise ValueError(f"{text!r} is not finite")
-    return value
-
-
-def whole(text: str) -> int:
-    """The label of a node, or a component.
-
-    Raises:
-        ValueError: if it is no whole number that fits eight bytes.
-    """
-    if not WHOLE_PATTERN.fullmatch(text.strip()):
-        raise ValueError(f"{text.strip()[:20]!r} is no whole number of at most 18 digits")
-    return int(text)
-
-
-def _fields(line: str) -> list[str]:
-    """Fields after the first: free, of 16 characters, or of 8; filled up to four or eight."""
-    if "," in line:
-        words = [word.strip() for word in line.split(",")[1:9]]
-        return words + [""] * (8 - len(words))
-    width = 16 if "*" in line[:8] else 8
-    return [line[k : k + width].strip() for k in range(8, 72, width)]
 
 
 def _enter(entries: dict[str, list[tuple[int, int, int, int, float]]], fields: list[str]) -> None:

@@ -7,10 +7,11 @@ from typing import Any
 import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix
 
+from rom.decks.lines import whole
 from rom.errors import ConfigError, FileFormatError
 from rom.io.files import check_last_line, check_readable, write_whole
 from rom.io.matrices.calculix import MATRIX_ENDINGS, read_stored_matrix
-from rom.io.matrices.dmig import Dofs, read_dmig, whole
+from rom.io.matrices.dmig import Dofs, read_dmig
 from rom.io.matrices.market import BANNER_TEXT, read_market
 from rom.io.matrices.op4 import Matrices, read_op4
 from rom.io.matrices.user_element import read_user_element

@@ -1,21 +1,21 @@
 """Nodes, and sets of nodes, in the files of other finite element programs."""
 
-from collections.abc import Iterator
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from rom.errors import ConfigError, FileFormatError, InterfaceError, UnsafeFileError
+from rom.decks.keywords import Block
+from rom.decks.nodes import READ, Nodes
+from rom.errors import ConfigError, FileFormatError, InterfaceError
 from rom.io.files import check_readable
-from rom.io.matrices.dmig import read_grids, whole
+from rom.io.matrices.dmig import read_grids
 from rom.model import Array, Index
 from rom.names import named, offered
 
 CARDS = (".bdf", ".dat")
-WITH_FILES, MOST_INCLUDED = ("*INCLUDE", "*NODE", "*NSET"), 20
-MOST_NESTED, MOST_NODES = 200, 100_000_000  # sets in sets, nodes in a set
+# keywords that make nodes in ways that are not read, or turn the rows of matrices
+REFUSED = ("NGEN", "NFILL", "NCOPY", "NMAP", "TRANSFORM", "PARAMETER")
 
 
 def read_nodes(nodes: Any) -> tuple[Index, Array]:
@@ -47,15 +47,35 @@ def _node_file(path: Path) -> tuple[Index, Array]:
         return read_grids(path)
     if ending not in (".inp", ".csv"):
         raise ConfigError(f"nodes are read from .inp, .bdf, .dat or .csv, not from {path}.")
-    rows = []
-    for line in _lines(path):
-        if line.keyword == ("" if ending == ".csv" else "*NODE"):
-            try:
-                rows.append((whole(line.words[0]), *(float(line.words[k]) for k in (1, 2, 3))))
-            except (ValueError, IndexError) as error:
-                raise FileFormatError("a node is label, x, y, z.", where=line.where) from error
-    labels = np.array([row[0] for row in rows], dtype=np.int64)
-    return labels, np.array([row[1:] for row in rows]).reshape(-1, 3)
+    return _deck(path).placed() if ending == ".inp" else _table(path)
+
+
+def _deck(path: Path) -> Nodes:
+    """The nodes and sets of a deck."""
+    deck = Nodes(path)
+    for block in deck.blocks():
+        if block.keyword in READ:
+            deck.take(block, READ)
+        elif block.keyword in REFUSED:
+            deck.unread.add(f"*{block.keyword}", block.place)
+    deck.unread.refuse()
+    return deck
+
+
+def _table(path: Path) -> tuple[Index, Array]:
+    """Lines ``label, x, y, z``."""
+    block = Block("NODE", {}, (check_readable(path), 1))
+    with path.open(encoding="utf-8", errors="replace") as file:
+        for number, line in enumerate(file, 1):
+            if line.strip() and not line.startswith(("**", "#")):
+                block.rows.append([word.strip() for word in line.split(",")])
+                block.places.append((path, number))
+                if not all(block.rows[-1][:4]) or len(block.rows[-1]) < 4:
+                    where = f"{path}, line {number}"
+                    raise FileFormatError("a node is label, x, y, z.", where=where)
+    rows = range(len(block.rows))
+    labels = np.array([block.whole(r, 0) for r in rows], dtype=np.int64)
+    return labels, np.array([block.reals(r, 1, 2, 3) for r in rows]).reshape(-1, 3)
 
 
 def read_node_sets(path: str | Path, names: tuple[str, ...]) -> dict[str, Index]:
@@ -76,90 +96,9 @@ def read_node_sets(path: str | Path, names: tuple[str, ...]) -> dict[str, Index]
             f"sets of nodes are read from .inp, not from {path}.",
             hint="Give a dictionary of labels.",
         )
-    sets = _Sets()
-    for line in _lines(path):
-        name = line.options.get("NSET", "").upper()
-        if not name or line.keyword not in ("*NSET", "*NODE"):
-            continue
-        members = sets.members.setdefault(name, [])
-        if line.keyword == "*NODE":
-            members.append(line.whole(0))
-        elif "GENERATE" in line.options:
-            step = line.whole(2) if len(line.words) > 2 else 1
-            members.append(range(line.whole(0), line.whole(1) + 1, max(step, 1)))
-        else:
-            members += [
-                line.whole(k) if w.isdecimal() else w.upper() for k, w in enumerate(line.words) if w
-            ]
+    sets = _deck(path).node_sets
     known = {name: name.upper() for name in names}
     missing = [name for name, key in known.items() if key not in sets.members]
     if missing:
         raise InterfaceError(f"{path} has no set {named(missing)}; it has {offered(sets.members)}.")
     return {name: sets.of(key, str(path)) for name, key in known.items()}
-
-
-@dataclass(slots=True)
-class _Sets:
-    """Members of each set: labels, ranges of labels, names of sets; each is resolved once."""
-
-    members: dict[str, list[Any]] = field(default_factory=dict)
-    known: dict[str, Index | None] = field(default_factory=dict)
-
-    def of(self, name: str, where: str) -> Index:
-        if name in self.known and (found := self.known[name]) is not None:
-            return found
-        if name not in self.members or name in self.known or len(self.known) > MOST_NESTED:
-            what = "in itself" if name in self.known else "unknown, or nested too deep"
-            raise FileFormatError(f"the set {name!r} is {what}.", where=where)
-        self.known[name] = None
-        parts = [np.zeros(0, dtype=np.int64)]
-        for member in self.members[name]:
-            if isinstance(member, str):
-                parts.append(self.of(member, where))
-            elif isinstance(member, range) and len(member) > MOST_NODES:
-                raise UnsafeFileError(f"the set {name!r} has {len(member)} nodes.", where=where)
-            else:
-                parts.append(np.atleast_1d(np.array(member, dtype=np.int64)))
-        self.known[name] = out = np.unique(np.concatenate(parts))
-        return out
-
-
-@dataclass(frozen=True, slots=True)
-class _Line:
-    """A line of data of a deck, and the keyword it stands under."""
-
-    keyword: str
-    options: dict[str, str]
-    words: list[str]
-    where: str
-
-    def whole(self, k: int) -> int:
-        try:
-            return whole(self.words[k])
-        except (ValueError, IndexError) as error:
-            raise FileFormatError("a label is a whole number.", where=self.where) from error
-
-
-def _lines(
-    path: Path, keyword: str = "", options: dict[str, str] | None = None, depth: int = 0
-) -> Iterator[_Line]:
-    """Lines of data of a deck and of the files it includes, whole or as data of a keyword."""
-    check_readable(path)
-    if depth > MOST_INCLUDED:
-        raise FileFormatError("files include each other too deep.", where=str(path))
-    options = options or {}
-    with path.open(encoding="utf-8", errors="replace") as file:
-        for number, line in enumerate(file, 1):
-            if line.startswith(("**", "#")) or not line.strip():
-                continue
-            words = [word.strip() for word in line.strip().rstrip(",").split(",")]
-            if not line.startswith("*"):
-                yield _Line(keyword, options, words, f"{path}, line {number}")
-                continue
-            pairs = (word.partition("=") for word in words[1:])
-            found = {key.strip().upper(): value.strip() for key, _, value in pairs}
-            if words[0].upper() != "*INCLUDE":
-                keyword, options = words[0].upper(), found
-            if "INPUT" in found and words[0].upper() in WITH_FILES:
-                other = path.parent / found["INPUT"].strip("\"'")
-                yield from _lines(other, keyword, options, depth + 1)

@@ -21,9 +21,10 @@ from typing import Any
 import numpy as np
 from scipy.sparse import csr_matrix, tril
 
+from rom.decks.lines import whole
 from rom.errors import ConfigError, FileFormatError, UnsafeFileError
 from rom.io.files import check_last_line, write_whole
-from rom.io.matrices.dmig import Dofs, whole
+from rom.io.matrices.dmig import Dofs
 from rom.model import Array
 from rom.names import ORIGIN_MARK
 

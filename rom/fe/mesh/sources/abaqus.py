@@ -1,18 +1,25 @@
-"""Abaqus decks.
+"""Decks of Abaqus and CalculiX.
 
 Regions are the element sets of ``*SOLID SECTION``, or without any the ``ELSET`` of ``*ELEMENT``.
-Interfaces are ``*SURFACE`` of element faces or nodes, skin elements (S3, S4, M3D3, ...) by their
-``ELSET``, and each ``*NSET`` that contains whole facets of the outer surface. One flat part.
-meshio 5.0 is not used here: it keeps only the last ``*NODE`` block and drops surfaces.
+Interfaces are ``*SURFACE`` of element faces or nodes, sets of skin elements (S3, S4, M3D3, CPS3,
+...), and each ``*NSET`` that contains whole facets of the outer surface. Every keyword is read,
+left aside because a free body does not need it, or refused by name.
+
+Source:
+    Abaqus Keywords Reference Guide; CalculiX CrunchiX user's manual.
 """
 
-from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
+from itertools import product
 from pathlib import Path
 
 import numpy as np
 
-from rom.errors import FileFormatError, MeshError, TagError
+from rom.decks.keywords import Block, Sets
+from rom.decks.lines import Unread
+from rom.decks.nodes import READ as READ_OF_NODES
+from rom.decks.nodes import SET_OPTIONS, Nodes, Table
+from rom.errors import FileFormatError, TagError
 from rom.fe.mesh.solid import Read, packed
 from rom.fe.mesh.sources.deck import (
     QUADRATIC_HEX,
@@ -23,12 +30,16 @@ from rom.fe.mesh.sources.deck import (
     positions,
     rings,
     to_gmsh,
+    unused,
 )
-from rom.model import Array, Index
-from rom.names import is_whole
+from rom.model import Index
+from rom.names import is_whole, named
 
 SOLIDS = {4: "tet4", 10: "tet10", 8: "hex8", 20: "hex20"}
-SKIN_TYPES = ("S3", "S4", "S6", "S8", "STRI3", "STRI65", "M3D3", "M3D4", "M3D6", "M3D8", "SFM3D")
+SKIN_TYPES = ("S3", "S4", "S6", "S8", "STRI3", "STRI65", "M3D3", "M3D4", "M3D6", "M3D8", "SFM3D",
+              "CPS")  # fmt: skip
+LINE_TYPES = ("T3D2", "T3D3")  # without a section, as gmsh writes curves
+MOST_GENERATED = 10_000_000  # elements by a row
 # corners of the faces S1, S2, ... of a cell
 SIDES = {
     4: ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0)),
@@ -37,16 +48,19 @@ SIDES = {
 
 
 @dataclass
-class Deck:
-    """What a deck says, in its own numbers. Sets hold numbers and names of other sets."""
+class Deck(Nodes):
+    """What a deck says, in its own numbers.
 
-    nodes: list[list[str]] = field(default_factory=list)
-    blocks: list[tuple[str, str, list[list[str]]]] = field(
-        default_factory=list
-    )  # type, elset, rows
-    node_sets: dict[str, list[int | str]] = field(default_factory=dict)
-    cell_sets: dict[str, list[int | str]] = field(default_factory=dict)
+    Solids are {number: (cell type, nodes)}, skin {number: nodes}, surfaces {name: (type, rows)};
+    own and sections are names of element sets: of ``*ELEMENT``, of sections.
+    """
+
+    aside: Unread = field(default_factory=Unread)
+    solids: dict[int, tuple[str, list[int]]] = field(default_factory=dict)
+    skin: dict[int, list[int]] = field(default_factory=dict)
+    cell_sets: Sets = field(default_factory=lambda: Sets("elements"))
     surfaces: dict[str, tuple[str, list[list[str]]]] = field(default_factory=dict)
+    own: list[str] = field(default_factory=list)
     sections: list[str] = field(default_factory=list)
 
 
@@ -54,177 +68,137 @@ def read(path: str) -> Read:
     """Read a deck; see `rom.fe.mesh.sources.readers.read`.
 
     Raises:
-        FileFormatError: the deck is damaged, or has parts this reader does not follow.
+        FileFormatError: the deck is damaged, or has keywords whose mass or stiffness would be lost.
         MeshError: no solid cells, or of several types.
         TagError: an element in two sections, or in none.
     """
-    deck = Deck()
-    for keyword, options, rows in _sections(Path(path).read_text(encoding="utf-8")):
-        BLOCK_READERS.get(keyword, _ignore)(deck, options, rows)
-    blocks = [block for block in deck.blocks if not block[0].startswith(SKIN_TYPES)]
-    cell_type = only_type(_solid(block[0]) for block in blocks)
-    width = QUADRATIC_HEX if cell_type == "hex20" else kind_of(cell_type).n_nodes
-    tables = [_table(rows, width) for _, _, rows in blocks]
-    own: dict[str, list[int | str]] = {}
-    for (_, name, _), table in zip(blocks, tables, strict=True):
-        own.setdefault(name or "body", []).extend(table[:, 0].tolist())
-    ids, raw = np.vstack(tables)[:, 0], np.vstack(tables)[:, 1:]
-    positions(ids, ids[:1], "element")  # refuses a number given twice
-    deck = replace(deck, cell_sets={**deck.cell_sets, **own})
-    node_ids, points = _points(deck)
+    deck = Deck(Path(path))
+    for block in deck.blocks():
+        if block.keyword in READ:
+            deck.take(block, READ)
+        elif block.keyword not in SILENT:
+            counted = deck.aside if block.keyword in ASIDE else deck.unread
+            counted.add(f"*{block.keyword}", block.place)
+    deck.unread.refuse()
+    cell_type = only_type(kind for kind, _ in deck.solids.values())
+    ids = np.array(list(deck.solids), dtype=np.int64)
+    raw = np.array([nodes for _, nodes in deck.solids.values()], dtype=np.int64)
+    node_ids, points = deck.placed()
     cells = to_gmsh(positions(node_ids, raw, "node"), cell_type)
-    names, regions = _regions(deck, list(own), ids)
+    names, regions = _regions(deck, ids)
     facets, remarks = _facets(deck, ids, cells, cell_type, node_ids)
     return packed(
         points, cells, cell_type, regions, ids,
-        facets=facets, region_names=names, warnings=remarks, provenance={"parameters": {}},
+        facets=facets,
+        region_names=names,
+        warnings=[*deck.aside.remark(), *remarks, *unused(node_ids, cells)],
+        provenance={"parameters": {}},
     )  # fmt: skip
 
 
-def _sections(text: str) -> Iterator[tuple[str, dict[str, str], list[list[str]]]]:
-    """(keyword, options, data rows) of each keyword line."""
-    rows: list[list[str]] = []
-    keyword, line_open = "", False
-    for line in text.splitlines():
-        line = line.strip()
-        if not line or line.startswith("**"):
-            continue
-        if line.startswith("*") or line_open:
-            if line_open:
-                keyword += line
-            else:
-                if keyword:
-                    yield *_options(keyword), rows
-                keyword, rows = line, []
-            line_open = line.endswith(",")
+def _element(deck: Deck, block: Block) -> None:
+    kind = block.option("TYPE").upper()
+    digits = "".join(c for c in kind.removeprefix("C3D") if c.isdigit())
+    if kind.startswith((*SKIN_TYPES, *LINE_TYPES)):
+        rows = [[block.whole(r, k) for k, w in enumerate(row) if w]
+                for r, row in enumerate(block.rows)]  # fmt: skip
+        deck.cell_sets.add(block.options.get("ELSET", kind), [row[0] for row in rows])
+        if kind in LINE_TYPES:
+            deck.aside.add(f"*ELEMENT, TYPE={kind}", block.place)
         else:
-            rows.append([x.strip() for x in line.split(",")])
-    if keyword:
-        yield *_options(keyword), rows
+            deck.skin |= {row[0]: row[1:] for row in rows}
+    elif kind.startswith("C3D") and is_whole(digits) and int(digits) in SOLIDS:
+        cell_type = SOLIDS[int(digits)]
+        width = 1 + (QUADRATIC_HEX if cell_type == "hex20" else kind_of(cell_type).n_nodes)
+        _new_cells(deck, block, cell_type, _table(block, width))
+    else:
+        deck.unread.add(f"*ELEMENT, TYPE={kind}", block.place)
 
 
-def _options(line: str) -> tuple[str, dict[str, str]]:
-    words = [w.strip() for w in line.lstrip("*").split(",") if w.strip()]
-    pairs = [w.partition("=") for w in words[1:]]
-    name = " ".join(words[0].upper().split()) if words else ""
-    return name, {k.strip().upper(): v.strip().strip('"') for k, _, v in pairs}
+def _table(block: Block, width: int) -> list[list[int]]:
+    """Element number and nodes of each element, which may run over several lines."""
+    numbers = [block.whole(r, k) for r, row in enumerate(block.rows)
+               for k, word in enumerate(row) if word]  # fmt: skip
+    if len(numbers) % width:
+        raise block.wrong(f"{len(numbers)} numbers are no multiple of {width}: a line is cut")
+    return [numbers[k : k + width] for k in range(0, len(numbers), width)]
 
 
-def _node(deck: Deck, options: dict[str, str], rows: list[list[str]]) -> None:
-    deck.nodes += rows
-    if "NSET" in options:
-        deck.node_sets.setdefault(options["NSET"], []).extend(int(row[0]) for row in rows)
+def _new_cells(deck: Deck, block: Block, cell_type: str, rows: list[list[int]]) -> None:
+    """Solids, in a set that is a region where there are no sections."""
+    for label, *nodes in rows:
+        if label in deck.solids:
+            raise block.wrong(f"element {label} is defined twice")
+        deck.solids[label] = cell_type, nodes
+    name = block.options.get("ELSET", "body")
+    deck.cell_sets.add(name, [row[0] for row in rows])
+    deck.own.append(name)
 
 
-def _element(deck: Deck, options: dict[str, str], rows: list[list[str]]) -> None:
-    deck.blocks.append((_needed(options, "TYPE").upper(), options.get("ELSET", ""), rows))
+def _copies(deck: Deck, block: Block) -> None:
+    """``*ELGEN``: an element again and again along rows, rows and layers."""
+    for r in range(len(block.rows)):
+        master = block.whole(r, 0)
+        if master not in deck.solids:
+            raise block.wrong(f"element {master} is not defined", r)
+        cell_type, nodes = deck.solids[master]
+        # along each direction: how often, and steps of nodes and elements
+        given = [(block.whole(r, 1, 1), block.whole(r, 2, 1), block.whole(r, 3, 1)),
+                 *((block.whole(r, k, 1), block.whole(r, k + 1, 0), block.whole(r, k + 2, 0))
+                   for k in (4, 7))]  # fmt: skip
+        counts = [n for n, _, _ in given]
+        if min(counts) < 1 or np.prod(counts, dtype=float) > MOST_GENERATED:
+            raise block.wrong(f"{counts} elements along its directions", r)
+        steps = np.array(list(product(*map(range, counts))), dtype=np.int64)[1:]
+        by_node, by_cell = (steps @ np.array([row[k] for row in given]) for k in (1, 2))
+        rows = [[master + c, *(n + node for node in nodes)]
+                for c, n in zip(by_cell.tolist(), by_node.tolist(), strict=True)]  # fmt: skip
+        _new_cells(deck, block, cell_type, rows)
+        if "ELSET" in block.options:
+            deck.cell_sets.add(block.option("ELSET"), [master])
 
 
-def _node_set(deck: Deck, options: dict[str, str], rows: list[list[str]]) -> None:
-    deck.node_sets.setdefault(_needed(options, "NSET"), []).extend(_members(options, rows))
+def _surface(deck: Deck, block: Block) -> None:
+    kind = block.options.get("TYPE", "ELEMENT").upper()
+    rows = deck.surfaces.setdefault(block.option("NAME"), (kind, []))[1]
+    rows.extend(block.rows)
 
 
-def _cell_set(deck: Deck, options: dict[str, str], rows: list[list[str]]) -> None:
-    deck.cell_sets.setdefault(_needed(options, "ELSET"), []).extend(_members(options, rows))
+READ: Table = {
+    **READ_OF_NODES,
+    "ELEMENT": (_element, ("TYPE", "ELSET")),
+    "ELGEN": (_copies, ("ELSET",)),
+    "ELSET": (lambda deck, block: deck.cell_sets.add(block.option("ELSET"), block.members()),
+              ("ELSET", *SET_OPTIONS)),
+    "SURFACE": (_surface, ("NAME", "TYPE", "INTERNAL")),
+    "SOLID SECTION": (lambda deck, block: deck.sections.append(block.option("ELSET")),
+                      ("ELSET", "MATERIAL", "ORIENTATION", "CONTROLS")),
+    "SURFACE SECTION": (lambda deck, block: None, ("ELSET",)),  # without a density
+}  # fmt: skip
+SILENT = {  # materials are given here; output
+    "HEADING", "PREPRINT", "ASSEMBLY", "END ASSEMBLY", "MATERIAL", "ELASTIC", "DENSITY",
+    "EXPANSION", "CONDUCTIVITY", "SPECIFIC HEAT", "PLASTIC", "CYCLIC HARDENING", "CREEP",
+    "DAMPING", "HYPERELASTIC", "VISCOELASTIC", "DEPVAR", "USER MATERIAL", "ORIENTATION",
+    "TRANSFORM", "SECTION CONTROLS", "AMPLITUDE", "PHYSICAL CONSTANTS", "SURFACE INTERACTION",
+    "SURFACE BEHAVIOR", "FRICTION", "RESTART", "TIME POINTS", "NODE PRINT", "EL PRINT",
+    "NODE FILE", "EL FILE", "FILE FORMAT",
+}  # fmt: skip
+ASIDE = {"STEP", "BOUNDARY", "INITIAL CONDITIONS", "CLOAD", "DLOAD", "DSLOAD", "TEMPERATURE"}
 
 
-def _needed(options: dict[str, str], name: str) -> str:
-    if name not in options:
-        raise FileFormatError(f"a keyword line has no {name}.")
-    return options[name]
-
-
-def _members(options: dict[str, str], rows: list[list[str]]) -> list[int | str]:
-    if "GENERATE" in options:
-        ranges = [[*(int(x) for x in row if x), 1][:3] for row in rows]
-        return [i for first, last, step in ranges for i in range(first, last + 1, step)]
-    return [_number(x) for row in rows for x in row if x]
-
-
-def _number(word: str) -> int | str:
-    return int(word) if is_whole(word) else word.strip('"')
-
-
-def _numbers(sets: dict[str, list[int | str]], name: int | str, depth: int = 20) -> list[int]:
-    """Numbers in a set, those of the sets it names included."""
-    if isinstance(name, int):
-        return [name]
-    if name not in sets:
-        raise FileFormatError(f"the set {name!r} is used but not defined.")
-    if not depth:
-        raise FileFormatError(f"the set {name!r} contains itself.")
-    return [i for one in sets[name] for i in _numbers(sets, one, depth - 1)]
-
-
-def _surface(deck: Deck, options: dict[str, str], rows: list[list[str]]) -> None:
-    deck.surfaces[_needed(options, "NAME")] = options.get("TYPE", "ELEMENT").upper(), rows
-
-
-def _section(deck: Deck, options: dict[str, str], rows: list[list[str]]) -> None:
-    deck.sections.append(_needed(options, "ELSET"))
-
-
-def _foreign(deck: Deck, options: dict[str, str], rows: list[list[str]]) -> None:
-    raise FileFormatError(
-        "the deck has *INCLUDE or a moved *INSTANCE, which this reader does not follow.",
-        hint="Write one flat input file, without parts and includes.",
-    )
-
-
-def _instance(deck: Deck, options: dict[str, str], rows: list[list[str]]) -> None:
-    if rows:
-        _foreign(deck, options, rows)
-
-
-def _ignore(deck: Deck, options: dict[str, str], rows: list[list[str]]) -> None:
-    pass
-
-
-BLOCK_READERS = {
-    "NODE": _node,
-    "ELEMENT": _element,
-    "NSET": _node_set,
-    "ELSET": _cell_set,
-    "SURFACE": _surface,
-    "SOLID SECTION": _section,
-    "INCLUDE": _foreign,
-    "INSTANCE": _instance,
-}
-
-
-def _solid(name: str) -> str:
-    digits = "".join(c for c in name.removeprefix("C3D") if c.isdigit())
-    if not name.startswith("C3D") or not is_whole(digits) or int(digits) not in SOLIDS:
-        raise MeshError(
-            f"elements of type {name} are not supported.",
-            hint="Supported are C3D4, C3D10, C3D8, C3D20 and their variants.",
-        )
-    return SOLIDS[int(digits)]
-
-
-def _table(rows: list[list[str]], width: int) -> Index:
-    """(m, 1 + width) element number and nodes; an element may run over several lines."""
-    numbers = np.array([int(x) for row in rows for x in row if x], dtype=np.int64)
-    if numbers.size % (width + 1):
-        raise FileFormatError(
-            f"an *ELEMENT block has {numbers.size} numbers, not a multiple of "
-            f"{width + 1}: a line is cut."
-        )
-    return numbers.reshape(-1, width + 1)
-
-
-def _points(deck: Deck) -> tuple[Index, Array]:
-    """(n,) node numbers and (n, 3) coordinates."""
-    ids = np.array([int(row[0]) for row in deck.nodes], dtype=np.int64)
-    return ids, np.array([[float(x) for x in row[1:4]] for row in deck.nodes]).reshape(-1, 3)
-
-
-def _regions(deck: Deck, own: list[str], ids: Index) -> tuple[dict[int, str], Index]:
+def _regions(deck: Deck, ids: Index) -> tuple[dict[int, str], Index]:
     """{region number: name} and the region number of each cell."""
-    names = dict(enumerate(deck.sections or own, 1))
+    names = dict(enumerate(dict.fromkeys(deck.sections or deck.own), 1))
     regions = np.zeros(ids.size, dtype=np.int64)
     for number, name in names.items():
-        chosen = np.isin(ids, np.array(_numbers(deck.cell_sets, name), dtype=np.int64))
+        members = deck.cell_sets.of(name)
+        if (others := np.setdiff1d(members, ids)).size:
+            raise FileFormatError(
+                f"the section of {name!r} has elements that are no solids: "
+                f"{named(others.tolist())}.",
+                hint="Shells, trusses and beams are not read; take their section out.",
+            )
+        chosen = np.isin(ids, members)
         if (both := chosen & (regions > 0)).any():
             raise TagError(
                 f"element {ids[both][0]} is in the sections {names[regions[both][0]]!r} and "
@@ -245,38 +219,39 @@ def _facets(
     n = node_ids.size
     outer = outer_facets(cells, cell_type, n)
     facets: dict[str, Index] = {}
-    sets = {k: v for k, v in deck.node_sets.items() if k not in deck.surfaces}
+    sets = {name: deck.node_sets.of(key) for key, name in deck.node_sets.names.items()
+            if name not in deck.surfaces}  # fmt: skip
     for name, (kind, rows) in deck.surfaces.items():
         if kind == "NODE":
-            sets[name] = [_number(row[0]) for row in rows]
+            sets[name] = np.concatenate([_members(deck.node_sets, row[0]) for row in rows])
         else:
             facets[name] = np.vstack([_sides(deck, row, ids, cells, cell_type) for row in rows])
     for name, nodes in _skin_nodes(deck).items():
         sets.setdefault(name, nodes)
-    found = {
-        name: positions(node_ids, np.array(_all_numbers(deck, members), dtype=np.int64), "node")
-        for name, members in sets.items()
-    }
+    found = {name: positions(node_ids, members, "node") for name, members in sets.items()}
     by_nodes, remarks = facets_of_nodes(outer, found, cell_type, n)
     return facets | by_nodes, remarks
 
 
-def _all_numbers(deck: Deck, members: list[int | str]) -> list[int]:
-    return [i for one in members for i in _numbers(deck.node_sets, one)]
-
-
-def _skin_nodes(deck: Deck) -> dict[str, list[int | str]]:
-    """Nodes of the skin elements by element set."""
-    found: dict[str, list[int | str]] = {}
-    for kind, name, rows in deck.blocks:
-        if kind.startswith(SKIN_TYPES) and name:
-            found.setdefault(name, []).extend(int(x) for row in rows for x in row[1:] if x)
+def _skin_nodes(deck: Deck) -> dict[str, Index]:
+    """Nodes of skin elements by the element sets that hold nothing else."""
+    found = {}
+    for key, name in deck.cell_sets.names.items():
+        members = deck.cell_sets.of(key).tolist()
+        if members and all(label in deck.skin for label in members):
+            nodes = {node for label in members for node in deck.skin[label]}
+            found[name] = np.array(sorted(nodes), dtype=np.int64)
     return found
+
+
+def _members(sets: Sets, word: str) -> Index:
+    """Numbers in a set, or the one number."""
+    return np.array([int(word)], dtype=np.int64) if is_whole(word) else sets.of(word.strip('"'))
 
 
 def _sides(deck: Deck, row: list[str], ids: Index, cells: Index, cell_type: str) -> Index:
     """(f, kf) facets of one line ``element or set, S1``."""
-    members = np.array(_numbers(deck.cell_sets, _number(row[0])), dtype=np.int64)
+    members = _members(deck.cell_sets, row[0])
     kind = kind_of(cell_type)
     sides = [set(side) for side in SIDES[kind.n_corners]]
     label = row[1].upper() if len(row) > 1 else ""

@@ -13,10 +13,12 @@ from rom.names import named
 QUADRATIC_HEX = 20  # nodes of a serendipity hexahedron; completed to 27 after reading
 # Mid-edge nodes by their corners, in the order of Abaqus and VTK.
 LOWER_EDGES, UPPER_EDGES = ((0, 1), (1, 2), (2, 3), (3, 0)), ((4, 5), (5, 6), (6, 7), (7, 4))
+BETWEEN = ((0, 4), (1, 5), (2, 6), (3, 7))
 DECK_EDGES = {
     "tet10": ((0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)),
-    "hex20": (*LOWER_EDGES, *UPPER_EDGES, (0, 4), (1, 5), (2, 6), (3, 7)),
+    "hex20": (*LOWER_EDGES, *UPPER_EDGES, *BETWEEN),
 }
+Edges = tuple[tuple[int, int], ...]
 WHOLE_TYPES = ("tet4", "hex8")
 
 
@@ -25,14 +27,14 @@ def kind_of(cell_type: str) -> CellType:
     return CELL_TYPES["hex27" if cell_type == "hex20" else cell_type]
 
 
-def to_gmsh(cells: Index, cell_type: str) -> Index:
-    """Cells in gmsh order from cells in deck order."""
+def to_gmsh(cells: Index, cell_type: str, edges: Edges | None = None) -> Index:
+    """Cells in gmsh order from cells in deck order, mid-edge nodes as in Abaqus or as given."""
     if cell_type in WHOLE_TYPES:
         return cells
     n_corners = kind_of(cell_type).n_corners
     wanted = [set(s) for s in kind_of(cell_type).supports[n_corners : cells.shape[1]]]
-    edges = [set(e) for e in DECK_EDGES[cell_type]]
-    order = [*range(n_corners), *(n_corners + edges.index(e) for e in wanted)]
+    listed = [set(e) for e in edges or DECK_EDGES[cell_type]]
+    order = [*range(n_corners), *(n_corners + listed.index(e) for e in wanted)]
     return cells[:, order]
 
 
@@ -105,3 +107,10 @@ def positions(ids: Index, wanted: Index, what: str) -> Index:
     if (missing := np.asarray(wanted)[ordered[place] != wanted]).size:
         raise FileFormatError(f"{what} {named(np.unique(missing).tolist())} is used, not defined.")
     return order[place]
+
+
+def unused(ids: Index, cells: Index) -> list[str]:
+    """A remark on the nodes of a deck that no solid uses."""
+    lonely = np.setdiff1d(np.arange(ids.size), cells)
+    text = f"{lonely.size} nodes belong to no solid and are left out: {named(ids[lonely].tolist())}"
+    return [f"{text}; check that no element is missing."] if lonely.size else []

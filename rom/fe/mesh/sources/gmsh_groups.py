@@ -90,6 +90,7 @@ def _group_names(gmsh: Any) -> Groups:
     names = {
         (dim, tag): gmsh.model.getPhysicalName(dim, tag) or f"{DIMENSIONS[dim]}_{tag}"
         for dim, tag in gmsh.model.getPhysicalGroups()
+        if dim != 2 or _surfaces(gmsh, tag)
     }
     _check_names(names)
     return names
@@ -127,6 +128,8 @@ def _solids(gmsh: Any) -> tuple[int, Blocks]:
     """Element type in gmsh, and element numbers and nodes of each volume."""
     blocks, kinds = {}, set()
     for _, volume in gmsh.model.getEntities(3):
+        if gmsh.model.getType(3, volume).startswith("Ghost"):  # copies for the neighbours of a part
+            continue
         types, ids, nodes = gmsh.model.mesh.getElements(3, volume)
         kinds |= {int(t) for t in types}
         if len(types) == 1:
@@ -204,10 +207,16 @@ def _region(gmsh: Any, volume: int, blocks: Blocks, groups: Groups) -> int:
     return tags[0]
 
 
+def _surfaces(gmsh: Any, tag: int) -> list[int]:
+    """Those of a group, without the cuts of a partition, which have the group of their volume."""
+    surfaces = gmsh.model.getEntitiesForPhysicalGroup(2, tag)
+    return [int(s) for s in surfaces if gmsh.model.getParent(2, s)[0] != 3]
+
+
 def _facets(gmsh: Any, tag: int, name: str, *, repeated: bool) -> Index:
     """(f, kf) node tags of a physical surface."""
     found = []
-    for surface in gmsh.model.getEntitiesForPhysicalGroup(2, tag):
+    for surface in _surfaces(gmsh, tag):
         groups = len(gmsh.model.getPhysicalGroupsForEntity(2, surface))
         for kind, _, nodes in zip(*gmsh.model.mesh.getElements(2, surface), strict=True):
             size = gmsh.model.mesh.getElementProperties(kind)[3]

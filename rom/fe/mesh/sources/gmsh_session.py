@@ -172,6 +172,8 @@ def _msh(gmsh: Any, path: Path, request: dict[str, Any]) -> Made:
         )
     if not end.splitlines()[-1].strip().startswith(b"$End"):
         raise FileFormatError("is cut: the last section has no end.", hint="Write it again.")
+    # parts of a version 2 file would become volumes of their own, without groups
+    gmsh.option.setNumber("Mesh.PartitionConvertMsh2", 0)
     # gmsh would also execute a file of the same name with .opt; beside this link there is none
     link = Path(request["folder"], path.name)
     link.symlink_to(path)

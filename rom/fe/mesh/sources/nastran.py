@@ -1,115 +1,127 @@
-"""Nastran bulk data, read by meshio.
+"""Nastran bulk data.
 
 Regions are the property numbers of the solids ("property_1"). Interfaces are skin elements
 (CTRIA3, CTRIA6, CQUAD4, CQUAD8) by property number ("property_5") and the nodes of SPC and SPC1
-cards by set number ("spc_7"), where they contain whole facets of the outer surface.
+cards by set number ("spc_7"), where they contain whole facets of the outer surface. Every card is
+read, left aside because a free body does not need it, or refused by name.
 """
 
-import re
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from rom.errors import FileFormatError, MeshError
+from rom.decks.bulk import POINTS, Card, cards, grids
+from rom.decks.lines import Unread
 from rom.fe.mesh.solid import Read, packed
-from rom.fe.mesh.sources.deck import facets_of_nodes, only_type, outer_facets, positions, to_gmsh
+from rom.fe.mesh.sources.deck import (
+    BETWEEN,
+    LOWER_EDGES,
+    UPPER_EDGES,
+    facets_of_nodes,
+    only_type,
+    outer_facets,
+    positions,
+    to_gmsh,
+    unused,
+)
 from rom.model import Index
 
-SOLIDS = {"tetra": "tet4", "tetra10": "tet10", "hexahedron": "hex8", "hexahedron20": "hex20"}
-PROPERTY_FIELD = "nastran:ref"
+SOLIDS = {"CTETRA": {4: "tet4", 10: "tet10"}, "CHEXA": {8: "hex8", 20: "hex20"}}
+EDGES = {"hex20": (*LOWER_EDGES, *BETWEEN, *UPPER_EDGES)}  # mid-edge nodes where not as in Abaqus
+SKIN = {"CTRIA3": 3, "CTRIA6": 3, "CQUAD4": 4, "CQUAD8": 4}  # corners
+LINES = ("CBAR",)  # without a property, as gmsh writes curves
+READ = {*POINTS, *SOLIDS, *SKIN, "SPC", "SPC1"}
+SILENT = ("PARAM", "MAT", "EIG", "TABLE", "PSOLID", "PLSOLID", "SET1", "SET3", "PLOTEL", "ECHO")
+# loads, supports, steps, and what a reduction there holds
+ASIDE = set(
+    "FORCE FORCE1 FORCE2 MOMENT MOMENT1 MOMENT2 PLOAD PLOAD1 PLOAD2 PLOAD4 GRAV ACCEL ACCEL1 "
+    "RFORCE LOAD DLOAD DAREA TLOAD1 TLOAD2 RLOAD1 RLOAD2 DELAY DPHASE LSEQ RANDPS TEMP TEMPD "
+    "TEMPP1 SPCD SPCADD SUPORT SUPORT1 FREQ FREQ1 FREQ2 FREQ3 FREQ4 TSTEP TSTEPNL NLPARM TIC "
+    "ASET ASET1 BSET BSET1 CSET CSET1 QSET QSET1 OMIT OMIT1 SPOINT".split()
+)
 
 
 def read(path: str) -> Read:
     """Read bulk data; see `rom.fe.mesh.sources.readers.read`.
 
     Raises:
-        FileFormatError: the file is damaged, or solids have no property.
+        FileFormatError: the file is damaged, solids have no property, or there are cards whose mass
+            or stiffness would be lost.
         MeshError: no solid cells, or of several types.
     """
-    import meshio
-
-    mesh = meshio.read(path, file_format="nastran")
-    solids = [i for i, block in enumerate(mesh.cells) if block.dim == 3]
-    cell_type = only_type(SOLIDS.get(mesh.cells[i].type, mesh.cells[i].type) for i in solids)
-    cells = np.vstack([mesh.cells[i].data for i in solids]).astype(np.int64)
-    if cell_type not in SOLIDS.values():
-        raise MeshError(f"cells of type {cell_type!r} are not supported; {sorted(SOLIDS)} are.")
-    properties = np.concatenate([_property(mesh, i) for i in solids])
-    sets = _skin(mesh) | _constrained(Path(path), mesh.points_id)
-    cells, n = to_gmsh(cells, cell_type), len(mesh.points)
+    found = _sorted(Path(path))
+    ids, points, _ = grids(found[0])
+    solids = [card for name in SOLIDS for card in found[0].get(name, ())]
+    cell_type = only_type(_type(card) for card in solids)
+    raw = np.array([_nodes(card, 2) for card in solids], dtype=np.int64)
+    properties = np.array([_property(card) for card in solids], dtype=np.int64)
+    numbers = np.array([card.whole(0) for card in solids], dtype=np.int64)
+    positions(numbers, numbers[:1], "element")  # refuses a number given twice
+    cells = to_gmsh(positions(ids, raw, "node"), cell_type, EDGES.get(cell_type))
+    sets = {name: positions(ids, np.array(nodes, dtype=np.int64), "node")
+            for name, nodes in _sets(found[0], ids).items()}  # fmt: skip
+    n = len(points)
     facets, remarks = facets_of_nodes(outer_facets(cells, cell_type, n), sets, cell_type, n)
     return packed(
-        mesh.points,
-        cells,
-        cell_type,
-        properties,
-        np.concatenate([mesh.cells_id[i] for i in solids]),
+        points, cells, cell_type, properties, numbers,
         facets=facets,
         region_names={int(p): f"property_{p}" for p in np.unique(properties)},
-        warnings=remarks,
-        provenance={"meshio": meshio.__version__, "parameters": {}},
-    )
+        warnings=[*found[1], *remarks, *unused(ids, cells)],
+        provenance={"parameters": {}},
+    )  # fmt: skip
 
 
-def _property(mesh: Any, block: int) -> Index:
-    numbers = mesh.cell_data.get(PROPERTY_FIELD, [])
-    if block >= len(numbers) or len(numbers[block]) != len(mesh.cells[block].data):
-        raise FileFormatError("elements have no property number.", hint="Give each cell a PID.")
-    return np.asarray(numbers[block], dtype=np.int64)
+def _sorted(path: Path) -> tuple[dict[str, list[Card]], list[str]]:
+    """Cards that are read, by name, and remarks on those that need not be."""
+    found: dict[str, list[Card]] = {}
+    unread, aside = Unread(), Unread()
+    for card in cards(path):
+        if card.name in READ:
+            found.setdefault(card.name, []).append(card)
+        elif card.name in ASIDE or card.name in LINES:
+            aside.add(card.name, card.place)
+        elif not card.name.startswith(SILENT):
+            unread.add(card.name, card.place)
+    unread.refuse()
+    return found, aside.remark()
 
 
-def _skin(mesh: Any) -> dict[str, Index]:
-    """Nodes of skin elements by property."""
-    found: dict[str, Index] = {}
-    for i, block in enumerate(mesh.cells):
-        if block.dim == 2:
-            numbers = _property(mesh, i)
-            for p in np.unique(numbers):
-                name = f"property_{p}"
-                nodes = np.unique(np.asarray(block.data)[numbers == p])
-                found[name] = np.union1d(found.get(name, nodes), nodes)
-    return found
+def _type(card: Card) -> str:
+    nodes, known = _nodes(card, 2), SOLIDS[card.name]
+    if len(nodes) not in known:
+        raise card.wrong(f"it has {len(nodes)} nodes, not {' or '.join(map(str, known))}")
+    return known[len(nodes)]
 
 
-def _constrained(path: Path, ids: Index) -> dict[str, Index]:
-    """Nodes of SPC and SPC1 cards by set number."""
-    found: dict[str, list[int]] = {}
-    for fields in _cards(path.read_text(encoding="utf-8")):
-        nodes = _spc1(fields[3:]) if fields[0] == "SPC1" else [int(x) for x in fields[2::3] if x]
-        found.setdefault(f"spc_{int(fields[1])}", []).extend(nodes)
-    return {name: positions(ids, np.array(nodes), "node") for name, nodes in found.items()}
+def _nodes(card: Card, start: int) -> list[int]:
+    """Labels from a field on, up to the last that is not empty or zero."""
+    words = card.fields[start:]
+    while words and not words[-1].strip("0"):
+        words = words[:-1]
+    return [card.whole(k) for k in range(start, start + len(words))]
 
 
-def _cards(text: str) -> list[list[str]]:
-    """Fields of the SPC and SPC1 cards, continuation lines joined."""
-    cards: list[list[str]] = []
-    inside = False
-    for line in text.splitlines():
-        line = line.partition("$")[0].rstrip()
-        if inside and re.match(r"[+*,]|\s{8}\S", line):
-            cards[-1] += _fields(line)[1:9]
-            continue
-        inside = re.match(r"SPC1?\b(?!\*)", line) is not None
-        if inside:
-            cards.append([f.upper() for f in _fields(line)[:9]])
-    return [_trimmed(card) for card in cards]
+def _property(card: Card) -> int:
+    if not card.text(1):
+        raise card.wrong("it has no property number")
+    return card.whole(1)
 
 
-def _fields(line: str) -> list[str]:
-    if "," in line:
-        return [f.strip() for f in line.split(",")]
-    return [line[i : i + 8].strip() for i in range(0, max(len(line), 8), 8)]
+def _sets(found: dict[str, list[Card]], ids: Index) -> dict[str, list[int]]:
+    """Nodes of skin elements by property, and of SPC and SPC1 cards by set number."""
+    sets: dict[str, list[int]] = {}
+    for name, n_corners in SKIN.items():
+        for card in found.get(name, ()):
+            corners = [card.whole(k) for k in range(2, 2 + n_corners)]
+            sets.setdefault(f"property_{_property(card)}", []).extend(corners)
+    for card in [*found.get("SPC", ()), *found.get("SPC1", ())]:
+        sets.setdefault(f"spc_{card.whole(0)}", []).extend(_held(card, ids))
+    return sets
 
 
-def _trimmed(card: list[str]) -> list[str]:
-    while card and not card[-1]:
-        card = card[:-1]
-    return card
-
-
-def _spc1(fields: list[str]) -> list[int]:
-    words = [f.upper() for f in fields if f]
-    if len(words) == 3 and words[1] == "THRU":
-        return list(range(int(words[0]), int(words[2]) + 1))
-    return [int(w) for w in words]
+def _held(card: Card, ids: Index) -> list[int]:
+    if card.text(3) == "THRU":  # not all points in between need exist
+        between = (ids >= card.whole(2)) & (ids <= card.whole(4))
+        return ids[between].tolist()
+    places = (1, 4) if card.name == "SPC" else range(2, len(card.fields))
+    return [card.whole(k) for k in places if card.text(k)]

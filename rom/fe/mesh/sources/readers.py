@@ -30,8 +30,7 @@ def read(request: dict[str, Any]) -> Read:
         raise ResourceError(
             f"gmsh cannot be loaded: {error}.", hint=f"On Debian: apt-get install {GMSH_LIBRARIES}."
         ) from error
-    # parsers raise whatever the broken line provokes, and meshio leaves the process
-    except (Exception, SystemExit) as error:
+    except Exception as error:  # parsers raise whatever the broken line provokes
         if request["reader"] in GEOMETRIES:
             raise
         raise FileFormatError(

@@ -1,0 +1,159 @@
+"""Cards of Nastran bulk data, and the places of its grid points.
+
+Source:
+    MSC Nastran Quick Reference Guide: formats of bulk data; entries GRID, GRDSET, CORD1R, CORD1C,
+    CORD1S, CORD2R, CORD2C, CORD2S and INCLUDE.
+"""
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from rom.decks.lines import Place, at, lines, real, whole
+from rom.decks.systems import BASIC, System, system
+from rom.errors import FileFormatError
+from rom.model import Array, Index
+
+INCLUDE = re.compile(r"""\s*(?P<keyword>INCLUDE)\s+["']?(?P<file>[^"'\n$]+)""", re.IGNORECASE)
+BEGIN, END = (re.compile(p, re.IGNORECASE) for p in (r"\s*BEGIN(\s+BULK)?\s*(\$|$)", r"ENDDATA"))
+POINTS = ("GRID", "GRDSET", "CORD1R", "CORD1C", "CORD1S", "CORD2R", "CORD2C", "CORD2S")
+PER_LINE = 8  # fields of a line, of 8 characters each or 4 of 16, behind the name
+
+
+@dataclass(slots=True)
+class Card:
+    """Name and fields in capitals, empty ones "", and the mark of the line that continues it."""
+
+    name: str
+    fields: list[str]
+    place: Place
+    mark: str = ""
+
+    def text(self, k: int) -> str:
+        """Field k, or "" behind the last."""
+        return self.fields[k] if k < len(self.fields) else ""
+
+    def whole(self, k: int, empty: int | None = None) -> int:
+        """Field k as a whole number, with a value for an empty one."""
+        if not self.text(k) and empty is not None:
+            return empty
+        try:
+            return whole(self.text(k))
+        except ValueError as error:
+            raise self.wrong(f"field {k + 2}: {error}") from error
+
+    def reals(self, *places: int) -> list[float]:
+        """Fields as numbers; empty ones are zero."""
+        try:
+            return [real(self.text(k)) for k in places]
+        except ValueError as error:
+            raise self.wrong(error) from error
+
+    def wrong(self, why: object) -> FileFormatError:
+        """The error of this card."""
+        return FileFormatError(f"this {self.name} is not read: {why}.", where=at(self.place))
+
+
+def cards(path: str | Path) -> Iterator[Card]:
+    """All cards of the bulk data of a file and those it includes, continuations joined.
+
+    What stands before BEGIN BULK is left out; without that line, the file is bulk data alone.
+    """
+    path = Path(path)
+    bulk = not any(BEGIN.match(line) for _, line in lines(path, INCLUDE))
+    card = Card("", [], (path, 0))
+    for place, line in lines(path, INCLUDE):
+        line = line.partition("$")[0].rstrip()
+        if not bulk or not line:
+            bulk = bulk or BEGIN.match(line) is not None
+            continue
+        if END.match(line):
+            break
+        head, fields, mark = _fields(line.upper().expandtabs(PER_LINE), place)
+        if head and head[0] not in "+*":
+            if card.name:
+                yield card
+            card = Card(head.rstrip("*_ "), fields, place)  # meshio writes CTETRA_
+        elif not card.name or (card.mark[1:] and head[1:] and card.mark[1:] != head[1:]):
+            raise FileFormatError(
+                f"this line, marked {head!r}, does not continue the card before it.",
+                where=at(place), hint="Put continuations behind their cards.",
+            )  # fmt: skip
+        else:
+            if len(fields) == PER_LINE:  # a lonely wide line is half a narrow one
+                card.fields += [""] * (-len(card.fields) % PER_LINE)
+            card.fields += fields
+        card.mark = mark
+    if card.name:
+        yield card
+
+
+def _fields(line: str, place: Place) -> tuple[str, list[str], str]:
+    """First field, the next eight or four, and the mark of the line that follows."""
+    wide = "*" in line[:PER_LINE].partition(",")[0]
+    n = PER_LINE // 2 if wide else PER_LINE
+    if "," in line:
+        head, *words = (word.strip() for word in line.split(","))
+        words += [""] * (n + 1 - len(words))
+        if any(words[n + 1 :]) or words[n][:1] not in ("", "+", "*"):
+            raise FileFormatError(
+                f"a line has {1 + len(words)} fields; {n + 1} are read.",
+                where=at(place), hint="Continue on the next line, behind a + and a comma.",
+            )  # fmt: skip
+        return head, words[:n], words[n]
+    fields = [line[k : k + 64 // n].strip() for k in range(PER_LINE, 72, 64 // n)]
+    return line[:PER_LINE].strip(), fields, line[72:80].strip()
+
+
+def grids(found: dict[str, list[Card]]) -> tuple[Index, Array, Index]:
+    """Labels (k,), positions (k, 3) in the basic system, and (k,) systems of displacements.
+
+    Args:
+        found: the cards of `POINTS` by their names.
+
+    Raises:
+        FileFormatError: naming the line, for damaged cards, labels that come twice, and systems
+            that are missing, flat or defined by themselves.
+    """
+    default = next(iter(found.get("GRDSET", ())), Card("GRDSET", [], (Path(), 0)))
+    own, turned = default.whole(1, 0), default.whole(5, 0)
+    grid: dict[int, tuple[int, list[float], int]] = {}
+    for card in found.get("GRID", ()):
+        row = card.whole(1, own), card.reals(2, 3, 4), card.whole(5, turned)
+        if grid.setdefault(card.whole(0), row) is not row:
+            raise card.wrong(f"node {card.whole(0)} is defined twice")
+    axes = {card.whole(k): (card, k) for name in POINTS[2:] for card in found.get(name, ())
+            for k in (0, 4) if not k or (name[4] == "1" and card.text(k))}  # fmt: skip
+    known: dict[int, System | None] = {0: BASIC}  # None while it is being resolved
+
+    def resolved(number: int, by: Card) -> System:
+        if number not in known:
+            if number not in axes:
+                raise by.wrong(f"the coordinate system {number} is not defined")
+            known[number] = None
+            card, start = axes[number]
+            if card.name[4] == "2":
+                x = np.array(card.reals(*range(2, 11))).reshape(3, 3)
+                corners = resolved(card.whole(1, 0), card).basic(x)
+            else:
+                corners = np.vstack([point(card.whole(start + k), card) for k in (1, 2, 3)])
+            known[number] = system(2, corners, card.name[5], at(card.place))
+        if (found := known[number]) is None:
+            raise by.wrong(f"the coordinate system {number} is defined by itself")
+        return found
+
+    def point(label: int, by: Card) -> Array:
+        if label not in grid:
+            raise by.wrong(f"node {label} is not defined")
+        return resolved(grid[label][0], by).basic(np.array([grid[label][1]]))
+
+    used = np.array([row[0] for row in grid.values()], dtype=np.int64)
+    x = np.array([row[1] for row in grid.values()]).reshape(-1, 3)
+    for number in np.unique(used):
+        here = used == number
+        x[here] = resolved(int(number), found["GRID"][int(here.argmax())]).basic(x[here])
+    labels = np.array(list(grid), dtype=np.int64)
+    return labels, x, np.array([row[2] for row in grid.values()], dtype=np.int64)

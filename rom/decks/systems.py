@@ -1,0 +1,48 @@
+"""Coordinate systems of decks: rectangular (R), cylindrical (C), spherical (S); in degrees."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rom.errors import FileFormatError
+from rom.model import Array
+
+THIN = 1e-9  # height over length of a triangle whose corners lie on a line
+
+
+@dataclass(frozen=True, slots=True)
+class System:
+    """Origin (3,), x, y and z as columns of axes (3, 3), kind of coordinates."""
+
+    origin: Array
+    axes: Array
+    kind: str = "R"
+
+    def basic(self, x: Array) -> Array:
+        """(k, 3) positions in the basic system of (k, 3) coordinates in this one."""
+        r, one, two = x[:, 0], np.radians(x[:, 1]), np.radians(x[:, 2])
+        if self.kind == "C":  # r, around z, z
+            x = np.column_stack([r * np.cos(one), r * np.sin(one), x[:, 2]])
+        elif self.kind == "S":  # r, from z, around z
+            away = r * np.sin(one)
+            x = np.column_stack([away * np.cos(two), away * np.sin(two), r * np.cos(one)])
+        return self.origin + x @ self.axes.T
+
+
+BASIC = System(np.zeros(3), np.eye(3))
+
+
+def system(first: int, corners: Array, kind: str, where: str) -> System:
+    """That of the rows (3, 3): its origin, a point on an axis, one in a plane of it.
+
+    The first axis is 2 on CORD cards (z, then z and x), 0 after ``*SYSTEM`` (x, then x and y).
+    """
+    along, beside = corners[1:] - corners[0]
+    across = np.cross(along, beside)
+    size = np.linalg.norm(along) * np.linalg.norm(beside)
+    if not np.linalg.norm(across) > THIN * size:
+        raise FileFormatError("the points of a coordinate system lie on a line.", where=where)
+    a, c = along / np.linalg.norm(along), across / np.linalg.norm(across)
+    axes = np.empty((3, 3))
+    axes[:, first], axes[:, first - 1], axes[:, first - 2] = a, c, np.cross(c, a)
+    return System(corners[0], axes, kind)
