@@ -6,8 +6,8 @@ import sys
 import pytest
 
 from cases.files.demos import DEMOS, LONG_DEMOS, check
+from cases.files.pictures import faults
 from cases.long import ROM_LONG
-from cases.pictures import faults
 from rom.view.canvas.picture import Picture
 
 pytest.importorskip("dolfinx", reason="demos start from finite elements")

@@ -14,10 +14,10 @@ pytest.importorskip("matplotlib", reason="pictures need matplotlib")
 
 from matplotlib.figure import Figure
 
+from cases.files.pictures import faults
 from cases.long import few
 from cases.mbs.drawn import lattice_bar, squeezed, swinging
 from cases.paths import ROOT
-from cases.pictures import faults
 from cases.solid import block
 from rom import view
 from rom.errors import ConfigError
