@@ -107,7 +107,8 @@ OTHERS = (  # ways to install, which `.ci/other_systems.sh` goes on systems of t
     "conda ", "docker ",
 )  # fmt: skip
 SHORTER = (  # what a command of a page gets instead, so that it takes seconds and needs no window
-    (r"--hinge \d+", "--hinge radius:0.006 -p lc=0.01 -m 4"),
+    (r"--hinge \d+", "--hinge radius:0.006 -m 4"),
+    (r"^(rom \w+ part.step)", r"\1 -p lc=0.005"),
     (r"lc=4e-3", "lc=8e-3"),
     (r"(rom reduce meshes/connecting_rod.geo.*)", r"\1 -p lc=0.012"),
     (r"(rom simulate demos/slider_crank.toml.*)", r"\1 --t-end 0.001"),
@@ -146,12 +147,12 @@ SHOWN = [page for page in PAGES if page.name != "step_part.md" and
 
 
 def part(folder):
-    """A plate with a bore of 6 mm and a foot that looks down."""
+    """A plate with a bore of 6 mm and a foot that looks down, in millimetres."""
     import gmsh
 
     gmsh.initialize()
-    plate = gmsh.model.occ.addBox(-0.02, -0.02, 0, 0.08, 0.04, 0.01)
-    bore = gmsh.model.occ.addCylinder(0, 0, -0.01, 0, 0, 0.03, 0.006)
+    plate = gmsh.model.occ.addBox(-20, -20, 0, 80, 40, 10)
+    bore = gmsh.model.occ.addCylinder(0, 0, -10, 0, 0, 30, 6)
     gmsh.model.occ.cut([(3, plate)], [(3, bore)])
     gmsh.model.occ.synchronize()
     gmsh.write(str(folder / "part.step"))
