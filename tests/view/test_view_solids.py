@@ -137,7 +137,7 @@ def test_meshes_are_joined_with_their_own_triangles():
         (lambda: view.ring((0, 0, 0), (0, 0, 1), 2.0, 1.0), "a bore of 2 m is not inside"),
         (lambda: view.ring((0, 0, 1), (0, 0, 1), 1.0, 2.0), "in one place"),
         (lambda: view.tube([(0, 0, 0)], 0.1), r"\(k, 3\) with k > 1, got \(1, 3\)"),
-        (lambda: view.tube([(0, 0, 0)] * 2, 0.1), "in one place"),
+        (lambda: view.tube([(0, 0, 0)] * 2, 0.1), "need a distance"),
         (lambda: view.coil((0, 0, 0), (0, 0, 1), 0.1, 0.2), "a wire of 0.2 m must be thinner"),
         (lambda: view.wound([(0, 0, 0), (0, 0, 0)], 0.2, 0.1), "need a distance"),
         (lambda: view.extruded([(0, 0), (1, 0)], 1.0), r"\(n, 2\) with n > 2, got \(2, 2\)"),
