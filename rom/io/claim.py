@@ -35,7 +35,7 @@ def claimed(folder: str | Path) -> Iterator[None]:
     try:
         handle = _locked(folder)
     except OSError as error:
-        raise ConfigError(f"the folder must be writable: {folder}, {error.strerror}.") from error
+        raise ConfigError(f"the folder {folder} is not writable: {error.strerror}.") from error
     try:
         yield
     finally:

@@ -413,7 +413,7 @@ MISTAKES = {
     "falling lengths": ('[laws.s]\nbetween = ["ground.wall", "block.p"]\nx = [2, 1]\n'
                         "values = [1, 2]\n", "do not ascend"),
     "lengths and values": ('[laws.s]\nbetween = ["ground.wall", "block.p"]\nx = [2, 1]\n'
-                           "values = [1]\n", "has 2 lengths and 1 values"),
+                           "values = [1]\n", "has 2 lengths, 1 values"),
     "event of nothing": ('[events.e]\nkind = "distance"\nbetween = ["ground.wall", "block.p"]\n',
                          "has no value it passes"),
     "event of two": ('[events.e]\nkind = "coordinate"\njoint = "guide"\nvalue = 1\n'

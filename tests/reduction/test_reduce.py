@@ -320,7 +320,7 @@ def test_messages_for_wrong_interfaces(model, body):
         body.with_reference(3)
     with pytest.raises(ModelError, match="need a distance"):
         body.with_reference(("root", "root"))
-    with pytest.raises(ConfigError, match="holds the interfaces of the body, and none"):
+    with pytest.raises(ConfigError, match="holds interfaces of the body, and needs one"):
         rom.reduce(model, method=rom.CraigBampton(3), interfaces={})
     one = model.interfaces["root"]
     twin = rom.Interface(

@@ -137,15 +137,15 @@ def test_meshes_are_joined_with_their_own_triangles():
         (lambda: view.ring((0, 0, 0), (0, 0, 1), 2.0, 1.0), "a bore of 2 m is not inside"),
         (lambda: view.ring((0, 0, 1), (0, 0, 1), 1.0, 2.0), "in one place"),
         (lambda: view.tube([(0, 0, 0)], 0.1), r"\(k, 3\) with k > 1, got \(1, 3\)"),
-        (lambda: view.tube([(0, 0, 0)] * 2, 0.1), "in one place"),
+        (lambda: view.tube([(0, 0, 0)] * 2, 0.1), "need a distance"),
         (lambda: view.coil((0, 0, 0), (0, 0, 1), 0.1, 0.2), "a wire of 0.2 m must be thinner"),
-        (lambda: view.wound([(0, 0, 0), (0, 0, 0)], 0.2, 0.1), "are in one place"),
+        (lambda: view.wound([(0, 0, 0), (0, 0, 0)], 0.2, 0.1), "need a distance"),
         (lambda: view.extruded([(0, 0), (1, 0)], 1.0), r"\(n, 2\) with n > 2, got \(2, 2\)"),
         (lambda: view.extruded([(1, 0), (0, -1), (-1, 0)], 1.0), "counter-clockwise"),
         (lambda: view.extruded([(1, -1), (1, 1), (-1, 1), (-1, -1)], 1.0, bore=2.0), "bore of 2 m"),
         (lambda: view.gear(5, 1e-3, 1e-2), "5 teeth of a pressure angle of 20 degrees"),
         (lambda: view.gear(20, 1e-3, 1e-2, pressure_angle=0.7), "40.1.* degrees are pointed"),
-        (lambda: view.gear(20, 1e-3, 1e-2, bore=0.02), "a bore of 0.02 m does not fit"),
+        (lambda: view.gear(20, 1e-3, 1e-2, bore=0.02), "a bore of 0.02 m must be below"),
     ],
 )
 def test_shapes_that_cannot_be_are_refused(call, words):

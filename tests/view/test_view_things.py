@@ -141,7 +141,7 @@ def test_a_scene_is_drawn_into_axes_of_the_caller():
         (view.Thing(np.zeros((3, 3)), [[0, 1, -1]]), "numbers from 0 to 2"),
         (view.Thing(np.zeros((3, 3)), [[0.0, 1.0]]), "numbers from 0 to 2"),
         (view.Thing(np.zeros((4, 3)), [[0, 1, 2, 3]]), "numbers from 0 to 3"),
-        (view.Thing(*BOX, values=[1.0, 2.0]), r"has \(1, 2\) values for \(1, 8\) points"),
+        (view.Thing(*BOX, values=[1.0, 2.0]), r"has \(1, 2\) values, not \(1, 8\)"),
         (view.Thing(*BOX, edges=[[0, 8]]), "edges are pairs of numbers from 0 to 7"),
     ],
 )
@@ -211,7 +211,7 @@ def test_what_is_left_of_an_update_has_a_scale_of_its_own():
     assert np.ptp(errors.get_xlim()) < 0.3
     responses = figure.axes[0].lines
     assert [line.get_xdata().size for line in responses] == [X.size, fine.size]
-    with pytest.raises(ConfigError, match="'test' has 2 values for 20 frequencies"):
+    with pytest.raises(ConfigError, match="'test' has 2 values; 20 frequencies"):
         view.updating(X, {"test": [1.0, 2.0]}, changes, structure=structure, label="u")
 
 

@@ -487,7 +487,7 @@ def test_time_is_read_off_a_stack_of_pictures(janus):
         (lambda: ShapeSphere(Bodies(np.ones(4))), ConfigError, "three bodies of degree -1"),
         (lambda: match(MASS, np.ones((3, 2)), np.ones((3, 2))), ConfigError, r"not \(3, 2\)"),
         (lambda: match(np.ones(2), CORNERS, CORNERS), ConfigError, r"shape \(2,\) does not fit 9"),
-        (lambda: match(MASS, CORNERS, CORNERS[:2]), ConfigError, "6 velocities do not fit 9"),
+        (lambda: match(MASS, CORNERS, CORNERS[:2]), ConfigError, "6 velocities must fit 9"),
         (lambda: frame(MASS, line(0, 1, 3), line(0, 1, 3)), ModelError, "no rotation is better"),
         (lambda: frame(MASS, CORNERS, CORNERS[:2]), ConfigError, "2 particles, not"),
         (lambda: match(MASS, np.nan * CORNERS, CORNERS), ConfigError, "entries that are not"),

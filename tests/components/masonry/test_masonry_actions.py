@@ -434,10 +434,13 @@ ONE = Masonry((stone(box(), **SOFT),), (), 1e9, 0.5)
     [
         ([PointLoad(1, (1.4, 0.5), (0.0, -1.0), name="crane")], "crane at .* lies 0.4 m outside"),
         ([PointLoad(0, (0.0, 0.0), (0.0, -1.0))], "acts on stone 0, which must not be held"),
-        ([PointLoad(7, (0.0, 0.0), (0.0, -1.0))], "stone 7 of the stones 0 to 1"),
+        ([PointLoad(7, (0.0, 0.0), (0.0, -1.0))], "stone 7; it needs 0 to 1"),
         ([STONE], "action 0 is .* which does nothing to masonry"),
         ([PointLoad(*STONE, history=Table([0.0, 0.05], [0.0, 1.0]))], "from 0 s to 0.05 s; asked"),
-        ([PointLoad(*STONE, history=lambda t: np.full(t.shape, np.inf))], "is inf at t ="),
+        (
+            [PointLoad(*STONE, history=lambda t: np.full(t.shape, np.inf))],
+            "must be finite, not inf at t =",
+        ),
         ([PointLoad(*STONE, history=lambda t: 1.0)], "gives the shape"),
         ([MovingLoad((0.0, -1.0), 1.0, 11.0)], "but the stones"),
         ([Wind(1.0, ((1, 4),))], "edge 4 of stone 1, but edges are 0 to 3"),

@@ -230,7 +230,7 @@ def test_damping_takes_energy_and_never_gives_any(damping):
 
 
 @pytest.mark.parametrize(("numbers", "message"), [
-    ({"balls": 2}, "no bearing has 2 balls"),
+    ({"balls": 2}, "a bearing needs three or more that fit, not 2"),
     ({"ball_diameter": 0.07}, "no bearing has 9 balls"),
     ({"balls": 20}, "do not fit on a circle"),
     ({"clearance": 2e-3}, "no clearance"),
