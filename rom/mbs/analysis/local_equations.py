@@ -298,4 +298,4 @@ def of_unit_mass(Z: Array, mass: Array) -> Array:
             "the mass matrix is not positive definite: a body is deformed beyond what its linear "
             "shapes can describe."
         ) from error
-    return solve_triangular(L, Z.T, lower=True).T
+    return solve_triangular(L, Z.T, lower=True).T if Z.size else Z
