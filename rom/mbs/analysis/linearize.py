@@ -267,7 +267,9 @@ def sparse_equations(now: Instant, state: State, axes: Axes) -> Any:
         return None, None, 0.0
     pencil = _pencil(now, state, axes)
     path = _Path(now, state, axes, np.zeros((state.v.size, 0)))
-    later = pencil if _rests(now, state, pencil) else _pencil(now, path.later().state, axes)
+    rests = _rests(now, state, pencil.basis, lambda added, load: pencil.inverse(
+        pencil.even + added * pencil.M).solve(load)[0])  # fmt: skip
+    later = pencil if rests else _pencil(now, path.later().state, axes)
     return (pencil, later, path.rate) if pencil.allows(later) else (None, None, 0.0)
 
 
@@ -275,18 +277,18 @@ def _pencil(now: Instant, state: State, axes: Axes) -> Pencil:
     return Pencil.of(now, state, small_motions(now.packed, state, axes))
 
 
-def _rests(now: Instant, state: State, pencil: Pencil) -> bool:
+def _rests(now: Instant, state: State, basis: Any, solve: Any) -> bool:
     """Whether a state has no velocity, and is so near to balance that its accelerations vanish.
 
-    Light pieces of stiff bodies turn round-off of forces into accelerations of any size.
+    Light pieces of stiff bodies turn round-off of forces into accelerations of any size. ``solve``
+    gives the motions in the basis, of unit mass, under a load, for a stiffness added [1/s^2].
     """
     if state.v.any() or not state.a.any():
         return not state.v.any()
     now.residual(state.q, state.v, state.a, state.lam)
-    equations = pencil.inverse(pencil.even + load_stiffness(now, state) * pencil.M)
-    force = pencil.basis.T @ (now.gradient(state.q, state.v)[2] @ state.a)
-    shift = pencil.basis @ equations.solve(force)[0]
-    return sizes(now.packed, shift)[0] <= RESTING_TOL
+    added = load_stiffness(now, state)
+    load = basis.T @ (now.gradient(state.q, state.v)[2] @ state.a)
+    return sizes(now.packed, basis @ solve(added, load))[0] <= RESTING_TOL
 
 
 def _part(around: Linearization, wanted: Wanted) -> Linearization:
@@ -381,16 +383,20 @@ class _Path:
 
 def _matrices(now: Instant, state: State, axes: Axes, path: _Path) -> Linearization:
     T, T1, T2, T3 = small_motions(now.packed, state, axes)
-    Z, (Zd, Zdd) = path.Z, path.rates()
     M, Cv, Kq = now.matrices(state)
-    H, basis = now.W.H.copy(), T @ Z
+    H, basis, Z = now.W.H.copy(), T @ path.Z, path.Z
     test = _virtual(now, state, basis)
-    acceleration = T @ Zdd + T2 @ Zd + T3 @ Z
-    M2 = test.T @ M @ basis
-    C2 = test.T @ (M @ (2 * T @ Zd + T2 @ Z) + Cv @ basis)
-    K2 = test.T @ (M @ acceleration + Cv @ (T @ Zd + T1 @ Z) + Kq @ basis)
-    test = np.linalg.solve(M2, test.T).T
-    C2, K2 = np.linalg.solve(M2, C2), np.linalg.solve(M2, K2)
+    C2 = test.T @ (M @ (T2 @ Z) + Cv @ basis)
+    K2 = test.T @ (M @ (T3 @ Z) + Cv @ (T1 @ Z) + Kq @ basis)
+    if test is not basis or not _rests(now, state, basis, lambda added, load: np.linalg.solve(
+            K2 + added * np.eye(len(K2)), load)):  # fmt: skip
+        Zd, Zdd = path.rates()
+        C2 += test.T @ (M @ (2 * T @ Zd))
+        K2 += test.T @ (M @ (T @ Zdd + T2 @ Zd) + Cv @ (T @ Zd))
+    if test is not basis:  # else the motions are of unit mass
+        M2 = test.T @ M @ basis
+        test = np.linalg.solve(M2, test.T).T
+        C2, K2 = np.linalg.solve(M2, C2), np.linalg.solve(M2, K2)
     M2, noise = np.eye(len(K2)), ZERO_FREQUENCY_RTOL if now.exact(state) else DIFFERENCED_ZERO_RTOL
     return Linearization(state, M2, C2, K2, basis, test, noise, now.probe(), now.packed, H)
 

@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from scipy.linalg import solve_triangular
 
 from rom.errors import ConfigError, ModelError, SolverError
 from rom.mbs.equations.equations import (
@@ -307,4 +308,4 @@ def of_unit_mass(Z: Array, mass: Array) -> Array:
             "the mass matrix is not positive definite: a body is deformed beyond what its linear "
             "shapes can describe."
         ) from error
-    return np.linalg.solve(L, Z.T).T
+    return solve_triangular(L, Z.T, lower=True).T if Z.size else Z

@@ -1,5 +1,6 @@
 """Statics and small motions by sparse matrices: as dense ones, as closed forms, none missed."""
 
+import sys
 import warnings
 from dataclasses import replace
 from functools import partial
@@ -7,6 +8,7 @@ from functools import partial
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scipy.linalg import eigvals
 from scipy.optimize import brentq
 from scipy.special import ellipj, ellipk, ellipkinc
 
@@ -455,3 +457,20 @@ def test_a_row_of_cranks_swings_as_one_whose_joints_repeat_each_other():
     found = rom.linearize(mech, state, n=1).frequencies
     square = (0.5 * n + (n - 1)) * 9.81 / (n * (0.1 + 0.25) + (n - 1))
     assert_allclose(found, np.sqrt(square) / (2 * np.pi), rtol=1e-9)
+
+
+def test_all_modes_at_rest_are_those_of_one_symmetric_problem(monkeypatch):
+    """Free motions are not followed to a later instant, and nothing damps but round-off."""
+    mech = rom.Mechanism(gravity=(0, 0, -9.81))
+    section = {"stretch": (5e5, 5e5, 1e6), "bend": (1e3, 2e3, 1.5e3), "mass": 1.0}
+    along = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]])
+    rod = straight(10.0, 8, frame=along, inertia=(1e-2, 2e-2, 3e-2), **section)
+    part = mech.add_nonlinear("rod", body(rod))
+    mech.fixed("clamp", mech.ground.marker((0, 0, 0)), part.marker("start"))
+    monkeypatch.setattr(sys.modules[rom.linearize.__module__]._Path, "at", None)
+    found = rom.linearize(mech, rom.equilibrium(mech))
+    assert not found.C.any()
+    general = np.sqrt(np.sort(eigvals(found.K).real)) / (2 * np.pi)
+    assert_allclose(found.frequencies, general, rtol=1e-7)
+    few_of_them = rom.linearize(mech, found.state, n=2).frequencies
+    assert_allclose(found.frequencies[:2], few_of_them, rtol=1e-7)
