@@ -130,6 +130,7 @@ class _Search:
                 f"the state has {np.size(state.q)} coordinates and {np.size(state.lam)} "
                 f"constraints; this mechanism has {packed.q.size} and {first.lam.size}."
             )
+        state.check_frames(packed)
         self.now.remember(state)
         base = first.base if state.base is None else packed.places.settled(state.base)
         q = assembled(packed, W, np.asarray(state.q, dtype=float))

@@ -145,7 +145,7 @@ def jacobian(packed: Packed, H: Array, marker: Marker) -> Array:
     Raises:
         ConfigError: if the marker is not one of the mechanism.
     """
-    if marker not in packed.markers:
+    if packed.markers.get(marker, len(H)) >= len(H):
         raise ConfigError(
             f"{marker!r} is not a marker of the mechanism.",
             hint="Name it when the body is added, and take it from the part: part.marker(...).",

@@ -247,6 +247,7 @@ def consistent(now: Instant, state: Any) -> State:
             "constraints; this mechanism has {}, {} and {}.".format(*needed),
             hint="Take a state of the same mechanism: sol.final, or rom.equilibrium.",
         )
+    state.check_frames(packed)
     now.remember(state)
     value, G, _ = now.gradient(state.q, state.v)
     rolls = packed.system.rows.kind == ROLL

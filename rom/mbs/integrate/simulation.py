@@ -157,6 +157,7 @@ def release(mechanism: Mechanism, state: State) -> State:
     packed = pack(mechanism)
     if not isinstance(state, State):
         raise ConfigError(f"{state!r} is no State.", hint="Take rom.equilibrium(...) or sol.final.")
+    state.check_frames(packed)
     sizes: Any = (state.q.size, state.v.size)
     if sizes != (packed.q.size, packed.v.size):
         raise ConfigError(
@@ -247,6 +248,7 @@ def _rescued(error: BaseException, record: Record) -> Solution | None:
 
 def _check_fit(state: Any, packed: Packed, mechanism: Mechanism) -> None:
     """Compiled code does not look at the size of its arrays, so this is the place to do it."""
+    state.check_frames(packed)
     followed = packed.followed
     base = np.zeros(followed) if state.base is None else state.base
     q, v, lam, angles = (np.size(x) for x in (state.q, state.v, state.lam, base))

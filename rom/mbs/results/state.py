@@ -1,9 +1,12 @@
 """A mechanism at one instant, and what a method remembers beside it."""
 
 from dataclasses import dataclass, field
+from typing import Any
 
 from rom.arguments import typed
+from rom.errors import ConfigError
 from rom.model import Array
+from rom.names import named
 
 
 @dataclass(frozen=True)
@@ -33,7 +36,7 @@ class State:
     Attributes:
         t: time [s].
         q: (n_q,) per body: origin (3) [m], quaternion (4) [1], elastic coordinates (r); the origin
-            and axes of a body with geometric stiffness are its mean ones.
+            and axes of a flexible body are its mean ones, at large deflection those of its frame.
         v: (n,) per body: velocity of the origin, world (3) [m/s], angular velocity, body frame (3)
             [rad/s], elastic rates (r).
         a: (n,) rates of v [m/s^2, rad/s^2].
@@ -44,6 +47,8 @@ class State:
         base: (c,) joint coordinates that forces or couplings act on [m, rad], angles counted over
             whole turns; None: as measured.
         memory: of the method that arrived here; None at a fresh start.
+        in_own_frames: read from a file in which bodies without geometric stiffness stand in the
+            frames they were given.
     """
 
     t: float
@@ -55,3 +60,19 @@ class State:
     algorithmic: Array | None = None
     base: Array | None = None
     memory: Memory | None = None
+    in_own_frames: bool = False
+
+    def check_frames(self, packed: Any) -> None:
+        """Refuse a state whose bodies stand in other frames than those that are integrated.
+
+        Raises:
+            ConfigError: naming the bodies.
+        """
+        stiffened = dict(zip(packed.names, packed.system.bodies.stiffened, strict=True))
+        moved = [marker.body for marker in packed.frames if not stiffened[marker.body]]
+        if self.in_own_frames and moved:
+            raise ConfigError(
+                f"the state counts {named(moved)} in the frame of its reference condition; motions "
+                "now are integrated on mean axes, and the two differ by the deformation.",
+                hint="Compute the motion up to there again; its file is of an older version.",
+            )

@@ -29,7 +29,7 @@ def warn_of_limits(solution: Solution) -> None:
             continue
         share, bent = softening(solution, name), deformation(solution, name, surface=False)
         if share >= 1.0:
-            top = np.linalg.norm(solution.omega(name), axis=1).max()
+            top = np.linalg.norm(_omega(solution, name), axis=1).max()
             warn(
                 f"body {name!r} turned at {top:.3g} rad/s; at {top / share:.3g} rad/s centrifugal "
                 "force has used up the stiffness of a body without geometric stiffness, which this "
@@ -105,8 +105,15 @@ def _top(solution: Solution, body: int) -> float:
     """Largest angular speed of a body, -1 for the ground."""
     if body < 0:
         return 0.0
-    omega = solution.omega(solution.packed.names[body])
+    omega = _omega(solution, solution.packed.names[body])
     return float(np.nanmax(np.linalg.norm(omega, axis=1), initial=0.0))
+
+
+def _omega(solution: Solution, name: str) -> Array:
+    """(n_t, 3) angular velocity of the frame that is integrated, in its axes [rad/s]."""
+    packed = solution.packed
+    at = packed.system.bodies.v_at[packed.names.index(name)] + 3
+    return solution.v[:, at : at + 3]
 
 
 def _spin(solution: Solution, body: int) -> Array:
@@ -125,7 +132,7 @@ def softening(solution: Solution, name: str) -> float:
     stiffens more than it softens.
     """
     part = solution.mechanism.parts[name]
-    body, omega = part.flexible, solution.omega(name)
+    body, omega = part.flexible, _omega(solution, name)
     omega = omega[np.isfinite(omega).all(axis=1)]
     if body.K_geo or not omega.size:
         return 0.0

@@ -253,6 +253,7 @@ def _guessed(mechanism: Mechanism, state: State | None) -> float:
 
 
 def _check_fit(flow: Flow, state: State) -> None:
+    state.check_frames(flow.packed)
     needed = flow.packed.q.size, flow.packed.v.size, flow.packed.system.rows.kind.size
     sizes = np.size(state.q), np.size(state.v), np.size(state.lam)
     if sizes != needed:
