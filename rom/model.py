@@ -337,6 +337,8 @@ FAILURE_COSTS = {
     "loads, or for more shapes.",
     "softens it to nothing": "Centrifugal force would stiffen it, which this body does not know. "
     "Reduce it with stiffening=True.",
+    "load that buckles it": "Pressed so much it bends more and vibrates more slowly, which this "
+    "body does not know. Reduce it with stiffening=True.",
     "energy balance": f"Energy comes from nowhere or is lost. {SMALLER_STEPS}",
     "drift of energy": f"Energy comes from nowhere or is lost. {SMALLER_STEPS}",
     "change of ": "Momentum changes though nothing pushes from outside. Flexible bodies with "

@@ -11,7 +11,7 @@ import numpy as np
 from rom.body.nonlinear.cauchy import CauchyRecovery
 from rom.body.nonlinear.quartic import Quartic
 from rom.body.nonlinear.sampled import Sampled
-from rom.body.records import Body, BodyData, Marker, Patch
+from rom.body.records import BUCKLING_LOADS, Body, BodyData, Marker, Patch
 from rom.body.recovery import CENTRIFUGAL_LOADS, N_FRAME_LOADS, StressRecovery
 from rom.body.stiffening import ANGULAR_LOADS, ELASTIC_LOAD, LINEAR_LOADS
 from rom.errors import ConfigError, ModelError
@@ -99,13 +99,16 @@ def converted(body: Body, units: str) -> Body:
 
 
 def _provenance(old: dict[str, Any], f: Factors) -> dict[str, Any]:
-    """With the energies to which load cases at large deflection hold."""
-    cases = old.get("large deflection")
-    if not cases:
-        return old
-    changed = {name: case | {"energy": case["energy"] * f.force * f.length}
-               for name, case in cases.items()}  # fmt: skip
-    return old | {"large deflection": changed}
+    """With the energies to which load cases at large deflection hold, and forces that buckle."""
+    found = dict(old)
+    if cases := old.get("large deflection"):
+        found["large deflection"] = {
+            name: case | {"energy": case["energy"] * f.force * f.length}
+            for name, case in cases.items()
+        }
+    if loads := old.get(BUCKLING_LOADS):
+        found[BUCKLING_LOADS] = [[one, two, load * f.force] for one, two, load in loads]
+    return found
 
 
 def _quartic(old: Quartic | Sampled, f: Factors) -> Quartic:

@@ -1,6 +1,6 @@
 """Small motions around any state of a mechanism: frequencies, damping, shapes."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -20,6 +20,7 @@ from rom.mbs.analysis.local_equations import (
 from rom.mbs.analysis.quadratic_eigen import modes, phases
 from rom.mbs.analysis.rotors.blades import Blades
 from rom.mbs.analysis.rotors.moving_axes import Axes, chosen, small_motions
+from rom.mbs.analysis.snapshot import of_instant
 from rom.mbs.analysis.tangent import load_stiffness, sizes
 from rom.mbs.equations.packing import Packed
 from rom.mbs.integrate.consistent_start import fitting_velocity, initial_state, with_accelerations
@@ -27,6 +28,7 @@ from rom.mbs.kernels.system import ROLL
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.parts.bodies import Marker
 from rom.mbs.results.state import State
+from rom.mbs.results.validity import warn_of_pressure
 from rom.model import Array
 
 PROBE_ANGLE = 1e-3  # by which the joints are moved to see how their free motions change [rad]
@@ -56,6 +58,8 @@ class Linearization:
         H: (k, 6, 6 + R) twist of all markers per velocity of their body [1, m, 1/m].
         known: eigenvalues (k,), vectors (f, k) and all eigenvalues, where the motions y are a
             part of all that hold k modes; None: computed when asked for.
+        pressed: by body, the force that presses two of its interfaces together over what buckles it
+            there [1]; zero with geometric stiffness, nan where the body does not know.
     """
 
     state: State
@@ -69,6 +73,7 @@ class Linearization:
     packed: Packed
     H: Array
     known: Any = None
+    pressed: dict[str, float] = field(default_factory=dict)
 
     @cached_property
     def _modes(self) -> tuple[Array, Array, Array]:
@@ -203,7 +208,8 @@ def linearize(
         ModesMissedError: if other modes were found than there are.
 
     Warns:
-        RomWarning: if the coefficients change with time: frequencies are then those of an instant.
+        RomWarning: if the coefficients change with time: frequencies are then those of an instant;
+            if a body without geometric stiffness is pressed by a tenth of what buckles it.
 
     Source:
         Variation of the equations of motion on R^3 x SO(3) x R^r, as in Bruels and Cardona,
@@ -226,10 +232,11 @@ def linearize(
     refuse_rolling(now.packed, state)
     if blades is not None:
         axes = replace(axes, blades=Blades.of(blades, now.packed, state))
-    if wanted is None:
-        return _reduced(now, state, axes)
-    found = _few(now, state, axes, wanted)
-    return found or _part(linearize(mechanism, state, t=t, frame=frame, blades=blades), wanted)
+    still = of_instant(mechanism, now, state)
+    found = _reduced(now, state, axes) if wanted is None else _few(now, state, axes, wanted)
+    if found is None:
+        return _part(linearize(mechanism, state, t=t, frame=frame, blades=blades), wanted)
+    return replace(found, pressed=warn_of_pressure(still))
 
 
 def _few(now: Instant, state: State, axes: Axes, wanted: Wanted) -> Linearization | None:

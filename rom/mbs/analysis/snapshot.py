@@ -3,7 +3,7 @@
 import numpy as np
 
 from rom.arguments import typed
-from rom.mbs.analysis.local_equations import consistent, instant
+from rom.mbs.analysis.local_equations import Instant, consistent, instant
 from rom.mbs.kernels.system import WORK
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.results.solution import Solution
@@ -29,7 +29,11 @@ def snapshot(mechanism: Mechanism, state: State) -> Solution:
         SolverError: if a drive or load is not finite then.
     """
     now = instant(mechanism, state.t)
-    at = consistent(now, state)
+    return of_instant(mechanism, now, consistent(now, state))
+
+
+def of_instant(mechanism: Mechanism, now: Instant, at: State) -> Solution:
+    """A consistent state as a motion of one instant."""
     W, works, status = now.W, np.zeros((1, len(WORK))), f"One instant, t = {at.t:g} s."
     t, q, v, a, lam, base, signals = (
         np.array([row]) for row in (at.t, at.q, at.v, at.a, at.lam, W.base, W.signal)

@@ -136,18 +136,18 @@ def test_chosen_steps_keep_their_tolerance_in_every_frame(seed):
 
 @pytest.mark.parametrize("frame", FRAMES)
 def test_a_hinged_panel_leaves_the_momentum_of_its_hub(frame):
-    """Integrated on its root it drifted by 7e-2 of it, on its tip Newton's method failed."""
-    panel = stiffened_beam(2.0, EI=300.0, rhoA=2.0, n_modes=6, stiffened=False)
+    """Integrated on its root it drifted by 1e-4 of it, on its tip Newton's method failed."""
+    panel = stiffened_beam(2.0, EI=300.0, rhoA=2.0, n_modes=12, stiffened=False)
     mech = Mechanism(gravity=(0, 0, 0))
-    centre = mech.add_rigid("hub", mass=10, inertia=(1, 1, 1), at=(0, 0, 0),
-                            markers={"side": (0.3, 0, 0)}, omega=(0, 0, 3.0))  # fmt: skip
+    centre = mech.add_rigid("hub", mass=2, inertia=(0.1,) * 3, at=(0, 0, 0),
+                            markers={"side": (0.3, 0, 0)}, omega=(0, 0, 10.0))  # fmt: skip
     wing = mech.add_flexible("panel", panel.with_reference(frame), at=(0.3, 0, 0),
-                             velocity=(0, 0.9, 0), omega=(0, 0, 1.0))  # fmt: skip
+                             velocity=(0, 3.0, 0), omega=(0, 0, 3.0))  # fmt: skip
     mech.revolute("hinge", centre.marker("side"), wing.marker("root"), axis=Z)
     mech.rotational_spring("coil", "hinge", stiffness=200.0)
     sol = simulate(mech, t_end=0.3, dt=1e-3)
     for momentum in sol.momentum:
-        assert np.ptp(momentum, axis=0).max() < 3e-4 * np.abs(momentum).max()
+        assert np.ptp(momentum, axis=0).max() < 2e-5 * np.abs(momentum).max()
 
 
 def test_a_state_of_an_older_file_is_refused_where_frames_have_changed(tmp_path, monkeypatch):
