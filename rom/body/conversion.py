@@ -11,11 +11,11 @@ import numpy as np
 from rom.body.nonlinear.cauchy import CauchyRecovery
 from rom.body.nonlinear.quartic import Quartic
 from rom.body.nonlinear.sampled import Sampled
-from rom.body.records import BUCKLING_LOADS, Body, BodyData, Marker, Patch
+from rom.body.records import Body, BodyData, Marker, Patch
 from rom.body.recovery import CENTRIFUGAL_LOADS, N_FRAME_LOADS, StressRecovery
 from rom.body.stiffening import ANGULAR_LOADS, ELASTIC_LOAD, LINEAR_LOADS
 from rom.errors import ConfigError, ModelError
-from rom.model import Array
+from rom.model import BUCKLING_LOADS, Array
 from rom.units import UnitSystem, unit_system
 
 N_INTERFACE_COORDINATES = 6  # coordinates of a rigid or averaged interface: displacement, rotation

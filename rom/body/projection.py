@@ -12,7 +12,7 @@ from rom.body.flexible import FlexibleBody
 from rom.body.inertia import InertiaIntegrals, inertia_integrals, point_integrals
 from rom.body.nonlinear.cauchy import CauchyRecovery
 from rom.body.prestress import UnitLoads
-from rom.body.records import BUCKLING_LOADS, Marker, Patch, Surface
+from rom.body.records import Marker, Patch, Surface
 from rom.body.recovery import StressRecovery
 from rom.eigen.attachments import carried_displacements
 from rom.eigen.verbs import (
@@ -25,7 +25,7 @@ from rom.eigen.verbs import (
     rigid_motions,
 )
 from rom.errors import ConfigError, ModelError
-from rom.model import Array, FEModel, Index, Interface
+from rom.model import BUCKLING_LOADS, Array, FEModel, Index, Interface
 
 NEGATIVE_STIFFNESS_RTOL = 1e-9  # of the largest eigenvalue of K; round-off is smaller
 RIGID_RESIDUAL = 1e-6  # relative distance of a rigid motion from the basis that is still accepted

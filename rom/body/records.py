@@ -17,7 +17,6 @@ from rom.errors import InterfaceError, ModelError
 from rom.model import Array, Index, Report
 from rom.names import check_text, named, offered
 
-BUCKLING_LOADS = "buckling loads"  # in the provenance of a body, see `UnitLoads.buckling_loads`
 REPEATED_ROW_RTOL = 1e-7  # singular value of rows that repeat others; modes are as accurate as 1e-8
 
 

@@ -7,11 +7,11 @@ import pytest
 from numpy.testing import assert_allclose
 
 import rom
+from cases.mbs.slender import E_STEEL, assembled
 from rom.errors import RomWarning
 
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")
 pytestmark = pytest.mark.fenicsx
-from cases.mbs.slender import E_STEEL, assembled  # needs FEniCSx
 
 L, B, H = 1.0, 0.05, 0.01
 EULER = np.pi**2 * E_STEEL * B * H**3 / 12 / L**2

@@ -15,12 +15,12 @@ from rom.mbs.analysis.local_equations import (
     consistent,
     free_motions,
     instant,
+    of_instant,
     of_unit_mass,
 )
 from rom.mbs.analysis.quadratic_eigen import modes, phases
 from rom.mbs.analysis.rotors.blades import Blades
 from rom.mbs.analysis.rotors.moving_axes import Axes, chosen, small_motions
-from rom.mbs.analysis.snapshot import of_instant
 from rom.mbs.analysis.tangent import load_stiffness, sizes
 from rom.mbs.equations.packing import Packed
 from rom.mbs.integrate.consistent_start import fitting_velocity, initial_state, with_accelerations
@@ -28,7 +28,7 @@ from rom.mbs.kernels.system import ROLL
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.parts.bodies import Marker
 from rom.mbs.results.state import State
-from rom.mbs.results.validity import warn_of_pressure
+from rom.mbs.results.validity import pressed
 from rom.model import Array
 
 PROBE_ANGLE = 1e-3  # by which the joints are moved to see how their free motions change [rad]
@@ -59,7 +59,7 @@ class Linearization:
         known: eigenvalues (k,), vectors (f, k) and all eigenvalues, where the motions y are a
             part of all that hold k modes; None: computed when asked for.
         pressed: by body, the force that presses two of its interfaces together over what buckles it
-            there [1]; zero with geometric stiffness, nan where the body does not know.
+            there [1]; zero with geometric stiffness, left out where the body does not know.
     """
 
     state: State
@@ -233,10 +233,14 @@ def linearize(
     if blades is not None:
         axes = replace(axes, blades=Blades.of(blades, now.packed, state))
     still = of_instant(mechanism, now, state)
-    found = _reduced(now, state, axes) if wanted is None else _few(now, state, axes, wanted)
-    if found is None:
+    if wanted is None:
+        found = _reduced(now, state, axes)
+    elif not (few := _few(now, state, axes, wanted)):
         return _part(linearize(mechanism, state, t=t, frame=frame, blades=blades), wanted)
-    return replace(found, pressed=warn_of_pressure(still))
+    else:
+        found = few
+    shares = {name: pressed(still, name) for name, part in mechanism.parts.items() if part.r}
+    return replace(found, pressed={name: x for name, x in shares.items() if x is not None})
 
 
 def _few(now: Instant, state: State, axes: Axes, wanted: Wanted) -> Linearization | None:

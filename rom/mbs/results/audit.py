@@ -7,13 +7,7 @@ import numpy as np
 from rom.arguments import typed
 from rom.mbs.kernels.system import ROLL
 from rom.mbs.results.solution import Solution
-from rom.mbs.results.validity import (
-    MAX_DEFORMATION,
-    MAX_PRESSURE,
-    deformation,
-    softening,
-    warn_of_pressure,
-)
+from rom.mbs.results.validity import MAX_DEFORMATION, MAX_PRESSURE, deformation, pressed, softening
 from rom.model import Report, Row
 
 # limits; energy counts relative to the largest amount of energy that was exchanged
@@ -116,14 +110,13 @@ def _numbers(solution: Solution) -> list[Row]:
     if "iterations" in statistics:
         mean = statistics["iterations"] / max(statistics["steps"], 1)
         rows.append(_row("Newton corrections per step", mean, MAX_MEAN_CORRECTIONS))
-    pressures = warn_of_pressure(solution)
     for name, part in solution.mechanism.parts.items():
         if part.r:
-            rows += _limits(solution, name, part.flexible, pressures)
+            rows += _limits(solution, name, part.flexible)
     return rows
 
 
-def _limits(solution: Solution, name: str, body: Any, pressures: dict[str, float]) -> list[Row]:
+def _limits(solution: Solution, name: str, body: Any) -> list[Row]:
     """Whether a body stays within what it was made for."""
     bent = deformation(solution, name)
     if getattr(body, "quartic", None) is not None:
@@ -137,8 +130,8 @@ def _limits(solution: Solution, name: str, body: Any, pressures: dict[str, float
     rows = [_row(f"largest deformation of {name} / size", bent, MAX_DEFORMATION)]
     if share := softening(solution, name):
         rows.append(_row(f"speed of {name} / speed that softens it to nothing", share, 1.0))
-    what, share = f"load that presses {name} / load that buckles it", pressures[name]
-    if np.isnan(share):
+    what, share = f"load that presses {name} / load that buckles it", pressed(solution, name)
+    if share is None:
         rows.append(Row(f"{what}, unknown", 0.0, "information", True))
     elif not body.K_geo:
         rows.append(_row(what, share, MAX_PRESSURE))

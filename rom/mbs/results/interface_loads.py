@@ -43,7 +43,7 @@ def at_instants(solution: Any) -> Iterator[Work]:
 def of_body(solution: Any, body: str, wrench: Array, frame: str) -> dict[Any, Array]:
     """{place: (n_t, 6)} loads on the markers of one body that carry any, in the axes asked for."""
     turned, found = frame == "body" and body != GROUND, {}
-    axes = rotation.matrix(solution.orientation(body).T) if turned else None
+    axes: Any = rotation.matrix(solution.orientation(body).T) if turned else None
     for marker, k in solution.packed.markers.items():
         if marker.body == body and wrench[:, k].any():
             both = wrench[:, k].reshape(-1, 2, 3)

@@ -3,6 +3,8 @@
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+
 from rom.arguments import typed
 from rom.errors import ConfigError
 from rom.model import Array
@@ -62,17 +64,27 @@ class State:
     memory: Memory | None = None
     in_own_frames: bool = False
 
-    def check_frames(self, packed: Any) -> None:
-        """Refuse a state whose bodies stand in other frames than those that are integrated.
 
-        Raises:
-            ConfigError: naming the bodies.
-        """
-        stiffened = dict(zip(packed.names, packed.system.bodies.stiffened, strict=True))
-        moved = [marker.body for marker in packed.frames if not stiffened[marker.body]]
-        if self.in_own_frames and moved:
-            raise ConfigError(
-                f"the state counts {named(moved)} in the frame of its reference condition; motions "
-                "now are integrated on mean axes, and the two differ by the deformation.",
-                hint="Compute the motion up to there again; its file is of an older version.",
-            )
+def check_state(state: State, packed: Any, *, joints: bool = True) -> None:
+    """Refuse a state of other bodies or joints, or of bodies in frames of an older version.
+
+    Raises:
+        ConfigError: with the numbers, or naming the bodies.
+    """
+    needed = (packed.q.size, packed.v.size, packed.system.rows.kind.size)
+    sizes: Any = tuple(map(np.size, (state.q, state.v, state.lam)))
+    if sizes[: 2 + joints] != needed[: 2 + joints]:
+        raise ConfigError(
+            f"the state has {sizes[0]} coordinates, {sizes[1]} velocities and {sizes[2]} "
+            "constraints; this mechanism has {}, {} and {}: their bodies "
+            "differ, or joints.".format(*needed),
+            hint="Take a state of the same mechanism: sol.final, or rom.equilibrium.",
+        )
+    stiffened = dict(zip(packed.names, packed.system.bodies.stiffened, strict=True))
+    moved = [marker.body for marker in packed.frames if not stiffened[marker.body]]
+    if state.in_own_frames and moved:
+        raise ConfigError(
+            f"the state counts {named(moved)} in the frame of its reference condition; motions "
+            "now are integrated on mean axes, and the two differ by the deformation.",
+            hint="Compute the motion up to there again; its file is of an older version.",
+        )

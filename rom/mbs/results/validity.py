@@ -6,11 +6,10 @@ import numpy as np
 from scipy.linalg import eigh
 
 from rom import rotation
-from rom.body.records import BUCKLING_LOADS
 from rom.errors import warn
 from rom.mbs.kernels.system import ANGLE
 from rom.mbs.results.solution import Solution
-from rom.model import Array
+from rom.model import BUCKLING_LOADS, Array
 
 # of the size of the body: beyond a tenth, linear elasticity is no longer to be trusted
 MAX_DEFORMATION = 0.1
@@ -56,40 +55,32 @@ def warn_of_range(mechanism: Any, packed: Any, state: Any) -> None:
             warn(f"body {name!r} is beyond the range of its certificate: {found[1]}")
 
 
-def pressed(solution: Solution, name: str) -> float:
+def pressed(solution: Solution, name: str) -> float | None:
     """Largest force that presses two interfaces of a body together, over what buckles it there [1].
 
-    As on hinges. Zero where geometric stiffness is known to the motion, nan where the body does
-    not know its buckling loads.
+    As on hinges, with a warning of too much. Zero where geometric stiffness is known to the motion,
+    None where the body does not know its buckling loads.
     """
     body: Any = solution.mechanism.parts[name].flexible
-    if body.K_geo or getattr(body, "quartic", None) is not None:
+    if body.K_geo or body.quartic is not None:
         return 0.0
-    known = getattr(body, "provenance", {}).get(BUCKLING_LOADS)
+    known = body.provenance.get(BUCKLING_LOADS)
     if known is None or not all({one, two} <= set(body.markers) for one, two, _ in known):
-        return np.nan
+        return None
     loads, share = solution.interface_loads(name) if known else {}, 0.0
     for one, two, most in known:
         if one in loads and two in loads:
             line = solution.position(name, two) - solution.position(name, one)
             e = line / np.linalg.norm(line, axis=1, keepdims=True)
             along = [np.einsum("ta,ta->t", e, loads[end][:, :3]) for end in (one, two)]
-            share = max(share, np.nanmax(np.minimum(along[0], -along[1])) / most)
+            share = max(share, float(np.nanmax(np.minimum(along[0], -along[1]))) / most)
+    if share > MAX_PRESSURE:
+        warn(
+            f"body {name!r} is pressed by {share:.2g} of the load that buckles it between two of "
+            "its interfaces: it bends more and vibrates more slowly than a body without geometric "
+            "stiffness knows. Reduce it with stiffening=True."
+        )
     return share
-
-
-def warn_of_pressure(solution: Solution) -> dict[str, float]:
-    """What `pressed` says of each flexible body, with a warning of those it says too much of."""
-    names = [name for name, part in solution.mechanism.parts.items() if part.r]
-    shares = {name: pressed(solution, name) for name in names}
-    for name, share in shares.items():
-        if share > MAX_PRESSURE:
-            warn(
-                f"body {name!r} is pressed by {share:.2g} of the load that buckles it between two "
-                "of its interfaces: it bends more and vibrates more slowly than a body without "
-                "geometric stiffness knows. Reduce it with stiffening=True."
-            )
-    return shares
 
 
 def _warn_of_range(solution: Solution, name: str) -> None:
