@@ -103,8 +103,10 @@ class UnitLoads:
             for (one, two), line in zip(pairs, lines, strict=True)
             if len(pairs) <= MAX_PAIRS and line.any()
         ]
+        if not pressed or not omega.size:
+            return []
         forces = [(one.translation - two.translation).T @ e for one, two, e in pressed]
-        U = E @ (np.reshape(forces, (-1, omega.size)) / omega**2).T
+        U = E @ (np.array(forces) / omega**2).T
         K = self.model.stresses.geometric_stiffness(U, E)
         K += self._surfaces(U, 0.0, E, markers, [])
         shares = np.linalg.eigvalsh(-K / np.outer(omega, omega))[:, -1]
