@@ -22,6 +22,7 @@ Index = npt.NDArray[np.int64]
 Mask = npt.NDArray[np.bool_]
 Integers = npt.NDArray[np.integer[Any]]
 Numbers = TypeVar("Numbers", Array, Index)
+BUCKLING_LOADS = "buckling loads"  # in the provenance of a body, see `rom.body.prestress`
 OWN_FRAME = "frame of the body"  # the marker that is the frame a body was given in
 
 
@@ -339,10 +340,11 @@ FAILURE_COSTS = {
     "loads, or for more shapes.",
     "softens it to nothing": "Centrifugal force would stiffen it, which this body does not know. "
     "Reduce it with stiffening=True.",
+    "load that buckles it": "Pressed so much it bends more and vibrates more slowly, which this "
+    "body does not know. Reduce it with stiffening=True.",
     "energy balance": f"Energy comes from nowhere or is lost. {SMALLER_STEPS}",
     "drift of energy": f"Energy comes from nowhere or is lost. {SMALLER_STEPS}",
-    "change of ": "Momentum changes though nothing pushes from outside. Flexible bodies with "
-    f'stiffening=True or reference="mean-axis" lose least. {SMALLER_STEPS}',
+    "change of ": f"Momentum changes though nothing pushes from outside. {SMALLER_STEPS}",
     "gap in a joint": f"Joints come apart. {SMALLER_STEPS}",
     "slip of what rolls": f"What rolls slips. {SMALLER_STEPS}",
     "chi-square of all residuals": "The model is not that of the test: deviations, which are those "

@@ -271,6 +271,9 @@ def _reduced_body(  # noqa: PLR0913  those of `reduce`
         name=name,
         stress=_left_out(model, ops, connection, basis) if stress and not nonlinear else None,
         stiffening=UnitLoads(model, bare, ops, connection) if stiffening else None,
+        pressing=None
+        if stiffening or nonlinear or model.stresses is None
+        else UnitLoads(model, bare, ops, connection),
         provenance=model.provenance | {"reduction": _described(method, basis, ops.n)},
     )
     if nonlinear is None:

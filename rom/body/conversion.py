@@ -15,7 +15,7 @@ from rom.body.records import Body, BodyData, Marker, Patch
 from rom.body.recovery import CENTRIFUGAL_LOADS, N_FRAME_LOADS, StressRecovery
 from rom.body.stiffening import ANGULAR_LOADS, ELASTIC_LOAD, LINEAR_LOADS
 from rom.errors import ConfigError, ModelError
-from rom.model import Array
+from rom.model import BUCKLING_LOADS, Array
 from rom.units import UnitSystem, unit_system
 
 N_INTERFACE_COORDINATES = 6  # coordinates of a rigid or averaged interface: displacement, rotation
@@ -99,13 +99,16 @@ def converted(body: Body, units: str) -> Body:
 
 
 def _provenance(old: dict[str, Any], f: Factors) -> dict[str, Any]:
-    """With the energies to which load cases at large deflection hold."""
-    cases = old.get("large deflection")
-    if not cases:
-        return old
-    changed = {name: case | {"energy": case["energy"] * f.force * f.length}
-               for name, case in cases.items()}  # fmt: skip
-    return old | {"large deflection": changed}
+    """With the energies to which load cases at large deflection hold, and forces that buckle."""
+    found = dict(old)
+    if cases := old.get("large deflection"):
+        found["large deflection"] = {
+            name: case | {"energy": case["energy"] * f.force * f.length}
+            for name, case in cases.items()
+        }
+    if loads := old.get(BUCKLING_LOADS):
+        found[BUCKLING_LOADS] = [[one, two, load * f.force] for one, two, load in loads]
+    return found
 
 
 def _quartic(old: Quartic | Sampled, f: Factors) -> Quartic:

@@ -134,7 +134,7 @@ class FlexibleBody(BodyData):
         On mean axes displacements of second order have no momentum that shapes do not have, so that
         inertia is that of linear shapes, see `rom.mbs.kernels.second_order`. On an interface they
         contain rigid motion of the whole body. The frame of the body is kept as the marker
-        `rom.model.OWN_FRAME`; a body without geometric stiffness, or on mean axes, stays as it is.
+        `rom.model.OWN_FRAME`; a body of large deflection, or on mean axes, stays as it is.
 
         Raises:
             ConfigError: if an interface has the name of that marker.

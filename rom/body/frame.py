@@ -9,7 +9,7 @@ from scipy.linalg import eigh
 from rom.body.nonlinear.quartic import Quartic
 from rom.body.records import Body, Marker
 from rom.body.recovery import StressRecovery
-from rom.body.reference import moved_frame, reference_motion
+from rom.body.reference import MEAN_AXES, moved_frame, reference_motion
 from rom.body.stiffening import SecondOrder, moved_stiffening, recombined_stiffening
 from rom.eigen.verbs import Operators, rigid_motions
 from rom.errors import ConfigError, ModelError
@@ -20,7 +20,8 @@ STILL_RTOL = 1e-9  # momentum of a shape, of the largest that its mass lets it h
 
 def on_mean_axes(body: Body) -> Body:
     """The same elastic coordinates on mean axes, see `FlexibleBody.on_mean_axes`."""
-    if not body.K_geo or _moves_around_rest(body):
+    rests = _moves_around_rest(body) if body.K_geo else body.reference in MEAN_AXES
+    if rests or body.quartic is not None:
         return body
     if OWN_FRAME in body.markers:
         raise ConfigError(

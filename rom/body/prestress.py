@@ -8,6 +8,7 @@ forces at its interfaces.
 """
 
 from dataclasses import dataclass
+from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,8 @@ from rom.eigen.attachments import carried_displacements
 from rom.eigen.verbs import Operators, dofs_of, mean_motion, rigid_motions
 from rom.errors import ConfigError
 from rom.model import Array, FEModel, Index, Interface
+
+MAX_PAIRS = 3  # of interfaces: each costs the assembly of a matrix
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,6 +83,36 @@ class UnitLoads:
             K -= _turning(moment, self._rotation(c.interface, E))
         return dict(zip(names, 0.5 * (K + K.transpose(0, 2, 1)), strict=True))
 
+    def buckling_loads(
+        self, E: Array, omega: Array, markers: dict[str, Marker]
+    ) -> list[tuple[str, str, float]]:
+        """Pairs of interfaces, and the force [N] that buckles the body pressed between them.
+
+        As on hinges: forces keep to the line of the pair, which holds nothing else of it. Of
+        more than `MAX_PAIRS` pairs of rigid or averaged interfaces none is looked at.
+
+        Args:
+            E: (n_local, r) mass-normalised shapes in their mean-axis frame.
+            omega: (r,) their frequencies [rad/s].
+            markers: interfaces by name.
+        """
+        pairs = list(combinations([m for m in markers.values() if m.patch is None], 2))
+        lines = [two.point - one.point for one, two in pairs]
+        pressed = [
+            (one, two, line / np.linalg.norm(line))
+            for (one, two), line in zip(pairs, lines, strict=True)
+            if len(pairs) <= MAX_PAIRS and line.any()
+        ]
+        if not pressed or not omega.size:
+            return []
+        forces = [(one.translation - two.translation).T @ e for one, two, e in pressed]
+        U = E @ (np.array(forces) / omega**2).T
+        K = self.model.stresses.geometric_stiffness(U, E)
+        K += self._surfaces(U, 0.0, E, markers, [])
+        shares = np.linalg.eigvalsh(-K / np.outer(omega, omega))[:, -1]
+        named = zip(pressed, shares, strict=True)
+        return [(one.name, two.name, float(1 / x)) for (one, two, _), x in named if x > 0.0]
+
     @property
     def _points(self) -> Array:
         first = self.mesh.first // 3
@@ -137,7 +170,7 @@ class UnitLoads:
     def _surfaces(
         self,
         U: Array,
-        forces: Array,
+        forces: Array | float,
         E: Array,
         markers: dict[str, Marker],
         carried: list[Carried],

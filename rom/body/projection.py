@@ -25,7 +25,7 @@ from rom.eigen.verbs import (
     rigid_motions,
 )
 from rom.errors import ConfigError, ModelError
-from rom.model import Array, FEModel, Index, Interface
+from rom.model import BUCKLING_LOADS, Array, FEModel, Index, Interface
 
 NEGATIVE_STIFFNESS_RTOL = 1e-9  # of the largest eigenvalue of K; round-off is smaller
 RIGID_RESIDUAL = 1e-6  # relative distance of a rigid motion from the basis that is still accepted
@@ -96,6 +96,7 @@ def flexible_body(  # noqa: PLR0913  what a body is made of
     provenance: dict[str, Any],
     stress: Callable[[dict[str, Marker]], Array | None] | None = None,
     stiffening: UnitLoads | None = None,
+    pressing: UnitLoads | None = None,
 ) -> FlexibleBody:
     """The body in its mean-axis frame.
 
@@ -111,11 +112,15 @@ def flexible_body(  # noqa: PLR0913  what a body is made of
         stress: makes the stress on the surface recoverable: the motion of the modes left out, see
             `rom.body.correction.residual_motion`, from the markers; None without stress.
         stiffening: the loads whose geometric stiffness the body gets.
+        pressing: those of which it is only told what would buckle it.
     """
     E = canonical_columns(ops, Psi @ elastic.V, model)
     integrals = _integrals(model, ops, E)
     markers = {n: _marker(ops, model.interfaces[n], tie, E) for n, tie in ties.items()}
     r = elastic.omega.size
+    if pressing is not None:
+        loads = pressing.buckling_loads(E, elastic.omega, markers)
+        provenance = provenance | {BUCKLING_LOADS: loads}
     return FlexibleBody(
         name=name,
         **{key: getattr(integrals, key) for key in integrals.__slots__},

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rom.arguments import typed, whole
-from rom.errors import ConfigError, ModelError, RomError, SolverError, reached, warn
+from rom.errors import ModelError, RomError, SolverError, reached, warn
 from rom.mbs.analysis.local_equations import Instant, instant
 from rom.mbs.analysis.rotors.spins import Spins
 from rom.mbs.analysis.sparse_tangent import Loan, SparseTangent
@@ -16,7 +16,7 @@ from rom.mbs.analysis.tangent import Tangent, faint_force, sizes
 from rom.mbs.equations.packing import Packed
 from rom.mbs.integrate.consistent_start import assembled, check_velocity, initial_state
 from rom.mbs.mechanism import Mechanism
-from rom.mbs.results.state import State
+from rom.mbs.results.state import State, check_state
 from rom.mbs.results.validity import warn_of_range
 from rom.model import Array
 
@@ -130,11 +130,7 @@ class _Search:
             first = replace(first, base=packed.places.settled(first.base))
         if state is None:
             return self.spins.steady(self.now, replace(first, lam=0 * first.lam))
-        if np.size(state.q) != packed.q.size or np.size(state.lam) != first.lam.size:
-            raise ConfigError(
-                f"the state has {np.size(state.q)} coordinates and {np.size(state.lam)} "
-                f"constraints; this mechanism has {packed.q.size} and {first.lam.size}."
-            )
+        check_state(state, packed)
         self.now.remember(state)
         base = first.base if state.base is None else packed.places.settled(state.base)
         q = assembled(packed, W, np.asarray(state.q, dtype=float))

@@ -1,6 +1,6 @@
 """Small motions around any state of a mechanism: frequencies, damping, shapes."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -15,6 +15,7 @@ from rom.mbs.analysis.local_equations import (
     consistent,
     free_motions,
     instant,
+    of_instant,
     of_unit_mass,
 )
 from rom.mbs.analysis.quadratic_eigen import modes, phases
@@ -27,6 +28,7 @@ from rom.mbs.kernels.system import ROLL
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.parts.bodies import Marker
 from rom.mbs.results.state import State
+from rom.mbs.results.validity import pressed
 from rom.model import Array
 
 PROBE_ANGLE = 1e-3  # by which the joints are moved to see how their free motions change [rad]
@@ -56,6 +58,8 @@ class Linearization:
         H: (k, 6, 6 + R) twist of all markers per velocity of their body [1, m, 1/m].
         known: eigenvalues (k,), vectors (f, k) and all eigenvalues, where the motions y are a
             part of all that hold k modes; None: computed when asked for.
+        pressed: by body, the force that presses two of its interfaces together over what buckles it
+            there [1]; zero with geometric stiffness, left out where the body does not know.
     """
 
     state: State
@@ -69,6 +73,7 @@ class Linearization:
     packed: Packed
     H: Array
     known: Any = None
+    pressed: dict[str, float] = field(default_factory=dict)
 
     @cached_property
     def _modes(self) -> tuple[Array, Array, Array]:
@@ -145,7 +150,7 @@ def jacobian(packed: Packed, H: Array, marker: Marker) -> Array:
     Raises:
         ConfigError: if the marker is not one of the mechanism.
     """
-    if marker not in packed.markers:
+    if packed.markers.get(marker, len(H)) >= len(H):
         raise ConfigError(
             f"{marker!r} is not a marker of the mechanism.",
             hint="Name it when the body is added, and take it from the part: part.marker(...).",
@@ -206,7 +211,8 @@ def linearize(  # noqa: PLR0913  keywords of the one entry, all have defaults
         ModesMissedError: if other modes were found than there are.
 
     Warns:
-        RomWarning: if the coefficients change with time: frequencies are then those of an instant.
+        RomWarning: if the coefficients change with time: frequencies are then those of an instant;
+            if a body without geometric stiffness is pressed by a tenth of what buckles it.
 
     Source:
         Variation of the equations of motion on R^3 x SO(3) x R^r, as in Bruels and Cardona,
@@ -229,10 +235,15 @@ def linearize(  # noqa: PLR0913  keywords of the one entry, all have defaults
     refuse_rolling(now.packed, state)
     if blades is not None:
         axes = replace(axes, blades=Blades.of(blades, now.packed, state))
+    still = of_instant(mechanism, now, state)
     if wanted is None:
-        return _reduced(now, state, axes)
-    found = _few(now, state, axes, wanted)
-    return found or _part(linearize(mechanism, state, t=t, frame=frame, blades=blades), wanted)
+        found = _reduced(now, state, axes)
+    elif not (few := _few(now, state, axes, wanted)):
+        return _part(linearize(mechanism, state, t=t, frame=frame, blades=blades), wanted)
+    else:
+        found = few
+    shares = {name: pressed(still, name) for name, part in mechanism.parts.items() if part.r}
+    return replace(found, pressed={name: x for name, x in shares.items() if x is not None})
 
 
 def _few(now: Instant, state: State, axes: Axes, wanted: Wanted) -> Linearization | None:

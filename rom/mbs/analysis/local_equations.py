@@ -23,11 +23,12 @@ from rom.mbs.integrate.consistent_start import (
     initial_state,
     with_accelerations,
 )
-from rom.mbs.kernels.system import ROLL
+from rom.mbs.kernels.system import ROLL, WORK
 from rom.mbs.kernels.work import Work, workspace
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.parts.signals import first_failure, sample_all
-from rom.mbs.results.state import State
+from rom.mbs.results.solution import Solution
+from rom.mbs.results.state import State, check_state
 from rom.model import Array
 
 # central differences: rotations in rad, displacements in sizes of the mechanism
@@ -250,14 +251,7 @@ def consistent(now: Instant, state: Any, assemble: bool = False) -> State:
     packed, W = now.packed, now.W
     if state is None:
         state = initial_state(packed, now.t, assemble=assemble)
-    sizes = tuple(np.size(getattr(state, x, 0.0)) for x in ("q", "v", "lam"))
-    needed = (packed.q.size, packed.v.size, W.value.size)
-    if not isinstance(state, State) or sizes != needed:
-        raise ConfigError(
-            f"the state has {sizes[0]} coordinates, {sizes[1]} velocities and {sizes[2]} "
-            "constraints; this mechanism has {}, {} and {}.".format(*needed),
-            hint="Take a state of the same mechanism: sol.final, or rom.equilibrium.",
-        )
+    check_state(state, packed)
     now.remember(state)
     value, G, _ = now.gradient(state.q, state.v)
     rolls = packed.system.rows.kind == ROLL
@@ -309,3 +303,13 @@ def of_unit_mass(Z: Array, mass: Array) -> Array:
             "shapes can describe."
         ) from error
     return solve_triangular(L, Z.T, lower=True).T if Z.size else Z
+
+
+def of_instant(mechanism: Mechanism, now: Instant, at: State) -> Solution:
+    """A consistent state as a motion of one instant."""
+    W, works, status = now.W, np.zeros((1, len(WORK))), f"One instant, t = {at.t:g} s."
+    t, q, v, a, lam, base, signals = (
+        np.array([row]) for row in (at.t, at.q, at.v, at.a, at.lam, W.base, W.signal)
+    )
+    rank = {"rank": at.rank}
+    return Solution(mechanism, now.packed, t, q, v, a, lam, works, base, signals, rank, status, at)

@@ -1,10 +1,7 @@
 """A state as a motion of one instant, which answers whatever motions answer."""
 
-import numpy as np
-
 from rom.arguments import typed
-from rom.mbs.analysis.local_equations import consistent, instant
-from rom.mbs.kernels.system import WORK
+from rom.mbs.analysis.local_equations import consistent, instant, of_instant
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.results.solution import Solution
 from rom.mbs.results.state import State
@@ -29,10 +26,4 @@ def snapshot(mechanism: Mechanism, state: State) -> Solution:
         SolverError: if a drive or load is not finite then.
     """
     now = instant(mechanism, state.t)
-    at = consistent(now, state)
-    W, works, status = now.W, np.zeros((1, len(WORK))), f"One instant, t = {at.t:g} s."
-    t, q, v, a, lam, base, signals = (
-        np.array([row]) for row in (at.t, at.q, at.v, at.a, at.lam, W.base, W.signal)
-    )
-    rank = {"rank": at.rank}
-    return Solution(mechanism, now.packed, t, q, v, a, lam, works, base, signals, rank, status, at)
+    return of_instant(mechanism, now, consistent(now, state))

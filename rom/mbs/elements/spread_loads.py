@@ -53,10 +53,10 @@ def spread_load(
 ) -> None:
     """Load on all points of a flexible body: pressure, traction, force per mass.
 
-    In the frame "body" the forces turn with it, as a pressure does: with its frame, or with the
-    mean axes of a body that has geometric stiffness; in the "world" they keep
-    their direction, given in the axes of the world. Either way they act on the points as they
-    deform, which changes moments; the area they were reduced for stays the undeformed one.
+    In the frame "body" the forces turn with its mean axes, as a pressure does, at large deflection
+    with its frame; in the "world" they keep their direction, given in the axes of the world.
+    Either way they act on the points as they deform, which changes moments; the area they were
+    reduced for stays the undeformed one.
 
     Args:
         name: name of the load.

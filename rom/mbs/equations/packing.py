@@ -26,7 +26,7 @@ from rom.mbs.mechanism import Mechanism
 from rom.mbs.parts.bodies import GROUND, Marker, Part, moving_start
 from rom.mbs.parts.joints import Joint, Row
 from rom.mbs.parts.signals import Signal, drive_signal
-from rom.model import Array, Index
+from rom.model import OWN_FRAME, Array, Index
 
 FAR_JOINTS = 1e4  # sizes from the origin; reactions of a pendulum there miss 2e-5 of its weight
 
@@ -42,6 +42,8 @@ class Packed:
 
     Attributes:
         system: the arrays.
+        seen: the same with the frames of bodies that move in another one as further markers, which
+            answers need and steps do not.
         names: bodies in the order of the arrays.
         markers: row of each marker.
         row_owner: (m,) joint or drive of each constraint row.
@@ -56,6 +58,7 @@ class Packed:
     """
 
     system: System
+    seen: System
     names: tuple[str, ...]
     markers: dict[Marker, int]
     row_owner: tuple[str, ...]
@@ -209,6 +212,11 @@ class Packed:
         """Groups of bodies that elements couple."""
         return coupled_by(self.elements, self.system.markers.body)
 
+    @property
+    def frames(self) -> list[Marker]:
+        """The further markers of ``seen``."""
+        return [marker for marker in self.markers if marker.place == OWN_FRAME]
+
     def row(self, marker: Marker) -> int:
         """Row of a marker in the arrays."""
         return self.markers[marker]
@@ -228,7 +236,8 @@ def pack(mechanism: Mechanism, *, whole: bool = False) -> Packed:
     if not parts:
         raise ConfigError("the mechanism has no body.", hint="Use add_rigid or add_flexible.")
     handles = _all_markers(mechanism, parts)
-    index = {marker: k for k, marker in enumerate(handles)}
+    seen = [*handles, *(part.own_frame for part in parts if part.own_frame)]
+    index = {marker: k for k, marker in enumerate(seen)}
     R, number = max(part.r for part in parts), {name: b for b, name in enumerate(mechanism.parts)}
     places = Places(number, index, mechanism.joints, R)
     rows = _rows(mechanism, places)
@@ -251,8 +260,10 @@ def pack(mechanism: Mechanism, *, whole: bool = False) -> Packed:
         np.concatenate([np.zeros(0), *places.remembered.values()]),
         _renewed(elements, sum(6 + part.r for part in parts)),
     )
+    system = system.replace(graph=graph_of(system, coupled_by(elements, markers.body), whole=whole))
     return Packed(
-        system.replace(graph=graph_of(system, coupled_by(elements, markers.body), whole=whole)),
+        system,
+        system.replace(markers=_markers(mechanism, seen, R)),
         tuple(mechanism.parts),
         index,
         tuple(places.owners),
@@ -291,7 +302,6 @@ def coupled_by(elements: dict[Family, Table], body: Index) -> list[Any]:
 def _all_markers(mechanism: Mechanism, parts: tuple[Part, ...]) -> list[Marker]:
     """Every named marker, every marker in use, and the origin of every body."""
     found = [Marker(part.name, name) for part in parts for name in part.names]
-    found += [part.own_frame for part in parts if part.own_frame]
     found += [m for joint in mechanism.joints.values() for m in joint.markers]
     found += [m for family, x in mechanism.elements.values() for m in family.ends(x)]
     found += [m for event in mechanism.events.values() for m in event.markers]

@@ -37,7 +37,7 @@ class Instant:
 
     def __init__(self, mechanism: Mechanism, packed: Packed):
         self._mechanism, self._packed = mechanism, packed
-        self.W: Any = workspace(packed.system, len(packed.signals))
+        self.W: Any = workspace(packed.seen, len(packed.signals))
         self.t, self.q, self.v = 0.0, packed.q, packed.v
         self._fresh = False
 
@@ -155,7 +155,7 @@ class Instant:
 
     def _evaluate(self) -> None:
         if not self._fresh:
-            evaluate(self._packed.system, self.W, self.q, self.v)
+            evaluate(self._packed.seen, self.W, self.q, self.v)
             self._fresh = True
 
 

@@ -20,7 +20,7 @@ from rom.mbs.integrate.run import Record, Settings
 from rom.mbs.kernels.work import workspace
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.results.solution import Solution
-from rom.mbs.results.state import State
+from rom.mbs.results.state import State, check_state
 from rom.mbs.results.validity import warn_of_limits
 from rom.process.interruption import terminable
 
@@ -169,12 +169,7 @@ def release(mechanism: Mechanism, state: State, *, assemble: bool = False) -> St
     packed = pack(mechanism)
     if not isinstance(state, State):
         raise ConfigError(f"{state!r} is no State.", hint="Take rom.equilibrium(...) or sol.final.")
-    sizes: Any = (state.q.size, state.v.size)
-    if sizes != (packed.q.size, packed.v.size):
-        raise ConfigError(
-            f"the state has {sizes[0]} coordinates and {sizes[1]} velocities, this mechanism "
-            f"{packed.q.size} and {packed.v.size}: it must be of the same bodies."
-        )
+    check_state(state, packed, joints=False)
     placed = replace(packed, q=state.q.copy(), v=state.v.copy())
     return initial_state(placed, state.t, assemble=assemble)
 
@@ -259,15 +254,12 @@ def _rescued(error: BaseException, record: Record) -> Solution | None:
 
 def _check_fit(state: Any, packed: Packed, mechanism: Mechanism) -> None:
     """Compiled code does not look at the size of its arrays, so this is the place to do it."""
-    followed = packed.followed
-    base = np.zeros(followed) if state.base is None else state.base
-    q, v, lam, angles = (np.size(x) for x in (state.q, state.v, state.lam, base))
-    needed = (packed.q.size, packed.v.size, packed.system.rows.kind.size, followed)
-    if (q, v, lam, angles) != needed:
+    check_state(state, packed)
+    angles = packed.followed if state.base is None else np.size(state.base)
+    if angles != packed.followed:
         remembering = [name for name, law in mechanism.laws.items() if law.memory.size]
         raise ConfigError(
-            f"the state has {q} coordinates and {v} velocities, {lam} constraints and {angles} "
-            "followed joint coordinates and remembered numbers; this mechanism has {}, {}, {} and "
-            "{}.".format(*needed),
+            f"the state has {angles} followed joint coordinates and remembered numbers; this "
+            f"mechanism has {packed.followed}.",
             hint=f"Its laws that remember are {remembering}." if remembering else "",
         )

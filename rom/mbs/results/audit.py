@@ -7,7 +7,7 @@ import numpy as np
 from rom.arguments import typed
 from rom.mbs.kernels.system import ROLL
 from rom.mbs.results.solution import Solution
-from rom.mbs.results.validity import MAX_DEFORMATION, deformation, softening
+from rom.mbs.results.validity import MAX_DEFORMATION, MAX_PRESSURE, deformation, pressed, softening
 from rom.model import Report, Row
 
 # limits; energy counts relative to the largest amount of energy that was exchanged
@@ -27,8 +27,10 @@ def audit(solution: Solution) -> Report:
     the mechanism, length of the quaternions, Newton corrections per step, and the largest elastic
     displacement relative to the size of its body: beyond a tenth, linear elasticity in a floating
     frame is no longer to be trusted. A body without geometric stiffness may not turn so fast that
-    centrifugal force uses up its stiffness. A body of large deflection may store as much energy as
-    the load cases to which its certificate holds. No row of a certificate may fail.
+    centrifugal force uses up its stiffness, nor be pressed between two interfaces by more than a
+    tenth of what buckles it there, of which there is a warning, too. A body of large deflection
+    may store as much energy as the load cases to which its certificate holds. No row of a
+    certificate may fail.
 
     Geometric stiffness enters through the kinetic energy and the work of forces, see
     `rom.mbs.kernels.second_order`: the balance of energy holds with it as it does without.
@@ -139,4 +141,9 @@ def _limits(solution: Solution, name: str, body: Any) -> list[Row]:
     rows = [*certified, _row(f"largest deformation of {name} / size", bent, MAX_DEFORMATION)]
     if share := softening(solution, name):
         rows.append(_row(f"speed of {name} / speed that softens it to nothing", share, 1.0))
+    what, share = f"load that presses {name} / load that buckles it", pressed(solution, name)
+    if share is None:
+        rows.append(Row(f"{what}, unknown", 0.0, "information", True))
+    elif not body.K_geo:
+        rows.append(_row(what, share, MAX_PRESSURE))
     return rows

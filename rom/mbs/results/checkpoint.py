@@ -9,7 +9,8 @@ from rom.io.archive import MAX_BYTES, Kind, read_archive, stated, write_archive
 from rom.mbs.results.state import Memory, State
 from rom.model import Array
 
-SCHEMA_NAME, VERSION = "rom-state", (2, 0)
+SCHEMA_NAME, VERSION = "rom-state", (2, 1)
+MEAN_AXES_SINCE = 1  # minor version from which every linear body is counted on its mean axes
 NEEDED_FIELDS = ("q", "v", "a", "lam")
 STATE_KIND = Kind({SCHEMA_NAME: VERSION}, "state file", NEEDED_FIELDS)
 OPTIONAL_FIELDS = ("algorithmic", "base")
@@ -76,7 +77,8 @@ def unpacked_state(manifest: dict[str, Any], arrays: dict[str, Array], path: str
         fields |= {name: arrays.get(name) for name in OPTIONAL_FIELDS}
         memory = _memory(manifest.get("memory"), arrays)
         t, rank = float.fromhex(manifest["t"]), int(manifest["rank"])
-        return State(t=t, rank=rank, **fields, memory=memory)
+        old = manifest["version"][1] < MEAN_AXES_SINCE
+        return State(t=t, rank=rank, **fields, memory=memory, in_own_frames=old)
 
 
 def _memory(manifest: dict[str, Any] | None, arrays: dict[str, Array]) -> Memory | None:

@@ -35,12 +35,12 @@ class Tracks(NamedTuple):
 
 def follow(solution: Any, marker: int, rows: Any) -> Tracks:
     """Evaluate one marker, some constraint rows and the totals along a solution."""
-    packed, n = solution.packed, solution.t.size
+    packed, system, n = solution.packed, solution.packed.seen, solution.t.size
     shapes = ((n, 3), (n, 3, 3), (n, 6), (n, 6), (n, 3), (n, 6), solution.lam.shape)
     tracks = Tracks(*(np.zeros(shape) for shape in shapes))
-    W = workspace(packed.system, len(packed.signals))
+    W = workspace(system, len(packed.signals))
     motion = (solution.q, solution.v, solution.lam, solution.base, solution.signals)
-    track(packed.system, W, motion, marker, rows, tracks)
+    track(system, W, motion, marker, rows, tracks)
     return tracks
 
 

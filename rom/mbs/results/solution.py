@@ -274,7 +274,7 @@ class Solution:
             ConfigError: if the stress of the body cannot be recovered.
         """
         part: Any = self.mechanism.part(body)
-        recovery = getattr(part.flexible, "stress", None) if part.r else None
+        recovery = getattr(part.moving, "stress", None) if part.r else None
         if recovery is None:
             raise ConfigError(
                 f"the stress of body {body!r} cannot be recovered.",
@@ -282,10 +282,11 @@ class Solution:
             )
         q, moving = self.elastic(body)[instant], None
         if recovery.inertial is not None:
-            at, A = self._start_of(body, velocity=True), matrix(self.orientation(body)[instant])
-            a = self.a[instant, at : at + 6 + part.r]
+            at, turned = self._start_of(body, velocity=True), self._start_of(body) + 3
+            A = matrix(self.q[instant, turned : turned + 4])
+            a, omega = self.a[instant, at : at + 6 + part.r], self.v[instant, at + 3 : at + 6]
             a_minus_g = A.T @ (a[:3] - np.asarray(self.mechanism.gravity))
-            moving = recovery.accelerations(a_minus_g, a[3:6], self.omega(body)[instant], a[6:])
+            moving = recovery.accelerations(a_minus_g, a[3:6], omega, a[6:])
         return recovery.field(q, moving)
 
     def reaction(self, name: str) -> Array:
@@ -390,7 +391,7 @@ class Solution:
         return tuple(name for name, x in found if markers_of(self.mechanism, *x))
 
     @cached_property
-    def _marker_loads(self) -> tuple[Array, Array]:
+    def _marker_loads(self) -> Array:
         return marker_loads(self)
 
     @cached_property

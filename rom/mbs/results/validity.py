@@ -10,10 +10,11 @@ from rom.errors import warn
 from rom.mbs.kernels.system import ANGLE
 from rom.mbs.parts.bodies import GROUND
 from rom.mbs.results.solution import Solution
-from rom.model import Array
+from rom.model import BUCKLING_LOADS, Array
 
 # of the size of the body: beyond a tenth, linear elasticity is no longer to be trusted
 MAX_DEFORMATION = 0.1
+MAX_PRESSURE = 0.1  # of the load that buckles: a frequency is lower by a twentieth there
 # of an interface against the frame [rad]: there exp(sin x) falls short of the angle x by 1.5 %
 MAX_MARKER_TURN = 0.3
 MAX_BUSHING_TURN = 0.95 * np.pi  # [rad]
@@ -33,7 +34,7 @@ def warn_of_limits(solution: Solution) -> None:
             continue
         share, bent = softening(solution, name), deformation(solution, name, surface=False)
         if share >= 1.0:
-            top = np.linalg.norm(solution.omega(name), axis=1).max()
+            top = np.linalg.norm(_omega(solution, name), axis=1).max()
             warn(
                 f"body {name!r} turned at {top:.3g} rad/s; at {top / share:.3g} rad/s centrifugal "
                 "force has used up the stiffness of a body without geometric stiffness, which this "
@@ -56,6 +57,34 @@ def warn_of_range(mechanism: Any, packed: Any, state: Any) -> None:
             continue
         if found := part.flexible.beyond_range(state.q[at + 7 : at + 7 + part.r][None]):
             warn(f"body {name!r} is beyond the range of its certificate: {found[1]}")
+
+
+def pressed(solution: Solution, name: str) -> float | None:
+    """Largest force that presses two interfaces of a body together, over what buckles it there [1].
+
+    As on hinges, with a warning of too much. Zero where geometric stiffness is known to the motion,
+    None where the body does not know its buckling loads.
+    """
+    body: Any = solution.mechanism.parts[name].flexible
+    if body.K_geo or body.quartic is not None:
+        return 0.0
+    known = body.provenance.get(BUCKLING_LOADS)
+    if known is None or not all({one, two} <= set(body.markers) for one, two, _ in known):
+        return None
+    loads, share = solution.interface_loads(name) if known else {}, 0.0
+    for one, two, most in known:
+        if one in loads and two in loads:
+            line = solution.position(name, two) - solution.position(name, one)
+            e = line / np.linalg.norm(line, axis=1, keepdims=True)
+            along = [np.einsum("ta,ta->t", e, loads[end][:, :3]) for end in (one, two)]
+            share = max(share, float(np.nanmax(np.minimum(along[0], -along[1]))) / most)
+    if share > MAX_PRESSURE:
+        warn(
+            f"body {name!r} is pressed by {share:.2g} of the load that buckles it between two of "
+            "its interfaces: it bends more and vibrates more slowly than a body without geometric "
+            "stiffness knows. Reduce it with stiffening=True."
+        )
+    return share
 
 
 def _warn_of_range(solution: Solution, name: str) -> None:
@@ -133,8 +162,15 @@ def _top(solution: Solution, body: int) -> float:
     """Largest angular speed of a body, -1 for the ground."""
     if body < 0:
         return 0.0
-    omega = solution.omega(solution.packed.names[body])
+    omega = _omega(solution, solution.packed.names[body])
     return float(np.nanmax(np.linalg.norm(omega, axis=1), initial=0.0))
+
+
+def _omega(solution: Solution, name: str) -> Array:
+    """(n_t, 3) angular velocity of the frame that is integrated, in its axes [rad/s]."""
+    packed = solution.packed
+    at = packed.system.bodies.v_at[packed.names.index(name)] + 3
+    return solution.v[:, at : at + 3]
 
 
 def _spin(solution: Solution, body: int) -> Array:
@@ -152,7 +188,7 @@ def softening(solution: Solution, name: str) -> float:
     stiffens more than it softens.
     """
     part = solution.mechanism.parts[name]
-    body, omega = part.flexible, solution.omega(name)
+    body, omega = part.flexible, _omega(solution, name)
     omega = omega[np.isfinite(omega).all(axis=1)]
     if body.K_geo or not omega.size:
         return 0.0

@@ -336,7 +336,7 @@ def test_a_law_is_not_refused_for_the_digits_of_a_late_time():
 
 def test_a_start_of_another_mechanism_is_refused():
     other = rom.equilibrium(double_pendulum())
-    with pytest.raises(ConfigError, match=r"the start has 14 coordinates.*this mechanism has 7"):
+    with pytest.raises(ConfigError, match=r"the state has 14 coordinates.*this mechanism has 7"):
         rom.periodic_motion(pushed(1.0), period=2 * np.pi, start=other)
 
 

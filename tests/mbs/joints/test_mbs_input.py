@@ -135,7 +135,7 @@ def test_wrong_arguments_of_a_run_are_named(options, words):
 
 def test_a_state_of_another_mechanism_is_refused():
     state = simulate_quietly(slider_crank(), **GOOD).final
-    with pytest.raises(ConfigError, match="the state has 21 coordinates and 18 velocities"):
+    with pytest.raises(ConfigError, match="the state has 21 coordinates, 18 velocities"):
         simulate(mechanism()[0], t_end=1.0, dt=0.1, state=state)
 
 

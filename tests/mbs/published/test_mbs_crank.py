@@ -165,22 +165,9 @@ def one_turn(rod):
     return bending, sol.position("slider", "b")[:, 0]
 
 
-def test_a_rod_moves_the_same_in_every_frame_but_for_the_square_of_its_deformation(steel_rod):
-    """A third of the stiffness: three times the bending, nine times the differences of frames.
-
-    Beside each other stand the frame on the chord and the mean axis.
-    """
-    frames, apart, bending = ("a", "b", ("a", "b"), "mean-axis"), [], []
-    for softer in (1.0, 3.0):
-        rod = replace(steel_rod, K=steel_rod.K / softer, omega=steel_rod.omega / np.sqrt(softer))
-        bent, ways = zip(*(one_turn(rod.with_reference(frame)) for frame in frames), strict=True)
-        bending.append(bent[0])
-        apart.append([[np.abs(x - y).max() for x in ways] for y in ways])
-    one, three = np.array(apart)
+def test_a_rod_moves_the_same_in_every_frame(steel_rod):
+    """Linear in each frame by itself, it would differ by the square of its bending, 1e-7 m."""
+    rods = (steel_rod.with_reference(frame) for frame in ("a", "b", ("a", "b"), "mean-axis"))
+    bending, ways = zip(*map(one_turn, rods), strict=True)
     assert bending[0] > 4e-4
-    assert_allclose(bending[1] / bending[0], 3.0, rtol=0.05)
-    i, j = np.array([(0, 1), (0, 2), (0, 3), (1, 2), (1, 3)]).T
-    assert 1e-8 < one[i, j].min() and one[i, j].max() < 1e-6
-    slope = np.log(three[i, j] / one[i, j]) / np.log(bending[1] / bending[0])
-    assert_allclose(slope, 2.0, atol=0.1)
-    assert one[2, 3] < 1e-3 * one[0, 2]
+    assert np.ptp(ways, axis=0).max() < 1e-9

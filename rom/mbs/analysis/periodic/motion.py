@@ -19,7 +19,7 @@ from rom.mbs.analysis.periodic.shooting import Return, energy
 from rom.mbs.analysis.periodic.turns import turns_of
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.results.solution import Solution
-from rom.mbs.results.state import State
+from rom.mbs.results.state import State, check_state
 
 N_STEPS, MAX_STEPS = 200, 100_000  # per period
 # the method forgets what a step does not resolve within a period; motions that keep their energy
@@ -236,7 +236,7 @@ def prepared(  # noqa: PLR0913  the arguments of the verb
     flow = shooting.flow(first)
     if state is None:
         state = flow.initial()
-    _check_fit(flow, state)
+    check_state(state, flow.packed)
     return shooting, flow, state
 
 
@@ -250,14 +250,3 @@ def _guessed(mechanism: Mechanism, state: State | None) -> float:
             hint="Give guess= a period near the one looked for, or period= that of the drives.",
         )
     return float(2 * np.pi / turning[np.argmax(turning.real)].imag)
-
-
-def _check_fit(flow: Flow, state: State) -> None:
-    needed = flow.packed.q.size, flow.packed.v.size, flow.packed.system.rows.kind.size
-    sizes = np.size(state.q), np.size(state.v), np.size(state.lam)
-    if sizes != needed:
-        raise ConfigError(
-            f"the start has {sizes[0]} coordinates, {sizes[1]} velocities and {sizes[2]} "
-            "constraints; this mechanism has {}, {} and {}.".format(*needed),
-            hint="Take a state or motion of the same mechanism.",
-        )
