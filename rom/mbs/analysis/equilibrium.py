@@ -28,6 +28,7 @@ MIN_LOAD_STEP = 1 / 64  # part of a load step at which the search is given up
 CORRECTION_TOL = 1e-12  # of the last correction
 LEAST_BENDING = 1e-3  # of the inertia in a motion, from which a body counts as deforming
 MAX_TURN = 2 * np.pi  # after which what turned meets the same forces again [rad]
+STRAIGHT = 0.99  # of the way turned, from which it was about one axis
 MAX_HALVINGS = 60  # of a correction that leaves a gap no room
 ROOM_LEFT = 0.5  # of a gap, after one correction
 MIN_ROOM = 1e-4  # of a gap, which no film keeps open
@@ -209,7 +210,7 @@ class _Search:
             ModelError: if a body turns on and on, as a rotor does against whose drag nothing holds.
         """
         now, last, trials = self.now.scaled(load), np.inf, MAX_TRIALS
-        turned = np.zeros((now.packed.system.bodies.mass.size, 3))
+        turned, way = np.zeros((now.packed.system.bodies.mass.size, 3)), 0.0
         state = replace(state, lam=state.lam + self.tangent(now, state).reaction())
         beyond: Equations | None = None
         for _ in range(MAX_PASSES):
@@ -230,9 +231,12 @@ class _Search:
             if size < CORRECTION_TOL or (size < STALLED_TOL and size > 0.5 * last):
                 return state
             last = size
-            turned += 0.0 if equations.rises else _turns(now.packed, before, state)
-            if np.linalg.norm(turned, axis=1).max() > MAX_TURN:
-                raise _turning(now.packed, turned)
+            if not equations.rises:
+                turn = _turns(now.packed, before, state)
+                turned, way = turned + turn, way + np.linalg.norm(turn, axis=1)
+                around = np.linalg.norm(turned, axis=1)
+                if ((around > MAX_TURN) & (around > STRAIGHT * way)).any():
+                    raise _turning(now.packed, turned)
         raise _failure(now, self.tangent(now, state), load)
 
     def corrected(
