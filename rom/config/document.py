@@ -102,7 +102,7 @@ def _refusal(message: str, found: list[tuple[KeyPath, int]], path: Path) -> Conf
                 )
             seen[key] = line
     place = re.search(r" \(at (?:line (\d+), column \d+|end of document)\)", message)
-    line = place[1] if place and place[1] else max((n for _, n in found), default=1)
+    line = int(place[1]) if place and place[1] else max((n for _, n in found), default=1)
     reason = re.sub(r" \(at [^)]*\)", "", message).rstrip(".")
     return ConfigError(
         f"this is no TOML: {reason[0].lower()}{reason[1:]}.",

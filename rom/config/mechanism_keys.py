@@ -361,7 +361,8 @@ SECTIONS: dict[str, tuple[str, Kind]] = {  # connections and forces: what, and h
         Key("transition_speed", Quantity("m/s", positive=True),
             "Of sliding flanks, over which friction turns."),
         Key("cells", Whole(1), "Slices across the face.", 21),
-        Key("phase", Quantity("rad"), "Turn of the pinion at the start.", 0.0),
+        Key("phase", Quantity("rad"), "Turn of the pinion at the start; so that teeth stand in "
+            "gaps if missing."),
         Key("entry", Quantity(), "Share of the base pitch over which teeth take up load.", 0.02),
         Key("conservative", Flag(), "Whether forces follow the energy along the path of contact."),
         Key("hertz", HERTZ, "Contact that gives way by its load."),

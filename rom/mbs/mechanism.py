@@ -346,10 +346,14 @@ class Mechanism:
 
         Raises:
             ConfigError: for a name in use, a marker that does not exist, or another family.
+            ModelError: if it holds a body that spins beside its axis.
         """
         self.check_new(name)
         check_family(name, element, family)
-        self.check_markers(name, *family.ends(element))
+        ends = family.ends(element)
+        self.check_markers(name, *ends)
+        for marker in ends if len(ends) > 1 else ():  # a load acts at a place in space
+            self.part(marker.body).check_on_axis(name, marker)
         self.elements[name] = family, element
 
     def families(self) -> dict[Family, dict[str, Any]]:

@@ -7,7 +7,7 @@ Source:
 """
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -15,7 +15,8 @@ from numpy.typing import ArrayLike
 from scipy.optimize import least_squares
 
 from rom.errors import ConfigError
-from rom.model import Array
+from rom.model import Array, Report
+from rom.updating.explained import explained
 from rom.updating.models import (
     AtSensors,
     Complex,
@@ -49,6 +50,8 @@ class Update:
         covariance: (n_p + m, n_p + m) of p and ln zeta that the residual implies [1].
         history: (k, n_p) p after each step [1].
         residual: root mean square of the weighted residual [1].
+        verdict: whether the responses of the corrected model leave noise alone; None for updates
+            that compare none.
     """
 
     p: Array
@@ -56,6 +59,7 @@ class Update:
     covariance: Array
     history: Array
     residual: float
+    verdict: Report | None = None
 
     @property
     def deviation(self) -> Array:
@@ -198,7 +202,8 @@ def sensitivity(
 def update_by_output(model: Model, test: Measurement, p: ArrayLike, zeta: ArrayLike) -> Update:
     """Least squares of ln(H / H_test) over p and ln zeta.
 
-    Each value counts by its relative error, so that antiresonances weigh as much as resonances.
+    Each value counts by its relative error, so that antiresonances weigh as much as resonances. The
+    ``verdict`` says whether what is left has the size of one noise at all sensors and in all bands.
 
     Args:
         model: with its sensors.
@@ -228,7 +233,8 @@ def update_by_output(model: Model, test: Measurement, p: ArrayLike, zeta: ArrayL
         residual, start, jacobian, bounds=(low, np.inf), max_nfev=MAX_EVALUATIONS,
         xtol=1e-12, ftol=1e-12, gtol=1e-12,
     )  # fmt: skip
-    return _update(found.x, n_p, found.fun, found.jac, [*path[1:], found.x[:n_p]])
+    ended = _update(found.x, n_p, found.fun, found.jac, [*path[1:], found.x[:n_p]])
+    return _judged(ended, model, test)
 
 
 def update_by_input(
@@ -262,7 +268,7 @@ def update_by_input(
         return _equations(model.at(x), test, ratios, rank)
 
     start = np.array(p, dtype=float), np.array(zeta, dtype=float)
-    return solved(triangle, start, n_values, limits, prior)
+    return _judged(solved(triangle, start, n_values, limits, prior), model, test)
 
 
 def solved(
@@ -413,6 +419,12 @@ def _update(x: Array, n_p: int, r: Array, J: Array, path: list[Array]) -> Update
     variance = (r @ r) / max(r.size - x.size, 1)
     covariance = np.linalg.pinv(J.T @ J) * variance
     return Update(x[:n_p], np.exp(x[n_p:]), covariance, np.array(path), np.sqrt((r @ r) / r.size))
+
+
+def _judged(found: Update, model: Model, test: Measurement) -> Update:
+    """The same with the verdict on its responses."""
+    H = responses(model, found.p, found.zeta, test.omega, test.inputs)
+    return replace(found, verdict=explained(H, test, found.p.size + found.zeta.size))
 
 
 def weighted(weights: Any, r: Complex) -> Array:

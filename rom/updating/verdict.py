@@ -12,8 +12,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy.stats import chi2
-from scipy.stats import f as f_ratio
 
 from rom.arguments import finite, whole
 from rom.assembly.assembly import Assembly
@@ -22,6 +20,7 @@ from rom.errors import ConfigError
 from rom.model import Array, Index, Mask, Report, Row
 from rom.parametric.assembled import FamilyAssembly
 from rom.rows import row
+from rom.updating.explained import MAX_UNLIKE, N_BANDS, chi_row, deviation
 from rom.updating.family_model import Family, FamilyModel, Parts
 from rom.updating.frf_data import Complex, frac
 from rom.updating.measured import Channels
@@ -45,11 +44,7 @@ LEFT_LOG_LEVEL = 0.7  # of a sensor at the end of the search: a factor of two
 FACTOR_LOG_ATOL = 0.7  # within which a known factor is named
 MIN_PHASE_COSINE = -0.4  # mean over the lines: a sensor of which measures the other direction
 MIN_OTHERS_COSINE = 0.2  # mean over the other sensors, without which phases say nothing
-MAX_FALSE_REFUSAL = 1e-3  # probability that a row refuses a right model
-MIN_SCALE = 1e-8  # variance of a scale that is worth a thought
 MAX_SCORE = 4.0  # standard deviations
-N_BANDS = 8  # of lines, in which the misfit is looked for
-MAX_UNLIKE = 0.5  # one less the median FRAC: more is another body
 UNSEEN_RTOL = 0.5  # of a parameter's range: a wider standard deviation says nothing new
 
 
@@ -378,12 +373,12 @@ def verdict(s: Sums, data: Data, n: int, missing: dict[str, float], doubts: list
     counted = 2.0 * (data.weight > 0)
     rows = [chi_row("chi-square of all residuals", s.chi_square, freedom, 1, data)]
     n_s = s.squares.shape[1]
-    worst = [(_deviation(s.squares[:, k].sum(), counted[:, k].sum()), k) for k in range(n_s)]
+    worst = [(deviation(s.squares[:, k].sum(), counted[:, k].sum()), k) for k in range(n_s)]
     k = max(worst)[1]
     name = f"worst sensor, {k}"
     rows.append(chi_row(name, s.squares[:, k].sum(), counted[:, k].sum(), n_s, data))
     blocks = np.array_split(np.arange(data.omega.size), min(N_BANDS, data.omega.size))
-    worst = [(_deviation(s.squares[b].sum(), counted[b].sum()), j) for j, b in enumerate(blocks)]
+    worst = [(deviation(s.squares[b].sum(), counted[b].sum()), j) for j, b in enumerate(blocks)]
     b = blocks[max(worst)[1]]
     hz = data.omega[b[[0, -1]]] / (2 * np.pi)
     name = f"worst band, {hz[0]:.4g} to {hz[1]:.4g} Hz"
@@ -423,22 +418,3 @@ def band(frequencies: Array, highest: float) -> Row:
     """
     middle = frequencies[(frequencies.size - 1) // 2]
     return row(f"highest line over {middle:.4g} Hz, the band of the basis", highest / middle, 1.0)
-
-
-def _deviation(value: float, freedom: float) -> float:
-    """Standard deviations of chi-square above its expectation."""
-    return float((value - freedom) / np.sqrt(2 * max(freedom, 1.0)))
-
-
-def chi_row(name: str, value: float, freedom: float, trials: int, data: Data | None = None) -> Row:
-    """Chi-square over its expectation; the limit is kept by a right model but for one in 1000.
-
-    Squares over estimated variances vary more, as if they had less freedom; what is not known of
-    the scale of all makes the quotient one of F, whose denominator has the freedom 2 / variance.
-    """
-    freedom = max(freedom, 1.0)
-    own, scale = (freedom, 0.0) if data is None else (data.known * freedom, data.scale)
-    limit = chi2.isf(MAX_FALSE_REFUSAL / trials, own) / own
-    if scale > MIN_SCALE:
-        limit = f_ratio.isf(MAX_FALSE_REFUSAL / trials, own, 2 / scale)
-    return row(f"{name}, over its expectation", value / freedom, float(limit))

@@ -203,7 +203,7 @@ def bending_table(
 def iso_stiffness(pair: GearPair) -> tuple[float, float, float]:
     """Stiffness after ISO 6336-1: c'_th, c' of a pair, and mean value of the mesh [N/m^2].
 
-    Solid wheels; the basic rack counts by its dedendum, at 20 degrees.
+    Solid wheels; the basic rack counts by its dedendum and its normal pressure angle.
     """
     z1, z2 = (z / (np.cos(pair.base_helix) ** 2 * np.cos(pair.helix)) for z in pair.teeth)
     x1, x2 = pair.shift
@@ -211,6 +211,7 @@ def iso_stiffness(pair: GearPair) -> tuple[float, float, float]:
     q += -0.24188 * x2 / z2 + 0.00529 * x1**2 + 0.00182 * x2**2
     ideal = 1e9 / q  # from mm um / N
     rack = 1 + 0.5 * (1.2 - pair.dedendum)
+    rack *= 1 - 0.02 * (20 - np.degrees(pair.pressure_angle))
     single = 0.8 * rack * ideal * np.cos(pair.helix)
     return float(ideal), float(single), float(single * (0.75 * pair.contact_ratio + 0.25))
 

@@ -205,6 +205,11 @@ class Impact:
         up = np.minimum(self.v[:, 0], 0.0)
         return float((up.min() / self.v[0, 0]) ** 2)
 
+    def exceeds(self, other: "Impact") -> bool:
+        """Whether one of the peaks or the deflection is larger than in another motion."""
+        ours, theirs = ((*one.peaks, one.deflection) for one in (self, other))
+        return any(a > (1.0 + kernels.PEAK_RTOL) * b for a, b in zip(ours, theirs, strict=True))
+
     def through(self, g: Gallery) -> bool:
         """Whether the last instant kept is nearly at the limit of the cushion of a gallery."""
         reach = float((self.z[:, 0] - self.z[:, 1]).max())
@@ -219,8 +224,8 @@ def strike(
     Args:
         g: what strikes what.
         t_end: duration [s]; None until the cushion has let go and neither a force nor the
-            deflection has grown for two of the longest periods. Later, weaker blows of a boulder
-            that bounces are left out.
+            deflection has grown for two of the longest periods. A boulder that bounces strikes
+            again as long as that lets one of them grow; blows that do not are left out.
         dt: time step [s]; None for a tenth of the reciprocal of the highest frequency.
         keep: about how many instants to keep.
 
@@ -235,17 +240,24 @@ def strike(
     ):
         raise ConfigError(f"t_end = {t_end} s, dt = {dt} s, keep = {keep}: all must be positive.")
     h = STEP_RATIO / g.highest_frequency() if dt is None else dt
-    if t_end is None:
-        steps = (h, MAX_STEPS, 1, int(np.ceil(QUIET_PERIODS * g.longest_period / h)))
-        rows = 2 * keep
-    else:
+    if t_end is not None:
         n = int(np.ceil(t_end / h))
-        steps = (t_end / n, n, max(1, n // keep), 0)
-        rows = n // steps[2] + 1
+        every = max(1, n // keep)
+        return _run(g, (t_end / n, n, every, 0, 0), n // every + 1)
+    steps = h, MAX_STEPS, 1, int(np.ceil(QUIET_PERIODS * g.longest_period / h))
+    first = _run(g, (*steps, 0), 2 * keep)
+    if not g.weight or first.forces[-1, 0] > 0.0:  # it lies, or is gone
+        return first
+    again = _run(g, (*steps, 1), 2 * keep)
+    return again if again.exceeds(first) else first
+
+
+def _run(g: Gallery, steps: tuple[float, int, int, int, int], rows: int) -> Impact:
+    """The motion in the steps of `kernels.strike`."""
     modes = tuple(np.array(x, dtype=float) for x in (g.slab.phi, g.slab.omega))
     out, last = np.zeros((rows, PARTS[-1] + modes[0].size)), np.zeros(7)
     filled, over = kernels.strike(_numbers(g), modes, steps, out, last)
-    _refuse(g, out[:filled], last, steps[0], over or t_end is not None)
+    _refuse(g, out[:filled], last, steps[0], over or steps[3] == 0)
     return _impact(out[:filled], last)
 
 

@@ -114,13 +114,15 @@ def strike(numbers, modes, steps, out, last):
     """Rows of out: time, ways, speeds, forces, energies, modes; last: peaks and what stays.
 
     Gives the number of rows; the impact ends after n steps, or when the cushion has let go and no
-    peak has grown for ``quiet`` ones. Rows that are full are thinned.
+    peak has grown for ``quiet`` ones. With ``again`` a boulder that its weight brings back is
+    awaited, as long as a blow lets a peak grow. Rows that are full are thinned.
     """
     (m1, m2, g, v1), c, s, (zeta, capacity, k3) = numbers
-    (phi, omega), (h, n, every, quiet) = modes, steps
+    (phi, omega), (h, n, every, quiet, again) = modes, steps
     z1, z2, v2, d, e, F1, F2, deepest, yielded = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     q, w, took, state = np.zeros(phi.size), np.zeros(phi.size), np.zeros(7), 0
     shape, marked, mark, rows, pressed = k3 * phi / omega**2, np.zeros(4), 0, 0, True
+    awaited, flies = again > 0 and g > 0.0, False
     for i in range(n + 1):
         d0, e0, f1, f2 = d, e, F1, F2
         z3, v3 = (phi * q).sum(), (phi * w).sum()
@@ -163,7 +165,11 @@ def strike(numbers, modes, steps, out, last):
         last[3], last[4], last[5], last[6] = deepest, max(last[4], z3), yielded, state
         if quiet > 0:
             pressed = pressed and (v1 >= v2 or F1 > RELEASED_RATIO * last[0] + 2.0 * m1 * g)
-            if _grown(last, marked) or pressed:
+            grown = _grown(last, marked)
+            if flies and F1 > 0.0:
+                awaited = False  # unless this blow lets something grow
+            awaited, flies = awaited or (grown and again > 0), F1 == 0.0 and g > 0.0
+            if grown or pressed or (flies and awaited):
                 mark = i
             if i - mark > quiet:
                 return rows, True

@@ -19,8 +19,8 @@ from scipy.optimize import brentq
 
 from rom.arguments import typed, vector
 from rom.components.compiled import inner, kernel
-from rom.components.wind.blading import Blading, RotorLoad, blading, rotor_load
-from rom.components.wind.wind_turbine import GEAR_RATIO, RATED_SPEED
+from rom.components.wind.blading import ROTOR_RADIUS, Blading, RotorLoad, blading, rotor_load
+from rom.components.wind.wind_turbine import GEAR_RATIO, N_BLADES, RATED_SPEED
 from rom.errors import ConfigError
 from rom.model import Array
 
@@ -40,6 +40,7 @@ PROPORTIONAL_GAIN, INTEGRAL_GAIN = 0.01882681, 0.008068634  # s and 1, at zero p
 DOUBLING_PITCH = 0.1099965  # where the power is twice as sensitive as at none [rad]
 LARGEST_PITCH, LARGEST_PITCH_RATE = math.radians(90.0), math.radians(8.0)  # rad, rad/s
 CORNER_FREQUENCY = 1.570796  # of the filter of the measured speed [rad/s]
+MAX_RADIUS_CHANGE = 0.1  # of a rotor that the published speeds and gains still serve
 SPEED_RTOL = 1e-12  # of steady speeds and pitches: digits that repeat
 # steady pitch above the rated wind: table 7-1 (wind [m/s], pitch [deg])
 PUBLISHED_PITCH = ((12.0, 3.83), (13.0, 6.60), (14.0, 8.70), (15.0, 10.45), (16.0, 12.06),
@@ -148,22 +149,41 @@ class Controller:
         self.filtered, self.integral, self.pitch, self.torque = map(float, state)
 
 
+def check_rotor(blades: Blading) -> None:
+    """Refuse a rotor that the controller is not made for.
+
+    Raises:
+        ConfigError: for blades of another length or number.
+    """
+    ratio = blades.rotor_radius / ROTOR_RADIUS
+    if abs(ratio - 1.0) > MAX_RADIUS_CHANGE or blades.n_blades != N_BLADES:
+        raise ConfigError(
+            f"the controller is that of the NREL 5 MW turbine, of {N_BLADES} blades up to "
+            f"{ROTOR_RADIUS:g} m at {RATED_SPEED:.4g} rad/s: {blades.n_blades} blades up to "
+            f"{blades.rotor_radius:g} m would have tips of "
+            f"{RATED_SPEED * blades.rotor_radius:.4g} m/s and a torque of another turbine.",
+            hint="Give speed and pitch yourself, rotor_load(blades, wind, speed, pitch) or "
+            "operate(..., held=...): a usual rule is 80 m/s over the radius.",
+        )
+
+
 @typed
 def steady(wind: float, blades: Blading | None = None, *, tower: bool = False) -> RotorLoad:
     """Speed, pitch and loads at which the controlled turbine stays in a steady wind.
 
     Args:
         wind: its speed, from cut-in at 3 to cut-out at 25 [m/s].
-        blades: None: those of the turbine.
+        blades: those of the turbine, changed at most; None: as published.
         tower: whether the tower dams the wind.
 
     Raises:
-        ConfigError: for a wind in which the turbine is parked.
+        ConfigError: for a wind in which the turbine is parked, or blades of another one.
     """
     if not CUT_IN_WIND <= wind <= CUT_OUT_WIND:
         raise ConfigError(f"the turbine is parked in a wind of {wind:g} m/s.",
                           hint="It works from 3 to 25 m/s.")  # fmt: skip
     blades = blading() if blades is None else blades
+    check_rotor(blades)
     load = partial(rotor_load, blades, float(wind), tower=tower)
 
     def excess(speed: float) -> float:
@@ -188,7 +208,7 @@ def power_curve(
 
     Args:
         winds: (k,) speeds [m/s].
-        blades: None: those of the turbine.
+        blades: those of the turbine, changed at most; None: as published.
         tower: whether the tower dams the wind.
 
     Returns:
@@ -197,7 +217,8 @@ def power_curve(
         the coefficients ``power_coefficient`` and ``thrust_coefficient`` of the rotor [1].
 
     Raises:
-        ConfigError: for winds that are no list, or in which the turbine is parked.
+        ConfigError: for winds that are no list, or in which the turbine is parked, or blades of
+            another one.
     """
     winds = vector("winds", winds)
     points = [steady(float(wind), blades, tower=tower) for wind in winds]

@@ -98,11 +98,13 @@ def operate(
         dt: step [s].
         blades: None: those of the turbine.
         dynamic: whether the wake has a memory; False: as in steady flow at each instant.
-        held: speed of the rotor [rad/s] and pitch [rad] over time, in the place of the control.
+        held: speed of the rotor [rad/s] and pitch [rad] over time, in the place of the control;
+            then the generator takes what the wind gives.
 
     Raises:
         ConfigError: for a step or an end that cannot be, or a wind in which the turbine is parked,
-            with its time, or a speed or a pitch to hold that is none.
+            with its time, or a speed or a pitch to hold that is none, or blades of another turbine
+            that are not held.
     """
     positive("t_end", t_end)
     if positive("dt", dt) > MAX_STEP:
@@ -144,6 +146,9 @@ class _Run:
             np.zeros((blades.radius.size, 6)),
             np.zeros((blades.radius.size, 2)),
         )
+        if held is not None:  # no controller acts, whose rotor it would have to be
+            self.speed, self.control = 0.0, Controller.at(0.0)
+            return
         start = steady(wind, blades)
         self.speed = start.speed
         self.control = Controller.at(GEAR_RATIO * start.speed, start.pitch)
@@ -164,7 +169,8 @@ class _Run:
         thrust = b.n_blades * cone * float(self.loads[:, 0] @ b.length)
         torque = b.n_blades * cone * float(self.loads[:, 1] @ (b.radius * b.length))
         fast = GEAR_RATIO * self.speed
-        power = GENERATOR_EFFICIENCY * self.control.torque * fast
+        taken = self.control.torque * fast if self.held is None else torque * self.speed
+        power = GENERATOR_EFFICIENCY * taken
         row = [self.speed, self.control.pitch, power, torque, thrust, *self.wake[:, 2]]
         if dt > 0.0 and self.held is None:
             self.speed += dt * (torque - GEAR_RATIO * self.control.torque) / DRIVE_INERTIA

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import numpy.typing as npt
 
+from rom import rotation
 from rom.arguments import typed, whole
 from rom.errors import ModelError, RomError, SolverError, reached, warn
 from rom.mbs.analysis.local_equations import Instant, instant
@@ -26,6 +27,8 @@ MOST_STEPS = 100_000  # of the load; where thousands do not help, another start 
 MIN_LOAD_STEP = 1 / 64  # part of a load step at which the search is given up
 CORRECTION_TOL = 1e-12  # of the last correction
 LEAST_BENDING = 1e-3  # of the inertia in a motion, from which a body counts as deforming
+MAX_TURN = 2 * np.pi  # after which what turned meets the same forces again [rad]
+STRAIGHT = 0.99  # of the way turned, from which it was about one axis
 MAX_HALVINGS = 60  # of a correction that leaves a gap no room
 ROOM_LEFT = 0.5  # of a gap, after one correction
 MIN_ROOM = 1e-4  # of a gap, which no film keeps open
@@ -205,13 +208,15 @@ class _Search:
 
         Raises:
             SolverError: if Newton's method fails.
+            ModelError: if a body turns on and on, as a rotor does against whose drag nothing holds.
         """
         now, last, trials = self.now.scaled(load), np.inf, MAX_TRIALS
+        turned, way = np.zeros((now.packed.system.bodies.mass.size, 3)), 0.0
         state = replace(state, lam=state.lam + self.tangent(now, state).reaction())
         beyond: Equations | None = None
         for _ in range(MAX_PASSES):
             equations = beyond or self.tangent(now, state)
-            found = None
+            found, before = None, state
             # forces that go around, as those of films, have no potential that curves
             descends = now.packed.has_potential and not directly
             straight = None if descends else equations.newton
@@ -227,6 +232,12 @@ class _Search:
             if size < CORRECTION_TOL or (size < STALLED_TOL and size > 0.5 * last):
                 return state
             last = size
+            if not equations.rises:
+                turn = _turns(now.packed, before, state)
+                turned, way = turned + turn, way + np.linalg.norm(turn, axis=1)
+                around = np.linalg.norm(turned, axis=1)
+                if ((around > MAX_TURN) & (around > STRAIGHT * way)).any():
+                    raise _turning(now.packed, turned)
         raise _failure(now, self.tangent(now, state), load)
 
     def corrected(
@@ -340,6 +351,25 @@ def _described(packed: Packed, motion: Array) -> str:
     return f"body {packed.names[b]!r} {verb} ({axis})"
 
 
+def _turns(packed: Packed, before: State, after: State) -> Array:
+    """(b, 3) rotations of all bodies from one state to another, in their axes [rad]."""
+    at = packed.system.bodies.q_at + 3
+    inverse = np.array([1.0, -1.0, -1.0, -1.0])
+    pairs = ((before.q[k : k + 4] * inverse, after.q[k : k + 4]) for k in at)
+    return np.array([rotation.log(rotation.multiply(*pair)) for pair in pairs])
+
+
+def _turning(packed: Packed, turned: Array) -> ModelError:
+    """That a body has turned and turned; the potential curved upwards on no way."""
+    motion, at = np.zeros(packed.v.size), packed.system.bodies.v_at[:, None] + np.arange(3, 6)
+    motion[at] = turned
+    return ModelError(
+        f"{_described(packed, motion)}, once around in the search, driven by forces that nothing "
+        "balances.",
+        hint="Hold it by a joint or a spring, or give its angle by a drive.",
+    )
+
+
 def _failure(now: Instant, tangent: Tangent | SparseTangent, load: float) -> RomError:
     """Why Newton's method failed: an open joint, a body that nothing holds, or lack of balance."""
     packed = now.packed
@@ -358,6 +388,9 @@ def _failure(now: Instant, tangent: Tangent | SparseTangent, load: float) -> Rom
         starts = packed.system.bodies.v_at
         b = int(np.searchsorted(starts, int(np.argmax(force)), side="right")) - 1
         what = f"body {packed.names[b]!r} stays out of balance, by {force.max():.3g} N or N m"
+        weakest = tangent.weakest()
+        if weakest.squares.size and weakest.squares[0] <= np.max(weakest.none):
+            what += f"; what holds least is how {_described(packed, weakest.motions[:, 0])}"
     return SolverError(
         f"no equilibrium found at {load:.3g} of the loads: {what}.",
         hint="Start nearer to it (state=...) or take more load steps.",

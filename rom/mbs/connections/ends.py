@@ -63,8 +63,11 @@ def enter(whole: Whole, joint: Joint) -> None:
     """Let the mechanism have a joint.
 
     Raises:
-        ModelError: if it transmits moments to free-free modes, which carry none to an interface.
+        ModelError: if it transmits moments to free-free modes, which carry none to an interface,
+            or holds a body that spins beside its axis.
     """
+    for marker in joint.markers:
+        whole.part(marker.body).check_on_axis(joint.name, marker)
     for marker in joint.markers if joint.kind not in MOMENT_FREE else ():
         body = whole.part(marker.body).flexible
         if body is not None and not body.has_static_shapes:

@@ -42,6 +42,8 @@ def rolling(
     """
     radius = positive("radius", radius)
     ends = ends_of(self, name, m1, m2)
+    for marker in ends.markers:
+        self.part(marker.body).refuse_spin(f"rolling joint {name!r}", "it would not roll")
     up = ends.direction("normal", normal)
     spin = None if axis is None else ends.direction("axis", axis)
     if spin is not None and abs(up @ spin) > FLAT_COSINE:

@@ -16,7 +16,8 @@ from rom.plausible import GYRATION, SIZE, warn_outside
 GROUND = "ground"
 # smallest over largest eigenvalue of the scaled mass matrix below which a body counts as singular
 SINGULAR_MASS = 1e-11
-SPIN_RTOL = 1e-6  # of an axis, from that about which a body spins
+SPIN_RTOL = 1e-6  # of an axis, from that about which a body spins, and of a marker on it
+MESHED_RTOL = 1e-3  # the same of a meshed body: gear shafts of 4000 nodes miss 4e-6
 
 
 SURFACE_PREFIX = "surface point "  # markers that a contact puts on the surface of a flexible body
@@ -139,6 +140,46 @@ class Part:
                 f"{name!r} is {axis.round(9).tolist()} in it: both must be one."
             )
         return speed
+
+    def refuse_spin(self, what: str, why: str) -> None:
+        """Refuse a body that spins, for what knows nothing of it.
+
+        Raises:
+            ConfigError: saying why.
+        """
+        if self.spin.any():
+            raise ConfigError(
+                f"{what} is of body {self.name!r}, which spins in its frame: {why}.",
+                hint="Let its frame turn: give omega instead of spin.",
+            )
+
+    def check_on_axis(self, name: str, marker: Marker) -> None:
+        """Refuse to hold a body that spins at a point which goes round with its material.
+
+        Args:
+            name: of what holds it.
+            marker: of this body.
+
+        Raises:
+            ModelError: if the marker lies beside the axis through the mass centre.
+        """
+        speed = float(np.linalg.norm(self.spin))
+        if not speed or self._surface_row(marker.place) is not None:
+            return
+        arm = self.point(marker) - self.first / self.mass
+        apart = float(np.linalg.norm(np.cross(self.spin, arm))) / speed
+        size = np.sqrt(np.trace(self.second) / self.mass)
+        if apart > (SPIN_RTOL if self.flexible is None else MESHED_RTOL) * size:
+            raise ModelError(
+                f"marker {marker.place!r} of body {self.name!r} lies {apart:.4g} m beside the axis "
+                f"about which the body spins, and {name!r} holds it there: with the material it "
+                f"would go round, an unbalance of {self.mass * apart:.4g} kg m that a frame which "
+                "does not turn cannot have.",
+                where=self.name,
+                hint="Let its frame turn: give omega instead of spin. Or put the marker on the "
+                f"axis and give the unbalance as a force that turns, of "
+                f"{self.mass * apart * speed**2:.4g} N at this speed.",
+            )
 
     @property
     def own_frame(self) -> Marker | None:

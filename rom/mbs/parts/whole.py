@@ -15,6 +15,7 @@ class Whole(Protocol):
         parts, joints, drives: {name: body, joint or drive}.
     """
 
+    gear_meshes: Any
     parts: dict[str, Part]
     joints: dict[str, Joint]
     drives: dict[str, Any]

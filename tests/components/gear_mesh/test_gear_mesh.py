@@ -198,6 +198,17 @@ def test_teeth_are_as_stiff_as_listed(row):
     assert_allclose(np.array(iso_stiffness(p)) / 1e9, row[8:], rtol=4e-4)
 
 
+@pytest.mark.parametrize("degrees", [15.0, 17.5, 25.0])
+def test_the_basic_rack_of_iso_6336_counts_by_its_pressure_angle(degrees):
+    """C_B has the factor 1 - 0.02 (20 - alpha_n); c'_th has none. It was left out."""
+    usual, other = (
+        iso_stiffness(GearPair((50, 60), 4e-3, 0.04, pressure_angle=float(np.radians(a))))
+        for a in (20.0, degrees)
+    )
+    assert other[0] == usual[0]
+    assert other[1] / usual[1] == pytest.approx(1 - 0.02 * (20 - degrees), rel=1e-12)
+
+
 @pytest.mark.parametrize("degrees", [-30, 8, 15, 25, 30])
 @pytest.mark.parametrize("teeth", [(26, 157), (50, 50), (20, 60), (34, 95)])
 def test_stiffness_falls_with_the_helix_as_in_iso_6336(teeth, degrees):

@@ -290,3 +290,13 @@ def test_recovery_is_the_share_of_the_energy(cushion, deepest, recovery):
     if c.exponent * recovery * taken < 0.7 * deepest * c.force(deepest):  # there is way enough
         assert returned / taken == pytest.approx(recovery, rel=0.04)
     assert returned < 1.02 * recovery * taken
+
+
+@pytest.mark.parametrize(("recovery", "grows"), [(0.03, False), (0.5, True)])
+def test_a_second_blow_is_seen_where_it_is_the_larger_one(recovery, grows):
+    """The cushion is stiff by then: 2589 kN after 2095, which an end at the first blow left out."""
+    g = baseline(cushion=Cushion.of_sand(4000.0, 1e6, recovery=recovery), weight=True)
+    got, long = strike(g), strike(g, t_end=20.0)
+    assert_allclose(got.peaks, long.peaks, rtol=2e-3)
+    assert got.deflection == pytest.approx(long.deflection, rel=2e-3)
+    assert (got.t[-1] > 2.0) == grows

@@ -202,6 +202,19 @@ def test_fixed_interface_modes_lift_the_floor():
     assert found[0] < 1e-3 and found[1] < 1e-3
 
 
+@pytest.mark.parametrize("level", [0.02, 0.05])
+def test_a_verdict_says_whether_noise_alone_is_left(level):
+    """A right model leaves one size everywhere; statics at the sensors miss the upper bands."""
+    right = update_by_output(BEAM, measured(level), START, GUESS).verdict
+    assert right.ok, right
+    wrong = update_by_output(AtSensors(BEAM), measured(level), START, GUESS).verdict
+    assert not wrong.ok
+    assert any("band" in r.quantity and not r.ok for r in wrong.rows)
+    assert update_by_output(BEAM, measured(), START, GUESS).verdict.ok  # round-off is no pattern
+    by_input = update_by_input(AtSensors(BEAM), measured(level), START, GUESS, rank=8).verdict
+    assert not by_input.ok
+
+
 @pytest.mark.parametrize("rank", [8, 5])
 def test_the_common_basis_works_from_as_many_columns_as_modes(rank):
     """Table: .065 and .061 for stiffness, .012 for mass, .037 and .035 for damping."""

@@ -1,12 +1,14 @@
 """The turbine in wind that changes: steady ends, the memory of the wake, the control in time."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
 from rom.components.histories import Table, recorded
 from rom.components.wind.blading import blading, rotor_load
-from rom.components.wind.control import steady
+from rom.components.wind.control import power_curve, steady
 from rom.components.wind.operation import operate
 from rom.components.wind.wake import late
 from rom.errors import ConfigError
@@ -192,3 +194,32 @@ def test_a_gust_speeds_the_rotor_up_by_what_its_inertia_takes():
 def test_what_cannot_be_is_named(call, said):
     with pytest.raises(ConfigError, match=said):
         call()
+
+
+def scaled(k):
+    """The rotor of the turbine, k times as large."""
+    one = straight()
+    return replace(one, radius=k * one.radius, length=k * one.length, chord=k * one.chord,
+                   rotor_radius=k * one.rotor_radius, hub_radius=k * one.hub_radius)  # fmt: skip
+
+
+@pytest.mark.parametrize("call", [
+    lambda blades: steady(9.0, blades),
+    lambda blades: power_curve([9.0], blades),
+    lambda blades: operate(lambda t: 9.0, 1.0, blades=blades),
+])  # fmt: skip
+def test_another_rotor_needs_a_controller_of_its_own(call):
+    """The published one would turn blades of 126 m with tips of 160 m/s, without a word."""
+    with pytest.raises(ConfigError, match=r"3 blades up to 126 m would have tips of 159\.7 m/s"):
+        call(scaled(2.0))
+    with pytest.raises(ConfigError, match="2 blades"):
+        call(replace(blading(), n_blades=2))
+    call(scaled(1.05))
+
+
+def test_another_rotor_works_at_a_speed_that_is_held():
+    """At the same ratio of tips to wind it has the coefficients of the small one."""
+    run = operate(lambda t: 9.0, 0.5, blades=scaled(2.0), held=lambda t: (0.6, 0.0), dynamic=False)
+    small = rotor_load(straight(), 9.0, 1.2, n_azimuths=1)
+    assert run.torque[-1] == pytest.approx(8 * small.torque, rel=1e-3)
+    assert_allclose(run.power, 0.944 * run.torque * 0.6, rtol=1e-12)

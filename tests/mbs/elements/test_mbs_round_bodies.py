@@ -11,7 +11,8 @@ from scipy.linalg import eigvals
 import rom
 from cases.mbs.tubes import tube
 from rom.body.damping import damped
-from rom.errors import ModelError
+from rom.components.gear_mesh import GearPair
+from rom.errors import ConfigError, ModelError
 from rom.rotation import matrix
 
 Z, ORIGIN = (0, 0, 1), (0, 0, 0)
@@ -178,3 +179,85 @@ def test_solids_are_refused_beside_their_axis_or_without_surface():
     with pytest.raises(ModelError, match="needs a surface"):
         mech.add_flexible("shaft", replace(body, surface=None), at=ORIGIN, spin=(0, 0, 5.0))
     assert not mech.parts
+
+
+ECCENTRICITY, STIFF = 2e-4, 1.5e5
+
+
+@pytest.mark.parametrize("ratio", [0.6, 1.4])
+@pytest.mark.parametrize("way", ["omega", "spin"])
+def test_an_unbalance_turns_on_its_orbit_as_the_hint_says(way, ratio):
+    """Jeffcott's rotor from rest: an orbit of e r^2 / (1 - r^2) and a whirl that the start leaves.
+
+    By a frame that turns about a point beside the mass centre, and by a force that turns.
+    """
+    mech, free = rom.Mechanism(gravity=ORIGIN), np.sqrt(STIFF / MASS)
+    speed, e = ratio * free, ECCENTRICITY if way == "omega" else 0.0
+    rotor = mech.add_rigid("rotor", mass=MASS, inertia=(ACROSS, ACROSS, ABOUT), at=(e, 0, 0),
+                           velocity=(0, speed * e, 0), **{way: (0, 0, speed)})  # fmt: skip
+    mech.bushing("shaft", mech.ground.marker(ORIGIN), rotor.marker((-e, 0, 0)),
+                 stiffness=(STIFF, STIFF, 1e6, 0, 0, 0))  # fmt: skip
+    if way == "spin":
+        pull = MASS * ECCENTRICITY * speed**2
+        mech.force("unbalance", rotor.marker(ORIGIN),
+                   lambda t: (pull * np.cos(speed * t), pull * np.sin(speed * t), 0))  # fmt: skip
+    sol = rom.simulate(mech, t_end=1.5 * 2 * np.pi / speed, dt=2e-4)
+    centre = sol.position("rotor") - [matrix(q[3:7]) @ [e, 0, 0] for q in sol.q]
+    whirl = np.cos(free * sol.t) + 1j * ratio * np.sin(free * sol.t)
+    wanted = ECCENTRICITY * ratio**2 / (1 - ratio**2) * (np.exp(1j * speed * sol.t) - whirl)
+    assert_allclose(centre[:, :2] @ [1, 1j], wanted, atol=2e-3 * np.abs(wanted).max())
+
+
+HOLDS = {
+    "bushing": lambda m, a, b: m.bushing("held", a, b, stiffness=(1e6,) * 6),
+    "spring": lambda m, a, b: m.spring_damper(
+        "held", m.ground.marker((0, 0.1, 0)), b, stiffness=1e5),
+    "joint": lambda m, a, b: m.spherical("held", a, b),
+    "film": lambda m, a, b: m.journal_bearing(
+        "held", b, a, axis=Z, oil=0.02, bearing=rom.mbs.JournalBearing(0.05, 0.03, 5e-4, [])),
+    "balls": lambda m, a, b: m.rolling_bearing(
+        "held", b, a, axis=Z, bearing=rom.mbs.BallBearing(9, 0.01, 0.05)),
+    "teeth": lambda m, a, b: m.gear_mesh(
+        "held", b, m.add_rigid("gear", mass=1, inertia=(1, 1, 1), at=(0.1, 0, 0)).marker(ORIGIN),
+        axis=Z, pair=GearPair((25, 25), 4e-3, 0.03, centre_distance=0.1), stiffness=1e9),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("how", HOLDS)
+def test_what_holds_a_spinning_body_beside_its_axis_is_refused(how):
+    """The unbalance would be lost without a word; on the axis all of them are taken."""
+    for beside in (True, False):
+        mech = rom.Mechanism()
+        x = ECCENTRICITY if beside else 0.0
+        rotor = mech.add_rigid("rotor", mass=MASS, inertia=(ACROSS, ACROSS, ABOUT), at=(-x, 0, 0),
+                               spin=(0, 0, 50.0))  # fmt: skip
+        ends = mech.ground.marker(ORIGIN), rotor.marker((x, 0, 0))
+        if not beside:
+            HOLDS[how](mech, *ends)
+            continue
+        with pytest.raises(ModelError, match=r"0.0002 m beside the axis.*0.0006 kg m") as error:
+            HOLDS[how](mech, *ends)
+        assert "1.5 N at this speed" in error.value.hint
+    mech.force("belt", rotor.marker((0.1, 0, 0)), (0, 1, 0))  # a place in space
+
+
+def test_a_mesh_whose_mass_centre_lies_beside_the_axis_is_refused():
+    """The force m e W^2 was left out of a flexible body up to 2 % of its size."""
+    mech, body = rom.Mechanism(), shaft()
+    beside = replace(body, first_moment=body.first_moment + 5e-4 * body.mass * np.eye(3)[0])
+    with pytest.raises(ModelError, match=r"its mass centre lies 0.0005 m beside"):
+        mech.add_flexible("shaft", beside, at=ORIGIN, spin=(0, 0, 5.0))
+
+
+@pytest.mark.parametrize("what", ["contact", "rolling"])
+def test_surfaces_of_spinning_bodies_that_slide_or_roll_are_refused(what):
+    """Their friction would see a surface at rest."""
+    mech = rom.Mechanism()
+    ball = mech.add_rigid("ball", mass=1, inertia=(1e-3,) * 3, at=(0, 0, 0.05), spin=(0, 9.0, 0))
+    ends = mech.ground.marker(ORIGIN), ball.marker(ORIGIN)
+    with pytest.raises(ConfigError, match="'ball', which spins in its frame"):
+        if what == "rolling":
+            mech.rolling("touch", *ends, normal=Z, radius=0.05)
+        else:
+            law = rom.mbs.Impact(stiffness=1e6, mu=0.2)
+            mech.sphere_on_plane("touch", *ends, normal=Z, radius=0.05, law=law)

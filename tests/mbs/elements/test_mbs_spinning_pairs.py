@@ -6,8 +6,9 @@ from numpy.testing import assert_allclose
 
 import rom
 from rom.components.gear_mesh import Correction, GearPair
-from rom.errors import ConfigError
+from rom.errors import ConfigError, ModelError
 from rom.mbs import Groove, JournalBearing
+from rom.mbs.analysis.equilibrium import _Search
 
 ORIGIN, Z = (0, 0, 0), (0, 0, 1)
 PAIR = GearPair((26, 40), 4e-3, 0.03, helix=0.2, thinning=5e-5)
@@ -101,3 +102,33 @@ def test_films_of_a_spinning_rotor_carry_as_those_of_a_turning_frame(speed):
         found.append(sol.position("rotor"))
     assert np.abs(found[0]).max() > 1e-6
     assert_allclose(found[1], found[0], atol=1e-6 * np.abs(found[0]).max())
+
+
+@pytest.mark.parametrize(("build", "most"), [
+    (lambda: carried("spin", 200.0), 2500),  # 4214 before, in a minute, and no word of the turning
+    (lambda: dragged(0.5), 100),  # 602 before
+])  # fmt: skip
+def test_a_rotor_that_nothing_holds_against_its_drag_is_named_soon(build, most, monkeypatch):
+    """Once around it has met all forces there are."""
+    tangents, count = _Search.tangent, []
+    monkeypatch.setattr(_Search, "tangent", lambda *x: count.append(1) or tangents(*x))
+    with pytest.raises(ModelError, match=r"'rotor' turns about its own axis \(0, 0, 1\), once"):
+        rom.equilibrium(build())
+    assert len(count) < most
+
+
+def dragged(moment, around=0.0):
+    """A rotor on a bushing that may hold it against turning, under a moment."""
+    mech = rom.Mechanism(gravity=ORIGIN)
+    rotor = mech.add_rigid("rotor", mass=2.0, inertia=(0.01, 0.01, 0.02), at=ORIGIN)
+    mech.revolute("axle", mech.ground.marker(ORIGIN), rotor.marker(ORIGIN), axis=Z)
+    mech.torque("drag", rotor.marker(ORIGIN), (0, 0, -moment))
+    if around:
+        mech.rotational_spring("spring", "axle", stiffness=around)
+    return mech
+
+
+def test_a_spring_may_be_wound_up_many_times():
+    """Its potential curves upwards: 20 rad are no turning without end."""
+    state = rom.equilibrium(dragged(40.0, around=2.0))
+    assert_allclose(2 * np.arctan2(state.q[6], state.q[3]) % (2 * np.pi), -20.0 % (2 * np.pi))

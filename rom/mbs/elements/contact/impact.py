@@ -8,6 +8,7 @@ from scipy.optimize import brentq
 
 from rom.arguments import number, positive
 from rom.errors import ConfigError
+from rom.mbs.parts.bodies import Part
 from rom.plausible import FRICTION, warn_outside
 
 
@@ -82,14 +83,16 @@ class Impact:
             )
 
 
-def checked_law(name: str, law: Any) -> Impact:
-    """The law, if it is one.
+def checked_law(name: str, law: Any, *parts: Part) -> Impact:
+    """The law, if it is one, and bodies that touch show how fast they slide.
 
     Raises:
-        ConfigError: if it is not.
+        ConfigError: if not.
     """
     if not isinstance(law, Impact):
         raise ConfigError(f"law of {name!r} is {law!r}; a rom.mbs.Impact is needed.")
+    for part in parts if law.mu else ():
+        part.refuse_spin(f"the friction of {name!r}", "its surface would not slide")
     return law
 
 

@@ -192,8 +192,8 @@ def enter_contact(  # noqa: PLR0913  what the record holds
         for marker, axis in zip(markers, axes, strict=True)
     ]
     i, j = markers
-    e, s = directions
-    self.add(name, Contact(kind, i, j, e, s, radius, checked_law(name, law), half), CONTACTS_FAMILY)
+    law = checked_law(name, law, self.part(i.body), self.part(j.body))
+    self.add(name, Contact(kind, i, j, *directions, radius, law, half), CONTACTS_FAMILY)
 
 
 @table

@@ -125,7 +125,7 @@ def _cover(
         raise ConfigError(f"contact {name!r}: body {part.name!r} is rigid, it has no surface.")
     if part.name == m1.body:
         raise ConfigError(f"contact {name!r} is of body {part.name!r} with itself; give two.")
-    law, e = checked_law(name, law), np.zeros(3)
+    law, e = checked_law(name, law, part, self.part(m1.body)), np.zeros(3)
     if axis is not None:
         world = unit_vector(f"axis of {name}", axis)
         e = rotation.matrix(self.part(m1.body).p).T @ world

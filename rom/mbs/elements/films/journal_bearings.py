@@ -117,12 +117,7 @@ def journal_bearing(  # noqa: PLR0913  one keyword per property
     _check_gap(name, bearing, np.array([D @ x, D @ np.cross(z, x)]), roughness)
     heat = _heat(name, carried, felt, thermal_time)
     numbers = (*_oil(name, oil, inlet), *heat, float(roughness))
-    if self.part(bush.body).spin.any():
-        raise ConfigError(
-            f"the bush of bearing {name!r} is of body {bush.body!r}, which spins in its frame: "
-            "grooves would turn in it.",
-            hint="Let its frame turn: give omega instead of spin.",
-        )
+    self.part(bush.body).refuse_spin(f"the bush of bearing {name!r}", "grooves would turn in it")
     turning = self.part(journal.body).spin_about(name, axes[0])
     film = OilFilm(journal, bush, bearing, axes, oil, numbers, turning)
     if elastic_bush and tabulated:

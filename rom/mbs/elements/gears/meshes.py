@@ -1,7 +1,7 @@
 """Gear meshes as elements: what users describe, their arrays and kernels."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -14,6 +14,7 @@ from rom.mbs.elements.family import Family, Places, integers, rows_of
 from rom.mbs.elements.gears.corrections import Correction, checked_map
 from rom.mbs.elements.gears.geometry import GearPair
 from rom.mbs.elements.gears.hertz import Hertz
+from rom.mbs.elements.gears.phases import phase_from
 from rom.mbs.elements.gears.racks import RackPair
 from rom.mbs.elements.gears.table import (
     COORDINATES,
@@ -76,7 +77,7 @@ def gear_mesh(  # noqa: PLR0913  one keyword per property
     friction: float = 0.0,
     transition_speed: float | None = None,
     cells: int = 21,
-    phase: float = 0.0,
+    phase: float | None = None,
     entry: float = 0.02,
     conservative: bool | None = None,
     hertz: Hertz | None = None,
@@ -105,7 +106,8 @@ def gear_mesh(  # noqa: PLR0913  one keyword per property
         transition_speed: of sliding flanks, over which friction turns [m/s].
         cells: slices across the face.
         phase: angle that the pinion has turned from where a line of contact begins at the tangent
-            point of its base circle [rad].
+            point of its base circle [rad]; None for the one at which teeth of wheels that other
+            meshes have already stand in gaps, and 0 for the first.
         entry: share of the base pitch over which a pair of teeth takes up its load as it comes, and
             gives it off as it goes; with 0 at once, which implicit steps do not like [1].
         conservative: whether forces are the gradient of the energy also where lines move along
@@ -122,7 +124,8 @@ def gear_mesh(  # noqa: PLR0913  one keyword per property
     Raises:
         ConfigError: for a name in use, unknown markers, wheels that do not stand as the pair says,
             or numbers no mesh has.
-        ModelError: for maps and contact that the wheels cannot have.
+        ModelError: for maps and contact that the wheels cannot have, or a planet whose teeth find
+            no gaps.
     """
     if not all(float(z).is_integer() for z in pair.teeth):
         raise ConfigError(f"the wheels of mesh {name!r} have {pair.teeth} teeth: whole numbers.")
@@ -154,9 +157,11 @@ def gear_mesh(  # noqa: PLR0913  one keyword per property
     parts = self.part(wheel_a.body), self.part(wheel_b.body)
     mesh = GearMesh(
         wheel_a, wheel_b, pair, stiffness, flanks, numbers, cells, axes, np.array([0.0, np.pi]),
-        float(D @ z), number("phase", phase), entry * pair.base_pitch,
+        float(D @ z), number("phase", phase or 0.0), entry * pair.base_pitch,
         _rims(parts, (wheel_a, wheel_b), axes, pair), hertz, _spins(name, parts, axes, pair),
     )  # fmt: skip
+    if phase is None:
+        mesh = replace(mesh, phase=phase_from(name, mesh, self.gear_meshes.items()))
     self.add(name, mesh, GEAR_MESHES_FAMILY)
 
 

@@ -23,12 +23,13 @@ from scipy.linalg import eigh
 from scipy.spatial import cKDTree
 
 from rom.errors import ModelError
+from rom.mbs.parts.bodies import MESHED_RTOL
 from rom.model import Array
 from rom.rotation import exp, matrix, skew
 
 TEST_TURN = 0.1  # by which fields are turned to see which modes go into which [rad]
 SAME_FREQUENCY_RTOL = 0.02  # of modes that a mesh, round but for its facets, leaves apart
-ROUND_RTOL = 0.02  # moments of inertia across the axis, and offset of the mass centre over the size
+ROUND_RTOL = 0.02  # of moments of inertia across the axis
 N_NEAREST = 12  # triangles whose middle is near a point: one of them holds it
 
 
@@ -73,8 +74,8 @@ def check_round(name: str, mass: float, first: Array, inertia: Array, axis: Arra
     across = np.linalg.eigvalsh((np.eye(3) - np.outer(axis, axis)) @ inertia
                                 @ (np.eye(3) - np.outer(axis, axis)))[1:]  # fmt: skip
     apart = float(np.linalg.norm(np.cross(axis, first)) / mass)
-    size = np.sqrt(np.abs(inertia).max() / mass)
-    if max(across[1] - across[0], tilted) > ROUND_RTOL * across[1] or apart > ROUND_RTOL * size:
+    size = np.sqrt(np.trace(inertia) / mass)
+    if max(across[1] - across[0], tilted) > ROUND_RTOL * across[1] or apart > MESHED_RTOL * size:
         raise ModelError(
             f"its moments of inertia across the axis {axis.round(6).tolist()} are "
             f"{across.round(9).tolist()} kg m^2 and its mass centre lies {apart:.3g} m beside it: "
