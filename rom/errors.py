@@ -15,21 +15,14 @@ from pathlib import Path
 from typing import Any
 
 RANKS = ("OMPI_COMM_WORLD_RANK", "PMI_RANK")  # as launchers of parallel programs name them
-# words by which a message of one clause, or the last clause of a message, says what is wanted
-IN_ONE_CLAUSE = re.compile(
-    r"\b(?:must|needs?|needed|takes|give|only|alone|either|neither|at most|at least|or more"
-    r"|expected|instead|known|wanted|belongs? to|goes with|but|than|between|in place of"
-    r"|(?:is|are) (?:not|no|none|outside))\b"
-    r"|, not |[<>]=? ",
+# words by which a message, or its last clause, says what is wanted or what there is
+WANTED = re.compile(
+    r"\b(?:must|needs?|needed|takes|expected|instead|wanted|belongs? to|goes? with|known"
+    r"|at most|at least|or more|between|in place of|there (?:is|are)|has|have|use|give|write"
+    r"|leave|name|take|reduce|choose|only|from \S+ to)\b|[<>]=? ",
     re.IGNORECASE,
 )
-IN_LAST_CLAUSE = re.compile(
-    IN_ONE_CLAUSE.pattern
-    + r"|\b(?:has|have|holds?|there|is|are|readable|reduce|condense|take|write|use|ask|leave|name"
-    r"|choose|remove|cut|fit|move|save|simulate|up to|from|within|above|below|both|each|limit"
-    r"|numbers)\b|\(\w+, ",
-    re.IGNORECASE,
-)
+ASKED = re.compile(r"\b(?:must|needs?|needed|takes|expected|wanted|at most|at least)\b|[<>]= ")
 PACKAGE_FOLDER = str(Path(__file__).parent) + os.sep
 
 
@@ -69,12 +62,12 @@ class RomError(Exception):
 
 
 def wish(message: str) -> str:
-    """What a message says to be wanted, or to be there: its last clause, all of it, or nothing."""
+    """What a message says to be wanted or to be there: its last clause, all of it, or nothing."""
     message = message.strip()
     clause = re.split(r"(?<=[;.]) |(?<=:) (?![\[(.'])", message)[-1]
-    if clause != message and IN_LAST_CLAUSE.search(clause):
+    if clause != message and WANTED.search(clause):
         return clause
-    return message if IN_ONE_CLAUSE.search(message) else ""
+    return message if ASKED.search(message) else ""
 
 
 @contextmanager

@@ -166,7 +166,7 @@ def in_si(text: str, wanted: str) -> float:
     """
     match = NUMBER.match(text.strip()) if len(text) <= MAX_LETTERS else None
     if not match:
-        raise ConfigError(f"{text[:MAX_LETTERS]!r} must begin with a number.")
+        raise ConfigError(f"{text[:MAX_LETTERS]!r} does not begin with a number.")
     symbol = text.strip()[match.end() :].strip()
     if symbol.startswith(","):
         raise ConfigError(f"{text!r}: a decimal point is needed, not a comma.")
@@ -184,7 +184,7 @@ def in_si(text: str, wanted: str) -> float:
     except OverflowError:
         value = math.inf
     if not math.isfinite(value):
-        raise ConfigError(f"{text!r} is too large; at most 1e308 is a number.")
+        raise ConfigError(f"{text!r} is too large.")
     return value
 
 

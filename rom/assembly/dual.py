@@ -130,9 +130,7 @@ class DualAssembly:
                 )
             x, y = (self.bodies[body].origins[name] for body, name in (one, other))
             if np.linalg.norm(x - y) > SAME_PLACE * max(np.linalg.norm(x), np.linalg.norm(y)):
-                raise InterfaceError(
-                    f"{one} and {other} lie {np.linalg.norm(x - y):.3g} m apart, not at one place."
-                )
+                raise InterfaceError(f"{one} and {other} lie {np.linalg.norm(x - y):.3g} m apart.")
 
     @cached_property
     def certificate(self) -> Report:

@@ -277,7 +277,9 @@ class Tree:
         owner = {interface: key for key, model in models.items() for interface in model.interfaces
                  if interface not in self.joints}  # fmt: skip
         if unknown := [name for name in geometric.loads if name not in owner]:
-            raise InterfaceError(f"loads name {named(unknown)}; the pieces have {offered(owner)}.")
+            raise InterfaceError(
+                f"the range of loads names {named(unknown)}; the pieces have {offered(owner)}."
+            )
         largest = {name: np.abs(np.asarray(x, dtype=float)) for name, x in geometric.loads.items()}
         loads: dict[str, dict[str, Array]] = {key: {} for key in self.reference}
         for name, load in largest.items():

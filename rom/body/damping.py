@@ -104,7 +104,9 @@ class ModalDamping:
         """
         zeta = np.asarray(self.ratio, dtype=float)
         if zeta.ndim > 1 or (zeta.ndim == 1 and zeta.size != body.n_modes):
-            raise ConfigError(f"ModalDamping has {zeta.size} ratios; {body.n_modes} are needed.")
+            raise ConfigError(
+                f"ModalDamping has {zeta.size} ratios for {body.n_modes} elastic coordinates."
+            )
         omega, B = _vibrations(body, self.fixed)
         if omega.size < body.n_modes:
             omega, B = _with_statics(body, omega, B)

@@ -105,7 +105,9 @@ def changes(given: dict[str, Any], places: dict[str, tuple[str, ...]], extra: An
             found |= SPECIAL_KEYS[option](value)
         else:
             name = "--" + option.replace("_", "-")
-            raise ConfigError(f"{name} does not go with a {TOML_SUFFIX} file.", hint="Write it in.")
+            raise ConfigError(
+                f"{name} does not go with a {TOML_SUFFIX} file.", hint="Write it there."
+            )
     return found
 
 

@@ -108,7 +108,9 @@ def _sets(args: argparse.Namespace, names: list[str]) -> dict[str, Any]:
 
     found = unique([(name, labels(text)) for name, text in args.set], "--set")
     if unused := sorted(set(found) - set(names)):
-        raise ConfigError(f"--set {', '.join(unused)} is no interface: -i or --fixed must name it.")
+        raise ConfigError(
+            f"--set {', '.join(unused)} is no interface: neither -i nor --fixed names it."
+        )
     remaining = tuple(name for name in names if name not in found)
     if remaining and args.nodes.suffix.lower() != ".inp":
         raise ConfigError(

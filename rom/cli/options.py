@@ -38,7 +38,7 @@ def typed_number(option: str, text: str) -> float:
     try:
         return number(text)
     except argparse.ArgumentTypeError as error:
-        raise ConfigError(f"{option} must be one of those of its help: {error}.") from None
+        raise ConfigError(f"{option}: {error}.") from None
 
 
 def positive(text: str) -> float:
@@ -114,7 +114,7 @@ def unique(pairs: list[tuple[str, Any]], option: str) -> dict[str, Any]:
     found: dict[str, Any] = {}
     for name, value in pairs:
         if name in found:
-            raise ConfigError(f"{option} {name} is given twice, not once: {found[name]}, {value}.")
+            raise ConfigError(f"{option} {name} is given twice: {found[name]} and {value}.")
         found[name] = value
     return found
 

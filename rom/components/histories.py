@@ -62,7 +62,7 @@ class Table:
                 )
         if not (np.diff(t) > 0).all():
             k = int(np.argmin(np.diff(t) > 0))
-            raise ConfigError(f"times of the history must grow from {t[k]} s to {t[k + 1]} s.")
+            raise ConfigError(f"times of the history do not grow from {t[k]} s to {t[k + 1]} s.")
 
     def __call__(self, t: Array) -> Array:
         """Values at times.
@@ -143,8 +143,8 @@ def sine(amplitude: float, period: float, *, cycles: float = np.inf, phase: floa
     """
     if not (0 < period < np.inf and cycles > 0 and np.isfinite([amplitude, phase]).all()):
         raise ConfigError(
-            f"no sine has amplitude = {amplitude}, period = {period} s, "
-            f"cycles = {cycles}, phase = {phase}; period and cycles must be positive."
+            f"no sine has amplitude = {amplitude}, period = {period} s, cycles = {cycles}, "
+            f"phase = {phase}."
         )
 
     def values(t: Array) -> Array:
@@ -162,9 +162,7 @@ def rectangle(amplitude: float, duration: float) -> History:
         ConfigError: if there is no such pulse.
     """
     if not (0 < duration < np.inf and np.isfinite(amplitude)):
-        raise ConfigError(
-            f"no pulse has amplitude = {amplitude}, duration = {duration} s, only > 0."
-        )
+        raise ConfigError(f"no pulse has amplitude = {amplitude}, duration = {duration} s.")
     return lambda t: np.where(np.asarray(t) < duration, amplitude, 0.0)
 
 
@@ -267,7 +265,7 @@ def values_at(name: str, history: History, t: Array) -> Array:
         )
     if not np.isfinite(found).all():
         raise ConfigError(
-            f"the history of {name} must be finite, not {found[~np.isfinite(found)][0]} at "
+            f"the history of {name} is {found[~np.isfinite(found)][0]} at "
             f"t = {t[np.argmin(np.isfinite(found))]:g} s."
         )
     return found

@@ -162,7 +162,7 @@ def face_functions(sector: CyclicSector, functions: Polynomial | FourierLegendre
     V, S = functions.functions(face), face.surface_mass
     at_rest = np.isin(face.dofs[::3], sector.held)
     if at_rest.all():
-        raise InterfaceError(f"nodes of the cyclic face {face.name!r} are held; leave some free.")
+        raise InterfaceError(f"all nodes of the cyclic face {face.name!r} are held.")
     if at_rest.any():
         V = V * fading(face, at_rest)[:, None]
     norms = np.sqrt(np.einsum("km,km->m", V, S @ V))

@@ -159,4 +159,4 @@ def _largest(C: Array, K: Array) -> float:
     try:
         return float(eigh(C, K, eigvals_only=True)[-1])
     except LinAlgError as error:
-        raise ModelError("nothing holds the wheel, even at rest; it needs a support.") from error
+        raise ModelError("nothing holds the wheel, even at rest.") from error

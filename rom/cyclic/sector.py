@@ -94,11 +94,11 @@ class CyclicSector:
     def __post_init__(self) -> None:
         whole("n_sectors", self.n_sectors, 2)
         if np.intersect1d(self.slave, self.master).size:
-            raise InterfaceError("a dof is on both cyclic faces; each belongs to one.")
+            raise InterfaceError("a dof is on both cyclic faces; sectors would be without width.")
         if matrix("coupling", self.coupling).shape != (self.slave.size, self.master.size):
             raise ConfigError(
                 f"the coupling of {self.slave.size} slave to {self.master.size} master dofs has "
-                f"the shape {self.coupling.shape}; slave by master is needed."
+                f"the shape {self.coupling.shape}."
             )
 
     @classmethod
@@ -211,8 +211,8 @@ class CyclicSector:
         """
         if isinstance(diameter, bool) or diameter not in self.diameters:
             raise ConfigError(
-                f"{diameter!r} nodal diameters: {self.n_sectors} sectors have only 0 to "
-                f"{self.n_sectors // 2}."
+                f"{diameter!r} nodal diameters: {self.n_sectors} sectors can tell 0 to "
+                f"{self.n_sectors // 2} apart."
             )
         return int(diameter)
 

@@ -35,9 +35,11 @@ def supported_sector(
         Rotating Machines (2010); see docs/theory/rotating_solids.md.
     """
     if not (np.isfinite([across, along]).all() and min(across, along) >= 0 < across + along):
-        raise ConfigError(f"springs of {across:g} N/m across, {along:g} N/m along must not be 0.")
+        raise ConfigError(
+            f"springs of {across:g} N/m across and {along:g} N/m along the axis hold nothing."
+        )
     if sector.points is None or face.dofs.max() >= sector.n:
-        raise InterfaceError(f"face {face.name!r} must be of this sector.")
+        raise InterfaceError(f"the sector does not have the nodes of {face.name!r}.")
     e = sector.axis
     each = across * (np.eye(3) - np.outer(e, e)) + along * np.outer(e, e)
     share = kron(face.surface_mass / face.area, each / sector.n_sectors, format="coo")

@@ -126,7 +126,7 @@ def _lowest(
     try:
         solve = splu(csc_matrix(K + shift * G + shift**2 * M, dtype=complex)).solve
     except RuntimeError as error:
-        raise ModelError("rotation has used up the stiffness; take a lower speed.") from error
+        raise ModelError("rotation has used up the stiffness of the wheel exactly.") from error
 
     def inverse(y: Complex) -> Complex:
         a, b = y[:f].ravel(), y[f:].ravel()

@@ -32,12 +32,12 @@ def point_masses(attachment: Attachment, origin: Array) -> tuple[Array, Array]:
     m, J = attachment.mass, np.asarray(attachment.inertia, dtype=float)
     at = origin if attachment.at is None else np.asarray(attachment.at, dtype=float)
     if not (np.isfinite(m) and m > 0):
-        raise MaterialError(f"attachment on {attachment.interface!r} needs a mass, got {m:g} kg.")
+        raise MaterialError(f"attachment on {attachment.interface!r} has the mass {m:g} kg.")
     second, axes = np.linalg.eigh(0.5 * np.trace(J) * np.eye(3) - J)  # integral of rho x x^T
     if J.shape != (3, 3) or second.min() < -1e-9 * max(second.max(), 1e-300):
         raise MaterialError(
             f"attachment on {attachment.interface!r}: no body has this inertia; "
-            "one principal moment must not exceed the sum of the others."
+            "one principal moment exceeds the sum of the two others."
         )
     arms = axes * np.sqrt(3 * np.maximum(second, 0.0) / m)
     return at + np.vstack([arms.T, -arms.T]), np.full(6, m / 6)

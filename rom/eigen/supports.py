@@ -50,7 +50,9 @@ def supports(fixed: Fixed, known: Iterable[str], owner: str = "the model") -> Su
     found: Supports = {}
     for name, words in pairs:
         if name in found:
-            raise ConfigError(f"fixed: {name!r} is held twice.", hint="Name it once.")
+            raise ConfigError(
+                f"fixed: {name!r} is held twice.", hint="Say all its directions once."
+            )
         found[name] = () if words is WHOLE_WORD else _directions(name, words)
     return found
 
@@ -120,11 +122,13 @@ def spring_matrices(springs: Springs | None, known: Iterable[str], owner: str) -
     for name, value in (springs or {}).items():
         k = finite(f"springs[{name!r}]", value, None)
         if k.shape not in ((3,), (6,), (6, 6)):
-            raise ConfigError(f"springs[{name!r}] has shape {k.shape}: it takes 3, 6 or 6 x 6.")
+            raise ConfigError(
+                f"springs[{name!r}] has the shape {k.shape}: it takes 3 or 6 numbers, or 6 x 6."
+            )
         k = np.diag(np.pad(k, (0, 6 - k.size))) if k.ndim == 1 else k
         lam = np.linalg.eigvalsh(0.5 * (k + k.T))
         if np.abs(k - k.T).max() > 1e-10 * np.abs(k).max() or lam[0] < -1e-10 * lam[-1]:
-            raise ConfigError(f"springs[{name!r}] must be symmetric and not negative.")
+            raise ConfigError(f"springs[{name!r}] has no energy: negative, or not symmetric.")
         if not k.any():
             raise ConfigError(f"springs[{name!r}] holds nothing: all of it is zero.")
         found[name] = 0.5 * (k + k.T)

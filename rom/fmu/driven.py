@@ -112,7 +112,9 @@ class Driven:
         count = len(self.variables)
         wrong = [int(ref) for ref in refs if not 0 <= ref < count]
         if wrong:
-            raise ConfigError(f"no variable has the reference {named(wrong)}; all are < {count}.")
+            raise ConfigError(
+                f"no variable has the value reference {named(wrong)}; all are < {count}."
+            )
         outputs = self._outputs() if (np.asarray(refs) >= first).any() else np.zeros(count - first)
         every = np.concatenate([self.parameters, self.inputs.values, outputs])
         return every[np.asarray(refs, dtype=int)]
@@ -142,7 +144,7 @@ class Driven:
         """
         if self.state is None or abs(t - self.state.t) > TIME_RTOL * max(h, 1e-3 * abs(t)):
             where = "not started" if self.state is None else f"at t = {self.state.t:.9g} s"
-            raise ConfigError(f"a step from t = {t:.9g} s is asked for, but the state is {where}.")
+            raise ConfigError(f"a step from t = {t:.9g} s is asked for, the mechanism is {where}.")
         if not (np.isfinite(h) and h > 0.0):
             raise ConfigError(f"the communication step {h} s must be positive.")
         n = max(1, int(np.ceil(h / float(self.parameters[0]) - 1e-6)))

@@ -63,7 +63,7 @@ def write_fmu(
     """
     path, script = check_writable(path), Path(script)
     if path.suffix != ".fmu":
-        raise ConfigError(f"{path} must end in .fmu.")
+        raise ConfigError(f"{path} does not end in .fmu.")
     if not (dt > 0.0 and 0.0 <= rho_inf <= 1.0):
         raise ConfigError(f"dt = {dt} s must be positive, rho_inf = {rho_inf} within [0, 1].")
     resources = {f"{MODEL_FOLDER}/{p.name}": _read(p) for p in (script, *map(Path, files))}

@@ -73,7 +73,7 @@ class Inputs:
         for name in names:
             check_known(name, kinds, f"no input {name!r}; the loads, motors and drives are")
             if list(names).count(name) > 1:
-                raise ConfigError(f"the input {name!r} is named twice; once is needed.")
+                raise ConfigError(f"the input {name!r} is named twice.")
         found = {name: kinds[name](mechanism, name) for name in names}
         self.variables = [variable for several in found.values() for variable in several]
         self.values = np.array([v.start for v in self.variables], dtype=float)

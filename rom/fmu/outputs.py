@@ -57,7 +57,7 @@ class Outputs:
         joints = {n: j for n, j in mechanism.joints.items() if j.coordinate is not None}
         for name in names:
             if list(names).count(name) > 1:
-                raise ConfigError(f"the output {name!r} is named twice; once is needed.")
+                raise ConfigError(f"the output {name!r} is named twice.")
             if name in places:
                 self._marker(places[name])
             elif name in joints:

@@ -65,7 +65,7 @@ def write_archive(
     """
     for name, A in arrays.items():
         if not np.isfinite(A).all():
-            raise QualityGateError(f"{name} of {what} must be finite; nothing was written.")
+            raise QualityGateError(f"{name} of {what} is not finite; nothing was written.")
     manifest = manifest | {"sha256": {name: digest(A) for name, A in arrays.items()}}
     text = np.frombuffer(json.dumps(manifest, sort_keys=True).encode(), dtype=np.uint8)
 
@@ -132,7 +132,9 @@ def stated(path: str | Path) -> Iterator[None]:
     except ConfigError as error:
         raise FileFormatError(error.message, where=str(path), hint=error.hint) from error
     except (KeyError, TypeError, ValueError, AttributeError, IndexError) as error:
-        raise FileFormatError(f"the manifest misstates {error}.", where=str(path)) from error
+        raise FileFormatError(
+            f"the manifest lacks or misstates {error}.", where=str(path)
+        ) from error
 
 
 def digest(A: Array) -> str:
@@ -179,7 +181,9 @@ def _read(archive: zipfile.ZipFile, name: str, path: Path) -> Array:
             else:
                 shape, fortran, dtype = npy.read_array_header_2_0(member)
     except (ValueError, SyntaxError, TypeError, TokenError) as error:
-        raise FileFormatError(f"array {name!r} has a broken header.", where=str(path)) from error
+        raise FileFormatError(
+            f"the array {name!r} has a broken header.", where=str(path)
+        ) from error
     if dtype.str not in ("<f8", "<i8", "|u1"):
         raise UnsafeFileError(
             f"the array {name!r} has the type {dtype.str}; such a file holds 8-byte numbers.",
@@ -194,7 +198,9 @@ def _read(archive: zipfile.ZipFile, name: str, path: Path) -> Array:
         try:
             return npy.read_array(member, allow_pickle=False)
         except ValueError as error:
-            raise FileFormatError(f"array {name!r} is cut: {error}.", where=str(path)) from error
+            raise FileFormatError(
+                f"the array {name!r} is cut: {error}.", where=str(path)
+            ) from error
 
 
 def _read_manifest(archive: zipfile.ZipFile, path: Path, kind: Kind) -> dict[str, Any]:

@@ -230,7 +230,7 @@ def _refuse_missing(manifest: dict[str, Any], arrays: dict[str, Array]) -> None:
     needed += [f"K_geo/{name}" for name in manifest["geometric_stiffness"]]
     needed += [f"surface/{part}" for part in SURFACE_ARRAYS] if manifest["surface"] else []
     if missing := [name for name in needed if name not in arrays]:
-        raise ConfigError(f"the file needs the array {named(missing)}.")
+        raise ConfigError(f"the file lacks the array {named(missing)}.")
 
 
 def _check_words(manifest: dict[str, Any], r: int) -> None:
@@ -286,7 +286,9 @@ def verify(body: FlexibleBody, path: Path) -> None:
         parts = (m.point.shape, m.translation.shape, m.rotation.shape, m.hold.shape[1:])
         six = m.kind not in SIX_KINDS or len(m.hold) == 6
         if not six or parts != ((3,), (3, r), (3, r), (6 + r,)):
-            raise FileFormatError(f"marker {m.name!r} must fit {r} coordinates.", where=str(path))
+            raise FileFormatError(
+                f"marker {m.name!r} does not fit {r} coordinates.", where=str(path)
+            )
         _verify_covariance(m, r, path)
         _verify_patch(m, path)
     if body.stress is not None and not body.stress.fits(r):
@@ -330,7 +332,8 @@ def _verify_stiffening(body: FlexibleBody, path: Path) -> None:
 def _verify_covariance(m: Marker, r: int, path: Path) -> None:
     if m.covariance is not None and m.covariance.shape != (3, 3, 1 + r):
         raise FileFormatError(
-            f"the covariance of marker {m.name!r} does not fit {r} coordinates.", where=str(path)
+            f"the covariance of marker {m.name!r} does not fit {r} coordinates.",
+            where=str(path),
         )
 
 

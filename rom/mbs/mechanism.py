@@ -447,7 +447,9 @@ class Mechanism:
             *(GROUND, *self.parts, *self.joints, *self.drives, *self.elements, *self.events),
         ]
         if name in taken:
-            raise ConfigError(f"the name {name!r} is used twice; there are {offered(taken, name)}.")
+            raise ConfigError(
+                f"the name {name!r} is used twice; in use are {offered(taken, name)}."
+            )
 
     def check_markers(self, name: str, *markers: Marker) -> None:
         """Refuse markers of bodies that are not in this mechanism, or of places they have not.

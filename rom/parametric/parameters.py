@@ -138,7 +138,7 @@ def checked_parameters(parameters: dict[str, Any]) -> dict[str, Parameter]:
                 hint='For example rom.YoungsModulus("web", 0.5, 2.0).',
             )
         if not str(name).isidentifier() or name == "extrapolate":
-            raise ParameterError(f"{name!r} cannot name a parameter: at({name}=1.0) needs another.")
+            raise ParameterError(f"{name!r} cannot name a parameter: at({name}=1.0) means no call.")
     if not parameters:
         raise ParameterError("a family of bodies needs a parameter.", hint="Use rom.reduce.")
     if len(parameters) > len(PRIMES):
@@ -163,7 +163,9 @@ def complete(
         ParameterError: if a name is unknown, or a factor no positive number or out of its range.
     """
     if unknown := sorted(set(values) - set(parameters)):
-        raise ParameterError(f"no parameter {named(unknown)}; the family has {sorted(parameters)}.")
+        raise ParameterError(
+            f"there is no parameter {named(unknown)}; the family has {sorted(parameters)}."
+        )
     return {
         name: _checked(name, parameter, values.get(name, 1.0), extrapolate)
         for name, parameter in parameters.items()

@@ -40,7 +40,7 @@ class StretchedModel(AffineModel):
     def __init__(self, model: FEModel, parameters: dict[str, Parameter]):
         super().__init__(model, parameters)
         if model.attachments:
-            raise ParameterError("a model with a parameter of thickness must not carry masses.")
+            raise ParameterError("a model with a parameter of thickness may carry no masses.")
         thin = [p for p in parameters.values() if isinstance(p, Thickness)]
         axis = "xyz".index(thin[0].axis)
         self.regions = {name: model.regions[name] for name in model.regions}
@@ -178,7 +178,7 @@ class StretchedModel(AffineModel):
             np.sqrt(np.diag(ops.gram(A, ops.apply_M(A))).max()) for A in (R - Phi @ C, ops.rigid)
         )
         if gap > RIGID_RTOL * size:
-            raise ModelError(f"the basis must have rigid motions of a stretched body: {gap:.1e}.")
+            raise ModelError(f"the basis misses a rigid motion of a stretched body by {gap:.1e}.")
         return C
 
     def _refuse_more(self, E: Array, shares: list[Share]) -> None:

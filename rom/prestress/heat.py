@@ -82,7 +82,9 @@ def _by_region(what: str, given: Any, names: tuple[str, ...]) -> dict[str, float
     table = dict(given) if isinstance(given, Mapping) else dict.fromkeys(names, given)
     for name, value in table.items():
         if name not in names:
-            raise ConfigError(f"the {what} names region {name!r}; the model has {sorted(names)}.")
+            raise ConfigError(
+                f"the {what} names the region {name!r}; the model has {sorted(names)}."
+            )
         number = isinstance(value, int | float | np.number) and not isinstance(value, bool)
         if not (number and np.isfinite(value)):
             raise ConfigError(f"the {what} of region {name!r} is {value!r}, not a finite number.")

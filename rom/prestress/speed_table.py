@@ -157,7 +157,7 @@ class SpinUp(SpeedTable):
             a, reached = self.steady.follow(start, self.speeds[k] ** 2, square, self.steady.load)
             if reached < square:
                 raise ModelError(
-                    f"no stable steady state was found at {speed:.5g} rad/s; take speeds below.",
+                    f"no stable steady state was found at {speed:.5g} rad/s.",
                     solution=self.steady.T @ a,
                 )
         return self.steady.T @ a

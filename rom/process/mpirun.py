@@ -48,6 +48,8 @@ def mpirun(n: int) -> list[str]:
     """
     program = found()
     if not program:
-        raise ResourceError(f"{PROGRAM_NAME} is not installed.", hint="See `rom doctor`.")
+        raise ResourceError(
+            f"{PROGRAM_NAME} is not installed.", hint="`rom doctor` says what to type."
+        )
     crowded = ["--oversubscribe"] if version(program).startswith(OPEN_MPI) else []
     return [program, *crowded, "-n", str(n)]

@@ -45,7 +45,7 @@ def table(header: Sequence[str], rows: Iterable[Sequence[Any]], caption: str) ->
     lines = []
     for row in rows:
         if len(row) != len(header):
-            raise ConfigError(f"a row of {len(row)} cells; the header needs {len(header)}: {row}.")
+            raise ConfigError(f"a row of {len(row)} cells under a header of {len(header)}: {row}.")
         lines.append("<tr>" + "".join(f"<td>{_cell(value)}</td>" for value in row) + "</tr>")
     head = "".join(f"<th>{html.escape(name)}</th>" for name in header)
     return (
@@ -86,7 +86,9 @@ def image(path: str | Path, words: str) -> str:
         raise ConfigError(f"{path} is no picture of the kinds {', '.join(KINDS)}.")
     data = path.read_bytes()
     if len(data) > MAX_PICTURE_BYTES:
-        raise ConfigError(f"{path} has {len(data)} bytes; pictures have up to {MAX_PICTURE_BYTES}.")
+        raise ConfigError(
+            f"{path} has {len(data)} bytes; pictures up to {MAX_PICTURE_BYTES} are embedded."
+        )
     code = base64.b64encode(data).decode("ascii")
     kind = KINDS[path.suffix.lower()]
     return f"<img alt='{html.escape(words, quote=True)}' src='data:{kind};base64,{code}'>"

@@ -92,7 +92,7 @@ def modes_scene(body: "FlexibleBody", *, size: int = SHAPE_BYTES) -> dict[str, A
     body = body.in_units("SI")
     surface, stress, found = _surface(body), _stress(body), list(_modes(body))
     if surface is None:
-        raise ConfigError(f"body {body.name!r} has no surface; reduce it with one.")
+        raise ConfigError(f"body {body.name!r} has no surface to draw.")
     Q = np.array([mode["q"] for mode in found]).reshape(len(found), -1)
     far = [float(np.abs(displacement(body, _motion(mode))).max()) for mode in found]
     kept = np.union1d(
@@ -172,7 +172,9 @@ def start_scene(
 def _meshes(shapes: dict[str, Mesh], mechanism: "Mechanism") -> dict[str, Mesh]:
     """The shapes of bodies, if the mechanism has these and the triangles have their corners."""
     if unknown := set(shapes) - set(mechanism.parts):
-        raise ConfigError(f"no body {named(sorted(unknown))}; it has {offered(mechanism.parts)}.")
+        raise ConfigError(
+            f"shapes: no body {named(sorted(unknown))}; there are {offered(mechanism.parts)}."
+        )
     found = {}
     for name, (points, triangles) in shapes.items():
         X, corner = np.asarray(points, dtype=float), np.asarray(triangles)
@@ -180,7 +182,7 @@ def _meshes(shapes: dict[str, Mesh], mechanism: "Mechanism") -> dict[str, Mesh]:
         if not fit or not np.isfinite(X).all() or corner.dtype.kind not in "iu":
             raise ConfigError(f"the shape of {name!r} is no (n, 3) points and (t, 3) corners.")
         if corner.min() < 0 or corner.max() >= len(X):
-            raise ConfigError(f"the shape of {name!r} needs corners below its {len(X)} points.")
+            raise ConfigError(f"the shape of {name!r} has corners beyond its {len(X)} points.")
         found[name] = X, corner.astype(np.int64)
     return found
 

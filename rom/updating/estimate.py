@@ -129,7 +129,7 @@ def update(  # noqa: PLR0913  keywords of one call
     model = family_model(family, rows, attached, candidates, fixed)
     unknown = _unknown(model, free, attached, candidates)
     if isinstance(prior, Updated) and residual != "responses":
-        raise ConfigError("an update by another test is a prior of responses only.")
+        raise ConfigError("the update by another test is a prior for the residual of responses.")
     before = _Before.of(prior or {}, model)
     search = _Search.begun(model, test, unknown, damping, before)
     check_channels(search.extremes(), search.data.roughly())
@@ -194,7 +194,7 @@ class _Before:
             return _Before(np.zeros(len(names)), np.diag(sigma**-2.0))
         known = [name for name in prior.names if name in names]
         if not known:
-            raise ConfigError(f"prior: the test before must have found {named(names)}.")
+            raise ConfigError(f"prior: the test before found none of {named(names)}.")
         here, there = ([those.index(n) for n in known] for those in (names, prior.names))
         precision[np.ix_(here, here)] = np.linalg.inv(prior.covariance[np.ix_(there, there)])
         x = [np.log(prior.factors.get(name, 1.0) or 1.0) for name in names]

@@ -88,7 +88,9 @@ class Parts:
             return "", self.bodies[""].marker(str(place))
         body, interface = place if isinstance(place, tuple) and len(place) == 2 else ("", "")
         if body not in self.bodies:
-            raise ConfigError(f"{place!r} is no (body, interface); there are {named(self.bodies)}.")
+            raise ConfigError(
+                f"{place!r} is no place (body, interface); bodies are {named(self.bodies)}."
+            )
         return body, self.bodies[body].marker(interface)
 
     def motion(self, place: Place) -> Array:
@@ -337,7 +339,7 @@ def family_model(
     outside = {**attached, **candidates}
     own: dict[str, Any] = {} if isinstance(family, FlexibleBody | Assembly) else family.parameters
     if len(outside) < len(attached) + len(candidates) or set(outside) & set(own):
-        raise ParameterError(f"one of {named(outside)} must name one parameter.")
+        raise ParameterError(f"one of {named(outside)} names two parameters.")
     pairs = [
         [_placed(A, parts.columns[name], parts.n) for A in term.full_matrices()]
         for name, term in terms_of(family)

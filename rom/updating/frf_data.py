@@ -340,7 +340,7 @@ def beside_poles(omega: Array, poles: npt.ArrayLike, zeta: npt.ArrayLike, width:
         ConfigError: if poles and ratios differ in number, or a bandwidth is not positive.
     """
     if np.shape(poles) != np.shape(zeta) or not (width * np.asarray(zeta) > 0).all():
-        raise ConfigError(f"{np.size(poles)} poles, zeta = {zeta!r}, width = {width} must be > 0.")
+        raise ConfigError(f"{np.size(poles)} poles, zeta = {zeta!r}, width = {width}: positive.")
     reach = width * np.asarray(zeta) * np.asarray(poles)
     far = np.abs(omega[:, None] - np.asarray(poles)) / reach
     return np.minimum(far, 1.0).prod(axis=1)[:, None, None]
@@ -357,7 +357,7 @@ def frac(H: Complex, G: Complex) -> Array:
         ConfigError: if the shapes differ.
     """
     if np.shape(H) != np.shape(G):
-        raise ConfigError(f"responses {np.shape(H)} and {np.shape(G)} must have one shape.")
+        raise ConfigError(f"responses {np.shape(H)} and {np.shape(G)} cannot be compared.")
     cross = np.abs((H.conj() * G).sum(axis=0)) ** 2
     return cross / (np.abs(H) ** 2).sum(axis=0) / (np.abs(G) ** 2).sum(axis=0)
 

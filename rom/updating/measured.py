@@ -54,9 +54,9 @@ class Channels:
             object.__setattr__(self, name, value)
         shapes = np.shape(self.points), np.shape(self.directions)
         if shapes[0] != shapes[1] or len(shapes[0]) != 2 or shapes[0][1] != 3:
-            raise ConfigError(f"points {shapes[0]}, directions {shapes[1]}; both must be (k, 3).")
+            raise ConfigError(f"points {shapes[0]}, directions {shapes[1]}: (k, 3) of both.")
         if not np.linalg.norm(self.directions, axis=1).all():
-            raise ConfigError("the direction of a channel must not have length zero.")
+            raise ConfigError("a channel has a direction of length zero.")
         self._name_bodies(shapes[0][0])
 
     def _name_bodies(self, k: int) -> None:
@@ -68,7 +68,7 @@ class Channels:
         if not isinstance(each, list | tuple) or not all(isinstance(name, str) for name in each):
             raise ConfigError(f"bodies = {given!r}: a name, or one of each channel.")
         if len(each) != k:
-            raise ConfigError(f"{len(each)} bodies are named; {k} channels need one each.")
+            raise ConfigError(f"{len(each)} bodies are named for {k} channels.")
         object.__setattr__(self, "bodies", tuple(each))
 
     def some(self, chosen: Any) -> "Channels":
@@ -186,7 +186,7 @@ def _complex(H: Any) -> Complex:
     try:
         return np.asarray(H, dtype=complex)
     except (TypeError, ValueError) as error:
-        raise ConfigError("H must hold numbers.") from error
+        raise ConfigError("H holds no numbers.") from error
 
 
 def _check_lengths(points: Array, surface: cKDTree, reach: float, what: str) -> None:
@@ -251,9 +251,11 @@ class Responses:
             raise ConfigError("frequencies must ascend and lie above zero.")
         wanted = (f.size, len(np.asarray(self.sensors.points)), len(np.asarray(self.inputs.points)))
         if self.H.shape != wanted:
-            raise ConfigError(f"H is {self.H.shape}; lines, sensors and inputs are {wanted}.")
+            raise ConfigError(
+                f"H is {self.H.shape}; lines, sensors and inputs are {wanted}.",
+            )
         if len(self.quantities) != wanted[1]:
-            raise ConfigError(f"{len(self.quantities)} quantities, not {wanted[1]}.")
+            raise ConfigError(f"{len(self.quantities)} quantities of {wanted[1]} sensors.")
         c = finite("coherence", self.coherence, None)
         if c.shape not in ((), wanted) or not ((c >= 0) & (c < 1)).all():
             raise ConfigError(
@@ -273,7 +275,7 @@ class Responses:
         """See that noise of forces and the estimator are such."""
         noise, one = finite("force_noise", self.force_noise, None), np.ndim(self.force_noise) == 0
         if not one and noise.shape != self.H.shape[::2]:
-            raise ConfigError(f"force_noise {noise.shape} must be () or {self.H.shape[::2]}.")
+            raise ConfigError(f"force_noise {noise.shape}: one number or {self.H.shape[::2]}.")
         if not (noise >= 0).all():
             least = self.force_noise if one else float(noise.min())
             raise ConfigError(f"force_noise = {least}: zero or more.")
@@ -369,10 +371,10 @@ class MeasuredModes:
         m, k = len(self.frequencies), len(self.points)
         shapes = np.asarray(self.shapes)
         if shapes.shape != (m, k, 3) or np.shape(self.damping) != (m,):
-            raise ConfigError(f"shapes {shapes.shape} for {m} modes at {k} points, not (m, k, 3).")
+            raise ConfigError(f"shapes {shapes.shape} for {m} modes at {k} points: ({m}, {k}, 3).")
         size = np.linalg.norm(shapes, axis=(1, 2))
         if bad := np.flatnonzero(~(np.isfinite(size) & (size > 0))).tolist():
-            raise ConfigError(f"the shape of mode {bad[0] + 1} must be finite and not zero.")
+            raise ConfigError(f"the shape of mode {bad[0] + 1} is zero or not finite.")
 
     def mac(
         self, body: FlexibleBody, *, fixed: Any = (), n: int, tolerance: float | None = None

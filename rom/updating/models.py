@@ -113,7 +113,7 @@ class AtSensors:
         try:
             K_oo = cho_factor(model.K[np.ix_(o, o)])
         except LinAlgError as error:
-            raise ModelError("held at its sensors, the structure must not move.") from error
+            raise ModelError("held at its sensors, the structure can still move.") from error
         T = np.zeros((len(model.K), s.size))
         T[s], T[o] = np.eye(s.size), -cho_solve(K_oo, model.K[np.ix_(o, s)])
         dT = -np.array([cho_solve(K_oo, (dK @ T)[o]) for dK in model.dK])  # rows o; s do not move
@@ -149,11 +149,11 @@ class Measurement:
     def __post_init__(self) -> None:
         if np.ndim(self.H) != 3 or self.H.shape[::2] != (len(self.omega), len(self.inputs)):
             n = (len(self.omega), len(self.inputs))
-            raise ConfigError(f"H is {np.shape(self.H)}; needed are {n[0]} lines, {n[1]} exciters.")
+            raise ConfigError(f"H is {np.shape(self.H)} for {n[0]} frequencies, {n[1]} exciters.")
         if not np.isfinite(self.H).all() or not np.abs(self.H).min() > 0:
-            raise ConfigError("H has entries that are zero or not finite; leave that channel out.")
+            raise ConfigError("H has entries that are zero or not finite: a dead channel.")
         if not set(self.inputs) <= set(range(self.H.shape[1])):
-            raise ConfigError(f"inputs = {self.inputs} must be of 0 to {self.H.shape[1] - 1}.")
+            raise ConfigError(f"inputs = {self.inputs} of the sensors 0 to {self.H.shape[1] - 1}.")
         w = np.shape(self.weights)
         if w not in ((), self.H.shape, (len(self.omega), 1, 1)):
             raise ConfigError(f"weights {w} fit neither a number nor responses {self.H.shape}.")
@@ -179,7 +179,9 @@ class Measurement:
         """
         full = model.full if isinstance(model, AtSensors) else model
         if len(full.sensors) != self.H.shape[1]:
-            raise ConfigError(f"the model has {len(full.sensors)} sensors, not {self.H.shape[1]}.")
+            raise ConfigError(
+                f"the model has {len(full.sensors)} sensors, the test {self.H.shape[1]}."
+            )
         if not (np.asarray(zeta) > 0).all():
             raise ConfigError(f"zeta = {zeta!r}: damping ratios to start from must be positive.")
 
@@ -229,7 +231,7 @@ def modal(model: ParametricModel, zeta: ArrayLike) -> Modal:
         )
     zeta, d = np.asarray(zeta, dtype=float), np.zeros(lam.size)
     if zeta.size > lam.size - model.n_rigid:
-        raise ConfigError(f"{zeta.size} damping ratios, not {lam.size - model.n_rigid}.")
+        raise ConfigError(f"{zeta.size} damping ratios for {lam.size - model.n_rigid} modes.")
     damped = slice(model.n_rigid, model.n_rigid + zeta.size)
     d[damped] = 2 * zeta * np.sqrt(lam[damped])
     return Modal(lam, Phi, d)

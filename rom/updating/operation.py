@@ -58,7 +58,7 @@ class Sensors:
     def __post_init__(self) -> None:
         one_of("quantity", self.quantity, tuple(UNITS))
         if finite("noise", self.noise, ()) < 0:
-            raise ConfigError(f"noise = {self.noise} must not be negative.")
+            raise ConfigError(f"noise = {self.noise} is negative.")
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -206,7 +206,7 @@ def operation(
         )
     if not model.K.shape[1]:
         what = named(body.name for body in parts.bodies.values())
-        raise ConfigError(f"body {what} cannot move with {fixed!r} held; leave some free.")
+        raise ConfigError(f"body {what} cannot move with {fixed!r} held.")
     lam, U = eigh(model.K.sum(axis=0), model.M.sum(axis=0))
     omega, V = np.sqrt(np.maximum(lam, 0.0)), model.seen @ U
     omega[: model.n_rigid] = 0.0
@@ -292,7 +292,7 @@ def stress_rows(
         far = np.linalg.norm(recovery.points - x, axis=1)
         n = int(far.argmin())
         if far[n] > reach:
-            raise ConfigError(f"{what} {k} at {x.tolist()} must be on it, not {far[n]:.3g} m off.")
+            raise ConfigError(f"{what} {k} at {x.tolist()} is {far[n]:.3g} m off the body.")
         a, b, c = d / np.linalg.norm(d)
         along = np.array([a * a, b * b, c * c, 2 * b * c, 2 * a * c, 2 * a * b])
         static.append(along @ recovery.operator[None, 6 * n : 6 * n + 6])

@@ -63,7 +63,7 @@ class Drift:
     def __post_init__(self) -> None:
         positive("first", self.first)
         if finite("walk", self.walk, ()) < 0:
-            raise ConfigError(f"walk = {self.walk} must not be negative.")
+            raise ConfigError(f"walk = {self.walk} is negative.")
 
 
 @dataclass(frozen=True, slots=True)

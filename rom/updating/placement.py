@@ -227,7 +227,7 @@ def place(  # noqa: PLR0913  keywords of one call
     one_of("quantity", quantity, tuple(DERIVATIVES))
     bodies = Parts.of(family).bodies
     if other := {body.units for body in bodies.values()} - {"SI"}:
-        raise ConfigError(f"the family is in {other.pop()}; SI is needed.")
+        raise ConfigError(f"the family is in {other.pop()}; plan in SI units.")
     least = 0.0 if floor is None else floor
     if min(noise, least) < 0 or not 0 < finite("noise + floor", noise + least, ()):
         raise ConfigError("noise and floor are not negative, and one of them is positive.")

@@ -99,7 +99,7 @@ class Observer:
         """
         y = finite("samples", samples, None)
         if y.ndim != 2 or y.shape[1] != len(self.C):
-            raise ConfigError(f"samples {y.shape}: (n_t, {len(self.C)}) are needed.")
+            raise ConfigError(f"samples {y.shape}: (n_t, {len(self.C)}) are taken.")
         closed, driven = self.A - self.A @ self.G @ self.C, self.A @ self.G
         x, out = np.zeros(len(self.A)), np.zeros((len(y), len(self.W)))
         for k, pushed in enumerate(y @ driven.T):
@@ -260,7 +260,7 @@ def checked_record(samples: Any, times: Any, n_y: int, dt: float) -> Array:
     """
     y = np.ascontiguousarray(samples, dtype=float)
     if y.ndim != 2 or y.shape[1] != n_y or np.isinf(y).any():
-        raise ConfigError(f"samples {y.shape}: (n_t, {n_y}) numbers are needed, or NaN.")
+        raise ConfigError(f"samples {y.shape}: (n_t, {n_y}) numbers are taken, or NaN.")
     if times is None:
         return y
     times = finite("times", times, (len(y),))
@@ -299,7 +299,7 @@ class Assumed:
         for name in ("dt", "walk") + ("first",) * (self.first is not None):
             positive(name, getattr(self, name))
         if finite("unmodelled", self.unmodelled, ()) < 0:
-            raise ConfigError(f"unmodelled = {self.unmodelled} must not be negative.")
+            raise ConfigError(f"unmodelled = {self.unmodelled} is negative.")
 
     def white(self, operation: Operation) -> Array:
         """(n, n) intensity of the noise of the state."""
@@ -393,4 +393,4 @@ def check_units(structure: Structure) -> None:
         ConfigError: if they are not in SI units.
     """
     if other := {body.units for body in Parts.of(structure).bodies.values()} - {"SI"}:
-        raise ConfigError(f"the body is in {other.pop()}; SI is needed.")
+        raise ConfigError(f"the body is in {other.pop()}; track it in SI units.")

@@ -74,7 +74,7 @@ FAULTS = {
                "--set root=11-14,20"),
     "set of nobody": ((*CALCULIX, "--set", "pin=12"), "--set pin is no interface"),
     "set twice": ((*CALCULIX, "--set", "a=3", "--set", "a=7", "--fixed", "a"), "--set a is given"),
-    "unknown node": ((*CALCULIX, "--set", "a=3-4", "--fixed", "a"), "'a' needs known nodes",
+    "unknown node": ((*CALCULIX, "--set", "a=3-4", "--fixed", "a"), "'a' has no nodes, or unknown",
                      "[4]"),
     "label": ((*CALCULIX, "--set", "a=3-x", "--fixed", "a"), "'3-x' is no label"),
     "range": ((*CALCULIX, "--set", "a=7-3", "--fixed", "a"), "'7-3' is no label"),

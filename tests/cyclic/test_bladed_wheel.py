@@ -235,7 +235,7 @@ def test_wrong_arguments_are_named(model, full, small, disk):
     with pytest.raises(ConfigError, match="does not move the tuned wheel"):
         disk.amplification(alike, force, **drive | {"at": [tip]})
     soft = replace(small.blade, K=-small.blade.K)
-    with pytest.raises(ModelError, match=r"without stiffness|a motion free"):
+    with pytest.raises(ModelError, match="without stiffness"):
         disk.modes([soft] * N)
 
 

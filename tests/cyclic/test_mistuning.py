@@ -97,14 +97,14 @@ def test_wrong_arguments_are_named():
         wheel.modes(np.full(6, -1.5))
     with pytest.raises(ConfigError, match=r"no region 'wing'; it has \['blade'\]"):
         rom.mistuned_wheel(bladed_ring(6), 1, blade="wing")
-    with pytest.raises(ConfigError, match=r"force has shape \(2,\)"):
+    with pytest.raises(ConfigError, match=r"force has the shape \(2,\)"):
         wheel.amplification(np.zeros(6), np.ones(2), **SWEEP)
     with pytest.raises(ConfigError, match=r"damping = 0\.0 must be a positive"):
         wheel.amplification(np.zeros(6), FORCE, **SWEEP | {"damping": 0.0})
     with pytest.raises(ConfigError, match="does not move the tuned wheel"):
         wheel.amplification(np.zeros(6), 0 * FORCE, **SWEEP)
     weak = replace(wheel, blade=50 * wheel.blade)
-    with pytest.raises(ModelError, match="leave a motion free"):
+    with pytest.raises(ModelError, match="without stiffness"):
         weak.modes(np.full(6, -0.9))
 
 

@@ -112,7 +112,7 @@ FILES = {
     "held for a format that holds nothing": (2, ["export", "good.npz", "x.op4", "--held", "root"],
                                              "held for openfast alone, not for op4"),
     "held misspelt": (2, ["export", "good.npz", "x.dat", "--to", "openfast", "--held", "rot"],
-                      "'rot' cannot be held; there are ('root', 'tip')"),
+                      "'rot' cannot be held; the interfaces are ('root', 'tip')"),
     "modes for a format without": (2, ["export", "good.npz", "x.pch"], "reads interfaces alone"),
     "export to an unknown format": (2, ["export", "good.npz", "x.fbx"], "'.fbx'"),
     "hinge misspelt": (4, ["simulate", "good.npz", "--hinge", "rot", "--t-end", "1", "--dt", "1e-3",

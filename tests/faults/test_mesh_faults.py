@@ -224,7 +224,7 @@ CELLS = {
                      MeshError, "no volume cells, only 8 facets"),
     "not meshed": ("box.msh", msh(blocks=[], names=[]), MeshError, "not meshed"),
     "mixed cells": ("box.msh", msh(blocks=[*BLOCKS, ("hex8", 1, 1, [range(8)])]), MeshError,
-                    "mixes types"),
+                    "several types"),
     "duplicate cell": ("box.msh", msh(blocks=cells(DUPLICATE)), MeshError, "cells 8, 73"),
     "flat cell": ("box.msh", msh(FLAT), MeshError, "cells 6"),
     "repeated node": ("box.msh", msh(blocks=cells([*BOX.cells, [0, 1, 1, 9]])), MeshError,

@@ -214,7 +214,7 @@ def test_what_is_wrong_is_told_and_the_instance_goes_on(free, tmp_path):
     one = Instance(free, tmp_path).begin()
     assert "value reference 0 = nan is not a finite" in one.fails(one.set, "a.force[1]", np.nan)
     assert "value reference 20 cannot be set" in one.fails(one.fmu.setReal, [20], [0.0])
-    assert "no variable has the reference 39" in one.fails(one.fmu.getReal, [39])
+    assert "no variable has the value reference 39" in one.fails(one.fmu.getReal, [39])
     assert "from t = 5 s is asked for, the body is at 0 s" in one.fails(one.fmu.doStep, 5.0, 0.1)
     for h in (0.0, -1.0, np.inf, np.nan):
         assert "must be positive and finite" in one.fails(one.fmu.doStep, 0.0, h)

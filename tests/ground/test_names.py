@@ -296,5 +296,5 @@ def test_a_body_that_is_none_of_hundreds_is_answered_in_one_line():
         mech.add_rigid(f"stone {k}", mass=1.0, inertia=(1, 1, 1), at=(k, 0, 0))
     with pytest.raises(ConfigError, match=r"no body 'stone_77'; the mechanism has \['stone 77',"):
         mech.part("stone_77")
-    with pytest.raises(ConfigError, match=r"used twice; there are \['stone 3',.* and 14\d more"):
+    with pytest.raises(ConfigError, match=r"used twice; in use are \['stone 3',.* and 14\d more"):
         mech.add_rigid("stone 3", mass=1.0, inertia=(1, 1, 1), at=(0, 0, 0))

@@ -92,7 +92,7 @@ def test_modes_that_interfaces_neither_move_nor_feel_leave_first():
         ((np.eye(2), np.eye(2), np.zeros((2, 2)), np.ones((2, 1)), np.ones((1, 2)), 1),
          ModelError, "not stable"),
         ((np.eye(2), np.eye(3), np.eye(2), np.ones((2, 1)), np.ones((1, 2)), 1),
-         ConfigError, "must fit"),
+         ConfigError, "shapes do not fit"),
         ((np.eye(2), np.eye(2), np.eye(2), np.ones((2, 1)), np.ones((1, 2)), 3),
          ConfigError, "r = 3, but"),
         ((np.eye(601),) * 3 + (np.ones((601, 1)), np.ones((1, 601)), 2),

@@ -115,8 +115,8 @@ def test_a_resonance_is_refused(connection):
     [
         (((), 1), "needs a frequency"),
         (((0.0,), 0), "order = 0 must be a whole number of 1"),
-        (((-1.0,), 1), "must differ, from 0 Hz"),
-        (((5.0, 5.0), 1), "must differ, from 0 Hz"),
+        (((-1.0,), 1), "different numbers from 0 Hz"),
+        (((5.0, 5.0), 1), "different numbers from 0 Hz"),
         (((np.nan,), 1), "frequencies.* = nan must be a finite number"),
         (((0.0,), 1.5), "order = 1.5 must be a whole number"),
     ],
@@ -128,7 +128,7 @@ def test_messages_for_wrong_numbers(arguments, words):
 
 def test_messages_for_wrong_boundaries(connection):
     method = rom.MomentMatching()
-    with pytest.raises(ConfigError, match="needs one"):
+    with pytest.raises(ConfigError, match="none is given"):
         method.basis(connection.ops, np.zeros(0, dtype=int), ())
     with pytest.raises(InterfaceError, match="leave a rigid motion free"):
         method.basis(connection.ops, connection.boundary[:3], ("",) * 3)

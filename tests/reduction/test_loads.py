@@ -80,7 +80,7 @@ def test_the_body_has_a_certificate(model):
     [
         (rom.Guyan(), "wind", "the only word known"),
         (rom.Guyan(), np.zeros((5, 1)), r"shape \(5, 1\)"),
-        (rom.Guyan(), np.full((297, 1), np.nan), "needed are finite"),
+        (rom.Guyan(), np.full((297, 1), np.nan), "finite forces"),
         (rom.FreeFree(3), "gravity", "has no constraint modes"),
     ],
 )

@@ -155,9 +155,9 @@ def test_the_certificate_says_that_enhanced_columns_give_up_statics():
 @pytest.mark.parametrize(
     ("method", "b", "error", "words"),
     [
-        (rom.Rubin(3), [], ConfigError, "needs one"),
-        (rom.Herting(3), [], ConfigError, "needs one"),
-        (rom.EnhancedCraigBampton(3), [], ConfigError, "needs one"),
+        (rom.Rubin(3), [], ConfigError, "none is given"),
+        (rom.Herting(3), [], ConfigError, "none is given"),
+        (rom.EnhancedCraigBampton(3), [], ConfigError, "none is given"),
         (rom.Rubin(3), [0, 1, 2], InterfaceError, "leave a rigid motion free"),
         (rom.Rubin(3), [0, 1, 2, 3, 4, 5], InterfaceError, "leave a rigid motion free"),
         (rom.Rubin(10_000), list(range(12)), ConfigError, "n_modes = 10000"),
@@ -202,7 +202,7 @@ def test_modes_by_substructures_are_those_by_lanczos(ops, model):
     [
         ({"f_max": 1e3, "search": "arnoldi"}, "search"),
         ({"n_modes": 3, "search": "substructures"}, "up to f_max"),
-        ({"f_max": 1e3, "tol": 1e-3, "search": "substructures"}, "in place of tol"),
+        ({"f_max": 1e3, "tol": 1e-3, "search": "substructures"}, "without tol"),
     ],
 )
 def test_a_search_that_does_not_suit_is_refused(given, said):

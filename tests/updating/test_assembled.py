@@ -206,7 +206,7 @@ def test_channels_name_the_body_on_which_they_lie(bolted):
             bad.rows(bodies, "sensor")
     with pytest.raises(ConfigError, match="lies on 'arm': this is one body alone"):
         both.rows(bodies["arm"], "sensor")
-    with pytest.raises(ConfigError, match="1 bodies are named; 2 channels need"):
+    with pytest.raises(ConfigError, match="1 bodies are named for 2 channels"):
         Channels(*at, ("arm",))
     offered = candidates(bolted, 12, fixed=HELD)
     assert set(offered.bodies) == {"frame", "arm"} and len(offered.points) == 36
@@ -346,12 +346,12 @@ def test_what_does_not_fit_an_assembly_is_named(families, bolted):
     seam = Channels([[0.5, 0.1, 0.08]], [[0, 0, 1]])
     refused("input 0 at .* is as near to one as to another of 'frame', 'arm'",
             test=replace(test, inputs=seam))  # fmt: skip
-    refused("'tip' is no .body, interface.; bodies are 'frame', 'arm'",
+    refused("'tip' is no place .body, interface.; bodies are 'frame', 'arm'",
             attached=AddedMass("tip", 1.0, 0.1, 1.0))  # fmt: skip
     refused("no place", attached=replace(BOLTS, one=("leg", "tip")))
     refused("knee", InterfaceError, attached=replace(BOLTS, one=("arm", "knee")))
     for fixed in ((("leg", "root"),), ("root",), "root", {"root": "x"}):
-        refused("is no .body, interface.", fixed=fixed)
+        refused("is no place .body, interface.", fixed=fixed)
     with pytest.raises(ConfigError, match="has the range"):
         replace(BOLTS, low=0.0)
     with pytest.raises(ConfigError, match="there is no family"):

@@ -128,7 +128,7 @@ DAMAGES = {
     "volts are not calibrated": (scaled(1.0), {"unit": "V/N"}, "'v' is no motion.*calibrate"),
     "the force is off the body": (
         scaled(1.0), {"force": (9, "Z"), "nodes": {**NODES, 9: (2.0, 0.0, 0.0)}},
-        "input 0 .* must be on it"),
+        "input 0 .* off the body"),
 }  # fmt: skip
 
 

@@ -173,7 +173,7 @@ def test_wrong_plans_are_named(family):
         with pytest.raises(kind, match=words):
             call()
 
-    refused("must be on it", lambda: planned(family, Channels([[9.0, 0, 0]], [[1, 0, 0]]), 1))
+    refused("off the body", lambda: planned(family, Channels([[9.0, 0, 0]], [[1, 0, 0]]), 1))
     refused("n_sensors = 13", lambda: planned(family, offered, 13))
     refused("n_inputs = 4", lambda: planned(family, offered, 3, n_inputs=4))
     refused("one of them is positive", lambda: planned(family, offered, 3, floor=0.0))

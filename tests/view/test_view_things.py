@@ -141,7 +141,7 @@ def test_a_scene_is_drawn_into_axes_of_the_caller():
         (view.Thing(np.zeros((3, 3)), [[0, 1, -1]]), "numbers from 0 to 2"),
         (view.Thing(np.zeros((3, 3)), [[0.0, 1.0]]), "numbers from 0 to 2"),
         (view.Thing(np.zeros((4, 3)), [[0, 1, 2, 3]]), "numbers from 0 to 3"),
-        (view.Thing(*BOX, values=[1.0, 2.0]), r"has \(1, 2\) values, not \(1, 8\)"),
+        (view.Thing(*BOX, values=[1.0, 2.0]), r"has \(1, 2\) values for \(1, 8\) points"),
         (view.Thing(*BOX, edges=[[0, 8]]), "edges are pairs of numbers from 0 to 7"),
     ],
 )
@@ -152,7 +152,7 @@ def test_wrong_things_are_refused_by_name(thing, words):
 
 def test_a_film_needs_a_time_for_each_picture_and_something_to_draw():
     moving = view.Thing(BOX[0] + np.zeros((3, 1, 1)), BOX[1])
-    with pytest.raises(ConfigError, match="2 times, not 3 as 'S'"):
+    with pytest.raises(ConfigError, match="2 times for 3 pictures of 'S'"):
         view.film([0.0, 1.0], view.Scene("S", {"box": moving}))
     with pytest.raises(ConfigError, match="nothing to draw in 'S'"):
         view.film([0.0], view.Scene("S", {}))
@@ -187,7 +187,7 @@ def test_plates_are_their_outlines_made_thick_and_move_with_them():
     np.testing.assert_allclose(step[second], [(0.0, 0.3, 0.0)] * second.sum(), atol=1e-15)
     np.testing.assert_array_equal(step[~second], 0.0)
     assert np.ptp(thing.points[..., 2]) == pytest.approx(0.5)
-    with pytest.raises(ConfigError, match=r"2 plates need one value each, got \(1,\)"):
+    with pytest.raises(ConfigError, match=r"2 plates have \(1,\) values"):
         view.plates(frames, 0.5, values=[1.0])
     with pytest.raises(ConfigError, match="there is no plate"):
         view.plates([[square], [square, other]], 0.5)
@@ -211,7 +211,7 @@ def test_what_is_left_of_an_update_has_a_scale_of_its_own():
     assert np.ptp(errors.get_xlim()) < 0.3
     responses = figure.axes[0].lines
     assert [line.get_xdata().size for line in responses] == [X.size, fine.size]
-    with pytest.raises(ConfigError, match="'test' has 2 values; 20 frequencies"):
+    with pytest.raises(ConfigError, match="'test' has 2 values for 20 frequencies"):
         view.updating(X, {"test": [1.0, 2.0]}, changes, structure=structure, label="u")
 
 

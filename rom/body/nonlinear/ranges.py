@@ -118,7 +118,7 @@ class Geometric:
         if self.about is not None:
             finite("about", self.about, (3,))
             if not spins:
-                raise ConfigError(f"about = {self.about!r} is for spin, which is 0; leave it out.")
+                raise ConfigError(f"about = {self.about!r} is a point of an axis, and spin is 0.")
 
     def components(self) -> list[Load]:
         """The loads that are not zero: those of interfaces, then centrifugal ones."""

@@ -154,7 +154,7 @@ class Stretch:
         try:
             found = np.linalg.solve(K, np.column_stack([self.start + p * rate - force, rate]))
         except np.linalg.LinAlgError as error:  # at a limit point to the last bit
-            raise SolverError("the stiffness is singular; hold every rigid motion.") from error
+            raise SolverError("the stiffness is singular.") from error
         return found[:, 0], found[:, 1]
 
     def stiffness(self, at: Array) -> Array:

@@ -205,7 +205,7 @@ def _pendulum(args: argparse.Namespace) -> Answer:
     if args.dt > args.t_end:
         raise ConfigError(f"--dt {args.dt:g} is longer than --t-end {args.t_end:g}.")
     if not any(args.axis):
-        raise ConfigError("--axis 0,0,0 has no direction; give another one.")
+        raise ConfigError("--axis 0,0,0 has no direction.")
     folder = claim(args)
     body = load(args.file)
     body.marker(args.hinge)

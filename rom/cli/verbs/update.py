@@ -213,7 +213,7 @@ def _outputs(args: argparse.Namespace, family: "Family") -> dict[str, Path]:
     if args.output is None:
         return {}
     if not args.output.name:
-        raise ConfigError("-o must name a file.")
+        raise ConfigError("-o names no file.")
     stem, paths = args.output.name.removesuffix(".npz").removesuffix(".rom"), {}
     for name in Parts.of(family).bodies:
         path = args.output.with_name(f"{stem}.{name}.rom.npz") if name else args.output
@@ -300,7 +300,7 @@ def _plan(args: argparse.Namespace) -> Answer:
     from rom.updating.placement import candidates, place
 
     if args.file is not None or args.candidate:
-        raise ConfigError("--plan takes neither a test nor --candidate.")
+        raise ConfigError("--plan takes neither a test nor --candidate: it comes before the test.")
     require({"--lines": args.lines}, hint="For example --lines 20:800, from 20 to 800 Hz.")
     output = args.output and checked(args, args.output)
     if output and output.suffix.lower() not in PLAN_ENDINGS:
@@ -461,7 +461,7 @@ def _outside(args: argparse.Namespace, family: "Family") -> "Attached":
                             ("--mass", args.mass)):  # fmt: skip
         for name, text in unique(several, option).items():
             if name in found:
-                raise ConfigError(f"{option} {name} has the name of another one; use a new one.")
+                raise ConfigError(f"{option} {name} has the name of another one.")
             at, value, low, high = _parts(option, text)
             places = [_place(option, part, bodies) for part in at.split(",")]
             if len(places) != 1 + (option == "--joint"):

@@ -184,7 +184,7 @@ def disc(center: npt.ArrayLike, radius: float, *, n: int = 120) -> Array:
         ConfigError: for a radius that is not positive, or fewer than three corners.
     """
     if not 0 < radius < np.inf or n < 3:
-        raise ConfigError(f"a disc of the radius {radius} m with {n} corners needs more of both.")
+        raise ConfigError(f"a disc of the radius {radius} m with {n} corners has no inside.")
     angle = 2 * np.pi * np.arange(n) / n
     return finite("center", center, (2,)) + radius * np.column_stack([np.cos(angle), np.sin(angle)])
 
@@ -252,7 +252,9 @@ def nodal(name: str, values: npt.ArrayLike, body: Sheet) -> Array:
     """
     x = np.ascontiguousarray(finite(name, values, None))
     if x.shape != body.points.shape:
-        raise ConfigError(f"{name} of shape {x.shape}: {body.points.shape} finite ones are needed.")
+        raise ConfigError(
+            f"{name} of the shape {x.shape}: {body.points.shape} finite numbers are needed."
+        )
     return x
 
 

@@ -178,7 +178,7 @@ def fly(
     """
     v, held = nodal("velocities", v, body), dofs_of(held, body)
     if not 0 < t_end < np.inf or pictures < 2:
-        raise ConfigError(f"t_end = {t_end} s with {pictures} pictures; both must be more.")
+        raise ConfigError(f"t_end = {t_end} s with {pictures} pictures: nothing to show.")
     actions = actions or Actions()
     held = np.union1d(held, dofs_of(actions.held, body))
     acts = prepared(body, replace(actions, held=held), (0.0, t_end))

@@ -123,7 +123,9 @@ def whole_numbers(name: str, value: npt.ArrayLike) -> Index:
 
 def _refuse_no_mesh(X: Array, T: Index, state: str) -> None:
     if X.ndim != 2 or X.shape[1] != 2 or T.ndim != 2 or T.shape[1] != 3 or not len(T):
-        raise MeshError(f"points {X.shape}, triangles {T.shape} where (n, 2), (t, 3) are needed.")
+        raise MeshError(
+            f"points {X.shape} and triangles {T.shape} where (n, 2) and (t, 3) were expected."
+        )
     if T.min() < 0 or T.max() >= len(X):
         raise MeshError(
             f"triangles name the nodes {T.min()} to {T.max()}; there are {len(X)} points.",

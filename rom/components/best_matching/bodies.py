@@ -171,7 +171,7 @@ class Bodies:
     def _placed(self, x: Array) -> Array:
         x = configuration(x)
         if len(x) != self.mass.size:
-            raise ConfigError(f"{len(x)} positions or velocities, not {self.mass.size}.")
+            raise ConfigError(f"{len(x)} positions or velocities of {self.mass.size} bodies.")
         return x
 
     def _apart(self, x: Array) -> Array:

@@ -61,7 +61,7 @@ def rigid_part(mass: Any, R: Array, V: Array) -> Array:
     V = np.asarray(V, dtype=float)
     MR = _weighted(mass, R)
     if V.shape[:1] != R.shape[:1]:
-        raise ConfigError(f"{V.shape[0]} velocities must fit {R.shape[0]} rows of generators.")
+        raise ConfigError(f"{V.shape[0]} velocities do not fit {R.shape[0]} rows of generators.")
     G = R.T @ MR
     unit = 1 / np.sqrt(np.maximum(np.diag(G), 1e-300))
     G = np.linalg.pinv(G * np.outer(unit, unit), rcond=INERTIA_RTOL, hermitian=True)
@@ -109,7 +109,7 @@ def frame(mass: Any, reference: Array, x: Array, *, plane: bool = False) -> tupl
     """
     X, x = configuration(reference), configuration(x)
     if X.shape != x.shape:
-        raise ConfigError(f"{len(x)} particles, not {len(X)} as the others.")
+        raise ConfigError(f"{len(x)} particles cannot be laid over {len(X)}.")
     share = _weighted(mass, np.ones((len(X), 1)))
     share = share / share.sum()
     centre_X, centre_x = share.T @ X, share.T @ x
@@ -189,7 +189,7 @@ def _weighted(mass: Any, V: Array) -> Array:
         return np.repeat(np.asarray(mass, dtype=float), len(V) // len(mass))[:, None] * V
     if np.ndim(mass) == 2 and mass.shape == (len(V), len(V)):
         return np.asarray(mass @ V)
-    raise ConfigError(f"a mass of shape {np.shape(mass)} must fit {len(V)} rows.")
+    raise ConfigError(f"a mass of shape {np.shape(mass)} does not fit {len(V)} rows.")
 
 
 def configuration(x: Array) -> Array:

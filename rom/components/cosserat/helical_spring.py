@@ -53,7 +53,9 @@ class HelicalSpring:
             if not value > 0:
                 raise ModelError(f"{name}={value:g} of a spring is not positive.")
         if self.diameter <= self.wire:
-            raise ModelError(f"wire of {self.wire:g} m must fit a helix of {self.diameter:g} m.")
+            raise ModelError(
+                f"wire of {self.wire:g} m does not fit a helix of {self.diameter:g} m."
+            )
         if self.length <= self.solid_length:
             raise ModelError(f"free length {self.length:g} m is not above the solid length "
                              f"{self.solid_length:g} m.", hint="Take fewer coils.")  # fmt: skip

@@ -88,7 +88,9 @@ class Mesh:
     def __post_init__(self) -> None:
         k = np.atleast_1d(np.asarray(self.stiffness, dtype=float))
         if not isinstance(self.pair, GearPair) or self.pair.internal:
-            raise ModelError("meshes of inner gears, racks are elements: use Mechanism.gear_mesh.")
+            raise ModelError(
+                "meshes of internal gears and racks are elements: use Mechanism.gear_mesh."
+            )
         if self.correction.measured:
             raise ModelError("maps and run-out are for elements: use Mechanism.gear_mesh.")
         if not (k.size and np.isfinite(k).all() and (k > 0).all()):
@@ -244,7 +246,7 @@ def transmission_error(mesh: Mesh, torque: float, theta: npt.ArrayLike) -> Array
         SolverError: if the teeth do not come to rest.
     """
     if not torque > 0:
-        raise ModelError(f"a torque of {torque} N m must press the working flanks together.")
+        raise ModelError(f"a torque of {torque} N m does not press the working flanks together.")
     return np.array([_closed(mesh, torque, t) for t in np.atleast_1d(theta)])
 
 

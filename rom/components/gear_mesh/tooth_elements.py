@@ -94,7 +94,7 @@ def tooth_model(
     """
     inner = bore * pair.r[gear]
     if not 0 < inner < 0.98 * pair.rf[gear]:
-        raise ModelError(f"a bore of {bore} of the reference diameter must leave a body.")
+        raise ModelError(f"a bore of {bore} of the reference diameter leaves no body.")
     points, cells, clamped, axis, flank = _mesh(pair, gear, inner, fine)
     K = _stiffness(points, cells, nu)
     fixed = np.concatenate([2 * clamped, 2 * clamped + 1])

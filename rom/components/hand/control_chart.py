@@ -79,7 +79,7 @@ class Chart:
         flexor, extensor = (np.array(part, dtype=float, ndmin=1) for part in (x, y))
         if flexor.shape != extensor.shape or not dt > 0:
             raise ConfigError(
-                f"{flexor.size} and {extensor.size} samples {dt:g} s apart are not two."
+                f"{flexor.size} and {extensor.size} samples {dt:g} s apart are no two signals."
             )
         n = flexor.size
         groups, pulls = np.empty(n, dtype=np.int64), np.empty((n, len(GROUPS)))

@@ -164,7 +164,7 @@ def table(mech: Mechanism, name: str, held: Held, *, leaves: float, speed: float
     """
     gravity = finite("gravity", mech.gravity, (3,))
     if not np.linalg.norm(gravity) > 0.0:
-        raise ConfigError(f"a table needs gravity to keep {name!r}.")
+        raise ConfigError(f"without gravity nothing keeps {name!r} on a table.")
     up = -gravity / np.linalg.norm(gravity)
     feet, radius = _feet(held, up)
     low = min(float(foot @ up) for foot in feet) - radius

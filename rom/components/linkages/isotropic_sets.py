@@ -177,7 +177,7 @@ def tool_isotropy(
     q = q.reshape(-1, 2)
     q = q[around(there.assembles, q)]
     if not len(q):
-        raise ModelError("the tool must reach some of the postures, not none.")
+        raise ModelError("none of the postures can be assembled: the tool reaches nothing.")
     ends = [[tip(*there.coordinates(q + s * e).T) for s in (1, -1)]
             for e in DIFFERENCE_STEP * np.eye(2)]  # fmt: skip
     if any(np.shape(x) != q.shape for both in ends for x in both):

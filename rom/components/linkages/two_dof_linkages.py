@@ -56,7 +56,7 @@ def rigid_link(mass: float, length: float, centre: npt.ArrayLike, inertia: float
     """
     x, y = np.asarray(centre, dtype=float)
     if not (mass > 0 and length > 0 and inertia >= 0 and np.isfinite([x, y]).all()):
-        raise ModelError(f"no link has mass {mass} kg, length {length} m, {inertia} kg m2 > 0.")
+        raise ModelError(f"no link has mass {mass} kg, length {length} m, inertia {inertia} kg m2.")
     J = inertia + mass * (x * x + y * y)
     M = np.array([[mass, 0, -mass * y], [0, mass, mass * x], [-mass * y, mass * x, J]])
     return Link(float(length), M, np.zeros((2, 0)), np.zeros((0, 0)))
@@ -93,7 +93,7 @@ def reduced_link(body: FlexibleBody, first: str, second: str) -> Link:
     axis = (b.point - a)[:2]
     length = float(np.hypot(*axis))
     if length == 0.0:
-        raise ModelError(f"pins {first!r} and {second!r} must not lie on one axis.")
+        raise ModelError(f"pins {first!r} and {second!r} lie on one axis along z.")
     e = axis / length
     R = np.array([[e[0], e[1]], [-e[1], e[0]]])  # world axes to along and across
     x, y = R @ (body.first_moment - body.mass * a)[:2]
@@ -128,7 +128,7 @@ class TwoLink:
 
     def __post_init__(self) -> None:
         if not self.payload >= 0:
-            raise ModelError(f"payload = {self.payload} kg must not be negative.")
+            raise ModelError(f"no payload has the mass {self.payload} kg.")
 
     def inertia(self, q1: npt.ArrayLike, q2: npt.ArrayLike, *, elastic: Elastic = "held") -> Array:
         """(..., 2, 2) generalised inertia [kg m^2] at angles (...) [rad].
@@ -334,7 +334,7 @@ class Driven:
         if len(rows) != 2 or not set(drives) <= set(mechanism.drives):
             raise ConfigError(f"{drives!r} are not two of the drives {sorted(mechanism.drives)}.")
         if tool is not None and tool not in self._packed.names:
-            raise ConfigError(f"the tool {tool!r} must be one of {list(self._packed.names)}.")
+            raise ConfigError(f"the tool {tool!r} is none of {list(self._packed.names)}.")
         self._rows, self._tool = np.array(rows), tool
         self._work = workspace(self._packed.system, len(self._packed.signals))
         self._known = lru_cache(KEPT_POSTURES)(self._found)
@@ -405,6 +405,6 @@ class Driven:
         if (self._is_held and N.shape[1] != 2) or np.linalg.cond(mobility) > 1e12:
             raise ModelError(
                 f"with elastic coordinates held the joints leave {N.shape[1]} motions to the two "
-                f"drives {self.drives!r}: it must not be singular, but a mechanism of two dof."
+                f"drives {self.drives!r}: a singular position, or not a mechanism of two dof."
             )
         return np.linalg.inv(mobility)

@@ -105,7 +105,7 @@ class MovingLoad:
         before = self.start < top[:, 0, 0].min() if self.speed <= 0 else False
         if beyond or before:
             raise ConfigError(
-                f"{self.name} starts at x = {self.start} m but the stones "
+                f"{self.name} starts at x = {self.start} m and never comes upon the stones, which "
                 f"lie from x = {top[:, 0, 0].min():.6g} m to {top[:, 1, 0].max():.6g} m."
             )
 
@@ -154,7 +154,7 @@ class Wind:
             outline = masonry.stones[_moving(self.name, stone, masonry)].outline
             if not 0 <= edge < len(outline):
                 raise ConfigError(
-                    f"{self.name} blows on edge {edge} of stone {stone}, but edges are 0 to "
+                    f"{self.name} blows on edge {edge} of stone {stone}, whose edges are 0 to "
                     f"{len(outline) - 1}."
                 )
             o = (edge + 1) % len(outline)
@@ -162,7 +162,7 @@ class Wind:
             inward = masonry.thickness * np.array([-along[1], along[0]])
             rows.append((stone, first[stone] + np.array([edge, o, o]), inward))
         if not rows:
-            raise ConfigError(f"{self.name} needs an edge to blow on.")
+            raise ConfigError(f"{self.name} blows on no edge.")
         block, corner, force = (list(x) for x in zip(*rows, strict=True))
         n = len(rows)
 
@@ -201,7 +201,7 @@ class SupportMotion:
         """
         end = np.r_[_vector(self.name, self.shift), self.turn]
         if not np.isfinite(self.turn):
-            raise ConfigError(f"{self.name} must turn by a number, not {self.turn}.")
+            raise ConfigError(f"{self.name} turns by {self.turn} rad.")
         touched = set(np.unique(touching(masonry).who[:, [0, 2]]).tolist())
         for stone in self.stones:
             if stone not in masonry.held:
@@ -209,7 +209,7 @@ class SupportMotion:
                     f"{self.name} moves stone {stone}, which is not held; held are {masonry.held}."
                 )
             if stone not in touched:
-                raise ConfigError(f"{self.name} moves stone {stone}, which must support one.")
+                raise ConfigError(f"{self.name} moves stone {stone}, which supports nothing.")
         if abs(values_at(self.name, self.history, np.zeros(1))[0]) > 0.0:
             raise ConfigError(
                 f"{self.name} begins away from where its stones lie.",
@@ -269,7 +269,7 @@ def facing(masonry: Masonry, direction: tuple[float, float]) -> tuple[tuple[int,
     """
     d = _vector("wind", direction)
     if not np.any(d):
-        raise ConfigError("wind needs a direction.")
+        raise ConfigError("wind blows in no direction.")
     d = d / np.linalg.norm(d)
     edges = [(b, k) for b, s in enumerate(masonry.stones) for k in range(len(s.outline))]
     start = np.array([masonry.stones[b].outline[k] for b, k in edges])
@@ -360,9 +360,11 @@ def _vector(name: str, x: tuple[float, float]) -> Array:
 
 def _moving(name: str, stone: int, masonry: Masonry) -> int:
     if not 0 <= stone < len(masonry.stones):
-        raise ConfigError(f"{name} acts on stone {stone}; it needs 0 to {len(masonry.stones) - 1}.")
+        raise ConfigError(
+            f"{name} acts on stone {stone} of the stones 0 to {len(masonry.stones) - 1}."
+        )
     if stone in masonry.held:
-        raise ConfigError(f"{name} acts on stone {stone}, which must not be held.")
+        raise ConfigError(f"{name} acts on stone {stone}, which is held and would not feel it.")
     return stone
 
 

@@ -88,7 +88,7 @@ def _law(where: str, law: Any) -> Joint:
     if not isinstance(law, Mapping) or not {"friction"} <= set(law) <= LAW_KEYS:
         keys = sorted(law) if isinstance(law, Mapping) else law
         raise FileFormatError(
-            f"{where} has {keys}; friction is needed, between, cohesion, tension may be."
+            f"{where} has {keys}; it needs friction, and may have between, cohesion, tension."
         )
     units = {"friction": "1", "cohesion": "Pa", "tension": "Pa"}
     try:

@@ -95,8 +95,8 @@ def arch(
     """
     if n < 2 or not 0 < thickness < 2 * radius or not 0 < half_angle < np.pi:
         raise ConfigError(
-            f"no arch has {n} voussoirs, radius {radius}, thickness {thickness}, "
-            f"half angle {half_angle}; needed are n >= 2 and half angles below pi."
+            f"no arch has {n} voussoirs, radius {radius}, thickness {thickness}, half angle "
+            f"{half_angle}."
         )
     rock = rock or Rock()
     joints = np.linspace(-half_angle, half_angle, n + 1)
@@ -151,9 +151,7 @@ def wall(
     """
     rock, (b, h) = rock or Rock(), brick
     if not (length > 0 and courses >= 1 and min(brick) > 0):
-        raise ConfigError(
-            f"no wall is {length} m long with {courses} courses of {brick}, only > 0."
-        )
+        raise ConfigError(f"no wall is {length} m long with {courses} courses of bricks {brick}.")
     for opening in openings:
         left, right, low, top = opening
         if not (0 < left < right < length and 0 <= low <= top < courses):
@@ -227,7 +225,7 @@ def load_factor(masonry: Masonry, loads: Sequence[Load], *, t: float = 0.0) -> f
     system, load = _joint_forces(masonry), _applied(masonry, loads, t)
     found = _solve(system, system.weight, load[:, None])
     if found.status == 2:
-        raise ConfigError("the masonry must stand under its own weight to have a load factor.")
+        raise ConfigError("the masonry does not stand under its own weight; no load factor exists.")
     if found.status not in (0, 3):
         raise SolverError(f"no load factor: {found.message}")
     return float(found.x[-1]) if found.status == 0 else np.inf

@@ -152,7 +152,7 @@ def _steps(t_end: float, dt: float, damping: float, save_every: int) -> int:
         raise ConfigError(f"t_end = {t_end} s in steps of dt = {dt} s: both must be positive.")
     n = round(t_end / dt)
     if n < 1 or save_every < 1:
-        raise ConfigError(f"{n} steps, save_every = {save_every}; give more steps.")
+        raise ConfigError(f"{n} steps, save_every = {save_every}: nothing to do.")
     if not damping >= 0:
         raise ConfigError(f"damping = {damping} 1/s would drive the stones; give 0 or more.")
     return n

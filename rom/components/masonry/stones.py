@@ -112,7 +112,7 @@ def _corners(outline: npt.ArrayLike) -> Array:
         raise ModelError(f"an outline of the shape {x.shape}: three rows or more of x, y make one.")
     sides = np.linalg.norm(np.roll(x, -1, axis=0) - x, axis=1)
     if not sides.all():
-        raise ModelError(f"corner {int(sides.argmin())} of a stone must be listed once.")
+        raise ModelError(f"corner {int(sides.argmin())} of a stone is listed twice in turn.")
     y = np.roll(x, -1, axis=0)
     area = float((x[:, 0] * y[:, 1] - x[:, 1] * y[:, 0]).sum() / 2)
     if not area > 0:
@@ -148,7 +148,7 @@ def reduced_stone(body: FlexibleBody, outline: npt.ArrayLike) -> Stone:
     """
     body, corners = body.with_reference("mean-axis"), _corners(outline)
     if body.surface is None:
-        raise ModelError(f"body {body.name!r} needs a surface.")
+        raise ModelError(f"body {body.name!r} has no surface.")
     points, shape = body.surface.points, body.surface.shape.reshape(-1, 3, body.n_modes)
     far = np.linalg.norm(points[None, :, :2] - corners[:, None], axis=2)
     at = far < 1e-6 * body.size
@@ -204,7 +204,7 @@ class Masonry:
                 ">= 0."
             )
         if not set(self.held) <= set(range(len(self.stones))):
-            raise ConfigError(f"held = {self.held} must be of 0 to {len(self.stones) - 1}.")
+            raise ConfigError(f"held are {self.held} of the stones 0 to {len(self.stones) - 1}.")
         if len(set(self.held)) == len(self.stones):
             raise ConfigError(
                 f"all of {len(self.stones)} stones are held.", hint="Leave one free to move."

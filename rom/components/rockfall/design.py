@@ -138,7 +138,7 @@ def capacity_heights(g: Gallery, boulders: Any, **allowed: float) -> Array:
         ConfigError: for a mass that is not positive, or a gallery that bears anything.
     """
     if not (g.cushion.limit < np.inf or g.shear.capacity < np.inf or g.slab.capacity < np.inf):
-        raise ConfigError("the gallery has no limit and no capacity; it needs one.")
+        raise ConfigError("the gallery has no limit and no capacity; it bears anything.")
     found = []
     for m in boulders:
 

@@ -70,7 +70,7 @@ class Slab:
             ModelError: if one is not positive.
         """
         if not (mass > 0 and stiffness > 0):
-            raise ModelError(f"no slab has mass {mass} kg, stiffness {stiffness} N/m; give more.")
+            raise ModelError(f"no slab has the mass {mass} kg and the stiffness {stiffness} N/m.")
         return cls(np.array([mass**-0.5]), np.array([np.sqrt(stiffness / mass)]), **more)
 
     @classmethod

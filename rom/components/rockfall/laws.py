@@ -177,7 +177,9 @@ class CushionForce:
 
     def __init__(self, cushion: Resistance, down: Any, gap: float, reach: float = np.inf):
         if not (0.0 <= gap < np.inf and reach > 0.0):
-            raise ConfigError(f"gap = {gap} m, reach = {reach} m: needed are gap >= 0, reach > 0.")
+            raise ConfigError(
+                f"gap = {gap} m, reach = {reach} m: needed are gap >= 0 and reach > 0."
+            )
         self.cushion, self.down = cushion, unit_vector("down", down)
         self.gap, self.reach = gap, reach
         self.t, self.trial, self.deepest = -np.inf, 0.0, 0.0
@@ -191,5 +193,5 @@ class CushionForce:
         aside = float(np.linalg.norm(arm - (arm @ self.down) * self.down))
         if self.trial > 0.0 and aside > self.reach:
             raise ConfigError(f"the boulder comes down {aside:.3g} m aside at t = {t:.4g} s, "
-                              f"but the slab reaches {self.reach:g} m.")  # fmt: skip
+                              f"beyond the slab, which reaches {self.reach:g} m.")  # fmt: skip
         return -self.cushion.force(self.trial, self.deepest) * self.down, np.zeros(3)

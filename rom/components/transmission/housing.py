@@ -87,9 +87,7 @@ class Housing:
             ModelError: naming what is missing, or does not fit.
         """
         if self.M.shape != self.K.shape or self.M.shape != (self.n, self.n):
-            raise ModelError(
-                f"a housing of {self.M.shape} mass must have as much stiffness, not {self.K.shape}."
-            )
+            raise ModelError(f"a housing of {self.M.shape} mass has {self.K.shape} stiffness.")
         for name, held, there in zip(("pinion", "gear"), bearings, self.bushes, strict=True):
             if set(held) != set(there):
                 raise ModelError(

@@ -75,11 +75,11 @@ class Shaft:
         z = np.asarray(self.z, dtype=float)
         d, hole = (np.asarray(x, dtype=float) for x in (self.diameter, self.bore))
         if z.size < 2 or np.any(np.diff(z) <= 0) or np.any(d <= 0):
-            raise ModelError(f"no shaft has nodes at {z.tolist()} m and {d.tolist()} m > 0 wide.")
+            raise ModelError(f"no shaft has nodes at {z.tolist()} m and diameters {d.tolist()} m.")
         if np.any(hole < 0) or np.any(hole >= d):
-            raise ModelError(f"bores of {hole.tolist()} m must fit shafts of {d.tolist()} m.")
+            raise ModelError(f"bores of {hole.tolist()} m in shafts of {d.tolist()} m.")
         if any(not 0 <= disc.node < z.size for disc in self.discs):
-            raise ModelError(f"a disc must sit on one of {z.size} nodes.")
+            raise ModelError(f"a disc sits beyond the last of {z.size} nodes.")
 
     @property
     def n(self) -> int:

@@ -131,7 +131,7 @@ def _matrices(
     C = np.zeros_like(K)
     for node, support in supports.items():
         if not 0 <= node < shaft.n // 6:
-            raise ModelError(f"a bearing sits at node {node}, but there are {shaft.n // 6}.")
+            raise ModelError(f"a bearing sits at node {node}, beyond the last of {shaft.n // 6}.")
         at = slice(6 * node, 6 * node + 2)
         K[at, at] += _square(support.stiffness)
         C[at, at] += _square(support.damping)

@@ -118,7 +118,7 @@ class Transmission:
         for name, rotor in (("pinion", self.pinion), ("gear", self.gear)):
             nodes = rotor.shaft.nodes
             if not rotor.bearings or not all(0 <= k < nodes for k in (*rotor.bearings, rotor.end)):
-                raise ModelError(f"the {name} needs bearings at its {nodes} nodes.")
+                raise ModelError(f"the {name} has no bearings, or one beyond {nodes} nodes.")
         if self.housing is not None:
             self.housing.check(self.pinion.bearings, self.gear.bearings)
 
@@ -370,7 +370,9 @@ def _newton(
         residual = float(np.abs(R * scale).max() / np.abs(f * scale).max())
         if residual < RESIDUAL_RTOL:
             if not forces.mesh.load.any():
-                raise SolverError("contact is lost: no teeth touch.", hint="Raise the load.")
+                raise SolverError(
+                    "contact is lost: no teeth touch at rest.", hint="Raise the load."
+                )
             return q, forces, residual
         if not forces.mesh.stiffness.any():
             raise SolverError(

@@ -96,7 +96,7 @@ class Blading:
         if not ((self.chord > 0.0).all() and (self.length > 0.0).all() and self.density > 0.0
                 and self.n_blades >= 1):  # fmt: skip
             raise ConfigError("chords, lengths, the density of the air and the number of blades "
-                              "must be positive.")  # fmt: skip
+                              "are positive.")  # fmt: skip
         if not (abs(self.tilt) < np.pi / 4 and abs(self.cone) < np.pi / 4):
             raise ConfigError(f"a shaft tilted by {self.tilt:g} rad and blades coned by "
                               f"{self.cone:g} rad are beyond this model.",

@@ -107,7 +107,7 @@ def generator_torque(speed: float, pitch: float = 0.0) -> float:
         ConfigError: for a speed or a pitch that is not finite.
     """
     if not (math.isfinite(speed) and math.isfinite(pitch)):
-        raise ConfigError(f"no generator turns at {speed:g} rad/s and {pitch:g} rad, only > 0.")
+        raise ConfigError(f"no generator turns at {speed:g} rad/s with a pitch of {pitch:g} rad.")
     return float(torque_at(float(speed), float(pitch)))
 
 

@@ -159,9 +159,7 @@ class _Run:
             self.speed, self.control.pitch = self.held(t)
             check_pitch(self.control.pitch)
             if not 0.0 <= self.speed < math.inf:
-                raise ConfigError(
-                    f"the rotor must turn freely, but is held at {self.speed:g} rad/s, at {t:g} s."
-                )
+                raise ConfigError(f"the rotor is held at {self.speed:g} rad/s, at {t:g} s.")
         cone, tilt = self.cosines
         flow = (wind * cone * tilt, self.speed, self.control.pitch, 0.5 * self.blades.density)
         wake_step(self.given, flow, self.wake, dt if self.dynamic else 0.0, self.loads)

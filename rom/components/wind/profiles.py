@@ -82,7 +82,7 @@ class Profile:
         """
         ratio = number("chord_over_radius", chord_over_radius)
         if ratio < 0.0:
-            raise ConfigError(f"chord = {ratio:g} radii must be positive.")
+            raise ConfigError(f"a strip has no chord of {ratio:g} radii.")
         begins = np.flatnonzero((self.lift[:-1] <= 0.0) & (self.lift[1:] > 0.0))
         if not begins.size:
             return self

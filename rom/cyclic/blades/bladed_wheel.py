@@ -260,7 +260,9 @@ class BladedWheel:
             ModelError: if a motion has no stiffness.
         """
         if not 0.0 < damping < 1.0:
-            raise ConfigError(f"damping = {damping!r} must be a positive share of critical.")
+            raise ConfigError(
+                f"damping = {damping!r} must be a positive share of critical damping, below 1."
+            )
         check_damping_ratio(damping, "the wheel")
         N, sweep = self.sector.n_sectors, vector("omega", omega)
         if speed:
@@ -303,7 +305,7 @@ class BladedWheel:
         tuned = self.response(alike, one, at=seen, **sweep)
         peak, reference = (float(np.linalg.norm(u, axis=-1).max()) for u in (found, tuned))
         if not reference > 0.0:
-            raise ConfigError("the force does not move the tuned wheel there; choose other dofs.")
+            raise ConfigError("the force does not move the tuned wheel at the dofs wanted.")
         return peak / reference
 
 
@@ -324,7 +326,7 @@ def _on(blade: ReducedBlade, force: npt.ArrayLike, j: int) -> Array:
     f = np.asarray(force)
     if f.shape != (blade.Psi.shape[0],):
         raise ConfigError(
-            f"the force on blade {j} has the shape {f.shape}, needed are {blade.Psi.shape[0]} dofs."
+            f"the force on blade {j} has the shape {f.shape}, its model {blade.Psi.shape[0]} dofs."
         )
     off = np.flatnonzero((f != 0.0) & ~blade.Psi.any(axis=1))
     if off.size:

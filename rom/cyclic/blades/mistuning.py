@@ -103,7 +103,7 @@ class MistunedWheel:
         """
         lam, V = np.linalg.eigh(self.stiffness(deviations))
         if lam.min() < -1e-9 * lam.max():
-            raise ModelError("blades with these deviations leave a motion free; it must be held.")
+            raise ModelError("blades with these deviations leave a motion without stiffness.")
         kept = lowest(n)
         return Modes(np.sqrt(np.maximum(lam[..., kept], 0.0)), V[..., kept])
 
@@ -176,7 +176,7 @@ class MistunedWheel:
         drive, rows = self._drive(force, engine_order), self._rows(at)
         tuned = self._peaks(np.zeros((1, N)), drive, sweep, damping, rows)[0]
         if not tuned > 0.0:
-            raise ConfigError("the force does not move the tuned wheel there; choose other dofs.")
+            raise ConfigError("the force does not move the tuned wheel at the dofs wanted.")
         batch = max(1, AT_ONCE // (sweep.size * N * max(rows.shape[0], self.omega.size // N + 1)))
         peaks = [self._peaks(many[first : first + batch], drive, sweep, damping, rows)
                  for first in range(0, len(many), batch)]  # fmt: skip
@@ -186,7 +186,9 @@ class MistunedWheel:
         """(r,) force on each wave: N times that on its sector, if the harmonics agree."""
         f = np.asarray(force)
         if f.shape != (self.sector.n,):
-            raise ConfigError(f"the force has shape {f.shape}, needed are {self.sector.n} dofs.")
+            raise ConfigError(
+                f"the force has the shape {f.shape}, the sector {self.sector.n} dofs."
+            )
         N = self.sector.n_sectors
         met = (self.harmonics - engine_order) % N == 0
         return np.where(met, N * (self.shapes.conj().T @ f), 0.0)

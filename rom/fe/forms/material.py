@@ -34,10 +34,12 @@ def by_region(material: Any, regions: dict[str, int]) -> dict[int, Solid]:
             f"material = {material!r} is neither Material, Orthotropic nor a dictionary of them."
         )
     if unknown := [name for name in material if name not in regions]:
-        raise MaterialError(f"no region {named(unknown)}; the mesh has {offered(regions)}.")
+        raise MaterialError(
+            f"there is no region {named(unknown)}; the mesh has {offered(regions)}."
+        )
     for name, value in material.items():
         if not isinstance(value, Solid):
-            raise MaterialError(f"region {name!r} needs a rom.Material, got {value!r}.")
+            raise MaterialError(f"the material of region {name!r} is {value!r}.")
     if missing := sorted(set(regions) - set(material)):
         raise TagError(
             f"the region {named(missing)} has no material; materials are given for "

@@ -89,7 +89,9 @@ def read_apart(
         try:
             text = json.dumps(request | {"folder": str(folder)}, default=_plain)
         except TypeError as error:
-            raise ConfigError(f"parameters: only text, numbers: {error}.", where=where) from None
+            raise ConfigError(
+                f"parameters must be numbers or text: {error}.", where=where
+            ) from None
         (folder / "request.json").write_text(text)
         command = child.python("rom.fe.mesh.child", str(folder))
         done = child.run(command, limits=limits, variables=VARIABLES)

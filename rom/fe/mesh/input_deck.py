@@ -62,7 +62,9 @@ def input_deck(
     """
     one_of("step", step, STEPS)
     if missing := sorted(set(fixed) - set(mesh.facets)):
-        raise InterfaceError(f"{named(missing)} cannot be held; there are {offered(mesh.facets)}.")
+        raise InterfaceError(
+            f"{named(missing)} cannot be held; the interfaces are {offered(mesh.facets)}."
+        )
     _check_names(mesh.region_names.values())
     _check_names(mesh.facets)
     mesh = _of_degree(mesh, degree)
@@ -81,7 +83,7 @@ def _of_degree(mesh: SolidMesh, degree: int) -> SolidMesh:
     if degree not in (1, 2):
         raise ConfigError(f"degree = {degree!r}; decks have elements of degree 1 or 2.")
     if degree == 1 and mesh.cell_type == "tet10":
-        raise MeshError("the mesh has curved edges, which needs elements of degree 2.")
+        raise MeshError("the mesh has curved edges, which elements of degree 1 do not.")
     return _with_edges(mesh) if degree == 2 and mesh.cell_type == "tet4" else mesh
 
 

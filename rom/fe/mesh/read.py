@@ -288,7 +288,7 @@ def _check_request(path: Path, request: dict[str, Any], scale: float) -> None:
     reader = request["reader"]
     if request["parameters"] and reader not in GEOMETRIES:
         raise ConfigError(
-            f"a finished mesh takes no parameters, got {sorted(request['parameters'])}.",
+            f"a finished mesh has no parameters, got {sorted(request['parameters'])}.",
             where=str(path),
         )
     if request["faces"] and reader != "step":

@@ -58,7 +58,9 @@ def _refuse(mesh: SolidMesh, bad: Mask, text: Callable[[int], str], hint: str) -
 
 def _check_tables(mesh: SolidMesh) -> None:
     if mesh.cell_type not in CELL_TYPES:
-        raise MeshError(f"cells of type {mesh.cell_type!r} are not read; {sorted(CELL_TYPES)} are.")
+        raise MeshError(
+            f"cells of type {mesh.cell_type!r} are not supported; {sorted(CELL_TYPES)} are."
+        )
     kind, m = mesh.kind, mesh.cells.shape[0]
     if not m:
         raise MeshError("there are no volume cells: the geometry is not meshed.")
@@ -94,7 +96,7 @@ def _check_numbers(mesh: SolidMesh) -> None:
         raise MeshError(f"the body has a size of {size:.3g} m.", hint="Check the scale.")
     for name, rows in mesh.facets.items():
         if rows.min() < 0 or rows.max() >= n:
-            raise TagError(f"surface {name!r} must name nodes 0 to {n - 1}.")
+            raise TagError(f"surface {name!r} names nodes outside 0 to {n - 1}.")
 
 
 def _check_cells(mesh: SolidMesh) -> None:
@@ -205,10 +207,10 @@ def _check_regions(mesh: SolidMesh) -> None:
     if nameless := sorted(used - mesh.region_names.keys()):
         raise TagError(f"there is no name for region {named(nameless)}, which has cells.")
     if unused := sorted(name for tag, name in mesh.region_names.items() if tag not in used):
-        raise TagError(f"region {named(unused)} has no cells; leave its name out.")
+        raise TagError(f"region {named(unused)} has no cells.")
     names = list(mesh.region_names.values())
     if double := sorted({name for name in names if names.count(name) > 1}):
-        raise TagError(f"the name {named(double)} stands for several regions; use one each.")
+        raise TagError(f"the name {named(double)} stands for several regions.")
 
 
 def checked(mesh: SolidMesh, remarks: Sequence[str] = ()) -> SolidMesh:

@@ -32,7 +32,7 @@ def write_vtu(body: FlexibleBody, path: str | Path) -> Path:
         ResourceError: if the disk is full.
     """
     if body.surface is None:
-        raise ConfigError(f"body {body.name!r} has no surface; reduce it with one.")
+        raise ConfigError(f"body {body.name!r} has no surface to draw.")
     text = _document(body)
     write_whole(path, lambda file: file.write(text.encode()))
     return Path(path)
@@ -87,7 +87,7 @@ def write_stress_history(
     whole("every", every, 1)
     path = Path(path)
     if path.suffix != ".pvd":
-        raise ConfigError(f"{path} must end in .pvd.")
+        raise ConfigError(f"{path} does not end in .pvd.")
     part = solution.mechanism.part(body)
     folder, lines = path.with_suffix(""), []
     for k in range(0, solution.t.size, every):

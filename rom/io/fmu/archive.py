@@ -101,9 +101,11 @@ def _library(sources: dict[str, bytes], names: tuple[str, ...]) -> bytes:
             command, folder=folder, limits=Limits(seconds=COMPILE_TIME_LIMIT), variables=variables
         )
         if done.overtime:
-            raise ResourceError(f"{compiler} must compile the FMU within {COMPILE_TIME_LIMIT:g} s.")
+            raise ResourceError(
+                f"{compiler} has not compiled the FMU within {COMPILE_TIME_LIMIT:g} s."
+            )
         if done.code:
-            raise ResourceError(f"{compiler} must compile the FMU: {done.err.strip()}")
+            raise ResourceError(f"{compiler} cannot compile the FMU: {done.err.strip()}")
         return (folder / "out.so").read_bytes()
 
 

@@ -54,7 +54,7 @@ def write_radioss(
     if set(labels) != set(form.names) or len(set(labels.values())) < len(labels):
         raise ConfigError(f"nodes {labels} are not one for each interface of {form.names}.")
     if not all(0 < label < 10**10 for label in labels.values()):
-        raise ConfigError(f"labels of nodes need 1 to 10 digits, got {labels}.")
+        raise ConfigError(f"labels of nodes have 1 to 10 digits, got {labels}.")
     dofs = form.dofs.copy()
     dofs[:, 0] = np.repeat([labels[name] for name in form.names], 6)
     return write_dmig({"KAAX": form.K, "MAAX": form.M}, dofs, path)

@@ -58,7 +58,7 @@ def read_responses(
         from rom.io.responses.arrays import read
 
         if averages is not None or coherence is not None or points is not None:
-            raise ConfigError(f"{path} says averages, coherence and points itself; leave them out.")
+            raise ConfigError(f"{path} says averages, coherence and points itself.")
         with _of(path):
             return read(path)
     if ending not in UNIVERSAL_ENDINGS + TABLE_ENDINGS:

@@ -115,7 +115,9 @@ def _functions(
         first, second = ("real", "imag") if "real" in own else ("magnitude", "phase")
         (unit, a), (other, b) = own[first], own[second]
         if first == "real" and other != unit:
-            raise FileFormatError(f"of {pair} units are {unit!r} and {other!r}.", where=str(path))
+            raise FileFormatError(
+                f"of {pair} the units are {unit!r} and {other!r}.", where=str(path)
+            )
         if first == "magnitude" and other not in ANGLES:
             raise FileFormatError(
                 f"of {pair} the phase has the unit {other!r}.", where=str(path), hint=NAME_HINT

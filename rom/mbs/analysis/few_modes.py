@@ -72,7 +72,9 @@ class Wanted:
             ConfigError, ModelError: if there are none, or fewer.
         """
         if self.n > roots.size:
-            raise ConfigError(f"n = {self.n}, but the joints leave {roots.size} motions and modes.")
+            raise ConfigError(
+                f"n = {self.n}, but the joints leave {roots.size} motions and as many modes."
+            )
         low, high = self.band
         kept = np.flatnonzero((roots.imag >= low) & (roots.imag < high))
         if not kept.size:

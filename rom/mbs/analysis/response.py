@@ -144,7 +144,7 @@ def transmissibility(
 
 def _refuse_moving(state: State) -> None:
     if state.v.any():
-        raise ModelError("transmissibility needs a mechanism at rest; this one moves.")
+        raise ModelError("transmissibility is that of a mechanism at rest; this one moves.")
 
 
 @dataclass(frozen=True)
@@ -227,7 +227,7 @@ def _infinite(f: float) -> SolverError:
 
 
 def _blocked(drive: str) -> ModelError:
-    return ModelError("the other joints must let this drive move.", where=drive)
+    return ModelError("the other joints do not let this drive move.", where=drive)
 
 
 def _forced(G: Array, packed: Any, drive: str, scale: Array) -> Array:

@@ -54,7 +54,7 @@ def ends_of(whole: Whole, name: str, m1: Marker, m2: Marker) -> Ends:
     whole.check_new(name)
     whole.check_markers(name, m1, m2)
     if m1.body == m2.body:
-        raise ConfigError(f"joint {name!r} connects body {m1.body!r} with itself; give two.")
+        raise ConfigError(f"joint {name!r} connects body {m1.body!r} with itself.")
     A1, A2 = (rotation.matrix(whole.part(m.body).p) for m in (m1, m2))
     return Ends(name, (m1, m2), (A1, A2), whole.design_point(m2) - whole.design_point(m1))
 

@@ -88,7 +88,7 @@ def bushing(  # noqa: PLR0913  one keyword per property
         ConfigError: for matrices without an energy, or tables that do not ascend.
     """
     if m1.body == m2.body:
-        raise ConfigError(f"bushing {name!r} connects body {m1.body!r} with itself; give two.")
+        raise ConfigError(f"bushing {name!r} connects body {m1.body!r} with itself.")
     world = rotation.matrix(unit_quaternion(axes))
     A1, A2 = (rotation.matrix(self.part(m.body).p) for m in (m1, m2))
     gap = self.design_point(m2) - self.design_point(m1)
@@ -122,7 +122,9 @@ def _curve(name: str, direction: str, table: Any) -> tuple[int, Array]:
     n = np.size(table[0])
     x, force = (finite(f"curve {direction} of {name}", values, (n,)) for values in table)
     if n < 2 or np.diff(x).min() <= 0.0:
-        raise ConfigError(f"curve {direction} of bushing {name!r} needs two or more that ascend.")
+        raise ConfigError(
+            f"curve {direction} of bushing {name!r} needs two or more ascending displacements."
+        )
     cubic = PchipInterpolator(x, force)
     energy = cubic.antiderivative()
     slopes = cubic.derivative()(x[[0, -1]])

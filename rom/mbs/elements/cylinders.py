@@ -99,7 +99,10 @@ def cylinder_of(part: Part, marker: Marker, axis: Array, across: Array) -> Cylin
     local = (patch.points - surface.point) @ axes.T
     theta, z = np.arctan2(local[:, 1], local[:, 0]), local[:, 2]
     if not np.ptp(z) > 0.0:
-        raise ConfigError(f"interface {marker.place!r} of {part.name!r} needs length on the axis.")
+        raise ConfigError(
+            f"interface {marker.place!r} of {part.name!r} is flat across the axis: no forces can "
+            "be spread along it."
+        )
     harmonics, order = _numbers(surface.kind)
     middle, half = 0.5 * (z.max() + z.min()), 0.5 * float(np.ptp(z))
     found = Cylinder(harmonics, order, middle, half, axes, np.zeros((0, 3, 0)), 0.0)

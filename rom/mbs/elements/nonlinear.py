@@ -154,7 +154,7 @@ class Assembly:
                 f"{offered(self.body.places, place)} and frames 0 to {len(self.parts) - 1}."
             )
         if not -len(self.parts) <= frame < len(self.parts):
-            raise ConfigError(f"body {self.name!r} has {len(self.parts)} frames, not {frame}.")
+            raise ConfigError(f"body {self.name!r} has {len(self.parts)} frames, no {frame}.")
         return self.parts[frame].marker((0.0, 0.0, 0.0))
 
     @property
@@ -238,14 +238,14 @@ def _check(name: str, body: Any) -> None:
             where=name,
         )
     if np.abs(np.linalg.norm(frames.p, axis=1) - 1.0).max() > QUATERNION_ATOL:
-        raise ModelError("quaternions of frames must have the length one.", where=name)
+        raise ModelError("a quaternion of a frame has not the length one.", where=name)
     for group in body.elements:
         if group.frames.ndim != 2 or len(group.frames) != len(group.numbers):
-            raise ModelError("as many numbers as elements are needed.", where=name)
+            raise ModelError("elements and their numbers differ in number.", where=name)
         if group.frames.min(initial=0) < 0 or group.frames.max(initial=0) >= n:
-            raise ModelError(f"elements must connect frames below {n}.", where=name)
+            raise ModelError(f"an element connects a frame beyond the {n} there are.", where=name)
         if not group.address:
-            raise ModelError("elements need a compiled law.", where=name)
+            raise ModelError("elements have no compiled law.", where=name)
 
 
 @table

@@ -47,7 +47,7 @@ def rotational_spring(
         ConfigError: for a name in use, or a joint that is unknown or does not turn.
     """
     if joint_with_axis(self.joints, joint, "rotational spring").turn is None:
-        raise ConfigError(f"joint {joint!r} does not turn; it must, for {name!r}.")
+        raise ConfigError(f"joint {joint!r} does not turn: no rotational spring {name!r}.")
     k, c = stiffness_and_damping(name, stiffness, damping)
     self.add(name, Turn(joint, k, c, number("free_angle", free_angle)), TURNS_FAMILY)
 

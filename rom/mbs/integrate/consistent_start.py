@@ -316,7 +316,7 @@ def check_velocity(packed: Packed, W: Work, v: Array, given: Array | None = None
     k = int(np.argmax(miss / np.maximum(size, 1e-300)))
     if miss[k] > 1e-8 * size[k]:
         raise ModelError(
-            f"the velocities of joints and drives must agree: "
+            f"the velocities of joints and drives contradict each other: "
             f"{packed.row_owner[k]!r} misses {miss[k]:.3g}.",
             where=packed.row_owner[k],
             hint="Let drives go as fast as what was given, or leave them out.",

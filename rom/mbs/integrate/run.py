@@ -143,7 +143,7 @@ class Settings:
         if self.stabilised and self.method == "dop853":
             raise ConfigError(
                 "stabilised is for implicit methods; dop853 keeps the constraints of velocities "
-                "to the tolerance of its steps; leave it out."
+                "to the tolerance of its steps."
             )
 
     @property

@@ -101,7 +101,9 @@ class Part:
             check_known(place, self.names, f"body {self.name!r} has no marker {place!r}; it has")
             return Marker(self.name, place)
         if self.flexible is not None:
-            raise ConfigError(f"body {self.name!r} is flexible: it has {sorted(self.names)}.")
+            raise ConfigError(
+                f"body {self.name!r} is flexible: its markers are {sorted(self.names)}."
+            )
         point = finite(f"marker of {self.name}", place, (3,))
         return Marker(self.name, (float(point[0]), float(point[1]), float(point[2])))
 
@@ -294,7 +296,7 @@ def moving_start(part: Part) -> tuple[Array, Array]:
 def _check_mass(part: Part) -> None:
     M = mass_at_rest(part)
     if not np.isfinite(M).all() or np.diag(M).min() <= 0.0:
-        raise ModelError("the mass matrix must be that of a body in its frame.", where=part.name)
+        raise ModelError("the mass matrix has entries that no body has.", where=part.name)
     scale = 1 / np.sqrt(np.diag(M))
     spectrum = np.linalg.eigvalsh(M * scale * scale[:, None])
     if spectrum[0] < SINGULAR_MASS * spectrum[-1]:

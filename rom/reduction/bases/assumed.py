@@ -64,7 +64,9 @@ class AssumedModes:
         R = orthonormal(ops, given_rigid_motions(ops))
         support = ops.hold(self.held)
         if self.n_modes > support.n_free:
-            raise ConfigError(f"n_modes = {self.n_modes}, but supports free {support.n_free} dofs.")
+            raise ConfigError(
+                f"n_modes = {self.n_modes}, but the supports leave {support.n_free} dofs."
+            )
         omega, Phi = lowest_modes(ops, support, self.n_modes)
         names = [*numbered("rigid", R.shape[1]), *numbered("assumed", omega.size)]
         return Basis(np.hstack([R, Phi]), omega, tuple(names))

@@ -60,7 +60,7 @@ class BalancedTruncation:
             ModelError: if the pool with its damping is not stable.
         """
         if boundary.size == 0:
-            raise ConfigError("the method holds interfaces of the body, and needs one.")
+            raise ConfigError("the method holds the interfaces of the body, and none is given.")
         held = ops.hold(boundary)
         Psi_b = constraint_modes(ops, held, boundary)
         pool = min(3 * self.n_modes if self.pool is None else self.pool, held.n_free)
@@ -125,7 +125,7 @@ def second_order_balanced_truncation(
     n = K.shape[0]
     if any(A.shape != (n, n) for A in (K, M, D)) or B.shape[0] != n or C.shape[1] != n:
         raise ConfigError(
-            f"K, M, D, B, C {K.shape} {M.shape} {D.shape} must fit {B.shape} {C.shape}."
+            f"shapes do not fit: K {K.shape}, M {M.shape}, D {D.shape}, B {B.shape}, C {C.shape}."
         )
     whole("r", r)
     if not 1 <= r <= n:
@@ -159,7 +159,7 @@ def _gramian_factors(K: Array, M: Array, D: Array, B: Array, C: Array) -> tuple[
          [-np.linalg.solve(M, K) / scale**2, -np.linalg.solve(M, D) / scale]]
     )  # fmt: skip
     if np.linalg.eigvals(A).real.max() >= 0.0:
-        raise ModelError("the system is not stable, which Gramians need; give damping.")
+        raise ModelError("the system is not stable: its Gramians do not exist.")
     b = np.vstack([np.zeros_like(B), np.linalg.solve(M, B) / scale**2])
     c = np.hstack([C, np.zeros_like(C)])
     P = solve_continuous_lyapunov(A, -b @ b.T)[:n, :n]

@@ -46,7 +46,7 @@ class EnhancedCraigBampton:
             InterfaceError: if the interfaces leave a rigid motion free.
         """
         if boundary.size == 0:
-            raise ConfigError("the method holds interfaces of the body, and needs one.")
+            raise ConfigError("the method holds the interfaces of the body, and none is given.")
         held = ops.hold(boundary)
         Psi_b = constraint_modes(ops, held, boundary)
         omega, Phi = ops.modes(held, self.n_modes)

@@ -218,4 +218,4 @@ def _check_boundary(boundary: Index, n: int) -> None:
             hint='Name one, for example interfaces={"pin_a": "rbe2"}.',
         )
     if boundary.ndim != 1 or boundary.min() < 0 or boundary.max() >= n:
-        raise ConfigError(f"boundary must be a row of numbers from 0 to {n - 1}.")
+        raise ConfigError(f"boundary holds no row of numbers from 0 to {n - 1}.")

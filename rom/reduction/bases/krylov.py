@@ -44,7 +44,9 @@ class MomentMatching:
         if not f.size:
             raise ConfigError("MomentMatching needs a frequency.")
         if not (np.isfinite(f) & (f >= 0)).all() or np.unique(f).size < f.size:
-            raise ConfigError(f"frequencies = {self.frequencies!r}: must differ, from 0 Hz on.")
+            raise ConfigError(
+                f"frequencies = {self.frequencies!r}: needed are different numbers from 0 Hz."
+            )
 
     def basis(self, ops: Operators, boundary: Index, labels: tuple[str, ...]) -> Basis:
         """The basis: columns of the interface dofs (n_b,), then modes of the inner part.
@@ -55,7 +57,7 @@ class MomentMatching:
             SolverError: if a frequency is a natural one of the body with its interfaces held.
         """
         if boundary.size == 0:
-            raise ConfigError("the method holds interfaces of the body, and needs one.")
+            raise ConfigError("the method holds the interfaces of the body, and none is given.")
         E, still = unit_motions(ops, boundary), ops.hold(boundary)
         blocks, Psi_b = [], E - still(ops.apply_K(E))
         for f in self.frequencies:

@@ -44,7 +44,7 @@ class WithLoads:
         basis = self.method.basis(ops, boundary, labels)
         n_b = boundary.size
         if basis.labels[:n_b] != labels:
-            raise ConfigError(f"{self.method!r} has no constraint modes, which loads need.")
+            raise ConfigError(f"{self.method!r} has no constraint modes to which loads could join.")
         outer, inner = basis.Psi[:, :n_b], basis.Psi[:, n_b:]
         held = ops.hold(boundary) if basis.held is None else basis.held
         answers = held(F)
@@ -68,5 +68,7 @@ class WithLoads:
         F = np.asarray(self.loads, dtype=float)
         n = ops.expand(np.zeros((ops.n_local, 1))).shape[0]
         if F.ndim != 2 or F.shape[0] != n or not np.isfinite(F).all():
-            raise ConfigError(f"loads have the shape {F.shape}; needed are finite ({n}, k).")
+            raise ConfigError(
+                f"loads have the shape {F.shape}; needed are finite forces of the shape ({n}, k)."
+            )
         return ops.restrict(F)

@@ -91,12 +91,12 @@ class CraigBampton:
             raise ConfigError(f"f_max = {self.f_max!r} Hz is not a positive frequency.")
         if self.tol is not None and (self.n_modes is not None or not 0 < self.tol < 1):
             raise ConfigError(
-                f"tol = {self.tol!r} is a relative error below 1, in place of n_modes."
+                f"tol = {self.tol!r} is a relative error between 0 and 1, in place of n_modes."
             )
 
         one_of("search", self.search, (LANCZOS_SEARCH, SUBSTRUCTURE_SEARCH))
         if self.search == SUBSTRUCTURE_SEARCH and (self.f_max is None or self.tol is not None):
-            raise ConfigError('search="substructures" needs f_max in place of tol.')
+            raise ConfigError('search="substructures" finds modes up to f_max, without tol.')
 
     @property
     def chooses(self) -> bool:

@@ -48,7 +48,7 @@ class Snapshots:
                 hint="One column per snapshot, x y z node by node.",
             )
         if not X.any():
-            raise ConfigError(f"all {X.shape[1]} snapshots are zero; a motion is needed.")
+            raise ConfigError(f"all {X.shape[1]} snapshots are zero: they show no motion.")
         if (self.energy is None) == (self.n is None):
             raise ConfigError(
                 "Snapshots needs either energy or n.", hint="energy=0.9999 keeps almost all."

@@ -199,7 +199,7 @@ def wound(line: npt.ArrayLike, diameter: float, wire: float, *, turns: float = 6
         ConfigError: if the points are no curve, or the wire is thicker than its bends allow.
     """
     if not 0.0 < wire < diameter:
-        raise ConfigError(f"a wire of {wire:g} m must be thinner than a coil of {diameter:g} m.")
+        raise ConfigError(f"a wire of {wire:g} m makes no coil of {diameter:g} m.")
     X, s = _curve(line)
     even = np.linspace(0.0, s[-1], int(np.ceil(COIL_POINTS * turns)) + 1)
     X = np.column_stack([np.interp(even, s, x) for x in X.T])
@@ -219,7 +219,7 @@ def _curve(line: npt.ArrayLike) -> tuple[Array, Array]:
         raise ConfigError(f"the line of a tube is (k, 3) with k > 1, got {X.shape}.")
     lengths = np.linalg.norm(np.diff(X, axis=0), axis=1)
     if not (lengths > 0.0).all():
-        raise ConfigError("two points of the line of a tube need a distance.")
+        raise ConfigError("two points of the line of a tube are in one place.")
     return X, np.concatenate([[0.0], np.cumsum(lengths)])
 
 
@@ -258,13 +258,13 @@ def extruded(outline: npt.ArrayLike, width: float, *, bore: float = 0.0) -> Mesh
     Q = np.roll(P, -1, axis=0)
     turning = P[:, 0] * Q[:, 1] - P[:, 1] * Q[:, 0]
     if not (turning > 0.0).all():
-        raise ConfigError("the outline must turn counter-clockwise about the origin.")
+        raise ConfigError("the outline does not turn counter-clockwise about the origin.")
     d = Q - P
     foot = np.clip(-np.sum(P * d, axis=1) / np.sum(d * d, axis=1), 0.0, 1.0)
     nearest = float(np.linalg.norm(P + foot[:, None] * d, axis=1).min())
     if not 0.0 <= bore < 2 * nearest:
         raise ConfigError(
-            f"a bore of {bore:g} m must be below the {nearest:g} m of the outline from the origin."
+            f"a bore of {bore:g} m does not fit into an outline {nearest:g} m from the origin."
         )
     if bore:  # as many points as a round hole needs
         k = -(-BORE_SIDES // len(P))
@@ -322,7 +322,7 @@ def gear_outline(teeth: int, module: float, pressure_angle: float, points: int =
     if teeth < 6 or not involute(np.arccos(base / top)) < half:
         raise ConfigError(
             f"{teeth} teeth of a pressure angle of {np.rad2deg(pressure_angle):g} degrees are "
-            "pointed, or too few; more are needed."
+            "pointed, or too few."
         )
     r = np.linspace(max(base, root), top, points)
     flank = involute(np.arccos(np.minimum(base / r, 1.0))) - half
@@ -362,7 +362,7 @@ def across(a: npt.ArrayLike, b: npt.ArrayLike) -> tuple[Array, Array, Array]:
     z = np.asarray(b, dtype=float) - np.asarray(a, dtype=float)
     length = np.linalg.norm(z)
     if not length > 0.0:
-        raise ConfigError(f"two points in one place, {a!r}, need a distance for a direction.")
+        raise ConfigError(f"two points in one place, {a!r}, have no direction.")
     z = z / length
     x = np.cross(z, np.eye(3)[np.argmin(np.abs(z))])
     x = x / np.linalg.norm(x)

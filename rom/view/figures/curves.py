@@ -104,7 +104,7 @@ def _histories(axes: Any, t: Array, curves: dict[str, Any], numbers: Sequence[in
             values = _rows(axes, values)
         x, y = (np.asarray(v, dtype=float) for v in (values if pair else (t, values)))
         if y.shape != x.shape:
-            raise ConfigError(f"{name!r} has {y.size} values; {x.size} times need one each.")
+            raise ConfigError(f"{name!r} has {y.size} values for {x.size} times.")
         lines.append((x, y))
     flat = without_round_off([y for _, y in lines])
     for k, (name, (x, _), y) in enumerate(zip(curves, lines, flat, strict=True)):
@@ -237,7 +237,7 @@ def convergence(
             for k, (name, (sizes, errors)) in enumerate(curves.items()):
                 x, y = np.asarray(sizes, dtype=float), np.asarray(errors, dtype=float)
                 if x.shape != y.shape:
-                    raise ConfigError(f"{name!r} has {y.size} errors, not {x.size}.")
+                    raise ConfigError(f"{name!r} has {y.size} errors for {x.size} sizes.")
                 look = {"color": LINES[k % len(LINES)], "marker": MARKERS[k % len(MARKERS)]}
                 axes.loglog(x, np.maximum(np.abs(y), MIN_ERROR), label=name, **look)
             axes.set_xlabel(xlabel, size=page.BODY_SIZE)
@@ -292,7 +292,7 @@ def campbell(  # noqa: PLR0913  keywords of one picture
         for values in (diagram.frequencies, 100 * diagram.damping_ratios)
     )
     if names and len(names) != f.shape[1]:
-        raise ConfigError(f"{len(names)} names; {f.shape[1]} modes need one each.")
+        raise ConfigError(f"{len(names)} names for {f.shape[1]} modes.")
     labels = names or [f"mode {k + 1}" for k in range(f.shape[1])]
     turns = 30 * diagram.speeds / np.pi
     damped = np.abs(damping).max(initial=0.0) > 1e-3

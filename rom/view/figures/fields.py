@@ -97,7 +97,7 @@ def plane(
     """
     path = page.wanted(path)
     if not drawings:
-        raise ConfigError("there is nothing to draw; give a field.")
+        raise ConfigError("there is nothing to draw.")
     if ax is not None:
         figure, areas = page.taken(ax, len(drawings), "plane")
         for axes, drawing in zip(areas, drawings, strict=True):

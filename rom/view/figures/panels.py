@@ -211,5 +211,5 @@ def _draw_bars(axes: Any, bars: Mapping[str, tuple[float, float]], ends: Any) ->
 def _paired(name: str, line: Line) -> Line:
     x, y = (np.atleast_1d(np.asarray(values, dtype=float)) for values in line)
     if x.shape != y.shape:
-        raise ConfigError(f"{name!r} has {y.size} values; {x.size} places need one each.")
+        raise ConfigError(f"{name!r} has {y.size} values for {x.size} places.")
     return x, y

@@ -99,7 +99,7 @@ def deformed(  # noqa: PLR0913  keywords of one picture
         return page.save(figure, path)
     left = PAGE_WIDTH - 30 - sum(s.width + 30 for s in shapes)
     if left < 400:
-        raise ConfigError(f"{len(shapes)} shapes leave {left} pixels for the curves; fewer fit.")
+        raise ConfigError(f"{len(shapes)} shapes leave {left} pixels for the curves.")
     with page.styled():
         figure = page.titled(PAGE_WIDTH, 225 + PANEL_HEIGHT, title, caption)
         axes = page.area(figure, 110, 120, left - 140, PANEL_HEIGHT)
@@ -161,7 +161,7 @@ def flow(
     """
     path = wanted(path)
     if len(times) != len(shapes):
-        raise ConfigError(f"{len(times)} times; {len(shapes)} shapes need one each.")
+        raise ConfigError(f"{len(times)} times for {len(shapes)} shapes.")
     highest = max(float(s.values.max()) for s in shapes if s.values is not None)
     everything = np.concatenate([s.points for s in shapes])
     frame = np.array([everything.min(axis=0), everything.max(axis=0)])

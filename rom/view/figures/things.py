@@ -106,7 +106,7 @@ def plates(
         raise ConfigError("there is no plate, or their corners differ from picture to picture.")
     per_plate = None if values is None else np.atleast_1d(np.asarray(values, dtype=float))
     if per_plate is not None and per_plate.shape != (len(counts),):
-        raise ConfigError(f"{len(counts)} plates need one value each, got {per_plate.shape}.")
+        raise ConfigError(f"{len(counts)} plates have {per_plate.shape} values.")
     of_points = None if per_plate is None else np.repeat(per_plate, counts)
     points = np.stack([joined(still)[0] for still in frames])
     return Thing(points, joined(frames[0])[1], colour, values=of_points)
@@ -148,7 +148,7 @@ def film(
     actors = actors_of(scene)
     frames = max(len(actor.points) for actor in actors)
     if t.shape != (frames,):
-        raise ConfigError(f"{t.size} times, not {frames} as {scene.title!r} has.")
+        raise ConfigError(f"{t.size} times for {frames} pictures of {scene.title!r}.")
     camera = aimed(_seen(actors), FILM_WIDTH, view=scene.view, up=scene.up, heights=HEIGHTS)
     limits = scene.limits or _limits(actors)
     images = render(actors, camera, limits=limits, oversampling=1)
@@ -205,7 +205,7 @@ def actors_of(scene: Scene) -> list[Actor]:
     for (name, thing), colour in zip(scene.things.items(), _colours(scene).values(), strict=True):
         drawn += thing_actors(name, thing, colour)
     if not drawn:
-        raise ConfigError(f"there is nothing to draw in {scene.title!r}; it needs a thing.")
+        raise ConfigError(f"there is nothing to draw in {scene.title!r}.")
     return drawn
 
 
@@ -226,7 +226,7 @@ def thing_actors(name: str, thing: Thing | Mesh, colour: str) -> list[Actor]:
                           f", got {cells.dtype} {cells.shape}.")  # fmt: skip
     values = None if thing.values is None else np.atleast_2d(np.asarray(thing.values, dtype=float))
     if values is not None and values.shape not in ((1, n), points.shape[:2]):
-        raise ConfigError(f"{name!r} has {values.shape} values, not {points.shape[:2]}.")
+        raise ConfigError(f"{name!r} has {values.shape} values for {points.shape[:2]} points.")
     if values is not None:
         values = np.broadcast_to(values, points.shape[:2])
     body = Actor(points, cells, values, colour, thing.width, thing.opacity)

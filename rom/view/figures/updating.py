@@ -63,7 +63,7 @@ def updating(  # noqa: PLR0913  keywords of one picture
     for name, (own, values) in lines.items():
         if np.shape(values) != np.shape(own):
             raise ConfigError(
-                f"{name!r} has {np.size(values)} values; {np.size(own)} frequencies need one each."
+                f"{name!r} has {np.size(values)} values for {np.size(own)} frequencies."
             )
     scene = structure if isinstance(structure, Scene) else _frame(*structure)
     if ax is not None:

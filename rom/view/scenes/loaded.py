@@ -119,10 +119,10 @@ def tooth_walls(
     """
     upright, scale = finite("direction", direction, (3,)), positive("scale", scale)
     if not upright.any():
-        raise ConfigError("the direction of the walls must not be zero.")
+        raise ConfigError("the direction of the walls is zero.")
     loads = tooth_loads(solution, name)[at]
     if not loads.force.any():
-        raise ConfigError(f"no tooth of {name!r} bears at that instant; choose another.")
+        raise ConfigError(f"no tooth of {name!r} bears at that instant.")
     mesh = solution.mechanism.gear_meshes[name]
     places = moving(solution.mechanism, solution, [at], 1.0)
     axes, middle = _axes(places, mesh), places.point(mesh.i)[0]

@@ -47,7 +47,7 @@ def mode_shapes(
     """
     path = page.wanted(path)
     if body.surface is None:
-        raise ConfigError(f"body {body.name!r} has no surface; reduce it with one.")
+        raise ConfigError(f"body {body.name!r} has no surface to draw.")
     body = body.in_units("SI")
     omega, V = body.modes(fixed=fixed)
     elastic = np.flatnonzero(omega > 0)[:n]

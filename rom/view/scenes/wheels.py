@@ -155,7 +155,7 @@ def _outside(model: FEModel, hidden: tuple[str, ...]) -> tuple[Index, Index]:
     """Nodes of the model on the outer surface of the wheel, and triangles between them."""
     surface = model.surface
     if surface is None:
-        raise ConfigError("a sector needs a surface to be drawn.")
+        raise ConfigError("a sector without a surface cannot be drawn.")
     inside = np.zeros(len(surface.triangles), dtype=np.bool_)
     for name in hidden:
         inside |= np.isin(surface.nodes[surface.triangles], model.interfaces[name].nodes).all(1)

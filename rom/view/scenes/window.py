@@ -53,7 +53,7 @@ def mode_scenes(body: Any, n: int, fixed: tuple[str, ...] = ()) -> list[Scene]:
         InterfaceError: if an interface is unknown.
     """
     if body.surface is None:
-        raise ConfigError(f"body {body.name!r} has no surface; reduce it with one.")
+        raise ConfigError(f"body {body.name!r} has no surface to draw.")
     body = body.in_units("SI")
     omega, V = body.modes(fixed=fixed)
     X, size = body.surface.points, np.ptp(body.surface.points, axis=0).max()

@@ -458,7 +458,7 @@ ABOVE = box((-1, 1), (2, 2))
         ({"tools": [Tool("pad", ABOVE[:2])]}, ConfigError, "'pad': an outline has three"),
         ({"tools": [Tool("pad", [*ABOVE, ABOVE[-1]])]}, ConfigError, "named twice"),
         ({"tools": [Tool("pad", ABOVE, 0.0, ((0, 1), (0, 1)))]}, ConfigError, r"'pad'.*\(2,\)"),
-        ({"loads": [Load(np.zeros((3, 2)))]}, ConfigError, "forces of load 0 of shape"),
+        ({"loads": [Load(np.zeros((3, 2)))]}, ConfigError, "forces of load 0 of the shape"),
         ({"loads": [Load(0 * SMALL.points, ((0, 0), (0, 1)))]}, ConfigError, "load 0: times"),
         ({"drives": [Drive([18], ((0,), (0,)))]}, ConfigError, "drive 0: dofs 18 to 18"),
         ({"drives": [Drive([3], ((0,), (0,))), Drive([3], ((0,), (1,)))]}, ConfigError, "twice"),

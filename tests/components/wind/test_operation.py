@@ -188,7 +188,7 @@ def test_a_gust_speeds_the_rotor_up_by_what_its_inertia_takes():
         ),
         (lambda: operate(recorded([0.0, 1.0, 2.0, 5.0], [8.0] * 4), 5.0), "a gap from 2 s to 5 s"),
         (lambda: operate(lambda t: 8.0, 1.0, held=lambda t: (np.nan, 0.0)), "held at nan"),
-        (lambda: operate(lambda t: 8.0, 1.0, held=lambda t: (1.0, 20.0)), "and 20 rad"),
+        (lambda: operate(lambda t: 8.0, 1.0, held=lambda t: (1.0, 20.0)), "pitch of 20 rad"),
     ],
 )
 def test_what_cannot_be_is_named(call, said):

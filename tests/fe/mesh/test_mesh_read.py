@@ -260,7 +260,7 @@ def test_reading_is_silent(capfd, folder):
         ({"parameters": {"lcc": 1.0}}, "no parameter 'lcc'"),
         ({"parameters": {"L": np.nan}}, "'L'"),
         ({"parameters": {"L": [1.0]}}, "'L'"),
-        ({"parameters": {"L": object()}}, "only text, numbers"),
+        ({"parameters": {"L": object()}}, "numbers or text"),
         ({"order": 3}, "order=3"),
         ({"scale": -1.0}, "scale=-1.0"),
         ({"faces": {"pin": (0, 0, 0)}}, "'pin'"),

@@ -270,7 +270,7 @@ def test_which_of_two_stable_motions_is_followed_the_start_says(exact, x, which)
 
 
 @pytest.mark.parametrize(("span", "more", "message"), [
-    ((1.0, 1.0), {}, "needs a length"),
+    ((1.0, 1.0), {}, "has no length"),
     ((1.0, 2.0), {"n": 1}, "n = 1"),
     ((1.0, 2.0), {"step": 0.0}, "step"),
     ((1.0, 2.0), {"period": lambda w: -w}, "period"),

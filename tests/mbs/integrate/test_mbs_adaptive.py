@@ -213,7 +213,7 @@ def test_velocities_of_drives_that_contradict_each_other_later_are_named():
             rate=lambda t, late=late: 1.0 + 1e6 * late * (t > 0.5) * np.cos(1e6 * (t - 0.5)),
             acceleration=lambda t: 0 * t,
         )
-    with pytest.raises(ModelError, match=r"must agree: 'drive (one|two)' misses .*e-07"):
+    with pytest.raises(ModelError, match=r"contradict each other: 'drive (one|two)' misses .*e-07"):
         simulate_quietly(mech, t_end=1.0, rtol=1e-3)
 
 

@@ -69,9 +69,9 @@ WRONG = {
         "j", box.marker("a"), box.marker("b")), ConfigError, "with itself"),
     "joint without marker": (lambda m, box, bar: m.spherical("j", box, bar), ConfigError,
                              "must be of type Marker"),
-    "axes must be at 90 degrees": (lambda m, box, bar: m.universal(
+    "axes not perpendicular": (lambda m, box, bar: m.universal(
         "j", box.marker("a"), bar.marker("a"), axis1=Z, axis2=(0, 1, 1)), ConfigError,
-        "must be at 90 degrees"),
+        "not perpendicular"),
     "drive of a ball": (lambda m, *_: m.drive("d", "ball", lambda t: t), ConfigError,
                         "'ball' is spherical"),
     "drive of nothing": (lambda m, *_: m.drive("d", "hunge", lambda t: t), ConfigError,

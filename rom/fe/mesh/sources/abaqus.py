@@ -202,7 +202,7 @@ def _regions(deck: Deck, ids: Index) -> tuple[dict[int, str], Index]:
         if (both := chosen & (regions > 0)).any():
             raise TagError(
                 f"element {ids[both][0]} is in the sections {names[regions[both][0]]!r} and "
-                f"{name!r}; it must be in one."
+                f"{name!r}."
             )
         regions[chosen] = number
     if not regions.all():

@@ -105,7 +105,9 @@ def positions(ids: Index, wanted: Index, what: str) -> Index:
         raise FileFormatError(f"no {what} is defined.")
     place = np.minimum(np.searchsorted(ordered, wanted), ordered.size - 1)
     if (missing := np.asarray(wanted)[ordered[place] != wanted]).size:
-        raise FileFormatError(f"{what} {named(np.unique(missing).tolist())} is used, not defined.")
+        raise FileFormatError(
+            f"{what} {named(np.unique(missing).tolist())} is used but not defined."
+        )
     return order[place]
 
 

@@ -134,7 +134,7 @@ def continuation(
     """
     first, last = finite("span", span, (2,))
     if first == last:
-        raise ConfigError(f"span = ({first:g}, {last:g}) s needs a length.")
+        raise ConfigError(f"span = ({first:g}, {last:g}) s has no length.")
     whole("n", n, 2, MAX_POINTS)
     longest = positive("step", step)
     now = instant(mechanism, first, sparse=True)

@@ -167,7 +167,7 @@ class Family:
         n = at.start.state.v.size
         period = at.period * (1 + step[-1]) if self.free else (period_at(self.period, p) or 0.0)
         if not 0.5 * at.period < period < 2 * at.period:
-            raise SolverError("the period changes by too much; a shorter step is needed.")
+            raise SolverError("the period changes by too much in a step.")
         flow = self.flow(p, period)
         start, scale = at.start, self.scale
         if self.last is not None:

@@ -69,7 +69,7 @@ class Spins:
         rolls = now.packed.system.rows.kind == ROLL
         if found.any and rolls.any():
             name = now.packed.row_owner[int(np.argmax(rolls))]
-            raise ModelError("what rolls and spins has no equilibrium; simulate it.", where=name)
+            raise ModelError("what rolls has no equilibrium while it spins.", where=name)
         return found
 
     @property

@@ -58,7 +58,7 @@ class Impact:
                 raise ConfigError(f"{name} = {getattr(self, name):g} must not be negative.")
         warn_outside(FRICTION, self.mu)
         if self.exponent < 1.0:
-            raise ConfigError(f"exponent = {self.exponent:g} is infinitely stiff; 1 is needed.")
+            raise ConfigError(f"exponent = {self.exponent:g} is below one: infinitely stiff.")
         self._check_spring()
         if (self.restitution is None) != (self.impact_speed is None):
             raise ConfigError(
@@ -67,7 +67,7 @@ class Impact:
             )
         if self.restitution is not None:
             if self.damping:
-                raise ConfigError(f"damping = {self.damping:g} and restitution: give only one.")
+                raise ConfigError(f"damping = {self.damping:g} and restitution exclude each other.")
             factor = damping_of(self.restitution, positive("impact_speed", self.impact_speed))
             object.__setattr__(self, "damping", factor)
 

@@ -183,7 +183,7 @@ def enter_contact(  # noqa: PLR0913  what the record holds
 ) -> None:
     """Add a contact whose axes are given in the world at the start; None where it has none."""
     if markers[0].body == markers[1].body:
-        raise ConfigError(f"contact {name!r} is of {markers[0].body!r} with itself; give two.")
+        raise ConfigError(f"contact {name!r} is of body {markers[0].body!r} with itself.")
     positive("radius", radius[0])
     directions = [
         np.zeros(3)

@@ -124,7 +124,7 @@ def _cover(
     if part.flexible is None:
         raise ConfigError(f"contact {name!r}: body {part.name!r} is rigid, it has no surface.")
     if part.name == m1.body:
-        raise ConfigError(f"contact {name!r} is of body {part.name!r} with itself; give two.")
+        raise ConfigError(f"contact {name!r} is of body {part.name!r} with itself.")
     law, e = checked_law(name, law, part, self.part(m1.body)), np.zeros(3)
     if axis is not None:
         world = unit_vector(f"axis of {name}", axis)

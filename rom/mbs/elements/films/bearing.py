@@ -108,7 +108,7 @@ class JournalBearing:
         if not 0 <= self.preload < 1:
             raise ModelError(f"preload {self.preload} leaves no room; it is from 0 to below 1.")
         if self.bore is not None and self.preload:
-            raise ModelError("a bearing has either a preload of two lobes, or a bore of its own.")
+            raise ModelError("a bearing has a preload of two lobes, or a bore of its own.")
         one_of("cavitation", self.cavitation, LAWS, error=ModelError)
         if self.cavitation == "jfo" and not self.grooves:
             raise ModelError(

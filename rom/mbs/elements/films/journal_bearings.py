@@ -109,7 +109,7 @@ def journal_bearing(  # noqa: PLR0913  one keyword per property
     """
     self.check_markers(name, journal, bush)
     if journal.body == bush.body:
-        raise ConfigError(f"bearing {name!r} is of body {journal.body!r} with itself; give two.")
+        raise ConfigError(f"bearing {name!r} is of body {journal.body!r} with itself.")
     z, x = _directions(name, axis, reference)
     turned = [matrix(self.part(side.body).p) for side in (journal, bush)]
     axes = np.array([z @ turned[0], z @ turned[1], x @ turned[1]])
@@ -137,7 +137,7 @@ def _directions(name: str, axis: npt.ArrayLike, reference: npt.ArrayLike | None)
     """(2, 3) axis, and direction from which angles count."""
     z = finite("axis", axis, (3,))
     if not np.linalg.norm(z) > 0.0:
-        raise ConfigError(f"the axis of bearing {name!r} is zero; give a direction.")
+        raise ConfigError(f"the axis of bearing {name!r} is zero.")
     z = z / np.linalg.norm(z)
     if reference is None:
         given = np.eye(3)[1 if abs(z[0]) > PARALLEL_COSINE else 0]
@@ -176,7 +176,7 @@ def _oil(name: str, oil: Oil | float, inlet: float | None) -> tuple[float, ...]:
         if inlet is None:
             raise ConfigError(f"bearing {name!r} has an oil, but no inlet temperature.")
         if not float(oil.viscosity(number("inlet", inlet))) > 0.0:
-            raise ConfigError(f"inlet = {inlet} of bearing {name!r} must not boil its oil.")
+            raise ConfigError(f"inlet = {inlet} of bearing {name!r}: its oil boils before.")
         return (0.0, *oil.law(), oil.density, oil.heat, float(inlet))
     if inlet is not None:
         raise ConfigError(
@@ -192,7 +192,7 @@ def _heat(name: str, carried: float, felt: float, lag: float) -> tuple[float, fl
     """Share of the heat that the temperature feels, and its lag."""
     for what, value in (("carried", carried), ("felt", felt)):
         if not 0.0 <= number(what, value) <= 1.0:
-            raise ConfigError(f"{what} = {value} of bearing {name!r} must be a share from 0 to 1.")
+            raise ConfigError(f"{what} = {value} of bearing {name!r} is a share from 0 to 1.")
     return float(carried) * float(felt), positive("thermal_time", lag)
 
 

@@ -75,7 +75,7 @@ class GearPair:
         check_numbers(self)
         if min(map(abs, self.teeth)) < 4 or not (self.module > 0 and self.width > 0):
             raise ModelError(
-                f"gears need more than {self.teeth} teeth, {self.module} m, {self.width} m."
+                f"no gears have {self.teeth} teeth of module {self.module} m, {self.width} m wide."
             )
         if not abs(self.helix) < 0.9 or not 0.1 < self.pressure_angle < 0.7:
             raise ModelError(

@@ -131,10 +131,10 @@ def gear_mesh(  # noqa: PLR0913  one keyword per property
         raise ConfigError(f"the wheels of mesh {name!r} have {pair.teeth} teeth: whole numbers.")
     self.check_markers(name, wheel_a, wheel_b)
     if wheel_a.body == wheel_b.body:
-        raise ConfigError(f"mesh {name!r} is of body {wheel_a.body!r} with itself; give two.")
+        raise ConfigError(f"mesh {name!r} is of body {wheel_a.body!r} with itself.")
     z = finite("axis", axis, (3,))
     if not np.linalg.norm(z) > 0.0:
-        raise ConfigError(f"the axis of mesh {name!r} is zero; give a direction.")
+        raise ConfigError(f"the axis of mesh {name!r} is zero.")
     z = z / np.linalg.norm(z)
     D = self.design_point(wheel_b) - self.design_point(wheel_a)
     _check_place(name, pair, D, z)
@@ -190,7 +190,7 @@ def _spins(
     if one and two and abs(z * one + w * two) > SPIN_RATIO_RTOL * abs(z * one):
         raise ConfigError(
             f"the wheels of mesh {name!r} spin at {one:.9g} and {two:.9g} rad/s about its axis: "
-            f"teeth {z} and {w} must turn at {one:.9g} and {-one * z / w:.9g}."
+            f"teeth {z} and {w} turn at {one:.9g} and {-one * z / w:.9g}."
         )
     return one, two
 
@@ -200,7 +200,7 @@ def _follows_energy(
 ) -> float:
     """1 for forces that follow the energy along the path, 0 for those along involutes."""
     if not 0.0 <= number("entry", entry) <= MAX_ENTRY:
-        raise ConfigError(f"entry = {entry:g} of mesh {name!r} must be from 0 to {MAX_ENTRY}.")
+        raise ConfigError(f"entry = {entry:g} of mesh {name!r} is a share from 0 to {MAX_ENTRY}.")
     jumps = entry == 0.0 and pair.helix == 0.0
     if conservative and jumps:
         raise ConfigError(
@@ -269,7 +269,9 @@ def _check_correction(name: str, pair: GearPair | RackPair, correction: Correcti
     """Refuse errors and maps of other wheels."""
     for errors, z in zip(correction.pitch, pair.teeth, strict=True):
         if len(errors) not in (0, abs(z)):
-            raise ConfigError(f"{len(errors)} pitch errors of {name!r} for {z} teeth; give {z}.")
+            raise ConfigError(
+                f"{len(errors)} pitch errors of {name!r} for {z} teeth: one per tooth."
+            )
         if not np.isfinite(np.asarray(errors, dtype=float)).all():
             raise ConfigError(f"pitch errors of {name!r} are not all finite numbers.")
     if isinstance(pair, RackPair) and correction.run_out[1][0] != 0.0:

@@ -68,10 +68,10 @@ def rolling_bearing(  # noqa: PLR0913  one keyword per property
     """
     self.check_markers(name, inner, outer)
     if inner.body == outer.body:
-        raise ConfigError(f"bearing {name!r} is of body {inner.body!r} with itself; give two.")
+        raise ConfigError(f"bearing {name!r} is of body {inner.body!r} with itself.")
     z = finite("axis", axis, (3,))
     if not np.linalg.norm(z) > 0.0:
-        raise ConfigError(f"the axis of bearing {name!r} is zero; give a direction.")
+        raise ConfigError(f"the axis of bearing {name!r} is zero.")
     if number("damping", damping) < 0.0:
         raise ConfigError(f"damping of bearing {name!r} is {damping:g}: it must not drive.")
     z = z / np.linalg.norm(z)

@@ -59,7 +59,7 @@ class BallBearing:
                 hint="Angles are in radians; a thrust bearing is not one of these.",
             )
         if not (self.E > 0 and -1 < self.nu <= 0.5):
-            raise ModelError(f"E = {self.E:g} Pa, nu = {self.nu:g}; needed are E > 0 and nu < 0.5.")
+            raise ModelError(f"no balls have E = {self.E:g} Pa and nu = {self.nu:g}.")
 
     @property
     def count(self) -> int:
@@ -135,7 +135,7 @@ class RollerBearing:
     def __post_init__(self) -> None:
         _check_row(self.rollers, self.roller_diameter, self.pitch_diameter, self.clearance)
         if not self.length > 0:
-            raise ModelError(f"rollers of length {self.length:g} m bear nothing; give more.")
+            raise ModelError(f"rollers of length {self.length:g} m bear nothing.")
 
     @property
     def count(self) -> int:
@@ -201,7 +201,9 @@ def _difference(m: float, wanted: float) -> float:
 def _check_row(number: int, diameter: float, pitch: float, clearance: float) -> None:
     """Refuse balls or rollers that do not fit on their circle."""
     if number < 3 or not (diameter > 0 and pitch > diameter):
-        raise ModelError(f"a bearing needs three or more that fit, not {number} of {diameter:g} m.")
+        raise ModelError(
+            f"no bearing has {number} balls or rollers of {diameter:g} m on one of {pitch:g} m."
+        )
     if diameter > pitch * np.sin(np.pi / number):
         raise ModelError(
             f"{number} balls or rollers of {diameter * 1e3:.4g} mm do not fit on a circle of "

@@ -148,7 +148,7 @@ def tendon(  # noqa: PLR0913  one keyword per property
         stiffness, loss = positive("EA", EA), _not_negative(name, "damping", damping)
         slack = length / (1.0 + _not_negative(name, "pretension", pretension) / stiffness)
         if pretension and free_length is not None:
-            raise ConfigError(f"tendon {name!r} has pretension and free_length; give only one.")
+            raise ConfigError(f"tendon {name!r} has both a pretension and a free_length.")
         function, given = _free(slack, free_length)
         numbers = (stiffness, loss, given, speed)
     self.add(name, Tendon(stations, numbers, EA is None, function), TENDONS_FAMILY)
@@ -163,11 +163,13 @@ def _station(whole: Whole, name: str, place: Any, friction: float) -> Station:
         return Station(place, np.eye(3)[:2], 0.0, mu, 0)
     whole.check_markers(name, place.marker)
     if not 0 <= place.turns <= MAX_TURNS:
-        raise ConfigError(f"turns = {place.turns} of a pulley of {name!r}: from 0 to {MAX_TURNS}.")
+        raise ConfigError(
+            f"turns = {place.turns} of a pulley of {name!r}: it has from 0 to {MAX_TURNS}."
+        )
     axis = finite("axis", place.axis, (3,))
     size = np.linalg.norm(axis)
     if size == 0.0:
-        raise ConfigError(f"the axis of a pulley of {name!r} is zero; give a direction.")
+        raise ConfigError(f"the axis of a pulley of {name!r} is zero.")
     n = axis / size
     e = np.cross(n, np.eye(3)[np.argmin(np.abs(n))])
     e /= np.linalg.norm(e)

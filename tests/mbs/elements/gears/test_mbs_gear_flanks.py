@@ -366,7 +366,7 @@ BAD = [
     ({"coupling": 1.0}, "from 0 to the width, 0.03"),
     ({"conservative": True}, "energy of mesh 'mesh' would jump"),
     ({"hertz": Hertz((1e-3, -1e-3))}, "depths .* above 0"),
-    ({"hertz": Hertz((1e-3, 1e-3), E=-1.0)}, "E = -1.*; 0 <= nu < 0.5 and E > 0"),
+    ({"hertz": Hertz((1e-3, 1e-3), E=-1.0)}, "no material has E = -1"),
 ]
 
 

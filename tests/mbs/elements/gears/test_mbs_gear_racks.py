@@ -225,7 +225,7 @@ def test_what_a_rack_does_not_have_is_refused():
         free(SPUR, correction=Correction(run_out=((0, 0), (1e-6, 0))))
     with pytest.raises(ModelError, match="racks are elements"):
         Mesh(SPUR, K)
-    with pytest.raises(ModelError, match="racks and inner teeth is not known"):
+    with pytest.raises(ModelError, match="racks and internal teeth is not known"):
         stiffness_table(SPUR, force=1e5)
 
 

@@ -286,7 +286,7 @@ def test_a_flat_interface_is_no_rim():
     shaft = mech.add_flexible("pinion", body, at=(0, 0, -LENGTH / 2))
     gear = mech.add_rigid("gear", mass=1, inertia=(1, 1, 1), at=(PAIR.distance, 0, 0),
                           markers={"middle": (0, 0, 0)})  # fmt: skip
-    with pytest.raises(ConfigError, match="'high' of 'pinion' needs a length along the axis"):
+    with pytest.raises(ConfigError, match="'high' of 'pinion' is flat across the axis"):
         mech.gear_mesh("mesh", shaft.marker("high"), gear.marker("middle"), axis=(0, 0, 1),
                        pair=PAIR, stiffness=K)  # fmt: skip
 

@@ -334,7 +334,7 @@ def test_an_internal_gear_is_one_of_negative_radii():
 
 @pytest.mark.parametrize("numbers", [(-20, 40), (40, -40), (40, -30), (3, 40), (20, -3)])
 def test_wheels_that_do_not_turn_in_each_other_are_refused(numbers):
-    with pytest.raises(ModelError, match=r"no pinion of|gears need more than"):
+    with pytest.raises(ModelError, match=r"no pinion of|no gears have"):
         GearPair(numbers, 2e-3, 0.02)
 
 
