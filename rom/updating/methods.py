@@ -16,7 +16,6 @@ from scipy.optimize import least_squares
 
 from rom.errors import ConfigError
 from rom.model import Array, Report
-from rom.updating.explained import explained
 from rom.updating.models import (
     AtSensors,
     Complex,
@@ -24,6 +23,7 @@ from rom.updating.models import (
     Modal,
     Model,
     ParametricModel,
+    explained,
     modal,
     sensor_dofs,
 )

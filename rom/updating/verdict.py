@@ -20,11 +20,10 @@ from rom.errors import ConfigError
 from rom.model import Array, Index, Mask, Report, Row
 from rom.parametric.assembled import FamilyAssembly
 from rom.rows import row
-from rom.updating.explained import MAX_UNLIKE, N_BANDS, chi_row, deviation
 from rom.updating.family_model import Family, FamilyModel, Parts
 from rom.updating.frf_data import Complex, frac
 from rom.updating.measured import Channels
-from rom.updating.models import DEAD_RATIO
+from rom.updating.models import DEAD_RATIO, MAX_UNLIKE, N_BANDS, chi_row, deviation
 from rom.updating.normal_equations import Data, Sums, responses_at, wrapped
 
 KNOWN_FACTORS = {
