@@ -16,13 +16,15 @@ from typing import Any
 
 RANKS = ("OMPI_COMM_WORLD_RANK", "PMI_RANK")  # as launchers of parallel programs name them
 # words by which a message, or its last clause, says what is wanted or what there is
-WANTED = re.compile(
+WISH_PATTERN = re.compile(
     r"\b(?:must|needs?|needed|takes|expected|instead|wanted|belongs? to|goes? with|known"
     r"|at most|at least|or more|between|in place of|there (?:is|are)|has|have|use|give|write"
     r"|leave|name|take|reduce|choose|only|from \S+ to)\b|[<>]=? ",
     re.IGNORECASE,
 )
-ASKED = re.compile(r"\b(?:must|needs?|needed|takes|expected|wanted|at most|at least)\b|[<>]= ")
+DEMAND_PATTERN = re.compile(
+    r"\b(?:must|needs?|needed|takes|expected|wanted|at most|at least|none of)\b|[<>]= "
+)
 PACKAGE_FOLDER = str(Path(__file__).parent) + os.sep
 
 
@@ -64,10 +66,10 @@ class RomError(Exception):
 def wish(message: str) -> str:
     """What a message says to be wanted or to be there: its last clause, all of it, or nothing."""
     message = message.strip()
-    clause = re.split(r"(?<=[;.]) |(?<=:) (?![\[(.'])", message)[-1]
-    if clause != message and WANTED.search(clause):
+    clause = re.split(r"(?<=[;.]) ", message)[-1]
+    if clause != message and WISH_PATTERN.search(clause):
         return clause
-    return message if ASKED.search(message) else ""
+    return message if DEMAND_PATTERN.search(message) else ""
 
 
 @contextmanager

@@ -361,8 +361,8 @@ FAILURE_COSTS = {
     "Newton corrections": f"Steps are hard to solve: something is stiff. {SMALLER_STEPS}",
 }
 RELATIONS = {"<=": operator.le, ">": operator.gt, "==": operator.eq}  # of a value to its limit
-UNLIMITED = ("information", "--", "")  # limits of values that are told, not judged
-_TOLD = WeakSet["Report"]()  # of whose failures a user was warned
+UNLIMITED_KINDS = ("information", "--", "")  # limits of values that are told, not judged
+_WARNED_OF = WeakSet["Report"]()  # of whose failures a user was warned
 
 
 @dataclass(frozen=True, slots=True)
@@ -377,7 +377,7 @@ class Row:
     @property
     def limited(self) -> bool:
         """Whether the limit is one: a relation and a number, or words of what is not judged."""
-        return self.limit in UNLIMITED or self.limit.partition(" ")[0] in RELATIONS
+        return self.limit in UNLIMITED_KINDS or self.limit.partition(" ")[0] in RELATIONS
 
     @property
     def excess(self) -> float:
@@ -385,7 +385,7 @@ class Row:
         relation, _, number = self.limit.partition(" ")
         if np.isnan(self.value):
             return np.inf
-        if self.limit in UNLIMITED or RELATIONS[relation](self.value, limit := float(number)):
+        if self.limit in UNLIMITED_KINDS or RELATIONS[relation](self.value, limit := float(number)):
             return 0.0
         return abs((self.value - limit) / limit) if limit else np.inf
 
@@ -427,7 +427,7 @@ class Report:
         Warns:
             RomWarning: with the worst row, what it costs, and what helps.
         """
-        if self.ok or self in _TOLD:
+        if self.ok or self in _WARNED_OF:
             return
         worst = self.worst
         warn(
@@ -435,7 +435,7 @@ class Report:
             f"{worst.quantity!r}: {worst.value:.3g}, limit {worst.limit}. "
             + " ".join(Report("", (worst,)).advice)
         )
-        _TOLD.add(self)
+        _WARNED_OF.add(self)
 
     @property
     def advice(self) -> tuple[str, ...]:

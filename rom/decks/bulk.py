@@ -13,12 +13,16 @@ from pathlib import Path
 import numpy as np
 
 from rom.decks.lines import Place, at, lines, real, whole
-from rom.decks.systems import BASIC, System, system
+from rom.decks.systems import BASIC_SYSTEM, System, system
 from rom.errors import FileFormatError
 from rom.model import Array, Index
 
-INCLUDE = re.compile(r"""\s*(?P<keyword>INCLUDE)\s+["']?(?P<file>[^"'\n$]+)""", re.IGNORECASE)
-BEGIN, END = (re.compile(p, re.IGNORECASE) for p in (r"\s*BEGIN(\s+BULK)?\s*(\$|$)", r"ENDDATA"))
+INCLUDE_PATTERN = re.compile(
+    r"""\s*(?P<keyword>INCLUDE)\s+["']?(?P<file>[^"'\n$]+)""", re.IGNORECASE
+)
+BEGIN_PATTERN, END_PATTERN = (
+    re.compile(p, re.IGNORECASE) for p in (r"\s*BEGIN(\s+BULK)?\s*(\$|$)", r"ENDDATA")
+)
 POINTS = ("GRID", "GRDSET", "CORD1R", "CORD1C", "CORD1S", "CORD2R", "CORD2C", "CORD2S")
 PER_LINE = 8  # fields of a line, of 8 characters each or 4 of 16, behind the name
 
@@ -63,14 +67,14 @@ def cards(path: str | Path) -> Iterator[Card]:
     What stands before BEGIN BULK is left out; without that line, the file is bulk data alone.
     """
     path = Path(path)
-    bulk = not any(BEGIN.match(line) for _, line in lines(path, INCLUDE))
+    bulk = not any(BEGIN_PATTERN.match(line) for _, line in lines(path, INCLUDE_PATTERN))
     card = Card("", [], (path, 0))
-    for place, line in lines(path, INCLUDE):
+    for place, line in lines(path, INCLUDE_PATTERN):
         line = line.partition("$")[0].rstrip()
         if not bulk or not line:
-            bulk = bulk or BEGIN.match(line) is not None
+            bulk = bulk or BEGIN_PATTERN.match(line) is not None
             continue
-        if END.match(line):
+        if END_PATTERN.match(line):
             break
         head, fields, mark = _fields(line.upper().expandtabs(PER_LINE), place)
         if head and head[0] not in "+*":
@@ -127,7 +131,7 @@ def grids(found: dict[str, list[Card]]) -> tuple[Index, Array, Index]:
             raise card.wrong(f"node {card.whole(0)} is defined twice")
     axes = {card.whole(k): (card, k) for name in POINTS[2:] for card in found.get(name, ())
             for k in (0, 4) if not k or (name[4] == "1" and card.text(k))}  # fmt: skip
-    known: dict[int, System | None] = {0: BASIC}  # None while it is being resolved
+    known: dict[int, System | None] = {0: BASIC_SYSTEM}  # None while it is being resolved
 
     def resolved(number: int, by: Card) -> System:
         if number not in known:

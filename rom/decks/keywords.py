@@ -13,7 +13,7 @@ from rom.errors import FileFormatError, UnsafeFileError
 from rom.model import Index
 from rom.names import is_whole
 
-INCLUDE = re.compile(
+INCLUDE_PATTERN = re.compile(
     r"""\s*\*(?P<keyword>[^*,][^,]*),(.*,)?\s*INPUT\s*=\s*(?P<file>"[^"]*"|[^,\n]+)""",
     re.IGNORECASE,
 )
@@ -71,7 +71,7 @@ def blocks(path: str | Path) -> Iterator[Block]:
     """The blocks of a deck and of the files it includes, whole or as data of a keyword."""
     block: Block | None = None
     head = ""
-    for place, line in lines(Path(path), INCLUDE):
+    for place, line in lines(Path(path), INCLUDE_PATTERN):
         line = line.strip()
         if not line or line.startswith("**"):
             continue

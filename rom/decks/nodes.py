@@ -13,7 +13,7 @@ import numpy as np
 
 from rom.decks.keywords import Block, Sets, blocks
 from rom.decks.lines import Unread, at
-from rom.decks.systems import BASIC, System, system
+from rom.decks.systems import BASIC_SYSTEM, System, system
 from rom.errors import FileFormatError
 from rom.model import Array, Index
 from rom.names import named
@@ -30,7 +30,7 @@ class Nodes:
     deck: Path
     nodes: dict[int, Array] = field(default_factory=dict)
     node_sets: Sets = field(default_factory=Sets)
-    axes: System = BASIC
+    axes: System = BASIC_SYSTEM
     unread: Unread = field(default_factory=Unread)
 
     def blocks(self) -> Iterator[Block]:
@@ -104,7 +104,7 @@ def _system(deck: Nodes, block: Block) -> None:
                   for v in block.reals(r, *(k for k, word in enumerate(row) if word))])  # fmt: skip
     if x.size not in (0, 3, 9):
         raise block.wrong(f"it has {x.size} numbers instead of 0, 3 or 9")
-    deck.axes = System(x, np.eye(3)) if x.size == 3 else BASIC
+    deck.axes = System(x, np.eye(3)) if x.size == 3 else BASIC_SYSTEM
     if x.size == 9:
         deck.axes = system(0, x.reshape(3, 3), "R", at(block.place))
 
@@ -126,12 +126,12 @@ def _node(deck: Nodes, block: Block) -> None:
 
 
 def _part(deck: Nodes, block: Block) -> None:
-    deck.axes = BASIC
+    deck.axes = BASIC_SYSTEM
     if block.rows:
         deck.unread.add(f"moved *{block.keyword}", block.place)
 
 
-READ: Table = {
+NODE_KEYWORDS: Table = {
     "PART": (_part, ("NAME",)),
     "END PART": (_part, ()),
     "INSTANCE": (_part, ("NAME", "PART")),

@@ -7,7 +7,7 @@ import numpy as np
 from rom.errors import FileFormatError
 from rom.model import Array
 
-THIN = 1e-9  # height over length of a triangle whose corners lie on a line
+MIN_HEIGHT_RATIO = 1e-9  # height over length of a triangle whose corners lie on a line
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,7 +29,7 @@ class System:
         return self.origin + x @ self.axes.T
 
 
-BASIC = System(np.zeros(3), np.eye(3))
+BASIC_SYSTEM = System(np.zeros(3), np.eye(3))
 
 
 def system(first: int, corners: Array, kind: str, where: str) -> System:
@@ -40,7 +40,7 @@ def system(first: int, corners: Array, kind: str, where: str) -> System:
     along, beside = corners[1:] - corners[0]
     across = np.cross(along, beside)
     size = np.linalg.norm(along) * np.linalg.norm(beside)
-    if not np.linalg.norm(across) > THIN * size:
+    if not np.linalg.norm(across) > MIN_HEIGHT_RATIO * size:
         raise FileFormatError("the points of a coordinate system lie on a line.", where=where)
     a, c = along / np.linalg.norm(along), across / np.linalg.norm(across)
     axes = np.empty((3, 3))

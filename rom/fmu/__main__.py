@@ -24,13 +24,13 @@ def main(resources: Path, *description: str) -> int:
             serve(connection, lambda: driven(resources))
         return 0
     found: Any
-    with warnings.catch_warnings(record=True) as told:
+    with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", RomWarning)
         try:
             found = {"variables": [asdict(variable) for variable in driven(resources).variables]}
         except RomError as error:
             found = {"error": str(error)}
-    found["warnings"] = [str(warning.message) for warning in told
+    found["warnings"] = [str(warning.message) for warning in caught
                          if issubclass(warning.category, RomWarning)]  # fmt: skip
     Path(description[0]).write_text(json.dumps(found))
     return 0

@@ -12,7 +12,7 @@ import sys
 
 # that read a file of the working folder when they are imported
 READERS = ("matplotlib", "numba", "petsc4py", "petsc4py.PETSc", "slepc4py", "slepc4py.SLEPc")
-ELSEWHERE = os.sep
+SAFE_FOLDER = os.sep
 PLACES = (  # variables that name a folder or file with settings, code or fonts
     *("MPLCONFIGDIR", "MATPLOTLIBRC", "NUMBA_CACHE_DIR", "PYVISTA_USERDATA_PATH"),
     *("XDG_CONFIG_HOME", "XDG_CACHE_HOME", "XDG_DATA_HOME", "OMPI_MCA_mca_base_param_files"),
@@ -43,7 +43,7 @@ def elsewhere(work: "Any", *arguments: "Any") -> None:
     """Do this in a folder where nobody but the administrator leaves files."""
     here = os.open(os.curdir, os.O_RDONLY)
     try:
-        os.chdir(ELSEWHERE)
+        os.chdir(SAFE_FOLDER)
         work(*arguments)
     finally:
         os.fchdir(here)

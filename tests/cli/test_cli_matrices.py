@@ -78,7 +78,7 @@ FAULTS = {
                      "[4]"),
     "label": ((*CALCULIX, "--set", "a=3-x", "--fixed", "a"), "'3-x' is no label"),
     "range": ((*CALCULIX, "--set", "a=7-3", "--fixed", "a"), "'7-3' is no label"),
-    "which": ((HERE / "dense.op4", *NASTRAN[1:]), "name one.", "FILE:NAME"),
+    "which": ((HERE / "dense.op4", *NASTRAN[1:]), "Name one, ", "FILE:NAME"),
     "unknown name": ((f"{HERE / 'dense.op4'}:KGG", *NASTRAN[1:]), "has no matrix 'KGG'"),
     "units": ((*CALCULIX, "--units", "inch"), "unit system = 'inch' is none of 'SI', "),
     "missing": ((HERE / "nope.sti", *CALCULIX[1:]), "nope.sti: there is no such file"),

@@ -308,7 +308,7 @@ t_end = 1
 dt = 0.01
 """
     cases = {
-        "drives": ("1/(t - 0.5)", "function of 'm'"),
+        "drives": ("2 + 1/(t - 0.5)", "function of 'm'"),
         "motors": ("log(0.5 - t)", "law of 'm' gives no finite number"),
     }
     for section, (expression, message) in cases.items():

@@ -157,7 +157,7 @@ WRONG_CALLS = {  # name: (call, words of the message or hint)
     "method of steps": (lambda t: rom.simulate(t["mech"], t_end=1.0, method="euler"), "bdf"),
     "name in use": (
         lambda t: t["mech"].add_rigid("a", mass=1.0, inertia=(1, 1, 1), at=(0, 0, 0)),
-        "there are",
+        "in use are",
     ),
     "negative mass": (
         lambda t: t["mech"].add_rigid("c", mass=-1.0, inertia=(1, 1, 1), at=(0, 0, 0)),

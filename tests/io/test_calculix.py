@@ -108,7 +108,7 @@ def test_a_body_goes_to_abaqus_and_comes_back(tmp_path):
         found = read_matrix((path, name))
         assert_allclose(found.A.toarray(), np.tril(A), rtol=1e-13)
         assert_array_equal(found.dofs, np.where(form.dofs == 0, 1, form.dofs))
-    with pytest.raises(ConfigError, match="name one"):
+    with pytest.raises(ConfigError, match="Name one"):
         read_matrix(path)
     labels, points = read_nodes(path)
     assert_array_equal(labels, [1, 2, 1001, 1002, 1003])

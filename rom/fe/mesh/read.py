@@ -34,7 +34,7 @@ from rom.fe.mesh.validate import checked
 from rom.model import Array, Index
 from rom.names import check_text
 
-INCLUDES = {"abaqus": keywords.INCLUDE, "nastran": bulk.INCLUDE}
+INCLUDES = {"abaqus": keywords.INCLUDE_PATTERN, "nastran": bulk.INCLUDE_PATTERN}
 LARGEST_FILE = 2**32  # bytes; some ten million nodes
 READERS = {
     ".geo": "geo",

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from rom.decks.keywords import Block
-from rom.decks.nodes import READ, Nodes
+from rom.decks.nodes import NODE_KEYWORDS, Nodes
 from rom.errors import ConfigError, FileFormatError, InterfaceError
 from rom.io.files import check_readable
 from rom.io.matrices.dmig import read_grids
@@ -15,7 +15,7 @@ from rom.names import named, offered
 
 CARDS = (".bdf", ".dat")
 # keywords that make nodes in ways that are not read, or turn the rows of matrices
-REFUSED = ("NGEN", "NFILL", "NCOPY", "NMAP", "TRANSFORM", "PARAMETER")
+REFUSED_KEYWORDS = ("NGEN", "NFILL", "NCOPY", "NMAP", "TRANSFORM", "PARAMETER")
 
 
 def read_nodes(nodes: Any) -> tuple[Index, Array]:
@@ -54,9 +54,9 @@ def _deck(path: Path) -> Nodes:
     """The nodes and sets of a deck."""
     deck = Nodes(path)
     for block in deck.blocks():
-        if block.keyword in READ:
-            deck.take(block, READ)
-        elif block.keyword in REFUSED:
+        if block.keyword in NODE_KEYWORDS:
+            deck.take(block, NODE_KEYWORDS)
+        elif block.keyword in REFUSED_KEYWORDS:
             deck.unread.add(f"*{block.keyword}", block.place)
     deck.unread.refuse()
     return deck

@@ -162,7 +162,7 @@ def _interface(name: str, wanted: npt.ArrayLike, labels: Index, points: Array) -
     known = labels[np.minimum(node, labels.size - 1)] == own
     if not own.size or not known.all():
         strange = own[~known][:MORE_NODES].tolist()
-        raise InterfaceError(f"interface {name!r} needs known nodes, got {strange}.")
+        raise InterfaceError(f"interface {name!r} has no nodes, or unknown ones: {strange}.")
     node = node[np.lexsort(points[node].T[::-1])]
     weights = identity(node.size, format="csr") / node.size
     return Interface(name, node, points[node], weights, points[node].mean(axis=0))

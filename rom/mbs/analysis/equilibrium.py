@@ -28,7 +28,7 @@ MIN_LOAD_STEP = 1 / 64  # part of a load step at which the search is given up
 CORRECTION_TOL = 1e-12  # of the last correction
 LEAST_BENDING = 1e-3  # of the inertia in a motion, from which a body counts as deforming
 MAX_TURN = 2 * np.pi  # after which what turned meets the same forces again [rad]
-STRAIGHT = 0.99  # of the way turned, from which it was about one axis
+STRAIGHT_SHARE = 0.99  # of the way turned, from which it was about one axis
 MAX_HALVINGS = 60  # of a correction that leaves a gap no room
 ROOM_LEFT = 0.5  # of a gap, after one correction
 MIN_ROOM = 1e-4  # of a gap, which no film keeps open
@@ -211,7 +211,7 @@ class _Search:
             ModelError: if a body turns on and on, as a rotor does against whose drag nothing holds.
         """
         now, last, trials = self.now.scaled(load), np.inf, MAX_TRIALS
-        turned, way = np.zeros((now.packed.system.bodies.mass.size, 3)), 0.0
+        turned, length = np.zeros((now.packed.system.bodies.mass.size, 3)), 0.0
         state = replace(state, lam=state.lam + self.tangent(now, state).reaction())
         beyond: Equations | None = None
         for _ in range(MAX_PASSES):
@@ -234,9 +234,9 @@ class _Search:
             last = size
             if not equations.rises:
                 turn = _turns(now.packed, before, state)
-                turned, way = turned + turn, way + np.linalg.norm(turn, axis=1)
+                turned, length = turned + turn, length + np.linalg.norm(turn, axis=1)
                 around = np.linalg.norm(turned, axis=1)
-                if ((around > MAX_TURN) & (around > STRAIGHT * way)).any():
+                if ((around > MAX_TURN) & (around > STRAIGHT_SHARE * length)).any():
                     raise _turning(now.packed, turned)
         raise _failure(now, self.tangent(now, state), load)
 

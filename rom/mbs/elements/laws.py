@@ -177,7 +177,7 @@ class Laws(Table):
         motion: (18 K,) of the markers of the law at hand.
         answer: (a,) of all; probe: likewise, of one at moved markers.
         D: (72 K^2,) derivatives of the law at hand by motions and by velocities, row by row.
-        told_at: (e + 1,) where those that laws in Python told begin; told: (d,) of all.
+        derivatives_at: (e + 1,) where those of laws in Python begin; derivatives: (d,) all of them.
     """
 
     address: Address1
@@ -195,8 +195,8 @@ class Laws(Table):
     answer: Scratch1
     probe: Scratch2
     D: Scratch1
-    told_at: Index1
-    told: Scratch1
+    derivatives_at: Index1
+    derivatives: Scratch1
 
 
 def pack(laws: Mapping[str, Law], places: Places) -> Laws:
@@ -208,7 +208,7 @@ def pack(laws: Mapping[str, Law], places: Places) -> Laws:
         marker[e, : len(law.markers)] = [places.marker[m] for m in law.markers]
     sizes = [6 * n + ENERGY_SIZE + m + o for n, m, o in (law.sizes for law in found)]
     remembered = [law.memory.size for law in found]
-    told = starts([72 * len(x.markers) ** 2 if x.compiled[0] is None else 0 for x in found])
+    derivatives = starts([72 * len(x.markers) ** 2 if x.compiled[0] is None else 0 for x in found])
     return Laws(
         *(integers(_address(law.compiled[k]) for law in found) for k in (0, 1)),
         integers(len(law.markers) for law in found),
@@ -224,8 +224,8 @@ def pack(laws: Mapping[str, Law], places: Places) -> Laws:
         np.zeros(sum(sizes)),
         np.zeros((2, max(sizes))),
         np.zeros(72 * most * most),
-        told,
-        np.zeros(told[-1]),
+        derivatives,
+        np.zeros(derivatives[-1]),
     )
 
 
@@ -328,7 +328,7 @@ def set_derivatives(s, W, laws, e):
     n = laws.count[e]
     if laws.address[e] == 0:
         for k in range(72 * n * n):
-            laws.D[k] = laws.told[laws.told_at[e] + k]
+            laws.D[k] = laws.derivatives[laws.derivatives_at[e] + k]
         return
     if laws.slopes[e] != 0:
         for k in range(72 * n * n):

@@ -63,8 +63,8 @@ class AskedLaw:
         motion = Motion(W.P[at], W.E[at], W.V[at, :3], W.V[at, 3:])
         laws.answer[laws.answer_at[e] : laws.answer_at[e + 1]] = self.ask(t, motion, memory)
         if slopes:
-            told = laws.told[laws.told_at[e] : laws.told_at[e + 1]]
-            told[:] = self.slopes(t, motion, memory).ravel()
+            own = laws.derivatives[laws.derivatives_at[e] : laws.derivatives_at[e + 1]]
+            own[:] = self.slopes(t, motion, memory).ravel()
 
     def ask(self, t: float, motion: Motion, memory: Array) -> Array:
         """All that it says."""

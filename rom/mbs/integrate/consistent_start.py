@@ -31,7 +31,7 @@ RANK_PIVOT_RTOL = 1e-9
 ELASTIC_WEIGHTS = (1e24, 1e8)
 # change of the start by joints and drives, of the size and of given velocities, from which it is
 # told, and of the size, from which it is refused
-TOLD, REFUSED = 1e-6, 1e-2
+WARNING_RTOL, REFUSAL_RTOL = 1e-6, 1e-2
 GAP_TOLERANCE = 1e-9
 MAX_ASSEMBLY = 60
 N_PROBES = 4  # gaps by which constraints that repeat others are found
@@ -94,7 +94,7 @@ def _told(packed: Packed, W: Work, q: Array, v: Array, assemble: bool, placing: 
     rows = packed.system.rows
     free = (rows.kind == ROLL) | (placing & (rows.signal >= 0))
     gap, where, size = _largest(packed, np.where(free, 0.0, W.value / packed.row_scale))
-    if gap > REFUSED and not assemble:
+    if gap > REFUSAL_RTOL and not assemble:
         raise ModelError(
             f"the start does not fit: where bodies are added it is open by {size}.",
             where=where,
@@ -112,9 +112,9 @@ def _told(packed: Packed, W: Work, q: Array, v: Array, assemble: bool, placing: 
         given, fitted = (x[b : b + 6 + r] / weight[b : b + 6 + r] for x in (packed.v, v))
         change = float(np.linalg.norm(fitted - given) / (np.linalg.norm(given) or np.inf))
         changes[f"the velocity of {name!r} changes by {change:.2g} of the given one"] = change
-    told = [what for what, change in changes.items() if change > TOLD]
-    if told and not assemble:
-        warn(f"the start was moved to fit joints and drives: {'; '.join(told)}.")
+    moved = [what for what, change in changes.items() if change > WARNING_RTOL]
+    if moved and not assemble:
+        warn(f"the start was moved to fit joints and drives: {'; '.join(moved)}.")
     return max(changes.values())
 
 

@@ -24,7 +24,7 @@ from rom.model import Array
 # seconds between looks at the keyboard and the progress line
 CHUNK_SECONDS = 0.2
 LARGEST_CHUNK = 4096
-RESTLESS = (
+RESTLESS_LAW_TEXT = (
     1e-2  # change of a law by the last correction, of its size, that keeps a step from ending
 )
 LOSING_SHARE = 0.9  # of half a turn a step, from where on one that gains speed may exceed it
@@ -220,7 +220,7 @@ def _restless_law(record: Record, W: Work, step: Step, t: float) -> str:
         if now.any()
     }
     name = max(changes, key=lambda name: changes[name], default="")
-    if not name or not changes[name] > RESTLESS:
+    if not name or not changes[name] > RESTLESS_LAW_TEXT:
         return ""
     return f"; the law of {name!r} still changes by {changes[name]:.2g} of itself"
 

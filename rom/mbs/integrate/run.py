@@ -65,7 +65,10 @@ class Settings:
         if not isinstance(self.progress, bool):
             raise ConfigError(f"progress = {self.progress!r} is neither True nor False.")
         if self.t_end <= self.t_start:
-            raise ConfigError(f"t_end = {self.t_end:g} s is not after {self.t_start:g} s.")
+            raise ConfigError(
+                f"t_end = {self.t_end:g} s is not after {self.t_start:g} s.",
+                hint="It is the time at the end, not how long the motion lasts.",
+            )
         for name in ("dt", "tolerance", "rtol", "atol"):
             if getattr(self, name) is not None and getattr(self, name) <= 0.0:
                 raise ConfigError(f"{name} = {getattr(self, name):g} must be positive.")

@@ -7,7 +7,7 @@ import pytest
 from cases.boxes import BOX_GEO
 from cases.paths import ROOT
 from rom.errors import UnsafeFileError
-from rom.fe.mesh.sources.script import FIELDS, VOCABULARY, check_script
+from rom.fe.mesh.sources.script import FIELDS, KNOWN_WORDS, check_script
 
 COMMANDS = (
     "SystemCall NonBlockingSystemCall System Print Save CreateDir OnelabRun SendToServer Plugin "
@@ -60,7 +60,7 @@ def test_options_that_name_programs_and_files_are_refused(text, tmp_path):
 
 
 def test_no_command_that_acts_is_in_the_vocabulary():
-    assert not {*COMMANDS} & {*VOCABULARY, *FIELDS}
+    assert not {*COMMANDS} & {*KNOWN_WORDS, *FIELDS}
 
 
 def test_all_geometries_of_the_source_are_written_in_it():

@@ -66,7 +66,7 @@ def test_a_bar_on_a_coil_turns_as_the_implicit_function_says():
 def guyed(place):
     """A box on a vertical slide at a place along x, held by a spring to (0.5, 0, 0.8)."""
     mech = rom.Mechanism(gravity=(0, 0, -G))
-    box = mech.add_rigid("box", mass=1.0, inertia=(1, 1, 1), at=(0, 0, 0))
+    box = mech.add_rigid("box", mass=1.0, inertia=(1, 1, 1), at=(place, 0, 0))
     centre = box.marker((0, 0, 0))
     mech.prismatic("slide", mech.ground.marker((place, 0, 0)), centre, axis=(0, 0, 1))
     guy = mech.ground.marker((0.5, 0, 0.8))

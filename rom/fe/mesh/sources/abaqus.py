@@ -17,8 +17,7 @@ import numpy as np
 
 from rom.decks.keywords import Block, Sets
 from rom.decks.lines import Unread
-from rom.decks.nodes import READ as READ_OF_NODES
-from rom.decks.nodes import SET_OPTIONS, Nodes, Table
+from rom.decks.nodes import NODE_KEYWORDS, SET_OPTIONS, Nodes, Table
 from rom.errors import FileFormatError, TagError
 from rom.fe.mesh.solid import Read, packed
 from rom.fe.mesh.sources.deck import (
@@ -74,10 +73,10 @@ def read(path: str) -> Read:
     """
     deck = Deck(Path(path))
     for block in deck.blocks():
-        if block.keyword in READ:
-            deck.take(block, READ)
-        elif block.keyword not in SILENT:
-            counted = deck.aside if block.keyword in ASIDE else deck.unread
+        if block.keyword in MESH_KEYWORDS:
+            deck.take(block, MESH_KEYWORDS)
+        elif block.keyword not in HARMLESS_KEYWORDS:
+            counted = deck.aside if block.keyword in LOAD_KEYWORDS else deck.unread
             counted.add(f"*{block.keyword}", block.place)
     deck.unread.refuse()
     cell_type = only_type(kind for kind, _ in deck.solids.values())
@@ -164,8 +163,8 @@ def _surface(deck: Deck, block: Block) -> None:
     rows.extend(block.rows)
 
 
-READ: Table = {
-    **READ_OF_NODES,
+MESH_KEYWORDS: Table = {
+    **NODE_KEYWORDS,
     "ELEMENT": (_element, ("TYPE", "ELSET")),
     "ELGEN": (_copies, ("ELSET",)),
     "ELSET": (lambda deck, block: deck.cell_sets.add(block.option("ELSET"), block.members()),
@@ -175,7 +174,7 @@ READ: Table = {
                       ("ELSET", "MATERIAL", "ORIENTATION", "CONTROLS")),
     "SURFACE SECTION": (lambda deck, block: None, ("ELSET",)),  # without a density
 }  # fmt: skip
-SILENT = {  # materials are given here; output
+HARMLESS_KEYWORDS = {  # materials are given here; output
     "HEADING", "PREPRINT", "ASSEMBLY", "END ASSEMBLY", "MATERIAL", "ELASTIC", "DENSITY",
     "EXPANSION", "CONDUCTIVITY", "SPECIFIC HEAT", "PLASTIC", "CYCLIC HARDENING", "CREEP",
     "DAMPING", "HYPERELASTIC", "VISCOELASTIC", "DEPVAR", "USER MATERIAL", "ORIENTATION",
@@ -183,7 +182,15 @@ SILENT = {  # materials are given here; output
     "SURFACE BEHAVIOR", "FRICTION", "RESTART", "TIME POINTS", "NODE PRINT", "EL PRINT",
     "NODE FILE", "EL FILE", "FILE FORMAT",
 }  # fmt: skip
-ASIDE = {"STEP", "BOUNDARY", "INITIAL CONDITIONS", "CLOAD", "DLOAD", "DSLOAD", "TEMPERATURE"}
+LOAD_KEYWORDS = {
+    "STEP",
+    "BOUNDARY",
+    "INITIAL CONDITIONS",
+    "CLOAD",
+    "DLOAD",
+    "DSLOAD",
+    "TEMPERATURE",
+}
 
 
 def _regions(deck: Deck, ids: Index) -> tuple[dict[int, str], Index]:

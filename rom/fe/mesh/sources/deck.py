@@ -13,10 +13,10 @@ from rom.names import named
 QUADRATIC_HEX = 20  # nodes of a serendipity hexahedron; completed to 27 after reading
 # Mid-edge nodes by their corners, in the order of Abaqus and VTK.
 LOWER_EDGES, UPPER_EDGES = ((0, 1), (1, 2), (2, 3), (3, 0)), ((4, 5), (5, 6), (6, 7), (7, 4))
-BETWEEN = ((0, 4), (1, 5), (2, 6), (3, 7))
+UPRIGHT_EDGES = ((0, 4), (1, 5), (2, 6), (3, 7))
 DECK_EDGES = {
     "tet10": ((0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)),
-    "hex20": (*LOWER_EDGES, *UPPER_EDGES, *BETWEEN),
+    "hex20": (*LOWER_EDGES, *UPPER_EDGES, *UPRIGHT_EDGES),
 }
 Edges = tuple[tuple[int, int], ...]
 WHOLE_TYPES = ("tet4", "hex8")

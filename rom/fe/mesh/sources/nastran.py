@@ -14,9 +14,9 @@ from rom.decks.bulk import POINTS, Card, cards, grids
 from rom.decks.lines import Unread
 from rom.fe.mesh.solid import Read, packed
 from rom.fe.mesh.sources.deck import (
-    BETWEEN,
     LOWER_EDGES,
     UPPER_EDGES,
+    UPRIGHT_EDGES,
     facets_of_nodes,
     only_type,
     outer_facets,
@@ -27,13 +27,26 @@ from rom.fe.mesh.sources.deck import (
 from rom.model import Index
 
 SOLIDS = {"CTETRA": {4: "tet4", 10: "tet10"}, "CHEXA": {8: "hex8", 20: "hex20"}}
-EDGES = {"hex20": (*LOWER_EDGES, *BETWEEN, *UPPER_EDGES)}  # mid-edge nodes where not as in Abaqus
-SKIN = {"CTRIA3": 3, "CTRIA6": 3, "CQUAD4": 4, "CQUAD8": 4}  # corners
+EDGES = {
+    "hex20": (*LOWER_EDGES, *UPRIGHT_EDGES, *UPPER_EDGES)
+}  # mid-edge nodes where not as in Abaqus
+SKIN_CARDS = {"CTRIA3": 3, "CTRIA6": 3, "CQUAD4": 4, "CQUAD8": 4}  # corners
 LINES = ("CBAR",)  # without a property, as gmsh writes curves
-READ = {*POINTS, *SOLIDS, *SKIN, "SPC", "SPC1"}
-SILENT = ("PARAM", "MAT", "EIG", "TABLE", "PSOLID", "PLSOLID", "SET1", "SET3", "PLOTEL", "ECHO")
+MESH_CARDS = {*POINTS, *SOLIDS, *SKIN_CARDS, "SPC", "SPC1"}
+HARMLESS_CARDS = (
+    "PARAM",
+    "MAT",
+    "EIG",
+    "TABLE",
+    "PSOLID",
+    "PLSOLID",
+    "SET1",
+    "SET3",
+    "PLOTEL",
+    "ECHO",
+)
 # loads, supports, steps, and what a reduction there holds
-ASIDE = set(
+LOAD_CARDS = set(
     "FORCE FORCE1 FORCE2 MOMENT MOMENT1 MOMENT2 PLOAD PLOAD1 PLOAD2 PLOAD4 GRAV ACCEL ACCEL1 "
     "RFORCE LOAD DLOAD DAREA TLOAD1 TLOAD2 RLOAD1 RLOAD2 DELAY DPHASE LSEQ RANDPS TEMP TEMPD "
     "TEMPP1 SPCD SPCADD SUPORT SUPORT1 FREQ FREQ1 FREQ2 FREQ3 FREQ4 TSTEP TSTEPNL NLPARM TIC "
@@ -76,11 +89,11 @@ def _sorted(path: Path) -> tuple[dict[str, list[Card]], list[str]]:
     found: dict[str, list[Card]] = {}
     unread, aside = Unread(), Unread()
     for card in cards(path):
-        if card.name in READ:
+        if card.name in MESH_CARDS:
             found.setdefault(card.name, []).append(card)
-        elif card.name in ASIDE or card.name in LINES:
+        elif card.name in LOAD_CARDS or card.name in LINES:
             aside.add(card.name, card.place)
-        elif not card.name.startswith(SILENT):
+        elif not card.name.startswith(HARMLESS_CARDS):
             unread.add(card.name, card.place)
     unread.refuse()
     return found, aside.remark()
@@ -110,7 +123,7 @@ def _property(card: Card) -> int:
 def _sets(found: dict[str, list[Card]], ids: Index) -> dict[str, list[int]]:
     """Nodes of skin elements by property, and of SPC and SPC1 cards by set number."""
     sets: dict[str, list[int]] = {}
-    for name, n_corners in SKIN.items():
+    for name, n_corners in SKIN_CARDS.items():
         for card in found.get(name, ()):
             corners = [card.whole(k) for k in range(2, 2 + n_corners)]
             sets.setdefault(f"property_{_property(card)}", []).extend(corners)

@@ -161,7 +161,7 @@ def pick(gmsh: Any, wanted: dict[str, Any], file: str) -> dict[str, list[int]]:
         try:
             tags = sorted({tag for wish in picks(wishes) for tag in picker.found(wish)})
         except TagError as error:
-            hint = f"{error.hint} rom mesh {file} --faces lists the faces.".strip()
+            hint = f"{error.told_hint} rom mesh {file} --faces lists the faces.".strip()
             raise TagError(f"face {name!r}: {error.message}", hint=hint) from None
         if both := [tag for tag in tags if tag in named]:
             raise TagError(

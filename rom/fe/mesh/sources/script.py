@@ -14,7 +14,7 @@ from pathlib import Path
 from rom.errors import FileFormatError, UnsafeFileError
 
 # What may stand before a bracket, a text or another word: geometry, control, functions, mesh sizes
-VOCABULARY = frozenset("""
+KNOWN_WORDS = frozenset("""
 Point Line Curve Circle Ellipse Ellipsis Conic Spline BSpline Bezier Nurbs Wire Loop Compound Plane
 Surface Ruled Bezier Volume Sphere Block Box Cylinder Cone Torus Wedge Disk Rectangle Physical
 Parametric In Extrude Layers Recombine RecombLaterals ScaleLastLayer Hole Alias AliasWithOptions
@@ -48,7 +48,7 @@ Structured Threshold
 """.split())  # fmt: skip
 OPTION_GROUPS = {"Mesh", "Geometry", "Print"}  # whose options say how, and never where or by whom
 GENERAL_OPTIONS = {"Terminal", "Verbosity", "ExpertMode", "NumThreads", "AbortOnError"}
-OPERATORS = "=.,;+-*/^<>!&|?:)]}~%"  # behind a variable; no command has one behind it
+OPERATOR_SIGNS = "=.,;+-*/^<>!&|?:)]}~%"  # behind a variable; no command has one behind it
 INCLUDE_COMMAND, MERGE_COMMANDS = "Include", ("Merge", "MergeWithBoundingBox")
 # endings, in these letters only, of files that gmsh gives to readers which run nothing
 SHAPES = (".step", ".STEP", ".stp", ".STP", ".iges", ".IGES", ".igs", ".IGS", ".brep", ".brp",
@@ -219,10 +219,12 @@ def _allowed(before: Token, word: Token, behind: list[Token]) -> bool:
     if after.value == "." and word.value[0].isupper():
         general = word.value == "General" and behind[1].value in GENERAL_OPTIONS
         return general or word.value in OPTION_GROUPS
-    if word.value in VOCABULARY:
+    if word.value in KNOWN_WORDS:
         return True
     own = not word.value[0].isupper() or len(word.value) <= 2 or "_" in word.value
-    return after.kind == "sign" and after.value in (OPERATORS + "([{" if own else OPERATORS)
+    return after.kind == "sign" and after.value in (
+        OPERATOR_SIGNS + "([{" if own else OPERATOR_SIGNS
+    )
 
 
 def _kind_of_field(tokens: list[Token], k: int) -> Token | None:
