@@ -24,6 +24,7 @@ WISH_PATTERN = re.compile(
 )
 DEMAND_PATTERN = re.compile(
     r"\b(?:must|needs?|needed|takes|expected|wanted|at most|at least|none of)\b|[<>]= "
+    r"|\bis (?:not|no) (?:an?|positive|finite|whole|between|within|one of)\b"
 )
 PACKAGE_FOLDER = str(Path(__file__).parent) + os.sep
 
