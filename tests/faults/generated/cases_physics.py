@@ -54,9 +54,9 @@ BODIES = {  # numbers of a rigid body
 STARTS = {  # laws, their value and rate at the start, which the mechanism takes up
     "a speed at once": (lambda t: 5.0 * t, 0.0, 5.0),
     "a harmonic at once": (lambda t: 0.5 * np.sin(20 * t), 0.0, 10.0),
-    "an angle at once": (lambda t: 0.5, 0.5, 0.0),
 }
-JUMPS = {  # laws that no mechanism can follow
+JUMPS = {  # laws that no mechanism can follow from where it is drawn
+    "an angle at once": lambda t: 0.5,
     "a step later": lambda t: 0.0 if t < 0.05 else 0.3,
     "a kink later": lambda t: 0.0 if t < 0.05 else 5.0 * (t - 0.05),
 }
