@@ -148,7 +148,7 @@ if first:
     some = np.arange(t.size) < 300
     some = np.roll(some, np.clip(np.argmax(abs(out - shares[0])) - 150, 0, t.size - 300))
     forces = {name: (1e3 * t[some], x[some])
-              for name, x in (("a tooth of the planet stands out", out),
+              for name, x in ((NAMES[1], out),
                               ("all teeth alike", shares[0]))}  # fmt: skip
     low = f < 2500
     view.panels(

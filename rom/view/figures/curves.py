@@ -70,7 +70,7 @@ def history(  # noqa: PLR0913  keywords of one picture
     with page.styled():
         names = [list(filter(None, curves)) for _, curves in panels]
         figure, areas = _panels(ax, names, "history", Words(title, caption, beside))
-        numbers = _numbered([list(curves) for _, curves in panels])
+        numbers = numbered([list(curves) for _, curves in panels])
         for axes, (label, curves), looks in zip(areas, panels, numbers, strict=True):
             _histories(axes, t, curves, looks)
             axes.set_xlabel(over or "time [s]", size=page.BODY_SIZE)
@@ -81,7 +81,7 @@ def history(  # noqa: PLR0913  keywords of one picture
         return page.save(figure, path)
 
 
-def _numbered(panels: Sequence[Sequence[str]]) -> list[list[int]]:
+def numbered(panels: Sequence[Sequence[str]]) -> list[list[int]]:
     """Number of the look of each curve: a name looks the same in all panels."""
     known: dict[str, int] = {}
     numbers = []

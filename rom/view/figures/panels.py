@@ -12,7 +12,7 @@ from rom.errors import ConfigError
 from rom.view.canvas import page
 from rom.view.canvas.scales import without_round_off
 from rom.view.canvas.scene import TEXT_COLOUR
-from rom.view.figures.curves import LINES, PAGE_WIDTH, finish, line_look, near_ticks
+from rom.view.figures.curves import LINES, PAGE_WIDTH, finish, line_look, near_ticks, numbered
 from rom.view.figures.things import Scene, draw_scene
 
 if TYPE_CHECKING:
@@ -86,6 +86,8 @@ def panels(
         ConfigError: if lengths differ, or pictures cannot be made here.
     """
     path = page.wanted(path)
+    drawn = [panel for row in rows for panel in row if isinstance(panel, Panel)]
+    numbers = iter(numbered([list(filter(_is_named, panel.curves)) for panel in drawn]))
     if ax is not None:
         diagrams = [panel for row in rows for panel in row]
         figure, areas = page.taken(ax, len(diagrams), "panels")
@@ -93,7 +95,7 @@ def panels(
             if isinstance(panel, Scene):
                 draw_scene(figure, area, panel)
             else:
-                _draw(area, panel, alone=True)
+                _draw(area, panel, next(numbers), alone=True)
         return page.save(figure, path)
     with page.styled():
         legends = [_legend_height(row) for row in rows]
@@ -108,7 +110,7 @@ def panels(
                     draw_scene(figure, axes, panel)
                 else:
                     axes = page.area(figure, left, top, width, PANEL_HEIGHT)
-                    _draw(axes, panel, alone=False)
+                    _draw(axes, panel, next(numbers), alone=False)
                     page.legend_above(axes, width, legend)
         return page.save(figure, path)
 
@@ -136,15 +138,19 @@ def _legend_height(row: Sequence[Panel | Scene]) -> int:
 
 def _named(panel: Panel) -> list[str]:
     names = (*panel.curves, *panel.points, *(panel.ends or ()))
-    return [name for name in names if not name.startswith("_")]
+    return list(filter(_is_named, names))
 
 
-def _draw(axes: Any, panel: Panel, *, alone: bool) -> None:
-    """A diagram; alone, with its legend where there is room."""
+def _is_named(name: str) -> bool:
+    return not name.startswith("_")
+
+
+def _draw(axes: Any, panel: Panel, numbers: Sequence[int], *, alone: bool) -> None:
+    """A diagram with the looks of its named curves; alone, with its legend where there is room."""
     curves, points = _lines(panel)
     named = _named(panel)
     for name, line in curves.items():
-        k = named.index(name) if name in named else 0
+        k = numbers[named.index(name)] if name in named else 0
         guide = name not in named and (len(curves) > 1 or bool(points))
         axes.plot(*line, label=name, **(GUIDE_STYLE if guide else line_look(k)))
     for name, line in points.items():
