@@ -68,10 +68,10 @@ def test_a_report_of_two_writers_is_always_one_of_both(tmp_path):
 
     def work(name):
         for _ in range(WRITES):
-            write_report(path, name, {name: [paragraph(name * 50_000)]})
+            write_report({name: [paragraph(name * 50_000)]}, path, name)
 
     work("a")
-    texts = {name: write_report(tmp_path / f"{name}.html", name, {name: [paragraph(name * 50_000)]})
+    texts = {name: write_report({name: [paragraph(name * 50_000)]}, tmp_path / f"{name}.html", name)
              .read_text() for name in "ab"}  # fmt: skip
     for _ in together(work, "a", "b"):
         assert path.read_text() in texts.values()
