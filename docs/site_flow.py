@@ -18,7 +18,7 @@ from rom.view.canvas import page
 
 SOURCE = Path(rom.__file__).parent
 STAGES = {  # what lies on the way, and the folders and files in which it lies
-    "geometry": ("fe.mesh",),
+    "geometry": ("decks", "fe.mesh"),
     "matrices": ("fe.forms", "fe.operators", "fe"),
     "modes": ("eigen", "reduction.interfaces", "reduction.bases", "reduction.full_model"),
     "body": (

@@ -41,7 +41,7 @@ def cantilever(body):
     """Let go under its weight, from straight."""
     mech = rom.Mechanism(gravity=(0, -9.81, 0))
     bar = mech.add_flexible("<b>bar", body)
-    mech.fixed("wall", mech.ground.marker((0, 0, 0)), bar.marker("root"))
+    mech.fixed("wall", mech.ground.marker(body.marker("root").point), bar.marker("root"))
     return rom.simulate(mech, t_end=0.02, dt=1e-4)
 
 

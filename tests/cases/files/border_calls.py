@@ -164,7 +164,7 @@ def mechanism():
     arm = mech.add_rigid("arm", mass=1.0, inertia=(1, 1, 1), at=(0, 0, -0.5), markers=marks)
     ground = mech.ground.marker((0, 0, 0))
     mech.revolute("hinge", ground, arm.marker("a"), axis=X)
-    beam = mech.add_flexible("beam", body(), at=(0, 0, -1.0))
+    beam = mech.add_flexible("beam", body(), at=(0, 0, -1.0) - body().marker("root").point)
     mech.fixed("weld", arm.marker("b"), beam.marker("root"))
     return mech
 

@@ -30,7 +30,7 @@ def swinging(bar):
     part = mech.add_flexible("bar", bar, omega=(0, 0, 30.0))
     mech.add_rigid("ball", mass=1.0, inertia=(1e-2,) * 3, at=(0, 0.6, 0))
     mech.spherical("tie", mech.ground.marker((0, 0, 0.15)), part.marker("n7"))
-    return mech, simulate(mech, t_end=0.1, dt=1e-3)
+    return mech, simulate(mech, t_end=0.1, dt=1e-3, assemble=True)
 
 
 def squeezed(amount):
