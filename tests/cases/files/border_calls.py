@@ -310,6 +310,7 @@ def of_wheel():
 
 
 GIVEN = {  # callable -> legal values of its own
+    "Report.warn_of_failures": lambda: {"of": "a check"},
     "bladed_wheel": lambda: {"sector": wheel().parts, "n_waves": 2},
     "campbell": lambda: {"mechanism": lambda speed: rotor(speed), "speeds": [1.0, 2.0]},
     "check": lambda: {"record": body()},
