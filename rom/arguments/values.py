@@ -162,7 +162,7 @@ def unit_vector(name: str, value: Any) -> Array:
     x = finite(name, value, (3,))
     length = np.linalg.norm(x)
     if length == 0.0:
-        raise ConfigError(f"{name} has length zero; a direction needs a length.")
+        raise ConfigError(f"{name} has length zero: it gives no direction.")
     return x / length
 
 

@@ -76,7 +76,8 @@ def _slider_crank() -> None:
     mech, radius, speed = Mechanism(gravity=(0.0, -9.81, 0.0)), 0.04, 300.0
     crank = mech.add_rigid("crank", mass=1.0, inertia=(1e-3,) * 3, at=ORIGIN,
                            omega=(0.0, 0.0, speed))  # fmt: skip
-    rod = mech.add_flexible("rod", _lattice(), at=(radius, 0, 0), velocity=(0, speed * radius, 0))
+    rod = mech.add_flexible("rod", _lattice(), at=(radius, 0, 0), velocity=(0, speed * radius, 0),
+                            omega=(0, 0, -speed * radius / 0.16))  # fmt: skip
     end = (0.16 + radius, 0.0, 0.0)
     slider = mech.add_rigid("slider", mass=0.3, inertia=(1e-4,) * 3, at=end)
     mech.revolute("main", mech.ground.marker(ORIGIN), crank.marker(ORIGIN), axis=Z_AXIS)
