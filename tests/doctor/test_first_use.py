@@ -79,7 +79,8 @@ def test_after_the_set_up_first_motions_compile_nothing():
     """As Numba counts, which then counts a function of another kind."""
     done = command("doctor", "--compile", "demo", timeout=600)
     assert done.returncode == 0, done.stderr
-    done = subprocess.run([sys.executable, "-c", FIRST_MOTIONS], env=environment(), text=True,
+    quiet = environment(PYTHONWARNINGS="ignore")
+    done = subprocess.run([sys.executable, "-c", FIRST_MOTIONS], env=quiet, text=True,
                           capture_output=True, timeout=120, check=False)  # fmt: skip
     assert (done.stdout.split(), done.stderr) == (["0", "1"], "")
 

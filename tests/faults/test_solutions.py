@@ -15,7 +15,7 @@ from rom.components.hand.compliant_hand import Finger, close
 from rom.components.masonry import motion as masonry_motion
 from rom.components.masonry import stones
 from rom.components.rockfall import Cushion, Gallery, Shear, Slab, strike
-from rom.errors import ConfigError, RomError, SolverError
+from rom.errors import RomError, SolverError
 from rom.mbs.results.solution import Solution
 from rom.mbs.results.state import State
 
@@ -170,12 +170,3 @@ def test_it_has_the_form_of_what_the_function_gives(monkeypatch):
     motion = caught.value.solution
     assert motion.t.tolist() == [0.0, 0.02, 0.04]
     assert {len(rows) for rows in (motion.q, motion.v, motion.energy)} == {3}
-
-
-@pytest.mark.parametrize("name", ["motion", "posture", "shape"])
-def test_names_of_components_stay_aliases(name):
-    error = SolverError("it failed.", solution=1.0)
-    assert getattr(error, name) == 1.0
-    setattr(error, name, 2.0)
-    assert error.solution == 2.0
-    assert getattr(ConfigError("nothing was reached."), name) is None
