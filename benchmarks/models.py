@@ -79,9 +79,9 @@ def slider_crank(rod: Any = None) -> Any:
     if rod is not None:
         ends = {name: rod.marker(name).point for name in ends}
     a, b = ends["root"], ends["tip"]
-    turning = -CRANK_SPEED * radius / (b - a)[0]  # the slider stands still in its dead centre
-    rising = CRANK_SPEED * radius - turning * a[0]
-    moving: dict[str, Any] = {"velocity": (0, rising, 0), "omega": (0, 0, turning)}
+    turning = np.array([0, 0, -CRANK_SPEED * radius / (b - a)[0]])  # the slider stands still
+    rising = np.array([0, CRANK_SPEED * radius, 0]) - np.cross(turning, a)
+    moving: dict[str, Any] = {"velocity": rising, "omega": turning}
     crank = mech.add_rigid(
         "crank",
         mass=1.0,
