@@ -101,7 +101,7 @@ def equilibrium(
         for at_load in search.loaded(found, steps) if nearby is None else (nearby,):
             found = at_load
         search.judge(found)
-    if search.spins.any and found.lam.size:
+    if search.spins.any and mechanism.drives:  # a support in axes that turn along is none of them
         now.gradient(found.q, found.v)
         check_velocity(now.packed, now.W, found.v)
     warn_of_range(mechanism, now.packed, found)
