@@ -101,9 +101,9 @@ def equilibrium(
         for at_load in search.loaded(found, steps) if nearby is None else (nearby,):
             found = at_load
         search.judge(found)
-    if search.spins.any and mechanism.drives:  # a support in axes that turn along is none of them
+    if search.spins.any and mechanism.drives:
         now.gradient(found.q, found.v)
-        check_velocity(now.packed, now.W, found.v)
+        check_velocity(now.packed, now.W, found.v, drives_only=True)
     warn_of_range(mechanism, now.packed, found)
     return found
 
