@@ -101,9 +101,9 @@ def equilibrium(
         for at_load in search.loaded(found, steps) if nearby is None else (nearby,):
             found = at_load
         search.judge(found)
-    if search.spins.any and mechanism.drives:
+    if isinstance(spin, Mapping) and found.lam.size:  # else supports turn along, and drives
         now.gradient(found.q, found.v)
-        check_velocity(now.packed, now.W, found.v, drives_only=True)
+        check_velocity(now.packed, now.W, found.v)
     warn_of_range(mechanism, now.packed, found)
     return found
 

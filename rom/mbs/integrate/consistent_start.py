@@ -292,9 +292,7 @@ def fitting_velocity(packed: Packed, W: Work, q: Array, v: Array) -> Array:
     return v
 
 
-def check_velocity(
-    packed: Packed, W: Work, v: Array, given: Array | None = None, *, drives_only: bool = False
-) -> None:
+def check_velocity(packed: Packed, W: Work, v: Array, given: Array | None = None) -> None:
     """Refuse velocities that do not satisfy joints and drives as linearised last.
 
     Args:
@@ -302,7 +300,6 @@ def check_velocity(
         W: its memory.
         v: (n,) the velocities.
         given: (n,) those they were fitted from: where all come to rest, v is their round-off.
-        drives_only: leave joints out, as in axes that turn along with their supports.
 
     Raises:
         ModelError: naming a joint or drive that contradicts others.
@@ -312,8 +309,6 @@ def check_velocity(
     gradient_times(packed.system, W, v, False, now)
     gradient_times(packed.system, W, v, True, size)
     miss, size = np.abs(now - wanted), size + np.abs(wanted)
-    if drives_only:
-        miss[packed.system.rows.signal < 0] = 0.0
     size = np.maximum(size, 1e-3 * size.max())  # rows at rest hold nothing but round-off
     if given is not None:
         gradient_times(packed.system, W, given, True, now)

@@ -128,9 +128,8 @@ def geared_disc(speed, rate=None, body=None):
 
 
 def test_speeds_of_spins_and_diagrams_are_those_that_drives_prescribe():
-    for spin in ({"axle": 50.0}, (0.0, 0.0, 50.0)):
-        with pytest.raises(ModelError, match=r"^motor: the velocities of joints and drives contra"):
-            rom.equilibrium(geared_disc(0.0, 100.0), spin=spin)
+    with pytest.raises(ModelError, match=r"^motor: the velocities of joints and drives contra"):
+        rom.equilibrium(geared_disc(0.0, 100.0), spin={"axle": 50.0})
     assert rom.equilibrium(geared_disc(0.0, 50.0), spin={"axle": 50.0}).v[5] == 50.0
     with pytest.warns(RomWarning, match="no body turns at the speed 50 rad/s"):
         rom.campbell(lambda speed: geared_disc(100.0), [50.0, 100.0], frame="world")
