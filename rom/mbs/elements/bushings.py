@@ -111,7 +111,7 @@ def _matrix66(name: str, value: Any) -> Array:
             "mech.law, of which docs/laws.md has this one.",
         )
     if np.linalg.eigvalsh(A)[0] < -1e-9 * size:
-        raise ConfigError(f"{name} must not be negative in any direction: it drives the motion.")
+        raise ConfigError(f"{name} is negative in some direction: it would drive the motion.")
     return 0.5 * (A + A.T)
 
 
