@@ -31,7 +31,7 @@ RANK_PIVOT_RTOL = 1e-9
 ELASTIC_WEIGHTS = (1e24, 1e8)
 # change of the start by joints and drives, of the size and of given velocities, from which it is
 # told, and of the size, from which it is refused
-WARNING_RTOL, REFUSAL_RTOL = 1e-6, 1e-2
+WARNING_RTOL = 1e-6
 GAP_TOLERANCE = 1e-9
 MAX_ASSEMBLY = 60
 N_PROBES = 4  # gaps by which constraints that repeat others are found
@@ -94,13 +94,6 @@ def _told(packed: Packed, W: Work, q: Array, v: Array, assemble: bool, placing: 
     rows = packed.system.rows
     free = (rows.kind == ROLL) | (placing & (rows.signal >= 0))
     gap, where, size = _largest(packed, np.where(free, 0.0, W.value / packed.row_scale))
-    if gap > REFUSAL_RTOL and not assemble:
-        raise ModelError(
-            f"the start does not fit: where bodies are added it is open by {size}.",
-            where=where,
-            hint="Draw the bodies so that joints are closed and drives begin where they are, or "
-            "let the start be moved (assemble=True).",
-        )
     linearize_constraints(packed.system, W, q, v)
     weight, changes = _weights(packed, W), {f"{where!r} was open by {size}": gap}
     bodies = packed.system.bodies
@@ -114,7 +107,10 @@ def _told(packed: Packed, W: Work, q: Array, v: Array, assemble: bool, placing: 
         changes[f"the velocity of {name!r} changes by {change:.2g} of the given one"] = change
     moved = [what for what, change in changes.items() if change > WARNING_RTOL]
     if moved and not assemble:
-        warn(f"the start was moved to fit joints and drives: {'; '.join(moved)}.")
+        warn(
+            f"the start was moved to fit joints and drives: {'; '.join(moved)}. Draw the bodies so "
+            "that joints are closed and drives begin where they are, or ask for it (assemble=True)."
+        )
     return max(changes.values())
 
 
@@ -164,7 +160,12 @@ def assembled(packed: Packed, W: Work, q: Array) -> Array:
     if not W.value.size:
         return q.copy()
     for elastic in ELASTIC_WEIGHTS:
-        closed = _closed(packed, W, q.copy(), elastic)
+        try:
+            closed = _closed(packed, W, q.copy(), elastic)
+        except SolverError:  # as rigid as that, bodies leave joints no way
+            if elastic == ELASTIC_WEIGHTS[-1]:
+                raise
+            continue
         evaluate(packed.system, W, closed, np.zeros(packed.v.size))
         gap = W.value / packed.row_scale
         if np.abs(gap).max() <= GAP_TOLERANCE or not packed.system.bodies.r.any():
