@@ -29,8 +29,7 @@ RANK_PIVOT_RTOL = 1e-9
 # a gap that rigid motion can close is not closed by deformation: elastic coordinates weigh so much
 # that they do not move, and only where a gap stays open, less
 ELASTIC_WEIGHTS = (1e24, 1e8)
-# change of the start by joints and drives, of the size and of given velocities, from which it is
-# told, and of the size, from which it is refused
+# change of the start by joints and drives, of the size and of given velocities, that is told
 WARNING_RTOL = 1e-6
 GAP_TOLERANCE = 1e-9
 MAX_ASSEMBLY = 60

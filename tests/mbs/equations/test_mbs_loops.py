@@ -195,7 +195,9 @@ def test_a_state_of_the_same_bodies_with_other_joints_is_refused(build):
     free.parts.update(joined.parts)
     for one, other in ((joined, free), (free, joined)):
         state = simulate(one, t_end=0.01, dt=1e-3).final
-        with pytest.raises(ConfigError, match=r"the state has \d followed"):
+        with pytest.raises(
+            ConfigError, match=r"the state has \d+ coordinates.* constraints; this mechanism has"
+        ):
             simulate(other, t_end=0.02, dt=1e-3, state=state)
 
 
@@ -205,6 +207,6 @@ def test_a_state_without_the_coil_is_refused():
     state = simulate(bare, t_end=0.01, dt=1e-3).final
     with pytest.raises(
         ConfigError,
-        match="0 followed joint coordinates and remembered numbers; this mechanism has 7, 6, 5",
+        match="0 followed joint coordinates and remembered numbers; this mechanism has 1",
     ):
         simulate(wound, t_end=0.02, dt=1e-3, state=state)
