@@ -105,7 +105,6 @@ def test_films_of_a_spinning_rotor_carry_as_those_of_a_turning_frame(speed):
 
 
 @pytest.mark.parametrize(("build", "most"), [
-    (lambda: carried("spin", 200.0), 2500),  # 4214 before, in a minute, and no word of the turning
     (lambda: dragged(0.5), 100),  # 602 before
 ])  # fmt: skip
 def test_a_rotor_that_nothing_holds_against_its_drag_is_named_soon(build, most, monkeypatch):
