@@ -23,14 +23,13 @@ from rom.updating.family_model import Attached, Family, FamilyModel, Parts, fami
 from rom.updating.frf_data import Complex, beside_poles
 from rom.updating.measured import Responses
 from rom.updating.methods import Update
-from rom.updating.models import modal
+from rom.updating.models import chi_row, modal
 from rom.updating.normal_equations import Data, Sums, responses_at, sums
 from rom.updating.verdict import (
     LEFT_LOG_LEVEL,
     Updated,
     band,
     check_channels,
-    chi_row,
     likeness,
     scores,
     suspects,

@@ -5,8 +5,8 @@ import sys
 
 import pytest
 
+from cases.figures.pictures import faults
 from cases.files.demos import DEMOS, LONG_DEMOS, check
-from cases.files.pictures import faults
 from cases.long import ROM_LONG
 from rom.view.canvas.picture import Picture
 

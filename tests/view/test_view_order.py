@@ -14,7 +14,7 @@ pytest.importorskip("matplotlib", reason="pictures need matplotlib")
 
 from matplotlib.figure import Figure
 
-from cases.files.pictures import faults
+from cases.figures.pictures import faults
 from cases.long import few
 from cases.mbs.drawn import lattice_bar, squeezed, swinging
 from cases.paths import ROOT

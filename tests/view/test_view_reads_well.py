@@ -7,7 +7,7 @@ pytest.importorskip("matplotlib", reason="pictures need matplotlib")
 
 from matplotlib.figure import Figure
 
-from cases.files.pictures import faults
+from cases.figures.pictures import faults
 from rom.view.figures.curves import line_look
 
 X = np.linspace(0.0, 1.0, 9)

@@ -1,0 +1,1 @@
+"""Figures as readers see them."""
