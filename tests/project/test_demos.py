@@ -5,12 +5,14 @@ import sys
 
 import pytest
 
+pytest.importorskip("dolfinx", reason="demos start from finite elements")
+pytest.importorskip("matplotlib", reason="pictures need matplotlib")
+
 from cases.figures.pictures import faults
 from cases.files.demos import DEMOS, LONG_DEMOS, check
 from cases.long import ROM_LONG
 from rom.view.canvas.picture import Picture
 
-pytest.importorskip("dolfinx", reason="demos start from finite elements")
 pytestmark = [pytest.mark.fenicsx, pytest.mark.slow]
 ALONE = [demo for demo in DEMOS if ROM_LONG or demo.stem not in LONG_DEMOS]
 
