@@ -87,8 +87,8 @@ def simulate(  # noqa: PLR0913  keywords of the one entry, most have defaults
             ``keep=rom.Keeping("run.parts")``, then ``rom.Keeping("run.parts", resume=True)``. With
             ``t_end`` before the time reached this reads the motion without moving on.
         assemble: move the start as far as joints and drives ask for it, without a word. Else a
-            change from 1e-6 of the size, or of given velocities, is told, and gaps from 1e-2 of
-            the size are refused. ``statistics["closed"]`` is the largest change.
+            change from 1e-6 of the size, or of given velocities, is told.
+            ``statistics["closed"]`` is the largest change.
 
     Returns:
         The motion, start and end included.
