@@ -157,6 +157,11 @@ def test_what_is_compared_has_one_scale(draw):
     assert not faults(figure)
 
 
+def test_curves_that_coincide_are_all_seen():
+    curves = {f"curve {k}": (X, X) for k in range(5)}
+    assert not faults(view.panels([[view.Panel("Five", "x [m]", "y [m]", curves)]]))
+
+
 def box_at(x, **more):
     return view.Thing(*view.box((1.0, 1.0, 1.0), (x, 0.0, 0.0)), **more)
 

@@ -148,3 +148,10 @@ def directed_edges(triangles: Index) -> tuple[Index, Index]:
     """(3 t, 2) edges of all triangles and (3 t,) the triangle of each."""
     pairs = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
     return pairs, np.repeat(np.arange(len(triangles)), 3)
+
+
+def boundary(triangles: Index) -> Index:
+    """(m, 2) edges that belong to one triangle."""
+    pairs = np.sort(directed_edges(triangles)[0], axis=1)
+    edges, count = np.unique(pairs, axis=0, return_counts=True)
+    return edges[count == 1]

@@ -28,6 +28,7 @@ LEVEL_STYLE = {"color": GREY, "ls": "-.", "lw": 0.9, "zorder": 1.5}
 RAYS_LABEL = "multiples of the speed"
 MAX_TICKS = 10  # sizes that have room for a tick each
 TICK_DISTANCE = 0.03  # least distance of words of ticks, of a logarithmic axis
+COVERED, COVER_WIDTH = 1.5, 2.4  # apart [pixel]; by which a curve below is wider [point]
 MIN_ERROR = 1e-12  # errors below are drawn there: round-off has no meaning
 
 
@@ -359,9 +360,7 @@ def _same_sizes(areas: Sequence[Any], sizes: list[Any]) -> None:
     ticks = np.unique(np.concatenate([np.asarray(x, dtype=float) for x in sizes]))
     low, high = ticks[0] / 1.15, ticks[-1] * 1.15
     if ticks.size > MAX_TICKS:
-        decades = 10.0 ** np.arange(np.floor(np.log10(low)), np.ceil(np.log10(high)))
-        ticks = np.outer(decades, [1, 2, 5]).ravel()
-        ticks = ticks[(ticks >= low) & (ticks <= high)]
+        ticks = _round(low, high)
     for axes in areas:
         axes.set_xticks(ticks, _apart(ticks, high / low))
         axes.minorticks_off()
@@ -378,11 +377,16 @@ def near_ticks(axis: Any) -> None:
 
     low, high = axis.get_view_interval()
     if high < 100 * low:
-        powers = 10.0 ** np.arange(np.floor(np.log10(low)), np.ceil(np.log10(high)) + 1)
-        ticks = np.outer(powers, (1.0, 2.0, 5.0)).ravel()
-        ticks = ticks[(ticks >= low) & (ticks <= high)]
+        ticks = _round(low, high)
         axis.set_ticks(ticks, [f"{x:g}" for x in ticks])
         axis.set_minor_formatter(NullFormatter())
+
+
+def _round(low: float, high: float) -> Array:
+    """1, 2 and 5 times powers of ten from low to high."""
+    powers = 10.0 ** np.arange(np.floor(np.log10(low)), np.ceil(np.log10(high)) + 1)
+    ticks = np.outer(powers, (1.0, 2.0, 5.0)).ravel()
+    return ticks[(ticks >= low) & (ticks <= high)]
 
 
 def _once(legends: Sequence[Sequence[str]]) -> list[list[str]]:
@@ -440,16 +444,58 @@ def _panels(
 
 def finish(axes: Any, *, legend: bool, alike: bool = False, size: float = page.BODY_SIZE) -> None:
     """Grid, spines, units, size of the names of axes, and legend of the house."""
+    _uncover(axes)
     readable(axes, alike=alike)
     for axis in (axes.xaxis, axes.yaxis):
         axis.label.set_size(size)
     axes.tick_params(labelsize=page.SMALL_SIZE)
-    axes.grid(color="#dfe3e8", lw=0.6)
+    if not axes.images:
+        axes.grid(color="#dfe3e8", lw=0.6)
     axes.set_axisbelow(True)
     for side in ("top", "right"):
         axes.spines[side].set_visible(False)
     if legend and axes.get_legend_handles_labels()[1]:
         axes.legend(fontsize=page.SMALL_SIZE, framealpha=0.9, edgecolor="none")
+
+
+def fill(
+    figure: Any, areas: Sequence[Any], drawings: Sequence[Any], draw: Any, *, legend: bool
+) -> None:
+    """Draw the diagrams and scenes of a page, each into its area, those compared in one scale.
+
+    Args:
+        figure: the page.
+        areas: of it.
+        drawings: scenes, and what has curves and may be drawn to scale.
+        draw: of axes, a drawing, and the number of the look of each named curve of it.
+        legend: whether a diagram has its own.
+    """
+    scenes = [drawing for drawing in drawings if isinstance(drawing, Scene)]
+    drawn = []
+    for axes, drawing in zip(areas, drawings, strict=True):
+        if isinstance(drawing, Scene):
+            draw_scene(figure, axes, drawing, scenes)
+        else:
+            drawn.append((axes, drawing))
+    names = [[name for name in x.curves if not name.startswith("_")] for _, x in drawn]
+    for (axes, x), own, looks in zip(drawn, names, numbered(names), strict=True):
+        draw(axes, x, dict(zip(own, looks, strict=True)))
+    one_scale([axes for axes, x in drawn if getattr(x, "extent", None) is None])
+    for axes, x in drawn:
+        if x.equal and not axes.images:
+            _same_scale(axes)
+        finish(axes, legend=legend, alike=x.equal, size=page.SMALL_SIZE)
+
+
+def _uncover(axes: Any) -> None:
+    """A curve that lies under another one of its dashes all along is wider, so that it shows."""
+    seen = [(line, line.get_linestyle(), axes.transData.transform(line.get_xydata()))
+            for line in axes.lines if line.get_linestyle() != "None"]  # fmt: skip
+    for k, (line, dashes, x) in enumerate(seen):
+        above = sum(dashes == other and x.shape == y.shape
+                    and np.allclose(x, y, 0.0, COVERED, equal_nan=True)
+                    for _, other, y in seen[k + 1 :])  # fmt: skip
+        line.set_linewidth(line.get_linewidth() + COVER_WIDTH * above)
 
 
 def one_scale(areas: Sequence[Any]) -> None:
@@ -466,7 +512,7 @@ def one_scale(areas: Sequence[Any]) -> None:
             axes.set_ylim(np.min(y), np.max(y))
 
 
-def same_scale(axes: Any) -> None:
+def _same_scale(axes: Any) -> None:
     """Widen the shorter axis until a metre is as long on both."""
     shape = axes.get_window_extent().size
     limits = np.array([axes.get_xlim(), axes.get_ylim()])

@@ -12,16 +12,8 @@ from rom.errors import ConfigError
 from rom.model import Array
 from rom.view.canvas import page
 from rom.view.canvas.offscreen import COLOUR_MAP
-from rom.view.figures.curves import (
-    LINES,
-    MARKERS,
-    finish,
-    line_look,
-    numbered,
-    one_scale,
-    same_scale,
-)
-from rom.view.figures.things import Scene, draw_scene
+from rom.view.figures.curves import LINES, MARKERS, fill, line_look
+from rom.view.figures.things import Scene
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -110,7 +102,7 @@ def plane(
         raise ConfigError("there is nothing to draw.")
     if ax is not None:
         figure, areas = page.taken(ax, len(drawings), "plane")
-        _draw_all(figure, areas, drawings)
+        fill(figure, areas, drawings, _draw, legend=False)
         return page.save(figure, path)
     rows = -(-len(drawings) // columns)
     gap = ROW_GAP if any(map(_named, drawings)) else BARE_GAP
@@ -124,7 +116,7 @@ def plane(
             narrow = BAR_WIDTH if isinstance(drawing, Drawing) and drawing.label else 0
             top = 110 + row * (height + gap)
             areas.append(page.area(figure, left, top, width - narrow, height))
-        _draw_all(figure, areas, drawings)
+        fill(figure, areas, drawings, _draw, legend=False)
         return page.save(figure, path)
 
 
@@ -134,29 +126,7 @@ def _named(drawing: Drawing | Scene) -> bool:
     return any(not name.startswith("_") for name in names)
 
 
-def _draw_all(figure: Any, areas: Sequence[Any], drawings: Sequence[Drawing | Scene]) -> None:
-    """Draw all of a page."""
-    scenes = [drawing for drawing in drawings if isinstance(drawing, Scene)]
-    for axes, scene in zip(areas, drawings, strict=True):
-        if isinstance(scene, Scene):
-            draw_scene(figure, axes, scene, scenes)
-    drawn = [(axes, drawing) for axes, drawing in zip(areas, drawings, strict=True)
-             if isinstance(drawing, Drawing)]  # fmt: skip
-    numbers = numbered([[*drawing.curves] for _, drawing in drawn])
-    for (axes, drawing), looks in zip(drawn, numbers, strict=True):
-        _draw(figure, axes, drawing, looks)
-    one_scale([axes for axes, drawing in drawn if drawing.extent is None])
-    for axes, drawing in drawn:
-        if drawing.equal and drawing.shade is None:
-            same_scale(axes)
-        finish(axes, legend=False, alike=drawing.equal, size=page.SMALL_SIZE)
-        axes.grid(drawing.shade is None)
-        if axes.get_legend_handles_labels()[0]:
-            place = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.15), "borderaxespad": 0.0}
-            axes.legend(fontsize=page.SMALL_SIZE, frameon=False, ncol=3, **place)
-
-
-def _draw(figure: Any, axes: Any, drawing: Drawing, numbers: Sequence[int]) -> None:
+def _draw(axes: Any, drawing: Drawing, numbers: dict[str, int]) -> None:
     axes.set_title(drawing.title, size=page.BODY_SIZE, loc="left")
     axes.set_xlabel(drawing.x)
     axes.set_ylabel(drawing.y)
@@ -167,11 +137,11 @@ def _draw(figure: Any, axes: Any, drawing: Drawing, numbers: Sequence[int]) -> N
             aspect="equal" if drawing.equal else "auto",
             interpolation="bilinear" if min(drawing.shade.shape) > MANY_CELLS else "nearest",
         )  # fmt: skip
-        _colour_bar(figure, axes, image, drawing)
-    _fill(figure, axes, drawing)
-    for k, (label, curves) in zip(numbers, drawing.curves.items(), strict=True):
+        _colour_bar(axes, image, drawing)
+    _fill(axes, drawing)
+    for k, (label, curves) in enumerate(drawing.curves.items()):
         for n, curve in enumerate(curves):
-            look = line_look(k)
+            look = line_look(numbers.get(label, k))
             look |= {"lw": 2.0, "zorder": look["zorder"] + 1.0}
             look |= {"color": "white", "lw": 1.0} if over else {}
             axes.plot(*curve.T, label=label if n == 0 else f"_{label}", **look)
@@ -184,11 +154,14 @@ def _draw(figure: Any, axes: Any, drawing: Drawing, numbers: Sequence[int]) -> N
     if drawing.extent is not None:
         axes.set_xlim(drawing.extent[:2])
         axes.set_ylim(drawing.extent[2:])
+    if axes.get_legend_handles_labels()[0]:
+        place = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.15), "borderaxespad": 0.0}
+        axes.legend(fontsize=page.SMALL_SIZE, frameon=False, ncol=3, **place)
 
 
-def _colour_bar(figure: Any, axes: Any, coloured: Any, drawing: Drawing) -> None:
+def _colour_bar(axes: Any, coloured: Any, drawing: Drawing) -> None:
     coloured.set_clim(drawing.limits)
-    bar = figure.colorbar(coloured, ax=axes, fraction=0.05, pad=0.03)
+    bar = axes.figure.colorbar(coloured, ax=axes, fraction=0.05, pad=0.03)
     bar.set_label(drawing.label, size=page.SMALL_SIZE)
     bar.ax.tick_params(labelsize=page.SMALL_SIZE)
 
@@ -214,7 +187,7 @@ def _draw_levels(axes: Any, drawing: Drawing) -> None:
                   bbox={"fc": "#22262b", "ec": "none", "alpha": 0.65, "pad": 1.2})  # fmt: skip
 
 
-def _fill(figure: Any, axes: Any, drawing: Drawing) -> None:
+def _fill(axes: Any, drawing: Drawing) -> None:
     """Draw polygons, and their colour bar when they have values."""
     if not len(drawing.polygons):
         return
@@ -227,5 +200,5 @@ def _fill(figure: Any, axes: Any, drawing: Drawing) -> None:
         values = np.asarray(drawing.values, dtype=float)
         blocks = PolyCollection(drawing.polygons, array=values, cmap=COLOUR_MAP, **look)
         axes.add_collection(blocks)
-        _colour_bar(figure, axes, blocks, drawing)
+        _colour_bar(axes, blocks, drawing)
     axes.autoscale_view()

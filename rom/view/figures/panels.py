@@ -12,18 +12,8 @@ from rom.errors import ConfigError
 from rom.view.canvas import page
 from rom.view.canvas.scales import without_round_off
 from rom.view.canvas.scene import TEXT_COLOUR
-from rom.view.figures.curves import (
-    LINES,
-    MARKERS,
-    PAGE_WIDTH,
-    finish,
-    line_look,
-    near_ticks,
-    numbered,
-    one_scale,
-    same_scale,
-)
-from rom.view.figures.things import Scene, below_height, draw_scene, seen
+from rom.view.figures.curves import LINES, MARKERS, PAGE_WIDTH, fill, line_look, near_ticks
+from rom.view.figures.things import Scene, below_height, seen
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -100,7 +90,7 @@ def panels(
     diagrams = [panel for row in rows for panel in row]
     if ax is not None:
         figure, areas = page.taken(ax, len(diagrams), "panels")
-        _fill(figure, areas, diagrams, alone=True)
+        fill(figure, areas, diagrams, _draw, legend=True)
         return page.save(figure, path)
     with page.styled():
         legends = [_legend_height(row) for row in rows]
@@ -115,7 +105,7 @@ def panels(
                 more = (legend, BOTTOM_MARGIN) if isinstance(panel, Scene) else (0, 0)
                 areas.append(page.area(figure, left, top - more[0], width, height + sum(more)))
                 above.append((width, legend))
-        _fill(figure, areas, diagrams, alone=False)
+        fill(figure, areas, diagrams, _draw, legend=False)
         for axes, panel, (width, legend) in zip(areas, diagrams, above, strict=True):
             if isinstance(panel, Panel):
                 page.legend_above(axes, width, legend)
@@ -166,34 +156,12 @@ def _is_named(name: str) -> bool:
     return not name.startswith("_")
 
 
-def _fill(
-    figure: Any, areas: Sequence[Any], diagrams: Sequence[Panel | Scene], *, alone: bool
-) -> None:
-    """Draw all diagrams of a page; alone, with their legends where there is room."""
-    scenes = [panel for panel in diagrams if isinstance(panel, Scene)]
-    for area, scene in zip(areas, diagrams, strict=True):
-        if isinstance(scene, Scene):
-            draw_scene(figure, area, scene, scenes)
-    drawn = [(area, panel) for area, panel in zip(areas, diagrams, strict=True)
-             if isinstance(panel, Panel)]  # fmt: skip
-    numbers = numbered([list(filter(_is_named, panel.curves)) for _, panel in drawn])
-    for (area, panel), looks in zip(drawn, numbers, strict=True):
-        _draw(area, panel, looks)
-    one_scale([area for area, _ in drawn])
-    for area, panel in drawn:
-        if panel.equal:
-            same_scale(area)
-        finish(area, legend=alone, alike=panel.equal, size=page.SMALL_SIZE)
-
-
-def _draw(axes: Any, panel: Panel, numbers: Sequence[int]) -> None:
+def _draw(axes: Any, panel: Panel, numbers: Mapping[str, int]) -> None:
     """A diagram with the looks of its named curves."""
     curves, points = _lines(panel)
-    named = _named(panel)
     for name, line in curves.items():
-        k = numbers[named.index(name)] if name in named else 0
-        guide = name not in named and (len(curves) > 1 or bool(points))
-        axes.plot(*line, label=name, **(GUIDE_STYLE if guide else line_look(k)))
+        guide = name not in numbers and (len(curves) > 1 or bool(points))
+        axes.plot(*line, label=name, **(GUIDE_STYLE if guide else line_look(numbers.get(name, 0))))
     for name, line in points.items():
         mark = MARKERS[[n for n in points if _is_named(n)].index(name)] if _is_named(name) else "o"
         look = {"mec": "#22262b", "mfc": "none", "ms": 4.0, "mew": 0.8}

@@ -77,7 +77,7 @@ def _pixels(axes: Axes, line: Any) -> np.ndarray:
 
 
 def _hidden(axes: Axes) -> list[str]:
-    """Named curves under another one without gaps."""
+    """Named curves under another one that has no gaps and is as wide."""
     named = [line for line in _seen(axes) if not line.get_label().startswith("_")
              and line.get_linestyle() != "None"]  # fmt: skip
     found = []
@@ -90,8 +90,9 @@ def _hidden(axes: Axes) -> list[str]:
         if np.nanmax(np.abs(apart)) > 1.0:
             continue
         above = max((one, other), key=lambda line: (line.get_zorder(), axes.lines.index(line)))
-        if above.get_linestyle() == "-":
-            below = other if above is one else one
+        below = other if above is one else one
+        covers = above.get_linestyle() in ("-", below.get_linestyle())
+        if covers and below.get_linewidth() < above.get_linewidth() + 1.0:
             found.append(f"{_title(axes)!r}: {above.get_label()!r} hides {below.get_label()!r}")
     return found
 
