@@ -206,7 +206,7 @@ def gallery(impact, steps):
 
 def chain():
     """Three masses on three springs, from top to bottom in the colours of their forces."""
-    ball, plate = view.ellipsoid((0.45,) * 3, (0, 0, 2.95)), view.box((4.5, 3.5, 0.2), (0, 0, 0.7))
+    ball, plate = view.ellipsoid((0.45,) * 3, (0, 0, 2.95)), view.box((4.5, 1.6, 0.2), (0, 0, 0.7))
     springs = [view.coil((0, 0, low), (0, 0, high), 0.4, 0.06, turns=4)
                for low, high in ((1.8, 2.5), (0.8, 1.4), (0.0, 0.6))]  # fmt: skip
     names = ("spring of the cushion", "in shear", "in bending")
@@ -214,7 +214,7 @@ def chain():
         "_boulder": (ball, "rock"),
         "_plug": (view.box((0.7, 0.7, 0.4), (0, 0, 1.6)), "sand"),
         "_slab": (plate, "walls"),
-        "_ground": (view.box((4.8, 3.8, 0.1), (0, 0, -0.05)), "walls"),
+        "_ground": (view.box((4.8, 1.9, 0.1), (0, 0, -0.05)), "walls"),
     }
     return ({n: view.Thing(*mesh, PARTS[part]) for n, (mesh, part) in masses.items()}
             | {n: view.Thing(*mesh, colour)

@@ -180,7 +180,8 @@ def rotor(instant):
 along = np.append(0.0, np.cumsum(rod.h))
 apart = {name: (along, np.linalg.norm(x - bent["rod"], axis=1))
          for name, x in bent.items() if name != "rod"}  # fmt: skip
-whole = {name: (x[:, 2] - HUB_RADIUS, x[:, 0]) for name, x in bent.items()}
+whole = {name: (bent[name][:, 2] - HUB_RADIUS, bent[name][:, 0])
+         for name in ("rod", "linear bodies: 1")}  # fmt: skip
 iron_hub = view.posed(mech, rest, 0.0, title="Hub under this load, deformed 1000 times larger",
                       magnify=1e3, symbols=False, view=(0.5, 1.0, 0.4), up=(0, 0, 1))  # fmt: skip
 iron_hub = replace(iron_hub, things={k: x for k, x in iron_hub.things.items()

@@ -461,14 +461,9 @@ def finish(axes: Any, *, legend: bool, alike: bool = False, size: float = page.B
 def fill(
     figure: Any, areas: Sequence[Any], drawings: Sequence[Any], draw: Any, *, legend: bool
 ) -> None:
-    """Draw the diagrams and scenes of a page, each into its area, those compared in one scale.
+    """Draw diagrams and scenes of a page into its areas, those compared in one scale.
 
-    Args:
-        figure: the page.
-        areas: of it.
-        drawings: scenes, and what has curves and may be drawn to scale.
-        draw: of axes, a drawing, and the number of the look of each named curve of it.
-        legend: whether a diagram has its own.
+    A diagram is drawn by ``draw(axes, drawing, {name of a curve: number of its look})``.
     """
     scenes = [drawing for drawing in drawings if isinstance(drawing, Scene)]
     drawn = []

@@ -94,8 +94,7 @@ def panels(
         return page.save(figure, path)
     with page.styled():
         legends = [_legend_height(row) for row in rows]
-        heights = [PANEL_HEIGHT + SCENE_MORE * any(isinstance(x, Scene) for x in row)
-                   for row in rows]  # fmt: skip
+        heights = [_height(row) for row in rows]
         feet = 65 + np.cumsum(np.add(legends, heights) + TOP_MARGIN + BOTTOM_MARGIN)
         figure = page.titled(PAGE_WIDTH, int(feet[-1]) + 5, title, caption)
         areas, above = [], []
@@ -129,6 +128,17 @@ def _columns(row: Sequence[Panel | Scene]) -> list[tuple[float, float]]:
         end += width
         columns.append((left, end - RIGHT_MARGIN - left))
     return columns
+
+
+def _height(row: Sequence[Panel | Scene]) -> int:
+    """Of the diagrams of a row; of scenes alone, what they fill [pixel]."""
+    scenes, width = [x for x in row if isinstance(x, Scene)], int(_columns(row)[0][1])
+    highest = PANEL_HEIGHT + SCENE_MORE * bool(scenes)
+    if len(scenes) < len(row):
+        return highest
+    views = [seen(x, width, (0.0, 9.0), frames=slice(1), among=scenes) for x in scenes]
+    filled = [view.camera.size[1] + below_height(view.scene, width) for view in views]
+    return min(highest, max(filled) - BOTTOM_MARGIN)
 
 
 def _filled(scene: Scene) -> float:

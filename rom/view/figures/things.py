@@ -168,15 +168,7 @@ def film(
 
 
 def draw_scene(figure: Any, axes: Any, scene: Scene, among: Sequence[Scene] = ()) -> None:
-    """Draw the first picture of a scene into axes of a figure, with what stands below it.
-
-    Scenes of a page that show the same things from the same side have one scale.
-
-    Args:
-        figure: the figure.
-        axes: of it.
-        scene: what is seen.
-        among: all scenes of the page.
+    """Draw the first picture of a scene, among others, into axes; what stands below it, too.
 
     Raises:
         ConfigError: if something is no thing, or pictures cannot be made here.
@@ -186,9 +178,8 @@ def draw_scene(figure: Any, axes: Any, scene: Scene, among: Sequence[Scene] = ()
     left, right, top = place.x0 * wide, place.x1 * wide, (1 - place.y1) * tall
     width = round(right - left)
     height = max(2, round(place.height * tall) - below_height(scene, width))
-    alike = [one for one in among if one is not scene and _side(one) == _side(scene)]
     highest = height / width
-    view = seen(scene, width, (min(HEIGHTS[0], highest), highest), frames=slice(1), alike=alike)
+    view = seen(scene, width, (min(HEIGHTS[0], highest), highest), frames=slice(1), among=among)
     image = view.drawn()[0]
     axes.set_title(scene.title, size=page.BODY_SIZE, loc="left")
     axes.set_axis_off()
@@ -222,17 +213,13 @@ def seen(
     heights: tuple[float, float] = HEIGHTS,
     *,
     frames: slice = slice(None),
-    alike: Sequence[Scene] = (),
+    among: Sequence[Scene] = (),
 ) -> View:
-    """A scene on so many pixels; in plain colours if too little of it shows values.
+    """A scene on a picture of that width [pixel]; plain if too little of it shows values.
 
-    Args:
-        scene: what is seen.
-        width: of the picture [pixel].
-        heights: bounds of its height, of its width.
-        frames: which pictures of a film.
-        alike: other scenes with the same scale and colours.
+    Scenes ``among`` others that show the same things from the same side have one scale.
     """
+    alike = [one for one in among if one is not scene and _side(one) == _side(scene)]
     actors, others = (
         [replace(a, points=a.points[frames], values=None if a.values is None else a.values[frames])
          for one in some for a in actors_of(one)] for some in ((scene,), alike)
@@ -291,6 +278,13 @@ def thing_actors(name: str, thing: Thing | Mesh, colour: str) -> list[Actor]:
         values = np.broadcast_to(values, points.shape[:2])
     body = Actor(points, cells, values, colour, thing.width, thing.opacity)
     return [body, *_edges(name, thing, points, cells)]
+
+
+def as_thing(actor: Actor, frames: slice = slice(None)) -> Thing:
+    """An actor as a thing without edges, or some of its pictures."""
+    values = None if actor.values is None else actor.values[frames]
+    return Thing(actor.points[frames], actor.cells, actor.colour, values, actor.opacity,
+                 actor.width, NO_LINES)  # fmt: skip
 
 
 def _edges(name: str, thing: Thing, points: Array, cells: Index) -> list[Actor]:

@@ -19,10 +19,9 @@ from rom.view.canvas.solids import Mesh
 from rom.view.canvas.symbols import polyline
 from rom.view.figures.things import (
     FILM_WIDTH,
-    NO_LINES,
     STILL_WIDTH,
     Scene,
-    Thing,
+    as_thing,
     film,
     seen,
     series_page,
@@ -141,20 +140,9 @@ def posed(  # noqa: PLR0913  keywords of one picture, all with defaults
     view: npt.ArrayLike | None = None,
     up: npt.ArrayLike | None = None,
 ) -> Scene:
-    """The mechanism at an instant as a `Scene`, to stand beside curves; otherwise as `animate`.
+    """The mechanism at an instant [s] as a `Scene`, to stand beside curves; otherwise as `animate`.
 
-    Args:
-        mechanism: the mechanism.
-        solution: its motion.
-        time: the instant [s]; the step nearest to it is drawn. Colours, rails and planes are those
-            of the whole motion.
-        title: what is seen.
-        shapes: {body: (points (n, 3), triangles (t, 3))} in the frame of a rigid body.
-        magnify: deformations are drawn so many times larger than they are [1].
-        symbols: draw joints, springs, planes of contact and the ground, too.
-        traces: bodies whose origin leaves a line behind, all of its way.
-        view: (3,) direction from the things to the eye [1]; None: mainly along the shortest extent.
-        up: (3,) upright direction [1]; None: against gravity, or across the longest extent without.
+    The step nearest to the time is drawn. Colours, rails and planes are those of the whole motion.
 
     Raises:
         ConfigError: for an unknown body.
@@ -199,11 +187,7 @@ class Stage:
 
     def scene(self, title: str, view: Any, up: Any, frames: slice = slice(None)) -> Scene:
         """Some of its pictures, in the colours of all of them."""
-        things: dict[str, Thing | Mesh] = {
-            f"_{k}": Thing(a.points[frames], a.cells, a.colour,
-                           None if a.values is None else a.values[frames], a.opacity, a.width,
-                           NO_LINES) for k, a in enumerate(self.actors)
-        }  # fmt: skip
+        things = {f"_{k}": as_thing(actor, frames) for k, actor in enumerate(self.actors)}
         label = f"deformation of {self.name} [{self.unit}]"
         return Scene(title, things, label, view, up, self.limits)
 

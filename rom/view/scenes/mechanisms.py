@@ -11,7 +11,7 @@ from rom.view.canvas import page
 from rom.view.canvas.scene import Actor
 from rom.view.canvas.solids import Mesh
 from rom.view.figures.things import COLOURS as COLOURS
-from rom.view.figures.things import NO_LINES, Scene, Thing, actors_of, scene_page, seen
+from rom.view.figures.things import Scene, Thing, actors_of, as_thing, scene_page, seen
 from rom.view.scenes.film import Look, symbols_of, together, upright
 from rom.view.scenes.places import at_start, placed
 from rom.view.scenes.rigid import BLOCK_OPACITY, BOX_OPACITY, bars, ends_of, shadow
@@ -77,8 +77,7 @@ def _things(mechanism: Any, *, symbols: bool, up: Any) -> dict[str, Thing | Mesh
         things[name] = Thing(placed(np.asarray(X)[None], pose), triangles, colour, opacity=opacity)
         block = None if surface is not None else shadow(part, ends)
         if block is not None:
-            box = placed(block[0][None], pose)
-            things[f"_block {k}"] = Thing(box, block[1], colour, None, BOX_OPACITY, 1.0, NO_LINES)
+            shade = Actor(placed(block[0][None], pose), block[1], None, colour, 1.0, BOX_OPACITY)
+            things[f"_block {k}"] = as_thing(shade)
     more = together(symbols_of(places, Look({}, up=up))) if symbols else []
-    return things | {f"_symbol {k}": Thing(a.points, a.cells, a.colour, None, a.opacity, a.width,
-                                           NO_LINES) for k, a in enumerate(more)}  # fmt: skip
+    return things | {f"_symbol {k}": as_thing(actor) for k, actor in enumerate(more)}

@@ -22,7 +22,7 @@ from matplotlib.ticker import FixedFormatter, FuncFormatter
 from matplotlib.transforms import Bbox
 
 LEAST_SHARE = 0.5  # of a diagram's width and height, that what is drawn takes at least
-LEAST_FILLED = 0.2  # of the room of things in space and of what stands below them
+LEAST_FILLED = 0.17  # of the room of things in space and of what stands below them
 FARTHEST = 30.0  # of a note from what is drawn [pixel]
 SLACK = 2.0  # by which words may overlap or leave a page [pixel]
 
