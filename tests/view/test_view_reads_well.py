@@ -75,6 +75,13 @@ def two_scales(axes):
     other.set(xlabel=axes.get_xlabel(), ylabel=axes.get_ylabel())
 
 
+def squeezed(axes):
+    two_scales(axes)
+    axes.lines[0].set_data(X / 5, X / 5)
+    for one in axes.figure.axes:
+        one.set(xlim=(-0.1, 1.1), ylim=(-0.1, 3.1))
+
+
 def stray(axes):
     axes.plot(X, X)
     axes.annotate("6x", (1.06, 0.5), annotation_clip=False)
@@ -98,6 +105,7 @@ def off_the_page(axes):
         (empty, "takes 10% of the height"),
         (hidden, "'other' hides 'one'"),
         (two_scales, "are compared and have two scales"),
+        (squeezed, "is compared with what is far smaller"),
         (bare, "things take 6% of their room"),
         (without_name, "the horizontal axis has no name"),
         (stray, "'6x' leaves the diagram"),

@@ -22,7 +22,7 @@ from matplotlib.ticker import FixedFormatter, FuncFormatter
 from matplotlib.transforms import Bbox
 
 LEAST_SHARE = 0.5  # of a diagram's width and height, that what is drawn takes at least
-LEAST_FILLED = 0.17  # of the room of things in space and of what stands below them
+LEAST_FILLED = 0.12  # of the room of things in space and of what stands below them
 FARTHEST = 30.0  # of a note from what is drawn [pixel]
 SLACK = 2.0  # by which words may overlap or leave a page [pixel]
 
@@ -138,6 +138,8 @@ def _empty(alike: list[Axes]) -> list[str]:
     if not parts:
         return found
     whole = Bbox.union(parts)
+    if any(max(box.width, box.height) < LEAST_SHARE / 2 for box in parts):
+        found.append(f"{_title(alike[0])!r} is compared with what is far smaller")
     return found + [f"{_title(alike[0])!r}: what is drawn takes {share:.0%} of the {side}"
             for side, share in (("width", whole.width), ("height", whole.height))
             if share < LEAST_SHARE]  # fmt: skip
