@@ -342,7 +342,8 @@ def _name_rays(axes: Any, turns: Array, orders: Sequence[float]) -> None:
             return sum(path.intersects_bbox(box, filled=False) for path in paths)
 
         out = min(turns[-1], 60 * axes.get_ylim()[1] / order)
-        crossed(min(np.linspace(out, turns[0], 60), key=crossed))
+        if crossed(min(np.linspace(out, turns[0], 60), key=crossed)):
+            text.set_bbox({"fc": "white", "ec": "none", "pad": 0.5})
 
 
 def _apart(ticks: Any, span: float) -> list[str]:
