@@ -209,7 +209,7 @@ if first:
                            {"smallest size": (janus, np.interp(janus, t, complexity))}),
             ],
             [
-                view.Panel("The gauge without size: clock pi", "x", "y",
+                view.Panel("The gauge without size: clock pi", "x / size", "y / size",
                            {n: sizeless.x[:, k, :2].T for k, n in enumerate(names)}, equal=True),
                 view.Panel("What it hides", "clock pi", "phi, time",
                            {"scale phi": (D, sizeless.phi), "time, from N": (D, sizeless.time)},

@@ -200,24 +200,24 @@ view.plane(
         view.Scene("The frame, bolted at its corners", things, view=(0.5, -1.0, 0.4), up=(0, 0, 1)),
         view.Drawing(
             "One of 28 measured responses", hertz, size, equal=False,
-            points={"_test": over(f, level(H1[:, c, 0]))[0]},
+            points={"test": over(f, level(H1[:, c, 0]))[0]},
             curves={
-                "mended model": over(fine, level(second.responses(fine)[:, c, 0])), "_": [],
+                "mended model": over(fine, level(second.responses(fine)[:, c, 0])),
                 "refused model": over(fine, level(first.responses(fine)[:, c, 0])),
             },
         ),
         view.Drawing(
             "Where the misfit sits", hertz, "log10 of chi-square over its expectation", equal=False,
             curves={
-                "mended model": over(f, np.log10(second.by_line)), "_": [],
+                "mended model": over(f, np.log10(second.by_line)),
                 "refused model": over(f, np.log10(first.by_line)),
             },
         ),
         view.Drawing(
             "Between two points that were not measured", hertz, size, equal=False,
             curves={
-                "mended model": over(fine, middle), "_object": over(fine, true_db),
-                "refused model": over(fine, db["first"][1]),
+                "mended model": over(fine, middle), "refused model": over(fine, db["first"][1]),
+                "object": over(fine, true_db),
             },
         ),
         view.Drawing(
@@ -236,7 +236,7 @@ view.plane(
     caption="A test with noise of 20 % on responses and 5 % on forces is compared with a reduced "
     "family of solid frames. Without the instrument on the beam, of which the model does not know, "
     "factors of stiffness settle at wrong values and the verdict refuses them; its largest score "
-    "names the instrument. Red: the test, or the object itself. Shaded: 95 of 100 draws of what "
+    "names the instrument. Shaded: 95 of 100 draws of what "
     "the test leaves open.",
 )  # fmt: skip
 

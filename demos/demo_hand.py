@@ -91,8 +91,10 @@ def fingers_as_things(kept):
 
 
 closing = view.Scene(
-    f"Index finger under {', '.join(f'{p.tension:g}' for p in postures[::2])} N",
-    fingers_as_things([built(p, (50 * MM * k, 0, 0)) for k, p in enumerate(postures[::2])]),
+    "Index finger under {:g} and {:g} N, below {:g} and {:g} N".format(
+        *(p.tension for p in postures[::2])),
+    fingers_as_things([built(p, (65 * MM * (k % 2), 0, -80 * MM * (k // 2)))
+                       for k, p in enumerate(postures[::2])]),
     view=(0.2, -1.0, 0.25), up=(0, 0, 1),
 )  # fmt: skip
 
@@ -283,8 +285,11 @@ def together(parts):
     return np.concatenate([points for points, _ in parts], axis=1), np.vstack(cells)
 
 
-def things_of(what, steps, aside=0.0):
-    """Hand, object and table at some steps, moved aside along z."""
+ASIDE = 220 * MM * np.array([0.51, 0.0, -0.86])  # to the right, as seen
+
+
+def things_of(what, steps, aside=(0.0, 0.0, 0.0)):
+    """Hand, object and table at some steps, moved aside (3,)."""
     sol, thing = motions[what], held[what]
     mech, parts = sol.mechanism, {"phalanges": [], "springs": [], "cables": []}
     for name, finger in fingers.items():
@@ -308,7 +313,7 @@ def things_of(what, steps, aside=0.0):
     parts["table"] = [(top[:, None] + plate[0], plate[1])]
     palm = view.box((75 * MM, 90 * MM, 20 * MM), mech.parts["palm"].at)
     parts["palm"] = [(np.repeat(palm[0][None], len(steps), axis=0), palm[1])]
-    return {kind: (points + np.array([0, 0, aside]), cells)
+    return {kind: (points + np.array(aside), cells)
             for kind, (points, cells) in ((k, together(p)) for k, p in parts.items())}  # fmt: skip
 
 
@@ -324,8 +329,10 @@ def scene(title, things):
 
 
 last = motions["bar"].t.size - 1
-beside = {what: [scene(f"{what} at {motions[what].t[k]:g} s", things_of(what, np.array([k])))
-                 for k in (0, last)] for what in held}  # fmt: skip
+shown = {"bar": (0.0, 0.6, 1.6, 2.2), "ball": (0.0, 0.6, 1.2, 2.2)}  # s
+beside = {what: [scene(f"{what} at {time:g} s", things_of(what, np.searchsorted(
+                 motions[what].t, [time - 0.5 * dt]))) for time in times]
+          for what, times in shown.items()}  # fmt: skip
 
 
 def rows(what):
@@ -362,7 +369,7 @@ view.history(
     "the skin carries it, and holds it where it is.",
 )  # fmt: skip
 steps = np.linspace(0, last, 36).round().astype(int)
-both = [things_of("bar", steps), things_of("ball", steps, -220 * MM)]
+both = [things_of("bar", steps), things_of("ball", steps, ASIDE)]
 moving = {kind: together([one[kind] for one in both if kind in one]) for kind in COLOURS}
 view.film(
     motions["bar"].t[steps], scene("A bar and a ball", moving), options.out / "hand_grasp.gif",

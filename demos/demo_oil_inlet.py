@@ -187,8 +187,8 @@ CASES = {
     "clearance": {f"{1e6 * c:.0f} \u00b5m": Films(clearance=c) for c in (3e-5, 5e-5, 1e-4)},
     "housing": {"gives way": Films(), "rigid": Films(rigid=True)},
 }  # fmt: skip
-RPM = np.array([1000, 2000, 3000, 4000, 4250, 4500, 4750, 5000, 6000])
-MIDDLE = 2  # 3000 of them
+RPM = np.array([*range(1000, 4000, 500), *range(4000, 5500, 250), 5500, 6000])
+MIDDLE = 4  # 3000 of them
 runs = {}
 for films in dict.fromkeys(films for case in CASES.values() for films in case.values()):
     found = runs[films] = []
@@ -298,7 +298,7 @@ def wheels(times):
         angle = first[k] + spin * times
         c, s, o, l = np.cos(angle), np.sin(angle), 0 * angle, 1 + 0 * angle
         R = np.array([[c, s, o], [-s, c, o], [o, o, l]]).transpose(2, 0, 1)
-        yield name, view.Thing(points @ R + (k * PAIR.distance, 0, 0), cells, colour)
+        yield name, view.Thing(points @ R + (k * PAIR.distance, 0, 0), cells, colour, opacity=0.4)
 
 
 def walls(loads, lines=3):
@@ -350,7 +350,7 @@ def path(films):
     return tuple(np.transpose([x.journal("pinion near") for x in runs[films]]) / films.clearance)
 
 
-arc = np.radians(np.linspace(-105, -40, 100))
+arc = np.radians(np.linspace(-100, -65, 100))
 ways = CASES["place of the groove"] | {
     x: CASES["clearance"][x] for x in ("30 \u00b5m", "100 \u00b5m")
 }
@@ -370,12 +370,12 @@ if first:
         caption=f"A pinion of {TEETH[0]} teeth, {TORQUE:g} N m, drives a gear of {TEETH[1]}, in a "
         "housing of grey iron that is meshed and reduced; each bearing gets ISO VG 46 from one "
         "groove and warms it. What is not said otherwise: groove opposite to the load, 60 "
-        "\u00b0C, 50 \u00b5m. Above, left: the wall is as high as the load on the line of "
-        "contact. Middle: where a journal rests, from 1000 (low, near the bush) to 6000 turns a "
-        "minute; the grey arc is the clearance. Right and below: largest over mean force between "
-        "the teeth in motion. It peaks where teeth pass as fast as wheels and housing vibrate, or "
-        "at a part of that speed; a rigid housing has its peaks elsewhere. Inlet, oil and "
-        "clearance change them by less than a tenth.",
+        "\u00b0C, 50 \u00b5m. Above, left, drawn as of glass: the wall is as high as the load on "
+        "the line of contact. Middle: where a journal rests, from 1000 (low, near the bush) to "
+        "6000 turns a minute; the grey arc is the clearance. Right and below: largest over mean "
+        "force between the teeth in motion. It peaks where teeth pass as fast as wheels and "
+        "housing vibrate, or at a part of that speed; a rigid housing has its peaks elsewhere. "
+        "Inlet, oil and clearance change them by less than a tenth.",
     )  # fmt: skip
     faces = against_speed("Load across the face: {}", lambda x: x.face_factor, "largest / mean")[:3]
     view.panels(
@@ -399,8 +399,8 @@ if first:
     )  # fmt: skip
     view.film(BASE.t, scene("Load on the teeth", BASE.t, BASE.loads),
               options.out / "oil_inlet.gif", seconds=3.0,
-              caption="A mesh period at 3000 turns a minute: the wall on each line of "
-              "contact is as high as its load.")  # fmt: skip
+              caption="A mesh period at 3000 turns a minute, wheels and housing as of glass: "
+              "the wall on each line of contact is as high as its load.")  # fmt: skip
 
 # ## What to remember
 #

@@ -2,8 +2,8 @@
 #
 # A sun drives three planets inside a ring that is held; they carry an arm round, which is braked.
 # The arm is meshed with gmsh and reduced, and its pins give way. All teeth touch on both flanks,
-# with backlash; the arm runs on two ball bearings. In a second run a tooth of one planet stands
-# out.
+# with backlash; the arm runs on two ball bearings. In a second run a tooth of one planet stands out
+# on the flank that the sun drives.
 #
 # Run: `python demos/demo_planetary.py`
 # Writes: `planetary_motion.png` and `planetary.png` into `out/`; another folder with `--out`
@@ -58,7 +58,7 @@ say(f"carrier: {arms.mass:.2f} kg, {model.n_dofs} dofs, {arms.n_modes} coordinat
 
 
 def train(*, error):
-    """The mechanism; one tooth of its first planet stands out by the error."""
+    """The mechanism; one tooth of its first planet stands out by the error, towards the sun."""
     mech = rom.Mechanism(gravity=(0, -9.81, 0))
     ground = mech.ground.marker
     bodies = {
@@ -87,7 +87,7 @@ def train(*, error):
         mech.revolute(f"pin {k}", carrier.marker(pin), planet.marker(O), axis=Z)
         teeth = np.where(np.arange(PLANET) == 5, 0.0, error if k == 0 else 0.0)
         law = {"stiffness": table, "damping": 2e-6}
-        with_sun, with_ring = (Correction(**relief, pitch=x) for x in (((), teeth), (teeth, ())))
+        with_sun, with_ring = Correction(**relief, pitch=((), teeth)), Correction(**relief)
         mech.gear_mesh(f"sun and planet {k}", bodies["sun"].marker(O), planet.marker(O), axis=Z,
                        pair=outer, correction=with_sun, **law)  # fmt: skip
         mech.gear_mesh(f"planet {k} and ring", planet.marker(O), bodies["ring"].marker(O),

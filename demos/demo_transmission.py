@@ -194,8 +194,8 @@ for name, k, sign, c in (("_pinion", 0, 1, BUSHES[0][2]), ("_gear", 2, -1, BUSHE
 journals = view.Panel(
     "Where journals rest", "x / clearance", "y / clearance",
     {"_clearance": (np.cos(turn), np.sin(turn))} | paths, points=paths, equal=True,
-    notes={"pinion, 25 N m": (-0.78, -0.22), "500 N m": (-0.52, -0.82),
-           "gear, 25 N m": (-0.68, 0.02), "500 N m ": (0.0, 0.55)},
+    notes={"pinion, 25 N m": (-0.6, -0.22), "500 N m": (-0.42, -0.82),
+           "gear, 25 N m": (-0.5, 0.02), "500 N m ": (0.1, 0.55)},
 )  # fmt: skip
 if first:
     options.out.mkdir(parents=True, exist_ok=True)

@@ -174,6 +174,11 @@ for stage, F in loads.items():
     say(f"{stage}: mean {F[late].mean():.0f} N, largest over mean {ratio:.2f}")
 say(rom.audit(motion))
 
+# All shafts on the coupling, by hand.
+inertia = sum(bodies[name].inertia[2, 2] * x**2 for name, x in zip(PLACE, RATIOS, strict=True))
+twist = np.pi * 0.04**4 / 32 * STEEL.E / (2 * (1 + STEEL.nu)) / 0.09  # from end to wheel
+coupled = np.sqrt(1 / (1 / COUPLING + 1 / twist) / inertia) / (2 * np.pi)
+
 # ## The pictures
 
 if first:
@@ -199,35 +204,36 @@ if first:
     journals = view.Panel(
         "Journals in their bushes", "x / clearance", "z / clearance",
         {"_clearance": (np.cos(turn), np.sin(turn))},
-        points={"_at rest": tuple(np.transpose(place))}, equal=True,
-        notes={"input": (-0.4, 0.12), "middle": (-0.35, -0.42), "output": (0.05, 0.35)},
+        points={f"{name} shaft": tuple(np.transpose(place[2 * k : 2 * k + 2]))
+                for k, name in enumerate(PLACE)}, equal=True,
     )  # fmt: skip
     some = motion.t > 8 * period
     ms = 1e3 * (motion.t[some] - motion.t[some][0])
     low = (vibration.frequencies > 1.0) & (vibration.frequencies < 700.0)
     modes = vibration.frequencies[low], vibration.damping_ratios[low]
+    named = {name: tuple(x[np.argmin(abs(modes[0] - f))] for x in modes)
+             for name, f in (("half-speed whirl", 25.0), ("coupling", coupled))}  # fmt: skip
     highest = max(x.pressure[0] for x in films.values()) / 1e6
     strongest = max((x.force / x.length).max() for x in teeth.values()) / 1e3
     view.panels(
-        [[scene, journals],
+        [[scene, journals,
+          view.Panel("Natural vibrations", "frequency [Hz]", "damping / critical",
+                     points={"_modes": modes}, notes=named)],
          [view.Panel("Load across the face", "along the shafts [mm]", "load / mean",
                      {stage: across([x for x, y in zip(found, late, strict=True) if y], stage)
                       for stage, found in moving.items()}),
           view.Panel("Force between the teeth", "time [ms]", "force [kN]",
-                     {stage: (ms, 1e-3 * F[some]) for stage, F in loads.items()}),
-          view.Panel("Natural vibrations", "frequency [Hz]", "damping / critical",
-                     points={"_modes": modes},
-                     notes={"half-speed whirl": (26, 0.27), "coupling": (98, 0.06)})]],
+                     {stage: (ms, 1e-3 * F[some]) for stage, F in loads.items()})]],
         options.out / "two_stage.png", title="Two stages of gears on six oil films",
         caption="Three solid shafts and a housing, meshed and reduced, at 3000 turns a minute with "
         f"{TORQUE:g} N m on the input shaft. Above, left, the housing drawn as of glass: walls on "
         f"the lines of contact are as high as the load on the teeth, up to {strongest:.0f} N/mm, "
         "those around the journals as the pressure of the oil, up to "
-        f"{highest:.1f} MPa. Right: where both journals of each shaft rest; the circle is the "
-        "clearance. Below, left: mean over time of the load across the faces; shafts, films and "
-        "housing give way, and one end carries more. Middle: tips are relieved, and teeth still "
-        "shake each other. Right: journals that bear little whirl at half the speed of their "
-        "shaft, 25 Hz, but damped.",
+        f"{highest:.1f} MPa. Middle: where both journals of each shaft rest; the circle is the "
+        "clearance. Right: journals that bear little whirl at half the speed of their shaft, 25 "
+        "Hz, but damped. Below, left: mean over time of the load across the faces; shafts, films "
+        "and housing give way, and one end carries more. Right: tips are relieved, and teeth "
+        "still shake each other.",
     )  # fmt: skip
 
 # ## What to remember
@@ -240,9 +246,6 @@ given = abs(still.element("end of input").moment[0, 1, 1]) * SPEED
 one, two = PAIRS.values()
 F, P = (teeth[stage].force.sum() for stage in PAIRS)
 drag = (heat["middle front"] + heat["middle back"]) / abs(SPINS["middle"])
-inertia = sum(bodies[name].inertia[2, 2] * x**2 for name, x in zip(PLACE, RATIOS, strict=True))
-twist = np.pi * 0.04**4 / 32 * STEEL.E / (2 * (1 + STEEL.nu)) / 0.09  # from end to wheel
-coupled = np.sqrt(1 / (1 / COUPLING + 1 / twist) / inertia) / (2 * np.pi)
 f = vibration.frequencies
 half = f[np.argsort(abs(f - 25.0))[:2]]
 results = {

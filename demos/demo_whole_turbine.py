@@ -156,8 +156,7 @@ view.history(
     "rigid. A torque that is limited and vanishes at 12.1 turns a minute starts the rotor from "
     "rest. Blades lag behind while they gain speed and swing under their weight once a turn, a "
     "third of a turn after each other. The tower leans upwind under the weight of the rotor; the "
-    "torque tilts it sideways, where it sways at its own 0.31 Hz. Colours: how far the hub gives "
-    "way.",
+    "torque tilts it sideways, where it sways at its own 0.31 Hz.",
 )  # fmt: skip
 
 # ## The film

@@ -183,8 +183,8 @@ loads = view.Thing(*view.joined(arrows), "#d1495b", edges=np.zeros((0, 2), dtype
 seen = dataclasses.replace(seen, things=seen.things | {"force of the wind": loads})
 tips = {f"blade {k + 1}": (motion.t, plant.tip(motion, k)[:, 0]) for k in range(3)}
 view.panels(
-    [[hub_scene, seen],
-     [Panel("Tips out of the plane", "time [s]", "downwind [m]", tips),
+    [[hub_scene, Panel("Tips out of the plane", "time [s]", "downwind [m]", tips)],
+     [seen,
       Panel("Torque on the shaft", "time [s]", "torque [MN m]",
             {"turbine that bends": (motion.t[1:], -motion.drive_load("speed")[1:] / MN),
              "rigid rotor, mean of a turn": (motion.t[[1, -1]], [point.torque / MN] * 2)})]],
@@ -193,7 +193,7 @@ view.panels(
     "and twenty shapes; three rods stand on it. The rotor is held at the speed that the control "
     "gives at 8 m/s; the wind comes from the left at once, so that blades, shaft and tower swing "
     "for a while, mostly the rotor on its twisting shaft at 0.6 Hz. Arrows: what the wind does to "
-    "each strip, 8 m for 1 kN/m. Colours: how far the hub gives way.",
+    "each strip, 8 m for 1 kN/m.",
 )  # fmt: skip
 
 # ## What to remember

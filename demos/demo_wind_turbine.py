@@ -180,8 +180,8 @@ def rotor(instant):
 along = np.append(0.0, np.cumsum(rod.h))
 apart = {name: (along, np.linalg.norm(x - bent["rod"], axis=1))
          for name, x in bent.items() if name != "rod"}  # fmt: skip
-whole = {"rod": (bent["rod"][:, 2] - HUB_RADIUS, bent["rod"][:, 0]),
-         "_straight": (rod.x[:, 2] - HUB_RADIUS, rod.x[:, 0])}  # fmt: skip
+whole = {name: (bent[name][:, 2] - HUB_RADIUS, bent[name][:, 0])
+         for name in ("rod", "linear bodies: 1")}  # fmt: skip
 iron_hub = view.posed(mech, rest, 0.0, title="Hub under this load, deformed 1000 times larger",
                       magnify=1e3, symbols=False, view=(0.5, 1.0, 0.4), up=(0, 0, 1))  # fmt: skip
 iron_hub = replace(iron_hub, things={k: x for k, x in iron_hub.things.items()
@@ -192,7 +192,7 @@ adds = Panel("A hub of cast iron adds", "along it [m]", "downwind [mm]",
              {"unit load": ([61.5], [1e3 * by_unit_load])})  # fmt: skip
 view.panels(
     [[rotor(instant) for instant in (6.0, 10.0, 14.0, 30.0)],
-     [Panel("Blade under 267 kN", "along it [m]", "downwind [m]", curves=whole, equal=True),
+     [Panel("Blade under 267 kN", "along it [m]", "downwind [m]", curves=whole),
       Panel("Linear bodies in series, away from the rod", "along it [m]", "distance [m]",
             curves=apart)],
      [iron_hub, adds]],
@@ -200,7 +200,7 @@ view.panels(
     title="Shapes of the blades",
     caption="Above: the rotor seen from upwind at four instants of the run-up, its first blade "
     f"blue, the second red, the third yellow, deflections drawn {LARGER} times larger; dark lines "
-    "are blades that do not bend. Middle: a blade under a static load, true to scale, and how far "
+    "are blades that do not bend. Middle: a blade under a static load, and how far "
     "linear bodies in series are from it. The tip of the rod comes in by 0.7 m; that of a single "
     "linear body does not. Below: the blade on a hub of cast iron that is meshed, reduced and held "
     "at its shaft; the ring under the blade turns and carries the tip along by a centimetre.",

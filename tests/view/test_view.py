@@ -305,7 +305,7 @@ def test_a_panel_may_have_logarithmic_scales():
     )
     with page.styled():
         axes = page.area(page.sheet(400, 300), 50, 50, 300, 200)
-        _draw(axes, line, [0, 1, 2], alone=True)
+        _draw(axes, line, {"one": 0})
         assert (axes.get_xscale(), axes.get_yscale()) == ("log", "log")
         assert axes.get_xlim()[0] < 1 and axes.get_xlim()[1] > 1000
 

@@ -8,6 +8,9 @@ pytest.importorskip("matplotlib", reason="pictures need matplotlib")
 from matplotlib.figure import Figure
 
 from cases.figures.pictures import faults
+from rom import view
+from rom.mbs.analysis.campbell import Campbell
+from rom.view.figures import things
 from rom.view.figures.curves import line_look
 
 X = np.linspace(0.0, 1.0, 9)
@@ -35,6 +38,50 @@ def without_name(axes):
     axes.set_xlabel("")
 
 
+def hidden(axes):
+    axes.plot(X, X, "r--", label="one")
+    axes.plot(X, X, "b-", label="other")
+
+
+def crossed(axes):
+    axes.plot(X, X)
+    axes.text(0.5, 0.5, "6x", ha="center", va="center")
+
+
+def hiding(axes):
+    axes.plot(X, X, "o")
+    axes.text(0.5, 0.5, "here", ha="center", va="center", bbox={"fc": "white"})
+
+
+def lost(axes):
+    axes.plot(X, X)
+    axes.text(0.1, 0.9, "the end of the line")
+
+
+def bare(axes):
+    """A picture of a thin thing in space, which needs no more than its box."""
+    axes.set_axis_off()
+    picture = np.full((400, 400, 3), 255)
+    picture[:, 190:210] = 0
+    axes.imshow(picture, aspect="auto")
+
+
+def two_scales(axes):
+    axes.plot(X, X)
+    axes.figure.set_size_inches(6, 8)
+    other = axes.figure.add_axes((0.125, 1.2 / 8, 0.775, 2 / 8))
+    axes.set_position((0.125, 4.4 / 8, 0.775, 3 / 8))
+    other.plot(X, 3 * X)
+    other.set(xlabel=axes.get_xlabel(), ylabel=axes.get_ylabel())
+
+
+def squeezed(axes):
+    two_scales(axes)
+    axes.lines[0].set_data(X / 5, X / 5)
+    for one in axes.figure.axes:
+        one.set(xlim=(-0.1, 1.1), ylim=(-0.1, 3.1))
+
+
 def stray(axes):
     axes.plot(X, X)
     axes.annotate("6x", (1.06, 0.5), annotation_clip=False)
@@ -42,8 +89,8 @@ def stray(axes):
 
 def crowded(axes):
     axes.plot(X, X)
-    axes.text(0.4, 0.5, "first words")
-    axes.text(0.42, 0.5, "others")
+    axes.text(0.4, 0.32, "first words")
+    axes.text(0.42, 0.32, "others")
 
 
 def off_the_page(axes):
@@ -56,8 +103,15 @@ def off_the_page(axes):
     [
         (alike, "'one' and 'other' look the same"),
         (empty, "takes 10% of the height"),
+        (hidden, "'other' hides 'one'"),
+        (two_scales, "are compared and have two scales"),
+        (squeezed, "is compared with what is far smaller"),
+        (bare, "things take 6% of their room"),
         (without_name, "the horizontal axis has no name"),
         (stray, "'6x' leaves the diagram"),
+        (crossed, "a curve runs through '6x'"),
+        (hiding, "'here' hides a point"),
+        (lost, "'the end of the line' stands away"),
         (crowded, "'first words' lies on 'others'"),
         (off_the_page, "leaves the page"),
     ],
@@ -75,3 +129,72 @@ def test_two_dozen_curves_all_look_different():
     for k in range(24):
         axes.plot(X, X * k, label=f"curve {k}", **line_look(k))
     assert not faults(figure)
+
+
+def test_names_of_rays_stand_in_the_diagram_and_on_no_line():
+    """Where the rays end, modes and the mark of a speed are."""
+    speeds = np.linspace(0.0, 1.5, 15)
+    f = np.array([0.32, 0.5, 0.62, 0.68, 1.05, 1.2]) + np.outer(speeds, [0, -0.05, 0, 0.1, -0.1, 0])
+    diagram = Campbell(speeds, 2j * np.pi * f, np.ones((14, 6)))
+    figure = view.campbell(diagram, orders=(1, 3, 6), marks={"rated": 1.45})
+    assert [text.get_text() for text in figure.axes[0].texts] == ["1x", "3x", "6x"]
+    assert not faults(figure)
+
+
+def panel(title, size):
+    return view.Panel(title, "time [s]", "force [N]", {"one": (X, size * X)})
+
+
+@pytest.mark.parametrize(
+    "draw",
+    [
+        lambda: view.panels([[panel("first", 1.0), panel("second", 1.8)], [panel("third", -0.5)]]),
+        lambda: view.plane([
+            view.Drawing(title, "x [m]", "y [m]", equal=False,
+                         curves={"way": [np.outer(X, (1, size))]})
+            for title, size in (("first", 1.0), ("second", 1.8))
+        ]),
+        lambda: view.history(X, [("angle [rad]", {"one": X}), ("angle [rad]", {"two": 1.8 * X})]),
+    ],
+    ids=["panels", "plane", "history"],
+)  # fmt: skip
+def test_what_is_compared_has_one_scale(draw):
+    figure = draw()
+    limits = {(*axes.get_xlim(), *axes.get_ylim()) for axes in figure.axes}
+    assert len(limits) == 1
+    assert not faults(figure)
+
+
+def test_curves_that_coincide_are_all_seen():
+    curves = {f"curve {k}": (X, X) for k in range(5)}
+    assert not faults(view.panels([[view.Panel("Five", "x [m]", "y [m]", curves)]]))
+
+
+def box_at(x, **more):
+    return view.Thing(*view.box((1.0, 1.0, 1.0), (x, 0.0, 0.0)), **more)
+
+
+def test_the_same_things_from_the_same_side_have_one_scale(monkeypatch):
+    """A scene that needs less room is not drawn larger; one from another side is."""
+    seen, real = [], things.seen
+    monkeypatch.setattr(things, "seen", lambda *a, **k: seen.append(real(*a, **k)) or seen[-1])
+    blank = lambda self, **_: np.full((1, *self.camera.size[::-1], 3), 128, np.uint8)  # noqa: E731
+    monkeypatch.setattr(things.View, "drawn", blank)
+    scenes = [
+        view.Scene(f"{x}", {"fixed": box_at(0.0), "moved": box_at(x)}, view=side, up=(0, 0, 1))
+        for x, side in ((2.0, (0, -1, 0)), (5.0, (0, -1, 0)), (2.0, (0, -1, 1)))
+    ]
+    view.plane(scenes, columns=3)
+    metres = [one.camera.metre for one in seen]
+    assert metres[0] == pytest.approx(metres[1], rel=1e-12)
+    assert metres[2] > 1.5 * metres[0]
+
+
+@pytest.mark.parametrize("size, coloured", [(20.0, False), (60.0, True)])
+def test_colours_of_a_few_pixels_are_left_out(size, coloured):
+    """Of a picture 900 pixels wide, 10 m are seen; the thing with values is that many large."""
+    small = view.box((size / 90,) * 3)
+    values = np.arange(len(small[0]), dtype=float)
+    both = {"wide": view.box((10.0, 1.0, 1.0)), "small": view.Thing(*small, values=values)}
+    scene = view.Scene("", both, view=(0, -1, 0), up=(0, 0, 1))
+    assert things.seen(scene, 900).coloured is coloured

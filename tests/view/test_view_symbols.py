@@ -12,10 +12,11 @@ from rom import view
 from rom.components.gear_mesh import RackPair
 from rom.errors import ConfigError
 from rom.view.canvas import symbols
-from rom.view.canvas.corner import BAR_SIZE, projected, scale
-from rom.view.canvas.scene import aimed
+from rom.view.canvas.corner import BAR_SIZE, scale
+from rom.view.canvas.scene import HEIGHTS, aimed
+from rom.view.figures.things import seen
 from rom.view.scenes.connections import SPRING_COLOUR, connections, stretched
-from rom.view.scenes.film import HEIGHTS, Look, _stage
+from rom.view.scenes.film import Look, _stage
 from rom.view.scenes.ground import GROUND_COLOUR, JOINT_COLOUR, PLANE_OPACITY
 from rom.view.scenes.places import at_start, different, moving
 from rom.view.scenes.rigid import bars, block_of, ends_of
@@ -226,17 +227,17 @@ def test_the_length_beside_a_picture_is_true_and_the_axes_are_those_of_the_camer
     length, wide = scale(camera)
     assert wide == pytest.approx(length * camera.size[1] / camera.height)
     assert BAR_SIZE / 2.6 < wide <= BAR_SIZE and length == pytest.approx(0.1)
-    np.testing.assert_allclose(projected(camera), [[1, 0, 0], [0, 0, -1], [0, 1, 0]], atol=1e-12)
+    np.testing.assert_allclose(camera.axes, [[1, 0, 0], [0, 0, -1], [0, 1, 0]], atol=1e-12)
 
 
 def test_the_camera_of_a_film_holds_all_instants_and_wastes_little():
     """The arm sweeps a half circle; its way fills the frame in one direction at least."""
     mech, sol = swinging(lattice_bar())
     stage = _stage(mech, sol, np.arange(0, 101, 5), Look({}, symbols=False))
-    camera = stage.camera(900, (0, 0, 1), (0, 1, 0))
-    seen = np.concatenate([a.points.reshape(-1, 3) for a in stage.actors])
+    camera = seen(stage.scene("", (0, 0, 1), (0, 1, 0)), 900).camera
+    points = np.concatenate([a.points.reshape(-1, 3) for a in stage.actors])
     right = np.cross(camera.up, camera.toward)
-    reach = np.abs((seen - camera.focus) @ np.column_stack([right, camera.up])).max(axis=0)
+    reach = np.abs((points - camera.focus) @ np.column_stack([right, camera.up])).max(axis=0)
     half = 0.5 * camera.height * np.array([camera.size[0] / camera.size[1], 1.0])
     assert (reach < half).all() and (reach > 0.9 * half).any()
     assert HEIGHTS[0] <= camera.size[1] / camera.size[0] <= HEIGHTS[1]

@@ -38,14 +38,8 @@ def corner(figure: Any, camera: Camera, left: float, right: float, top: float) -
 
 def scale(camera: Camera) -> tuple[float, float]:
     """A round length [m] and how many pixels of the picture it takes."""
-    metre = camera.size[1] / camera.height
-    length = round_length(BAR_SIZE / metre)
-    return length, length * metre
-
-
-def projected(camera: Camera) -> Any:
-    """(3, 3) rows x, y and z of the world: to the right, upwards, and towards the eye."""
-    return np.column_stack([np.cross(camera.up, camera.toward), camera.up, camera.toward])
+    length = round_length(BAR_SIZE / camera.metre)
+    return length, length * camera.metre
 
 
 def triad(axes: Any, camera: Camera) -> None:
@@ -53,7 +47,7 @@ def triad(axes: Any, camera: Camera) -> None:
     axes.set_axis_off()
     axes.set_xlim(-1.45, 1.45)
     axes.set_ylim(-1.45, 1.45)
-    seen = projected(camera)
+    seen = camera.axes
     for k in np.argsort(seen[:, 2]):
         x, y = seen[k, :2]
         colour, long = AXIS_COLOURS[k], float(np.hypot(x, y))

@@ -12,6 +12,7 @@ from rom.model import Array, Index
 SHARP_COSINE = np.cos(np.deg2rad(35.0))  # cosine of the angle from which an edge is drawn
 TEXT_COLOUR, UNDEFORMED_COLOUR = "#20242a", "#7c828c"
 MARGIN_RATIO = 0.03  # of the view, left free on every side
+HEIGHTS = (0.2, 0.85)  # bounds of the height of a picture, of its width
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,6 +56,16 @@ class Camera:
     height: float
     size: tuple[int, int]
 
+    @property
+    def axes(self) -> Array:
+        """(3, 3) columns: to the right, upwards, and towards the eye."""
+        return np.column_stack([np.cross(self.up, self.toward), self.up, self.toward])
+
+    @property
+    def metre(self) -> float:
+        """How many pixels of the picture it takes."""
+        return self.size[1] / self.height
+
 
 def aimed(
     points: Array,
@@ -62,7 +73,7 @@ def aimed(
     *,
     view: npt.ArrayLike | None = None,
     up: npt.ArrayLike | None = None,
-    heights: tuple[float, float] = (0.2, 0.75),
+    heights: tuple[float, float] = HEIGHTS,
 ) -> Camera:
     """A camera that sees all points with little space wasted.
 
@@ -137,3 +148,10 @@ def directed_edges(triangles: Index) -> tuple[Index, Index]:
     """(3 t, 2) edges of all triangles and (3 t,) the triangle of each."""
     pairs = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
     return pairs, np.repeat(np.arange(len(triangles)), 3)
+
+
+def boundary(triangles: Index) -> Index:
+    """(m, 2) edges that belong to one triangle."""
+    pairs = np.sort(directed_edges(triangles)[0], axis=1)
+    edges, count = np.unique(pairs, axis=0, return_counts=True)
+    return edges[count == 1]

@@ -122,15 +122,9 @@ def ellipsoid(
     latitudes = np.pi * np.arange(1, sides // 2) / (sides // 2)
     circle = _circle(np.eye(3)[0], np.eye(3)[1], 1.0, sides)
     rows = [np.sin(u) * circle - np.cos(u) * np.eye(3)[2] for u in latitudes]
-    points = np.vstack([*rows, -np.eye(3)[2], np.eye(3)[2]])
-    i, j = np.arange(sides), np.roll(np.arange(sides), -1)
-    south, north = len(points) - 2, len(points) - 1
-    last = (len(rows) - 1) * sides
-    triangles = [_band(k * sides + i, (k + 1) * sides + i) for k in range(len(rows) - 1)]
-    triangles += [np.column_stack([0 * i + south, j, i])]
-    triangles += [np.column_stack([0 * i + north, last + i, last + j])]
+    points, triangles = _closed(rows, -np.eye(3)[2], np.eye(3)[2])
     scaled = points * np.asarray(semi_axes, dtype=float)
-    return scaled + np.asarray(centre, dtype=float), np.vstack(triangles)
+    return scaled + np.asarray(centre, dtype=float), triangles
 
 
 @typed
@@ -151,12 +145,18 @@ def tube(line: npt.ArrayLike, diameter: float, *, sides: int = 16) -> Mesh:
     X = _curve(line)[0]
     loops = [centre + _circle(x, y, diameter / 2, sides)
              for centre, x, y in zip(X, *_sections(X), strict=True)]  # fmt: skip
+    return _closed(loops, X[0], X[-1])
+
+
+def _closed(loops: Sequence[Array], start: Array, end: Array) -> Mesh:
+    """Loops of as many points, one after the other, and a fan to a point at either end."""
+    sides = len(loops[0])
     i, j = np.arange(sides), np.roll(np.arange(sides), -1)
-    n, last = sides * len(X), sides * (len(X) - 1)
-    triangles = [_band(k * sides + i, (k + 1) * sides + i) for k in range(len(X) - 1)]
+    n, last = sides * len(loops), sides * (len(loops) - 1)
+    triangles = [_band(k * sides + i, (k + 1) * sides + i) for k in range(len(loops) - 1)]
     triangles += [np.column_stack([0 * i + n, j, i])]
     triangles += [np.column_stack([0 * i + n + 1, last + i, last + j])]
-    return np.vstack([*loops, X[:1], X[-1:]]), np.vstack(triangles)
+    return np.vstack([*loops, start, end]), np.vstack(triangles)
 
 
 @typed

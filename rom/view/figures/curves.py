@@ -28,6 +28,7 @@ LEVEL_STYLE = {"color": GREY, "ls": "-.", "lw": 0.9, "zorder": 1.5}
 RAYS_LABEL = "multiples of the speed"
 MAX_TICKS = 10  # sizes that have room for a tick each
 TICK_DISTANCE = 0.03  # least distance of words of ticks, of a logarithmic axis
+COVERED, COVER_WIDTH = 1.5, 2.4  # apart [pixel]; by which a curve below is wider [point]
 MIN_ERROR = 1e-12  # errors below are drawn there: round-off has no meaning
 
 
@@ -73,11 +74,9 @@ def history(  # noqa: PLR0913  keywords of one picture
         numbers = numbered([list(curves) for _, curves in panels])
         for axes, (label, curves), looks in zip(areas, panels, numbers, strict=True):
             _histories(axes, t, curves, looks)
-            axes.set_xlabel(over or "time [s]", size=page.BODY_SIZE)
-            axes.set_ylabel(label, size=page.BODY_SIZE)
+            axes.set_ylabel(label)
             axes.set_xlim(t[0], t[-1])
-            finish(axes, legend=ax is not None and any(curves))
-        _shared(areas, ax)
+        _complete(areas, over or "time [s]", ax)
         return page.save(figure, path)
 
 
@@ -129,11 +128,16 @@ def _rows(axes: Any, words: Any) -> Array:
     return np.array([names.index(word) for word in words], dtype=float)
 
 
-def _shared(areas: Sequence[Any], ax: Any) -> None:
-    """One horizontal axis for all panels of a page, and legends above them, equal ones once.
+def _complete(areas: Sequence[Any], xlabel: str, ax: Any) -> None:
+    """Names of axes; on a page one horizontal axis for all, and legends above, equal ones once.
 
-    Axes of a caller keep theirs.
+    Axes of a caller keep their own, with what is named.
     """
+    for axes in areas:
+        axes.set_xlabel(xlabel)
+    one_scale(areas)
+    for axes in areas:
+        finish(axes, legend=ax is not None)
     if ax is not None:
         return
     names = [axes.get_legend_handles_labels()[1] for axes in areas]
@@ -191,10 +195,8 @@ def frequencies(
             axes.semilogy(np.arange(1, full.size + 1), error, label=support, **look)
         axes.axhline(1e-3, color="#5c636e", lw=1.0, ls="--")
         axes.set_xticks(range(1, longest + 1))
-        axes.set_xlabel("elastic mode", size=page.BODY_SIZE)
-        axes.set_ylabel("relative error", size=page.BODY_SIZE)
-        finish(axes, legend=ax is not None)
-        _shared([axes], ax)
+        axes.set_ylabel("relative error")
+        _complete([axes], "elastic mode", ax)
         return page.save(figure, path)
 
 
@@ -240,12 +242,10 @@ def convergence(
                     raise ConfigError(f"{name!r} has {y.size} errors for {x.size} sizes.")
                 look = {"color": LINES[k % len(LINES)], "marker": MARKERS[k % len(MARKERS)]}
                 axes.loglog(x, np.maximum(np.abs(y), MIN_ERROR), label=name, **look)
-            axes.set_xlabel(xlabel, size=page.BODY_SIZE)
-            axes.set_ylabel(label, size=page.BODY_SIZE)
+            axes.set_ylabel(label)
             near_ticks(axes.yaxis)
-            finish(axes, legend=ax is not None)
         _same_sizes(areas, [x for _, curves in panels for x, _ in curves.values()])
-        _shared(areas, ax)
+        _complete(areas, xlabel, ax)
         return page.save(figure, path)
 
 
@@ -305,33 +305,45 @@ def campbell(  # noqa: PLR0913  keywords of one picture
             areas[0].plot(turns, f[:, k], label=label, **look)
             if damped:
                 areas[1].plot(turns, damping[:, k], label=label, **look)
-        _multiples(areas[0], diagram, turns, orders)
         for axes, label in zip(areas, ("frequency [Hz]", "damping [% of critical]"), strict=False):
-            axes.set_xlabel("speed [1/min]", size=page.BODY_SIZE)
-            axes.set_ylabel(label, size=page.BODY_SIZE)
+            axes.set_ylabel(label)
             axes.set_xlim(turns[0], turns[-1])
+        _multiples(areas[0], diagram, turns, orders)
+        for axes in areas:
             for name, speed in (marks or {}).items():
                 axes.axvline(30 * speed / np.pi, label=name, **LEVEL_STYLE)
-            finish(axes, legend=ax is not None)
-        _shared(areas, ax)
+        _name_rays(areas[0], turns, orders)
+        _complete(areas, "speed [1/min]", ax)
         return page.save(figure, path)
 
 
 def _multiples(axes: Any, diagram: Any, turns: Any, orders: Sequence[float]) -> None:
-    """Rays of the orders, each named where it leaves the picture, and rings where modes meet."""
+    """Rays of the orders, and rings where modes meet them."""
     top = 1.06 * diagram.frequencies.max()
     axes.set_ylim(0.0, top)
     for k, order in enumerate(orders):
-        end = min(turns[-1], 60 * top / order)
-        label = RAYS_LABEL if k == 0 else None
-        axes.plot([turns[0], end], [order * turns[0] / 60, order * end / 60], color=GREY, lw=0.9,
-                  label=label)  # fmt: skip
-        name, place = f"{order:g}x", (end, order * end / 60)
-        axes.annotate(name, place, (-5, -4), textcoords="offset points", ha="right", va="top",
-                      color=GREY, size=page.SMALL_SIZE)  # fmt: skip
-        for _, speed in diagram.crossings(order):
-            at = 30 * speed / np.pi
-            axes.plot(at, order * at / 60, "o", ms=11, mfc="none", mec="#1d2733", mew=1.3)
+        axes.plot(turns, order * turns / 60, color=GREY, lw=0.9, label=None if k else RAYS_LABEL)
+        at = 30 * np.array([speed for _, speed in diagram.crossings(order)]) / np.pi
+        axes.plot(at, order * at / 60, "o", ms=11, mfc="none", mec="#1d2733", mew=1.3)
+
+
+def _name_rays(axes: Any, turns: Array, orders: Sequence[float]) -> None:
+    """Names below the rays, as far out as there is room where no line runs through them."""
+    paths = [line.get_path().transformed(line.get_transform()) for line in axes.lines]
+    for order in orders:
+        text = axes.annotate(f"{order:g}x", (0.0, 0.0), (3, -3), textcoords="offset points",
+                             va="top", color=GREY, size=page.SMALL_SIZE)  # fmt: skip
+
+        def crossed(x: float, text: Any = text, slope: float = order / 60) -> float:
+            text.xy = x, slope * x
+            box = text.get_window_extent()
+            if not axes.bbox.containsx(box.x1) or not axes.bbox.containsy(box.y0):
+                return np.inf
+            return sum(path.intersects_bbox(box, filled=False) for path in paths)
+
+        out = min(turns[-1], 60 * axes.get_ylim()[1] / order)
+        if crossed(min(np.linspace(out, turns[0], 60), key=crossed)):
+            text.set_bbox({"fc": "white", "ec": "none", "pad": 0.5})
 
 
 def _apart(ticks: Any, span: float) -> list[str]:
@@ -349,9 +361,7 @@ def _same_sizes(areas: Sequence[Any], sizes: list[Any]) -> None:
     ticks = np.unique(np.concatenate([np.asarray(x, dtype=float) for x in sizes]))
     low, high = ticks[0] / 1.15, ticks[-1] * 1.15
     if ticks.size > MAX_TICKS:
-        decades = 10.0 ** np.arange(np.floor(np.log10(low)), np.ceil(np.log10(high)))
-        ticks = np.outer(decades, [1, 2, 5]).ravel()
-        ticks = ticks[(ticks >= low) & (ticks <= high)]
+        ticks = _round(low, high)
     for axes in areas:
         axes.set_xticks(ticks, _apart(ticks, high / low))
         axes.minorticks_off()
@@ -368,11 +378,16 @@ def near_ticks(axis: Any) -> None:
 
     low, high = axis.get_view_interval()
     if high < 100 * low:
-        powers = 10.0 ** np.arange(np.floor(np.log10(low)), np.ceil(np.log10(high)) + 1)
-        ticks = np.outer(powers, (1.0, 2.0, 5.0)).ravel()
-        ticks = ticks[(ticks >= low) & (ticks <= high)]
+        ticks = _round(low, high)
         axis.set_ticks(ticks, [f"{x:g}" for x in ticks])
         axis.set_minor_formatter(NullFormatter())
+
+
+def _round(low: float, high: float) -> Array:
+    """1, 2 and 5 times powers of ten from low to high."""
+    powers = 10.0 ** np.arange(np.floor(np.log10(low)), np.ceil(np.log10(high)) + 1)
+    ticks = np.outer(powers, (1.0, 2.0, 5.0)).ravel()
+    return ticks[(ticks >= low) & (ticks <= high)]
 
 
 def _once(legends: Sequence[Sequence[str]]) -> list[list[str]]:
@@ -413,7 +428,7 @@ def _panels(
         if words.title:
             areas[0].set_title(words.title, loc="left")
         for axes, scene in zip(areas[n:], scenes, strict=True):
-            draw_scene(figure, axes, scene)
+            draw_scene(figure, axes, scene, scenes)
         return figure, areas[:n]
     width = PAGE_WIDTH - 190 - (BESIDE_WIDTH + 30 if scenes else 0)
     rows = np.array([page.legend_shape(names, width)[0] for names in _once(legends)])
@@ -423,17 +438,81 @@ def _panels(
     tall = (feet[-1] - 45 + SCENE_GAP) / max(1, len(scenes))
     for k, scene in enumerate(scenes):
         left, top = PAGE_WIDTH - BESIDE_WIDTH - 20, 105 + k * tall
-        draw_scene(figure, page.area(figure, left, top, BESIDE_WIDTH, tall - SCENE_GAP), scene)
+        area = page.area(figure, left, top, BESIDE_WIDTH, tall - SCENE_GAP)
+        draw_scene(figure, area, scene, scenes)
     return figure, areas
 
 
-def finish(axes: Any, *, legend: bool, loc: str = "best", alike: bool = False) -> None:
-    """Grid, spines, units and legend of the house."""
+def finish(axes: Any, *, legend: bool, alike: bool = False, size: float = page.BODY_SIZE) -> None:
+    """Grid, spines, units, size of the names of axes, and legend of the house."""
+    _uncover(axes)
     readable(axes, alike=alike)
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.label.set_size(size)
     axes.tick_params(labelsize=page.SMALL_SIZE)
-    axes.grid(color="#dfe3e8", lw=0.6)
+    if not axes.images:
+        axes.grid(color="#dfe3e8", lw=0.6)
     axes.set_axisbelow(True)
     for side in ("top", "right"):
         axes.spines[side].set_visible(False)
-    if legend:
-        axes.legend(fontsize=page.SMALL_SIZE, framealpha=0.9, edgecolor="none", loc=loc)
+    if legend and axes.get_legend_handles_labels()[1]:
+        axes.legend(fontsize=page.SMALL_SIZE, framealpha=0.9, edgecolor="none")
+
+
+def fill(
+    figure: Any, areas: Sequence[Any], drawings: Sequence[Any], draw: Any, *, legend: bool
+) -> None:
+    """Draw diagrams and scenes of a page into its areas, those compared in one scale.
+
+    A diagram is drawn by ``draw(axes, drawing, {name of a curve: number of its look})``.
+    """
+    scenes = [drawing for drawing in drawings if isinstance(drawing, Scene)]
+    drawn = []
+    for axes, drawing in zip(areas, drawings, strict=True):
+        if isinstance(drawing, Scene):
+            draw_scene(figure, axes, drawing, scenes)
+        else:
+            drawn.append((axes, drawing))
+    names = [[name for name in x.curves if not name.startswith("_")] for _, x in drawn]
+    for (axes, x), own, looks in zip(drawn, names, numbered(names), strict=True):
+        draw(axes, x, dict(zip(own, looks, strict=True)))
+    one_scale([axes for axes, x in drawn if getattr(x, "extent", None) is None])
+    for axes, x in drawn:
+        if x.equal and not axes.images:
+            _same_scale(axes)
+        finish(axes, legend=legend, alike=x.equal, size=page.SMALL_SIZE)
+
+
+def _uncover(axes: Any) -> None:
+    """A curve that lies under another one of its dashes all along is wider, so that it shows."""
+    seen = [(line, line.get_linestyle(), axes.transData.transform(line.get_xydata()))
+            for line in axes.lines if line.get_linestyle() != "None"]  # fmt: skip
+    for k, (line, dashes, x) in enumerate(seen):
+        above = sum(dashes == other and x.shape == y.shape
+                    and np.allclose(x, y, 0.0, COVERED, equal_nan=True)
+                    for _, other, y in seen[k + 1 :])  # fmt: skip
+        line.set_linewidth(line.get_linewidth() + COVER_WIDTH * above)
+
+
+def one_scale(areas: Sequence[Any]) -> None:
+    """The same limits for diagrams whose axes have the same names: they are compared."""
+    groups: dict[tuple[str, ...], list[Any]] = {}
+    for axes in areas:
+        names = axes.get_xlabel(), axes.get_ylabel()
+        if all(names):
+            groups.setdefault((*names, axes.get_xscale(), axes.get_yscale()), []).append(axes)
+    for alike in (group for group in groups.values() if len(group) > 1):
+        x, y = ([getattr(axes, f"get_{k}lim")() for axes in alike] for k in "xy")
+        for axes in alike:
+            axes.set_xlim(np.min(x), np.max(x))
+            axes.set_ylim(np.min(y), np.max(y))
+
+
+def _same_scale(axes: Any) -> None:
+    """Widen the shorter axis until a metre is as long on both."""
+    shape = axes.get_window_extent().size
+    limits = np.array([axes.get_xlim(), axes.get_ylim()])
+    half = 0.5 * (np.ptp(limits, axis=1) / shape).max() * shape
+    x, y = limits.mean(axis=1)
+    axes.set_xlim(x - half[0], x + half[0])
+    axes.set_ylim(y - half[1], y + half[1])

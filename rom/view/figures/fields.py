@@ -12,9 +12,8 @@ from rom.errors import ConfigError
 from rom.model import Array
 from rom.view.canvas import page
 from rom.view.canvas.offscreen import COLOUR_MAP
-from rom.view.canvas.scales import readable
-from rom.view.figures.curves import LINES, MARKERS, line_look
-from rom.view.figures.things import Scene, draw_scene
+from rom.view.figures.curves import LINES, MARKERS, fill, line_look
+from rom.view.figures.things import Scene
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -23,6 +22,7 @@ PAGE_WIDTH = 1400  # [pixel]
 COLUMN_GAP = 120  # [pixel]
 ROW_GAP, BARE_GAP = 150, 90  # below a drawing with a legend, and without [pixel]
 BAR_WIDTH = 60  # of a colour bar [pixel]
+MANY_CELLS, MANY_POINTS = 12, 40  # fewer values along a shade are squares; more points are small
 LABEL_RATIO = 0.04  # of a drawing, that the names of level curves stay away from its edge
 ON_SHADE = (("#d1495b", "white"), ("white", "#22262b"))  # fill and edge of points on colours
 STONE_COLOUR, EDGE_COLOUR = "#d9d2c3", "#5c636e"
@@ -80,6 +80,8 @@ def plane(
 ) -> "Figure":
     """Draw things in a plane, side by side.
 
+    Those without an extent of their own have one scale if their axes have the same names.
+
     Args:
         drawings: drawings and scenes row by row, from the top left.
         path: picture to write, .png; None to write nothing.
@@ -100,20 +102,21 @@ def plane(
         raise ConfigError("there is nothing to draw.")
     if ax is not None:
         figure, areas = page.taken(ax, len(drawings), "plane")
-        for axes, drawing in zip(areas, drawings, strict=True):
-            _draw(figure, axes, drawing)
+        fill(figure, areas, drawings, _draw, legend=False)
         return page.save(figure, path)
     rows = -(-len(drawings) // columns)
     gap = ROW_GAP if any(map(_named, drawings)) else BARE_GAP
     width = (PAGE_WIDTH - 30) // columns - COLUMN_GAP
     with page.styled():
         figure = page.titled(PAGE_WIDTH, 100 + rows * (height + gap), title, caption)
+        areas = []
         for k, drawing in enumerate(drawings):
             row, column = divmod(k, columns)
             left = 95 + column * (width + COLUMN_GAP)
             narrow = BAR_WIDTH if isinstance(drawing, Drawing) and drawing.label else 0
-            axes = page.area(figure, left, 110 + row * (height + gap), width - narrow, height)
-            _draw(figure, axes, drawing)
+            top = 110 + row * (height + gap)
+            areas.append(page.area(figure, left, top, width - narrow, height))
+        fill(figure, areas, drawings, _draw, legend=False)
         return page.save(figure, path)
 
 
@@ -123,44 +126,44 @@ def _named(drawing: Drawing | Scene) -> bool:
     return any(not name.startswith("_") for name in names)
 
 
-def _draw(figure: Any, axes: Any, drawing: Drawing | Scene) -> None:
-    if isinstance(drawing, Scene):
-        return draw_scene(figure, axes, drawing)
+def _draw(axes: Any, drawing: Drawing, numbers: dict[str, int]) -> None:
     axes.set_title(drawing.title, size=page.BODY_SIZE, loc="left")
-    axes.set_xlabel(drawing.x, size=page.SMALL_SIZE)
-    axes.set_ylabel(drawing.y, size=page.SMALL_SIZE)
-    axes.tick_params(labelsize=page.SMALL_SIZE)
+    axes.set_xlabel(drawing.x)
+    axes.set_ylabel(drawing.y)
+    over = drawing.shade is not None
     if drawing.shade is not None:
         image = axes.imshow(
             drawing.shade.T, origin="lower", extent=drawing.extent, cmap=COLOUR_MAP,
-            aspect="auto", interpolation="bilinear",
+            aspect="equal" if drawing.equal else "auto",
+            interpolation="bilinear" if min(drawing.shade.shape) > MANY_CELLS else "nearest",
         )  # fmt: skip
-        image.set_clim(drawing.limits)
-        bar = figure.colorbar(image, ax=axes, fraction=0.05, pad=0.03)
-        bar.set_label(drawing.label, size=page.SMALL_SIZE)
-        bar.ax.tick_params(labelsize=page.SMALL_SIZE)
-    _fill(figure, axes, drawing)
+        _colour_bar(axes, image, drawing)
+    _fill(axes, drawing)
     for k, (label, curves) in enumerate(drawing.curves.items()):
         for n, curve in enumerate(curves):
-            look = line_look(k)
+            look = line_look(numbers.get(label, k))
             look |= {"lw": 2.0, "zorder": look["zorder"] + 1.0}
-            look |= {"color": "white", "lw": 1.0} if drawing.shade is not None else {}
+            look |= {"color": "white", "lw": 1.0} if over else {}
             axes.plot(*curve.T, label=label if n == 0 else f"_{label}", **look)
     _draw_levels(axes, drawing)
-    over = drawing.shade is not None
     for k, (label, points) in enumerate(drawing.points.items()):
         fill, edge = ON_SHADE[k % 2] if over else (LINES[(k + 1) % len(LINES)], "white")
         look = {"color": fill, "edgecolor": edge, "zorder": 4}
-        axes.scatter(*points.T, s=48, marker=MARKERS[k % len(MARKERS)], label=label, **look)
+        look |= {"s": 48 if len(points) < MANY_POINTS else 14}
+        axes.scatter(*points.T, marker=MARKERS[k % len(MARKERS)], label=label, **look)
     if drawing.extent is not None:
         axes.set_xlim(drawing.extent[:2])
         axes.set_ylim(drawing.extent[2:])
-    if drawing.equal:
-        axes.set_aspect("equal", adjustable="box" if drawing.shade is not None else "datalim")
-    readable(axes, alike=drawing.equal)
     if axes.get_legend_handles_labels()[0]:
         place = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.15), "borderaxespad": 0.0}
-        axes.legend(fontsize=page.SMALL_SIZE, frameon=False, ncol=2, **place)
+        axes.legend(fontsize=page.SMALL_SIZE, frameon=False, ncol=3, **place)
+
+
+def _colour_bar(axes: Any, coloured: Any, drawing: Drawing) -> None:
+    coloured.set_clim(drawing.limits)
+    bar = axes.figure.colorbar(coloured, ax=axes, fraction=0.05, pad=0.03)
+    bar.set_label(drawing.label, size=page.SMALL_SIZE)
+    bar.ax.tick_params(labelsize=page.SMALL_SIZE)
 
 
 def _draw_levels(axes: Any, drawing: Drawing) -> None:
@@ -184,7 +187,7 @@ def _draw_levels(axes: Any, drawing: Drawing) -> None:
                   bbox={"fc": "#22262b", "ec": "none", "alpha": 0.65, "pad": 1.2})  # fmt: skip
 
 
-def _fill(figure: Any, axes: Any, drawing: Drawing) -> None:
+def _fill(axes: Any, drawing: Drawing) -> None:
     """Draw polygons, and their colour bar when they have values."""
     if not len(drawing.polygons):
         return
@@ -196,9 +199,6 @@ def _fill(figure: Any, axes: Any, drawing: Drawing) -> None:
     else:
         values = np.asarray(drawing.values, dtype=float)
         blocks = PolyCollection(drawing.polygons, array=values, cmap=COLOUR_MAP, **look)
-        blocks.set_clim(drawing.limits)
         axes.add_collection(blocks)
-        bar = figure.colorbar(blocks, ax=axes, fraction=0.05, pad=0.03)
-        bar.set_label(drawing.label, size=page.SMALL_SIZE)
-        bar.ax.tick_params(labelsize=page.SMALL_SIZE)
+        _colour_bar(axes, blocks, drawing)
     axes.autoscale_view()

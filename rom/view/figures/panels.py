@@ -12,15 +12,16 @@ from rom.errors import ConfigError
 from rom.view.canvas import page
 from rom.view.canvas.scales import without_round_off
 from rom.view.canvas.scene import TEXT_COLOUR
-from rom.view.figures.curves import LINES, PAGE_WIDTH, finish, line_look, near_ticks, numbered
-from rom.view.figures.things import Scene, draw_scene
+from rom.view.figures.curves import LINES, MARKERS, PAGE_WIDTH, fill, line_look, near_ticks
+from rom.view.figures.things import Scene, below_height, seen
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 # pixel, of a diagram and around it
 PANEL_HEIGHT, LEFT_MARGIN, RIGHT_MARGIN, TOP_MARGIN, BOTTOM_MARGIN = 370, 95, 30, 55, 75
-ROW_STEP = TOP_MARGIN + PANEL_HEIGHT + BOTTOM_MARGIN
+SCENE_MORE = 90  # by which rows with scenes are higher [pixel]
+LEAST_WIDTH = 420  # of scenes beside diagrams [pixel]
 GUIDE_STYLE = {"color": "#8a9199", "lw": 0.9}  # a curve without a name
 Line = tuple[Any, Any]  # (n,) numbers each; NaN leaves a gap
 
@@ -35,7 +36,7 @@ class Panel:
         xlabel, ylabel: labels of the axes with their units; a sketch has none, and no axes.
         curves: {name: (x (n,), y (n,))} drawn as lines; thin, without legend, if the name starts
             with "_".
-        points: {name: (x (n,), y (n,))} drawn as small circles over them.
+        points: {name: (x (n,), y (n,))} drawn as small marks over them, each name with its own.
         bars: {name: (low, high)} horizontal bars from low to high in units of the axis, from top to
             bottom.
         ends: what the two ends of the bars are; each then has a colour of its own from zero on.
@@ -70,7 +71,7 @@ def panels(
     caption: str = "",
     ax: Any = None,
 ) -> "Figure":
-    """Draw rows of diagrams.
+    """Draw rows of diagrams; those whose axes have the same names have one scale.
 
     Args:
         rows: diagrams and scenes from top to bottom, and from left to right in each row.
@@ -86,45 +87,65 @@ def panels(
         ConfigError: if lengths differ, or pictures cannot be made here.
     """
     path = page.wanted(path)
-    drawn = [panel for row in rows for panel in row if isinstance(panel, Panel)]
-    numbers = iter(numbered([list(filter(_is_named, panel.curves)) for panel in drawn]))
+    diagrams = [panel for row in rows for panel in row]
     if ax is not None:
-        diagrams = [panel for row in rows for panel in row]
         figure, areas = page.taken(ax, len(diagrams), "panels")
-        for area, panel in zip(areas, diagrams, strict=True):
-            if isinstance(panel, Scene):
-                draw_scene(figure, area, panel)
-            else:
-                _draw(area, panel, next(numbers), alone=True)
+        fill(figure, areas, diagrams, _draw, legend=True)
         return page.save(figure, path)
     with page.styled():
         legends = [_legend_height(row) for row in rows]
-        feet = 65 + np.cumsum([legend + ROW_STEP for legend in legends])
+        heights = [_height(row) for row in rows]
+        feet = 65 + np.cumsum(np.add(legends, heights) + TOP_MARGIN + BOTTOM_MARGIN)
         figure = page.titled(PAGE_WIDTH, int(feet[-1]) + 5, title, caption)
-        for row, legend, foot in zip(rows, legends, feet, strict=True):
-            top = foot - BOTTOM_MARGIN - PANEL_HEIGHT
+        areas, above = [], []
+        for row, legend, height, foot in zip(rows, legends, heights, feet, strict=True):
+            top = foot - BOTTOM_MARGIN - height
             for panel, (left, width) in zip(row, _columns(row), strict=True):
-                if isinstance(panel, Scene):
-                    tall = legend + PANEL_HEIGHT + BOTTOM_MARGIN
-                    axes = page.area(figure, left, top - legend, width, tall)
-                    draw_scene(figure, axes, panel)
-                else:
-                    axes = page.area(figure, left, top, width, PANEL_HEIGHT)
-                    _draw(axes, panel, next(numbers), alone=False)
-                    page.legend_above(axes, width, legend)
+                more = (legend, BOTTOM_MARGIN) if isinstance(panel, Scene) else (0, 0)
+                areas.append(page.area(figure, left, top - more[0], width, height + sum(more)))
+                above.append((width, legend))
+        fill(figure, areas, diagrams, _draw, legend=False)
+        for axes, panel, (width, legend) in zip(areas, diagrams, above, strict=True):
+            if isinstance(panel, Panel):
+                page.legend_above(axes, width, legend)
         return page.save(figure, path)
 
 
 def _columns(row: Sequence[Panel | Scene]) -> list[tuple[float, float]]:
-    """Left end and width of each diagram [pixel]; names of bars stand left of them."""
-    width = (PAGE_WIDTH - 2 * RIGHT_MARGIN) / len(row)
-    columns = []
-    for j, panel in enumerate(row):
-        left = RIGHT_MARGIN + j * width + (LEFT_MARGIN if isinstance(panel, Panel) else 0)
+    """Left end and width of each diagram [pixel]; names of bars stand left of them.
+
+    A scene is no wider than it fills, if there is something else.
+    """
+    whole = PAGE_WIDTH - 2 * RIGHT_MARGIN
+    widths = [min(_filled(x), whole / len(row)) if isinstance(x, Scene) else 0.0 for x in row]
+    others = widths.count(0.0)
+    columns, end = [], float(RIGHT_MARGIN)
+    for panel, own in zip(row, widths, strict=True):
+        width = whole / len(row) if not others else own or (whole - sum(widths)) / others
+        left = end + (LEFT_MARGIN if isinstance(panel, Panel) else 0)
         if isinstance(panel, Panel) and panel.bars:
             left += page.LETTER_WIDTH * max(map(len, panel.bars)) + 25 - LEFT_MARGIN
-        columns.append((left, RIGHT_MARGIN + (j + 1) * width - RIGHT_MARGIN - left))
+        end += width
+        columns.append((left, end - RIGHT_MARGIN - left))
     return columns
+
+
+def _height(row: Sequence[Panel | Scene]) -> int:
+    """Of the diagrams of a row; of scenes alone, what they fill [pixel]."""
+    scenes, width = [x for x in row if isinstance(x, Scene)], int(_columns(row)[0][1])
+    highest = PANEL_HEIGHT + SCENE_MORE * bool(scenes)
+    if len(scenes) < len(row):
+        return highest
+    views = [seen(x, width, (0.0, 9.0), frames=slice(1), among=scenes) for x in scenes]
+    filled = [view.camera.size[1] + below_height(view.scene, width) for view in views]
+    return min(highest, max(filled) - BOTTOM_MARGIN)
+
+
+def _filled(scene: Scene) -> float:
+    """Width of a column that a scene fills as high as its row is [pixel]."""
+    tall = PANEL_HEIGHT + SCENE_MORE + BOTTOM_MARGIN - below_height(scene, LEAST_WIDTH)
+    width, height = seen(scene, PAGE_WIDTH, (0.0, 9.0), frames=slice(1)).camera.size
+    return max(LEAST_WIDTH, tall * width / height + RIGHT_MARGIN)
 
 
 def _legend_height(row: Sequence[Panel | Scene]) -> int:
@@ -145,17 +166,16 @@ def _is_named(name: str) -> bool:
     return not name.startswith("_")
 
 
-def _draw(axes: Any, panel: Panel, numbers: Sequence[int], *, alone: bool) -> None:
-    """A diagram with the looks of its named curves; alone, with its legend where there is room."""
+def _draw(axes: Any, panel: Panel, numbers: Mapping[str, int]) -> None:
+    """A diagram with the looks of its named curves."""
     curves, points = _lines(panel)
-    named = _named(panel)
     for name, line in curves.items():
-        k = numbers[named.index(name)] if name in named else 0
-        guide = name not in named and (len(curves) > 1 or bool(points))
-        axes.plot(*line, label=name, **(GUIDE_STYLE if guide else line_look(k)))
+        guide = name not in numbers and (len(curves) > 1 or bool(points))
+        axes.plot(*line, label=name, **(GUIDE_STYLE if guide else line_look(numbers.get(name, 0))))
     for name, line in points.items():
+        mark = MARKERS[[n for n in points if _is_named(n)].index(name)] if _is_named(name) else "o"
         look = {"mec": "#22262b", "mfc": "none", "ms": 4.0, "mew": 0.8}
-        axes.plot(*line, "o", label=name, **look)
+        axes.plot(*line, mark, label=name, **look)
     if panel.bars:
         _draw_bars(axes, panel.bars, panel.ends)
     for words, place in panel.notes.items():
@@ -163,8 +183,8 @@ def _draw(axes: Any, panel: Panel, numbers: Sequence[int], *, alone: bool) -> No
                       size=page.SMALL_SIZE, color=TEXT_COLOUR,
                       bbox={"fc": "white", "ec": "none", "alpha": 0.8, "pad": 0.8})  # fmt: skip
     axes.set_title(panel.title, size=page.BODY_SIZE, loc="left")
-    axes.set_xlabel(panel.xlabel, size=page.SMALL_SIZE)
-    axes.set_ylabel(panel.ylabel, size=page.SMALL_SIZE)
+    axes.set_xlabel(panel.xlabel)
+    axes.set_ylabel(panel.ylabel)
     if panel.log:
         axes.set_xscale("log")
         axes.set_yscale("log")
@@ -172,9 +192,6 @@ def _draw(axes: Any, panel: Panel, numbers: Sequence[int], *, alone: bool) -> No
         near_ticks(axes.yaxis)
     if not (panel.xlabel or panel.ylabel):
         axes.set_axis_off()
-    if panel.equal:
-        _same_scale(axes, axes.get_window_extent().size)
-    finish(axes, legend=alone and bool(named), alike=panel.equal)
 
 
 def _lines(panel: Panel) -> tuple[dict[str, Line], dict[str, Line]]:
@@ -188,16 +205,6 @@ def _lines(panel: Panel) -> tuple[dict[str, Line], dict[str, Line]]:
     return dict(zip(names[:n], lines[:n], strict=True)), dict(
         zip(names[n:], lines[n:], strict=True)
     )
-
-
-def _same_scale(axes: Any, shape: tuple[float, float]) -> None:
-    """Widen the shorter axis until a metre is as long on both; the shape is that of the area."""
-    limits = np.array([axes.get_xlim(), axes.get_ylim()])
-    metre = (np.ptp(limits, axis=1) / shape).max()
-    half = 0.5 * metre * np.array(shape)
-    x, y = limits.mean(axis=1)
-    axes.set_xlim(x - half[0], x + half[0])
-    axes.set_ylim(y - half[1], y + half[1])
 
 
 def _draw_bars(axes: Any, bars: Mapping[str, tuple[float, float]], ends: Any) -> None:

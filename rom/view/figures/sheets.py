@@ -14,6 +14,7 @@ from rom.view.canvas import page
 from rom.view.canvas.films import Film, finished, wanted
 from rom.view.canvas.offscreen import COLOUR_MAP
 from rom.view.canvas.scales import clock_texts
+from rom.view.canvas.scene import boundary
 from rom.view.figures.curves import LINES, MARKERS, finish
 
 if TYPE_CHECKING:
@@ -195,7 +196,7 @@ def _shape(
     else:
         look["vmax"] = highest or float(shape.values.max())
     drawn = axes.tripcolor(x, y, shape.triangles, **look)
-    for edge in _boundary(shape.triangles):
+    for edge in boundary(shape.triangles):
         axes.plot(*shape.before[edge].T, color=UNDEFORMED_COLOUR, ls="--", lw=0.9)
     for outline in shape.tools:
         axes.fill(*outline.T, facecolor=TOOL_COLOUR, edgecolor=EDGE_COLOUR, hatch="///", lw=0.8)
@@ -213,10 +214,3 @@ def _one_colour() -> Any:
     from matplotlib.colors import ListedColormap
 
     return ListedColormap([SURFACE_COLOUR])
-
-
-def _boundary(triangles: Index) -> Index:
-    """(m, 2) sides that belong to one triangle."""
-    sides = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-    edges, count = np.unique(sides, axis=0, return_counts=True)
-    return edges[count == 1]

@@ -1,7 +1,7 @@
 """Things in space beside curves, and films of them: bodies, blocks, rods, meshes."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,17 +14,19 @@ from rom.model import Array, Index
 from rom.view.canvas import page
 from rom.view.canvas.corner import BAR_SIZE, STRIP_HEIGHT, TRIAD_SIZE, corner
 from rom.view.canvas.films import Film, finished, wanted
-from rom.view.canvas.offscreen import render
+from rom.view.canvas.offscreen import Image, render
 from rom.view.canvas.scales import clock_texts
-from rom.view.canvas.scene import Actor, Camera, aimed, sharp_edges
+from rom.view.canvas.scene import HEIGHTS, Actor, Camera, aimed, sharp_edges
 from rom.view.canvas.solids import Mesh, extruded, joined
 
 # of things without one
 COLOURS = ("#9aa5b1", "#2f7f9f", "#d1495b", "#edae49", "#66a182", "#8d6a9f", "#c3c9d0", "#5c636e")
 EDGE_COLOUR = "#3a414b"
 FILM_WIDTH, CLOCK_HEIGHT = 900, 40  # of a film, and of the strip with the time [pixel]
-HEIGHTS = (0.2, 0.75)  # bounds of the height of its pictures, of their width
+LEAST_COLOURED = 40  # of what shows values, the longer side, or its colours are not read [pixel]
 ROW_HEIGHT = 32  # of names [pixel]
+PAGE_TOP, STILL_WIDTH = 80, 740  # of a page with a heading; of one of several pictures [pixel]
+NO_LINES = np.zeros((0, 2), dtype=int)
 
 
 @typed
@@ -145,20 +147,18 @@ def film(
         ResourceError: for .mp4 without ffmpeg.
     """
     path, t = wanted(path), np.asarray(times, dtype=float)
-    actors = actors_of(scene)
-    frames = max(len(actor.points) for actor in actors)
+    view = seen(scene, FILM_WIDTH)
+    frames = max(len(actor.points) for actor in view.actors)
     if t.shape != (frames,):
         raise ConfigError(f"{t.size} times for {frames} pictures of {scene.title!r}.")
-    camera = aimed(_seen(actors), FILM_WIDTH, view=scene.view, up=scene.up, heights=HEIGHTS)
-    limits = scene.limits or _limits(actors)
-    images = render(actors, camera, limits=limits, oversampling=1)
+    images = view.drawn(oversampling=1)
     top, height = CLOCK_HEIGHT, images.shape[1]
     foot = top + height + below_height(scene, FILM_WIDTH)
     with page.styled():
         text, below = page.caption(caption, FILM_WIDTH - 40)
         figure = page.sheet(FILM_WIDTH, foot + below + 20)
         page.words(figure, scene.title, FILM_WIDTH - 20, 8, ha="right")
-        _below(figure, scene, camera, limits, (0, FILM_WIDTH, top + height))
+        below_view(figure, view, (0, FILM_WIDTH, top + height))
         page.words(figure, text, 20, foot + 5, size=page.SMALL_SIZE)
         pages = np.repeat(page.pixels(figure)[None], frames, axis=0)
         clocks = page.strips(clock_texts(t), FILM_WIDTH // 4, CLOCK_HEIGHT)
@@ -167,8 +167,8 @@ def film(
     return finished(pages, seconds / frames, path)
 
 
-def draw_scene(figure: Any, axes: Any, scene: Scene) -> None:
-    """Draw the first picture of a scene into axes of a figure, with what stands below it.
+def draw_scene(figure: Any, axes: Any, scene: Scene, among: Sequence[Scene] = ()) -> None:
+    """Draw the first picture of a scene, among others, into axes; what stands below it, too.
 
     Raises:
         ConfigError: if something is no thing, or pictures cannot be made here.
@@ -178,19 +178,66 @@ def draw_scene(figure: Any, axes: Any, scene: Scene) -> None:
     left, right, top = place.x0 * wide, place.x1 * wide, (1 - place.y1) * tall
     width = round(right - left)
     height = max(2, round(place.height * tall) - below_height(scene, width))
-    actors = [
-        Actor(a.points[:1], a.cells, None if a.values is None else a.values[:1], a.colour, a.width,
-              a.opacity) for a in actors_of(scene)
-    ]  # fmt: skip
-    shape = height / width
-    camera = aimed(_seen(actors), width, view=scene.view, up=scene.up, heights=(shape, shape))
-    limits = scene.limits or _limits(actors)
-    image = render(actors, camera, limits=limits)[0]
+    highest = height / width
+    view = seen(scene, width, (min(HEIGHTS[0], highest), highest), frames=slice(1), among=among)
+    image = view.drawn()[0]
     axes.set_title(scene.title, size=page.BODY_SIZE, loc="left")
     axes.set_axis_off()
     axes.imshow(image, extent=(0, width, 0, len(image)), aspect="auto", interpolation="nearest")
     axes.set_ylim(len(image) - place.height * tall, len(image))
-    _below(figure, scene, camera, limits, (left, right, top + len(image)))
+    below_view(figure, view, (left, right, top + len(image)))
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """A scene as it is seen: what is drawn, from where, and the values at the ends of colours."""
+
+    scene: Scene
+    actors: list[Actor]
+    camera: Camera
+    limits: tuple[float, float]
+
+    @property
+    def coloured(self) -> bool:
+        """Whether colours show values."""
+        return any(actor.values is not None for actor in self.actors)
+
+    def drawn(self, **how: Any) -> Image:
+        """(f, height, width, 3) its pictures; see `render`."""
+        return render(self.actors, self.camera, limits=self.limits, **how)
+
+
+def seen(
+    scene: Scene,
+    width: int,
+    heights: tuple[float, float] = HEIGHTS,
+    *,
+    frames: slice = slice(None),
+    among: Sequence[Scene] = (),
+) -> View:
+    """A scene on a picture of that width [pixel]; plain if too little of it shows values.
+
+    Scenes ``among`` others that show the same things from the same side have one scale.
+    """
+    alike = [one for one in among if one is not scene and _side(one) == _side(scene)]
+    actors, others = (
+        [replace(a, points=a.points[frames], values=None if a.values is None else a.values[frames])
+         for one in some for a in actors_of(one)] for some in ((scene,), alike)
+    )  # fmt: skip
+    whole = [*actors, *others]
+    camera = aimed(_seen(whole), width, view=scene.view, up=scene.up, heights=heights)
+    limits = scene.limits or _limits(whole)
+    coloured = [actor for actor in actors if actor.values is not None]
+    if coloured:
+        sides = camera.metre * np.ptp(_seen(coloured, slice(1)) @ camera.axes[:, :2], axis=0)
+        if sides.max() < LEAST_COLOURED:
+            actors = [replace(actor, values=None) for actor in actors]
+    return View(scene, actors, camera, limits)
+
+
+def _side(scene: Scene) -> tuple[Any, ...]:
+    """What is seen from where; scenes in which it is the same are compared."""
+    return [*scene.things], scene.label, *(np.asarray(x).tolist() for x in (scene.view, scene.up))
 
 
 def below_height(scene: Scene, width: int) -> int:
@@ -231,6 +278,13 @@ def thing_actors(name: str, thing: Thing | Mesh, colour: str) -> list[Actor]:
         values = np.broadcast_to(values, points.shape[:2])
     body = Actor(points, cells, values, colour, thing.width, thing.opacity)
     return [body, *_edges(name, thing, points, cells)]
+
+
+def as_thing(actor: Actor, frames: slice = slice(None)) -> Thing:
+    """An actor as a thing without edges, or some of its pictures."""
+    values = None if actor.values is None else actor.values[frames]
+    return Thing(actor.points[frames], actor.cells, actor.colour, values, actor.opacity,
+                 actor.width, NO_LINES)  # fmt: skip
 
 
 def _edges(name: str, thing: Thing, points: Array, cells: Index) -> list[Actor]:
@@ -274,28 +328,48 @@ def _limits(actors: Sequence[Actor]) -> tuple[float, float]:
     return min(0.0, low), high if high > min(0.0, low) else min(0.0, low) + 1.0
 
 
-def _seen(actors: Sequence[Actor]) -> Array:
+def _seen(actors: Sequence[Actor], frames: slice = slice(None)) -> Array:
     """(n, 3) points of cells: others may belong to what is left out."""
-    seen = [actor.points[:, np.unique(actor.cells)].reshape(-1, 3) for actor in actors]
-    return np.concatenate(seen)
+    points = [actor.points[frames, np.unique(actor.cells)].reshape(-1, 3) for actor in actors]
+    return np.concatenate(points)
 
 
-def _below(
-    figure: Any,
-    scene: Scene,
-    camera: Camera,
-    limits: tuple[float, float],
-    strip: tuple[float, float, float],
-) -> None:
+def below_view(figure: Any, view: View, strip: tuple[float, float, float]) -> None:
     """Axes, colours and a length, and names below; the strip is its left, right and top."""
-    left, right, top = strip
-    corner(figure, camera, left, right, top)
-    if any(getattr(thing, "values", None) is not None for thing in scene.things.values()):
+    (left, right, top), scene = strip, view.scene
+    corner(figure, view.camera, left, right, top)
+    if view.coloured:
         wide = min(500.0, right - left - TRIAD_SIZE - BAR_SIZE - 60)
         middle = (left + TRIAD_SIZE + right - BAR_SIZE) / 2
-        page.colour_bar(figure, limits, scene.label, (middle - wide / 2, top + 38, wide, 16))
+        page.colour_bar(figure, view.limits, scene.label, (middle - wide / 2, top + 38, wide, 16))
     colours, names = _colours(scene), _legend(scene)
     for name, (row, at) in zip(names, page.packed(names, right - left), strict=True):
         at, level = left + at, top + STRIP_HEIGHT + ROW_HEIGHT * row
         page.words(figure, "\u25a0", at, level - 3, color=colours[name], size=page.TITLE_SIZE)
         page.words(figure, name, at + 26, level, size=page.SMALL_SIZE)
+
+
+def scene_page(view: View, caption: str) -> Any:
+    """A page with the heading of a scene, its picture and what stands below it."""
+    width, height = view.camera.size
+    foot = PAGE_TOP + height + below_height(view.scene, width)
+    figure = page.titled(width, foot + 20, view.scene.title, caption)
+    page.place(figure, view.drawn()[0], 0, PAGE_TOP)
+    below_view(figure, view, (20, width - 20, PAGE_TOP + height))
+    return figure
+
+
+def series_page(view: View, names: Sequence[str], caption: str) -> Any:
+    """A page of the pictures of a scene, two beside each other, each with its name."""
+    images, title = view.drawn(), view.scene.title
+    columns = min(2, len(images))
+    width, height = columns * (STILL_WIDTH + 20) + 20, images.shape[1] + 50
+    head = PAGE_TOP if title else 20
+    foot = head + -(-len(images) // columns) * height
+    figure = page.titled(width, foot + STRIP_HEIGHT + 10, title, caption)
+    for k, (image, name) in enumerate(zip(images, names, strict=True)):
+        left, top = 20 + (k % columns) * (STILL_WIDTH + 20), head + (k // columns) * height
+        page.words(figure, name, left + 10, top)
+        page.place(figure, image, left, top + 35)
+    below_view(figure, view, (15, width - 15, foot))
+    return figure

@@ -66,21 +66,21 @@ def updating(  # noqa: PLR0913  keywords of one picture
                 f"{name!r} has {np.size(values)} values for {np.size(own)} frequencies."
             )
     scene = structure if isinstance(structure, Scene) else _frame(*structure)
-    if ax is not None:
-        figure, (responses, bars, errors, seen) = page.taken(ax, 4, "updating")
-        _responses(responses, f, lines, label)
-        _changes(bars, errors, changes)
-        draw_scene(figure, seen, scene)
-        return page.save(figure, path)
+    figure: Figure
     with page.styled():
-        top = 85 + TOP_HEIGHT + 145
-        figure = page.titled(PAGE_WIDTH, top + BOTTOM_HEIGHT + 75, title, caption)
-        _responses(page.area(figure, 130, 85, PAGE_WIDTH - 170, TOP_HEIGHT), f, lines, label)
-        areas = [page.area(figure, left, top, 270, BOTTOM_HEIGHT) for left in (250, 560)]
-        _changes(areas[0], areas[1], changes)
-        for axes in areas:
+        if ax is None:
+            top = 85 + TOP_HEIGHT + 145
+            figure = page.titled(PAGE_WIDTH, top + BOTTOM_HEIGHT + 75, title, caption)
+            areas = [page.area(figure, 130, 85, PAGE_WIDTH - 170, TOP_HEIGHT)]
+            areas += [page.area(figure, left, top, 270, BOTTOM_HEIGHT) for left in (250, 560)]
+            areas += [page.area(figure, 880, top - 10, 590, BOTTOM_HEIGHT + 85)]
+        else:
+            figure, areas = page.taken(ax, 4, "updating")
+        _responses(areas[0], f, lines, label)
+        _changes(areas[1], areas[2], changes)
+        draw_scene(figure, areas[3], scene)
+        for axes in areas[1:3] if ax is None else ():
             page.legend_above(axes, 270)
-        draw_scene(figure, page.area(figure, 880, top - 10, 590, BOTTOM_HEIGHT + 85), scene)
         return page.save(figure, path)
 
 
@@ -93,8 +93,8 @@ def _responses(axes: Any, f: Array, curves: dict[str, tuple[Any, Any]], label: s
     for (name, (own, values)), look in zip(curves.items(), looks, strict=False):
         axes.semilogy(own, np.abs(np.asarray(values)), label=name, **look)
     axes.set_xlim(f[0], f[-1])
-    axes.set_xlabel("frequency [Hz]", size=page.BODY_SIZE)
-    axes.set_ylabel(label, size=page.BODY_SIZE)
+    axes.set_xlabel("frequency [Hz]")
+    axes.set_ylabel(label)
     finish(axes, legend=True)
 
 

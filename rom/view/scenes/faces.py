@@ -14,7 +14,7 @@ from rom.errors import ConfigError
 from rom.model import Array, Index
 from rom.view.canvas import page
 from rom.view.canvas.offscreen import Image, render
-from rom.view.canvas.scene import TEXT_COLOUR, Actor, Camera, aimed, directed_edges
+from rom.view.canvas.scene import TEXT_COLOUR, Actor, Camera, aimed, boundary
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -86,15 +86,8 @@ def _actors(x: Array, triangles: Mapping[str, Index]) -> Iterator[Actor]:
         same = [t for label, t in triangles.items() if colours.get(label, REST_COLOUR) == colour]
         if sum(map(len, same)):
             yield Actor(x, np.vstack(same), colour=colour)
-    edges = np.vstack([_outline(t) for t in triangles.values()])
+    edges = np.vstack([boundary(t) for t in triangles.values()])
     yield Actor(x, edges, colour=EDGE_COLOUR, width=1.2)
-
-
-def _outline(triangles: Index) -> Index:
-    """(m, 2) edges at the end of a patch."""
-    pairs = np.sort(directed_edges(triangles)[0], axis=1)
-    edges, count = np.unique(pairs, axis=0, return_counts=True)
-    return edges[count == 1]
 
 
 def _numbers(x: Array, triangles: Mapping[str, Index], camera: Camera) -> Index:

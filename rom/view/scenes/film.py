@@ -12,25 +12,27 @@ from rom.errors import ConfigError
 from rom.model import Array
 from rom.names import named, offered
 from rom.view.canvas import page
-from rom.view.canvas.corner import BAR_SIZE, STRIP_HEIGHT, TRIAD_SIZE, corner
-from rom.view.canvas.films import Film, finished, wanted
-from rom.view.canvas.offscreen import Image, render
+from rom.view.canvas.films import Film, wanted
 from rom.view.canvas.scales import clock_texts, prefixed
-from rom.view.canvas.scene import Actor, Camera, aimed, sharp_edges
+from rom.view.canvas.scene import Actor, sharp_edges
 from rom.view.canvas.solids import Mesh
 from rom.view.canvas.symbols import polyline
-from rom.view.figures.things import Scene, Thing
+from rom.view.figures.things import (
+    FILM_WIDTH,
+    STILL_WIDTH,
+    Scene,
+    as_thing,
+    film,
+    seen,
+    series_page,
+)
 from rom.view.scenes.connections import connections
-from rom.view.scenes.meshes import NO_LINES
 from rom.view.scenes.places import Places, different, moving, placed
 from rom.view.scenes.rigid import BLOCK_OPACITY, BOX_OPACITY, bars, ends_of, shadow
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-FILM_WIDTH, STILL_WIDTH = 900, 740  # of a film and of one instant in a series [pixel]
-HEIGHTS = (0.2, 0.85)  # bounds of the height of a picture, of its width
-CLOCK_HEIGHT = 40  # of the strip with the time [pixel]
 N_INSTANTS = 4  # that are chosen where none are asked for
 METAL_COLOURS = ("#9aa5b1", "#c3c9d0", "#7d8791")  # rigid bodies
 EDGE_COLOUR, TRACE_COLOUR = "#3a414b", "#d1495b"
@@ -83,18 +85,10 @@ def animate(  # noqa: PLR0913  keywords of one picture, all with defaults
     path = wanted(path)
     steps = np.linspace(0, solution.t.size - 1, min(frames, solution.t.size)).round().astype(int)
     up = upright(mechanism) if up is None else up
-    look = Look(shapes or {}, magnify, symbols, traces, up)
-    stage = _stage(mechanism, solution, steps, look)
-    camera = stage.camera(FILM_WIDTH, view, up)
-    # many small pictures: as large as they are, the smooth edges that the driver has will do
-    images = render(stage.actors, camera, limits=stage.limits, oversampling=1)
-    with page.styled():
-        blank = _film_sheet(stage, camera, images.shape[1], magnify, title)
-        clocks = page.strips(clock_texts(solution.t[steps]), FILM_WIDTH // 4, CLOCK_HEIGHT)
-    pages = np.repeat(blank[None], len(images), axis=0)
-    pages[:, CLOCK_HEIGHT : CLOCK_HEIGHT + images.shape[1]] = images
-    pages[:, :CLOCK_HEIGHT, : FILM_WIDTH // 4] = clocks
-    return finished(pages, seconds / len(images), path)
+    stage = _stage(mechanism, solution, steps, Look(shapes or {}, magnify, symbols, traces, up))
+    scene = stage.scene(title, view, up)
+    words = _words(stage, magnify, coloured=seen(scene, FILM_WIDTH).coloured)
+    return film(solution.t[steps], scene, path, seconds=seconds, caption=words)
 
 
 @typed
@@ -126,11 +120,10 @@ def instants(  # noqa: PLR0913  keywords of one picture, all with defaults
     steps = np.array([int(np.argmin(np.abs(solution.t - t))) for t in given.ravel()])
     up = upright(mechanism) if up is None else up
     stage = _stage(mechanism, solution, steps, Look(shapes or {}, magnify, symbols, traces, up))
-    camera = stage.camera(STILL_WIDTH, view, up)
-    images = render(stage.actors, camera, limits=stage.limits)
+    series = seen(stage.scene("", view, up), STILL_WIDTH)
     with page.styled():
-        words = f"{caption} {_words(stage, magnify)}".lstrip()
-        return page.save(_series_sheet(stage, camera, images, solution.t[steps], words), path)
+        words = f"{caption} {_words(stage, magnify, coloured=series.coloured)}".lstrip()
+        return page.save(series_page(series, clock_texts(solution.t[steps]), words), path)
 
 
 @typed
@@ -147,20 +140,9 @@ def posed(  # noqa: PLR0913  keywords of one picture, all with defaults
     view: npt.ArrayLike | None = None,
     up: npt.ArrayLike | None = None,
 ) -> Scene:
-    """The mechanism at an instant as a `Scene`, to stand beside curves; otherwise as `animate`.
+    """The mechanism at an instant [s] as a `Scene`, to stand beside curves; otherwise as `animate`.
 
-    Args:
-        mechanism: the mechanism.
-        solution: its motion.
-        time: the instant [s]; the step nearest to it is drawn. Colours, rails and planes are those
-            of the whole motion.
-        title: what is seen.
-        shapes: {body: (points (n, 3), triangles (t, 3))} in the frame of a rigid body.
-        magnify: deformations are drawn so many times larger than they are [1].
-        symbols: draw joints, springs, planes of contact and the ground, too.
-        traces: bodies whose origin leaves a line behind, all of its way.
-        view: (3,) direction from the things to the eye [1]; None: mainly along the shortest extent.
-        up: (3,) upright direction [1]; None: against gravity, or across the longest extent without.
+    The step nearest to the time is drawn. Colours, rails and planes are those of the whole motion.
 
     Raises:
         ConfigError: for an unknown body.
@@ -170,12 +152,8 @@ def posed(  # noqa: PLR0913  keywords of one picture, all with defaults
     up = upright(mechanism) if up is None else up
     look = Look(shapes or {}, magnify, symbols, traces, up)
     stage = _stage(mechanism, solution, np.array([step, *others]), look)
-    things: dict[str, Thing | Mesh] = {
-        f"_{k}": Thing(a.points[0], a.cells, a.colour, None if a.values is None else a.values[0],
-                       a.opacity, a.width, NO_LINES) for k, a in enumerate(stage.actors)
-    }  # fmt: skip
-    label = f"deformation [{stage.unit}]" if stage.name else ""
-    return Scene(title, things, label, view, up, stage.limits if stage.name else None)
+    scene = stage.scene(title, view, up, slice(1))
+    return replace(scene, label=f"deformation [{stage.unit}]")
 
 
 @dataclass(frozen=True, slots=True)
@@ -207,10 +185,11 @@ class Stage:
     name: str
     grey: str = "rigid bodies"
 
-    def camera(self, width: int, view: Any, up: Any) -> Camera:
-        """A camera that sees everything all the time."""
-        seen = np.concatenate([actor.points.reshape(-1, 3) for actor in self.actors])
-        return aimed(seen, width, view=view, up=up, heights=HEIGHTS)
+    def scene(self, title: str, view: Any, up: Any, frames: slice = slice(None)) -> Scene:
+        """Some of its pictures, in the colours of all of them."""
+        things = {f"_{k}": as_thing(actor, frames) for k, actor in enumerate(self.actors)}
+        label = f"deformation of {self.name} [{self.unit}]"
+        return Scene(title, things, label, view, up, self.limits)
 
 
 def _stage(mechanism: Any, solution: Any, steps: Any, look: Look) -> Stage:
@@ -331,48 +310,12 @@ def together(actors: list[Actor]) -> list[Actor]:
     return kept
 
 
-def _words(stage: Stage, magnify: float) -> str:
+def _words(stage: Stage, magnify: float, *, coloured: bool = True) -> str:
     if not stage.name:
         return "Motion of the mechanism in true size."
     how = "true size" if magnify == 1.0 else f"{magnify:g} times larger"
-    return (
-        f"Motion of the mechanism, deformation of {stage.name} drawn {how}. Colours: "
-        f"displacement relative to the floating frame, in {stage.unit}; grey are {stage.grey}."
-    )
-
-
-def _film_sheet(stage: Stage, camera: Camera, height: int, magnify: float, title: str) -> Image:
-    """What stays around the pictures of a film."""
-    text, below = page.caption(_words(stage, magnify), FILM_WIDTH - 40)
-    top = CLOCK_HEIGHT + height
-    figure = page.sheet(FILM_WIDTH, top + STRIP_HEIGHT + below + 20)
-    page.words(figure, title, FILM_WIDTH - 20, 8, ha="right")
-    _below(figure, stage, camera, FILM_WIDTH, top)
-    page.words(figure, text, 20, top + STRIP_HEIGHT, size=page.SMALL_SIZE)
-    return page.pixels(figure)
-
-
-def _series_sheet(stage: Stage, camera: Camera, images: Image, times: Array, words: str) -> Any:
-    columns = min(2, len(images))
-    width, height = columns * (STILL_WIDTH + 20) + 20, images.shape[1] + 50
-    rows = -(-len(images) // columns)
-    text, below = page.caption(words, width - 60)
-    foot = 20 + rows * height
-    figure = page.sheet(width, foot + STRIP_HEIGHT + below + 40)
-    texts = clock_texts(times)
-    for k, (image, clock) in enumerate(zip(images, texts, strict=True)):
-        left, top = 20 + (k % columns) * (STILL_WIDTH + 20), 20 + (k // columns) * height
-        page.words(figure, clock, left + 10, top)
-        page.place(figure, image, left, top + 35)
-    _below(figure, stage, camera, width, foot)
-    page.words(figure, text, 30, foot + STRIP_HEIGHT + 10, size=page.SMALL_SIZE)
-    return figure
-
-
-def _below(figure: Any, stage: Stage, camera: Camera, width: int, top: int) -> None:
-    """The strip below a picture: axes, colours and their meaning, a length."""
-    corner(figure, camera, 15, width - 15, top)
-    if stage.name:
-        wide = min(500, width - 2 * max(TRIAD_SIZE, BAR_SIZE) - 90)
-        label = f"deformation of {stage.name} [{stage.unit}]"
-        page.colour_bar(figure, stage.limits, label, ((width - wide) / 2, top + 38, wide, 16))
+    words = f"Motion of the mechanism, deformation of {stage.name} drawn {how}."
+    if coloured:
+        words += " Colours: displacement relative to the floating frame, in "
+        words += f"{stage.unit}; grey are {stage.grey}."
+    return words

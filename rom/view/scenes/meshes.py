@@ -1,7 +1,7 @@
 """Picture of a finite element mesh with its interfaces."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -10,17 +10,14 @@ from rom.arguments import typed
 from rom.errors import ConfigError
 from rom.model import FEModel
 from rom.view.canvas import page
-from rom.view.canvas.corner import STRIP_HEIGHT, corner
-from rom.view.canvas.offscreen import render
-from rom.view.canvas.scene import Actor, Camera, aimed, directed_edges
-from rom.view.figures.things import Scene, Thing, actors_of
+from rom.view.canvas.scene import Actor, Camera, directed_edges
+from rom.view.figures.things import NO_LINES, Scene, Thing, actors_of, scene_page, seen
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 PAGE_WIDTH = 1500  # [pixel]
 PART_COLOUR = "#c9d1da"
-NO_LINES = np.zeros((0, 2), dtype=int)
 # one per interface
 MARK_COLOURS = ("#d1495b", "#2f7f9f", "#edae49", "#66a182", "#8d6a9f", "#00798c")
 
@@ -47,11 +44,20 @@ def mesh(
         ConfigError: if the model has no surface, or pictures cannot be made here.
     """
     path = page.wanted(path)
-    actors = mesh_actors(model)
-    camera = aimed(actors[0].points, PAGE_WIDTH, view=view, up=up)
-    image = render(actors, camera)[0]
+    camera = seen(Scene(title, meshed(model), view=view, up=up), PAGE_WIDTH).camera
+    hidden = [name for name in model.interfaces if not in_sight(model, name, camera)]
+    things = {name + " (turned away)" * (name in hidden): thing
+              for name, thing in meshed(model).items()}  # fmt: skip
+    whole = seen(Scene(title, things, view=view, up=up), PAGE_WIDTH)
+    size = np.ptp(model.points, axis=0) * 1e3
+    words = (
+        f"Finite element mesh: {model.n_dofs} displacement dofs, "
+        f"{size[0]:.4g} mm x {size[1]:.4g} mm x {size[2]:.4g} mm. Lines join neighbouring nodes of "
+        "the outer surface; coloured surfaces are the interfaces, through which the body touches "
+        "the rest of the mechanism."
+    )
     with page.styled():
-        return page.save(_sheet(model, camera, image, title), path)
+        return page.save(scene_page(whole, words), path)
 
 
 @typed
@@ -96,25 +102,3 @@ def mesh_actors(model: FEModel) -> list[Actor]:
         ConfigError: if the model has no surface.
     """
     return actors_of(Scene("mesh", meshed(model)))
-
-
-def _sheet(model: FEModel, camera: Camera, image: Any, title: str) -> Any:
-    size = np.ptp(model.points, axis=0) * 1e3
-    words = (
-        f"Finite element mesh: {model.n_dofs} displacement dofs, "
-        f"{size[0]:.4g} mm x {size[1]:.4g} mm x {size[2]:.4g} mm. Lines join neighbouring nodes of "
-        "the outer surface; coloured surfaces are the interfaces, through which the body touches "
-        "the rest of the mechanism."
-    )
-    top = image.shape[0] + STRIP_HEIGHT + 90
-    figure = page.titled(PAGE_WIDTH, top + 50, title, words)
-    page.place(figure, image, 0, 80)
-    corner(figure, camera, 20, PAGE_WIDTH - 20, image.shape[0] + 80)
-    left = 30
-    for k, name in enumerate(model.interfaces):
-        colour = MARK_COLOURS[k % len(MARK_COLOURS)]
-        page.words(figure, "\u25a0", left, top, color=colour, size=page.TITLE_SIZE)
-        note = "" if in_sight(model, name, camera) else " (turned away)"
-        page.words(figure, name + note, left + 30, top + 3, size=page.BODY_SIZE)
-        left += 60 + 16 * len(name + note)
-    return figure

@@ -1,5 +1,6 @@
 """Pictures of natural modes on the deformed surface."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,14 +11,12 @@ from rom.arguments import AnyBody, typed
 from rom.errors import ConfigError
 from rom.model import Array
 from rom.view.canvas import page
-from rom.view.canvas.corner import corner
-from rom.view.canvas.offscreen import Image, render
-from rom.view.canvas.scene import UNDEFORMED_COLOUR, Actor, Camera, aimed, sharp_edges
+from rom.view.canvas.scene import UNDEFORMED_COLOUR, sharp_edges
+from rom.view.figures.things import NO_LINES, STILL_WIDTH, Scene, Thing, seen, series_page
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-PANEL_WIDTH = 740  # of one mode [pixel]
 AMPLITUDE_RATIO = 0.08  # largest displacement shown, of the body's size
 
 
@@ -51,17 +50,16 @@ def mode_shapes(
     body = body.in_units("SI")
     omega, V = body.modes(fixed=fixed)
     elastic = np.flatnonzero(omega > 0)[:n]
-    shapes = [displacement(body, V[:, k]) for k in elastic]
-    images, camera = drawn(body.surface, shapes, view, up)
+    shapes = {f"mode {i}: {omega[k] / (2 * np.pi):.5g} Hz": displacement(body, V[:, k])
+              for i, k in enumerate(elastic, start=1)}  # fmt: skip
     support = f"{' and '.join(fixed)} held" if fixed else "free, its six rigid motions left out"
     words = (
         f"Lowest elastic modes of the reduced body {body.name} ({body.n_modes} elastic "
         f"coordinates), {support}."
     )
-    with page.styled():
-        names = [f"mode {i + 1}: {omega[k] / (2 * np.pi):.5g} Hz" for i, k in enumerate(elastic)]
-        title = f"Mode shapes of {body.name}"
-        return page.save(sheet(images, camera, names, title, words, "body"), path)
+    title = f"Mode shapes of {body.name}"
+    figure = modes_page(body.surface, shapes, title, words, what="body", view=view, up=up)
+    return page.save(figure, path)
 
 
 def displacement(body: Any, motion: Array) -> Array:
@@ -71,47 +69,31 @@ def displacement(body: Any, motion: Array) -> Array:
     return rigid + (body.surface.shape @ motion[6:]).reshape(-1, 3)
 
 
-def drawn(surface: Any, shapes: list[Array], view: Any, up: Any) -> tuple[Image, Camera]:
-    """One picture per shape, all from the same place, and that place."""
-    X, size = surface.points, np.ptp(surface.points, axis=0).max()
-    lengths = [np.linalg.norm(u, axis=1) for u in shapes]
-    moved = [
-        X + AMPLITUDE_RATIO * size * u / length.max()
-        for u, length in zip(shapes, lengths, strict=True)
-    ]
-    camera = aimed(np.stack([X, *moved]), PANEL_WIDTH, view=view, up=up)
-    edges, values = sharp_edges(X, surface.triangles), [v / v.max() for v in lengths]
-    still = Actor(X[None], edges, colour=UNDEFORMED_COLOUR, width=1.0)
-    actors = [still, Actor(np.stack(moved), surface.triangles, np.stack(values))]
-    return render(actors, camera), camera
-
-
-def sheet(images: Any, camera: Camera, names: list[str], title: str, words: str, what: str) -> Any:
-    """A page of modes, two beside each other.
+def modes_page(
+    surface: Any, shapes: Mapping[str, Array], title: str, words: str, *, what: str, **look: Any
+) -> Any:
+    """A page of modes on a deformed surface, all seen from the same place.
 
     Args:
-        images: of `drawn`.
-        camera: of `drawn`.
-        names: of the modes.
+        surface: of the body.
+        shapes: {name of a mode: (s, 3) displacements of the surface}.
         title: heading.
         words: caption, to which the meaning of displacements and grey lines is added.
         what: that whose size displacements are compared with.
+        look: from where it is seen, as a `Scene` wants it.
     """
-    columns = min(2, len(images))
-    width = columns * (PANEL_WIDTH + 20) + 20
-    rows, height = -(-len(images) // columns), images[0].shape[0] + 50
+    X, size = surface.points, np.ptp(surface.points, axis=0).max()
+    lengths = np.array([np.linalg.norm(u, axis=1) for u in shapes.values()])
+    largest = lengths.max(axis=1, keepdims=True)
+    moved = X + AMPLITUDE_RATIO * size * np.array([*shapes.values()]) / largest[..., None]
+    still = Thing(X, sharp_edges(X, surface.triangles), UNDEFORMED_COLOUR, width=1.0)
+    body = Thing(moved, surface.triangles, values=lengths / largest, edges=NO_LINES)
+    label = "displacement / largest displacement of the mode"
+    scene = Scene(title, {"_still": still, "body": body}, label, limits=(0.0, 1.0), **look)
     caption = (
         f"{words} The largest displacement is drawn as {100 * AMPLITUDE_RATIO:g} % of the size of "
         f"the {what}; grey lines show the undeformed edges."
     )
-    figure = page.titled(width, 80 + rows * height + 110, title, caption)
-    for k, (image, name) in enumerate(zip(images, names, strict=True)):
-        left, top = 20 + (k % columns) * (PANEL_WIDTH + 20), 80 + (k // columns) * height
-        page.words(figure, name, left + 10, top + 10)
-        page.place(figure, image, left, top + 40)
-    top = 80 + rows * height
-    label = "displacement / largest displacement of the mode"
-    wide = min(500, width - 320)
-    page.colour_bar(figure, (0.0, 1.0), label, ((width - wide) / 2, top + 35, wide, 18))
-    corner(figure, camera, 15, width - 15, top)
-    return figure
+    view = seen(scene, STILL_WIDTH)
+    with page.styled():
+        return series_page(view, list(shapes), caption)

@@ -3,7 +3,6 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,7 +14,7 @@ from rom.errors import ConfigError
 from rom.model import Array, FEModel, Index
 from rom.view.canvas import page
 from rom.view.figures.things import Thing
-from rom.view.scenes.mode_shapes import drawn, sheet
+from rom.view.scenes.mode_shapes import modes_page
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -59,11 +58,8 @@ def wheel_modes(  # noqa: PLR0913  keywords of one picture
     if any(u.shape != (N, 3 * model.points.shape[0]) for u in U):
         raise ConfigError(f"each shape needs {3 * model.points.shape[0]} numbers per sector.")
     around = _around([model] * N, hidden, axis)
-    moved = [around.displaced(list(u)) for u in U]
-    surface = SimpleNamespace(points=around.points, triangles=around.triangles)
-    images, camera = drawn(surface, moved, view, None)
-    with page.styled():
-        return page.save(sheet(images, camera, list(shapes), title, caption, "wheel"), path)
+    moved = {name: around.displaced(list(u)) for name, u in zip(shapes, U, strict=True)}
+    return page.save(modes_page(around, moved, title, caption, what="wheel", view=view), path)
 
 
 @typed
