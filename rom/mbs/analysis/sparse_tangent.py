@@ -149,6 +149,10 @@ class SparseTangent:
         none = np.maximum(p.round_off(U), LOAD_STIFFNESS_RTOL * self.pull)
         return Weakest(squares, p.basis @ U, none, np.abs(U.T @ self.r))
 
+    def driven(self, faint: float) -> Array | None:
+        """(n,) a motion that no force opposes, though one beyond ``faint`` drives it."""
+        return self.weakest().driven(faint)
+
     def reaction(self) -> Array:
         """(m,) change of the multipliers that balances the forces best."""
         return self._balanced()[1]
