@@ -1,10 +1,12 @@
 """Is a computed motion believable? Conservation, constraints, Newton, size of deformations."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from rom.arguments import typed
+from rom.errors import warn
 from rom.mbs.kernels.system import ROLL
 from rom.mbs.results.solution import Solution
 from rom.mbs.results.validity import MAX_DEFORMATION, MAX_PRESSURE, deformation, pressed, softening
@@ -17,6 +19,8 @@ QUATERNION_ATOL = 1e-12
 MOMENTUM_RTOL = 1e-5  # a second-order method conserves it to the error of its steps, not exactly
 MAX_MEAN_CORRECTIONS = 8.0
 CERTIFIED_RTOL = 1e-6  # of energy on the very edge of a range
+LOOK_EVERY = 4  # instants, where a run looks at its own motion
+MOTION = ("t", "q", "v", "a", "lam", "work", "base", "signals")  # a row for each instant
 
 
 @typed
@@ -47,8 +51,34 @@ def audit(solution: Solution) -> Report:
         >>> rom.audit(rom.simulate(mech, t_end=1.0, dt=1e-2)).ok
         True
     """
-    rows = [*_energy(solution), *_momentum(solution), *_joints(solution), *_numbers(solution)]
+    rows = _of_steps(solution)
+    for name, part in solution.mechanism.parts.items():
+        if part.r:
+            rows += _limits(solution, name, part.flexible)
     return Report(f"audit of {solution.t[-1] - solution.t[0]:g} s of motion", tuple(rows))
+
+
+def warn_of_failures(solution: Solution) -> None:
+    """Warn once of a motion whose balances, joints or steps the audit finds wrong.
+
+    Every fourth instant is looked at, which takes a few per cent of the time of the run. Of bodies
+    that left their range `rom.mbs.results.validity` warns.
+    """
+    n = solution.t.size
+    seen = np.unique([*range(0, n, LOOK_EVERY), n - 1])
+    motion = {name: getattr(solution, name)[seen] for name in MOTION}
+    rows = _of_steps(replace(solution, **motion, _tracks={}))
+    failures = [f"{row.quantity} {row.value:.2g}" for row in rows if not row.ok]
+    if failures:
+        warn(
+            f"the motion does not pass its audit: {'; '.join(failures)}. Take smaller steps, or "
+            "look for a load, stiffness or drive that they do not resolve; rom.audit has limits."
+        )
+
+
+def _of_steps(solution: Solution) -> list[Row]:
+    """What one look at all instants tells of a motion as a whole."""
+    return [*_energy(solution), *_momentum(solution), *_joints(solution), *_numbers(solution)]
 
 
 def _row(quantity: str, value: float, limit: float) -> Row:
@@ -111,9 +141,6 @@ def _numbers(solution: Solution) -> list[Row]:
     if "iterations" in statistics:
         mean = statistics["iterations"] / max(statistics["steps"], 1)
         rows.append(_row("Newton corrections per step", mean, MAX_MEAN_CORRECTIONS))
-    for name, part in solution.mechanism.parts.items():
-        if part.r:
-            rows += _limits(solution, name, part.flexible)
     return rows
 
 
