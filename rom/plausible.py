@@ -5,6 +5,7 @@ what is built, so that nobody is blamed who means what he writes.
 """
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from numbers import Real
 from typing import Any
@@ -21,7 +22,7 @@ class Range:
         low, high: limits, in ``unit``; None for no limit.
         unit: SI unit, empty for a plain number.
         known: what lies at the limits.
-        cure: what to look at.
+        cure: what to look at; if empty, the unit that the value seems to have.
     """
 
     quantity: str
@@ -31,15 +32,25 @@ class Range:
     known: str
     cure: str
 
+    def includes(self, value: float) -> bool:
+        """Whether the value lies inside."""
+        low = -math.inf if self.low is None else self.low
+        return low <= value <= (math.inf if self.high is None else self.high)
+
     def doubt(self, value: float, of: str = "") -> str:
         """A sentence if the value lies outside, else nothing."""
-        low = -float("inf") if self.low is None else self.low
-        high = float("inf") if self.high is None else self.high
-        if low <= value <= high:
+        if self.includes(value):
             return ""
         name = f"{self.quantity} of {of}" if of else self.quantity
         unit = f" {self.unit}" if self.unit else ""
-        return f"{name} is {value:.4g}{unit}; {self.known}. {self.cure}"
+        return f"{name} is {value:.4g}{unit}; {self.known}. {self.cure or self._slip(value)}"
+
+    def _slip(self, value: float) -> str:
+        """The unit in which the value would be usual."""
+        for word, factor in SLIPS.get(self.unit, ()):
+            if self.includes(meant := value * factor):
+                return f"It looks like {word}: {value:.4g} {word} are {meant:.4g} {self.unit}."
+        return f"It is in {self.unit}."
 
 
 WAVE_SPEED = Range(
@@ -98,7 +109,7 @@ GYRATION = Range(
 )  # fmt: skip
 FRICTION = Range(
     "the coefficient of friction", None, 3.0, "", "rubber on rock reaches 2",
-    "Thirty per cent are 0.3.",
+    "Thirty per cent are 0.3, an angle of 35 degrees is 0.7.",
 )  # fmt: skip
 SPEED = Range(
     "the speed at the start", None, 1e5, "m/s", "spacecraft reach 70000 m/s",
@@ -117,6 +128,59 @@ DAMPING = Range(
     "the damping", 0.0, None, "", "below zero it gives energy to the motion", "Check the sign.",
 )  # fmt: skip
 
+
+SLIPS = {  # units that stand for others by mistake, and what they are
+    "m": (("mm", 1e-3), ("micrometres", 1e-6)),
+    "rad": (("degrees", math.pi / 180),),
+    "Pa": (("bar", 1e5), ("MPa", 1e6), ("GPa", 1e9)),
+    "Pa s": (("mPa s", 1e-3),),
+    "N/m^2": (("N/(mm um)", 1e9),),
+    "kg/m^3": (("g/cm^3", 1e3),),
+    "J/(kg K)": (("kJ/(kg K)", 1e3),),
+}
+_VISCOSITY = Range("the viscosity", 1e-6, 10.0, "Pa s", "oils have 0.002 to 2, air 2e-05", "")
+_BEARING = Range("the size", 1e-4, 10.0, "m", "journals have 0.001 m to 1.5 m", "")
+_BALL = Range("the diameter", 1e-5, 1.0, "m", "bearings and springs have 1e-4 m to 0.2 m", "")
+_YOUNG = Range("Young's modulus", 3e8, 2e12, "Pa", "machine parts have 1e9 (plastics) to 1e12", "")
+_FACE = Range("the width", 1e-5, 5.0, "m", "gears have 0.0001 m to 1 m", "")
+# what arguments of public functions and records of components are, by their name, or where the
+# name has other meanings elsewhere, by whose it is; zero is for what is not there
+USUAL = {
+    "friction": FRICTION,
+    "mu": FRICTION,
+    "module": Range("the module", 1e-5, 0.2, "m", "gears have 5e-05 m (watches) to 0.1 m", ""),
+    "GearPair.width": _FACE,
+    "RackPair.width": _FACE,
+    "gear.width": _FACE,
+    "gear_mesh.stiffness": Range(
+        "the stiffness", 1e6, 1e13, "N/m^2", "teeth of steel have 1e10 to 2e10 per width", "",
+    ),
+    "oil": _VISCOSITY,
+    "viscosity": _VISCOSITY,
+    "JournalBearing.diameter": _BEARING,
+    "JournalBearing.length": _BEARING,
+    "clearance": Range("the clearance", -0.01, 0.02, "m", "bearings have 1e-06 m to 0.001 m", ""),
+    "roughness": Range("the roughness", None, 1e-3, "m", "journals have 1e-07 m to 1e-05 m", ""),
+    "inlet": Range(
+        "the temperature", -60.0, 200.0, "degrees Celsius", "oil comes in at 20 to 90",
+        "A temperature in K is 273 more.",
+    ),
+    "Groove.pressure": Range("the pressure", 1e3, 1e8, "Pa", "oil comes in at 1e4 to 1e7", ""),
+    "Oil.density": Range("the density", 300.0, 3000.0, "kg/m^3", "oils have 700 to 1100", ""),
+    "Oil.heat": Range("the specific heat", 500.0, 1e4, "J/(kg K)", "oils have 1600 to 2500", ""),
+    "ball_diameter": _BALL,
+    "roller_diameter": _BALL,
+    "wire": _BALL,
+    "pitch_diameter": Range("the diameter", 1e-4, 20.0, "m", "bearings have 0.002 m to 10 m", ""),
+    "BallBearing.E": _YOUNG,
+    "Hertz.E": _YOUNG,
+    "HelicalSpring.E": _YOUNG,
+} | {
+    name: Range(f"the angle {name.split('.')[-1]!r}", -2 * math.pi, 2 * math.pi, "rad",
+                "a whole turn has 6.283 rad", "")
+    for name in ("lobes", "helix", "gear_helix", "pressure_angle", "contact_angle", "cone", "tilt",
+                 "yaw", "half_angle", "Groove.angle", "Groove.width")
+}  # fmt: skip
 
 MAX_ORIGIN_RATIO = 100.0  # sizes from the origin: four of sixteen digits of an inertia cancel
 SCALED_RATIO = 100.0  # times a default, from where a value has another unit
@@ -149,6 +213,17 @@ def scaled_doubt(name: str, value: Any, default: Any) -> str:
 def warn_outside(limits: Range, value: float, of: str = "") -> None:
     """Warn if a value lies outside its range."""
     warn(limits.doubt(value, of))
+
+
+def usual(owner: str, names: Iterable[str]) -> dict[str, Range]:
+    """What arguments are in machines, those that the table knows.
+
+    Args:
+        owner: the function or class.
+        names: of its arguments.
+    """
+    known = {name: USUAL.get(f"{owner}.{name}", USUAL.get(name)) for name in names}
+    return {name: limits for name, limits in known.items() if limits}
 
 
 def check_damping_ratio(ratio: Any, of: str = "", *, stilled: bool = False) -> None:

@@ -102,8 +102,8 @@ def _told(packed: Packed, W: Work, q: Array, v: Array, assemble: bool, placing: 
         raise ModelError(
             f"the start contradicts joints and drives: {said}",
             where=moved[0][1],
-            hint="Correct places, velocities or drives so that they fit where bodies are added, "
-            "or let the start be moved (assemble=True; in a file, assemble = true).",
+            hint="Let places and drives fit, and velocities: omega about a pin moves the origin, "
+            "too. Or let the start be moved (assemble=True; in a file, assemble = true).",
         )
     if moved and not assemble:
         warn(

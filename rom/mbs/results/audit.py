@@ -14,6 +14,7 @@ from rom.model import Report, Row
 
 # limits; energy counts relative to the largest amount of energy that was exchanged
 ENERGY_RTOL = 1e-2
+ROUND_OFF_RTOL = 1e-12
 GAP_RTOL = 1e-9
 QUATERNION_ATOL = 1e-12
 MOMENTUM_RTOL = 1e-5  # a second-order method conserves it to the error of its steps, not exactly
@@ -89,13 +90,22 @@ def _energy(solution: Solution) -> list[Row]:
     e = solution.energy
     parts = (e.kinetic, e.strain, e.potential, e.drives, e.forces, e.damping)
     turnover = max(np.ptp(part) for part in parts)
-    scale = max(turnover, np.abs(e.kinetic).max(), np.abs(e.strain).max(), 1e-300)
+    scale = max(turnover, np.abs(e.kinetic).max(), np.abs(e.strain).max(), _at_rest(solution))
     rows = [_row("energy balance / energy", np.abs(e.balance).max() / scale, ENERGY_RTOL)]
     if solution.t.size > 3:
         t = solution.t - solution.t.mean()
         slope = (t @ e.balance) / (t @ t) * np.ptp(solution.t)
         rows.append(_row("drift of energy / energy", abs(slope) / scale, ENERGY_RTOL))
     return rows
+
+
+def _at_rest(solution: Solution) -> float:
+    """Energy that is round-off: of the largest one, of the weight or of a way in the time [J]."""
+    e, packed, T = solution.energy, solution.packed, np.ptp(solution.t)
+    weight = np.linalg.norm(packed.system.bodies.gravity) * packed.length
+    crossing = (packed.length / T) ** 2 if T else 0.0
+    largest = max(np.abs(part).max() for part in (e.potential, e.drives, e.forces, e.damping))
+    return ROUND_OFF_RTOL * (largest + packed.mass * (weight + crossing)) or 1e-300
 
 
 def _momentum(solution: Solution) -> list[Row]:

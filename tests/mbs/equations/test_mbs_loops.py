@@ -159,7 +159,9 @@ def coil():
 def swing():
     """A flexible body on a ball joint."""
     mech = Mechanism()
-    body = mech.add_flexible("one", random_body(np.random.default_rng(3)), omega=(1.0, 2.0, 3.0))
+    shapes, omega = random_body(np.random.default_rng(3)), (1.0, 2.0, 3.0)
+    start = np.cross(shapes.markers["a"].point, omega)
+    body = mech.add_flexible("one", shapes, omega=omega, velocity=start)
     place = mech.design_point(body.marker("a"))
     mech.spherical("hook", mech.ground.marker(place), body.marker("a"))
     return mech

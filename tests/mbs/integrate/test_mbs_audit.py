@@ -124,3 +124,15 @@ def test_an_element_from_outside_says_itself_what_it_cannot_bear():
     mech.elements["rubber"] = mine, mech.elements["rubber"][1]
     with pytest.warns(RomWarning, match=r"^rubber after 0\.01 s at 0\.998$"):
         simulate(mech, t_end=0.01, dt=1e-3)
+
+
+@pytest.mark.parametrize("gravity", [0.0, 9.81])
+def test_what_rests_passes_whatever_its_round_off_is(gravity):
+    """A rod that a drive holds level: all energies are round-off, their balance is another one."""
+    mech = Mechanism(gravity=(0, -gravity, 0))
+    rod = mech.add_rigid("rod", mass=1.0, inertia=(1e-3, 0.1, 0.1), at=(0.51, 0, 0))
+    mech.revolute("pin", mech.ground.marker((0.01, 0, 0)), rod.marker((-0.5, 0, 0)), axis=(0, 0, 1))
+    mech.drive("turn", "pin", lambda t: 0.3 + 0.0 * t)
+    sol = simulate(mech, t_end=1e-3, dt=1e-4, assemble=True)
+    assert sol.energy.kinetic.max() < 1e-20
+    assert audit(sol).ok, audit(sol)

@@ -12,7 +12,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from rom.arguments import one_of
+from rom.arguments import one_of, typed
 from rom.errors import ModelError
 from rom.model import Array, Index
 
@@ -45,6 +45,7 @@ class Grid(NamedTuple):
     half: float
 
 
+@typed
 @dataclass(frozen=True, slots=True)
 class Groove:
     """An axial groove full of oil.
@@ -62,6 +63,7 @@ class Groove:
     share: float = 1.0
 
 
+@typed
 @dataclass(frozen=True)
 class JournalBearing:
     """A bearing and the cells its film is divided into.

@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import brentq
 
+from rom.arguments import typed
 from rom.errors import ModelError
 from rom.model import Array
 
@@ -36,6 +37,7 @@ def check_numbers(pair: Any) -> None:
             raise ModelError(f"{field.name} = {value} of a pair of gears is no finite number.")
 
 
+@typed
 @dataclass(frozen=True)
 class GearPair:
     """A pair of cylindrical gears.

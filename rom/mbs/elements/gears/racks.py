@@ -5,11 +5,13 @@ from functools import cached_property
 
 import numpy as np
 
+from rom.arguments import typed
 from rom.errors import ModelError
 from rom.mbs.elements.gears.geometry import GearPair, check_numbers
 from rom.model import Array
 
 
+@typed
 @dataclass(frozen=True)
 class RackPair:
     """A cylindrical pinion and a rack, without ends: see `rom.Mechanism.stop`.
