@@ -160,7 +160,6 @@ USUAL = {
     "JournalBearing.diameter": _BEARING,
     "JournalBearing.length": _BEARING,
     "clearance": Range("the clearance", -0.01, 0.02, "m", "bearings have 1e-06 m to 0.001 m", ""),
-    "roughness": Range("the roughness", None, 1e-3, "m", "journals have 1e-07 m to 1e-05 m", ""),
     "inlet": Range(
         "the temperature", -60.0, 200.0, "degrees Celsius", "oil comes in at 20 to 90",
         "A temperature in K is 273 more.",
