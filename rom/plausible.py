@@ -138,48 +138,35 @@ SLIPS = {  # units that stand for others by mistake, and what they are
     "kg/m^3": (("g/cm^3", 1e3),),
     "J/(kg K)": (("kJ/(kg K)", 1e3),),
 }
-_VISCOSITY = Range("the viscosity", 1e-6, 10.0, "Pa s", "oils have 0.002 to 2, air 2e-05", "")
-_BEARING = Range("the size", 1e-4, 10.0, "m", "journals have 0.001 m to 1.5 m", "")
-_BALL = Range("the diameter", 1e-5, 1.0, "m", "bearings and springs have 1e-4 m to 0.2 m", "")
-_YOUNG = Range("Young's modulus", 3e8, 2e12, "Pa", "machine parts have 1e9 (plastics) to 1e12", "")
-_FACE = Range("the width", 1e-5, 5.0, "m", "gears have 0.0001 m to 1 m", "")
+TURN = 2 * math.pi
 # what arguments of public functions and records of components are, by their name, or where the
-# name has other meanings elsewhere, by whose it is; zero is for what is not there
-USUAL = {
-    "friction": FRICTION,
-    "mu": FRICTION,
-    "module": Range("the module", 1e-5, 0.2, "m", "gears have 5e-05 m (watches) to 0.1 m", ""),
-    "GearPair.width": _FACE,
-    "RackPair.width": _FACE,
-    "gear.width": _FACE,
-    "gear_mesh.stiffness": Range(
-        "the stiffness", 1e6, 1e13, "N/m^2", "teeth of steel have 1e10 to 2e10 per width", "",
-    ),
-    "oil": _VISCOSITY,
-    "viscosity": _VISCOSITY,
-    "JournalBearing.diameter": _BEARING,
-    "JournalBearing.length": _BEARING,
-    "clearance": Range("the clearance", -0.01, 0.02, "m", "bearings have 1e-06 m to 0.001 m", ""),
-    "inlet": Range(
-        "the temperature", -60.0, 200.0, "degrees Celsius", "oil comes in at 20 to 90",
-        "A temperature in K is 273 more.",
-    ),
-    "Groove.pressure": Range("the pressure", 1e3, 1e8, "Pa", "oil comes in at 1e4 to 1e7", ""),
-    "Oil.density": Range("the density", 300.0, 3000.0, "kg/m^3", "oils have 700 to 1100", ""),
-    "Oil.heat": Range("the specific heat", 500.0, 1e4, "J/(kg K)", "oils have 1600 to 2500", ""),
-    "ball_diameter": _BALL,
-    "roller_diameter": _BALL,
-    "wire": _BALL,
-    "pitch_diameter": Range("the diameter", 1e-4, 20.0, "m", "bearings have 0.002 m to 10 m", ""),
-    "BallBearing.E": _YOUNG,
-    "Hertz.E": _YOUNG,
-    "HelicalSpring.E": _YOUNG,
-} | {
-    name: Range(f"the angle {name.split('.')[-1]!r}", -2 * math.pi, 2 * math.pi, "rad",
-                "a whole turn has 6.283 rad", "")
-    for name in ("lobes", "helix", "gear_helix", "pressure_angle", "contact_angle", "cone", "tilt",
-                 "yaw", "half_angle", "Groove.angle", "Groove.width")
-}  # fmt: skip
+# name has other meanings elsewhere, by whose it is: limits, unit, what there is. Zero is for none
+_OIL = 1e-6, 10.0, "Pa s", "oils have 0.002 to 2, air 2e-05"
+_STEEL = 3e8, 2e12, "Pa", "machine parts have 1e9 (plastics) to 1e12"
+_BALL = 1e-5, 1.0, "m", "bearings and springs have 0.0001 m to 0.2 m"
+_FACE = 1e-5, 5.0, "m", "gears have 0.0001 m to 1 m"
+_JOURNAL = 1e-4, 10.0, "m", "journals have 0.001 m to 1.5 m"
+_ANGLE = -TURN, TURN, "rad", "a whole turn has 6.283 rad"
+_LIMITS: dict[str, tuple[float, float, str, str]] = {
+    "module": (1e-5, 0.2, "m", "gears have 5e-05 m (watches) to 0.1 m"),
+    "gear_mesh.stiffness": (1e6, 1e13, "N/m^2", "teeth of steel have about 1e10 per width"),
+    "clearance": (-0.01, 0.02, "m", "bearings have 1e-06 m to 0.001 m"),
+    "Groove.pressure": (1e3, 1e8, "Pa", "oil comes in at 1e4 to 1e7"),
+    "Oil.density": (300.0, 3000.0, "kg/m^3", "oils have 700 to 1100"),
+    "Oil.heat": (500.0, 1e4, "J/(kg K)", "oils have 1600 to 2500"),
+    "inlet": (-60.0, 200.0, "degrees Celsius", "oil comes in at 20 to 90, in K 273 more"),
+    "pitch_diameter": (1e-4, 20.0, "m", "bearings have 0.002 m to 10 m"),
+    **dict.fromkeys(("oil", "viscosity"), _OIL),
+    **dict.fromkeys(("BallBearing.E", "Hertz.E", "HelicalSpring.E"), _STEEL),
+    **dict.fromkeys(("ball_diameter", "roller_diameter", "wire"), _BALL),
+    **dict.fromkeys(("GearPair.width", "RackPair.width", "gear.width"), _FACE),
+    **dict.fromkeys(("JournalBearing.diameter", "JournalBearing.length"), _JOURNAL),
+    **dict.fromkeys(("lobes", "helix", "gear_helix", "pressure_angle", "contact_angle"), _ANGLE),
+    **dict.fromkeys(("cone", "tilt", "yaw", "half_angle", "Groove.angle", "Groove.width"), _ANGLE),
+}
+USUAL = {"friction": FRICTION, "mu": FRICTION} | {
+    name: Range(repr(name.split(".")[-1]), *limits, "") for name, limits in _LIMITS.items()
+}
 
 MAX_ORIGIN_RATIO = 100.0  # sizes from the origin: four of sixteen digits of an inertia cancel
 SCALED_RATIO = 100.0  # times a default, from where a value has another unit

@@ -289,7 +289,7 @@ SLIPS = {  # what is made of a number, the number, the same in another unit, wha
                                 friction=x), 0.3, 30.0, "Thirty per cent"),
     "tendon in a hand": (lambda x: Tendon((Hole(0, 0, (0, 0, 0)),) * 2, x), 0.3, 30.0, "per cent"),
     "viscosity": (lambda x: in_film(oil=x), 0.02, 20.0, "mPa s: 20 mPa s are 0.02 Pa s"),
-    "inlet": (lambda x: in_film(oil=Oil(46.0, 6.8), inlet=x), 40.0, 313.0, "in K is 273 more"),
+    "inlet": (lambda x: in_film(oil=Oil(46.0, 6.8), inlet=x), 40.0, 313.0, "in K 273 more"),
     "lobes": (lambda x: JournalBearing(0.05, 0.03, 5e-5, preload=0.4, lobes=x), np.pi / 2, 90,
               "degrees: 90 degrees are 1.571 rad"),
     "journal": (lambda x: JournalBearing(x, x, 1e-3 * x), 0.05, 50.0, "mm: 50 mm are 0.05 m"),

@@ -151,7 +151,9 @@ class SparseTangent:
 
     def driven(self, faint: float) -> Array | None:
         """(n,) a motion that no force opposes, though one beyond ``faint`` drives it."""
-        return self.weakest().driven(faint)
+        weakest = self.weakest()
+        pushed = np.where(weakest.loose, weakest.along, 0.0)
+        return weakest.motions[:, int(np.argmax(pushed))] if pushed.max(initial=0) > faint else None
 
     def reaction(self) -> Array:
         """(m,) change of the multipliers that balances the forces best."""

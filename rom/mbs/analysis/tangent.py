@@ -183,11 +183,6 @@ class Weakest:
         """(k,) whether nothing opposes it."""
         return np.abs(self.squares) <= self.none
 
-    def driven(self, faint: float) -> Array | None:
-        """(n,) the motion that forces drive and no stiffness opposes, if there is one."""
-        pushed = np.where(self.loose, self.along, 0.0)
-        return self.motions[:, int(np.argmax(pushed))] if pushed.max(initial=0.0) > faint else None
-
 
 def load_stiffness(now: Instant, state: State) -> float:
     """Gravity over length, and what other loads add; residual first [1/s^2]."""

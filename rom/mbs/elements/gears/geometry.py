@@ -7,9 +7,8 @@ An internal gear has a negative number of teeth, and with it negative radii and 
 distance, as in ISO 21771: then all formulas are those of external gears.
 """
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -23,18 +22,6 @@ from rom.model import Array
 def involute(angle: npt.ArrayLike) -> Array:
     """Tan a - a of a pressure angle [rad]."""
     return np.tan(angle) - np.asarray(angle, dtype=float)
-
-
-def check_numbers(pair: Any) -> None:
-    """Refuse sizes of a pair that are no finite numbers.
-
-    Raises:
-        ModelError: for the first of them.
-    """
-    for field in fields(pair):
-        value = getattr(pair, field.name)
-        if value is not None and not np.isfinite(value).all():
-            raise ModelError(f"{field.name} = {value} of a pair of gears is no finite number.")
 
 
 @typed
@@ -74,7 +61,6 @@ class GearPair:
     gear_helix: float | None = None
 
     def __post_init__(self) -> None:
-        check_numbers(self)
         if min(map(abs, self.teeth)) < 4 or not (self.module > 0 and self.width > 0):
             raise ModelError(
                 f"no gears have {self.teeth} teeth of module {self.module} m, {self.width} m wide."
