@@ -33,6 +33,7 @@ ELASTIC_WEIGHTS = (1e24, 1e8)
 # change of the start by joints and drives, of the size and of given velocities, from which it is
 # told, and from which it is no slip of a drawing any more and refused
 WARNING_RTOL, REFUSAL_RTOL = 1e-6, 1e-2
+LED_WEIGHT = 1e4  # of the motion of bodies that were given no velocity
 GAP_TOLERANCE = 1e-9
 MAX_ASSEMBLY = 60
 N_PROBES = 4  # gaps by which constraints that repeat others are found
@@ -80,7 +81,7 @@ def _start(packed: Packed, signal: Array, t: float, asked: tuple[bool, bool]) ->
         return _start(packed.sharing(), signal, t, asked)
     rank = W.value.size if surely else _rank(packed, W, q)
     _check_start(packed, W, q, rank)
-    v = fitting_velocity(packed, W, q, packed.v)
+    v = fitting_velocity(packed, W, q, packed.v, led=True)
     closed, lam = _told(packed, W, q, v, *asked), np.zeros(W.value.size)
     return with_accelerations(packed, W, State(t, q, v, v * 0, lam, rank, closed=closed))
 
@@ -305,8 +306,15 @@ def least_motion(s: Any, W: Work, gap: Array) -> Array:
     return x
 
 
-def fitting_velocity(packed: Packed, W: Work, q: Array, v: Array) -> Array:
+def fitting_velocity(packed: Packed, W: Work, q: Array, v: Array, *, led: bool = False) -> Array:
     """The velocities nearest to v that satisfy joints and drives.
+
+    Args:
+        packed: the mechanism.
+        W: its memory.
+        q: where it is.
+        v: (n,) velocities that were given.
+        led: bodies that were given none are led by the others, and do not slow them down.
 
     Raises:
         ModelError: naming a joint or drive that contradicts others.
@@ -316,6 +324,10 @@ def fitting_velocity(packed: Packed, W: Work, q: Array, v: Array) -> Array:
     linearize_constraints(packed.system, W, q, v)
     weight, wanted = _weights(packed, W), _prescribed(packed, W, 1)
     now, every, given = np.zeros_like(wanted), np.arange(wanted.size), v
+    if led:
+        bodies = packed.system.bodies
+        for at, r in zip(bodies.v_at, bodies.r, strict=True):
+            weight[at : at + 6 + r] *= 1.0 if v[at : at + 6 + r].any() else LED_WEIGHT
     for _ in range(2):  # the second pass removes the round-off of the first
         gradient_times(packed.system, W, v, False, now)
         v = v + _least_change(packed, W, wanted - now, weight, every)

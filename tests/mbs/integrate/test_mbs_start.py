@@ -1,13 +1,14 @@
 """A start that joints or drives move: told, refused where it is wrong, without a strain."""
 
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
 import rom
-from cases.mbs.mechanisms import lattice, lattice_body
+from cases.mbs.mechanisms import lattice, lattice_body, slider_crank
 from rom.errors import ConfigError, ModelError, RomWarning
 
 Z = (0, 0, 1)
@@ -176,3 +177,17 @@ def test_a_reduced_body_that_spins_is_not_counted_in_axes_of_the_world(asked):
     mech = geared_disc(50.0, body=lattice_body(lattice(stiffness=4e4)))
     with pytest.raises(ModelError, match=r"^disc: it spins at .* rad.s and its shapes turn"):
         asked(mech, frame="world", assemble=True)
+
+
+def test_bodies_that_were_given_no_velocity_are_led_by_those_that_were():
+    """The crank keeps its 10 rad/s; rod and slider, as heavy, move as the linkage makes them."""
+    mech = slider_crank(l1=0.1, l2=0.3, speed=0.0)
+    mech.drives.clear()
+    crank = mech.parts["crank"]
+    mech.parts["crank"] = replace(crank, omega=np.array([0.0, 0.0, 10.0]))
+    with warnings.catch_warnings():
+        warnings.filterwarnings("error", message=".*start")
+        sol = moved(mech)
+    assert_allclose(sol.omega("crank")[0], [0, 0, 10.0], atol=1e-7)
+    assert_allclose(sol.omega("rod")[0, 2], -10.0 / 3, rtol=1e-7)
+    assert_allclose(sol.velocity("slider")[0], 0.0, atol=1e-7)

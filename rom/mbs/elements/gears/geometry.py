@@ -47,7 +47,7 @@ class GearPair:
         ModelError: if no such gears mesh.
     """
 
-    teeth: tuple[int, int]
+    teeth: tuple[float, float]  # parts of teeth in sections across the flank
     module: float
     width: float
     helix: float = 0.0

@@ -126,6 +126,8 @@ def gear_mesh(  # noqa: PLR0913  one keyword per property
         ModelError: for maps and contact that the wheels cannot have, or a planet whose teeth find
             no gaps.
     """
+    if not all(float(z).is_integer() for z in pair.teeth):
+        raise ConfigError(f"the wheels of mesh {name!r} have {pair.teeth} teeth: whole numbers.")
     self.check_markers(name, wheel_a, wheel_b)
     if wheel_a.body == wheel_b.body:
         raise ConfigError(f"mesh {name!r} is of body {wheel_a.body!r} with itself.")
