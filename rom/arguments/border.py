@@ -15,7 +15,7 @@ from typing import Any, NoReturn, TypeVar
 from rom.arguments.kinds import Names, Taken, Unfit, call_of, taken_by
 from rom.arguments.values import is_number, shortened
 from rom.errors import ConfigError, UnknownNameError
-from rom.plausible import usual, warn_outside
+from rom.plausible import USUAL, warn_outside
 
 Public = TypeVar("Public", bound=Callable[..., Any])
 MAX_NEAR = 6  # names that are offered for an unknown one
@@ -99,7 +99,8 @@ class _Border:
         self.places = [(p.name, takes[p.name]) for p in parameters if p.kind in BY_PLACE]
         self.takes = takes
         owner = function.__qualname__.removesuffix(".__init__").split(".")[-1]
-        self.usual = usual(owner, takes)
+        ranges = ((p, USUAL.get(f"{owner}.{p}", USUAL.get(p))) for p in takes)
+        self.usual = {p: limits for p, limits in ranges if limits}
 
     def passed(
         self, args: tuple[Any, ...], named: dict[str, Any]
