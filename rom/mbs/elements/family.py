@@ -113,7 +113,7 @@ def nothing_kept(_: Any, memory: Array) -> Array:
     return np.zeros(len(memory))
 
 
-def nothing_beyond(_name: str, _element: Any, _t: Array, _axes: Callable[[str], Array]) -> str:
+def nothing_beyond(*_: Any) -> str:
     """Its forces hold in any motion."""
     return ""
 
@@ -279,7 +279,7 @@ class Family:
         remembers: table -> (e,) whether forces depend on the past, other than by angles that go on.
         kept: (table, (n_t, p) memory) -> (n_t,) energy in springs that slip, which is in the power
             lost when they are stretched [J].
-        beyond: (name, record, (n_t,) times, body -> (n_t, 3, 3) its axes in the world) -> where
+        beyond: (name, record, (n_t,) times [s], body -> (n_t, 3, 3) its axes in the world) -> where
             and how a motion left the range of its forces, in a sentence; empty if it did not.
         phases: (table, work) -> (e,) numbers at the last residual which go on by whole ones in
             motions that repeat [1].

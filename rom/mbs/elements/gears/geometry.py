@@ -30,7 +30,7 @@ class GearPair:
     """A pair of cylindrical gears.
 
     Attributes:
-        teeth: of pinion and gear; that of an internal gear is negative.
+        teeth: of pinion and gear [1]; that of an internal gear is negative.
         module: normal module [m].
         width: common face width [m].
         helix: angle at the reference circle [rad]; positive for a right-handed pinion.

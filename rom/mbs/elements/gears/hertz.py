@@ -24,7 +24,7 @@ class Hertz:
         depths: (2,) or (n, 2) from the flanks of pinion and gear to the axes of their teeth, at
             places from first to last contact [m].
         E: Young's modulus [Pa].
-        nu: Poisson's ratio.
+        nu: Poisson's ratio [1].
 
     Source:
         Weber and Banaschek, VDI-Bericht 1953.
