@@ -116,7 +116,7 @@ _STEEL = 3e8, 2e12, "Pa", "machine parts have 1e9 (plastics) to 1e12"
 _BALL = 1e-5, 1.0, "m", "bearings and springs have 0.0001 m to 0.2 m"
 _FACE = 1e-5, 5.0, "m", "gears have 0.0001 m to 1 m"
 _JOURNAL = 1e-4, 10.0, "m", "journals have 0.001 m to 1.5 m"
-_ANGLE = -TURN, TURN, "rad", "a whole turn has 6.283 rad"
+_ANGLE = -2 * TURN, 2 * TURN, "rad", "a whole turn has 6.283 rad"
 _LIMITS: dict[str, tuple[float, float, str, str]] = {
     "module": (1e-5, 0.2, "m", "gears have 5e-05 m (watches) to 0.1 m"),
     "gear_mesh.stiffness": (1e6, 1e13, "N/m^2", "teeth of steel have about 1e10 per width"),

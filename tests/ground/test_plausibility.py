@@ -293,7 +293,7 @@ SLIPS = {  # what is made of a number, the number, the same in another unit, wha
     "lobes": (lambda x: JournalBearing(0.05, 0.03, 5e-5, preload=0.4, lobes=x), np.pi / 2, 90,
               "degrees: 90 degrees are 1.571 rad"),
     "journal": (lambda x: JournalBearing(x, x, 1e-3 * x), 0.05, 50.0, "mm: 50 mm are 0.05 m"),
-    "groove": (lambda x: Groove(x), -np.pi, 180.0, "degrees: 180 degrees are 3.142 rad"),
+    "groove": (lambda x: Groove(x), 7.6, 180.0, "degrees: 180 degrees are 3.142 rad"),
     "oil pressure": (lambda x: Groove(0.0, pressure=x), 2e5, 2.0, "bar: 2 bar are 2e+05 Pa"),
     "oil": (lambda x: Oil(46.0, 6.8, density=x), 870.0, 0.87, "g/cm^3 are 870 kg/m^3"),
     "heat": (lambda x: Oil(46.0, 6.8, heat=x), 2000.0, 2.0, "2 kJ/(kg K) are 2000"),

@@ -56,8 +56,8 @@ ORDER = {
     for level, names in {
         "": (
             "errors notebook rotation places lazy names readable process plausible "
-            "arguments units material model rows paths decks eigen reduction body fe checks assembly "
-            "cyclic workflow parametric updating prestress io mbs fmu view config report "
+            "arguments units material model rows paths decks eigen reduction body fe checks "
+            "assembly cyclic workflow parametric updating prestress io mbs fmu view config report "
             "components doctor cli __main__"
         ),
         "cli": (
