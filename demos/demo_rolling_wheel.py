@@ -35,7 +35,7 @@ def wheel(kind, speed, wobble=0.0):
     A, C = (share * mass * r**2 for share in kinds[kind])
     mech = rom.Mechanism(gravity=(0, 0, -g))
     body = mech.add_rigid(
-        "wheel", mass=mass, inertia=(A, C, A), at=(0, 0, r), velocity=(speed, 0, 0),
+        "wheel", mass=mass, inertia=(A, C, A), at=(0, 0, r), velocity=(speed, -wobble * r, 0),
         omega=(wobble, speed / r, 0), markers={"c": (0, 0, 0)},
     )  # fmt: skip
     floor = mech.ground.marker((0, 0, 0))

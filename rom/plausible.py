@@ -21,7 +21,7 @@ class Range:
         low, high: limits, in ``unit``; None for no limit.
         unit: SI unit, empty for a plain number.
         known: what lies at the limits.
-        cure: what to look at.
+        cure: what to look at; if empty, the unit that the value seems to have.
     """
 
     quantity: str
@@ -31,92 +31,112 @@ class Range:
     known: str
     cure: str
 
+    def includes(self, value: float) -> bool:
+        """Whether the value lies inside."""
+        low = -math.inf if self.low is None else self.low
+        return low <= value <= (math.inf if self.high is None else self.high)
+
     def doubt(self, value: float, of: str = "") -> str:
         """A sentence if the value lies outside, else nothing."""
-        low = -float("inf") if self.low is None else self.low
-        high = float("inf") if self.high is None else self.high
-        if low <= value <= high:
+        if self.includes(value):
             return ""
         name = f"{self.quantity} of {of}" if of else self.quantity
         unit = f" {self.unit}" if self.unit else ""
-        return f"{name} is {value:.4g}{unit}; {self.known}. {self.cure}"
+        return f"{name} is {value:.4g}{unit}; {self.known}. {self.cure or self._slip(value)}"
+
+    def _slip(self, value: float) -> str:
+        """The unit in which the value would be usual."""
+        for word, factor in SLIPS.get(self.unit, ()):
+            if self.includes(meant := value * factor):
+                return f"It looks like {word}: {value:.4g} {word} are {meant:.4g} {self.unit}."
+        return f"It is in {self.unit}."
 
 
-WAVE_SPEED = Range(
-    "the speed of sound sqrt(E/rho)", 10.0, 2.0e4, "m/s",
-    "solids have 10 m/s (soft foam) to 20000 m/s (diamond)",
-    "Check the units: E in Pa, rho in kg/m^3.",
-)  # fmt: skip
-MATRIX_SPEED = Range(
-    "the speed of sound, estimated from stiffness and mass at the nodes,", 7.0, 3.0e4, "m/s",
-    "solids have 10 m/s (soft foam) to 20000 m/s (diamond)",
-    "Check units='...' of the matrices and nodes.",
-)  # fmt: skip
+WAVE_SPEED = Range("the speed of sound sqrt(E/rho)", 10.0, 2.0e4, "m/s",
+                   "solids have 10 m/s (soft foam) to 20000 m/s (diamond)",
+                   "Check the units: E in Pa, rho in kg/m^3.")  # fmt: skip
+MATRIX_SPEED = Range("the speed of sound, estimated from stiffness and mass at the nodes,", 7.0,
+                     3.0e4, "m/s", "solids have 10 m/s (soft foam) to 20000 m/s (diamond)",
+                     "Check units='...' of the matrices and nodes.")  # fmt: skip
 FOAM_SPEED = 1000.0  # m/s; no foam is faster
 LIGHT_SPEED = 100.0  # m/s; nothing lighter than honeycomb is faster
 HEAVY_DENSITY = 5000.0  # kg/m^3; beyond are metals, the slowest of them lead with 1190 m/s
-HEAVY_SPEED = Range(
-    "the speed of sound sqrt(E/rho)", 600.0, 2.0e4, "m/s",
-    "solids as heavy have 1190 m/s (lead) to 7000 m/s (ceramics)",
-    "Check the units: E in Pa, rho in kg/m^3.",
-)  # fmt: skip
-SOLID_DENSITY = Range(
-    "the density", 0.1, 3.0e4, "kg/m^3", "solids have 0.1 kg/m^3 (aerogel) to 22600 (osmium)",
-    "Check the units: E in Pa, rho in kg/m^3.",
-)  # fmt: skip
-STIFF_DENSITY = Range(
-    "the density", 10.0, 3.0e4, "kg/m^3",
-    "solids as stiff for their weight have 10 kg/m^3 (honeycomb) to 22600 (osmium)",
-    "Check the units: E in Pa, rho in kg/m^3.",
-)  # fmt: skip
-FACTOR = Range(
-    "the factor", 1e-3, 1e3, "", "one is the model as it was made",
-    "Give factors of the number, not the number itself.",
-)  # fmt: skip
-SIZE = Range(
-    "the size", 1e-6, 1e4, "m", "bodies have 1e-06 m (microsystems) to 10000 m",
-    "Check the unit of the coordinates: scale=1e-3 is for millimetres.",
-)  # fmt: skip
-DENSITY = Range(
-    "the mass over the volume of the bounding box", None, 3.0e4, "kg/m^3",
-    "no solid is denser than 22600 kg/m^3 (osmium)",
-    "Check the units of mass and coordinates.",
-)  # fmt: skip
-GRAVITY = Range(
-    "gravity", None, 100.0, "m/s^2", "the earth has 9.81 m/s^2, the largest planet 25",
-    "It is in m/s^2: 9810 belongs to millimetres.",
-)  # fmt: skip
-DAMPING_RATIO = Range(
-    "the damping ratio", None, 0.3, "",
-    "metal has 0.0005 to 0.01, bolted structures up to 0.1, rubber up to 0.3",
-    "One is critical damping: write two per cent as 0.02.",
-)  # fmt: skip
-GYRATION = Range(
-    "the radius of gyration over the reach of the markers", None, 100.0, "",
-    "a body reaches as far as its mass",
-    "Check the unit of the inertia: kg m^2.",
-)  # fmt: skip
-FRICTION = Range(
-    "the coefficient of friction", None, 3.0, "", "rubber on rock reaches 2",
-    "Thirty per cent are 0.3.",
-)  # fmt: skip
-SPEED = Range(
-    "the speed at the start", None, 1e5, "m/s", "spacecraft reach 70000 m/s",
-    "Check the unit: m/s.",
-)  # fmt: skip
-REACH = Range(
-    "the reach of its mass over the size of the model", None, 100.0, "",
-    "what an interface carries is not so much larger",
-    "Check the units: kg m^2 for the inertia, m for at.",
-)  # fmt: skip
-STIFFNESS = Range(
-    "the stiffness", 0.0, None, "", "below zero it pushes away from its position without force",
-    "Check the sign.",
-)  # fmt: skip
-DAMPING = Range(
-    "the damping", 0.0, None, "", "below zero it gives energy to the motion", "Check the sign.",
-)  # fmt: skip
+HEAVY_SPEED = Range("the speed of sound sqrt(E/rho)", 600.0, 2.0e4, "m/s",
+                    "solids as heavy have 1190 m/s (lead) to 7000 m/s (ceramics)",
+                    "Check the units: E in Pa, rho in kg/m^3.")  # fmt: skip
+SOLID_DENSITY = Range("the density", 0.1, 3.0e4, "kg/m^3",
+                      "solids have 0.1 kg/m^3 (aerogel) to 22600 (osmium)",
+                      "Check the units: E in Pa, rho in kg/m^3.")  # fmt: skip
+STIFF_DENSITY = Range("the density", 10.0, 3.0e4, "kg/m^3",
+                      "solids as stiff by weight have 10 kg/m^3 (honeycomb) to 22600 (osmium)",
+                      "Check the units: E in Pa, rho in kg/m^3.")  # fmt: skip
+FACTOR = Range("the factor", 1e-3, 1e3, "", "one is the model as it was made",
+               "Give factors of the number, not the number itself.")  # fmt: skip
+SIZE = Range("the size", 1e-6, 1e4, "m", "bodies have 1e-06 m (microsystems) to 10000 m",
+             "Check the unit of the coordinates: scale=1e-3 is for millimetres.")  # fmt: skip
+DENSITY = Range("the mass over the volume of the bounding box", None, 3.0e4, "kg/m^3",
+                "no solid is denser than 22600 kg/m^3 (osmium)",
+                "Check the units of mass and coordinates.")  # fmt: skip
+GRAVITY = Range("gravity", None, 100.0, "m/s^2", "the earth has 9.81 m/s^2, the largest planet 25",
+                "It is in m/s^2: 9810 belongs to millimetres.")  # fmt: skip
+DAMPING_RATIO = Range("the damping ratio", None, 0.3, "",
+                      "metal has 0.0005 to 0.01, bolted structures up to 0.1, rubber up to 0.3",
+                      "One is critical damping: write two per cent as 0.02.")  # fmt: skip
+GYRATION = Range("the radius of gyration over the reach of the markers", None, 100.0, "",
+                 "a body reaches as far as its mass",
+                 "Check the unit of the inertia: kg m^2.")  # fmt: skip
+FRICTION = Range("the coefficient of friction", None, 3.0, "", "rubber on rock reaches 2",
+                 "Thirty per cent are 0.3, an angle of 35 degrees is 0.7.")  # fmt: skip
+SPEED = Range("the speed at the start", None, 1e5, "m/s", "spacecraft reach 70000 m/s",
+              "Check the unit: m/s.")  # fmt: skip
+REACH = Range("the reach of its mass over the size of the model", None, 100.0, "",
+              "what an interface carries is not so much larger",
+              "Check the units: kg m^2 for the inertia, m for at.")  # fmt: skip
+STIFFNESS = Range("the stiffness", 0.0, None, "",
+                  "below zero it pushes away from its position without force",
+                  "Check the sign.")  # fmt: skip
+DAMPING = Range("the damping", 0.0, None, "", "below zero it gives energy to the motion",
+                "Check the sign.")  # fmt: skip
 
+
+SLIPS = {  # units that stand for others by mistake, and what they are
+    "m": (("mm", 1e-3), ("micrometres", 1e-6)),
+    "rad": (("degrees", math.pi / 180),),
+    "Pa": (("bar", 1e5), ("MPa", 1e6), ("GPa", 1e9)),
+    "Pa s": (("mPa s", 1e-3),),
+    "N/m^2": (("N/(mm um)", 1e9),),
+    "kg/m^3": (("g/cm^3", 1e3),),
+    "J/(kg K)": (("kJ/(kg K)", 1e3),),
+}
+TURN = 2 * math.pi
+# what arguments of public functions and records of components are, by their name, or where the
+# name has other meanings elsewhere, by whose it is: limits, unit, what there is. Zero is for none
+_OIL = 1e-6, 10.0, "Pa s", "oils have 0.002 to 2, air 2e-05"
+_STEEL = 3e8, 2e12, "Pa", "machine parts have 1e9 (plastics) to 1e12"
+_BALL = 1e-5, 1.0, "m", "bearings and springs have 0.0001 m to 0.2 m"
+_FACE = 1e-5, 5.0, "m", "gears have 0.0001 m to 1 m"
+_JOURNAL = 1e-4, 10.0, "m", "journals have 0.001 m to 1.5 m"
+_ANGLE = -2 * TURN, 2 * TURN, "rad", "a whole turn has 6.283 rad"
+_LIMITS: dict[str, tuple[float, float, str, str]] = {
+    "module": (1e-5, 0.2, "m", "gears have 5e-05 m (watches) to 0.1 m"),
+    "gear_mesh.stiffness": (1e6, 1e13, "N/m^2", "teeth of steel have about 1e10 per width"),
+    "clearance": (-0.01, 0.02, "m", "bearings have 1e-06 m to 0.001 m"),
+    "Groove.pressure": (1e3, 1e8, "Pa", "oil comes in at 1e4 to 1e7"),
+    "Oil.density": (300.0, 3000.0, "kg/m^3", "oils have 700 to 1100"),
+    "Oil.heat": (500.0, 1e4, "J/(kg K)", "oils have 1600 to 2500"),
+    "inlet": (-60.0, 200.0, "degrees Celsius", "oil comes in at 20 to 90, in K 273 more"),
+    "pitch_diameter": (1e-4, 20.0, "m", "bearings have 0.002 m to 10 m"),
+    **dict.fromkeys(("oil", "viscosity"), _OIL),
+    **dict.fromkeys(("BallBearing.E", "Hertz.E", "HelicalSpring.E"), _STEEL),
+    **dict.fromkeys(("ball_diameter", "roller_diameter", "wire"), _BALL),
+    **dict.fromkeys(("GearPair.width", "RackPair.width", "gear.width"), _FACE),
+    **dict.fromkeys(("JournalBearing.diameter", "JournalBearing.length"), _JOURNAL),
+    **dict.fromkeys(("lobes", "helix", "gear_helix", "pressure_angle", "contact_angle"), _ANGLE),
+    **dict.fromkeys(("cone", "tilt", "yaw", "half_angle", "Groove.angle", "Groove.width"), _ANGLE),
+}
+USUAL = {"friction": FRICTION, "mu": FRICTION} | {
+    name: Range(repr(name.split(".")[-1]), *limits, "") for name, limits in _LIMITS.items()
+}
 
 MAX_ORIGIN_RATIO = 100.0  # sizes from the origin: four of sixteen digits of an inertia cancel
 SCALED_RATIO = 100.0  # times a default, from where a value has another unit

@@ -13,8 +13,9 @@ from inspect import Parameter, signature
 from typing import Any, NoReturn, TypeVar
 
 from rom.arguments.kinds import Names, Taken, Unfit, call_of, taken_by
-from rom.arguments.values import shortened
+from rom.arguments.values import is_number, shortened
 from rom.errors import ConfigError, UnknownNameError
+from rom.plausible import USUAL, warn_outside
 
 Public = TypeVar("Public", bound=Callable[..., Any])
 MAX_NEAR = 6  # names that are offered for an unknown one
@@ -97,6 +98,9 @@ class _Border:
         self.rest = rest or [("", None)]  # more than Python will let through
         self.places = [(p.name, takes[p.name]) for p in parameters if p.kind in BY_PLACE]
         self.takes = takes
+        owner = function.__qualname__.removesuffix(".__init__").split(".")[-1]
+        ranges = ((p, USUAL.get(f"{owner}.{p}", USUAL.get(p))) for p in takes)
+        self.usual = {p: limits for p, limits in ranges if limits}
 
     def passed(
         self, args: tuple[Any, ...], named: dict[str, Any]
@@ -113,16 +117,25 @@ class _Border:
                 raise ConfigError(text, where=self._label(args, named), hint=f"Leave {name} out.")
         given = zip(self._places(len(args)), args, strict=True)
         try:
-            return (
-                [_taken(name, take, value) for (name, take), value in given],
-                {k: _taken(k, self.takes.get(k, *self.more), x) for k, x in named.items()},
-            )
+            taken = [_taken(name, take, value) for (name, take), value in given]
+            more = {k: _taken(k, self.takes.get(k, *self.more), x) for k, x in named.items()}
         except Unfit as unfit:
             where, hint = self._label(args, named), f"must be {unfit.wanted}."
             text = f"{unfit.place} = {shortened(unfit.value)} {hint}"
             if isinstance(unfit.value, type):
                 text, hint = f"{unfit.place}: {call_of(unfit.value)}", ""
             raise ConfigError(text, where=where, hint=hint) from unfit.__cause__
+        if self.usual:
+            self._doubt(taken, more)
+        return taken, more
+
+    def _doubt(self, taken: list[Any], named: dict[str, Any]) -> None:
+        """Warn of numbers that no machine has, as those in another unit are."""
+        given = dict(zip((name for name, _ in self.places), taken, strict=False)) | named
+        for name, limits in self.usual.items():
+            value = given.get(name, 0.0)
+            if is_number(value) and value:
+                warn_outside(limits, value, self._label(tuple(taken), named))
 
     def _places(self, n: int) -> list[tuple[str, Taken | None]]:
         beyond = n - len(self.places)

@@ -115,6 +115,7 @@ def gear_pair(name: str, pair: dict[str, Any]) -> Any:
     from rom.mbs.elements.gears.racks import RackPair
 
     given: Any = {key: tuple(x) if isinstance(x, list) else x for key, x in pair.items()}
+    given["teeth"] = tuple(int(z) if z.is_integer() else z for z in given["teeth"])
     if given["teeth"][1] != 0:
         return GearPair(**given)
     (pinion, _), (shift, of_rack) = given.pop("teeth"), given.pop("shift")

@@ -128,7 +128,7 @@ class Driven:
         """
         self.inputs.begin(t)
         self.stepped = False
-        state = initial_state(self.packed, t, 0.05 * float(self.parameters[0]), assemble=True)
+        state = initial_state(self.packed, t, 0.05 * float(self.parameters[0]), placing=True)
         if self.packed.by_blocks and state.rank < state.lam.size:
             self.packed = self.packed.whole()
             self.W = workspace(self.packed.system, len(self.packed.signals))

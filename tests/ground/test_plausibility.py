@@ -15,10 +15,14 @@ from cases.solid import STEEL, block
 from rom.body.conversion import Factors
 from rom.body.rotating import rotating_frequencies
 from rom.body.stiffening import known_loads
+from rom.components.cosserat import HelicalSpring
+from rom.components.gear_mesh import GearPair, RackPair
+from rom.components.hand.cable import Hole, Tendon
 from rom.errors import ConfigError, ModelError, RomWarning
 from rom.fe.mesh.validate import checked
 from rom.io.matrices.op4 import write_op4
 from rom.io.native import body_arrays
+from rom.mbs import BallBearing, Groove, JournalBearing, Oil, Pulley, RollerBearing
 from rom.mbs.elements.contact.impact import Impact
 from rom.mbs.parts.jumps import Examined
 from rom.plausible import far_doubt, scaled_doubt
@@ -256,6 +260,57 @@ MU = {
 def test_friction_in_per_cent_is_doubted(way, mu, n):
     found = said(lambda: MU[way](mu))
     assert len(found) == n and all("friction" in text and "is 30;" in text for text in found)
+
+
+def in_film(**how):
+    """A journal in a film."""
+    mech = rom.Mechanism()
+    rotor = mech.add_rigid("rotor", mass=1.0, inertia=(1e-2,) * 3, at=(0, 0, 0))
+    ends = rotor.marker((0, 0, 0)), mech.ground.marker((0, 0, 0))
+    mech.journal_bearing("low", *ends, axis=(0, 0, 1), **{
+        "bearing": JournalBearing(0.05, 0.03, 5e-5)} | how)  # fmt: skip
+
+
+def geared(**how):
+    """Two wheels in mesh."""
+    mech, pair = rom.Mechanism(), GearPair((26, 40), 4e-3, 0.03)
+    ends = [mech.add_rigid(name, mass=1, inertia=(1, 1, 1), at=(x, 0, 0)).marker((0, 0, 0))
+            for name, x in (("a", 0.0), ("b", pair.distance))]  # fmt: skip
+    mech.gear_mesh("mesh", *ends, axis=(0, 0, 1), pair=pair, transition_speed=0.1, **how)
+
+
+SLIPS = {  # what is made of a number, the number, the same in another unit, what is said of that
+    "module": (lambda x: GearPair((26, 40), x, 0.03), 4e-3, 4.0, "mm: 4 mm are 0.004 m"),
+    "face width": (lambda x: GearPair((26, 40), 4e-3, x), 0.03, 30.0, "mm: 30 mm are 0.03 m"),
+    "rack": (lambda x: RackPair(26, x, 0.03), 4e-3, 4.0, "mm: 4 mm are 0.004 m"),
+    "stiffness of teeth": (lambda x: geared(stiffness=x), 1.4e10, 14.0, "14 N/(mm um) are 1.4e+10"),
+    "friction of teeth": (lambda x: geared(stiffness=1e10, friction=x), 0.7, 35.0, "35 degrees"),
+    "pulley": (lambda x: Pulley(rom.Mechanism().ground.marker((0, 0, 0)), 0.1, (0, 0, 1),
+                                friction=x), 0.3, 30.0, "Thirty per cent"),
+    "tendon in a hand": (lambda x: Tendon((Hole(0, 0, (0, 0, 0)),) * 2, x), 0.3, 30.0, "per cent"),
+    "viscosity": (lambda x: in_film(oil=x), 0.02, 20.0, "mPa s: 20 mPa s are 0.02 Pa s"),
+    "inlet": (lambda x: in_film(oil=Oil(46.0, 6.8), inlet=x), 40.0, 313.0, "in K 273 more"),
+    "lobes": (lambda x: JournalBearing(0.05, 0.03, 5e-5, preload=0.4, lobes=x), np.pi / 2, 90,
+              "degrees: 90 degrees are 1.571 rad"),
+    "journal": (lambda x: JournalBearing(x, x, 1e-3 * x), 0.05, 50.0, "mm: 50 mm are 0.05 m"),
+    "groove": (lambda x: Groove(x), 7.6, 180.0, "degrees: 180 degrees are 3.142 rad"),
+    "oil pressure": (lambda x: Groove(0.0, pressure=x), 2e5, 2.0, "bar: 2 bar are 2e+05 Pa"),
+    "oil": (lambda x: Oil(46.0, 6.8, density=x), 870.0, 0.87, "g/cm^3 are 870 kg/m^3"),
+    "heat": (lambda x: Oil(46.0, 6.8, heat=x), 2000.0, 2.0, "2 kJ/(kg K) are 2000"),
+    "balls": (lambda x: BallBearing(9, 8e-3, 0.04, E=x), 206e9, 206.0, "GPa: 206 GPa are 2.06e+11"),
+    "pitch circle": (lambda x: BallBearing(9, 0.2 * x, x), 0.04, 40.0, "40 mm are 0.04 m"),
+    "rollers": (lambda x: RollerBearing(14, x, x, 8 * x), 8e-3, 8.0, "8 mm are 0.008 m"),
+    "wire": (lambda x: HelicalSpring(x, 8 * x, 6.0, 20 * x), 2e-3, 2.0, "2 mm are 0.002 m"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", SLIPS)
+def test_components_doubt_what_looks_like_another_unit(case):
+    """A warning names the number, what is usual and the slip; it is never refused."""
+    make, meant, slipped, words = SLIPS[case]
+    assert not [text for text in said(lambda: make(meant)) if "looks like" in text or "; " in text]
+    found = said(lambda: make(slipped))
+    assert any(f"{slipped:g}" in text and words in text for text in found), found
 
 
 @pytest.mark.parametrize(("speed", "n"), [(0.0, 0), (7.8e3, 0), (7e4, 0), (3e6, 1)])

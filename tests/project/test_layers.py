@@ -20,6 +20,7 @@ ANYTHING = {"__init__", "__main__", "cli", "doctor"}  # they stand in front
 GROUND = {*"arguments lazy names places plausible process readable".split()}
 MAY_IMPORT = {  # module or package below rom/ -> what it may import from rom beside GROUND
     **{part: {"places", "errors", "model", "rotation"} for part in GROUND},
+    "arguments": {"places", "errors", "model", "rotation", "plausible"},  # numbers are doubted
     "errors": set(),
     "notebook": set(),
     "model": {"errors", "material", "notebook"},
@@ -54,9 +55,9 @@ ORDER = {
     level: tuple(names.split())
     for level, names in {
         "": (
-            "errors notebook rotation places lazy names readable process arguments units "
-            "plausible material model rows paths decks eigen reduction body fe checks assembly "
-            "cyclic workflow parametric updating prestress io mbs fmu view config report "
+            "errors notebook rotation places lazy names readable process plausible "
+            "arguments units material model rows paths decks eigen reduction body fe checks "
+            "assembly cyclic workflow parametric updating prestress io mbs fmu view config report "
             "components doctor cli __main__"
         ),
         "cli": (

@@ -38,7 +38,8 @@ def solution(body):
     mech = rom.Mechanism(gravity=(0, -9.81, 0))
     bar = mech.add_flexible("bar", body)
     mech.add_rigid("ball", mass=1.0, inertia=(1e-3,) * 3, at=(0.5, 0.0, 0.5))
-    mech.fixed("wall", mech.ground.marker((0, 0, 0)), bar.marker("root"))
+    place = mech.design_point(bar.marker("root"))
+    mech.fixed("wall", mech.ground.marker(place), bar.marker("root"))
     return rom.simulate(mech, t_end=0.02, dt=1e-4)
 
 

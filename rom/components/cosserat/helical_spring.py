@@ -16,11 +16,13 @@ import numpy as np
 import numpy.typing as npt
 
 from rom import rotation
+from rom.arguments import typed
 from rom.components.cosserat import Rod, along, clamped, linearised, reference, straight
 from rom.errors import ModelError
 from rom.model import Array
 
 
+@typed
 @dataclass(frozen=True)
 class HelicalSpring:
     """A compression spring of round wire.

@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rom import rotation
+from rom.arguments import typed
 from rom.components.cosserat import Rod, Shape
 from rom.errors import ModelError
 from rom.model import Array
@@ -33,6 +34,7 @@ class Hole:
     arm: tuple[float, float, float]
 
 
+@typed
 @dataclass(frozen=True)
 class Tendon:
     """A cable through holes, pulled at the first and fixed at the last.

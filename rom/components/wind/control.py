@@ -10,6 +10,7 @@ Source:
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 
@@ -41,6 +42,7 @@ DOUBLING_PITCH = 0.1099965  # where the power is twice as sensitive as at none [
 LARGEST_PITCH, LARGEST_PITCH_RATE = math.radians(90.0), math.radians(8.0)  # rad, rad/s
 CORNER_FREQUENCY = 1.570796  # of the filter of the measured speed [rad/s]
 MAX_RADIUS_CHANGE = 0.1  # of a rotor that the published speeds and gains still serve
+Held = Callable[[float], tuple[float, float]]  # speed of the rotor and pitch [rad/s, rad]
 SPEED_RTOL = 1e-12  # of steady speeds and pitches: digits that repeat
 # steady pitch above the rated wind: table 7-1 (wind [m/s], pitch [deg])
 PUBLISHED_PITCH = ((12.0, 3.83), (13.0, 6.60), (14.0, 8.70), (15.0, 10.45), (16.0, 12.06),
@@ -162,23 +164,30 @@ def check_rotor(blades: Blading) -> None:
             f"{ROTOR_RADIUS:g} m at {RATED_SPEED:.4g} rad/s: {blades.n_blades} blades up to "
             f"{blades.rotor_radius:g} m would have tips of "
             f"{RATED_SPEED * blades.rotor_radius:.4g} m/s and a torque of another turbine.",
-            hint="Give speed and pitch yourself, rotor_load(blades, wind, speed, pitch) or "
-            "operate(..., held=...): a usual rule is 80 m/s over the radius.",
+            hint="Give speed and pitch yourself, held=lambda wind: (speed, pitch), over the time "
+            "in operate: a usual rule is 80 m/s over the radius.",
         )
 
 
 @typed
-def steady(wind: float, blades: Blading | None = None, *, tower: bool = False) -> RotorLoad:
+def steady(
+    wind: float, blades: Blading | None = None, *, tower: bool = False, held: Held | None = None
+) -> RotorLoad:
     """Speed, pitch and loads at which the controlled turbine stays in a steady wind.
 
     Args:
         wind: its speed, from cut-in at 3 to cut-out at 25 [m/s].
         blades: those of the turbine, changed at most; None: as published.
         tower: whether the tower dams the wind.
+        held: speed of the rotor [rad/s] and pitch [rad] over the wind [m/s], in the place of the
+            control: that of another turbine.
 
     Raises:
-        ConfigError: for a wind in which the turbine is parked, or blades of another one.
+        ConfigError: for a wind in which the turbine is parked, or blades of another one that are
+            not held.
     """
+    if held is not None:
+        return rotor_load(blading() if blades is None else blades, wind, *held(wind), tower=tower)
     if not CUT_IN_WIND <= wind <= CUT_OUT_WIND:
         raise ConfigError(f"the turbine is parked in a wind of {wind:g} m/s.",
                           hint="It works from 3 to 25 m/s.")  # fmt: skip
@@ -202,7 +211,11 @@ def steady(wind: float, blades: Blading | None = None, *, tower: bool = False) -
 
 @typed
 def power_curve(
-    winds: npt.ArrayLike, blades: Blading | None = None, *, tower: bool = False
+    winds: npt.ArrayLike,
+    blades: Blading | None = None,
+    *,
+    tower: bool = False,
+    held: Held | None = None,
 ) -> dict[str, Array]:
     """The turbine over steady winds.
 
@@ -210,6 +223,7 @@ def power_curve(
         winds: (k,) speeds [m/s].
         blades: those of the turbine, changed at most; None: as published.
         tower: whether the tower dams the wind.
+        held: see `steady`.
 
     Returns:
         {name: (k,)} of ``wind`` [m/s], ``speed`` of the rotor [rad/s], ``pitch`` [rad], ``power``
@@ -221,7 +235,7 @@ def power_curve(
             another one.
     """
     winds = vector("winds", winds)
-    points = [steady(float(wind), blades, tower=tower) for wind in winds]
+    points = [steady(float(wind), blades, tower=tower, held=held) for wind in winds]
     names = ("wind", "speed", "pitch", "thrust", "torque", "power_coefficient",
              "thrust_coefficient")  # fmt: skip
     found = {name: np.array([getattr(p, name) for p in points]) for name in names}

@@ -230,6 +230,8 @@ class _Search:
             if not np.isfinite(size) or (directly and size > max(last, STALLED_TOL)):
                 break
             if size < CORRECTION_TOL or (size < STALLED_TOL and size > 0.5 * last):
+                if straight and equations.driven(faint_force(now, equations.pull)) is not None:
+                    break
                 return state
             last = size
             if not equations.rises:
@@ -378,7 +380,7 @@ def _failure(now: Instant, tangent: Tangent | SparseTangent, load: float) -> Rom
         k = int(np.argmax(gap))
         what = f"joint {packed.row_owner[k]!r} stays open by {gap[k]:.3g} of the size"
     else:
-        loose = tangent.weakest().driven(faint_force(now, tangent.pull))
+        loose = tangent.driven(faint_force(now, tangent.pull))
         if loose is not None:
             return ModelError(
                 f"{_described(packed, loose)}, pushed by forces that nothing balances.",

@@ -149,6 +149,12 @@ class SparseTangent:
         none = np.maximum(p.round_off(U), LOAD_STIFFNESS_RTOL * self.pull)
         return Weakest(squares, p.basis @ U, none, np.abs(U.T @ self.r))
 
+    def driven(self, faint: float) -> Array | None:
+        """(n,) a motion that no force opposes, though one beyond ``faint`` drives it."""
+        weakest = self.weakest()
+        pushed = np.where(weakest.loose, weakest.along, 0.0)
+        return weakest.motions[:, int(np.argmax(pushed))] if pushed.max(initial=0) > faint else None
+
     def reaction(self) -> Array:
         """(m,) change of the multipliers that balances the forces best."""
         return self._balanced()[1]

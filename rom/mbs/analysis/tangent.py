@@ -92,7 +92,18 @@ class Tangent:
 
     def balanced(self) -> tuple[Array, Array]:
         """(n,), (m,) variations that balance the forces and close the gaps."""
-        return self._answered(lambda force: -np.linalg.solve(self.Z.T @ self.K @ self.Z, force))
+        return self._answered(self._held)
+
+    def driven(self, faint: float) -> Array | None:
+        """(n,) a motion that no force opposes, though one beyond ``faint`` drives it.
+
+        Drag that goes around has no potential: what changes no force need not be what is driven.
+        """
+        U, s, V = self._singular
+        along = np.where(s > self.none(s), 0.0, np.abs(U.T @ (self.Z.T @ self.r)))
+        if along.max(initial=0.0) <= faint:
+            return None
+        return np.asarray(self.T @ self.Z @ V[int(np.argmax(along))])
 
     @cached_property
     def newton(self) -> tuple[Array, Array] | None:
@@ -100,10 +111,7 @@ class Tangent:
         squares = self._principal[0]
         if np.abs(squares).min(initial=np.inf) <= self.none(squares):
             return None
-        try:
-            return self.balanced()
-        except np.linalg.LinAlgError:  # films that start to fill: forces without a potential
-            return None
+        return self.balanced()
 
     @cached_property
     def rises(self) -> bool:
@@ -122,6 +130,12 @@ class Tangent:
         squares, V = np.linalg.eigh(self.curvature)
         return squares, V
 
+    @cached_property
+    def _singular(self) -> tuple[Array, Array, Array]:
+        """Singular values of the stiffness of the free motions, between forces and motions."""
+        U, s, V = np.linalg.svd(self.Z.T @ self.K @ self.Z)
+        return U, s, V
+
     def _answered(self, motion: Callable[[Array], Array]) -> tuple[Array, Array]:
         """The joints closed, and the motion (f,) that answers the forces left over (f,)."""
         scale = self.now.probe()
@@ -131,6 +145,14 @@ class Tangent:
         shift = shift + self.Z @ motion(self.Z.T @ (self.r + self.K @ shift))
         reaction = np.linalg.lstsq(A.T, -(self.r + self.K @ shift) * scale, rcond=1e-9)[0]
         return self.T @ shift, reaction
+
+    def _held(self, force: Array) -> Array:
+        """(f,) motion that balances the force, as far as stiffness does."""
+        if self.rises:
+            return -np.linalg.solve(self.Z.T @ self.K @ self.Z, force)
+        U, s, V = self._singular
+        held = s > self.none(s)
+        return -V[held].T @ (U[:, held].T @ force / s[held])
 
     def _downhill(self, force: Array) -> Array:
         """(f,) motion along the force, by the absolute values of the curvatures."""
@@ -160,11 +182,6 @@ class Weakest:
     def loose(self) -> Array:
         """(k,) whether nothing opposes it."""
         return np.abs(self.squares) <= self.none
-
-    def driven(self, faint: float) -> Array | None:
-        """(n,) the motion that forces drive and no stiffness opposes, if there is one."""
-        pushed = np.where(self.loose, self.along, 0.0)
-        return self.motions[:, int(np.argmax(pushed))] if pushed.max(initial=0.0) > faint else None
 
 
 def load_stiffness(now: Instant, state: State) -> float:

@@ -6,6 +6,7 @@ has a potential whatever the rotation.
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -41,6 +42,7 @@ from rom.mbs.parts.whole import Whole
 from rom.model import Array
 
 DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
+MAX_TURN = 0.95 * np.pi  # [rad]
 Curves = dict[str, tuple[npt.ArrayLike, npt.ArrayLike]]
 
 
@@ -391,6 +393,25 @@ def bushing_energy(_s, W, bushings, _q, _v):
     return total
 
 
+def turned_over(name: str, bushing: Bushing, t: Array, axes: Callable[[str], Array]) -> str:
+    """That its rotation vector came near half a turn, where it begins anew on the other side."""
+    if not (np.any(bushing.stiffness[3:]) or any(at > 2 for at, _ in bushing.curves)):
+        return ""
+    one, other = (
+        axes(marker.body) @ frame
+        for marker, frame in zip((bushing.i, bushing.j), bushing.frames, strict=True)
+    )
+    turn = np.arccos(np.clip((np.einsum("tij,tij->t", one, other) - 1) / 2, -1, 1))
+    if not np.nanmax(turn) > MAX_TURN:
+        return ""
+    k = int(np.nanargmax(turn > MAX_TURN))
+    return (
+        f"bushing {name!r} was turned by {turn[k]:.3g} rad at {t[k]:.4g} s: its "
+        "moment jumps to the other side at half a turn. A rotational spring counts whole turns."
+    )
+
+
 BUSHINGS_FAMILY = Family(
-    "bushings", Bushing, pack, bushing_wrenches, bushing_tangents, bushing_energy
+    "bushings", Bushing, pack, bushing_wrenches, bushing_tangents, bushing_energy,
+    beyond=turned_over,
 )  # fmt: skip

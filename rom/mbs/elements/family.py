@@ -113,6 +113,11 @@ def nothing_kept(_: Any, memory: Array) -> Array:
     return np.zeros(len(memory))
 
 
+def nothing_beyond(*_: Any) -> str:
+    """Its forces hold in any motion."""
+    return ""
+
+
 def no_phases(_: Any, _W: Any) -> Array:
     """(0,) nothing that has to go on by whole numbers."""
     return np.zeros(0)
@@ -274,6 +279,8 @@ class Family:
         remembers: table -> (e,) whether forces depend on the past, other than by angles that go on.
         kept: (table, (n_t, p) memory) -> (n_t,) energy in springs that slip, which is in the power
             lost when they are stretched [J].
+        beyond: (name, record, (n_t,) times [s], body -> (n_t, 3, 3) its axes in the world) -> where
+            and how a motion left the range of its forces, in a sentence; empty if it did not.
         phases: (table, work) -> (e,) numbers at the last residual which go on by whole ones in
             motions that repeat [1].
     """
@@ -300,6 +307,7 @@ class Family:
     eased: Callable[[Any], AbstractContextManager[bool]] = nothing_eased
     remembers: Callable[[Any], Array] = nothing_remembered
     kept: Callable[[Any, Array], Array] = nothing_kept
+    beyond: Callable[[str, Any, Array, Callable[[str], Array]], str] = nothing_beyond
     phases: Callable[[Any, Any], Array] = no_phases
 
     @property

@@ -15,7 +15,6 @@ from rom.mbs.kernels.system import ALONG, POINT
 from rom.mbs.kernels.tables import Array2, Index1, Table, table
 from rom.mbs.parts.joints import Row, coordinate_of
 from rom.mbs.parts.whole import Whole
-from rom.plausible import FRICTION, warn_outside
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +67,6 @@ def friction(  # noqa: PLR0913  one keyword per property
     for what, value in (("coulomb", coulomb), ("mu", mu), ("viscous", viscous)):
         if number(what, value) < 0.0:
             raise ConfigError(f"{what} of friction {name!r} is {value:g}: it must not drive.")
-    warn_outside(FRICTION, mu, repr(name))
     turns = row is self.joints[joint].turn
     if mu and turns and radius is None:
         raise ConfigError(f"friction {name!r} with mu on an angle needs the radius of the pin.")

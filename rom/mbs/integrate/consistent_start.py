@@ -1,5 +1,6 @@
 """The start of a motion: positions that fit, velocities that fit, accelerations."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -29,8 +30,10 @@ RANK_PIVOT_RTOL = 1e-9
 # a gap that rigid motion can close is not closed by deformation: elastic coordinates weigh so much
 # that they do not move, and only where a gap stays open, less
 ELASTIC_WEIGHTS = (1e24, 1e8)
-# change of the start by joints and drives, of the size and of given velocities, that is told
-WARNING_RTOL = 1e-6
+# change of the start by joints and drives, of the size and of given velocities, from which it is
+# told, and from which it is no slip of a drawing any more and refused
+WARNING_RTOL, REFUSAL_RTOL = 1e-6, 1e-2
+LED_WEIGHT = 1e4  # of the motion of bodies that were given no velocity
 GAP_TOLERANCE = 1e-9
 MAX_ASSEMBLY = 60
 N_PROBES = 4  # gaps by which constraints that repeat others are found
@@ -53,7 +56,7 @@ def initial_state(
         t: start time [s].
         spacing: of finite differences of drives [s].
         assemble: close gaps of any size, and change given velocities by as much as it takes.
-        placing: drives say where bodies are; where these were added is no contradiction.
+        placing: drives say where bodies are and how they move; what was given contradicts nothing.
 
     Raises:
         ModelError: naming the joint that cannot be satisfied, or that contradicts what was given.
@@ -78,7 +81,7 @@ def _start(packed: Packed, signal: Array, t: float, asked: tuple[bool, bool]) ->
         return _start(packed.sharing(), signal, t, asked)
     rank = W.value.size if surely else _rank(packed, W, q)
     _check_start(packed, W, q, rank)
-    v = fitting_velocity(packed, W, q, packed.v)
+    v = fitting_velocity(packed, W, q, packed.v, led=True)
     closed, lam = _told(packed, W, q, v, *asked), np.zeros(W.value.size)
     return with_accelerations(packed, W, State(t, q, v, v * 0, lam, rank, closed=closed))
 
@@ -86,31 +89,60 @@ def _start(packed: Packed, signal: Array, t: float, asked: tuple[bool, bool]) ->
 def _told(packed: Packed, W: Work, q: Array, v: Array, assemble: bool, placing: bool) -> float:
     """Largest change of what was given, of the size or of velocities, after telling it.
 
-    Velocities are told only: they are the nearest ones, and those of bodies that were given none
-    are what joints and drives make them.
+    Bodies that were given no velocity have the one that joints and drives give them.
+
+    Raises:
+        ModelError: naming what has to change by more than a slip of the pen, unless asked for.
     """
+    given = v if placing else packed.v
+    changes = [_opened(packed, W, placing), *_bent_and_hurried(packed, W, q, v, given)]
+    moved = [(what, where) for change, what, where in changes if change > WARNING_RTOL]
+    largest = max(change for change, *_ in changes)
+    said = f"{'; '.join(what for what, _ in moved)}."
+    if largest > REFUSAL_RTOL and not assemble:
+        raise ModelError(
+            f"the start contradicts joints and drives: {said}",
+            where=moved[0][1],
+            hint="Let places and drives fit, and velocities: omega about a pin moves the origin, "
+            "too. Or let the start be moved (assemble=True; in a file, assemble = true).",
+        )
+    if moved and not assemble:
+        warn(
+            f"the start was moved to fit joints and drives: {said} Draw the bodies so "
+            "that joints are closed and drives begin where they are, or ask for it (assemble=True)."
+        )
+    return largest
+
+
+def _opened(packed: Packed, W: Work, placing: bool) -> tuple[float, str, str]:
+    """Largest gap where bodies were added, over the size, in words, and whose joint it is."""
     evaluate(packed.system, W, packed.q, packed.v)
     rows = packed.system.rows
     free = (rows.kind == ROLL) | (placing & (rows.signal >= 0))
     gap, where, size = _largest(packed, np.where(free, 0.0, W.value / packed.row_scale))
+    return gap, f"{where!r} was open by {size}", where
+
+
+def _bent_and_hurried(
+    packed: Packed, W: Work, q: Array, v: Array, given: Array
+) -> Iterator[tuple[float, str, str]]:
+    """How far each body is strained, of the size, and its velocity changed, of the largest given.
+
+    Lengths and speeds are means by mass.
+    """
     linearize_constraints(packed.system, W, q, v)
-    weight, changes = _weights(packed, W), {f"{where!r} was open by {size}": gap}
-    bodies = packed.system.bodies
-    places = bodies.q_at, bodies.v_at, bodies.r
-    for name, a, b, r in zip(packed.names, *places, strict=True):
-        bent = (q - packed.q)[a + 7 : a + 7 + r] / weight[b + 6 : b + 6 + r]
-        change = float(np.linalg.norm(bent)) / np.sqrt(ELASTIC_WEIGHTS[-1] * packed.mass)
-        changes[f"it bends {name!r} by {change:.2g} of the size"] = change / packed.length
-        given, fitted = (x[b : b + 6 + r] / weight[b : b + 6 + r] for x in (packed.v, v))
-        change = float(np.linalg.norm(fitted - given) / (np.linalg.norm(given) or np.inf))
-        changes[f"the velocity of {name!r} changes by {change:.2g} of the given one"] = change
-    moved = [what for what, change in changes.items() if change > WARNING_RTOL]
-    if moved and not assemble:
-        warn(
-            f"the start was moved to fit joints and drives: {'; '.join(moved)}. Draw the bodies so "
-            "that joints are closed and drives begin where they are, or ask for it (assemble=True)."
-        )
-    return max(changes.values())
+    bodies, unit = packed.system.bodies, _weights(packed, W, 1.0)
+    mine = [slice(at, at + 6 + r) for at, r in zip(bodies.v_at, bodies.r, strict=True)]
+    size = np.repeat(np.sqrt(bodies.mass), 6 + bodies.r) * unit
+    speed, change = (
+        [float(np.linalg.norm((x / size)[k])) for k in mine] for x in (given, v - given)
+    )
+    for b, (name, at, k) in enumerate(zip(packed.names, bodies.q_at, mine, strict=True)):
+        strain = (q - packed.q)[at + 7 : at + 1 + k.stop - k.start] / unit[k][6:]
+        bent = float(np.linalg.norm(strain) / np.sqrt(packed.mass) / packed.length)
+        yield bent, f"it bends {name!r} by {bent:.2g} of the size", name
+        share = change[b] / max(speed) if speed[b] else 0.0
+        yield share, f"the velocity of {name!r} changes by {share:.2g} of the largest given", name
 
 
 def _largest(packed: Packed, gaps: Array) -> tuple[float, str, str]:
@@ -274,8 +306,15 @@ def least_motion(s: Any, W: Work, gap: Array) -> Array:
     return x
 
 
-def fitting_velocity(packed: Packed, W: Work, q: Array, v: Array) -> Array:
+def fitting_velocity(packed: Packed, W: Work, q: Array, v: Array, *, led: bool = False) -> Array:
     """The velocities nearest to v that satisfy joints and drives.
+
+    Args:
+        packed: the mechanism.
+        W: its memory.
+        q: where it is.
+        v: (n,) velocities that were given.
+        led: bodies that were given none are led by the others, and do not slow them down.
 
     Raises:
         ModelError: naming a joint or drive that contradicts others.
@@ -285,6 +324,10 @@ def fitting_velocity(packed: Packed, W: Work, q: Array, v: Array) -> Array:
     linearize_constraints(packed.system, W, q, v)
     weight, wanted = _weights(packed, W), _prescribed(packed, W, 1)
     now, every, given = np.zeros_like(wanted), np.arange(wanted.size), v
+    if led:
+        bodies = packed.system.bodies
+        for at, r in zip(bodies.v_at, bodies.r, strict=True):
+            weight[at : at + 6 + r] *= 1.0 if v[at : at + 6 + r].any() else LED_WEIGHT
     for _ in range(2):  # the second pass removes the round-off of the first
         gradient_times(packed.system, W, v, False, now)
         v = v + _least_change(packed, W, wanted - now, weight, every)

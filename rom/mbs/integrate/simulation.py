@@ -19,6 +19,7 @@ from rom.mbs.integrate.keeping import Keeping, digests_of
 from rom.mbs.integrate.run import Record, Settings
 from rom.mbs.kernels.work import workspace
 from rom.mbs.mechanism import Mechanism
+from rom.mbs.results.audit import warn_of_failures
 from rom.mbs.results.solution import Solution
 from rom.mbs.results.state import State, check_state
 from rom.mbs.results.validity import warn_of_limits
@@ -86,8 +87,10 @@ def simulate(  # noqa: PLR0913  keywords of the one entry, most have defaults
             from which a run that was ended by anything goes on to the same bits:
             ``keep=rom.Keeping("run.parts")``, then ``rom.Keeping("run.parts", resume=True)``. With
             ``t_end`` before the time reached this reads the motion without moving on.
-        assemble: move the start as far as joints and drives ask for it, without a word. Else a
-            change from 1e-6 of the size, or of given velocities, is told.
+        assemble: move the start as far as joints and drives ask for it, without a word. Else
+            gaps and strains from 1e-6 of the size of the mechanism (or in rad), and changes of
+            velocities from 1e-6 of the largest one given, are told, and from 1e-2 refused. Bodies
+            that were given no velocity take that of their joints and drives without a word.
             ``statistics["closed"]`` is the largest change.
 
     Returns:
@@ -95,7 +98,7 @@ def simulate(  # noqa: PLR0913  keywords of the one entry, most have defaults
 
     Raises:
         ConfigError: for a wrong argument, or a function that takes or gives the wrong thing.
-        ModelError: if joints contradict each other, or the start.
+        ModelError: if joints contradict each other, or what was given at the start.
         SolverError: naming time and culprit, a function of the user too, whatever it raised.
         ResourceError: if what would be kept exceeds the memory, or the memory ran out.
         InterruptedRun: after Ctrl-C or SIGTERM; the caller decides what then. This and every
@@ -104,7 +107,8 @@ def simulate(  # noqa: PLR0913  keywords of the one entry, most have defaults
 
     Warns:
         RomWarning: if joints or drives moved the start, a body left the range of small elastic
-            deformation, or turned faster than it can without geometric stiffness.
+            deformation, or turned faster than it can without geometric stiffness; or if balances,
+            joints or steps of the motion do not pass `rom.audit`.
 
     Source:
         Bruels, Cardona and Arnold, Lie group generalized-alpha time integration of constrained
@@ -195,6 +199,7 @@ def _moved(record: Record, t_start: float) -> Solution:
     stopped = "" if record.watch is None else record.watch.sentence
     solution = record.solution(stopped or f"Reached t = {settings.t_end:g} s.")
     warn_of_limits(solution)
+    warn_of_failures(solution)
     return solution
 
 

@@ -1,10 +1,12 @@
 """Is a computed motion believable? Conservation, constraints, Newton, size of deformations."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from rom.arguments import typed
+from rom.errors import warn
 from rom.mbs.kernels.system import ROLL
 from rom.mbs.results.solution import Solution
 from rom.mbs.results.validity import MAX_DEFORMATION, MAX_PRESSURE, deformation, pressed, softening
@@ -12,11 +14,14 @@ from rom.model import Report, Row
 
 # limits; energy counts relative to the largest amount of energy that was exchanged
 ENERGY_RTOL = 1e-2
+ROUND_OFF_RTOL = 1e-12
 GAP_RTOL = 1e-9
 QUATERNION_ATOL = 1e-12
 MOMENTUM_RTOL = 1e-5  # a second-order method conserves it to the error of its steps, not exactly
 MAX_MEAN_CORRECTIONS = 8.0
 CERTIFIED_RTOL = 1e-6  # of energy on the very edge of a range
+LOOK_EVERY = 4  # instants, where a run looks at its own motion
+MOTION = ("t", "q", "v", "a", "lam", "work", "base", "signals")  # a row for each instant
 
 
 @typed
@@ -47,8 +52,34 @@ def audit(solution: Solution) -> Report:
         >>> rom.audit(rom.simulate(mech, t_end=1.0, dt=1e-2)).ok
         True
     """
-    rows = [*_energy(solution), *_momentum(solution), *_joints(solution), *_numbers(solution)]
+    rows = _of_steps(solution)
+    for name, part in solution.mechanism.parts.items():
+        if part.r:
+            rows += _limits(solution, name, part.flexible)
     return Report(f"audit of {solution.t[-1] - solution.t[0]:g} s of motion", tuple(rows))
+
+
+def warn_of_failures(solution: Solution) -> None:
+    """Warn once of a motion whose balances, joints or steps the audit finds wrong.
+
+    Every fourth instant is looked at, which takes a few per cent of the time of the run. Of bodies
+    that left their range `rom.mbs.results.validity` warns.
+    """
+    n = solution.t.size
+    seen = np.unique([*range(0, n, LOOK_EVERY), n - 1])
+    motion = {name: getattr(solution, name)[seen] for name in MOTION}
+    rows = _of_steps(replace(solution, **motion, _tracks={}))
+    failures = [f"{row.quantity} {row.value:.2g}" for row in rows if not row.ok]
+    if failures:
+        warn(
+            f"the motion does not pass its audit: {'; '.join(failures)}. Take smaller steps, or "
+            "look for a load, stiffness or drive that they do not resolve; rom.audit has limits."
+        )
+
+
+def _of_steps(solution: Solution) -> list[Row]:
+    """What one look at all instants tells of a motion as a whole."""
+    return [*_energy(solution), *_momentum(solution), *_joints(solution), *_numbers(solution)]
 
 
 def _row(quantity: str, value: float, limit: float) -> Row:
@@ -59,13 +90,22 @@ def _energy(solution: Solution) -> list[Row]:
     e = solution.energy
     parts = (e.kinetic, e.strain, e.potential, e.drives, e.forces, e.damping)
     turnover = max(np.ptp(part) for part in parts)
-    scale = max(turnover, np.abs(e.kinetic).max(), np.abs(e.strain).max(), 1e-300)
+    scale = max(turnover, np.abs(e.kinetic).max(), np.abs(e.strain).max(), _at_rest(solution))
     rows = [_row("energy balance / energy", np.abs(e.balance).max() / scale, ENERGY_RTOL)]
     if solution.t.size > 3:
         t = solution.t - solution.t.mean()
         slope = (t @ e.balance) / (t @ t) * np.ptp(solution.t)
         rows.append(_row("drift of energy / energy", abs(slope) / scale, ENERGY_RTOL))
     return rows
+
+
+def _at_rest(solution: Solution) -> float:
+    """Energy that is round-off: of the largest one, of the weight or of a way in the time [J]."""
+    e, packed, T = solution.energy, solution.packed, np.ptp(solution.t)
+    weight = np.linalg.norm(packed.system.bodies.gravity) * packed.length
+    crossing = (packed.length / T) ** 2 if T else 0.0
+    largest = max(np.abs(part).max() for part in (e.potential, e.drives, e.forces, e.damping))
+    return ROUND_OFF_RTOL * (largest + packed.mass * (weight + crossing)) or 1e-300
 
 
 def _momentum(solution: Solution) -> list[Row]:
@@ -102,18 +142,13 @@ def _joints(solution: Solution) -> list[Row]:
 
 
 def _numbers(solution: Solution) -> list[Row]:
-    norms = [
-        np.abs(np.linalg.norm(solution.orientation(name), axis=1) - 1).max()
-        for name in solution.packed.names
-    ]
-    rows = [_row("quaternion length - 1", max(norms), QUATERNION_ATOL)]
+    p = solution.q[:, solution.packed.system.bodies.q_at[:, None] + np.arange(3, 7)]
+    stretched = np.abs(np.linalg.norm(p, axis=2) - 1).max()
+    rows = [_row("quaternion length - 1", stretched, QUATERNION_ATOL)]
     statistics: dict[str, Any] = solution.statistics
     if "iterations" in statistics:
         mean = statistics["iterations"] / max(statistics["steps"], 1)
         rows.append(_row("Newton corrections per step", mean, MAX_MEAN_CORRECTIONS))
-    for name, part in solution.mechanism.parts.items():
-        if part.r:
-            rows += _limits(solution, name, part.flexible)
     return rows
 
 

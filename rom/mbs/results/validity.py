@@ -1,5 +1,6 @@
 """Does a motion stay where linear elasticity in a floating frame holds? If not, it says so."""
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -17,14 +18,14 @@ MAX_DEFORMATION = 0.1
 MAX_PRESSURE = 0.1  # of the load that buckles: a frequency is lower by a twentieth there
 # of an interface against the frame [rad]: there exp(sin x) falls short of the angle x by 1.5 %
 MAX_MARKER_TURN = 0.3
-MAX_BUSHING_TURN = 0.95 * np.pi  # [rad]
 
 
 def warn_of_limits(solution: Solution) -> None:
-    """Warn of bodies that left small deformations, or turned too fast for stiffness or step."""
+    """Warn of bodies and elements that left the range where what is said of them holds."""
     _warn_of_lost_turns(solution)
-    for name, bushing in solution.mechanism.bushings.items():
-        _warn_of_turned_bushing(solution, name, bushing)
+    axes = partial(_axes, solution)
+    for name, (family, element) in solution.mechanism.elements.items():
+        warn(family.beyond(name, element, solution.t, axes))
     for name, part in solution.mechanism.parts.items():
         if not part.r:
             continue
@@ -132,23 +133,6 @@ def _warn_of_lost_turns(solution: Solution) -> None:
                 "angle of their joint loses whole turns beyond pi, and with it the spring, motor, "
                 f"gear or stop that acts on it is wrong. Take steps below {np.pi / rate:.3g} s."
             )
-
-
-def _warn_of_turned_bushing(solution: Solution, name: str, bushing: Any) -> None:
-    """The rotation vector of a bushing ends at half a turn, and begins anew on the other side."""
-    if not (np.any(bushing.stiffness[3:]) or any(at > 2 for at, _ in bushing.curves)):
-        return
-    one, other = (
-        _axes(solution, marker.body) @ frame
-        for marker, frame in zip((bushing.i, bushing.j), bushing.frames, strict=True)
-    )
-    turn = np.arccos(np.clip((np.einsum("tij,tij->t", one, other) - 1) / 2, -1, 1))
-    if np.nanmax(turn) > MAX_BUSHING_TURN:
-        k = int(np.nanargmax(turn > MAX_BUSHING_TURN))
-        warn(
-            f"bushing {name!r} was turned by {turn[k]:.3g} rad at {solution.t[k]:.4g} s: its "
-            "moment jumps to the other side at half a turn. A rotational spring counts whole turns."
-        )
 
 
 def _axes(solution: Solution, body: str) -> Array:

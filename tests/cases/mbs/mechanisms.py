@@ -244,10 +244,10 @@ def simeon_crank(axial_mass_divisor=1.0, start=None):
 
 
 def simulate_quietly(mechanism, **options):
-    """Simulate a mechanism whose redundant constraints are known."""
+    """Simulate a mechanism whose redundant constraints, and start beside its joints, are known."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RomWarning)
-        return simulate(mechanism, **options)
+        return simulate(mechanism, **{"assemble": True} | options)
 
 
 def slider_crank(l1=0.1, l2=0.3, speed=50.0, gravity=0.0, rod=None):

@@ -40,7 +40,9 @@ PARTS = ("t", "q", "v", "a", "lam", "base")
 def swing():
     """A flexible body on a ball joint, pulled by a load and by a law in Python."""
     mech = Mechanism()
-    body = mech.add_flexible("one", random_body(np.random.default_rng(3)), omega=(1.0, 2.0, 3.0))
+    shapes, omega = random_body(np.random.default_rng(3)), (1.0, 2.0, 3.0)
+    start = np.cross(shapes.markers["a"].point, omega)
+    body = mech.add_flexible("one", shapes, omega=omega, velocity=start)
     place = mech.design_point(body.marker("a"))
     mech.spherical("hook", mech.ground.marker(place), body.marker("a"))
     mech.force("pull", body.marker("b"), lambda t: (0.3 * t**3, 0, np.sin(t)))

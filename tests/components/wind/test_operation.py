@@ -223,3 +223,16 @@ def test_another_rotor_works_at_a_speed_that_is_held():
     small = rotor_load(straight(), 9.0, 1.2, n_azimuths=1)
     assert run.torque[-1] == pytest.approx(8 * small.torque, rel=1e-3)
     assert_allclose(run.power, 0.944 * run.torque * 0.6, rtol=1e-12)
+
+
+def test_the_power_curve_of_another_rotor_follows_a_controller_that_is_handed_over():
+    """At the same ratio of tips to wind, twice the rotor has four times the power in any wind."""
+    law = lambda wind: (min(0.11 * wind, 1.2), 0.01 * max(wind - 11.0, 0.0))  # noqa: E731
+    winds = [2.0, 9.0, 15.0, 28.0]
+    large = power_curve(winds, scaled(2.0), held=law)
+    small = [rotor_load(straight(), w, 2 * law(w)[0], law(w)[1]) for w in winds]
+    assert_allclose(large["speed"], [0.22, 0.99, 1.2, 1.2], rtol=1e-12)
+    assert_allclose(large["power"], [4 * 0.944 * one.power for one in small], rtol=1e-3)
+    assert steady(9.0, scaled(2.0), held=law).torque == pytest.approx(large["torque"][1])
+    with pytest.raises(ConfigError, match="nan"):
+        steady(9.0, scaled(2.0), held=lambda wind: (np.nan, 0.0))

@@ -80,7 +80,9 @@ def test_inverse_dynamics_agrees_with_the_simulated_motion():
 def loaded_swing():
     """A flexible body on a ball joint with a spring, a load and a law in Python."""
     mech = rom.Mechanism()
-    body = mech.add_flexible("one", random_body(np.random.default_rng(3)), omega=(1.0, 2.0, 3.0))
+    shapes, omega = random_body(np.random.default_rng(3)), (1.0, 2.0, 3.0)
+    start = np.cross(shapes.markers["a"].point, omega)
+    body = mech.add_flexible("one", shapes, omega=omega, velocity=start)
     hook = mech.ground.marker(mech.design_point(body.marker("a")))
     mech.spherical("hook", hook, body.marker("a"))
     mech.force("pull", body.marker("b"), lambda t: (0.3 * t, 0, np.sin(t)), frame="body")

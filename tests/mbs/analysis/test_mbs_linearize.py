@@ -279,7 +279,7 @@ def test_exact_tangents_and_differences_agree():
     now.packed.system.markers.twist[:] = 0.0
     now.packed.system.markers.bend[:, 3:] = 0.0
     rng = np.random.default_rng(3)
-    state = initial_state(now.packed)
+    state = initial_state(now.packed, assemble=True)
     state = replace(state, a=rng.normal(size=10), v=rng.normal(size=10), lam=rng.normal(size=3))
     assert now.exact(state)
     residual = lambda dq: now.residual(  # noqa: E731

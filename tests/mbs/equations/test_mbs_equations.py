@@ -145,7 +145,7 @@ def test_stiffness_of_drives_and_coils_is_exact_where_the_joint_is_closed():
     packed, W = prepared(mech)
     packed.system.markers.twist[:] *= 1e-3
     packed.system.markers.bend[:, 3:] *= 1e-3
-    start = initial_state(packed)
+    start = initial_state(packed, assemble=True)
     W.signal[:, 0] = 0.4
     linearize_constraints(packed.system, W, start.q, start.v)
     motions = null_space(W.G[:5])

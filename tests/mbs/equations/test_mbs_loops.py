@@ -120,7 +120,8 @@ def hinge_and_ball(*drives):
     mech = Mechanism(gravity=(0, 0, 0))
     box = mech.add_rigid("box", mass=1.0, inertia=(1, 1, 1), at=(0, 0, 0),
                          markers={"a": (0, 0, 0), "b": (1, 0, 0)})  # fmt: skip
-    bar = mech.add_flexible("bar", random_body(np.random.default_rng(1)))
+    body = random_body(np.random.default_rng(1))
+    bar = mech.add_flexible("bar", body, at=X - np.asarray(body.markers["a"].point))
     mech.revolute("hinge", mech.ground.marker((0, 0, 0)), box.marker("a"), axis=Z)
     mech.spherical("ball", box.marker("b"), bar.marker("a"))
     for k, function in enumerate(drives):
@@ -158,7 +159,9 @@ def coil():
 def swing():
     """A flexible body on a ball joint."""
     mech = Mechanism()
-    body = mech.add_flexible("one", random_body(np.random.default_rng(3)), omega=(1.0, 2.0, 3.0))
+    shapes, omega = random_body(np.random.default_rng(3)), (1.0, 2.0, 3.0)
+    start = np.cross(shapes.markers["a"].point, omega)
+    body = mech.add_flexible("one", shapes, omega=omega, velocity=start)
     place = mech.design_point(body.marker("a"))
     mech.spherical("hook", mech.ground.marker(place), body.marker("a"))
     return mech

@@ -182,9 +182,9 @@ def test_many_wheels_roll_by_blocks_as_by_whole_matrices(whole):
 
 def test_gaps_of_what_rolls_are_closed_as_by_whole_matrices(whole):
     """Bars given a centimetre beside their axles: bodies come together, wheels may slip for it."""
-    blocks = quietly(rom.simulate, train(12, apart=0.01), t_end=1e-3, dt=1e-3)
+    blocks = quietly(rom.simulate, train(12, apart=0.01), t_end=1e-3, dt=1e-3, assemble=True)
     whole()
-    other = quietly(rom.simulate, train(12, apart=0.01), t_end=1e-3, dt=1e-3)
+    other = quietly(rom.simulate, train(12, apart=0.01), t_end=1e-3, dt=1e-3, assemble=True)
     assert blocks.packed.by_blocks and not other.packed.by_blocks
     assert np.abs(blocks.position("bar 3")[0] - [3.51, 0, 0.3]).max() > 1e-3
     assert_allclose(blocks.q[0], other.q[0], atol=1e-9)

@@ -1,11 +1,14 @@
 """The audit of a motion: quiet when it is right, red in the right line when it is not."""
 
+import warnings
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from cases.mbs.mechanisms import lattice, lattice_body, simulate_quietly, slider_crank
+from rom.errors import RomWarning
+from rom.mbs.elements.bushings import BUSHINGS_FAMILY
 from rom.mbs.integrate.simulation import simulate
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.results.audit import audit
@@ -88,3 +91,48 @@ def test_deformations_beyond_linear_elasticity_are_seen():
 def test_newton_that_toils_is_seen(crank):
     statistics = crank.statistics | {"iterations": 9 * crank.statistics["steps"]}
     assert failures(replace(crank, statistics=statistics)) == ["Newton corrections per step"]
+
+
+def weight_on_a_spring(**steps):
+    """4 Hz, 0.1 m."""
+    mech = Mechanism(gravity=(0, 0, 0))
+    ball = mech.add_rigid("ball", mass=1.0, inertia=(1, 1, 1), at=(0.6, 0, 0))
+    mech.spring_damper("spring", mech.ground.marker((0, 0, 0)), ball.marker((0, 0, 0)),
+                       stiffness=(8 * np.pi) ** 2, free_length=0.5)  # fmt: skip
+    return simulate(mech, t_end=1.0, **steps)
+
+
+def test_a_run_tells_itself_what_the_audit_finds_wrong():
+    """Steps of a fifth of a period take its energy; one sentence names the rows."""
+    with pytest.warns(RomWarning, match="its audit: energy balance / energy .*; drift") as told:
+        sol = weight_on_a_spring(dt=0.05, rho_inf=0.5)
+    assert len(told) == 1
+    assert all(what in str(told[0].message) for what in failures(sol)) and failures(sol)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert audit(weight_on_a_spring(dt=0.002)).ok
+
+
+def test_an_element_from_outside_says_itself_what_it_cannot_bear():
+    """No list of elements in the core: the family answers for its own."""
+    mech = Mechanism(gravity=(0, 0, 0))
+    ball = mech.add_rigid("ball", mass=1.0, inertia=(1, 1, 1), at=(0, 0, 0), omega=(0, 0, 7.0))
+    mech.bushing("rubber", mech.ground.marker((0, 0, 0)), ball.marker((0, 0, 0)),
+                 stiffness=(1e3, 1e3, 1e3, 0, 0, 1e-3))  # fmt: skip
+    mine = replace(BUSHINGS_FAMILY, beyond=lambda name, _e, t, axes: (
+        f"{name} after {t[-1]:g} s at {axes('ball')[-1, 0, 0]:.3f}"))  # fmt: skip
+    mech.elements["rubber"] = mine, mech.elements["rubber"][1]
+    with pytest.warns(RomWarning, match=r"^rubber after 0\.01 s at 0\.998$"):
+        simulate(mech, t_end=0.01, dt=1e-3)
+
+
+@pytest.mark.parametrize("gravity", [0.0, 9.81])
+def test_what_rests_passes_whatever_its_round_off_is(gravity):
+    """A rod that a drive holds level: all energies are round-off, their balance is another one."""
+    mech = Mechanism(gravity=(0, -gravity, 0))
+    rod = mech.add_rigid("rod", mass=1.0, inertia=(1e-3, 0.1, 0.1), at=(0.51, 0, 0))
+    mech.revolute("pin", mech.ground.marker((0.01, 0, 0)), rod.marker((-0.5, 0, 0)), axis=(0, 0, 1))
+    mech.drive("turn", "pin", lambda t: 0.3 + 0.0 * t)
+    sol = simulate(mech, t_end=1e-3, dt=1e-4, assemble=True)
+    assert sol.energy.kinetic.max() < 1e-20
+    assert audit(sol).ok, audit(sol)

@@ -1,13 +1,14 @@
 """A start that joints or drives move: told, refused where it is wrong, without a strain."""
 
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
 import rom
-from cases.mbs.mechanisms import lattice, lattice_body
+from cases.mbs.mechanisms import lattice, lattice_body, slider_crank
 from rom.errors import ConfigError, ModelError, RomWarning
 
 Z = (0, 0, 1)
@@ -40,16 +41,16 @@ ASKED = {
 
 
 @pytest.mark.parametrize("asked", ASKED)
-def test_a_start_far_from_joints_or_drives_is_told_unless_asked_for(asked):
-    for fault, name in (({"gap": 0.05}, "pin"), ({"angle": 0.3}, "turn")):
-        with pytest.warns(RomWarning, match=f"moved to fit joints and drives: '{name}' was open"):
+def test_a_start_far_from_joints_or_drives_is_refused_unless_asked_for(asked):
+    for fault, name in (({"gap": 0.0051}, "pin"), ({"angle": 0.3}, "turn")):
+        with pytest.raises(ModelError, match=rf"^{name}: the start contra.*open by .*=True"):
             ASKED[asked](rod_on_a_pin(**fault))
         with warnings.catch_warnings():
             warnings.simplefilter("error", RomWarning)
             ASKED[asked](rod_on_a_pin(**fault | {"rate": 0.0}), assemble=True)
 
 
-@pytest.mark.parametrize(("gap", "told"), [(1e-9, False), (1e-4, True)])
+@pytest.mark.parametrize(("gap", "told"), [(1e-9, False), (1e-4, True), (0.0049, True)])
 def test_a_small_gap_is_told_and_recorded(gap, told):
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
@@ -63,19 +64,54 @@ def test_statics_begin_where_drives_say_and_not_where_joints_are_open():
     assert_allclose(state.q[:2], 0.5 * np.array([np.cos(0.3), np.sin(0.3)]), atol=1e-12)
     sol = rom.inverse_dynamics(rod_on_a_pin(angle=0.3), [0.0, 1e-3])
     assert_allclose(sol.drive_load("turn")[0], 9.81 * 0.5 * np.cos(0.3), rtol=1e-6)
-    for asked in (rom.equilibrium, lambda mech: rom.inverse_dynamics(mech, [0.0, 1.0])):
-        with pytest.warns(RomWarning, match=r"moved to fit joints and drives: 'pin' was open"):
-            asked(rod_on_a_pin(gap=0.05, angle=0.3))
+    for asked in (rom.equilibrium, lambda mech: rom.inverse_dynamics(mech, [0.0, 1.0]), repeated):
+        with pytest.raises(ModelError, match=r"^pin: the start contradicts joints and drives"):
+            asked(rod_on_a_pin(gap=0.05, angle=0.3, rate=0.0))
 
 
-@pytest.mark.parametrize(("rate", "told"), [(3.0, True), (4.0, False)])
-def test_a_given_velocity_that_a_drive_contradicts_is_told(rate, told):
+def repeated(mech):
+    return rom.periodic_motion(mech, period=0.1)
+
+
+def test_a_state_that_new_joints_do_not_fit_is_refused_unless_asked_for():
+    state = rom.equilibrium(rod_on_a_pin(angle=0.3))
+    with pytest.raises(ModelError, match=r"^turn: the start contradicts"):
+        rom.release(rod_on_a_pin(angle=0.4), state)
+    assert_allclose(rom.release(rod_on_a_pin(angle=0.4), state, assemble=True).q[1],
+                    0.5 * np.sin(0.4), atol=1e-12)  # fmt: skip
+
+
+@pytest.mark.parametrize(("omega", "rate", "told"), [
+    (4.0, 4.0, ""), (4.0, 4.02, "0.005"), (0.0, 3.0, ""), (4.0, 3.0, "0.25"), (4.0, -4.0, "2")
+])  # fmt: skip
+def test_a_given_velocity_that_a_drive_contradicts_is_told_or_refused(omega, rate, told):
+    """A rod that was given none has the one of its drive."""
+    mech, said = rod_on_a_pin(omega=omega, rate=rate), f"the velocity of 'rod' changes by {told} of"
+    if told and float(told) > 1e-2:
+        with pytest.raises(ModelError, match=f"^rod: the start contradicts .*{said}"):
+            moved(mech)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        sol = moved(rod_on_a_pin(omega=4.0, rate=rate))
-    said = "the velocity of 'rod' changes by 0.25 of the given one"
-    assert [(said in str(w.message)) for w in caught] == [True] * told
+        sol = moved(mech, assemble=bool(told) and float(told) > 1e-2)
+    assert [said in str(w.message) for w in caught] == [True] * (told == "0.005")
     assert_allclose(sol.omega("rod")[0, 2], rate, rtol=1e-6)
+
+
+def test_what_moves_a_light_body_counts_as_much_as_what_moves_a_heavy_one():
+    """Speeds are compared, not momenta; a body next to rest is compared with the fastest."""
+    for mass, slow, refused in ((1e3, 0.0, True), (1e-6, 0.0, True), (1.0, 3.999, False)):
+        mech = rod_on_a_pin(omega=4.0)
+        light = mech.add_rigid("light", mass=mass, inertia=(mass,) * 3, at=(0, 0, 1),
+                               velocity=(slow or 2.0, 0, 0))  # fmt: skip
+        mech.prismatic("rail", mech.ground.marker((0, 0, 1)), light.marker((0, 0, 0)),
+                       axis=(1, 0, 0))  # fmt: skip
+        mech.drive("push", "rail", lambda t: 4.0 * t)
+        if refused:
+            with pytest.raises(ModelError, match=r"^light: .*'light' changes by [\d.]+ of"):
+                moved(mech)
+        else:
+            with pytest.warns(RomWarning, match="the velocity of 'light' changes by 0.000"):
+                moved(mech)
 
 
 def flexible(gaps, fixed=("n0",)):
@@ -141,3 +177,17 @@ def test_a_reduced_body_that_spins_is_not_counted_in_axes_of_the_world(asked):
     mech = geared_disc(50.0, body=lattice_body(lattice(stiffness=4e4)))
     with pytest.raises(ModelError, match=r"^disc: it spins at .* rad.s and its shapes turn"):
         asked(mech, frame="world", assemble=True)
+
+
+def test_bodies_that_were_given_no_velocity_are_led_by_those_that_were():
+    """The crank keeps its 10 rad/s; rod and slider, as heavy, move as the linkage makes them."""
+    mech = slider_crank(l1=0.1, l2=0.3, speed=0.0)
+    mech.drives.clear()
+    crank = mech.parts["crank"]
+    mech.parts["crank"] = replace(crank, omega=np.array([0.0, 0.0, 10.0]))
+    with warnings.catch_warnings():
+        warnings.filterwarnings("error", message=".*start")
+        sol = moved(mech)
+    assert_allclose(sol.omega("crank")[0], [0, 0, 10.0], atol=1e-7)
+    assert_allclose(sol.omega("rod")[0, 2], -10.0 / 3, rtol=1e-7)
+    assert_allclose(sol.velocity("slider")[0], 0.0, atol=1e-7)

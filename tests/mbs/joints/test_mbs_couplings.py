@@ -271,7 +271,7 @@ def test_a_ball_on_a_turntable_circles_with_two_sevenths_of_its_speed(method):
     mech.revolute("axle", mech.ground.marker((0, 0, 0)), table.marker("o"), axis=Z)
     mech.rolling("roll", table.marker("o"), ball.marker("o"), normal=Z, radius=radius)
     mech.drive("motor", "axle", lambda t: speed * t)
-    sol = simulate(mech, t_end=4.0, dt=2e-3, method=method)
+    sol = simulate(mech, t_end=4.0, dt=2e-3, method=method, assemble=True)
     w, v0, x0 = 2 / 7 * speed, sol.velocity("ball")[0], sol.position("ball")[0]
     centre = x0[:2] + np.array([-v0[1], v0[0]]) / w
     arm = x0[:2] - centre
@@ -293,12 +293,12 @@ def test_a_thrown_hoop_wobbles_without_loss_and_touches_the_plane():
     axle = np.array([0, np.cos(0.2), np.sin(0.2)])
     mech.rolling("roll", mech.ground.marker((0, 0, 0)), hoop.marker("o"), normal=Z, radius=0.3,
                  axis=axle)  # fmt: skip
-    sol = simulate(mech, t_end=2.0, dt=0.01, method="dop853")
+    sol = simulate(mech, t_end=2.0, dt=0.01, method="dop853", assemble=True)
     assert np.abs(sol.energy.balance).max() < 1e-8 * sol.energy.kinetic.max()
     s = np.einsum("tij,j->ti", sol.axes("hoop", "o"), [0, 1.0, 0])
     assert np.ptp(s[:, 2]) > 0.05
     assert_allclose(sol.position("hoop")[:, 2], 0.3 * np.sqrt(1 - s[:, 2] ** 2), atol=1e-9)
-    slow = simulate(mech, t_end=2.0, dt=1e-3)
+    slow = simulate(mech, t_end=2.0, dt=1e-3, assemble=True)
     assert_allclose(slow.position("hoop")[-1], sol.position("hoop")[-1], atol=1e-4)
 
 
@@ -319,7 +319,7 @@ def test_planar_joint_and_points_on_lines_stay_where_they_should():
             mech.point_on_line("j", a, b, axis=AXIS)
         else:
             mech.point_on_plane("j", a, b, normal=AXIS)
-        sol = simulate(mech, t_end=0.4, dt=1e-3)
+        sol = simulate(mech, t_end=0.4, dt=1e-3, assemble=True)
         E1, E2 = sol.axes("one", "b"), sol.axes("two", "a")
         gap = np.einsum("tba,tb->ta", E1, sol.position("two", "a") - sol.position("one", "b"))
         axis = E1[0].T @ AXIS

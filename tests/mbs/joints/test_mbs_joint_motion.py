@@ -57,7 +57,7 @@ def flexible():
                          omega=(-0.2, 0.4, 0.3))  # fmt: skip
     mech.screw("thread", one.marker("b"), two.marker((0, 0, 0)), axis=AXIS, pitch=0.02)
     mech.motor("servo", "thread", lambda t, x, v: 5.0 - 0.1 * v, coordinate="angle")
-    return simulate(mech, t_end=2.0, dt=1e-3)
+    return simulate(mech, t_end=2.0, dt=1e-3, assemble=True)
 
 
 def test_a_screw_advances_by_its_pitch(flexible):

@@ -26,7 +26,7 @@ def two_bodies(join):
         omega=(-1.0, 2.0, 1.0), markers={"a": _body_point([-0.4, 0.3, -0.2])},
     )  # fmt: skip
     join(mech, one.marker("b"), two.marker("a"))
-    sol = simulate(mech, t_end=0.4, dt=1e-3)
+    sol = simulate(mech, t_end=0.4, dt=1e-3, assemble=True)
     assert np.abs(sol.energy.balance).max() < 1e-4 * np.ptp(sol.energy.potential)
     gap = sol.position("two", "a") - sol.position("one", "b")
     E1, E2 = sol.axes("one", "b"), sol.axes("two", "a")

@@ -121,7 +121,7 @@ class Flow:
 
     def initial(self) -> State:
         """Where the bodies were added."""
-        return initial_state(self.packed, self.t0, self.settings.spacing, assemble=True)
+        return initial_state(self.packed, self.t0, self.settings.spacing, placing=True)
 
     def begun(self, state: State) -> Start:
         """A state as the start of a run would have it.

@@ -6,12 +6,12 @@ from typing import Any
 import numpy as np
 from scipy.optimize import brentq
 
-from rom.arguments import number, positive
+from rom.arguments import number, positive, typed
 from rom.errors import ConfigError
 from rom.mbs.parts.bodies import Part
-from rom.plausible import FRICTION, warn_outside
 
 
+@typed
 @dataclass(frozen=True, slots=True)
 class Impact:
     """Force of penetration: stiffness depth^exponent (1 + damping d(depth)/dt), never pulling.
@@ -56,7 +56,6 @@ class Impact:
         for name in ("damping", "mu", "tangential_damping"):
             if number(name, getattr(self, name)) < 0.0:
                 raise ConfigError(f"{name} = {getattr(self, name):g} must not be negative.")
-        warn_outside(FRICTION, self.mu)
         if self.exponent < 1.0:
             raise ConfigError(f"exponent = {self.exponent:g} is below one: infinitely stiff.")
         self._check_spring()

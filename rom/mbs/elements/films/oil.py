@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from rom.arguments import typed
 from rom.errors import ModelError
 from rom.model import Array
 
@@ -16,6 +17,7 @@ CELSIUS_ZERO = 273.15  # [K]
 AT_100 = {32: 5.4, 46: 6.8, 68: 8.7}  # usual mineral oils of these grades [mm^2/s]
 
 
+@typed
 @dataclass(frozen=True, slots=True)
 class Oil:
     """A mineral oil; log log (nu + 0.7) is linear in log T (Walther, ASTM D341).

@@ -7,14 +7,14 @@ An internal gear has a negative number of teeth, and with it negative radii and 
 distance, as in ISO 21771: then all formulas are those of external gears.
 """
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 from scipy.optimize import brentq
 
+from rom.arguments import typed
 from rom.errors import ModelError
 from rom.model import Array
 
@@ -24,24 +24,13 @@ def involute(angle: npt.ArrayLike) -> Array:
     return np.tan(angle) - np.asarray(angle, dtype=float)
 
 
-def check_numbers(pair: Any) -> None:
-    """Refuse sizes of a pair that are no finite numbers.
-
-    Raises:
-        ModelError: for the first of them.
-    """
-    for field in fields(pair):
-        value = getattr(pair, field.name)
-        if value is not None and not np.isfinite(value).all():
-            raise ModelError(f"{field.name} = {value} of a pair of gears is no finite number.")
-
-
+@typed
 @dataclass(frozen=True)
 class GearPair:
     """A pair of cylindrical gears.
 
     Attributes:
-        teeth: of pinion and gear; that of an internal gear is negative.
+        teeth: of pinion and gear [1]; that of an internal gear is negative.
         module: normal module [m].
         width: common face width [m].
         helix: angle at the reference circle [rad]; positive for a right-handed pinion.
@@ -58,7 +47,7 @@ class GearPair:
         ModelError: if no such gears mesh.
     """
 
-    teeth: tuple[int, int]
+    teeth: tuple[float, float]  # parts of teeth in sections across the flank
     module: float
     width: float
     helix: float = 0.0
@@ -72,7 +61,6 @@ class GearPair:
     gear_helix: float | None = None
 
     def __post_init__(self) -> None:
-        check_numbers(self)
         if min(map(abs, self.teeth)) < 4 or not (self.module > 0 and self.width > 0):
             raise ModelError(
                 f"no gears have {self.teeth} teeth of module {self.module} m, {self.width} m wide."

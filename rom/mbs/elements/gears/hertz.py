@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from rom.arguments import typed
 from rom.errors import ModelError
 from rom.mbs.elements.gears.geometry import GearPair
 from rom.mbs.elements.gears.racks import RackPair
@@ -14,6 +15,7 @@ MIN_CURVATURE_RTOL = 1e-6  # radius over the path of contact: at the tangent poi
 N_PLACES = 41  # of the table along the path: its constant is a logarithm and changes slowly
 
 
+@typed
 @dataclass(frozen=True, slots=True)
 class Hertz:
     """Line contact of two teeth, whose approach per load grows with the logarithm of the load.
@@ -22,7 +24,7 @@ class Hertz:
         depths: (2,) or (n, 2) from the flanks of pinion and gear to the axes of their teeth, at
             places from first to last contact [m].
         E: Young's modulus [Pa].
-        nu: Poisson's ratio.
+        nu: Poisson's ratio [1].
 
     Source:
         Weber and Banaschek, VDI-Bericht 1953.

@@ -29,7 +29,6 @@ from rom.mbs.elements.gears.teeth import mesh_energy, mesh_tangents, mesh_wrench
 from rom.mbs.parts.bodies import Marker, Part
 from rom.mbs.parts.whole import Whole
 from rom.model import Array
-from rom.plausible import FRICTION, warn_outside
 from rom.rotation import matrix
 
 DISTANCE_RTOL = 1e-3  # of the module: by which bodies may stand elsewhere than the pair says
@@ -244,7 +243,6 @@ def _law(name: str, damping: Any, friction: Any, speed: Any) -> tuple[float, ...
     for what, value in (("damping", damping), ("friction", friction)):
         if number(what, value) < 0.0:
             raise ConfigError(f"{what} of mesh {name!r} is {value:g}: it must not drive.")
-    warn_outside(FRICTION, friction, repr(name))
     if friction and speed is None:
         raise ConfigError(
             f"mesh {name!r} has friction, but no transition_speed.",

@@ -5,11 +5,13 @@ from functools import cached_property
 
 import numpy as np
 
+from rom.arguments import typed
 from rom.errors import ModelError
-from rom.mbs.elements.gears.geometry import GearPair, check_numbers
+from rom.mbs.elements.gears.geometry import GearPair
 from rom.model import Array
 
 
+@typed
 @dataclass(frozen=True)
 class RackPair:
     """A cylindrical pinion and a rack, without ends: see `rom.Mechanism.stop`.
@@ -60,7 +62,6 @@ class RackPair:
             )
 
     def _check_sizes(self) -> None:
-        check_numbers(self)
         if not (self.pinion_teeth >= 4 and self.module > 0 and self.width > 0):
             raise ModelError(
                 f"no pinion of {self.pinion_teeth} teeth of module {self.module} m, {self.width} m "

@@ -68,7 +68,7 @@ class BallBearing:
 
     @property
     def exponent(self) -> float:
-        """Of the depth in the force."""
+        """Of the depth in the force [1]."""
         return 1.5
 
     @property
@@ -144,7 +144,7 @@ class RollerBearing:
 
     @property
     def exponent(self) -> float:
-        """Of the depth in the force."""
+        """Of the depth in the force [1]."""
         return 10 / 9
 
     @property

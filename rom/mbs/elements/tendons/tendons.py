@@ -45,7 +45,6 @@ from rom.mbs.kernels.tables import (
 from rom.mbs.parts.bodies import Marker
 from rom.mbs.parts.whole import Whole
 from rom.model import Array, Index
-from rom.plausible import FRICTION, warn_outside
 from rom.rotation import matrix
 
 MAX_TURNS = 1000  # of a cable about a pulley
@@ -157,7 +156,6 @@ def tendon(  # noqa: PLR0913  one keyword per property
 def _station(whole: Whole, name: str, place: Any, friction: float) -> Station:
     """A place of the path in the axes of its marker."""
     mu = _not_negative(name, "friction", getattr(place, "friction", friction))
-    warn_outside(FRICTION, mu, repr(name))
     if isinstance(place, Marker):
         whole.check_markers(name, place)
         return Station(place, np.eye(3)[:2], 0.0, mu, 0)
