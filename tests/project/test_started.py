@@ -147,12 +147,12 @@ SHOWN = [page for page in PAGES if page.name != "step_part.md" and
 
 
 def part(folder):
-    """A plate with a bore of 6 mm and a foot that looks down, in millimetres."""
+    """A plate with a blind bore of 6 mm, which leaves its foot whole, in millimetres."""
     import gmsh
 
     gmsh.initialize()
     plate = gmsh.model.occ.addBox(-20, -20, 0, 80, 40, 10)
-    bore = gmsh.model.occ.addCylinder(0, 0, -10, 0, 0, 30, 6)
+    bore = gmsh.model.occ.addCylinder(0, 0, 4, 0, 0, 30, 6)
     gmsh.model.occ.cut([(3, plate)], [(3, bore)])
     gmsh.model.occ.synchronize()
     gmsh.write(str(folder / "part.step"))
