@@ -20,12 +20,13 @@ from benchmarks.models import (
     STEEL,
     TITANIUM,
     bar,
-    chain_of,
     geometry,
     rigid_chain,
     slider_crank,
     top,
 )
+from benchmarks.peers.mechanisms import built
+from benchmarks.peers.mechanisms import chain as row_of
 from benchmarks.timing import timed
 from rom.arguments import one_of
 from rom.model import FEModel
@@ -151,7 +152,7 @@ def chain(lengths: tuple[int, ...] = (4, 16, 64, 256, 1000)) -> Iterator[Figure]
     )
     dt, per_link = 1e-3, []
     for n in lengths:
-        mechanism, steps = chain_of(link, n), max(10, min(200, 6400 // n))
+        mechanism, steps = built(row_of(link, n), link), max(10, min(200, 6400 // n))
         warm = simulate(mechanism, t_end=2 * dt, dt=dt)
         run = simulate(mechanism, t_end=(2 + steps) * dt, dt=dt, state=warm.final)
         case, speed = f"{n} links of {link.n_modes} modes", run.statistics["steps_per_second"]
