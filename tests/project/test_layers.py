@@ -120,13 +120,10 @@ def wrong(part, name):
     if package in DRAWING and part not in ("view", "report", "doctor"):
         return f"{name}; only rom.view may"
     target = rest.split(".")[0]
-    if package == "rom" and part not in ANYTHING:
+    if package == "rom" and part not in ANYTHING and target != part:
         if not target:
             return "the package root"
-        known = (
-            ALONE.get(part, {target}) - {"fe"} | {part} | ({"fe"} if part == "config" else set())
-        )
-        if target not in known:
+        if target not in ALONE.get(part, {target}) or (target == "fe" and part != "config"):
             return f"rom.{target}"
     return None
 
