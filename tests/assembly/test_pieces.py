@@ -218,7 +218,7 @@ def test_pieces_are_certified_under_moments_that_turn_with_their_section(halves)
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("large, least", [(True, 3e-3), (False, 1e-2)])
+@pytest.mark.parametrize("large, least", [(True, 1e-3), (False, 1e-2)])
 def test_without_states_of_full_models_pieces_under_moments_are_worse(halves, large, least):
     """Those of small deflection fail."""
     models, _, made = halves
