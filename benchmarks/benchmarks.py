@@ -323,7 +323,10 @@ def geared(steps: int = 20000) -> Iterator[Figure]:
 
 
 def transmission(
-    speeds: int = 100, cells: tuple[int, int] = (120, 8), ross: bool = True
+    speeds: int = 100,
+    cells: tuple[int, int] = (120, 8),
+    ross: bool = True,
+    stage_cells: tuple[int, int] = (60, 4),
 ) -> Iterator[Figure]:
     """A gear unit on oil films through its speeds; coefficients of a bearing here and by ROSS.
 
@@ -334,6 +337,7 @@ def transmission(
         speeds: of the pinion, 500 to 6000 rpm, each with the motion that repeats with the mesh.
         cells: of each film.
         ross: compare with ROSS, which is installed from the package index.
+        stage_cells: of each film of the two stages.
     """
     from benchmarks.peers.films import (
         coefficients_compared,
@@ -345,7 +349,7 @@ def transmission(
     for rows in (speeds_run_through, programs_compared):
         for row in rows(speeds, cells):
             yield Figure("transmission", *row)
-    for row in stages_run():
+    for row in stages_run(stage_cells):
         yield Figure("transmission", *row)
     if ross:
         for row in coefficients_compared():

@@ -282,7 +282,8 @@ def test_families_on_a_joint_are_updated_and_written_one_by_one(bolted, capsys):
         assert_allclose(written.frequencies(4), body.frequencies(4), rtol=1e-12)
 
 
-def test_a_coupled_assembly_is_planned(bolted, capsys):
+def test_a_coupled_assembly_is_planned(bolted, capsys, monkeypatch):
+    monkeypatch.setattr("rom.cli.verbs.update.PLAN_POINTS", 6)
     words = ["--plan", "4,1", "--lines", "20:900", "--couple", "frame.tip=arm.root", *HALVES]
     found = halves([*words, "-o", "halves.png", "--force"], capsys)
     assert errors(found, schema("update")) == []

@@ -25,7 +25,7 @@ COARSE_WHEEL = {"lc": 0.02, "lc_blade": 0.02}
 BRIEF = {  # benchmark: arguments with which it takes seconds
     "blade": {"parameters": {"lc": 0.02, "lc_flank": 0.01}},
     "film": {"solves": 4},
-    "transmission": {"speeds": 2, "cells": (24, 4)},
+    "transmission": {"speeds": 1, "cells": (24, 4), "stage_cells": (24, 3)},
     "geared": {"steps": 50},
     "integrator": {"turns": 1},
     "chain": {"lengths": (2, 4)},
