@@ -51,6 +51,7 @@ def test_every_benchmark_has_a_brief_form():
 
 
 @pytest.mark.long
+@pytest.mark.timeout(3600)  # a program to compare with is installed first
 @pytest.mark.parametrize("name", BRIEF)
 def test_a_benchmark_runs_from_its_beginning_to_its_end(name, monkeypatch):
     """Programs to compare with come from the package index; where that is not, the rest has run."""

@@ -8,15 +8,7 @@ names, so that kernels are written as if the table were a tuple.
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import (
-    Annotated,
-    Any,
-    Self,
-    TypeVar,
-    dataclass_transform,
-    get_args,
-    get_type_hints,
-)
+from typing import Annotated, Any, Self, TypeVar, dataclass_transform, get_args, get_type_hints
 
 import numpy as np
 from numba import types
