@@ -20,12 +20,13 @@ from benchmarks.models import (
     STEEL,
     TITANIUM,
     bar,
-    chain_of,
     geometry,
     rigid_chain,
     slider_crank,
     top,
 )
+from benchmarks.peers.mechanisms import built
+from benchmarks.peers.mechanisms import chain as row_of
 from benchmarks.timing import timed
 from rom.arguments import one_of
 from rom.model import FEModel
@@ -151,7 +152,7 @@ def chain(lengths: tuple[int, ...] = (4, 16, 64, 256, 1000)) -> Iterator[Figure]
     )
     dt, per_link = 1e-3, []
     for n in lengths:
-        mechanism, steps = chain_of(link, n), max(10, min(200, 6400 // n))
+        mechanism, steps = built(row_of(link, n), link), max(10, min(200, 6400 // n))
         warm = simulate(mechanism, t_end=2 * dt, dt=dt)
         run = simulate(mechanism, t_end=(2 + steps) * dt, dt=dt, state=warm.final)
         case, speed = f"{n} links of {link.n_modes} modes", run.statistics["steps_per_second"]
@@ -322,7 +323,10 @@ def geared(steps: int = 20000) -> Iterator[Figure]:
 
 
 def transmission(
-    speeds: int = 100, cells: tuple[int, int] = (120, 8), ross: bool = True
+    speeds: int = 100,
+    cells: tuple[int, int] = (120, 8),
+    ross: bool = True,
+    stage_cells: tuple[int, int] = (60, 4),
 ) -> Iterator[Figure]:
     """A gear unit on oil films through its speeds; coefficients of a bearing here and by ROSS.
 
@@ -333,6 +337,7 @@ def transmission(
         speeds: of the pinion, 500 to 6000 rpm, each with the motion that repeats with the mesh.
         cells: of each film.
         ross: compare with ROSS, which is installed from the package index.
+        stage_cells: of each film of the two stages.
     """
     from benchmarks.peers.films import (
         coefficients_compared,
@@ -344,7 +349,7 @@ def transmission(
     for rows in (speeds_run_through, programs_compared):
         for row in rows(speeds, cells):
             yield Figure("transmission", *row)
-    for row in stages_run():
+    for row in stages_run(stage_cells):
         yield Figure("transmission", *row)
     if ross:
         for row in coefficients_compared():

@@ -107,22 +107,8 @@ def slider_crank(rod: Any = None) -> Any:
     return mech
 
 
-def chain_of(link: Any, n: int) -> Any:
-    """So many links in a row along x, hinged about z to each other and to the ground."""
-    from rom.mbs.mechanism import Mechanism
-
-    mech = Mechanism(gravity=(0, -9.81, 0))
-    step = link.marker("tip").point - link.marker("root").point
-    before = mech.ground.marker((0.0, 0.0, 0.0))
-    for k in range(n):
-        part = mech.add_flexible(f"link {k}", link, at=k * step - link.marker("root").point)
-        mech.revolute(f"pin {k}", before, part.marker("root"), axis=(0, 0, 1))
-        before = part.marker("tip")
-    return mech
-
-
 def rigid_chain(n: int) -> Any:
-    """So many rigid links of half a metre in a row along x, hinged as those of `chain_of`."""
+    """So many rigid links of half a metre in a row along x, hinged about z."""
     from rom.mbs.mechanism import Mechanism
 
     mech, ends = Mechanism(gravity=(0, -9.81, 0)), {"a": (-0.25, 0, 0), "b": (0.25, 0, 0)}

@@ -62,6 +62,7 @@ def test_a_rod_spins_up_as_the_exact_beam_does():
     assert errors[1] < 1e-2 and 3 < errors[0] / errors[1] < 5
 
 
+@pytest.mark.long
 @pytest.mark.fenicsx
 @pytest.mark.filterwarnings("ignore:Number of integration points")
 def test_the_bar_of_a_few_cells_is_measured():

@@ -28,7 +28,7 @@ BooleanUnion(3) = { Volume{1}; Delete; }{ Volume{2}; Delete; };
 Physical Volume("body", 1) = {3};
 Physical Surface("root", 11) = Surface In BoundingBox{-1e-5, -1, -1, 1e-5, 1, 1};
 Physical Surface("tip", 12) = Surface In BoundingBox{0.3, 0.24999, -1, 1, 0.25001, 1};
-Mesh.MeshSizeMin = 0.02; Mesh.MeshSizeMax = 0.02;
+Mesh.MeshSizeMin = 0.03; Mesh.MeshSizeMax = 0.03;
 """
 ALUMINIUM = rom.Material(E=70e9, nu=0.33, rho=2700.0)
 FORCE = np.array([0.0, 300.0, -400.0])  # the tip moves by a fifth of the length [N]

@@ -89,7 +89,7 @@ def test_a_guided_leaf_hardens_and_comes_back_as_its_elastica_says(leaf):
 
 
 class Change(ast.NodeTransformer):
-    """Changes one place: a factor is multiplied, or an index takes the place of its neighbour."""
+    """Changes one place: a factor is doubled or trebled, or an index becomes its neighbour."""
 
     def __init__(self, which, times):
         self.left, self.times, self.inside = which, times, 0
@@ -105,7 +105,7 @@ class Change(ast.NodeTransformer):
         return node if getattr(node.func, "id", "") == "entries" else self.generic_visit(node)
 
     def visit_Name(self, node):
-        if self.inside and node.id in "ijkl" and self._here():
+        if self.inside and node.id in "ijkl" and self.times == 2 and self._here():
             node.id = "ijkli"["ijkl".index(node.id) + 1]
         return node
 

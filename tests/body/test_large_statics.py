@@ -6,6 +6,7 @@ from numpy.testing import assert_allclose
 from scipy.linalg import eigh, null_space
 
 import rom
+from cases.long import few
 from cases.mbs.slender import SYMMETRIC, Full, assembled, reduced, slender
 from rom.errors import ConfigError, InterfaceError, ModelError
 
@@ -85,7 +86,7 @@ def test_a_column_buckles_at_eulers_load():
     assert_allclose(found, 1 / share, rtol=2e-3)
 
 
-@pytest.mark.parametrize("nu, rtol", [(0.0, 5e-3), (0.3, 3e-3)])
+@pytest.mark.parametrize("nu, rtol", few(1, [(0.3, 3e-3), (0.0, 5e-3)]))
 def test_a_cantilever_bends_in_space_as_finite_elements_do(nu, rtol):
     """Force along all axes and a twist at once, to a slope of half a radian."""
     model, EI = slender(50, 12, nu)

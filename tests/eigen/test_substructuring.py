@@ -10,6 +10,7 @@ from scipy.sparse import block_diag, csr_matrix, diags, random
 
 import rom
 from benchmarks.models import bar
+from cases.long import few
 from rom.eigen import dissection, fronts, substructuring
 from rom.eigen.scipy import SciPyOperators
 from rom.eigen.substructuring import lehmann_bounds, substructured_modes
@@ -69,7 +70,7 @@ def certain(K, M, rigid, f_max, **more):
     return found
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", few(6, range(12)))
 def test_bodies_of_any_size_keep_their_bounds(seed):
     rng = np.random.default_rng(seed)
     cells = tuple(rng.integers(1, [7, 3, 3], endpoint=True))
@@ -80,7 +81,7 @@ def test_bodies_of_any_size_keep_their_bounds(seed):
     certain(K, M, rigid, f_max, tol=10.0 ** rng.uniform(-5, -1))
 
 
-@pytest.mark.parametrize("ratio", [2.5, 4.0, 25.0])
+@pytest.mark.parametrize("ratio", few(1, [4.0, 2.5, 25.0]))
 def test_bounds_hold_for_any_cutoff(monkeypatch, ratio):
     """The cut-off decides what is found after how many steps, and never what is true."""
     monkeypatch.setattr(substructuring, "CUTOFF_RATIOS", (ratio, 36.0))

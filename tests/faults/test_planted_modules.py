@@ -193,7 +193,7 @@ STARTERS = {
 }
 
 
-@pytest.mark.parametrize("function", few(4, STARTERS))
+@pytest.mark.parametrize("function", few(3, STARTERS))
 def test_no_function_that_starts_a_process_runs_what_lies_in_the_folder(function, planted):
     """Whether it succeeds on this machine is not asked."""
     if function == "mesh" and not HAS_FE:

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 import rom
-from cases.long import ROM_LONG
+from cases.long import few
 from cases.paths import RANKS, ROOT
 from cases.ranks.environment import ENVIRONMENT
 from rom.errors import ResourceError
@@ -29,7 +29,6 @@ SHAPES = {  # length, width, height, size of elements [m]
     "large block": (1.0, 1.0, 1.0, 0.08),
     "large rod": (16.0, 0.3, 0.2, 0.06),
 }
-TRIED = list(SHAPES) if ROM_LONG else ["plate", "rod"]
 GIB = 2.0**30
 DISK_BYTES = 100_000_000  # of one on which a factor is tried that takes a fifth
 
@@ -78,8 +77,8 @@ def taken_and_foreseen(shape, solver):
 @pytest.mark.parametrize(
     ("shape", "solver"),
     [
-        *((shape, "direct") for shape in TRIED),
-        *(pytest.param(s, "iterative", marks=pytest.mark.long) for s in ("plate", "rod")),
+        *few(1, [(shape, "direct") for shape in SHAPES]),
+        *few(0, [("plate", "iterative"), ("rod", "iterative")]),
     ],
 )
 def test_a_reduction_takes_the_memory_foreseen(shape, solver):

@@ -1,6 +1,8 @@
-"""Every demo runs and ends in numbers that agree with what is known."""
+"""Every demo runs and ends in numbers that agree with what is known, on two processes too."""
 
+import json
 import runpy
+import subprocess
 import sys
 
 import pytest
@@ -9,8 +11,11 @@ pytest.importorskip("dolfinx", reason="demos start from finite elements")
 pytest.importorskip("matplotlib", reason="pictures need matplotlib")
 
 from cases.figures.pictures import faults
-from cases.files.demos import DEMOS, LONG_DEMOS, check
+from cases.files.demos import DEMOS, LONG_DEMOS, MESHED, check
 from cases.long import ROM_LONG
+from cases.paths import RANKS
+from cases.ranks.environment import ENVIRONMENT
+from rom.process.mpirun import mpirun
 from rom.view.canvas.picture import Picture
 
 pytestmark = [pytest.mark.fenicsx, pytest.mark.slow]
@@ -35,3 +40,21 @@ def test_demo_ends_in_the_numbers_expected(demo, tmp_path, monkeypatch):
 def test_what_is_left_to_make_long_exists():
     """A name that is none would let a demo run twice, or hide that all are left."""
     assert {demo.stem for demo in DEMOS} > LONG_DEMOS
+
+
+@pytest.mark.long
+@pytest.mark.mpi
+@pytest.mark.timeout(1800)  # another test file may run on the same two cores
+@pytest.mark.parametrize("demo", MESHED, ids=lambda path: path.stem)
+def test_demo_runs_unchanged_on_two_processes(demo, tmp_path):
+    out, file = tmp_path / "out", tmp_path / "results.json"
+    done = subprocess.run(
+        [*mpirun(2), sys.executable, str(RANKS / "demo_under_mpi.py"),
+         str(file), str(demo), "--quiet", "--out", str(out)],
+        env=ENVIRONMENT, capture_output=True, text=True, timeout=1740, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    results = json.loads(file.read_text())
+    said = [line.rpartition(": ")[0] for line in done.stdout.splitlines()]
+    assert [said.count(name) for name in results] == [1] * len(results)
+    check(demo, results, out)

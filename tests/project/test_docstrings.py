@@ -31,7 +31,6 @@ from cases.files.docstrings import (
     raises_in,
 )
 from cases.paths import ROOT
-from rom.errors import ConfigError
 
 pytestmark = pytest.mark.once
 
@@ -173,24 +172,6 @@ def test_lists_of_exceptions_are_up_to_date():
 # --- examples of what is found ---
 
 
-def full(stiffness: float, x: rom.model.Array) -> rom.model.Array:
-    """Force of a spring.
-
-    Args:
-        stiffness: of the spring [N/m].
-        x: (n,) elongations [m].
-
-    Returns:
-        (n,) forces [N].
-
-    Raises:
-        ConfigError: without elongations.
-    """
-    if not x.size:
-        raise ConfigError("no elongations.")
-    return stiffness * x
-
-
 def bare(stiffness: float, x: rom.model.Array) -> rom.model.Array:
     """Force [N] of a spring.
 
@@ -198,11 +179,7 @@ def bare(stiffness: float, x: rom.model.Array) -> rom.model.Array:
         stiffness: of the spring.
         x: elongations [from rest].
     """
-    try:
-        full(stiffness, x)
-    except ConfigError:
-        return x
-    return full(stiffness, x)
+    return stiffness * x
 
 
 def short(a: rom.model.Array, b: rom.model.Array, c: rom.model.Array) -> rom.model.Array:
@@ -211,8 +188,7 @@ def short(a: rom.model.Array, b: rom.model.Array, c: rom.model.Array) -> rom.mod
 
 
 def test_the_measures_see_what_is_not_said():
-    one, two, three = (of_function(f.__name__, f) for f in (full, bare, short))
-    assert without_units(one) == without_shapes(one) == []
+    two, three = (of_function(f.__name__, f) for f in (bare, short))
     assert without_units(two) == ["stiffness", "x"] and without_shapes(two) == ["x", "result"]
     assert without_units(three) == without_shapes(three) == ["a", "b", "c", "result"]
     assert not UNITS.search("from 0 to 1 [a, b] [0, 1]") and UNITS.search("[N m/rad, 1/s^2]")

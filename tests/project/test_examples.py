@@ -18,19 +18,6 @@ from cases.solid import block
 pytestmark = pytest.mark.once
 
 MANY = 5  # calls of a name of rom in demos and pages, from which on it has an example
-USED_METHODS = {  # which the same count cannot tell from others of the same name
-    "rom.body.flexible.FlexibleBody": ("frequencies", "marker", "with_reference"),
-    "rom.mbs.mechanism.Mechanism": ("add_rigid", "add_flexible", "revolute", "fixed"),
-    "rom.mbs.parts.bodies.Part": ("marker",),
-    "rom.mbs.results.solution.Solution": ("position", "reaction"),
-    "rom.model.Basis": ("project",),
-    "rom.model.FEModel": ("mass",),
-}
-USED_FUNCTIONS = {
-    "rom.fe.model", "rom.io.export.export", "rom.io.family.save",
-    "rom.reduction.bases.fixed_interface.craig_bampton", "rom.view.figures.panels.Panel",
-    "rom.reduction.full_model.mass_properties",
-}  # fmt: skip
 MAX_LINES = 7
 
 
@@ -104,8 +91,7 @@ def run(name, beam, folder, monkeypatch):
 def test_what_is_used_most_has_an_example():
     calls = re.findall(r"\brom\.([A-Za-z]\w+)\(", pages_and_demos())
     used = {f"{rom.MODULES[name]}.{name}" for name in rom.__all__ if calls.count(name) >= MANY}
-    used |= {f"{owner}.{name}" for owner, names in USED_METHODS.items() for name in names}
-    used = {name.replace("rom.material.", "rom.model.") for name in used | USED_FUNCTIONS}
+    used = {name.replace("rom.material.", "rom.model.") for name in used}
     assert used <= set(EXAMPLES), sorted(used - set(EXAMPLES))
     assert len(EXAMPLES) >= 30
     assert max(len(text.strip().splitlines()) for text in EXAMPLES.values()) <= MAX_LINES

@@ -2,8 +2,12 @@
 
 import ast
 import os
+import re
 import subprocess
 import sys
+import tomllib
+from functools import cache
+from pathlib import Path
 
 import pytest
 
@@ -13,42 +17,22 @@ pytestmark = pytest.mark.once
 
 HEAVY = {"dolfinx", "ufl", "basix", "ffcx", "petsc4py", "slepc4py", "mpi4py", "gmsh", "meshio"}
 DRAWING = {"pyvista", "vtk", "vtkmodules", "matplotlib"}
-LIGHT = {"assembly", "body", "cyclic", "eigen", "errors", "io", "mbs", "model", "parametric",
-         "paths", "reduction", "rotation", "units"}  # fmt: skip
 ANYTHING = {"__init__", "__main__", "cli", "doctor"}  # they stand in front
-# what every part stands on, none of it above another
-GROUND = {*"arguments lazy names places plausible process readable".split()}
-MAY_IMPORT = {  # module or package below rom/ -> what it may import from rom beside GROUND
-    **{part: {"places", "errors", "model", "rotation"} for part in GROUND},
-    "arguments": {"places", "errors", "model", "rotation", "plausible"},  # numbers are doubted
-    "errors": set(),
-    "notebook": set(),
-    "model": {"errors", "material", "notebook"},
-    "decks": {"model", "errors"},
-    "units": {"errors"},
-    "rotation": {"errors"},
-    "paths": {"model", "errors"},
-    "eigen": {"model", "errors"},
-    "reduction": {"model", "rows", "eigen", "errors"},
-    "cyclic": {"model", "rows", "eigen", "rotation", "reduction", "errors"},
-    "body": {"model", "eigen", "rotation", "notebook", "paths", "units", "errors"},
-    "assembly": {"model", "rows", "eigen", "body", "reduction", "rotation", "errors"},
-    "mbs": {"model", "rotation", "io", "notebook", "paths", "errors"},
-    "io": {"model", "units", "body", "parametric", "updating", "errors", "decks"},
-    "checks": {"model", "rows", "eigen", "body", "reduction", "errors"},
-    "workflow": LIGHT | {"checks"},
-    "prestress": {"model", "rows", "eigen", "rotation", "cyclic", "reduction", "errors"},
-    "parametric": LIGHT | {"checks", "rows", "workflow"},
-    "updating": {*"model rows body eigen assembly parametric reduction rotation errors".split()},
-    "fe": {"model", "eigen", "units", "errors", "decks"},
-    "components": LIGHT | {"updating"},
-    "view": {"model", "mbs", "rotation", "io", "errors"},
-    "fmu": {"model", "mbs", "rotation", "body", "io", "errors"},
-    "config": LIGHT | {"checks", "fe", "fmu", "workflow"},
-    "report": LIGHT | {"checks", "config", "view"},
-    "material": {"errors", "units"},
-    "rows": {"model"},
-}
+GROUND = (
+    "errors notebook rotation places lazy names readable process arguments units plausible material"
+).split()
+# parts that know, of all that lies below them, the ground and these alone: what moves, say, are
+# arrays, whoever has made them
+ALONE = {
+    part: {part, *names.split(), *GROUND}
+    for part, names in {
+        "model": "", "eigen": "model", "reduction": "model rows eigen", "body": "model eigen paths",
+        "fe": "model eigen decks", "io": "model body parametric updating decks",
+        "mbs": "model io paths", "view": "model mbs io", "fmu": "model mbs body io",
+        "updating": "model rows body eigen assembly parametric reduction",
+        "prestress": "model rows eigen cyclic reduction",
+    }.items()
+}  # fmt: skip
 # inside each folder that has folders, what lies lower stands first; a file imports its own folder
 # or a lower one
 ORDER = {
@@ -103,24 +87,29 @@ ORDER = {
         "view": "canvas figures scenes",
     }.items()
 }
-MODULES = sorted((ROOT / "rom").rglob("*.py"))
+MODULES, TESTS = sorted((ROOT / "rom").rglob("*.py")), ROOT / "tests"
+
+
+@cache
+def imports(path):
+    """(line, module, name) of every import in a file, functions included; None for a module."""
+    found = []
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            found += ((node.lineno, alias.name, None) for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path}:{node.lineno}: write absolute imports"
+            found += ((node.lineno, node.module, alias.name) for alias in node.names)
+    return found
+
+
+def whole(module, name):
+    """Dotted, of modules also where a package is named first."""
+    return module if name is None else f"{module}.{name}"
 
 
 def part_of(path):
     return path.relative_to(ROOT / "rom").with_suffix("").parts[0]
-
-
-def imports(path):
-    """(line, module) of every import in a file, functions included."""
-    for node in ast.walk(ast.parse(path.read_text())):
-        if isinstance(node, ast.Import):
-            yield from ((node.lineno, alias.name) for alias in node.names)
-        elif isinstance(node, ast.ImportFrom):
-            assert node.level == 0, f"{path}:{node.lineno}: write absolute imports"
-            if node.module == "rom":
-                yield from ((node.lineno, f"rom.{alias.name}") for alias in node.names)
-            else:
-                yield node.lineno, node.module
 
 
 def wrong(part, name):
@@ -134,21 +123,25 @@ def wrong(part, name):
     if package == "rom" and part not in ANYTHING and target != part:
         if not target:
             return "the package root"
-        ground = GROUND - {part} if part not in {"errors", "notebook", *GROUND} else set()
-        if target not in MAY_IMPORT[part] | ground:
+        if target not in ALONE.get(part, {target}) or (target == "fe" and part != "config"):
             return f"rom.{target}"
     return None
 
 
-@pytest.mark.parametrize("path", MODULES, ids=lambda p: str(p.relative_to(ROOT)))
-def test_imports_follow_the_layers(path):
-    found = [(line, wrong(part_of(path), name)) for line, name in imports(path)]
-    bad = [f"{path.name}:{line} imports {what}" for line, what in found if what]
+def remarks(judge):
+    """What is said against the imports of all files, by (path, module, name)."""
+    said = ((path, line, judge(path, module, name)) for path in MODULES
+            for line, module, name in imports(path))  # fmt: skip
+    return [f"{path.relative_to(ROOT)}:{line} {what}" for path, line, what in said if what]
+
+
+def test_imports_follow_the_layers():
+    bad = remarks(
+        lambda path, module, name: wrong(
+            part_of(path), whole(module, name) if module == "rom" else module
+        )
+    )
     assert not bad, "\n".join(bad)
-
-
-def test_every_part_has_a_place_in_the_layers():
-    assert {part_of(path) for path in MODULES} <= set(MAY_IMPORT) | ANYTHING
 
 
 def level_of(parts):
@@ -171,20 +164,9 @@ def upward(path, name, order):
     return None
 
 
-def whole_imports(path):
-    """(line, module) of every import, of modules also where a package is named first."""
-    for node in ast.walk(ast.parse(path.read_text())):
-        if isinstance(node, ast.Import):
-            yield from ((node.lineno, alias.name) for alias in node.names)
-        elif isinstance(node, ast.ImportFrom):
-            yield from ((node.lineno, f"{node.module}.{alias.name}") for alias in node.names)
-
-
-@pytest.mark.parametrize("path", MODULES, ids=lambda p: str(p.relative_to(ROOT)))
-def test_no_file_imports_from_a_higher_room(path):
+def test_no_file_imports_from_a_higher_room():
     """At every level, also inside functions and where only types are meant."""
-    found = [(line, upward(path, name, ORDER)) for line, name in whole_imports(path)]
-    bad = [f"{path.name}:{line} {what}" for line, what in found if what]
+    bad = remarks(lambda path, module, name: upward(path, whole(module, name), ORDER))
     assert not bad, "\n".join(bad)
 
 
@@ -198,22 +180,20 @@ def test_every_room_has_its_place_in_the_order():
             assert inside | folders == set(ORDER[level]), level or "rom"
 
 
-@pytest.mark.parametrize("level", ORDER)
-def test_an_upward_import_is_found_on_each_level(level):
-    low, high = ORDER[level][0], ORDER[level][-1]
-    start = ".".join(("rom", *filter(None, [level])))
-    folder = ROOT.joinpath(*start.split("."))
-    file = folder / low / "x.py" if (folder / low).is_dir() else folder / f"{low}.py"
-    assert upward(file, f"{start}.{high}.y", ORDER)
-    assert not upward(folder / f"{high}.py", f"{start}.{low}", ORDER)
+def test_an_upward_import_is_found_on_each_level():
+    for level, places in ORDER.items():
+        start = ".".join(("rom", *filter(None, [level])))
+        folder, low, high = ROOT.joinpath(*start.split(".")), places[0], places[-1]
+        file = folder / low / "x.py" if (folder / low).is_dir() else folder / f"{low}.py"
+        assert upward(file, f"{start}.{high}.y", ORDER)
+        assert not upward(folder / f"{high}.py", f"{start}.{low}", ORDER)
 
 
 def test_components_do_not_know_who_uses_them():
     """They could leave as a package of their own; the doctor compiles them ahead."""
-    for path in MODULES:
-        if part_of(path) not in ("components", "doctor"):
-            bad = [name for _, name in imports(path) if name.startswith("rom.components")]
-            assert not bad, f"{path}: {bad}"
+    outside = [path for path in MODULES if part_of(path) not in ("components", "doctor")]
+    assert not [path for path in outside for _, module, name in imports(path)
+                if whole(module, name).startswith("rom.components")]  # fmt: skip
 
 
 def circles(modules, package=ROOT / "rom"):
@@ -221,7 +201,10 @@ def circles(modules, package=ROOT / "rom"):
     parts = {path: path.relative_to(package.parent).with_suffix("").parts for path in modules}
     names = {level_of(p[:-1] if p[-1] == "__init__" else p): path for path, p in parts.items()}
     reach = {
-        name: {one if one in names else one.rpartition(".")[0] for _, one in whole_imports(path)}
+        name: {
+            one if one in names else one.rpartition(".")[0]
+            for one in (whole(*found) for _, *found in imports(path))
+        }
         for name, path in names.items()
     }
     reach = {name: near & names.keys() for name, near in reach.items()}
@@ -236,39 +219,44 @@ def test_no_files_go_round_in_circles():
     assert not [" ".join(sorted(one)) for one in circles(MODULES)]
 
 
-PLANTED = {  # files of a package, and those of them that go round
-    "in functions": ({"a": "from rom import b", "b": "import rom.c", "d": "import rom.a",
-                      "c": "def f():\n    from rom.a import x"}, {"rom.a", "rom.b", "rom.c"}),
-    "through a front": ({"p/__init__": "from rom.p.a import x", "p/a": "import rom.b",
-                         "b": "from rom.p import x"}, {"rom.p", "rom.p.a", "rom.b"}),
-    "none": ({"p/__init__": "from rom.p.a import x", "p/a": "from rom.p import b",
-              "p/b": "import numpy"}, None),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("case", PLANTED)
-def test_a_circle_of_imports_is_found(case, tmp_path):
-    files, round_and_round = PLANTED[case]
+def test_a_circle_of_imports_is_found(tmp_path):
+    """In functions, and through a front."""
+    files = {"a": "from rom import b", "b": "import rom.c", "d": "import rom.a",
+             "c": "def f():\n    from rom.a import x", "e": "from rom.p import x",
+             "p/__init__": "from rom.p.q import x", "p/q": "import rom.e"}  # fmt: skip
     package = tmp_path / "rom"
     (package / "p").mkdir(parents=True)
     for name, text in files.items():
         (package / f"{name}.py").write_text(text)
     found = circles(sorted(package.rglob("*.py")), package)
-    assert found == ({frozenset(round_and_round)} if round_and_round else set())
+    assert found == {
+        frozenset({"rom.a", "rom.b", "rom.c"}), frozenset({"rom.p", "rom.p.q", "rom.e"})
+    }  # fmt: skip
+
+
+PRIVATE = re.compile(r"\bnumba\.(core|np|_\w+)\b|\bllvmlite\b|\.overloads\b|\bcall_conv\b")
+
+
+def test_what_is_private_to_numba_is_touched_in_one_folder_which_knows_the_newest_version():
+    """Its front says what to do when Numba moves."""
+    found = {path.parent for path in MODULES if PRIVATE.search(path.read_text())}
+    assert found == {ROOT / "rom" / "mbs" / "compiler"}
+    newest = re.search(r"^numba==0\.(\d+)", (ROOT / ".ci" / "light.txt").read_text(), re.M)
+    bound = f'<0.{int(newest.group(1)) + 1}"'
+    assert re.search(f'"numba>=[\\d.]+,{bound}', (ROOT / "pyproject.toml").read_text())
 
 
 def test_folders_hold_no_more_than_one_can_look_over():
-    for folder in {path.parent for path in MODULES}:
+    assert [path.name for path in TESTS.glob("*.py")] == ["conftest.py"]
+    for folder in {path.parent for path in (*MODULES, *TESTS.rglob("*.py"))}:
         assert len([p for p in folder.glob("*.py") if p.name != "__init__.py"]) <= 15, folder
 
 
-@pytest.mark.parametrize(
-    ("part", "name"),
-    [("io", "rom.fe.mesh"), ("mbs", "rom.body.flexible"), ("model", "rom"), ("fe", "rom.workflow"),
-     ("cli", "dolfinx"), ("io", "meshio"), ("mbs", "matplotlib.pyplot")],
-)  # fmt: skip
-def test_the_rules_forbid_something(part, name):
-    assert wrong(part, name)
+def test_the_rules_forbid_something():
+    for part, name in {"io": "rom.fe.mesh", "mbs": "rom.body.flexible", "model": "rom",
+                       "fe": "rom.workflow", "cli": "dolfinx", "view": "meshio",
+                       "config": "matplotlib.pyplot"}.items():  # fmt: skip
+        assert wrong(part, name), (part, name)
 
 
 def run_blocked(code, *, blocked):
@@ -281,48 +269,59 @@ def run_blocked(code, *, blocked):
     )  # fmt: skip
 
 
-def test_the_front_door_opens_without_fenicsx_and_pictures():
-    """Every public name resolves where only NumPy, SciPy and Numba are installed."""
-    code = "import rom\nfor name in rom.__all__: getattr(rom, name)"
-    done = run_blocked(code, blocked=HEAVY | DRAWING)
+@pytest.mark.parametrize(
+    ("code", "blocked"),
+    [("import rom\nfor name in rom.__all__: getattr(rom, name)", HEAVY | DRAWING),
+     ("import rom.fe.mesh.validate, rom.fe.mesh, rom.fe.mesh.summary", HEAVY)],
+    ids=["the front door", "checks of meshes"],
+)  # fmt: skip
+def test_what_needs_no_fenicsx_opens_without(code, blocked):
+    """Where only NumPy, SciPy and Numba are installed."""
+    done = run_blocked(code, blocked=blocked)
     assert done.returncode == 0, done.stderr
 
 
-def test_importing_rom_loads_nothing_heavy():
-    """Start-up time: the command line imports rom before it knows what it is asked."""
-    code = f"import rom; print(sorted(({HEAVY | DRAWING!r} | {{'numba'}}) & set(sys.modules)))"
-    done = run_blocked(code, blocked=())
-    assert done.stdout.strip() == "[]", done.stderr
-
-
 def test_fronts_load_nothing_but_fronts():
-    """Neither NumPy nor a module behind them, so that a name costs what stands behind that name."""
+    """Start-up time: neither NumPy nor a module behind them, so that a name costs what it needs."""
     stubs = (path.parent.relative_to(ROOT).parts for path in (ROOT / "rom").rglob("__init__.pyi"))
     fronts = [".".join(parts) for parts in stubs if "fe" not in parts]
     done = run_blocked(f"import sys, {', '.join(fronts)}; print(*sys.modules)", blocked=())
     loaded = set(done.stdout.split())
     own = {name for name in loaded if name.split(".")[0] == "rom"}
     assert own == {*fronts, "rom.lazy", "rom.process", "rom.process.launcher"}, done.stderr
-    assert not {"numpy", "scipy", "numba"} & loaded
-
-
-def test_the_mesh_checks_run_without_gmsh_and_dolfinx():
-    done = run_blocked(
-        "import rom.fe.mesh.validate, rom.fe.mesh, rom.fe.mesh.summary", blocked=HEAVY
-    )
-    assert done.returncode == 0, done.stderr
-
-
-TESTS = ROOT / "tests"
+    assert not (HEAVY | DRAWING | {"numpy", "scipy", "numba"}) & loaded
 
 
 def test_tests_share_what_lies_in_cases_and_nothing_else():
     for path in TESTS.rglob("*.py"):
-        for name in {name.split(".")[0] for _, name in imports(path)}:
+        for name in {module.split(".")[0] for _, module, _ in imports(path)}:
             assert not name.startswith("test_"), f"{path}: {name} is a file of tests"
 
 
-def test_folders_of_tests_are_as_easy_to_look_over_as_those_of_the_package():
-    assert [path.name for path in TESTS.glob("*.py")] == ["conftest.py"]
-    for folder in {path.parent for path in TESTS.rglob("*.py")}:
-        assert len([p for p in folder.glob("*.py") if p.name != "__init__.py"]) <= 15, folder
+# Lines of Python per folder only fall: a number of `lines.toml` is raised with a reason beside it.
+LIMITS = tomllib.loads(Path(__file__).with_name("lines.toml").read_text())
+DEEPER = ("rom", "rom/components", "rom/mbs")  # told folder by folder
+
+
+def lines(place):
+    """Of all files below a folder, or of those that a pattern names."""
+    found = ROOT.glob(place) if "*" in place else (ROOT / place).rglob("*.py")
+    return sum(len(path.read_bytes().splitlines()) for path in found)
+
+
+def folders():
+    """The places that have a number: the sums, folders, and files that lie in none of these."""
+    inside = {p for d in DEEPER for p in (ROOT / d).iterdir() if any(p.rglob("*.py"))}
+    named = {p.relative_to(ROOT).as_posix() for p in inside if p.is_dir()}
+    return {"tests", "rom"} | {f"{d}/*.py" for d in DEEPER} | (named - set(DEEPER))
+
+
+def test_no_folder_grows_beyond_its_lines():
+    assert set(LIMITS) == folders()
+    grown = {place: lines(place) for place in LIMITS if lines(place) > LIMITS[place]}
+    assert not grown, f"more lines than in lines.toml: {grown}"
+
+
+def test_lines_of_all_folders_are_counted():
+    parts = [place for place in LIMITS if place not in ("tests", "rom")]
+    assert sum(map(lines, parts)) == lines("rom") > 10_000 and lines("rom/*.py") > 1000

@@ -144,9 +144,10 @@ def test_the_command_comes_with_the_wheel(installed, tmp_path):
 def test_versions_agree_everywhere():
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     citation = (ROOT / "CITATION.cff").read_text()
-    newest = re.search(r"^## (\d+\.\d+\.\d+)", (ROOT / "CHANGELOG.md").read_text(), re.M).group(1)
-    cited = re.search(r"^version: (.+)$", citation, re.M).group(1)
-    assert project["version"] == cited == newest == rom.__version__
+    changes = (ROOT / "CHANGELOG.md").read_text()
+    newest, day = re.search(r"^## (\d+\.\d+\.\d+), (\d{4}-\d\d-\d\d)$", changes, re.M).groups()
+    assert f"\nversion: {newest}\ndate-released: {day}\n" in citation
+    assert project["version"] == newest == rom.__version__
     assert f"license: {project['license']['text']}" in citation
 
 

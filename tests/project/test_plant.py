@@ -28,19 +28,15 @@ compiled_law(law)
 """
 
 
-def test_it_finds_signs_and_factors_of_compiled_functions_alone():
-    found = [[ast.unparse(node) for node in nodes] for nodes in plant.places(SOURCE)]
+def test_it_plants_one_sign_or_factor_of_compiled_functions_alone():
+    signs, factors = plant.places(SOURCE)
+    found = [[ast.unparse(node) for node in nodes] for nodes in (signs, factors)]
     assert found == [
         ["out[k + 1] += 2.0 * x - x[k - 1] / 3.0", "2.0 * x - x[k - 1] / 3.0", "x - 0.5"],
         ["2.0 * x", "x[k - 1] / 3.0"],
     ]
-
-
-def test_it_plants_one_thing():
-    signs, factors = plant.places(SOURCE)
     changed = [plant.planted(SOURCE, node) for node in (*signs[:2], *factors)]
-    lines = [text.splitlines()[3].strip() for text in changed]
-    assert lines == [
+    assert [text.splitlines()[3].strip() for text in changed] == [
         "out[k + 1] -= (2.0 * x - x[k - 1] / 3.0)",
         "out[k + 1] += ((2.0 * x) + (x[k - 1] / 3.0))",
         "out[k + 1] += (2.0 * (2.0 * x)) - x[k - 1] / 3.0",

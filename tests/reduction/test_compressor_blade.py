@@ -236,6 +236,7 @@ def worst_seated(dense, W):
     return np.abs(np.sqrt(lam / exact) - 1).max()
 
 
+@pytest.mark.long
 def test_polynomials_of_the_comparison_are_those_of_dense_matrices(compared, dense):
     for order in (1, 3):
         found = [interface_functions(Polynomial(order), compared["alone"].interfaces[name])
@@ -246,6 +247,7 @@ def test_polynomials_of_the_comparison_are_those_of_dense_matrices(compared, den
         assert row["seated"] == pytest.approx(worst_seated(dense, W), rel=1e-5)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("n", [12, 24, 60])
 @pytest.mark.parametrize("level", ["system", "local", "alone"])
 def test_characteristic_modes_of_the_comparison_are_those_of_dense_matrices(
@@ -266,6 +268,7 @@ def test_characteristic_modes_of_the_comparison_are_those_of_dense_matrices(
     assert row["seated"] == pytest.approx(worst_seated(dense, np.hstack([rigid, chi])), rel=1e-4)
 
 
+@pytest.mark.long
 def test_the_comparison_puts_the_kinds_of_flanks_in_their_order(compared):
     """What knows more of blade and bed needs fewer functions; polynomials need fewest solutions."""
     table = {label: row["seated"] for label, row in compared["table"].items()}

@@ -282,6 +282,7 @@ def test_a_body_beside_one_that_it_does_not_touch_is_tracked_as_alone(families):
         assert_allclose(getattr(b, name) / scale, getattr(a, name) / scale, atol=1e-8)
 
 
+@pytest.mark.long  # that of a family is tried in test_parameter_tracking.py
 def test_the_fmu_of_an_assembly_follows_as_python_does(bolted, tmp_path):
     """Bolts and the modulus of one body; names of parameters carry that of the body."""
     fmus = importlib.import_module("cases.mbs.fmu_instance")  # skips where fmpy is not installed

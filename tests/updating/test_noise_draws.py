@@ -9,6 +9,7 @@ from numpy.testing import assert_allclose
 from scipy.stats import binom, chi2, kstest, norm, truncnorm
 
 import rom
+from cases.long import few
 from cases.solid import STEEL, composite
 from rom.errors import ConfigError
 from rom.updating import Channels, Responses
@@ -89,15 +90,15 @@ ESTIMATORS = ("H1", "H2", "Hv")
 
 @pytest.mark.parametrize(
     ("name", "on_force", "on_response", "known"),
-    [
-        ("H1", 0.0, 0.1, KNOWN),
+    few(3, [
         ("H1", 0.1, 0.03, {}),
         ("H2", 0.03, 0.1, {}),
-        ("Hv", 0.01, 0.01, {}),
         ("Hv", 0.1, 0.1, {}),
+        ("H1", 0.0, 0.1, KNOWN),
+        ("Hv", 0.01, 0.01, {}),
         ("Hv", 0.1, 0.03, {}),
-    ],
-)
+    ]),
+)  # fmt: skip
 def test_parameters_lie_inside_two_deviations_as_often_as_they_must(
     drawn, name, on_force, on_response, known
 ):
@@ -130,8 +131,9 @@ def test_a_thousand_draws_lie_inside_two_deviations_as_often_as_they_must(
 
 @pytest.mark.parametrize(
     ("name", "on_force", "on_response", "bias"),
-    [("H1", 0.1, 0.1, 1.01), ("H2", 0.1, 0.1, 1 / 1.01), ("Hv", 0.2, 0.05, np.sqrt(1.04 / 1.0025))],
-)
+    few(1, [("Hv", 0.2, 0.05, np.sqrt(1.04 / 1.0025)), ("H1", 0.1, 0.1, 1.01),
+            ("H2", 0.1, 0.1, 1 / 1.01)]),
+)  # fmt: skip
 def test_an_estimator_taken_for_unbiased_is_wrong_by_its_bias(
     drawn, name, on_force, on_response, bias
 ):

@@ -3,10 +3,8 @@
 from typing import Any, NamedTuple
 
 import numba
-from numba.core.ccallback import CFunc
-from numba.core.sigutils import normalize_signature
 
-from rom.mbs.compiler.cache import guard
+from rom.mbs.compiler.calls import c_function
 from rom.mbs.compiler.intermediate import INTERMEDIATE_OPTIONS
 from rom.mbs.kernels.compiled import OPTIONS
 from rom.mbs.parts.foreign import compiled_function
@@ -140,8 +138,4 @@ def compiled_entry(function: Any, types: str) -> Any:
         types: of its arguments, as ``numba.cfunc`` takes them.
     """
     options = {name: value for name, value in OPTIONS.items() if name != "cache"} | {"_nrt": True}
-    made = CFunc(function, normalize_signature(types), {}, options)
-    made.enable_caching()
-    guard(made, function)
-    made.compile()
-    return made
+    return c_function(function, types, options)

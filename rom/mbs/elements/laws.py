@@ -32,11 +32,12 @@ from numba.extending import intrinsic
 
 from rom.arguments import finite, shortened
 from rom.errors import ConfigError
+from rom.mbs.compiler.calls import called
 from rom.mbs.elements.family import Family, Places, integers, starts
 from rom.mbs.elements.law_calls import DIFFERENCE_STEP, ENERGY_SIZE, MOTION_SIZE, entries
 from rom.mbs.elements.laws_in_python import AskedForce, AskedLaw
 from rom.mbs.kernels.algebra import add, cross, scale, unit
-from rom.mbs.kernels.compiled import called, inner
+from rom.mbs.kernels.compiled import inner
 from rom.mbs.kernels.constraints import pair_stiffness
 from rom.mbs.kernels.element_calls import energy, residuals, tangents
 from rom.mbs.kernels.tables import (

@@ -9,10 +9,11 @@ import numpy as np
 from numba import types
 from numba.extending import intrinsic
 
+from rom.mbs.compiler.calls import called
 from rom.mbs.elements.family import Family, Places, apart, integers, on_joint, starts
 from rom.mbs.elements.formulas.programs import Formula
 from rom.mbs.elements.law_calls import DIFFERENCE_STEP
-from rom.mbs.kernels.compiled import called, inner
+from rom.mbs.kernels.compiled import inner
 from rom.mbs.kernels.coordinates import coordinate_tangent, push_coordinate
 from rom.mbs.kernels.element_calls import residuals, tangents
 from rom.mbs.kernels.tables import Address1, Array1, Index1, Scratch1, Scratch2, Table, table

@@ -32,9 +32,10 @@ from numba.extending import intrinsic
 from rom import rotation
 from rom.arguments import finite, start_pose, typed
 from rom.errors import ConfigError, ModelError
+from rom.mbs.compiler.calls import called
 from rom.mbs.elements.family import Family, Places, integers, on_joint
 from rom.mbs.elements.law_calls import compiled_entry
-from rom.mbs.kernels.compiled import called, inner
+from rom.mbs.kernels.compiled import inner
 from rom.mbs.kernels.constraints import block_of
 from rom.mbs.kernels.element_calls import energy, residuals, tangents
 from rom.mbs.kernels.tables import (

@@ -7,16 +7,15 @@ its table, and those of its kernels. A family is compiled when a mechanism first
 from collections.abc import Callable
 from typing import Any
 
-from llvmlite import ir
 from numba import config, njit, types
-from numba.core.typing.templates import AbstractTemplate, infer_global
-from numba.extending import lower_builtin
 
 from rom.mbs.compiler.cache import kept
+from rom.mbs.compiler.calls import address_of, call_at, let_kernels_call
+from rom.mbs.compiler.table_types import number, pointer, word
 from rom.mbs.kernels.compiled import OPTIONS
-from rom.mbs.kernels.stages import REAL_VECTOR, address_of, call_at
+from rom.mbs.kernels.stages import REAL_VECTOR
 from rom.mbs.kernels.system import System
-from rom.mbs.kernels.tables import TABLE_WORD, Table
+from rom.mbs.kernels.tables import Table
 from rom.mbs.kernels.work import Work
 
 ROW_WORDS = 6  # of a family: its table, then its kernels in the order of their columns
@@ -58,9 +57,8 @@ class Role:
 
     def __init__(self, column: int, result: Any, *types_: Any):
         self.column, self.result, self.types = column, result, types_
-        called = {"key": self, "generic": lambda typing, given, _: self._typed()}
-        infer_global(self, types.Function(type(f"Role{column}", (AbstractTemplate,), called)))
-        lower_builtin(self, types.VarArg(types.Any))(self._call)
+        signature = result(SYSTEM_TYPE, types.intp, WORK_TYPE, *types_)
+        let_kernels_call(self, f"Role{column}", signature, self._call)
 
     def of(self, table: Any) -> Callable[[Callable[..., Any]], ElementKernel]:
         """Make a function the kernel in this role of the family with this class of table."""
@@ -72,24 +70,19 @@ class Role:
         table, kernel = (int(s.elements[k, c]) for c in (0, self.column))
         return PYTHON_OBJECTS[kernel](s, W, PYTHON_OBJECTS[table], *arguments) if kernel else 0.0
 
-    def _typed(self) -> Any:
-        return self.result(SYSTEM_TYPE, types.intp, WORK_TYPE, *self.types)
-
     def _call(self, context: Any, builder: Any, signature: Any, values: Any) -> Any:
         s, k, W, *arguments = values
-        at = ir.Constant(TABLE_WORD, System._layout["elements"][0])
-        rows = builder.inttoptr(builder.load(builder.gep(s, [at])), TABLE_WORD.as_pointer())
-        first = builder.mul(k, ir.Constant(TABLE_WORD, ROW_WORDS))
+        rows = pointer(builder, word(builder, s, number(System._layout["elements"][0])))
+        first = builder.mul(k, number(ROW_WORDS))
 
-        def word(column: int) -> Any:
-            place = builder.add(first, ir.Constant(TABLE_WORD, column))
-            return builder.load(builder.gep(rows, [place]))
+        def of_row(column: int) -> Any:
+            return word(builder, rows, builder.add(first, number(column)))
 
-        table = builder.inttoptr(word(0), TABLE_WORD.as_pointer())
+        table = pointer(builder, of_row(0))
         # all tables are one address to compiled code: that of any class stands for the others
         called = self.result(SYSTEM_TYPE, WORK_TYPE, SYSTEM_TYPE, *self.types)
         values = [s, W, table, *arguments]
-        return call_at(context, builder, called, word(self.column), values)
+        return call_at(context, builder, called, of_row(self.column), values)
 
 
 # (s, k, W, q, v, lam): add wrenches on markers, forces to W.residual and powers to W.power

@@ -9,17 +9,12 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from llvmlite import ir
-from numba import njit, types
-from numba.core import cgutils, config
-from numba.core.compiler_lock import global_compiler_lock
-from numba.core.errors import TypingError
-from numba.core.typing.templates import AbstractTemplate, infer_global
-from numba.extending import lower_builtin
+from numba import config, njit, types
 
 from rom.mbs.compiler.cache import CODE_FILES, EXPECTED_FUNCTIONS, kept
+from rom.mbs.compiler.calls import address_of, call_at, let_kernels_call
+from rom.mbs.compiler.table_types import number, pointer, word
 from rom.mbs.kernels.compiled import OPTIONS
-from rom.mbs.kernels.tables import TABLE_WORD
 
 REAL_VECTOR = types.Array(types.float64, 1, "A")  # a row or a column of a table
 REAL_MATRIX = types.Array(types.float64, 2, "C")
@@ -66,9 +61,7 @@ class Stage:
         self.kernel = kept(njit(**OPTIONS, no_cfunc_wrapper=True))(function)
         self.slot = STAGE_NAMES.index(function.__name__)
         STAGE_KERNELS[function.__name__] = self
-        called = {"key": self, "generic": lambda typing, given, _: self._typed(typing, given)}
-        infer_global(self, types.Function(type(function.__name__, (AbstractTemplate,), called)))
-        lower_builtin(self, types.VarArg(types.Any))(self._call)
+        let_kernels_call(self, function.__name__, self.signature, self._call)
 
     @property
     def linked(self) -> bool:
@@ -84,40 +77,11 @@ class Stage:
         """Run it from Python."""
         return self.kernel(*arguments)
 
-    def _typed(self, typing: Any, given: Any) -> Any:
-        """The signature, for a call in a kernel."""
-        for kind, asked in zip(given, self.signature.args, strict=True):
-            if typing.context.can_convert(kind, asked) is None:
-                raise TypingError(f"{self.kernel.__name__} takes {asked}, not {kind}.")
-        return self.signature
-
     def _call(self, context: Any, builder: Any, signature: Any, values: Any) -> Any:
         """What a call in a kernel becomes."""
-        addresses = builder.inttoptr(builder.load(values[0]), TABLE_WORD.as_pointer())
-        address = builder.load(builder.gep(addresses, [ir.Constant(TABLE_WORD, self.slot)]))
+        addresses = pointer(builder, word(builder, values[0], number(0)))
+        address = word(builder, addresses, number(self.slot))
         return call_at(context, builder, signature, address, values)
-
-
-def address_of(kernel: Any, signature: Any) -> int:
-    """Address of the compiled form of a kernel, which takes no other types from then on."""
-    with global_compiler_lock:  # of two threads the second finds it compiled
-        if signature.args not in kernel.overloads:
-            kernel.compile(signature)
-            kernel.disable_compile()
-    compiled = kernel.overloads[signature.args]
-    return int(compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name))
-
-
-def call_at(context: Any, builder: Any, signature: Any, address: Any, values: Any) -> Any:
-    """What a call of the kernel at an address becomes: its answer, 0 if the address is 0."""
-    result, arguments = signature.return_type, signature.args
-    kind = context.call_conv.get_function_type(result, arguments)
-    code = builder.inttoptr(address, kind.as_pointer())
-    answer = cgutils.alloca_once_value(builder, context.get_constant_null(result))
-    with builder.if_then(cgutils.is_not_null(builder, code), likely=True):
-        _, given = context.call_conv.call_function(builder, code, result, arguments, values)
-        builder.store(given, answer)
-    return builder.load(answer)
 
 
 def stage(

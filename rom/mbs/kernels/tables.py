@@ -6,29 +6,14 @@ whole numbers, the address and the shape of each of its arrays; compiled code re
 names, so that kernels are written as if the table were a tuple.
 """
 
-import operator
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import (
-    Annotated,
-    Any,
-    ClassVar,
-    Self,
-    TypeVar,
-    dataclass_transform,
-    get_args,
-    get_type_hints,
-)
+from typing import Annotated, Any, Self, TypeVar, dataclass_transform, get_args, get_type_hints
 
 import numpy as np
-from llvmlite import ir
 from numba import types
-from numba.core.imputils import lower_getattr_generic
-from numba.core.typing.arraydecl import GetItemBuffer, SetItemBuffer
-from numba.core.typing.templates import AttributeTemplate, infer_getattr, infer_global
-from numba.extending import NativeValue, models, register_model, unbox
-from numba.np.arrayobj import populate_array
 
+from rom.mbs.compiler.table_types import TableType
 from rom.model import Array, Index
 
 Array1 = Annotated[Array, types.Array(types.float64, 1, "C")]
@@ -45,17 +30,7 @@ Address2 = Annotated[Index, types.Array(types.int64, 2, "C"), PASSING_MARK]
 Scratch1 = Annotated[Array, types.Array(types.float64, 1, "C"), PASSING_MARK]
 Scratch2 = Annotated[Array, types.Array(types.float64, 2, "C"), PASSING_MARK]
 Scratch3 = Annotated[Array, types.Array(types.float64, 3, "C"), PASSING_MARK]
-TABLE_WORD = ir.IntType(64)
-WORD_SIZE = 8  # of all entries, real and whole numbers both [bytes]
 T = TypeVar("T")
-
-
-class TableType(types.Type):
-    """Type of a table in compiled code; its class says what is in it."""
-
-    def __init__(self, cls: type):
-        self.cls = cls
-        super().__init__(f"{cls.__module__}.{cls.__qualname__}")
 
 
 class Table:
@@ -131,74 +106,3 @@ def _words(value: Any, kind: Any, what: str) -> list[int]:
             f"{what} is an array of {value.dtype} with strides {value.strides}, not {kind}."
         )
     return [value.ctypes.data, *value.shape]
-
-
-# Numba asks what lists, strings and dates would do with an index before it asks what an array does,
-# which takes a fifth of its time; what belongs to a target comes first
-@infer_global(operator.getitem)
-class _Entry(GetItemBuffer):
-    metadata: ClassVar = {"target": "cpu"}
-
-
-@infer_global(operator.setitem)
-class _NewEntry(SetItemBuffer):
-    metadata: ClassVar = {"target": "cpu"}
-
-
-@register_model(TableType)
-class _Pointer(models.PrimitiveModel):
-    def __init__(self, manager: Any, kind: Any):
-        super().__init__(manager, kind, TABLE_WORD.as_pointer())
-
-
-@unbox(TableType)
-def _unbox(kind: Any, value: Any, c: Any) -> Any:
-    number = c.pyapi.object_getattr_string(value, "_address")
-    address = c.pyapi.long_as_longlong(number)
-    c.pyapi.decref(number)
-    return NativeValue(c.builder.inttoptr(address, TABLE_WORD.as_pointer()))
-
-
-@infer_getattr
-class _Fields(AttributeTemplate):
-    key = TableType
-
-    def generic_resolve(self, kind: Any, name: str) -> Any:
-        return kind.cls._layout[name][1] if name in kind.cls._layout else None
-
-
-@lower_getattr_generic(TableType)
-def _field(context: Any, builder: Any, kind: Any, value: Any, name: str) -> Any:
-    at, field = kind.cls._layout[name]
-
-    def word(k: int) -> Any:
-        found = builder.load(builder.gep(value, [ir.Constant(TABLE_WORD, at + k)]))
-        # the words never change while a kernel runs: they are read once, before its loops
-        found.set_metadata("invariant.load", builder.module.add_metadata([]))
-        return found
-
-    if field is types.int64:
-        return word(0)
-    if isinstance(field, TableType):
-        return builder.inttoptr(word(0), TABLE_WORD.as_pointer())
-    return _array(context, builder, field, word)
-
-
-def _array(context: Any, builder: Any, kind: Any, word: Any) -> Any:
-    """The view of an array whose address and shape are told."""
-    array = context.make_array(kind)(context, builder)
-    shape = [word(1 + k) for k in range(kind.ndim)]
-    stride = ir.Constant(TABLE_WORD, WORD_SIZE)
-    strides = [stride]
-    for length in shape[:0:-1]:
-        stride = builder.mul(stride, length)
-        strides.insert(0, stride)
-    populate_array(
-        array,
-        data=builder.inttoptr(word(0), context.get_data_type(kind.dtype).as_pointer()),
-        shape=shape,
-        strides=strides,
-        itemsize=ir.Constant(TABLE_WORD, WORD_SIZE),
-        meminfo=None,
-    )
-    return array._getvalue()

@@ -333,7 +333,7 @@ GIVEN = {  # callable -> legal values of its own
     "inverse_dynamics": lambda: {"mechanism": driven(free=False), "t": [0.0, 1e-3]},
     "linearize": dict,
     "periodic_motion": lambda: {"period": 1.0, "steps": 10},
-    "periodic_path": lambda: {"build": spring, "span": (1.0, 1.1), "period": 1.0, "steps": 10},
+    "periodic_path": lambda: {"build": spring, "span": (1.0, 1.1), "period": 1.0, "steps": 2},
     "load": lambda: {"path": "body.rom.npz"},
     "load_state": lambda: {"path": "state.npz"},
     "mistuned_wheel": lambda: {"sector": ring()},

@@ -14,7 +14,7 @@ MESHED = [path for path in DEMOS if "rom.fe" in path.read_text()]
 LONG_DEMOS = {
     "demo_assembly", "demo_beam", "demo_bent_blade", "demo_best_matching", "demo_bladed_disk",
     "demo_bolted_frame", "demo_compressor_blade", "demo_exchange", "demo_flexure", "demo_forming",
-    "demo_hand",
+    "demo_hand", "demo_isotropy",
     "demo_large_deflection", "demo_large_mesh", "demo_lost_tip",
     "demo_masonry", "demo_mistuning", "demo_oil_inlet", "demo_parameters", "demo_pendulum_chain",
     "demo_periodic", "demo_planetary",

@@ -1,4 +1,4 @@
-"""Run by test_demos_under_mpi.py under mpirun: a demo as users run it, its numbers into a file."""
+"""Run by test_demos.py under mpirun: a demo as users run it, its numbers into a file."""
 
 import json
 import runpy

@@ -105,6 +105,7 @@ def test_the_branch_between_the_folds_is_unstable_and_alone_so(curve):
     assert np.all(np.diff(a[changes[0] + 1 : changes[1]]) < 0.0)
 
 
+@pytest.mark.long
 def test_the_way_back_meets_the_same_folds(curve):
     back = rom.periodic_path(across, (1.5, 1.1), period=lambda w: 2 * np.pi / w, steps=150,
                              n=30)  # fmt: skip

@@ -7,6 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import rom
+from cases.long import few
 from rom.errors import ModelError, RomWarning
 from rom.mbs.equations import packing
 
@@ -61,7 +62,7 @@ METHODS = {
 }
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", few(3, METHODS))
 def test_blocks_move_and_carry_as_whole_matrices(method, whole):
     """Positions, velocities and the reactions of least norm."""
     options = {"t_end": 0.3, **METHODS[method]}

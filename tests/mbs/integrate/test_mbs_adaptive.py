@@ -8,6 +8,7 @@ from scipy.special import ellipj, ellipk
 
 import rom
 from benchmarks.models import rigid_chain
+from cases.long import few
 from cases.mbs.mechanisms import simulate_quietly, slider_crank
 from cases.mbs.motions import (
     PARTS,
@@ -148,7 +149,7 @@ def braked(brake, build):
 
 
 @pytest.mark.parametrize("method", IMPLICIT)
-@pytest.mark.parametrize(("build", "t_end"), [(pendulum, 0.3), (wound_drive, 0.03)])
+@pytest.mark.parametrize(("build", "t_end"), few(1, [(pendulum, 0.3), (wound_drive, 0.03)]))
 def test_a_run_that_breaks_within_a_call_goes_on_to_the_same_bits(build, t_end, method, tmp_path):
     """In any evaluation: of steps, of the instants at their ends, of steps that are rejected."""
     options, push = {"t_end": t_end, "rtol": 1e-4, "method": method}, 0.6 * t_end

@@ -16,7 +16,7 @@ from rom.mbs.integrate import keeping, simulation
 from rom.mbs.integrate.run import Record
 from rom.mbs.mechanism import Mechanism
 
-FAULTS_EACH = 10 if ROM_LONG else 2
+FAULTS_EACH = 10 if ROM_LONG else 1
 
 PARTS = ("t", "q", "v", "a", "lam", "work", "base", "signals")
 T_END = 0.072
