@@ -46,7 +46,7 @@ def run_variable(record: Record, W: Work, state: State) -> None:
     limit = FIRST_CHUNK
     while record.t < record.settings.t_end and not record.stopped:
         clock = perf_counter()
-        taken = run.chunk(1 if record.watch else limit)
+        taken = run.chunk(limit)
         spent = max(perf_counter() - clock, 1e-6)
         limit = int(np.clip(CHUNK_SECONDS / spent * taken, 1, LARGEST_CHUNK))
         record.pause()
@@ -104,7 +104,34 @@ class _Run:
         self.W.base[:], now.jerk[:] = arrays["base"], arrays["jerk"]
 
     def chunk(self, limit: int) -> int:
-        """Take up to so many steps and keep what is to be saved; returns how many were taken."""
+        """Take up to so many steps and keep what is to be saved; returns how many were taken.
+
+        Where an event function fails at one of them, they are taken again one by one, to stand
+        behind the last good one with all that the next depends on.
+        """
+        record, now = self.record, self.now
+        if not record.watch or limit == 1:
+            return self.piece(limit)
+        mark = now.reals.copy(), now.wholes.copy(), now.lu.copy()
+        before = record.final if self.T.count[alpha.STEPS] else record.given
+        begun = record.t, record.final, record.noted, len(record.blocks)
+        try:
+            return self.piece(limit)
+        except BaseException:
+            taken = int(now.count[control.TAKEN])
+            if record.final.t > before.t:
+                raise
+            now.reals[:], now.wholes[:], now.lu[:] = mark
+            now.count[[control.STAGE, control.AT_HAND]] = control.BEGINS, 0
+            record.t, record.final, record.noted = begun[:3]
+            record.watch.recall(record.noted)
+            del record.blocks[begun[3] :]
+            for _ in range(taken):
+                self.piece(1)
+            raise
+
+    def piece(self, limit: int) -> int:
+        """Take up to so many steps as above."""
         record, count = self.record, self.now.count
         before = record.final if self.T.count[alpha.STEPS] else record.given
         count[control.LIMIT], count[control.TAKEN], count[control.SAVED] = limit, 0, 0
@@ -222,13 +249,14 @@ class _Run:
             return
         every, kept = record.settings.save_every, int(now.count[control.SAVED])
         t, *out = self.columns(self.trial.rows[:kept])
-        saved = np.full(kept, not record.watch or self.T.count[alpha.STEPS] % every == 0)
+        steps = int(self.T.count[alpha.STEPS]) - np.arange(kept)[::-1]
+        saved = steps % every == 0 if record.watch else np.full(kept, True)
         if record.watch and kept_before_the_end(
             record, self.beside, self.forces, t, tuple(out), saved
         ):
             return
         if saved.any():
-            record.keep(t, *out)
+            record.keep(t[saved], *(x[saved] for x in out))
         record.t = float(now.number[control.TIME])
         q, v, a, lam, base = (x.copy() for x in (self.T.q, now.v, now.a, now.lam, now.base))
         record.reach(State(record.t, q, v, a, lam, record.final.rank, None, base))

@@ -80,6 +80,8 @@ def _look(
         right = Point(t[k], *(x[k] for x in out[:3]))
 
         def motion(x: float, left: Point = left, right: Point = right) -> tuple[Array, Array]:
+            if x == right.t:
+                return right.q, right.v
             return between(record.packed.system, left, right, x)[:2]
 
         def exact(x: float, ends: tuple[Point, Point] = (left, right)) -> tuple[Array, Array]:
