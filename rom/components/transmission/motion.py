@@ -10,9 +10,9 @@ Source:
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.linalg import eig
 
 from rom.components.transmission.mechanism import NAMES, coordinates_of, mechanism_of, places_of
+from rom.components.transmission.shaft import ComplexArray, vibrations
 from rom.components.transmission.unit import Rest, Transmission, rest
 from rom.errors import ModelError, RomError
 from rom.mbs.integrate import simulation
@@ -30,8 +30,8 @@ class Whirl:
         shapes: (n, 2n) their displacements, columns, in units of the coordinates.
     """
 
-    values: Array
-    shapes: Array
+    values: ComplexArray
+    shapes: ComplexArray
 
     @property
     def stable(self) -> bool:
@@ -53,14 +53,11 @@ def linearised(state: Rest) -> tuple[Array, Array, Array]:
 
 def whirl(state: Rest) -> Whirl:
     """Natural vibrations about an equilibrium, teeth as they touch there."""
-    M, C, K = linearised(state)
-    n = len(M)
-    A = np.block([[np.zeros((n, n)), np.eye(n)], [-np.linalg.solve(M, K), -np.linalg.solve(M, C)]])
-    values, vectors = eig(A)
+    values, shapes = vibrations(*linearised(state))
     # of a pair, whose real parts differ by round-off, the one that turns forwards comes first
     growth = (values.real / np.abs(values).max()).round(9)
     order = np.lexsort((-values.imag, -growth))
-    return Whirl(values[order], vectors[:n, order])
+    return Whirl(values[order], shapes[:, order])
 
 
 def threshold(unit: Transmission, low: float, high: float, *, within: float = 0.01) -> float:

@@ -8,8 +8,7 @@ from numpy.testing import assert_allclose
 from scipy.linalg import eigh, eigvals
 from scipy.optimize import brentq
 
-from cases import gear_steps
-from cases.gear_unit import NODES, journal, unit
+from cases.gear_unit import NODES, journal, stepped, unit
 from cases.long import few
 from rom.components.gear_mesh import Correction, GearPair
 from rom.components.journal_bearing import Groove, equilibrium, stability
@@ -257,7 +256,7 @@ def test_steps_converge_to_a_reference_of_a_tenth_of_the_step(loaded):
 def test_steps_are_those_of_another_program(loaded):
     """Through the loss and the gain of a pair of teeth; but for finite turns of the journals."""
     run = simulate(loaded, periods=0.5, steps=40)
-    q, teeth, end, _ = gear_steps.run(loaded.unit, loaded.q, None, loaded.theta, 40, 20)
+    q, teeth, end, _ = stepped(loaded.unit, loaded.q, None, loaded.theta, 40, 20)
     assert_allclose(run.q, q, atol=1e-4 * np.abs(q).max())
     assert_allclose(run.teeth, teeth, atol=2e-3 * teeth.max())
     assert_allclose(run.v[-1], end[q.shape[1] :], atol=2e-2 * np.abs(run.v).max())

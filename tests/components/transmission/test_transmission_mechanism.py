@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 
 import rom
 from benchmarks.units import as_mechanism
-from cases import gear_steps
+from cases.gear_unit import repeating
 from cases.mbs.geared_rotors import SIZES, SPAN, rigid_unit
 from rom.components.journal_bearing import Groove
 from rom.components.transmission import rest, steady, whirl
@@ -123,7 +123,7 @@ def test_it_runs_through_its_speeds_as_another_program():
     for speed in (725.0, 750.0):
         unit = rigid_unit(torque=300.0, speed=speed)
         mech = as_mechanism(unit)
-        q, own_teeth, values = gear_steps.repeating(rest(unit), 60)
+        q, own_teeth, values = repeating(rest(unit), 60)
         own_error = (q @ unit.wheels[[5, 11]].T) @ unit.mesh.pair.rb
         start = rom.equilibrium(mech) if motion is None else motion
         motion = rom.periodic_motion(mech, period=unit.mesh_period, steps=60, start=start)

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from cases import gear_steps
-from cases.gear_unit import unit
+from cases.gear_unit import repeating, unit
 from rom.components.gear_mesh import Correction
 from rom.components.transmission import rest, simulate, steady, sweep, whirl
 from rom.errors import ModelError
@@ -57,7 +56,7 @@ def test_it_ends_as_it_began(found):
 @pytest.mark.long
 def test_it_is_the_motion_of_another_program(lossy, found):
     """With its derivatives; but for friction in them, and for how the methods damp a step."""
-    q, teeth, multipliers = gear_steps.repeating(lossy, STEPS)
+    q, teeth, multipliers = repeating(lossy, STEPS)
     assert_allclose(found.q, q, atol=1e-3 * np.abs(q).max())
     assert_allclose(found.teeth, teeth, atol=0.02 * teeth.max())
     first = [1 - np.abs(values[:8]) for values in (found.multipliers, multipliers)]

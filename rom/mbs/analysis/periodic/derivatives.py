@@ -245,7 +245,12 @@ def by_steps(found: Return) -> Tangent:
     Raises:
         SolverError: if a step fails.
     """
-    flow, (q, v, vd) = found.flow, _first_changes(found)
+    chart, flow, columns, d = found.chart, found.flow, [], PROBE_RTOL
+    for e in np.eye(chart.size):
+        one, two = (chart.moved(x).state for x in (d * e, -d * e))
+        moved = flow.apart(two, one), one.v - two.v, one.a - two.a
+        columns.append(np.array(moved) / (2 * d))
+    q, v, vd = np.array(columns).transpose(1, 2, 0)
     if flow.packed.room:
         vd = np.array([_accelerated(found, *move) for move in zip(q.T, v.T, strict=True)]).T
     beside = Beside(flow.now, q, v, vd, vd.copy())
@@ -257,16 +262,6 @@ def by_steps(found: Return) -> Tangent:
         turn = rotation.spatial_tangent(-away[first : first + 3])
         later[first : first + 3] = np.linalg.solve(turn, later[first : first + 3])
     return Tangent(found, _seen(found, q, v), _seen(found, later, rates), carried=True)
-
-
-def _first_changes(found: Return) -> Array:
-    """(3, n, f) of positions, velocities and accelerations of the start, by its coordinates."""
-    columns, d = [], PROBE_RTOL
-    for e in np.eye(found.chart.size):
-        one, two = (found.chart.moved(x).state for x in (d * e, -d * e))
-        moved = found.flow.apart(two, one), one.v - two.v, one.a - two.a
-        columns.append(np.array(moved) / (2 * d))
-    return np.array(columns).transpose(1, 2, 0)
 
 
 def _accelerated(found: Return, dq: Array, dv: Array) -> Array:
