@@ -46,9 +46,9 @@ def mechanism_of(unit: Transmission, q: Array, v: Array) -> Mechanism:
         part = mech.add_flexible(NAMES[k], body, at=origins[k], q=y, qd=yd)
         mech.fixed(f"frame of {NAMES[k]}", mech.ground.marker(origins[k]), part.marker(FRAME))
         if k < 2:
-            # a body of modes has no surface to tell gyroscopic forces from: they are those of G
+            # modes have no surface to tell gyroscopic forces -G v from: they are given
             mech.parts[NAMES[k]] = replace(part, spin=unit.spins[k] * Z_AXIS)
-            spin = np.pad(V.T @ G @ V, (3, 0))
+            spin = -np.pad(V.T @ G @ V, (3, 0))
             mech.add(f"spin of {NAMES[k]}", Spin(NAMES[k], spin, 0.0 * G), SPINS_FAMILY)
             shapes = (V.T @ unit.load[at])[:, None, None] * np.eye(3) / 3
             load = SpreadLoad(np.zeros(3), np.zeros((3, 3)), shapes)

@@ -8,6 +8,7 @@ from numpy.testing import assert_allclose
 from scipy.linalg import eigh, eigvals
 from scipy.optimize import brentq
 
+import rom
 from cases.gear_unit import NODES, journal, stepped, unit
 from cases.long import few
 from rom.components.gear_mesh import Correction, GearPair
@@ -22,6 +23,7 @@ from rom.components.transmission import (
     threshold,
     whirl,
 )
+from rom.components.transmission.mechanism import coordinates_of, mechanism_of
 from rom.errors import ModelError, SolverError
 
 E, NU, RHO = 206e9, 0.3, 7850.0
@@ -205,6 +207,23 @@ def test_a_rotor_alone_whirls_at_the_threshold_of_its_bearings():
     found = brentq(growth, 0.5 * s.critical_mass, 2 * s.critical_mass, xtol=1e-10)
     assert found == pytest.approx(s.critical_mass, rel=1e-9)
     assert s.whirl_ratio == pytest.approx(0.5, abs=0.03)
+
+
+@pytest.mark.parametrize("helix", [0.0, HELIX])
+def test_its_mechanism_rests_and_whirls_as_the_unit(helix):
+    """But for finite turns of journals, and for forces that turn with the line of centres."""
+    state = rest(unit(helix=helix, speed=600.0, gravity=(0.0, -9.81)))
+    still = np.zeros(state.q.size)
+    mech = mechanism_of(state.unit, still, still)
+    found = rom.equilibrium(mech)
+    q, v = coordinates_of(state.unit, rom.mbs.snapshot(mech, found))
+    assert_allclose(q[0], state.q, atol=1e-4 * np.abs(state.q).max())
+    assert not v.any()
+    own, others = (
+        values[np.argsort(values.imag)][-np.sum(values.imag > 1.0) :]
+        for values in (whirl(state).values, rom.linearize(mech, found).eigenvalues)
+    )
+    assert_allclose(others, own, rtol=2e-3)
 
 
 @pytest.mark.long
