@@ -49,7 +49,7 @@ def test_it_ends_as_it_began(found):
     assert found.orbits.shape == (4, STEPS + 1, 2)
     assert_allclose(found.orbits[0], found.q[:, :2])  # first node of the pinion
     assert found.stable and found.apart == 0
-    assert found.motion.runs < 40  # its derivatives come with the steps on films of half a micrometre
+    assert found.motion.runs < 40  # also on films of half a micrometre
     mean = 300.0 / found.unit.mesh.pair.rb[0]
     assert found.teeth[1:].mean() == pytest.approx(mean, rel=0.01)  # but for friction
 
