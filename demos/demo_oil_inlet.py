@@ -204,8 +204,8 @@ for films in dict.fromkeys(films for case in CASES.values() for films in case.va
 
 # ## The other program
 #
-# `rom.components.transmission` finds the motion that repeats; its films have one viscosity, and no
-# memory.
+# `rom.components.transmission` has such units ready: shafts that only move a little, at rest by a
+# program of its own. It finds the motion that repeats; its films have one viscosity, and no memory.
 
 
 @dataclass(frozen=True)

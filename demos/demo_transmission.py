@@ -1,9 +1,9 @@
 # # Geared shafts on oil films
 #
 # After Fargere and Velex: a pinion drives a gear, their shafts turn in hydrodynamic bearings, and
-# teeth and films share the load. Shafts are beams, in a program of its own, and then solids, meshed
-# with gmsh and reduced, as a mechanism. Numbers of teeth are those of a known rig; all else is for
-# illustration, no measurement is reproduced.
+# teeth and films share the load. Shafts are beams, in a unit that stands ready, and then solids,
+# meshed with gmsh and reduced, as a mechanism. Numbers of teeth are those of a known rig; all else
+# is for illustration, no measurement is reproduced.
 #
 # Run: `python demos/demo_transmission.py`
 # Writes: `transmission.png` into `out/`; another folder with `--out`

@@ -15,7 +15,7 @@ from rom.components.hand.compliant_hand import Finger, close
 from rom.components.masonry import motion as masonry_motion
 from rom.components.masonry import stones
 from rom.components.rockfall import Cushion, Gallery, Shear, Slab, strike
-from rom.errors import RomError, SolverError
+from rom.errors import RomError
 from rom.mbs.results.solution import Solution
 from rom.mbs.results.state import State
 
@@ -111,17 +111,20 @@ def gears_at_rest(_):
 
 def gears(monkeypatch):
     """A run whose third step fails."""
-    from rom.components.transmission.motion import Step
-
-    state, advance, calls = transmission.rest(unit()), Step.advance, []
+    from rom.components.transmission import motion
 
     def failing(*arguments):
-        calls.append(1)
-        if len(calls) == 3:
-            raise SolverError("a step fails.")
-        advance(*arguments)
+        mech = whole(*arguments)
+        mech.user_force("rope", law, mech.part("pinion").marker("node 2"))
+        return mech
 
-    monkeypatch.setattr(Step, "advance", failing)
+    def law(t, _):
+        if t > 2.5 / 50 * state.unit.mesh_period:
+            raise ValueError("torn")
+        return (0, 0, 0), (0, 0, 0)
+
+    state, whole = transmission.rest(unit()), motion.mechanism_of
+    monkeypatch.setattr(motion, "mechanism_of", failing)
     return transmission.simulate(state, periods=1, steps=50)
 
 

@@ -148,16 +148,9 @@ class Film:
     @cached_property
     def friction_torque(self) -> float:
         """That brakes the journal [N m]: shear of the oil there is, and pressure on its slope."""
-        b, (H, dH) = self.bearing, self._films()
-        shear = np.sum(self.fill / H) * 2 * np.pi / len(H) - 0.5 * np.sum(self.P * dH)
-        return (
-            self._width
-            * shear
-            * self.viscosity
-            * self.speed
-            * b.radius**3
-            * (b.length / b.clearance)
-        )
+        b = self.bearing
+        size = self.viscosity * self.speed * b.radius**3 * b.length / b.clearance
+        return size * self._drag(self.fill)
 
     def friction(self, streamers: bool = True) -> float:
         """Friction over load times R/c [1].
@@ -165,9 +158,7 @@ class Film:
         Args:
             streamers: of oil that are sheared where it cavitates, too.
         """
-        H, dH = self._films()
-        shear = np.sum((1.0 if streamers else self.fill) / H) * 2 * np.pi / len(H)
-        return float(self._width * (shear - 0.5 * np.sum(self.P * dH)) / np.hypot(*self.F[:2]))
+        return self._drag(1.0 if streamers else self.fill) / float(np.hypot(*self.F[:2]))
 
     @property
     def dissipated(self) -> float:
@@ -204,8 +195,10 @@ class Film:
         b = self.bearing
         return self.speed * b.clearance * b.radius * b.length / 12
 
-    def _films(self) -> tuple[Array, Array]:
-        """(nt, nz) film at the centres, and what it gains across a cell, in clearances."""
+    def _drag(self, fill: Array | float) -> float:
+        """Torque of oil that is sheared and of pressure on the slope of the film [1]."""
         grid = self.bearing.grid
         H, behind = gap(grid, self.motion / self.bearing.scale, grid.Z)
-        return H, behind - np.roll(behind, 1, axis=0)
+        shear = np.sum(fill / H) * 2 * np.pi / len(H)
+        rise = behind - np.roll(behind, 1, axis=0)
+        return self._width * float(shear - 0.5 * np.sum(self.P * rise))

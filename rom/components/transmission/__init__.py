@@ -1,8 +1,8 @@
 """Geared shafts on journal bearings: where they rest, whether they whirl, how they vibrate.
 
 `shaft` and `solid_shaft` spin in a `housing`, `unit` puts them together and finds where they rest;
-`motion` moves them, `response` and `steady` are vibrations that repeat with the mesh, `supports`
-has the whirl of one shaft.
+as a `mechanism` they move in `motion`; `response` and `steady` are vibrations that repeat with the
+mesh, `supports` has the whirl of one shaft.
 """
 
 from rom.lazy import front

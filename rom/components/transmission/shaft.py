@@ -9,11 +9,13 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+from scipy.linalg import eig
 
 from rom.errors import ModelError
 from rom.model import Array
 
 GAUSS_POINTS, GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(4)
+ComplexArray = npt.NDArray[np.complex128]
 STEEL = (206e9, 0.3, 7850.0)
 
 
@@ -127,6 +129,13 @@ class Shaft:
             G[i + 3, i + 4] += disc.polar
             G[i + 4, i + 3] -= disc.polar
         return M, K, G
+
+
+def vibrations(M: Array, C: Array, K: Array) -> tuple[ComplexArray, ComplexArray]:
+    """(2n,) eigenvalues [1/s] and (n, 2n) shapes of M q'' + C q' + K q = 0."""
+    below = -np.linalg.solve(M, np.hstack([K, C]))
+    values, vectors = eig(np.vstack([np.eye(len(M), 2 * len(M), len(M)), below]))
+    return values.astype(complex), vectors[: len(M)]
 
 
 def _beam(

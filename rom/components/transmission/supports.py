@@ -16,9 +16,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.linalg import eig, eigh
+from scipy.linalg import eigh
 
-from rom.components.transmission.shaft import Shaft
+from rom.components.transmission.shaft import ComplexArray, Shaft, vibrations
 from rom.errors import ModelError
 from rom.model import Array
 
@@ -50,8 +50,8 @@ class ShaftWhirl:
         direction: (m,) [1] +1 forward, with the rotation, -1 backward, 0 along a line.
     """
 
-    values: npt.NDArray[np.complex128]
-    shapes: npt.NDArray[np.complex128]
+    values: ComplexArray
+    shapes: ComplexArray
     direction: Array
 
     @property
@@ -85,16 +85,11 @@ def shaft_whirl(
         ModelError: if a bearing sits beyond the shaft, or the bearings leave a rigid motion free.
     """
     M, C, K, G, rows = _matrices(shaft, supports)
-    size = rows.size
-    A = np.block([
-        [np.zeros((size, size)), np.eye(size)],
-        [-np.linalg.solve(M, K), -np.linalg.solve(M, C + speed * G)],
-    ])  # fmt: skip
-    values, vectors = eig(A)
+    values, vectors = vibrations(M, C + speed * G, K)
     keep = np.flatnonzero(values.imag > 0)
     keep = keep[np.argsort(values[keep].imag, kind="stable")][:n]
     shapes = np.zeros((shaft.n, keep.size), dtype=complex)
-    shapes[rows] = vectors[:size, keep]
+    shapes[rows] = vectors[:, keep]
     turn = 1.0 if speed == 0 else np.sign(speed)
     return ShaftWhirl(values[keep], shapes, _direction(shapes, M) * turn)
 
@@ -164,7 +159,7 @@ def _square(value: npt.ArrayLike) -> Array:
     return given * np.eye(2) if given.ndim == 0 else given
 
 
-def _direction(shapes: npt.NDArray[np.complex128], M: Array) -> Array:
+def _direction(shapes: ComplexArray, M: Array) -> Array:
     """+1 where orbits of q = Re(shape e^{i w t}) turn from X to Y, by the sense of most mass."""
     x, y = shapes[0::6], shapes[1::6]
     weight = np.diag(M)[0::4][:, None]

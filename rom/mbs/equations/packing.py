@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -169,7 +170,7 @@ class Packed:
         """Numbers of the constraint rows of a joint or drive."""
         return np.array([k for k, owner in enumerate(self.row_owner) if owner == joint], dtype=int)
 
-    @property
+    @cached_property
     def row_scale(self) -> Array:
         """(m,) length of the mechanism for rows that measure lengths, one for the others."""
         rows = self.system.rows

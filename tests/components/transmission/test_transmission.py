@@ -8,7 +8,8 @@ from numpy.testing import assert_allclose
 from scipy.linalg import eigh, eigvals
 from scipy.optimize import brentq
 
-from cases.gear_unit import NODES, journal, unit
+import rom
+from cases.gear_unit import NODES, journal, stepped, unit
 from cases.long import few
 from rom.components.gear_mesh import Correction, GearPair
 from rom.components.journal_bearing import Groove, equilibrium, stability
@@ -22,6 +23,7 @@ from rom.components.transmission import (
     threshold,
     whirl,
 )
+from rom.components.transmission.mechanism import coordinates_of, mechanism_of
 from rom.errors import ModelError, SolverError
 
 E, NU, RHO = 206e9, 0.3, 7850.0
@@ -207,6 +209,23 @@ def test_a_rotor_alone_whirls_at_the_threshold_of_its_bearings():
     assert s.whirl_ratio == pytest.approx(0.5, abs=0.03)
 
 
+@pytest.mark.parametrize("helix", [0.0, HELIX])
+def test_its_mechanism_rests_and_whirls_as_the_unit(helix):
+    """But for finite turns of journals, and for forces that turn with the line of centres."""
+    state = rest(unit(helix=helix, speed=600.0, gravity=(0.0, -9.81)))
+    still = np.zeros(state.q.size)
+    mech = mechanism_of(state.unit, still, still)
+    found = rom.equilibrium(mech)
+    q, v = coordinates_of(state.unit, rom.mbs.snapshot(mech, found))
+    assert_allclose(q[0], state.q, atol=1e-4 * np.abs(state.q).max())
+    assert not v.any()
+    own, others = (
+        values[np.argsort(values.imag)][-np.sum(values.imag > 1.0) :]
+        for values in (whirl(state).values, rom.linearize(mech, found).eigenvalues)
+    )
+    assert_allclose(others, own, rtol=2e-3)
+
+
 @pytest.mark.long
 def test_fast_and_lightly_loaded_journals_whirl():
     light = unit(torque=8.0, clearance=90e-6)
@@ -251,6 +270,16 @@ def test_steps_converge_to_a_reference_of_a_tenth_of_the_step(loaded):
     assert spent == pytest.approx(heat, rel=0.01)  # but for spin that films do not know
     names = {"drive", "load", "films", "teeth", "shafts", "kinetic"}
     assert names == set(fine.work)
+
+
+def test_steps_are_those_of_another_program(loaded):
+    """Through the loss and the gain of a pair of teeth; but for finite turns of the journals."""
+    run = simulate(loaded, periods=0.5, steps=40)
+    q, teeth, end, _ = stepped(loaded.unit, loaded.q, None, loaded.theta, 40, 20)
+    assert_allclose(run.q, q, atol=1e-4 * np.abs(q).max())
+    assert_allclose(run.teeth, teeth, atol=2e-3 * teeth.max())
+    assert_allclose(run.v[-1], end[q.shape[1] :], atol=2e-2 * np.abs(run.v).max())
+    assert np.ptp(teeth) > 0.1 * teeth[0] and run.balance < 1e-6
 
 
 @pytest.mark.long

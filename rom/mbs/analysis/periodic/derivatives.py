@@ -28,6 +28,7 @@ from rom.model import Array
 # the deflection of teeth and races is still resolved; where teeth come and go in between, or films
 # change, motions have to begin nearer
 PROBE_RTOL, NEAR_PROBE_RTOL = 1e-7, 1e-8
+GAP_PROBE_RTOL = 1e-11  # the same where films have gaps, which may be a millionth wide
 SMOOTH_TOL = 2e-4  # by which a nearer motion may end elsewhere, of its start: its round-off is 4e-5
 SINGULAR_RTOL = 1e-7  # differences leave this much of motions that a period does not change
 MAX_VARIED = 8  # coordinates up to which differences take no longer than tangents of steps
@@ -71,8 +72,8 @@ class Tangent:
         missed = two.gap - one.gap - (self.E - self.B) @ y
         return replace(self, E=self.E + np.outer(missed, y) / size, own=False)
 
-    def measured(self, Y: Array) -> tuple["Tangent", float]:
-        """The same with what motions beside do in directions (f, k), and the largest difference.
+    def measured(self, Y: Array, d: float = NEAR_PROBE_RTOL) -> tuple["Tangent", float]:
+        """The same with what motions at a distance do in directions (f, k); largest difference.
 
         Raises:
             SolverError: if a step fails.
@@ -80,7 +81,7 @@ class Tangent:
         if not Y.size:
             return self, 0.0
         X = np.linalg.solve(self.B, Y)
-        ends = np.array([varied(self.around, x, NEAR_PROBE_RTOL)[1] for x in X.T]).T
+        ends = np.array([varied(self.around, x, d)[1] for x in X.T]).T
         missed = ends - self.E @ X
         return replace(self, E=self.E + missed @ np.linalg.pinv(X)), float(np.abs(missed).max())
 
@@ -202,14 +203,18 @@ def confirmed(found: Return, known: Tangent | None = None) -> Tangent:
     y = (shapes @ np.exp(1j * np.arange(len(shapes)))).real
     # only how far they are off: a correction in this one direction, of what fades at once, would
     # move the multipliers of what does not
-    _, missed = known.measured((y / np.abs(y).max())[:, None])
+    enough = CARRIED_TOL if carried else SMOOTH_TOL
+    for d in (NEAR_PROBE_RTOL, GAP_PROBE_RTOL) if carried else (NEAR_PROBE_RTOL,):
+        _, missed = known.measured((y / np.abs(y).max())[:, None], d)
+        if missed <= enough:
+            break
     near = (np.abs(values) > 1.0 - missed) & (values.imag >= 0.0)
-    if missed > (CARRIED_TOL if carried else SMOOTH_TOL) or (carried and near.sum() > MAX_NEAR):
+    if missed > enough or (carried and near.sum() > MAX_NEAR):
         return by_differences(found, NEAR_PROBE_RTOL)
     if not carried:
         return known
     slow = shapes[:, near]
-    return known.measured(np.hstack([slow.real, slow.imag[:, values[near].imag > 0.0]]))[0]
+    return known.measured(np.hstack([slow.real, slow.imag[:, values[near].imag > 0.0]]), d)[0]
 
 
 def by_differences(found: Return, d: float = PROBE_RTOL) -> Tangent:
@@ -246,6 +251,8 @@ def by_steps(found: Return) -> Tangent:
         moved = flow.apart(two, one), one.v - two.v, one.a - two.a
         columns.append(np.array(moved) / (2 * d))
     q, v, vd = np.array(columns).transpose(1, 2, 0)
+    if flow.packed.room:
+        vd = np.array([_accelerated(found, *move) for move in zip(q.T, v.T, strict=True)]).T
     beside = Beside(flow.now, q, v, vd, vd.copy())
     flow.end(found.start, beside)
     angles = found.turns.angles(found.start.state, found.end)
@@ -255,6 +262,16 @@ def by_steps(found: Return) -> Tangent:
         turn = rotation.spatial_tangent(-away[first : first + 3])
         later[first : first + 3] = np.linalg.solve(turn, later[first : first + 3])
     return Tangent(found, _seen(found, q, v), _seen(found, later, rates), carried=True)
+
+
+def _accelerated(found: Return, dq: Array, dv: Array) -> Array:
+    """(n,) change of the accelerations of the start, so near to it that films hardly change."""
+    flow, state, a = found.flow, found.start.state, []
+    for d in (GAP_PROBE_RTOL, -GAP_PROBE_RTOL):
+        flow.remember(state)
+        q, v = flow.now.shifted(state.q, d * dq), state.v + d * dv
+        a.append(flow.accelerated(q, v, state).a)
+    return np.asarray(a[0] - a[1]) / (2 * GAP_PROBE_RTOL)
 
 
 def _seen(found: Return, q: Array, v: Array) -> Array:

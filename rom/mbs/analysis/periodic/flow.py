@@ -140,12 +140,19 @@ class Flow:
 
     def _fitted(self, q: Array, v: Array, like: State) -> State:
         """The nearest state that satisfies the constraints, with its accelerations."""
-        packed, W = self.packed, self.W
-        W.signal[:] = self.table[0]
+        self.remember(like)
+        q = assembled(self.packed, self.W, q)
+        return self.accelerated(q, fitting_velocity(self.packed, self.W, q, v), like)
+
+    def remember(self, like: State) -> None:
+        """Count angles from those of a state, at the begin of the period."""
+        self.W.signal[:] = self.table[0]
         if like.base is not None:
-            W.base[:] = like.base
-        q = assembled(packed, W, q)
-        v = fitting_velocity(packed, W, q, v)
+            self.W.base[:] = like.base
+
+    def accelerated(self, q: Array, v: Array, like: State) -> State:
+        """The state with coordinates and velocities that satisfy the constraints."""
+        packed, W = self.packed, self.W
         evaluate(packed.system, W, q, v)
         apply_laws(packed.asked, W, self.t0)
         kept = W.base.copy()

@@ -1,0 +1,143 @@
+"""A gear unit as a mechanism: shafts and housing are bodies in frames that are held.
+
+All motions of a shaft are small in axes that do not spin, its rigid ones too. They are elastic
+coordinates of a body whose frame does not move: modes y of the part with its drive and its thrust
+bearing, q = V y. Films and teeth lie between such bodies as between any others.
+"""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+from scipy.linalg import eigh
+
+from rom.body.flexible import FlexibleBody
+from rom.body.records import Marker
+from rom.body.spread import SpreadLoad
+from rom.components.transmission.unit import Transmission
+from rom.mbs.elements.round_bodies.spins import SPINS_FAMILY, Spin
+from rom.mbs.mechanism import Mechanism
+from rom.mbs.results.solution import Solution
+from rom.model import Array
+
+NAMES = ("pinion", "gear", "housing")
+FRAME = "frame"
+Z_AXIS = np.array([0.0, 0.0, 1.0])
+Rows = Mapping[str, tuple[Array, Array]]
+
+
+def mechanism_of(unit: Transmission, q: Array, v: Array) -> Mechanism:
+    """The unit as a mechanism, which starts in a position with velocities.
+
+    Its time is the angle of the drive over the speed. Films are called ``pinion 0`` by shaft and
+    node, the teeth ``teeth``.
+
+    Args:
+        unit: two geared shafts.
+        q: (n,) coordinates [m, rad].
+        v: (n,) their rates [m/s, rad/s].
+    """
+    mech, matrices = Mechanism(gravity=(0.0, 0.0, 0.0)), unit.matrices
+    places, origins = places_of(unit)
+    for k, at in enumerate(unit.parts[: len(places)]):
+        M, K, G = (A[at, at] for A in matrices)
+        body, V = _held(NAMES[k], M, K, unit.loss, places[k])
+        y, yd = (V.T @ M @ x[at] for x in (q, v))
+        part = mech.add_flexible(NAMES[k], body, at=origins[k], q=y, qd=yd)
+        mech.fixed(f"frame of {NAMES[k]}", mech.ground.marker(origins[k]), part.marker(FRAME))
+        if k < 2:
+            # modes have no surface to tell gyroscopic forces -G v from: they are given
+            mech.parts[NAMES[k]] = replace(part, spin=unit.spins[k] * Z_AXIS)
+            spin = -np.pad(V.T @ G @ V, (3, 0))
+            mech.add(f"spin of {NAMES[k]}", Spin(NAMES[k], spin, 0.0 * G), SPINS_FAMILY)
+            shapes = (V.T @ unit.load[at])[:, None, None] * np.eye(3) / 3
+            load = SpreadLoad(np.zeros(3), np.zeros((3, 3)), shapes)
+            mech.spread_load(f"load of {NAMES[k]}", part, load, frame="world")
+    _add_contacts(mech, unit)
+    return mech
+
+
+def _add_contacts(mech: Mechanism, unit: Transmission) -> None:
+    """Films and teeth."""
+    for name, rotor, turn in (("pinion", unit.pinion, 1.0), ("gear", unit.gear, -1.0)):
+        for node, bearing in rotor.bearings.items():
+            seat = mech.part(name).marker(f"node {node}")
+            bush = mech.ground.marker(mech.design_point(seat))
+            if unit.housing is not None:
+                bush = mech.part("housing").marker(f"{name} {node}")
+            mech.journal_bearing(f"{name} {node}", seat, bush, axis=turn * Z_AXIS,
+                                 reference=(1, 0, 0), bearing=bearing,
+                                 oil=unit.viscosity)  # fmt: skip
+    mesh = unit.mesh
+    wheels = (
+        mech.part(name).marker(f"node {rotor.wheel}")
+        for name, rotor in (("pinion", unit.pinion), ("gear", unit.gear))
+    )
+    mech.gear_mesh("teeth", *wheels, axis=Z_AXIS, pair=mesh.pair, stiffness=mesh.stiffness,
+                   correction=mesh.correction, damping=mesh.damping, entry=0.0,
+                   conservative=False, cells=mesh.cells)  # fmt: skip
+
+
+def coordinates_of(unit: Transmission, solution: Solution) -> tuple[Array, Array]:
+    """(n_t, n) coordinates and rates of the unit in a motion of its mechanism."""
+    bodies, found = solution.packed.system.bodies, []
+    for rows, starts, frame in ((solution.q, bodies.q_at, 7), (solution.v, bodies.v_at, 6)):
+        moved = []
+        for first, r, at in zip(starts, bodies.r, unit.parts, strict=False):
+            V = _modes(*(A[at, at] for A in unit.matrices[:2]))[1]
+            moved.append(rows[:, first + frame : first + frame + r] @ V.T)
+        found.append(np.hstack(moved))
+    return found[0], found[1]
+
+
+def _modes(M: Array, K: Array) -> tuple[Array, Array]:
+    """(n,) squares of frequencies [rad^2/s^2] and (n, n) shapes of unit mass."""
+    squares, V = eigh(K, M)
+    return np.maximum(squares, 0.0), V
+
+
+def places_of(unit: Transmission) -> tuple[list[Rows], list[Array]]:
+    """Of each part its places by name: (3,) points, and (6, n) rows of motion; and its origin."""
+    rotors, distance = (unit.pinion, unit.gear), unit.mesh.pair.distance
+    along = [
+        {node: float((one.shaft.rows(node) @ one.shaft.rigid())[0, 4])
+         for node in (*one.bearings, one.wheel)}
+        for one in rotors
+    ]  # fmt: skip
+    beside = along[0][unit.pinion.wheel] - along[1][unit.gear.wheel]
+    origins = [np.zeros(3), np.array([distance, 0.0, beside])]
+    places: list[Rows] = [
+        {f"node {node}": (z * Z_AXIS, one.shaft.rows(node)) for node, z in heights.items()}
+        for one, heights in zip(rotors, along, strict=True)
+    ]
+    if unit.housing is not None:
+        origins.append(np.zeros(3))
+        places.append({
+            f"{NAMES[k]} {node}": (origins[k] + along[k][node] * Z_AXIS, rows)
+            for k, bushes in enumerate(unit.housing.bushes) for node, rows in bushes.items()
+        })  # fmt: skip
+    return places, origins
+
+
+def _held(name: str, M: Array, K: Array, loss: float, places: Rows) -> tuple[FlexibleBody, Array]:
+    """A body of modes in a frame that will be held, and (n, n) coordinates per mode.
+
+    The frame has no part in the motion; by its mass one counts how far modes move: none moves a
+    place farther than the mechanism is long where it counts as one.
+    """
+    squares, V = _modes(M, K)
+    r, still = squares.size, np.zeros((3, squares.size))
+    markers = {FRAME: Marker(FRAME, np.zeros(3), still, still, "rbe2", np.eye(6, 6 + r))}
+    for key, (point, rows) in places.items():
+        shift, turn = np.split(rows @ V, 2)
+        hold = np.hstack([np.eye(6), np.vstack([shift, turn])])
+        markers[key] = Marker(key, point, shift, turn, "rbe2", hold)
+    mass = 1.0 / max(np.abs(marker.translation).max() for marker in markers.values()) ** 2
+    reach = max(float(np.linalg.norm(marker.point)) for marker in markers.values())
+    body = FlexibleBody(
+        name=name, mass=mass, first_moment=np.zeros(3), inertia=mass * reach**2 * np.eye(3),
+        S=still, Ibar_kl=np.zeros((3, 3, r)), K=np.diag(squares), D=loss * np.diag(squares),
+        S_kl=np.einsum("ab,kl->abkl", np.eye(3) / 3, np.eye(r)), markers=markers,
+        omega=np.sqrt(squares), labels=tuple(f"mode {k + 1}" for k in range(r)),
+    )  # fmt: skip
+    return body, V
