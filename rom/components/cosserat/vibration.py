@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 from scipy.linalg import cholesky, eigh, solve_triangular
-from scipy.sparse import csc_matrix
+from scipy.sparse import block_diag, csc_matrix
 from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh
 
 from rom import rotation
@@ -48,10 +48,8 @@ def gyroscopic(rod: Rod, shape: Shape, spin: npt.ArrayLike) -> csc_matrix:
         W = rotation.skew(w)
         G[k, :3, :3] = J[:, None] * W + W * J - rotation.skew(J * w)
     G[:-1, 3:, 3:] = 2 * rod.mass[:, None, None] * rotation.skew(spin)
-    rows = np.arange(6 * len(rod.p)).reshape(-1, 6)
-    i, j = np.repeat(rows, 6, axis=1).ravel(), np.tile(rows, 6).ravel()
     n = 6 * rod.h.size + 9
-    return csc_matrix((G.ravel(), (i, j)))[:n, :n]
+    return block_diag(G, format="csc")[:n, :n]
 
 
 def modes(
