@@ -219,9 +219,10 @@ class _Run:
             why = failed_step(record, self.W, self.T, int(count[control.ANSWER]), t).message
         return SolverError(
             f"the step became too small at t = {number[control.TIME]:.9g} s ({h:.3g} s): {why}.",
-            hint="A force jumps there, or the mechanism is near a singular position; or ask "
-            f"for less than rtol = {record.settings.rtol:.3g}. The motion up to there is "
-            "kept in error.solution.",
+            hint="A force jumps there, or the mechanism is near a singular position, or bodies "
+            "vibrate faster than anybody asks: take steps of one length, dt=..., that resolve what "
+            f"matters, or ask for less than rtol = {record.settings.rtol:.3g}. The motion up to "
+            "there is kept in error.solution.",
         )
 
     def columns(self, rows: Array) -> tuple[Array, ...]:
