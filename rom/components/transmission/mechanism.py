@@ -21,7 +21,7 @@ from rom.mbs.results.solution import Solution
 from rom.model import Array
 
 NAMES = ("pinion", "gear", "housing")
-FRAME = "frame"
+FRAME_NAME = "frame"
 Z_AXIS = np.array([0.0, 0.0, 1.0])
 Rows = Mapping[str, tuple[Array, Array]]
 
@@ -44,7 +44,7 @@ def mechanism_of(unit: Transmission, q: Array, v: Array) -> Mechanism:
         body, V = _held(NAMES[k], M, K, unit.loss, places[k])
         y, yd = (V.T @ M @ x[at] for x in (q, v))
         part = mech.add_flexible(NAMES[k], body, at=origins[k], q=y, qd=yd)
-        mech.fixed(f"frame of {NAMES[k]}", mech.ground.marker(origins[k]), part.marker(FRAME))
+        mech.fixed(f"frame of {NAMES[k]}", mech.ground.marker(origins[k]), part.marker(FRAME_NAME))
         if k < 2:
             # modes have no surface to tell gyroscopic forces -G v from: they are given
             mech.parts[NAMES[k]] = replace(part, spin=unit.spins[k] * Z_AXIS)
@@ -127,7 +127,7 @@ def _held(name: str, M: Array, K: Array, loss: float, places: Rows) -> tuple[Fle
     """
     squares, V = _modes(M, K)
     r, still = squares.size, np.zeros((3, squares.size))
-    markers = {FRAME: Marker(FRAME, np.zeros(3), still, still, "rbe2", np.eye(6, 6 + r))}
+    markers = {FRAME_NAME: Marker(FRAME_NAME, np.zeros(3), still, still, "rbe2", np.eye(6, 6 + r))}
     for key, (point, rows) in places.items():
         shift, turn = np.split(rows @ V, 2)
         hold = np.hstack([np.eye(6), np.vstack([shift, turn])])

@@ -98,17 +98,17 @@ def _told(packed: Packed, W: Work, q: Array, v: Array, assemble: bool, placing: 
     changes = [_opened(packed, W, placing), *_bent_and_hurried(packed, W, q, v, given)]
     moved = [(what, where) for change, what, where in changes if change > WARNING_RTOL]
     largest = max(change for change, *_ in changes)
-    said = f"{'; '.join(what for what, _ in moved)}."
+    summary = f"{'; '.join(what for what, _ in moved)}."
     if largest > REFUSAL_RTOL and not assemble:
         raise ModelError(
-            f"the start contradicts joints and drives: {said}",
+            f"the start contradicts joints and drives: {summary}",
             where=moved[0][1],
             hint="Let places and drives fit, and velocities: omega about a pin moves the origin, "
             "too. Or let the start be moved (assemble=True; in a file, assemble = true).",
         )
     if moved and not assemble:
         warn(
-            f"the start was moved to fit joints and drives: {said} Draw the bodies so "
+            f"the start was moved to fit joints and drives: {summary} Draw the bodies so "
             "that joints are closed and drives begin where they are, or ask for it (assemble=True)."
         )
     return largest

@@ -21,7 +21,7 @@ MOMENTUM_RTOL = 1e-5  # a second-order method conserves it to the error of its s
 MAX_MEAN_CORRECTIONS = 8.0
 CERTIFIED_RTOL = 1e-6  # of energy on the very edge of a range
 LOOK_EVERY = 4  # instants, where a run looks at its own motion
-MOTION = ("t", "q", "v", "a", "lam", "work", "base", "signals")  # a row for each instant
+MOTION_ARRAYS = ("t", "q", "v", "a", "lam", "work", "base", "signals")  # a row for each instant
 
 
 @typed
@@ -67,7 +67,7 @@ def warn_of_failures(solution: Solution) -> None:
     """
     n = solution.t.size
     seen = np.unique([*range(0, n, LOOK_EVERY), n - 1])
-    motion = {name: getattr(solution, name)[seen] for name in MOTION}
+    motion = {name: getattr(solution, name)[seen] for name in MOTION_ARRAYS}
     rows = _of_steps(replace(solution, **motion, _tracks={}))
     failures = [f"{row.quantity} {row.value:.2g}" for row in rows if not row.ok]
     if failures:

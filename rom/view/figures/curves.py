@@ -28,7 +28,7 @@ LEVEL_STYLE = {"color": GREY, "ls": "-.", "lw": 0.9, "zorder": 1.5}
 RAYS_LABEL = "multiples of the speed"
 MAX_TICKS = 10  # sizes that have room for a tick each
 TICK_DISTANCE = 0.03  # least distance of words of ticks, of a logarithmic axis
-COVERED, COVER_WIDTH = 1.5, 2.4  # apart [pixel]; by which a curve below is wider [point]
+COVER_DISTANCE, COVER_WIDTH = 1.5, 2.4  # apart [pixel]; by which a curve below is wider [point]
 MIN_ERROR = 1e-12  # errors below are drawn there: round-off has no meaning
 
 
@@ -489,7 +489,7 @@ def _uncover(axes: Any) -> None:
             for line in axes.lines if line.get_linestyle() != "None"]  # fmt: skip
     for k, (line, dashes, x) in enumerate(seen):
         above = sum(dashes == other and x.shape == y.shape
-                    and np.allclose(x, y, 0.0, COVERED, equal_nan=True)
+                    and np.allclose(x, y, 0.0, COVER_DISTANCE, equal_nan=True)
                     for _, other, y in seen[k + 1 :])  # fmt: skip
         line.set_linewidth(line.get_linewidth() + COVER_WIDTH * above)
 
