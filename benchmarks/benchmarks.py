@@ -25,8 +25,6 @@ from benchmarks.models import (
     slider_crank,
     top,
 )
-from benchmarks.peers.mechanisms import built
-from benchmarks.peers.mechanisms import chain as row_of
 from benchmarks.timing import timed
 from rom.arguments import one_of
 from rom.model import FEModel
@@ -144,6 +142,7 @@ def chain(lengths: tuple[int, ...] = (4, 16, 64, 256, 1000)) -> Iterator[Figure]
     Args:
         lengths: numbers of links.
     """
+    from benchmarks.peers import mechanisms
     from rom.mbs.integrate.simulation import simulate
 
     straight = bar((0.25, 0.02, 0.012), (8, 1, 1))
@@ -152,7 +151,8 @@ def chain(lengths: tuple[int, ...] = (4, 16, 64, 256, 1000)) -> Iterator[Figure]
     )
     dt, per_link = 1e-3, []
     for n in lengths:
-        mechanism, steps = built(row_of(link, n), link), max(10, min(200, 6400 // n))
+        mechanism = mechanisms.built(mechanisms.chain(link, n), link)
+        steps = max(10, min(200, 6400 // n))
         warm = simulate(mechanism, t_end=2 * dt, dt=dt)
         run = simulate(mechanism, t_end=(2 + steps) * dt, dt=dt, state=warm.final)
         case, speed = f"{n} links of {link.n_modes} modes", run.statistics["steps_per_second"]
