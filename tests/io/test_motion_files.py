@@ -92,7 +92,7 @@ def mixed():
     mech.cylindrical("pin", mech.ground.marker(mech.design_point(body.marker("a"))),
                      body.marker("a"), axis=(0, 0, 1))  # fmt: skip
     mech.add_rigid("ball", mass=1.0, inertia=(1, 1, 1), at=(0, 0, 0), velocity=(1, 0, 0))
-    return rom.simulate(mech, t_end=0.02, dt=1e-3)
+    return rom.simulate(mech, t_end=0.02, dt=1e-3, assemble=True)
 
 
 def test_a_data_frame_is_the_table_of_the_file(mixed, tmp_path):
