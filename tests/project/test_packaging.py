@@ -36,7 +36,7 @@ mech.revolute("big end", crank.marker("pin"), rod.marker("root"), axis=(0, 0, 1)
 mech.spherical("small end", rod.marker("tip"), slider.marker("pin"))
 mech.prismatic("guide", ground.marker(({L1 + L2}, 0, 0)), slider.marker("pin"), axis=(1, 0, 0))
 mech.drive("motor", "main", lambda t: {SPEED} * t)
-sol = rom.simulate(mech, t_end=2e-3, dt=1e-4)
+sol = rom.simulate(mech, t_end=2e-3, dt=1e-4, assemble=True)
 print(rom.__file__)
 print(*sol.position("slider")[:, 0])
 """
