@@ -18,7 +18,6 @@ MAX_ONE_WORD = 40
 # constants of one word that are clear: what they are, by name
 CLEAR = {
     "ADMITTED": "share of a contact in a kernel",
-    "ALPHA": "symbol of the method",
     "ALUMINIUM": "a material",
     "CHORD": "of a blade, in a kernel",
     "DPI": "unit of the resolution of pictures",
