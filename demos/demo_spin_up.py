@@ -4,6 +4,8 @@
 # about its base, from rest to 6 rad/s within 15 s. Multibody programs of the day let it bend
 # without limit: they knew that rotation softens a bar, not that the pull of centrifugal force
 # stiffens it. Here the bar is a solid, reduced once with and once without its geometric stiffness.
+# On mean axes, where rom integrates every body, most of the pull acts on their turning against the
+# base, which is exact: without geometric stiffness the bar no longer runs away, but is wrong.
 #
 # Run: `python demos/demo_spin_up.py`, or under `mpirun -n 2`
 # Writes: `spin_up.png` into `out/`; another folder with `--out`
@@ -94,10 +96,9 @@ sol, u, v = spin_up(stiff, 18.0)
 say(rom.audit(sol))
 with warnings.catch_warnings(record=True) as said:
     warnings.simplefilter("always")
-    sol_soft, _, v_soft = spin_up(soft, 10.0)
+    sol_soft, _, v_soft = spin_up(soft, 18.0)
 for warning in said:
     say(f"without stiffening: {warning.message}")
-t_away = sol.t[np.argmax(np.abs(v_soft) > 1.0)]
 
 # Extreme of a geometrically exact beam, and its deflection at some instants.
 EXACT = {2.5: -0.15128, 5.0: -0.46845, 6.76: -0.57379, 7.5: -0.55905, 10.0: -0.36277,
@@ -105,11 +106,9 @@ EXACT = {2.5: -0.15128, 5.0: -0.46845, 6.76: -0.57379, 7.5: -0.55905, 10.0: -0.3
 
 if first:
     options.out.mkdir(parents=True, exist_ok=True)
-    runaway = np.full(sol.t.size, np.nan)
-    runaway[: v_soft.size] = np.where(np.abs(v_soft) < 1.0, v_soft, np.nan)
     omega = sol.omega("bar")[:, 2]
     at = {f"after {sol.t[v.argmin()]:.1f} s": (stiff, sol, v.argmin(), "#2f7f9f"),
-          f"without, {t_away:.1f} s": (soft, sol_soft, np.argmax(np.abs(v_soft) > 1.0), "#d1495b"),
+          f"without, {sol.t[v_soft.argmin()]:.1f} s": (soft, sol_soft, v_soft.argmin(), "#d1495b"),
           "at rest": (stiff, sol, 0, "#c3c9d0")}  # fmt: skip
     seen = {"base": view.cylinder((0, 0, -0.3), (0, 0, 0.3), 0.5)}  # seen along the axis
     for name, (body, motion, k, colour) in at.items():
@@ -119,7 +118,7 @@ if first:
         sol.t,
         [
             ("deflection of the tip [m]", {
-                "with geometric stiffness": v, "without": runaway,
+                "with geometric stiffness": v, "without": v_soft,
                 "geometrically exact beam": (list(EXACT), list(EXACT.values())),
             }),
             ("axial displacement of the tip [mm]", {"": 1e3 * u}),
@@ -134,8 +133,7 @@ if first:
         caption="Right: the bar in true size. The base accelerates and the tip lags behind; after "
         "15 s the bar turns steadily. "
         "Points: spectral solution of a geometrically exact beam. Without geometric stiffness the "
-        f"bar is too soft from the start, and beyond {2 * np.pi * f_rest:.2f} rad/s it has none "
-        "left and bends without limit; its curve is cut at 1 m. Bending draws the tip towards the "
+        "bar bends a fifth too far and comes back too late. Bending draws the tip towards the "
         "base; in the end centrifugal force stretches the bar by half a millimetre.",
     )  # fmt: skip
 
@@ -152,7 +150,7 @@ results = {
     "time of the extreme [s]": (sol.t[v.argmin()], 6.76, 2e-3),
     "largest axial displacement [m]": (u.min(), -0.01882, 3e-3),
     "stretch in the end [m]": (u[sol.t > END].mean(), 5.1395e-4, 5e-3),
-    "time when the bar without stiffening has bent by 1 m [s]": (t_away, 6.78, 2e-3),
+    "extreme without stiffening, of that with it": (v_soft.min() / v.min(), 1.19, 5e-3),
 }
 if first:
     for name, (value, expected, tolerance) in results.items():
