@@ -80,14 +80,13 @@ def _add_contacts(mech: Mechanism, unit: Transmission) -> None:
 
 def coordinates_of(unit: Transmission, solution: Solution) -> tuple[Array, Array]:
     """(n_t, n) coordinates and rates of the unit in a motion of its mechanism."""
-    bodies, found = solution.packed.system.bodies, []
-    for rows, starts, frame in ((solution.q, bodies.q_at, 7), (solution.v, bodies.v_at, 6)):
-        moved = []
-        for first, r, at in zip(starts, bodies.r, unit.parts, strict=False):
-            V = _modes(*(A[at, at] for A in unit.matrices[:2]))[1]
-            moved.append(rows[:, first + frame : first + frame + r] @ V.T)
-        found.append(np.hstack(moved))
-    return found[0], found[1]
+    bodies = solution.packed.system.bodies
+    q, v = [], []
+    for i, k, r, at in zip(bodies.q_at, bodies.v_at, bodies.r, unit.parts, strict=False):
+        V = _modes(*(A[at, at] for A in unit.matrices[:2]))[1]
+        q.append(solution.q[:, i + 7 : i + 7 + r] @ V.T)
+        v.append(solution.v[:, k + 6 : k + 6 + r] @ V.T)
+    return np.hstack(q), np.hstack(v)
 
 
 def _modes(M: Array, K: Array) -> tuple[Array, Array]:
