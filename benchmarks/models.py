@@ -153,7 +153,7 @@ def geometry(name: str) -> Path:
 
 def shaft_in_films(cavitation: Any) -> Any:
     """A free shaft with an unbalance in two oil films of 120 x 8 cells."""
-    from rom.mbs.elements.films.bearing import Groove, JournalBearing
+    from rom.components.journal_bearing.films.bearing import Groove, JournalBearing
     from rom.mbs.mechanism import Mechanism
 
     mech, z = Mechanism(gravity=(0, -9.81, 0)), (0, 0, 1)
@@ -174,7 +174,7 @@ def planetary_train(**more: Any) -> Any:
     Args:
         more: what else the meshes are given.
     """
-    from rom.mbs.elements.gears.geometry import GearPair
+    from rom.components.gear_mesh.gears.geometry import GearPair
     from rom.mbs.mechanism import Mechanism
 
     sun_pair = GearPair((24, 24), 2e-3, 0.02, thinning=2e-5)

@@ -24,7 +24,12 @@ class Front(ModuleType):
         if name in self.PACKAGES:
             return importlib.import_module(f"{self.__name__}.{name}")
         if name in self.MODULES:
-            return getattr(importlib.import_module(self.MODULES[name]), name)
+            try:
+                return getattr(importlib.import_module(self.MODULES[name]), name)
+            except ModuleNotFoundError as error:
+                from rom.fields import missing
+
+                raise missing(name, error) or error from None
         text = f"module {self.__name__!r} has no attribute {name!r}"
         if not name.startswith("_"):
             from difflib import get_close_matches
@@ -40,6 +45,39 @@ class Front(ModuleType):
 
     def __dir__(self) -> list[str]:
         return sorted({*self.__all__, *self.PACKAGES})
+
+
+class Moved:
+    """Finds modules of fields under their earlier names, which pickles of then have."""
+
+    def find_spec(self, name: str, *_: object) -> object:
+        """Where a module is, if it was moved."""
+        if not name.startswith("rom.mbs."):
+            return None
+        from importlib.util import spec_from_loader
+
+        from rom.fields import names
+
+        found = (f"{new}{name[len(old) :]}" for old, new in names("moved").items()
+                 if f"{name}.".startswith(f"{old}."))  # fmt: skip
+        place = next(found, "")
+        if not place:
+            return None
+        self.module = importlib.import_module(place)
+        self.spec = self.module.__spec__
+        package = hasattr(self.module, "__path__")  # an empty one, so that its modules come here
+        return spec_from_loader(name, self, is_package=package)  # type: ignore[arg-type]
+
+    def create_module(self, spec: "Any") -> ModuleType | None:
+        """The module itself."""
+        return self.module if spec.submodule_search_locations is None else None
+
+    def exec_module(self, module: ModuleType) -> None:
+        """It has run already."""
+        module.__spec__ = self.spec if module is self.module else module.__spec__
+
+
+sys.meta_path.append(Moved())  # type: ignore[arg-type]
 
 
 def front(package: str) -> None:

@@ -119,7 +119,6 @@ _JOURNAL = 1e-4, 10.0, "m", "journals have 0.001 m to 1.5 m"
 _ANGLE = -2 * TURN, 2 * TURN, "rad", "a whole turn has 6.283 rad"
 _LIMITS: dict[str, tuple[float, float, str, str]] = {
     "module": (1e-5, 0.2, "m", "gears have 5e-05 m (watches) to 0.1 m"),
-    "gear_mesh.stiffness": (1e6, 1e13, "N/m^2", "teeth of steel have about 1e10 per width"),
     "clearance": (-0.01, 0.02, "m", "bearings have 1e-06 m to 0.001 m"),
     "Groove.pressure": (1e3, 1e8, "Pa", "oil comes in at 1e4 to 1e7"),
     "Oil.density": (300.0, 3000.0, "kg/m^3", "oils have 700 to 1100"),

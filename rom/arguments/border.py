@@ -10,7 +10,7 @@ from collections.abc import Callable
 from difflib import get_close_matches
 from functools import wraps
 from inspect import Parameter, signature
-from typing import Any, NoReturn, TypeVar
+from typing import Any, TypeVar
 
 from rom.arguments.kinds import Names, Taken, Unfit, call_of, taken_by
 from rom.arguments.values import is_number, shortened
@@ -45,7 +45,7 @@ def typed(public: Public) -> Public:
     """
     if not isinstance(public, type):
         return _typed_function(public)  # type: ignore[return-value]
-    if not hasattr(public, "__getattr__"):
+    if "__getattr__" not in vars(public):
         public.__getattr__ = _unknown  # type: ignore[attr-defined]
     for name, member in list(vars(public).items()):
         if name.startswith("_") and name != "__init__":
@@ -57,8 +57,10 @@ def typed(public: Public) -> Public:
     return public
 
 
-def _unknown(record: Any, name: str) -> NoReturn:
-    """Raise what Python would, with the names that are near."""
+def _unknown(record: Any, name: str) -> Any:
+    """What a field gives, see `rom.fields`; else raise what Python would, with the names near."""
+    if getattr(type(type(record)), "bind", None) and type(record).bind(name):
+        return getattr(record, name)
     kind = type(record).__name__
     text = f"{kind!r} object has no attribute {name!r}"
     if name.startswith("_"):

@@ -2,8 +2,10 @@
 
 import argparse
 from collections.abc import Sequence
+from contextlib import suppress
 from typing import Any, NoReturn
 
+from rom import fields
 from rom.cli.options import options_of
 from rom.cli.verbs import (
     bench,
@@ -21,7 +23,7 @@ from rom.cli.verbs import (
     view,
 )
 from rom.config.keys import nearest
-from rom.errors import ConfigError
+from rom.errors import ConfigError, UnknownNameError
 
 VERBS = (
     doctor,
@@ -70,7 +72,8 @@ class ShowSchema(argparse.Action):
         from rom.cli.schemas import schema
         from rom.cli.speech import say
 
-        say(to_json(schema(parser.prog.split()[-1])))
+        verb = parser.prog.split()[-1]
+        say(to_json(schema(verb, getattr(verb_modules()[verb], "SCHEMA", None))))
         parser.exit()
 
 
@@ -101,6 +104,7 @@ class Parser(argparse.ArgumentParser):
 
     def _check_value(self, action: argparse.Action, value: object) -> None:
         if action.choices is not None and value not in action.choices:
+            fields.find("verbs", str(value))  # of a field that is not here
             known = [str(choice) for choice in action.choices]
             raise ConfigError(
                 f"the {action.dest} {str(value)!r} does not exist.",
@@ -129,6 +133,15 @@ def _verb_parsers(parser: argparse.ArgumentParser) -> list[argparse.ArgumentPars
     return []
 
 
+def verb_modules() -> dict[str, Any]:
+    """{verb: its module}, those of fields behind those of the program."""
+    found = {module.__name__.rpartition(".")[2]: module for module in VERBS}
+    for name in fields.names("verbs"):
+        with suppress(UnknownNameError):
+            found.setdefault(name, fields.find("verbs", name))
+    return found
+
+
 def build_parser() -> Parser:
     """The whole grammar; loads nothing heavy."""
     parser = Parser(
@@ -141,8 +154,7 @@ def build_parser() -> Parser:
     parser.add_argument("--version", action="store_true", help="print the version and leave")
     add_common(parser, default=False)
     verbs = parser.add_subparsers(dest="verb", metavar="VERB", title="verbs", parser_class=Parser)
-    for module in VERBS:
-        name = module.__name__.rpartition(".")[2]
+    for name, module in verb_modules().items():
         sub = verbs.add_parser(
             name,
             help=module.SUMMARY,

@@ -256,9 +256,9 @@ ERROR = record(
 )
 
 
-def schema(verb: str) -> Schema:
+def schema(verb: str, own: Schema | None = None) -> Schema:
     """The schema of everything a verb can print with ``--json``: its answer, or an error."""
-    own = VERBS[verb]
+    own = own or VERBS[verb]
     answer = own | {
         "properties": {"ok": flag("whether everything holds")}
         | own["properties"]

@@ -1,7 +1,8 @@
 """Engineering components on the light layers.
 
 Structures: rods of `cosserat`, sheets of `assumed_strain`, `masonry`, `rockfall`.
-Machines: `hand`, `linkages`, `wind`, `gear_mesh`, `journal_bearing`, `transmission`. Methods:
+Machines: `hand`, `linkages`, `wind`, `gear_mesh`, `journal_bearing`,
+`rolling_bearing`, `transmission`, `tendons`, `round_bodies`. Methods:
 `updating` by measured responses, `best_matching`. `histories` are what
 changes in time, `compiled` is the compiler of their kernels.
 """

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from rom.config.keys import Place, nearest
 from rom.config.laws import Law, law_of
-from rom.config.machines import correction, gear_pair, journal_bearing, oil, rolling_bearing
-from rom.config.mechanism_keys import IMPACT
+from rom.config.mechanism_keys import IMPACT, POSE, sections
 from rom.config.python_files import function_of, plain_function_of
 from rom.errors import ConfigError
 
@@ -26,6 +25,7 @@ METHODS = {  # section: method of a mechanism; in the others the kind of the ent
     "frictions": "friction",
 }
 Measured = tuple[float, float]  # value and rate
+GROUND = "ground"
 DIRECTIONS = {"rising": 1, "falling": -1, "both": 0}
 
 
@@ -60,7 +60,7 @@ class Entry:
         Raises:
             RomError: for what the mechanism refuses.
         """
-        connect = CALLS.get(self.section, _plainly)
+        connect = sections()[self.section].connect or CALLS.get(self.section, _plainly)
         connect(self)
 
     def law(self, key: str) -> Law:
@@ -167,48 +167,6 @@ def _contact(entry: Entry) -> None:
     kind, impact = entry.values.pop("kind"), entry.take_impact()
     body = [entry.take_body()] if "body" in entry.values else []
     getattr(entry.made, kind)(entry.name, *entry.ends, *body, impact, **entry.values)
-
-
-def _gear_mesh(entry: Entry) -> None:
-    from rom.mbs.elements.gears.hertz import Hertz
-
-    values = entry.values
-    values["pair"] = gear_pair(entry.name, values["pair"])
-    values["correction"] = correction(values["correction"])
-    if "hertz" in values:
-        values["hertz"] = Hertz(**values["hertz"])
-    entry.made.gear_mesh(entry.name, *entry.ends, **values)
-
-
-def _rolling_bearing(entry: Entry) -> None:
-    how = {key: entry.values.pop(key) for key in ("axis", "damping", "phase")}
-    bearing = rolling_bearing(entry.values)
-    entry.made.rolling_bearing(entry.name, *entry.ends, bearing=bearing, **how)
-
-
-def _journal_bearing(entry: Entry) -> None:
-    values = entry.values
-    values |= {"bearing": journal_bearing(values["bearing"]), "oil": oil(values["oil"])}
-    entry.made.journal_bearing(entry.name, *entry.ends, **values)
-
-
-def _tendon(entry: Entry) -> None:
-    from rom.mbs.elements.tendons.tendons import Pulley
-
-    values, pulleys = entry.values, entry.values.pop("pulleys")
-    for key in ("free_length", "tension"):
-        if isinstance(values.get(key), Mapping):
-            values[key] = entry.law(key).value
-    names = entry.marker_names
-    for name in pulleys:
-        if name not in names:
-            place = entry.place.at("pulleys").at(name)
-            raise place.error(f"{name!r} is no marker of the path.", nearest(name, names))
-    path = [
-        Pulley(marker, **pulleys[name]) if name in pulleys else marker
-        for marker, name in zip(entry.ends, names, strict=True)
-    ]
-    entry.made.tendon(entry.name, path, **values)
 
 
 def _law(entry: Entry) -> None:
@@ -346,10 +304,6 @@ CALLS: dict[str, Callable[[Entry], None]] = {
     "bushings": _bushing,
     "stops": _stop,
     "contacts": _contact,
-    "gear_meshes": _gear_mesh,
-    "rolling_bearings": _rolling_bearing,
-    "journal_bearings": _journal_bearing,
-    "tendons": _tendon,
     "laws": _law,
     "events": _event,
 }
@@ -361,11 +315,24 @@ LAWS: dict[str, Callable[[Entry], None]] = {
 }
 
 
-def check_name(name: str, ground: str) -> None:
+def check_name(name: str) -> None:
     """Refuse names of bodies and rods that markers could not name.
 
     Raises:
         ConfigError: for one with a dot, or that of the ground.
     """
-    if "." in name or name == ground:
+    if "." in name or name == GROUND:
         raise ConfigError(f"{name!r} is no name for a body: markers are written body.marker.")
+
+
+def pose_of(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Where the frame of a body is at the start, and how it moves."""
+    from rom import rotation
+    from rom.arguments import unit_vector
+
+    pose = {key: values[key] for key in ("at", *(key.name for key in POSE)) if key in values}
+    turned = pose.get("orientation")
+    if isinstance(turned, Mapping):
+        axis = unit_vector("axis", turned["axis"])
+        pose["orientation"] = rotation.exp(turned["angle"] * axis)
+    return pose

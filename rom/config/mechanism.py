@@ -5,22 +5,21 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rom.arguments import typed
-from rom.config.component import Described, change, read_component
-from rom.config.connections import Entry, check_name
+from rom.config.component import Described, Located, change, read_component
+from rom.config.connections import GROUND, Entry, check_name, pose_of
 from rom.config.document import read_document
 from rom.config.keys import Place, nearest, raise_mistakes, read_table
 from rom.config.laws import Pending
-from rom.config.mechanism_keys import SECTIONS, TABLE
+from rom.config.mechanism_keys import mechanism_table, sections
 from rom.config.python_files import check_trust, python_entries
-from rom.config.rods import rod_of
 from rom.errors import ConfigError, warn
+from rom.fields import find
 
 if TYPE_CHECKING:
     from rom.mbs.integrate.keeping import Keeping
     from rom.mbs.mechanism import Mechanism
     from rom.mbs.results.solution import Solution
 
-GROUND = "ground"
 # of the mechanism's size; bores of a mesh are polygons, so that small gaps are normal
 GAP_RTOL = 1e-2
 MARKER_KEYS = ("between", "marker", "markers", "path")
@@ -29,7 +28,7 @@ MassProperties = tuple[float, Any, Any, dict[str, Any]]  # mass, centre, inertia
 
 
 class MechanismFile(Described):
-    """A mechanism as its file describes it, by the keys of `rom.config.mechanism_keys.TABLE`."""
+    """A mechanism as its file describes it, by the keys of `rom.config.mechanism_keys`."""
 
     __slots__ = ()
 
@@ -47,9 +46,9 @@ class MechanismFile(Described):
         for name, values in self.values["bodies"].items():
             with self.at("bodies", name):
                 _add_body(made, name, dict(values), self.meshing)
-        for name, values in self.values["rods"].items():
-            with self.at("rods", name):
-                _add_rod(made, name, dict(values), Place(self.document, ("rods", name)))
+        for section, name, values in self._entries(bodies=True):
+            with self.at(section, name):
+                self._connect(made, section, name, dict(values))
         self._refuse_unknown_markers(made)
         for section, name, values in self._connections():
             with self.at(section, name):
@@ -81,9 +80,14 @@ class MechanismFile(Described):
         with self.at("simulation"):
             return simulate(made, progress=progress, keep=keep, **self.values["simulation"])
 
+    def _entries(self, *, bodies: bool) -> list[tuple[str, str, dict[str, Any]]]:
+        """Section, name and values of all sections of bodies, or of all others."""
+        some = [name for name, section in sections().items() if section.bodies is bodies]
+        return [(s, name, values) for s in some for name, values in self.values[s].items()]
+
     def _connections(self) -> list[tuple[str, str, dict[str, Any]]]:
         """Section, name and values; gears behind the joints they couple."""
-        entries = [(s, name, v) for s in SECTIONS for name, v in self.values[s].items()]
+        entries = self._entries(bodies=False)
         gears = [entry for entry in entries if entry[2].get("kind") == "gear"]
         joints = [e for e in entries if e[0] == "joints" and e not in gears]
         return [*joints, *gears, *(entry for entry in entries if entry[0] != "joints")]
@@ -147,7 +151,7 @@ class MechanismFile(Described):
         body, where = marker
         names: dict[str, Any] = {GROUND: self.values["ground"]}
         names |= {key: made.parts[key].names for key in self.values["bodies"]}
-        names |= {key: _places(made, key) for key in self.values["rods"]}
+        names |= {key: _places(made, key) for key in made.nonlinear}
         if body not in names:
             place.mistakes.append(place.error(f"there is no body {body!r}.", nearest(body, names)))
             return
@@ -157,7 +161,7 @@ class MechanismFile(Described):
                 list(made.nonlinear[body].body.places) if body in made.nonlinear else names[body]
             )
             place.mistakes.append(place.error(f"{what} {where!r}.", nearest(where, known)))
-        elif not isinstance(where, str) and body in self.values["rods"]:
+        elif not isinstance(where, str) and body in made.nonlinear:
             frames = f'"{body}.start", "{body}.end" or "{body}.3" for its frame 3'
             what = f"rod {body!r} has no points of its own."
             place.mistakes.append(place.error(what, f"Write {frames}."))
@@ -185,9 +189,8 @@ def _turns(made: "Mechanism", joint: str, coordinate: str | None) -> bool:
 def _add_body(
     made: "Mechanism", name: str, values: dict[str, Any], meshing: dict[str, Any]
 ) -> None:
-    check_name(name, GROUND)
-    if "orientation" in values:
-        values["orientation"] = _orientation(values["orientation"])
+    check_name(name)
+    values |= pose_of(values)
     if "file" not in values:
         made.add_rigid(name, **values)
         return
@@ -202,26 +205,6 @@ def _add_body(
     if reference is not None:
         body = body.with_reference(reference[0] if len(reference) == 1 else reference)
     made.add_flexible(name, body, **values)
-
-
-def _add_rod(made: "Mechanism", name: str, values: dict[str, Any], place: Place) -> None:
-    from rom.mbs.elements.rods.bodies import body
-
-    check_name(name, GROUND)
-    keys = ("at", "orientation", "velocity", "omega")
-    pose = {key: values[key] for key in keys if key in values}
-    if "orientation" in pose:
-        pose["orientation"] = _orientation(pose["orientation"])
-    made.add_nonlinear(name, body(rod_of(values, place)), **pose)
-
-
-def _orientation(value: Any) -> Any:
-    from rom import rotation
-    from rom.arguments import unit_vector
-
-    if not isinstance(value, Mapping):
-        return value
-    return rotation.exp(value["angle"] * unit_vector("axis", value["axis"]))
 
 
 def _body_of(file: Path, meshing: dict[str, Any]) -> Any:
@@ -303,14 +286,18 @@ def read_mechanism(
             "this is a component; a mechanism is needed.", where=document.where(()),
             hint="A mechanism has [bodies], one of which may have this file.",
         )  # fmt: skip
-    if not {"bodies", "rods"} & set(document.data):
+    bodies = (name for name, section in sections().items() if section.bodies)
+    if not {"bodies", *bodies} & set(document.data):
         raise ConfigError(
             "bodies is missing.", where=document.where(()), hint="Add [bodies.NAME].",
         )  # fmt: skip
+    for name in document.data.keys() - sections().keys():
+        with Located(document, (name,)):
+            find("sections", name)  # of a field that is not here
     for key, value in (changes or {}).items():
         change(document.data, key, value)
     meshing = {"trust": trust, "time_limit": time_limit, "memory_limit": memory_limit}
-    file = MechanismFile(document, read_table(TABLE, document), meshing)
+    file = MechanismFile(document, read_table(mechanism_table(), document), meshing)
     with file.at("simulation", "dt"):
         _check_step(file.values["simulation"])
     return file

@@ -1,8 +1,10 @@
 """The keys of a mechanism file."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from functools import cache
+from typing import Any, ClassVar, NamedTuple
 
 from rom.config.expressions import FormulaTable, formula_keys, formula_kind
 from rom.config.keys import (
@@ -22,9 +24,9 @@ from rom.config.keys import (
     as_text,
 )
 from rom.config.laws import ByCoordinate, law_kind
-from rom.config.machines import CORRECTION, GEAR_PAIR, HERTZ, JOURNAL_BEARING, OILS, ROLLING
 from rom.config.python_files import PYTHON_KEYS
-from rom.config.rods import ROD_KEYS
+from rom.errors import UnknownNameError
+from rom.fields import find, names
 
 POINT, DIRECTION = Quantity("m", ((3,),)), Quantity("1", ((3,),))
 
@@ -100,13 +102,6 @@ FROM_FILE = Table("A body from a file; its frame is that of its geometry.", (
     SPIN,
     Key("q", Quantity("1", ((None,),)), "Elastic coordinates at the start; zero if missing."),
     Key("qd", Quantity("1", ((None,),)), "Their rates at the start; zero if missing."),
-))  # fmt: skip
-ROD = Table(
-    "A geometrically exact rod. Markers are its ends, `rod.start` and `rod.end`, and its frames by "
-    "number, `rod.0`, `rod.1`, ...", (
-    *ROD_KEYS,
-    Key("at", POINT, "Origin of its frame at the start.", [0.0, 0.0, 0.0]),
-    *POSE,
 ))  # fmt: skip
 
 
@@ -249,13 +244,6 @@ SPREAD_KEYS = (
     Key("frame", Text(("body", "world")), "Axes in which it keeps its direction.", "body"),
 )
 MANY = Key("markers", Markers(), "On which it acts.", ...)
-PULLEY = Table("A pulley in place of an eyelet.", (
-    Key("radius", RADIUS, "Of the cable.", ...),
-    Key("axis", DIRECTION, "In the world at the start; the cable goes around it in the positive "
-        "sense.", ...),
-    Key("friction", Quantity(), "Coefficient between cable and pulley.", 0.0),
-    Key("turns", Whole(0), "Whole turns beyond the wrap of less than one.", 0),
-))  # fmt: skip
 LAWS = {
     "line": formula_kind("N", MOTION, "A force along the line between two markers, positive when "
                          "it pushes them apart: x is its length, v its rate.", BETWEEN),
@@ -300,12 +288,32 @@ EVENTS = {
         Key("markers", Markers(), "It asks for, beyond those with names."), *PYTHON_KEYS, *WHEN,
     )),
 }  # fmt: skip
-ROLLING_KEYS = (
-    BETWEEN, AXIS,
-    Key("damping", Quantity("s/m"), "Force on a ball grows by this factor of its speed.", 0.0),
-    Key("phase", Quantity("rad"), "Angle of the first one.", 0.0),
-)  # fmt: skip
-SECTIONS: dict[str, tuple[str, Kind]] = {  # connections and forces: what, and how
+
+
+class Section(NamedTuple):
+    """A section of a mechanism file.
+
+    Attributes:
+        about: what its entries are.
+        kind: how they are written.
+        connect: what an `Entry` of it does, see `rom.config.connections`.
+        bodies: whether they are bodies, which markers name.
+        summary: a sentence about them, where there is more to say.
+    """
+
+    about: str
+    kind: Kind
+    connect: Callable[[Any], None] | None = None
+    bodies: bool = False
+    summary: str = ""
+
+    def key(self, name: str) -> Key:
+        """The section as a key of the file."""
+        summary = self.summary or f"{self.about.capitalize()}."
+        return Key(name, Named(self.kind, self.about), summary, {})
+
+
+BEFORE_FIELDS: dict[str, tuple[str, Kind]] = {  # connections and forces: what, and how
     "joints": ("joints", Variants(JOINTS)),
     "drives": ("prescribed joint coordinates", Table("A joint coordinate prescribed in time.", (
         JOINT,
@@ -336,59 +344,8 @@ SECTIONS: dict[str, tuple[str, Kind]] = {  # connections and forces: what, and h
         Key("turning_damping", Quantity("N m s/rad", ((3,),)), "About them.", [0.0, 0.0, 0.0]),
         Key("axes", Quantity("1", ((4,), (3, 3))), "Axes to world at the start; world if missing."),
     ))),
-    "tendons": ("cables", Table("A cable through eyelets and over pulleys, which goes slack.", (
-        Key("path", Markers(), "Markers in the order in which it passes them.", ...),
-        Key("pulleys", Named(PULLEY, "pulleys"), "Which of these markers are pulleys.", {}),
-        Key("EA", Quantity("N", positive=True), "Force per strain; none if it is pulled."),
-        Key("damping", Quantity("N s"), "Tension per rate of strain.", 0.0),
-        Key("free_length", law_kind("m"), "Length without force, over time for a winch; that at "
-            "the start if missing."),
-        Key("pretension", Quantity("N"), "Tension at the start, in its place.", 0.0),
-        Key("tension", law_kind("N"), "Force that pulls at its first end, in place of EA."),
-        Key("friction", Quantity(), "Coefficient at all eyelets.", 0.0),
-        Key("transition_speed", Quantity("m/s", positive=True),
-            "Of the sliding cable, over which friction turns."),
-    ))),
-    "gear_meshes": ("gear meshes", Table("Involute teeth of two wheels in contact.", (
-        Key("between", Markers(two=True), "Middle of the faces of pinion and gear.", ...),
-        Key("axis", DIRECTION, "Of the pinion, in the world at the start.", ...),
-        Key("pair", GEAR_PAIR, "The wheels.", ...),
-        Key("stiffness", Quantity("N/m^2", ((), (None,))), "Of one pair of teeth per length of "
-            "contact line; one, or from first to last contact.", ...),
-        Key("correction", CORRECTION, "Of the working flanks.", {}),
-        Key("damping", Quantity("s"), "Force per rate over force per deflection.", 0.0),
-        Key("friction", Quantity(), "Coefficient between the flanks.", 0.0),
-        Key("transition_speed", Quantity("m/s", positive=True),
-            "Of sliding flanks, over which friction turns."),
-        Key("cells", Whole(1), "Slices across the face.", 21),
-        Key("phase", Quantity("rad"), "Turn of the pinion at the start; so that teeth stand in "
-            "gaps if missing."),
-        Key("entry", Quantity(), "Share of the base pitch over which teeth take up load.", 0.02),
-        Key("conservative", Flag(), "Whether forces follow the energy along the path of contact."),
-        Key("hertz", HERTZ, "Contact that gives way by its load."),
-        Key("coupling", Quantity("m"), "Length over which slices carry each other.", 0.0),
-    ))),
-    "rolling_bearings": ("rolling bearings", Variants({
-        kind: Table(table.about, (*ROLLING_KEYS, *table.keys)) for kind, table in ROLLING.items()
-    }, {kind: kind for kind in ROLLING})),
-    "journal_bearings": ("journal bearings", Table("An oil film between journal and bush.", (
-        Key("between", Markers(two=True), "On the axis of the journal, and in the middle of the "
-            "bush.", ...),
-        Key("axis", DIRECTION, "Of both, in the world at the start.", ...),
-        Key("reference", DIRECTION, "From where angles count, across the axis; X if missing."),
-        Key("bearing", JOURNAL_BEARING, "Its sizes.", ...),
-        Key("oil", Variants(OILS, {"viscosity": "constant", "grade": "grade", "nu_40": "oil"}),
-            "In it.", ...),
-        Key("inlet", Quantity(), "Temperature of the oil that comes in [degrees Celsius]."),
-        Key("roughness", Quantity("m"), "Height at which journal and bush touch.", 0.0),
-        Key("carried", Quantity(), "Share of the heat that leaves with the oil.", 0.9),
-        Key("felt", Quantity(), "Share of the rise that the film feels.", 0.5),
-        Key("thermal_time", Quantity("s", positive=True), "Over which its temperature follows.",
-            1.0),
-        Key("elastic_bush", Flag(), "Whether its pressure bends the bore, which has functions.",
-            False),
-        Key("tabulated", Flag(), "Whether it is read from a table.", False),
-    ))),
+}  # fmt: skip
+BEHIND_FIELDS: dict[str, tuple[str, Kind]] = {
     "forces": ("forces", Table("A force on a marker.", (
         MARKER, Key("vector", Quantity("N", ((3,),)), "The force.", ...), FACTOR, FRAME,
     ))),
@@ -441,14 +398,33 @@ OUTPUT = Table("What `rom simulate` writes beside the table `motion.csv`.", (
     Key("view", DIRECTION, "Direction to the eye."),
     Key("up", DIRECTION, "Upright direction."),
 ))  # fmt: skip
-TABLE = Table("A mechanism.", (
+BEFORE_BODIES = (
     Key("name", Text(), "Its name; that of the file if missing."),
     Key("gravity", Quantity("m/s^2", ((3,),)), "Acceleration of gravity.", [0.0, 0.0, -9.81]),
     Key("bodies", Named(Body(), "bodies"), "What moves, beside rods.", {}),
-    Key("rods", Named(ROD, "rods"), "Slender bodies of any deflection.", {}),
-    Key("ground", Named(POINT, "points"), "Named points of the ground.", {}),
-    *(Key(name, Named(kind, what), what.capitalize() + ".", {})
-      for name, (what, kind) in SECTIONS.items()),
+)
+GROUND_POINTS = Key("ground", Named(POINT, "points"), "Named points of the ground.", {})
+HOW = (
     Key("simulation", SIMULATION, "How it is moved.", ...),
     Key("output", OUTPUT, "What is written.", {}),
-))  # fmt: skip
+)
+
+
+@cache
+def sections() -> dict[str, Section]:
+    """Sections of the core and, between them, those of all fields that are here."""
+    of_fields = {}
+    for name in names("sections"):
+        with suppress(UnknownNameError):  # told where a file has the section
+            of_fields[name] = find("sections", name)
+    first, last = ({name: Section(*one) for name, one in some.items()}
+                   for some in (BEFORE_FIELDS, BEHIND_FIELDS))  # fmt: skip
+    return first | of_fields | last
+
+
+@cache
+def mechanism_table() -> Table:
+    """All keys of a mechanism file."""
+    bodies, others = ([one.key(name) for name, one in sections().items() if one.bodies is which]
+                      for which in (True, False))  # fmt: skip
+    return Table("A mechanism.", (*BEFORE_BODIES, *bodies, GROUND_POINTS, *others, *HOW))

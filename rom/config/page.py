@@ -6,7 +6,7 @@ from typing import Any
 from rom.config.component_keys import TABLE as COMPONENT
 from rom.config.keys import Either, Key, Kind, Named, Table, Variants
 from rom.config.laws import law_kind
-from rom.config.mechanism_keys import TABLE as MECHANISM
+from rom.config.mechanism_keys import mechanism_table
 from rom.mbs.elements.formulas.codes import FUNCTIONS
 from rom.units import UNITS, Dimension, dimension_name
 
@@ -34,7 +34,7 @@ def page(component: str, mechanism: str) -> str:
     parts = [PAGE_HEADER, "## A component", f"```toml\n{component.strip()}\n```"]
     parts += list(_sections(COMPONENT))
     parts += ["## A mechanism", f"```toml\n{mechanism.strip()}\n```"]
-    parts += list(_sections(MECHANISM))
+    parts += list(_sections(mechanism_table()))
     parts += ["## Laws", LAWS_SECTION]
     parts += [f"**{name}.** {t.about}\n\n{keys(t)}" for name, t in tables(law_kind("1"))]
     parts += ["## Formulas", FORMULA_SECTION]

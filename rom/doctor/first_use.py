@@ -107,13 +107,13 @@ def _chain() -> None:
 
 def _elements() -> None:
     """All stages, the kernels of all families of elements, a law of a user, and bars that touch."""
+    from rom.fields import families
     from rom.mbs.elements.contact.impact import Impact
     from rom.mbs.kernels.stages import STAGE_KERNELS
-    from rom.mbs.mechanism import FAMILIES
 
     for stage in STAGE_KERNELS.values():
         stage.link()
-    for family in FAMILIES:
+    for family in families():
         for kernel in family.kernels:
             kernel.link()
     mech = pendulum()
@@ -189,7 +189,7 @@ def _rod_alone() -> None:
 
 def _oil_film() -> None:
     from rom.components.journal_bearing import Groove, JournalBearing, film
-    from rom.mbs.elements.films.tabulated import table_of
+    from rom.components.journal_bearing.films.tabulated import table_of
 
     for law in ("reynolds", "jfo"):
         groove = [Groove(np.pi, 0.35)]

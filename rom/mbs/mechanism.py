@@ -10,29 +10,11 @@ import numpy.typing as npt
 from rom import rotation
 from rom.arguments import AnyBody, finite, matrix33, positive, start_pose, typed
 from rom.errors import ConfigError
+from rom.fields import Methods, Open, families, find
 from rom.mbs.connections import drives as joint_drives
 from rom.mbs.connections import gears, lower_pairs, rolling, universal
 from rom.mbs.connections import points as joint_points
-from rom.mbs.elements import (
-    bushings,
-    frictions,
-    laws,
-    loads,
-    motors,
-    nonlinear,
-    rotational_springs,
-    spread_loads,
-    springs,
-    stops,
-)
-from rom.mbs.elements.contact import capsules, points, surfaces
 from rom.mbs.elements.family import Family, check_family
-from rom.mbs.elements.films import journal_bearings
-from rom.mbs.elements.gears import meshes
-from rom.mbs.elements.rolling import bearings
-from rom.mbs.elements.round_bodies import spins
-from rom.mbs.elements.solids import quartics, sampled
-from rom.mbs.elements.tendons import tendons
 from rom.mbs.parts.bodies import GROUND, Marker, Part, flexible_part, ground_part, rigid_part
 from rom.mbs.parts.joints import Joint, Row, coordinate_of
 from rom.model import Array
@@ -40,27 +22,6 @@ from rom.names import check_name, check_text, offered
 from rom.notebook import html_table, listed
 from rom.plausible import GRAVITY, SPEED, warn_outside
 
-# The list of families: each has its file, and a method or more of `Mechanism`.
-FAMILIES = (
-    springs.SPRINGS_FAMILY,
-    rotational_springs.TURNS_FAMILY,
-    loads.LOADS_FAMILY,
-    laws.LAWS_FAMILY,
-    motors.MOTORS_FAMILY,
-    frictions.FRICTIONS_FAMILY,
-    stops.STOPS_FAMILY,
-    bushings.BUSHINGS_FAMILY,
-    points.CONTACTS_FAMILY,
-    spread_loads.SPREAD_LOADS_FAMILY,
-    nonlinear.NONLINEAR_FAMILY,
-    tendons.TENDONS_FAMILY,
-    meshes.GEAR_MESHES_FAMILY,
-    bearings.ROLLING_BEARINGS_FAMILY,
-    journal_bearings.JOURNAL_BEARINGS_FAMILY,
-    spins.SPINS_FAMILY,
-    quartics.QUARTICS_FAMILY,
-    sampled.SAMPLES_FAMILY,
-)
 Element = TypeVar("Element")
 
 
@@ -104,6 +65,11 @@ class Every(Generic[Element]):
         return ElementsOf({} if mechanism is None else mechanism.elements, self.record)
 
 
+def bound(found: Any) -> Any:
+    """What a field gives as an attribute: a method, or for a record its elements."""
+    return Every(found) if isinstance(found, type) else typed(found)
+
+
 @dataclass(frozen=True, slots=True)
 class Event:
     """A function of the motion whose zeros are looked for.
@@ -125,7 +91,7 @@ class Event:
 
 @typed
 @dataclass
-class Mechanism:
+class Mechanism(Methods, metaclass=Open, kind="methods", bound=bound):
     """Rigid and flexible bodies, connected and loaded.
 
     Joints are defined in the position in which the bodies are added, flexible bodies
@@ -169,48 +135,6 @@ class Mechanism:
     rolling = rolling.rolling
     gear = gears.gear
     drive = joint_drives.drive
-
-    spring_damper = springs.spring_damper
-    rotational_spring = rotational_springs.rotational_spring
-    force = loads.force
-    torque = loads.torque
-    law = laws.law
-    user_force = laws.user_force
-    motor = motors.motor
-    friction = frictions.friction
-    stop = stops.stop
-    bushing = bushings.bushing
-    sphere_on_plane = points.sphere_on_plane
-    disc_on_plane = points.disc_on_plane
-    sphere_on_sphere = points.sphere_on_sphere
-    sphere_on_cylinder = points.sphere_on_cylinder
-    capsule_on_capsule = capsules.capsule_on_capsule
-    surface_on_plane = surfaces.surface_on_plane
-    surface_on_sphere = surfaces.surface_on_sphere
-    surface_on_cylinder = surfaces.surface_on_cylinder
-    spread_load = spread_loads.spread_load
-    tendon = tendons.tendon
-    gear_mesh = meshes.gear_mesh
-    rolling_bearing = bearings.rolling_bearing
-    journal_bearing = journal_bearings.journal_bearing
-    add_nonlinear = nonlinear.add_nonlinear
-
-    springs = Every(springs.Spring)
-    turns = Every(rotational_springs.Turn)
-    loads = Every(loads.Load)
-    user_forces = Every(laws.UserForce)
-    laws = Every(laws.Law)
-    motors = Every(motors.Motor)
-    frictions = Every(frictions.Friction)
-    stops = Every(stops.Stop)
-    bushings = Every(bushings.Bushing)
-    contacts = Every(points.Contact)
-    spread_loads = Every(spread_loads.Spread)
-    tendons = Every(tendons.Tendon)
-    gear_meshes = Every(meshes.GearMesh)
-    rolling_bearings = Every(bearings.RollingBearing)
-    journal_bearings = Every(journal_bearings.OilFilm)
-    nonlinear = Every(nonlinear.Assembly)
 
     def __post_init__(self) -> None:
         self.gravity = finite("gravity", self.gravity, (3,))
@@ -319,7 +243,6 @@ class Mechanism:
             >>> round(beam.mass, 6)
             11.775
         """
-        quartics.refuse_stiffening_twice(body)
         if getattr(body, "certificate", None) is not None:
             body.certificate.warn_of_failures(f"the certificate of body {body.name!r}")
         body = body.in_units("SI") if getattr(body, "units", "SI") != "SI" else body
@@ -357,11 +280,12 @@ class Mechanism:
         self.elements[name] = family, element
 
     def families(self) -> dict[Family, dict[str, Any]]:
-        """The families that occur, those of `FAMILIES` first, with their elements by name."""
-        found: dict[Family, dict[str, Any]] = {family: {} for family in FAMILIES}
+        """The families that occur, in the order of `rom.fields`, with their elements by name."""
+        found: dict[Family, dict[str, Any]] = {}
         for name, (family, element) in self.elements.items():
             found.setdefault(family, {})[name] = element
-        return {family: elements for family, elements in found.items() if elements}
+        known = families(loaded=True) if len(found) > 1 else ()
+        return {family: found.pop(family) for family in known if family in found} | found
 
     def event(
         self,
@@ -425,15 +349,12 @@ class Mechanism:
         self.check_new(part.name)
         warn_outside(SPEED, float(np.linalg.norm(part.velocity)), f"body {part.name!r}")
         part = part if spin is None else replace(part, spin=finite("spin", spin, (3,)))
-        deflects = quartics.large_deflection_of(part)
-        turns = spins.spin_of(part) if part.spin.any() else None
+        large = getattr(part.flexible, "quartic", None) is not None
+        kinds = ["deflection"] * large + ["spin"] * bool(part.spin.any())
+        more = {f"{kind} of {part.name}": find("bodies", kind)(part) for kind in kinds}
         self.parts[part.name] = part
-        if turns is not None:
-            self.add(f"spin of {part.name}", turns, spins.SPINS_FAMILY)
-        if deflects is not None:
-            by_points = hasattr(deflects.energy, "gradients")
-            family = sampled.SAMPLES_FAMILY if by_points else quartics.QUARTICS_FAMILY
-            self.add(f"deflection of {part.name}", deflects, family)
+        for name, element in more.items():
+            self.add(name, *element)
         return part
 
     def check_new(self, name: str) -> None:

@@ -330,10 +330,10 @@ def _motion(moved: Run, look: dict[str, Any]) -> list[str]:
 
 
 def _connection_table(file: "MechanismFile") -> str:
-    from rom.config.mechanism_keys import SECTIONS
+    from rom.config.mechanism_keys import sections
 
     rows = []
-    for section in SECTIONS:
+    for section in sections():
         for name, values in file.values[section].items():
             ends = values.get("between") or values.get("markers") or []
             ends = [*ends, *(values[k] for k in ("marker",) if k in values)]

@@ -1,3 +1,6 @@
+from rom.components.transmission.loaded import film_wall as film_wall
+from rom.components.transmission.loaded import tooth_walls as tooth_walls
+from rom.components.transmission.loaded import toothed_shaft as toothed_shaft
 from rom.view.canvas.films import Film as Film
 from rom.view.canvas.solids import bar as bar
 from rom.view.canvas.solids import box as box
@@ -31,9 +34,6 @@ from rom.view.scenes.faces import faces as faces
 from rom.view.scenes.film import animate as animate
 from rom.view.scenes.film import instants as instants
 from rom.view.scenes.film import posed as posed
-from rom.view.scenes.loaded import film_wall as film_wall
-from rom.view.scenes.loaded import tooth_walls as tooth_walls
-from rom.view.scenes.loaded import toothed_shaft as toothed_shaft
 from rom.view.scenes.mechanisms import start as start
 from rom.view.scenes.meshes import mesh as mesh
 from rom.view.scenes.meshes import meshed as meshed

@@ -17,7 +17,8 @@ OF_OTHERS = {"add", "check_markers"}  # elements of any family, by what others m
 def adding_methods():
     """Methods whose first argument is the name of what they add."""
     found = set()
-    for name, method in vars(Mechanism).items():
+    for name in dir(Mechanism):
+        method = getattr(Mechanism, name)
         if inspect.isfunction(method) and not name.startswith("_"):
             arguments = list(inspect.signature(method).parameters)
             if arguments[1:2] == ["name"] and len(arguments) > 2:

@@ -7,9 +7,9 @@ from scipy.special import ellipeinc, ellipkinc
 
 import rom
 from rom import rotation
+from rom.components.cosserat.bodies import body, shape_of
+from rom.components.cosserat.shapes import straight
 from rom.config.mechanism import read_mechanism
-from rom.mbs.elements.rods.bodies import body, shape_of
-from rom.mbs.elements.rods.shapes import straight
 
 STEEL = 'material = { E = "210 GPa", nu = 0.3, rho = "7850 kg/m^3" }\n'
 E, NU, RHO = 210e9, 0.3, 7850.0

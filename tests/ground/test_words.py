@@ -39,11 +39,12 @@ CLEAR = {
 }
 # names that are a convention of their own: what every verb has, variables of types, and files in
 # which a name is that of the key, dimension, range or field that it describes
-OF_VERBS = {"SUMMARY", "EXAMPLES"}
+OF_VERBS = {"SUMMARY", "EXAMPLES", "FIELD", "SECTION"}  # and every field
 OF_TYPES = {"ParamSpec", "TypeVar"}
 DESCRIPTIONS = {
-    "cli/schemas.py", "config/component_keys.py", "config/machines.py", "config/mechanism_keys.py",
-    "plausible.py", "units.py",
+    "cli/schemas.py", "config/component_keys.py", "config/mechanism_keys.py", "plausible.py",
+    "units.py", *(path.relative_to(ROOT / "rom").as_posix()
+                  for path in (ROOT / "rom" / "components").glob("*/keys.py")),
 }  # fmt: skip
 # words for which there is a better one: the word, what to say, and the folders and modules it is
 # looked for in; elsewhere it may be the right one, as the lift of a wing

@@ -39,6 +39,14 @@ METHODS = ("rom.reduction.", "rom.mbs.integrate.", "rom.components.", "rom.cycli
            "rom.prestress.", "rom.parametric.", "rom.assembly.")  # fmt: skip
 PLAIN = {  # of these folders, and no published method
     "rom.assembly.condensed.CondensedAssembly": "the result",
+    "rom.components.gear_mesh.gears.corrections.flank_map": "a file",
+    "rom.components.gear_mesh.tooth_loads.tooth_loads": "a result",
+    "rom.components.journal_bearing.films.bearing.multilobe": "a definition",
+    "rom.components.journal_bearing.films.oil.iso_vg": "a table",
+    "rom.components.journal_bearing.pressures.film_pressures": "a result",
+    "rom.components.transmission.loaded.film_wall": "a picture",
+    "rom.components.transmission.loaded.tooth_walls": "a picture",
+    "rom.components.transmission.loaded.toothed_shaft": "a picture",
     "rom.components.gear_mesh.tooth_elements.element_table": "finite elements of the textbooks",
     "rom.components.gear_mesh.tooth_elements.tooth_model": "finite elements of the textbooks",
     "rom.components.hand.control_chart.muscle": "noise",

@@ -13,9 +13,9 @@ from cases.mbs.geared_rotors import rigid_unit
 from rom import view
 from rom.components.gear_mesh import GearPair
 from rom.components.journal_bearing import film, iso_vg
+from rom.components.transmission.loaded import _lines, _tooth
 from rom.errors import ConfigError
 from rom.view.canvas.solids import gear_outline
-from rom.view.scenes.loaded import _lines, _tooth
 
 SCALE = 1e-6
 

@@ -1,7 +1,7 @@
 """Elimination along the rod: a banded system solved from one end to the other and back."""
 
 from rom.components.compiled import inner, kernel
-from rom.mbs.elements.rods.energy import HALF_BANDWIDTH
+from rom.components.cosserat.energy import HALF_BANDWIDTH
 
 
 @kernel

@@ -20,10 +20,7 @@ import numpy.typing as npt
 from rom import rotation
 from rom.components.compiled import inner, kernel
 from rom.components.cosserat.band import hold, solve
-from rom.components.cosserat.statics import add_loads, clamped, largest
-from rom.components.cosserat.vibration import lumped_mass
-from rom.errors import ConfigError, SolverError
-from rom.mbs.elements.rods.energy import (
+from rom.components.cosserat.energy import (
     HALF_BANDWIDTH,
     Rod,
     energy,
@@ -31,7 +28,10 @@ from rom.mbs.elements.rods.energy import (
     turn,
     work,
 )
-from rom.mbs.elements.rods.shapes import Shape, reference
+from rom.components.cosserat.shapes import Shape, reference
+from rom.components.cosserat.statics import add_loads, clamped, largest
+from rom.components.cosserat.vibration import lumped_mass
+from rom.errors import ConfigError, SolverError
 from rom.mbs.integrate.generalized_alpha import coefficients
 from rom.model import Array, Mask
 

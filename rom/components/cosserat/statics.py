@@ -10,8 +10,7 @@ import numpy.typing as npt
 
 from rom.components.compiled import inner, kernel
 from rom.components.cosserat.band import hold, solve
-from rom.errors import ConfigError, SolverError
-from rom.mbs.elements.rods.energy import (
+from rom.components.cosserat.energy import (
     HALF_BANDWIDTH,
     Rod,
     add_turning,
@@ -20,7 +19,8 @@ from rom.mbs.elements.rods.energy import (
     turn,
     work,
 )
-from rom.mbs.elements.rods.shapes import Shape, reference
+from rom.components.cosserat.shapes import Shape, reference
+from rom.errors import ConfigError, SolverError
 from rom.model import Array, Mask
 
 MAX_ROTATION = 0.2  # rotation of an iteration [rad]: larger steps jump to other equilibria

@@ -15,10 +15,10 @@ from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh
 
 from rom import rotation
 from rom.arguments import whole
+from rom.components.cosserat.energy import Rod
+from rom.components.cosserat.shapes import Shape
 from rom.components.cosserat.statics import clamped, linearised
 from rom.errors import SolverError
-from rom.mbs.elements.rods.energy import Rod
-from rom.mbs.elements.rods.shapes import Shape
 from rom.model import Array, Modes
 
 

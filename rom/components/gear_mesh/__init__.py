@@ -1,7 +1,8 @@
 """Gear meshes: involute pairs, compliance of their teeth, contact on the base plane.
 
-`compliance` has teeth in closed form and `tooth_elements` by finite elements, `contact` the forces
-between them; the pairs are those of `rom.mbs.elements.gears`.
+`field` says what they have for mechanisms, their files (`keys`) and pictures (`symbols`);
+`tooth_loads` are those of a motion. `compliance` has teeth in closed form and `tooth_elements` by
+finite elements, `contact` the forces between them; pairs and elements are in `gears`.
 """
 
 from rom.lazy import front

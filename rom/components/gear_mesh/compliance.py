@@ -12,9 +12,9 @@ import numpy as np
 import numpy.typing as npt
 from scipy.integrate import trapezoid
 
+from rom.components.gear_mesh.gears.geometry import GearPair, involute
+from rom.components.gear_mesh.gears.hertz import Hertz
 from rom.errors import ModelError
-from rom.mbs.elements.gears.geometry import GearPair, involute
-from rom.mbs.elements.gears.hertz import Hertz
 from rom.model import Array
 
 Body = Literal["weber", "sainsot"]

@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from rom.components.gear_mesh.gears.corrections import Correction
+from rom.components.gear_mesh.gears.geometry import GearPair, involute, path_of_contact
 from rom.errors import ModelError, SolverError
-from rom.mbs.elements.gears.corrections import Correction
-from rom.mbs.elements.gears.geometry import GearPair, involute, path_of_contact
 from rom.model import Array, Index
 
 

@@ -19,8 +19,8 @@ from rom.components.gear_mesh.compliance import (
     profile,
     tooth_compliance,
 )
+from rom.components.gear_mesh.gears.geometry import GearPair
 from rom.errors import ModelError
-from rom.mbs.elements.gears.geometry import GearPair
 from rom.model import Array, Index
 
 GAUSS_POINTS, GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(3)

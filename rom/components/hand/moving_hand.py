@@ -17,11 +17,11 @@ import numpy.typing as npt
 
 from rom.arguments import finite, number, positive
 from rom.components.cosserat import body
+from rom.components.cosserat.coils import with_coils
 from rom.components.cosserat.helical_spring import HelicalSpring
 from rom.components.hand.compliant_hand import STOP_STIFFNESS_RATIO, Finger, hand
 from rom.components.hand.solid_finger import STEEL_DENSITY, heavy_spring
 from rom.errors import ConfigError, ModelError
-from rom.mbs.elements.rods.coils import with_coils
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.parts.bodies import Marker, Part
 from rom.model import Array

@@ -5,6 +5,10 @@ from rom.components.journal_bearing.closed_forms import short_coefficients as sh
 from rom.components.journal_bearing.closed_forms import short_eccentricity as short_eccentricity
 from rom.components.journal_bearing.closed_forms import short_force as short_force
 from rom.components.journal_bearing.closed_forms import short_sommerfeld as short_sommerfeld
+from rom.components.journal_bearing.films.bearing import Groove as Groove
+from rom.components.journal_bearing.films.bearing import JournalBearing as JournalBearing
+from rom.components.journal_bearing.films.oil import Oil as Oil
+from rom.components.journal_bearing.films.oil import iso_vg as iso_vg
 from rom.components.journal_bearing.oil import Warm as Warm
 from rom.components.journal_bearing.oil import warm_bearing as warm_bearing
 from rom.components.journal_bearing.oil import warm_equilibrium as warm_equilibrium
@@ -15,7 +19,3 @@ from rom.components.journal_bearing.statics import coefficients as coefficients
 from rom.components.journal_bearing.statics import equilibrium as equilibrium
 from rom.components.journal_bearing.statics import stability as stability
 from rom.components.journal_bearing.statics import threshold_speed as threshold_speed
-from rom.mbs.elements.films.bearing import Groove as Groove
-from rom.mbs.elements.films.bearing import JournalBearing as JournalBearing
-from rom.mbs.elements.films.oil import Oil as Oil
-from rom.mbs.elements.films.oil import iso_vg as iso_vg

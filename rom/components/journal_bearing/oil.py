@@ -8,11 +8,11 @@ from dataclasses import dataclass, replace
 
 import numpy.typing as npt
 
+from rom.components.journal_bearing.films.bearing import JournalBearing
+from rom.components.journal_bearing.films.oil import Oil
 from rom.components.journal_bearing.oil_film import Film
 from rom.components.journal_bearing.statics import equilibrium
 from rom.errors import ModelError, SolverError
-from rom.mbs.elements.films.bearing import JournalBearing
-from rom.mbs.elements.films.oil import Oil
 
 
 @dataclass(frozen=True, slots=True)

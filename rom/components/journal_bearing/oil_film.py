@@ -11,11 +11,11 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
+from rom.components.journal_bearing.films.bearing import JournalBearing, four
+from rom.components.journal_bearing.films.bearing import thickness as gap
+from rom.components.journal_bearing.films.cells import N_MOTIONS, cells_of
+from rom.components.journal_bearing.films.slopes import solve_film
 from rom.errors import ModelError, SolverError
-from rom.mbs.elements.films.bearing import JournalBearing, four
-from rom.mbs.elements.films.bearing import thickness as gap
-from rom.mbs.elements.films.cells import N_MOTIONS, cells_of
-from rom.mbs.elements.films.slopes import solve_film
 from rom.model import Array, Index
 
 

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from rom.components.journal_bearing.films.bearing import JournalBearing
 from rom.components.journal_bearing.oil_film import Film, film
 from rom.errors import ModelError, SolverError
-from rom.mbs.elements.films.bearing import JournalBearing
 from rom.model import Array
 
 MAX_STEP = 0.1  # of the clearance

@@ -2,7 +2,7 @@
 
 `shaft` and `solid_shaft` spin in a `housing`, `unit` puts them together and finds where they rest;
 as a `mechanism` they move in `motion`; `response` and `steady` are vibrations that repeat with the
-mesh, `supports` has the whirl of one shaft.
+mesh, `supports` has the whirl of one shaft; `loaded` draws teeth and films as they bear.
 """
 
 from rom.lazy import front

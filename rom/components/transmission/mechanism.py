@@ -14,8 +14,8 @@ from scipy.linalg import eigh
 from rom.body.flexible import FlexibleBody
 from rom.body.records import Marker
 from rom.body.spread import SpreadLoad
+from rom.components.round_bodies.spins import SPINS_FAMILY, Spin
 from rom.components.transmission.unit import Transmission
-from rom.mbs.elements.round_bodies.spins import SPINS_FAMILY, Spin
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.results.solution import Solution
 from rom.model import Array

@@ -16,10 +16,10 @@ import numpy.typing as npt
 from scipy.linalg import eigh
 
 from rom.body.flexible import FlexibleBody
+from rom.components.round_bodies.gyroscopic import directed_mass
 from rom.components.transmission.housing import motion_of
 from rom.components.transmission.shaft import Disc
 from rom.errors import ModelError
-from rom.mbs.elements.round_bodies.gyroscopic import directed_mass
 from rom.model import Array
 
 MAX_MODES = 8  # of each kind, next to the static shapes under loads on the seats

@@ -20,6 +20,8 @@ import numpy.typing as npt
 from numba import carray
 
 from rom.arguments import unit_vector
+from rom.components.cosserat.bodies import RodBody
+from rom.components.cosserat.energy import rotation_of
 from rom.components.wind.blading import (
     AIR_DENSITY,
     CHORD,
@@ -42,8 +44,6 @@ from rom.components.wind.wind_turbine import (
 )
 from rom.errors import ConfigError
 from rom.mbs.elements.nonlinear import Elements, compiled_law
-from rom.mbs.elements.rods.bodies import RodBody
-from rom.mbs.elements.rods.energy import rotation_of
 from rom.mbs.kernels.compiled import inner
 from rom.model import Array
 

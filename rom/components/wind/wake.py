@@ -17,6 +17,7 @@ import numpy.typing as npt
 from numba import carray
 
 from rom.arguments import finite
+from rom.components.cosserat.bodies import RodBody
 from rom.components.wind.blade_element import (
     PROFILE_START,
     TWIST_PLACE,
@@ -38,7 +39,6 @@ from rom.components.wind.wind_turbine import CONE_ANGLE
 from rom.errors import ConfigError
 from rom.mbs.elements.law_calls import LAW_TYPES, compiled_entry
 from rom.mbs.elements.nonlinear import Assembly
-from rom.mbs.elements.rods.bodies import RodBody
 from rom.mbs.kernels.compiled import inner
 from rom.mbs.mechanism import Mechanism
 from rom.model import Array

@@ -13,12 +13,13 @@ class Whole(Protocol):
 
     Attributes:
         parts, joints, drives: {name: body, joint or drive}.
+        elements: {name: (family, element)}.
     """
 
-    gear_meshes: Any
     parts: dict[str, Part]
     joints: dict[str, Joint]
     drives: dict[str, Any]
+    elements: dict[str, tuple[Any, Any]]
 
     @property
     def spherical(self) -> Callable[[str, Marker, Marker], None]:

@@ -1,7 +1,6 @@
 """What a motion leaves.
 
 `state` is one instant, `solution` all of them, with `interpolation` between; `recomputed` and
-`interface_loads`, the `element_record` of a force element, the `law_record` of a law, the
-`bearing_record` and the `film_pressures` of a journal bearing, the `tooth_loads` of gears and the
+`interface_loads`, the `element_record` of a force element, the `law_record` of a law and the
 `joint_motion` of a joint follow from it; `audit` and `validity` judge it, `checkpoint` saves it.
 """

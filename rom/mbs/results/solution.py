@@ -9,6 +9,7 @@ import numpy as np
 
 from rom.arguments import one_of, typed, vector
 from rom.errors import ConfigError
+from rom.fields import Columns, Open
 from rom.io.history import data_frame, data_set
 from rom.mbs.equations.packing import Packed
 from rom.mbs.kernels.system import WORK
@@ -16,7 +17,6 @@ from rom.mbs.mechanism import Mechanism
 from rom.mbs.parts.bodies import Marker
 from rom.mbs.parts.joints import joint_with_axis
 from rom.mbs.parts.signals import sample_all
-from rom.mbs.results.bearing_record import BearingRecord, bearing_record
 from rom.mbs.results.element_record import ElementRecord, element_record, markers_of
 from rom.mbs.results.interface_loads import marker_loads, of_body
 from rom.mbs.results.interpolation import Point, between
@@ -78,7 +78,7 @@ class Energy:
 
 @typed
 @dataclass(frozen=True)
-class Solution:
+class Solution(Columns, metaclass=Open, kind="columns", bound=typed):
     """Motion of a mechanism.
 
     Attributes:
@@ -364,17 +364,6 @@ class Solution:
         if name not in self.mechanism.laws:
             raise ConfigError(f"no law {name!r}; there are {offered(self.mechanism.laws, name)}.")
         return law_record(self, name)
-
-    def journal_bearing(self, name: str) -> BearingRecord:
-        """Film, pressure, temperature, losses and flow of one journal bearing over time.
-
-        Raises:
-            ConfigError: for a name that no journal bearing has.
-        """
-        films = self.mechanism.journal_bearings
-        if name not in films:
-            raise ConfigError(f"no journal bearing {name!r}; there are {offered(films, name)}.")
-        return bearing_record(self, name)
 
     def element(self, name: str) -> ElementRecord:
         """Forces, energy and losses of one spring, motor, contact or other force element.

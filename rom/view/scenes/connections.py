@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
+from rom.fields import find
 from rom.mbs.elements.contact.points import BORE, CAPSULE, CYLINDER, DISC, PLANE
-from rom.mbs.elements.tendons.paths import Place, path_through, points_along
 from rom.mbs.kernels.system import NORMAL
 from rom.mbs.parts.bodies import GROUND, Marker
 from rom.model import Array
@@ -60,26 +60,10 @@ def connections(
     actors: list[Actor] = []
     for joint in mechanism.joints.values():
         actors += _joint(scenery, joint)
-    for turn in mechanism.turns.values():
-        actors += _spiral(scenery, mechanism.joints[turn.joint])
-    for spring in mechanism.springs.values():
-        actors += _spring(scenery, spring)
-    for bushing in mechanism.bushings.values():
-        actors += _bushing(scenery, bushing.i, bushing.j)
-    for name, tendon in mechanism.tendons.items():
-        actors += _tendon(places, name, tendon)
-    for one in mechanism.rolling_bearings.values():
-        actors.append(_circle(places, one.j, one.axes[2], 0.5 * one.bearing.pitch_diameter))
-    for film in mechanism.journal_bearings.values():
-        for marker, axis in zip((film.i, film.j), film.axes[:2], strict=True):
-            actors.append(_circle(places, marker, axis, film.bearing.radius))
-    for mesh in mechanism.gear_meshes.values():
-        for marker, axis, radius in zip(
-            (mesh.i, mesh.j), mesh.axes[::2], mesh.pair.r, strict=False
-        ):
-            actors.append(_circle(places, marker, axis, float(radius)))
-        if not mesh.pair.teeth[1]:
-            actors.append(_rack(places, mesh))
+    for family, elements in mechanism.families().items():
+        draw = find("symbols", family.name)
+        for name, element in elements.items() if draw else ():
+            actors += draw(scenery, name, element)
     return actors + list(_contacts(scenery))
 
 
@@ -193,7 +177,7 @@ def _on_plane(scenery: Scenery, joint: Any, normal: Array) -> Iterator[Actor]:
     places, (first, second) = scenery.places, joint.markers
     radius = joint.rows[0].radius
     if joint.kind == "rolling" and joint.rows[0].b.any():
-        yield _circle(places, second, joint.rows[0].b, radius)
+        yield circle(places, second, joint.rows[0].b, radius)
     elif joint.kind == "rolling" and second.body not in scenery.solid:
         yield from _ball(places, second, radius)
     A = matrix(places.mechanism.part(first.body).p)
@@ -216,7 +200,9 @@ def _ball(places: Places, marker: Marker, radius: float) -> list[Actor]:
     return solid(symbols.ball(radius / symbols.BALL_RATIO), pose, JOINT_COLOUR, 0.5)
 
 
-def _spiral(scenery: Scenery, joint: Any) -> Iterator[Actor]:
+def spiral(scenery: Scenery, _: str, turn: Any) -> Iterator[Actor]:
+    """A spring about a joint."""
+    joint = scenery.places.mechanism.joints[turn.joint]
     axis = axis_of(joint, scenery.places.mechanism)
     if axis is None:
         return
@@ -229,11 +215,11 @@ def _spiral(scenery: Scenery, joint: Any) -> Iterator[Actor]:
     yield lines(symbols.spiral(size), pose, SPRING_COLOUR, LINE_WIDTH)
 
 
-def _spring(scenery: Scenery, spring: Any) -> Iterator[Actor]:
+def spring(scenery: Scenery, _: str, spring: Any) -> Iterator[Actor]:
     """Coil and dashpot between two markers, stretched as they move."""
     ends = _both(scenery.places, spring.i, spring.j)
     if np.linalg.norm(ends[1] - ends[0], axis=1).max() < scenery.size:
-        yield from _bushing(scenery, spring.i, spring.j)
+        yield from bushing(scenery, "", spring)
         return
     if spring.stiffness:
         shape = symbols.spring(scenery.size)
@@ -259,34 +245,14 @@ def stretched(shape: symbols.Lines, ends: tuple[Array, Array], colour: str) -> A
     return Actor(placed(shape[0][None], (a, axes)), shape[1], colour=colour, width=LINE_WIDTH)
 
 
-def _bushing(scenery: Scenery, first: Marker, second: Marker) -> Iterator[Actor]:
-    places = scenery.places
+def bushing(scenery: Scenery, _: str, element: Any) -> Iterator[Actor]:
+    """What holds two markers together."""
+    places, first, second = scenery.places, element.i, element.j
     pose = at(places.point(second), places.pose(second.body)[1])
     yield from solid(symbols.weld(scenery.size), pose, SPRING_COLOUR)
     for marker in (first, second):
         if marker.body == GROUND:
             yield from support(scenery, places.point(marker)[0], None)
-
-
-def _tendon(places: Places, name: str, tendon: Any) -> Iterator[Actor]:
-    """The line of a cable, and the circles of its pulleys."""
-    stations = tendon.stations
-    x = [places.point(one.marker) for one in stations]
-    turned = [places.pose(one.marker.body)[1] for one in stations]
-    drawn = []
-    for f in range(max(map(len, x))):
-        found = [
-            Place(x[k][f % len(x[k])], one.axes @ turned[k][f % len(turned[k])].T, one.radius)
-            for k, one in enumerate(stations)
-        ]
-        drawn.append(points_along(path_through(name, found), found))
-    points = np.array(drawn)
-    n = points.shape[1]
-    cells = np.column_stack([np.arange(n - 1), np.arange(1, n)])
-    yield Actor(points, cells, colour=DAMPER_COLOUR, width=LINE_WIDTH)
-    for one in stations:
-        if one.radius:
-            yield _circle(places, one.marker, one.axes[0], one.radius)
 
 
 def _contacts(scenery: Scenery) -> Iterator[Actor]:
@@ -299,7 +265,7 @@ def _contacts(scenery: Scenery) -> Iterator[Actor]:
         if contact.kind in (PLANE, DISC):
             planes.setdefault(key, []).append((contact.j, contact.radius[0]))
             if contact.kind == DISC:
-                yield _circle(scenery.places, contact.j, contact.s, contact.radius[0])
+                yield circle(scenery.places, contact.j, contact.s, contact.radius[0])
         elif contact.kind in (CYLINDER, BORE):
             rounds.add((*key, contact.radius[1]))
         elif contact.kind == CAPSULE:
@@ -316,7 +282,7 @@ def _contacts(scenery: Scenery) -> Iterator[Actor]:
     for (marker, normal), touching in planes.items():
         yield from plane(scenery, marker, np.array(normal), touching)
     for marker, axis, radius in rounds:
-        yield _circle(scenery.places, marker, np.array(axis), radius)
+        yield circle(scenery.places, marker, np.array(axis), radius)
     for one in capsules:
         yield from _capsule(scenery.places, *one)
 
@@ -331,16 +297,8 @@ def _capsule(
     yield from solid(shape, pose, ROD_COLOUR, 0.6)
 
 
-def _circle(places: Places, marker: Marker, axis: Array, radius: float) -> Actor:
+def circle(places: Places, marker: Marker, axis: Array, radius: float) -> Actor:
+    """A circle about an axis of the body of a marker."""
     local = np.column_stack(across(np.zeros(3), axis))
     pose = at(places.point(marker), places.pose(marker.body)[1] @ local)
     return lines(symbols.circle(radius), pose, width=LINE_WIDTH)
-
-
-def _rack(places: Places, mesh: Any) -> Actor:
-    """The line that the circle of a pinion rolls on, over one of its turns."""
-    normal, along, radius = mesh.axes[2], mesh.axes[3], float(mesh.pair.r[0])
-    middle = -(mesh.pair.distance - radius) * np.cross(along, normal)
-    points = middle + np.pi * radius * np.array([[-1.0], [1.0]]) * along
-    pose = at(places.point(mesh.j), places.pose(mesh.j.body)[1])
-    return lines((points, np.array([[0, 1]])), pose, width=LINE_WIDTH)

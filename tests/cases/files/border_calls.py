@@ -21,12 +21,12 @@ from cases.files.toml_files import PENDULUM
 from cases.mbs.mechanisms import rotor
 from cases.solid import STEEL, block, composite
 from cases.wheels import beam_ring, bladed_model, bladed_ring
+from rom.components.gear_mesh.gears.geometry import GearPair
+from rom.components.journal_bearing.films.tabulated import table_of
 from rom.eigen.scipy import SciPyOperators
 from rom.eigen.verbs import rigid_motions
 from rom.mbs.elements import springs
 from rom.mbs.elements.contact.impact import Impact
-from rom.mbs.elements.films.tabulated import table_of
-from rom.mbs.elements.gears.geometry import GearPair
 from rom.mbs.results.solution import Solution
 from rom.mbs.results.state import State
 from rom.reduction.interfaces.connection import connect

@@ -24,9 +24,9 @@ import numpy.typing as npt
 from scipy.integrate import solve_ivp
 
 from rom import rotation
+from rom.components.cosserat.energy import Rod, internal, work
+from rom.components.cosserat.shapes import Shape, reference
 from rom.components.cosserat.vibration import lumped_mass
-from rom.mbs.elements.rods.energy import Rod, internal, work
-from rom.mbs.elements.rods.shapes import Shape, reference
 from rom.model import Array
 
 FRAME_DOFS = 6  # of the origin in the world, angular in the frame's own axes

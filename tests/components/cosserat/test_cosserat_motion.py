@@ -21,10 +21,10 @@ from rom.components.cosserat import (
     simulate,
     straight,
 )
+from rom.components.cosserat.energy import HALF_BANDWIDTH, work
 from rom.components.cosserat.motion import add_inertia
 from rom.components.cosserat.vibration import gyroscopic
 from rom.errors import ConfigError, SolverError
-from rom.mbs.elements.rods.energy import HALF_BANDWIDTH, work
 
 ALONG_X = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]])  # section axes: y, z, x
 

@@ -27,8 +27,8 @@ from rom.components.cosserat import (
     strain,
 )
 from rom.components.cosserat.band import solve
+from rom.components.cosserat.energy import BAND_WIDTH, HALF_BANDWIDTH
 from rom.errors import ConfigError, ModelError, SolverError
-from rom.mbs.elements.rods.energy import BAND_WIDTH, HALF_BANDWIDTH
 
 STIFF = 1e6  # against bending rigidities of one: neither shear nor stretch
 

@@ -8,7 +8,7 @@ import rom
 from cases.mbs import floating_rod as floating
 from rom import rotation
 from rom.components import cosserat
-from rom.mbs.elements.rods import energy
+from rom.components.cosserat import energy
 
 LOAD = {"tip": (30.0, -20.0, 10.0), "tip_moment": (10.0, 20.0, -15.0), "weight": (0, 0, -9.81)}
 VELOCITY, OMEGA = (1.0, 2.0, 0.0), (1.0, -2.0, 3.0)

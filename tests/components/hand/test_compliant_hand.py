@@ -7,6 +7,7 @@ from numpy.testing import assert_allclose
 import rom
 from rom import rotation
 from rom.components.cosserat import Shape, body, elastic_energy, linearised, reference, straight
+from rom.components.cosserat.bodies import shape_of
 from rom.components.cosserat.helical_spring import HelicalSpring, plate_compliance, spring_rod
 from rom.components.hand.cable import Hole, Tendon
 from rom.components.hand.compliant_hand import (
@@ -19,7 +20,6 @@ from rom.components.hand.compliant_hand import (
 )
 from rom.components.hand.grasp import Bar, grasp
 from rom.errors import ConfigError, ModelError, SolverError
-from rom.mbs.elements.rods.bodies import shape_of
 
 MM = 1e-3
 BENCH = HelicalSpring(1 * MM, 10 * MM, 6, 15 * MM, total_coils=0.0)  # coils pass each other

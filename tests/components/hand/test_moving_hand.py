@@ -7,13 +7,13 @@ from numpy.testing import assert_allclose
 
 import rom
 from rom import rotation
+from rom.components.cosserat.bodies import POSE_SIZE
+from rom.components.cosserat.coils import add_bending, bend_of
 from rom.components.hand.compliant_hand import LENGTHS, Finger, close, hand
 from rom.components.hand.moving_hand import SEATS, Build, Drive, Seat, moving_hand
 from rom.components.hand.tip_loads import deflections, one_finger
 from rom.components.hand.winches import motor_force, shaft, shaft_moment
 from rom.errors import ConfigError, ModelError, SolverError
-from rom.mbs.elements.rods.bodies import POSE_SIZE
-from rom.mbs.elements.rods.coils import add_bending, bend_of
 
 MM = 1e-3
 INDEX = {  # tension [N]: angle of a joint [deg], x, z of the tip, pull [mm]; machines by shooting

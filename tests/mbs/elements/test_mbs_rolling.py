@@ -16,10 +16,10 @@ from cases.mbs.tangents import (
     forces_at,
     shifted,
 )
+from rom.components.rolling_bearing.bearings import ROLLING_BEARINGS_FAMILY
+from rom.components.rolling_bearing.races import elliptic_stiffness
 from rom.errors import ConfigError, ModelError
 from rom.mbs import BallBearing, RollerBearing
-from rom.mbs.elements.rolling.bearings import ROLLING_BEARINGS_FAMILY
-from rom.mbs.elements.rolling.races import elliptic_stiffness
 
 ORIGIN, Z = (0, 0, 0), (0, 0, 1)
 BALLS = BallBearing(9, 12.7e-3, 65e-3, clearance=15e-6)  # a 6209

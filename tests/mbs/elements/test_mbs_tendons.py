@@ -13,9 +13,9 @@ from cases.mbs.mechanisms import (
     tangents_at,
 )
 from cases.mbs.tangents import check_tangents, difference, energy_gradient, forces_at, near
+from rom.components.tendons.tendons import TENDONS_FAMILY
 from rom.errors import ConfigError, RomWarning, SolverError
 from rom.mbs import Pulley
-from rom.mbs.elements.tendons.tendons import TENDONS_FAMILY
 
 G = 9.81
 SMALL = (1e-3, 1e-3, 1e-3)

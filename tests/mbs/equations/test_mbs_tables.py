@@ -15,13 +15,13 @@ from cases.mbs.trusses import truss
 from rom.body.nonlinear.quartic import Quartic, n_entries
 from rom.body.nonlinear.sampled import Sampled
 from rom.components.cosserat import body, straight
-from rom.mbs.elements.gears.geometry import GearPair
+from rom.components.gear_mesh.gears.geometry import GearPair
+from rom.fields import families
 from rom.mbs.equations.packing import pack
 from rom.mbs.integrate import step_memory
 from rom.mbs.kernels.compiled import kernel
 from rom.mbs.kernels.stages import STAGE_KERNELS, STAGE_NAMES, link, needed_by
 from rom.mbs.kernels.tables import Array1, Array3, Index2, Table, table
-from rom.mbs.mechanism import FAMILIES
 
 
 @table
@@ -214,7 +214,7 @@ def test_a_mechanism_has_the_kernels_of_its_elements_and_no_others(name):
 
 
 def test_every_family_of_the_list_is_tried():
-    assert [family.name for family in FAMILIES] == [*ELEMENTS]
+    assert [family.name for family in families()] == [*ELEMENTS]
 
 
 ASKED = {  # stages -> what asks for them

@@ -1,5 +1,5 @@
 """Solids at large deflection as bodies of mechanisms.
 
-`quartics` is what their strain energy has beyond that of small deflection, as elements, `sampled`
-the same of material whose energy is no polynomial.
+`field` lists them, `quartics` is what their strain energy has beyond that of small deflection, as
+elements, `sampled` the same of material whose energy is no polynomial.
 """

@@ -14,14 +14,11 @@ from typing import Any
 
 import numpy as np
 
-from rom.errors import ModelError
 from rom.mbs.elements.family import Family, Places, apart, integers, on_joint
 from rom.mbs.kernels.compiled import inner
 from rom.mbs.kernels.element_calls import energy, residuals, tangents
 from rom.mbs.kernels.markers import own_corner
 from rom.mbs.kernels.tables import Array3, Index1, Scratch1, Scratch2, Table, table
-from rom.mbs.parts.bodies import Part
-from rom.notebook import listed
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,39 +27,6 @@ class LargeDeflection:
 
     body: str
     energy: Any
-
-
-def refuse_stiffening_twice(body: Any) -> None:
-    """Refuse geometric stiffness beside the energy of large deflection, which has it.
-
-    Raises:
-        ModelError: naming the loads.
-    """
-    if getattr(body, "quartic", None) is not None and body.K_geo:
-        raise ModelError(
-            f"body {body.name!r} has the energy of large deflection, in which all loads stiffen; "
-            f"the geometric stiffness {listed(body.K_geo)} would be counted twice.",
-            hint="Leave K_geo empty.",
-        )
-
-
-def large_deflection_of(part: Part) -> LargeDeflection | None:
-    """The energy of a body beyond small deflection, None if it has none.
-
-    Raises:
-        ModelError: for a body that spins in its frame.
-    """
-    energy = getattr(part.flexible, "quartic", None)
-    if energy is None:
-        return None
-    if part.spin.any():
-        raise ModelError(
-            "a body of large deflection does not spin in a frame that rests: its gyroscopic forces "
-            "would be those of small deflection.",
-            where=part.name,
-            hint="Let it turn with its frame, by omega.",
-        )
-    return LargeDeflection(part.name, energy)
 
 
 @table

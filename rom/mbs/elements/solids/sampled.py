@@ -12,12 +12,15 @@ from math import log1p, nan
 
 import numpy as np
 
+from rom.errors import ModelError
 from rom.mbs.elements.family import Family, Places, apart, integers, on_joint
-from rom.mbs.elements.solids.quartics import LargeDeflection
+from rom.mbs.elements.solids.quartics import QUARTICS_FAMILY, LargeDeflection
 from rom.mbs.kernels.compiled import inner
 from rom.mbs.kernels.element_calls import energy, residuals, tangents
 from rom.mbs.kernels.markers import own_corner
 from rom.mbs.kernels.tables import Array1, Array2, Array3, Index1, Scratch1, Scratch2, Table, table
+from rom.mbs.parts.bodies import Part
+from rom.notebook import listed
 
 
 @table
@@ -172,3 +175,28 @@ SAMPLES_FAMILY = Family(
     "bodies of sampled elements", LargeDeflection, pack, sample_residuals, sample_tangents,
     sample_energy, ends=on_joint, couples=apart, by_rate=lambda _: False, complete=True,
 )  # fmt: skip
+
+
+def deflection_of(part: Part) -> tuple[LargeDeflection, Family]:
+    """The energy of a body of large deflection beyond that of small deflection, and its family.
+
+    Raises:
+        ModelError: for geometric stiffness beside it, or a body that spins in its frame.
+    """
+    body = part.flexible
+    if body.K_geo:
+        raise ModelError(
+            f"body {body.name!r} has the energy of large deflection, in which all loads stiffen; "
+            f"the geometric stiffness {listed(body.K_geo)} would be counted twice.",
+            hint="Leave K_geo empty.",
+        )
+    if part.spin.any():
+        raise ModelError(
+            "a body of large deflection does not spin in a frame that rests: its gyroscopic forces "
+            "would be those of small deflection.",
+            where=part.name,
+            hint="Let it turn with its frame, by omega.",
+        )
+    by_points = hasattr(body.quartic, "gradients")
+    family = SAMPLES_FAMILY if by_points else QUARTICS_FAMILY
+    return LargeDeflection(part.name, body.quartic), family

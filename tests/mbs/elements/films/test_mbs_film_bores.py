@@ -14,10 +14,10 @@ from cases.mbs.films import ORIGIN, held_rotor
 from cases.mbs.mechanisms import prepared, residual_at, tangents_at
 from cases.mbs.tangents import forces_at, shifted
 from cases.mbs.tubes import tube
+from rom.components.journal_bearing.films.journals import FIRST_CONTENT, KNOWN, TIME
 from rom.config.mechanism import read_mechanism
 from rom.errors import ConfigError
 from rom.mbs import Groove, JournalBearing
-from rom.mbs.elements.films.journals import FIRST_CONTENT, KNOWN, TIME
 
 DIAMETER, LENGTH, CLEARANCE, OUTER = 0.04, 0.04, 4e-5, 0.03
 SOFT, STEEL = 5e9, 2e11  # moduli [Pa]

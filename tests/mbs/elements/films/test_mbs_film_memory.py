@@ -9,8 +9,8 @@ from numpy.testing import assert_allclose
 import rom
 from cases.mbs.films import held_rotor
 from cases.mbs.mechanisms import prepared, residual_at
+from rom.components.journal_bearing.films.journals import FIRST_CONTENT
 from rom.mbs import Groove, JournalBearing
-from rom.mbs.elements.films.journals import FIRST_CONTENT
 
 SPEED, VISCOSITY, C = 100.0, 0.03, 1e-4
 

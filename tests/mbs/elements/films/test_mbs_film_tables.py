@@ -7,10 +7,10 @@ from numpy.testing import assert_allclose
 import rom
 from cases.mbs.films import NONE, ORIGIN, Pair, held_rotor, resting
 from cases.mbs.mechanisms import prepared, residual_at, tangents_at
+from rom.components.journal_bearing.films.tabulated import MAX_TILT_SHARE
 from rom.config.mechanism import read_mechanism
 from rom.errors import ConfigError, SolverError
 from rom.mbs import Groove, JournalBearing, iso_vg, multilobe
-from rom.mbs.elements.films.tabulated import MAX_TILT_SHARE
 
 SIDES = [Groove(np.pi / 2, 0.35), Groove(-np.pi / 2, 0.35)]
 SPEED, OIL, CLEARANCE = 100.0, 0.03, 1e-4

@@ -10,11 +10,11 @@ from cases.mbs.films import MOTION, NONE, ORIGIN, RATE, SPEED, VISCOSITY, Pair, 
 from cases.mbs.mechanisms import prepared, random_body, tangents_at
 from cases.mbs.tangents import difference, forces_at, shifted
 from rom.components.journal_bearing import film
+from rom.components.journal_bearing.films.cells import SPIN_COLUMN, cells_of
+from rom.components.journal_bearing.films.journals import FIRST_CONTENT, KNOWN, TIME
+from rom.components.journal_bearing.films.slopes import solve_film
 from rom.errors import ConfigError, ModelError, SolverError
 from rom.mbs import Groove, JournalBearing, iso_vg
-from rom.mbs.elements.films.cells import SPIN_COLUMN, cells_of
-from rom.mbs.elements.films.journals import FIRST_CONTENT, KNOWN, TIME
-from rom.mbs.elements.films.slopes import solve_film
 from rom.rotation import matrix
 
 GROOVES = [Groove(1.2, 0.3, 1e5, share=0.7)]

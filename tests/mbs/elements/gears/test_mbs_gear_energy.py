@@ -13,8 +13,8 @@ from cases.mbs.tangents import (
     shifted,
 )
 from rom.components.gear_mesh import Correction, GearPair, Hertz
-from rom.mbs.elements.films.bearing import Groove, JournalBearing
-from rom.mbs.elements.gears.meshes import GEAR_MESHES_FAMILY
+from rom.components.gear_mesh.gears.meshes import GEAR_MESHES_FAMILY
+from rom.components.journal_bearing.films.bearing import Groove, JournalBearing
 
 ORIGIN, Z = (0, 0, 0), (0, 0, 1)
 K = 1.3e10

@@ -22,10 +22,10 @@ from rom.components.gear_mesh import (
     pair_stiffness,
     tooth_compliance,
 )
+from rom.components.gear_mesh.gears.meshes import GEAR_MESHES_FAMILY
+from rom.components.gear_mesh.gears.table import PHASE
 from rom.config.mechanism import read_mechanism
 from rom.errors import ConfigError, ModelError
-from rom.mbs.elements.gears.meshes import GEAR_MESHES_FAMILY
-from rom.mbs.elements.gears.table import PHASE
 
 ORIGIN, Z, K = (0, 0, 0), (0, 0, 1), 1.3e10
 SPUR = GearPair((26, 40), 4e-3, 0.03, thinning=5e-5)

@@ -16,9 +16,9 @@ from cases.mbs.tangents import (
     shifted,
 )
 from rom.components.gear_mesh import Correction, GearPair, Hertz, Mesh, RackPair, stiffness_table
+from rom.components.gear_mesh.gears.meshes import GEAR_MESHES_FAMILY
 from rom.config.mechanism import read_mechanism
 from rom.errors import ConfigError, ModelError
-from rom.mbs.elements.gears.meshes import GEAR_MESHES_FAMILY
 
 ORIGIN, X, Y, Z, K = (0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), 1.3e10
 LOSSES = {"damping": 1e-6, "friction": 0.1, "transition_speed": 0.1}

@@ -20,9 +20,9 @@ from cases.mbs.tangents import (
 )
 from cases.mbs.tubes import tube
 from rom.components.gear_mesh import GearPair, RackPair
+from rom.components.gear_mesh.gears.meshes import GEAR_MESHES_FAMILY
+from rom.components.round_bodies.cylinders import cylinder_of, pack_cylinders, set_basis
 from rom.errors import ConfigError, RomWarning
-from rom.mbs.elements.cylinders import cylinder_of, pack_cylinders, set_basis
-from rom.mbs.elements.gears.meshes import GEAR_MESHES_FAMILY
 
 PAIR, K, PHASE, TORQUE = GearPair((26, 57), 3e-3, 0.06), 15e9, 0.3, 300.0
 CELLS, SLICES = (52, 2, 14), 20  # of the body, of the face

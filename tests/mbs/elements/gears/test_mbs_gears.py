@@ -16,9 +16,9 @@ from cases.mbs.tangents import (
 )
 from rom import rotation
 from rom.components.gear_mesh import Correction, GearPair, Mesh, stiffness_table
+from rom.components.gear_mesh.gears.meshes import GEAR_MESHES_FAMILY
+from rom.components.gear_mesh.gears.table import PHASE
 from rom.errors import ConfigError, ModelError, SolverError
-from rom.mbs.elements.gears.meshes import GEAR_MESHES_FAMILY
-from rom.mbs.elements.gears.table import PHASE
 
 ORIGIN, Z = (0, 0, 0), (0, 0, 1)
 SPUR = GearPair((26, 40), 4e-3, 0.03, thinning=5e-5)

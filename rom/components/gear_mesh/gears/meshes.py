@@ -1,0 +1,402 @@
+"""Gear meshes as elements: what users describe, their arrays and kernels."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rom.arguments import finite, number, positive
+from rom.components.gear_mesh.gears.corrections import Correction, checked_map
+from rom.components.gear_mesh.gears.geometry import GearPair
+from rom.components.gear_mesh.gears.hertz import Hertz
+from rom.components.gear_mesh.gears.phases import phase_from
+from rom.components.gear_mesh.gears.racks import RackPair
+from rom.components.gear_mesh.gears.table import (
+    COORDINATES,
+    DAMPING,
+    PITCH,
+    RB_1,
+    SLICE_COLUMNS,
+    SPEED,
+    Meshes,
+)
+from rom.components.gear_mesh.gears.teeth import mesh_energy, mesh_tangents, mesh_wrenches
+from rom.components.round_bodies.cylinders import Cylinder, cylinder_of, pack_cylinders
+from rom.errors import ConfigError
+from rom.mbs.elements.family import Family, Places, integers, rows_of
+from rom.mbs.parts.bodies import Marker, Part
+from rom.mbs.parts.whole import Whole
+from rom.model import Array
+from rom.plausible import USUAL, Range
+from rom.rotation import matrix
+
+DISTANCE_RTOL = 1e-3  # of the module: by which bodies may stand elsewhere than the pair says
+FACE_RTOL = 1e-2  # of the width: by which faces may be beside each other
+SPIN_RATIO_RTOL = 1e-6  # by which the speeds of spinning wheels may miss the ratio of the teeth
+MAX_CELLS = 1000
+MAX_APPROACH = 0.1  # of the base pitch: a hundred times the deflection of loaded teeth
+MAX_ENTRY = 0.5  # of the base pitch
+MAX_RUN_OUT = 0.1  # of the module: by which an involute is what it is to first order
+NO_ERRORS = np.zeros(0)
+
+TOOTH_STIFFNESS_LIMITS = 1e6, 1e13, "N/m^2", "teeth of steel have about 1e10 per width"
+USUAL["gear_mesh.stiffness"] = Range("'stiffness'", *TOOTH_STIFFNESS_LIMITS, "")
+
+
+@dataclass(frozen=True, slots=True)
+class GearMesh:
+    """Two wheels in mesh; axes (4, 3) and start (2,) as in `Meshes`."""
+
+    i: Marker
+    j: Marker
+    pair: GearPair | RackPair
+    stiffness: Array
+    correction: Correction
+    numbers: tuple[float, ...]
+    cells: int
+    axes: Array
+    start: Array
+    offset: float
+    phase: float
+    entry: float
+    rims: tuple[tuple[Cylinder, float] | None, ...]
+    hertz: Hertz | None = None
+    spins: tuple[float, float] = (0.0, 0.0)
+
+
+def gear_mesh(  # noqa: PLR0913  one keyword per property
+    self: Whole,
+    name: str,
+    wheel_a: Marker,
+    wheel_b: Marker,
+    *,
+    axis: npt.ArrayLike,
+    pair: GearPair | RackPair,
+    stiffness: npt.ArrayLike,
+    correction: Correction | None = None,
+    damping: float = 0.0,
+    friction: float = 0.0,
+    transition_speed: float | None = None,
+    cells: int = 21,
+    phase: float | None = None,
+    entry: float = 0.02,
+    conservative: bool | None = None,
+    hertz: Hertz | None = None,
+    coupling: float = 0.0,
+) -> None:
+    """Involute teeth of two wheels in contact, on both flanks, with backlash and loss of contact.
+
+    Where the bodies were added the working flanks just touch without load; they are those with
+    which a pinion that turns in the positive sense about the axis drives. The wheels may turn and
+    move as their bodies do: the pressure angle follows their distance. Bearings and shafts hold
+    them; the teeth bend as said here, wheels as their bodies do.
+
+    Args:
+        name: name of the mesh.
+        wheel_a: middle of the face of the pinion, on its axis.
+        wheel_b: that of the gear, or the point of the reference line of a rack opposite to it.
+        axis: (3,) of the pinion, in the world at the start.
+        pair: `rom.components.gear_mesh.GearPair`, at whose distance the wheels stand, or
+            `rom.components.gear_mesh.RackPair`, whose rack runs across axis and distance.
+        stiffness: of one pair of teeth per length of contact line [N/m^2]: a number, or (n,) values
+            from first to last contact, as `rom.components.gear_mesh.stiffness_table` has them.
+        correction: `rom.components.gear_mesh.Correction` of the working flanks.
+        damping: force per rate over force per deflection of a slice [s]; its force is never more
+            than the elastic one.
+        friction: coefficient between the flanks [1].
+        transition_speed: of sliding flanks, over which friction turns [m/s].
+        cells: slices across the face.
+        phase: angle that the pinion has turned from where a line of contact begins at the tangent
+            point of its base circle [rad]; None for the one at which teeth of wheels that other
+            meshes have already stand in gaps, and 0 for the first.
+        entry: share of the base pitch over which a pair of teeth takes up its load as it comes, and
+            gives it off as it goes; with 0 at once, which implicit steps do not like [1].
+        conservative: whether forces are the gradient of the energy also where lines move along
+            the path and over the face: relieved flanks press along their own normal, and what
+            lines bring and take as they come and go is work of the wheels. Else they follow the
+            normal of the involutes, and the balance of energy lacks that work. None for yes, unless
+            spur teeth take up their load at once, which is a jump of energy.
+        hertz: `rom.components.gear_mesh.Hertz`, contact that gives way by its load; then
+            `stiffness` is that of the teeth without it, see
+            `rom.components.gear_mesh.bending_table`.
+        coupling: length over which slices of a line carry each other, by a foundation after
+            Pasternak that shears [m].
+
+    Raises:
+        ConfigError: for a name in use, unknown markers, wheels that do not stand as the pair says,
+            or numbers no mesh has.
+        ModelError: for maps and contact that the wheels cannot have, or a planet whose teeth find
+            no gaps.
+    """
+    if not all(float(z).is_integer() for z in pair.teeth):
+        raise ConfigError(f"the wheels of mesh {name!r} have {pair.teeth} teeth: whole numbers.")
+    self.check_markers(name, wheel_a, wheel_b)
+    if wheel_a.body == wheel_b.body:
+        raise ConfigError(f"mesh {name!r} is of body {wheel_a.body!r} with itself.")
+    z = finite("axis", axis, (3,))
+    if not np.linalg.norm(z) > 0.0:
+        raise ConfigError(f"the axis of mesh {name!r} is zero.")
+    z = z / np.linalg.norm(z)
+    D = self.design_point(wheel_b) - self.design_point(wheel_a)
+    _check_place(name, pair, D, z)
+    c = np.sign(pair.distance) * (D - (D @ z) * z) / np.linalg.norm(D - (D @ z) * z)
+    turned = [matrix(self.part(wheel.body).p) for wheel in (wheel_a, wheel_b)]
+    along = np.cross(z, c) if isinstance(pair, RackPair) else -c
+    axes = np.array([z @ turned[0], c @ turned[0], z @ turned[1], along @ turned[1]])
+    if not 1 <= cells <= MAX_CELLS:
+        raise ConfigError(f"cells = {cells} of mesh {name!r}: it has from 1 to {MAX_CELLS}.")
+    follows = _follows_energy(name, pair, entry, conservative)
+    numbers = (
+        *_law(name, damping, friction, transition_speed), follows,
+        _coupling(name, coupling, pair), hertz.compliance if hertz else 0.0,
+    )  # fmt: skip
+    stiffness = _stiffness(name, stiffness)
+    flanks = Correction() if correction is None else correction
+    _check_correction(name, pair, flanks)
+    if hertz:
+        hertz.constants(pair)
+    parts = self.part(wheel_a.body), self.part(wheel_b.body)
+    mesh = GearMesh(
+        wheel_a, wheel_b, pair, stiffness, flanks, numbers, cells, axes, np.array([0.0, np.pi]),
+        float(D @ z), number("phase", phase or 0.0), entry * pair.base_pitch,
+        _rims(parts, (wheel_a, wheel_b), axes, pair), hertz, _spins(name, parts, axes, pair),
+    )  # fmt: skip
+    if phase is None:
+        mesh = replace(mesh, phase=phase_from(name, mesh, _others(self)))
+    self.add(name, mesh, GEAR_MESHES_FAMILY)
+
+
+def _others(whole: Whole) -> list[tuple[str, GearMesh]]:
+    """The meshes that are there already."""
+    return [(name, x) for name, (_, x) in whole.elements.items() if isinstance(x, GearMesh)]
+
+
+def _rims(
+    parts: tuple[Part, Part], wheels: tuple[Marker, Marker], axes: Array, pair: GearPair
+) -> tuple[tuple[Cylinder, float] | None, ...]:
+    """How the rims of flexible wheels deform, and the angle that a tooth takes on each [rad]."""
+    found: list[tuple[Cylinder, float] | None] = []
+    for side in range(2):
+        if not pair.teeth[side]:
+            found.append(None)
+            continue
+        rim = cylinder_of(parts[side], wheels[side], *axes[2 * side : 2 * side + 2])
+        found.append(None if rim is None else (rim, np.pi / abs(pair.teeth[side])))
+    return tuple(found)
+
+
+def _spins(
+    name: str, parts: tuple[Part, Part], axes: Array, pair: GearPair | RackPair
+) -> tuple[float, float]:
+    """Of both wheels in the frames of their bodies, about the axis of the pinion [rad/s]."""
+    one, two = (part.spin_about(name, axes[2 * k]) for k, part in enumerate(parts))
+    z, w = pair.teeth
+    if two and not w:
+        raise ConfigError(f"the rack of {name!r} spins at {two:.9g} rad/s: only wheels do.")
+    if one and two and abs(z * one + w * two) > SPIN_RATIO_RTOL * abs(z * one):
+        raise ConfigError(
+            f"the wheels of mesh {name!r} spin at {one:.9g} and {two:.9g} rad/s about its axis: "
+            f"teeth {z} and {w} turn at {one:.9g} and {-one * z / w:.9g}."
+        )
+    return one, two
+
+
+def _follows_energy(
+    name: str, pair: GearPair | RackPair, entry: Any, conservative: bool | None
+) -> float:
+    """1 for forces that follow the energy along the path, 0 for those along involutes."""
+    if not 0.0 <= number("entry", entry) <= MAX_ENTRY:
+        raise ConfigError(f"entry = {entry:g} of mesh {name!r} is a share from 0 to {MAX_ENTRY}.")
+    jumps = entry == 0.0 and pair.helix == 0.0
+    if conservative and jumps:
+        raise ConfigError(
+            f"the energy of mesh {name!r} would jump: its lines come with their whole width at "
+            "once, for entry = 0.",
+            hint="Let teeth take up their load over an entry of 0.02, or give conservative=False.",
+        )
+    return float(not jumps if conservative is None else conservative)
+
+
+def _coupling(name: str, length: Any, pair: GearPair | RackPair) -> float:
+    """Length over which slices carry each other [m]."""
+    if not 0.0 <= number("coupling", length) <= pair.width:
+        raise ConfigError(
+            f"coupling = {length:g} m of mesh {name!r} is a length from 0 to the width, "
+            f"{pair.width:g} m.",
+            hint="Teeth carry their neighbours over about a module.",
+        )
+    return float(length)
+
+
+def _check_place(name: str, pair: GearPair | RackPair, D: Array, z: Array) -> None:
+    """Refuse wheels that do not stand as the pair says."""
+    distance = float(np.linalg.norm(D - (D @ z) * z))
+    if not abs(distance - abs(pair.distance)) <= DISTANCE_RTOL * pair.module:
+        raise ConfigError(
+            f"the wheels of mesh {name!r} stand {distance * 1e3:.6g} mm apart, those of its pair "
+            f"{abs(pair.distance) * 1e3:.6g} mm.",
+            hint="Move a body, or give the pair this centre_distance; the marker of a rack is "
+            "beside the axis of its pinion.",
+        )
+    if not abs(float(D @ z)) <= FACE_RTOL * pair.width:
+        raise ConfigError(
+            f"the faces of mesh {name!r} are {abs(D @ z) * 1e3:.4g} mm beside each other: wheel_a "
+            "and wheel_b are the middles of the common face.",
+        )
+
+
+def _law(name: str, damping: Any, friction: Any, speed: Any) -> tuple[float, ...]:
+    """Damping, friction and transition speed."""
+    for what, value in (("damping", damping), ("friction", friction)):
+        if number(what, value) < 0.0:
+            raise ConfigError(f"{what} of mesh {name!r} is {value:g}: it must not drive.")
+    if friction and speed is None:
+        raise ConfigError(
+            f"mesh {name!r} has friction, but no transition_speed.",
+            hint="Take a hundredth of the speed with which its flanks slide.",
+        )
+    return (
+        float(damping),
+        float(friction),
+        1.0 if speed is None else positive("transition_speed", speed),
+    )
+
+
+def _stiffness(name: str, given: Any) -> Array:
+    """(n,) stiffness from first to last contact [N/m^2]."""
+    k = np.atleast_1d(np.asarray(given, dtype=float))
+    if not (k.ndim == 1 and k.size and np.isfinite(k).all() and (k > 0.0).all()):
+        raise ConfigError(f"stiffness of the teeth of {name!r} must be positive numbers [N/m^2].")
+    return k
+
+
+def _check_correction(name: str, pair: GearPair | RackPair, correction: Correction) -> None:
+    """Refuse errors and maps of other wheels."""
+    for errors, z in zip(correction.pitch, pair.teeth, strict=True):
+        if len(errors) not in (0, abs(z)):
+            raise ConfigError(
+                f"{len(errors)} pitch errors of {name!r} for {z} teeth: one per tooth."
+            )
+        if not np.isfinite(np.asarray(errors, dtype=float)).all():
+            raise ConfigError(f"pitch errors of {name!r} are not all finite numbers.")
+    if isinstance(pair, RackPair) and correction.run_out[1][0] != 0.0:
+        raise ConfigError(f"the rack of {name!r} does not turn: it has no run-out.")
+    for amount, direction in correction.run_out:
+        ends = finite("run_out", (amount, direction), (2,))
+        if not abs(ends[0]) <= MAX_RUN_OUT * pair.module:
+            raise ConfigError(
+                f"run-out {amount:g} m of {name!r} is more than {MAX_RUN_OUT} modules.",
+                hint="Flanks with so much are no involutes about their axis: move the marker.",
+            )
+    _maps(pair, correction, name)
+
+
+def _maps(pair: GearPair | RackPair, correction: Correction, name: str) -> list[Array]:
+    """Maps of the working flanks of pinion and gear, and of their back flanks."""
+    kinds = ("working", correction.maps), ("back", correction.back_maps)
+    return [
+        checked_map(given, z, f"the map of the {kind} flanks of the {wheel} of {name!r}")
+        for kind, both in kinds
+        for given, z, wheel in zip(both, pair.teeth, ("pinion", "gear"), strict=True)
+    ]
+
+
+def pack(meshes: Mapping[str, GearMesh], places: Places) -> Meshes:
+    """The meshes as arrays."""
+    found = list(meshes.values())
+    maps = [m for name, mesh in meshes.items() for m in _maps(mesh.pair, mesh.correction, name)]
+    markers = ([places.marker[getattr(mesh, side)] for mesh in found] for side in "ij")
+    return Meshes(
+        *map(integers, markers),
+        rows_of((mesh.axes.ravel() for mesh in found), 12),
+        rows_of((_sizes(mesh) for mesh in found), 15),
+        rows_of((_flanks(mesh, maps[4 * k : 4 * k + 4]) for k, mesh in enumerate(found)), 13),
+        rows_of((mesh.numbers for mesh in found), 6),
+        rows_of((mesh.spins for mesh in found), 2),
+        integers([places.clock()]),
+        integers(mesh.cells for mesh in found),
+        *_joined([mesh.stiffness for mesh in found]),
+        *_joined([mesh.hertz.constants(mesh.pair) if mesh.hertz else NO_ERRORS for mesh in found]),
+        *_joined([_from_lowest(errors) for mesh in found for errors in mesh.correction.pitch]),
+        *_joined([m.ravel() for m in maps]),
+        np.array([m.shape for m in maps], dtype=np.int64).reshape(-1, 3),
+        integers(places.memory(name, mesh.start) for name, mesh in meshes.items()),
+        rows_of((mesh.start for mesh in found), 2),
+        np.zeros(len(found)),
+        np.zeros(len(found)),
+        np.zeros((len(found), max(map(_most_slices, found)), 5)),
+        np.zeros(len(found)),
+        pack_cylinders([mesh.rims for mesh in found], places.R, max(mesh.cells for mesh in found)),
+        np.zeros(2),
+        np.zeros((max(mesh.cells for mesh in found), SLICE_COLUMNS)),
+        *np.zeros((2, COORDINATES)),
+        np.zeros((2, COORDINATES, COORDINATES)),
+        np.zeros((COORDINATES, 12)),
+        np.zeros((2, 12)),
+        np.zeros((2, 12, 12)),
+    )
+
+
+def _joined(rows: list[Array]) -> tuple[Array, Array]:
+    """Where each row begins, and all of them."""
+    return np.cumsum([0, *(row.size for row in rows)]), np.concatenate([NO_ERRORS, *rows])
+
+
+def _most_slices(mesh: GearMesh) -> int:
+    """As many as can bear at once on both flanks, of wheels a little closer than they are cut."""
+    pair = mesh.pair
+    along = 1.5 * (pair.path[1] - pair.path[0]) + mesh.entry
+    lines = (along + pair.width * np.tan(abs(pair.base_helix))) / pair.base_pitch + 3
+    return 2 * mesh.cells * int(np.ceil(lines))
+
+
+def _from_lowest(errors: Any) -> Array:
+    """Pitch errors as gaps, the tooth that touches first without one."""
+    found = np.asarray(errors, dtype=float)
+    return found - found.min() if found.size else found
+
+
+def _sizes(mesh: GearMesh) -> list[float]:
+    pair = mesh.pair
+    rack = (pair.distance, pair.tip) if isinstance(pair, RackPair) else (0.0, 0.0)
+    tips = (pair.wheel.ra[0], 0.0) if isinstance(pair, RackPair) else pair.ra
+    return [
+        *pair.rb, *tips, pair.base_helix, pair.base_pitch, pair.base_thickness[0], pair.backlash,
+        pair.alpha, pair.width, mesh.offset, mesh.phase, mesh.entry, *rack,
+    ]  # fmt: skip
+
+
+def _flanks(mesh: GearMesh, maps: list[Array]) -> list[float]:
+    """Corrections, eccentricities and the least gaps of working and back flanks."""
+    c, pair, lead = mesh.correction, mesh.pair, np.cos(mesh.pair.base_helix)
+    amounts, towards = zip(*((float(e), float(angle)) for e, angle in c.run_out), strict=True)
+    if pair.internal:  # wheels mesh on one side of both centres
+        towards = (towards[0], towards[1] + np.pi)
+    off = lead * float(np.abs(amounts).sum())
+    least = [sum(float(m.min(initial=0.0)) for m in two) - off for two in (maps[:2], maps[2:])]
+    least[0] += sum(min(x, 0.0) for x in (*c.relief, c.crowning))
+    least[1] += lead * pair.backlash
+    return [*c.relief, *c.extent, c.power, c.crowning, c.slope, *amounts, *towards, *least]
+
+
+def _room(meshes: Meshes) -> Array:
+    """(k,) share of the depth that is left which no teeth reach, and a correction must not."""
+    room: Array = 1.0 - meshes.approach / (MAX_APPROACH * meshes.size[:, PITCH])
+    return room
+
+
+def _passed(meshes: Meshes, W: Any) -> Array:
+    """(k,) teeth of the pinions that have gone by."""
+    turned = W.fresh[meshes.remembered] + meshes.spin[:, 0] * W.signal[meshes.clock[0], 0]
+    teeth: Array = meshes.size[:, RB_1] / meshes.size[:, PITCH] * turned
+    return teeth
+
+
+GEAR_MESHES_FAMILY = Family(
+    "gear_meshes", GearMesh, pack, mesh_wrenches, mesh_tangents, mesh_energy,
+    by_rate=lambda meshes: meshes.law[:, DAMPING : SPEED].any(), answers=lambda meshes: meshes.load,
+    lost="the wheels of {} are so close that they have no common tangent", room=_room,
+    phases=_passed,
+)  # fmt: skip

@@ -1,0 +1,124 @@
+"""The arrays of gear meshes, and the names of their columns."""
+
+from rom.components.round_bodies.cylinders import Cylinders
+from rom.mbs.kernels.tables import (
+    Array1,
+    Array2,
+    Index1,
+    Index2,
+    Scratch1,
+    Scratch2,
+    Scratch3,
+    Table,
+    table,
+)
+
+# columns of Meshes.size, Meshes.flank and Meshes.law
+RB_1, RB_2, RA_1, RA_2, HELIX, PITCH, THICKNESS = range(7)
+BACKLASH, ALPHA, WIDTH, OFFSET, PHASE, ENTRY, RACK, TIP = range(7, 15)
+RELIEF_1, RELIEF_2, EXTENT_1, EXTENT_2, POWER, CROWNING, SLOPE = range(7)
+RUN_OUT_1, RUN_OUT_2, TOWARDS_1, TOWARDS_2, LEAST, LEAST_BACK = range(7, 13)
+DAMPING, FRICTION, SPEED, FOLLOWS, COUPLING, HERTZ = range(6)
+SIDE, PLACE, HEIGHT, LENGTH, LOAD = range(5)  # columns of Meshes.slices
+# what `rom.components.gear_mesh.gears.teeth.add_lines` adds up
+FORCES, TANGENTS, ENERGY = range(3)
+# how the wheels stand to each other: all that the energy of the teeth depends on
+TURN_1, TURN_2, DISTANCE, SHIFT, TILT_C, TILT_T, COORDINATES = range(7)
+# columns of Meshes.line: of a slice its place, how deep its flanks are in each other, its weight
+# (length of line times the share of its load that it has taken up), the stiffness of its teeth and
+# the constant of its contact; then how these follow the line along the path, and the path's begin
+X, Z, DEPTH, WEIGHT, STIFFNESS, CONSTANT = range(6)
+DEPTH_AT, WEIGHT_AT, STIFFNESS_AT, CONSTANT_AT = range(6, 10)
+DEPTH_FIRST, WEIGHT_FIRST, STIFFNESS_FIRST, CONSTANT_FIRST = range(10, 14)
+# its force and how that follows depth, weight, stiffness and constant; its energy and how that
+# follows the last three
+FORCE, BY_DEPTH, BY_WEIGHT, BY_STIFFNESS, BY_CONSTANT = range(14, 19)
+STORED, WORK_WEIGHT, WORK_STIFFNESS, WORK_CONSTANT = range(19, 23)
+# of slices that carry each other: their foundation, what binds one to the next, whether it touches,
+# its deflection, and three columns of memory
+FOUNDATION, LINK, TOUCHES, BENT, UPPER, ANSWER, TARGET = range(23, 30)
+# the length of its piece of the line, the force that damping adds, and how the whole follows depth
+# and its rate
+LENGTH_OF_LINE, LOSS, STEEP, VISCOUS = range(30, 34)
+FIRST_GRADIENT = 34  # first of the derivatives of its depth by the coordinates of the wheels
+SLICE_COLUMNS = FIRST_GRADIENT + COORDINATES
+
+
+@table
+class Meshes(Table):
+    """All meshes.
+
+    Attributes:
+        i, j: (k,) markers of pinion and gear.
+        axes: (k, 12) axis of the pinion, a direction across it, the same of the gear, in the axes
+            of their markers.
+        size: (k, 15) base radii, tip radii [m], base helix [rad], base pitch, thickness of the
+            pinion's teeth on the base circle, backlash [m], working pressure angle at the datum
+            [rad], width, offset of the faces [m], angle of the pinion at the datum [rad], length
+            of entry [m]; distance of a rack, 0 for gears, and height of its teeth [m].
+        flank: (k, 13) tip relief of pinion and gear, their extents [m], power, crowning, slope,
+            eccentricities of the wheels [m], their directions [rad], least gaps of working and
+            back flanks [m].
+        law: (k, 6) damping [s], coefficient of friction, transition speed [m/s], whether forces
+            follow the energy along the path, length over which slices carry each other [m],
+            compliance of the contact [m^2/N].
+        spin: (k, 2) of both wheels in the frames of their bodies, about the axis of the pinion
+            [rad/s]; clock: (1,) function that tells the time.
+        cells: (k,) slices across the face.
+        stiffness_at, stiffness: (k + 1,) where the tables begin [N/m^2].
+        constant_at, constant: (k + 1,) where those of the contact begin [1].
+        pitch_at, pitch: (2 k + 1,) where the pitch errors of wheels begin [m].
+        map_at, maps: (4 k + 1,) where the maps of the working flanks of both wheels and of their
+            back flanks begin [m].
+        map_shape: (4 k, 3) teeth, places along profile and lead.
+        remembered: (k,) first of two angles that are followed.
+        start: (k, 2) these angles at the datum [rad].
+        load: (k,) sum of the normal forces at the last residual; NaN without a common tangent [N].
+        approach: (k,) of the flanks that are deepest in each other, of wheels that are rigid [m].
+        slices: (k, m, 5) of all that bear at the last residual: side, place on the path of
+            contact, height over the middle of the face, length of the line [m], force [N].
+        n_slices: (k,) how many.
+        rims: how the rims of flexible wheels deform.
+        factor: (2,) of stiffness and damping in the tangents.
+        line: (c, 40) slices of one line, with the columns above.
+        gradient: (6,) of the energy, and of the power lost to damping, by the coordinates of the
+            wheels and their rates `speed` (6,).
+        hessian: (2, 6, 6) how it follows the coordinates and their rates.
+        rates: (6, 12) of the coordinates by the motions of both markers.
+        lever: (2, 12) what the motions do across a slice, and how they close it.
+        tangent: (2, 12, 12) of one mesh, by motions and velocities.
+    """
+
+    i: Index1
+    j: Index1
+    axes: Array2
+    size: Array2
+    flank: Array2
+    law: Array2
+    spin: Array2
+    clock: Index1
+    cells: Index1
+    stiffness_at: Index1
+    stiffness: Array1
+    constant_at: Index1
+    constant: Array1
+    pitch_at: Index1
+    pitch: Array1
+    map_at: Index1
+    maps: Array1
+    map_shape: Index2
+    remembered: Index1
+    start: Array2
+    load: Scratch1
+    approach: Scratch1
+    slices: Scratch3
+    n_slices: Scratch1
+    rims: Cylinders
+    factor: Scratch1
+    line: Scratch2
+    gradient: Scratch1
+    speed: Scratch1
+    hessian: Scratch3
+    rates: Scratch2
+    lever: Scratch2
+    tangent: Scratch3

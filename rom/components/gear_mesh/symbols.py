@@ -1,0 +1,29 @@
+"""How gear meshes are drawn."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from rom.view.canvas.scene import Actor
+from rom.view.scenes.connections import LINE_WIDTH, circle
+from rom.view.scenes.ground import Scenery, at, lines
+from rom.view.scenes.places import Places
+
+
+def draw(scenery: Scenery, _: str, mesh: Any) -> Iterator[Actor]:
+    """The circles that roll on each other, and the line of a rack."""
+    wheels = zip((mesh.i, mesh.j), mesh.axes[::2], mesh.pair.r, strict=False)
+    for marker, axis, radius in wheels:
+        yield circle(scenery.places, marker, axis, float(radius))
+    if not mesh.pair.teeth[1]:
+        yield _rack(scenery.places, mesh)
+
+
+def _rack(places: Places, mesh: Any) -> Actor:
+    """The line that the circle of a pinion rolls on, over one of its turns."""
+    normal, along, radius = mesh.axes[2], mesh.axes[3], float(mesh.pair.r[0])
+    middle = -(mesh.pair.distance - radius) * np.cross(along, normal)
+    points = middle + np.pi * radius * np.array([[-1.0], [1.0]]) * along
+    pose = at(places.point(mesh.j), places.pose(mesh.j.body)[1])
+    return lines((points, np.array([[0, 1]])), pose, width=LINE_WIDTH)

@@ -1,0 +1,162 @@
+"""Films in cells: the arrays of all films of a mechanism, or of one alone."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from rom.components.journal_bearing.films.bearing import LAWS, JournalBearing
+from rom.mbs.kernels.tables import (
+    Address2,
+    Array2,
+    Array3,
+    Index1,
+    Index2,
+    Scratch2,
+    Scratch3,
+    Table,
+    table,
+)
+from rom.model import Array
+
+N_MOTIONS = 4  # journal centre x, y and tilt about x, y
+N_ANSWERS = 5  # what works on them, and the friction torque
+# columns of Cells.size
+RADIUS, LENGTH, CLEARANCE, SLENDER, IMAGES, Z_FIRST = range(6)
+# columns of Cells.circle: cosine, sine and bore at the centre of a column, and at the face behind
+COS, SIN, BORE = range(3)
+BEHIND_FACE = 3
+# columns of Cells.state: motion, its rate, then
+SPIN_COLUMN, PASSED_TIME, CONTENT_KNOWN = 2 * N_MOTIONS, 2 * N_MOTIONS + 1, 2 * N_MOTIONS + 2
+# column of Cells.slope where openings begin, and behind them their rates
+FIRST_OPENED = SPIN_COLUMN + 1
+
+
+@table
+class Cells(Table):
+    """Films, each of nt columns of nz cells; cell i nz + j is the one at i along the circle.
+
+    Unwrapped, film in clearances c, pressure in viscosity times (R/c)^2 over seconds, width in
+    lengths L of the bearing. Rows are padded to those of the largest film.
+
+    Attributes:
+        shape: (k, 2) nt, nz.
+        law: (k,) FULL, REYNOLDS or JFO.
+        size: (k, 6) R, L, c [m], (R/L)^2, 2 if the cells cover half the width and the other half is
+            their image, else 1; where the cells begin along the width.
+        circle: (k, nt, 6) cosine, sine, bore at the centres of columns and at the faces behind.
+        fixed: (k, n) 1 where a groove holds the pressure.
+        inlet: (k, n) pressure there [Pa].
+        n_functions: (k,) number of functions by which a bore that deforms opens the film;
+            functions: (k, n, m) their values at the centres [1].
+        state: (k, 11) motion (4,) and its rate [1/s], spin of the journal [rad/s], time that has
+            passed since the filling was known [s], whether it is remembered.
+        opening, opening_rate: (k, n) by which the bush gives way, in clearances; per second.
+        supply: (k, n) pressure of the grooves in units of the film.
+        behind, side, middle: (k, n), (k, nt (nz + 1)), (k, n) film at the faces behind, at the
+            faces across, at the centres.
+        conducts, leaks: (k, n), (k, nt (nz + 1)) conductance of these faces.
+        store, gain: (k, n) oil that a cell takes up when full, and has had to give.
+        content: (k, n) film times filling at the last accepted instant.
+        active: (k, n) 1 where the film carries pressure: a guess, and what came out.
+        place: (k, nt) order of the columns.
+        band: (k, n, 4 nz + 1) factors of the balances.
+        unknown, P, fill: (k, n) of the balances; pressure; filling [1].
+        answer: (k, 5 + m) forces that work on the motions, friction torque, forces that work on
+            the functions.
+        weight: (k, n, 5 + m) of the balances in each answer.
+        change: (k, 9 + 2 m) derivatives of the balance of one cell by motions, rates, spin,
+            openings and their rates.
+        slope: (k, 5 + m, 9 + 2 m) the same of the answers.
+    """
+
+    shape: Index2
+    law: Index1
+    size: Array2
+    circle: Array3
+    fixed: Index2
+    inlet: Array2
+    n_functions: Index1
+    functions: Array3
+    state: Scratch2
+    opening: Scratch2
+    opening_rate: Scratch2
+    supply: Scratch2
+    behind: Scratch2
+    side: Scratch2
+    middle: Scratch2
+    conducts: Scratch2
+    leaks: Scratch2
+    store: Scratch2
+    gain: Scratch2
+    content: Scratch2
+    active: Address2
+    place: Address2
+    band: Scratch3
+    unknown: Scratch2
+    P: Scratch2
+    fill: Scratch2
+    answer: Scratch2
+    weight: Scratch3
+    change: Scratch2
+    slope: Scratch3
+
+
+def cells_of(
+    bearings: Sequence[JournalBearing], functions: Sequence[Array | None] | None = None
+) -> Cells:
+    """The cells of some bearings.
+
+    Args:
+        bearings: k of them.
+        functions: (n, m) by which the bore of each opens the film in its cells; None of a rigid
+            one.
+    """
+    k, grids = len(bearings), [one.grid for one in bearings]
+    shapes = np.array([grid.fixed.shape for grid in grids], dtype=np.int64).reshape(-1, 2)
+    nt, nz, n = int(shapes[:, 0].max()), int(shapes[:, 1].max()), int(shapes.prod(axis=1).max())
+    sides = int((shapes[:, 0] * (shapes[:, 1] + 1)).max())
+    circles = [np.concatenate([grid.angle, grid.bore[..., None]], axis=-1) for grid in grids]
+    sizes = [
+        [b.radius, b.length, b.clearance, b.grid.slender, 1.0 + b.grid.half, b.grid.Z_face[0]]
+        for b in bearings
+    ]
+    given = [np.zeros((0, 0)) if one is None else one for one in functions or [None] * k]
+    counts = np.array([one.shape[1] for one in given], dtype=np.int64)
+    most = int(counts.max(initial=0))
+    opens = np.zeros((k, n, most))
+    for row, one in zip(opens, given, strict=True):
+        row[: one.shape[0], : one.shape[1]] = one
+    widths = {"side": sides, "leaks": sides}
+    scratch = {
+        name: np.zeros((k, widths.get(name, n)))
+        for name in ("opening", "opening_rate", "supply", "behind", "side", "middle", "conducts",
+                     "leaks", "store", "gain", "content", "unknown", "P", "fill")
+    }  # fmt: skip
+    return Cells(
+        shape=shapes,
+        law=np.array([LAWS[one.cavitation] for one in bearings], dtype=np.int64),
+        size=np.array(sizes),
+        circle=_padded([np.concatenate([c[0], c[1]], axis=1) for c in circles], nt),
+        fixed=_padded([grid.fixed.ravel() for grid in grids], n),
+        inlet=_padded([grid.inlet.ravel() for grid in grids], n),
+        n_functions=counts,
+        functions=opens,
+        state=np.zeros((k, CONTENT_KNOWN + 1)),
+        active=np.ones((k, n), dtype=np.int64),
+        place=np.zeros((k, nt), dtype=np.int64),
+        band=np.zeros((k, n, 4 * nz + 1)),
+        answer=np.zeros((k, N_ANSWERS + most)),
+        weight=np.zeros((k, n, N_ANSWERS + most)),
+        change=np.zeros((k, FIRST_OPENED + 2 * most)),
+        slope=np.zeros((k, N_ANSWERS + most, FIRST_OPENED + 2 * most)),
+        **scratch,
+    )
+
+
+def _padded(rows: Sequence[Any], n: int) -> Any:
+    """Rows of one length, zeros behind."""
+    padded: Any = np.zeros((len(rows), n, *rows[0].shape[1:]), dtype=rows[0].dtype)
+    for row, values in zip(padded, rows, strict=True):
+        row[: len(values)] = values
+    return padded

@@ -1,0 +1,436 @@
+"""Tendons as elements: what users describe, their arrays and kernels."""
+
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from rom.arguments import finite, number, positive, typed
+from rom.components.tendons.paths import Place, path_through
+from rom.components.tendons.routing import (
+    bearing_angle,
+    between,
+    departure,
+    directions,
+    piece,
+    pulley_axis,
+    turning,
+)
+from rom.components.tendons.tension import (
+    add_powers,
+    place_tangents,
+    share_tension,
+    stored_energy,
+    tension_slopes,
+)
+from rom.errors import ConfigError
+from rom.mbs.elements.family import Family, Places, integers, rows_of, starts
+from rom.mbs.elements.pair_motion import followed_angle
+from rom.mbs.kernels.algebra import cross, dot, row, sub, turn
+from rom.mbs.kernels.compiled import inner
+from rom.mbs.kernels.element_calls import energy, residuals, tangents
+from rom.mbs.kernels.tables import (
+    Array1,
+    Array2,
+    Index1,
+    Scratch1,
+    Scratch2,
+    Scratch3,
+    Table,
+    table,
+)
+from rom.mbs.parts.bodies import Marker
+from rom.mbs.parts.whole import Whole
+from rom.model import Array, Index
+from rom.rotation import matrix
+
+MAX_TURNS = 1000  # of a cable about a pulley
+
+
+@typed
+@dataclass(frozen=True)
+class Pulley:
+    """A place of a tendon at which it runs around a circle.
+
+    Attributes:
+        marker: centre.
+        radius: of the cable [m].
+        axis: (3,) of the pulley, in the world at the start; the cable goes around it in the
+            positive sense.
+        friction: coefficient between cable and pulley [1]; without it the cable slides, or turns a
+            sheave without bearing friction.
+        turns: whole turns about it beyond the wrap of less than one.
+    """
+
+    marker: Marker
+    radius: float
+    axis: Any
+    friction: float = 0.0
+    turns: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Station:
+    """A place of a tendon; numbers as in `Tendons`."""
+
+    marker: Marker
+    axes: Array
+    radius: float
+    friction: float
+    turns: int
+
+
+@dataclass(frozen=True, slots=True)
+class Tendon:
+    """A cable; numbers as in `Tendons`."""
+
+    stations: tuple[Station, ...]
+    numbers: tuple[float, ...]
+    pulled: bool
+    function: Callable[[float], Any] | None
+
+
+def tendon(  # noqa: PLR0913  one keyword per property
+    self: Whole,
+    name: str,
+    path: Sequence[Marker | Pulley],
+    *,
+    EA: float | None = None,
+    damping: float = 0.0,
+    free_length: Any = None,
+    pretension: float = 0.0,
+    tension: Any = None,
+    friction: float = 0.0,
+    transition_speed: float | None = None,
+) -> None:
+    """Cable that pulls along a path through eyelets and over pulleys, and goes slack.
+
+    It has no mass and is fixed at both ends. Tensions on both sides of an eyelet at which it turns
+    differ by the factor exp(friction angle) while it slides (Euler, Eytelwein); what sticks creeps
+    with less than the transition speed. Either it stretches, or a force pulls it at its first end,
+    from beyond the path.
+
+    Args:
+        name: name of the tendon.
+        path: markers in the order in which it passes them, and `rom.mbs.Pulley` between the ends.
+        EA: force per strain [N].
+        damping: tension per rate of strain [N s]; it is never more than the elastic tension.
+        free_length: length without force [m], or a function of time: a winch before the first
+            marker; None for the length at the start.
+        pretension: tension at the start, in place of a free length [N].
+        tension: force that pulls at the first end, or a function of time [N], in place of EA.
+        friction: coefficient at all eyelets [1].
+        transition_speed: of the sliding cable, over which friction turns [m/s].
+
+    Raises:
+        ConfigError: for a name in use, an unknown marker, a path that is none, pulleys that overlap
+            or whose axes are not parallel, or numbers no cable has.
+    """
+    stations = tuple(_station(self, name, place, friction) for place in path)
+    length = _design_length(self, name, stations)
+    if any(one.friction for one in stations[1:-1]) and transition_speed is None:
+        raise ConfigError(
+            f"tendon {name!r} has friction, but no transition_speed.",
+            hint="Take a hundredth of the speed with which it slides.",
+        )
+    speed = 1.0 if transition_speed is None else positive("transition_speed", transition_speed)
+    if (EA is None) == (tension is None):
+        raise ConfigError(f"tendon {name!r} needs either EA or tension.")
+    if EA is None:
+        _refuse_stretch(name, damping, free_length, pretension)
+        function, given = _given(name, "tension", tension)
+        numbers = (0.0, 0.0, given, speed)
+    else:
+        stiffness, loss = positive("EA", EA), _not_negative(name, "damping", damping)
+        slack = length / (1.0 + _not_negative(name, "pretension", pretension) / stiffness)
+        if pretension and free_length is not None:
+            raise ConfigError(f"tendon {name!r} has both a pretension and a free_length.")
+        function, given = _free(slack, free_length)
+        numbers = (stiffness, loss, given, speed)
+    self.add(name, Tendon(stations, numbers, EA is None, function), TENDONS_FAMILY)
+
+
+def _station(whole: Whole, name: str, place: Any, friction: float) -> Station:
+    """A place of the path in the axes of its marker."""
+    mu = _not_negative(name, "friction", getattr(place, "friction", friction))
+    if isinstance(place, Marker):
+        whole.check_markers(name, place)
+        return Station(place, np.eye(3)[:2], 0.0, mu, 0)
+    whole.check_markers(name, place.marker)
+    if not 0 <= place.turns <= MAX_TURNS:
+        raise ConfigError(
+            f"turns = {place.turns} of a pulley of {name!r}: it has from 0 to {MAX_TURNS}."
+        )
+    axis = finite("axis", place.axis, (3,))
+    size = np.linalg.norm(axis)
+    if size == 0.0:
+        raise ConfigError(f"the axis of a pulley of {name!r} is zero.")
+    n = axis / size
+    e = np.cross(n, np.eye(3)[np.argmin(np.abs(n))])
+    e /= np.linalg.norm(e)
+    axes = np.array([n, e]) @ matrix(whole.part(place.marker.body).p)
+    return Station(place.marker, axes, positive("radius", place.radius), mu, place.turns)
+
+
+def _not_negative(name: str, what: str, value: Any) -> float:
+    if number(what, value) < 0.0:
+        raise ConfigError(f"{what} of tendon {name!r} is {value:g}: it must not drive.")
+    return float(value)
+
+
+def _refuse_stretch(name: str, damping: Any, free_length: Any, pretension: Any) -> None:
+    if damping or pretension or free_length is not None:
+        raise ConfigError(
+            f"tendon {name!r} is pulled by a given tension and does not stretch: damping, "
+            "free_length and pretension have no meaning."
+        )
+
+
+def _given(name: str, what: str, value: Any) -> tuple[Callable[[float], Any] | None, float]:
+    """A function of time, or a number that is not negative."""
+    return (value, 0.0) if callable(value) else (None, _not_negative(name, what, value))
+
+
+def _free(slack: float, free: Any) -> tuple[Callable[[float], Any] | None, float]:
+    """Function and number of the free length, the latter that of the start if none is given [m]."""
+    if free is None:
+        return None, slack
+    return (free, 0.0) if callable(free) else (None, positive("free_length", free))
+
+
+def _design_length(whole: Whole, name: str, stations: Sequence[Station]) -> float:
+    """Length of the path where the bodies were added.
+
+    Raises:
+        ConfigError: for a path that is none.
+    """
+    if len(stations) < 2:
+        raise ConfigError(f"the path of tendon {name!r} has {len(stations)} places: two are ends.")
+    if stations[0].radius or stations[-1].radius:
+        raise ConfigError(
+            f"tendon {name!r} ends at a pulley.", hint="It is fixed at a marker at both ends."
+        )
+    path = path_through(name, [_placed(whole, one) for one in stations])
+    arcs = (one.radius * (wrap + 2 * np.pi * one.turns)
+            for one, wrap in zip(stations, path.wrap, strict=True))  # fmt: skip
+    return float(path.straight.sum() + sum(arcs))
+
+
+def _placed(whole: Whole, one: Station) -> Place:
+    """A place where its body was added."""
+    axes = one.axes @ matrix(whole.part(one.marker.body).p).T
+    return Place(whole.design_point(one.marker), axes, one.radius)
+
+
+@table
+class Tendons(Table):
+    """All tendons; the p stations of one after those of the other.
+
+    A piece has the number of the station before it, so that that of a last station is unused.
+
+    Attributes:
+        first: (k + 1,) first station of each tendon.
+        law: (k, 4) EA [N], damping [N s], free length [m] or tension [N] without a function,
+            transition speed [m/s].
+        signal: (k,) motion of the free length, or function of time of the tension; -1 for none.
+        pulled: (k,) 1 if its tension is given.
+        rated: (k,) 1 if its tension depends on velocities.
+        at: (p,) markers.
+        axes: (p, 6) axis of a pulley and a direction across it, in the axes of the marker.
+        radius: (p,) of the pulley [m], 0 for an eyelet.
+        friction: (p,) coefficient [1].
+        remembered: (p,) where the angle of wrap is kept, -1 for eyelets.
+        length, rate: (p,) of pieces, with half of the arcs at both ends [m, m/s].
+        gradient: (p, 12) of the length between points of both stations, by their motions.
+        pull: (p, 3) gradient of the straight length by the position of its second end.
+        wrap: (p,) angle by which it turns at a station [rad].
+        wrap_gradient: (p, 18) by the motions of the station before, its own, and that behind.
+        weight, flow, tension: (p,) of pieces, flow over the station [1, m/s, N].
+        rate_gradient: (p, 12) of the rate of the length of a piece, by motions.
+        bend: (p, 36) of the direction of a piece, by motions; (3, 12) row by row.
+        slope: (3, m, m) of the tensions of one tendon by lengths, rates and angles.
+        change: (2, 6 m) of one tension by motions and velocities of m stations.
+        stiffness, damping: (6 m, 6 m) of one tendon, by motions of its stations.
+    """
+
+    first: Index1
+    law: Array2
+    signal: Index1
+    pulled: Index1
+    rated: Index1
+    at: Index1
+    axes: Array2
+    radius: Array1
+    friction: Array1
+    remembered: Index1
+    length: Scratch1
+    rate: Scratch1
+    gradient: Scratch2
+    pull: Scratch2
+    wrap: Scratch1
+    wrap_gradient: Scratch2
+    weight: Scratch1
+    flow: Scratch1
+    tension: Scratch1
+    rate_gradient: Scratch2
+    bend: Scratch2
+    slope: Scratch3
+    change: Scratch2
+    stiffness: Scratch2
+    damping: Scratch2
+
+
+def pack(tendons: Mapping[str, Tendon], places: Places) -> Tendons:
+    """The tendons as arrays."""
+    stations = [one for tendon in tendons.values() for one in tendon.stations]
+    sizes = [len(tendon.stations) for tendon in tendons.values()]
+    p, m = len(stations), max(sizes)
+    radius = np.array([one.radius for one in stations])
+    return Tendons(
+        starts(sizes),
+        rows_of((tendon.numbers for tendon in tendons.values()), 4),
+        integers(_signal(name, tendon, places) for name, tendon in tendons.items()),
+        integers(tendon.pulled for tendon in tendons.values()),
+        integers(_rated(tendon) for tendon in tendons.values()),
+        integers(places.marker[one.marker] for one in stations),
+        rows_of((one.axes.ravel() for one in stations), 6),
+        radius,
+        np.array([one.friction for one in stations]),
+        integers(_remembered(*one, places) for one in _named(tendons)),
+        *(np.zeros(x) for x in (p, p, (p, 12), (p, 3), p, (p, 18), p, p, p, (p, 12), (p, 36))),
+        *(np.zeros(x) for x in ((3, m, m), (2, 6 * m), (6 * m, 6 * m), (6 * m, 6 * m))),
+    )
+
+
+def _rated(tendon: Tendon) -> bool:
+    return tendon.numbers[1] > 0.0 or any(one.friction > 0.0 for one in tendon.stations[1:-1])
+
+
+def _signal(name: str, tendon: Tendon, places: Places) -> int:
+    function = tendon.function
+    if function is None or not tendon.pulled:
+        return places.motion(name, function)
+    return places.signal(name, lambda t: (function(t), 0.0, 0.0))
+
+
+def _named(tendons: Mapping[str, Tendon]) -> Iterable[tuple[str, Station]]:
+    """All stations, with a name of their own."""
+    return (
+        (f"place {k} of {name}", one)
+        for name, tendon in tendons.items()
+        for k, one in enumerate(tendon.stations)
+    )
+
+
+def _remembered(name: str, one: Station, places: Places) -> int:
+    """Where the angle of wrap is kept; it begins where the first angle is within the turn meant."""
+    if one.radius == 0.0:
+        return -1
+    return places.memory(name, np.array([np.pi * (1 + 2 * one.turns)]))
+
+
+@inner
+def route(s, W, tendons, k):
+    """Set lengths, rates, angles and their gradients of tendon k."""
+    first, last = tendons.first[k], tendons.first[k + 1] - 1
+    for i in range(first, last):
+        D, a, b = between(W, tendons, i), tendons.at[i], tendons.at[i + 1]
+        axes = pulley_axis(W, tendons, i), pulley_axis(W, tendons, i + 1)
+        length, force, ma, mb = piece(D, *axes, tendons.radius[i], tendons.radius[i + 1])
+        rate = dot(force, sub(row(W.V, b, 0), row(W.V, a, 0)))
+        tendons.rate[i] = rate + dot(ma, row(W.V, a, 3)) + dot(mb, row(W.V, b, 3))
+        tendons.length[i] = length
+        for p in range(3):
+            tendons.pull[i, p] = D[p] / length
+            tendons.gradient[i, p], tendons.gradient[i, 6 + p] = -force[p], force[p]
+            tendons.gradient[i, 3 + p], tendons.gradient[i, 9 + p] = ma[p], mb[p]
+    for i in range(first + 1, last):
+        if tendons.radius[i] > 0.0:
+            wrap_pulley(s, W, tendons, i)
+        elif tendons.friction[i] > 0.0:
+            tendons.wrap[i] = turning(*directions(tendons, i))[0]
+
+
+@inner
+def wrap_pulley(s, W, tendons, i):
+    """Set the angle of wrap of station i, followed over whole turns, and add its arc."""
+    m, R, n = tendons.at[i], tendons.radius[i], pulley_axis(W, tendons, i)
+    e = turn(W.E, m, row(tendons.axes, i, 3))
+    D_in, D_out = between(W, tendons, i - 1), between(W, tendons, i)
+    R_in, R_out = tendons.radius[i - 1], tendons.radius[i + 1]
+    s_in = -1.0 if dot(n, pulley_axis(W, tendons, i - 1)) < 0.0 else 1.0
+    s_out = -1.0 if dot(n, pulley_axis(W, tendons, i + 1)) < 0.0 else 1.0
+    into, out = s_in * R_in - R, R - s_out * R_out
+    angle = bearing_angle(D_out, n, e, out) - bearing_angle(D_in, n, e, into)
+    angle = followed_angle(s, W, tendons.remembered[i], angle)
+    if angle < 0.0:  # it has left the pulley
+        angle = math.nan
+    g_in, g_out = departure(D_in, n, into)[1], departure(D_out, n, out)[1]
+    spin = sub(cross(D_in, g_in), cross(D_out, g_out))
+    tendons.wrap[i] = angle
+    for p in range(3):
+        tendons.wrap_gradient[i, p] = g_in[p]
+        tendons.wrap_gradient[i, 6 + p] = -g_in[p] - g_out[p]
+        tendons.wrap_gradient[i, 9 + p] = spin[p]
+        tendons.wrap_gradient[i, 12 + p] = g_out[p]
+    tendons.length[i - 1] += 0.5 * R * angle
+    tendons.length[i] += 0.5 * R * angle
+
+
+@residuals.of(Tendons)
+def tendon_wrenches(s, W, tendons, _q, _v, _lam):
+    """Add the tendons to the wrenches on the markers, and to the powers."""
+    for k in range(tendons.law.shape[0]):
+        route(s, W, tendons, k)
+        share_tension(W, tendons, k)
+        add_powers(W, tendons, k)
+        for i in range(tendons.first[k], tendons.first[k + 1] - 1):
+            a, b = tendons.at[i], tendons.at[i + 1]
+            for p in range(6):
+                W.wrench[a, p] -= tendons.tension[i] * tendons.gradient[i, p]
+                W.wrench[b, p] -= tendons.tension[i] * tendons.gradient[i, 6 + p]
+
+
+@tangents.of(Tendons)
+def tendon_tangents(s, W, tendons, _lam, ck, cc):
+    """Add ck times the stiffness to W.Kt and cc times the damping to W.S."""
+    for k in range(tendons.law.shape[0]):
+        tension_slopes(W, tendons, k)
+        place_tangents(s, W, tendons, k, ck, cc)
+
+
+@energy.of(Tendons)
+def tendon_energy(s, W, tendons, _q, _v):
+    """Energy stored in tendons."""
+    total = 0.0
+    for k in range(tendons.law.shape[0]):
+        route(s, W, tendons, k)
+        total += stored_energy(W, tendons, k)
+    return total
+
+
+def coupled(tendons: Tendons, body: Index) -> Iterable[Sequence[int]]:
+    """The bodies of the places of each tendon."""
+    return [
+        sorted(set(body[tendons.at[a:b]].tolist())) for a, b in pairwise(tendons.first.tolist())
+    ]
+
+
+def ends(tendon: Tendon) -> tuple[Marker, ...]:
+    """Its markers, each once."""
+    return tuple(dict.fromkeys(one.marker for one in tendon.stations))
+
+
+def tensions(tendons: Tendons) -> list[Array]:
+    """(pieces,) of each tendon at the last residual; NaN where its path is lost."""
+    return [tendons.tension[a : b - 1] for a, b in pairwise(tendons.first.tolist())]
+
+
+TENDONS_FAMILY = Family(
+    "tendons", Tendon, pack, tendon_wrenches, tendon_tangents, tendon_energy, ends=ends,
+    couples=coupled, by_rate=lambda tendons: tendons.rated.any(), answers=tensions,
+    lost="the path of {} is lost: it has left a pulley, its places meet, or a winch took it all",
+)  # fmt: skip

@@ -1,0 +1,209 @@
+"""Fields of engineering: what each has for the rest, which imports none and runs with none.
+
+A field is a folder with its elements, keys, symbols, columns and verbs, and a record that says by
+import strings, "module:name", where they are. Nothing is imported before somebody asks for it.
+"""
+
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
+from dataclasses import dataclass, field
+from functools import cache
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from rom.errors import UnknownNameError, warn
+
+if TYPE_CHECKING:  # what fields give to mechanisms and solutions, as types
+    from rom.components.methods import Columns as Columns
+    from rom.components.methods import Methods as Methods
+else:
+    Methods = Columns = object
+
+# The list: the modules of all records, in the order of tables for compiled code; and, of fields
+# that may be missing, the names by which they are asked for
+FIELDS = {
+    "rom.mbs.elements.field": "",
+    "rom.components.tendons.field": "tendon tendons",
+    "rom.components.gear_mesh.field": "gear_mesh gear_meshes",
+    "rom.components.rolling_bearing.field": "rolling_bearing rolling_bearings",
+    "rom.components.journal_bearing.field": "journal_bearing journal_bearings",
+    "rom.components.round_bodies.field": "spin",
+    "rom.mbs.elements.solids.field": "",
+    "rom.components.cosserat.field": "rods",
+}
+ENTRY_POINT_GROUP = "rom.fields"  # of entry points, by which other packages bring theirs
+
+
+@dataclass(frozen=True, slots=True)
+class Field:
+    """What a field has.
+
+    Attributes:
+        families: of its elements, as `rom.mbs.elements.family` describes them.
+        methods: {name: function on a mechanism; or a record, for the elements of that kind}.
+        bodies: {what a body has: function of it, which gives its element and its family}.
+        sections: {section of a mechanism file: a `rom.config.mechanism_keys.Section`}.
+        symbols: {name of a family: function of scenery, name and element, whose actors draw it}.
+        columns: {name: function on a solution, by which it tells of an element over time}.
+        verbs: {verb of the command line: its module}.
+        page: where it is described.
+        moved: {earlier name of a module, as pickles may have it: its name}.
+    """
+
+    families: tuple[str, ...] = ()
+    methods: Mapping[str, str] = field(default_factory=dict)
+    bodies: Mapping[str, str] = field(default_factory=dict)
+    sections: Mapping[str, str] = field(default_factory=dict)
+    symbols: Mapping[str, str] = field(default_factory=dict)
+    columns: Mapping[str, str] = field(default_factory=dict)
+    verbs: Mapping[str, str] = field(default_factory=dict)
+    page: str = ""
+    moved: Mapping[str, str] = field(default_factory=dict)
+
+
+def follow(place: str) -> Any:
+    """What is at an import string."""
+    module, _, name = place.partition(":")
+    found = import_module(module)
+    return getattr(found, name) if name else found
+
+
+FAILURES: dict[str, Exception] = {}  # of records that could not be imported
+
+
+@cache
+def record(place: str) -> Field | None:
+    """The record of a module; None if it cannot be imported, which takes no other field down."""
+    try:
+        found: Field = follow(place if ":" in place else f"{place}:FIELD")
+    except Exception as error:
+        FAILURES[place] = error
+        if not is_missing(place):
+            lost = _lost("", place, _told(error))
+            warn(f"{lost.message} {lost.hint}")
+        return None
+    return found
+
+
+def is_missing(place: str) -> bool:
+    """Whether a record could not be imported because its field is not there at all."""
+    name = getattr(FAILURES[place], "name", None) or " "
+    return isinstance(FAILURES[place], ModuleNotFoundError) and f"{place}.".startswith(f"{name}.")
+
+
+def _told(error: Exception) -> str:
+    return f"{type(error).__name__}: {error}".rstrip(".")
+
+
+@cache
+def brought() -> dict[str, str]:
+    """{record: package that brings it} of the fields of other packages."""
+    from importlib.metadata import entry_points
+
+    found = entry_points(group=ENTRY_POINT_GROUP)
+    return {entry.value: entry.dist.name if entry.dist else entry.name for entry in found}
+
+
+def records() -> Iterator[Field]:
+    """Those of all fields that are here."""
+    found = (record(place) for place in (*FIELDS, *brought()))
+    return (one for one in found if one is not None)
+
+
+def families(*, loaded: bool = False) -> Iterator[Any]:
+    """All families in the order of their tables, or only those whose modules are in use."""
+    for one in records():
+        for place in one.families:
+            if not loaded or place.partition(":")[0] in sys.modules:
+                yield follow(place)
+
+
+def names(kind: str) -> dict[str, str]:
+    """{name: import string} of all that fields have of one kind, an attribute of `Field`."""
+    return {name: place for one in records() for name, place in getattr(one, kind).items()}
+
+
+def find(kind: str, name: str) -> Any:
+    """What a field has of that kind and name; None if no field has it.
+
+    Raises:
+        UnknownNameError: if the field that has it is not installed, or cannot be imported.
+    """
+    own = [place for place, words in FIELDS.items() if name in words.split()]
+    for place in own or [place for place, words in FIELDS.items() if not words] + list(brought()):
+        found = record(place)
+        try:
+            if found is not None and name in getattr(found, kind):
+                return follow(getattr(found, kind)[name])
+        except Exception as error:
+            raise _lost(name, place, _told(error)) from error
+        if found is None and own:
+            why = "is not installed" if is_missing(place) else _told(FAILURES[place])
+            raise _lost(name, place, why) from FAILURES[place]
+    return None
+
+
+def missing(name: str, error: ModuleNotFoundError) -> UnknownNameError | None:
+    """Why a name of a package is not there, if it is that of a field which is not installed."""
+    package = ".".join(str(error.name).split(".")[:3])
+    return _lost(name, package, "is not installed") if f"{package}.field" in FIELDS else None
+
+
+def _lost(name: str, place: str, why: str) -> UnknownNameError:
+    module = place.partition(":")[0].removesuffix(".field")
+    package = brought().get(place, "fenicsx-rom")
+    why = why if why.startswith("is ") else f"cannot be imported: {why}"
+    whose = f"{name!r} belongs to the field {module!r}, which" if name else f"the field {module!r}"
+    return UnknownNameError(
+        f"{whose} {why}.",
+        hint=f"pip install --force-reinstall {package} brings the field whole.",
+    )
+
+
+class Open(type):
+    """Class of classes to which fields give what is asked of their objects.
+
+    Args:
+        kind: of what is given, an attribute of `Field`.
+        bound: what becomes an attribute of the class of what a field has.
+    """
+
+    _kind: str
+    _bound: Callable[[Any], Any]
+
+    def __init__(
+        cls, name: str, bases: Any, inside: Any, kind: str = "", bound: Any = None
+    ) -> None:
+        super().__init__(name, bases, inside)
+        if kind:
+            cls._kind, cls._bound = kind, bound
+            cls.__dir__ = _dir  # type: ignore[assignment]
+
+    def __new__(cls, name: str, bases: Any, inside: Any, **_: Any) -> "Open":
+        """Without the keywords."""
+        return super().__new__(cls, name, bases, inside)
+
+    def bind(cls, name: str) -> bool:
+        """Whether a field has it, which makes it an attribute of the class."""
+        own = name.startswith("_") or name.isupper() or name in cls.__annotations__
+        found = None if own else find(cls._kind, name)
+        if found is not None:
+            setattr(cls, name, cls._bound(found))
+        return found is not None
+
+    def __getattr__(cls, name: str) -> Any:
+        if cls.bind(name):
+            return getattr(cls, name)
+        raise AttributeError(f"type object {cls.__name__!r} has no attribute {name!r}")
+
+    def __dir__(cls) -> list[str]:
+        """All names; what looks at a class, as ``help`` does, finds them in it from then on."""
+        for name in names(cls._kind):
+            with suppress(UnknownNameError):
+                _ = name in vars(cls) or cls.bind(name)
+        return list(super().__dir__())
+
+
+def _dir(one: Any) -> list[str]:
+    return sorted({*object.__dir__(one), *names(type(one)._kind)})

@@ -1,6 +1,0 @@
-"""Tendons: cables through eyelets and over pulleys of any bodies.
-
-`tendons` has the elements and their kernels, `routing` the lengths of straight pieces and how they
-change, `tension` how friction and stretch share the force between the pieces, `paths` the whole
-path at one instant.
-"""
