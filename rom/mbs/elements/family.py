@@ -3,8 +3,8 @@
 A family has a record of one element as the user described it, a table of all of them for compiled
 code, and kernels that take this table. Everything else asks the family: names in use, arrays, which
 bodies it couples, which of its forces depend on rates, whether it conserves momentum. The families
-of `rom.mbs.mechanism.FAMILIES` are the ones with methods of their own; any other enters a mechanism
-by ``mechanism.add``.
+that `rom.fields` knows have methods of their own; any other enters a mechanism by
+``mechanism.add``.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
