@@ -7,9 +7,9 @@ import numpy as np
 
 from benchmarks.models import STEEL, geometry
 from benchmarks.timing import Row, timed
-from rom.mbs.analysis.equilibrium import equilibrium
-from rom.components.journal_bearing.films.bearing import Groove, JournalBearing
 from rom.components.gear_mesh.gears.geometry import GearPair
+from rom.components.journal_bearing.films.bearing import Groove, JournalBearing
+from rom.mbs.analysis.equilibrium import equilibrium
 from rom.mbs.integrate.simulation import simulate
 from rom.mbs.mechanism import Mechanism
 from rom.reduction.bases.method import CraigBampton

@@ -44,7 +44,8 @@ class Field:
         methods: {name: function on a mechanism; or a record, for the elements of that kind}.
         bodies: {what a body has: function of it, which gives its element and its family}.
         sections: {section of a mechanism file: a `rom.config.mechanism_keys.Section`}.
-        symbols: {name of a family: function of scenery, name and element, whose actors draw it}.
+        symbols: {name of a family: function of scenery, name and element, which gives what is drawn
+            of it: actors, or circles by marker, axis and radius}.
         columns: {name: function on a solution, by which it tells of an element over time}.
         verbs: {verb of the command line: its module}.
         page: where it is described.

@@ -180,6 +180,10 @@ IMPACT = (
     Key("tangential_damping", Quantity("1"), "Of that spring, a plain number in SI.", 0.0),
 )  # fmt: skip
 RADIUS = Quantity("m", positive=True)
+STEEL = (
+    Key("E", Quantity("Pa", positive=True), "Young's modulus.", 206e9),
+    Key("nu", Quantity(), "Poisson's ratio.", 0.3),
+)
 FLEXIBLE = Key("body", Text(), "Flexible body that carries a surface.", ...)
 WHERE = Key("where", Text(), "Deformable interface that is the part of it; all of it if missing.")
 COVER = (

@@ -5,7 +5,7 @@ from rom.components.journal_bearing.films.bearing import JournalBearing as Journ
 from rom.components.journal_bearing.films.bearing import multilobe as multilobe
 from rom.components.journal_bearing.films.oil import Oil as Oil
 from rom.components.journal_bearing.films.oil import iso_vg as iso_vg
-from rom.components.journal_bearing.pressures import film_pressures as film_pressures
+from rom.components.journal_bearing.record import film_pressures as film_pressures
 from rom.components.rolling_bearing.races import BallBearing as BallBearing
 from rom.components.rolling_bearing.races import RollerBearing as RollerBearing
 from rom.components.tendons.tendons import Pulley as Pulley

@@ -43,7 +43,7 @@ PLAIN = {  # of these folders, and no published method
     "rom.components.gear_mesh.tooth_loads.tooth_loads": "a result",
     "rom.components.journal_bearing.films.bearing.multilobe": "a definition",
     "rom.components.journal_bearing.films.oil.iso_vg": "a table",
-    "rom.components.journal_bearing.pressures.film_pressures": "a result",
+    "rom.components.journal_bearing.record.film_pressures": "a result",
     "rom.components.transmission.loaded.film_wall": "a picture",
     "rom.components.transmission.loaded.tooth_walls": "a picture",
     "rom.components.transmission.loaded.toothed_shaft": "a picture",

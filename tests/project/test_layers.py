@@ -83,9 +83,7 @@ ORDER = {
         "components.gear_mesh": (
             "gears compliance tooth_elements contact tooth_loads symbols keys field"
         ),
-        "components.journal_bearing": (
-            "films closed_forms oil_film statics oil record pressures symbols keys field"
-        ),
+        "components.journal_bearing": ("films closed_forms oil_film statics oil record keys field"),
         "body": (
             "recovery nonlinear records inertia reference stiffening conversion frame rotating "
             "surface flexible prestress projection correction damping spread"

@@ -2,15 +2,16 @@
 
 from typing import TYPE_CHECKING, Any
 
-from rom.components.round_bodies.keys import LENGTH, STEEL, TWO
 from rom.config.keys import FilePath, Flag, Key, Quantity, Table, Whole
-from rom.config.mechanism_keys import DIRECTION, Markers, Section
+from rom.config.mechanism_keys import DIRECTION, STEEL, Markers, Section
+from rom.config.mechanism_keys import RADIUS as LENGTH
 from rom.errors import ConfigError
 
 if TYPE_CHECKING:
     from rom.components.gear_mesh.gears.corrections import Correction
     from rom.config.connections import Entry
 
+TWO = ((2,),)
 GEAR_PAIR = Table("A pair of involute wheels.", (
     Key("teeth", Quantity("1", TWO), "Of pinion and gear; below zero inside a ring, 0 of a rack.",
         ...),

@@ -1,7 +1,7 @@
 """Hydrodynamic journal bearings: the film, what carries the load, heat, and stability of whirl.
 
-`field` says what they have for mechanisms, their files (`keys`) and pictures (`symbols`); `record`
-and `pressures` are those of a motion. `oil_film` gives pressure and forces, `statics` rest and
+`field` says what they have for mechanisms, their pictures and files (`keys`); `record`
+is that of a motion. `oil_film` gives pressure and forces, `statics` rest and
 stability, `oil` heat, `closed_forms` short and long bearings. Bearings, oils and what is compiled
 are in `films`.
 """

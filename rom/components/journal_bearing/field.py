@@ -10,7 +10,7 @@ FIELD = Field(
     },
     columns={"journal_bearing": "rom.components.journal_bearing.record:journal_bearing"},
     sections={"journal_bearings": "rom.components.journal_bearing.keys:SECTION"},
-    symbols={"journal_bearings": "rom.components.journal_bearing.symbols:draw"},
+    symbols={"journal_bearings": "rom.components.journal_bearing.films.journal_bearings:circles"},
     moved={
         "rom.mbs.elements.films": "rom.components.journal_bearing.films",
         "rom.mbs.results.bearing_record": "rom.components.journal_bearing.record",

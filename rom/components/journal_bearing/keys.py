@@ -2,9 +2,9 @@
 
 from typing import TYPE_CHECKING, Any
 
-from rom.components.round_bodies.keys import LENGTH
 from rom.config.keys import Flag, Key, Named, Quantity, Table, Text, Variants, Whole
 from rom.config.mechanism_keys import DIRECTION, Markers, Section
+from rom.config.mechanism_keys import RADIUS as LENGTH
 
 if TYPE_CHECKING:
     from rom.components.journal_bearing.films.bearing import JournalBearing

@@ -9,6 +9,6 @@ FIELD = Field(
         "rolling_bearings": "rom.components.rolling_bearing.bearings:RollingBearing",
     },
     sections={"rolling_bearings": "rom.components.rolling_bearing.keys:SECTION"},
-    symbols={"rolling_bearings": "rom.components.rolling_bearing.symbols:draw"},
+    symbols={"rolling_bearings": "rom.components.rolling_bearing.bearings:circles"},
     moved={"rom.mbs.elements.rolling": "rom.components.rolling_bearing"},
 )

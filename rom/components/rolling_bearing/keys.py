@@ -2,13 +2,14 @@
 
 from typing import TYPE_CHECKING, Any
 
-from rom.components.round_bodies.keys import LENGTH, STEEL, TWO
 from rom.config.keys import Key, Quantity, Table, Variants, Whole
-from rom.config.mechanism_keys import AXIS, BETWEEN, Section
+from rom.config.mechanism_keys import AXIS, BETWEEN, STEEL, Section
+from rom.config.mechanism_keys import RADIUS as LENGTH
 
 if TYPE_CHECKING:
     from rom.config.connections import Entry
 
+TWO = ((2,),)
 ROLLING = {
     "balls": Table("A row of balls.", (
         Key("balls", Whole(3), "Number.", ...),

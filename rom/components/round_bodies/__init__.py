@@ -1,6 +1,5 @@
 """Round bodies: they turn in frames which do not, and their surfaces deform.
 
 `field` says what they have for mechanisms. `spins` has their gyroscopic forces as elements,
-`gyroscopic` their matrices, `cylinders` their rims and bores, which gears and bearings press;
-`keys` are what files say of all of these.
+`cylinders` their rims and bores, which gears and bearings press.
 """

@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from rom.arguments import AnyMechanism, AnySolution, finite, positive, typed
 from rom.components.gear_mesh.tooth_loads import ToothLoads, tooth_loads
-from rom.components.journal_bearing.pressures import film_pressures
+from rom.components.journal_bearing.record import film_pressures
 from rom.errors import ConfigError
 from rom.model import Array
 from rom.names import offered

@@ -16,7 +16,7 @@ import numpy.typing as npt
 from scipy.linalg import eigh
 
 from rom.body.flexible import FlexibleBody
-from rom.components.round_bodies.gyroscopic import directed_mass
+from rom.components.round_bodies.spins import directed_mass
 from rom.components.transmission.housing import motion_of
 from rom.components.transmission.shaft import Disc
 from rom.errors import ModelError

@@ -78,11 +78,6 @@ def no_rows(_: Table) -> Index:
     return NO_ROWS
 
 
-def nothing_asked(_elements: Mapping[str, Any], _table: Any, _followed: int) -> Sequence[Asked]:
-    """All laws are compiled."""
-    return ()
-
-
 def integers(values: Any) -> Index:
     """Whole numbers as an array, empty ones too."""
     return np.array(list(values), dtype=np.int64)
@@ -96,41 +91,6 @@ def starts(lengths: Any) -> Index:
 def rows_of(values: Any, *shape: int) -> Array:
     """Numbers as an array of rows of this shape, empty ones too."""
     return np.array(list(values), dtype=float).reshape(-1, *shape)
-
-
-def no_room(_: Any) -> Array:
-    """(0,) no gap that is of the size of corrections."""
-    return np.zeros(0)
-
-
-def nothing_remembered(_: Any) -> Array:
-    """(0,) no element whose forces depend on its past."""
-    return np.zeros(0, dtype=bool)
-
-
-def nothing_kept(_: Any, memory: Array) -> Array:
-    """(n_t,) no energy in what gives way for good beyond a limit [J]."""
-    return np.zeros(len(memory))
-
-
-def nothing_beyond(*_: Any) -> str:
-    """Its forces hold in any motion."""
-    return ""
-
-
-def no_phases(_: Any, _W: Any) -> Array:
-    """(0,) nothing that has to go on by whole numbers."""
-    return np.zeros(0)
-
-
-def nothing_eased(_: Table) -> AbstractContextManager[bool]:
-    """Elements that come to rest as they are."""
-    return nullcontext(False)
-
-
-def no_answers(_: Table) -> Sequence[Any]:
-    """None of the laws is the user's."""
-    return ()
 
 
 @dataclass
@@ -300,15 +260,15 @@ class Family:
     complete: bool = False
     potential: bool = True
     loaded_rows: Callable[[Any], Index] = no_rows
-    asked: Callable[[Mapping[str, Any], Any, int], Sequence[Asked]] = nothing_asked
-    answers: Callable[[Any], Sequence[Any]] = no_answers
+    asked: Callable[[Mapping[str, Any], Any, int], Sequence[Asked]] = lambda *_: ()
+    answers: Callable[[Any], Sequence[Any]] = lambda _: ()
     lost: str = "the law of {} gives no finite number"
-    room: Callable[[Any], Array] = no_room
-    eased: Callable[[Any], AbstractContextManager[bool]] = nothing_eased
-    remembers: Callable[[Any], Array] = nothing_remembered
-    kept: Callable[[Any, Array], Array] = nothing_kept
-    beyond: Callable[[str, Any, Array, Callable[[str], Array]], str] = nothing_beyond
-    phases: Callable[[Any, Any], Array] = no_phases
+    room: Callable[[Any], Array] = lambda _: np.zeros(0)
+    eased: Callable[[Any], AbstractContextManager[bool]] = lambda _: nullcontext(False)
+    remembers: Callable[[Any], Array] = lambda _: np.zeros(0, dtype=bool)
+    kept: Callable[[Any, Array], Array] = lambda _, memory: np.zeros(len(memory))
+    beyond: Callable[[str, Any, Array, Callable[[str], Array]], str] = lambda *_: ""
+    phases: Callable[[Any, Any], Array] = lambda *_: np.zeros(0)
 
     @property
     def kernels(self) -> list[ElementKernel]:

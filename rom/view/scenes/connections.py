@@ -63,7 +63,8 @@ def connections(
     for family, elements in mechanism.families().items():
         draw = find("symbols", family.name)
         for name, element in elements.items() if draw else ():
-            actors += draw(scenery, name, element)
+            for one in draw(scenery, name, element):
+                actors.append(one if isinstance(one, Actor) else circle(places, *one))
     return actors + list(_contacts(scenery))
 
 

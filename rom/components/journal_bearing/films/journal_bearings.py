@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -194,6 +195,12 @@ def _heat(name: str, carried: float, felt: float, lag: float) -> tuple[float, fl
         if not 0.0 <= number(what, value) <= 1.0:
             raise ConfigError(f"{what} = {value} of bearing {name!r} is a share from 0 to 1.")
     return float(carried) * float(felt), positive("thermal_time", lag)
+
+
+def circles(_: Any, __: str, film: OilFilm) -> list[Any]:
+    """What is drawn: the journal and the bush."""
+    pair = zip((film.i, film.j), film.axes[:2], strict=True)
+    return [(marker, axis, film.bearing.radius) for marker, axis in pair]
 
 
 def pack(found: Mapping[str, OilFilm], places: Places) -> Journals:
