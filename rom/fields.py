@@ -145,10 +145,10 @@ def find(kind: str, name: str) -> Any:
     return None
 
 
-def missing(name: str, error: ModuleNotFoundError) -> UnknownNameError | None:
-    """Why a name of a package is not there, if it is that of a field which is not installed."""
-    package = ".".join(str(error.name).split(".")[:3])
-    return _lost(name, package, "is not installed") if f"{package}.field" in FIELDS else None
+def missing(name: str, module: str, error: ModuleNotFoundError) -> Exception:
+    """Why a name of a module is not there; in words if it is that of a field not installed."""
+    gone = module.startswith("rom.components.") and f"{module}.".startswith(f"{error.name}.")
+    return _lost(name, ".".join(module.split(".")[:3]), "is not installed") if gone else error
 
 
 def _lost(name: str, place: str, why: str) -> UnknownNameError:

@@ -29,7 +29,7 @@ class Front(ModuleType):
             except ModuleNotFoundError as error:
                 from rom.fields import missing
 
-                raise missing(name, error) or error from None
+                raise missing(name, self.MODULES[name], error) from None
         text = f"module {self.__name__!r} has no attribute {name!r}"
         if not name.startswith("_"):
             from difflib import get_close_matches

@@ -6,16 +6,14 @@ from typing import Any
 import numpy as np
 
 from rom.view.canvas.scene import Actor
-from rom.view.scenes.connections import LINE_WIDTH, circle
+from rom.view.scenes.connections import LINE_WIDTH
 from rom.view.scenes.ground import Scenery, at, lines
 from rom.view.scenes.places import Places
 
 
-def draw(scenery: Scenery, _: str, mesh: Any) -> Iterator[Actor]:
+def draw(scenery: Scenery, _: str, mesh: Any) -> Iterator[Any]:
     """The circles that roll on each other, and the line of a rack."""
-    wheels = zip((mesh.i, mesh.j), mesh.axes[::2], mesh.pair.r, strict=False)
-    for marker, axis, radius in wheels:
-        yield circle(scenery.places, marker, axis, float(radius))
+    yield from zip((mesh.i, mesh.j), mesh.axes[::2], map(float, mesh.pair.r), strict=False)
     if not mesh.pair.teeth[1]:
         yield _rack(scenery.places, mesh)
 

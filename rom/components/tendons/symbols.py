@@ -7,11 +7,11 @@ import numpy as np
 
 from rom.components.tendons.paths import Place, path_through, points_along
 from rom.view.canvas.scene import Actor
-from rom.view.scenes.connections import DAMPER_COLOUR, LINE_WIDTH, circle
+from rom.view.scenes.connections import DAMPER_COLOUR, LINE_WIDTH
 from rom.view.scenes.ground import Scenery
 
 
-def draw(scenery: Scenery, name: str, tendon: Any) -> Iterator[Actor]:
+def draw(scenery: Scenery, name: str, tendon: Any) -> Iterator[Any]:
     """The line of a cable, and the circles of its pulleys."""
     places, stations = scenery.places, tendon.stations
     x = [places.point(one.marker) for one in stations]
@@ -29,4 +29,4 @@ def draw(scenery: Scenery, name: str, tendon: Any) -> Iterator[Actor]:
     yield Actor(points, cells, colour=DAMPER_COLOUR, width=LINE_WIDTH)
     for one in stations:
         if one.radius:
-            yield circle(places, one.marker, one.axes[0], one.radius)
+            yield one.marker, one.axes[0], one.radius
