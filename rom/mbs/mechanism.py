@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator, MutableMapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, TypeVar
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -55,11 +55,19 @@ class ElementsOf(MutableMapping[str, Element]):
         return repr(dict(self))
 
 
+class Every(Generic[Element]):
+    """Attribute of a mechanism: its elements of one kind."""
+
+    def __init__(self, record: type[Element]):
+        self.record = record
+
+    def __get__(self, mechanism: "Mechanism | None", _: Any = None) -> ElementsOf[Element]:
+        return ElementsOf({} if mechanism is None else mechanism.elements, self.record)
+
+
 def bound(found: Any) -> Any:
     """What a field gives as an attribute: a method, or for a record its elements."""
-    if isinstance(found, type):
-        return property(lambda mechanism: ElementsOf(mechanism.elements, found))
-    return typed(found)
+    return Every(found) if isinstance(found, type) else typed(found)
 
 
 @dataclass(frozen=True, slots=True)

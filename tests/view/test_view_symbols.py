@@ -299,3 +299,16 @@ def test_the_circle_of_a_pinion_touches_the_line_of_its_rack_at_all_instants():
     for f, y in enumerate((0.0, 0.04)):
         ends = [[0.2 + r, y + side * np.pi * r, 0] for side in (-1, 1)]
         np.testing.assert_allclose(line.points[f], ends, atol=1e-6)
+
+
+def test_bearings_are_circles_of_their_balls_and_of_journal_and_bush():
+    mech = rom.Mechanism(gravity=(0, 0, 0))
+    shaft = mech.add_rigid("shaft", mass=1.0, inertia=(1e-3,) * 3, at=(0.1, 0, 0))
+    ends = mech.ground.marker((0.1, 0, 0)), shaft.marker((0, 0, 0))
+    row, film = rom.mbs.BallBearing(8, 8e-3, 40e-3), rom.mbs.JournalBearing(0.03, 0.02, 3e-5)
+    mech.rolling_bearing("row", *ends, axis=(0, 0, 1), bearing=row)
+    mech.journal_bearing("film", *ends[::-1], axis=(0, 0, 1), bearing=film, oil=0.02)
+    circles = connections(at_start(mech), {}, set(), UP)
+    radii = [np.linalg.norm(one.points - [0.1, 0, 0], axis=2) for one in circles]
+    for found, expected in zip(radii, (20e-3, 15e-3, 15e-3), strict=True):
+        np.testing.assert_allclose(found, expected)

@@ -93,6 +93,36 @@ def rows_of(values: Any, *shape: int) -> Array:
     return np.array(list(values), dtype=float).reshape(-1, *shape)
 
 
+def nothing(*_: Any) -> tuple[()]:
+    """No laws that stay in Python, or none of the user's."""
+    return ()
+
+
+def no_numbers(*_: Any) -> Array:
+    """(0,) no gap that is of the size of corrections, or nothing that goes on by whole numbers."""
+    return np.zeros(0)
+
+
+def nothing_remembered(_: Any) -> Array:
+    """(0,) no element whose forces depend on its past."""
+    return np.zeros(0, dtype=bool)
+
+
+def nothing_kept(_: Any, memory: Array) -> Array:
+    """(n_t,) no energy in what gives way for good beyond a limit [J]."""
+    return np.zeros(len(memory))
+
+
+def nothing_beyond(*_: Any) -> str:
+    """Its forces hold in any motion."""
+    return ""
+
+
+def nothing_eased(_: Table) -> AbstractContextManager[bool]:
+    """Elements that come to rest as they are."""
+    return nullcontext(False)
+
+
 @dataclass
 class Places:
     """Where the arrays of a mechanism have what elements speak of.
@@ -260,15 +290,15 @@ class Family:
     complete: bool = False
     potential: bool = True
     loaded_rows: Callable[[Any], Index] = no_rows
-    asked: Callable[[Mapping[str, Any], Any, int], Sequence[Asked]] = lambda *_: ()
-    answers: Callable[[Any], Sequence[Any]] = lambda _: ()
+    asked: Callable[[Mapping[str, Any], Any, int], Sequence[Asked]] = nothing
+    answers: Callable[[Any], Sequence[Any]] = nothing
     lost: str = "the law of {} gives no finite number"
-    room: Callable[[Any], Array] = lambda _: np.zeros(0)
-    eased: Callable[[Any], AbstractContextManager[bool]] = lambda _: nullcontext(False)
-    remembers: Callable[[Any], Array] = lambda _: np.zeros(0, dtype=bool)
-    kept: Callable[[Any, Array], Array] = lambda _, memory: np.zeros(len(memory))
-    beyond: Callable[[str, Any, Array, Callable[[str], Array]], str] = lambda *_: ""
-    phases: Callable[[Any, Any], Array] = lambda *_: np.zeros(0)
+    room: Callable[[Any], Array] = no_numbers
+    eased: Callable[[Any], AbstractContextManager[bool]] = nothing_eased
+    remembers: Callable[[Any], Array] = nothing_remembered
+    kept: Callable[[Any, Array], Array] = nothing_kept
+    beyond: Callable[[str, Any, Array, Callable[[str], Array]], str] = nothing_beyond
+    phases: Callable[[Any, Any], Array] = no_numbers
 
     @property
     def kernels(self) -> list[ElementKernel]:
