@@ -18,7 +18,7 @@ import numpy.typing as npt
 from scipy.interpolate import CubicHermiteSpline
 
 from rom import rotation
-from rom.components.cosserat.statics import add_loads, clamped
+from rom.components.cosserat.statics import add_loads, fitting, loads
 from rom.errors import ConfigError, RomError
 from rom.mbs.connections.ends import enter
 from rom.mbs.elements.rods.bodies import body
@@ -105,31 +105,32 @@ def simulate(  # noqa: PLR0913  keywords of one run, all with defaults
         save_every: steps between instants that are kept.
 
     Raises:
-        ConfigError: for a step or an end that is not positive, damping outside 0 to 1, or a section
-            of which two rotations are free.
+        ConfigError: for a step or an end that is not positive, damping outside 0 to 1, shapes of
+            arrays that differ from those of the rod, or a section of which two rotations are free.
+        ModelError: if the rod has no mass at all.
         SolverError: if a step has no solution; its ``solution`` is what came before.
     """
     if not (dt > 0 and t_end > 0 and 0 <= rho_inf <= 1):
         raise ConfigError(f"dt={dt:g}, t_end={t_end:g}, rho_inf={rho_inf:g} is no run.",
                           hint="Times are positive, rho_inf lies between 0 and 1.")  # fmt: skip
-    moving = clamped(rod) if free is None else np.asarray(free, dtype=np.bool_)
-    loads: Any = cache(load) if callable(load) else lambda _: load
+    constant = loads(rod) if load is None else load
+    acting: Any = cache(load) if callable(load) else lambda _: constant
+    moving = fitting(rod, acting(0.0), free)[1]
     times = dt * np.arange(round(t_end / dt) + 1)
     rod, shape = _heavy(rod), reference(rod) if start is None else start
     mech = _at_start(rod, shape, root)
     if root is not None:
         _lead(mech, root, times)
     _hold(mech, moving, led=root is not None)
-    if load is not None:
-        _press(mech, loads, times if callable(load) else times[:1])
+    _press(mech, acting, times if callable(load) else times[:1])
     try:
         found = simulate_mechanism(mech, t_end=float(times[-1]), dt=dt, rho_inf=rho_inf,
                                    save_every=save_every)  # fmt: skip
     except RomError as error:
         if isinstance(error.solution, Solution):
-            error.solution = _motion(rod, error.solution, loads, moving)
+            error.solution = _motion(rod, error.solution, acting, moving)
         raise
-    return _motion(rod, found, loads, moving)
+    return _motion(rod, found, acting, moving)
 
 
 def _at_start(rod: Rod, shape: Shape, root: Callable[[float], Placement] | None) -> Mechanism:
@@ -205,22 +206,22 @@ def _hold(mech: Mechanism, free: Mask, *, led: bool) -> None:
             enter(mech, Joint(f"hold {k}", "hold", ends, tuple(rows)))
 
 
-def _press(mech: Mechanism, loads: Callable[[float], Loads], times: Array) -> None:
+def _press(mech: Mechanism, acting: Callable[[float], Loads], times: Array) -> None:
     """Loads on the frames on which there are some at any of these times."""
     parts, constant = mech.nonlinear["rod"].parts, times.size == 1
     for kind, add in enumerate((mech.force, mech.torque)):
-        ever = np.any([np.any(loads(float(t))[kind], axis=1) for t in times], axis=0)
+        ever = np.any([np.any(acting(float(t))[kind], axis=1) for t in times], axis=0)
         for k in np.flatnonzero(ever):
             name, marker = f"{('force', 'moment')[kind]} {k}", parts[k].marker((0.0, 0.0, 0.0))
-            one = partial(_part, loads, kind, k)
+            one = partial(_part, acting, kind, k)
             add(name, marker, one(0.0) if constant else one)
 
 
-def _part(loads: Callable[[float], Loads], kind: int, k: int, t: float) -> Array:
-    return loads(t)[kind][k]
+def _part(acting: Callable[[float], Loads], kind: int, k: int, t: float) -> Array:
+    return acting(t)[kind][k]
 
 
-def _motion(rod: Rod, found: Solution, loads: Any, free: Mask) -> Motion:
+def _motion(rod: Rod, found: Solution, acting: Any, free: Mask) -> Motion:
     """What the mechanism did, in the order of the rod."""
     q, v = found.q.reshape(len(found.t), -1, 7), found.v.reshape(len(found.t), -1, 6)
     x, p = q[:, :-1, :3].copy(), q[:, :, 3:].copy()
@@ -228,8 +229,6 @@ def _motion(rod: Rod, found: Solution, loads: Any, free: Mask) -> Motion:
     W, root = work(rod), np.zeros((len(found.t), 6))
     for k, t in enumerate(found.t):
         internal(rod, x[k], p[k], v[k], 0.0, W)
-        load = loads(float(t))
-        if load is not None:
-            add_loads(p[k], *load, W)
+        add_loads(p[k], *acting(float(t)), W)
         root[k] = np.roll(np.where(free[:6], 0.0, W.r[:6]), 3)
     return Motion(rod, found.t, x, p, v, root, int(found.statistics["iterations"]))

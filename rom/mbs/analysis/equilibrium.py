@@ -13,7 +13,7 @@ from rom.errors import ModelError, RomError, SolverError, reached, warn
 from rom.mbs.analysis.local_equations import Instant, instant
 from rom.mbs.analysis.rotors.spins import Spins
 from rom.mbs.analysis.sparse_tangent import Loan, SparseTangent
-from rom.mbs.analysis.tangent import Tangent, faint_force, sizes
+from rom.mbs.analysis.tangent import Tangent, best_reactions, faint_force, sizes
 from rom.mbs.equations.packing import Packed
 from rom.mbs.integrate.consistent_start import assembled, check_velocity, initial_state
 from rom.mbs.mechanism import Mechanism
@@ -217,7 +217,7 @@ class _Search:
         now, last, trials = self.now.scaled(load), np.inf, MAX_TRIALS
         turned, length = np.zeros((now.packed.system.bodies.mass.size, 3)), 0.0
         progress = _Progress(now)
-        state = replace(state, lam=state.lam + self.tangent(now, state).reaction())
+        state = replace(state, lam=state.lam + best_reactions(now, state)[1])
         beyond: Equations | None = None
         for _ in range(MAX_PASSES):
             equations = beyond or self.tangent(now, state)
@@ -248,7 +248,7 @@ class _Search:
                 around = np.linalg.norm(turned, axis=1)
                 if ((around > MAX_TURN) & (around > STRAIGHT_SHARE * length)).any():
                     raise _turning(now.packed, turned)
-        raise _failure(now, self.tangent(now, state), load)
+        raise _failure(now, self.tangent(now, state), state, load)
 
     def corrected(
         self, now: Instant, state: State, correction: tuple[Array, Array]
@@ -260,7 +260,7 @@ class _Search:
             return size, step, state
         factor, state = self.within_room(now, state, (factor * step, factor * dlam), factor)
         if factor < 1.0:
-            state = replace(state, lam=state.lam + self.tangent(now, state).reaction())
+            state = replace(state, lam=state.lam + best_reactions(now, state)[1])
         return size, factor * step, state
 
     def within_room(
@@ -379,7 +379,7 @@ class _Progress:
     def ends(self, size: float, motion: Array, before: State, after: State) -> bool:
         """Whether many corrections have led nowhere, or very far away, with one more."""
         along = [self.now.residual(x.q, x.v, x.a, x.lam) @ motion for x in (before, after)]
-        self.work += 0.5 * sum(along)
+        self.work += 0.5 * float(along[0] + along[1])
         self.sizes, self.way = [*self.sizes[1 - WINDOW :], size], self.way + motion
         reached, faint = np.array([self.work, max(self.sizes)]), PROGRESS_RTOL * np.abs(along).max()
         leads = (reached < self.least - np.array([faint, PROGRESS_RTOL * size])).any()
@@ -398,7 +398,7 @@ def _turning(packed: Packed, turned: Array) -> ModelError:
     )
 
 
-def _failure(now: Instant, tangent: Tangent | SparseTangent, load: float) -> RomError:
+def _failure(now: Instant, tangent: Equations, state: State, load: float) -> RomError:
     """Why Newton's method failed: an open joint, a body that nothing holds, or lack of balance."""
     packed = now.packed
     gap = np.abs(tangent.gap) / packed.row_scale
@@ -412,7 +412,7 @@ def _failure(now: Instant, tangent: Tangent | SparseTangent, load: float) -> Rom
                 f"{_described(packed, loose)}, pushed by forces that nothing balances.",
                 hint="Hold it by a joint or a spring, or give its place by a drive.",
             )
-        force = np.abs(tangent.unbalanced())
+        force = np.abs(best_reactions(now, state)[0])
         starts = packed.system.bodies.v_at
         b = int(np.searchsorted(starts, int(np.argmax(force)), side="right")) - 1
         what = f"body {packed.names[b]!r} stays out of balance, by {force.max():.3g} N or N m"

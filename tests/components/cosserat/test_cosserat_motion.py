@@ -231,7 +231,7 @@ def coning(t):
 
 def test_a_root_goes_its_way_and_what_it_needs_is_what_changes_the_momentum(recwarn):
     one = straight(1.0, 6, frame=ALONG_X, stretch=1e5, bend=50.0, mass=1.0, inertia=1e-3)
-    one = one._replace(x=one.x + [0.5, 0, 0])
+    one = one._replace(x=np.add(one.x, [0.5, 0, 0]))
     motion = simulate(one, 4.0, 0.005, root=coning)
     for k in (0, 123, 800):
         x, p, v, w = coning(motion.t[k])
@@ -266,6 +266,8 @@ def test_what_has_no_mass_or_inertia_follows_the_rest():
 
 def test_bad_runs_are_refused_and_lost_ones_kept():
     one = straight(1.0, 4, stretch=1e3, bend=1.0, mass=1.0, inertia=1e-3)
+    with pytest.raises(ConfigError, match=r"loads of shape \(4, 3\) and \(6, 3\) and 33 dofs for"):
+        simulate(one, 1.0, 0.1, load=(np.zeros((4, 3)), np.zeros((6, 3))))
     with pytest.raises(ConfigError, match=r"rho_inf=1\.5 is no run"):
         simulate(one, 1.0, 0.1, rho_inf=1.5)
     with pytest.raises(SolverError, match="did not converge") as error:
