@@ -1,168 +1,41 @@
-"""Rods in motion: generalised-alpha on positions and rotations, one elimination per iteration.
+"""Rods in motion: one rod as a `rom.Mechanism`, held and led as one of its own asks.
 
-Each step finds increments D with q_1 = q_0 o exp(D), so that at its end M a + g(q, v) = f; the
-acceleration that moves the rod follows a by the filter of the scheme. Masses are lumped, so the
-matrix of a step has the band of the stiffness, and its cost grows with the number of segments.
+What has no mass or inertia gets some, too little to matter: a ten-thousandth of the heaviest
+vertex, a hundredth of mass times square of the length of a segment.
 
 Source:
-    Bruels, Cardona, Arnold, Lie group generalized-alpha time integration of constrained flexible
-    multibody systems, Mech. Mach. Theory 48 (2012) 121, without the constraints.
+    Lang, Linn and Arnold, Multi-body dynamics simulation of geometrically exact Cosserat rods,
+    Multibody Syst. Dyn. 25 (2011) 285; see docs/theory/rods.md.
 """
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from functools import cache, partial
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from scipy.interpolate import CubicHermiteSpline
 
 from rom import rotation
-from rom.components.compiled import inner, kernel
-from rom.components.cosserat.band import hold, solve
-from rom.components.cosserat.energy import (
-    HALF_BANDWIDTH,
-    Rod,
-    energy,
-    internal,
-    turn,
-    work,
-)
+from rom.components.cosserat.bodies import body
+from rom.components.cosserat.energy import Rod, energy, internal, work
 from rom.components.cosserat.shapes import Shape, reference
-from rom.components.cosserat.statics import add_loads, clamped, largest
-from rom.components.cosserat.vibration import lumped_mass
-from rom.errors import ConfigError, SolverError
-from rom.mbs.integrate.generalized_alpha import coefficients
+from rom.components.cosserat.statics import add_loads, fitting, loads
+from rom.errors import ConfigError, RomError
+from rom.mbs.connections.ends import enter
+from rom.mbs.integrate.simulation import simulate as simulate_mechanism
+from rom.mbs.kernels.system import ANGLE, NORMAL, POINT
+from rom.mbs.mechanism import Mechanism
+from rom.mbs.parts.joints import NO_VECTOR, Joint, Row
+from rom.mbs.results.solution import Solution
 from rom.model import Array, Mask
 
-HELD, HEAVY, LIGHT = 0, 1, 2  # dofs; light ones have no mass and follow the rest
-INCREMENT_RTOL = 1e-9  # last increment, in rad and lengths of the rod
-MAX_ITERATIONS = 25
+LEAST_COSINE = 0.1  # between an axis of a root that is led and its mean direction
+LEAST_MASS_SHARE, LEAST_INERTIA_SHARE = 1e-4, 1e-2  # of what has none, see above
 
 Loads = tuple[Array, Array]
 Placement = tuple[npt.ArrayLike, npt.ArrayLike, npt.ArrayLike, npt.ArrayLike]
-
-
-class Scheme(NamedTuple):
-    """Step and coefficients of generalised-alpha."""
-
-    h: float
-    alpha_m: float
-    alpha_f: float
-    beta: float
-    gamma: float
-
-
-def scheme(h: float, rho: float) -> Scheme:
-    """The scheme that damps the highest frequencies by rho a step."""
-    _, beta, gamma, alpha_m, alpha_f = coefficients(h, rho).tolist()
-    return Scheme(h, alpha_m, alpha_f, beta, gamma)
-
-
-class Point(NamedTuple):
-    """State at an instant: positions, quaternions, velocities, accelerations, filtered ones.
-
-    Velocities (n,) are ordered like increments: angular ones in section axes, others in the world.
-    """
-
-    x: Array
-    p: Array
-    v: Array
-    a: Array
-    f: Array
-
-
-@inner
-def add_inertia(rod, v, a, accelerating, rate, W):
-    """Add M a and gyroscopic moments to W.r, and their tangent to W.A."""
-    for i in range(rod.mass.size):
-        for c in range(6 * i + 3, 6 * i + 6):
-            W.r[c] += rod.mass[i] * a[c]
-            W.A[c, HALF_BANDWIDTH] += rod.mass[i] * accelerating
-    for k in range(rod.inertia.shape[0]):
-        J, w, at = rod.inertia[k], v[6 * k : 6 * k + 3], 6 * k
-        for c in range(3):
-            d, e = (c + 1) % 3, (c + 2) % 3
-            W.a[c] = J[c] * w[c]
-            W.r[at + c] += J[c] * a[at + c] + (J[e] - J[d]) * w[d] * w[e]
-            W.A[at + c, HALF_BANDWIDTH] += accelerating * J[c]
-            W.A[at + c, d - c + HALF_BANDWIDTH] += rate * (J[e] - J[d]) * w[e]
-            W.A[at + c, e - c + HALF_BANDWIDTH] += rate * (J[e] - J[d]) * w[d]
-
-
-@inner
-def add_increment(D, d):
-    """Add increments d at the end of a step to its increments D since the start."""
-    for k in range(D.size // 3):
-        at = 3 * k
-        if k % 2 == 1:
-            for c in range(3):
-                D[at + c] += d[at + c, 0]
-            continue
-        x, y, z = D[at], D[at + 1], D[at + 2]
-        half = 0.5 * math.sqrt(x * x + y * y + z * z)
-        share = 1 / 12 if half < 1e-3 else (1 - half / math.tan(half)) / (4 * half * half)
-        u, v, w = d[at, 0], d[at + 1, 0], d[at + 2, 0]
-        a, b, c = y * w - z * v, z * u - x * w, x * v - y * u
-        D[at] += u + 0.5 * a + share * (y * c - z * b)
-        D[at + 1] += v + 0.5 * b + share * (z * a - x * c)
-        D[at + 2] += w + 0.5 * c + share * (x * b - y * a)
-
-
-@inner
-def place(old, D, free, new):
-    """Set positions and rotations of free dofs after the increments of a step."""
-    for i in range(old.x.shape[0]):
-        for c in range(3):
-            if free[6 * i + 3 + c] != HELD:
-                new.x[i, c] = old.x[i, c] + D[6 * i + 3 + c]
-    for k in range(old.p.shape[0]):
-        if free[6 * k] != HELD or free[6 * k + 1] != HELD or free[6 * k + 2] != HELD:
-            turn(old.p[k], D[6 * k], D[6 * k + 1], D[6 * k + 2], new.p[k])
-
-
-@inner
-def update(S, old, D, free, new):
-    """Set velocities and accelerations that belong to the increments of a step."""
-    h = S.h
-    for k in range(D.size):
-        if free[k] == LIGHT:
-            new.f[k], new.v[k], new.a[k] = 0.0, D[k] / h, 0.0
-        elif free[k] == HEAVY:
-            f, v, a = old.f[k], old.v[k], old.a[k]
-            g = (D[k] - h * v) / (h * h * S.beta) - (0.5 / S.beta - 1) * f
-            new.f[k] = g
-            new.v[k] = v + h * ((1 - S.gamma) * f + S.gamma * g)
-            new.a[k] = ((1 - S.alpha_m) * g + S.alpha_m * f - S.alpha_f * a) / (1 - S.alpha_f)
-
-
-@kernel
-def advance(rod, S, old, load, free, new, W):
-    """One step; held dofs of ``new`` are set before. Iterations (-1: none found) and products."""
-    D = S.h * old.v + 0.5 * S.h * S.h * old.f
-    rate = S.gamma / (S.beta * S.h)
-    accelerating = (1 - S.alpha_m) / (S.beta * S.h * S.h * (1 - S.alpha_f))
-    length, count = rod.h.sum(), 0
-    for iteration in range(MAX_ITERATIONS):
-        place(old, D, free, new)
-        update(S, old, D, free, new)
-        internal(rod, new.x, new.p, new.v, rate, W)
-        add_loads(new.p, load[0], load[1], W)
-        add_inertia(rod, new.v, new.a, accelerating, rate, W)
-        for k in range(D.size):
-            W.d[k, 0] = -W.r[k]
-        hold(W.A, W.d, free)
-        products = solve(W.A, W.d)
-        count += products
-        turned, moved = largest(W.d, length)
-        if products == 0 or not turned + moved < 1e3:
-            return -1, count
-        add_increment(D, W.d)
-        if max(turned, moved) < INCREMENT_RTOL:
-            place(old, D, free, new)
-            update(S, old, D, free, new)
-            return iteration + 1, count
-    return -1, count
 
 
 @dataclass(frozen=True)
@@ -170,7 +43,7 @@ class Motion:
     """How a rod moved.
 
     Attributes:
-        rod: the rod.
+        rod: the rod, with the mass and inertia that it had.
         t: (k,) instants [s].
         x: (k, N + 1, 3) positions [m].
         p: (k, N + 2, 4) quaternions of plate, segments, plate [1].
@@ -178,7 +51,7 @@ class Motion:
             section axes.
         root: (k, 6) what holds the start: force in world axes [N], moment in section axes [N m],
             without the inertia of the held vertex itself.
-        iterations, products: of all steps together.
+        iterations: of all steps together.
     """
 
     rod: Rod
@@ -188,7 +61,6 @@ class Motion:
     v: Array
     root: Array
     iterations: int
-    products: int
 
     def shape(self, k: int) -> Shape:
         """The shape at an instant."""
@@ -233,75 +105,130 @@ def simulate(  # noqa: PLR0913  keywords of one run, all with defaults
         save_every: steps between instants that are kept.
 
     Raises:
-        ConfigError: for a step or an end that is not positive, or damping outside 0 to 1.
+        ConfigError: for a step or an end that is not positive, damping outside 0 to 1, shapes of
+            arrays that differ from those of the rod, or a section of which two rotations are free.
+        ModelError: if the rod has no mass at all.
         SolverError: if a step has no solution; its ``solution`` is what came before.
     """
     if not (dt > 0 and t_end > 0 and 0 <= rho_inf <= 1):
         raise ConfigError(f"dt={dt:g}, t_end={t_end:g}, rho_inf={rho_inf:g} is no run.",
                           hint="Times are positive, rho_inf lies between 0 and 1.")  # fmt: skip
-    moving = clamped(rod) if free is None else np.asarray(free, dtype=np.bool_)
-    kinds = np.where(moving, np.where(lumped_mass(rod) > 0, HEAVY, LIGHT), HELD)
-    shape, W = reference(rod) if start is None else start, work(rod)
-    loads = load if callable(load) else _always(rod, load)
-    S = scheme(dt, rho_inf)
-    point = _begin(rod, shape, loads(0.0), root, moving)
-    kept = [(0.0, point, np.zeros(6))]
-    total = np.zeros(2, dtype=int)
-    steps = round(t_end / dt)
-    for step in range(1, steps + 1):
-        new = Point(*(part.copy() for part in point))
-        if root is not None:
-            _put(new, root(step * dt))
-        done = advance(rod, S, point, loads(step * dt), kinds, new, W)
-        if done[0] < 0:
-            raise SolverError(f"step {step} at {step * dt:g} s did not converge.",
-                              hint="Halve dt, or the load leaves the rod no way.",
-                              solution=_motion(rod, kept, total))  # fmt: skip
-        total += done
-        point = new
-        if step % save_every == 0 or step == steps:
-            kept.append((step * dt, point, np.append(W.r[3:6], W.r[:3])))
-    return _motion(rod, kept, total)
-
-
-def _always(rod: Rod, load: Loads | None) -> Callable[[float], Loads]:
-    constant = (np.zeros_like(rod.x), np.zeros((len(rod.p), 3))) if load is None else load
-    return lambda _: constant
-
-
-def _put(point: Point, placement: Placement) -> None:
-    x, p, v, w = placement
-    point.x[0], point.p[0], point.v[3:6], point.v[:3] = x, p, v, w
-
-
-def _begin(
-    rod: Rod, shape: Shape, load: Loads, root: Callable[[float], Placement] | None, free: Mask
-) -> Point:
-    """Rest, or the rigid motion of the root, with the accelerations of what has mass."""
-    W = work(rod)
-    v, a = np.zeros(W.r.size), np.zeros(W.r.size)
-    point = Point(shape.x.copy(), shape.p.copy(), v, a, np.zeros(W.r.size))
+    constant = loads(rod) if load is None else load
+    acting: Any = cache(load) if callable(load) else lambda _: constant
+    moving = fitting(rod, acting(0.0), free)[1]
+    times = dt * np.arange(round(t_end / dt) + 1)
+    rod, shape = _heavy(rod), reference(rod) if start is None else start
+    mech = _at_start(rod, shape, root)
     if root is not None:
-        _put(point, root(0.0))
-        spin = rotation.matrix(point.p[0]) @ v[:3]
-        for k, p in enumerate(point.p):
-            v[6 * k : 6 * k + 3] = rotation.matrix(p).T @ spin
-        for i, x in enumerate(point.x):
-            v[6 * i + 3 : 6 * i + 6] = v[3:6] + np.cross(spin, x - point.x[0])
-    internal(rod, point.x, point.p, v, 0.0, W)
-    add_loads(point.p, load[0], load[1], W)
-    mass = lumped_mass(rod)
-    w = np.append(v, np.zeros(3)).reshape(-1, 6)[:, :3]
-    gyro = np.zeros((len(w), 6))
-    gyro[:, :3] = np.cross(w, rod.inertia * w)
-    force = -W.r - gyro.ravel()[:-3]
-    moves = free & (mass > 0)
-    a[moves] = force[moves] / mass[moves]
-    point.f[:] = a
-    return point
+        _lead(mech, root, times)
+    _hold(mech, moving, led=root is not None)
+    _press(mech, acting, times if callable(load) else times[:1])
+    try:
+        found = simulate_mechanism(mech, t_end=float(times[-1]), dt=dt, rho_inf=rho_inf,
+                                   save_every=save_every)  # fmt: skip
+    except RomError as error:
+        if isinstance(error.solution, Solution):
+            error.solution = _motion(rod, error.solution, acting, moving)
+        raise
+    return _motion(rod, found, acting, moving)
 
 
-def _motion(rod: Rod, kept: list[Any], total: Any) -> Motion:
-    t, points, root = zip(*kept, strict=True)
-    x, p, v = (np.array([getattr(point, part) for point in points]) for part in ("x", "p", "v"))
-    return Motion(rod, np.array(t), x, p, v, np.array(root), int(total[0]), int(total[1]))
+def _at_start(rod: Rod, shape: Shape, root: Callable[[float], Placement] | None) -> Mechanism:
+    """The rod at its start, with the velocity of its root."""
+    x, p, v, w = (
+        [shape.x[0], shape.p[0], np.zeros(3), np.zeros(3)]
+        if root is None
+        else (np.asarray(part, dtype=float) for part in root(0.0))
+    )
+    shape, spin = Shape(shape.x.copy(), shape.p.copy()), rotation.matrix(p) @ w
+    shape.x[0], shape.p[0] = x, p
+    mech = Mechanism(gravity=(0.0, 0.0, 0.0))
+    mech.add_nonlinear("rod", body(rod, shape), velocity=v - np.cross(spin, x), omega=spin)
+    return mech
+
+
+def _heavy(rod: Rod) -> Rod:
+    """The same with a little mass and inertia where there is none, as its body has them."""
+    mass, inertia = rod.mass.copy(), rod.inertia.copy()
+    mass[mass <= 0.0] = LEAST_MASS_SHARE * mass.max()
+    own = LEAST_INERTIA_SHARE * 0.5 * (mass[1:] + mass[:-1]) * rod.h**2
+    inner = inertia[1:-1]
+    inertia[1:-1] = np.where(inner > 0.0, inner, own[:, None])
+    rod = rod._replace(mass=mass, inertia=inertia)
+    return rod._replace(inertia=body(rod).frames.inertia)
+
+
+def _lead(mech: Mechanism, root: Callable[[float], Placement], times: Array) -> None:
+    """Drives of place, of the angle about the axis that moves least, and of tilt against it."""
+    x, p, v, w = (np.array(part, dtype=float) for part in zip(*map(root, times), strict=True))
+    turned = np.array([rotation.matrix(one) for one in p])
+    turning = turned @ np.array([rotation.skew(one) for one in w])
+    world, _, own = np.linalg.svd(turned.mean(axis=0))
+    seen, change = world.T @ turned @ own.T, world.T @ turning @ own.T
+    if not seen[:, 0, 0].min() > LEAST_COSINE:
+        raise ConfigError("the root tumbles: none of its axes stays on one side of a plane.",
+                          hint="Cut the run in two.")  # fmt: skip
+    (c, s), (dc, ds) = (A[:, 1:, 1].T for A in (seen, change))
+    angle, rate = np.unwrap(np.arctan2(s, c)), (c * ds - s * dc) / (c * c + s * s)
+    way = CubicHermiteSpline(times, np.column_stack([x, angle, seen[:, 0, 1:]]),
+                             np.column_stack([v, rate, change[:, 0, 1:]]))  # fmt: skip
+    rows = [Row(POINT, e, NO_VECTOR, NO_VECTOR) for e in np.eye(3)]
+    rows += [Row(ANGLE, world[:, 1], own[1], world[:, 2])]
+    rows += [Row(NORMAL, world[:, 0], b, NO_VECTOR) for b in own[1:]]
+    ends = mech.ground.marker((0.0, 0.0, 0.0)), mech.nonlinear["rod"].marker("start")
+    for k, row in enumerate(rows):
+        enter(mech, Joint(f"root {k}", "guide", ends, (), row))
+        value, first = (partial(_column, of, k) for of in (way, way.derivative()))
+        mech.drive(f"way of root {k}", f"root {k}", value, rate=first)
+
+
+def _column(function: Callable[[Any], Array], k: int, t: Any) -> Any:
+    return function(t)[..., k]
+
+
+def _hold(mech: Mechanism, free: Mask, *, led: bool) -> None:
+    """Joints to the ground for what is held, but for a root that is led."""
+    parts = mech.nonlinear["rod"].parts
+    held = ~np.append(free, np.ones(3, dtype=bool)).reshape(-1, 2, 3)
+    for k, part in enumerate(parts):
+        if led and k == 0:
+            continue
+        A, turns = rotation.matrix(part.p), np.flatnonzero(held[k, 0])
+        if turns.size == 1:
+            raise ConfigError(f"section {k} is free to turn about two of its axes, which no joint "
+                              "leaves.", hint="Free one, or all.")  # fmt: skip
+        pairs = ((0, 1), (1, 2), (2, 0)) if turns.size == 3 else [
+            (a, c) for a in turns for c in np.flatnonzero(~held[k, 0])]  # fmt: skip
+        rows = [Row(POINT, e, NO_VECTOR, NO_VECTOR) for e in np.eye(3)[held[k, 1]]]
+        rows += [Row(NORMAL, A[:, a], np.eye(3)[c], NO_VECTOR) for a, c in pairs]
+        if rows:
+            ends = mech.ground.marker(part.at), part.marker((0.0, 0.0, 0.0))
+            enter(mech, Joint(f"hold {k}", "hold", ends, tuple(rows)))
+
+
+def _press(mech: Mechanism, acting: Callable[[float], Loads], times: Array) -> None:
+    """Loads on the frames on which there are some at any of these times."""
+    parts, constant = mech.nonlinear["rod"].parts, times.size == 1
+    for kind, add in enumerate((mech.force, mech.torque)):
+        ever = np.any([np.any(acting(float(t))[kind], axis=1) for t in times], axis=0)
+        for k in np.flatnonzero(ever):
+            name, marker = f"{('force', 'moment')[kind]} {k}", parts[k].marker((0.0, 0.0, 0.0))
+            one = partial(_part, acting, kind, k)
+            add(name, marker, one(0.0) if constant else one)
+
+
+def _part(acting: Callable[[float], Loads], kind: int, k: int, t: float) -> Array:
+    return acting(t)[kind][k]
+
+
+def _motion(rod: Rod, found: Solution, acting: Any, free: Mask) -> Motion:
+    """What the mechanism did, in the order of the rod."""
+    q, v = found.q.reshape(len(found.t), -1, 7), found.v.reshape(len(found.t), -1, 6)
+    x, p = q[:, :-1, :3].copy(), q[:, :, 3:].copy()
+    v = np.roll(v, 3, axis=2).reshape(len(found.t), -1)[:, :-3]
+    W, root = work(rod), np.zeros((len(found.t), 6))
+    for k, t in enumerate(found.t):
+        internal(rod, x[k], p[k], v[k], 0.0, W)
+        add_loads(p[k], *acting(float(t)), W)
+        root[k] = np.roll(np.where(free[:6], 0.0, W.r[:6]), 3)
+    return Motion(rod, found.t, x, p, v, root, int(found.statistics["iterations"]))

@@ -151,6 +151,23 @@ def loads(
     return f, m
 
 
+def fitting(
+    rod: Rod, load: tuple[npt.ArrayLike, npt.ArrayLike], free: npt.ArrayLike | None
+) -> tuple[tuple[Array, Array], Mask]:
+    """Loads, and which dofs are free, as arrays.
+
+    Raises:
+        ConfigError: if their shapes differ from those of the rod.
+    """
+    free = clamped(rod) if free is None else np.asarray(free, dtype=bool)
+    force, moment = (np.array(part, dtype=float) for part in load)
+    if (force.shape, moment.shape, free.shape) != (rod.x.shape, (len(rod.p), 3),
+                                                   (6 * rod.h.size + 9,)):  # fmt: skip
+        raise ConfigError(f"loads of shape {force.shape} and {moment.shape} and {free.size} dofs "
+                          f"for a rod of {rod.h.size} segments.")  # fmt: skip
+    return (force, moment), free
+
+
 def equilibrium(
     rod: Rod,
     load: tuple[Array, Array],
@@ -180,12 +197,7 @@ def equilibrium(
             its ``share`` the part of the load it carries.
     """
     shape = reference(rod) if start is None else Shape(start.x.copy(), start.p.copy())
-    free = clamped(rod) if free is None else np.asarray(free, dtype=bool)
-    force, moment = (np.array(part, dtype=float) for part in load)
-    if (force.shape, moment.shape, free.size) != (rod.x.shape, (len(rod.p), 3), 3 * rod.p.size // 4
-                                                  + rod.x.size):  # fmt: skip
-        raise ConfigError(f"loads of shape {force.shape} and {moment.shape} and {free.size} dofs "
-                          f"for a rod of {rod.h.size} segments.")  # fmt: skip
+    (force, moment), free = fitting(rod, load, free)
     W, speed = work(rod), np.array(spin, dtype=float)
     share, part = (0.0, 1.0 / steps) if start is None else (0.0, 1.0)
     while share < 1.0:

@@ -3,17 +3,17 @@
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from rom import rotation
 from rom.arguments import typed, whole
 from rom.errors import ModelError, RomError, SolverError, reached, warn
 from rom.mbs.analysis.local_equations import Instant, instant
 from rom.mbs.analysis.rotors.spins import Spins
 from rom.mbs.analysis.sparse_tangent import Loan, SparseTangent
-from rom.mbs.analysis.tangent import Tangent, faint_force, sizes
+from rom.mbs.analysis.tangent import Tangent, best_reactions, faint_force, sizes
 from rom.mbs.equations.packing import Packed
 from rom.mbs.integrate.consistent_start import assembled, check_velocity, initial_state
 from rom.mbs.mechanism import Mechanism
@@ -21,7 +21,11 @@ from rom.mbs.results.state import State, check_state
 from rom.mbs.results.validity import warn_of_range
 from rom.model import Array
 
-MAX_PASSES = 300
+MAX_PASSES = 150
+MAX_IDLE = 25  # that lead neither down nor nearer; what is found at all is found in as many
+WINDOW = 8  # corrections of which the largest counts
+PROGRESS_RTOL = 1e-6  # round-off of both
+MAX_WAY = 30.0  # of the search, in rad and sizes of the mechanism
 MAX_TRIALS = 40  # of Newton's corrections where the potential curves downwards
 MOST_STEPS = 100_000  # of the load; where thousands do not help, another start may
 MIN_LOAD_STEP = 1 / 64  # part of a load step at which the search is given up
@@ -212,7 +216,8 @@ class _Search:
         """
         now, last, trials = self.now.scaled(load), np.inf, MAX_TRIALS
         turned, length = np.zeros((now.packed.system.bodies.mass.size, 3)), 0.0
-        state = replace(state, lam=state.lam + self.tangent(now, state).reaction())
+        progress = _Progress(now)
+        state = replace(state, lam=state.lam + best_reactions(now, state)[1])
         beyond: Equations | None = None
         for _ in range(MAX_PASSES):
             equations = beyond or self.tangent(now, state)
@@ -223,10 +228,11 @@ class _Search:
             if straight is None and trials and not equations.rises:
                 found, trials = self.tried(now, state, equations), trials - 1
             if found is None:
-                size, state = self.corrected(now, state, straight or equations.correction())
+                correction = straight or equations.correction()
+                size, motion, state = self.corrected(now, state, correction)
                 beyond = None
             else:
-                size, state, beyond = found
+                (size, motion, state), beyond = found
             if not np.isfinite(size) or (directly and size > max(last, STALLED_TOL)):
                 break
             if size < CORRECTION_TOL or (size < STALLED_TOL and size > 0.5 * last):
@@ -234,26 +240,28 @@ class _Search:
                     break
                 return state
             last = size
+            if progress.ends(size, motion, before, state):
+                break
             if not equations.rises:
-                turn = _turns(now.packed, before, state)
+                turn = motion[now.packed.system.bodies.v_at[:, None] + np.arange(3, 6)]
                 turned, length = turned + turn, length + np.linalg.norm(turn, axis=1)
                 around = np.linalg.norm(turned, axis=1)
                 if ((around > MAX_TURN) & (around > STRAIGHT_SHARE * length)).any():
                     raise _turning(now.packed, turned)
-        raise _failure(now, self.tangent(now, state), load)
+        raise _failure(now, self.tangent(now, state), state, load)
 
     def corrected(
         self, now: Instant, state: State, correction: tuple[Array, Array]
-    ) -> tuple[float, State]:
-        """Size of a correction, and the state after as much of it as linear equations allow."""
+    ) -> tuple[float, Array, State]:
+        """Size of a correction, as much of it as linear equations allow, and the state after."""
         step, dlam = correction
         size, factor = sizes(now.packed, step)
         if not np.isfinite(size):
-            return size, state
+            return size, step, state
         factor, state = self.within_room(now, state, (factor * step, factor * dlam), factor)
         if factor < 1.0:
-            state = replace(state, lam=state.lam + self.tangent(now, state).reaction())
-        return size, state
+            state = replace(state, lam=state.lam + best_reactions(now, state)[1])
+        return size, factor * step, state
 
     def within_room(
         self, now: Instant, state: State, correction: tuple[Array, Array], factor: float
@@ -288,7 +296,7 @@ class _Search:
 
     def tried(
         self, now: Instant, state: State, equations: Equations
-    ) -> tuple[float, State, Equations] | None:
+    ) -> tuple[tuple[float, Array, State], Equations] | None:
         """Newton's correction although the potential curves downwards, with what is behind it.
 
         Only one that can be taken whole and leads to where the potential curves upwards: what is
@@ -297,9 +305,9 @@ class _Search:
         newton = equations.newton
         if newton is None or sizes(now.packed, newton[0])[1] < 1.0:
             return None
-        size, ahead = self.corrected(now, state, newton)
-        beyond = self.tangent(now, ahead)
-        return (size, ahead, beyond) if beyond.steadier(equations) else None
+        ahead = self.corrected(now, state, newton)
+        beyond = self.tangent(now, ahead[2])
+        return (ahead, beyond) if beyond.steadier(equations) else None
 
     def judge(self, state: State) -> None:
         """Refuse free motions, and warn of unstable ones."""
@@ -353,12 +361,30 @@ def _described(packed: Packed, motion: Array) -> str:
     return f"body {packed.names[b]!r} {verb} ({axis})"
 
 
-def _turns(packed: Packed, before: State, after: State) -> Array:
-    """(b, 3) rotations of all bodies from one state to another, in their axes [rad]."""
-    at = packed.system.bodies.q_at + 3
-    inverse = np.array([1.0, -1.0, -1.0, -1.0])
-    pairs = ((before.q[k : k + 4] * inverse, after.q[k : k + 4]) for k in at)
-    return np.array([rotation.log(rotation.multiply(*pair)) for pair in pairs])
+@dataclass
+class _Progress:
+    """Whether a search still leads somewhere: to lower potential, or to smaller corrections.
+
+    Corrections of stiff bodies come in pairs, one that strains them by the square of a finite
+    rotation and one that takes it back: the largest of a few is what must fall.
+    """
+
+    now: Instant
+    sizes: list[float] = field(default_factory=list)
+    way: Any = 0.0
+    work: float = 0.0  # of the forces against the motion
+    least: Any = np.inf
+    idle: int = 0
+
+    def ends(self, size: float, motion: Array, before: State, after: State) -> bool:
+        """Whether many corrections have led nowhere, or very far away, with one more."""
+        along = [self.now.residual(x.q, x.v, x.a, x.lam) @ motion for x in (before, after)]
+        self.work += 0.5 * float(along[0] + along[1])
+        self.sizes, self.way = [*self.sizes[1 - WINDOW :], size], self.way + motion
+        reached, faint = np.array([self.work, max(self.sizes)]), PROGRESS_RTOL * np.abs(along).max()
+        leads = (reached < self.least - np.array([faint, PROGRESS_RTOL * size])).any()
+        self.least, self.idle = np.minimum(self.least, reached), 0 if leads else self.idle + 1
+        return self.idle >= MAX_IDLE or sizes(self.now.packed, self.way)[0] > MAX_WAY
 
 
 def _turning(packed: Packed, turned: Array) -> ModelError:
@@ -372,7 +398,7 @@ def _turning(packed: Packed, turned: Array) -> ModelError:
     )
 
 
-def _failure(now: Instant, tangent: Tangent | SparseTangent, load: float) -> RomError:
+def _failure(now: Instant, tangent: Equations, state: State, load: float) -> RomError:
     """Why Newton's method failed: an open joint, a body that nothing holds, or lack of balance."""
     packed = now.packed
     gap = np.abs(tangent.gap) / packed.row_scale
@@ -386,7 +412,7 @@ def _failure(now: Instant, tangent: Tangent | SparseTangent, load: float) -> Rom
                 f"{_described(packed, loose)}, pushed by forces that nothing balances.",
                 hint="Hold it by a joint or a spring, or give its place by a drive.",
             )
-        force = np.abs(tangent.unbalanced())
+        force = np.abs(best_reactions(now, state)[0])
         starts = packed.system.bodies.v_at
         b = int(np.searchsorted(starts, int(np.argmax(force)), side="right")) - 1
         what = f"body {packed.names[b]!r} stays out of balance, by {force.max():.3g} N or N m"

@@ -126,15 +126,17 @@ class Pencil:
         M, C, K = now.matrices(state)
         D = diags(1 / np.sqrt(M.diagonal()))
         basis = T @ D
-        K2 = basis.T @ (K @ T + C @ T1 + M @ T3) @ D
-        C2 = basis.T @ (C @ T + M @ T2) @ D
+        if state.v.any() or state.a.any():
+            K2, C2 = K @ T + C @ T1 + M @ T3, C @ T + M @ T2
+        else:
+            K2, C2 = K @ T, C @ T
+        K2, C2 = basis.T @ K2 @ D, basis.T @ C2 @ D
         G, row = unit_rows(now.gradient(state.q, state.v)[1] @ basis)
         stiffest = abs(K2).max() if K2.nnz else 0.0
         K2, C2, M2 = (csc_matrix(A) for A in (K2, C2, basis.T @ M @ basis))
         scale = SHIFT_SHARE * stiffest or 1.0
         groups = now.pattern.groups
-        alone = now.packed.by_blocks and not now.packed.shares
-        return cls(K2, C2, M2, G, groups, scale, csc_matrix(basis), row, alone)
+        return cls(K2, C2, M2, G, groups, scale, csc_matrix(basis), row, now.independent)
 
     @cached_property
     def redundant(self) -> int:

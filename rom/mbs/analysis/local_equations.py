@@ -1,6 +1,7 @@
 """How the equations of motion change around one state, and which motions the joints leave."""
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -80,11 +81,16 @@ class Instant:
         self.W.signal[:] = table[0]
         return replace(self, t=t)
 
-    @property
+    @cached_property
     def system(self) -> Any:
         """The arrays of the mechanism, gravity times the factor of the loads."""
         s = self.packed.system
         return s.replace(bodies=s.bodies.replace(gravity=self.load * s.bodies.gravity))
+
+    @property
+    def independent(self) -> bool:
+        """Whether no constraint is known to repeat others."""
+        return bool(self.packed.by_blocks and not self.packed.shares)
 
     def evaluate(self, q: Array, v: Array) -> None:
         """Everything that depends on coordinates and velocities, Python forces included."""

@@ -9,7 +9,6 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.sparse import identity
 
 from rom.errors import SolverError
 from rom.mbs.analysis.few_modes import Pencil
@@ -22,7 +21,6 @@ from rom.mbs.analysis.tangent import (
     load_stiffness,
     sizes,
 )
-from rom.mbs.equations.sparse_solve import Constrained
 from rom.mbs.results.state import State
 from rom.model import Array
 
@@ -154,19 +152,3 @@ class SparseTangent:
         weakest = self.weakest()
         pushed = np.where(weakest.loose, weakest.along, 0.0)
         return weakest.motions[:, int(np.argmax(pushed))] if pushed.max(initial=0) > faint else None
-
-    def reaction(self) -> Array:
-        """(m,) change of the multipliers that balances the forces best."""
-        return self._balanced()[1]
-
-    def unbalanced(self) -> Array:
-        """(n,) forces that the best reactions leave over."""
-        basis = self.pencil.basis
-        scale = np.sqrt(np.asarray(basis.multiply(basis).sum(axis=0)).ravel())
-        return self._balanced()[0] / scale
-
-    def _balanced(self) -> tuple[Array, Array]:
-        """(n,) what remains of the forces beside (m,) the best multipliers."""
-        p = self.pencil
-        left, l = Constrained(identity(self.r.size), p.G, redundant=not p.independent).solve(self.r)
-        return left, -l / p.row

@@ -6,10 +6,12 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from scipy.sparse import diags, identity
 
 from rom.mbs.analysis.local_equations import Instant, free_motions, of_unit_mass
 from rom.mbs.analysis.rotors.spins import Spins
 from rom.mbs.equations.packing import Packed
+from rom.mbs.equations.sparse_solve import Constrained, unit_rows
 from rom.mbs.results.state import State
 from rom.model import Array
 
@@ -74,15 +76,6 @@ class Tangent:
         squares, V = self._principal
         along = np.abs(V.T @ (self.Z.T @ self.r))
         return Weakest(squares, self.T @ self.Z @ V, self.none(squares), along)
-
-    def reaction(self) -> Array:
-        """(m,) change of the multipliers that balances the forces best."""
-        scale = self.now.probe()
-        return -np.linalg.lstsq((self.G * scale).T, self.r * scale, rcond=1e-9)[0]
-
-    def unbalanced(self) -> Array:
-        """(n,) forces that the best reactions leave over."""
-        return self.r + self.G.T @ self.reaction()
 
     def correction(self) -> tuple[Array, Array]:
         """(n,) variation of the coordinates and (m,) of the multipliers, downhill."""
@@ -160,6 +153,20 @@ class Tangent:
         none, along = self.none(squares), V.T @ force
         still = (np.abs(squares) <= none) & (np.abs(along) <= faint_force(self.now, self.pull))
         return -V @ np.where(still, 0.0, along / np.maximum(np.abs(squares), none))
+
+
+def best_reactions(now: Instant, state: State) -> tuple[Array, Array]:
+    """(n,) what is left of the forces, by the change (m,) of the multipliers that balances best."""
+    r = now.residual(state.q, state.v, state.a, state.lam)
+    _, G, M = now.gradient(state.q, state.v)
+    if now.pattern is None:
+        scale = now.probe()
+        l = -np.linalg.lstsq((G * scale).T, r * scale, rcond=1e-9)[0]
+        return r + G.T @ l, l
+    scale = 1 / np.sqrt(M.diagonal())
+    rows, length = unit_rows(G @ diags(scale))
+    left, l = Constrained(identity(r.size), rows, redundant=not now.independent).solve(r * scale)
+    return left / scale, -l / length
 
 
 @dataclass(frozen=True)

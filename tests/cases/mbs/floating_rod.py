@@ -26,6 +26,7 @@ from scipy.integrate import solve_ivp
 from rom import rotation
 from rom.components.cosserat.energy import Rod, internal, work
 from rom.components.cosserat.shapes import Shape, reference
+from rom.components.cosserat.statics import add_loads
 from rom.components.cosserat.vibration import lumped_mass
 from rom.model import Array
 
@@ -211,3 +212,31 @@ def simulate(
     )  # fmt: skip
     assert found.success, found.message
     return [Instant.unpacked(y, n) for y in found.y.T]
+
+
+def swing(rod: Rod, t: float, load: tuple[Array, Array], free: Array) -> Shape:
+    """Shape of a rod with mass, held to the ground, after a load has acted on it.
+
+    Each dof by itself, since masses are lumped: no mechanism, no frame, no elimination.
+    """
+    W, M, n = work(rod), lumped_mass(rod), rod.x.size
+
+    def parts(y: Array) -> tuple[Array, Array, Array]:
+        p = y[n : -M.size].reshape(-1, 4)
+        return y[:n].reshape(-1, 3), p / np.linalg.norm(p, axis=1)[:, None], y[-M.size :]
+
+    def rates(_: float, y: Array) -> Array:
+        x, p, v = parts(y)
+        rows = np.append(v, np.zeros(3)).reshape(-1, 6)
+        internal(rod, x, p, v, 0.0, W)
+        add_loads(p, *load, W)
+        spin = np.zeros_like(rows)
+        spin[:, :3] = np.cross(rows[:, :3], rod.inertia * rows[:, :3])
+        a = np.where(free, -(W.r + spin.ravel()[:-3]) / M, 0.0)
+        w = np.insert(rows[:, :3], 0, 0.0, axis=1)
+        turning = [0.5 * rotation.multiply(q, one) for q, one in zip(p, w, strict=True)]
+        return np.concatenate([rows[:-1, 3:].ravel(), np.ravel(turning), a])
+
+    start = np.concatenate([rod.x.ravel(), rod.p.ravel(), np.zeros(M.size)])
+    end = solve_ivp(rates, (0.0, t), start, "DOP853", rtol=1e-9, atol=1e-9).y[:, -1]
+    return Shape(*parts(end)[:2])

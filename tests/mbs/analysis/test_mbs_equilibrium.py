@@ -12,7 +12,8 @@ import rom
 from cases.beam import stiffened_beam
 from cases.long import few
 from cases.mbs.mechanisms import slider_crank
-from rom.errors import ConfigError, ModelError, RomWarning
+from rom.errors import ConfigError, ModelError, RomWarning, SolverError
+from rom.mbs.analysis.tangent import Tangent
 from rom.mbs.elements.contact.impact import Impact
 from rom.mbs.mechanism import Mechanism
 
@@ -202,6 +203,29 @@ def test_what_nothing_holds_is_named():
     mech.force("push", cart.marker("c"), (1.0, 0, 0))
     with pytest.raises(ModelError, match=r"'cart' slides along .*, pushed by forces that nothing"):
         rom.equilibrium(mech)
+
+
+@pytest.mark.parametrize(("law", "error", "said", "most"), [
+    (lambda x: 1.0, ModelError, "'cart' slides along .*, pushed by forces that nothing", 150),
+    (lambda x: -np.sign(x) * np.sqrt(abs(x)), SolverError, "'cart' stays out of balance", 400),
+])  # fmt: skip
+def test_a_search_that_leads_nowhere_is_given_up(law, error, said, most, monkeypatch):
+    """By nothing at all; and where Newton's corrections go to and fro for ever, x to -x."""
+    found, tangents = Tangent.of.__func__, []
+
+    def counted(cls, *arguments):
+        tangents.append(arguments)
+        return found(cls, *arguments)
+
+    monkeypatch.setattr(Tangent, "of", classmethod(counted))
+    mech = Mechanism(gravity=(0, 0, 0))
+    cart = mech.add_rigid("cart", mass=1.0, inertia=(1, 1, 1), at=(0.1, 0, 0),
+                          markers={"c": (0, 0, 0)})  # fmt: skip
+    mech.prismatic("rail", mech.ground.marker((0, 0, 0)), cart.marker("c"), axis=X)
+    mech.user_force("push", lambda t, a: (law(a.position[0]) * X, 0 * X), cart.marker("c"))
+    with pytest.raises(error, match=said):
+        rom.equilibrium(mech)
+    assert len(tangents) < most
 
 
 def test_wrong_arguments_are_named():
