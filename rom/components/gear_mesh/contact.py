@@ -160,6 +160,10 @@ class Mesh:
         K, C = teeth.tangent.copy()
         return MeshForce(force, K, C, energy, lost, slices, load)
 
+    def __getstate__(self) -> dict[str, Any]:
+        """All but memory of kernels, which no copy shares."""
+        return {name: value for name, value in vars(self).items() if name != "_wheels"}
+
     @cached_property
     def _wheels(self) -> Instant:
         """The element between two free wheels at the datum."""

@@ -1,5 +1,7 @@
 """Gear meshes against series, tables, exact transmission errors and rigid motions."""
 
+import pickle
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -388,6 +390,8 @@ def test_damping_takes_power_from_teeth_in_contact():
     q[5], v[5] = 1e-4, 0.01
     f, still = m.forces(q, 0.1, v), m.forces(q, 0.1)
     assert (still.force - f.force) @ v == pytest.approx(f.lost, rel=1e-12)
+    again = pickle.loads(pickle.dumps(m)).forces(q, 0.1, v)
+    assert_allclose(again.force, f.force, rtol=0)
     assert_allclose(f.damping, 1e-6 * f.stiffness, atol=1e-18 * np.abs(f.stiffness).max())
 
 
