@@ -311,7 +311,7 @@ def film(solves: int = 400) -> Iterator[Figure]:
 
 
 def geared(steps: int = 20000) -> Iterator[Figure]:
-    """A planetary train of six meshes in time, and what its teeth cost beside the plane model.
+    """A planetary train of six meshes in time, and what its teeth cost asked for from Python.
 
     Args:
         steps: of 1e-5 s.

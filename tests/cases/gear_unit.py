@@ -1,17 +1,21 @@
-"""A small gear unit, and its motion step by step by a second program.
+"""A small gear unit, and second programs: of its motion step by step, of teeth in one position.
 
-It knows nothing of mechanisms: the forces of `Transmission.forces`, Newmark, Newton and shooting.
+They know nothing of mechanisms. That of motions has the films of `Transmission.forces`, teeth in
+their plane, Newmark, Newton and shooting. In helical gears contact lines run as
+s = r_b1 theta + k p_b + z tan(beta_b), whose normal is cos(beta_b) n_t - sin(beta_b) e_z.
 
 Source:
     Newmark, A method of computation for structural dynamics, J. Eng. Mech. Div. 85 (1959) 67;
-    Hilber, Hughes and Taylor, Earthq. Eng. Struct. Dyn. 5 (1977) 283.
+    Hilber, Hughes and Taylor, Earthq. Eng. Struct. Dyn. 5 (1977) 283; teeth: Velex and Maatar, J.
+    Sound Vib. 191 (1996) 629.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rom.components.gear_mesh import GearPair, Mesh
+from rom.components.gear_mesh import GearPair, Mesh, MeshForce, Slices
+from rom.components.gear_mesh.gears.geometry import involute, path_of_contact
 from rom.components.journal_bearing import Groove, JournalBearing
 from rom.components.transmission import Disc, Rotor, Shaft, Transmission
 
@@ -51,7 +55,10 @@ class Step:
 
     def __init__(self, unit, q, theta, v=None, *, alpha=0.0):
         self.alpha, self.beta, self.gamma = alpha, (1 - alpha) ** 2 / 4, 0.5 - alpha
-        self.unit, self.q, self.v = unit, q, np.zeros(q.size) if v is None else v
+        mesh = unit.mesh
+        plane = PlaneMesh(mesh.pair, mesh.stiffness, mesh.correction, mesh.damping, mesh.cells)
+        self.unit = unit = replace(unit, mesh=plane)
+        self.q, self.v = q, np.zeros(q.size) if v is None else v
         self.M, self.K, G = unit.matrices
         self.C = unit.loss * self.K + G
         self.now = unit.forces(q, self.v, theta)
@@ -134,3 +141,119 @@ def repeating(state, steps, alpha=-0.05, rtol=1e-6):
         dt = unit.mesh_period / steps
         x = x + min(unit.allowed(x[:n], d[:n]), unit.allowed(x[:n], dt * d[n:])) * d
     raise AssertionError(f"the motion does not close by {gap:.3g}")
+
+
+# --- teeth in one position ---
+
+
+class PlaneMesh(Mesh):
+    """Two wheels whose flanks approach to the first order of shifts along the axis and tilts."""
+
+    def gap(self, slices, path):
+        """(n,) normal gap of the unloaded flanks at the datum [m]."""
+        c, b, e = self.correction, self.pair.width, np.zeros(slices.s.size)
+        starts = (slices.s - path[1] + c.extent[0], path[0] + c.extent[1] - slices.s)
+        for depth, extent, beyond in zip(c.relief, c.extent, starts, strict=True):
+            if extent > 0:
+                e += depth * np.clip(beyond / extent, 0.0, None) ** c.power
+        e += c.crowning * (2 * slices.z / b) ** 2 + c.slope * slices.z / b
+        e += abs(c.slope) / 2
+        for errors in c.pitch:
+            if len(errors):
+                lowest = np.asarray(errors, dtype=float)
+                e += (lowest - lowest.min())[(-slices.line) % len(errors)]
+        back = self.pair.backlash * np.cos(self.pair.base_helix)
+        return np.where(slices.back, back, e)
+
+    def forces(self, q, theta, rate=None):
+        """Forces of the teeth on both wheels."""
+        q = np.asarray(q, dtype=float)
+        line = Line.of(self.pair, q)
+        path = path_of_contact(self.pair, line.alpha)
+        slices = contact_lines(self.pair, line, theta + q[5], self.cells, path)
+        V = structural_vectors(self.pair, line, slices)
+        d = approach(self.pair, line, slices, V, q) - self.gap(slices, path)
+        k = self.pair_stiffness(slices.s, path) * slices.length * (d > 0)
+        v = np.zeros(d.size) if rate is None else V @ np.asarray(rate, dtype=float)
+        load = k * (d + self.damping * v)
+        K = (V * k[:, None]).T @ V
+        return MeshForce(
+            -V.T @ load, K, self.damping * K, 0.5 * float(k @ d**2),
+            self.damping * float(k @ v**2), slices, load,
+        )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Line:
+    """The line of action of wheels whose centres moved.
+
+    Attributes:
+        alpha: pressure angle [rad].
+        turn: of the line of centres [rad].
+        datum: pressure angle at the datum [rad].
+    """
+
+    alpha: float
+    turn: float
+    datum: float
+
+    @classmethod
+    def of(cls, pair, q):
+        """Where the middles of the faces are."""
+        x, y = pair.distance + q[6] - q[0], q[7] - q[1]
+        cosine = float(pair.rb.sum() / np.hypot(x, y))
+        return cls(float(np.arccos(cosine)), float(np.arctan2(y, x)), pair.alpha)
+
+
+def contact_lines(pair, line, theta, cells, path):
+    """Contact lines of working and back flanks, cut where they leave the field of contact."""
+    slant, rb = float(np.tan(pair.base_helix)), float(pair.rb[0])
+    forward = rb * (theta + line.alpha - line.datum - line.turn)
+    behind = float(pair.base_thickness[0]) + 2 * rb * line.alpha - forward
+    both = [_cut(pair, start, t, cells, path) for start, t in ((forward, slant), (behind, -slant))]
+    s, z, length, number = (np.concatenate(columns) for columns in zip(*both, strict=True))
+    return Slices(s, z, length, number, np.repeat([False, True], [len(b[0]) for b in both]))
+
+
+def structural_vectors(pair, line, slices):
+    """(n, 12) approach of the flanks per motion of the wheels."""
+    side = np.where(slices.back, -1.0, 1.0)
+    c, s = np.cos(line.turn), np.sin(line.turn)
+    A = np.array([[c, -s], [s, c]])
+    beta = pair.base_helix
+    t = np.stack([np.full(side.size, np.sin(line.alpha)), side * np.cos(line.alpha)])
+    start = pair.rb[0] * np.stack([np.full(side.size, np.cos(line.alpha)),
+                                   -side * np.sin(line.alpha)])  # fmt: skip
+    M = A @ (start + slices.s * t)
+    centre = A @ np.array([pair.rb.sum() / np.cos(line.alpha), 0.0])
+    n = np.vstack([np.cos(beta) * (A @ t), -side * np.sin(beta)]).T
+    arms = [np.vstack([M - off[:, None], slices.z]).T for off in (np.zeros(2), centre)]
+    return np.hstack([n, np.cross(arms[0], n), -n, -np.cross(arms[1], n)])
+
+
+def approach(pair, line, slices, V, q):
+    """(n,) normal approach of the flanks; exact for wheels that move and turn in their plane."""
+    rb, sum_rb, side = pair.rb, float(pair.rb.sum()), np.where(slices.back, -1.0, 1.0)
+    opened = sum_rb * float(involute(line.alpha) - involute(line.datum))
+    rolled = rb[0] * q[5] + rb[1] * q[11] - sum_rb * line.turn
+    plane = np.cos(pair.base_helix) * (side * rolled - opened)
+    out_of_plane = np.array([2, 3, 4, 8, 9, 10])
+    return plane + V[:, out_of_plane] @ q[out_of_plane]
+
+
+def _cut(pair, start, slant, cells, path):
+    """Pieces of the lines s = start + k p_b + slant z within path and face."""
+    A, B = path
+    edges, p = np.linspace(-pair.width / 2, pair.width / 2, cells + 1), pair.base_pitch
+    reach = abs(slant) * pair.width / 2
+    k = np.arange(np.floor((A - start - reach) / p), np.ceil((B - start + reach) / p) + 1)
+    s0 = start + k[:, None] * p
+    if slant == 0.0:
+        low, high = np.broadcast_arrays(edges[:-1], np.where((s0 >= A) & (s0 < B), edges[1:], -1))
+    else:
+        ends = np.sort(np.stack([(A - s0) / slant, (B - s0) / slant]), axis=0)
+        low, high = np.maximum(edges[:-1], ends[0]), np.minimum(edges[1:], ends[1])
+    row, column = np.nonzero(high - low > 1e-15)
+    a, b = low[row, column], high[row, column]
+    z = (a + b) / 2
+    return s0[row, 0] + slant * z, z, (b - a) / np.cos(np.arctan(slant)), k[row].astype(np.int64)

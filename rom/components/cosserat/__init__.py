@@ -4,8 +4,8 @@
 exact tangents, `bodies` the laws by which they take part in mechanisms, `coils` the stop of a
 spring whose coils touch; `field` says what they have for files, by `keys`. `statics` brings one
 alone to rest under loads or in steady rotation along its `band`, `vibration` finds its modes,
-`motion` moves it as a mechanism. `helical_spring` are springs as rods, `linear_pieces` cuts one into
-linear bodies. Axes of a section: third along the rod. Loads are dead: they keep their direction.
+`motion` moves it as a mechanism. `helical_spring` are springs as rods, `linear_pieces` cuts one
+into linear bodies. Axes of a section: third along the rod. Loads keep their direction.
 """
 
 from rom.lazy import front

@@ -1,8 +1,7 @@
-"""Contact of gear teeth in thin slices on the base plane, working and back flanks.
+"""Contact of gear teeth in one position of two wheels, by the element of mechanisms.
 
 Motions q = (u1, phi1, u2, phi2) of both wheels count from the datum: wheels centred, shafts
-parallel, working flanks just touching. In helical gears contact lines run as
-s = r_b1 theta + k p_b + z tan(beta_b), whose normal is cos(beta_b) n_t - sin(beta_b) e_z.
+parallel, working flanks just touching. How flanks touch says `rom.components.gear_mesh.gears.teeth`.
 
 Source:
     Velex and Maatar, A mathematical model for analyzing the influence of shape deviations and
@@ -10,15 +9,22 @@ Source:
 """
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from rom.components.gear_mesh.gears.corrections import Correction
-from rom.components.gear_mesh.gears.geometry import GearPair, involute, path_of_contact
-from rom.errors import ModelError, SolverError
+from rom.components.gear_mesh.gears.geometry import GearPair, path_of_contact
+from rom.components.gear_mesh.gears.meshes import GEAR_MESHES_FAMILY
+from rom.components.gear_mesh.gears.table import HEIGHT, LENGTH, LOAD, PHASE, PLACE, SIDE
+from rom.errors import ModelError
+from rom.mbs.analysis.local_equations import Instant, instant
+from rom.mbs.equations.equations import tangents
+from rom.mbs.mechanism import Mechanism
 from rom.model import Array, Index
+from rom.rotation import matrix
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +56,7 @@ class MeshForce:
             s/rad].
         energy: stored [J].
         lost: power of the damping [W].
-        slices: where the flanks are near.
+        slices: where the flanks touch.
         load: (n,) normal force on the slices [N].
     """
 
@@ -99,29 +105,9 @@ class Mesh:
             if len(errors) not in (0, z):
                 raise ModelError(f"{len(errors)} pitch errors for {z} teeth; give one per tooth.")
 
-    def gap(self, slices: Slices, path: tuple[float, float]) -> Array:
-        """(n,) normal gap of the unloaded flanks at the datum [m]."""
-        c, b, e = self.correction, self.pair.width, np.zeros(slices.s.size)
-        starts = (slices.s - path[1] + c.extent[0], path[0] + c.extent[1] - slices.s)
-        for depth, extent, beyond in zip(c.relief, c.extent, starts, strict=True):
-            if extent > 0:
-                e += depth * np.clip(beyond / extent, 0.0, None) ** c.power
-        e += c.crowning * (2 * slices.z / b) ** 2 + c.slope * slices.z / b
-        e += abs(c.slope) / 2
-        for errors in c.pitch:
-            if len(errors):
-                lowest = np.asarray(errors, dtype=float)
-                e += (lowest - lowest.min())[(-slices.line) % len(errors)]
-        back = self.pair.backlash * np.cos(self.pair.base_helix)
-        return np.where(slices.back, back, e)
-
     def least_gap(self, theta: float) -> float:
         """How far the working flanks are apart at the datum, along the line of action [m]."""
-        slices = contact_lines(
-            self.pair, Line.of(self.pair, np.zeros(12)), theta, self.cells, self.pair.path
-        )
-        gap = self.gap(slices, self.pair.path)[~slices.back]
-        return float(gap.min() / np.cos(self.pair.base_helix))
+        return _closed(self, 0.0, theta)
 
     def pair_stiffness(self, s: Array, path: tuple[float, float]) -> Array:
         """(n,) stiffness per length of contact line [N/m^2].
@@ -148,89 +134,66 @@ class Mesh:
         Raises:
             ModelError: if the wheels came so close that they have no common tangent.
         """
-        q = np.asarray(q, dtype=float)
-        line = Line.of(self.pair, q)
-        path = path_of_contact(self.pair, line.alpha)
-        slices = contact_lines(self.pair, line, theta + q[5], self.cells, path)
-        V = structural_vectors(self.pair, line, slices)
-        d = approach(self.pair, line, slices, V, q) - self.gap(slices, path)
-        k = self.pair_stiffness(slices.s, path) * slices.length * (d > 0)
-        v = np.zeros(d.size) if rate is None else V @ np.asarray(rate, dtype=float)
-        load = k * (d + self.damping * v)
-        K = (V * k[:, None]).T @ V
-        return MeshForce(
-            -V.T @ load, K, self.damping * K, 0.5 * float(k @ d**2),
-            self.damping * float(k @ v**2), slices, load,
-        )  # fmt: skip
-
-
-@dataclass(frozen=True, slots=True)
-class Line:
-    """The line of action of wheels whose centres moved.
-
-    Attributes:
-        alpha: pressure angle [rad].
-        turn: of the line of centres [rad].
-        datum: pressure angle at the datum [rad].
-    """
-
-    alpha: float
-    turn: float
-    datum: float
-
-    @classmethod
-    def of(cls, pair: GearPair, q: Array) -> "Line":
-        """Where the middles of the faces are.
-
-        Raises:
-            ModelError: if the wheels have no common tangent.
-        """
-        x, y = pair.distance + q[6] - q[0], q[7] - q[1]
-        cosine = float(pair.rb.sum() / np.hypot(x, y))
-        if not cosine < 1:
+        now, q = self._wheels, np.asarray(q, dtype=float)
+        apart = float(np.hypot(self.pair.distance + q[6] - q[0], q[7] - q[1]))
+        if not apart > self.pair.rb.sum():
             raise ModelError(
-                f"the wheels are {np.hypot(x, y) * 1e3:.4f} mm apart: their base circles overlap.",
+                f"the wheels are {apart * 1e3:.4f} mm apart: their base circles overlap.",
                 hint="Motions are in metres and radians.",
             )
-        return cls(float(np.arccos(cosine)), float(np.arctan2(y, x)), pair.alpha)
+        W, teeth, still = now.W, now.packed.elements[GEAR_MESHES_FAMILY], np.zeros(12)
+        teeth.size[0, PHASE], none = theta, np.zeros(0)
+        W.base[-2:] = q[[5, 11]]  # turns are followed from there
+        at = now.shifted(now.packed.q, q)
+        now.residual(at, still, still, none)
+        slices, k = self._slices(q, theta)
+        bent = teeth.slices[0, : k.size, LOAD] / k
+        energy = 0.5 * float(k @ bent**2)
+        if rate is not None:
+            v = np.array(rate, dtype=float).reshape(2, 2, 3)
+            for wheel, x in zip(v, at.reshape(2, 7), strict=True):
+                wheel[1] = wheel[1] @ matrix(x[3:])
+            now.residual(at, v.ravel(), still, none)
+        force = W.wrench[[teeth.i[0], teeth.j[0]]].ravel()
+        load, lost = teeth.slices[0, : k.size, LOAD].copy(), float(W.power[2])
+        tangents(now.system, W, still, still, none, (0.0, 1.0, 1.0))
+        K, C = teeth.tangent.copy()
+        return MeshForce(force, K, C, energy, lost, slices, load)
 
+    def __getstate__(self) -> dict[str, Any]:
+        """All but memory of kernels, which no copy shares."""
+        return {name: value for name, value in vars(self).items() if name != "_wheels"}
 
-def contact_lines(
-    pair: GearPair, line: Line, theta: float, cells: int, path: tuple[float, float]
-) -> Slices:
-    """Contact lines of working and back flanks, cut where they leave the field of contact."""
-    slant, rb = float(np.tan(pair.base_helix)), float(pair.rb[0])
-    forward = rb * (theta + line.alpha - line.datum - line.turn)
-    behind = float(pair.base_thickness[0]) + 2 * rb * line.alpha - forward
-    both = [_cut(pair, start, t, cells, path) for start, t in ((forward, slant), (behind, -slant))]
-    s, z, length, number = (np.concatenate(columns) for columns in zip(*both, strict=True))
-    return Slices(s, z, length, number, np.repeat([False, True], [len(b[0]) for b in both]))
+    @cached_property
+    def _wheels(self) -> Instant:
+        """The element between two free wheels at the datum."""
+        mech = Mechanism(gravity=(0.0, 0.0, 0.0))
+        places = {"pinion": (0.0, 0.0, 0.0), "gear": (self.pair.distance, 0.0, 0.0)}
+        ends = [
+            mech.add_rigid(name, mass=1.0, inertia=(1.0, 1.0, 1.0), at=at).marker((0, 0, 0))
+            for name, at in places.items()
+        ]
+        mech.gear_mesh("teeth", *ends, axis=(0, 0, 1), pair=self.pair, stiffness=self.stiffness,
+                       correction=self.correction, damping=self.damping, entry=0.0,
+                       conservative=False, cells=self.cells, phase=0.0)  # fmt: skip
+        now = instant(mech, 0.0)
+        teeth = now.packed.elements[GEAR_MESHES_FAMILY]
+        teeth.axes[0, 9:] *= -1.0  # turns of the gear count from zero, where numbers are finest
+        teeth.start[:] = 0.0
+        return now
 
-
-def structural_vectors(pair: GearPair, line: Line, slices: Slices) -> Array:
-    """(n, 12) approach of the flanks per motion of the wheels."""
-    side = np.where(slices.back, -1.0, 1.0)
-    c, s = np.cos(line.turn), np.sin(line.turn)
-    A = np.array([[c, -s], [s, c]])
-    beta = pair.base_helix
-    t = np.stack([np.full(side.size, np.sin(line.alpha)), side * np.cos(line.alpha)])
-    start = pair.rb[0] * np.stack([np.full(side.size, np.cos(line.alpha)),
-                                   -side * np.sin(line.alpha)])  # fmt: skip
-    M = A @ (start + slices.s * t)
-    centre = A @ np.array([pair.rb.sum() / np.cos(line.alpha), 0.0])
-    n = np.vstack([np.cos(beta) * (A @ t), -side * np.sin(beta)]).T
-    arms = [np.vstack([M - off[:, None], slices.z]).T for off in (np.zeros(2), centre)]
-    return np.hstack([n, np.cross(arms[0], n), -n, -np.cross(arms[1], n)])
-
-
-def approach(pair: GearPair, line: Line, slices: Slices, V: Array, q: Array) -> Array:
-    """(n,) normal approach of the flanks; exact for wheels that move and turn in their plane."""
-    rb, sum_rb, side = pair.rb, float(pair.rb.sum()), np.where(slices.back, -1.0, 1.0)
-    opened = sum_rb * float(involute(line.alpha) - involute(line.datum))
-    rolled = rb[0] * q[5] + rb[1] * q[11] - sum_rb * line.turn
-    plane = np.cos(pair.base_helix) * (side * rolled - opened)
-    out_of_plane = np.array([2, 3, 4, 8, 9, 10])
-    return plane + V[:, out_of_plane] @ q[out_of_plane]
+    def _slices(self, q: Array, theta: float) -> tuple[Slices, Array]:
+        """Slices that bear after the last residual, and (n,) their stiffness [N/m]."""
+        teeth, pair = self._wheels.packed.elements[GEAR_MESHES_FAMILY], self.pair
+        x, y = pair.distance + q[6] - q[0], q[7] - q[1]
+        found = teeth.slices[0, : int(teeth.n_slices[0])]
+        side, s, z, length = found[:, [SIDE, PLACE, HEIGHT, LENGTH]].T
+        alpha, rb = float(np.arccos(pair.rb.sum() / np.hypot(x, y))), pair.rb[0]
+        forward = rb * (theta + q[5] + alpha - pair.alpha - np.arctan2(y, x))
+        start = np.where(side > 0, forward, pair.base_thickness[0] + 2 * rb * alpha - forward)
+        line = np.rint((s - side * np.tan(pair.base_helix) * z - start) / pair.base_pitch)
+        k = self.pair_stiffness(s, path_of_contact(pair, alpha)) * length
+        return Slices(s, z, length, line.astype(np.int64), side < 0), k
 
 
 def transmission_error(mesh: Mesh, torque: float, theta: npt.ArrayLike) -> Array:
@@ -243,7 +206,6 @@ def transmission_error(mesh: Mesh, torque: float, theta: npt.ArrayLike) -> Array
 
     Raises:
         ModelError: without a torque that closes the working flanks.
-        SolverError: if the teeth do not come to rest.
     """
     if not torque > 0:
         raise ModelError(f"a torque of {torque} N m does not press the working flanks together.")
@@ -251,38 +213,16 @@ def transmission_error(mesh: Mesh, torque: float, theta: npt.ArrayLike) -> Array
 
 
 def _closed(mesh: Mesh, torque: float, theta: float) -> float:
-    q, rb = np.zeros(12), float(mesh.pair.rb[0])
-    line = Line.of(mesh.pair, q)
-    slices = contact_lines(mesh.pair, line, theta, mesh.cells, mesh.pair.path)
-    use = ~slices.back
-    e = mesh.gap(slices, mesh.pair.path)[use] / np.cos(mesh.pair.base_helix)
-    k = mesh.pair_stiffness(slices.s, mesh.pair.path) * slices.length
-    k = k[use] * np.cos(mesh.pair.base_helix) ** 2
-    x = float(e.max()) + torque / (rb * float(k.sum()))
-    for _ in range(200):
-        on = e < x
-        new = (torque / rb + float(k[on] @ e[on])) / float(k[on].sum())
-        if abs(new - x) <= 1e-14 * abs(x):
-            return new
-        x = new
-    raise SolverError(f"the teeth do not come to rest at theta = {theta} rad.")
+    """Way along the line of action by which the pinion turns ahead under a torque [m].
 
-
-def _cut(
-    pair: GearPair, start: float, slant: float, cells: int, path: tuple[float, float]
-) -> tuple[Array, Array, Array, Index]:
-    """Pieces of the lines s = start + k p_b + slant z within path and face."""
-    A, B = path
-    edges, p = np.linspace(-pair.width / 2, pair.width / 2, cells + 1), pair.base_pitch
-    reach = abs(slant) * pair.width / 2
-    k = np.arange(np.floor((A - start - reach) / p), np.ceil((B - start + reach) / p) + 1)
-    s0 = start + k[:, None] * p
-    if slant == 0.0:
-        low, high = np.broadcast_arrays(edges[:-1], np.where((s0 >= A) & (s0 < B), edges[1:], -1))
-    else:
-        ends = np.sort(np.stack([(A - s0) / slant, (B - s0) / slant]), axis=0)
-        low, high = np.maximum(edges[:-1], ends[0]), np.minimum(edges[1:], ends[1])
-    row, column = np.nonzero(high - low > 1e-15)
-    a, b = low[row, column], high[row, column]
-    z = (a + b) / 2
-    return s0[row, 0] + slant * z, z, (b - a) / np.cos(np.arctan(slant)), k[row].astype(np.int64)
+    The torque is convex and linear in pieces: Newton's method from above loses slices until none
+    leaves.
+    """
+    rb, q, bearing = float(mesh.pair.rb[0]), np.zeros(12), np.inf
+    q[5] = mesh.pair.module / rb
+    while True:
+        teeth = mesh.forces(q, theta - q[5])
+        if not 0 < teeth.load.size < bearing:
+            return rb * float(q[5])
+        bearing = teeth.load.size
+        q[5] += (torque + teeth.force[5]) / teeth.stiffness[5, 5]

@@ -383,7 +383,10 @@ def _newton(
         thin = min(f.bearing.thinnest(f.motion) / f.bearing.clearance for f in forces.films)
         if thin < MIN_FILM_RATIO:
             break
-        step = np.linalg.solve(K + forces.stiffness, R)
+        try:
+            step = np.linalg.solve(K + forces.stiffness, R)
+        except np.linalg.LinAlgError:  # dry films hold no tilt
+            break
         q = q + unit.allowed(q, step) * step
     raise SolverError(
         f"the unit does not come to rest under {unit.torque} N m at {unit.speed:.1f} rad/s: "

@@ -7,6 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import rom
+from cases.gear_unit import PlaneMesh
 from cases.long import few
 from cases.mbs.mechanisms import prepared, residual_at
 from cases.mbs.tangents import (
@@ -127,7 +128,7 @@ def test_a_rack_is_a_gear_without_end():
     assert SPUR.contact_ratio == pytest.approx(gear.contact_ratio, rel=1e-4)
     packed, W = prepared(free(SPUR, phase=0.3))
     table = K * np.array([0.6, 1.1, 0.7])
-    wanted = Mesh(gear, table, cells=7)
+    wanted = PlaneMesh(gear, table, cells=7)
     q, delta = np.zeros(12), np.zeros(12)
     q[5] = delta[5] = 1e-4
     residual_at(packed.system, W, shifted(packed, packed.q, delta), q * 0, q * 0, np.zeros(0))

@@ -6,6 +6,7 @@ from numpy.testing import assert_allclose
 from scipy.optimize import root
 
 import rom
+from cases.gear_unit import PlaneMesh
 from cases.mbs.mechanisms import prepared, random_body, residual_at, tangents_at
 from cases.mbs.tangents import (
     by_position,
@@ -66,7 +67,7 @@ def wrench(packed, W, q, v):
 def test_forces_in_the_plane_are_those_of_the_plane_model(pair, phase):
     """Wheels that move and turn in their plane: the same physics, in another frame."""
     table = stiffness_table(pair, force=3e5)
-    mesh = Mesh(pair, table, FLANKS, damping=2e-6)
+    mesh = PlaneMesh(pair, table, FLANKS, damping=2e-6)
     packed, W = prepared(
         wheels(pair, stiffness=table, correction=FLANKS, damping=2e-6, phase=phase)
     )
@@ -91,7 +92,7 @@ def test_forces_in_the_plane_are_those_of_the_plane_model(pair, phase):
 
 @pytest.mark.parametrize("pair", [SPUR, HELICAL], ids=["spur", "helical"])
 def test_shifts_along_the_axis_and_tilts_add_what_they_do_in_first_order(pair):
-    mesh = Mesh(pair, K)
+    mesh = PlaneMesh(pair, K)
     packed, W = prepared(wheels(pair, phase=0.4))
     rng = np.random.default_rng(2)
     q = 1e-9 * rng.normal(size=12)
@@ -200,7 +201,7 @@ def test_the_mesh_vibrates_as_a_spring_along_the_line_of_action():
     mech.torque("drive", mech.parts["pinion"].marker(ORIGIN), (0, 0, 50.0))
     mech.rotational_spring("coil", "gear axle", stiffness=1e5)
     state = rom.equilibrium(mech)
-    small = Mesh(pair, K).forces(state_motion(mech, state), 0.0).stiffness
+    small = PlaneMesh(pair, K).forces(state_motion(mech, state), 0.0).stiffness
     k = small[5, 5] / pair.rb[0] ** 2
     A = k * np.outer(pair.rb, pair.rb) + np.diag([0.0, 1e5])
     wanted = np.sqrt(np.linalg.eigvals(A / np.array(J)[:, None]))
