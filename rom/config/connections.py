@@ -368,4 +368,6 @@ def check_name(name: str, ground: str) -> None:
         ConfigError: for one with a dot, or that of the ground.
     """
     if "." in name or name == ground:
-        raise ConfigError(f"{name!r} is no name for a body: markers are written body.marker.")
+        raise ConfigError(
+            f"{name!r} is no name for a body; use one without a dot that is not {ground!r}."
+        )

@@ -18,11 +18,12 @@ import numpy as np
 import numpy.typing as npt
 
 from rom import rotation
+from rom.arguments import between, positive
 from rom.components.compiled import inner, kernel
 from rom.components.cosserat.band import hold, solve
 from rom.components.cosserat.statics import add_loads, clamped, largest
 from rom.components.cosserat.vibration import lumped_mass
-from rom.errors import ConfigError, SolverError
+from rom.errors import SolverError
 from rom.mbs.elements.rods.energy import (
     HALF_BANDWIDTH,
     Rod,
@@ -236,9 +237,9 @@ def simulate(  # noqa: PLR0913  keywords of one run, all with defaults
         ConfigError: for a step or an end that is not positive, or damping outside 0 to 1.
         SolverError: if a step has no solution; its ``solution`` is what came before.
     """
-    if not (dt > 0 and t_end > 0 and 0 <= rho_inf <= 1):
-        raise ConfigError(f"dt={dt:g}, t_end={t_end:g}, rho_inf={rho_inf:g} is no run.",
-                          hint="Times are positive, rho_inf lies between 0 and 1.")  # fmt: skip
+    positive("dt", dt)
+    positive("t_end", t_end)
+    between("rho_inf", rho_inf, 0, 1)
     moving = clamped(rod) if free is None else np.asarray(free, dtype=np.bool_)
     kinds = np.where(moving, np.where(lumped_mass(rod) > 0, HEAVY, LIGHT), HELD)
     shape, W = reference(rod) if start is None else start, work(rod)

@@ -184,8 +184,8 @@ def equilibrium(
     force, moment = (np.array(part, dtype=float) for part in load)
     if (force.shape, moment.shape, free.size) != (rod.x.shape, (len(rod.p), 3), 3 * rod.p.size // 4
                                                   + rod.x.size):  # fmt: skip
-        raise ConfigError(f"loads of shape {force.shape} and {moment.shape} and {free.size} dofs "
-                          f"for a rod of {rod.h.size} segments.")  # fmt: skip
+        raise ConfigError(f"loads of shape {force.shape} and {moment.shape} and {free.size} dofs; "
+                          f"needed are {rod.x.shape} and {(len(rod.p), 3)}.")  # fmt: skip
     W, speed = work(rod), np.array(spin, dtype=float)
     share, part = (0.0, 1.0 / steps) if start is None else (0.0, 1.0)
     while share < 1.0:

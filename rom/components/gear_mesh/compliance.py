@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.integrate import trapezoid
 
+from rom.arguments import between
 from rom.errors import ModelError
 from rom.mbs.elements.gears.geometry import GearPair, involute
 from rom.mbs.elements.gears.hertz import Hertz
@@ -60,11 +61,8 @@ def tooth_compliance(
     Raises:
         ModelError: if the tooth has no such radius.
     """
-    if not pair.rb[gear] <= radius <= pair.ra[gear] * (1 + 1e-12):
-        raise ModelError(
-            f"radius {radius} m is not on the involute, from {pair.rb[gear]:.6f} m to "
-            f"{pair.ra[gear]:.6f} m."
-        )
+    ends = float(pair.rb[gear]), float(pair.ra[gear] * (1 + 1e-12))
+    between("radius on the involute", radius, *ends, error=ModelError)
     y, t = profile(pair, gear)
     half = float(_half_angle(pair, gear, np.array([radius]))[0])
     gamma = float(np.arccos(min(pair.rb[gear] / radius, 1.0))) - half
@@ -111,7 +109,7 @@ def normal_section(pair: GearPair) -> GearPair:
     """
     if not isinstance(pair, GearPair) or pair.internal:
         raise ModelError(
-            "the compliance of racks and internal teeth is not known here: give numbers."
+            "the compliance of racks and internal teeth is not known here; give numbers."
         )
     if pair.helix == 0.0:
         return pair

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from rom.arguments import positive
 from rom.errors import ModelError, SolverError
 from rom.mbs.elements.gears.corrections import Correction
 from rom.mbs.elements.gears.geometry import GearPair, involute, path_of_contact
@@ -89,10 +90,10 @@ class Mesh:
         k = np.atleast_1d(np.asarray(self.stiffness, dtype=float))
         if not isinstance(self.pair, GearPair) or self.pair.internal:
             raise ModelError(
-                "meshes of internal gears and racks are elements: use Mechanism.gear_mesh."
+                "meshes of internal gears and racks are elements; use Mechanism.gear_mesh."
             )
         if self.correction.measured:
-            raise ModelError("maps and run-out are for elements: use Mechanism.gear_mesh.")
+            raise ModelError("maps and run-out are for elements; use Mechanism.gear_mesh.")
         if not (k.size and np.isfinite(k).all() and (k > 0).all()):
             raise ModelError(f"stiffness {self.stiffness} of the teeth must be positive [N/m^2].")
         for errors, z in zip(self.correction.pitch, self.pair.teeth, strict=True):
@@ -245,8 +246,7 @@ def transmission_error(mesh: Mesh, torque: float, theta: npt.ArrayLike) -> Array
         ModelError: without a torque that closes the working flanks.
         SolverError: if the teeth do not come to rest.
     """
-    if not torque > 0:
-        raise ModelError(f"a torque of {torque} N m does not press the working flanks together.")
+    positive("torque", torque, error=ModelError)
     return np.array([_closed(mesh, torque, t) for t in np.atleast_1d(theta)])
 
 

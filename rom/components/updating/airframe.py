@@ -108,7 +108,7 @@ class Airframe:
         far = np.linalg.norm(self.points - np.asarray(point, dtype=float), axis=1)
         if far.min() > 1e-4:
             raise ConfigError(
-                f"no node at {np.asarray(point)}; the nearest is {far.min():.3g} m away."
+                f"no node at {np.asarray(point)}; there is one at {self.points[far.argmin()]}."
             )
         return int(far.argmin())
 

@@ -107,7 +107,8 @@ def joint_with_axis(joints: Mapping[str, Joint], joint: str, what: str) -> Joint
     if joints[joint].coordinate is None:
         raise ConfigError(
             f"{what}: joint {joint!r} is {joints[joint].kind}, which leaves no angle about an axis "
-            "and no way along one: it has no coordinate."
+            "and no way along one: it has no coordinate.",
+            hint="Take a revolute, prismatic or cylindrical one.",
         )
     return joints[joint]
 
@@ -122,8 +123,11 @@ def coordinate_of(joints: Mapping[str, Joint], joint: str, which: str | None, wh
     rows = {None: found.coordinate, "angle": found.turn, "displacement": found.displacement}
     rows["way"] = found.displacement  # as it was called before
     if which not in rows:
-        raise ConfigError(f"coordinate {which!r} of {joint!r}: it is 'angle' or 'displacement'.")
+        raise ConfigError(f"coordinate {which!r} of {joint!r} must be 'angle' or 'displacement'.")
     row = rows[which]
     if row is None:
-        raise ConfigError(f"joint {joint!r} is {found.kind}: it has no coordinate {which!r}.")
+        raise ConfigError(
+            f"{what}: joint {joint!r} is {found.kind}: it has no coordinate {which!r}.",
+            hint="Take a joint that has one: angle that turns, displacement that slides.",
+        )
     return row

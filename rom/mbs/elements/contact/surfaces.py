@@ -122,9 +122,11 @@ def _cover(
     self.check_new(name)
     part = self.part(str(getattr(part, "name", part)))
     if part.flexible is None:
-        raise ConfigError(f"contact {name!r}: body {part.name!r} is rigid, it has no surface.")
-    if part.name == m1.body:
-        raise ConfigError(f"contact {name!r} is of body {part.name!r} with itself.")
+        raise ConfigError(
+            f"contact {name!r}: body {part.name!r} is rigid, it has no surface.",
+            hint="Add it by add_flexible, or give markers and a sphere_contact.",
+        )
+    self.check_apart(name, m1, Marker(part.name, surface_place(0)))
     law, e = checked_law(name, law, part, self.part(m1.body)), np.zeros(3)
     if axis is not None:
         world = unit_vector(f"axis of {name}", axis)
