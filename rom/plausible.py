@@ -206,6 +206,4 @@ def refuse_negative(name: str, value: Any) -> None:
     if isinstance(value, bool) or not isinstance(value, Real) or not math.isfinite(value):
         raise ConfigError(f"{name} = {value!r} must be a finite number.")
     if value < 0.0:
-        raise ConfigError(
-            f"{name} = {value:g} is negative: it must be >= 0, or it would drive the motion."
-        )
+        raise ConfigError(f"{name} = {value:g} is negative: it must be >= 0, not to drive.")

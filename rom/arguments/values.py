@@ -288,7 +288,7 @@ def unit_quaternion(value: Any) -> Array:
         p = finite("orientation", value, (4,))
         if abs(np.linalg.norm(p) - 1.0) > 1e-3:
             raise ConfigError(
-                f"quaternion {p.tolist()} has length {np.linalg.norm(p):.6g}, needed is 1."
+                f"orientation {p.tolist()} must have length 1, not {np.linalg.norm(p):.6g}."
             )
         return p / np.linalg.norm(p)
     A = finite("orientation", value, (3, 3))

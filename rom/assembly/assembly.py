@@ -161,9 +161,7 @@ class Assembly:
         """
         one_of("level", level, ("system", "local"))
         if not self.couplings:
-            raise ConfigError(
-                "nothing is coupled: interfaces to reduce are needed; couple bodies first."
-            )
+            raise ConfigError("nothing is coupled: interfaces to reduce need couplings.")
         (M, K), H = self._matrices(), self._interfaces()
         parts = self._partition(None, fixed)
         if level == "system":

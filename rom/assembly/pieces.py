@@ -196,9 +196,7 @@ class Tree:
                 owners.setdefault(interface, []).append(key)
         for interface, keys in owners.items():
             if len(keys) > 2:
-                raise InterfaceError(
-                    f"interface {interface!r} is of the pieces {named(keys)}; at most two meet."
-                )
+                raise InterfaceError(f"{interface!r} is of {named(keys)}; at most two pieces meet.")
         free = [interface for interface, keys in owners.items() if len(keys) == 1]
         check_known(
             reference,

@@ -62,9 +62,7 @@ class Table:
                 )
         if not (np.diff(t) > 0).all():
             k = int(np.argmin(np.diff(t) > 0))
-            raise ConfigError(
-                f"times of the history must grow: {t[k]} s comes before {t[k + 1]} s."
-            )
+            raise ConfigError(f"times of a history must grow: {t[k]} s comes before {t[k + 1]} s.")
 
     def __call__(self, t: Array) -> Array:
         """Values at times.
@@ -127,7 +125,7 @@ def read_record(path: str | Path, *, scale: float = 1.0) -> Table:
         raise FileFormatError(f"{path} is no record: {error}") from error
     if columns.shape[1] != 2:
         raise FileFormatError(
-            f"{path} has {columns.shape[1]} columns.", hint="Write two: time and value."
+            f"{path} has {columns.shape[1]} columns.", hint="Write time and value."
         )
     return recorded(columns[:, 0], scale * columns[:, 1])
 
@@ -206,9 +204,7 @@ def corners_of(name: str, pair: Pair, n: int = 1, *, rows: bool = False) -> tupl
         )
     y = np.repeat(y[:, None], n, axis=1) if y.ndim == 1 and not rows else y
     if y.shape != (len(t), n) or not (np.isfinite(t).all() and np.isfinite(y).all()):
-        raise ConfigError(
-            f"{name}: values of the shape {y.shape}, needed are {(len(t), n)} finite ones."
-        )
+        raise ConfigError(f"{name}: values {y.shape}, needed are {(len(t), n)} finite ones.")
     return t, y
 
 

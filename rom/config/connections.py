@@ -368,6 +368,4 @@ def check_name(name: str, ground: str) -> None:
         ConfigError: for one with a dot, or that of the ground.
     """
     if "." in name or name == ground:
-        raise ConfigError(
-            f"{name!r} is no name for a body; use one without a dot that is not {ground!r}."
-        )
+        raise ConfigError(f"{name!r} is no name for a body; use one without a dot, not {ground!r}.")

@@ -350,9 +350,7 @@ def _cell_regions(mesh: Any, cell_tags: Any, regions: dict[str, int]) -> Index:
     if len(regions) == 1:
         return tags
     if cell_tags is None:
-        raise TagError(
-            f"the regions {sorted(regions)} are named, but no cell is tagged; give cell_tags."
-        )
+        raise TagError(f"the regions {sorted(regions)} are named without cells; give cell_tags.")
     tags -= 1
     tags[cell_tags.indices] = cell_tags.values
     owned = tags[: cells.size_local]

@@ -144,9 +144,7 @@ class Driven:
         """
         if self.state is None or abs(t - self.state.t) > TIME_RTOL * max(h, 1e-3 * abs(t)):
             where = "not started" if self.state is None else f"at t = {self.state.t:.9g} s"
-            raise ConfigError(
-                f"a step from t = {t:.9g} s must start where the mechanism is: {where}."
-            )
+            raise ConfigError(f"a step from t = {t:.9g} s must start at the mechanism, {where}.")
         positive("the communication step", h)
         n = max(1, int(np.ceil(h / float(self.parameters[0]) - 1e-6)))
         dt, begun = h / n, self._jumped(self.state)

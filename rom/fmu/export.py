@@ -102,7 +102,7 @@ def _variables(resources: dict[str, bytes], script: Path) -> list[Variable]:
     for sentence in found["warnings"]:
         warn(sentence)
     if "error" in found:
-        raise ConfigError(found["error"], where=script.name)
+        raise ConfigError(found["error"], where=script.name, hint=found["hint"])
     return [Variable(**one) for one in found["variables"]]
 
 

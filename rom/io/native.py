@@ -258,9 +258,7 @@ def _check_words(manifest: dict[str, Any], r: int) -> None:
         reference.startswith(word) and _are_names(reference.removeprefix(word), n, names)
         for word, n in (("pins ", 2), ("3-2-1 ", 3))
     ):
-        raise ConfigError(
-            f"reference = {reference!r} must be {named(FRAMES)} or of {named(names)}."
-        )
+        raise ConfigError(f"reference = {reference!r} must be {named(FRAMES)}, or of {names}.")
     if wrong := [m["kind"] for m in manifest["markers"] if m["kind"].split(":")[0] not in KINDS]:
         raise ConfigError(f"the kind of interface {named(wrong)} is none of {', '.join(KINDS)}.")
 

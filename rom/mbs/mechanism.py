@@ -390,9 +390,7 @@ class Mechanism:
         """
         self.check_new(name)
         if direction not in (-1, 0, 1):
-            raise ConfigError(
-                f"direction of event {name!r} is {direction!r}, needed is -1, 0 or 1."
-            )
+            raise ConfigError(f"direction of event {name!r} is {direction!r}; use -1, 0 or 1.")
         markers = tuple(one for one in follow if isinstance(one, Marker))
         self.check_markers(name, *markers)
         named = [(one, None) if isinstance(one, str) else one for one in follow]

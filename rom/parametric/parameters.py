@@ -48,7 +48,7 @@ class Parameter:
             number(f"{name} of {self}", getattr(self, name), error=ParameterError)
         if not 0.0 < self.low <= self.high:
             raise ParameterError(
-                f"the range {self.low:g} to {self.high:g} of {self} must be of positive factors."
+                f"{self}: needed is 0 < low <= high, got {self.low:g}, {self.high:g}."
             )
         for end in dict.fromkeys((self.low, self.high)):
             warn_outside(FACTOR, end, str(self))
@@ -134,15 +134,11 @@ def checked_parameters(parameters: dict[str, Any]) -> dict[str, Parameter]:
                 hint='For example rom.YoungsModulus("web", 0.5, 2.0).',
             )
         if not str(name).isidentifier() or name == "extrapolate":
-            raise ParameterError(
-                f"{name!r} cannot name a parameter; use letters, as in at(web=1.0)."
-            )
+            raise ParameterError(f"{name!r} names no parameter; use letters, as in at(web=1.0).")
     if not parameters:
         raise ParameterError("a family of bodies needs a parameter.", hint="Use rom.reduce.")
     if len(parameters) > len(PRIMES):
-        raise ParameterError(
-            f"at most {len(PRIMES)} parameters are possible, got {len(parameters)}."
-        )
+        raise ParameterError(f"{len(parameters)} parameters must be at most {len(PRIMES)}.")
     axes = {p.axis for p in parameters.values() if isinstance(p, Thickness)}
     if len(axes) > 1:
         raise ParameterError(f"thicknesses along {sorted(axes)} in one family; choose one axis.")

@@ -88,9 +88,7 @@ class Parts:
             return "", self.bodies[""].marker(str(place))
         body, interface = place if isinstance(place, tuple) and len(place) == 2 else ("", "")
         if body not in self.bodies:
-            raise ConfigError(
-                f"{place!r} must be (body, interface), of one of the bodies {named(self.bodies)}."
-            )
+            raise ConfigError(f"{place!r} must be (body, interface) of {named(self.bodies)}.")
         return body, self.bodies[body].marker(interface)
 
     def motion(self, place: Place) -> Array:
@@ -358,9 +356,7 @@ def family_model(
     outside = {**attached, **candidates}
     own: dict[str, Any] = {} if isinstance(family, FlexibleBody | Assembly) else family.parameters
     if len(outside) < len(attached) + len(candidates) or set(outside) & set(own):
-        raise ParameterError(
-            f"one of {named(outside)} names two parameters; give each a name of its own."
-        )
+        raise ParameterError(f"{named(outside)}: one names two parameters; use another name.")
     pairs = [
         [_placed(A, parts.columns[name], parts.n) for A in term.full_matrices()]
         for name, term in terms_of(family)

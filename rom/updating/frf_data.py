@@ -81,7 +81,7 @@ def estimators(
     """
     if len(x) < 2 or np.shape(x) != np.shape(f):
         raise ConfigError(
-            f"spectra {np.shape(x)}, {np.shape(f)}: at least two averages of both are needed."
+            f"{np.shape(x)}, {np.shape(f)}: at least two averages of both are needed."
         )
     not_negative("ratio", ratio)
     S_ff, S_xx = ((np.abs(a) ** 2).mean(axis=0) for a in (f, x))

@@ -54,13 +54,9 @@ class Channels:
             object.__setattr__(self, name, value)
         shapes = np.shape(self.points), np.shape(self.directions)
         if shapes[0] != shapes[1] or len(shapes[0]) != 2 or shapes[0][1] != 3:
-            raise ConfigError(
-                f"points {shapes[0]}, directions {shapes[1]}: needed are (k, 3) of both."
-            )
+            raise ConfigError(f"points {shapes[0]}, directions {shapes[1]} must be (k, 3) both.")
         if not np.linalg.norm(self.directions, axis=1).all():
-            raise ConfigError(
-                "a channel has a direction of length zero; give one, such as (0, 0, 1)."
-            )
+            raise ConfigError("a direction of a channel has length zero; give one as (0, 0, 1).")
         self._name_bodies(shapes[0][0])
 
     def _name_bodies(self, k: int) -> None:
@@ -255,7 +251,7 @@ class Responses:
         wanted = (f.size, len(np.asarray(self.sensors.points)), len(np.asarray(self.inputs.points)))
         if self.H.shape != wanted:
             raise ConfigError(
-                f"H is {self.H.shape}, needed are lines, sensors and inputs {wanted}.",
+                f"H is {self.H.shape}, needed are lines, sensors, inputs {wanted}.",
             )
         one_each("quantities", len(self.quantities), "sensors", wanted[1])
         c = finite("coherence", self.coherence, None)
@@ -277,9 +273,7 @@ class Responses:
         """See that noise of forces and the estimator are such."""
         noise, one = finite("force_noise", self.force_noise, None), np.ndim(self.force_noise) == 0
         if not one and noise.shape != self.H.shape[::2]:
-            raise ConfigError(
-                f"force_noise {noise.shape} must be one number or {self.H.shape[::2]}."
-            )
+            raise ConfigError(f"force_noise {noise.shape} must be a number or {self.H.shape[::2]}.")
         if not (noise >= 0).all():
             least = self.force_noise if one else float(noise.min())
             raise ConfigError(f"force_noise = {least} must be zero or more.")

@@ -89,9 +89,7 @@ def responses(
     """
     here = model.at(p)
     if not set(inputs) <= set(range(len(here.sensors))) or not np.isfinite(omega).all():
-        raise ConfigError(
-            f"inputs = {inputs} must be sensors from 0 to {len(here.sensors) - 1}, omega finite."
-        )
+        raise ConfigError(f"inputs = {inputs} must be 0 to {len(here.sensors) - 1}, omega finite.")
     return _receptance(here, modal(here, zeta), omega, inputs)
 
 

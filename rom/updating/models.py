@@ -120,7 +120,7 @@ class AtSensors:
             K_oo = cho_factor(model.K[np.ix_(o, o)])
         except LinAlgError as error:
             raise ModelError(
-                "held at its sensors, the structure must not move: it needs more of them."
+                "held at its sensors it still moves; it needs more of them."
             ) from error
         T = np.zeros((len(model.K), s.size))
         T[s], T[o] = np.eye(s.size), -cho_solve(K_oo, model.K[np.ix_(o, s)])
@@ -157,17 +157,11 @@ class Measurement:
     def __post_init__(self) -> None:
         if np.ndim(self.H) != 3 or self.H.shape[::2] != (len(self.omega), len(self.inputs)):
             n = (len(self.omega), len(self.inputs))
-            raise ConfigError(
-                f"H is {np.shape(self.H)} for {n[0]} lines, {n[1]} exciters, needed is one each."
-            )
+            raise ConfigError(f"H is {np.shape(self.H)}, needed are {n[0]} lines, {n[1]} exciters.")
         if not np.isfinite(self.H).all() or not np.abs(self.H).min() > 0:
-            raise ConfigError(
-                "H has entries that are zero or not finite: a dead channel; leave it out."
-            )
+            raise ConfigError("H is zero or not finite somewhere: a dead channel; leave it out.")
         if not set(self.inputs) <= set(range(self.H.shape[1])):
-            raise ConfigError(
-                f"inputs = {self.inputs} must be sensors from 0 to {self.H.shape[1] - 1}."
-            )
+            raise ConfigError(f"inputs = {self.inputs} must be from 0 to {self.H.shape[1] - 1}.")
         w = np.shape(self.weights)
         if w not in ((), self.H.shape, (len(self.omega), 1, 1)):
             raise ConfigError(f"weights {w} must be one number, or of the shape {self.H.shape}.")

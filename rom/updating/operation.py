@@ -292,7 +292,7 @@ def stress_rows(
         n = int(far.argmin())
         if far[n] > reach:
             raise ConfigError(
-                f"{what} {k} at {x.tolist()} is {far[n]:.3g} m off the body, at most {reach:.3g}."
+                f"{what} {k} is {far[n]:.3g} m off the body; at most {reach:.3g} m may be."
             )
         a, b, c = d / np.linalg.norm(d)
         along = np.array([a * a, b * b, c * c, 2 * b * c, 2 * a * c, 2 * a * b])

@@ -140,9 +140,7 @@ class ParameterTracker:
             ParameterError: for a name that is not tracked, or a factor that is not positive.
         """
         if wrong := set(factors) - set(self.names):
-            raise ParameterError(
-                f"{named(sorted(wrong))} must be of what is tracked: {named(self.names)}."
-            )
+            raise ParameterError(f"{named(sorted(wrong))} must be of {named(self.names)}.")
         x = np.log([positive(name, factors.get(name, 1.0)) for name in self.names])
         return linear_tracker(self.operation, x, self.assumed, self.sensors, self.wanted)
 

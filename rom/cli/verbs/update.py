@@ -181,9 +181,7 @@ def run(args: argparse.Namespace) -> Answer:
     test = replace(test, **{name: value for name, value in noise.items() if value is not None})
     outside = _outside(args, family)
     if wrong := sorted(set(args.candidate) - set(outside)):
-        raise ConfigError(
-            f"--candidate {wrong[0]} must have the name of a --spring, --joint or --mass."
-        )
+        raise ConfigError(f"--candidate {wrong[0]} must name a --spring, --joint or --mass.")
     prior = unique(args.prior, "--prior")
     prior = {name: typed_number("--prior", text) for name, text in prior.items()}
     found = update(
@@ -280,9 +278,7 @@ def _place(option: str, text: str, bodies: Collection[str]) -> Any:
     for name in bodies:
         if text.startswith(f"{name}."):
             return name, text.removeprefix(f"{name}.")
-    raise ConfigError(
-        f"{option} {text!r} must be BODY.INTERFACE, of one of the bodies {named(bodies)}."
-    )
+    raise ConfigError(f"{option} {text!r} must be BODY.INTERFACE, of {named(bodies)}.")
 
 
 def _held(args: argparse.Namespace, family: "Family") -> tuple[Any, ...]:
@@ -464,9 +460,7 @@ def _outside(args: argparse.Namespace, family: "Family") -> "Attached":
                             ("--mass", args.mass)):  # fmt: skip
         for name, text in unique(several, option).items():
             if name in found:
-                raise ConfigError(
-                    f"{option} {name} has the name of another one; give it one of its own."
-                )
+                raise ConfigError(f"{option} {name} needs a name of its own.")
             at, value, low, high = _parts(option, text)
             places = [_place(option, part, bodies) for part in at.split(",")]
             if len(places) != (n := 1 + (option == "--joint")):

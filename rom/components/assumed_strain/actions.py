@@ -301,7 +301,7 @@ def _faces(tool: Tool) -> Array:
     length = np.linalg.norm(along, axis=1)
     if not length.min() > 0:
         raise ConfigError(
-            f"tool {tool.name!r}: a corner of the outline is named twice; leave one out."
+            f"tool {tool.name!r}: a corner of the outline is there twice; use it once."
         )
     t = along / length[:, None]
     turn = np.roll(t, -1, axis=0)

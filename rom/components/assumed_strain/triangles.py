@@ -164,9 +164,7 @@ def _opposite(T: Index) -> Index:
     corner, t = T.T.ravel(), len(T)
     _, place, count = np.unique(sides, axis=0, return_inverse=True, return_counts=True)
     if count.max() > 2:
-        raise MeshError(
-            f"a side belongs to {count.max()} triangles: the sheet branches, at most two may."
-        )
+        raise MeshError(f"a side belongs to {count.max()} triangles; at most two may meet.")
     order = np.argsort(place.ravel(), kind="stable")
     twin = np.flatnonzero(np.diff(place.ravel()[order]) == 0)
     found = np.full(3 * t, -1)
@@ -212,9 +210,7 @@ def rectangle(
         ConfigError: for fewer than one division, other corners, or another way to split.
     """
     if min(n) < 1 or diagonal not in ("/", "\\", "x"):
-        raise ConfigError(
-            f'n = {n}, diagonal = {diagonal!r}: at least one, and "/", "\\\\" or "x".'
-        )
+        raise ConfigError(f'n = {n}, diagonal = {diagonal!r}: at least 1, and "/", "\\\\" or "x".')
     s, t = (np.linspace(0, 1, k + 1) for k in n)
     C = finite("corners", corners, (4, 2))
     a, b = (x.ravel() for x in np.meshgrid(s, t))

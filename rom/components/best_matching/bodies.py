@@ -61,9 +61,7 @@ class Bodies:
         if self.mass.ndim != 1 or self.mass.size < 2 or not (self.mass > 0).all():
             raise ConfigError(f"mass = {self.mass.tolist()}: needed are two or more masses > 0.")
         if not self.degree < 0:
-            raise ConfigError(
-                f"degree = {self.degree:g}: it must be negative, so that bodies attract."
-            )
+            raise ConfigError(f"degree = {self.degree:g}: it must be negative, to attract.")
 
     def potential(self, x: Array) -> float:
         """Potential energy of the configuration (n, 3) [1].
@@ -180,9 +178,7 @@ class Bodies:
         x = self._placed(x)
         i, j = np.triu_indices(len(x), 1)
         if not np.abs(x[i] - x[j]).max(axis=1).min() > 0:
-            raise ModelError(
-                "two bodies are in the same place: their attraction has no limit; take others."
-            )
+            raise ModelError("two bodies are in the same place; they must be apart to attract.")
         return x
 
 

@@ -133,9 +133,7 @@ def _turn_in_plane(C: Array) -> Array:
     c, s = C[0, 0] + C[1, 1], C[1, 0] - C[0, 1]
     length = np.hypot(c, s)
     if length <= ON_ITSELF * np.abs(C).max():
-        raise ModelError(
-            "no rotation in the plane is better than all others: needed are other shapes."
-        )
+        raise ModelError("no rotation in the plane is better than all others; use other shapes.")
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, length]]) / length
 
 

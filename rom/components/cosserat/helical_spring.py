@@ -55,7 +55,7 @@ class HelicalSpring:
             positive(f"{name} of a spring", value, error=ModelError)
         if self.diameter <= self.wire:
             raise ModelError(
-                f"wire = {self.wire:g} m must be thinner than diameter = {self.diameter:g} m."
+                f"wire = {self.wire:g} m must be below diameter = {self.diameter:g} m."
             )
         if self.length <= self.solid_length:
             raise ModelError(f"free length {self.length:g} m is not above the solid length "

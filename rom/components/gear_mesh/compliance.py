@@ -108,9 +108,7 @@ def normal_section(pair: GearPair) -> GearPair:
         ISO 6336-1 and ISO 21771: virtual spur gears.
     """
     if not isinstance(pair, GearPair) or pair.internal:
-        raise ModelError(
-            "the compliance of racks and internal teeth is not known here; give numbers."
-        )
+        raise ModelError("compliances of racks and internal teeth are not known; give numbers.")
     if pair.helix == 0.0:
         return pair
     teeth: Any = tuple(z / (np.cos(pair.base_helix) ** 2 * np.cos(pair.helix)) for z in pair.teeth)

@@ -89,9 +89,7 @@ class Mesh:
     def __post_init__(self) -> None:
         k = np.atleast_1d(np.asarray(self.stiffness, dtype=float))
         if not isinstance(self.pair, GearPair) or self.pair.internal:
-            raise ModelError(
-                "meshes of internal gears and racks are elements; use Mechanism.gear_mesh."
-            )
+            raise ModelError("internal gears and racks are for elements; use Mechanism.gear_mesh.")
         if self.correction.measured:
             raise ModelError("maps and run-out are for elements; use Mechanism.gear_mesh.")
         if not (k.size and np.isfinite(k).all() and (k > 0).all()):

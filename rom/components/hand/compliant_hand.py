@@ -69,9 +69,7 @@ class Finger:
             raise ModelError(f"{len(self.springs)} springs and {len(self.phalanges)} phalanges.",
                              hint="Each spring carries one phalanx.")  # fmt: skip
         if min(self.phalanges[:-1], default=1.0) <= 0 or self.phalanges[-1] < 0:
-            raise ModelError(
-                f"phalanges of {self.phalanges} m: all must be positive, the last at least zero."
-            )
+            raise ModelError(f"phalanges of {self.phalanges} m: they must be > 0, the last >= 0.")
 
     @cached_property
     def joints(self) -> tuple[tuple[int, int, int, int], ...]:

@@ -88,9 +88,7 @@ def hold(mech: Mechanism, name: str, held: Held, *, law: Impact = SKIN_CONTACT,
     positive("radius", held.radius)
     phalanges = [part for part in mech.parts.values() if "distal" in part.points]
     if not phalanges:
-        raise ConfigError(
-            f"nothing can hold {name!r}: the mechanism needs fingers of `moving_hand`."
-        )
+        raise ConfigError(f"nothing holds {name!r}: the mechanism needs fingers of `moving_hand`.")
     pieces = [(matrix(bone.p)[:, 2], float(np.linalg.norm(bone.points["distal"])))
               for bone in phalanges]  # fmt: skip
     face, normal = _palm_face(mech)

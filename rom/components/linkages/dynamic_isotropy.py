@@ -98,9 +98,7 @@ def checked(ranges: Ranges) -> Ranges:
     """
     for r in ranges:
         if r is not None and not (np.isfinite(r).all() and r[0] < r[1]):
-            raise ConfigError(
-                f"a range {r!r} must be (low, high) with low < high, or None for a turn."
-            )
+            raise ConfigError(f"a range {r!r} must be (low, high), low < high, or None for a turn.")
     return ranges
 
 

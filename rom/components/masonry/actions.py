@@ -201,12 +201,10 @@ class SupportMotion:
         for stone in self.stones:
             if stone not in masonry.held:
                 raise ConfigError(
-                    f"{self.name} moves stone {stone}, which must be held, as {masonry.held} are."
+                    f"{self.name} moves {stone}, which must be of the held {masonry.held}."
                 )
             if stone not in touched:
-                raise ConfigError(
-                    f"{self.name} moves stone {stone}, which must support another one."
-                )
+                raise ConfigError(f"{self.name} moves stone {stone}, which must support another.")
         if abs(values_at(self.name, self.history, np.zeros(1))[0]) > 0.0:
             raise ConfigError(
                 f"{self.name} begins away from where its stones lie.",
@@ -358,9 +356,7 @@ def _vector(name: str, x: tuple[float, float]) -> Array:
 def _moving(name: str, stone: int, masonry: Masonry) -> int:
     whole(f"stone of {name}", stone, 0, len(masonry.stones) - 1)
     if stone in masonry.held:
-        raise ConfigError(
-            f"{name} acts on stone {stone}, which is held and would not feel it; take another one."
-        )
+        raise ConfigError(f"{name} acts on stone {stone}, which is held; take another one.")
     return stone
 
 

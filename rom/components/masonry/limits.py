@@ -149,9 +149,7 @@ def wall(
     """
     rock, (b, h) = rock or Rock(), brick
     if not (length > 0 and courses >= 1 and min(brick) > 0):
-        raise ConfigError(
-            f"no wall is {length} m long with {courses} courses of {brick}; all must be > 0."
-        )
+        raise ConfigError(f"no wall is {length} m long with {courses} courses of {brick}; use > 0.")
     for opening in openings:
         left, right, low, top = opening
         if not (0 < left < right < length and 0 <= low <= top < courses):
@@ -225,9 +223,7 @@ def load_factor(masonry: Masonry, loads: Sequence[Load], *, t: float = 0.0) -> f
     system, load = _joint_forces(masonry), _applied(masonry, loads, t)
     found = _solve(system, system.weight, load[:, None])
     if found.status == 2:
-        raise ConfigError(
-            "the masonry does not stand under its own weight; it needs more thickness or friction."
-        )
+        raise ConfigError("the masonry does not stand by itself; it needs thickness or friction.")
     if found.status not in (0, 3):
         raise SolverError(f"no load factor: {found.message}")
     return float(found.x[-1]) if found.status == 0 else np.inf

@@ -113,9 +113,7 @@ def _corners(outline: npt.ArrayLike) -> Array:
         raise ModelError(f"an outline must have at least three corners, got {len(x)}.")
     sides = np.linalg.norm(np.roll(x, -1, axis=0) - x, axis=1)
     if not sides.all():
-        raise ModelError(
-            f"corner {int(sides.argmin())} of a stone is listed twice in turn; leave one out."
-        )
+        raise ModelError(f"corner {int(sides.argmin())} is listed twice in turn; leave one out.")
     y = np.roll(x, -1, axis=0)
     area = float((x[:, 0] * y[:, 1] - x[:, 1] * y[:, 0]).sum() / 2)
     if not area > 0:
@@ -206,9 +204,7 @@ class Masonry:
                 ">= 0."
             )
         if not set(self.held) <= set(range(len(self.stones))):
-            raise ConfigError(
-                f"held = {self.held} must be stones from 0 to {len(self.stones) - 1}."
-            )
+            raise ConfigError(f"held = {self.held} must be of stones 0 to {len(self.stones) - 1}.")
         if len(set(self.held)) == len(self.stones):
             raise ConfigError(
                 f"all of {len(self.stones)} stones are held.", hint="Leave one free to move."

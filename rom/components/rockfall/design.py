@@ -138,9 +138,7 @@ def capacity_heights(g: Gallery, boulders: Any, **allowed: float) -> Array:
         ConfigError: for a mass that is not positive, or a gallery that bears anything.
     """
     if not (g.cushion.limit < np.inf or g.shear.capacity < np.inf or g.slab.capacity < np.inf):
-        raise ConfigError(
-            "the gallery bears anything: it needs a limit of the cushion or a capacity."
-        )
+        raise ConfigError("the gallery bears anything: it needs a limit or a capacity.")
     found = []
     for m in boulders:
 

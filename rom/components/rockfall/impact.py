@@ -56,9 +56,7 @@ class Slab:
         if not (np.isfinite(self.phi).all() and np.isfinite(self.omega).all()):
             raise ModelError("the modes of the slab must be finite.")
         if not np.any(self.phi):
-            raise ModelError(
-                "no mode of the slab moves under the plug; choose another place of it."
-            )
+            raise ModelError("no mode of the slab moves under the plug; choose another place.")
         if not (self.capacity > 0 and 0 <= self.damping < np.inf):
             raise ModelError(
                 f"capacity = {self.capacity} N, damping = {self.damping}: needed are capacity > 0, "

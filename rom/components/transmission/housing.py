@@ -87,9 +87,7 @@ class Housing:
             ModelError: naming what is missing, or does not fit.
         """
         if self.M.shape != self.K.shape or self.M.shape != (self.n, self.n):
-            raise ModelError(
-                f"mass {self.M.shape} and stiffness {self.K.shape} must be ({self.n}, {self.n})."
-            )
+            raise ModelError(f"M {self.M.shape} and K {self.K.shape} must be ({self.n}, {self.n}).")
         for name, held, there in zip(("pinion", "gear"), bearings, self.bushes, strict=True):
             if set(held) != set(there):
                 raise ModelError(

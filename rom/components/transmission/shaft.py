@@ -77,9 +77,7 @@ class Shaft:
         z = np.asarray(self.z, dtype=float)
         d, hole = (np.asarray(x, dtype=float) for x in (self.diameter, self.bore))
         if z.size < 2 or np.any(np.diff(z) <= 0) or np.any(d <= 0):
-            raise ModelError(
-                f"nodes at {z.tolist()} m must ascend, diameters {d.tolist()} m must be positive."
-            )
+            raise ModelError(f"z = {z.tolist()} must ascend, diameter = {d.tolist()} be positive.")
         if np.any(hole < 0) or np.any(hole >= d):
             raise ModelError(f"bores of {hole.tolist()} m must be smaller than {d.tolist()} m.")
         if any(not 0 <= disc.node < z.size for disc in self.discs):

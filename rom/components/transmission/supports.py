@@ -155,9 +155,7 @@ def _refuse_loose(shaft: Shaft, supports: Mapping[int, Support]) -> None:
 def _square(value: npt.ArrayLike) -> Array:
     given = np.asarray(value, dtype=float)
     if given.shape not in ((), (2, 2)):
-        raise ModelError(
-            f"a bearing needs a number or a (2, 2) matrix, not the shape {given.shape}."
-        )
+        raise ModelError(f"a bearing needs a number or (2, 2) matrix, not the shape {given.shape}.")
     return given * np.eye(2) if given.ndim == 0 else given
 
 

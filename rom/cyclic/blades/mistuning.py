@@ -83,9 +83,7 @@ class MistunedWheel:
         delta = np.asarray(deviations, dtype=float)
         N = self.sector.n_sectors
         if delta.shape[-1:] != (N,) or not np.isfinite(delta).all() or delta.min() <= -1.0:
-            raise ConfigError(
-                f"deviations of the shape {delta.shape}; give {N} numbers above -1, one per blade."
-            )
+            raise ConfigError(f"deviations {delta.shape}; give {N} above -1, one per blade.")
         waves = np.fft.ifft(delta, axis=-1)  # 1/N sum_j delta_j exp(+i k j alpha)
         k = (self.harmonics[None, :] - self.harmonics[:, None]) % N
         return waves[..., k] * self.blade + np.diag(self.omega**2)

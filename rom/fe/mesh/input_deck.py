@@ -181,7 +181,5 @@ def _check_names(names: Iterable[str]) -> None:
                 hint="It begins with a letter, followed by at most 79 letters, digits, _, - or .",
             )
         if name.upper() in seen:
-            raise TagError(
-                f"{name!r} names two sets; use another name, decks have no small letters."
-            )
+            raise TagError(f"{name!r} names two sets; use another, decks have no small letters.")
         seen.add(name.upper())

@@ -58,14 +58,10 @@ def _refuse(mesh: SolidMesh, bad: Mask, text: Callable[[int], str], hint: str) -
 
 def _check_tables(mesh: SolidMesh) -> None:
     if mesh.cell_type not in CELL_TYPES:
-        raise MeshError(
-            f"cells of type {mesh.cell_type!r} are not supported; known are {sorted(CELL_TYPES)}."
-        )
+        raise MeshError(f"{mesh.cell_type!r} is no type of cells; known are {sorted(CELL_TYPES)}.")
     kind, m = mesh.kind, mesh.cells.shape[0]
     if not m:
-        raise MeshError(
-            "there are no volume cells; mesh the geometry in 3D, or use its .geo or .step file."
-        )
+        raise MeshError("there are no volume cells; mesh in 3D, or give the .geo or .step file.")
     shapes = {
         "points": (mesh.points.shape[1:], (3,)),
         "cells": (mesh.cells.shape[1:], (kind.n_nodes,)),

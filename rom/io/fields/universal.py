@@ -67,7 +67,7 @@ class Function:
             raise ConfigError(f"{_name(self)}: the function must be a response to a force.")
         if self.numerator not in PER_RECEPTANCE:
             raise ConfigError(
-                f"{_name(self)}: numerator {self.numerator} must be of {sorted(PER_RECEPTANCE)}."
+                f"{_name(self)}: {self.numerator} must be of {sorted(PER_RECEPTANCE)}."
             )
         power = PER_RECEPTANCE[self.numerator]
         if power and not self.x.all():

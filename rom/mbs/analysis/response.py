@@ -144,9 +144,7 @@ def transmissibility(
 
 def _refuse_moving(state: State) -> None:
     if state.v.any():
-        raise ModelError(
-            "transmissibility needs a mechanism at rest; give the state of rom.equilibrium."
-        )
+        raise ModelError("transmissibility needs rest; give the state of rom.equilibrium.")
 
 
 @dataclass(frozen=True)

@@ -207,9 +207,7 @@ def _path(build: Builder, values: dict[str, float], name: str, state: State) -> 
         mechanism = build(**{**values, name: values[name] + sign * step})
         now = instant(mechanism, state.t)
         if (now.packed.q.size, now.W.value.size) != (state.q.size, state.lam.size):
-            raise ConfigError(
-                f"the mechanism must have the same bodies and joints for another {name!r}."
-            )
+            raise ConfigError(f"bodies and joints must be the same for another {name!r}.")
         now.W.base[:] = state.base
         sides.append((sign, mechanism, now))
     tangent = Tangent.of(instant(build(**values), state.t), state, AT_REST)

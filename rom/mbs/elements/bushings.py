@@ -112,9 +112,7 @@ def _matrix66(name: str, value: Any) -> Array:
             "mech.law, of which docs/laws.md has this one.",
         )
     if np.linalg.eigvalsh(A)[0] < -1e-9 * size:
-        raise ConfigError(
-            f"{name} must not be negative in any direction: it would drive the motion."
-        )
+        raise ConfigError(f"{name} must not be negative in a direction: it would drive the motion.")
     return 0.5 * (A + A.T)
 
 

@@ -139,9 +139,7 @@ def law(  # noqa: PLR0913  one keyword per property
 
 def _check_function(what: str, function: Any, name: str) -> None:
     if not callable(function) and not hasattr(function, "address"):
-        raise ConfigError(
-            f"{what} = {shortened(function)} of law {name!r} must be a function or have an address."
-        )
+        raise ConfigError(f"{what} = {shortened(function)} of {name!r} must be a function.")
 
 
 def user_force(

@@ -243,7 +243,7 @@ def _check(name: str, body: Any) -> None:
     for group in body.elements:
         if group.frames.ndim != 2 or len(group.frames) != len(group.numbers):
             raise ModelError(
-                "frames (e, k) and numbers of elements must be of the same number e.", where=name
+                "frames (e, k) and numbers must be of the same e elements.", where=name
             )
         if group.frames.min(initial=0) < 0 or group.frames.max(initial=0) >= n:
             raise ModelError(f"elements must connect frames from 0 to {n - 1}.", where=name)

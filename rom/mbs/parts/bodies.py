@@ -101,9 +101,7 @@ class Part:
             check_known(place, self.names, f"body {self.name!r} has no marker {place!r}; it has")
             return Marker(self.name, place)
         if self.flexible is not None:
-            raise ConfigError(
-                f"body {self.name!r} is flexible; use one of its markers {sorted(self.names)}."
-            )
+            raise ConfigError(f"{self.name!r} is flexible; use its markers {sorted(self.names)}.")
         point = finite(f"marker of {self.name}", place, (3,))
         return Marker(self.name, (float(point[0]), float(point[1]), float(point[2])))
 

@@ -175,9 +175,7 @@ def frequencies(
     path = page.wanted(path)
     comparison = {support: table for support, table in comparison.items() if table["full"]}
     if not comparison:
-        raise ConfigError(
-            "there is no comparison of frequencies to draw; give a table of at least one support."
-        )
+        raise ConfigError("there is nothing to compare; give a table of one support.")
     caption = (
         "Relative error of the natural frequencies of the reduced body against the full finite "
         "element model, for each support of its interfaces; the dashed line is 0.1 %. Reduced "

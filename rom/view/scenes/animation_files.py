@@ -59,9 +59,7 @@ def write_animation(
         known = sorted(solution.mechanism.parts)
         raise ConfigError(f"shapes: no body {named(sorted(unknown))}; there are {known}.")
     if min(frames, solution.t.size) < 2 or (seconds is not None and not 0 < seconds < np.inf):
-        raise ConfigError(
-            f"a film needs at least 2 frames in more than 0 s, got {frames} in {seconds} s."
-        )
+        raise ConfigError(f"a film needs 2 frames in more than 0 s, got {frames} in {seconds} s.")
     steps = np.linspace(0, solution.t.size - 1, min(frames, solution.t.size)).round().astype(int)
     bodies = _bodies(solution, steps, shapes, magnify)
     t = solution.t[steps]

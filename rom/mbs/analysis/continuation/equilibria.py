@@ -315,9 +315,7 @@ class _March:
         if not length > 0.0:
             raise ConfigError("along needs a motion: all of it is zero.")
         if not self.low <= state.t <= self.high:
-            raise ConfigError(
-                f"the branch leaves at t = {state.t:g} s, which must be within the span."
-            )
+            raise ConfigError(f"the branch leaves at t = {state.t:g} s; it must be in the span.")
         return Point(self.still(state), state.t, step / length, 0.0)
 
     def still(self, state: State) -> State:

@@ -166,9 +166,7 @@ def multilobe(lobes: int, preload: float, *, first: float = 0.0) -> Callable[[Ar
         ModelError: for no arcs, or a preload that leaves no room.
     """
     if lobes < 1 or not 0 <= preload < 1:
-        raise ModelError(
-            f"{lobes} lobes with preload {preload}: needed are at least 1, and 0 <= preload < 1."
-        )
+        raise ModelError(f"lobes = {lobes} must be at least 1, preload = {preload} 0 to 1.")
     half = np.pi / lobes
 
     def bore(angles: Array) -> Array:

@@ -172,7 +172,7 @@ def _oil(name: str, oil: Oil | float, inlet: float | None) -> tuple[float, ...]:
             raise ConfigError(f"bearing {name!r} has an oil; give its inlet temperature.")
         if not float(oil.viscosity(number("inlet", inlet))) > 0.0:
             raise ConfigError(
-                f"inlet = {inlet} of bearing {name!r}: its oil boils before; give degrees Celsius."
+                f"inlet = {inlet} of {name!r}: the oil boils before; give degrees Celsius."
             )
         return (0.0, *oil.law(), oil.density, oil.heat, float(inlet))
     if inlet is not None:

@@ -53,9 +53,7 @@ class Hertz:
         """
         h = np.atleast_2d(np.asarray(self.depths, dtype=float))
         if h.ndim != 2 or h.shape[1] != 2 or not (np.isfinite(h).all() and (h > 0).all()):
-            raise ModelError(
-                f"depths {self.depths} of Hertz's contact must be (2,) or (n, 2), > 0."
-            )
+            raise ModelError(f"depths {self.depths} of Hertz's contact must be (2,) or (n, 2) > 0.")
         positive("E", self.E, error=ModelError)
         between("nu", self.nu, 0, 0.5, "[)", error=ModelError)
         share = np.linspace(0, 1, N_PLACES)

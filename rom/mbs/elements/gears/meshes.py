@@ -127,9 +127,7 @@ def gear_mesh(  # noqa: PLR0913  one keyword per property
             no gaps.
     """
     if not all(float(z).is_integer() for z in pair.teeth):
-        raise ConfigError(
-            f"the wheels of mesh {name!r} have {pair.teeth} teeth, needed are whole ones."
-        )
+        raise ConfigError(f"wheels of {name!r} have {pair.teeth} teeth, needed are whole ones.")
     self.check_apart(name, wheel_a, wheel_b)
     z = unit_vector(f"axis of {name}", axis)
     D = self.design_point(wheel_b) - self.design_point(wheel_a)

@@ -108,7 +108,7 @@ def _check_apart(name: str, k: int, ends: tuple[Place, Place], shift: float) -> 
     D = ends[1].x - ends[0].x
     if np.linalg.norm(D) <= 1e-12:
         raise ConfigError(
-            f"places {k + 1} and {k + 2} of tendon {name!r} are at one point; leave one out."
+            f"places {k + 1} and {k + 2} of {name!r} are at one point; leave one out."
         )
     for one in ends:
         n = one.axes[0]

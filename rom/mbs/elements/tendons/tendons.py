@@ -147,9 +147,7 @@ def tendon(  # noqa: PLR0913  one keyword per property
         stiffness, loss = positive("EA", EA), _not_negative(name, "damping", damping)
         slack = length / (1.0 + _not_negative(name, "pretension", pretension) / stiffness)
         if pretension and free_length is not None:
-            raise ConfigError(
-                f"tendon {name!r} has both a pretension and a free_length; give only one."
-            )
+            raise ConfigError(f"tendon {name!r} has pretension and free_length; give only one.")
         function, given = _free(slack, free_length)
         numbers = (stiffness, loss, given, speed)
     self.add(name, Tendon(stations, numbers, EA is None, function), TENDONS_FAMILY)
@@ -201,9 +199,7 @@ def _design_length(whole: Whole, name: str, stations: Sequence[Station]) -> floa
         ConfigError: for a path that is none.
     """
     if len(stations) < 2:
-        raise ConfigError(
-            f"the path of tendon {name!r} needs at least two places, got {len(stations)}."
-        )
+        raise ConfigError(f"tendon {name!r} needs at least two places, got {len(stations)}.")
     if stations[0].radius or stations[-1].radius:
         raise ConfigError(
             f"tendon {name!r} ends at a pulley.", hint="It is fixed at a marker at both ends."
