@@ -181,7 +181,7 @@ def finite(
     ):
         raise error(f"{name} has shape {array.shape}, needed is {shape_words(shape)}.")
     if not np.isfinite(array).all():
-        raise error(f"{name} = {shortened(array.tolist())} is not finite.")
+        raise error(f"{name} = {shortened(array.tolist())} is not finite; give finite numbers.")
     return array
 
 
@@ -206,7 +206,8 @@ def one_each(
         RomError: of that class, with both numbers.
     """
     if given != wanted:
-        raise error(f"{given} {what} for {wanted} {each}; give one for each.")
+        n, m = (x[0] if isinstance(x, tuple) and len(x) == 1 else x for x in (given, wanted))
+        raise error(f"{n} {what} for {m} {each}; give one for each.")
 
 
 def number(name: str, value: Any, *, error: type[RomError] = ConfigError) -> float:
@@ -288,7 +289,7 @@ def unit_quaternion(value: Any) -> Array:
         p = finite("orientation", value, (4,))
         if abs(np.linalg.norm(p) - 1.0) > 1e-3:
             raise ConfigError(
-                f"orientation {p.tolist()} must have length 1, not {np.linalg.norm(p):.6g}."
+                f"quaternion {p.tolist()} must have length 1, not {np.linalg.norm(p):.6g}."
             )
         return p / np.linalg.norm(p)
     A = finite("orientation", value, (3, 3))

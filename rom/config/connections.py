@@ -229,9 +229,11 @@ def _points(entry: Entry) -> None:
 
     x, values = entry.values["x"], entry.values["values"]
     if len(x) != len(values) or len(x) < 2:
-        raise entry.place.error(f"{entry.place.name} has {len(x)} lengths, {len(values)} values.")
+        raise entry.place.error(
+            f"{entry.place.name} needs two lengths or more, and as many values."
+        )
     if any(b <= a for a, b in pairwise(x)):
-        raise entry.place.at("x").error(f"the lengths of {entry.place.name} do not ascend.")
+        raise entry.place.at("x").error(f"the lengths of {entry.place.name} must ascend.")
     one, two = entry.ends
     force, potential = through_points(x, values, entry.values["interpolation"])
     line_law(entry.made, entry.name, one, two, force, potential)

@@ -375,7 +375,7 @@ PYTHON_MISTAKES = {
     "no Python": ("laws.py", "m.toml", "is no Python file"),
     "a file that fails": ("laws.py", "bad.py", "cannot be run: ZeroDivisionError"),
     "a file that leaves": ("laws.py", "exit.py", "cannot be run: SystemExit: 3, line 1"),
-    "no text": ('"laws.py"', "3", "= 3 is not a text"),
+    "no text": ('"laws.py"', "3", "= 3 must be a text"),
 }  # fmt: skip
 
 
@@ -405,7 +405,7 @@ MISTAKES = {
         '[motors.m]\njoint = "guide"\nlaw = { expression = "k", constants = { k = "2 foo" } }\n',
         "'foo' in 'foo' is no unit"),
     "number for a formula": ('[motors.m]\njoint = "guide"\nlaw = { expression = 3 }\n',
-                             "= 3 is not a text"),
+                             "= 3 must be a text"),
     "law without force": ('[laws.s]\nbetween = ["ground.wall", "block.p"]\n',
                           "kind is missing in [laws.s]"),
     "line without length": ('[laws.s]\nbetween = [{ ground = [1.1, 0, 0] }, "block.p"]\n'

@@ -380,9 +380,9 @@ def test_the_command_line_writes_fmus_of_mechanisms(folder, capsys):
     [
         (["crank.toml", "c.fmu", "--inputs", "gass"], "no input 'gass'"),
         (["crank.toml", "c.fmu", "--outputs", "slider.pine"], "no output 'slider.pine'"),
-        (["crank.toml", "c.vtu"], "c.vtu does not end in .fmu"),
+        (["crank.toml", "c.vtu"], "a unit is written as .fmu"),
         (["crank.toml", "c.fmu", "--held", "root"], "--held does not go with a .toml file"),
-        (["rod.rom.npz", "c.fmu", "--inputs", "gas"], "--inputs goes with the .toml file of a"),
+        (["rod.rom.npz", "c.fmu", "--inputs", "gas"], "--inputs needs the .toml file of a"),
         (["still.toml", "c.fmu"], "gives no dt, which an FMU needs"),
     ],
 )

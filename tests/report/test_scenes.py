@@ -227,7 +227,7 @@ def test_what_cannot_be_drawn_is_refused(body, solution):
         report.modes(replace(body, surface=None, stress=None))
     with pytest.raises(ConfigError, match="shapes: no body 'wheel'"):
         report.motion(solution, shapes={"wheel": sphere(4)})
-    with pytest.raises(ConfigError, match="no picture of the kinds"):
+    with pytest.raises(ConfigError, match="must be a picture of the kinds"):
         report.motion(solution, "none.png")
     with pytest.raises(ConfigError, match="are no two directions"):
         report.motion(solution, view=(0, 1, 0), up=(0, 1, 0))

@@ -82,5 +82,5 @@ def not_zero(name: str, value: float) -> float:
     """A finite number that is not zero."""
     x = number(name, value)
     if x == 0.0:
-        raise ConfigError(f"{name} must not be 0: it would lock the joint instead of coupling it.")
+        raise ConfigError(f"{name} = 0 would lock the joint instead of coupling it; give another.")
     return x

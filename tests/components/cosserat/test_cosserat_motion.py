@@ -266,7 +266,7 @@ def test_the_tangent_of_inertia_is_the_derivative_of_its_forces():
 
 def test_bad_runs_are_refused_and_lost_ones_kept():
     one = straight(1.0, 4, stretch=1e3, bend=1.0, mass=1.0, inertia=1e-3)
-    with pytest.raises(ConfigError, match=r"rho_inf=1\.5 is no run"):
+    with pytest.raises(ConfigError, match=r"rho_inf = 1\.5 must be"):
         simulate(one, 1.0, 0.1, rho_inf=1.5)
     with pytest.raises(SolverError, match="step 1 at 10 s did not converge") as error:
         simulate(one, 100.0, 10.0, load=loads(one, tip=(1e4, 0, 0)))

@@ -114,7 +114,7 @@ GAP = np.r_[T[:20], T[30:]]
         (lambda: History(T - 0.01, T), ConfigError, "t >= 0"),
         (lambda: History(T, T[1:]), ConfigError, "as many times as values"),
         (lambda: History(T[:5], T[:5]), ConfigError, "8 at least"),
-        (lambda: History(T, 0 * T), ConfigError, "history of zeros"),
+        (lambda: History(T, 0 * T), ConfigError, "history needs values"),
         (lambda: History(T, T, deviation=-1.0), ConfigError, "not positive"),
         (lambda: calibrate(FIRST, {}), ConfigError, "nothing is measured"),
         (lambda: calibrate(FIRST, {"hue": History(T, T)}), ConfigError, "'hue' is no channel"),

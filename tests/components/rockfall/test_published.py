@@ -161,7 +161,7 @@ def test_sand_bears_as_vesic_says(degrees, factor):
         (lambda: calibrate(
             full_size(Cushion(1e6)),
             {"deflection": History(np.arange(9.0), np.ones(9))}, ["strength of the cushion"],
-        ), "only a Layer"),
+        ), "needs a cushion of type Layer"),
     ],
 )  # fmt: skip
 def test_bad_numbers_are_named(make, words):

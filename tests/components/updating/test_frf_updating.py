@@ -442,14 +442,14 @@ def test_a_wing_alone_is_a_free_beam():
         (lambda: AtSensors(BEAM.in_basis(np.eye(48)[:, ::-1] * 2)).at(START), "no dofs"),
         (lambda: modal(BEAM, np.ones(60)), "60 damping ratios"),
         (lambda: Measurement(OMEGA, EXACT, (2, 8)), r"inputs = \(2, 8\) of the sensors 0 to 7"),
-        (lambda: measured(weights=np.ones(7)), r"weights \(7,\) fit neither"),
+        (lambda: measured(weights=np.ones(7)), r"weights \(7,\) must be"),
         (lambda: responses(BEAM, START, GUESS, OMEGA, (2, 99)), r"inputs = \(2, 99\)"),
-        (lambda: responses(BEAM, START, GUESS, OMEGA * np.nan, (2,)), "at finite omega"),
+        (lambda: responses(BEAM, START, GUESS, OMEGA * np.nan, (2,)), "omega finite"),
         (lambda: update_by_output(BEAM, measured(), START, -GUESS), "ratios to start from"),
         (lambda: update_by_output(BEAM, measured(), START[:3], GUESS), "9 of them"),
         (
             lambda: update_by_output(BEAM, Measurement(OMEGA, EXACT[:, :5], (2, 4)), START, GUESS),
-            "8 sensors, the test 5",
+            "8 sensors of the model for 5 of the test",
         ),
         (lambda: response_function_method(BEAM, measured(), START, np.eye(3)), "3\\) for 48 dofs"),
         (lambda: response_function_method(BEAM, measured(), START, BEAM.K, steps=0), "0 steps"),
@@ -457,7 +457,7 @@ def test_a_wing_alone_is_a_free_beam():
         (lambda: data.noisy(EXACT, -0.1, np.random.default_rng(0)), "level = -0.1"),
         (lambda: data.random_error(0.5, 0), "n_averages = 0"),
         (lambda: data.beside_poles(OMEGA, [1.0, 2.0], [0.1], 30.0), "2 poles"),
-        (lambda: data.frac(EXACT, EXACT[:3]), "cannot be compared"),
+        (lambda: data.frac(EXACT, EXACT[:3]), "for .* others"),
     ],
 )
 def test_wrong_input_is_named(change, message):

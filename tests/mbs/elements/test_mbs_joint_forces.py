@@ -424,7 +424,7 @@ WRONG = {
                              "coulomb of friction 's' is -1"),
     "pin without radius": (lambda m: m.friction("s", "axle", mu=0.1, transition_speed=1), "radius"),
     "way with radius": (lambda m: m.friction("s", "tube", coordinate="way", radius=1, mu=0.1,
-                                             transition_speed=1), "has no radius"),
+                                             transition_speed=1), "leave radius out"),
     "less at rest": (lambda m: m.friction("s", "axle", static=0.5, transition_speed=1), "static"),
     "static alone": (lambda m: m.friction("s", "axle", static=2, transition_speed=1), "stribeck"),
     "jump": (lambda m: m.friction("s", "axle", coulomb=1, transition_speed=0), "transition_speed"),

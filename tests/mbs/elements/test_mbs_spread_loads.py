@@ -165,7 +165,7 @@ def test_messages():
     mech = rom.Mechanism()
     part = mech.add_flexible("one", body)
     load = rom.mass_load(body, (0, 0, 1.0))
-    with pytest.raises(ConfigError, match="either a pressure, a traction or forces"):
+    with pytest.raises(ConfigError, match="exactly one of pressure, traction and forces"):
         rom.surface_load(body, pressure=1.0, traction=(0, 0, 1))
     with pytest.raises(ConfigError, match="chooses no triangle of the 4"):
         rom.surface_load(body, pressure=1.0, where=lambda points: points[:, 0] > 1e9)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from rom.arguments import not_negative, positive, typed, unit_vector
+from rom.arguments import not_negative, positive, typed, unit_vector, whole
 from rom.errors import ConfigError
 from rom.mbs.elements.family import Family, Places, integers, rows_of, starts
 from rom.mbs.elements.pair_motion import followed_angle
@@ -153,18 +153,18 @@ def tendon(  # noqa: PLR0913  one keyword per property
     self.add(name, Tendon(stations, numbers, EA is None, function), TENDONS_FAMILY)
 
 
-def _station(whole: Whole, name: str, place: Any, friction: float) -> Station:
+def _station(mechanism: Whole, name: str, place: Any, friction: float) -> Station:
     """A place of the path in the axes of its marker."""
     mu = _not_negative(name, "friction", getattr(place, "friction", friction))
     if isinstance(place, Marker):
-        whole.check_markers(name, place)
+        mechanism.check_markers(name, place)
         return Station(place, np.eye(3)[:2], 0.0, mu, 0)
-    whole.check_markers(name, place.marker)
+    mechanism.check_markers(name, place.marker)
     whole(f"turns of a pulley of {name!r}", place.turns, 0, MAX_TURNS)
     n = unit_vector(f"axis of a pulley of {name}", place.axis)
     e = np.cross(n, np.eye(3)[np.argmin(np.abs(n))])
     e /= np.linalg.norm(e)
-    axes = np.array([n, e]) @ matrix(whole.part(place.marker.body).p)
+    axes = np.array([n, e]) @ matrix(mechanism.part(place.marker.body).p)
     return Station(place.marker, axes, positive("radius", place.radius), mu, place.turns)
 
 

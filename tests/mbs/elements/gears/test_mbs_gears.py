@@ -291,7 +291,7 @@ def test_wheels_pressed_into_each_other_are_named():
 
 
 WRONG = [
-    ({"axis": (0, 0, 0)}, "axis of mesh 'mesh' is zero"),
+    ({"axis": (0, 0, 0)}, "axis of mesh has length zero"),
     ({"stiffness": []}, "stiffness of the teeth of 'mesh'"),
     ({"cells": 0}, "cells = 0 of mesh 'mesh'"),
     ({"correction": Correction(pitch=((0.0, 1.0), ()))}, "2 pitch errors of .*'mesh' for 26"),
