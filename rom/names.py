@@ -166,7 +166,7 @@ def check_once(names: Iterable[object], what: str, error: type[RomError] = Confi
         RomError: of that class, naming them.
     """
     if twice := [name for name, n in Counter(names).items() if n > 1]:
-        raise error(f"{what} {named(twice)} occurs more than once; give each one once.")
+        raise error(f"{what} {named(twice)} is given twice; keep one of them.")
 
 
 def check_known(

@@ -64,8 +64,8 @@ def test_units_are_those_named(capsys):
 
 FAULTS = {
     "no nodes": (CALCULIX[:3], "--mass needs --nodes"),
-    "nodes without mass": ((CALCULIX[0], *CALCULIX[3:]), "--nodes goes with --mass"),
-    "units without mass": (("x.geo", "--units", "SI"), "--units goes with --mass"),
+    "nodes without mass": ((CALCULIX[0], *CALCULIX[3:]), "--nodes needs --mass"),
+    "units without mass": (("x.geo", "--units", "SI"), "--units needs --mass"),
     "material twice": ((*CALCULIX, "--rho", "1"), "--rho is for geometries"),
     "scale": ((*CALCULIX, "--scale", "1e-3"), "--scale is for geometries"),
     "parameter": ((*CALCULIX, "-p", "lc=1"), "--parameter is for geometries"),
@@ -73,8 +73,8 @@ FAULTS = {
     "no set": ((*NASTRAN, "--fixed", "root"), "which nodes are the interface 'root'?",
                "--set root=11-14,20"),
     "set of nobody": ((*CALCULIX, "--set", "pin=12"), "--set pin is no interface"),
-    "set twice": ((*CALCULIX, "--set", "a=3", "--set", "a=7", "--fixed", "a"), "--set a is given"),
-    "unknown node": ((*CALCULIX, "--set", "a=3-4", "--fixed", "a"), "'a' has no nodes, or unknown",
+    "set twice": ((*CALCULIX, "--set", "a=3", "--set", "a=7", "--fixed", "a"), "--set 'a' is given"),
+    "unknown node": ((*CALCULIX, "--set", "a=3-4", "--fixed", "a"), "'a' needs nodes of the model",
                      "[4]"),
     "label": ((*CALCULIX, "--set", "a=3-x", "--fixed", "a"), "'3-x' must be a label"),
     "range": ((*CALCULIX, "--set", "a=7-3", "--fixed", "a"), "'7-3' must be a label"),

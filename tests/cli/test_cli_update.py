@@ -327,7 +327,7 @@ def test_families_that_are_no_assembly_are_named(bolted, capsys):
         assert main(["update", "bolted.h5", *words]) == 2
         assert message in capsys.readouterr().err
 
-    refused(HALVES[:2] * 2, "--family frame is given twice")
+    refused(HALVES[:2] * 2, "--family 'frame' is given twice")
     refused([*HALVES, *JOINT, "--spring", "q=tip:1,1,1:1:2"], "'tip' must be BODY.INTERFACE")
     refused([*HALVES[:4], "--fixed", "root"], "--fixed 'root' must be BODY.INTERFACE, of")
     refused([*HALVES, "--joint", "q=frame.tip:1,1,1:1:2"], "lies between 1 places")

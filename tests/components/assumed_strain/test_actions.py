@@ -468,7 +468,7 @@ ABOVE = box((-1, 1), (2, 2))
         ({"tools": [Tool("pad", ABOVE, 0.0, np.sin)]}, ConfigError, r"'pad': .*\(257,\), not"),
         ({"tractions": [Traction([(0, 4)], 1.0)]}, ConfigError, "the side 0-4 is not an outer"),
         ({"tractions": [Traction([(1, 0)], 1.0)]}, ConfigError, "solid on the left"),
-        ({"tractions": [Traction([(0, 1)], np.inf)]}, ConfigError, "traction 0 is not finite"),
+        ({"tractions": [Traction([(0, 1)], np.inf)]}, ConfigError, "traction 0 needs finite"),
     ],
 )  # fmt: skip
 def test_actions_that_do_not_fit_are_named(actions, error, words):

@@ -365,7 +365,7 @@ BAD = [
     ({"coupling": -1e-3}, "mesh 'mesh' and its width = -0.001 must"),
     ({"coupling": 1.0}, "at least 0 and at most 0.03"),
     ({"conservative": True}, "energy of mesh 'mesh' would jump"),
-    ({"hertz": Hertz((1e-3, -1e-3))}, "depths .* above 0"),
+    ({"hertz": Hertz((1e-3, -1e-3))}, "depths .* > 0"),
     ({"hertz": Hertz((1e-3, 1e-3), E=-1.0)}, "E = -1 must be positive"),
 ]
 
