@@ -155,16 +155,7 @@ def offered(names: Iterable[object], wanted: object = "") -> str:
 
 
 def check_once(names: Iterable[object], what: str, error: type[RomError] = ConfigError) -> None:
-    """Refuse names that occur more than once.
-
-    Args:
-        names: as given.
-        what: they name, for the message.
-        error: class of what is raised.
-
-    Raises:
-        RomError: of that class, naming them.
-    """
+    """Refuse names that occur twice; arguments and errors as for `check_text`."""
     if twice := [name for name, n in Counter(names).items() if n > 1]:
         raise error(f"{what} {named(twice)} is given twice; keep one of them.")
 

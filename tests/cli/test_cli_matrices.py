@@ -73,7 +73,7 @@ FAULTS = {
     "no set": ((*NASTRAN, "--fixed", "root"), "which nodes are the interface 'root'?",
                "--set root=11-14,20"),
     "set of nobody": ((*CALCULIX, "--set", "pin=12"), "--set pin is no interface"),
-    "set twice": ((*CALCULIX, "--set", "a=3", "--set", "a=7", "--fixed", "a"), "--set 'a' is given"),
+    "set twice": ((*CALCULIX, "--set", "a=3", "--set", "a=7", "--fixed", "a"), "'a' is given"),
     "unknown node": ((*CALCULIX, "--set", "a=3-4", "--fixed", "a"), "'a' needs nodes of the model",
                      "[4]"),
     "label": ((*CALCULIX, "--set", "a=3-x", "--fixed", "a"), "'3-x' must be a label"),

@@ -429,7 +429,7 @@ def test_a_groove_in_the_loaded_arc_leaves_no_film():
     (lambda: film(bearing(), [0, 0, 1e-4, 0], **RUN), "bearing is aligned"),
     (lambda: film(bearing(), [0, 0], speed=-1.0, viscosity=0.1), "from its other end"),
     (lambda: equilibrium(bearing(), [0, 0], **RUN), "presses the journal nowhere"),
-    (lambda: short_sommerfeld(1.2), "not between 0 and 1"),
+    (lambda: short_sommerfeld(1.2), "must lie between 0 and 1"),
     (lambda: short_eccentricity(0.0), "sommerfeld = "),
     (lambda: stability(np.eye(2), -np.eye(2), 1.0), "feeds the whirl"),
     (lambda: Oil(5.0, 40.0), "hot oil is thinner"),

@@ -379,7 +379,7 @@ def test_what_cannot_be_is_refused():
     for wrong in ({"stiffness": -1e9}, {"friction": -0.1}):
         with pytest.raises(ConfigError, match="needed are > 0, >= 0"):
             replace(one, **wrong)
-    with pytest.raises(ConfigError, match=r"held are \(2,\) of the stones 0 to 1"):
+    with pytest.raises(ConfigError, match=r"held = \(2,\) must be of stones 0 to 1"):
         Masonry((block, block), (2,), 1e9, 0.1)
 
 
