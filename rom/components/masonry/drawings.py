@@ -70,7 +70,9 @@ def _numbers_below(what: str, given: npt.ArrayLike, count: int) -> Index:
     if (numbers != found).any():
         raise ModelError(f"{what}: {found[numbers != found][0]} must be a whole number.")
     if numbers.size and not 0 <= numbers.min() <= numbers.max() < count:
-        raise ModelError(f"{what}: {numbers.min()} to {numbers.max()} must be 0 to {count - 1}.")
+        raise ModelError(
+            f"{what} must be 0 to {count - 1}, got {numbers.min()} to {numbers.max()}."
+        )
     return numbers
 
 

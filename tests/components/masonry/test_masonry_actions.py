@@ -434,7 +434,7 @@ ONE = Masonry((stone(box(), **SOFT),), (), 1e9, 0.5)
     [
         ([PointLoad(1, (1.4, 0.5), (0.0, -1.0), name="crane")], "crane at .* lies 0.4 m outside"),
         ([PointLoad(0, (0.0, 0.0), (0.0, -1.0))], "acts on stone 0, which is held"),
-        ([PointLoad(7, (0.0, 0.0), (0.0, -1.0))], "stone 7 of the stones 0 to 1"),
+        ([PointLoad(7, (0.0, 0.0), (0.0, -1.0))], "stone of point load = 7"),
         ([STONE], "action 0 is .* which does nothing to masonry"),
         ([PointLoad(*STONE, history=Table([0.0, 0.05], [0.0, 1.0]))], "from 0 s to 0.05 s; asked"),
         ([PointLoad(*STONE, history=lambda t: np.full(t.shape, np.inf))], "is inf at t ="),
@@ -469,7 +469,7 @@ def test_actions_that_cannot_be_are_named(actions, words):
         (lambda: Wind(1.0, (1, 2)), r"edges\[0\] = 1"),
         (lambda: SupportMotion(0, (0.0, 1.0)), "stones = 0"),
         (lambda: BaseMotion("shake"), "acceleration = 'shake'"),
-        (lambda: Table("a", "b"), "not made of numbers"),
+        (lambda: Table("a", "b"), "must be made of numbers"),
         (lambda: ramp(None), "duration = None"),
         (lambda: sine("a", 1.0), "amplitude = 'a'"),
         (lambda: stone([0, 1, 2], **SOFT), r"outline of a stone has shape \(3,\)"),
@@ -477,7 +477,7 @@ def test_actions_that_cannot_be_are_named(actions, words):
         (lambda: Masonry((), (), 1e9, 0.5), "all of 0 stones are held"),
         (lambda: Masonry((stone(box(), **SOFT),), (0,), 1e9, 0.5), "all of 1 stones are held"),
         (lambda: replace(ONE, gravity=(0.0, 0.0, -9.81)), "gravity = .* a row of 2"),
-        (lambda: replace(ONE, reach=-1.0), "reach = -1.0 m"),
+        (lambda: replace(ONE, reach=-1.0), "reach = -1 must"),
         (lambda: replace(ONE, stiffness=np.inf), "stiffness = inf"),
         (lambda: simulate(ONE, t_end=1.0, dt=0.1, actions=BaseMotion(1.0)), "actions = "),
         (lambda: simulate(ONE, t_end=1.0, dt=0.1, v=np.full((1, 6), np.nan)), "v = .* not finite"),
@@ -493,7 +493,7 @@ def test_supports_that_bear_nothing_and_frames_without_ground_are_named():
                   (0, 2), 1e10, 0.5)  # fmt: skip
     with pytest.raises(ConfigError, match="moves stone 2, which must support"):
         simulate(far, t_end=0.1, dt=0.01, actions=[SupportMotion((2,), (0.1, 0.0))])
-    with pytest.raises(ConfigError, match="no stone is held"):
+    with pytest.raises(ConfigError, match="a stone must be held"):
         simulate(alone(), t_end=0.1, dt=0.01, actions=[BaseMotion(1.0)])
     with pytest.raises(ConfigError, match="does not stand by itself"):
         load_factor(arch(10, 5.0, 0.4), [BaseMotion(1.0)])
