@@ -411,9 +411,9 @@ MISTAKES = {
     "line without length": ('[laws.s]\nbetween = [{ ground = [1.1, 0, 0] }, "block.p"]\n'
                             'expression = "x"\n', "are in one place at the start"),
     "falling lengths": ('[laws.s]\nbetween = ["ground.wall", "block.p"]\nx = [2, 1]\n'
-                        "values = [1, 2]\n", "do not ascend"),
+                        "values = [1, 2]\n", "must ascend"),
     "lengths and values": ('[laws.s]\nbetween = ["ground.wall", "block.p"]\nx = [2, 1]\n'
-                           "values = [1]\n", "has 2 lengths, 1 values"),
+                           "values = [1]\n", "needs two lengths"),
     "event of nothing": ('[events.e]\nkind = "distance"\nbetween = ["ground.wall", "block.p"]\n',
                          "has no value it passes"),
     "event of two": ('[events.e]\nkind = "coordinate"\njoint = "guide"\nvalue = 1\n'

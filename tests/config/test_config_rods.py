@@ -189,7 +189,7 @@ MISTAKES = {
     "no material": ("", STEEL, "a section of kind circle needs a material"),
     "normal along": (STEEL + "normal = [2, 0, 0]\n", STEEL, "must not lie along the rod"),
     "no normal": (STEEL + "normal = [0, 0, 0]\n", STEEL, "must not lie along the rod"),
-    "no elements": (STEEL + "elements = 0\n", STEEL, "is not a whole number from 1"),
+    "no elements": (STEEL + "elements = 0\n", STEEL, "must be a whole number from 1"),
     "negative modulus": ('E = "-1 GPa"', 'E = "210 GPa"', "E = -1e+09"),
 }  # fmt: skip
 

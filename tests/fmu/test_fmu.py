@@ -320,7 +320,7 @@ def test_a_flexible_body_travels_inside_and_states_can_be_taken_back(hanging, tm
 def test_what_is_wrong_is_told_and_the_instance_goes_on(hanging, tmp_path):
     one = Instance(hanging, tmp_path)
     assert "before its initialisation" in one.fails(one.fmu.doStep, 0.0, 0.1)
-    assert "dt = -1 s must be positive" in one.fails(one.set, "dt", -1.0)
+    assert "dt = -1 must be positive" in one.fails(one.set, "dt", -1.0)
     assert "outside [0, 1]" in one.fails(one.set, "rho_inf", 1.5)
     one.begin()
     assert "pull[2] = nan is not a finite number" in one.fails(one.set, "pull[2]", np.nan)
@@ -431,7 +431,7 @@ def written(tmp_path, script, **options):
         (CRANK, {"inputs": ["gass"]}, "m.py: no input 'gass'; the loads, motors and drives are"),
         (CRANK, {"dt": 0.0}, "must be positive"),
         (CRANK, {"files": ["nothing.npz"]}, "there is no file"),
-        ("mechanism = 3", {}, r"m.py has no function mechanism\(\)"),
+        ("mechanism = 3", {}, r"m.py needs a function mechanism\(\)"),
         ("def mechanism(): return 3", {}, "gave 3; it must return a Mechanism"),
         ("open('rod.npz')", {}, "holds only it and the files named: FileNotFoundError"),
     ],
@@ -445,9 +445,9 @@ def test_what_cannot_be_written_is_refused(tmp_path, script, options, message):
 @pytest.mark.parametrize(
     ("inputs", "outputs", "message"),
     [
-        (("gas", "gas"), (), "the input 'gas' is named twice"),
+        (("gas", "gas"), (), "the input 'gas' is given twice"),
         ((), ("slider.c",), "no output 'slider.c'; there are .'crank.a', 'crank.o', 'guide'"),
-        ((), ("pin", "pin"), "the output 'pin' is named twice"),
+        ((), ("pin", "pin"), "the output 'pin' is given twice"),
     ],
 )
 def test_unknown_names_are_refused(inputs, outputs, message):

@@ -223,7 +223,7 @@ def test_coordinates_that_do_nothing_are_not_sent(solution, monkeypatch):
 
 
 def test_what_cannot_be_drawn_is_refused(body, solution):
-    with pytest.raises(ConfigError, match="body 'bar' has no surface to draw"):
+    with pytest.raises(ConfigError, match="body 'bar' carries no surface"):
         report.modes(replace(body, surface=None, stress=None))
     with pytest.raises(ConfigError, match="shapes: no body 'wheel'"):
         report.motion(solution, shapes={"wheel": sphere(4)})

@@ -349,10 +349,10 @@ def test_what_does_not_fit_an_assembly_is_named(families, bolted):
             test=replace(test, inputs=seam))  # fmt: skip
     refused("'tip' must be .body, interface. of 'frame', 'arm'",
             attached=AddedMass("tip", 1.0, 0.1, 1.0))  # fmt: skip
-    refused("no place", attached=replace(BOLTS, one=("leg", "tip")))
+    refused("must be .body, interface", attached=replace(BOLTS, one=("leg", "tip")))
     refused("knee", InterfaceError, attached=replace(BOLTS, one=("arm", "knee")))
     for fixed in ((("leg", "root"),), ("root",), "root", {"root": "x"}):
-        refused("is no place .body, interface.", fixed=fixed)
+        refused("is must be .body, interface .body, interface.", fixed=fixed)
     with pytest.raises(ConfigError, match="has the range"):
         replace(BOLTS, low=0.0)
     with pytest.raises(ConfigError, match="there is no family"):

@@ -372,7 +372,7 @@ def test_noise_of_forces_and_few_averages_are_checked(exact):
         replace(test, force_noise=-0.1)
     with pytest.raises(ConfigError, match="estimated from 2 averages says nothing"):
         replace(test, averages=2)
-    with pytest.raises(ConfigError, match=r"force_noise \(3,\): one number or \(20, 2\)"):
+    with pytest.raises(ConfigError, match=r"force_noise \(3,\) must be a number or \(20, 2\)"):
         replace(test, force_noise=np.zeros(3))
     with pytest.raises(ConfigError, match="estimator = 'H3'"):
         replace(test, estimator="H3")

@@ -148,7 +148,7 @@ def test_meshes_are_joined_with_their_own_triangles():
             "outline = 2 must",
         ),
         (lambda: view.extruded([(1, 0), (0, -1), (-1, 0)], 1.0), "counter-clockwise"),
-        (lambda: view.extruded([(1, -1), (1, 1), (-1, 1), (-1, -1)], 1.0, bore=2.0), "bore of 2 m"),
+        (lambda: view.extruded([(1, -1), (1, 1), (-1, 1), (-1, -1)], 1.0, bore=2.0), "bore = 2"),
         (lambda: view.gear(5, 1e-3, 1e-2), "5 teeth of a pressure angle of 20 degrees"),
         (lambda: view.gear(20, 1e-3, 1e-2, pressure_angle=0.7), "40.1.* degrees are pointed"),
         (lambda: view.gear(20, 1e-3, 1e-2, bore=0.02), "bore = 0.02 must be"),

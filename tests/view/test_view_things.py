@@ -136,12 +136,12 @@ def test_a_scene_is_drawn_into_axes_of_the_caller():
 @pytest.mark.parametrize(
     ("thing", "words"),
     [
-        (view.Thing(np.zeros((3, 2)), [[0, 1, 2]]), r"points are \(n, 3\)"),
-        (view.Thing(np.zeros((3, 3)), [[0, 1, 3]]), "numbers from 0 to 2"),
-        (view.Thing(np.zeros((3, 3)), [[0, 1, -1]]), "numbers from 0 to 2"),
-        (view.Thing(np.zeros((3, 3)), [[0.0, 1.0]]), "numbers from 0 to 2"),
-        (view.Thing(np.zeros((4, 3)), [[0, 1, 2, 3]]), "numbers from 0 to 3"),
-        (view.Thing(*BOX, values=[1.0, 2.0]), r"has \(1, 2\) values for \(1, 8\) points"),
+        (view.Thing(np.zeros((3, 2)), [[0, 1, 2]]), r"points must be \(n, 3\)"),
+        (view.Thing(np.zeros((3, 3)), [[0, 1, 3]]), "from 0 to 2"),
+        (view.Thing(np.zeros((3, 3)), [[0, 1, -1]]), "from 0 to 2"),
+        (view.Thing(np.zeros((3, 3)), [[0.0, 1.0]]), "from 0 to 2"),
+        (view.Thing(np.zeros((4, 3)), [[0, 1, 2, 3]]), "from 0 to 3"),
+        (view.Thing(*BOX, values=[1.0, 2.0]), r"has \(1, 2\) values, needed are \(1, 8\)"),
         (view.Thing(*BOX, edges=[[0, 8]]), "edges must be pairs from 0 to 7"),
     ],
 )

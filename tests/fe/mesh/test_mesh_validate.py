@@ -296,7 +296,7 @@ FAULTS = {
     "no cells": (lambda m: recelled(m, np.empty((0, 4), int)), MeshError, "no volume cells"),
     "region without a name": (lambda m: replace(m, regions=m.regions + 4), TagError, "region 5"),
     "region without cells": (
-        lambda m: replace(m, region_names={1: "body", 2: "liner"}), TagError, "'liner' has no",
+        lambda m: replace(m, region_names={1: "body", 2: "liner"}), TagError, "'liner' needs cells",
     ),
     "region with a name of two lines": (
         lambda m: replace(m, region_names={1: "a\nb"}), TagError, "U+000A",
