@@ -157,7 +157,7 @@ def offered(names: Iterable[object], wanted: object = "") -> str:
 def check_once(names: Iterable[object], what: str, error: type[RomError] = ConfigError) -> None:
     """Refuse names that occur twice; arguments and errors as for `check_text`."""
     if twice := [name for name, n in Counter(names).items() if n > 1]:
-        raise error(f"{what} {named(twice)} is given twice; keep one of them.")
+        raise error(f"{what} {named(twice)} is given twice; use each once.")
 
 
 def check_known(

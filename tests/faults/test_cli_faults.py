@@ -49,7 +49,7 @@ USAGE = {
                                  "not allowed with"),
     "parameter without value": (["mesh", BEAM, "-p", "lc"], "'lc' is not NAME=VALUE"),
     "parameter twice": (["mesh", BEAM, "-p", "lc=1", "-p", "lc=2"],
-                        "-p 'lc' is given twice; keep one"),
+                        "-p 'lc' is given twice; use each"),
     "interface twice": (["modes", BEAM, *STEEL, "-i", "root=rbe2", "-i", "root=full"],
                         "-i 'root' is given twice"),
     "no interface": (["reduce", BEAM, *STEEL, "-o", "x.npz"], "needs an interface"),

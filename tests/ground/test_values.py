@@ -60,7 +60,7 @@ WRONG = {  # what is said: call, class
         lambda: symmetric("S", csr_matrix(SKEW), 0.24, error=ModelError), ModelError),
     "a/b.txt: a picture is written as .png, .gif. Write b.png": (
         lambda: check_ending("a/b.txt", "a picture", ".png", ".gif"), ConfigError),
-    "the input 'a' is given twice; keep one of them": (
+    "the input 'a' is given twice; use each once": (
         lambda: check_once(["a", "b", "a"], "the input", FileFormatError), FileFormatError),
 }  # fmt: skip
 
