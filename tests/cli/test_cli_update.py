@@ -217,7 +217,7 @@ def test_what_is_wrong_with_the_options_is_said(capsys):
 
     refused(["--spring", "soil=tip:2e5:0.1"], "must be written INTERFACE:VALUE:LOW:HIGH")
     refused(["--mass", "cable=tip:heavy:0.1:10"], "--mass: 'heavy' is not a number")
-    same = "--mass soil has the name of another one"
+    same = "--mass soil needs a name of its own"
     refused([*ATTACHED[:2], "--mass", "soil=tip:1:0.1:10"], same)
     refused(["--rank", "3"], "rank needs residual=")
     refused(["--residual", "equations"], "input 0 has no sensor at its point")
@@ -330,6 +330,6 @@ def test_families_that_are_no_assembly_are_named(bolted, capsys):
     refused(HALVES[:2] * 2, "--family 'frame' is given twice")
     refused([*HALVES, *JOINT, "--spring", "q=tip:1,1,1:1:2"], "'tip' must be BODY.INTERFACE")
     refused([*HALVES[:4], "--fixed", "root"], "--fixed 'root' must be BODY.INTERFACE, of")
-    refused([*HALVES, "--joint", "q=frame.tip:1,1,1:1:2"], "lies between 1 places")
+    refused([*HALVES, "--joint", "q=frame.tip:1,1,1:1:2"], "names 1 places, needed are 2")
     refused([*HALVES, "--mass", "q=frame.tip:1,1:1:2"], "a mass must be one number")
     refused(["--family", "a=body.rom.npz"], "body.rom.npz holds one body, without parameters")
