@@ -321,7 +321,7 @@ def test_what_is_wrong_is_told_and_the_instance_goes_on(hanging, tmp_path):
     one = Instance(hanging, tmp_path)
     assert "before its initialisation" in one.fails(one.fmu.doStep, 0.0, 0.1)
     assert "dt = -1 must be positive" in one.fails(one.set, "dt", -1.0)
-    assert "outside [0, 1]" in one.fails(one.set, "rho_inf", 1.5)
+    assert "must be at least 0 and at most 1" in one.fails(one.set, "rho_inf", 1.5)
     one.begin()
     assert "pull[2] = nan is not a finite number" in one.fails(one.set, "pull[2]", np.nan)
     assert "the output 'one.b.position[1]' cannot be set" in one.fails(

@@ -231,7 +231,7 @@ def test_factors_outside_the_range_are_refused_or_announced(family):
 def test_wrong_parameters_are_named():
     with pytest.raises(ParameterError, match="YoungsModulus of web: needed is"):
         rom.YoungsModulus("web", 2.0, 1.0)
-    with pytest.raises(ParameterError, match="Density of the whole body: low = nan"):
+    with pytest.raises(ParameterError, match="low of Density of the whole body = nan"):
         rom.Density(None, np.nan, 1.0)
     arguments = {"method": rom.CraigBampton(2), "interfaces": KINDS}
     half = rom.Density("web", 0.5, 1.0)
