@@ -352,7 +352,7 @@ def test_what_does_not_fit_an_assembly_is_named(families, bolted):
     refused("must be .body, interface", attached=replace(BOLTS, one=("leg", "tip")))
     refused("knee", InterfaceError, attached=replace(BOLTS, one=("arm", "knee")))
     for fixed in ((("leg", "root"),), ("root",), "root", {"root": "x"}):
-        refused("is must be .body, interface .body, interface.", fixed=fixed)
+        refused("must be .body, interface", fixed=fixed)
     with pytest.raises(ConfigError, match="has the range"):
         replace(BOLTS, low=0.0)
     with pytest.raises(ConfigError, match="there is no family"):
