@@ -6,7 +6,6 @@ quality gate, 6 resources, 7 interrupted; 1 is kept for our own bugs.
 """
 
 import os
-import re
 import sys
 import warnings
 from collections.abc import Callable, Iterator
@@ -15,17 +14,6 @@ from pathlib import Path
 from typing import Any
 
 RANKS = ("OMPI_COMM_WORLD_RANK", "PMI_RANK")  # as launchers of parallel programs name them
-# words by which a message, or its last clause, says what is wanted or what there is
-WISH_PATTERN = re.compile(
-    r"\b(?:must|needs?|needed|takes|expected|instead|wanted|belongs? to|goes? with|known"
-    r"|at most|at least|or more|between|in place of|there (?:is|are)|has|have|use|give|write"
-    r"|leave|name|take|reduce|choose|only|from \S+ to)\b|[<>]=? ",
-    re.IGNORECASE,
-)
-DEMAND_PATTERN = re.compile(
-    r"\b(?:must|needs?|needed|takes|expected|wanted|at most|at least|none of)\b|[<>]= "
-    r"|\bis (?:not|no) (?:an?|positive|finite|whole|between|within|one of)\b"
-)
 PACKAGE_FOLDER = str(Path(__file__).parent) + os.sep
 
 
@@ -35,18 +23,22 @@ class RomError(Exception):
     Args:
         message: what happened, with the number and the name of the culprit.
         where: file, body, joint or interface the message is about; printed in front.
-        hint: what to do; printed behind. Without one it is the last clause of the message, where
-            that says what is wanted or what there is.
+        hint: what to do; printed behind. Without one, and without `advice`, it is the last clause
+            of the message, which then says what is wanted or what there is.
         solution: the part of a motion, or the last state, that was reached before it failed, as
             the function that failed would have returned it; None where nothing was reached.
     """
 
     exit_code = 1
-    advice = ""  # where neither a hint is given nor the message says what is wanted
+    advice = ""  # where no hint is given
     solution: Any = None
 
     def __init__(self, message: str, *, where: str = "", hint: str = "", solution: Any = None):
-        self.message, self.where, self.hint = message, where, hint or wish(message) or self.advice
+        self.message, self.where, self.hint = (
+            message,
+            where,
+            hint or self.advice or last_clause(message),
+        )
         self.solution = solution
         super().__init__(message, where, hint)
 
@@ -64,13 +56,9 @@ class RomError(Exception):
         return _rebuild, (type(self), self.message, self.where, self.hint)
 
 
-def wish(message: str) -> str:
-    """What a message says to be wanted or to be there: its last clause, all of it, or nothing."""
-    message = message.strip()
-    clause = re.split(r"(?<=[;.]) ", message)[-1]
-    if clause != message and WISH_PATTERN.search(clause):
-        return clause
-    return message if DEMAND_PATTERN.search(message) else ""
+def last_clause(message: str) -> str:
+    """What stands behind the last semicolon or full stop within a message, or all of it."""
+    return message.strip().replace("; ", ". ").rpartition(". ")[2]
 
 
 @contextmanager

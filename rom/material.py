@@ -136,7 +136,7 @@ class Orthotropic:
         _check_positive("rho", self.rho, "kg/m^3")
         axes = finite("axes", self.axes, None)
         if axes.shape != (3, 3) or not np.allclose(axes @ axes.T, np.eye(3), atol=1e-9):
-            raise MaterialError("axes is not a (3, 3) matrix of orthonormal rows.")
+            raise MaterialError("axes must be a (3, 3) matrix of orthonormal rows.")
         lowest = np.linalg.eigvalsh(self._compliance()).min()
         if lowest <= 0:
             raise MaterialError(
@@ -234,7 +234,7 @@ def _strain_rotation(Q: Array) -> Array:
 
 def _check_number(name: str, value: Any) -> None:
     if not is_number(value):
-        raise MaterialError(f"{name} = {shortened(value)} is not a finite number.")
+        raise MaterialError(f"{name} = {shortened(value)} must be a finite number.")
 
 
 def _check_three(name: str, values: Any) -> None:

@@ -10,6 +10,7 @@ may become a file name; so it is one line of text that can be seen and cannot le
 """
 
 import unicodedata
+from collections import Counter
 from collections.abc import Iterable
 from difflib import get_close_matches
 from pathlib import Path
@@ -98,6 +99,26 @@ def file_name(name: str, ending: str = "") -> str:
     return found
 
 
+def check_ending(path: str | Path, what: str, *endings: str) -> Path:
+    """The path, if it has one of the endings that such a file is written with.
+
+    Args:
+        path: as given.
+        what: is written, for the message.
+        endings: with their dots, the usual one first.
+
+    Raises:
+        ConfigError: naming them.
+    """
+    path = Path(path)
+    if path.suffix.lower() not in endings:
+        raise ConfigError(
+            f"{path}: {what} is written as {', '.join(endings)}.",
+            hint=f"Write {path.stem or 'name'}{endings[0]}.",
+        )
+    return path
+
+
 def csv_cell(text: str) -> str:
     """A text in a table with commas, which no spreadsheet takes for a formula or two cells."""
     text = f"'{text}" if text.startswith(FORMULA_STARTS) else text
@@ -131,6 +152,12 @@ def offered(names: Iterable[object], wanted: object = "") -> str:
         return str(every)
     near = get_close_matches(str(wanted), every, MAX_OFFERED, cutoff=0.0)
     return f"{near} and {len(every) - len(near)} more"
+
+
+def check_once(names: Iterable[object], what: str, error: type[RomError] = ConfigError) -> None:
+    """Refuse names that occur twice; arguments and errors as for `check_text`."""
+    if twice := [name for name, n in Counter(names).items() if n > 1]:
+        raise error(f"{what} {named(twice)} is given twice; use each once.")
 
 
 def check_known(

@@ -203,6 +203,6 @@ def refuse_negative(name: str, value: Any) -> None:
         ConfigError: naming it.
     """
     if isinstance(value, bool) or not isinstance(value, Real) or not math.isfinite(value):
-        raise ConfigError(f"{name} = {value!r} is not a finite number.")
+        raise ConfigError(f"{name} = {value!r} must be a finite number.")
     if value < 0.0:
-        raise ConfigError(f"{name} = {value:g} is negative: it would give energy to the motion.")
+        raise ConfigError(f"{name} = {value:g} is negative: it must be >= 0, not to drive.")

@@ -181,13 +181,15 @@ def in_si(text: str, wanted: str) -> float:
         )
     found = unit(symbol) if symbol else goal
     if not fits(found.dimension, goal.dimension):
-        raise ConfigError(f"{text!r} is {dimension_name(found.dimension)}; {_wanted(wanted)}.")
+        raise ConfigError(
+            f"{text!r} is {dimension_name(found.dimension)}; {_wanted(wanted)} is wanted."
+        )
     try:
         value = float(Fraction(match[0]) * found.factor)
     except OverflowError:
         value = math.inf
     if not math.isfinite(value):
-        raise ConfigError(f"{text!r} is too large.")
+        raise ConfigError(f"{text!r} is too large: at most 1e308 {wanted} can be told.")
     return value
 
 
@@ -212,6 +214,6 @@ def dimension_name(dimension: Dimension) -> str:
 def _wanted(wanted: str) -> str:
     dimension = unit(wanted).dimension
     if dimension == NONE:
-        return "a number without unit is wanted"
+        return "a number without unit"
     named = f"{NAMES[dimension]} " if dimension in NAMES else ""
-    return f"{named}[{wanted}] is wanted"
+    return f"{named}[{wanted}]"

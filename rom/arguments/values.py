@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rom import rotation
-from rom.errors import ConfigError, RomError
+from rom.errors import ConfigError, QualityGateError, RomError
 
 Array = npt.NDArray[np.float64]  # not from rom.model, whose records are checked here
 SHOWN_LENGTH = 60  # letters of a wrong value in a message
@@ -82,8 +82,38 @@ def matrix(name: str, value: Any, shape: tuple[int | None, int | None] = (None, 
     if len(found.shape) != 2 or found.dtype.kind not in "iuf":
         raise ConfigError(f"{name} = {shortened(value)} must be a matrix of numbers.")
     if any(n not in (None, size) for n, size in zip(shape, found.shape, strict=True)):
-        raise ConfigError(f"{name} has shape {found.shape}, needed is {shape}.")
+        raise ConfigError(f"{name} has shape {found.shape}, needed is {shape_words(shape)}.")
     return found
+
+
+def symmetric(
+    name: str,
+    A: Any,
+    rtol: float,
+    *,
+    where: str = "",
+    error: type[RomError] = QualityGateError,
+) -> None:
+    """Refuse a matrix, sparse or dense, that belongs to no energy.
+
+    Args:
+        name: of the matrix.
+        A: (n, n).
+        rtol: difference of its halves over its largest entry [1] that is round-off.
+        where: the file it comes from.
+        error: class of what is raised.
+
+    Raises:
+        RomError: of that class, with the difference.
+    """
+    gap, size = (abs(X).max() if A.shape[0] else 0.0 for X in (A - A.T, A))
+    if gap > rtol * size:
+        raise error(
+            f"{name} is not symmetric: its halves differ by {gap / size:.2g} of its largest entry.",
+            where=where,
+            hint="Look for a block that is transposed or missing; where both halves are meant, "
+            "write (A + A.T) / 2.",
+        )
 
 
 def rows_at(name: str, at: Any, A: npt.NDArray[Any]) -> npt.NDArray[Any]:
@@ -125,36 +155,110 @@ def one_of(
     raise error(f"{name} = {shortened(value)} is none of {', '.join(map(repr, known))}.")
 
 
-def finite(name: str, value: Any, shape: tuple[int, ...] | None) -> Array:
-    """The value as a float array of this shape; None for any.
+def finite(
+    name: str,
+    value: Any,
+    shape: tuple[int | None, ...] | None,
+    *,
+    error: type[RomError] = ConfigError,
+) -> Array:
+    """The value as a float array of this shape; None for any, or for any length.
 
     Raises:
-        ConfigError: for another shape, or entries that are not finite numbers.
+        RomError: of the class ``error``, for another shape, or entries that are not finite numbers.
     """
     try:
         array = np.array(value, dtype=float)
-    except (TypeError, ValueError, OverflowError) as error:
-        raise ConfigError(f"{name} = {shortened(value)} is not made of numbers.") from error
-    if np.array(value).dtype.kind not in "iuf" and array.size:
-        raise ConfigError(f"{name} = {shortened(value)} is not made of numbers.")
-    if shape is not None and array.shape != shape:
-        raise ConfigError(f"{name} has shape {array.shape}, needed is {shape}.")
+        fits = not array.size or np.array(value).dtype.kind in "iuf"
+    except (TypeError, ValueError, OverflowError):
+        fits = False
+    wanted = "finite numbers" if shape is None else f"shape {shape_words(shape)}"
+    if not fits:
+        raise error(f"{name} = {shortened(value)} is not made of numbers, needed is {wanted}.")
+    if shape is not None and (
+        array.ndim != len(shape)
+        or any(n not in (None, k) for n, k in zip(shape, array.shape, strict=True))
+    ):
+        raise error(f"{name} has shape {array.shape}, needed is {shape_words(shape)}.")
     if not np.isfinite(array).all():
-        raise ConfigError(f"{name} = {shortened(array.tolist())} is not finite.")
+        raise error(f"{name} = {shortened(array.tolist())} is not finite; give finite numbers.")
     return array
 
 
-def number(name: str, value: Any) -> float:
+def shape_words(shape: tuple[int | None, ...]) -> str:
+    """A shape as it is written, n for any length."""
+    return str(shape).replace("None", "n")
+
+
+def one_each(
+    what: str, given: Any, each: str, wanted: Any, *, error: type[RomError] = ConfigError
+) -> None:
+    """Refuse things that are not one for each of others.
+
+    Args:
+        what: their name, in the plural.
+        given: their number, or shape.
+        each: name of the others.
+        wanted: the number of these, or their shape.
+        error: class of what is raised.
+
+    Raises:
+        RomError: of that class, with both numbers.
+    """
+    if given != wanted:
+        n, m = (x[0] if isinstance(x, tuple) and len(x) == 1 else x for x in (given, wanted))
+        raise error(f"{n} {what} for {m} {each}; give one for each.")
+
+
+def number(name: str, value: Any, *, error: type[RomError] = ConfigError) -> float:
     """The value as a finite float."""
-    return float(finite(name, value, ()))
+    return float(finite(name, value, (), error=error))
 
 
-def positive(name: str, value: Any) -> float:
+def positive(name: str, value: Any, *, error: type[RomError] = ConfigError) -> float:
     """The value as a finite positive float."""
-    x = number(name, value)
+    x = number(name, value, error=error)
     if x <= 0.0:
-        raise ConfigError(f"{name} = {x:g} must be positive.")
+        raise error(f"{name} = {x:g} must be positive.")
     return x
+
+
+def not_negative(name: str, value: Any, *, error: type[RomError] = ConfigError) -> float:
+    """The value as a finite float of zero or more."""
+    x = number(name, value, error=error)
+    if x < 0.0:
+        raise error(f"{name} = {x:g} must not be negative.")
+    return x
+
+
+def between(
+    name: str,
+    value: Any,
+    low: float,
+    high: float,
+    ends: str = "[]",
+    *,
+    error: type[RomError] = ConfigError,
+) -> float:
+    """The value as a finite float of an interval.
+
+    Args:
+        name: of the argument.
+        value: what was given.
+        low: where the interval begins.
+        high: where it ends.
+        ends: brackets of it: round ones where the end is no part of it.
+        error: class of what is raised.
+
+    Raises:
+        RomError: of that class, with the interval.
+    """
+    x = number(name, value, error=error)
+    if low <= x <= high and (x != low or ends[0] == "[") and (x != high or ends[1] == "]"):
+        return x
+    lowest_words = f"{'at least' if ends[0] == '[' else 'above'} {low:.6g}"
+    highest_words = f"{'at most' if ends[1] == ']' else 'below'} {high:.6g}"
+    raise error(f"{name} = {x:g} must be {lowest_words} and {highest_words}.")
 
 
 def unit_vector(name: str, value: Any) -> Array:
@@ -162,7 +266,7 @@ def unit_vector(name: str, value: Any) -> Array:
     x = finite(name, value, (3,))
     length = np.linalg.norm(x)
     if length == 0.0:
-        raise ConfigError(f"{name} has length zero: it gives no direction.")
+        raise ConfigError(f"{name} has length zero; give a direction, such as (0, 0, 1).")
     return x / length
 
 
@@ -184,13 +288,15 @@ def unit_quaternion(value: Any) -> Array:
     if np.shape(value) == (4,):
         p = finite("orientation", value, (4,))
         if abs(np.linalg.norm(p) - 1.0) > 1e-3:
-            raise ConfigError(f"quaternion {p.tolist()} has length {np.linalg.norm(p):.6g}, not 1.")
+            raise ConfigError(
+                f"quaternion {p.tolist()} must have length 1, not {np.linalg.norm(p):.6g}."
+            )
         return p / np.linalg.norm(p)
     A = finite("orientation", value, (3, 3))
     error = np.abs(A @ A.T - np.eye(3)).max()
     if error > 1e-3 or np.linalg.det(A) < 0.0:
         raise ConfigError(
-            f"orientation is not a rotation: A A^T differs from 1 by {error:.3g}, "
+            f"orientation must be a rotation: A A^T differs from 1 by {error:.3g}, "
             f"its determinant is {np.linalg.det(A):.6g}."
         )
     U, _, V = np.linalg.svd(A)

@@ -161,7 +161,7 @@ class Assembly:
         """
         one_of("level", level, ("system", "local"))
         if not self.couplings:
-            raise ConfigError("nothing is coupled: there are no interfaces to reduce.")
+            raise ConfigError("nothing is coupled: interfaces to reduce need couplings.")
         (M, K), H = self._matrices(), self._interfaces()
         parts = self._partition(None, fixed)
         if level == "system":
@@ -252,9 +252,7 @@ class Assembly:
             try:
                 one, other = (self._marker(place) for place in coupling)
             except (TypeError, ValueError) as error:
-                raise ConfigError(
-                    f"coupling {coupling!r} is not a pair of (body, interface)."
-                ) from error
+                raise ConfigError(f"{coupling!r} must be pairs (body, interface).") from error
             rows = coupled_rows(coupling, one, other, size, self.projection)
             terms.append(tuple(zip(coupling, rows, (1.0, -1.0), strict=True)))
         return terms

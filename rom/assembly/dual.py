@@ -130,7 +130,10 @@ class DualAssembly:
                 )
             x, y = (self.bodies[body].origins[name] for body, name in (one, other))
             if np.linalg.norm(x - y) > SAME_PLACE * max(np.linalg.norm(x), np.linalg.norm(y)):
-                raise InterfaceError(f"{one} and {other} lie {np.linalg.norm(x - y):.3g} m apart.")
+                raise InterfaceError(
+                    f"{one} and {other} lie {np.linalg.norm(x - y):.3g} m apart.",
+                    hint="Draw both in one frame, so that interfaces to be coupled coincide.",
+                )
 
     @cached_property
     def certificate(self) -> Report:

@@ -78,7 +78,7 @@ class Pieces:
             ('beam 2', ['beam cut 1'])
         """
         if not hasattr(mech, "add_flexible"):
-            raise ConfigError(f"mech = {mech!r:.60} is no Mechanism, to which bodies are added.")
+            raise ConfigError(f"mech = {mech!r:.60} is no Mechanism; give one of rom.Mechanism.")
         check_name(name, "a body")
         allowed = ("at", "orientation", "velocity", "omega")
         if unknown := [key for key in pose if key not in allowed]:
@@ -196,9 +196,7 @@ class Tree:
                 owners.setdefault(interface, []).append(key)
         for interface, keys in owners.items():
             if len(keys) > 2:
-                raise InterfaceError(
-                    f"interface {interface!r} belongs to the pieces {named(keys)}; two meet there."
-                )
+                raise InterfaceError(f"{interface!r} is of {named(keys)}; at most two pieces meet.")
         free = [interface for interface, keys in owners.items() if len(keys) == 1]
         check_known(
             reference,
@@ -226,6 +224,7 @@ class Tree:
             raise InterfaceError(
                 f"piece {named(loose)} does not hang on that with {reference!r}: no interface has "
                 "the name of one of another piece.",
+                hint="Give the interfaces that meet one name in both models.",
             )
         return cls(found, joints)
 

@@ -6,12 +6,11 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import eigh
 
-from rom.arguments import typed
+from rom.arguments import one_each, typed
 from rom.body.flexible import FlexibleBody
 from rom.body.records import still_motions
 from rom.body.reference import rigid_elastic, rigid_mass
 from rom.eigen.supports import Fixed
-from rom.errors import ConfigError
 from rom.model import Array, Row
 from rom.plausible import DAMPING_RATIO, check_damping_ratio, refuse_negative, warn_outside
 
@@ -104,9 +103,7 @@ class ModalDamping:
         """
         zeta = np.asarray(self.ratio, dtype=float)
         if zeta.ndim > 1 or (zeta.ndim == 1 and zeta.size != body.n_modes):
-            raise ConfigError(
-                f"ModalDamping has {zeta.size} ratios for {body.n_modes} elastic coordinates."
-            )
+            one_each("ratios of ModalDamping", zeta.shape, "elastic coordinates", (body.n_modes,))
         omega, B = _vibrations(body, self.fixed)
         if omega.size < body.n_modes:
             omega, B = _with_statics(body, omega, B)

@@ -305,7 +305,7 @@ class FlexibleBody(BodyData):
         """
         q = np.asarray(q)
         if q.ndim != 2 or q.shape[1] != self.n_modes:
-            raise ConfigError(f"q of shape {q.shape} must have the shape (s, {self.n_modes})")
+            raise ConfigError(f"q of shape {q.shape} must have the shape (s, {self.n_modes}).")
         most = self.certified_energy
         if not np.isfinite(most):
             return None

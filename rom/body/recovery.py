@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rom.arguments import finite
 from rom.errors import ConfigError
 from rom.model import Array
 
@@ -49,12 +50,7 @@ class StressRecovery:
         Raises:
             ConfigError: if q has another length, or the modes left out are not known.
         """
-        q = np.asarray(q, dtype=float)
-        if q.shape != self.operator.shape[1:]:
-            raise ConfigError(
-                f"q has the shape {q.shape}; the body has {self.operator.shape[1]} elastic "
-                "coordinates."
-            )
+        q = finite("q", q, self.operator.shape[1:])
         found: Array = self.operator @ q
         if accelerations is not None:
             if self.inertial is None:

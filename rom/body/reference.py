@@ -73,7 +73,10 @@ def _pins(first: Marker, second: Marker, r: int) -> tuple[Array, Array]:
     axis = second.point - first.point
     length = np.linalg.norm(axis)
     if length == 0.0:
-        raise ModelError(f"pins {first.name!r} and {second.name!r} lie in the same point.")
+        raise ModelError(
+            f"pins {first.name!r} and {second.name!r} lie in the same point: no axis.",
+            hint="Name two pins that are apart, or one interface alone.",
+        )
     axis = axis / length
     across = np.linalg.svd(axis[None])[2][1:]
     rows = []

@@ -131,7 +131,10 @@ def _frequencies(M: Array, K: Array, G: Array, culprit: str) -> Array:
     one, zero = np.eye(r), np.zeros((r, r))
     lam = eigvals(np.block([[zero, one], [-K, -G]]), np.block([[one, zero], [zero, M]]))
     if not np.isfinite(lam).all():
-        raise ModelError(f"{culprit} has no vibrations: its mass is singular.")
+        raise ModelError(
+            f"{culprit} has no vibrations: its mass is singular.",
+            hint="Look for a coordinate without mass, such as a node of a massless region.",
+        )
     if lam.real.max(initial=0.0) > GROWTH_RATE_RTOL * np.abs(lam).max(initial=0.0):
         warn(
             f"{culprit} is unstable: rotation has used up its stiffness; motions that run away "

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from rom.arguments import typed
+from rom.arguments import finite, typed
 from rom.body.flexible import FlexibleBody
 from rom.body.surface import Where, chosen_triangles, surface_of
 from rom.errors import ConfigError, ModelError
@@ -64,16 +64,13 @@ def surface_load(
             outside, which a pressure needs.
     """
     if sum(x is not None for x in (pressure, traction, forces)) != 1:
-        raise ConfigError("give either a pressure, a traction or forces.")
+        raise ConfigError("exactly one of pressure, traction and forces must be given.")
     surface = surface_of(body)
     shapes = surface.shape.reshape(surface.points.shape[0], 3, -1)
     if forces is not None:
-        f = np.asarray(forces, dtype=float)
-        if where is not None or f.shape != surface.points.shape:
-            raise ConfigError(
-                f"forces have the shape {f.shape}; needed is {surface.points.shape}, zero where "
-                "there is none, and no `where`."
-            )
+        if where is not None:
+            raise ConfigError("forces take no `where`; write zeros where there is none.")
+        f = finite("forces", forces, surface.points.shape)
         return _reduced(surface.points, shapes, f)
     if pressure is not None:
         _refuse_inside_out(body.name, surface.triangles)
@@ -81,9 +78,7 @@ def surface_load(
     if pressure is not None:
         each = -float(pressure) * areas
     else:
-        t = np.asarray(traction, dtype=float)
-        if t.shape != (3,):
-            raise ConfigError(f"traction has the shape {t.shape}; needed is (3,).")
+        t = finite("traction", traction, (3,))
         each = np.linalg.norm(areas, axis=1)[:, None] * t
     f = np.zeros(surface.points.shape)
     np.add.at(f, chosen.ravel(), np.repeat(each / 3, 3, axis=0))
@@ -101,9 +96,7 @@ def mass_load(body: FlexibleBody, acceleration: npt.ArrayLike) -> SpreadLoad:
     Raises:
         ConfigError: for another shape.
     """
-    g = np.asarray(acceleration, dtype=float)
-    if g.shape != (3,):
-        raise ConfigError(f"acceleration has the shape {g.shape}; needed is (3,).")
+    g = finite("acceleration", acceleration, (3,))
     shapes = np.einsum("ak,b->kab", body.S, g)
     return SpreadLoad(body.mass * g, np.outer(body.first_moment, g), shapes)
 

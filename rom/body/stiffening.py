@@ -28,6 +28,7 @@ from typing import Any
 
 import numpy as np
 
+from rom.arguments import matrix, symmetric
 from rom.body.records import BodyData, Marker
 from rom.body.recovery import AXIS_NAMES, CENTRIFUGAL_LOADS, PRODUCTS
 from rom.body.reference import moved_integrals, moved_marker, reference_motion, skew_tensor
@@ -139,11 +140,8 @@ def _check(body: BodyData) -> None:
                 hint=f"Loads are {', '.join(known)}.",
             )
         A = np.asarray(A)
-        if A.shape != (r, r) or np.abs(A - A.T).max(initial=0.0) > 1e-9 * np.abs(A).max(initial=0):
-            raise ConfigError(
-                f"the geometric stiffness {load!r} of body {body.name!r} is no symmetric matrix "
-                f"of {r} coordinates."
-            )
+        name = f"the geometric stiffness {load!r} of body {body.name!r}"
+        symmetric(name, matrix(name, A, (r, r)), 1e-9, error=ConfigError)
 
 
 def moved_stiffening(old: BodyData, new: BodyData, X: Array, reference: Any) -> Any:

@@ -133,7 +133,9 @@ def rayleigh(text: str) -> dict[str, float]:
     try:
         alpha, beta = map(float, text.split(","))
     except ValueError:
-        raise ConfigError(f"--rayleigh {text} is not two numbers, as in 0.1,1e-6.") from None
+        raise ConfigError(
+            f"--rayleigh {text} is not two numbers; write them as 0.1,1e-6, only with a comma."
+        ) from None
     return {"alpha": alpha, "beta": beta}
 
 

@@ -56,7 +56,7 @@ def check_geometry(args: argparse.Namespace) -> None:
     """
     given = [f"--{name}" for name in ("nodes", "set", "units") if getattr(args, name)]
     if given:
-        raise ConfigError(f"{given[0]} goes with --mass, which is not given.")
+        raise ConfigError(f"{given[0]} needs --mass FILE: it is for matrices.")
     hint = "For matrices of another program give --mass and --nodes instead."
     require(solid_options(args), hint)
 
@@ -82,7 +82,7 @@ def read_matrices(args: argparse.Namespace) -> "FEModel":
         if getattr(args, name) != default
     ]
     if odd:
-        raise ConfigError(f"{odd[0]} is for geometries, and --mass for matrices: give one of them.")
+        raise ConfigError(f"{odd[0]} is for geometries, and --mass for matrices; give one of them.")
     if args.nodes is None:
         raise ConfigError("--mass needs --nodes, the file with the places of the nodes.")
     held = [word.partition(":")[0] for word in getattr(args, "fixed", ())]
@@ -108,9 +108,7 @@ def _sets(args: argparse.Namespace, names: list[str]) -> dict[str, Any]:
 
     found = unique([(name, labels(text)) for name, text in args.set], "--set")
     if unused := sorted(set(found) - set(names)):
-        raise ConfigError(
-            f"--set {', '.join(unused)} is no interface: neither -i nor --fixed names it."
-        )
+        raise ConfigError(f"--set {', '.join(unused)} is no interface; name it by -i or --fixed.")
     remaining = tuple(name for name in names if name not in found)
     if remaining and args.nodes.suffix.lower() != ".inp":
         raise ConfigError(
@@ -131,8 +129,8 @@ def labels(text: str) -> list[int]:
         first, dash, last = part.strip().partition("-")
         last = last if dash else first
         if not (is_whole(first) and is_whole(last) and int(first) <= int(last)):
-            raise ConfigError(f"--set: {part!r} is no label and no range of labels as in 11-14.")
+            raise ConfigError(f"--set: {part!r} must be a label or a range of labels as in 11-14.")
         if int(last) - int(first) > MOST_NODES:
-            raise ConfigError(f"--set: {part} has more than {MOST_NODES} nodes.")
+            raise ConfigError(f"--set: {part} must have at most {MOST_NODES} nodes.")
         found += range(int(first), int(last) + 1)
     return found

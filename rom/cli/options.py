@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rom.errors import ConfigError
-from rom.names import is_whole
+from rom.names import check_once, is_whole
 
 if TYPE_CHECKING:
     from rom.model import Material
@@ -38,7 +38,7 @@ def typed_number(option: str, text: str) -> float:
     try:
         return number(text)
     except argparse.ArgumentTypeError as error:
-        raise ConfigError(f"{option}: {error}.") from None
+        raise ConfigError(f"{option}: {error}; a number is needed.") from None
 
 
 def positive(text: str) -> float:
@@ -111,12 +111,8 @@ def unique(pairs: list[tuple[str, Any]], option: str) -> dict[str, Any]:
     Raises:
         ConfigError: if a name is given twice.
     """
-    found: dict[str, Any] = {}
-    for name, value in pairs:
-        if name in found:
-            raise ConfigError(f"{option} {name} is given twice: {found[name]} and {value}.")
-        found[name] = value
-    return found
+    check_once([name for name, _ in pairs], option)
+    return dict(pairs)
 
 
 def add_geometry(parser: argparse.ArgumentParser) -> None:

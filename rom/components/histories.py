@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rom.arguments import is_number, typed
+from rom.arguments import finite, is_number, number, positive, typed
 from rom.errors import ConfigError, FileFormatError
 from rom.model import Array
 
@@ -47,7 +47,7 @@ class Table:
         try:
             t, values = (np.asarray(x, dtype=float) for x in (self.t, self.values))
         except (TypeError, ValueError) as error:
-            raise ConfigError("times or values of the history are not made of numbers.") from error
+            raise ConfigError("times and values of the history must be made of numbers.") from error
         if t.ndim != 1 or t.shape != values.shape or len(t) < 2:
             raise ConfigError(
                 f"a history of {t.shape} times and {values.shape} values: two or more of each are "
@@ -62,7 +62,7 @@ class Table:
                 )
         if not (np.diff(t) > 0).all():
             k = int(np.argmin(np.diff(t) > 0))
-            raise ConfigError(f"times of the history do not grow from {t[k]} s to {t[k + 1]} s.")
+            raise ConfigError(f"times of a history must grow: {t[k]} s comes before {t[k + 1]} s.")
 
     def __call__(self, t: Array) -> Array:
         """Values at times.
@@ -124,7 +124,9 @@ def read_record(path: str | Path, *, scale: float = 1.0) -> Table:
     except (OSError, ValueError) as error:
         raise FileFormatError(f"{path} is no record: {error}") from error
     if columns.shape[1] != 2:
-        raise FileFormatError(f"{path} has {columns.shape[1]} columns; time and value are needed.")
+        raise FileFormatError(
+            f"{path} has {columns.shape[1]} columns.", hint="Write time and value."
+        )
     return recorded(columns[:, 0], scale * columns[:, 1])
 
 
@@ -141,11 +143,10 @@ def sine(amplitude: float, period: float, *, cycles: float = np.inf, phase: floa
     Raises:
         ConfigError: if there is no such motion.
     """
-    if not (0 < period < np.inf and cycles > 0 and np.isfinite([amplitude, phase]).all()):
-        raise ConfigError(
-            f"no sine has amplitude = {amplitude}, period = {period} s, cycles = {cycles}, "
-            f"phase = {phase}."
-        )
+    finite("amplitude and phase", [amplitude, phase], (2,))
+    positive("period", period)
+    if not cycles > 0:
+        raise ConfigError(f"cycles = {cycles} must be positive.")
 
     def values(t: Array) -> Array:
         turns = np.asarray(t) / period
@@ -161,8 +162,8 @@ def rectangle(amplitude: float, duration: float) -> History:
     Raises:
         ConfigError: if there is no such pulse.
     """
-    if not (0 < duration < np.inf and np.isfinite(amplitude)):
-        raise ConfigError(f"no pulse has amplitude = {amplitude}, duration = {duration} s.")
+    number("amplitude", amplitude)
+    positive("duration", duration)
     return lambda t: np.where(np.asarray(t) < duration, amplitude, 0.0)
 
 
@@ -194,7 +195,7 @@ def corners_of(name: str, pair: Pair, n: int = 1, *, rows: bool = False) -> tupl
         t, y = (np.asarray(x, dtype=float) for x in pair)
     except (TypeError, ValueError) as error:
         raise ConfigError(
-            f"{name}: its history is no number, no function, and no pair of times and values."
+            f"{name}: its history must be a number, a function, or a pair of times and values."
         ) from error
     if t.ndim != 1 or not t.size or y.shape[:1] != t.shape or not np.all(np.diff(t) > 0):
         raise ConfigError(
@@ -203,7 +204,7 @@ def corners_of(name: str, pair: Pair, n: int = 1, *, rows: bool = False) -> tupl
         )
     y = np.repeat(y[:, None], n, axis=1) if y.ndim == 1 and not rows else y
     if y.shape != (len(t), n) or not (np.isfinite(t).all() and np.isfinite(y).all()):
-        raise ConfigError(f"{name}: values of the shape {y.shape}, not {(len(t), n)} finite ones.")
+        raise ConfigError(f"{name}: values {y.shape}, needed are {(len(t), n)} finite ones.")
     return t, y
 
 
@@ -266,6 +267,6 @@ def values_at(name: str, history: History, t: Array) -> Array:
     if not np.isfinite(found).all():
         raise ConfigError(
             f"the history of {name} is {found[~np.isfinite(found)][0]} at "
-            f"t = {t[np.argmin(np.isfinite(found))]:g} s."
+            f"t = {t[np.argmin(np.isfinite(found))]:g} s, needed are finite values."
         )
     return found

@@ -304,7 +304,7 @@ def change(data: dict[str, Any], key: tuple[str, ...], value: Any) -> None:
     for name in key[:-1]:
         inner = data.setdefault(name, {})
         if not isinstance(inner, dict):
-            raise ConfigError(f"{name} = {as_text(inner)} is no table.")
+            raise ConfigError(f"{name} = {as_text(inner)} must be a table, to have keys below.")
         data = inner
     if value is None:
         data.pop(key[-1], None)

@@ -187,9 +187,11 @@ def _points(entry: Entry) -> None:
 
     x, values = entry.values["x"], entry.values["values"]
     if len(x) != len(values) or len(x) < 2:
-        raise entry.place.error(f"{entry.place.name} has {len(x)} lengths, {len(values)} values.")
+        raise entry.place.error(
+            f"{entry.place.name} needs two lengths or more, and as many values."
+        )
     if any(b <= a for a, b in pairwise(x)):
-        raise entry.place.at("x").error(f"the lengths of {entry.place.name} do not ascend.")
+        raise entry.place.at("x").error(f"the lengths of {entry.place.name} must ascend.")
     one, two = entry.ends
     force, potential = through_points(x, values, entry.values["interpolation"])
     line_law(entry.made, entry.name, one, two, force, potential)
@@ -322,7 +324,7 @@ def check_name(name: str) -> None:
         ConfigError: for one with a dot, or that of the ground.
     """
     if "." in name or name == GROUND:
-        raise ConfigError(f"{name!r} is no name for a body: markers are written body.marker.")
+        raise ConfigError(f"{name!r} is no name for a body; use one without a dot, not {GROUND!r}.")
 
 
 def pose_of(values: Mapping[str, Any]) -> dict[str, Any]:

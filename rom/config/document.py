@@ -68,7 +68,7 @@ def parsed(text: str, path: Path) -> Document:
     for key, line in found:
         if len(key) > MAX_DEPTH:
             where = f"{path}:{line}"
-            raise ConfigError(f"a key is deeper than {MAX_DEPTH} tables.", where=where)
+            raise ConfigError(f"a key must be at most {MAX_DEPTH} tables deep.", where=where)
     try:
         data = tomllib.loads(text)
     except ValueError as error:
@@ -86,7 +86,7 @@ def _check_depth(text: str, path: Path) -> None:
         depth += (token[0] in ("[", "{")) - (token[0] in ("]", "}"))
         if depth > MAX_DEPTH:
             where = f"{path}:{text.count(chr(10), 0, token.start()) + 1}"
-            raise ConfigError(f"has more than {MAX_DEPTH} brackets in each other.", where=where)
+            raise ConfigError(f"at most {MAX_DEPTH} brackets may be in each other.", where=where)
 
 
 def _refusal(message: str, found: list[tuple[KeyPath, int]], path: Path) -> ConfigError:

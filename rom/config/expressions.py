@@ -235,7 +235,7 @@ class AnyQuantity:
                 raise place.error(f"{place.name}: {error.message}", error.hint) from None
         if isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < 1e300:
             return float(value)
-        raise place.error(f"{place.name} = {as_text(value)} is no {self.summary}.")
+        raise place.error(f"{place.name} = {as_text(value)} must be a {self.summary}.")
 
 
 @dataclass(frozen=True, slots=True)

@@ -94,10 +94,10 @@ class Quantity:
         elif isinstance(value, int | float) and not isinstance(value, bool):
             x = float(value) if abs(value) <= 1e300 else math.inf
         else:
-            raise place.error(f"{place.name} = {as_text(value)} is not a {self.summary}.")
+            raise place.error(f"{place.name} = {as_text(value)} must be a {self.summary}.")
         if not math.isfinite(x) or (self.positive and x <= 0):
-            what = "is not positive" if math.isfinite(x) else "is not a finite number"
-            raise place.error(f"{place.name} = {as_text(value)} {what}.")
+            what = "positive" if math.isfinite(x) else "a finite number"
+            raise place.error(f"{place.name} = {as_text(value)} must be {what}.")
         return x
 
 
@@ -132,10 +132,9 @@ class Whole:
 
     def read(self, value: Any, place: Place) -> int:
         """The number."""
-        if isinstance(value, bool) or not isinstance(value, int):
-            raise place.error(f"{place.name} = {as_text(value)} is not a {self.summary}.")
-        if not self.least <= value <= self.most:
-            raise place.error(f"{place.name} = {as_text(value)} is not a {self.summary}.")
+        fits = isinstance(value, int) and not isinstance(value, bool)
+        if not fits or not self.least <= value <= self.most:
+            raise place.error(f"{place.name} = {as_text(value)} must be a {self.summary}.")
         return value
 
 
@@ -154,7 +153,7 @@ class Flag:
         """The value."""
         if isinstance(value, bool) or (self.more and value == self.more):
             return value
-        raise place.error(f"{place.name} = {as_text(value)} is not {self.summary}.")
+        raise place.error(f"{place.name} = {as_text(value)} must be {self.summary}.")
 
 
 @dataclass(frozen=True, slots=True)
@@ -171,7 +170,7 @@ class Text:
     def read(self, value: Any, place: Place) -> str:
         """The text."""
         if not isinstance(value, str) or not value or "\0" in value:
-            raise place.error(f"{place.name} = {as_text(value)} is not a text.")
+            raise place.error(f"{place.name} = {as_text(value)} must be a text.")
         if self.choices and value not in self.choices:
             hint = nearest(value, self.choices)
             raise place.error(f"{place.name} = {value!r} does not exist.", hint)
@@ -228,7 +227,7 @@ class Anything:
         """The value as it is."""
         if isinstance(value, int | float | str | list | dict):
             return value
-        raise place.error(f"{place.name} = {as_text(value)} is no {self.summary}.")
+        raise place.error(f"{place.name} = {as_text(value)} must be a {self.summary}.")
 
 
 @dataclass(frozen=True, slots=True)

@@ -204,9 +204,9 @@ def _harmonic(values: dict[str, Any]) -> Law:
 def _check_points(values: dict[str, Any], place: Place, t_end: float | None) -> None:
     t, y = values["t"], values["values"]
     if len(t) != len(y) or len(t) < 2:
-        raise place.error(f"{place.name} has {len(t)} times and {len(y)} values.")
+        raise place.error(f"{place.name} needs two times or more, and as many values.")
     if any(b <= a for a, b in pairwise(t)):
-        raise place.error(f"the times of {place.name} do not ascend.")
+        raise place.error(f"the times of {place.name} must ascend.")
     if t_end is not None and not (t[0] <= 0.0 and t[-1] >= t_end):
         raise place.error(
             f"the points of {place.name} cover {t[0]:g} s to {t[-1]:g} s; "

@@ -198,7 +198,7 @@ def _add_body(
     reference = values.pop("reference", None)
     if rigid:
         if "q" in values or "qd" in values:
-            raise ConfigError("a rigid body has no elastic coordinates: leave q and qd out.")
+            raise ConfigError("a rigid body has no elastic coordinates; leave q and qd out.")
         _add_rigid_from(made, name, _mass_of(file, meshing), values)
         return
     body = _body_of(file, meshing)
@@ -306,4 +306,4 @@ def read_mechanism(
 def _check_step(simulation: dict[str, Any]) -> None:
     t_end, dt = simulation["t_end"], simulation.get("dt")
     if dt is not None and dt > t_end:
-        raise ConfigError(f"dt = {dt:g} s is longer than t_end = {t_end:g} s.")
+        raise ConfigError(f"dt = {dt:g} s must be at most t_end = {t_end:g} s.")

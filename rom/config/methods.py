@@ -55,11 +55,11 @@ def _plain(settings: dict[str, Any]) -> "Method":
     modes, f_max = settings.get("modes"), settings.get("f_max")
     for key, owner in OWN_SETTINGS.items():
         if key in settings and name != owner:
-            raise ConfigError(f"{key} belongs to {owner}, not to {name}.")
+            raise ConfigError(f"{key} belongs to {owner}, not to {name}; leave it out.")
     if modes is not None and {"f_max", "tol"} & set(settings):
-        raise ConfigError(f"{name} has {'tol' if f_max is None else 'f_max'}: leave modes out.")
+        raise ConfigError(f"{name} has {'tol' if f_max is None else 'f_max'}; leave modes out.")
     if modes is not None and default is None:
-        raise ConfigError(f"{name} keeps no modes: leave modes out.")
+        raise ConfigError(f"{name} keeps no modes; leave modes out.")
     make: Any = getattr(import_module(f"rom.reduction.bases.{module}"), kind)
     if name == CRAIG_BAMPTON:
         return make(modes, f_max, settings.get("tol"))

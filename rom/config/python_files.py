@@ -52,7 +52,8 @@ def plain_function_of(
             del sys.modules[name]
             if isinstance(error, KeyboardInterrupt | RomError):
                 raise
-            raise place.error(f"{path} cannot be run: {_summary(error, path)}.") from error
+            hint = f"See that python {path.name} runs by itself."
+            raise place.error(f"{path} cannot be run: {_summary(error, path)}.", hint) from error
     known = {
         key: one
         for key, one in vars(sys.modules[name]).items()

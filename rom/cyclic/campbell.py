@@ -81,7 +81,7 @@ def wheel_campbell(
     """
     Omega = np.atleast_1d(np.asarray(speeds, dtype=float))
     if Omega.ndim != 1 or not Omega.size or not np.isfinite(Omega).all() or Omega.min() < 0.0:
-        raise ConfigError(f"speeds = {speeds!r}: give angular speeds [rad/s], none below 0.")
+        raise ConfigError(f"speeds = {speeds!r}; give angular speeds [rad/s], none below 0.")
     omega, direction, shapes = _waves(sector, diameter, n, Omega[0])
     omega, direction, shapes = omega[:n], direction[:n], shapes[:, :n]
     found, likeness = [omega], [np.ones(n)]

@@ -157,7 +157,8 @@ def _refuse_divergence(sector: CyclicSector, diameter: int, speed: float) -> Non
         limit = divergence_speed(sector, diameter)
         raise ModelError(
             f"at {speed:g} rad/s the wheel is above its instability: spin softening has used up "
-            f"the stiffness against {diameter} nodal diameters at {limit:.6g} rad/s."
+            f"the stiffness against {diameter} nodal diameters at {limit:.6g} rad/s.",
+            hint="Give a speed below that.",
         )
 
 
@@ -168,7 +169,7 @@ def spinning(sector: CyclicSector, speed: float) -> csr_matrix:
         ConfigError: if the sector has no matrices of rotation, or the speed is no number.
     """
     if not np.isfinite(speed):
-        raise ConfigError(f"speed = {speed!r}: give an angular speed in rad/s.")
+        raise ConfigError(f"speed = {speed!r}; give an angular speed in rad/s.")
     if sector.centrifugal is None:
         raise ConfigError(
             "the sector has no matrices of rotation.", hint="Make it with rom.rotating_sector."

@@ -94,7 +94,7 @@ def reduce_sector(
             )
         n_modes = method.n_modes
     if n_modes is None:
-        raise ConfigError("give the number of fixed-interface modes, for example n_modes=60.")
+        raise ConfigError("the number of fixed-interface modes is needed, for example n_modes=60.")
     if sector.face is None:
         raise ConfigError(
             "interface functions need the geometry of the cyclic faces.",
@@ -162,7 +162,10 @@ def face_functions(sector: CyclicSector, functions: Polynomial | FourierLegendre
     V, S = functions.functions(face), face.surface_mass
     at_rest = np.isin(face.dofs[::3], sector.held)
     if at_rest.all():
-        raise InterfaceError(f"all nodes of the cyclic face {face.name!r} are held.")
+        raise InterfaceError(
+            f"all nodes of the cyclic face {face.name!r} are held.",
+            hint="Hold another interface; of this face nothing is left to reduce.",
+        )
     if at_rest.any():
         V = V * fading(face, at_rest)[:, None]
     norms = np.sqrt(np.einsum("km,km->m", V, S @ V))

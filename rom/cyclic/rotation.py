@@ -159,4 +159,7 @@ def _largest(C: Array, K: Array) -> float:
     try:
         return float(eigh(C, K, eigvals_only=True)[-1])
     except LinAlgError as error:
-        raise ModelError("nothing holds the wheel, even at rest.") from error
+        raise ModelError(
+            "nothing holds the wheel, even at rest.",
+            hint="Hold the hub by fixed=, or put it on springs by rom.supported_sector.",
+        ) from error

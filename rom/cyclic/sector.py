@@ -94,12 +94,11 @@ class CyclicSector:
     def __post_init__(self) -> None:
         whole("n_sectors", self.n_sectors, 2)
         if np.intersect1d(self.slave, self.master).size:
-            raise InterfaceError("a dof is on both cyclic faces; sectors would be without width.")
-        if matrix("coupling", self.coupling).shape != (self.slave.size, self.master.size):
-            raise ConfigError(
-                f"the coupling of {self.slave.size} slave to {self.master.size} master dofs has "
-                f"the shape {self.coupling.shape}."
+            raise InterfaceError(
+                "a dof is on both cyclic faces: sectors would be without width.",
+                hint="Name two faces that meet at most on the axis.",
             )
+        matrix("coupling", self.coupling, (self.slave.size, self.master.size))
 
     @classmethod
     def from_model(
@@ -209,11 +208,8 @@ class CyclicSector:
         Raises:
             ConfigError: if not.
         """
-        if isinstance(diameter, bool) or diameter not in self.diameters:
-            raise ConfigError(
-                f"{diameter!r} nodal diameters: {self.n_sectors} sectors can tell 0 to "
-                f"{self.n_sectors // 2} apart."
-            )
+        most = self.n_sectors // 2
+        whole("diameter", diameter, 0, most, reason="what so many sectors can tell apart")
         return int(diameter)
 
     def parts(self) -> tuple[csr_matrix, csr_matrix]:

@@ -36,10 +36,14 @@ def supported_sector(
     """
     if not (np.isfinite([across, along]).all() and min(across, along) >= 0 < across + along):
         raise ConfigError(
-            f"springs of {across:g} N/m across and {along:g} N/m along the axis hold nothing."
+            f"springs of {across:g} N/m across and {along:g} N/m along the axis hold nothing; "
+            "one must be positive, none negative."
         )
     if sector.points is None or face.dofs.max() >= sector.n:
-        raise InterfaceError(f"the sector does not have the nodes of {face.name!r}.")
+        raise InterfaceError(
+            f"the sector does not have the nodes of {face.name!r}.",
+            hint="Give an interface of the model that the sector was made from.",
+        )
     e = sector.axis
     each = across * (np.eye(3) - np.outer(e, e)) + along * np.outer(e, e)
     share = kron(face.surface_mass / face.area, each / sector.n_sectors, format="coo")

@@ -89,7 +89,7 @@ def travelling_modes(
     K = spinning(sector, speed)
     T = sector.harmonic(sector.checked(diameter))
     if speed == 0.0 or not np.isfinite(speed):
-        raise ConfigError(f"speed = {speed!r}: waves of a wheel at rest are cyclic_modes.")
+        raise ConfigError(f"speed = {speed!r}; give one in rad/s, at rest use cyclic_modes.")
     standing = sector.standing(diameter)
     n = whole("n", n, 1, T.shape[1] if standing else 2 * T.shape[1])
     wanted = 2 * n if standing else n
@@ -126,7 +126,10 @@ def _lowest(
     try:
         solve = splu(csc_matrix(K + shift * G + shift**2 * M, dtype=complex)).solve
     except RuntimeError as error:
-        raise ModelError("rotation has used up the stiffness of the wheel exactly.") from error
+        raise ModelError(
+            "rotation has used up the stiffness of the wheel exactly.",
+            hint="Take another speed, below that of divergence_speed.",
+        ) from error
 
     def inverse(y: Complex) -> Complex:
         a, b = y[:f].ravel(), y[f:].ravel()

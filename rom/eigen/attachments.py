@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from scipy.sparse import csr_matrix
 
+from rom.arguments import positive
 from rom.eigen.verbs import mean_motion, rigid_motions
 from rom.errors import InterfaceError, MaterialError
 from rom.model import Array, Attachment, FEModel
@@ -31,13 +32,12 @@ def point_masses(attachment: Attachment, origin: Array) -> tuple[Array, Array]:
     """
     m, J = attachment.mass, np.asarray(attachment.inertia, dtype=float)
     at = origin if attachment.at is None else np.asarray(attachment.at, dtype=float)
-    if not (np.isfinite(m) and m > 0):
-        raise MaterialError(f"attachment on {attachment.interface!r} has the mass {m:g} kg.")
+    positive(f"mass of the attachment on {attachment.interface!r} [kg]", m, error=MaterialError)
     second, axes = np.linalg.eigh(0.5 * np.trace(J) * np.eye(3) - J)  # integral of rho x x^T
     if J.shape != (3, 3) or second.min() < -1e-9 * max(second.max(), 1e-300):
         raise MaterialError(
             f"attachment on {attachment.interface!r}: no body has this inertia; "
-            "one principal moment exceeds the sum of the two others."
+            "each principal moment must be at most the sum of the two others."
         )
     arms = axes * np.sqrt(3 * np.maximum(second, 0.0) / m)
     return at + np.vstack([arms.T, -arms.T]), np.full(6, m / 6)

@@ -11,12 +11,13 @@ from typing import Any, cast
 import numpy as np
 from scipy.linalg import LinAlgError, eigh, eigvalsh
 
+from rom.arguments import whole
 from rom.eigen.condensed import Supported
 from rom.eigen.gaussian import gaussian_block
 from rom.eigen.held import RIGID_RTOL, HeldBody
 from rom.eigen.lanczos import BLOCK_SIZE, EIGENVALUE_RTOLS, BlockLanczos, capacity
 from rom.eigen.verbs import Operators, count_shift, every_row, orthonormal, own_rows
-from rom.errors import ConfigError, ModelError, ModesMissedError, QualityGateError, SolverError
+from rom.errors import ModelError, ModesMissedError, QualityGateError, SolverError
 from rom.model import Array
 from rom.process.stopwatch import SEARCH_PIECE, piece
 
@@ -71,11 +72,8 @@ class ModeSearch:
             if np.size(held) == 0:
                 return self._free_modes(m, sigma)
             held, finished = self.hold(held), True
-        if not 0 <= m <= held.n_free:
-            raise ConfigError(
-                f"n_modes={m}, but {self.n} dofs minus {held.held.size} boundary dofs leave "
-                f"{held.n_free} interior dofs; ask for 0 to {held.n_free} modes."
-            )
+        reason = f"{self.n} dofs without {held.held.size} boundary dofs leave no more"
+        whole("n_modes", m, 0, held.n_free, reason=reason)
         lam, Phi = np.zeros(0), np.zeros((self.n_local, m))
         if m:
             how = {"in_blocks": in_blocks, "finished": finished}
@@ -120,8 +118,7 @@ class ModeSearch:
         return omega, np.hstack([R, self.signed(Phi)])
 
     def _free_modes(self, m: int, sigma: float | None) -> tuple[Array, Array]:
-        if not 0 <= m <= self.n:
-            raise ConfigError(f"n_modes={m}, but the model has {self.n} dofs.")
+        whole("n_modes", m, 0, self.n, reason="the dofs of the model")
         R = self._rigid_modes()
         lam, Phi = self._elastic_modes(R, max(m - R.shape[1], 0), sigma)
         omega = np.concatenate([np.zeros(R.shape[1]), np.sqrt(lam)])

@@ -13,14 +13,14 @@ import numpy.typing as npt
 from scipy.linalg import eigh, qr
 from scipy.sparse import csr_matrix, issparse
 
-from rom.arguments import positive
+from rom.arguments import between, positive
 from rom.eigen.fronts import SubstructuredBody, refuse_beyond
 from rom.eigen.gaussian import gaussian_block
 from rom.eigen.held import RIGID_RTOL
 from rom.eigen.lanczos import BlockLanczos, capacity
 from rom.eigen.scipy import SciPyOperators, dof_set
 from rom.eigen.verbs import canonical_signs, orthonormal
-from rom.errors import ConfigError, ModelError, ModesMissedError, ParallelError, SolverError
+from rom.errors import ModelError, ModesMissedError, ParallelError, SolverError
 from rom.model import Array, Modes
 
 CUTOFF_RATIOS = (9.0, 16.0)  # eigenvalues of substructures kept up to, over the last one sought
@@ -79,8 +79,7 @@ def substructured_modes(
         >>> np.round(found.omega, 6)  # 2 sin(k pi / 20)
         array([0.312869, 0.618034])
     """
-    if not 0 < tol < 1:
-        raise ConfigError(f"tol = {tol!r} is a relative error between 0 and 1.")
+    between("tol", tol, 0, 1, "()")
     ops = SciPyOperators(K, M, rigid)
     last = (2 * np.pi * positive("f_max", f_max)) ** 2
     for ratio, spare in zip(CUTOFF_RATIOS, SPARE_RATIOS, strict=True):

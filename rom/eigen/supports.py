@@ -128,9 +128,9 @@ def spring_matrices(springs: Springs | None, known: Iterable[str], owner: str) -
         k = np.diag(np.pad(k, (0, 6 - k.size))) if k.ndim == 1 else k
         lam = np.linalg.eigvalsh(0.5 * (k + k.T))
         if np.abs(k - k.T).max() > 1e-10 * np.abs(k).max() or lam[0] < -1e-10 * lam[-1]:
-            raise ConfigError(f"springs[{name!r}] has no energy: negative, or not symmetric.")
+            raise ConfigError(f"springs[{name!r}] must be symmetric, and positive or zero.")
         if not k.any():
-            raise ConfigError(f"springs[{name!r}] holds nothing: all of it is zero.")
+            raise ConfigError(f"springs[{name!r}] needs a stiffness that is not zero.")
         found[name] = 0.5 * (k + k.T)
     return found
 

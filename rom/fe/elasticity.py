@@ -30,6 +30,7 @@ from rom.fe.operators.petsc import PETScOperators
 from rom.fe.operators.solver import DIRECT_SOLVER, parsed
 from rom.fe.parallel import collective, install_abort_hook, on_root
 from rom.model import Attachment, FEModel, Index, Interface, Material, Orthotropic
+from rom.names import check_known
 
 log = logging.getLogger("rom")
 WHOLE_REGION = "solid"  # name of the only region of a mesh without named regions
@@ -349,7 +350,7 @@ def _cell_regions(mesh: Any, cell_tags: Any, regions: dict[str, int]) -> Index:
     if len(regions) == 1:
         return tags
     if cell_tags is None:
-        raise TagError(f"the regions {sorted(regions)} are named, but no cell is tagged.")
+        raise TagError(f"the regions {sorted(regions)} are named without cells; give cell_tags.")
     tags -= 1
     tags[cell_tags.indices] = cell_tags.values
     owned = tags[: cells.size_local]
@@ -360,11 +361,8 @@ def _cell_regions(mesh: Any, cell_tags: Any, regions: dict[str, int]) -> Index:
 
 def _check_attachments(attached: Sequence[Attachment], names: dict[str, Any]) -> None:
     for item in attached:
-        if item.interface not in names:
-            raise InterfaceError(
-                f"a mass of {item.mass:g} kg hangs on {item.interface!r}, "
-                f"but the interfaces are {sorted(names)}."
-            )
+        text = f"a mass of {item.mass:g} kg hangs on {item.interface!r}; use one of"
+        check_known(item.interface, names, text, InterfaceError)
 
 
 def _warn(comm: MPI.Comm, remarks: list[str]) -> None:

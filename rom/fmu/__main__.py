@@ -29,7 +29,7 @@ def main(resources: Path, *description: str) -> int:
         try:
             found = {"variables": [asdict(variable) for variable in driven(resources).variables]}
         except RomError as error:
-            found = {"error": str(error)}
+            found = {"error": error.message, "hint": error.hint}
     found["warnings"] = [str(warning.message) for warning in caught
                          if issubclass(warning.category, RomWarning)]  # fmt: skip
     Path(description[0]).write_text(json.dumps(found))

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from rom.arguments import between, number, positive
 from rom.errors import ConfigError, SolverError
 from rom.fmu.inputs import Inputs
 from rom.fmu.outputs import Outputs
@@ -86,8 +87,7 @@ class Driven:
             if variable is None or variable.causality == "output":
                 what = f"the output {variable.name!r}" if variable else f"value reference {ref}"
                 raise ConfigError(f"{what} cannot be set; there are {len(known)} variables.")
-            if not np.isfinite(value):
-                raise ConfigError(f"{variable.name} = {value} is not a finite number.")
+            number(variable.name, value)
             if variable.causality == "parameter":
                 self._set_parameter(int(ref), variable.name, float(value))
             else:
@@ -95,11 +95,11 @@ class Driven:
 
     def _set_parameter(self, k: int, name: str, value: float) -> None:
         if self.stepped:
-            raise ConfigError(f"{name} can be set before the first step only.")
-        if k == 0 and value <= 0.0:
-            raise ConfigError(f"dt = {value:g} s must be positive.")
-        if k == 1 and not 0.0 <= value <= 1.0:
-            raise ConfigError(f"rho_inf = {value:g} is outside [0, 1].")
+            raise ConfigError(f"{name} must be set before the first step.")
+        if k == 0:
+            positive("dt", value)
+        if k == 1:
+            between("rho_inf", value, 0, 1)
         self.parameters[k] = value
 
     def get(self, refs: Any) -> Array:
@@ -144,9 +144,8 @@ class Driven:
         """
         if self.state is None or abs(t - self.state.t) > TIME_RTOL * max(h, 1e-3 * abs(t)):
             where = "not started" if self.state is None else f"at t = {self.state.t:.9g} s"
-            raise ConfigError(f"a step from t = {t:.9g} s is asked for, the mechanism is {where}.")
-        if not (np.isfinite(h) and h > 0.0):
-            raise ConfigError(f"the communication step {h} s must be positive.")
+            raise ConfigError(f"a step from t = {t:.9g} s must start at the mechanism, {where}.")
+        positive("the communication step", h)
         n = max(1, int(np.ceil(h / float(self.parameters[0]) - 1e-6)))
         dt, begun = h / n, self._jumped(self.state)
         if begun.memory is not None and abs(begun.memory.h - dt) < TIME_RTOL * dt:
@@ -208,5 +207,5 @@ class Driven:
 
     def _outputs(self) -> Array:
         if self.state is None:
-            raise ConfigError("the mechanism has not started: it has no outputs yet.")
+            raise ConfigError("the mechanism has no outputs yet: it must be initialised first.")
         return self.outputs.values(self._evaluated(self.state), self.state.lam, self.packed)

@@ -6,13 +6,14 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from rom.arguments import typed
+from rom.arguments import between, positive, typed
 from rom.errors import ConfigError, warn
 from rom.fmu.server import SETTINGS_FILE
 from rom.io.files import check_writable
 from rom.io.fmu.archive import Content, write_archive
 from rom.io.fmu.description import Model, model_description
 from rom.io.fmu.variables import Variable
+from rom.names import check_ending
 from rom.process.child import Limits, python, run, scratch
 
 PYTHON_FILE = "python"  # names the interpreter; read by process.c
@@ -61,11 +62,9 @@ def write_fmu(
             cannot be built from these files alone, or a place not writable.
         ResourceError: if there is no C compiler, it fails, or the disk is full.
     """
-    path, script = check_writable(path), Path(script)
-    if path.suffix != ".fmu":
-        raise ConfigError(f"{path} does not end in .fmu.")
-    if not (dt > 0.0 and 0.0 <= rho_inf <= 1.0):
-        raise ConfigError(f"dt = {dt} s must be positive, rho_inf = {rho_inf} within [0, 1].")
+    path, script = check_ending(check_writable(path), "a unit", ".fmu"), Path(script)
+    positive("dt", dt)
+    between("rho_inf", rho_inf, 0, 1)
     resources = {f"{MODEL_FOLDER}/{p.name}": _read(p) for p in (script, *map(Path, files))}
     settings: dict[str, Any] = {"script": f"{MODEL_FOLDER}/{script.name}"}
     settings |= {"inputs": list(inputs), "outputs": list(outputs)}
@@ -78,7 +77,7 @@ def write_fmu(
 
 def _read(path: Path) -> bytes:
     if not path.is_file():
-        raise ConfigError(f"there is no file {path}.")
+        raise ConfigError(f"there is no file {path}.", hint="Relative paths start where you are.")
     return path.read_bytes()
 
 
@@ -103,7 +102,7 @@ def _variables(resources: dict[str, bytes], script: Path) -> list[Variable]:
     for sentence in found["warnings"]:
         warn(sentence)
     if "error" in found:
-        raise ConfigError(found["error"], where=script.name)
+        raise ConfigError(found["error"], where=script.name, hint=found["hint"])
     return [Variable(**one) for one in found["variables"]]
 
 

@@ -6,13 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from rom.errors import ConfigError
 from rom.io.fmu.variables import Variable, structured
 from rom.mbs.connections.drives import Drive
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.parts.signals import drive_signal
 from rom.model import Array
-from rom.names import check_known
+from rom.names import check_known, check_once
 
 INFINITE_SPAN = (-np.inf, np.inf)
 DIFFERENCE_SPACING = 1e-4  # of the differences for the speed of a drive at the start [s]
@@ -70,10 +69,9 @@ class Inputs:
             **dict.fromkeys(mechanism.motors, _motor),
             **dict.fromkeys(mechanism.drives, _drive),
         }
+        check_once(names, "the input")
         for name in names:
             check_known(name, kinds, f"no input {name!r}; the loads, motors and drives are")
-            if list(names).count(name) > 1:
-                raise ConfigError(f"the input {name!r} is named twice.")
         found = {name: kinds[name](mechanism, name) for name in names}
         self.variables = [variable for several in found.values() for variable in several]
         self.values = np.array([v.start for v in self.variables], dtype=float)

@@ -13,6 +13,7 @@ from rom.mbs.kernels.work import Work
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.parts.bodies import Marker
 from rom.model import Array
+from rom.names import check_once
 from rom.rotation import quaternion
 
 # reads (W, lam, packed) at an instant
@@ -55,9 +56,8 @@ class Outputs:
             for place in part.names
         }
         joints = {n: j for n, j in mechanism.joints.items() if j.coordinate is not None}
+        check_once(names, "the output")
         for name in names:
-            if list(names).count(name) > 1:
-                raise ConfigError(f"the output {name!r} is named twice.")
             if name in places:
                 self._marker(places[name])
             elif name in joints:

@@ -44,14 +44,10 @@ def driven(resources: Path) -> Driven:
     spec.loader.exec_module(module)
     build = getattr(module, BUILD_FUNCTION, None)
     if not callable(build):
-        raise ConfigError(
-            f"{script.name} has no function {BUILD_FUNCTION}() that builds the mechanism."
-        )
+        raise ConfigError(f"{script.name} needs a function {BUILD_FUNCTION}() for the mechanism.")
     mechanism = build()
     if not isinstance(mechanism, Mechanism):
-        raise ConfigError(
-            f"{BUILD_FUNCTION}() of {script.name} gave {mechanism!r}, not a Mechanism."
-        )
+        raise ConfigError(f"{BUILD_FUNCTION}() gave {mechanism!r}; it must return a Mechanism.")
     names = {key: tuple(settings[key]) for key in ("inputs", "outputs")}
     return Driven(mechanism, **names, dt=settings["dt"], rho_inf=settings["rho_inf"])
 
@@ -115,7 +111,7 @@ class Server:
 
     def _recall(self, refs: Index, values: Array) -> Array:
         if int(values[0]) not in self.states:
-            raise ConfigError("this state has been freed, or is of another instance.")
+            raise ConfigError("this state was freed, or of another instance; take a kept one.")
         self.model.recall(self.states[int(values[0])])
         return NO_VALUES
 

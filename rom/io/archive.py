@@ -65,7 +65,7 @@ def write_archive(
     """
     for name, A in arrays.items():
         if not np.isfinite(A).all():
-            raise QualityGateError(f"{name} of {what} is not finite; nothing was written.")
+            raise QualityGateError(f"{name} of {what} must be finite; nothing was written.")
     manifest = manifest | {"sha256": {name: digest(A) for name, A in arrays.items()}}
     text = np.frombuffer(json.dumps(manifest, sort_keys=True).encode(), dtype=np.uint8)
 

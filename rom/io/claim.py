@@ -35,7 +35,10 @@ def claimed(folder: str | Path) -> Iterator[None]:
     try:
         handle = _locked(folder)
     except OSError as error:
-        raise ConfigError(f"the folder {folder} is not writable: {error.strerror}.") from error
+        hint = "Choose another folder, or ask for the right to write there."
+        raise ConfigError(
+            f"the folder {folder} is not writable: {error.strerror}.", hint=hint
+        ) from error
     try:
         yield
     finally:

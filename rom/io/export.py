@@ -106,7 +106,7 @@ def export(
     """
     kind = format_of(path, to)
     if held and kind not in HOLDING_FORMATS:
-        raise ConfigError(f"interfaces are held for {HOLDING_FORMATS[0]} alone, not for {kind}.")
+        raise ConfigError(f"{kind} holds no interfaces, {HOLDING_FORMATS[0]} does; leave held out.")
     if body.quartic is not None and kind not in NONLINEAR_FORMATS:
         raise ConfigError(
             f"the format {kind!r} has no place for the energy of body {body.name!r} at large "

@@ -27,9 +27,7 @@ def write_whole(path: str | Path, write: Callable[[IO[bytes]], object]) -> None:
     path = check_writable(path)
     try:
         handle, name = tempfile.mkstemp(prefix=f".{path.name}.", suffix=".part", dir=path.parent)
-    except PermissionError as error:
-        raise ConfigError(f"the folder {path.parent} is not writable.") from error
-    except OSError as error:
+    except OSError as error:  # of which check_writable knows nothing
         raise ResourceError(f"{path} cannot be written: {error.strerror}.") from error
     try:
         _fill(handle, write)
@@ -59,7 +57,10 @@ def check_writable(path: str | Path) -> Path:
     if not path.parent.is_dir():
         raise ConfigError(f"the folder {path.parent} does not exist.", hint="Make it first.")
     if not os.access(path.parent, os.W_OK | os.X_OK):
-        raise ConfigError(f"the folder {path.parent} is not writable.")
+        raise ConfigError(
+            f"the folder {path.parent} is not writable.",
+            hint="Choose another folder, or ask for the right to write there.",
+        )
     return path
 
 

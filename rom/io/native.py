@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix
 
+from rom.arguments import symmetric
 from rom.body.flexible import FlexibleBody
 from rom.body.nonlinear.cauchy import CauchyRecovery
 from rom.body.nonlinear.quartic import Quartic
@@ -84,7 +85,11 @@ def read_finite(path: Path, kind: Kind, limit: int) -> tuple[dict[str, Any], dic
             squares = np.square(A, dtype=float)
         if not np.isfinite(squares).all():
             what = "whose square is not" if np.isfinite(A).all() else "that is not"
-            raise QualityGateError(f"{name} holds a number {what} finite.", where=str(path))
+            raise QualityGateError(
+                f"{name} holds a number {what} finite.",
+                where=str(path),
+                hint="Look where the body was computed: no force or motion follows from it.",
+            )
     return manifest, arrays
 
 
@@ -230,7 +235,7 @@ def _refuse_missing(manifest: dict[str, Any], arrays: dict[str, Array]) -> None:
     needed += [f"K_geo/{name}" for name in manifest["geometric_stiffness"]]
     needed += [f"surface/{part}" for part in SURFACE_ARRAYS] if manifest["surface"] else []
     if missing := [name for name in needed if name not in arrays]:
-        raise ConfigError(f"the file lacks the array {named(missing)}.")
+        raise ConfigError(f"the file needs the array {named(missing)}; write it again by rom.save.")
 
 
 def _check_words(manifest: dict[str, Any], r: int) -> None:
@@ -253,7 +258,7 @@ def _check_words(manifest: dict[str, Any], r: int) -> None:
         reference.startswith(word) and _are_names(reference.removeprefix(word), n, names)
         for word, n in (("pins ", 2), ("3-2-1 ", 3))
     ):
-        raise ConfigError(f"reference = {reference!r} is no frame of a body with {named(names)}.")
+        raise ConfigError(f"reference = {reference!r} must be {named(FRAMES)}, or of {names}.")
     if wrong := [m["kind"] for m in manifest["markers"] if m["kind"].split(":")[0] not in KINDS]:
         raise ConfigError(f"the kind of interface {named(wrong)} is none of {', '.join(KINDS)}.")
 
@@ -302,12 +307,11 @@ def verify(body: FlexibleBody, path: Path) -> None:
             raise FileFormatError("the surface does not fit the body.", where=str(path))
     _verify_stiffening(body, path)
     for name, A in (("K", body.K), ("D", body.D), ("inertia", body.inertia)):
-        if np.abs(A - A.T).max(initial=0.0) > 1e-10 * np.abs(A).max(initial=1e-300):
-            raise QualityGateError(f"{name} is not symmetric.", where=str(path))
+        symmetric(name, A, 1e-10, where=str(path))
     if body.omega.min(initial=0.0) < 0.0:
-        raise QualityGateError("a frequency of the coordinates is negative.", where=str(path))
+        raise QualityGateError("each frequency of the coordinates must be >= 0.", where=str(path))
     if body.mass <= 0 or (r and np.linalg.eigvalsh(body.M)[0] <= 0):
-        raise QualityGateError("the mass is not positive definite.", where=str(path))
+        raise QualityGateError("the mass must be positive definite.", where=str(path))
 
 
 def _verify_stiffening(body: FlexibleBody, path: Path) -> None:
@@ -323,10 +327,7 @@ def _verify_stiffening(body: FlexibleBody, path: Path) -> None:
                 f"{body.K.shape}.",
                 where=str(path),
             )
-        if not np.allclose(A, A.T, rtol=0, atol=1e-10 * np.abs(A).max(initial=0.0)):
-            raise QualityGateError(
-                f"the geometric stiffness {load!r} is not symmetric.", where=str(path)
-            )
+        symmetric(f"the geometric stiffness {load!r}", A, 1e-10, where=str(path))
 
 
 def _verify_covariance(m: Marker, r: int, path: Path) -> None:

@@ -314,7 +314,7 @@ class Mechanism(Methods, metaclass=Open, kind="methods", bound=bound):
         """
         self.check_new(name)
         if direction not in (-1, 0, 1):
-            raise ConfigError(f"direction of event {name!r} is {direction!r}; it is -1, 0 or 1.")
+            raise ConfigError(f"direction of event {name!r} is {direction!r}; use -1, 0 or 1.")
         markers = tuple(one for one in follow if isinstance(one, Marker))
         self.check_markers(name, *markers)
         named = [(one, None) if isinstance(one, str) else one for one in follow]
@@ -380,3 +380,16 @@ class Mechanism(Methods, metaclass=Open, kind="methods", bound=bound):
         """
         for marker in markers:
             self.part(marker.body).point(marker)
+
+    def check_apart(self, name: str, m1: Marker, m2: Marker) -> None:
+        """Refuse to connect a body with itself; markers as `check_markers`.
+
+        Raises:
+            ConfigError: naming the body.
+        """
+        self.check_markers(name, m1, m2)
+        if m1.body == m2.body:
+            raise ConfigError(
+                f"{name!r} connects body {m1.body!r} with itself.",
+                hint="Give a marker of another body, such as mech.ground.marker((0, 0, 0)).",
+            )

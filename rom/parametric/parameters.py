@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from rom.arguments import is_number, one_of, shortened, typed
+from rom.arguments import between, number, one_of, typed
 from rom.errors import ParameterError, warn
 from rom.model import Array
 from rom.names import check_text, named
@@ -45,13 +45,10 @@ class Parameter:
         if self.region is not None:
             check_text(self.region, "a region")
         for name in ("low", "high"):
-            value = getattr(self, name)
-            if not is_number(value):
-                message = f"{name} = {shortened(value)} is not a finite factor."
-                raise ParameterError(message, where=str(self))
+            number(f"{name} of {self}", getattr(self, name), error=ParameterError)
         if not 0.0 < self.low <= self.high:
             raise ParameterError(
-                f"the range {self.low:g} to {self.high:g} of {self} is not one of positive factors."
+                f"{self}: needed is 0 < low <= high, got {self.low:g}, {self.high:g}."
             )
         for end in dict.fromkeys((self.low, self.high)):
             warn_outside(FACTOR, end, str(self))
@@ -66,8 +63,7 @@ class Parameter:
         Raises:
             ParameterError: for another share.
         """
-        if not 0.0 <= share <= 1.0:
-            raise ParameterError(f"share = {share:g} is not within 0 and 1.", where=str(self))
+        between("share", share, 0, 1, error=ParameterError)
         return float(self.low * (self.high / self.low) ** share)
 
 
@@ -138,11 +134,11 @@ def checked_parameters(parameters: dict[str, Any]) -> dict[str, Parameter]:
                 hint='For example rom.YoungsModulus("web", 0.5, 2.0).',
             )
         if not str(name).isidentifier() or name == "extrapolate":
-            raise ParameterError(f"{name!r} cannot name a parameter: at({name}=1.0) means no call.")
+            raise ParameterError(f"{name!r} names no parameter; use letters, as in at(web=1.0).")
     if not parameters:
         raise ParameterError("a family of bodies needs a parameter.", hint="Use rom.reduce.")
     if len(parameters) > len(PRIMES):
-        raise ParameterError(f"{len(parameters)} parameters are more than {len(PRIMES)}.")
+        raise ParameterError(f"{len(parameters)} parameters must be at most {len(PRIMES)}.")
     axes = {p.axis for p in parameters.values() if isinstance(p, Thickness)}
     if len(axes) > 1:
         raise ParameterError(f"thicknesses along {sorted(axes)} in one family; choose one axis.")
@@ -175,7 +171,7 @@ def complete(
 def _checked(name: str, parameter: Parameter, value: Any, extrapolate: bool) -> float:
     number = np.ndim(value) == 0 and not isinstance(value, bool | str)
     if not (number and np.isfinite(value) and value > 0):
-        raise ParameterError(f"{name} = {value!r} is not a positive factor.")
+        raise ParameterError(f"{name} = {value!r} must be a positive factor.")
     low, high = parameter.low, parameter.high
     if not low * (1 - RANGE_RTOL) <= value <= high * (1 + RANGE_RTOL):
         message = f"{name} = {value:g} is outside {low:g} to {high:g}, where the basis was made."

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from rom.arguments import typed
+from rom.arguments import between, typed
 from rom.body.damping import ModalDamping, Rayleigh
 from rom.body.projection import canonical_columns, elastic_part, flexible_body
-from rom.errors import ConfigError, ParameterError
+from rom.errors import ParameterError
 from rom.model import FEModel
 from rom.names import check_name
 from rom.parametric.affine import AffineModel
@@ -98,8 +98,7 @@ def reduce_parametric(  # noqa: PLR0913  one keyword per choice
     """
     check_name(name, "a body")
     clock = perf_counter()
-    if isinstance(tol, bool) or not 0 < tol < 1:
-        raise ConfigError(f"tol = {tol!r} is not a relative error between 0 and 1.")
+    between("tol", tol, 0, 1, "()")
     affine = _affine(model, checked_parameters(parameters), stress)
     middle = centre(affine.parameters)
     there, kinds = affine.model_at(middle), affine.kinds(interfaces)

@@ -40,7 +40,7 @@ class StretchedModel(AffineModel):
     def __init__(self, model: FEModel, parameters: dict[str, Parameter]):
         super().__init__(model, parameters)
         if model.attachments:
-            raise ParameterError("a model with a parameter of thickness may carry no masses.")
+            raise ParameterError("a model with a parameter of thickness takes no attached masses.")
         thin = [p for p in parameters.values() if isinstance(p, Thickness)]
         axis = "xyz".index(thin[0].axis)
         self.regions = {name: model.regions[name] for name in model.regions}
@@ -178,7 +178,10 @@ class StretchedModel(AffineModel):
             np.sqrt(np.diag(ops.gram(A, ops.apply_M(A))).max()) for A in (R - Phi @ C, ops.rigid)
         )
         if gap > RIGID_RTOL * size:
-            raise ModelError(f"the basis misses a rigid motion of a stretched body by {gap:.1e}.")
+            raise ModelError(
+                f"the basis misses a rigid motion of a stretched body by {gap:.1e}.",
+                hint="Ask for more modes, or a narrower range of the thickness.",
+            )
         return C
 
     def _refuse_more(self, E: Array, shares: list[Share]) -> None:
@@ -191,7 +194,7 @@ class StretchedModel(AffineModel):
             if abs(whole - found) > REMAINDER_RTOL * whole:
                 raise ParameterError(
                     f"the regions {sorted(self.regions)} are not the whole model, whose thickness "
-                    "is to change."
+                    "is to change; name all of them."
                 )
 
     def _slopes(self, point: Point) -> Array:

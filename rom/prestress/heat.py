@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rom.arguments import typed
+from rom.arguments import finite, number, typed
 from rom.errors import ConfigError
 from rom.model import Array, FEModel
+from rom.names import check_known
 
 Temperature = float | Mapping[str, float] | npt.ArrayLike | Callable[[Array], Any]
 
@@ -56,12 +57,8 @@ class Heat:
         given = self.temperature
         if not callable(given) and (isinstance(given, Mapping) or np.ndim(given) == 0):
             return alpha, _by_region("temperature", given, names), cold
-        values = np.asarray(given(model.points) if callable(given) else given, dtype=float)
-        if values.shape != cold.shape or not np.isfinite(values).all():
-            raise ConfigError(
-                f"the temperature has the shape {values.shape}; the {cold.size} nodes of the model "
-                "need one finite number each."
-            )
+        values = given(model.points) if callable(given) else given
+        values = finite("the temperature at the nodes", values, cold.shape)
         return alpha, dict.fromkeys(names, 0.0), values
 
     def largest_strain(self, model: FEModel) -> float:
@@ -81,11 +78,6 @@ class Heat:
 def _by_region(what: str, given: Any, names: tuple[str, ...]) -> dict[str, float]:
     table = dict(given) if isinstance(given, Mapping) else dict.fromkeys(names, given)
     for name, value in table.items():
-        if name not in names:
-            raise ConfigError(
-                f"the {what} names the region {name!r}; the model has {sorted(names)}."
-            )
-        number = isinstance(value, int | float | np.number) and not isinstance(value, bool)
-        if not (number and np.isfinite(value)):
-            raise ConfigError(f"the {what} of region {name!r} is {value!r}, not a finite number.")
+        check_known(name, names, f"the {what} names the region {name!r}; the model has")
+        number(f"the {what} of region {name!r}", value)
     return {name: float(table.get(name, 0.0)) for name in names}

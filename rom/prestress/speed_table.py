@@ -158,6 +158,7 @@ class SpinUp(SpeedTable):
             if reached < square:
                 raise ModelError(
                     f"no stable steady state was found at {speed:.5g} rad/s.",
+                    hint=f"Stay below {reached**0.5:.5g} rad/s, up to where one was found.",
                     solution=self.steady.T @ a,
                 )
         return self.steady.T @ a

@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from rom.arguments import typed
+from rom.arguments import one_each, typed
 from rom.errors import ConfigError
 from rom.io.files import write_whole
 from rom.model import Report
-from rom.names import ORIGIN_MARK
+from rom.names import ORIGIN_MARK, check_ending
 
 SOURCE_FOLDER = Path(__file__).parent
 PAGE_STYLE = (SOURCE_FOLDER / "page.css").read_text(encoding="utf-8")
@@ -44,8 +44,7 @@ def table(header: Sequence[str], rows: Iterable[Sequence[Any]], caption: str) ->
     """
     lines = []
     for row in rows:
-        if len(row) != len(header):
-            raise ConfigError(f"a row of {len(row)} cells under a header of {len(header)}: {row}.")
+        one_each(f"cells of the row {row}", len(row), "columns of the header", len(header))
         lines.append("<tr>" + "".join(f"<td>{_cell(value)}</td>" for value in row) + "</tr>")
     head = "".join(f"<th>{html.escape(name)}</th>" for name in header)
     return (
@@ -83,12 +82,10 @@ def image(path: str | Path, words: str) -> str:
     """A picture without a caption; words for those who do not see it. Raises as `picture`."""
     path = Path(path)
     if path.suffix.lower() not in KINDS or not path.is_file():
-        raise ConfigError(f"{path} is no picture of the kinds {', '.join(KINDS)}.")
+        raise ConfigError(f"{path} must be a picture of the kinds {', '.join(KINDS)}.")
     data = path.read_bytes()
     if len(data) > MAX_PICTURE_BYTES:
-        raise ConfigError(
-            f"{path} has {len(data)} bytes; pictures up to {MAX_PICTURE_BYTES} are embedded."
-        )
+        raise ConfigError(f"{path} must have at most {MAX_PICTURE_BYTES} bytes, not {len(data)}.")
     code = base64.b64encode(data).decode("ascii")
     kind = KINDS[path.suffix.lower()]
     return f"<img alt='{html.escape(words, quote=True)}' src='data:{kind};base64,{code}'>"
@@ -110,9 +107,7 @@ def write_report(sections: dict[str, Sequence[str]], path: str | Path, title: st
         ConfigError: if the ending is another one or the folder cannot be written.
         ResourceError: if the disk is full.
     """
-    path = Path(path)
-    if path.suffix.lower() != ".html":
-        raise ConfigError(f"{path}: a report is written as .html.")
+    path = check_ending(path, "a report", ".html")
     body = "".join(
         f"<h2>{html.escape(heading)}</h2>{''.join(blocks)}" for heading, blocks in sections.items()
     )

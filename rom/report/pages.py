@@ -72,7 +72,7 @@ def describe(
         moved = run(file, progress=progress) if move else None
         return of_mechanism(file, how(command, made), moved)
     if move:
-        raise ConfigError(f"{source} is no mechanism file, which alone can be moved.")
+        raise ConfigError(f"{source} must be a mechanism file to be moved; leave move out.")
     if source.is_dir():
         return of_run(source)
     if described:

@@ -92,7 +92,7 @@ def modes_scene(body: "FlexibleBody", *, size: int = SHAPE_BYTES) -> dict[str, A
     body = body.in_units("SI")
     surface, stress, found = _surface(body), _stress(body), list(_modes(body))
     if surface is None:
-        raise ConfigError(f"body {body.name!r} has no surface to draw.")
+        raise ConfigError(f"body {body.name!r} carries no surface; only meshed ones are drawn.")
     Q = np.array([mode["q"] for mode in found]).reshape(len(found), -1)
     far = [float(np.abs(displacement(body, _motion(mode))).max()) for mode in found]
     kept = np.union1d(
@@ -180,9 +180,9 @@ def _meshes(shapes: dict[str, Mesh], mechanism: "Mechanism") -> dict[str, Mesh]:
         X, corner = np.asarray(points, dtype=float), np.asarray(triangles)
         fit = X.ndim == corner.ndim == 2 and X.shape[1] == corner.shape[1] == 3 and corner.size
         if not fit or not np.isfinite(X).all() or corner.dtype.kind not in "iu":
-            raise ConfigError(f"the shape of {name!r} is no (n, 3) points and (t, 3) corners.")
+            raise ConfigError(f"the shape of {name!r} must be (n, 3) points and (t, 3) corners.")
         if corner.min() < 0 or corner.max() >= len(X):
-            raise ConfigError(f"the shape of {name!r} has corners beyond its {len(X)} points.")
+            raise ConfigError(f"the shape of {name!r} must have corners from 0 to {len(X) - 1}.")
         found[name] = X, corner.astype(np.int64)
     return found
 

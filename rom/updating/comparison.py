@@ -101,7 +101,7 @@ def compare(
     n_f = len(test.frequencies)
     whole("folds", folds, 2, n_f, reason="lines")
     if not sets:
-        raise ConfigError("there is no set of parameters to compare.")
+        raise ConfigError("at least one set of parameters to compare is needed.")
     data, by_line, n_unknowns = Data.of(test), np.zeros((len(sets), n_f)), []
     for k, own in enumerate(sets.values()):
         for first in range(folds):

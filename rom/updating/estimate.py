@@ -12,14 +12,22 @@ from typing import Any
 import numpy as np
 from scipy.linalg import block_diag
 
-from rom.arguments import one_of, positive, typed
+from rom.arguments import between, one_of, positive, typed
 from rom.errors import ConfigError, ParameterError, SolverError, warn
 from rom.model import Array, Mask, Row
 from rom.names import named
 from rom.plausible import check_damping_ratio
 from rom.rows import row
 from rom.updating.equations import by_equations, by_response_functions
-from rom.updating.family_model import Attached, Family, FamilyModel, Parts, family_model
+from rom.updating.family_model import (
+    Attached,
+    Family,
+    FamilyModel,
+    Parts,
+    check_prior,
+    check_units,
+    family_model,
+)
 from rom.updating.frf_data import Complex, beside_poles
 from rom.updating.measured import Responses
 from rom.updating.methods import Update
@@ -114,21 +122,16 @@ def update(  # noqa: PLR0913  keywords of one call
     check_damping_ratio(damping)
     one_of("residual", residual, RESIDUALS)
     if rank is not None and residual != "equations":
-        raise ConfigError("rank belongs to the residual of equations.")
-    if not DAMPING_RANGE[0] <= damping <= DAMPING_RANGE[1]:
-        raise ConfigError(f"damping = {damping} to start from is not within {DAMPING_RANGE}.")
+        raise ConfigError('rank needs residual="equations".')
+    between("damping", damping, *DAMPING_RANGE)
+    check_units(family)
     bodies = Parts.of(family).bodies
-    if other := {body.units for body in bodies.values()} - {"SI"}:
-        raise ConfigError(
-            f"the family is in {other.pop()}, responses in SI.",
-            hint="Reduce the model in SI units to update it.",
-        )
     attached, candidates = dict(attached or {}), dict(candidates or {})
     rows = test.rows(bodies, tolerance)
     model = family_model(family, rows, attached, candidates, fixed)
     unknown = _unknown(model, free, attached, candidates)
     if isinstance(prior, Updated) and residual != "responses":
-        raise ConfigError("the update by another test is a prior for the residual of responses.")
+        raise ConfigError('the update by another test as a prior needs residual="responses".')
     before = _Before.of(prior or {}, model)
     search = _Search.begun(model, test, unknown, damping, before)
     check_channels(search.extremes(), search.data.roughly())
@@ -185,8 +188,7 @@ class _Before:
         """
         names, precision = model.names, np.zeros((len(model.names),) * 2)
         if not isinstance(prior, Updated):
-            if wrong := set(prior) - set(names):
-                raise ParameterError(f"prior: there is no parameter {named(wrong)}.")
+            check_prior(prior, names)
             sigma = np.array([prior.get(name, np.inf) for name in names])
             for name in prior:
                 positive(f"prior of {name}", prior[name])

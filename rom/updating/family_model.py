@@ -6,7 +6,7 @@ All parameters are factors and enter by their logarithm. Rigid coordinates come 
 elastic ones of the family; what is held is eliminated.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import block_diag
 
-from rom.arguments import finite
+from rom.arguments import finite, positive
 from rom.assembly.assembly import Assembly
 from rom.body.flexible import FlexibleBody
 from rom.body.records import Marker, still_motions
@@ -23,7 +23,7 @@ from rom.body.reference import marker_motion
 from rom.eigen.supports import spring_matrices
 from rom.errors import ConfigError, ParameterError
 from rom.model import Array, Index, Mask
-from rom.names import named
+from rom.names import check_known, named
 from rom.parametric.assembled import FamilyAssembly
 from rom.parametric.family import BodyFamily
 from rom.parametric.parameters import Density, Parameter, YoungsModulus
@@ -88,9 +88,7 @@ class Parts:
             return "", self.bodies[""].marker(str(place))
         body, interface = place if isinstance(place, tuple) and len(place) == 2 else ("", "")
         if body not in self.bodies:
-            raise ConfigError(
-                f"{place!r} is no place (body, interface); bodies are {named(self.bodies)}."
-            )
+            raise ConfigError(f"{place!r} must be (body, interface) of {named(self.bodies)}.")
         return body, self.bodies[body].marker(interface)
 
     def motion(self, place: Place) -> Array:
@@ -225,8 +223,7 @@ class AddedMass:
 
     def __post_init__(self) -> None:
         check_range(f"the mass at {self.at!r}", self.low, self.high)
-        if not finite("mass", self.mass, ()) > 0:
-            raise ConfigError(f"the mass at {self.at!r} is {self.mass} kg: it must be positive.")
+        positive(f"the mass at {self.at!r}", self.mass)
 
     def term(self, structure: FlexibleBody | Parts) -> tuple[Array, Array]:
         """Stiffness [N/m] and mass [kg] (n, n) that it adds to a body at a factor of one.
@@ -238,6 +235,26 @@ class AddedMass:
         return np.zeros((H.shape[1],) * 2), self.mass * H.T @ H
 
 
+def check_units(structure: Structure) -> None:
+    """Refuse bodies in other units than those of what was measured.
+
+    Raises:
+        ConfigError: if they are not in SI units.
+    """
+    if other := {body.units for body in Parts.of(structure).bodies.values()} - {"SI"}:
+        raise ConfigError(f"the body is in {other.pop()}; use SI units, as body.in_units gives it.")
+
+
+def check_prior(prior: Iterable[str], names: tuple[str, ...]) -> None:
+    """Refuse a prior of parameters that there are not.
+
+    Raises:
+        ParameterError: listing those there are.
+    """
+    for name in prior:
+        check_known(name, names, f"prior: no parameter {name!r}; there are", ParameterError)
+
+
 def check_range(what: str, low: float, high: float) -> None:
     """Refuse a range that is not one of positive factors.
 
@@ -245,7 +262,7 @@ def check_range(what: str, low: float, high: float) -> None:
         ConfigError: naming what has it.
     """
     if not 0 < finite("low", low, ()) <= finite("high", high, ()):
-        raise ConfigError(f"{what} has the range {low} to {high}; factors are positive.")
+        raise ConfigError(f"{what} has the range {low} to {high}, needed is 0 < low <= high.")
 
 
 def _stiffness(place: Place, stiffness: npt.ArrayLike) -> Array:
@@ -339,7 +356,7 @@ def family_model(
     outside = {**attached, **candidates}
     own: dict[str, Any] = {} if isinstance(family, FlexibleBody | Assembly) else family.parameters
     if len(outside) < len(attached) + len(candidates) or set(outside) & set(own):
-        raise ParameterError(f"one of {named(outside)} names two parameters.")
+        raise ParameterError(f"{named(outside)}: one names two parameters; use another name.")
     pairs = [
         [_placed(A, parts.columns[name], parts.n) for A in term.full_matrices()]
         for name, term in terms_of(family)

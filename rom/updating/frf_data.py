@@ -16,7 +16,7 @@ import numpy.typing as npt
 from scipy.special import digamma, erfcx, polygamma
 from scipy.stats import norm
 
-from rom.arguments import finite
+from rom.arguments import not_negative, one_each, whole
 from rom.errors import ConfigError
 from rom.model import Array, Mask
 
@@ -48,7 +48,7 @@ def noisy(H: Complex, level: float, rng: np.random.Generator) -> Complex:
         ConfigError: for a negative level.
     """
     if not (np.asarray(level) >= 0).all():
-        raise ConfigError(f"level = {level}: noise has a standard deviation of zero or more.")
+        raise ConfigError(f"level = {level} must be zero or more: a standard deviation.")
     real, imaginary = rng.standard_normal((2, *H.shape))
     return H * (1 + level * (real + 1j * imaginary) / np.sqrt(2))
 
@@ -80,9 +80,10 @@ def estimators(
         Wicks and Vold, The Hs frequency response function estimator, IMAC IV (1986).
     """
     if len(x) < 2 or np.shape(x) != np.shape(f):
-        raise ConfigError(f"spectra {np.shape(x)}, {np.shape(f)}: two averages or more of both.")
-    if not finite("ratio", ratio, ()) >= 0:
-        raise ConfigError(f"ratio = {ratio}: noise of responses over that of forces, 0 or more.")
+        raise ConfigError(
+            f"{np.shape(x)}, {np.shape(f)}: at least two averages of both are needed."
+        )
+    not_negative("ratio", ratio)
     S_ff, S_xx = ((np.abs(a) ** 2).mean(axis=0) for a in (f, x))
     S_fx = (f.conj() * x).mean(axis=0)
     H1, H2 = S_fx / S_ff, S_xx / S_fx.conj()
@@ -105,8 +106,7 @@ def random_error(coherence: npt.ArrayLike, n_averages: int) -> Array:
     Source:
         Bendat and Piersol, Random data: sqrt((1 - g^2) / (2 n g^2)) with the coherence g^2.
     """
-    if n_averages < 1:
-        raise ConfigError(f"n_averages = {n_averages}: one or more.")
+    whole("n_averages", n_averages, 1)
     g2 = np.asarray(coherence, dtype=float)
     return np.sqrt((1 - g2) / (2 * n_averages * g2))
 
@@ -339,8 +339,9 @@ def beside_poles(omega: Array, poles: npt.ArrayLike, zeta: npt.ArrayLike, width:
     Raises:
         ConfigError: if poles and ratios differ in number, or a bandwidth is not positive.
     """
-    if np.shape(poles) != np.shape(zeta) or not (width * np.asarray(zeta) > 0).all():
-        raise ConfigError(f"{np.size(poles)} poles, zeta = {zeta!r}, width = {width}: positive.")
+    one_each("damping ratios", np.shape(zeta), "poles", np.shape(poles))
+    if not (width * np.asarray(zeta) > 0).all():
+        raise ConfigError(f"zeta = {zeta!r} and width = {width} must be positive.")
     reach = width * np.asarray(zeta) * np.asarray(poles)
     far = np.abs(omega[:, None] - np.asarray(poles)) / reach
     return np.minimum(far, 1.0).prod(axis=1)[:, None, None]
@@ -356,8 +357,7 @@ def frac(H: Complex, G: Complex) -> Array:
     Raises:
         ConfigError: if the shapes differ.
     """
-    if np.shape(H) != np.shape(G):
-        raise ConfigError(f"responses {np.shape(H)} and {np.shape(G)} cannot be compared.")
+    one_each("responses", np.shape(H), "others", np.shape(G))
     cross = np.abs((H.conj() * G).sum(axis=0)) ** 2
     return cross / (np.abs(H) ** 2).sum(axis=0) / (np.abs(G) ** 2).sum(axis=0)
 

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial import cKDTree
 
-from rom.arguments import finite, one_of, typed, whole
+from rom.arguments import finite, one_each, one_of, typed, whole
 from rom.body.flexible import FlexibleBody
 from rom.body.surface import strain_rows, surface_of
 from rom.errors import ConfigError
@@ -54,9 +54,9 @@ class Channels:
             object.__setattr__(self, name, value)
         shapes = np.shape(self.points), np.shape(self.directions)
         if shapes[0] != shapes[1] or len(shapes[0]) != 2 or shapes[0][1] != 3:
-            raise ConfigError(f"points {shapes[0]}, directions {shapes[1]}: (k, 3) of both.")
+            raise ConfigError(f"points {shapes[0]}, directions {shapes[1]} must be (k, 3) both.")
         if not np.linalg.norm(self.directions, axis=1).all():
-            raise ConfigError("a channel has a direction of length zero.")
+            raise ConfigError("a direction of a channel has length zero; give one as (0, 0, 1).")
         self._name_bodies(shapes[0][0])
 
     def _name_bodies(self, k: int) -> None:
@@ -66,9 +66,8 @@ class Channels:
             return
         each = (given,) * k if isinstance(given, str) else given
         if not isinstance(each, list | tuple) or not all(isinstance(name, str) for name in each):
-            raise ConfigError(f"bodies = {given!r}: a name, or one of each channel.")
-        if len(each) != k:
-            raise ConfigError(f"{len(each)} bodies are named for {k} channels.")
+            raise ConfigError(f"bodies = {given!r} must be a name, or one of each channel.")
+        one_each("names of bodies", len(each), "channels", k)
         object.__setattr__(self, "bodies", tuple(each))
 
     def some(self, chosen: Any) -> "Channels":
@@ -84,8 +83,8 @@ class Channels:
             return np.zeros((len(names), 1))
         if unknown := set(self.bodies) - set(names):
             k = next(k for k, name in enumerate(self.bodies) if name in unknown)
-            known = f"bodies are {named(names)}" if names != ("",) else "this is one body alone"
-            raise ConfigError(f"{what} {k} lies on {self.bodies[k]!r}: {known}.")
+            known = f"of {named(names)}" if names != ("",) else "none of this body alone"
+            raise ConfigError(f"{what} {k} lies on {self.bodies[k]!r}; give {known}.")
         other = np.array([[name != own for own in self.bodies] for name in names])
         return np.where(other, np.inf, 0.0)
 
@@ -186,7 +185,7 @@ def _complex(H: Any) -> Complex:
     try:
         return np.asarray(H, dtype=complex)
     except (TypeError, ValueError) as error:
-        raise ConfigError("H holds no numbers.") from error
+        raise ConfigError("H must hold numbers.") from error
 
 
 def _check_lengths(points: Array, surface: cKDTree, reach: float, what: str) -> None:
@@ -252,10 +251,9 @@ class Responses:
         wanted = (f.size, len(np.asarray(self.sensors.points)), len(np.asarray(self.inputs.points)))
         if self.H.shape != wanted:
             raise ConfigError(
-                f"H is {self.H.shape}; lines, sensors and inputs are {wanted}.",
+                f"H is {self.H.shape}, needed are lines, sensors, inputs {wanted}.",
             )
-        if len(self.quantities) != wanted[1]:
-            raise ConfigError(f"{len(self.quantities)} quantities of {wanted[1]} sensors.")
+        one_each("quantities", len(self.quantities), "sensors", wanted[1])
         c = finite("coherence", self.coherence, None)
         if c.shape not in ((), wanted) or not ((c >= 0) & (c < 1)).all():
             raise ConfigError(
@@ -275,10 +273,10 @@ class Responses:
         """See that noise of forces and the estimator are such."""
         noise, one = finite("force_noise", self.force_noise, None), np.ndim(self.force_noise) == 0
         if not one and noise.shape != self.H.shape[::2]:
-            raise ConfigError(f"force_noise {noise.shape}: one number or {self.H.shape[::2]}.")
+            raise ConfigError(f"force_noise {noise.shape} must be a number or {self.H.shape[::2]}.")
         if not (noise >= 0).all():
             least = self.force_noise if one else float(noise.min())
-            raise ConfigError(f"force_noise = {least}: zero or more.")
+            raise ConfigError(f"force_noise = {least} must be zero or more.")
         if self.estimator is not None:
             one_of("estimator", self.estimator, tuple(POWERS))
 
@@ -371,10 +369,10 @@ class MeasuredModes:
         m, k = len(self.frequencies), len(self.points)
         shapes = np.asarray(self.shapes)
         if shapes.shape != (m, k, 3) or np.shape(self.damping) != (m,):
-            raise ConfigError(f"shapes {shapes.shape} for {m} modes at {k} points: ({m}, {k}, 3).")
+            raise ConfigError(f"shapes {shapes.shape} for {m} modes, needed are ({m}, {k}, 3).")
         size = np.linalg.norm(shapes, axis=(1, 2))
         if bad := np.flatnonzero(~(np.isfinite(size) & (size > 0))).tolist():
-            raise ConfigError(f"the shape of mode {bad[0] + 1} is zero or not finite.")
+            raise ConfigError(f"the shape of mode {bad[0] + 1} must be finite and not zero.")
 
     def mac(
         self, body: FlexibleBody, *, fixed: Any = (), n: int, tolerance: float | None = None
@@ -397,8 +395,7 @@ class MeasuredModes:
         """
         omega, Phi = body.modes(fixed=fixed)
         Phi = Phi[:, omega > 0]
-        if not 1 <= n <= Phi.shape[1]:
-            raise ConfigError(f"n = {n}: the body has {Phi.shape[1]} elastic modes.")
+        whole("n", n, 1, Phi.shape[1], reason="the elastic modes of the body")
         axes = np.tile(np.eye(3), (len(self.points), 1))
         rows = Channels(np.repeat(self.points, 3, axis=0), axes).rows(body, "point", tolerance)
         own = rows @ Phi[:, :n]

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import least_squares
 
+from rom.arguments import matrix, whole
 from rom.errors import ConfigError
 from rom.model import Array, Report
 from rom.updating.models import (
@@ -88,9 +89,7 @@ def responses(
     """
     here = model.at(p)
     if not set(inputs) <= set(range(len(here.sensors))) or not np.isfinite(omega).all():
-        raise ConfigError(
-            f"inputs = {inputs} of the sensors 0 to {len(here.sensors) - 1}, at finite omega."
-        )
+        raise ConfigError(f"inputs = {inputs} must be 0 to {len(here.sensors) - 1}, omega finite.")
     return _receptance(here, modal(here, zeta), omega, inputs)
 
 
@@ -262,8 +261,7 @@ def update_by_input(
         ModelError: for mass or stiffness not positive.
     """
     test.check(model, zeta)
-    if not 1 <= rank <= test.H.shape[1]:
-        raise ConfigError(f"rank = {rank} is not among 1 to {test.H.shape[1]} sensors.")
+    whole("rank", rank, 1, test.H.shape[1], reason="the sensors")
     n_values = 2 * rank * test.omega.size * len(test.inputs)
 
     def triangle(x: Array, ratios: Array) -> Array:
@@ -363,11 +361,8 @@ def response_function_method(
         Signal Process. 8 (1994) 437.
     """
     test.check(model)
-    if np.shape(C) != model.K.shape or steps < 1:
-        raise ConfigError(
-            f"C is {np.shape(C)} for {len(model.K)} dofs, with {steps} steps: square, and one or "
-            "more."
-        )
+    matrix("C", C, model.K.shape)
+    whole("steps", steps, 1)
     p, path, s = np.array(p, dtype=float), [], sensor_dofs(model)
     clip = MAX_PARAMETER_CHANGE if steps > 1 else np.inf
     o = np.setdiff1d(np.arange(len(model.K)), s)

@@ -14,6 +14,7 @@ from scipy.linalg import LinAlgError, cho_factor, cho_solve, eigh
 from scipy.stats import chi2
 from scipy.stats import f as f_ratio
 
+from rom.arguments import finite, one_each
 from rom.errors import ConfigError, ModelError
 from rom.model import Array, Report, Row
 from rom.reduction.bases.fixed_interface import craig_bampton
@@ -59,9 +60,7 @@ class ParametricModel:
         wanted = {"M": (n, n), "dK": (n_p, n, n), "dM": (n_p, n, n)}
         wanted["sensors"] = (len(self.sensors), n)
         for name, shape in wanted.items():
-            found = np.shape(getattr(self, name))
-            if found != shape:
-                raise ConfigError(f"{name} is {found} where {shape} belongs to {n} dofs.")
+            finite(name, getattr(self, name), shape)
 
     def at(self, p: ArrayLike) -> "ParametricModel":
         """The model with its origin at p (n_p,) [1].
@@ -69,9 +68,7 @@ class ParametricModel:
         Raises:
             ConfigError: if p has another length.
         """
-        p = np.asarray(p, dtype=float)
-        if p.shape != (len(self.dK),):
-            raise ConfigError(f"p has the shape {p.shape}; the model has {len(self.dK)} of them.")
+        p = finite("p", p, (len(self.dK),))
         K, M = (A + np.tensordot(p, dA, 1) for A, dA in ((self.K, self.dK), (self.M, self.dM)))
         return ParametricModel(K, M, self.dK, self.dM, self.sensors, self.n_rigid)
 
@@ -122,7 +119,9 @@ class AtSensors:
         try:
             K_oo = cho_factor(model.K[np.ix_(o, o)])
         except LinAlgError as error:
-            raise ModelError("held at its sensors, the structure can still move.") from error
+            raise ModelError(
+                "held at its sensors it still moves; it needs more of them."
+            ) from error
         T = np.zeros((len(model.K), s.size))
         T[s], T[o] = np.eye(s.size), -cho_solve(K_oo, model.K[np.ix_(o, s)])
         dT = -np.array([cho_solve(K_oo, (dK @ T)[o]) for dK in model.dK])  # rows o; s do not move
@@ -158,14 +157,14 @@ class Measurement:
     def __post_init__(self) -> None:
         if np.ndim(self.H) != 3 or self.H.shape[::2] != (len(self.omega), len(self.inputs)):
             n = (len(self.omega), len(self.inputs))
-            raise ConfigError(f"H is {np.shape(self.H)} for {n[0]} frequencies, {n[1]} exciters.")
+            raise ConfigError(f"H is {np.shape(self.H)}, needed are {n[0]} lines, {n[1]} exciters.")
         if not np.isfinite(self.H).all() or not np.abs(self.H).min() > 0:
-            raise ConfigError("H has entries that are zero or not finite: a dead channel.")
+            raise ConfigError("H is zero or not finite somewhere: a dead channel; leave it out.")
         if not set(self.inputs) <= set(range(self.H.shape[1])):
-            raise ConfigError(f"inputs = {self.inputs} of the sensors 0 to {self.H.shape[1] - 1}.")
+            raise ConfigError(f"inputs = {self.inputs} must be from 0 to {self.H.shape[1] - 1}.")
         w = np.shape(self.weights)
         if w not in ((), self.H.shape, (len(self.omega), 1, 1)):
-            raise ConfigError(f"weights {w} fit neither a number nor responses {self.H.shape}.")
+            raise ConfigError(f"weights {w} must be one number, or of the shape {self.H.shape}.")
         self._check_levels()
 
     def _check_levels(self) -> None:
@@ -187,10 +186,7 @@ class Measurement:
             ConfigError: if the sensors differ in number, or a ratio is not positive.
         """
         full = model.full if isinstance(model, AtSensors) else model
-        if len(full.sensors) != self.H.shape[1]:
-            raise ConfigError(
-                f"the model has {len(full.sensors)} sensors, the test {self.H.shape[1]}."
-            )
+        one_each("sensors of the model", len(full.sensors), "of the test", self.H.shape[1])
         if not (np.asarray(zeta) > 0).all():
             raise ConfigError(f"zeta = {zeta!r}: damping ratios to start from must be positive.")
 
@@ -224,23 +220,23 @@ def modal(model: ParametricModel, zeta: ArrayLike) -> Modal:
     try:
         lam, Phi = eigh(model.K, model.M)
     except LinAlgError as error:
-        raise ModelError("the changes leave a mass matrix that is not positive.") from error
+        raise ModelError("the changes must leave a mass matrix that is positive.") from error
     elastic = slice(model.n_rigid, None)
     rigid = np.abs(lam[: model.n_rigid]).max(initial=0.0)
     if rigid > RIGID_RTOL * np.abs(lam[elastic]).min(initial=np.inf):
         raise ModelError(
             f"n_rigid = {model.n_rigid}, but a motion among them has the frequency "
-            f"{np.sqrt(rigid):.4g} rad/s: the structure is held."
+            f"{np.sqrt(rigid):.4g} rad/s: the structure is held; take n_rigid of what is free."
         )
     lam[: model.n_rigid] = 0.0
     if not (lam[elastic] > 0).all():
         raise ModelError(
             f"{model.n_rigid} rigid motions leave the eigenvalue {lam[elastic].min():.3g}"
-            " rad^2/s^2: the stiffness is not positive."
+            " rad^2/s^2: the stiffness must be positive."
         )
     zeta, d = np.asarray(zeta, dtype=float), np.zeros(lam.size)
-    if zeta.size > lam.size - model.n_rigid:
-        raise ConfigError(f"{zeta.size} damping ratios for {lam.size - model.n_rigid} modes.")
+    if zeta.size > (n := lam.size - model.n_rigid):
+        raise ConfigError(f"at most {n} damping ratios, of the elastic modes, got {zeta.size}.")
     damped = slice(model.n_rigid, model.n_rigid + zeta.size)
     d[damped] = 2 * zeta * np.sqrt(lam[damped])
     return Modal(lam, Phi, d)
@@ -284,7 +280,7 @@ def sensor_dofs(model: ParametricModel) -> Any:
     """
     s = model.sensors.argmax(axis=1)
     if not np.array_equal(model.sensors, np.eye(len(model.K))[s]):
-        raise ConfigError("the sensors are no dofs of the model; condense before reducing.")
+        raise ConfigError("the sensors must be dofs of the model; condense before reducing.")
     return s
 
 

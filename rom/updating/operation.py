@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from scipy.linalg import eigh, expm, expm_frechet
 
-from rom.arguments import finite, one_of
+from rom.arguments import not_negative, one_of
 from rom.body.flexible import FlexibleBody
 from rom.body.recovery import StressRecovery
 from rom.errors import ConfigError, ModelError
@@ -57,8 +57,7 @@ class Sensors:
 
     def __post_init__(self) -> None:
         one_of("quantity", self.quantity, tuple(UNITS))
-        if finite("noise", self.noise, ()) < 0:
-            raise ConfigError(f"noise = {self.noise} is negative.")
+        not_negative("noise", self.noise)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -206,7 +205,7 @@ def operation(
         )
     if not model.K.shape[1]:
         what = named(body.name for body in parts.bodies.values())
-        raise ConfigError(f"body {what} cannot move with {fixed!r} held.")
+        raise ConfigError(f"body {what} cannot move with {fixed!r} held; leave one of them free.")
     lam, U = eigh(model.K.sum(axis=0), model.M.sum(axis=0))
     omega, V = np.sqrt(np.maximum(lam, 0.0)), model.seen @ U
     omega[: model.n_rigid] = 0.0
@@ -292,7 +291,9 @@ def stress_rows(
         far = np.linalg.norm(recovery.points - x, axis=1)
         n = int(far.argmin())
         if far[n] > reach:
-            raise ConfigError(f"{what} {k} at {x.tolist()} is {far[n]:.3g} m off the body.")
+            raise ConfigError(
+                f"{what} {k} is {far[n]:.3g} m off the body; at most {reach:.3g} m may be."
+            )
         a, b, c = d / np.linalg.norm(d)
         along = np.array([a * a, b * b, c * c, 2 * b * c, 2 * a * c, 2 * a * b])
         static.append(along @ recovery.operator[None, 6 * n : 6 * n + 6])

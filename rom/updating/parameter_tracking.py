@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from scipy.linalg import block_diag
 
-from rom.arguments import finite, positive, typed
+from rom.arguments import not_negative, positive, typed
 from rom.errors import ConfigError, ParameterError, SolverError
 from rom.model import Array
 from rom.names import named
@@ -62,8 +62,7 @@ class Drift:
 
     def __post_init__(self) -> None:
         positive("first", self.first)
-        if finite("walk", self.walk, ()) < 0:
-            raise ConfigError(f"walk = {self.walk} is negative.")
+        not_negative("walk", self.walk)
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,7 +140,7 @@ class ParameterTracker:
             ParameterError: for a name that is not tracked, or a factor that is not positive.
         """
         if wrong := set(factors) - set(self.names):
-            raise ParameterError(f"{named(sorted(wrong))}: tracked are {named(self.names)}.")
+            raise ParameterError(f"{named(sorted(wrong))} must be of {named(self.names)}.")
         x = np.log([positive(name, factors.get(name, 1.0)) for name in self.names])
         return linear_tracker(self.operation, x, self.assumed, self.sensors, self.wanted)
 

@@ -18,12 +18,20 @@ import numpy as np
 from rom.arguments import finite, one_of, typed, whole
 from rom.body.flexible import FlexibleBody
 from rom.body.surface import surface_of
-from rom.errors import ConfigError, ModelError, ParameterError
+from rom.errors import ConfigError, ModelError
 from rom.model import Array, Index
-from rom.names import csv_cell, named
+from rom.names import csv_cell
 from rom.plausible import check_damping_ratio
 from rom.updating.estimate import BAND_RATIO, DAMPING_LOG_DEVIATION
-from rom.updating.family_model import Attached, Family, FamilyModel, Parts, family_model
+from rom.updating.family_model import (
+    Attached,
+    Family,
+    FamilyModel,
+    Parts,
+    check_prior,
+    check_units,
+    family_model,
+)
 from rom.updating.frf_data import Complex
 from rom.updating.measured import DERIVATIVES, Channels
 from rom.updating.models import DEAD_RATIO, modal
@@ -226,11 +234,10 @@ def place(  # noqa: PLR0913  keywords of one call
     check_damping_ratio(damping)
     one_of("quantity", quantity, tuple(DERIVATIVES))
     bodies = Parts.of(family).bodies
-    if other := {body.units for body in bodies.values()} - {"SI"}:
-        raise ConfigError(f"the family is in {other.pop()}; plan in SI units.")
+    check_units(family)
     least = 0.0 if floor is None else floor
     if min(noise, least) < 0 or not 0 < finite("noise + floor", noise + least, ()):
-        raise ConfigError("noise and floor are not negative, and one of them is positive.")
+        raise ConfigError("noise and floor must not be negative, and one of them must be positive.")
     omega = 2 * np.pi * np.atleast_1d(finite("frequencies", frequencies, None))
     if not omega.size or omega.min() <= 0:
         raise ConfigError("frequencies must lie above zero.")
@@ -293,8 +300,7 @@ def _information(
     model: FamilyModel, omega: Array, damping: float, prior: Mapping[str, float], error: _Error
 ) -> tuple[Array, Array, tuple[str, ...]]:
     """What each pair of channels tells (n_s, n_e, n, n), the prior (n, n), and the names (n,)."""
-    if wrong := set(prior) - set(model.names):
-        raise ParameterError(f"prior: there is no parameter {named(wrong)}.")
+    check_prior(prior, model.names)
     x = np.clip(np.zeros(len(model.names)), np.log(model.low), np.log(model.high))
     lam = modal(model.at(x), ()).lam[model.n_rigid :]
     m = min(int(np.count_nonzero(lam < (BAND_RATIO * omega.max()) ** 2)) + 1, lam.size)
@@ -312,7 +318,7 @@ def _information(
     width = np.log(model.high / model.low)
     sigma = np.array([prior.get(k, w) for k, w in zip(model.names, width, strict=True)])
     if not (sigma > 0).all():
-        raise ConfigError("prior: a standard deviation is positive, and so is a range.")
+        raise ConfigError("prior: each standard deviation must be positive, and low < high.")
     known = np.diag(np.r_[sigma, np.full(m, DAMPING_LOG_DEVIATION)] ** -2.0)
     return blocks, known, (*model.names, *(f"zeta {k + 1}" for k in range(m)))
 

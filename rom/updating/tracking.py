@@ -16,12 +16,12 @@ from typing import Any
 
 import numpy as np
 
-from rom.arguments import finite, positive, typed
+from rom.arguments import finite, not_negative, positive, typed
 from rom.assembly.assembly import Assembly
 from rom.body.flexible import FlexibleBody
 from rom.errors import ConfigError, SolverError
 from rom.model import Array
-from rom.updating.family_model import Parts, Structure
+from rom.updating.family_model import check_units
 from rom.updating.filter_steps import filtered
 from rom.updating.measured import Channels
 from rom.updating.operation import (
@@ -97,9 +97,7 @@ class Observer:
         Raises:
             ConfigError: for another number of sensors, or samples that are not finite.
         """
-        y = finite("samples", samples, None)
-        if y.ndim != 2 or y.shape[1] != len(self.C):
-            raise ConfigError(f"samples {y.shape}: (n_t, {len(self.C)}) are taken.")
+        y = finite("samples", samples, (None, len(self.C)))
         closed, driven = self.A - self.A @ self.G @ self.C, self.A @ self.G
         x, out = np.zeros(len(self.A)), np.zeros((len(y), len(self.W)))
         for k, pushed in enumerate(y @ driven.T):
@@ -260,7 +258,7 @@ def checked_record(samples: Any, times: Any, n_y: int, dt: float) -> Array:
     """
     y = np.ascontiguousarray(samples, dtype=float)
     if y.ndim != 2 or y.shape[1] != n_y or np.isinf(y).any():
-        raise ConfigError(f"samples {y.shape}: (n_t, {n_y}) numbers are taken, or NaN.")
+        raise ConfigError(f"samples {y.shape} must be (n_t, {n_y}) numbers, or NaN.")
     if times is None:
         return y
     times = finite("times", times, (len(y),))
@@ -298,8 +296,7 @@ class Assumed:
     def __post_init__(self) -> None:
         for name in ("dt", "walk") + ("first",) * (self.first is not None):
             positive(name, getattr(self, name))
-        if finite("unmodelled", self.unmodelled, ()) < 0:
-            raise ConfigError(f"unmodelled = {self.unmodelled} is negative.")
+        not_negative("unmodelled", self.unmodelled)
 
     def white(self, operation: Operation) -> Array:
         """(n, n) intensity of the noise of the state."""
@@ -335,7 +332,7 @@ def linear_tracker(
         )
     R = np.concatenate([np.full(len(s.names), s.noise**2.0) for s in sensors])
     if not R.all():
-        raise ConfigError("a sensor has no noise: give its standard deviation.")
+        raise ConfigError("a sensor has no noise; give its standard deviation.")
     check_seen(at, operation)
     step, Q = discrete(at.A, assumed.white(operation), assumed.dt)
     inputs, outputs = (
@@ -384,13 +381,3 @@ def tracker(  # noqa: PLR0913  keywords of one call
     assumed = Assumed(dt, walk, unmodelled, first)
     motion = operation(body, (), {}, (sensors, forces, wanted), None, fixed)
     return linear_tracker(motion, np.zeros(0), assumed, sensors, wanted)
-
-
-def check_units(structure: Structure) -> None:
-    """Refuse bodies in other units than those of samples.
-
-    Raises:
-        ConfigError: if they are not in SI units.
-    """
-    if other := {body.units for body in Parts.of(structure).bodies.values()} - {"SI"}:
-        raise ConfigError(f"the body is in {other.pop()}; track it in SI units.")

@@ -356,7 +356,7 @@ def test_pieces_that_make_no_body_are_refused_by_name():
         Tree.of(models | {"3": named("3", "tip")}, "root")
     with pytest.raises(ModelError, match="form a ring that closes at 'y'"):
         Tree.of({"1": named("1", "root", "x", "y"), "2": named("2", "x", "y")}, "root")
-    with pytest.raises(InterfaceError, match="'x' belongs to the pieces '1', '2', '3'"):
+    with pytest.raises(InterfaceError, match="'x' is of '1', '2', '3'"):
         Tree.of({key: named(key, "x", f"end {key}") for key in models}, "end 1")
     tree = Tree.of(models, "root")
     with pytest.raises(InterfaceError, match="names 'cut 1'"):

@@ -180,7 +180,7 @@ def test_points_are_drawn_also_where_they_are_off_the_body(capsys, monkeypatch):
     assert "Largest distance of the 13 points from one of the surface: 0.5 m" in words["caption"]
     assert np.ptp(scenes[0].things["sensors"][0][:, 2]) > 0.5
     assert main(["update", "off.h5", *WORDS, "--picture", "points.svg"]) == 2
-    assert "written as .png" in capsys.readouterr().err
+    assert "picture is written as .png" in capsys.readouterr().err
 
 
 def answered_plan(words, capsys):
@@ -215,15 +215,15 @@ def test_what_is_wrong_with_the_options_is_said(capsys):
         assert main(["update", file, *WORDS, *words]) == 2
         assert message in capsys.readouterr().err
 
-    refused(["--spring", "soil=tip:2e5:0.1"], "is not INTERFACE:VALUE:LOW:HIGH")
+    refused(["--spring", "soil=tip:2e5:0.1"], "must be written INTERFACE:VALUE:LOW:HIGH")
     refused(["--mass", "cable=tip:heavy:0.1:10"], "--mass: 'heavy' is not a number")
-    same = "--mass soil has the name of another one"
+    same = "--mass soil needs a name of its own"
     refused([*ATTACHED[:2], "--mass", "soil=tip:1:0.1:10"], same)
-    refused(["--rank", "3"], "rank belongs to the residual of equations")
+    refused(["--rank", "3"], "rank needs residual=")
     refused(["--residual", "equations"], "input 0 has no sensor at its point")
     refused(["--candidate", "cable"], "--candidate cable is no --spring, --joint or --mass")
     refused(["--family", "body.rom.npz"], "--family family.rom.npz, body.rom.npz: of several each")
-    refused(["--joint", "j=a.tip,b.tip:1,1,1:0.1:1"], "belong to an assembly")
+    refused(["--joint", "j=a.tip,b.tip:1,1,1:0.1:1"], "need an assembly")
     refused(["--force-noise", "0.1"], "the estimator of H is not named")
     refused(["-o", "family.rom.npz"], "family.rom.npz")
 
@@ -327,9 +327,9 @@ def test_families_that_are_no_assembly_are_named(bolted, capsys):
         assert main(["update", "bolted.h5", *words]) == 2
         assert message in capsys.readouterr().err
 
-    refused(HALVES[:2] * 2, "--family frame is given twice")
-    refused([*HALVES, *JOINT, "--spring", "q=tip:1,1,1:1:2"], "--spring 'tip' is no BODY.INTERFACE")
-    refused([*HALVES[:4], "--fixed", "root"], "--fixed 'root' is no BODY.INTERFACE; bodies are")
-    refused([*HALVES, "--joint", "q=frame.tip:1,1,1:1:2"], "lies between 1 places")
-    refused([*HALVES, "--mass", "q=frame.tip:1,1:1:2"], "a mass is one number")
+    refused(HALVES[:2] * 2, "--family 'frame' is given twice")
+    refused([*HALVES, *JOINT, "--spring", "q=tip:1,1,1:1:2"], "'tip' must be BODY.INTERFACE")
+    refused([*HALVES[:4], "--fixed", "root"], "--fixed 'root' must be BODY.INTERFACE, of")
+    refused([*HALVES, "--joint", "q=frame.tip:1,1,1:1:2"], "names 1 places, needed are 2")
+    refused([*HALVES, "--mass", "q=frame.tip:1,1:1:2"], "a mass must be one number")
     refused(["--family", "a=body.rom.npz"], "body.rom.npz holds one body, without parameters")

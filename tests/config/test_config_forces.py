@@ -375,7 +375,7 @@ PYTHON_MISTAKES = {
     "no Python": ("laws.py", "m.toml", "is no Python file"),
     "a file that fails": ("laws.py", "bad.py", "cannot be run: ZeroDivisionError"),
     "a file that leaves": ("laws.py", "exit.py", "cannot be run: SystemExit: 3, line 1"),
-    "no text": ('"laws.py"', "3", "= 3 is not a text"),
+    "no text": ('"laws.py"', "3", "= 3 must be a text"),
 }  # fmt: skip
 
 
@@ -405,15 +405,15 @@ MISTAKES = {
         '[motors.m]\njoint = "guide"\nlaw = { expression = "k", constants = { k = "2 foo" } }\n',
         "'foo' in 'foo' is no unit"),
     "number for a formula": ('[motors.m]\njoint = "guide"\nlaw = { expression = 3 }\n',
-                             "= 3 is not a text"),
+                             "= 3 must be a text"),
     "law without force": ('[laws.s]\nbetween = ["ground.wall", "block.p"]\n',
                           "kind is missing in [laws.s]"),
     "line without length": ('[laws.s]\nbetween = [{ ground = [1.1, 0, 0] }, "block.p"]\n'
                             'expression = "x"\n', "are in one place at the start"),
     "falling lengths": ('[laws.s]\nbetween = ["ground.wall", "block.p"]\nx = [2, 1]\n'
-                        "values = [1, 2]\n", "do not ascend"),
+                        "values = [1, 2]\n", "must ascend"),
     "lengths and values": ('[laws.s]\nbetween = ["ground.wall", "block.p"]\nx = [2, 1]\n'
-                           "values = [1]\n", "has 2 lengths, 1 values"),
+                           "values = [1]\n", "needs two lengths"),
     "event of nothing": ('[events.e]\nkind = "distance"\nbetween = ["ground.wall", "block.p"]\n',
                          "has no value it passes"),
     "event of two": ('[events.e]\nkind = "coordinate"\njoint = "guide"\nvalue = 1\n'

@@ -228,7 +228,7 @@ MISTAKES = {
     "inertia": ('["0.01 kg m^2", 0.02, 0.025]', "[1, 1, 9]",
                 "p.toml:4: bob: the largest principal moment"),
     "mass": ('"2 kg"', '"2 m"', "p.toml:5: bodies.bob.mass: '2 m' is a length; a mass [kg]"),
-    "negative mass": ('"2 kg"', "-2", "bodies.bob.mass = -2 is not positive"),
+    "negative mass": ('"2 kg"', "-2", "bodies.bob.mass = -2 must be positive"),
     "name with a dot": ("[bodies.bob]", '[bodies."b.c"]', "'b.c' is no name for a body"),
     "no end": ('t_end = "0.5 s"\n', "", "t_end is missing in [simulation]"),
     "method": ("rho_inf = 1", 'method = "bfd"', "Did you mean bdf?"),
@@ -258,7 +258,7 @@ JOINTED = {
     "short table": ('[drives.m]\njoint = "pivot"\nlaw = { kind = "table", t = [0, 0.1], values = '
                     "[0, 1] }\n", "cover 0 s to 0.1 s; the run needs 0 s to 0.5 s"),
     "table that falls": ('[drives.m]\njoint = "pivot"\nlaw = { kind = "table", t = [0, 2, 1], '
-                         "values = [0, 1, 2] }\n", "do not ascend"),
+                         "values = [0, 1, 2] }\n", "must ascend"),
     "name twice": ('[drives.pivot]\njoint = "pivot"\nlaw = 1\n', "the name 'pivot' is used twice"),
     "stop without limit": ('[stops.m]\njoint = "pivot"\nstiffness = 1\n', "has no limit"),
     "missing file": ('[bodies.x]\nfile = "nope.rom.npz"\n', "nope.rom.npz"),
@@ -380,9 +380,9 @@ def test_the_command_line_writes_fmus_of_mechanisms(folder, capsys):
     [
         (["crank.toml", "c.fmu", "--inputs", "gass"], "no input 'gass'"),
         (["crank.toml", "c.fmu", "--outputs", "slider.pine"], "no output 'slider.pine'"),
-        (["crank.toml", "c.vtu"], "c.vtu does not end in .fmu"),
+        (["crank.toml", "c.vtu"], "a unit is written as .fmu"),
         (["crank.toml", "c.fmu", "--held", "root"], "--held does not go with a .toml file"),
-        (["rod.rom.npz", "c.fmu", "--inputs", "gas"], "--inputs goes with the .toml file of a"),
+        (["rod.rom.npz", "c.fmu", "--inputs", "gas"], "--inputs needs the .toml file of a"),
         (["still.toml", "c.fmu"], "gives no dt, which an FMU needs"),
     ],
 )

@@ -11,7 +11,11 @@ from cases.solid import block
 from rom.config.mechanism import read_mechanism
 from rom.mbs.mechanism import Mechanism
 
-OF_OTHERS = {"add", "check_markers"}  # elements of any family, by what others make in Python
+OF_OTHERS = {
+    "add",
+    "check_apart",
+    "check_markers",
+}  # elements of any family, by what others make in Python
 
 
 def adding_methods():

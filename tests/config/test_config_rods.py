@@ -179,7 +179,7 @@ def test_sections_along_a_helix_turn_by_its_torsion(tmp_path):
 
 ROUND = 'points = [[0, 0, 0], [1, 0, 0]]\nsection = { kind = "circle", diameter = 0.01 }\n'
 MISTAKES = {
-    "one point": ("[[0, 0, 0]]", "[[0, 0, 0], [1, 0, 0]]", "1 points are no rod"),
+    "one point": ("[[0, 0, 0]]", "[[0, 0, 0], [1, 0, 0]]", "1 points must be 2 to"),
     "points of two": ("[[0, 0], [1, 1]]", "[[0, 0, 0], [1, 0, 0]]", "needed is a matrix nx3"),
     "two points in one": ("[[0, 0, 0], [1, 0, 0], [1, 0, 0]]", "[[0, 0, 0], [1, 0, 0]]",
                           "points 1 and 2 are one"),
@@ -187,9 +187,9 @@ MISTAKES = {
                    "turns back on itself. Take more elements"),
     "thick wall": ('kind = "tube", thickness = 0.006', 'kind = "circle"', "more than the radius"),
     "no material": ("", STEEL, "a section of kind circle needs a material"),
-    "normal along": (STEEL + "normal = [2, 0, 0]\n", STEEL, "lies along the rod"),
-    "no normal": (STEEL + "normal = [0, 0, 0]\n", STEEL, "lies along the rod"),
-    "no elements": (STEEL + "elements = 0\n", STEEL, "is not a whole number from 1"),
+    "normal along": (STEEL + "normal = [2, 0, 0]\n", STEEL, "must not lie along the rod"),
+    "no normal": (STEEL + "normal = [0, 0, 0]\n", STEEL, "must not lie along the rod"),
+    "no elements": (STEEL + "elements = 0\n", STEEL, "must be a whole number from 1"),
     "negative modulus": ('E = "-1 GPa"', 'E = "210 GPa"', "E = -1e+09"),
 }  # fmt: skip
 

@@ -217,7 +217,7 @@ def test_wrong_arguments_are_named(model, full, small, disk):
         disk.modes([small.blade] * 5)
     with pytest.raises(ConfigError, match="n_waves = 1000"):
         rom.bladed_wheel(small, 1000)
-    with pytest.raises(ConfigError, match="n_root = 58: a root has 1 to 57"):
+    with pytest.raises(ConfigError, match="n_root = 58 must be a whole number from 1 to 57"):
         rom.bladed_wheel(small, 2, n_root=58)
     drive = {"engine_order": 1, "omega": [1.0], "damping": 1e-3, "at": [0]}
     alike, force = [small.blade] * N, np.zeros(full.n)
@@ -226,11 +226,11 @@ def test_wrong_arguments_are_named(model, full, small, disk):
         disk.response(alike, force, **drive | {"damping": 0.0})
     with pytest.raises(ConfigError, match="not those of blade 0"):
         disk.response(alike, force, **drive)
-    with pytest.raises(ConfigError, match=r"blade 0 has the shape \(3,\)"):
+    with pytest.raises(ConfigError, match=r"3 forces on blade 0 for"):
         disk.response(alike, np.ones(3), **drive)
-    with pytest.raises(ConfigError, match="a list of 2 forces or places: give 6"):
+    with pytest.raises(ConfigError, match="2 forces or places for 6 blades"):
         disk.response(alike, [force, force], **drive)
-    with pytest.raises(ConfigError, match="dofs that are not its own"):
+    with pytest.raises(ConfigError, match="dofs of the disk"):
         disk.response(alike, force + 1.0, **drive)
     with pytest.raises(ConfigError, match="does not move the tuned wheel"):
         disk.amplification(alike, force, **drive | {"at": [tip]})

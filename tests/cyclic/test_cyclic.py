@@ -143,7 +143,7 @@ def test_faces_that_cannot_close_a_wheel_are_refused(high, message):
 
 def test_wrong_arguments_are_named():
     ring, model = mass_ring(6), block()
-    with pytest.raises(ConfigError, match="6 sectors can tell 0 to 3 apart"):
+    with pytest.raises(ConfigError, match="diameter = 4 must"):
         rom.cyclic_modes(ring, 4, 1)
     with pytest.raises(ConfigError, match="n = 2 must be a whole number from 1 to 1"):
         rom.cyclic_modes(ring, 1, 2)
@@ -153,11 +153,11 @@ def test_wrong_arguments_are_named():
         mass_ring(1)
     with pytest.raises(InterfaceError, match="both cyclic faces"):
         replace(ring, slave=np.array([0]))
-    with pytest.raises(ConfigError, match="coupling of 1 slave to 1 master dofs has"):
+    with pytest.raises(ConfigError, match="coupling has shape"):
         replace(ring, coupling=identity(2))
     with pytest.raises(InterfaceError, match="no interface 'cyclic_low', 'cyclic_high'; it has"):
         rom.CyclicSector.from_model(model)
-    with pytest.raises(ConfigError, match="no direction"):
+    with pytest.raises(ConfigError, match="length zero"):
         rom.CyclicSector.from_model(model, low="root", high="tip", axis=(0, 0, 0))
     with pytest.raises(InterfaceError, match="does not divide"):
         rom.CyclicSector.from_model(model, low="root", high="tip", at=(0.3, -2.0, 0))

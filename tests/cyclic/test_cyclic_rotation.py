@@ -65,7 +65,7 @@ def test_a_wheel_whose_support_softens_diverges():
 
 def test_wrong_arguments_are_named():
     ring = beam_ring(6, 4)
-    with pytest.raises(ConfigError, match=r"at rest are cyclic_modes"):
+    with pytest.raises(ConfigError, match=r"at rest use cyclic_modes"):
         rom.travelling_modes(ring, 2, 2, speed=0.0)
     for call in (rom.travelling_modes, rom.cyclic_modes):
         with pytest.raises(ConfigError, match="speed = nan"):

@@ -91,13 +91,13 @@ def test_batches_and_norms_do_not_matter(monkeypatch):
 
 def test_wrong_arguments_are_named():
     wheel = rom.mistuned_wheel(bladed_ring(6), 1)
-    with pytest.raises(ConfigError, match=r"6 numbers above -1"):
+    with pytest.raises(ConfigError, match=r"6 above -1"):
         wheel.modes(np.zeros(5))
-    with pytest.raises(ConfigError, match=r"6 numbers above -1"):
+    with pytest.raises(ConfigError, match=r"6 above -1"):
         wheel.modes(np.full(6, -1.5))
     with pytest.raises(ConfigError, match=r"no region 'wing'; it has \['blade'\]"):
         rom.mistuned_wheel(bladed_ring(6), 1, blade="wing")
-    with pytest.raises(ConfigError, match=r"force has the shape \(2,\)"):
+    with pytest.raises(ConfigError, match=r"2 forces for"):
         wheel.amplification(np.zeros(6), np.ones(2), **SWEEP)
     with pytest.raises(ConfigError, match=r"damping = 0\.0 must be a positive"):
         wheel.amplification(np.zeros(6), FORCE, **SWEEP | {"damping": 0.0})

@@ -126,7 +126,7 @@ def test_messages(model):
     )
     with pytest.raises(ConfigError, match="cannot be recovered"):
         rom.write_stress(replace(body, stress=None), np.zeros(8), "x.vtu")
-    with pytest.raises(ConfigError, match=r"q has the shape \(3,\)"):
+    with pytest.raises(ConfigError, match=r"q has shape \(3,\)"):
         body.stress.field(np.zeros(3))
     from benchmarks.models import bar
 
@@ -229,7 +229,7 @@ def test_a_bar_that_spins_in_free_fall_has_the_stress_of_closed_form(model, tmp_
     last.set_active_time_value(sol.t[-1])
     seen = last.read()[0]["stress xx yy zz yz xz xy [Pa]"]
     assert_allclose(seen, sol.stress("bar", -1))
-    with pytest.raises(ConfigError, match="does not end in"):
+    with pytest.raises(ConfigError, match="a motion is written as"):
         rom.write_stress_history(sol, "bar", tmp_path / "bar.vtu")
 
 

@@ -296,7 +296,7 @@ def test_a_flexible_body_travels_inside_and_states_can_be_taken_back(hanging, tm
     one.fmu.doStep(0.05, 0.05)
     assert_array_equal(one.get(*names), first)
     one.fmu.freeFMUstate(state)
-    assert "this state has been freed" in one.fails(one.fmu.setFMUstate, state)
+    assert "this state was freed" in one.fails(one.fmu.setFMUstate, state)
     mech = Mechanism()
     body = mech.add_flexible("one", random_body(np.random.default_rng(3)), omega=(1.0, 2.0, 3.0))
     place = mech.design_point(body.marker("a"))
@@ -320,8 +320,8 @@ def test_a_flexible_body_travels_inside_and_states_can_be_taken_back(hanging, tm
 def test_what_is_wrong_is_told_and_the_instance_goes_on(hanging, tmp_path):
     one = Instance(hanging, tmp_path)
     assert "before its initialisation" in one.fails(one.fmu.doStep, 0.0, 0.1)
-    assert "dt = -1 s must be positive" in one.fails(one.set, "dt", -1.0)
-    assert "outside [0, 1]" in one.fails(one.set, "rho_inf", 1.5)
+    assert "dt = -1 must be positive" in one.fails(one.set, "dt", -1.0)
+    assert "must be at least 0 and at most 1" in one.fails(one.set, "rho_inf", 1.5)
     one.begin()
     assert "pull[2] = nan is not a finite number" in one.fails(one.set, "pull[2]", np.nan)
     assert "the output 'one.b.position[1]' cannot be set" in one.fails(
@@ -431,8 +431,8 @@ def written(tmp_path, script, **options):
         (CRANK, {"inputs": ["gass"]}, "m.py: no input 'gass'; the loads, motors and drives are"),
         (CRANK, {"dt": 0.0}, "must be positive"),
         (CRANK, {"files": ["nothing.npz"]}, "there is no file"),
-        ("mechanism = 3", {}, r"m.py has no function mechanism\(\)"),
-        ("def mechanism(): return 3", {}, "gave 3, not a Mechanism"),
+        ("mechanism = 3", {}, r"m.py needs a function mechanism\(\)"),
+        ("def mechanism(): return 3", {}, "gave 3; it must return a Mechanism"),
         ("open('rod.npz')", {}, "holds only it and the files named: FileNotFoundError"),
     ],
 )
@@ -445,9 +445,9 @@ def test_what_cannot_be_written_is_refused(tmp_path, script, options, message):
 @pytest.mark.parametrize(
     ("inputs", "outputs", "message"),
     [
-        (("gas", "gas"), (), "the input 'gas' is named twice"),
+        (("gas", "gas"), (), "the input 'gas' is given twice"),
         ((), ("slider.c",), "no output 'slider.c'; there are .'crank.a', 'crank.o', 'guide'"),
-        ((), ("pin", "pin"), "the output 'pin' is named twice"),
+        ((), ("pin", "pin"), "the output 'pin' is given twice"),
     ],
 )
 def test_unknown_names_are_refused(inputs, outputs, message):
@@ -456,7 +456,7 @@ def test_unknown_names_are_refused(inputs, outputs, message):
 
 
 def test_an_fmu_ends_in_fmu_and_needs_a_compiler(tmp_path, monkeypatch):
-    with pytest.raises(ConfigError, match=r"does not end in \.fmu"):
+    with pytest.raises(ConfigError, match=r"is written as \.fmu"):
         rom.write_fmu("m.py", tmp_path / "m.zip", dt=1.0)
     monkeypatch.setenv("PATH", str(tmp_path))
     with pytest.raises(ResourceError, match="needs a C compiler"):

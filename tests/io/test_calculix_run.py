@@ -258,5 +258,5 @@ def test_meshes_without_a_deck_are_named():
     with pytest.raises(MeshError, match="curved edges"):
         input_deck(solid("tet10"), degree=1)
     mesh = solid("tet4")
-    with pytest.raises(TagError, match="'TIP' is the name of another set"):
+    with pytest.raises(TagError, match="'TIP' names two sets"):
         input_deck(replace(mesh, facets=mesh.facets | {"TIP": mesh.facets["root"]}))

@@ -82,9 +82,9 @@ def test_what_openradioss_does_not_take_is_named(model, body, tmp_path):
     two = {name: KINDS[name] for name in ("root", "tip")}
     with pytest.raises(ConfigError, match="has 2 interfaces"):
         rom.export(rom.reduce(model, method=rom.Guyan(), interfaces=two, certify=False), path)
-    with pytest.raises(ConfigError, match="not one for each interface"):
+    with pytest.raises(ConfigError, match="must be one label for each interface"):
         write_radioss(body, path, nodes={"root": 1, "tip": 2})
-    with pytest.raises(ConfigError, match="not one for each interface"):
+    with pytest.raises(ConfigError, match="must be one label for each interface"):
         write_radioss(body, path, nodes={"root": 1, "tip": 2, "side": 2})
     with pytest.raises(ConfigError, match="1 to 10 digits"):
         write_radioss(body, path, nodes={"root": 1, "tip": 2, "side": -3})

@@ -221,7 +221,7 @@ def test_factors_outside_the_range_are_refused_or_announced(family):
     with pytest.raises(ParameterError, match=r"no parameter 'E_wbe'; the family has \['E_web'"):
         family.at(E_wbe=1.0)
     for wrong in (0.0, -1.0):
-        with pytest.raises(ParameterError, match="is not a positive factor"):
+        with pytest.raises(ParameterError, match="must be a positive factor"):
             family.at(E_web=wrong, extrapolate=True)
     for wrong in (np.nan, np.inf, "1", True, [1.0]):
         with pytest.raises(ConfigError, match=r"BodyFamily.at: E_web = .* must be a finite number"):
@@ -229,16 +229,16 @@ def test_factors_outside_the_range_are_refused_or_announced(family):
 
 
 def test_wrong_parameters_are_named():
-    with pytest.raises(ParameterError, match="range 2 to 1 of YoungsModulus of web"):
+    with pytest.raises(ParameterError, match="YoungsModulus of web: needed is"):
         rom.YoungsModulus("web", 2.0, 1.0)
-    with pytest.raises(ParameterError, match="Density of the whole body: low = nan"):
+    with pytest.raises(ParameterError, match="low of Density of the whole body = nan"):
         rom.Density(None, np.nan, 1.0)
     arguments = {"method": rom.CraigBampton(2), "interfaces": KINDS}
     half = rom.Density("web", 0.5, 1.0)
     for parameters, what in (
         ({}, "needs a parameter"),
         ({"rho": 2.0}, r"parameters\['rho'\] = 2.0 must be of type Parameter"),
-        ({"2rho": half}, "'2rho' cannot name a parameter"),
+        ({"2rho": half}, "'2rho' names no parameter"),
         (
             {"rho": rom.Density("wbe", 0.5, 1.0)},
             r"no region 'wbe'; the model has \['rest', 'web'\]",
@@ -246,7 +246,7 @@ def test_wrong_parameters_are_named():
     ):
         with pytest.raises(ConfigError, match=what):
             rom.reduce_parametric(made(), parameters=parameters, **arguments)
-    with pytest.raises(ConfigError, match="tol = 0 is not a relative error"):
+    with pytest.raises(ConfigError, match="tol = 0 must be above 0"):
         rom.reduce_parametric(made(), parameters={"rho": half}, tol=0, **arguments)
     with pytest.raises(ConfigError, match="which this method does not keep"):
         rom.reduce_parametric(

@@ -163,7 +163,12 @@ def test_what_thickness_does_not_go_with_is_named():
     cases = (
         (model, KINDS | {"tip": "full"}, {}, "interface 'tip' has the kind 'full'"),
         (model, KINDS, {"stress": True}, "stress is not recovered"),
-        (replace(model, attachments=(rom.Attachment("tip", 1.0),)), KINDS, {}, "no masses"),
+        (
+            replace(model, attachments=(rom.Attachment("tip", 1.0),)),
+            KINDS,
+            {},
+            "attached masses",
+        ),
         (replace(model, regions={}), KINDS, {}, "do not tell how they are stretched"),
         (replace(model, K=2 * model.K), KINDS, {}, "are not the whole model"),
     )

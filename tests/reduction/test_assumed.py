@@ -145,7 +145,9 @@ def test_wrong_wishes_are_refused(model):
     for n in (0, -1, 1.5):
         with pytest.raises(ConfigError, match="n_modes"):
             rom.AssumedModes(n)
-    with pytest.raises(ConfigError, match=r"n_modes = 100000, but the supports leave \d+ dofs"):
+    with pytest.raises(
+        ConfigError, match=r"n_modes = 100000 must be .* the dofs that supports leave"
+    ):
         reduced(model, 100_000, reference="root")
     with pytest.raises(InterfaceError, match="'foot'"):
         reduced(model, 2, {"foot": "x"})

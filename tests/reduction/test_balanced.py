@@ -92,9 +92,9 @@ def test_modes_that_interfaces_neither_move_nor_feel_leave_first():
         ((np.eye(2), np.eye(2), np.zeros((2, 2)), np.ones((2, 1)), np.ones((1, 2)), 1),
          ModelError, "not stable"),
         ((np.eye(2), np.eye(3), np.eye(2), np.ones((2, 1)), np.ones((1, 2)), 1),
-         ConfigError, "shapes do not fit"),
+         ConfigError, "M has shape"),
         ((np.eye(2), np.eye(2), np.eye(2), np.ones((2, 1)), np.ones((1, 2)), 3),
-         ConfigError, "r = 3, but"),
+         ConfigError, "r = 3 must be a whole number from 1 to 2"),
         ((np.eye(601),) * 3 + (np.ones((601, 1)), np.ones((1, 601)), 2),
          ResourceError, "refused above 600"),
         ((np.diag([1.0, 2.0]), np.eye(2), np.eye(2), [[1.0], [0.0]], [[1.0, 0.0]], 2),
@@ -109,8 +109,8 @@ def test_messages(arguments, error, words):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        ((5, 3), "pool = 3 is less"),
-        ((5, 9, 0.0), "not between 0 and 1"),
+        ((5, 3), "pool = 3 must be a whole number of 5 or more"),
+        ((5, 9, 0.0), "must be above 0 and below 1"),
         ((-1,), "n_modes = -1 must be"),
     ],
 )

@@ -240,7 +240,10 @@ def test_a_repeated_frequency_of_one_body_is_kept_whole(caplog):
 def test_messages_for_bodies_without_functions():
     with pytest.raises(ConfigError, match="n = 5 must be a whole number of 6 or more"):
         rom.Characteristic(rom.CraigBampton(4), 5)
-    with pytest.raises(ConfigError, match=r"n = 49, but interface 'root' has 48 coordinates"):
+    with pytest.raises(
+        ConfigError,
+        match=r"n = 49 must be a whole number from 0 to 48: the coordinates of interface 'root'",
+    ):
         body(BOTH, 49)
     with pytest.raises(ConfigError, match="reduces full interfaces, and none is given"):
         body(dict.fromkeys(BOTH, "rbe2"), 8)

@@ -201,8 +201,8 @@ def test_modes_by_substructures_are_those_by_lanczos(ops, model):
     ("given", "said"),
     [
         ({"f_max": 1e3, "search": "arnoldi"}, "search"),
-        ({"n_modes": 3, "search": "substructures"}, "up to f_max"),
-        ({"f_max": 1e3, "tol": 1e-3, "search": "substructures"}, "without tol"),
+        ({"n_modes": 3, "search": "substructures"}, "needs f_max"),
+        ({"f_max": 1e3, "tol": 1e-3, "search": "substructures"}, "takes no tol"),
     ],
 )
 def test_a_search_that_does_not_suit_is_refused(given, said):

@@ -118,7 +118,7 @@ def test_the_kind_is_named_and_can_be_held(seen):
             lambda: rom.Snapshots(RANDOM, n=5),
             "n = 5 must be a whole number of 6 or more",
         ),
-        (lambda: rom.Snapshots(RANDOM, energy=1.5), r"energy = 1\.5 is not a share"),
+        (lambda: rom.Snapshots(RANDOM, energy=1.5), r"energy = 1\.5 must be above 0"),
         (lambda: tie(ROOT, rom.Snapshots(RANDOM[:45], n=6)), "45 dofs do not fit .*'root' with 48"),
         (
             lambda: tie(ROOT, rom.Snapshots(RANDOM[:, :4], n=11)),

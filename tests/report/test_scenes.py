@@ -223,11 +223,11 @@ def test_coordinates_that_do_nothing_are_not_sent(solution, monkeypatch):
 
 
 def test_what_cannot_be_drawn_is_refused(body, solution):
-    with pytest.raises(ConfigError, match="body 'bar' has no surface to draw"):
+    with pytest.raises(ConfigError, match="body 'bar' carries no surface"):
         report.modes(replace(body, surface=None, stress=None))
     with pytest.raises(ConfigError, match="shapes: no body 'wheel'"):
         report.motion(solution, shapes={"wheel": sphere(4)})
-    with pytest.raises(ConfigError, match="no picture of the kinds"):
+    with pytest.raises(ConfigError, match="must be a picture of the kinds"):
         report.motion(solution, "none.png")
     with pytest.raises(ConfigError, match="are no two directions"):
         report.motion(solution, view=(0, 1, 0), up=(0, 1, 0))

@@ -199,14 +199,14 @@ def test_channels_name_the_body_on_which_they_lie(bolted):
     assert both.owners(bodies, "sensor") == ["arm", "frame"]
     assert both.some([1]).bodies == ("frame",) and Channels(*at, "arm").bodies == ("arm", "arm")
     for bad, words in (
-        (Channels(*at, "leg"), "sensor 0 lies on 'leg': bodies are 'frame', 'arm'"),
+        (Channels(*at, "leg"), "sensor 0 lies on 'leg'; give of 'frame', 'arm'"),
         (Channels([[0.1, 0.1, 0.08]], [[0, 0, 1]], "arm"), "sensor 0 at .* m off 'arm'"),
     ):
         with pytest.raises(ConfigError, match=words):
             bad.rows(bodies, "sensor")
-    with pytest.raises(ConfigError, match="lies on 'arm': this is one body alone"):
+    with pytest.raises(ConfigError, match="lies on 'arm'; give none of this body"):
         both.rows(bodies["arm"], "sensor")
-    with pytest.raises(ConfigError, match="1 bodies are named for 2 channels"):
+    with pytest.raises(ConfigError, match="1 names of bodies for 2 channels"):
         Channels(*at, ("arm",))
     offered = candidates(bolted, 12, fixed=HELD)
     assert set(offered.bodies) == {"frame", "arm"} and len(offered.points) == 36
@@ -347,12 +347,12 @@ def test_what_does_not_fit_an_assembly_is_named(families, bolted):
     seam = Channels([[0.5, 0.1, 0.08]], [[0, 0, 1]])
     refused("input 0 at .* is as near to one as to another of 'frame', 'arm'",
             test=replace(test, inputs=seam))  # fmt: skip
-    refused("'tip' is no place .body, interface.; bodies are 'frame', 'arm'",
+    refused("'tip' must be .body, interface. of 'frame', 'arm'",
             attached=AddedMass("tip", 1.0, 0.1, 1.0))  # fmt: skip
-    refused("no place", attached=replace(BOLTS, one=("leg", "tip")))
+    refused("must be .body, interface", attached=replace(BOLTS, one=("leg", "tip")))
     refused("knee", InterfaceError, attached=replace(BOLTS, one=("arm", "knee")))
     for fixed in ((("leg", "root"),), ("root",), "root", {"root": "x"}):
-        refused("is no place .body, interface.", fixed=fixed)
+        refused("must be .body, interface", fixed=fixed)
     with pytest.raises(ConfigError, match="has the range"):
         replace(BOLTS, low=0.0)
     with pytest.raises(ConfigError, match="there is no family"):

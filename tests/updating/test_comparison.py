@@ -116,7 +116,7 @@ def test_a_set_is_worse_by_its_paired_difference():
 
 def test_what_cannot_be_compared_is_named(family):
     test = measured(family, 0, {})
-    with pytest.raises(ConfigError, match="no set"):
+    with pytest.raises(ConfigError, match="at least one set"):
         compare(family, test, {}, **COMMON)
     with pytest.raises(ConfigError, match="folds = 1"):
         compare(family, test, SETS, folds=1, **COMMON)

@@ -276,7 +276,9 @@ CHANGES = {
     "not those of its checksum": lambda file: file["H"].__setitem__((0, 0, 0), 1.0),
     "'frequencies' holds no real": lambda file: other(file, "frequencies", [1j, 2j]),
     "'H' holds no complex numbers": lambda file: other(file, "H", np.bytes_("H")),
-    r"H is \(6, 2, 1\); lines": lambda file: other(file, "frequencies", [1.0, 2.0], True),
+    r"H is \(6, 2, 1\), needed are lines": lambda file: other(
+        file, "frequencies", [1.0, 2.0], True
+    ),
     "quantity": lambda file: file.attrs.__setitem__("quantity", "force"),
 }
 

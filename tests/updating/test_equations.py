@@ -246,8 +246,8 @@ def test_what_equations_need_is_named(family, model):
             rom.update(family, test, fixed=("root",), **{"residual": "equations"} | options)
 
     refused("residual = 'force'", residual="force")
-    refused("rank belongs", rank=3, residual="responses")
-    refused("rank belongs", rank=3, residual="response-function")
+    refused("rank needs", rank=3, residual="responses")
+    refused("rank needs", rank=3, residual="response-function")
     refused("prior of E_inner = -0.1 must be positive", prior={"E_inner": -0.1})
     refused("rank = 99", rank=99)
     refused("rank = 1.5", rank=1.5)

@@ -306,7 +306,7 @@ def test_what_cannot_be_followed_is_named(family, filter_):
         Drift(0.0)
     with pytest.raises(ConfigError, match="walk = -1"):
         Drift(0.1, -1.0)
-    with pytest.raises(ParameterError, match=r"'E'.*tracked are"):
+    with pytest.raises(ParameterError, match=r"'E' must be of 'E_inner'"):
         filter_.held(E=1.0)
     with pytest.raises(ConfigError, match=r"samples \(5, 2\)"):
         filter_.run(np.zeros((5, 2)))

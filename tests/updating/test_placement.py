@@ -176,14 +176,14 @@ def test_wrong_plans_are_named(family):
     refused("off the body", lambda: planned(family, Channels([[9.0, 0, 0]], [[1, 0, 0]]), 1))
     refused("n_sensors = 13", lambda: planned(family, offered, 13))
     refused("n_inputs = 4", lambda: planned(family, offered, 3, n_inputs=4))
-    refused("one of them is positive", lambda: planned(family, offered, 3, floor=0.0))
+    refused("one of them must be positive", lambda: planned(family, offered, 3, floor=0.0))
     refused(
         "above zero", lambda: place(family, offered, SHAKERS, [0.0, 1.0], n_sensors=2, noise=0.1)
     )
     refused(
         "no parameter 'E'", lambda: planned(family, offered, 3, prior={"E": 1.0}), ParameterError
     )
-    refused("deviation is positive", lambda: planned(family, offered, 3, prior={"E_inner": 0.0}))
+    refused("must be positive", lambda: planned(family, offered, 3, prior={"E_inner": 0.0}))
     refused("n = 2 ", lambda: independent(family.body, offered, 2, modes=3, fixed=("root",)))
     along = some(offered, np.arange(0, 12, 3))
     one = Channels(np.repeat(np.asarray(along.points)[:1], 4, axis=0), along.directions)

@@ -134,18 +134,24 @@ def test_meshes_are_joined_with_their_own_triangles():
 @pytest.mark.parametrize(
     ("call", "words"),
     [
-        (lambda: view.ring((0, 0, 0), (0, 0, 1), 2.0, 1.0), "a bore of 2 m is not inside"),
+        (lambda: view.ring((0, 0, 0), (0, 0, 1), 2.0, 1.0), "a bore of 2 m must be smaller"),
         (lambda: view.ring((0, 0, 1), (0, 0, 1), 1.0, 2.0), "in one place"),
-        (lambda: view.tube([(0, 0, 0)], 0.1), r"\(k, 3\) with k > 1, got \(1, 3\)"),
+        (
+            lambda: view.tube([(0, 0, 0)], 0.1),
+            "line of a tube = 1 must",
+        ),
         (lambda: view.tube([(0, 0, 0)] * 2, 0.1), "in one place"),
-        (lambda: view.coil((0, 0, 0), (0, 0, 1), 0.1, 0.2), "a wire of 0.2 m makes no coil"),
+        (lambda: view.coil((0, 0, 0), (0, 0, 1), 0.1, 0.2), "a wire of 0.2 m must be thinner"),
         (lambda: view.wound([(0, 0, 0), (0, 0, 0)], 0.2, 0.1), "are in one place"),
-        (lambda: view.extruded([(0, 0), (1, 0)], 1.0), r"\(n, 2\) with n > 2, got \(2, 2\)"),
+        (
+            lambda: view.extruded([(0, 0), (1, 0)], 1.0),
+            "outline = 2 must",
+        ),
         (lambda: view.extruded([(1, 0), (0, -1), (-1, 0)], 1.0), "counter-clockwise"),
-        (lambda: view.extruded([(1, -1), (1, 1), (-1, 1), (-1, -1)], 1.0, bore=2.0), "bore of 2 m"),
+        (lambda: view.extruded([(1, -1), (1, 1), (-1, 1), (-1, -1)], 1.0, bore=2.0), "bore = 2"),
         (lambda: view.gear(5, 1e-3, 1e-2), "5 teeth of a pressure angle of 20 degrees"),
         (lambda: view.gear(20, 1e-3, 1e-2, pressure_angle=0.7), "40.1.* degrees are pointed"),
-        (lambda: view.gear(20, 1e-3, 1e-2, bore=0.02), "a bore of 0.02 m does not fit"),
+        (lambda: view.gear(20, 1e-3, 1e-2, bore=0.02), "bore = 0.02 must be"),
     ],
 )
 def test_shapes_that_cannot_be_are_refused(call, words):
@@ -162,5 +168,5 @@ def test_a_bar_has_its_section_across_its_length():
     np.testing.assert_allclose(points.mean(axis=0), (a + b) / 2, atol=1e-15)
     assert np.ptp(points[:, 2]) == pytest.approx(0.06)
     assert np.ptp(points @ (b - a)) == pytest.approx(0.25)
-    with pytest.raises(ConfigError, match="no direction across the bar"):
+    with pytest.raises(ConfigError, match="must be a direction across the bar"):
         view.bar(a, b, (0.1, 0.1), b - a)

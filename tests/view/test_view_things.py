@@ -136,13 +136,13 @@ def test_a_scene_is_drawn_into_axes_of_the_caller():
 @pytest.mark.parametrize(
     ("thing", "words"),
     [
-        (view.Thing(np.zeros((3, 2)), [[0, 1, 2]]), r"points are \(n, 3\)"),
-        (view.Thing(np.zeros((3, 3)), [[0, 1, 3]]), "numbers from 0 to 2"),
-        (view.Thing(np.zeros((3, 3)), [[0, 1, -1]]), "numbers from 0 to 2"),
-        (view.Thing(np.zeros((3, 3)), [[0.0, 1.0]]), "numbers from 0 to 2"),
-        (view.Thing(np.zeros((4, 3)), [[0, 1, 2, 3]]), "numbers from 0 to 3"),
-        (view.Thing(*BOX, values=[1.0, 2.0]), r"has \(1, 2\) values for \(1, 8\) points"),
-        (view.Thing(*BOX, edges=[[0, 8]]), "edges are pairs of numbers from 0 to 7"),
+        (view.Thing(np.zeros((3, 2)), [[0, 1, 2]]), r"points must be \(n, 3\)"),
+        (view.Thing(np.zeros((3, 3)), [[0, 1, 3]]), "from 0 to 2"),
+        (view.Thing(np.zeros((3, 3)), [[0, 1, -1]]), "from 0 to 2"),
+        (view.Thing(np.zeros((3, 3)), [[0.0, 1.0]]), "from 0 to 2"),
+        (view.Thing(np.zeros((4, 3)), [[0, 1, 2, 3]]), "from 0 to 3"),
+        (view.Thing(*BOX, values=[1.0, 2.0]), r"has \(1, 2\) values, needed are \(1, 8\)"),
+        (view.Thing(*BOX, edges=[[0, 8]]), "edges must be pairs from 0 to 7"),
     ],
 )
 def test_wrong_things_are_refused_by_name(thing, words):
@@ -187,9 +187,9 @@ def test_plates_are_their_outlines_made_thick_and_move_with_them():
     np.testing.assert_allclose(step[second], [(0.0, 0.3, 0.0)] * second.sum(), atol=1e-15)
     np.testing.assert_array_equal(step[~second], 0.0)
     assert np.ptp(thing.points[..., 2]) == pytest.approx(0.5)
-    with pytest.raises(ConfigError, match=r"2 plates have \(1,\) values"):
+    with pytest.raises(ConfigError, match=r"1 values for 2 plates"):
         view.plates(frames, 0.5, values=[1.0])
-    with pytest.raises(ConfigError, match="there is no plate"):
+    with pytest.raises(ConfigError, match="at least one plate"):
         view.plates([[square], [square, other]], 0.5)
 
 

@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from rom.arguments import finite, typed, whole
+from rom.arguments import between, finite, typed, whole
 from rom.body.recovery import CENTRIFUGAL_LOADS, PRODUCTS, centrifugal
 from rom.eigen.supports import DIRECTIONS, Fixed, supports
 from rom.eigen.verbs import Operators, mean_motion
@@ -102,13 +102,12 @@ class Geometric:
         whole("n_modes", self.n_modes)
         if self.n_shapes is not None:
             whole("n_shapes", self.n_shapes, 1, reason="without any the basis locks")
-        if not 0 < self.tol < 1:
-            raise ConfigError(f"tol = {self.tol!r} is a share between 0 and 1.")
-        if self.sampling is not None and not 0 < self.sampling < 1:
-            raise ConfigError(f"sampling = {self.sampling!r} is a share between 0 and 1.")
+        between("tol", self.tol, 0, 1, "()")
+        if self.sampling is not None:
+            between("sampling", self.sampling, 0, 1, "()")
         for name, load in self.loads.items():
             if not finite(f"the range of loads at {name!r}", load, (6,)).any():
-                raise ConfigError(f"the range of loads at {name!r} is {load!r}: all are zero.")
+                raise ConfigError(f"the range of loads at {name!r} is {load!r}: it needs a force.")
         spins = finite("spin", self.spin, (3,)).any()
         if not self.loads and not spins:
             raise ConfigError(
@@ -118,7 +117,7 @@ class Geometric:
         if self.about is not None:
             finite("about", self.about, (3,))
             if not spins:
-                raise ConfigError(f"about = {self.about!r} is a point of an axis, and spin is 0.")
+                raise ConfigError(f"about = {self.about!r} needs a spin; leave it out without one.")
 
     def components(self) -> list[Load]:
         """The loads that are not zero: those of interfaces, then centrifugal ones."""

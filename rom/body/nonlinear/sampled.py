@@ -129,7 +129,7 @@ def sampled_energy(
         ModelError: for material that is not isotropic; or without equilibrium in the range.
     """
     if energy.mesh.comm.size > 1:
-        raise ParallelError("elements are sampled on one process.")
+        raise ParallelError("elements are sampled on one process only; leave mpirun out.")
     if np.any(geometric.spin):
         raise ConfigError(
             "sampling and spin do not go together: centrifugal force is not among the states.",

@@ -68,7 +68,7 @@ def _body(args: argparse.Namespace) -> Answer:
     from rom.io.files import check_writable
 
     if wrong := [option for option in MECHANISM_OPTIONS if getattr(args, option)]:
-        raise ConfigError(f"--{wrong[0]} goes with the .toml file of a mechanism.")
+        raise ConfigError(f"--{wrong[0]} needs the .toml file of a mechanism.")
     check_writable(args.output)
     kind = format_of(args.output, args.to)
     checked(args, args.output, kind)

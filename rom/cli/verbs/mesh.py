@@ -15,6 +15,7 @@ from rom.cli.options import (
 )
 from rom.cli.output import add_force, checked
 from rom.errors import ConfigError
+from rom.names import check_ending
 
 if TYPE_CHECKING:
     from rom.fe.mesh.solid import SolidMesh
@@ -86,10 +87,8 @@ def run(args: argparse.Namespace) -> Answer:
 
 
 def _check_save(args: argparse.Namespace, geometry: Path) -> None:
-    path = args.save
+    path = check_ending(args.save, "a mesh", ".png", ".vtu", DECK_SUFFIX)
     suffix = path.suffix.lower()
-    if suffix not in (".vtu", ".png", DECK_SUFFIX):
-        raise ConfigError(f"--save {path}: a mesh is written as .png, .vtu or .inp only.")
     checked(args, path, "deck" if suffix == DECK_SUFFIX else suffix[1:], inputs=[geometry])
 
 
@@ -99,7 +98,7 @@ def _solid(args: argparse.Namespace) -> "Material | None":
     if not given:
         return None
     if args.save is None or args.save.suffix.lower() != DECK_SUFFIX:
-        raise ConfigError(f"{given[0]} goes with --save FILE.inp.")
+        raise ConfigError(f"{given[0]} needs --save FILE.inp.")
     if len(given) < 3:
         raise ConfigError(f"a material needs --E, --nu and --rho, got {', '.join(given)}.")
     return material(args)

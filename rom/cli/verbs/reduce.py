@@ -146,7 +146,7 @@ def _damping(args: argparse.Namespace) -> "Rayleigh | ModalDamping | None":
     if args.damping_ratio is not None:
         return ModalDamping(args.damping_ratio, args.damping_fixed)
     if args.damping_fixed:
-        raise ConfigError("--damping-fixed says where --damping-ratio is meant, which is missing.")
+        raise ConfigError("--damping-fixed says where a ratio is meant: it needs --damping-ratio.")
     return None if args.rayleigh is None else Rayleigh(**rayleigh(args.rayleigh))
 
 

@@ -11,6 +11,7 @@ from shlex import quote
 from rom.cli.answer import Answer
 from rom.cli.options import add_meshing, meshing
 from rom.cli.output import add_force, checked
+from rom.names import check_ending
 
 SUMMARY = "write a report as one HTML file"
 EXAMPLES = """\
@@ -36,12 +37,10 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> Answer:
     """Describe; the file is written at the end."""
     from rom import __version__
-    from rom.errors import ConfigError
     from rom.report.html import write_report
     from rom.report.pages import describe
 
-    if args.output.suffix.lower() != ".html":
-        raise ConfigError(f"{args.output}: a report is written as .html.")
+    check_ending(args.output, "a report", ".html")
     checked(args, args.output)
     command = f"rom {' '.join(map(quote, args.argv))}"
     title, sections = describe(

@@ -203,9 +203,9 @@ def _pendulum(args: argparse.Namespace) -> Answer:
     needed = {"--hinge": args.hinge, "--t-end": args.t_end, "--dt": args.dt}
     require(needed | {OUTPUT_FLAG: args.output})
     if args.dt > args.t_end:
-        raise ConfigError(f"--dt {args.dt:g} is longer than --t-end {args.t_end:g}.")
+        raise ConfigError(f"--dt {args.dt:g} must be at most --t-end {args.t_end:g}.")
     if not any(args.axis):
-        raise ConfigError("--axis 0,0,0 has no direction.")
+        raise ConfigError("--axis 0,0,0 has no direction; give one, such as --axis 0,0,1.")
     folder = claim(args)
     body = load(args.file)
     body.marker(args.hinge)

@@ -25,7 +25,7 @@ from rom.cli.options import (
 )
 from rom.cli.output import add_force, checked
 from rom.errors import ConfigError
-from rom.names import named
+from rom.names import check_ending, named
 
 if TYPE_CHECKING:
     from rom.updating import Channels, Responses, Updated
@@ -181,7 +181,7 @@ def run(args: argparse.Namespace) -> Answer:
     test = replace(test, **{name: value for name, value in noise.items() if value is not None})
     outside = _outside(args, family)
     if wrong := sorted(set(args.candidate) - set(outside)):
-        raise ConfigError(f"--candidate {wrong[0]} is no --spring, --joint or --mass.")
+        raise ConfigError(f"--candidate {wrong[0]} must name a --spring, --joint or --mass.")
     prior = unique(args.prior, "--prior")
     prior = {name: typed_number("--prior", text) for name, text in prior.items()}
     found = update(
@@ -213,7 +213,7 @@ def _outputs(args: argparse.Namespace, family: "Family") -> dict[str, Path]:
     if args.output is None:
         return {}
     if not args.output.name:
-        raise ConfigError("-o names no file.")
+        raise ConfigError("-o must name a file.")
     stem, paths = args.output.name.removesuffix(".npz").removesuffix(".rom"), {}
     for name in Parts.of(family).bodies:
         path = args.output.with_name(f"{stem}.{name}.rom.npz") if name else args.output
@@ -258,7 +258,7 @@ def _family(args: argparse.Namespace) -> "Family":
             )
     if "" in families:
         if args.couple or args.joint:
-            raise ConfigError("--couple and --joint belong to an assembly of several families.")
+            raise ConfigError("--couple and --joint need an assembly of several families.")
         return families[""]
     pairs = [
         (_place("--couple", one, families), _place("--couple", other, families))
@@ -278,7 +278,7 @@ def _place(option: str, text: str, bodies: Collection[str]) -> Any:
     for name in bodies:
         if text.startswith(f"{name}."):
             return name, text.removeprefix(f"{name}.")
-    raise ConfigError(f"{option} {text!r} is no BODY.INTERFACE; bodies are {named(bodies)}.")
+    raise ConfigError(f"{option} {text!r} must be BODY.INTERFACE, of {named(bodies)}.")
 
 
 def _held(args: argparse.Namespace, family: "Family") -> tuple[Any, ...]:
@@ -303,8 +303,8 @@ def _plan(args: argparse.Namespace) -> Answer:
         raise ConfigError("--plan takes neither a test nor --candidate: it comes before the test.")
     require({"--lines": args.lines}, hint="For example --lines 20:800, from 20 to 800 Hz.")
     output = args.output and checked(args, args.output)
-    if output and output.suffix.lower() not in PLAN_ENDINGS:
-        raise ConfigError(f"-o {output}: a plan is written as {', '.join(PLAN_ENDINGS)}.")
+    if output:
+        check_ending(output, "a plan", *PLAN_ENDINGS)
     family = _family(args)
     held = _held(args, family)
     offered = candidates(family, PLAN_POINTS, fixed=held)
@@ -358,8 +358,7 @@ def _match(args: argparse.Namespace, family: "Family", test: "Responses") -> Non
     from scipy.spatial import cKDTree
 
     path = checked(args, args.picture, inputs=_files(args).values())
-    if path.suffix.lower() != ".png":
-        raise ConfigError(f"--picture {path}: it is written as .png.")
+    check_ending(path, "a picture", ".png")
     points = np.vstack([test.sensors.points, test.inputs.points])
     far = cKDTree(_surface(family)[0]).query(points)[0]
     _drawn(
@@ -461,11 +460,11 @@ def _outside(args: argparse.Namespace, family: "Family") -> "Attached":
                             ("--mass", args.mass)):  # fmt: skip
         for name, text in unique(several, option).items():
             if name in found:
-                raise ConfigError(f"{option} {name} has the name of another one.")
+                raise ConfigError(f"{option} {name} needs a name of its own.")
             at, value, low, high = _parts(option, text)
             places = [_place(option, part, bodies) for part in at.split(",")]
-            if len(places) != 1 + (option == "--joint"):
-                raise ConfigError(f"{option} {text!r} lies between {len(places)} places.")
+            if len(places) != (n := 1 + (option == "--joint")):
+                raise ConfigError(f"{option} {text!r} names {len(places)} places, needed are {n}.")
             numbers = [typed_number(option, part) for part in value.split(",")]
             if option == "--spring":
                 found[name] = GroundSpring(places[0], numbers, low, high)
@@ -474,12 +473,12 @@ def _outside(args: argparse.Namespace, family: "Family") -> "Attached":
             elif len(numbers) == 1:
                 found[name] = AddedMass(places[0], numbers[0], low, high)
             else:
-                raise ConfigError(f"{option} {text!r}: a mass is one number.")
+                raise ConfigError(f"{option} {text!r}: a mass must be one number [kg].")
     return found
 
 
 def _parts(option: str, text: str) -> tuple[str, str, float, float]:
     parts = text.split(":")
     if len(parts) != 4:
-        raise ConfigError(f"{option} {text!r} is not INTERFACE:VALUE:LOW:HIGH.")
+        raise ConfigError(f"{option} {text!r} must be written INTERFACE:VALUE:LOW:HIGH.")
     return parts[0], parts[1], typed_number(option, parts[2]), typed_number(option, parts[3])

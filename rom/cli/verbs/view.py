@@ -12,7 +12,7 @@ from rom.cli.answer import Answer
 from rom.cli.described import component, described, mechanism
 from rom.cli.options import add_meshing, count, names
 from rom.cli.output import add_force, checked
-from rom.errors import ConfigError
+from rom.names import check_ending
 
 SUMMARY = "look at a body, a component or a mechanism"
 EXAMPLES = """\
@@ -42,8 +42,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> Answer:
     """Load; the picture is drawn, or the window opened, at the end."""
     path = args.output or Path(f"{args.file.name.partition('.')[0]}.png")
-    if path.suffix.lower() != ".png":
-        raise ConfigError(f"{path}: a picture is written as .png only.")
+    check_ending(path, "a picture", ".png")
     from rom.view.scenes.window import has_display
 
     window = args.output is None and has_display()

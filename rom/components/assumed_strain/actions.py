@@ -10,11 +10,12 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from rom.arguments import finite, is_number, shortened, typed
+from rom.arguments import finite, is_number, positive, shortened, typed, whole
 from rom.components.assumed_strain.triangles import Sheet, sides_of, whole_numbers
 from rom.components.histories import History, straightened
 from rom.errors import ConfigError, MeshError
 from rom.model import Array, Index
+from rom.names import check_text
 
 TOUCH_RTOL = 1e-6  # depth over the longest side of the outline that counts as touching at the start
 
@@ -183,8 +184,8 @@ def disc(center: npt.ArrayLike, radius: float, *, n: int = 120) -> Array:
     Raises:
         ConfigError: for a radius that is not positive, or fewer than three corners.
     """
-    if not 0 < radius < np.inf or n < 3:
-        raise ConfigError(f"a disc of the radius {radius} m with {n} corners has no inside.")
+    positive("radius", radius)
+    whole("n", n, 3)
     angle = 2 * np.pi * np.arange(n) / n
     return finite("center", center, (2,)) + radius * np.column_stack([np.cos(angle), np.sin(angle)])
 
@@ -230,7 +231,7 @@ def _refuse_strangers(actions: Actions) -> None:
             )
         for k, one in enumerate(given):
             if not isinstance(one, kind):
-                raise ConfigError(f"{name}[{k}] = {shortened(one)} is no {kind.__name__}.")
+                raise ConfigError(f"{name}[{k}] = {shortened(one)} must be a {kind.__name__}.")
 
 
 def _driven(held: Index, moved: list[Index], first: int) -> tuple[Index, Index]:
@@ -250,12 +251,7 @@ def nodal(name: str, values: npt.ArrayLike, body: Sheet) -> Array:
     Raises:
         ConfigError: if they do not fit the sheet.
     """
-    x = np.ascontiguousarray(finite(name, values, None))
-    if x.shape != body.points.shape:
-        raise ConfigError(
-            f"{name} of the shape {x.shape}: {body.points.shape} finite numbers are needed."
-        )
-    return x
+    return np.ascontiguousarray(finite(name, values, body.points.shape))
 
 
 def dofs_of(held: npt.ArrayLike, body: Sheet, name: str = "held") -> Index:
@@ -277,9 +273,9 @@ def _outer(body: Sheet, k: int, traction: Traction) -> Index:
     """Sides of a traction; each must be at the edge, and turned as there."""
     wanted = whole_numbers(f"traction {k}: sides", traction.sides)
     if wanted.ndim != 2 or wanted.shape[1] != 2:
-        raise ConfigError(f"traction {k}: sides of the shape {wanted.shape}, not (k, 2).")
+        raise ConfigError(f"traction {k}: sides of the shape {wanted.shape}, needed is (k, 2).")
     if not (is_number(traction.pressure) and is_number(traction.shear)):
-        raise ConfigError(f"traction {k} is not finite.")
+        raise ConfigError(f"traction {k} needs finite pressure and shear.")
     there = {tuple(side) for side in outer_sides(body).tolist()}
     for side in wanted.tolist():
         if tuple(side) not in there:
@@ -292,11 +288,9 @@ def _outer(body: Sheet, k: int, traction: Traction) -> Index:
 
 def _faces(tool: Tool) -> Array:
     """(f, 7) corner, tangent, outer normal, length; a tool must be convex."""
-    if not isinstance(tool.name, str):
-        raise ConfigError(f"a tool has the name {shortened(tool.name)}, which is no text.")
-    X = finite(f"tool {tool.name!r}: the outline", tool.outline, None)
-    if X.ndim != 2 or X.shape[1] != 2 or len(X) < 3:
-        raise ConfigError(f"tool {tool.name!r}: an outline has three finite corners or more.")
+    name = f"tool {check_text(tool.name, 'a tool')!r}"
+    X = finite(f"{name}: the outline", tool.outline, (None, 2))
+    whole(f"{name}: corners of the outline", len(X), 3)
     rough = isinstance(tool.friction, float) and tool.friction == np.inf
     if not (rough or (is_number(tool.friction) and tool.friction >= 0)):
         raise ConfigError(
@@ -306,7 +300,9 @@ def _faces(tool: Tool) -> Array:
     along = np.roll(X, -1, axis=0) - X
     length = np.linalg.norm(along, axis=1)
     if not length.min() > 0:
-        raise ConfigError(f"tool {tool.name!r}: a corner of the outline is named twice.")
+        raise ConfigError(
+            f"tool {tool.name!r}: a corner of the outline is there twice; use it once."
+        )
     t = along / length[:, None]
     turn = np.roll(t, -1, axis=0)
     if np.any(t[:, 0] * turn[:, 1] - t[:, 1] * turn[:, 0] < -1e-9):

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from scipy.sparse import coo_matrix, csr_matrix
 from scipy.sparse.linalg import spsolve
 
-from rom.arguments import finite, typed
+from rom.arguments import between, finite, typed
 from rom.components.assumed_strain import kernels
 from rom.components.assumed_strain.actions import Actions, Load, nodal, prepared
 from rom.components.assumed_strain.contact import touch
@@ -152,8 +152,7 @@ def implicit_motion(
         SolverError: if no motion is found, or plastic strain leaps even in the shortest steps;
             ``error.solution`` holds the instants before.
     """
-    if not 0 <= rho_inf <= 1:
-        raise ConfigError(f"rho_inf = {rho_inf}: from 0 to 1.")
+    between("rho_inf", rho_inf, 0, 1)
     if actions.tools and rho_inf > MAX_RHO_OF_IMPACTS:
         raise ConfigError(
             f"rho_inf = {rho_inf} with tools: impacts would gain energy.",

@@ -12,11 +12,11 @@ import numpy as np
 import numpy.typing as npt
 from scipy.sparse import coo_matrix, csr_matrix, identity, kron
 
-from rom.arguments import finite, is_number, shortened, typed
+from rom.arguments import finite, is_number, positive, shortened, typed, whole
 from rom.components.assumed_strain import kernels
 from rom.components.assumed_strain.actions import Actions, dofs_of, nodal, prepared
 from rom.components.assumed_strain.triangles import STATES, Sheet
-from rom.errors import ConfigError, MaterialError, SolverError
+from rom.errors import MaterialError, SolverError
 from rom.model import Array
 
 
@@ -177,8 +177,8 @@ def fly(
         SolverError: if the motion is lost; ``error.solution`` holds the pictures before.
     """
     v, held = nodal("velocities", v, body), dofs_of(held, body)
-    if not 0 < t_end < np.inf or pictures < 2:
-        raise ConfigError(f"t_end = {t_end} s with {pictures} pictures: nothing to show.")
+    positive("t_end", t_end)
+    whole("pictures", pictures, 2)
     actions = actions or Actions()
     held = np.union1d(held, dofs_of(actions.held, body))
     acts = prepared(body, replace(actions, held=held), (0.0, t_end))

@@ -32,7 +32,7 @@ def stiffness_by_sides(body: Sheet, metal: Metal, *, share: tuple[int, int] = (0
     """
     mine, of = share
     if not 0 <= mine < of or body.state == "axisymmetric":
-        raise ConfigError(f"share {mine} of {of}, {body.state}: a share from 0 of a plane sheet.")
+        raise ConfigError(f"share {mine} of {of}, {body.state}: needed is a share of a plane one.")
     triangles, there = (rows[mine::of] for rows in _triangles_at_sides(body.triangles))
     G, area = constant_gradients(body.points, body.triangles)
     parts = area[triangles] * there

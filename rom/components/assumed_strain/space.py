@@ -28,7 +28,7 @@ def in_space(body: Sheet, metal: Metal, interfaces: dict[str, Index]) -> FEModel
         Bending: Morley, Aero. Quart. 19 (1968) 149, with fitted slopes as `plates` says.
     """
     if body.state != "plane stress":
-        raise ConfigError(f"a sheet in space is in plane stress, not {body.state}.")
+        raise ConfigError(f"a sheet in space must be in plane stress, not {body.state}.")
     n, parts = len(body.points), tuple(np.unique(nodes) for nodes in interfaces.values())
     points = np.column_stack([body.points, np.zeros(n)])
     K = _placed(tangent(body, metal, body.points), (0, 1)) + _placed(

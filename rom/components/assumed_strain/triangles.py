@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from rom.arguments import finite, one_of, shortened, typed
+from rom.arguments import finite, one_of, positive, shortened, typed
 from rom.errors import ConfigError, MeshError
 from rom.model import Array, Index
 
@@ -77,8 +77,7 @@ def sheet(
     """
     one_of("element", element, ELEMENTS)
     one_of("state", state, STATES)
-    if not 0 < thickness < np.inf:
-        raise ConfigError(f"thickness = {thickness} m: no sheet is as thin or as thick.")
+    positive("thickness", thickness)
     X, T = finite("points", points, None), whole_numbers("triangles", triangles)
     _refuse_no_mesh(X, T, state)
     constant, area = constant_gradients(X, T)
@@ -165,7 +164,7 @@ def _opposite(T: Index) -> Index:
     corner, t = T.T.ravel(), len(T)
     _, place, count = np.unique(sides, axis=0, return_inverse=True, return_counts=True)
     if count.max() > 2:
-        raise MeshError(f"a side belongs to {count.max()} triangles: the sheet branches.")
+        raise MeshError(f"a side belongs to {count.max()} triangles; at most two may meet.")
     order = np.argsort(place.ravel(), kind="stable")
     twin = np.flatnonzero(np.diff(place.ravel()[order]) == 0)
     found = np.full(3 * t, -1)
@@ -211,7 +210,7 @@ def rectangle(
         ConfigError: for fewer than one division, other corners, or another way to split.
     """
     if min(n) < 1 or diagonal not in ("/", "\\", "x"):
-        raise ConfigError(f'n = {n}, diagonal = {diagonal!r}: one or more, and "/", "\\\\" or "x".')
+        raise ConfigError(f'n = {n}, diagonal = {diagonal!r}: at least 1, and "/", "\\\\" or "x".')
     s, t = (np.linspace(0, 1, k + 1) for k in n)
     C = finite("corners", corners, (4, 2))
     a, b = (x.ravel() for x in np.meshgrid(s, t))

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from scipy.integrate import solve_ivp
 
+from rom.arguments import one_each
 from rom.components.best_matching.projection import configuration, match
 from rom.components.compiled import kernel
 from rom.errors import ConfigError, ModelError, SolverError
@@ -60,7 +61,7 @@ class Bodies:
         if self.mass.ndim != 1 or self.mass.size < 2 or not (self.mass > 0).all():
             raise ConfigError(f"mass = {self.mass.tolist()}: needed are two or more masses > 0.")
         if not self.degree < 0:
-            raise ConfigError(f"degree = {self.degree:g}: the bodies attract with degree < 0.")
+            raise ConfigError(f"degree = {self.degree:g}: it must be negative, to attract.")
 
     def potential(self, x: Array) -> float:
         """Potential energy of the configuration (n, 3) [1].
@@ -145,7 +146,7 @@ class Bodies:
         x = self.centred(x)
         matched = match(self.mass, x, v)
         if matched.energy <= 1e-20 * self.kinetic(v):
-            raise ModelError("the velocities are a rigid motion: nothing is left to scale.")
+            raise ModelError("the velocities are a rigid motion: they must change the shape.")
         return x, matched.rest * np.sqrt(-self.potential(x) / matched.energy)
 
     def move(self, x: Array, v: Array, t: Array) -> tuple[Array, Array]:
@@ -170,15 +171,14 @@ class Bodies:
 
     def _placed(self, x: Array) -> Array:
         x = configuration(x)
-        if len(x) != self.mass.size:
-            raise ConfigError(f"{len(x)} positions or velocities of {self.mass.size} bodies.")
+        one_each("positions or velocities", len(x), "bodies", self.mass.size)
         return x
 
     def _apart(self, x: Array) -> Array:
         x = self._placed(x)
         i, j = np.triu_indices(len(x), 1)
         if not np.abs(x[i] - x[j]).max(axis=1).min() > 0:
-            raise ModelError("two bodies are in the same place: their attraction has no limit.")
+            raise ModelError("two bodies are in the same place; they must be apart to attract.")
         return x
 
 

@@ -198,7 +198,7 @@ class Linking:
         if abs(self.bodies.size(x) - 1) > SIZE_RTOL or abs((x * p).sum()) > SIZE_RTOL * max(
             1.0, float(np.abs(p).max())
         ):
-            raise ModelError("shapes have the size sum m x^2 = 1 and no growth sum x . p.")
+            raise ModelError("shapes must have the size sum m x^2 = 1 and no growth sum x . p.")
         y = np.concatenate([x.ravel(), p.ravel()])
         Y = integrated(self._shape_rates, y, D).reshape(len(D), 2, -1, 3)
         return Y[:, 0], Y[:, 1]

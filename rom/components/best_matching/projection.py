@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from rom.arguments import finite, one_each, whole
 from rom.eigen.verbs import rigid_motions
 from rom.errors import ConfigError, ModelError
 from rom.model import Array
@@ -60,8 +61,7 @@ def rigid_part(mass: Any, R: Array, V: Array) -> Array:
     """
     V = np.asarray(V, dtype=float)
     MR = _weighted(mass, R)
-    if V.shape[:1] != R.shape[:1]:
-        raise ConfigError(f"{V.shape[0]} velocities do not fit {R.shape[0]} rows of generators.")
+    one_each("velocities", V.shape[:1], "rows of generators", R.shape[:1])
     G = R.T @ MR
     unit = 1 / np.sqrt(np.maximum(np.diag(G), 1e-300))
     G = np.linalg.pinv(G * np.outer(unit, unit), rcond=INERTIA_RTOL, hermitian=True)
@@ -108,8 +108,7 @@ def frame(mass: Any, reference: Array, x: Array, *, plane: bool = False) -> tupl
         Kabsch, Acta Cryst. A32 (1976) 922; Eckart, Phys. Rev. 47 (1935) 552.
     """
     X, x = configuration(reference), configuration(x)
-    if X.shape != x.shape:
-        raise ConfigError(f"{len(x)} particles cannot be laid over {len(X)}.")
+    one_each("particles", len(x), "of the reference", len(X))
     share = _weighted(mass, np.ones((len(X), 1)))
     share = share / share.sum()
     centre_X, centre_x = share.T @ X, share.T @ x
@@ -134,7 +133,7 @@ def _turn_in_plane(C: Array) -> Array:
     c, s = C[0, 0] + C[1, 1], C[1, 0] - C[0, 1]
     length = np.hypot(c, s)
     if length <= ON_ITSELF * np.abs(C).max():
-        raise ModelError("no rotation in the plane is better than all others.")
+        raise ModelError("no rotation in the plane is better than all others; use other shapes.")
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, length]]) / length
 
 
@@ -152,9 +151,8 @@ def stacked(mass: Any, X: Array, *, plane: bool = False) -> Array:
     Raises:
         ConfigError: without a picture.
     """
-    film = np.array(X, dtype=float)
-    if film.ndim != 3 or not len(film):
-        raise ConfigError(f"a film has the shape (k, n, 3), not {film.shape}.")
+    film = finite("the film", X, (None, None, 3))
+    whole("pictures of the film", len(film), 1)
     for k in range(1, len(film)):
         r, A = frame(mass, film[k], film[k - 1], plane=plane)
         film[k] = r + film[k] @ A.T
@@ -179,7 +177,7 @@ def emergent_rate(mass: Any, x: Array, dx: Array, kinetic: float) -> float:
         ModelError: if nothing is left to move with.
     """
     if not kinetic > 0:
-        raise ModelError(f"E - V = {kinetic:.4g} J: time passes only where it is positive.")
+        raise ModelError(f"E - V = {kinetic:.4g} J: it must be positive, or no time passes.")
     return float(np.sqrt(match(mass, x, dx).energy / kinetic))
 
 
@@ -189,14 +187,10 @@ def _weighted(mass: Any, V: Array) -> Array:
         return np.repeat(np.asarray(mass, dtype=float), len(V) // len(mass))[:, None] * V
     if np.ndim(mass) == 2 and mass.shape == (len(V), len(V)):
         return np.asarray(mass @ V)
-    raise ConfigError(f"a mass of shape {np.shape(mass)} does not fit {len(V)} rows.")
+    raise ConfigError(f"a mass of shape {np.shape(mass)} must fit {len(V)} rows.")
 
 
 def configuration(x: Array) -> Array:
     """Finite positions or velocities (n, 3)."""
-    x = np.ascontiguousarray(x, dtype=float)
-    if x.ndim != 2 or x.shape[1] != 3:
-        raise ConfigError(f"a configuration has the shape (n, 3), not {x.shape}.")
-    if not np.isfinite(x).all():
-        raise ConfigError("a configuration has entries that are not finite.")
+    x = np.ascontiguousarray(finite("a configuration", x, (None, 3)))
     return x

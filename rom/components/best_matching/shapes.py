@@ -27,7 +27,7 @@ class ShapeSphere:
 
     def __post_init__(self) -> None:
         if self.bodies.mass.size != 3 or self.bodies.degree != -1.0:
-            raise ConfigError("the shape sphere is that of three bodies of degree -1.")
+            raise ConfigError("the shape sphere needs three bodies of degree -1.")
 
     def shape(self, x: Array) -> Array:
         """(3,) point on the unit sphere of the configuration (3, 3) [1]."""

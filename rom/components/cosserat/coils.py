@@ -16,10 +16,9 @@ from typing import Any
 import numpy as np
 from numba import carray
 
-from rom.arguments import number, positive
+from rom.arguments import not_negative, positive
 from rom.components.cosserat.bodies import POSE_SIZE, RodBody
 from rom.components.cosserat.energy import product
-from rom.errors import ConfigError
 from rom.mbs.elements.nonlinear import Elements, compiled_law
 from rom.mbs.kernels.algebra import dot, scale, sub, vec
 from rom.mbs.kernels.compiled import inner
@@ -146,8 +145,7 @@ def with_coils(body: RodBody, *, radius: float, solid: float, stiffness: float) 
         ConfigError: for numbers that no spring has.
     """
     n = len(body.frames.x)
-    if number("solid", solid) < 0.0:
-        raise ConfigError(f"coils that touch are {solid:g} m long: no length is below zero.")
+    not_negative("solid", solid)
     numbers = [n, positive("radius", radius), solid, positive("stiffness", stiffness)]
     stop = Elements.of(_law(), np.arange(n)[None], np.array([numbers], dtype=float), by_rate=False)
     return replace(body, elements=(*body.elements, stop))

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rom import rotation
-from rom.arguments import typed
+from rom.arguments import positive, typed
 from rom.components.cosserat import Rod, along, clamped, linearised, reference, straight
 from rom.errors import ModelError
 from rom.model import Array
@@ -52,11 +52,10 @@ class HelicalSpring:
         sizes = {"wire": self.wire, "diameter": self.diameter, "coils": self.coils,
                  "length": self.length, "E": self.E}  # fmt: skip
         for name, value in sizes.items():
-            if not value > 0:
-                raise ModelError(f"{name}={value:g} of a spring is not positive.")
+            positive(f"{name} of a spring", value, error=ModelError)
         if self.diameter <= self.wire:
             raise ModelError(
-                f"wire of {self.wire:g} m does not fit a helix of {self.diameter:g} m."
+                f"wire = {self.wire:g} m must be below diameter = {self.diameter:g} m."
             )
         if self.length <= self.solid_length:
             raise ModelError(f"free length {self.length:g} m is not above the solid length "

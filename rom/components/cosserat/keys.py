@@ -131,7 +131,7 @@ def _curve(values: dict[str, Any], place: Place) -> tuple["Array", "Array"]:
 
     points = np.array(values["points"])
     if not 2 <= len(points) <= MAX_POINTS:
-        raise place.at("points").error(f"{len(points)} points are no rod; 2 to {MAX_POINTS} are.")
+        raise place.at("points").error(f"{len(points)} points must be 2 to {MAX_POINTS} of a rod.")
     chords = np.linalg.norm(np.diff(points, axis=0), axis=1)
     if chords.min() <= 0.0:
         k = int(np.argmin(chords))
@@ -184,7 +184,7 @@ def _frames(x: "Array", tangents: "Array", normal: Any, place: Place) -> "Array"
     first = first - (first @ t) * t
     size = float(np.linalg.norm(first))
     if size <= 1e-9 * (1.0 if normal is None else float(np.linalg.norm(normal))):
-        raise place.at("normal").error(f"normal = {normal} lies along the rod.")
+        raise place.at("normal").error(f"normal = {normal} must not lie along the rod.")
     found, r = [], first / size
     for k, t in enumerate(tangents):
         if k:

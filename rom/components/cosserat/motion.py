@@ -18,6 +18,7 @@ import numpy.typing as npt
 from scipy.interpolate import CubicHermiteSpline
 
 from rom import rotation
+from rom.arguments import between, positive
 from rom.components.cosserat.bodies import body
 from rom.components.cosserat.energy import Rod, energy, internal, work
 from rom.components.cosserat.shapes import Shape, reference
@@ -110,9 +111,9 @@ def simulate(  # noqa: PLR0913  keywords of one run, all with defaults
         ModelError: if the rod has no mass at all.
         SolverError: if a step has no solution; its ``solution`` is what came before.
     """
-    if not (dt > 0 and t_end > 0 and 0 <= rho_inf <= 1):
-        raise ConfigError(f"dt={dt:g}, t_end={t_end:g}, rho_inf={rho_inf:g} is no run.",
-                          hint="Times are positive, rho_inf lies between 0 and 1.")  # fmt: skip
+    positive("dt", dt)
+    positive("t_end", t_end)
+    between("rho_inf", rho_inf, 0, 1)
     constant = loads(rod) if load is None else load
     acting: Any = cache(load) if callable(load) else lambda _: constant
     moving = fitting(rod, acting(0.0), free)[1]

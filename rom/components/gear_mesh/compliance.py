@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.integrate import trapezoid
 
+from rom.arguments import between
 from rom.components.gear_mesh.gears.geometry import GearPair, involute
 from rom.components.gear_mesh.gears.hertz import Hertz
 from rom.errors import ModelError
@@ -60,11 +61,8 @@ def tooth_compliance(
     Raises:
         ModelError: if the tooth has no such radius.
     """
-    if not pair.rb[gear] <= radius <= pair.ra[gear] * (1 + 1e-12):
-        raise ModelError(
-            f"radius {radius} m is not on the involute, from {pair.rb[gear]:.6f} m to "
-            f"{pair.ra[gear]:.6f} m."
-        )
+    ends = float(pair.rb[gear]), float(pair.ra[gear] * (1 + 1e-12))
+    between("radius on the involute", radius, *ends, error=ModelError)
     y, t = profile(pair, gear)
     half = float(_half_angle(pair, gear, np.array([radius]))[0])
     gamma = float(np.arccos(min(pair.rb[gear] / radius, 1.0))) - half
@@ -110,9 +108,7 @@ def normal_section(pair: GearPair) -> GearPair:
         ISO 6336-1 and ISO 21771: virtual spur gears.
     """
     if not isinstance(pair, GearPair) or pair.internal:
-        raise ModelError(
-            "the compliance of racks and internal teeth is not known here: give numbers."
-        )
+        raise ModelError("compliances of racks and internal teeth are not known; give numbers.")
     if pair.helix == 0.0:
         return pair
     teeth: Any = tuple(z / (np.cos(pair.base_helix) ** 2 * np.cos(pair.helix)) for z in pair.teeth)

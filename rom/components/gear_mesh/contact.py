@@ -1,7 +1,7 @@
 """Contact of gear teeth in one position of two wheels, by the element of mechanisms.
 
 Motions q = (u1, phi1, u2, phi2) of both wheels count from the datum: wheels centred, shafts
-parallel, working flanks just touching. How flanks touch says `rom.components.gear_mesh.gears.teeth`.
+parallel, working flanks just touching. How flanks touch says `gears.teeth`.
 
 Source:
     Velex and Maatar, A mathematical model for analyzing the influence of shape deviations and
@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from rom.arguments import positive
 from rom.components.gear_mesh.gears.corrections import Correction
 from rom.components.gear_mesh.gears.geometry import GearPair, path_of_contact
 from rom.components.gear_mesh.gears.meshes import GEAR_MESHES_FAMILY
@@ -94,11 +95,9 @@ class Mesh:
     def __post_init__(self) -> None:
         k = np.atleast_1d(np.asarray(self.stiffness, dtype=float))
         if not isinstance(self.pair, GearPair) or self.pair.internal:
-            raise ModelError(
-                "meshes of internal gears and racks are elements: use Mechanism.gear_mesh."
-            )
+            raise ModelError("internal gears and racks are for elements; use Mechanism.gear_mesh.")
         if self.correction.measured:
-            raise ModelError("maps and run-out are for elements: use Mechanism.gear_mesh.")
+            raise ModelError("maps and run-out are for elements; use Mechanism.gear_mesh.")
         if not (k.size and np.isfinite(k).all() and (k > 0).all()):
             raise ModelError(f"stiffness {self.stiffness} of the teeth must be positive [N/m^2].")
         for errors, z in zip(self.correction.pitch, self.pair.teeth, strict=True):
@@ -207,8 +206,7 @@ def transmission_error(mesh: Mesh, torque: float, theta: npt.ArrayLike) -> Array
     Raises:
         ModelError: without a torque that closes the working flanks.
     """
-    if not torque > 0:
-        raise ModelError(f"a torque of {torque} N m does not press the working flanks together.")
+    positive("torque", torque, error=ModelError)
     return np.array([_closed(mesh, torque, t) for t in np.atleast_1d(theta)])
 
 

@@ -65,8 +65,8 @@ def gear_pair(name: str, pair: dict[str, Any]) -> Any:
     (pinion, _), (shift, of_rack) = given.pop("teeth"), given.pop("shift")
     if of_rack != 0.0:
         raise ConfigError(
-            f"the rack of {name!r} has a profile shift of {of_rack:g}: where its reference line is "
-            "says centre_distance."
+            f"the rack of {name!r} has a profile shift of {of_rack:g}.",
+            hint="Write 0 and move its reference line by centre_distance.",
         )
     return RackPair(**given, pinion_teeth=pinion, shift=shift)
 

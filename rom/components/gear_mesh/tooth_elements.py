@@ -12,6 +12,7 @@ from scipy.interpolate import interp1d
 from scipy.sparse import coo_matrix
 from scipy.sparse.linalg import splu
 
+from rom.arguments import between
 from rom.components.gear_mesh.compliance import (
     contact_compliance,
     in_normal_section,
@@ -60,8 +61,7 @@ class ToothModel:
         """
         flank, axis = self.points[self.flank], self.points[self.axis]
         r = np.hypot(*flank.T)
-        if not r[0] <= radius <= r[-1] * (1 + 1e-9):
-            raise ModelError(f"radius {radius} m is not on the flank, {r[0]:.5f} to {r[-1]:.5f} m.")
+        between("radius on the flank", radius, r[0], r[-1] * (1 + 1e-9), error=ModelError)
         x, y = (float(interp1d(r, flank[:, k])(min(radius, r[-1]))) for k in (0, 1))
         turn = np.arccos(min(self.pair.rb[self.gear] / radius, 1.0)) - np.arctan2(x, y)
         n = np.array([-np.cos(turn), -np.sin(turn)])  # the mate pushes into the flank
@@ -93,8 +93,7 @@ def tooth_model(
         ModelError: if the bore leaves no body.
     """
     inner = bore * pair.r[gear]
-    if not 0 < inner < 0.98 * pair.rf[gear]:
-        raise ModelError(f"a bore of {bore} of the reference diameter leaves no body.")
+    between("bore", bore, 0, 0.98 * pair.rf[gear] / pair.r[gear], "()", error=ModelError)
     points, cells, clamped, axis, flank = _mesh(pair, gear, inner, fine)
     K = _stiffness(points, cells, nu)
     fixed = np.concatenate([2 * clamped, 2 * clamped + 1])

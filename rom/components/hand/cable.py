@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rom import rotation
-from rom.arguments import typed
+from rom.arguments import not_negative, typed
 from rom.components.cosserat import Rod, Shape
 from rom.errors import ModelError
 from rom.model import Array
@@ -55,9 +55,8 @@ class Tendon:
     def __post_init__(self) -> None:
         if len(self.holes) < 2:
             raise ModelError(f"a tendon of {len(self.holes)} holes.", hint="It needs two ends.")
-        if self.friction < 0 or self.conduit < 0:
-            raise ModelError(f"friction={self.friction:g}, conduit={self.conduit:g} of a tendon: "
-                             "neither can be negative.")  # fmt: skip
+        not_negative("friction of a tendon", self.friction, error=ModelError)
+        not_negative("conduit of a tendon", self.conduit, error=ModelError)
 
     def points(self, shape: Shape) -> Array:
         """(k, 3) holes in the world [m]."""

@@ -18,6 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rom import rotation
+from rom.arguments import between
 from rom.components.cosserat import Rod, Shape, clamped, linearised, loads, reference, rod
 from rom.components.cosserat.helical_spring import HelicalSpring
 from rom.components.hand.cable import Hole, Tendon
@@ -68,7 +69,7 @@ class Finger:
             raise ModelError(f"{len(self.springs)} springs and {len(self.phalanges)} phalanges.",
                              hint="Each spring carries one phalanx.")  # fmt: skip
         if min(self.phalanges[:-1], default=1.0) <= 0 or self.phalanges[-1] < 0:
-            raise ModelError(f"phalanges of {self.phalanges} m: only the last may be zero.")
+            raise ModelError(f"phalanges of {self.phalanges} m: they must be > 0, the last >= 0.")
 
     @cached_property
     def joints(self) -> tuple[tuple[int, int, int, int], ...]:
@@ -234,8 +235,8 @@ def close(
     if tension is not None and tension < 0:
         raise ConfigError(f"tension {tension:g} N: a cable does not push.", hint="Slack is zero.")
     limit = 0.9 * sum(s.length for s in finger.springs)
-    if pull is not None and not 0 <= pull < limit:
-        raise ConfigError(f"pull {pull:g} m is outside 0 to {limit:g} m: springs are not longer.")
+    if pull is not None:
+        between("pull [m] of springs so long", pull, 0, limit, "[)")
     here = rest(finger) if start is None else start
     drawn = pull is not None
     first = here.pull if drawn else here.tension

@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.signal import butter, lfilter
 
+from rom.arguments import one_each, positive
 from rom.errors import ConfigError
 from rom.model import Array, Index, Mask
 
@@ -77,10 +78,8 @@ class Chart:
             ConfigError: if the signals differ in length, or dt is not positive.
         """
         flexor, extensor = (np.array(part, dtype=float, ndmin=1) for part in (x, y))
-        if flexor.shape != extensor.shape or not dt > 0:
-            raise ConfigError(
-                f"{flexor.size} and {extensor.size} samples {dt:g} s apart are no two signals."
-            )
+        one_each("samples of the extensor", extensor.shape, "of the flexor", flexor.shape)
+        positive("dt", dt)
         n = flexor.size
         groups, pulls = np.empty(n, dtype=np.int64), np.empty((n, len(GROUPS)))
         opening = np.empty(n, dtype=np.bool_)

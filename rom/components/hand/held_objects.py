@@ -88,7 +88,7 @@ def hold(mech: Mechanism, name: str, held: Held, *, law: Impact = SKIN_CONTACT,
     positive("radius", held.radius)
     phalanges = [part for part in mech.parts.values() if "distal" in part.points]
     if not phalanges:
-        raise ConfigError(f"nothing can hold {name!r}: it has no finger of `moving_hand`.")
+        raise ConfigError(f"nothing holds {name!r}: the mechanism needs fingers of `moving_hand`.")
     pieces = [(matrix(bone.p)[:, 2], float(np.linalg.norm(bone.points["distal"])))
               for bone in phalanges]  # fmt: skip
     face, normal = _palm_face(mech)
@@ -164,7 +164,7 @@ def table(mech: Mechanism, name: str, held: Held, *, leaves: float, speed: float
     """
     gravity = finite("gravity", mech.gravity, (3,))
     if not np.linalg.norm(gravity) > 0.0:
-        raise ConfigError(f"without gravity nothing keeps {name!r} on a table.")
+        raise ConfigError(f"{name!r} on a table needs gravity.")
     up = -gravity / np.linalg.norm(gravity)
     feet, radius = _feet(held, up)
     low = min(float(foot @ up) for foot in feet) - radius

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rom.arguments import finite, number, positive
+from rom.arguments import finite, not_negative, number, positive
 from rom.components.cosserat import body
 from rom.components.cosserat.coils import with_coils
 from rom.components.cosserat.helical_spring import HelicalSpring
@@ -25,7 +25,7 @@ from rom.errors import ConfigError, ModelError
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.parts.bodies import Marker, Part
 from rom.model import Array
-from rom.names import offered
+from rom.names import check_known
 
 PULL_SHARE = 0.9  # of the springs of a finger that a winch may take in
 TRANSITION_SPEED = 1e-3  # of cables in their holes [m/s], a fortieth of that of the winches
@@ -185,8 +185,7 @@ def moving_hand(
         ("seat", fingers, seats),
     ):
         for name in names:
-            if name not in known:
-                raise ConfigError(f"{kind} of {name!r}: there are {offered(known, name)}.")
+            check_known(name, known, f"{kind} of {name!r}: there are")
     made = _Assembly(Mechanism(gravity=gravity), build or Build())
     palm = _palm(made, [seats[name] for name in fingers])
     if held:
@@ -303,8 +302,7 @@ def _cable(
     points = np.array([mech.design_point(marker) for marker in path])
     length = float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
     pull(0.0)
-    if number("sleeve", drive.sleeve) < 0.0:
-        raise ConfigError(f"the sleeve of {name!r} is {drive.sleeve:g} m long: not below zero.")
+    not_negative(f"sleeve of {name!r}", drive.sleeve)
     EA = positive("EA", drive.EA) * length / (length + drive.sleeve)
     mech.tendon(f"{name} cable", path, EA=EA, damping=drive.damping,
                 free_length=lambda t: length - pull(t), **how)  # fmt: skip

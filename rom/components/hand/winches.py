@@ -11,9 +11,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy.interpolate import PchipInterpolator
 
-from rom.arguments import positive
+from rom.arguments import finite, positive, whole
 from rom.components.hand.moving_hand import Drive
-from rom.errors import ConfigError
 from rom.model import Array
 
 FINGERS = ("thumb", "index", "middle", "ring", "little")  # columns of `Commands.fingers`
@@ -81,12 +80,8 @@ def winches(
         Two signals of muscles that command five fingers: Potratz and others, J. Biomech. Eng. 127
         (2005) 934.
     """
-    commands = np.asarray(pulls, dtype=float)
-    if commands.ndim != 2 or commands.shape[1] != len(names) or len(commands) < 2:
-        raise ConfigError(
-            f"commands of shape {commands.shape} are none for the {len(names)} fingers "
-            f"{', '.join(names)} at two instants or more."
-        )
+    commands = finite(f"pulls of {', '.join(names)}", pulls, (None, len(names)))
+    whole("instants of pulls", len(commands), 2)
     reached = (motor or Motor()).follow(commands, dt)
     t = dt * np.arange(len(reached))
     base = drive or Drive()

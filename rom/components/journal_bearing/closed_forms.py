@@ -11,6 +11,7 @@ Source:
 import numpy as np
 import numpy.typing as npt
 
+from rom.arguments import positive
 from rom.errors import ModelError
 from rom.model import Array
 
@@ -43,8 +44,7 @@ def short_eccentricity(sommerfeld: float) -> float:
     Raises:
         ModelError: if it is not positive.
     """
-    if not sommerfeld > 0:
-        raise ModelError(f"S (L/D)^2 = {sommerfeld} belongs to no loaded bearing.")
+    positive("sommerfeld", sommerfeld, error=ModelError)
     low, high = 1e-12, 1 - 1e-12
     for _ in range(100):
         middle = (low + high) / 2
@@ -132,5 +132,5 @@ def long_force(eccentricity: float) -> Array:
 def _inside(eccentricity: npt.ArrayLike) -> Array:
     e = np.asarray(eccentricity, dtype=float)
     if not np.all((e > 0) & (e < 1)):
-        raise ModelError(f"an eccentricity of {e} clearances is not between 0 and 1.")
+        raise ModelError(f"an eccentricity of {e} clearances must lie between 0 and 1.")
     return e

@@ -50,11 +50,11 @@ def film(
             hint="A shaft that turns the other way is described from its other end.",
         )
     if bearing.aligned and np.any([m[2:], v[2:]]):
-        raise ModelError("the journal tilts, but the bearing is solved as aligned.")
+        raise ModelError("the journal tilts, but the bearing is aligned; give it aligned=False.")
     if not bearing.thinnest(motion) > 0:
         raise ModelError(
             f"the journal touches the bush at {np.asarray(motion) * 1e6} (micrometres, "
-            f"microradians); the clearance is {bearing.clearance * 1e6:.3g} micrometres."
+            f"microradians); it must stay within {bearing.clearance * 1e6:.3g} micrometres."
         )
     shape = bearing.grid.fixed.shape
     films = cells_of([bearing])

@@ -98,7 +98,7 @@ def checked(ranges: Ranges) -> Ranges:
     """
     for r in ranges:
         if r is not None and not (np.isfinite(r).all() and r[0] < r[1]):
-            raise ConfigError(f"a range {r!r}: (low, high) with low < high, or None for a turn.")
+            raise ConfigError(f"a range {r!r} must be (low, high), low < high, or None for a turn.")
     return ranges
 
 
@@ -268,11 +268,11 @@ def inertia_at(inertia: Inertia, q1: Array, q2: Array) -> Array:
 def _positive(A: Array) -> Array:
     """A (..., 2, 2) if it can be an inertia: of positive trace and no negative determinant."""
     if np.shape(A)[-2:] != (2, 2):
-        raise ModelError(f"an inertia of two motors has the shape (..., 2, 2), not {np.shape(A)}.")
+        raise ModelError(f"an inertia of two motors must be (..., 2, 2), not {np.shape(A)}.")
     trace = A[..., 0, 0] + A[..., 1, 1]
     determinant = A[..., 0, 0] * A[..., 1, 1] - A[..., 0, 1] * A[..., 1, 0]
     if not ((trace > 0) & (determinant > -DETERMINANT_RTOL * trace**2)).all():
-        raise ModelError("the inertia is not positive: some motion would have no kinetic energy.")
+        raise ModelError("the inertia must be positive, or some motion has no kinetic energy.")
     return A
 
 

@@ -188,7 +188,7 @@ def tool_isotropy(
     J = np.stack([(up - down) / (2 * DIFFERENCE_STEP) for up, down in ends], axis=-1)
     weight = np.abs(np.linalg.det(J)) * (2 * np.pi / n) ** 2
     if weight.sum() <= 1e-9 * np.square(J).sum() * (2 * np.pi / n) ** 2:
-        raise ModelError("the tool moves along a line only: two drives, one direction.")
+        raise ModelError("the tool moves along a line; its two drives must move it in a plane.")
     q, J, weight = q[weight > 0], J[weight > 0], weight[weight > 0]
     # a positive matrix of two rows has the index of its inverse
     A = there.inertia(*q.T) * np.multiply.outer(there.slopes(), there.slopes())

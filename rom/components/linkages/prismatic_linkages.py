@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from rom.arguments import typed
+from rom.arguments import not_negative, positive, typed
 from rom.components.linkages.chains import (
     Link,
     Motion,
@@ -31,17 +31,13 @@ from rom.model import Array
 
 
 def _not_negative(name: str, **numbers: float) -> None:
-    wrong = {key: value for key, value in numbers.items() if not 0 <= value < np.inf}
-    if wrong:
-        raise ModelError(f"{name}: {wrong}; masses and inertias are finite and not negative.")
+    for key, value in numbers.items():
+        not_negative(f"{key} of the {name}", value, error=ModelError)
 
 
 def _positive(name: str, **numbers: float) -> None:
-    wrong = {key: value for key, value in numbers.items() if not 0 < value < np.inf}
-    if wrong:
-        raise ModelError(
-            f"{name}: {wrong} must be positive.", hint="Without mass a motion costs no energy."
-        )
+    for key, value in numbers.items():
+        positive(f"{key} of the {name}", value, error=ModelError)
 
 
 @typed

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import null_space
 
-from rom.arguments import one_of, typed
+from rom.arguments import finite, not_negative, one_of, positive, typed
 from rom.body.flexible import FlexibleBody
 from rom.components.linkages.chains import (
     Link,
@@ -55,8 +55,10 @@ def rigid_link(mass: float, length: float, centre: npt.ArrayLike, inertia: float
         ModelError: if a number is not that of a real link.
     """
     x, y = np.asarray(centre, dtype=float)
-    if not (mass > 0 and length > 0 and inertia >= 0 and np.isfinite([x, y]).all()):
-        raise ModelError(f"no link has mass {mass} kg, length {length} m, inertia {inertia} kg m2.")
+    finite("centre", [x, y], (2,), error=ModelError)
+    positive("mass", mass, error=ModelError)
+    positive("length", length, error=ModelError)
+    not_negative("inertia", inertia, error=ModelError)
     J = inertia + mass * (x * x + y * y)
     M = np.array([[mass, 0, -mass * y], [0, mass, mass * x], [-mass * y, mass * x, J]])
     return Link(float(length), M, np.zeros((2, 0)), np.zeros((0, 0)))
@@ -93,7 +95,7 @@ def reduced_link(body: FlexibleBody, first: str, second: str) -> Link:
     axis = (b.point - a)[:2]
     length = float(np.hypot(*axis))
     if length == 0.0:
-        raise ModelError(f"pins {first!r} and {second!r} lie on one axis along z.")
+        raise ModelError(f"pins {first!r} and {second!r} lie on one axis along z; take others.")
     e = axis / length
     R = np.array([[e[0], e[1]], [-e[1], e[0]]])  # world axes to along and across
     x, y = R @ (body.first_moment - body.mass * a)[:2]
@@ -127,8 +129,7 @@ class TwoLink:
     relative: bool = False
 
     def __post_init__(self) -> None:
-        if not self.payload >= 0:
-            raise ModelError(f"no payload has the mass {self.payload} kg.")
+        not_negative("payload", self.payload, error=ModelError)
 
     def inertia(self, q1: npt.ArrayLike, q2: npt.ArrayLike, *, elastic: Elastic = "held") -> Array:
         """(..., 2, 2) generalised inertia [kg m^2] at angles (...) [rad].
@@ -267,8 +268,7 @@ def as_elastic(links: tuple[Link, ...], elastic: Elastic) -> tuple[Link, ...]:
         ConfigError: for another word than "held" or "free", or a frequency that is not positive.
     """
     if isinstance(elastic, int | float):
-        if not 0 < elastic < np.inf:
-            raise ConfigError(f"elastic = {elastic} rad/s is no frequency of torques.")
+        positive("elastic", elastic)
         padded = (np.pad(link.K / elastic**2, ((3, 0), (3, 0))) for link in links)
         return tuple(replace(link, M=link.M - K) for link, K in zip(links, padded, strict=True))
     if one_of("elastic", elastic, ("held", "free")) == "free":
@@ -332,7 +332,7 @@ class Driven:
         self._packed, self.drives = pack(mechanism, whole=True), drives
         rows = [int(k) for name in drives for k in self._packed.rows_of(name)]
         if len(rows) != 2 or not set(drives) <= set(mechanism.drives):
-            raise ConfigError(f"{drives!r} are not two of the drives {sorted(mechanism.drives)}.")
+            raise ConfigError(f"{drives!r} must be two of the drives {sorted(mechanism.drives)}.")
         if tool is not None and tool not in self._packed.names:
             raise ConfigError(f"the tool {tool!r} is none of {list(self._packed.names)}.")
         self._rows, self._tool = np.array(rows), tool
@@ -360,7 +360,7 @@ class Driven:
             ConfigError, ModelError: without a tool; as `inertia`.
         """
         if self._tool is None:
-            raise ConfigError("no tool was named: Driven(mechanism, drives, tool=...).")
+            raise ConfigError("no tool was named; write Driven(mechanism, drives, tool=...).")
         q1, q2 = np.broadcast_arrays(np.asarray(q1, dtype=float), np.asarray(q2, dtype=float))
         at = self._packed.system.bodies.q_at[self._packed.names.index(self._tool)]
         places = [self._posture(q)[at : at + 2] for q in zip(q1.flat, q2.flat, strict=True)]
@@ -405,6 +405,6 @@ class Driven:
         if (self._is_held and N.shape[1] != 2) or np.linalg.cond(mobility) > 1e12:
             raise ModelError(
                 f"with elastic coordinates held the joints leave {N.shape[1]} motions to the two "
-                f"drives {self.drives!r}: a singular position, or not a mechanism of two dof."
+                f"drives {self.drives!r}: needed are two, and no singular position."
             )
         return np.linalg.inv(mobility)

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial import Delaunay
 
-from rom.arguments import shortened, typed
+from rom.arguments import number, shortened, typed, whole
 from rom.components.histories import History, ramp, values_at
 from rom.components.masonry.discontinuous_deformation import Drive
 from rom.components.masonry.stones import Masonry, touching
@@ -105,8 +105,8 @@ class MovingLoad:
         before = self.start < top[:, 0, 0].min() if self.speed <= 0 else False
         if beyond or before:
             raise ConfigError(
-                f"{self.name} starts at x = {self.start} m and never comes upon the stones, which "
-                f"lie from x = {top[:, 0, 0].min():.6g} m to {top[:, 1, 0].max():.6g} m."
+                f"{self.name} starts at x = {self.start} m and never comes upon the stones; give "
+                f"from x = {top[:, 0, 0].min():.6g} m to {top[:, 1, 0].max():.6g} m."
             )
 
         def at(t: Array) -> Forces:
@@ -152,17 +152,13 @@ class Wind:
         first, rows = masonry.first_corners(), []
         for stone, edge in self.edges:
             outline = masonry.stones[_moving(self.name, stone, masonry)].outline
-            if not 0 <= edge < len(outline):
-                raise ConfigError(
-                    f"{self.name} blows on edge {edge} of stone {stone}, whose edges are 0 to "
-                    f"{len(outline) - 1}."
-                )
+            whole(f"edge of stone {stone} for {self.name}", edge, 0, len(outline) - 1)
             o = (edge + 1) % len(outline)
             along = outline[o] - outline[edge]
             inward = masonry.thickness * np.array([-along[1], along[0]])
             rows.append((stone, first[stone] + np.array([edge, o, o]), inward))
         if not rows:
-            raise ConfigError(f"{self.name} blows on no edge.")
+            raise ConfigError(f"{self.name} blows on no edge; give some.")
         block, corner, force = (list(x) for x in zip(*rows, strict=True))
         n = len(rows)
 
@@ -200,16 +196,15 @@ class SupportMotion:
             ConfigError: if a stone is not held or touches nothing, or does not start where it is.
         """
         end = np.r_[_vector(self.name, self.shift), self.turn]
-        if not np.isfinite(self.turn):
-            raise ConfigError(f"{self.name} turns by {self.turn} rad.")
+        number(f"turn of {self.name}", self.turn)
         touched = set(np.unique(touching(masonry).who[:, [0, 2]]).tolist())
         for stone in self.stones:
             if stone not in masonry.held:
                 raise ConfigError(
-                    f"{self.name} moves stone {stone}, which is not held; held are {masonry.held}."
+                    f"{self.name} moves {stone}, which must be of the held {masonry.held}."
                 )
             if stone not in touched:
-                raise ConfigError(f"{self.name} moves stone {stone}, which supports nothing.")
+                raise ConfigError(f"{self.name} moves stone {stone}, which must support another.")
         if abs(values_at(self.name, self.history, np.zeros(1))[0]) > 0.0:
             raise ConfigError(
                 f"{self.name} begins away from where its stones lie.",
@@ -247,7 +242,7 @@ class BaseMotion:
         """
         direction = _vector(self.name, self.direction)
         if not masonry.held:
-            raise ConfigError(f"{self.name}: no stone is held, so nothing stands on the ground.")
+            raise ConfigError(f"{self.name}: a stone must be held, to stand on the ground.")
         return lambda t: values_at(self.name, self.acceleration, t)[:, None] * direction
 
 
@@ -269,7 +264,7 @@ def facing(masonry: Masonry, direction: tuple[float, float]) -> tuple[tuple[int,
     """
     d = _vector("wind", direction)
     if not np.any(d):
-        raise ConfigError("wind blows in no direction.")
+        raise ConfigError("wind needs a direction that is not zero.")
     d = d / np.linalg.norm(d)
     edges = [(b, k) for b, s in enumerate(masonry.stones) for k in range(len(s.outline))]
     start = np.array([masonry.stones[b].outline[k] for b, k in edges])
@@ -307,7 +302,7 @@ def driver(masonry: Masonry, actions: Sequence[Action]) -> Callable[[Array], Dri
     moved = [s for a in actions if isinstance(a, SupportMotion) for s in a.stones]
     twice = sorted({s for s in moved if moved.count(s) > 1})
     if twice:
-        raise ConfigError(f"supports {twice} are moved by two actions; let one move each.")
+        raise ConfigError(f"supports {twice} are moved by two actions; only one may move each.")
     loads = [a.begin(masonry) for a in actions if isinstance(a, PointLoad | MovingLoad | Wind)]
     supports = [a.begin(masonry) for a in actions if isinstance(a, SupportMotion)]
     grounds = [a.begin(masonry) for a in actions if isinstance(a, BaseMotion)]
@@ -354,17 +349,14 @@ def _fixed(n: int, block: Sequence[int], corner: Sequence[Index] | Array,
 def _vector(name: str, x: tuple[float, float]) -> Array:
     found = np.asarray(x, dtype=float)
     if found.shape != (2,) or not np.isfinite(found).all():
-        raise ConfigError(f"{name} has {x}, which are not two numbers.")
+        raise ConfigError(f"{name} has {x}, which must be two numbers.")
     return found
 
 
 def _moving(name: str, stone: int, masonry: Masonry) -> int:
-    if not 0 <= stone < len(masonry.stones):
-        raise ConfigError(
-            f"{name} acts on stone {stone} of the stones 0 to {len(masonry.stones) - 1}."
-        )
+    whole(f"stone of {name}", stone, 0, len(masonry.stones) - 1)
     if stone in masonry.held:
-        raise ConfigError(f"{name} acts on stone {stone}, which is held and would not feel it.")
+        raise ConfigError(f"{name} acts on stone {stone}, which is held; take another one.")
     return stone
 
 

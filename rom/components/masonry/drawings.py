@@ -43,12 +43,10 @@ def drawn(
         ModelError: if a surface is no stone, stones overlap, or one touches no other, by its name;
             if numbers of nodes or triangles do not exist.
     """
-    x = finite("points", points, None)
-    if x.ndim != 2 or x.shape[1] != 2:
-        raise ModelError(f"points of the shape {x.shape}: stones lie in a plane, as (n, 2).")
+    x = finite("points", points, (None, 2), error=ModelError)
     T = _numbers_below("triangles", triangles, len(x))
     if T.ndim != 2 or T.shape[1] != 3:
-        raise ModelError(f"triangles of the shape {T.shape}: each has three corners, as (t, 3).")
+        raise ModelError(f"triangles of the shape {T.shape}: needed is (t, 3).")
     rows = {name: _numbers_below(f"stone {name!r}", chosen, len(T)).ravel()
             for name, chosen in surfaces.items()}  # fmt: skip
     rock, names = rock or Rock(), list(rows)
@@ -70,9 +68,11 @@ def _numbers_below(what: str, given: npt.ArrayLike, count: int) -> Index:
     found = finite(what, given, None)
     numbers = found.astype(np.int64)
     if (numbers != found).any():
-        raise ModelError(f"{what}: {found[numbers != found][0]} is no whole number.")
+        raise ModelError(f"{what}: {found[numbers != found][0]} must be a whole number.")
     if numbers.size and not 0 <= numbers.min() <= numbers.max() < count:
-        raise ModelError(f"{what}: numbers from {numbers.min()} to {numbers.max()}, of {count}.")
+        raise ModelError(
+            f"{what} must be 0 to {count - 1}, got {numbers.min()} to {numbers.max()}."
+        )
     return numbers
 
 
@@ -81,7 +81,7 @@ def _numbers(name: str, names: list[str]) -> list[int]:
     found = [k for k, (group, _, part) in parts
              if names[k] == name or (group == name and part.isdigit())]  # fmt: skip
     if not found:
-        raise ConfigError(f"held is {name!r}, which is no stone; stones are {names}.")
+        raise ConfigError(f"held is {name!r}, which is no stone; use one of {names}.")
     return found
 
 

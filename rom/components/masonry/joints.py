@@ -88,7 +88,8 @@ def _law(where: str, law: Any) -> Joint:
     if not isinstance(law, Mapping) or not {"friction"} <= set(law) <= LAW_KEYS:
         keys = sorted(law) if isinstance(law, Mapping) else law
         raise FileFormatError(
-            f"{where} has {keys}; it needs friction, and may have between, cohesion, tension."
+            f"{where} has {keys}.",
+            hint="It needs friction, and may have between, cohesion and tension.",
         )
     units = {"friction": "1", "cohesion": "Pa", "tension": "Pa"}
     try:
@@ -100,7 +101,7 @@ def _law(where: str, law: Any) -> Joint:
     try:
         return Joint(**numbers, between=pairs)
     except RomError as error:
-        raise ConfigError(f"{where}: {error}") from error
+        raise ConfigError(error.message, where=where, hint=error.hint) from error
 
 
 def _number(value: Any, unit: str) -> float:
@@ -179,7 +180,7 @@ def _pairs(joint: Joint, n: int) -> Index | None:
         return None
     rows = np.array(joint.between, dtype=np.int64).reshape(-1, 2)
     if rows.size and not (0 <= rows.min() and rows.max() < n and (rows[:, 0] != rows[:, 1]).all()):
-        raise ConfigError(f"a joint is between {joint.between}; stones are 0 to {n - 1}.")
+        raise ConfigError(f"a joint is between {joint.between}; use stones from 0 to {n - 1}.")
     return rows
 
 

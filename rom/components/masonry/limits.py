@@ -21,7 +21,7 @@ import numpy as np
 from scipy.optimize import brentq, linprog, minimize_scalar
 from scipy.sparse import coo_matrix, hstack
 
-from rom.arguments import typed
+from rom.arguments import between, positive, typed, whole
 from rom.components.masonry.actions import BaseMotion, MovingLoad, PointLoad, Wind
 from rom.components.masonry.stones import Masonry, Stone, stone, touching
 from rom.errors import ConfigError, SolverError
@@ -93,11 +93,9 @@ def arch(
     Raises:
         ConfigError: if this is no arch.
     """
-    if n < 2 or not 0 < thickness < 2 * radius or not 0 < half_angle < np.pi:
-        raise ConfigError(
-            f"no arch has {n} voussoirs, radius {radius}, thickness {thickness}, half angle "
-            f"{half_angle}."
-        )
+    whole("n", n, 2)
+    between("thickness", thickness, 0, 2 * positive("radius", radius), "()")
+    between("half_angle", half_angle, 0, np.pi, "()")
     rock = rock or Rock()
     joints = np.linspace(-half_angle, half_angle, n + 1)
     inner, outer = radius - thickness / 2, radius + thickness / 2
@@ -151,7 +149,7 @@ def wall(
     """
     rock, (b, h) = rock or Rock(), brick
     if not (length > 0 and courses >= 1 and min(brick) > 0):
-        raise ConfigError(f"no wall is {length} m long with {courses} courses of bricks {brick}.")
+        raise ConfigError(f"no wall is {length} m long with {courses} courses of {brick}; use > 0.")
     for opening in openings:
         left, right, low, top = opening
         if not (0 < left < right < length and 0 <= low <= top < courses):
@@ -225,7 +223,7 @@ def load_factor(masonry: Masonry, loads: Sequence[Load], *, t: float = 0.0) -> f
     system, load = _joint_forces(masonry), _applied(masonry, loads, t)
     found = _solve(system, system.weight, load[:, None])
     if found.status == 2:
-        raise ConfigError("the masonry does not stand under its own weight; no load factor exists.")
+        raise ConfigError("the masonry does not stand by itself; it needs thickness or friction.")
     if found.status not in (0, 3):
         raise SolverError(f"no load factor: {found.message}")
     return float(found.x[-1]) if found.status == 0 else np.inf

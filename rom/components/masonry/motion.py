@@ -122,10 +122,8 @@ def simulate(  # noqa: PLR0913  all that a run needs
     n = _steps(t_end, dt, damping, save_every)
     W, acting = work(B), driver(masonry, actions)
     for name, given, target in (("q", q, W.q), ("v", v, W.v)):
-        x = finite(name, masonry.start() * (name == "q") if given is None else given, None)
-        if x.shape != target.shape:
-            raise ConfigError(f"{name} has the shape {x.shape}; the stones need {target.shape}.")
-        target[:] = x
+        start = masonry.start() * (name == "q") if given is None else given
+        target[:] = finite(name, start, target.shape)
     C, old = (contacts(8 * len(B.corner), B.load.shape[1], len(B.size)) for _ in range(2))
     cuts, kept = np.zeros(1, dtype=np.int64), np.array([0, *range(save_every, n + 1, save_every)])
     found = Motion(
@@ -152,7 +150,7 @@ def _steps(t_end: float, dt: float, damping: float, save_every: int) -> int:
         raise ConfigError(f"t_end = {t_end} s in steps of dt = {dt} s: both must be positive.")
     n = round(t_end / dt)
     if n < 1 or save_every < 1:
-        raise ConfigError(f"{n} steps, save_every = {save_every}: nothing to do.")
+        raise ConfigError(f"{n} steps, save_every = {save_every}: both must be at least 1.")
     if not damping >= 0:
         raise ConfigError(f"damping = {damping} 1/s would drive the stones; give 0 or more.")
     return n

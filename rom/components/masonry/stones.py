@@ -17,8 +17,9 @@ import numpy.typing as npt
 from scipy.sparse import coo_matrix, csr_matrix
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
-from rom.arguments import finite, typed
+from rom.arguments import finite, positive, typed
 from rom.body.flexible import FlexibleBody
+from rom.body.surface import surface_of
 from rom.components.masonry.block_contact import (
     Blocks,
     Bonds,
@@ -107,12 +108,12 @@ def stone(
 
 def _corners(outline: npt.ArrayLike) -> Array:
     """(k, 2) corners of a polygon that encloses an area, counterclockwise."""
-    x = finite("the outline of a stone", outline, None)
-    if x.ndim != 2 or x.shape[1] != 2 or len(x) < 3:
-        raise ModelError(f"an outline of the shape {x.shape}: three rows or more of x, y make one.")
+    x = finite("the outline of a stone", outline, (None, 2), error=ModelError)
+    if len(x) < 3:
+        raise ModelError(f"an outline must have at least three corners, got {len(x)}.")
     sides = np.linalg.norm(np.roll(x, -1, axis=0) - x, axis=1)
     if not sides.all():
-        raise ModelError(f"corner {int(sides.argmin())} of a stone is listed twice in turn.")
+        raise ModelError(f"corner {int(sides.argmin())} is listed twice in turn; leave one out.")
     y = np.roll(x, -1, axis=0)
     area = float((x[:, 0] * y[:, 1] - x[:, 1] * y[:, 0]).sum() / 2)
     if not area > 0:
@@ -147,16 +148,15 @@ def reduced_stone(body: FlexibleBody, outline: npt.ArrayLike) -> Stone:
         ModelError: if the outline is not one, or has a corner without a node.
     """
     body, corners = body.with_reference("mean-axis"), _corners(outline)
-    if body.surface is None:
-        raise ModelError(f"body {body.name!r} has no surface.")
-    points, shape = body.surface.points, body.surface.shape.reshape(-1, 3, body.n_modes)
+    surface = surface_of(body)
+    points, shape = surface.points, surface.shape.reshape(-1, 3, body.n_modes)
     far = np.linalg.norm(points[None, :, :2] - corners[:, None], axis=2)
     at = far < 1e-6 * body.size
     if not at.any(axis=1).all():
         k = int(np.argmin(at.any(axis=1)))
         raise ModelError(
             f"no node of body {body.name!r} lies at the corner {corners[k].tolist()}; the nearest "
-            f"is {far[k].min():.3g} m away."
+            f"is {far[k].min():.3g} m away. Give outlines through nodes, in metres."
         )
     shapes = np.array([shape[nodes, :2].mean(axis=0) for nodes in at])
     centre = body.first_moment[:2] / body.mass
@@ -204,15 +204,14 @@ class Masonry:
                 ">= 0."
             )
         if not set(self.held) <= set(range(len(self.stones))):
-            raise ConfigError(f"held are {self.held} of the stones 0 to {len(self.stones) - 1}.")
+            raise ConfigError(f"held = {self.held} must be of stones 0 to {len(self.stones) - 1}.")
         if len(set(self.held)) == len(self.stones):
             raise ConfigError(
                 f"all of {len(self.stones)} stones are held.", hint="Leave one free to move."
             )
-        if not 0 < self.thickness < np.inf:
-            raise ConfigError(f"masonry is not {self.thickness} m thick.")
-        if self.reach is not None and not self.reach > 0:
-            raise ConfigError(f"reach = {self.reach} m: corners watch edges within more than 0.")
+        positive("thickness", self.thickness)
+        if self.reach is not None:
+            positive("reach", self.reach)
         finite("gravity", self.gravity, (2,))
 
     @property

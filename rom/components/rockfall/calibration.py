@@ -72,10 +72,10 @@ class History:
             raise ConfigError(f"times of a history increase from contact, t >= 0; see {t[k]:g} s.")
         if (steps > MAX_GAP * np.median(steps)).any():
             k = int(steps.argmax())
-            raise ConfigError(f"the history has a gap from {t[k]:g} s to {t[k + 1]:g} s; cut it "
-                              "in two there.")  # fmt: skip
+            raise ConfigError(f"the history has a gap from {t[k]:g} s to {t[k + 1]:g} s; take it "
+                              "as two, cut there.")  # fmt: skip
         if not x.any() or not (self.deviation is None or self.deviation > 0):
-            raise ConfigError("a history of zeros, or a deviation that is not positive.")
+            raise ConfigError("a history needs values that are not zero, and a positive deviation.")
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,7 +126,7 @@ def calibrate(
     pieces = _pieces(measured, t_end)
     scaled(g, dict.fromkeys(names, 1.0))
     if len(set(names)) != len(names) or not names:
-        raise ConfigError(f"names = {tuple(names)}: one or more parameters, each once.")
+        raise ConfigError(f"names = {tuple(names)} must be at least one parameter, each once.")
     end = max(float(h.t[-1]) for _, h in pieces)
     count = 0
 
@@ -208,7 +208,7 @@ def _covariance(J: Array, x: Array, names: Sequence[str], bounds: tuple[Array, A
     lost = blind + [n for n, w, b in zip(names, wide, at_bound, strict=True) if w or b]
     if lost:
         raise ModelError(
-            f"the histories do not determine {', '.join(dict.fromkeys(lost))}; fit fewer "
-            "parameters, or measure where they matter."
+            f"the histories do not determine {', '.join(dict.fromkeys(lost))}.",
+            hint="Fit fewer parameters, or measure where they matter.",
         )
     return cov

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import brentq
 
+from rom.arguments import positive
 from rom.components.rockfall.impact import Gallery, strike
 from rom.components.rockfall.layer import Layer
 from rom.errors import ConfigError, SolverError
@@ -98,8 +99,7 @@ def with_boulder(g: Gallery, boulder: float, height: float | None = None) -> Gal
     Raises:
         ConfigError: for a mass or a height that is not positive.
     """
-    if not 0 < boulder < np.inf:
-        raise ConfigError(f"boulder = {boulder} kg: it must be positive.")
+    positive("boulder", boulder)
     ratio, c = (boulder / g.boulder) ** (1 / 3), g.cushion
     cushion = (replace(c, radius=c.radius * ratio) if isinstance(c, Layer)
                else replace(c, stiffness=c.stiffness * ratio**0.5))  # fmt: skip
@@ -138,7 +138,7 @@ def capacity_heights(g: Gallery, boulders: Any, **allowed: float) -> Array:
         ConfigError: for a mass that is not positive, or a gallery that bears anything.
     """
     if not (g.cushion.limit < np.inf or g.shear.capacity < np.inf or g.slab.capacity < np.inf):
-        raise ConfigError("the gallery has no limit and no capacity; it bears anything.")
+        raise ConfigError("the gallery bears anything: it needs a limit or a capacity.")
     found = []
     for m in boulders:
 

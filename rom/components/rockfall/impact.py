@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from scipy.linalg import eigh
 
+from rom.arguments import positive
 from rom.components.rockfall import kernels
 from rom.components.rockfall.laws import GRAVITY, Cushion, Shear
 from rom.components.rockfall.layer import Layer
@@ -53,9 +54,9 @@ class Slab:
         if np.size(self.phi) != np.size(self.omega) or not (np.asarray(self.omega) > 0).all():
             raise ModelError("a slab needs as many phi as omega, and supports that hold it.")
         if not (np.isfinite(self.phi).all() and np.isfinite(self.omega).all()):
-            raise ModelError("the modes of the slab are not finite.")
+            raise ModelError("the modes of the slab must be finite.")
         if not np.any(self.phi):
-            raise ModelError("no mode of the slab moves under the plug; move the plug.")
+            raise ModelError("no mode of the slab moves under the plug; choose another place.")
         if not (self.capacity > 0 and 0 <= self.damping < np.inf):
             raise ModelError(
                 f"capacity = {self.capacity} N, damping = {self.damping}: needed are capacity > 0, "
@@ -69,8 +70,8 @@ class Slab:
         Raises:
             ModelError: if one is not positive.
         """
-        if not (mass > 0 and stiffness > 0):
-            raise ModelError(f"no slab has the mass {mass} kg and the stiffness {stiffness} N/m.")
+        positive("mass", mass, error=ModelError)
+        positive("stiffness", stiffness, error=ModelError)
         return cls(np.array([mass**-0.5]), np.array([np.sqrt(stiffness / mass)]), **more)
 
     @classmethod
@@ -123,11 +124,8 @@ class Gallery:
     weight: bool = True
 
     def __post_init__(self) -> None:
-        if not all(0 < x < np.inf for x in (self.boulder, self.plug, self.height)):
-            raise ConfigError(
-                f"boulder = {self.boulder} kg, plug = {self.plug} kg, height = {self.height} m: "
-                "all must be positive."
-            )
+        for name in ("boulder", "plug", "height"):
+            positive(name, getattr(self, name))
 
     @property
     def speed(self) -> float:
@@ -283,7 +281,8 @@ def _refuse(g: Gallery, out: Array, last: Array, step: float, over: bool) -> Non
         raise SolverError(reason, solution=before)
     if not over:
         raise SolverError(
-            f"the peaks of the impact still grow after {out[-1, 0]:.3g} s; give t_end.",
+            f"the peaks of the impact still grow after {out[-1, 0]:.3g} s.",
+            hint="Give t_end.",
             solution=_impact(out, last),
         )
 
@@ -351,7 +350,7 @@ def scaled(g: Gallery, factors: dict[str, float]) -> Gallery:
             raise ConfigError(f"{name!r} cannot be varied; known are {', '.join(FITTED_NUMBERS)}.")
         path, power = FITTED_NUMBERS[name]
         if name == STRENGTH_NAME and not isinstance(g.cushion, Layer):
-            raise ConfigError("only a Layer has a strength of the cushion.")
+            raise ConfigError(f"{name} needs a cushion of type Layer.")
         kind = "modulus" if isinstance(g.cushion, Layer) else "stiffness"
         g = _scaled(g, path.format(stiffness=kind), factor**power)
     return g

@@ -193,5 +193,5 @@ class CushionForce:
         aside = float(np.linalg.norm(arm - (arm @ self.down) * self.down))
         if self.trial > 0.0 and aside > self.reach:
             raise ConfigError(f"the boulder comes down {aside:.3g} m aside at t = {t:.4g} s, "
-                              f"beyond the slab, which reaches {self.reach:g} m.")  # fmt: skip
+                              f"beyond the slab; at most {self.reach:g} m are on it.")  # fmt: skip
         return -self.cushion.force(self.trial, self.deepest) * self.down, np.zeros(3)

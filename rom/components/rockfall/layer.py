@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from rom.arguments import between, positive
 from rom.components.rockfall import kernels
 from rom.components.rockfall.laws import (
     GRAVITY,
@@ -67,8 +68,7 @@ class Layer(Resistance):
         if not (good and 0 < self.recovery <= 1):
             needed = "modulus, radius, thickness, density and strength > 0, 0 < recovery <= 1"
             raise ConfigError(f"{self}: needed are {needed}.")
-        if not 0 < self.angle < np.pi / 2:
-            raise ConfigError(f"{self}: the angle is one between 0 and pi / 2, in radians.")
+        between("angle", self.angle, 0, np.pi / 2, "()")
 
     @classmethod
     def of_sand(
@@ -113,8 +113,7 @@ class Layer(Resistance):
         Raises:
             ConfigError: for a penetration that is negative or through the layer.
         """
-        if not 0 <= d < self.thickness:
-            raise ConfigError(f"d = {d} m: the layer is {self.thickness} m thick.")
+        between("d", d, 0, self.thickness, "[)")
         x = min(d, self.radius)
         return float(np.sqrt(2 * self.radius * x - x**2))
 
@@ -191,11 +190,9 @@ def bearing_pressure(friction: float, radius: float, density: float = SAND_DENSI
         Vesic, Analysis of ultimate loads of shallow foundations, J. Soil Mech. Found. Div. ASCE
         99 (1973) 45.
     """
-    if not (0 < friction < np.pi / 3 and radius > 0 and density > 0):
-        raise ConfigError(
-            f"friction = {friction} rad, radius = {radius} m, density = {density} kg/m^3: needed "
-            "are an angle between 0 and pi / 3 and sizes > 0."
-        )
+    between("friction", friction, 0, np.pi / 3, "()")
+    positive("radius", radius)
+    positive("density", density)
     slope = np.tan(friction)
     n_q = np.exp(np.pi * slope) * np.tan(np.pi / 4 + friction / 2) ** 2
     return float(0.6 * density * GRAVITY * radius * 2 * (n_q + 1) * slope)

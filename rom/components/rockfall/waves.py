@@ -11,7 +11,7 @@ Source:
 import numpy as np
 import numpy.typing as npt
 
-from rom.arguments import positive, typed, vector
+from rom.arguments import between, positive, typed, vector
 from rom.components.rockfall.layer import Layer
 from rom.errors import ConfigError
 from rom.model import Array
@@ -32,8 +32,7 @@ def wave_delay(layer: Layer, d: float = 0.0) -> float:
     Raises:
         ConfigError: for a penetration that is negative or through the layer.
     """
-    if not 0 <= d < layer.thickness:
-        raise ConfigError(f"d = {d} m: the layer is {layer.thickness} m thick.")
+    between("d", d, 0, layer.thickness, "[)")
     return float((layer.thickness - d) * np.sqrt(layer.density / layer.modulus))
 
 
@@ -65,8 +64,7 @@ def arriving(
     if t.shape != force.shape or t.size < 2 or not (np.diff(t) > 0).all():
         raise ConfigError(f"{t.size} instants with {force.size} forces: needed are instants that "
                           "grow, and a force at each.")  # fmt: skip
-    if not 0 <= reflection <= 1:
-        raise ConfigError(f"reflection = {reflection}: a share from 0 to 1.")
+    between("reflection", reflection, 0, 1)
     passages = int(np.ceil((t[-1] - t[0]) / positive("delay", delay) / 2)) + 1
     if passages > MAX_PASSAGES:
         raise ConfigError(f"{passages} passages of a wave of {delay:.3g} s in {t[-1] - t[0]:.3g} s;"

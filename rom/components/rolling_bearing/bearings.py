@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rom.arguments import finite, number
+from rom.arguments import not_negative, number, unit_vector
 from rom.components.rolling_bearing.races import BallBearing, RollerBearing
 from rom.errors import ConfigError
 from rom.mbs.elements.family import Family, Places, integers, rows_of
@@ -240,15 +240,9 @@ def rolling_bearing(  # noqa: PLR0913  one keyword per property
         ConfigError: for a name in use, unknown markers, rings that are not at one place, or numbers
             no bearing has.
     """
-    self.check_markers(name, inner, outer)
-    if inner.body == outer.body:
-        raise ConfigError(f"bearing {name!r} is of body {inner.body!r} with itself.")
-    z = finite("axis", axis, (3,))
-    if not np.linalg.norm(z) > 0.0:
-        raise ConfigError(f"the axis of bearing {name!r} is zero.")
-    if number("damping", damping) < 0.0:
-        raise ConfigError(f"damping of bearing {name!r} is {damping:g}: it must not drive.")
-    z = z / np.linalg.norm(z)
+    self.check_apart(name, inner, outer)
+    z = unit_vector(f"axis of {name}", axis)
+    not_negative(f"damping of bearing {name!r}", damping)
     apart = float(np.linalg.norm(self.design_point(inner) - self.design_point(outer)))
     if apart > PLACE_RTOL * bearing.pitch_diameter:
         raise ConfigError(

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.special import ellipe, ellipk
 
-from rom.arguments import typed
+from rom.arguments import between, positive, typed
 from rom.errors import ModelError
 from rom.model import Array
 
@@ -50,16 +50,16 @@ class BallBearing:
         _check_row(self.balls, self.ball_diameter, self.pitch_diameter, self.clearance)
         if not 0.5 < min(self.conformity) <= max(self.conformity) <= 1.0:
             raise ModelError(
-                f"conformity {self.conformity} of a ball bearing: a groove is a little wider than "
-                "its ball, from above 0.5 to 1."
+                f"conformity {self.conformity} must be above 0.5 and at most 1: a "
+                "groove is a little wider than its ball, by 0.52 as a rule."
             )
         if not abs(self.contact_angle) < 1.4:
             raise ModelError(
                 f"contact angle {self.contact_angle:g} rad is not below 80 degrees.",
                 hint="Angles are in radians; a thrust bearing is not one of these.",
             )
-        if not (self.E > 0 and -1 < self.nu <= 0.5):
-            raise ModelError(f"no balls have E = {self.E:g} Pa and nu = {self.nu:g}.")
+        positive("E", self.E, error=ModelError)
+        between("nu", self.nu, -1, 0.5, "(]", error=ModelError)
 
     @property
     def count(self) -> int:
@@ -134,8 +134,7 @@ class RollerBearing:
 
     def __post_init__(self) -> None:
         _check_row(self.rollers, self.roller_diameter, self.pitch_diameter, self.clearance)
-        if not self.length > 0:
-            raise ModelError(f"rollers of length {self.length:g} m bear nothing.")
+        positive("length", self.length, error=ModelError)
 
     @property
     def count(self) -> int:
@@ -202,7 +201,8 @@ def _check_row(number: int, diameter: float, pitch: float, clearance: float) -> 
     """Refuse balls or rollers that do not fit on their circle."""
     if number < 3 or not (diameter > 0 and pitch > diameter):
         raise ModelError(
-            f"no bearing has {number} balls or rollers of {diameter:g} m on one of {pitch:g} m."
+            f"no bearing has {number} balls or rollers of {diameter:g} m on one of {pitch:g} m; "
+            "needed are at least 3, smaller than their circle."
         )
     if diameter > pitch * np.sin(np.pi / number):
         raise ModelError(
@@ -210,5 +210,4 @@ def _check_row(number: int, diameter: float, pitch: float, clearance: float) -> 
             f"{pitch * 1e3:.4g} mm.",
             hint=f"There is room for {int(np.pi / np.arcsin(diameter / pitch))}.",
         )
-    if not abs(clearance) < 0.1 * diameter:
-        raise ModelError(f"a play of {clearance:g} m is no clearance of a bearing.")
+    between("clearance", clearance, -0.1 * diameter, 0.1 * diameter, "()", error=ModelError)

@@ -101,7 +101,7 @@ def cylinder_of(part: Part, marker: Marker, axis: Array, across: Array) -> Cylin
     if not np.ptp(z) > 0.0:
         raise ConfigError(
             f"interface {marker.place!r} of {part.name!r} is flat across the axis: no forces can "
-            "be spread along it."
+            "be spread along it; take the cylinder face, or another axis."
         )
     harmonics, order = _numbers(surface.kind)
     middle, half = 0.5 * (z.max() + z.min()), 0.5 * float(np.ptp(z))

@@ -108,12 +108,13 @@ def _check_apart(name: str, k: int, ends: tuple[Place, Place], shift: float) -> 
     D = ends[1].x - ends[0].x
     if np.linalg.norm(D) <= 1e-12:
         raise ConfigError(
-            f"places {k + 1} and {k + 2} of tendon {name!r} are at one point: it would be a knot."
+            f"places {k + 1} and {k + 2} of {name!r} are at one point; leave one out."
         )
     for one in ends:
         n = one.axes[0]
         if one.radius and np.linalg.norm(D - (D @ n) * n) <= abs(shift):
             raise ConfigError(
                 f"between places {k + 1} and {k + 2} of tendon {name!r} there is no room: one lies "
-                "within the pulley of the other, or pulleys that it crosses over overlap."
+                "within the pulley of the other, or pulleys that it crosses over overlap. Take a "
+                "smaller radius."
             )

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from rom.arguments import finite, number, positive, typed
+from rom.arguments import not_negative, positive, typed, unit_vector, whole
 from rom.components.tendons.paths import Place, path_through
 from rom.components.tendons.routing import (
     bearing_angle,
@@ -147,45 +147,36 @@ def tendon(  # noqa: PLR0913  one keyword per property
         stiffness, loss = positive("EA", EA), _not_negative(name, "damping", damping)
         slack = length / (1.0 + _not_negative(name, "pretension", pretension) / stiffness)
         if pretension and free_length is not None:
-            raise ConfigError(f"tendon {name!r} has both a pretension and a free_length.")
+            raise ConfigError(f"tendon {name!r} has pretension and free_length; give only one.")
         function, given = _free(slack, free_length)
         numbers = (stiffness, loss, given, speed)
     self.add(name, Tendon(stations, numbers, EA is None, function), TENDONS_FAMILY)
 
 
-def _station(whole: Whole, name: str, place: Any, friction: float) -> Station:
+def _station(mechanism: Whole, name: str, place: Any, friction: float) -> Station:
     """A place of the path in the axes of its marker."""
     mu = _not_negative(name, "friction", getattr(place, "friction", friction))
     if isinstance(place, Marker):
-        whole.check_markers(name, place)
+        mechanism.check_markers(name, place)
         return Station(place, np.eye(3)[:2], 0.0, mu, 0)
-    whole.check_markers(name, place.marker)
-    if not 0 <= place.turns <= MAX_TURNS:
-        raise ConfigError(
-            f"turns = {place.turns} of a pulley of {name!r}: it has from 0 to {MAX_TURNS}."
-        )
-    axis = finite("axis", place.axis, (3,))
-    size = np.linalg.norm(axis)
-    if size == 0.0:
-        raise ConfigError(f"the axis of a pulley of {name!r} is zero.")
-    n = axis / size
+    mechanism.check_markers(name, place.marker)
+    whole(f"turns of a pulley of {name!r}", place.turns, 0, MAX_TURNS)
+    n = unit_vector(f"axis of a pulley of {name}", place.axis)
     e = np.cross(n, np.eye(3)[np.argmin(np.abs(n))])
     e /= np.linalg.norm(e)
-    axes = np.array([n, e]) @ matrix(whole.part(place.marker.body).p)
+    axes = np.array([n, e]) @ matrix(mechanism.part(place.marker.body).p)
     return Station(place.marker, axes, positive("radius", place.radius), mu, place.turns)
 
 
 def _not_negative(name: str, what: str, value: Any) -> float:
-    if number(what, value) < 0.0:
-        raise ConfigError(f"{what} of tendon {name!r} is {value:g}: it must not drive.")
-    return float(value)
+    return not_negative(f"{what} of tendon {name!r}", value)
 
 
 def _refuse_stretch(name: str, damping: Any, free_length: Any, pretension: Any) -> None:
     if damping or pretension or free_length is not None:
         raise ConfigError(
-            f"tendon {name!r} is pulled by a given tension and does not stretch: damping, "
-            "free_length and pretension have no meaning."
+            f"tendon {name!r} is pulled by a given tension and does not stretch; leave damping, "
+            "free_length and pretension out."
         )
 
 
@@ -208,7 +199,7 @@ def _design_length(whole: Whole, name: str, stations: Sequence[Station]) -> floa
         ConfigError: for a path that is none.
     """
     if len(stations) < 2:
-        raise ConfigError(f"the path of tendon {name!r} has {len(stations)} places: two are ends.")
+        raise ConfigError(f"tendon {name!r} needs at least two places, got {len(stations)}.")
     if stations[0].radius or stations[-1].radius:
         raise ConfigError(
             f"tendon {name!r} ends at a pulley.", hint="It is fixed at a marker at both ends."

@@ -63,7 +63,7 @@ class Housing:
         """
         A = np.asarray(axes, dtype=float)
         if A.shape != (3, 3) or not np.allclose(A @ A.T, np.eye(3), atol=1e-9):
-            raise ModelError(f"axes {A.tolist()} of the unit are not orthonormal rows.")
+            raise ModelError(f"axes {A.tolist()} of the unit must be orthonormal rows.")
         M, K = body.full_matrices()
         N = still_motions(np.vstack([body.marker(name).hold for name in fixed]))
         omega2, V = eigh(N.T @ K @ N, N.T @ M @ N)
@@ -87,7 +87,7 @@ class Housing:
             ModelError: naming what is missing, or does not fit.
         """
         if self.M.shape != self.K.shape or self.M.shape != (self.n, self.n):
-            raise ModelError(f"a housing of {self.M.shape} mass has {self.K.shape} stiffness.")
+            raise ModelError(f"M {self.M.shape} and K {self.K.shape} must be ({self.n}, {self.n}).")
         for name, held, there in zip(("pinion", "gear"), bearings, self.bushes, strict=True):
             if set(held) != set(there):
                 raise ModelError(

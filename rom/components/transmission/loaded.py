@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rom.arguments import AnyMechanism, AnySolution, finite, positive, typed
+from rom.arguments import AnyMechanism, AnySolution, positive, typed, unit_vector
 from rom.components.gear_mesh.tooth_loads import ToothLoads, tooth_loads
 from rom.components.journal_bearing.record import film_pressures
 from rom.errors import ConfigError
@@ -61,7 +61,7 @@ def _wheels(places: Places, body: str) -> Iterator[Mesh]:
                 continue
             pair = mesh.pair
             if getattr(pair, "helix", 0.0) or min(pair.teeth) < 0:
-                raise ConfigError(f"the wheels of {name!r} are no spur wheels with teeth outside.")
+                raise ConfigError(f"the wheels of {name!r} must be spur wheels with teeth outside.")
             axes = _axes(places, mesh)
             points, triangles = gear(pair.teeth[side], pair.module, pair.width,
                                      pressure_angle=pair.pressure_angle)  # fmt: skip
@@ -117,12 +117,10 @@ def tooth_walls(
     Raises:
         ConfigError: if there is no such mesh, or no tooth of it bears.
     """
-    upright, scale = finite("direction", direction, (3,)), positive("scale", scale)
-    if not upright.any():
-        raise ConfigError("the direction of the walls is zero.")
+    upright, scale = unit_vector("direction", direction), positive("scale", scale)
     loads = tooth_loads(solution, name)[at]
     if not loads.force.any():
-        raise ConfigError(f"no tooth of {name!r} bears at that instant.")
+        raise ConfigError(f"no tooth of {name!r} bears at that instant; take another one of sol.t.")
     mesh = solution.mechanism.gear_meshes[name]
     places = moving(solution.mechanism, solution, [at], 1.0)
     axes, middle = _axes(places, mesh), places.point(mesh.i)[0]

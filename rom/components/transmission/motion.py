@@ -79,7 +79,7 @@ def threshold(unit: Transmission, low: float, high: float, *, within: float = 0.
         words = ["whirls" if not s else "does not whirl" for s in found]
         raise ModelError(
             f"the unit {words[0]} at {low:.1f} rad/s and {words[1]} at {high:.1f} rad/s: the "
-            "threshold is not between them."
+            "threshold must lie between them."
         )
     while high - low > within * low:
         middle = (low + high) / 2

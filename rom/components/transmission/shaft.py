@@ -77,11 +77,11 @@ class Shaft:
         z = np.asarray(self.z, dtype=float)
         d, hole = (np.asarray(x, dtype=float) for x in (self.diameter, self.bore))
         if z.size < 2 or np.any(np.diff(z) <= 0) or np.any(d <= 0):
-            raise ModelError(f"no shaft has nodes at {z.tolist()} m and diameters {d.tolist()} m.")
+            raise ModelError(f"z = {z.tolist()} must ascend, diameter = {d.tolist()} be positive.")
         if np.any(hole < 0) or np.any(hole >= d):
-            raise ModelError(f"bores of {hole.tolist()} m in shafts of {d.tolist()} m.")
+            raise ModelError(f"bores of {hole.tolist()} m must be smaller than {d.tolist()} m.")
         if any(not 0 <= disc.node < z.size for disc in self.discs):
-            raise ModelError(f"a disc sits beyond the last of {z.size} nodes.")
+            raise ModelError(f"each disc must sit at a node from 0 to {z.size - 1}.")
 
     @property
     def n(self) -> int:

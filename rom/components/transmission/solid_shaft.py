@@ -51,7 +51,7 @@ class SolidShaft:
 
     def __post_init__(self) -> None:
         if any(not 0 <= disc.node < len(self.seats) for disc in self.discs):
-            raise ModelError(f"a disc sits beyond the last of {len(self.seats)} seats.")
+            raise ModelError(f"each disc must sit at a seat from 0 to {len(self.seats) - 1}.")
         for name in self.seats:
             x, y, _ = self.body.marker(name).point
             if np.hypot(x, y) > 1e-3 * self.body.size:

@@ -18,6 +18,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import eigh
 
+from rom.arguments import symmetric
 from rom.components.transmission.shaft import ComplexArray, Shaft, vibrations
 from rom.errors import ModelError
 from rom.model import Array
@@ -109,8 +110,7 @@ def critical_speeds(shaft: Shaft, supports: Mapping[int, Support]) -> tuple[Arra
         ModelError: as in `shaft_whirl`, or if a stiffness is not symmetric.
     """
     M, _, K, G, rows = _matrices(shaft, supports)
-    if not np.allclose(K, K.T, rtol=1e-9, atol=1e-9 * np.abs(K).max()):
-        raise ModelError("a bearing whose stiffness is not symmetric: speeds grow or decay.")
+    symmetric("the stiffness of the bearings", K, 1e-9, error=ModelError)
     inverse, vectors = eigh(M - 1j * G, K)
     keep = np.flatnonzero(inverse > 1e-12 * inverse.max())[::-1]
     shapes = np.zeros((shaft.n, keep.size), dtype=complex)
@@ -126,7 +126,7 @@ def _matrices(
     C = np.zeros_like(K)
     for node, support in supports.items():
         if not 0 <= node < shaft.n // 6:
-            raise ModelError(f"a bearing sits at node {node}, beyond the last of {shaft.n // 6}.")
+            raise ModelError(f"the node {node} of a bearing must be 0 to {shaft.n // 6 - 1}.")
         at = slice(6 * node, 6 * node + 2)
         K[at, at] += _square(support.stiffness)
         C[at, at] += _square(support.damping)
@@ -155,7 +155,7 @@ def _refuse_loose(shaft: Shaft, supports: Mapping[int, Support]) -> None:
 def _square(value: npt.ArrayLike) -> Array:
     given = np.asarray(value, dtype=float)
     if given.shape not in ((), (2, 2)):
-        raise ModelError(f"a bearing has a number or a (2, 2) matrix, not the shape {given.shape}.")
+        raise ModelError(f"a bearing needs a number or (2, 2) matrix, not the shape {given.shape}.")
     return given * np.eye(2) if given.ndim == 0 else given
 
 

@@ -17,6 +17,7 @@ from itertools import pairwise, product
 
 import numpy as np
 
+from rom.arguments import positive
 from rom.components.gear_mesh import Mesh, MeshForce
 from rom.components.journal_bearing import Film, JournalBearing, film
 from rom.components.transmission.housing import Housing
@@ -104,11 +105,8 @@ class Transmission:
     housing: Housing | None = None
 
     def __post_init__(self) -> None:
-        if not (self.speed > 0 and self.viscosity > 0 and self.motor > 0):
-            raise ModelError(
-                f"speed {self.speed} rad/s, viscosity {self.viscosity} Pa s and stiffness "
-                f"{self.motor} N m/rad of the drive must be positive."
-            )
+        for name in ("speed", "viscosity", "motor"):
+            positive(name, getattr(self, name), error=ModelError)
         if not self.torque > 0:
             raise ModelError(
                 f"contact is lost: a load of {self.torque} N m does not press the working flanks "
@@ -118,7 +116,7 @@ class Transmission:
         for name, rotor in (("pinion", self.pinion), ("gear", self.gear)):
             nodes = rotor.shaft.nodes
             if not rotor.bearings or not all(0 <= k < nodes for k in (*rotor.bearings, rotor.end)):
-                raise ModelError(f"the {name} has no bearings, or one beyond {nodes} nodes.")
+                raise ModelError(f"the {name} needs bearings, all at nodes from 0 to {nodes - 1}.")
         if self.housing is not None:
             self.housing.check(self.pinion.bearings, self.gear.bearings)
 

@@ -19,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 from numba import carray
 
-from rom.arguments import unit_vector
+from rom.arguments import finite, positive, unit_vector
 from rom.components.cosserat.bodies import RodBody
 from rom.components.cosserat.energy import rotation_of
 from rom.components.wind.blading import (
@@ -257,15 +257,12 @@ def far_away(
     wind: npt.ArrayLike, axis: npt.ArrayLike, *, tower: bool, density: float
 ) -> list[float]:
     """Half the density, wind, axis and tower as strips know them; `in_wind` refuses the same."""
-    wind = np.asarray(wind, dtype=float)
-    if wind.shape != (3,) or not np.isfinite(wind).all():
-        raise ConfigError(f"the wind {wind.tolist()} is no velocity of three numbers.")
+    wind = finite("wind", wind, (3,))
     axis = unit_vector("axis", axis)
     if wind @ axis < 0.0:
         raise ConfigError(f"the wind {wind.tolist()} comes from behind the rotor.",
                           hint="The axis of the shaft points downwind.")  # fmt: skip
-    if not density > 0.0:
-        raise ConfigError(f"there is no air of {density:g} kg/m^3.")
+    positive("density", density)
     return [0.5 * density, *wind, *axis, *(TOWER_TUBE if tower else NO_TOWER)]
 
 

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rom.arguments import typed
+from rom.arguments import not_negative, one_each, typed
 from rom.components.compiled import inner, kernel
 from rom.components.wind.inflow import NO_TOWER, TOWER_TUBE, wind_at
 from rom.components.wind.momentum import CHORD_COLUMN, coefficients, slowed
@@ -85,9 +85,7 @@ class Blading:
         """Refuse blades that cannot be."""
         size = len(self.profile)
         for name in ("radius", "length", "chord", "twist"):
-            if getattr(self, name).shape != (size,):
-                raise ConfigError(f"blades have {size} profiles and {getattr(self, name).shape} "
-                                  f"of {name}; one for each strip.")  # fmt: skip
+            one_each(f"of {name}", getattr(self, name).shape, "profiles", (size,))
         if not (self.hub_radius > 0.0 and (self.radius > self.hub_radius).all()
                 and (self.radius < self.rotor_radius).all()):  # fmt: skip
             raise ConfigError(f"strips lie from {self.radius.min():g} to {self.radius.max():g} m, "
@@ -96,7 +94,7 @@ class Blading:
         if not ((self.chord > 0.0).all() and (self.length > 0.0).all() and self.density > 0.0
                 and self.n_blades >= 1):  # fmt: skip
             raise ConfigError("chords, lengths, the density of the air and the number of blades "
-                              "are positive.")  # fmt: skip
+                              "must be positive.")  # fmt: skip
         if not (abs(self.tilt) < np.pi / 4 and abs(self.cone) < np.pi / 4):
             raise ConfigError(f"a shaft tilted by {self.tilt:g} rad and blades coned by "
                               f"{self.cone:g} rad are beyond this model.",
@@ -270,9 +268,7 @@ def rotor_load(  # noqa: PLR0913  one keyword per choice, all with defaults
             a yaw beyond the model, or no azimuths.
     """
     for name, value in (("wind", wind), ("speed of the rotor", speed)):
-        if not (np.isfinite(value) and value >= 0.0):
-            raise ConfigError(f"a {name} of {value:g}; it is finite and not negative.",
-                              hint="Turn the rotor into the wind.")  # fmt: skip
+        not_negative(name, value)
     check_pitch(pitch)
     if not abs(yaw) < np.pi / 4:
         raise ConfigError(f"a wind from {yaw:g} rad aside is beyond this model.",

@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import brentq
 
-from rom.arguments import typed, vector
+from rom.arguments import number, typed, vector
 from rom.components.compiled import inner, kernel
 from rom.components.wind.blading import ROTOR_RADIUS, Blading, RotorLoad, blading, rotor_load
 from rom.components.wind.wind_turbine import GEAR_RATIO, N_BLADES, RATED_SPEED
@@ -108,8 +108,8 @@ def generator_torque(speed: float, pitch: float = 0.0) -> float:
     Raises:
         ConfigError: for a speed or a pitch that is not finite.
     """
-    if not (math.isfinite(speed) and math.isfinite(pitch)):
-        raise ConfigError(f"no generator turns at {speed:g} rad/s with a pitch of {pitch:g} rad.")
+    number("speed", speed)
+    number("pitch", pitch)
     return float(torque_at(float(speed), float(pitch)))
 
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rom.arguments import positive, typed
+from rom.arguments import between, not_negative, positive, typed
 from rom.components.compiled import kernel
 from rom.components.wind.blading import Blading, blading, check_pitch, strip_load
 from rom.components.wind.control import (
@@ -107,9 +107,7 @@ def operate(
             that are not held.
     """
     positive("t_end", t_end)
-    if positive("dt", dt) > MAX_STEP:
-        raise ConfigError(f"a step of {dt:g} s is longer than the control can follow, "
-                          f"{MAX_STEP:g} s.")  # fmt: skip
+    between("dt", dt, 0, MAX_STEP, "(]")
     blades = blading() if blades is None else blades
     t = dt * np.arange(round(t_end / dt) + 1)
     blows = np.array([_wind_at(wind, s) for s in t])
@@ -158,8 +156,7 @@ class _Run:
         if self.held is not None:
             self.speed, self.control.pitch = self.held(t)
             check_pitch(self.control.pitch)
-            if not 0.0 <= self.speed < math.inf:
-                raise ConfigError(f"the rotor is held at {self.speed:g} rad/s, at {t:g} s.")
+            not_negative(f"speed held at {t:g} s", self.speed)
         cone, tilt = self.cosines
         flow = (wind * cone * tilt, self.speed, self.control.pitch, 0.5 * self.blades.density)
         wake_step(self.given, flow, self.wake, dt if self.dynamic else 0.0, self.loads)

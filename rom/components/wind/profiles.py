@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from rom.arguments import number, typed, vector
+from rom.arguments import not_negative, typed, vector
 from rom.errors import ConfigError
 from rom.model import Array
 
@@ -80,9 +80,7 @@ class Profile:
         Raises:
             ConfigError: for a ratio that is negative or not finite.
         """
-        ratio = number("chord_over_radius", chord_over_radius)
-        if ratio < 0.0:
-            raise ConfigError(f"a strip has no chord of {ratio:g} radii.")
+        ratio = not_negative("chord_over_radius", chord_over_radius)
         begins = np.flatnonzero((self.lift[:-1] <= 0.0) & (self.lift[1:] > 0.0))
         if not begins.size:
             return self
@@ -140,7 +138,7 @@ def profile(
                  (("angle", angle), ("lift", lift), ("drag", drag)))  # fmt: skip
     _check(name, a, cl, cd)
     if not aspect > 0.0:
-        raise ConfigError(f"profile {name!r} has an aspect ratio of {aspect:g}; it is positive.")
+        raise ConfigError(f"aspect = {aspect:g} of profile {name!r} must be positive.")
     if a[0] <= ROUND_ATOL - np.pi and a[-1] >= np.pi - ROUND_ATOL:
         return Profile(name, a, cl, cd)
     return _carried_on(name, (a, cl, cd), 1.11 + 0.018 * aspect)
@@ -155,7 +153,7 @@ def _check(name: str, a: Array, cl: Array, cd: Array) -> None:
         raise ConfigError(f"angles of profile {name!r} do not ascend within -pi to pi.",
                           hint="Angles of attack are in radians.")  # fmt: skip
     if (cd < 0.0).any():
-        raise ConfigError(f"profile {name!r} has a drag of {cd.min():g}; drag is not negative.")
+        raise ConfigError(f"profile {name!r} has a drag of {cd.min():g}; it must not be negative.")
     if not 0.0 < a[-1] < np.pi / 2 and a[-1] < np.pi - ROUND_ATOL:
         raise ConfigError(f"the table of profile {name!r} ends at {np.degrees(a[-1]):g} degrees; "
                           "stall lies between 0 and 90, or it goes once round.")  # fmt: skip

@@ -190,7 +190,7 @@ def over_time(wind: npt.ArrayLike) -> Array:
         raise ConfigError(f"a wind of shape {given.shape} is no speed over time.",
                           hint="Give one speed, or rows of an instant and a speed.")  # fmt: skip
     if (np.diff(winds[:, 0]) <= 0.0).any():
-        raise ConfigError("instants of a wind ascend.")
+        raise ConfigError("instants of a wind must ascend.")
     if (winds[:, 1] < 0.0).any():
-        raise ConfigError(f"the wind of {winds[:, 1].min():g} m/s comes from behind the rotor.")
+        raise ConfigError(f"the wind of {winds[:, 1].min():g} m/s must not be negative.")
     return winds

@@ -244,7 +244,7 @@ def _hub(mech: Mechanism, solid: FlexibleBody | None, at: Array, lean: Array, sp
         return mech.add_rigid("hub", mass=HUB_MASS, inertia=(HUB_INERTIA,) * 3, **pose)
     missing = {"shaft", *(f"blade_{k + 1}" for k in range(N_BLADES))} - set(solid.markers)
     if missing:
-        raise ConfigError(f"the hub {solid.name!r} has no interfaces {sorted(missing)}.")
+        raise ConfigError(f"the hub {solid.name!r} needs the interfaces {sorted(missing)}.")
     part = mech.add_flexible("hub", solid, **pose)
     own = float(part.second[1, 1] + part.second[2, 2])
     if not (part.mass < HUB_MASS and own < HUB_INERTIA):

@@ -148,7 +148,10 @@ def cut(K: csr_matrix, K_blade: csr_matrix, name: str) -> tuple[Index, Index]:
     shared = (mine > 0.0) & (total - mine > SHARED_STIFFNESS_RTOL * total)
     nodes = np.flatnonzero(shared.reshape(-1, 3).any(axis=1))
     if nodes.size == 0:
-        raise InterfaceError(f"region {name!r} shares no node with the rest of the sector.")
+        raise InterfaceError(
+            f"region {name!r} shares no node with the rest of the sector.",
+            hint="Mesh blade and disk as one solid, so that they have the nodes of the root alike.",
+        )
     return np.setdiff1d(np.flatnonzero(mine > 0.0), dofs_of(nodes)), nodes
 
 

@@ -26,7 +26,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import block_diag, eigh
 
-from rom.arguments import lowest, matrix, rows_at, typed, vector
+from rom.arguments import lowest, matrix, one_each, rows_at, typed, vector
 from rom.cyclic.blades.records import ReducedBlade, SubstructuredSector
 from rom.cyclic.certificate import wheel_certificate
 from rom.cyclic.gyroscopic import GyroscopicModes, gyroscopic_modes
@@ -86,8 +86,6 @@ class BladedWheel:
                 matrices of rotation are missing.
         """
         self._check(blades)
-        if not np.isfinite(speed):
-            raise ConfigError(f"speed = {speed!r}: give an angular speed in rad/s.")
         K, M = (self._joined(name, blades) for name in ("K", "M"))
         return (K + speed**2 * self._joined("centrifugal", blades) if speed else K), M
 
@@ -180,7 +178,8 @@ class BladedWheel:
                 f"at {speed:g} rad/s the wheel with these blades is above its instability: spin "
                 "softening has used up its stiffness."
                 if speed
-                else "these blades leave a motion without stiffness."
+                else "these blades leave a motion without stiffness.",
+                hint="Turn more slowly." if speed else "Look for a deviation of -1 or below.",
             )
         kept = lowest(n)
         return Modes(np.sqrt(np.maximum(lam[kept], 0.0)), Phi[:, kept])
@@ -317,20 +316,16 @@ def _each(what: Any, N: int) -> list[Any]:
     """
     if not isinstance(what, list) or not what or np.ndim(what[0]) == 0:
         return [what] * N
-    if len(what) != N:
-        raise ConfigError(f"a list of {len(what)} forces or places: give {N}, one for each blade.")
+    one_each("forces or places", len(what), "blades", N)
     return what
 
 
 def _on(blade: ReducedBlade, force: npt.ArrayLike, j: int) -> Array:
     f = np.asarray(force)
-    if f.shape != (blade.Psi.shape[0],):
-        raise ConfigError(
-            f"the force on blade {j} has the shape {f.shape}, its model {blade.Psi.shape[0]} dofs."
-        )
+    one_each(f"forces on blade {j}", f.shape, "dofs of its model", (blade.Psi.shape[0],))
     off = np.flatnonzero((f != 0.0) & ~blade.Psi.any(axis=1))
     if off.size:
-        raise ConfigError(f"the force on blade {j} acts on {off.size} dofs that are not its own.")
+        raise ConfigError(f"the force on blade {j} must be zero on {off.size} dofs of the disk.")
     return f
 
 

@@ -5,12 +5,11 @@ from typing import Any
 import numpy as np
 from scipy.linalg import block_diag, eigh
 
-from rom.arguments import typed
+from rom.arguments import typed, whole
 from rom.cyclic.blades.bladed_wheel import BladedWheel
 from rom.cyclic.blades.records import SubstructuredSector
 from rom.cyclic.modes import real_span
 from rom.cyclic.sector import Complex
-from rom.errors import ConfigError
 from rom.model import Array
 
 RIGID_SPAN_RTOL = 1e-6  # share of a rigid motion that the coordinates may miss
@@ -85,8 +84,7 @@ def _root_shapes(
     r = len(K)
     if n_root is None:
         return np.eye(r, dtype=complex)
-    if isinstance(n_root, bool) or not 1 <= n_root <= r:
-        raise ConfigError(f"n_root = {n_root!r}: a root has 1 to {r} shapes.")
+    whole("n_root", n_root, 1, r, reason="the shapes of a root")
     static = (A[:r, :r] for A in (sector.blade.K, sector.blade.M))
     V = eigh(*(A + own for A, own in zip((K, M), static, strict=True)))[1]
     return np.asarray(V[:, :n_root], dtype=complex)
@@ -100,8 +98,7 @@ def _condensed(
     T = sector.harmonic(n)[:, kept].toarray()
     root = np.searchsorted(sector.free[kept], sector.root)
     inner = np.setdiff1d(np.arange(T.shape[1]), root)
-    if isinstance(n_waves, bool) or not 0 <= n_waves <= inner.size:
-        raise ConfigError(f"n_waves = {n_waves!r}: the disk has 0 to {inner.size} with roots held.")
+    whole("n_waves", n_waves, 0, inner.size, reason="the dofs of the disk with roots held")
     waves = {name: T.conj().T @ A @ T for name, A in disk.items()}
     K, M = waves["K"], waves["M"]
     K_ii = K[np.ix_(inner, inner)]

@@ -26,7 +26,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import eigh
 
-from rom.arguments import lowest, matrix, rows_at, typed, vector
+from rom.arguments import lowest, matrix, one_each, rows_at, typed, vector
 from rom.cyclic.certificate import mistuned_certificate
 from rom.cyclic.modes import cyclic_modes, spinning
 from rom.cyclic.sector import Complex, CyclicSector, each_diameter
@@ -83,9 +83,7 @@ class MistunedWheel:
         delta = np.asarray(deviations, dtype=float)
         N = self.sector.n_sectors
         if delta.shape[-1:] != (N,) or not np.isfinite(delta).all() or delta.min() <= -1.0:
-            raise ConfigError(
-                f"deviations of the shape {delta.shape}: give {N} numbers above -1, one per blade."
-            )
+            raise ConfigError(f"deviations {delta.shape}; give {N} above -1, one per blade.")
         waves = np.fft.ifft(delta, axis=-1)  # 1/N sum_j delta_j exp(+i k j alpha)
         k = (self.harmonics[None, :] - self.harmonics[:, None]) % N
         return waves[..., k] * self.blade + np.diag(self.omega**2)
@@ -103,7 +101,10 @@ class MistunedWheel:
         """
         lam, V = np.linalg.eigh(self.stiffness(deviations))
         if lam.min() < -1e-9 * lam.max():
-            raise ModelError("blades with these deviations leave a motion without stiffness.")
+            raise ModelError(
+                "blades with these deviations leave a motion without stiffness.",
+                hint=f"The least deviation is {np.min(deviations):g}; take smaller ones.",
+            )
         kept = lowest(n)
         return Modes(np.sqrt(np.maximum(lam[..., kept], 0.0)), V[..., kept])
 
@@ -185,10 +186,7 @@ class MistunedWheel:
     def _drive(self, force: npt.ArrayLike | Complex, engine_order: int) -> Complex:
         """(r,) force on each wave: N times that on its sector, if the harmonics agree."""
         f = np.asarray(force)
-        if f.shape != (self.sector.n,):
-            raise ConfigError(
-                f"the force has the shape {f.shape}, the sector {self.sector.n} dofs."
-            )
+        one_each("forces", f.shape, "dofs of the sector", (self.sector.n,))
         N = self.sector.n_sectors
         met = (self.harmonics - engine_order) % N == 0
         return np.where(met, N * (self.shapes.conj().T @ f), 0.0)

@@ -31,7 +31,7 @@ def by_region(material: Any, regions: dict[str, int]) -> dict[int, Solid]:
         return dict.fromkeys(regions.values(), material)
     if not isinstance(material, dict):
         raise MaterialError(
-            f"material = {material!r} is neither Material, Orthotropic nor a dictionary of them."
+            f"material = {material!r} must be a Material, Orthotropic or dictionary."
         )
     if unknown := [name for name in material if name not in regions]:
         raise MaterialError(
@@ -39,7 +39,7 @@ def by_region(material: Any, regions: dict[str, int]) -> dict[int, Solid]:
         )
     for name, value in material.items():
         if not isinstance(value, Solid):
-            raise MaterialError(f"the material of region {name!r} is {value!r}.")
+            raise MaterialError(f"material[{name!r}] = {value!r} must be a rom.Material.")
     if missing := sorted(set(regions) - set(material)):
         raise TagError(
             f"the region {named(missing)} has no material; materials are given for "

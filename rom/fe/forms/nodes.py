@@ -57,7 +57,7 @@ def interface(name: str, tags: Any, V: Any, points: Array) -> Interface:
     """
     comm, facets = V.mesh.comm, tags.indices
     if comm.allreduce(facets.size) == 0:
-        raise InterfaceError(f"the interface {name!r} has no facet: its surface is empty.")
+        raise InterfaceError(f"the interface {name!r} has no facet; use tags of the mesh.")
     nodes = _nodes(V, facets)
     nodes = nodes[by_position(points[nodes], np.ptp(points, axis=0).max())]
     S = _surface_mass(V, facets, nodes)

@@ -20,7 +20,7 @@ from rom.fe.mesh.sources.abaqus import SIDES
 from rom.fe.mesh.sources.deck import DECK_EDGES
 from rom.fe.mesh.topology import row_ids
 from rom.model import Index, Orthotropic
-from rom.names import ORIGIN_MARK, named, offered
+from rom.names import ORIGIN_MARK, check_known
 
 STEPS = {
     "frequencies": "*FREQUENCY\n{n}",
@@ -61,10 +61,9 @@ def input_deck(
         TagError: if a region has no material, or a name is none for a deck.
     """
     one_of("step", step, STEPS)
-    if missing := sorted(set(fixed) - set(mesh.facets)):
-        raise InterfaceError(
-            f"{named(missing)} cannot be held; the interfaces are {offered(mesh.facets)}."
-        )
+    for name in fixed:
+        text = f"{name!r} cannot be held; there are"
+        check_known(name, mesh.facets, text, InterfaceError)
     _check_names(mesh.region_names.values())
     _check_names(mesh.facets)
     mesh = _of_degree(mesh, degree)
@@ -83,7 +82,7 @@ def _of_degree(mesh: SolidMesh, degree: int) -> SolidMesh:
     if degree not in (1, 2):
         raise ConfigError(f"degree = {degree!r}; decks have elements of degree 1 or 2.")
     if degree == 1 and mesh.cell_type == "tet10":
-        raise MeshError("the mesh has curved edges, which elements of degree 1 do not.")
+        raise MeshError("the mesh has curved edges, which need degree=2.")
     return _with_edges(mesh) if degree == 2 and mesh.cell_type == "tet4" else mesh
 
 
@@ -182,5 +181,5 @@ def _check_names(names: Iterable[str]) -> None:
                 hint="It begins with a letter, followed by at most 79 letters, digits, _, - or .",
             )
         if name.upper() in seen:
-            raise TagError(f"{name!r} is the name of another set: decks have no small letters.")
+            raise TagError(f"{name!r} names two sets; use another, decks have no small letters.")
         seen.add(name.upper())

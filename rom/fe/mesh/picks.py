@@ -99,9 +99,9 @@ def _number(number: int) -> Pick:
 
 def _checked(pick: Pick) -> Pick:
     if pick.kind == "radius" and not pick.values[0] > 0:
-        raise ConfigError(f"{pick.text!r} is no face: a radius is a positive length [m].")
+        raise ConfigError(f"{pick.text!r} is no face: its radius must be positive [m].")
     if pick.kind == "normal" and not any(pick.values):
-        raise ConfigError(f"{pick.text!r} is no face: a normal has a direction.")
+        raise ConfigError(f"{pick.text!r} is no face: a normal needs a direction, such as 0,0,1.")
     return pick
 
 

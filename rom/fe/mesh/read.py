@@ -274,7 +274,7 @@ def _reader(path: Path) -> str:
         return READERS[path.suffix.lower()]
     except KeyError:
         raise ConfigError(
-            f"no reader for the suffix {path.suffix!r}; readable are {sorted(READERS)}.",
+            f"no reader for the suffix {path.suffix!r}; known are {sorted(READERS)}.",
             where=str(path),
         ) from None
 
@@ -288,7 +288,7 @@ def _check_request(path: Path, request: dict[str, Any], scale: float) -> None:
     reader = request["reader"]
     if request["parameters"] and reader not in GEOMETRIES:
         raise ConfigError(
-            f"a finished mesh has no parameters, got {sorted(request['parameters'])}.",
+            f"a finished mesh takes no parameters, got {sorted(request['parameters'])}.",
             where=str(path),
         )
     if request["faces"] and reader != "step":
@@ -303,8 +303,7 @@ def _check_request(path: Path, request: dict[str, Any], scale: float) -> None:
             _check_pick(path, name, wanted)
     if request["order"] not in (None, 1, 2) or (request["order"] and reader not in GEOMETRIES):
         raise ConfigError(
-            f"order={request['order']!r}: the geometry has degree 1 or 2, and can be chosen only "
-            "when the mesh is made here.",
+            f"order={request['order']!r} must be 1 or 2, or None where the file is a mesh.",
             where=str(path),
         )
     if not (np.isscalar(scale) and np.isfinite(scale) and scale > 0):

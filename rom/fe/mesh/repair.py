@@ -76,7 +76,7 @@ def _complete(mesh: SolidMesh) -> SolidMesh:
     """27-node hexahedra with the same geometry as the 20-node ones: the new nodes are on it."""
     kind, cells, x = CELL_TYPES["hex27"], mesh.cells, mesh.points
     if cells.shape[1] != len(HEX20_NODES):
-        raise MeshError(f"a 20-node hexahedron has 20 nodes, got {cells.shape[1]}.")
+        raise MeshError(f"a 20-node hexahedron needs 20 nodes, got {cells.shape[1]}.")
     n, m = x.shape[0], cells.shape[0]
     faces = cells[:, np.array(kind.faces)]
     number, n_faces = row_ids(np.sort(faces.reshape(-1, 4), axis=1), n)

@@ -58,12 +58,10 @@ def _refuse(mesh: SolidMesh, bad: Mask, text: Callable[[int], str], hint: str) -
 
 def _check_tables(mesh: SolidMesh) -> None:
     if mesh.cell_type not in CELL_TYPES:
-        raise MeshError(
-            f"cells of type {mesh.cell_type!r} are not supported; {sorted(CELL_TYPES)} are."
-        )
+        raise MeshError(f"{mesh.cell_type!r} is no type of cells; known are {sorted(CELL_TYPES)}.")
     kind, m = mesh.kind, mesh.cells.shape[0]
     if not m:
-        raise MeshError("there are no volume cells: the geometry is not meshed.")
+        raise MeshError("there are no volume cells; mesh in 3D, or give the .geo or .step file.")
     shapes = {
         "points": (mesh.points.shape[1:], (3,)),
         "cells": (mesh.cells.shape[1:], (kind.n_nodes,)),
@@ -96,7 +94,7 @@ def _check_numbers(mesh: SolidMesh) -> None:
         raise MeshError(f"the body has a size of {size:.3g} m.", hint="Check the scale.")
     for name, rows in mesh.facets.items():
         if rows.min() < 0 or rows.max() >= n:
-            raise TagError(f"surface {name!r} names nodes outside 0 to {n - 1}.")
+            raise TagError(f"surface {name!r} must name nodes from 0 to {n - 1} only.")
 
 
 def _check_cells(mesh: SolidMesh) -> None:
@@ -205,12 +203,12 @@ def _check_names(mesh: SolidMesh) -> None:
 def _check_regions(mesh: SolidMesh) -> None:
     used = {int(r) for r in np.unique(mesh.regions)}
     if nameless := sorted(used - mesh.region_names.keys()):
-        raise TagError(f"there is no name for region {named(nameless)}, which has cells.")
+        raise TagError(f"region {named(nameless)} has cells and needs a name in region_names.")
     if unused := sorted(name for tag, name in mesh.region_names.items() if tag not in used):
-        raise TagError(f"region {named(unused)} has no cells.")
+        raise TagError(f"region {named(unused)} needs cells; leave the name out without.")
     names = list(mesh.region_names.values())
     if double := sorted({name for name in names if names.count(name) > 1}):
-        raise TagError(f"the name {named(double)} stands for several regions.")
+        raise TagError(f"the name {named(double)} stands for several regions; each needs its own.")
 
 
 def checked(mesh: SolidMesh, remarks: Sequence[str] = ()) -> SolidMesh:

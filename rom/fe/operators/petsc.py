@@ -16,7 +16,7 @@ import numpy.typing as npt
 from scipy.sparse import csr_matrix
 
 from rom.eigen.place import moves_most
-from rom.eigen.scipy import dof_set
+from rom.eigen.scipy import ENTRY_HINT, dof_set
 from rom.eigen.search import N_SPARE_MODES, ModeSearch
 from rom.eigen.verbs import Weighted
 from rom.errors import ConfigError, SolverError
@@ -80,7 +80,7 @@ class PETScOperators(ModeSearch):
         self.last = self.comm.rank == self.comm.size - 1
         for name, A in (("K", K), ("M", M)):
             if not np.isfinite(A.norm()):
-                raise SolverError(f"{name} has an entry that is not finite.")
+                raise SolverError(f"{name} has an entry that is not finite.", hint=ENTRY_HINT)
         if fixed is None:
             fixed = fixed_vector(self.comm, rigid, self.first, self.n_local)
         self.fixed = fixed

@@ -64,12 +64,14 @@ class Function:
             ConfigError: if this is no motion per force.
         """
         if self.kind != FREQUENCY_RESPONSE or self.denominator != FORCE_TYPE:
-            raise ConfigError(f"{_name(self)}: the function is no response to a force.")
+            raise ConfigError(f"{_name(self)}: the function must be a response to a force.")
         if self.numerator not in PER_RECEPTANCE:
-            raise ConfigError(f"{_name(self)}: its numerator {self.numerator} is no motion.")
+            raise ConfigError(
+                f"{_name(self)}: {self.numerator} must be of {sorted(PER_RECEPTANCE)}."
+            )
         power = PER_RECEPTANCE[self.numerator]
         if power and not self.x.all():
-            raise ConfigError(f"{_name(self)}: no displacement follows from motion at 0 Hz.")
+            raise ConfigError(f"{_name(self)}: displacements need frequencies > 0 Hz.")
         return np.asarray(self.y / (2j * np.pi * self.x) ** power, dtype=np.complex128)
 
 
@@ -148,7 +150,7 @@ def assemble(
         f = known[wanted]
         x = x if columns else f.x
         if f.x.shape != x.shape or not np.allclose(f.x, x, rtol=1e-5, atol=0):
-            raise ConfigError(f"{_name(f)} has other frequencies than those before.")
+            raise ConfigError(f"{_name(f)} needs the frequencies of those before.")
         sign = np.sign(f.response[1]) * np.sign(f.reference[1])
         columns.append(sign * f.receptance())
     H = np.array(columns).reshape(len(responses), len(references), -1)

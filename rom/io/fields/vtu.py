@@ -14,7 +14,7 @@ from rom.body.recovery import von_mises
 from rom.errors import ConfigError
 from rom.io.files import write_whole
 from rom.model import Array, Index
-from rom.names import ORIGIN_MARK
+from rom.names import ORIGIN_MARK, check_ending
 
 VTK_TRIANGLE = 5  # number of this cell type
 TYPES = {"<f8": "Float64", "<i8": "Int64", "|u1": "UInt8"}
@@ -32,7 +32,7 @@ def write_vtu(body: FlexibleBody, path: str | Path) -> Path:
         ResourceError: if the disk is full.
     """
     if body.surface is None:
-        raise ConfigError(f"body {body.name!r} has no surface to draw.")
+        raise ConfigError(f"body {body.name!r} has no surface; to be drawn it needs a meshed one.")
     text = _document(body)
     write_whole(path, lambda file: file.write(text.encode()))
     return Path(path)
@@ -85,9 +85,7 @@ def write_stress_history(
         ResourceError: if the disk is full.
     """
     whole("every", every, 1)
-    path = Path(path)
-    if path.suffix != ".pvd":
-        raise ConfigError(f"{path} does not end in .pvd.")
+    path = check_ending(path, "a motion", ".pvd")
     part = solution.mechanism.part(body)
     folder, lines = path.with_suffix(""), []
     for k in range(0, solution.t.size, every):

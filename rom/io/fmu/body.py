@@ -61,7 +61,7 @@ def write_body_fmu(body: FlexibleBody, path: str | Path, *, fixed: tuple[str, ..
         raise ConfigError(f"body {body.name!r} {what}; an FMU needs interfaces and SI units.")
     omega, V = body.modes(fixed=fixed)
     if not omega.size:
-        raise ConfigError(f"body {body.name!r} cannot move with {fixed!r} held.")
+        raise ConfigError(f"body {body.name!r} cannot move with {fixed!r} held; leave one free.")
     first = omega[omega > 0.0][:1] / (2 * np.pi)
     step = 1.0 / (STEPS_PER_PERIOD * float(first[0])) if first.size else 1e-3
     about = f"Small motions of the flexible body {path.stem}, inputs held over a step."

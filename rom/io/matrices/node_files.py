@@ -46,7 +46,7 @@ def _node_file(path: Path) -> tuple[Index, Array]:
     if ending in CARDS:
         return read_grids(path)
     if ending not in (".inp", ".csv"):
-        raise ConfigError(f"nodes are read from .inp, .bdf, .dat or .csv, not from {path}.")
+        raise ConfigError(f"{path}: nodes must come from .inp, .bdf, .dat or .csv.")
     return _deck(path).placed() if ending == ".inp" else _table(path)
 
 

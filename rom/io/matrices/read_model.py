@@ -9,7 +9,7 @@ import numpy.typing as npt
 from scipy.sparse import csr_matrix, identity, kron
 from scipy.spatial import cKDTree
 
-from rom.arguments import typed
+from rom.arguments import symmetric, typed
 from rom.errors import ConfigError, FileFormatError, InterfaceError, ModelError, QualityGateError
 from rom.io.matrices.dmig import Dofs
 from rom.io.matrices.matrix_files import NamedMatrix, read_matrix
@@ -146,8 +146,7 @@ def _completed(found: NamedMatrix) -> csr_matrix:
     A = csr_matrix(A + A.T - A.T.multiply(both))
     if not A.nnz:
         raise FileFormatError("the matrix is empty.", where=found.where)
-    if abs(A - A.T).max() > ASYMMETRY_RTOL * abs(A).max():
-        raise QualityGateError("the matrix is not symmetric.", where=found.where)
+    symmetric("the matrix", A, ASYMMETRY_RTOL, where=found.where)
     return csr_matrix(0.5 * (A + A.T))
 
 
@@ -156,13 +155,13 @@ def _interface(name: str, wanted: npt.ArrayLike, labels: Index, points: Array) -
         own = np.unique(np.asarray(wanted, dtype=np.int64))
     except (TypeError, ValueError, OverflowError):
         raise InterfaceError(
-            f"interface {name!r}: {repr(wanted)[:MOST_SHOWN]} are no labels of nodes."
+            f"interface {name!r}: {repr(wanted)[:MOST_SHOWN]} must be labels of nodes."
         ) from None
     node = np.searchsorted(labels, own)
     known = labels[np.minimum(node, labels.size - 1)] == own
     if not own.size or not known.all():
         strange = own[~known][:MORE_NODES].tolist()
-        raise InterfaceError(f"interface {name!r} has no nodes, or unknown ones: {strange}.")
+        raise InterfaceError(f"interface {name!r} needs nodes of the model; unknown are {strange}.")
     node = node[np.lexsort(points[node].T[::-1])]
     weights = identity(node.size, format="csr") / node.size
     return Interface(name, node, points[node], weights, points[node].mean(axis=0))

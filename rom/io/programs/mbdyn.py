@@ -50,7 +50,7 @@ def write_mbdyn(body: FlexibleBody, path: str | Path) -> Path:
         )
     labels = ["_".join(name.split()) for name in body.markers]
     if len(set(labels)) < len(labels):
-        raise ConfigError(f"labels of nodes have no blanks, and {labels} are not distinct.")
+        raise ConfigError(f"interfaces need names that differ in more than blanks, got {labels}.")
     text = "\n".join(_document(body, labels)) + "\n"
     write_whole(path, lambda file: file.write(text.encode()))
     return Path(path)

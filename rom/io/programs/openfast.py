@@ -21,7 +21,7 @@ from rom.io.files import write_whole
 from rom.io.programs.interface_form import InterfaceForm, interface_form
 from rom.io.programs.openfast_reading import LOADING_LINE, Superelement
 from rom.model import Array
-from rom.names import ORIGIN_MARK, named
+from rom.names import ORIGIN_MARK, check_known
 
 VERSIONS = (4, 5)
 LOAD_DURATION = 1e5  # [s]; how long the loads of version 4 are constant
@@ -85,8 +85,8 @@ def superelement(
 
 def _rows(body: FlexibleBody, form: InterfaceForm, held: Sequence[str]) -> npt.NDArray[np.int64]:
     """Rows of the free interface, then of the modes."""
-    if unknown := sorted(set(held) - set(form.names)):
-        raise ConfigError(f"{named(unknown)} cannot be held; the interfaces are {form.names}.")
+    for name in held:
+        check_known(name, form.names, f"{name!r} cannot be held; there are")
     free = [name for name in form.names if name not in held]
     if len(free) != 1:
         raise ConfigError(

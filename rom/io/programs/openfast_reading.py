@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from rom.arguments import symmetric
 from rom.errors import FileFormatError, QualityGateError, UnsafeFileError
 from rom.io.files import check_readable
 from rom.model import Array
@@ -162,10 +163,8 @@ class _Reader:
 
 def _check(found: Superelement, path: str) -> None:
     for name in ("M", "K", "D"):
-        A = getattr(found, name)
-        if np.abs(A - A.T).max() > ASYMMETRY_RTOL * np.abs(A).max():
-            raise QualityGateError(f"the matrix {name} is not symmetric.", where=path)
+        symmetric(f"the matrix {name}", getattr(found, name), ASYMMETRY_RTOL, where=path)
     size = np.sqrt(np.abs(np.diag(found.M)))
     size[size == 0] = 1.0
     if np.linalg.eigvalsh(found.M / np.outer(size, size))[0] <= 0:
-        raise QualityGateError("the mass is not positive: some motion has no inertia.", where=path)
+        raise QualityGateError("the mass must be positive: some motion has no inertia.", where=path)

@@ -52,9 +52,9 @@ def write_radioss(
         )
     labels = dict(nodes) if nodes else {name: k for k, name in enumerate(form.names, 1)}
     if set(labels) != set(form.names) or len(set(labels.values())) < len(labels):
-        raise ConfigError(f"nodes {labels} are not one for each interface of {form.names}.")
+        raise ConfigError(f"nodes {labels} must be one label for each interface of {form.names}.")
     if not all(0 < label < 10**10 for label in labels.values()):
-        raise ConfigError(f"labels of nodes have 1 to 10 digits, got {labels}.")
+        raise ConfigError(f"labels of nodes must have 1 to 10 digits, got {labels}.")
     dofs = form.dofs.copy()
     dofs[:, 0] = np.repeat([labels[name] for name in form.names], 6)
     return write_dmig({"KAAX": form.K, "MAAX": form.M}, dofs, path)

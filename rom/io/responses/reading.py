@@ -58,7 +58,7 @@ def read_responses(
         from rom.io.responses.arrays import read
 
         if averages is not None or coherence is not None or points is not None:
-            raise ConfigError(f"{path} says averages, coherence and points itself.")
+            raise ConfigError(f"{path} says averages, coherence and points itself; leave them out.")
         with _of(path):
             return read(path)
     if ending not in UNIVERSAL_ENDINGS + TABLE_ENDINGS:
@@ -142,4 +142,4 @@ def _points(path: str | Path | None) -> tuple[dict[int, Array], dict[int, str]]:
 
 
 def _unknown(path: Path, known: tuple[str, ...]) -> ConfigError:
-    return ConfigError(f"{path}: the ending is not one of {', '.join(known)}.")
+    return ConfigError(f"{path}: the ending must be one of {', '.join(known)}.")

@@ -94,6 +94,6 @@ def motion_per_force(text: str) -> tuple[int, float]:
     """
     motion, slash, force = plain(text).rpartition("/")
     if not slash:
-        raise ConfigError(f"the unit {text!r} is no motion per force, as m/s^2/N.")
+        raise ConfigError(f"the unit {text!r} must be one of a motion per force, as m/s^2/N.")
     kind, factor = motion_of_unit(motion)
     return kind, factor / force_of(force)

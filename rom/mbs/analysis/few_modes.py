@@ -59,7 +59,7 @@ class Wanted:
         if band is None:
             return cls(whole("n", n, 1))
         if n is not None:
-            raise ConfigError("n and band: give one of them.")
+            raise ConfigError("at most one of n and band must be given.")
         low, high = finite("band", band, (2,))
         if not 0 <= low < high:
             raise ConfigError(f"band = ({low:g}, {high:g}) Hz must be two growing frequencies.")
@@ -72,9 +72,7 @@ class Wanted:
             ConfigError, ModelError: if there are none, or fewer.
         """
         if self.n > roots.size:
-            raise ConfigError(
-                f"n = {self.n}, but the joints leave {roots.size} motions and as many modes."
-            )
+            whole("n", self.n, 1, roots.size, reason="the motions that the joints leave")
         low, high = self.band
         kept = np.flatnonzero((roots.imag >= low) & (roots.imag < high))
         if not kept.size:
@@ -91,7 +89,10 @@ class Wanted:
         middle = 0.5 * sum(self.band)
         found = sorted(sorted(np.unique(near), key=lambda w: abs(w - middle))[:2])
         modes = " and ".join(f"{w / (2 * np.pi):.6g}" for w in found)
-        raise ModelError(f"no mode lies between {low:g} and {high:g} Hz; near are {modes} Hz.")
+        raise ModelError(
+            f"no mode lies between {low:g} and {high:g} Hz; near are {modes} Hz.",
+            hint="Widen band.",
+        )
 
 
 @dataclass(frozen=True)

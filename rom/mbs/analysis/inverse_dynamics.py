@@ -49,8 +49,6 @@ def inverse_dynamics(mechanism: Mechanism, t: npt.ArrayLike, *, assemble: bool =
         ModelError: if motions stay free, or joints and drives contradict each other.
         SolverError: if a drive or load is not finite.
     """
-    if not isinstance(mechanism, Mechanism):
-        raise ConfigError(f"{mechanism!r} is no Mechanism.")
     times = np.array(t, dtype=float)
     if times.ndim != 1 or times.size < 2 or not (np.diff(times) > 0).all():
         raise ConfigError(f"t must hold at least two ascending times, got {np.shape(t)}.")
@@ -106,7 +104,7 @@ def _refuse_free(packed: Packed, state: State) -> None:
         )
     if rolls.any():
         raise ModelError(
-            "rolling prescribes velocities, not positions: simulate the motion.",
+            "rolling prescribes velocities, not positions; use rom.simulate instead.",
             where=packed.row_owner[int(np.argmax(rolls))],
         )
 

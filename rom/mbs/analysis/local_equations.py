@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from scipy.linalg import solve_triangular
 
+from rom.arguments import number
 from rom.errors import ConfigError, ModelError, SolverError
 from rom.mbs.equations.equations import (
     evaluate,
@@ -228,9 +229,8 @@ def instant(mechanism: Any, t: float, *, sparse: bool | None = False) -> Instant
         SolverError: if a drive or load is not finite.
     """
     if not isinstance(mechanism, Mechanism):
-        raise ConfigError(f"{mechanism!r} is no Mechanism.")
-    if not np.isfinite(t):
-        raise ConfigError(f"t = {t!r} is no time.")
+        raise ConfigError(f"{mechanism!r} must be a rom.Mechanism.")
+    number("t", t)
     packed = pack(mechanism, whole=sparse is False)
     if sparse is None:
         sparse = packed.v.size > MAX_DENSE

@@ -144,7 +144,7 @@ def transmissibility(
 
 def _refuse_moving(state: State) -> None:
     if state.v.any():
-        raise ModelError("transmissibility is that of a mechanism at rest; this one moves.")
+        raise ModelError("transmissibility needs rest; give the state of rom.equilibrium.")
 
 
 @dataclass(frozen=True)
@@ -227,7 +227,11 @@ def _infinite(f: float) -> SolverError:
 
 
 def _blocked(drive: str) -> ModelError:
-    return ModelError("the other joints do not let this drive move.", where=drive)
+    return ModelError(
+        "the other joints do not let this drive move.",
+        where=drive,
+        hint="Take out the joint that holds it, or drive another one.",
+    )
 
 
 def _forced(G: Array, packed: Any, drive: str, scale: Array) -> Array:

@@ -172,13 +172,13 @@ def motion_sensitivity(result: Callable[..., Any], parameters: Mapping[str, floa
 def _checked(parameters: Mapping[str, float], **called: Callable[..., Any]) -> dict[str, float]:
     """The parameters, if there are some and a function takes them by name."""
     if not parameters:
-        raise ConfigError(f"parameters = {parameters!r} is no {{name: value}}.")
+        raise ConfigError(f"parameters = {parameters!r} must be {{name: value}}.")
     for name, function in called.items():
         try:
             signature(function).bind(**parameters)
         except TypeError as error:
             raise ConfigError(
-                f"{name} does not take the parameters {sorted(parameters)}: {error}."
+                f"{name} must take the parameters {sorted(parameters)} by name: {error}."
             ) from error
         except ValueError:  # written in C, without a signature
             continue
@@ -195,7 +195,7 @@ def _rest(
     mechanism = build(**values)
     state = equilibrium(mechanism, **options)
     if state.v.any():
-        raise ModelError("sensitivities are those of an equilibrium at rest; this one spins.")
+        raise ModelError("sensitivities need an equilibrium at rest; leave spin out.")
     return mechanism, state
 
 
@@ -207,7 +207,7 @@ def _path(build: Builder, values: dict[str, float], name: str, state: State) -> 
         mechanism = build(**{**values, name: values[name] + sign * step})
         now = instant(mechanism, state.t)
         if (now.packed.q.size, now.W.value.size) != (state.q.size, state.lam.size):
-            raise ConfigError(f"the mechanism has other bodies or joints for another {name!r}.")
+            raise ConfigError(f"bodies and joints must be the same for another {name!r}.")
         now.W.base[:] = state.base
         sides.append((sign, mechanism, now))
     tangent = Tangent.of(instant(build(**values), state.t), state, AT_REST)
@@ -280,7 +280,7 @@ def _ridders(
     for _ in range(MAX_HALVINGS):
         ends = [np.asarray(result(**{**values, name: values[name] + x})) for x in (-step, step)]
         if ends[0].shape != ends[1].shape:
-            raise ConfigError(f"the result has another shape for another {name!r}.")
+            raise ConfigError(f"the result must have the same shape for another {name!r}.")
         slope = (ends[1] - ends[0]) / (2 * step)
         if last is not None:
             better = slope + (slope - last[0]) / 3

@@ -52,9 +52,7 @@ def ends_of(whole: Whole, name: str, m1: Marker, m2: Marker) -> Ends:
         ConfigError: for a name in use, markers that do not exist, or one body with itself.
     """
     whole.check_new(name)
-    whole.check_markers(name, m1, m2)
-    if m1.body == m2.body:
-        raise ConfigError(f"joint {name!r} connects body {m1.body!r} with itself.")
+    whole.check_apart(name, m1, m2)
     A1, A2 = (rotation.matrix(whole.part(m.body).p) for m in (m1, m2))
     return Ends(name, (m1, m2), (A1, A2), whole.design_point(m2) - whole.design_point(m1))
 
@@ -84,5 +82,5 @@ def not_zero(name: str, value: float) -> float:
     """A finite number that is not zero."""
     x = number(name, value)
     if x == 0.0:
-        raise ConfigError(f"{name} = 0: it would lock the joint instead of coupling it.")
+        raise ConfigError(f"{name} = 0 would lock the joint instead of coupling it; give another.")
     return x

@@ -42,7 +42,7 @@ def gear(
         coordinate_of(self.joints, j, c, "gear") for j, c in zip(names, wanted, strict=True)
     )
     if rows[0] is rows[1]:
-        raise ConfigError(f"gear {name!r} couples joint {joint1!r} with itself.")
+        raise ConfigError(f"gear {name!r} couples {joint1!r} with itself; give two coordinates.")
     terms = ((rows[1], 1.0), (rows[0], -not_zero("ratio", ratio)))
     row = Row(COUPLING, NO_VECTOR, NO_VECTOR, NO_VECTOR, terms=terms)
     markers = (*self.joints[joint2].markers, *self.joints[joint1].markers)

@@ -47,7 +47,7 @@ def rolling(
     up = ends.direction("normal", normal)
     spin = None if axis is None else ends.direction("axis", axis)
     if spin is not None and abs(up @ spin) > FLAT_COSINE:
-        raise ConfigError(f"the wheel of joint {name!r} lies flat on its plane: it cannot roll.")
+        raise ConfigError(f"the wheel of {name!r} lies flat; give an axis along the plane.")
     t = ends.triad(up)
     n, s = t.one[:, 2], NO_VECTOR if spin is None else ends.frames[1].T @ spin
     touch = Row(TOUCH, n, s, n, radius=radius)

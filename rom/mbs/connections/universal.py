@@ -38,8 +38,6 @@ def universal(
     ends = ends_of(self, name, m1, m2)
     one, two = ends.direction("axis1", axis1), ends.direction("axis2", axis2)
     if abs(one @ two) > NORMAL_ATOL:
-        raise ConfigError(
-            f"the axes of joint {name!r} are not perpendicular: cosine {one @ two:.3g}."
-        )
+        raise ConfigError(f"axes of joint {name!r} must be perpendicular: cosine {one @ two:.3g}.")
     cross = Row(NORMAL, ends.frames[0].T @ one, ends.frames[1].T @ two, NO_VECTOR)
     enter(self, Joint(name, "universal", ends.markers, (*coincidence(), cross)))

@@ -15,7 +15,7 @@ import numpy.typing as npt
 from scipy.interpolate import PchipInterpolator
 
 from rom import rotation
-from rom.arguments import finite, unit_quaternion
+from rom.arguments import finite, one_of, unit_quaternion
 from rom.errors import ConfigError
 from rom.mbs.elements.family import Family, Places, integers, rows_of
 from rom.mbs.kernels.algebra import (
@@ -89,8 +89,7 @@ def bushing(  # noqa: PLR0913  one keyword per property
     Raises:
         ConfigError: for matrices without an energy, or tables that do not ascend.
     """
-    if m1.body == m2.body:
-        raise ConfigError(f"bushing {name!r} connects body {m1.body!r} with itself.")
+    self.check_apart(name, m1, m2)
     world = rotation.matrix(unit_quaternion(axes))
     A1, A2 = (rotation.matrix(self.part(m.body).p) for m in (m1, m2))
     gap = self.design_point(m2) - self.design_point(m1)
@@ -113,14 +112,13 @@ def _matrix66(name: str, value: Any) -> Array:
             "mech.law, of which docs/laws.md has this one.",
         )
     if np.linalg.eigvalsh(A)[0] < -1e-9 * size:
-        raise ConfigError(f"{name} is negative in some direction: it would drive the motion.")
+        raise ConfigError(f"{name} must not be negative in a direction: it would drive the motion.")
     return 0.5 * (A + A.T)
 
 
 def _curve(name: str, direction: str, table: Any) -> tuple[int, Array]:
     """Direction and pieces (n, 7) of a tabulated force, see `Bushings`."""
-    if direction not in DIRECTIONS:
-        raise ConfigError(f"curve {direction!r} of bushing {name!r}: it is one of {DIRECTIONS}.")
+    one_of(f"curve of bushing {name!r}", direction, DIRECTIONS)
     n = np.size(table[0])
     x, force = (finite(f"curve {direction} of {name}", values, (n,)) for values in table)
     if n < 2 or np.diff(x).min() <= 0.0:

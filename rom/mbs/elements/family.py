@@ -328,6 +328,6 @@ def check_family(name: str, element: Any, family: Family) -> None:
     """
     if not isinstance(element, family.record):
         raise ConfigError(
-            f"element = {element!r} of {name!r} is no {family.record.__name__}, of which the "
-            f"{family.name} are."
+            f"element = {element!r} of {name!r} must be of type {family.record.__name__}, as all "
+            f"{family.name}."
         )

@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from rom.arguments import number, positive
+from rom.arguments import not_negative, number, positive
 from rom.errors import ConfigError
 from rom.mbs.elements.family import Family, Places, apart, integers, on_joint, rows_of
 from rom.mbs.kernels.compiled import inner
@@ -65,13 +65,12 @@ def friction(  # noqa: PLR0913  one keyword per property
     """
     row = coordinate_of(self.joints, joint, coordinate, "friction")
     for what, value in (("coulomb", coulomb), ("mu", mu), ("viscous", viscous)):
-        if number(what, value) < 0.0:
-            raise ConfigError(f"{what} of friction {name!r} is {value:g}: it must not drive.")
+        not_negative(f"{what} of friction {name!r}", value)
     turns = row is self.joints[joint].turn
     if mu and turns and radius is None:
         raise ConfigError(f"friction {name!r} with mu on an angle needs the radius of the pin.")
     if radius is not None and not turns:
-        raise ConfigError(f"friction {name!r} acts along a displacement: it has no radius.")
+        raise ConfigError(f"friction {name!r} acts along a displacement; leave radius out.")
     if number("static", static) < 1.0 or (static > 1.0 and stribeck_speed is None):
         raise ConfigError(
             f"static = {static:g} of friction {name!r} must be at least 1, and above 1 it "

@@ -130,7 +130,7 @@ def law(  # noqa: PLR0913  one keyword per property
     given = finite(f"parameters of {name}", parameters, (np.size(parameters),))
     kept = finite(f"memory of {name}", memory, (np.size(memory),))
     if not markers:
-        raise ConfigError(f"law {name!r} acts on no marker.")
+        raise ConfigError(f"law {name!r} needs a marker to act on.")
     sizes = len(markers), kept.size, len(outputs)
     called = entries(name, (function, tangents), (given.size, *sizes), compiled)
     element = Law(function, tangents, markers, given, kept, tuple(outputs), energy, called)
@@ -139,9 +139,7 @@ def law(  # noqa: PLR0913  one keyword per property
 
 def _check_function(what: str, function: Any, name: str) -> None:
     if not callable(function) and not hasattr(function, "address"):
-        raise ConfigError(
-            f"{what} = {shortened(function)} of law {name!r} is no function and has no address."
-        )
+        raise ConfigError(f"{what} = {shortened(function)} of {name!r} must be a function.")
 
 
 def user_force(

@@ -6,8 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from rom.arguments import finite
-from rom.errors import ConfigError
+from rom.arguments import finite, one_of
 from rom.mbs.elements.family import Family, Places, apart, from_outside, integers, rows_of
 from rom.mbs.kernels.algebra import add, cross, dot, place, put, row, scale, turn, unit
 from rom.mbs.kernels.compiled import inner
@@ -51,8 +50,7 @@ def torque(self: Whole, name: str, marker: Marker, vector: Any, *, frame: str = 
 
 
 def _load(self: Whole, name: str, marker: Marker, vector: Any, frame: str, kind: int) -> None:
-    if frame not in ("world", "body"):
-        raise ConfigError(f"frame of {name!r} is {frame!r}; it is 'world' or 'body'.")
+    one_of(f"frame of {name!r}", frame, ("world", "body"))
     function = vector if callable(vector) else None
     constant = np.zeros(3) if function else finite(f"vector of {name}", vector, (3,))
     self.add(name, Load(marker, kind + (frame == "body"), constant, function), LOADS_FAMILY)

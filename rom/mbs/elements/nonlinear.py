@@ -30,7 +30,7 @@ from numba import types
 from numba.extending import intrinsic
 
 from rom import rotation
-from rom.arguments import finite, start_pose, typed
+from rom.arguments import finite, start_pose, typed, whole
 from rom.errors import ConfigError, ModelError
 from rom.mbs.compiler.calls import called
 from rom.mbs.elements.family import Family, Places, integers, on_joint
@@ -154,8 +154,8 @@ class Assembly:
                 f"body {self.name!r} has no marker {place!r}; it has "
                 f"{offered(self.body.places, place)} and frames 0 to {len(self.parts) - 1}."
             )
-        if not -len(self.parts) <= frame < len(self.parts):
-            raise ConfigError(f"body {self.name!r} has {len(self.parts)} frames, no {frame}.")
+        n = len(self.parts)
+        whole(f"frame of body {self.name!r}", frame, -n, n - 1)
         return self.parts[frame].marker((0.0, 0.0, 0.0))
 
     @property
@@ -239,14 +239,16 @@ def _check(name: str, body: Any) -> None:
             where=name,
         )
     if np.abs(np.linalg.norm(frames.p, axis=1) - 1.0).max() > QUATERNION_ATOL:
-        raise ModelError("a quaternion of a frame has not the length one.", where=name)
+        raise ModelError("each quaternion of a frame must have the length one.", where=name)
     for group in body.elements:
         if group.frames.ndim != 2 or len(group.frames) != len(group.numbers):
-            raise ModelError("elements and their numbers differ in number.", where=name)
+            raise ModelError(
+                "frames (e, k) and numbers must be of the same e elements.", where=name
+            )
         if group.frames.min(initial=0) < 0 or group.frames.max(initial=0) >= n:
-            raise ModelError(f"an element connects a frame beyond the {n} there are.", where=name)
+            raise ModelError(f"elements must connect frames from 0 to {n - 1}.", where=name)
         if not group.address:
-            raise ModelError("elements have no compiled law.", where=name)
+            raise ModelError("elements need a compiled law; give its address.", where=name)
 
 
 @table

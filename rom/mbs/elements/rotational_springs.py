@@ -4,14 +4,13 @@ from dataclasses import dataclass
 from typing import Any
 
 from rom.arguments import number
-from rom.errors import ConfigError
 from rom.mbs.elements.family import Family, Places, apart, integers, on_joint, rows_of
 from rom.mbs.elements.springs import stiffness_and_damping
 from rom.mbs.kernels.compiled import inner
 from rom.mbs.kernels.coordinates import coordinate_tangent, push_coordinate
 from rom.mbs.kernels.element_calls import energy, residuals, tangents
 from rom.mbs.kernels.tables import Array2, Index1, Table, table
-from rom.mbs.parts.joints import joint_with_axis
+from rom.mbs.parts.joints import coordinate_of
 from rom.mbs.parts.whole import Whole
 
 
@@ -46,8 +45,7 @@ def rotational_spring(
     Raises:
         ConfigError: for a name in use, or a joint that is unknown or does not turn.
     """
-    if joint_with_axis(self.joints, joint, "rotational spring").turn is None:
-        raise ConfigError(f"joint {joint!r} does not turn: no rotational spring {name!r}.")
+    coordinate_of(self.joints, joint, "angle", f"rotational spring {name!r}")
     k, c = stiffness_and_damping(name, stiffness, damping)
     self.add(name, Turn(joint, k, c, number("free_angle", free_angle)), TURNS_FAMILY)
 

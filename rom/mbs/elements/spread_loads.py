@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from rom.arguments import number
+from rom.arguments import number, one_of
 from rom.errors import ConfigError
 from rom.mbs.elements.family import (
     Family,
@@ -69,8 +69,7 @@ def spread_load(
         ConfigError: for a name in use, a load of another body, or a wrong frame or amplitude.
     """
     part = self.part(str(getattr(part, "name", part)))
-    if frame not in ("world", "body"):
-        raise ConfigError(f"frame of {name!r} is {frame!r}; it is 'world' or 'body'.")
+    one_of(f"frame of {name!r}", frame, ("world", "body"))
     shapes = getattr(load, "shapes", None)
     if shapes is None or shapes.shape != (part.r, 3, 3) or part.flexible is None:
         raise ConfigError(

@@ -6,8 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from rom.arguments import number
-from rom.errors import ConfigError
+from rom.arguments import not_negative, number
 from rom.mbs.elements.family import Family, Places, integers, rows_of
 from rom.mbs.kernels.algebra import add, dot, put, row, scale, sub, unit
 from rom.mbs.kernels.compiled import inner
@@ -54,10 +53,10 @@ def spring_damper(
         ConfigError: for a name in use, an unknown marker, or a length below zero.
     """
     gap = self.design_point(m2) - self.design_point(m1)
-    free = np.linalg.norm(gap) if free_length is None else number("free_length", free_length)
+    free = np.linalg.norm(gap)
+    if free_length is not None:
+        free = not_negative(f"free_length of {name!r}", free_length)
     k, c = stiffness_and_damping(name, stiffness, damping)
-    if free < 0.0:
-        raise ConfigError(f"free_length of {name!r} = {free:g} m: a length is not negative.")
     self.add(name, Spring(m1, m2, k, c, float(free)), SPRINGS_FAMILY)
 
 

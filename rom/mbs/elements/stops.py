@@ -55,7 +55,7 @@ def stop(
     if not limits:
         raise ConfigError(f"stop {name!r} has no limit.", hint="Give lower or upper.")
     if len(limits) == 2 and limits[0][1] > limits[1][1]:
-        raise ConfigError(f"stop {name!r}: the lower limit {lower:g} is above the upper {upper:g}.")
+        raise ConfigError(f"stop {name!r}: lower = {lower:g} must be at most upper = {upper:g}.")
     self.add(name, Stop(joint, row, tuple(limits), law), STOPS_FAMILY)
 
 

@@ -173,7 +173,9 @@ class Keeping:
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
-            raise ConfigError(f"{self.folder} cannot be made: {error.strerror}.") from error
+            raise ConfigError(
+                f"{self.folder} cannot be made: {error.strerror}.", hint="Choose another folder."
+            ) from error
         parts = self._parts
         if count > self._blocks:
             parts += 1

@@ -1,15 +1,14 @@
 """Settings of a run, and the record it fills."""
 
-import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from numbers import Real
 from time import perf_counter
 from typing import Any
 
 import numpy as np
 
+from rom.arguments import between, number, positive, whole
 from rom.errors import ConfigError, ResourceError
 from rom.mbs.equations.packing import Packed
 from rom.mbs.integrate.bdf import LARGEST_ORDER
@@ -60,26 +59,22 @@ class Settings:
             value = getattr(self, name)
             if name == "dt" and value is None:
                 continue
-            if not _is_finite(value):
-                raise ConfigError(f"{name} = {value!r} is not a finite number.")
-        if not isinstance(self.progress, bool):
-            raise ConfigError(f"progress = {self.progress!r} is neither True nor False.")
+            number(name, value)
+        for name in ("progress", "stabilised"):
+            if not isinstance(getattr(self, name), bool):
+                raise ConfigError(f"{name} = {getattr(self, name)!r} must be True or False.")
         if self.t_end <= self.t_start:
             raise ConfigError(
                 f"t_end = {self.t_end:g} s is not after {self.t_start:g} s.",
                 hint="It is the time at the end, not how long the motion lasts.",
             )
         for name in ("dt", "tolerance", "rtol", "atol"):
-            if getattr(self, name) is not None and getattr(self, name) <= 0.0:
-                raise ConfigError(f"{name} = {getattr(self, name):g} must be positive.")
-        if not TOLERANCES[0] <= self.tolerance <= TOLERANCES[1]:
-            raise ConfigError(
-                f"tolerance = {self.tolerance:g} is outside {TOLERANCES[0]:g} to {TOLERANCES[1]:g}."
-            )
-        if not 0.0 <= self.rho_inf <= 1.0:
-            raise ConfigError(f"rho_inf = {self.rho_inf:g} is outside [0, 1].")
+            if getattr(self, name) is not None:
+                positive(name, getattr(self, name))
+        between("tolerance", self.tolerance, *TOLERANCES)
+        between("rho_inf", self.rho_inf, 0, 1)
         if int(self.save_every) != self.save_every or self.save_every < 1:
-            raise ConfigError(f"save_every = {self.save_every!r} is not a positive whole number.")
+            raise ConfigError(f"save_every = {self.save_every!r} must be a positive whole number.")
         self._check_kind()
         self._check_steps()
 
@@ -129,8 +124,7 @@ class Settings:
 
     def _check_kind(self) -> None:
         """Order and stabilisation must be offered by the method."""
-        if isinstance(self.order, bool) or self.order not in range(1, LARGEST_ORDER + 1):
-            raise ConfigError(f"order = {self.order!r} is not 1, 2, 3, 4 or 5.")
+        whole("order", self.order, 1, LARGEST_ORDER)
         if self.order != 2 and self.method != "bdf":
             raise ConfigError(
                 f"{self.method} has one order; order = {self.order} is for bdf only.",
@@ -141,12 +135,10 @@ class Settings:
                 f"bdf of order {self.order} needs steps of one length dt; steps of chosen length "
                 "have order two."
             )
-        if not isinstance(self.stabilised, bool):
-            raise ConfigError(f"stabilised = {self.stabilised!r} is neither True nor False.")
         if self.stabilised and self.method == "dop853":
             raise ConfigError(
                 "stabilised is for implicit methods; dop853 keeps the constraints of velocities "
-                "to the tolerance of its steps."
+                "to the tolerance of its steps. Leave it out."
             )
 
     @property
@@ -216,15 +208,6 @@ class Settings:
 def of(state: State) -> Array:
     """What a state must still be for a memory that is more than a factorisation to fit."""
     return np.concatenate([[state.t], state.q, state.v])
-
-
-def _is_finite(value: Any) -> bool:
-    if isinstance(value, bool) or not isinstance(value, Real):
-        return False
-    try:
-        return math.isfinite(value)
-    except OverflowError:  # a whole number of more than 308 digits
-        return False
 
 
 @dataclass

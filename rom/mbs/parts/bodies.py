@@ -101,9 +101,7 @@ class Part:
             check_known(place, self.names, f"body {self.name!r} has no marker {place!r}; it has")
             return Marker(self.name, place)
         if self.flexible is not None:
-            raise ConfigError(
-                f"body {self.name!r} is flexible: its markers are {sorted(self.names)}."
-            )
+            raise ConfigError(f"{self.name!r} is flexible; use its markers {sorted(self.names)}.")
         point = finite(f"marker of {self.name}", place, (3,))
         return Marker(self.name, (float(point[0]), float(point[1]), float(point[2])))
 
@@ -235,7 +233,7 @@ def rigid_part(name: str, mass: float, inertia: Array, pose: Any, points: dict[s
         )
     if moments[2] > (1 + 1e-6) * (moments[0] + moments[1]):
         raise ModelError(
-            f"the largest principal moment {moments[2]:g} exceeds the sum of the others, "
+            f"the largest principal moment {moments[2]:g} must be at most the sum of the others, "
             f"{moments[0] + moments[1]:g} kg m^2: no body has this inertia.",
             where=name,
         )
@@ -296,7 +294,11 @@ def moving_start(part: Part) -> tuple[Array, Array]:
 def _check_mass(part: Part) -> None:
     M = mass_at_rest(part)
     if not np.isfinite(M).all() or np.diag(M).min() <= 0.0:
-        raise ModelError("the mass matrix has entries that no body has.", where=part.name)
+        raise ModelError(
+            "the mass matrix must be finite, with a positive diagonal.",
+            where=part.name,
+            hint="Reduce the body again; rom.check names what is wrong with one of a file.",
+        )
     scale = 1 / np.sqrt(np.diag(M))
     spectrum = np.linalg.eigvalsh(M * scale * scale[:, None])
     if spectrum[0] < SINGULAR_MASS * spectrum[-1]:

@@ -102,13 +102,7 @@ def joint_with_axis(joints: Mapping[str, Joint], joint: str, what: str) -> Joint
     Raises:
         ConfigError: if it is unknown, or has none.
     """
-    if joint not in joints:
-        raise ConfigError(f"{what}: no joint {joint!r}; there are {offered(joints, joint)}.")
-    if joints[joint].coordinate is None:
-        raise ConfigError(
-            f"{what}: joint {joint!r} is {joints[joint].kind}, which leaves no angle about an axis "
-            "and no way along one: it has no coordinate."
-        )
+    coordinate_of(joints, joint, None, what)
     return joints[joint]
 
 
@@ -118,12 +112,18 @@ def coordinate_of(joints: Mapping[str, Joint], joint: str, which: str | None, wh
     Raises:
         ConfigError: if the joint is unknown, or has no such coordinate.
     """
-    found = joint_with_axis(joints, joint, what)
-    rows = {None: found.coordinate, "angle": found.turn, "displacement": found.displacement}
-    rows["way"] = found.displacement  # as it was called before
-    if which not in rows:
-        raise ConfigError(f"coordinate {which!r} of {joint!r}: it is 'angle' or 'displacement'.")
-    row = rows[which]
+    if joint not in joints:
+        raise ConfigError(f"{what}: no joint {joint!r}; there are {offered(joints, joint)}.")
+    names = {None: "coordinate", "angle": "turn", "displacement": "displacement"}
+    names["way"] = "displacement"  # as it was called before
+    if which not in names:
+        raise ConfigError(f"coordinate {which!r} of {joint!r} must be 'angle' or 'displacement'.")
+    row: Row | None = getattr(joints[joint], names[which])
     if row is None:
-        raise ConfigError(f"joint {joint!r} is {found.kind}: it has no coordinate {which!r}.")
+        able = [name for name, one in joints.items() if getattr(one, names[which])]
+        lack = f"coordinate {which!r}" if which else "angle about an axis and no way along one"
+        raise ConfigError(
+            f"{what}: joint {joint!r} is {joints[joint].kind}: it has no {lack}.",
+            hint=f"Joints that have one: {offered(able, joint)}.",
+        )
     return row

@@ -43,3 +43,6 @@ class Whole(Protocol):
 
     def check_markers(self, name: str, *markers: Marker) -> None:
         """Refuse markers that do not exist."""
+
+    def check_apart(self, name: str, m1: Marker, m2: Marker) -> None:
+        """Refuse such markers, or both of one body."""

@@ -4,7 +4,6 @@ from pathlib import Path
 from typing import Any
 
 from rom.arguments import typed
-from rom.errors import ConfigError
 from rom.io.archive import MAX_BYTES, Kind, read_archive, stated, write_archive
 from rom.mbs.results.state import Memory, State
 from rom.model import Array
@@ -30,8 +29,6 @@ def save_state(state: State, path: str | Path) -> Path:
         QualityGateError: if the state holds a number that is not finite.
         ResourceError: if the disk is full.
     """
-    if not isinstance(state, State):
-        raise ConfigError(f"{state!r} is no State; save sol.final.")
     return write_archive(path, *packed_state(state), "the state")
 
 

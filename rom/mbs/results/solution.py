@@ -152,7 +152,7 @@ class Solution(Columns, metaclass=Open, kind="columns", bound=typed):
         outside = ~((t >= self.t[0]) & (t <= self.t[-1]))
         if outside.any():
             raise ConfigError(
-                f"t = {t[outside][0]:g} s is not within the motion from {self.t[0]:g} s to "
+                f"t = {t[outside][0]:g} s must be within the motion from {self.t[0]:g} s to "
                 f"{self.t[-1]:g} s."
             )
         if self.t.size == 1:

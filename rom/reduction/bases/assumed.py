@@ -63,10 +63,7 @@ class AssumedModes:
         refuse_loose(ops, self.held)
         R = orthonormal(ops, given_rigid_motions(ops))
         support = ops.hold(self.held)
-        if self.n_modes > support.n_free:
-            raise ConfigError(
-                f"n_modes = {self.n_modes}, but the supports leave {support.n_free} dofs."
-            )
+        whole("n_modes", self.n_modes, 0, support.n_free, reason="the dofs that supports leave")
         omega, Phi = lowest_modes(ops, support, self.n_modes)
         names = [*numbered("rigid", R.shape[1]), *numbered("assumed", omega.size)]
         return Basis(np.hstack([R, Phi]), omega, tuple(names))

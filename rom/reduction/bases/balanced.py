@@ -5,11 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import qr, solve_continuous_lyapunov, svd
 
-from rom.arguments import typed, whole
+from rom.arguments import between, matrix, typed, whole
 from rom.eigen.verbs import Operators, constraint_modes
 from rom.errors import ConfigError, ModelError, ResourceError
 from rom.model import Array, Basis, Index
-from rom.reduction.bases.free_interface import numbered
+from rom.reduction.bases.free_interface import check_interfaces, numbered
 
 MAX_COORDINATES = 600  # a Lyapunov equation of twice the size is solved in seconds up to here
 
@@ -44,11 +44,8 @@ class BalancedTruncation:
     def __post_init__(self) -> None:
         whole("n_modes", self.n_modes)
         if self.pool is not None:
-            whole("pool", self.pool)
-            if self.pool < self.n_modes:
-                raise ConfigError(f"pool = {self.pool} is less than n_modes = {self.n_modes}.")
-        if not 0.0 < self.damping_ratio < 1.0:
-            raise ConfigError(f"damping_ratio = {self.damping_ratio!r} is not between 0 and 1.")
+            whole("pool", self.pool, self.n_modes, reason="n_modes are chosen from it")
+        between("damping_ratio", self.damping_ratio, 0, 1, "()")
 
     def basis(self, ops: Operators, boundary: Index, labels: tuple[str, ...]) -> Basis:
         """The basis for the interface dofs (n_b,); their columns first.
@@ -59,13 +56,11 @@ class BalancedTruncation:
             InterfaceError: if the interfaces leave a rigid motion free.
             ModelError: if the pool with its damping is not stable.
         """
-        if boundary.size == 0:
-            raise ConfigError("the method holds the interfaces of the body, and none is given.")
+        check_interfaces(boundary, ops.n)
         held = ops.hold(boundary)
         Psi_b = constraint_modes(ops, held, boundary)
         pool = min(3 * self.n_modes if self.pool is None else self.pool, held.n_free)
-        if self.n_modes > held.n_free:
-            raise ConfigError(f"n_modes = {self.n_modes}, but {held.n_free} dofs are free.")
+        whole("n_modes", self.n_modes, 0, held.n_free, reason="the dofs that are free")
         omega, Phi = ops.modes(held, pool)
         if not omega.size:
             return Basis(Psi_b, omega, labels, held)
@@ -123,19 +118,16 @@ def second_order_balanced_truncation(
     """
     K, M, D, B, C = (np.atleast_2d(np.asarray(A, dtype=float)) for A in (K, M, D, B, C))
     n = K.shape[0]
-    if any(A.shape != (n, n) for A in (K, M, D)) or B.shape[0] != n or C.shape[1] != n:
-        raise ConfigError(
-            f"shapes do not fit: K {K.shape}, M {M.shape}, D {D.shape}, B {B.shape}, C {C.shape}."
-        )
-    whole("r", r)
-    if not 1 <= r <= n:
-        raise ConfigError(f"r = {r}, but the system has {n} coordinates.")
+    for name, A, shape in (("K", K, (n, n)), ("M", M, (n, n)), ("D", D, (n, n)),
+                           ("B", B, (n, None)), ("C", C, (None, n))):  # fmt: skip
+        matrix(name, A, shape)
+    whole("r", r, 1, n, reason="the coordinates of the system")
     S, R = _gramian_factors(K, M, D, B, C)
     U, sigma, Vt = svd(S.T @ R)
     if sigma[r - 1] <= np.finfo(float).eps * sigma[0]:
         raise ConfigError(
             f"r = {r}, but only {np.count_nonzero(sigma > np.finfo(float).eps * sigma[0])} "
-            "coordinates are both controllable and observable."
+            "coordinates are both controllable and observable; take r at most so large."
         )
     right = R @ Vt[:r].T / np.sqrt(sigma[:r])
     left = S @ U[:, :r] / np.sqrt(sigma[:r])  # left^T right = 1
@@ -159,7 +151,10 @@ def _gramian_factors(K: Array, M: Array, D: Array, B: Array, C: Array) -> tuple[
          [-np.linalg.solve(M, K) / scale**2, -np.linalg.solve(M, D) / scale]]
     )  # fmt: skip
     if np.linalg.eigvals(A).real.max() >= 0.0:
-        raise ModelError("the system is not stable: its Gramians do not exist.")
+        raise ModelError(
+            "the system is not stable: its Gramians do not exist.",
+            hint="Hold its rigid motions, and give each mode damping above zero.",
+        )
     b = np.vstack([np.zeros_like(B), np.linalg.solve(M, B) / scale**2])
     c = np.hstack([C, np.zeros_like(C)])
     P = solve_continuous_lyapunov(A, -b @ b.T)[:n, :n]

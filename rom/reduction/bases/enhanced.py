@@ -6,9 +6,8 @@ import numpy as np
 
 from rom.arguments import typed, whole
 from rom.eigen.verbs import Held, Operators, constraint_modes, quadratic
-from rom.errors import ConfigError
 from rom.model import Array, Basis, Index
-from rom.reduction.bases.free_interface import numbered
+from rom.reduction.bases.free_interface import check_interfaces, numbered
 
 
 @typed
@@ -45,8 +44,7 @@ class EnhancedCraigBampton:
             ConfigError: without an interface, or for too many modes.
             InterfaceError: if the interfaces leave a rigid motion free.
         """
-        if boundary.size == 0:
-            raise ConfigError("the method holds the interfaces of the body, and none is given.")
+        check_interfaces(boundary, ops.n)
         held = ops.hold(boundary)
         Psi_b = constraint_modes(ops, held, boundary)
         omega, Phi = ops.modes(held, self.n_modes)

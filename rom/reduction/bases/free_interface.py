@@ -53,7 +53,7 @@ class Rubin:
             ConfigError: without an interface, or for more modes than there are dofs.
             InterfaceError: if the interfaces depend on each other or on the modes kept.
         """
-        _check_boundary(boundary, ops.n)
+        check_interfaces(boundary, ops.n)
         R, omega, Phi = free_modes(ops, self.n_modes)
         G = residual_flexibility(ops, boundary, R, omega, Phi)
         Psi_b = _attached(ops, boundary, G)
@@ -92,7 +92,7 @@ class Herting:
             ConfigError: without an interface, or for more modes than there are dofs.
             InterfaceError: if the interfaces leave a rigid motion free.
         """
-        _check_boundary(boundary, ops.n)
+        check_interfaces(boundary, ops.n)
         held = ops.hold(boundary)
         Psi_b = constraint_modes(ops, held, boundary)
         R, omega, Phi = free_modes(ops, self.n_modes)
@@ -146,8 +146,7 @@ def free_modes(ops: Operators, n_modes: int) -> tuple[Array, Array, Array]:
     """
     n_rigid = 0 if ops.rigid is None else ops.rigid.shape[1]
     n_asked = n_modes + (n_rigid or 6)
-    if n_asked > ops.n:
-        raise ConfigError(f"n_modes = {n_modes}, but the body has {ops.n} dofs.")
+    whole("n_modes", n_modes, 0, ops.n - (n_rigid or 6), reason="the dofs without rigid motions")
     omega, Phi = ops.modes((), n_asked)
     if ops.rigid is None:
         i = np.arange(ops.first, ops.first + ops.n_local)
@@ -211,11 +210,16 @@ def numbered(what: str, n: int) -> list[str]:
     return [f"{what} {k + 1}" for k in range(n)]
 
 
-def _check_boundary(boundary: Index, n: int) -> None:
+def check_interfaces(boundary: Index, n: int) -> None:
+    """Refuse no interface, or dofs (n_b,) of one beyond the n of the model.
+
+    Raises:
+        ConfigError: naming an example, or the range.
+    """
     if boundary.size == 0:
         raise ConfigError(
             "the method needs interfaces, and none is given.",
             hint='Name one, for example interfaces={"pin_a": "rbe2"}.',
         )
     if boundary.ndim != 1 or boundary.min() < 0 or boundary.max() >= n:
-        raise ConfigError(f"boundary holds no row of numbers from 0 to {n - 1}.")
+        raise ConfigError(f"boundary must be a row of numbers from 0 to {n - 1}.")

@@ -8,7 +8,7 @@ from rom.arguments import typed, whole
 from rom.eigen.verbs import Operators, unit_motions, without_dependent
 from rom.errors import ConfigError, SolverError
 from rom.model import Basis, Index
-from rom.reduction.bases.free_interface import numbered
+from rom.reduction.bases.free_interface import check_interfaces, numbered
 
 RESONANCE_RTOL = 1e-8  # distance of a frequency from a mode
 
@@ -56,8 +56,7 @@ class MomentMatching:
             InterfaceError: if the interfaces leave a rigid motion free.
             SolverError: if a frequency is a natural one of the body with its interfaces held.
         """
-        if boundary.size == 0:
-            raise ConfigError("the method holds the interfaces of the body, and none is given.")
+        check_interfaces(boundary, ops.n)
         E, still = unit_motions(ops, boundary), ops.hold(boundary)
         blocks, Psi_b = [], E - still(ops.apply_K(E))
         for f in self.frequencies:

@@ -44,7 +44,7 @@ class WithLoads:
         basis = self.method.basis(ops, boundary, labels)
         n_b = boundary.size
         if basis.labels[:n_b] != labels:
-            raise ConfigError(f"{self.method!r} has no constraint modes to which loads could join.")
+            raise ConfigError(f"{self.method!r} has no constraint modes; use rom.CraigBampton.")
         outer, inner = basis.Psi[:, :n_b], basis.Psi[:, n_b:]
         held = ops.hold(boundary) if basis.held is None else basis.held
         answers = held(F)

@@ -5,11 +5,12 @@ from typing import Protocol
 
 import numpy as np
 
-from rom.arguments import one_of, typed, whole
+from rom.arguments import between, one_of, positive, typed, whole
 from rom.eigen.substructuring import modes_up_to
 from rom.eigen.verbs import Held, Operators, constraint_modes, whole_clusters
 from rom.errors import ConfigError, warn
 from rom.model import Array, Basis, Index
+from rom.reduction.bases.free_interface import check_interfaces
 from rom.reduction.bases.selection import Wanted, enough_modes
 from rom.rows import FREQUENCY_RTOL
 
@@ -87,16 +88,15 @@ class CraigBampton:
             raise ConfigError("CraigBampton takes n_modes or f_max, not both.")
         if self.n_modes is not None:
             whole("n_modes", self.n_modes)
-        if self.f_max is not None and not (np.isfinite(self.f_max) and self.f_max > 0):
-            raise ConfigError(f"f_max = {self.f_max!r} Hz is not a positive frequency.")
-        if self.tol is not None and (self.n_modes is not None or not 0 < self.tol < 1):
-            raise ConfigError(
-                f"tol = {self.tol!r} is a relative error between 0 and 1, in place of n_modes."
-            )
-
+        if self.f_max is not None:
+            positive("f_max", self.f_max)
+        if self.tol is not None:
+            between("tol", self.tol, 0, 1, "()")
+            if self.n_modes is not None:
+                raise ConfigError("CraigBampton takes n_modes or tol, not both.")
         one_of("search", self.search, (LANCZOS_SEARCH, SUBSTRUCTURE_SEARCH))
         if self.search == SUBSTRUCTURE_SEARCH and (self.f_max is None or self.tol is not None):
-            raise ConfigError('search="substructures" finds modes up to f_max, without tol.')
+            raise ConfigError('search="substructures" needs f_max, and takes no tol.')
 
     @property
     def chooses(self) -> bool:
@@ -111,11 +111,7 @@ class CraigBampton:
             InterfaceError: if the interfaces leave a rigid motion free.
             ModesMissedError: if a count says that a mode was skipped.
         """
-        if boundary.size == 0:
-            raise ConfigError(
-                "Craig-Bampton holds the interfaces of the body, and none is given.",
-                hint='Name one, for example interfaces={"pin_a": "rbe2"}.',
-            )
+        check_interfaces(boundary, ops.n)
         held = ops.hold(boundary)
         Psi_b = constraint_modes(ops, held, boundary)
         if self.chooses:
@@ -135,10 +131,7 @@ class CraigBampton:
             found = modes_up_to(ops, boundary, self.f_max, SUBSTRUCTURE_RTOL)
             return found.omega, found.shapes
         if self.n_modes is not None:
-            if self.n_modes > held.n_free:
-                raise ConfigError(
-                    f"n_modes = {self.n_modes}, but only {held.n_free} dofs are off the interfaces."
-                )
+            whole("n_modes", self.n_modes, 0, held.n_free, reason="the dofs off the interfaces")
             return lowest_modes(ops, held, int(self.n_modes))
         limit = 2 * np.pi * (np.inf if self.f_max is None else self.f_max)
         m = min(FIRST_BATCH, held.n_free)

@@ -75,11 +75,8 @@ class Characteristic:
                 hint='Name one, for example interfaces={"pin_a": "full"}.',
             )
         sizes = [connection.parts[name].size for name in names]
-        if self.n > min(sizes):
-            raise ConfigError(
-                f"n = {self.n}, but interface {names[int(np.argmin(sizes))]!r} has {min(sizes)} "
-                "coordinates."
-            )
+        least = names[int(np.argmin(sizes))]
+        whole("n", self.n, 0, min(sizes), reason=f"the coordinates of interface {least!r}")
         ops, full = connection.ops, np.concatenate([connection.parts[name] for name in names])
         basis = Guyan().basis(ops, connection.boundary, connection.labels)
         rigid = ops.rows(given_rigid_motions(ops), connection.boundary[full])

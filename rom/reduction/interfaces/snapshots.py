@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from rom.arguments import finite, typed, whole
+from rom.arguments import between, finite, typed, whole
 from rom.eigen.verbs import rigid_motions
 from rom.errors import ConfigError
 from rom.model import Array, Interface
@@ -48,13 +48,13 @@ class Snapshots:
                 hint="One column per snapshot, x y z node by node.",
             )
         if not X.any():
-            raise ConfigError(f"all {X.shape[1]} snapshots are zero: they show no motion.")
+            raise ConfigError(f"all {X.shape[1]} snapshots are zero: one must show a motion.")
         if (self.energy is None) == (self.n is None):
             raise ConfigError(
                 "Snapshots needs either energy or n.", hint="energy=0.9999 keeps almost all."
             )
-        if self.energy is not None and not 0 < self.energy <= 1:
-            raise ConfigError(f"energy = {self.energy!r} is not a share between 0 and 1.")
+        if self.energy is not None:
+            between("energy", self.energy, 0, 1, "(]")
         if self.n is not None:
             whole("n", self.n, 6, reason="the rigid motions count")
 

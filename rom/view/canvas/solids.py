@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rom.arguments import typed
+from rom.arguments import between, finite, typed, whole
 from rom.errors import ConfigError
 from rom.model import Array, Index
 
@@ -53,7 +53,7 @@ def bar(
     along = across(a, b)[2]
     side = broad - (broad @ along) * along
     if not np.linalg.norm(side) > 1e-9 * np.linalg.norm(broad):
-        raise ConfigError(f"broad = {broad} is no direction across the bar from {a} to {b}.")
+        raise ConfigError(f"broad = {broad} must be a direction across the bar from {a} to {b}.")
     side /= np.linalg.norm(side)
     points, triangles = box((float(np.linalg.norm(b - a)), *size))
     return points @ np.array([along, side, np.cross(along, side)]) + (a + b) / 2, triangles
@@ -96,7 +96,7 @@ def ring(
         ConfigError: if the bore is not inside.
     """
     if not 0.0 < inner < outer:
-        raise ConfigError(f"a bore of {inner:g} m is not inside a ring of {outer:g} m.")
+        raise ConfigError(f"a bore of {inner:g} m must be smaller than its ring of {outer:g} m.")
     x, y, _ = across(a, b)
     loops = [_circle(x, y, d / 2, sides) for d in (inner, outer, outer, inner)]
     ends = (a, a, b, b)
@@ -199,7 +199,7 @@ def wound(line: npt.ArrayLike, diameter: float, wire: float, *, turns: float = 6
         ConfigError: if the points are no curve, or the wire is thicker than its bends allow.
     """
     if not 0.0 < wire < diameter:
-        raise ConfigError(f"a wire of {wire:g} m makes no coil of {diameter:g} m.")
+        raise ConfigError(f"a wire of {wire:g} m must be thinner than its coil of {diameter:g} m.")
     X, s = _curve(line)
     even = np.linspace(0.0, s[-1], int(np.ceil(COIL_POINTS * turns)) + 1)
     X = np.column_stack([np.interp(even, s, x) for x in X.T])
@@ -214,12 +214,11 @@ def _curve(line: npt.ArrayLike) -> tuple[Array, Array]:
     Raises:
         ConfigError: if the points are no curve.
     """
-    X = np.asarray(line, dtype=float)
-    if X.ndim != 2 or X.shape[1:] != (3,) or len(X) < 2:
-        raise ConfigError(f"the line of a tube is (k, 3) with k > 1, got {X.shape}.")
+    X = finite("the line of a tube", line, (None, 3))
+    whole("points of the line of a tube", len(X), 2)
     lengths = np.linalg.norm(np.diff(X, axis=0), axis=1)
     if not (lengths > 0.0).all():
-        raise ConfigError("two points of the line of a tube are in one place.")
+        raise ConfigError("two points of the line of a tube are in one place; leave one out.")
     return X, np.concatenate([[0.0], np.cumsum(lengths)])
 
 
@@ -252,20 +251,16 @@ def extruded(outline: npt.ArrayLike, width: float, *, bore: float = 0.0) -> Mesh
     Raises:
         ConfigError: if the outline is not seen from the origin, or the bore leaves it.
     """
-    P = np.asarray(outline, dtype=float)
-    if P.ndim != 2 or P.shape[1:] != (2,) or len(P) < 3:
-        raise ConfigError(f"an outline is (n, 2) with n > 2, got {P.shape}.")
+    P = finite("outline", outline, (None, 2))
+    whole("corners of the outline", len(P), 3)
     Q = np.roll(P, -1, axis=0)
     turning = P[:, 0] * Q[:, 1] - P[:, 1] * Q[:, 0]
     if not (turning > 0.0).all():
-        raise ConfigError("the outline does not turn counter-clockwise about the origin.")
+        raise ConfigError("the outline must turn counter-clockwise about the origin.")
     d = Q - P
     foot = np.clip(-np.sum(P * d, axis=1) / np.sum(d * d, axis=1), 0.0, 1.0)
     nearest = float(np.linalg.norm(P + foot[:, None] * d, axis=1).min())
-    if not 0.0 <= bore < 2 * nearest:
-        raise ConfigError(
-            f"a bore of {bore:g} m does not fit into an outline {nearest:g} m from the origin."
-        )
+    between("bore", bore, 0, 2 * nearest, "[)")
     if bore:  # as many points as a round hole needs
         k = -(-BORE_SIDES // len(P))
         share = np.arange(k)[:, None, None] / k
@@ -322,7 +317,7 @@ def gear_outline(teeth: int, module: float, pressure_angle: float, points: int =
     if teeth < 6 or not involute(np.arccos(base / top)) < half:
         raise ConfigError(
             f"{teeth} teeth of a pressure angle of {np.rad2deg(pressure_angle):g} degrees are "
-            "pointed, or too few."
+            "pointed, or too few; use more."
         )
     r = np.linspace(max(base, root), top, points)
     flank = involute(np.arccos(np.minimum(base / r, 1.0))) - half
@@ -362,7 +357,7 @@ def across(a: npt.ArrayLike, b: npt.ArrayLike) -> tuple[Array, Array, Array]:
     z = np.asarray(b, dtype=float) - np.asarray(a, dtype=float)
     length = np.linalg.norm(z)
     if not length > 0.0:
-        raise ConfigError(f"two points in one place, {a!r}, have no direction.")
+        raise ConfigError(f"two points in one place, {a!r}, have no direction; give another one.")
     z = z / length
     x = np.cross(z, np.eye(3)[np.argmin(np.abs(z))])
     x = x / np.linalg.norm(x)

@@ -56,7 +56,7 @@ def channels(
         x, d = (np.atleast_2d(finite(name, A, None)) for A in (where, along))
         if x.shape != d.shape or x.shape[1:] != (3,) or not np.linalg.norm(d, axis=1).all():
             raise ConfigError(
-                f"{name!r}: {x.shape} points and {d.shape} directions; (k, 3) of both."
+                f"{name!r}: {x.shape} points, {d.shape} directions; give (k, 3) of both."
             )
         things[name] = joined([part for k in range(len(x)) for part in _channel(x[k], d[k], size)])
         gaps = [gap for p in x if (gap := _gap(p, points, size)) is not None]

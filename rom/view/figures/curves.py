@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from rom.arguments import typed
+from rom.arguments import one_each, typed
 from rom.errors import ConfigError
 from rom.model import Array
 from rom.view.canvas import page
@@ -102,8 +102,7 @@ def _histories(axes: Any, t: Array, curves: dict[str, Any], numbers: Sequence[in
         if not pair and np.asarray(values).dtype.kind == "U":
             values = _rows(axes, values)
         x, y = (np.asarray(v, dtype=float) for v in (values if pair else (t, values)))
-        if y.shape != x.shape:
-            raise ConfigError(f"{name!r} has {y.size} values for {x.size} times.")
+        one_each(f"values of {name!r}", y.shape, "times", x.shape)
         lines.append((x, y))
     flat = without_round_off([y for _, y in lines])
     for k, (name, (x, _), y) in enumerate(zip(curves, lines, flat, strict=True)):
@@ -176,7 +175,7 @@ def frequencies(
     path = page.wanted(path)
     comparison = {support: table for support, table in comparison.items() if table["full"]}
     if not comparison:
-        raise ConfigError("there is no comparison of frequencies to draw.")
+        raise ConfigError("there is nothing to compare; give a table of one support.")
     caption = (
         "Relative error of the natural frequencies of the reduced body against the full finite "
         "element model, for each support of its interfaces; the dashed line is 0.1 %. Reduced "
@@ -238,8 +237,7 @@ def convergence(
         for axes, (label, curves) in zip(areas, panels, strict=True):
             for k, (name, (sizes, errors)) in enumerate(curves.items()):
                 x, y = np.asarray(sizes, dtype=float), np.asarray(errors, dtype=float)
-                if x.shape != y.shape:
-                    raise ConfigError(f"{name!r} has {y.size} errors for {x.size} sizes.")
+                one_each(f"errors of {name!r}", y.shape, "sizes", x.shape)
                 look = {"color": LINES[k % len(LINES)], "marker": MARKERS[k % len(MARKERS)]}
                 axes.loglog(x, np.maximum(np.abs(y), MIN_ERROR), label=name, **look)
             axes.set_ylabel(label)
@@ -291,8 +289,8 @@ def campbell(  # noqa: PLR0913  keywords of one picture
         np.stack(without_round_off(list(values.T)), axis=1)
         for values in (diagram.frequencies, 100 * diagram.damping_ratios)
     )
-    if names and len(names) != f.shape[1]:
-        raise ConfigError(f"{len(names)} names for {f.shape[1]} modes.")
+    if names:
+        one_each("names", len(names), "modes", f.shape[1])
     labels = names or [f"mode {k + 1}" for k in range(f.shape[1])]
     turns = 30 * diagram.speeds / np.pi
     damped = np.abs(damping).max(initial=0.0) > 1e-3

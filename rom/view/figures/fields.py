@@ -99,7 +99,7 @@ def plane(
     """
     path = page.wanted(path)
     if not drawings:
-        raise ConfigError("there is nothing to draw.")
+        raise ConfigError("there is nothing to draw; give at least one drawing.")
     if ax is not None:
         figure, areas = page.taken(ax, len(drawings), "plane")
         fill(figure, areas, drawings, _draw, legend=False)

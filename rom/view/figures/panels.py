@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rom.arguments import typed
-from rom.errors import ConfigError
+from rom.arguments import one_each, typed
 from rom.view.canvas import page
 from rom.view.canvas.scales import without_round_off
 from rom.view.canvas.scene import TEXT_COLOUR
@@ -223,6 +222,5 @@ def _draw_bars(axes: Any, bars: Mapping[str, tuple[float, float]], ends: Any) ->
 
 def _paired(name: str, line: Line) -> Line:
     x, y = (np.atleast_1d(np.asarray(values, dtype=float)) for values in line)
-    if x.shape != y.shape:
-        raise ConfigError(f"{name!r} has {y.size} values for {x.size} places.")
+    one_each(f"values of {name!r}", y.shape, "places", x.shape)
     return x, y

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rom.arguments import typed
+from rom.arguments import one_each, typed
 from rom.errors import ConfigError
 from rom.model import Array, Index
 from rom.view.canvas import page
@@ -100,7 +100,7 @@ def deformed(  # noqa: PLR0913  keywords of one picture
         return page.save(figure, path)
     left = PAGE_WIDTH - 30 - sum(s.width + 30 for s in shapes)
     if left < 400:
-        raise ConfigError(f"{len(shapes)} shapes leave {left} pixels for the curves.")
+        raise ConfigError(f"{len(shapes)} shapes leave {left} pixels for the curves; take fewer.")
     with page.styled():
         figure = page.titled(PAGE_WIDTH, 225 + PANEL_HEIGHT, title, caption)
         axes = page.area(figure, 110, 120, left - 140, PANEL_HEIGHT)
@@ -161,8 +161,7 @@ def flow(
         ConfigError: if lengths differ, or pictures cannot be made here.
     """
     path = wanted(path)
-    if len(times) != len(shapes):
-        raise ConfigError(f"{len(times)} times for {len(shapes)} shapes.")
+    one_each("times", len(times), "shapes", len(shapes))
     highest = max(float(s.values.max()) for s in shapes if s.values is not None)
     everything = np.concatenate([s.points for s in shapes])
     frame = np.array([everything.min(axis=0), everything.max(axis=0)])

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rom.arguments import typed
+from rom.arguments import one_each, typed
 from rom.errors import ConfigError
 from rom.model import Array, Index
 from rom.view.canvas import page
@@ -105,10 +105,10 @@ def plates(
     frames = [[_plate(outline, width) for outline in still] for still in outlines]
     counts = [len(points) for points, _ in frames[0]] if frames else []
     if not counts or any([len(p) for p, _ in still] != counts for still in frames):
-        raise ConfigError("there is no plate, or their corners differ from picture to picture.")
+        raise ConfigError("at least one plate is needed, with as many corners in each picture.")
     per_plate = None if values is None else np.atleast_1d(np.asarray(values, dtype=float))
-    if per_plate is not None and per_plate.shape != (len(counts),):
-        raise ConfigError(f"{len(counts)} plates have {per_plate.shape} values.")
+    if per_plate is not None:
+        one_each("values", per_plate.shape, "plates", (len(counts),))
     of_points = None if per_plate is None else np.repeat(per_plate, counts)
     points = np.stack([joined(still)[0] for still in frames])
     return Thing(points, joined(frames[0])[1], colour, values=of_points)
@@ -149,8 +149,7 @@ def film(
     path, t = wanted(path), np.asarray(times, dtype=float)
     view = seen(scene, FILM_WIDTH)
     frames = max(len(actor.points) for actor in view.actors)
-    if t.shape != (frames,):
-        raise ConfigError(f"{t.size} times for {frames} pictures of {scene.title!r}.")
+    one_each("times", t.shape, f"pictures of {scene.title!r}", (frames,))
     images = view.drawn(oversampling=1)
     top, height = CLOCK_HEIGHT, images.shape[1]
     foot = top + height + below_height(scene, FILM_WIDTH)
@@ -252,7 +251,7 @@ def actors_of(scene: Scene) -> list[Actor]:
     for (name, thing), colour in zip(scene.things.items(), _colours(scene).values(), strict=True):
         drawn += thing_actors(name, thing, colour)
     if not drawn:
-        raise ConfigError(f"there is nothing to draw in {scene.title!r}.")
+        raise ConfigError(f"there is nothing to draw in {scene.title!r}; give it a thing.")
     return drawn
 
 
@@ -266,14 +265,14 @@ def thing_actors(name: str, thing: Thing | Mesh, colour: str) -> list[Actor]:
     points, cells = np.asarray(thing.points, dtype=float), np.asarray(thing.cells)
     points = points[None] if points.ndim == 2 else points
     if points.ndim != 3 or points.shape[2] != 3:
-        raise ConfigError(f"{name!r}: points are (n, 3) or (f, n, 3), got {points.shape}.")
+        raise ConfigError(f"{name!r}: points must be (n, 3) or (f, n, 3), got {points.shape}.")
     n = points.shape[1]
     if cells.ndim != 2 or not 1 <= cells.shape[1] <= 3 or not _between(cells, n):
-        raise ConfigError(f"{name!r}: cells are (m, 1), (m, 2) or (m, 3) numbers from 0 to {n - 1}"
+        raise ConfigError(f"{name!r}: cells must be (m, 1), (m, 2) or (m, 3) from 0 to {n - 1}"
                           f", got {cells.dtype} {cells.shape}.")  # fmt: skip
     values = None if thing.values is None else np.atleast_2d(np.asarray(thing.values, dtype=float))
     if values is not None and values.shape not in ((1, n), points.shape[:2]):
-        raise ConfigError(f"{name!r} has {values.shape} values for {points.shape[:2]} points.")
+        raise ConfigError(f"{name!r} has {values.shape} values, needed are {points.shape[:2]}.")
     if values is not None:
         values = np.broadcast_to(values, points.shape[:2])
     body = Actor(points, cells, values, colour, thing.width, thing.opacity)
@@ -294,7 +293,7 @@ def _edges(name: str, thing: Thing, points: Array, cells: Index) -> list[Actor]:
         return [Actor(points, sharp_edges(points[0], cells), colour=EDGE_COLOUR)]
     pairs = np.asarray(thing.edges).reshape(-1, 2)
     if not _between(pairs, points.shape[1]):
-        raise ConfigError(f"{name!r}: edges are pairs of numbers from 0 to {points.shape[1] - 1}.")
+        raise ConfigError(f"{name!r}: edges must be pairs from 0 to {points.shape[1] - 1}.")
     return [Actor(points, pairs, colour="#6b7480", width=0.6)]
 
 

@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from rom.arguments import typed
-from rom.errors import ConfigError
+from rom.arguments import one_each, typed
 from rom.model import Array, Index
 from rom.view.canvas import page
 from rom.view.figures.curves import LINES, finish
@@ -61,10 +60,7 @@ def updating(  # noqa: PLR0913  keywords of one picture
         for name, values in curves.items()
     }
     for name, (own, values) in lines.items():
-        if np.shape(values) != np.shape(own):
-            raise ConfigError(
-                f"{name!r} has {np.size(values)} values for {np.size(own)} frequencies."
-            )
+        one_each(f"values of {name!r}", np.shape(values), "frequencies", np.shape(own))
     scene = structure if isinstance(structure, Scene) else _frame(*structure)
     figure: Figure
     with page.styled():

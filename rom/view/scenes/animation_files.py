@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rom import rotation
-from rom.arguments import AnySolution, typed
+from rom.arguments import AnySolution, typed, unit_vector
 from rom.errors import ConfigError
 from rom.io.fields.gltf import MovingMesh, write_glb
 from rom.io.fields.vtkhdf import write_vtkhdf
@@ -59,7 +59,7 @@ def write_animation(
         known = sorted(solution.mechanism.parts)
         raise ConfigError(f"shapes: no body {named(sorted(unknown))}; there are {known}.")
     if min(frames, solution.t.size) < 2 or (seconds is not None and not 0 < seconds < np.inf):
-        raise ConfigError(f"no film has {frames} frames in {seconds} s.")
+        raise ConfigError(f"a film needs 2 frames in more than 0 s, got {frames} in {seconds} s.")
     steps = np.linspace(0, solution.t.size - 1, min(frames, solution.t.size)).round().astype(int)
     bodies = _bodies(solution, steps, shapes, magnify)
     t = solution.t[steps]
@@ -114,7 +114,4 @@ def _up(solution: Any, up: npt.ArrayLike | None) -> Array:
     if up is None:
         gravity = np.asarray(solution.mechanism.gravity, dtype=float)
         return -gravity if gravity.any() else np.array([0.0, 0.0, 1.0])
-    direction = np.asarray(up, dtype=float)
-    if direction.shape != (3,) or not (np.isfinite(direction).all() and direction.any()):
-        raise ConfigError(f"up = {up!r} is no direction.")
-    return direction
+    return unit_vector("up", up)

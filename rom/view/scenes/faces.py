@@ -59,7 +59,7 @@ def faces(
     x = np.asarray(points, dtype=float)
     triangles = {label: np.asarray(t, dtype=np.int64) for label, t in patches.items()}
     if not any(map(len, triangles.values())):
-        raise ConfigError("there is no face to draw.")
+        raise ConfigError("there is no face to draw; give triangles.")
     used = np.unique(np.concatenate([t.ravel() for t in triangles.values()]))
     camera = aimed(x[used], PAGE_WIDTH, view=view, up=up, heights=(0.2, 0.6))
     both = np.stack([x, _turned(x, camera)])

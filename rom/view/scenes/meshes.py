@@ -1,7 +1,7 @@
 """Picture of a finite element mesh with its interfaces."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -70,17 +70,30 @@ def meshed(model: FEModel) -> dict[str, Thing]:
     Raises:
         ConfigError: if the model has no surface.
     """
-    if model.surface is None:
-        raise ConfigError("the model has no surface to draw.", hint="Give it a `SurfaceMesh`.")
-    points, triangles = model.points[model.surface.nodes], model.surface.triangles
+    surface = surface_of(model)
+    points, triangles = model.points[surface.nodes], surface.triangles
     edges = np.unique(np.sort(directed_edges(triangles)[0], axis=1), axis=0)
     things = {"_surface": Thing(points, triangles, PART_COLOUR, edges=edges)}
     for k, (name, interface) in enumerate(model.interfaces.items()):
-        on = np.isin(model.surface.nodes, interface.nodes)
+        on = np.isin(surface.nodes, interface.nodes)
         patch = triangles[on[triangles].all(axis=1)]
         colour = MARK_COLOURS[k % len(MARK_COLOURS)]
         things[name] = Thing(points, patch, colour, edges=NO_LINES)
     return things
+
+
+def surface_of(thing: Any) -> Any:
+    """The surface of a body or a model.
+
+    Raises:
+        ConfigError: if it has none.
+    """
+    if thing.surface is None:
+        raise ConfigError(
+            f"{getattr(thing, 'name', 'the model')} has no surface to draw.",
+            hint="Take it from rom.fe.model, which gives one; matrices alone have none.",
+        )
+    return thing.surface
 
 
 def in_sight(model: FEModel, name: str, camera: Camera) -> bool:

@@ -8,11 +8,11 @@ import numpy as np
 import numpy.typing as npt
 
 from rom.arguments import AnyBody, typed
-from rom.errors import ConfigError
 from rom.model import Array
 from rom.view.canvas import page
 from rom.view.canvas.scene import UNDEFORMED_COLOUR, sharp_edges
 from rom.view.figures.things import NO_LINES, STILL_WIDTH, Scene, Thing, seen, series_page
+from rom.view.scenes.meshes import surface_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -45,8 +45,7 @@ def mode_shapes(
         InterfaceError: if an interface is unknown.
     """
     path = page.wanted(path)
-    if body.surface is None:
-        raise ConfigError(f"body {body.name!r} has no surface to draw.")
+    surface_of(body)
     body = body.in_units("SI")
     omega, V = body.modes(fixed=fixed)
     elastic = np.flatnonzero(omega > 0)[:n]

@@ -30,7 +30,7 @@ def sleeves(rod: Any, widths: npt.ArrayLike) -> dict[str, Mesh]:
     except ValueError:
         sides = np.zeros((1, 2))
     if not (sides > 0.0).all():
-        raise ConfigError(f"widths are (2,) or ({along.size}, 2) and positive, got {widths!r}.")
+        raise ConfigError(f"widths must be (2,) or ({along.size}, 2) and positive, got {widths!r}.")
     lengths = np.concatenate([[0.0], along, [0.0]])
     sides = np.vstack([sides[:1], sides, sides[-1:]])
     return {

@@ -14,6 +14,7 @@ from rom.errors import ConfigError
 from rom.model import Array, FEModel, Index
 from rom.view.canvas import page
 from rom.view.figures.things import Thing
+from rom.view.scenes.meshes import surface_of
 from rom.view.scenes.mode_shapes import modes_page
 
 if TYPE_CHECKING:
@@ -51,8 +52,9 @@ def wheel_modes(  # noqa: PLR0913  keywords of one picture
         ConfigError: if there is nothing to draw, or pictures cannot be made here.
     """
     path = page.wanted(path)
-    if model.surface is None or not shapes:
-        raise ConfigError("there is no surface, or no mode of the wheel, to draw.")
+    surface_of(model)
+    if not shapes:
+        raise ConfigError("at least one mode of the wheel is needed to draw.")
     U = [np.asarray(u, dtype=float) for u in shapes.values()]
     N = U[0].shape[0]
     if any(u.shape != (N, 3 * model.points.shape[0]) for u in U):
@@ -91,15 +93,15 @@ def wheel(
     """
     chosen = list(range(len(models)) if sectors is None else sectors)
     if not chosen or not all(0 <= j < len(models) for j in chosen):
-        raise ConfigError(f"sectors {chosen} are not some of {len(models)}.")
+        raise ConfigError(f"sectors {chosen} must be from 0 to {len(models) - 1}.")
     around = _around(models, hidden, axis, chosen)
     if shape is None:
         return Thing(around.points, around.triangles)
     u = [np.asarray(one, dtype=float).ravel() for one in shape]
     sizes = [3 * len(models[j].points) for j in chosen]
     if [one.size for one in u] != sizes:
-        raise ConfigError(f"the shape has {[one.size for one in u]} numbers per sector, not "
-                          f"{sizes}.")  # fmt: skip
+        raise ConfigError(f"the shape has {[one.size for one in u]} numbers per sector, "
+                          f"needed are {sizes}.")  # fmt: skip
     moved = around.displaced(u)
     values = scale * np.linalg.norm(moved, axis=1)
     return Thing(around.points + magnify * moved, around.triangles, values=values)
@@ -149,9 +151,7 @@ def _around(
 
 def _outside(model: FEModel, hidden: tuple[str, ...]) -> tuple[Index, Index]:
     """Nodes of the model on the outer surface of the wheel, and triangles between them."""
-    surface = model.surface
-    if surface is None:
-        raise ConfigError("a sector without a surface cannot be drawn.")
+    surface = surface_of(model)
     inside = np.zeros(len(surface.triangles), dtype=np.bool_)
     for name in hidden:
         inside |= np.isin(surface.nodes[surface.triangles], model.interfaces[name].nodes).all(1)

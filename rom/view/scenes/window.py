@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from rom.arguments import AnyBody, AnyMechanism, typed
+from rom.arguments import AnyBody, AnyMechanism, typed, whole
 from rom.errors import ConfigError
 from rom.model import FEModel
 from rom.process.child import python, run, scratch
@@ -22,7 +22,7 @@ from rom.view.canvas.draw import add, aim
 from rom.view.canvas.offscreen import child_failure, require, write_scene
 from rom.view.canvas.scene import Actor, aimed, sharp_edges
 from rom.view.scenes.mechanisms import start_actors
-from rom.view.scenes.meshes import mesh_actors
+from rom.view.scenes.meshes import mesh_actors, surface_of
 from rom.view.scenes.mode_shapes import AMPLITUDE_RATIO, displacement
 
 WINDOW_WIDTH = 1200  # [pixel]
@@ -52,8 +52,7 @@ def mode_scenes(body: Any, n: int, fixed: tuple[str, ...] = ()) -> list[Scene]:
         ConfigError: if the body has no surface.
         InterfaceError: if an interface is unknown.
     """
-    if body.surface is None:
-        raise ConfigError(f"body {body.name!r} has no surface to draw.")
+    surface_of(body)
     body = body.in_units("SI")
     omega, V = body.modes(fixed=fixed)
     X, size = body.surface.points, np.ptp(body.surface.points, axis=0).max()
@@ -118,8 +117,7 @@ def _actors(thing: Any, n: int) -> list[Actor]:
     if hasattr(thing, "parts"):
         return start_actors(thing)
     scenes = mode_scenes(thing, n)
-    if not 1 <= n <= len(scenes):
-        raise ConfigError(f"n = {n}: body {thing.name!r} has elastic modes 1 to {len(scenes)}.")
+    whole("n", n, 1, len(scenes), reason=f"the elastic modes of body {thing.name!r}")
     surface, still = scenes[n - 1].actors
     largest = np.abs(surface.points - surface.points[0]).max(axis=(1, 2)).argmax()
     return [replace(surface, points=surface.points[largest][None]), still]

@@ -357,7 +357,7 @@ def test_what_is_no_rod_is_named():
     with pytest.raises(ModelError, match="N \\+ 1 vertices and N \\+ 2 quaternions"):
         rod([[0, 0, 0], [0, 0, 1]], turned, **section)
     one = straight(1.0, 4, **section)
-    with pytest.raises(ConfigError, match="for a rod of 4 segments"):
+    with pytest.raises(ConfigError, match=r"needed are \(5, 3\)"):
         equilibrium(one, (np.zeros((4, 3)), np.zeros((6, 3))))
 
 

@@ -101,9 +101,9 @@ def test_stress_and_clearance():
 
 
 def test_impossible_springs_are_named():
-    with pytest.raises(ModelError, match="wire=0 of a spring is not positive"):
+    with pytest.raises(ModelError, match="wire of a spring = 0 must be positive"):
         spring(0, 10, 6, 15)
-    with pytest.raises(ModelError, match=r"does not fit a helix of 0\.01"):
+    with pytest.raises(ModelError, match=r"must be below diameter = 0\.01"):
         spring(10, 10, 1, 15)
     with pytest.raises(ModelError, match=r"free length 0\.006 m is not above the solid length"):
         spring(1, 10, 6, 6)

@@ -251,7 +251,7 @@ def test_what_no_hand_can_do_is_named():
         moving_hand(finger, drives={"index": Drive(pull=30 * MM)})
     with pytest.raises(ConfigError, match="cannot close towards"):
         moving_hand(finger, seats={"index": Seat(palmar=(0.0, 0.0, 2.0))})
-    with pytest.raises(ConfigError, match="'index cable' are at one point: it would be a knot"):
+    with pytest.raises(ConfigError, match="'index cable' are at one point"):
         moving_hand(finger, drives={"index": Drive(tension=1.0, conduit=2 * ((0.0, 0.0, -0.1),))})
     with pytest.raises(ModelError, match="'index' ends in a bare plate"):
         moving_hand({"index": Finger(phalanges=(0.02, 0.02, 0.0), n=2)})
@@ -261,7 +261,7 @@ def test_what_no_hand_can_do_is_named():
         moving_hand(finger, drives={"index joint 1": Drive(tension=1.0, conduit=((0, 0, -0.1),))})
     with pytest.raises(ConfigError, match="drive of 'index joint 4'"):
         moving_hand(finger, drives={"index joint 4": Drive(tension=1.0)})
-    with pytest.raises(ConfigError, match=r"sleeve of 'index' is -0\.1 m"):
+    with pytest.raises(ConfigError, match=r"sleeve of 'index' = -0.1 must"):
         moving_hand(finger, drives={"index": Drive(pull=0.0, sleeve=-0.1)})
     mech = moving_hand(finger, drives={"index": Drive(pull=lambda t: 400.0 * t * t)})
     with pytest.raises((ConfigError, SolverError), match=r"winch of 'index' is to take in 0\.02"):

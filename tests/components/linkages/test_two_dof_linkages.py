@@ -232,7 +232,7 @@ def test_inertia_and_christoffel_symbols_reproduce_the_free_motion_of_the_core()
 
 
 def test_what_cannot_be_is_refused():
-    with pytest.raises(ModelError, match="no link has mass -1"):
+    with pytest.raises(ModelError, match="mass = -1"):
         rod(-1.0, 0.3)
     with pytest.raises(ModelError, match=r"1.3 m apart; couplers of 0.3 m and 0.3 m do not meet"):
         FiveBar(0.7, (rod(2.0, 0.3),) * 2, (rod(1.0, 0.3),) * 2).inertia(np.pi, [0.0, 1.0])
@@ -241,9 +241,9 @@ def test_what_cannot_be_is_refused():
     with pytest.raises(ConfigError, match="elastic = nan must be"):
         TWO.inertia(0.0, 1.0, elastic=np.nan)
     for frequency in (0.0, -1.0):
-        with pytest.raises(ConfigError, match="is no frequency of torques"):
+        with pytest.raises(ConfigError, match="must be positive"):
             TWO.inertia(0.0, 1.0, elastic=frequency)
     mech = Mechanism()
     mech.add_rigid("box", mass=1.0, inertia=(1, 1, 1), at=(0, 0, 0))
-    with pytest.raises(ConfigError, match="are not two of the drives"):
+    with pytest.raises(ConfigError, match="must be two of the drives"):
         mechanism_inertia(mech, ("left", "right"))

@@ -434,15 +434,15 @@ ONE = Masonry((stone(box(), **SOFT),), (), 1e9, 0.5)
     [
         ([PointLoad(1, (1.4, 0.5), (0.0, -1.0), name="crane")], "crane at .* lies 0.4 m outside"),
         ([PointLoad(0, (0.0, 0.0), (0.0, -1.0))], "acts on stone 0, which is held"),
-        ([PointLoad(7, (0.0, 0.0), (0.0, -1.0))], "stone 7 of the stones 0 to 1"),
+        ([PointLoad(7, (0.0, 0.0), (0.0, -1.0))], "stone of point load = 7"),
         ([STONE], "action 0 is .* which does nothing to masonry"),
         ([PointLoad(*STONE, history=Table([0.0, 0.05], [0.0, 1.0]))], "from 0 s to 0.05 s; asked"),
         ([PointLoad(*STONE, history=lambda t: np.full(t.shape, np.inf))], "is inf at t ="),
         ([PointLoad(*STONE, history=lambda t: 1.0)], "gives the shape"),
         ([MovingLoad((0.0, -1.0), 1.0, 11.0)], "never comes upon the stones"),
-        ([Wind(1.0, ((1, 4),))], "edge 4 of stone 1, whose edges are 0 to 3"),
+        ([Wind(1.0, ((1, 4),))], "edge of stone 1 for wind = 4 must be a whole number from 0 to 3"),
         ([Wind(1.0, ())], "blows on no edge"),
-        ([SupportMotion((1,), (0.1, 0.0))], "moves stone 1, which is not held"),
+        ([SupportMotion((1,), (0.1, 0.0))], "moves 1, which must be of the held"),
         ([SupportMotion((0,), (0.1, 0.0), history=1.0)], "begins away from where"),
         ([SupportMotion((0,), (0.1, 0.0), history=rectangle(1.0, 1.0))], "begins away"),
         (
@@ -469,15 +469,15 @@ def test_actions_that_cannot_be_are_named(actions, words):
         (lambda: Wind(1.0, (1, 2)), r"edges\[0\] = 1"),
         (lambda: SupportMotion(0, (0.0, 1.0)), "stones = 0"),
         (lambda: BaseMotion("shake"), "acceleration = 'shake'"),
-        (lambda: Table("a", "b"), "not made of numbers"),
+        (lambda: Table("a", "b"), "must be made of numbers"),
         (lambda: ramp(None), "duration = None"),
         (lambda: sine("a", 1.0), "amplitude = 'a'"),
-        (lambda: stone([0, 1, 2], **SOFT), r"an outline of the shape \(3,\)"),
-        (lambda: stone(box()[[0, 0, 1, 2, 3]], **SOFT), "corner 0 of a stone is listed twice"),
+        (lambda: stone([0, 1, 2], **SOFT), r"outline of a stone has shape \(3,\)"),
+        (lambda: stone(box()[[0, 0, 1, 2, 3]], **SOFT), "corner 0 is listed twice"),
         (lambda: Masonry((), (), 1e9, 0.5), "all of 0 stones are held"),
         (lambda: Masonry((stone(box(), **SOFT),), (0,), 1e9, 0.5), "all of 1 stones are held"),
         (lambda: replace(ONE, gravity=(0.0, 0.0, -9.81)), "gravity = .* a row of 2"),
-        (lambda: replace(ONE, reach=-1.0), "reach = -1.0 m"),
+        (lambda: replace(ONE, reach=-1.0), "reach = -1 must"),
         (lambda: replace(ONE, stiffness=np.inf), "stiffness = inf"),
         (lambda: simulate(ONE, t_end=1.0, dt=0.1, actions=BaseMotion(1.0)), "actions = "),
         (lambda: simulate(ONE, t_end=1.0, dt=0.1, v=np.full((1, 6), np.nan)), "v = .* not finite"),
@@ -491,13 +491,13 @@ def test_what_is_no_masonry_and_no_action_is_named_where_it_is_made(wrong, words
 def test_supports_that_bear_nothing_and_frames_without_ground_are_named():
     far = Masonry((stone(GROUND, **SOFT), stone(box(), **SOFT), stone(box(at=(0, 5.0)), **SOFT)),
                   (0, 2), 1e10, 0.5)  # fmt: skip
-    with pytest.raises(ConfigError, match="moves stone 2, which supports nothing"):
+    with pytest.raises(ConfigError, match="moves stone 2, which must support"):
         simulate(far, t_end=0.1, dt=0.01, actions=[SupportMotion((2,), (0.1, 0.0))])
-    with pytest.raises(ConfigError, match="no stone is held"):
+    with pytest.raises(ConfigError, match="a stone must be held"):
         simulate(alone(), t_end=0.1, dt=0.01, actions=[BaseMotion(1.0)])
-    with pytest.raises(ConfigError, match="does not stand under its own weight"):
+    with pytest.raises(ConfigError, match="does not stand by itself"):
         load_factor(arch(10, 5.0, 0.4), [BaseMotion(1.0)])
-    with pytest.raises(ConfigError, match="blows in no direction"):
+    with pytest.raises(ConfigError, match="needs a direction"):
         facing(far, (0.0, 0.0))
 
 
@@ -505,14 +505,14 @@ def test_supports_that_bear_nothing_and_frames_without_ground_are_named():
     ("make", "words"),
     [
         (lambda: Table([0.0, 1.0], [0.0, np.nan]), "value 1 of the history is nan.*gaps"),
-        (lambda: Table([0.0, 0.0], [0.0, 1.0]), "do not grow from 0.0 s to 0.0 s"),
+        (lambda: Table([0.0, 0.0], [0.0, 1.0]), "must grow: 0.0 s comes before 0.0 s"),
         (lambda: Table([0.0], [1.0]), "two or more of each"),
         (lambda: recorded([0.0, 0.1, 0.2, 0.5, 0.6], np.zeros(5)), "gap from 0.2 s to 0.5 s"),
-        (lambda: sine(1.0, 0.0), "no sine has"),
-        (lambda: rectangle(1.0, -1.0), "no pulse has"),
+        (lambda: sine(1.0, 0.0), "period = "),
+        (lambda: rectangle(1.0, -1.0), "duration = "),
         (lambda: ramp(0.0), "no ramp takes"),
         (lambda: minimum_thickness(half_angle=np.radians(140)), "not so far round"),
-        (lambda: arch(10, 5.0, 0.5, half_angle=3.2), "no arch has"),
+        (lambda: arch(10, 5.0, 0.5, half_angle=3.2), "must be"),
     ],
 )
 def test_histories_with_gaps_are_named(make, words):

@@ -164,8 +164,8 @@ tension = 1e5
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("[[joint]]\nfriction = 0.6\nglue = 1", r"joint 1 has \['friction', 'glue'\]; it needs"),
-        ("[[joint]]\ncohesion = 1.0", "it needs friction"),
+        ("[[joint]]\nfriction = 0.6\nglue = 1", r"joint 1 has \['friction', 'glue'\]. It needs"),
+        ("[[joint]]\ncohesion = 1.0", "It needs friction"),
         ("[[joint]]\nfriction = '0.2 MPa'", "joint 1: "),
         ("[[joint]]\nfriction = true", "True is no number"),
         ("[[joint]]\nfriction = 0.1\nbetween = [[1]]", "joint 1: "),
@@ -191,13 +191,13 @@ def test_joints_that_cannot_be_are_named(tmp_path):
         with pytest.raises(ConfigError, match="no joint has friction"):
             Joint(*numbers)
     for between in (((0, 5),), ((1, 1),)):
-        with pytest.raises(ConfigError, match="stones are 0 to 1"):
+        with pytest.raises(ConfigError, match="use stones from 0 to 1"):
             simulate(pair(Joint(0.5, between=between)), t_end=0.1, dt=0.01)
     apart = Masonry((stone(box(), **SOFT), stone(box(at=(0, 1.5)), **SOFT)), (0,), 1e10, 0.5,
                     joints=(Joint(0.5, 1e5, between=((0, 1),)),))  # fmt: skip
     with pytest.raises(ConfigError, match="stones 0 and 1 have no joint that could be glued"):
         simulate(apart, t_end=0.1, dt=0.01)
-    with pytest.raises(ConfigError, match=r"masonry is not 0.0 m thick"):
+    with pytest.raises(ConfigError, match=r"thickness = 0 must be positive"):
         pair(Joint(0.5), thickness=0.0)
 
 

@@ -412,7 +412,7 @@ def test_the_joint_and_the_torsion_of_a_wing_are_found_from_noisy_responses():
 def test_an_airframe_of_nothing_is_refused(wrong):
     with pytest.raises(ConfigError, match="must be positive"):
         airframe(**wrong)
-    with pytest.raises(ConfigError, match=r"nearest is 0.05 m away"):
+    with pytest.raises(ConfigError, match=r"there is one at .0.6"):
         airframe(0.1).node((0.65, 0, 0))
 
 
@@ -434,30 +434,33 @@ def test_a_wing_alone_is_a_free_beam():
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (lambda: BEAM.at([0.0]), "9 of them"),
-        (lambda: Measurement(OMEGA, EXACT, (2,)), "180 frequencies, 1 exciters"),
+        (lambda: BEAM.at([0.0]), r"needed is \(9,\)"),
+        (lambda: Measurement(OMEGA, EXACT, (2,)), "180 lines, 1 exciters"),
         (lambda: Measurement(OMEGA, 0 * EXACT, INPUTS), "dead channel"),
         (lambda: ParametricModel(BEAM.K, BEAM.M, BEAM.dK, BEAM.dM, BEAM.sensors[:, 1:]), "sensors"),
         (lambda: update_by_input(AtSensors(BEAM), measured(), START, GUESS, rank=9), "rank = 9"),
-        (lambda: AtSensors(BEAM.in_basis(np.eye(48)[:, ::-1] * 2)).at(START), "no dofs"),
-        (lambda: modal(BEAM, np.ones(60)), "60 damping ratios"),
-        (lambda: Measurement(OMEGA, EXACT, (2, 8)), r"inputs = \(2, 8\) of the sensors 0 to 7"),
-        (lambda: measured(weights=np.ones(7)), r"weights \(7,\) fit neither"),
+        (lambda: AtSensors(BEAM.in_basis(np.eye(48)[:, ::-1] * 2)).at(START), "must be dofs"),
+        (lambda: modal(BEAM, np.ones(60)), "at most 48 damping ratios"),
+        (lambda: Measurement(OMEGA, EXACT, (2, 8)), r"inputs = \(2, 8\) must be from 0 to 7"),
+        (lambda: measured(weights=np.ones(7)), r"weights \(7,\) must be"),
         (lambda: responses(BEAM, START, GUESS, OMEGA, (2, 99)), r"inputs = \(2, 99\)"),
-        (lambda: responses(BEAM, START, GUESS, OMEGA * np.nan, (2,)), "at finite omega"),
+        (lambda: responses(BEAM, START, GUESS, OMEGA * np.nan, (2,)), "omega finite"),
         (lambda: update_by_output(BEAM, measured(), START, -GUESS), "ratios to start from"),
-        (lambda: update_by_output(BEAM, measured(), START[:3], GUESS), "9 of them"),
+        (lambda: update_by_output(BEAM, measured(), START[:3], GUESS), r"needed is \(9,\)"),
         (
             lambda: update_by_output(BEAM, Measurement(OMEGA, EXACT[:, :5], (2, 4)), START, GUESS),
-            "8 sensors, the test 5",
+            "8 sensors of the model for 5 of the test",
         ),
-        (lambda: response_function_method(BEAM, measured(), START, np.eye(3)), "3\\) for 48 dofs"),
-        (lambda: response_function_method(BEAM, measured(), START, BEAM.K, steps=0), "0 steps"),
+        (
+            lambda: response_function_method(BEAM, measured(), START, np.eye(3)),
+            "needed is .48",
+        ),
+        (lambda: response_function_method(BEAM, measured(), START, BEAM.K, steps=0), "steps = 0"),
         (lambda: parametric_basis(BEAM, 0, START), "n_modes = 0"),
         (lambda: data.noisy(EXACT, -0.1, np.random.default_rng(0)), "level = -0.1"),
         (lambda: data.random_error(0.5, 0), "n_averages = 0"),
         (lambda: data.beside_poles(OMEGA, [1.0, 2.0], [0.1], 30.0), "2 poles"),
-        (lambda: data.frac(EXACT, EXACT[:3]), "cannot be compared"),
+        (lambda: data.frac(EXACT, EXACT[:3]), "for .* others"),
     ],
 )
 def test_wrong_input_is_named(change, message):
@@ -466,7 +469,7 @@ def test_wrong_input_is_named(change, message):
 
 
 def test_a_structure_that_lost_its_stiffness_is_refused():
-    with pytest.raises(ModelError, match="not positive"):
+    with pytest.raises(ModelError, match="must be positive"):
         modal(BEAM.at([-2.0] * 6 + [0.0] * 3), [])
     with pytest.raises(ModelError, match="mass matrix"):
         modal(BEAM.at([0.0] * 6 + [-2.0] * 3), [])

@@ -59,5 +59,5 @@ def test_a_solid_that_is_no_hub_is_named():
     with pytest.raises(ConfigError, match=r"'hub' has 1\d+ kg and .* all of the hub has 56780"):
         turbine(4, hub_body=hub(rho=25_000.0))
     few = replace(hub(), markers={k: v for k, v in hub().markers.items() if k != "blade_2"})
-    with pytest.raises(ConfigError, match=r"'hub' has no interfaces \['blade_2'\]"):
+    with pytest.raises(ConfigError, match=r"'hub' needs the interfaces \['blade_2'\]"):
         turbine(4, hub_body=few)

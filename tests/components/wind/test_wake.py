@@ -185,12 +185,12 @@ def test_the_actuator_is_that_of_the_report():
 @pytest.mark.parametrize(
     ("wind", "said"),
     [
-        ([[0.0, 8.0], [0.0, 9.0]], "instants of a wind ascend"),
+        ([[0.0, 8.0], [0.0, 9.0]], "instants of a wind must ascend"),
         ([[0.0, np.nan]], "finite"),
         (lambda t: 8.0, "wind"),
         ([8.0, 9.0], "no speed over time"),
         (np.zeros((0, 2)), "no speed over time"),
-        (-8.0, "from behind"),
+        (-8.0, "must not be negative"),
     ],
 )
 def test_a_wind_that_cannot_be_is_named(wind, said):

@@ -292,11 +292,11 @@ FAULTS = {
     "two bodies": (nowhere, MeshError, "not connected; they do not touch"),
     "doubled nodes": (unmerged, MeshError, "18 nodes of them lie on nodes of others"),
     "facet of no cell": (facet_of_no_cell, TagError, "1 of 1 facets of surface 'pin'"),
-    "facet out of range": (facet_out_of_range, TagError, "'pin' names nodes outside 0 to 35"),
+    "facet out of range": (facet_out_of_range, TagError, "'pin' must name nodes from 0 to 35"),
     "no cells": (lambda m: recelled(m, np.empty((0, 4), int)), MeshError, "no volume cells"),
     "region without a name": (lambda m: replace(m, regions=m.regions + 4), TagError, "region 5"),
     "region without cells": (
-        lambda m: replace(m, region_names={1: "body", 2: "liner"}), TagError, "'liner' has no",
+        lambda m: replace(m, region_names={1: "body", 2: "liner"}), TagError, "'liner' needs cells",
     ),
     "region with a name of two lines": (
         lambda m: replace(m, region_names={1: "a\nb"}), TagError, "U+000A",

@@ -292,7 +292,7 @@ def test_settling_brings_the_start_nearer():
     ({"period": 1.0, "tolerance": 0.0}, "tolerance"),
     ({"period": 1.0, "conservative": True}, "nothing drives"),
     ({"period": 1.0, "turns": {"giude": 1.0}}, "no joint or body 'giude'"),
-    ({"period": 1.0, "turns": {"guide": 1.0}}, "'guide' is prismatic, which has no angle"),
+    ({"period": 1.0, "turns": {"guide": 1.0}}, "'guide' is prismatic; take a revolute"),
 ])  # fmt: skip
 def test_wrong_arguments_are_named(more, message):
     with pytest.raises(ConfigError, match=message):

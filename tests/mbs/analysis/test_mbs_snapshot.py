@@ -63,7 +63,7 @@ def test_a_body_at_rest_weighs_on_its_pin():
     assert_allclose(rest.joint("pin").angle, np.arctan2(0.3, 0.4), rtol=1e-9)
     assert_allclose(rest.interface_loads("bob")["eye"], rest.reaction("pin"), atol=1e-9)
     assert rest.at(0.0) is rest
-    with pytest.raises(ConfigError, match=r"t = 1 s is not within the motion from 0 s to 0 s"):
+    with pytest.raises(ConfigError, match=r"t = 1 s must be within the motion from 0 s to 0 s"):
         rest.at(1.0)
 
 

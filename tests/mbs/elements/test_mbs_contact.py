@@ -274,7 +274,7 @@ WRONG = {
     "no axis": (lambda m, a, b: m.disc_on_plane("s", a, b, Impact(1), normal=Z, axis=0 * Z,
                                                 radius=1), "axis of s"),
     "too large": (lambda m, a, b: m.sphere_on_cylinder("s", a, b, Impact(1), axis=Z, radius1=1,
-                                                       radius2=1, inside=True), "does not fit"),
+                                                       radius2=1, inside=True), "must be smaller"),
     "itself": (lambda m, a, b: m.sphere_on_sphere("s", b, b, Impact(1), radius1=1, radius2=1),
                "with itself"),
     "no capsule": (lambda m, a, b: m.capsule_on_capsule("s", a, b, Impact(1), radius1=1, radius2=1,

@@ -253,16 +253,16 @@ def unknown_name(t, parameters, motion, memory, out):
 
 
 REFUSED = [
-    (lambda m, a, b: m.law("l", late_nan), "acts on no marker"),
-    (lambda m, a, b: m.law("l", None, a), "function = None of law 'l' is no function"),
-    (lambda m, a, b: m.law("l", late_nan, a, tangents=3), "tangents = 3 of law 'l' is no function"),
+    (lambda m, a, b: m.law("l", late_nan), "needs a marker"),
+    (lambda m, a, b: m.law("l", None, a), "function = None of 'l' must be a function"),
+    (lambda m, a, b: m.law("l", late_nan, a, tangents=3), "tangents = 3 of 'l' must be a function"),
     (
         lambda m, a, b: m.law("l", unknown_name, a, compiled=True),
         "law 'l' cannot be compiled: NameError: .*'nobody' is not defined",
     ),
     (lambda m, a, b: m.law("l", late_nan, a, parameters=[np.inf]), "parameters"),
     (lambda m, a, b: m.law("l", late_nan, rom.mbs.Marker("nobody", (0.0, 0.0, 0.0))), "nobody"),
-    (lambda m, a, b: m.add("l", 3, laws.LAWS_FAMILY), "element = 3 of 'l' is no Law"),
+    (lambda m, a, b: m.add("l", 3, laws.LAWS_FAMILY), "element = 3 of 'l' must be of type Law"),
     (lambda m, a, b: m.add("l", 3, 4), "family = 4 must be of type Family"),
 ]
 

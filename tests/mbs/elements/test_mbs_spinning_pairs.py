@@ -55,7 +55,7 @@ def test_speeds_that_teeth_cannot_have_are_named():
     mech = rom.Mechanism()
     ends = [mech.add_rigid(name, mass=1, inertia=(1, 1, 1), at=(x, 0, 0), spin=(0, 0, speed))
             for name, x, speed in (("a", 0, 30.0), ("b", PAIR.distance, 19.5))]  # fmt: skip
-    with pytest.raises(ConfigError, match=r"teeth 26 and 40 turn at 30 and -19.5"):
+    with pytest.raises(ConfigError, match=r"teeth 26 and 40 need 30 and -19.5"):
         mech.gear_mesh("mesh", *(end.marker(ORIGIN) for end in ends), axis=Z, pair=PAIR,
                        stiffness=1e10)  # fmt: skip
     balls, rings = rom.mbs.BallBearing(9, 0.01, 0.05), (ends[0].marker(ORIGIN), mech.ground)

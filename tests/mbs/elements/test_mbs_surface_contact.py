@@ -155,7 +155,7 @@ def test_messages(brick):
         mech.surface_on_sphere("ball", floor, box, LAW, radius=1.0)
     with pytest.raises(ConfigError, match="with itself"):
         mech.surface_on_sphere("ball", part.marker("root"), part, LAW, radius=1.0)
-    with pytest.raises(ConfigError, match="is flexible: its markers"):
+    with pytest.raises(ConfigError, match="is flexible; use its markers"):
         part.marker((0.0, 0.0, 0.0))
     bare = rom.Mechanism()
     bald = bare.add_flexible("brick", replace(brick, surface=None))

@@ -158,6 +158,6 @@ def test_at_the_instants_themselves_nothing_changes():
     assert_allclose(again.reaction("main"), sol.reaction("main"), rtol=1e-12, atol=1e-9)
     assert sol.at(0.0105).position("slider").shape == (1, 3)
     with pytest.raises(
-        ConfigError, match=r"t = 0\.03 s is not within the motion from 0 s to 0\.02 s"
+        ConfigError, match=r"t = 0\.03 s must be within the motion from 0 s to 0\.02 s"
     ):
         sol.at(0.03)

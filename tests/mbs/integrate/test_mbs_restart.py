@@ -80,7 +80,7 @@ def test_a_state_file_says_what_is_wrong_with_it(tmp_path):
             rom.load_state(tmp_path / f"{name}.npz")
     with pytest.raises(FileFormatError, match="schema 'rom-state'"):
         rom.load(path)
-    with pytest.raises(QualityGateError, match="v of the state is not finite"):
+    with pytest.raises(QualityGateError, match="v of the state must be finite"):
         rom.save_state(replace(state, v=state.v * np.nan), path)
     assert path.read_bytes() == data
     assert sorted(p.name for p in tmp_path.iterdir()) == [

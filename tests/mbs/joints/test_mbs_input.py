@@ -71,7 +71,7 @@ WRONG = {
                              "must be of type Marker"),
     "axes not perpendicular": (lambda m, box, bar: m.universal(
         "j", box.marker("a"), bar.marker("a"), axis1=Z, axis2=(0, 1, 1)), ConfigError,
-        "not perpendicular"),
+        "must be perpendicular"),
     "drive of a ball": (lambda m, *_: m.drive("d", "ball", lambda t: t), ConfigError,
                         "'ball' is spherical"),
     "drive of nothing": (lambda m, *_: m.drive("d", "hunge", lambda t: t), ConfigError,
@@ -82,7 +82,7 @@ WRONG = {
         "s", box.marker("a"), bar.marker("a"), stiffness="hard"), ConfigError, "stiffness"),
     "coil on a slide": (lambda m, box, bar: (
         m.prismatic("slide", mechanism_ground(m), bar.marker("b"), axis=Z),
-        m.rotational_spring("coil", "slide", stiffness=1.0)), ConfigError, "does not turn"),
+        m.rotational_spring("coil", "slide", stiffness=1.0)), ConfigError, "no coordinate 'angle'"),
     "force of two": (lambda m, box, bar: m.force("f", box.marker("a"), (1, 2)), ConfigError,
                      "vector of f"),
     "force in no frame": (lambda m, box, bar: m.force(

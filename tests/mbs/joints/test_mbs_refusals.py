@@ -114,7 +114,7 @@ def test_wrong_joints_and_forces_are_refused_and_leave_no_trace(case, parts):
     [
         ("car", "a", "no body 'car'; the mechanism has ['bar', 'box']"),
         ("bar", "hub", "body 'bar' has no marker 'hub'; it has ['a', 'b']"),
-        ("bar", (0, 0, 0), "body 'bar' is flexible: its markers are ['a', 'b']"),
+        ("bar", (0, 0, 0), "'bar' is flexible; use its markers ['a', 'b']"),
     ],
 )
 def test_markers_of_another_mechanism_are_refused_when_they_fit_nothing(name, place, words, parts):

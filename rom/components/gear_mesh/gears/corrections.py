@@ -93,7 +93,7 @@ def checked_map(given: Any, teeth: int, what: str) -> Array:
     found = found[None] if found.ndim == 2 else found
     if found.ndim != 3 or not found.size or found.shape[0] not in (1, abs(teeth)):
         raise ModelError(
-            f"{what} has shape {np.shape(given)}: it is (n_profile, n_lead) or ({abs(teeth)}, "
+            f"{what} has shape {np.shape(given)}, needed is (n_profile, n_lead) or ({abs(teeth)}, "
             "n_profile, n_lead)."
         )
     if not np.isfinite(found).all():

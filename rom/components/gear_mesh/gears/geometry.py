@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import brentq
 
-from rom.arguments import typed
+from rom.arguments import positive, typed
 from rom.errors import ModelError
 from rom.model import Array
 
@@ -63,12 +63,13 @@ class GearPair:
     def __post_init__(self) -> None:
         if min(map(abs, self.teeth)) < 4 or not (self.module > 0 and self.width > 0):
             raise ModelError(
-                f"no gears have {self.teeth} teeth of module {self.module} m, {self.width} m wide."
+                f"no gears have {self.teeth} teeth of module {self.module} m, {self.width} m wide; "
+                "needed are at least 4 teeth, and module and width > 0."
             )
         if not abs(self.helix) < 0.9 or not 0.1 < self.pressure_angle < 0.7:
             raise ModelError(
-                f"helix {self.helix} and pressure angle {self.pressure_angle} are in radians; "
-                "usual are up to 0.6 and 0.35."
+                f"helix {self.helix} and pressure angle {self.pressure_angle} must be in radians, "
+                "below 0.9 and between 0.1 and 0.7."
             )
         fits = self.helix if self.internal else -self.helix
         if self.gear_helix is not None and not abs(self.gear_helix - fits) < 1e-9:
@@ -83,8 +84,8 @@ class GearPair:
                 f"no pinion of {self.teeth[0]} teeth turns in a gear of {self.teeth[1]}.",
                 hint="Of an internal gear the number is negative, and larger than the pinion's.",
             )
-        if self.centre_distance is not None and not self.centre_distance > 0:
-            raise ModelError(f"a centre distance of {self.centre_distance} m is not above zero.")
+        if self.centre_distance is not None:
+            positive("centre_distance", self.centre_distance, error=ModelError)
         self._check_teeth()
         if not self.cos_working < 1:
             raise ModelError(

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from rom.arguments import typed
+from rom.arguments import between, positive, typed
 from rom.components.gear_mesh.gears.geometry import GearPair
 from rom.components.gear_mesh.gears.racks import RackPair
 from rom.errors import ModelError
@@ -53,9 +53,9 @@ class Hertz:
         """
         h = np.atleast_2d(np.asarray(self.depths, dtype=float))
         if h.ndim != 2 or h.shape[1] != 2 or not (np.isfinite(h).all() and (h > 0).all()):
-            raise ModelError(f"depths {self.depths} of Hertz's contact are (2,) or (n, 2) above 0.")
-        if not (self.E > 0 and 0 <= self.nu < 0.5):
-            raise ModelError(f"no material has E = {self.E} Pa and nu = {self.nu}.")
+            raise ModelError(f"depths {self.depths} of Hertz's contact must be (2,) or (n, 2) > 0.")
+        positive("E", self.E, error=ModelError)
+        between("nu", self.nu, 0, 0.5, "[)", error=ModelError)
         share = np.linspace(0, 1, N_PLACES)
         h = np.stack([np.interp(share, np.linspace(0, 1, len(h)), column) for column in h.T])
         s = pair.path[0] + share * (pair.path[1] - pair.path[0])

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rom.arguments import finite, number, positive
+from rom.arguments import between, finite, not_negative, number, positive, unit_vector, whole
 from rom.components.gear_mesh.gears.corrections import Correction, checked_map
 from rom.components.gear_mesh.gears.geometry import GearPair
 from rom.components.gear_mesh.gears.hertz import Hertz
@@ -131,22 +131,16 @@ def gear_mesh(  # noqa: PLR0913  one keyword per property
             no gaps.
     """
     if not all(float(z).is_integer() for z in pair.teeth):
-        raise ConfigError(f"the wheels of mesh {name!r} have {pair.teeth} teeth: whole numbers.")
-    self.check_markers(name, wheel_a, wheel_b)
-    if wheel_a.body == wheel_b.body:
-        raise ConfigError(f"mesh {name!r} is of body {wheel_a.body!r} with itself.")
-    z = finite("axis", axis, (3,))
-    if not np.linalg.norm(z) > 0.0:
-        raise ConfigError(f"the axis of mesh {name!r} is zero.")
-    z = z / np.linalg.norm(z)
+        raise ConfigError(f"wheels of {name!r} have {pair.teeth} teeth, needed are whole ones.")
+    self.check_apart(name, wheel_a, wheel_b)
+    z = unit_vector(f"axis of {name}", axis)
     D = self.design_point(wheel_b) - self.design_point(wheel_a)
     _check_place(name, pair, D, z)
     c = np.sign(pair.distance) * (D - (D @ z) * z) / np.linalg.norm(D - (D @ z) * z)
     turned = [matrix(self.part(wheel.body).p) for wheel in (wheel_a, wheel_b)]
     along = np.cross(z, c) if isinstance(pair, RackPair) else -c
     axes = np.array([z @ turned[0], c @ turned[0], z @ turned[1], along @ turned[1]])
-    if not 1 <= cells <= MAX_CELLS:
-        raise ConfigError(f"cells = {cells} of mesh {name!r}: it has from 1 to {MAX_CELLS}.")
+    whole(f"cells of mesh {name!r}", cells, 1, MAX_CELLS)
     follows = _follows_energy(name, pair, entry, conservative)
     numbers = (
         *_law(name, damping, friction, transition_speed), follows,
@@ -194,11 +188,11 @@ def _spins(
     one, two = (part.spin_about(name, axes[2 * k]) for k, part in enumerate(parts))
     z, w = pair.teeth
     if two and not w:
-        raise ConfigError(f"the rack of {name!r} spins at {two:.9g} rad/s: only wheels do.")
+        raise ConfigError(f"the rack of {name!r} spins at {two:.9g} rad/s; give it no spin.")
     if one and two and abs(z * one + w * two) > SPIN_RATIO_RTOL * abs(z * one):
         raise ConfigError(
             f"the wheels of mesh {name!r} spin at {one:.9g} and {two:.9g} rad/s about its axis: "
-            f"teeth {z} and {w} turn at {one:.9g} and {-one * z / w:.9g}."
+            f"teeth {z} and {w} need {one:.9g} and {-one * z / w:.9g}."
         )
     return one, two
 
@@ -207,8 +201,7 @@ def _follows_energy(
     name: str, pair: GearPair | RackPair, entry: Any, conservative: bool | None
 ) -> float:
     """1 for forces that follow the energy along the path, 0 for those along involutes."""
-    if not 0.0 <= number("entry", entry) <= MAX_ENTRY:
-        raise ConfigError(f"entry = {entry:g} of mesh {name!r} is a share from 0 to {MAX_ENTRY}.")
+    between(f"entry of mesh {name!r}", entry, 0, MAX_ENTRY)
     jumps = entry == 0.0 and pair.helix == 0.0
     if conservative and jumps:
         raise ConfigError(
@@ -221,13 +214,7 @@ def _follows_energy(
 
 def _coupling(name: str, length: Any, pair: GearPair | RackPair) -> float:
     """Length over which slices carry each other [m]."""
-    if not 0.0 <= number("coupling", length) <= pair.width:
-        raise ConfigError(
-            f"coupling = {length:g} m of mesh {name!r} is a length from 0 to the width, "
-            f"{pair.width:g} m.",
-            hint="Teeth carry their neighbours over about a module.",
-        )
-    return float(length)
+    return between(f"coupling [m] of mesh {name!r} and its width", length, 0, pair.width)
 
 
 def _check_place(name: str, pair: GearPair | RackPair, D: Array, z: Array) -> None:
@@ -242,16 +229,15 @@ def _check_place(name: str, pair: GearPair | RackPair, D: Array, z: Array) -> No
         )
     if not abs(float(D @ z)) <= FACE_RTOL * pair.width:
         raise ConfigError(
-            f"the faces of mesh {name!r} are {abs(D @ z) * 1e3:.4g} mm beside each other: wheel_a "
-            "and wheel_b are the middles of the common face.",
+            f"the faces of mesh {name!r} are {abs(D @ z) * 1e3:.4g} mm beside each other; wheel_a "
+            "and wheel_b must be the middles of the common face.",
         )
 
 
 def _law(name: str, damping: Any, friction: Any, speed: Any) -> tuple[float, ...]:
     """Damping, friction and transition speed."""
     for what, value in (("damping", damping), ("friction", friction)):
-        if number(what, value) < 0.0:
-            raise ConfigError(f"{what} of mesh {name!r} is {value:g}: it must not drive.")
+        not_negative(f"{what} of mesh {name!r}", value)
     if friction and speed is None:
         raise ConfigError(
             f"mesh {name!r} has friction, but no transition_speed.",
@@ -275,14 +261,10 @@ def _stiffness(name: str, given: Any) -> Array:
 def _check_correction(name: str, pair: GearPair | RackPair, correction: Correction) -> None:
     """Refuse errors and maps of other wheels."""
     for errors, z in zip(correction.pitch, pair.teeth, strict=True):
-        if len(errors) not in (0, abs(z)):
-            raise ConfigError(
-                f"{len(errors)} pitch errors of {name!r} for {z} teeth: one per tooth."
-            )
-        if not np.isfinite(np.asarray(errors, dtype=float)).all():
-            raise ConfigError(f"pitch errors of {name!r} are not all finite numbers.")
+        if len(errors):
+            finite(f"pitch errors of {name!r}", errors, (abs(z),))
     if isinstance(pair, RackPair) and correction.run_out[1][0] != 0.0:
-        raise ConfigError(f"the rack of {name!r} does not turn: it has no run-out.")
+        raise ConfigError(f"the rack of {name!r} does not turn; give it no run-out.")
     for amount, direction in correction.run_out:
         ends = finite("run_out", (amount, direction), (2,))
         if not abs(ends[0]) <= MAX_RUN_OUT * pair.module:

@@ -110,7 +110,7 @@ class JournalBearing:
         if not 0 <= self.preload < 1:
             raise ModelError(f"preload {self.preload} leaves no room; it is from 0 to below 1.")
         if self.bore is not None and self.preload:
-            raise ModelError("a bearing has a preload of two lobes, or a bore of its own.")
+            raise ModelError("a bearing takes a preload of lobes or a bore of its own, not both.")
         if self.cavitation == "jfo" and not self.grooves:
             raise ModelError(
                 "a mass-conserving film without a groove has no oil.", hint="Add a Groove."
@@ -119,7 +119,7 @@ class JournalBearing:
             raise ModelError(f"{self.cells} cells are too few; at least 12 around and 2 along.")
         object.__setattr__(self, "grid", _grid(self))
         if not (np.isfinite(self.grid.bore).all() and self.grid.bore.min() > 0.0):
-            raise ModelError("the bore leaves a centred journal no room; it is above zero.")
+            raise ModelError("the bore must be > 0 all around, to leave a centred journal room.")
 
     @property
     def radius(self) -> float:
@@ -166,7 +166,7 @@ def multilobe(lobes: int, preload: float, *, first: float = 0.0) -> Callable[[Ar
         ModelError: for no arcs, or a preload that leaves no room.
     """
     if lobes < 1 or not 0 <= preload < 1:
-        raise ModelError(f"{lobes} lobes with preload {preload} are no bore.")
+        raise ModelError(f"lobes = {lobes} must be at least 1, preload = {preload} 0 to 1.")
     half = np.pi / lobes
 
     def bore(angles: Array) -> Array:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rom.arguments import finite, number, positive
+from rom.arguments import between, finite, number, positive, unit_vector
 from rom.components.journal_bearing.films.bearing import JFO, REYNOLDS, JournalBearing
 from rom.components.journal_bearing.films.bores import bore_of
 from rom.components.journal_bearing.films.cells import CLEARANCE, N_ANSWERS, cells_of
@@ -108,9 +108,7 @@ def journal_bearing(  # noqa: PLR0913  one keyword per property
             start, numbers no film has, an elastic bush without functions of this bore, or a film
             that is more than a table.
     """
-    self.check_markers(name, journal, bush)
-    if journal.body == bush.body:
-        raise ConfigError(f"bearing {name!r} is of body {journal.body!r} with itself.")
+    self.check_apart(name, journal, bush)
     z, x = _directions(name, axis, reference)
     turned = [matrix(self.part(side.body).p) for side in (journal, bush)]
     axes = np.array([z @ turned[0], z @ turned[1], x @ turned[1]])
@@ -136,10 +134,7 @@ def journal_bearing(  # noqa: PLR0913  one keyword per property
 
 def _directions(name: str, axis: npt.ArrayLike, reference: npt.ArrayLike | None) -> Array:
     """(2, 3) axis, and direction from which angles count."""
-    z = finite("axis", axis, (3,))
-    if not np.linalg.norm(z) > 0.0:
-        raise ConfigError(f"the axis of bearing {name!r} is zero.")
-    z = z / np.linalg.norm(z)
+    z = unit_vector(f"axis of {name}", axis)
     if reference is None:
         given = np.eye(3)[1 if abs(z[0]) > PARALLEL_COSINE else 0]
     else:
@@ -147,8 +142,8 @@ def _directions(name: str, axis: npt.ArrayLike, reference: npt.ArrayLike | None)
     x = given - (given @ z) * z
     if not np.linalg.norm(x) > 1e-6 * np.linalg.norm(given):
         raise ConfigError(
-            f"reference of bearing {name!r} lies along its axis: angles count from a direction "
-            "across it."
+            f"reference of bearing {name!r} lies along its axis; give a direction across it, from "
+            "which angles count."
         )
     return np.array([z, x / np.linalg.norm(x)])
 
@@ -175,25 +170,25 @@ def _oil(name: str, oil: Oil | float, inlet: float | None) -> tuple[float, ...]:
     """Viscosity if it stays, law, density, specific heat and inlet temperature."""
     if isinstance(oil, Oil):
         if inlet is None:
-            raise ConfigError(f"bearing {name!r} has an oil, but no inlet temperature.")
+            raise ConfigError(f"bearing {name!r} has an oil; give its inlet temperature.")
         if not float(oil.viscosity(number("inlet", inlet))) > 0.0:
-            raise ConfigError(f"inlet = {inlet} of bearing {name!r}: its oil boils before.")
+            raise ConfigError(
+                f"inlet = {inlet} of {name!r}: the oil boils before; give degrees Celsius."
+            )
         return (0.0, *oil.law(), oil.density, oil.heat, float(inlet))
     if inlet is not None:
         raise ConfigError(
             f"bearing {name!r} has an inlet temperature, but a viscosity that stays.",
             hint="Give an rom.mbs.Oil instead.",
         )
-    if not number("oil", oil) > 0.0:
-        raise ConfigError(f"oil of bearing {name!r} is {oil} Pa s: a viscosity is positive.")
+    positive(f"oil of bearing {name!r} [Pa s]", oil)
     return (float(oil), 0.0, 0.0, 1.0, 1.0, 0.0)
 
 
 def _heat(name: str, carried: float, felt: float, lag: float) -> tuple[float, float]:
     """Share of the heat that the temperature feels, and its lag."""
     for what, value in (("carried", carried), ("felt", felt)):
-        if not 0.0 <= number(what, value) <= 1.0:
-            raise ConfigError(f"{what} = {value} of bearing {name!r} is a share from 0 to 1.")
+        between(f"{what} of bearing {name!r}", value, 0, 1)
     return float(carried) * float(felt), positive("thermal_time", lag)
 
 

@@ -40,7 +40,7 @@ class Oil:
         if not (self.nu_40 > self.nu_100 > 0.3 and self.density > 0 and self.heat > 0):
             raise ModelError(
                 f"no oil has {self.nu_40} mm2/s at 40 C and {self.nu_100} mm2/s at 100 C: hot oil "
-                "is thinner."
+                "is thinner; needed are nu_40 > nu_100 > 0.3, density > 0 and heat > 0."
             )
 
     def law(self) -> tuple[float, float]:

@@ -87,7 +87,7 @@ def _table(bearing: JournalBearing) -> Array:
             begin(f"table of a film of {nt} x {nz} cells")
             part = slice(some[0], some[-1] + 1)
             if not solve_nodes(cells, states[part], values[part]):
-                raise ModelError("a film of this bearing finds no pressure; refine its cells.")
+                raise ModelError("a film of this bearing finds no pressure; take more cells.")
     values *= (1 - e**2)[:, None] ** 2
     values = values.reshape(N_PLACES, N_PLACES, N_DIRECTIONS, N_VALUES)
     A, B = _natural(N_PLACES), _periodic(N_DIRECTIONS)

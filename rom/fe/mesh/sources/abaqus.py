@@ -209,7 +209,7 @@ def _regions(deck: Deck, ids: Index) -> tuple[dict[int, str], Index]:
         if (both := chosen & (regions > 0)).any():
             raise TagError(
                 f"element {ids[both][0]} is in the sections {names[regions[both][0]]!r} and "
-                f"{name!r}."
+                f"{name!r}; give it to only one."
             )
         regions[chosen] = number
     if not regions.all():

@@ -36,7 +36,9 @@ def make(gmsh: Any, path: Path, request: dict[str, Any]) -> Made:
     except (RomError, MemoryError):
         raise
     except Exception as error:
-        raise MeshError(f"build failed at {_place(error, path)}: {error}.") from error
+        raise MeshError(
+            f"build failed at {_place(error, path)}: {error}.", hint="Mend that line of the script."
+        ) from error
     plain = {name: value for name, value in values.items() if isinstance(value, str | int | float)}
     return plain, {name: x for name, x in defaults.items() if name in plain}
 

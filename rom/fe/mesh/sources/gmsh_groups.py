@@ -227,7 +227,7 @@ def _facets(gmsh: Any, tag: int, name: str, *, repeated: bool) -> Index:
     if not found:
         raise TagError(f"the physical surface {name!r} has no facets.", hint="Mesh it.")
     if len({rows.shape[1] for rows in found}) > 1:
-        raise MeshError(f"the physical surface {name!r} mixes facets of several types.")
+        raise MeshError(f"the physical surface {name!r} mixes types of facets; use only one.")
     return np.vstack(found)
 
 

@@ -101,7 +101,7 @@ class Picker:
             f"{r} ({count[r]} face{'s' * (count[r] > 1)})" for r in near[:MAX_SHOWN]
         ) + (", ..." if len(near) > MAX_SHOWN else "")
         there = f"the nearest radii are {listed} m." if near else "the part has no cylinder face."
-        raise TagError(f"no cylinder face has the radius {wanted:g} m; {there}")
+        raise TagError(f"no cylinder face has the radius {wanted:g} m.", hint=there)
 
     def _normal(self, wish: Pick) -> list[int]:
         """The plane face that looks this way."""
@@ -121,7 +121,7 @@ class Picker:
         near = sorted(planes, key=lambda f: angle[f.number])[:MAX_SHOWN]
         listed = ", ".join(f"{f.number} ({_words(f.normal or ())})" for f in near)
         there = f"the nearest are {listed}." if near else "the part has no plane face."
-        raise TagError(f"no plane face has the outward normal {wish.text[7:]}; {there}")
+        raise TagError(f"no plane face has the outward normal {wish.text[7:]}.", hint=there)
 
 
 def _angle(a: Array, b: Array) -> float:

@@ -75,7 +75,7 @@ class EquilibriumPath:
             ConfigError: if it is not one of the mechanism.
         """
         if marker not in self.now.packed.markers:
-            raise ConfigError(f"{marker!r} is not a marker of the mechanism.")
+            raise ConfigError(f"{marker!r} must be a marker of the mechanism.")
         k, places = self.now.packed.row(marker), []
         for state in self.states:
             self.now.evaluate(state.q, state.v)
@@ -134,7 +134,7 @@ def continuation(
     """
     first, last = finite("span", span, (2,))
     if first == last:
-        raise ConfigError(f"span = ({first:g}, {last:g}) s has no length.")
+        raise ConfigError(f"span = ({first:g}, {last:g}) s needs two values that differ.")
     whole("n", n, 2, MAX_POINTS)
     longest = positive("step", step)
     now = instant(mechanism, first, sparse=True)
@@ -309,13 +309,13 @@ class _March:
         now = self.problem.now
         now.remember(state)
         if (np.size(state.q), np.size(state.lam)) != (now.packed.q.size, now.W.value.size):
-            raise ConfigError("the state belongs to another mechanism.")
+            raise ConfigError("the state must belong to this mechanism: take it from this branch.")
         step = np.concatenate([along, 0 * state.lam])
         length = self.curve.length(step, 0.0)
         if not length > 0.0:
-            raise ConfigError("along is no motion: all of it is zero.")
+            raise ConfigError("along needs a motion: all of it is zero.")
         if not self.low <= state.t <= self.high:
-            raise ConfigError(f"the branch leaves at t = {state.t:g} s, which is outside the span.")
+            raise ConfigError(f"the branch leaves at t = {state.t:g} s; it must be in the span.")
         return Point(self.still(state), state.t, step / length, 0.0)
 
     def still(self, state: State) -> State:

@@ -105,7 +105,7 @@ class Family:
     def _check_size(self, flow: Flow, p: float) -> None:
         q = self.first.solution.q
         if flow.packed.q.size != q.shape[1]:
-            raise ConfigError(f"the mechanism has other bodies at {p:g} than at the first value.")
+            raise ConfigError(f"the bodies at {p:g} must be those at the first value.")
 
     def turning(self, flow: Flow, start: Start) -> Turns:
         """What advances."""

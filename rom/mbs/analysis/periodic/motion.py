@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rom.arguments import number, positive, typed, whole
+from rom.arguments import between, positive, typed, whole
 from rom.errors import ConfigError, SolverError
 from rom.mbs.analysis.linearize import linearize
 from rom.mbs.analysis.periodic.derivatives import Derivatives, Tangent
@@ -170,7 +170,7 @@ def periodic_motion(  # noqa: PLR0913  one keyword per choice, most have default
         rho_inf = CONSERVATIVE_RHO_INF if conservative else RHO_INF
     whole("settle", settle, 0, MAX_SETTLE)
     if conservative and period is not None:
-        raise ConfigError("conservative is for motions that nothing drives; here period is given.")
+        raise ConfigError("conservative is for motions that nothing drives; leave period out.")
     for more in range(MAX_TRIALS):
         shooting, flow, begin = prepared(
             mechanism, period, start, turns, steps + more, rho_inf, guess, t_start, tolerance,
@@ -222,8 +222,7 @@ def prepared(  # noqa: PLR0913  the arguments of the verb
         t_start = 0.0 if state is None else state.t
     whole("steps", steps, 4, MAX_STEPS)
     positive("tolerance", tolerance)
-    if not 0.0 <= number("rho_inf", rho_inf) <= 1.0:
-        raise ConfigError(f"rho_inf = {rho_inf:g} is outside [0, 1].")
+    between("rho_inf", rho_inf, 0, 1)
     if period is not None:
         positive("period", period)
     if guess is not None:

@@ -140,7 +140,7 @@ def periodic_path(  # noqa: PLR0913  one keyword per choice, most have defaults
     """
     first, last = finite("span", span, (2,))
     if first == last:
-        raise ConfigError(f"span = ({first:g}, {last:g}) has no length.")
+        raise ConfigError(f"span = ({first:g}, {last:g}) needs two values that differ.")
     whole("n", n, 2, MAX_POINTS)
     longest = positive("step", step)
     T = period_at(period, first)

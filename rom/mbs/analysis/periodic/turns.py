@@ -160,7 +160,7 @@ def _hinged(
 
 def _of_joint(mechanism: Mechanism, joint: Joint) -> tuple[str, Array, Array, float]:
     if joint.turn is None or joint.turn.kind != ANGLE:
-        raise ConfigError(f"turns: joint {joint.name!r} is {joint.kind}, which has no angle.")
+        raise ConfigError(f"turns: {joint.name!r} is {joint.kind}; take a revolute joint.")
     one, two = joint.markers[:2]
     marker, sign = (one, -1.0) if two.body == GROUND else (two, 1.0)
     base, part = mechanism.part(one.body), mechanism.part(marker.body)

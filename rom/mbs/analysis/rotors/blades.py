@@ -163,7 +163,7 @@ def _bodies(blades: Any, packed: Packed) -> Index:
         raise ConfigError("blades must be alike: the same bodies in the same order for each.")
     every = np.array(rows)
     if np.unique(every).size != every.size:
-        raise ConfigError("blades: a body belongs to two blades, or twice to one.")
+        raise ConfigError("blades: each body must be listed once, in only one blade.")
     return every
 
 

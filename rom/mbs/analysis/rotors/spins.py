@@ -16,7 +16,7 @@ from rom.mbs.analysis.rotors.moving_axes import IN_BODIES, small_motions
 from rom.mbs.kernels.system import COUPLING, ROLL
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.parts.bodies import GROUND
-from rom.mbs.parts.joints import joint_with_axis
+from rom.mbs.parts.joints import coordinate_of
 from rom.mbs.results.state import State
 from rom.model import Array
 
@@ -69,7 +69,10 @@ class Spins:
         rolls = now.packed.system.rows.kind == ROLL
         if found.any and rolls.any():
             name = now.packed.row_owner[int(np.argmax(rolls))]
-            raise ModelError("what rolls has no equilibrium while it spins.", where=name)
+            raise ModelError(
+                "what rolls has no equilibrium while it spins; use rom.simulate instead.",
+                where=name,
+            )
         return found
 
     @property
@@ -141,10 +144,9 @@ AT_REST = Spins(np.zeros(3), np.zeros(3))
 
 def _turning(mechanism: Mechanism, now: Instant, spin: Mapping[str, Any]) -> tuple[Turning, ...]:
     """The bodies behind each joint: what joints and elements connect with its second side."""
-    joints = [joint_with_axis(mechanism.joints, joint, "spin") for joint in spin]
-    for joint in joints:
-        if joint.turn is None:
-            raise ConfigError(f"spin: joint {joint.name!r} is {joint.kind}: it has no angle.")
+    for joint in spin:
+        coordinate_of(mechanism.joints, joint, "angle", "spin")
+    joints = [mechanism.joints[joint] for joint in spin]
     packed = now.packed
     number_of = {name: b for b, name in enumerate(packed.names)} | {GROUND: -1}
     fixed = [

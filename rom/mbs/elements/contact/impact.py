@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import brentq
 
-from rom.arguments import number, positive, typed
+from rom.arguments import between, not_negative, positive, typed
 from rom.errors import ConfigError
 from rom.mbs.parts.bodies import Part
 
@@ -54,10 +54,9 @@ class Impact:
         for name in ("stiffness", "exponent", "transition_speed"):
             positive(name, getattr(self, name))
         for name in ("damping", "mu", "tangential_damping"):
-            if number(name, getattr(self, name)) < 0.0:
-                raise ConfigError(f"{name} = {getattr(self, name):g} must not be negative.")
+            not_negative(name, getattr(self, name))
         if self.exponent < 1.0:
-            raise ConfigError(f"exponent = {self.exponent:g} is below one: infinitely stiff.")
+            raise ConfigError(f"exponent = {self.exponent:g} must be at least 1: infinitely stiff.")
         self._check_spring()
         if (self.restitution is None) != (self.impact_speed is None):
             raise ConfigError(
@@ -66,7 +65,7 @@ class Impact:
             )
         if self.restitution is not None:
             if self.damping:
-                raise ConfigError(f"damping = {self.damping:g} and restitution exclude each other.")
+                raise ConfigError(f"damping = {self.damping:g} and restitution; give only one.")
             factor = damping_of(self.restitution, positive("impact_speed", self.impact_speed))
             object.__setattr__(self, "damping", factor)
 
@@ -101,9 +100,7 @@ def damping_of(restitution: float, speed: float) -> float:
     Raises:
         ConfigError: if the coefficient is not above 0 and at most 1.
     """
-    e = number("restitution", restitution)
-    if not 0.0 < e <= 1.0:
-        raise ConfigError(f"restitution = {e:g} is outside (0, 1].")
+    e = between("restitution", restitution, 0, 1, "(]")
     if e > 1.0 - 1e-9:
         return 0.0
 
@@ -134,7 +131,6 @@ def hertz_stiffness(E1: float, nu1: float, E2: float, nu2: float, radius: float)
         Johnson, Contact Mechanics, 1985, equation 4.23.
     """
     for name, nu in (("nu1", nu1), ("nu2", nu2)):
-        if not -1.0 < number(name, nu) <= 0.5:
-            raise ConfigError(f"{name} = {nu:g} is outside (-1, 0.5].")
+        between(name, nu, -1, 0.5, "(]")
     soft = (1 - nu1**2) / positive("E1", E1) + (1 - nu2**2) / positive("E2", E2)
     return 4 / 3 * np.sqrt(positive("radius", radius)) / soft

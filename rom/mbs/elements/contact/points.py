@@ -165,8 +165,8 @@ def sphere_on_cylinder(  # noqa: PLR0913  two surfaces and a law
     radii = positive("radius2", radius2), positive("radius1", radius1)
     if inside and radii[0] >= radii[1]:
         raise ConfigError(
-            f"contact {name!r}: a sphere of {radii[0]:g} m does not fit into a bore of "
-            f"{radii[1]:g} m."
+            f"contact {name!r}: the sphere of {radii[0]:g} m must be smaller than the bore of "
+            f"{radii[1]:g} m; leave inside out for a sphere outside."
         )
     enter_contact(self, name, BORE if inside else CYLINDER, (m1, m2), law, (axis, None), radii)
 
@@ -182,8 +182,7 @@ def enter_contact(  # noqa: PLR0913  what the record holds
     half: tuple[float, float] = (0.0, 0.0),
 ) -> None:
     """Add a contact whose axes are given in the world at the start; None where it has none."""
-    if markers[0].body == markers[1].body:
-        raise ConfigError(f"contact {name!r} is of body {markers[0].body!r} with itself.")
+    self.check_apart(name, *markers)
     positive("radius", radius[0])
     directions = [
         np.zeros(3)

@@ -122,14 +122,16 @@ def _cover(
     self.check_new(name)
     part = self.part(str(getattr(part, "name", part)))
     if part.flexible is None:
-        raise ConfigError(f"contact {name!r}: body {part.name!r} is rigid, it has no surface.")
-    if part.name == m1.body:
-        raise ConfigError(f"contact {name!r} is of body {part.name!r} with itself.")
+        raise ConfigError(
+            f"contact {name!r}: body {part.name!r} is rigid, it has no surface.",
+            hint="Add it by add_flexible, or give markers and a sphere_contact.",
+        )
     law, e = checked_law(name, law, part, self.part(m1.body)), np.zeros(3)
     if axis is not None:
         world = unit_vector(f"axis of {name}", axis)
         e = rotation.matrix(self.part(m1.body).p).T @ world
     areas, spring = part.flexible.surface_areas(where), law.tangential_stiffness
+    self.check_apart(name, m1, Marker(part.name, surface_place(0)))
     for k in np.flatnonzero(areas):
         own = Impact(
             stiffness=float(law.stiffness * areas[k]),

@@ -360,13 +360,13 @@ BAD = [
     ({"correction": Correction(maps=(np.zeros((25, 4, 3)), None))}, r"\(25, 4, 3\).*or \(26"),
     ({"correction": Correction(maps=(None, np.zeros(4)))}, r"working flanks of the gear .*\(4,\)"),
     ({"correction": Correction(back_maps=(NAN, None))}, "back flanks of the pinion .* 12 values"),
-    ({"correction": Correction(pitch=(np.full(26, np.nan), ()))}, "not all finite"),
+    ({"correction": Correction(pitch=(np.full(26, np.nan), ()))}, "is not finite"),
     ({"correction": Correction(run_out=((1e-3, 0.0), (0, 0)))}, "run-out 0.001 m of 'mesh'"),
-    ({"coupling": -1e-3}, "coupling = -0.001 m of mesh 'mesh'"),
-    ({"coupling": 1.0}, "from 0 to the width, 0.03"),
+    ({"coupling": -1e-3}, "mesh 'mesh' and its width = -0.001 must"),
+    ({"coupling": 1.0}, "at least 0 and at most 0.03"),
     ({"conservative": True}, "energy of mesh 'mesh' would jump"),
-    ({"hertz": Hertz((1e-3, -1e-3))}, "depths .* above 0"),
-    ({"hertz": Hertz((1e-3, 1e-3), E=-1.0)}, "no material has E = -1"),
+    ({"hertz": Hertz((1e-3, -1e-3))}, "depths .* > 0"),
+    ({"hertz": Hertz((1e-3, 1e-3), E=-1.0)}, "E = -1 must be positive"),
 ]
 
 

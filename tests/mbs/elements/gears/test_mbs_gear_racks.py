@@ -226,9 +226,9 @@ def test_a_pinion_that_spins_in_its_frame_drives_its_rack():
 def test_what_a_rack_does_not_have_is_refused():
     with pytest.raises(ConfigError, match="rack of 'mesh' does not turn"):
         free(SPUR, correction=Correction(run_out=((0, 0), (1e-6, 0))))
-    with pytest.raises(ModelError, match="racks are elements"):
+    with pytest.raises(ModelError, match="racks are for elements"):
         Mesh(SPUR, K)
-    with pytest.raises(ModelError, match="racks and internal teeth is not known"):
+    with pytest.raises(ModelError, match="racks and internal teeth are not known"):
         stiffness_table(SPUR, force=1e5)
 
 

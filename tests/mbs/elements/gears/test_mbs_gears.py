@@ -292,10 +292,10 @@ def test_wheels_pressed_into_each_other_are_named():
 
 
 WRONG = [
-    ({"axis": (0, 0, 0)}, "axis of mesh 'mesh' is zero"),
+    ({"axis": (0, 0, 0)}, "axis of mesh has length zero"),
     ({"stiffness": []}, "stiffness of the teeth of 'mesh'"),
-    ({"cells": 0}, "cells = 0 of mesh 'mesh'"),
-    ({"correction": Correction(pitch=((0.0, 1.0), ()))}, "2 pitch errors of .*'mesh' for 26"),
+    ({"cells": 0}, "cells of mesh 'mesh' = 0"),
+    ({"correction": Correction(pitch=((0.0, 1.0), ()))}, "pitch errors of 'mesh' has shape"),
 ]
 
 
@@ -306,7 +306,7 @@ def test_what_is_no_mesh_is_refused(more, message):
             for n, x in (("a", 0.0), ("b", SPUR.distance))]  # fmt: skip
     with pytest.raises(ConfigError, match=message):
         mech.gear_mesh("mesh", *ends, **{"axis": Z, "pair": SPUR, "stiffness": K} | more)
-    with pytest.raises(ConfigError, match="of body 'a' with itself"):
+    with pytest.raises(ConfigError, match="connects body 'a' with itself"):
         mech.gear_mesh("mesh", ends[0], ends[0], axis=Z, pair=SPUR, stiffness=K)
     beside = mech.add_rigid("c", mass=1.0, inertia=(1e-3,) * 3, at=(SPUR.distance, 0, 0.01))
     with pytest.raises(ConfigError, match="10 mm beside each other"):
@@ -327,7 +327,7 @@ def test_an_internal_gear_is_one_of_negative_radii():
     last = np.sqrt(26e-3**2 - (24e-3 * np.cos(np.radians(20))) ** 2)
     assert_allclose(RING.path, [first, last], rtol=1e-12)
     assert RING.backlash == pytest.approx(2e-5)
-    with pytest.raises(ModelError, match="not known here"):
+    with pytest.raises(ModelError, match="not known; give numbers"):
         stiffness_table(RING, force=1e5)
     with pytest.raises(ModelError, match=r"use Mechanism\.gear_mesh"):
         Mesh(RING, K)
