@@ -361,7 +361,7 @@ def response_function_method(
         Signal Process. 8 (1994) 437.
     """
     test.check(model)
-    matrix("C", C, model.K.shape)
+    matrix("C", C, (len(model.K), len(model.K)))
     whole("steps", steps, 1)
     p, path, s = np.array(p, dtype=float), [], sensor_dofs(model)
     clip = MAX_PARAMETER_CHANGE if steps > 1 else np.inf

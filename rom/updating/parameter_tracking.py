@@ -22,7 +22,7 @@ from rom.errors import ConfigError, ParameterError, SolverError
 from rom.model import Array
 from rom.names import named
 from rom.plausible import check_damping_ratio
-from rom.updating.family_model import Attached, Family
+from rom.updating.family_model import Attached, Family, check_units
 from rom.updating.measured import Channels
 from rom.updating.operation import (
     Linear,
@@ -36,7 +36,6 @@ from rom.updating.tracking import (
     Assumed,
     Track,
     Tracker,
-    check_units,
     checked_record,
     linear_tracker,
     recorded,

@@ -79,7 +79,9 @@ def _rigidities(values: dict[str, Any], place: Place) -> dict[str, Any]:
     kind, given = section.pop("kind"), "material" in values
     if given == (kind == "numbers"):
         what = "takes no material" if given else "needs a material"
-        raise place.at("section").error(f"a section of kind {kind} {what}.")
+        raise place.at("section").error(
+            f"a section of kind {kind} {what}.", "Shapes have one, numbers have none."
+        )
     if kind == "numbers":
         return section
     material = Material(**values["material"])

@@ -164,7 +164,8 @@ def fitting(
     if (force.shape, moment.shape, free.shape) != (rod.x.shape, (len(rod.p), 3),
                                                    (6 * rod.h.size + 9,)):  # fmt: skip
         raise ConfigError(f"loads of shape {force.shape} and {moment.shape} and {free.size} dofs "
-                          f"for a rod of {rod.h.size} segments.")  # fmt: skip
+                          f"for a rod of {rod.h.size} segments; needed are {rod.x.shape}, "
+                          f"{(len(rod.p), 3)} and {6 * rod.h.size + 9} dofs.")  # fmt: skip
     return (force, moment), free
 
 

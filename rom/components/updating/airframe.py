@@ -107,7 +107,7 @@ class Airframe:
         """
         far = np.linalg.norm(self.points - np.asarray(point, dtype=float), axis=1)
         if far.min() > 1e-4:
-            raise ConfigError(f"no node at {point}; there is one at {self.points[far.argmin()]}.")
+            raise ConfigError(f"no node at {point!r}; there is one at {self.points[far.argmin()]}.")
         return int(far.argmin())
 
     def sensor(self, point: npt.ArrayLike, axis: int) -> Array:

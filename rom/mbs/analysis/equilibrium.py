@@ -23,7 +23,7 @@ from rom.model import Array
 
 MAX_PASSES = 150
 MAX_IDLE = 25  # that lead neither down nor nearer; what is found at all is found in as many
-WINDOW = 8  # corrections of which the largest counts
+MAX_KEPT = 8  # corrections of which the largest counts
 PROGRESS_RTOL = 1e-6  # round-off of both
 MAX_WAY = 30.0  # of the search, in rad and sizes of the mechanism
 MAX_TRIALS = 40  # of Newton's corrections where the potential curves downwards
@@ -371,7 +371,7 @@ class _Progress:
 
     now: Instant
     sizes: list[float] = field(default_factory=list)
-    way: Any = 0.0
+    displacement: Any = 0.0
     work: float = 0.0  # of the forces against the motion
     least: Any = np.inf
     idle: int = 0
@@ -380,11 +380,12 @@ class _Progress:
         """Whether many corrections have led nowhere, or very far away, with one more."""
         along = [self.now.residual(x.q, x.v, x.a, x.lam) @ motion for x in (before, after)]
         self.work += 0.5 * float(along[0] + along[1])
-        self.sizes, self.way = [*self.sizes[1 - WINDOW :], size], self.way + motion
+        self.sizes = [*self.sizes[1 - MAX_KEPT :], size]
+        self.displacement = self.displacement + motion
         reached, faint = np.array([self.work, max(self.sizes)]), PROGRESS_RTOL * np.abs(along).max()
         leads = (reached < self.least - np.array([faint, PROGRESS_RTOL * size])).any()
         self.least, self.idle = np.minimum(self.least, reached), 0 if leads else self.idle + 1
-        return self.idle >= MAX_IDLE or sizes(self.now.packed, self.way)[0] > MAX_WAY
+        return self.idle >= MAX_IDLE or sizes(self.now.packed, self.displacement)[0] > MAX_WAY
 
 
 def _turning(packed: Packed, turned: Array) -> ModelError:

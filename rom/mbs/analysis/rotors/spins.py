@@ -144,15 +144,15 @@ AT_REST = Spins(np.zeros(3), np.zeros(3))
 
 def _turning(mechanism: Mechanism, now: Instant, spin: Mapping[str, Any]) -> tuple[Turning, ...]:
     """The bodies behind each joint: what joints and elements connect with its second side."""
-    for joint in spin:
-        coordinate_of(mechanism.joints, joint, "angle", "spin")
-    joints = [mechanism.joints[joint] for joint in spin]
+    for name in spin:
+        coordinate_of(mechanism.joints, name, "angle", "spin")
+    joints = [mechanism.joints[name] for name in spin]
     packed = now.packed
     number_of = {name: b for b, name in enumerate(packed.names)} | {GROUND: -1}
     fixed = [
-        {number_of[m.body] for m in other.markers}
-        for name, other in mechanism.joints.items()
-        if name not in spin and all(row.kind != COUPLING for row in other.rows)
+        {number_of[m.body] for m in joint.markers}
+        for name, joint in mechanism.joints.items()
+        if name not in spin and all(row.kind != COUPLING for row in joint.rows)
     ]
     fixed += [
         {number_of[part.name] for part in mechanism.nonlinear[name].parts}
