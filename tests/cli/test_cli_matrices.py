@@ -99,5 +99,5 @@ def test_names_stand_behind_a_colon(tmp_path):
     assert source(str(tmp_path / "a:b.op4")) == str(tmp_path / "a:b.op4")
     assert source("a.op4:KAA") == ("a.op4", "KAA") and source("a.mtx") == "a.mtx"
     assert labels("11-13, 20") == [11, 12, 13, 20]
-    with pytest.raises(ConfigError, match="more than 10000000 nodes"):
+    with pytest.raises(ConfigError, match="at most 10000000 nodes"):
         labels("1-99999999999")

@@ -82,7 +82,7 @@ def test_a_mechanism_is_moved_where_that_is_asked_for(folder, monkeypatch, capsy
     for words in ("Mechanism pendulum", "Reached t = 0.5 s.", "energy balance / energy"):
         assert words in text, words
     assert main(["report", "rod.rom.npz", "--move", "-o", "s.html"]) == 2
-    assert "rod.rom.npz is no mechanism file" in capsys.readouterr().err
+    assert "rod.rom.npz must be a mechanism file" in capsys.readouterr().err
     assert not (folder / "s.html").exists()
 
 

@@ -221,7 +221,7 @@ def test_what_is_wrong_with_the_options_is_said(capsys):
     refused([*ATTACHED[:2], "--mass", "soil=tip:1:0.1:10"], same)
     refused(["--rank", "3"], "rank needs residual=")
     refused(["--residual", "equations"], "input 0 has no sensor at its point")
-    refused(["--candidate", "cable"], "--candidate cable is no --spring, --joint or --mass")
+    refused(["--candidate", "cable"], "--candidate cable must name a --spring, --joint or --mass")
     refused(["--family", "body.rom.npz"], "--family family.rom.npz, body.rom.npz: of several each")
     refused(["--joint", "j=a.tip,b.tip:1,1,1:0.1:1"], "need an assembly")
     refused(["--force-noise", "0.1"], "the estimator of H is not named")

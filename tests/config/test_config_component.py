@@ -112,7 +112,7 @@ def test_options_go_before_the_file(folder, capsys):
 def test_a_certificate_is_wanted_or_not_or_wanted_in_full(folder, capsys):
     given = ("reduction", "certificate")
     assert read_component("bar.toml", {given: "full"}).values["reduction"]["certificate"] == "full"
-    with pytest.raises(ConfigError, match='not true, false or "full"'):
+    with pytest.raises(ConfigError, match='must be true, false or "full"'):
         read_component("bar.toml", {given: "half"})
     assert main(["reduce", "bar.toml", "-m", "3", "--full-certificate", "-q"]) in (0, 5)
     assert main(["reduce", "bar.toml", "--full-certificate", "--no-certificate"]) == 2

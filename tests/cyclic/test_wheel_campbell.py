@@ -62,5 +62,5 @@ def test_speeds_and_numbers_that_make_no_diagram_are_named():
         rom.wheel_campbell(two_rings(), 1, 2, speeds=[0.0, -1.0])
     with pytest.raises(ConfigError, match="n = 5 must be a whole number from 1 to 4"):
         rom.wheel_campbell(two_rings(), 1, 5, speeds=[0.0])
-    with pytest.raises(ConfigError, match=r"4 nodal diameters"):
+    with pytest.raises(ConfigError, match=r"diameter = 4 must be a whole number from 0 to 3"):
         rom.wheel_campbell(two_rings(), 4, 1, speeds=[0.0])

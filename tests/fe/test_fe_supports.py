@@ -175,8 +175,8 @@ def test_a_body_on_soft_springs_swings_as_a_rigid_one(model, body):
 def test_wrong_springs_are_named(model, body):
     for springs, error, why in (
         ({"tip": [1.0, 2.0]}, ConfigError, r"shape \(2,\): it takes 3 or 6"),
-        ({"tip": [1.0, -2.0, 0.0]}, ConfigError, "no energy"),
-        ({"tip": np.eye(6) + np.eye(6, k=1)}, ConfigError, "not symmetric"),
+        ({"tip": [1.0, -2.0, 0.0]}, ConfigError, "and positive or zero"),
+        ({"tip": np.eye(6) + np.eye(6, k=1)}, ConfigError, "must be symmetric"),
         ({"tip": np.zeros(3)}, ConfigError, "holds nothing"),
         ({"tip": [np.nan, 1.0, 1.0]}, ConfigError, "springs"),
         ({"foot": np.ones(3)}, InterfaceError, "no interface 'foot'"),

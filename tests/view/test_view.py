@@ -70,7 +70,7 @@ def test_an_update_is_drawn_with_its_changes(tmp_path):
     bars = (image == (213, 218, 225)).all(axis=2).sum(axis=1)
     middle = int(np.flatnonzero(bars > 20).mean())
     assert bars[:middle].max() == pytest.approx(4 * bars[middle:].max(), rel=0.03)
-    with pytest.raises(ConfigError, match="7 values for 50"):
+    with pytest.raises(ConfigError, match="7 values of 'test' for 50"):
         view.updating(f, {"test": f[:7]}, path=tmp_path / "u.png", **more)
 
 
@@ -235,7 +235,7 @@ def test_wrong_requests_are_refused(bar, tmp_path):
     ]:
         with pytest.raises(ConfigError, match=f"(?s){words}"):
             aimed(np.eye(3), 100, **wrong)
-    with pytest.raises(ConfigError, match="'one' has 3 values for 2 times"):
+    with pytest.raises(ConfigError, match="3 values of 'one' for 2 times"):
         view.history([0, 1], [("x", {"one": [1, 2, 3]})], tmp_path / "h.png", title="", caption="")
     assert not list(tmp_path.iterdir())
 
@@ -292,7 +292,7 @@ def test_convergence_is_drawn_per_panel_and_curve(tmp_path):
     image = pixels(tmp_path / "c.png")
     for colour in ((0x2F, 0x7F, 0x9F), (0xD1, 0x49, 0x5B)):
         assert (np.abs(image - colour).max(axis=2) < 12).sum() > 300
-    with pytest.raises(ConfigError, match="'x' has 1 errors for 2 sizes"):
+    with pytest.raises(ConfigError, match="1 errors of 'x' for 2 sizes"):
         view.convergence([("error", {"x": ([1, 2], [1.0])})], tmp_path / "d.png", **look)
 
 
@@ -322,7 +322,7 @@ def test_panels_stand_in_rows_with_lines_points_and_bars(tmp_path):
     rows = blue[:middle, 800:].sum(axis=1)
     assert rows.max() > 1.5 * rows[rows > 50].min()  # the first bar is 2.5 times as long
     wrong = view.Panel("", "", curves={"one": ([1, 2], [1])})
-    with pytest.raises(ConfigError, match="'one' has 1 values for 2 places"):
+    with pytest.raises(ConfigError, match="1 values of 'one' for 2 places"):
         view.panels([[wrong]], tmp_path / "q.png", title="", caption="")
 
 

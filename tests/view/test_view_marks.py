@@ -62,7 +62,7 @@ def test_a_name_has_one_colour_in_all_panels():
 
 
 def test_points_of_another_length_are_refused():
-    with pytest.raises(ConfigError, match="'seen' has 2 values for 3 times"):
+    with pytest.raises(ConfigError, match="2 values of 'seen' for 3 times"):
         view.history(X, [("y", {"seen": ([0.0, 0.5, 1.0], [1.0, 2.0])})])
 
 

@@ -184,7 +184,7 @@ def disc(center: npt.ArrayLike, radius: float, *, n: int = 120) -> Array:
     Raises:
         ConfigError: for a radius that is not positive, or fewer than three corners.
     """
-    positive("radius", radius)
+    positive("radius [m]", radius)
     whole("n", n, 3)
     angle = 2 * np.pi * np.arange(n) / n
     return finite("center", center, (2,)) + radius * np.column_stack([np.cos(angle), np.sin(angle)])

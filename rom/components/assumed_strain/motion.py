@@ -177,7 +177,7 @@ def fly(
         SolverError: if the motion is lost; ``error.solution`` holds the pictures before.
     """
     v, held = nodal("velocities", v, body), dofs_of(held, body)
-    positive("t_end", t_end)
+    positive("t_end [s]", t_end)
     whole("pictures", pictures, 2)
     actions = actions or Actions()
     held = np.union1d(held, dofs_of(actions.held, body))

@@ -77,7 +77,7 @@ def sheet(
     """
     one_of("element", element, ELEMENTS)
     one_of("state", state, STATES)
-    positive("thickness", thickness)
+    positive("thickness [m]", thickness)
     X, T = finite("points", points, None), whole_numbers("triangles", triangles)
     _refuse_no_mesh(X, T, state)
     constant, area = constant_gradients(X, T)

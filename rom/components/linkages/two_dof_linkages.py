@@ -56,9 +56,9 @@ def rigid_link(mass: float, length: float, centre: npt.ArrayLike, inertia: float
     """
     x, y = np.asarray(centre, dtype=float)
     finite("centre", [x, y], (2,), error=ModelError)
-    positive("mass", mass, error=ModelError)
-    positive("length", length, error=ModelError)
-    not_negative("inertia", inertia, error=ModelError)
+    positive("mass [kg]", mass, error=ModelError)
+    positive("length [m]", length, error=ModelError)
+    not_negative("inertia [kg m^2]", inertia, error=ModelError)
     J = inertia + mass * (x * x + y * y)
     M = np.array([[mass, 0, -mass * y], [0, mass, mass * x], [-mass * y, mass * x, J]])
     return Link(float(length), M, np.zeros((2, 0)), np.zeros((0, 0)))
@@ -129,7 +129,7 @@ class TwoLink:
     relative: bool = False
 
     def __post_init__(self) -> None:
-        not_negative("payload", self.payload, error=ModelError)
+        not_negative("payload [kg]", self.payload, error=ModelError)
 
     def inertia(self, q1: npt.ArrayLike, q2: npt.ArrayLike, *, elastic: Elastic = "held") -> Array:
         """(..., 2, 2) generalised inertia [kg m^2] at angles (...) [rad].
@@ -268,7 +268,7 @@ def as_elastic(links: tuple[Link, ...], elastic: Elastic) -> tuple[Link, ...]:
         ConfigError: for another word than "held" or "free", or a frequency that is not positive.
     """
     if isinstance(elastic, int | float):
-        positive("elastic", elastic)
+        positive("elastic [rad/s]", elastic)
         padded = (np.pad(link.K / elastic**2, ((3, 0), (3, 0))) for link in links)
         return tuple(replace(link, M=link.M - K) for link, K in zip(links, padded, strict=True))
     if one_of("elastic", elastic, ("held", "free")) == "free":

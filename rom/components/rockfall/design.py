@@ -99,7 +99,7 @@ def with_boulder(g: Gallery, boulder: float, height: float | None = None) -> Gal
     Raises:
         ConfigError: for a mass or a height that is not positive.
     """
-    positive("boulder", boulder)
+    positive("boulder [kg]", boulder)
     ratio, c = (boulder / g.boulder) ** (1 / 3), g.cushion
     cushion = (replace(c, radius=c.radius * ratio) if isinstance(c, Layer)
                else replace(c, stiffness=c.stiffness * ratio**0.5))  # fmt: skip

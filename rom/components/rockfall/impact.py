@@ -70,8 +70,8 @@ class Slab:
         Raises:
             ModelError: if one is not positive.
         """
-        positive("mass", mass, error=ModelError)
-        positive("stiffness", stiffness, error=ModelError)
+        positive("mass [kg]", mass, error=ModelError)
+        positive("stiffness [N/m]", stiffness, error=ModelError)
         return cls(np.array([mass**-0.5]), np.array([np.sqrt(stiffness / mass)]), **more)
 
     @classmethod
@@ -124,8 +124,8 @@ class Gallery:
     weight: bool = True
 
     def __post_init__(self) -> None:
-        for name in ("boulder", "plug", "height"):
-            positive(name, getattr(self, name))
+        for name, unit in (("boulder", "kg"), ("plug", "kg"), ("height", "m")):
+            positive(f"{name} [{unit}]", getattr(self, name))
 
     @property
     def speed(self) -> float:

@@ -68,7 +68,7 @@ class Layer(Resistance):
         if not (good and 0 < self.recovery <= 1):
             needed = "modulus, radius, thickness, density and strength > 0, 0 < recovery <= 1"
             raise ConfigError(f"{self}: needed are {needed}.")
-        between("angle", self.angle, 0, np.pi / 2, "()")
+        between("angle [rad]", self.angle, 0, np.pi / 2, "()")
 
     @classmethod
     def of_sand(
@@ -113,7 +113,7 @@ class Layer(Resistance):
         Raises:
             ConfigError: for a penetration that is negative or through the layer.
         """
-        between("d", d, 0, self.thickness, "[)")
+        between("d [m]", d, 0, self.thickness, "[)")
         x = min(d, self.radius)
         return float(np.sqrt(2 * self.radius * x - x**2))
 
@@ -190,9 +190,9 @@ def bearing_pressure(friction: float, radius: float, density: float = SAND_DENSI
         Vesic, Analysis of ultimate loads of shallow foundations, J. Soil Mech. Found. Div. ASCE
         99 (1973) 45.
     """
-    between("friction", friction, 0, np.pi / 3, "()")
-    positive("radius", radius)
-    positive("density", density)
+    between("friction [rad]", friction, 0, np.pi / 3, "()")
+    positive("radius [m]", radius)
+    positive("density [kg/m^3]", density)
     slope = np.tan(friction)
     n_q = np.exp(np.pi * slope) * np.tan(np.pi / 4 + friction / 2) ** 2
     return float(0.6 * density * GRAVITY * radius * 2 * (n_q + 1) * slope)

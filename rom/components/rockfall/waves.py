@@ -32,7 +32,7 @@ def wave_delay(layer: Layer, d: float = 0.0) -> float:
     Raises:
         ConfigError: for a penetration that is negative or through the layer.
     """
-    between("d", d, 0, layer.thickness, "[)")
+    between("d [m]", d, 0, layer.thickness, "[)")
     return float((layer.thickness - d) * np.sqrt(layer.density / layer.modulus))
 
 
@@ -65,7 +65,7 @@ def arriving(
         raise ConfigError(f"{t.size} instants with {force.size} forces: needed are instants that "
                           "grow, and a force at each.")  # fmt: skip
     between("reflection", reflection, 0, 1)
-    passages = int(np.ceil((t[-1] - t[0]) / positive("delay", delay) / 2)) + 1
+    passages = int(np.ceil((t[-1] - t[0]) / positive("delay [s]", delay) / 2)) + 1
     if passages > MAX_PASSAGES:
         raise ConfigError(f"{passages} passages of a wave of {delay:.3g} s in {t[-1] - t[0]:.3g} s;"
                           f" at most {MAX_PASSAGES} are followed.")  # fmt: skip

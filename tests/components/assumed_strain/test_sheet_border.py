@@ -151,7 +151,7 @@ def test_what_no_action_takes_is_refused_by_its_name(named):
         (lambda: sheets.fly(BODY, METAL, 0 * X, LOW == 0, 1.0), ConfigError, "held = "),
         (lambda: prepared(BODY, Actions(LOW + 0.5)), ConfigError, "held dofs = .*flatnonzero"),
         (lambda: prepared(BODY, Actions(loads=Load(0 * X))), ConfigError, r"Write \[Load"),
-        (lambda: prepared(BODY, Actions(tools=[PAD])), ConfigError, r"tools\[0\] = .* is no Tool"),
+        (lambda: prepared(BODY, Actions(tools=[PAD])), ConfigError, r"tools\[0\] = .* be a Tool"),
         (lambda: sheets.forces(BODY, METAL, X, HISTORY[:3]), ConfigError, "history has shape"),
         (lambda: Metal(True, 0.3), MaterialError, "E = True must be a finite number"),
         (lambda: Metal(1.0, 0.3, np.inf), MaterialError, "rho = inf"),

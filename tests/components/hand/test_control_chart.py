@@ -86,7 +86,7 @@ def test_envelope_of_noise_is_its_strength():
 
 
 def test_signals_that_do_not_fit_are_refused():
-    with pytest.raises(ConfigError, match="3 and 2 samples"):
+    with pytest.raises(ConfigError, match="2 samples of the extensor for 3"):
         Chart().follow(np.zeros(3), np.zeros(2), DT)
     with pytest.raises(ConfigError, match="miss 450 Hz"):
         envelope(np.zeros(10), 2e-3)

@@ -318,7 +318,7 @@ def test_missed_configurations_are_not_passed_over(found):
         (lambda: isotropy_index(np.eye(2), lengths=(0.0, 1.0)), ConfigError, "two positive"),
         (lambda: closed_loci(np.zeros((3, 4)), 0.1), ConfigError, r"a field \(3, 4\)"),
         (lambda: closed_loci(np.full((4, 4), np.nan), 0.1), ConfigError, "finite values"),
-        (lambda: replace(TWO, payload=-1.0), ModelError, "mass -1.0 kg"),
+        (lambda: replace(TWO, payload=-1.0), ModelError, r"payload \[kg\] = -1"),
         (lambda: replace(FIVE, base=-1.0), ModelError, "base = -1.0 m"),
         (lambda: replace(FIVE, side=0), ModelError, "side = 0"),
     ],

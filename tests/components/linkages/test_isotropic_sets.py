@@ -474,11 +474,11 @@ def test_loci_within_a_window_are_those_of_the_torus():
     ("make", "error", "words"),
     [
         (lambda: CrossSlides((1.0, 0.0)), ModelError, "must be positive"),
-        (lambda: CrossSlides((-1.0, 1.0)), ModelError, "not negative"),
+        (lambda: CrossSlides((-1.0, 1.0)), ModelError, "must not be negative"),
         (lambda: CrossSlides((1.0, 1.0), angle=np.pi), ModelError, "parallel"),
         (lambda: PolarArm(0.1, 0.0), ModelError, "must be positive"),
         (lambda: PolarArm(float("nan"), 1.0), ConfigError, "finite"),
-        (lambda: SlideArm(-1.0, rod(1, 1)), ModelError, "not negative"),
+        (lambda: SlideArm(-1.0, rod(1, 1)), ModelError, "must not be negative"),
         (lambda: replace(GLIDE, side=0), ModelError, "needed is 1 or -1"),
         (lambda: replace(GLIDE, slides=(1.0, -1.0)), ModelError, "right"),
         (lambda: GLIDE.inertia(0.0, 1.3), ModelError, "do not meet"),
@@ -514,8 +514,8 @@ def test_loci_within_a_window_are_those_of_the_torus():
             "no tool",
         ),
         (lambda: Driven(polar_of_the_core(), ("turn", "x")), ConfigError, "x"),
-        (lambda: Driven(polar_of_the_core(), ("turn", "feed", "feed")), ConfigError, "not two"),
-        (lambda: Driven(polar_of_the_core(), ("turn",)), ConfigError, "not two"),
+        (lambda: Driven(polar_of_the_core(), ("turn", "feed", "feed")), ConfigError, "must be two"),
+        (lambda: Driven(polar_of_the_core(), ("turn",)), ConfigError, "must be two"),
     ],
 )  # fmt: skip
 def test_what_is_no_linkage_is_refused(make, error, words):

@@ -184,7 +184,7 @@ def test_above_the_first_frequency_on_held_drives_there_is_no_inertia(bar):
     first = bar.frequencies(1, fixed=("root",))[0]
     below, above = (2 * np.pi * share * first for share in (0.9, 1.1))
     index_map(lambda a, b: arm.inertia(a, b, elastic=below), n=4)
-    with pytest.raises(ModelError, match="not positive"):
+    with pytest.raises(ModelError, match="inertia must be positive"):
         index_map(lambda a, b: arm.inertia(a, b, elastic=above), n=4)
 
 
@@ -232,7 +232,7 @@ def test_inertia_and_christoffel_symbols_reproduce_the_free_motion_of_the_core()
 
 
 def test_what_cannot_be_is_refused():
-    with pytest.raises(ModelError, match="mass = -1"):
+    with pytest.raises(ModelError, match=r"mass \[kg\] = -1"):
         rod(-1.0, 0.3)
     with pytest.raises(ModelError, match=r"1.3 m apart; couplers of 0.3 m and 0.3 m do not meet"):
         FiveBar(0.7, (rod(2.0, 0.3),) * 2, (rod(1.0, 0.3),) * 2).inertia(np.pi, [0.0, 1.0])

@@ -423,9 +423,9 @@ def test_tables_of_any_extent_are_carried_on_once_round(first, last):
 @pytest.mark.parametrize(
     ("call", "said"),
     [
-        (lambda: rotor_load(blading(), -3.0, 1.0), "wind of -3"),
+        (lambda: rotor_load(blading(), -3.0, 1.0), "wind.* = -3"),
         (lambda: rotor_load(blading(), np.nan, 1.0), "wind = nan must be a finite"),
-        (lambda: rotor_load(blading(), 8.0, -RATED_SPEED), "speed of the rotor of -1.2"),
+        (lambda: rotor_load(blading(), 8.0, -RATED_SPEED), "speed of the rotor.* = -1.2"),
         (lambda: rotor_load(blading(), 8.0, 1.0, n_azimuths=0), "a turn of 0 azimuths"),
         (lambda: rotor_load(blading(), 8.0, 1.0, n_azimuths=2.5), "n_azimuths"),
         (lambda: rotor_load(blading(), "8", 1.0), "wind"),

@@ -160,11 +160,11 @@ REFUSED = {
     "99": r"'a': there is no face 99; the part has 9 faces, numbered 1 to 9. rom mesh plate.step "
     r"--faces",
     "0": "there is no face 0",
-    "radius:6": r"no cylinder face has the radius 6 m; the nearest radii are 0.01 \(2 faces\), "
+    "radius:6": r"no cylinder face has the radius 6 m\. The nearest radii are 0.01 \(2 faces\), "
     r"0.006 \(1 face\) m",
-    "radius:0.00601": r"0.00601 m; the nearest radii are 0.006 \(1 face\), 0.01 \(2 faces\) m",
-    "normal:0,1,1": r"no plane face has the outward normal 0,1,1; the nearest are \d \(",
-    "normal:0.01,0,1": "no plane face has the outward normal 0.01,0,1; the nearest are",
+    "radius:0.00601": r"0.00601 m\. The nearest radii are 0.006 \(1 face\), 0.01 \(2 faces\) m",
+    "normal:0,1,1": r"no plane face has the outward normal 0,1,1\. The nearest are \d \(",
+    "normal:0.01,0,1": r"no plane face has the outward normal 0.01,0,1\. The nearest are",
     "0,0,1": "the nearest face is 0.99 m from the point 0,0,1, the body 0.117 m long",
     "0,0,0": r"faces \d and \d are equally near to the point 0,0,0.* or a number",
     "1,2,3": r"Faces of these numbers are '1\+2\+3'",
@@ -197,7 +197,7 @@ def test_two_planes_of_one_normal_are_listed(tmp_path):
 
 def test_a_part_without_cylinders_says_so(tmp_path):
     step_box(tmp_path / "box.step", 10, 10, 10)
-    with pytest.raises(TagError, match=r"radius 0.001 m; the part has no cylinder face"):
+    with pytest.raises(TagError, match=r"radius 0.001 m\. The part has no cylinder face"):
         read_mesh(tmp_path / "box.step", faces={"bore": "radius:1e-3"})
 
 

@@ -100,7 +100,7 @@ class Picker:
         listed = ", ".join(
             f"{r} ({count[r]} face{'s' * (count[r] > 1)})" for r in near[:MAX_SHOWN]
         ) + (", ..." if len(near) > MAX_SHOWN else "")
-        there = f"the nearest radii are {listed} m." if near else "the part has no cylinder face."
+        there = f"The nearest radii are {listed} m." if near else "The part has no cylinder face."
         raise TagError(f"no cylinder face has the radius {wanted:g} m.", hint=there)
 
     def _normal(self, wish: Pick) -> list[int]:
@@ -120,7 +120,7 @@ class Picker:
             )
         near = sorted(planes, key=lambda f: angle[f.number])[:MAX_SHOWN]
         listed = ", ".join(f"{f.number} ({_words(f.normal or ())})" for f in near)
-        there = f"the nearest are {listed}." if near else "the part has no plane face."
+        there = f"The nearest are {listed}." if near else "The part has no plane face."
         raise TagError(f"no plane face has the outward normal {wish.text[7:]}.", hint=there)
 
 
