@@ -55,7 +55,9 @@ def stuck_rod(_):
 
 
 def lost_rod(_):
-    return cosserat.simulate(ROD, 100.0, 10.0, load=cosserat.loads(ROD, tip=(1e4, 0, 0)))
+    """A run whose load is no number from its third step on."""
+    far = lambda t: cosserat.loads(ROD, tip=(np.nan if t > 0.25 else 0.0, 0, 0))  # noqa: E731
+    return cosserat.simulate(ROD, 1.0, 0.1, load=far)
 
 
 def finger(_):
@@ -144,7 +146,7 @@ CASES = [  # what fails, the numbers it leaves, how many instants or states at l
     (pushed, lambda found: found.q, 7),
     (torn, lambda found: found.q, 5),
     (stuck_rod, lambda found: found.x, 7),
-    (lost_rod, lambda found: found.t, 1),
+    (lost_rod, lambda found: found.t, 3),
     (finger, lambda found: found.tip, 3),
     (crushed, lambda found: found.x[-1], 9),
     (flown, lambda found: found.x, 2),

@@ -63,7 +63,7 @@ def test_stored_matrices_are_those_of_the_elements():
     root = model.interfaces["root"]
     assert_array_equal(np.sort(LABELS)[root.nodes], [12, 3, 40, 7])  # by coordinates
     assert_allclose(root.origin, [0.0, 0.1, 0.05])
-    with pytest.raises(RomError, match=r"'loose' has no nodes, or unknown ones: \[5\]"):
+    with pytest.raises(RomError, match=r"'loose' needs nodes of the model; unknown are \[5\]"):
         stored(interfaces={"loose": [5]})
 
 

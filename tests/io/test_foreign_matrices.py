@@ -247,7 +247,7 @@ def test_what_does_not_fit_is_named(brick, tmp_path):
         read(K=(HERE / "dense.op4", "KGG"))
     with pytest.raises(ConfigError, match="unit system"):
         read(units="inch")
-    with pytest.raises(InterfaceError, match=r"'tip' has no nodes, or unknown ones: \[8\]"):
+    with pytest.raises(InterfaceError, match=r"'tip' needs nodes of the model; unknown are \[8\]"):
         read(interfaces={"tip": [7, 8]})
     labels, points = read_grids(nodes)
     with pytest.raises(FileFormatError, match="24 rows are neither 3 nor 6 for each of 7"):

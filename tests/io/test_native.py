@@ -155,7 +155,7 @@ def test_other_files_and_newer_versions_are_named(file, tmp_path, body):
 
 
 def test_a_body_that_is_not_finite_or_not_definite_is_not_passed_on(body, tmp_path):
-    with pytest.raises(QualityGateError, match="K of body 'body' is not finite"):
+    with pytest.raises(QualityGateError, match="K of body 'body' must be finite"):
         rom.save(replace(body, K=body.K * np.nan), tmp_path / "nan.npz")
     assert not list(tmp_path.iterdir())
     path = rom.save(replace(body, S_kl=-body.S_kl), tmp_path / "negative.npz")

@@ -32,5 +32,5 @@ def test_an_unknown_ending_and_a_body_without_surface_are_named(body, tmp_path):
 
     with pytest.raises(ConfigError, match=r"'.SID'; known: .npz, .vtu|ending '.sid'"):
         rom.export(body, tmp_path / "rod.SID")
-    with pytest.raises(ConfigError, match="has no surface to draw"):
+    with pytest.raises(ConfigError, match="has no surface; to be drawn"):
         rom.export(replace(body, surface=None), tmp_path / "rod.vtu")

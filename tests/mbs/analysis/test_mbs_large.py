@@ -162,7 +162,7 @@ def test_wrong_wishes_are_refused():
     mech = rod_on("fixed", 5)
     for wish, why in (
         ({"n": 0}, "n = 0"),
-        ({"n": 500}, "the joints leave 33 motions"),
+        ({"n": 500}, "from 1 to 33: the motions that the joints leave"),
         ({"n": 3, "band": (1, 2)}, "give one of them"),
         ({"band": (3.0, 2.0)}, "two growing frequencies"),
         ({"band": (-3.0, 2.0)}, "two growing frequencies"),

@@ -205,7 +205,7 @@ def test_spins_that_make_no_sense_are_refused(build, spin, message):
         (blades(2), "3 or more"),
         ("blade", "3 or more"),
         (["blade 0", "blade 1", "blade 3"], "no body 'blade 3'"),
-        (["blade 0", "blade 1", "blade 1"], "twice"),
+        (["blade 0", "blade 1", "blade 1"], "listed once"),
         (["blade 0", "blade 1", "hub"], "alike"),
         ([["blade 0", "hub"], ["blade 1"], ["blade 2"]], "alike"),
     ],

@@ -183,7 +183,7 @@ def test_the_end_of_a_motion_changes_as_its_equation_says():
 
 
 def test_wrong_questions_are_refused():
-    with pytest.raises(ConfigError, match=r"is no \{name: value\}"):
+    with pytest.raises(ConfigError, match=r"must be \{name: value\}"):
         rom.motion_sensitivity(lambda: 0.0, {})
     with pytest.raises(ConfigError, match="another shape"):
         rom.motion_sensitivity(lambda x: np.zeros(1 + (x > 1)), {"x": 1.0})

@@ -405,7 +405,7 @@ def test_a_file_asks_for_an_elastic_bush(tmp_path):
     (None, "[0, 0, 1]", "[1, 0, 0]", "m.toml:10: the bush of bearing 'film'.* is no bore of it"),
     (None, "40 mm", "50 mm", "m.toml:10: the bush of bearing 'film'.* a radius of 25 mm"),
     (None, "40 um", "-40 um", "m.toml:15: journal_bearings.film.bearing.clearance = '-40 um'"),
-    (None, "true", '"yes"', "m.toml:14: journal_bearings.film.elastic_bush = 'yes' is not true"),
+    (None, "true", '"yes"', "m.toml:14: journal_bearings.film.elastic_bush = 'yes' must be true"),
 ])  # fmt: skip
 def test_a_file_that_asks_in_vain_is_told_where(kind, given, instead, words, tmp_path):
     kind = kind or rom.FourierLegendre(1, 1)
