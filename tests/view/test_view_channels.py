@@ -42,7 +42,7 @@ def test_the_scene_is_drawn(tmp_path):
 
 
 def test_wrong_groups_are_named():
-    with pytest.raises(ConfigError, match=r"'sensors': \(1, 3\) points and \(2, 3\)"):
+    with pytest.raises(ConfigError, match=r"'sensors': \(1, 3\) points, \(2, 3\)"):
         view.channels(BOX, {"sensors": ([[0, 0, 0]], [[0, 0, 1]] * 2)})
     with pytest.raises(ConfigError, match="'sensors'"):
         view.channels(BOX, {"sensors": ([[0, 0, 0]], [[0, 0, 0]])})

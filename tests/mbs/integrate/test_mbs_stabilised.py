@@ -161,7 +161,7 @@ def test_turns_join_to_the_turn_of_their_product():
     ("options", "message"),
     [
         ({"order": 3}, "order = 3 is for bdf only"),
-        ({"method": "bdf", "order": 6}, "order = 6 is not 1, 2, 3, 4 or 5"),
+        ({"method": "bdf", "order": 6}, "order = 6 must be a whole number from 1 to 5"),
         ({"method": "bdf", "order": 4, "dt": None}, "steps of one length"),
         ({"method": "dop853", "stabilised": True}, "stabilised is for implicit methods"),
         ({"method": "bdf", "order": 5, "t_end": 3e-3}, "needs 4 steps to begin with"),

@@ -114,7 +114,7 @@ def test_joints_without_a_coordinate_are_named():
     mech = spinning_ball(1.0, "revolute")
     mech.spherical("ball joint", mech.ground.marker((1, 2, 3)), mech.part("ball").marker((0, 0, 0)))
     sol = simulate(mech, t_end=0.01, dt=1e-3)
-    with pytest.raises(ConfigError, match="'ball joint' is spherical, it has no angle"):
+    with pytest.raises(ConfigError, match="'ball joint' is spherical: it has no angle"):
         sol.joint("ball joint")
     with pytest.raises(ConfigError, match=r"no joint 'pine'; there are \['ball joint', 'pin'\]"):
         sol.joint("pine")
