@@ -177,7 +177,7 @@ def test_wrong_springs_are_named(model, body):
         ({"tip": [1.0, 2.0]}, ConfigError, r"shape \(2,\): it takes 3 or 6"),
         ({"tip": [1.0, -2.0, 0.0]}, ConfigError, "and positive or zero"),
         ({"tip": np.eye(6) + np.eye(6, k=1)}, ConfigError, "must be symmetric"),
-        ({"tip": np.zeros(3)}, ConfigError, "holds nothing"),
+        ({"tip": np.zeros(3)}, ConfigError, "needs a stiffness that is not zero"),
         ({"tip": [np.nan, 1.0, 1.0]}, ConfigError, "springs"),
         ({"foot": np.ones(3)}, InterfaceError, "no interface 'foot'"),
     ):

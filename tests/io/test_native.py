@@ -159,7 +159,7 @@ def test_a_body_that_is_not_finite_or_not_definite_is_not_passed_on(body, tmp_pa
         rom.save(replace(body, K=body.K * np.nan), tmp_path / "nan.npz")
     assert not list(tmp_path.iterdir())
     path = rom.save(replace(body, S_kl=-body.S_kl), tmp_path / "negative.npz")
-    with pytest.raises(QualityGateError, match="mass is not positive definite"):
+    with pytest.raises(QualityGateError, match="mass must be positive definite"):
         rom.load(path)
     K = body.K.copy()
     K[0, 1] = K.max()

@@ -265,8 +265,8 @@ def test_what_makes_no_path_is_named():
         ({"span": (0.0, 1.0), "step": 0.0}, "step"),
         ({"span": (0.0, 1.0), "along": np.ones(6)}, "a branch leaves a state"),
         ({"span": (0.0, 1.0), "along": np.ones(5), "state": state}, "along"),
-        ({"span": (0.0, 1.0), "along": np.zeros(6), "state": state}, "no motion"),
-        ({"span": (5.0, 6.0), "along": np.ones(6), "state": state}, "outside the span"),
+        ({"span": (0.0, 1.0), "along": np.zeros(6), "state": state}, "along needs a motion"),
+        ({"span": (5.0, 6.0), "along": np.ones(6), "state": state}, "it must be in the span"),
         (
             {"span": (0.0, 1.0), "along": np.ones(6), "state": rom.equilibrium(truss()[0])},
             "joint coordinates that forces act on",

@@ -163,7 +163,7 @@ def test_wrong_wishes_are_refused():
     for wish, why in (
         ({"n": 0}, "n = 0"),
         ({"n": 500}, "from 1 to 33: the motions that the joints leave"),
-        ({"n": 3, "band": (1, 2)}, "give one of them"),
+        ({"n": 3, "band": (1, 2)}, "at most one of n and band"),
         ({"band": (3.0, 2.0)}, "two growing frequencies"),
         ({"band": (-3.0, 2.0)}, "two growing frequencies"),
         ({"band": (1.0, np.nan)}, "band"),
