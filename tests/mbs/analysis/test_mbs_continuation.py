@@ -282,7 +282,7 @@ def test_what_makes_no_path_is_named():
     with pytest.raises(ModelError, match="there is no unique equilibrium"):
         rom.continuation(free, (0.0, 1.0))
     stray = rom.Mechanism().ground.marker((0, 0, 7))
-    with pytest.raises(ConfigError, match="not a marker"):
+    with pytest.raises(ConfigError, match="must be a marker"):
         rom.continuation(mech, (0.0, 1.0)).position(stray)
 
 
