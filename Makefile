@@ -10,8 +10,8 @@
 # make bench   measure speed and memory, NAME=motion for one of what `rom bench --list` names
 # make clean   remove what the others have left, but not the environments
 PYTHON = .venv/bin/python
-# tests that try more where there is time
-LONG = $(shell grep -rlE 'cases.long|mark.long' tests --include='test_*.py')
+# files whose tests try more where there is time, besides what is marked `long`
+MORE = $(shell grep -rlE 'ROM_LONG|SHARED_BY' tests --include='test_*.py')
 # test files side by side, in the order of tests/conftest.py, so that none of the long ones is last
 SIDE_BY_SIDE = -n 2 --dist loadfile --no-loadscope-reorder
 LIGHT = .venv-light/bin/python
@@ -33,7 +33,8 @@ test: setup
 	$(LIGHT) -m pytest -m "not fenicsx and not once" -p no:cacheprovider $(SIDE_BY_SIDE)
 
 long: setup
-	ROM_LONG=1 $(PYTHON) -m pytest $(LONG) $(SIDE_BY_SIDE)
+	ROM_LONG=1 $(PYTHON) -m pytest -m long $(SIDE_BY_SIDE)
+	ROM_LONG=1 $(PYTHON) -m pytest -m "not long" $(MORE) $(SIDE_BY_SIDE)
 	$(PYTHON) -m pytest -m "not fenicsx and not once" $(SIDE_BY_SIDE)
 	ROM_LONG=1 $(LIGHT) -m pytest -m "not fenicsx and once" -p no:cacheprovider $(SIDE_BY_SIDE)
 

@@ -122,8 +122,9 @@ def test_what_begins_exists_and_what_waits_for_make_long_is_run_there():
     importing = {path for path in TESTS.rglob("*.py") if "cases.long" in path.read_text()}
     apart = {TESTS / "conftest.py", Path(__file__)}
     assert all(path.name.startswith("test_") for path in importing - apart)
-    assert "grep -rlE 'cases.long|mark.long' tests" in (ROOT / "Makefile").read_text()
-    assert "ROM_LONG=1 $(PYTHON) -m pytest $(LONG)" in recipe("long")
+    assert "grep -rlE 'ROM_LONG|SHARED_BY' tests" in (ROOT / "Makefile").read_text()
+    assert "ROM_LONG=1 $(PYTHON) -m pytest -m long" in recipe("long")
+    assert 'ROM_LONG=1 $(PYTHON) -m pytest -m "not long" $(MORE)' in recipe("long")
     assert 'ROM_LONG=1 $(LIGHT) -m pytest -m "not fenicsx and once"' in recipe("long")
 
 
