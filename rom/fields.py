@@ -31,6 +31,12 @@ FIELDS = {
     "rom.components.round_bodies.field": "spin",
     "rom.mbs.elements.solids.field": "",
     "rom.components.cosserat.field": "rods",
+    "rom.components.assumed_strain.field": "assumed_strain",
+    "rom.components.best_matching.field": "best_matching",
+    "rom.components.linkages.field": "linkages",
+    "rom.components.masonry.field": "masonry",
+    "rom.components.rockfall.field": "rockfall",
+    "rom.components.wind.field": "wind",
 }
 ENTRY_POINT_GROUP = "rom.fields"  # of entry points, by which other packages bring theirs
 
@@ -48,7 +54,7 @@ class Field:
             of it: actors, or circles by marker, axis and radius}.
         columns: {name: function on a solution, by which it tells of an element over time}.
         verbs: {verb of the command line: its module}.
-        page: where it is described.
+        first_use: {name: function that does a small case of all that is compiled}.
         moved: {earlier name of a module, as pickles may have it: its name}.
     """
 
@@ -59,7 +65,7 @@ class Field:
     symbols: Mapping[str, str] = field(default_factory=dict)
     columns: Mapping[str, str] = field(default_factory=dict)
     verbs: Mapping[str, str] = field(default_factory=dict)
-    page: str = ""
+    first_use: Mapping[str, str] = field(default_factory=dict)
     moved: Mapping[str, str] = field(default_factory=dict)
 
 

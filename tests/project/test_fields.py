@@ -54,7 +54,7 @@ def run(code, *paths):
 @pytest.mark.parametrize("place", FIELDS)
 def test_the_list_has_the_names_by_which_fields_are_asked(place):
     """Of those that may be missing, so that the error can say whose they are."""
-    kinds = "methods", "bodies", "sections", "columns"
+    kinds = "methods", "bodies", "sections", "columns", "verbs", "first_use"
     given = {name for kind in kinds for name in getattr(record(place), kind)}
     words = set(FIELDS[place].split())
     assert words == given if place.startswith("rom.components") else given and not words
