@@ -31,6 +31,7 @@ from rom.body.spread import SpreadLoad as SpreadLoad
 from rom.body.spread import mass_load as mass_load
 from rom.body.spread import surface_load as surface_load
 from rom.checks.gates import check as check
+from rom.components.updating.estimate import update as update
 from rom.config.component import read_component as read_component
 from rom.config.mechanism import read_mechanism as read_mechanism
 from rom.config.mechanism_fmu import write_mechanism_fmu as write_mechanism_fmu
@@ -149,7 +150,6 @@ from rom.reduction.interfaces.polynomial import Polynomial as Polynomial
 from rom.reduction.interfaces.snapshots import Snapshots as Snapshots
 from rom.report.html import write_report as write_report
 from rom.report.pieces import certify_pieces as certify_pieces
-from rom.updating.estimate import update as update
 from rom.view.scenes.animation_files import write_animation as write_animation
 from rom.workflow import reduce as reduce
 from rom.workflow import reduce_pieces as reduce_pieces

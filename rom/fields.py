@@ -36,6 +36,7 @@ FIELDS = {
     "rom.components.linkages.field": "linkages",
     "rom.components.masonry.field": "masonry",
     "rom.components.rockfall.field": "rockfall",
+    "rom.components.updating.field": "update",
     "rom.components.wind.field": "wind",
 }
 ENTRY_POINT_GROUP = "rom.fields"  # of entry points, by which other packages bring theirs

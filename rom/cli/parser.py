@@ -19,7 +19,6 @@ from rom.cli.verbs import (
     report,
     simulate,
     swing,
-    update,
     view,
 )
 from rom.config.keys import nearest
@@ -36,10 +35,8 @@ VERBS = (
     view,
     report,
     swing,
-    update,
-    bench,
-    completion,
 )
+LAST_VERBS = (bench, completion)  # behind those of fields
 EXIT_CODES = """\
 exit codes:
   0  done
@@ -72,8 +69,7 @@ class ShowSchema(argparse.Action):
         from rom.cli.schemas import schema
         from rom.cli.speech import say
 
-        verb = parser.prog.split()[-1]
-        say(to_json(schema(verb, getattr(verb_modules()[verb], "SCHEMA", None))))
+        say(to_json(schema(parser.prog.split()[-1])))
         parser.exit()
 
 
@@ -134,12 +130,13 @@ def _verb_parsers(parser: argparse.ArgumentParser) -> list[argparse.ArgumentPars
 
 
 def verb_modules() -> dict[str, Any]:
-    """{verb: its module}, those of fields behind those of the program."""
-    found = {module.__name__.rpartition(".")[2]: module for module in VERBS}
+    """{verb: its module}, those of fields too."""
+    first, last = ({m.__name__.rpartition(".")[2]: m for m in some} for some in (VERBS, LAST_VERBS))
+    given = {}
     for name in fields.names("verbs"):
         with suppress(UnknownNameError):
-            found.setdefault(name, fields.find("verbs", name))
-    return found
+            given[name] = fields.find("verbs", name)
+    return first | given | first | last  # no field takes a verb of the program
 
 
 def build_parser() -> Parser:

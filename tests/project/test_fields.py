@@ -115,6 +115,7 @@ def test_all_components_may_be_deleted():
     from pathlib import Path
     from cases.mbs.trusses import truss
     from rom.cli.main import main
+    from rom.cli.parser import build_parser
     body = mech.add_flexible("beam", truss())
     mech.spring_damper("s", hinge, body.marker("mean"), stiffness=1.0)
     print(rom.simulate(mech, t_end=2e-3, dt=1e-3, progress=False).elastic("beam").shape)
@@ -131,17 +132,19 @@ def test_all_components_may_be_deleted():
     rom.read_mechanism(file).simulate()
     file.write_text(FILE + "[rods.r]\\nelements = 3\\n")
     told(lambda: rom.read_mechanism(file))
+    told(lambda: build_parser().parse_args(["update", "test.uff"]))
     print(main(["--help"]) or 0, "rom.components" in str([m for m in sys.modules.values() if m]))
     """.replace("FILE", repr(FILE)).replace("\n    ", "\n")
     )
     said = run(code, ROOT / "tests").stdout
-    for name, module in (("gear_mesh", "gear_mesh"), ("spin", "round_bodies"),
-                         ("Pulley", "tendons"), ("rods", "cosserat")):  # fmt: skip
+    whose = {"gear_mesh": "gear_mesh", "spin": "round_bodies", "Pulley": "tendons",
+             "rods": "cosserat", "update": "updating"}  # fmt: skip
+    for name, module in whose.items():
         sentence = (
             f"'{name}' belongs to the field 'rom.components.{module}', which is not installed"
         )
         assert sentence in said
-    assert said.count("pip install --force-reinstall fenicsx-rom") == 4
+    assert said.count("pip install --force-reinstall fenicsx-rom") == 5
     assert "fields.toml:" in said and "VERB" in said
 
 
@@ -284,12 +287,20 @@ def test_a_field_of_ours_that_cannot_be_imported_takes_no_other_down():
     assert "RuntimeError: cut" in done.stderr
 
 
-def test_what_was_pickled_under_the_names_before_is_read():
-    pair = GearPair((20, 30), 2e-3, 0.02)
-    now, before = b"rom.components.gear_mesh.gears.geometry", b"rom.mbs.elements.gears.geometry"
-    written = pickle.dumps(pair, protocol=0)
+@pytest.mark.parametrize(
+    ("thing", "now", "before"),
+    [(GearPair((20, 30), 2e-3, 0.02), "gear_mesh.gears.geometry", "mbs.elements.gears.geometry"),
+     (rom.updating.Sensors, "updating.observers.operation", "updating.operation"),
+     (rom.updating.Responses, "updating.measured", "updating.measured"),
+     (rom.io.read_responses, "updating.responses.reading", "io.responses.reading")],
+)  # fmt: skip
+def test_what_was_pickled_under_the_names_before_is_read(thing, now, before):
+    now, before = f"rom.components.{now}\n".encode(), f"rom.{before}\n".encode()
+    written = pickle.dumps(thing, protocol=0)
     assert now in written
-    read = pickle.loads(written.replace(now, before))
-    assert type(read) is GearPair and read == pair
+    assert pickle.loads(written.replace(now, before)) == thing
+
+
+def test_a_module_that_never_was_is_not_found():
     with pytest.raises(ModuleNotFoundError, match="springs_of_gears"):
         __import__("rom.mbs.elements.springs_of_gears")

@@ -28,9 +28,8 @@ ALONE = {
     part: {part, *names.split(), *GROUND}
     for part, names in {
         "model": "", "eigen": "model", "reduction": "model rows eigen", "body": "model eigen paths",
-        "fe": "model eigen decks", "io": "model body parametric updating decks",
+        "fe": "model eigen decks", "io": "model body parametric decks",
         "mbs": "model io paths", "view": "model mbs io", "fmu": "model mbs body io",
-        "updating": "model rows body eigen assembly parametric reduction",
         "prestress": "model rows eigen cyclic reduction",
     }.items()
 }  # fmt: skip
@@ -63,7 +62,7 @@ ORDER = {
             "cut distribute read summary input_deck"
         ),
         "io": (
-            "files hdf5 archive native fields responses matrices sid programs fmu family history "
+            "files hdf5 archive native fields matrices sid programs fmu family history "
             "export claim ours"
         ),
         "mbs": (
@@ -82,6 +81,10 @@ ORDER = {
         ),
         "components.gear_mesh": (
             "gears compliance tooth_elements contact tooth_loads symbols keys field"
+        ),
+        "components.updating": (
+            "frf_data measured responses airframe models methods family_model normal_equations "
+            "equations verdict estimate comparison placement observers pictures verb field"
         ),
         "components.journal_bearing": ("films closed_forms oil_film statics oil record keys field"),
         "body": (

@@ -18,10 +18,10 @@ from typing import Any
 
 import numpy as np
 
+from rom.components.updating.measured import Channels, Responses
 from rom.errors import FileFormatError, UnsafeFileError
 from rom.io.files import check_readable, write_whole
 from rom.io.hdf5 import h5py
-from rom.updating.measured import Channels, Responses
 
 HEADERS = ("v108", "v108")  # oldest and newest version of HDF5 that is written
 KINDS = {"fiu": "real numbers", "c": "complex numbers"}  # by the letters of NumPy

@@ -18,12 +18,8 @@ import numpy as np
 from rom.arguments import finite, one_of, typed, whole
 from rom.body.flexible import FlexibleBody
 from rom.body.surface import surface_of
-from rom.errors import ConfigError, ModelError
-from rom.model import Array, Index
-from rom.names import csv_cell
-from rom.plausible import check_damping_ratio
-from rom.updating.estimate import BAND_RATIO, DAMPING_LOG_DEVIATION
-from rom.updating.family_model import (
+from rom.components.updating.estimate import BAND_RATIO, DAMPING_LOG_DEVIATION
+from rom.components.updating.family_model import (
     Attached,
     Family,
     FamilyModel,
@@ -32,11 +28,15 @@ from rom.updating.family_model import (
     check_units,
     family_model,
 )
-from rom.updating.frf_data import Complex
-from rom.updating.measured import DERIVATIVES, Channels
-from rom.updating.models import DEAD_RATIO, modal
-from rom.updating.normal_equations import responses_at, sensitivity
-from rom.updating.verdict import unseen_directions
+from rom.components.updating.frf_data import Complex
+from rom.components.updating.measured import DERIVATIVES, Channels
+from rom.components.updating.models import DEAD_RATIO, modal
+from rom.components.updating.normal_equations import responses_at, sensitivity
+from rom.components.updating.verdict import unseen_directions
+from rom.errors import ConfigError, ModelError
+from rom.model import Array, Index
+from rom.names import csv_cell
+from rom.plausible import check_damping_ratio
 
 INDEPENDENCE_RTOL = 1e-10  # smallest singular value of modes at the sensors, over the largest
 MAX_EXCHANGES = 50  # rounds; three are usual

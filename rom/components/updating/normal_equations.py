@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 
+from rom.components.updating.family_model import FamilyModel
+from rom.components.updating.frf_data import Complex
+from rom.components.updating.measured import Responses
+from rom.components.updating.methods import blocks, receptance, through_modes
+from rom.components.updating.models import Modal, ParametricModel, modal
 from rom.model import Array, Index
-from rom.updating.family_model import FamilyModel
-from rom.updating.frf_data import Complex
-from rom.updating.measured import Responses
-from rom.updating.methods import blocks, receptance, through_modes
-from rom.updating.models import Modal, ParametricModel, modal
 
 ROUGH_LINES = 500  # at most: enough to see resonances
 ROUGH_ERROR = 0.3  # of responses, with which the search begins

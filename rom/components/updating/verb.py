@@ -24,12 +24,15 @@ from rom.cli.options import (
     unique,
 )
 from rom.cli.output import add_force, checked
+from rom.cli.schemas import FILE, OUTPUT, REPORT, by_name, each, record
+from rom.cli.schemas import number as ratio
+from rom.cli.schemas import text as words
 from rom.errors import ConfigError
 from rom.names import check_ending, named
 
 if TYPE_CHECKING:
-    from rom.updating import Channels, Responses, Updated
-    from rom.updating.family_model import Attached, Family
+    from rom.components.updating.family_model import Attached, Family
+    from rom.components.updating.verdict import Updated
 
 SUMMARY = "update a family of bodies by a vibration test"
 EXAMPLES = """\
@@ -49,9 +52,28 @@ PLAN_LINES = 100  # between the first and the last one
 PLAN_POINTS = 20  # of the surface that are offered, each along three axes
 PLAN_ENDINGS = (".csv", ".uff", ".png")
 PLAN_SIZE = (8, 1)  # sensors and forces, where none are asked for
-PIN_RATIO = 0.12  # length of a pin in a picture, over the size of the body
-PIN_SLENDERNESS = 12.0  # of a pin; its ball is three times as thick
 FACTOR_HELP = "by a factor from LOW to HIGH that is sought; may be repeated"
+POINT_KEY = each(ratio("[m] and direction"), "x, y, z, dx, dy, dz")
+SCHEMA = record(
+    "what a test says about a family of bodies; with --plan, what one will say",
+    optional=tuple("file factors damping scores by_sensor at_bound report plan output".split()),
+    file=FILE,
+    family=words("the family read"),
+    factors=by_name(ratio("factor"), "all parameters; 0 for a candidate, not in the model"),
+    damping=each(ratio("ratio"), "of the lowest elastic modes, the last of all others"),
+    deviations=by_name(ratio("relative"), "standard deviation of each unknown"),
+    scores=by_name(ratio("deviations"), "by which the data ask for what was not updated"),
+    by_sensor=each(ratio("ratio"), "mean squared residual over its expectation"),
+    unseen=each(by_name(ratio("share"), "a direction"), "directions the data do not see"),
+    at_bound=each(words("parameter"), "those at an end of their range"),
+    report=REPORT,
+    plan=record(
+        "channels of a test: point [m] and direction",
+        sensors=each(POINT_KEY, "sensors"),
+        inputs=each(POINT_KEY, "forces"),
+    ),
+    output=OUTPUT,
+)
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -161,10 +183,10 @@ def _plan_options(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> Answer:
     """Read, update, judge."""
+    from rom.components.updating.estimate import update
+    from rom.components.updating.family_model import Parts
+    from rom.components.updating.responses.reading import read_responses
     from rom.io.family import save
-    from rom.io.responses.reading import read_responses
-    from rom.updating.estimate import update
-    from rom.updating.family_model import Parts
 
     if args.plan is not None:
         return _plan(args)
@@ -176,7 +198,9 @@ def run(args: argparse.Namespace) -> Answer:
         bodies=[name for name in Parts.of(family).bodies if name],
     )  # fmt: skip
     if args.picture is not None:
-        _match(args, family, test)
+        from rom.components.updating.pictures import match
+
+        match(family, test, checked(args, args.picture, inputs=_files(args).values()))
     noise = {"force_noise": args.force_noise, "estimator": args.estimator}
     test = replace(test, **{name: value for name, value in noise.items() if value is not None})
     outside = _outside(args, family)
@@ -208,7 +232,7 @@ def run(args: argparse.Namespace) -> Answer:
 
 def _outputs(args: argparse.Namespace, family: "Family") -> dict[str, Path]:
     """{name: file} of the bodies that are written; one alone has no name."""
-    from rom.updating.family_model import Parts
+    from rom.components.updating.family_model import Parts
 
     if args.output is None:
         return {}
@@ -283,7 +307,7 @@ def _place(option: str, text: str, bodies: Collection[str]) -> Any:
 
 def _held(args: argparse.Namespace, family: "Family") -> tuple[Any, ...]:
     """What was held, as the family wants it."""
-    from rom.updating.family_model import Parts
+    from rom.components.updating.family_model import Parts
 
     return tuple(_place("--fixed", text, Parts.of(family).bodies) for text in args.fixed)
 
@@ -296,8 +320,8 @@ def _plan(args: argparse.Namespace) -> Answer:
     """
     import numpy as np
 
+    from rom.components.updating.placement import candidates, place
     from rom.io.files import write_whole
-    from rom.updating.placement import candidates, place
 
     if args.file is not None or args.candidate:
         raise ConfigError("--plan takes neither a test nor --candidate: it comes before the test.")
@@ -332,12 +356,14 @@ def _plan(args: argparse.Namespace) -> Answer:
     if not output:
         return Answer(data, f"{plan}\n{plan.csv()}")
     if output.suffix.lower() == ".png":
+        from rom.components.updating.pictures import drawn
+
         left = ", ".join(f"{name} to {100 * d:.2g} %" for name, d in plan.deviations.items()
                          if name in family.parameters)  # fmt: skip
         title, more = "Plan of a vibration test", f"The test will leave deviations: {left}."
         return Answer(
             data | {"output": str(output)}, str(plan),
-            lambda: _drawn(family, (plan.sensors, plan.inputs), output, title, more),
+            lambda: drawn(family, (plan.sensors, plan.inputs), output, title, more),
         )  # fmt: skip
     text = plan.uff() if output.suffix.lower() == ".uff" else plan.csv()
     return Answer(
@@ -345,71 +371,6 @@ def _plan(args: argparse.Namespace) -> Answer:
         str(plan),
         lambda: write_whole(output, lambda out: out.write(text.encode())),
     )
-
-
-def _match(args: argparse.Namespace, family: "Family", test: "Responses") -> None:
-    """Draw where the points of a test are, also of one that does not belong to the body.
-
-    Raises:
-        ConfigError: for a picture of another kind, or one that must not be replaced.
-        ModelError: if the body carries no surface.
-    """
-    import numpy as np
-    from scipy.spatial import cKDTree
-
-    path = checked(args, args.picture, inputs=_files(args).values())
-    check_ending(path, "a picture", ".png")
-    points = np.vstack([test.sensors.points, test.inputs.points])
-    far = cKDTree(_surface(family)[0]).query(points)[0]
-    _drawn(
-        family, (test.sensors, test.inputs), path, "Points of a vibration test",
-        f"Largest distance of the {len(points)} points from one of the surface: {far.max():.3g} m.",
-    )  # fmt: skip
-
-
-def _drawn(
-    family: "Family",
-    channels: "tuple[Channels, Channels]",
-    path: Path,
-    title: str,
-    more: str,
-) -> None:
-    """A picture of the body with a pin along each channel, its ball where it is mounted."""
-    import numpy as np
-
-    from rom import view
-
-    surface = _surface(family)
-    length = PIN_RATIO * float(np.ptp(surface[0], axis=0).max())
-    thick = length / PIN_SLENDERNESS
-    things = {"body": surface}
-    for name, several in zip(("sensors", "forces"), channels, strict=True):
-        pins = []
-        for x, d in zip(np.asarray(several.points), np.asarray(several.directions), strict=True):
-            pins += [view.cylinder(x, x + length * d / np.linalg.norm(d), thick, sides=12)]
-            pins += [view.ellipsoid((1.5 * thick,) * 3, x, sides=12)]
-        things[name] = view.joined(pins)
-    view.plane(
-        [view.Scene(f"Seen from {side}", things, view=(0.6 * y, y, 0.7 * z), up=(0, 0, 1))
-         for side, y, z in (("the front and above", -1.0, 1.0), ("behind and below", 1.0, -1.0))],
-        path, title=title,
-        caption="A ball marks a point, its pin the direction, in the axes of the geometry; a "
-        f"point may carry several. {more}",
-    )  # fmt: skip
-
-
-def _surface(family: "Family") -> Any:
-    """Points (n, 3) [m] and triangles of all bodies together.
-
-    Raises:
-        ModelError: if a body carries no surface.
-    """
-    from rom import view
-    from rom.body.surface import surface_of
-    from rom.updating.family_model import Parts
-
-    surfaces = [surface_of(body) for body in Parts.of(family).bodies.values()]
-    return view.joined([(surface.points, surface.triangles) for surface in surfaces])
 
 
 def _two_counts(text: str) -> tuple[int, int]:
@@ -452,7 +413,7 @@ def _outside(args: argparse.Namespace, family: "Family") -> "Attached":
     Raises:
         ConfigError: naming the option that is not as it is shown.
     """
-    from rom.updating.family_model import AddedMass, GroundSpring, JointSpring, Parts
+    from rom.components.updating.family_model import AddedMass, GroundSpring, JointSpring, Parts
 
     bodies = Parts.of(family).bodies
     found: dict[str, GroundSpring | JointSpring | AddedMass] = {}

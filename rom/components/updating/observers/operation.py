@@ -23,11 +23,11 @@ from scipy.linalg import eigh, expm, expm_frechet
 from rom.arguments import not_negative, one_of
 from rom.body.flexible import FlexibleBody
 from rom.body.recovery import StressRecovery
+from rom.components.updating.family_model import Attached, Parts, Structure, family_model, terms_of
+from rom.components.updating.measured import POINT_RTOL, Channels
 from rom.errors import ConfigError, ModelError
 from rom.model import Array
 from rom.names import named
-from rom.updating.family_model import Attached, Parts, Structure, family_model, terms_of
-from rom.updating.measured import POINT_RTOL, Channels
 
 UNITS = {
     "displacement": "m", "velocity": "m/s", "acceleration": "m/s2", "strain": "1", "stress": "Pa"

@@ -15,9 +15,7 @@ from numpy.typing import ArrayLike
 from scipy.optimize import least_squares
 
 from rom.arguments import matrix, whole
-from rom.errors import ConfigError
-from rom.model import Array, Report
-from rom.updating.models import (
+from rom.components.updating.models import (
     AtSensors,
     Complex,
     Measurement,
@@ -28,6 +26,8 @@ from rom.updating.models import (
     modal,
     sensor_dofs,
 )
+from rom.errors import ConfigError
+from rom.model import Array, Report
 
 MAX_EVALUATIONS = 100  # evaluations of the responses; more are needed if the start is too far away
 BLOCK_LINES = 256  # at once: some ten megabytes of derivatives for sixty channels

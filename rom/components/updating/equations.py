@@ -10,11 +10,8 @@ import numpy as np
 from scipy.linalg import null_space, qr
 
 from rom.arguments import whole
-from rom.errors import ConfigError
-from rom.model import Array, Index, Mask
-from rom.names import named
-from rom.updating.family_model import FamilyModel
-from rom.updating.methods import (
+from rom.components.updating.family_model import FamilyModel
+from rom.components.updating.methods import (
     Update,
     blocks,
     folded,
@@ -22,8 +19,11 @@ from rom.updating.methods import (
     update_by_input,
     weighted,
 )
-from rom.updating.models import AtSensors, Measurement, ParametricModel, modal
-from rom.updating.normal_equations import Data, shared, through_shared, white
+from rom.components.updating.models import AtSensors, Measurement, ParametricModel, modal
+from rom.components.updating.normal_equations import Data, shared, through_shared, white
+from rom.errors import ConfigError
+from rom.model import Array, Index, Mask
+from rom.names import named
 
 SENSOR_RTOL = 1e-8  # singular value of sensors that follow others, over the largest
 LAST_STEP = 1e-3  # in standard deviations

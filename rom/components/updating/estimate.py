@@ -13,13 +13,8 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from rom.arguments import between, one_of, positive, typed
-from rom.errors import ConfigError, ParameterError, SolverError, warn
-from rom.model import Array, Mask, Row
-from rom.names import named
-from rom.plausible import check_damping_ratio
-from rom.rows import row
-from rom.updating.equations import by_equations, by_response_functions
-from rom.updating.family_model import (
+from rom.components.updating.equations import by_equations, by_response_functions
+from rom.components.updating.family_model import (
     Attached,
     Family,
     FamilyModel,
@@ -28,12 +23,12 @@ from rom.updating.family_model import (
     check_units,
     family_model,
 )
-from rom.updating.frf_data import Complex, beside_poles
-from rom.updating.measured import Responses
-from rom.updating.methods import Update
-from rom.updating.models import chi_row, modal
-from rom.updating.normal_equations import Data, Sums, responses_at, sums
-from rom.updating.verdict import (
+from rom.components.updating.frf_data import Complex, beside_poles
+from rom.components.updating.measured import Responses
+from rom.components.updating.methods import Update
+from rom.components.updating.models import chi_row, modal
+from rom.components.updating.normal_equations import Data, Sums, responses_at, sums
+from rom.components.updating.verdict import (
     LEFT_LOG_LEVEL,
     Updated,
     band,
@@ -44,6 +39,11 @@ from rom.updating.verdict import (
     unseen_directions,
     verdict,
 )
+from rom.errors import ConfigError, ParameterError, SolverError, warn
+from rom.model import Array, Mask, Row
+from rom.names import named
+from rom.plausible import check_damping_ratio
+from rom.rows import row
 
 MAX_STEPS = 60  # of the search; ten are usual
 MAX_MISFIT = 2.0  # chi-square over its expectation: what did not settle here is a wrong model

@@ -10,10 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
-from rom.errors import ConfigError, FileFormatError
-from rom.io.fields.universal import FREQUENCY_RESPONSE, Function, scan
-from rom.io.responses.grid import COHERENCE_KIND
-from rom.io.responses.unit_labels import (
+from rom.components.updating.measured import MeasuredModes
+from rom.components.updating.responses.grid import COHERENCE_KIND
+from rom.components.updating.responses.unit_labels import (
     IN_G,
     NO_UNITS,
     force_of,
@@ -21,8 +20,9 @@ from rom.io.responses.unit_labels import (
     motion_of_unit,
     plain,
 )  # fmt: skip
+from rom.errors import ConfigError, FileFormatError
+from rom.io.fields.universal import FREQUENCY_RESPONSE, Function, scan
 from rom.model import Array
-from rom.updating.measured import MeasuredModes
 
 SETS = dict[str, list[list[str]]]
 NODE_SETS = ("15", "2411")

@@ -12,13 +12,13 @@ from typing import Any
 import numpy as np
 
 from rom.arguments import typed, whole
+from rom.components.updating.estimate import update
+from rom.components.updating.family_model import Family
+from rom.components.updating.measured import Responses
+from rom.components.updating.normal_equations import Data, sums
+from rom.components.updating.verdict import Updated
 from rom.errors import ConfigError
 from rom.model import Array, Index
-from rom.updating.estimate import update
-from rom.updating.family_model import Family
-from rom.updating.measured import Responses
-from rom.updating.normal_equations import Data, sums
-from rom.updating.verdict import Updated
 
 MAX_WORSE = 2.0  # standard deviations by which a smaller set may foretell worse than the best
 

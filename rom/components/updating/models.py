@@ -15,11 +15,11 @@ from scipy.stats import chi2
 from scipy.stats import f as f_ratio
 
 from rom.arguments import finite, one_each
+from rom.components.updating.frf_data import frac
 from rom.errors import ConfigError, ModelError
 from rom.model import Array, Report, Row
 from rom.reduction.bases.fixed_interface import craig_bampton
 from rom.rows import row
-from rom.updating.frf_data import frac
 
 Complex = NDArray[np.complex128]
 RIGID_RTOL = 1e-4  # round-off of a rigid motion's eigenvalue, of the lowest elastic one

@@ -1,14 +1,17 @@
-"""Tests of vibration from files: the reader is chosen by the ending."""
+"""Tests of vibration from files: the reader is chosen by the ending.
+
+See docs/theory/updating.md.
+"""
 
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from rom.arguments import typed
+from rom.components.updating.measured import MeasuredModes, Responses
+from rom.components.updating.responses.grid import Bodies, side_by_side
 from rom.errors import ConfigError, FileFormatError
-from rom.io.responses.grid import Bodies, side_by_side
 from rom.model import Array
-from rom.updating.measured import MeasuredModes, Responses
 
 UNIVERSAL_ENDINGS, TABLE_ENDINGS, ARRAY_ENDINGS = (
     (".uff", ".unv", ".uf"),
@@ -49,13 +52,13 @@ def read_responses(
     Source:
         SDRC, Universal file datasets, as published by the University of Cincinnati.
     """
-    from rom.io.responses.tables import functions_of
-    from rom.io.responses.universal_test import functions_and_points
+    from rom.components.updating.responses.tables import functions_of
+    from rom.components.updating.responses.universal_test import functions_and_points
 
     path = Path(path)
     ending = path.suffix.lower()
     if ending in ARRAY_ENDINGS:
-        from rom.io.responses.arrays import read
+        from rom.components.updating.responses.arrays import read
 
         if averages is not None or coherence is not None or points is not None:
             raise ConfigError(f"{path} says averages, coherence and points itself; leave them out.")
@@ -94,7 +97,7 @@ def read_modes(path: str | Path, *, points: str | Path | None = None) -> Measure
     Source:
         SDRC, Universal file datasets, as published by the University of Cincinnati.
     """
-    from rom.io.responses.universal_test import modes_of
+    from rom.components.updating.responses.universal_test import modes_of
 
     places, _ = _points(points)
     with _of(Path(path)):
@@ -113,7 +116,7 @@ def write_responses(test: Responses, path: str | Path) -> Path:
         ConfigError: for another ending, or if the folder is missing or not writable.
         ResourceError: if the disk is full, or h5py is missing.
     """
-    from rom.io.responses.arrays import written
+    from rom.components.updating.responses.arrays import written
 
     if Path(path).suffix.lower() not in ARRAY_ENDINGS:
         raise _unknown(Path(path), ARRAY_ENDINGS)
@@ -130,8 +133,8 @@ def _of(path: Path) -> Iterator[None]:
 
 
 def _points(path: str | Path | None) -> tuple[dict[int, Array], dict[int, str]]:
-    from rom.io.responses.tables import points_of
-    from rom.io.responses.universal_test import functions_and_points
+    from rom.components.updating.responses.tables import points_of
+    from rom.components.updating.responses.universal_test import functions_and_points
 
     if path is None:
         return {}, {}

@@ -12,11 +12,11 @@ from typing import Any
 
 import numpy as np
 
+from rom.components.updating.responses.grid import COHERENCE_KIND
+from rom.components.updating.responses.unit_labels import length_of, lines_of, motion_per_force
 from rom.errors import ConfigError, FileFormatError
 from rom.io.fields.universal import FORCE_TYPE, FREQUENCY_RESPONSE, Function
 from rom.io.files import check_readable
-from rom.io.responses.grid import COHERENCE_KIND
-from rom.io.responses.unit_labels import length_of, lines_of, motion_per_force
 from rom.model import Array
 
 MAX_TABLE_BYTES = 2**29

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from rom.components.updating.measured import Channels, Responses
 from rom.errors import FileFormatError
 from rom.io.fields.universal import FREQUENCY_RESPONSE, Function
 from rom.model import Array
 from rom.names import named
-from rom.updating.measured import Channels, Responses
 
 COHERENCE_KIND = 6  # of functions in universal files
 LINES_RTOL = 1e-5  # of frequencies that are the same: files hold six digits

@@ -1,4 +1,7 @@
-"""The FMU of a filter: samples of sensors in, estimates anywhere on the body out; no Python."""
+"""The FMU of a filter: samples of sensors in, estimates anywhere on the body out; no Python.
+
+See docs/theory/tracking.md.
+"""
 
 import json
 from functools import partial
@@ -7,13 +10,13 @@ from pathlib import Path
 import numpy as np
 
 from rom.arguments import typed
+from rom.components.updating.observers.operation import UNITS
+from rom.components.updating.observers.parameter_tracking import LINEAR_REACH, ParameterTracker
+from rom.components.updating.observers.tracking import Observer
 from rom.io.files import check_writable
 from rom.io.fmu.archive import Content, write_archive
 from rom.io.fmu.body import description, table
 from rom.io.fmu.variables import Variable, structured
-from rom.updating.operation import UNITS
-from rom.updating.parameter_tracking import LINEAR_REACH, ParameterTracker
-from rom.updating.tracking import Observer
 
 
 @typed

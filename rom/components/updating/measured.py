@@ -11,11 +11,11 @@ from scipy.spatial import cKDTree
 from rom.arguments import finite, one_each, one_of, typed, whole
 from rom.body.flexible import FlexibleBody
 from rom.body.surface import strain_rows, surface_of
+from rom.components.updating.frf_data import FREEDOM_LOST, POWERS, Complex, Noise
 from rom.errors import ConfigError
 from rom.model import Array, Index
 from rom.names import named
 from rom.rotation import skew
-from rom.updating.frf_data import FREEDOM_LOST, POWERS, Complex, Noise
 
 DERIVATIVES = {"displacement": 0, "velocity": 1, "acceleration": 2}
 LENGTHS = {  # factors by which points that are off a body may all lie on it

@@ -14,6 +14,9 @@ from cases.long import ROM_LONG
 from cases.solid import STEEL, composite
 from rom.cli.main import main
 from rom.cli.schemas import schema
+from rom.components.updating.family_model import Parts, family_model
+from rom.components.updating.frf_data import noisy
+from rom.components.updating.normal_equations import responses_at
 from rom.parametric import FamilyAssembly
 from rom.updating import (
     AddedMass,
@@ -24,9 +27,6 @@ from rom.updating import (
     candidates,
     place,
 )
-from rom.updating.family_model import Parts, family_model
-from rom.updating.frf_data import noisy
-from rom.updating.normal_equations import responses_at
 
 pytestmark = pytest.mark.once  # the environment without FEniCSx has no h5py
 SIZE, CELLS = (1.0, 0.1, 0.08), (8, 1, 1)
@@ -283,7 +283,7 @@ def test_families_on_a_joint_are_updated_and_written_one_by_one(bolted, capsys):
 
 
 def test_a_coupled_assembly_is_planned(bolted, capsys, monkeypatch):
-    monkeypatch.setattr("rom.cli.verbs.update.PLAN_POINTS", 6)
+    monkeypatch.setattr("rom.components.updating.verb.PLAN_POINTS", 6)
     words = ["--plan", "4,1", "--lines", "20:900", "--couple", "frame.tip=arm.root", *HALVES]
     found = halves([*words, "-o", "halves.png", "--force"], capsys)
     assert errors(found, schema("update")) == []

@@ -16,15 +16,15 @@ import numpy as np
 from rom.arguments import finite, whole
 from rom.assembly.assembly import Assembly
 from rom.body.flexible import FlexibleBody
+from rom.components.updating.family_model import Family, FamilyModel, Parts
+from rom.components.updating.frf_data import Complex, frac
+from rom.components.updating.measured import Channels
+from rom.components.updating.models import DEAD_RATIO, MAX_UNLIKE, N_BANDS, chi_row, deviation
+from rom.components.updating.normal_equations import Data, Sums, responses_at, wrapped
 from rom.errors import ConfigError
 from rom.model import Array, Index, Mask, Report, Row
 from rom.parametric.assembled import FamilyAssembly
 from rom.rows import row
-from rom.updating.family_model import Family, FamilyModel, Parts
-from rom.updating.frf_data import Complex, frac
-from rom.updating.measured import Channels
-from rom.updating.models import DEAD_RATIO, MAX_UNLIKE, N_BANDS, chi_row, deviation
-from rom.updating.normal_equations import Data, Sums, responses_at, wrapped
 
 KNOWN_FACTORS = {
     9.80665: "acceleration in g",

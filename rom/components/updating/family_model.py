@@ -20,6 +20,7 @@ from rom.body.flexible import FlexibleBody
 from rom.body.records import Marker, still_motions
 from rom.body.recovery import StressRecovery
 from rom.body.reference import marker_motion
+from rom.components.updating.models import ParametricModel
 from rom.eigen.supports import spring_matrices
 from rom.errors import ConfigError, ParameterError
 from rom.model import Array, Index, Mask
@@ -28,7 +29,6 @@ from rom.parametric.assembled import FamilyAssembly
 from rom.parametric.family import BodyFamily
 from rom.parametric.parameters import Density, Parameter, YoungsModulus
 from rom.rotation import skew
-from rom.updating.models import ParametricModel
 
 HELD_RTOL = 1e-9  # singular value of a motion that nothing holds
 MASS_DOFS = 3  # translations, which a point mass resists

@@ -18,13 +18,9 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from rom.arguments import not_negative, positive, typed
-from rom.errors import ConfigError, ParameterError, SolverError
-from rom.model import Array
-from rom.names import named
-from rom.plausible import check_damping_ratio
-from rom.updating.family_model import Attached, Family, check_units
-from rom.updating.measured import Channels
-from rom.updating.operation import (
+from rom.components.updating.family_model import Attached, Family, check_units
+from rom.components.updating.measured import Channels
+from rom.components.updating.observers.operation import (
     Linear,
     Operation,
     Sensors,
@@ -32,7 +28,7 @@ from rom.updating.operation import (
     operation,
     step_derivatives,
 )  # fmt: skip
-from rom.updating.tracking import (
+from rom.components.updating.observers.tracking import (
     Assumed,
     Track,
     Tracker,
@@ -40,6 +36,10 @@ from rom.updating.tracking import (
     linear_tracker,
     recorded,
 )  # fmt: skip
+from rom.errors import ConfigError, ParameterError, SolverError
+from rom.model import Array
+from rom.names import named
+from rom.plausible import check_damping_ratio
 
 LINEAR_REACH = 5e-3  # of a logarithm, within which transitions are linear in it
 

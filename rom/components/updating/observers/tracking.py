@@ -19,12 +19,10 @@ import numpy as np
 from rom.arguments import finite, not_negative, positive, typed
 from rom.assembly.assembly import Assembly
 from rom.body.flexible import FlexibleBody
-from rom.errors import ConfigError, SolverError
-from rom.model import Array
-from rom.updating.family_model import check_units
-from rom.updating.filter_steps import filtered
-from rom.updating.measured import Channels
-from rom.updating.operation import (
+from rom.components.updating.family_model import check_units
+from rom.components.updating.measured import Channels
+from rom.components.updating.observers.filter_steps import filtered
+from rom.components.updating.observers.operation import (
     UNITS,
     Linear,
     Operation,
@@ -33,6 +31,8 @@ from rom.updating.operation import (
     discrete,
     operation,
 )  # fmt: skip
+from rom.errors import ConfigError, SolverError
+from rom.model import Array
 
 TIME_RTOL = 1e-6  # of steps that count as equal
 SETTLED_RTOL = 1e-12  # change of variances from one doubling to the next
