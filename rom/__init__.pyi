@@ -31,6 +31,9 @@ from rom.body.spread import SpreadLoad as SpreadLoad
 from rom.body.spread import mass_load as mass_load
 from rom.body.spread import surface_load as surface_load
 from rom.checks.gates import check as check
+from rom.components.orbits.equilibria import continuation as continuation
+from rom.components.orbits.motion import periodic_motion as periodic_motion
+from rom.components.orbits.path import periodic_path as periodic_path
 from rom.components.updating.estimate import update as update
 from rom.config.component import read_component as read_component
 from rom.config.mechanism import read_mechanism as read_mechanism
@@ -82,13 +85,10 @@ from rom.io.history import write_history as write_history
 from rom.io.matrices.read_model import read_model as read_model
 from rom.io.sid.dialect import read_sid as read_sid
 from rom.mbs.analysis.campbell import campbell as campbell
-from rom.mbs.analysis.continuation.equilibria import continuation as continuation
 from rom.mbs.analysis.equilibrium import equilibrium as equilibrium
 from rom.mbs.analysis.inverse_dynamics import inverse_dynamics as inverse_dynamics
 from rom.mbs.analysis.law_check import check_law as check_law
 from rom.mbs.analysis.linearize import linearize as linearize
-from rom.mbs.analysis.periodic.motion import periodic_motion as periodic_motion
-from rom.mbs.analysis.periodic.path import periodic_path as periodic_path
 from rom.mbs.analysis.response import frequency_response as frequency_response
 from rom.mbs.analysis.response import transmissibility as transmissibility
 from rom.mbs.analysis.sensitivity import equilibrium_sensitivity as equilibrium_sensitivity

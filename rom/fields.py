@@ -21,7 +21,7 @@ else:
     Methods = Columns = object
 
 # The list: the modules of all records, in the order of tables for compiled code; and, of fields
-# that may be missing, the names by which they are asked for
+# that may be missing, the names by which they are asked for, or that of the folder
 FIELDS = {
     "rom.mbs.elements.field": "",
     "rom.components.tendons.field": "tendon tendons",
@@ -35,6 +35,7 @@ FIELDS = {
     "rom.components.best_matching.field": "best_matching",
     "rom.components.linkages.field": "linkages",
     "rom.components.masonry.field": "masonry",
+    "rom.components.orbits.field": "orbits",
     "rom.components.rockfall.field": "rockfall",
     "rom.components.updating.field": "update",
     "rom.components.wind.field": "wind",

@@ -72,7 +72,7 @@ ORDER = {
         "mbs.analysis": (
             "quadratic_eigen local_equations rotors few_modes tangent sparse_tangent equilibrium "
             "linearize campbell response snapshot steady_motion sensitivity inverse_dynamics "
-            "law_check continuation periodic"
+            "law_check"
         ),
         "mbs.elements": (
             "field family pair_motion springs rotational_springs loads law_calls "

@@ -17,10 +17,10 @@ import numpy.typing as npt
 from scipy.linalg import block_diag
 
 from rom import rotation
+from rom.components.orbits.beside import Beside
+from rom.components.orbits.flow import Start
+from rom.components.orbits.shooting import Return, energy
 from rom.mbs.analysis.local_equations import MAX_DENSE
-from rom.mbs.analysis.periodic.beside import Beside
-from rom.mbs.analysis.periodic.flow import Start
-from rom.mbs.analysis.periodic.shooting import Return, energy
 from rom.mbs.kernels.system import ROLL
 from rom.model import Array
 

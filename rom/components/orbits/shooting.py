@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
+from rom.components.orbits.flow import Flow, Start
+from rom.components.orbits.turns import Turns
 from rom.mbs.analysis.local_equations import free_motions
-from rom.mbs.analysis.periodic.flow import Flow, Start
-from rom.mbs.analysis.periodic.turns import Turns
 from rom.mbs.analysis.snapshot import snapshot
 from rom.mbs.analysis.tangent import sizes
 from rom.mbs.kernels.system import ROLL

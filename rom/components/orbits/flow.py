@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from rom import rotation
+from rom.components.orbits.beside import Beside
 from rom.mbs.analysis.local_equations import DIFFERENCE_STEP, Instant
-from rom.mbs.analysis.periodic.beside import Beside
 from rom.mbs.equations.equations import evaluate, retract
 from rom.mbs.equations.packing import Packed, pack
 from rom.mbs.equations.python_laws import apply_laws

@@ -9,11 +9,10 @@ import numpy as np
 import numpy.typing as npt
 
 from rom.arguments import finite, positive, typed, whole
-from rom.errors import ConfigError, SolverError, reached
-from rom.mbs.analysis.periodic.derivatives import confirmed
-from rom.mbs.analysis.periodic.family import Family, Period, period_at
-from rom.mbs.analysis.periodic.flow import Flow
-from rom.mbs.analysis.periodic.motion import (
+from rom.components.orbits.derivatives import confirmed
+from rom.components.orbits.family import Family, Period, period_at
+from rom.components.orbits.flow import Flow
+from rom.components.orbits.motion import (
     N_STEPS,
     RHO_INF,
     STABLE_TOL,
@@ -21,6 +20,7 @@ from rom.mbs.analysis.periodic.motion import (
     periodic_motion,
     recorded,
 )
+from rom.errors import ConfigError, SolverError, reached
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.results.solution import Solution
 from rom.mbs.results.state import State

@@ -5,8 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rom.errors import ModelError, SolverError
-from rom.mbs.analysis.periodic.derivatives import (
+from rom.components.orbits.derivatives import (
     Derivatives,
     Tangent,
     by_differences,
@@ -14,10 +13,11 @@ from rom.mbs.analysis.periodic.derivatives import (
     confirmed,
     follows,
 )
-from rom.mbs.analysis.periodic.flow import Flow, Start
-from rom.mbs.analysis.periodic.repetition import refuse_other_forces
-from rom.mbs.analysis.periodic.shooting import Return, energy, moved_by
-from rom.mbs.analysis.periodic.turns import Turns
+from rom.components.orbits.flow import Flow, Start
+from rom.components.orbits.repetition import refuse_other_forces
+from rom.components.orbits.shooting import Return, energy, moved_by
+from rom.components.orbits.turns import Turns
+from rom.errors import ModelError, SolverError
 from rom.mbs.integrate.simulation import simulate
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.results.solution import Solution

@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from rom.components.orbits.flow import Flow, Start
+from rom.components.orbits.shooting import Return
+from rom.components.orbits.turns import FULL_TURN, Turns
 from rom.errors import ModelError
-from rom.mbs.analysis.periodic.flow import Flow, Start
-from rom.mbs.analysis.periodic.shooting import Return
-from rom.mbs.analysis.periodic.turns import FULL_TURN, Turns
 from rom.mbs.kernels.system import ANGLE
 from rom.mbs.parts.signals import Signal
 from rom.mbs.results.state import State

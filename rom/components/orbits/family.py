@@ -8,13 +8,13 @@ import numpy as np
 from scipy.integrate import trapezoid
 
 from rom.arguments import positive
+from rom.components.orbits.derivatives import Tangent, by_differences, by_steps, follows
+from rom.components.orbits.flow import Flow, Start
+from rom.components.orbits.motion import PeriodicMotion
+from rom.components.orbits.search import GOOD_RATIO, Shooting
+from rom.components.orbits.shooting import Return
+from rom.components.orbits.turns import Turns, turns_of
 from rom.errors import ConfigError, ModelError, SolverError
-from rom.mbs.analysis.periodic.derivatives import Tangent, by_differences, by_steps, follows
-from rom.mbs.analysis.periodic.flow import Flow, Start
-from rom.mbs.analysis.periodic.motion import PeriodicMotion
-from rom.mbs.analysis.periodic.search import GOOD_RATIO, Shooting
-from rom.mbs.analysis.periodic.shooting import Return
-from rom.mbs.analysis.periodic.turns import Turns, turns_of
 from rom.mbs.mechanism import Mechanism
 from rom.model import Array
 

@@ -9,14 +9,14 @@ import numpy as np
 import numpy.typing as npt
 
 from rom.arguments import between, positive, typed, whole
+from rom.components.orbits.derivatives import Derivatives, Tangent
+from rom.components.orbits.flow import Flow
+from rom.components.orbits.repetition import refuse_what_changes
+from rom.components.orbits.search import Shooting
+from rom.components.orbits.shooting import Return, energy
+from rom.components.orbits.turns import turns_of
 from rom.errors import ConfigError, SolverError
 from rom.mbs.analysis.linearize import linearize
-from rom.mbs.analysis.periodic.derivatives import Derivatives, Tangent
-from rom.mbs.analysis.periodic.flow import Flow
-from rom.mbs.analysis.periodic.repetition import refuse_what_changes
-from rom.mbs.analysis.periodic.search import Shooting
-from rom.mbs.analysis.periodic.shooting import Return, energy
-from rom.mbs.analysis.periodic.turns import turns_of
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.results.solution import Solution
 from rom.mbs.results.state import State, check_state
