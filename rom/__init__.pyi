@@ -31,6 +31,11 @@ from rom.body.spread import SpreadLoad as SpreadLoad
 from rom.body.spread import mass_load as mass_load
 from rom.body.spread import surface_load as surface_load
 from rom.checks.gates import check as check
+from rom.components.families.family import BodyFamily as BodyFamily
+from rom.components.families.parameters import Density as Density
+from rom.components.families.parameters import Thickness as Thickness
+from rom.components.families.parameters import YoungsModulus as YoungsModulus
+from rom.components.families.reduce import reduce_parametric as reduce_parametric
 from rom.components.orbits.equilibria import continuation as continuation
 from rom.components.orbits.motion import periodic_motion as periodic_motion
 from rom.components.orbits.path import periodic_path as periodic_path
@@ -75,9 +80,9 @@ from rom.errors import TagError as TagError
 from rom.errors import UnknownNameError as UnknownNameError
 from rom.errors import UnsafeFileError as UnsafeFileError
 from rom.fmu.export import write_fmu as write_fmu
+from rom.io.bodies import load as load
+from rom.io.bodies import save as save
 from rom.io.export import export as export
-from rom.io.family import load as load
-from rom.io.family import save as save
 from rom.io.fields.vtu import write_stress as write_stress
 from rom.io.fields.vtu import write_stress_history as write_stress_history
 from rom.io.fmu.body import write_body_fmu as write_body_fmu
@@ -115,11 +120,6 @@ from rom.model import Orthotropic as Orthotropic
 from rom.model import Region as Region
 from rom.model import Report as Report
 from rom.model import SurfaceMesh as SurfaceMesh
-from rom.parametric.family import BodyFamily as BodyFamily
-from rom.parametric.parameters import Density as Density
-from rom.parametric.parameters import Thickness as Thickness
-from rom.parametric.parameters import YoungsModulus as YoungsModulus
-from rom.parametric.reduce import reduce_parametric as reduce_parametric
 from rom.prestress.heat import Heat as Heat
 from rom.prestress.speed_table import ReducedSpinUp as ReducedSpinUp
 from rom.prestress.speed_table import SpinUp as SpinUp

@@ -2,10 +2,10 @@ from rom.components.updating.observers.fmu import write_observer_fmu as write_ob
 from rom.components.updating.responses.reading import read_modes as read_modes
 from rom.components.updating.responses.reading import read_responses as read_responses
 from rom.components.updating.responses.reading import write_responses as write_responses
+from rom.io.bodies import load as load
+from rom.io.bodies import save as save
 from rom.io.export import export as export
 from rom.io.export import read_body as read_body
-from rom.io.family import load as load
-from rom.io.family import save as save
 from rom.io.fields.gltf import MovingMesh as MovingMesh
 from rom.io.fields.gltf import write_glb as write_glb
 from rom.io.fields.universal import read_universal as read_universal

@@ -13,9 +13,9 @@ from cases.long import SHARED_BY
 from cases.panels import ALLOY, FOAM, KINDS, PARAMETERS, ROOT, panel
 from cases.paths import RANKS
 from cases.ranks.environment import ENVIRONMENT
+from rom.components.families.affine import AffineModel
 from rom.eigen.scipy import SciPyOperators
 from rom.eigen.verbs import rigid_motions
-from rom.parametric.affine import AffineModel
 from rom.process.mpirun import mpirun
 
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")

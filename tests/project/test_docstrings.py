@@ -36,7 +36,7 @@ pytestmark = pytest.mark.once
 
 ENOUGH = 0.95
 METHODS = ("rom.reduction.", "rom.mbs.integrate.", "rom.components.", "rom.cyclic.",
-           "rom.prestress.", "rom.parametric.", "rom.assembly.")  # fmt: skip
+           "rom.prestress.", "rom.assembly.")  # fmt: skip
 PLAIN = {  # of these folders, and no published method
     "rom.assembly.condensed.CondensedAssembly": "the result",
     "rom.components.gear_mesh.gears.corrections.flank_map": "a file",

@@ -54,7 +54,7 @@ def run(code, *paths):
 @pytest.mark.parametrize("place", FIELDS)
 def test_the_list_has_the_names_by_which_fields_are_asked(place):
     """Of those that may be missing, so that the error can say whose they are."""
-    kinds = "methods", "bodies", "sections", "columns", "verbs", "first_use"
+    kinds = "methods", "bodies", "sections", "columns", "takes", "verbs", "first_use"
     given = {name for kind in kinds for name in getattr(record(place), kind)}
     words = set(FIELDS[place].split())
     own = given or {place.split(".")[2]}
@@ -294,6 +294,7 @@ def test_a_field_of_ours_that_cannot_be_imported_takes_no_other_down():
      (rom.updating.Sensors, "updating.observers.operation", "updating.operation"),
      (rom.updating.Responses, "updating.measured", "updating.measured"),
      (rom.mbs.PeriodicMotion, "orbits.motion", "mbs.analysis.periodic.motion"),
+     (rom.BodyFamily, "families.family", "parametric.family"),
      (rom.io.read_responses, "updating.responses.reading", "io.responses.reading")],
 )  # fmt: skip
 def test_what_was_pickled_under_the_names_before_is_read(thing, now, before):

@@ -28,7 +28,7 @@ ALONE = {
     part: {part, *names.split(), *GROUND}
     for part, names in {
         "model": "", "eigen": "model", "reduction": "model rows eigen", "body": "model eigen paths",
-        "fe": "model eigen decks", "io": "model body parametric decks",
+        "fe": "model eigen decks", "io": "model body decks",
         "mbs": "model io paths", "view": "model mbs io", "fmu": "model mbs body io",
         "prestress": "model rows eigen cyclic reduction",
     }.items()
@@ -62,7 +62,7 @@ ORDER = {
             "cut distribute read summary input_deck"
         ),
         "io": (
-            "files hdf5 archive native fields matrices sid programs fmu family history "
+            "files hdf5 archive native fields matrices sid programs fmu bodies history "
             "export claim ours"
         ),
         "mbs": (

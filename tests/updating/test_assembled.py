@@ -10,6 +10,7 @@ from numpy.testing import assert_allclose
 import rom
 from cases.solid import STEEL, composite
 from rom.body.recovery import StressRecovery
+from rom.components.families.parameters import centre
 from rom.components.updating.family_model import Parts, family_model
 from rom.components.updating.frf_data import noisy
 from rom.components.updating.models import modal
@@ -17,7 +18,6 @@ from rom.components.updating.normal_equations import responses_at
 from rom.components.updating.observers.operation import discrete
 from rom.errors import ConfigError, InterfaceError
 from rom.parametric import FamilyAssembly
-from rom.parametric.parameters import centre
 from rom.updating import (
     AddedMass,
     Channels,

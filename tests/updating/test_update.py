@@ -10,13 +10,13 @@ from scipy.linalg import eigh, solve_sylvester, sqrtm
 
 import rom
 from cases.solid import STEEL, composite
+from rom.components.families.layers import Stretch
 from rom.components.updating.estimate import _Before, _Search
 from rom.components.updating.family_model import family_model
 from rom.components.updating.frf_data import estimators, noisy, random_error
 from rom.components.updating.methods import receptance
 from rom.components.updating.normal_equations import Data, responses_at, sums
 from rom.errors import ConfigError, ParameterError, SolverError
-from rom.parametric.layers import Stretch
 from rom.updating import AddedMass, Channels, GroundSpring, Responses
 
 KINDS = {"root": "rbe2", "tip": "rbe2"}

@@ -20,14 +20,14 @@ from rom.body.flexible import FlexibleBody
 from rom.body.records import Marker, still_motions
 from rom.body.recovery import StressRecovery
 from rom.body.reference import marker_motion
+from rom.components.families.assembled import FamilyAssembly
+from rom.components.families.family import BodyFamily
+from rom.components.families.parameters import Density, Parameter, YoungsModulus
 from rom.components.updating.models import ParametricModel
 from rom.eigen.supports import spring_matrices
 from rom.errors import ConfigError, ParameterError
 from rom.model import Array, Index, Mask
 from rom.names import check_known, named
-from rom.parametric.assembled import FamilyAssembly
-from rom.parametric.family import BodyFamily
-from rom.parametric.parameters import Density, Parameter, YoungsModulus
 from rom.rotation import skew
 
 HELD_RTOL = 1e-9  # singular value of a motion that nothing holds

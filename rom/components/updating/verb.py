@@ -186,7 +186,7 @@ def run(args: argparse.Namespace) -> Answer:
     from rom.components.updating.estimate import update
     from rom.components.updating.family_model import Parts
     from rom.components.updating.responses.reading import read_responses
-    from rom.io.family import save
+    from rom.io.bodies import save
 
     if args.plan is not None:
         return _plan(args)
@@ -269,9 +269,9 @@ def _family(args: argparse.Namespace) -> "Family":
     Raises:
         ConfigError: for a file of one body, or couplings of one family alone.
     """
-    from rom.io.family import load
-    from rom.parametric.assembled import FamilyAssembly
-    from rom.parametric.family import BodyFamily
+    from rom.components.families.assembled import FamilyAssembly
+    from rom.components.families.family import BodyFamily
+    from rom.io.bodies import load
 
     families = {name: load(file) for name, file in _files(args).items()}
     for name, family in families.items():

@@ -16,6 +16,7 @@ import numpy as np
 from rom.arguments import finite, whole
 from rom.assembly.assembly import Assembly
 from rom.body.flexible import FlexibleBody
+from rom.components.families.assembled import FamilyAssembly
 from rom.components.updating.family_model import Family, FamilyModel, Parts
 from rom.components.updating.frf_data import Complex, frac
 from rom.components.updating.measured import Channels
@@ -23,7 +24,6 @@ from rom.components.updating.models import DEAD_RATIO, MAX_UNLIKE, N_BANDS, chi_
 from rom.components.updating.normal_equations import Data, Sums, responses_at, wrapped
 from rom.errors import ConfigError
 from rom.model import Array, Index, Mask, Report, Row
-from rom.parametric.assembled import FamilyAssembly
 from rom.rows import row
 
 KNOWN_FACTORS = {

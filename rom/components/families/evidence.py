@@ -15,11 +15,11 @@ from rom.checks.certificate import (
     reduced_shapes,
     rigid_rows,
 )
+from rom.components.families.affine import AffineModel
+from rom.components.families.family import BodyFamily
+from rom.components.families.parameters import scattered
 from rom.eigen.verbs import residual_errors
 from rom.model import Basis, Report, Row
-from rom.parametric.affine import AffineModel
-from rom.parametric.family import BodyFamily
-from rom.parametric.parameters import scattered
 from rom.reduction.interfaces.connection import connect
 from rom.reduction.interfaces.records import Connection
 from rom.rows import N_COMPARED, frequency_rows, row

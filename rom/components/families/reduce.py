@@ -10,14 +10,11 @@ import numpy as np
 from rom.arguments import between, typed
 from rom.body.damping import ModalDamping, Rayleigh
 from rom.body.projection import canonical_columns, elastic_part, flexible_body
-from rom.errors import ParameterError
-from rom.model import FEModel
-from rom.names import check_name
-from rom.parametric.affine import AffineModel
-from rom.parametric.common_basis import CommonBasis, first_sample
-from rom.parametric.evidence import certified, estimated
-from rom.parametric.family import BodyFamily
-from rom.parametric.parameters import (
+from rom.components.families.affine import AffineModel
+from rom.components.families.common_basis import CommonBasis, first_sample
+from rom.components.families.evidence import certified, estimated
+from rom.components.families.family import BodyFamily
+from rom.components.families.parameters import (
     Parameter,
     Point,
     Thickness,
@@ -27,7 +24,10 @@ from rom.parametric.parameters import (
     scattered,
     written,
 )
-from rom.parametric.stretched import StretchedModel
+from rom.components.families.stretched import StretchedModel
+from rom.errors import ParameterError
+from rom.model import FEModel
+from rom.names import check_name
 from rom.reduction.bases.method import Method
 from rom.reduction.interfaces.characteristic import Characteristic
 from rom.reduction.interfaces.connection import connect

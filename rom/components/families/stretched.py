@@ -9,13 +9,13 @@ from scipy.sparse import identity, kron
 
 from rom.body.flexible import FlexibleBody
 from rom.body.inertia import inertia_integrals
+from rom.components.families.affine import AffineModel, RegionOperators, symmetric
+from rom.components.families.family import Share
+from rom.components.families.layers import Stretch
+from rom.components.families.parameters import Parameter, Point, Thickness, centre, factor, factors
 from rom.eigen.verbs import Operators, orthonormal_in, rigid_motions
 from rom.errors import ModelError, ParameterError
 from rom.model import Array, FEModel, Interface, Layered
-from rom.parametric.affine import AffineModel, RegionOperators, symmetric
-from rom.parametric.family import Share
-from rom.parametric.layers import Stretch
-from rom.parametric.parameters import Parameter, Point, Thickness, centre, factor, factors
 from rom.reduction.interfaces.characteristic import GivenFunctions
 
 OVERLAP_RTOL = 1e-6  # of the extent, by which regions may overlap along the axis

@@ -20,9 +20,9 @@ from scipy.linalg import null_space
 from rom.body.flexible import FlexibleBody
 from rom.body.inertia import InertiaIntegrals
 from rom.body.records import Marker, Surface
+from rom.components.families.parameters import Parameter, Point, Thickness, factor
 from rom.eigen.verbs import rigid_motions
 from rom.model import Array
-from rom.parametric.parameters import Parameter, Point, Thickness, factor
 from rom.rotation import skew
 
 ROUND_OFF = 1e-12  # of the largest distance from the origin: no length outside the layers

@@ -6,99 +6,53 @@ from typing import Any
 
 import numpy as np
 
-from rom.arguments import typed
 from rom.body.damping import ModalDamping, Rayleigh
 from rom.body.flexible import FlexibleBody
 from rom.body.inertia import InertiaIntegrals
 from rom.body.recovery import StressRecovery
+from rom.components.families.family import BodyFamily, Share
+from rom.components.families.layers import Stretch
+from rom.components.families.parameters import read, written
 from rom.errors import FileFormatError
 from rom.io import native
-from rom.io.archive import MAX_BYTES, Kind, stated, write_archive
+from rom.io.archive import stated, write_archive
 from rom.model import Array
-from rom.parametric.family import BodyFamily, Share
-from rom.parametric.layers import Stretch
-from rom.parametric.parameters import read, written
 
 SCHEMA_NAME = "rom-family"
 VERSION = (1, 1)  # counts like that of the body file
 INTEGRALS = InertiaIntegrals.__slots__
 
 
-@typed
-def save(body: FlexibleBody | BodyFamily, path: str | Path) -> Path:
-    """Write a flexible body, or a family of them, whole or not at all.
-
-    Args:
-        body: what to write.
-        path: file name, usually ending in ``.rom.npz``.
-
-    Raises:
-        ConfigError: if the folder is missing or not writable.
-        QualityGateError: if an array holds a number that is not finite.
-        ResourceError: if the disk is full.
-
-    Example:
-        >>> body = rom.load("beam.rom.npz")
-        >>> file = rom.save(body, "copy.rom.npz")
-        >>> rom.load("copy.rom.npz").n_modes == body.n_modes
-        True
-    """
-    if isinstance(body, FlexibleBody):
-        return native.save(body, path)
-    arrays = native.body_arrays(body.body)
-    for i, share in enumerate(body.shares):
+def save(family: BodyFamily, path: str | Path) -> Path:
+    """Write a family; see `rom.save`."""
+    arrays = native.body_arrays(family.body)
+    for i, share in enumerate(family.shares):
         found = {name: getattr(share.integrals, name) for name in INTEGRALS} | {"K": share.K}
         if share.stress is not None:
             found["stress"] = share.stress
         arrays |= {f"share/{i}/{name}": np.asarray(A, dtype=float) for name, A in found.items()}
-    if body.stretch is not None:
-        arrays["stretch/rigid"] = np.asarray(body.stretch.rigid, dtype=float)
-    damping, numbers = _damping(body.damping)
+    if family.stretch is not None:
+        arrays["stretch/rigid"] = np.asarray(family.stretch.rigid, dtype=float)
+    damping, numbers = _damping(family.damping)
     arrays |= numbers
-    manifest = native.body_manifest(body.body) | {
+    manifest = native.body_manifest(family.body) | {
         "schema": SCHEMA_NAME,
         "version": list(VERSION),
-        "parameters": written(body.parameters),
-        "shares": [{"region": s.region, "fixed": s.fixed} for s in body.shares],
-        "frame": body.reference,
+        "parameters": written(family.parameters),
+        "shares": [{"region": s.region, "fixed": s.fixed} for s in family.shares],
+        "frame": family.reference,
         "damping": damping,
-        "stretch": _layers(body.stretch),
-        "provenance": body.provenance,
-        "certificate": None if body.certificate is None else asdict(body.certificate),
+        "stretch": _layers(family.stretch),
+        "provenance": family.provenance,
+        "certificate": None if family.certificate is None else asdict(family.certificate),
     }
-    return write_archive(path, manifest, arrays, f"family {body.body.name!r}")
+    return write_archive(path, manifest, arrays, f"family {family.body.name!r}")
 
 
-@typed
-def load(path: str | Path, *, limit: int = MAX_BYTES) -> Any:
-    """Read a flexible body, or a family of them.
-
-    Args:
-        path: file written by `save`.
-        limit: bytes the arrays may take in memory.
-
-    Returns:
-        FlexibleBody or BodyFamily.
-
-    Raises:
-        FileFormatError: if the file is missing, cut, changed, or no body file.
-        UnsafeFileError: if it asks for more memory than the limit or holds anything but numbers.
-        QualityGateError: if the numbers are not those of a body.
-
-    Example:
-        >>> round(rom.load("beam.rom.npz").mass, 6)  # steel, 1 m x 50 mm x 30 mm
-        11.775
-    """
-    path = Path(path)
-    known = Kind(
-        {native.SCHEMA_NAME: native.VERSION, SCHEMA_NAME: VERSION}, "body file", native.FIELDS
-    )
-    manifest, arrays = native.read_finite(path, known, limit)
-    with stated(path):
-        body = native.body_of(manifest, arrays)
-    native.verify(body, path)
-    if manifest["schema"] == native.SCHEMA_NAME:
-        return body
+def load(
+    manifest: dict[str, Any], arrays: dict[str, Array], body: FlexibleBody, path: Path
+) -> BodyFamily:
+    """The family of which a file holds a body; see `rom.load`."""
     with stated(path):
         family = _family(manifest, arrays, body)
     _verify(family, path)

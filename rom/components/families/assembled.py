@@ -6,10 +6,10 @@ from typing import Any
 
 from rom.arguments import typed
 from rom.assembly.assembly import Assembly, Place
+from rom.components.families.family import BodyFamily
+from rom.components.families.parameters import Parameter, complete
 from rom.errors import ConfigError
 from rom.names import check_text, named
-from rom.parametric.family import BodyFamily
-from rom.parametric.parameters import Parameter, complete
 
 
 @typed

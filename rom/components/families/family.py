@@ -20,10 +20,18 @@ from rom.body.flexible import FlexibleBody
 from rom.body.frame import reference_label
 from rom.body.inertia import InertiaIntegrals, weighted
 from rom.body.recovery import StressRecovery
+from rom.components.families.layers import Stretch, stretched_body
+from rom.components.families.parameters import (
+    Parameter,
+    Point,
+    Thickness,
+    centre,
+    complete,
+    factor,
+    factors,
+)
 from rom.eigen.supports import Fixed, Springs
 from rom.model import Array, Report
-from rom.parametric.layers import Stretch, stretched_body
-from rom.parametric.parameters import Parameter, Point, Thickness, centre, complete, factor, factors
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,14 +9,14 @@ import numpy as np
 from rom.body.flexible import FlexibleBody
 from rom.body.inertia import InertiaIntegrals, inertia_integrals, point_integrals, weighted
 from rom.body.recovery import StressRecovery
+from rom.components.families.family import Share
+from rom.components.families.layers import Stretch
+from rom.components.families.parameters import Density, Parameter, Point, factors
 from rom.eigen.attachments import added_mass, carried_displacements
 from rom.eigen.verbs import Operators
 from rom.errors import ParameterError
 from rom.model import Array, FEModel, Region
 from rom.names import offered
-from rom.parametric.family import Share
-from rom.parametric.layers import Stretch
-from rom.parametric.parameters import Density, Parameter, Point, factors
 from rom.reduction.full_model import mesh_operators
 
 REMAINDER_RTOL = 1e-12  # share of mass and stiffness below which all belongs to named regions
