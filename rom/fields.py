@@ -39,6 +39,7 @@ FIELDS = {
     "rom.components.orbits.field": "orbits",
     "rom.components.rockfall.field": "rockfall",
     "rom.components.updating.field": "update",
+    "rom.components.wheels.field": "reduce.CyclicSector",
     "rom.components.wind.field": "wind",
 }
 ENTRY_POINT_GROUP = "rom.fields"  # of entry points, by which other packages bring theirs

@@ -30,7 +30,6 @@ ALONE = {
         "model": "", "eigen": "model", "reduction": "model rows eigen", "body": "model eigen paths",
         "fe": "model eigen decks", "io": "model body decks",
         "mbs": "model io paths", "view": "model mbs io", "fmu": "model mbs body io",
-        "prestress": "model rows eigen cyclic reduction",
     }.items()
 }  # fmt: skip
 # inside each folder that has folders, what lies lower stands first; a file imports its own folder
@@ -47,10 +46,6 @@ ORDER = {
         "cli": (
             "answer speech schemas options described method ranks matrices model output verbs "
             "parser main"
-        ),
-        "cyclic": (
-            "faces sector rotation modes gyroscopic travelling supports campbell certificate "
-            "reduced blades"
         ),
         "fe": "costs parallel jit compat operators forms mesh elasticity probe",
         "fe.operators": (
@@ -81,6 +76,10 @@ ORDER = {
         ),
         "components.gear_mesh": (
             "gears compliance tooth_elements contact tooth_loads symbols keys field"
+        ),
+        "components.wheels": (
+            "faces sector rotation modes gyroscopic travelling supports campbell certificate "
+            "reduced blades prestress field"
         ),
         "components.updating": (
             "frf_data measured responses airframe models methods family_model normal_equations "

@@ -22,7 +22,7 @@ import numpy.typing as npt
 from scipy.sparse import block_diag, csr_matrix, identity, kron
 
 from rom.arguments import finite, matrix, typed, whole
-from rom.cyclic.faces import paired, refuse_all_around, turned, unit_axis
+from rom.components.wheels.faces import paired, refuse_all_around, turned, unit_axis
 from rom.eigen.attachments import added_mass
 from rom.eigen.supports import Fixed, held_dofs
 from rom.eigen.verbs import rigid_motions

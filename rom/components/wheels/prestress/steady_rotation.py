@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from scipy.sparse import csr_matrix
 
-from rom.cyclic.rotation import axial_pins, rotation_matrices
-from rom.cyclic.sector import CyclicSector
+from rom.components.wheels.rotation import axial_pins, rotation_matrices
+from rom.components.wheels.sector import CyclicSector
 from rom.model import Array
 
 MAX_ITERATIONS = 25

@@ -5,7 +5,7 @@ from dataclasses import fields
 import numpy as np
 
 from rom.arguments import typed
-from rom.cyclic.blades.blade import (
+from rom.components.wheels.blades.blade import (
     SHARED_STIFFNESS_RTOL,
     blade_in,
     cut,
@@ -13,10 +13,10 @@ from rom.cyclic.blades.blade import (
     stresses_of,
     turning,
 )
-from rom.cyclic.blades.records import SubstructuredSector
-from rom.cyclic.reduced import ReducedSector, face_functions, projected
-from rom.cyclic.rotation import centrifugal_displacement
-from rom.cyclic.sector import CyclicSector, all_rows, region
+from rom.components.wheels.blades.records import SubstructuredSector
+from rom.components.wheels.reduced import ReducedSector, face_functions, projected
+from rom.components.wheels.rotation import centrifugal_displacement
+from rom.components.wheels.sector import CyclicSector, all_rows, region
 from rom.eigen.verbs import dofs_of, every_row, own_rows
 from rom.errors import ConfigError, InterfaceError
 from rom.model import Array, FEModel

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import eigh
 
-from rom.cyclic.sector import Complex
+from rom.components.wheels.sector import Complex
 from rom.model import Array
 
 

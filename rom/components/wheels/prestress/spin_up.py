@@ -7,17 +7,17 @@ import numpy.typing as npt
 from scipy.sparse import csr_matrix
 
 from rom.arguments import positive, typed, whole
-from rom.cyclic.faces import unit_axis
-from rom.cyclic.modes import cyclic_modes
-from rom.cyclic.rotation import rotation_matrices
-from rom.cyclic.sector import NO_DOFS, CyclicSector, all_rows, workers_of
+from rom.components.wheels.faces import unit_axis
+from rom.components.wheels.modes import cyclic_modes
+from rom.components.wheels.prestress.heat import Heat
+from rom.components.wheels.prestress.speed_table import SpinUp, straightened
+from rom.components.wheels.prestress.steady_rotation import SteadyRotation
+from rom.components.wheels.prestress.thermal import finite_solid
+from rom.components.wheels.rotation import rotation_matrices
+from rom.components.wheels.sector import NO_DOFS, CyclicSector, all_rows, workers_of
 from rom.eigen.supports import Fixed, held_dofs
 from rom.errors import ConfigError, ModelError, reached
 from rom.model import Array, FEModel
-from rom.prestress.heat import Heat
-from rom.prestress.speed_table import SpinUp, straightened
-from rom.prestress.steady_rotation import SteadyRotation
-from rom.prestress.thermal import finite_solid
 
 
 @typed

@@ -20,17 +20,17 @@ import numpy as np
 from scipy.sparse import csr_matrix, identity
 
 from rom.arguments import typed
-from rom.cyclic.blades.records import ReducedBlade
-from rom.cyclic.faces import interpolation
-from rom.cyclic.rotation import arms, rotation_matrices
-from rom.cyclic.sector import all_rows, region
+from rom.components.wheels.blades.records import ReducedBlade
+from rom.components.wheels.faces import interpolation
+from rom.components.wheels.rotation import arms, rotation_matrices
+from rom.components.wheels.sector import all_rows, region
 from rom.eigen.verbs import dofs_of, every_row, own_rows
 from rom.errors import ConfigError, InterfaceError
 from rom.model import Array, FEModel, Index, Interface
 from rom.names import check_known
 
 if TYPE_CHECKING:
-    from rom.cyclic.blades.records import SubstructuredSector
+    from rom.components.wheels.blades.records import SubstructuredSector
 
 # of the root's size: distance and difference in size of two roots that match
 ROOT_MATCH_RTOL = 0.05

@@ -8,8 +8,8 @@ from scipy.linalg import eigh
 from scipy.sparse import bmat, csr_matrix
 
 from rom.arguments import typed, whole
-from rom.cyclic.rotation import divergence_speed
-from rom.cyclic.sector import Complex, CyclicSector, each_diameter
+from rom.components.wheels.rotation import divergence_speed
+from rom.components.wheels.sector import Complex, CyclicSector, each_diameter
 from rom.eigen.scipy import negative_count
 from rom.eigen.workers import Workers
 from rom.errors import ConfigError, ModelError

@@ -27,10 +27,10 @@ import numpy.typing as npt
 from scipy.linalg import block_diag, eigh
 
 from rom.arguments import lowest, matrix, one_each, rows_at, typed, vector
-from rom.cyclic.blades.records import ReducedBlade, SubstructuredSector
-from rom.cyclic.certificate import wheel_certificate
-from rom.cyclic.gyroscopic import GyroscopicModes, gyroscopic_modes
-from rom.cyclic.sector import Complex
+from rom.components.wheels.blades.records import ReducedBlade, SubstructuredSector
+from rom.components.wheels.certificate import wheel_certificate
+from rom.components.wheels.gyroscopic import GyroscopicModes, gyroscopic_modes
+from rom.components.wheels.sector import Complex
 from rom.errors import ConfigError, ModelError
 from rom.model import Array, Modes, Report
 from rom.plausible import check_damping_ratio

@@ -8,9 +8,9 @@ import numpy.typing as npt
 from scipy.optimize import linear_sum_assignment
 
 from rom.arguments import typed, whole
-from rom.cyclic.modes import cyclic_modes
-from rom.cyclic.sector import Complex, CyclicSector
-from rom.cyclic.travelling import travelling_modes
+from rom.components.wheels.modes import cyclic_modes
+from rom.components.wheels.sector import Complex, CyclicSector
+from rom.components.wheels.travelling import travelling_modes
 from rom.errors import ConfigError
 from rom.model import Array
 

@@ -6,10 +6,10 @@ import numpy as np
 from scipy.linalg import block_diag, eigh
 
 from rom.arguments import typed, whole
-from rom.cyclic.blades.bladed_wheel import BladedWheel
-from rom.cyclic.blades.records import SubstructuredSector
-from rom.cyclic.modes import real_span
-from rom.cyclic.sector import Complex
+from rom.components.wheels.blades.bladed_wheel import BladedWheel
+from rom.components.wheels.blades.records import SubstructuredSector
+from rom.components.wheels.modes import real_span
+from rom.components.wheels.sector import Complex
 from rom.model import Array
 
 RIGID_SPAN_RTOL = 1e-6  # share of a rigid motion that the coordinates may miss

@@ -6,8 +6,8 @@ import numpy as np
 import numpy.typing as npt
 
 from rom.arguments import typed, vector
-from rom.cyclic.reduced import ReducedSector
-from rom.cyclic.sector import NO_DOFS
+from rom.components.wheels.reduced import ReducedSector
+from rom.components.wheels.sector import NO_DOFS
 from rom.errors import ConfigError
 from rom.model import Array, Index
 

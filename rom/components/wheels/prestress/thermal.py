@@ -18,15 +18,15 @@ from scipy.linalg import qr
 from scipy.sparse import block_diag, csr_matrix, identity
 
 from rom.arguments import typed
-from rom.cyclic.modes import real_form
-from rom.cyclic.rotation import axial_pins, largest_ratio
-from rom.cyclic.sector import CyclicSector, all_rows, workers_of
+from rom.components.wheels.modes import real_form
+from rom.components.wheels.prestress.heat import Heat
+from rom.components.wheels.rotation import axial_pins, largest_ratio
+from rom.components.wheels.sector import CyclicSector, all_rows, workers_of
 from rom.eigen.supports import Fixed, held_dofs
 from rom.eigen.verbs import dofs_of, rigid_motions
 from rom.eigen.workers import Workers, held_solution
 from rom.errors import ConfigError, ModelError
 from rom.model import Array, FEModel, Index
-from rom.prestress.heat import Heat
 
 LARGEST_STRAIN = 0.5  # of heat, far beyond what a linear solid can say
 RANK_RTOL = 1e-9  # of the largest: remainder of a motion that others contain

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from rom.cyclic.modes import cyclic_modes, wheel_modes
-from rom.cyclic.sector import CyclicSector, each_diameter
+from rom.components.wheels.modes import cyclic_modes, wheel_modes
+from rom.components.wheels.sector import CyclicSector, each_diameter
 from rom.model import Array, Report, Row
 from rom.rows import FREQUENCY_RTOL, N_COMPARED, frequency_rows
 

@@ -14,13 +14,13 @@ from scipy.optimize import linear_sum_assignment
 from scipy.sparse import csr_matrix
 
 from rom.arguments import typed
-from rom.cyclic.modes import CyclicModes, cyclic_modes
-from rom.cyclic.reduced import ReducedSector, projected, reduce_sector
-from rom.cyclic.sector import CyclicSector
-from rom.cyclic.travelling import TravellingModes, travelling_modes
+from rom.components.wheels.modes import CyclicModes, cyclic_modes
+from rom.components.wheels.prestress.steady_rotation import SteadyRotation
+from rom.components.wheels.reduced import ReducedSector, projected, reduce_sector
+from rom.components.wheels.sector import CyclicSector
+from rom.components.wheels.travelling import TravellingModes, travelling_modes
 from rom.errors import ConfigError, ModelError, warn
 from rom.model import Array, Report
-from rom.prestress.steady_rotation import SteadyRotation
 from rom.reduction.interfaces.polynomial import FourierLegendre, Polynomial
 from rom.rows import row
 

@@ -18,7 +18,7 @@ from scipy.sparse import csr_matrix, identity, kron
 from scipy.sparse.linalg import LinearOperator, eigsh, splu
 
 from rom.arguments import typed
-from rom.cyclic.sector import NO_DOFS, CyclicSector
+from rom.components.wheels.sector import NO_DOFS, CyclicSector
 from rom.eigen.search import MAX_DENSE_DOFS
 from rom.eigen.workers import held_solution
 from rom.errors import ConfigError, ModelError

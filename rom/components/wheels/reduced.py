@@ -10,13 +10,15 @@ from scipy.sparse import csr_matrix, identity
 from scipy.spatial import cKDTree
 
 from rom.arguments import typed
-from rom.cyclic.certificate import sector_certificate
-from rom.cyclic.sector import Complex, CyclicSector
+from rom.components.wheels.certificate import sector_certificate
+from rom.components.wheels.sector import Complex, CyclicSector
 from rom.eigen.verbs import DEPENDENT_RTOL, every_row, orthonormal_in, own_rows
 from rom.errors import ConfigError, InterfaceError
 from rom.model import Array, Interface, Report
 from rom.reduction.bases.method import CraigBampton
 from rom.reduction.interfaces.polynomial import FourierLegendre, Polynomial
+
+CYCLIC_FACES = "cyclic"  # what the faces are called where sectors of a wheel meet
 
 
 @dataclass(frozen=True)
@@ -113,6 +115,24 @@ def reduce_sector(
     E = own_rows(ops, E)
     Psi = every_row(ops, np.hstack([E - inner(ops.apply_K(E)), Phi]))
     return projected(sector, Psi, q, omega)
+
+
+def reduced_by(
+    sector: CyclicSector, method: Any, interfaces: dict[str, Any], *, of_bodies: bool
+) -> ReducedSector:
+    """A sector by what is given to `rom.reduce`: a method and the functions on its cyclic faces."""
+    if of_bodies:
+        raise ConfigError(
+            "reference, damping, stress, stiffening and nonlinear belong to bodies in motion; a "
+            "sector has none of them.",
+            hint="Give a sector the matrices of its rotation by rom.rotating_sector.",
+        )
+    if set(interfaces) - {CYCLIC_FACES}:
+        raise ConfigError(
+            f"a sector has one interface, {CYCLIC_FACES!r}, not {sorted(interfaces)}.",
+            hint=f"Write interfaces={{{CYCLIC_FACES!r}: rom.Polynomial(4)}}.",
+        )
+    return reduce_sector(sector, method=method, functions=interfaces.get(CYCLIC_FACES))
 
 
 def _by_number(method: Any) -> bool:

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.sparse import csr_matrix, kron
 
 from rom.arguments import typed
-from rom.cyclic.sector import CyclicSector
+from rom.components.wheels.sector import CyclicSector
 from rom.errors import ConfigError, InterfaceError
 from rom.model import Interface
 

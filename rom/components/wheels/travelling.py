@@ -8,8 +8,8 @@ from scipy.sparse import csc_matrix, csr_matrix
 from scipy.sparse.linalg import LinearOperator, eigs, splu
 
 from rom.arguments import typed, whole
-from rom.cyclic.modes import real_form, spinning
-from rom.cyclic.sector import Complex, CyclicSector
+from rom.components.wheels.modes import real_form, spinning
+from rom.components.wheels.sector import Complex, CyclicSector
 from rom.eigen.scipy import negative_count
 from rom.eigen.verbs import count_shift
 from rom.errors import ConfigError, ModelError, ModesMissedError
@@ -166,7 +166,7 @@ def _refuse_growth(lam: Complex, diameter: int, speed: float) -> None:
             f"at {speed:g} rad/s a motion with {diameter} nodal diameters grows by "
             f"{growth:.3g} 1/s at {abs(worst.imag) / (2 * np.pi):.4g} Hz: the speed is above that "
             "of an instability.",
-            hint="rom.cyclic.rotation.divergence_speed tells where stiffness is used up.",
+            hint="rom.cyclic.divergence_speed tells where stiffness is used up.",
         )
 
 
