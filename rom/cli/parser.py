@@ -7,36 +7,11 @@ from typing import Any, NoReturn
 
 from rom import fields
 from rom.cli.options import options_of
-from rom.cli.verbs import (
-    bench,
-    check,
-    completion,
-    doctor,
-    export,
-    mesh,
-    modes,
-    reduce,
-    report,
-    simulate,
-    swing,
-    view,
-)
 from rom.config.keys import nearest
 from rom.errors import ConfigError, UnknownNameError
 
-VERBS = (
-    doctor,
-    mesh,
-    modes,
-    reduce,
-    check,
-    export,
-    simulate,
-    view,
-    report,
-    swing,
-)
-LAST_VERBS = (bench, completion)  # behind those of fields
+VERBS = "doctor mesh modes reduce check export simulate view report swing".split()
+LAST_VERBS = ["bench", "completion"]  # behind those of fields
 EXIT_CODES = """\
 exit codes:
   0  done
@@ -130,13 +105,16 @@ def _verb_parsers(parser: argparse.ArgumentParser) -> list[argparse.ArgumentPars
 
 
 def verb_modules() -> dict[str, Any]:
-    """{verb: its module}, those of fields too."""
-    first, last = ({m.__name__.rpartition(".")[2]: m for m in some} for some in (VERBS, LAST_VERBS))
+    """{verb: its module}, those of fields too, which take none of the program."""
+    first, last = (
+        {name: fields.follow(f"rom.cli.verbs.{name}") for name in some}
+        for some in (VERBS, LAST_VERBS)
+    )
     given = {}
     for name in fields.names("verbs"):
         with suppress(UnknownNameError):
             given[name] = fields.find("verbs", name)
-    return first | given | first | last  # no field takes a verb of the program
+    return first | given | first | last
 
 
 def build_parser() -> Parser:
