@@ -33,11 +33,7 @@ def match(family: Family, test: Responses, path: Path) -> None:
 
 
 def drawn(
-    family: Family,
-    channels: tuple[Channels, Channels],
-    path: Path,
-    title: str,
-    more: str,
+    family: Family, channels: tuple[Channels, Channels], path: Path, title: str, more: str
 ) -> None:
     """A picture of the body with a pin along each channel, its ball where it is mounted."""
     surface = _surface(family)
