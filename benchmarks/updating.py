@@ -10,16 +10,16 @@ from scipy.sparse.linalg import splu
 from benchmarks.models import KINDS
 from benchmarks.timing import Row, timed
 from rom.body.surface import surface_of
+from rom.components.families.parameters import Density, YoungsModulus
+from rom.components.families.reduce import reduce_parametric
+from rom.components.updating.estimate import update
+from rom.components.updating.family_model import AddedMass, GroundSpring, family_model
+from rom.components.updating.frf_data import noisy
+from rom.components.updating.measured import Channels, Responses
+from rom.components.updating.normal_equations import Data, responses_at, sums
 from rom.model import Array, FEModel
-from rom.parametric.parameters import Density, YoungsModulus
-from rom.parametric.reduce import reduce_parametric
 from rom.process.memory import peak_bytes
 from rom.reduction.bases.method import CraigBampton
-from rom.updating.estimate import update
-from rom.updating.family_model import AddedMass, GroundSpring, family_model
-from rom.updating.frf_data import noisy
-from rom.updating.measured import Channels, Responses
-from rom.updating.normal_equations import Data, responses_at, sums
 
 N_SENSORS, N_INPUTS, N_LINES = 20, 3, 4000
 HIGHEST_LINE = 1500.0  # [Hz]

@@ -7,9 +7,9 @@ import numpy as np
 
 from benchmarks.models import TITANIUM
 from benchmarks.timing import Row, timed
-from rom.cyclic.modes import wheel_modes
-from rom.cyclic.reduced import reduce_sector
-from rom.cyclic.sector import CyclicSector
+from rom.components.wheels.modes import wheel_modes
+from rom.components.wheels.reduced import reduce_sector
+from rom.components.wheels.sector import CyclicSector
 from rom.eigen.scipy import SciPyOperators
 from rom.model import Array
 from rom.process.memory import peak_bytes

@@ -19,8 +19,8 @@ from scipy.linalg import eigh, null_space
 
 import rom
 from rom import view
+from rom.components.updating import estimators
 from rom.updating import AddedMass, Channels, GroundSpring, MeasuredModes, Responses
-from rom.updating.frf_data import estimators
 
 options = argparse.ArgumentParser(description="a bolted frame corrected by a vibration test")
 options.add_argument("--out", type=Path, default=Path("out"), help="folder, made if missing")

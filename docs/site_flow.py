@@ -21,15 +21,13 @@ STAGES = {  # what lies on the way, and the folders and files in which it lies
     "geometry": ("decks", "fe.mesh"),
     "matrices": ("fe.forms", "fe.operators", "fe"),
     "modes": ("eigen", "reduction.interfaces", "reduction.bases", "reduction.full_model"),
-    "body": (
-        *("body", "checks", "workflow", "io"),
-        *("assembly", "parametric", "updating", "cyclic", "prestress"),
-    ),
+    "body": ("body", "checks", "workflow", "io", "assembly"),
     "mechanism": ("mbs.kernels", "mbs.parts", "mbs.elements", "mbs"),
     "motion": ("mbs.equations", "mbs.integrate", "mbs.results"),
     "results": ("mbs.analysis", "view", "fmu"),
 }
 COMPONENTS, FRONT, GROUND = "components", "front", "ground"
+COMPONENT_FRONTS = ("parametric", "updating", "cyclic", "prestress")
 GROUND_FOLDERS = ("arguments", "paths", "process")  # beside the single files at the top
 FRONTS = ("cli", "config", "report", "doctor", "__main__")
 HANDED_ON = ("SolidMesh", "FEModel", "Basis", "FlexibleBody", "Mechanism", "Solution")
@@ -65,7 +63,8 @@ def stage_of(module: str) -> str:
     """
     places = {part: stage for stage, parts in STAGES.items() for part in parts}
     places = {part.partition(".")[0]: stage for part, stage in places.items()} | places
-    places |= {COMPONENTS: COMPONENTS} | dict.fromkeys(FRONTS, FRONT)
+    places |= dict.fromkeys((COMPONENTS, *COMPONENT_FRONTS), COMPONENTS)
+    places |= dict.fromkeys(FRONTS, FRONT)
     parts = module.split(".")
     for n in (2, 1):
         if ".".join(parts[:n]) in places:

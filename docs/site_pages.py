@@ -20,9 +20,8 @@ from sphinx.application import Sphinx
 
 import rom
 from rom import errors
-from rom.cli.parser import EXIT_CODES, VERBS, build_parser
-from rom.cli.schemas import ERROR
-from rom.cli.schemas import VERBS as VERBS_SCHEMAS
+from rom.cli.parser import EXIT_CODES, build_parser, verb_modules
+from rom.cli.schemas import ERROR, answer_of
 from rom.config.page import page
 
 ROOT = Path(rom.__file__).parents[1]
@@ -156,8 +155,7 @@ def command_page() -> str:
     parser = build_parser()
     verbs: Any = next(a for a in parser._actions if a.dest == "verb").choices
     parts = ["# Commands", f"```text\n{parser.format_help().strip()}\n```"]
-    for module in VERBS:
-        name = module.__name__.rpartition(".")[2]
+    for name in verb_modules():
         text = verbs[name].format_help().partition("\nexit codes:")[0].strip()
         parts += [f"## rom {name}", f"```text\n{text}\n```"]
     return "\n\n".join(parts) + "\n"
@@ -178,7 +176,8 @@ def answers_page() -> str:
         " and, where something does not hold, `failed`. An error has these keys instead:",
         _keys(ERROR),
     ]
-    for verb, schema in VERBS_SCHEMAS.items():
+    for verb in verb_modules():
+        schema = answer_of(verb)
         parts += [f"## rom {verb}", f"{schema['description'].capitalize()}.", _keys(schema)]
     return "\n\n".join(parts) + "\n"
 

@@ -21,7 +21,7 @@ else:
     Methods = Columns = object
 
 # The list: the modules of all records, in the order of tables for compiled code; and, of fields
-# that may be missing, the names by which they are asked for
+# that may be missing, the names by which they are asked for, or that of the folder
 FIELDS = {
     "rom.mbs.elements.field": "",
     "rom.components.tendons.field": "tendon tendons",
@@ -31,6 +31,16 @@ FIELDS = {
     "rom.components.round_bodies.field": "spin",
     "rom.mbs.elements.solids.field": "",
     "rom.components.cosserat.field": "rods",
+    "rom.components.assumed_strain.field": "assumed_strain",
+    "rom.components.best_matching.field": "best_matching",
+    "rom.components.families.field": "save.BodyFamily load.rom-family",
+    "rom.components.linkages.field": "linkages",
+    "rom.components.masonry.field": "masonry",
+    "rom.components.orbits.field": "orbits",
+    "rom.components.rockfall.field": "rockfall",
+    "rom.components.updating.field": "update",
+    "rom.components.wheels.field": "reduce.CyclicSector",
+    "rom.components.wind.field": "wind",
 }
 ENTRY_POINT_GROUP = "rom.fields"  # of entry points, by which other packages bring theirs
 
@@ -47,8 +57,10 @@ class Field:
         symbols: {name of a family: function of scenery, name and element, which gives what is drawn
             of it: actors, or circles by marker, axis and radius}.
         columns: {name: function on a solution, by which it tells of an element over time}.
+        takes: {"verb.name": to what a verb of the core hands objects of the class, or files of the
+            schema, of that name: a module or a function}.
         verbs: {verb of the command line: its module}.
-        page: where it is described.
+        first_use: {name: function that does a small case of all that is compiled}.
         moved: {earlier name of a module, as pickles may have it: its name}.
     """
 
@@ -58,8 +70,9 @@ class Field:
     sections: Mapping[str, str] = field(default_factory=dict)
     symbols: Mapping[str, str] = field(default_factory=dict)
     columns: Mapping[str, str] = field(default_factory=dict)
+    takes: Mapping[str, str] = field(default_factory=dict)
     verbs: Mapping[str, str] = field(default_factory=dict)
-    page: str = ""
+    first_use: Mapping[str, str] = field(default_factory=dict)
     moved: Mapping[str, str] = field(default_factory=dict)
 
 
@@ -143,6 +156,12 @@ def find(kind: str, name: str) -> Any:
             why = "is not installed" if is_missing(place) else _told(FAILURES[place])
             raise _lost(name, place, why) from FAILURES[place]
     return None
+
+
+def taker(verb: str, thing: Any) -> Any:
+    """To what a verb of the core hands an object, by the name of its class or of one above."""
+    words = (f"{verb}.{kind.__name__}" for kind in type(thing).__mro__)
+    return next(filter(None, (find("takes", word) for word in words)))
 
 
 def missing(name: str, module: str, error: ModuleNotFoundError) -> Exception:

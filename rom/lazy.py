@@ -52,16 +52,16 @@ class Moved:
 
     def find_spec(self, name: str, *_: object) -> object:
         """Where a module is, if it was moved."""
-        if not name.startswith("rom.mbs."):
+        if not name.startswith("rom.") or f"{name}.".startswith("rom.components."):
             return None
-        from importlib.util import spec_from_loader
+        from importlib.util import find_spec, spec_from_loader
 
         from rom.fields import names
 
         found = (f"{new}{name[len(old) :]}" for old, new in names("moved").items()
                  if f"{name}.".startswith(f"{old}."))  # fmt: skip
         place = next(found, "")
-        if not place:
+        if not place or find_spec(place) is None:
             return None
         self.module = importlib.import_module(place)
         self.spec = self.module.__spec__

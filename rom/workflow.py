@@ -9,7 +9,7 @@ from typing import Any, Literal, overload
 
 import numpy as np
 
-from rom.arguments import typed
+from rom.arguments import AnySector, typed
 from rom.assembly.dual import FreeSubstructure, free_substructure, with_certificate
 from rom.assembly.pieces import Pieces, Tree, together
 from rom.body.correction import residual_motion
@@ -31,10 +31,9 @@ from rom.body.projection import (
 from rom.body.records import Marker
 from rom.checks.certificate import certify_body
 from rom.checks.deflection import deflection_rows
-from rom.cyclic.reduced import ReducedSector, reduce_sector
-from rom.cyclic.sector import CyclicSector
 from rom.eigen.verbs import Operators
 from rom.errors import ConfigError, InterfaceError
+from rom.fields import taker
 from rom.model import Array, Basis, FEModel, Index
 from rom.names import check_name
 from rom.process.progress import MANY_DOFS, stages
@@ -50,7 +49,6 @@ from rom.reduction.interfaces.records import Connection
 
 log = logging.getLogger("rom")
 ENOUGH_MODES = CraigBampton()  # as many as the certificate needs
-CYCLIC_FACES = "cyclic"  # what the faces are called where sectors of a wheel meet
 
 
 @overload
@@ -71,13 +69,13 @@ def reduce(
 
 @overload
 def reduce(
-    model: CyclicSector, *, method: CraigBampton, interfaces: dict[str, Any] | None = None
-) -> ReducedSector: ...
+    model: AnySector, *, method: CraigBampton, interfaces: dict[str, Any] | None = None
+) -> Any: ...
 
 
 @typed
 def reduce(  # noqa: PLR0913  one keyword per choice
-    model: FEModel | CyclicSector,
+    model: FEModel | AnySector,
     *,
     method: Method | Characteristic = ENOUGH_MODES,
     interfaces: dict[str, Any] | None = None,
@@ -88,7 +86,7 @@ def reduce(  # noqa: PLR0913  one keyword per choice
     stiffening: bool = False,
     nonlinear: Geometric | None = None,
     certify: bool | Literal["full"] = True,
-) -> FlexibleBody | ReducedSector:
+) -> Any:
     """A flexible body that stands for the full model, with the evidence for it.
 
     Args:
@@ -138,9 +136,9 @@ def reduce(  # noqa: PLR0913  one keyword per choice
         >>> body.n_modes, body.certificate.ok  # 2 x 6 + 40 coordinates less 6 rigid motions
         (46, True)
     """
-    if isinstance(model, CyclicSector):
+    if not isinstance(model, FEModel):
         of_bodies = (reference != "mean-axis", damping, stress, stiffening, nonlinear)
-        return _reduced_sector(model, method, interfaces or {}, any(of_bodies))
+        return taker("reduce", model)(model, method, interfaces or {}, of_bodies=any(of_bodies))
     check_name(name, "a body")
     if nonlinear is not None and stiffening:
         raise ConfigError(
@@ -350,24 +348,6 @@ def judged_in(method: Any, supports: tuple[Index, ...]) -> Any:
         return replace(method, method=judged_in(inner, supports))
     chooses = isinstance(method, CraigBampton) and method.chooses
     return replace(method, supports=supports) if chooses else method
-
-
-def _reduced_sector(
-    sector: CyclicSector, method: Any, interfaces: dict[str, Any], of_bodies: bool
-) -> ReducedSector:
-    """One sector of a wheel by the method and the functions on its cyclic faces."""
-    if of_bodies:
-        raise ConfigError(
-            "reference, damping, stress, stiffening and nonlinear belong to bodies in motion; a "
-            "sector has none of them.",
-            hint="Give a sector the matrices of its rotation by rom.rotating_sector.",
-        )
-    if set(interfaces) - {CYCLIC_FACES}:
-        raise ConfigError(
-            f"a sector has one interface, {CYCLIC_FACES!r}, not {sorted(interfaces)}.",
-            hint=f"Write interfaces={{{CYCLIC_FACES!r}: rom.Polynomial(4)}}.",
-        )
-    return reduce_sector(sector, method=method, functions=interfaces.get(CYCLIC_FACES))
 
 
 @contextmanager

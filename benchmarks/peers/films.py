@@ -24,10 +24,10 @@ from rom.components.journal_bearing import (
     equilibrium,
     iso_vg,
 )
+from rom.components.orbits.motion import periodic_motion
 from rom.components.transmission import Disc, Rotor, Shaft, Transmission, rest, steady, sweep
 from rom.mbs import tooth_loads
 from rom.mbs.analysis.equilibrium import equilibrium as mechanism_at_rest
-from rom.mbs.analysis.periodic.motion import periodic_motion
 from rom.model import Array
 
 # of a wheel of charts that newer drawing libraries lack

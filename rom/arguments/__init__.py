@@ -5,7 +5,7 @@ numbers, words, shapes and rotations.
 """
 
 from rom.arguments.border import typed
-from rom.arguments.kinds import AnyBody, AnyMechanism, AnySolution
+from rom.arguments.kinds import AnyBody, AnyFamily, AnyMechanism, AnySector, AnySolution
 from rom.arguments.values import (
     between,
     finite,
@@ -30,7 +30,9 @@ from rom.arguments.values import (
 
 __all__ = [
     "AnyBody",
+    "AnyFamily",
     "AnyMechanism",
+    "AnySector",
     "AnySolution",
     "between",
     "finite",

@@ -100,7 +100,9 @@ class _Named(type):
 
 # records that the layers do not let every module import
 AnyBody = Annotated[Any, _Named("FlexibleBody", (), {})]
+AnyFamily = Annotated[Any, _Named("BodyFamily", (), {})]
 AnyMechanism = Annotated[Any, _Named("Mechanism", (), {})]
+AnySector = Annotated[Any, _Named("CyclicSector", (), {})]
 AnySolution = Annotated[Any, _Named("Solution", (), {})]
 
 

@@ -7,39 +7,11 @@ from typing import Any, NoReturn
 
 from rom import fields
 from rom.cli.options import options_of
-from rom.cli.verbs import (
-    bench,
-    check,
-    completion,
-    doctor,
-    export,
-    mesh,
-    modes,
-    reduce,
-    report,
-    simulate,
-    swing,
-    update,
-    view,
-)
 from rom.config.keys import nearest
 from rom.errors import ConfigError, UnknownNameError
 
-VERBS = (
-    doctor,
-    mesh,
-    modes,
-    reduce,
-    check,
-    export,
-    simulate,
-    view,
-    report,
-    swing,
-    update,
-    bench,
-    completion,
-)
+VERBS = "doctor mesh modes reduce check export simulate view report swing".split()
+LAST_VERBS = ["bench", "completion"]  # behind those of fields
 EXIT_CODES = """\
 exit codes:
   0  done
@@ -72,8 +44,7 @@ class ShowSchema(argparse.Action):
         from rom.cli.schemas import schema
         from rom.cli.speech import say
 
-        verb = parser.prog.split()[-1]
-        say(to_json(schema(verb, getattr(verb_modules()[verb], "SCHEMA", None))))
+        say(to_json(schema(parser.prog.split()[-1])))
         parser.exit()
 
 
@@ -134,12 +105,16 @@ def _verb_parsers(parser: argparse.ArgumentParser) -> list[argparse.ArgumentPars
 
 
 def verb_modules() -> dict[str, Any]:
-    """{verb: its module}, those of fields behind those of the program."""
-    found = {module.__name__.rpartition(".")[2]: module for module in VERBS}
+    """{verb: its module}, those of fields too, which take none of the program."""
+    first, last = (
+        {name: fields.follow(f"rom.cli.verbs.{name}") for name in some}
+        for some in (VERBS, LAST_VERBS)
+    )
+    given = {}
     for name in fields.names("verbs"):
         with suppress(UnknownNameError):
-            found.setdefault(name, fields.find("verbs", name))
-    return found
+            given[name] = fields.find("verbs", name)
+    return first | given | first | last
 
 
 def build_parser() -> Parser:

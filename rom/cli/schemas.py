@@ -6,6 +6,8 @@ version. Numbers that are not finite are null.
 
 from typing import Any
 
+from rom.fields import find
+
 Schema = dict[str, Any]
 SCHEMA_DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
@@ -197,36 +199,6 @@ VERBS: dict[str, Schema] = {
         frequencies=FREQUENCIES,
         certificate=REPORT,
     ),
-    "update": record(
-        "what a test says about a family of bodies; with --plan, what one will say",
-        optional=(
-            "file",
-            "factors",
-            "damping",
-            "scores",
-            "by_sensor",
-            "at_bound",
-            "report",
-            "plan",
-            "output",
-        ),
-        file=FILE,
-        family=text("the family read"),
-        factors=by_name(number("factor"), "all parameters; 0 for a candidate, not in the model"),
-        damping=each(number("ratio"), "of the lowest elastic modes, the last of all others"),
-        deviations=by_name(number("relative"), "standard deviation of each unknown"),
-        scores=by_name(number("deviations"), "by which the data ask for what was not updated"),
-        by_sensor=each(number("ratio"), "mean squared residual over its expectation"),
-        unseen=each(by_name(number("share"), "a direction"), "directions the data do not see"),
-        at_bound=each(text("parameter"), "those at an end of their range"),
-        report=REPORT,
-        plan=record(
-            "channels of a test: point [m] and direction",
-            sensors=each(each(number("[m] and direction"), "x, y, z, dx, dy, dz"), "sensors"),
-            inputs=each(each(number("[m] and direction"), "x, y, z, dx, dy, dz"), "forces"),
-        ),
-        output=OUTPUT,
-    ),
     "bench": record(
         "figures of speed and memory; with --list the benchmarks",
         optional=("figures", "benchmarks"),
@@ -256,9 +228,15 @@ ERROR = record(
 )
 
 
-def schema(verb: str, own: Schema | None = None) -> Schema:
+def answer_of(verb: str) -> Schema:
+    """The schema of the answer of a verb, which may be that of a field."""
+    own: Schema = VERBS.get(verb) or find("verbs", verb).SCHEMA
+    return own
+
+
+def schema(verb: str) -> Schema:
     """The schema of everything a verb can print with ``--json``: its answer, or an error."""
-    own = own or VERBS[verb]
+    own = answer_of(verb)
     answer = own | {
         "properties": {"ok": flag("whether everything holds")}
         | own["properties"]

@@ -1,8 +1,6 @@
-"""Wheels of equal sectors.
+"""Wheels of equal sectors: names of `rom.components.wheels`.
 
-`sector` and `faces` describe one, `modes` and `reduced` solve it; `rotation`, `gyroscopic`,
-`travelling` and `campbell` let it turn, `supports` hold it; `blades` lets blades differ;
-`certificate` shows what a reduction lost.
+See docs/theory/cyclic_symmetry.md.
 """
 
 from rom.lazy import front

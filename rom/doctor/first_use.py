@@ -7,6 +7,7 @@ each how many functions were compiled and how much time of the processor it took
 import json
 import sys
 from collections.abc import Callable
+from functools import partial
 from itertools import combinations
 from time import process_time
 from typing import Any
@@ -14,6 +15,7 @@ from typing import Any
 import numpy as np
 from scipy.sparse import csr_matrix, identity
 
+from rom.fields import families, find, names
 from rom.model import FEModel, Interface
 from rom.reduction.bases.method import CraigBampton
 from rom.workflow import reduce
@@ -107,7 +109,6 @@ def _chain() -> None:
 
 def _elements() -> None:
     """All stages, the kernels of all families of elements, a law of a user, and bars that touch."""
-    from rom.fields import families
     from rom.mbs.elements.contact.impact import Impact
     from rom.mbs.kernels.stages import STAGE_KERNELS
 
@@ -140,28 +141,6 @@ def _formulas() -> None:
     twice.rate(0.0)
 
 
-def _rod() -> None:
-    """A rod in a mechanism: its law, and the stages of elements with laws."""
-    from rom.components.cosserat import body, straight
-    from rom.mbs.mechanism import Mechanism
-
-    mech = Mechanism()
-    section = {"stretch": 1e6, "bend": 100.0, "mass": 1.0, "inertia": 1e-3}
-    rod = mech.add_nonlinear("rod", body(straight(1.0, 3, **section)))
-    mech.spherical("hook", mech.ground.marker(ORIGIN), rod.marker("start"))
-    _move(mech)
-
-
-def _wind() -> None:
-    from rom.components.wind.blading import blading, rotor_load
-    from rom.components.wind.operation import operate
-    from rom.components.wind.whole_turbine import turbine
-
-    rotor_load(blading(), 8.0, 1.0, n_azimuths=3)
-    operate(lambda t: 8.0, 0.1)
-    _move(turbine(2, tower_segments=0, wind=8.0).mechanism)
-
-
 def _equilibrium() -> Any:
     from rom.mbs.analysis.equilibrium import equilibrium
 
@@ -175,65 +154,8 @@ def _linearize() -> None:
     linearize(*_equilibrium())
 
 
-def _rod_alone() -> None:
-    """Rods outside mechanisms: their shape under load, and a motion."""
-    from rom.components import cosserat
-
-    rod = cosserat.straight(1.0, 3, stretch=1e6, bend=100.0, mass=1.0, inertia=1e-3)
-    weight = cosserat.loads(rod, weight=(0.0, -9.81, 0.0))
-    shape = cosserat.equilibrium(rod, weight)
-    cosserat.elastic_energy(rod, shape)
-    cosserat.strain(rod, shape)
-    cosserat.simulate(rod, 2e-3, dt=1e-3, load=weight)
-
-
-def _oil_film() -> None:
-    from rom.components.journal_bearing import Groove, JournalBearing, film
-    from rom.components.journal_bearing.films.tabulated import table_of
-
-    for law in ("reynolds", "jfo"):
-        groove = [Groove(np.pi, 0.35)]
-        bearing = JournalBearing(0.1, 0.05, 1e-4, groove, cavitation=law, aligned=True)
-        film(bearing, (5e-5, 1e-5), speed=300.0, viscosity=0.03)
-    table_of("film", JournalBearing(0.1, 0.05, 1e-4, cells=(12, 2)))
-
-
-def _loops() -> None:
-    """Stones, postures of a linkage, and metal that flows or stretches."""
-    from rom.components.assumed_strain import Metal, fly, rectangle, sheet, tangent
-    from rom.components.histories import sine
-    from rom.components.linkages.dynamic_isotropy import angle_grid, isotropy_index
-    from rom.components.linkages.two_dof_linkages import FiveBar, rod
-    from rom.components.masonry.actions import BaseMotion
-    from rom.components.masonry.limits import arch
-    from rom.components.masonry.motion import simulate
-
-    for actions in ((), (BaseMotion(sine(1.0, 0.5)),)):
-        simulate(arch(3, 5.0, 0.6), t_end=2e-3, dt=1e-3, actions=actions, damping=30.0)
-    five = FiveBar(0.7, (rod(2.0, 0.3),) * 2, (rod(1.0, 0.8),) * 2, payload=0.5)
-    isotropy_index(five.inertia(*angle_grid(4)))
-    copper = Metal(117e9, 0.35, 8930.0, yield_stress=400e6, hardening=100e6)
-    X, triangles = rectangle((1, 1), [(0, 0), (1, 0), (1, 1), (0, 1)])
-    bar = sheet(X, triangles, element="F1", state="axisymmetric")
-    fly(bar, copper, np.full(X.shape, -1.0), np.array([0, 1]), 1e-8)
-    tangent(sheet(X, triangles), copper, X)
-
-
-def _rockfall() -> None:
-    from rom.components.rockfall import Cushion, Gallery, Shear, Slab, strike
-
-    sand, slab = Cushion.of_sand(4000.0, 1e6), Slab.of_mass(6000.0, 1.2e8)
-    strike(Gallery(4000.0, 15.0, 2500.0, sand, shear=Shear(2e9), slab=slab), t_end=1e-3)
-
-
-def _three_bodies() -> None:
-    from rom.components.best_matching import Bodies, ShapeSphere
-
-    bodies, x = Bodies(np.ones(3)), np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
-    sphere = ShapeSphere(bodies)
-    bodies.move(x, 0.1 * x[::-1], np.array([0.0, 1e-3]))
-    n = sphere.shape(x)
-    sphere.move(n, sphere.momentum(x, 0.1 * x[::-1]), np.array([0.0, 1e-3]))
+def _of_field(name: str) -> None:
+    find("first_use", name)()
 
 
 CASES: dict[str, Callable[[], object]] = {
@@ -249,13 +171,7 @@ CASES: dict[str, Callable[[], object]] = {
     "elements": _elements,
     "formulas": _formulas,
     "chain": _chain,
-    "rod": _rod,
-    "wind": _wind,
-    "rod alone": _rod_alone,
-    "oil film": _oil_film,
-    "stones and metal": _loops,
-    "rockfall": _rockfall,
-    "three bodies": _three_bodies,
+    **{name: partial(_of_field, name) for name in names("first_use")},
 }
 DEMO_CASES = ("pendulum", "slider-crank")  # what `make demo` and the first page need
 

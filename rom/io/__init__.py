@@ -1,9 +1,9 @@
 """Files: the native body file and other formats.
 
-`native` and `family` are files of rom, an `archive` each; `export` picks one of `programs`, `sid`,
-`matrices`, `fields` or `fmu` by name, `history` writes motions, `responses` reads tests. `files`
-are written whole, `ours` says which may be replaced, `claim` who writes in a folder, `hdf5` loads
-h5py beside dolfinx.
+`native` is the file of a body, an `archive`, as is all that stands for `bodies`; `export` picks one
+of `programs`, `sid`, `matrices`, `fields` or `fmu` by name, `history` writes motions. `files` are
+written whole, `ours` says which may be replaced, `claim` who writes in a folder, `hdf5` loads h5py
+beside dolfinx.
 """
 
 from rom.lazy import front

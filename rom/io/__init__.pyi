@@ -1,7 +1,11 @@
+from rom.components.updating.observers.fmu import write_observer_fmu as write_observer_fmu
+from rom.components.updating.responses.reading import read_modes as read_modes
+from rom.components.updating.responses.reading import read_responses as read_responses
+from rom.components.updating.responses.reading import write_responses as write_responses
+from rom.io.bodies import load as load
+from rom.io.bodies import save as save
 from rom.io.export import export as export
 from rom.io.export import read_body as read_body
-from rom.io.family import load as load
-from rom.io.family import save as save
 from rom.io.fields.gltf import MovingMesh as MovingMesh
 from rom.io.fields.gltf import write_glb as write_glb
 from rom.io.fields.universal import read_universal as read_universal
@@ -10,7 +14,6 @@ from rom.io.fields.vtu import write_stress as write_stress
 from rom.io.fields.vtu import write_stress_history as write_stress_history
 from rom.io.fields.vtu import write_vtu as write_vtu
 from rom.io.fmu.body import write_body_fmu as write_body_fmu
-from rom.io.fmu.observer import write_observer_fmu as write_observer_fmu
 from rom.io.history import write_history as write_history
 from rom.io.matrices.calculix import read_stored_matrix as read_stored_matrix
 from rom.io.matrices.dmig import read_dmig as read_dmig
@@ -35,9 +38,6 @@ from rom.io.programs.openfast_reading import Superelement as Superelement
 from rom.io.programs.openfast_reading import read_openfast as read_openfast
 from rom.io.programs.radioss import write_radioss as write_radioss
 from rom.io.programs.simscape import write_simscape as write_simscape
-from rom.io.responses.reading import read_modes as read_modes
-from rom.io.responses.reading import read_responses as read_responses
-from rom.io.responses.reading import write_responses as write_responses
 from rom.io.sid.body import sid_body as sid_body
 from rom.io.sid.body import standard_input as standard_input
 from rom.io.sid.dialect import check_sid as check_sid

@@ -1,8 +1,6 @@
-"""Bodies that depend on parameters.
+"""Bodies that depend on parameters: names of `rom.components.families`.
 
-`parameters` are factors of material and thickness, `layers` thick ones; `affine` and `stretched`
-models of them are reduced on a `common_basis`; `family` is the result, with `evidence`, and
-`reduce` the way to it in one call. Families that touch are `assembled`.
+See docs/theory/updating.md.
 """
 
 from rom.lazy import front

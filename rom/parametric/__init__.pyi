@@ -1,7 +1,7 @@
-from rom.parametric.assembled import FamilyAssembly as FamilyAssembly
-from rom.parametric.family import BodyFamily as BodyFamily
-from rom.parametric.parameters import Density as Density
-from rom.parametric.parameters import Parameter as Parameter
-from rom.parametric.parameters import Thickness as Thickness
-from rom.parametric.parameters import YoungsModulus as YoungsModulus
-from rom.parametric.reduce import reduce_parametric as reduce_parametric
+from rom.components.families.assembled import FamilyAssembly as FamilyAssembly
+from rom.components.families.family import BodyFamily as BodyFamily
+from rom.components.families.parameters import Density as Density
+from rom.components.families.parameters import Parameter as Parameter
+from rom.components.families.parameters import Thickness as Thickness
+from rom.components.families.parameters import YoungsModulus as YoungsModulus
+from rom.components.families.reduce import reduce_parametric as reduce_parametric

@@ -1,7 +1,6 @@
-"""Solids under heat and in steady rotation.
+"""Solids under heat and in steady rotation: names of `rom.components.wheels.prestress`.
 
-`heat` and `thermal` stress a body, `steady_rotation` and `spin_up` turn it at large displacement,
-`speed_table` has the states over the speed.
+See docs/theory/rotating_solids.md.
 """
 
 from rom.lazy import front

@@ -25,7 +25,7 @@ from rom.body.stiffening import (
     elastic_loads,
     interface_loads,
 )
-from rom.cyclic.rotation import rotation_matrices
+from rom.components.wheels.rotation import rotation_matrices
 from rom.eigen.verbs import rigid_motions
 from rom.errors import ConfigError, ModelError, RomWarning
 from rom.process.mpirun import mpirun

@@ -14,9 +14,9 @@ from cases.mbs.slender import E_STEEL, STEEL, Full, assembled, cantilever, slend
 from rom.body.nonlinear.cauchy import CauchyRecovery
 from rom.body.projection import cauchy_recovery
 from rom.body.recovery import von_mises
+from rom.components.updating.observers.operation import stress_rows
 from rom.errors import ConfigError, FileFormatError, ModelError, ResourceError
 from rom.updating import Channels
-from rom.updating.operation import stress_rows
 
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")
 pytestmark = [

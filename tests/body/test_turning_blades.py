@@ -11,8 +11,8 @@ from scipy.sparse.linalg import eigsh, splu
 
 import rom
 from cases.wheels import bladed_model
-from rom.cyclic.rotation import arms, rotation_matrices
-from rom.cyclic.sector import region
+from rom.components.wheels.rotation import arms, rotation_matrices
+from rom.components.wheels.sector import region
 from rom.eigen.scipy import SciPyOperators
 from rom.errors import ConfigError, ModelError
 

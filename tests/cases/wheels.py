@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.sparse import csr_matrix, identity, kron
 
-from rom.cyclic.sector import CyclicSector
+from rom.components.wheels.sector import CyclicSector
 
 
 def mass_ring(N, k=3.0e5, coupling=0.7e5, m=0.4):

@@ -20,13 +20,13 @@ from cases.long import few
 from cases.solid import block
 from rom.cli.answer import Answer, table, to_json
 from rom.cli.main import main
-from rom.cli.parser import VERBS, build_parser
+from rom.cli.parser import build_parser, verb_modules
 from rom.cli.schemas import schema
 from rom.cli.verbs import check
 from rom.errors import RomWarning
 
 STEEL = ("--E", "210e9", "--nu", "0.3", "--rho", "7850")
-NAMES = [module.__name__.rpartition(".")[2] for module in VERBS]
+NAMES = list(verb_modules())
 
 
 @pytest.fixture(scope="module")

@@ -11,11 +11,11 @@ from cases.files.schema import errors
 from cases.files.toml_files import PENDULUM
 from cases.solid import block
 from rom.cli.main import main
-from rom.cli.parser import VERBS
+from rom.cli.parser import verb_modules
 from rom.cli.schemas import schema
 from rom.doctor.probes import Finding
 
-NAMES = [module.__name__.rpartition(".")[2] for module in VERBS]
+NAMES = list(verb_modules())
 ANSWERS = {
     "check": ["check", "rod.rom.npz"],
     "check, with a failed gate": ["check", "poor.rom.npz"],

@@ -11,7 +11,7 @@ from scipy.sparse import csr_matrix, identity
 import rom
 from cases.solid import block
 from cases.wheels import beam_ring, mass_ring, ring_frequency
-from rom.cyclic.faces import interpolation, paired
+from rom.components.wheels.faces import interpolation, paired
 from rom.errors import ConfigError, InterfaceError
 from rom.model import Interface
 
@@ -86,7 +86,7 @@ def test_held_dofs_stay_on_both_faces():
 
 def face(name, angle, n=6, size=(0.1, 0.05), about=Z, at=ORIGIN):
     """A radial face of n x n nodes from radius 0.2, turned about the axis."""
-    from rom.cyclic.faces import turned
+    from rom.components.wheels.faces import turned
 
     r, z = np.meshgrid(np.linspace(0.2, 0.2 + size[0], n), np.linspace(0.0, size[1], n))
     points = np.column_stack([r.ravel(), 0 * r.ravel(), z.ravel()])
@@ -110,7 +110,7 @@ def test_the_finer_face_follows_the_coarser(finer, angle):
     faces = [face("low", 0.0, n["low"]), face("high", angle, n["high"])]
     pair = paired(*faces, Z, ORIGIN)
     assert (pair.slave.name, pair.matching) == (finer, False)
-    from rom.cyclic.faces import turned
+    from rom.components.wheels.faces import turned
 
     R = turned(Z, pair.step * np.pi / 6)
     assert_allclose(pair.weights @ pair.master.points @ R.T, pair.slave.points, atol=1e-12)

@@ -10,7 +10,7 @@ from scipy.sparse import identity
 import rom
 from cases.solid import block
 from cases.wheels import mass_ring
-from rom.cyclic.reduced import distance, face_functions, fading
+from rom.components.wheels.reduced import distance, face_functions, fading
 from rom.eigen.verbs import rigid_motions
 from rom.errors import ConfigError, InterfaceError
 

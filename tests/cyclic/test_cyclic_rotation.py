@@ -10,7 +10,7 @@ from scipy.sparse import csr_matrix
 
 import rom
 from cases.wheels import beam_ring, bladed_model, mass_ring
-from rom.cyclic.rotation import divergence_speed, rotation_matrices
+from rom.components.wheels.rotation import divergence_speed, rotation_matrices
 from rom.errors import ConfigError, ModelError, ModesMissedError
 
 N, SPEED = 6, 900.0
@@ -164,7 +164,7 @@ def test_only_solids_that_are_known_can_rotate(model):
 
 
 def test_a_missed_wave_is_noticed():
-    from rom.cyclic.travelling import _verify
+    from rom.components.wheels.travelling import _verify
 
     held = replace(beam_ring(6, 4, EA=1e3, rotary=0.1), held=np.array([0, 1]))
     T = held.harmonic(1)

@@ -9,7 +9,7 @@ from scipy.linalg import eigh
 
 import rom
 from cases.wheels import bladed_model, bladed_ring
-from rom.cyclic.blades.mistuning import whitehead
+from rom.components.wheels.blades.mistuning import whitehead
 from rom.errors import ConfigError, ModelError
 
 FORCE = np.array([0.0, 1.0, 0.0])
@@ -83,7 +83,7 @@ def test_batches_and_norms_do_not_matter(monkeypatch):
     wheel = rom.mistuned_wheel(bladed_ring(6), 2)
     deltas = spread(np.random.default_rng(2), (7, 6))
     whole = wheel.amplification(deltas, FORCE, **SWEEP)
-    monkeypatch.setattr("rom.cyclic.blades.mistuning.AT_ONCE", 1)
+    monkeypatch.setattr("rom.components.wheels.blades.mistuning.AT_ONCE", 1)
     assert_allclose(wheel.amplification(deltas, FORCE, **SWEEP), whole, rtol=1e-12)
     rows = np.array([[0.0, 0.6, 0.0], [0.0, 0.8, 0.0]])
     assert_allclose(wheel.amplification(deltas, FORCE, **SWEEP | {"at": rows}), whole, rtol=1e-12)

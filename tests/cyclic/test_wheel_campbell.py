@@ -9,7 +9,7 @@ from scipy.sparse import block_diag, csr_matrix, diags, identity
 
 import rom
 from cases.wheels import beam_ring, mass_ring
-from rom.cyclic.sector import CyclicSector
+from rom.components.wheels.sector import CyclicSector
 from rom.errors import ConfigError
 
 N, C = 6, 3.0

@@ -89,7 +89,7 @@ def test_after_the_set_up_first_motions_compile_nothing():
 @pytest.mark.once
 def test_first_uses_are_measured_with_nothing_compiled_and_again():
     """A case of few functions, of which Numba keeps each in a file."""
-    name = "three bodies"
+    name = "best_matching"
     figures = list(start(cases=(name,), again=(name,)))
     assert [(f.case, f.quantity) for f in figures] == [
         (name, "functions compiled"), (name, "processor time"),

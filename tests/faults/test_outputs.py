@@ -11,7 +11,7 @@ import rom
 from cases.command import ROOT
 from cases.solid import block
 from rom.cli.main import main
-from rom.cli.parser import VERBS, build_parser
+from rom.cli.parser import build_parser, verb_modules
 from rom.errors import ConfigError
 from rom.io.export import FORMATS
 from rom.io.ours import FILE_SIGNS, SAME_KIND, check_replaceable, is_ours
@@ -154,7 +154,7 @@ def test_a_link_is_replaced_and_not_followed(folder, capsys):
 
 def test_every_verb_that_writes_has_force():
     """A verb writes when it has an output; completion and the others print."""
-    verbs = {module.__name__.rpartition(".")[2] for module in VERBS}
+    verbs = set(verb_modules())
     have, write = set(), set()
     for verb in verbs:
         (sub,) = [a.choices[verb] for a in build_parser()._actions if verb in (a.choices or ())]

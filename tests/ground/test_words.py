@@ -39,7 +39,7 @@ CLEAR = {
 }
 # names that are a convention of their own: what every verb has, variables of types, and files in
 # which a name is that of the key, dimension, range or field that it describes
-OF_VERBS = {"SUMMARY", "EXAMPLES", "FIELD", "SECTION"}  # and every field
+OF_VERBS = {"SUMMARY", "EXAMPLES", "SCHEMA", "FIELD", "SECTION"}  # and every field
 OF_TYPES = {"ParamSpec", "TypeVar"}
 DESCRIPTIONS = {
     "cli/schemas.py", "config/component_keys.py", "config/mechanism_keys.py", "plausible.py",

@@ -14,8 +14,8 @@ import rom
 from cases.paths import ROOT
 from cases.solid import STEEL, block, composite
 from rom.body.reference import rigid_elastic
+from rom.components.families.affine import AffineModel
 from rom.errors import ConfigError, FileFormatError, ParameterError, RomWarning
-from rom.parametric.affine import AffineModel
 
 ALLOY = rom.Material(E=70e9, nu=0.33, rho=2700.0)
 KINDS = {"root": "rbe2", "tip": "rbe2"}
@@ -197,7 +197,7 @@ def test_the_certificate_compares_away_from_the_points_sampled(family):
 
 def test_points_between_join_where_the_estimate_says_so(monkeypatch):
     """Without the corners one basis must not do for a range of a million."""
-    monkeypatch.setattr(rom.parametric.reduce, "corners", lambda *_: [])
+    monkeypatch.setattr(rom.components.families.reduce, "corners", lambda *_: [])
     wide = {"E": rom.YoungsModulus("web", 1e-3, 1e3)}
     arguments = {"parameters": wide, "interfaces": KINDS, "certify": False}
     coarse, fine = (

@@ -13,10 +13,11 @@ from cases.long import SHARED_BY
 from cases.panels import ALLOY, FOAM, KINDS, PARAMETERS, ROOT, panel
 from cases.paths import RANKS
 from cases.ranks.environment import ENVIRONMENT
+from rom.components.families.affine import AffineModel
 from rom.eigen.scipy import SciPyOperators
 from rom.eigen.verbs import rigid_motions
-from rom.parametric.affine import AffineModel
 from rom.process.mpirun import mpirun
+from rom.reduction.full_model import mesh_operators
 
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")
 pytestmark = pytest.mark.fenicsx
@@ -98,7 +99,7 @@ def test_petsc_and_scipy_say_the_same(model, family):
         K, M = (_csr(A, model.n_dofs) for A in (model.regions[name].K, model.regions[name].M))
         regions[name] = rom.Region(K, M)
     plain = replace(model, operators=None, regions=regions, stresses=None)
-    assert isinstance(rom.workflow.mesh_operators(plain), SciPyOperators)
+    assert isinstance(mesh_operators(plain), SciPyOperators)
     assert np.abs(regions["core"].K @ rigid_motions(model.points)).max() < 1e-3
     other = rom.reduce_parametric(
         plain,

@@ -15,10 +15,10 @@ from cases.long import ROM_LONG, SHARED_BY
 from cases.paths import RANKS
 from cases.solid import STEEL, block
 from rom.body.reference import rigid_elastic
+from rom.components.families.layers import Stretch
+from rom.components.families.stretched import StretchedModel
 from rom.eigen.verbs import rigid_motions
 from rom.errors import FileFormatError, ParameterError
-from rom.parametric.layers import Stretch
-from rom.parametric.stretched import StretchedModel
 from rom.process.mpirun import mpirun
 
 AXES = "xyz"

@@ -11,11 +11,11 @@ from scipy.integrate import solve_bvp
 import rom
 from cases.wheels import bladed_model
 from rom.components import cosserat
-from rom.cyclic.rotation import centrifugal_displacement
+from rom.components.wheels.prestress.speed_table import lagrange
+from rom.components.wheels.prestress.steady_rotation import SteadyRotation
+from rom.components.wheels.prestress.thermal import finite_solid
+from rom.components.wheels.rotation import centrifugal_displacement
 from rom.errors import ConfigError, InterfaceError, ModelError, RomWarning
-from rom.prestress.speed_table import lagrange
-from rom.prestress.steady_rotation import SteadyRotation
-from rom.prestress.thermal import finite_solid
 
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")
 pytestmark = [

@@ -12,10 +12,10 @@ from scipy.sparse.linalg import eigsh
 
 import rom
 from cases.wheels import bladed_model
+from rom.components.wheels.prestress.thermal import _stressed, _thermal, finite_solid
 from rom.eigen.verbs import rigid_motions
 from rom.eigen.workers import ONE_PROCESS
 from rom.errors import ConfigError, InterfaceError, ModelError
-from rom.prestress.thermal import _stressed, _thermal, finite_solid
 
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")
 pytestmark = [

@@ -23,10 +23,10 @@ MEMBERS = {
     "a picture": r"wheel_modes",
 }
 ELSEWHERE = {  # where the word means something else, or the member is used and no family listed
-    "a kind of interface": ("rom/cyclic/", "rom/prestress/"),
+    "a kind of interface": ("rom/components/wheels/",),
     "a joint": ("rom/io/",),
     "a verb of the command line": ("rom/mbs/",),
-    "a picture": ("rom/cyclic/", "rom/__init__.pyi"),
+    "a picture": ("rom/components/wheels/", "rom/cyclic/", "rom/__init__.pyi"),
 }
 
 

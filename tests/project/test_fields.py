@@ -3,6 +3,8 @@
 import ast
 import inspect
 import pickle
+import re
+import shutil
 import subprocess
 import sys
 from textwrap import dedent
@@ -40,24 +42,44 @@ axis = [0, 1, 0]
 t_end = "1 ms"
 dt = "1 ms"
 """
+CORE = (
+    PENDULUM
+    + """
+from pathlib import Path
+from cases.mbs.trusses import truss
+from rom.cli.main import main
+body = mech.add_flexible("beam", truss())
+mech.spring_damper("s", hinge, body.marker("mean"), stiffness=1.0)
+print(rom.simulate(mech, t_end=2e-3, dt=1e-3, progress=False).elastic("beam").shape)
+file = Path("fields.toml")
+file.write_text(FILE)
+rom.read_mechanism(file).simulate()
+""".replace("FILE", repr(FILE))
+)
 NO_COMPONENTS = "import sys; sys.modules['rom.components'] = None\n"  # as if they were deleted
 
 
-def run(code, *paths):
+def run(code, *paths, cwd=None):
+    return program("-c", dedent(code), paths=paths, cwd=cwd)
+
+
+def program(*words, paths=(), cwd=None):
+    """What Python has done, modules of these folders first."""
     path = ":".join(map(str, [*paths, environment()["PYTHONPATH"]]))
-    done = subprocess.run([sys.executable, "-c", dedent(code)], text=True, capture_output=True,
-                          env=environment(PYTHONPATH=path), timeout=300, check=False)  # fmt: skip
-    assert done.returncode == 0, done.stderr
+    done = subprocess.run([sys.executable, *words], text=True, capture_output=True, cwd=cwd,
+                          env=environment(PYTHONPATH=path), timeout=600, check=False)  # fmt: skip
+    assert done.returncode == 0, done.stdout[-3000:] + done.stderr
     return done
 
 
 @pytest.mark.parametrize("place", FIELDS)
 def test_the_list_has_the_names_by_which_fields_are_asked(place):
     """Of those that may be missing, so that the error can say whose they are."""
-    kinds = "methods", "bodies", "sections", "columns"
+    kinds = "methods", "bodies", "sections", "columns", "takes", "verbs", "first_use"
     given = {name for kind in kinds for name in getattr(record(place), kind)}
     words = set(FIELDS[place].split())
-    assert words == given if place.startswith("rom.components") else given and not words
+    own = given or {place.split(".")[2]}
+    assert words == own if place.startswith("rom.components") else given and not words
 
 
 def test_who_checks_types_sees_what_fields_give():
@@ -106,18 +128,13 @@ def test_families_keep_their_order_whatever_is_added_first():
     assert [family.name for family in mech.families()] == ["springs", "loads", "tendons"]
 
 
-def test_all_components_may_be_deleted():
+def test_all_components_may_be_deleted(tmp_path):
     """A pendulum moves, a body bends, a file is read; the rest is told by the name of its field."""
     code = (
         NO_COMPONENTS
-        + PENDULUM
+        + CORE
         + """
-    from pathlib import Path
-    from cases.mbs.trusses import truss
-    from rom.cli.main import main
-    body = mech.add_flexible("beam", truss())
-    mech.spring_damper("s", hinge, body.marker("mean"), stiffness=1.0)
-    print(rom.simulate(mech, t_end=2e-3, dt=1e-3, progress=False).elastic("beam").shape)
+    from rom.cli.parser import build_parser
     def told(call):
         try:
             call()
@@ -126,23 +143,79 @@ def test_all_components_may_be_deleted():
     told(lambda: mech.gear_mesh)
     told(lambda: mech.add_rigid("r", mass=1, inertia=(1, 1, 1), at=(0, 0, 0), spin=(0, 0, 1)))
     told(lambda: rom.mbs.Pulley)
-    file = Path("fields.toml")
-    file.write_text(FILE)
-    rom.read_mechanism(file).simulate()
-    file.write_text(FILE + "[rods.r]\\nelements = 3\\n")
+    file.write_text(file.read_text() + "[rods.r]\\nelements = 3\\n")
     told(lambda: rom.read_mechanism(file))
+    told(lambda: build_parser().parse_args(["update", "test.uff"]))
     print(main(["--help"]) or 0, "rom.components" in str([m for m in sys.modules.values() if m]))
-    """.replace("FILE", repr(FILE)).replace("\n    ", "\n")
+    """.replace("\n    ", "\n")
     )
-    said = run(code, ROOT / "tests").stdout
-    for name, module in (("gear_mesh", "gear_mesh"), ("spin", "round_bodies"),
-                         ("Pulley", "tendons"), ("rods", "cosserat")):  # fmt: skip
+    said = run(code, ROOT / "tests", cwd=tmp_path).stdout
+    whose = {"gear_mesh": "gear_mesh", "spin": "round_bodies", "Pulley": "tendons",
+             "rods": "cosserat", "update": "updating"}  # fmt: skip
+    for name, module in whose.items():
         sentence = (
             f"'{name}' belongs to the field 'rom.components.{module}', which is not installed"
         )
         assert sentence in said
-    assert said.count("pip install --force-reinstall fenicsx-rom") == 4
+    assert said.count("pip install --force-reinstall fenicsx-rom") == 5
     assert "fields.toml:" in said and "VERB" in said
+
+
+EVERY_MODULE = """
+import importlib, pkgutil
+for module in pkgutil.walk_packages(rom.__path__, "rom."):
+    if not module.name.endswith("__main__"):
+        importlib.import_module(module.name)
+main(["--help"])
+"""
+QUICK = "project/test_layers.py project/test_fronts.py config/test_config_expressions.py"
+LEFT_OUT = "not lines and not says_what_is_inside and not users"  # numbers, prose and demos
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("field", ["tendons", "rolling_bearing", "cosserat", "updating"])
+def test_a_field_may_be_deleted(field, tmp_path):
+    """With its line and what imports it, among which is nothing of the core."""
+    for name in ("rom", "tests", ".ci"):
+        shutil.copytree(ROOT / name, tmp_path / name)
+    shutil.copy(ROOT / "pyproject.toml", tmp_path)
+    delete(tmp_path, field)
+    paths = tmp_path, tmp_path / "tests"
+    said = run(CORE + EVERY_MODULE, *paths, cwd=tmp_path).stdout
+    assert "exit codes:" in said and ("  update  " in said) == (field != "updating")
+    tests = [f"tests/{name}" for name in QUICK.split()]
+    done = program("-m", "pytest", "-q", *tests, "-k", LEFT_OUT, paths=paths, cwd=tmp_path)
+    assert " passed" in done.stdout
+
+
+def delete(tree, field):
+    """A component, and components and tests that import it or what went with it."""
+    gone = {f"rom.components.{field}"}
+    shutil.rmtree(tree / "rom" / "components" / field)
+    while files := [path for path in tree.rglob("*.py") if gone & imported(path)]:
+        for path in files:
+            parts = path.relative_to(tree).with_suffix("").parts
+            core = parts[0] == "rom" and parts[1] != "components"
+            assert not core, f"{path} of the core imports one of {sorted(gone)}"
+            gone.add(".".join(parts[:3] if parts[0] == "rom" else parts[1:]))
+            path.unlink(missing_ok=True)
+            if parts[0] == "rom":
+                shutil.rmtree(tree.joinpath(*parts[:3]), ignore_errors=True)
+    names = "|".join(one.removeprefix("rom.components.") for one in gone if "rom." in one)
+    whose = rf"from rom\.components(?:\.(?:{names})\b[\w.]* import| import (?:{names})\b)"
+    text = rf'    "rom\.components\.(?:{names})\..*'
+    line = re.compile(rf"^(?:{whose} (?:\([^)]*\)|.*)|{text})\n", re.M)
+    for path in (tree / "rom" / "fields.py", *tree.rglob("*.pyi")):
+        path.write_text(line.sub("", path.read_text()))
+
+
+def imported(path):
+    """Modules, packages above them too, that a file imports anywhere."""
+    nodes = list(ast.walk(ast.parse(path.read_text())))
+    found = {alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names}
+    found |= {f"{node.module}.{alias.name}" for node in nodes if isinstance(node, ast.ImportFrom)
+              for alias in node.names}  # fmt: skip
+    return {name.rsplit(".", k)[0] for name in found for k in range(name.count(".") + 1)}
 
 
 CAMS = {  # the package of a stranger
@@ -284,12 +357,24 @@ def test_a_field_of_ours_that_cannot_be_imported_takes_no_other_down():
     assert "RuntimeError: cut" in done.stderr
 
 
-def test_what_was_pickled_under_the_names_before_is_read():
-    pair = GearPair((20, 30), 2e-3, 0.02)
-    now, before = b"rom.components.gear_mesh.gears.geometry", b"rom.mbs.elements.gears.geometry"
-    written = pickle.dumps(pair, protocol=0)
+@pytest.mark.parametrize(
+    ("thing", "now", "before"),
+    [(GearPair((20, 30), 2e-3, 0.02), "gear_mesh.gears.geometry", "mbs.elements.gears.geometry"),
+     (rom.updating.Sensors, "updating.observers.operation", "updating.operation"),
+     (rom.updating.Responses, "updating.measured", "updating.measured"),
+     (rom.mbs.PeriodicMotion, "orbits.motion", "mbs.analysis.periodic.motion"),
+     (rom.CyclicSector, "wheels.sector", "cyclic.sector"),
+     (rom.SpinUp, "wheels.prestress.speed_table", "prestress.speed_table"),
+     (rom.BodyFamily, "families.family", "parametric.family"),
+     (rom.io.read_responses, "updating.responses.reading", "io.responses.reading")],
+)  # fmt: skip
+def test_what_was_pickled_under_the_names_before_is_read(thing, now, before):
+    now, before = f"rom.components.{now}\n".encode(), f"rom.{before}\n".encode()
+    written = pickle.dumps(thing, protocol=0)
     assert now in written
-    read = pickle.loads(written.replace(now, before))
-    assert type(read) is GearPair and read == pair
+    assert pickle.loads(written.replace(now, before)) == thing
+
+
+def test_a_module_that_never_was_is_not_found():
     with pytest.raises(ModuleNotFoundError, match="springs_of_gears"):
         __import__("rom.mbs.elements.springs_of_gears")

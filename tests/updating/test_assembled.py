@@ -10,9 +10,14 @@ from numpy.testing import assert_allclose
 import rom
 from cases.solid import STEEL, composite
 from rom.body.recovery import StressRecovery
+from rom.components.families.parameters import centre
+from rom.components.updating.family_model import Parts, family_model
+from rom.components.updating.frf_data import noisy
+from rom.components.updating.models import modal
+from rom.components.updating.normal_equations import responses_at
+from rom.components.updating.observers.operation import discrete
 from rom.errors import ConfigError, InterfaceError
 from rom.parametric import FamilyAssembly
-from rom.parametric.parameters import centre
 from rom.updating import (
     AddedMass,
     Channels,
@@ -26,11 +31,6 @@ from rom.updating import (
     place,
     tracker,
 )  # fmt: skip
-from rom.updating.family_model import Parts, family_model
-from rom.updating.frf_data import noisy
-from rom.updating.models import modal
-from rom.updating.normal_equations import responses_at
-from rom.updating.operation import discrete
 
 BOLTS = JointSpring(
     ("frame", "tip"), ("arm", "root"), (4e8, 4e8, 4e8, 2e5, 1e5, 1e5), 0.1, 10.0

@@ -9,11 +9,11 @@ from numpy.testing import assert_allclose
 import rom
 from cases.long import few
 from cases.solid import STEEL, composite
+from rom.components.updating.family_model import family_model
+from rom.components.updating.frf_data import noisy
+from rom.components.updating.normal_equations import responses_at
 from rom.errors import ConfigError, ParameterError
 from rom.updating import AddedMass, Channels, Comparison, Responses, compare
-from rom.updating.family_model import family_model
-from rom.updating.frf_data import noisy
-from rom.updating.normal_equations import responses_at
 
 REGIONS = ("inner", "middle", "outer")
 PARAMETERS = {f"E_{name}": rom.YoungsModulus(name, 0.4, 2.5) for name in REGIONS}

@@ -8,14 +8,14 @@ from numpy.testing import assert_allclose
 
 import rom
 from cases.solid import STEEL, composite
+from rom.components.updating.equations import InSensors
+from rom.components.updating.family_model import family_model
+from rom.components.updating.frf_data import noisy
+from rom.components.updating.methods import update_by_input
+from rom.components.updating.models import AtSensors, Measurement, ParametricModel, modal
+from rom.components.updating.normal_equations import responses_at
 from rom.errors import ConfigError
 from rom.updating import Channels, Responses
-from rom.updating.equations import InSensors
-from rom.updating.family_model import family_model
-from rom.updating.frf_data import noisy
-from rom.updating.methods import update_by_input
-from rom.updating.models import AtSensors, Measurement, ParametricModel, modal
-from rom.updating.normal_equations import responses_at
 
 PARAMETERS = {
     "E_inner": rom.YoungsModulus("inner", 0.3, 3.0),
@@ -150,7 +150,7 @@ def test_lines_are_summed_in_blocks(family, model, monkeypatch):
     test = measured(family, model, level=0.01)
     options = {"fixed": ("root",), "residual": "equations", "damping": 0.02}
     whole = rom.update(family, test, **options)
-    monkeypatch.setattr("rom.updating.methods.BLOCK_LINES", 7)
+    monkeypatch.setattr("rom.components.updating.methods.BLOCK_LINES", 7)
     pieces = rom.update(family, test, **options)
     assert_allclose(list(pieces.factors.values()), list(whole.factors.values()), rtol=1e-9)
     assert_allclose(pieces.covariance, whole.covariance, rtol=1e-6, atol=1e-12)

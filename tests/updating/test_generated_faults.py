@@ -8,11 +8,11 @@ import pytest
 import rom
 from cases.long import ROM_LONG
 from cases.solid import STEEL, composite
+from rom.components.updating.family_model import family_model
+from rom.components.updating.frf_data import noisy
+from rom.components.updating.normal_equations import responses_at
 from rom.errors import ConfigError, RomError
 from rom.updating import Channels, Responses
-from rom.updating.family_model import family_model
-from rom.updating.frf_data import noisy
-from rom.updating.normal_equations import responses_at
 
 PARAMETERS = {name: rom.YoungsModulus(name, 0.5, 2.0) for name in ("inner", "outer")}
 GRID = [[k / 6, y, 0.08] for k in (2, 3, 4, 5) for y in (0.0, 0.1)]

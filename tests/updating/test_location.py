@@ -5,10 +5,10 @@ import pytest
 
 import rom
 from cases.solid import STEEL, composite
+from rom.components.updating.family_model import family_model
+from rom.components.updating.frf_data import estimators, noisy
+from rom.components.updating.normal_equations import responses_at
 from rom.updating import AddedMass, Channels, GroundSpring, Responses
-from rom.updating.family_model import family_model
-from rom.updating.frf_data import estimators, noisy
-from rom.updating.normal_equations import responses_at
 
 REGIONS = ("inner", "middle", "outer")
 PARAMETERS = {f"E_{name}": rom.YoungsModulus(name, 0.4, 2.5) for name in REGIONS}

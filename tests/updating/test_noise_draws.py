@@ -11,12 +11,12 @@ from scipy.stats import binom, chi2, kstest, norm, truncnorm
 import rom
 from cases.long import few
 from cases.solid import STEEL, composite
+from rom.components.updating.estimate import DAMPING_LOG_DEVIATION
+from rom.components.updating.family_model import family_model
+from rom.components.updating.frf_data import estimators, pooled, positive_mean
+from rom.components.updating.normal_equations import Data, responses_at, sums, unsure, white
 from rom.errors import ConfigError
 from rom.updating import Channels, Responses
-from rom.updating.estimate import DAMPING_LOG_DEVIATION
-from rom.updating.family_model import family_model
-from rom.updating.frf_data import estimators, pooled, positive_mean
-from rom.updating.normal_equations import Data, responses_at, sums, unsure, white
 
 PARAMETERS = {
     "E_inner": rom.YoungsModulus("inner", 0.4, 2.5),

@@ -11,6 +11,9 @@ import rom
 from cases.mbs.fmu_instance import Instance, fmpy
 from cases.solid import STEEL, composite
 from rom.body.recovery import StressRecovery
+from rom.components.updating.observers import parameter_tracking
+from rom.components.updating.observers.operation import discrete
+from rom.components.updating.observers.parameter_tracking import LINEAR_REACH
 from rom.errors import ConfigError, ParameterError, SolverError
 from rom.updating import (
     Channels,
@@ -20,8 +23,6 @@ from rom.updating import (
     parameter_tracker,
     tracker,
 )  # fmt: skip
-from rom.updating.operation import discrete
-from rom.updating.parameter_tracking import LINEAR_REACH
 
 DT = 1e-3
 PARAMETERS = {
@@ -170,7 +171,7 @@ def test_the_filter_is_an_extended_one_linearised_at_every_step(filter_, monkeyp
             z, P = z + g * (sample[i] - at.C[i] @ z[:n]), P - np.outer(g, c @ P)
     size = np.sqrt(np.diag(P))[n:]
     for reach, share in ((0.0, 0.08), (LINEAR_REACH, 0.4)):
-        monkeypatch.setattr("rom.updating.parameter_tracking.LINEAR_REACH", reach)
+        monkeypatch.setattr(parameter_tracking, "LINEAR_REACH", reach)
         found = t.run(y)
         assert (np.abs(np.log(found.factors[-1]) - z[n:]) < share * size).all()
         assert_allclose(found.factor_deviations[-1], size, rtol=0.03)

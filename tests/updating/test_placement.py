@@ -8,11 +8,11 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import rom
 from cases.solid import STEEL, composite
+from rom.components.updating.family_model import family_model
+from rom.components.updating.normal_equations import responses_at
+from rom.components.updating.placement import eliminated, gain
 from rom.errors import ConfigError, ModelError, ParameterError
 from rom.updating import Channels, candidates, independent, place
-from rom.updating.family_model import family_model
-from rom.updating.normal_equations import responses_at
-from rom.updating.placement import eliminated, gain
 
 PARAMETERS = {
     "E_inner": rom.YoungsModulus("inner", 0.4, 2.5),

@@ -8,10 +8,10 @@ from scipy.stats import chi2
 import rom
 from cases.long import few
 from cases.solid import STEEL, composite
+from rom.components.updating.family_model import family_model
+from rom.components.updating.frf_data import noisy
+from rom.components.updating.normal_equations import responses_at
 from rom.updating import Channels, Responses, candidates, place
-from rom.updating.family_model import family_model
-from rom.updating.frf_data import noisy
-from rom.updating.normal_equations import responses_at
 
 REGIONS = ("inner", "middle", "outer")
 PARAMETERS = {f"E_{name}": rom.YoungsModulus(name, 0.4, 2.5) for name in REGIONS[::2]}

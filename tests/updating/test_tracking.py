@@ -14,10 +14,10 @@ from cases.mbs.fmu_instance import Instance, fmpy
 from cases.solid import STEEL, block
 from rom.body.recovery import StressRecovery
 from rom.body.surface import strain_rows
+from rom.components.updating.observers.operation import discrete, stress_rows
+from rom.components.updating.observers.tracking import steady
 from rom.errors import ConfigError, ModelError
 from rom.updating import Channels, Sensors, tracker
-from rom.updating.operation import discrete, stress_rows
-from rom.updating.tracking import steady
 
 DT, WALK = 5e-4, 400.0
 TIP = Channels([[1.0, 0, 0]], [[0, 0, 1]])

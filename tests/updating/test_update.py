@@ -10,14 +10,14 @@ from scipy.linalg import eigh, solve_sylvester, sqrtm
 
 import rom
 from cases.solid import STEEL, composite
+from rom.components.families.layers import Stretch
+from rom.components.updating.estimate import _Before, _Search
+from rom.components.updating.family_model import family_model
+from rom.components.updating.frf_data import estimators, noisy, random_error
+from rom.components.updating.methods import receptance
+from rom.components.updating.normal_equations import Data, responses_at, sums
 from rom.errors import ConfigError, ParameterError, SolverError
-from rom.parametric.layers import Stretch
 from rom.updating import AddedMass, Channels, GroundSpring, Responses
-from rom.updating.estimate import _Before, _Search
-from rom.updating.family_model import family_model
-from rom.updating.frf_data import estimators, noisy, random_error
-from rom.updating.methods import receptance
-from rom.updating.normal_equations import Data, responses_at, sums
 
 KINDS = {"root": "rbe2", "tip": "rbe2"}
 SIZE, CELLS = (1.0, 0.1, 0.08), (12, 2, 2)
@@ -167,7 +167,7 @@ def test_sums_do_not_depend_on_blocks(family, monkeypatch):
     model, data = model_of(family), Data.of(synthetic(family))
     x, ratios = np.zeros(3), np.full(4, 0.02)
     whole = sums(model, x, ratios, data)
-    monkeypatch.setattr("rom.updating.methods.BLOCK_LINES", 7)
+    monkeypatch.setattr("rom.components.updating.methods.BLOCK_LINES", 7)
     pieces = sums(model, x, ratios, data)
     for name in ("normal", "gradient", "squares"):
         expected = getattr(whole, name)
@@ -304,7 +304,7 @@ def test_the_score_names_the_parameter_that_is_missing(family):
 
 def test_what_is_missing_is_named_though_the_search_does_not_end(family, monkeypatch):
     """Everything is free and 1 kg is missing: 12 steps are not enough, its score is the largest."""
-    monkeypatch.setattr("rom.updating.estimate.MAX_STEPS", 12)
+    monkeypatch.setattr("rom.components.updating.estimate.MAX_STEPS", 12)
     offered = {
         "tip mass": AddedMass("tip", 1.0, 0.1, 10),
         "tip spring": GroundSpring("tip", (0, 3e5, 3e5), 0.1, 10),
@@ -318,8 +318,8 @@ def test_what_is_missing_is_named_though_the_search_does_not_end(family, monkeyp
 
 
 def test_a_search_that_does_not_end_at_a_model_that_fits_is_an_error(family, monkeypatch):
-    monkeypatch.setattr("rom.updating.estimate.MAX_MISFIT", np.inf)
-    monkeypatch.setattr("rom.updating.estimate.MAX_STEPS", 2)
+    monkeypatch.setattr("rom.components.updating.estimate.MAX_MISFIT", np.inf)
+    monkeypatch.setattr("rom.components.updating.estimate.MAX_STEPS", 2)
     with pytest.raises(SolverError, match="did not settle in 2 steps"):
         rom.update(family, synthetic(family), fixed=HELD)
 

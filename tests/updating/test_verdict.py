@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-import rom.updating.frf_data as frf
-from rom.updating.normal_equations import Data, Sums
-from rom.updating.verdict import chi_row, scores, unseen_directions, verdict
+import rom.components.updating.frf_data as frf
+from rom.components.updating.normal_equations import Data, Sums
+from rom.components.updating.verdict import chi_row, scores, unseen_directions, verdict
 
 SHAPE = (6, 2, 1)
 

@@ -85,7 +85,7 @@ FILMS = {
 DRAWN_BY_A_CHILD = {
     "faces", "instants", "mesh", "mode_shapes", "start", "updating", "wheel_modes"
 }  # fmt: skip
-WRITERS = ("io/programs", "io/matrices", "io/sid", "io/fields", "io/native.py", "io/family.py",
+WRITERS = ("io/programs", "io/matrices", "io/sid", "io/fields", "io/native.py", "io/bodies.py",
            "io/export.py", "io/history.py", "io/fmu/body.py", "fmu/export.py", "report/html.py",
            "mbs/results/checkpoint.py", "view/scenes")  # fmt: skip
 

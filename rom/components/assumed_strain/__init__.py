@@ -4,7 +4,8 @@ Total Lagrangian. The metric is evaluated at the middles of the sides, each from
 two neighbouring triangles; logarithmic strain, plasticity of von Mises with linear hardening.
 `triangles` has the meshes, `actions` loads, drives and tools, `motion` forces and explicit steps,
 `implicit` equilibria and implicit steps, which `contact` serves, `sides` the linear stiffness,
-`space` sheets as bodies, which bend by `plates`; `kernels` are compiled. See docs/theory/sheets.md.
+`space` sheets as bodies, which bend by `plates`; `kernels` are compiled, ahead by `field`.
+See docs/theory/sheets.md.
 """
 
 from rom.lazy import front

@@ -11,7 +11,7 @@ over a reference obeys that of Eckart; in a flexible body this is the mean-axis 
 deformations both are. The toys of N bodies, which are Newton's, show what remains of mechanics:
 shapes, and a time read off them. Nothing here is about gravity as geometry. `projection` matches,
 `bodies` are the toys, `shapes` those of three, `linking` the one system of which the motions of
-Newton and of shapes are two gauges.
+Newton and of shapes are two gauges, `field` what the doctor compiles.
 
 Source:
     After Mercati's chapter on shape dynamics, a theory of gravity of which this package takes the

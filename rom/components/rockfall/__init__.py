@@ -14,7 +14,7 @@ q'' + 2 zeta omega q' + omega^2 q = phi F_2, z_3 = phi . q.
 `laws` has simple laws of cushion and plug, `layer` the cushion as a layer of sand from its
 geometry, `impact` the motion and what decides over it, `calibration` fits parameters to measured
 histories, `design` says what a gallery bears, `waves` which force arrives below the sand, `kernels`
-are compiled. What is published of tests, and how far it is met: docs/theory/rockfall.md.
+are compiled, ahead by `field`. Published tests, and how far they are met: docs/theory/rockfall.md.
 
 Source:
     After Schellenberg, On the design of rockfall protection galleries, ETH Zurich (2009), and

@@ -4,7 +4,7 @@
 all in one mechanism. Of the wind, `profiles` has lift and drag, `momentum` the induction, `inflow`
 the dam of the tower, `blading` the loads of a rotor, `blade_element` those on rods, `wake` the
 memory of their wake, `control` torque, pitch and power curve, `controlled` both in a mechanism,
-`operation` the turbine in wind that changes.
+`operation` the turbine in wind that changes. `field` is what the doctor compiles.
 """
 
 from rom.lazy import front

@@ -3,7 +3,6 @@
 Rest, tangents and modes: `equilibrium`, `linearize`, `campbell`, `response`, `steady_motion`,
 `sensitivity`, `inverse_dynamics`; `local_equations`, `tangent` and `quadratic_eigen` are what they
 are made of, `sparse_tangent` and `few_modes` where there are many coordinates. `rotors` has what
-turns: steady motions and the axes of small ones. `continuation` follows equilibria past limit
-points, `periodic` finds motions that repeat. `snapshot` asks one state what motions are asked,
+turns: steady motions and the axes of small ones. `snapshot` asks one state what motions are asked,
 `law_check` looks for mistakes in laws of the user.
 """

@@ -23,6 +23,8 @@ from cases.solid import STEEL, block, composite
 from cases.wheels import beam_ring, bladed_model, bladed_ring
 from rom.components.gear_mesh.gears.geometry import GearPair
 from rom.components.journal_bearing.films.tabulated import table_of
+from rom.components.updating.family_model import family_model
+from rom.components.updating.normal_equations import responses_at
 from rom.eigen.scipy import SciPyOperators
 from rom.eigen.verbs import rigid_motions
 from rom.mbs.elements import springs
@@ -30,8 +32,6 @@ from rom.mbs.elements.contact.impact import Impact
 from rom.mbs.results.solution import Solution
 from rom.mbs.results.state import State
 from rom.reduction.interfaces.connection import connect
-from rom.updating.family_model import family_model
-from rom.updating.normal_equations import responses_at
 
 X, Y, Z = np.eye(3)
 KINDS = {"root": "rbe2", "tip": "rbe2"}

@@ -15,10 +15,7 @@ from cases.paths import ROOT
 from rom import errors
 
 # fronts that only other packages read, for they hold parts of what others show
-INSIDE = {
-    "rom.cyclic.blades", "rom.fe.mesh", "rom.io.sid", "rom.mbs.integrate",
-    "rom.mbs.parts", "rom.report",
-}  # fmt: skip
+INSIDE = {"rom.fe.mesh", "rom.io.sid", "rom.mbs.integrate", "rom.mbs.parts", "rom.report"}
 MODULES = ("rom.rotation", "rom.units")  # whose functions are public without a front
 SECTION = re.compile(r"^(Args|Attributes|Returns|Raises|Warns|Source|Example):$", re.M)
 

@@ -9,7 +9,7 @@ from mpi4py import MPI
 import numpy as np
 
 import rom
-from rom.cyclic.sector import each_diameter
+from rom.components.wheels.sector import each_diameter
 from rom.errors import ModesMissedError, RomError
 
 

@@ -21,10 +21,10 @@ from rom.components.updating import (
     update_by_input,
     update_by_output,
 )
+from rom.components.updating import frf_data as data
 from rom.components.updating.airframe import airframe, torsion_constant
 from rom.errors import ConfigError, ModelError
 from rom.io.fields.universal import assemble, read_universal
-from rom.updating import frf_data as data
 
 TRUE = np.array([0.30, -0.25, 0.0, 0.20, 0.0, -0.35, 0.0, 0.25, -0.20])
 ZETA = np.array([1.2, 0.8, 1.5, 1.0, 2.0]) / 100

@@ -8,8 +8,8 @@ from scipy.special import ellipk
 import rom
 from cases.long import few
 from rom.components.cosserat import along, body, straight
+from rom.components.orbits import equilibria
 from rom.errors import ConfigError, ModelError, SolverError
-from rom.mbs.analysis.continuation import equilibria
 
 X, Y, Z = np.eye(3)
 

@@ -11,9 +11,9 @@ from scipy.optimize import fsolve
 from scipy.special import mathieu_a, mathieu_b
 
 import rom
+from rom.components.orbits.family import Family
+from rom.components.orbits.flow import Flow
 from rom.errors import ConfigError, ModelError, SolverError
-from rom.mbs.analysis.periodic.family import Family
-from rom.mbs.analysis.periodic.flow import Flow
 
 X, Y, Z = np.eye(3)
 ORIGIN = (0, 0, 0)

@@ -11,12 +11,12 @@ import rom
 from benchmarks.units import as_mechanism
 from cases.mbs.geared_rotors import rigid_unit
 from rom.components.journal_bearing import iso_vg
+from rom.components.orbits import search
+from rom.components.orbits.derivatives import by_differences, by_steps, confirmed, follows
+from rom.components.orbits.flow import Flow
+from rom.components.orbits.shooting import Return
+from rom.components.orbits.turns import Turns, turns_of
 from rom.errors import ModelError
-from rom.mbs.analysis.periodic import search
-from rom.mbs.analysis.periodic.derivatives import by_differences, by_steps, confirmed, follows
-from rom.mbs.analysis.periodic.flow import Flow
-from rom.mbs.analysis.periodic.shooting import Return
-from rom.mbs.analysis.periodic.turns import Turns, turns_of
 
 X, Y, Z = np.eye(3)
 ORIGIN = (0, 0, 0)

@@ -1,0 +1,205 @@
+"""A finite element model whose layers may change their thickness."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from scipy.sparse import identity, kron
+
+from rom.body.flexible import FlexibleBody
+from rom.body.inertia import inertia_integrals
+from rom.components.families.affine import AffineModel, RegionOperators, symmetric
+from rom.components.families.family import Share
+from rom.components.families.layers import Stretch
+from rom.components.families.parameters import Parameter, Point, Thickness, centre, factor, factors
+from rom.eigen.verbs import Operators, orthonormal_in, rigid_motions
+from rom.errors import ModelError, ParameterError
+from rom.model import Array, FEModel, Interface, Layered
+from rom.reduction.interfaces.characteristic import GivenFunctions
+
+OVERLAP_RTOL = 1e-6  # of the extent, by which regions may overlap along the axis
+REMAINDER_RTOL = 1e-9  # share of mass and stiffness that may lie outside all regions
+ARM_RTOL = 1e-9  # of the extent: round-off of the arms of rotations
+RIGID_RTOL = 1e-6  # distance of rigid motions from the basis that is still accepted
+
+
+class StretchedModel(AffineModel):
+    """A model whose regions have factors of thickness besides those of the material.
+
+    All its regions are terms, each with three parts of the stiffness, see `rom.model.Layered`.
+
+    Args:
+        model: the model at factors of one.
+        parameters: by name.
+
+    Raises:
+        ParameterError: if a region is unknown or no layer, or the model carries masses.
+    """
+
+    def __init__(self, model: FEModel, parameters: dict[str, Parameter]):
+        super().__init__(model, parameters)
+        if model.attachments:
+            raise ParameterError("a model with a parameter of thickness takes no attached masses.")
+        thin = [p for p in parameters.values() if isinstance(p, Thickness)]
+        axis = "xyz".index(thin[0].axis)
+        self.regions = {name: model.regions[name] for name in model.regions}
+        if not self.regions or any(part.stretched is None for part in self.regions.values()):
+            raise ParameterError(
+                "the regions of the model do not tell how they are stretched.",
+                hint="Models of rom.fe do; others need rom.Region(stretched=...).",
+            )
+        self.layered: dict[str, Layered] = {n: r.stretched(axis) for n, r in self.regions.items()}
+        names = tuple(dict.fromkeys(p.region for p in thin if p.region is not None))
+        for name in names:
+            self._refuse_neighbours(name, float(np.ptp(model.points[:, axis])))
+        self.stretch = Stretch(axis, names, tuple(self.layered[name].layers for name in names))
+
+    def _refuse_neighbours(self, name: str, extent: float) -> None:
+        for other, layered in self.layered.items():
+            for low, high in layered.layers if other != name else ():
+                for a, b in self.layered[name].layers:
+                    if min(b, high) - max(a, low) > OVERLAP_RTOL * extent:
+                        raise ParameterError(
+                            f"region {name!r} is no layer of its own: {other!r} lies beside it "
+                            f"from {max(a, low):g} to {min(b, high):g} m.",
+                            hint="Choose another axis, or change both with one parameter.",
+                        )
+
+    @property
+    def moving(self) -> list[str]:
+        """Parameters that change shapes."""
+        thick = [n for n, p in self.parameters.items() if isinstance(p, Thickness)]
+        return list(dict.fromkeys([*super().moving, *thick]))
+
+    def model_at(self, point: Point) -> FEModel:
+        """Points and interfaces at some factors."""
+        return self._moved(self.stretch.weights(self.parameters, point))
+
+    def rigid_samples(self) -> Iterator[tuple[Operators, FEModel]]:
+        """Models whose rigid motions together span those of every field."""
+        nominal = np.ones(2 + len(self.stretch.regions))
+        for w in (nominal, *(nominal + e for e in np.eye(nominal.size)[1:])):
+            moved = self._moved(w)
+            rigid = rigid_motions(self._local(moved.points))
+            yield self.ops.varied((1.0, []), (1.0, []), rigid), moved
+
+    def _moved(self, w: Array) -> FEModel:
+        """The model with its fields weighted."""
+
+        def face(nominal: Interface) -> Interface:
+            origin = self.stretch.mapped(nominal.origin[None], w)[0]
+            points = self.stretch.mapped(nominal.points, w)
+            return replace(nominal, points=points, origin=origin, axis=None)
+
+        faces = {name: face(nominal) for name, nominal in self.model.interfaces.items()}
+        return replace(
+            self.model, points=self.stretch.mapped(self.model.points, w), interfaces=faces
+        )
+
+    def kinds(self, interfaces: dict[str, Any]) -> dict[str, Any]:
+        """All motions that are rigid at some thickness, for interfaces that are rigid.
+
+        Raises:
+            ParameterError: for an interface of another kind.
+        """
+        for name, kind in interfaces.items():
+            if not isinstance(kind, str) or kind != "rbe2":
+                raise ParameterError(
+                    f"interface {name!r} has the kind {kind!r}; with a parameter of thickness it "
+                    'must be "rbe2".'
+                )
+        return {
+            name: self._functions(self.model.interfaces[name])
+            if name in self.model.interfaces
+            else "rbe2"
+            for name in interfaces
+        }
+
+    def _functions(self, face: Interface) -> GivenFunctions:
+        """Orthonormal; rotations of every field on their own."""
+        motions = np.hstack(self.stretch.motions(face.points))
+        size = np.linalg.norm(motions, axis=0)
+        real = size > ARM_RTOL * np.ptp(self.model.points) * size[0]  # a face at x = 1e-17 has none
+        S = kron(face.surface_mass, identity(3), format="csr")
+        return GivenFunctions(orthonormal_in(S, motions[:, real]))
+
+    def bare(self, point: Point) -> Operators:
+        """The model at some factors."""
+        (k, m), t = factors(self.parameters, tuple(self.regions), point), self._slopes(point)
+        K, M = [], []
+        for i, (name, region) in enumerate(self.regions.items()):
+            parts = self.layered[name]
+            K += [
+                (k[i] * t[i], parts.K_along),
+                (k[i], parts.K_mixed),
+                (k[i] / t[i], parts.K_across),
+            ]
+            M.append((m[i] * t[i], region.M))
+        points = self._local(self.model_at(point).points)
+        return self.ops.varied((0.0, K), (0.0, M), rigid_motions(points))
+
+    def terms(self, body: FlexibleBody, E: Array) -> dict[str, Any]:
+        """Fields of the family: its body at nominal points, shares and layers."""
+        points, middle = self._local(self.model.points), self.bare(centre(self.parameters))
+        X = self.stretch.fields(points)
+        Phi = np.hstack([middle.rigid, E])
+        columns = np.hstack([X.reshape(len(X), -1).T, Phi])
+        shares = []
+        for name, region in self.regions.items():
+            part: Any = RegionOperators(self.ops, region)
+            parts = self.layered[name]
+            matrices = (parts.K_along, parts.K_mixed, parts.K_across)
+            K = [symmetric(self.ops.gram(Phi, self.ops.product(A, Phi))) for A in matrices]
+            shares.append(Share(name, inertia_integrals(part, points, columns), np.array(K)))
+        self._refuse_more(E, shares)
+        rigid = np.array([self._coefficients(middle, Phi, R) for R in self.stretch.motions(points)])
+        markers = {
+            n: replace(m, point=self.model.interfaces[n].origin, patch=None, kind="rbe2")
+            for n, m in body.markers.items()
+        }
+        surface = body.surface
+        if surface is not None:
+            surface = replace(surface, points=self.model.points[self.model.surface.nodes])
+        return {
+            "body": replace(body, markers=markers, surface=surface),
+            "shares": tuple(shares),
+            "stretch": replace(self.stretch, rigid=rigid),
+        }
+
+    def _coefficients(self, ops: Operators, Phi: Array, R: Array) -> Array:
+        """(6 + r, 6) combinations of Phi that give the rigid motions of one field."""
+        MPhi = ops.apply_M(Phi)
+        M = ops.gram(Phi, MPhi)
+        scale = 1 / np.sqrt(np.diag(M))
+        C = np.linalg.solve(scale[:, None] * M * scale, scale[:, None] * ops.gram(MPhi, R))
+        C = scale[:, None] * C
+        gap, size = (
+            np.sqrt(np.diag(ops.gram(A, ops.apply_M(A))).max()) for A in (R - Phi @ C, ops.rigid)
+        )
+        if gap > RIGID_RTOL * size:
+            raise ModelError(
+                f"the basis misses a rigid motion of a stretched body by {gap:.1e}.",
+                hint="Ask for more modes, or a narrower range of the thickness.",
+            )
+        return C
+
+    def _refuse_more(self, E: Array, shares: list[Share]) -> None:
+        """All elements must belong to a region."""
+        ops, first = self.ops, -E.shape[1]
+        K = sum(np.trace(share.K.sum(axis=0)[first:, first:]) for share in shares)
+        M = sum(np.einsum("aakk->k", s.integrals.S_kl)[first:].sum() for s in shares)
+        for A, found in ((ops.apply_K(E), K), (ops.apply_M(E), M)):
+            whole = np.trace(ops.gram(E, A))
+            if abs(whole - found) > REMAINDER_RTOL * whole:
+                raise ParameterError(
+                    f"the regions {sorted(self.regions)} are not the whole model, whose thickness "
+                    "is to change; name all of them."
+                )
+
+    def _slopes(self, point: Point) -> Array:
+        return np.array([factor(self.parameters, Thickness, name, point) for name in self.regions])
+
+    def _local(self, points: Array) -> Array:
+        first = self.ops.first // 3
+        return points[first : first + self.ops.n_local // 3]

@@ -1,0 +1,252 @@
+"""One period of a mechanism in compiled steps, from any start, without what a run keeps."""
+
+from copy import copy
+from dataclasses import dataclass, replace
+from functools import cached_property
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from rom import rotation
+from rom.components.orbits.beside import Beside
+from rom.mbs.analysis.local_equations import DIFFERENCE_STEP, Instant
+from rom.mbs.equations.equations import evaluate, retract
+from rom.mbs.equations.packing import Packed, pack
+from rom.mbs.equations.python_laws import apply_laws
+from rom.mbs.integrate import generalized_alpha as alpha
+from rom.mbs.integrate.consistent_start import (
+    assembled,
+    fitting_velocity,
+    initial_state,
+    with_accelerations,
+)
+from rom.mbs.integrate.fixed_step import failed_step, space
+from rom.mbs.integrate.run import Record, Settings
+from rom.mbs.integrate.step_memory import begin
+from rom.mbs.kernels.work import Step, Work, workspace
+from rom.mbs.mechanism import Mechanism
+from rom.mbs.parts.signals import padded, sampled
+from rom.mbs.results.state import State
+from rom.model import Array
+
+# of Newton's method in a step, of what accelerations move: derivatives are differences of ends
+STEP_TOLERANCE = 1e-13
+LAWS_OWNER = "laws"  # owner of the only numbers that elements remember and that are no angles
+
+
+@dataclass(frozen=True)
+class Start:
+    """A state with what the method has beside it after many steps.
+
+    Attributes:
+        state: coordinates, velocities and accelerations that belong together.
+        ahead: (n,) velocities of the method minus those that fit the constraints.
+        later: (n,) its acceleration-like variable minus the accelerations.
+    """
+
+    state: State
+    ahead: Array
+    later: Array
+
+
+class Flow:
+    """A mechanism that moves through a time again and again.
+
+    Args:
+        mechanism: what moves.
+        t0: time at which it begins [s].
+        period: its length [s].
+        steps: number of time steps.
+        rho_inf: of generalised-alpha.
+
+    Raises:
+        SolverError: if a drive or load is not finite.
+    """
+
+    def __init__(self, mechanism: Mechanism, t0: float, period: float, steps: int, rho_inf: float):
+        numbers = (t0, t0 + period, period / steps, steps, rho_inf, STEP_TOLERANCE, 1e-4, 1e-12)
+        self.mechanism, self.t0, self.period, self.steps = mechanism, t0, period, steps
+        self.settings = Settings(*numbers, progress=False)
+        self.runs, self.failed = [0], [0]
+        self._take(pack(mechanism))
+
+    def lasting(self, period: float) -> "Flow":
+        """The same over another period; memory and counts are shared."""
+        other, s = copy(self), self.settings
+        other.period, end = period, s.t_start + period
+        other.settings = replace(s, t_end=end, dt=period / self.steps)
+        other._prescribe()
+        return other
+
+    def _take(self, packed: Packed) -> None:
+        """Move this mechanism, in blocks or whole."""
+        self.packed = packed
+        self.W: Work = workspace(packed.system, len(packed.signals))
+        self._prescribe()
+
+    def _prescribe(self) -> None:
+        """Ask drives and loads for all steps."""
+        packed, mechanism = self.packed, self.mechanism
+        self.record = Record(mechanism, packed, self.settings, perf_counter())
+        self.t = self.settings.time(np.arange(self.steps + 1))
+        span, spacing = self.settings.span, self.settings.spacing
+        table, failure = sampled(packed.signals, padded(self.t), span, spacing, self.settings.h)
+        if failure is not None:
+            raise failure
+        self.table = np.ascontiguousarray(table[: self.t.size])
+        self.step: Step | None = None
+
+    @cached_property
+    def now(self) -> Instant:
+        """The equations, by whole matrices."""
+        packed = self.packed.whole()
+        W = workspace(packed.system, len(packed.signals))
+        return Instant(packed, W, self.t0, packed.asked).at(self.t0)
+
+    @cached_property
+    def probe(self) -> Array:
+        """(n,) motion of each coordinate that counts as one: a rad, a length of the mechanism."""
+        return self.now.probe() / DIFFERENCE_STEP
+
+    @property
+    def law_memory(self) -> slice:
+        """Where `State.base` has what laws of the user remember."""
+        remembered, at = self.packed.places.remembered, self.packed.system.coordinates.kind.size
+        for owner, numbers in remembered.items():
+            if owner == LAWS_OWNER:
+                return slice(at, at + numbers.size)
+            at += numbers.size
+        return slice(at, at)
+
+    def initial(self) -> State:
+        """Where the bodies were added."""
+        return initial_state(self.packed, self.t0, self.settings.spacing, placing=True)
+
+    def begun(self, state: State) -> Start:
+        """A state as the start of a run would have it.
+
+        Raises:
+            ModelError: if the state does not satisfy the joints.
+        """
+        ready = self.packed.of_rank(state.rank)
+        if ready is not self.packed:
+            self._take(ready)
+        state = replace(state, t=self.t0, memory=None, algorithmic=None)
+        state = self._fitted(state.q, state.v, state)
+        self.step, found = begin(self.record, self.W, state, self.packed.asked, self.settings.h)
+        ahead = self.step.v - found.v
+        return Start(found, ahead, self.step.a - found.a)
+
+    def _fitted(self, q: Array, v: Array, like: State) -> State:
+        """The nearest state that satisfies the constraints, with its accelerations."""
+        self.remember(like)
+        q = assembled(self.packed, self.W, q)
+        return self.accelerated(q, fitting_velocity(self.packed, self.W, q, v), like)
+
+    def remember(self, like: State) -> None:
+        """Count angles from those of a state, at the begin of the period."""
+        self.W.signal[:] = self.table[0]
+        if like.base is not None:
+            self.W.base[:] = like.base
+
+    def accelerated(self, q: Array, v: Array, like: State) -> State:
+        """The state with coordinates and velocities that satisfy the constraints."""
+        packed, W = self.packed, self.W
+        evaluate(packed.system, W, q, v)
+        apply_laws(packed.asked, W, self.t0)
+        kept = W.base.copy()
+        found: Any = with_accelerations(packed, W, replace(like, t=self.t0, q=q, v=v))
+        joints = packed.system.coordinates.kind.size  # what laws remember is theirs alone
+        base = np.concatenate([found.base[:joints], kept[joints:]])
+        return replace(found, base=base, algorithmic=None, memory=None)
+
+    def at(self, q: Array, v: Array, like: Start) -> Start:
+        """A start nearby, with the same differences between method and motion."""
+        return replace(like, state=self._fitted(q, v, like.state))
+
+    def moved(self, start: Start, dq: Array, dv: Array) -> Start:
+        """The start after a small motion (n,) and a change (n,) of the velocities."""
+        q = np.empty_like(start.state.q)
+        retract(self.packed.system, start.state.q, np.ascontiguousarray(dq), q)
+        return self.at(q, start.state.v + dv, start)
+
+    def end(self, start: Start, beside: Beside | None = None) -> State:
+        """The state a period later; small motions beside it go along.
+
+        Raises:
+            SolverError: if a step fails.
+        """
+        step, table = self._reset(start), self.table[1:]
+        out = space(self.W, step, 1)
+        for signals in (table,) if beside is None else table[:, None]:
+            base = self.W.base.copy()
+            self._advance(start, step, signals, out)
+            if beside is not None:
+                beside.follow(step, base, signals[0])
+        self.runs[0] += 1
+        q, v, a, lam = (x.copy() for x in (step.q, step.v, step.vd, step.lam))
+        t, base = self.t0 + self.period, self.W.base.copy()
+        return State(t, q, v, a, lam, start.state.rank, step.a.copy(), base)
+
+    def _advance(self, start: Start, step: Step, signals: Array, out: Any) -> None:
+        """Take a step for each row of signals (k, s, 3)."""
+        rank = self.packed.rows_solved(start.state.rank)
+        step.count[alpha.STEPS_BEFORE] = step.count[alpha.STEPS]
+        answer = alpha.NEEDS_LAWS
+        alpha.advance.link()
+        while answer == alpha.NEEDS_LAWS:
+            answer = alpha.advance(self.packed.system, self.W, step, rank, signals, self.steps, out)
+            taken = int(step.count[alpha.STEPS])
+            if answer == alpha.NEEDS_LAWS:
+                slopes, t = not step.count[alpha.HAS_FACTOR], float(self.t[1 + taken])
+                apply_laws(self.packed.asked, self.W, t, slopes=slopes)
+        if answer != alpha.CONVERGED:
+            self.failed[0] += 1
+            raise failed_step(self.record, self.W, step, answer, float(self.t[1 + taken]))
+
+    def _reset(self, start: Start) -> Step:
+        """The step memory at a start."""
+        state = start.state
+        if self.step is None:
+            like = replace(state, algorithmic=state.a)
+            self.step = begin(self.record, self.W, like, self.packed.asked, self.settings.h)[0]
+        step: Any = self.step
+        for memory in (step.work, step.lost, step.psi, step.drift):
+            memory[:] = 0.0
+        step.q[:], step.v[:], step.vd[:], step.lam[:] = (
+            state.q, state.v + start.ahead, state.a, state.lam)  # fmt: skip
+        step.a[:] = state.a + start.later
+        step.size[[0, 4]] = 0.0
+        step.count[:] = 0
+        step.count[alpha.USES_LAWS] = bool(self.packed.asked)
+        self.W.base[:] = state.base
+        return step
+
+    def given(self, start: Start) -> State:
+        """The start as a run takes it."""
+        state = start.state
+        return replace(state, v=state.v + start.ahead, algorithmic=state.a + start.later)
+
+    def forces(self, state: State) -> Array:
+        """(n,) what acts on the bodies at a state, inertia included and joints left out."""
+        now = self.now.at(state.t)
+        now.remember(state)
+        return now.residual(state.q, state.v, state.a, 0 * state.lam)
+
+    @property
+    def pressed(self) -> float:
+        """Largest force on a marker in what `forces` has looked at; they may all balance."""
+        return float(np.abs(self.now.W.wrench).max(initial=0.0))
+
+    def apart(self, one: State, two: State) -> Array:
+        """(n,) small motion from one position to another."""
+        bodies = self.packed.system.bodies
+        out = np.zeros(one.v.size)
+        for at, to, r in zip(bodies.q_at, bodies.v_at, bodies.r, strict=True):
+            out[to : to + 3] = two.q[at : at + 3] - one.q[at : at + 3]
+            back = one.q[at + 3 : at + 7] * [1.0, -1.0, -1.0, -1.0]
+            turn = rotation.multiply(back, two.q[at + 3 : at + 7])
+            out[to + 3 : to + 6] = rotation.log(turn / np.linalg.norm(turn))
+            out[to + 6 : to + 6 + r] = two.q[at + 7 : at + 7 + r] - one.q[at + 7 : at + 7 + r]
+        return out

@@ -1,0 +1,434 @@
+"""A family of bodies as a model with parameters: sums of small matrices, in its own modes.
+
+A body, or an assembly of bodies, is a family without parameters.
+
+All parameters are factors and enter by their logarithm. Rigid coordinates come first, then the
+elastic ones of the family; what is held is eliminated.
+"""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from scipy.linalg import block_diag
+
+from rom.arguments import finite, positive
+from rom.assembly.assembly import Assembly
+from rom.body.flexible import FlexibleBody
+from rom.body.records import Marker, still_motions
+from rom.body.recovery import StressRecovery
+from rom.body.reference import marker_motion
+from rom.components.families.assembled import FamilyAssembly
+from rom.components.families.family import BodyFamily
+from rom.components.families.parameters import Density, Parameter, YoungsModulus
+from rom.components.updating.models import ParametricModel
+from rom.eigen.supports import spring_matrices
+from rom.errors import ConfigError, ParameterError
+from rom.model import Array, Index, Mask
+from rom.names import check_known, named
+from rom.rotation import skew
+
+HELD_RTOL = 1e-9  # singular value of a motion that nothing holds
+MASS_DOFS = 3  # translations, which a point mass resists
+Family = BodyFamily | FamilyAssembly
+Structure = Family | FlexibleBody | Assembly
+Place = str | tuple[str, str]  # interface of a body alone; body and interface of an assembly
+
+
+@dataclass(frozen=True, slots=True)
+class Parts:
+    """The families of a structure, whose rigid and elastic coordinates stand one after another.
+
+    Attributes:
+        bodies: {name: body} at the centre of the ranges; one alone has no name.
+    """
+
+    bodies: dict[str, FlexibleBody]
+
+    @staticmethod
+    def of(structure: "Structure | Parts") -> "Parts":
+        """Those of an assembly, or of a body alone."""
+        if isinstance(structure, Parts):
+            return structure
+        found = parts_of(structure)
+        return Parts(
+            {k: one if isinstance(one, FlexibleBody) else one.body for k, one in found.items()}
+        )
+
+    @property
+    def columns(self) -> dict[str, slice]:
+        """Where the coordinates of each body stand."""
+        ends = np.cumsum([6 + body.n_modes for body in self.bodies.values()])
+        return {
+            name: slice(int(end) - 6 - body.n_modes, int(end))
+            for (name, body), end in zip(self.bodies.items(), ends, strict=True)
+        }
+
+    @property
+    def n(self) -> int:
+        """Number of all coordinates."""
+        return sum(6 + body.n_modes for body in self.bodies.values())
+
+    def rigid(self) -> tuple[Index, Array]:
+        """(6 n_b,) numbers of the rigid coordinates, and their sizes where points move by one."""
+        size = max(body.size for body in self.bodies.values())
+        first = [columns.start + np.arange(6) for columns in self.columns.values()]
+        return np.concatenate(first), np.tile(np.r_[np.ones(3), np.full(3, 1 / size)], len(first))
+
+    def marker(self, place: Place) -> tuple[str, Marker]:
+        """Name of the body and its interface.
+
+        Raises:
+            ConfigError: for a place of another kind, or an unknown body.
+            InterfaceError: for a wrong interface.
+        """
+        if "" in self.bodies:
+            return "", self.bodies[""].marker(str(place))
+        body, interface = place if isinstance(place, tuple) and len(place) == 2 else ("", "")
+        if body not in self.bodies:
+            raise ConfigError(f"{place!r} must be (body, interface) of {named(self.bodies)}.")
+        return body, self.bodies[body].marker(interface)
+
+    def motion(self, place: Place) -> Array:
+        """(6, n) translation and rotation of an interface by all coordinates.
+
+        Raises:
+            ConfigError, InterfaceError: see `marker`.
+        """
+        body, marker = self.marker(place)
+        H = np.zeros((6, self.n))
+        H[:, self.columns[body]] = np.hstack(marker_motion(marker, self.bodies[body].n_modes))
+        return H
+
+
+def parts_of(structure: Structure) -> dict[str, BodyFamily] | dict[str, FlexibleBody]:
+    """{name: family or body} of an assembly; of one alone, without a name."""
+    if isinstance(structure, BodyFamily):
+        return {"": structure}
+    if isinstance(structure, FlexibleBody):
+        return {"": structure}
+    return structure.families if isinstance(structure, FamilyAssembly) else structure.bodies
+
+
+def terms_of(structure: Structure) -> list[tuple[str, FlexibleBody]]:
+    """For each term of a sum its body by name, with the mass, stiffness and stress of the term."""
+    found = []
+    for name, one in parts_of(structure).items():
+        if isinstance(one, FlexibleBody):
+            found.append((name, one))
+            continue
+        for share in one.shares:
+            mass = {key: getattr(share.integrals, key) for key in share.integrals.__slots__}
+            stress = one.body.stress
+            if isinstance(stress, StressRecovery):
+                own = np.zeros_like(stress.operator) if share.stress is None else share.stress
+                stress = StressRecovery(stress.points, own)
+            found.append((name, replace(one.body, **mass, K=share.K, stress=stress)))
+    return found
+
+
+@dataclass(frozen=True, slots=True)
+class GroundSpring:
+    """A spring between an interface and the ground, unknown by a factor.
+
+    Attributes:
+        at: name of the interface; (body, interface) of an assembly.
+        stiffness: (3,) translations, (6,) with rotations, or (6, 6) at a factor of one
+            [N/m, N m/rad].
+        low: smallest factor [1].
+        high: largest factor [1].
+
+    Raises:
+        ConfigError: unless 0 < low <= high.
+    """
+
+    at: Place
+    stiffness: npt.ArrayLike
+    low: float
+    high: float
+
+    def __post_init__(self) -> None:
+        check_range(f"the spring at {self.at!r}", self.low, self.high)
+
+    def term(self, structure: FlexibleBody | Parts) -> tuple[Array, Array]:
+        """Stiffness [N/m] and mass [kg] (n, n) that it adds to a body at a factor of one.
+
+        Raises:
+            ConfigError, InterfaceError: for a wrong stiffness or interface.
+        """
+        parts = Parts.of(structure)
+        H = parts.motion(self.at)
+        return H.T @ _stiffness(self.at, self.stiffness) @ H, np.zeros((parts.n,) * 2)
+
+
+@dataclass(frozen=True, slots=True)
+class JointSpring:
+    """A spring between two interfaces of an assembly, unknown by a factor: a bolted joint.
+
+    It acts where the first one is; the second one reaches there by a rigid arm.
+
+    Attributes:
+        one: (body, interface).
+        other: (body, interface).
+        stiffness: (3,) translations, (6,) with rotations, or (6, 6) at a factor of one
+            [N/m, N m/rad].
+        low: smallest factor [1].
+        high: largest factor [1].
+
+    Raises:
+        ConfigError: unless 0 < low <= high.
+    """
+
+    one: tuple[str, str]
+    other: tuple[str, str]
+    stiffness: npt.ArrayLike
+    low: float
+    high: float
+
+    def __post_init__(self) -> None:
+        check_range(f"the joint of {self.one!r} and {self.other!r}", self.low, self.high)
+
+    def term(self, structure: FlexibleBody | Parts) -> tuple[Array, Array]:
+        """Stiffness [N/m] and mass [kg] (n, n) that it adds to a body at a factor of one.
+
+        Raises:
+            ConfigError, InterfaceError: for a wrong stiffness, body or interface.
+        """
+        parts, arm = Parts.of(structure), np.eye(6)
+        arm[:3, 3:] = -skew(parts.marker(self.one)[1].point - parts.marker(self.other)[1].point)
+        H = parts.motion(self.one) - arm @ parts.motion(self.other)
+        return H.T @ _stiffness(self.one, self.stiffness) @ H, np.zeros((parts.n,) * 2)
+
+
+@dataclass(frozen=True, slots=True)
+class AddedMass:
+    """A point mass on an interface, unknown by a factor.
+
+    Attributes:
+        at: name of the interface; (body, interface) of an assembly.
+        mass: at a factor of one [kg].
+        low: smallest factor [1].
+        high: largest factor [1].
+
+    Raises:
+        ConfigError: unless 0 < low <= high and the mass is positive.
+    """
+
+    at: Place
+    mass: float
+    low: float
+    high: float
+
+    def __post_init__(self) -> None:
+        check_range(f"the mass at {self.at!r}", self.low, self.high)
+        positive(f"the mass at {self.at!r}", self.mass)
+
+    def term(self, structure: FlexibleBody | Parts) -> tuple[Array, Array]:
+        """Stiffness [N/m] and mass [kg] (n, n) that it adds to a body at a factor of one.
+
+        Raises:
+            InterfaceError: for a wrong interface.
+        """
+        H = Parts.of(structure).motion(self.at)[:MASS_DOFS]
+        return np.zeros((H.shape[1],) * 2), self.mass * H.T @ H
+
+
+def check_units(structure: Structure) -> None:
+    """Refuse bodies in other units than those of what was measured.
+
+    Raises:
+        ConfigError: if they are not in SI units.
+    """
+    if other := {body.units for body in Parts.of(structure).bodies.values()} - {"SI"}:
+        raise ConfigError(f"the body is in {other.pop()}; use SI units, as body.in_units gives it.")
+
+
+def check_prior(prior: Iterable[str], names: tuple[str, ...]) -> None:
+    """Refuse a prior of parameters that there are not.
+
+    Raises:
+        ParameterError: listing those there are.
+    """
+    for name in prior:
+        check_known(name, names, f"prior: no parameter {name!r}; there are", ParameterError)
+
+
+def check_range(what: str, low: float, high: float) -> None:
+    """Refuse a range that is not one of positive factors.
+
+    Raises:
+        ConfigError: naming what has it.
+    """
+    if not 0 < finite("low", low, ()) <= finite("high", high, ()):
+        raise ConfigError(f"{what} has the range {low} to {high}, needed is 0 < low <= high.")
+
+
+def _stiffness(place: Place, stiffness: npt.ArrayLike) -> Array:
+    """(6, 6) of a spring at a place."""
+    return spring_matrices({str(place): stiffness}, (str(place),), "the structure")[str(place)]
+
+
+Attached = Mapping[str, GroundSpring | JointSpring | AddedMass]
+
+
+@dataclass(frozen=True, slots=True)
+class FamilyModel:
+    """K = sum k_i(p) K_i, M = sum m_i(p) M_i of a family with what is attached to it.
+
+    Attributes:
+        K: (n_t, n, n) terms of the stiffness at factors of one.
+        M: (n_t, n, n) terms of the mass.
+        k_powers: (n_t, n_p) one where a parameter multiplies a term of the stiffness.
+        m_powers: (n_t, n_p) likewise of the mass.
+        seen: (n_s, n) rows of the sensors.
+        driven: (n_e, n) rows of the inputs.
+        names: of the parameters.
+        low: (n_p,) smallest factors.
+        high: (n_p,) largest factors.
+        amount: (n_t,) one; zero for a candidate, which is not in the model but has derivatives.
+        n_rigid: number of motions that nothing holds.
+        motions: (n_q, n) rigid and elastic coordinates of all bodies per coordinate here.
+    """
+
+    K: Array
+    M: Array
+    k_powers: Array
+    m_powers: Array
+    seen: Array
+    driven: Array
+    names: tuple[str, ...]
+    low: Array
+    high: Array
+    amount: Array
+    n_rigid: int
+    motions: Array
+
+    @property
+    def present(self) -> Mask:
+        """(n_p,) whether a parameter is part of the model: not a candidate."""
+        n = len(self.names)
+        absent = int(np.count_nonzero(self.amount == 0))
+        return np.arange(n) < n - absent
+
+    @property
+    def n_elastic(self) -> int:
+        """Number of its elastic modes."""
+        return self.K.shape[1] - self.n_rigid
+
+    def at(self, x: Array) -> ParametricModel:
+        """The model at logarithms x (n_p,) of the factors, with the derivatives by them."""
+        k, m = np.exp(self.k_powers @ x), np.exp(self.m_powers @ x)
+        dK = np.tensordot(self.k_powers.T * k, self.K, 1)
+        dM = np.tensordot(self.m_powers.T * m, self.M, 1)
+        K, M = (np.tensordot(self.amount * c, A, 1) for c, A in ((k, self.K), (m, self.M)))
+        return ParametricModel(K, M, dK, dM, self.seen, self.n_rigid)
+
+
+def family_model(
+    family: Structure,
+    rows: tuple[Array, Array],
+    attached: Attached,
+    candidates: Attached,
+    fixed: Any,
+) -> FamilyModel:
+    """A family, body or assembly seen at sensors and driven at inputs.
+
+    Args:
+        family: without parameters of thickness.
+        rows: (n_s, n) of the sensors and (n_e, n) of the inputs, by rigid and elastic coordinates
+            of one body after another.
+        attached: springs and masses with unknown factors, by name.
+        candidates: springs and masses that may be missing; not part of the model.
+        fixed: what is held, see `FlexibleBody.frequencies` and `rom.Assembly.frequencies`.
+
+    Raises:
+        ConfigError: for a parameter of thickness, or a name that is taken.
+        InterfaceError: if an interface is unknown.
+    """
+    parts = Parts.of(family)
+    if any(isinstance(p, BodyFamily) and p.stretch is not None for p in parts_of(family).values()):
+        raise ConfigError(
+            "a family with a parameter of thickness cannot be updated.",
+            hint="Reduce a family with moduli and densities alone.",
+        )
+    outside = {**attached, **candidates}
+    own: dict[str, Any] = {} if isinstance(family, FlexibleBody | Assembly) else family.parameters
+    if len(outside) < len(attached) + len(candidates) or set(outside) & set(own):
+        raise ParameterError(f"{named(outside)}: one names two parameters; use another name.")
+    pairs = [
+        [_placed(A, parts.columns[name], parts.n) for A in term.full_matrices()]
+        for name, term in terms_of(family)
+    ]
+    added = [item.term(parts) for item in outside.values()]
+    M, K = (np.array([p[i] for p in pairs] + [p[1 - i] for p in added]) for i in (0, 1))
+    held = _conditions(family, fixed)
+    N = still_motions(held)
+    known = {**own, **outside}
+    powers = _powers(family, tuple(outside))
+    return FamilyModel(
+        K=N.T @ K @ N,
+        M=N.T @ M @ N,
+        k_powers=powers[0],
+        m_powers=powers[1],
+        seen=rows[0] @ N,
+        driven=rows[1] @ N,
+        names=tuple(known),
+        low=np.array([p.low for p in known.values()]),
+        high=np.array([p.high for p in known.values()]),
+        amount=np.repeat([1.0, 0.0], [len(K) - len(candidates), len(candidates)]),
+        n_rigid=_count_free(parts, attached, held),
+        motions=N,
+    )
+
+
+def _placed(A: Array, columns: slice, n: int) -> Array:
+    """A matrix of one body among the coordinates (n, n) of all."""
+    whole = np.zeros((n, n))
+    whole[columns, columns] = A
+    return whole
+
+
+def _powers(family: Structure, outside: tuple[str, ...]) -> tuple[Array, Array]:
+    """Which parameters multiply which terms."""
+    own = [_own_powers(one) for one in parts_of(family).values()] + [(np.eye(len(outside)),) * 2]
+    k, m = (block_diag(*(pair[i] for pair in own)) for i in (0, 1))
+    return k, m
+
+
+def _own_powers(family: BodyFamily | FlexibleBody) -> tuple[Array, Array]:
+    if isinstance(family, FlexibleBody):
+        return (np.zeros((1, 0)),) * 2
+    k, m = np.zeros((2, len(family.shares), len(family.parameters)))
+    for i, share in enumerate(family.shares):
+        for j, p in enumerate(family.parameters.values()):
+            k[i, j] = _acts(p, YoungsModulus, share.region)
+            m[i, j] = _acts(p, Density, share.region) and not share.fixed
+    return k, m
+
+
+def _acts(parameter: Parameter, kind: type, region: str | None) -> bool:
+    return isinstance(parameter, kind) and parameter.region in (None, region)
+
+
+def _conditions(family: Structure, fixed: Any) -> Array:
+    """(c, n) coordinates that supports and couplings keep zero."""
+    parts = Parts.of(family)
+    if isinstance(family, FamilyAssembly | Assembly):
+        for place in fixed:
+            parts.marker(place)
+        whole = family if isinstance(family, Assembly) else family.nominal
+        return whole.conditions(tuple(fixed))
+    body = parts.bodies[""]
+    body.check_support(fixed)
+    return body.held_rows(fixed)
+
+
+def _count_free(parts: Parts, attached: Attached, held: Array) -> int:
+    """Number of rigid motions of all bodies that neither supports, couplings nor springs hold."""
+    rigid, scale = parts.rigid()
+    stiff = [item.term(parts)[0][np.ix_(rigid, rigid)] for item in attached.values()]
+    pulls = [k * np.outer(scale, scale) / max(np.abs(k).max(), 1e-300) for k in stiff]
+    rows = np.vstack([np.zeros((1, rigid.size)), held[:, rigid] * scale, *pulls])
+    return int(rigid.size - np.linalg.matrix_rank(rows, tol=HELD_RTOL))

@@ -1,0 +1,336 @@
+"""Models with parameters, their modes, and what is measured of them.
+
+Source:
+    Condensation to the sensors: Guyan, Reduction of stiffness and mass matrices, AIAA J. 3
+    (1965) 380.
+"""
+
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import LinAlgError, cho_factor, cho_solve, eigh
+from scipy.stats import chi2
+from scipy.stats import f as f_ratio
+
+from rom.arguments import finite, one_each
+from rom.components.updating.frf_data import frac
+from rom.errors import ConfigError, ModelError
+from rom.model import Array, Report, Row
+from rom.reduction.bases.fixed_interface import craig_bampton
+from rom.rows import row
+
+Complex = NDArray[np.complex128]
+RIGID_RTOL = 1e-4  # round-off of a rigid motion's eigenvalue, of the lowest elastic one
+MAX_FALSE_REFUSAL = 1e-3  # probability that a row refuses a right model
+MIN_SCALE = 1e-8  # variance of a scale that is worth a thought
+N_BANDS = 8  # of lines, in which the misfit is looked for
+MAX_UNLIKE = 0.5  # one less the median FRAC: more is another body
+ROUND_OFF = 1e-6  # of a relative error of responses: what is below has no pattern to be judged by
+DEAD_RATIO = 1e-8  # of the largest response: below it, round-off of those who compute responses
+RANK_RTOL = 1e-7  # singular value of dependent columns of a basis, of the largest one
+
+
+@dataclass(frozen=True, slots=True)
+class ParametricModel:
+    """K(p) = K + sum p_i dK_i and M(p) = M + sum p_i dM_i, seen at sensors.
+
+    Attributes:
+        K: (n, n) stiffness at p = 0 [N/m].
+        M: (n, n) mass at p = 0 [kg].
+        dK: (n_p, n, n) what each parameter adds to K [N/m]; zeros where it does not.
+        dM: (n_p, n, n) what each parameter adds to M [kg].
+        sensors: (n_s, n) rows that give the measured displacements [1].
+        n_rigid: number of rigid motions, 0 for a supported and 6 for a free structure.
+
+    Raises:
+        ConfigError: if the matrices do not fit each other.
+    """
+
+    K: Array
+    M: Array
+    dK: Array
+    dM: Array
+    sensors: Array
+    n_rigid: int = 0
+
+    def __post_init__(self) -> None:
+        n, n_p = len(self.K), len(self.dK)
+        wanted = {"M": (n, n), "dK": (n_p, n, n), "dM": (n_p, n, n)}
+        wanted["sensors"] = (len(self.sensors), n)
+        for name, shape in wanted.items():
+            finite(name, getattr(self, name), shape)
+
+    def at(self, p: ArrayLike) -> "ParametricModel":
+        """The model with its origin at p (n_p,) [1].
+
+        Raises:
+            ConfigError: if p has another length.
+        """
+        p = finite("p", p, (len(self.dK),))
+        K, M = (A + np.tensordot(p, dA, 1) for A, dA in ((self.K, self.dK), (self.M, self.dM)))
+        return ParametricModel(K, M, self.dK, self.dM, self.sensors, self.n_rigid)
+
+    def in_basis(self, T: Array) -> "ParametricModel":
+        """The model reduced to u = T a, T (n, r) the same for all p [1]: fast, still parametric.
+
+        Raises:
+            ConfigError: if the matrices do not fit each other.
+        """
+        K, M, dK, dM = (T.T @ A @ T for A in (self.K, self.M, self.dK, self.dM))
+        return ParametricModel(K, M, dK, dM, self.sensors @ T, self.n_rigid)
+
+
+class SensorModel(Protocol):
+    """A model whose sensors are dofs, with its origin where it is asked for."""
+
+    @property
+    def sensors(self) -> Array:
+        """(n_s, n) rows that give the measured displacements [1]."""
+
+    def at(self, p: Array) -> ParametricModel:
+        """The model with its origin at p (n_p,) [1]."""
+
+
+@dataclass(frozen=True, slots=True)
+class AtSensors:
+    """A parametric model condensed statically to its sensors, anew for each p.
+
+    With T = [1; -K_oo^-1 K_os] the stiffness at the sensors has the derivative T^T dK T, and the
+    mass also that of T. What is between the sensors follows them statically, so that frequencies
+    are too high however good the data.
+
+    Attributes:
+        full: the model; its sensors are dofs.
+    """
+
+    full: "SensorModel"
+
+    def at(self, p: ArrayLike) -> ParametricModel:
+        """The condensed model with its origin at p (n_p,) [1] and the derivatives there.
+
+        Raises:
+            ConfigError, ModelError: if sensors are no dofs, or do not hold the structure.
+        """
+        model = self.full.at(np.asarray(p, dtype=float))
+        s = sensor_dofs(model)
+        o = np.setdiff1d(np.arange(len(model.K)), s)
+        try:
+            K_oo = cho_factor(model.K[np.ix_(o, o)])
+        except LinAlgError as error:
+            raise ModelError(
+                "held at its sensors it still moves; it needs more of them."
+            ) from error
+        T = np.zeros((len(model.K), s.size))
+        T[s], T[o] = np.eye(s.size), -cho_solve(K_oo, model.K[np.ix_(o, s)])
+        dT = -np.array([cho_solve(K_oo, (dK @ T)[o]) for dK in model.dK])  # rows o; s do not move
+        moved = np.swapaxes(dT, 1, 2) @ (model.M @ T)[o]
+        K, M, dK, dM = (T.T @ A @ T for A in (model.K, model.M, model.dK, model.dM))
+        dM = dM + moved + np.swapaxes(moved, 1, 2)
+        return ParametricModel(K, M, dK, dM, np.eye(s.size), model.n_rigid)
+
+
+Model = ParametricModel | AtSensors
+
+
+@dataclass(frozen=True, slots=True)
+class Measurement:
+    """Measured receptances.
+
+    Attributes:
+        omega: (n_f,) circular frequencies [rad/s].
+        H: (n_f, n_s, n_e) displacement at each sensor per unit force at each exciter [m/N].
+        inputs: (n_e,) which sensors have an exciter.
+        weights: (n_f, n_s, n_e), (n_f, 1, 1) or one number: how far to trust each value; zero for
+            a sensor that symmetry keeps at rest, which has only round-off or noise to say.
+
+    Raises:
+        ConfigError: if these do not fit each other, or a channel is dead.
+    """
+
+    omega: Array
+    H: Complex
+    inputs: tuple[int, ...]
+    weights: Any = 1.0
+
+    def __post_init__(self) -> None:
+        if np.ndim(self.H) != 3 or self.H.shape[::2] != (len(self.omega), len(self.inputs)):
+            n = (len(self.omega), len(self.inputs))
+            raise ConfigError(f"H is {np.shape(self.H)}, needed are {n[0]} lines, {n[1]} exciters.")
+        if not np.isfinite(self.H).all() or not np.abs(self.H).min() > 0:
+            raise ConfigError("H is zero or not finite somewhere: a dead channel; leave it out.")
+        if not set(self.inputs) <= set(range(self.H.shape[1])):
+            raise ConfigError(f"inputs = {self.inputs} must be from 0 to {self.H.shape[1] - 1}.")
+        w = np.shape(self.weights)
+        if w not in ((), self.H.shape, (len(self.omega), 1, 1)):
+            raise ConfigError(f"weights {w} must be one number, or of the shape {self.H.shape}.")
+        self._check_levels()
+
+    def _check_levels(self) -> None:
+        """Refuse channels that only round-off moves: the logarithm of that is anything."""
+        level = np.abs(self.H).max(axis=0)
+        trusted = np.broadcast_to(self.weights, self.H.shape).any(axis=0)
+        for sensor, exciter in np.argwhere((level < DEAD_RATIO * level.max()) & trusted):
+            raise ConfigError(
+                f"under exciter {exciter} sensor {sensor} moves by "
+                f"{level[sensor, exciter] / level.max():.1e} of the largest response: a dead "
+                "channel, kept at rest by symmetry or a support.",
+                hint="Give it the weight 0 there, or leave it out.",
+            )
+
+    def check(self, model: "Model", zeta: ArrayLike = ()) -> None:
+        """See that a model and damping ratios (m,) [1] can answer to it.
+
+        Raises:
+            ConfigError: if the sensors differ in number, or a ratio is not positive.
+        """
+        full = model.full if isinstance(model, AtSensors) else model
+        one_each("sensors of the model", len(full.sensors), "of the test", self.H.shape[1])
+        if not (np.asarray(zeta) > 0).all():
+            raise ConfigError(f"zeta = {zeta!r}: damping ratios to start from must be positive.")
+
+
+@dataclass(frozen=True, slots=True)
+class Modal:
+    """A model in its own modes: Z^-1 = Phi diag(g(omega)) Phi^T with modal damping.
+
+    Attributes:
+        lam: (n,) eigenvalues [rad^2/s^2].
+        Phi: (n, n) modes, mass-normalised [kg^-1/2].
+        d: (n,) damping 2 zeta omega [rad/s] of each mode.
+    """
+
+    lam: Array
+    Phi: Array
+    d: Array
+
+    def g(self, omega: Array) -> Complex:
+        """(n_f, n) receptance of each mode [s^2] at omega (n_f,) [rad/s]."""
+        w = omega[:, None]
+        return 1.0 / (self.lam - w**2 + 1j * w * self.d)
+
+
+def modal(model: ParametricModel, zeta: ArrayLike) -> Modal:
+    """Modes of a model at its origin; zeta (m,) [1] of the lowest elastic ones, others undamped.
+
+    Raises:
+        ConfigError, ModelError: for more ratios than modes; for mass or stiffness not positive.
+    """
+    try:
+        lam, Phi = eigh(model.K, model.M)
+    except LinAlgError as error:
+        raise ModelError("the changes must leave a mass matrix that is positive.") from error
+    elastic = slice(model.n_rigid, None)
+    rigid = np.abs(lam[: model.n_rigid]).max(initial=0.0)
+    if rigid > RIGID_RTOL * np.abs(lam[elastic]).min(initial=np.inf):
+        raise ModelError(
+            f"n_rigid = {model.n_rigid}, but a motion among them has the frequency "
+            f"{np.sqrt(rigid):.4g} rad/s: the structure is held; take n_rigid of what is free."
+        )
+    lam[: model.n_rigid] = 0.0
+    if not (lam[elastic] > 0).all():
+        raise ModelError(
+            f"{model.n_rigid} rigid motions leave the eigenvalue {lam[elastic].min():.3g}"
+            " rad^2/s^2: the stiffness must be positive."
+        )
+    zeta, d = np.asarray(zeta, dtype=float), np.zeros(lam.size)
+    if zeta.size > (n := lam.size - model.n_rigid):
+        raise ConfigError(f"at most {n} damping ratios, of the elastic modes, got {zeta.size}.")
+    damped = slice(model.n_rigid, model.n_rigid + zeta.size)
+    d[damped] = 2 * zeta * np.sqrt(lam[damped])
+    return Modal(lam, Phi, d)
+
+
+def damping_matrix(model: ParametricModel, zeta: ArrayLike) -> Array:
+    """(n, n) C = sum 2 zeta omega (M phi)(M phi)^T at the origin of the model [N s/m].
+
+    Raises:
+        ConfigError, ModelError: as `modal`.
+    """
+    modes = modal(model, zeta)
+    return (model.M @ modes.Phi * modes.d) @ (model.M @ modes.Phi).T
+
+
+def parametric_basis(model: ParametricModel, n_modes: int, samples: ArrayLike) -> Array:
+    """(n, r) basis [1] for a range of p: Craig-Bampton at samples, held at the sensors.
+
+    Args:
+        model: with its sensors.
+        n_modes: number of modes at each sample.
+        samples: (k, n_p) relative changes [1].
+
+    Raises:
+        ConfigError: without a mode, or if sensors are no dofs.
+    """
+    if n_modes < 1:
+        raise ConfigError(f"n_modes = {n_modes}: a basis needs one or more between the sensors.")
+    s = sensor_dofs(model)
+    at = [model.at(p) for p in np.atleast_2d(np.asarray(samples, dtype=float))]
+    Psi = np.hstack([craig_bampton(here.K, here.M, s, n_modes).Psi for here in at])
+    U, size, _ = np.linalg.svd(Psi / np.linalg.norm(Psi, axis=0), full_matrices=False)
+    return U[:, size > RANK_RTOL * size[0]]
+
+
+def sensor_dofs(model: ParametricModel) -> Any:
+    """(n_s,) the dofs that the sensors are.
+
+    Raises:
+        ConfigError: if they are none.
+    """
+    s = model.sensors.argmax(axis=1)
+    if not np.array_equal(model.sensors, np.eye(len(model.K))[s]):
+        raise ConfigError("the sensors must be dofs of the model; condense before reducing.")
+    return s
+
+
+def explained(H: Complex, test: Measurement, n: int) -> Report:
+    """Whether the responses of a corrected model leave noise alone, of a size that is not known.
+
+    What is left of noise with the weights of the test has one size at all sensors and in all
+    bands, and the responses are alike.
+
+    Args:
+        H: (n_f, n_s, n_e) of the corrected model [m/N].
+        test: what was measured.
+        n: number of unknowns.
+    """
+    weight = np.broadcast_to(np.asarray(test.weights, dtype=float), test.H.shape)
+    used = weight > 0
+    alike = frac(H * used, test.H * used)[used.any(axis=0)]
+    rows = [row("one less the median FRAC", 1.0 - float(np.median(alike)), MAX_UNLIKE)]
+    squares = np.abs(np.log(H / test.H) * weight) ** 2
+    freedom = max(2 * int(used.sum()) - n, 1)
+    variance = squares.sum() / freedom
+    if variance > ROUND_OFF**2:
+        blocks = np.array_split(np.arange(len(H)), min(N_BANDS, len(H)))
+        f = test.omega / (2 * np.pi)
+        sensors = {f"worst sensor, {k}": np.s_[:, k] for k in range(H.shape[1])}
+        bands = {f"worst band, {f[b[0]]:.4g} to {f[b[-1]]:.4g} Hz": np.s_[b] for b in blocks}
+        for parts in (sensors, bands):
+            found = {name: (squares[at].sum() / variance, 2.0 * used[at].sum())
+                     for name, at in parts.items() if used[at].any()}  # fmt: skip
+            name = max(found, key=lambda x: deviation(*found[x]))
+            rows.append(chi_row(name, *found[name], len(parts), scale=2 / freedom))
+    return Report("updating", tuple(rows))
+
+
+def deviation(value: float, freedom: float) -> float:
+    """Standard deviations of chi-square above its expectation."""
+    return float((value - freedom) / np.sqrt(2 * max(freedom, 1.0)))
+
+
+def chi_row(
+    name: str, value: float, freedom: float, trials: int, data: Any = None, scale: float = 0.0
+) -> Row:
+    """Chi-square over its expectation; the limit is kept by a right model but for one in 1000.
+
+    Squares over estimated variances vary more, as if they had less freedom; what is not known of
+    the scale of all makes the quotient one of F, whose denominator has the freedom 2 / variance.
+    """
+    freedom = max(freedom, 1.0)
+    own, scale = (freedom, scale) if data is None else (data.known * freedom, data.scale)
+    limit = chi2.isf(MAX_FALSE_REFUSAL / trials, own) / own
+    if scale > MIN_SCALE:
+        limit = f_ratio.isf(MAX_FALSE_REFUSAL / trials, own, 2 / scale)
+    return row(f"{name}, over its expectation", value / freedom, float(limit))

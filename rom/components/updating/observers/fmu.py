@@ -1,0 +1,110 @@
+"""The FMU of a filter: samples of sensors in, estimates anywhere on the body out; no Python.
+
+See docs/theory/tracking.md.
+"""
+
+import json
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from rom.arguments import typed
+from rom.components.updating.observers.operation import UNITS
+from rom.components.updating.observers.parameter_tracking import LINEAR_REACH, ParameterTracker
+from rom.components.updating.observers.tracking import Observer
+from rom.io.files import check_writable
+from rom.io.fmu.archive import Content, write_archive
+from rom.io.fmu.body import description, table
+from rom.io.fmu.variables import Variable, structured
+
+
+@typed
+def write_observer_fmu(observer: Observer | ParameterTracker, path: str | Path) -> Path:
+    """Write a filter as an FMU for co-simulation (FMI 2.0) that needs nothing where it runs.
+
+    Inputs are the samples ``sensor.acceleration[1]`` and so on; outputs are estimates
+    ``estimate.force[1]``, ``estimate.stress[1]`` and so on and their standard deviations
+    ``deviation.stress[1]``. Those of an observer are for the end of the step that begins with the
+    samples, as `Observer.run` has them. Those of a tracker of parameters, factors
+    ``estimate.factor.joint`` among them, are for the time of the samples, as
+    `ParameterTracker.run` has them; deviations of factors are relative. The communication step is
+    that of the filter.
+
+    Args:
+        observer: from `Tracker.observer`, or a tracker of parameters.
+        path: file ending in ``.fmu``.
+
+    Raises:
+        ConfigError: if the place is not writable.
+        ResourceError: if there is no C compiler, it fails, or the disk is full.
+    """
+    path = check_writable(path)
+    if isinstance(observer, Observer):
+        inputs, outputs, text = observer.inputs, observer.outputs, _steady(observer)
+        core, when = "observer.c", "one step after their samples"
+    else:
+        (inputs, outputs), text = _names(observer), _changing(observer)
+        core, when = "parameter_tracker.c", "at their samples, and of what changes"
+    variables = [Variable(f"sensor.{name}", "input", unit, 0.0) for name, unit in inputs]
+    for kind in ("estimate", "deviation"):
+        variables += [Variable(f"{kind}.{name}", "output", unit) for name, unit in outputs]
+    dt = observer.dt if isinstance(observer, Observer) else observer.assumed.dt
+    about = f"Estimates of {path.stem} from a few sensors, {when}."
+    describe = partial(description, path.stem, about, variables, dt)
+    headers = ("filter.h", "states.h")
+    return write_archive(path, Content(path.stem, core, describe, data=text, headers=headers))
+
+
+Names = tuple[tuple[str, str], ...]
+
+
+def _names(tracker: ParameterTracker) -> tuple[Names, Names]:
+    """Names and units of samples (n_y,), and of what is wanted, of forces and factors (n_v,)."""
+    inputs, wanted = (
+        tuple((name, UNITS[s.quantity]) for s in several for name in s.names)
+        for several in (tracker.sensors, tracker.wanted)
+    )
+    forces = [(f"force[{k}]", "N") for k in range(1, tracker.operation.driven.shape[1] + 1)]
+    factors = [(structured("factor", name), "1") for name in tracker.names]
+    return inputs, (*wanted, *forces, *factors)
+
+
+def _steady(o: Observer) -> str:
+    """Tables of a filter in its steady state."""
+    tables = {
+        "DT": np.array([o.dt]),
+        "CLOSED": o.A - o.A @ o.G @ o.C,
+        "DRIVEN": o.A @ o.G,
+        "WANTED": o.W,
+        "DEVIATIONS": o.deviations,
+    }
+    n_v, n = o.W.shape
+    sizes = f"enum {{ STATES = {n}, SENSORS = {len(o.C)}, VALUES = {n_v} }};\n"
+    return sizes + "".join(table(name, A) for name, A in tables.items())
+
+
+def _changing(tracker: ParameterTracker) -> str:
+    """Tables of a filter that linearises its equations again."""
+    o, assumed = tracker.operation, tracker.assumed
+    drifts = tracker.drifts.values()
+    tables = {
+        "DT": np.array([assumed.dt]), "REACH": np.array([LINEAR_REACH]),
+        "SCALE": o.scale, "STIFFNESS": o.K, "MASS": o.M, "DAMPING": o.XI, "DRIVEN": o.driven,
+        "K_POWERS": o.k_powers, "M_POWERS": o.m_powers, "LOW": o.low, "HIGH": o.high,
+        "WHITE": np.diag(assumed.white(o)), "VARIANCES": tracker.R,
+        "WALKS": np.array([d.walk**2 * assumed.dt for d in drifts]),
+        "BEFORE": np.r_[np.diag(assumed.before(o)), [d.first**2 for d in drifts]],
+    }  # fmt: skip
+    for name, rows in (("SEEN", o.seen), ("WANTED", o.wanted)):
+        tables[f"{name}_STILL"], tables[f"{name}_CARRIED"] = rows.displacement, rows.carried
+        tables[f"{name}_MOVING"], tables[f"{name}_PUSHED"] = rows.velocity, rows.acceleration
+    m, n_e = o.driven.shape
+    sizes = {
+        "MODES": m, "FORCES": n_e, "PARAMETERS": len(o.names), "TERMS": len(o.K),
+        "SENSORS": len(tracker.R), "WANTED": len(o.wanted.displacement),
+    }  # fmt: skip
+    numbers = ", ".join(f"{name} = {size}" for name, size in sizes.items())
+    names = ", ".join(json.dumps(name) for name in o.names)
+    text = f"enum {{ {numbers} }};\nstatic const char *const NAMES[] = {{{names}}};\n"
+    return text + "".join(table(name, A) for name, A in tables.items())

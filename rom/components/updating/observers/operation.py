@@ -1,0 +1,372 @@
+"""A body in operation as equations of first order, with their derivatives by its parameters.
+
+State: s y and y' of modes, s the larger of frequency and one, then forces::
+
+    M(p) y'' + Xi y' + K(p) y = Phi' f,   K = sum k_i(p) K_i,   M alike
+
+Modes are those at factors of one. Sensors and what is wanted are rows of the state, accelerations
+by the equation of motion.
+
+Source:
+    Noise of a step: Van Loan, Computing integrals involving the matrix exponential, IEEE Trans.
+    Autom. Control 23 (1978) 395; its derivative: Najfeld and Havel, Derivatives of the matrix
+    exponential and their computation, Adv. Appl. Math. 16 (1995) 321.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.linalg import eigh, expm, expm_frechet
+
+from rom.arguments import not_negative, one_of
+from rom.body.flexible import FlexibleBody
+from rom.body.recovery import StressRecovery
+from rom.components.updating.family_model import Attached, Parts, Structure, family_model, terms_of
+from rom.components.updating.measured import POINT_RTOL, Channels
+from rom.errors import ConfigError, ModelError
+from rom.model import Array
+from rom.names import named
+
+UNITS = {
+    "displacement": "m", "velocity": "m/s", "acceleration": "m/s2", "strain": "1", "stress": "Pa"
+}  # fmt: skip
+UNSEEN_STATE_RTOL = 1e-9  # singular value of a motion that no sensor sees, over the largest
+DAMPED_RTOL = 1e-9  # decay over frequency from which on an unseen motion dies out by itself
+MAX_NORM = 0.5  # of a matrix whose exponential is summed; longer steps are doublings
+
+
+@dataclass(frozen=True, slots=True)
+class Sensors:
+    """Channels of one kind, measured or wanted.
+
+    Attributes:
+        channels: where, and along which direction.
+        quantity: "displacement", "velocity", "acceleration", or along the direction the normal
+            "strain", in the surface and constant over a triangle of it, or the normal "stress".
+        noise: standard deviation of a sample [unit of the quantity]; not used where it is wanted.
+
+    Raises:
+        ConfigError: for another quantity, or noise that is negative or not finite.
+    """
+
+    channels: Channels
+    quantity: str
+    noise: float = 0.0
+
+    def __post_init__(self) -> None:
+        one_of("quantity", self.quantity, tuple(UNITS))
+        not_negative("noise", self.noise)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Quantity and number from one of each channel."""
+        n = len(np.asarray(self.channels.points))
+        return tuple(f"{self.quantity}[{k}]" for k in range(1, n + 1))
+
+
+@dataclass(frozen=True, slots=True)
+class Rows:
+    """What sensors see of m modes; n_t terms have factors.
+
+    Attributes:
+        displacement: (k, m) of y [unit of a sensor / (m kg^(1/2))].
+        carried: (n_t, k, m) of y, times the factor of a term of the stiffness.
+        velocity: (k, m) of y'.
+        acceleration: (k, m) of y''.
+    """
+
+    displacement: Array
+    carried: Array
+    velocity: Array
+    acceleration: Array
+
+
+@dataclass(frozen=True, slots=True)
+class Linear:
+    """The equations at one point of the parameters, with their derivatives there.
+
+    Attributes:
+        A: (n, n) rates of the state [1/s].
+        dA: (n_p, n, n) by the logarithms of factors.
+        C: (n_y, n) what sensors see [unit of a sensor / unit of a state].
+        dC: (n_p, n_y, n) likewise.
+        W: (n_v, n) what is wanted.
+        dW: (n_p, n_v, n) likewise.
+    """
+
+    A: Array
+    dA: Array
+    C: Array
+    dC: Array
+    W: Array
+    dW: Array
+
+
+@dataclass(frozen=True, slots=True)
+class Operation:
+    """Modes of a body, forces on them, and what is seen.
+
+    Attributes:
+        names: (n_p,) of the parameters.
+        low: (n_p,) smallest logarithms of factors [1].
+        high: (n_p,) largest ones [1].
+        omega: (m,) frequencies at factors of one [rad/s].
+        K: (n_t, m, m) terms of the stiffness.
+        M: (n_t, m, m) terms of the mass.
+        k_powers: (n_t, n_p) one where a parameter multiplies a term of the stiffness.
+        m_powers: (n_t, n_p) likewise of the mass.
+        XI: (m, m) damping [1/s].
+        driven: (m, n_e) forces of the modes per force.
+        seen: rows of the sensors.
+        wanted: rows of what is wanted.
+    """
+
+    names: tuple[str, ...]
+    low: Array
+    high: Array
+    omega: Array
+    K: Array
+    M: Array
+    k_powers: Array
+    m_powers: Array
+    XI: Array
+    driven: Array
+    seen: Rows
+    wanted: Rows
+
+    @property
+    def scale(self) -> Array:
+        """(m,) what makes a velocity of a displacement [rad/s]."""
+        return np.maximum(self.omega, 1.0)
+
+    def at(self, x: Array) -> Linear:
+        """The equations at logarithms x (n_p,) of factors."""
+        m, n_e = self.driven.shape
+        k = np.exp(self.k_powers @ x)
+        acc, dacc = self._accelerations(x)
+        A, at = np.zeros((2 * m + n_e,) * 2), np.arange(m)
+        A[at, m + at] = self.scale
+        A[m : 2 * m] = acc
+        dA = np.zeros((x.size, *A.shape))
+        dA[:, m : 2 * m] = dacc
+        found = []
+        for rows in (self.seen, self.wanted):
+            y = np.tensordot(k, rows.carried, 1) + rows.displacement
+            C = rows.acceleration @ acc
+            C[:, :m] += y / self.scale
+            C[:, m : 2 * m] += rows.velocity
+            dC = rows.acceleration @ dacc
+            dC[..., :m] += np.einsum("tp,t,tkm->pkm", self.k_powers, k, rows.carried) / self.scale
+            found += [C, dC]
+        return Linear(A, dA, *found)
+
+    def _accelerations(self, x: Array) -> tuple[Array, Array]:
+        """(m, n) accelerations of the modes by the state, and (n_p, m, n) their derivatives."""
+        k, m = np.exp(self.k_powers @ x), np.exp(self.m_powers @ x)
+        K, M = np.tensordot(k, self.K, 1), np.tensordot(m, self.M, 1)
+        acc = np.linalg.solve(M, np.hstack([-K / self.scale, -self.XI, self.driven]))
+        dK = np.einsum("tp,t,tij->pij", self.k_powers, k, self.K) / self.scale
+        right = -np.einsum("tp,t,tij,jk->pik", self.m_powers, m, self.M, acc, optimize=True)
+        right[..., : len(K)] -= dK
+        return acc, np.linalg.solve(M, right)
+
+
+def operation(
+    structure: Structure,
+    names: Sequence[str],
+    attached: Attached,
+    channels: tuple[Sequence[Sensors], Channels, Sequence[Sensors]],
+    damping: float | None,
+    fixed: Any,
+) -> Operation:
+    """The equations of a body, an assembly or a family.
+
+    Args:
+        structure: families are without parameters of thickness.
+        names: of parameters that change; others stay at factors of one.
+        attached: springs and masses, by name.
+        channels: sensors, forces and what is wanted.
+        damping: ratio of all modes at factors of one [1]; None for that of the bodies.
+        fixed: what is held, see `FlexibleBody.frequencies`.
+
+    Raises:
+        ConfigError: if nothing can move, for channels off the body, or an unknown name.
+        ModelError: if a body has no surface or stress where they are needed.
+    """
+    parts = Parts.of(structure)
+    nothing = np.eye(parts.n), np.zeros((0, parts.n))
+    model = family_model(structure, nothing, attached, {}, fixed)
+    if wrong := set(names) - set(model.names):
+        raise ConfigError(
+            f"there is no parameter {named(sorted(wrong))}.",
+            hint=f"The family and what is attached have {named(model.names)}.",
+        )
+    if not model.K.shape[1]:
+        what = named(body.name for body in parts.bodies.values())
+        raise ConfigError(f"body {what} cannot move with {fixed!r} held; leave one of them free.")
+    lam, U = eigh(model.K.sum(axis=0), model.M.sum(axis=0))
+    omega, V = np.sqrt(np.maximum(lam, 0.0)), model.seen @ U
+    omega[: model.n_rigid] = 0.0
+    XI = np.diag(2 * (damping or 0.0) * omega)
+    if damping is None:
+        for name, body in parts.bodies.items():
+            elastic = V[parts.columns[name]][6:]
+            XI += elastic.T @ body.D @ elastic
+        XI[: model.n_rigid], XI[:, : model.n_rigid] = 0.0, 0.0  # rigid motion is not damped
+    chosen = [model.names.index(name) for name in names]
+    sensors, forces, wanted = channels
+    terms = terms_of(structure)
+    groups = [
+        _rows(parts, terms, V, several, what, len(attached))
+        for several, what in ((sensors, "sensor"), (wanted, "wanted value"))
+    ]
+    return Operation(
+        tuple(names), np.log(model.low[chosen]), np.log(model.high[chosen]), omega,
+        K=U.T @ model.K @ U, M=U.T @ model.M @ U,
+        k_powers=model.k_powers[:, chosen], m_powers=model.m_powers[:, chosen],
+        XI=XI, driven=(forces.rows(parts.bodies, "force") @ V).T,
+        seen=groups[0], wanted=groups[1],
+    )  # fmt: skip
+
+
+def _rows(
+    parts: Parts,
+    terms: list[tuple[str, FlexibleBody]],
+    V: Array,
+    several: Sequence[Sensors],
+    what: str,
+    n_attached: int,
+) -> Rows:
+    """Rows of channels, one below the other."""
+    k, m, order = sum(len(s.names) for s in several), V.shape[1], ("displacement", "velocity")
+    rows = {name: np.zeros((k, m)) for name in (*order, "acceleration")}
+    carried, first = np.zeros((len(terms) + n_attached, k, m)), 0
+    for s in several:
+        own = np.arange(first, first + len(s.names))
+        first += own.size
+        if s.quantity != "stress":
+            seen = s.channels.rows(parts.bodies, what, gauges=s.quantity == "strain") @ V
+            rows["displacement" if s.quantity == "strain" else s.quantity][own] = seen
+            continue
+        owners = np.array(s.channels.owners(parts.bodies, what))
+        for t, (name, term) in enumerate(terms):
+            lies, here = np.flatnonzero(owners == name), V[parts.columns[name]]
+            if not lies.size:
+                continue
+            static, inertial = stress_rows(term, s.channels, what, lies)
+            carried[t, own[lies]] = static @ here[6:]
+            rows["acceleration"][own[lies]] += inertial @ here
+    return Rows(rows["displacement"], carried, rows["velocity"], rows["acceleration"])
+
+
+def stress_rows(
+    body: FlexibleBody, channels: Channels, what: str, chosen: Any = None
+) -> tuple[Array, Array]:
+    """Normal stress along channels by elastic coordinates (k, r) [Pa], and by accelerations.
+
+    The latter (k, 6 + r), of rigid and elastic coordinates, is that of modes left out.
+
+    Args:
+        body: with stress on its surface.
+        channels: where, and along which direction.
+        what: they are, for messages.
+        chosen: (k,) numbers of channels; None for all.
+
+    Raises:
+        ConfigError: if a channel is off the body.
+        ModelError: if the body knows no stress.
+    """
+    recovery = _linear_stress(body)
+    reach = POINT_RTOL * np.ptp(recovery.points, axis=0).max()
+    n_r = body.n_modes
+    extra = recovery.inertial
+    left_out = np.zeros((len(recovery.operator), 6 + n_r))
+    if extra is not None:
+        left_out = np.hstack([extra[:, :6], extra[:, -n_r:]])
+    static, inertial = [np.zeros((0, n_r))], [np.zeros((0, 6 + n_r))]
+    for k in range(len(np.asarray(channels.points))) if chosen is None else chosen:
+        x, d = np.asarray(channels.points)[k], np.asarray(channels.directions)[k]
+        far = np.linalg.norm(recovery.points - x, axis=1)
+        n = int(far.argmin())
+        if far[n] > reach:
+            raise ConfigError(
+                f"{what} {k} is {far[n]:.3g} m off the body; at most {reach:.3g} m may be."
+            )
+        a, b, c = d / np.linalg.norm(d)
+        along = np.array([a * a, b * b, c * c, 2 * b * c, 2 * a * c, 2 * a * b])
+        static.append(along @ recovery.operator[None, 6 * n : 6 * n + 6])
+        inertial.append(along @ left_out[None, 6 * n : 6 * n + 6])
+    return np.vstack(static), np.vstack(inertial)
+
+
+def _linear_stress(body: FlexibleBody) -> StressRecovery:
+    recovery = body.stress
+    if recovery is None:
+        raise ModelError(f"body {body.name!r} carries no stress.", hint="Reduce with stress=True.")
+    if not isinstance(recovery, StressRecovery):
+        raise ModelError(
+            f"the stress of body {body.name!r} is that of large deflection, and what is estimated "
+            "here is linear.",
+            hint="Reduce without nonlinear.",
+        )
+    return recovery
+
+
+def check_seen(at: Linear, body: Operation) -> None:
+    """Refuse what lasts and is not seen: at each undamped root of A, after Popov and Hautus.
+
+    Raises:
+        ModelError: naming the force or the motion.
+    """
+    m, n_e = body.driven.shape
+    scale = np.r_[np.ones(2 * m), 1 / np.maximum(np.abs(body.driven).max(axis=0), 1e-300)]
+    A, C = at.A * scale / scale[:, None], at.C * scale
+    C = C / np.maximum(np.abs(C).max(axis=1, keepdims=True), 1e-300)
+    undamped = (np.diag(body.XI) <= DAMPED_RTOL * body.omega) & (body.omega > 0)
+    for root in (0.0, *(1j * body.omega[undamped])):
+        test = A - root * np.eye(len(A))
+        test = test / np.maximum(np.abs(test).max(axis=1, keepdims=True), 1e-300)
+        _, size, Vh = np.linalg.svd(np.vstack([test, C]))
+        if size[-1] > UNSEEN_STATE_RTOL * size[0]:
+            continue
+        x = np.abs(Vh[-1])
+        unseen = [f"force {k}" for k in range(n_e) if x[2 * m + k] > 0.1 * x.max()]
+        unseen += [
+            f"the motion at {w / (2 * np.pi):.4g} Hz"
+            for k, w in enumerate(body.omega) if max(x[k], x[m + k]) > 0.1 * x.max()
+        ]  # fmt: skip
+        raise ModelError(
+            f"the sensors do not see {named(unseen)}, which would drift.",
+            hint="Add a displacement or a stress: accelerations do not see what stands still.",
+        )
+
+
+def discrete(A: Array, white: Array, dt: float) -> tuple[Array, Array]:
+    """Transition (n, n) over a step, and covariance (n, n) of what white noise adds.
+
+    A short step by Van Loan's exponential, then doublings, which do not overflow for modes far
+    above the samples.
+
+    Args:
+        A: (n, n) rates of the state [1/s].
+        white: (n, n) intensity of the noise.
+        dt: step [s].
+    """
+    n = len(A)
+    halvings = max(0, int(np.ceil(np.log2(max(np.abs(A).sum(axis=1).max() * dt / MAX_NORM, 1.0)))))
+    h = dt / 2.0**halvings
+    E = expm(np.block([[-A, white], [np.zeros((n, n)), A.T]]) * h)
+    step = E[n:, n:].T
+    Q = step @ E[:n, n:]
+    for _ in range(halvings):
+        Q = Q + step @ Q @ step.T
+        step = step @ step
+    return step, 0.5 * (Q + Q.T)
+
+
+def step_derivatives(A: Array, dA: Array, dt: float) -> Array:
+    """(n_p, n, n) derivatives of the transition exp(A dt) along dA (n_p, n, n) [1/s]."""
+    found = [expm_frechet(A * dt, B * dt, compute_expm=False) for B in dA]
+    return np.array(found).reshape(dA.shape)

@@ -1,0 +1,197 @@
+"""Parameters of a body that change slowly in operation, estimated with its motion and forces.
+
+Logarithms of factors are random walks beside the forces. The transition over a step is exact at
+one point of the parameters and linear in their distance from it; when they have moved away, the
+point moves after them.
+
+Source:
+    Extended filter: Jazwinski, Stochastic processes and filtering theory (1970), chapter 8;
+    parameters as states: Hoshiya and Saito, Structural identification by extended Kalman filter,
+    J. Eng. Mech. 110 (1984) 1757.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.linalg import block_diag
+
+from rom.arguments import not_negative, positive, typed
+from rom.components.updating.family_model import Attached, Family, check_units
+from rom.components.updating.measured import Channels
+from rom.components.updating.observers.operation import (
+    Linear,
+    Operation,
+    Sensors,
+    discrete,
+    operation,
+    step_derivatives,
+)  # fmt: skip
+from rom.components.updating.observers.tracking import (
+    Assumed,
+    Track,
+    Tracker,
+    checked_record,
+    linear_tracker,
+    recorded,
+)  # fmt: skip
+from rom.errors import ConfigError, ParameterError, SolverError
+from rom.model import Array
+from rom.names import named
+from rom.plausible import check_damping_ratio
+
+LINEAR_REACH = 5e-3  # of a logarithm, within which transitions are linear in it
+
+
+@dataclass(frozen=True, slots=True)
+class Drift:
+    """How a factor may change.
+
+    Attributes:
+        first: its relative standard deviation about one before the first sample [1].
+        walk: relative standard deviation after a second, as a random walk [1/s^(1/2)].
+
+    Raises:
+        ConfigError: if the first is not positive, or the walk negative.
+    """
+
+    first: float
+    walk: float = 0.0
+
+    def __post_init__(self) -> None:
+        positive("first", self.first)
+        not_negative("walk", self.walk)
+
+
+@dataclass(frozen=True, slots=True)
+class ParameterTracker:
+    """A family with sensors and unknown forces, and parameters that change.
+
+    Attributes:
+        operation: its equations.
+        assumed: of steps and forces.
+        drifts: of the parameters, by name.
+        R: (n_y,) variances of samples [unit of a sensor, squared].
+        sensors: what is measured.
+        wanted: what is to be estimated.
+    """
+
+    operation: Operation
+    assumed: Assumed
+    drifts: Mapping[str, Drift]
+    R: Array
+    sensors: tuple[Sensors, ...]
+    wanted: tuple[Sensors, ...]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the parameters."""
+        return self.operation.names
+
+    def run(self, samples: Any, times: Any = None) -> Track:
+        """Filter a record that begins at rest.
+
+        Args:
+            samples: (n_t, n_y), in the order of the sensors; NaN where one is missing.
+            times: (n_t,) of the samples, to see that their steps are dt [s]; None to trust.
+
+        Raises:
+            ConfigError: for another number of sensors, infinite samples, or unequal steps.
+            SolverError: if a parameter leaves the range of its family.
+        """
+        y = checked_record(samples, times, len(self.R), self.assumed.dt)
+        first = np.array([d.first for d in self.drifts.values()])
+        P = block_diag(self.assumed.before(self.operation), np.diag(first**2))
+        n_e = self.operation.driven.shape[1]
+        return recorded(y, P, self.R, n_e, first.size, self.at, LINEAR_REACH)
+
+    def at(self, x: Array) -> tuple[Array, Linear, Array]:
+        """The point x (n_p,) [1], steps of the equations there, and noise (N, N) [of two states].
+
+        Raises:
+            SolverError: if a parameter has left its range.
+        """
+        o, dt = self.operation, self.assumed.dt
+        if wrong := [j for j in range(x.size) if not o.low[j] <= x[j] <= o.high[j]]:
+            j = wrong[0]
+            raise SolverError(
+                f"parameter {o.names[j]!r} has reached the factor {np.exp(x[j]):.4g}; the family "
+                f"goes from {np.exp(o.low[j]):.4g} to {np.exp(o.high[j]):.4g}.",
+                hint="See whether forces, noise and support are those of the body, then make a "
+                "family with a wider range.",
+            )
+        rates = o.at(x)
+        step, Q = discrete(rates.A, self.assumed.white(o), dt)
+        walks = np.array([d.walk for d in self.drifts.values()])
+        at = Linear(
+            step, step_derivatives(rates.A, rates.dA, dt), rates.C, rates.dC, rates.W, rates.dW
+        )
+        return x.copy(), at, block_diag(Q, np.diag(walks**2 * dt))
+
+    def held(self, **factors: float) -> Tracker:
+        """The filter with factors that stay, for its steady state and its FMU.
+
+        Args:
+            factors: by name; one for those not given [1].
+
+        Raises:
+            ParameterError: for a name that is not tracked, or a factor that is not positive.
+        """
+        if wrong := set(factors) - set(self.names):
+            raise ParameterError(f"{named(sorted(wrong))} must be of {named(self.names)}.")
+        x = np.log([positive(name, factors.get(name, 1.0)) for name in self.names])
+        return linear_tracker(self.operation, x, self.assumed, self.sensors, self.wanted)
+
+
+@typed
+def parameter_tracker(  # noqa: PLR0913  keywords of one call
+    family: Family,
+    sensors: Sequence[Sensors],
+    forces: Channels,
+    wanted: Sequence[Sensors],
+    *,
+    parameters: Mapping[str, Drift],
+    dt: float,
+    walk: float,
+    damping: float = 0.01,
+    attached: Attached | None = None,
+    fixed: Any = (),
+    unmodelled: float = 0.0,
+    first: float | None = None,
+) -> ParameterTracker:
+    """A filter that also follows parameters: a joint that loosens, a mass that grows.
+
+    Args:
+        family: from `rom.reduce_parametric`, with moduli and densities, in SI units; or several, as
+            a `rom.parametric.FamilyAssembly`, whose parameters are called "body.parameter".
+        sensors: see `tracker`.
+        forces: see `tracker`.
+        wanted: see `tracker`.
+        parameters: {name: `Drift`} of the family or of what is attached; others stay at one.
+        dt: see `tracker` [s].
+        walk: see `tracker` [N/s^(1/2)].
+        damping: ratio of all modes at factors of one [1].
+        attached: {name: `GroundSpring`, `AddedMass` or `JointSpring`}.
+        fixed: see `tracker`.
+        unmodelled: see `tracker` [m kg^(1/2)/s^(3/2)].
+        first: see `tracker` [N].
+
+    Raises:
+        ConfigError: as `tracker`, or for an unknown parameter or none.
+        ModelError: as `tracker`.
+        ParameterError: for a name that is taken.
+        InterfaceError: if an interface is unknown.
+    """
+    check_units(family)
+    if not parameters:
+        raise ConfigError("no parameter changes.", hint="Use tracker for a body that stays.")
+    check_damping_ratio(damping)
+    channels = sensors, forces, wanted
+    motion = operation(family, tuple(parameters), dict(attached or {}), channels, damping, fixed)
+    assumed = Assumed(dt, walk, unmodelled, first)
+    start = np.zeros(len(parameters))
+    checked = linear_tracker(motion, start, assumed, sensors, wanted)
+    return ParameterTracker(
+        motion, assumed, dict(parameters), checked.R, tuple(sensors), tuple(wanted)
+    )

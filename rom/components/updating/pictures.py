@@ -1,0 +1,65 @@
+"""Pictures of a vibration test: where its points are on the body, and along which directions."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from rom import view
+from rom.body.surface import surface_of
+from rom.components.updating.family_model import Family, Parts
+from rom.components.updating.measured import Channels, Responses
+from rom.names import check_ending
+
+PIN_RATIO = 0.12  # length of a pin in a picture, over the size of the body
+PIN_SLENDERNESS = 12.0  # of a pin; its ball is three times as thick
+
+
+def match(family: Family, test: Responses, path: Path) -> None:
+    """Draw where the points of a test are, also of one that does not belong to the body.
+
+    Raises:
+        ConfigError: for a picture of another kind.
+        ModelError: if the body carries no surface.
+    """
+    check_ending(path, "a picture", ".png")
+    points = np.vstack([test.sensors.points, test.inputs.points])
+    far = cKDTree(_surface(family)[0]).query(points)[0]
+    drawn(
+        family, (test.sensors, test.inputs), path, "Points of a vibration test",
+        f"Largest distance of the {len(points)} points from one of the surface: {far.max():.3g} m.",
+    )  # fmt: skip
+
+
+def drawn(
+    family: Family, channels: tuple[Channels, Channels], path: Path, title: str, more: str
+) -> None:
+    """A picture of the body with a pin along each channel, its ball where it is mounted."""
+    surface = _surface(family)
+    length = PIN_RATIO * float(np.ptp(surface[0], axis=0).max())
+    thick = length / PIN_SLENDERNESS
+    things = {"body": surface}
+    for name, several in zip(("sensors", "forces"), channels, strict=True):
+        pins = []
+        for x, d in zip(np.asarray(several.points), np.asarray(several.directions), strict=True):
+            pins += [view.cylinder(x, x + length * d / np.linalg.norm(d), thick, sides=12)]
+            pins += [view.ellipsoid((1.5 * thick,) * 3, x, sides=12)]
+        things[name] = view.joined(pins)
+    view.plane(
+        [view.Scene(f"Seen from {side}", things, view=(0.6 * y, y, 0.7 * z), up=(0, 0, 1))
+         for side, y, z in (("the front and above", -1.0, 1.0), ("behind and below", 1.0, -1.0))],
+        path, title=title,
+        caption="A ball marks a point, its pin the direction, in the axes of the geometry; a "
+        f"point may carry several. {more}",
+    )  # fmt: skip
+
+
+def _surface(family: Family) -> Any:
+    """Points (n, 3) [m] and triangles of all bodies together.
+
+    Raises:
+        ModelError: if a body carries no surface.
+    """
+    surfaces = [surface_of(body) for body in Parts.of(family).bodies.values()]
+    return view.joined([(surface.points, surface.triangles) for surface in surfaces])

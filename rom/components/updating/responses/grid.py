@@ -1,0 +1,188 @@
+"""Functions of single pairs of sensor and force side by side, at the points of a test."""
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rom.components.updating.measured import Channels, Responses
+from rom.errors import FileFormatError
+from rom.io.fields.universal import FREQUENCY_RESPONSE, Function
+from rom.model import Array
+from rom.names import named
+
+COHERENCE_KIND = 6  # of functions in universal files
+LINES_RTOL = 1e-5  # of frequencies that are the same: files hold six digits
+COHERENCE_STEP = 5e-6  # of the last of six digits, by which one may be rounded up to 1
+MAX_NAMED = 5  # in a message
+ENTITY_LENGTH = 10  # characters of a name in universal files
+Dof = tuple[int, int, str]  # node, direction, name of the body or ""
+Points = Mapping[int, Array]
+
+
+def side_by_side(
+    path: Path,
+    functions: tuple[Function, ...],
+    points: Points,
+    averages: int,
+    coherence: float | None,
+    bodies: "Bodies",
+) -> Responses:
+    """Responses of all sensors to all forces; pairs that are missing have the coherence zero.
+
+    Args:
+        path: for messages.
+        functions: frequency responses in SI units, and their coherences.
+        points: {node: (3,) point [m]}.
+        averages: behind all functions.
+        coherence: of all values where the file says nothing [1].
+        bodies: to which nodes belong.
+
+    Raises:
+        FileFormatError: if functions, lines or points do not fit each other.
+        ConfigError: as `Responses`.
+    """
+    bodies = bodies.of(functions)
+    found = _by_pair(path, [f for f in functions if f.kind == FREQUENCY_RESPONSE], bodies)
+    coherences = _by_pair(path, [f for f in functions if f.kind == COHERENCE_KIND], bodies)
+    if not found:
+        raise FileFormatError("there is no frequency response to a force.", where=str(path))
+    if coherence is None and (silent := sorted(set(found) - set(coherences))):
+        raise FileFormatError(
+            f"there is no coherence of {_some(silent)}.",
+            where=str(path),
+            hint="Give one number, coherence=..., from what is known of the noise.",
+        )
+    sensors, inputs = (sorted({pair[k] for pair in found}) for k in (0, 1))
+    x = next(iter(found.values())).x
+    H = np.full((len(sensors), len(inputs), x.size), np.nan, dtype=complex)
+    c = np.zeros(H.shape)
+    for (sensor, force), f in found.items():
+        at = sensors.index(sensor), inputs.index(force)
+        _check_lines(path, f, x)
+        H[at] = _receptance(f)
+        own = coherences.get((sensor, force))
+        c[at] = coherence if own is None or coherence is not None else _rounded(path, own, x)
+    keep = x > 0  # no displacement follows from motion at 0 Hz
+    where = [_channels(path, dofs, points) for dofs in (sensors, inputs)]
+    H, c = (np.moveaxis(A, 2, 0)[keep] for A in (H, c))
+    return Responses(x[keep], H, where[0], where[1], c, averages)
+
+
+@dataclass(frozen=True, slots=True)
+class Bodies:
+    """To which bodies of an assembly nodes belong.
+
+    Attributes:
+        of_nodes: {node: body}.
+        names: of all bodies, to which entities in universal files belong by their first ten
+            characters, where one of them does.
+    """
+
+    of_nodes: Mapping[int, str]
+    names: Collection[str] = ()
+
+    def of(self, functions: tuple[Function, ...]) -> "Bodies":
+        """Without the names where the entities of no function are bodies."""
+        entities = {entity.lower() for f in functions for entity in f.entities}
+        return self if entities & {_entity(name) for name in self.names} else Bodies(self.of_nodes)
+
+    def dof(self, path: Path, dof: tuple[int, int], entity: str) -> Dof:
+        """Node and direction with the name of the body.
+
+        Raises:
+            FileFormatError: for an entity that is not one body.
+        """
+        node, axis = dof
+        if node in self.of_nodes or not self.names:
+            return node, axis, self.of_nodes.get(node, "")
+        found = [name for name in self.names if _entity(name) == entity.lower()]
+        if len(found) != 1 and entity.upper() not in ("", "NONE"):
+            raise FileFormatError(
+                f"node {node} is of {entity!r}; bodies are {named(self.names)}.",
+                where=str(path),
+                hint="Name them as the file does, in ten characters that differ.",
+            )
+        return node, axis, found[0] if found else ""
+
+
+def _entity(name: str) -> str:
+    return name[:ENTITY_LENGTH].strip().lower()
+
+
+def _by_pair(
+    path: Path, functions: list[Function], bodies: Bodies
+) -> dict[tuple[Dof, Dof], Function]:
+    known: dict[tuple[Dof, Dof], Function] = {}
+    for f in functions:
+        dofs = zip((f.response, f.reference), f.entities, strict=True)
+        one, other = (bodies.dof(path, dof, entity) for dof, entity in dofs)
+        pair = one, other
+        if not all(1 <= abs(dof[1]) <= 3 for dof in pair):
+            raise FileFormatError(
+                f"the function of {_dof(pair[0])} by {_dof(pair[1])} is no translation by a force.",
+                where=str(path),
+            )
+        if pair in known:
+            raise FileFormatError(
+                f"{_some([pair])} is there twice.",
+                where=str(path),
+                hint="Keep one run, or average them before.",
+            )
+        known[pair] = f
+    return known
+
+
+def _receptance(f: Function) -> Any:
+    used = f.x > 0
+    H = np.full(f.x.shape, np.nan, dtype=complex)
+    H[used] = replace(f, x=f.x[used], y=f.y[used]).receptance()
+    return H
+
+
+def _rounded(path: Path, f: Function, x: Array) -> Array:
+    """Coherence, with what rounding has made one taken back by half a digit."""
+    _check_lines(path, f, x)
+    c = np.real(f.y)
+    return c if (c >= 1).all() else np.where(c == 1, 1 - COHERENCE_STEP, c)
+
+
+def _check_lines(path: Path, f: Function, x: Array) -> None:
+    if f.x.shape != x.shape or not np.allclose(f.x, x, rtol=LINES_RTOL, atol=0):
+        raise FileFormatError(
+            f"{_some([((*f.response, ''), (*f.reference, ''))])} has other lines than the first "
+            "function.",
+            where=str(path),
+        )
+
+
+def _channels(path: Path, dofs: list[Dof], points: Points) -> Channels:
+    if missing := sorted({dof[0] for dof in dofs} - set(points)):
+        raise FileFormatError(
+            f"nodes without coordinates: {', '.join(map(str, missing[:MAX_NAMED]))}.",
+            where=str(path),
+            hint="Universal files have them in dataset 15 or 2411; else name a file, points=...",
+        )
+    axes = np.array([np.sign(axis) * np.eye(3)[abs(axis) - 1] for _, axis, _ in dofs])
+    owners = tuple(body for *_, body in dofs)
+    if any(owners) and not all(owners):
+        node = dofs[owners.index("")][0]
+        raise FileFormatError(
+            f"node {node} has no body, others have one.",
+            where=str(path),
+            hint="Name the bodies of all nodes, or of none.",
+        )
+    where = np.array([points[node] for node, *_ in dofs])
+    return Channels(where, axes, owners if any(owners) else None)
+
+
+def _dof(dof: Dof) -> str:
+    node, axis, _ = dof
+    return f"{node}{'+' if axis > 0 else '-'}{'0XYZ'[abs(axis)] if abs(axis) < 4 else abs(axis)}"
+
+
+def _some(pairs: list[tuple[Dof, Dof]]) -> str:
+    names = [f"{_dof(a)}/{_dof(b)}" for a, b in pairs[:MAX_NAMED]]
+    return ", ".join(names) + (f" and {len(pairs) - MAX_NAMED} more" * (len(pairs) > MAX_NAMED))

@@ -1,0 +1,196 @@
+"""Responses in texts of spectrum analysers: a column of frequencies, and one for each part.
+
+A column is named ``12+Z/3-Y real [m/s^2/N]``: node and direction of the sensor and of the force,
+the part (real, imag, magnitude, phase or coherence) and its unit. Lines above the names are passed
+over. Columns stand between commas, semicolons or tabs; with these two, numbers may have a comma.
+"""
+
+import codecs
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rom.components.updating.responses.grid import COHERENCE_KIND
+from rom.components.updating.responses.unit_labels import length_of, lines_of, motion_per_force
+from rom.errors import ConfigError, FileFormatError
+from rom.io.fields.universal import FORCE_TYPE, FREQUENCY_RESPONSE, Function
+from rom.io.files import check_readable
+from rom.model import Array
+
+MAX_TABLE_BYTES = 2**29
+COLUMN_NAME = re.compile(
+    r"(\d+)\s*:?\s*([+-]?)([XYZ])\s*/\s*(\d+)\s*:?\s*([+-]?)([XYZ])[\s,;:]*"
+    r"(real|imag|magnitude|phase|coherence)\s*(?:[\[(](.+)[\])])?",
+    re.IGNORECASE,
+)
+POINT_COLUMN = re.compile(r"([xyz])\s*[\[(](.+)[\])]", re.IGNORECASE)
+ANGLES = {"deg": np.pi / 180, "rad": 1.0}
+NAME_HINT = (
+    "A column is named as in 12+Z/3-Y real [m/s^2/N]; parts are real and imag, or magnitude "
+)
+NAME_HINT += "and phase [deg], and coherence."
+Row = list[str]
+Pair = tuple[tuple[int, int], tuple[int, int]]  # node and direction of sensor and force
+
+
+def functions_of(path: Path) -> tuple[Function, ...]:
+    """All functions of a table, in SI units.
+
+    Raises:
+        FileFormatError: naming line or column that is not as described.
+    """
+    names, rows, separator = _cells(path, re.compile(r"freq", re.IGNORECASE))
+    values = _numbers(path, rows, separator)
+    if label := re.search(r"[\[(]([^\])]+)[\])]", names[0]):
+        try:
+            values[:, 0] *= lines_of(label.group(1))
+        except ConfigError as error:
+            raise FileFormatError(error.message, where=str(path)) from error
+    parts: dict[Pair, dict[str, tuple[str, Array]]] = {}
+    for k, name in enumerate(names[1:], 1):
+        found = COLUMN_NAME.fullmatch(name)
+        if not found:
+            raise FileFormatError(
+                f"column {k + 1} has the name {name!r}.", where=str(path), hint=NAME_HINT
+            )
+        s, s_sign, s_axis, e, e_sign, e_axis, part, unit = found.groups()
+        pair = (int(s), _axis(s_sign, s_axis)), (int(e), _axis(e_sign, e_axis))
+        own = parts.setdefault(pair, {})
+        if part.lower() in own:
+            raise FileFormatError(f"two columns are named {name!r}.", where=str(path))
+        own[part.lower()] = unit or "", values[:, k]
+    return tuple(
+        f for pair, own in parts.items() for f in _functions(path, pair, own, values[:, 0])
+    )
+
+
+def points_of(path: Path) -> tuple[dict[int, Array], dict[int, str]]:
+    """{node: point [m]} of a table with the columns node, x [m], y [m] and z [m]; {node: body}.
+
+    The latter where there is a last column, body.
+
+    Raises:
+        FileFormatError: naming line or column that is not as described.
+    """
+    names, rows, separator = _cells(path, re.compile(r"node", re.IGNORECASE))
+    named = names[-1].lower() == "body"
+    owners = [cells.pop().strip().strip('"') for _, cells in rows] if named else []
+    names = names[:-1] if named else names
+    values = _numbers(path, rows, separator)
+    found = [POINT_COLUMN.fullmatch(name) for name in names[1:]]
+    axes = [m.group(1).lower() for m in found if m]
+    if axes != ["x", "y", "z"] or len(names) != 4:
+        raise FileFormatError(
+            f"columns {names}: node, x [m], y [m], z [m], and body if there are several.",
+            where=str(path),
+        )
+    try:
+        factors = np.array([length_of(m.group(2)) for m in found if m])
+    except ConfigError as error:
+        raise FileFormatError(error.message, where=str(path)) from error
+    nodes = values[:, 0]
+    if len(set(nodes)) < len(nodes) or (nodes != np.floor(nodes)).any():
+        raise FileFormatError("nodes are whole numbers, each one once.", where=str(path))
+    places = {int(row[0]): row[1:] * factors for row in values}
+    return places, dict(zip(places, owners, strict=True)) if named else {}
+
+
+def _axis(sign: str, axis: str) -> int:
+    return ("XYZ".index(axis.upper()) + 1) * (-1 if sign == "-" else 1)
+
+
+def _functions(
+    path: Path, pair: Pair, own: dict[str, tuple[str, Array]], x: Array
+) -> list[Function]:
+    """The response and the coherence of one pair."""
+    response = set(own) - {"coherence"}
+    if response not in ({"real", "imag"}, {"magnitude", "phase"}, set()):
+        raise FileFormatError(
+            f"of {pair} there is {sorted(response)} alone.", where=str(path), hint=NAME_HINT
+        )
+    found = []
+    if response:
+        first, second = ("real", "imag") if "real" in own else ("magnitude", "phase")
+        (unit, a), (other, b) = own[first], own[second]
+        if first == "real" and other != unit:
+            raise FileFormatError(
+                f"of {pair} the units are {unit!r} and {other!r}.", where=str(path)
+            )
+        if first == "magnitude" and other not in ANGLES:
+            raise FileFormatError(
+                f"of {pair} the phase has the unit {other!r}.", where=str(path), hint=NAME_HINT
+            )
+        try:
+            kind, factor = motion_per_force(unit)
+        except ConfigError as error:
+            raise FileFormatError(
+                error.message, where=str(path), hint=error.hint or NAME_HINT
+            ) from error
+        y = a + 1j * b if first == "real" else a * np.exp(1j * b * ANGLES[other])
+        found.append(_function(FREQUENCY_RESPONSE, pair, x, y * factor, kind))
+    if "coherence" in own:
+        found.append(_function(COHERENCE_KIND, pair, x, own["coherence"][1], 0))
+    return found
+
+
+def _function(kind: int, pair: Pair, x: Array, y: Any, numerator: int) -> Function:
+    return Function(kind, x, y, *pair, numerator, FORCE_TYPE, ())
+
+
+def _cells(path: Path, first: re.Pattern[str]) -> tuple[Row, list[tuple[int, Row]], str]:
+    """Names of columns, the first of which is like a pattern; cells of each line by its number."""
+    text = _decoded(check_readable(path, MAX_TABLE_BYTES).read_bytes()).splitlines()
+    for above, line in enumerate(text, 1):
+        separator = max("\t;,", key=line.count)
+        names = [cell.strip().strip('"') for cell in line.split(separator)]
+        if len(names) > 1 and first.match(names[0]):
+            rest = text[above:]
+            break
+    else:
+        raise FileFormatError(f"no column is named {first.pattern!r}.", where=str(path))
+    rows = []
+    for number, line in enumerate(rest, above + 1):
+        if not line.strip():
+            continue
+        cells = line.split(separator)
+        rows.append((number, cells))
+        if len(cells) != len(names):
+            raise FileFormatError(
+                f"line {number} has {len(cells)} numbers under {len(names)} names.", where=str(path)
+            )
+    if not rows:
+        raise FileFormatError("there are no numbers under the names.", where=str(path))
+    return names, rows, separator
+
+
+def _decoded(data: bytes) -> str:
+    """Text in Unicode, or as Windows writes it in the west."""
+    if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        return data.decode("utf-16", "replace")
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return data.decode("cp1252", "replace")
+
+
+def _numbers(path: Path, rows: list[tuple[int, Row]], separator: str) -> Array:
+    """(n, columns) numbers of cells."""
+    found = []
+    if separator != "," and all(any(c in x for _, cells in rows for x in cells) for c in ",."):
+        raise FileFormatError(
+            "numbers have commas and points: one of them is of thousands.", where=str(path),
+            hint="Write numbers without separators of thousands.",
+        )  # fmt: skip
+    for number, cells in rows:
+        try:
+            found.append([_number(cell, separator) for cell in cells])
+        except ValueError as error:
+            raise FileFormatError(f"line {number}: {error}.", where=str(path)) from error
+    return np.array(found)
+
+
+def _number(cell: str, separator: str) -> float:
+    cell = cell.strip().strip('"')
+    return float(cell if separator == "," else cell.replace(",", "."))

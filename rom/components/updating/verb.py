@@ -1,0 +1,445 @@
+"""Update a family of bodies by a vibration test, and say what the test can and cannot tell.
+
+The family comes from `rom.reduce_parametric` and a file of `rom.save`. With -o the body at the
+factors found is written. With --plan and no test, the sensors and forces that will tell most are
+chosen, and written with -o. Several families NAME=FILE are an assembly: its places are
+BODY.INTERFACE, and -o writes one body of each, with its name before the ending.
+"""
+
+import argparse
+from collections.abc import Collection
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rom.cli.answer import Answer, failures, report_data
+from rom.cli.options import (
+    assignment,
+    count,
+    names,
+    number,
+    positive,
+    require,
+    typed_number,
+    unique,
+)
+from rom.cli.output import add_force, checked
+from rom.cli.schemas import FILE, OUTPUT, REPORT, by_name, each, record
+from rom.cli.schemas import number as ratio
+from rom.cli.schemas import text as words
+from rom.errors import ConfigError
+from rom.names import check_ending, named
+
+if TYPE_CHECKING:
+    from rom.components.updating.family_model import Attached, Family
+    from rom.components.updating.verdict import Updated
+
+SUMMARY = "update a family of bodies by a vibration test"
+EXAMPLES = """\
+  rom update test.uff --family panel.rom.npz --averages 50 --fixed root
+  rom update test.csv --points points.csv --family panel.rom.npz --averages 50 --coherence 0.98 \\
+      --picture points.png
+  rom update test.uff --family panel.rom.npz --averages 50 --free core,clamp \\
+      --spring clamp=root:1e8,1e8,1e8:0.1:10 --mass cable=tip:0.05:0.1:10 --candidate cable \\
+      -o updated.rom.npz
+  rom update test.uff --family panel.rom.npz --averages 50 --residual equations --prior core=0.3
+  rom update test.h5 --family frame=frame.rom.npz --family arm=arm.rom.npz --fixed frame.root \
+      --joint bolts=frame.tip,arm.root:4e8,4e8,4e8,2e5,1e5,1e5:0.1:10
+  rom update --plan 8,1 --lines 20:800 --family panel.rom.npz --fixed root -o plan.csv
+  rom update --plan --lines 20:800 --family panel.rom.npz --fixed root -o plan.png
+"""
+PLAN_LINES = 100  # between the first and the last one
+PLAN_POINTS = 20  # of the surface that are offered, each along three axes
+PLAN_ENDINGS = (".csv", ".uff", ".png")
+PLAN_SIZE = (8, 1)  # sensors and forces, where none are asked for
+FACTOR_HELP = "by a factor from LOW to HIGH that is sought; may be repeated"
+POINT_KEY = each(ratio("[m] and direction"), "x, y, z, dx, dy, dz")
+SCHEMA = record(
+    "what a test says about a family of bodies; with --plan, what one will say",
+    optional=tuple("file factors damping scores by_sensor at_bound report plan output".split()),
+    file=FILE,
+    family=words("the family read"),
+    factors=by_name(ratio("factor"), "all parameters; 0 for a candidate, not in the model"),
+    damping=each(ratio("ratio"), "of the lowest elastic modes, the last of all others"),
+    deviations=by_name(ratio("relative"), "standard deviation of each unknown"),
+    scores=by_name(ratio("deviations"), "by which the data ask for what was not updated"),
+    by_sensor=each(ratio("ratio"), "mean squared residual over its expectation"),
+    unseen=each(by_name(ratio("share"), "a direction"), "directions the data do not see"),
+    at_bound=each(words("parameter"), "those at an end of their range"),
+    report=REPORT,
+    plan=record(
+        "channels of a test: point [m] and direction",
+        sensors=each(POINT_KEY, "sensors"),
+        inputs=each(POINT_KEY, "forces"),
+    ),
+    output=OUTPUT,
+)
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Options of the verb."""
+    for part in (_structure, _test, _search, _plan_options):
+        part(parser)
+    parser.add_argument(
+        "-o", "--output", type=Path, help="updated body, .rom.npz; plan, .csv, .uff or .png"
+    )
+    add_force(parser)
+
+
+def _test(parser: argparse.ArgumentParser) -> None:
+    """What was measured."""
+    parser.add_argument("file", type=Path, nargs="?", help="test: .uff, .unv, .csv, .txt or .h5")
+    parser.add_argument("--averages", type=count, help="number of them behind each function")
+    parser.add_argument("--coherence", type=number, help="of all values, where the file has none")
+    parser.add_argument(
+        "--force-noise", type=positive, help="on the signal of a force, over the force itself"
+    )
+    parser.add_argument(
+        "--estimator", choices=("H1", "H2", "Hv"), help="that the functions are, where it matters"
+    )
+    parser.add_argument(
+        "--points", type=Path, help="another file with nodes, and bodies of an assembly"
+    )
+    parser.add_argument("--tolerance", type=positive, help="of points off the body [m]")
+    parser.add_argument(
+        "--picture", type=Path, help="of the points of a test on the body, .png, drawn first"
+    )
+
+
+def _structure(parser: argparse.ArgumentParser) -> None:
+    """What the model is, and what of it is unknown."""
+    parser.add_argument(
+        "--family", metavar="FILE or NAME=FILE", action="append", required=True,
+        help="family file, .rom.npz; of several, repeated, each with a name: an assembly",
+    )  # fmt: skip
+    parser.add_argument(
+        "--couple", metavar="BODY.INTERFACE=BODY.INTERFACE", type=assignment, action="append",
+        default=[], help="of an assembly: they move together; may be repeated",
+    )  # fmt: skip
+    parser.add_argument("--fixed", metavar="NAME,...", type=names, default=(), help="what was held")
+    parser.add_argument(
+        "--free", metavar="NAME,...", type=names,
+        help="unknown parameters (default: all); springs and masses are always",
+    )  # fmt: skip
+    parser.add_argument(
+        "--spring", metavar="NAME=INTERFACE:KX,KY,KZ:LOW:HIGH", type=assignment, action="append",
+        default=[], help=f"between an interface and the ground [N/m, N m/rad], {FACTOR_HELP}",
+    )  # fmt: skip
+    parser.add_argument(
+        "--joint", metavar="NAME=BODY.INTERFACE,BODY.INTERFACE:KX,KY,KZ:LOW:HIGH", type=assignment,
+        action="append", default=[], help=f"between bodies [N/m, N m/rad], {FACTOR_HELP}",
+    )  # fmt: skip
+    parser.add_argument(
+        "--mass", metavar="NAME=INTERFACE:KG:LOW:HIGH", type=assignment, action="append",
+        default=[], help=f"on an interface [kg], {FACTOR_HELP}",
+    )  # fmt: skip
+    parser.add_argument(
+        "--candidate", metavar="NAME,...", type=names, default=(),
+        help="springs and masses that the model has not, tried by their score",
+    )  # fmt: skip
+    parser.add_argument(
+        "--prior", metavar="NAME=DEVIATION", type=assignment, action="append", default=[],
+        help="relative standard deviation of a factor about one, before the test",
+    )  # fmt: skip
+
+
+def _search(parser: argparse.ArgumentParser) -> None:
+    """How the unknowns are sought."""
+    parser.add_argument(
+        "--residual", choices=("responses", "equations", "response-function"), default="responses",
+        help="what is made small: responses (default), equations of motion at the sensors, or what "
+        "the response function method leaves",
+    )  # fmt: skip
+    parser.add_argument(
+        "--rank", type=count, help="of the basis of equations (default: one per mode of the band)"
+    )
+    parser.add_argument(
+        "--beside-poles", metavar="WIDTH", type=positive,
+        help="half bandwidths of the poles within which lines count less",
+    )  # fmt: skip
+    parser.add_argument(
+        "--damping", type=positive, default=0.01, help="to start from (default 1 %%)"
+    )
+
+
+def _plan_options(parser: argparse.ArgumentParser) -> None:
+    """What a test to be should tell."""
+    parser.add_argument(
+        "--plan", metavar="SENSORS,FORCES", type=_two_counts, nargs="?", const=PLAN_SIZE,
+        help="choose so many for a test to be (8,1 where they are left out)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--lines", metavar="LOW:HIGH", type=_range, help="of the test that is planned [Hz]"
+    )
+    parser.add_argument(
+        "--noise", type=positive, default=0.05, help="relative, of what is planned (default 5 %%)"
+    )
+    parser.add_argument(
+        "--floor", type=number,
+        help="noise of what is planned where nothing moves [m/s^2 per N] (default: a thousandth of "
+        "the largest response)",
+    )  # fmt: skip
+
+
+def run(args: argparse.Namespace) -> Answer:
+    """Read, update, judge."""
+    from rom.components.updating.estimate import update
+    from rom.components.updating.family_model import Parts
+    from rom.components.updating.responses.reading import read_responses
+    from rom.io.bodies import save
+
+    if args.plan is not None:
+        return _plan(args)
+    require({"file": args.file}, hint="A test, or --plan for one that is to be made.")
+    family = _family(args)
+    outputs = _outputs(args, family)
+    test = read_responses(
+        args.file, averages=args.averages, coherence=args.coherence, points=args.points,
+        bodies=[name for name in Parts.of(family).bodies if name],
+    )  # fmt: skip
+    if args.picture is not None:
+        from rom.components.updating.pictures import match
+
+        match(family, test, checked(args, args.picture, inputs=_files(args).values()))
+    noise = {"force_noise": args.force_noise, "estimator": args.estimator}
+    test = replace(test, **{name: value for name, value in noise.items() if value is not None})
+    outside = _outside(args, family)
+    if wrong := sorted(set(args.candidate) - set(outside)):
+        raise ConfigError(f"--candidate {wrong[0]} must name a --spring, --joint or --mass.")
+    prior = unique(args.prior, "--prior")
+    prior = {name: typed_number("--prior", text) for name, text in prior.items()}
+    found = update(
+        family, test, free=args.free, fixed=_held(args, family), damping=args.damping,
+        attached={name: part for name, part in outside.items() if name not in args.candidate},
+        candidates={name: outside[name] for name in args.candidate},
+        prior=prior,
+        tolerance=args.tolerance,
+        residual=args.residual,
+        rank=args.rank,
+        beside_poles=args.beside_poles,
+    )  # fmt: skip
+
+    def write() -> None:
+        bodies = {"": found.body} if "" in outputs else found.assembly.bodies
+        for name, path in outputs.items():
+            save(bodies[name], path)
+
+    text = f"{args.file}: {test.H.shape[1]} sensors, {test.H.shape[2]} forces, {len(test.H)} lines"
+    return Answer(
+        _data(args, found), f"{text}\n{found}", write if outputs else None, failures(found.verdict)
+    )
+
+
+def _outputs(args: argparse.Namespace, family: "Family") -> dict[str, Path]:
+    """{name: file} of the bodies that are written; one alone has no name."""
+    from rom.components.updating.family_model import Parts
+
+    if args.output is None:
+        return {}
+    if not args.output.name:
+        raise ConfigError("-o must name a file.")
+    stem, paths = args.output.name.removesuffix(".npz").removesuffix(".rom"), {}
+    for name in Parts.of(family).bodies:
+        path = args.output.with_name(f"{stem}.{name}.rom.npz") if name else args.output
+        paths[name] = checked(args, path, "npz", inputs=_files(args).values())
+    return paths
+
+
+def _files(args: argparse.Namespace) -> dict[str, Path]:
+    """{name: file} of the families; one alone has no name.
+
+    Raises:
+        ConfigError: for several of which one has no name, or two the same.
+    """
+    pairs = []
+    for text in args.family:
+        name, _, file = text.partition("=")
+        pairs.append(("", text) if not file or Path(text).exists() else (name, file))
+    if len(pairs) > 1 and not all(name for name, _ in pairs):
+        given = ", ".join(file for name, file in pairs if not name)
+        raise ConfigError(
+            f"--family {given}: of several each has a name.", hint="Write --family NAME=FILE."
+        )
+    return {name: Path(file) for name, file in unique(pairs, "--family").items()}
+
+
+def _family(args: argparse.Namespace) -> "Family":
+    """The family, or the assembly of several.
+
+    Raises:
+        ConfigError: for a file of one body, or couplings of one family alone.
+    """
+    from rom.components.families.assembled import FamilyAssembly
+    from rom.components.families.family import BodyFamily
+    from rom.io.bodies import load
+
+    families = {name: load(file) for name, file in _files(args).items()}
+    for name, family in families.items():
+        if not isinstance(family, BodyFamily):
+            raise ConfigError(
+                f"{_files(args)[name]} holds one body, without parameters.",
+                hint="Make a family with rom.reduce_parametric and write it with rom.save.",
+            )
+    if "" in families:
+        if args.couple or args.joint:
+            raise ConfigError("--couple and --joint need an assembly of several families.")
+        return families[""]
+    pairs = [
+        (_place("--couple", one, families), _place("--couple", other, families))
+        for one, other in args.couple
+    ]
+    return FamilyAssembly(families, tuple(pairs))
+
+
+def _place(option: str, text: str, bodies: Collection[str]) -> Any:
+    """The interface of a body alone, (body, interface) of an assembly.
+
+    Raises:
+        ConfigError: for a place without its body.
+    """
+    if "" in bodies:
+        return text
+    for name in bodies:
+        if text.startswith(f"{name}."):
+            return name, text.removeprefix(f"{name}.")
+    raise ConfigError(f"{option} {text!r} must be BODY.INTERFACE, of {named(bodies)}.")
+
+
+def _held(args: argparse.Namespace, family: "Family") -> tuple[Any, ...]:
+    """What was held, as the family wants it."""
+    from rom.components.updating.family_model import Parts
+
+    return tuple(_place("--fixed", text, Parts.of(family).bodies) for text in args.fixed)
+
+
+def _plan(args: argparse.Namespace) -> Answer:
+    """Choose the channels of a test.
+
+    Raises:
+        ConfigError: for a test that is there, no lines, or an output of another kind.
+    """
+    import numpy as np
+
+    from rom.components.updating.placement import candidates, place
+    from rom.io.files import write_whole
+
+    if args.file is not None or args.candidate:
+        raise ConfigError("--plan takes neither a test nor --candidate: it comes before the test.")
+    require({"--lines": args.lines}, hint="For example --lines 20:800, from 20 to 800 Hz.")
+    output = args.output and checked(args, args.output)
+    if output:
+        check_ending(output, "a plan", *PLAN_ENDINGS)
+    family = _family(args)
+    held = _held(args, family)
+    offered = candidates(family, PLAN_POINTS, fixed=held)
+    n_sensors, n_inputs = args.plan
+    low, high = args.lines
+    prior = unique(args.prior, "--prior")
+    plan = place(
+        family, offered, offered, np.linspace(low, high, PLAN_LINES), n_sensors=n_sensors,
+        n_inputs=n_inputs, noise=args.noise, floor=args.floor, fixed=held,
+        attached=_outside(args, family), damping=args.damping,
+        prior={name: typed_number("--prior", text) for name, text in prior.items()},
+    )  # fmt: skip
+    channels = (("sensors", plan.sensors), ("inputs", plan.inputs))
+    placed = {
+        name: [[*x, *d] for x, d in zip(np.asarray(c.points).tolist(),
+                                        np.asarray(c.directions).tolist(), strict=True)]
+        for name, c in channels
+    }  # fmt: skip
+    data = {
+        "family": ", ".join(args.family),
+        "plan": placed,
+        "deviations": plan.deviations,
+        "unseen": list(plan.unseen),
+    }
+    if not output:
+        return Answer(data, f"{plan}\n{plan.csv()}")
+    if output.suffix.lower() == ".png":
+        from rom.components.updating.pictures import drawn
+
+        left = ", ".join(f"{name} to {100 * d:.2g} %" for name, d in plan.deviations.items()
+                         if name in family.parameters)  # fmt: skip
+        title, more = "Plan of a vibration test", f"The test will leave deviations: {left}."
+        return Answer(
+            data | {"output": str(output)}, str(plan),
+            lambda: drawn(family, (plan.sensors, plan.inputs), output, title, more),
+        )  # fmt: skip
+    text = plan.uff() if output.suffix.lower() == ".uff" else plan.csv()
+    return Answer(
+        data | {"output": str(output)},
+        str(plan),
+        lambda: write_whole(output, lambda out: out.write(text.encode())),
+    )
+
+
+def _two_counts(text: str) -> tuple[int, int]:
+    parts = text.split(",")
+    if len(parts) != 2:
+        raise argparse.ArgumentTypeError(f"{text!r} is not two whole numbers, as in 8,1")
+    return count(parts[0]), count(parts[1])
+
+
+def _range(text: str) -> tuple[float, float]:
+    parts = text.split(":")
+    if len(parts) != 2:
+        raise argparse.ArgumentTypeError(f"{text!r} is not LOW:HIGH, as in 20:800")
+    low, high = map(positive, parts)
+    if not low < high:
+        raise argparse.ArgumentTypeError(f"{text!r} does not ascend")
+    return low, high
+
+
+def _data(args: argparse.Namespace, found: "Updated") -> dict[str, Any]:
+    deviations = found.deviations
+    data = {
+        "file": str(args.file),
+        "family": ", ".join(args.family),
+        "factors": found.factors,
+        "damping": found.zeta.tolist(),
+        "deviations": deviations,
+        "scores": found.scores,
+        "by_sensor": found.by_sensor.tolist(),
+        "unseen": list(found.unseen),
+        "at_bound": list(found.at_bound),
+        "report": report_data(found.verdict),
+    }
+    return data | ({} if args.output is None else {"output": str(args.output)})
+
+
+def _outside(args: argparse.Namespace, family: "Family") -> "Attached":
+    """Springs, joints and masses by their names.
+
+    Raises:
+        ConfigError: naming the option that is not as it is shown.
+    """
+    from rom.components.updating.family_model import AddedMass, GroundSpring, JointSpring, Parts
+
+    bodies = Parts.of(family).bodies
+    found: dict[str, GroundSpring | JointSpring | AddedMass] = {}
+    for option, several in (("--spring", args.spring), ("--joint", args.joint),
+                            ("--mass", args.mass)):  # fmt: skip
+        for name, text in unique(several, option).items():
+            if name in found:
+                raise ConfigError(f"{option} {name} needs a name of its own.")
+            at, value, low, high = _parts(option, text)
+            places = [_place(option, part, bodies) for part in at.split(",")]
+            if len(places) != (n := 1 + (option == "--joint")):
+                raise ConfigError(f"{option} {text!r} names {len(places)} places, needed are {n}.")
+            numbers = [typed_number(option, part) for part in value.split(",")]
+            if option == "--spring":
+                found[name] = GroundSpring(places[0], numbers, low, high)
+            elif option == "--joint":
+                found[name] = JointSpring(places[0], places[1], numbers, low, high)
+            elif len(numbers) == 1:
+                found[name] = AddedMass(places[0], numbers[0], low, high)
+            else:
+                raise ConfigError(f"{option} {text!r}: a mass must be one number [kg].")
+    return found
+
+
+def _parts(option: str, text: str) -> tuple[str, str, float, float]:
+    parts = text.split(":")
+    if len(parts) != 4:
+        raise ConfigError(f"{option} {text!r} must be written INTERFACE:VALUE:LOW:HIGH.")
+    return parts[0], parts[1], typed_number(option, parts[2]), typed_number(option, parts[3])

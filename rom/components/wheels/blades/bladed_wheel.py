@@ -1,0 +1,351 @@
+"""A disk whose blades are substructures of their own: each with its parameters, or its shape.
+
+The disk alone is cyclic. For each harmonic n it is condensed to the roots of the blades, which move
+by r_j = sum_n exp(i n j alpha) V_n a_n / sqrt(N), and a few waves with all roots held; its matrices
+are diagonal in n, whatever stands on it::
+
+    K_n = V_n^H C_n^H K C_n V_n,    C_n = [I; -K_ii^-1 K_ir]
+
+The blades add their own matrices to the root each of them stands on. Nothing is assumed to be
+small: a blade may be cracked, or another one. At speed disk and blades bring their Coriolis and
+centrifugal matrices, K(Omega) = K + Omega^2 C, in the same coordinates; the roots of all blades are
+pulled outwards as those of the tuned wheel.
+
+Source:
+    Castanier, Ottarsson and Pierre, A reduced order modeling technique for mistuned bladed disks,
+    J. Vibration and Acoustics 119 (1997) 439; Castanier, Tan and Pierre, Characteristic constraint
+    modes for component mode synthesis, AIAA J. 39 (2001) 1182, here of the roots of a wheel.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from scipy.linalg import block_diag, eigh
+
+from rom.arguments import lowest, matrix, one_each, rows_at, typed, vector
+from rom.components.wheels.blades.records import ReducedBlade, SubstructuredSector
+from rom.components.wheels.certificate import wheel_certificate
+from rom.components.wheels.gyroscopic import GyroscopicModes, gyroscopic_modes
+from rom.components.wheels.sector import Complex
+from rom.errors import ConfigError, ModelError
+from rom.model import Array, Modes, Report
+from rom.plausible import check_damping_ratio
+
+RIGID_RTOL = 1e-9  # of the largest squared frequency: what is less negative is a rigid motion
+
+
+@typed
+@dataclass(frozen=True)
+class BladedWheel:
+    """A disk without blades, ready for any set of them.
+
+    Attributes:
+        sector: the sector of the tuned wheel.
+        K: (d, d) stiffness [N/m; 1/s^2] of the disk in c coordinates of the roots, then
+            mass-normalised waves with all roots held.
+        M: (d, d) its mass [kg; 1].
+        roots: (N, r, c) how the roots of the blades move by these coordinates, in units of them.
+        rigid: (c, k) rigid motions of a free wheel, in units of the coordinates; k = 0 if it is
+            held.
+        coriolis: (d, d) Coriolis matrix of the disk per rad/s [kg], or None.
+        centrifugal: (d, d) change of K per (rad/s)^2 [kg]; None at rest.
+    """
+
+    sector: SubstructuredSector
+    K: Array
+    M: Array
+    roots: Array
+    rigid: Array
+    coriolis: Array | None = None
+    centrifugal: Array | None = None
+
+    @cached_property
+    def certificate(self) -> Report:
+        """The wheel of equal blades against the full sector, solved when this is first asked."""
+        nominal = [self.sector.blade] * self.sector.n_sectors
+        return wheel_certificate(self.modes(nominal).frequencies, self.sector.full)
+
+    def matrices(
+        self, blades: Sequence[ReducedBlade], *, speed: float = 0.0
+    ) -> tuple[Array, Array]:
+        """Stiffness and mass of the wheel: disk, then the cantilever modes of all blades.
+
+        Args:
+            blades: N of them, in the order of the sectors.
+            speed: angular speed that stiffens and softens [rad/s].
+
+        Returns:
+            (n, n), (n, n) stiffness [N/m; 1/s^2] and mass [kg; 1].
+
+        Raises:
+            ConfigError: if there is not one blade for each sector, one has another root, or the
+                matrices of rotation are missing.
+        """
+        self._check(blades)
+        K, M = (self._joined(name, blades) for name in ("K", "M"))
+        return (K + speed**2 * self._joined("centrifugal", blades) if speed else K), M
+
+    def coriolis_matrix(self, blades: Sequence[ReducedBlade]) -> Array:
+        """(n, n) skew-symmetric Coriolis matrix per rad/s [kg], in the coordinates of `matrices`.
+
+        Raises:
+            ConfigError: see `matrices`.
+        """
+        self._check(blades)
+        return self._joined("coriolis", blades)
+
+    def _check(self, blades: Sequence[ReducedBlade]) -> None:
+        N, r, _ = self.roots.shape
+        if len(blades) != N or any(blade.n_root != r for blade in blades):
+            raise ConfigError(
+                f"{len(blades)} blades, with {sorted({b.n_root for b in blades})} root "
+                f"coordinates: give {N} with {r}.",
+                hint="Take sector.blade, its varied(…), or rom.reduced_blade(sector, …).",
+            )
+
+    def _joined(self, name: str, blades: Sequence[ReducedBlade]) -> Array:
+        """The matrix of that name of the disk, and those of the blades on their roots."""
+        disk, own = getattr(self, name), [getattr(blade, name) for blade in blades]
+        if disk is None or any(B is None for B in own):
+            place = "disk" if disk is None else f"blade {[B is None for B in own].index(True)}"
+            raise ConfigError(
+                f"the {place} has no matrices of rotation.",
+                hint="Substructure a sector of rom.rotating_sector, and reduce blades on it.",
+            )
+        N, r, c = self.roots.shape
+        d, X = len(disk), self.roots.reshape(N * r, c)
+        each = list(zip(own, self.roots, strict=True))
+        A = block_diag(disk, *(B[r:, r:] for B in own))
+        A[:c, :c] += X.T @ np.vstack([B[:r, :r] @ Y for B, Y in each])
+        A[:c, d:] += np.hstack([Y.T @ B[:r, r:] for B, Y in each])
+        A[d:, :c] += np.vstack([B[r:, :r] @ Y for B, Y in each])
+        return A
+
+    def of_blades(self, blades: Sequence[ReducedBlade], Phi: Array) -> list[Array]:
+        """Root and cantilever coordinates of every blade in k motions of the wheel.
+
+        Args:
+            blades: N of them, in the order of the sectors.
+            Phi: (n, k) motions, in units of the coordinates.
+
+        Returns:
+            (r + m, k) per blade, in units of Phi.
+
+        Raises:
+            ConfigError: if Phi or the blades do not fit the wheel.
+        """
+        self._check(blades)
+        Phi = matrix("Phi", Phi, (len(self.K) + sum(blade.n_modes for blade in blades), None))
+        c = self.roots.shape[2]
+        ends = len(self.K) + np.cumsum([blade.n_modes for blade in blades])
+        return [
+            np.vstack([Y @ Phi[:c], Phi[end - blade.n_modes : end]])
+            for blade, Y, end in zip(blades, self.roots, ends, strict=True)
+        ]
+
+    def modes(
+        self, blades: Sequence[ReducedBlade], n: int | None = None, *, speed: float = 0.0
+    ) -> Modes:
+        """Circular frequencies [rad/s] and mass-normalised modes of the wheel with these blades.
+
+        Args:
+            blades: N of them, in the order of the sectors.
+            n: number of modes, lowest first; None for all.
+            speed: angular speed [rad/s]; Coriolis forces are left out, see `waves`.
+
+        Returns:
+            omega (n,), ascending, rigid motions of a free wheel exactly zero, and Phi with n
+            columns in the coordinates of `matrices`.
+
+        Raises:
+            ConfigError: see `matrices`; for a free wheel at speed.
+            ModelError: if a motion is left without stiffness, by the blades or by the speed.
+        """
+        if speed and not self.sector.supported:
+            raise ConfigError(
+                "a free wheel of different blades has no modes at speed: nothing holds it on its "
+                "axis.",
+                hint="Hold the disk, fixed=(…), or put it on springs, rom.supported_sector.",
+            )
+        K, M = self.matrices(blades, speed=speed)
+        lam, Phi = _apart(K, M, self.rigid)
+        if lam[0] < -RIGID_RTOL * lam[-1] or (speed and lam[0] <= 0.0):
+            raise ModelError(
+                f"at {speed:g} rad/s the wheel with these blades is above its instability: spin "
+                "softening has used up its stiffness."
+                if speed
+                else "these blades leave a motion without stiffness.",
+                hint="Turn more slowly." if speed else "Look for a deviation of -1 or below.",
+            )
+        kept = lowest(n)
+        return Modes(np.sqrt(np.maximum(lam[kept], 0.0)), Phi[:, kept])
+
+    def waves(self, blades: Sequence[ReducedBlade], *, speed: float) -> Modes:
+        """Circular frequencies [rad/s], seen from the wheel, and shapes with Coriolis forces.
+
+        Args:
+            blades: N of them, in the order of the sectors.
+            speed: angular speed [rad/s]; its sign is that of the axis.
+
+        Returns:
+            omega (n,), ascending, and complex Phi (n, n) in the coordinates of `matrices`, which
+            turn with exp(i omega t); of unit modal mass.
+
+        Raises:
+            ConfigError, ModelError: see `modes`.
+        """
+        Phi, motions = self._gyroscopic(blades, speed)
+        omega, q = motions.waves()
+        return Modes(omega, Phi @ q)
+
+    def _gyroscopic(
+        self, blades: Sequence[ReducedBlade], speed: float
+    ) -> tuple[Array, GyroscopicModes]:
+        """Modes at speed, and the motions among them that Coriolis forces leave."""
+        omega, Phi = self.modes(blades, speed=speed)
+        g = speed * (Phi.T @ self.coriolis_matrix(blades) @ Phi)
+        return Phi, gyroscopic_modes(omega, 0.5 * (g - g.T))
+
+    def energies(self, blades: Sequence[ReducedBlade], n: int) -> Array:
+        """(n, N) share of the strain energy of the blades that each of them has [1], lowest modes.
+
+        Raises:
+            ConfigError: if there is not one blade for each sector, or one has another root.
+            ModelError: if a motion has no stiffness.
+        """
+        _, Phi = self.modes(blades)
+        each = np.array([np.einsum("am,ab,bm->m", q, blade.K, q)
+                         for blade, q in zip(blades, self.of_blades(blades, Phi[:, :n]),
+                                             strict=True)])  # fmt: skip
+        return (each / each.sum(axis=0)).T
+
+    def response(
+        self,
+        blades: Sequence[ReducedBlade],
+        force: Any,
+        *,
+        engine_order: int,
+        omega: npt.ArrayLike,
+        damping: float,
+        at: Any,
+        speed: float = 0.0,
+    ) -> Complex:
+        """Answer of all blades to forces that travel around the wheel.
+
+        Blade j feels force * exp(i E j alpha) * exp(i omega t) with the engine order E: for E > 0
+        the wave runs against the rotation, as that of a wheel past struts at rest does. Every mode
+        of the wheel has the same share of critical damping.
+
+        Args:
+            blades: N of them, in the order of the sectors.
+            force: (n,) on the dofs of the model of a blade [N], or a list of N for blades of
+                different models.
+            engine_order: number E of disturbances around the circumference.
+            omega: (w,) circular frequencies [rad/s].
+            damping: share of critical damping of each mode [1].
+            at: (p,) dofs of the model of a blade, or (p, n) rows, whose displacements are wanted;
+                or a list of N of them.
+            speed: angular speed [rad/s], with Coriolis forces.
+
+        Returns:
+            (w, N, p) complex displacements [m], in the axes of each sector.
+
+        Raises:
+            ConfigError: for damping not between 0 and 1, or a force or place off the blades.
+            ModelError: if a motion has no stiffness.
+        """
+        if not 0.0 < damping < 1.0:
+            raise ConfigError(
+                f"damping = {damping!r} must be a positive share of critical damping, below 1."
+            )
+        check_damping_ratio(damping, "the wheel")
+        N, sweep = self.sector.n_sectors, vector("omega", omega)
+        if speed:
+            Phi, motions = self._gyroscopic(blades, speed)
+        else:
+            frequencies, Phi = self.modes(blades)
+        moved = self.of_blades(blades, Phi)
+        forces, rows = _each(force, N), _each(at, N)
+        phase = np.exp(1j * engine_order * self.sector.angle * np.arange(N))
+        load = sum(
+            phase[j] * (q.T @ (blade.Psi.T @ _on(blade, forces[j], j)))
+            for j, (blade, q) in enumerate(zip(blades, moved, strict=True))
+        )
+        if speed:
+            amplitude = motions.response(load, sweep, damping)
+        else:
+            gap = frequencies**2 - sweep[:, None] ** 2
+            amplitude = load / (gap + 2j * damping * sweep[:, None] * frequencies)
+        seen = [_rows(blade, rows[j], j) @ moved[j] for j, blade in enumerate(blades)]
+        return np.stack([amplitude @ row.T for row in seen], axis=1)
+
+    def amplification(
+        self, blades: Sequence[ReducedBlade], force: Any, *, at: Any, **sweep: Any
+    ) -> float:
+        """Largest amplitude of any blade, as a multiple of that of the tuned wheel [1].
+
+        Args:
+            blades: see `response`.
+            force: see `response`; on the tuned wheel the first of a list acts everywhere.
+            at: the amplitude is the norm of these displacements; of a list, as with the force.
+            sweep: engine_order, omega, damping and speed of `response`; the tuned peak is found in
+                the same sweep.
+
+        Raises:
+            ConfigError: as `response`, or if the force does not move the tuned wheel there.
+        """
+        found = self.response(blades, force, at=at, **sweep)
+        alike = [self.sector.blade] * self.sector.n_sectors
+        one, seen = (_each(what, len(alike))[0] for what in (force, at))
+        tuned = self.response(alike, one, at=seen, **sweep)
+        peak, reference = (float(np.linalg.norm(u, axis=-1).max()) for u in (found, tuned))
+        if not reference > 0.0:
+            raise ConfigError("the force does not move the tuned wheel at the dofs wanted.")
+        return peak / reference
+
+
+def _each(what: Any, N: int) -> list[Any]:
+    """One for each blade: a list of arrays, or the same for all.
+
+    Raises:
+        ConfigError: if a list has another length.
+    """
+    if not isinstance(what, list) or not what or np.ndim(what[0]) == 0:
+        return [what] * N
+    one_each("forces or places", len(what), "blades", N)
+    return what
+
+
+def _on(blade: ReducedBlade, force: npt.ArrayLike, j: int) -> Array:
+    f = np.asarray(force)
+    one_each(f"forces on blade {j}", f.shape, "dofs of its model", (blade.Psi.shape[0],))
+    off = np.flatnonzero((f != 0.0) & ~blade.Psi.any(axis=1))
+    if off.size:
+        raise ConfigError(f"the force on blade {j} must be zero on {off.size} dofs of the disk.")
+    return f
+
+
+def _rows(blade: ReducedBlade, at: npt.ArrayLike, j: int) -> Array:
+    """(p, r + m) displacements wanted of the coordinates of a blade."""
+    found = rows_at("at", at, blade.Psi)
+    if not found.any(axis=1).all():
+        raise ConfigError(f"some displacements wanted are not those of blade {j}.")
+    return found
+
+
+def _apart(K: Array, M: Array, rigid: Array) -> tuple[Array, Array]:
+    """Squared frequencies and modes, rigid motions first and exact."""
+    n, k = len(K), rigid.shape[1]
+    if k == 0:
+        lam, Phi = eigh(K, M)
+        return lam, Phi
+    R = np.zeros((n, k))
+    R[: len(rigid)] = rigid
+    R = np.linalg.solve(np.linalg.cholesky(R.T @ M @ R), R.T).T
+    Z = np.linalg.qr(M @ R, mode="complete")[0][:, k:]
+    lam, V = eigh(Z.T @ K @ Z, Z.T @ M @ Z)
+    return np.r_[np.zeros(k), lam], np.hstack([R, Z @ V])

@@ -1,0 +1,218 @@
+"""Component mode synthesis of one sector, good for all nodal diameters at once."""
+
+from dataclasses import dataclass, fields
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from scipy.sparse import csr_matrix, identity
+from scipy.spatial import cKDTree
+
+from rom.arguments import typed
+from rom.components.wheels.certificate import sector_certificate
+from rom.components.wheels.sector import Complex, CyclicSector
+from rom.eigen.verbs import DEPENDENT_RTOL, every_row, orthonormal_in, own_rows
+from rom.errors import ConfigError, InterfaceError
+from rom.model import Array, Interface, Report
+from rom.reduction.bases.method import CraigBampton
+from rom.reduction.interfaces.polynomial import FourierLegendre, Polynomial
+
+CYCLIC_FACES = "cyclic"  # what the faces are called where sectors of a wheel meet
+
+
+@dataclass(frozen=True)
+class ReducedSector(CyclicSector):
+    """A sector in a few coordinates: those of its two faces, then fixed-interface modes.
+
+    Attributes:
+        Psi: (n_full, r) displacement shapes of the full sector [1; kg^-1/2].
+        full: the full sector.
+        omega: (m,) circular frequencies of the fixed-interface modes [rad/s].
+    """
+
+    Psi: Array | None = None
+    full: CyclicSector | None = None
+    omega: Array | None = None
+
+    @property
+    def supported(self) -> bool:
+        """True when something of the full sector is held."""
+        return self.full.supported
+
+    @cached_property
+    def certificate(self) -> Report:
+        """Frequencies against the full sector, which is solved when this is first asked for."""
+        return sector_certificate(self, self.full)
+
+    def expand(self, shapes: Complex) -> Complex:
+        """(n_full, m) displacements of the full sector, in units of the shapes (r, m) given."""
+        return self.Psi @ shapes
+
+    def on_wheel(self, shapes: Complex, diameter: int, phase: float = 0.0) -> Array:
+        """(N, n_full, m) real displacements of the full sectors, see `CyclicSector.on_wheel`."""
+        return self.full.on_wheel(self.expand(shapes), diameter, phase)
+
+
+@typed
+def reduce_sector(
+    sector: CyclicSector,
+    *,
+    n_modes: int | None = None,
+    functions: Polynomial | FourierLegendre | None = None,
+    method: CraigBampton | None = None,
+) -> ReducedSector:
+    """Craig-Bampton reduction of a sector with a-priori functions on its cyclic faces.
+
+    The faces follow u_master = (Q (x) I) a and u_slave = C (Q (x) I) b with functions Q that are
+    chosen before anything is solved; both faces take the same, so that sectors stay joined exactly
+    and a and b are again dofs of a sector whose faces match. Frequencies are never below those of
+    the full sector.
+
+    Args:
+        sector: the full sector, made by `CyclicSector.from_model`.
+        n_modes: number of fixed-interface modes; or `method`.
+        functions: on the cyclic faces; `Polynomial` of order 4 unless given. Where the face is
+            held they fall to zero, see `fading`. Order 7 with 60 modes brings the ten lowest
+            frequencies of each nodal diameter of a bladed disk within 0.1 %.
+        method: ``CraigBampton(n_modes)`` instead of the number.
+
+    Returns:
+        ReducedSector; `cyclic_modes` and the other functions take it like any sector.
+
+    Raises:
+        ConfigError: if the sector has no geometry of its faces, or cannot have so many modes.
+        InterfaceError: if the functions cannot move the face.
+
+    Source:
+        Carassale and Maurici, Interface reduction in Craig-Bampton component mode synthesis by
+        orthogonal polynomial series, J. Eng. Gas Turbines Power 140 (2018); on cyclic faces ours.
+    """
+    if method is not None:
+        if n_modes is not None or not _by_number(method):
+            raise ConfigError(
+                f"a sector is reduced by a number of fixed-interface modes, not by {method!r}.",
+                hint="Write n_modes=60, or method=rom.CraigBampton(n_modes=60).",
+            )
+        n_modes = method.n_modes
+    if n_modes is None:
+        raise ConfigError("the number of fixed-interface modes is needed, for example n_modes=60.")
+    if sector.face is None:
+        raise ConfigError(
+            "interface functions need the geometry of the cyclic faces.",
+            hint="Make the sector with rom.CyclicSector.from_model.",
+        )
+    Q = face_functions(sector, functions or Polynomial(4))
+    W = np.kron(Q, np.eye(3))
+    q = W.shape[1]
+    E = np.zeros((sector.n, 2 * q))
+    E[sector.master, :q] = W
+    E[sector.slave, q:] = sector.coupling @ W
+    E[sector.held] = 0.0
+    ops = sector.workers.operators(sector.K, sector.M, together=True)
+    inner = ops.hold(np.union1d(np.union1d(sector.slave, sector.master), sector.held))
+    omega, Phi = ops.modes(inner, n_modes)  # then solutions with the same factor
+    E = own_rows(ops, E)
+    Psi = every_row(ops, np.hstack([E - inner(ops.apply_K(E)), Phi]))
+    return projected(sector, Psi, q, omega)
+
+
+def reduced_by(
+    sector: CyclicSector, method: Any, interfaces: dict[str, Any], *, of_bodies: bool
+) -> ReducedSector:
+    """A sector by what is given to `rom.reduce`: a method and the functions on its cyclic faces."""
+    if of_bodies:
+        raise ConfigError(
+            "reference, damping, stress, stiffening and nonlinear belong to bodies in motion; a "
+            "sector has none of them.",
+            hint="Give a sector the matrices of its rotation by rom.rotating_sector.",
+        )
+    if set(interfaces) - {CYCLIC_FACES}:
+        raise ConfigError(
+            f"a sector has one interface, {CYCLIC_FACES!r}, not {sorted(interfaces)}.",
+            hint=f"Write interfaces={{{CYCLIC_FACES!r}: rom.Polynomial(4)}}.",
+        )
+    return reduce_sector(sector, method=method, functions=interfaces.get(CYCLIC_FACES))
+
+
+def _by_number(method: Any) -> bool:
+    return isinstance(method, CraigBampton) and method.n_modes is not None
+
+
+def projected(sector: CyclicSector, Psi: Array, q: int, omega: Array) -> ReducedSector:
+    """The sector in the coordinates of Psi, the first q of them one face, the next q the other."""
+
+    def small(A: Any) -> csr_matrix:
+        return None if A is None else csr_matrix(Psi.T @ (A @ Psi))
+
+    K, M = (0.5 * (A + A.T) for A in (small(sector.K), small(sector.M)))
+    kept = {f.name: getattr(sector, f.name) for f in fields(CyclicSector)}
+    motions = None
+    if sector.motions is not None:
+        motions = np.linalg.solve(M.toarray(), Psi.T @ (sector.M @ sector.motions))
+    return ReducedSector(
+        **kept
+        | {
+            "K": K,
+            "M": M,
+            "slave": np.arange(q, 2 * q),
+            "master": np.arange(q),
+            "coupling": identity(q, format="csr"),
+            "held": np.zeros(0, dtype=np.int64),
+            "points": None,
+            "motions": motions,
+            "coriolis": small(sector.coriolis),
+            "centrifugal": small(sector.centrifugal),
+            "regions": {name: small(A) for name, A in sector.regions.items()},
+            "face": None,
+        },
+        Psi=Psi,
+        full=sector,
+        omega=omega,
+    )
+
+
+def face_functions(sector: CyclicSector, functions: Polynomial | FourierLegendre) -> Array:
+    """(k, m) functions on the leading face, orthonormal over its area, zero where it is held.
+
+    Raises:
+        InterfaceError: if all of the face is held.
+    """
+    face: Interface = sector.face
+    V, S = functions.functions(face), face.surface_mass
+    at_rest = np.isin(face.dofs[::3], sector.held)
+    if at_rest.all():
+        raise InterfaceError(
+            f"all nodes of the cyclic face {face.name!r} are held.",
+            hint="Hold another interface; of this face nothing is left to reduce.",
+        )
+    if at_rest.any():
+        V = V * fading(face, at_rest)[:, None]
+    norms = np.sqrt(np.einsum("km,km->m", V, S @ V))
+    return orthonormal_in(S, V[:, norms > DEPENDENT_RTOL * norms.max()])
+
+
+def fading(face: Interface, at_rest: npt.NDArray[np.bool_]) -> Array:
+    """(k,) factor d / (d + l) that grows from 0 at what is held to 1, d the distance from it [m].
+
+    What a clamped edge disturbs dies out within the thickness of the face (Saint-Venant); l is
+    half of it. Polynomials times d alone need high orders to rise as steeply as the motion does.
+    """
+    d = distance(face.points, face.points[at_rest])
+    weights = np.asarray(face.surface_mass.sum(axis=1)).ravel() / face.area
+    x = face.points - weights @ face.points
+    across = np.linalg.eigvalsh((weights[:, None] * x).T @ x)[1]  # of a strip, thickness^2 / 12
+    return d / (d + np.sqrt(3 * across))
+
+
+def distance(points: Array, line: Array) -> Array:
+    """(k,) distance from the segments between neighbours among scattered nodes of a line."""
+    near = cKDTree(line).query(points, list(range(1, min(3, len(line)) + 1)))[1]
+    first = line[near[:, 0]]
+    arm, found = points - first, np.linalg.norm(points - first, axis=1)
+    for other in near.T[1:]:
+        edge = line[other] - first
+        share = np.einsum("ka,ka->k", arm, edge) / np.einsum("ka,ka->k", edge, edge)
+        beside = arm - np.clip(share, 0.0, 1.0)[:, None] * edge
+        found = np.minimum(found, np.linalg.norm(beside, axis=1))
+    return found

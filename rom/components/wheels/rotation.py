@@ -1,0 +1,165 @@
+"""What rotation does to a sector: stress that stiffens, spin that softens, Coriolis forces.
+
+In axes that turn with the wheel, small vibrations about its steady state obey::
+
+    M u'' + Omega G u' + (K + Omega^2 C) u = f,    G = 2 M (I (x) S),    C = K_geo - M (I (x) P)
+
+with S = skew(e) of the axis e, P = I - e e^T, and K_geo the geometric stiffness of the stress that
+centrifugal force leaves at one rad/s. Coriolis and softening matrices follow from the mass matrix
+alone, because equal functions interpolate all three directions.
+"""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from scipy.linalg import LinAlgError, eigh, qr
+from scipy.sparse import csr_matrix, identity, kron
+from scipy.sparse.linalg import LinearOperator, eigsh, splu
+
+from rom.arguments import typed
+from rom.components.wheels.sector import NO_DOFS, CyclicSector
+from rom.eigen.search import MAX_DENSE_DOFS
+from rom.eigen.workers import held_solution
+from rom.errors import ConfigError, ModelError
+from rom.model import Array, FEModel, Index
+from rom.rotation import skew
+
+EIGENVECTOR_RTOL = 1e-7  # residual of eigenvectors; the error of separate eigenvalues is its square
+NONE_POSITIVE = 1e-4  # of the largest size: round-off of solutions with slender solids
+
+
+@typed
+def rotating_sector(sector: CyclicSector, model: FEModel) -> CyclicSector:
+    """The sector with the matrices of its rotation, for all speeds.
+
+    The wheel turns about the axis of the sector; its centrifugal stress is that of the linear
+    solid, and grows with the square of the speed.
+
+    Args:
+        sector: made from the model by `CyclicSector.from_model`.
+        model: the finite elements.
+
+    Raises:
+        ConfigError: if the model has no finite elements, or carries attachments.
+
+    Source:
+        Friswell, Penny, Garvey and Lees, Dynamics of Rotating Machines (2010); see
+        docs/theory/rotating_solids.md.
+    """
+    if model.stresses is None:
+        raise ConfigError(
+            "the model has no finite elements, from which alone geometric stiffness follows.",
+            hint="Make it with rom.fe.model.",
+        )
+    if model.attachments:
+        raise ConfigError(
+            f"the model carries {len(model.attachments)} attachments, whose rotation is not known.",
+            hint="Mesh them as a region of their own density.",
+        )
+    K_geo = model.stresses.prestress(centrifugal_displacement(sector))
+    coriolis, softening = rotation_matrices(sector.M, sector.axis)
+    return replace(sector, coriolis=coriolis, centrifugal=csr_matrix(K_geo - softening))
+
+
+def rotation_matrices(M: Any, axis: Array) -> tuple[csr_matrix, csr_matrix]:
+    """Coriolis matrix per rad/s and softening M (I (x) P) per (rad/s)^2, (n, n) each [kg].
+
+    Args:
+        M: (n, n) mass of a solid, the same for all directions [kg].
+        axis: (3,) unit vector [1].
+
+    Source:
+        See docs/theory/rotating_solids.md for G and the softening.
+    """
+    nodes = identity(M.shape[0] // 3)
+    turn, across = skew(axis), np.eye(3) - np.outer(axis, axis)
+    G, P = (csr_matrix(M @ kron(nodes, A, format="csr")) for A in (turn, across))
+    return csr_matrix(G - G.T), 0.5 * (P + P.T)
+
+
+def centrifugal_displacement(sector: CyclicSector) -> Array:
+    """(n,) displacement of the sector in a wheel that turns at 1 rad/s [m].
+
+    Raises:
+        ConfigError: if the matrices of the sector do not fit each other.
+
+    Source:
+        See docs/theory/rotating_solids.md for the linear solid in steady rotation.
+    """
+    T = sector.harmonic(0)
+    load = sector.M @ arms(sector, sector.points).ravel()
+    return T @ held_solution(sector.workers, (T.T @ sector.K @ T, T.T @ sector.M @ T),
+                             axial_pins(sector), T.T @ load)  # fmt: skip
+
+
+def arms(sector: CyclicSector, points: Array) -> Array:
+    """(k, 3) vectors from the axis of rotation to points, across it [m]."""
+    x = points - sector.at
+    return x - np.outer(x @ sector.axis, sector.axis)
+
+
+def axial_pins(sector: CyclicSector) -> Index:
+    """Independent dofs that keep a free wheel from moving along its axis and turning about it.
+
+    Loads that are the same in all sectors and balance each other leave them without force.
+    """
+    rigid = sector.rigid(0)[sector.free].real
+    if not rigid.shape[1]:
+        return NO_DOFS
+    scaled = rigid / np.linalg.norm(rigid, axis=0)
+    return np.sort(qr(scaled.T, mode="r", pivoting=True)[1][: rigid.shape[1]]).astype(np.int64)
+
+
+def divergence_speed(sector: CyclicSector, diameter: int) -> float:
+    """Speed [rad/s] at which rotation has used up the stiffness; infinite if it never does.
+
+    The smallest Omega with a singular K + Omega^2 C, Coriolis forces left out.
+
+    Args:
+        sector: a supported sector with matrices of rotation.
+        diameter: number of nodal diameters.
+
+    Raises:
+        ModelError: if nothing holds the wheel even at rest.
+
+    Source:
+        See docs/theory/rotating_solids.md for the matrices of rotation.
+    """
+    T = sector.harmonic(sector.checked(diameter))
+    H = T.conj().T
+    most = largest_ratio(csr_matrix(-(H @ sector.centrifugal @ T)), csr_matrix(H @ sector.K @ T))
+    return float(1 / np.sqrt(most)) if most > 0 else np.inf
+
+
+def largest_ratio(C: csr_matrix, K: csr_matrix) -> float:
+    """Largest eigenvalue mu of C x = mu K x, zero if none is positive.
+
+    Args:
+        C: (n, n) symmetric or Hermitian.
+        K: (n, n) the same, positive definite.
+
+    Raises:
+        ModelError: if K is not.
+    """
+    if K.shape[0] <= MAX_DENSE_DOFS:
+        return max(_largest(C.toarray(), K.toarray()), 0.0)
+    inverse = LinearOperator(K.shape, matvec=splu(K.tocsc()).solve, dtype=K.dtype)
+    start = np.sin(1.0 + np.arange(K.shape[0])).astype(K.dtype)
+    how = {"Minv": inverse, "v0": start, "return_eigenvectors": False}
+    size = float(abs(eigsh(C, 1, K, which="LM", tol=0.1, **how)[0]))
+    if size == 0.0:
+        return 0.0
+    # where none is positive they crowd at zero, which has no relative accuracy; one has
+    most = float(eigsh(C / size + K, 1, K, which="LA", tol=EIGENVECTOR_RTOL, **how)[0]) - 1.0
+    return most * size if most > NONE_POSITIVE else 0.0
+
+
+def _largest(C: Array, K: Array) -> float:
+    try:
+        return float(eigh(C, K, eigvals_only=True)[-1])
+    except LinAlgError as error:
+        raise ModelError(
+            "nothing holds the wheel, even at rest.",
+            hint="Hold the hub by fixed=, or put it on springs by rom.supported_sector.",
+        ) from error

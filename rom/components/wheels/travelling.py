@@ -1,0 +1,196 @@
+"""Waves that travel around a rotating wheel, with Coriolis forces."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import eig
+from scipy.sparse import csc_matrix, csr_matrix
+from scipy.sparse.linalg import LinearOperator, eigs, splu
+
+from rom.arguments import typed, whole
+from rom.components.wheels.modes import real_form, spinning
+from rom.components.wheels.sector import Complex, CyclicSector
+from rom.eigen.scipy import negative_count
+from rom.eigen.verbs import count_shift
+from rom.errors import ConfigError, ModelError, ModesMissedError
+from rom.model import Array, Modes
+
+GROWTH_RATE_RTOL = 1e-4  # growth rate of an unstable motion, of the largest frequency found
+RIGID_RTOL = 0.01  # of the speed: distance of a rigid motion's frequency from zero or the speed
+N_SPARE_WAVES = 4  # beyond those asked for
+MAX_DENSE_DOFS = 40  # all waves are computed at once up to here
+
+
+@typed
+@dataclass(frozen=True, kw_only=True)
+class TravellingModes(Modes):
+    """Waves with the same number of nodal diameters on a wheel that turns steadily.
+
+    Seen from the wheel; an observer at rest sees ``frequencies`` changed by the turning pattern,
+    see `at_rest`.
+
+    Attributes:
+        omega: (m,) circular frequencies seen from the wheel [rad/s], ascending.
+        shapes: (n, m) complex displacements of sector 0 at the time 0, u_j = exp(i n j alpha) u_0;
+            they turn with exp(-i omega t) in forward and exp(i omega t) in all other waves.
+        sector: the sector.
+        diameter: number n of nodal diameters.
+        speed: angular speed Omega [rad/s].
+        direction: (m,) [1] +1 for waves that run ahead with the rotation, -1 against it, 0 where a
+            wave stands: n = 0 and N / 2.
+    """
+
+    sector: CyclicSector
+    diameter: int
+    speed: float
+    direction: Array
+
+    @property
+    def forward(self) -> Array:
+        """(k,) frequencies of the waves that run ahead, seen from the wheel [Hz]."""
+        return self.frequencies[self.direction > 0]
+
+    @property
+    def backward(self) -> Array:
+        """(k,) frequencies of the waves that run back, seen from the wheel [Hz]."""
+        return self.frequencies[self.direction < 0]
+
+    @property
+    def at_rest(self) -> Array:
+        """(m,) frequencies seen by an observer at rest [Hz]: f + n Omega, or f - n Omega.
+
+        A negative one runs ahead more slowly than the wheel turns: it moves forward in space.
+        """
+        turns = self.diameter * self.speed / (2 * np.pi)
+        return self.frequencies + turns * self.direction
+
+
+@typed
+def travelling_modes(
+    sector: CyclicSector, diameter: int, n: int, *, speed: float
+) -> TravellingModes:
+    """Lowest waves of a rotating wheel, forward and backward, with Coriolis forces.
+
+    Args:
+        sector: with matrices of rotation, see `rom.rotating_sector`; full or reduced.
+        diameter: number of nodal diameters, 0 to N / 2.
+        n: number of waves, counting both directions.
+        speed: angular speed [rad/s], not zero; its sign is that of the axis.
+
+    Raises:
+        ConfigError: if the wheel cannot have the diameters, or has no matrices of rotation.
+        ModelError: if a motion grows: the speed is above that of an instability.
+        ModesMissedError: if the inertia count of a supported wheel says that a wave was skipped.
+
+    Source:
+        Bryan, On the beats in the vibrations of a revolving cylinder or bell, Proc. Cambridge
+        Phil. Soc. 7 (1890) 101; see docs/theory/rotating_solids.md.
+    """
+    K = spinning(sector, speed)
+    T = sector.harmonic(sector.checked(diameter))
+    if speed == 0.0 or not np.isfinite(speed):
+        raise ConfigError(f"speed = {speed!r}; give one in rad/s, at rest use cyclic_modes.")
+    standing = sector.standing(diameter)
+    n = whole("n", n, 1, T.shape[1] if standing else 2 * T.shape[1])
+    wanted = 2 * n if standing else n
+    H = T.conj().T
+    M, G, K = (csr_matrix(H @ A @ T) for A in (sector.M, speed * sector.coriolis, K))
+    lam, U = _lowest(M, G, K, wanted, 0.0 if sector.supported else 0.3 * abs(speed))
+    _refuse_growth(lam if sector.supported else _elastic(lam, speed), diameter, speed)
+    if sector.supported and lam.size > wanted:
+        _verify(M, G, K, lam, U, wanted)
+    keep = np.arange(wanted) if not standing else np.flatnonzero(lam.imag > 0)[:n]
+    lam, U = lam[keep], U[:, keep]
+    ahead = np.zeros(lam.size) if standing else -np.sign(lam.imag) * np.sign(speed)
+    size = np.sqrt(np.einsum("fm,fm->m", U.conj(), M @ U).real)
+    return TravellingModes(
+        abs(lam.imag),
+        T @ (U / size),
+        sector=sector,
+        diameter=diameter,
+        speed=abs(speed),
+        direction=ahead,
+    )
+
+
+def _lowest(
+    M: csr_matrix, G: csr_matrix, K: csr_matrix, m: int, shift: float
+) -> tuple[Complex, Complex]:
+    """Eigenvalues of lam^2 M + lam G + K nearest to the shift, and some more, by size.
+
+    With lam = shift + mu, 1 / mu is an eigenvalue of the inverse of the companion matrix, which
+    costs one solution with K + shift G + shift^2 M.
+    """
+    f = K.shape[0]
+    D = csr_matrix(G + 2 * shift * M)
+    try:
+        solve = splu(csc_matrix(K + shift * G + shift**2 * M, dtype=complex)).solve
+    except RuntimeError as error:
+        raise ModelError(
+            "rotation has used up the stiffness of the wheel exactly.",
+            hint="Take another speed, below that of divergence_speed.",
+        ) from error
+
+    def inverse(y: Complex) -> Complex:
+        a, b = y[:f].ravel(), y[f:].ravel()
+        return np.concatenate([-solve(M @ b + D @ a), a])
+
+    if f <= MAX_DENSE_DOFS or m + N_SPARE_WAVES >= 2 * f - 1:
+        columns = [inverse(e) for e in np.eye(2 * f, dtype=complex)]
+        mu, V = eig(np.array(columns).T)
+    else:
+        operator = LinearOperator((2 * f, 2 * f), matvec=inverse, dtype=complex)
+        start = np.exp(1j * np.arange(2 * f))
+        mu, V = eigs(
+            operator, m + N_SPARE_WAVES, v0=start, tol=0.0, ncv=max(2 * (m + N_SPARE_WAVES) + 1, 20)
+        )
+    lam = shift + 1 / mu
+    order = np.argsort(abs(lam))
+    return lam[order], V[:f, order]
+
+
+def _elastic(lam: Complex, speed: float) -> Complex:
+    """Without motions of a free wheel as a whole: double roots, of which round-off makes growth.
+
+    Whoever floats along in a straight line is seen from the wheel to circle at its speed.
+    """
+    rigid = np.minimum(abs(lam), abs(abs(lam) - abs(speed))) < RIGID_RTOL * abs(speed)
+    return lam[~rigid]
+
+
+def _refuse_growth(lam: Complex, diameter: int, speed: float) -> None:
+    growth = lam.real.max(initial=0.0)
+    if growth > GROWTH_RATE_RTOL * abs(lam).max(initial=0.0):
+        worst = lam[lam.real.argmax()]
+        raise ModelError(
+            f"at {speed:g} rad/s a motion with {diameter} nodal diameters grows by "
+            f"{growth:.3g} 1/s at {abs(worst.imag) / (2 * np.pi):.4g} Hz: the speed is above that "
+            "of an instability.",
+            hint="rom.cyclic.divergence_speed tells where stiffness is used up.",
+        )
+
+
+def _verify(M: csr_matrix, G: csr_matrix, K: csr_matrix, lam: Complex, U: Complex, m: int) -> None:
+    """Waves below a frequency: the inertia of L(w) = K - w^2 M + i w G, for both directions.
+
+    An eigenvalue of L falls through zero at each wave; it rises through zero where a wave that the
+    rotation carries along seems to run back, as all do that are slower than the wheel turns. The
+    softening has then made K indefinite, and the count begins there.
+    """
+    count, square = count_shift(abs(lam) ** 2, m)
+    w = np.sqrt(square)
+    start = negative_count(csc_matrix(real_form(K))) // 2
+    U, lam = U[:, :count], lam[:count]
+    inertia = np.einsum("fm,fm->m", U.conj(), M @ U).real
+    coriolis = np.einsum("fm,fm->m", U.conj(), G @ U).imag
+    for sign in (1, -1):
+        here = np.sign(lam.imag) == sign
+        falls = np.sign(2 * abs(lam.imag) * inertia + sign * coriolis)[here]
+        A = csr_matrix(K - square * M + 1j * sign * w * G)
+        true = negative_count(csc_matrix(real_form(A))) // 2
+        if true != start + falls.sum():
+            raise ModesMissedError(
+                f"{falls.size} waves of one direction were found below {w / (2 * np.pi):.6g} Hz, "
+                f"which does not agree with the inertia of the system, {true} from {start} on.",
+                hint="Ask for more waves.",
+            )

@@ -1,9 +1,0 @@
-from rom.cyclic.blades.blade import ROOT_MATCH_RTOL as ROOT_MATCH_RTOL
-from rom.cyclic.blades.blade import SHARED_STIFFNESS_RTOL as SHARED_STIFFNESS_RTOL
-from rom.cyclic.blades.blade import blade_in as blade_in
-from rom.cyclic.blades.blade import cut as cut
-from rom.cyclic.blades.blade import reduced_blade as reduced_blade
-from rom.cyclic.blades.blade import root_of as root_of
-from rom.cyclic.blades.blade import stresses_of as stresses_of
-from rom.cyclic.blades.blade import turning as turning
-from rom.cyclic.blades.records import ReducedBlade as ReducedBlade

@@ -1,0 +1,335 @@
+"""The verb update: what it prints is what `rom.update` finds, and the body it writes is updated."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import rom
+from cases.files.schema import errors
+from cases.long import ROM_LONG
+from cases.solid import STEEL, composite
+from rom.cli.main import main
+from rom.cli.schemas import schema
+from rom.components.updating.family_model import Parts, family_model
+from rom.components.updating.frf_data import noisy
+from rom.components.updating.normal_equations import responses_at
+from rom.parametric import FamilyAssembly
+from rom.updating import (
+    AddedMass,
+    Channels,
+    GroundSpring,
+    JointSpring,
+    Responses,
+    candidates,
+    place,
+)
+
+pytestmark = pytest.mark.once  # the environment without FEniCSx has no h5py
+SIZE, CELLS = (1.0, 0.1, 0.08), (8, 1, 1)
+PARAMETERS = {name: rom.YoungsModulus(name, 0.4, 2.5) for name in ("inner", "outer")}
+TRUE = {"inner": 1.3, "outer": 0.8}
+SPRING = GroundSpring("tip", (0.0, 2e5, 3e5), 0.1, 10.0)
+MASS = AddedMass("tip", 0.4, 0.1, 10.0)
+WORDS = ["--family", "family.rom.npz", "--fixed", "root", "--damping", "0.02"]
+ATTACHED = ["--spring", "soil=tip:0,2e5,3e5:0.1:10", "--mass", "cable=tip:0.4:0.1:10"]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A family, two tests of it as HDF5, one with a sensor at the force, and a body alone."""
+    pytest.importorskip("h5py", reason="h5py is not installed")
+    path = tmp_path_factory.mktemp("update")
+    part = composite(
+        dict.fromkeys(TRUE, STEEL), lambda c: "inner" if c[0] < 4 else "outer", SIZE, CELLS
+    )
+    family = rom.reduce_parametric(
+        part, parameters=PARAMETERS, method=rom.CraigBampton(8),
+        interfaces={"root": "rbe2", "tip": "rbe2"}, certify=False,
+    )  # fmt: skip
+    rom.save(family, path / "family.rom.npz")
+    rom.save(family.body, path / "body.rom.npz")
+    points = [[x, y, 0.08] for x in (0.5, 0.75, 1.0) for y in (0.0, 0.1)]
+    sensors = Channels(np.repeat(points, 2, axis=0), np.tile([[0, 1, 0], [0, 0, 1]], (6, 1)))
+    true = family.at(**TRUE)
+    omega, Phi = true.modes(fixed=("root",))
+    f = np.linspace(20, 900, 80)
+    w = 2 * np.pi * f[:, None]
+    own = np.delete(np.arange(12), 10)  # of two along y on the rigid face of the tip one is enough
+    independent = Channels(sensors.points[own], sensors.directions[own])
+    for name, seeing, force in (
+        ("test.h5", sensors, Channels([[0.75, 0.1, 0.0]], [[0, 1, 2]])),
+        ("driven.h5", independent, Channels(sensors.points[7], sensors.directions[7])),
+    ):
+        seen, driven = (c.rows(true, "sensor") @ Phi for c in (seeing, force))
+        H = np.einsum("sn,fn,en->fse", seen, 1 / (omega**2 - w**2 + 0.04j * w * omega), driven)
+        H = noisy(H, np.sqrt(2) * 0.02, np.random.default_rng(2))
+        test = Responses(f, H, seeing, force, 1 / (1 + 2 * 50 * 0.02**2), 50)
+        rom.io.write_responses(test, path / name)
+    return path
+
+
+@pytest.fixture(autouse=True)
+def there(folder, monkeypatch):
+    monkeypatch.chdir(folder)
+
+
+def answered(words, capsys, code=0, file="test.h5"):
+    capsys.readouterr()
+    assert main(["update", file, *WORDS, *words, "--json"]) == code
+    found = json.loads(capsys.readouterr().out)
+    assert errors(found, schema("update")) == []
+    return found
+
+
+def test_the_verb_finds_what_the_function_finds_and_writes_the_body(capsys):
+    found = answered(["-o", "updated.rom.npz"], capsys)
+    family, test = rom.load("family.rom.npz"), rom.io.read_responses("test.h5")
+    same = rom.update(family, test, fixed=("root",), damping=0.02)
+    assert found["factors"] == same.factors and found["deviations"] == same.deviations
+    assert found["report"]["ok"] and "failed" not in found
+    for name, value in TRUE.items():
+        assert abs(np.log(found["factors"][name] / value)) < 4 * found["deviations"][name]
+    body = rom.load("updated.rom.npz")
+    assert_allclose(body.modes(4).omega, family.at(**same.factors).modes(4).omega, rtol=1e-12)
+    told = body.provenance["updating"]
+    assert told["deviations"] == same.deviations and told["verdict holds"] is True
+    assert told["lines"] == 80 and told["sensors"] == 12
+
+
+def test_noise_of_forces_is_taken(capsys):
+    found = answered(["--force-noise", "0.03", "--estimator", "H1"], capsys)
+    test = replace(rom.io.read_responses("test.h5"), force_noise=0.03, estimator="H1")
+    same = rom.update(rom.load("family.rom.npz"), test, fixed=("root",), damping=0.02)
+    assert found["factors"] == same.factors and found["deviations"] == same.deviations
+
+
+def test_springs_masses_candidates_and_priors_are_taken(capsys):
+    found = answered([*ATTACHED, "--candidate", "cable", "--free", "inner",
+                      "--prior", "inner=0.5"], capsys, code=5)  # fmt: skip
+    same = rom.update(
+        rom.load("family.rom.npz"), rom.io.read_responses("test.h5"), fixed=("root",),
+        free=("inner",), attached={"soil": SPRING}, candidates={"cable": MASS},
+        prior={"inner": 0.5}, damping=0.02,
+    )  # fmt: skip
+    assert found["factors"] == same.factors and found["scores"] == same.scores
+    assert set(found["scores"]) == {"outer", "cable"} and found["failed"]
+
+
+def test_equations_are_taken_with_their_rank_and_a_prior(capsys):
+    words = ["--residual", "equations", "--rank", "7", "--prior", "inner=0.01"]
+    found = answered(words, capsys, code=5, file="driven.h5")
+    same = rom.update(
+        rom.load("family.rom.npz"), rom.io.read_responses("driven.h5"), fixed=("root",),
+        damping=0.02, residual="equations", rank=7, prior={"inner": 0.01},
+    )  # fmt: skip
+    assert found["factors"] == same.factors and found["deviations"] == same.deviations
+    free = answered(words[:4], capsys, code=5, file="driven.h5")
+    unbiased = answered(["--residual", "response-function"], capsys, file="driven.h5")
+    assert unbiased["factors"]["inner"] == pytest.approx(TRUE["inner"], rel=0.01)
+    assert found["deviations"]["inner"] < 0.01 and found["factors"] != free["factors"]
+
+
+@pytest.mark.parametrize("ending", ["csv", "uff"])
+def test_a_test_is_planned(capsys, ending):
+    words = ["--plan", "5,2", "--lines", "20:900", "--noise", "0.02", "--prior", "inner=0.3",
+             *ATTACHED[:2], "-o", f"plan.{ending}"]  # fmt: skip
+    assert main(["update", *WORDS, *words, "--force", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert errors(found, schema("update")) == []
+    family = rom.load("family.rom.npz")
+    offered = candidates(family.body, 20, fixed=("root",))
+    same = place(
+        family, offered, offered, np.linspace(20, 900, 100), n_sensors=5, n_inputs=2, noise=0.02,
+        fixed=("root",), attached={"soil": SPRING}, damping=0.02, prior={"inner": 0.3},
+    )  # fmt: skip
+    assert Path(f"plan.{ending}").read_text() == getattr(same, ending)()
+    assert found["deviations"] == same.deviations
+    assert_allclose(found["plan"]["sensors"], np.hstack([same.sensors.points,
+                                                        same.sensors.directions]))  # fmt: skip
+    assert_allclose(np.array(found["plan"]["inputs"])[:, :3], same.inputs.points)
+
+
+def test_a_plan_is_drawn_and_has_a_size_of_its_own(capsys):
+    words = ["--plan", "--lines", "20:900", "--floor", "0.02", "-o", "plan.png"]
+    assert main(["update", *WORDS, *words, "--force", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert [len(found["plan"][name]) for name in ("sensors", "inputs")] == [8, 1]
+    assert Path("plan.png").read_bytes()[:4] == b"\x89PNG"
+    quiet = answered_plan([*words[:4], "0"], capsys)  # without a floor antiresonances tell too much
+    for name in TRUE:
+        assert found["deviations"][name] > 2 * quiet["deviations"][name]
+
+
+def test_points_are_drawn_also_where_they_are_off_the_body(capsys, monkeypatch):
+    drawn = []
+    monkeypatch.setattr("rom.view.plane", lambda scenes, path, **k: drawn.append((scenes, path, k)))
+    test = rom.io.read_responses("test.h5")
+    points = np.array(test.sensors.points)
+    points[3, 2] += 0.5
+    off = replace(test, sensors=Channels(points, test.sensors.directions))
+    rom.io.write_responses(off, "off.h5")
+    capsys.readouterr()
+    assert main(["update", "off.h5", *WORDS, "--picture", "points.png"]) == 2
+    assert "sensor 3" in capsys.readouterr().err
+    ((scenes, path, words),) = drawn
+    assert str(path) == "points.png" and len(scenes) == 2
+    assert "Largest distance of the 13 points from one of the surface: 0.5 m" in words["caption"]
+    assert np.ptp(scenes[0].things["sensors"][0][:, 2]) > 0.5
+    assert main(["update", "off.h5", *WORDS, "--picture", "points.svg"]) == 2
+    assert "picture is written as .png" in capsys.readouterr().err
+
+
+def answered_plan(words, capsys):
+    assert main(["update", *WORDS, *words, "--json"]) == 0
+    return json.loads(capsys.readouterr().out)
+
+
+def test_wrong_plans_are_said(capsys):
+    def refused(words, message):
+        capsys.readouterr()
+        try:
+            code = main(["update", *WORDS, *words])
+        except SystemExit as end:
+            code = end.code
+        assert code == 2
+        assert message in capsys.readouterr().err
+
+    lines = ["--lines", "20:900"]
+    refused([], "required: file")
+    refused(["--plan", "5,1"], "required: --lines")
+    refused(["test.h5", "--plan", *lines], "neither a test nor")
+    refused(["--plan", "5", *lines], "is not two whole numbers")
+    refused(["--plan", "5,1", "--lines", "900:20"], "does not ascend")
+    refused(["test.h5", "--plan", "5,1", *lines], "neither a test nor")
+    refused(["--plan", "5,1", *lines, "-o", "plan.txt"], "written as .csv, .uff, .png")
+    refused(["--plan", "500,1", *lines], "n_sensors = 500")
+
+
+def test_what_is_wrong_with_the_options_is_said(capsys):
+    def refused(words, message, file="test.h5"):
+        capsys.readouterr()
+        assert main(["update", file, *WORDS, *words]) == 2
+        assert message in capsys.readouterr().err
+
+    refused(["--spring", "soil=tip:2e5:0.1"], "must be written INTERFACE:VALUE:LOW:HIGH")
+    refused(["--mass", "cable=tip:heavy:0.1:10"], "--mass: 'heavy' is not a number")
+    same = "--mass soil needs a name of its own"
+    refused([*ATTACHED[:2], "--mass", "soil=tip:1:0.1:10"], same)
+    refused(["--rank", "3"], "rank needs residual=")
+    refused(["--residual", "equations"], "input 0 has no sensor at its point")
+    refused(["--candidate", "cable"], "--candidate cable must name a --spring, --joint or --mass")
+    refused(["--family", "body.rom.npz"], "--family family.rom.npz, body.rom.npz: of several each")
+    refused(["--joint", "j=a.tip,b.tip:1,1,1:0.1:1"], "need an assembly")
+    refused(["--force-noise", "0.1"], "the estimator of H is not named")
+    refused(["-o", "family.rom.npz"], "family.rom.npz")
+
+
+BOLTS = JointSpring(("frame", "tip"), ("arm", "root"), (4e8, 4e8, 4e8, 2e5, 1e5, 1e5), 0.1, 10.0)
+HALVES = ["--family", "frame=frame.rom.npz", "--family", "arm=arm.rom.npz",
+          "--fixed", "frame.root", "--damping", "0.02"]  # fmt: skip
+JOINT = ["--joint", "bolts=frame.tip,arm.root:4e8,4e8,4e8,2e5,1e5,1e5:0.1:10"]
+
+
+@pytest.fixture(scope="module")
+def bolted(folder):
+    """Two families in files, their assembly, and a test of it in which a sensor names its body."""
+    families = {}
+    for name, x in (("frame", 0.0), ("arm", 0.5)):
+        half = composite({name: STEEL}, lambda c, n=name: n, (0.5, 0.1, 0.08), (4, 1, 1), (x, 0, 0))
+        families[name] = rom.reduce_parametric(
+            half, parameters={"E": rom.YoungsModulus(name, 0.3, 3.0)},
+            method=rom.CraigBampton(8), interfaces={"root": "rbe2", "tip": "rbe2"}, certify=False,
+        )  # fmt: skip
+        rom.save(families[name], folder / f"{name}.rom.npz")
+    points = [[x, y, 0.08] for x in (0.25, 0.5, 0.75, 1.0) for y in (0.0, 0.1)]
+    sensors = Channels(
+        np.repeat(points, 2, axis=0), np.tile([[0, 1, 0], [0, 0, 1]], (8, 1)),
+        ("frame",) * 8 + ("arm",) * 8,
+    )  # fmt: skip
+    force = Channels([[0.75, 0.1, 0.0]], [[0, 1, 2]])
+    whole, f = FamilyAssembly(families), np.linspace(20, 900, 100)
+    rows = [c.rows(Parts.of(whole).bodies, "channel") for c in (sensors, force)]
+    model = family_model(whole, rows, {"bolts": BOLTS}, {}, (("frame", "root"),))
+    H = responses_at(model, np.log([1.2, 0.9, 0.5]), np.array([0.02]), 2 * np.pi * f)
+    H = noisy(H, 0.03, np.random.default_rng(4))
+    test = Responses(f, H, sensors, force, 1 / (1 + 50 * 0.03**2), 50)
+    rom.io.write_responses(test, folder / "bolted.h5")
+    return whole
+
+
+def halves(words, capsys, code=0):
+    capsys.readouterr()
+    assert main(["update", *words, "--json"]) == code
+    return json.loads(capsys.readouterr().out)
+
+
+def test_families_on_a_joint_are_updated_and_written_one_by_one(bolted, capsys):
+    found = halves(["bolted.h5", *HALVES, *JOINT, "-o", "new.rom.npz"], capsys)
+    assert errors(found, schema("update")) == []
+    test = rom.io.read_responses("bolted.h5")
+    assert test.sensors.bodies == ("frame",) * 8 + ("arm",) * 8 and test.inputs.bodies is None
+    same = rom.update(bolted, test, fixed=(("frame", "root"),), attached={"bolts": BOLTS},
+                      damping=0.02)  # fmt: skip
+    assert found["factors"] == same.factors and found["deviations"] == same.deviations
+    for name, value in (("frame.E", 1.2), ("arm.E", 0.9), ("bolts", 0.5)):
+        assert abs(np.log(found["factors"][name] / value)) < 4 * found["deviations"][name]
+    for name, body in same.assembly.bodies.items():
+        written = rom.load(f"new.{name}.rom.npz")
+        assert_allclose(written.frequencies(4), body.frequencies(4), rtol=1e-12)
+
+
+def test_a_coupled_assembly_is_planned(bolted, capsys, monkeypatch):
+    monkeypatch.setattr("rom.components.updating.verb.PLAN_POINTS", 6)
+    words = ["--plan", "4,1", "--lines", "20:900", "--couple", "frame.tip=arm.root", *HALVES]
+    found = halves([*words, "-o", "halves.png", "--force"], capsys)
+    assert errors(found, schema("update")) == []
+    assert {"frame.E", "arm.E"} <= set(found["deviations"])
+    assert Path("halves.png").read_bytes()[:4] == b"\x89PNG"
+
+
+WRONG = ("", "nan", "-1", "0", "1e400", "x", "1:2", "a=b", "a=b:c:d:e", "tip:1:1:1", "no.npz",
+         "frame.knee", "leg.tip", "q=frame.tip:1,1,1:0:1", "q=frame.tip:1,1,1:2:1",
+         "q=frame.tip,arm.root:1,1:1:2", "q=frame.tip:1,1,1:1:2")  # fmt: skip
+OPTIONS = (
+    "--family", "--averages", "--coherence", "--force-noise", "--estimator", "--points", "--fixed",
+    "--free", "--spring", "--mass", "--joint", "--couple", "--candidate", "--prior", "--residual",
+    "--rank", "--beside-poles", "--damping", "--tolerance", "--picture", "--plan", "--lines",
+    "--noise", "--floor", "-o",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("option", OPTIONS)
+def test_a_wrong_value_of_an_option_is_named(bolted, capsys, option):
+    """Each option with each wrong value, also of other options: an error of the user, or right."""
+    for value in WRONG if ROM_LONG else WRONG[OPTIONS.index(option) % 2 :: 2]:
+        words = ["update", "bolted.h5", *HALVES, *JOINT, option, value]
+        capsys.readouterr()
+        try:
+            code = main(words)
+        except SystemExit as end:
+            code = end.code
+        out, err = capsys.readouterr()
+        assert code in (0, 2, 3, 4, 5), f"{words}: {code}\n{err}"
+        assert "Traceback" not in out + err
+        if code:
+            assert err.startswith(("error:", "usage:")), err
+        else:
+            assert option == "-o" or value not in ("nan", "1e400"), f"{words}: {out}"
+
+
+def test_families_that_are_no_assembly_are_named(bolted, capsys):
+    def refused(words, message):
+        capsys.readouterr()
+        assert main(["update", "bolted.h5", *words]) == 2
+        assert message in capsys.readouterr().err
+
+    refused(HALVES[:2] * 2, "--family 'frame' is given twice")
+    refused([*HALVES, *JOINT, "--spring", "q=tip:1,1,1:1:2"], "'tip' must be BODY.INTERFACE")
+    refused([*HALVES[:4], "--fixed", "root"], "--fixed 'root' must be BODY.INTERFACE, of")
+    refused([*HALVES, "--joint", "q=frame.tip:1,1,1:1:2"], "names 1 places, needed are 2")
+    refused([*HALVES, "--mass", "q=frame.tip:1,1:1:2"], "a mass must be one number")
+    refused(["--family", "a=body.rom.npz"], "body.rom.npz holds one body, without parameters")
