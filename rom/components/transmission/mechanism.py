@@ -1,4 +1,4 @@
-"""A gear unit as a mechanism: shafts and housing are bodies in frames that are held.
+"""A gear unit as a mechanism, and where it rests: shafts and housing are in frames that are held.
 
 All motions of a shaft are small in axes that do not spin, its rigid ones too. They are elastic
 coordinates of a body whose frame does not move: modes y of the part with its drive and its thrust
@@ -15,7 +15,10 @@ from rom.body.flexible import FlexibleBody
 from rom.body.records import Marker
 from rom.body.spread import SpreadLoad
 from rom.components.round_bodies.spins import SPINS_FAMILY, Spin
-from rom.components.transmission.unit import Transmission
+from rom.components.transmission.unit import Rest, Transmission
+from rom.errors import RomError, SolverError, reached
+from rom.mbs.analysis.equilibrium import equilibrium
+from rom.mbs.analysis.snapshot import snapshot
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.results.solution import Solution
 from rom.model import Array
@@ -24,6 +27,59 @@ NAMES = ("pinion", "gear", "housing")
 FRAME_NAME = "frame"
 Z_AXIS = np.array([0.0, 0.0, 1.0])
 Rows = Mapping[str, tuple[Array, Array]]
+
+
+def rest(
+    unit: Transmission,
+    theta: float = 0.0,
+    *,
+    start: Array | None = None,
+    loads: tuple[float, ...] = (1.0,),
+) -> Rest:
+    """Static equilibrium, found from the unloaded datum.
+
+    Args:
+        unit: the transmission.
+        theta: angle of the pinion [rad].
+        start: (n,) coordinates of an equilibrium nearby [m, rad]; then the load is not raised.
+        loads: shares of the load on the way [1].
+
+    Raises:
+        SolverError: if films or teeth cannot carry the load; ``error.solution`` is the equilibrium
+            at the share of it before, if there was one.
+
+    Source:
+        Gears and films in one: Fargere and Velex, J. Vib. Acoust. 135 (2013) 061014.
+    """
+    q, found = np.zeros(unit.load.size) if start is None else start, list[Rest]()
+    with reached(lambda: found[-1] if found else None):
+        for share in loads if start is None else (1.0,):
+            x, y = (share * g for g in unit.gravity)
+            there = replace(unit, torque=share * unit.torque, gravity=(x, y))
+            found.append(_settled(unit if share == 1.0 else there, theta, q))
+            q = found[-1].q
+    return found[-1]
+
+
+def _settled(unit: Transmission, theta: float, q: Array) -> Rest:
+    """Where a unit rests, found from other coordinates (n,)."""
+    mech = mechanism_of(unit, q, 0.0 * q)
+    try:
+        still = snapshot(mech, equilibrium(mech, t=theta / unit.speed))
+    except RomError as error:
+        raise SolverError(
+            f"the unit does not come to rest under {unit.torque} N m at {unit.speed:.1f} rad/s: "
+            f"{error.message}",
+            hint="Raise speed or viscosity, lower the torque, or move the oil inlets.",
+        ) from error
+    (q,), (v,) = coordinates_of(unit, still)
+    seen = [
+        still.journal_bearing(name).motion[0] * (1.0, 1.0, turn, turn)
+        for name, (_, _, turn) in zip(mech.journal_bearings, unit.journals, strict=True)
+    ]
+    size = np.sqrt(unit.load @ np.linalg.solve(unit.matrices[0], unit.load))
+    forces = unit.forces(q, v, theta, seen=np.array(seen))
+    return Rest(unit, q, theta, forces, float(np.linalg.norm(still.a) / size))
 
 
 def mechanism_of(unit: Transmission, q: Array, v: Array) -> Mechanism:

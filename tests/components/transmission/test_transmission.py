@@ -9,7 +9,7 @@ from scipy.linalg import eigh, eigvals
 from scipy.optimize import brentq
 
 import rom
-from cases.gear_unit import NODES, journal, stepped, unit
+from cases.gear_unit import NODES, journal, resting, stepped, tilting, unit
 from cases.long import few
 from rom.components.gear_mesh import Correction, GearPair
 from rom.components.journal_bearing import Groove, equilibrium, stability
@@ -159,8 +159,10 @@ def test_relieved_teeth_are_closed_before_they_are_loaded(loaded):
 
 
 def test_what_goes_in_comes_out_or_heats_the_oil(loaded):
+    """But for moments about tilted axes, to which twists of 3e-3 add a hundredth."""
     given, taken, heat = loaded.powers
-    assert heat > 100.0 and given - taken - heat == pytest.approx(0, abs=1e-8 * given)
+    assert heat > 100.0 and given - taken - heat == pytest.approx(tilting(loaded), rel=0.03)
+    assert abs(tilting(loaded)) < 2e-7 * given
     assert taken == pytest.approx(200 * loaded.unit.speed, rel=1e-12)
 
 
@@ -217,7 +219,8 @@ def test_its_mechanism_rests_and_whirls_as_the_unit(helix):
     mech = mechanism_of(state.unit, still, still)
     found = rom.equilibrium(mech)
     q, v = coordinates_of(state.unit, rom.mbs.snapshot(mech, found))
-    assert_allclose(q[0], state.q, atol=1e-4 * np.abs(state.q).max())
+    assert_allclose(q[0], state.q, atol=1e-9 * np.abs(state.q).max())
+    assert_allclose(state.q, resting(state.unit), atol=1e-4 * np.abs(state.q).max())
     assert not v.any()
     own, others = (
         values[np.argsort(values.imag)][-np.sum(values.imag > 1.0) :]
@@ -326,5 +329,5 @@ def test_what_cannot_be_is_said(make, said):
 
 
 def test_films_that_cannot_carry_are_named():
-    with pytest.raises(SolverError, match=r"does not come to rest under .* the thinnest film"):
+    with pytest.raises(SolverError, match=r"does not come to rest under .* gap of 'gear 0'"):
         rest(replace(unit(torque=5000.0), viscosity=2e-4))
