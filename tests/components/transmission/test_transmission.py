@@ -23,7 +23,7 @@ from rom.components.transmission import (
     threshold,
     whirl,
 )
-from rom.components.transmission.mechanism import coordinates_of, mechanism_of
+from rom.components.transmission.mechanism import mechanism_of
 from rom.errors import ModelError, SolverError
 
 E, NU, RHO = 206e9, 0.3, 7850.0
@@ -212,16 +212,15 @@ def test_a_rotor_alone_whirls_at_the_threshold_of_its_bearings():
 
 
 @pytest.mark.parametrize("helix", [0.0, HELIX])
-def test_its_mechanism_rests_and_whirls_as_the_unit(helix):
-    """But for finite turns of journals, and for forces that turn with the line of centres."""
+def test_it_rests_as_another_program_says_and_whirls_as_its_mechanism(helix):
+    """But for products of turns, and for forces that turn with the line of centres.
+
+    Half of a twist of 3e-3 times a tilt of 2e-4 is 1e-4 of the largest turn.
+    """
     state = rest(unit(helix=helix, speed=600.0, gravity=(0.0, -9.81)))
-    still = np.zeros(state.q.size)
-    mech = mechanism_of(state.unit, still, still)
-    found = rom.equilibrium(mech)
-    q, v = coordinates_of(state.unit, rom.mbs.snapshot(mech, found))
-    assert_allclose(q[0], state.q, atol=1e-9 * np.abs(state.q).max())
     assert_allclose(state.q, resting(state.unit), atol=1e-4 * np.abs(state.q).max())
-    assert not v.any()
+    mech = mechanism_of(state.unit, state.q, 0.0 * state.q)
+    found = rom.equilibrium(mech)
     own, others = (
         values[np.argsort(values.imag)][-np.sum(values.imag > 1.0) :]
         for values in (whirl(state).values, rom.linearize(mech, found).eigenvalues)
