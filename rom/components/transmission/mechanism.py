@@ -16,11 +16,12 @@ from rom.body.records import Marker
 from rom.body.spread import SpreadLoad
 from rom.components.round_bodies.spins import SPINS_FAMILY, Spin
 from rom.components.transmission.unit import Rest, Transmission
-from rom.errors import RomError, SolverError, reached
+from rom.errors import RomError, SolverError
 from rom.mbs.analysis.equilibrium import equilibrium
 from rom.mbs.analysis.snapshot import snapshot
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.results.solution import Solution
+from rom.mbs.results.state import State
 from rom.model import Array
 
 NAMES = ("pinion", "gear", "housing")
@@ -45,33 +46,44 @@ def rest(
         loads: shares of the load on the way [1].
 
     Raises:
-        SolverError: if films or teeth cannot carry the load; ``error.solution`` is the equilibrium
-            at the share of it before, if there was one.
+        SolverError: if films or teeth cannot carry the load; ``error.solution`` is what was reached
+            at the share of it before.
 
     Source:
         Gears and films in one: Fargere and Velex, J. Vib. Acoust. 135 (2013) 061014.
     """
-    q, found = np.zeros(unit.load.size) if start is None else start, list[Rest]()
-    with reached(lambda: found[-1] if found else None):
-        for share in loads if start is None else (1.0,):
-            x, y = (share * g for g in unit.gravity)
-            there = replace(unit, torque=share * unit.torque, gravity=(x, y))
-            found.append(_settled(unit if share == 1.0 else there, theta, q))
-            q = found[-1].q
-    return found[-1]
+    q, (*before, last) = np.zeros(unit.load.size), loads
+    if start is not None:
+        q, before, last = start, [], 1.0
+    for share in before:
+        q = _settled(_loaded(unit, share), theta, q).q
+    return _settled(_loaded(unit, last), theta, q)
+
+
+def _loaded(unit: Transmission, share: float) -> Transmission:
+    """The unit under a share of its load."""
+    x, y = (share * g for g in unit.gravity)
+    there = replace(unit, torque=share * unit.torque, gravity=(x, y))
+    return unit if share == 1.0 else there
 
 
 def _settled(unit: Transmission, theta: float, q: Array) -> Rest:
     """Where a unit rests, found from other coordinates (n,)."""
     mech = mechanism_of(unit, q, 0.0 * q)
     try:
-        still = snapshot(mech, equilibrium(mech, t=theta / unit.speed))
+        return _rest_of(unit, theta, mech, equilibrium(mech, t=theta / unit.speed))
     except RomError as error:
         raise SolverError(
             f"the unit does not come to rest under {unit.torque} N m at {unit.speed:.1f} rad/s: "
             f"{error.message}",
             hint="Raise speed or viscosity, lower the torque, or move the oil inlets.",
+            solution=error.solution and _rest_of(unit, theta, mech, error.solution),
         ) from error
+
+
+def _rest_of(unit: Transmission, theta: float, mech: Mechanism, state: State) -> Rest:
+    """A state of the mechanism in the coordinates of the unit, with films and teeth."""
+    still = snapshot(mech, state)
     (q,), (v,) = coordinates_of(unit, still)
     seen = [
         still.journal_bearing(name).motion[0] * (1.0, 1.0, turn, turn)
