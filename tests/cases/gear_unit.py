@@ -17,7 +17,7 @@ import numpy as np
 from rom.components.gear_mesh import GearPair, Mesh, MeshForce, Slices
 from rom.components.gear_mesh.gears.geometry import involute, path_of_contact
 from rom.components.journal_bearing import Groove, JournalBearing
-from rom.components.transmission import Disc, Rotor, Shaft, Transmission
+from rom.components.transmission import Disc, Rotor, Shaft, Transmission, rest
 
 CELLS = (60, 4)
 FORCE_RTOL, MAX_ITERATIONS, MAX_PASSES = 1e-9, 30, 20
@@ -103,6 +103,20 @@ def tilting(state):
     M = np.array([*teeth, *(film.force[2:] for film in state.forces.films)])
     phi = np.array([*wheels, *journals])
     return 0.5 * float(spins @ (M[:, 0] * phi[:, 1] - M[:, 1] * phi[:, 0]))
+
+
+def with_inlets(unit, beyond):
+    """The unit with films that conserve their oil, from one inlet each: angle [deg] from the load.
+
+    It counts in the direction of rotation.
+    """
+    push, rotors = rest(unit).forces.mesh.force, []
+    for rotor, side in ((unit.pinion, 1), (unit.gear, -1)):
+        at = np.arctan2(push[1], side * push[0]) + np.radians(beyond)
+        inlet = [Groove(at, np.radians(20))]
+        films = {k: replace(b, grooves=inlet, cavitation="jfo") for k, b in rotor.bearings.items()}
+        rotors.append(replace(rotor, bearings=films))
+    return replace(unit, pinion=rotors[0], gear=rotors[1])
 
 
 class Step:

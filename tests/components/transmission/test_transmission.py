@@ -9,10 +9,10 @@ from scipy.linalg import eigh, eigvals
 from scipy.optimize import brentq
 
 import rom
-from cases.gear_unit import NODES, journal, resting, stepped, tilting, unit
+from cases.gear_unit import NODES, journal, resting, stepped, tilting, unit, with_inlets
 from cases.long import few
 from rom.components.gear_mesh import Correction, GearPair
-from rom.components.journal_bearing import Groove, equilibrium, stability
+from rom.components.journal_bearing import equilibrium, stability
 from rom.components.transmission import (
     Disc,
     Shaft,
@@ -104,23 +104,12 @@ def test_both_journals_rest_where_a_journal_alone_would(loaded):
     assert loaded.forces.films[2].eccentricity > loaded.forces.films[0].eccentricity
 
 
-def with_inlets(at, beyond, **more):
-    """One groove in each bearing, so many degrees beyond the load in the direction of rotation."""
-    u, rotors = unit(**more), []
-    for rotor, turned in ((u.pinion, at), (u.gear, np.pi - at)):
-        inlet = [Groove(turned + np.radians(beyond), np.radians(20))]
-        oiled = {k: replace(b, grooves=inlet, cavitation="jfo") for k, b in rotor.bearings.items()}
-        rotors.append(replace(rotor, bearings=oiled))
-    return replace(u, pinion=rotors[0], gear=rotors[1])
-
-
 @pytest.mark.parametrize(
     ("torque", "beyond"), few(2, [(200.0, 60), (20.0, 75), (200.0, 90), (200.0, 45)])
 )
 def test_films_that_conserve_their_oil_carry_teeth_as_they_carry_a_load(torque, beyond):
     """On the way there, under less load, they run dry. Other than a lone journal, a shaft tilts."""
-    push = rest(unit(torque)).forces.mesh.force
-    u = with_inlets(np.arctan2(push[1], push[0]), beyond, torque=torque)
+    u = with_inlets(unit(torque), beyond)
     found = rest(u)
     assert found.residual < 1e-9
     F = found.forces.mesh.force
@@ -132,9 +121,8 @@ def test_films_that_conserve_their_oil_carry_teeth_as_they_carry_a_load(torque, 
 
 
 def test_without_oil_where_it_is_needed_nothing_rests():
-    push = rest(unit()).forces.mesh.force
     with pytest.raises(SolverError, match="does not come to rest under 1207") as caught:
-        rest(with_inlets(np.arctan2(push[1], push[0]), 0.0))
+        rest(with_inlets(unit(), 0.0))
     assert "inlets" in caught.value.hint
 
 
