@@ -37,11 +37,6 @@ class RigidShaft:
         across = M[3, 3] - M[0, 0] * z.mean() ** 2
         return cls(float(M[0, 0]), float(across), float(M[5, 5]), float(np.ptp(z)))
 
-    @property
-    def in_metres(self) -> Array:
-        """(6,) which coordinates are lengths."""
-        return np.array([True, True, True, False, False, False])
-
     def rows(self, node: int) -> Array:
         """(6, 6) motion of a node per coordinate [1]."""
         found, z = np.eye(6), self.span * (node - 1) / 2

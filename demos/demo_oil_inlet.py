@@ -204,8 +204,8 @@ for films in dict.fromkeys(films for case in CASES.values() for films in case.va
 
 # ## The other program
 #
-# `rom.components.transmission` has such units ready: shafts that only move a little, at rest by a
-# program of its own. It finds the motion that repeats; its films have one viscosity, and no memory.
+# `rom.components.transmission` has such units ready, of shafts that only move a little in axes that
+# do not spin. It finds the motion that repeats; its films have one viscosity, and no memory.
 
 
 @dataclass(frozen=True)
@@ -216,10 +216,6 @@ class Stiff:
     places: tuple = (SEATS["near"], 0.0, SEATS["far"])
     nodes: int = 3
     n: int = 6
-
-    @property
-    def in_metres(self):
-        return np.arange(6) < 3
 
     def rows(self, node):
         found, z = np.eye(6), self.places[node]

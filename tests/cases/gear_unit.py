@@ -17,10 +17,11 @@ import numpy as np
 from rom.components.gear_mesh import GearPair, Mesh, MeshForce, Slices
 from rom.components.gear_mesh.gears.geometry import involute, path_of_contact
 from rom.components.journal_bearing import Groove, JournalBearing
-from rom.components.transmission import Disc, Rotor, Shaft, Transmission
+from rom.components.transmission import Disc, Rotor, Shaft, Transmission, rest
 
 CELLS = (60, 4)
 FORCE_RTOL, MAX_ITERATIONS, MAX_PASSES = 1e-9, 30, 20
+LOADS, MAX_CORRECTIONS, MAX_STEP = (0.01, 0.03, 0.1, 0.25, 0.5, 1.0), 80, 0.1
 
 
 NODES = np.linspace(0, 0.2, 5)
@@ -50,14 +51,80 @@ def unit(torque=200.0, speed=100 * np.pi, helix=0.0, width=0.04, clearance=50e-6
     return Transmission(*rotors, mesh, speed, torque * 157 / 26, 0.02, **more)
 
 
+def plane(unit):
+    """The unit with teeth of this program."""
+    mesh = unit.mesh
+    own = PlaneMesh(mesh.pair, mesh.stiffness, mesh.correction, mesh.damping, mesh.cells)
+    return replace(unit, mesh=own)
+
+
+def allowed(unit, q, step):
+    """Share of a step that keeps films: no journal moves far, or loses half of its film."""
+    share = 1.0
+    for inside, bearing, _ in unit.journals:
+        at, d = inside[:4] @ q, inside[:4] @ step
+        share = min(share, MAX_STEP * bearing.clearance / max(np.hypot(*d[:2]), 1e-30))
+        while bearing.thinnest(at + share * d) < 0.5 * bearing.thinnest(at):
+            share /= 2
+    return share
+
+
+def resting(unit, theta=0.0):
+    """Equilibrium by Newton's method, the load raised from where teeth touch: (n,) coordinates."""
+    unit = plane(unit)
+    K, f, films = unit.matrices[1], unit.load, None
+    q = (1e-7 + unit.mesh.least_gap(theta)) / unit.mesh.pair.rb[1] * unit.rigid[1][:, 5]
+    x, y = unit.mesh.forces(unit.wheels @ q, theta).force[:2]
+    ahead = 5e-6 * np.array([-y, x]) / max(np.hypot(x, y), 1e-300)
+    q = q + (unit.rigid[0] + unit.rigid[1])[:, :2] @ ahead  # where films begin to carry
+    for share in LOADS:
+        for _ in range(MAX_CORRECTIONS):
+            now = unit.forces(q, 0.0 * q, theta, films)
+            R, films = share * f + now.force - K @ q, now.films
+            if np.abs(R).max() < 1e-10 * np.abs(share * f).max():
+                break
+            step = np.linalg.solve(K + now.stiffness, R)
+            q = q + allowed(unit, q, step) * step
+        else:
+            raise AssertionError(f"{np.abs(R).max():.3g} N are left")
+    return q
+
+
+def tilting(state):
+    """Power of moments about axes that are tilted and turned, seen along Z, to second order [W].
+
+    Turns phi are vectors of rotation. On phi_z works M_z - (phi x M)_z / 2, along the axis of the
+    shaft, about which it spins, M_z + M (phi x e_z): the difference is (M x phi)_z / 2.
+    """
+    u, teeth = state.unit, state.forces.mesh.force.reshape(2, 2, 3)[:, 1, :2]
+    wheels = (u.wheels @ state.q).reshape(2, 2, 3)[:, 1, :2]
+    journals = [(inside @ state.q)[2:4] for inside, _, _ in u.journals]
+    spins = [*u.spins, *(abs(u.spins[0 if turn > 0 else 1]) for _, _, turn in u.journals)]
+    M = np.array([*teeth, *(film.force[2:] for film in state.forces.films)])
+    phi = np.array([*wheels, *journals])
+    return 0.5 * float(spins @ (M[:, 0] * phi[:, 1] - M[:, 1] * phi[:, 0]))
+
+
+def with_inlets(unit, beyond):
+    """The unit with films that conserve their oil, from one inlet each: angle [deg] from the load.
+
+    It counts in the direction of rotation.
+    """
+    push, rotors = rest(unit).forces.mesh.force, []
+    for rotor, side in ((unit.pinion, 1), (unit.gear, -1)):
+        at = np.arctan2(push[1], side * push[0]) + np.radians(beyond)
+        inlet = [Groove(at, np.radians(20))]
+        films = {k: replace(b, grooves=inlet, cavitation="jfo") for k, b in rotor.bearings.items()}
+        rotors.append(replace(rotor, bearings=films))
+    return replace(unit, pinion=rotors[0], gear=rotors[1])
+
+
 class Step:
     """Position and rates of a unit; alpha from -1/3 to 0 damps what steps do not resolve."""
 
     def __init__(self, unit, q, theta, v=None, *, alpha=0.0):
         self.alpha, self.beta, self.gamma = alpha, (1 - alpha) ** 2 / 4, 0.5 - alpha
-        mesh = unit.mesh
-        plane = PlaneMesh(mesh.pair, mesh.stiffness, mesh.correction, mesh.damping, mesh.cells)
-        self.unit = unit = replace(unit, mesh=plane)
+        self.unit = unit = plane(unit)
         self.q, self.v = q, np.zeros(q.size) if v is None else v
         self.M, self.K, G = unit.matrices
         self.C = unit.loss * self.K + G
@@ -73,7 +140,7 @@ class Step:
         unit, before, q0 = self.unit, self.forces(self.q, self.v), self.q
         size = max(np.abs(self.K @ self.q).max(), np.abs(unit.load).max())
         self.last, ahead = self.now, dt * self.v + dt**2 / 4 * self.a
-        q = q0 + unit.allowed(q0, ahead) * ahead
+        q = q0 + allowed(unit, q0, ahead) * ahead
         for k in range(MAX_ITERATIONS):
             v, a = self.rates(dt, q - q0, self.v, self.a)
             self.now = unit.forces(q, v, theta, self.now.films)
@@ -82,7 +149,7 @@ class Step:
                 break
             d = np.linalg.solve(self.jacobian(dt), R)
             # where teeth or voids come and go, whole corrections may go round in a circle
-            q = q + (1.0 if k < MAX_ITERATIONS // 2 else 0.5) * unit.allowed(q, d) * d
+            q = q + (1.0 if k < MAX_ITERATIONS // 2 else 0.5) * allowed(unit, q, d) * d
         else:
             raise AssertionError(f"{np.abs(R).max():.3g} N are left")
         self.q, self.v, self.a = q, v, a
@@ -139,7 +206,7 @@ def repeating(state, steps, alpha=-0.05, rtol=1e-6):
             return q, teeth, values[np.argsort(-np.abs(values))]
         d = np.linalg.solve(np.eye(2 * n) - F, end - x)
         dt = unit.mesh_period / steps
-        x = x + min(unit.allowed(x[:n], d[:n]), unit.allowed(x[:n], dt * d[n:])) * d
+        x = x + min(allowed(unit, x[:n], d[:n]), allowed(unit, x[:n], dt * d[n:])) * d
     raise AssertionError(f"the motion does not close by {gap:.3g}")
 
 

@@ -213,14 +213,14 @@ def transmission_error(mesh: Mesh, torque: float, theta: npt.ArrayLike) -> Array
 def _closed(mesh: Mesh, torque: float, theta: float) -> float:
     """Way along the line of action by which the pinion turns ahead under a torque [m].
 
-    The torque is convex and linear in pieces: Newton's method from above loses slices until none
-    leaves.
+    A module ahead all slices of the working flanks bear, and say how far each is apart. Were those
+    that close first, however many, held together, the least way is that of slices that only push.
     """
-    rb, q, bearing = float(mesh.pair.rb[0]), np.zeros(12), np.inf
+    rb, slant, q = mesh.pair.rb[0], np.cos(mesh.pair.base_helix), np.zeros(12)
     q[5] = mesh.pair.module / rb
-    while True:
-        teeth = mesh.forces(q, theta - q[5])
-        if not 0 < teeth.load.size < bearing:
-            return rb * float(q[5])
-        bearing = teeth.load.size
-        q[5] += (torque + teeth.force[5]) / teeth.stiffness[5, 5]
+    teeth = mesh.forces(q, theta - q[5])
+    k = mesh.pair_stiffness(teeth.slices.s, mesh.pair.path) * teeth.slices.length
+    gap = mesh.pair.module * slant - teeth.load / k
+    k, gap = np.array([k, gap])[:, np.argsort(gap)]
+    ways = (torque / (rb * slant) + np.cumsum(k * gap)) / np.cumsum(k)
+    return float(ways.min() / slant)

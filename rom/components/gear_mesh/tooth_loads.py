@@ -9,11 +9,10 @@ import numpy.typing as npt
 from rom.arguments import typed
 from rom.components.gear_mesh.gears.meshes import GEAR_MESHES_FAMILY
 from rom.components.gear_mesh.gears.table import HEIGHT, LENGTH, LOAD, PLACE, SIDE
-from rom.errors import ConfigError
 from rom.mbs.results.interface_loads import at_instants
 from rom.mbs.results.solution import Solution
 from rom.model import Array
-from rom.names import offered
+from rom.names import check_known
 
 
 @dataclass(frozen=True)
@@ -58,8 +57,7 @@ def tooth_loads(solution: Solution, name: str) -> tuple[ToothLoads, ...]:
         ConfigError: if there is no such mesh.
     """
     names = solution.packed.element_names.get(GEAR_MESHES_FAMILY, ())
-    if name not in names:
-        raise ConfigError(f"no gear mesh {name!r}; there are {offered(names, name)}.")
+    check_known(name, names, f"no gear mesh {name!r}; there are")
     k, table = names.index(name), solution.packed.elements[GEAR_MESHES_FAMILY]
     return tuple(_of_table(table, k) for _ in at_instants(solution))
 

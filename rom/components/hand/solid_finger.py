@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rom import rotation
+from rom.body.reference import marker_motion
 from rom.components.cosserat import Rod, body
 from rom.components.cosserat.helical_spring import HelicalSpring, plate_compliance, spring_rod
 from rom.errors import ModelError
@@ -107,7 +108,7 @@ def link_compliance(solid: Any, ends: tuple[str, str] = ENDS) -> Array:
         solid: a ``FlexibleBody``.
         ends: the marker that is held and the one that is loaded.
     """
-    held, loaded = (_rows(solid, name) for name in ends)
+    held, loaded = (np.hstack(marker_motion(solid.marker(name), solid.n_modes)) for name in ends)
     K = solid.full_matrices()[1]
     size = np.abs(K).max()
     zero, load = np.zeros((6, 6)), np.vstack([loaded.T, np.zeros((6, 6))])
@@ -162,12 +163,6 @@ def _moved(arm: Array) -> Array:
     X = np.eye(6)
     X[:3, 3:] = -rotation.skew(arm)
     return X
-
-
-def _rows(solid: Any, name: str) -> Array:
-    """(6, 6 + r) motion of a marker per motion of the frame and elastic coordinate."""
-    marker = solid.marker(name)
-    return np.hstack([_moved(marker.point), np.vstack([marker.translation, marker.rotation])])
 
 
 def _check(bodies: Sequence[Any], springs: Sequence[HelicalSpring]) -> None:

@@ -24,7 +24,7 @@ from rom.errors import ConfigError
 from rom.mbs.results.interface_loads import at_instants
 from rom.mbs.results.solution import Solution
 from rom.model import Array
-from rom.names import offered
+from rom.names import check_known
 
 
 @typed
@@ -43,8 +43,7 @@ def film_pressures(solution: Solution, name: str) -> Array:
         ConfigError: if there is no such bearing, or its film is read from a table.
     """
     names = solution.packed.element_names.get(JOURNAL_BEARINGS_FAMILY, ())
-    if name not in names:
-        raise ConfigError(f"no journal bearing {name!r}; there are {offered(names, name)}.")
+    check_known(name, names, f"no journal bearing {name!r}; there are")
     k, table = names.index(name), solution.packed.elements[JOURNAL_BEARINGS_FAMILY]
     if table.number[k] >= 0:
         raise ConfigError(
@@ -100,8 +99,7 @@ def journal_bearing(self: Any, name: str) -> BearingRecord:
         ConfigError: for a name that no journal bearing has.
     """
     films = self.mechanism.journal_bearings
-    if name not in films:
-        raise ConfigError(f"no journal bearing {name!r}; there are {offered(films, name)}.")
+    check_known(name, films, f"no journal bearing {name!r}; there are")
     packed, element = self.packed, films[name]
     first = len(packed.places.coordinates) + packed.places.memory(name, np.zeros(0))
     found = self.base[:, first:]

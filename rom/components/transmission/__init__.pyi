@@ -1,4 +1,5 @@
 from rom.components.transmission.housing import Housing as Housing
+from rom.components.transmission.mechanism import rest as rest
 from rom.components.transmission.motion import Run as Run
 from rom.components.transmission.motion import Whirl as Whirl
 from rom.components.transmission.motion import linearised as linearised
@@ -21,4 +22,3 @@ from rom.components.transmission.unit import Forces as Forces
 from rom.components.transmission.unit import Rest as Rest
 from rom.components.transmission.unit import Rotor as Rotor
 from rom.components.transmission.unit import Transmission as Transmission
-from rom.components.transmission.unit import rest as rest

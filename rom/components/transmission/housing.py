@@ -13,6 +13,7 @@ from scipy.linalg import eigh
 
 from rom.body.flexible import FlexibleBody
 from rom.body.records import still_motions
+from rom.body.reference import marker_motion
 from rom.errors import ModelError
 from rom.model import Array
 
@@ -105,8 +106,4 @@ def motion_of(body: FlexibleBody, name: str) -> Array:
     Raises:
         InterfaceError: if the body has no such interface.
     """
-    marker = body.marker(name)
-    x, y, z = marker.point
-    arm = np.array([[0, z, -y], [-z, 0, x], [y, -x, 0]])
-    rigid = np.block([[np.eye(3), arm], [np.zeros((3, 3)), np.eye(3)]])
-    return np.hstack([rigid, np.vstack([marker.translation, marker.rotation])])
+    return np.hstack(marker_motion(body.marker(name), body.n_modes))

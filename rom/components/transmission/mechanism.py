@@ -1,4 +1,4 @@
-"""A gear unit as a mechanism: shafts and housing are bodies in frames that are held.
+"""A gear unit as a mechanism, and where it rests: shafts and housing are in frames that are held.
 
 All motions of a shaft are small in axes that do not spin, its rigid ones too. They are elastic
 coordinates of a body whose frame does not move: modes y of the part with its drive and its thrust
@@ -15,15 +15,83 @@ from rom.body.flexible import FlexibleBody
 from rom.body.records import Marker
 from rom.body.spread import SpreadLoad
 from rom.components.round_bodies.spins import SPINS_FAMILY, Spin
-from rom.components.transmission.unit import Transmission
+from rom.components.transmission.unit import Rest, Transmission
+from rom.errors import RomError, SolverError
+from rom.mbs.analysis.equilibrium import equilibrium
+from rom.mbs.analysis.snapshot import snapshot
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.results.solution import Solution
+from rom.mbs.results.state import State
 from rom.model import Array
 
 NAMES = ("pinion", "gear", "housing")
 FRAME_NAME = "frame"
 Z_AXIS = np.array([0.0, 0.0, 1.0])
 Rows = Mapping[str, tuple[Array, Array]]
+
+
+def rest(
+    unit: Transmission,
+    theta: float = 0.0,
+    *,
+    start: Array | None = None,
+    loads: tuple[float, ...] = (1.0,),
+) -> Rest:
+    """Static equilibrium, found from the unloaded datum.
+
+    Args:
+        unit: the transmission.
+        theta: angle of the pinion [rad].
+        start: (n,) coordinates of an equilibrium nearby [m, rad]; then the load is not raised.
+        loads: shares of the load on the way [1].
+
+    Raises:
+        SolverError: if films or teeth cannot carry the load; ``error.solution`` is what was reached
+            at the share of it before.
+
+    Source:
+        Gears and films in one: Fargere and Velex, J. Vib. Acoust. 135 (2013) 061014.
+    """
+    q, (*before, last) = np.zeros(unit.load.size), loads
+    if start is not None:
+        q, before, last = start, [], 1.0
+    for share in before:
+        q = _settled(_loaded(unit, share), theta, q).q
+    return _settled(_loaded(unit, last), theta, q)
+
+
+def _loaded(unit: Transmission, share: float) -> Transmission:
+    """The unit under a share of its load."""
+    x, y = (share * g for g in unit.gravity)
+    there = replace(unit, torque=share * unit.torque, gravity=(x, y))
+    return unit if share == 1.0 else there
+
+
+def _settled(unit: Transmission, theta: float, q: Array) -> Rest:
+    """Where a unit rests, found from other coordinates (n,)."""
+    mech = mechanism_of(unit, q, 0.0 * q)
+    try:
+        return _rest_of(unit, theta, mech, equilibrium(mech, t=theta / unit.speed))
+    except RomError as error:
+        raise SolverError(
+            f"the unit does not come to rest under {unit.torque} N m at {unit.speed:.1f} rad/s: "
+            f"{error.message}",
+            hint="Raise speed or viscosity, lower the torque, or move the oil inlets.",
+            solution=error.solution and _rest_of(unit, theta, mech, error.solution),
+        ) from error
+
+
+def _rest_of(unit: Transmission, theta: float, mech: Mechanism, state: State) -> Rest:
+    """A state of the mechanism in the coordinates of the unit, with films and teeth."""
+    still = snapshot(mech, state)
+    (q,), (v,) = coordinates_of(unit, still)
+    seen = [
+        still.journal_bearing(name).motion[0] * (1.0, 1.0, turn, turn)
+        for name, (_, _, turn) in zip(mech.journal_bearings, unit.journals, strict=True)
+    ]
+    size = np.sqrt(unit.load @ np.linalg.solve(unit.matrices[0], unit.load))
+    forces = unit.forces(q, v, theta, seen=np.array(seen))
+    return Rest(unit, q, theta, forces, float(np.linalg.norm(still.a) / size))
 
 
 def mechanism_of(unit: Transmission, q: Array, v: Array) -> Mechanism:

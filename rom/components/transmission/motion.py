@@ -12,9 +12,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rom.components.gear_mesh.tooth_loads import tooth_loads
-from rom.components.transmission.mechanism import NAMES, coordinates_of, mechanism_of, places_of
+from rom.components.transmission.mechanism import (
+    NAMES,
+    coordinates_of,
+    mechanism_of,
+    places_of,
+    rest,
+)
 from rom.components.transmission.shaft import ComplexArray, vibrations
-from rom.components.transmission.unit import Rest, Transmission, rest
+from rom.components.transmission.unit import Rest, Transmission
 from rom.errors import ModelError, RomError
 from rom.mbs.integrate import simulation
 from rom.mbs.results.solution import Solution

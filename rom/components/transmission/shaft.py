@@ -93,11 +93,6 @@ class Shaft:
         """Number of nodes."""
         return self.n // 6
 
-    @property
-    def in_metres(self) -> npt.NDArray[np.bool_]:
-        """(n,) whether a coordinate is a length; else it is an angle."""
-        return np.tile([True] * 3 + [False] * 3, self.nodes)
-
     def rows(self, node: int) -> Array:
         """(6, n) motion of a node per coordinate [1]."""
         return np.eye(self.n)[6 * node : 6 * node + 6]

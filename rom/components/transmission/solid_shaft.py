@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 from scipy.linalg import eigh
 
 from rom.body.flexible import FlexibleBody
@@ -70,11 +69,6 @@ class SolidShaft:
         """Number of coordinates."""
         bend, stretch, twist = self._shapes
         return 2 * bend.shape[1] + stretch.shape[1] + twist.shape[1]
-
-    @property
-    def in_metres(self) -> npt.NDArray[np.bool_]:
-        """(n,) all are lengths: motions with the mass of the body."""
-        return np.ones(self.n, dtype=bool)
 
     def rows(self, node: int) -> Array:
         """(6, n) mean motion of a seat [m, rad] per coordinate."""

@@ -11,9 +11,9 @@ import numpy as np
 import numpy.typing as npt
 
 from rom.components.orbits.motion import PeriodicMotion, periodic_motion
-from rom.components.transmission.mechanism import coordinates_of, mechanism_of
+from rom.components.transmission.mechanism import coordinates_of, mechanism_of, rest
 from rom.components.transmission.motion import teeth_and_heat
-from rom.components.transmission.unit import Rest, Transmission, rest
+from rom.components.transmission.unit import Rest, Transmission
 from rom.errors import ModelError, reached
 from rom.mbs.mechanism import Mechanism
 from rom.model import Array

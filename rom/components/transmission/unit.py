@@ -1,4 +1,4 @@
-"""A pair of geared shafts in journal bearings: the forces in one position, and where it rests.
+"""A pair of geared shafts in journal bearings, and the forces in one position.
 
 Datum: journals centred, shafts parallel, working flanks just touching. The pinion turns about +Z
 and is driven through a torsion spring that turns at constant speed; the gear turns about -Z, and a
@@ -9,11 +9,10 @@ Source:
     135 (2013) 061014.
 """
 
-from collections.abc import Iterator, Mapping
-from contextlib import suppress
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise, product
+from itertools import pairwise
 
 import numpy as np
 
@@ -23,17 +22,10 @@ from rom.components.journal_bearing import Film, JournalBearing, film
 from rom.components.transmission.housing import Housing
 from rom.components.transmission.shaft import Shaft
 from rom.components.transmission.solid_shaft import SolidShaft
-from rom.errors import ModelError, SolverError, reached
+from rom.errors import ModelError
 from rom.model import Array
 
 MIRROR_SIGNS = np.array([1.0, -1.0, -1.0, 1.0])  # x, y, phi_x, phi_y of a journal seen from behind
-LOADS = (0.01, 0.03, 0.1, 0.25, 0.5, 1.0)
-# to the load from heavier ones, under which films find oil more easily
-WAYS_DOWN = ((1.0,), (2.0, 1.4, 1.0), (4.0, 2.8, 2.0, 1.7, 1.4, 1.2, 1.0))
-MAX_ITERATIONS = 80
-RESIDUAL_RTOL = 1e-10
-MAX_STEP = 0.1  # of the clearance
-MIN_FILM_RATIO = 2e-3  # thinnest film, of the clearance
 
 
 @dataclass(frozen=True)
@@ -211,7 +203,15 @@ class Transmission:
             f = f + g * (M @ (self.rigid[0] + self.rigid[1])[:, axis])
         return f
 
-    def forces(self, q: Array, v: Array, theta: float, warm: list[Film] | None = None) -> Forces:
+    def forces(
+        self,
+        q: Array,
+        v: Array,
+        theta: float,
+        warm: list[Film] | None = None,
+        *,
+        seen: Array | None = None,
+    ) -> Forces:
         """Forces of films and teeth.
 
         Args:
@@ -219,6 +219,8 @@ class Transmission:
             v: (n,) their rates [m/s, rad/s].
             theta: angle that the drive has turned [rad].
             warm: films of a position nearby.
+            seen: (bearings, 4) motions of the journals in their bushes [m, rad]; None to the first
+                order of turns.
 
         Raises:
             ModelError, SolverError: if a journal touches its bush, or a film is not found.
@@ -227,8 +229,8 @@ class Transmission:
         F, K, C, films = np.zeros(n), np.zeros((n, n)), np.zeros((n, n)), []
         for k, (inside, bearing, turn) in enumerate(self.journals):
             B, speed = inside[:4], abs(self.spins[0 if turn > 0 else 1])
-            start = None if warm is None else warm[k].active
-            f = film(bearing, B @ q, B @ v, speed=speed, viscosity=self.viscosity, warm=start)
+            start, at = None if warm is None else warm[k].active, B @ q if seen is None else seen[k]
+            f = film(bearing, at, B @ v, speed=speed, viscosity=self.viscosity, warm=start)
             F += f.force @ B - f.friction_torque * inside[4]
             K += B.T @ f.stiffness @ B
             C += B.T @ f.damping @ B
@@ -240,26 +242,6 @@ class Transmission:
         C += self.mesh.damping * felt
         return Forces(F + teeth.force @ W, K, C, films, teeth)
 
-    def allowed(self, q: Array, step: Array) -> float:
-        """Share [1] of a step that keeps films: no journal moves far, or loses half of its film.
-
-        Args:
-            q: (n,) coordinates [m, rad].
-            step: (n,) their change [m, rad].
-        """
-        share = 1.0
-        for inside, bearing, _ in self.journals:
-            at, d = inside[:4] @ q, inside[:4] @ step
-            moved = float(np.hypot(*d[:2])) / bearing.clearance
-            share = min(share, MAX_STEP / max(moved, 1e-30))
-            here = bearing.thinnest(at)
-            reach = share * (np.hypot(*d[:2]) + bearing.length / 2 * np.hypot(*d[2:]))
-            if reach < 0.5 * here:
-                continue
-            while bearing.thinnest(at + share * d) < 0.5 * here:
-                share /= 2
-        return share
-
 
 @dataclass(frozen=True)
 class Rest:
@@ -270,7 +252,7 @@ class Rest:
         q: (n,) coordinates [m, rad].
         theta: angle of the pinion [rad].
         forces: of films and teeth.
-        residual: largest force that is not balanced, over the largest force [1].
+        residual: what is not balanced over the load, both by how they would move the shafts [1].
     """
 
     unit: Transmission
@@ -290,113 +272,3 @@ class Rest:
         first, second = self.unit.spins
         heat = sum(f.dissipated for f in self.forces.films)
         return self.input_torque * first, -self.unit.torque * second, heat
-
-
-def rest(
-    unit: Transmission,
-    theta: float = 0.0,
-    *,
-    start: Array | None = None,
-    loads: tuple[float, ...] = LOADS,
-) -> Rest:
-    """Static equilibrium, found by raising the load from the unloaded datum.
-
-    A film that conserves its oil may run dry on that way and yet carry the whole load: then the
-    search goes on from where films rest that find oil everywhere, under the load or a heavier one.
-
-    Args:
-        unit: the transmission.
-        theta: angle of the pinion [rad].
-        start: (n,) coordinates of an equilibrium nearby [m, rad]; then the load is not raised.
-        loads: shares of the load on the way [1].
-
-    Raises:
-        SolverError: if films or teeth cannot carry the load; ``error.solution`` is the equilibrium
-            at the share of it before, if there was one.
-    """
-    if start is not None:
-        return _rest(unit, theta, np.array(start, dtype=float), (1.0,))
-    try:
-        return _rest(unit, theta, _touching(unit, theta), loads)
-    except SolverError:
-        for way, other in product(WAYS_DOWN, _oiled(unit)):
-            with suppress(SolverError):
-                near = _rest(other, theta, _touching(other, theta), (*loads, way[0]))
-                return _rest(unit, theta, near.q, way)
-        raise
-
-
-def _rest(unit: Transmission, theta: float, q: Array, loads: tuple[float, ...]) -> Rest:
-    """Equilibrium under one share of the load after the other."""
-    K, f, found = unit.matrices[1], unit.load, list[Rest]()
-    with reached(lambda: found[-1] if found else None):
-        for share in loads:
-            q, forces, residual = _newton(unit, K, share * f, q, theta)
-            found.append(Rest(unit, q, theta, forces, residual))
-    return found[-1]
-
-
-def _oiled(unit: Transmission) -> Iterator[Transmission]:
-    """The unit with films that find oil everywhere, with their grooves and without."""
-    for k in range(max(len(bearing.oiled) for _, bearing, _ in unit.journals)):
-        rotors = []
-        for rotor in (unit.pinion, unit.gear):
-            oiled = {node: (one.oiled or (one, one))[k] for node, one in rotor.bearings.items()}
-            rotors.append(replace(rotor, bearings=oiled))
-        yield replace(unit, pinion=rotors[0], gear=rotors[1])
-
-
-def _touching(unit: Transmission, theta: float) -> Array:
-    """Teeth touch, and journals are where films begin to carry: ahead of the load, as they turn."""
-    closed = 1e-7 + unit.mesh.least_gap(theta)
-    q = closed / unit.mesh.pair.rb[1] * unit.rigid[1][:, 5]
-    x, y = unit.mesh.forces(unit.wheels @ q, theta).force[:2]
-    # the gear is loaded and turns the other way than the pinion: both move alike
-    ahead = np.array([-y, x]) / max(np.hypot(x, y), 1e-300)
-    least = min(bearing.clearance for _, bearing, _ in unit.journals)
-    return q + MAX_STEP * least * (unit.rigid[0] + unit.rigid[1])[:, :2] @ ahead
-
-
-def _newton(
-    unit: Transmission, K: Array, f: Array, q: Array, theta: float
-) -> tuple[Array, Forces, float]:
-    still, warm = np.zeros(q.size), None
-    scale = _scale(unit)
-    for _ in range(MAX_ITERATIONS):
-        forces = unit.forces(q, still, theta, warm)
-        R, warm = f + forces.force - K @ q, forces.films
-        residual = float(np.abs(R * scale).max() / np.abs(f * scale).max())
-        if residual < RESIDUAL_RTOL:
-            if not forces.mesh.load.any():
-                raise SolverError(
-                    "contact is lost: no teeth touch at rest.", hint="Raise the load."
-                )
-            return q, forces, residual
-        if not forces.mesh.stiffness.any():
-            raise SolverError(
-                f"contact is lost: no teeth touch on the way to rest; {residual:.1e} of the load "
-                "is left.",
-                hint="Raise the load or the viscosity.",
-            )
-        thin = min(f.bearing.thinnest(f.motion) / f.bearing.clearance for f in forces.films)
-        if thin < MIN_FILM_RATIO:
-            break
-        try:
-            step = np.linalg.solve(K + forces.stiffness, R)
-        except np.linalg.LinAlgError:  # dry films hold no tilt
-            break
-        q = q + unit.allowed(q, step) * step
-    raise SolverError(
-        f"the unit does not come to rest under {unit.torque} N m at {unit.speed:.1f} rad/s: "
-        f"{residual:.1e} of the load is left; the thinnest film has "
-        f"{thin:.3g} clearances.",
-        hint="Raise speed or viscosity, lower the torque, or move the oil inlets.",
-    )
-
-
-def _scale(unit: Transmission) -> Array:
-    """(n,) lengths that turn forces into moments."""
-    metres = [rotor.shaft.in_metres for rotor in (unit.pinion, unit.gear)]
-    if unit.housing is not None:
-        metres.append(np.ones(unit.housing.n, dtype=bool))
-    return np.where(np.concatenate(metres), unit.mesh.pair.rb[0], 1.0)

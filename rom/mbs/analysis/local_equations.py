@@ -121,24 +121,6 @@ class Instant:
             return value, G.copy(), M.copy()
         return value, self.pattern.gradient(G), self.pattern.matrix(M)
 
-    def damping(self, state: State) -> Any:
-        """(n, n) derivative of the residual by the velocities."""
-        q, v, a, lam = state.q, state.v, state.a, state.lam
-        self.residual(q, v, a, lam)
-        apply_laws(self.laws, self.W, self.t, slopes=True)
-        tangents(self.system, self.W, v, a, lam, (0.0, 1.0, 0.0))
-        return self.W.S.copy() if self.pattern is None else self.pattern.matrix(self.W.S)
-
-    def stiffness(self, state: State) -> Any:
-        """(n, n) derivative of the residual by the coordinates, rotations in the body frame."""
-        q, v, a, lam = state.q, state.v, state.a, state.lam
-        if not self.exact(state):
-            return self.difference(lambda dq: self.residual(self.shifted(q, dq), v, a, lam))
-        self.residual(q, v, a, lam)
-        apply_laws(self.laws, self.W, self.t, slopes=True)
-        tangents(self.system, self.W, v, a, lam, (0.0, 0.0, 1.0))
-        return self.W.Kt.copy() if self.pattern is None else self.pattern.matrix(self.W.Kt)
-
     def difference(self, f: Any) -> Any:
         """(n, n) central differences of forces f by motions or velocities."""
         if self.pattern is None:
@@ -159,9 +141,20 @@ class Instant:
         return bool(rests and np.abs(self.W.theta).max(initial=0.0) < ELASTIC_TURN)
 
     def matrices(self, state: State) -> tuple[Any, Any, Any]:
-        """(n, n) derivatives of the residual by accelerations, velocities, coordinates."""
-        C, K = self.damping(state), self.stiffness(state)
-        return self.gradient(state.q, state.v)[2], C, K
+        """(n, n) derivatives of the residual by accelerations, velocities, coordinates.
+
+        Those by coordinates for rotations in the body frame.
+        """
+        q, v, a, lam = state.q, state.v, state.a, state.lam
+        exact = self.exact(state)
+        self.residual(q, v, a, lam)
+        apply_laws(self.laws, self.W, self.t, slopes=True)
+        tangents(self.system, self.W, v, a, lam, (0.0, 1.0, 1.0))
+        found = self.W.S, self.W.Kt
+        C, K = (A.copy() if self.pattern is None else self.pattern.matrix(A) for A in found)
+        if not exact:
+            K = self.difference(lambda dq: self.residual(self.shifted(q, dq), v, a, lam))
+        return self.gradient(q, v)[2], C, K
 
     def reactions(self, state: State) -> Array:
         """(n, m) derivative of the residual by the multipliers; friction may depend on them."""

