@@ -24,9 +24,9 @@ import pytest
 
 import rom
 from cases.boxes import BOX_GEO
-from cases.command import ROOT, environment
+from cases.command import ROOT, environment, python
 from cases.long import ROM_LONG, few
-from cases.solid import block
+from cases.solid import block, reduced
 from rom.process import child
 
 pytestmark = pytest.mark.once
@@ -66,9 +66,7 @@ FORMS = {
 
 @pytest.fixture(scope="module")
 def body(tmp_path_factory):
-    kinds = {"root": "rbe2", "tip": "rbe2"}
-    made = rom.reduce(block(), method=rom.CraigBampton(4), interfaces=kinds, reference="root",
-                      certify=False)  # fmt: skip
+    made = reduced(4, block(), reference="root")
     return rom.save(made, tmp_path_factory.mktemp("body") / "bar.rom.npz")
 
 
@@ -127,8 +125,7 @@ def loaded_by_python():
     """Modules that `python -m` itself loads from there, before any package can forestall it."""
     with tempfile.TemporaryDirectory() as folder:
         Path(folder, "shown.py").write_text("import sys\nprint(*sys.modules)\n")
-        done = subprocess.run([sys.executable, "-m", "shown"], cwd=folder, env=environment(),
-                              capture_output=True, text=True, check=True)  # fmt: skip
+        done = python("-m", "shown", cwd=folder, check=True)
     return frozenset(done.stdout.split())
 
 
@@ -158,8 +155,7 @@ def test_no_library_reads_a_file_of_the_folder(entry, planted):
     """Whatever it is called: all that is opened is looked at."""
     code = LOADED.format(folder=os.getcwd(), entry=ENTRIES[entry])
     env = environment(MPLCONFIGDIR="settings", MATPLOTLIBRC=".", NUMBA_CACHE_DIR=".")
-    done = subprocess.run([sys.executable, "-P", "-c", code], env=env, capture_output=True,
-                          text=True, timeout=120, check=False)  # fmt: skip
+    done = python("-P", "-c", code, env=env, timeout=120)
     assert done.stdout.split() == ["end"], done.stdout + done.stderr
     assert left(planted) == [] and not Path("settings").exists()
 
@@ -168,7 +164,8 @@ def test_a_child_imports_where_no_settings_lie(planted, tmp_path):
     """Those of the folder would let matplotlib start LaTeX."""
     module = tmp_path / "shown.py"
     module.write_text("import matplotlib as m\nprint(m.rcParams['text.usetex'])\n")
-    pytest.importorskip("matplotlib", reason="matplotlib is not installed")
+    if find_spec("matplotlib") is None:  # imported here it would read them itself
+        pytest.skip("matplotlib is not installed")
     done = child.run(child.python("shown"), variables={"PYTHONPATH": f"{ROOT}:{tmp_path}"})
     assert (done.code, done.out) == (0, "False\n"), done.err
 
@@ -198,8 +195,7 @@ def test_no_function_that_starts_a_process_runs_what_lies_in_the_folder(function
     """Whether it succeeds on this machine is not asked."""
     if function == "mesh" and not HAS_FE:
         pytest.skip("gmsh is not installed")
-    subprocess.run([sys.executable, "-P", "-c", STARTERS[function]], env=environment(), check=False,
-                   timeout=120, capture_output=True)  # fmt: skip
+    python("-P", "-c", STARTERS[function], timeout=120)
     assert left(planted) == []
 
 
@@ -208,8 +204,7 @@ def test_petsc_reads_no_option_file_of_the_folder_but_its_variable(planted):
     if not HAS_FE:
         pytest.skip("dolfinx is not installed")
     code = "import rom.fe.jit; from petsc4py import PETSc; print(sorted(PETSc.Options().getAll()))"
-    done = subprocess.run([sys.executable, "-P", "-c", code], capture_output=True, text=True,
-                          env=environment(PETSC_OPTIONS="-mine 1"), check=True)  # fmt: skip
+    done = python("-P", "-c", code, env=environment(PETSC_OPTIONS="-mine 1"), check=True)
     assert done.stdout.splitlines()[0] == "['mine', 'skip_petscrc']"  # 3.25 adds a remark
 
 
@@ -319,8 +314,7 @@ def test_a_folder_that_another_process_sweeps_before_it_is_locked_is_made_anew(
 def test_numba_loads_nothing_from_where_the_folder_says(planted):
     code = "import rom, numba.core.config as c; print(repr(c.CACHE_DIR))"
     env = {k: v for k, v in environment().items() if k != "NUMBA_CACHE_DIR"}  # the user's own word
-    done = subprocess.run([sys.executable, "-P", "-c", code], env=env, check=True,
-                          capture_output=True, text=True)  # fmt: skip
+    done = python("-P", "-c", code, env=env, check=True)
     assert done.stdout.strip() == "''"
     assert np.array_equal(left(planted), [])
 

@@ -67,6 +67,8 @@ WRONG = {  # E, rho: what is said
     "E in kPa": (2.1e8, 7850.0, "163.6 m/s"),
     "E in psi": (3.05e7, 7850.0, "62.33 m/s"),
     "ksi and lb/in^3": (3.05e4, 0.284, "0.284 kg/m^3"),
+    "just too slow": (9.5e4, 1000.0, "9.747 m/s"),
+    "just too fast": (4.1e11, 1000.0, "2.025e+04 m/s"),
 }
 RIGHT = {  # E, rho
     "steel": (210e9, 7850.0), "diamond": (1.2e12, 3510.0), "beryllium": (3.03e11, 1850.0),
@@ -74,6 +76,7 @@ RIGHT = {  # E, rho
     "honeycomb": (1e9, 50.0), "aerogel": (1e4, 2.0), "tungsten": (4e11, 19300.0),
     "balsa": (3e9, 120.0), "osmium": (5.6e11, 22590.0), "lead": (1.6e10, 11340.0),
     "gold": (7.8e10, 19300.0), "polystyrene foam": (3e6, 15.0), "concrete": (3e10, 2400.0),
+    "just not too slow": (1.05e5, 1000.0), "just not too fast": (3.9e11, 1000.0),
 }  # fmt: skip
 
 

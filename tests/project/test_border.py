@@ -277,7 +277,6 @@ def test_pictures_refuse_what_they_cannot_draw_before_they_look_at_the_rest(func
 @pytest.mark.fenicsx
 @pytest.mark.parametrize("argument", ["path", "material", "degree", "parameters"])
 def test_meshes_refuse_what_they_cannot_read(argument):
-    pytest.importorskip("dolfinx", reason="dolfinx is not installed")
     given = {"path": "none.msh", "material": rom.Material(1.0, 0.3, 1.0)} | {argument: object()}
     with pytest.raises(rom.ConfigError, match=f"{argument} = "):
         rom.fe.model(**given)
@@ -292,7 +291,6 @@ def test_forces_with_a_phase_are_numbers():
 
 @pytest.mark.fenicsx
 def test_forms_need_a_compiler_and_say_which(monkeypatch, tmp_path):
-    pytest.importorskip("dolfinx", reason="dolfinx is not installed")
     from mpi4py import MPI
 
     from rom.fe.jit import compiling

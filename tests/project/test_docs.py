@@ -220,7 +220,6 @@ def test_formulas_mean_what_is_written(formula, meaning, pages):
 @pytest.mark.fenicsx
 @pytest.mark.slow
 def test_the_site_builds_without_warnings(tmp_path):
-    pytest.importorskip("dolfinx", reason="docstrings of rom.fe need it")
     pytest.importorskip("sphinx", reason="the site is built in the environment of the developers")
     source = tmp_path / "docs"  # `make docs` may be writing into the folder itself
     shutil.copytree(
@@ -281,7 +280,6 @@ HOLDS = {STEP_PART: lever_balances}
 @pytest.mark.long
 def test_commands_of_the_page_about_a_part_run(tmp_path, monkeypatch):
     """As typed, one after the other, with the file that the page shows."""
-    pytest.importorskip("gmsh", reason="gmsh writes the part")
     monkeypatch.chdir(tmp_path)
     text = STEP_PART.read_text()
     exec(CODE.search(text).group(1), {})

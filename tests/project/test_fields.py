@@ -10,7 +10,7 @@ from textwrap import dedent
 import pytest
 
 import rom
-from cases.command import environment
+from cases.command import environment, python
 from cases.paths import ROOT
 from rom import fields
 from rom.components.gear_mesh import GearPair
@@ -45,8 +45,7 @@ NO_COMPONENTS = "import sys; sys.modules['rom.components'] = None\n"  # as if th
 
 def run(code, *paths):
     path = ":".join(map(str, [*paths, environment()["PYTHONPATH"]]))
-    done = subprocess.run([sys.executable, "-c", dedent(code)], text=True, capture_output=True,
-                          env=environment(PYTHONPATH=path), timeout=300, check=False)  # fmt: skip
+    done = python("-c", dedent(code), env=environment(PYTHONPATH=path), timeout=300)
     assert done.returncode == 0, done.stderr
     return done
 

@@ -19,7 +19,7 @@ import rom.report
 import rom.view
 from cases.files.toml_files import PENDULUM
 from cases.mbs.mechanisms import rotor
-from cases.solid import STEEL, block, composite
+from cases.solid import STEEL, block, composite, reduced
 from cases.wheels import beam_ring, bladed_model, bladed_ring
 from rom.components.gear_mesh.gears.geometry import GearPair
 from rom.components.journal_bearing.films.tabulated import table_of
@@ -90,7 +90,7 @@ def film_bearing():
 
 @cache
 def body():
-    return rom.reduce(model(), method=rom.CraigBampton(3), interfaces=KINDS, certify=False)
+    return reduced(3, model())
 
 
 @cache

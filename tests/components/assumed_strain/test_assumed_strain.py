@@ -178,7 +178,6 @@ def test_processes_share_the_sides():
 @pytest.mark.mpi
 def test_two_processes_find_the_frequencies_of_one(tmp_path):
     """Each assembles its sides; the sum has the spectrum of the patches on one process."""
-    pytest.importorskip("mpi4py", reason="needs MPI")
     script = RANKS / "sheet_under_mpi.py"
     environment = {
         "OMPI_ALLOW_RUN_AS_ROOT": "1",

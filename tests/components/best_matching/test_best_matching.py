@@ -7,7 +7,7 @@ from scipy.linalg import eigh, expm
 from scipy.optimize import brentq, minimize
 
 import rom
-from cases.solid import block
+from cases.solid import block, reduced
 from rom import rotation
 from rom.body.reference import reference_motion, rigid_elastic, rigid_mass
 from rom.components.best_matching import (
@@ -177,10 +177,7 @@ def model():
 
 @pytest.fixture(scope="module")
 def bodies(model):
-    at_root = rom.reduce(
-        model, method=rom.CraigBampton(10), interfaces={"root": "rbe2", "tip": "rbe2"},
-        reference="root", certify=False,
-    )  # fmt: skip
+    at_root = reduced(10, model, reference="root")
     return at_root, at_root.with_reference("mean-axis")
 
 

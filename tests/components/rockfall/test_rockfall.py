@@ -417,7 +417,6 @@ def test_a_mechanism_of_bodies_says_the_same(slab_body, recovery):
 @pytest.mark.fenicsx
 def test_the_slab_of_dolfinx_bends_as_its_unreduced_elements():
     """Newmark's mean acceleration on 5000 dofs under the force of the reduced impact."""
-    pytest.importorskip("dolfinx", reason="needs finite elements")
     model = rom.fe.model(
         MESHES / "gallery_slab.geo", material=CONCRETE, parameters={"lc": 0.5, "patch": 1.0}
     )
@@ -533,7 +532,6 @@ def test_a_boulder_beside_the_slab_is_named():
 
 @pytest.mark.fenicsx
 def test_a_patch_beyond_the_supports_is_refused():
-    pytest.importorskip("gmsh", reason="needs gmsh")
     from rom.fe.mesh.read import read_mesh
 
     with pytest.raises(ConfigError, match=r"patch = 4 < B = 3\.5"):

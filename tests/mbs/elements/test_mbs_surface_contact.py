@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import rom
-from cases.solid import block
+from cases.solid import block, reduced
 from rom import rotation
 from rom.errors import ConfigError, ModelError
 from rom.mbs.elements.contact.impact import Impact
@@ -25,8 +25,7 @@ def below(points):
 @pytest.fixture(scope="module")
 def brick():
     model = block(size=SIZE, cells=(3, 2, 2))
-    kinds = {"root": "rbe2", "tip": "rbe2"}
-    return rom.reduce(model, method=rom.CraigBampton(2), interfaces=kinds, certify=False)
+    return reduced(2, model)
 
 
 def on_floor(brick, law=LAW, **start):

@@ -1,15 +1,13 @@
 """Tables and stages: what compiled code is told of arrays, and which kernels a system asks for."""
 
 import pickle
-import subprocess
-import sys
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import rom
-from cases.command import environment
+from cases.command import python
 from cases.mbs.mechanisms import random_body
 from cases.mbs.trusses import truss
 from rom.body.nonlinear.quartic import Quartic, n_entries
@@ -281,8 +279,7 @@ print(rom.simulate(mech, t_end=0.01, dt=1e-3, progress=False).position("ball")[-
 """
     orders = [(), ("rom.mbs.elements.contact.points", "rom.mbs.equations.linear_solve")]
     said = {
-        subprocess.run([sys.executable, "-c", code, *order], env=environment(), text=True,
-                       capture_output=True, check=True, timeout=300).stdout
+        python("-c", code, *order, timeout=300, check=True).stdout
         for order in orders
     }  # fmt: skip
     assert len(said) == 1

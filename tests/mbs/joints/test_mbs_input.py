@@ -49,6 +49,10 @@ WRONG = {
         "x", **UNIT | {"inertia": [[1, 0.5, 0], [0, 1, 0], [0, 0, 1]]}), ModelError, "symmetric"),
     "quaternion zero": (lambda m, *_: m.add_rigid("x", **UNIT, orientation=(0, 0, 0, 0)),
                         ConfigError, "quaternion [0.0, 0.0, 0.0, 0.0]"),
+    "quaternion of length 1.1": (lambda m, *_: m.add_rigid("x", **UNIT, orientation=(1.1, 0, 0, 0)),
+                                 ConfigError, "quaternion"),
+    "stretch as orientation": (lambda m, *_: m.add_rigid(
+        "x", **UNIT, orientation=np.diag([2, 1, 1])), ConfigError, "orientation"),
     "mirror as orientation": (lambda m, *_: m.add_rigid(
         "x", **UNIT, orientation=np.diag([1, 1, -1])), ConfigError, "orientation"),
     "position of text": (lambda m, *_: m.add_rigid("x", **UNIT | {"at": ("a", 0, 0)}),
