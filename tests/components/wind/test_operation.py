@@ -181,7 +181,6 @@ def test_a_gust_speeds_the_rotor_up_by_what_its_inertia_takes():
         (lambda: operate(lambda t: np.nan, 10.0), "parked in a wind of nan"),
         (lambda: operate(lambda t: 8.0, 10.0, dt=2.0), "dt = 2 must be above 0"),
         (lambda: operate(lambda t: 8.0, -1.0), "t_end"),
-        (lambda: operate(8.0, 10.0), "wind"),
         (
             lambda: operate(Table([0.0, 5.0], [8.0, 9.0]), 10.0),
             "from 0 s to 5 s; asked is t = 5.05",
