@@ -82,5 +82,5 @@ def test_a_profile_that_turns_has_a_share_of_what_lacks_to_potential_flow():
 
 
 def test_a_ratio_that_is_none_is_named():
-    with pytest.raises(ConfigError, match="chord_over_radius = -0.1"):
+    with pytest.raises(ConfigError, match=r"chord_over_radius = -0\.1"):
         profiles()["NACA64"].rotating(-0.1)
