@@ -3,7 +3,6 @@
 The folder is full of modules and option files that leave a mark when they are read as a program.
 """
 
-import ast
 import fcntl
 import json
 import os
@@ -317,47 +316,3 @@ def test_numba_loads_nothing_from_where_the_folder_says(planted):
     done = python("-P", "-c", code, env=env, check=True)
     assert done.stdout.strip() == "''"
     assert np.array_equal(left(planted), [])
-
-
-DIRECT = {"Popen", "call", "check_call", "check_output", "run", "getoutput", "getstatusoutput"}
-IN_OS = ("system", "popen", "exec", "spawn", "posix_spawn", "fork")
-EXCEPTIONS = {
-    "process/child.py": "the one way",
-    "process/child_entry.py": "becomes the command",
-}
-
-
-def starts(tree):
-    """Lines that start a process without `rom.process.child`."""
-    for node in ast.walk(tree):
-        if isinstance(node, ast.ImportFrom) and node.module in ("subprocess", "multiprocessing"):
-            yield node.lineno
-        if isinstance(node, ast.Import):
-            if {alias.name for alias in node.names} & {"multiprocessing", "pty"}:
-                yield node.lineno
-        if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
-            module, name = node.value.id, node.attr
-            if (module == "subprocess" and name in DIRECT - {"Popen"}) or (
-                module == "os" and name.startswith(IN_OS)
-            ):
-                yield node.lineno
-        if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
-            if node.func.attr == "Popen":
-                yield node.lineno
-
-
-def test_processes_are_started_in_one_place():
-    found = {
-        str(path.relative_to(ROOT / "rom")): list(starts(ast.parse(path.read_text())))
-        for path in (ROOT / "rom").rglob("*.py")
-    }
-    assert {name for name, lines in found.items() if lines} == set(EXCEPTIONS)
-
-
-@pytest.mark.parametrize(
-    "text", ["import subprocess\nsubprocess.run([])", "import os\nos.system('')", "from subprocess "
-             "import run", "import subprocess as s\ns.Popen([])", "import os\nos.execvp('a', [])",
-             "import multiprocessing"],
-)  # fmt: skip
-def test_a_process_started_elsewhere_would_be_seen(text):
-    assert list(starts(ast.parse(text)))
