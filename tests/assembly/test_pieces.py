@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 from scipy.spatial import cKDTree
 
 import rom
-from cases.mbs.elastica import elastica
+from cases.beam import elastica
 from cases.paths import RANKS, ROOT
 from cases.ranks.environment import ENVIRONMENT
 from rom import rotation

@@ -13,7 +13,7 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.optimize import brentq
 
-from cases.mbs.elastica import elastica, load_at
+from cases.beam import elastica, load_at
 from cases.mbs.slender import reduced, slender
 from rom.body.nonlinear import quartic
 from rom.body.nonlinear.quartic import Quartic

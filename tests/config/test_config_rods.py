@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import rom
-from cases.mbs.elastica import elastica
+from cases.beam import elastica
 from rom import rotation
 from rom.components.cosserat.bodies import body, shape_of
 from rom.components.cosserat.shapes import straight

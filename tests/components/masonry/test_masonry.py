@@ -12,13 +12,7 @@ from cases.solid import STEEL, block
 from rom.components.masonry.block_contact import SLIDES
 from rom.components.masonry.limits import Rock, arch, stands
 from rom.components.masonry.motion import simulate
-from rom.components.masonry.stones import (
-    Masonry,
-    polygon_moments,
-    reduced_stone,
-    stone,
-    touching,
-)
+from rom.components.masonry.stones import Masonry, polygon_moments, reduced_stone, stone, touching
 from rom.eigen.verbs import rigid_motions
 from rom.errors import ConfigError, MaterialError, ModelError
 

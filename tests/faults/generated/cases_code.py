@@ -6,12 +6,7 @@ import zipfile
 
 import numpy as np
 
-from generated.case import (
-    Silent,
-    arrays_changed,
-    case,
-    write,
-)
+from generated.case import Silent, arrays_changed, case, write
 from generated.stock import STEEL
 from rom.errors import ConfigError, FileFormatError, UnsafeFileError
 

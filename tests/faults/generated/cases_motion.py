@@ -7,12 +7,7 @@ import rom
 from generated.case import Works, case, require, write
 from generated.stock import pendulum
 from rom.cli.main import main
-from rom.errors import (
-    ConfigError,
-    FileFormatError,
-    ResourceError,
-    SolverError,
-)
+from rom.errors import ConfigError, FileFormatError, ResourceError, SolverError
 
 RESUMED = {  # what is wrong with the folder from which a run goes on
     "an empty folder": (lambda folder: (folder / "out").mkdir(), "out"),

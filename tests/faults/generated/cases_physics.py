@@ -6,13 +6,7 @@ import rom
 from generated.case import Warned, Works, case
 from generated.cases_reliability import matrices, skewed, spoilt
 from generated.stock import KINDS, STEEL, model, origin
-from rom.errors import (
-    ConfigError,
-    MaterialError,
-    ModelError,
-    QualityGateError,
-    SolverError,
-)
+from rom.errors import ConfigError, MaterialError, ModelError, QualityGateError, SolverError
 
 
 def unheld(folder):

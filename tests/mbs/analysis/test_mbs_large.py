@@ -12,8 +12,8 @@ from scipy.linalg import eigvals
 from scipy.optimize import brentq
 
 import rom
+from cases.beam import elastica
 from cases.long import few
-from cases.mbs.elastica import elastica
 from cases.mbs.mechanisms import random_body, slider_crank
 from rom.components.cosserat import body, straight
 from rom.errors import ConfigError, ModelError, ModesMissedError, RomWarning, SolverError

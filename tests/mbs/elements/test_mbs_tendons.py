@@ -5,13 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import rom
-from cases.mbs.mechanisms import (
-    prepared,
-    random_body,
-    random_pose,
-    stored_at,
-    tangents_at,
-)
+from cases.mbs.mechanisms import prepared, random_body, random_pose, stored_at, tangents_at
 from cases.mbs.tangents import check_tangents, difference, energy_gradient, forces_at, near
 from rom.components.tendons.tendons import TENDONS_FAMILY
 from rom.errors import ConfigError, RomWarning, SolverError

@@ -219,17 +219,15 @@ ASKED = {  # stages -> what asks for them
     "coordinate_states": [ELEMENTS["motors"], ELEMENTS["frictions"], ELEMENTS["stops"]],
     "coordinate_states coupling_row coupling_stiffness": [geared_body],
     "rolling_row rolling_stiffness": [
-        lambda m, a, b: m.rolling("e", m.ground.marker((0, 0, 0)), b, normal=(0, 0, 1), radius=0.3),
+        lambda m, a, b: m.rolling("e", m.ground.marker((0, 0, 0)), b, normal=(0, 0, 1), radius=0.3)
     ],
     "elastic_damping elastic_stiffness": [lambda m, a, b: flexible_body(m)],
     "elastic_damping elastic_stiffness fitted_motion fitted_wrench_stiffness": [
-        lambda m, a, b: m.force("e", m.add_flexible("c", truss()).marker("mean"), (1, 0, 0)),
+        lambda m, a, b: m.force("e", m.add_flexible("c", truss()).marker("mean"), (1, 0, 0))
     ],
     "elastic_damping elastic_stiffness "
     "bent_coordinates bent_integrals bent_mass bent_damping bent_motion bent_stiffness "
-    "bent_wrench_stiffness": [
-        lambda m, a, b: flexible_body(m, stiffened=True),
-    ],
+    "bent_wrench_stiffness": [lambda m, a, b: flexible_body(m, stiffened=True)],
 }
 
 

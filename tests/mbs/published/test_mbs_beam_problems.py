@@ -5,8 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import rom
-from cases.beam import gauss_hermite, stiffened_beam
-from cases.mbs.elastica import elastica
+from cases.beam import elastica, gauss_hermite, stiffened_beam
 from cases.mbs.mechanisms import nodal_body
 from rom.mbs.mechanism import Mechanism
 
