@@ -12,8 +12,6 @@ from cases.solid import block, reduced
 from rom.cli.main import main
 from rom.view.scenes import window
 
-KINDS = {"root": "rbe2", "tip": "rbe2"}
-
 
 @pytest.fixture(scope="module")
 def bar():

@@ -27,7 +27,6 @@ from rom.io.programs.openfast_reading import read_openfast
 from rom.io.sid.dialect import read_sid
 
 HERE = TESTS / "reference" / "foreign"
-KINDS = {"root": "rbe2", "tip": "rbe2"}
 MUTANTS = 60
 pytestmark = pytest.mark.filterwarnings("ignore::rom.errors.RomWarning")
 
