@@ -48,6 +48,13 @@ def pytest_collection_modifyitems(config, items):
     items.sort(key=lambda item: rank.get(item.path, len(rank)))
 
 
+def pytest_runtest_setup(item):
+    """What is marked `fenicsx` needs it, in whatever way it is started."""
+    if item.get_closest_marker("fenicsx"):
+        for name in ("dolfinx", "gmsh"):
+            pytest.importorskip(name, reason=f"{name} is not installed")
+
+
 @pytest.hookimpl(hookwrapper=True)
 def pytest_runtest_makereport(item):
     """What the light half skips is run nowhere: it needs the mark `once`."""

@@ -24,7 +24,7 @@ def compiled(module: str, cases: Sequence[str]) -> Iterator[Finding]:
         One finding per case as soon as it has ended.
     """
     cores, waiting = len(os.sched_getaffinity(0)), list(cases)
-    running: dict[str, subprocess.Popen[bytes]] = {}
+    running: dict[str, subprocess.Popen[bytes]] = {}  # noqa: TID251  a type
     while waiting or running:
         while waiting and len(running) < cores:
             case = waiting.pop(0)

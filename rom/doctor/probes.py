@@ -41,7 +41,7 @@ class Probe:
         ending: "" after a good end, else what happened.
     """
 
-    process: subprocess.Popen[bytes]
+    process: subprocess.Popen[bytes]  # noqa: TID251  a type
     ending: str = ""
 
     def answer(self) -> dict[str, dict[str, Any]]:

@@ -9,8 +9,8 @@ from scipy.sparse import identity
 
 import rom
 from cases.halves import COUPLED, ROOT, half, halves, joined, study, whole
+from cases.measures import surface
 from cases.solid import block
-from cases.surfaces import surface
 from rom.assembly import coupling
 from rom.body.records import Marker, Patch
 from rom.eigen.verbs import rigid_motions

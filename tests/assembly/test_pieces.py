@@ -7,11 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from scipy.optimize import brentq
 from scipy.spatial import cKDTree
-from scipy.special import ellipe, ellipeinc, ellipk, ellipkinc
 
 import rom
+from cases.beam import elastica
 from cases.paths import RANKS, ROOT
 from cases.ranks.environment import ENVIRONMENT
 from rom import rotation
@@ -47,21 +46,6 @@ def clamped(pieces):
     assert set(markers) == {"root", "tip"}
     mech.fixed("wall", mech.ground.marker((0, 0, 0)), markers["root"])
     return mech, markers["tip"]
-
-
-def elastica(load):
-    """Slope [rad], place along and across over the length of the tip under load EI / L^2.
-
-    sqrt(load) = K(k) - F(arcsin(1 / (k sqrt 2)), k), the slope at the tip is arcsin(2 k^2 - 1).
-    """
-
-    def length(k):
-        return ellipk(k * k) - ellipkinc(np.arcsin(1 / (k * np.sqrt(2))), k * k)
-
-    k = brentq(lambda k: length(k) - np.sqrt(load), np.sqrt(0.5) + 1e-13, 1 - 1e-14)
-    m, s = k * k, 2 * k * k - 1
-    bent = ellipe(m) - ellipeinc(np.arcsin(1 / (k * np.sqrt(2))), m)
-    return np.arcsin(s), np.sqrt(2 * s / load), 1 - 2 / np.sqrt(load) * bent
 
 
 def tip_at(mech, tip, steps):

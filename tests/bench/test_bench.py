@@ -13,6 +13,7 @@ from scipy.linalg import eigh
 import rom
 from benchmarks import benchmarks, many_modes, updating, wheel
 from benchmarks.models import planetary_train, shaft_in_films
+from cases.command import python
 from cases.paths import ROOT
 from cases.solid import block
 from rom.eigen.verbs import rigid_motions
@@ -87,11 +88,7 @@ def test_the_integrator_is_measured_without_fenicsx():
         "from benchmarks.benchmarks import integrator\n"
         "for figure in integrator(turns=2): print(figure.case, figure.quantity, figure.value > 0)"
     )
-    done = subprocess.run(
-        [sys.executable, "-c", code],
-        env=os.environ | {"PYTHONPATH": str(ROOT)},
-        capture_output=True, text=True, timeout=600, check=False,
-    )  # fmt: skip
+    done = python("-c", code, env=os.environ | {"PYTHONPATH": str(ROOT)}, timeout=600)
     case = "26 elastic coordinates, 2000 steps"
     expected = [f"{case} steps per second True", f"{case} share outside compiled code True"]
     assert done.stdout.splitlines() == expected, done.stderr
@@ -173,7 +170,6 @@ def test_an_environment_that_cannot_be_made_is_named(tmp_path, monkeypatch):
 @pytest.mark.fenicsx
 @pytest.mark.parametrize("size", [30e3, 100e3])
 def test_the_beam_comes_within_a_tenth_of_the_size_asked_for(size):
-    pytest.importorskip("dolfinx", reason="dolfinx is not installed")
     from rom.fe.mesh.read import read_mesh
 
     solid = read_mesh(benchmarks.geometry("beam"), parameters=benchmarks._beam(size))
@@ -186,7 +182,6 @@ def test_the_beam_comes_within_a_tenth_of_the_size_asked_for(size):
 @pytest.mark.fenicsx
 @pytest.mark.long
 def test_a_wheel_and_its_sector_are_measured_on_the_same_modes():
-    pytest.importorskip("dolfinx", reason="the sector is meshed")
     coarse = wheel.WHEEL_SIZES | {"lc": 0.02, "lc_blade": 0.02}
     figures = {f.quantity.split(":")[0]: f.value for f in benchmarks.wheel(3, coarse)}
     assert 1e-8 < figures["reduced sector above sector"] < 1e-3

@@ -66,7 +66,6 @@ def test_a_rod_spins_up_as_the_exact_beam_does():
 @pytest.mark.fenicsx
 @pytest.mark.filterwarnings("ignore:Number of integration points")
 def test_the_bar_of_a_few_cells_is_measured():
-    pytest.importorskip("dolfinx", reason="dolfinx is not installed")
     stocky = {"L": 1.0, "b": 0.2, "h": 0.1, "lc": 0.1}
     rows = list(bench.measured(stocky, (8, 1), (10, 1), (8,), ()))
     assert all(row[2] >= 0 for row in rows)

@@ -1,7 +1,9 @@
-"""Planar Euler-Bernoulli beams of Hermite elements, a body made of one, and its spin-up."""
+"""Planar beams of Hermite elements, a body made of one, and its spin-up; the elastica."""
 
 import numpy as np
 from scipy.linalg import eigh
+from scipy.optimize import brentq
+from scipy.special import ellipe, ellipeinc, ellipk, ellipkinc
 
 from rom.body.flexible import FlexibleBody
 from rom.body.records import Marker
@@ -121,3 +123,23 @@ def spin_up(body, speed, t_end, *, duration=15.0, **options):
     tip, arm = sol.position("beam", "tip"), body.marker("tip").point - body.marker("root").point
     u = np.cos(psi) * tip[:, 0] + np.sin(psi) * tip[:, 1] - arm[0]
     return sol, u, np.cos(psi) * tip[:, 1] - np.sin(psi) * tip[:, 0]
+
+
+def load_at(slope):
+    """P L^2 / EI at a slope of the tip [rad]."""
+    m = (1 + np.sin(slope)) / 2
+    return (ellipk(m) - ellipkinc(np.arcsin(np.sqrt(0.5 / m)), m)) ** 2
+
+
+def elastica(load):
+    """Slope of the tip [rad], and its place along and across over the length, under P L^2 / EI.
+
+    A cantilever that is thin, inextensible and pushed across. With the slope a of the tip,
+    k^2 = (1 + sin a) / 2 and sin b = 1 / (k sqrt 2): sqrt(load) = K(k) - F(b, k), along
+    x / L = sqrt(2 sin a / load), across z / L = 1 - 2 (E(k) - E(b, k)) / sqrt(load).
+    Bisshopp, Drucker, Large deflection of cantilever beams, Quart. Appl. Math. 3 (1945) 272.
+    """
+    slope = brentq(lambda a: load_at(a) - load, 1e-9, np.pi / 2 - 1e-12, xtol=1e-15)
+    m = (1 + np.sin(slope)) / 2
+    bent = ellipe(m) - ellipeinc(np.arcsin(np.sqrt(0.5 / m)), m)
+    return slope, np.sqrt(2 * np.sin(slope) / load), 1 - 2 * bent / np.sqrt(load)

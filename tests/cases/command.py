@@ -13,9 +13,13 @@ def environment(**more):
     return os.environ | {"PYTHONPATH": path, "OMPI_MCA_mpi_yield_when_idle": "1"} | more
 
 
-def rom(*arguments, n=1, timeout=180, **options):
-    """Finished process of ``rom …``, on n ranks."""
-    launcher = mpirun(n) if n > 1 else []
-    command = [*launcher, sys.executable, "-m", "rom", *map(str, arguments)]
+def python(*arguments, timeout=180, launcher=(), **options):
+    """Finished process of Python, its texts captured."""
+    command = [*launcher, sys.executable, *map(str, arguments)]
     options = {"env": environment(), "capture_output": True, "text": True, "check": False} | options
     return subprocess.run(command, timeout=timeout, **options)
+
+
+def rom(*arguments, n=1, **options):
+    """Finished process of ``rom …``, on n ranks."""
+    return python("-m", "rom", *arguments, launcher=mpirun(n) if n > 1 else (), **options)

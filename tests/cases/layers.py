@@ -11,10 +11,7 @@ KINDS = {"root": "rbe2", "tip": "rbe2"}
 FOAM, ALLOY = rom.Material(E=700e6, nu=0.3, rho=60.0), rom.Material(E=70e9, nu=0.33, rho=2700.0)
 
 
-LAYERS = {
-    "t_core": rom.Thickness("core", 0.7, 1.8),
-    "t_faces": rom.Thickness("faces", 0.7, 1.4),
-}
+LAYERS = {"t_core": rom.Thickness("core", 0.7, 1.8), "t_faces": rom.Thickness("faces", 0.7, 1.4)}
 
 
 def panel(t_core=1.0, t_faces=1.0, *, E=1.0, core=FOAM):

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix, identity, kron
 
+import rom
 from rom.model import FEModel, Interface, Material, Region, SurfaceMesh
 
 STEEL = Material(E=210e9, nu=0.3, rho=7850.0)
@@ -54,6 +55,13 @@ def block(size=(1.0, 0.1, 0.08), cells=(8, 2, 2), material=STEEL, origin=(0.0, 0
     cell = size[1:] / cells[1:]
     interfaces = {name: _interface(name, face, points, cell) for name, face in faces.items()}
     return FEModel(0.5 * (K + K.T), M, points, interfaces, surface=_surface(number))
+
+
+def reduced(n_modes, model, **how):
+    """A model between rigid ends "root" and "tip", with modes of the held one, uncertified."""
+    kinds = {"root": "rbe2", "tip": "rbe2"}
+    return rom.reduce(model, method=rom.CraigBampton(n_modes), interfaces=kinds, certify=False,
+                      **how)  # fmt: skip
 
 
 def composite(materials, region, size=(1.0, 0.1, 0.08), cells=(8, 2, 2), origin=(0.0, 0.0, 0.0)):

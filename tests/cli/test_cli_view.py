@@ -1,25 +1,21 @@
 """rom view: a window where there is a display, a picture where there is none."""
 
-import subprocess
 import sys
 
 import numpy as np
 import pytest
 
 import rom
-from cases.command import environment
+from cases.command import python
 from cases.files.toml_files import CRANK
-from cases.solid import block
+from cases.solid import block, reduced
 from rom.cli.main import main
 from rom.view.scenes import window
-
-KINDS = {"root": "rbe2", "tip": "rbe2"}
 
 
 @pytest.fixture(scope="module")
 def bar():
-    return rom.reduce(block(cells=(6, 1, 1)), method=rom.CraigBampton(6), interfaces=KINDS,
-                      reference="root", name="bar", certify=False)  # fmt: skip
+    return reduced(6, block(cells=(6, 1, 1)), reference="root", name="bar")
 
 
 @pytest.fixture
@@ -103,8 +99,7 @@ def test_keys_and_time_change_what_the_window_shows(bar, tmp_path):
     """Off-screen: six frames on, the next mode, and around to the first again."""
     pytest.importorskip("pyvista", reason="VTK comes with the pictures")
     window.leave(window.mode_scenes(bar, 2), tmp_path)
-    done = subprocess.run([sys.executable, "-c", CODE, tmp_path], env=environment(),
-                          capture_output=True, text=True, timeout=600, check=False)  # fmt: skip
+    done = python("-c", CODE, tmp_path, timeout=600)
     assert done.stdout.split() == ["True", "True", "True", "0"], done.stderr
 
 

@@ -111,7 +111,6 @@ def test_half_a_point_is_refused():
 @pytest.mark.filterwarnings(f"ignore::{RomWarning.__module__}.RomWarning")
 def test_a_step_file_swings_on_the_face_chosen(tmp_path):
     """A cantilever of 200 x 20 x 10 mm; Euler and Bernoulli are 1 % low, for the hinge is stiff."""
-    pytest.importorskip("dolfinx", reason="the part is made of finite elements")
     pytest.importorskip("pyvista", reason="pictures need pyvista")
     step_box(tmp_path / "bar.step", 200, 20, 10)
     done = run_rom("swing", "bar.step", "--hinge", "0,0.01,0.005", "--material", "aluminium",
@@ -133,7 +132,6 @@ def test_a_step_file_swings_on_the_face_chosen(tmp_path):
 @pytest.mark.filterwarnings(f"ignore::{RomWarning.__module__}.RomWarning")
 def test_a_step_file_swings_about_its_bore(tmp_path):
     """A plate with two bores, on the small one: a compound pendulum, released flat."""
-    pytest.importorskip("dolfinx", reason="the part is made of finite elements")
     pytest.importorskip("pyvista", reason="pictures need pyvista")
     step_plate(tmp_path / "plate.step")
     done = run_rom("swing", "plate.step", "-p", "lc=0.006", "--face", "pin=radius:0.006",

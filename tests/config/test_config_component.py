@@ -255,7 +255,6 @@ def test_the_sample_describes_the_rod_of_the_demo():
 @pytest.mark.long
 @pytest.mark.fenicsx
 def test_the_sample_is_meshed_as_the_shell_changes_it(capsys, monkeypatch):
-    pytest.importorskip("dolfinx", reason="dolfinx is not installed")
     monkeypatch.chdir(ROOT)
     found = []
     for size in ("0.012", "0.009"):

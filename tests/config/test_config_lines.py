@@ -35,7 +35,7 @@ law = 1.0
 t_end = "0.1 s"
 dt = 1e-3
 """
-WRONG = ('"text"', "-1.0", "[]", "true", "[1.0]", "1e999", '"3 furlong"', "{ a = 1 }")
+WRONG = ('"text"', "-1.0", "[]", "true", "[1.0]", "1e999", "nan", '"3 furlong"', "{ a = 1 }")
 
 
 def mutants():
@@ -55,16 +55,20 @@ def mutants():
 @pytest.mark.once
 def test_every_refusal_of_a_mechanism_file_has_file_line_and_cure(tmp_path):
     path = tmp_path / "crank.toml"
-    refused = 0
+    refused, taken = 0, []
     for k, change, text in mutants():
         path.write_text(text)
+        key, _, value = change.partition(" = ")
         try:
             rom.read_mechanism(path).mechanism()
         except RomError as error:
             refused += 1
             assert re.search(r"crank\.toml:\d+", error.where), (k, change, str(error))
             assert error.hint, (k, change, str(error))
-    assert refused > 100
+            assert value not in WRONG or key in str(error), (k, change, str(error))
+        else:
+            taken.append(change)
+    assert set(taken) == {"", "law = -1.0"} and refused > 200
 
 
 def test_what_is_missing_altogether_has_the_line_behind_which_it_goes(tmp_path):

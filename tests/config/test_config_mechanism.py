@@ -2,8 +2,6 @@
 
 import json
 import re
-import subprocess
-import sys
 import zipfile
 
 import numpy as np
@@ -12,10 +10,10 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.special import ellipk
 
 import rom
-from cases.command import ROOT, environment
+from cases.command import ROOT, python
 from cases.files.toml_files import ALL, CRANK, PENDULUM, laid_out
 from cases.long import few
-from cases.solid import block
+from cases.solid import block, reduced
 from rom.cli.main import main
 from rom.config.document import parsed
 from rom.config.keys import Place
@@ -26,9 +24,7 @@ from rom.errors import ConfigError
 
 @pytest.fixture(scope="module")
 def rod(tmp_path_factory):
-    body = rom.reduce(block(cells=(6, 1, 1)), method=rom.CraigBampton(4),
-                      interfaces={"root": "rbe2", "tip": "rbe2"}, reference="root",
-                      damping=rom.ModalDamping(0.01), certify=False)  # fmt: skip
+    body = reduced(4, block(cells=(6, 1, 1)), reference="root", damping=rom.ModalDamping(0.01))
     return rom.save(body, tmp_path_factory.mktemp("rod") / "rod.rom.npz")
 
 
@@ -294,8 +290,7 @@ def test_it_moves_without_fenicsx_and_pictures(folder):
     code = f"import sys; sys.modules.update(dict.fromkeys({heavy!r}))\n"
     code += "from rom.cli.main import main\n"
     code += "sys.exit(main(['simulate', 'crank.toml', '-q', '-o', 'out']))"
-    done = subprocess.run([sys.executable, "-c", code], env=environment(), cwd=folder,
-                          capture_output=True, text=True, timeout=600, check=False)  # fmt: skip
+    done = python("-c", code, cwd=folder, timeout=600)
     assert done.returncode == 0, done.stderr
     assert (folder / "out" / "motion.csv").exists()
 
@@ -304,7 +299,6 @@ def test_it_moves_without_fenicsx_and_pictures(folder):
 @pytest.mark.fenicsx
 def test_the_sample_is_the_mechanism_of_the_demo(tmp_path):
     """Its bodies are meshed and reduced, here coarsely; the rod stays as long as it is."""
-    pytest.importorskip("dolfinx", reason="dolfinx is not installed")
     for folder in ("meshes", "demos"):
         (tmp_path / folder).mkdir()
     for name in ("connecting_rod", "crank"):

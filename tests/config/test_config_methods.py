@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 import rom
-from cases.solid import block
+from cases.solid import block, reduced
 from rom.config.mechanism import read_mechanism
 from rom.mbs.mechanism import Mechanism
 
@@ -124,9 +124,7 @@ ENTRIES = {  # method: an entry that calls it
 
 @pytest.fixture(scope="module")
 def soft(tmp_path_factory):
-    body = rom.reduce(block(cells=(3, 1, 1)), method=rom.CraigBampton(1),
-                      interfaces={"root": "rbe2", "tip": "rbe2"}, reference="root",
-                      certify=False)  # fmt: skip
+    body = reduced(1, block(cells=(3, 1, 1)), reference="root")
     return rom.save(body, tmp_path_factory.mktemp("soft") / "soft.rom.npz")
 
 

@@ -234,7 +234,6 @@ def old(path, data=b"x", age=3600):
 @pytest.mark.long
 @pytest.mark.fenicsx
 def test_forms_left_by_a_killed_compilation_are_found_and_removed(tmp_path):
-    pytest.importorskip("dolfinx", reason="dolfinx is not installed")
     cache = tmp_path / "fenics"
     cache.mkdir()
     stale = old(cache / "libffcx_forms_dead.c")

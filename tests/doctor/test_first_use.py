@@ -2,13 +2,11 @@
 
 import json
 import os
-import subprocess
-import sys
 
 import pytest
 
 from benchmarks.benchmarks import start
-from cases.command import environment
+from cases.command import environment, python
 from cases.command import rom as command
 from cases.long import few
 from rom.doctor import first_use
@@ -36,8 +34,7 @@ print(len(first), *sorted(f.__qualname__ for f, x in first.items() if not x.over
 @pytest.mark.once
 def test_cases_of_first_use_ask_for_all_that_can_be_compiled():
     """Whatever no other kernel calls, every stage too, has been called or linked by a case."""
-    done = subprocess.run([sys.executable, "-c", USED], env=environment(), text=True, timeout=900,
-                          capture_output=True, check=False)  # fmt: skip
+    done = python("-c", USED, timeout=900)
     assert done.returncode == 0, done.stderr
     count, *unused = done.stdout.split()
     assert int(count) > 30 and not unused
@@ -80,8 +77,7 @@ def test_after_the_set_up_first_motions_compile_nothing():
     done = command("doctor", "--compile", "demo", timeout=600)
     assert done.returncode == 0, done.stderr
     quiet = environment(PYTHONWARNINGS="ignore")
-    done = subprocess.run([sys.executable, "-c", FIRST_MOTIONS], env=quiet, text=True,
-                          capture_output=True, timeout=120, check=False)  # fmt: skip
+    done = python("-c", FIRST_MOTIONS, env=quiet, timeout=120)
     assert (done.stdout.split(), done.stderr) == (["0", "1"], "")
 
 

@@ -10,9 +10,9 @@ import time
 import pytest
 
 import rom
-from cases.command import ROOT, environment
+from cases.command import ROOT, environment, python
 from cases.command import rom as command
-from cases.solid import block
+from cases.solid import block, reduced
 from rom.cli.main import main
 from rom.cli.verbs import check
 from rom.process.mpirun import mpirun
@@ -138,8 +138,7 @@ PHYSICS = {
 
 @pytest.fixture(scope="module")
 def good(tmp_path_factory):
-    body = rom.reduce(block(cells=(4, 1, 1)), method=rom.CraigBampton(4),
-                      interfaces={"root": "rbe2", "tip": "rbe2"}, certify=False)  # fmt: skip
+    body = reduced(4, block(cells=(4, 1, 1)))
     return rom.save(body, tmp_path_factory.mktemp("good") / "good.npz").read_bytes()
 
 
@@ -179,8 +178,7 @@ def test_a_wrong_command_line_is_refused_before_anything_heavy_is_loaded(folder)
     code = "import sys\nfrom rom.cli.main import main\n"
     code += f"codes = {{main(words) for words in {[words for words, *_ in USAGE.values()]}}}\n"
     code += f"print(codes, sorted({heavy} & set(sys.modules)))"
-    done = subprocess.run([sys.executable, "-c", code], env=environment(), capture_output=True,
-                          text=True, timeout=60, check=False)  # fmt: skip
+    done = python("-c", code, timeout=60)
     assert done.stdout == "{2} []\n", done.stderr
 
 
@@ -193,7 +191,6 @@ def test_a_wrong_file_is_named(case, folder, capsys):
 @pytest.mark.fenicsx
 @pytest.mark.parametrize("case", PHYSICS)
 def test_a_wrong_model_is_explained(case, folder, capsys):
-    pytest.importorskip("dolfinx", reason="dolfinx is not installed")
     code, arguments, *words = PHYSICS[case]
     refused(capsys, code, arguments, *words)
 
@@ -245,8 +242,7 @@ def test_without_fenicsx_a_finite_element_verb_says_what_is_missing(folder):
     code = "import sys; sys.modules['dolfinx'] = sys.modules['petsc4py'] = None\n"
     code += "sys.modules['mpi4py'] = None\nfrom rom.cli.main import main\n"
     code += f"sys.exit(main({['modes', BEAM, *STEEL]!r}))"
-    done = subprocess.run([sys.executable, "-c", code], env=environment(), capture_output=True,
-                          text=True, timeout=60, check=False)  # fmt: skip
+    done = python("-c", code, timeout=60)
     assert done.returncode == 6
     assert "is not installed" in done.stderr and "rom doctor" in done.stderr
 
@@ -254,7 +250,6 @@ def test_without_fenicsx_a_finite_element_verb_says_what_is_missing(folder):
 @pytest.mark.fenicsx
 def test_ctrl_c_ends_with_code_7_and_leaves_nothing(folder):
     """While gmsh is at work in a process of its own, which does not hear Ctrl-C itself."""
-    pytest.importorskip("gmsh", reason="gmsh is not installed")
     source = folder / "slow.py"
     source.write_text("import time\ndef build(gmsh):\n    open('begun', 'w')\n    time.sleep(60)\n")
     command_line = [sys.executable, "-m", "rom", "mesh", "slow.py", "--save", "x.vtu", "--trust"]
@@ -295,7 +290,6 @@ def wait_for(path, seconds=20):
     ],
 )
 def test_two_ranks_complain_once_and_end_within_seconds(arguments, code, words, folder):
-    pytest.importorskip("dolfinx", reason="dolfinx is not installed")
     start = time.perf_counter()
     done = command(*arguments, n=2)
     assert done.returncode == code, done.stderr
@@ -307,7 +301,6 @@ def test_two_ranks_complain_once_and_end_within_seconds(arguments, code, words, 
 @pytest.mark.fenicsx
 @pytest.mark.mpi
 def test_a_rank_that_is_alone_with_its_error_ends_all(folder):
-    pytest.importorskip("dolfinx", reason="dolfinx is not installed")
     (folder / "alone.py").write_text(
         "import sys\nfrom mpi4py import MPI\nfrom rom.cli.verbs import check\n"
         "from rom.cli.main import main\nfrom rom.errors import MaterialError\n"
@@ -318,9 +311,7 @@ def test_a_rank_that_is_alone_with_its_error_ends_all(folder):
         "check.run = run\nsys.exit(main(['check', 'x']))\n"
     )
     start = time.perf_counter()
-    done = subprocess.run([*mpirun(2), sys.executable, "alone.py"],
-                          env=environment(), capture_output=True, text=True, timeout=60,
-                          check=False)  # fmt: skip
+    done = python("alone.py", launcher=mpirun(2), timeout=60)
     assert done.returncode == 4
     assert "error: rank 1: rho = 0." in done.stderr
     assert time.perf_counter() - start < A_HANG

@@ -13,7 +13,7 @@ import rom
 from cases.files.damage import damaged, outcome
 from cases.mbs.mechanisms import random_body
 from cases.paths import TESTS
-from cases.solid import block
+from cases.solid import block, reduced
 from rom.errors import ConfigError, FileFormatError
 from rom.io.export import read_body
 from rom.io.fields.universal import read_universal
@@ -27,7 +27,6 @@ from rom.io.programs.openfast_reading import read_openfast
 from rom.io.sid.dialect import read_sid
 
 HERE = TESTS / "reference" / "foreign"
-KINDS = {"root": "rbe2", "tip": "rbe2"}
 MUTANTS = 60
 pytestmark = pytest.mark.filterwarnings("ignore::rom.errors.RomWarning")
 
@@ -68,8 +67,7 @@ def abaqus(folder):
 
 def exported(to, held=()):
     def content(folder):
-        body = rom.reduce(block(cells=(2, 1, 1)), method=rom.CraigBampton(2), interfaces=KINDS,
-                          certify=False)  # fmt: skip
+        body = reduced(2, block(cells=(2, 1, 1)))
         return rom.export(body, folder / "export", to=to, held=held).read_bytes()
 
     return content

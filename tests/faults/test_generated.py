@@ -20,7 +20,7 @@ CASES = all_cases()
 # Classes that share a process.
 GROUPS = ("1", "2", "3", "4", "5", "6", "7", "8", "R")
 # What of them `make test` runs, fewest of those that start processes; `make long` runs all.
-SHARES = dict.fromkeys("1348R", 1 / 16) | dict.fromkeys("567", 1 / 6)
+SHARES = dict.fromkeys("1348R", 1 / 6) | dict.fromkeys("567", 1 / 4)
 LEAST_SHARE = 1.0 if ROM_LONG else 0.2
 
 

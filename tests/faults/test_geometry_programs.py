@@ -33,7 +33,6 @@ pytest.importorskip("gmsh", reason="gmsh is not installed")
 pytestmark = pytest.mark.fenicsx
 LINUX = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="what Linux offers")
 TOUCH = 'SystemCall "touch pwned";\n'
-STEP = "ISO-10303-21;\n"
 # name: what the geometry and the files beside it say
 STARTERS = {
     "directly": {"box.geo": BOX + TOUCH},

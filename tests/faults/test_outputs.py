@@ -9,7 +9,7 @@ import pytest
 
 import rom
 from cases.command import ROOT
-from cases.solid import block
+from cases.solid import block, reduced
 from rom.cli.main import main
 from rom.cli.parser import build_parser, verb_modules
 from rom.errors import ConfigError
@@ -51,8 +51,7 @@ BEFORE_COMPUTING = {  # case: (what to type, the file it would write); nothing o
 
 @pytest.fixture(scope="module")
 def body():
-    found = rom.reduce(block(cells=(4, 1, 1)), method=rom.CraigBampton(2), name="good",
-                       interfaces={"root": "rbe2", "tip": "rbe2"}, certify=False)  # fmt: skip
+    found = reduced(2, block(cells=(4, 1, 1)), name="good")
     return replace(found, provenance={"reduction": found.provenance["reduction"]})
 
 
@@ -95,7 +94,6 @@ def test_it_is_said_before_anything_is_read(case, folder, capsys):
 @pytest.mark.fenicsx
 @pytest.mark.parametrize("name", ["x.vtu", "x.inp"])
 def test_a_mesh_is_replaced_by_another_one_of_its_kind(name, folder, capsys):
-    pytest.importorskip("gmsh", reason="gmsh is not installed")
     for coarse in ("0.2", "0.3"):
         assert main(["mesh", BEAM, "-p", f"lc={coarse}", "--save", name]) == 0
     rom.export(rom.load("good.npz"), "good.inp", to="abaqus")

@@ -5,8 +5,6 @@ import errno
 import io
 import os
 import stat
-import subprocess
-import sys
 import tempfile
 from pathlib import Path
 
@@ -14,8 +12,8 @@ import numpy as np
 import pytest
 
 import rom
-from cases.command import environment
-from cases.solid import block
+from cases.command import environment, python
+from cases.solid import block, reduced
 from rom.cli.main import main
 from rom.config.component import read_component
 from rom.errors import ConfigError, ResourceError, RomWarning
@@ -32,9 +30,7 @@ FULL = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 def here(tmp_path, monkeypatch):
     """A folder with a body file in it."""
     monkeypatch.chdir(tmp_path)
-    kinds = {"root": "rbe2", "tip": "rbe2"}
-    made = rom.reduce(block(), method=rom.CraigBampton(4), interfaces=kinds, reference="root",
-                      certify=False)  # fmt: skip
+    made = reduced(4, block(), reference="root")
     rom.save(made, "bar.rom.npz")
     return tmp_path
 
@@ -201,8 +197,7 @@ def test_compiled_code_that_others_may_have_written_is_not_loaded(tmp_path):
 
     def compiled():
         env = environment(NUMBA_CACHE_DIR=str(code))
-        done = subprocess.run([sys.executable, script], env=env, capture_output=True, text=True,
-                              timeout=120, check=True)  # fmt: skip
+        done = python(script, env=env, timeout=120, check=True)
         return int(done.stdout)
 
     assert (compiled(), compiled()) == (1, 0)
@@ -218,7 +213,6 @@ def test_compiled_code_that_others_may_have_written_is_not_loaded(tmp_path):
 
 @pytest.mark.fenicsx
 def test_forms_are_not_taken_from_where_others_may_write(tmp_path, monkeypatch):
-    pytest.importorskip("dolfinx", reason="dolfinx is not installed")
     from rom.fe import jit
 
     monkeypatch.setattr(jit, "cache_directory", lambda: tmp_path)

@@ -18,7 +18,7 @@ from cases.command import environment
 from cases.command import rom as command
 from cases.long import few
 from cases.paths import TESTS
-from cases.solid import block
+from cases.solid import block, reduced
 from rom.cli.main import main
 from rom.errors import ConfigError, ResourceError
 from rom.io.claim import LOCK_NAME, claimed
@@ -46,8 +46,7 @@ def together(work, *cases):
 
 @pytest.fixture(scope="module")
 def body():
-    return rom.reduce(block(cells=(4, 1, 1)), method=rom.CraigBampton(2), name="b",
-                      interfaces={"root": "rbe2", "tip": "rbe2"}, certify=False)  # fmt: skip
+    return reduced(2, block(cells=(4, 1, 1)), name="b")
 
 
 def test_a_body_file_of_two_writers_is_always_one_of_both(body, tmp_path):
@@ -300,7 +299,6 @@ with jit.compiling(MPI.COMM_SELF):
 @pytest.mark.long
 @pytest.mark.fenicsx
 def test_forms_compiled_by_two_processes_at_once_are_the_same(tmp_path):
-    pytest.importorskip("dolfinx", reason="dolfinx is not installed")
     (tmp_path / "fenics").mkdir()
     (tmp_path / "fenics" / "rom.lock").write_text("")  # of a process that is gone
     env = environment(XDG_CACHE_HOME=str(tmp_path))
@@ -352,7 +350,6 @@ def test_a_rank_has_one_thread_unless_the_user_chooses(numpy_comes, chosen):
 @pytest.mark.mpi
 def test_two_ranks_are_one_writer(body, tmp_path):
     """Neither keeps the other out of their folder, and both end with what the first one finds."""
-    pytest.importorskip("mpi4py", reason="mpi4py is not installed")
     rom.save(body, tmp_path / "b.npz")
     assert command(*PENDULUM, "-o", "out", n=2, cwd=tmp_path).returncode in (0, 5)
     (tmp_path / "out" / "b.csv").write_text("my notes\n")

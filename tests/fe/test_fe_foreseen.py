@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 import rom
+from cases.command import python
 from cases.long import few
 from cases.paths import RANKS, ROOT
 from cases.ranks.environment import ENVIRONMENT
@@ -85,8 +86,7 @@ def test_a_reduction_takes_the_memory_foreseen(shape, solver):
     """In a process of its own: what other tests leave in the heap is no part of it."""
     code = f"import test_fe_foreseen as t; print(*t.taken_and_foreseen{shape, solver})"
     here = f"{Path(__file__).parent}{os.pathsep}{ENVIRONMENT['PYTHONPATH']}"
-    ran = subprocess.run([sys.executable, "-c", code], env=ENVIRONMENT | {"PYTHONPATH": here},
-                         capture_output=True, text=True, check=True)  # fmt: skip
+    ran = python("-c", code, env=ENVIRONMENT | {"PYTHONPATH": here}, check=True)
     taken, foreseen = map(float, ran.stdout.split()[-2:])
     assert taken == pytest.approx(foreseen, rel=0.2)
 

@@ -5,7 +5,7 @@ import time
 
 import pytest
 
-from cases.command import environment
+from cases.command import python
 from rom.errors import ResourceError, RomWarning
 
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")
@@ -66,8 +66,6 @@ def test_a_form_whose_compilation_was_killed_is_compiled_again(tmp_path, monkeyp
 )  # fmt: skip
 def test_option_files_of_the_working_folder_are_not_read(tmp_path, name):
     """Not even as JSON; in a process of its own, for dolfinx keeps what it has read once."""
-    import subprocess
-    import sys
 
     (tmp_path / name).write_text("no JSON")
     code = (
@@ -77,8 +75,7 @@ def test_option_files_of_the_working_folder_are_not_read(tmp_path, name):
         "for module in (dolfinx.jit, ffcx):\n"
         "    for get in ('get_parameters', 'get_options'): getattr(module, get, dict)()"
     )
-    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, env=environment(),
-                          capture_output=True, text=True, check=False)  # fmt: skip
+    done = python("-c", code, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
 
 

@@ -1,13 +1,11 @@
 """How FEniCSx is loaded: the helper of its wheel first, and only ranks that know of each other."""
 
 import os
-import subprocess
-import sys
 from importlib.util import find_spec
 
 import pytest
 
-from cases.command import environment
+from cases.command import environment, python
 from cases.command import rom as command
 from rom.fe import HELPER_MODULE
 
@@ -35,8 +33,7 @@ def started(folder, helper=None):
     if helper is not None:
         (folder / f"{HELPER_MODULE}.py").write_text(helper)
     path = os.pathsep.join([str(folder), environment()["PYTHONPATH"]])
-    return subprocess.run([sys.executable, "-c", START], env=environment(PYTHONPATH=path),
-                          capture_output=True, text=True, timeout=60, check=False)  # fmt: skip
+    return python("-c", START, env=environment(PYTHONPATH=path), timeout=60)
 
 
 def test_the_helper_of_the_wheel_is_loaded_before_petsc_and_not_with_rom(tmp_path):
@@ -62,7 +59,6 @@ def test_what_the_helper_complains_of_is_not_passed_over(tmp_path):
 def test_ranks_of_another_launcher_do_not_each_do_all_of_the_work():
     """Under the variables of a launcher that is not of the MPI which is loaded."""
     MPI = pytest.importorskip("mpi4py.MPI", reason="mpi4py is not installed")
-    pytest.importorskip("dolfinx", reason="dolfinx is not installed")
     names = ("PMI_RANK", "PMI_SIZE")
     if not MPI.Get_library_version().startswith("Open MPI"):
         names = ("OMPI_COMM_WORLD_RANK", "OMPI_COMM_WORLD_SIZE")

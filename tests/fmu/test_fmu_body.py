@@ -13,7 +13,7 @@ from scipy.linalg import expm
 import rom
 from cases.mbs.fmu_instance import Instance, fmpy
 from cases.mbs.mechanisms import random_body, simulate_quietly
-from cases.solid import block
+from cases.solid import block, reduced
 from rom.errors import ConfigError, InterfaceError
 from rom.mbs.mechanism import Mechanism
 
@@ -39,10 +39,7 @@ def free(body, tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def rod():
-    return rom.reduce(
-        block(cells=(4, 1, 1)), method=rom.CraigBampton(4), certify=False,
-        interfaces={"root": "rbe2", "tip": "rbe2"}, reference="root", damping=rom.Rayleigh(0, 1e-5),
-    )  # fmt: skip
+    return reduced(4, block(cells=(4, 1, 1)), reference="root", damping=rom.Rayleigh(0, 1e-5))
 
 
 def motion(one, name):

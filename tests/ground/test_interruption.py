@@ -2,14 +2,12 @@
 
 import os
 import signal
-import subprocess
-import sys
 import threading
 import time
 
 import pytest
 
-from cases.command import environment
+from cases.command import python
 from rom.process.interruption import Terminated, terminable
 
 
@@ -72,8 +70,7 @@ def test_the_process_cleans_up_and_ends_by_sigterm():
         "with terminable():\n    try:\n        os.kill(os.getpid(), signal.SIGTERM)\n"
         "        signal.pause()\n    finally:\n        print('clean', flush=True)\n"
     )
-    done = subprocess.run([sys.executable, "-c", code], env=environment(), capture_output=True,
-                          text=True, timeout=60, check=False)  # fmt: skip
+    done = python("-c", code, timeout=60)
     assert (done.returncode, done.stdout) == (-signal.SIGTERM, "clean\n"), done.stderr
 
 
@@ -87,6 +84,5 @@ def test_a_signal_dropped_in_a_callback_comes_again(number):
         f"    def __del__(self): os.kill(os.getpid(), signal.{number}); time.sleep(0.01)\n"
         "with terminable():\n    x = Last(); del x\n    time.sleep(20)"
     )
-    done = subprocess.run([sys.executable, "-c", code], env=environment(), capture_output=True,
-                          text=True, timeout=15, check=False)  # fmt: skip
+    done = python("-c", code, timeout=15)
     assert done.returncode == -getattr(signal, number), done.stderr

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import rom
-from cases.solid import block
+from cases.solid import block, reduced
 from rom.cli.main import main
 from rom.config.keys import Named, Quantity
 from rom.errors import ConfigError, FileFormatError, InterfaceError, RomError
@@ -26,8 +26,9 @@ UNSEEN = ["a\0b", "a\nb", "a\rb", "a\x1b[2Jb", "\u202egnp.x", "a\u200bb", "a\u20
           "x" * 300, "", " "]  # fmt: skip
 ELSEWHERE = ["../../x", "/etc/x", "a/b", "..", ".", "~root/x", "-rf", "a\\b", ".x", "x ", " x"]
 HARMLESS = ["$(touch x)", "`touch x`", "~root", "CON", "a;b", "50% (a+b), #3", "Kolben №1", "ピン",
-            "=1+1", "x" * MAX_CHARACTERS, "%s{0}"]  # fmt: skip
-INJECTED = """a"<b>&'],;=x"""
+            "=1+1", "x" * MAX_CHARACTERS, "%s{0}", '"""; open("x", "w"); """',
+            "'); open('x', 'w'); ('"]  # fmt: skip
+INJECTED = 'a"""<b>&\'],;=x'
 
 
 @pytest.mark.parametrize("name", [*UNSEEN, 5, None, b"x"])
@@ -79,8 +80,7 @@ def test_all_names_are_told_up_to_a_line():
 
 @pytest.fixture(scope="module")
 def body():
-    return rom.reduce(block(cells=(4, 1, 1)), method=rom.CraigBampton(2), interfaces=KINDS,
-                      certify=False)  # fmt: skip
+    return reduced(2, block(cells=(4, 1, 1)))
 
 
 def listing(folder):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import rom
-from cases.solid import block
+from cases.solid import block, reduced
 from rom.model import Modes, Report, Row
 from rom.notebook import MAX_ROWS, html_table, listed
 
@@ -37,8 +37,7 @@ class Cells(HTMLParser):
 
 @pytest.fixture(scope="module")
 def bar():
-    return rom.reduce(block(cells=(4, 1, 1)), method=rom.CraigBampton(4), name="<b>bar",
-                      interfaces={"root": "rbe2", "tip": "rbe2"}, certify=False)  # fmt: skip
+    return reduced(4, block(cells=(4, 1, 1)), name="<b>bar")
 
 
 @pytest.fixture(scope="module")

@@ -67,6 +67,8 @@ WRONG = {  # E, rho: what is said
     "E in kPa": (2.1e8, 7850.0, "163.6 m/s"),
     "E in psi": (3.05e7, 7850.0, "62.33 m/s"),
     "ksi and lb/in^3": (3.05e4, 0.284, "0.284 kg/m^3"),
+    "just too slow": (9.5e4, 1000.0, "9.747 m/s"),
+    "just too fast": (4.1e11, 1000.0, "2.025e+04 m/s"),
 }
 RIGHT = {  # E, rho
     "steel": (210e9, 7850.0), "diamond": (1.2e12, 3510.0), "beryllium": (3.03e11, 1850.0),
@@ -74,6 +76,7 @@ RIGHT = {  # E, rho
     "honeycomb": (1e9, 50.0), "aerogel": (1e4, 2.0), "tungsten": (4e11, 19300.0),
     "balsa": (3e9, 120.0), "osmium": (5.6e11, 22590.0), "lead": (1.6e10, 11340.0),
     "gold": (7.8e10, 19300.0), "polystyrene foam": (3e6, 15.0), "concrete": (3e10, 2400.0),
+    "just not too slow": (1.05e5, 1000.0), "just not too fast": (3.9e11, 1000.0),
 }  # fmt: skip
 
 
@@ -121,8 +124,6 @@ def test_a_factor_that_is_the_number_itself_is_doubted(kind, high, n):
 DAMPING = {
     "beyond one": (2.0, ConfigError, "2 per cent write 0.02"),
     "negative": (-0.01, ConfigError, "-0.01 is negative"),
-    "no number": (float("nan"), ConfigError, "must be finite numbers"),
-    "infinite": (float("inf"), ConfigError, "must be finite numbers"),
     "just beyond one": (1.01, ConfigError, "1.01 per cent write 0.0101"),
     "strong": (0.5, None, "0.5"),
 }
@@ -187,7 +188,7 @@ def test_gravity_of_no_planet_is_doubted(way, g, n, tmp_path):
     assert len(found) == n and all(f"gravity is {g:.4g} m/s^2" in text for text in found)
 
 
-@pytest.mark.parametrize("g", [9.81, "9.81", (9.81,), None])
+@pytest.mark.parametrize("g", [9.81, "9.81", (9.81,)])
 def test_gravity_needs_a_direction(g):
     with pytest.raises(ConfigError, match="gravity"):
         rom.Mechanism(gravity=g)

@@ -26,10 +26,7 @@ from rom.fe.mesh.read import read_mesh
 from rom.io.matrices.matrix_files import read_matrix
 from rom.io.programs.interface_form import interface_form
 
-BEAM = {
-    "path": str(ROOT / "meshes" / "beam.geo"),
-    "parameters": {"L": 0.3, "lc": 0.04},
-}
+BEAM = {"path": str(ROOT / "meshes" / "beam.geo"), "parameters": {"L": 0.3, "lc": 0.04}}
 STEEL = rom.Material(E=210e9, nu=0.3, rho=7850.0)
 WOOD = rom.Orthotropic(
     E=(12e9, 0.9e9, 0.5e9), nu=(0.35, 0.4, 0.3), G=(0.8e9, 0.7e9, 0.1e9), rho=500.0,

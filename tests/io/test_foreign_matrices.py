@@ -16,7 +16,7 @@ from scipy.sparse import csr_matrix
 import rom
 from cases.files.decks import DECK
 from cases.paths import TESTS
-from cases.solid import block
+from cases.solid import block, reduced
 from rom.decks.lines import real
 from rom.errors import (
     ConfigError,
@@ -96,10 +96,7 @@ def test_a_model_from_files_reduces_like_its_origin(brick, case):
     for name, interface in model.interfaces.items():
         ours = brick.interfaces[name]
         assert_allclose(interface.points, ours.points[np.lexsort(ours.points.T[::-1])])
-    bodies = [
-        rom.reduce(m, method=rom.CraigBampton(0), interfaces=KINDS, certify=False)
-        for m in (model, brick)
-    ]
+    bodies = [reduced(0, m) for m in (model, brick)]
     f, expected = (body.frequencies(fixed=("root",)) for body in bodies)
     assert_allclose(f, expected, rtol=1e-7)
     assert_allclose(bodies[0].inertia, bodies[1].inertia, rtol=1e-7, atol=1e-9)
@@ -303,10 +300,7 @@ def test_hostile_sizes_take_no_memory(tmp_path):
 
 @pytest.fixture(scope="module")
 def body():
-    return rom.reduce(
-        block(cells=(4, 1, 1)), method=rom.CraigBampton(3), interfaces=KINDS,
-        damping=rom.Rayleigh(0.0, 1e-6), certify=False,
-    )  # fmt: skip
+    return reduced(3, block(cells=(4, 1, 1)), damping=rom.Rayleigh(0.0, 1e-6))
 
 
 def test_the_interface_form_is_the_same_body(body):

@@ -7,7 +7,7 @@ from scipy.linalg import eigh
 
 import rom
 from cases.paths import TESTS
-from cases.solid import block
+from cases.solid import block, reduced
 from rom.cli.main import main
 from rom.errors import ConfigError, FileFormatError, QualityGateError, UnsafeFileError
 from rom.io.programs.openfast import LOAD_DURATION, superelement, write_openfast
@@ -25,8 +25,7 @@ def model():
 
 @pytest.fixture(scope="module")
 def body(model):
-    return rom.reduce(model, method=rom.CraigBampton(4), interfaces=KINDS,
-                      damping=rom.Rayleigh(0.0, 1e-6), certify=False)  # fmt: skip
+    return reduced(4, model, damping=rom.Rayleigh(0.0, 1e-6))
 
 
 @pytest.fixture(params=[4, 5])

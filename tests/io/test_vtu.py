@@ -5,14 +5,13 @@ import pytest
 from numpy.testing import assert_allclose
 
 import rom
-from cases.solid import block
+from cases.solid import block, reduced
 from rom.errors import ConfigError
 
 
 @pytest.fixture(scope="module")
 def body():
-    kinds = {"root": "rbe2", "tip": "rbe2"}
-    return rom.reduce(block(), method=rom.CraigBampton(3), interfaces=kinds, certify=False)
+    return reduced(3, block())
 
 
 @pytest.mark.fenicsx

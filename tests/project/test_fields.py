@@ -12,7 +12,7 @@ from textwrap import dedent
 import pytest
 
 import rom
-from cases.command import environment
+from cases.command import environment, python
 from cases.paths import ROOT
 from rom import fields
 from rom.components.gear_mesh import GearPair
@@ -66,8 +66,7 @@ def run(code, *paths, cwd=None):
 def program(*words, paths=(), cwd=None):
     """What Python has done, modules of these folders first."""
     path = ":".join(map(str, [*paths, environment()["PYTHONPATH"]]))
-    done = subprocess.run([sys.executable, *words], text=True, capture_output=True, cwd=cwd,
-                          env=environment(PYTHONPATH=path), timeout=600, check=False)  # fmt: skip
+    done = python(*words, cwd=cwd, env=environment(PYTHONPATH=path), timeout=600)
     assert done.returncode == 0, done.stdout[-3000:] + done.stderr
     return done
 

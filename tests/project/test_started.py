@@ -16,7 +16,7 @@ from benchmarks import two_stages
 from benchmarks.benchmarks import BENCHMARKS
 from cases import command
 from cases.paths import ROOT
-from cases.solid import block
+from cases.solid import block, reduced
 from rom.errors import ResourceError
 
 pytestmark = pytest.mark.once
@@ -164,13 +164,10 @@ def part(folder):
 @pytest.mark.fenicsx
 @pytest.mark.parametrize("page", SHOWN, ids=lambda page: page.name)
 def test_commands_of_a_page_run_one_after_the_other(page, tmp_path):
-    pytest.importorskip("dolfinx", reason="most of them mesh")
     for name in ("meshes", "demos"):
         shutil.copytree(ROOT / name, tmp_path / name, ignore=shutil.ignore_patterns("__pycache__"))
     part(tmp_path)
-    kinds = {"root": "rbe2", "tip": "rbe2"}
-    made = rom.reduce(block(), method=rom.CraigBampton(4), interfaces=kinds, reference="root",
-                      certify=False)  # fmt: skip
+    made = reduced(4, block(), reference="root")
     rom.save(made, tmp_path / "jacket.rom.npz")
     for line in commands(page):
         if kind(line) != "rom" or "rod.sti" in line:  # matrices of another program

@@ -37,7 +37,6 @@ def files():
 
 @pytest.mark.fenicsx
 def test_first_readme_block_runs(monkeypatch, tmp_path):
-    pytest.importorskip("dolfinx", reason="dolfinx is not installed")
     block = re.search(r"```python\n(.*?)```", readme(), re.S).group(1)
     (tmp_path / "meshes").symlink_to(ROOT / "meshes")
     monkeypatch.chdir(tmp_path)

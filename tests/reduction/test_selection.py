@@ -94,7 +94,6 @@ def test_the_default_passes_its_certificate():
 @pytest.mark.fenicsx
 def test_the_selection_works_on_meshes_too():
     """PETSc operators, rbe3 and orthogonal functions as interfaces."""
-    pytest.importorskip("dolfinx", reason="needs finite elements")
     from cases.boxes import box
     from rom.fe.elasticity import assemble
 
@@ -112,7 +111,6 @@ def test_the_selection_works_on_meshes_too():
 @pytest.mark.long
 def test_the_order_is_chosen_on_meshes_too():
     """Beside an averaging interface, which PETSc has to project."""
-    pytest.importorskip("dolfinx", reason="needs finite elements")
     from cases.boxes import box
     from rom.fe.elasticity import assemble
 

@@ -8,10 +8,9 @@ from html.parser import HTMLParser
 
 import pytest
 
-import rom
 from cases.files.reports import read
 from cases.paths import ROOT
-from cases.solid import block
+from cases.solid import block, reduced
 from rom.report import html, viewer
 
 pytestmark = pytest.mark.once
@@ -21,8 +20,7 @@ NAME = "</script><b>bar"
 
 @pytest.fixture(scope="module")
 def body():
-    made = rom.reduce(block(cells=(4, 1, 1)), method=rom.CraigBampton(2), certify=False,
-                      interfaces={"root": "rbe2", "tip": "rbe2"}, name="bar")  # fmt: skip
+    made = reduced(2, block(cells=(4, 1, 1)), name="bar")
     return replace(made, name=NAME)
 
 

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from cases.refusals import refused
 from rom import view
 from rom.errors import ConfigError
 from rom.view.canvas.scene import sharp_edges
@@ -131,32 +132,27 @@ def test_meshes_are_joined_with_their_own_triangles():
     assert is_closed(both) and volume(both) == pytest.approx(3.0)
 
 
-@pytest.mark.parametrize(
-    ("call", "words"),
-    [
-        (lambda: view.ring((0, 0, 0), (0, 0, 1), 2.0, 1.0), "a bore of 2 m must be smaller"),
-        (lambda: view.ring((0, 0, 1), (0, 0, 1), 1.0, 2.0), "in one place"),
-        (
-            lambda: view.tube([(0, 0, 0)], 0.1),
-            "line of a tube = 1 must",
-        ),
-        (lambda: view.tube([(0, 0, 0)] * 2, 0.1), "in one place"),
-        (lambda: view.coil((0, 0, 0), (0, 0, 1), 0.1, 0.2), "a wire of 0.2 m must be thinner"),
-        (lambda: view.wound([(0, 0, 0), (0, 0, 0)], 0.2, 0.1), "are in one place"),
-        (
-            lambda: view.extruded([(0, 0), (1, 0)], 1.0),
-            "outline = 2 must",
-        ),
-        (lambda: view.extruded([(1, 0), (0, -1), (-1, 0)], 1.0), "counter-clockwise"),
-        (lambda: view.extruded([(1, -1), (1, 1), (-1, 1), (-1, -1)], 1.0, bore=2.0), "bore = 2"),
-        (lambda: view.gear(5, 1e-3, 1e-2), "5 teeth of a pressure angle of 20 degrees"),
-        (lambda: view.gear(20, 1e-3, 1e-2, pressure_angle=0.7), "40.1.* degrees are pointed"),
-        (lambda: view.gear(20, 1e-3, 1e-2, bore=0.02), "bore = 0.02 must be"),
-    ],
+test_shapes_that_cannot_be_are_refused = refused(
+    (lambda: view.ring((0, 0, 0), (0, 0, 1), 2.0, 1.0), "a bore of 2 m must be smaller"),
+    (lambda: view.ring((0, 0, 1), (0, 0, 1), 1.0, 2.0), "in one place"),
+    (
+        lambda: view.tube([(0, 0, 0)], 0.1),
+        "line of a tube = 1 must",
+    ),
+    (lambda: view.tube([(0, 0, 0)] * 2, 0.1), "in one place"),
+    (lambda: view.coil((0, 0, 0), (0, 0, 1), 0.1, 0.2), "a wire of 0.2 m must be thinner"),
+    (lambda: view.wound([(0, 0, 0), (0, 0, 0)], 0.2, 0.1), "are in one place"),
+    (
+        lambda: view.extruded([(0, 0), (1, 0)], 1.0),
+        "outline = 2 must",
+    ),
+    (lambda: view.extruded([(1, 0), (0, -1), (-1, 0)], 1.0), "counter-clockwise"),
+    (lambda: view.extruded([(1, -1), (1, 1), (-1, 1), (-1, -1)], 1.0, bore=2.0), "bore = 2"),
+    (lambda: view.gear(5, 1e-3, 1e-2), "5 teeth of a pressure angle of 20 degrees"),
+    (lambda: view.gear(20, 1e-3, 1e-2, pressure_angle=0.7), "40.1.* degrees are pointed"),
+    (lambda: view.gear(20, 1e-3, 1e-2, bore=0.02), "bore = 0.02 must be"),
+    error=ConfigError,
 )
-def test_shapes_that_cannot_be_are_refused(call, words):
-    with pytest.raises(ConfigError, match=words):
-        call()
 
 
 def test_a_bar_has_its_section_across_its_length():

@@ -19,8 +19,9 @@ import rom.report
 import rom.view
 from cases.files.toml_files import PENDULUM
 from cases.mbs.mechanisms import rotor
-from cases.solid import STEEL, block, composite
+from cases.solid import STEEL, block, composite, reduced
 from cases.wheels import beam_ring, bladed_model, bladed_ring
+from rom.components import cosserat
 from rom.components.gear_mesh.gears.geometry import GearPair
 from rom.components.journal_bearing.films.tabulated import table_of
 from rom.components.updating.family_model import family_model
@@ -90,7 +91,7 @@ def film_bearing():
 
 @cache
 def body():
-    return rom.reduce(model(), method=rom.CraigBampton(3), interfaces=KINDS, certify=False)
+    return reduced(3, model())
 
 
 @cache
@@ -182,6 +183,12 @@ def driven(*, free=True):
     one, two = (mech.parts[name] for name in ("table", "mass"))
     mech.spring_damper("spring", one.marker("c"), two.marker("d"), stiffness=100.0, damping=1.0)
     return mech
+
+
+def rod():
+    """The frames of a rod."""
+    section = {"stretch": 1e3, "bend": 1.0, "mass": 1.0, "inertia": 1e-3}
+    return cosserat.body(cosserat.straight(1.0, 2, **section))
 
 
 @cache
@@ -533,7 +540,7 @@ JOIN_OWN = {
     ("motor", "law"): lambda mech: lambda t, x, v: 0.0,
     ("stop", "lower"): lambda mech: -1.0,
     ("part", "name"): lambda mech: "arm",
-    ("add_nonlinear", "body"): lambda mech: None,
+    ("add_nonlinear", "body"): lambda mech: rod(),
     ("bushing", "stiffness"): lambda mech: np.ones(6),
     ("gear_mesh", "wheel_a"): lambda mech: mech.ground.marker((0, 0, 0)),
     ("gear_mesh", "wheel_b"): lambda mech: mech.parts["arm"].marker((0, 0, 0)),

@@ -7,10 +7,9 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 
-import rom
 from cases.mbs.linkages import five_bar_of_the_core, rail_of_the_core
 from cases.mbs.mechanisms import simulate_quietly
-from cases.solid import STEEL, block
+from cases.solid import STEEL, block, reduced
 from rom.components.linkages.dynamic_isotropy import christoffel, index_map
 from rom.components.linkages.two_dof_linkages import (
     Driven,
@@ -31,12 +30,7 @@ TWO = TwoLink(rod(1.0, 0.5), rod(2.0, 0.4))
 @pytest.fixture(scope="module")
 def bar():
     """A slender steel block with faces "root" and "tip", its axis aside from its frame."""
-    return rom.reduce(
-        block(size=(0.3, 0.02, 0.02), cells=(6, 2, 2), origin=(0.1, -0.03, 0.0)),
-        method=rom.CraigBampton(n_modes=4),
-        interfaces={"root": "rbe2", "tip": "rbe2"},
-        certify=False,
-    )
+    return reduced(4, block(size=(0.3, 0.02, 0.02), cells=(6, 2, 2), origin=(0.1, -0.03, 0.0)))
 
 
 def two_link_closed_form(l1, lc1, m1, I1, lc2, m2, I2, q1, q2):  # noqa: PLR0913
@@ -164,8 +158,7 @@ def test_inertia_at_a_frequency_is_that_of_a_beam_and_converges_with_its_modes()
     found, free = [], []
     model = block((L, side, side), (120, 1, 1), replace(STEEL, nu=0.0))
     for n in (1, 4, 12):
-        body = rom.reduce(model, method=rom.CraigBampton(n_modes=n),
-                          interfaces={"root": "rbe2", "tip": "rbe2"}, certify=False)  # fmt: skip
+        body = reduced(n, model)
         arm = TwoLink(rod(1.0, 0.3), reduced_link(body, "root", "tip"))
         found.append(arm.inertia(0.0, 1.0, elastic=w)[1, 1])
         free.append(arm.inertia(0.0, 1.0, elastic="free")[1, 1])
@@ -236,10 +229,6 @@ def test_what_cannot_be_is_refused():
         rod(-1.0, 0.3)
     with pytest.raises(ModelError, match=r"1.3 m apart; couplers of 0.3 m and 0.3 m do not meet"):
         FiveBar(0.7, (rod(2.0, 0.3),) * 2, (rod(1.0, 0.3),) * 2).inertia(np.pi, [0.0, 1.0])
-    with pytest.raises(ConfigError, match="elastic = 'loose' must be 'held' or 'free' or a finite"):
-        TWO.inertia(0.0, 1.0, elastic="loose")
-    with pytest.raises(ConfigError, match="elastic = nan must be"):
-        TWO.inertia(0.0, 1.0, elastic=np.nan)
     for frequency in (0.0, -1.0):
         with pytest.raises(ConfigError, match="must be positive"):
             TWO.inertia(0.0, 1.0, elastic=frequency)

@@ -12,13 +12,7 @@ from cases.solid import STEEL, block
 from rom.components.masonry.block_contact import SLIDES
 from rom.components.masonry.limits import Rock, arch, stands
 from rom.components.masonry.motion import simulate
-from rom.components.masonry.stones import (
-    Masonry,
-    polygon_moments,
-    reduced_stone,
-    stone,
-    touching,
-)
+from rom.components.masonry.stones import Masonry, polygon_moments, reduced_stone, stone, touching
 from rom.eigen.verbs import rigid_motions
 from rom.errors import ConfigError, MaterialError, ModelError
 
@@ -374,8 +368,6 @@ def test_what_cannot_be_is_refused():
     for wrong in ({"E": -1.0}, {"nu": 0.5}, {"rho": 0.0}, {"thickness": 0.0}):
         with pytest.raises(MaterialError, match=f"{next(iter(wrong))} = .*E, rho, thickness > 0"):
             stone(box(), **numbers | wrong)
-    with pytest.raises(ConfigError, match="state = 'liquid' must be 'plane stress' or"):
-        stone(box(), **numbers, state="liquid")
     for wrong in ({"stiffness": -1e9}, {"friction": -0.1}):
         with pytest.raises(ConfigError, match="needed are > 0, >= 0"):
             replace(one, **wrong)

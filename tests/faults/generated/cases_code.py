@@ -1,24 +1,12 @@
 """Code that lies in the working folder, or comes in a file that should hold none, is not run."""
 
 import io
-import json
 import os
 import zipfile
 
 import numpy as np
 
-import rom
-from generated.case import (
-    Silent,
-    Warned,
-    Works,
-    arrays_changed,
-    case,
-    edit,
-    geometry,
-    require,
-    write,
-)
+from generated.case import Silent, arrays_changed, case, write
 from generated.stock import STEEL
 from rom.errors import ConfigError, FileFormatError, UnsafeFileError
 
@@ -49,44 +37,16 @@ def renamed(member):
     return prepare
 
 
-def trusted(folder):
-    """A builder that is trusted is run."""
-    material = rom.Material(E=210e9, nu=0.3, rho=7850.0)
-    require(rom.fe.model(folder / "build.py", material=material, degree=1, trust=True).n_dofs, "")
-
-
-def untrusted(folder):
-    material = rom.Material(E=210e9, nu=0.3, rho=7850.0)
-    rom.fe.model(folder / "build.py", material=material, degree=1)
-
-
-def compiled(folder):
-    """What dolfinx reads from the working folder must not change how forms are compiled."""
-    (folder / "dolfinx_jit_parameters.json").write_text(
-        json.dumps({"cffi_extra_compile_args": ["-O3", "-fpwned"]})
-    )
-
-
 TRUST = ("trust",)
 CASES = [
-    case("SystemCall in a geometry", "mesh box.geo", UnsafeFileError, "SystemCall",
-         given=geometry(SHELL), fe=True),
     *(case(f"{name} beside a mesh", "mesh box.msh", Silent, fe=True,
            given=(home, write(name, f"{SHELL}\n")))
       for name in (".gmshrc", ".gmsh-options")),
-    case("a builder, rom mesh", "mesh build.py", UnsafeFileError, *TRUST, fe=True),
     case("a builder, rom modes", f"modes build.py {STEEL}", UnsafeFileError, *TRUST, fe=True),
     case("a builder, rom reduce", f"reduce build.py {STEEL} -i root=rbe2 -o a.npz",
          UnsafeFileError, *TRUST, fe=True),
     case("a builder, rom swing", "swing build.py --hinge root -o out", UnsafeFileError, *TRUST,
          fe=True),
-    case("a builder in a component file", "mesh solid.toml", UnsafeFileError, *TRUST, fe=True,
-         given=edit("solid.toml", "box.msh", "build.py")),
-    case("a builder in Python", untrusted, UnsafeFileError, *TRUST, fe=True),
-    case("a builder with --trust", "mesh build.py --trust", Works, fe=True),
-    case("a builder with trust=True", trusted, Works, fe=True),
-    case("options of dolfinx beside a mesh", f"modes box.msh {STEEL} -n 7", (Works, Warned),
-         given=compiled, fe=True),
     *(case(f"a pickle as {member}", "check good.npz", UnsafeFileError, "good.npz",
            given=pickled(member)) for member in ("K", "mass", "manifest")),
     case("a pickle that nothing names", "check good.npz", Silent, given=pickled("extra")),

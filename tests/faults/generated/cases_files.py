@@ -3,17 +3,19 @@
 import json
 
 import numpy as np
+from scipy.sparse import identity
 
 import rom
 from cases.files.damage import HOSTILE, WAYS
 from generated.case import Silent, Warned, arrays_changed, case, changed, cut, edit, mutated, write
-from generated.stock import MATRICES, STEEL
+from generated.stock import MATRICES, STEEL, model
 from rom.errors import (
     ConfigError,
     FileFormatError,
     InterfaceError,
     MaterialError,
     ModelError,
+    ParameterError,
     QualityGateError,
     UnsafeFileError,
 )
@@ -90,23 +92,14 @@ LINE = "reduce K.mtx --mass M.mtx --nodes deck.inp -i root=rbe2 -i tip=rbe2 --no
 FOREIGN = (*READ, ConfigError, InterfaceError)
 CONFIG = (ConfigError,)
 MECHANISM = {  # what stands in pendulum.toml, what instead, and what is named
-    "an unknown key": ("mass =", "masss =", "masss"),
     "a key in the wrong place": ("[simulation]", "[simulation]\nmass = 1", "mass"),
     "a key twice": ("dt = 0.01", "dt = 0.01\ndt = 0.02", "dt"),
     "a table twice": ("[simulation]", "[simulation]\n[simulation]", "simulation"),
-    "a missing key": ("mass = 1.0\n", "", "mass"),
     "a missing table": ("[simulation]\nt_end = 0.05\ndt = 0.01\n", "", "simulation"),
-    "text for a number": ("mass = 1.0", 'mass = "heavy"', "mass"),
     "a number as text": ("mass = 1.0", 'mass = "1.0"', "mass"),
-    "a list for a number": ("mass = 1.0", "mass = [1.0]", "mass"),
-    "a table for a number": ("mass = 1.0", "mass = { kg = 1 }", "mass"),
-    "a truth for a number": ("mass = 1.0", "mass = true", "mass"),
     "a date for a number": ("mass = 1.0", "mass = 2020-01-01", "mass"),
     "nan": ("mass = 1.0", "mass = nan", "mass"),
-    "infinity": ("mass = 1.0", "mass = inf", "mass"),
-    "zero": ("mass = 1.0", "mass = 0", "mass"),
     "a huge whole number": ("mass = 1.0", "mass = 1" + 400 * "0", "mass"),
-    "an unknown unit": ("mass = 1.0", 'mass = "1 stone"', "stone"),
     "a unit without number": ("mass = 1.0", 'mass = "kg"', "mass"),
     "two numbers": ("mass = 1.0", 'mass = "1 2 kg"', "mass"),
     "a decimal comma": ("mass = 1.0", "mass = 1,0", "pendulum.toml:4"),
@@ -114,21 +107,15 @@ MECHANISM = {  # what stands in pendulum.toml, what instead, and what is named
     "no quotes": ("mass = 1.0", "mass = 1 kg", "pendulum.toml:4"),
     "an open quote": ('kind = "revolute"', 'kind = "revolute', "pendulum.toml:9"),
     "an open bracket": ("axis = [0, 0, 1]", "axis = [0, 0, 1", "pendulum.toml"),
-    "four numbers for three": ("axis = [0, 0, 1]", "axis = [0, 0, 0, 1]", "axis"),
     "numbers and text": ("axis = [0, 0, 1]", 'axis = [0, "a", 1]', "axis"),
     "no kind": ('kind = "revolute"\n', "", "kind"),
-    "one marker": (', "bob.pin"]', "]", "between"),
     "a body twice in a joint": ("{ ground = [0, 0, 0] }", '"bob.pin"', ("bob", "hinge")),
-    "negative inertia": ("[1e-3, 1e-3, 1e-3]", "[1e-3, 1e-3, -1e-3]", "inertia"),
     "no time": ("t_end = 0.05", "t_end = 0", "t_end"),
     "time backwards": ("t_end = 0.05", "t_end = -1", "t_end"),
-    "a step longer than the run": ("dt = 0.01", "dt = 1", "dt"),
     "half an order": ("dt = 0.01", 'dt = 0.01\nmethod = "bdf"\norder = 2.5', "order"),
     "an order of nine": ("dt = 0.01", 'dt = 0.01\nmethod = "bdf"\norder = 9', "order"),
     "a truth as text": ("dt = 0.01", 'dt = 0.01\nstabilised = "yes"', "stabilised"),
-    "a column that is not there": ("[simulation]", '[output]\nplot = ["bob heat"]\n[simulation]', "bob heat"),
     "an unknown law": ("[simulation]", '[drives.m]\njoint = "hinge"\nlaw = { kind = "sine" }\n[simulation]', "sine"),
-    "a table of one point": ("[simulation]", '[drives.m]\njoint = "hinge"\nlaw = { kind = "table", t = [0], values = [0] }\n[simulation]', ("law", "drives.m")),
     "a spring of a wrong unit": ("[simulation]", '[springs.s]\nbetween = [{ ground = [0, 0, 0] }, "bob.pin"]\nstiffness = "1 N m"\n[simulation]', "stiffness"),
 }  # fmt: skip
 COMPONENT = {  # the same of part.toml
@@ -138,23 +125,17 @@ COMPONENT = {  # the same of part.toml
     "the mass for the nodes": ('"deck.inp"', '"M.mtx"', ("M.mtx", ".mtx")),
     "no mass": ('mass = "M.mtx"\n', "", "mass"),
     "an interface without nodes": ('root = "rbe2"', 'rot = "rbe2"', "rot"),
-    "an unknown kind of interface": ('root = "rbe2"', 'root = "rbe4"', "rbe4"),
-    "no interface": ('root = "rbe2"\ntip = "rbe2"\n', "", "interface"),
     "more modes than dofs": ("modes = 4", "modes = 400", ("400", "modes")),
     "an unknown frame": ('reference = "root"', 'reference = "rot"', "rot"),
-    "two ways to choose modes": ("modes = 4", "modes = 4\nf_max = 100.0", "f_max"),
     "a tolerance and a number": ("modes = 4", "modes = 4\ntol = 0.1", "tol"),
-    "two dampings": ("ratio = 0.01", "ratio = 0.01\nalpha = 1", ("ratio", "damping")),
     "a negative ratio": ("ratio = 0.01", "ratio = -0.01", "ratio"),
     "a ratio with a unit": ("ratio = 0.01", 'ratio = "1 Hz"', "ratio"),
     "an unknown unit system": ('nodes = "deck.inp"', 'nodes = "deck.inp"\nunits = "inch"', "inch"),
     "a folder for a matrix": ('"K.mtx"', '"."', "."),
-    "a geometry too": ("[interfaces]", '[geometry]\nfile = "box.msh"\n[interfaces]', "geometry"),
     "a name that is no text": ('"part"', "7", "name"),
 }
 LINES = {  # command lines of which one thing is wrong
     "an option without value": ("modes box.msh --E", "--E"),
-    "a number too large": (f"modes box.msh {STEEL} --scale 1e999", "1e999"),
     "a negative count": (f"modes box.msh {STEEL} -n=-1", "-1"),
     "an interface without kind": (f"modes box.msh {STEEL} -i root", "root"),
     "an interface of an empty kind": (f"modes box.msh {STEEL} -i root=", "root="),
@@ -179,7 +160,7 @@ LINES = {  # command lines of which one thing is wrong
     "an unknown material": ("swing box.msh --hinge root --material wood -o out", "wood"),
     "an unknown shell": ("completion cmd", "cmd"),
 }
-ANY = (ConfigError, ModelError, InterfaceError, FileFormatError, MaterialError)
+ANY = (ConfigError, ModelError, InterfaceError, FileFormatError, MaterialError, ParameterError)
 BYTES = {  # whole documents
     "empty": (b"", "bodies"),
     "a blank line": (b"\n", "bodies"),
@@ -227,7 +208,15 @@ def reading(name):
     return lambda folder: READERS[name](folder / name)
 
 
+def craig_bampton(folder):
+    """A mass that does not fit the stiffness."""
+    return rom.craig_bampton(model().K, identity(3, format="csr"), list(range(12)), 2)
+
+
 CASES = [
+    *(case(f"a parameter of {value!r}", lambda folder, x=value: rom.load(folder / FAMILY).at(rho=x), ANY,
+           "rho") for value in ("five", np.nan, np.inf, [1.0, 2.0], 1j, {})),
+    case("matrices that do not fit", craig_bampton, (*ANY, QualityGateError), "36"),
     *(case(f"a mechanism: {name}", "simulate pendulum.toml -o out", ANY, *words,
            given=edit("pendulum.toml", old, new)) for name, (old, new, *words) in MECHANISM.items()),
     *(case(f"a component: {name}", "reduce part.toml -o a.npz", ANY, *words,

@@ -10,7 +10,7 @@ import numpy as np
 
 import rom
 from generated.case import Silent, Works, case, require
-from generated.stock import KINDS, STEEL, body, model, on_ranks, pendulum
+from generated.stock import KINDS, STEEL, body, model, pendulum
 from rom.cli.main import main
 from rom.errors import ConfigError, FileFormatError, ResourceError, RomError
 
@@ -140,33 +140,6 @@ def gone_output(folder):
         os.chdir(folder)
 
 
-def closed(folder):
-    """The reader of the answer has seen enough."""
-    run = subprocess.run(
-        f"{sys.executable} -m rom check good.npz | head -c 1",
-        shell=True,
-        capture_output=True,
-        check=False,
-    )
-    require(b"Traceback" not in run.stderr and b"BrokenPipe" not in run.stderr, run.stderr[-500:])
-
-
-def link(folder):
-    """A link as output: what it points to is not lost."""
-    (folder / "target.npz").write_text("mine")
-    (folder / "a.npz").symlink_to("target.npz")
-
-
-def ranks(words, code):
-    """On two ranks: one code, within seconds."""
-
-    def act(folder):
-        run = on_ranks(2, words)
-        require(run.returncode == code, f"exit code {run.returncode}: {run.stderr[-500:]!r}")
-
-    return act
-
-
 def same_bits(folder):
     """Two processes of different hash seeds compute the same bits."""
     for name, seed in (("a", "1"), ("b", "2")):
@@ -205,14 +178,6 @@ def unloaded(folder):
     require(not errors, errors)
 
 
-def whole(name):
-    return lambda folder: rom.load(folder / name)
-
-
-def tabled(folder):
-    require((folder / "out/motion.csv").read_text().count("\n") == 7, "a torn table")
-
-
 CASES = [
     *(case(f"without {name}", without(name, words), ResourceError, name, fe=name == "petsc4py", leaves=True)
       for name, words in MISSING.items()),
@@ -221,9 +186,6 @@ CASES = [
       for what in (("simulate",) if name in ("no HOME",) else ("check",))),
     case("a German locale and a geometry", in_circumstances(CIRCUMSTANCES["a German locale"], ["mesh", "box.geo"]),
          Works, fe=True),
-    case("four exports at once", several(4, ["export", "good.npz", "same.npz"], whole("same.npz")), Works),
-    case("two motions in one folder at once",
-         several(2, ["simulate", "pendulum.toml", "-o", "out", "-q"], tabled), Works),
     case("three meshes at once", several(3, ["mesh", "box.geo"], lambda folder: None), Works, fe=True),
     case("motions in threads", threads(motion), Works),
     case("reductions in threads", threads(frequencies), Works),
@@ -231,15 +193,8 @@ CASES = [
     case("one file read by several threads", unloaded, Works),
     case("a folder that is gone", gone, Works),
     case("a folder that is gone as output", gone_output, (ConfigError, ResourceError), ("a.npz", "folder")),
-    case("a reader that has seen enough", closed, Works),
-    case("a link as output", "export good.npz a.npz", (ConfigError, Works), "a.npz", given=link),
     case("two processes, the same bits", same_bits, Works),
     case("a call after an error", again, Works),
-    case("two ranks and no mesh", ranks("mesh nope.msh", 3), Works, fe=True),
-    case("two ranks and a wrong number", ranks("modes box.msh --E 1e9 --nu 0.7 --rho 1e3", 4), Works, fe=True),
-    case("two ranks and no verb", ranks("modess", 2), Works, fe=True),
-    case("a read-only folder", "export good.npz locked/a.vtu", (ConfigError, Works), "locked",
-         given=lambda folder: (folder / "locked").mkdir(mode=0o555)),
     case("a folder instead of a motion", "report out -o a.html", (FileFormatError, ConfigError), "out",
          given=lambda folder: (folder / "out").mkdir()),
     case("a motion without its table", "report out -o a.html", (FileFormatError, ConfigError), "out",

@@ -1,8 +1,5 @@
 """The valid files that cases damage, and small models in memory."""
 
-import os
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +12,6 @@ from cases.solid import block
 from rom.io.matrices.dmig import write_dmig
 from rom.io.matrices.op4 import write_op4
 from rom.mbs.results.state import Memory, State
-from rom.process.child import environment
-from rom.process.mpirun import mpirun
 
 PLANTED = "pwned"  # part of the name of every file that planted code makes
 KINDS = {"root": "rbe2", "tip": "rbe2"}
@@ -174,14 +169,6 @@ def compile_kernels() -> None:
     rom.simulate(mech, t_end=0.02, dt=0.01)
     rom.linearize(pendulum(), still)
     rom.transmissibility(mech, None, [1.0], drive="motor", motion=mech.part("bob").marker("pin"))
-
-
-def on_ranks(n: int, words: str) -> subprocess.CompletedProcess[bytes]:
-    """A finished run of rom on some ranks; it must not inherit that this process uses MPI, too."""
-    launcher = [*mpirun(n), sys.executable, "-P", "-m", "rom"]
-    allowed = {k: v for k, v in os.environ.items() if k.startswith("OMPI_ALLOW")}
-    return subprocess.run([*launcher, *words.split()], env=environment() | allowed,
-                          capture_output=True, timeout=50, check=False)  # fmt: skip
 
 
 def origin(mech: Any) -> Any:

@@ -74,7 +74,6 @@ def test_full_modes_are_found_where_they_cost_less_than_the_reduction_or_little(
 
 @pytest.mark.fenicsx
 def test_a_factor_that_was_made_says_what_it_cost(monkeypatch):
-    pytest.importorskip("dolfinx", reason="needs finite elements")
     from rom.fe.operators import petsc
     from rom.workflow import operators
 
@@ -93,7 +92,6 @@ def test_a_factor_that_was_made_says_what_it_cost(monkeypatch):
 
 @pytest.mark.fenicsx
 def test_where_full_modes_are_dear_other_supports_have_the_estimates_alone(monkeypatch):
-    pytest.importorskip("dolfinx", reason="needs finite elements")
     model = rom.fe.model(
         "meshes/beam.geo", material=rom.Material(E=210e9, nu=0.3, rho=7850.0),
         parameters={"L": 1.0, "b": 0.2, "h": 0.1, "lc": 0.1},

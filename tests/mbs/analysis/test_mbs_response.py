@@ -202,10 +202,6 @@ def test_a_mechanism_as_a_whole_takes_its_equilibrium_at_each_speed():
 
 
 def test_wrong_speeds_and_mechanisms_are_named():
-    for what, speeds, message in (
-        (rotor, [1.0], "at least two growing"),
-        (rotor, [2.0, 1.0], "at least two growing"),
-        ("rotor", [1.0, 2.0], "must be of type Mechanism .* or a function"),
-    ):
-        with pytest.raises(ConfigError, match=message):
-            rom.campbell(what, speeds)
+    for speeds in ([1.0], [2.0, 1.0]):
+        with pytest.raises(ConfigError, match="at least two growing"):
+            rom.campbell(rotor, speeds)

@@ -7,12 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import rom
-from cases.mbs.mechanisms import (
-    prepared,
-    random_body,
-    random_pose,
-    tangents_at,
-)
+from cases.mbs.mechanisms import prepared, random_body, random_pose, tangents_at
 from cases.mbs.tangents import check_tangents, difference, energy_gradient, forces_at, near
 from rom import rotation
 from rom.errors import ConfigError

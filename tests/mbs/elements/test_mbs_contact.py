@@ -268,7 +268,6 @@ def test_two_discs_are_a_cylinder_that_rolls_down_a_slope():
 
 
 WRONG = {
-    "no law": (lambda m, a, b: m.sphere_on_plane("s", a, b, None, normal=Z, radius=1), "law ="),
     "no size": (lambda m, a, b: m.sphere_on_plane("s", a, b, Impact(1), normal=Z, radius=0),
                 "radius = 0"),
     "no axis": (lambda m, a, b: m.disc_on_plane("s", a, b, Impact(1), normal=Z, axis=0 * Z,

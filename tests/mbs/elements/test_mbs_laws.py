@@ -260,10 +260,8 @@ REFUSED = [
         lambda m, a, b: m.law("l", unknown_name, a, compiled=True),
         "law 'l' cannot be compiled: NameError: .*'nobody' is not defined",
     ),
-    (lambda m, a, b: m.law("l", late_nan, a, parameters=[np.inf]), "parameters"),
     (lambda m, a, b: m.law("l", late_nan, rom.mbs.Marker("nobody", (0.0, 0.0, 0.0))), "nobody"),
     (lambda m, a, b: m.add("l", 3, laws.LAWS_FAMILY), "element = 3 of 'l' must be of type Law"),
-    (lambda m, a, b: m.add("l", 3, 4), "family = 4 must be of type Family"),
 ]
 
 

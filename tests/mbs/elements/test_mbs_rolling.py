@@ -9,13 +9,7 @@ from scipy.optimize import brentq, root
 import rom
 from cases.long import few
 from cases.mbs.mechanisms import prepared, residual_at
-from cases.mbs.tangents import (
-    by_position,
-    by_velocity,
-    energy_gradient,
-    forces_at,
-    shifted,
-)
+from cases.mbs.tangents import by_position, by_velocity, energy_gradient, forces_at, shifted
 from rom.components.rolling_bearing.bearings import ROLLING_BEARINGS_FAMILY
 from rom.components.rolling_bearing.races import elliptic_stiffness
 from rom.errors import ConfigError, ModelError

@@ -1,15 +1,13 @@
 """Compiled kernels: dropped when a source of theirs changes, and what they leave out."""
 
 import shutil
-import subprocess
-import sys
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from numba import njit
 
-from cases.command import environment
+from cases.command import environment, python
 from cases.long import few
 from cases.paths import ROOT
 from rom.mbs.compiler import cache
@@ -73,8 +71,7 @@ def test_no_kernel_runs_that_was_made_of_other_sources(where, tmp_path):
         (toy / "words.py").write_text(f"told = {told}")
         (toy / "inner.py").write_text(INNER.format(size=size, added=added))
         (toy / "outer.py").write_text(OUTER.format(more=more))
-        done = subprocess.run([sys.executable, "-m", "rom.toy.outer"], env=env, cwd=tmp_path,
-                              capture_output=True, text=True, check=True)  # fmt: skip
+        done = python("-m", "rom.toy.outer", env=env, cwd=tmp_path, check=True)
         return done.stdout.split()
 
     assert answer(2, 1) == ["4.0", "0"]
@@ -127,8 +124,7 @@ def test_who_waits_for_the_compiler_is_told_once(tmp_path, level, rank, said):
     (tmp_path / "slow.py").write_text(SLOW)
     env = environment(OMPI_COMM_WORLD_RANK=rank, OMPI_COMM_WORLD_SIZE="2")
     for expected in (said, 0):
-        done = subprocess.run([sys.executable, tmp_path / "slow.py", level], env=env, text=True,
-                              capture_output=True, check=True)  # fmt: skip
+        done = python(tmp_path / "slow.py", level, env=env, check=True)
         lines = done.stderr.splitlines()
         assert len(lines) == expected, lines
         assert all(" takes about 5 s more, this once: the code is kept in " in x for x in lines)
@@ -166,8 +162,7 @@ def test_who_can_keep_nothing_is_told_so(tmp_path):
     (tmp_path / "slow.py").write_text(SLOW)
     env = environment(**place_for_code("nowhere", tmp_path, tmp_path))
     for _ in range(2):
-        done = subprocess.run([sys.executable, tmp_path / "slow.py", "INFO"], env=env, text=True,
-                              capture_output=True, check=True)  # fmt: skip
+        done = python(tmp_path / "slow.py", "INFO", env=env, check=True)
         assert " s more, in each run, as no folder can be written: set NUMBA_CACHE" in done.stderr
 
 

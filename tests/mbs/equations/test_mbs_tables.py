@@ -1,15 +1,13 @@
 """Tables and stages: what compiled code is told of arrays, and which kernels a system asks for."""
 
 import pickle
-import subprocess
-import sys
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import rom
-from cases.command import environment
+from cases.command import python
 from cases.mbs.mechanisms import random_body
 from cases.mbs.trusses import truss
 from rom.body.nonlinear.quartic import Quartic, n_entries
@@ -221,17 +219,15 @@ ASKED = {  # stages -> what asks for them
     "coordinate_states": [ELEMENTS["motors"], ELEMENTS["frictions"], ELEMENTS["stops"]],
     "coordinate_states coupling_row coupling_stiffness": [geared_body],
     "rolling_row rolling_stiffness": [
-        lambda m, a, b: m.rolling("e", m.ground.marker((0, 0, 0)), b, normal=(0, 0, 1), radius=0.3),
+        lambda m, a, b: m.rolling("e", m.ground.marker((0, 0, 0)), b, normal=(0, 0, 1), radius=0.3)
     ],
     "elastic_damping elastic_stiffness": [lambda m, a, b: flexible_body(m)],
     "elastic_damping elastic_stiffness fitted_motion fitted_wrench_stiffness": [
-        lambda m, a, b: m.force("e", m.add_flexible("c", truss()).marker("mean"), (1, 0, 0)),
+        lambda m, a, b: m.force("e", m.add_flexible("c", truss()).marker("mean"), (1, 0, 0))
     ],
     "elastic_damping elastic_stiffness "
     "bent_coordinates bent_integrals bent_mass bent_damping bent_motion bent_stiffness "
-    "bent_wrench_stiffness": [
-        lambda m, a, b: flexible_body(m, stiffened=True),
-    ],
+    "bent_wrench_stiffness": [lambda m, a, b: flexible_body(m, stiffened=True)],
 }
 
 
@@ -281,8 +277,7 @@ print(rom.simulate(mech, t_end=0.01, dt=1e-3, progress=False).position("ball")[-
 """
     orders = [(), ("rom.mbs.elements.contact.points", "rom.mbs.equations.linear_solve")]
     said = {
-        subprocess.run([sys.executable, "-c", code, *order], env=environment(), text=True,
-                       capture_output=True, check=True, timeout=300).stdout
+        python("-c", code, *order, timeout=300, check=True).stdout
         for order in orders
     }  # fmt: skip
     assert len(said) == 1

@@ -13,16 +13,17 @@ from cases.mbs.mechanisms import (
 from rom.errors import ConfigError, InterruptedRun, ModelError, SolverError
 from rom.mbs.integrate.simulation import simulate
 from rom.mbs.mechanism import Mechanism
+from rom.mbs.results.audit import audit
 
 Z = (0, 0, 1)
 UNIT = {"mass": 1.0, "inertia": (1.0, 1.0, 1.0), "at": (0, 0, 0)}
+BODY = random_body(np.random.default_rng(1))
 
 
 def mechanism():
     mech = Mechanism(gravity=(0, 0, -9.81))
     box = mech.add_rigid("box", **UNIT, markers={"a": (0, 0, 0), "b": (1, 0, 0)})
-    body = random_body(np.random.default_rng(1))
-    bar = mech.add_flexible("bar", body, at=(1, 0, 0) - body.marker("a").point)
+    bar = mech.add_flexible("bar", BODY, at=(1, 0, 0) - BODY.marker("a").point)
     mech.revolute("hinge", mech.ground.marker((0, 0, 0)), box.marker("a"), axis=Z)
     mech.spherical("ball", box.marker("b"), bar.marker("a"))
     return mech, box, bar
@@ -37,10 +38,7 @@ def singular_body():
 
 WRONG = {
     "gravity of two": (lambda m, box, bar: Mechanism(gravity=(0, 1)), ConfigError, "gravity"),
-    "gravity not finite": (lambda m, box, bar: Mechanism(gravity=(0, 0, np.nan)), ConfigError,
-                           "gravity"),
     "mass zero": (lambda m, *_: m.add_rigid("x", **UNIT | {"mass": 0}), ConfigError, "mass"),
-    "mass negative": (lambda m, *_: m.add_rigid("x", **UNIT | {"mass": -1}), ConfigError, "mass"),
     "inertia negative": (lambda m, *_: m.add_rigid("x", **UNIT | {"inertia": (1, 1, -1)}),
                          ModelError, "principal moments"),
     "inertia of no body": (lambda m, *_: m.add_rigid("x", **UNIT | {"inertia": (1, 1, 3)}),
@@ -49,10 +47,24 @@ WRONG = {
         "x", **UNIT | {"inertia": [[1, 0.5, 0], [0, 1, 0], [0, 0, 1]]}), ModelError, "symmetric"),
     "quaternion zero": (lambda m, *_: m.add_rigid("x", **UNIT, orientation=(0, 0, 0, 0)),
                         ConfigError, "quaternion [0.0, 0.0, 0.0, 0.0]"),
+    "quaternion of length 1.1": (lambda m, *_: m.add_rigid("x", **UNIT, orientation=(1.1, 0, 0, 0)),
+                                 ConfigError, "quaternion"),
+    "stretch as orientation": (lambda m, *_: m.add_rigid(
+        "x", **UNIT, orientation=np.diag([2, 1, 1])), ConfigError, "orientation"),
     "mirror as orientation": (lambda m, *_: m.add_rigid(
         "x", **UNIT, orientation=np.diag([1, 1, -1])), ConfigError, "orientation"),
-    "position of text": (lambda m, *_: m.add_rigid("x", **UNIT | {"at": ("a", 0, 0)}),
-                         ConfigError, "at"),
+    "inertia of two": (lambda m, *_: m.add_rigid("x", **UNIT | {"inertia": (1, 2)}), ConfigError,
+                       "inertia has shape (2,)"),
+    "position of two": (lambda m, *_: m.add_rigid("x", **UNIT | {"at": (0, 0)}), ConfigError,
+                        "at has shape (2,)"),
+    "marker of two": (lambda m, *_: m.add_rigid("x", **UNIT, markers={"tip": (0, 0)}), ConfigError,
+                      "marker tip has shape (2,)"),
+    "marker nowhere": (lambda m, *_: m.add_rigid("x", **UNIT, markers={"tip": (0, 0, np.nan)}),
+                       ConfigError, "markers['tip'] = (0, 0, nan)"),
+    "rates too short": (lambda m, *_: m.add_flexible("x", BODY, qd=(0, 0, 0)), ConfigError,
+                        "qd has shape (3,), needed is (4,)"),
+    "turning of two": (lambda m, *_: m.add_flexible("x", BODY, omega=(0, 0)), ConfigError,
+                       "omega has shape (2,)"),
     "name twice": (lambda m, *_: m.add_rigid("box", **UNIT), ConfigError, "'box' is used twice"),
     "name of the ground": (lambda m, *_: m.add_rigid("ground", **UNIT), ConfigError, "ground"),
     "name empty": (lambda m, *_: m.add_rigid("", **UNIT), ConfigError, "name"),
@@ -61,14 +73,12 @@ WRONG = {
                                       "is flexible"),
     "rigid motion in the shapes": (lambda m, *_: m.add_flexible("x", singular_body()), ModelError,
                                    "singular"),
-    "elastic start too short": (lambda m, *_: m.add_flexible(
-        "x", random_body(np.random.default_rng(1)), q=(1.0,)), ConfigError, "q"),
+    "elastic start too short": (lambda m, *_: m.add_flexible("x", BODY, q=(1.0,)), ConfigError,
+                                "q has shape (1,)"),
     "axis zero": (lambda m, box, bar: m.revolute(
         "j", box.marker("a"), bar.marker("a"), axis=(0, 0, 0)), ConfigError, "axis of j"),
     "joint with itself": (lambda m, box, bar: m.spherical(
         "j", box.marker("a"), box.marker("b")), ConfigError, "with itself"),
-    "joint without marker": (lambda m, box, bar: m.spherical("j", box, bar), ConfigError,
-                             "must be of type Marker"),
     "axes not perpendicular": (lambda m, box, bar: m.universal(
         "j", box.marker("a"), bar.marker("a"), axis1=Z, axis2=(0, 1, 1)), ConfigError,
         "must be perpendicular"),
@@ -76,10 +86,17 @@ WRONG = {
                         "'ball' is spherical"),
     "drive of nothing": (lambda m, *_: m.drive("d", "hunge", lambda t: t), ConfigError,
                          "no joint 'hunge'"),
-    "drive by a number": (lambda m, *_: m.drive("d", "hinge", 3.0), ConfigError,
-                          "function = 3.0 must be a function"),
-    "stiffness of text": (lambda m, box, bar: m.spring_damper(
-        "s", box.marker("a"), bar.marker("a"), stiffness="hard"), ConfigError, "stiffness"),
+    "cross without arm": (lambda m, box, bar: m.universal(
+        "j", box.marker("a"), bar.marker("a"), axis1=Z, axis2=(0, 0, 0)), ConfigError,
+        "axis2 of j has length zero"),
+    "joint twice": (lambda m, box, bar: m.revolute(
+        "hinge", box.marker("a"), bar.marker("a"), axis=Z), ConfigError, "'hinge' is used twice"),
+    "joint like a body": (lambda m, box, bar: m.fixed("box", box.marker("a"), bar.marker("a")),
+                          ConfigError, "'box' is used twice"),
+    "load like a joint": (lambda m, box, bar: m.force("ball", box.marker("a"), Z), ConfigError,
+                          "'ball' is used twice"),
+    "coil on a ball": (lambda m, *_: m.rotational_spring("c", "ball", stiffness=1.0), ConfigError,
+                       "'ball' is spherical"),
     "coil on a slide": (lambda m, box, bar: (
         m.prismatic("slide", mechanism_ground(m), bar.marker("b"), axis=Z),
         m.rotational_spring("coil", "slide", stiffness=1.0)), ConfigError, "no coordinate 'angle'"),
@@ -87,8 +104,6 @@ WRONG = {
                      "vector of f"),
     "force in no frame": (lambda m, box, bar: m.force(
         "f", box.marker("a"), (1, 2, 3), frame="local"), ConfigError, "'local'"),
-    "law of a number": (lambda m, box, bar: m.user_force("u", 1.0, box.marker("a")), ConfigError,
-                        "function = 1.0 must be a function"),
 }  # fmt: skip
 
 
@@ -100,11 +115,13 @@ def mechanism_ground(m):
 def test_wrong_parts_of_a_mechanism_are_refused_where_they_are_made(case):
     act, error, words = WRONG[case]
     mech, box, bar = mechanism()
-    before = (set(mech.parts), set(mech.drives), set(mech.springs), set(mech.loads))
+    entries = (mech.parts, mech.joints, mech.drives, mech.springs, mech.turns, mech.loads,
+               mech.user_forces)  # fmt: skip
+    before = [set(x) for x in entries]
     with pytest.raises(error) as caught:
         act(mech, box, bar)
     assert words in f"{caught.value} {caught.value.where}"
-    assert (set(mech.parts), set(mech.drives), set(mech.springs), set(mech.loads)) == before
+    assert [set(x) - {"slide"} for x in entries] == before
 
 
 GOOD = {"t_end": 0.01, "dt": 1e-3}
@@ -114,16 +131,13 @@ GOOD = {"t_end": 0.01, "dt": 1e-3}
     ("options", "words"),
     [
         ({"dt": 0.0}, "dt = 0"),
-        ({"dt": -1e-3}, "dt = -0.001"),
-        ({"dt": np.nan}, "dt = nan"),
         ({"t_end": 0.0}, "t_end = 0 s is not after 0 s"),
-        ({"t_end": np.inf}, "t_end = inf"),
-        ({"t_end": "1"}, "t_end = '1'"),
         ({"rho_inf": 1.1}, "rho_inf = 1.1"),
         ({"rho_inf": -0.1}, "rho_inf = -0.1"),
         ({"tolerance": 0.0}, "tolerance = 0"),
+        ({"rtol": -1.0}, "rtol = "),
+        ({"atol": 0.0}, "atol = "),
         ({"save_every": 0}, "save_every = 0"),
-        ({"save_every": 1.5}, "save_every = 1.5"),
         ({"method": "euler"}, "method = 'euler' is none of "),
     ],
 )
@@ -146,10 +160,7 @@ def test_an_empty_mechanism_is_refused():
 
 @pytest.mark.parametrize("method", ["generalized-alpha", "dop853"])
 def test_a_drive_that_is_no_number_ends_the_run_with_the_motion_so_far(method):
-    mech = Mechanism(gravity=(0, 0, 0))
-    box = mech.add_rigid("box", **UNIT)
-    mech.revolute("hinge", mech.ground.marker((0, 0, 0)), box.marker((0, 0, 0)), axis=Z)
-    mech.drive("motor", "hinge", lambda t: t if t < 0.05 else np.nan)
+    mech = driven(lambda t: t if t < 0.05 else np.nan)
     with pytest.raises(SolverError, match=r"'motor' gives .*nan.* at t = ") as caught:
         simulate(mech, t_end=0.1, dt=1e-3, method=method)
     kept = caught.value.solution
@@ -206,3 +217,101 @@ def test_questions_about_unknown_bodies_joints_and_markers_are_answered_with_nam
     ):
         with pytest.raises(ConfigError, match=words):
             ask()
+
+
+@pytest.mark.parametrize(
+    ("name", "place", "words"),
+    [
+        ("car", "a", "no body 'car'; the mechanism has ['bar', 'box']"),
+        ("bar", "hub", "body 'bar' has no marker 'hub'; it has ['a', 'b']"),
+        ("bar", (0, 0, 0), "'bar' is flexible; use its markers ['a', 'b']"),
+    ],
+)
+def test_markers_of_another_mechanism_are_refused_when_they_fit_nothing(name, place, words):
+    other = Mechanism().add_rigid(name, **UNIT, markers={"a": (0, 0, 0), "hub": (0, 0, 0)})
+    mech, box, _ = mechanism()
+    with pytest.raises(ConfigError) as caught:
+        mech.spherical("j", box.marker("b"), other.marker(place))
+    assert words in str(caught.value)
+    assert "j" not in mech.joints
+
+
+def test_numbers_of_numpy_are_numbers():
+    options = {"t_end": np.float64(0.01), "dt": np.float32(1e-3), "save_every": np.int64(2)}
+    assert simulate(mechanism()[0], **options).t.size == 6
+
+
+def driven(function):
+    """A box on a hinge."""
+    mech = Mechanism(gravity=(0, 0, 0))
+    box = mech.add_rigid("box", **UNIT)
+    mech.revolute("hinge", mech.ground.marker((0, 0, 0)), box.marker((0, 0, 0)), axis=Z)
+    mech.drive("motor", "hinge", function)
+    return mech
+
+
+def pushed(function):
+    mech = driven(lambda t: t)
+    mech.force("push", mech.parts["box"].marker((0, 0, 0)), function)
+    return mech
+
+
+@pytest.mark.parametrize("method", ["generalized-alpha", "dop853"])
+@pytest.mark.parametrize(
+    ("build", "name"),
+    [
+        (lambda: driven(lambda t: np.nan), "motor"),
+        (lambda: pushed(lambda t: (0, 0, np.nan)), "push"),
+    ],
+)
+def test_a_signal_that_is_no_number_at_the_start_is_named_itself(build, name, method):
+    """Not the joint it drives, which no position could close."""
+    with pytest.raises(SolverError, match=f"'{name}' gives .*nan.* at t = 0 s") as caught:
+        simulate(build(), t_end=0.1, dt=1e-3, method=method)
+    assert caught.value.solution is None
+
+
+@pytest.mark.parametrize(
+    ("build", "words"),
+    [
+        (lambda: driven(lambda t: (t, t)), "'motor' returned .* needed is a number"),
+        (lambda: driven(lambda t: "x"), "'motor' returned 'x' at t = 0 s"),
+        (lambda: pushed(lambda t: (t, t)), "'push' returned .* a vector of 3 numbers"),
+    ],
+)
+def test_signals_of_the_wrong_shape_are_named(build, words):
+    with pytest.raises(ConfigError, match=words):
+        simulate(build(), t_end=0.1, dt=1e-3)
+
+
+def test_a_load_that_ceases_to_be_a_number_keeps_the_motion_so_far():
+    mech = pushed(lambda t: (1.0, 0, 0 if t < 0.05 else np.nan))
+    with pytest.raises(SolverError, match=r"'push' gives .*nan.* at t = 0\.05 s") as caught:
+        simulate(mech, t_end=0.1, dt=1e-3)
+    assert caught.value.solution.t[-1] == pytest.approx(0.049)
+
+
+@pytest.mark.parametrize("method", ["generalized-alpha", "dop853"])
+def test_ctrl_c_inside_a_drive_keeps_the_motion_so_far(method):
+    """Drives are sampled ahead, so that the motion ends some steps before the function did."""
+
+    def angle(t):
+        if np.max(t) > 0.5:
+            raise KeyboardInterrupt
+        return 2.0 * t
+
+    with pytest.raises(InterruptedRun, match=r"interrupted at t = 0\.\d+ s of 1 s") as caught:
+        simulate(driven(angle), t_end=1.0, dt=1e-3, method=method)
+    kept = caught.value.solution
+    assert 0.01 < kept.t[-1] <= 0.5
+    assert np.abs(kept.omega("box")[:, 2] - 2.0).max() < 1e-9
+    assert kept.final.t == kept.t[-1]
+
+
+def test_steps_far_too_long_are_seen_by_the_audit():
+    """Twelve steps to a turn: the joints stay closed, the energy is not kept."""
+    sol = simulate_quietly(slider_crank(gravity=9.81), t_end=0.1, dt=0.01)
+    assert [row.quantity for row in audit(sol).failures] == [
+        "energy balance / energy",
+        "drift of energy / energy",
+    ]

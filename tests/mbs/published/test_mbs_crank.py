@@ -7,11 +7,10 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-import rom
 from cases.long import ROM_LONG
 from cases.mbs.mechanisms import CRANK, simeon_crank, simulate_quietly, slider_crank
 from cases.paths import TESTS
-from cases.solid import block
+from cases.solid import block, reduced
 
 REFERENCE = json.loads((TESTS / "reference" / "simeon_crank.json").read_text())
 
@@ -142,10 +141,7 @@ def test_speed_of_the_published_crank_is_that_of_the_drive():
 @pytest.fixture(scope="module")
 def steel_rod():
     """A slender steel block between the pins "a" and "b"."""
-    rod = rom.reduce(
-        block(size=(0.3, 0.01, 0.01), cells=(10, 1, 1)), method=rom.CraigBampton(2),
-        interfaces={"root": "rbe2", "tip": "rbe2"}, certify=False,
-    )  # fmt: skip
+    rod = reduced(2, block(size=(0.3, 0.01, 0.01), cells=(10, 1, 1)))
     ends = {new: replace(rod.marker(old), name=new) for old, new in (("root", "a"), ("tip", "b"))}
     return replace(rod, markers=ends)
 

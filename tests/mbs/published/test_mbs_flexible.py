@@ -7,7 +7,6 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 
-import rom
 from cases.mbs.mechanisms import (
     lattice,
     lattice_body,
@@ -15,7 +14,7 @@ from cases.mbs.mechanisms import (
     random_body,
     simulate_quietly,
 )
-from cases.solid import block
+from cases.solid import block, reduced
 from rom import rotation
 from rom.mbs.integrate.simulation import simulate
 from rom.mbs.mechanism import Mechanism
@@ -182,10 +181,7 @@ def test_momentum_gets_better_with_the_step_down_to_the_smallest():
 def beam():
     """A slender block on the hinge side "root", reduced to rigid ends and ten modes."""
     model = block(size=(1.0, 0.02, 0.02), cells=(16, 1, 1))
-    kinds = {"root": "rbe2", "tip": "rbe2"}
-    return rom.reduce(
-        model, method=rom.CraigBampton(4), interfaces=kinds, reference="root", certify=False
-    )
+    return reduced(4, model, reference="root")
 
 
 def hinged(body, tip_mass=0.5, scale=1.0):
