@@ -2,6 +2,6 @@
 
 `timing` is the clock, `models` are the components, `units` a gear unit for two programs,
 `two_stages` one of solids, `gears` a planetary train, `oil_films` a bearing, `loops`, `wheel`,
-`many_modes`, `updating` and `large_deflection` large measurements, `starts` what compiles when it
+`updating` and `large_deflection` large measurements, `starts` what compiles when it
 is used first, `peers` the other programs; `benchmarks` lists them all for ``rom bench``.
 """

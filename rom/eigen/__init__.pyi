@@ -1,4 +1,4 @@
-from rom.eigen.substructuring import substructured_modes as substructured_modes
+from rom.eigen.band import substructured_modes as substructured_modes
 from rom.eigen.verbs import CLUSTER_RTOL as CLUSTER_RTOL
 from rom.eigen.verbs import ON_A_LINE as ON_A_LINE
 from rom.eigen.verbs import Held as Held

@@ -7,8 +7,8 @@ import numpy as np
 
 from rom.arguments import typed, whole
 from rom.eigen.attachments import added_mass
+from rom.eigen.band import modes_up_to
 from rom.eigen.scipy import SciPyOperators
-from rom.eigen.substructuring import modes_up_to
 from rom.eigen.supports import Fixed, Springs, refuse_loose, spring_matrices, supports
 from rom.eigen.verbs import COLUMNS_AT_ONCE, Operators, rigid_motions
 from rom.errors import ConfigError
@@ -89,7 +89,7 @@ def modes(
         model: the body.
         n: number of modes; without support the six rigid motions come first and count.
         f_max: alternatively, all modes up to this frequency [Hz], by
-            `rom.eigen.substructured_modes`, for hundreds to thousands of them in one process.
+            `rom.eigen.substructured_modes`, counted first, in one process.
         fixed: names of the interfaces held, or {name: directions}: {"root": "yz"} slides along x,
             {"cut": "x"} on a plane normal to x is one of symmetry; "xyz rx" with rotations where
             the interface is rigid or averaged.

@@ -6,7 +6,7 @@ from typing import Protocol
 import numpy as np
 
 from rom.arguments import between, one_of, positive, typed, whole
-from rom.eigen.substructuring import modes_up_to
+from rom.eigen.band import modes_up_to
 from rom.eigen.verbs import Held, Operators, constraint_modes, whole_clusters
 from rom.errors import ConfigError, warn
 from rom.model import Array, Basis, Index
@@ -17,7 +17,7 @@ from rom.rows import FREQUENCY_RTOL
 FIRST_BATCH = 16  # modes computed first where their number is looked for
 ENOUGH_RTOL = 0.5 * FREQUENCY_RTOL  # the estimate is none below half the limit of certificates
 LANCZOS_SEARCH, SUBSTRUCTURE_SEARCH = "lanczos", "substructures"
-SUBSTRUCTURE_RTOL = 1e-3  # of frequencies, by their bounds; most are a hundred times better
+SUBSTRUCTURE_RTOL = 1e-3  # of frequencies, by their bounds; most are far better
 
 
 class Method(Protocol):
@@ -61,8 +61,8 @@ class CraigBampton:
         tol: keep instead the fewest modes whose estimated error [1] of every natural frequency of
             the free body up to f_max is at most this, e.g. 1e-3; without f_max, of the lowest
             six in every support, 5e-4 if not given.
-        search: how modes up to f_max are found: "lanczos", to round-off, or "substructures", for
-            hundreds to thousands of them, with frequencies within 1e-3; in one process.
+        search: how modes up to f_max are found: "lanczos", in batches of twice the number, or
+            "substructures", which counts them first: for hundreds of them, in one process.
         supports: columns of the interfaces that are held for this, which `rom.reduce` fills in.
 
     Raises:
@@ -128,7 +128,7 @@ class CraigBampton:
 
     def _normal_modes(self, ops: Operators, held: Held, boundary: Index) -> tuple[Array, Array]:
         if self.search == SUBSTRUCTURE_SEARCH and self.f_max is not None:
-            found = modes_up_to(ops, boundary, self.f_max, SUBSTRUCTURE_RTOL)
+            found = modes_up_to(ops, held, self.f_max, SUBSTRUCTURE_RTOL)
             return found.omega, found.shapes
         if self.n_modes is not None:
             whole("n_modes", self.n_modes, 0, held.n_free, reason="the dofs off the interfaces")

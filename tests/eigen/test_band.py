@@ -1,19 +1,17 @@
-"""Modes by substructuring: none missed, and every frequency within the bound stated with it."""
-
-import tracemalloc
+"""Modes up to a frequency: none missed, and every one within the bound stated with it."""
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.linalg import eigh
-from scipy.sparse import block_diag, csr_matrix, diags, random
+from scipy.sparse import block_diag, csr_matrix, diags
 
 import rom
 from benchmarks.models import bar
 from cases.long import few
-from rom.eigen import dissection, fronts, substructuring
+from rom.eigen import band
+from rom.eigen.band import lehmann_bounds, substructured_modes
 from rom.eigen.scipy import SciPyOperators
-from rom.eigen.substructuring import lehmann_bounds, substructured_modes
 from rom.eigen.verbs import rigid_motions
 from rom.errors import (
     ConfigError,
@@ -25,13 +23,6 @@ from rom.errors import (
 )
 
 ROUND_OFF = 1e-10  # of frequencies of dense solutions, 1e-16 times the ratio of the extremes
-
-
-@pytest.fixture(autouse=True)
-def small_parts(monkeypatch):
-    """Parts of sixty dofs, so that small bodies have trees of several levels, and few columns."""
-    monkeypatch.setattr(fronts, "MAX_PART_DOFS", 60)
-    monkeypatch.setattr(substructuring, "N_COLUMNS", 16)
 
 
 def body(size, cells, held=False):
@@ -81,14 +72,6 @@ def test_bodies_of_any_size_keep_their_bounds(seed):
     certain(K, M, rigid, f_max, tol=10.0 ** rng.uniform(-5, -1))
 
 
-@pytest.mark.parametrize("ratio", few(1, [4.0, 2.5, 25.0]))
-def test_bounds_hold_for_any_cutoff(monkeypatch, ratio):
-    """The cut-off decides what is found after how many steps, and never what is true."""
-    monkeypatch.setattr(substructuring, "CUTOFF_RATIOS", (ratio, 36.0))
-    K, M, rigid = body((0.3, 0.07, 0.05), (7, 3, 2))
-    certain(K, M, rigid, exact(K, M, rigid)[45] * 1.003 / (2 * np.pi))
-
-
 def test_one_and_a_half_times_the_band_is_certain_too():
     K, M, rigid = body((0.3, 0.07, 0.05), (8, 3, 2), held=True)
     f_max = exact(K, M, rigid)[30] * 1.001 / (2 * np.pi)
@@ -129,17 +112,6 @@ def test_rigid_motions_stay_exact():
     assert_allclose(Phi @ (Phi.T @ (M @ R)), R, atol=1e-10)
 
 
-def test_the_block_of_modes_has_no_part_of_rigid_motions():
-    """Its products with the mass are kept, not formed again; the bounds go by them."""
-    K, M, rigid = body((0.2, 0.05, 0.04), (4, 2, 1))
-    ops = SciPyOperators(K, M, rigid)
-    search = substructuring._Search(ops, (2 * np.pi * 3e4) ** 2, 2.0, 1.6)
-    for _ in range(2):
-        assert_allclose(search.MR.T @ search.X, 0.0, atol=1e-11)
-        assert_allclose(search.gram, search.X.T @ (M @ search.X), atol=1e-11)
-        search.step()
-
-
 def test_a_band_without_modes_is_empty():
     assert certain(*body((0.2, 0.05, 0.04), (4, 2, 1)), 1e-3).omega.size == 6
     assert certain(*body((0.2, 0.05, 0.04), (4, 2, 1), held=True), 10.0).omega.size == 0
@@ -150,54 +122,6 @@ def test_all_modes_of_a_small_body():
     K, M, rigid = body((0.2, 0.05, 0.04), (2, 1, 1), held=True)
     found = certain(K, M, rigid, 1e7)
     assert found.omega.size == K.shape[0]
-
-
-@pytest.mark.parametrize("shift", [0.3, 0.999, 1.001, 3.0, 30.0])
-def test_the_inertia_counts(shift):
-    K, M, _ = body((0.2, 0.05, 0.04), (4, 2, 1), held=True)
-    lam = exact(K, M, None) ** 2
-    counted = fronts.SubstructuredBody(K, M, 0.0).count(shift * lam[20])
-    assert counted == np.count_nonzero(lam < shift * lam[20])
-
-
-def test_the_transformed_body_is_the_body():
-    """With all modes of all substructures, statics, mass and stiffness are as before."""
-    K, M, _ = body((0.2, 0.05, 0.04), (4, 2, 1), held=True)
-    whole = fronts.SubstructuredBody(K, M, 1e30)
-    T = whole.expand(np.eye(K.shape[0]))
-    assert len(whole.parts) > 6
-    assert_allclose(T.T @ (K @ T), np.eye(K.shape[0]), atol=1e-9)
-    mass = whole.apply_mass(np.eye(K.shape[0]))
-    assert_allclose(T.T @ (M @ T), mass, atol=1e-12 * mass.max())
-    assert_allclose(whole.compliance, np.diag(mass))
-    F = np.random.default_rng(0).normal(size=(K.shape[0], 3))
-    assert_allclose(K @ whole.solve(F), F, atol=1e-8)
-
-
-@pytest.mark.parametrize("seed", range(6))
-def test_what_comes_later_separates_what_comes_first(seed):
-    """No two parts are coupled unless one is on the boundary of the other; any graph."""
-    rng = np.random.default_rng(seed)
-    A = abs(random(300, 300, 10.0 ** rng.uniform(-3, -1), random_state=seed))
-    A = csr_matrix(A + A.T + diags(np.ones(300)))
-    order, parts = dissection.dissected(A, 40)
-    assert np.array_equal(np.sort(order), np.arange(300))
-    A = A[order][:, order]
-    assert [p.first for p in parts[1:]] == [p.end for p in parts[:-1]]
-    for p in parts:
-        later = np.unique(A[p.first : p.end].indices)
-        assert set(later[later >= p.end]) <= set(p.boundary)
-        assert p.parent == -1 or parts[p.parent].first <= p.boundary[0] < parts[p.parent].end
-        assert p.parent == -1 or set(p.boundary) <= set(parts[p.parent].places)
-
-
-def test_a_strip_is_cut_across():
-    """Separators of a strip of 60 x 4 nodes have four nodes, by Koenig's theorem the fewest."""
-    x, y = (a.ravel() for a in np.meshgrid(np.arange(60), np.arange(4), indexing="ij"))
-    near = np.maximum(abs(x[:, None] - x), abs(y[:, None] - y)) <= 1
-    parts = dissection.dissected(csr_matrix(near.astype(float)), 30)[1]
-    assert max(p.size for p in parts) <= 30
-    assert max(p.boundary.size for p in parts) <= 8
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -240,75 +164,27 @@ def test_a_number_or_a_band(wrong):
 
 def test_what_does_not_suit_is_refused():
     K, M, rigid = body((0.2, 0.05, 0.04), (3, 2, 1))
-    with pytest.raises((InterfaceError, ModelError), match="rigid motions"):
+    with pytest.raises((InterfaceError, ModelError), match="rigid motion"):
         substructured_modes(K, M, 1e4)
     with pytest.raises(ConfigError, match="tol = 2"):
         substructured_modes(K, M, 1e4, rigid=rigid, tol=2)
     with pytest.raises(SolverError, match="are known within"):
         substructured_modes(K, M, 2e4, rigid=rigid, tol=1e-15)
     two = block_diag([K] * 2, "csr"), block_diag([M] * 2, "csr")
-    with pytest.raises(ModelError, match=r"6 motions without stiffness more .* moves most"):
+    with pytest.raises(ModelError, match=r"6 more motions without stiffness .* moves most"):
         substructured_modes(*two, 1e4, rigid=np.vstack([rigid] * 2))
 
 
-def test_modes_of_substructures_by_lanczos_are_those_of_the_dense_problem(monkeypatch):
-    """Up to a limit, two of whose modes are so near to each other that a block must hold both."""
-    K, M, _ = body((0.3, 0.05, 0.05), (10, 2, 2), held=True)
-    lam = exact(K, M, None) ** 2
-    whole = fronts.SubstructuredBody(K, M, 6.0 * lam[24])
-    dense = substructuring._kept_modes(whole, lam[24], whole.n_kept)
-    monkeypatch.setattr(substructuring, "LANCZOS_WIDTH", 4)
-    monkeypatch.setattr(substructuring, "LOOSE_SHARE", 0.0)
-    monkeypatch.setattr(substructuring, "LANCZOS_RTOL", 1e-8)
-    monkeypatch.setattr(substructuring, "capacity", lambda k: k + 30)  # too narrow at first
-    Y = substructuring._kept_modes(whole, lam[24], 2)
-    assert whole.n_kept > 2 * (Y.shape[1] + 30)
-    Y = Y[:, : dense.shape[1]]
-    assert_allclose(np.sum(Y**2, axis=0), np.sum(dense**2, axis=0), rtol=1e-9)
-    assert_allclose(Y.T @ whole.apply_mass(Y), np.eye(Y.shape[1]), atol=1e-9)
-
-
-def test_the_search_by_lanczos_keeps_all_bounds(monkeypatch):
-    monkeypatch.setattr(substructuring, "capacity", lambda k: k + 60)
-    K, M, rigid = body((0.3, 0.07, 0.05), (6, 3, 2))
-    certain(K, M, rigid, exact(K, M, rigid)[26] * 1.003 / (2 * np.pi))
-
-
-def test_the_memory_foreseen_is_what_the_blocks_take(monkeypatch):
-    K, M, _ = body((0.3, 0.07, 0.05), (10, 3, 3), held=True)
-    foreseen, before = [], []
-
-    def noted(need, what):
-        foreseen.append(need)
-        before.append(tracemalloc.get_traced_memory()[0])
-        tracemalloc.reset_peak()
-
-    monkeypatch.setattr(fronts, "refuse_beyond", noted)
-    tracemalloc.start()
-    fronts.SubstructuredBody(K, M, 0.0)
-    taken = tracemalloc.get_traced_memory()[1] - before[0]
-    tracemalloc.stop()
-    assert foreseen[0] == pytest.approx(taken, rel=0.08)
-
-
-@pytest.mark.parametrize(
-    ("module", "what"),
-    [(fronts, "360 dofs in dense blocks"), (substructuring, "modes of 360 dofs")],
-)
-def test_too_little_memory_is_said_before(monkeypatch, module, what):
-    """First what the blocks take, then what the modes do; with a frequency that is not too high."""
+def test_too_little_memory_is_said_before(monkeypatch):
     K, M, _ = body((0.2, 0.05, 0.04), (4, 2, 1), held=True)
-    refuse = fronts.refuse_beyond
-    monkeypatch.setattr(fronts, "free_bytes", lambda: 1e3)
-    if module is substructuring:
-        monkeypatch.setattr(fronts, "refuse_beyond", lambda *a: None)
-        monkeypatch.setattr(substructuring, "refuse_beyond", refuse)
-    with pytest.raises(ResourceError, match=rf"{what} takes .* GiB; 9.31e-07 GiB are free"):
+    monkeypatch.setattr(band, "free_bytes", lambda: 1e3)
+    with pytest.raises(ResourceError, match=r"of 360 dofs takes .* GiB; 9.31e-07 GiB are free"):
         substructured_modes(K, M, 2e4)
 
 
 def test_a_mode_that_is_missed_is_said(monkeypatch):
-    monkeypatch.setattr(fronts.SubstructuredBody, "count", lambda body, shift: 99)
     K, M, rigid = body((0.2, 0.05, 0.04), (3, 2, 1))
-    with pytest.raises(ModesMissedError, match="counts 93"):
+    count = SciPyOperators.count_below
+    monkeypatch.setattr(SciPyOperators, "count_below", lambda ops, s, *a: count(ops, s, *a) + 1)
+    with pytest.raises(ModesMissedError, match="counts"):
         substructured_modes(K, M, 1e4, rigid=rigid)
