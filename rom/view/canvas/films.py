@@ -1,6 +1,7 @@
 """Finished films: what functions of `rom.view` give back, and their files."""
 
 import base64
+import io
 import shutil
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -13,8 +14,7 @@ from rom.errors import ConfigError, ResourceError
 from rom.io.files import write_whole
 from rom.names import ORIGIN_MARK
 from rom.process.child import run, scratch
-from rom.view.canvas.gif import gif
-from rom.view.canvas.offscreen import Image
+from rom.view.canvas.offscreen import Image, require
 from rom.view.canvas.style import checked
 
 ENDINGS = (".gif", ".mp4")
@@ -129,3 +129,34 @@ def even(pages: Image) -> Image:
     height, width = pages.shape[1:3]
     rows, columns = ((0, n % 2) for n in (height, width))
     return np.pad(pages, ((0, 0), rows, columns, (0, 0)), mode="edge")
+
+
+def gif(pages: Image, duration: float) -> bytes:
+    """The bytes of a film; one palette for all pictures, so that colours do not flicker.
+
+    Args:
+        pages: (f, height, width, 3) pictures.
+        duration: of each [s].
+    """
+    require("PIL")
+    from PIL import Image as Picture
+
+    pictures = [Picture.fromarray(p) for p in pages]
+    colours = pages[:: max(1, len(pages) // 8)].reshape(-1, 3)
+    drawn = colours[colours.min(axis=1) < 250]  # white paper would take most of the palette
+    sample = np.vstack([drawn, np.full((len(drawn) // 100 + 1, 3), 255, np.uint8)])
+    palette = Picture.fromarray(sample[None]).quantize(
+        256, method=Picture.Quantize.MEDIANCUT, kmeans=2
+    )
+    frames = [p.quantize(palette=palette, dither=Picture.Dither.NONE) for p in pictures]
+    buffer = io.BytesIO()
+    frames[0].save(
+        buffer,
+        format="GIF",
+        save_all=True,
+        append_images=frames[1:],
+        duration=max(20, round(1000 * duration)),
+        loop=0,
+        comment=ORIGIN_MARK.encode(),
+    )
+    return buffer.getvalue()
