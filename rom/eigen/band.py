@@ -3,7 +3,6 @@
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from scipy.linalg import eigh
 from scipy.sparse import issparse
 
@@ -60,7 +59,7 @@ def substructured_modes(
     return modes_up_to(SciPyOperators(K, M, rigid), (), f_max, tol)
 
 
-def modes_up_to(ops: Any, held: npt.ArrayLike | HeldBody, f_max: float, tol: float) -> Modes:
+def modes_up_to(ops: Any, held: Any, f_max: float, tol: float) -> Modes:
     """`substructured_modes` of operators in one process, some dofs held or what `hold` returned."""
     between("tol", tol, 0, 1, "()")
     last = (2 * np.pi * positive("f_max", f_max)) ** 2
