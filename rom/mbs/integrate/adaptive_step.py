@@ -26,8 +26,11 @@ from rom.mbs.results.state import Memory, State
 from rom.model import Array
 
 FIRST_CHUNK = 16  # steps, before it is known how long they take
+# of the duration, a length of steps by which no run comes to its end, and how many may be shorter
+# in a row, as at a start or where something hits
+ENDLESS_RATIO, ENDLESS_STEPS = 1e-9, 100_000
 # what a run remembers beside its step memory, whose arrays have this in front of their names
-NUMBERS = (control.LENGTH, control.BEFORE, control.FASTEST, control.SHORTEST, control.LONGEST)
+NUMBERS = (control.LENGTH, control.BEFORE, control.ERROR_BEFORE, control.SHORTEST, control.LONGEST)
 COUNTS = (control.REJECTED, control.UNEVEN)
 STEP_PREFIX = "step."
 # what belongs to the method and its length
@@ -43,10 +46,14 @@ def run_variable(record: Record, W: Work, state: State) -> None:
     alpha.advance.link()
     goes_on = record.settings.begun > 0
     run = _Run(record, W, state if goes_on else replace(state, algorithmic=None, memory=None))
-    limit = FIRST_CHUNK
+    limit, endless = FIRST_CHUNK, 0
     while record.t < record.settings.t_end and not record.stopped:
-        clock = perf_counter()
+        clock, before = perf_counter(), record.t
         taken = run.chunk(limit)
+        slow = record.t - before < taken * ENDLESS_RATIO * run.now.number[control.DURATION]
+        endless = endless + taken if slow else 0
+        if endless > ENDLESS_STEPS:
+            raise run.failure(control.TOO_SHORT)
         spent = max(perf_counter() - clock, 1e-6)
         limit = int(np.clip(CHUNK_SECONDS / spent * taken, 1, LARGEST_CHUNK))
         record.pause()
@@ -73,7 +80,6 @@ class _Run:
         number[[control.TIME, control.END]] = start.t, settings.t_end
         number[[control.LENGTH, control.BEFORE, control.SHORTEST]] = h, h, np.inf
         number[[control.DURATION, control.RTOL]] = duration, settings.rtol
-        number[control.FASTEST] = record.packed.length / duration
         count[control.IS_BDF] = settings.method == "bdf"
         count[control.EVERY] = 1 if record.watch else settings.save_every
         if settings.begun:
@@ -291,7 +297,7 @@ def _control(W: Work, step: alpha.Step, start: State) -> tuple[Work, Control]:
     fields |= {"reals": reals[0], "wholes": wholes[0], "lu": W.lu.reshape(-1)}
     fields["instant"] = reals[0][: sum(own[name].size for name in INSTANT_FIELDS)]
     fields["step"] = alpha.Step(**{name: parts[f"step {name}"] for name, _ in step.items()})
-    return W, Control(**fields, by_blocks=W.by_blocks, W_base=W.base, weight=W.weight)
+    return W, Control(**fields, by_blocks=W.by_blocks, W_base=W.base)
 
 
 def _trial(record: Record, start: State, E: Work) -> tuple[Work, Trial]:

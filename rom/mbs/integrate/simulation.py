@@ -68,8 +68,9 @@ def simulate(  # noqa: PLR0913  keywords of the one entry, most have defaults
             not resolve in one step.
         tolerance: of the Newton iteration [1], relative to what the accelerations move in one step.
         rtol: relative tolerance of variable steps [1]. dop853 keeps it in every step (1e-12);
-            implicit methods let the errors of all steps add up to it (1e-4), lengths relative to
-            the size of the mechanism, velocities to the largest so far, weighted by mass.
+            implicit methods let the errors of places in all steps add up to it (1e-4), relative to
+            the size of the mechanism and weighted by mass. Vibrations too small to matter for it
+            are not followed; who asks for them, for velocities or loads, asks for less.
         atol: absolute tolerance of dop853, of positions and velocities [m, rad, m/s, rad/s].
         progress: report on stderr.
         save_every: keep every so many steps.

@@ -50,7 +50,8 @@ def test_a_block_below_the_angle_of_friction_rests(how):
     angle = 0.15
     sol = rom.simulate(block(angle), t_end=0.6, **how)
     assert_allclose(gone(sol)[-1], MASS * g * np.sin(angle) / (3 * STIFFNESS), rtol=1e-5)
-    assert_allclose(sol.velocity("block")[-1], 0.0, atol=1e-8)
+    # chosen steps limit the errors of places only
+    assert_allclose(sol.velocity("block")[-1], 0.0, atol=1e-6 if "rtol" in how else 1e-8)
 
 
 def block_moved(sol):

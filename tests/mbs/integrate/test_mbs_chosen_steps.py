@@ -1,0 +1,127 @@
+"""Chosen steps follow what moves places, not vibrations far above it, and meet their tolerance."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import rom
+from benchmarks.models import rigid_chain
+from cases.beam import stiffened_beam
+from cases.long import few
+from cases.mbs.mechanisms import simeon_crank, simulate_quietly
+from cases.mbs.motions import heavy_top, pendulum
+from rom import rotation
+from rom.components import cosserat
+from rom.mbs.mechanism import Mechanism
+
+X, Z, ORIGIN = np.array([1.0, 0, 0]), (0, 0, 1), (0.0, 0.0, 0.0)
+STEEL_BAR = {"EI": 2800.0, "rhoA": 3.1, "n_modes": 5, "stiffened": False}  # 20 mm square
+
+
+def four_bar():
+    """Driven at 6 rad/s; its bars bend by less than a thousandth, at 50 Hz and far more."""
+    mech, fold = Mechanism(gravity=(0, -9.81, 0)), rotation.matrix(rotation.exp((0, 0, -2.0)))
+    coupler, rocker = stiffened_beam(1.0, **STEEL_BAR), stiffened_beam(0.8, **STEEL_BAR)
+    pins = {"o": (-0.1, 0, 0), "a": (0.1, 0, 0)}
+    crank = mech.add_rigid("crank", mass=1, inertia=(0.01,) * 3, at=(0.1, 0, 0), markers=pins)
+    one = mech.add_flexible("coupler", coupler, at=0.2 * X)
+    two = mech.add_flexible("rocker", rocker, at=1.2 * X, orientation=fold)
+    mech.revolute("main", mech.ground.marker(ORIGIN), crank.marker("o"), axis=Z)
+    mech.revolute("pin", crank.marker("a"), one.marker("root"), axis=Z)
+    mech.spherical("wrist", one.marker("tip"), two.marker("root"))
+    foot = mech.ground.marker(1.2 * X + 0.8 * fold @ X)
+    mech.revolute("foot", foot, two.marker("tip"), axis=Z)
+    mech.drive("motor", "main", lambda t: 6 * t)
+    return mech
+
+
+def hub_and_panel():
+    mech = Mechanism(gravity=(0, 0, 0))
+    panel = stiffened_beam(2.0, EI=300.0, rhoA=2.0, n_modes=12, stiffened=False)
+    hub = mech.add_rigid("hub", mass=2, inertia=(0.1,) * 3, at=(0, 0, 0), omega=(0, 0, 10.0),
+                         markers={"side": (0.3, 0, 0)})  # fmt: skip
+    wing = mech.add_flexible("panel", panel, at=(0.3, 0, 0), velocity=(0, 3, 0), omega=(0, 0, 3))
+    mech.revolute("hinge", hub.marker("side"), wing.marker("root"), axis=Z)
+    mech.rotational_spring("coil", "hinge", stiffness=200.0)
+    return mech
+
+
+def arm():
+    """Two elastic links, the first driven; at every tolerance its steps once became too small."""
+    mech, link = Mechanism(gravity=(0, -9.81, 0)), {"EI": 500.0, "rhoA": 1.0, "n_modes": 4}
+    link = stiffened_beam(1.0, **link, stiffened=False)
+    one, two = mech.add_flexible("one", link), mech.add_flexible("two", link, at=X)
+    mech.revolute("shoulder", mech.ground.marker(ORIGIN), one.marker("root"), axis=Z)
+    mech.revolute("elbow", one.marker("tip"), two.marker("root"), axis=Z)
+    mech.drive("motor", "shoulder", lambda t: 0.5 * np.sin(4 * t))
+    mech.rotational_spring("coil", "elbow", stiffness=30.0, damping=0.5)
+    return mech
+
+
+def rod(n):
+    """A steel rod of 1 m and 10 mm on a hinge, let go as it lies; inertias of plates are small."""
+    along = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]])
+    section = {"stretch": (5e6, 5e6, 1.6e7), "bend": (98.0, 98.0, 75.0), "mass": 0.61}
+    one = cosserat.straight(1.0, n, frame=along, inertia=(3.8e-6, 3.8e-6, 7.7e-6), **section)
+    one = one._replace(inertia=cosserat.body(one).frames.inertia)
+    mech = Mechanism(gravity=(0, 0, -9.81))
+    part = mech.add_nonlinear("rod", cosserat.body(one))
+    mech.revolute("hinge", mech.ground.marker(ORIGIN), part.marker("start"), axis=(0, 1, 0))
+    return mech
+
+
+# builder, duration, fixed steps by which its reference is computed
+MECHANISMS = {
+    "arm": (arm, 1.0, 40_000),
+    "rod of 10": (lambda: rod(10), 0.5, 20_000),
+    "pendulum": (pendulum, 2.0, 40_000),
+    "chain": (lambda: rigid_chain(4), 1.5, 80_000),
+    "top": (heavy_top, 0.5, 80_000),
+    "crank": (simeon_crank, 0.1, 40_000),
+    "four-bar": (four_bar, 1.0, 80_000),
+    "hub and panel": (hub_and_panel, 2.0, 160_000),
+    "rod of 40": (lambda: rod(40), 0.5, 10_000),
+    "rod of 100": (lambda: rod(100), 0.5, 5_000),
+}
+
+
+INSTANTS = 40
+
+
+def seen(mech, t_end, n=None, **options):
+    """Places and turns of all markers at instants of a run, by n fixed steps if given."""
+    if n:
+        options |= {"dt": t_end / n, "save_every": n // INSTANTS}
+    sol = simulate_quietly(mech, t_end=t_end, tolerance=1e-9, **options)
+    sol = sol if n else sol.at(np.linspace(0, t_end, INSTANTS + 1))
+    ends = [(name, m) for name, part in sol.mechanism.parts.items() for m in part.names or ()]
+    found = [(sol.position(*end)[:, None], sol.axes(*end)) for end in ends]
+    return np.array([np.concatenate(x, axis=1) for x in found] or sol.q), sol.statistics["steps"]
+
+
+@pytest.mark.parametrize("name", few(2, MECHANISMS))
+def test_chosen_steps_meet_their_tolerance_and_are_few(name):
+    """A third of them, all of one length, are less accurate."""
+    build, t_end, n = MECHANISMS[name]
+    exact, _ = seen(build(), t_end, n)
+    found, steps = seen(build(), t_end, rtol=1e-4)
+    off = np.abs(found - exact).max()
+    assert off < 2e-4  # in metres and rad, where the tolerance weighs by mass
+    fixed, _ = seen(build(), t_end, steps // (3 * INSTANTS) * INSTANTS)
+    assert np.abs(fixed - exact).max() > off
+
+
+def test_finer_rods_take_no_more_steps():
+    counts = [seen(rod(n), 0.5, rtol=1e-3)[1] for n in (10, 40)]
+    assert counts[1] < 1.5 * counts[0]
+
+
+def test_a_step_does_not_leap_to_another_equilibrium():
+    """A spring whose mass has come to rest has one on its other side, too."""
+    mech, end = Mechanism(gravity=(0, 0, 0)), 1e5
+    mass = mech.add_rigid("mass", mass=1.0, inertia=(1, 1, 1), at=(1.2, 0, 0)).marker(ORIGIN)
+    base = mech.ground.marker(ORIGIN)
+    mech.prismatic("guide", base, mass, axis=(1, 0, 0))
+    mech.spring_damper("spring", base, mass, stiffness=1e8, damping=1.8e4, free_length=1.0)
+    sol = rom.simulate(mech, t_end=end, rtol=0.5)
+    assert_allclose(sol.position("mass")[-1], X, atol=1e-3)
