@@ -44,8 +44,7 @@ ORDER = {
             "doctor cli components __main__"
         ),
         "cli": (
-            "answer speech schemas options described ranks matrices model output verbs "
-            "parser main"
+            "answer speech schemas options described ranks matrices model output verbs parser main"
         ),
         "fe": "costs parallel jit compat operators forms mesh elasticity probe",
         "fe.operators": (
