@@ -221,6 +221,8 @@ class _Run:
             broken = record.packed.broken_laws
             return SolverError(f"the equations of motion are singular {where}{broken}.")
         why = f"its error is {error:.3g} times the tolerance"
+        if error <= 1.0:
+            why += f", and {(record.settings.t_end - t) / h:.2g} such steps would follow"
         if count[control.ANSWER] != alpha.CONVERGED:
             why = failed_step(record, self.W, self.T, int(count[control.ANSWER]), t).message
         return SolverError(
