@@ -26,9 +26,6 @@ from rom.mbs.results.state import Memory, State
 from rom.model import Array
 
 FIRST_CHUNK = 16  # steps, before it is known how long they take
-# of the duration, a length of steps by which no run comes to its end, and how many may be shorter
-# in a row, as at a start or where something hits
-ENDLESS_RATIO, ENDLESS_STEPS = 1e-9, 100_000
 # what a run remembers beside its step memory, whose arrays have this in front of their names
 NUMBERS = (control.LENGTH, control.BEFORE, control.ERROR_BEFORE, control.SHORTEST, control.LONGEST)
 COUNTS = (control.REJECTED, control.UNEVEN)
@@ -46,14 +43,10 @@ def run_variable(record: Record, W: Work, state: State) -> None:
     alpha.advance.link()
     goes_on = record.settings.begun > 0
     run = _Run(record, W, state if goes_on else replace(state, algorithmic=None, memory=None))
-    limit, endless = FIRST_CHUNK, 0
+    limit = FIRST_CHUNK
     while record.t < record.settings.t_end and not record.stopped:
-        clock, before = perf_counter(), record.t
+        clock = perf_counter()
         taken = run.chunk(limit)
-        slow = record.t - before < taken * ENDLESS_RATIO * run.now.number[control.DURATION]
-        endless = endless + taken if slow else 0
-        if endless > ENDLESS_STEPS:
-            raise run.failure(control.TOO_SHORT)
         spent = max(perf_counter() - clock, 1e-6)
         limit = int(np.clip(CHUNK_SECONDS / spent * taken, 1, LARGEST_CHUNK))
         record.pause()
@@ -221,8 +214,6 @@ class _Run:
             broken = record.packed.broken_laws
             return SolverError(f"the equations of motion are singular {where}{broken}.")
         why = f"its error is {error:.3g} times the tolerance"
-        if error <= 1.0:
-            why += f", and {(record.settings.t_end - t) / h:.2g} such steps would follow"
         if count[control.ANSWER] != alpha.CONVERGED:
             why = failed_step(record, self.W, self.T, int(count[control.ANSWER]), t).message
         return SolverError(

@@ -209,7 +209,7 @@ def test_a_force_that_jumps_all_the_time_makes_the_step_too_small(method):
         bob.marker("tip"),
     )
     with pytest.raises(
-        SolverError, match=r"the step became too small at t = .* its error .* would follow"
+        SolverError, match=r"the step became too small at t = .* its error"
     ) as caught:
         simulate(mech, t_end=1.0, method=method, rtol=1e-6)
     assert caught.value.solution.t[-1] < 1.0
