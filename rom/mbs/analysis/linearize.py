@@ -5,6 +5,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from scipy.sparse import csr_matrix
 
 from rom.arguments import typed
 from rom.errors import ConfigError, ModelError, warn
@@ -394,7 +395,7 @@ class _Path:
 
 def _matrices(now: Instant, state: State, axes: Axes, path: _Path) -> Linearization:
     T, T1, T2, T3 = small_motions(now.packed, state, axes)
-    M, Cv, Kq = now.matrices(state)
+    M, Cv, Kq = map(csr_matrix, now.matrices(state))
     H, basis, Z = now.W.H.copy(), T @ path.Z, path.Z
     test = _virtual(now, state, basis)
     C2 = test.T @ (M @ (T2 @ Z) + Cv @ basis)
