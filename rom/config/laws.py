@@ -147,47 +147,17 @@ def law_of(values: Any, place: Place, *, t_end: float | None = None, trust: bool
 
         spline = CubicSpline(np.array(values["t"]), np.array(values["values"]))
         return Law(spline, spline.derivative(1), spline.derivative(2))
-    return {"run-up": _run_up, "ramp": _ramp, "harmonic": _harmonic}[kind](values)
+    if kind == "harmonic":
+        return _harmonic(values)
+    from rom.mbs.parts.signals import run_up, transition
+
+    if kind == "run-up":
+        return Law(*run_up(**values))
+    return Law(*transition(values.pop("from"), values.pop("to"), **values))
 
 
 def _polynomial(start: float, slope: float) -> Law:
     return Law(lambda t: start + slope * t, lambda t: slope + 0 * t, lambda t: 0.0 * t)
-
-
-def _run_up(values: dict[str, Any]) -> Law:
-    import numpy as np
-
-    speed, T = values["rate"], values["duration"]
-    w = 2 * np.pi / T
-
-    def angle(t: Any) -> Any:
-        s = np.minimum(t, T)
-        return speed * (s**2 / (2 * T) + (np.cos(w * s) - 1) / (w * 2 * np.pi) + t - s)
-
-    def rate(t: Any) -> Any:
-        s = np.minimum(t, T)
-        return speed * (s / T - np.sin(w * s) / (2 * np.pi))
-
-    def acceleration(t: Any) -> Any:
-        return speed / T * (1 - np.cos(w * np.minimum(t, T)))
-
-    return Law(angle, rate, acceleration)
-
-
-def _ramp(values: dict[str, Any]) -> Law:
-    import numpy as np
-
-    low, high, T = values["from"], values["to"], values["duration"]
-    w, rise = 2 * np.pi, high - low
-
-    def s(t: Any) -> Any:
-        return np.clip((t - values["start"]) / T, 0.0, 1.0)
-
-    return Law(
-        lambda t: low + rise * (s(t) - np.sin(w * s(t)) / w),
-        lambda t: rise / T * (1 - np.cos(w * s(t))),
-        lambda t: rise / T**2 * w * np.sin(w * s(t)),
-    )
 
 
 def _harmonic(values: dict[str, Any]) -> Law:

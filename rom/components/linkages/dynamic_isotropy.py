@@ -16,6 +16,7 @@ Source:
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -49,12 +50,21 @@ def isotropy_index(A: Array, *, lengths: npt.ArrayLike = (1.0, 1.0)) -> Array:
     Raises:
         ConfigError, ModelError: for lengths that are not positive; for an inertia that is not.
     """
+    scale = positive_pair(lengths)
+    _, trace, determinant = _positive(np.asarray(A, dtype=float) / np.multiply.outer(scale, scale))
+    return 2 * np.sqrt(np.maximum(determinant, 0.0)) / trace
+
+
+def positive_pair(lengths: npt.ArrayLike) -> Array:
+    """(2,) lengths of both coordinates [1 or m].
+
+    Raises:
+        ConfigError: unless they are two positive numbers.
+    """
     scale = np.asarray(lengths, dtype=float)
-    if scale.shape != (2,) or not (scale > 0).all():
+    if scale.shape != (2,) or not (scale > 0).all() or not np.isfinite(scale).all():
         raise ConfigError(f"lengths = {lengths!r}: two positive numbers are needed.")
-    A = _positive(np.asarray(A, dtype=float) / np.multiply.outer(scale, scale))
-    determinant = A[..., 0, 0] * A[..., 1, 1] - A[..., 0, 1] * A[..., 1, 0]
-    return 2 * np.sqrt(np.maximum(determinant, 0.0)) / (A[..., 0, 0] + A[..., 1, 1])
+    return scale
 
 
 @typed
@@ -63,11 +73,14 @@ def christoffel(inertia: Inertia, q: npt.ArrayLike) -> Array:
 
     All are zero where the mechanism is dynamically uniform. By central differences.
     """
-    q1, q2 = np.asarray(q, dtype=float)
-    step = DIFFERENCE_STEP * np.array([1.0, -1.0])
-    D = np.stack([inertia(q1 + step, q2 + 0 * step), inertia(q1 + 0 * step, q2 + step)])
-    D = (D[:, 0] - D[:, 1]) / (2 * DIFFERENCE_STEP)  # D[k] = dA / dq_k
-    return 0.5 * (np.einsum("kij->ijk", D) + np.einsum("jik->ijk", D) - D)
+    D = derivatives(inertia, np.asarray(q, dtype=float)[None])[0]  # D[:, :, k] = dA / dq_k
+    return 0.5 * (D + D.transpose(0, 2, 1) - D.transpose(2, 0, 1))
+
+
+def derivatives(function: Inertia, q: Array) -> Array:
+    """(k, ..., 2) central differences of a function at (k, 2), its unit over that [rad or m]."""
+    ends = [[function(*(q + s * e).T) for s in (1, -1)] for e in DIFFERENCE_STEP * np.eye(2)]
+    return np.stack([up - down for up, down in ends], axis=-1) / (2 * DIFFERENCE_STEP)
 
 
 @typed
@@ -239,8 +252,7 @@ def anisotropy(inertia: Inertia, q1: Array, q2: Array) -> Array:
     Raises:
         ModelError: if the function returns no inertia.
     """
-    A = _positive(inertia_at(inertia, q1, q2))
-    trace = A[..., 0, 0] + A[..., 1, 1]
+    A, trace, _ = _positive(inertia_at(inertia, q1, q2))
     return np.stack([(A[..., 0, 0] - A[..., 1, 1]) / trace, 2 * A[..., 0, 1] / trace], axis=-1)
 
 
@@ -265,32 +277,33 @@ def inertia_at(inertia: Inertia, q1: Array, q2: Array) -> Array:
     return np.asarray(A, dtype=float)
 
 
-def _positive(A: Array) -> Array:
-    """A (..., 2, 2) if it can be an inertia: of positive trace and no negative determinant."""
+def _positive(A: Array) -> tuple[Array, Array, Array]:
+    """A (..., 2, 2) if it can be an inertia, its positive trace and determinant, not negative."""
     if np.shape(A)[-2:] != (2, 2):
         raise ModelError(f"an inertia of two motors must be (..., 2, 2), not {np.shape(A)}.")
     trace = A[..., 0, 0] + A[..., 1, 1]
     determinant = A[..., 0, 0] * A[..., 1, 1] - A[..., 0, 1] * A[..., 1, 0]
     if not ((trace > 0) & (determinant > -DETERMINANT_RTOL * trace**2)).all():
         raise ModelError("the inertia must be positive, or some motion has no kinetic energy.")
-    return A
+    return A, trace, determinant
 
 
 def anisotropy_gradient(inertia: Inertia, q: Array) -> Array:
     """(k, 2, 2) derivatives of `anisotropy` at angles (k, 2) [rad], by central differences."""
-    columns = [
-        anisotropy(inertia, *(q + e).T) - anisotropy(inertia, *(q - e).T)
-        for e in DIFFERENCE_STEP * np.eye(2)
-    ]
-    return np.stack(columns, axis=-1) / (2 * DIFFERENCE_STEP)
+    return derivatives(partial(anisotropy, inertia), q)
 
 
 def _suspects(f: Array) -> Index:
     """(k, 2) cells of a periodic grid (n, n, 2) in which both values may vanish."""
-    corners = np.stack([np.roll(f, s, axis=(0, 1)) for s in ((0, 0), (-1, 0), (0, -1), (-1, -1))])
+    corners = _corners(f)
     low, high = corners.min(axis=0), corners.max(axis=0)
     margin = 0.25 * (high - low) + 1e-12  # the values are curved between the corners
     return np.argwhere(((low <= margin) & (high >= -margin)).all(axis=-1))
+
+
+def _corners(f: Array) -> Array:
+    """(4, n, n, ...) values at the corners of each cell of a periodic grid, around it."""
+    return np.stack([np.roll(f, s, axis=(0, 1)) for s in ((0, 0), (-1, 0), (-1, -1), (0, -1))])
 
 
 def _distinct(q: Array) -> Array:
@@ -322,12 +335,8 @@ def closed_loci(index: Array, level: float, ranges: Ranges = TURNS) -> list[Arra
         ConfigError: if the field is not that of a square grid, or has gaps; for ranges that cannot
             be.
     """
-    if (
-        np.ndim(index) != 2
-        or len(set(np.shape(index))) != 1
-        or len(index) < 2
-        or not np.isfinite(index).all()
-    ):
+    square = np.ndim(index) == 2 and np.shape(index)[0] == np.shape(index)[1] > 1
+    if not square or not np.isfinite(index).all():
         raise ConfigError(f"a field {np.shape(index)}: (n, n) finite values are needed.")
     names, neighbours = _joined(index, level, checked(ranges))
     nodes, fresh, curves = _crossings(index, level, names), np.ones(len(names), dtype=bool), []
@@ -364,9 +373,7 @@ def _joined(index: Array, level: float, ranges: Ranges) -> tuple[Index, Index]:
     along = np.arange(n * n).reshape(n, n)  # edge from node (i, j) to (i + 1, j)
     up = n * n + along  # to (i, j + 1)
     sides = np.stack([along, np.roll(up, -1, axis=0), np.roll(along, -1, axis=1), up])
-    corners = np.stack(
-        [np.roll(index, s, axis=(0, 1)) for s in ((0, 0), (-1, 0), (-1, -1), (0, -1))]
-    )
+    corners = _corners(index)
     inside = corners >= level
     cut = inside != np.roll(inside, -1, axis=0)
     cut[:, -1:, :] &= ranges[0] is None  # no cells beyond the last node of a range

@@ -24,18 +24,20 @@ import numpy.typing as npt
 
 from rom.arguments import typed
 from rom.components.linkages.dynamic_isotropy import (
-    DIFFERENCE_STEP,
     TURNS,
     Assembles,
     Inertia,
     Ranges,
+    angle_grid,
     anisotropy,
     anisotropy_gradient,
     around,
     checked,
+    derivatives,
     inertia_at,
     isotropic_configurations,
     isotropy_index,
+    positive_pair,
 )
 from rom.errors import ConfigError, ModelError
 from rom.model import Array, Index
@@ -87,10 +89,8 @@ def isotropic_set(
         ModelError: if the mechanism can be assembled nowhere or has no inertia.
         SolverError: if the windings of isolated points of a torus do not add up to zero.
     """
-    if n < 4:
-        raise ConfigError(f"n = {n}: the search needs four cells or more.")
-    there = _Stretched(checked(ranges), n, inertia, _both(lengths), assembles)
-    q1, q2 = np.meshgrid(*2 * [2 * np.pi * np.arange(n) / n], indexing="ij")
+    q1, q2 = angle_grid(n)
+    there = _Stretched(checked(ranges), n, inertia, positive_pair(lengths), assembles)
     inside = there.assembles(q1, q2)
     if inside.any():
         q = np.column_stack([q1[inside], q2[inside]])
@@ -178,14 +178,7 @@ def tool_isotropy(
     q = q[around(there.assembles, q)]
     if not len(q):
         raise ModelError("none of the postures can be assembled: the tool reaches nothing.")
-    ends = [[tip(*there.coordinates(q + s * e).T) for s in (1, -1)]
-            for e in DIFFERENCE_STEP * np.eye(2)]  # fmt: skip
-    if any(np.shape(x) != q.shape for both in ends for x in both):
-        raise ModelError(
-            f"tip returns the shape {np.shape(ends[0][0])} for {len(q)} postures, not {q.shape}.",
-            hint="Write it for arrays of coordinates; a place is two numbers.",
-        )
-    J = np.stack([(up - down) / (2 * DIFFERENCE_STEP) for up, down in ends], axis=-1)
+    J = derivatives(lambda *at: _place(tip, there.coordinates(np.column_stack(at))), q)
     weight = np.abs(np.linalg.det(J)) * (2 * np.pi / n) ** 2
     if weight.sum() <= 1e-9 * np.square(J).sum() * (2 * np.pi / n) ** 2:
         raise ModelError("the tool moves along a line; its two drives must move it in a plane.")
@@ -196,6 +189,16 @@ def tool_isotropy(
     return ToolIsotropy(
         float(index @ weight / weight.sum()), float(index.max()), float(weight.sum())
     )
+
+
+def _place(tip: Tip, q: Array) -> Array:
+    """(k, 2) the tool at coordinates (k, 2), if the function gives one place for each."""
+    if np.shape(x := tip(*q.T)) != q.shape:
+        raise ModelError(
+            f"tip returns the shape {np.shape(x)} for {len(q)} postures, not {q.shape}.",
+            hint="Write it for arrays of coordinates; a place is two numbers.",
+        )
+    return x
 
 
 @dataclass(frozen=True, slots=True)
@@ -243,10 +246,3 @@ class _Stretched:
 
     def _end(self) -> float:
         return 2 * np.pi * (1.0 if self.closed else 1 - 2 / self.n)
-
-
-def _both(lengths: npt.ArrayLike) -> Array:
-    scale = np.asarray(lengths, dtype=float)
-    if scale.shape != (2,) or not (scale > 0).all() or not np.isfinite(scale).all():
-        raise ConfigError(f"lengths = {lengths!r}: two positive numbers are needed.")
-    return scale

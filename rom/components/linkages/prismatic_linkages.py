@@ -8,26 +8,23 @@ Source:
     `theory/isotropy`.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from rom.arguments import not_negative, positive, typed
 from rom.components.linkages.chains import (
+    ClosedLinkage,
     Link,
+    Linkage,
     Motion,
-    closed,
+    both,
     directions,
-    gram,
-    in_chunks,
-    meeting,
-    reach,
     unit_rows,
 )
-from rom.components.linkages.two_dof_linkages import Elastic, as_elastic
 from rom.errors import ModelError
-from rom.model import Array
+from rom.model import Array, Index
 
 
 def _not_negative(name: str, **numbers: float) -> None:
@@ -75,7 +72,7 @@ class CrossSlides:
 
     def tip(self, q1: npt.ArrayLike, q2: npt.ArrayLike) -> Array:
         """(..., 2) where the tool is at displacements (...) [m]; q1 and q2 in [m]."""
-        q1, q2 = np.broadcast_arrays(np.asarray(q1, dtype=float), np.asarray(q2, dtype=float))
+        q1, q2 = both(q1, q2)
         return np.stack([q1, 0 * q1], axis=-1) + q2[..., None] * directions(np.array(self.angle))
 
 
@@ -112,7 +109,7 @@ class PolarArm:
             q1: (...,) angle of the guide [rad].
             q2: (...,) displacement of the slide from the pivot [m].
         """
-        _, s = np.broadcast_arrays(np.asarray(q1, dtype=float), np.asarray(q2, dtype=float))
+        _, s = both(q1, q2)
         A = np.empty((*s.shape, 2, 2))
         A[..., 0, 0] = self.guide + self.spin + self.slide * (s * s + self.offset**2)
         A[..., 0, 1] = A[..., 1, 0] = -self.slide * self.offset
@@ -121,7 +118,7 @@ class PolarArm:
 
     def tip(self, q1: npt.ArrayLike, q2: npt.ArrayLike) -> Array:
         """(..., 2) where the centre of the slide is [m]; q1 in [rad], q2 in [m]."""
-        q1, s = np.broadcast_arrays(np.asarray(q1, dtype=float), np.asarray(q2, dtype=float))
+        q1, s = both(q1, q2)
         across = directions(q1 + np.pi / 2)
         return s[..., None] * directions(q1) + self.offset * across
 
@@ -136,8 +133,8 @@ class PolarArm:
 
 @typed
 @dataclass(frozen=True, slots=True)
-class SlideArm:
-    """PR: a slide along x, and a link on it.
+class SlideArm(Linkage):
+    """PR: a slide along x, and a link on it: coordinates are its displacement and the angle.
 
     Attributes:
         slide: mass of the slide [kg].
@@ -155,35 +152,29 @@ class SlideArm:
     def __post_init__(self) -> None:
         _not_negative("slide with an arm", slide=self.slide, payload=self.payload)
 
-    def inertia(self, q1: npt.ArrayLike, q2: npt.ArrayLike, *, elastic: Elastic = "held") -> Array:
-        """(..., 2, 2) generalised inertia [kg, kg m, kg m^2].
-
-        Args:
-            q1: (...,) displacement of the slide [m].
-            q2: (...,) angle of the link [rad].
-            elastic: "held", a frequency or "free", see `TwoLink.inertia`.
-        """
-        (link,) = as_elastic((self.link,), elastic)
-        return in_chunks(replace(self, link=link)._of_all_rates, q1, q2)
+    @property
+    def _links(self) -> tuple[Link, ...]:
+        return (self.link,)
 
     def tip(self, q1: npt.ArrayLike, q2: npt.ArrayLike) -> Array:
         """(..., 2) where the end of the link is [m]; q1 in [m], q2 in [rad]."""
-        q1, q2 = np.broadcast_arrays(np.asarray(q1, dtype=float), np.asarray(q2, dtype=float))
+        q1, q2 = both(q1, q2)
         return np.stack([q1, 0 * q1], axis=-1) + self.link.length * directions(q2)
 
-    def _of_all_rates(self, q1: Array, q2: Array) -> Array:
-        n = 2 + self.link.r
-        motion = Motion.at_rest(q1.size, n)
+    def _moved(self, links: tuple[Link, ...], q: tuple[Array, Array], at: Index) -> Motion:
+        motion = Motion.at_rest(q[0].size, int(at[-1]))
         motion.pin[:, 0, 0] = 1.0
         motion.A[:, 0, 0] = self.slide
-        motion.add(self.link, q2, unit_rows(n, 1), 2)
-        return motion.A + self.payload * gram(motion.pin, motion.pin)
+        motion.add(links[0], q[1], unit_rows(int(at[-1]), 1), 2)
+        return motion
 
 
 @typed
 @dataclass(frozen=True, slots=True)
-class SlideFiveBar:
+class SlideFiveBar(ClosedLinkage):
     """PRRRP: two slides on straight rails, two couplers that meet in the tip.
+
+    Coordinates are the displacements of the left and of the right slide [m].
 
     Attributes:
         rails: (x, y, angle) of a point of the left and of the right rail [m, m, rad]; displacements
@@ -209,48 +200,19 @@ class SlideFiveBar:
         if self.side not in (1, -1):
             raise ModelError(f"side = {self.side}: needed is 1 or -1.")
 
-    def inertia(self, q1: npt.ArrayLike, q2: npt.ArrayLike, *, elastic: Elastic = "held") -> Array:
-        """(..., 2, 2) generalised inertia [kg] at displacements (...) of the slides [m].
+    @property
+    def _links(self) -> tuple[Link, ...]:
+        return self.couplers
 
-        Args:
-            q1: (...,) displacement of the left slide [m].
-            q2: (...,) of the right one [m].
-            elastic: "held", a frequency or "free", see `TwoLink.inertia`.
-
-        Raises:
-            ModelError: if the couplers cannot reach each other somewhere.
-        """
-        left, right = as_elastic(self.couplers, elastic)
-        return in_chunks(replace(self, couplers=(left, right))._of_all_rates, q1, q2)
-
-    def tip(self, q1: npt.ArrayLike, q2: npt.ArrayLike) -> Array:
-        """(..., 2) where the tool is at displacements (...) [m]; q1 and q2 in [m].
-
-        Raises:
-            ModelError: if the couplers cannot reach each other somewhere.
-        """
-        q1, q2 = np.broadcast_arrays(np.asarray(q1, dtype=float), np.asarray(q2, dtype=float))
-        return meeting(*self._elbows(q1, q2), self.couplers, self.side, (q1, q2))
-
-    def assembles(self, q1: npt.ArrayLike, q2: npt.ArrayLike) -> npt.NDArray[np.bool_]:
-        """Whether the couplers meet at displacements (...) [m], and not in one line."""
-        return reach(*self._elbows(q1, q2), self.couplers)
-
-    def _elbows(self, q1: npt.ArrayLike, q2: npt.ArrayLike) -> tuple[Array, Array]:
+    def _elbows(self, q1: Array, q2: Array) -> tuple[Array, Array]:
         left, right = (
-            np.array(rail[:2])
-            + np.asarray(q, dtype=float)[..., None] * directions(np.array(rail[2]))
-            for rail, q in zip(self.rails, np.broadcast_arrays(q1, q2), strict=True)
+            np.array(rail[:2]) + q[..., None] * directions(np.array(rail[2]))
+            for rail, q in zip(self.rails, (q1, q2), strict=True)
         )
         return left, right
 
-    def _of_all_rates(self, q1: Array, q2: Array) -> Array:
-        at = 2 + np.cumsum([0, *(link.r for link in self.couplers)])
-        left, right = self._elbows(q1, q2)
-        sides = [Motion.at_rest(q1.size, int(at[-1])) for _ in range(2)]
-        for k, (side, rail, mass) in enumerate(zip(sides, self.rails, self.slides, strict=True)):
-            side.pin[:, :, k] = directions(np.array(rail[2]))
-            side.A[:, k, k] = mass
-        P = np.stack([left, self.tip(q1, q2), right], axis=1)
-        closed(sides, self.couplers, P, at)
-        return sides[0].A + sides[1].A + self.payload * gram(sides[0].pin, sides[0].pin)
+    def _side(self, k: int, link: Link, q: Array, at: Index) -> Motion:
+        side = Motion.at_rest(q.size, int(at[-1]))
+        side.pin[:, :, k] = directions(np.array(self.rails[k][2]))
+        side.A[:, k, k] = self.slides[k]
+        return side

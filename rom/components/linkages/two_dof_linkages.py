@@ -6,7 +6,7 @@ coordinates are held, vibrate with the torques of the motors, or are free. `mech
 the same from the mass matrix and the constraints of any `rom.Mechanism`.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Literal
 
@@ -17,14 +17,12 @@ from scipy.linalg import null_space
 from rom.arguments import finite, not_negative, one_of, positive, typed
 from rom.body.flexible import FlexibleBody
 from rom.components.linkages.chains import (
+    ClosedLinkage,
     Link,
+    Linkage,
     Motion,
-    closed,
+    both,
     directions,
-    gram,
-    in_chunks,
-    meeting,
-    reach,
     unit_rows,
 )
 from rom.errors import ConfigError, ModelError
@@ -33,9 +31,8 @@ from rom.mbs.equations.packing import pack
 from rom.mbs.integrate.consistent_start import assembled
 from rom.mbs.kernels.work import workspace
 from rom.mbs.mechanism import Mechanism
-from rom.model import Array
+from rom.model import Array, Index
 
-Elastic = Literal["held", "free"] | float
 KEPT_POSTURES = 4096  # whose inertia is known: asking whether it exists costs nothing more
 # of a drive between two assemblies [rad, or sizes of the mechanism]: farther, it closes elsewhere
 MAX_FOLLOWED = 0.5
@@ -110,7 +107,7 @@ def reduced_link(body: FlexibleBody, first: str, second: str) -> Link:
 
 @typed
 @dataclass(frozen=True, slots=True)
-class TwoLink:
+class TwoLink(Linkage):
     """A chain of two links on a fixed pivot, a point mass at its end.
 
     Attributes:
@@ -131,41 +128,31 @@ class TwoLink:
     def __post_init__(self) -> None:
         not_negative("payload [kg]", self.payload, error=ModelError)
 
-    def inertia(self, q1: npt.ArrayLike, q2: npt.ArrayLike, *, elastic: Elastic = "held") -> Array:
-        """(..., 2, 2) generalised inertia [kg m^2] at angles (...) [rad].
-
-        Args:
-            q1: (...,) angle of the first link [rad].
-            q2: (...,) angle of the second one, of the same shape [rad].
-            elastic: "held", what slow motors feel; the circular frequency of their torques
-                [rad/s], at which elastic coordinates vibrate with them; "free", that without
-                bound: it falls with every mode a link keeps, and says nothing about the machine.
-
-        Raises:
-            ConfigError: for another word, or a frequency that is not positive.
-        """
-        links = as_elastic((self.first, self.second), elastic)
-        return in_chunks(replace(self, first=links[0], second=links[1])._of_all_rates, q1, q2)
+    @property
+    def _links(self) -> tuple[Link, ...]:
+        return self.first, self.second
 
     def tip(self, q1: npt.ArrayLike, q2: npt.ArrayLike) -> Array:
         """(..., 2) where the end of the chain is at angles (...) [m]; q1 and q2 in [rad]."""
-        q1, q2 = np.asarray(q1, dtype=float), np.asarray(q2, dtype=float)
+        q1, q2 = both(q1, q2)
         angle = q2 + q1 if self.relative else q2
         return self.first.length * directions(q1) + self.second.length * directions(angle)
 
-    def _of_all_rates(self, q1: Array, q2: Array) -> Array:
-        n = 2 + self.first.r + self.second.r
+    def _moved(self, links: tuple[Link, ...], q: tuple[Array, Array], at: Index) -> Motion:
+        n, (q1, q2) = int(at[-1]), q
         motion, angle = Motion.at_rest(q1.size, n), q2 + q1 if self.relative else q2
         spin = unit_rows(n, 0, 1) if self.relative else unit_rows(n, 1)
-        motion.add(self.first, q1, unit_rows(n, 0), 2)
-        motion.add(self.second, angle, spin, 2 + self.first.r)
-        return motion.A + self.payload * gram(motion.pin, motion.pin)
+        motion.add(links[0], q1, unit_rows(n, 0), at[0])
+        motion.add(links[1], angle, spin, at[1])
+        return motion
 
 
 @typed
 @dataclass(frozen=True, slots=True)
-class FiveBar:
+class FiveBar(ClosedLinkage):
     """Two driven cranks on a common base, two couplers that meet in the tip.
+
+    Coordinates are the angles of the left and of the right crank against the base [rad].
 
     Attributes:
         base: distance of the driven pivots, along x [m].
@@ -190,20 +177,9 @@ class FiveBar:
                 "are >= 0, >= 0, and 1 or -1."
             )
 
-    def inertia(self, q1: npt.ArrayLike, q2: npt.ArrayLike, *, elastic: Elastic = "held") -> Array:
-        """(..., 2, 2) generalised inertia [kg m^2] at angles (...) [rad] of the cranks.
-
-        Args:
-            q1: (...,) angle of the left crank against the base [rad].
-            q2: (...,) angle of the right one, of the same shape [rad].
-            elastic: "held", a frequency or "free", see `TwoLink.inertia`.
-
-        Raises:
-            ModelError: if the couplers cannot reach each other at some angles.
-        """
-        a, b, c, d = as_elastic(self.cranks + self.couplers, elastic)
-        moved = replace(self, cranks=(a, b), couplers=(c, d))
-        return in_chunks(moved._of_all_rates, q1, q2)
+    @property
+    def _links(self) -> tuple[Link, ...]:
+        return self.cranks + self.couplers
 
     def posture(self, q1: npt.ArrayLike, q2: npt.ArrayLike) -> Array:
         """Where the joints are at angles of the cranks.
@@ -218,63 +194,20 @@ class FiveBar:
         Raises:
             ModelError: if the couplers cannot reach each other at some angles.
         """
-        pivots, left, right = self._elbows(q1, q2)
-        q1, q2 = np.broadcast_arrays(np.asarray(q1, dtype=float), np.asarray(q2, dtype=float))
-        tip = meeting(left, right, self.couplers, self.side, (q1, q2))
+        tip, (left, right) = self.tip(q1, q2), self._elbows(*both(q1, q2))
+        pivots = np.zeros((2, *tip.shape))
+        pivots[1, ..., 0] = self.base
         return np.stack([pivots[0], left, tip, right, pivots[1]], axis=-2)
 
-    def tip(self, q1: npt.ArrayLike, q2: npt.ArrayLike) -> Array:
-        """(..., 2) where the tool is at angles (...) of the cranks [m]; q1 and q2 in [rad].
+    def _elbows(self, q1: Array, q2: Array) -> tuple[Array, Array]:
+        left, right = self.cranks
+        pivot = np.array([self.base, 0.0])
+        return left.length * directions(q1), pivot + right.length * directions(q2)
 
-        Raises:
-            ModelError: as `posture`.
-        """
-        return self.posture(q1, q2)[..., 2, :]
-
-    def assembles(self, q1: npt.ArrayLike, q2: npt.ArrayLike) -> npt.NDArray[np.bool_]:
-        """Whether the couplers meet at angles (...) of the cranks [rad], and not in one line."""
-        _, left, right = self._elbows(q1, q2)
-        return reach(left, right, self.couplers)
-
-    def _elbows(self, q1: npt.ArrayLike, q2: npt.ArrayLike) -> tuple[Array, Array, Array]:
-        """Pivots (2, ..., 2) and both elbows (..., 2) [m]."""
-        q1, q2 = np.broadcast_arrays(np.asarray(q1, dtype=float), np.asarray(q2, dtype=float))
-        pivots = np.zeros((2, *q1.shape, 2))
-        pivots[1, ..., 0] = self.base
-        left, right = (
-            pivot + crank.length * directions(q)
-            for pivot, crank, q in zip(pivots, self.cranks, (q1, q2), strict=True)
-        )
-        return pivots, left, right
-
-    def _of_all_rates(self, q1: Array, q2: Array) -> Array:
-        links = self.cranks + self.couplers
-        at = 2 + np.cumsum([0, *(link.r for link in links)])
-        n, N = int(at[-1]), q1.size
-        sides = [Motion.at_rest(N, n) for _ in range(2)]
-        for k, q in enumerate((q1, q2)):
-            sides[k].add(links[k], q, unit_rows(n, k), at[k])
-        P = self.posture(q1, q2)
-        closed(sides, self.couplers, P[:, 1:4], at[2:])
-        return sides[0].A + sides[1].A + self.payload * gram(sides[0].pin, sides[0].pin)
-
-
-def as_elastic(links: tuple[Link, ...], elastic: Elastic) -> tuple[Link, ...]:
-    """The links with their elastic coordinates, or without if these are held.
-
-    At a frequency w elastic forces -K q = K q'' / w^2 are those of a mass -K / w^2.
-
-    Raises:
-        ConfigError: for another word than "held" or "free", or a frequency that is not positive.
-    """
-    if isinstance(elastic, int | float):
-        positive("elastic [rad/s]", elastic)
-        padded = (np.pad(link.K / elastic**2, ((3, 0), (3, 0))) for link in links)
-        return tuple(replace(link, M=link.M - K) for link, K in zip(links, padded, strict=True))
-    if one_of("elastic", elastic, ("held", "free")) == "free":
-        return links
-    tip, K = np.zeros((2, 0)), np.zeros((0, 0))
-    return tuple(replace(link, M=link.M[:3, :3], tip=tip, K=K) for link in links)
+    def _side(self, k: int, link: Link, q: Array, at: Index) -> Motion:
+        side = Motion.at_rest(q.size, int(at[-1]))
+        side.add(link, q, unit_rows(int(at[-1]), k), at[k])
+        return side
 
 
 @typed
@@ -346,7 +279,7 @@ class Driven:
         Raises:
             ModelError: if the drives do not determine the motion there, or it cannot be assembled.
         """
-        q1, q2 = np.broadcast_arrays(np.asarray(q1, dtype=float), np.asarray(q2, dtype=float))
+        q1, q2 = both(q1, q2)
         out = [self._known(*q) for q in zip(q1.flat, q2.flat, strict=True)]
         for found in out:
             if isinstance(found, ModelError):
@@ -361,14 +294,14 @@ class Driven:
         """
         if self._tool is None:
             raise ConfigError("no tool was named; write Driven(mechanism, drives, tool=...).")
-        q1, q2 = np.broadcast_arrays(np.asarray(q1, dtype=float), np.asarray(q2, dtype=float))
+        q1, q2 = both(q1, q2)
         at = self._packed.system.bodies.q_at[self._packed.names.index(self._tool)]
         places = [self._posture(q)[at : at + 2] for q in zip(q1.flat, q2.flat, strict=True)]
         return np.array(places).reshape(*q1.shape, 2)
 
     def assembles(self, q1: npt.ArrayLike, q2: npt.ArrayLike) -> npt.NDArray[np.bool_]:
         """(...) whether there is an inertia at coordinates (...) [rad or m]."""
-        q1, q2 = np.broadcast_arrays(np.asarray(q1, dtype=float), np.asarray(q2, dtype=float))
+        q1, q2 = both(q1, q2)
         known = (self._known(*q) for q in zip(q1.flat, q2.flat, strict=True))
         return np.array([not isinstance(x, ModelError) for x in known], bool).reshape(q1.shape)
 
@@ -379,7 +312,7 @@ class Driven:
         except ModelError as error:
             return error
 
-    def _posture(self, coordinates: tuple[float, float]) -> Array:
+    def _posture(self, coordinates: npt.ArrayLike) -> Array:
         """All coordinates of the bodies, followed from where they were added."""
         W, rows, q = self._work, self._packed.system.rows, self._packed.q
         far = np.abs(coordinates) / self._packed.row_scale[self._rows]

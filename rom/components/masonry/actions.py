@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial import Delaunay
 
-from rom.arguments import number, shortened, typed, whole
+from rom.arguments import finite, number, shortened, typed, whole
 from rom.components.histories import History, ramp, values_at
 from rom.components.masonry.discontinuous_deformation import Drive
 from rom.components.masonry.stones import Masonry, touching
@@ -63,8 +63,9 @@ class PointLoad:
             ConfigError: if there is no such stone, or the point lies outside of it.
         """
         block = _moving(self.name, self.stone, masonry)
-        corner, share = _place(self.name, masonry, block, np.asarray(self.at, dtype=float))
-        force = _vector(self.name, self.force)
+        place = finite(f"place of {self.name}", self.at, (2,))
+        corner, share = _place(self.name, masonry, block, place)
+        force = finite(f"force of {self.name}", self.force, (2,))
 
         def at(t: Array) -> Forces:
             return _fixed(len(t), [block], [corner], [share], [0])._replace(
@@ -99,8 +100,8 @@ class MovingLoad:
         """
         first = masonry.first_corners()
         top, who = _tops(masonry)
-        force = _vector(self.name, self.force)
-        _vector(self.name, (self.speed, self.start))
+        force = finite(f"force of {self.name}", self.force, (2,))
+        finite(f"speed and start of {self.name}", (self.speed, self.start), (2,))
         beyond = self.start > top[:, 1, 0].max() if self.speed >= 0 else False
         before = self.start < top[:, 0, 0].min() if self.speed <= 0 else False
         if beyond or before:
@@ -195,7 +196,7 @@ class SupportMotion:
         Raises:
             ConfigError: if a stone is not held or touches nothing, or does not start where it is.
         """
-        end = np.r_[_vector(self.name, self.shift), self.turn]
+        end = np.r_[finite(f"shift of {self.name}", self.shift, (2,)), self.turn]
         number(f"turn of {self.name}", self.turn)
         touched = set(np.unique(touching(masonry).who[:, [0, 2]]).tolist())
         for stone in self.stones:
@@ -240,7 +241,7 @@ class BaseMotion:
         Raises:
             ConfigError: if the direction is none, or no stone is held by the ground.
         """
-        direction = _vector(self.name, self.direction)
+        direction = finite(f"direction of {self.name}", self.direction, (2,))
         if not masonry.held:
             raise ConfigError(f"{self.name}: a stone must be held, to stand on the ground.")
         return lambda t: values_at(self.name, self.acceleration, t)[:, None] * direction
@@ -262,7 +263,7 @@ def facing(masonry: Masonry, direction: tuple[float, float]) -> tuple[tuple[int,
     Raises:
         ConfigError: if the direction is none.
     """
-    d = _vector("wind", direction)
+    d = finite("direction of the wind", direction, (2,))
     if not np.any(d):
         raise ConfigError("wind needs a direction that is not zero.")
     d = d / np.linalg.norm(d)
@@ -346,13 +347,6 @@ def _fixed(n: int, block: Sequence[int], corner: Sequence[Index] | Array,
     )
 
 
-def _vector(name: str, x: tuple[float, float]) -> Array:
-    found = np.asarray(x, dtype=float)
-    if found.shape != (2,) or not np.isfinite(found).all():
-        raise ConfigError(f"{name} has {x}, which must be two numbers.")
-    return found
-
-
 def _moving(name: str, stone: int, masonry: Masonry) -> int:
     whole(f"stone of {name}", stone, 0, len(masonry.stones) - 1)
     if stone in masonry.held:
@@ -374,7 +368,6 @@ def _tops(masonry: Masonry) -> tuple[Array, Index]:
 
 def _place(name: str, masonry: Masonry, stone: int, x: Array) -> tuple[Index, Array]:
     """Three corners of a stone that a point lies between, and their shares in it."""
-    _vector(name, (x[0], x[1]) if x.shape == (2,) else (np.nan, np.nan))
     corners, first = masonry.stones[stone].outline, masonry.first_corners()[stone]
     after = np.roll(corners, -1, axis=0) - corners
     w = np.clip(((x - corners) * after).sum(axis=1) / (after**2).sum(axis=1), 0, 1)

@@ -4,7 +4,7 @@ The model is condensed statically to the sensors, which is wrong by inertia betw
 good the data are; the verdict, of responses of the model that is not condensed, says how much.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import null_space, qr
@@ -16,11 +16,12 @@ from rom.components.updating.methods import (
     blocks,
     folded,
     solved,
+    through_modes,
     update_by_input,
     weighted,
 )
 from rom.components.updating.models import AtSensors, Measurement, ParametricModel, modal
-from rom.components.updating.normal_equations import Data, shared, through_shared, white
+from rom.components.updating.normal_equations import Data, shared, white
 from rom.errors import ConfigError
 from rom.model import Array, Index, Mask
 from rom.names import named
@@ -72,10 +73,8 @@ class InSensors:
         whole = self.x.copy()
         whole[self.free] = x
         here = self.model.at(whole)
-        dK, dM = here.dK[self.free], here.dM[self.free]
-        T = self.basis
-        K, M, dK, dM = (T.T @ A @ T for A in (here.K, here.M, dK, dM))
-        return ParametricModel(K, M, dK, dM, self.sensors, here.n_rigid)
+        here = replace(here, dK=here.dK[self.free], dM=here.dM[self.free])
+        return replace(here.in_basis(self.basis), sensors=self.sensors)
 
 
 def by_equations(
@@ -165,7 +164,8 @@ def by_response_functions(
     def triangle(x: Array, ratios: Array) -> Array:
         here = inside.at(x)
         modes = modal(here, shared(ratios, model.n_elastic))
-        change, MPhi = through_shared(here, modes, ratios.size), here.M @ modes.Phi
+        change = through_modes(here, modes, ratios.size, shared=True)
+        MPhi = here.M @ modes.Phi
         driven, n = modes.Phi.T @ F, x.size + ratios.size
         C, R = (MPhi * modes.d) @ MPhi.T, np.zeros((0, 2 * n + 1))
         for block in blocks(used.omega.size):

@@ -26,14 +26,13 @@ from rom.components.updating.family_model import (
 from rom.components.updating.frf_data import Complex, beside_poles
 from rom.components.updating.measured import Responses
 from rom.components.updating.methods import Update
-from rom.components.updating.models import chi_row, modal
+from rom.components.updating.models import chi_row, likeness, modal
 from rom.components.updating.normal_equations import Data, Sums, responses_at, sums
 from rom.components.updating.verdict import (
     LEFT_LOG_LEVEL,
     Updated,
     band,
     check_channels,
-    likeness,
     scores,
     suspects,
     unseen_directions,
@@ -403,8 +402,10 @@ def _doubts(search: _Search, at_bound: tuple[str, ...]) -> list[Row]:
     model, data = search.model, search.data
     H = responses_at(model, search.x, search.zeta, data.omega)
     lam = modal(model.at(search.x), ()).lam[model.n_rigid :]
-    used = data.omega[(data.weight > 0).any(axis=(1, 2))]
-    rows = [likeness(H, data), band(np.sqrt(lam) / (2 * np.pi), used[-1] / (2 * np.pi))]
+    counted = data.weight > 0
+    highest = data.omega[counted.any(axis=(1, 2))][-1] / (2 * np.pi)
+    alike = likeness(H, np.exp(data.logarithm), counted)
+    rows = [alike, band(np.sqrt(lam) / (2 * np.pi), highest)]
     if search.n_known:
         n = len(model.names)
         off = (search.theta - search.before)[:n]

@@ -132,7 +132,7 @@ def _modal_sensitivity(model: ParametricModel, modes: Modal) -> tuple[Array, Arr
 
 
 def through_modes(
-    model: ParametricModel, modes: Modal, m: int
+    model: ParametricModel, modes: Modal, m: int, *, shared: bool = False
 ) -> Callable[[Any, Any, Array], Complex]:
     """The function of sides (n_f, a, n), (n_f, n, b) and lines (n_f,) that gives side dZ side.
 
@@ -142,14 +142,19 @@ def through_modes(
         model: at its origin.
         modes: of the model.
         m: number of the lowest elastic modes whose damping is unknown.
+        shared: whether the last of these ratios is that of all other modes too.
     """
-    by_p = _modal_sensitivity(model, modes)
-    e = slice(model.n_rigid, model.n_rigid + m)
+    by_p, last = _modal_sensitivity(model, modes), model.n_rigid + m - 1
+    e, others = slice(model.n_rigid, last + (not shared)), slice(last, None)
 
     def change(left: Any, right: Any, omega: Array) -> Complex:
         damped = left[:, :, None, e] * np.swapaxes(right[:, e], 1, 2)[:, None]
-        damped = damped * (1j * omega[:, None, None, None] * modes.d[e])
-        return np.concatenate([_through(left, by_p, right, omega), damped], axis=-1)
+        w = 1j * omega[:, None, None, None]
+        columns = [_through(left, by_p, right, omega), damped * (w * modes.d[e])]
+        if shared:
+            together = (left[:, :, others] * modes.d[others]) @ right[:, others]
+            columns.append(w * together[..., None])
+        return np.concatenate(columns, axis=-1)
 
     return change
 

@@ -5,7 +5,7 @@ Source:
     (1965) 380.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -17,7 +17,7 @@ from scipy.stats import f as f_ratio
 from rom.arguments import finite, one_each
 from rom.components.updating.frf_data import frac
 from rom.errors import ConfigError, ModelError
-from rom.model import Array, Report, Row
+from rom.model import Array, Mask, Report, Row
 from rom.reduction.bases.fixed_interface import craig_bampton
 from rom.rows import row
 
@@ -70,7 +70,7 @@ class ParametricModel:
         """
         p = finite("p", p, (len(self.dK),))
         K, M = (A + np.tensordot(p, dA, 1) for A, dA in ((self.K, self.dK), (self.M, self.dM)))
-        return ParametricModel(K, M, self.dK, self.dM, self.sensors, self.n_rigid)
+        return replace(self, K=K, M=M)
 
     def in_basis(self, T: Array) -> "ParametricModel":
         """The model reduced to u = T a, T (n, r) the same for all p [1]: fast, still parametric.
@@ -126,9 +126,8 @@ class AtSensors:
         T[s], T[o] = np.eye(s.size), -cho_solve(K_oo, model.K[np.ix_(o, s)])
         dT = -np.array([cho_solve(K_oo, (dK @ T)[o]) for dK in model.dK])  # rows o; s do not move
         moved = np.swapaxes(dT, 1, 2) @ (model.M @ T)[o]
-        K, M, dK, dM = (T.T @ A @ T for A in (model.K, model.M, model.dK, model.dM))
-        dM = dM + moved + np.swapaxes(moved, 1, 2)
-        return ParametricModel(K, M, dK, dM, np.eye(s.size), model.n_rigid)
+        small = model.in_basis(T)
+        return replace(small, dM=small.dM + moved + np.swapaxes(moved, 1, 2))
 
 
 Model = ParametricModel | AtSensors
@@ -297,22 +296,46 @@ def explained(H: Complex, test: Measurement, n: int) -> Report:
     """
     weight = np.broadcast_to(np.asarray(test.weights, dtype=float), test.H.shape)
     used = weight > 0
-    alike = frac(H * used, test.H * used)[used.any(axis=0)]
-    rows = [row("one less the median FRAC", 1.0 - float(np.median(alike)), MAX_UNLIKE)]
+    rows = [likeness(H, test.H, used)]
     squares = np.abs(np.log(H / test.H) * weight) ** 2
     freedom = max(2 * int(used.sum()) - n, 1)
     variance = squares.sum() / freedom
     if variance > ROUND_OFF**2:
-        blocks = np.array_split(np.arange(len(H)), min(N_BANDS, len(H)))
-        f = test.omega / (2 * np.pi)
-        sensors = {f"worst sensor, {k}": np.s_[:, k] for k in range(H.shape[1])}
-        bands = {f"worst band, {f[b[0]]:.4g} to {f[b[-1]]:.4g} Hz": np.s_[b] for b in blocks}
-        for parts in (sensors, bands):
-            found = {name: (squares[at].sum() / variance, 2.0 * used[at].sum())
-                     for name, at in parts.items() if used[at].any()}  # fmt: skip
-            name = max(found, key=lambda x: deviation(*found[x]))
-            rows.append(chi_row(name, *found[name], len(parts), scale=2 / freedom))
+        rows += worst_rows(squares / variance, used, test.omega, scale=2 / freedom)
     return Report("updating", tuple(rows))
+
+
+def likeness(H: Complex, measured: Complex, used: Mask) -> Row:
+    """One less the median FRAC of all pairs of channels, over the lines that count.
+
+    Args:
+        H: (n_f, n_s, n_e) of the corrected model [m/N].
+        measured: (n_f, n_s, n_e) responses [m/N].
+        used: (n_f, n_s, n_e) which count.
+    """
+    value = frac(H * used, np.where(used, measured, 0.0))[used.any(axis=0)]
+    return row("one less the median FRAC", 1.0 - float(np.median(value)), MAX_UNLIKE)
+
+
+def worst_rows(squares: Array, used: Mask, omega: Array, **known: Any) -> list[Row]:
+    """Chi-square of the sensor and of the band of lines that deviate most.
+
+    Args:
+        squares: (n_f, n_s, n_e) squared residuals [1].
+        used: (n_f, n_s, n_e) which count.
+        omega: (n_f,) lines [rad/s].
+        **known: see `chi_row`.
+    """
+    blocks = np.array_split(np.arange(omega.size), min(N_BANDS, omega.size))
+    f, rows = omega / (2 * np.pi), []
+    sensors = [(f"worst sensor, {k}", np.s_[:, k]) for k in range(squares.shape[1])]
+    bands = [(f"worst band, {f[b[0]]:.4g} to {f[b[-1]]:.4g} Hz", np.s_[b]) for b in blocks]
+    for parts in (sensors, bands):
+        found = [(name, squares[at].sum(), 2.0 * used[at].sum())
+                 for name, at in parts if used[at].any()]  # fmt: skip
+        worst = max(found, key=lambda x: deviation(*x[1:]))
+        rows.append(chi_row(*worst, len(parts), **known))
+    return rows
 
 
 def deviation(value: float, freedom: float) -> float:

@@ -14,7 +14,7 @@ from rom.components.updating.family_model import FamilyModel
 from rom.components.updating.frf_data import Complex
 from rom.components.updating.measured import Responses
 from rom.components.updating.methods import blocks, receptance, through_modes
-from rom.components.updating.models import Modal, ParametricModel, modal
+from rom.components.updating.models import modal
 from rom.model import Array, Index
 
 ROUGH_LINES = 500  # at most: enough to see resonances
@@ -130,32 +130,12 @@ def sensitivity(
     here = model.at(x)
     modes = modal(here, shared(ratios, model.n_elastic))
     seen, driven = model.seen @ modes.Phi, model.driven @ modes.Phi
-    change = through_shared(here, modes, ratios.size)
+    change = through_modes(here, modes, ratios.size, shared=True)
 
     def at(omega: Array) -> tuple[Complex, Complex]:
         g = modes.g(omega)
         left, right = seen * g[:, None, :], g[:, :, None] * driven.T
         return receptance(seen, g, driven), -change(left, right, omega)
-
-    return at
-
-
-def through_shared(
-    model: ParametricModel, modes: Modal, m: int
-) -> Callable[[Any, Any, Array], Complex]:
-    """The function of `through_modes` where the last of m ratios is that of all other modes too.
-
-    Args:
-        model: at its origin.
-        modes: of the model.
-        m: number of damping ratios.
-    """
-    change, others = through_modes(model, modes, m - 1), slice(model.n_rigid + m - 1, None)
-
-    def at(left: Any, right: Any, omega: Array) -> Complex:
-        last = (left[:, :, others] * modes.d[others]) @ right[:, others]
-        last = 1j * omega[:, None, None, None] * last[..., None]
-        return np.concatenate([change(left, right, omega), last], axis=-1)
 
     return at
 

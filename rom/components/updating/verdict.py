@@ -18,9 +18,9 @@ from rom.assembly.assembly import Assembly
 from rom.body.flexible import FlexibleBody
 from rom.components.families.assembled import FamilyAssembly
 from rom.components.updating.family_model import Family, FamilyModel, Parts
-from rom.components.updating.frf_data import Complex, frac
+from rom.components.updating.frf_data import Complex
 from rom.components.updating.measured import Channels
-from rom.components.updating.models import DEAD_RATIO, MAX_UNLIKE, N_BANDS, chi_row, deviation
+from rom.components.updating.models import DEAD_RATIO, chi_row, worst_rows
 from rom.components.updating.normal_equations import Data, Sums, responses_at, wrapped
 from rom.errors import ConfigError
 from rom.model import Array, Index, Mask, Report, Row
@@ -369,38 +369,13 @@ def verdict(s: Sums, data: Data, n: int, missing: dict[str, float], doubts: list
         doubts: rows beside those of residuals.
     """
     freedom = data.n_values - n
-    counted = 2.0 * (data.weight > 0)
     rows = [chi_row("chi-square of all residuals", s.chi_square, freedom, 1, data)]
-    n_s = s.squares.shape[1]
-    worst = [(deviation(s.squares[:, k].sum(), counted[:, k].sum()), k) for k in range(n_s)]
-    k = max(worst)[1]
-    name = f"worst sensor, {k}"
-    rows.append(chi_row(name, s.squares[:, k].sum(), counted[:, k].sum(), n_s, data))
-    blocks = np.array_split(np.arange(data.omega.size), min(N_BANDS, data.omega.size))
-    worst = [(deviation(s.squares[b].sum(), counted[b].sum()), j) for j, b in enumerate(blocks)]
-    b = blocks[max(worst)[1]]
-    hz = data.omega[b[[0, -1]]] / (2 * np.pi)
-    name = f"worst band, {hz[0]:.4g} to {hz[1]:.4g} Hz"
-    rows.append(chi_row(name, s.squares[b].sum(), counted[b].sum(), len(blocks), data))
+    rows += worst_rows(s.squares, data.weight > 0, data.omega, data=data)
     if missing:
         worst_name = max(missing, key=lambda name: abs(missing[name]))
         quantity = f"largest score, {worst_name} [deviations]"
         rows.append(row(quantity, abs(missing[worst_name]), MAX_SCORE))
     return Report("updating", (*rows, *doubts))
-
-
-def likeness(H: Complex, data: Data) -> Row:
-    """One less the median FRAC of all pairs of channels, over the lines that count.
-
-    Args:
-        H: (n_f, n_s, n_e) of the updated model [m/N].
-        data: what was measured.
-    """
-    used = data.weight > 0
-    pairs = used.any(axis=0)
-    measured = np.where(used, np.exp(data.logarithm), 0.0)
-    value = frac(H * used, measured)[pairs]
-    return row("one less the median FRAC", 1.0 - float(np.median(value)), MAX_UNLIKE)
 
 
 def band(frequencies: Array, highest: float) -> Row:

@@ -18,6 +18,7 @@ import numpy as np
 
 from rom import rotation
 from rom.components.cosserat import Motion, Rod, along, equilibrium, loads, simulate
+from rom.mbs.parts import signals
 from rom.model import Array
 
 STATIONS = Path(__file__).parent / "nrel5mw_blade.csv"
@@ -132,16 +133,7 @@ def ramp(final: float, rise: float) -> tuple[Callable[[float], float], Callable[
 
     The speed is final (t / rise - sin(2 pi t / rise) / 2 pi) until ``rise`` [s].
     """
-    k = 2 * np.pi / rise
-
-    def speed(t: float) -> float:
-        return final * (t / rise - np.sin(k * t) / (2 * np.pi)) if t < rise else final
-
-    def angle(t: float) -> float:
-        if t >= rise:
-            return final * (t - rise / 2)
-        return final * (t * t / (2 * rise) - np.sin(k * t / 2) ** 2 / (np.pi * k))
-
+    angle, speed, _ = signals.run_up(final, rise)
     return speed, angle
 
 

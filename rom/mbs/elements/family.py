@@ -20,7 +20,7 @@ from rom.mbs.kernels.system import Coordinates
 from rom.mbs.kernels.tables import Table
 from rom.mbs.parts.bodies import GROUND, Marker
 from rom.mbs.parts.joints import Row
-from rom.mbs.parts.signals import Signal, clock_signal, load_signal, motion_signal
+from rom.mbs.parts.signals import Signal, clock_signal
 from rom.model import Array, Index
 
 NO_ROWS = np.zeros(0, dtype=np.int64)
@@ -173,14 +173,14 @@ class Places:
         """Number of a function of time with values (3,), -1 for none."""
         if function is None:
             return -1
-        self.signals.append(load_signal(name, function))
+        self.signals.append(Signal(name, function, width=3))
         return len(self.signals) - 1
 
     def motion(self, name: str, function: Callable[[float], Any] | None) -> int:
         """Number of a prescribed length and its rate, -1 for none; it must not jump."""
         if function is None:
             return -1
-        self.signals.append(motion_signal(name, function))
+        self.signals.append(Signal(name, function))
         return len(self.signals) - 1
 
     def clock(self) -> int:

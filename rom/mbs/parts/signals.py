@@ -11,6 +11,8 @@ from rom.mbs.parts.foreign import KEPT_HINT, ask, real
 from rom.mbs.parts.jumps import Examined
 from rom.model import Array
 
+# a function of time (numbers and arrays) with its rate and acceleration
+Motion = tuple[Callable[[Any], Any], Callable[[Any], Any], Callable[[Any], Any]]
 # first and last time a function may be asked for
 Span = tuple[float, float]
 # weights of f(t), f(t + s), ... f(t + 4 s) in 12 s f' and 12 s^2 f'', fourth and third order
@@ -132,14 +134,33 @@ def clock_signal() -> Signal:
     return Signal("clock", lambda t: t, lambda t: 1.0 + 0.0 * t, lambda t: 0.0 * t)
 
 
-def load_signal(name: str, function: Callable[[float], Any]) -> Signal:
-    """Signal of a load that depends on time."""
-    return Signal(name, function, width=3)
+def transition(low: float, high: float, duration: float, start: float = 0.0) -> Motion:
+    """From one value to another on a cycloid, in a time [s] from a start [s] on.
+
+    It is low + (high - low) (s - sin(2 pi s) / 2 pi) with s = (t - start) / duration.
+    """
+    w, rise = 2 * np.pi, high - low
+
+    def s(t: Any) -> Any:
+        return np.clip((t - start) / duration, 0.0, 1.0)
+
+    return (
+        lambda t: low + rise * (s(t) - np.sin(w * s(t)) / w),
+        lambda t: rise / duration * (1 - np.cos(w * s(t))),
+        lambda t: rise / duration**2 * w * np.sin(w * s(t)),
+    )
 
 
-def motion_signal(name: str, function: Callable[[float], Any]) -> Signal:
-    """Signal of a prescribed length that is no joint coordinate."""
-    return Signal(name, function)
+def run_up(rate: float, duration: float) -> Motion:
+    """From rest to a steady rate, which rises without a jolt as in `transition`."""
+    k, (speed, acceleration, _) = 2 * np.pi / duration, transition(0.0, rate, duration)
+
+    def value(t: Any) -> Any:
+        s = np.clip(t, 0.0, duration)
+        rising = s * s / (2 * duration) - np.sin(k * s / 2) ** 2 / (np.pi * k)
+        return rate * (rising + np.maximum(t - duration, 0.0))
+
+    return value, speed, acceleration
 
 
 def sample_all(signals: tuple[Signal, ...], t: Array, span: Span, spacing: float) -> Array:
