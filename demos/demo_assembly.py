@@ -152,7 +152,7 @@ free = pair.frequencies(7)
 # ## The picture
 
 options.out.mkdir(parents=True, exist_ok=True)
-apart, camera = np.array([[-0.06, 0, 0], [0, 0, 0.1], [0.06, 0, 0]]), {"up": (0, 0, 1)}
+apart = np.array([[-0.06, 0, 0], [0, 0, 0.1], [0.06, 0, 0]])
 view.convergence(
     [("error, meshes match", errors), ("error, right seat does not match", projected)],
     options.out / "assembly_errors.png",
@@ -166,10 +166,13 @@ view.convergence(
                 for (name, model), aside in zip(models.items(), apart, strict=True)
             },
             view=(0.4, -1.0, 0.4),
-            **camera,
+            up=(0, 0, 1),
         ),
         view.Scene(
-            "The mesh of a column", view.meshed(models["right"]), view=(0.4, -1.0, -0.4), **camera
+            "The mesh of a column, lying",
+            view.meshed(models["right"]),
+            view=(0.3, -1.0, -0.4),
+            up=(1, 0, 0),
         ),
     ],
     caption="Largest relative error of the ten lowest frequencies of a portal frame with clamped "

@@ -67,8 +67,8 @@ def test_all_ranks_refuse_alike(every):
     assert said[0]["interface"].startswith("InterfaceError: the model has no interface 'rim'")
     assert said[0]["region"].startswith("ConfigError: the sector has no region 'rim'")
     assert said[0]["memory"].startswith(f"ResourceError: each of {len(said)} ranks needs all")
-    assert said[0]["diameter"].startswith("ConfigError: 99 nodal diameters")
-    assert said[0]["one rank"] == "ModesMissedError: 3 modes were found."
+    assert said[0]["diameter"].startswith("ConfigError: diameter = 99 must be")
+    assert said[0]["one rank"].startswith("ModesMissedError: 3 modes were found.")
     assert "IndexError" in said[0]["bug"]
 
 

@@ -150,7 +150,7 @@ def colour_bar(
     )
     axes.set_yticks([])
     axes.tick_params(labelsize=SMALL_SIZE, pad=3, length=4)
-    axes.locator_params(axis="x", nbins=int(np.clip(np.ceil(rectangle[2] / TICK_WIDTH), 1, 6)))
+    axes.locator_params(axis="x", nbins=int(np.clip(rectangle[2] // TICK_WIDTH, 1, 6)))
     axes.set_title(label, size=SMALL_SIZE, pad=6)
 
 

@@ -306,11 +306,12 @@ def test_free_bodies_on_a_cable_with_friction_keep_their_momentum_and_lose_what_
     wheel = Pulley(b, 0.1, (0, 0.1, 1), friction=0.2)
     mech.tendon("rope", [a, wheel, c, d], EA=500.0, damping=5.0, pretension=5.0, friction=0.3,
                 transition_speed=0.05)  # fmt: skip
-    moved = rom.simulate(mech, t_end=1.0, dt=1e-3, method="dop853", rtol=1e-10, progress=False)
+    # at the ends of steps: within the one in which the rope goes slack, work is interpolated badly
+    moved = rom.simulate(mech, t_end=1.0, method="dop853", rtol=1e-10, progress=False)
     for kind in moved.momentum:
         assert np.ptp(kind, axis=0).max() < 1e-9
     lost = np.diff(moved.energy.damping)
-    assert (lost > -1e-8 * lost.sum()).all() and lost.sum() > 0.1  # interpolated within steps
+    assert (lost > -1e-8 * lost.sum()).all() and lost.sum() > 0.1
     assert np.abs(moved.energy.balance).max() < 1e-7
 
 
