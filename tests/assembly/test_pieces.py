@@ -191,6 +191,7 @@ def test_the_certificate_of_pieces_compares_them_with_the_whole_solid(halves):
 TURNED = rom.Geometric(loads={"tip": (0, 0, 0.3 * EI, 0, 0.8 * EI, 0)}, n_modes=2, snapshots=True)
 
 
+@pytest.mark.long
 def test_pieces_are_certified_under_moments_that_turn_with_their_section(halves):
     """With a force beside it, to a slope of 46 degrees, from states of full models."""
     models, _, made = halves
@@ -359,6 +360,7 @@ def test_a_mechanism_takes_pieces_as_one_body_only(three):
 
 
 @pytest.mark.mpi
+@pytest.mark.long
 def test_pieces_are_the_same_on_two_processes(tmp_path):
     found = []
     for n in (1, 2):

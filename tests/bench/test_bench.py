@@ -103,6 +103,7 @@ def test_chains_of_all_lengths_are_measured():
     assert all(figure.value > 0.0 for figure in figures)
 
 
+@pytest.mark.long
 def test_a_planetary_train_is_timed_on_a_motion_that_is_right():
     mech, pair, _ = planetary_train()
     moved = rom.simulate(mech, t_end=0.02, dt=1e-5, save_every=100, progress=False)
@@ -112,6 +113,7 @@ def test_a_planetary_train_is_timed_on_a_motion_that_is_right():
     assert len(speeds) == 4 and all(figure.value > 0 for figure in (*speeds, ratio))
 
 
+@pytest.mark.long
 def test_a_shaft_in_films_is_timed_on_a_motion_that_is_right():
     """It is carried: its weight, on both films alike."""
     mech = shaft_in_films("reynolds")

@@ -234,9 +234,8 @@ def held_at_speed(model, held, centre, speed, *, large):
     return np.sqrt(np.sort(eigsh(K, 4, M, sigma=0.0)[0])) / (2 * np.pi)
 
 
-@pytest.mark.parametrize(
-    ("degree", "hertz", "rtol"), [(1, 125.0, 4e-4), pytest.param(2, 62.5, 6e-5, marks=LONG)]
-)
+@LONG
+@pytest.mark.parametrize(("degree", "hertz", "rtol"), [(1, 125.0, 4e-4), (2, 62.5, 6e-5)])
 def test_a_twisted_blade_has_the_frequencies_of_the_shape_it_takes_at_speed(degree, hertz, rtol):
     """Centrifugal force untwists it, in the first order of the load; any frame says the same."""
     model = rom.fe.model(

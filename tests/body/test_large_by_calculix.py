@@ -60,6 +60,7 @@ def by_calculix(folder, path, tip):
     return np.array([found[share] for share in SHARES])
 
 
+@pytest.mark.long
 def test_an_angle_bends_and_twists_as_in_calculix(tmp_path):
     """Two components at once, at the edge of the range: nothing warns."""
     path = tmp_path / "angle.geo"

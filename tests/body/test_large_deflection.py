@@ -586,6 +586,7 @@ def test_a_cantilever_in_a_mechanism_bends_as_it_does_alone(certified):
 
 
 @pytest.mark.mpi
+@pytest.mark.long
 def test_energy_and_body_are_the_same_on_any_number_of_processes(tmp_path):
     found = {}
     for n in (1, *SHARED_BY):

@@ -99,6 +99,7 @@ def test_a_cantilever_bends_in_space_as_finite_elements_do(nu, rtol):
     assert np.linalg.norm(full[3:]) > 0.4
 
 
+@pytest.mark.long
 def test_with_poissons_ratio_a_cantilever_bends_to_70_degrees_as_finite_elements_do():
     """P L^2 / EI = 5, where sections warp with the curvature: states of the full model show how."""
     model, EI = slender(100, 40, nu=0.3)
@@ -126,6 +127,7 @@ PRINCETON = {
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_the_princeton_beam_is_no_further_from_published_solids_than_published_beams_are():
     """The tip goes down by a quarter of the length; these solids and beams are 2 to 3 % apart."""
     force, b, t = 8.896, 12.3777e-3, 3.2024e-3
