@@ -252,7 +252,7 @@ def pack(mechanism: Mechanism, *, whole: bool = False) -> Packed:
     markers = _markers(mechanism, handles, R)
     system = System(
         STAGE_ADDRESSES,
-        _bodies(parts, R, np.asarray(mechanism.gravity)),
+        _bodies(parts, R, np.asarray(mechanism.gravity, dtype=float)),
         markers,
         rows,
         places.packed_coordinates(),

@@ -238,7 +238,9 @@ def test_markers_of_another_mechanism_are_refused_when_they_fit_nothing(name, pl
 
 def test_numbers_of_numpy_are_numbers():
     options = {"t_end": np.float64(0.01), "dt": np.float32(1e-3), "save_every": np.int64(2)}
-    assert simulate(mechanism()[0], **options).t.size == 6
+    mech = mechanism()[0]
+    mech.gravity = (0, 0, -10)  # of integers, as an attribute may be set
+    assert simulate(mech, **options).t.size == 6
 
 
 def driven(function):
