@@ -40,7 +40,8 @@ ALSO = {  # what public functions give back or raise
         "mbs.parts.signals",
     ),
 }
-FURTHER_PARTS = ("eigen",)  # packages without a name that `rom` has itself
+# packages without a name that `rom` has itself, or whose names stand in components
+FURTHER_PARTS = ("eigen", "cyclic", "prestress", "parametric", "updating")
 WHOLE_MODULES = ("rom.rotation", "rom.units")
 CURES = {  # what to do about it, where no single message can tell
     "ConfigError": "Compare with `rom VERB --help` or the arguments of the function.",

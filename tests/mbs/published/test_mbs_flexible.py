@@ -199,9 +199,8 @@ def hinged(body, tip_mass=0.5, scale=1.0):
 
 @pytest.mark.long
 @pytest.mark.once
-def test_the_frame_changes_the_motion_at_second_order_in_the_deformation_only(beam):
-    """Ten times the load, ten times the deformation: a hundred times the difference of frames."""
-    apart, bent = [], []
+def test_no_frame_changes_the_motion_whatever_the_deformation(beam):
+    """Once they differed by the square of the deformation; all are integrated on mean axes."""
     for softer in (1.0, 10.0):
         tips = []
         for reference in ("root", "mean-axis", ("root", "tip")):
@@ -210,11 +209,9 @@ def test_the_frame_changes_the_motion_at_second_order_in_the_deformation_only(be
             sol = simulate(hinged(seen), t_end=0.1, dt=0.01, **EXACT)
             tips.append(sol.position("ball"))
             if reference == "root":
-                bent.append(np.abs(sol.elastic("bar") @ seen.marker("tip").translation.T).max())
-        apart.append(max(np.abs(tip - tips[0]).max() for tip in tips[1:]))
-    slope = np.log(apart[1] / apart[0]) / np.log(bent[1] / bent[0])
-    assert bent[0] > 5e-5
-    assert_allclose(slope, 2.0, atol=0.1)
+                bent = np.abs(sol.elastic("bar") @ seen.marker("tip").translation.T).max()
+        assert bent > 5e-5 * softer / 2
+        assert_allclose(tips[1:], [tips[0]] * 2, rtol=0, atol=1e-6 * bent)
 
 
 def test_small_swings_have_the_frequencies_of_the_hinged_body(beam):
