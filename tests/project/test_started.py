@@ -38,7 +38,7 @@ BRIEF = {  # benchmark: arguments with which it takes seconds
     "peers": {"meshes": (0.024,)},
     "motion": {"meshes": (0.024,), "links": (2,)},
     "rods": {"lengths": (10, 20)},
-    "start": {"cases": ("three bodies",), "again": ("three bodies",)},
+    "start": {"cases": ("best_matching",), "again": ("best_matching",)},
     "updating": {"sizes": (2e3,)},
     "large-deflection": {
         "size": 2e3, "coarse": (10, 1), "fine": (12, 1), "segments": (10,), "elements": (10,)},
