@@ -119,9 +119,10 @@ def planted(text: str, node: Any) -> str:
 
 def tests_of(path: str) -> list[str]:
     """The tests that belong to a file."""
-    own = f"tests/components/{path.split('/')[2]}"
-    if path.startswith("rom/components/") and (ROOT / own).exists():
-        return [own]
+    if path.startswith("rom/components/"):
+        own = f"tests/components/{path.split('/')[2]}"
+        if (ROOT / own).exists():
+            return [own]
     return next((tests for part, tests in TESTS.items() if path.startswith(part)), ["tests"])
 
 

@@ -48,8 +48,8 @@ def hub_and_panel():
 
 def arm():
     """Two elastic links, the first driven; at every tolerance its steps once became too small."""
-    mech, link = Mechanism(gravity=(0, -9.81, 0)), {"EI": 500.0, "rhoA": 1.0, "n_modes": 4}
-    link = stiffened_beam(1.0, **link, stiffened=False)
+    mech = Mechanism(gravity=(0, -9.81, 0))
+    link = stiffened_beam(1.0, EI=500.0, rhoA=1.0, n_modes=4, stiffened=False)
     one, two = mech.add_flexible("one", link), mech.add_flexible("two", link, at=X)
     mech.revolute("shoulder", mech.ground.marker(ORIGIN), one.marker("root"), axis=Z)
     mech.revolute("elbow", one.marker("tip"), two.marker("root"), axis=Z)
