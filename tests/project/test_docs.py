@@ -374,3 +374,10 @@ def test_claims_name_tests_that_exist():
             there = name in known or (dots and any(one.startswith(name) for one in known))
             assert there, f"{path.name} names {name}"
     assert len(re.findall(r"`test_\w+`", (DOCS / "claims.md").read_text())) > 30
+
+
+def test_lists_named_for_contributors_exist():
+    for name, path in re.findall(
+        r"`([A-Z_]+)` of `([\w./]+)`", (DOCS / "contributing.md").read_text()
+    ):
+        assert re.search(rf"^{name}\b", (ROOT / path).read_text(), re.M), f"{name} of {path}"
