@@ -85,21 +85,6 @@ def write(name: str, content: str | bytes) -> Callable[[Path], object]:
     return lambda folder: (folder / name).write_bytes(data)
 
 
-def changed(name: str, change: Callable[[bytes], bytes]) -> Callable[[Path], object]:
-    """Replaces the bytes of a file by what a function makes of them."""
-    return lambda folder: (folder / name).write_bytes(change((folder / name).read_bytes()))
-
-
-def cut(name: str, share: float) -> Callable[[Path], object]:
-    """A file of which only this share is there."""
-    return changed(name, lambda data: data[: int(share * len(data))])
-
-
-def mutated(name: str, way: Any, seed: int) -> Callable[[Path], object]:
-    """A file damaged at random."""
-    return changed(name, lambda data: way(data, np.random.default_rng(seed)))
-
-
 def arrays_changed(name: str, change: Callable[[dict[str, Any]], object]) -> Any:
     """Changes arrays of a body file behind the back of its checksums, as another program would."""
 
