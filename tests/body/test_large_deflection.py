@@ -3,7 +3,7 @@
 import subprocess
 import sys
 import tracemalloc
-from dataclasses import fields, replace
+from dataclasses import replace
 from itertools import combinations_with_replacement, cycle
 
 import numpy as np
@@ -478,27 +478,13 @@ def test_what_does_not_go_together_is_refused_by_name(change, error, says):
 
 @pytest.mark.parametrize(
     "wrong",
-    [{"loads": {}}, {"loads": {"tip": (1, 2, 3)}}, {"loads": {"tip": (0,) * 6}}, {"tol": 2.0},
-     {"loads": {"tip": (0, np.nan, 0, 0, 0, 0)}}, {"n_shapes": 0}, {"n_steps": 0},
-     {"loads": {}, "spin": (0, np.inf, 0)},
+    [{"loads": {}}, {"loads": {"tip": (1, 2, 3)}}, {"loads": {"tip": (0,) * 6}},
+     {"loads": {"tip": (0, np.nan, 0, 0, 0, 0)}},
      {"about": (0, 0, 1)}, {"loads": {}, "spin": (0, 0, 1), "about": (0, 0)}],
 )  # fmt: skip
 def test_a_range_that_is_none_is_refused(wrong):
     with pytest.raises(ConfigError):
         rom.Geometric(**{"loads": {"tip": (0, 1.0, 0, 0, 0, 0)}} | wrong)
-
-
-WRONG = (True, "x", -1, 1.5, np.nan, np.inf, 10**160, (1, 2), [[1]], 1j, {"tip": None},
-         {"tip": "x"}, {"tip": (0, 1j, 0, 0, 0, 0)}, {"tip": (1, 2, 3)},
-         {1: (0, 1, 0, 0, 0, 0)})  # fmt: skip
-
-
-@pytest.mark.parametrize("key", [one.name for one in fields(rom.Geometric) if one.name != "fixed"])
-def test_no_value_of_a_wrong_kind_passes_into_a_range(key):
-    """Whatever it is, the error is one of the package, which names what it is about."""
-    for value in WRONG[key == "snapshots" :]:  # for which the first is right
-        with pytest.raises(ConfigError, match=r"tip|loads|\b" + key):
-            rom.Geometric(**{"loads": {"tip": (0, 1.0, 0, 0, 0, 0)}} | {key: value})
 
 
 @pytest.mark.parametrize(

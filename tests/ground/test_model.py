@@ -23,12 +23,6 @@ WOOD = {"E": (12e9, 0.8e9, 0.5e9), "nu": (0.4, 0.4, 0.3), "G": (0.7e9, 0.6e9, 0.
         ({"nu": -1.2}, "nu = -1.2 is outside"),
         ({"nu": 0.5}, "nu = 0.5 is outside"),
         ({"nu": -1.0}, "nu = -1 is outside"),
-        ({"rho": 0.0}, "rho = 0 kg/m\\^3 must be positive"),
-        ({"rho": -7850.0}, "rho = -7850 kg"),
-        ({"E": 0.0}, "E = 0 Pa must be positive"),
-        ({"E": -210e9}, "E = -2.1e\\+11 Pa must be positive"),
-        ({"E": float("nan")}, "E = nan must be a finite number"),
-        ({"E": "2.1e11"}, "E = '2.1e11' must be a finite number"),
     ],
 )
 def test_message_for_numbers_no_solid_can_have(numbers, message):

@@ -153,13 +153,6 @@ def test_damping_of_structures_and_residual_shapes_stilled_are_silent(ratio):
     assert said(lambda: rom.ModalDamping(ratio)) == []
 
 
-@pytest.mark.parametrize("name", ["alpha", "beta"])
-@pytest.mark.parametrize("value", [-1.0, float("nan"), float("inf"), "1"])
-def test_factors_of_rayleigh_are_finite_and_not_negative(name, value):
-    with pytest.raises(ConfigError, match=f"{name} = "):
-        rom.Rayleigh(**{name: value})
-
-
 @pytest.mark.parametrize(("share", "n"), [(0.2, 0), (0.5, 1), (3.0, 1)])
 def test_rayleigh_is_doubted_by_its_lowest_mode(part, share, n):
     beta = 2 * share / (2 * np.pi * part.frequencies()[6])
