@@ -18,8 +18,7 @@ import re
 
 import pytest
 
-import rom
-from cases.files.docstrings import INSIDE, of_function, pages_and_demos, public, raised
+from cases.files.docstrings import INSIDE, pages_and_demos, public, raised
 from cases.paths import ROOT
 
 pytestmark = pytest.mark.once
@@ -141,30 +140,3 @@ def test_users_import_from_no_inner_front():
     for package in INSIDE:
         assert (ROOT / package.replace(".", "/") / "__init__.pyi").exists()
         assert not re.search(rf"from {package} import", text), f"users import from {package}"
-
-
-# --- examples of what is found ---
-
-
-def bare(stiffness: float, x: rom.model.Array) -> rom.model.Array:
-    """Force [N] of a spring.
-
-    Args:
-        stiffness: of the spring.
-        x: elongations [from rest].
-    """
-    return stiffness * x
-
-
-def short(a: rom.model.Array, b: rom.model.Array, c: rom.model.Array) -> rom.model.Array:
-    """(n,) sum of all [m]."""
-    return a + b + c
-
-
-def test_the_measures_see_what_is_not_said():
-    two, three = (of_function(f.__name__, f) for f in (bare, short))
-    assert without_units(two) == ["stiffness", "x"] and without_shapes(two) == ["x", "result"]
-    assert without_units(three) == without_shapes(three) == ["a", "b", "c", "result"]
-    assert not UNITS.search("from 0 to 1 [a, b] [0, 1]") and UNITS.search("[N m/rad, 1/s^2]")
-    assert not source_in("Found in 1965.") and not source_in("Source:\n    A book.")
-    assert not source_in("Source:\n    See docs/theory/nothing.md.")
