@@ -11,6 +11,7 @@ from scipy.spatial import cKDTree
 
 import rom
 from cases.beam import elastica
+from cases.long import COARSE
 from cases.paths import RANKS, ROOT
 from cases.ranks.environment import ENVIRONMENT
 from rom import rotation
@@ -21,12 +22,7 @@ from rom.process.mpirun import mpirun
 
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")
 pytest.importorskip("gmsh", reason="gmsh is not installed")
-pytestmark = [
-    pytest.mark.fenicsx,
-    pytest.mark.once,
-    pytest.mark.filterwarnings("ignore:Number of integration points"),
-    pytest.mark.filterwarnings("ignore::rom.errors.RomWarning"),
-]
+pytestmark = COARSE
 E, THICK = 210e9, 0.01
 EI = E * THICK**4 / 12
 

@@ -90,6 +90,8 @@ KINDS = {  # callable -> kinds of its arguments; the values above are refused
     "reduce_parametric": "tol=negative",
     "FlexibleBody.frequencies": "n=negative fixed=word",
     "FlexibleBody.with_reference": "reference=frame",
+    "FlexibleBody.in_units": "units=word",
+    "Solution.to_pandas": "every=counted",
     "CraigBampton": "n_modes=negative f_max=counted tol=share",
     "EnhancedCraigBampton": "n_modes=negative",
     "MomentMatching": "order=counted",

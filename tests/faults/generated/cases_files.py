@@ -122,8 +122,4 @@ CASES = [
       for name, (old, new, word) in DECKS.items()),
     case("a mass as stiffness", LINE.replace("K.mtx --mass M.mtx", "M.mtx --mass K.mtx"), FOREIGN,
          ("mass", "K.mtx", "M.mtx")),
-    case("a circle of links", "check loop.npz", FileFormatError, "loop.npz",
-         given=lambda folder: (folder / "loop.npz").symlink_to("loop.npz")),
-    case("a link to nothing", "check link.npz", FileFormatError, "link.npz",
-         given=lambda folder: (folder / "link.npz").symlink_to("nope.npz")),
 ]  # fmt: skip
