@@ -81,6 +81,12 @@ def spoilt(A, value=np.nan):
     return A
 
 
+def skewed(A):
+    A = A.tolil()
+    A[0, 5] += 0.1 * abs(A).max()
+    return A.tocsr()
+
+
 def interface(nodes, kind, **how):
     """A reduction whose interface has these nodes."""
 
