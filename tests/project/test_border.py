@@ -247,17 +247,10 @@ def test_nearly_every_refusal_names_the_argument(capsys):
 
 
 SAID = {
-    "save nothing": (
-        lambda b: rom.save(None, "x"),
-        "save: body = None must be of type FlexibleBody",
-    ),
-    "load bytes": (lambda b: rom.load(b"x"), "load: path = b'x' must be a path"),
     "a method by name": (
         lambda b: rom.reduce(model(), method="craig-bampton", interfaces={}),
         "reduce: method = 'craig-bampton' must be of type Method (such as rom.CraigBampton",
     ),
-    "half a mode": (lambda b: b.frequencies(2.5), "FlexibleBody.frequencies: n = 2.5 must be"),
-    "a number among names": (lambda b: b.frequencies(fixed=("root", 3)), "fixed[1] = 3 must be"),
     "a joint of parts": (
         lambda b: rom.Mechanism().spherical("ball", None, None),
         "Mechanism.spherical 'ball': m1 = None must be of type Marker (from part.marker(place)",
@@ -292,14 +285,6 @@ def test_large_deflection_is_refused_by_name_where_it_is_not_taken(function):
         rom.ConfigError, match=rf"{function.__name__}: .* is for rom\.reduce, .*out"
     ):
         function(nonlinear=rom.Geometric({"tip": (0, 1.0, 0, 0, 0, 0)}))
-
-
-@pytest.mark.fenicsx
-@pytest.mark.parametrize("argument", ["path", "material", "degree", "parameters"])
-def test_meshes_refuse_what_they_cannot_read(argument):
-    given = {"path": "none.msh", "material": rom.Material(1.0, 0.3, 1.0)} | {argument: object()}
-    with pytest.raises(rom.ConfigError, match=f"{argument} = "):
-        rom.fe.model(**given)
 
 
 def test_forces_with_a_phase_are_numbers():
