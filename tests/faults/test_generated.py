@@ -11,6 +11,7 @@ from generated.case import CLASSES, Silent, Warned, Works, all_cases
 from generated.stock import PLANTED, compile_kernels, fill
 
 import rom.cli.main as command_line
+from cases.paths import ROOT
 from rom.errors import QualityGateError, RomError, RomWarning
 
 pytestmark = pytest.mark.once
@@ -46,6 +47,7 @@ def folder(stock, tmp_path, monkeypatch):
     """A copy to work in; where it lies and the environment are as before afterwards."""
     shutil.copytree(stock, tmp_path / "here")
     monkeypatch.chdir(tmp_path / "here")
+    monkeypatch.setenv("PYTHONPATH", str(ROOT))  # of processes that cases start
     before = dict(os.environ)
     yield tmp_path / "here"
     os.environ.clear()
