@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 import rom
-from cases.files.archives import ARCHIVES
-from cases.files.damage import outcome
+from cases.files.damage import ARCHIVES, outcome
 from rom.io.archive import write_archive
 
 WRONG = (None, -1, 1e308, "x", [1], {"x": 1}, True)

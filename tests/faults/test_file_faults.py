@@ -10,8 +10,7 @@ from scipy.io import mmwrite
 from scipy.sparse import random as random_matrix
 
 import rom
-from cases.files.archives import ARCHIVES
-from cases.files.damage import damaged, outcome
+from cases.files.damage import ARCHIVES, damaged, outcome
 from cases.mbs.mechanisms import random_body
 from cases.paths import TESTS
 from cases.solid import block, reduced

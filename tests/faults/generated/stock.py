@@ -6,7 +6,7 @@ from typing import Any
 from scipy.io import mmwrite
 
 import rom
-from cases.files import archives
+from cases.files import damage
 from cases.files.cells import blocks_of, solid, write_msh
 from cases.solid import block
 
@@ -116,8 +116,8 @@ def fill(folder: Path) -> None:
     rom.save(body(), folder / "good.npz")
     rom.export(body(), folder / "good.SID_FEM")
     matrices(folder)
-    archives.state(folder).rename(folder / "good.state.npz")
-    archives.family(folder).rename(folder / "family.npz")
+    damage.state(folder).rename(folder / "good.state.npz")
+    damage.family(folder).rename(folder / "family.npz")
 
 
 def model(cells: Any = (2, 1, 1)) -> Any:
