@@ -1,7 +1,5 @@
 """Bodies of large deflection: the energy of shapes, their derivatives, and beams that bend far."""
 
-import subprocess
-import sys
 import tracemalloc
 from dataclasses import replace
 from itertools import combinations_with_replacement, cycle
@@ -17,8 +15,8 @@ from scipy.special import ellipk
 import rom
 from cases.long import SHARED_BY, few
 from cases.mbs.slender import STEEL, Full, assembled, cantilever, reduced, slender, tip_of
-from cases.paths import RANKS, ROOT
-from cases.ranks.environment import ENVIRONMENT
+from cases.paths import RANKS
+from cases.ranks.environment import on_ranks
 from rom.body.nonlinear.full import rows_of
 from rom.body.nonlinear.geometric import ELLIPTIC_STRETCH, Section, foreseen
 from rom.body.nonlinear.quartic import Quartic, entries, n_entries, position
@@ -33,7 +31,6 @@ from rom.checks.deflection import (
 )
 from rom.eigen.verbs import rigid_motions
 from rom.errors import ConfigError, InterfaceError, ModelError, ResourceError, RomWarning
-from rom.process.mpirun import mpirun
 
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")
 pytestmark = [
@@ -577,11 +574,8 @@ def test_energy_and_body_are_the_same_on_any_number_of_processes(tmp_path):
     found = {}
     for n in (1, *SHARED_BY):
         file = tmp_path / f"{n}.npz"
-        script = str(RANKS / "large_strain_under_mpi.py")
-        subprocess.run(
-            [*mpirun(n), sys.executable, script, str(file)],
-            env=ENVIRONMENT, timeout=300, check=True, capture_output=True, cwd=ROOT,
-        )  # fmt: skip
+        done = on_ranks(n, RANKS / "large_strain_under_mpi.py", file, timeout=300)
+        assert file.exists(), done.stderr
         found[n] = np.load(file)
     for n in SHARED_BY:
         assert found[1]["errors"].shape == (2, 2, 3)  # displacement and frequencies at three steps
