@@ -17,7 +17,7 @@ from scipy.interpolate import PchipInterpolator
 from rom import rotation
 from rom.arguments import finite, one_of, unit_quaternion
 from rom.errors import ConfigError
-from rom.mbs.elements.family import Family, Places, integers, rows_of
+from rom.mbs.elements.family import Family, Hooks, Places, integers, rows_of
 from rom.mbs.kernels.algebra import (
     add,
     cross,
@@ -411,5 +411,5 @@ def turned_over(name: str, bushing: Bushing, t: Array, axes: Callable[[str], Arr
 
 BUSHINGS_FAMILY = Family(
     "bushings", Bushing, pack, bushing_wrenches, bushing_tangents, bushing_energy,
-    beyond=turned_over,
+    hooks=Hooks(beyond=turned_over),
 )  # fmt: skip

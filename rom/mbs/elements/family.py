@@ -8,7 +8,7 @@ that `rom.fields` knows have methods of their own; any other enters a mechanism 
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
@@ -22,8 +22,6 @@ from rom.mbs.parts.bodies import GROUND, Marker
 from rom.mbs.parts.joints import Row
 from rom.mbs.parts.signals import Signal, clock_signal
 from rom.model import Array, Index
-
-NO_ROWS = np.zeros(0, dtype=np.int64)
 
 
 class Asked(Protocol):
@@ -58,6 +56,11 @@ def always(_: Table) -> bool:
     return True
 
 
+def never(_: Table) -> bool:
+    """They do not, or the tangents know how."""
+    return False
+
+
 def pairs(table: Any, body: Index) -> Iterable[Sequence[int]]:
     """(e, 2) bodies of the markers i and j of each of e elements.
 
@@ -73,11 +76,6 @@ def apart(_table: Any, _body: Index) -> Iterable[Sequence[int]]:
     return ()
 
 
-def no_rows(_: Table) -> Index:
-    """(0,) constraint rows: the forces do not depend on what joints transmit."""
-    return NO_ROWS
-
-
 def integers(values: Any) -> Index:
     """Whole numbers as an array, empty ones too."""
     return np.array(list(values), dtype=np.int64)
@@ -91,36 +89,6 @@ def starts(lengths: Any) -> Index:
 def rows_of(values: Any, *shape: int) -> Array:
     """Numbers as an array of rows of this shape, empty ones too."""
     return np.array(list(values), dtype=float).reshape(-1, *shape)
-
-
-def nothing(*_: Any) -> tuple[()]:
-    """No laws that stay in Python, or none of the user's."""
-    return ()
-
-
-def no_numbers(*_: Any) -> Array:
-    """(0,) no gap that is of the size of corrections, or nothing that goes on by whole numbers."""
-    return np.zeros(0)
-
-
-def nothing_remembered(_: Any) -> Array:
-    """(0,) no element whose forces depend on its past."""
-    return np.zeros(0, dtype=bool)
-
-
-def nothing_kept(_: Any, memory: Array) -> Array:
-    """(n_t,) no energy in what gives way for good beyond a limit [J]."""
-    return np.zeros(len(memory))
-
-
-def nothing_beyond(*_: Any) -> str:
-    """Its forces hold in any motion."""
-    return ""
-
-
-def nothing_eased(_: Table) -> AbstractContextManager[bool]:
-    """Elements that come to rest as they are."""
-    return nullcontext(False)
 
 
 @dataclass
@@ -201,7 +169,7 @@ class Places:
         self.remembered.setdefault(owner, start)
         if settling is not None:
             self.settling[owner] = settling
-        return sum(x.size for x in self._until(owner))
+        return self._own(owner).start
 
     def before(self, base: Array) -> Array:
         """(n_t, c + p) the same over time, what settles as it was at the instant before.
@@ -210,21 +178,21 @@ class Places:
         """
         base, c = base.copy(), len(self.coordinates)
         for owner in self.settling:
-            at = c + sum(x.size for x in self._until(owner))
-            mine = slice(at, at + self.remembered[owner].size)
-            base[1:, mine] = base[:-1, mine]
+            memory = base[:, c:][:, self._own(owner)]
+            memory[1:] = memory[:-1].copy()
         return base
 
-    def _until(self, owner: str) -> list[Array]:
-        """What those before an owner remember."""
-        return list(self.remembered.values())[: list(self.remembered).index(owner)]
+    def _own(self, owner: str) -> slice:
+        """Where the memory has that of an owner."""
+        before = list(self.remembered).index(owner)
+        first = sum(x.size for x in list(self.remembered.values())[:before])
+        return slice(first, first + self.remembered[owner].size)
 
     def settled(self, base: Array) -> Array:
         """(c + p,) joint coordinates and memory, the latter as an equilibrium starts from it."""
         base, c = base.copy(), len(self.coordinates)
         for owner, numbers in self.settling.items():
-            at = c + sum(x.size for x in self._until(owner))
-            base[at : at + numbers.size] = numbers
+            base[c:][self._own(owner)] = numbers
         return base
 
     def packed_coordinates(self) -> Coordinates:
@@ -236,6 +204,46 @@ class Places:
             *(rows_of((getattr(row, axis) for row in rows), 3) for axis in "abc"),
             np.array([row.offset for row in rows], dtype=float),
         )
+
+
+@dataclass(frozen=True, eq=False)
+class Hooks:
+    """What only few families have to say; None where one has nothing to say.
+
+    Attributes:
+        asked: ({name: record}, table, number of joint coordinates) -> laws that stay in Python.
+        answers: table -> (e, ...) what each law of a user answered last.
+        lost: what is wrong if an answer is not finite; in place of {}, the names.
+        potential: whether the forces, dampers aside, follow from a potential; those of films and of
+            what spins go around.
+        loaded_rows: table -> constraint rows whose multipliers the forces depend on.
+        room: table -> (e,) gaps over those in the middle [1], which one correction towards an
+            equilibrium may halve or double at most.
+        eased: table -> context within which its elements find their equilibrium more easily, close
+            to the one that is wanted; it says whether that changes anything.
+        remembers: table -> (e,) whether forces depend on the past, other than by angles that go on.
+        kept: (table, (n_t, p) memory) -> (n_t,) energy in springs that slip, which is in the power
+            lost when they are stretched [J].
+        beyond: (name, record, (n_t,) times [s], body -> (n_t, 3, 3) its axes in the world) -> where
+            and how a motion left the range of its forces, in a sentence; empty if it did not.
+        phases: (table, work) -> (e,) numbers at the last residual which go on by whole ones in
+            motions that repeat [1].
+    """
+
+    asked: Callable[[Mapping[str, Any], Any, int], Sequence[Asked]] | None = None
+    answers: Callable[[Any], Sequence[Any]] | None = None
+    lost: str = "the law of {} gives no finite number"
+    potential: bool = True
+    loaded_rows: Callable[[Any], Index] | None = None
+    room: Callable[[Any], Array] | None = None
+    eased: Callable[[Any], AbstractContextManager[bool]] | None = None
+    remembers: Callable[[Any], Array] | None = None
+    kept: Callable[[Any, Array], Array] | None = None
+    beyond: Callable[[str, Any, Array, Callable[[str], Array]], str] | None = None
+    phases: Callable[[Any, Any], Array] | None = None
+
+
+NO_HOOKS = Hooks()
 
 
 @dataclass(frozen=True, eq=False)
@@ -253,26 +261,9 @@ class Family:
         outside: record -> whether it acts from outside even though no marker is on the ground.
         couples: (table, (k,) bodies of the markers) -> groups of bodies that it couples, -1 for
             the ground.
-        by_rate: table -> whether the forces depend on velocities.
-        complete: whether its tangents have all of their changes with the position, those of rates
-            at given velocities too.
-        potential: whether its forces, dampers aside, follow from a potential; those of films and of
-            what spins go around.
-        loaded_rows: table -> constraint rows whose multipliers they depend on.
-        asked: ({name: record}, table, number of joint coordinates) -> laws that stay in Python.
-        answers: table -> (e, ...) what each law of a user answered last, None if there is none.
-        lost: what is wrong if an answer is not finite; in place of {}, the names.
-        room: table -> (e,) gaps over those in the middle [1], which one correction towards an
-            equilibrium may halve or double at most.
-        eased: table -> context within which its elements find their equilibrium more easily, close
-            to the one that is wanted; it says whether that changes anything.
-        remembers: table -> (e,) whether forces depend on the past, other than by angles that go on.
-        kept: (table, (n_t, p) memory) -> (n_t,) energy in springs that slip, which is in the power
-            lost when they are stretched [J].
-        beyond: (name, record, (n_t,) times [s], body -> (n_t, 3, 3) its axes in the world) -> where
-            and how a motion left the range of its forces, in a sentence; empty if it did not.
-        phases: (table, work) -> (e,) numbers at the last residual which go on by whole ones in
-            motions that repeat [1].
+        by_rate: table -> whether the forces depend on velocities in a way that the tangents do not
+            know whole: they lack the change of rates with the position.
+        hooks: what only few families have to say.
     """
 
     name: str
@@ -287,18 +278,7 @@ class Family:
     outside: Callable[[Any], bool] = from_ground
     couples: Callable[[Any, Index], Iterable[Sequence[int]]] = pairs
     by_rate: Callable[[Any], bool] = always
-    complete: bool = False
-    potential: bool = True
-    loaded_rows: Callable[[Any], Index] = no_rows
-    asked: Callable[[Mapping[str, Any], Any, int], Sequence[Asked]] = nothing
-    answers: Callable[[Any], Sequence[Any]] = nothing
-    lost: str = "the law of {} gives no finite number"
-    room: Callable[[Any], Array] = no_numbers
-    eased: Callable[[Any], AbstractContextManager[bool]] = nothing_eased
-    remembers: Callable[[Any], Array] = nothing_remembered
-    kept: Callable[[Any, Array], Array] = nothing_kept
-    beyond: Callable[[str, Any, Array, Callable[[str], Array]], str] = nothing_beyond
-    phases: Callable[[Any, Any], Array] = no_numbers
+    hooks: Hooks = NO_HOOKS
 
     @property
     def kernels(self) -> list[ElementKernel]:

@@ -6,7 +6,7 @@ from typing import Any
 
 from rom.arguments import not_negative, number, positive
 from rom.errors import ConfigError
-from rom.mbs.elements.family import Family, Places, apart, integers, on_joint, rows_of
+from rom.mbs.elements.family import Family, Hooks, Places, apart, integers, on_joint, rows_of
 from rom.mbs.kernels.compiled import inner
 from rom.mbs.kernels.constraints import column_of
 from rom.mbs.kernels.coordinates import coordinate_tangent, push_coordinate
@@ -194,5 +194,5 @@ def add_gradient(s, W, at, c, row):
 FRICTIONS_FAMILY = Family(
     "frictions", Friction, pack, friction_wrenches, friction_tangents,
     multiplier_columns=load_columns, ends=on_joint, couples=apart,
-    loaded_rows=lambda frictions: frictions.load_first[frictions.law[:, 1] != 0.0],
+    hooks=Hooks(loaded_rows=lambda frictions: frictions.load_first[frictions.law[:, 1] != 0.0]),
 )  # fmt: skip

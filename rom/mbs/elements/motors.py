@@ -10,7 +10,7 @@ from numba import types
 from numba.extending import intrinsic
 
 from rom.mbs.compiler.calls import called
-from rom.mbs.elements.family import Family, Places, apart, integers, on_joint, starts
+from rom.mbs.elements.family import Family, Hooks, Places, apart, integers, on_joint, starts
 from rom.mbs.elements.formulas.programs import Formula
 from rom.mbs.elements.law_calls import DIFFERENCE_STEP
 from rom.mbs.kernels.compiled import inner
@@ -229,5 +229,5 @@ def motor_tangents(s, W, motors, _lam, ck, cc):
 
 MOTORS_FAMILY = Family(
     "motors", Motor, pack, motor_wrenches, motor_tangents, ends=on_joint, couples=apart,
-    asked=asked, answers=lambda motors: motors.answer,
+    hooks=Hooks(asked=asked, answers=lambda motors: motors.answer),
 )  # fmt: skip
