@@ -14,7 +14,6 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from rom.errors import ConfigError
 from rom.mbs.kernels.element_calls import ElementKernel, row_of
 from rom.mbs.kernels.system import Coordinates
 from rom.mbs.kernels.tables import Table
@@ -31,19 +30,9 @@ class Asked(Protocol):
         """Put the answer at time t, and its derivatives, where the kernels of its family look."""
 
 
-def between(element: Any) -> tuple[Marker, ...]:
-    """The two markers of most elements."""
-    return element.i, element.j
-
-
 def on_joint(_: Any) -> tuple[Marker, ...]:
     """None of its own: the joint has them."""
     return ()
-
-
-def from_ground(_: Any) -> bool:
-    """Momentum is lost to the ground alone, if one of the markers is there."""
-    return False
 
 
 def from_outside(_: Any) -> bool:
@@ -51,24 +40,9 @@ def from_outside(_: Any) -> bool:
     return True
 
 
-def always(_: Table) -> bool:
-    """The forces depend on velocities."""
-    return True
-
-
 def never(_: Table) -> bool:
-    """They do not, or the tangents know how."""
+    """The forces do not depend on velocities, or the tangents know how."""
     return False
-
-
-def pairs(table: Any, body: Index) -> Iterable[Sequence[int]]:
-    """(e, 2) bodies of the markers i and j of each of e elements.
-
-    Args:
-        table: the elements.
-        body: (m,) body of every marker.
-    """
-    return np.column_stack([body[table.i], body[table.j]])
 
 
 def apart(_table: Any, _body: Index) -> Iterable[Sequence[int]]:
@@ -257,10 +231,10 @@ class Family:
         residuals, tangents, energy, multiplier_columns, pair_tangents: kernels, see
             `rom.mbs.kernels.element_calls`; None for forces that do not change, store no energy,
             do not depend on multipliers, or whose tangents stay about the same over a step.
-        ends: record -> the markers it acts on.
+        ends: record -> the markers it acts on; of most ``i`` and ``j``.
         outside: record -> whether it acts from outside even though no marker is on the ground.
         couples: (table, (k,) bodies of the markers) -> groups of bodies that it couples, -1 for
-            the ground.
+            the ground; of most those of the markers ``i`` and ``j``.
         by_rate: table -> whether the forces depend on velocities in a way that the tangents do not
             know whole: they lack the change of rates with the position.
         hooks: what only few families have to say.
@@ -274,10 +248,12 @@ class Family:
     energy: ElementKernel | None = None
     multiplier_columns: ElementKernel | None = None
     pair_tangents: ElementKernel | None = None
-    ends: Callable[[Any], tuple[Marker, ...]] = between
-    outside: Callable[[Any], bool] = from_ground
-    couples: Callable[[Any, Index], Iterable[Sequence[int]]] = pairs
-    by_rate: Callable[[Any], bool] = always
+    ends: Callable[[Any], tuple[Marker, ...]] = lambda element: (element.i, element.j)
+    outside: Callable[[Any], bool] = lambda _: False
+    couples: Callable[[Any, Index], Iterable[Sequence[int]]] = lambda table, body: np.column_stack(
+        [body[table.i], body[table.j]]
+    )
+    by_rate: Callable[[Any], bool] = lambda _: True
     hooks: Hooks = NO_HOOKS
 
     @property
@@ -298,16 +274,3 @@ class Family:
     def pushes(self, element: Any) -> bool:
         """Whether an element changes the momentum of all bodies together."""
         return self.outside(element) or any(m.body == GROUND for m in self.ends(element))
-
-
-def check_family(name: str, element: Any, family: Family) -> None:
-    """Refuse what cannot enter a mechanism.
-
-    Raises:
-        ConfigError: if the family has other records.
-    """
-    if not isinstance(element, family.record):
-        raise ConfigError(
-            f"element = {element!r} of {name!r} must be of type {family.record.__name__}, as all "
-            f"{family.name}."
-        )
