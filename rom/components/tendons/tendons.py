@@ -28,9 +28,9 @@ from rom.components.tendons.tension import (
 )
 from rom.errors import ConfigError
 from rom.mbs.elements.family import Family, Hooks, Places, integers, rows_of, starts
-from rom.mbs.elements.pair_motion import followed_angle
 from rom.mbs.kernels.algebra import cross, dot, row, sub, turn
 from rom.mbs.kernels.compiled import inner
+from rom.mbs.kernels.coordinates import followed_angle
 from rom.mbs.kernels.element_calls import energy, residuals, tangents
 from rom.mbs.kernels.tables import (
     Array1,
