@@ -69,7 +69,7 @@ ORDER = {
             "law_check"
         ),
         "mbs.elements": (
-            "field family pair_motion springs rotational_springs loads law_calls "
+            "field family law_calls joint_forces springs rotational_springs loads "
             "laws_in_python laws formulas motors frictions contact stops bushings spread_loads "
             "nonlinear solids"
         ),

@@ -33,7 +33,7 @@ from rom import rotation
 from rom.arguments import finite, start_pose, typed, whole
 from rom.errors import ConfigError, ModelError
 from rom.mbs.compiler.calls import called
-from rom.mbs.elements.family import Family, Places, integers, on_joint
+from rom.mbs.elements.family import Family, Hooks, Places, integers, on_joint
 from rom.mbs.elements.law_calls import compiled_entry
 from rom.mbs.kernels.compiled import inner
 from rom.mbs.kernels.constraints import block_of
@@ -385,6 +385,7 @@ def _outside(whole: Assembly) -> bool:
 
 NONLINEAR_FAMILY = Family(
     "nonlinear", Assembly, pack, nonlinear_residuals, nonlinear_tangents, nonlinear_energy,
-    ends=on_joint, outside=_outside, couples=_couples, answers=lambda elements: elements.forces,
+    ends=on_joint, outside=_outside, couples=_couples,
     by_rate=lambda elements: bool(elements.by_rate.any()),
+    hooks=Hooks(answers=lambda elements: elements.forces),
 )  # fmt: skip
