@@ -77,8 +77,7 @@ def write_archive(
                 with archive.open(info, "w", force_zip64=True) as member:
                     npy.write_array(member, np.ascontiguousarray(A), allow_pickle=False)
 
-    write_whole(path, write)
-    return Path(path)
+    return write_whole(path, write)
 
 
 def read_archive(

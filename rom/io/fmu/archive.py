@@ -65,8 +65,7 @@ def write_archive(path: Path, content: Content) -> Path:
     packed |= {f"resources/{name}": data for name, data in content.resources.items()}
     packed[f"binaries/{_platform()}/{identifier}.so"] = _library(sources, names)
     packed["modelDescription.xml"] = content.describe(guid, identifier, names)
-    write_whole(path, lambda file: _pack(file, packed))
-    return path
+    return write_whole(path, lambda file: _pack(file, packed))
 
 
 def _guid(sources: dict[str, bytes], content: Content) -> str:

@@ -86,8 +86,7 @@ def write_user_element(
         ResourceError: if the disk is full.
     """
     text = "\n".join(_document(matrices, np.asarray(dofs), nodes)) + "\n"
-    write_whole(path, lambda file: file.write(text.encode("ascii")))
-    return Path(path)
+    return write_whole(path, text.encode("ascii"))
 
 
 def _comment(element: _Element, keyword: str, line: str) -> str:

@@ -140,8 +140,7 @@ def write_exudyn(body: FlexibleBody, path: str | Path) -> Path:
     text = MODULE_TEXT.format(
         mark=ORIGIN_MARK, stem=stem, names=_encoded(names), arrays=_encoded(memory.getvalue())
     )
-    write_whole(path, lambda file: file.write(text.encode()))
-    return path
+    return write_whole(path, text.encode())
 
 
 def arrays(body: FlexibleBody) -> dict[str, Array]:

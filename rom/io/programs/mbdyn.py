@@ -52,8 +52,7 @@ def write_mbdyn(body: FlexibleBody, path: str | Path) -> Path:
     if len(set(labels)) < len(labels):
         raise ConfigError(f"interfaces need names that differ in more than blanks, got {labels}.")
     text = "\n".join(_document(body, labels)) + "\n"
-    write_whole(path, lambda file: file.write(text.encode()))
-    return Path(path)
+    return write_whole(path, text.encode())
 
 
 def invariants(body: FlexibleBody) -> dict[str, Array]:

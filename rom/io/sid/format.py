@@ -107,8 +107,7 @@ def write_sid(record: StandardInput, path: str | Path, *, dialect: str = "fembs"
     """
     one_of("dialect", dialect, DIALECTS)
     text = "\n".join(_document(record, dialect)) + "\n"
-    write_whole(path, lambda file: file.write(text.encode("ascii", "replace")))
-    return Path(path)
+    return write_whole(path, text.encode("ascii", "replace"))
 
 
 def repacked(A: Array, *, by_axis: bool) -> Array:
