@@ -53,7 +53,7 @@ ORDER = {
         ),
         "fe.mesh": (
             "cell_types topology picks cad solid sources child curving quality repair validate "
-            "cut distribute read summary input_deck"
+            "cut read summary input_deck"
         ),
         "io": (
             "files hdf5 archive native fields matrices sid programs fmu bodies history "
