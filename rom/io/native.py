@@ -19,7 +19,7 @@ from rom.body.nonlinear.quartic import Quartic
 from rom.body.nonlinear.sampled import Sampled
 from rom.body.records import Marker, Patch, Surface
 from rom.body.recovery import StressRecovery
-from rom.errors import ConfigError, FileFormatError, QualityGateError
+from rom.errors import ConfigError, FileFormatError, QualityGateError, in_file
 from rom.io.archive import MAX_BYTES, Kind, read_archive, stated, write_archive
 from rom.model import Array, Report, Row
 from rom.names import named
@@ -54,10 +54,19 @@ def read(
     """The body of a file, whose schema may be one of others, its manifest and arrays."""
     kind = Kind({SCHEMA_NAME: VERSION} | others, "body file", FIELDS)
     manifest, arrays = read_archive(path, kind, limit)
+    with in_file(path):
+        _check_numbers(manifest, arrays)
+        with stated(path):
+            body = body_of(manifest, arrays)
+        _verify(body)
+    return body, manifest, arrays
+
+
+def _check_numbers(manifest: dict[str, Any], arrays: dict[str, Array]) -> None:
+    """Known units, and numbers whose squares are finite."""
     if manifest.get("units") not in list(SYSTEMS):
         raise FileFormatError(
-            f"the unit system {manifest.get('units')!r} is unknown; known: {sorted(SYSTEMS)}.",
-            where=str(path),
+            f"the unit system {manifest.get('units')!r} is unknown; known: {sorted(SYSTEMS)}."
         )
     for name, A in arrays.items():
         with np.errstate(over="ignore"):
@@ -66,13 +75,8 @@ def read(
             what = "whose square is not" if np.isfinite(A).all() else "that is not"
             raise QualityGateError(
                 f"{name} holds a number {what} finite.",
-                where=str(path),
                 hint="Look where the body was computed: no force or motion follows from it.",
             )
-    with stated(path):
-        body = body_of(manifest, arrays)
-    verify(body, path)
-    return body, manifest, arrays
 
 
 def body_arrays(body: FlexibleBody) -> dict[str, Array]:
@@ -256,17 +260,17 @@ def _are_names(text: str, n: int, names: list[str]) -> bool:
     )
 
 
-def verify(body: FlexibleBody, path: Path) -> None:
+def _verify(body: FlexibleBody) -> None:
     """Shapes that belong together and matrices a body can have."""
     for misfit in _misfits(body, body.K.shape[0] if body.K.ndim == 2 else -1):
-        raise FileFormatError(f"{misfit}.", where=str(path))
+        raise FileFormatError(f"{misfit}.")
     matrices = {f"the geometric stiffness {load!r}": A for load, A in body.K_geo.items()}
     for name, A in ({"K": body.K, "D": body.D, "inertia": body.inertia} | matrices).items():
-        symmetric(name, A, 1e-10, where=str(path))
+        symmetric(name, A, 1e-10)
     if body.omega.min(initial=0.0) < 0.0:
-        raise QualityGateError("each frequency of the coordinates must be >= 0.", where=str(path))
+        raise QualityGateError("each frequency of the coordinates must be >= 0.")
     if body.mass <= 0 or (body.n_modes and np.linalg.eigvalsh(body.M)[0] <= 0):
-        raise QualityGateError("the mass must be positive definite.", where=str(path))
+        raise QualityGateError("the mass must be positive definite.")
 
 
 def _misfits(body: FlexibleBody, r: int) -> Iterator[str]:
