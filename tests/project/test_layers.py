@@ -48,8 +48,8 @@ ORDER = {
         ),
         "fe": "costs parallel jit compat operators forms mesh elasticity probe",
         "fe.operators": (
-            "solver memory disk aij foreseen factor corrected substructures held spectrum "
-            "iterative counting krylov_schur workers petsc"
+            "solver memory disk aij foreseen factor substructures held spectrum "
+            "iterative krylov_schur workers petsc"
         ),
         "fe.mesh": (
             "cell_types topology picks cad solid sources child curving quality repair validate "
