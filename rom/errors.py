@@ -75,6 +75,16 @@ def reached(found: Callable[[], Any]) -> Iterator[None]:
         raise
 
 
+@contextmanager
+def in_file(path: str | Path) -> Iterator[None]:
+    """Errors from within name this file where they name no place."""
+    try:
+        yield
+    except RomError as error:
+        error.where = error.where or str(path)
+        raise
+
+
 def _rebuild(kind: type[RomError], message: str, where: str, hint: str) -> RomError:
     return kind(message, where=where, hint=hint)
 

@@ -109,21 +109,20 @@ class Sets:
         self.names.setdefault(name.upper(), name)
         self.members.setdefault(name.upper(), []).extend(members)
 
-    def of(self, name: str, where: str = "") -> Index:
+    def of(self, name: str) -> Index:
         """Ascending numbers in a set, those of the sets it names included."""
         key = name.upper()
         if key in self.known and (found := self.known[key]) is not None:
             return found
         if key not in self.members or key in self.known or len(self.known) > MOST_NESTED:
             what = "in itself" if key in self.known else "unknown, or nested too deep"
-            raise FileFormatError(f"the set {name!r} is {what}.", where=where)
+            raise FileFormatError(f"the set {name!r} is {what}.")
         self.known[key] = None
         parts = [np.zeros(0, dtype=np.int64)]
         for member in self.members[key]:
             if isinstance(member, range) and len(member) > MOST_NODES:
-                what = f"the set {name!r} has {len(member)} {self.what}."
-                raise UnsafeFileError(what, where=where)
-            own = self.of(member, where) if isinstance(member, str) else np.array(member)
+                raise UnsafeFileError(f"the set {name!r} has {len(member)} {self.what}.")
+            own = self.of(member) if isinstance(member, str) else np.array(member)
             parts.append(np.atleast_1d(own).astype(np.int64))
         self.known[key] = out = np.unique(np.concatenate(parts))
         return out

@@ -4,7 +4,6 @@
 each how many functions were compiled and how much time of the processor it took.
 """
 
-import json
 import sys
 from collections.abc import Callable
 from functools import partial
@@ -15,6 +14,7 @@ from typing import Any
 import numpy as np
 from scipy.sparse import csr_matrix, identity
 
+from rom.doctor.probes import say
 from rom.fields import families, find, names
 from rom.model import FEModel, Interface
 from rom.reduction.bases.method import CraigBampton
@@ -189,5 +189,4 @@ def measured(name: str) -> dict[str, Any]:
 
 if __name__ == "__main__":
     for case in sys.argv[1:]:
-        sys.stdout.write(json.dumps(measured(case)) + "\n")
-        sys.stdout.flush()
+        say(**measured(case))

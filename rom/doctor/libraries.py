@@ -3,7 +3,6 @@
 ``python -m rom.doctor.libraries`` draws a sphere off-screen and says which window drew it.
 """
 
-import json
 import platform
 import shutil
 import sys
@@ -12,7 +11,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-from rom.doctor.probes import Finding
+from rom.doctor.probes import Finding, say
 from rom.fe import GMSH_LIBRARIES, WHEEL_PACKAGES
 from rom.process import mpirun
 
@@ -182,20 +181,15 @@ def draw() -> None:
     import pyvista
     from vtkmodules.vtkCommonCore import vtkVersion  # all of vtk is twice the work
 
-    _write("pyvista", version=pyvista.__version__)
-    _write("vtk", version=vtkVersion().GetVTKVersion())
+    say("pyvista", version=pyvista.__version__)
+    say("vtk", version=vtkVersion().GetVTKVersion())
     began = perf_counter()
     plotter: Any = pyvista.Plotter(off_screen=True, window_size=[200, 200])
     plotter.add_mesh(pyvista.Sphere())
     contrast = float(plotter.screenshot(return_img=True).std())
     seconds = round(perf_counter() - began, 2)
-    _write("picture", window=plotter.ren_win.GetClassName(), contrast=contrast, seconds=seconds)
+    say("picture", window=plotter.ren_win.GetClassName(), contrast=contrast, seconds=seconds)
     plotter.close()
-
-
-def _write(name: str, **found: Any) -> None:
-    sys.stdout.write(json.dumps({"name": name, **found}) + "\n")
-    sys.stdout.flush()
 
 
 if __name__ == "__main__":

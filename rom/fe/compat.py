@@ -82,14 +82,6 @@ def assemble_matrix(form: ufl.Form) -> PETSc.Mat:
     return copy
 
 
-def assemble_vector(form: ufl.Form) -> Array:
-    """(n,) vector of a linear form, on one process."""
-    b = fem_petsc.assemble_vector(compiled(form))
-    values = b.array.copy()
-    b.destroy()
-    return values
-
-
 def assembled_vector(form: Any) -> Array:
     """(n_local,) vector of a compiled linear form, summed over the ranks that share a node."""
     b = fem_petsc.assemble_vector(form)
@@ -236,9 +228,19 @@ def node_coordinates(space: Any) -> Array:
     return x[: space.dofmap.index_map.size_local]
 
 
-def quadrature_points(mesh: Any, degree: int) -> Array:
-    """(k, 3) points of a quadrature that is exact for that degree, in the reference cell."""
-    return quadrature_rule(mesh, degree)[0]
+def degree_of_slopes(mesh: Any, degree: int, power: int, in_bricks: int | None = None) -> int:
+    """Quadrature degree for a power of the gradient of displacements, exact on straight tetrahedra.
+
+    Args:
+        mesh: the mesh; curved cells get more.
+        degree: of the displacement.
+        power: of the gradient.
+        in_bricks: the power that counts on hexahedra, where it is another one.
+    """
+    curved = geometry_degree(mesh) - 1
+    if cell_name(mesh) == "tetrahedron":
+        return power * (degree - 1) + 3 * curved
+    return (in_bricks or power) * degree + 2 * curved
 
 
 def quadrature_rule(mesh: Any, degree: int) -> tuple[Array, Array]:

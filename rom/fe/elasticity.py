@@ -301,7 +301,8 @@ def assemble(
         interfaces = {key: interface(key, value, V, points) for key, value in facet_tags.items()}
     named = {region: solids[tag] for region, tag in regions.items()}
     remarks = list(doubts(named, float(np.ptp(points, axis=0).max()), name, degree))
-    _warn(mesh.comm, remarks)
+    for remark in remarks if mesh.comm.rank == 0 else ():
+        warn(remark)
     doubts_found = list(dict.fromkeys(solid.doubt for solid in named.values() if solid.doubt))
     give_back()
     A, B = (K, M) if shared else (wrapped(K), wrapped(M))
@@ -363,8 +364,3 @@ def _check_attachments(attached: Sequence[Attachment], names: dict[str, Any]) ->
     for item in attached:
         text = f"a mass of {item.mass:g} kg hangs on {item.interface!r}; use one of"
         check_known(item.interface, names, text, InterfaceError)
-
-
-def _warn(comm: MPI.Comm, remarks: list[str]) -> None:
-    for remark in remarks if comm.rank == 0 else ():
-        warn(remark)

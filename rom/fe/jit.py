@@ -73,7 +73,8 @@ def not_here() -> str:
 def on_root_lock(comm: MPI.Comm) -> int | None:
     """Descriptor of the locked cache on rank 0, None elsewhere and where locks do not work."""
     path = on_root(comm, usable_cache)
-    _set_cache(path)
+    defaults = _defaults()  # coordinate maps are compiled inside dolfinx, which takes no options
+    defaults["cache_dir"] = (path, *defaults["cache_dir"][1:])
     if comm.rank > 0:
         return None
     try:
@@ -146,9 +147,3 @@ def _ignore_option_files() -> None:
         for name in READERS:
             if hasattr(module, name):
                 setattr(module, name, lambda: ({}, {}))
-
-
-def _set_cache(path: Path) -> None:
-    """Coordinate maps are compiled inside dolfinx, where no options can be passed."""
-    defaults = _defaults()
-    defaults["cache_dir"] = (path, *defaults["cache_dir"][1:])

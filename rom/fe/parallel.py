@@ -85,13 +85,6 @@ def collective(comm: MPI.Comm) -> Iterator[None]:
     _raise_together(comm, error)
 
 
-def together(comm: MPI.Comm, function: Callable[[], T]) -> T:
-    """Value of a function called on every rank; see `collective` for its errors."""
-    with collective(comm):
-        value = function()
-    return value
-
-
 def meet(comm: MPI.Comm) -> None:
     """Wait for all ranks asleep: MPI itself would wait for them in a busy loop.
 

@@ -2,7 +2,6 @@
 
 import json
 import sys
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -10,8 +9,8 @@ from rom.arguments import between, positive, typed
 from rom.errors import ConfigError, warn
 from rom.fmu.server import SETTINGS_FILE
 from rom.io.files import check_writable
-from rom.io.fmu.archive import Content, write_archive
-from rom.io.fmu.description import Model, model_description
+from rom.io.fmu.archive import write_archive
+from rom.io.fmu.description import Content
 from rom.io.fmu.variables import Variable
 from rom.names import check_ending
 from rom.process.child import Limits, python, run, scratch
@@ -71,8 +70,12 @@ def write_fmu(
     settings |= {"dt": float(dt), "rho_inf": float(rho_inf)}
     resources[PYTHON_FILE] = sys.executable.encode()
     resources[SETTINGS_FILE] = json.dumps(settings, indent=1).encode()
-    describe = partial(_description, path.stem, _variables(resources, script), float(dt))
-    return write_archive(path, Content(path.stem, "process.c", describe, resources))
+    about = f"Mechanism {path.stem}, moved by rom, which must be installed where the FMU runs."
+    variables = _variables(resources, script)
+    content = Content(
+        path.stem, about, variables, float(dt), "process.c", resources=resources, tool=True
+    )
+    return write_archive(path, content)
 
 
 def _read(path: Path) -> bytes:
@@ -104,10 +107,3 @@ def _variables(resources: dict[str, bytes], script: Path) -> list[Variable]:
     if "error" in found:
         raise ConfigError(found["error"], where=script.name, hint=found["hint"])
     return [Variable(**one) for one in found["variables"]]
-
-
-def _description(
-    name: str, variables: list[Variable], dt: float, guid: str, identifier: str, names: Any
-) -> bytes:
-    about = f"Mechanism {name}, moved by rom, which must be installed where the FMU runs."
-    return model_description(Model(name, identifier, guid, True, names, dt, about), variables)

@@ -5,7 +5,6 @@ from typing import Any
 
 import numpy as np
 
-from rom.errors import ConfigError
 from rom.io.fmu.variables import Variable, structured
 from rom.mbs.elements import frictions
 from rom.mbs.equations.packing import Packed
@@ -13,7 +12,7 @@ from rom.mbs.kernels.work import Work
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.parts.bodies import Marker
 from rom.model import Array
-from rom.names import check_once
+from rom.names import check_known, check_once
 from rom.rotation import quaternion
 
 # reads (W, lam, packed) at an instant
@@ -55,18 +54,15 @@ class Outputs:
             for part in mechanism.parts.values()
             for place in part.names
         }
-        joints = {n: j for n, j in mechanism.joints.items() if j.coordinate is not None}
         check_once(names, "the output")
         for name in names:
+            check_known(name, output_names(mechanism), f"no output {name!r}; there are")
             if name in places:
                 self._marker(places[name])
-            elif name in joints:
+            elif name in mechanism.joints:
                 self._joint(mechanism, name)
-            elif name in mechanism.drives:
-                self._drive(mechanism, name)
             else:
-                known = sorted(output_names(mechanism))
-                raise ConfigError(f"no output {name!r}; there are {known}.")
+                self._drive(mechanism, name)
 
     def values(self, W: Work, lam: Array, packed: Packed) -> Array:
         """(n,) all outputs after an evaluation of the mechanism."""

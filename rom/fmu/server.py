@@ -64,11 +64,11 @@ class Server:
         self.states: dict[int, Any] = {}
         self.count = 0
         self.reported: set[str] = set()
-        self.verbs: dict[int, Callable[[Index, Array], Array]] = {
-            1: self._set,
+        self.verbs: dict[int, Callable[[Index, Array], Array | None]] = {
+            1: lambda refs, values: self.model.set(refs, values),
             2: lambda refs, values: self.model.get(refs),
-            3: self._start,
-            4: self._step,
+            3: lambda refs, values: self.model.start(float(values[0])),
+            4: lambda refs, values: self.model.step(float(values[0]), float(values[1])),
             5: self._keep,
             6: self._recall,
             7: self._drop,
@@ -90,38 +90,23 @@ class Server:
                 return ERROR, NO_VALUES, f"{type(error).__name__}: {error}"
         new = {str(w.message) for w in caught if issubclass(w.category, RomWarning)} - self.reported
         self.reported |= new
-        return OK, found, " ".join(sorted(new))
-
-    def _set(self, refs: Index, values: Array) -> Array:
-        self.model.set(refs, values)
-        return NO_VALUES
-
-    def _start(self, refs: Index, values: Array) -> Array:
-        self.model.start(float(values[0]))
-        return NO_VALUES
-
-    def _step(self, refs: Index, values: Array) -> Array:
-        self.model.step(float(values[0]), float(values[1]))
-        return NO_VALUES
+        return OK, NO_VALUES if found is None else found, " ".join(sorted(new))
 
     def _keep(self, refs: Index, values: Array) -> Array:
         self.count += 1
         self.states[self.count] = self.model.keep()
         return np.array([float(self.count)])
 
-    def _recall(self, refs: Index, values: Array) -> Array:
+    def _recall(self, refs: Index, values: Array) -> None:
         if int(values[0]) not in self.states:
             raise ConfigError("this state was freed, or of another instance; take a kept one.")
         self.model.recall(self.states[int(values[0])])
-        return NO_VALUES
 
-    def _drop(self, refs: Index, values: Array) -> Array:
+    def _drop(self, refs: Index, values: Array) -> None:
         self.states.pop(int(values[0]), None)
-        return NO_VALUES
 
-    def _reset(self, refs: Index, values: Array) -> Array:
+    def _reset(self, refs: Index, values: Array) -> None:
         self.model = self.build()
-        return NO_VALUES
 
 
 def serve(connection: socket.socket, build: Callable[[], Driven]) -> None:
@@ -133,28 +118,18 @@ def serve(connection: socket.socket, build: Callable[[], Driven]) -> None:
         _send(connection, ERROR, NO_VALUES, f"{kind}{error}")
         return
     _send(connection, OK, NO_VALUES, "")
-    while (head := _receive(connection, HEAD_LAYOUT.size)) is not None:
-        verb, n_refs, n_values = HEAD_LAYOUT.unpack(head)
-        data = _receive(connection, 4 * n_refs + 8 * n_values)
-        if data is None:
-            return
-        refs = np.frombuffer(data, np.uint32, n_refs).astype(np.int64)
-        values = np.frombuffer(data, float, n_values, 4 * n_refs)
-        _send(connection, *server.answer(verb, refs, values))
+    with connection.makefile("rb") as requests:
+        while len(head := requests.read(HEAD_LAYOUT.size)) == HEAD_LAYOUT.size:
+            verb, n_refs, n_values = HEAD_LAYOUT.unpack(head)
+            size = 4 * n_refs + 8 * n_values
+            if len(data := requests.read(size)) < size:
+                return
+            refs = np.frombuffer(data, np.uint32, n_refs).astype(np.int64)
+            values = np.frombuffer(data, float, n_values, 4 * n_refs)
+            _send(connection, *server.answer(verb, refs, values))
 
 
 def _send(connection: socket.socket, status: int, values: Array, text: str) -> None:
     words = text.encode()
     head = HEAD_LAYOUT.pack(status, values.size, len(words))
     connection.sendall(head + np.ascontiguousarray(values, dtype=float).tobytes() + words)
-
-
-def _receive(connection: socket.socket, size: int) -> bytes | None:
-    """So many bytes, or None at the end."""
-    data = b""
-    while len(data) < size:
-        more = connection.recv(size - len(data))
-        if not more:
-            return None
-        data += more
-    return data

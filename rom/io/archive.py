@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.lib import format as npy
 
-from rom.errors import ConfigError, FileFormatError, QualityGateError, UnsafeFileError
+from rom.errors import ConfigError, FileFormatError, QualityGateError, UnsafeFileError, in_file
 from rom.io.files import MAX_FILE_BYTES, check_readable, write_whole
 from rom.model import Array
 from rom.names import named
@@ -77,8 +77,7 @@ def write_archive(
                 with archive.open(info, "w", force_zip64=True) as member:
                     npy.write_array(member, np.ascontiguousarray(A), allow_pickle=False)
 
-    write_whole(path, write)
-    return Path(path)
+    return write_whole(path, write)
 
 
 def read_archive(
@@ -96,45 +95,40 @@ def read_archive(
         UnsafeFileError: if it asks for more memory than the limit or holds anything but numbers.
     """
     path = check_readable(path, max(limit, MAX_FILE_BYTES))
+    with in_file(path):
+        manifest, arrays = _checked(path, kind, limit)
+        for name, A in arrays.items():
+            if manifest["sha256"][name] != digest(A):
+                raise FileFormatError(f"the array {name!r} was changed after writing.")
+    return manifest, arrays
+
+
+def _checked(path: Path, kind: Kind, limit: int) -> tuple[dict[str, Any], dict[str, Array]]:
+    """Manifest and arrays as they are."""
     try:
         with zipfile.ZipFile(path) as archive:
-            _refuse_oversize(archive, path, limit)
-            _refuse_paths(archive, path)
-            manifest = _read_manifest(archive, path, kind)
-            names = sorted(_digests(manifest, path, kind))
-            _refuse_missing(archive, names, path)
-            arrays = {name: _read(archive, name, path) for name in names}
-    except (
-        zipfile.BadZipFile,
-        OSError,
-        EOFError,
-        KeyError,
-        RuntimeError,
-        NotImplementedError,
-    ) as e:
+            _refuse_oversize(archive, limit)
+            _refuse_paths(archive)
+            manifest = _read_manifest(archive, kind)
+            names = sorted(_digests(manifest, kind))
+            _refuse_missing(archive, names)
+            return manifest, {name: _read(archive, name) for name in names}
+    except (zipfile.BadZipFile, OSError, EOFError, KeyError, RuntimeError) as e:
         cut = "It may have been cut in a transfer; write or copy it again."
-        raise FileFormatError(
-            f"this is not a complete {kind.what} ({e}).",
-            where=str(path),
-            hint=READER_ADVICE.get(path.suffix.lower(), cut),
-        ) from e
-    for name, A in arrays.items():
-        if manifest["sha256"][name] != digest(A):
-            raise FileFormatError(f"the array {name!r} was changed after writing.", where=str(path))
-    return manifest, arrays
+        hint = READER_ADVICE.get(path.suffix.lower(), cut)
+        raise FileFormatError(f"this is not a complete {kind.what} ({e}).", hint=hint) from e
 
 
 @contextmanager
 def stated(path: str | Path) -> Iterator[None]:
     """Turn what a wrong manifest causes into an error that names the file."""
-    try:
-        yield
-    except ConfigError as error:
-        raise FileFormatError(error.message, where=str(path), hint=error.hint) from error
-    except (KeyError, TypeError, ValueError, AttributeError, IndexError) as error:
-        raise FileFormatError(
-            f"the manifest lacks or misstates {error}.", where=str(path)
-        ) from error
+    with in_file(path):
+        try:
+            yield
+        except ConfigError as error:
+            raise FileFormatError(error.message, hint=error.hint) from error
+        except (KeyError, TypeError, ValueError, AttributeError, IndexError) as error:
+            raise FileFormatError(f"the manifest lacks or misstates {error}.") from error
 
 
 def digest(A: Array) -> str:
@@ -143,101 +137,81 @@ def digest(A: Array) -> str:
     return hashlib.sha256(f"{A.dtype.str}{A.shape}".encode() + A.tobytes()).hexdigest()
 
 
-def _refuse_paths(archive: zipfile.ZipFile, path: Path) -> None:
+def _refuse_paths(archive: zipfile.ZipFile) -> None:
     """Whoever unpacks such a file by other means would write elsewhere."""
     for name in archive.namelist():
         if name.startswith("/") or "\\" in name or ".." in name.split("/"):
-            raise UnsafeFileError(f"the member {name[:60]!r} leads elsewhere.", where=str(path))
+            raise UnsafeFileError(f"the member {name[:60]!r} leads elsewhere.")
 
 
-def _refuse_oversize(archive: zipfile.ZipFile, path: Path, limit: int) -> None:
+def _refuse_oversize(archive: zipfile.ZipFile, limit: int) -> None:
     total = sum(info.file_size for info in archive.infolist())
     if total > limit:
         raise UnsafeFileError(
             f"the file unpacks to {total / 1e9:.2f} GB, above the limit of {limit / 1e9:.2f} GB.",
-            where=str(path),
             hint="If it is yours, pass a larger limit to load.",
         )
 
 
-def _refuse_missing(archive: zipfile.ZipFile, names: list[str], path: Path) -> None:
+def _refuse_missing(archive: zipfile.ZipFile, names: list[str]) -> None:
     there = set(archive.namelist())
     if missing := [name for name in names if f"{name}.npy" not in there]:
         raise FileFormatError(
             f"the file lacks the array {named(missing)} of its manifest.",
-            where=str(path),
             hint="It may have been changed after writing; write or copy it again.",
         )
 
 
-def _read(archive: zipfile.ZipFile, name: str, path: Path) -> Array:
+def _read(archive: zipfile.ZipFile, name: str) -> Array:
     """One array; the header is compared with the size of the member before memory is taken."""
     info = archive.getinfo(f"{name}.npy")
     try:
         with archive.open(info) as member:
-            version = npy.read_magic(member)
-            if version == (1, 0):
+            if npy.read_magic(member) == (1, 0):
                 shape, fortran, dtype = npy.read_array_header_1_0(member)
             else:
                 shape, fortran, dtype = npy.read_array_header_2_0(member)
     except (ValueError, SyntaxError, TypeError, TokenError) as error:
-        raise FileFormatError(
-            f"the array {name!r} has a broken header.", where=str(path)
-        ) from error
+        raise FileFormatError(f"the array {name!r} has a broken header.") from error
     if dtype.str not in ("<f8", "<i8", "|u1"):
         raise UnsafeFileError(
-            f"the array {name!r} has the type {dtype.str}; such a file holds 8-byte numbers.",
-            where=str(path),
+            f"the array {name!r} has the type {dtype.str}; such a file holds 8-byte numbers."
         )
     n_bytes = int(np.prod(shape, dtype=object)) * dtype.itemsize
     if fortran or n_bytes > info.file_size:
         raise UnsafeFileError(
-            f"the array {name!r} claims {n_bytes} bytes but has {info.file_size}.", where=str(path)
+            f"the array {name!r} claims {n_bytes} bytes but has {info.file_size}."
         )
     with archive.open(info) as member:
         try:
             return npy.read_array(member, allow_pickle=False)
         except ValueError as error:
-            raise FileFormatError(
-                f"the array {name!r} is cut: {error}.", where=str(path)
-            ) from error
+            raise FileFormatError(f"the array {name!r} is cut: {error}.") from error
 
 
-def _read_manifest(archive: zipfile.ZipFile, path: Path, kind: Kind) -> dict[str, Any]:
+def _read_manifest(archive: zipfile.ZipFile, kind: Kind) -> dict[str, Any]:
     if "manifest.npy" not in archive.namelist():
-        raise FileFormatError(
-            f"this archive is not a {kind.what}: it has no manifest.", where=str(path)
-        )
+        raise FileFormatError(f"this archive is not a {kind.what}: it has no manifest.")
     try:
-        manifest = json.loads(_read(archive, "manifest", path).tobytes())
+        manifest = json.loads(_read(archive, "manifest").tobytes())
         schema, (major, minor) = manifest["schema"], manifest["version"]
     except (ValueError, KeyError, TypeError, RecursionError) as error:
-        raise FileFormatError(f"the manifest cannot be read: {error}.", where=str(path)) from error
-    if (
-        not isinstance(schema, str)
-        or schema not in kind.schemas
-        or major != kind.schemas[schema][0]
-        or type(major) is not int
-        or type(minor) is not int
-        or minor < 0
-    ):
-        known = " or ".join(f"{name!r} {list(version)}" for name, version in kind.schemas.items())
+        raise FileFormatError(f"the manifest cannot be read: {error}.") from error
+    known = kind.schemas.get(schema) if isinstance(schema, str) else None
+    numbers = type(major) is int and type(minor) is int and minor >= 0
+    if known is None or major != known[0] or not numbers:
+        each = " or ".join(f"{name!r} {list(version)}" for name, version in kind.schemas.items())
         raise FileFormatError(
-            f"the file has the schema {schema!r} {manifest['version']}; it was to be {known}.",
-            where=str(path),
-            hint="Newer files need a newer program." if schema in list(kind.schemas) else "",
+            f"the file has the schema {schema!r} {manifest['version']}; it was to be {each}.",
+            hint="Newer files need a newer program." if known else "",
         )
     return manifest
 
 
-def _digests(manifest: dict[str, Any], path: Path, kind: Kind) -> dict[str, str]:
+def _digests(manifest: dict[str, Any], kind: Kind) -> dict[str, str]:
     digests = manifest.get("sha256")
     if not isinstance(digests, dict):
-        raise FileFormatError(
-            f"the manifest does not list the arrays of a {kind.what}.", where=str(path)
-        )
+        raise FileFormatError(f"the manifest does not list the arrays of a {kind.what}.")
     if missing := [name for name in kind.needed if name not in digests]:
-        raise FileFormatError(
-            f"the manifest of the {kind.what} lists no array {named(missing)}.", where=str(path)
-        )
+        raise FileFormatError(f"the manifest of the {kind.what} lists no array {named(missing)}.")
     return digests

@@ -7,7 +7,7 @@ from rom.arguments import AnyFamily, typed
 from rom.body.flexible import FlexibleBody
 from rom.fields import follow, names, taker
 from rom.io import native
-from rom.io.archive import MAX_BYTES, Kind, stated
+from rom.io.archive import MAX_BYTES
 
 
 @typed
@@ -59,10 +59,6 @@ def load(path: str | Path, *, limit: int = MAX_BYTES) -> Any:
     others = {name.removeprefix("load."): follow(place) for name, place in names("takes").items()
               if name.startswith("load.")}  # fmt: skip
     versions = {name: module.VERSION for name, module in others.items()}
-    known = Kind({native.SCHEMA_NAME: native.VERSION} | versions, "body file", native.FIELDS)
-    manifest, arrays = native.read_finite(path, known, limit)
-    with stated(path):
-        body = native.body_of(manifest, arrays)
-    native.verify(body, path)
+    body, manifest, arrays = native.read(path, versions, limit)
     other = others.get(manifest["schema"])
     return body if other is None else other.load(manifest, arrays, body, path)

@@ -7,7 +7,7 @@ from typing import Any
 
 from rom.arguments import one_of, typed
 from rom.body.flexible import FlexibleBody
-from rom.errors import ConfigError
+from rom.errors import ConfigError, in_file
 from rom.io.fields.vtu import write_vtu
 from rom.io.fmu.body import write_body_fmu
 from rom.io.matrices.dmig import write_dmig
@@ -146,9 +146,6 @@ def read_body(path: str | Path) -> FlexibleBody:
         FileFormatError: if the file is missing, cut, or not what its ending promises.
     """
     if Path(path).suffix.lower() == SID_SUFFIX:
-        record = read_sid(path)
-        try:
-            return sid_body(record)
-        except ConfigError as error:
-            raise ConfigError(error.message, where=str(path), hint=error.hint) from error
+        with in_file(path):
+            return sid_body(read_sid(path))
     return load(path)

@@ -13,12 +13,12 @@ from rom.readable import MAX_FILE_BYTES as MAX_FILE_BYTES
 from rom.readable import check_readable as check_readable
 
 
-def write_whole(path: str | Path, write: Callable[[IO[bytes]], object]) -> None:
-    """Write a file through a temporary one in the same folder, then rename.
+def write_whole(path: str | Path, content: bytes | Callable[[IO[bytes]], object]) -> Path:
+    """Write a file through a temporary one in the same folder, then rename; its path.
 
     Args:
         path: final name; a file of that name is replaced only by a complete new one.
-        write: gets the open binary file.
+        content: what is in it, or what writes that into the open binary file.
 
     Raises:
         ConfigError: if the folder does not exist or may not be written, or the name is a folder.
@@ -30,7 +30,7 @@ def write_whole(path: str | Path, write: Callable[[IO[bytes]], object]) -> None:
     except OSError as error:  # of which check_writable knows nothing
         raise ResourceError(f"{path} cannot be written: {error.strerror}.") from error
     try:
-        _fill(handle, write)
+        _fill(handle, content)
         os.chmod(name, 0o666 & ~_umask())
         os.replace(name, path)
         _sync_folder(path.parent)
@@ -42,6 +42,7 @@ def write_whole(path: str | Path, write: Callable[[IO[bytes]], object]) -> None:
         ) from error
     finally:
         Path(name).unlink(missing_ok=True)
+    return path
 
 
 def check_writable(path: str | Path) -> Path:
@@ -94,9 +95,9 @@ def check_last_line(path: Path) -> None:
             )
 
 
-def _fill(handle: int, write: Callable[[IO[bytes]], object]) -> None:
+def _fill(handle: int, content: bytes | Callable[[IO[bytes]], object]) -> None:
     with os.fdopen(handle, "wb") as file:
-        write(file)
+        file.write(content) if isinstance(content, bytes) else content(file)
         file.flush()
         os.fsync(file.fileno())
 

@@ -65,9 +65,7 @@ def write_history(solution: AnySolution, path: str | Path, *, every: int = 1) ->
     if ending not in WRITERS:
         raise ConfigError(f"{path} has the ending {ending!r}; known: {', '.join(sorted(WRITERS))}.")
     path = check_writable(path)
-    content = WRITERS[ending](solution, *_every(solution, every))
-    write_whole(path, lambda file: file.write(content))
-    return path
+    return write_whole(path, WRITERS[ending](solution, *_every(solution, every)))
 
 
 def _every(solution: Any, every: int) -> tuple[Array, tuple[Channel, ...]]:

@@ -4,6 +4,7 @@ The manifest is a JSON text stored as bytes: schema and version, units, names, p
 certificate, and the SHA-256 of every array. A reader needs NumPy and this page only.
 """
 
+from collections.abc import Iterator
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
@@ -18,7 +19,7 @@ from rom.body.nonlinear.quartic import Quartic
 from rom.body.nonlinear.sampled import Sampled
 from rom.body.records import Marker, Patch, Surface
 from rom.body.recovery import StressRecovery
-from rom.errors import ConfigError, FileFormatError, QualityGateError
+from rom.errors import ConfigError, FileFormatError, QualityGateError, in_file
 from rom.io.archive import MAX_BYTES, Kind, read_archive, stated, write_archive
 from rom.model import Array, Report, Row
 from rom.names import named
@@ -38,47 +39,34 @@ CAUCHY_ARRAYS = ("points", "gradient", "stiffness", "node", "material", "share")
 
 
 def save(body: FlexibleBody, path: str | Path) -> Path:
-    """Write a flexible body, whole or not at all.
-
-    Args:
-        body: what to write.
-        path: file name, usually ending in ``.rom.npz``.
-
-    Raises:
-        ConfigError: if the folder is missing or not writable.
-        QualityGateError: if an array holds a number that is not finite.
-        ResourceError: if the disk is full.
-    """
+    """Write a flexible body; see `rom.save`."""
     return write_archive(path, body_manifest(body), body_arrays(body), f"body {body.name!r}")
 
 
 def load(path: str | Path, *, limit: int = MAX_BYTES) -> FlexibleBody:
-    """Read a flexible body.
-
-    Args:
-        path: file written by `save`.
-        limit: bytes the arrays may take in memory.
-
-    Raises:
-        FileFormatError: if the file is missing, cut, changed, or no body file.
-        UnsafeFileError: if it asks for more memory than the limit or holds anything but numbers.
-        QualityGateError: if the numbers are not those of a body.
-    """
-    path = Path(path)
-    manifest, arrays = read_finite(path, Kind({SCHEMA_NAME: VERSION}, "body file", FIELDS), limit)
-    with stated(path):
-        body = body_of(manifest, arrays)
-    verify(body, path)
-    return body
+    """Read a flexible body, and no family; see `rom.load`."""
+    return read(Path(path), {}, limit)[0]
 
 
-def read_finite(path: Path, kind: Kind, limit: int) -> tuple[dict[str, Any], dict[str, Array]]:
-    """The manifest and the arrays of a file as written; see `load` for what is raised."""
+def read(
+    path: Path, others: dict[str, tuple[int, int]], limit: int
+) -> tuple[FlexibleBody, dict[str, Any], dict[str, Array]]:
+    """The body of a file, whose schema may be one of others, its manifest and arrays."""
+    kind = Kind({SCHEMA_NAME: VERSION} | others, "body file", FIELDS)
     manifest, arrays = read_archive(path, kind, limit)
+    with in_file(path):
+        _check_numbers(manifest, arrays)
+        with stated(path):
+            body = body_of(manifest, arrays)
+        _verify(body)
+    return body, manifest, arrays
+
+
+def _check_numbers(manifest: dict[str, Any], arrays: dict[str, Array]) -> None:
+    """Known units, and numbers whose squares are finite."""
     if manifest.get("units") not in list(SYSTEMS):
         raise FileFormatError(
-            f"the unit system {manifest.get('units')!r} is unknown; known: {sorted(SYSTEMS)}.",
-            where=str(path),
+            f"the unit system {manifest.get('units')!r} is unknown; known: {sorted(SYSTEMS)}."
         )
     for name, A in arrays.items():
         with np.errstate(over="ignore"):
@@ -87,10 +75,8 @@ def read_finite(path: Path, kind: Kind, limit: int) -> tuple[dict[str, Any], dic
             what = "whose square is not" if np.isfinite(A).all() else "that is not"
             raise QualityGateError(
                 f"{name} holds a number {what} finite.",
-                where=str(path),
                 hint="Look where the body was computed: no force or motion follows from it.",
             )
-    return manifest, arrays
 
 
 def body_arrays(body: FlexibleBody) -> dict[str, Array]:
@@ -274,77 +260,56 @@ def _are_names(text: str, n: int, names: list[str]) -> bool:
     )
 
 
-def verify(body: FlexibleBody, path: Path) -> None:
+def _verify(body: FlexibleBody) -> None:
     """Shapes that belong together and matrices a body can have."""
-    r = body.K.shape[0] if body.K.ndim == 2 else -1
+    for misfit in _misfits(body, body.K.shape[0] if body.K.ndim == 2 else -1):
+        raise FileFormatError(f"{misfit}.")
+    matrices = {f"the geometric stiffness {load!r}": A for load, A in body.K_geo.items()}
+    for name, A in ({"K": body.K, "D": body.D, "inertia": body.inertia} | matrices).items():
+        symmetric(name, A, 1e-10)
+    if body.omega.min(initial=0.0) < 0.0:
+        raise QualityGateError("each frequency of the coordinates must be >= 0.")
+    if body.mass <= 0 or (body.n_modes and np.linalg.eigvalsh(body.M)[0] <= 0):
+        raise QualityGateError("the mass must be positive definite.")
+
+
+def _misfits(body: FlexibleBody, r: int) -> Iterator[str]:
+    """What does not belong to a body of r elastic coordinates."""
     shapes = {
         "first_moment": (3,), "inertia": (3, 3), "S": (3, r), "Ibar_kl": (3, 3, r),
         "S_kl": (3, 3, r, r), "K": (r, r), "D": (r, r), "omega": (r,),
     }  # fmt: skip
-    for name, shape in shapes.items():
-        if getattr(body, name).shape != shape:
-            raise FileFormatError(
-                f"{name} has the shape {getattr(body, name).shape}, expected {shape}.",
-                where=str(path),
-            )
-    for m in body.markers.values():
-        parts = (m.point.shape, m.translation.shape, m.rotation.shape, m.hold.shape[1:])
-        six = m.kind not in SIX_KINDS or len(m.hold) >= 6  # families hold more of theirs
-        if not six or parts != ((3,), (3, r), (3, r), (6 + r,)):
-            raise FileFormatError(
-                f"marker {m.name!r} does not fit {r} coordinates.", where=str(path)
-            )
-        _verify_covariance(m, r, path)
-        _verify_patch(m, path)
-    if body.stress is not None and not body.stress.fits(r):
-        raise FileFormatError("the stress recovery does not fit the body.", where=str(path))
-    if body.surface is not None:
-        n = body.surface.points.shape[0]
-        triangles = body.surface.triangles
-        if (body.surface.shape.shape, triangles.shape[1:]) != ((3 * n, r), (3,)) or not (
-            triangles.size == 0 or (triangles.min() >= 0 and triangles.max() < n)
-        ):
-            raise FileFormatError("the surface does not fit the body.", where=str(path))
-    _verify_stiffening(body, path)
-    for name, A in (("K", body.K), ("D", body.D), ("inertia", body.inertia)):
-        symmetric(name, A, 1e-10, where=str(path))
-    if body.omega.min(initial=0.0) < 0.0:
-        raise QualityGateError("each frequency of the coordinates must be >= 0.", where=str(path))
-    if body.mass <= 0 or (r and np.linalg.eigvalsh(body.M)[0] <= 0):
-        raise QualityGateError("the mass must be positive definite.", where=str(path))
-
-
-def _verify_stiffening(body: FlexibleBody, path: Path) -> None:
-    if body.quartic is not None and not body.quartic.fits(body.n_modes):
-        raise FileFormatError(
-            f"the energy at large deflection does not fit {body.n_modes} coordinates.",
-            where=str(path),
-        )
+    arrays = {name: (getattr(body, name), shape) for name, shape in shapes.items()}
     for load, A in body.K_geo.items():
-        if A.shape != body.K.shape:
-            raise FileFormatError(
-                f"the geometric stiffness {load!r} has the shape {A.shape}, expected "
-                f"{body.K.shape}.",
-                where=str(path),
-            )
-        symmetric(f"the geometric stiffness {load!r}", A, 1e-10, where=str(path))
+        arrays[f"the geometric stiffness {load!r}"] = A, (r, r)
+    for name, (A, shape) in arrays.items():
+        if A.shape != shape:
+            yield f"{name} has the shape {A.shape}, expected {shape}"
+    for m in body.markers.values():
+        yield from _marker_misfits(m, r)
+    if body.stress is not None and not body.stress.fits(r):
+        yield "the stress recovery does not fit the body"
+    if body.surface is not None and not _surface_fits(body.surface, r):
+        yield "the surface does not fit the body"
+    if body.quartic is not None and not body.quartic.fits(r):
+        yield f"the energy at large deflection does not fit {r} coordinates"
 
 
-def _verify_covariance(m: Marker, r: int, path: Path) -> None:
+def _marker_misfits(m: Marker, r: int) -> Iterator[str]:
+    parts = (m.point.shape, m.translation.shape, m.rotation.shape, m.hold.shape[1:])
+    n_c = len(m.hold)
+    six = m.kind not in SIX_KINDS or n_c >= 6  # families hold more of theirs
+    if not six or parts != ((3,), (3, r), (3, r), (6 + r,)):
+        yield f"marker {m.name!r} does not fit {r} coordinates"
     if m.covariance is not None and m.covariance.shape != (3, 3, 1 + r):
-        raise FileFormatError(
-            f"the covariance of marker {m.name!r} does not fit {r} coordinates.",
-            where=str(path),
-        )
+        yield f"the covariance of marker {m.name!r} does not fit {r} coordinates"
+    if m.patch is not None:
+        dofs, shapes = 3 * len(m.patch.points), m.patch.shapes
+        if (n_c != dofs) if shapes is None else (shapes.shape != (dofs, n_c)):
+            yield f"the surface of marker {m.name!r} does not fit {n_c} coordinates"
 
 
-def _verify_patch(marker: Marker, path: Path) -> None:
-    if marker.patch is None:
-        return
-    dofs, n_c = 3 * marker.patch.points.shape[0], marker.hold.shape[0]
-    shapes = marker.patch.shapes
-    if (n_c != dofs) if shapes is None else (shapes.shape != (dofs, n_c)):
-        raise FileFormatError(
-            f"the surface of marker {marker.name!r} does not fit {n_c} coordinates.",
-            where=str(path),
-        )
+def _surface_fits(surface: Surface, r: int) -> bool:
+    n, corners = len(surface.points), surface.triangles
+    fits = (surface.shape.shape, corners.shape[1:]) == ((3 * n, r), (3,))
+    return fits and (corners.size == 0 or bool(corners.min() >= 0 and corners.max() < n))

@@ -38,21 +38,21 @@ def peak_bytes() -> int:
 
 def mapped_files() -> list[str]:
     """Shared libraries this process has loaded; empty where the system does not tell."""
+    return sorted({line.split()[-1] for line in _lines("/proc/self/maps") if ".so" in line})
+
+
+def _lines(file: str) -> list[str]:
+    """Of a file of the system; none where it does not tell."""
     try:
-        lines = Path("/proc/self/maps").read_text().splitlines()
+        return Path(file).read_text().splitlines()
     except OSError:
         return []
-    return sorted({line.split()[-1] for line in lines if ".so" in line})
 
 
 def machine_free_bytes() -> float:
     """What the machine has free; where it does not tell, no limit."""
-    try:
-        lines = Path("/proc/meminfo").read_text().splitlines()
-    except OSError:
-        return float(NO_LIMIT)
-    fields = dict(line.split(":", 1) for line in lines)
-    return 1024.0 * float(fields["MemAvailable"].split()[0])
+    fields = dict(line.split(":", 1) for line in _lines("/proc/meminfo"))
+    return 1024.0 * float(fields["MemAvailable"].split()[0]) if fields else float(NO_LIMIT)
 
 
 def address_bytes() -> float:
@@ -81,11 +81,7 @@ def group_bytes(folder: Path) -> float:
 def _groups() -> Iterator[Path]:
     """Folders of the control groups of this process, and of those around them."""
     yield from (CONTROL_GROUPS, CONTROL_GROUPS / "memory")
-    try:
-        lines = Path("/proc/self/cgroup").read_text().splitlines()
-    except OSError:
-        return
-    for line in lines:
+    for line in _lines("/proc/self/cgroup"):
         _, controllers, path = line.split(":", 2)
         root = CONTROL_GROUPS / ("memory" if controllers == "memory" else "")
         if controllers in ("", "memory"):

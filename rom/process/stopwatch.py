@@ -10,12 +10,8 @@ from rom.process.launcher import ranks
 from rom.process.memory import peak_bytes
 
 # pieces that stages have in common; the rest of a stage belongs to none
-FACTORISATION_PIECE, SOLUTION_PIECE, SEARCH_PIECE, REST_PIECE = (
-    "factorisations",
-    "solutions",
-    "searches",
-    "rest",
-)
+FACTORISATION_PIECE, SOLUTION_PIECE = "factorisations", "solutions"
+SEARCH_PIECE, REST_PIECE = "searches", "rest"
 MEGABYTE_SIZE = 1e6  # [bytes]
 # numbers that pieces of work leave with the stage under way
 FLOPS_NOTE, MISS_NOTE = "flops of the largest factorisation", "probability of a missed mode"

@@ -29,7 +29,7 @@ def volume(mesh):
         u, v = np.repeat(x, n * n), np.tile(np.repeat(x, n), n)
         weights = weights * (1 - u) ** 2 * (1 - v)
     return float(
-        (jacobians(mesh.points[mesh.cells], kind.gradients(kind.quadrature)) @ weights).sum()
+        (jacobians(mesh.points[mesh.cells], kind.gradients(kind.quadrature[0])) @ weights).sum()
     )
 
 

@@ -10,7 +10,7 @@ from cases.command import environment, python
 from cases.command import rom as command
 from cases.long import few
 from rom.doctor import first_use
-from rom.doctor.compilation import compiled
+from rom.doctor.probes import compiled
 
 USED = """
 import importlib, pkgutil

@@ -82,10 +82,9 @@ def test_a_rank_that_fails_ends_all_within_seconds(kind, code, words):
 def test_on_one_rank_errors_pass_as_they_are():
     from mpi4py import MPI
 
-    from rom.fe.parallel import collective, on_root, together
+    from rom.fe.parallel import collective, on_root
 
     assert on_root(MPI.COMM_SELF, lambda a, b: a + b, 1, b=2) == 3
-    assert together(MPI.COMM_SELF, lambda: 7) == 7
     with pytest.raises(ZeroDivisionError):
         on_root(MPI.COMM_SELF, lambda: 1 / 0)
     with pytest.raises(MaterialError), collective(MPI.COMM_SELF):

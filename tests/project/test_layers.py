@@ -48,12 +48,12 @@ ORDER = {
         ),
         "fe": "costs parallel jit compat operators forms mesh elasticity probe",
         "fe.operators": (
-            "solver memory disk aij foreseen factor corrected substructures held spectrum "
-            "iterative counting krylov_schur workers petsc"
+            "solver memory disk aij foreseen factor substructures held spectrum "
+            "iterative krylov_schur workers petsc"
         ),
         "fe.mesh": (
             "cell_types topology picks cad solid sources child curving quality repair validate "
-            "cut distribute read summary input_deck"
+            "cut read summary input_deck"
         ),
         "io": (
             "files hdf5 archive native fields matrices sid programs fmu bodies history "

@@ -64,7 +64,7 @@ def _diagnosed(fix: bool) -> "list[Finding]":
 def _compiled(what: str) -> "list[Finding]":
     """Findings of all cases, each said as soon as it is done: some take a minute."""
     from rom.doctor import first_use
-    from rom.doctor.compilation import compiled
+    from rom.doctor.probes import compiled
 
     cases = first_use.DEMO_CASES if what == "demo" else tuple(first_use.CASES)
     found = {}

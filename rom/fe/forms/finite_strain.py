@@ -20,9 +20,8 @@ from scipy.sparse import csr_matrix
 from rom.fe.compat import (
     assemble_matrix,
     assembled_vector,
-    cell_name,
     compiled,
-    geometry_degree,
+    degree_of_slopes,
     give_own,
     per_cell,
 )
@@ -61,9 +60,9 @@ class FiniteStrain:
         # the first component is the temperature: nodes of another space have other numbers
         self.share = fem.Constant(self.mesh, 1.0)
         self.theta = self.share * self.expansion * (self.in_cells + self.at_nodes[0])
-        self.dx = ufl.Measure(
-            "dx", domain=self.mesh, metadata={"quadrature_degree": self._quadrature(degree)}
-        )
+        # on straight tetrahedra exact: forces have the fourth power of grad u
+        order = degree_of_slopes(self.mesh, degree, 4, in_bricks=3)
+        self.dx = ufl.Measure("dx", domain=self.mesh, metadata={"quadrature_degree": order})
 
     def warm(self, share: float) -> None:
         """Apply a share of the heat from now on."""
@@ -86,17 +85,17 @@ class FiniteStrain:
 
     def force(self, u: Array) -> Array:
         """(n,) forces that hold the solid at a displacement (n,) [N]."""
-        self._set(u)
+        self._give(self.u, u)
         return gathered_rows(self.mesh.comm, assembled_vector(self._force))
 
     def tangent(self, u: Array) -> csr_matrix:
         """(n, n) derivative of the forces at a displacement (n,) [N/m]."""
-        self._set(u)
+        self._give(self.u, u)
         return self._matrix(self._tangent)
 
     def geometric(self, u: Array) -> csr_matrix:
         """(n, n) geometric stiffness of the stress C : (eps(u) - theta I) [N/m]."""
-        self._set(u)
+        self._give(self.u, u)
         return self._matrix(self._geometric)
 
     def layout(self, A: csr_matrix) -> Any:
@@ -112,9 +111,6 @@ class FiniteStrain:
         """First dof of this rank, and the first of the next."""
         first, end = self.V.dofmap.index_map.local_range
         return 3 * first, 3 * end
-
-    def _set(self, u: Array) -> None:
-        self._give(self.u, u)
 
     def _give(self, function: Any, u: Array) -> None:
         """Let a function of the displacement's space have the values (n,) of the whole solid."""
@@ -168,10 +164,3 @@ class FiniteStrain:
     def _compiled(self, integrand: Any) -> Any:
         with compiling(self.mesh.comm):
             return compiled(integrand * self.dx)
-
-    def _quadrature(self, degree: int) -> int:
-        """Exact on straight tetrahedra, where forces have the fourth power of grad u."""
-        curved = geometry_degree(self.mesh) - 1
-        if cell_name(self.mesh) == "tetrahedron":
-            return max(4 * (degree - 1) + 3 * curved, 1)
-        return 3 * degree + 2 * curved

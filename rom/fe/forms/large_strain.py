@@ -23,10 +23,9 @@ from dolfinx import fem
 
 from rom.fe.compat import (
     assembled_vector,
-    cell_name,
     compiled,
+    degree_of_slopes,
     evaluated,
-    geometry_degree,
     give_own,
     quadrature_rule,
 )
@@ -48,7 +47,8 @@ class LargeStrain:
 
     def __init__(self, V: Any, numbers: dict[str, Any], degree: int):
         self.V, self.mesh, self.numbers = V, V.mesh, numbers
-        self.order, self.few = exact_degree(V.mesh, degree), few_degree(V.mesh, degree)
+        # for the fourth power of grad u, and for the linear stiffness
+        self.order, self.few = (degree_of_slopes(V.mesh, degree, power) for power in (4, 2))
         self.points, self.weights = quadrature_rule(self.mesh, self.order)
         self.n_cells = self.mesh.topology.index_map(3).size_local
 
@@ -211,19 +211,3 @@ def quadratic_strain(H: Array) -> Array:
     rows = [products[:, a, j, b, k] if a == b else
             products[:, a, j, b, k] + products[:, b, j, a, k] for a, b in PAIRS]  # fmt: skip
     return np.stack(rows, axis=1)
-
-
-def exact_degree(mesh: Any, degree: int) -> int:
-    """Quadrature degree that is exact for the fourth power of grad u on straight cells."""
-    curved = geometry_degree(mesh) - 1
-    if cell_name(mesh) == "tetrahedron":
-        return max(4 * (degree - 1) + 3 * curved, 1)
-    return 4 * degree + 2 * curved
-
-
-def few_degree(mesh: Any, degree: int) -> int:
-    """Quadrature degree of the linear stiffness on straight cells."""
-    curved = geometry_degree(mesh) - 1
-    if cell_name(mesh) == "tetrahedron":
-        return max(2 * (degree - 1) + 3 * curved, 1)
-    return 2 * degree + 2 * curved

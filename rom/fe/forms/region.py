@@ -6,7 +6,13 @@ from typing import Any
 import numpy as np
 import ufl
 
-from rom.fe.compat import assemble_matrix, cell_dofs, cell_name, geometry_degree
+from rom.fe.compat import (
+    assemble_matrix,
+    cell_dofs,
+    cell_name,
+    degree_of_slopes,
+    geometry_degree,
+)
 from rom.fe.forms.material import Solid, of_region, stress
 from rom.fe.forms.stress import Stresses
 from rom.fe.jit import compiling
@@ -36,20 +42,18 @@ class Regions(Mapping[str, Region]):
         mesh, tag = self.V.mesh, self.names[name]
         with compiling(mesh.comm):
             numbers = of_region(mesh, self.tags, self.solids, tag)
-            K, M = (assemble_matrix(form) for form in forms(self.V, numbers, self.degree))
-        if mesh.comm.size == 1:
-            K, M = (wrapped(symmetric(A)) for A in (K, M))
+            K, M = map(self._matrix, forms(self.V, numbers, self.degree))
         stresses = Stresses(self.V, numbers, self.degree)
         return Region(K, M, stresses, lambda axis: self._stretched(tag, numbers, axis))
 
     def _stretched(self, tag: int, numbers: dict[str, Any], axis: int) -> Layered:
-        mesh = self.V.mesh
-        with compiling(mesh.comm):
-            split = stretched_forms(self.V, numbers, self.degree, axis)
-            parts = [assemble_matrix(form) for form in split]
-        if mesh.comm.size == 1:
-            parts = [wrapped(symmetric(A)) for A in parts]
-        return Layered(self._layers(tag, axis), *parts)
+        with compiling(self.V.mesh.comm):
+            parts = map(self._matrix, stretched_forms(self.V, numbers, self.degree, axis))
+            return Layered(self._layers(tag, axis), *parts)
+
+    def _matrix(self, form: ufl.Form) -> Any:
+        A = assemble_matrix(form)
+        return wrapped(symmetric(A)) if self.V.mesh.comm.size == 1 else A
 
     def _layers(self, tag: int, axis: int) -> tuple[tuple[float, float], ...]:
         """Extent of the region along an axis, cells that touch joined; equal on all ranks."""
@@ -70,7 +74,7 @@ class Regions(Mapping[str, Region]):
 def forms(V: Any, numbers: dict[str, Any], degree: int) -> tuple[ufl.Form, ufl.Form]:
     """Stiffness and mass; quadrature exact on straight cells, more than enough on curved ones."""
     u, v = ufl.TrialFunction(V), ufl.TestFunction(V)
-    q_K, q_M = _quadrature(cell_name(V.mesh), degree, geometry_degree(V.mesh))
+    q_K, q_M = degree_of_slopes(V.mesh, degree, 2), _mass_degree(V.mesh, degree)
     dx = ufl.Measure("dx", domain=V.mesh)
     sigma = stress(ufl.sym(ufl.grad(u)), numbers)
     K = ufl.inner(sigma, ufl.sym(ufl.grad(v))) * dx(metadata={"quadrature_degree": q_K})
@@ -83,7 +87,7 @@ def stretched_forms(
 ) -> tuple[ufl.Form, ufl.Form, ufl.Form]:
     """Stiffness split by whether strains come from derivatives along an axis; see `Layered`."""
     u, v = ufl.TrialFunction(V), ufl.TestFunction(V)
-    q_K, _ = _quadrature(cell_name(V.mesh), degree, geometry_degree(V.mesh))
+    q_K = degree_of_slopes(V.mesh, degree, 2)
     dx = ufl.Measure("dx", domain=V.mesh, metadata={"quadrature_degree": q_K})
     P = ufl.as_matrix([[float(i == j == axis) for j in range(3)] for i in range(3)])
 
@@ -112,13 +116,11 @@ def joined(ends: Array) -> tuple[tuple[float, float], ...]:
     return tuple((low, high) for low, high in found)
 
 
-def _quadrature(name: str, degree: int, curved: int) -> tuple[int, int]:
-    """Quadrature degrees of K and M.
+def _mass_degree(mesh: Any, degree: int) -> int:
+    """Quadrature degree of M: the determinant of the map adds to that of the displacements.
 
-    On straight tetrahedra the integrands are polynomials of these degrees. On hexahedra the
-    determinant of the map adds 3 g - 1 per direction to the mass, on curved tetrahedra 3 (g - 1)
-    in total, g the degree of the geometry.
+    On hexahedra 3 g - 1 per direction, on tetrahedra 3 (g - 1) in total, g the degree of the
+    geometry.
     """
-    if name == "tetrahedron":
-        return 2 * (degree - 1) + 3 * (curved - 1), 2 * degree + 3 * (curved - 1)
-    return 2 * degree + 2 * (curved - 1), 2 * degree + 3 * curved - 1
+    map_degree = 3 * geometry_degree(mesh)
+    return 2 * degree + map_degree - (3 if cell_name(mesh) == "tetrahedron" else 1)

@@ -12,11 +12,10 @@ from scipy.sparse import csr_matrix
 from rom.fe.compat import (
     assemble_matrix,
     cell_dofs,
-    cell_name,
+    degree_of_slopes,
     evaluated,
-    geometry_degree,
     give_own,
-    quadrature_points,
+    quadrature_rule,
     reference_points,
     to_global,
 )
@@ -141,7 +140,7 @@ class Stresses:
             (g, 3) points [m] and (g, 6, k) stress xx, yy, zz, yz, xz, xy [Pa].
         """
         cells = np.arange(self.n_cells, dtype=np.int32)
-        X = quadrature_points(self.mesh, 2 * (self.degree - 1))
+        X, _ = quadrature_rule(self.mesh, 2 * (self.degree - 1))
         with compiling(self.mesh.comm):
             x = fem.Expression(ufl.SpatialCoordinate(self.mesh), X)
         points = evaluated(x, self.mesh, cells).reshape(-1, 3)
@@ -203,12 +202,8 @@ class Stresses:
         """Bilinear form; quadrature exact on straight tetrahedra, as for the mass on others."""
         u, v = ufl.TrialFunction(self.V), ufl.TestFunction(self.V)
         sigma = stress(ufl.sym(ufl.grad(load)), self.numbers)
-        curved = geometry_degree(self.mesh) - 1
-        if cell_name(self.mesh) == "tetrahedron":
-            degree = 3 * (self.degree - 1) + 3 * curved
-        else:
-            degree = 3 * self.degree + 2 * curved
-        dx = ufl.Measure("dx", domain=self.mesh, metadata={"quadrature_degree": max(degree, 1)})
+        order = degree_of_slopes(self.mesh, self.degree, 3)
+        dx = ufl.Measure("dx", domain=self.mesh, metadata={"quadrature_degree": order})
         return geometric_stiffness(u, v, sigma) * dx
 
     def _hooke(self, u: Any) -> Any:

@@ -1,6 +1,6 @@
 """What the CAD knows of faces, in records: kind, radius, axis, area."""
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
 Vector = tuple[float, float, float]
@@ -55,19 +55,15 @@ Record = TypeVar("Record", Face, Axis)
 
 def scaled(record: Record, scale: float) -> Record:
     """The same with all lengths multiplied."""
-    lengths = {
-        item.name: value
-        for item in fields(record)
-        if item.name in LENGTHS and (value := getattr(record, item.name)) is not None
-    }
-    changes: dict[str, Any] = {name: _times(value, scale) for name, value in lengths.items()}
+    changes: dict[str, Any] = {}
+    for name in LENGTHS:
+        value = getattr(record, name, None)
+        if value is not None:
+            along = isinstance(value, tuple)
+            changes[name] = tuple(scale * x for x in value) if along else scale * value
     if isinstance(record, Face):
         changes["area"] = record.area * scale**2
     return replace(record, **changes)
-
-
-def _times(value: Any, scale: float) -> Any:
-    return tuple(scale * x for x in value) if isinstance(value, tuple) else scale * value
 
 
 def from_plain(kind: type[Record], values: dict[str, Any]) -> Record:

@@ -7,6 +7,7 @@ Source:
     gmsh reference manual, section "Node ordering".
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
@@ -24,6 +25,13 @@ HEX_EDGES = (
     *((0, 1), (0, 3), (0, 4), (1, 2), (1, 5), (2, 3)),
     *((2, 6), (3, 7), (4, 5), (4, 7), (5, 6), (6, 7)),
 )
+# nodes amid edges in the order of Abaqus and VTK, which gmsh does not follow
+LOWER_EDGES, UPPER_EDGES = ((0, 1), (1, 2), (2, 3), (3, 0)), ((4, 5), (5, 6), (6, 7), (7, 4))
+UPRIGHT_EDGES = ((0, 4), (1, 5), (2, 6), (3, 7))
+DECK_EDGES = {
+    "tet10": ((0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)),
+    "hex20": (*LOWER_EDGES, *UPPER_EDGES, *UPRIGHT_EDGES),
+}
 
 
 @dataclass(frozen=True)
@@ -61,6 +69,11 @@ class CellType:
         """Number of corners of a face."""
         return len(self.faces[0])
 
+    @property
+    def straight(self) -> "CellType":
+        """The kind of the same shape with straight edges."""
+        return CELL_TYPES["tet4" if self.shape == "tetrahedron" else "hex8"]
+
     @cached_property
     def nodes(self) -> Array:
         """(n_nodes, 3) reference coordinates."""
@@ -75,14 +88,15 @@ class CellType:
     @cached_property
     def face_nodes(self) -> tuple[tuple[int, ...], ...]:
         """Node numbers of each face, in the order of gmsh: corners, edges around, the middle."""
+        return tuple(
+            self.among((*_alone(face), *zip(face, (*face[1:], face[0]), strict=True), face))
+            for face in self.faces
+        )
+
+    def among(self, wanted: Iterable[tuple[int, ...]]) -> tuple[int, ...]:
+        """Numbers of the nodes amid these corners, of those that there are, in their order."""
         number = {frozenset(s): k for k, s in enumerate(self.supports)}
-        found = []
-        for face in self.faces:
-            around = zip(face, (*face[1:], face[0]), strict=True)
-            wanted = [*((c,) for c in face), *around, face]
-            listed = [number[frozenset(s)] for s in wanted if frozenset(s) in number]
-            found.append(tuple(listed))
-        return tuple(found)
+        return tuple(number[frozenset(s)] for s in wanted if frozenset(s) in number)
 
     @cached_property
     def mirrored(self) -> tuple[int, ...]:
@@ -102,14 +116,16 @@ class CellType:
         return np.stack([_derivative(at, e, a) @ coefficients for a in range(3)], axis=-1)
 
     @cached_property
-    def quadrature(self) -> Array:
-        """(q, 3) Gauss points, exact for the mass matrix of displacements of the same degree."""
-        x, _ = np.polynomial.legendre.leggauss(self.degree + 1)
+    def quadrature(self) -> tuple[Array, Array]:
+        """Gauss points (q, 3) and weights (q,), exact for displacements of this degree squared."""
+        x, w = np.polynomial.legendre.leggauss(self.degree + 1)
         points = np.array(list(product((x + 1) / 2, repeat=3)))
+        weights = np.prod(list(product(w / 2, repeat=3)), axis=1)
         if self.shape == "hexahedron":
-            return points
-        u, v, w = points.T  # cube collapsed onto the tetrahedron
-        return np.column_stack([u, v * (1 - u), w * (1 - u) * (1 - v)])
+            return points, weights
+        u, v, w = points.T  # cube collapsed onto the tetrahedron, with its determinant
+        collapsed = np.column_stack([u, v * (1 - u), w * (1 - u) * (1 - v)])
+        return collapsed, weights * (1 - u) ** 2 * (1 - v)
 
 
 def _monomials(x: Array, exponents: Integers) -> Array:
@@ -122,21 +138,26 @@ def _derivative(x: Array, exponents: Integers, axis: int) -> Array:
     return exponents[:, axis] * _monomials(x, lowered)
 
 
-def _alone(n: int) -> tuple[tuple[int, ...], ...]:
-    return tuple((i,) for i in range(n))
+def _alone(corners: Iterable[int]) -> tuple[tuple[int, ...], ...]:
+    return tuple((i,) for i in corners)
 
 
-_HEX27_NODES = (*_alone(8), *HEX_EDGES, *HEX_FACES, tuple(range(8)))
+_TET4_NODES, _HEX8_NODES = _alone(range(4)), _alone(range(8))
+_HEX20_NODES = (*_HEX8_NODES, *HEX_EDGES)
+_HEX27_NODES = (*_HEX20_NODES, *HEX_FACES, tuple(range(8)))
 
 CELL_TYPES = {
     kind.name: kind
     for kind in (
-        CellType("tet4", "tetrahedron", 1, TET_CORNERS, TET_FACES, _alone(4)),
-        CellType("tet10", "tetrahedron", 2, TET_CORNERS, TET_FACES, (*_alone(4), *TET_EDGES)),
-        CellType("hex8", "hexahedron", 1, HEX_CORNERS, HEX_FACES, _alone(8)),
+        CellType("tet4", "tetrahedron", 1, TET_CORNERS, TET_FACES, _TET4_NODES),
+        CellType("tet10", "tetrahedron", 2, TET_CORNERS, TET_FACES, (*_TET4_NODES, *TET_EDGES)),
+        CellType("hex8", "hexahedron", 1, HEX_CORNERS, HEX_FACES, _HEX8_NODES),
         CellType("hex27", "hexahedron", 2, HEX_CORNERS, HEX_FACES, _HEX27_NODES),
     )
 }
+# files have them; their mid-face and middle nodes are added by `rom.fe.mesh.repair`
+SERENDIPITY = CellType("hex20", "hexahedron", 2, HEX_CORNERS, HEX_FACES, _HEX20_NODES)
+READ_TYPES = CELL_TYPES | {"hex20": SERENDIPITY}
 
 
 def jacobians(x: Array, gradients: Array) -> Array:

@@ -21,6 +21,7 @@ from rom.errors import (
     ResourceError,
     RomError,
     UnsafeFileError,
+    in_file,
 )
 from rom.fe.mesh.solid import GEOMETRIES, Read
 from rom.fe.mesh.sources.builder import unmeshable
@@ -30,6 +31,7 @@ from rom.process.memory import total_bytes
 
 BYTES_PER_MEGABYTE, BYTES_PER_GIGABYTE = 2**20, 1e9
 MESHER_TIME_LIMIT = 1800.0  # [s]
+WRITE_AGAIN = "The file is damaged; write it again."
 MAX_MEMORY_SHARE = 0.8  # of the memory of the machine, for a mesher
 # LC_ALL: gmsh reads decimal points with the locale of the process
 VARIABLES = {"OMP_NUM_THREADS": "1", "LC_ALL": "C.UTF-8"}
@@ -40,21 +42,14 @@ class Reading:
     """A request under its limits, for what is said when it fails.
 
     Attributes:
-        where: name of the file.
-        reader: as in `rom.fe.mesh.sources.readers`.
-        given: whether the geometry was given parameters.
+        geometry: whether the file is one, which is meshed here.
+        given: whether it was given parameters.
         limits: what the reader may take.
     """
 
-    where: str
-    reader: str
+    geometry: bool
     given: bool
     limits: child.Limits
-
-    @property
-    def geometry(self) -> bool:
-        """Whether the file is a geometry, which is meshed here."""
-        return self.reader in GEOMETRIES
 
 
 def read_apart(
@@ -84,14 +79,12 @@ def read_apart(
         ResourceError: it ran out of time or memory.
     """
     limits = _limits(request["reader"], size, time_limit, memory_limit)
-    reading = Reading(where, request["reader"], bool(request["parameters"]), limits)
-    with child.scratch("mesh") as folder:
+    reading = Reading(request["reader"] in GEOMETRIES, bool(request["parameters"]), limits)
+    with child.scratch("mesh") as folder, in_file(where):
         try:
             text = json.dumps(request | {"folder": str(folder)}, default=_plain)
         except TypeError as error:
-            raise ConfigError(
-                f"parameters must be numbers or text: {error}.", where=where
-            ) from None
+            raise ConfigError(f"parameters must be numbers or text: {error}.") from None
         (folder / "request.json").write_text(text)
         command = child.python("rom.fe.mesh.child", str(folder))
         done = child.run(command, limits=limits, variables=VARIABLES)
@@ -139,9 +132,7 @@ def _result(folder: Path, done: child.Ended, reading: Reading) -> Read:
     if notes.get("error") == MemoryError.__name__:
         raise _too_large(reading)
     if "error" in notes:
-        raise getattr(errors, notes["error"])(
-            notes["message"], where=notes["where"] or reading.where, hint=notes["hint"]
-        )
+        raise getattr(errors, notes.pop("error"))(notes.pop("message"), **notes)
     with np.load(folder / "arrays.npz", allow_pickle=False) as arrays:
         return dict(arrays), notes
 
@@ -155,7 +146,6 @@ def _died(done: child.Ended, reading: Reading) -> BaseException:
     if done.signal == "SIGSYS":
         return UnsafeFileError(
             "tries to start a process, which a geometry may not.",
-            where=reading.where,
             hint="Read the file; take that command out, or mesh it in gmsh and give the .msh.",
         )
     if done.signal == "SIGINT":
@@ -163,7 +153,6 @@ def _died(done: child.Ended, reading: Reading) -> BaseException:
     if done.signal in ("SIGKILL", "SIGTERM"):
         return ResourceError(
             "the mesh reader was killed, most likely for lack of memory.",
-            where=reading.where,
             hint="Use larger elements.",
         )
     if done.code > 0 and "Traceback" in done.err:
@@ -175,15 +164,11 @@ def _too_long(reading: Reading) -> RomError:
     if reading.geometry:
         return ResourceError(
             f"meshing did not end within the limit of {reading.limits.seconds:g} s.",
-            where=reading.where,
             hint="Does the geometry loop without end? Else use larger elements, or raise the limit "
             "by --time-limit SECONDS or time_limit=.",
         )
-    return FileFormatError(
-        "reading did not end within the time a file of this size needs.",
-        where=reading.where,
-        hint="The file is damaged; write it again.",
-    )
+    text = "reading did not end within the time a file of this size needs."
+    return FileFormatError(text, hint=WRITE_AGAIN)
 
 
 def _too_large(reading: Reading) -> RomError:
@@ -191,25 +176,17 @@ def _too_large(reading: Reading) -> RomError:
         limit = reading.limits.memory / BYTES_PER_GIGABYTE
         return ResourceError(
             f"meshing needs more than the limit of {limit:.3g} GB.",
-            where=reading.where,
             hint="Use larger elements, or raise the limit by --memory-limit GIGABYTES or "
             "memory_limit= [bytes].",
         )
-    return FileFormatError(
-        "asks for more memory than a file of its size can need.",
-        where=reading.where,
-        hint="The file is damaged; write it again.",
-    )
+    return FileFormatError("asks for more memory than its size can need.", hint=WRITE_AGAIN)
 
 
 def _crashed(how: str, reading: Reading) -> RomError:
     if reading.geometry:
-        return unmeshable(how, reading.where, given=reading.given)
-    return FileFormatError(
-        f"the reader crashed ({how}): the file is damaged.",
-        where=reading.where,
-        hint="Open it in gmsh and save it again.",
-    )
+        return unmeshable(how, given=reading.given)
+    text = f"the reader crashed ({how}): the file is damaged."
+    return FileFormatError(text, hint="Open it in gmsh and save it again.")
 
 
 def main(folder: str) -> None:

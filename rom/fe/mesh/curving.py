@@ -18,14 +18,13 @@ from math import comb, factorial
 import numpy as np
 
 from rom.fe.mesh.cell_types import CELL_TYPES, CellType, jacobians
-from rom.fe.mesh.solid import SolidMesh
+from rom.fe.mesh.solid import SolidMesh, compact
 from rom.model import Array, Index, Integers, Mask
 
 STRAIGHT_EDGE_RTOL = 1e-9  # of the edge: distance of its mid-side node from the middle
 BLOCK_SIZE = 5000  # cells looked at together, bounds the memory
 BOUND_GAP = 1e-4  # of the cube of the cell: how well the smallest determinant is known
 MOST_HALVINGS = 12
-STRAIGHT_KINDS = {"tetrahedron": "tet4", "hexahedron": "hex8"}
 DEGREES = {"tetrahedron": 3, "hexahedron": 5}  # of the determinant
 # Corners of the eight halves of a tetrahedron: a number, or two for the middle of an edge.
 TET_HALVES = (
@@ -51,17 +50,9 @@ def without_middles(mesh: SolidMesh) -> SolidMesh:
     """The same body with cells of first order, where no cell is curved; else the mesh itself."""
     if mesh.kind.degree == 1 or bent(mesh).any():
         return mesh
-    kind = CELL_TYPES[STRAIGHT_KINDS[mesh.kind.shape]]
-    used = np.zeros(len(mesh.points), dtype=bool)
-    used[mesh.corners] = True
-    new = np.cumsum(used) - 1
-    return replace(
-        mesh,
-        points=mesh.points[used],
-        cells=new[mesh.corners],
-        cell_type=kind.name,
-        facets={name: new[rows[:, : kind.corners_per_face]] for name, rows in mesh.facets.items()},
-    )
+    kind = mesh.kind.straight
+    facets = {name: rows[:, : kind.corners_per_face] for name, rows in mesh.facets.items()}
+    return compact(replace(mesh, cells=mesh.corners, cell_type=kind.name, facets=facets))
 
 
 def straightened(mesh: SolidMesh, cells: Mask, share: float) -> SolidMesh:

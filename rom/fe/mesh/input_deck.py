@@ -14,10 +14,9 @@ import numpy as np
 
 from rom.arguments import one_of
 from rom.errors import ConfigError, InterfaceError, MeshError, TagError
-from rom.fe.mesh.cell_types import CELL_TYPES
+from rom.fe.mesh.cell_types import CELL_TYPES, DECK_EDGES
 from rom.fe.mesh.solid import SolidMesh
 from rom.fe.mesh.sources.abaqus import SIDES
-from rom.fe.mesh.sources.deck import DECK_EDGES
 from rom.fe.mesh.topology import row_ids
 from rom.model import Index, Orthotropic
 from rom.names import ORIGIN_MARK, check_known
@@ -104,9 +103,7 @@ def _nodes(mesh: SolidMesh) -> Iterator[str]:
 
 
 def _elements(mesh: SolidMesh) -> Iterator[str]:
-    position = {frozenset(s): k for k, s in enumerate(mesh.kind.supports)}
-    edges = DECK_EDGES["tet10"] if mesh.cell_type == "tet10" else ()
-    order = [0, 1, 2, 3, *(position[frozenset(edge)] for edge in edges)]
+    order = [0, 1, 2, 3, *mesh.kind.among(DECK_EDGES["tet10"])]
     for tag, name in mesh.region_names.items():
         yield f"*ELEMENT, TYPE={ELEMENTS[mesh.cell_type]}, ELSET={name}"
         for k in np.flatnonzero(mesh.regions == tag):

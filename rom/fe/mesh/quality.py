@@ -5,17 +5,10 @@ from itertools import chain, repeat
 
 import numpy as np
 
-from rom.errors import MeshError
-from rom.fe.mesh.cell_types import CELL_TYPES, CellType, jacobians
-from rom.fe.mesh.curving import (
-    BOUND_GAP,
-    STRAIGHT_KINDS,
-    bent,
-    smallest_determinants,
-    straightened,
-)
-from rom.fe.mesh.solid import SolidMesh, cell_names
-from rom.model import Array, Index, Mask
+from rom.fe.mesh.cell_types import CellType, jacobians
+from rom.fe.mesh.curving import BOUND_GAP, bent, smallest_determinants, straightened
+from rom.fe.mesh.solid import SolidMesh, cell_names, refuse_cells
+from rom.model import Array, Index
 
 # Smallest over largest possible determinant: round-off of coordinates gives 1e-16 times the
 # distance from the origin over the cell size, bad but usable cells of gmsh have 1e-4.
@@ -34,18 +27,19 @@ def check_shape(mesh: SolidMesh) -> list[str]:
         MeshError: with the numbers of the cells and the worst quality.
     """
     quality, sampled = scaled_jacobian(mesh), _sampled(mesh) / _longest_edge(mesh) ** 3
-    _refuse(
+    refuse_cells(
         mesh,
         np.abs(sampled) < FLAT_CELL_RTOL,
-        sampled,
-        "have no volume",
+        lambda k: f"{k} cells have no volume (quality {np.abs(sampled).min():.2g})",
         "Mesh again; see gmsh's Mesh.Optimize.",
     )
-    _refuse(
+    refuse_cells(
         mesh,
         quality < -FLAT_CELL_RTOL,
-        quality,
-        "are inverted: the Jacobian changes sign inside",
+        lambda k: (
+            f"{k} cells are inverted: the Jacobian changes sign inside "
+            f"(quality {quality.min():.2g})"
+        ),
         "Mid-side nodes are too far out or corners are crossed; use smaller elements, straight "
         "edges, or Mesh.HighOrderOptimize of gmsh.",
     )
@@ -57,16 +51,6 @@ def check_shape(mesh: SolidMesh) -> list[str]:
         f"{slender.size} cells are slender, aspect ratio up to {ratio.max():.3g} (cells "
         f"{cell_names(mesh, slender)}): expect stiff and ill-conditioned results."
     ]
-
-
-def _refuse(mesh: SolidMesh, bad: Mask, quality: Array, what: str, hint: str) -> None:
-    cells = np.flatnonzero(bad)
-    if cells.size:
-        worst = quality[cells[np.abs(quality[cells]).argmin() if "no" in what else 0]]
-        raise MeshError(
-            f"{cells.size} cells {what}: cells {cell_names(mesh, cells)} (quality {worst:.2g}).",
-            hint=hint,
-        )
 
 
 def scaled_jacobian(mesh: SolidMesh) -> Array:
@@ -120,7 +104,7 @@ def straighten(mesh: SolidMesh) -> tuple[SolidMesh, list[str]]:
 def _sampled(mesh: SolidMesh) -> Array:
     """(m,) smallest determinant at the quadrature points."""
     kind = mesh.kind
-    smallest = _smallest(mesh.points, mesh.corners, CELL_TYPES[STRAIGHT_KINDS[kind.shape]])
+    smallest = _smallest(mesh.points, mesh.corners, kind.straight)
     if kind.degree == 2:
         curved = np.flatnonzero(bent(mesh))
         smallest[curved] = _smallest(mesh.points, mesh.cells[curved], kind)
@@ -128,8 +112,8 @@ def _sampled(mesh: SolidMesh) -> Array:
 
 
 def _smallest(points: Array, cells: Index, kind: CellType) -> Array:
-    at = kind.quadrature[:1] if kind.name == "tet4" else kind.quadrature
-    gradients = kind.gradients(at)
+    at, _ = kind.quadrature
+    gradients = kind.gradients(at[:1] if kind.name == "tet4" else at)
     blocks = [cells[i : i + BLOCK_SIZE] for i in range(0, len(cells), BLOCK_SIZE)]
     found = [jacobians(points[block], gradients).min(axis=1) for block in blocks]
     return np.concatenate(found) if found else np.empty(0)

@@ -19,11 +19,13 @@ from rom.decks.lines import lines
 from rom.errors import (
     ConfigError,
     FileFormatError,
-    ResourceError,
+    ParallelError,
     TagError,
     UnsafeFileError,
+    in_file,
 )
 from rom.fe.mesh.cad import Axis, Face, from_plain, scaled
+from rom.fe.mesh.cell_types import CELL_TYPES
 from rom.fe.mesh.child import read_apart
 from rom.fe.mesh.curving import without_middles
 from rom.fe.mesh.picks import EVERY_FACE, picks
@@ -32,10 +34,12 @@ from rom.fe.mesh.repair import repair
 from rom.fe.mesh.solid import GEOMETRIES, PROGRAMS, Arrays, SolidMesh
 from rom.fe.mesh.validate import checked
 from rom.model import Array, Index
-from rom.names import check_text
+from rom.names import check_known, check_text
+from rom.readable import check_readable
 
 INCLUDES = {"abaqus": keywords.INCLUDE_PATTERN, "nastran": bulk.INCLUDE_PATTERN}
 LARGEST_FILE = 2**32  # bytes; some ten million nodes
+FACET_SHAPE = {"tetrahedron": "triangle", "hexahedron": "quadrilateral"}
 READERS = {
     ".geo": "geo",
     ".py": "builder",
@@ -96,16 +100,9 @@ def read_mesh(  # noqa: PLR0913  limits and trust beside what is read
         ResourceError: meshing exceeds its limit of time or memory.
     """
     path = Path(path)
-    reader = _reader(path)
-    request = {
-        "path": str(path.absolute()),
-        "reader": reader,
-        "parameters": dict(parameters or {}),
-        "faces": dict(faces or {}),
-        "order": order,
-    }
-    _check_request(path, request, scale)
-    _check_trust(path, reader, trust)
+    with in_file(path):
+        request = _request(path, parameters, scale, trust=trust, faces=faces, order=order)
+    reader = request["reader"]
     files = {path}  # a deck may include others
     if reader in INCLUDES:
         files |= {place[0] for place, _ in lines(path, INCLUDES[reader])}
@@ -120,11 +117,11 @@ def read_mesh(  # noqa: PLR0913  limits and trust beside what is read
         **notes["provenance"],
     }
     mesh, remarks = _solid(arrays, notes, provenance, scale), notes["warnings"]
-    if request["reader"] in GEOMETRIES:
+    if reader in GEOMETRIES:
         mesh, straightened = straighten(repair(mesh))
         mesh = mesh if order else without_middles(mesh)
         remarks = [*remarks, *straightened]
-    if request["reader"] == "step" and scale != 1.0:
+    if reader == "step" and scale != 1.0:
         remarks = [*remarks, _scaled_twice(mesh.size, scale)]
     return checked(mesh, remarks)
 
@@ -154,9 +151,7 @@ class FlatMesh:
         Raises:
             TagError: if there is none of this name.
         """
-        if name not in self.curves:
-            raise TagError(f"there is no curve {name!r}; there are {sorted(self.curves)}.",
-                           hint=f'Add Physical Curve("{name}") = {{...}};')  # fmt: skip
+        check_known(name, self.curves, f"there is no curve {name!r}; there are", TagError)
         return np.unique(self.curves[name])
 
 
@@ -185,16 +180,13 @@ def read_triangles(
         ResourceError: meshing exceeds its limit of time or memory.
     """
     path = Path(path)
-    reader = _reader(path)
-    if reader not in ("geo", "builder", "msh"):
-        raise ConfigError(f"the suffix {path.suffix!r} holds no plane section.", where=str(path),
-                          hint="Give .geo, .py or .msh.")  # fmt: skip
-    request = {
-        "path": str(path.absolute()), "reader": reader, "parameters": dict(parameters or {}),
-        "faces": {}, "order": None, "flat": True,
-    }  # fmt: skip
-    _check_request(path, request, scale)
-    _check_trust(path, reader, trust)
+    with in_file(path):
+        request = _request(path, parameters, scale, trust=trust) | {"flat": True}
+        if request["reader"] not in ("geo", "builder", "msh"):
+            raise ConfigError(
+                f"the suffix {path.suffix!r} holds no plane section.",
+                hint="Give .geo, .py or .msh.",
+            )
     arrays, notes = read_apart(request, where=str(path), size=path.stat().st_size)
     provenance = {"path": str(path), "sha256": _digest(path), "scale": scale}
     X, T = arrays["points"][:, :2] * scale, arrays["cells"]
@@ -236,9 +228,32 @@ def to_dolfinx(mesh: SolidMesh | None, comm: Any) -> tuple[Any, Any, dict[str, A
     Raises:
         MeshError, TagError: on all ranks.
     """
-    from rom.fe.mesh.distribute import distribute
+    from rom.fe.compat import create_mesh, gmsh_order, tag_entities
+    from rom.fe.parallel import on_root
 
-    return distribute(mesh, comm)
+    kept: list[SolidMesh] = []
+
+    def prepare() -> tuple[str, list[str]]:
+        if mesh is None:
+            raise ParallelError("rank 0 gave no mesh to share.", hint="Read it on rank 0.")
+        kept.append(mesh if mesh.warnings is not None else checked(mesh))
+        return kept[0].cell_type, list(kept[0].facets)
+
+    cell_type, names = on_root(comm, prepare)
+    kind, none = CELL_TYPES[cell_type], np.empty(0, dtype=np.int64)
+    facets = dict.fromkeys(names, none.reshape(0, kind.nodes_per_face))
+    empty = SolidMesh(np.empty((0, 3)), none.reshape(0, kind.n_nodes), cell_type, none, {}, facets)
+    solid = kept[0] if kept else empty
+    cells = np.ascontiguousarray(solid.cells[:, gmsh_order(kind.shape, kind.n_nodes)])
+    made = create_mesh(comm, cells, solid.points, kind.shape, kind.degree)
+    cell_tags = tag_entities(made, 3, cells, solid.regions)
+    order = gmsh_order(FACET_SHAPE[kind.shape], kind.nodes_per_face)
+    facet_tags = {}
+    for name in names:
+        rows = np.ascontiguousarray(solid.facets[name][:, order])
+        facet_tags[name] = tag_entities(made, 2, rows, np.ones(len(rows), dtype=np.int32))
+        facet_tags[name].name = name
+    return made, cell_tags, facet_tags
 
 
 def _solid(
@@ -261,22 +276,34 @@ def _solid(
     )
 
 
-def _reader(path: Path) -> str:
-    if path.is_dir():
-        raise FileFormatError("is a folder, not a mesh or geometry.", where=str(path))
-    if not path.is_file():
-        raise FileFormatError(
-            "there is no such file.", where=str(path), hint="Relative paths start where you are."
+def _request(
+    path: Path,
+    parameters: Mapping[str, Any] | None,
+    scale: float,
+    *,
+    trust: bool,
+    faces: Mapping[str, Any] | None = None,
+    order: int | None = None,
+) -> dict[str, Any]:
+    """What is asked of the reader of a file, checked."""
+    check_readable(path, LARGEST_FILE)
+    reader = READERS.get(path.suffix.lower())
+    if reader is None:
+        raise ConfigError(f"no reader for the suffix {path.suffix!r}; known are {sorted(READERS)}.")
+    request = {
+        "path": str(path.absolute()),
+        "reader": reader,
+        "parameters": dict(parameters or {}),
+        "faces": dict(faces or {}),
+        "order": order,
+    }
+    _check_request(request, scale)
+    if reader in PROGRAMS and trust is not True:
+        raise UnsafeFileError(
+            "is a Python program, which can do to this machine whatever you can.",
+            hint="Read it; if you trust it, run it with --trust or trust=True.",
         )
-    if path.stat().st_size > LARGEST_FILE:
-        raise UnsafeFileError(f"has more than {LARGEST_FILE / 2**30:g} GiB.", where=str(path))
-    try:
-        return READERS[path.suffix.lower()]
-    except KeyError:
-        raise ConfigError(
-            f"no reader for the suffix {path.suffix!r}; known are {sorted(READERS)}.",
-            where=str(path),
-        ) from None
+    return request
 
 
 def is_geometry(path: str | Path) -> bool:
@@ -284,48 +311,30 @@ def is_geometry(path: str | Path) -> bool:
     return READERS.get(Path(path).suffix.lower()) in GEOMETRIES
 
 
-def _check_request(path: Path, request: dict[str, Any], scale: float) -> None:
+def _check_request(request: dict[str, Any], scale: float) -> None:
     reader = request["reader"]
     if request["parameters"] and reader not in GEOMETRIES:
         raise ConfigError(
-            f"a finished mesh takes no parameters, got {sorted(request['parameters'])}.",
-            where=str(path),
+            f"a finished mesh takes no parameters, got {sorted(request['parameters'])}."
         )
     if request["faces"] and reader != "step":
         raise ConfigError(
             f"faces={sorted(request['faces'])} can be picked in a .step file only.",
-            where=str(path),
             hint="Name physical surfaces in the geometry instead.",
         )
     for name, wanted in request["faces"].items():
         check_text(name, "a surface", TagError)
-        if not (isinstance(wanted, str) and wanted == EVERY_FACE):
-            _check_pick(path, name, wanted)
+        try:
+            if not (isinstance(wanted, str) and wanted == EVERY_FACE):
+                picks(wanted)
+        except ConfigError as error:
+            raise ConfigError(f"face {name!r}: {error.message}", hint=error.hint) from None
     if request["order"] not in (None, 1, 2) or (request["order"] and reader not in GEOMETRIES):
         raise ConfigError(
-            f"order={request['order']!r} must be 1 or 2, or None where the file is a mesh.",
-            where=str(path),
+            f"order={request['order']!r} must be 1 or 2, or None where the file is a mesh."
         )
     if not (np.isscalar(scale) and np.isfinite(scale) and scale > 0):
-        raise ConfigError(f"scale={scale!r} must be a positive number.", where=str(path))
-
-
-def _check_pick(path: Path, name: str, wanted: Any) -> None:
-    try:
-        picks(wanted)
-    except ConfigError as error:
-        raise ConfigError(
-            f"face {name!r}: {error.message}", where=str(path), hint=error.hint
-        ) from None
-
-
-def _check_trust(path: Path, reader: str, trust: bool) -> None:
-    if reader in PROGRAMS and trust is not True:
-        raise UnsafeFileError(
-            "is a Python program, which can do to this machine whatever you can.",
-            where=str(path),
-            hint="Read it; if you trust it, run it with --trust or trust=True.",
-        )
+        raise ConfigError(f"scale={scale!r} must be a positive number.")
 
 
 def _digest(*files: Path) -> str:
@@ -335,7 +344,5 @@ def _digest(*files: Path) -> str:
             with path.open("rb") as stream:
                 hashlib.file_digest(stream, lambda: digest)
         return digest.hexdigest()
-    except PermissionError as error:
-        raise ResourceError(f"cannot be read: {error.strerror}.", where=str(path)) from error
     except OSError as error:
         raise FileFormatError(f"cannot be read: {error}.", where=str(path)) from error

@@ -5,12 +5,11 @@ from dataclasses import replace
 import numpy as np
 
 from rom.errors import MeshError
-from rom.fe.mesh.cell_types import CELL_TYPES, CellType, jacobians
-from rom.fe.mesh.solid import SolidMesh
+from rom.fe.mesh.cell_types import CellType, jacobians
+from rom.fe.mesh.solid import SolidMesh, compact
 from rom.fe.mesh.topology import row_ids
 from rom.model import Array, Index
 
-HEX20_NODES = CELL_TYPES["hex27"].supports[:20]
 # Serendipity shape functions at the centre of a face, and of the cell: corners, then mid-edges.
 FACE_CORNER, FACE_EDGE, CELL_CORNER, CELL_EDGE = -0.25, 0.5, -0.25, 0.25
 
@@ -28,7 +27,7 @@ def repair(mesh: SolidMesh) -> SolidMesh:
     rows = (mesh.cells, *mesh.facets.values())
     if not mesh.cells.size or any(r.size and (r.min() < 0 or r.max() >= n) for r in rows):
         return mesh
-    mesh = _compact(replace(mesh, facets={k: _distinct(f, n) for k, f in mesh.facets.items()}))
+    mesh = compact(replace(mesh, facets={k: _distinct(f, n) for k, f in mesh.facets.items()}))
     if not np.isfinite(mesh.points).all():
         return mesh
     return _turned(_complete(mesh) if mesh.cell_type == "hex20" else mesh)
@@ -42,18 +41,6 @@ def _distinct(rows: Index, n: int) -> Index:
     return rows[np.sort(np.unique(number, return_index=True)[1])]
 
 
-def _compact(mesh: SolidMesh) -> SolidMesh:
-    """Without nodes that belong to no cell; facets keep theirs, to be found by the checks."""
-    used = np.zeros(mesh.points.shape[0], dtype=bool)
-    for rows in (mesh.cells, *mesh.facets.values()):
-        used[rows] = True
-    if used.all():
-        return mesh
-    new = np.cumsum(used) - 1
-    facets = {name: new[rows] for name, rows in mesh.facets.items()}
-    return replace(mesh, points=mesh.points[used], cells=new[mesh.cells], facets=facets)
-
-
 def _turned(mesh: SolidMesh) -> SolidMesh:
     """Cells of negative volume with their nodes in mirrored order.
 
@@ -61,9 +48,8 @@ def _turned(mesh: SolidMesh) -> SolidMesh:
     run around their face in the same direction (`rom.fe.mesh.validate`).
     """
     kind = mesh.kind
-    corners = CELL_TYPES["tet4" if kind.shape == "tetrahedron" else "hex8"]
-    centre = np.full((1, 3), 0.25 if kind.shape == "tetrahedron" else 0.5)
-    volume = jacobians(mesh.points[mesh.corners], corners.gradients(centre))[:, 0]
+    centre = kind.straight.nodes.mean(axis=0, keepdims=True)
+    volume = jacobians(mesh.points[mesh.corners], kind.straight.gradients(centre))[:, 0]
     mirrored = volume < 0
     if not mirrored.any():
         return mesh
@@ -74,8 +60,8 @@ def _turned(mesh: SolidMesh) -> SolidMesh:
 
 def _complete(mesh: SolidMesh) -> SolidMesh:
     """27-node hexahedra with the same geometry as the 20-node ones: the new nodes are on it."""
-    kind, cells, x = CELL_TYPES["hex27"], mesh.cells, mesh.points
-    if cells.shape[1] != len(HEX20_NODES):
+    kind, cells, x = mesh.kind, mesh.cells, mesh.points
+    if cells.shape[1] != kind.n_nodes:
         raise MeshError(f"a 20-node hexahedron needs 20 nodes, got {cells.shape[1]}.")
     n, m = x.shape[0], cells.shape[0]
     faces = cells[:, np.array(kind.faces)]
@@ -92,9 +78,8 @@ def _complete(mesh: SolidMesh) -> SolidMesh:
 def _face_centres(x: Array, cells: Index, kind: CellType) -> Array:
     """(m, 6, 3) centres of the faces."""
     centres = []
-    for face in kind.faces:
-        edges = [i for i, s in enumerate(HEX20_NODES) if len(s) == 2 and set(s) <= set(face)]
-        corner, edge = x[cells[:, list(face)]].sum(axis=1), x[cells[:, edges]].sum(axis=1)
+    for nodes in map(list, kind.face_nodes):
+        corner, edge = (x[cells[:, some]].sum(axis=1) for some in (nodes[:4], sorted(nodes[4:])))
         centres.append(FACE_CORNER * corner + FACE_EDGE * edge)
     return np.stack(centres, axis=1)
 

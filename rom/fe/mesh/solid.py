@@ -1,14 +1,16 @@
 """The record of a solid mesh: plain NumPy arrays, on one process."""
 
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from rom.errors import MeshError
 from rom.fe.mesh.cad import Axis, Face
-from rom.fe.mesh.cell_types import CELL_TYPES, CellType
-from rom.model import Array, Index, Integers
+from rom.fe.mesh.cell_types import READ_TYPES, CellType
+from rom.model import Array, Index, Integers, Mask
 
 MAX_SHOWN = 5  # culprits named in a message
 
@@ -47,7 +49,7 @@ class SolidMesh:
     @property
     def kind(self) -> CellType:
         """Node order, faces and shape functions of the cells."""
-        return CELL_TYPES[self.cell_type]
+        return READ_TYPES[self.cell_type]
 
     @property
     def size(self) -> float:
@@ -60,10 +62,33 @@ class SolidMesh:
         return self.cells[:, : self.kind.n_corners]
 
 
+def compact(mesh: SolidMesh) -> SolidMesh:
+    """Without nodes that belong to no cell; facets keep theirs, to be found by the checks."""
+    used = np.zeros(mesh.points.shape[0], dtype=bool)
+    for rows in (mesh.cells, *mesh.facets.values()):
+        used[rows] = True
+    if used.all():
+        return mesh
+    new = np.cumsum(used) - 1
+    facets = {name: new[rows] for name, rows in mesh.facets.items()}
+    return replace(mesh, points=mesh.points[used], cells=new[mesh.cells], facets=facets)
+
+
 def cell_names(mesh: SolidMesh, cells: Index) -> str:
     """The numbers of the first few of some cells in their file, for messages."""
-    ids = cells if mesh.cell_ids is None else mesh.cell_ids[cells]
-    return ", ".join(map(str, ids[:MAX_SHOWN])) + (", ..." if len(ids) > MAX_SHOWN else "")
+    return shown(cells if mesh.cell_ids is None else mesh.cell_ids[cells])
+
+
+def shown(some: Any) -> str:
+    """The first few of some things, for messages."""
+    return ", ".join(map(str, some[:MAX_SHOWN])) + (", ..." if len(some) > MAX_SHOWN else "")
+
+
+def refuse_cells(mesh: SolidMesh, bad: Mask, text: Callable[[int], str], hint: str) -> None:
+    """Raise a MeshError when any cell is bad, with their number and the first few."""
+    cells = np.flatnonzero(bad)
+    if cells.size:
+        raise MeshError(f"{text(cells.size)}: cells {cell_names(mesh, cells)}.", hint=hint)
 
 
 Arrays = dict[str, npt.NDArray[Any]]

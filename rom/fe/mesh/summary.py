@@ -1,13 +1,12 @@
 """What a mesh holds, in numbers."""
 
 from dataclasses import asdict
-from itertools import product
 from typing import Any
 
 import numpy as np
 
 from rom.fe.mesh.cad import Axis
-from rom.fe.mesh.cell_types import CELL_TYPES, CellType, jacobians
+from rom.fe.mesh.cell_types import DECK_EDGES, jacobians
 from rom.fe.mesh.quality import aspect_ratio, scaled_jacobian
 from rom.fe.mesh.solid import SolidMesh
 from rom.fe.mesh.topology import faces_of, row_ids
@@ -15,12 +14,6 @@ from rom.model import Array, Index
 
 COUNTED_CELLS = ("curved cells", "straightened cells")  # where the mesh was made here
 VTK_TYPES = {"tet4": 10, "tet10": 24, "hex8": 12, "hex27": 29}
-# Corner sets of VTK's nodes where its order differs from gmsh's.
-VTK_TET_EDGES = ((0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3))
-VTK_HEX_EDGES = (
-    *((0, 1), (1, 2), (2, 3), (0, 3), (4, 5), (5, 6), (6, 7), (4, 7)),
-    *((0, 4), (1, 5), (2, 6), (3, 7)),
-)
 VTK_HEX_FACES = ((0, 3, 4, 7), (1, 2, 5, 6), (0, 1, 4, 5), (2, 3, 6, 7), (0, 1, 2, 3), (4, 5, 6, 7))
 
 
@@ -116,25 +109,13 @@ def _middle(points: Array) -> list[float]:
 def cell_volumes(mesh: SolidMesh) -> Array:
     """(m,) volumes of the cells [m^3], exact for curved ones too."""
     kind = mesh.kind
-    determinants = jacobians(mesh.points[mesh.cells], kind.gradients(kind.quadrature))
-    return determinants @ _weights(kind)
-
-
-def _weights(kind: CellType) -> Array:
-    """Weights of `CellType.quadrature`; the collapsed cube brings its own determinant."""
-    x, w = np.polynomial.legendre.leggauss(kind.degree + 1)
-    weights = np.prod(list(product(w / 2, repeat=3)), axis=1)
-    if kind.shape == "hexahedron":
-        return weights
-    u, v, _ = np.array(list(product((x + 1) / 2, repeat=3))).T
-    return weights * (1 - u) ** 2 * (1 - v)
+    points, weights = kind.quadrature
+    return jacobians(mesh.points[mesh.cells], kind.gradients(points)) @ weights
 
 
 def vtk_cells(mesh: SolidMesh) -> tuple[Index, int]:
     """(m, k) node numbers in VTK's order, and VTK's number of the cell."""
-    kind = CELL_TYPES[mesh.cell_type]
-    position = {frozenset(support): i for i, support in enumerate(kind.supports)}
-    corners = [(i,) for i in range(kind.n_corners)]
-    more = {"tet10": VTK_TET_EDGES, "hex27": (*VTK_HEX_EDGES, *VTK_HEX_FACES, tuple(range(8)))}
-    order = [position[frozenset(s)] for s in (*corners, *more.get(kind.name, ()))]
-    return mesh.cells[:, order], VTK_TYPES[kind.name]
+    more = {"tet10": DECK_EDGES["tet10"],
+            "hex27": (*DECK_EDGES["hex20"], *VTK_HEX_FACES, tuple(range(8)))}  # fmt: skip
+    order = mesh.kind.among(more.get(mesh.cell_type, ()))
+    return np.hstack([mesh.corners, mesh.cells[:, list(order)]]), VTK_TYPES[mesh.cell_type]

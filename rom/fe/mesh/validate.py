@@ -4,19 +4,18 @@ dolfinx 0.5 stops the whole process, hangs, or computes with NaN on several of t
 here. Cells are named by their numbers in the file.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from rom.errors import MeshError, RomError, TagError, warn
+from rom.errors import MeshError, TagError, in_file, warn
 from rom.fe.mesh.cell_types import CELL_TYPES
 from rom.fe.mesh.quality import check_shape
 from rom.fe.mesh.repair import repair
-from rom.fe.mesh.solid import MAX_SHOWN, SolidMesh, cell_names
+from rom.fe.mesh.solid import SolidMesh, cell_names, refuse_cells, shown
 from rom.fe.mesh.topology import Faces, faces_of, parts_by_face, parts_by_node, row_ids
-from rom.model import Mask
 from rom.names import check_text, named
 from rom.plausible import SIZE, far_doubt
 
@@ -49,13 +48,6 @@ def validate(mesh: SolidMesh) -> list[str]:
     return [*warnings, *_slits(mesh, faces), *_doubts(mesh)]
 
 
-def _refuse(mesh: SolidMesh, bad: Mask, text: Callable[[int], str], hint: str) -> None:
-    """Raise when any cell is bad, with their number and the first few."""
-    cells = np.flatnonzero(bad)
-    if cells.size:
-        raise MeshError(f"{text(cells.size)}: cells {cell_names(mesh, cells)}.", hint=hint)
-
-
 def _check_tables(mesh: SolidMesh) -> None:
     if mesh.cell_type not in CELL_TYPES:
         raise MeshError(f"{mesh.cell_type!r} is no type of cells; known are {sorted(CELL_TYPES)}.")
@@ -81,7 +73,7 @@ def _check_tables(mesh: SolidMesh) -> None:
 def _check_numbers(mesh: SolidMesh) -> None:
     n = mesh.points.shape[0]
     outside = ((mesh.cells < 0) | (mesh.cells >= n)).any(axis=1)
-    _refuse(mesh, outside, lambda k: f"{k} cells name nodes outside 0 to {n - 1}", "")
+    refuse_cells(mesh, outside, lambda k: f"{k} cells name nodes outside 0 to {n - 1}", "")
     bad = ~np.isfinite(mesh.points).all(axis=1)
     if bad.any():
         where, cells = mesh.points[bad.argmax()], np.flatnonzero(bad[mesh.cells].any(axis=1))
@@ -99,14 +91,14 @@ def _check_numbers(mesh: SolidMesh) -> None:
 
 def _check_cells(mesh: SolidMesh) -> None:
     ordered = np.sort(mesh.cells, axis=1)
-    _refuse(
+    refuse_cells(
         mesh,
         (ordered[:, 1:] == ordered[:, :-1]).any(axis=1),
         lambda k: f"{k} cells use a node twice",
         "Collapsed cells have no volume; mesh again.",
     )
     number, _ = row_ids(np.sort(mesh.corners, axis=1), mesh.points.shape[0])
-    _refuse(
+    refuse_cells(
         mesh,
         np.bincount(number)[number] > 1,
         lambda k: f"{k} cells have the same corners as another one",
@@ -115,7 +107,7 @@ def _check_cells(mesh: SolidMesh) -> None:
 
 
 def _check_faces(mesh: SolidMesh, faces: Faces) -> None:
-    _refuse(
+    refuse_cells(
         mesh,
         (faces.count[faces.of_cell] > 2).any(axis=1),
         lambda k: f"{k} cells share a face with more than one other cell",
@@ -125,7 +117,7 @@ def _check_faces(mesh: SolidMesh, faces: Faces) -> None:
     number = faces.of_cell.ravel()
     total = np.bincount(number, weights=faces.sign.ravel(), minlength=faces.count.size)
     folded = (faces.count == 2) & (total != 0)
-    _refuse(
+    refuse_cells(
         mesh,
         folded[faces.of_cell].any(axis=1),
         lambda k: f"{k} cells lie on the same side of a common face: the mesh is folded",
@@ -138,8 +130,7 @@ def _check_connected(mesh: SolidMesh, faces: Faces) -> None:
     if n_parts == 1:
         return
     n_loose = parts_by_node(mesh.corners)[0]
-    cells = np.sort(np.bincount(part))[::-1]
-    sizes = ", ".join(map(str, cells[:MAX_SHOWN])) + (", ..." if n_parts > MAX_SHOWN else "")
+    sizes = shown(np.sort(np.bincount(part))[::-1])
     if n_loose == 1:
         raise MeshError(
             f"the mesh has {n_parts} parts ({sizes} cells) that meet only in an edge or a point: "
@@ -222,11 +213,9 @@ def checked(mesh: SolidMesh, remarks: Sequence[str] = ()) -> SolidMesh:
         MeshError, TagError: see `rom.fe.mesh.validate.validate`.
     """
     where = str(mesh.provenance.get("path", ""))
-    try:
+    with in_file(where):
         mesh = repair(mesh)
         found = (*remarks, *validate(mesh))
-    except RomError as error:
-        raise type(error)(error.message, where=error.where or where, hint=error.hint) from None
     for text in found:
         warn(f"{where}: {text}" if where else text)
     return replace(mesh, warnings=found)

@@ -1,8 +1,8 @@
 """The verbs of `rom.eigen` with PETSc and SLEPc, on any number of ranks.
 
 `petsc` has them on matrices of `aij`, also in new coordinates; a `solver` is chosen by what is
-`foreseen` of `memory` and `disk`: `held`, `factor` and, with a few dofs more, `corrected` solve,
-over ranks the folder `substructures`; `krylov_schur` finds modes with a shift of `spectrum`,
-`counting` proves that none is missed; the folder `iterative` does all of it without a factor.
-`workers` are ranks that each have whole matrices.
+`foreseen` of `memory` and `disk`: `held` and `factor` solve, over ranks the folder
+`substructures`; `krylov_schur` finds modes with a shift of `spectrum`, `factor` proves that none is
+missed; the folder `iterative` does all of it without a factor. `workers` are ranks that each have
+whole matrices.
 """

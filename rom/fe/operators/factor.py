@@ -1,14 +1,27 @@
-"""One MUMPS factorisation, used for many right-hand sides and for counting eigenvalues."""
+"""One MUMPS factorisation, for many right-hand sides, also with a few dofs more, and for counting.
 
+The inertia of K - sigma M counts eigenvalues, so that no mode is missed.
+"""
+
+from collections.abc import Callable
 from contextlib import nullcontext
+from typing import Any
 
 from petsc4py import PETSc
 
 import numpy as np
+from scipy.linalg import lu_factor, lu_solve
 
 from rom.errors import SolverError
+from rom.fe.compat import same_layout
 from rom.fe.operators.disk import DISK_ERRORS, disk_too_small, watched
-from rom.fe.operators.foreseen import by_mumps, check_disk, entry_count, too_large
+from rom.fe.operators.foreseen import (
+    by_mumps,
+    check_disk,
+    entry_count,
+    stored_entries,
+    too_large,
+)
 from rom.fe.operators.memory import allowed_bytes, factor_bytes, give_back
 from rom.fe.operators.solver import DIRECT_SOLVER, Solver
 from rom.model import Array
@@ -93,15 +106,14 @@ class Factor:
 
     def solve(self, F: Array) -> Array:
         """A^-1 F for (n_local, k) right-hand sides, in blocks."""
-        X = np.empty(F.shape, order="F")
-        for first in range(0, F.shape[1], BLOCK_SIZE):
-            columns = slice(first, min(first + BLOCK_SIZE, F.shape[1]))
-            with piece(SOLUTION_PIECE):
-                B, Y = dense(F[:, columns], self.A), dense(np.zeros_like(F[:, columns]), self.A)
-                self.factor.matSolve(B, Y)
-                X[:, columns] = Y.getDenseArray()
-                B.destroy(), Y.destroy()
-        return X
+        return in_blocks(self._solve, F)
+
+    def _solve(self, F: Array, X: Array) -> None:
+        """Fill (n_local, k) solutions X."""
+        B, Y = dense(F, self.A), dense(np.zeros_like(F), self.A)
+        self.factor.matSolve(B, Y)
+        X[:] = Y.getDenseArray()
+        B.destroy(), Y.destroy()
 
     def apply(self, b: PETSc.Vec, x: PETSc.Vec) -> None:
         """One solution x for b."""
@@ -123,6 +135,98 @@ class Factor:
         if not self.ok:
             raise SolverError("the matrix K - sigma M could not be factored to count modes.")
         return int(self.factor.getInertia()[0])
+
+
+class Corrected:
+    """(A + V E + E^T V^T + E^T D E)^-1, d rows in E, with the factor of A.
+
+    With W = (V / c, E^T) that matrix is A + W C W^T, C = ((0, c), (c, D)), and its inverse
+    A^-1 - Y S^-1 Y^T, Y = A^-1 W, S = C^-1 + W^T Y; c makes both halves of S as large.
+
+    Args:
+        factor: of A.
+        gram: X^T Y summed over the ranks.
+        V, E_T: (n_local, d).
+        D: (d, d).
+
+    Source:
+        Woodbury, Inverting modified matrices, Princeton University, Statistical Research Group,
+        Memorandum 42 (1950).
+    """
+
+    ok = True
+
+    def __init__(
+        self, factor: Any, gram: Callable[[Array, Array], Array], V: Array, E_T: Array, D: Array
+    ):
+        self.factor, self.gram, self.A = factor, gram, factor.A
+        self.counted = getattr(factor, "counted", None)
+        c, eye = np.abs(np.diag(D)).mean(), np.eye(len(D))
+        W = np.asfortranarray(np.hstack([V / c, E_T]))
+        self.Y = factor.solve(W)
+        S = np.block([[-D / c**2, eye / c], [eye / c, 0.0 * eye]]) + gram(W, self.Y)
+        self.S = lu_factor(0.5 * (S + S.T))
+
+    def solve(self, F: Array) -> Array:
+        """Solutions for (n_local, k) right-hand sides."""
+        X = self.factor.solve(F)
+        X -= self.Y @ lu_solve(self.S, self.gram(self.Y, F))
+        return X
+
+    def apply(self, b: PETSc.Vec, x: PETSc.Vec) -> None:
+        """One solution x for b."""
+        x.array[:] = self.solve(b.array[:, None])[:, 0]
+
+    def release(self) -> None:
+        """Give the memory of the factor back."""
+        self.factor.release()
+
+
+def count_below(ops: Any, sigma: float, spent: Any = None) -> int | None:
+    """Number of eigenvalues below sigma, the inertia of K - sigma M (Sylvester).
+
+    Without a factor there is nothing to count; `definite` looks for missed modes instead.
+
+    Args:
+        ops: `PETScOperators` of the body.
+        sigma: the shift [rad^2/s^2].
+        spent: a factor of K that nobody needs any more and that gives its place.
+    """
+    if ops.solver.iterative:
+        return None
+    A = ops.shifted(sigma)
+    of_K = isinstance(spent, Factor) and spent.A == ops.K and same_layout(A, ops.K)
+    if of_K and stored_entries(A) == stored_entries(ops.K):
+        return _counted_in_place(ops.K, A, spent)
+    if spent is not None:
+        spent.release()
+    factor = Factor(A, definite=False, solver=ops.solver)
+    count = factor.negative_pivots()
+    factor.release()
+    A.destroy()
+    return count
+
+
+def _counted_in_place(K: PETSc.Mat, A: PETSc.Mat, factor: Factor) -> int:
+    """The values of A, whose pattern is that of K, go through the analysis of the factor of K."""
+    same, values = PETSc.Mat.Structure.SAME_NONZERO_PATTERN, K.copy()
+    A.copy(K, structure=same)
+    A.destroy()
+    factor.compute(definite=False)
+    count = factor.negative_pivots()
+    values.copy(K, structure=same)
+    values.destroy()
+    return count
+
+
+def in_blocks(solve: Callable[[Array, Array], None], F: Array) -> Array:
+    """(n_local, k) solutions that a function fills in, some right-hand sides F at a time."""
+    X = np.empty(F.shape, order="F")
+    for first in range(0, F.shape[1], BLOCK_SIZE):
+        columns = slice(first, first + BLOCK_SIZE)
+        with piece(SOLUTION_PIECE):
+            solve(F[:, columns], X[:, columns])
+    return X
 
 
 def dense(X: Array, A: PETSc.Mat) -> PETSc.Mat:

@@ -80,12 +80,12 @@ def entry_count(factor: PETSc.Mat) -> float:
 def beside_factor(A: PETSc.Mat, n_columns: int, n_matrices: int) -> float:
     """Memory of dense columns and copies of the matrix A [bytes], on all ranks together."""
     n = A.getSize()[0]
-    return ENTRY_BYTES * n_matrices * _entries(A) + 8.0 * n * (SEARCH_COLUMNS + n_columns)
+    return ENTRY_BYTES * n_matrices * stored_entries(A) + 8.0 * n * (SEARCH_COLUMNS + n_columns)
 
 
 def multigrid_bytes(A: PETSc.Mat) -> float:
     """Memory of multigrid for A [bytes], on all ranks together."""
-    return MULTIGRID_RATIO * ENTRY_BYTES * _entries(A)
+    return MULTIGRID_RATIO * ENTRY_BYTES * stored_entries(A)
 
 
 def check_factor_memory(A: PETSc.Mat, n_columns: int, solver: Solver) -> None:
@@ -164,7 +164,7 @@ def too_large(n: int, need: float, there: float) -> ResourceError:
     )
 
 
-def _entries(A: PETSc.Mat) -> float:
+def stored_entries(A: PETSc.Mat) -> float:
     """Number of entries on all ranks."""
     return float(A.getInfo(PETSc.Mat.InfoType.GLOBAL_SUM)["nz_used"])
 

@@ -9,8 +9,7 @@ import numpy as np
 
 from rom.eigen.search import refined
 from rom.errors import SolverError
-from rom.fe.operators.corrected import Corrected
-from rom.fe.operators.factor import Factor
+from rom.fe.operators.factor import Corrected, Factor
 from rom.fe.operators.substructures.shared import SubstructuredFactor
 from rom.model import Array
 from rom.process.stopwatch import SEARCH_PIECE, piece

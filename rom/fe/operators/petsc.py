@@ -22,9 +22,7 @@ from rom.eigen.verbs import Weighted
 from rom.errors import ConfigError, SolverError
 from rom.fe.costs import comparison_pays, cost_of
 from rom.fe.operators.aij import aij, chosen, gathered, symmetrized, weighted
-from rom.fe.operators.corrected import Corrected
-from rom.fe.operators.counting import count_below
-from rom.fe.operators.factor import Factor, dense_rows
+from rom.fe.operators.factor import Corrected, Factor, count_below, dense_rows
 from rom.fe.operators.foreseen import check_factor_memory
 from rom.fe.operators.held import HeldPETSc
 from rom.fe.operators.iterative.gradients import ConjugateGradients, Inverse, refined
@@ -154,17 +152,16 @@ class PETScOperators(ModeSearch):
 
     def plus_mass(self, dM: Any) -> "PETScOperators":
         """The same body with the mass M + dM."""
-        sizes = ((self.n_local, self.n), (self.n_local, self.n))
-        M = self.M.copy()
-        M.axpy(1.0, aij(csr_matrix(dM), sizes, self.comm))
-        return self._like(self.K, M, self.rigid)
+        return self._like(self.K, self._plus(self.M, dM), self.rigid)
 
     def on_springs(self, dK: Any) -> "PETScOperators":
         """The body held by springs to the ground: stiffness K + dK, no rigid motion of its own."""
-        sizes = ((self.n_local, self.n), (self.n_local, self.n))
-        K = self.K.copy()
-        K.axpy(1.0, aij(csr_matrix(dK), sizes, self.comm))
-        return self._like(K, self.M, None)
+        return self._like(self._plus(self.K, dK), self.M, None)
+
+    def _plus(self, A: PETSc.Mat, dA: Any) -> PETSc.Mat:
+        B, size = A.copy(), (self.n_local, self.n)
+        B.axpy(1.0, aij(csr_matrix(dA), (size, size), self.comm))
+        return B
 
     @property
     def geometric(self) -> bool:
@@ -280,7 +277,7 @@ class PETScOperators(ModeSearch):
         return first_elastic(self)
 
     def count_below(self, sigma: float, spent: Any = None) -> int | None:
-        """Number of eigenvalues below sigma, see `counting`."""
+        """Number of eigenvalues below sigma, see `factor.count_below`."""
         return count_below(self, sigma, spent)
 
     def signed(self, Phi: Array) -> Array:

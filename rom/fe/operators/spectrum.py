@@ -24,8 +24,7 @@ def fixed_vector(comm: MPI.Comm, rigid: Array | None, first: int, n_local: int) 
     if rigid is None:
         return np.sin(1.0 + np.arange(first, first + n_local))
     points = points_of(rigid)
-    low = comm.allreduce(points.min(axis=0, initial=np.inf), op=MINIMUM_OP)
-    high = comm.allreduce(points.max(axis=0, initial=-np.inf), op=MAXIMUM_OP)
+    low, high = _box(comm, points)
     size = (high - low).max()
     return np.sin((points - low) / size @ DIRECTIONS + np.arange(1.0, 4.0)).ravel()
 
@@ -36,18 +35,18 @@ def points_of(rigid: Array) -> Array:
     return np.column_stack([x, y, z])
 
 
-def _elementwise(function: Any) -> MPI.Op:
-    return MPI.Op.Create(lambda a, b, _: function(a, b), commute=True)
-
-
-MINIMUM_OP, MAXIMUM_OP = _elementwise(np.minimum), _elementwise(np.maximum)
+def _box(comm: MPI.Comm, points: Array) -> tuple[Array, Array]:
+    """Lowest and highest coordinates of all ranks."""
+    low, high = points.min(axis=0, initial=np.inf), points.max(axis=0, initial=-np.inf)
+    comm.Allreduce(MPI.IN_PLACE, low, MPI.MIN)
+    comm.Allreduce(MPI.IN_PLACE, high, MPI.MAX)
+    return low, high
 
 
 def polynomial_fields(comm: MPI.Comm, rigid: Array) -> Array:
     """(n_local, 60) displacements that are polynomials of degree up to three in the coordinates."""
     x = points_of(rigid)
-    low = comm.allreduce(x.min(axis=0, initial=np.inf), op=MINIMUM_OP)
-    high = comm.allreduce(x.max(axis=0, initial=-np.inf), op=MAXIMUM_OP)
+    low, high = _box(comm, x)
     x = 2.0 * (x - low) / np.maximum(high - low, 1e-9 * (high - low).max()) - 1.0
     powers = [np.polynomial.legendre.legvander(column, 3).T for column in x.T]
     scalar = [
@@ -95,7 +94,8 @@ def signed(ops: Any, Phi: Array) -> Array:
     Among equally large entries the place decides, not the numbering.
     """
     size = np.abs(Phi)
-    largest = ops.comm.allreduce(size.max(axis=0, initial=0.0), op=MAXIMUM_OP)
+    largest = size.max(axis=0, initial=0.0)
+    ops.comm.Allreduce(MPI.IN_PLACE, largest, MPI.MAX)
     if Phi.shape[0]:
         key = np.where(size >= (1 - EQUAL_ENTRY_RTOL) * largest, ops.fixed[:, None], -np.inf)
         row = key.argmax(axis=0)

@@ -112,9 +112,7 @@ def write_glb(
     document.json["nodes"][root]["children"] = list(range(1, 1 + len(bodies)))
     document.json["scenes"] = [{"name": title, "nodes": [root]}]
     document.json["animations"] = [motion]
-    content = _packed(document)
-    write_whole(path, lambda file: file.write(content))
-    return Path(path)
+    return write_whole(path, _packed(document))
 
 
 def upright(up: Array) -> Array:

@@ -58,6 +58,4 @@ def write_vtkhdf(
         for name, values in fields.items():
             root[f"PointData/{name}"] = values.reshape(f * n, *values.shape[2:])
             steps[f"PointDataOffsets/{name}"] = every
-    content = memory.getvalue()
-    write_whole(path, lambda file: file.write(content))
-    return Path(path)
+    return write_whole(path, memory.getvalue())

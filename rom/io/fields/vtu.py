@@ -1,7 +1,6 @@
 """Mode shapes on the surface of a body, and meshes, for ParaView (VTK XML, unstructured grid)."""
 
 import base64
-from functools import partial
 from pathlib import Path
 from typing import Any
 from xml.sax.saxutils import quoteattr
@@ -10,6 +9,7 @@ import numpy as np
 
 from rom.arguments import AnySolution, typed, whole
 from rom.body.flexible import FlexibleBody
+from rom.body.records import Surface
 from rom.body.recovery import von_mises
 from rom.errors import ConfigError
 from rom.io.files import write_whole
@@ -33,9 +33,14 @@ def write_vtu(body: FlexibleBody, path: str | Path) -> Path:
     """
     if body.surface is None:
         raise ConfigError(f"body {body.name!r} has no surface; to be drawn it needs a meshed one.")
-    text = _document(body)
-    write_whole(path, lambda file: file.write(text.encode()))
-    return Path(path)
+    surface = body.surface
+    shapes = surface.shape.reshape(surface.points.shape[0], 3, -1)
+    fields = {
+        f"{label}, {omega / (2 * np.pi):.6g} Hz": shapes[:, :, k]
+        for k, (label, omega) in enumerate(zip(body.labels, body.omega, strict=True))
+    }
+    text = grid(surface.points, surface.triangles, VTK_TRIANGLE, at_points=fields)
+    return write_whole(path, text.encode())
 
 
 @typed
@@ -61,9 +66,7 @@ def write_stress(
             f"the stress of body {body.name!r} cannot be recovered.",
             hint="Reduce it with stress=True.",
         )
-    text = _stressed(body, q, body.stress.field(q, accelerations))
-    write_whole(path, lambda file: file.write(text.encode()))
-    return Path(path)
+    return write_whole(path, _stressed(body.surface, q, body.stress.field(q, accelerations)))
 
 
 @typed
@@ -92,41 +95,23 @@ def write_stress_history(
         stress = solution.stress(body, k)
         folder.mkdir(parents=True, exist_ok=True)
         file = folder / f"{folder.name}_{k:06d}.vtu"
-        text = _stressed(part.flexible, solution.elastic(body)[k], stress).encode()
-        write_whole(file, partial(_write, text))
+        write_whole(file, _stressed(part.flexible.surface, solution.elastic(body)[k], stress))
         name = quoteattr(f"{folder.name}/{file.name}")
         lines.append(f'<DataSet timestep="{float(solution.t[k])!r}" file={name}/>')
     series = "\n".join(
         ['<VTKFile type="Collection" version="1.0"><Collection>', *lines, "</Collection></VTKFile>"]
     )
-    write_whole(path, partial(_write, f"{series}\n".encode()))
-    return path
+    return write_whole(path, f"{series}\n".encode())
 
 
-def _write(text: bytes, file: Any) -> None:
-    file.write(text)
-
-
-def _stressed(body: FlexibleBody, q: Array, stress: Array) -> str:
-    surface = body.surface
-    assert surface is not None
+def _stressed(surface: Surface, q: Array, stress: Array) -> bytes:
     fields = {
         "stress xx yy zz yz xz xy [Pa]": stress,
         "von Mises stress [Pa]": von_mises(stress),
         "displacement [m]": (surface.shape @ np.asarray(q, dtype=float)).reshape(-1, 3),
     }
-    return grid(surface.points, surface.triangles, VTK_TRIANGLE, at_points=fields)
-
-
-def _document(body: FlexibleBody) -> str:
-    surface = body.surface
-    assert surface is not None
-    shapes = surface.shape.reshape(surface.points.shape[0], 3, -1)
-    fields = {
-        f"{label}, {omega / (2 * np.pi):.6g} Hz": shapes[:, :, k]
-        for k, (label, omega) in enumerate(zip(body.labels, body.omega, strict=True))
-    }
-    return grid(surface.points, surface.triangles, VTK_TRIANGLE, at_points=fields)
+    text = grid(surface.points, surface.triangles, VTK_TRIANGLE, at_points=fields)
+    return text.encode()
 
 
 def grid(

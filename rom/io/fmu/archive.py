@@ -6,13 +6,12 @@ import re
 import shutil
 import uuid
 import zipfile
-from collections.abc import Callable
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import IO
 
 from rom.errors import ResourceError
 from rom.io.files import write_whole
+from rom.io.fmu.description import Content, model_description
 from rom.names import ORIGIN_MARK, check_text
 from rom.process.child import Limits, run, scratch
 
@@ -20,27 +19,6 @@ SOURCES = Path(__file__).with_name("c")
 OPTIONS = ("-std=c11", "-O2", "-fPIC", "-shared", "-fvisibility=hidden")
 COMPILE_TIME_LIMIT = 600.0  # [s]
 ZIP_EPOCH = (1980, 1, 1, 0, 0, 0)  # the same archive from the same content
-
-
-@dataclass(frozen=True)
-class Content:
-    """What goes into an FMU.
-
-    Attributes:
-        name: of the model.
-        core: C file of the model behind the interface.
-        headers: C files that it includes.
-        resources: files by their names below ``resources/``.
-        data: C text of tables that the core includes as ``tables.h``.
-        describe: (guid, identifier, names of C files) -> text of ``modelDescription.xml``.
-    """
-
-    name: str
-    core: str
-    describe: Callable[[str, str, tuple[str, ...]], bytes]
-    resources: dict[str, bytes] = field(default_factory=dict)
-    data: str = ""
-    headers: tuple[str, ...] = ()
 
 
 def write_archive(path: Path, content: Content) -> Path:
@@ -64,9 +42,8 @@ def write_archive(path: Path, content: Content) -> Path:
     packed = {f"sources/{name}": data for name, data in sources.items()}
     packed |= {f"resources/{name}": data for name, data in content.resources.items()}
     packed[f"binaries/{_platform()}/{identifier}.so"] = _library(sources, names)
-    packed["modelDescription.xml"] = content.describe(guid, identifier, names)
-    write_whole(path, lambda file: _pack(file, packed))
-    return path
+    packed["modelDescription.xml"] = model_description(content, guid, identifier, names)
+    return write_whole(path, lambda file: _pack(file, packed))
 
 
 def _guid(sources: dict[str, bytes], content: Content) -> str:
@@ -75,7 +52,7 @@ def _guid(sources: dict[str, bytes], content: Content) -> str:
     parts = {**sources, **content.resources, "tables": content.data.encode()}
     for name, data in sorted(parts.items()):
         digest.update(f"{name} {len(data)}\n".encode() + data)
-    digest.update(content.describe("", "", ()))
+    digest.update(model_description(content))
     return f"{{{uuid.UUID(bytes=digest.digest()[:16])}}}"
 
 

@@ -6,17 +6,17 @@ the other program knows, or of a free one as long as its rotation stays small. B
 belong into a mechanism, see `rom.fmu`.
 """
 
-from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from rom.arguments import typed
 from rom.body.flexible import FlexibleBody
+from rom.body.reference import marker_motion
 from rom.errors import ConfigError
 from rom.io.files import check_writable
-from rom.io.fmu.archive import Content, write_archive
-from rom.io.fmu.description import Model, model_description
+from rom.io.fmu.archive import write_archive
+from rom.io.fmu.description import Content
 from rom.io.fmu.variables import Variable, structured
 from rom.model import Array
 
@@ -65,26 +65,16 @@ def write_body_fmu(body: FlexibleBody, path: str | Path, *, fixed: tuple[str, ..
     first = omega[omega > 0.0][:1] / (2 * np.pi)
     step = 1.0 / (STEPS_PER_PERIOD * float(first[0])) if first.size else 1e-3
     about = f"Small motions of the flexible body {path.stem}, inputs held over a step."
-    describe = partial(description, path.stem, about, _variables(body), step)
-    tables = _tables(body, omega, V)
-    content = Content(path.stem, "linear.c", describe, data=tables, headers=("states.h",))
-    return write_archive(path, content)
-
-
-def interface_motion(body: FlexibleBody) -> Array:
-    """(6 i, 6 + r) displacement and rotation of all i interfaces per rigid and elastic motion."""
-    blocks = []
-    for marker in body.markers.values():
-        x, y, z = marker.point
-        across = np.array([[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]])  # a x p = across a
-        blocks.append(np.hstack([np.eye(3), across, marker.translation]))
-        blocks.append(np.hstack([np.zeros((3, 3)), np.eye(3), marker.rotation]))
-    return np.vstack(blocks)
+    headers, tables = ("states.h",), _tables(body, omega, V)
+    return write_archive(
+        path, Content(path.stem, about, _variables(body), step, "linear.c", headers, tables)
+    )
 
 
 def _tables(body: FlexibleBody, omega: Array, V: Array) -> str:
     """The numbers of the equations as C text."""
-    motion = interface_motion(body) @ V
+    motions = [marker_motion(marker, body.n_modes) for marker in body.markers.values()]
+    motion = np.vstack([np.hstack(parts) for parts in motions]) @ V
     fall = body.full_matrices()[0][:, :3]
     tables = {
         "OMEGA": omega,
@@ -93,7 +83,7 @@ def _tables(body: FlexibleBody, omega: Array, V: Array) -> str:
         "MOTION": motion,
     }
     sizes = f"enum {{ MODES = {omega.size}, INTERFACES = {len(body.markers)} }};\n"
-    return sizes + "".join(table(name, A) for name, A in tables.items())
+    return sizes + arrays(tables)
 
 
 def _modal_damping(body: FlexibleBody, omega: Array, V: Array) -> Array:
@@ -104,10 +94,13 @@ def _modal_damping(body: FlexibleBody, omega: Array, V: Array) -> Array:
     return np.where((pairs > 0.0) & (np.abs(XI) > ROUND_OFF * pairs), XI, 0.0)
 
 
-def table(name: str, A: Array) -> str:
-    """An array of C; of nothing, one zero."""
-    numbers = [float(x).hex() for x in np.ravel(A)] or ["0.0"]
-    return f"static const double {name}[{len(numbers)}] = {{\n" + ",\n".join(numbers) + "};\n"
+def arrays(tables: dict[str, Array]) -> str:
+    """Arrays of C; of nothing, one zero."""
+    text = ""
+    for name, A in tables.items():
+        numbers = [float(x).hex() for x in np.ravel(A)] or ["0.0"]
+        text += f"static const double {name}[{len(numbers)}] = {{\n" + ",\n".join(numbers) + "};\n"
+    return text
 
 
 def _variables(body: FlexibleBody) -> list[Variable]:
@@ -122,16 +115,3 @@ def _three(parts: tuple[str, ...], causality: str, unit: str) -> list[Variable]:
     start = 0.0 if causality == "input" else None
     name = structured(*parts)
     return [Variable(f"{name}[{k}]", causality, unit, start) for k in (1, 2, 3)]
-
-
-def description(
-    name: str,
-    about: str,
-    variables: list[Variable],
-    step: float,
-    guid: str,
-    identifier: str,
-    sources: tuple[str, ...],
-) -> bytes:
-    """The text of ``modelDescription.xml`` of a model that needs nothing where it runs."""
-    return model_description(Model(name, identifier, guid, False, sources, step, about), variables)

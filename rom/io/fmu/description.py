@@ -5,7 +5,7 @@ Source:
 """
 
 import xml.etree.ElementTree as ET
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from rom.io.fmu.variables import Variable
 
@@ -25,31 +25,37 @@ UNITS = {
 }
 
 
-@dataclass(frozen=True, slots=True)
-class Model:
-    """What an FMU is apart from its variables.
+@dataclass(frozen=True)
+class Content:
+    """What goes into an FMU.
 
     Attributes:
         name: of the model.
-        identifier: of its binary, a C name.
-        guid: of this very FMU.
-        tool: whether it needs another program where it runs.
-        sources: names of its C files.
+        about: one sentence on it.
+        variables: in the order of their value references.
         step: communication step for a start [s].
-        description: one sentence.
+        core: C file of the model behind the interface.
+        headers: C files that it includes.
+        data: C text of tables that the core includes as ``tables.h``.
+        resources: files by their names below ``resources/``.
+        tool: whether it needs another program where it runs.
     """
 
     name: str
-    identifier: str
-    guid: str
-    tool: bool
-    sources: tuple[str, ...]
+    about: str
+    variables: list[Variable]
     step: float
-    description: str
+    core: str
+    headers: tuple[str, ...] = ()
+    data: str = ""
+    resources: dict[str, bytes] = field(default_factory=dict)
+    tool: bool = False
 
 
-def model_description(model: Model, variables: list[Variable]) -> bytes:
-    """The XML text.
+def model_description(
+    content: Content, guid: str = "", identifier: str = "", sources: tuple[str, ...] = ()
+) -> bytes:
+    """The XML text for this very FMU, the C name of its binary and its C files.
 
     Outputs are those of the last communication point and do not follow inputs at once, which
     spares the caller algebraic loops.
@@ -57,34 +63,16 @@ def model_description(model: Model, variables: list[Variable]) -> bytes:
     root = ET.Element(
         "fmiModelDescription",
         fmiVersion="2.0",
-        modelName=model.name,
-        guid=model.guid,
-        description=model.description,
+        modelName=content.name,
+        guid=guid,
+        description=content.about,
         generationTool="rom",
         variableNamingConvention="structured",
         numberOfEventIndicators="0",
     )
-    _co_simulation(root, model)
-    units = ET.SubElement(root, "UnitDefinitions")
-    for name in sorted({variable.unit for variable in variables}):
-        powers = {key: str(value) for key, value in UNITS[name].items()}
-        ET.SubElement(ET.SubElement(units, "Unit", name=name), "BaseUnit", powers)
-    categories = ET.SubElement(root, "LogCategories")
-    for name in ("logStatusError", "logStatusWarning"):
-        ET.SubElement(categories, "Category", name=name)
-    ET.SubElement(root, "DefaultExperiment", startTime="0.0", stepSize=repr(model.step))
-    listed = ET.SubElement(root, "ModelVariables")
-    for reference, variable in enumerate(variables):
-        _variable(listed, reference, variable)
-    _structure(root, variables)
-    ET.indent(root)
-    return ET.tostring(root, encoding="UTF-8", xml_declaration=True)
-
-
-def _co_simulation(root: ET.Element, model: Model) -> None:
     flags = {
-        "modelIdentifier": model.identifier,
-        "needsExecutionTool": str(model.tool).lower(),
+        "modelIdentifier": identifier,
+        "needsExecutionTool": str(content.tool).lower(),
         "canHandleVariableCommunicationStepSize": "true",
         "canGetAndSetFMUstate": "true",
         "canSerializeFMUstate": "false",
@@ -92,8 +80,22 @@ def _co_simulation(root: ET.Element, model: Model) -> None:
         "canNotUseMemoryManagementFunctions": "true",
     }
     files = ET.SubElement(ET.SubElement(root, "CoSimulation", flags), "SourceFiles")
-    for name in model.sources:
+    for name in sources:
         ET.SubElement(files, "File", name=name)
+    units = ET.SubElement(root, "UnitDefinitions")
+    for name in sorted({variable.unit for variable in content.variables}):
+        powers = {key: str(value) for key, value in UNITS[name].items()}
+        ET.SubElement(ET.SubElement(units, "Unit", name=name), "BaseUnit", powers)
+    categories = ET.SubElement(root, "LogCategories")
+    for name in ("logStatusError", "logStatusWarning"):
+        ET.SubElement(categories, "Category", name=name)
+    ET.SubElement(root, "DefaultExperiment", startTime="0.0", stepSize=repr(content.step))
+    listed = ET.SubElement(root, "ModelVariables")
+    for reference, variable in enumerate(content.variables):
+        _variable(listed, reference, variable)
+    _structure(root, content.variables)
+    ET.indent(root)
+    return ET.tostring(root, encoding="UTF-8", xml_declaration=True)
 
 
 def _variable(listed: ET.Element, reference: int, variable: Variable) -> None:

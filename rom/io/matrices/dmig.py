@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.sparse import coo_matrix, csc_matrix
+from scipy.sparse import coo_matrix, csc_matrix, csr_matrix
 
 from rom.decks.bulk import POINTS, Card, cards, grids
 from rom.decks.lines import at, real, whole
@@ -45,7 +45,7 @@ def read_dmig(path: str | Path) -> dict[str, tuple[Any, Dofs]]:
             ) from error
     if not entries:
         raise FileFormatError("the file holds no DMIG matrix.", where=str(path))
-    return {name: _matrix(rows) for name, rows in entries.items()}
+    return {name: labelled(rows) for name, rows in entries.items()}
 
 
 def read_grids(path: str | Path) -> tuple[Index, Array]:
@@ -90,8 +90,7 @@ def write_dmig(
     for name, A in matrices.items():
         lines += _written(name.upper(), csc_matrix(A), dofs)
     text = "\n".join(lines) + "\n"
-    write_whole(path, lambda file: file.write(text.encode("ascii")))
-    return Path(path)
+    return write_whole(path, text.encode("ascii"))
 
 
 def _enter(entries: dict[str, list[tuple[int, int, int, int, float]]], fields: list[str]) -> None:
@@ -110,7 +109,8 @@ def _enter(entries: dict[str, list[tuple[int, int, int, int, float]]], fields: l
             entries[name].append((whole(node), whole(component or "0"), *column, real(value)))
 
 
-def _matrix(rows: list[tuple[int, int, int, int, float]]) -> tuple[Any, Dofs]:
+def labelled(rows: list[tuple[int, int, int, int, float]]) -> tuple[csr_matrix, Dofs]:
+    """Matrix (n, n) and dofs of entries: node and component of row and column, value."""
     table = np.array([row[:4] for row in rows], dtype=np.int64).reshape(-1, 2, 2)
     dofs, place = np.unique(table.reshape(-1, 2), axis=0, return_inverse=True)
     i, j = place.reshape(-1, 2).T

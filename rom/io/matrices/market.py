@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix
 
-from rom.errors import FileFormatError, UnsafeFileError
+from rom.errors import FileFormatError, UnsafeFileError, in_file
 from rom.io.files import check_last_line
 from rom.model import Array, Index
 
@@ -32,27 +32,25 @@ def read_market(path: str | Path) -> csr_matrix:
     """
     path = Path(path)
     check_last_line(path)
-    with path.open(encoding="latin1") as file:
+    with in_file(path), path.open(encoding="latin1") as file:
         words = file.readline(200).lower().split()[1:]
         line = file.readline(2000)
         while line.startswith("%") or (line and not line.strip()):
             line = file.readline(2000)
         if words[:1] != ["matrix"] or len(words) != 4 or words[2] not in ("real", "integer"):
-            raise FileFormatError("the matrix is not real.", where=str(path))
+            raise FileFormatError("the matrix is not real.")
         _, form, _, symmetry = words
         try:
             if form not in ("coordinate", "array") or symmetry not in SIGNS:
                 raise ValueError(f"'{form} {words[2]} {symmetry}' is unknown")
             sizes = _sizes(line, 3 if form == "coordinate" else 2)
             if max(sizes[:2]) > MOST_ROWS or 2 * sizes[-1] > path.stat().st_size:
-                raise UnsafeFileError(f"sizes {sizes} do not fit the file.", where=str(path))
+                raise UnsafeFileError(f"sizes {sizes} do not fit the file.")
             table = _table(file)
             read = _coordinates if form == "coordinate" else _dense
             i, j, values = read(table, sizes, SIGNS[symmetry])
         except (ValueError, OverflowError) as error:
-            raise FileFormatError(
-                f"this is no Matrix Market file: {error}.", where=str(path)
-            ) from error
+            raise FileFormatError(f"this is no Matrix Market file: {error}.") from error
     mirrored = SIGNS[symmetry] * values * (i != j)
     both = (np.r_[values, mirrored], (np.r_[i, j], np.r_[j, i])) if SIGNS[symmetry] else (
         values, (i, j))  # fmt: skip

@@ -11,7 +11,7 @@ from rom.decks.lines import whole
 from rom.errors import ConfigError, FileFormatError
 from rom.io.files import check_last_line, check_readable, write_whole
 from rom.io.matrices.calculix import MATRIX_ENDINGS, read_stored_matrix
-from rom.io.matrices.dmig import Dofs, read_dmig
+from rom.io.matrices.dmig import Dofs, labelled, read_dmig
 from rom.io.matrices.market import BANNER_TEXT, read_market
 from rom.io.matrices.op4 import Matrices, read_op4
 from rom.io.matrices.user_element import read_user_element
@@ -85,8 +85,7 @@ def write_abaqus_matrix(A: Any, dofs: Dofs, path: str | Path) -> Path:
         if i >= j and v
     ]
     text = "\n".join(lines) + "\n"
-    write_whole(path, lambda file: file.write(text.encode("ascii")))
-    return Path(path)
+    return write_whole(path, text.encode("ascii"))
 
 
 def _all(path: Path) -> tuple[Matrices, dict[str, Dofs]]:
@@ -133,17 +132,14 @@ def _abaqus(path: Path) -> tuple[Any, Dofs]:
             try:
                 if len(words) != 5:
                     raise ValueError(f"{len(words)} numbers instead of 5")
-                rows.append([*(whole(word) for word in words[:4]), float(words[4])])
+                i, a, j, b = map(whole, words[:4])
+                rows.append((i, a, j, b, float(words[4])))
             except ValueError as error:
                 where = f"{path}, line {number}"
                 raise FileFormatError(f"this is no entry: {error}.", where=where) from error
     if not rows:
         raise FileFormatError("the file holds no entry.", where=str(path))
-    table = np.array([row[:4] for row in rows], dtype=np.int64).reshape(-1, 2)
-    dofs, place = np.unique(table, axis=0, return_inverse=True)
-    i, j = place.reshape(-1, 2).T
-    values = np.array([row[4] for row in rows])
-    A = coo_matrix((values, (i, j)), shape=(len(dofs),) * 2).tocsr()
+    A, dofs = labelled(rows)
     return _finite(A, path), dofs
 
 

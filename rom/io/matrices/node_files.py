@@ -7,7 +7,7 @@ import numpy as np
 
 from rom.decks.keywords import Block
 from rom.decks.nodes import NODE_KEYWORDS, Nodes
-from rom.errors import ConfigError, FileFormatError, InterfaceError
+from rom.errors import ConfigError, FileFormatError, InterfaceError, in_file
 from rom.io.files import check_readable
 from rom.io.matrices.dmig import read_grids
 from rom.model import Array, Index
@@ -101,4 +101,5 @@ def read_node_sets(path: str | Path, names: tuple[str, ...]) -> dict[str, Index]
     missing = [name for name, key in known.items() if key not in sets.members]
     if missing:
         raise InterfaceError(f"{path} has no set {named(missing)}; it has {offered(sets.members)}.")
-    return {name: sets.of(key, str(path)) for name, key in known.items()}
+    with in_file(path):
+        return {name: sets.of(key) for name, key in known.items()}

@@ -148,8 +148,7 @@ def write_op4(matrices: dict[str, Any], path: str | Path) -> Path:
         ResourceError: if the disk is full.
     """
     text = "".join(_written(name, csc_matrix(A)) for name, A in matrices.items())
-    write_whole(path, lambda file: file.write(text.encode("ascii")))
-    return Path(path)
+    return write_whole(path, text.encode("ascii"))
 
 
 def _written(name: str, A: csc_matrix) -> str:

@@ -10,7 +10,14 @@ from scipy.sparse import csr_matrix, identity, kron
 from scipy.spatial import cKDTree
 
 from rom.arguments import symmetric, typed
-from rom.errors import ConfigError, FileFormatError, InterfaceError, ModelError, QualityGateError
+from rom.errors import (
+    ConfigError,
+    FileFormatError,
+    InterfaceError,
+    ModelError,
+    QualityGateError,
+    in_file,
+)
 from rom.io.matrices.dmig import Dofs
 from rom.io.matrices.matrix_files import NamedMatrix, read_matrix
 from rom.io.matrices.node_files import read_node_sets, read_nodes
@@ -65,7 +72,9 @@ def read_model(
     labels, points = read_nodes(nodes)
     if not isinstance(interfaces, Mapping):
         names = (interfaces,) if isinstance(interfaces, str) else tuple(interfaces)
-        interfaces = read_node_sets(_deck(nodes), names)
+        if not isinstance(nodes, str | Path):
+            raise ConfigError("names of interfaces need nodes from an .inp file, with its sets.")
+        interfaces = read_node_sets(nodes, names)
     found = [read_matrix(source) for source in (K, M)]
     labels, points = _used(labels, points, found)
     stiffness, mass = (_placed(A, labels) for A in found)
@@ -83,12 +92,6 @@ def read_model(
     return model
 
 
-def _deck(nodes: Any) -> Path:
-    if not isinstance(nodes, str | Path):
-        raise ConfigError("names of interfaces need nodes from an .inp file, which has the sets.")
-    return Path(nodes)
-
-
 def _used(labels: Index, points: Array, found: list[NamedMatrix]) -> tuple[Index, Array]:
     """Nodes without those in no row, as decks carry them for loads and pictures."""
     rows = [A.dofs[:, 0] for A in found if A.dofs is not None]
@@ -100,17 +103,9 @@ def _used(labels: Index, points: Array, found: list[NamedMatrix]) -> tuple[Index
 
 def _placed(found: NamedMatrix, labels: Index) -> csr_matrix:
     """(3 k, 3 k) symmetric matrix in the order of the nodes."""
-    A, dofs = _completed(found), found.dofs
-    if dofs is None:
-        per_node, remainder = divmod(A.shape[0], labels.size)
-        if remainder or per_node not in (3, 6):
-            raise FileFormatError(
-                f"{A.shape[0]} rows are neither 3 nor 6 for each of {labels.size} nodes.",
-                where=found.where,
-            )
-        nodes = np.repeat(labels, per_node)
-        dofs = np.column_stack([nodes, np.tile(np.arange(1, per_node + 1), labels.size)])
-    place = _rows(found, A, dofs, labels)
+    with in_file(found.where):
+        A = _completed(found.A)
+        place = _rows(A, found.dofs, labels)
     moving = place >= 0
     pick = csr_matrix(
         (np.ones(moving.sum()), (place[moving], np.flatnonzero(moving))),
@@ -119,34 +114,39 @@ def _placed(found: NamedMatrix, labels: Index) -> csr_matrix:
     return (pick @ A @ pick.T).tocsr()
 
 
-def _rows(found: NamedMatrix, A: csr_matrix, dofs: Dofs, labels: Index) -> Index:
+def _rows(A: csr_matrix, dofs: Dofs | None, labels: Index) -> Index:
     """Row in the model of each row of a matrix; -1 for rotations, which must be empty."""
+    if dofs is None:
+        per_node, remainder = divmod(A.shape[0], labels.size)
+        if remainder or per_node not in (3, 6):
+            raise FileFormatError(
+                f"{A.shape[0]} rows are neither 3 nor 6 for each of {labels.size} nodes."
+            )
+        nodes = np.repeat(labels, per_node)
+        dofs = np.column_stack([nodes, np.tile(np.arange(1, per_node + 1), labels.size)])
     node = np.searchsorted(labels, dofs[:, 0])
     known = labels[np.minimum(node, labels.size - 1)] == dofs[:, 0]
     if not known.all():
         strange = np.unique(dofs[~known, 0])[:MORE_NODES].tolist()
-        raise FileFormatError(f"rows belong to nodes that are not given: {strange}.",
-                              where=found.where)  # fmt: skip
+        raise FileFormatError(f"rows belong to nodes that are not given: {strange}.")
     turning = (dofs[:, 1] < 1) | (dofs[:, 1] > 3)
     if np.abs(A[turning]).sum() > 0:
         label, component = dofs[np.flatnonzero(turning)[0]]
         raise ModelError(
             f"node {label} has the component {component}: nodes that turn are those of beams and "
-            "shells; this body has to be a solid.",
-            where=found.where,
+            "shells; this body has to be a solid."
         )
     return np.where(turning, -1, 3 * node + dofs[:, 1] - 1)
 
 
-def _completed(found: NamedMatrix) -> csr_matrix:
+def _completed(A: csr_matrix) -> csr_matrix:
     """The whole matrix; entries without their mirror image get it."""
-    A = found.A
     there = csr_matrix((np.ones(A.nnz), A.indices, A.indptr), shape=A.shape)
     both = there.multiply(there.T)
     A = csr_matrix(A + A.T - A.T.multiply(both))
     if not A.nnz:
-        raise FileFormatError("the matrix is empty.", where=found.where)
-    symmetric("the matrix", A, ASYMMETRY_RTOL, where=found.where)
+        raise FileFormatError("the matrix is empty.")
+    symmetric("the matrix", A, ASYMMETRY_RTOL)
     return csr_matrix(0.5 * (A + A.T))
 
 

@@ -22,7 +22,7 @@ import numpy as np
 from scipy.sparse import csr_matrix, tril
 
 from rom.decks.lines import whole
-from rom.errors import ConfigError, FileFormatError, UnsafeFileError
+from rom.errors import ConfigError, FileFormatError, UnsafeFileError, in_file
 from rom.io.files import check_last_line, write_whole
 from rom.io.matrices.dmig import Dofs
 from rom.model import Array
@@ -66,7 +66,8 @@ def read_user_element(path: str | Path) -> dict[str, tuple[csr_matrix, Dofs]]:
             except ValueError as error:
                 where = f"{path}, line {number}"
                 raise FileFormatError(f"this is no user element: {error}.", where=where) from error
-    return _matrices(element, str(path))
+    with in_file(path):
+        return _matrices(element)
 
 
 def write_user_element(
@@ -86,8 +87,7 @@ def write_user_element(
         ResourceError: if the disk is full.
     """
     text = "\n".join(_document(matrices, np.asarray(dofs), nodes)) + "\n"
-    write_whole(path, lambda file: file.write(text.encode("ascii")))
-    return Path(path)
+    return write_whole(path, text.encode("ascii"))
 
 
 def _comment(element: _Element, keyword: str, line: str) -> str:
@@ -129,12 +129,12 @@ def _data(element: _Element, keyword: str, kind: str, words: list[str]) -> None:
         element.lists.append((place, components))
 
 
-def _matrices(element: _Element, where: str) -> dict[str, tuple[csr_matrix, Dofs]]:
+def _matrices(element: _Element) -> dict[str, tuple[csr_matrix, Dofs]]:
     if element.n_nodes > MOST_NODES:
-        raise UnsafeFileError(f"an element of {element.n_nodes} nodes is not read.", where=where)
+        raise UnsafeFileError(f"an element of {element.n_nodes} nodes is not read.")
     if element.n_nodes < 1 or not element.lists or not element.values:
-        raise FileFormatError("there is no linear user element with matrices.", where=where)
-    dofs = _dofs(element, where)
+        raise FileFormatError("there is no linear user element with matrices.")
+    dofs = _dofs(element)
     n = len(dofs)
     found = {}
     for kind, values in element.values.items():
@@ -142,7 +142,6 @@ def _matrices(element: _Element, where: str) -> dict[str, tuple[csr_matrix, Dofs
             raise FileFormatError(
                 f"the matrix {kind} has {len(values)} numbers; the upper triangle of {n} rows has "
                 f"{n * (n + 1) // 2}, all finite.",
-                where=where,
                 hint="Write the file again; it is cut or changed.",
             )
         A = np.zeros((n, n))
@@ -151,11 +150,11 @@ def _matrices(element: _Element, where: str) -> dict[str, tuple[csr_matrix, Dofs
     return found
 
 
-def _dofs(element: _Element, where: str) -> Dofs:
+def _dofs(element: _Element) -> Dofs:
     labels = element.labels or list(range(1, element.n_nodes + 1))
     if len(labels) != element.n_nodes:
         raise FileFormatError(
-            f"{len(labels)} nodes are named, but the element has {element.n_nodes}.", where=where
+            f"{len(labels)} nodes are named, but the element has {element.n_nodes}."
         )
     ends = [place for place, _ in element.lists[1:]] + [element.n_nodes + 1]
     rows = [
@@ -166,7 +165,7 @@ def _dofs(element: _Element, where: str) -> Dofs:
     ]
     dofs = np.array(rows, dtype=np.int64).reshape(-1, 2)
     if len(np.unique(dofs, axis=0)) < len(dofs):
-        raise FileFormatError("a component of a node comes twice.", where=where)
+        raise FileFormatError("a component of a node comes twice.")
     return dofs
 
 

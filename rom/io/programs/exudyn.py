@@ -28,6 +28,7 @@ from rom.body.flexible import FlexibleBody
 from rom.body.reference import skew_tensor
 from rom.errors import warn
 from rom.io.files import write_whole
+from rom.io.sid.body import invariants
 from rom.model import Array
 from rom.names import ORIGIN_MARK
 
@@ -140,17 +141,12 @@ def write_exudyn(body: FlexibleBody, path: str | Path) -> Path:
     text = MODULE_TEXT.format(
         mark=ORIGIN_MARK, stem=stem, names=_encoded(names), arrays=_encoded(memory.getvalue())
     )
-    write_whole(path, lambda file: file.write(text.encode()))
-    return path
+    return write_whole(path, text.encode())
 
 
 def arrays(body: FlexibleBody) -> dict[str, Array]:
     """Arrays by the names of Exudyn's arguments, and K, M, D, triangles."""
-    r, eye, eps = body.n_modes, np.eye(3), skew_tensor()
-    dot = np.einsum("aak->k", body.Ibar_kl)
-    both = np.einsum("aajk->jk", body.S_kl)
-    x_phi = dot[:, None, None] * eye - body.Ibar_kl.transpose(2, 1, 0)  # (k, a, b)
-    phi_phi = np.einsum("jk,ab->jakb", both, eye) - body.S_kl.transpose(2, 1, 3, 0)
+    r, integrals = body.n_modes, invariants(body)
     return {
         "K": body.K,
         "M": body.M,
@@ -159,11 +155,11 @@ def arrays(body: FlexibleBody) -> dict[str, Array]:
         "inertia": body.inertia,
         "centerOfMass": body.first_moment / body.mass,
         "mPhitTPsi": body.S,
-        "mPhitTPsiTilde": np.einsum("abc,ck->akb", eps, body.S).reshape(3, 3 * r),
-        "mXRefTildePsi": np.einsum("cab,abk->ck", eps, body.Ibar_kl),
-        "mXRefTildePsiTilde": x_phi.transpose(1, 0, 2).reshape(3, 3 * r),
-        "mPsiTildePsi": np.einsum("cab,abjk->jck", eps, body.S_kl).reshape(3 * r, r),
-        "mPsiTildePsiTilde": phi_phi.reshape(3 * r, 3 * r),
+        "mPhitTPsiTilde": np.einsum("abc,ck->akb", skew_tensor(), body.S).reshape(3, 3 * r),
+        "mXRefTildePsi": -integrals["Inv4"],
+        "mXRefTildePsiTilde": integrals["Inv8"].reshape(3, 3 * r),
+        "mPsiTildePsi": -integrals["Inv5"].swapaxes(0, 1).reshape(3 * r, r),
+        "mPsiTildePsiTilde": -integrals["Inv9"].swapaxes(0, 1).reshape(3 * r, 3 * r),
         **_nodes(body),
     }
 

@@ -20,10 +20,10 @@ from pathlib import Path
 import numpy as np
 
 from rom.body.flexible import FlexibleBody
-from rom.body.reference import skew_tensor
 from rom.body.stiffening import ELASTIC_LOAD, known_loads
 from rom.errors import ConfigError
 from rom.io.files import write_whole
+from rom.io.sid.body import invariants
 from rom.model import Array
 from rom.names import ORIGIN_MARK
 
@@ -52,23 +52,7 @@ def write_mbdyn(body: FlexibleBody, path: str | Path) -> Path:
     if len(set(labels)) < len(labels):
         raise ConfigError(f"interfaces need names that differ in more than blanks, got {labels}.")
     text = "\n".join(_document(body, labels)) + "\n"
-    write_whole(path, lambda file: file.write(text.encode()))
-    return Path(path)
-
-
-def invariants(body: FlexibleBody) -> dict[str, Array]:
-    """Inv3, Inv4 (3, r), Inv8 (3, r, 3), Inv5 (3, r, r), Inv9 (3, r, r, 3)."""
-    eye, eps = np.eye(3), -skew_tensor()
-    dot = np.einsum("aak->k", body.Ibar_kl)
-    both = np.einsum("aajk->jk", body.S_kl)
-    return {
-        "Inv3": body.S,
-        "Inv4": np.einsum("cab,abk->ck", eps, body.Ibar_kl),
-        "Inv8": np.einsum("j,ac->ajc", dot, eye) - body.Ibar_kl.transpose(1, 2, 0),
-        "Inv5": np.einsum("cab,abjk->cjk", eps, body.S_kl),
-        # phi~_j phi~_k = phi_k phi_j^T - (phi_j . phi_k) 1
-        "Inv9": body.S_kl.transpose(1, 2, 3, 0) - np.einsum("jk,ac->ajkc", both, eye),
-    }
+    return write_whole(path, text.encode())
 
 
 def _document(body: FlexibleBody, labels: list[str]) -> Iterator[str]:

@@ -56,8 +56,7 @@ def write_openfast(
         raise ConfigError(f"version {version!r} of OpenFAST is unknown; known: {VERSIONS}.")
     found = superelement(body, held=held, gravity=gravity)
     lines = [f"! {body.name}, {ORIGIN_MARK}", *(_current(found) if version == 5 else _old(found))]
-    write_whole(path, lambda file: file.write(("\n".join(lines) + "\n").encode()))
-    return Path(path)
+    return write_whole(path, ("\n".join(lines) + "\n").encode())
 
 
 def superelement(

@@ -50,5 +50,4 @@ def write_simscape(body: FlexibleBody, path: str | Path) -> Path:
     savemat(memory, variables)
     # the text at the head of a file has the date, which would make every file a new one
     content = f"MATLAB 5.0 MAT-file, {ORIGIN_MARK}".encode().ljust(116) + memory.getvalue()[116:]
-    write_whole(path, lambda file: file.write(content))
-    return Path(path)
+    return write_whole(path, content)

@@ -48,11 +48,29 @@ def standard_input(body: FlexibleBody) -> StandardInput:
     )
 
 
+def invariants(body: FlexibleBody) -> dict[str, Array]:
+    """Integrals of the shapes phi_k, with x~ the matrix of the cross product with the position x.
+
+    Inv3 (3, r) of phi_k, Inv4 (3, r) of x x phi_k, Inv8 (3, r, 3) of -x~ phi~_j, Inv5 (3, r, r) of
+    phi_j x phi_k, Inv9 (3, r, r, 3) of phi~_j phi~_k, with the numbers of MBDyn.
+    """
+    eye = np.eye(3)
+    dot = np.einsum("aak->k", body.Ibar_kl)
+    both = np.einsum("aajk->jk", body.S_kl)
+    return {
+        "Inv3": body.S,
+        "Inv4": np.einsum("cab,abk->ck", EPS, body.Ibar_kl),
+        "Inv8": np.einsum("j,ac->ajc", dot, eye) - body.Ibar_kl.transpose(1, 2, 0),
+        "Inv5": np.einsum("cab,abjk->cjk", EPS, body.S_kl),
+        # phi~_j phi~_k = phi_k phi_j^T - (phi_j . phi_k) 1
+        "Inv9": body.S_kl.transpose(1, 2, 3, 0) - np.einsum("jk,ac->ajkc", both, eye),
+    }
+
+
 def _inertia(body: FlexibleBody, K: dict[str, Array]) -> dict[str, Taylor]:
-    r, X, S = body.n_modes, body.Ibar_kl, body.S_kl
-    dot = np.einsum("aak->k", X)
-    C4 = X.transpose(2, 1, 0) - dot[:, None, None] * np.eye(3)  # (r, 3, 3)
-    cross = np.einsum("cab,abji->jic", EPS, S)  # integral of phi_j x phi_i
+    r, X, S, integrals = body.n_modes, body.Ibar_kl, body.S_kl, invariants(body)
+    C4 = -integrals["Inv8"].swapaxes(0, 1)  # (r, 3, 3)
+    cross = integrals["Inv5"].transpose(1, 2, 0)  # of phi_j x phi_i
     Oe0 = np.stack([_product(X, a, b) for a, b in PRODUCTS], axis=1)
     Oe1 = np.stack([_product(S, a, b) for a, b in PRODUCTS], axis=-1)  # (r, r, 6), by j and i
     cross = 0.5 * (cross - cross.swapaxes(0, 1))  # to the last digit: it must do no work
@@ -60,9 +78,7 @@ def _inertia(body: FlexibleBody, K: dict[str, Array]) -> dict[str, Taylor]:
         "mdCM": Taylor(body.first_moment[:, None], body.S.T[:, :, None]),
         "J": Taylor(body.inertia, -(C4 + C4.swapaxes(1, 2))),
         "Ct": Taylor(body.S.T, _loads(K, LINEAR_LOADS, r)),
-        "Cr": Taylor(
-            np.einsum("cab,abk->kc", EPS, X), cross + _loads(K, ANGULAR_LOADS, r, zero=True)
-        ),
+        "Cr": Taylor(integrals["Inv4"].T, cross + _loads(K, ANGULAR_LOADS, r, zero=True)),
         "Gr": Taylor(-2 * _by_axis(C4)),
         "Ge": Taylor(2 * _by_axis(cross)),
         "Oe": Taylor(Oe0, Oe1 + _loads(K, CENTRIFUGAL_LOADS, r, zero=True)),

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from rom.arguments import one_of, typed
+from rom.body.reference import skew_tensor
 from rom.errors import FileFormatError, warn
 from rom.io.sid.format import (
     BLOCKS,
@@ -143,9 +144,7 @@ def _tilted(M1: Array | None, psi: Array) -> float:
 
 def _skew(a: Array) -> Array:
     """(k, 3, 3) matrices of the cross products with (k, 3) vectors."""
-    x, y, z = np.asarray(a).T
-    zero = np.zeros_like(x)
-    return np.array([[zero, -z, y], [z, zero, -x], [-y, x, zero]]).transpose(2, 0, 1)
+    return np.einsum("abc,kc->kab", skew_tensor(), a)
 
 
 def _relative(A: Array, B: Array, floor: float) -> float:

@@ -107,8 +107,7 @@ def write_sid(record: StandardInput, path: str | Path, *, dialect: str = "fembs"
     """
     one_of("dialect", dialect, DIALECTS)
     text = "\n".join(_document(record, dialect)) + "\n"
-    write_whole(path, lambda file: file.write(text.encode("ascii", "replace")))
-    return Path(path)
+    return write_whole(path, text.encode("ascii", "replace"))
 
 
 def repacked(A: Array, *, by_axis: bool) -> Array:
@@ -185,17 +184,11 @@ def _structure(name: str, M0: Array, M1: Array | None) -> int:
     changes = M1 is not None and M1.any()
     if not M0.any() and not changes:
         return ZERO
-    square = M0.shape[0] == M0.shape[1]
-    if square and not changes and np.array_equal(M0, np.eye(len(M0))):
+    if M0.shape[0] == M0.shape[1] and not changes and np.array_equal(M0, np.eye(len(M0))):
         return UNIT
-    if (
-        square
-        and not changes
-        and name in ALWAYS_SYMMETRIC
-        and not (M0 - np.diag(np.diag(M0))).any()
-    ):
-        return DIAGONAL
-    return SYMMETRIC if square and name in ALWAYS_SYMMETRIC else GENERAL
+    if M0.shape[0] != M0.shape[1] or name not in ALWAYS_SYMMETRIC:
+        return GENERAL
+    return SYMMETRIC if changes or (M0 - np.diag(np.diag(M0))).any() else DIAGONAL
 
 
 def _indented(depth: int, text: str) -> str:

@@ -370,7 +370,7 @@ def test_cells_inverted_near_a_corner_alone_are_refused(kind):
     At 0.26 of the edge from the middle, every quadrature point still has a positive determinant.
     """
     bad = pulled(kind, 0.26)
-    at_points = jacobians(bad.points[bad.cells], bad.kind.gradients(bad.kind.quadrature))
+    at_points = jacobians(bad.points[bad.cells], bad.kind.gradients(bad.kind.quadrature[0]))
     assert at_points.min() > 0.02 * at_points.max()
     with pytest.raises(MeshError, match="inverted: the Jacobian changes sign inside"):
         validate(bad)
@@ -397,7 +397,7 @@ def test_the_smallest_determinant_of_a_curved_cell_is_found(kind):
     kind, rng = CELL_TYPES[kind], np.random.default_rng(3)
     x = kind.nodes + 0.1 * rng.standard_normal((400, kind.n_nodes, 3))
     corners = jacobians(x, kind.gradients(np.array(kind.corners, dtype=float))).min(axis=1)
-    inside = corners - jacobians(x, kind.gradients(kind.quadrature)).min(axis=1)
+    inside = corners - jacobians(x, kind.gradients(kind.quadrature[0])).min(axis=1)
     x = x[np.argsort(-inside)[:8]]  # smallest far from the corners
     points, cells = x.reshape(-1, 3), np.arange(x.size // 3).reshape(len(x), -1)
     found = smallest_determinants(points, cells, kind, np.full(len(x), 1e-4))

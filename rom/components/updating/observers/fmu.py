@@ -4,7 +4,6 @@ See docs/theory/tracking.md.
 """
 
 import json
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -14,8 +13,9 @@ from rom.components.updating.observers.operation import UNITS
 from rom.components.updating.observers.parameter_tracking import LINEAR_REACH, ParameterTracker
 from rom.components.updating.observers.tracking import Observer
 from rom.io.files import check_writable
-from rom.io.fmu.archive import Content, write_archive
-from rom.io.fmu.body import description, table
+from rom.io.fmu.archive import write_archive
+from rom.io.fmu.body import arrays
+from rom.io.fmu.description import Content
 from rom.io.fmu.variables import Variable, structured
 
 
@@ -51,9 +51,8 @@ def write_observer_fmu(observer: Observer | ParameterTracker, path: str | Path) 
         variables += [Variable(f"{kind}.{name}", "output", unit) for name, unit in outputs]
     dt = observer.dt if isinstance(observer, Observer) else observer.assumed.dt
     about = f"Estimates of {path.stem} from a few sensors, {when}."
-    describe = partial(description, path.stem, about, variables, dt)
     headers = ("filter.h", "states.h")
-    return write_archive(path, Content(path.stem, core, describe, data=text, headers=headers))
+    return write_archive(path, Content(path.stem, about, variables, dt, core, headers, text))
 
 
 Names = tuple[tuple[str, str], ...]
@@ -81,7 +80,7 @@ def _steady(o: Observer) -> str:
     }
     n_v, n = o.W.shape
     sizes = f"enum {{ STATES = {n}, SENSORS = {len(o.C)}, VALUES = {n_v} }};\n"
-    return sizes + "".join(table(name, A) for name, A in tables.items())
+    return sizes + arrays(tables)
 
 
 def _changing(tracker: ParameterTracker) -> str:
@@ -107,4 +106,4 @@ def _changing(tracker: ParameterTracker) -> str:
     numbers = ", ".join(f"{name} = {size}" for name, size in sizes.items())
     names = ", ".join(json.dumps(name) for name in o.names)
     text = f"enum {{ {numbers} }};\nstatic const char *const NAMES[] = {{{names}}};\n"
-    return text + "".join(table(name, A) for name, A in tables.items())
+    return text + arrays(tables)

@@ -19,15 +19,13 @@ from rom.decks.keywords import Block, Sets
 from rom.decks.lines import Unread
 from rom.decks.nodes import NODE_KEYWORDS, SET_OPTIONS, Nodes, Table
 from rom.errors import FileFormatError, TagError
+from rom.fe.mesh.cell_types import READ_TYPES
 from rom.fe.mesh.solid import Read, packed
 from rom.fe.mesh.sources.deck import (
-    QUADRATIC_HEX,
     facets_of_nodes,
-    kind_of,
     only_type,
     outer_facets,
     positions,
-    rings,
     to_gmsh,
     unused,
 )
@@ -108,8 +106,7 @@ def _element(deck: Deck, block: Block) -> None:
             deck.skin |= {row[0]: row[1:] for row in rows}
     elif kind.startswith("C3D") and is_whole(digits) and int(digits) in SOLIDS:
         cell_type = SOLIDS[int(digits)]
-        width = 1 + (QUADRATIC_HEX if cell_type == "hex20" else kind_of(cell_type).n_nodes)
-        _new_cells(deck, block, cell_type, _table(block, width))
+        _new_cells(deck, block, cell_type, _table(block, 1 + READ_TYPES[cell_type].n_nodes))
     else:
         deck.unread.add(f"*ELEMENT, TYPE={kind}", block.place)
 
@@ -182,15 +179,7 @@ HARMLESS_KEYWORDS = {  # materials are given here; output
     "SURFACE BEHAVIOR", "FRICTION", "RESTART", "TIME POINTS", "NODE PRINT", "EL PRINT",
     "NODE FILE", "EL FILE", "FILE FORMAT",
 }  # fmt: skip
-LOAD_KEYWORDS = {
-    "STEP",
-    "BOUNDARY",
-    "INITIAL CONDITIONS",
-    "CLOAD",
-    "DLOAD",
-    "DSLOAD",
-    "TEMPERATURE",
-}
+LOAD_KEYWORDS = set("STEP,BOUNDARY,INITIAL CONDITIONS,CLOAD,DLOAD,DSLOAD,TEMPERATURE".split(","))
 
 
 def _regions(deck: Deck, ids: Index) -> tuple[dict[int, str], Index]:
@@ -259,10 +248,10 @@ def _members(sets: Sets, word: str) -> Index:
 def _sides(deck: Deck, row: list[str], ids: Index, cells: Index, cell_type: str) -> Index:
     """(f, kf) facets of one line ``element or set, S1``."""
     members = _members(deck.cell_sets, row[0])
-    kind = kind_of(cell_type)
+    kind = READ_TYPES[cell_type]
     sides = [set(side) for side in SIDES[kind.n_corners]]
     label = row[1].upper() if len(row) > 1 else ""
     if label not in {f"S{i + 1}" for i in range(len(sides))}:
         raise FileFormatError(f"{label!r} is no face of a {kind.shape}; S1 to S{len(sides)} are.")
     face = next(i for i, f in enumerate(kind.faces) if set(f) == sides[int(label[1:]) - 1])
-    return cells[positions(ids, members, "element")][:, rings(cell_type)[face]]
+    return cells[positions(ids, members, "element")][:, kind.face_nodes[face]]

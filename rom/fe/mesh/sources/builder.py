@@ -90,17 +90,15 @@ def _place(error: Exception, path: Path) -> str:
     return f"{path.name}, line {lines[-1]}" if lines else path.name
 
 
-def unmeshable(how: str, where: str = "", *, given: bool) -> MeshError:
+def unmeshable(how: str, *, given: bool) -> MeshError:
     """What is said of a geometry without a mesh: it is a program and does what its values ask for.
 
     Args:
         how: how gmsh ended, by a crash or in its own words.
-        where: name of the file.
         given: whether the geometry was given parameters.
     """
     cause = "with these parameters" if given else "with the values it holds"
     return MeshError(
         f"gmsh ended without a mesh ({how}): the geometry cannot be meshed {cause}.",
-        where=where,
         hint="Check the element size (lc = 0?), lengths that vanish and volumes that overlap.",
     )

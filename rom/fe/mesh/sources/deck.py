@@ -5,37 +5,19 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 
 from rom.errors import FileFormatError, MeshError
-from rom.fe.mesh.cell_types import CELL_TYPES, CellType
+from rom.fe.mesh.cell_types import DECK_EDGES, READ_TYPES
 from rom.fe.mesh.topology import faces_of
 from rom.model import Index
 from rom.names import named
 
-QUADRATIC_HEX = 20  # nodes of a serendipity hexahedron; completed to 27 after reading
-# Mid-edge nodes by their corners, in the order of Abaqus and VTK.
-LOWER_EDGES, UPPER_EDGES = ((0, 1), (1, 2), (2, 3), (3, 0)), ((4, 5), (5, 6), (6, 7), (7, 4))
-UPRIGHT_EDGES = ((0, 4), (1, 5), (2, 6), (3, 7))
-DECK_EDGES = {
-    "tet10": ((0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)),
-    "hex20": (*LOWER_EDGES, *UPPER_EDGES, *UPRIGHT_EDGES),
-}
 Edges = tuple[tuple[int, int], ...]
-WHOLE_TYPES = ("tet4", "hex8")
-
-
-def kind_of(cell_type: str) -> CellType:
-    """Faces and node order; those of hex27 also serve hex20, whose nodes are the first 20."""
-    return CELL_TYPES["hex27" if cell_type == "hex20" else cell_type]
 
 
 def to_gmsh(cells: Index, cell_type: str, edges: Edges | None = None) -> Index:
     """Cells in gmsh order from cells in deck order, mid-edge nodes as in Abaqus or as given."""
-    if cell_type in WHOLE_TYPES:
-        return cells
-    n_corners = kind_of(cell_type).n_corners
-    wanted = [set(s) for s in kind_of(cell_type).supports[n_corners : cells.shape[1]]]
-    listed = [set(e) for e in edges or DECK_EDGES[cell_type]]
-    order = [*range(n_corners), *(n_corners + listed.index(e) for e in wanted)]
-    return cells[:, order]
+    kind = READ_TYPES[cell_type]
+    places = kind.among(edges or DECK_EDGES.get(cell_type, ()))
+    return cells[:, [*range(kind.n_corners), *(kind.n_corners + np.argsort(places))]]
 
 
 def only_type(found: Iterable[str]) -> str:
@@ -55,22 +37,10 @@ def only_type(found: Iterable[str]) -> str:
     return types[0]
 
 
-def rings(cell_type: str) -> list[list[int]]:
-    """For each face, its nodes in gmsh order: corners in turn, then mid-edge nodes in turn."""
-    kind = kind_of(cell_type)
-    n_nodes = QUADRATIC_HEX if cell_type == "hex20" else kind.n_nodes
-    edge = {frozenset(s): i for i, s in enumerate(kind.supports[:n_nodes]) if len(s) == 2}
-    found = []
-    for face in kind.faces:
-        sides = zip(face, face[1:] + face[:1], strict=True)
-        found.append([*face, *(edge[frozenset(s)] for s in sides if edge)])
-    return found
-
-
 def outer_facets(cells: Index, cell_type: str, n_points: int) -> Index:
     """(f, kf) facets of the outer surface."""
-    faces = faces_of(cells, kind_of(cell_type), n_points)
-    listed = cells[:, np.array(rings(cell_type))]
+    faces = faces_of(cells, READ_TYPES[cell_type], n_points)
+    listed = cells[:, np.array(READ_TYPES[cell_type].face_nodes)]
     return listed[faces.count[faces.of_cell] == 1]
 
 
@@ -82,7 +52,7 @@ def facets_of_nodes(
     for name, nodes in sets.items():
         chosen = np.zeros(n_points, dtype=bool)
         chosen[nodes] = True
-        rows = outer[chosen[outer[:, : kind_of(cell_type).corners_per_face]].all(axis=1)]
+        rows = outer[chosen[outer[:, : READ_TYPES[cell_type].corners_per_face]].all(axis=1)]
         if 0 < len(rows) < len(outer):
             facets[name] = rows
         else:

@@ -80,7 +80,7 @@ def collect(gmsh: Any, declared: Path, *, strict: bool, repeated: bool) -> Read:
         np.repeat([region[volume] for volume in blocks], counts),
         np.concatenate([ids for ids, _ in blocks.values()]),
         facets=facets,
-        region_names=_region_names(groups),
+        region_names={tag: name for (dim, tag), name in groups.items() if dim == 3} or {1: "body"},
         warnings=_remarks(groups) if strict else [],
     )
 
@@ -107,10 +107,6 @@ def _check_names(names: dict[tuple[int, int], str]) -> None:
                 hint="Give each group its own name.",
             )
         seen[name] = what
-
-
-def _region_names(groups: dict[tuple[int, int], str]) -> dict[int, str]:
-    return {tag: name for (dim, tag), name in groups.items() if dim == 3} or {1: "body"}
 
 
 def _remarks(groups: dict[tuple[int, int], str]) -> list[str]:

@@ -49,12 +49,7 @@ def run(request: dict[str, Any]) -> Read:
         notes["axes"] = {name: asdict(axis) for name, axis in axes(gmsh).items()}
         if EVERY_FACE in request["faces"].values():
             notes["faces"] = [asdict(face) for face in faces(gmsh)]
-        notes["provenance"] = {
-            "gmsh": gmsh.option.getString("General.Version"),
-            "parameters": values,
-            **({"faces": picked} if picked else {}),
-            "gmsh_warnings": _log(gmsh, "Warning"),
-        }
+        notes["provenance"] = _provenance(gmsh, values) | ({"faces": picked} if picked else {})
         doubts = (scaled_doubt(name, values[name], x) for name, x in defaults.items())
         notes["warnings"] = [*notes["warnings"], *filter(None, doubts)]
         return arrays, notes
@@ -79,9 +74,7 @@ def complaints(gmsh: Any, kind: type[RomError] = FileFormatError) -> Iterator[No
     """Turn gmsh's exceptions into errors with its own words, file and line."""
     try:
         yield
-    except RomError:
-        raise
-    except MemoryError:
+    except (RomError, MemoryError):
         raise
     except Exception as error:  # gmsh raises bare Exception
         text = _complaint(gmsh, error)
@@ -188,12 +181,12 @@ def _flat(gmsh: Any, request: dict[str, Any], values: dict[str, Any]) -> Read:
         with complaints(gmsh, MeshError):
             gmsh.model.mesh.generate(2)
     arrays, notes = triangles(gmsh)
-    notes["provenance"] = {
-        "gmsh": gmsh.option.getString("General.Version"),
-        "parameters": values,
-        "gmsh_warnings": _log(gmsh, "Warning"),
-    }
-    return arrays, notes
+    return arrays, notes | {"provenance": _provenance(gmsh, values)}
+
+
+def _provenance(gmsh: Any, values: dict[str, Any]) -> dict[str, Any]:
+    number = gmsh.option.getString("General.Version")
+    return {"gmsh": number, "parameters": values, "gmsh_warnings": _log(gmsh, "Warning")}
 
 
 def _generate(gmsh: Any, request: dict[str, Any], declared: Path) -> None:
@@ -203,7 +196,12 @@ def _generate(gmsh: Any, request: dict[str, Any], declared: Path) -> None:
     gmsh.option.setNumber("General.NumThreads", 1)
     if gmsh.option.getNumber("Mesh.Algorithm3D") == HXT_ALGORITHM:
         gmsh.option.setNumber("Mesh.Algorithm3D", 1)
-    _check_order(gmsh.option.getNumber("Mesh.ElementOrder"))
+    if (wanted := gmsh.option.getNumber("Mesh.ElementOrder")) > HIGHEST_ORDER:
+        # cells of high order take minutes to make, and no element here has them
+        raise MeshError(
+            f"Mesh.ElementOrder = {wanted:g}: cells have first or second order.",
+            hint="Leave the order out, or write Mesh.ElementOrder = 2.",
+        )
     order = request["order"] or HIGHEST_ORDER
     gmsh.option.setNumber("Mesh.ElementOrder", order)
     gmsh.write(str(declared))
@@ -216,15 +214,6 @@ def _generate(gmsh: Any, request: dict[str, Any], declared: Path) -> None:
             raise builder.unmeshable(_complaint(gmsh, error), given=given) from error
     else:  # the geometry has made its mesh itself
         gmsh.model.mesh.setOrder(order)
-
-
-def _check_order(order: float) -> None:
-    """Cells of high order take minutes to make, and no element here has them."""
-    if order > HIGHEST_ORDER:
-        raise MeshError(
-            f"Mesh.ElementOrder = {order:g}: cells have first or second order.",
-            hint="Leave the order out, or write Mesh.ElementOrder = 2.",
-        )
 
 
 MAKERS = {"geo": _geo, "builder": builder.make, "step": step.make, "msh": _msh}

@@ -12,11 +12,9 @@ import numpy as np
 
 from rom.decks.bulk import POINTS, Card, cards, grids
 from rom.decks.lines import Unread
+from rom.fe.mesh.cell_types import LOWER_EDGES, UPPER_EDGES, UPRIGHT_EDGES
 from rom.fe.mesh.solid import Read, packed
 from rom.fe.mesh.sources.deck import (
-    LOWER_EDGES,
-    UPPER_EDGES,
-    UPRIGHT_EDGES,
     facets_of_nodes,
     only_type,
     outer_facets,
@@ -27,24 +25,12 @@ from rom.fe.mesh.sources.deck import (
 from rom.model import Index
 
 SOLIDS = {"CTETRA": {4: "tet4", 10: "tet10"}, "CHEXA": {8: "hex8", 20: "hex20"}}
-EDGES = {
-    "hex20": (*LOWER_EDGES, *UPRIGHT_EDGES, *UPPER_EDGES)
-}  # mid-edge nodes where not as in Abaqus
+# mid-edge nodes where not as in Abaqus
+EDGES = {"hex20": (*LOWER_EDGES, *UPRIGHT_EDGES, *UPPER_EDGES)}
 SKIN_CARDS = {"CTRIA3": 3, "CTRIA6": 3, "CQUAD4": 4, "CQUAD8": 4}  # corners
 LINES = ("CBAR",)  # without a property, as gmsh writes curves
 MESH_CARDS = {*POINTS, *SOLIDS, *SKIN_CARDS, "SPC", "SPC1"}
-HARMLESS_CARDS = (
-    "PARAM",
-    "MAT",
-    "EIG",
-    "TABLE",
-    "PSOLID",
-    "PLSOLID",
-    "SET1",
-    "SET3",
-    "PLOTEL",
-    "ECHO",
-)
+HARMLESS_CARDS = tuple("PARAM MAT EIG TABLE PSOLID PLSOLID SET1 SET3 PLOTEL ECHO".split())
 # loads, supports, steps, and what a reduction there holds
 LOAD_CARDS = set(
     "FORCE FORCE1 FORCE2 MOMENT MOMENT1 MOMENT2 PLOAD PLOAD1 PLOAD2 PLOAD4 GRAV ACCEL ACCEL1 "

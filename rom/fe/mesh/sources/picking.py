@@ -9,7 +9,7 @@ import numpy as np
 from rom.errors import TagError
 from rom.fe.mesh.cad import Face
 from rom.fe.mesh.picks import EVERY_FACE, Pick, picks
-from rom.fe.mesh.solid import MAX_SHOWN
+from rom.fe.mesh.solid import MAX_SHOWN, shown
 from rom.fe.mesh.sources.cad_faces import faces, surfaces
 from rom.fe.mesh.sources.step import diagonal, group
 from rom.model import Array
@@ -97,9 +97,7 @@ class Picker:
             return found
         count = Counter(f"{r:.6g}" for r in known.values())
         near = sorted(count, key=lambda text: abs(float(text) - wanted))
-        listed = ", ".join(
-            f"{r} ({count[r]} face{'s' * (count[r] > 1)})" for r in near[:MAX_SHOWN]
-        ) + (", ..." if len(near) > MAX_SHOWN else "")
+        listed = shown([f"{r} ({count[r]} face{'s' * (count[r] > 1)})" for r in near])
         there = f"The nearest radii are {listed} m." if near else "The part has no cylinder face."
         raise TagError(f"no cylinder face has the radius {wanted:g} m.", hint=there)
 
@@ -113,9 +111,9 @@ class Picker:
             return [found[0].number]
         if found:
             joined = "+".join(str(f.number) for f in found[:2])
+            listed = shown([f"{f.number} (middle {_words(f.middle)} m)" for f in found])
             raise TagError(
-                f"{len(found)} plane faces have the outward normal {wish.text[7:]}: "
-                f"{_listed(found)}.",
+                f"{len(found)} plane faces have the outward normal {wish.text[7:]}: {listed}.",
                 hint=f"Pick one by its number or by a point on it, or several as {joined}.",
             )
         near = sorted(planes, key=lambda f: angle[f.number])[:MAX_SHOWN]
@@ -127,11 +125,6 @@ class Picker:
 def _angle(a: Array, b: Array) -> float:
     """Angle between unit vectors [rad]."""
     return float(2 * np.arctan2(np.linalg.norm(a - b), np.linalg.norm(a + b)))
-
-
-def _listed(found: list[Face]) -> str:
-    words = [f"{f.number} (middle {_words(f.middle)} m)" for f in found[:MAX_SHOWN]]
-    return ", ".join(words) + (", ..." if len(found) > MAX_SHOWN else "")
 
 
 def _words(x: tuple[float, ...]) -> str:

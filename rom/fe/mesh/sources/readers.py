@@ -1,6 +1,7 @@
 """The readers, by name; runs in the child process of `rom.fe.mesh.child`."""
 
 from collections.abc import Callable
+from importlib import import_module
 from typing import Any
 
 from rom.errors import FileFormatError, ResourceError, RomError
@@ -40,14 +41,9 @@ def read(request: dict[str, Any]) -> Read:
 
 def _reader(name: str) -> Callable[[dict[str, Any]], Read]:
     """The reading function; only its own libraries are loaded."""
-    if name == "abaqus":
-        from rom.fe.mesh.sources import abaqus
+    if name in ("abaqus", "nastran"):
+        read_deck = import_module(f"rom.fe.mesh.sources.{name}").read
+        return lambda request: read_deck(request["path"])
+    from rom.fe.mesh.sources.gmsh_session import run
 
-        return lambda request: abaqus.read(request["path"])
-    if name == "nastran":
-        from rom.fe.mesh.sources import nastran
-
-        return lambda request: nastran.read(request["path"])
-    from rom.fe.mesh.sources import gmsh_session
-
-    return gmsh_session.run
+    return run

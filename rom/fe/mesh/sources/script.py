@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from rom.errors import FileFormatError, UnsafeFileError
+from rom.errors import FileFormatError, UnsafeFileError, in_file
 
 # What may stand before a bracket, a text or another word: geometry, control, functions, mesh sizes
 KNOWN_WORDS = frozenset("""
@@ -101,22 +101,21 @@ def _check(path: Path, around: tuple[Path, ...], seen: list[Path]) -> None:
             hint="Take the Include out.",
         )
     seen.append(real)
-    if len(seen) > MOST_FILES or path.stat().st_size > MOST_BYTES:
-        raise UnsafeFileError(
-            f"{path.name} is script number {len(seen)} of at most {MOST_FILES}, or larger than "
-            f"{MOST_BYTES / 1e6:g} MB.",
-            where=_where(path, around),
-            hint="Merge data as .msh files.",
-        )
-    where = _where(path, around)
-    tokens = list(_tokens(path, where))
-    for line, why in _refusals(tokens):
-        raise UnsafeFileError(
-            f"line {line}: {why}.",
-            where=where,
-            hint="Read the file and take that out: a geometry needs no such command.",
-        )
-    for command, name in _read_files(tokens, where):
+    with in_file(_where(path, around)):
+        if len(seen) > MOST_FILES or path.stat().st_size > MOST_BYTES:
+            raise UnsafeFileError(
+                f"{path.name} is script number {len(seen)} of at most {MOST_FILES}, or larger than "
+                f"{MOST_BYTES / 1e6:g} MB.",
+                hint="Merge data as .msh files.",
+            )
+        tokens = list(_tokens(path))
+        for line, why in _refusals(tokens):
+            raise UnsafeFileError(
+                f"line {line}: {why}.",
+                hint="Read the file and take that out: a geometry needs no such command.",
+            )
+        files = list(_read_files(tokens))
+    for command, name in files:
         _check_read(path.parent / name, command, (*around, real), seen)
     _check_read(Path(f"{path}.opt"), INCLUDE_COMMAND, (*around, real), seen)  # gmsh runs it as well
 
@@ -156,7 +155,7 @@ def _start(path: Path) -> bytes:
         return stream.read(16)
 
 
-def _tokens(path: Path, where: str) -> Iterator[Token]:
+def _tokens(path: Path) -> Iterator[Token]:
     """Words, texts and signs, without comments and numbers.
 
     Raises:
@@ -172,7 +171,6 @@ def _tokens(path: Path, where: str) -> Iterator[Token]:
         if kind == "open" or hidden or long or b"\0" in value:
             raise UnsafeFileError(
                 f"line {line}: what is text here and what a command cannot be told.",
-                where=where,
                 hint="Close every text and comment, keep texts short, and put a blank before "
                 "quotes and comments.",
             )
@@ -235,7 +233,7 @@ def _kind_of_field(tokens: list[Token], k: int) -> Token | None:
     return tokens[end + 1] if end + 1 < len(tokens) and tokens[end].value == "=" else None
 
 
-def _read_files(tokens: list[Token], where: str) -> Iterator[tuple[str, str]]:
+def _read_files(tokens: list[Token]) -> Iterator[tuple[str, str]]:
     """Commands that read files, with the names of these."""
     for k, token in enumerate(tokens):
         if token.kind != "word" or token.value not in (INCLUDE_COMMAND, *MERGE_COMMANDS):
@@ -245,7 +243,6 @@ def _read_files(tokens: list[Token], where: str) -> Iterator[tuple[str, str]]:
         if name is None:
             raise UnsafeFileError(
                 f"line {token.line}: which file {token.value} reads cannot be told from the text.",
-                where=where,
                 hint=f'Write its name as a text: {token.value} "part.geo";',
             )
         yield token.value, name

@@ -13,7 +13,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from rom.errors import ConfigError, FileFormatError, MeshError, TagError
-from rom.fe.mesh.solid import MAX_SHOWN, Made
+from rom.fe.mesh.solid import Made, shown
 from rom.fe.mesh.sources.cad_faces import surfaces
 from rom.names import named
 
@@ -69,12 +69,11 @@ def _check_solid(gmsh: Any) -> None:
             f"the STEP file contains no solid{what}.",
             hint="Let the CAD program close the faces to a solid body, and export that.",
         )
-    if (n_parts := _parts(gmsh, solids)) > 1:
+    if _parts(gmsh, solids) > 1:
         volumes = sorted((gmsh.model.occ.getMass(3, tag) for tag in solids), reverse=True)
-        listed = ", ".join(f"{v:.4g}" for v in volumes[:MAX_SHOWN])
-        more = ", ..." if n_parts > MAX_SHOWN else ""
+        listed = shown([f"{v:.4g}" for v in volumes])
         raise MeshError(
-            f"the STEP file holds {len(solids)} solids, of {listed}{more} m^3, that share no face; "
+            f"the STEP file holds {len(solids)} solids, of {listed} m^3, that share no face; "
             "one model is one body.",
             hint="Unite them in the CAD program if they are one part, for solids that only touch "
             "are not connected; else export each into a file of its own and join them in a "

@@ -17,12 +17,12 @@ import numpy as np
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 from scipy.sparse import coo_matrix, csr_matrix
 
-from rom.fe.operators.factor import BLOCK_SIZE, MEMORY_ERRORS
+from rom.fe.operators.factor import MEMORY_ERRORS, in_blocks
 from rom.fe.operators.memory import allowed_bytes, give_back
 from rom.fe.operators.solver import Solver
 from rom.fe.operators.substructures.mumps import Inside, elimination_order, library
 from rom.model import Array, Index
-from rom.process.stopwatch import FACTORISATION_PIECE, FLOPS_NOTE, SOLUTION_PIECE, note, piece
+from rom.process.stopwatch import FACTORISATION_PIECE, FLOPS_NOTE, note, piece
 
 MAX_BORDER_RATIO = 1.0  # flops of the border, which every rank spends, over those of an inside
 MAX_CLIQUE_RATIO = 10.0  # pairs of nodes on a border over entries of the matrix: slow to order
@@ -70,12 +70,7 @@ class SubstructuredFactor:
 
     def solve(self, F: Array) -> Array:
         """A^-1 F for (n_local, k) right-hand sides, in blocks."""
-        X = np.empty(F.shape, order="F")
-        for first in range(0, F.shape[1], BLOCK_SIZE):
-            columns = slice(first, min(first + BLOCK_SIZE, F.shape[1]))
-            with piece(SOLUTION_PIECE):
-                self._solve(F[:, columns], X[:, columns])
-        return X
+        return in_blocks(self._solve, F)
 
     def _solve(self, F: Array, X: Array) -> None:
         """Fill (n_local, k) solutions X."""
