@@ -2,7 +2,9 @@
 
 import os
 
-from cases.paths import PYTHONPATH
+from cases.command import python
+from cases.paths import PYTHONPATH, RANKS, ROOT
+from rom.process.mpirun import mpirun
 
 ENVIRONMENT = os.environ | {
     "PYTHONPATH": PYTHONPATH,
@@ -11,3 +13,10 @@ ENVIRONMENT = os.environ | {
     "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
     "OMPI_MCA_mpi_yield_when_idle": "1",
 }
+
+
+def under_mpi(n, script, *arguments):
+    """Finished process of a script of this folder on n ranks, its texts captured."""
+    return python(
+        RANKS / script, *arguments, launcher=mpirun(n), env=ENVIRONMENT, timeout=600, cwd=ROOT
+    )
