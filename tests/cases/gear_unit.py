@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from benchmarks.units import RigidShaft, with_shafts
 from rom.components.gear_mesh import GearPair, Mesh, MeshForce, Slices
 from rom.components.gear_mesh.gears.geometry import involute, path_of_contact
 from rom.components.journal_bearing import Groove, JournalBearing
@@ -25,6 +26,8 @@ LOADS, MAX_CORRECTIONS, MAX_STEP = (0.01, 0.03, 0.1, 0.25, 0.5, 1.0), 80, 0.1
 
 
 NODES = np.linspace(0, 0.2, 5)
+SPAN = 0.2
+SIZES = ((9.0, 6e-2, 1.3e-2), (60.0, 1.6, 3.0))  # mass, inertia across and about, if rigid
 
 
 def journal(direction, clearance=50e-6):
@@ -49,6 +52,11 @@ def unit(torque=200.0, speed=100 * np.pi, helix=0.0, width=0.04, clearance=50e-6
     ]  # fmt: skip
     mesh = Mesh(pair, 15e9, damping=2e-6)
     return Transmission(*rotors, mesh, speed, torque * 157 / 26, 0.02, **more)
+
+
+def rigid_unit(**more):
+    """`unit` with rigid shafts."""
+    return with_shafts(unit(**more), tuple(RigidShaft(*size, SPAN) for size in SIZES))
 
 
 def plane(unit):

@@ -1,9 +1,16 @@
 """Wheels for tests: rings of masses, rings of beams, and solid bladed disks of bricks."""
 
 import numpy as np
+import pytest
 from scipy.sparse import csr_matrix, identity, kron
 
 from rom.components.wheels.sector import CyclicSector
+
+MARKS = [  # of modules on wheels of finite elements
+    pytest.mark.fenicsx,
+    pytest.mark.filterwarnings("ignore::rom.errors.RomWarning"),
+    pytest.mark.filterwarnings("ignore:Number of integration points"),
+]
 
 
 def mass_ring(N, k=3.0e5, coupling=0.7e5, m=0.4):

@@ -8,18 +8,14 @@ from numpy.testing import assert_allclose
 from scipy.sparse import csr_matrix
 
 import rom
-from cases.wheels import bladed_model
+from cases.wheels import MARKS, bladed_model
 from rom.components.wheels.blades.blade import cut, region, root_of
 from rom.eigen.scipy import SciPyOperators
 from rom.eigen.verbs import dofs_of
 from rom.errors import ConfigError, InterfaceError, ModelError
 
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")
-pytestmark = [
-    pytest.mark.fenicsx,
-    pytest.mark.filterwarnings("ignore::rom.errors.RomWarning"),
-    pytest.mark.filterwarnings("ignore:Number of integration points"),
-]
+pytestmark = MARKS
 N, ORDER, ZETA = 6, 2, 2e-3
 SIZES = {"cells": (6, 2, 3, 2), "blade": (2, 4)}
 

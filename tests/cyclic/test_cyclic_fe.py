@@ -5,15 +5,11 @@ import pytest
 from numpy.testing import assert_allclose
 
 import rom
-from cases.wheels import bladed_model, ring_frequency
+from cases.wheels import MARKS, bladed_model, ring_frequency
 from rom.errors import InterfaceError
 
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")
-pytestmark = [
-    pytest.mark.fenicsx,
-    pytest.mark.filterwarnings("ignore::rom.errors.RomWarning"),
-    pytest.mark.filterwarnings("ignore:Number of integration points"),
-]
+pytestmark = MARKS
 N = 6
 SIZES = {"degree": 1, "cells": (4, 2, 2, 2)}
 
@@ -112,16 +108,22 @@ def test_the_geometry_is_a_sector_with_a_blade(bladed_disk):
 
 
 @pytest.mark.parametrize(
-    ("parameters", "culprit"),
-    [({"N": 7.5}, "whole number of sectors"), ({"r_rim": 0.3}, "r_rim = 0.3"),
-     ({"chord": 0.05}, "foot of the blade")],
-)  # fmt: skip
-def test_impossible_wheels_are_named(parameters, culprit):
+    ("geometry", "parameters", "culprit"),
+    [
+        ("bladed_disk", {"N": 7.5}, "whole number of sectors"),
+        ("bladed_disk", {"r_rim": 0.3}, "r_rim = 0.3"),
+        ("bladed_disk", {"chord": 0.05}, "foot of the blade"),
+        ("rotor", {"N": 7.5}, "whole number of sectors"),
+        ("rotor", {"d": 0.3}, "d = 0.3 < d_1 = 0.28"),
+        ("rotor", {"w": 0.5}, "discs of width w = 0.5"),
+    ],
+)
+def test_impossible_wheels_and_rotors_are_named(geometry, parameters, culprit):
     from rom.errors import ConfigError
     from rom.fe.mesh.read import read_mesh
 
     with pytest.raises(ConfigError, match=culprit):
-        read_mesh("meshes/bladed_disk.geo", parameters=parameters)
+        read_mesh(f"meshes/{geometry}.geo", parameters=parameters)
 
 
 def test_an_axis_through_the_sector_is_no_axis_of_its_wheel(bladed_disk):

@@ -1,8 +1,6 @@
 """A sector shared among ranks is the sector of one process, on each of them."""
 
 import json
-import subprocess
-import sys
 from itertools import chain
 
 import numpy as np
@@ -10,10 +8,9 @@ import pytest
 from numpy.testing import assert_allclose
 
 from cases.paths import RANKS, ROOT
-from rom.process.mpirun import mpirun
+from cases.ranks.environment import on_ranks
 
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")
-from cases.ranks.environment import ENVIRONMENT
 from cases.ranks.sectors_under_mpi import wheel
 from rom.fe.operators.workers import shared_out
 
@@ -21,17 +18,12 @@ pytestmark = [
     pytest.mark.fenicsx, pytest.mark.mpi,
     pytest.mark.filterwarnings("ignore::rom.errors.RomWarning"),
 ]  # fmt: skip
-SCRIPT = RANKS / "sectors_under_mpi.py"
 
 
 @pytest.fixture(scope="module", params=[2, 3])
 def every(tmp_path_factory, request):
     file = tmp_path_factory.mktemp("sectors") / "ranks.json"
-    done = subprocess.run(
-        [*mpirun(request.param), sys.executable, str(SCRIPT), str(file)],
-        env=ENVIRONMENT, timeout=600, capture_output=True, text=True, check=False,
-        cwd=ROOT,
-    )  # fmt: skip
+    done = on_ranks(request.param, RANKS / "sectors_under_mpi.py", file)
     assert file.exists(), done.stderr
     return json.loads(file.read_text())
 

@@ -113,7 +113,6 @@ def test_wrong_arguments_are_named():
 @pytest.mark.filterwarnings("ignore:Number of integration points")
 def test_a_mistuned_wheel_of_finite_elements():
     """Frequencies and peaks of the whole wheel within 1 %, from full and from reduced sectors."""
-    pytest.importorskip("dolfinx", reason="dolfinx is not installed")
     N, order, zeta = 6, 2, 2e-3
     model = bladed_model(N, degree=1, cells=(4, 2, 3, 2))
     sector = rom.CyclicSector.from_model(model, fixed=("bore",), regions=("blade",))

@@ -9,16 +9,12 @@ from scipy.optimize import brentq, fsolve
 from scipy.special import iv, ivp, jv, jvp, kv, kvp, yv, yvp
 
 import rom
-from cases.wheels import model_of, revolved_mesh
+from cases.wheels import MARKS, model_of, revolved_mesh
 from rom.components.transmission import Disc
 from rom.errors import ConfigError, InterfaceError
 
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")
-pytestmark = [
-    pytest.mark.fenicsx,
-    pytest.mark.filterwarnings("ignore::rom.errors.RomWarning"),
-    pytest.mark.filterwarnings("ignore:Number of integration points"),
-]
+pytestmark = MARKS
 STEEL = rom.Material(E=211e9, nu=211e9 / (2 * 81.2e9) - 1, rho=7810.0)
 
 
@@ -216,15 +212,3 @@ def test_springs_that_hold_nothing_are_refused(published):
     small = rom.reduce_sector(published, n_modes=5)
     with pytest.raises(InterfaceError, match="nodes of 'cyclic_low'"):
         rom.supported_sector(small, face, across=1.0)
-
-
-@pytest.mark.parametrize(
-    ("parameters", "culprit"),
-    [({"N": 7.5}, "whole number of sectors"), ({"d": 0.3}, "d = 0.3 < d_1 = 0.28"),
-     ({"w": 0.5}, "discs of width w = 0.5")],
-)  # fmt: skip
-def test_impossible_rotors_are_named(parameters, culprit):
-    from rom.fe.mesh.read import read_mesh
-
-    with pytest.raises(ConfigError, match=culprit):
-        read_mesh("meshes/rotor.geo", parameters=parameters)

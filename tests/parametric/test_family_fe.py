@@ -1,7 +1,5 @@
 """Bodies with parameters from finite elements: named regions, stress, any number of processes."""
 
-import subprocess
-import sys
 from dataclasses import replace
 
 import numpy as np
@@ -10,13 +8,12 @@ from numpy.testing import assert_allclose
 
 import rom
 from cases.long import SHARED_BY
-from cases.panels import ALLOY, FOAM, KINDS, PARAMETERS, ROOT, panel
+from cases.panels import ALLOY, FOAM, KINDS, PARAMETERS, panel
 from cases.paths import RANKS
-from cases.ranks.environment import ENVIRONMENT
+from cases.ranks.environment import on_ranks
 from rom.components.families.affine import AffineModel
 from rom.eigen.scipy import SciPyOperators
 from rom.eigen.verbs import rigid_motions
-from rom.process.mpirun import mpirun
 from rom.reduction.full_model import mesh_operators
 
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")
@@ -151,11 +148,7 @@ def families(tmp_path_factory):
     """The same script on one process and on several."""
     folder = tmp_path_factory.mktemp("families")
     for n in (1, *SHARED_BY):
-        done = subprocess.run(
-            [*mpirun(n), sys.executable,
-             str(RANKS / "family_under_mpi.py"), "material", str(folder / f"{n}.npz")],
-            env=ENVIRONMENT, timeout=600, capture_output=True, text=True, check=False, cwd=ROOT,
-        )  # fmt: skip
+        done = on_ranks(n, RANKS / "family_under_mpi.py", "material", folder / f"{n}.npz")
         assert (folder / f"{n}.npz").exists(), done.stderr
     return {n: rom.load(folder / f"{n}.npz") for n in (1, *SHARED_BY)}
 

@@ -1,7 +1,5 @@
 """Layers that change their thickness against models meshed with that thickness."""
 
-import subprocess
-import sys
 from dataclasses import replace
 
 import numpy as np
@@ -10,16 +8,16 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.sparse import csr_matrix
 
 import rom
-from cases.layers import KINDS, LAYERS, ROOT, families, panel
+from cases.layers import KINDS, LAYERS, families, panel
 from cases.long import ROM_LONG, SHARED_BY
 from cases.paths import RANKS
+from cases.ranks.environment import on_ranks
 from cases.solid import STEEL, block
 from rom.body.reference import rigid_elastic
 from rom.components.families.layers import Stretch
 from rom.components.families.stretched import StretchedModel
 from rom.eigen.verbs import rigid_motions
 from rom.errors import FileFormatError, ParameterError
-from rom.process.mpirun import mpirun
 
 AXES = "xyz"
 
@@ -213,7 +211,6 @@ POINT = {"t_core": 1.5, "t_faces": 0.8}
 @pytest.mark.fenicsx
 def test_core_and_faces_of_a_panel_change_their_thickness():
     """The mesh of another thickness is the same mesh stretched."""
-    pytest.importorskip("dolfinx", reason="dolfinx is not installed")
     body, full = families(panel()).at(**POINT), panel(**POINT)
     core, faces = 0.4 * 0.1 * 0.03 * 60.0, 0.4 * 0.1 * 0.0032 * 2700.0
     assert_allclose(body.mass, core + faces, rtol=1e-11)
@@ -233,7 +230,6 @@ def test_core_and_faces_of_a_panel_change_their_thickness():
 @pytest.mark.fenicsx
 def test_faces_of_one_thickness_move_with_the_core():
     """Nothing stretches the faces, but the rigid motions of the whole change."""
-    pytest.importorskip("dolfinx", reason="dolfinx is not installed")
     family = rom.reduce_parametric(
         panel(), parameters={"t": rom.Thickness("core", 0.7, 1.8)}, method=rom.CraigBampton(16),
         interfaces=KINDS, certify=False,
@@ -246,7 +242,6 @@ def test_faces_of_one_thickness_move_with_the_core():
 
 @pytest.mark.fenicsx
 def test_the_terms_of_the_stiffness_are_those_of_the_stretched_mesh():
-    pytest.importorskip("dolfinx", reason="dolfinx is not installed")
     parameters = LAYERS | {"E": rom.YoungsModulus("core", 0.5, 2.0)}
     model, full = StretchedModel(panel(), parameters), panel(**POINT, E=1.6)
     ops = model.bare(POINT | {"E": 1.6})
@@ -262,17 +257,10 @@ def test_the_terms_of_the_stiffness_are_those_of_the_stretched_mesh():
 @pytest.mark.slow
 @pytest.mark.skipif(not ROM_LONG, reason="half a minute; families of regions are shared above all")
 def test_layers_are_blind_to_the_number_of_processes(tmp_path):
-    pytest.importorskip("dolfinx", reason="dolfinx is not installed")
-    from cases.ranks.environment import ENVIRONMENT
-
     found = {}
     for n in (1, *SHARED_BY):
         path = tmp_path / f"{n}.npz"
-        done = subprocess.run(
-            [*mpirun(n), sys.executable,
-             str(RANKS / "family_under_mpi.py"), "thickness", str(path)],
-            env=ENVIRONMENT, timeout=600, capture_output=True, text=True, check=False, cwd=ROOT,
-        )  # fmt: skip
+        done = on_ranks(n, RANKS / "family_under_mpi.py", "thickness", path)
         assert path.exists(), done.stderr
         family = rom.load(path)
         found[n] = [family.at(**p).frequencies(14)[6:] for p in ({}, POINT)]

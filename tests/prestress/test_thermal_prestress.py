@@ -11,18 +11,14 @@ from scipy.sparse import identity
 from scipy.sparse.linalg import eigsh
 
 import rom
-from cases.wheels import bladed_model
+from cases.wheels import MARKS, bladed_model
 from rom.components.wheels.prestress.thermal import _stressed, _thermal, finite_solid
 from rom.eigen.verbs import rigid_motions
 from rom.eigen.workers import ONE_PROCESS
 from rom.errors import ConfigError, InterfaceError, ModelError
 
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")
-pytestmark = [
-    pytest.mark.fenicsx,
-    pytest.mark.filterwarnings("ignore::rom.errors.RomWarning"),
-    pytest.mark.filterwarnings("ignore:Number of integration points"),
-]
+pytestmark = MARKS
 E, RHO, L, B, H, ALPHA = 70e9, 2700.0, 1.0, 0.02, 0.01, 23e-6
 EULER = np.pi**2 * H**2 / (12 * L**2)  # strain at which a pinned column buckles
 ENDS = ("root", "tip")

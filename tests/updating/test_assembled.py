@@ -8,11 +8,11 @@ import pytest
 from numpy.testing import assert_allclose
 
 import rom
-from cases.solid import STEEL, composite
+from cases.components import updating
+from cases.components.updating import BOLTS, halves, noisy_test
 from rom.body.recovery import StressRecovery
 from rom.components.families.parameters import centre
-from rom.components.updating.family_model import Parts, family_model
-from rom.components.updating.frf_data import noisy
+from rom.components.updating.family_model import Parts
 from rom.components.updating.models import modal
 from rom.components.updating.normal_equations import responses_at
 from rom.components.updating.observers.operation import discrete
@@ -24,7 +24,6 @@ from rom.updating import (
     Drift,
     GroundSpring,
     JointSpring,
-    Responses,
     Sensors,
     candidates,
     parameter_tracker,
@@ -32,9 +31,6 @@ from rom.updating import (
     tracker,
 )  # fmt: skip
 
-BOLTS = JointSpring(
-    ("frame", "tip"), ("arm", "root"), (4e8, 4e8, 4e8, 2e5, 1e5, 1e5), 0.1, 10.0
-)  # fmt: skip
 HELD = (("frame", "root"),)
 LINES = np.linspace(20, 1000, 150)
 AVERAGES, LEVEL = 50, 0.03
@@ -42,15 +38,7 @@ AVERAGES, LEVEL = 50, 0.03
 
 @pytest.fixture(scope="module")
 def families():
-    """Two halves of a beam, 0.5 m each."""
-    found = {}
-    for name, x in (("frame", 0.0), ("arm", 0.5)):
-        half = composite({name: STEEL}, lambda c, n=name: n, (0.5, 0.1, 0.08), (4, 1, 1), (x, 0, 0))
-        found[name] = rom.reduce_parametric(
-            half, parameters={"E": rom.YoungsModulus(name, 0.3, 3.0)},
-            method=rom.CraigBampton(12), interfaces={"root": "rbe2", "tip": "rbe2"}, certify=False,
-        )  # fmt: skip
-    return found
+    return halves()
 
 
 @pytest.fixture(scope="module")
@@ -65,18 +53,12 @@ def channels():
 
 
 def model_of(family, attached, fixed=HELD):
-    bodies = Parts.of(family).bodies
-    rows = [c.rows(bodies, "channel") for c in channels()]
-    return family_model(family, rows, attached, {}, fixed)
+    return updating.model_of(family, channels(), fixed, attached)
 
 
 def measured(family, attached, true, seed=0):
-    model = model_of(family, attached)
-    x = np.log([true.get(name, 1.0) for name in model.names])
-    H = responses_at(model, x, np.array([0.02]), 2 * np.pi * LINES)
-    H = noisy(H, LEVEL, np.random.default_rng(seed))
-    coherence = 1 / (1 + AVERAGES * LEVEL**2)
-    return Responses(LINES, H, *channels(), coherence, AVERAGES)
+    how = {"level": LEVEL, "averages": AVERAGES, "seed": seed, "attached": attached, "fixed": HELD}
+    return noisy_test(family, true, channels(), LINES, **how)
 
 
 def test_coupled_families_have_the_frequencies_of_their_assembly(families):
@@ -376,8 +358,5 @@ def test_what_does_not_fit_an_assembly_is_named(families, bolted):
 def alone(family):
     """A test of one body."""
     sensors = Channels([[0.375, 0.1, 0.08]], [[0, 1, 2]])
-    rows = (sensors.rows(family.body, "sensor"),) * 2
-    H = responses_at(family_model(family, rows, {}, {}, ("root",)), np.zeros(1),
-                     np.array([0.02]), 2 * np.pi * LINES)  # fmt: skip
-    H = noisy(H, LEVEL, np.random.default_rng(0))
-    return Responses(LINES, H, sensors, sensors, 1 / (1 + AVERAGES * LEVEL**2), AVERAGES)
+    how = {"level": LEVEL, "averages": AVERAGES, "fixed": ("root",)}
+    return noisy_test(family, {}, (sensors,) * 2, LINES, **how)

@@ -9,27 +9,24 @@ import pytest
 from numpy.testing import assert_allclose
 
 import rom
+from cases.components.updating import BOLTS, family_of, noisy_test
+from cases.components.updating import halves as halves_of
 from cases.files.schema import errors
 from cases.long import ROM_LONG
-from cases.solid import STEEL, composite
 from rom.cli.main import main
 from rom.cli.schemas import schema
-from rom.components.updating.family_model import Parts, family_model
 from rom.components.updating.frf_data import noisy
-from rom.components.updating.normal_equations import responses_at
 from rom.parametric import FamilyAssembly
 from rom.updating import (
     AddedMass,
     Channels,
     GroundSpring,
-    JointSpring,
     Responses,
     candidates,
     place,
 )
 
 pytestmark = pytest.mark.once  # the environment without FEniCSx has no h5py
-SIZE, CELLS = (1.0, 0.1, 0.08), (8, 1, 1)
 PARAMETERS = {name: rom.YoungsModulus(name, 0.4, 2.5) for name in ("inner", "outer")}
 TRUE = {"inner": 1.3, "outer": 0.8}
 SPRING = GroundSpring("tip", (0.0, 2e5, 3e5), 0.1, 10.0)
@@ -43,13 +40,7 @@ def folder(tmp_path_factory):
     """A family, two tests of it as HDF5, one with a sensor at the force, and a body alone."""
     pytest.importorskip("h5py", reason="h5py is not installed")
     path = tmp_path_factory.mktemp("update")
-    part = composite(
-        dict.fromkeys(TRUE, STEEL), lambda c: "inner" if c[0] < 4 else "outer", SIZE, CELLS
-    )
-    family = rom.reduce_parametric(
-        part, parameters=PARAMETERS, method=rom.CraigBampton(8),
-        interfaces={"root": "rbe2", "tip": "rbe2"}, certify=False,
-    )  # fmt: skip
+    family = family_of(PARAMETERS, (8, 1, 1), 8)
     rom.save(family, path / "family.rom.npz")
     rom.save(family.body, path / "body.rom.npz")
     points = [[x, y, 0.08] for x in (0.5, 0.75, 1.0) for y in (0.0, 0.1)]
@@ -228,7 +219,6 @@ def test_what_is_wrong_with_the_options_is_said(capsys):
     refused(["-o", "family.rom.npz"], "family.rom.npz")
 
 
-BOLTS = JointSpring(("frame", "tip"), ("arm", "root"), (4e8, 4e8, 4e8, 2e5, 1e5, 1e5), 0.1, 10.0)
 HALVES = ["--family", "frame=frame.rom.npz", "--family", "arm=arm.rom.npz",
           "--fixed", "frame.root", "--damping", "0.02"]  # fmt: skip
 JOINT = ["--joint", "bolts=frame.tip,arm.root:4e8,4e8,4e8,2e5,1e5,1e5:0.1:10"]
@@ -237,14 +227,9 @@ JOINT = ["--joint", "bolts=frame.tip,arm.root:4e8,4e8,4e8,2e5,1e5,1e5:0.1:10"]
 @pytest.fixture(scope="module")
 def bolted(folder):
     """Two families in files, their assembly, and a test of it in which a sensor names its body."""
-    families = {}
-    for name, x in (("frame", 0.0), ("arm", 0.5)):
-        half = composite({name: STEEL}, lambda c, n=name: n, (0.5, 0.1, 0.08), (4, 1, 1), (x, 0, 0))
-        families[name] = rom.reduce_parametric(
-            half, parameters={"E": rom.YoungsModulus(name, 0.3, 3.0)},
-            method=rom.CraigBampton(8), interfaces={"root": "rbe2", "tip": "rbe2"}, certify=False,
-        )  # fmt: skip
-        rom.save(families[name], folder / f"{name}.rom.npz")
+    families = halves_of(8)
+    for name, family in families.items():
+        rom.save(family, folder / f"{name}.rom.npz")
     points = [[x, y, 0.08] for x in (0.25, 0.5, 0.75, 1.0) for y in (0.0, 0.1)]
     sensors = Channels(
         np.repeat(points, 2, axis=0), np.tile([[0, 1, 0], [0, 0, 1]], (8, 1)),
@@ -252,11 +237,16 @@ def bolted(folder):
     )  # fmt: skip
     force = Channels([[0.75, 0.1, 0.0]], [[0, 1, 2]])
     whole, f = FamilyAssembly(families), np.linspace(20, 900, 100)
-    rows = [c.rows(Parts.of(whole).bodies, "channel") for c in (sensors, force)]
-    model = family_model(whole, rows, {"bolts": BOLTS}, {}, (("frame", "root"),))
-    H = responses_at(model, np.log([1.2, 0.9, 0.5]), np.array([0.02]), 2 * np.pi * f)
-    H = noisy(H, 0.03, np.random.default_rng(4))
-    test = Responses(f, H, sensors, force, 1 / (1 + 50 * 0.03**2), 50)
+    how = {
+        "level": 0.03,
+        "averages": 50,
+        "seed": 4,
+        "attached": {"bolts": BOLTS},
+        "fixed": (("frame", "root"),),
+    }
+    test = noisy_test(
+        whole, {"frame.E": 1.2, "arm.E": 0.9, "bolts": 0.5}, (sensors, force), f, **how
+    )
     rom.io.write_responses(test, folder / "bolted.h5")
     return whole
 

@@ -1,4 +1,4 @@
-"""Sets of parameters on lines kept aside: by hand, and the right one is chosen."""
+"""Which parameters: sets on lines kept aside, and a wrong model whose fault is named."""
 
 from dataclasses import replace
 
@@ -7,16 +7,16 @@ import pytest
 from numpy.testing import assert_allclose
 
 import rom
+from cases.components.updating import exact_responses, family_of, model_of, noisy_test
 from cases.long import few
-from cases.solid import STEEL, composite
-from rom.components.updating.family_model import family_model
-from rom.components.updating.frf_data import noisy
-from rom.components.updating.normal_equations import responses_at
+from rom.components.updating.frf_data import estimators
 from rom.errors import ConfigError, ParameterError
-from rom.updating import AddedMass, Channels, Comparison, Responses, compare
+from rom.updating import AddedMass, Channels, Comparison, GroundSpring, Responses, compare
 
 REGIONS = ("inner", "middle", "outer")
 PARAMETERS = {f"E_{name}": rom.YoungsModulus(name, 0.4, 2.5) for name in REGIONS}
+MODULI = tuple(PARAMETERS)
+PARAMETERS |= {f"rho_{name}": rom.Density(name, 0.4, 2.5) for name in REGIONS}
 SENSORS = Channels(
     [[x, 0.1, 0.08] for x in (0.33, 0.67, 1.0)] * 2, [[0, 1, 0]] * 3 + [[0, 0, 1]] * 3
 )
@@ -27,7 +27,7 @@ MASS = AddedMass("tip", 0.2, 0.1, 10)
 SETS = {
     "one modulus": {"free": ("E_inner",)},
     "two moduli": {"free": ("E_inner", "E_outer")},
-    "three moduli": {"free": tuple(PARAMETERS)},
+    "three moduli": {"free": MODULI},
     "two moduli and a mass": {"free": ("E_inner", "E_outer"), "attached": {"mass": MASS}},
 }
 COMMON = {"fixed": HELD, "damping": 0.02}
@@ -35,21 +35,12 @@ COMMON = {"fixed": HELD, "damping": 0.02}
 
 @pytest.fixture(scope="module")
 def family():
-    where = dict(zip(range(6), np.repeat(REGIONS, 2), strict=True))
-    model = composite(dict.fromkeys(REGIONS, STEEL), lambda c: where[c[0]], cells=(6, 1, 1))
-    return rom.reduce_parametric(
-        model, parameters=PARAMETERS, method=rom.CraigBampton(4),
-        interfaces={"root": "rbe2", "tip": "rbe2"}, certify=False,
-    )  # fmt: skip
+    return family_of(PARAMETERS, (6, 1, 1), 4, REGIONS)
 
 
 def measured(family, seed, true, **there):
-    rows = (SENSORS.rows(family.body, "sensor"), INPUTS.rows(family.body, "input"))
-    model = family_model(family, rows, there, {}, HELD)
-    x = np.log([true.get(name, 1.0) for name in model.names])
-    H = responses_at(model, x, np.array([0.02]), 2 * np.pi * LINES)
-    H = noisy(H, LEVEL, np.random.default_rng(seed))
-    return Responses(LINES, H, SENSORS, INPUTS, 1 / (1 + AVERAGES * LEVEL**2), AVERAGES)
+    how = {"level": LEVEL, "averages": AVERAGES, "seed": seed, "attached": there, "fixed": HELD}
+    return noisy_test(family, true, (SENSORS, INPUTS), LINES, **how)
 
 
 def test_lines_are_foretold_by_the_update_of_all_others(family):
@@ -134,3 +125,78 @@ def test_coherence_of_each_line_goes_with_it(family):
     found = compare(family, replace(test, coherence=c), {"one": SETS["one modulus"]}, **COMMON)
     assert not found.by_line[0, ::3].any() and not found.expected[::3].any()
     assert_allclose(found.misfit["one"], 1.0, atol=0.2)
+
+
+POINTS = [[x, 0.1, 0.08] for x in (0.33, 0.5, 0.67, 1.0)]
+EIGHT = Channels(POINTS * 2, [[0, 1, 0]] * 4 + [[0, 0, 1]] * 4)
+SHAKERS = Channels([[1.0, 0.0, 0.0], [0.5, 0.1, 0.08]], [[0, 1, 1], [0, 1, -0.5]])
+BAND = np.linspace(30, 700, 120)
+HINGE = {"root": "x y z rx rz"}  # the clamp about y is a spring of the model
+CLAMP = GroundSpring("root", (0, 0, 0, 0, 4e6, 0), 0.1, 10)
+OFFERED = {
+    "joint at the tip": GroundSpring("tip", (0, 0, 1e5), 0.1, 10),
+    "twist at the tip": GroundSpring("tip", (0, 0, 0, 1e3, 0, 0), 0.1, 10),
+    "turn at the root": GroundSpring("root", (0, 0, 0, 0, 4e6, 0), 0.1, 10),
+    "mass at the tip": AddedMass("tip", 1.0, 0.1, 10),
+}
+
+
+def found(family, true, seed, on_force=0.0, **there):
+    """Update of moduli alone, by a test of a structure that has more to it."""
+    channels, more = (EIGHT, SHAKERS), {"fixed": HINGE, "attached": {"clamp": CLAMP} | there}
+    test = noisy_test(family, true, channels, BAND, level=0.03, averages=100, seed=seed, **more)
+    if on_force:
+        H = exact_responses(model_of(family, channels, **more), true, BAND)
+        test = averaged(H, on_force, np.random.default_rng(seed))
+    return rom.update(
+        family, test, free=MODULI, fixed=HINGE, attached={"clamp": CLAMP}, candidates=OFFERED,
+        prior={"clamp": 1e-4}, damping=0.02,
+    )  # fmt: skip
+
+
+def averaged(H, on_force, rng, n=50):
+    """H1 of noisy forces, and responses with ten per cent; its coherence is of the same records."""
+
+    def gauss(shape):
+        return rng.standard_normal((*shape, 2)) @ [1, 1j] / np.sqrt(2)
+
+    f = gauss((n, BAND.size, 1, 2))
+    x = H * (f + 0.1 * gauss((n, *H.shape)))
+    f = f + on_force * gauss(f.shape)
+    H1, _, _, coherence = estimators(x, np.broadcast_to(f, x.shape))
+    return Responses(BAND, H1, EIGHT, SHAKERS, coherence, n, force_noise=on_force, estimator="H1")
+
+
+WRONG = [
+    ({"joint": 0.3}, {"joint": OFFERED["joint at the tip"]}, "joint at the tip", 1),
+    ({"clamp": 0.85}, {}, "turn at the root", -1),
+    ({"rho_middle": 1.03}, {}, "rho_middle", 1),
+    ({"mass": 0.15}, {"mass": OFFERED["mass at the tip"]}, "mass at the tip", 1),
+]
+
+
+# noise that sensors share as large as their own and three times: limits are wider then
+DRAWN = [(0, 0.0), (1, 0.0), (2, 0.0), (1, 0.1), (1, 0.3)]
+
+
+@pytest.mark.parametrize(("seed", "on_force"), DRAWN)
+@pytest.mark.parametrize(("true", "there", "name", "sign"), WRONG)
+def test_the_largest_score_is_that_of_what_is_wrong(
+    family, true, there, name, sign, seed, on_force
+):
+    """Of a joint, a support, the mass of a region and one that was added; of seven offered."""
+    update = found(family, true, seed, on_force, **there)
+    assert not update.verdict.ok
+    assert max(update.scores, key=lambda k: abs(update.scores[k])) == name, update.scores
+    assert sign * update.scores[name] > (6 if on_force else 10)
+    if name in ("joint at the tip", "turn at the root") and not on_force:  # they bend along z
+        assert np.argmax(update.by_sensor) >= 4
+    if not on_force:
+        assert any(f"largest score, {name}" in row.quantity for row in update.verdict.failures)
+
+
+@pytest.mark.parametrize(("seed", "on_force"), DRAWN)
+def test_of_a_right_model_nothing_is_named(family, seed, on_force):
+    update = found(family, {"E_middle": 1.1}, seed, on_force)
+    assert update.verdict.ok, str(update.verdict)
+    assert on_force or max(abs(score) for score in update.scores.values()) < 4

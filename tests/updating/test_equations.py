@@ -7,9 +7,9 @@ import pytest
 from numpy.testing import assert_allclose
 
 import rom
+from cases.components.updating import model_of
 from cases.solid import STEEL, composite
 from rom.components.updating.equations import InSensors
-from rom.components.updating.family_model import family_model
 from rom.components.updating.frf_data import noisy
 from rom.components.updating.methods import update_by_input
 from rom.components.updating.models import AtSensors, Measurement, ParametricModel, modal
@@ -64,8 +64,7 @@ def dense(model):
 
 
 def small(family, model, sign=1.0):
-    rows = [c.rows(family.body, "channel") for c in channels(model, sign)]
-    return family_model(family, rows, {}, {}, ("root",))
+    return model_of(family, channels(model, sign), ("root",))
 
 
 def measured(family, model, *, level=0.0, sign=1.0, H=None, seed=0):
@@ -157,7 +156,9 @@ def test_lines_are_summed_in_blocks(family, model, monkeypatch):
 
 
 @pytest.mark.parametrize(("residual", "made", "away"), [
-    ("equations", "condensed", 2e-4), ("response-function", "measured", 2e-3),
+    ("equations", "condensed", 2e-4),
+    ("response-function", "measured", 2e-3),
+    ("responses", "measured", 2e-3),
 ])  # fmt: skip
 def test_a_prior_as_sure_as_the_data_halves_what_they_find(family, model, residual, made, away):
     """Mean of zero and the estimate, weighted by precision; deviation over the square root of 2."""

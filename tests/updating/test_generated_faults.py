@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import rom
+from cases.components.updating import family_of
 from cases.long import ROM_LONG
-from cases.solid import STEEL, composite
 from rom.components.updating.family_model import family_model
 from rom.components.updating.frf_data import noisy
 from rom.components.updating.normal_equations import responses_at
@@ -24,14 +24,7 @@ COHERENCE = 1 / (1 + AVERAGES * LEVEL**2)
 
 
 def reduced(length=1.0):
-    model = composite(
-        dict.fromkeys(PARAMETERS, STEEL), lambda c: "inner" if c[0] < 3 else "outer",
-        (length, 0.1, 0.08), (6, 1, 1),
-    )  # fmt: skip
-    return rom.reduce_parametric(
-        model, parameters=PARAMETERS, method=rom.CraigBampton(16),
-        interfaces={"root": "rbe2", "tip": "rbe2"}, certify=False,
-    )  # fmt: skip
+    return family_of(PARAMETERS, (6, 1, 1), 16, size=(length, 0.1, 0.08))
 
 
 @pytest.fixture(scope="module")

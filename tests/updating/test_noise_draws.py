@@ -9,12 +9,11 @@ from numpy.testing import assert_allclose
 from scipy.stats import binom, chi2, kstest, norm, truncnorm
 
 import rom
+from cases.components.updating import exact_responses, family_of, model_of
 from cases.long import few
-from cases.solid import STEEL, composite
 from rom.components.updating.estimate import DAMPING_LOG_DEVIATION
-from rom.components.updating.family_model import family_model
 from rom.components.updating.frf_data import estimators, pooled, positive_mean
-from rom.components.updating.normal_equations import Data, responses_at, sums, unsure, white
+from rom.components.updating.normal_equations import Data, sums, unsure, white
 from rom.errors import ConfigError
 from rom.updating import Channels, Responses
 
@@ -35,20 +34,12 @@ AVERAGES, DRAWS = 100, 100
 
 @pytest.fixture(scope="module")
 def family():
-    parts = {"inner": STEEL, "outer": STEEL}
-    model = composite(parts, lambda c: "inner" if c[0] < 2 else "outer", cells=(4, 1, 1))
-    return rom.reduce_parametric(
-        model, parameters=PARAMETERS, method=rom.CraigBampton(1),
-        interfaces={"root": "rbe2", "tip": "rbe2"}, certify=False,
-    )  # fmt: skip
+    return family_of(PARAMETERS, (4, 2, 2), 1)
 
 
 @pytest.fixture(scope="module")
 def exact(family):
-    rows = (SENSORS.rows(family.body, "sensor"), INPUTS.rows(family.body, "input"))
-    model = family_model(family, rows, {}, {}, HELD)
-    x = np.log([TRUE[name] for name in model.names])
-    return responses_at(model, x, np.array([0.02]), 2 * np.pi * LINES)
+    return exact_responses(model_of(family, (SENSORS, INPUTS), HELD), TRUE, LINES)
 
 
 def gauss(rng, shape):
@@ -214,10 +205,7 @@ def test_an_update_weighs_by_the_model_it_found(family, exact):
     """
     rng, n = np.random.default_rng(9), 20
     lines = np.linspace(40, 160, 800)
-    rows = (SENSORS.rows(family.body, "sensor"), INPUTS.rows(family.body, "input"))
-    model = family_model(family, rows, {}, {}, HELD)
-    x = np.log([TRUE[name] for name in model.names])
-    H = responses_at(model, x, np.array([0.02]), 2 * np.pi * lines)
+    H = exact_responses(model_of(family, (SENSORS, INPUTS), HELD), TRUE, lines)
     f = np.broadcast_to(gauss(rng, (n, 800, 1, 2)), (n, *H.shape))
     H1, _, _, c = estimators(H * (f + 0.3 * gauss(rng, f.shape)), f)
     found = rom.update(family, Responses(lines, H1, SENSORS, INPUTS, c, n), fixed=HELD)
@@ -372,10 +360,10 @@ def test_noise_of_forces_and_few_averages_are_checked(exact):
         replace(test, force_noise=-0.1)
     with pytest.raises(ConfigError, match="estimated from 2 averages says nothing"):
         replace(test, averages=2)
-    with pytest.raises(ConfigError, match=r"force_noise \(3,\) must be a number or \(20, 2\)"):
-        replace(test, force_noise=np.zeros(3))
     with pytest.raises(ConfigError, match="estimator = 'H3'"):
         replace(test, estimator="H3")
+    with pytest.raises(ConfigError, match=r"force_noise \(3,\) must be a number or \(20, 2\)"):
+        replace(test, force_noise=np.zeros(3))
     with pytest.raises(ConfigError, match="the estimator of H is not named"):
         replace(test, force_noise=0.01, estimator=None).logarithm()
     with pytest.raises(ConfigError, match=r"force_noise alone has .* times the power"):

@@ -1,24 +1,21 @@
-"""Placement of channels: exhaustive search, linear estimation, random and even layouts."""
+"""Placement of channels: exhaustive search, linear estimation, other layouts, and updates."""
 
 from itertools import combinations
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from scipy.stats import chi2
 
 import rom
-from cases.solid import STEEL, composite
-from rom.components.updating.family_model import family_model
+from cases.components.updating import PARAMETERS, exact_responses, family_of, model_of
+from cases.long import few
+from rom.components.updating.frf_data import noisy
 from rom.components.updating.normal_equations import responses_at
 from rom.components.updating.placement import eliminated, gain
 from rom.errors import ConfigError, ModelError, ParameterError
-from rom.updating import Channels, candidates, independent, place
+from rom.updating import Channels, Responses, candidates, independent, place
 
-PARAMETERS = {
-    "E_inner": rom.YoungsModulus("inner", 0.4, 2.5),
-    "E_outer": rom.YoungsModulus("outer", 0.4, 2.5),
-    "rho_outer": rom.Density("outer", 0.5, 2.0),
-}
 LINES = np.linspace(20, 1400, 60)
 SHAKERS = Channels([[1.0, 0, 0], [0.5, 0, 0], [0.25, 0, 0]], [[0, 1, 1]] * 3)
 FLOOR = 0.02  # [m/s^2 per N]
@@ -26,23 +23,12 @@ FLOOR = 0.02  # [m/s^2 per N]
 
 @pytest.fixture(scope="module")
 def family():
-    model = composite(
-        {"inner": STEEL, "outer": STEEL}, lambda c: "inner" if c[0] < 6 else "outer",
-        (1.0, 0.1, 0.08), (12, 2, 2),
-    )  # fmt: skip
-    return rom.reduce_parametric(
-        model, parameters=PARAMETERS, method=rom.CraigBampton(10), certify=False,
-        interfaces={"root": "rbe2", "tip": "rbe2"},
-    )  # fmt: skip
+    return family_of(PARAMETERS, (12, 2, 2), 10)
 
 
 def planned(family, offered, n, **options):
     options = {"floor": FLOOR, "fixed": ("root",), "n_sensors": n, **options}
     return place(family, offered, options.pop("shakers", SHAKERS), LINES, **options)
-
-
-def some(channels, numbers):
-    return Channels(np.asarray(channels.points)[numbers], np.asarray(channels.directions)[numbers])
 
 
 def volume(plan):
@@ -52,10 +38,10 @@ def volume(plan):
 
 def test_the_best_three_of_nine_are_those_of_an_exhaustive_search(family):
     offered = candidates(family.body, 3, fixed=("root",))
-    shaker = some(SHAKERS, [0])
+    shaker = SHAKERS.some([0])
     plan = planned(family, offered, 3, shakers=shaker)
     trials = {
-        c: volume(planned(family, some(offered, list(c)), 3, shakers=shaker))
+        c: volume(planned(family, offered.some(list(c)), 3, shakers=shaker))
         for c in combinations(range(9), 3)
     }
     assert tuple(plan.sensor_numbers) == min(trials, key=trials.get)
@@ -66,8 +52,7 @@ def test_the_information_is_the_inverse_covariance_of_linear_estimation(family):
     """2000 noisy tests; derivatives by differences of responses, not by those of the plan."""
     offered = candidates(family.body, 2, fixed=("root",))
     plan = planned(family, offered, 6, n_inputs=2)
-    rows = plan.sensors.rows(family.body, "sensor"), plan.inputs.rows(family.body, "input")
-    model = family_model(family, rows, {}, {}, ("root",))
+    model = model_of(family, (plan.sensors, plan.inputs), ("root",))
     omega, n = 2 * np.pi * LINES, len(plan.names)
 
     def at(q):
@@ -86,22 +71,6 @@ def test_the_information_is_the_inverse_covariance_of_linear_estimation(family):
     assert_allclose(np.linalg.inv(A.T @ A), plan.covariance, rtol=1e-5, atol=1e-9)
     ratio = np.linalg.solve(plan.covariance[:3, :3], np.cov(found)[:3, :3])
     assert_allclose(np.linalg.eigvals(ratio), 1.0, atol=0.12)
-
-
-def test_the_plan_beats_random_and_even_layouts(family):
-    """Six of sixty; also the shaker is chosen."""
-    offered = candidates(family.body, 20, fixed=("root",))
-    plan = planned(family, offered, 6)
-    rng = np.random.default_rng(0)
-    at_random = [
-        volume(planned(family, some(offered, rng.permutation(60)[:6]), 6,
-                       shakers=some(SHAKERS, [rng.integers(3)])))
-        for _ in range(30)
-    ]  # fmt: skip
-    even = candidates(family.body, 2, fixed=("root",))
-    assert np.median(at_random) > 1.4 * volume(plan)
-    assert volume(plan) < min(at_random)
-    assert volume(planned(family, even, 6, shakers=some(SHAKERS, [1]))) > 1.2 * volume(plan)
 
 
 def test_effective_independence_finds_what_an_exhaustive_search_finds(family):
@@ -144,9 +113,7 @@ def test_what_is_not_seen_is_named(family):
 def test_the_floor_is_a_thousandth_of_the_largest_response(family):
     """Accelerations per force of the finest peak among the candidates, at factors of one."""
     offered = candidates(family.body, 4, fixed=("root",))
-    rows = offered.rows(family.body, "candidate")
-    H = responses_at(family_model(family, (rows, rows), {}, {}, ("root",)), np.zeros(3),
-                     np.array([0.01]), 2 * np.pi * LINES)  # fmt: skip
+    H = exact_responses(model_of(family, (offered, offered), ("root",)), {}, LINES, 0.01)
     largest = ((2 * np.pi * LINES) ** 2 * np.abs(H).max(axis=(1, 2))).max()
     same = planned(family, offered, 3, shakers=offered, noise=0.05, floor=1e-3 * largest)
     found = planned(family, offered, 3, shakers=offered, noise=0.05, floor=None)
@@ -185,7 +152,7 @@ def test_wrong_plans_are_named(family):
     )
     refused("must be positive", lambda: planned(family, offered, 3, prior={"E_inner": 0.0}))
     refused("n = 2 ", lambda: independent(family.body, offered, 2, modes=3, fixed=("root",)))
-    along = some(offered, np.arange(0, 12, 3))
+    along = offered.some(np.arange(0, 12, 3))
     one = Channels(np.repeat(np.asarray(along.points)[:1], 4, axis=0), along.directions)
     refused(
         "modes apart",
@@ -193,3 +160,125 @@ def test_wrong_plans_are_named(family):
         ModelError,
     )
     refused("n = 5000", lambda: candidates(family.body, 5000))
+
+
+REGIONS = ("inner", "middle", "outer")
+FACTORS = {f"E_{name}": rom.YoungsModulus(name, 0.4, 2.5) for name in REGIONS[::2]}
+FACTORS |= {"rho_middle": rom.Density("middle", 0.5, 2.0)}
+BEAM, PLATE = ((1.0, 0.1, 0.08), (6, 1, 1)), ((0.6, 0.4, 0.02), (6, 2, 1))
+CASES = {  # body, what is held, highest line [Hz]: two or three modes lie below
+    "cantilever": (BEAM, ("root",), 1400.0),
+    "beam between walls": (BEAM, ("root", "tip"), 3000.0),
+    "free plate": (PLATE, (), 600.0),
+    "plate on a wall": (PLATE, ("root",), 400.0),
+}
+N_SENSORS, DRAWS, NOISE = 6, 80, 0.02
+
+
+class Case:
+    """A family, its candidates, and plans with some of them."""
+
+    def __init__(self, name):
+        (size, cells), self.fixed, highest = CASES[name]
+        self.family = family_of(FACTORS, cells, 8, REGIONS, size=size)
+        self.lines = np.linspace(highest / 50, highest, 60)
+        self.offered, self.shakers = (self.even(n) for n in (8, 3))
+
+    def even(self, n):
+        return candidates(self.family.body, n, fixed=self.fixed)
+
+    def plan(self, sensors, inputs, **options):
+        options = {"floor": 0.02, "n_sensors": N_SENSORS, "fixed": self.fixed} | options
+        return place(self.family, sensors, inputs, self.lines, **options)
+
+
+@pytest.fixture(scope="module", params=CASES)
+def case(request):
+    return Case(request.param)
+
+
+def measures(plan):
+    """Of the covariance of the parameters: root of the determinant per parameter, and trace."""
+    C = plan.covariance[:3, :3]
+    return np.array([np.linalg.det(C) ** (1 / 6), np.trace(C) ** 0.5])
+
+
+def test_a_plan_beats_even_layouts_with_any_shaker(case):
+    """Six channels each: two points far apart, all axes; the best of nine shakers is given."""
+    best = measures(case.plan(case.offered, case.shakers))
+    two = case.even(2)
+    even = [measures(case.plan(two, case.shakers.some([k]))) for k in range(9)]
+    assert (np.min(even, axis=0) > 1.2 * best).all()
+    assert (np.median(even, axis=0) > 2.0 * best).all()
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_plan_beats_random_layouts(case, seed):
+    """Twelve layouts from the same candidates: each is worse, half of them by twice and more."""
+    best = measures(case.plan(case.offered, case.shakers))
+    rng = np.random.default_rng(seed)
+    layouts = [
+        measures(case.plan(case.offered.some(rng.permutation(24)[:N_SENSORS]),
+                           case.shakers.some([rng.integers(9)])))
+        for _ in range(12)
+    ]  # fmt: skip
+    assert (np.median(layouts, axis=0) > 2.0 * best).all()
+    assert (np.min(layouts, axis=0) > 1.05 * best).all()
+
+
+def updates(case, plan, lines, n):
+    """Updates by noisy tests with the channels of a plan, at factors of one."""
+    channels = plan.sensors, plan.inputs
+    exact = exact_responses(model_of(case.family, channels, case.fixed), {}, lines, 0.01)
+    rng = np.random.default_rng(7)
+    for _ in range(n):
+        H = noisy(exact, np.sqrt(2) * NOISE, rng)
+        coherence = 1 / (1 + 2 * 100 * NOISE**2)
+        test = Responses(lines, H, *channels, coherence, 100)
+        yield rom.update(case.family, test, fixed=case.fixed)
+
+
+@pytest.mark.parametrize("case", few(1, ["cantilever", "free plate"]), indirect=True)
+def test_updates_scatter_as_the_plan_foretells(case):
+    """d^T C^-1 d over all draws is chi-square of three times their number, in all directions."""
+    plan = case.plan(case.offered, case.shakers, floor=0.0, noise=NOISE)
+    found = list(updates(case, plan, case.lines, DRAWS))
+    d = np.log([[u.factors[name] for name in FACTORS] for u in found])
+    C = plan.covariance[:3, :3]
+    along = np.linalg.eigh(C)[1]
+    size = np.square(d @ along) / np.diag(along.T @ C @ along)
+    low, high = chi2.ppf([0.001, 0.999], DRAWS)
+    assert ((size.sum(axis=0) > low) & (size.sum(axis=0) < high)).all(), size.mean(axis=0)
+    for name in FACTORS:
+        assert_allclose(np.mean([u.deviations[name] for u in found]), plan.deviations[name],
+                        rtol=0.05)  # fmt: skip
+    assert not plan.unseen and not any(u.unseen for u in found)
+
+
+@pytest.mark.parametrize("case", ["cantilever"], indirect=True)
+def test_a_test_made_after_a_written_plan_is_read_and_updates(case, tmp_path):
+    """The universal file gives the nodes, the table of the plan the directions."""
+    plan = case.plan(case.offered, case.shakers, floor=0.0, noise=NOISE)
+    (tmp_path / "plan.uff").write_text(plan.uff())
+    rows = [line.split(",") for line in plan.csv().splitlines()[1:]]
+    d = np.array([row[5:] for row in rows], dtype=float)
+    axis = np.abs(d).argmax(axis=1)
+    dofs = [
+        f"{k}{'-+'[int(x[a] > 0)]}{'XYZ'[a]}"
+        for k, (a, x) in enumerate(zip(axis, d, strict=True), 1)
+    ]
+    model = model_of(case.family, (plan.sensors, plan.inputs), case.fixed)
+    H = np.ascontiguousarray(exact_responses(model, {}, case.lines, 0.01)[:, :, 0])
+    names = [f"{dof}/{dofs[-1]} {part} [m/N]" for dof in dofs[:-1] for part in ("real", "imag")]
+    values = np.column_stack([case.lines, H.view(float).reshape(len(H), -1)])
+    text = [",".join(["Frequency [Hz]", *names])]
+    text += [",".join(f"{x:.12g}" for x in row) for row in values]
+    (tmp_path / "test.csv").write_text("\n".join(text))
+    test = rom.io.read_responses(
+        tmp_path / "test.csv", averages=100, coherence=0.95, points=tmp_path / "plan.uff"
+    )
+    for read, planned in ((test.sensors, plan.sensors), (test.inputs, plan.inputs)):
+        assert_allclose(read.points, planned.points, atol=1e-5)
+        assert_allclose(read.directions, planned.directions)
+    found = rom.update(case.family, test, fixed=case.fixed, damping=0.02)
+    assert_allclose([found.factors[name] for name in FACTORS], 1.0, atol=1e-3)

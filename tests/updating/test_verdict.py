@@ -80,16 +80,6 @@ def test_limits_allow_for_what_is_not_known_of_variances():
     assert scaled.limit == f"<= {2 * (0.001**-0.5 - 1):g}"
 
 
-def test_estimators_keep_the_phase_and_assurance_is_of_conjugates():
-    H, f = 2.0 * np.exp(0.7j), np.exp(1j * np.arange(5.0))
-    H1, H2, Hv, coherence = frf.estimators(H * f, f)
-    assert_allclose([H1, H2, Hv], H, rtol=1e-12)
-    assert_allclose(coherence, 1.0)
-    A = np.exp(1j * np.arange(12.0)).reshape(SHAPE)
-    assert_allclose(frf.frac(A, 1j * A), 1.0)
-    assert_allclose(np.diag(frf.fdac(A, 1j * A)), 1.0)
-
-
 def test_noise_has_the_level_of_both_parts_together():
     H = frf.noisy(np.full(200_000, 3.0 + 4.0j), 0.1, np.random.default_rng(0))
     assert_allclose(np.sqrt(np.mean(np.abs(H / (3 + 4j) - 1) ** 2)), 0.1, rtol=0.01)

@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 
 import rom
 from benchmarks.units import as_mechanism
-from cases.mbs.geared_rotors import rigid_unit
+from cases.gear_unit import rigid_unit
 from rom import view
 from rom.components.gear_mesh import GearPair
 from rom.components.journal_bearing import film, iso_vg

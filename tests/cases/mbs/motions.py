@@ -4,6 +4,8 @@ import json
 
 import numpy as np
 
+from benchmarks.models import rigid_chain
+from cases.beam import stiffened_beam
 from cases.mbs.mechanisms import random_body, slider_crank
 from cases.paths import TESTS
 from rom.mbs.mechanism import Mechanism
@@ -82,6 +84,23 @@ def free_crank():
     """A slider-crank that falls and turns freely."""
     mech = slider_crank(gravity=G)
     mech.drives.clear()
+    return mech
+
+
+def four_links():
+    """Whose equations are eliminated by blocks."""
+    return rigid_chain(4)
+
+
+def hub_and_panel(frame="root"):
+    """A free hub that turns, and a panel on a hinge and a coil; its body is in the frame."""
+    mech, z = Mechanism(gravity=(0, 0, 0)), (0, 0, 1)
+    panel = stiffened_beam(2.0, EI=300.0, rhoA=2.0, n_modes=12, stiffened=False)
+    hub = mech.add_rigid("hub", mass=2, inertia=(0.1,) * 3, at=(0, 0, 0), omega=(0, 0, 10.0))
+    moving = {"velocity": (0, 3.0, 0), "omega": (0, 0, 3.0)}
+    wing = mech.add_flexible("panel", panel.with_reference(frame), at=(0.3, 0, 0), **moving)
+    mech.revolute("hinge", hub.marker((0.3, 0, 0)), wing.marker("root"), axis=z)
+    mech.rotational_spring("coil", "hinge", stiffness=200.0)
     return mech
 
 

@@ -481,10 +481,10 @@ def test_wrong_runs_are_named():
         quasi_static(SMALL, SOFT, Actions(), [0.0])
     with pytest.raises(ConfigError, match="rho_inf = 2"):
         implicit_motion(SMALL, SOFT, Actions(), [0.0, 1.0], rho_inf=2)
-    with pytest.raises(ConfigError, match="impacts would gain energy"):
-        implicit_motion(SMALL, SOFT, Actions(tools=[Tool("pad", ABOVE)]), [0, 1], rho_inf=0.8)
     with pytest.raises(ConfigError, match=r"radius \[m\] = -1 must"):
         disc((0, 0), -1)
+    with pytest.raises(ConfigError, match="impacts would gain energy"):
+        implicit_motion(SMALL, SOFT, Actions(tools=[Tool("pad", ABOVE)]), [0, 1], rho_inf=0.8)
     tear = Actions(range(6), drives=[Drive(range(6, 18), ((0, 1), (0, 30.0)))])
     with pytest.raises(SolverError, match=r"strain grows by 0.\d+, more than 0.05 a step, between"):
         quasi_static(SMALL, replace(SOFT, yield_stress=1e-3), tear, [0, 1])

@@ -192,14 +192,14 @@ def test_what_has_a_size_a_frame_or_no_clock_is_refused():
     linking = Linking(bodies)
     with pytest.raises(ConfigError, match="degree = -2"):
         Linking(Bodies(MASS, -2.0))
+    with pytest.raises(ConfigError, match="bodies"):
+        linking.state(x[:3], v[:3])
     with pytest.raises(ModelError, match="'energy'"):
         linking.state(x, 1.1 * v)
     with pytest.raises(ModelError, match="'momentum'"):
         linking.state(x, v + np.array([0.1, 0, 0]))
     with pytest.raises(ModelError, match="'angular momentum'"):
         linking.state(x, v + np.cross([0, 0, 0.1], x))
-    with pytest.raises(ConfigError, match="bodies"):
-        linking.state(x[:3], v[:3])
     with pytest.raises(ModelError, match="size"):
         linking.move_shapes(2 * x, v, np.arange(2.0))
     state = linking.state(x, v)

@@ -174,16 +174,20 @@ def test_a_free_rod_keeps_its_momentum():
     assert_allclose(arm, A @ [10, 0, 0], atol=1e-12)
 
 
+def steel(b, h, E=210e9, rho=7850.0):
+    """Section of a bar; axes y, z, along: a moment about y bends over z."""
+    A, I = b * h, np.array([b * h**3, h * b**3]) / 12
+    return {"stretch": E / 2.6 * A * np.array([5 / 6, 5 / 6, 2.6]),
+            "bend": (E * I[0], E * I[1], E / 2.6 * 0.196 * b * h**3),
+            "mass": rho * A, "inertia": rho * np.array([I[0], I[1], I.sum()])}  # fmt: skip
+
+
 def test_a_rod_goes_on_where_a_reduced_solid_ends():
     """A steel bar of one metre: half of it bricks in Craig-Bampton form, half a rod."""
-    size, E, rho = (0.5, 0.03, 0.02), 210e9, 7850.0
+    size = (0.5, 0.03, 0.02)
     solid = rom.reduce(bar(size, (20, 2, 2)), method=rom.CraigBampton(6), certify=False,
                        interfaces={"root": "rbe2", "tip": "rbe3"}, reference="root")  # fmt: skip
-    A, I = size[1] * size[2], np.array([size[1] * size[2] ** 3, size[2] * size[1] ** 3]) / 12
-    # axes of the section: y, z, along; a moment about y bends over z
-    section = {"stretch": E / 2.6 * A * np.array([5 / 6, 5 / 6, 2.6]),
-               "bend": (E * I[0], E * I[1], E / 2.6 * 0.196 * size[1] * size[2] ** 3),
-               "mass": rho * A, "inertia": rho * np.array([I[0], I[1], I.sum()])}  # fmt: skip
+    section = steel(*size[1:])
     half = body(cosserat.straight(0.5, 48, frame=ALONG_X, **section))
     whole = cosserat.straight(1.0, 96, frame=ALONG_X, **section)
     expected = cosserat.modes(whole, cosserat.reference(whole), 4).frequencies
@@ -199,15 +203,10 @@ def test_a_rod_goes_on_where_a_reduced_solid_ends():
 
 def test_a_rod_that_hardly_bends_has_the_frequencies_of_the_reduced_solid():
     """Cantilever of one metre, 30 x 20 mm: bricks in Craig-Bampton form against 192 segments."""
-    size, E, rho = (1.0, 0.03, 0.02), 210e9, 7850.0
+    size = (1.0, 0.03, 0.02)
     solid = rom.reduce(bar(size, (40, 2, 2)), method=rom.CraigBampton(8), certify=False,
                        interfaces={"root": "rbe3"})  # fmt: skip
-    A, I = size[1] * size[2], np.array([size[1] * size[2] ** 3, size[2] * size[1] ** 3]) / 12
-    rod = cosserat.straight(
-        1.0, 192, frame=ALONG_X, stretch=E / 2.6 * A * np.array([5 / 6, 5 / 6, 2.6]),
-        bend=(E * I[0], E * I[1], E / 2.6 * 0.196 * size[1] * size[2] ** 3), mass=rho * A,
-        inertia=rho * np.array([I[0], I[1], I.sum()]),
-    )  # fmt: skip
+    rod = cosserat.straight(1.0, 192, frame=ALONG_X, **steel(*size[1:]))
     found = cosserat.modes(rod, cosserat.reference(rod), 5).frequencies
     assert_allclose(found, solid.frequencies(fixed="root")[:5], rtol=3e-3)
 
@@ -267,14 +266,6 @@ def test_pictures_of_a_rod_are_its_segments():
         view.sleeves(part, np.ones((3, 2)))
     with pytest.raises(ConfigError, match="positive"):
         view.sleeves(part, (1.0, 0.0))
-
-
-@pytest.mark.parametrize("n", [50, 400])
-def test_memory_of_the_elimination_grows_with_the_rod(n):
-    mech, _ = clamped(cosserat.straight(10.0, n, **SECTION))
-    packed = pack(mech)
-    assert packed.by_blocks
-    assert packed.system.graph.plan.memory[0] < 130 * (n + 4)
 
 
 def test_elimination_along_the_rod_is_the_dense_solution():

@@ -4,14 +4,11 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-import rom
 from rom import rotation
-from rom.components.cosserat import Shape, body, elastic_energy, linearised, reference, straight
-from rom.components.cosserat.bodies import shape_of
+from rom.components.cosserat import Shape, elastic_energy, linearised, reference, straight
 from rom.components.cosserat.helical_spring import HelicalSpring, plate_compliance, spring_rod
 from rom.components.hand.cable import Hole, Tendon
 from rom.components.hand.compliant_hand import (
-    LENGTHS,
     PHALANX_RIGIDITY_RATIO,
     Finger,
     close,
@@ -269,35 +266,3 @@ def test_contact_with_a_bar_has_its_tangent_and_balances():
     with pytest.raises(ConfigError, match=r"the bar reaches 0\.005 m into"):
         grasp(finger, Bar((20 * MM, 34 * MM), 20 * MM), [1.0])
     assert bar.pressure(held)[0].max() == 0.0
-
-
-def in_a_mechanism(finger, tension, load):
-    """The finger as a rod of a mechanism with a tendon through its plates.
-
-    The hole at the far end of a spring is one of the phalanx beyond it.
-    """
-    n = finger.rod.h.size
-    moved = finger.rod._replace(mass=np.full(n + 1, 1e-3), inertia=np.full((n + 2, 3), 1e-8))
-    mech = rom.Mechanism(gravity=(0, 0, 0))
-    made = mech.add_nonlinear("finger", body(moved))
-    mech.fixed("palm", mech.ground.marker((0, 0, 0)), made.marker("start"))
-    path = []
-    for (_, base, _, beyond), link in zip(finger.joints, finger.phalanges, strict=True):
-        near, far = (mech.parts[f"finger.{k}"] for k in (base, beyond))
-        path += [near.marker((finger.offset, 0, 0)), far.marker((finger.offset, 0, -link))]
-    mech.tendon("cable", path, tension=tension)
-    mech.force("load", made.marker("end"), load)
-    return mech
-
-
-@pytest.mark.parametrize(("tension", "load"), [(0.5, (0, 0, 0)), (1.5, (0, 0, 0)),
-                                               (1.5, (0.05, 0.02, 0))])  # fmt: skip
-def test_a_finger_in_a_mechanism_rests_as_by_itself(tension, load):
-    """To 1e-6 of its length: phalanges that stretch by 1e-5 of the springs move the holes."""
-    finger = Finger(n=6)
-    alone = close(finger, tension=tension, load=load)
-    mech = in_a_mechanism(finger, tension, load)
-    state = rom.equilibrium(mech)
-    assert not alone.bound.any() and alone.angles.min() > 0.1
-    found = shape_of(rom.snapshot(mech, state), "finger").x
-    assert_allclose(found, alone.shape.x, atol=1e-6 * LENGTHS["index"])

@@ -16,7 +16,6 @@ from rom.components.hand.budgets import (
     wire_stress,
 )
 from rom.components.hand.compliant_hand import HAND_SPRING, Finger, hand
-from rom.components.hand.control_chart import Chart
 from rom.components.hand.held_objects import (
     SKIN_CONTACT,
     Held,
@@ -247,7 +246,5 @@ def test_what_cannot_be_held_is_named():
         table(mech, "ball", BALL, leaves=1.0)
     with pytest.raises(ConfigError, match=r"mu = -0\.1 must not be negative"):
         replace(SKIN_CONTACT, mu=-0.1)
-    with pytest.raises(ConfigError, match="9 samples of the extensor for 10"):
-        Chart().follow(np.zeros(10), np.zeros(9), 1e-3)
     with pytest.raises(ConfigError, match=r"shape \(10, 4\), needed is \(n, 5\)"):
         winches(np.zeros((10, 4)), 1e-3)

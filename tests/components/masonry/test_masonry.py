@@ -8,6 +8,7 @@ from numpy.testing import assert_allclose
 from scipy.linalg import eigh
 
 import rom
+from cases.components.masonry import GROUND, SOFT, G, box, on_the_ground, turned
 from cases.solid import STEEL, block
 from rom.components.masonry.block_contact import SLIDES
 from rom.components.masonry.limits import Rock, arch, stands
@@ -15,24 +16,6 @@ from rom.components.masonry.motion import simulate
 from rom.components.masonry.stones import Masonry, polygon_moments, reduced_stone, stone, touching
 from rom.eigen.verbs import rigid_motions
 from rom.errors import ConfigError, MaterialError, ModelError
-
-G = 9.81
-SOFT = {"E": 1e9, "nu": 0.2, "rho": 2000.0}
-GROUND = np.array([[-10.0, -1.0], [10.0, -1.0], [10.0, 0.0], [-10.0, 0.0]])
-
-
-def box(width=1.0, height=1.0, at=(0.0, 0.0)):
-    return np.array([[0, 0], [width, 0], [width, height], [0, height]]) + np.asarray(at)
-
-
-def turned(angle):
-    c, s = np.cos(angle), np.sin(angle)
-    return np.array([[c, -s], [s, c]])
-
-
-def on_the_ground(*stones, friction=0.0, **options):
-    ground = stone(GROUND @ turned(options.pop("slope", 0.0)).T, **SOFT)
-    return Masonry((ground, *stones), (0,), 10 * SOFT["E"], friction, **options)
 
 
 def test_mass_of_a_block_is_that_of_finite_elements():

@@ -8,6 +8,7 @@ from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
+from cases.components.masonry import GROUND, SOFT, G, box, on_the_ground
 from cases.refusals import refused
 from rom.components.masonry import (
     BaseMotion,
@@ -34,17 +35,9 @@ from rom.components.masonry import (
 )
 from rom.errors import ConfigError, FileFormatError, ModelError
 
-G = 9.81
-SOFT = {"E": 1e9, "nu": 0.2, "rho": 2000.0}
-GROUND = np.array([[-10.0, -1.0], [10.0, -1.0], [10.0, 0.0], [-10.0, 0.0]])
 
-
-def box(width=1.0, height=1.0, at=(0.0, 0.0)):
-    return np.array([[0, 0], [width, 0], [width, height], [0, height]]) + np.asarray(at)
-
-
-def on_the_ground(*stones, friction=0.84, **options):
-    return Masonry((stone(GROUND, **SOFT), *stones), (0,), 10 * SOFT["E"], friction, **options)
+def on_ground(*stones, friction=0.84, **options):
+    return on_the_ground(*stones, friction=friction, **options)
 
 
 def alone(**options):
@@ -53,7 +46,7 @@ def alone(**options):
 
 @pytest.mark.parametrize("at", [(0.3, 0.4), (0.3, 1.0), (1.0, 1.0)])
 def test_ground_feels_weight_and_a_point_load_where_they_are(at):
-    model, load = on_the_ground(stone(box(), **SOFT)), PointLoad(1, at, (0.0, -3e4))
+    model, load = on_ground(stone(box(), **SOFT)), PointLoad(1, at, (0.0, -3e4))
     still = simulate(model, t_end=1.0, dt=0.02, actions=[load], damping=np.inf, save_every=50)
     ((centre, force),) = still.joints().values()
     weight = 2000 * G
@@ -78,7 +71,7 @@ def test_wind_tips_a_block_at_its_closed_form(factor, stays):
     """p h h / 2 = rho g b h b / 2; the wall is 0.5 m thick out of the plane."""
     b, h = 0.5, 2.0
     one = stone(box(b, h), **SOFT, thickness=0.5)
-    model = on_the_ground(one, thickness=0.5)
+    model = on_ground(one, thickness=0.5)
     edges = facing(model, (1.0, 0.0))
     assert edges == ((1, 3),)
     wind = Wind(lambda t: factor * 2000 * G * b**2 / h * ramp(1.0)(t), edges)
@@ -98,7 +91,7 @@ def test_wind_turns_with_its_stone_and_a_weight_does_not():
 
 
 def test_wind_meets_only_what_faces_it():
-    model = on_the_ground(stone(box(), **SOFT), stone(box(at=(2.0, 0.0)), **SOFT),
+    model = on_ground(stone(box(), **SOFT), stone(box(at=(2.0, 0.0)), **SOFT),
                           stone(box(at=(2.0, 1.0)), **SOFT))  # fmt: skip
     assert facing(model, (1.0, 0.0)) == ((1, 3), (3, 3))
     assert facing(model, (-2.0, 0.0)) == ((2, 1), (3, 1))
@@ -134,14 +127,14 @@ def test_a_support_that_settles_turns_the_beam():
     assert motion.q[-1, 1, 1] - motion.q[0, 1, 1] == pytest.approx(-0.02, rel=1e-12)
     assert motion.q[-1, 2, 2] == pytest.approx(-0.02 / 3.9, rel=1e-3)  # between edges that touch
     turned = simulate(
-        on_the_ground(stone(box(), **SOFT)), t_end=2.0, dt=5e-3, damping=20.0, save_every=400,
+        on_ground(stone(box(), **SOFT)), t_end=2.0, dt=5e-3, damping=20.0, save_every=400,
         actions=[SupportMotion((0,), (0.0, 0.0), 0.1, ramp(1.5))])  # fmt: skip
     assert_allclose(turned.q[-1, :, 2], 0.1, atol=1e-4)
 
 
 def test_moving_the_ground_or_the_frame_is_the_same():
     """A sliding block: held ground moved by x(t), and inertia of x''(t), two ways to one slip."""
-    model = on_the_ground(stone(box(), **SOFT), friction=0.2)
+    model = on_ground(stone(box(), **SOFT), friction=0.2)
     a, T = 5.0, 0.8
     shift = a * (T / (2 * np.pi)) ** 2
 
@@ -160,7 +153,7 @@ def test_moving_the_ground_or_the_frame_is_the_same():
 def test_slip_under_a_pulse_is_that_of_newmark(mu, a, width):
     """Newmark (1965): V^2 / (2 mu g) (1 - mu g / a), V = a t, for a rectangular pulse."""
     t = 0.2
-    model = on_the_ground(stone(box(width), **SOFT), friction=mu)
+    model = on_ground(stone(box(width), **SOFT), friction=mu)
     settled = simulate(model, t_end=0.2, dt=0.01, damping=np.inf).q[-1]
     pulse = BaseMotion(rectangle(a, t))
     motion = simulate(model, t_end=1.5, dt=5e-4, actions=[pulse], q=settled, save_every=3000)
@@ -304,7 +297,7 @@ def test_a_block_tips_after_an_impact_as_housner_loses_speed(frequency):
 
 def test_a_support_that_parts_lets_its_stone_fall_and_catches_it():
     """Drawn away at 2 g for 0.2 s: free fall by g t^2 / 2, then it lies on the support again."""
-    model, T = on_the_ground(stone(box(), **SOFT)), 0.2
+    model, T = on_ground(stone(box(), **SOFT)), 0.2
     away = SupportMotion((0,), (0.0, -G * T**2), history=lambda t: np.minimum(t / T, 1.0) ** 2)
     motion = simulate(model, t_end=2.0, dt=1e-3, actions=[away], damping=0.0)
     flight = (motion.t > 0.05) & (motion.t < 0.28)
@@ -419,7 +412,7 @@ def test_records_come_from_files(tmp_path):
 
 
 def test_a_pair_of_times_and_values_is_a_history_that_holds_its_ends():
-    model, still = on_the_ground(stone(box(), **SOFT)), []
+    model, still = on_ground(stone(box(), **SOFT)), []
     for history in (((0.0, 0.1), (0.0, 1.0)), Table([0, 0.1, 9], [0, 1, 1])):
         load = PointLoad(1, (0.5, 1.0), (2e4, -3e4), history)
         still.append(simulate(model, t_end=0.2, dt=0.02, actions=[load]).q)
@@ -454,7 +447,7 @@ ONE = Masonry((stone(box(), **SOFT),), (), 1e9, 0.5)
     ],
 )
 def test_actions_that_cannot_be_are_named(actions, words):
-    model = on_the_ground(stone(box(), **SOFT))
+    model = on_ground(stone(box(), **SOFT))
     with pytest.raises(ConfigError, match=words):
         simulate(model, t_end=0.1, dt=0.01, actions=actions)
 
@@ -538,6 +531,6 @@ def test_steps_settle_with_friction_of_one_and_more(friction, cuts):
 def test_a_horizontal_force_tips_a_block_by_its_lever_about_the_ground(y, force):
     """F y = W b / 2, on whatever side and below or above the mass centre; friction of 4 holds."""
     b, h = 0.5, 2.0
-    model = on_the_ground(stone(box(b, h), **SOFT), friction=4.0)
+    model = on_ground(stone(box(b, h), **SOFT), friction=4.0)
     load = PointLoad(1, (0.0 if force > 0 else b, y), (force, 0.0))
     assert load_factor(model, [load]) == pytest.approx(2000 * b * h * G * b / 2 / y, rel=1e-6)

@@ -7,6 +7,7 @@ import pytest
 from numba import njit
 from numpy.testing import assert_allclose
 
+from cases.components.masonry import SOFT, G, box
 from rom.components.masonry import (
     Joint,
     Masonry,
@@ -23,13 +24,6 @@ from rom.components.masonry import (
 )
 from rom.components.masonry.block_contact import contacts, drop_doubles
 from rom.errors import ConfigError, FileFormatError
-
-G = 9.81
-SOFT = {"E": 1e9, "nu": 0.2, "rho": 2000.0}
-
-
-def box(width=1.0, height=1.0, at=(0.0, 0.0)):
-    return np.array([[0, 0], [width, 0], [width, height], [0, height]]) + np.asarray(at)
 
 
 def pair(joint, *, upper=1.0, below=False, **options):

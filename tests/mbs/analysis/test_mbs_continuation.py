@@ -7,32 +7,33 @@ from scipy.special import ellipk
 
 import rom
 from cases.long import few
-from rom.components.cosserat import along, body, straight
+from cases.mbs.parts import ORIGIN, X, Y, Z, held_rod, on_guide, on_hinge
+from rom.components.cosserat import along, body
 from rom.components.orbits import equilibria
 from rom.errors import ConfigError, ModelError, SolverError
 
-X, Y, Z = np.eye(3)
+
+def column(mech, name="column", x=0.0, half=1.0):
+    """The top of a stiff column on a hinge about y at its foot."""
+    part = mech.add_rigid(name, mass=1, inertia=(1, 1, 1), at=(x, 0, half))
+    foot = part.marker((0, 0, -half))
+    mech.revolute(f"hinge of {name}", mech.ground.marker((x, 0, 0)), foot, axis=Y)
+    return part.marker((0, 0, half))
 
 
-def hinged_column(gravity=(0, 0, 0)):
-    """A stiff column of length 2 m on a hinge with a spring of 10 N m/rad, under a dead load."""
-    mech = rom.Mechanism(gravity=gravity)
-    marks = {"foot": (0, 0, -1), "top": (0, 0, 1)}
-    column = mech.add_rigid("column", mass=1, inertia=(1, 1, 1), at=(0, 0, 1), markers=marks)
-    mech.revolute("hinge", mech.ground.marker((0, 0, 0)), column.marker("foot"), axis=Y)
-    mech.rotational_spring("spring", "hinge", stiffness=10.0)
-    mech.force("load", column.marker("top"), lambda t: (0, 0, -t))
-    return mech, column.marker("top")
+def hinged_column(mech=None, name="column", x=0.0, stiffness=10.0):
+    """A column of length 2 m with a spring in its hinge [N m/rad], under a dead load."""
+    mech = mech or rom.Mechanism(gravity=ORIGIN)
+    top = column(mech, name, x)
+    mech.rotational_spring(f"spring of {name}", f"hinge of {name}", stiffness=stiffness)
+    mech.force(f"load of {name}", top, lambda t: (0, 0, -t))
+    return mech, top
 
 
 def test_two_columns_that_buckle_in_one_step_are_told_apart():
     mech = rom.Mechanism(gravity=(0, 0, 0))
     for k, stiffness in enumerate((10.0, 10.02, 12.0)):
-        marks, at = {"foot": (0, 0, -1), "top": (0, 0, 1)}, (k, 0, 1)
-        column = mech.add_rigid(f"{k}", mass=1, inertia=(1, 1, 1), at=at, markers=marks)
-        mech.revolute(f"hinge {k}", mech.ground.marker((k, 0, 0)), column.marker("foot"), axis=Y)
-        mech.rotational_spring(f"spring {k}", f"hinge {k}", stiffness=stiffness)
-        mech.force(f"load {k}", column.marker("top"), lambda t: (0, 0, -t))
+        hinged_column(mech, f"{k}", k, stiffness)
     path = rom.continuation(mech, (0.0, 20.0))
     assert_allclose(loads(path), [5.0, 5.01, 6.0], rtol=1e-9)
     for k, critical in enumerate(path.critical):
@@ -43,10 +44,7 @@ def test_two_columns_that_buckle_in_one_step_are_told_apart():
 def test_a_branch_that_crosses_at_an_angle_is_the_closed_form():
     """A column held by a sloping spring (Koiter): P = k (s0 / s - 1) L cos(a) / sin(a)."""
     mech = rom.Mechanism(gravity=(0, 0, 0))
-    marks = {"foot": (0, 0, -0.5), "top": (0, 0, 0.5)}
-    column = mech.add_rigid("column", mass=1, inertia=(1, 1, 1), at=(0, 0, 0.5), markers=marks)
-    mech.revolute("hinge", mech.ground.marker((0, 0, 0)), column.marker("foot"), axis=Y)
-    top = column.marker("top")
+    top = column(mech, half=0.5)
     mech.spring_damper("spring", mech.ground.marker((1, 0, 0)), top, stiffness=10.0)
     mech.force("load", top, lambda t: (0, 0, -t))
     start = rom.continuation(mech, (0.0, 20.0)).critical[0]
@@ -103,9 +101,8 @@ def test_states_of_a_path_can_be_linearised_and_are_in_balance():
 def truss(height=0.3, stiffness=1000.0):
     """Two springs that lean on each other (von Mises), and the load at a height z."""
     mech = rom.Mechanism(gravity=(0, 0, 0))
-    top = mech.add_rigid("top", mass=1, inertia=(1, 1, 1), at=(0, 0, height),
-                         markers={"m": (0, 0, 0)}).marker("m")  # fmt: skip
-    mech.prismatic("guide", mech.ground.marker((0, 0, height)), top, axis=Z)
+    at = (0, 0, height)
+    top = on_guide(mech, "top", at=at, base=at, axis=Z)
     for side in (-1, 1):
         foot = mech.ground.marker((side, 0, 0))
         mech.spring_damper(f"bar {side}", foot, top, stiffness=stiffness)
@@ -149,18 +146,16 @@ def test_a_crank_longer_than_its_rod_turns_back_at_its_dead_point(dense, monkeyp
     monkeypatch.setattr(equilibria, "MAX_DENSE", dense)
     mech = rom.Mechanism(gravity=(0, 0, 0))
     solid = {"mass": 1.0, "inertia": (1, 1, 1)}
-    crank = mech.add_rigid("crank", **solid, at=(1, 0, 0), markers={"a": (-1, 0, 0), "b": X})
+    crank = on_hinge(mech, X, "crank", **solid, axis=Z)
     rod = mech.add_rigid("rod", **solid, at=(2.5, 0, 0), markers={"a": (-0.5, 0, 0), "b": X / 2})
-    slider = mech.add_rigid("slider", **solid, at=(3, 0, 0), markers={"m": (0, 0, 0)})
-    mech.revolute("main", mech.ground.marker((0, 0, 0)), crank.marker("a"), axis=Z)
-    mech.revolute("pin", crank.marker("b"), rod.marker("a"), axis=Z)
-    mech.spherical("end", rod.marker("b"), slider.marker("m"))
-    mech.prismatic("guide", mech.ground.marker((3, 0, 0)), slider.marker("m"), axis=X)
-    mech.drive("angle", "main", lambda t: t)
+    slider = on_guide(mech, "slider", at=3 * X, base=3 * X)
+    mech.revolute("pin", crank.marker(X), rod.marker("a"), axis=Z)
+    mech.spherical("end", rod.marker("b"), slider)
+    mech.drive("angle", "hinge", lambda t: t)
     path = rom.continuation(mech, (0.0, 1.0), n=60)
     assert kinds(path)[:1] == ["limit"]
     assert_allclose(loads(path)[0], np.pi / 6, rtol=1e-9)
-    x = path.position(slider.marker("m"))[:, 0]
+    x = path.position(slider)[:, 0]
     assert_allclose((x - 2 * np.cos(path.t)) ** 2, 1 - (2 * np.sin(path.t)) ** 2, atol=1e-9)
     assert x.min() < 1.5
 
@@ -208,10 +203,8 @@ def test_a_shallow_arch_passes_its_limit_points_and_where_it_gives_way_sideways(
 
 
 def upright(n=16, weak=1.0, stiff=50.0):
-    mech = rom.Mechanism(gravity=(0, 0, 0))
     section = {"stretch": 1e5, "bend": (stiff, weak, stiff), "mass": 1.0, "inertia": 1e-3}
-    rod = mech.add_nonlinear("rod", body(straight(1.0, n, **section)))
-    mech.fixed("clamp", mech.ground.marker((0, 0, 0)), rod.marker("start"))
+    mech, rod = held_rod(n, **section)
     return mech, rod.marker("end")
 
 
@@ -236,10 +229,7 @@ def test_eulers_column_and_the_elastica_behind_it(dense, monkeypatch):
 
 def test_a_narrow_cantilever_twists_away_under_a_load_in_its_plane():
     """P = 4.0126 sqrt(EI GJ) / L^2 (Prandtl 1899), for a beam that hardly bends before."""
-    mech = rom.Mechanism(gravity=(0, 0, 0))
-    section = {"stretch": 1e6, "bend": (1.0, 1e4, 2.0), "mass": 1.0, "inertia": 1e-3}
-    rod = mech.add_nonlinear("rod", body(straight(1.0, 30, **section)))
-    mech.fixed("clamp", mech.ground.marker((0, 0, 0)), rod.marker("start"))
+    mech, rod = held_rod(30, stretch=1e6, bend=(1.0, 1e4, 2.0), mass=1.0, inertia=1e-3)
     mech.force("load", rod.marker("end"), lambda t: (t, 0, 0))
     path = rom.continuation(mech, (0.0, 7.0))
     assert kinds(path) == ["bifurcation"]
@@ -261,7 +251,6 @@ def test_what_makes_no_path_is_named():
     for wish, why in (
         ({"span": (1.0, 1.0)}, "needs two values that differ"),
         ({"span": (0.0, 1.0), "n": 1}, "n = 1"),
-        ({"span": (0.0, 1.0), "step": 0.0}, "step"),
         ({"span": (0.0, 1.0), "along": np.ones(6)}, "a branch leaves a state"),
         ({"span": (0.0, 1.0), "along": np.ones(5), "state": state}, "along"),
         ({"span": (0.0, 1.0), "along": np.zeros(6), "state": state}, "along needs a motion"),

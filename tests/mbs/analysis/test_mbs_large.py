@@ -1,7 +1,6 @@
 """Statics and small motions by sparse matrices: as dense ones, as closed forms, none missed."""
 
 import sys
-import warnings
 from dataclasses import replace
 from functools import partial
 
@@ -15,7 +14,7 @@ import rom
 from cases.beam import elastica
 from cases.long import few
 from cases.mbs.mechanisms import random_body, slider_crank
-from rom.components.cosserat import body, straight
+from cases.mbs.parts import ORIGIN, X, Y, Z, held_rod, on_guide
 from rom.errors import ConfigError, ModelError, ModesMissedError, RomWarning, SolverError
 from rom.mbs.analysis import campbell as campbell_module
 from rom.mbs.analysis import few_modes, local_equations
@@ -23,16 +22,11 @@ from rom.mbs.analysis.tangent import best_reactions
 from rom.mbs.integrate.consistent_start import initial_state
 from rom.mbs.mechanism import Mechanism
 
-X, Y, Z = np.eye(3)
 SECTION = {"stretch": 1e5, "bend": (40.0, 60.0, 30.0), "mass": 1.0, "inertia": (1e-3, 2e-3, 3e-3)}
 
 
-def rod_on(joint, n=20, gravity=(0, 0, -9.81), viscosity=0.0, **more):
-    mech = Mechanism(gravity=gravity)
-    rod = mech.add_nonlinear("rod", body(straight(1.0, n, **SECTION, viscosity=viscosity)))
-    if joint:
-        getattr(mech, joint)("hook", mech.ground.marker((0, 0, 0)), rod.marker("start"), **more)
-    return mech
+def rod_on(joint, n=20, gravity=(0, 0, -9.81), **more):
+    return held_rod(n, joint=joint, gravity=gravity, **SECTION | more)[0]
 
 
 def flexible_pair(seed=3):
@@ -165,7 +159,6 @@ def test_wrong_wishes_are_refused():
         ({"n": 500}, "from 1 to 33: the motions that the joints leave"),
         ({"n": 3, "band": (1, 2)}, "at most one of n and band"),
         ({"band": (3.0, 2.0)}, "two growing frequencies"),
-        ({"band": (-3.0, 2.0)}, "two growing frequencies"),
     ):
         with pytest.raises(ConfigError, match=why):
             rom.linearize(mech, **wish)
@@ -192,13 +185,12 @@ def with_spring(mech):
     return mech
 
 
+@pytest.mark.filterwarnings("ignore::rom.errors.RomWarning")
 @pytest.mark.parametrize("name", STATICS)
 def test_large_statics_are_those_of_dense_matrices(name, monkeypatch):
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", RomWarning)
-        exact = rom.equilibrium(STATICS[name]())
-        monkeypatch.setattr(local_equations, "MAX_DENSE", 0)
-        state = rom.equilibrium(STATICS[name]())
+    exact = rom.equilibrium(STATICS[name]())
+    monkeypatch.setattr(local_equations, "MAX_DENSE", 0)
+    state = rom.equilibrium(STATICS[name]())
     assert_allclose(state.q, exact.q, atol=1e-11)
     assert_allclose(state.lam, exact.lam, atol=1e-8 * max(1.0, np.abs(exact.lam).max(initial=0.0)))
 
@@ -246,10 +238,7 @@ def test_reactions_balance_best_as_those_of_dense_matrices():
 def test_mattiassons_table_of_the_elastica(load, deflection, shortening):
     """Mattiasson, Int. J. Numer. Meth. Eng. 17 (1981) 145, and the elliptic integrals."""
     assert_allclose(elastica(load)[1:], (1 - shortening, deflection), atol=6e-6)
-    mech = Mechanism(gravity=(0, 0, 0))
-    stiff = {"stretch": 1e7, "bend": 1.0, "mass": 1.0, "inertia": 1e-4}
-    rod = mech.add_nonlinear("rod", body(straight(1.0, 400, **stiff)))
-    mech.fixed("clamp", mech.ground.marker((0, 0, 0)), rod.marker("start"))
+    mech, rod = held_rod(400, stretch=1e7, bend=1.0, mass=1.0, inertia=1e-4)
     mech.force("tip", rod.marker("end"), (load, 0, 0))
     tip = rom.equilibrium(mech).q[-7:-4]
     assert_allclose((tip[2], tip[0]), elastica(load)[1:], atol=8e-6)
@@ -266,10 +255,7 @@ def test_slender_rods_need_no_more_corrections_than_stocky_ones(many, monkeypatc
     )
     needed = []
     for stretch in (1e4, 1e7):
-        mech = Mechanism(gravity=(0, 0, 0))
-        stiff = {"stretch": stretch, "bend": 1.0, "mass": 1.0, "inertia": 1e-4}
-        rod = mech.add_nonlinear("rod", body(straight(1.0, 30, **stiff)))
-        mech.fixed("clamp", mech.ground.marker((0, 0, 0)), rod.marker("start"))
+        mech, rod = held_rod(30, stretch=stretch, bend=1.0, mass=1.0, inertia=1e-4)
         mech.force("tip", rod.marker("end"), (10.0, 0, 0))
         counted.clear()
         tip = rom.equilibrium(mech).q[-7:-4]
@@ -312,10 +298,7 @@ def test_modes_about_a_bent_shape_need_no_whole_matrices():
     """Round-off of its balance accelerates the light pieces of a fine rod, and yet it rests."""
     found = []
     for n in (150, 600):
-        mech = Mechanism(gravity=(0, 0, 0))
-        section = {"stretch": 1e6, "bend": 100.0, "mass": 1.0, "inertia": 1e-3}
-        rod = mech.add_nonlinear("rod", body(straight(1.0, n, **section)))
-        mech.fixed("clamp", mech.ground.marker((0, 0, 0)), rod.marker("start"))
+        mech, rod = held_rod(n, stretch=1e6, bend=100.0, mass=1.0, inertia=1e-3)
         mech.force("tip", rod.marker("end"), (200.0, 0, 0))
         around = rom.linearize(mech, rom.equilibrium(mech), n=4)
         assert around.basis.shape[1] == 4
@@ -333,12 +316,10 @@ def test_a_mechanism_that_nothing_holds_is_refused_and_a_head_that_stands_is_sai
 
 def shaken_rod(viscosity=1e-3, n=12):
     """A rod on a table that a drive may shake along x."""
-    mech, ground = Mechanism(gravity=(0, 0, -9.81)), (0, 0, 0)
-    table = mech.add_rigid("table", mass=7.0, inertia=(1, 1, 1), markers={"c": ground}, at=ground)
-    mech.prismatic("slide", mech.ground.marker(ground), table.marker("c"), axis=X)
-    mech.drive("shaker", "slide", lambda t: 0.0 * t)
-    rod = mech.add_nonlinear("rod", body(straight(1.0, n, **SECTION, viscosity=viscosity)))
-    mech.fixed("hook", table.marker("c"), rod.marker("start"))
+    mech = Mechanism(gravity=(0, 0, -9.81))
+    table = on_guide(mech, "table", mass=7.0)
+    mech.drive("shaker", "guide", lambda t: 0.0 * t)
+    _, rod = held_rod(n, on=(mech, table), **SECTION, viscosity=viscosity)
     return mech, rod.marker("end")
 
 
@@ -356,7 +337,7 @@ def test_responses_of_large_mechanisms_are_those_of_dense_matrices(monkeypatch):
             rom.frequency_response(pair, other, f, force=marks[0], motion=marks[1]).receptance,
             rom.transmissibility(rod, state, f, drive="shaker", motion=tip),
             rom.transmissibility(rod, state, f, drive="shaker",
-                                 motion=rod.parts["table"].marker("c")),
+                                 motion=rod.parts["table"].marker(ORIGIN)),
         ))  # fmt: skip
     assert_allclose(answers[1][3][:, 0], 1.0, rtol=1e-9)  # the table moves as its drive does
     for whole, sparse in zip(*answers, strict=True):
@@ -366,12 +347,9 @@ def test_responses_of_large_mechanisms_are_those_of_dense_matrices(monkeypatch):
 
 def test_a_rod_of_thousands_of_unknowns_answers_as_its_closed_form():
     """Tip of a clamped beam under a harmonic force: (sin ch - cos sh) / (EI k^3 (1 + cos ch))."""
-    mech, EI, mass = Mechanism(gravity=(0, 0, 0)), 1.0, 1.0
-    section = {"stretch": 1e6, "bend": EI, "mass": mass, "inertia": 1e-9}
-    rod = mech.add_nonlinear("rod", body(straight(1.0, 150, **section)))
-    mech.fixed("clamp", mech.ground.marker((0, 0, 0)), rod.marker("start"))
+    mech, rod = held_rod(150, stretch=1e6, bend=1.0, mass=1.0, inertia=1e-9)
     tip, k = rod.marker("end"), np.array([1.0, 2.5, 4.0])
-    f = k**2 * np.sqrt(EI / mass) / (2 * np.pi)
+    f = k**2 / (2 * np.pi)
     found = rom.frequency_response(mech, None, f, force=tip, motion=tip).receptance[:, 0, 0]
     exact = (np.sin(k) * np.cosh(k) - np.cos(k) * np.sinh(k)) / (1 + np.cos(k) * np.cosh(k)) / k**3
     assert_allclose(found, exact, rtol=2e-5, atol=2e-5)
@@ -391,7 +369,7 @@ def test_an_infinite_response_of_a_large_mechanism_is_named(monkeypatch):
     end = free.nonlinear["rod"].marker("end")
     with pytest.raises(SolverError, match="at 0 Hz is infinite"):
         rom.frequency_response(free, None, 0.0, force=end, motion=end)
-    mech.fixed("bolt", mech.ground.marker((0, 0, 0)), mech.parts["table"].marker("c"))
+    mech.fixed("bolt", mech.ground.marker(ORIGIN), mech.parts["table"].marker(ORIGIN))
     with pytest.warns(RomWarning), pytest.raises(ModelError, match="do not let this drive move"):
         rom.transmissibility(mech, None, 1.0, drive="shaker", motion=tip)
 
@@ -399,10 +377,9 @@ def test_an_infinite_response_of_a_large_mechanism_is_named(monkeypatch):
 def test_a_campbell_diagram_of_some_modes_is_that_of_all(monkeypatch):
     """A rod on a hub that turns as a whole, gyroscopic and stiffened."""
     mech = Mechanism(gravity=(0, 0, 0))
-    hub = mech.add_rigid("hub", mass=1.0, inertia=(1, 1, 1), at=(0, 0, 0), markers={"c": (0, 0, 0)})
-    rod = mech.add_nonlinear("rod", body(straight(1.0, 12, **SECTION)))
-    mech.revolute("axle", mech.ground.marker((0, 0, 0)), hub.marker("c"), axis=X)
-    mech.fixed("root", hub.marker("c"), rod.marker("start"))
+    hub = mech.add_rigid("hub", mass=1.0, inertia=(1, 1, 1), at=ORIGIN).marker(ORIGIN)
+    mech.revolute("axle", mech.ground.marker(ORIGIN), hub, axis=X)
+    held_rod(12, on=(mech, hub), **SECTION)
     speeds, found = (2.0, 8.0, 20.0), []
     for size in (200, 0):
         monkeypatch.setattr(local_equations, "MAX_DENSE", size)
@@ -419,15 +396,13 @@ def test_a_row_of_cranks_swings_as_one_whose_joints_repeat_each_other():
     solid = {"mass": 1.0, "inertia": (0.1, 0.1, 0.1)}
     before = None
     for k in range(n):
-        crank = mech.add_rigid(f"crank {k}", **solid, at=(k, 0, -0.5),
-                               markers={"a": Z / 2, "b": -Z / 2})  # fmt: skip
-        mech.revolute(f"hinge {k}", mech.ground.marker((k, 0, 0)), crank.marker("a"), axis=Y)
+        crank = mech.add_rigid(f"crank {k}", **solid, at=(k, 0, -0.5))
+        mech.revolute(f"hinge {k}", mech.ground.marker((k, 0, 0)), crank.marker(Z / 2), axis=Y)
         if before:
-            rod = mech.add_rigid(f"rod {k}", **solid, at=(k - 0.5, 0, -1),
-                                 markers={"a": -X / 2, "b": X / 2})  # fmt: skip
-            mech.spherical(f"ball {k}", before, rod.marker("a"))
-            mech.revolute(f"pin {k}", rod.marker("b"), crank.marker("b"), axis=Y)
-        before = crank.marker("b")
+            rod = mech.add_rigid(f"rod {k}", **solid, at=(k - 0.5, 0, -1))
+            mech.spherical(f"ball {k}", before, rod.marker(-X / 2))
+            mech.revolute(f"pin {k}", rod.marker(X / 2), crank.marker(-Z / 2), axis=Y)
+        before = crank.marker(-Z / 2)
     with pytest.warns(RomWarning, match="19 of 252 constraints repeat others"):
         state = rom.equilibrium(mech)
     found = rom.linearize(mech, state, n=1).frequencies
@@ -437,12 +412,10 @@ def test_a_row_of_cranks_swings_as_one_whose_joints_repeat_each_other():
 
 def test_all_modes_at_rest_are_those_of_one_symmetric_problem(monkeypatch):
     """Free motions are not followed to a later instant, and nothing damps but round-off."""
-    mech = rom.Mechanism(gravity=(0, 0, -9.81))
-    section = {"stretch": (5e5, 5e5, 1e6), "bend": (1e3, 2e3, 1.5e3), "mass": 1.0}
+    section = {"stretch": (5e5, 5e5, 1e6), "bend": (1e3, 2e3, 1.5e3), "mass": 1.0,
+               "inertia": (1e-2, 2e-2, 3e-2)}  # fmt: skip
     along = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]])
-    rod = straight(10.0, 8, frame=along, inertia=(1e-2, 2e-2, 3e-2), **section)
-    part = mech.add_nonlinear("rod", body(rod))
-    mech.fixed("clamp", mech.ground.marker((0, 0, 0)), part.marker("start"))
+    mech, _ = held_rod(8, gravity=(0, 0, -9.81), length=10.0, frame=along, **section)
     monkeypatch.setattr(sys.modules[rom.linearize.__module__]._Path, "at", None)
     found = rom.linearize(mech, rom.equilibrium(mech))
     assert not found.C.any()

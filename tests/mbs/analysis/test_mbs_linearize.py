@@ -11,6 +11,7 @@ from scipy.optimize import brentq
 import rom
 from cases.beam import stiffened_beam
 from cases.mbs.mechanisms import random_body, rotor
+from cases.mbs.parts import ORIGIN, X, Y, Z, below, on_guide, on_hinge
 from cases.mbs.trusses import HUB_INERTIA, MASS, REST, SPRING, dumbbell
 from rom.errors import ConfigError, ModelError, RomWarning
 from rom.mbs.analysis.linearize import linearize
@@ -20,15 +21,12 @@ from rom.mbs.integrate.consistent_start import initial_state
 from rom.mbs.mechanism import Mechanism
 
 g, TINY = 9.81, (1e-12, 1e-12, 1e-12)
-X, Y, Z = (1, 0, 0), (0, 1, 0), (0, 0, 1)
 
 
 def pendulum(length=0.7, angle=0.0, inertia=TINY):
     """A bob that swings about y."""
     mech = Mechanism(gravity=(0, 0, -g))
-    at = length * np.array([np.sin(angle), 0, -np.cos(angle)])
-    bob = mech.add_rigid("bob", mass=2.0, inertia=inertia, at=at, markers={"pin": -at})
-    mech.revolute("hinge", mech.ground.marker((0, 0, 0)), bob.marker("pin"), axis=Y)
+    on_hinge(mech, below(angle, length), inertia=inertia)
     return mech
 
 
@@ -102,13 +100,9 @@ def test_double_pendulum():
 def chain(n=3, *, mass=2.0, stiffness=50.0, damping=0.0, held=True):
     """Masses on a rail along x, joined by springs; the first one to the ground."""
     mech = Mechanism(gravity=(0, 0, -g))
-    ground = mech.ground.marker((0, 0, 0))
-    last = ground
+    last = mech.ground.marker(ORIGIN)
     for k in range(n):
-        cart = mech.add_rigid(f"cart {k}", mass=mass, inertia=(1, 1, 1), at=(k + 1.0, 0, 0),
-                              markers={"hook": (0, 0, 0)})  # fmt: skip
-        hook = cart.marker("hook")
-        mech.prismatic(f"rail {k}", ground, hook, axis=(1, 0, 0))
+        hook = on_guide(mech, f"cart {k}", mass=mass, at=(k + 1.0, 0, 0), guide=f"rail {k}")
         if k or held:
             mech.spring_damper(f"spring {k}", last, hook, stiffness=stiffness, damping=damping)
         last = hook
@@ -318,10 +312,9 @@ def test_a_state_of_a_run_is_good_enough():
 
 def test_a_wheel_that_rolls_is_linearised_at_rest_only():
     mech = Mechanism(gravity=(0, 0, -g))
-    wheel = mech.add_rigid("wheel", mass=1.0, inertia=(1, 1, 1), at=(0, 0, 0.5),
-                           markers={"c": (0, 0, 0)})  # fmt: skip
-    mech.rolling("road", mech.ground.marker((0, 0, 0)), wheel.marker("c"), radius=0.5, normal=Z)
-    mech.spring_damper("rope", mech.ground.marker((2, 0, 0.5)), wheel.marker("c"), stiffness=80.0)
+    wheel = mech.add_rigid("wheel", mass=1.0, inertia=(1, 1, 1), at=Z / 2).marker(ORIGIN)
+    mech.rolling("road", mech.ground.marker(ORIGIN), wheel, radius=0.5, normal=Z)
+    mech.spring_damper("rope", mech.ground.marker((2, 0, 0.5)), wheel, stiffness=80.0)
     swing = 2 * np.pi * rom.linearize(mech).frequencies
     assert_allclose(swing[-1], np.sqrt(80.0 / (1.0 + 1.0 / 0.25)), rtol=1e-8)
     assert_allclose(swing[:-1], 0.0)
@@ -329,13 +322,9 @@ def test_a_wheel_that_rolls_is_linearised_at_rest_only():
 
 def dry_pendulum(angle, rate):
     """A pendulum under way whose hinge rubs by its load, with a damper to the ground."""
-    mech, at = Mechanism(gravity=(0, 0, -g)), 0.7 * np.array([np.sin(angle), 0, -np.cos(angle)])
-    turn = (np.cos(angle / 2), 0, -np.sin(angle / 2), 0)
-    marks = {"pin": (0, 0, 0.7), "c": (0, 0, 0)}
-    bob = mech.add_rigid("bob", mass=2.0, inertia=(0.3, 0.2, 0.3), at=at, orientation=turn,
-                         markers=marks, omega=(0, -rate, 0),
-                         velocity=np.cross((0, -rate, 0), at))  # fmt: skip
-    mech.revolute("hinge", mech.ground.marker((0, 0, 0)), bob.marker("pin"), axis=Y)
+    mech, at = Mechanism(gravity=(0, 0, -g)), below(angle, 0.7)
+    moving = {"omega": (0, -rate, 0), "velocity": np.cross((0, -rate, 0), at)}
+    bob = on_hinge(mech, at, inertia=(0.3, 0.2, 0.3), **moving)
     mech.friction("rub", "hinge", transition_speed=2.0, mu=0.4, radius=0.1, coulomb=0.3)
     mech.spring_damper("rope", mech.ground.marker((1, 0, -1)), bob.marker("c"), stiffness=9.0,
                        damping=4.0, free_length=0.8)  # fmt: skip

@@ -9,12 +9,11 @@ from scipy.integrate import solve_ivp
 
 import rom
 from cases.beam import stiffened_beam
+from cases.mbs.parts import ORIGIN, Z
 from rom.components.gear_mesh import Correction, GearPair
 from rom.errors import ModelError
 from rom.mbs import BallBearing
 
-X, Y, Z = np.eye(3)
-ORIGIN = (0, 0, 0)
 EXACT = {"rtol": 1e-11, "atol": 1e-13, "method": "DOP853"}
 PAIR = GearPair((26, 40), 4e-3, 0.03, thinning=5e-5)
 TURNS = {"pinion axle": 2 * np.pi / 26, "gear axle": -2 * np.pi / 40}

@@ -11,21 +11,18 @@ from scipy.optimize import fsolve
 from scipy.special import mathieu_a, mathieu_b
 
 import rom
+from cases.mbs.parts import ORIGIN, X, Z, on_guide, on_hinge
 from rom.components.orbits.family import Family
 from rom.components.orbits.flow import Flow
 from rom.errors import ConfigError, ModelError, SolverError
 
-X, Y, Z = np.eye(3)
-ORIGIN = (0, 0, 0)
 FORCE, DAMPING, SPRING, FREE = 0.3, 0.1, 2.5, 0.8
 
 
 def across(w):
     """A mass of 1 kg along x between two springs across: F = -2 k x (1 - l / sqrt(1 + x^2))."""
     mech = rom.Mechanism(gravity=(0, 0, 0))
-    mass = mech.add_rigid("mass", mass=1.0, inertia=(1, 1, 1), at=ORIGIN).marker(ORIGIN)
-    base = mech.ground.marker(ORIGIN)
-    mech.prismatic("guide", base, mass, axis=X)
+    mass, base = on_guide(mech), mech.ground.marker(ORIGIN)
     for side in (1, -1):
         end = mech.ground.marker((0, side, 0))
         mech.spring_damper(f"spring {side}", end, mass, stiffness=SPRING, free_length=FREE)
@@ -122,15 +119,12 @@ def shaken(border):
 
     def build(factor):
         mech = rom.Mechanism(gravity=(0, 0, -factor * squared * w**2 / 4))
-        cart = mech.add_rigid("cart", mass=1.0, inertia=(1, 1, 1), at=ORIGIN).marker(ORIGIN)
-        bob = mech.add_rigid("bob", mass=1.0, inertia=(1e-9,) * 3, at=(0, 0, side),
-                             markers={"pin": (0, 0, -side)})  # fmt: skip
-        mech.prismatic("lift", mech.ground.marker(ORIGIN), cart, axis=Z)
+        cart = on_guide(mech, "cart", axis=Z, guide="lift")
         a = 0.5 * q
         mech.drive("shaker", "lift", lambda t: a * np.cos(w * t),
                    rate=lambda t: -a * w * np.sin(w * t),
                    acceleration=lambda t: -a * w**2 * np.cos(w * t))  # fmt: skip
-        mech.revolute("hinge", cart, bob.marker("pin"), axis=Y)
+        on_hinge(mech, side * Z, mass=1.0, inertia=(1e-9,) * 3, pivot=cart)
         return mech
 
     return build, 2 * np.pi / w
@@ -148,8 +142,7 @@ def test_where_a_shaken_pendulum_loses_its_stability_it_is_at_the_border_of_math
 def fed(c):
     """An oscillator that is pushed, with damping that may feed it."""
     mech = rom.Mechanism(gravity=(0, 0, 0))
-    mass = mech.add_rigid("mass", mass=1.0, inertia=(1, 1, 1), at=ORIGIN).marker(ORIGIN)
-    mech.prismatic("guide", mech.ground.marker(ORIGIN), mass, axis=X)
+    mass = on_guide(mech)
     mech.motor("law", "guide", lambda t, x, v: -4.0 * x - c * v, compiled=False)
     mech.force("push", mass, lambda t: (np.cos(1.3 * t), 0, 0))
     return mech
@@ -163,9 +156,7 @@ def test_a_second_frequency_comes_in_where_damping_vanishes():
 
 def self_excited(mu):
     mech = rom.Mechanism(gravity=(0, 0, 0))
-    mass = mech.add_rigid("mass", mass=1.0, inertia=(1, 1, 1), at=(2.0, 0, 0)).marker(ORIGIN)
-    base = mech.ground.marker((2.0, 0, 0))
-    mech.prismatic("guide", base, mass, axis=X)
+    on_guide(mech, at=2 * X, base=2 * X)
     mech.motor("law", "guide", lambda t, x, v: mu * (1 - (x + 2) ** 2) * v - x - 2, compiled=False)
     return mech
 
@@ -189,13 +180,10 @@ def test_limit_cycles_are_followed_with_their_periods():
 def swinging(torque):
     """A pendulum of which a torque makes a swing, with moments of its pin."""
     mech = rom.Mechanism(gravity=(0, 0, -9.81))
-    bob = mech.add_rigid("bob", mass=1.0, inertia=(0.1, 0.1, 0.1), at=(0, 0, -1),
-                         markers={"pin": (0, 0, 1)})  # fmt: skip
-    base = mech.ground.marker(ORIGIN)
-    mech.revolute("hinge", base, bob.marker("pin"), axis=Y)
-    mech.bushing("loss", base, bob.marker("pin"), stiffness=np.zeros(6),
-                 damping=(0, 0, 0, 0, 0.5, 0))  # fmt: skip
-    mech.torque("drive", bob.marker("pin"), lambda t: (0, torque * np.cos(2.0 * t), 0))
+    pin = on_hinge(mech, -Z, mass=1.0, inertia=(0.1, 0.1, 0.1)).marker("pin")
+    loss = (0, 0, 0, 0, 0.5, 0)
+    mech.bushing("loss", mech.ground.marker(ORIGIN), pin, stiffness=np.zeros(6), damping=loss)
+    mech.torque("drive", pin, lambda t: (0, torque * np.cos(2.0 * t), 0))
     return mech
 
 

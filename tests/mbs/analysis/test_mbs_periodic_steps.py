@@ -9,7 +9,8 @@ from scipy.linalg import block_diag
 
 import rom
 from benchmarks.units import as_mechanism
-from cases.mbs.geared_rotors import rigid_unit
+from cases.gear_unit import rigid_unit
+from cases.mbs.parts import ORIGIN, Y, Z
 from rom.components.journal_bearing import iso_vg
 from rom.components.orbits import search
 from rom.components.orbits.derivatives import by_differences, by_steps, confirmed, follows
@@ -17,9 +18,6 @@ from rom.components.orbits.flow import Flow
 from rom.components.orbits.shooting import Return
 from rom.components.orbits.turns import Turns, turns_of
 from rom.errors import ModelError
-
-X, Y, Z = np.eye(3)
-ORIGIN = (0, 0, 0)
 
 
 def swung(mechanism, period, steps=40, turns=None):

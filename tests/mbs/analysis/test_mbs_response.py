@@ -6,31 +6,25 @@ from numpy.testing import assert_allclose
 
 import rom
 from cases.mbs.mechanisms import rotor
+from cases.mbs.parts import ORIGIN, X, Y, Z, on_guide, on_hinge
 from rom.errors import ConfigError, ModelError, RomWarning, SolverError
 from rom.mbs.analysis.campbell import Campbell
 from rom.mbs.mechanism import Mechanism
 
-X, Y, Z = np.eye(3)
 M1, M2, K1, K2, C1, C2 = 3.0, 1.0, 400.0, 150.0, 2.0, 0.5
 
 
 def absorber(*, damped=1.0, shaken=False):
     """A mass on springs that carries a second one, along x; on a base that a drive may shake."""
     mech = Mechanism(gravity=(0, 0, 0))
-    base, inertia = mech.ground.marker((0, 0, 0)), (1, 1, 1)
+    base = mech.ground.marker(ORIGIN)
     if shaken:
-        table = mech.add_rigid("table", mass=7.0, inertia=inertia, at=(0, 0, 0),
-                               markers={"c": (0, 0, 0)})  # fmt: skip
-        mech.prismatic("slide", base, table.marker("c"), axis=X)
+        base = on_guide(mech, "table", mass=7.0, guide="slide")
         mech.drive("shaker", "slide", lambda t: 0.0 * t)
-        base = table.marker("c")
     for k, (m, stiffness, c) in enumerate(((M1, K1, C1), (M2, K2, C2))):
-        cart = mech.add_rigid(f"cart {k}", mass=m, inertia=inertia, at=(k + 1.0, 0, 0),
-                              markers={"c": (0, 0, 0)})  # fmt: skip
-        mech.prismatic(f"rail {k}", mech.ground.marker((0, 0, 0)), cart.marker("c"), axis=X)
-        mech.spring_damper(f"spring {k}", base, cart.marker("c"), stiffness=stiffness,
-                           damping=damped * c)  # fmt: skip
-        base = cart.marker("c")
+        cart = on_guide(mech, f"cart {k}", mass=m, at=(k + 1.0, 0, 0), guide=f"rail {k}")
+        mech.spring_damper(f"spring {k}", base, cart, stiffness=stiffness, damping=damped * c)
+        base = cart
     return mech
 
 
@@ -44,7 +38,7 @@ def closed_form(f, load):
 
 
 def center(mech, k):
-    return mech.parts[f"cart {k}"].marker("c")
+    return mech.parts[f"cart {k}"].marker(ORIGIN)
 
 
 def test_response_of_two_masses_to_a_force():
@@ -61,9 +55,7 @@ def test_response_of_two_masses_to_a_force():
 def test_the_response_to_a_couple_and_of_an_angle():
     """An undamped pendulum: angle per moment 1 / (J (w0^2 - w^2)), its bob L times as far."""
     mech = Mechanism(gravity=(0, 0, -9.81))
-    marks = {"pin": (0, 0, 0.5), "c": (0, 0, 0)}
-    bob = mech.add_rigid("bob", mass=2.0, inertia=(0.2, 0.3, 0.2), at=(0, 0, -0.5), markers=marks)
-    mech.revolute("hinge", mech.ground.marker((0, 0, 0)), bob.marker("pin"), axis=Y)
+    bob = on_hinge(mech, -Z / 2, inertia=(0.2, 0.3, 0.2))
     f, J = np.array([0.0, 0.4, 1.7]), 0.3 + 2.0 * 0.25
     found = rom.frequency_response(mech, rom.equilibrium(mech), f, force=bob.marker("c"),
                                    motion=bob.marker("c")).receptance  # fmt: skip
@@ -82,7 +74,7 @@ def test_transmissibility_of_two_masses_on_a_shaken_base():
         assert_allclose(found[:, 0], exact[k], rtol=1e-8)
         assert_allclose(found[:, 1:], 0, atol=1e-12)
     table = rom.transmissibility(mech, None, f, drive="shaker",
-                                 motion=mech.parts["table"].marker("c"))  # fmt: skip
+                                 motion=mech.parts["table"].marker(ORIGIN))  # fmt: skip
     assert_allclose(table[:, 0], 1.0, rtol=1e-12)
 
 
@@ -119,7 +111,7 @@ def test_infinite_responses_and_wrong_arguments_are_named():
         rom.transmissibility(mech, None, [1.0], drive="belt", motion=center(mech, 1))
     shaken = absorber(shaken=True)
     table = shaken.parts["table"]
-    shaken.fixed("bolt", shaken.ground.marker((0, 0, 0)), table.marker("c"))
+    shaken.fixed("bolt", shaken.ground.marker(ORIGIN), table.marker(ORIGIN))
     with pytest.warns(RomWarning), pytest.raises(ModelError, match="do not let this drive move"):
         rom.transmissibility(shaken, None, [1.0], drive="shaker", motion=center(shaken, 1))
 
@@ -145,15 +137,14 @@ def crossing(speed):
     """Two bobs on a turning shaft, one swings outwards, one sideways with a coil."""
     mech = Mechanism(gravity=(0, 0, 0))
     turn = np.array([0, 0, speed])
-    marks = {"c": (0, 0, 0), "pin": (-0.5, 0, 0)}
-    shaft = mech.add_rigid("shaft", mass=1.0, inertia=(1, 1, 1), at=(0, 0, 0), omega=turn,
-                           markers={"c": (0, 0, 0)})  # fmt: skip
-    mech.revolute("axle", mech.ground.marker((0, 0, 0)), shaft.marker("c"), axis=Z)
+    marks, solid = {"pin": (-0.5, 0, 0)}, {"mass": 1.0, "inertia": (1, 1, 1)}
+    shaft = mech.add_rigid("shaft", **solid, at=ORIGIN, omega=turn).marker(ORIGIN)
+    mech.revolute("axle", mech.ground.marker(ORIGIN), shaft, axis=Z)
     mech.drive("motor", "axle", lambda t: speed * t, rate=lambda t: speed)
     for name, axis, k in (("lag", Z, 60.0), ("flap", Y, 20.0)):
         bob = mech.add_rigid(name, mass=2.0, inertia=(1e-6,) * 3, at=(0.5, 0, 0), markers=marks,
                              velocity=np.cross(turn, (0.5, 0, 0)), omega=turn)  # fmt: skip
-        mech.revolute(f"hinge {name}", shaft.marker("c"), bob.marker("pin"), axis=axis)
+        mech.revolute(f"hinge {name}", shaft, bob.marker("pin"), axis=axis)
         mech.rotational_spring(f"coil {name}", f"hinge {name}", stiffness=k)
     return mech
 
@@ -184,13 +175,11 @@ def test_a_mechanism_as_a_whole_takes_its_equilibrium_at_each_speed():
     """
     k, m, rest, J = 200.0, 0.5, 0.4, 0.3
     mech = Mechanism(gravity=(0, 0, 0))
-    slot = mech.add_rigid("slot", mass=1.0, inertia=(J, J, J), at=(0, 0, 0),
-                          markers={"c": (0, 0, 0)})  # fmt: skip
-    ball = mech.add_rigid("ball", mass=m, inertia=(1e-6,) * 3, at=(rest, 0, 0),
-                          markers={"c": (0, 0, 0)})  # fmt: skip
-    mech.revolute("axle", mech.ground.marker((0, 0, 0)), slot.marker("c"), axis=Z)
-    mech.prismatic("groove", slot.marker("c"), ball.marker("c"), axis=X)
-    mech.spring_damper("rope", slot.marker("c"), ball.marker("c"), stiffness=k)
+    slot = mech.add_rigid("slot", mass=1.0, inertia=(J, J, J), at=ORIGIN).marker(ORIGIN)
+    ball = mech.add_rigid("ball", mass=m, inertia=(1e-6,) * 3, at=(rest, 0, 0)).marker(ORIGIN)
+    mech.revolute("axle", mech.ground.marker(ORIGIN), slot, axis=Z)
+    mech.prismatic("groove", slot, ball, axis=X)
+    mech.spring_damper("rope", slot, ball, stiffness=k)
     speeds = np.array([2.0, 7.0, 12.0])
     r = k * rest / (k - m * speeds**2)
     for speed, radius in zip(speeds, r, strict=True):

@@ -86,11 +86,6 @@ def test_ground_resonance_has_the_rates_of_coleman_and_feingold(n, speed, dampin
     assert small.stable == (expected.real.max() < 1e-9)
 
 
-def test_some_speed_of_ground_resonance_is_unstable():
-    assert coleman_feingold(3, 26.0).real.max() > 0.1
-    assert coleman_feingold(3, 5.0).real.max() < 1e-9
-
-
 def test_ground_resonance_grows_as_fast_in_time():
     """Blades pushed a little in their plane: the nacelle sways more and more."""
     speed = 26.0
@@ -203,23 +198,17 @@ def test_spins_that_make_no_sense_are_refused(build, spin, message):
     [
         (blades(2), "3 or more"),
         ("blade", "3 or more"),
-        (["blade 0", "blade 1", "blade 3"], "no body 'blade 3'"),
+        (["blade 0", "blade 1", "blade 9"], "no body 'blade 9'"),
         (["blade 0", "blade 1", "blade 1"], "listed once"),
         (["blade 0", "blade 1", "hub"], "alike"),
         ([["blade 0", "hub"], ["blade 1"], ["blade 2"]], "alike"),
+        ([f"blade {k}" for k in (0, 2, 1, 3)], "does not stand"),  # across instead of around
     ],
 )
 def test_blades_that_are_none_are_refused(named, message):
-    mech, state = turning(3, 5.0, hinge="lag")
+    mech, state = turning(4, 5.0, hinge="lag")
     with pytest.raises(ConfigError, match=message):
         rom.linearize(mech, state, blades=named)
-
-
-def test_blades_out_of_order_are_refused():
-    """Four named across instead of around stand by half a turn."""
-    mech, state = turning(4, 5.0, hinge="lag")
-    with pytest.raises(ConfigError, match="does not stand"):
-        rom.linearize(mech, state, blades=[f"blade {k}" for k in (0, 2, 1, 3)])
 
 
 def test_the_order_of_blades_may_be_either_sense():

@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 
 import rom
 from cases.mbs.mechanisms import random_body
-from rom.components import cosserat
+from cases.mbs.parts import held_rod, on_hinge
 from rom.errors import ConfigError
 
 GRAVITY, MASS, LENGTH, BENDING = 9.81, 3.0, 2.0, 50.0
@@ -15,9 +15,7 @@ GRAVITY, MASS, LENGTH, BENDING = 9.81, 3.0, 2.0, 50.0
 def cantilever(n=80):
     """A rod along z, clamped at its start, with a small force across at its tip."""
     section = {"stretch": 1e6, "bend": BENDING, "mass": 0.1, "inertia": (1e-4, 1e-4, 2e-4)}
-    mech = rom.Mechanism(gravity=(0, 0, 0))
-    rod = mech.add_nonlinear("rod", cosserat.body(cosserat.straight(LENGTH, n, **section)))
-    mech.fixed("clamp", mech.ground.marker((0, 0, 0)), rod.marker("start"))
+    mech, rod = held_rod(n, length=LENGTH, **section)
     mech.force("load", rod.marker("end"), (0.05, 0, 0))
     return mech
 
@@ -33,7 +31,7 @@ def test_a_cantilever_bends_by_its_closed_form():
     bent = 0.05 * z**2 * (3 * LENGTH - z) / (6 * BENDING)
     assert_allclose(points[0, :, 0], bent, atol=2e-3 * bent.max())
     assert_allclose(rest.position("rod", -1), end, rtol=0)
-    assert_allclose(rest.reaction("clamp")[0, 0], -0.05, rtol=1e-6)
+    assert_allclose(rest.reaction("hook")[0, 0], -0.05, rtol=1e-6)
     slope = rest.axes("rod", "end")[0] @ rest.axes("rod", "start")[0].T @ [0, 0, 1]
     assert slope[0] == pytest.approx(0.05 * LENGTH**2 / (2 * BENDING), rel=2e-2)
     strain = 0.5 * 0.05 * end[0, 0]  # Clapeyron
@@ -54,14 +52,12 @@ def test_points_of_a_rod_move_as_their_frames():
 
 def test_a_body_at_rest_weighs_on_its_pin():
     mech = rom.Mechanism(gravity=(0, 0, -GRAVITY))
-    body = mech.add_rigid("bob", mass=MASS, inertia=(1, 1, 1), at=(0.3, 0, -0.4),
-                          markers={"eye": (-0.3, 0, 0.4)})  # fmt: skip
-    mech.revolute("pin", mech.ground.marker((0, 0, 0)), body.marker("eye"), axis=(0, 1, 0))
+    on_hinge(mech, (0.3, 0, -0.4), mass=MASS, inertia=(1, 1, 1))
     rest = rom.snapshot(mech, rom.equilibrium(mech))
     assert_allclose(rest.position("bob"), [[0, 0, -0.5]], atol=1e-9)
-    assert_allclose(rest.reaction("pin"), [[0, 0, MASS * GRAVITY, 0, 0, 0]], atol=1e-6)
-    assert_allclose(rest.joint("pin").angle, np.arctan2(0.3, 0.4), rtol=1e-9)
-    assert_allclose(rest.interface_loads("bob")["eye"], rest.reaction("pin"), atol=1e-9)
+    assert_allclose(rest.reaction("hinge"), [[0, 0, MASS * GRAVITY, 0, 0, 0]], atol=1e-6)
+    assert_allclose(rest.joint("hinge").angle, np.arctan2(0.3, 0.4), rtol=1e-9)
+    assert_allclose(rest.interface_loads("bob")["pin"], rest.reaction("hinge"), atol=1e-9)
     assert rest.at(0.0) is rest
     with pytest.raises(ConfigError, match=r"t = 1 s must be within the motion from 0 s to 0 s"):
         rest.at(1.0)

@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.linalg import null_space
 
-from cases.mbs.mechanisms import prepared, random_body, simulate_quietly, slider_crank
+from cases.mbs.mechanisms import prepared, random_body, simulate_quietly
 from rom.errors import ConfigError, ModelError, RomWarning
 from rom.mbs.equations.equations import linearize_constraints
 from rom.mbs.integrate.simulation import simulate
@@ -154,40 +154,6 @@ def coil():
     mech.revolute("axle", mech.ground.marker((0, 0, 0)), wheel.marker((0, 0, 0)), axis=Z)
     mech.rotational_spring("coil", "axle", stiffness=2.0)
     return mech
-
-
-def swing():
-    """A flexible body on a ball joint."""
-    mech = Mechanism()
-    shapes, omega = random_body(np.random.default_rng(3)), (1.0, 2.0, 3.0)
-    start = np.cross(shapes.markers["a"].point, omega)
-    body = mech.add_flexible("one", shapes, omega=omega, velocity=start)
-    place = mech.design_point(body.marker("a"))
-    mech.spherical("hook", mech.ground.marker(place), body.marker("a"))
-    return mech
-
-
-@pytest.mark.parametrize(
-    ("build", "options", "tolerance"),
-    [
-        (slider_crank, {"tolerance": 1e-12}, 1e-12),
-        (coil, {"tolerance": 1e-12}, 1e-12),
-        (swing, {"tolerance": 1e-12}, 1e-12),
-        (swing, {"method": "dop853"}, 2e-11),
-    ],
-)
-def test_a_run_in_two_pieces_is_the_run_in_one(build, options, tolerance):
-    """Both pieces take the same steps; Newton and DOP853 differ by their tolerances."""
-    whole = simulate_quietly(build(), t_end=0.4, dt=1e-3, **options)
-    mech = build()
-    first = simulate_quietly(mech, t_end=0.2, dt=1e-3, **options)
-    second = simulate_quietly(mech, t_end=0.4, dt=1e-3, state=first.final, **options)
-    assert_allclose(second.t, whole.t[200:], atol=1e-14)
-    for name, share in (("q", 1.0), ("v", 100.0)):
-        wanted = getattr(whole, name)[200:]
-        limit = tolerance * share * np.abs(wanted).max()
-        assert_allclose(getattr(second, name), wanted, atol=limit)
-    assert_allclose(second.base, whole.base[200:], atol=1e-10)
 
 
 @pytest.mark.parametrize("build", [hinge_and_ball, coil])

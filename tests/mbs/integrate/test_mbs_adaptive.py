@@ -7,7 +7,6 @@ from scipy.integrate import solve_ivp
 from scipy.special import ellipj, ellipk
 
 import rom
-from benchmarks.models import rigid_chain
 from cases.long import few
 from cases.mbs.mechanisms import simulate_quietly, slider_crank
 from cases.mbs.motions import (
@@ -15,6 +14,7 @@ from cases.mbs.motions import (
     TOP,
     G,
     falling,
+    four_links,
     free_crank,
     heavy_top,
     pendulum,
@@ -72,11 +72,6 @@ def test_a_heavy_top_keeps_energy_and_momenta_to_the_tolerance(method):
     assert sol.statistics["steps"] > 20_000
 
 
-def chain():
-    """Four links, whose equations are eliminated by blocks."""
-    return rigid_chain(4)
-
-
 def calls_of(monkeypatch, build, **options):
     """The motion, and how often compiled code was called."""
     calls, take = [], adaptive_step.control.take_steps
@@ -110,7 +105,7 @@ def test_one_call_of_compiled_code_takes_many_steps(method, build, t_end, rtol, 
         (slider_crank, 0.03, 1e-4),
         (wound_drive, 0.03, 1e-4),
         (swing, 0.05, 1e-3),
-        (chain, 0.3, 1e-3),
+        (four_links, 0.3, 1e-3),
     ],
 )
 def test_how_many_steps_a_call_takes_changes_no_bit(build, t_end, rtol, options, monkeypatch):

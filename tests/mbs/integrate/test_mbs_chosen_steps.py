@@ -5,11 +5,10 @@ import pytest
 from numpy.testing import assert_allclose
 
 import rom
-from benchmarks.models import rigid_chain
 from cases.beam import stiffened_beam
 from cases.long import few
 from cases.mbs.mechanisms import simeon_crank, simulate_quietly
-from cases.mbs.motions import heavy_top, pendulum
+from cases.mbs.motions import four_links, heavy_top, hub_and_panel, pendulum
 from rom import rotation
 from rom.components import cosserat
 from rom.mbs.mechanism import Mechanism
@@ -32,17 +31,6 @@ def four_bar():
     foot = mech.ground.marker(1.2 * X + 0.8 * fold @ X)
     mech.revolute("foot", foot, two.marker("tip"), axis=Z)
     mech.drive("motor", "main", lambda t: 6 * t)
-    return mech
-
-
-def hub_and_panel():
-    mech = Mechanism(gravity=(0, 0, 0))
-    panel = stiffened_beam(2.0, EI=300.0, rhoA=2.0, n_modes=12, stiffened=False)
-    hub = mech.add_rigid("hub", mass=2, inertia=(0.1,) * 3, at=(0, 0, 0), omega=(0, 0, 10.0),
-                         markers={"side": (0.3, 0, 0)})  # fmt: skip
-    wing = mech.add_flexible("panel", panel, at=(0.3, 0, 0), velocity=(0, 3, 0), omega=(0, 0, 3))
-    mech.revolute("hinge", hub.marker("side"), wing.marker("root"), axis=Z)
-    mech.rotational_spring("coil", "hinge", stiffness=200.0)
     return mech
 
 
@@ -75,7 +63,7 @@ MECHANISMS = {
     "arm": (arm, 1.0, 40_000),
     "rod of 10": (lambda: rod(10), 0.5, 20_000),
     "pendulum": (pendulum, 2.0, 40_000),
-    "chain": (lambda: rigid_chain(4), 1.5, 80_000),
+    "chain": (four_links, 1.5, 80_000),
     "top": (heavy_top, 0.5, 80_000),
     "crank": (simeon_crank, 0.1, 40_000),
     "four-bar": (four_bar, 1.0, 80_000),

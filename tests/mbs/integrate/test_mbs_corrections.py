@@ -6,8 +6,8 @@ from numpy.testing import assert_allclose
 
 import rom
 from benchmarks.units import as_mechanism
+from cases.gear_unit import rigid_unit
 from cases.long import few
-from cases.mbs.geared_rotors import rigid_unit
 from rom.errors import SolverError
 from rom.mbs import Impact
 

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 from numba import njit
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_allclose
 
 import rom
 from cases.mbs.mechanisms import simulate_quietly, slider_crank
-from cases.mbs.motions import PARTS, errors, free_crank, heavy_top, swing, wound_drive
+from cases.mbs.motions import errors, free_crank, heavy_top, swing
 from rom import rotation
 from rom.errors import ConfigError
 from rom.mbs.equations.equations import linearize_constraints
@@ -109,27 +109,6 @@ def test_energy_of_a_flexible_body_agrees_with_the_reference():
         sol = simulate_quietly(swing(), t_end=0.2, dt=1e-3, save_every=20, **options)
         assert np.abs(sol.q - exact.q).max() < tolerance * np.abs(exact.q).max()
         assert np.abs(sol.energy.balance).max() < 5e-3 * np.ptp(sol.energy.kinetic)
-
-
-@pytest.mark.parametrize("options", [STABILISED[0], BDF[0], BDF[3]], ids=str)
-@pytest.mark.parametrize(("build", "dt"), [(swing, 1e-2), (slider_crank, 1e-3)])
-def test_a_run_goes_on_with_the_same_bits(build, dt, options, tmp_path):
-    """Drives need their rates for it: differences end where a run ends."""
-    whole = simulate_quietly(build(), t_end=40 * dt, dt=dt, **options)
-    state = simulate_quietly(build(), t_end=13 * dt, dt=dt, **options).final
-    state = rom.load_state(rom.save_state(state, tmp_path / "half.state.npz"))
-    second = simulate_quietly(build(), t_end=40 * dt, dt=dt, state=state, **options)
-    for name in PARTS:
-        assert_array_equal(getattr(second, name), getattr(whole, name)[13:], err_msg=name)
-
-
-def test_saving_less_often_keeps_the_same_instants():
-    every = simulate_quietly(wound_drive(), t_end=0.03, dt=1e-3, method="bdf", order=5)
-    third = simulate_quietly(
-        wound_drive(), t_end=0.03, dt=1e-3, method="bdf", order=5, save_every=3
-    )
-    assert_array_equal(third.q, every.q[::3])
-    assert_array_equal(third.t, every.t[::3])
 
 
 def test_an_event_can_end_the_first_steps():

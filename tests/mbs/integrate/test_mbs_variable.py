@@ -8,14 +8,20 @@ from numba import njit
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import solve_ivp
 
-from benchmarks.models import rigid_chain
-from cases.mbs.mechanisms import simulate_quietly, slider_crank
-from cases.mbs.motions import G, errors, falling, free_crank, heavy_top, pendulum
+from cases.mbs.mechanisms import prepared, random_body, simulate_quietly, slider_crank
+from cases.mbs.motions import G, errors, falling, four_links, free_crank, heavy_top, pendulum
 from rom import rotation
 from rom.errors import SolverError
 from rom.mbs.equations.packing import pack
 from rom.mbs.integrate.adaptive_step import _Run
-from rom.mbs.integrate.generalized_alpha import HAS_FACTOR, STEPS, bdf_coefficients
+from rom.mbs.integrate.generalized_alpha import (
+    HAS_FACTOR,
+    STEPS,
+    Step,
+    bdf_coefficients,
+    coefficients,
+    turn_columns,
+)
 from rom.mbs.integrate.simulation import simulate
 from rom.mbs.integrate.step_control import LENGTH, increment
 from rom.mbs.integrate.step_memory import across, shift_ahead
@@ -23,11 +29,6 @@ from rom.mbs.kernels.work import workspace
 from rom.mbs.mechanism import Mechanism
 
 IMPLICIT = ["generalized-alpha", "bdf"]
-
-
-def chain():
-    """Four links, whose equations are eliminated by blocks."""
-    return rigid_chain(4)
 
 
 class End(NamedTuple):
@@ -112,7 +113,9 @@ def test_the_increment_of_a_step_is_known_to_fourth_order():
     assert (ratio > 13).all()
 
 
-@pytest.mark.parametrize(("build", "t_end"), [(pendulum, 0.3), (heavy_top, 0.02), (chain, 0.3)])
+@pytest.mark.parametrize(
+    ("build", "t_end"), [(pendulum, 0.3), (heavy_top, 0.02), (four_links, 0.3)]
+)
 def test_another_length_of_steps_prepares_the_method_for_it(build, t_end, monkeypatch):
     """Acceleration a + (alpha_m - alpha_f) h da/dt, velocity ahead across constraints only."""
     seen = []
@@ -233,3 +236,44 @@ def test_a_first_step_that_is_far_too_long_is_shortened_until_it_fits(method):
     exact = x0 * np.exp(-D * w * t) * (np.cos(fast * t) + D * w / fast * np.sin(fast * t))
     assert_allclose(sol.position("mass")[:, 0] - 1.0, exact, atol=1e-6 * x0)
     assert sol.statistics["shortest"] < 1e-12 * day
+
+
+@njit
+def turned_columns(s, W, T):
+    turn_columns(s, W, T, 1)
+
+
+def change(psi, delta):
+    """Rotation in the body frame from exp(psi) to exp(psi + delta)."""
+    return rotation.log(rotation.multiply(rotation.exp(-psi), rotation.exp(psi + delta)))
+
+
+def hung():
+    """A flexible body on a ball joint."""
+    mech = Mechanism()
+    one = mech.add_flexible("one", random_body(np.random.default_rng(5)))
+    mech.spherical("hook", mech.ground.marker(mech.design_point(one.marker("a"))), one.marker("a"))
+    return prepared(mech)
+
+
+def test_columns_of_rotations_count_in_increments_of_the_rotation_vector():
+    """A wrong tangent only makes Newton slower: no motion would tell."""
+    rng = np.random.default_rng(6)
+    packed, W = hung()
+    n, m = packed.v.size, W.value.size
+    psi = rng.normal(size=n)
+    vectors = [np.zeros(k) for k in (packed.q.size, n, n, n, m, packed.q.size, n, n, m)]
+    counts = np.zeros(11, dtype=np.int64)
+    constants = (np.zeros(4), coefficients(1e-3, 0.9), np.zeros(3))
+    history = np.zeros((2, 1, n)), np.zeros(n)
+    T = Step(*vectors, psi, np.zeros(3), np.zeros(3), counts, *constants, *history)
+    W.Kt[:], W.UG[:] = rng.normal(size=(n, n)), rng.normal(size=(m, n))
+    W.UGT[:] = W.UG
+    tangent, step = np.eye(n), 1e-6
+    for j, e in enumerate(np.eye(3)):
+        both = change(psi[3:6], step * e) - change(psi[3:6], -step * e)
+        tangent[3:6, 3 + j] = both / (2 * step)
+    wanted, border = W.Kt @ tangent, W.UG[0] @ tangent
+    turned_columns(packed.system, W, T)
+    assert_allclose(W.S, wanted, atol=1e-8)
+    assert_allclose(W.UGT[0], border, atol=1e-8)

@@ -78,20 +78,6 @@ def test_constraint_stiffness_is_the_derivative_of_the_constraint_forces(kind):
     check_tangents(packed, W, random_state(rng, packed), np.eye(packed.v.size), 1e-6)
 
 
-def test_a_nut_falls_on_a_steep_screw_with_the_acceleration_of_the_closed_form():
-    """Weight m g lowers m and turns J = I (2 pi / p)^2: a = g / (1 + J / m (2 pi / p)^2)."""
-    m, J, pitch = 2.0, 5e-3, 0.25
-    mech = Mechanism()
-    nut = mech.add_rigid("nut", mass=m, inertia=(J, J, J), at=(0, 0, 0), markers={"o": (0, 0, 0)})
-    mech.screw("thread", mech.ground.marker((0, 0, 0)), nut.marker("o"), axis=Z, pitch=pitch)
-    sol = simulate(mech, t_end=1.0, dt=1e-3)
-    a = 9.81 / (1 + J / m * (2 * np.pi / pitch) ** 2)
-    assert_allclose(sol.position("nut")[:, 2], -0.5 * a * sol.t**2, atol=1e-9)
-    assert_allclose(sol.omega("nut")[:, 2], -2 * np.pi / pitch * a * sol.t, atol=1e-8)
-    assert sol.omega("nut")[-1, 2] / 2 * sol.t[-1] < -2 * np.pi  # more than a turn
-    assert audit(sol).ok, audit(sol)
-
-
 def gear_pair(ratio, torque, speed=0.0):
     """Two wheels on parallel axles a metre apart, the first one driven by a torque."""
     mech = Mechanism(gravity=(0, 0, 0))
@@ -171,6 +157,8 @@ def test_a_screw_turns_torque_into_thrust(pitch):
     turns = 0.5 * alpha * sol.t**2 / (2 * np.pi)
     assert_allclose(sol.position("bolt")[:, 0], pitch * turns, atol=1e-9)
     assert_allclose(sol.reaction("thread")[-1, 0], m * pitch / (2 * np.pi) * alpha, rtol=1e-7)
+    assert abs(turns[-1]) > 10
+    assert audit(sol).ok, audit(sol)
 
 
 def test_a_gear_run_in_two_pieces_is_the_run_in_one():
@@ -300,35 +288,6 @@ def test_a_thrown_hoop_wobbles_without_loss_and_touches_the_plane():
     assert_allclose(sol.position("hoop")[:, 2], 0.3 * np.sqrt(1 - s[:, 2] ** 2), atol=1e-9)
     slow = simulate(mech, t_end=2.0, dt=1e-3, assemble=True)
     assert_allclose(slow.position("hoop")[-1], sol.position("hoop")[-1], atol=1e-4)
-
-
-def test_planar_joint_and_points_on_lines_stay_where_they_should():
-    """A flexible body thrown with a rigid one."""
-    rng = np.random.default_rng(17)
-    for kind in ("planar", "line", "plane"):
-        mech = Mechanism()
-        one = mech.add_flexible("one", random_body(rng), omega=(2.0, -1.0, 3.0))
-        place = mech.design_point(one.marker("b"))
-        two = mech.add_rigid("two", mass=2.0, inertia=(1.0, 1.5, 2.0), at=place,
-                             velocity=(1.0, 0.5, -0.5), omega=(-1.0, 2.0, 1.0),
-                             markers={"a": (0, 0, 0)})  # fmt: skip
-        a, b = one.marker("b"), two.marker("a")
-        if kind == "planar":
-            mech.planar("j", a, b, normal=AXIS)
-        elif kind == "line":
-            mech.point_on_line("j", a, b, axis=AXIS)
-        else:
-            mech.point_on_plane("j", a, b, normal=AXIS)
-        sol = simulate(mech, t_end=0.4, dt=1e-3, assemble=True)
-        E1, E2 = sol.axes("one", "b"), sol.axes("two", "a")
-        gap = np.einsum("tba,tb->ta", E1, sol.position("two", "a") - sol.position("one", "b"))
-        axis = E1[0].T @ AXIS
-        off = np.cross(gap, axis) if kind == "line" else gap @ axis
-        assert np.abs(off).max() < 1e-10
-        assert np.abs(gap).max() > 1e-2
-        turned = np.linalg.norm(E1 @ axis - E2 @ (E2[0].T @ AXIS), axis=1)
-        assert (turned.max() < 1e-9) == (kind == "planar")
-        assert np.abs(sol.energy.balance).max() < 1e-4 * np.ptp(sol.energy.potential)
 
 
 WRONG = {

@@ -1,0 +1,1 @@
+"""Cases of components that several files test."""

@@ -1,0 +1,72 @@
+"""Families of steel blocks to be updated, and their tests with noise."""
+
+import numpy as np
+
+import rom
+from cases.solid import STEEL, composite
+from rom.components.updating.family_model import Parts, family_model
+from rom.components.updating.frf_data import noisy
+from rom.components.updating.normal_equations import responses_at
+from rom.updating import JointSpring, Responses
+
+BEAM = (1.0, 0.1, 0.08)
+KINDS = {"root": "rbe2", "tip": "rbe2"}
+BOLTS = JointSpring(("frame", "tip"), ("arm", "root"), (4e8, 4e8, 4e8, 2e5, 1e5, 1e5), 0.1, 10.0)
+PARAMETERS = {
+    "E_inner": rom.YoungsModulus("inner", 0.4, 2.5),
+    "E_outer": rom.YoungsModulus("outer", 0.4, 2.5),
+    "rho_outer": rom.Density("outer", 0.5, 2.0),
+}
+
+
+def family_of(parameters, cells, n_modes, regions=("inner", "outer"), *, size=BEAM, **options):
+    """Family of a block whose length its regions share, uncertified.
+
+    Args:
+        parameters: {name: parameter}.
+        cells: (3,) numbers of bricks.
+        n_modes: of the fixed interfaces.
+        regions: names, along x.
+        size: of the block [m].
+        options: ``origin`` of the block [m], and more as of `rom.reduce_parametric`.
+    """
+    origin = options.pop("origin", (0.0, 0.0, 0.0))
+    parts = dict.fromkeys(regions, STEEL)
+    model = composite(
+        parts, lambda c: regions[len(regions) * c[0] // cells[0]], size, cells, origin
+    )
+    options = {"interfaces": KINDS, "certify": False} | options
+    method = rom.CraigBampton(n_modes)
+    return rom.reduce_parametric(model, parameters=parameters, method=method, **options)
+
+
+def halves(n_modes=12):
+    """Families of the two halves of a beam, "frame" before "arm", each with its modulus."""
+    return {
+        name: family_of(
+            {"E": rom.YoungsModulus(name, 0.3, 3.0)}, (4, 1, 1), n_modes, (name,),
+            size=(0.5, 0.1, 0.08), origin=(x, 0, 0),
+        )
+        for name, x in (("frame", 0.0), ("arm", 0.5))
+    }  # fmt: skip
+
+
+def model_of(family, channels, fixed, attached=None, candidates=None):
+    """The equations of a family, or an assembly of some, at its sensors and inputs."""
+    bodies = Parts.of(family).bodies
+    bodies = bodies if len(bodies) > 1 or "" not in bodies else bodies[""]
+    rows = [side.rows(bodies, "channel") for side in channels]
+    return family_model(family, rows, attached or {}, candidates or {}, fixed)
+
+
+def exact_responses(model, true, lines, zeta=0.02):
+    """(n_f, n_s, n_e) responses at factors {name: value} and one damping ratio."""
+    x = np.log([true.get(name, 1.0) for name in model.names])
+    return responses_at(model, x, np.array([zeta]), 2 * np.pi * np.asarray(lines))
+
+
+def noisy_test(family, true, channels, lines, *, level, averages, seed=0, **model):
+    """A test whose noise has a level; of so many averages, its coherence says so."""
+    H = exact_responses(model_of(family, channels, **model), true, lines)
+    H = noisy(H, level, np.random.default_rng(seed))
+    return Responses(lines, H, *channels, 1 / (1 + averages * level**2), averages)

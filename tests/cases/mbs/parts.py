@@ -1,0 +1,55 @@
+"""What many mechanisms begin with: a body on a guide or a hinge, a rod held at its start."""
+
+import numpy as np
+
+import rom
+from rom.components.cosserat import body, straight
+
+ORIGIN = (0.0, 0.0, 0.0)
+X, Y, Z = np.eye(3)
+
+
+def on_guide(mech, name="mass", *, mass=1.0, at=ORIGIN, axis=X, base=ORIGIN, guide="guide", **more):
+    """Centre of a body that slides along an axis, on the ground at a place or on a marker."""
+    centre = mech.add_rigid(name, mass=mass, inertia=(1, 1, 1), at=at, **more).marker(ORIGIN)
+    base = mech.ground.marker(base) if np.ndim(base) else base
+    mech.prismatic(guide, base, centre, axis=axis)
+    return centre
+
+
+def on_hinge(mech, at, name="bob", *, mass=2.0, inertia, axis=Y, pivot=None, **more):
+    """A body on a hinge through the origin: its "pin" there, "c" its centre of mass."""
+    markers = {"pin": -np.asarray(at), "c": ORIGIN}
+    part = mech.add_rigid(name, mass=mass, inertia=inertia, at=at, markers=markers, **more)
+    mech.revolute("hinge", pivot or mech.ground.marker(ORIGIN), part.marker("pin"), axis=axis)
+    return part
+
+
+def below(angle, length=1.0):
+    """A place at an angle from straight below the origin, about y."""
+    return length * np.array([np.sin(angle), 0, -np.cos(angle)])
+
+
+def held_rod(n, *, joint="fixed", gravity=ORIGIN, on=None, axis=None, length=1.0, **section):
+    """A mechanism with an upright rod, its start joined to the ground or to a marker.
+
+    Args:
+        n: number of pieces.
+        joint: kind of the joint, or nothing.
+        gravity: of the mechanism.
+        on: (mechanism, marker) that it stands on instead.
+        axis: of the joint, where it has one.
+        length: of the rod [m].
+        section: as of `straight`.
+
+    Returns:
+        Mechanism and rod.
+    """
+    mech, base = on or (rom.Mechanism(gravity=gravity), None)
+    rod = mech.add_nonlinear("rod", body(straight(length, n, **section)))
+    if joint:
+        about = {} if axis is None else {"axis": axis}
+        getattr(mech, joint)(
+            "hook", base or mech.ground.marker(ORIGIN), rod.marker("start"), **about
+        )
+    return mech, rod
