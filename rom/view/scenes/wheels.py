@@ -145,10 +145,8 @@ def _around(
     points = np.vstack([models[j].points[n] @ R.T
                         for j, n, R in zip(chosen, nodes, turns, strict=True)])  # fmt: skip
     every = np.vstack([t + start for t, start in zip(triangles, starts, strict=True)])
-    # one of each group of points in the same place; away from round coordinates
-    grid = np.round(points / (COINCIDENT_RTOL * np.ptp(points)) + 0.381966)
-    _, first, place = np.unique(grid, axis=0, return_index=True, return_inverse=True)
-    return Around(nodes, first, points[first], place.ravel()[every])
+    first, whole = _joined(points, every)
+    return Around(nodes, first, points[first], whole)
 
 
 def _outside(model: FEModel, hidden: tuple[str, ...]) -> tuple[Index, Index]:
@@ -159,3 +157,12 @@ def _outside(model: FEModel, hidden: tuple[str, ...]) -> tuple[Index, Index]:
         inside |= np.isin(surface.nodes[surface.triangles], model.interfaces[name].nodes).all(1)
     used, triangles = np.unique(surface.triangles[~inside], return_inverse=True)
     return surface.nodes[used], triangles.reshape(-1, 3)
+
+
+def _joined(points: Array, triangles: Index) -> tuple[Index, Index]:
+    """One of each group of points in the same place, and the triangles between these."""
+    grid = np.round(
+        points / (COINCIDENT_RTOL * np.ptp(points)) + 0.381966
+    )  # away from round coordinates
+    _, first, place = np.unique(grid, axis=0, return_index=True, return_inverse=True)
+    return first, place.ravel()[triangles]
