@@ -418,8 +418,9 @@ def common_basis(test: Complex, model: Complex, rank: int) -> Array:
     return np.linalg.svd(R, full_matrices=False)[2][:rank].T
 
 
-def blocks(n: int, size: int = BLOCK_LINES) -> Iterator[slice]:
+def blocks(n: int, size: int = 0) -> Iterator[slice]:
     """Lines (n,) piece by piece, so that memory does not grow with their number."""
+    size = size or BLOCK_LINES
     return (slice(first, first + size) for first in range(0, n, size))
 
 
