@@ -13,9 +13,7 @@ MAX_INT16 = np.iinfo(np.int16).max
 TYPES = {"int16": "<i2", "uint16": "<u2", "uint32": "<u4", "float32": "<f4"}
 CELL_GROWTH = 1.1
 MOST_COLLAPSED = 10  # times the wanted number of points: more are put together in cells first
-EVENNESS_RATIO = (
-    0.01  # weight of the squared way of a point against its squared distance from planes
-)
+EVENNESS_RATIO = 0.01  # weight of the squared way of a point against its distance from planes
 LEAST_HEIGHT = 0.02  # of a triangle that changes, over its longer side
 LEAST_COSINE = 0.2  # between the normals of a triangle before and after
 

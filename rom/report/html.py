@@ -45,12 +45,8 @@ def table(header: Sequence[str], rows: Iterable[Sequence[Any]], caption: str) ->
     lines = []
     for row in rows:
         one_each(f"cells of the row {row}", len(row), "columns of the header", len(header))
-        lines.append("<tr>" + "".join(f"<td>{_cell(value)}</td>" for value in row) + "</tr>")
-    head = "".join(f"<th>{html.escape(name)}</th>" for name in header)
-    return (
-        f"<table><caption>{html.escape(caption)}</caption><thead><tr>{head}</tr></thead>"
-        f"<tbody>{''.join(lines)}</tbody></table>"
-    )
+        lines.append("".join(f"<td>{_cell(value)}</td>" for value in row))
+    return _table(header, lines, caption)
 
 
 def checks(report: Report, caption: str) -> str:
@@ -59,12 +55,19 @@ def checks(report: Report, caption: str) -> str:
     for row in report.rows:
         verdict = "ok" if row.ok else "failed"
         cells = f"<td>{html.escape(row.quantity)}</td><td>{_cell(row.value)}</td>"
-        cells += f"<td>{html.escape(row.limit)}</td><td class='{verdict}'>{verdict}</td>"
-        lines.append(f"<tr>{cells}</tr>")
-    head = "<tr><th>quantity</th><th>value</th><th>limit</th><th></th></tr>"
+        lines.append(
+            f"{cells}<td>{html.escape(row.limit)}</td><td class='{verdict}'>{verdict}</td>"
+        )
+    return _table(("quantity", "value", "limit", ""), lines, caption)
+
+
+def _table(header: Sequence[str], lines: Iterable[str], caption: str) -> str:
+    """A table of lines of cells."""
+    head = "".join(f"<th>{html.escape(name)}</th>" for name in header)
+    rows = "".join(f"<tr>{cells}</tr>" for cells in lines)
     return (
-        f"<table><caption>{html.escape(caption)}</caption><thead>{head}</thead>"
-        f"<tbody>{''.join(lines)}</tbody></table>"
+        f"<table><caption>{html.escape(caption)}</caption><thead><tr>{head}</tr></thead>"
+        f"<tbody>{rows}</tbody></table>"
     )
 
 
@@ -111,7 +114,8 @@ def write_report(sections: dict[str, Sequence[str]], path: str | Path, title: st
     body = "".join(
         f"<h2>{html.escape(heading)}</h2>{''.join(blocks)}" for heading, blocks in sections.items()
     )
-    scripts = _scripts() if "<figure class='scene" in body else []
+    turning = "<figure class='scene" in body
+    scripts = [(SOURCE_FOLDER / name).read_text("utf-8") for name in SCRIPTS if turning]
     name = html.escape(title)
     text = (
         f"<!DOCTYPE html><html lang='en'><head><meta charset='utf-8'><title>{name}</title>"
@@ -123,11 +127,6 @@ def write_report(sections: dict[str, Sequence[str]], path: str | Path, title: st
     )
     write_whole(path, lambda file: file.write(text.encode("utf-8")))
     return path
-
-
-def _scripts() -> list[str]:
-    """What draws the figures that turn."""
-    return [(SOURCE_FOLDER / name).read_text(encoding="utf-8") for name in SCRIPTS]
 
 
 def _policy(scripts: Sequence[str]) -> str:

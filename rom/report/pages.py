@@ -21,7 +21,7 @@ from rom.process.stopwatch import (
     SOLUTION_PIECE,
 )
 from rom.report import html
-from rom.report.run import RECORD_FILE, SCENE_FILE, Run, run, versions
+from rom.report.run import RECORD_FILE, SCENE_FILE, Run, look_of, run, versions
 from rom.report.scene import SHAPE_BYTES, modes_scene, motion_scene, start_scene
 from rom.report.scene_file import read_scene
 from rom.report.viewer import MOTION_WORDS, START_WORDS, figure, modes_words
@@ -222,7 +222,7 @@ def _stages(stages: dict[str, dict[str, float]]) -> list[str]:
     notes = (FLOPS_NOTE, MISS_NOTE, RESIDUAL_NOTE)
     rows = [
         (stage, f"{found['seconds']:.2f}", *(_piece(found, name) for name in pieces),
-         f"{found['MB']:.0f}", *(_noted(found, name) for name in notes))
+         f"{found['MB']:.0f}", *(f"{found[name]:.1e}" if name in found else "" for name in notes))
         for stage, found in stages.items()
     ]  # fmt: skip
     header = ("stage", "seconds", *pieces, "memory [MB]", *notes)
@@ -232,10 +232,6 @@ def _stages(stages: dict[str, dict[str, float]]) -> list[str]:
         "brackets how often; the memory is the largest of that process so far."
     )
     return [html.table(header, rows, caption)] if rows else []
-
-
-def _noted(stage: dict[str, float], name: str) -> str:
-    return f"{stage[name]:.1e}" if name in stage else ""
 
 
 def _piece(stage: dict[str, float], name: str) -> str:
@@ -274,8 +270,7 @@ def of_mechanism(
         f"{len(mechanism.joints)} joints; gravity is {file.values['gravity']} m/s^2."
     )
 
-    look = {key: file.values["output"][key] for key in ("view", "up")
-            if key in file.values["output"]}  # fmt: skip
+    look = look_of(file)
 
     def draw(path: Path) -> None:
         from rom.view.scenes.mechanisms import start

@@ -117,32 +117,30 @@ class Run:
 
     def _draw(self, paths: list[Path]) -> None:
         out, solution = self.file.values["output"], self.solution
-        names = {path.name: path for path in paths}
-        look = {key: out[key] for key in ("view", "up") if key in out}
-        if "instants.png" in names:
-            from rom.view.scenes.film import instants
+        how = look_of(self.file) | {"magnify": out["magnify"]}
+        for path in paths:
+            if path.name == "curves.png":
+                self._curves(path)
+            elif path.name == "instants.png":
+                from rom.view.scenes.film import instants
 
-            how = look | {"magnify": out["magnify"]}
-            instants(solution.mechanism, solution, names["instants.png"], **how)
-        for path in (p for p in paths if p.suffix in (".gif", ".mp4")):
-            from rom.view.scenes.film import animate
+                instants(solution.mechanism, solution, path, **how)
+            elif path.suffix in (".gif", ".mp4"):
+                from rom.view.scenes.film import animate
 
-            how = look | {"magnify": out["magnify"]}
-            animate(solution.mechanism, solution, path, **how)
-        for path in (p for p in paths if p.suffix in (".glb", ".vtkhdf")):
-            from rom.view.scenes.animation_files import write_animation
+                animate(solution.mechanism, solution, path, **how)
+            elif path.suffix in (".glb", ".vtkhdf"):
+                from rom.view.scenes.animation_files import write_animation
 
-            write_animation(solution, path, magnify=out["magnify"], up=out.get("up"))
-        if "curves.png" in names:
-            self._curves(names["curves.png"])
+                write_animation(solution, path, magnify=out["magnify"], up=out.get("up"))
 
     def _scene(self, path: Path) -> None:
         from rom.report.scene import motion_scene
         from rom.report.scene_file import write_scene
 
-        out, title = self.file.values["output"], f"Motion of {self.file.name}"
-        look = {key: out[key] for key in ("view", "up") if key in out}
-        write_scene(motion_scene(self.solution, title=title, magnify=out["magnify"], **look), path)
+        title, magnify = f"Motion of {self.file.name}", self.file.values["output"]["magnify"]
+        look = look_of(self.file)
+        write_scene(motion_scene(self.solution, title=title, magnify=magnify, **look), path)
 
     def _curves(self, path: Path) -> None:
         from rom.view.figures.curves import history
@@ -169,6 +167,11 @@ def paths_of(file: MechanismFile, folder: Path) -> list[Path]:
     names += ["curves.png"] if out["plot"] else []
     names += [f"motion.{out['film']}"] if "film" in out else []
     return [folder / name for name in [*names, SCENE_FILE, RECORD_FILE]]
+
+
+def look_of(file: MechanismFile) -> dict[str, Any]:
+    """From where pictures of a mechanism file are seen, as far as it says."""
+    return {key: x for key, x in file.values["output"].items() if key in ("view", "up")}
 
 
 def happened(solution: "Solution") -> dict[str, list[float]]:

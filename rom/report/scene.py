@@ -16,7 +16,6 @@ from rom.body.records import Surface
 from rom.body.recovery import StressRecovery, von_mises
 from rom.errors import ConfigError
 from rom.model import Array, Index
-from rom.names import named, offered
 from rom.report.coarse import array, coarsened, corners, quantised_column, quantised_points
 from rom.rotation import matrix
 from rom.view.canvas.scene import aimed, sharp_edges
@@ -25,7 +24,7 @@ from rom.view.scenes.film import METAL_COLOURS, shades_of
 from rom.view.scenes.mechanisms import COLOURS
 from rom.view.scenes.mode_shapes import AMPLITUDE_RATIO, displacement
 from rom.view.scenes.places import placed
-from rom.view.scenes.rigid import bars, ends_of
+from rom.view.scenes.rigid import bars, check_bodies, ends_of
 
 if TYPE_CHECKING:
     from rom.body.flexible import FlexibleBody
@@ -94,7 +93,9 @@ def modes_scene(body: "FlexibleBody", *, size: int = SHAPE_BYTES) -> dict[str, A
     if surface is None:
         raise ConfigError(f"body {body.name!r} carries no surface; only meshed ones are drawn.")
     Q = np.array([mode["q"] for mode in found]).reshape(len(found), -1)
-    far = [float(np.abs(displacement(body, _motion(mode))).max()) for mode in found]
+    far = [
+        float(np.abs(displacement(body, np.r_[mode["rigid"], mode["q"]])).max()) for mode in found
+    ]
     kept = np.union1d(
         _felt(surface.shape, stress, Q, np.array(far)), np.arange(body.n_modes)[:N_COORDINATES]
     ).astype(int)
@@ -171,10 +172,7 @@ def start_scene(
 
 def _meshes(shapes: dict[str, Mesh], mechanism: "Mechanism") -> dict[str, Mesh]:
     """The shapes of bodies, if the mechanism has these and the triangles have their corners."""
-    if unknown := set(shapes) - set(mechanism.parts):
-        raise ConfigError(
-            f"shapes: no body {named(sorted(unknown))}; there are {offered(mechanism.parts)}."
-        )
+    check_bodies(mechanism, "shapes", shapes)
     found = {}
     for name, (points, triangles) in shapes.items():
         X, corner = np.asarray(points, dtype=float), np.asarray(triangles)
@@ -216,10 +214,6 @@ def _modes(body: "FlexibleBody") -> Iterator[dict[str, Any]]:
                 "group": support.capitalize() if not fixed else support,
                 "label": label, "rigid": V[:6, k], "q": V[6:, k],
             }  # fmt: skip
-
-
-def _motion(mode: dict[str, Any]) -> Array:
-    return np.concatenate([mode["rigid"], mode["q"]])
 
 
 def _felt(shapes: Array, stress: Array | None, Q: Array, far: Array) -> Index:
@@ -285,18 +279,13 @@ def _chunked(of: Callable[[Array], float], columns: Array, q: Array) -> Iterator
 
 def _limits(thing: Thing) -> dict[str, float]:
     """Largest displacement relative to the frame [m] and equivalent stress [Pa] of a motion."""
-    out = {"displacement": 0.0, "stress": 0.0}
-    if thing.shapes.size:
-        out["displacement"] = max(
-            _chunked(
-                lambda u: np.linalg.norm(u.reshape(-1, 3), axis=1).max(), thing.shapes, thing.q
-            )
-        )
-    if thing.stress is not None and thing.stress.size:
-        out["stress"] = max(
-            _chunked(lambda s: von_mises(s.reshape(-1, 6)).max(), thing.stress, thing.q)
-        )
-    return out
+    far = _chunked(lambda u: np.linalg.norm(u.reshape(-1, 3), axis=1).max(), thing.shapes, thing.q)
+    if thing.stress is None or not thing.stress.size:
+        high: Iterator[float] = iter(())
+    else:
+        high = _chunked(lambda s: von_mises(s.reshape(-1, 6)).max(), thing.stress, thing.q)
+    far = far if thing.shapes.size else iter(())
+    return {"displacement": max(far, default=0.0), "stress": max(high, default=0.0)}
 
 
 def _scene(title: str, things: Sequence[Thing], size: int, look: dict[str, Any]) -> dict[str, Any]:
@@ -327,9 +316,8 @@ def _view(seen: Array, view: Any, up: Any, gravity: Any) -> tuple[dict[str, Any]
         if np.linalg.norm(np.cross(toward, up)) < 0.05 * np.linalg.norm(up):  # seen from above
             up = None
     camera = aimed(seen, 1000, view=view, up=up, heights=(0.02, 50.0))
-    upright = np.eye(3)[np.argmax(np.abs(camera.up))] * np.sign(
-        camera.up[np.argmax(np.abs(camera.up))]
-    )
+    k = np.argmax(np.abs(camera.up))
+    upright = np.eye(3)[k] * np.sign(camera.up[k])
     if up is not None:
         upright = np.asarray(up, dtype=float) / np.linalg.norm(up)
     radius = float(np.linalg.norm(seen - camera.focus, axis=1).max()) or 1.0

@@ -7,7 +7,7 @@ import numpy as np
 
 from rom.view.canvas.scene import Actor
 from rom.view.scenes.connections import LINE_WIDTH
-from rom.view.scenes.ground import Scenery, at, lines
+from rom.view.scenes.ground import Scenery, lines
 from rom.view.scenes.places import Places
 
 
@@ -23,5 +23,4 @@ def _rack(places: Places, mesh: Any) -> Actor:
     normal, along, radius = mesh.axes[2], mesh.axes[3], float(mesh.pair.r[0])
     middle = -(mesh.pair.distance - radius) * np.cross(along, normal)
     points = middle + np.pi * radius * np.array([[-1.0], [1.0]]) * along
-    pose = at(places.point(mesh.j), places.pose(mesh.j.body)[1])
-    return lines((points, np.array([[0, 1]])), pose, width=LINE_WIDTH)
+    return lines((points, np.array([[0, 1]])), places.frame(mesh.j), width=LINE_WIDTH)

@@ -16,7 +16,6 @@ from rom.components.updating.estimate import update
 from rom.components.updating.family_model import Family
 from rom.components.updating.measured import Responses
 from rom.components.updating.normal_equations import Data, sums
-from rom.components.updating.verdict import Updated
 from rom.errors import ConfigError
 from rom.model import Array, Index
 
@@ -108,7 +107,8 @@ def compare(
             aside = np.arange(first, n_f, folds)
             found = update(family, _some(test, np.setdiff1d(np.arange(n_f), aside)),
                            **{**common, **own})  # fmt: skip
-            by_line[k, aside] = _squares(found, data.lines(aside))
+            left = sums(found.model, found.logarithms, found.zeta, data.lines(aside))
+            by_line[k, aside] = left.squares.sum(axis=(1, 2))
         n_unknowns.append(len(found.names))
     expected = 2.0 * np.count_nonzero(data.weight, axis=(1, 2))
     return Comparison(tuple(sets), np.array(n_unknowns), by_line, expected)
@@ -123,9 +123,3 @@ def _some(test: Responses, lines: Index) -> Responses:
         coherence=c[lines] if c.ndim else test.coherence,
         force_noise=noise[lines] if noise.ndim else test.force_noise,
     )
-
-
-def _squares(found: Updated, data: Data) -> Array:
-    """(n_f,) squared residuals of lines."""
-    left = sums(found.model, found.logarithms, found.zeta, data)
-    return left.squares.sum(axis=(1, 2))

@@ -4,8 +4,6 @@ The model is condensed statically to the sensors, which is wrong by inertia betw
 good the data are; the verdict, of responses of the model that is not condensed, says how much.
 """
 
-from dataclasses import dataclass, replace
-
 import numpy as np
 from scipy.linalg import null_space, qr
 
@@ -20,8 +18,8 @@ from rom.components.updating.methods import (
     update_by_input,
     weighted,
 )
-from rom.components.updating.models import AtSensors, Measurement, ParametricModel, modal
-from rom.components.updating.normal_equations import Data, shared, white
+from rom.components.updating.models import AtSensors, Measurement
+from rom.components.updating.normal_equations import Data, white
 from rom.errors import ConfigError
 from rom.model import Array, Index, Mask
 from rom.names import named
@@ -31,50 +29,26 @@ LAST_STEP = 1e-3  # in standard deviations
 COLLOCATED_RTOL = 1e-8  # of the row of a sensor that measures what an input drives
 
 
-@dataclass(frozen=True, slots=True)
-class InSensors:
-    """A family in coordinates of which the first are its sensors; some parameters unknown.
+def in_sensors(model: FamilyModel, x: Array, free: Mask) -> FamilyModel:
+    """A family in coordinates of which the first are its sensors, the others no sensor sees.
 
-    Attributes:
-        model: with n_s sensors, none of which follows from others.
-        x: (n_p,) logarithms of all factors; those that are sought are replaced.
+    Args:
+        model: with its sensors.
+        x: (n_p,) logarithms of all factors, of which those that are not sought stay.
         free: (n_p,) which are sought.
-        basis: (n, n) coordinates of the family per sensor, and per motion that no sensor sees.
+
+    Raises:
+        ConfigError: if a sensor follows from others, or the family has too few coordinates.
     """
-
-    model: FamilyModel
-    x: Array
-    free: Mask
-    basis: Array
-
-    @staticmethod
-    def of(model: FamilyModel, x: Array, free: Mask) -> "InSensors":
-        """Coordinates from the rows of the sensors.
-
-        Raises:
-            ConfigError: if a sensor follows from others, or the family has too few coordinates.
-        """
-        S = model.seen
-        if follow := sorted(_followers(S)):
-            raise ConfigError(
-                f"sensors {named(follow)} of {len(S)} follow from others in a family of "
-                f"{S.shape[1]} coordinates: equations need independent ones.",
-                hint="Leave them out, reduce with more modes, or update by responses.",
-            )
-        return InSensors(model, x, free, np.hstack([np.linalg.pinv(S), null_space(S)]))
-
-    @property
-    def sensors(self) -> Array:
-        """(n_s, n) rows of the first coordinates."""
-        return np.eye(len(self.model.seen), len(self.basis))
-
-    def at(self, x: Array) -> ParametricModel:
-        """The model at logarithms of the factors that are sought, with derivatives by them."""
-        whole = self.x.copy()
-        whole[self.free] = x
-        here = self.model.at(whole)
-        here = replace(here, dK=here.dK[self.free], dM=here.dM[self.free])
-        return replace(here.in_basis(self.basis), sensors=self.sensors)
+    S = model.seen
+    if follow := sorted(_followers(S)):
+        raise ConfigError(
+            f"sensors {named(follow)} of {len(S)} follow from others in a family of "
+            f"{S.shape[1]} coordinates: equations need independent ones.",
+            hint="Leave them out, reduce with more modes, or update by responses.",
+        )
+    basis = np.hstack([np.linalg.pinv(S), null_space(S)])
+    return model.reduced(basis, free, x, np.eye(len(S), S.shape[1]))
 
 
 def by_equations(
@@ -105,8 +79,7 @@ def by_equations(
     """
     lines = _whole_lines(data)
     inputs, signs = _collocated(model)
-    lam = modal(model.at(x), ()).lam
-    m = int(np.count_nonzero(lam[model.n_rigid :] <= data.omega[lines[-1]] ** 2))
+    m = int(np.count_nonzero(model.elastic(x) <= data.omega[lines[-1]] ** 2))
     n_s, needed = len(model.seen), m + model.n_rigid
     if n_s < needed:
         raise ConfigError(
@@ -116,11 +89,11 @@ def by_equations(
         )
     H = np.exp(data.logarithm[lines]) * signs
     test = Measurement(data.omega[lines], H, inputs, data.weight[lines])
-    limits = np.log(model.low[free]), np.log(model.high[free])
-    small = AtSensors(InSensors.of(model, x, free))
+    inside = in_sensors(model, x, free)
+    small = AtSensors(inside)
     rank = whole("rank", min(n_s, needed) if rank is None else rank, 1, n_s, reason="sensors")
     start = x[free], np.full(m, damping)
-    return update_by_input(small, test, *start, rank=rank, limits=limits, prior=prior[free])
+    return update_by_input(small, test, *start, rank=rank, limits=inside.ends, prior=prior[free])
 
 
 def by_response_functions(
@@ -158,12 +131,12 @@ def by_response_functions(
         (1989), chapter 8.
     """
     used = data.lines(_whole_lines(data))
-    inside, n_s = InSensors.of(model, x, free), len(model.seen)
-    F = inside.basis.T @ model.driven.T
+    inside, n_s = in_sensors(model, x, free), len(model.seen)
+    F = inside.driven.T
 
     def triangle(x: Array, ratios: Array) -> Array:
         here = inside.at(x)
-        modes = modal(here, shared(ratios, model.n_elastic))
+        modes = model.modal(here, ratios)
         change = through_modes(here, modes, ratios.size, shared=True)
         MPhi = here.M @ modes.Phi
         driven, n = modes.Phi.T @ F, x.size + ratios.size
@@ -181,8 +154,7 @@ def by_response_functions(
             R = folded(R, weighted(1.0, white(columns, some.weight, some.common)))
         return R
 
-    limits = np.log(model.low[free]), np.log(model.high[free])
-    options = 2 * used.logarithm.size, limits, prior[free], prior_damping
+    options = 2 * used.logarithm.size, inside.ends, prior[free], prior_damping
     return solved(triangle, (x[free], ratios), *options, enough=LAST_STEP)
 
 

@@ -26,7 +26,7 @@ from rom.components.updating.family_model import (
 from rom.components.updating.frf_data import Complex, beside_poles
 from rom.components.updating.measured import Responses
 from rom.components.updating.methods import Update
-from rom.components.updating.models import chi_row, likeness, modal
+from rom.components.updating.models import chi_row, likeness
 from rom.components.updating.normal_equations import Data, Sums, responses_at, sums
 from rom.components.updating.verdict import (
     LEFT_LOG_LEVEL,
@@ -52,7 +52,6 @@ DECREMENT_TOL = 1e-4  # expected gain of chi-square: a hundredth of a standard d
 START_STIFFNESS = 1e-3  # of a step, over the information of each unknown
 NEAR_STIFFNESS = 1e-9  # the same, close to the end
 MAX_STIFFNESS = 1e10  # beyond it no shorter step lowers the residual
-BAND_RATIO = 1.5  # modes up to here, over the highest line, have damping that lines can see
 BOUND_ATOL = 1e-9  # distance of a logarithm from the end of its range
 DAMPING_LOG_DEVIATION = 1.5  # of ratios about their start, before the test: a factor of 20 in two
 RESIDUALS = ("responses", "equations", "response-function")
@@ -222,9 +221,8 @@ class _Search:
         model: FamilyModel, test: Responses, unknown: Mask, damping: float, prior: _Before
     ) -> "_Search":
         data = Data.of(test)
-        x = np.clip(prior.x, np.log(model.low), np.log(model.high))
-        lam = modal(model.at(x), ()).lam[model.n_rigid :]
-        m = min(int(np.count_nonzero(lam < (BAND_RATIO * data.omega[-1]) ** 2)) + 1, lam.size)
+        x = np.clip(prior.x, *model.ends)
+        m = model.n_ratios(x, data.omega[-1])
         free = np.r_[unknown, np.ones(m, dtype=bool)]
         if data.n_values <= free.sum():
             raise ConfigError(
@@ -240,9 +238,9 @@ class _Search:
         omega = self.data.roughly().omega
         yield responses_at(self.model, self.x, self.zeta, omega)
         for j in np.flatnonzero(self.free[: len(self.model.names)] & self.model.present):
-            for end in (self.model.low[j], self.model.high[j]):
+            for end in self.model.ends:
                 x = self.x.copy()
-                x[j] = np.log(end)
+                x[j] = end[j]
                 yield responses_at(self.model, x, self.zeta, omega)
 
     @property
@@ -256,8 +254,8 @@ class _Search:
     @property
     def bounds(self) -> tuple[Array, Array]:
         m = self.theta.size - len(self.model.names)
-        ends = zip((self.model.low, self.model.high), DAMPING_RANGE, strict=True)
-        low, high = (np.log(np.r_[p, np.full(m, z)]) for p, z in ends)
+        ends = zip(self.model.ends, np.log(DAMPING_RANGE), strict=True)
+        low, high = (np.r_[p, np.full(m, z)] for p, z in ends)
         return low, high
 
     def at(self, theta: Array) -> tuple[Sums, float]:
@@ -289,7 +287,7 @@ class _Search:
 
     def beside(self, width: float) -> "_Search":
         """Where it is, with lines that count less close to its poles."""
-        poles = np.sqrt(modal(self.model.at(self.x), ()).lam[self.model.n_rigid :])
+        poles = np.sqrt(self.model.elastic(self.x))
         self.count = beside_poles(self.data.omega, poles[: self.zeta.size], self.zeta, width)
         self.data = replace(self.data, weight=self.data.weight * self.count)
         return self
@@ -360,10 +358,9 @@ def _found(family: Family, search: _Search) -> Updated:
     """The record of a search that has ended."""
     model, data, s = search.model, search.data, search.sums
     n, free = len(model.names), np.flatnonzero(search.free)
-    zetas = tuple(f"zeta {k + 1}" for k in range(search.theta.size - n))
-    labels = tuple((*model.names, *zetas)[k] for k in free)
+    labels = tuple(model.labels(search.theta.size - n)[k] for k in free)
     N, g = search.posterior()
-    width = np.r_[np.log(model.high / model.low), np.ones(len(zetas))][free]
+    width = np.r_[np.log(model.high / model.low), np.ones(search.theta.size - n)][free]
     low, high = search.bounds
     ends = np.minimum(search.x - low[:n], high[:n] - search.x) <= BOUND_ATOL
     at_bound = tuple(
@@ -401,11 +398,10 @@ def _doubts(search: _Search, at_bound: tuple[str, ...]) -> list[Row]:
     """What makes the end of a search doubtful, whatever noise explains."""
     model, data = search.model, search.data
     H = responses_at(model, search.x, search.zeta, data.omega)
-    lam = modal(model.at(search.x), ()).lam[model.n_rigid :]
     counted = data.weight > 0
     highest = data.omega[counted.any(axis=(1, 2))][-1] / (2 * np.pi)
     alike = likeness(H, np.exp(data.logarithm), counted)
-    rows = [alike, band(np.sqrt(lam) / (2 * np.pi), highest)]
+    rows = [alike, band(np.sqrt(model.elastic(search.x)) / (2 * np.pi), highest)]
     if search.n_known:
         n = len(model.names)
         off = (search.theta - search.before)[:n]

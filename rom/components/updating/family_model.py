@@ -23,13 +23,14 @@ from rom.body.reference import marker_motion
 from rom.components.families.assembled import FamilyAssembly
 from rom.components.families.family import BodyFamily
 from rom.components.families.parameters import Density, Parameter, YoungsModulus
-from rom.components.updating.models import ParametricModel
+from rom.components.updating.models import Modal, ParametricModel, modal
 from rom.eigen.supports import spring_matrices
 from rom.errors import ConfigError, ParameterError
 from rom.model import Array, Index, Mask
 from rom.names import check_known, named
 from rom.rotation import skew
 
+BAND_RATIO = 1.5  # modes up to here, over the highest line, have damping that lines can see
 HELD_RTOL = 1e-9  # singular value of a motion that nothing holds
 MASS_DOFS = 3  # translations, which a point mass resists
 Family = BodyFamily | FamilyAssembly
@@ -317,13 +318,70 @@ class FamilyModel:
         """Number of its elastic modes."""
         return self.K.shape[1] - self.n_rigid
 
+    @property
+    def ends(self) -> tuple[Array, Array]:
+        """(n_p,) smallest and largest logarithms of factors."""
+        return np.log(self.low), np.log(self.high)
+
+    @property
+    def sensors(self) -> Array:
+        """The rows ``seen``, as a `SensorModel` calls them."""
+        return self.seen
+
+    def labels(self, m: int) -> tuple[str, ...]:
+        """Names of the parameters and of m damping ratios."""
+        return (*self.names, *(f"zeta {k + 1}" for k in range(m)))
+
     def at(self, x: Array) -> ParametricModel:
         """The model at logarithms x (n_p,) of the factors, with the derivatives by them."""
-        k, m = np.exp(self.k_powers @ x), np.exp(self.m_powers @ x)
-        dK = np.tensordot(self.k_powers.T * k, self.K, 1)
-        dM = np.tensordot(self.m_powers.T * m, self.M, 1)
-        K, M = (np.tensordot(self.amount * c, A, 1) for c, A in ((k, self.K), (m, self.M)))
+        K, dK = summed(self.K, self.k_powers, x, self.amount)
+        M, dM = summed(self.M, self.m_powers, x, self.amount)
         return ParametricModel(K, M, dK, dM, self.seen, self.n_rigid)
+
+    def modal(self, here: ParametricModel, ratios: Array) -> Modal:
+        """Modes of the model at some factors; the last damping ratio is that of all others too."""
+        return modal(here, np.r_[ratios, np.full(self.n_elastic - ratios.size, ratios[-1])])
+
+    def elastic(self, x: Array) -> Array:
+        """(n_elastic,) eigenvalues [rad^2/s^2] at logarithms x (n_p,) of the factors."""
+        return modal(self.at(x), ()).lam[self.n_rigid :]
+
+    def n_ratios(self, x: Array, highest: float) -> int:
+        """How many damping ratios lines up to the highest one [rad/s] see, and one for others."""
+        lam = self.elastic(x)
+        return min(int(np.count_nonzero(lam < (BAND_RATIO * highest) ** 2)) + 1, lam.size)
+
+    def reduced(self, T: Array, free: Mask, x: Array, seen: Array) -> "FamilyModel":
+        """The same in coordinates T (n, r), of some free parameters (n_p,), the others kept at x.
+
+        Args:
+            T: coordinates of the family per new one [1].
+            free: which parameters stay unknown.
+            x: (n_p,) logarithms of the factors of the others.
+            seen: (n_s, r) rows of the sensors.
+        """
+        kept = np.where(free, 0.0, x)
+        K, M = ((T.T @ A @ T) * np.exp(powers @ kept)[:, None, None]
+                for A, powers in ((self.K, self.k_powers), (self.M, self.m_powers)))  # fmt: skip
+        names = tuple(name for name, one in zip(self.names, free, strict=True) if one)
+        return replace(
+            self, K=K, M=M, k_powers=self.k_powers[:, free], m_powers=self.m_powers[:, free],
+            seen=seen, driven=self.driven @ T, names=names, low=self.low[free],
+            high=self.high[free], motions=self.motions @ T,
+        )  # fmt: skip
+
+
+def summed(terms: Array, powers: Array, x: Array, amount: Any = 1.0) -> tuple[Array, Array]:
+    """A sum of terms (n_t, ...) with factors, and its derivatives (n_p, ...) by their logarithms.
+
+    Args:
+        terms: at factors of one.
+        powers: (n_t, n_p) one where a parameter multiplies a term.
+        x: (n_p,) logarithms of the factors.
+        amount: (n_t,) of the terms in the sum; derivatives have all of them [1].
+    """
+    c = np.exp(powers @ x)
+    return np.tensordot(amount * c, terms, 1), np.tensordot(powers.T * c, terms, 1)
 
 
 def family_model(
@@ -366,12 +424,13 @@ def family_model(
     held = _conditions(family, fixed)
     N = still_motions(held)
     known = {**own, **outside}
-    powers = _powers(family, tuple(outside))
+    powers = [_own_powers(one) for one in parts_of(family).values()] + [(np.eye(len(outside)),) * 2]
+    k_powers, m_powers = (block_diag(*(pair[i] for pair in powers)) for i in (0, 1))
     return FamilyModel(
         K=N.T @ K @ N,
         M=N.T @ M @ N,
-        k_powers=powers[0],
-        m_powers=powers[1],
+        k_powers=k_powers,
+        m_powers=m_powers,
         seen=rows[0] @ N,
         driven=rows[1] @ N,
         names=tuple(known),
@@ -390,14 +449,8 @@ def _placed(A: Array, columns: slice, n: int) -> Array:
     return whole
 
 
-def _powers(family: Structure, outside: tuple[str, ...]) -> tuple[Array, Array]:
-    """Which parameters multiply which terms."""
-    own = [_own_powers(one) for one in parts_of(family).values()] + [(np.eye(len(outside)),) * 2]
-    k, m = (block_diag(*(pair[i] for pair in own)) for i in (0, 1))
-    return k, m
-
-
 def _own_powers(family: BodyFamily | FlexibleBody) -> tuple[Array, Array]:
+    """Which parameters multiply which terms of the stiffness and of the mass."""
     if isinstance(family, FlexibleBody):
         return (np.zeros((1, 0)),) * 2
     k, m = np.zeros((2, len(family.shares), len(family.parameters)))

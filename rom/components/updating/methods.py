@@ -15,9 +15,9 @@ from numpy.typing import ArrayLike
 from scipy.optimize import least_squares
 
 from rom.arguments import matrix, whole
+from rom.components.updating.frf_data import Complex
 from rom.components.updating.models import (
     AtSensors,
-    Complex,
     Measurement,
     Modal,
     Model,
@@ -34,9 +34,7 @@ BLOCK_LINES = 256  # at once: some ten megabytes of derivatives for sixty channe
 MAX_STEPS = 40  # linear solutions
 STEP_ATOL = 1e-8  # in standard deviations, below which equations are solved
 MAX_PARAMETER_CHANGE = 0.2  # in one step
-SHRINKING_RATIO = (
-    0.5  # of a step, over the one before, from which on noise of derivatives does not lead
-)
+SHRINKING_RATIO = 0.5  # of a step over the one before, above which noise does not lead
 MIN_PARAMETER = -0.95  # change that leaves a twentieth of the stiffness or mass
 EQUAL_EIGENVALUE_RTOL = 1e-12  # distance of eigenvalues whose modes have no derivative
 
@@ -159,6 +157,25 @@ def through_modes(
     return change
 
 
+def transfer(
+    here: ParametricModel, modes: Modal, driven: Array, m: int, *, shared: bool = False
+) -> Callable[[Array], tuple[Complex, Complex]]:
+    """The function of lines (n_f,) [rad/s] that gives receptances and their derivatives.
+
+    These are (n_f, n_s, n_e) [m/N] and (n_f, n_s, n_e, n_p + m); inputs are rows ``driven``
+    (n_e, n) [1], otherwise arguments are those of `through_modes`.
+    """
+    seen, driven = here.sensors @ modes.Phi, driven @ modes.Phi
+    change = through_modes(here, modes, m, shared=shared)
+
+    def at(omega: Array) -> tuple[Complex, Complex]:
+        g = modes.g(omega)
+        sides = seen * g[:, None, :], g[:, :, None] * driven.T
+        return receptance(seen, g, driven), -change(*sides, omega)
+
+    return at
+
+
 def _through(left: Complex, S: tuple[Array, ...], right: Complex, omega: Array) -> Complex:
     """Left (A - omega^2 B + i omega C) right: (n_f, a, n), (n_q, n, n), (n_f, n, b).
 
@@ -198,11 +215,8 @@ def sensitivity(
         ConfigError, ModelError: as `responses`.
     """
     here = model.at(p)
-    modes = modal(here, zeta)
-    seen, g = here.sensors @ modes.Phi, modes.g(omega)
-    sides = (seen * g[:, None, :], g[:, :, None] * seen[list(inputs)].T, omega)
-    H = _receptance(here, modes, omega, inputs)
-    return H, -through_modes(here, modes, np.size(zeta))(*sides)
+    driven = here.sensors[list(inputs)]
+    return transfer(here, modal(here, zeta), driven, np.size(zeta))(omega)
 
 
 def update_by_output(model: Model, test: Measurement, p: ArrayLike, zeta: ArrayLike) -> Update:
@@ -404,9 +418,10 @@ def common_basis(test: Complex, model: Complex, rank: int) -> Array:
     return np.linalg.svd(R, full_matrices=False)[2][:rank].T
 
 
-def blocks(n: int) -> Iterator[slice]:
+def blocks(n: int, size: int = 0) -> Iterator[slice]:
     """Lines (n,) piece by piece, so that memory does not grow with their number."""
-    return (slice(first, first + BLOCK_LINES) for first in range(0, n, BLOCK_LINES))
+    size = size or BLOCK_LINES
+    return (slice(first, first + size) for first in range(0, n, size))
 
 
 def folded(R: Array, A: Array) -> Array:

@@ -9,19 +9,18 @@ from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.linalg import LinAlgError, cho_factor, cho_solve, eigh
 from scipy.stats import chi2
 from scipy.stats import f as f_ratio
 
 from rom.arguments import finite, one_each
-from rom.components.updating.frf_data import frac
+from rom.components.updating.frf_data import Complex, frac
 from rom.errors import ConfigError, ModelError
 from rom.model import Array, Mask, Report, Row
 from rom.reduction.bases.fixed_interface import craig_bampton
 from rom.rows import row
 
-Complex = NDArray[np.complex128]
 RIGID_RTOL = 1e-4  # round-off of a rigid motion's eigenvalue, of the lowest elastic one
 MAX_FALSE_REFUSAL = 1e-3  # probability that a row refuses a right model
 MIN_SCALE = 1e-8  # variance of a scale that is worth a thought

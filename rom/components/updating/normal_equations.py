@@ -13,8 +13,7 @@ import numpy as np
 from rom.components.updating.family_model import FamilyModel
 from rom.components.updating.frf_data import Complex
 from rom.components.updating.measured import Responses
-from rom.components.updating.methods import blocks, receptance, through_modes
-from rom.components.updating.models import modal
+from rom.components.updating.methods import blocks, receptance, transfer
 from rom.model import Array, Index
 
 ROUGH_LINES = 500  # at most: enough to see resonances
@@ -54,14 +53,9 @@ class Data:
 
     def lines(self, chosen: Index | slice) -> "Data":
         """Some of the lines."""
-        return replace(
-            self,
-            omega=self.omega[chosen],
-            logarithm=self.logarithm[chosen],
-            weight=self.weight[chosen],
-            common=self.common[chosen] if np.ndim(self.common) else self.common,
-            varied=self.varied[chosen] if np.ndim(self.varied) else self.varied,
-        )
+        names = ("omega", "logarithm", "weight", "common", "varied")
+        of_lines = {name: x for name in names if np.ndim(x := getattr(self, name))}
+        return replace(self, **{name: x[chosen] for name, x in of_lines.items()})
 
     def roughly(self) -> "Data":
         """Lines at even distances, with errors that are large enough to start from afar."""
@@ -105,48 +99,26 @@ def responses_at(model: FamilyModel, x: Array, ratios: Array, omega: Array) -> C
         ratios: (m,) damping ratios of the lowest elastic modes, the last one of all others too [1].
         omega: (n_f,) lines [rad/s].
     """
-    modes = modal(model.at(x), shared(ratios, model.n_elastic))
+    modes = model.modal(model.at(x), ratios)
     return receptance(model.seen @ modes.Phi, modes.g(omega), model.driven @ modes.Phi)
-
-
-def shared(ratios: Array, n: int) -> Array:
-    """(n,) damping ratios of all elastic modes; from the last one given on they are equal."""
-    return np.r_[ratios, np.full(n - ratios.size, ratios[-1])]
 
 
 def sensitivity(
     model: FamilyModel, x: Array, ratios: Array
 ) -> Callable[[Array], tuple[Complex, Complex]]:
-    """The function of lines (n_f,) [rad/s] that gives receptances and their derivatives.
-
-    These are (n_f, n_s, n_e) [m/N] and (n_f, n_s, n_e, n_q) by the logarithms of factors and of
-    damping ratios.
-
-    Args:
-        model: the family with its sensors.
-        x: (n_p,) logarithms of its factors.
-        ratios: (m,) damping ratios of the lowest elastic modes, the last one of all others too [1].
-    """
+    """As `transfer`, by logarithms of factors and of ratios; arguments as of `responses_at`."""
     here = model.at(x)
-    modes = modal(here, shared(ratios, model.n_elastic))
-    seen, driven = model.seen @ modes.Phi, model.driven @ modes.Phi
-    change = through_modes(here, modes, ratios.size, shared=True)
-
-    def at(omega: Array) -> tuple[Complex, Complex]:
-        g = modes.g(omega)
-        left, right = seen * g[:, None, :], g[:, :, None] * driven.T
-        return receptance(seen, g, driven), -change(left, right, omega)
-
-    return at
+    modes = model.modal(here, ratios)
+    return transfer(here, modes, model.driven, ratios.size, shared=True)
 
 
 def sums(model: FamilyModel, x: Array, ratios: Array, data: Data) -> Sums:
     """J^T J and J^T r by the logarithms of factors and of damping ratios.
 
     Args:
-        model: the family with its sensors.
-        x: (n_p,) logarithms of its factors.
-        ratios: (m,) damping ratios of the lowest elastic modes, the last one of all others too [1].
+        model: see `responses_at`.
+        x: see `responses_at`.
+        ratios: see `responses_at`.
         data: what was measured.
     """
     n = x.size + ratios.size

@@ -18,7 +18,7 @@ import numpy as np
 from rom.arguments import finite, one_of, typed, whole
 from rom.body.flexible import FlexibleBody
 from rom.body.surface import surface_of
-from rom.components.updating.estimate import BAND_RATIO, DAMPING_LOG_DEVIATION
+from rom.components.updating.estimate import DAMPING_LOG_DEVIATION
 from rom.components.updating.family_model import (
     Attached,
     Family,
@@ -30,7 +30,8 @@ from rom.components.updating.family_model import (
 )
 from rom.components.updating.frf_data import Complex
 from rom.components.updating.measured import DERIVATIVES, Channels
-from rom.components.updating.models import DEAD_RATIO, modal
+from rom.components.updating.methods import blocks
+from rom.components.updating.models import DEAD_RATIO
 from rom.components.updating.normal_equations import responses_at, sensitivity
 from rom.components.updating.verdict import unseen_directions
 from rom.errors import ConfigError, ModelError
@@ -180,7 +181,8 @@ def independent(
     while kept.size > n:
         Q = np.linalg.qr(Phi[kept])[0]
         kept = np.delete(kept, np.square(Q).sum(axis=1).argmin())
-    return kept, auto_mac(Phi[kept])
+    G = Phi[kept].T @ Phi[kept]  # squared cosines between the columns
+    return kept, np.square(G) / np.outer(np.diag(G), np.diag(G))
 
 
 @typed
@@ -249,9 +251,9 @@ def place(  # noqa: PLR0913  keywords of one call
     if floor is None:
         floor = DYNAMIC_RANGE * _largest(model, omega, damping, order)
     error = _Error(noise, floor, order)
-    blocks, known, names = _information(model, omega, damping, prior or {}, error)
-    s, e = _chosen(blocks, known, len(model.names), n_sensors, n_inputs)
-    N = known + blocks[np.ix_(s, e)].sum(axis=(0, 1))
+    told, known, names = _information(model, omega, damping, prior or {}, error)
+    s, e = _chosen(told, known, len(model.names), n_sensors, n_inputs)
+    N = known + told[np.ix_(s, e)].sum(axis=(0, 1))
     width = np.r_[np.log(model.high / model.low), np.ones(len(names) - len(model.names))]
     assumed = np.array([name in model.names and name not in (prior or {}) for name in names])
     return Plan(
@@ -263,12 +265,6 @@ def place(  # noqa: PLR0913  keywords of one call
         covariance=np.linalg.inv(N),
         unseen=unseen_directions(N - known * assumed, width, names),
     )
-
-
-def auto_mac(Phi: Array) -> Array:
-    """(m, m) squared cosines between the columns of shapes (n_s, m) at sensors [1]."""
-    G = Phi.T @ Phi
-    return np.square(G) / np.outer(np.diag(G), np.diag(G))
 
 
 @dataclass(frozen=True, slots=True)
@@ -286,11 +282,10 @@ class _Error:
 
 def _largest(model: FamilyModel, omega: Array, damping: float, order: int) -> float:
     """Largest response at factors of one, a derivative of this order [1/N]."""
-    x = np.clip(np.zeros(len(model.names)), np.log(model.low), np.log(model.high))
+    x = np.clip(np.zeros(len(model.names)), *model.ends)
     lines = max(1, BLOCK_VALUES // (len(model.seen) * len(model.driven)))
     sizes = []
-    for first in range(0, omega.size, lines):
-        w = omega[first : first + lines]
+    for w in (omega[block] for block in blocks(omega.size, lines)):
         size = np.abs(responses_at(model, x, np.array([damping]), w)).max(axis=(1, 2))
         sizes.append((w**order * size).max())
     return float(max(sizes))
@@ -301,26 +296,24 @@ def _information(
 ) -> tuple[Array, Array, tuple[str, ...]]:
     """What each pair of channels tells (n_s, n_e, n, n), the prior (n, n), and the names (n,)."""
     check_prior(prior, model.names)
-    x = np.clip(np.zeros(len(model.names)), np.log(model.low), np.log(model.high))
-    lam = modal(model.at(x), ()).lam[model.n_rigid :]
-    m = min(int(np.count_nonzero(lam < (BAND_RATIO * omega.max()) ** 2)) + 1, lam.size)
+    x = np.clip(np.zeros(len(model.names)), *model.ends)
+    m = model.n_ratios(x, omega.max())
     at, n = sensitivity(model, x, np.full(m, damping)), x.size + m
     n_s, n_e = len(model.seen), len(model.driven)
-    blocks, size = np.zeros((n_s, n_e, n, n)), np.zeros((n_s, n_e))
+    told, size = np.zeros((n_s, n_e, n, n)), np.zeros((n_s, n_e))
     lines = max(1, BLOCK_VALUES // (n_s * n_e * n))
-    for first in range(0, omega.size, lines):
-        w = omega[first : first + lines]
+    for w in (omega[block] for block in blocks(omega.size, lines)):
         H, J = at(w)
         J = np.moveaxis(J / error.of(H, w)[..., None], 0, 2)
-        blocks += (np.swapaxes(J.conj(), 2, 3) @ J).real
+        told += (np.swapaxes(J.conj(), 2, 3) @ J).real
         size = np.maximum(size, np.abs(H).max(axis=0))
-    blocks[size < DEAD_RATIO * size.max()] = 0.0  # relative noise makes nothing of round-off
+    told[size < DEAD_RATIO * size.max()] = 0.0  # relative noise makes nothing of round-off
     width = np.log(model.high / model.low)
     sigma = np.array([prior.get(k, w) for k, w in zip(model.names, width, strict=True)])
     if not (sigma > 0).all():
         raise ConfigError("prior: each standard deviation must be positive, and low < high.")
     known = np.diag(np.r_[sigma, np.full(m, DAMPING_LOG_DEVIATION)] ** -2.0)
-    return blocks, known, (*model.names, *(f"zeta {k + 1}" for k in range(m)))
+    return told, known, model.labels(m)
 
 
 def gain(N: Array, n_p: int) -> Array:

@@ -32,6 +32,7 @@ from rom.names import check_ending, named
 
 if TYPE_CHECKING:
     from rom.components.updating.family_model import Attached, Family
+    from rom.components.updating.placement import Plan
     from rom.components.updating.verdict import Updated
 
 SUMMARY = "update a family of bodies by a vibration test"
@@ -112,9 +113,10 @@ def _structure(parser: argparse.ArgumentParser) -> None:
         "--family", metavar="FILE or NAME=FILE", action="append", required=True,
         help="family file, .rom.npz; of several, repeated, each with a name: an assembly",
     )  # fmt: skip
+    several: dict[str, Any] = {"type": assignment, "action": "append", "default": []}
     parser.add_argument(
-        "--couple", metavar="BODY.INTERFACE=BODY.INTERFACE", type=assignment, action="append",
-        default=[], help="of an assembly: they move together; may be repeated",
+        "--couple", metavar="BODY.INTERFACE=BODY.INTERFACE", **several,
+        help="of an assembly: they move together; may be repeated",
     )  # fmt: skip
     parser.add_argument("--fixed", metavar="NAME,...", type=names, default=(), help="what was held")
     parser.add_argument(
@@ -122,23 +124,23 @@ def _structure(parser: argparse.ArgumentParser) -> None:
         help="unknown parameters (default: all); springs and masses are always",
     )  # fmt: skip
     parser.add_argument(
-        "--spring", metavar="NAME=INTERFACE:KX,KY,KZ:LOW:HIGH", type=assignment, action="append",
-        default=[], help=f"between an interface and the ground [N/m, N m/rad], {FACTOR_HELP}",
+        "--spring", metavar="NAME=INTERFACE:KX,KY,KZ:LOW:HIGH", **several,
+        help=f"between an interface and the ground [N/m, N m/rad], {FACTOR_HELP}",
     )  # fmt: skip
     parser.add_argument(
-        "--joint", metavar="NAME=BODY.INTERFACE,BODY.INTERFACE:KX,KY,KZ:LOW:HIGH", type=assignment,
-        action="append", default=[], help=f"between bodies [N/m, N m/rad], {FACTOR_HELP}",
+        "--joint", metavar="NAME=BODY.INTERFACE,BODY.INTERFACE:KX,KY,KZ:LOW:HIGH", **several,
+        help=f"between bodies [N/m, N m/rad], {FACTOR_HELP}",
     )  # fmt: skip
     parser.add_argument(
-        "--mass", metavar="NAME=INTERFACE:KG:LOW:HIGH", type=assignment, action="append",
-        default=[], help=f"on an interface [kg], {FACTOR_HELP}",
+        "--mass", metavar="NAME=INTERFACE:KG:LOW:HIGH", **several,
+        help=f"on an interface [kg], {FACTOR_HELP}",
     )  # fmt: skip
     parser.add_argument(
         "--candidate", metavar="NAME,...", type=names, default=(),
         help="springs and masses that the model has not, tried by their score",
     )  # fmt: skip
     parser.add_argument(
-        "--prior", metavar="NAME=DEVIATION", type=assignment, action="append", default=[],
+        "--prior", metavar="NAME=DEVIATION", **several,
         help="relative standard deviation of a factor about one, before the test",
     )  # fmt: skip
 
@@ -203,20 +205,15 @@ def run(args: argparse.Namespace) -> Answer:
         match(family, test, checked(args, args.picture, inputs=_files(args).values()))
     noise = {"force_noise": args.force_noise, "estimator": args.estimator}
     test = replace(test, **{name: value for name, value in noise.items() if value is not None})
-    outside = _outside(args, family)
+    common = _common(args, family)
+    outside = common.pop("attached")
     if wrong := sorted(set(args.candidate) - set(outside)):
         raise ConfigError(f"--candidate {wrong[0]} must name a --spring, --joint or --mass.")
-    prior = unique(args.prior, "--prior")
-    prior = {name: typed_number("--prior", text) for name, text in prior.items()}
     found = update(
-        family, test, free=args.free, fixed=_held(args, family), damping=args.damping,
+        family, test, **common, free=args.free,
         attached={name: part for name, part in outside.items() if name not in args.candidate},
-        candidates={name: outside[name] for name in args.candidate},
-        prior=prior,
-        tolerance=args.tolerance,
-        residual=args.residual,
-        rank=args.rank,
-        beside_poles=args.beside_poles,
+        candidates={name: outside[name] for name in args.candidate}, tolerance=args.tolerance,
+        residual=args.residual, rank=args.rank, beside_poles=args.beside_poles,
     )  # fmt: skip
 
     def write() -> None:
@@ -225,9 +222,16 @@ def run(args: argparse.Namespace) -> Answer:
             save(bodies[name], path)
 
     text = f"{args.file}: {test.H.shape[1]} sensors, {test.H.shape[2]} forces, {len(test.H)} lines"
-    return Answer(
-        _data(args, found), f"{text}\n{found}", write if outputs else None, failures(found.verdict)
-    )
+    data = _data(args, found) | {
+        "file": str(args.file),
+        "factors": found.factors,
+        "damping": found.zeta.tolist(),
+        "scores": found.scores,
+        "by_sensor": found.by_sensor.tolist(),
+        "at_bound": list(found.at_bound),
+        "report": report_data(found.verdict),
+    }
+    return Answer(data, f"{text}\n{found}", write if outputs else None, failures(found.verdict))
 
 
 def _outputs(args: argparse.Namespace, family: "Family") -> dict[str, Path]:
@@ -305,11 +309,17 @@ def _place(option: str, text: str, bodies: Collection[str]) -> Any:
     raise ConfigError(f"{option} {text!r} must be BODY.INTERFACE, of {named(bodies)}.")
 
 
-def _held(args: argparse.Namespace, family: "Family") -> tuple[Any, ...]:
-    """What was held, as the family wants it."""
+def _common(args: argparse.Namespace, family: "Family") -> dict[str, Any]:
+    """What an update and a plan know of a family before the test."""
     from rom.components.updating.family_model import Parts
 
-    return tuple(_place("--fixed", text, Parts.of(family).bodies) for text in args.fixed)
+    prior = unique(args.prior, "--prior")
+    return {
+        "fixed": tuple(_place("--fixed", text, Parts.of(family).bodies) for text in args.fixed),
+        "attached": _outside(args, family),
+        "damping": args.damping,
+        "prior": {name: typed_number("--prior", text) for name, text in prior.items()},
+    }
 
 
 def _plan(args: argparse.Namespace) -> Answer:
@@ -330,28 +340,18 @@ def _plan(args: argparse.Namespace) -> Answer:
     if output:
         check_ending(output, "a plan", *PLAN_ENDINGS)
     family = _family(args)
-    held = _held(args, family)
-    offered = candidates(family, PLAN_POINTS, fixed=held)
-    n_sensors, n_inputs = args.plan
-    low, high = args.lines
-    prior = unique(args.prior, "--prior")
+    common = _common(args, family)
+    offered = candidates(family, PLAN_POINTS, fixed=common["fixed"])
+    (n_sensors, n_inputs), (low, high) = args.plan, args.lines
     plan = place(
         family, offered, offered, np.linspace(low, high, PLAN_LINES), n_sensors=n_sensors,
-        n_inputs=n_inputs, noise=args.noise, floor=args.floor, fixed=held,
-        attached=_outside(args, family), damping=args.damping,
-        prior={name: typed_number("--prior", text) for name, text in prior.items()},
+        n_inputs=n_inputs, noise=args.noise, floor=args.floor, **common,
     )  # fmt: skip
-    channels = (("sensors", plan.sensors), ("inputs", plan.inputs))
-    placed = {
-        name: [[*x, *d] for x, d in zip(np.asarray(c.points).tolist(),
-                                        np.asarray(c.directions).tolist(), strict=True)]
-        for name, c in channels
-    }  # fmt: skip
-    data = {
-        "family": ", ".join(args.family),
-        "plan": placed,
-        "deviations": plan.deviations,
-        "unseen": list(plan.unseen),
+    data = _data(args, plan) | {
+        "plan": {
+            name: np.hstack([several.points, several.directions]).tolist()
+            for name, several in (("sensors", plan.sensors), ("inputs", plan.inputs))
+        }
     }
     if not output:
         return Answer(data, f"{plan}\n{plan.csv()}")
@@ -362,14 +362,12 @@ def _plan(args: argparse.Namespace) -> Answer:
                          if name in family.parameters)  # fmt: skip
         title, more = "Plan of a vibration test", f"The test will leave deviations: {left}."
         return Answer(
-            data | {"output": str(output)}, str(plan),
+            data, str(plan),
             lambda: drawn(family, (plan.sensors, plan.inputs), output, title, more),
         )  # fmt: skip
     text = plan.uff() if output.suffix.lower() == ".uff" else plan.csv()
     return Answer(
-        data | {"output": str(output)},
-        str(plan),
-        lambda: write_whole(output, lambda out: out.write(text.encode())),
+        data, str(plan), lambda: write_whole(output, lambda out: out.write(text.encode()))
     )
 
 
@@ -390,19 +388,12 @@ def _range(text: str) -> tuple[float, float]:
     return low, high
 
 
-def _data(args: argparse.Namespace, found: "Updated") -> dict[str, Any]:
-    deviations = found.deviations
+def _data(args: argparse.Namespace, found: "Updated | Plan") -> dict[str, Any]:
+    """What an update and a plan tell."""
     data = {
-        "file": str(args.file),
         "family": ", ".join(args.family),
-        "factors": found.factors,
-        "damping": found.zeta.tolist(),
-        "deviations": deviations,
-        "scores": found.scores,
-        "by_sensor": found.by_sensor.tolist(),
+        "deviations": found.deviations,
         "unseen": list(found.unseen),
-        "at_bound": list(found.at_bound),
-        "report": report_data(found.verdict),
     }
     return data | ({} if args.output is None else {"output": str(args.output)})
 

@@ -172,8 +172,7 @@ class Updated:
         )
         model = replace(self.model, seen=seen, driven=driven)
         x = self.logarithms
-        labels = (*model.names, *(f"zeta {k + 1}" for k in range(self.zeta.size)))
-        unknown = [labels.index(name) for name in self.names]
+        unknown = [model.labels(self.zeta.size).index(name) for name in self.names]
         theta = np.tile(np.r_[x, np.log(self.zeta)], (n, 1))
         rng = np.random.default_rng(seed)
         theta[:, unknown] += rng.multivariate_normal(np.zeros(len(unknown)), self.covariance, n)

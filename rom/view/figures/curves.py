@@ -1,7 +1,6 @@
 """Curves over time, and how far reduced frequencies are from full ones."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -70,7 +69,7 @@ def history(  # noqa: PLR0913  keywords of one picture
     t = np.asarray(t, dtype=float)
     with page.styled():
         names = [list(filter(None, curves)) for _, curves in panels]
-        figure, areas = _panels(ax, names, "history", Words(title, caption, beside))
+        figure, areas = _panels(ax, names, "history", title, caption, beside)
         numbers = numbered([list(curves) for _, curves in panels])
         for axes, (label, curves), looks in zip(areas, panels, numbers, strict=True):
             _histories(axes, t, curves, looks)
@@ -182,8 +181,7 @@ def frequencies(
         "frequencies are never below full ones."
     )
     with page.styled():
-        words = Words(title, caption, beside)
-        figure, (axes,) = _panels(ax, [[*comparison]], "frequencies", words)
+        figure, (axes,) = _panels(ax, [[*comparison]], "frequencies", title, caption, beside)
         longest = 0
         for k, (support, table) in enumerate(comparison.items()):
             full, reduced = (np.array(table[key]) for key in ("full", "reduced"))
@@ -233,7 +231,7 @@ def convergence(
     path = page.wanted(path)
     with page.styled():
         names = [[*curves] for _, curves in panels]
-        figure, areas = _panels(ax, names, "convergence", Words(title, caption, beside))
+        figure, areas = _panels(ax, names, "convergence", title, caption, beside)
         for axes, (label, curves) in zip(areas, panels, strict=True):
             for k, (name, (sizes, errors)) in enumerate(curves.items()):
                 x, y = np.asarray(sizes, dtype=float), np.asarray(errors, dtype=float)
@@ -297,7 +295,7 @@ def campbell(  # noqa: PLR0913  keywords of one picture
     with page.styled():
         legends = [[*labels, RAYS_LABEL, *(marks or {})]]
         legends += [[*labels, *(marks or {})]] if damped else []
-        figure, areas = _panels(ax, legends, "campbell", Words(title, caption, beside))
+        figure, areas = _panels(ax, legends, "campbell", title, caption, beside)
         for k, label in enumerate(labels):
             look = line_look(k)
             areas[0].plot(turns, f[:, k], label=label, **look)
@@ -394,23 +392,13 @@ def _once(legends: Sequence[Sequence[str]]) -> list[list[str]]:
     return [first, *([] if list(names) == first else list(names) for names in legends[1:])]
 
 
-@dataclass(frozen=True, slots=True)
-class Words:
-    """Around the panels of a page: heading, caption, and what stands beside them."""
-
-    title: str
-    caption: str
-    beside: Scene | Sequence[Scene] | None = None
-
-    @property
-    def scenes(self) -> list[Scene]:
-        """What stands beside the panels, from top to bottom."""
-        beside = [] if self.beside is None else self.beside
-        return [beside] if isinstance(beside, Scene) else list(beside)
-
-
 def _panels(
-    ax: Any, legends: Sequence[Sequence[str]], name: str, words: Words
+    ax: Any,
+    legends: Sequence[Sequence[str]],
+    name: str,
+    title: str,
+    caption: str,
+    beside: Scene | Sequence[Scene] | None,
 ) -> tuple[Any, list[Any]]:
     """Figure and axes: those of the caller, or one below the other on a page.
 
@@ -418,20 +406,22 @@ def _panels(
         ax: of the caller.
         legends: names of the curves of each panel.
         name: of the function that draws.
-        words: what stands around.
+        title: heading.
+        caption: what a stranger has to know.
+        beside: what stands beside the panels, from top to bottom.
     """
-    scenes, n = words.scenes, len(legends)
+    scenes, n = [beside] if isinstance(beside, Scene) else list(beside or ()), len(legends)
     if ax is not None:
         figure, areas = page.taken(ax, n + len(scenes), name)
-        if words.title:
-            areas[0].set_title(words.title, loc="left")
+        if title:
+            areas[0].set_title(title, loc="left")
         for axes, scene in zip(areas[n:], scenes, strict=True):
             draw_scene(figure, axes, scene, scenes)
         return figure, areas[:n]
     width = PAGE_WIDTH - 190 - (BESIDE_WIDTH + 30 if scenes else 0)
     rows = np.array([page.legend_shape(names, width)[0] for names in _once(legends)])
     feet = 60 + np.cumsum(PANEL_HEIGHT + 25 + page.ROW_HEIGHT * rows)
-    figure = page.titled(PAGE_WIDTH, int(feet[-1]) + 85, words.title, words.caption)
+    figure = page.titled(PAGE_WIDTH, int(feet[-1]) + 85, title, caption)
     areas = [page.area(figure, 150, foot - PANEL_HEIGHT, width, PANEL_HEIGHT) for foot in feet]
     tall = (feet[-1] - 45 + SCENE_GAP) / max(1, len(scenes))
     for k, scene in enumerate(scenes):
@@ -455,6 +445,12 @@ def finish(axes: Any, *, legend: bool, alike: bool = False, size: float = page.B
         axes.spines[side].set_visible(False)
     if legend and axes.get_legend_handles_labels()[1]:
         axes.legend(fontsize=page.SMALL_SIZE, framealpha=0.9, edgecolor="none")
+
+
+def legend_names(drawing: Any) -> list[str]:
+    """Names of a diagram that stand in its legend."""
+    names = (*drawing.curves, *drawing.points, *(getattr(drawing, "ends", None) or ()))
+    return [name for name in names if not name.startswith("_")]
 
 
 def fill(

@@ -12,7 +12,7 @@ from rom.errors import ConfigError
 from rom.model import Array
 from rom.view.canvas import page
 from rom.view.canvas.offscreen import COLOUR_MAP
-from rom.view.figures.curves import LINES, MARKERS, fill, line_look
+from rom.view.figures.curves import LINES, MARKERS, fill, legend_names, line_look
 from rom.view.figures.things import Scene
 
 if TYPE_CHECKING:
@@ -105,7 +105,7 @@ def plane(
         fill(figure, areas, drawings, _draw, legend=False)
         return page.save(figure, path)
     rows = -(-len(drawings) // columns)
-    gap = ROW_GAP if any(map(_named, drawings)) else BARE_GAP
+    gap = ROW_GAP if any(isinstance(x, Drawing) and legend_names(x) for x in drawings) else BARE_GAP
     width = (PAGE_WIDTH - 30) // columns - COLUMN_GAP
     with page.styled():
         figure = page.titled(PAGE_WIDTH, 100 + rows * (height + gap), title, caption)
@@ -118,12 +118,6 @@ def plane(
             areas.append(page.area(figure, left, top, width - narrow, height))
         fill(figure, areas, drawings, _draw, legend=False)
         return page.save(figure, path)
-
-
-def _named(drawing: Drawing | Scene) -> bool:
-    """Whether it has a legend below it."""
-    names = [] if isinstance(drawing, Scene) else [*drawing.curves, *drawing.points]
-    return any(not name.startswith("_") for name in names)
 
 
 def _draw(axes: Any, drawing: Drawing, numbers: dict[str, int]) -> None:

@@ -11,7 +11,15 @@ from rom.arguments import one_each, typed
 from rom.view.canvas import page
 from rom.view.canvas.scales import without_round_off
 from rom.view.canvas.scene import TEXT_COLOUR
-from rom.view.figures.curves import LINES, MARKERS, PAGE_WIDTH, fill, line_look, near_ticks
+from rom.view.figures.curves import (
+    LINES,
+    MARKERS,
+    PAGE_WIDTH,
+    fill,
+    legend_names,
+    line_look,
+    near_ticks,
+)
 from rom.view.figures.things import Scene, below_height, seen
 
 if TYPE_CHECKING:
@@ -150,19 +158,10 @@ def _filled(scene: Scene) -> float:
 def _legend_height(row: Sequence[Panel | Scene]) -> int:
     """Of the highest legend in a row [pixel]."""
     rows = [
-        page.legend_shape(_named(panel), width)[0] if isinstance(panel, Panel) else 0
+        page.legend_shape(legend_names(panel), width)[0] if isinstance(panel, Panel) else 0
         for panel, (_, width) in zip(row, _columns(row), strict=True)
     ]
     return page.ROW_HEIGHT * max(rows, default=0)
-
-
-def _named(panel: Panel) -> list[str]:
-    names = (*panel.curves, *panel.points, *(panel.ends or ()))
-    return list(filter(_is_named, names))
-
-
-def _is_named(name: str) -> bool:
-    return not name.startswith("_")
 
 
 def _draw(axes: Any, panel: Panel, numbers: Mapping[str, int]) -> None:
@@ -172,7 +171,8 @@ def _draw(axes: Any, panel: Panel, numbers: Mapping[str, int]) -> None:
         guide = name not in numbers and (len(curves) > 1 or bool(points))
         axes.plot(*line, label=name, **(GUIDE_STYLE if guide else line_look(numbers.get(name, 0))))
     for name, line in points.items():
-        mark = MARKERS[[n for n in points if _is_named(n)].index(name)] if _is_named(name) else "o"
+        named = [other for other in points if not other.startswith("_")]
+        mark = MARKERS[named.index(name)] if name in named else "o"
         look = {"mec": "#22262b", "mfc": "none", "ms": 4.0, "mew": 0.8}
         axes.plot(*line, mark, label=name, **look)
     if panel.bars:

@@ -190,8 +190,10 @@ def _shape(
     look: dict[str, Any] = {"facecolors": shape.values, "cmap": COLOUR_MAP, "vmin": 0.0,
                             "edgecolors": "face", "lw": 0.7}  # fmt: skip
     if shape.values is None:
-        plain = np.zeros(len(shape.triangles))
-        look = {"facecolors": plain, "cmap": _one_colour(), "edgecolors": EDGE_COLOUR, "lw": 0.5}
+        from matplotlib.colors import ListedColormap
+
+        plain, one = np.zeros(len(shape.triangles)), ListedColormap([SURFACE_COLOUR])
+        look = {"facecolors": plain, "cmap": one, "edgecolors": EDGE_COLOUR, "lw": 0.5}
     else:
         look["vmax"] = highest or float(shape.values.max())
     drawn = axes.tripcolor(x, y, shape.triangles, **look)
@@ -207,9 +209,3 @@ def _shape(
     axes.set_aspect("equal")
     axes.set_axis_off()
     return drawn
-
-
-def _one_colour() -> Any:
-    from matplotlib.colors import ListedColormap
-
-    return ListedColormap([SURFACE_COLOUR])

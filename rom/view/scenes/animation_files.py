@@ -12,12 +12,11 @@ from rom.errors import ConfigError
 from rom.io.fields.gltf import MovingMesh, write_glb
 from rom.io.fields.vtkhdf import write_vtkhdf
 from rom.model import Array
-from rom.names import named
 from rom.view.canvas.solids import Mesh
 from rom.view.canvas.style import checked
-from rom.view.scenes.film import shades_of
+from rom.view.scenes.film import shades_of, upright
 from rom.view.scenes.places import placed
-from rom.view.scenes.rigid import bars, ends_of
+from rom.view.scenes.rigid import check_bodies, form_of
 
 METAL_COLOURS = ((0.42, 0.48, 0.55), (0.62, 0.66, 0.70), (0.30, 0.34, 0.39))  # rigid bodies
 ELASTIC_COLOURS = ((0.11, 0.44, 0.60), (0.82, 0.29, 0.36), (0.93, 0.68, 0.29), (0.40, 0.63, 0.51))
@@ -54,10 +53,7 @@ def write_animation(
     """
     path = checked(path, ".glb", ".vtkhdf")
     shapes = shapes or {}
-    unknown = set(shapes) - set(solution.mechanism.parts)
-    if unknown:
-        known = sorted(solution.mechanism.parts)
-        raise ConfigError(f"shapes: no body {named(sorted(unknown))}; there are {known}.")
+    check_bodies(solution.mechanism, "shapes", shapes)
     if min(frames, solution.t.size) < 2 or (seconds is not None and not 0 < seconds < np.inf):
         raise ConfigError(f"a film needs 2 frames in more than 0 s, got {frames} in {seconds} s.")
     steps = np.linspace(0, solution.t.size - 1, min(frames, solution.t.size)).round().astype(int)
@@ -69,28 +65,22 @@ def write_animation(
     if seconds is not None:
         times *= seconds / times[-1]
     title = "motion" if magnify == 1.0 else f"motion, deformation drawn {magnify:g} times larger"
-    return write_glb(bodies, times, path, up=_up(solution, up), title=title)
+    up = upright(solution.mechanism) if up is None else unit_vector("up", up)
+    return write_glb(bodies, times, path, up=np.eye(3)[2] if up is None else up, title=title)
 
 
 def _bodies(solution: Any, steps: Any, shapes: dict[str, Mesh], magnify: float) -> list[MovingMesh]:
     bodies, elastic, shades = [], 0, shades_of(solution.mechanism)
-    for name, part in solution.mechanism.parts.items():
-        surface = getattr(part.flexible, "surface", None)
-        if surface is not None:
-            points, triangles, modes = surface.points, surface.triangles, magnify * surface.shape
-            q, colour = (
-                solution.elastic(name)[steps],
-                ELASTIC_COLOURS[elastic % len(ELASTIC_COLOURS)],
-            )
+    for name in solution.mechanism.parts:
+        form = form_of(solution.mechanism, name, shapes)
+        modes, q = np.zeros((form.points.size, 0)), np.zeros((len(steps), 0))
+        colour = METAL_COLOURS[shades[name]]
+        if form.surface is not None:
+            modes, q = magnify * form.surface.shape, solution.elastic(name)[steps]
+            colour = ELASTIC_COLOURS[elastic % len(ELASTIC_COLOURS)]
             elastic += 1
-        else:
-            points, triangles = (
-                shapes[name] if name in shapes else bars(part, ends_of(solution.mechanism, name))
-            )
-            modes, q = np.zeros((3 * len(points), 0)), np.zeros((len(steps), 0))
-            colour = METAL_COLOURS[shades[name]]
         pose = solution.position(name)[steps], solution.orientation(name)[steps]
-        mesh = np.asarray(points, dtype=float), np.asarray(triangles, dtype=np.int64)
+        mesh = form.points, np.asarray(form.triangles, dtype=np.int64)
         bodies.append(MovingMesh(name, *mesh, *pose, modes, q, colour))
     return bodies
 
@@ -108,10 +98,3 @@ def _surfaces(bodies: list[MovingMesh], t: Array, path: Path, magnify: float) ->
         count += len(body.points)
     fields = {"displacement [m]": np.hstack(moved), "body": np.hstack(numbers)}
     return write_vtkhdf(np.hstack(points), np.vstack(triangles), t, path, fields=fields)
-
-
-def _up(solution: Any, up: npt.ArrayLike | None) -> Array:
-    if up is None:
-        gravity = np.asarray(solution.mechanism.gravity, dtype=float)
-        return -gravity if gravity.any() else np.array([0.0, 0.0, 1.0])
-    return unit_vector("up", up)

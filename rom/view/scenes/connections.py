@@ -17,7 +17,6 @@ from rom.view.canvas.solids import Mesh, across, cylinder, ellipsoid, joined
 from rom.view.scenes.ground import (
     JOINT_COLOUR,
     Scenery,
-    at,
     guide,
     lines,
     plane,
@@ -84,7 +83,8 @@ def _joint(scenery: Scenery, joint: Any) -> Iterator[Actor]:
     mechanism, (first, second) = scenery.places.mechanism, joint.markers[:2]
     axis = axis_of(joint, mechanism)
     if joint.kind == "distance":
-        yield _rod(scenery.places, first, second)
+        points = np.stack(_both(scenery.places, first, second), axis=1)
+        yield Actor(points, np.array([[0, 1]]), colour=ROD_COLOUR, width=1.5 * LINE_WIDTH)
     if joint.kind in BUSHES:
         yield from _bush(scenery, joint, axis)
     if joint.kind in SLIDING_KINDS and axis is not None:
@@ -104,12 +104,8 @@ def _bush(scenery: Scenery, joint: Any, axis: Array | None) -> Iterator[Actor]:
         x, z = B.T @ A @ joint.rows[-1].a, local[:, 2]
         local = np.column_stack([x, np.cross(z, x), z])
     shift, size = _bearing(scenery, joint, axis)
-    A = places.pose(second.body)[1]
-    yield from solid(
-        BUSHES[joint.kind](size),
-        at(places.point(second) + A @ (B.T @ shift), A @ local),
-        JOINT_COLOUR,
-    )
+    pose = places.frame(second, local, B.T @ shift)
+    yield from solid(BUSHES[joint.kind](size), pose, JOINT_COLOUR)
 
 
 def _bearing(scenery: Scenery, joint: Any, axis: Array | None) -> tuple[Array, float]:
@@ -185,11 +181,6 @@ def _on_plane(scenery: Scenery, joint: Any, normal: Array) -> Iterator[Actor]:
     yield from plane(scenery, first, A.T @ normal, [(second, radius)])
 
 
-def _rod(places: Places, first: Marker, second: Marker) -> Actor:
-    points = np.stack(_both(places, first, second), axis=1)
-    return Actor(points, np.array([[0, 1]]), colour=ROD_COLOUR, width=1.5 * LINE_WIDTH)
-
-
 def _both(places: Places, first: Marker, second: Marker) -> tuple[Array, Array]:
     """(f, 3) where two markers are."""
     a, b = np.broadcast_arrays(places.point(first), places.point(second))
@@ -197,8 +188,8 @@ def _both(places: Places, first: Marker, second: Marker) -> tuple[Array, Array]:
 
 
 def _ball(places: Places, marker: Marker, radius: float) -> list[Actor]:
-    pose = at(places.point(marker), places.pose(marker.body)[1])
-    return solid(symbols.ball(radius / symbols.BALL_RATIO), pose, JOINT_COLOUR, 0.5)
+    shape = symbols.ball(radius / symbols.BALL_RATIO)
+    return solid(shape, places.frame(marker), JOINT_COLOUR, 0.5)
 
 
 def spiral(scenery: Scenery, _: str, turn: Any) -> Iterator[Actor]:
@@ -211,8 +202,7 @@ def spiral(scenery: Scenery, _: str, turn: Any) -> Iterator[Actor]:
     B = matrix(scenery.places.mechanism.part(second.body).p)
     local = np.column_stack(across(np.zeros(3), B.T @ axis))
     shift, size = _bearing(scenery, joint, axis)
-    A = scenery.places.pose(second.body)[1]
-    pose = at(scenery.places.point(second) + A @ (B.T @ (shift + 1.3 * size * axis)), A @ local)
+    pose = scenery.places.frame(second, local, B.T @ (shift + 1.3 * size * axis))
     yield lines(symbols.spiral(size), pose, SPRING_COLOUR, LINE_WIDTH)
 
 
@@ -248,10 +238,9 @@ def stretched(shape: symbols.Lines, ends: tuple[Array, Array], colour: str) -> A
 
 def bushing(scenery: Scenery, _: str, element: Any) -> Iterator[Actor]:
     """What holds two markers together."""
-    places, first, second = scenery.places, element.i, element.j
-    pose = at(places.point(second), places.pose(second.body)[1])
-    yield from solid(symbols.weld(scenery.size), pose, SPRING_COLOUR)
-    for marker in (first, second):
+    places = scenery.places
+    yield from solid(symbols.weld(scenery.size), places.frame(element.j), SPRING_COLOUR)
+    for marker in (element.i, element.j):
         if marker.body == GROUND:
             yield from support(scenery, places.point(marker)[0], None)
 
@@ -294,12 +283,10 @@ def _capsule(
     end = half * np.array(axis)
     balls = [ellipsoid((radius,) * 3, x) for x in (-end, end)[: 2 if half else 1]]
     shape = joined([*balls, cylinder(-end, end, 2 * radius)]) if half else balls[0]
-    pose = at(places.point(marker), places.pose(marker.body)[1])
-    yield from solid(shape, pose, ROD_COLOUR, 0.6)
+    yield from solid(shape, places.frame(marker), ROD_COLOUR, 0.6)
 
 
 def circle(places: Places, marker: Marker, axis: Array, radius: float) -> Actor:
     """A circle about an axis of the body of a marker."""
     local = np.column_stack(across(np.zeros(3), axis))
-    pose = at(places.point(marker), places.pose(marker.body)[1] @ local)
-    return lines(symbols.circle(radius), pose, width=LINE_WIDTH)
+    return lines(symbols.circle(radius), places.frame(marker, local), width=LINE_WIDTH)

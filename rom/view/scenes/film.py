@@ -8,9 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rom.arguments import AnyMechanism, AnySolution, typed
-from rom.errors import ConfigError
 from rom.model import Array
-from rom.names import named, offered
 from rom.view.canvas import page
 from rom.view.canvas.films import Film, wanted
 from rom.view.canvas.scales import clock_texts, prefixed
@@ -28,7 +26,7 @@ from rom.view.figures.things import (
 )
 from rom.view.scenes.connections import connections
 from rom.view.scenes.places import Places, different, moving, placed
-from rom.view.scenes.rigid import BLOCK_OPACITY, BOX_OPACITY, bars, ends_of, shadow
+from rom.view.scenes.rigid import BOX_OPACITY, check_bodies, form_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -193,11 +191,8 @@ class Stage:
 
 
 def _stage(mechanism: Any, solution: Any, steps: Any, look: Look) -> Stage:
-    for what, names in (("shapes", look.shapes), ("traces", look.traces)):
-        unknown = set(names) - set(mechanism.parts)
-        if unknown:
-            there = offered(mechanism.parts)
-            raise ConfigError(f"{what}: no body {named(sorted(unknown))}; there are {there}.")
+    check_bodies(mechanism, "shapes", look.shapes)
+    check_bodies(mechanism, "traces", look.traces)
     places = moving(mechanism, solution, steps, look.magnify)
     drawn = {name: _body(places, name, look) for name in mechanism.parts}
     actors: list[Actor] = []
@@ -216,26 +211,19 @@ def _stage(mechanism: Any, solution: Any, steps: Any, look: Look) -> Stage:
 
 def _body(places: Places, name: str, look: Look) -> list[Actor]:
     """Surface and edges of a body, and what is seen through of a rigid one."""
-    part, pose = places.mechanism.parts[name], places.pose(name)
+    form, pose = form_of(places.mechanism, name, look.shapes), places.pose(name)
     colour = METAL_COLOURS[shades_of(places.mechanism)[name]]
-    surface = getattr(part.flexible, "surface", None)
-    ends = ends_of(places.mechanism, name)
-    if surface is None:
-        X, triangles = look.shapes[name] if name in look.shapes else bars(part, ends)
-        X, values = np.asarray(X, dtype=float)[None], None
-    else:
-        u = (places.elastic[name] @ surface.shape.T).reshape(len(places.elastic[name]), -1, 3)
-        X, triangles = surface.points + look.magnify * u, surface.triangles
-        values = np.linalg.norm(u, axis=2)
+    X, values = form.points[None], None
+    if form.surface is not None:
+        q = places.elastic[name]
+        u = (q @ form.surface.shape.T).reshape(len(q), -1, 3)
+        X, values = X + look.magnify * u, np.linalg.norm(u, axis=2)
     points = placed(X, pose)
-    edges = Actor(points, sharp_edges(X[0], triangles), colour=EDGE_COLOUR, width=1.0)
-    alone = surface is None and name not in look.shapes and not ends
-    opacity = BLOCK_OPACITY if alone else 1.0
-    actors = [Actor(points, triangles, values, colour, opacity=opacity), edges]
-    seen_through = None if surface is not None or name in look.shapes else shadow(part, ends)
-    if seen_through is not None:
-        points = placed(seen_through[0][None], pose)
-        actors.append(Actor(points, seen_through[1], colour=colour, opacity=BOX_OPACITY))
+    edges = Actor(points, sharp_edges(X[0], form.triangles), colour=EDGE_COLOUR, width=1.0)
+    actors = [Actor(points, form.triangles, values, colour, opacity=form.opacity), edges]
+    if form.block is not None:
+        points = placed(form.block[0][None], pose)
+        actors.append(Actor(points, form.block[1], colour=colour, opacity=BOX_OPACITY))
     return actors
 
 
@@ -248,16 +236,9 @@ def _trace(way: Array) -> Actor:
 
 def symbols_of(places: Places, look: Look) -> list[Actor]:
     """Symbols of joints, springs, contacts and the ground."""
-    drawn: dict[str, Array] = {}
-    surfaces = set(look.shapes)
-    for name, part in places.mechanism.parts.items():
-        surface = getattr(part.flexible, "surface", None)
-        if surface is not None:
-            surfaces.add(name)
-            drawn[name] = surface.points
-        else:
-            given = look.shapes.get(name) or bars(part, ends_of(places.mechanism, name))
-            drawn[name] = np.asarray(given[0], dtype=float)
+    forms = {name: form_of(places.mechanism, name, look.shapes) for name in places.mechanism.parts}
+    drawn = {name: form.points for name, form in forms.items()}
+    surfaces = {name for name, form in forms.items() if form.surface is not None} | {*look.shapes}
     up = np.array([0.0, 0.0, 1.0]) if look.up is None else np.asarray(look.up, dtype=float)
     return connections(places, drawn, surfaces, up)
 

@@ -10,7 +10,7 @@ from rom.model import Array
 from rom.view.canvas import symbols
 from rom.view.canvas.scene import Actor, sharp_edges
 from rom.view.canvas.solids import Mesh, across
-from rom.view.scenes.places import Places, Pose, placed
+from rom.view.scenes.places import Places, Pose, at, placed
 
 GROUND_COLOUR, JOINT_COLOUR, INK_COLOUR = "#e3e7ec", "#f4f1e4", "#23282f"
 PLANE_OPACITY = 0.5
@@ -71,12 +71,6 @@ def lines(shape: symbols.Lines, pose: Pose, colour: str = INK_COLOUR, width: flo
     return Actor(placed(shape[0][None], pose), shape[1], colour=colour, width=width)
 
 
-def at(r: Array, A: Array) -> Pose:
-    """A pose from (f or 1, 3) points and (f or 1, 3, 3) axes."""
-    n = max(len(r), len(A))
-    return np.broadcast_to(r, (n, 3)), np.broadcast_to(A, (n, 3, 3))
-
-
 def upright(axis: Array, up: Array) -> Array:
     """(3, 3) axes as columns: x along a direction, z as near to the upright one as can be."""
     z = up - (up @ axis) * axis
@@ -134,8 +128,7 @@ def guide(scenery: Scenery, first: Marker, second: Marker, axis: Array) -> Itera
     low, high = way.min() - over, way.max() + over
     if first.body != GROUND:
         local = np.stack([low * axis, high * axis])
-        pose = at(places.point(first), places.pose(first.body)[1])
-        yield lines(symbols.polyline(local), pose, width=2.0)
+        yield lines(symbols.polyline(local), places.frame(first), width=2.0)
         return
     axes = upright(axis, scenery.up)
     A = places.pose(second.body)[1][0]
@@ -178,15 +171,13 @@ def plane(
     pad = 3.0 * scenery.size + 1.2 * max(radius for _, radius in touching)
     low, high = (flat @ axes).min(axis=0) - pad, (flat @ axes).max(axis=0) + pad
     plate, hatching = symbols.ground_plate(high[0] - low[0], high[1] - low[1], 0.8 * scenery.size)
-    r, A = places.point(first), places.pose(first.body)[1]
-    middle = axes[:, :2] @ (low + high)[:2] / 2
-    pose = at(r + A @ middle, A @ axes)
-    opacity = PLANE_OPACITY
-    yield Actor(placed(plate[0][None], pose), plate[1], colour=GROUND_COLOUR, opacity=opacity)
+    pose = places.frame(first, axes, axes[:, :2] @ (low + high)[:2] / 2)
+    points = placed(plate[0][None], pose)
+    yield Actor(points, plate[1], colour=GROUND_COLOUR, opacity=PLANE_OPACITY)
     if first.body == GROUND:
         yield lines(hatching, pose, width=1.0)
     else:
-        yield Actor(placed(plate[0][None], pose), sharp_edges(*plate), colour=INK_COLOUR, width=1.0)
+        yield Actor(points, sharp_edges(*plate), colour=INK_COLOUR, width=1.0)
 
 
 def _hatched(plate: tuple[Mesh, symbols.Lines], pose: Pose) -> Iterator[Actor]:

@@ -3,7 +3,6 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 import numpy.typing as npt
 
 from rom.arguments import AnyMechanism, typed
@@ -11,10 +10,10 @@ from rom.view.canvas import page
 from rom.view.canvas.scene import Actor
 from rom.view.canvas.solids import Mesh
 from rom.view.figures.things import COLOURS as COLOURS
-from rom.view.figures.things import Scene, Thing, actors_of, as_thing, scene_page, seen
+from rom.view.figures.things import NO_LINES, Scene, Thing, actors_of, as_thing, scene_page, seen
 from rom.view.scenes.film import Look, symbols_of, together, upright
 from rom.view.scenes.places import at_start, placed
-from rom.view.scenes.rigid import BLOCK_OPACITY, BOX_OPACITY, bars, ends_of, shadow
+from rom.view.scenes.rigid import BOX_OPACITY, form_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -68,16 +67,14 @@ def _things(mechanism: Any, *, symbols: bool, up: Any) -> dict[str, Thing | Mesh
     places = at_start(mechanism)
     things: dict[str, Thing | Mesh] = {}
     for k, part in enumerate(mechanism.parts.values()):
-        surface = getattr(part.flexible, "surface", None)
-        ends = ends_of(mechanism, part.name)
-        X, triangles = bars(part, ends) if surface is None else (surface.points, surface.triangles)
-        opacity = 1.0 if surface is not None or ends else BLOCK_OPACITY
+        form, pose = form_of(mechanism, part.name, {}), places.pose(part.name)
         name, colour = part.name if k < MAX_LEGEND_BODIES else f"_{k}", COLOURS[k % len(COLOURS)]
-        pose = places.pose(part.name)
-        things[name] = Thing(placed(np.asarray(X)[None], pose), triangles, colour, opacity=opacity)
-        block = None if surface is not None else shadow(part, ends)
-        if block is not None:
-            shade = Actor(placed(block[0][None], pose), block[1], None, colour, 1.0, BOX_OPACITY)
-            things[f"_block {k}"] = as_thing(shade)
+        points = placed(form.points[None], pose)
+        things[name] = Thing(points, form.triangles, colour, opacity=form.opacity)
+        if form.block is not None:
+            points = placed(form.block[0][None], pose)
+            things[f"_block {k}"] = Thing(
+                points, form.block[1], colour, None, BOX_OPACITY, 1.0, NO_LINES
+            )
     more = together(symbols_of(places, Look({}, up=up))) if symbols else []
     return things | {f"_symbol {k}": as_thing(actor) for k, actor in enumerate(more)}

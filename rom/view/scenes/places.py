@@ -14,6 +14,9 @@ MAX_CANDIDATES = 400  # instants that are compared
 SAME_PLACE_RATIO = 0.02  # of the longest way, below which two places are one
 
 
+NO_TURN, NO_SHIFT = np.eye(3), np.zeros(3)
+
+
 @dataclass(frozen=True, slots=True)
 class Places:
     """Bodies of a mechanism in f instants.
@@ -43,6 +46,11 @@ class Places:
         r, A = self.pose(marker.body)
         return r + np.einsum("fab,fb->fa", A, np.broadcast_to(X, r.shape))
 
+    def frame(self, marker: Marker, axes: Any = NO_TURN, shift: Any = NO_SHIFT) -> Pose:
+        """Axes (3, 3), as columns, at a marker, both turning with its body; shifted in its axes."""
+        r, A = self.point(marker), self.pose(marker.body)[1]
+        return at(r + A @ shift, A @ axes)
+
     def direction(self, body: str, vector: Array) -> Array:
         """(f, 3) direction in the world of one that is fixed in a body."""
         return self.pose(body)[1] @ vector
@@ -66,6 +74,12 @@ def moving(mechanism: Any, solution: Any, steps: Any, magnify: float) -> Places:
     }
     elastic = {name: solution.elastic(name)[steps] for name in mechanism.parts}
     return Places(mechanism, poses, elastic, magnify)
+
+
+def at(r: Array, A: Array) -> Pose:
+    """A pose from (f or 1, 3) points and (f or 1, 3, 3) axes."""
+    n = max(len(r), len(A))
+    return np.broadcast_to(r, (n, 3)), np.broadcast_to(A, (n, 3, 3))
 
 
 def placed(X: Array, pose: Pose) -> Array:

@@ -1,15 +1,62 @@
-"""Rigid bodies without a shape of their own: tubes to their markers, and a box of their inertia."""
+"""What bodies of a mechanism are drawn by: a surface, a given shape, or tubes to their markers."""
 
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from rom.errors import ConfigError
 from rom.model import Array
+from rom.names import named, offered
 from rom.view.canvas.solids import Mesh, box, cylinder, ellipsoid, joined
 
 TUBE_RATIO = 0.07  # diameter of a tube, of the reach of the body
 BOX_OPACITY, BLOCK_OPACITY = 0.22, 0.5  # of a box around tubes, and of one that is alone
 MAX_BOX_RATIO = 3.0  # of the reach of a body with markers; larger boxes say nothing of its shape
+
+
+@dataclass(frozen=True, slots=True)
+class Form:
+    """What a body is drawn by, in its frame.
+
+    Attributes:
+        points: (n, 3) [m].
+        triangles: (m, 3) between them.
+        surface: of a flexible body whose points these are; or None.
+        block: of its mass and inertia, to be seen through, beside tubes; or None.
+        opacity: 0 to 1.
+    """
+
+    points: Array
+    triangles: Any
+    surface: Any = None
+    block: Mesh | None = None
+    opacity: float = 1.0
+
+
+def form_of(mechanism: Any, name: str, shapes: Mapping[str, Mesh]) -> Form:
+    """The surface of a flexible body; of others a given shape, or else tubes to their markers."""
+    part = mechanism.parts[name]
+    surface = getattr(part.flexible, "surface", None)
+    if surface is not None:
+        return Form(surface.points, surface.triangles, surface)
+    if name in shapes:
+        points, triangles = shapes[name]
+        return Form(np.asarray(points, dtype=float), np.asarray(triangles))
+    ends = ends_of(mechanism, name)
+    return Form(*bars(part, ends), None, shadow(part, ends), 1.0 if ends else BLOCK_OPACITY)
+
+
+def check_bodies(mechanism: Any, what: str, names: Collection[str]) -> None:
+    """Refuse names of bodies that a mechanism does not have.
+
+    Raises:
+        ConfigError: listing those there are.
+    """
+    if unknown := set(names) - set(mechanism.parts):
+        there = offered(mechanism.parts)
+        raise ConfigError(f"{what}: no body {named(sorted(unknown))}; there are {there}.")
 
 
 def ends_of(mechanism: Any, name: str) -> list[Array]:

@@ -170,9 +170,7 @@ class Window:
         self.plotter.clear_actors()
         for k in range(len(self.scene["actors"])):
             add(self.plotter, self.scene, self.arrays, k, 0)
-        text = (
-            f"{self.titles[self.at]}\n{KEYS_HELP}" if len(self.titles) > 1 else self.titles[self.at]
-        )
+        text = self.titles[self.at] + f"\n{KEYS_HELP}" * (len(self.titles) > 1)
         self.plotter.add_text(text, font_size=10, color="#20242a", name="title", render=False)
         if not step:
             aim(self.plotter, self.scene, self.arrays)

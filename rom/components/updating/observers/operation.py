@@ -23,7 +23,14 @@ from scipy.linalg import eigh, expm, expm_frechet
 from rom.arguments import not_negative, one_of
 from rom.body.flexible import FlexibleBody
 from rom.body.recovery import StressRecovery
-from rom.components.updating.family_model import Attached, Parts, Structure, family_model, terms_of
+from rom.components.updating.family_model import (
+    Attached,
+    Parts,
+    Structure,
+    family_model,
+    summed,
+    terms_of,
+)
 from rom.components.updating.measured import POINT_RTOL, Channels
 from rom.errors import ConfigError, ModelError
 from rom.model import Array
@@ -144,7 +151,6 @@ class Operation:
     def at(self, x: Array) -> Linear:
         """The equations at logarithms x (n_p,) of factors."""
         m, n_e = self.driven.shape
-        k = np.exp(self.k_powers @ x)
         acc, dacc = self._accelerations(x)
         A, at = np.zeros((2 * m + n_e,) * 2), np.arange(m)
         A[at, m + at] = self.scale
@@ -153,23 +159,21 @@ class Operation:
         dA[:, m : 2 * m] = dacc
         found = []
         for rows in (self.seen, self.wanted):
-            y = np.tensordot(k, rows.carried, 1) + rows.displacement
+            y, dy = summed(rows.carried, self.k_powers, x)
             C = rows.acceleration @ acc
-            C[:, :m] += y / self.scale
+            C[:, :m] += (y + rows.displacement) / self.scale
             C[:, m : 2 * m] += rows.velocity
             dC = rows.acceleration @ dacc
-            dC[..., :m] += np.einsum("tp,t,tkm->pkm", self.k_powers, k, rows.carried) / self.scale
+            dC[..., :m] += dy / self.scale
             found += [C, dC]
         return Linear(A, dA, *found)
 
     def _accelerations(self, x: Array) -> tuple[Array, Array]:
         """(m, n) accelerations of the modes by the state, and (n_p, m, n) their derivatives."""
-        k, m = np.exp(self.k_powers @ x), np.exp(self.m_powers @ x)
-        K, M = np.tensordot(k, self.K, 1), np.tensordot(m, self.M, 1)
+        (K, dK), (M, dM) = (summed(self.K, self.k_powers, x), summed(self.M, self.m_powers, x))
         acc = np.linalg.solve(M, np.hstack([-K / self.scale, -self.XI, self.driven]))
-        dK = np.einsum("tp,t,tij->pij", self.k_powers, k, self.K) / self.scale
-        right = -np.einsum("tp,t,tij,jk->pik", self.m_powers, m, self.M, acc, optimize=True)
-        right[..., : len(K)] -= dK
+        right = -dM @ acc
+        right[..., : len(K)] -= dK / self.scale
         return acc, np.linalg.solve(M, right)
 
 

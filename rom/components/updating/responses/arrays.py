@@ -78,43 +78,39 @@ def read(path: Path) -> Responses:
     """
     try:
         with h5py(".uff").File(check_readable(path), "r") as file:
-            return _test(path, file)
+            return _test(file)
     except (OSError, RuntimeError, KeyError, TypeError, ValueError) as error:
-        raise FileFormatError(f"this is no whole HDF5 file: {error}.", where=str(path)) from error
+        raise FileFormatError(f"this is no whole HDF5 file: {error}.") from error
 
 
-def _test(path: Path, file: Any) -> Responses:
+def _test(file: Any) -> Responses:
     h5 = h5py(".uff")
     if missing := [name for name in DATA_SETS if not isinstance(file.get(name), h5.Dataset)]:
-        raise FileFormatError(f"there is no data set {missing[0]!r}.", where=str(path))
+        raise FileFormatError(f"there is no data set {missing[0]!r}.")
     if missing := [name for name in ("averages", "quantity", "units") if name not in file.attrs]:
-        raise FileFormatError(f"the file has no attribute {missing[0]!r}.", where=str(path))
+        raise FileFormatError(f"the file has no attribute {missing[0]!r}.")
     if (units := _text(file.attrs["units"])) != "SI":
-        raise FileFormatError(f"units are {units!r}, not 'SI'.", where=str(path))
+        raise FileFormatError(f"units are {units!r}, not 'SI'.")
     names = (*DATA_SETS, *[FORCE_NOISE] * isinstance(file.get(FORCE_NOISE), h5.Dataset))
     if sum(file[name].nbytes for name in names) > MAX_ARRAY_BYTES:
-        raise UnsafeFileError("its arrays take more than 4 GiB.", where=str(path))
+        raise UnsafeFileError("its arrays take more than 4 GiB.")
     for name in names:
         kinds = "c" if name == "H" else "fiu"
         if file[name].dtype.kind not in kinds:
-            raise FileFormatError(f"{name!r} holds no {KINDS[kinds]}.", where=str(path))
+            raise FileFormatError(f"{name!r} holds no {KINDS[kinds]}.")
     f, H, c, *where = values = [file[name][()] for name in names]
     if "checksum" in file.attrs and _text(file.attrs["checksum"]) != _checksum(values):
         raise FileFormatError(
-            "the arrays are not those of its checksum: it was damaged or changed.", where=str(path)
+            "the arrays are not those of its checksum: it was damaged or changed."
         )
     bodies = [_bodies(file, side) for side in ("sensors", "inputs")]
     sensors = Channels(where[0], where[1], bodies[0])
     inputs = Channels(where[2], where[3], bodies[1])
-    averages = _number(path, file, "averages")
+    averages = _number(file, "averages")
     if averages != int(averages):
-        raise FileFormatError(f"averages = {averages} is no whole number.", where=str(path))
+        raise FileFormatError(f"averages = {averages} is no whole number.")
     noise = (
-        _number(path, file, FORCE_NOISE)
-        if FORCE_NOISE in file.attrs
-        else where[4]
-        if where[4:]
-        else 0.0
+        _number(file, FORCE_NOISE) if FORCE_NOISE in file.attrs else where[4] if where[4:] else 0.0
     )
     estimator = _text(file.attrs["estimator"]) if "estimator" in file.attrs else None
     text = _text(file.attrs["quantity"])
@@ -141,8 +137,8 @@ def _text(value: Any) -> str:
     return value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
 
 
-def _number(path: Path, file: Any, name: str) -> float:
+def _number(file: Any, name: str) -> float:
     value = np.asarray(file.attrs[name])
     if value.shape or value.dtype.kind not in "fiu" or not np.isfinite(value):
-        raise FileFormatError(f"{name} = {file.attrs[name]} is no number.", where=str(path))
+        raise FileFormatError(f"{name} = {file.attrs[name]} is no number.")
     return float(value)

@@ -2,7 +2,6 @@
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -23,7 +22,6 @@ Points = Mapping[int, Array]
 
 
 def side_by_side(
-    path: Path,
     functions: tuple[Function, ...],
     points: Points,
     averages: int,
@@ -33,7 +31,6 @@ def side_by_side(
     """Responses of all sensors to all forces; pairs that are missing have the coherence zero.
 
     Args:
-        path: for messages.
         functions: frequency responses in SI units, and their coherences.
         points: {node: (3,) point [m]}.
         averages: behind all functions.
@@ -45,14 +42,13 @@ def side_by_side(
         ConfigError: as `Responses`.
     """
     bodies = bodies.of(functions)
-    found = _by_pair(path, [f for f in functions if f.kind == FREQUENCY_RESPONSE], bodies)
-    coherences = _by_pair(path, [f for f in functions if f.kind == COHERENCE_KIND], bodies)
+    found = _by_pair([f for f in functions if f.kind == FREQUENCY_RESPONSE], bodies)
+    coherences = _by_pair([f for f in functions if f.kind == COHERENCE_KIND], bodies)
     if not found:
-        raise FileFormatError("there is no frequency response to a force.", where=str(path))
+        raise FileFormatError("there is no frequency response to a force.")
     if coherence is None and (silent := sorted(set(found) - set(coherences))):
         raise FileFormatError(
             f"there is no coherence of {_some(silent)}.",
-            where=str(path),
             hint="Give one number, coherence=..., from what is known of the noise.",
         )
     sensors, inputs = (sorted({pair[k] for pair in found}) for k in (0, 1))
@@ -61,12 +57,12 @@ def side_by_side(
     c = np.zeros(H.shape)
     for (sensor, force), f in found.items():
         at = sensors.index(sensor), inputs.index(force)
-        _check_lines(path, f, x)
+        _check_lines(f, x)
         H[at] = _receptance(f)
         own = coherences.get((sensor, force))
-        c[at] = coherence if own is None or coherence is not None else _rounded(path, own, x)
+        c[at] = coherence if own is None or coherence is not None else _rounded(own, x)
     keep = x > 0  # no displacement follows from motion at 0 Hz
-    where = [_channels(path, dofs, points) for dofs in (sensors, inputs)]
+    where = [_channels(dofs, points) for dofs in (sensors, inputs)]
     H, c = (np.moveaxis(A, 2, 0)[keep] for A in (H, c))
     return Responses(x[keep], H, where[0], where[1], c, averages)
 
@@ -89,7 +85,7 @@ class Bodies:
         entities = {entity.lower() for f in functions for entity in f.entities}
         return self if entities & {_entity(name) for name in self.names} else Bodies(self.of_nodes)
 
-    def dof(self, path: Path, dof: tuple[int, int], entity: str) -> Dof:
+    def dof(self, dof: tuple[int, int], entity: str) -> Dof:
         """Node and direction with the name of the body.
 
         Raises:
@@ -102,7 +98,6 @@ class Bodies:
         if len(found) != 1 and entity.upper() not in ("", "NONE"):
             raise FileFormatError(
                 f"node {node} is of {entity!r}; bodies are {named(self.names)}.",
-                where=str(path),
                 hint="Name them as the file does, in ten characters that differ.",
             )
         return node, axis, found[0] if found else ""
@@ -112,24 +107,19 @@ def _entity(name: str) -> str:
     return name[:ENTITY_LENGTH].strip().lower()
 
 
-def _by_pair(
-    path: Path, functions: list[Function], bodies: Bodies
-) -> dict[tuple[Dof, Dof], Function]:
+def _by_pair(functions: list[Function], bodies: Bodies) -> dict[tuple[Dof, Dof], Function]:
     known: dict[tuple[Dof, Dof], Function] = {}
     for f in functions:
         dofs = zip((f.response, f.reference), f.entities, strict=True)
-        one, other = (bodies.dof(path, dof, entity) for dof, entity in dofs)
+        one, other = (bodies.dof(dof, entity) for dof, entity in dofs)
         pair = one, other
         if not all(1 <= abs(dof[1]) <= 3 for dof in pair):
             raise FileFormatError(
-                f"the function of {_dof(pair[0])} by {_dof(pair[1])} is no translation by a force.",
-                where=str(path),
+                f"the function of {_dof(pair[0])} by {_dof(pair[1])} is no translation by a force."
             )
         if pair in known:
             raise FileFormatError(
-                f"{_some([pair])} is there twice.",
-                where=str(path),
-                hint="Keep one run, or average them before.",
+                f"{_some([pair])} is there twice.", hint="Keep one run, or average them before."
             )
         known[pair] = f
     return known
@@ -142,27 +132,25 @@ def _receptance(f: Function) -> Any:
     return H
 
 
-def _rounded(path: Path, f: Function, x: Array) -> Array:
+def _rounded(f: Function, x: Array) -> Array:
     """Coherence, with what rounding has made one taken back by half a digit."""
-    _check_lines(path, f, x)
+    _check_lines(f, x)
     c = np.real(f.y)
     return c if (c >= 1).all() else np.where(c == 1, 1 - COHERENCE_STEP, c)
 
 
-def _check_lines(path: Path, f: Function, x: Array) -> None:
+def _check_lines(f: Function, x: Array) -> None:
     if f.x.shape != x.shape or not np.allclose(f.x, x, rtol=LINES_RTOL, atol=0):
         raise FileFormatError(
             f"{_some([((*f.response, ''), (*f.reference, ''))])} has other lines than the first "
-            "function.",
-            where=str(path),
+            "function."
         )
 
 
-def _channels(path: Path, dofs: list[Dof], points: Points) -> Channels:
+def _channels(dofs: list[Dof], points: Points) -> Channels:
     if missing := sorted({dof[0] for dof in dofs} - set(points)):
         raise FileFormatError(
             f"nodes without coordinates: {', '.join(map(str, missing[:MAX_NAMED]))}.",
-            where=str(path),
             hint="Universal files have them in dataset 15 or 2411; else name a file, points=...",
         )
     axes = np.array([np.sign(axis) * np.eye(3)[abs(axis) - 1] for _, axis, _ in dofs])
@@ -171,7 +159,6 @@ def _channels(path: Path, dofs: list[Dof], points: Points) -> Channels:
         node = dofs[owners.index("")][0]
         raise FileFormatError(
             f"node {node} has no body, others have one.",
-            where=str(path),
             hint="Name the bodies of all nodes, or of none.",
         )
     where = np.array([points[node] for node, *_ in dofs])

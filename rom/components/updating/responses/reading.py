@@ -71,15 +71,12 @@ def read_responses(
             "averages is missing: how many are behind the functions?",
             hint="Without it the coherence says nothing of random errors.",
         )
-    nodes: dict[int, Array] = {}
-    if ending in TABLE_ENDINGS:
-        functions = functions_of(path)
-    else:
-        functions, nodes = functions_and_points(path)
     more, owners = _points(points)
     with _of(path):
+        table = ending in TABLE_ENDINGS
+        functions, nodes = (functions_of(path), {}) if table else functions_and_points(path)
         where = nodes | more
-        return side_by_side(path, functions, where, averages, coherence, Bodies(owners, bodies))
+        return side_by_side(functions, where, averages, coherence, Bodies(owners, bodies))
 
 
 @typed
@@ -125,11 +122,15 @@ def write_responses(test: Responses, path: str | Path) -> Path:
 
 @contextmanager
 def _of(path: Path) -> Iterator[None]:
-    """Turn what wrong values cause into an error that names the file."""
+    """Errors name the file, also where wrong values cause them."""
     try:
         yield
-    except ConfigError as error:
-        raise FileFormatError(error.message, where=str(path), hint=error.hint) from error
+    except (ConfigError, FileFormatError) as error:
+        if error.where.startswith(str(path)):
+            raise
+        kind = type(error) if isinstance(error, FileFormatError) else FileFormatError
+        where = ": ".join(filter(None, (str(path), error.where)))
+        raise kind(error.message, where=where, hint=error.hint) from error
 
 
 def _points(path: str | Path | None) -> tuple[dict[int, Array], dict[int, str]]:
@@ -139,9 +140,10 @@ def _points(path: str | Path | None) -> tuple[dict[int, Array], dict[int, str]]:
     if path is None:
         return {}, {}
     path = Path(path)
-    if path.suffix.lower() in TABLE_ENDINGS:
-        return points_of(path)
-    return functions_and_points(path)[1], {}
+    with _of(path):
+        if path.suffix.lower() in TABLE_ENDINGS:
+            return points_of(path)
+        return functions_and_points(path)[1], {}
 
 
 def _unknown(path: Path, known: tuple[str, ...]) -> ConfigError:

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 from rom.components.updating.responses.grid import COHERENCE_KIND
-from rom.components.updating.responses.unit_labels import length_of, lines_of, motion_per_force
-from rom.errors import ConfigError, FileFormatError
+from rom.components.updating.responses.unit_labels import in_si, motion_per_force
+from rom.errors import FileFormatError
 from rom.io.fields.universal import FORCE_TYPE, FREQUENCY_RESPONSE, Function
 from rom.io.files import check_readable
 from rom.model import Array
@@ -42,28 +42,21 @@ def functions_of(path: Path) -> tuple[Function, ...]:
         FileFormatError: naming line or column that is not as described.
     """
     names, rows, separator = _cells(path, re.compile(r"freq", re.IGNORECASE))
-    values = _numbers(path, rows, separator)
+    values = _numbers(rows, separator)
     if label := re.search(r"[\[(]([^\])]+)[\])]", names[0]):
-        try:
-            values[:, 0] *= lines_of(label.group(1))
-        except ConfigError as error:
-            raise FileFormatError(error.message, where=str(path)) from error
+        values[:, 0] *= in_si(label.group(1), "frequency")
     parts: dict[Pair, dict[str, tuple[str, Array]]] = {}
     for k, name in enumerate(names[1:], 1):
         found = COLUMN_NAME.fullmatch(name)
         if not found:
-            raise FileFormatError(
-                f"column {k + 1} has the name {name!r}.", where=str(path), hint=NAME_HINT
-            )
+            raise FileFormatError(f"column {k + 1} has the name {name!r}.", hint=NAME_HINT)
         s, s_sign, s_axis, e, e_sign, e_axis, part, unit = found.groups()
         pair = (int(s), _axis(s_sign, s_axis)), (int(e), _axis(e_sign, e_axis))
         own = parts.setdefault(pair, {})
         if part.lower() in own:
-            raise FileFormatError(f"two columns are named {name!r}.", where=str(path))
+            raise FileFormatError(f"two columns are named {name!r}.")
         own[part.lower()] = unit or "", values[:, k]
-    return tuple(
-        f for pair, own in parts.items() for f in _functions(path, pair, own, values[:, 0])
-    )
+    return tuple(f for pair, own in parts.items() for f in _functions(pair, own, values[:, 0]))
 
 
 def points_of(path: Path) -> tuple[dict[int, Array], dict[int, str]]:
@@ -78,21 +71,17 @@ def points_of(path: Path) -> tuple[dict[int, Array], dict[int, str]]:
     named = names[-1].lower() == "body"
     owners = [cells.pop().strip().strip('"') for _, cells in rows] if named else []
     names = names[:-1] if named else names
-    values = _numbers(path, rows, separator)
+    values = _numbers(rows, separator)
     found = [POINT_COLUMN.fullmatch(name) for name in names[1:]]
     axes = [m.group(1).lower() for m in found if m]
     if axes != ["x", "y", "z"] or len(names) != 4:
         raise FileFormatError(
-            f"columns {names}: node, x [m], y [m], z [m], and body if there are several.",
-            where=str(path),
+            f"columns {names}: node, x [m], y [m], z [m], and body if there are several."
         )
-    try:
-        factors = np.array([length_of(m.group(2)) for m in found if m])
-    except ConfigError as error:
-        raise FileFormatError(error.message, where=str(path)) from error
+    factors = np.array([in_si(m.group(2), "length") for m in found if m])
     nodes = values[:, 0]
     if len(set(nodes)) < len(nodes) or (nodes != np.floor(nodes)).any():
-        raise FileFormatError("nodes are whole numbers, each one once.", where=str(path))
+        raise FileFormatError("nodes are whole numbers, each one once.")
     places = {int(row[0]): row[1:] * factors for row in values}
     return places, dict(zip(places, owners, strict=True)) if named else {}
 
@@ -101,33 +90,20 @@ def _axis(sign: str, axis: str) -> int:
     return ("XYZ".index(axis.upper()) + 1) * (-1 if sign == "-" else 1)
 
 
-def _functions(
-    path: Path, pair: Pair, own: dict[str, tuple[str, Array]], x: Array
-) -> list[Function]:
+def _functions(pair: Pair, own: dict[str, tuple[str, Array]], x: Array) -> list[Function]:
     """The response and the coherence of one pair."""
     response = set(own) - {"coherence"}
     if response not in ({"real", "imag"}, {"magnitude", "phase"}, set()):
-        raise FileFormatError(
-            f"of {pair} there is {sorted(response)} alone.", where=str(path), hint=NAME_HINT
-        )
+        raise FileFormatError(f"of {pair} there is {sorted(response)} alone.", hint=NAME_HINT)
     found = []
     if response:
         first, second = ("real", "imag") if "real" in own else ("magnitude", "phase")
         (unit, a), (other, b) = own[first], own[second]
         if first == "real" and other != unit:
-            raise FileFormatError(
-                f"of {pair} the units are {unit!r} and {other!r}.", where=str(path)
-            )
+            raise FileFormatError(f"of {pair} the units are {unit!r} and {other!r}.")
         if first == "magnitude" and other not in ANGLES:
-            raise FileFormatError(
-                f"of {pair} the phase has the unit {other!r}.", where=str(path), hint=NAME_HINT
-            )
-        try:
-            kind, factor = motion_per_force(unit)
-        except ConfigError as error:
-            raise FileFormatError(
-                error.message, where=str(path), hint=error.hint or NAME_HINT
-            ) from error
+            raise FileFormatError(f"of {pair} the phase has the unit {other!r}.", hint=NAME_HINT)
+        kind, factor = motion_per_force(unit)
         y = a + 1j * b if first == "real" else a * np.exp(1j * b * ANGLES[other])
         found.append(_function(FREQUENCY_RESPONSE, pair, x, y * factor, kind))
     if "coherence" in own:
@@ -149,7 +125,7 @@ def _cells(path: Path, first: re.Pattern[str]) -> tuple[Row, list[tuple[int, Row
             rest = text[above:]
             break
     else:
-        raise FileFormatError(f"no column is named {first.pattern!r}.", where=str(path))
+        raise FileFormatError(f"no column is named {first.pattern!r}.")
     rows = []
     for number, line in enumerate(rest, above + 1):
         if not line.strip():
@@ -158,10 +134,10 @@ def _cells(path: Path, first: re.Pattern[str]) -> tuple[Row, list[tuple[int, Row
         rows.append((number, cells))
         if len(cells) != len(names):
             raise FileFormatError(
-                f"line {number} has {len(cells)} numbers under {len(names)} names.", where=str(path)
+                f"line {number} has {len(cells)} numbers under {len(names)} names."
             )
     if not rows:
-        raise FileFormatError("there are no numbers under the names.", where=str(path))
+        raise FileFormatError("there are no numbers under the names.")
     return names, rows, separator
 
 
@@ -175,19 +151,19 @@ def _decoded(data: bytes) -> str:
         return data.decode("cp1252", "replace")
 
 
-def _numbers(path: Path, rows: list[tuple[int, Row]], separator: str) -> Array:
+def _numbers(rows: list[tuple[int, Row]], separator: str) -> Array:
     """(n, columns) numbers of cells."""
     found = []
     if separator != "," and all(any(c in x for _, cells in rows for x in cells) for c in ",."):
         raise FileFormatError(
-            "numbers have commas and points: one of them is of thousands.", where=str(path),
+            "numbers have commas and points: one of them is of thousands.",
             hint="Write numbers without separators of thousands.",
         )  # fmt: skip
     for number, cells in rows:
         try:
             found.append([_number(cell, separator) for cell in cells])
         except ValueError as error:
-            raise FileFormatError(f"line {number}: {error}.", where=str(path)) from error
+            raise FileFormatError(f"line {number}: {error}.") from error
     return np.array(found)
 
 

@@ -19,6 +19,7 @@ MOTIONS = {"": 8, "/s": 11, "/s^2": 12}  # types of ordinate in universal files
 SPELLINGS = {"\u00b2": "^2", "\u00b5": "u", "\u03bc": "u", "**": "^", "s2": "s^2", "inch": "in"}
 IN_G = ("g", "gn", "g's")
 LINES = {"hz": 1.0, "khz": 1e3, "1/s": 1.0, "cps": 1.0, "rad/s": 1 / (2 * math.pi)}  # [Hz]
+QUANTITIES = {"length": LENGTHS, "force": FORCES, "frequency": LINES}
 NO_UNITS = ("", "none", "unknown", "unkn", "si")
 
 
@@ -30,13 +31,17 @@ def plain(text: str) -> str:
     return text
 
 
-def length_of(text: str) -> float:
-    """Metres of a unit of length.
+def in_si(text: str, quantity: str) -> float:
+    """Metres, newtons or hertz of a unit of "length", "force" or "frequency".
 
     Raises:
-        ConfigError: for another word.
+        ConfigError: for another word, as V, of a sensor that is not calibrated.
     """
-    return _known(text, LENGTHS, "length")
+    units = QUANTITIES[quantity]
+    if plain(text) not in units:
+        hint = f"Known are {', '.join(units)}{'; calibrate volts' * (quantity == 'force')}."
+        raise ConfigError(f"the unit {text!r} is no {quantity}.", hint=hint)
+    return units[plain(text)]
 
 
 def motion_of_unit(text: str) -> tuple[int, float]:
@@ -57,35 +62,6 @@ def motion_of_unit(text: str) -> tuple[int, float]:
     )
 
 
-def force_of(text: str) -> float:
-    """Newtons of a unit of force; mN is a millinewton.
-
-    Raises:
-        ConfigError: for another word.
-    """
-    if plain(text) not in FORCES:
-        raise ConfigError(
-            f"the unit {text!r} is no force.",
-            hint=f"Known are {', '.join(FORCES)}; calibrate volts.",
-        )
-    return FORCES[plain(text)]
-
-
-def lines_of(text: str) -> float:
-    """Hertz of a unit of frequency.
-
-    Raises:
-        ConfigError: for another word.
-    """
-    return _known(text, LINES, "frequency")
-
-
-def _known(text: str, units: dict[str, float], quantity: str) -> float:
-    if plain(text) not in units:
-        raise ConfigError(f"the unit {text!r} is no {quantity}; known are {', '.join(units)}.")
-    return units[plain(text)]
-
-
 def motion_per_force(text: str) -> tuple[int, float]:
     """Type of ordinate and factor to SI units of a ratio, as (m/s^2)/N.
 
@@ -96,4 +72,4 @@ def motion_per_force(text: str) -> tuple[int, float]:
     if not slash:
         raise ConfigError(f"the unit {text!r} must be one of a motion per force, as m/s^2/N.")
     kind, factor = motion_of_unit(motion)
-    return kind, factor / force_of(force)
+    return kind, factor / in_si(force, "force")

@@ -15,8 +15,7 @@ from rom.components.updating.responses.grid import COHERENCE_KIND
 from rom.components.updating.responses.unit_labels import (
     IN_G,
     NO_UNITS,
-    force_of,
-    lines_of,
+    in_si,
     motion_of_unit,
     plain,
 )  # fmt: skip
@@ -40,8 +39,8 @@ def functions_and_points(path: Path) -> tuple[tuple[Function, ...], dict[int, Ar
         FileFormatError: if a dataset is cut, or its units contradict each other.
     """
     functions, others = scan(path)
-    factors = _factors(path, others)
-    return tuple(_in_si(path, f, factors) for f in functions), _points(path, others, factors)
+    factors = _factors(others)
+    return tuple(_in_si(f, factors) for f in functions), _points(others, factors)
 
 
 def modes_of(path: Path, points: dict[int, Array] | None = None) -> MeasuredModes:
@@ -55,13 +54,13 @@ def modes_of(path: Path, points: dict[int, Array] | None = None) -> MeasuredMode
         FileFormatError: if there is none, or it does not fit the others.
     """
     _, others = scan(path)
-    places = _points(path, others, _factors(path, others)) | (points or {})
-    found = [s for lines in others.get("55", []) if (s := _shape(path, lines)) is not None]
+    places = _points(others, _factors(others)) | (points or {})
+    found = [s for lines in others.get("55", []) if (s := _shape(lines)) is not None]
     if not found:
-        raise FileFormatError("there is no mode (dataset 55).", where=str(path))
+        raise FileFormatError("there is no mode (dataset 55).")
     nodes = sorted({node for _, _, values in found for node in values})
     if missing := [node for node in nodes if node not in places]:
-        raise FileFormatError(f"node {missing[0]} has no coordinates.", where=str(path))
+        raise FileFormatError(f"node {missing[0]} has no coordinates.")
     zero = np.zeros(3)  # records of zeros need not appear
     shapes = np.array([[values.get(node, zero) for node in nodes] for _, _, values in found])
     order = np.argsort([f for f, _, _ in found])
@@ -69,39 +68,38 @@ def modes_of(path: Path, points: dict[int, Array] | None = None) -> MeasuredMode
     return MeasuredModes(f, zeta, np.array([places[node] for node in nodes]), shapes[order])
 
 
-def _factors(path: Path, others: SETS) -> tuple[float, float] | None:
+def _factors(others: SETS) -> tuple[float, float] | None:
     """Units of the file per metre and newton, where it says."""
     found = set()
     for lines in others.get("164", []):
         try:
             length, force = (float(lines[1][a:b].replace("D", "E")) for a, b in ((0, 25), (25, 50)))
         except (ValueError, IndexError) as error:
-            raise FileFormatError(f"dataset 164 is cut: {error}.", where=str(path)) from error
+            raise FileFormatError(f"dataset 164 is cut: {error}.") from error
         found.add((length, force))
     if len(found) > 1 or not all(np.isfinite(f).all() and min(f) > 0 for f in found):
-        raise FileFormatError(f"dataset 164 has the factors {sorted(found)}.", where=str(path))
+        raise FileFormatError(f"dataset 164 has the factors {sorted(found)}.")
     return found.pop() if found else None
 
 
-def _points(path: Path, others: SETS, factors: tuple[float, float] | None) -> dict[int, Array]:
+def _points(others: SETS, factors: tuple[float, float] | None) -> dict[int, Array]:
     length = factors[0] if factors else 1.0
     points: dict[int, Array] = {}
     try:
         names, same = _systems(others)
     except (ValueError, IndexError) as error:
-        raise FileFormatError(f"a dataset 18 or 2420 is cut: {error}.", where=str(path)) from error
+        raise FileFormatError(f"a dataset 18 or 2420 is cut: {error}.") from error
     local = any(name in others for name in AXES_SETS)
     for name in NODE_SETS:
         for lines in others.get(name, []):
-            records = lines if name == "15" else [a + b for a, b in _pairs(path, lines)]
+            records = lines if name == "15" else [a + b for a, b in _pairs(lines)]
             width = 13 if name == "15" else 25
             for line in records:
-                node, system, turned, x = _node(path, name, line, width)
+                node, system, turned, x = _node(name, line, width)
                 if local and (other := {system, turned} - same):
                     named = [f"{k} {names.get(k, '')}".strip() for k in sorted(other)]
                     raise FileFormatError(
                         f"node {node} is in the local coordinate system {', '.join(named)}.",
-                        where=str(path),
                         hint="Export the test in global axes; local ones are not read.",
                     )
                 points[node] = x / length
@@ -136,28 +134,28 @@ def _along_axes(A: Array) -> bool:
     )
 
 
-def _node(path: Path, name: str, line: str, width: int) -> tuple[int, int, int, Array]:
+def _node(name: str, line: str, width: int) -> tuple[int, int, int, Array]:
     try:
         whole = [int(line[a : a + 10]) for a in (0, 10, 20)]
         x = [float(line[40 + width * k : 40 + width * (k + 1)].replace("D", "E")) for k in range(3)]
     except ValueError as error:
-        raise FileFormatError(f"dataset {name} is cut: {error}.", where=str(path)) from error
+        raise FileFormatError(f"dataset {name} is cut: {error}.") from error
     return whole[0], whole[1], whole[2], np.array(x)
 
 
-def _pairs(path: Path, lines: list[str]) -> list[tuple[str, str]]:
+def _pairs(lines: list[str]) -> list[tuple[str, str]]:
     if len(lines) % 2:
-        raise FileFormatError("dataset 2411 is cut: it has an odd line.", where=str(path))
+        raise FileFormatError("dataset 2411 is cut: it has an odd line.")
     return [(f"{a:<40}"[:40], b) for a, b in zip(lines[::2], lines[1::2], strict=True)]
 
 
-def _in_si(path: Path, f: Function, factors: tuple[float, float] | None) -> Function:
+def _in_si(f: Function, factors: tuple[float, float] | None) -> Function:
     """The function in SI units, by the labels at its axis, else by the units of the file."""
     if f.kind not in (FREQUENCY_RESPONSE, COHERENCE_KIND):
         return f
     try:
         if plain(f.abscissa) not in NO_UNITS:
-            f = replace(f, x=f.x * lines_of(f.abscissa))
+            f = replace(f, x=f.x * in_si(f.abscissa, "frequency"))
         if f.kind == COHERENCE_KIND:
             return f
         replace(f, x=np.ones(1), y=np.ones(1)).receptance()  # refuses what is no response
@@ -168,10 +166,10 @@ def _in_si(path: Path, f: Function, factors: tuple[float, float] | None) -> Func
                 raise ConfigError(f"its numerator needs unit {f.numerator}, got {f.units[0]!r}.")
             motion = _agreed(own, motion if factors and plain(f.units[0]) not in IN_G else own)
         if plain(f.units[1]) not in NO_UNITS:
-            own = force_of(f.units[1])
+            own = in_si(f.units[1], "force")
             force = _agreed(own, force if factors else own)
     except ConfigError as error:
-        where = f"{path}: function of {f.response} by {f.reference}"
+        where = f"function of {f.response} by {f.reference}"
         raise FileFormatError(error.message, where=where, hint=error.hint) from error
     return replace(f, y=f.y * motion / force)
 
@@ -185,7 +183,7 @@ def _agreed(label: float, units: float) -> float:
     return label
 
 
-def _shape(path: Path, lines: list[str]) -> tuple[float, float, dict[int, Array]] | None:
+def _shape(lines: list[str]) -> tuple[float, float, dict[int, Array]] | None:
     """Frequency [Hz], damping ratio and {node: (3,)} of one dataset 55; None if it is no mode."""
     try:
         analysis, kind = (int(lines[5][a : a + 10]) for a in (10, 40))
@@ -199,7 +197,7 @@ def _shape(path: Path, lines: list[str]) -> tuple[float, float, dict[int, Array]
             f, zeta = size / (2 * np.pi), -real[0] / size
         values = _values(lines[N_SHAPE_RECORDS:], kind == 5)
     except (ValueError, IndexError, KeyError) as error:
-        raise FileFormatError(f"dataset 55 is cut: {error}.", where=str(path)) from error
+        raise FileFormatError(f"dataset 55 is cut: {error}.") from error
     return float(f), float(zeta), values
 
 
