@@ -29,8 +29,8 @@ from rom.components.wheels.rotation import rotation_matrices
 from rom.eigen.verbs import rigid_motions
 from rom.errors import ConfigError, ModelError, RomWarning
 from rom.process.mpirun import mpirun
+from rom.reduction.full_model import operators
 from rom.reduction.interfaces.connection import connect
-from rom.workflow import operators
 
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")
 import ufl
