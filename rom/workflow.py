@@ -7,7 +7,7 @@ from rom.body.damping import ModalDamping, Rayleigh
 from rom.body.flexible import FlexibleBody
 from rom.body.nonlinear.ranges import Geometric
 from rom.checks.certificate import certify
-from rom.draft import Draft, Stage, run, wanted
+from rom.checks.draft import Draft, Stage, run, wanted
 from rom.fields import taker
 from rom.model import FEModel
 from rom.names import check_name

@@ -29,7 +29,7 @@ from scipy.linalg import block_diag, eigh, null_space
 
 from rom.arguments import one_of, typed
 from rom.assembly.certificate import rows_of_parts
-from rom.draft import COMPARISON_STAGE, Draft, run, wanted
+from rom.checks.draft import COMPARISON_STAGE, Draft, run, wanted
 from rom.errors import ConfigError, InterfaceError
 from rom.model import Array, FEModel, Index, Report, Row
 from rom.names import check_known, offered

@@ -10,7 +10,7 @@ from rom.body.damping import damping_rows
 from rom.body.flexible import FlexibleBody
 from rom.body.projection import Elastic
 from rom.body.reference import rigid_mass
-from rom.draft import COMPARISON_STAGE, Draft
+from rom.checks.draft import COMPARISON_STAGE, Draft
 from rom.eigen.condensed import Condensed, condensed
 from rom.eigen.verbs import (
     Operators,

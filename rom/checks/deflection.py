@@ -18,7 +18,7 @@ from rom.body.nonlinear.full import N_TANGENT, HeldSolid
 from rom.body.nonlinear.ranges import Geometric, Load, axis_point, held_motions, nodal_forces
 from rom.body.nonlinear.statics import follow, free_motions
 from rom.body.projection import cauchy_recovery
-from rom.draft import COMPARISON_STAGE, Draft
+from rom.checks.draft import COMPARISON_STAGE, Draft
 from rom.errors import ModelError
 from rom.model import Array, FEModel, Row
 from rom.rows import row

@@ -12,7 +12,7 @@ from rom.body.damping import damped
 from rom.body.prestress import UnitLoads
 from rom.body.projection import canonical_columns, elastic_part, flexible_body, stress_recovery
 from rom.body.recovery import residual_motion
-from rom.draft import Draft
+from rom.checks.draft import Draft
 from rom.errors import InterfaceError
 from rom.model import BUCKLING_LOADS
 from rom.process.progress import MANY_DOFS

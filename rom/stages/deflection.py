@@ -9,7 +9,7 @@ from rom.body.nonlinear.sampled import sampled_energy
 from rom.body.projection import cauchy_recovery, stressed_nodes
 from rom.checks.certificate import certify
 from rom.checks.deflection import compare_deflections
-from rom.draft import Draft, Stage, wanted
+from rom.checks.draft import Draft, Stage, wanted
 from rom.errors import ConfigError
 from rom.reduction.interfaces.characteristic import Characteristic
 from rom.stages import bodies

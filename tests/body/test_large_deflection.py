@@ -31,7 +31,7 @@ from rom.checks.deflection import (
     compare_deflections,
     load_cases,
 )
-from rom.draft import Draft
+from rom.checks.draft import Draft
 from rom.eigen.verbs import rigid_motions
 from rom.errors import ConfigError, InterfaceError, ModelError, ResourceError, RomWarning
 from rom.process.mpirun import mpirun

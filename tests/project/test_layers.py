@@ -39,7 +39,7 @@ ORDER = {
     for level, names in {
         "": (
             "errors notebook rotation places fields lazy names readable process plausible "
-            "arguments units material model rows paths decks eigen reduction body fe draft checks "
+            "arguments units material model rows paths decks eigen reduction body fe checks "
             "stages workflow assembly cyclic parametric updating prestress io mbs fmu view config "
             "report doctor cli components __main__"
         ),

@@ -13,9 +13,9 @@ from rom.checks.certificate import (
     reduced_shapes,
     rigid_rows,
 )
+from rom.checks.draft import COMPARISON_STAGE, Draft
 from rom.components.families.affine import AffineModel
 from rom.components.families.parameters import Point, scattered
-from rom.draft import COMPARISON_STAGE, Draft
 from rom.eigen.verbs import residual_errors
 from rom.model import Basis, Report, Row
 from rom.reduction.interfaces.connection import connect

@@ -9,6 +9,7 @@ import numpy as np
 from rom.arguments import between, typed
 from rom.body.damping import ModalDamping, Rayleigh
 from rom.body.projection import stress_recovery
+from rom.checks.draft import Stage, run, wanted
 from rom.components.families.affine import AffineModel
 from rom.components.families.common_basis import first_sample
 from rom.components.families.evidence import FamilyDraft, certify, estimated
@@ -24,7 +25,6 @@ from rom.components.families.parameters import (
     written,
 )
 from rom.components.families.stretched import StretchedModel
-from rom.draft import Stage, run, wanted
 from rom.errors import ParameterError
 from rom.model import FEModel
 from rom.names import check_name

@@ -10,9 +10,9 @@ from scipy.sparse import csr_matrix, identity
 from scipy.spatial import cKDTree
 
 from rom.arguments import typed
+from rom.checks.draft import Draft, run
 from rom.components.wheels.certificate import sector_certificate
 from rom.components.wheels.sector import Complex, CyclicSector
-from rom.draft import Draft, run
 from rom.eigen.verbs import DEPENDENT_RTOL, every_row, orthonormal_in, own_rows, static_shapes
 from rom.errors import ConfigError, InterfaceError
 from rom.model import Array, Basis, Index, Interface, Report

@@ -5,6 +5,7 @@ from dataclasses import fields
 import numpy as np
 
 from rom.arguments import typed
+from rom.checks.draft import run
 from rom.components.wheels.blades.blade import (
     SHARED_STIFFNESS_RTOL,
     blade_in,
@@ -25,7 +26,6 @@ from rom.components.wheels.reduced import (
 )
 from rom.components.wheels.rotation import centrifugal_displacement
 from rom.components.wheels.sector import CyclicSector, all_rows, region
-from rom.draft import run
 from rom.eigen.verbs import dofs_of
 from rom.errors import ConfigError, InterfaceError
 from rom.model import Array, FEModel
