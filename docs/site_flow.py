@@ -21,7 +21,7 @@ STAGES = {  # what lies on the way, and the folders and files in which it lies
     "geometry": ("decks", "fe.mesh"),
     "matrices": ("fe.forms", "fe.operators", "fe"),
     "modes": ("eigen", "reduction.interfaces", "reduction.bases", "reduction.full_model"),
-    "body": ("body", "checks", "workflow", "io", "assembly"),
+    "body": ("body", "checks", "stages", "workflow", "io", "assembly"),
     "mechanism": ("mbs.kernels", "mbs.parts", "mbs.elements", "mbs"),
     "motion": ("mbs.equations", "mbs.integrate", "mbs.results"),
     "results": ("mbs.analysis", "view", "fmu"),

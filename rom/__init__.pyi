@@ -22,7 +22,9 @@ from rom import view as view
 from rom.assembly.assembly import Assembly as Assembly
 from rom.assembly.dual import DualAssembly as DualAssembly
 from rom.assembly.dual import FreeSubstructure as FreeSubstructure
+from rom.assembly.dual import substructure as substructure
 from rom.assembly.pieces import Pieces as Pieces
+from rom.assembly.pieces import reduce_pieces as reduce_pieces
 from rom.body.damping import ModalDamping as ModalDamping
 from rom.body.damping import Rayleigh as Rayleigh
 from rom.body.flexible import FlexibleBody as FlexibleBody
@@ -154,8 +156,6 @@ from rom.report.html import write_report as write_report
 from rom.report.pieces import certify_pieces as certify_pieces
 from rom.view.scenes.animation_files import write_animation as write_animation
 from rom.workflow import reduce as reduce
-from rom.workflow import reduce_pieces as reduce_pieces
-from rom.workflow import substructure as substructure
 
 __version__: str
 __all__: list[str]

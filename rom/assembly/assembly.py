@@ -7,18 +7,17 @@ from typing import Any
 import numpy as np
 from scipy.linalg import block_diag
 
-from rom.arguments import lowest, one_of, typed
+from rom.arguments import lowest, one_of, typed, whole
 from rom.assembly.certificate import rows_of_parts
 from rom.assembly.condensed import (
     CondensedAssembly,
     Partition,
-    check_count,
+    enough,
     joint_functions,
     local_traces,
     natural_modes,
     partition,
     per_body,
-    system_functions,
 )
 from rom.assembly.coupling import coupled_rows
 from rom.body.flexible import FlexibleBody
@@ -29,6 +28,7 @@ from rom.names import named, offered
 from rom.rows import N_COMPARED, frequency_rows, row
 
 Place = tuple[str, str]  # body, interface
+AT_MOST = "coordinates of the coupled interfaces"
 GAP_RTOL = 1e-9  # of the motion of the coupled interfaces
 
 
@@ -165,7 +165,8 @@ class Assembly:
         (M, K), H = self._matrices(), self._interfaces()
         parts = self._partition(None, fixed)
         if level == "system":
-            W = system_functions(parts, n_interface)
+            whole("n_interface", n_interface, 1, parts.lam.size, reason=AT_MOST)
+            W = parts.chi[:, : enough(parts.lam, n_interface, "interfaces of the assembly")]
         else:
             W = joint_functions(H @ parts.C, self._traces(n_interface, fixed))
         basis = np.hstack([parts.C @ W, parts.F])
@@ -209,7 +210,8 @@ class Assembly:
             )
         coupled = list(dict.fromkeys(body for body, _ in places))
         parts = {name: self._partition(name, fixed) for name in coupled}
-        check_count(n, max(part.lam.size for part in parts.values()))
+        most = max(part.lam.size for part in parts.values())
+        whole("n_interface", n, 1, most, reason=AT_MOST)
         found: dict[Place, Array] = {}
         for name in coupled:
             rows = self._rows_of(name)

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import block_diag, eigh
 
-from rom.arguments import lowest, whole
+from rom.arguments import lowest
 from rom.eigen.verbs import whole_clusters
 from rom.model import Array, Modes, Report
 from rom.reduction.bases.selection import reduced_modes
@@ -134,21 +134,6 @@ def enough(lam: Array, n: int, where: str) -> int:
         repeated = np.sqrt(lam[m - 1]) / (2 * np.pi)
         log.info("%s: %d functions instead of %d, %.4g Hz is repeated", where, m, n, repeated)
     return m
-
-
-def check_count(n: int, available: int) -> None:
-    """Refuse a number of functions that interfaces do not have.
-
-    Raises:
-        ConfigError: naming the value.
-    """
-    whole("n_interface", n, 1, available, reason="coordinates of the coupled interfaces")
-
-
-def system_functions(parts: Partition, n: int) -> Array:
-    """(c, n) lowest characteristic constraint modes of the whole assembly."""
-    check_count(n, parts.lam.size)
-    return parts.chi[:, : enough(parts.lam, n, "interfaces of the assembly")]
 
 
 def local_traces(parts: Partition, n: int, rows: list[Array], where: str) -> list[Array]:

@@ -22,18 +22,21 @@ Source:
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from scipy.linalg import block_diag, eigh, null_space
 
 from rom.arguments import one_of, typed
 from rom.assembly.certificate import rows_of_parts
+from rom.checks.draft import COMPARISON_STAGE, Draft, run, wanted
 from rom.errors import ConfigError, InterfaceError
-from rom.model import Array, Index, Report, Row
+from rom.model import Array, FEModel, Index, Report, Row
 from rom.names import check_known, offered
-from rom.reduction.bases.free_interface import free_modes, residual_flexibility
+from rom.reduction.bases.free_interface import Rubin, free_modes, residual_flexibility
 from rom.reduction.interfaces.records import Connection
 from rom.rows import FREQUENCY_RTOL, N_COMPARED, frequency_rows, row
+from rom.stages.bodies import connect
 
 KINDS = ("macneal", "rubin", "dual")
 SAME_PLACE = 1e-6  # distance of two interfaces, of their distance from the origin, that still meet
@@ -284,14 +287,42 @@ class DualAssembly:
         return self.bodies[body].parts[interface]
 
 
-def with_certificate(body: FreeSubstructure, connection: Connection) -> FreeSubstructure:
-    """The substructure with its evidence: each interface held in turn, by Rubin's method.
+@typed
+def substructure(
+    model: FEModel, *, n_modes: int, interfaces: dict[str, Any], certify: bool = True
+) -> FreeSubstructure:
+    """A free body for coupling by interface forces: MacNeal, Rubin, dual Craig-Bampton.
 
     Args:
-        body: made by `free_substructure`.
-        connection: the full model in interface coordinates.
+        model: the full model, free-free.
+        n_modes: number of elastic free-free modes.
+        interfaces: {name: kind} as for `reduce`.
+        certify: compare with the full model; costs one more factorisation per interface.
+
+    Raises:
+        InterfaceError, ConfigError: for a wrong interface, kind or number of modes.
+
+    Source:
+        Rixen, A dual Craig-Bampton method for dynamic substructuring, J. Comput. Appl. Math.
+        168 (2004) 383; see docs/theory/other_bases.md.
     """
-    alone, rows = DualAssembly({"body": body}, ()), []
+    how = Rubin(n_modes)
+    draft = Draft(model=model, method=how, interfaces=interfaces)
+    return run(wanted((True, connect), (True, release), (certify, hold_in_turn)), draft)
+
+
+def release(draft: Draft) -> None:
+    """Find the free modes, and what they leave of the flexibility of the interfaces."""
+    draft.watch.begin("shapes")
+    origins = {name: draft.model.interfaces[name].origin for name in draft.connection.parts}
+    draft.body = free_substructure(draft.connection, origins, draft.method.n_modes)
+
+
+def hold_in_turn(draft: Draft) -> None:
+    """Compare the substructure, held by each interface, with the full model, by Rubin's method."""
+    draft.watch.begin(COMPARISON_STAGE)
+    connection, rows = draft.connection, list[Row]()
+    alone = DualAssembly({"body": draft.body}, ())
     if not connection.ops.affordable:
         rows = [Row("dofs; full modes are too dear", connection.ops.n, "--", True)]
     for name in connection.parts if connection.ops.affordable else ():
@@ -304,4 +335,4 @@ def with_certificate(body: FreeSubstructure, connection: Connection) -> FreeSubs
         rows += frequency_rows(f"{name} held", table) if reduced.size else []
     report = Report("certificate of the substructure", tuple(rows))
     report.warn_of_failures("the certificate of the substructure")
-    return replace(body, certificate=report)
+    draft.body = replace(draft.body, certificate=report)

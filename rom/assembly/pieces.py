@@ -16,11 +16,14 @@ import numpy as np
 
 from rom import rotation
 from rom.arguments import start_pose, typed
+from rom.body.damping import ModalDamping, Rayleigh
 from rom.body.flexible import FlexibleBody
 from rom.body.nonlinear.ranges import Geometric
 from rom.errors import ConfigError, InterfaceError, ModelError
 from rom.model import Array, FEModel, Mask, Report
 from rom.names import check_known, check_name, named, offered
+from rom.reduction.bases.method import Method
+from rom.workflow import ENOUGH_MODES, reduce
 
 SAME_RTOL = 1e-9  # of places and matrices of pieces that repeat each other
 
@@ -236,17 +239,6 @@ class Tree:
                 found.append(other)
         return found
 
-    def refuse_unknown(self, names: Iterable[str], models: Mapping[str, FEModel]) -> None:
-        """Refuse names of interfaces that no piece has.
-
-        Raises:
-            InterfaceError: offering those there are.
-        """
-        every = {name for model in models.values() for name in model.interfaces}
-        if unknown := [name for name in names if name not in every]:
-            raise InterfaceError(f"there is no interface {named(unknown)}; the pieces have "
-                                 f"{offered(every)}.")  # fmt: skip
-
     def ranges(
         self, geometric: Geometric, models: Mapping[str, FEModel]
     ) -> dict[str, Geometric | None]:
@@ -321,6 +313,66 @@ def together(
             loads[at] = np.maximum(six, loads.get(at, 0.0))
             own = own or range_
     return None if own is None else replace(own, loads=loads)
+
+
+@typed
+def reduce_pieces(
+    models: Mapping[str, FEModel],
+    *,
+    reference: str,
+    method: Method = ENOUGH_MODES,
+    interfaces: dict[str, Any] | None = None,
+    nonlinear: Geometric | None = None,
+    damping: Rayleigh | ModalDamping | None = None,
+    certify: bool = True,
+) -> Pieces:
+    """Reduced bodies of the pieces of one solid, for rotations beyond what one frame carries.
+
+    Args:
+        models: {name: piece} of `rom.fe.pieces`, or any others that have an interface of one name
+            where they meet.
+        reference: interface at which the whole is held, or that turns least; each piece is seen
+            from its section towards it.
+        method: how to reduce each of them.
+        interfaces: {name: kind}; "rbe3" for all that are not named.
+        nonlinear: the loads of the whole under which it is to deflect far; each piece is made for
+            those that reach its sections. Pieces that repeat each other are reduced once, for the
+            largest loads of any of them.
+        damping: structural damping of each.
+        certify: compare each piece with its full model.
+
+    Raises:
+        RomError: for pieces that do not hang together, or form a ring; see `reduce`.
+
+    Example:
+        >>> beam = {"n": 2, "axis": (1, 0, 0), "material": rom.Material(E=2e11, nu=0, rho=7850.0)}
+        >>> beam["parameters"] = {"hex": 1, "nx": 8, "ny": 1, "nz": 1}
+        >>> models = rom.fe.pieces("meshes/beam.geo", **beam)
+        >>> rom.reduce_pieces(models, reference="root", method=rom.CraigBampton(n_modes=2))
+        Pieces(2 bodies with 16 coordinates, 1 welds)
+    """
+    tree = Tree.of(models, reference)
+    ranges = dict.fromkeys(models) if nonlinear is None else tree.ranges(nonlinear, models)
+    kinds, bodies = interfaces or {}, dict[str, FlexibleBody]()
+    every = {interface for model in models.values() for interface in model.interfaces}
+    if unknown := [name for name in kinds if name not in every]:
+        raise InterfaceError(
+            f"there is no interface {named(unknown)}; the pieces have {offered(every)}."
+        )
+    repeated = tree.repeated(models, kinds)
+    for name, seen_from in tree.reference.items():
+        if name in repeated:
+            continue
+        copies = [(ranges[key], one) for key, one in repeated.items() if one.of == name]
+        bodies[name] = reduce(
+            models[name], method=method, reference=seen_from,
+            nonlinear=together(ranges[name], copies),
+            interfaces={key: kinds.get(key, "rbe3") for key in models[name].interfaces},
+            damping=damping, name=name, certify=certify,
+        )  # fmt: skip
+    bodies |= {key: one.named_as(bodies[one.of], key) for key, one in repeated.items()}
+    places = {key: one.shift for key, one in repeated.items()}
+    return Pieces({name: bodies[name] for name in models}, tree.joints, places)
 
 
 def _moved(load: Array, arm: Array) -> Array:

@@ -11,7 +11,7 @@ from rom.body.records import Body, Marker
 from rom.body.recovery import StressRecovery
 from rom.body.reference import MEAN_AXES, moved_frame, reference_motion
 from rom.body.stiffening import SecondOrder, moved_stiffening, recombined_stiffening
-from rom.eigen.verbs import Operators, rigid_motions
+from rom.eigen.verbs import Operators, own_points, rigid_motions
 from rom.errors import ConfigError, ModelError
 from rom.model import OWN_FRAME, Array, FEModel, Interface
 
@@ -67,8 +67,7 @@ def at_large_deflection(
     """
     moved, X = moved_to(body, reference), reference_motion(body, reference)
     omega, V = _normal_modes(moved.K, moved.M)
-    points = model.points[ops.first // 3 : (ops.first + ops.n_local) // 3]
-    shapes = (E - rigid_motions(points) @ X) @ V
+    shapes = (E - rigid_motions(own_points(ops, model.points)) @ X) @ V
     found = _recombined(moved, V, omega, reference_label(reference))
     energy = Quartic.from_gram(model.stresses.large_strain().gram(shapes), omega.size)
     markers = {

@@ -11,6 +11,7 @@ Source:
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -31,8 +32,13 @@ class InertiaIntegrals:
 
     def __add__(self, other: "InertiaIntegrals") -> "InertiaIntegrals":
         """Integrals of two bodies that share the shapes."""
-        names = ("mass", "first_moment", "inertia", "S", "Ibar_kl", "S_kl")
+        names = InertiaIntegrals.__slots__
         return InertiaIntegrals(*(getattr(self, n) + getattr(other, n) for n in names))
+
+
+def fields_of(integrals: InertiaIntegrals) -> dict[str, Any]:
+    """The integrals by their names, which bodies have as well."""
+    return {name: getattr(integrals, name) for name in integrals.__slots__}
 
 
 def weighted(weights: Array, parts: Sequence[InertiaIntegrals]) -> InertiaIntegrals:
@@ -44,19 +50,23 @@ def weighted(weights: Array, parts: Sequence[InertiaIntegrals]) -> InertiaIntegr
     return InertiaIntegrals(*sums)
 
 
-def inertia_integrals(ops: Operators, points: Array, Psi: Array) -> InertiaIntegrals:
-    """Integrals of the finite element body.
+def inertia_integrals(
+    ops: Operators, points: Array, Psi: Array, part: Any = None
+) -> InertiaIntegrals:
+    """Integrals of the finite element body, or of a part of it.
 
     Args:
         ops: operators with the mass of the mesh, M = M_s (x) I_3.
         points: (n_local/3, 3) coordinates of this process's nodes [m].
         Psi: (n_local, r) shapes.
+        part: (n, n) mass of the part [kg].
     """
     fields = np.column_stack([np.ones(ops.n_local), points.reshape(-1), Psi])
     n, k = fields.shape[0] // 3, fields.shape[1]
     S = np.empty((3, k, 3, k))
     for some in column_blocks(k):
-        weighted = ops.apply_M(fields[:, some]).reshape(n, -1)
+        X = fields[:, some]
+        weighted = (ops.apply_M(X) if part is None else ops.product(part, X)).reshape(n, -1)
         S[..., some] = ops.gram(fields.reshape(n, 3 * k), weighted).reshape(3, k, 3, -1)
     return _split(S)
 

@@ -12,13 +12,12 @@ from itertools import combinations
 from typing import Any
 
 import numpy as np
-from scipy.linalg import qr
 
 from rom.body.records import Marker
 from rom.body.recovery import CENTRIFUGAL_LOADS, centrifugal
 from rom.body.stiffening import elastic_loads, interface_loads
 from rom.eigen.attachments import carried_displacements
-from rom.eigen.verbs import Operators, dofs_of, mean_motion, rigid_motions
+from rom.eigen.verbs import Operators, dofs_of, mean_motion, own_points, pins, rigid_motions
 from rom.errors import ConfigError
 from rom.model import Array, FEModel, Index, Interface
 
@@ -115,8 +114,7 @@ class UnitLoads:
 
     @property
     def _points(self) -> Array:
-        first = self.mesh.first // 3
-        return self.model.points[first : first + self.mesh.n_local // 3]
+        return own_points(self.mesh, self.model.points)
 
     def _balanced(self, carried: list[Carried], names: tuple[str, ...]) -> tuple[Any, Array]:
         """Accelerations of body forces as a function of points, and nodal interface loads."""
@@ -163,9 +161,7 @@ class UnitLoads:
             x = self.model.points
             nodes = np.unique(np.r_[x.argmin(axis=0), x.argmax(axis=0)])
             candidates = dofs_of(nodes)
-        rows = ops.rows(ops.rigid, candidates)
-        rows = rows / np.linalg.norm(rows, axis=0)
-        return np.sort(candidates[qr(rows.T, mode="r", pivoting=True)[1][:6]])
+        return np.sort(candidates[pins(ops.rows(ops.rigid, candidates))])
 
     def _surfaces(
         self,

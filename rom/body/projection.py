@@ -1,6 +1,5 @@
 """From a basis to a flexible body: rigid motions out, integrals, markers, surface."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -9,9 +8,8 @@ from scipy.linalg import eigh, null_space
 from scipy.sparse import csr_matrix
 
 from rom.body.flexible import FlexibleBody
-from rom.body.inertia import InertiaIntegrals, inertia_integrals, point_integrals
+from rom.body.inertia import InertiaIntegrals, fields_of, inertia_integrals, point_integrals
 from rom.body.nonlinear.cauchy import CauchyRecovery
-from rom.body.prestress import UnitLoads
 from rom.body.records import Marker, Patch, Surface
 from rom.body.recovery import StressRecovery
 from rom.eigen.attachments import carried_displacements
@@ -21,11 +19,12 @@ from rom.eigen.verbs import (
     given_rigid_motions,
     mean_motion,
     orthonormal,
+    own_points,
     quadratic,
     rigid_motions,
 )
 from rom.errors import ConfigError, ModelError
-from rom.model import BUCKLING_LOADS, Array, FEModel, Index, Interface
+from rom.model import Array, FEModel, Index, Interface
 
 NEGATIVE_STIFFNESS_RTOL = 1e-9  # of the largest eigenvalue of K; round-off is smaller
 RIGID_RESIDUAL = 1e-6  # relative distance of a rigid motion from the basis that is still accepted
@@ -85,63 +84,46 @@ def elastic_part(ops: Operators, Psi: Array) -> Elastic:
     return Elastic(V, np.sqrt(np.maximum(lam, 0.0)), scale[:, None] * B, residual)
 
 
-def flexible_body(  # noqa: PLR0913  what a body is made of
+def flexible_body(
     model: FEModel,
     ops: Operators,
-    Psi: Array,
-    elastic: Elastic,
+    E: Array,
+    omega: Array,
     *,
     ties: dict[str, Any],
     name: str,
     provenance: dict[str, Any],
-    stress: Callable[[dict[str, Marker]], Array | None] | None = None,
-    stiffening: UnitLoads | None = None,
-    pressing: UnitLoads | None = None,
 ) -> FlexibleBody:
     """The body in its mean-axis frame.
 
     Args:
         model: supplies points, interfaces, attachments and surface.
         ops: operators with the mass of the mesh alone, in nodal dofs.
-        Psi: (n_local, r + 6) basis in nodal dofs.
-        elastic: what `elastic_part` found in it.
+        E: (n_local, r) its mass-normalised shapes without rigid motion, in nodal dofs.
+        omega: (r,) their circular frequencies [rad/s].
         ties: {interface: tie} of the interfaces that become markers; each has a ``label`` and the
             map ``coordinates`` (n_c, 3k) from the dofs of the surface to what is zero when held.
         name: name of the body.
         provenance: how it was made.
-        stress: makes the stress on the surface recoverable: the motion of the modes left out, see
-            `rom.body.correction.residual_motion`, from the markers; None without stress.
-        stiffening: the loads whose geometric stiffness the body gets.
-        pressing: those of which it is only told what would buckle it.
     """
-    E = canonical_columns(ops, Psi @ elastic.V, model)
-    integrals = _integrals(model, ops, E)
-    markers = {n: _marker(ops, model.interfaces[n], tie, E) for n, tie in ties.items()}
-    r = elastic.omega.size
-    if pressing is not None:
-        loads = pressing.buckling_loads(E, elastic.omega, markers)
-        provenance = provenance | {BUCKLING_LOADS: loads}
+    integrals = inertia_integrals(ops, own_points(ops, model.points), E)
     return FlexibleBody(
         name=name,
-        **{key: getattr(integrals, key) for key in integrals.__slots__},
-        K=np.diag(elastic.omega**2),
-        D=np.zeros((r, r)),
-        K_geo=stiffening.geometric_stiffness(E, markers) if stiffening else {},
-        markers=markers,
-        omega=elastic.omega,
-        labels=tuple(f"mode {k + 1}, mean-axis frame" for k in range(r)),
-        reference="mean-axis",
+        **fields_of(sum(carried_integrals(model, ops, E), integrals)),
+        K=np.diag(omega**2),
+        D=np.zeros((omega.size, omega.size)),
+        markers={n: _marker(ops, model.interfaces[n], tie, E) for n, tie in ties.items()},
+        omega=omega,
+        labels=tuple(f"mode {k + 1}, mean-axis frame" for k in range(omega.size)),
         surface=_surface(ops, model, E),
-        stress=_recovery(model, E, stress(markers)) if stress else None,
         provenance=provenance,
     )
 
 
 def canonical_columns(ops: Operators, E: Array, model: FEModel) -> Array:
     """Turn the sign of each shape by a measure that does not depend on the numbering of nodes."""
-    first = ops.first // 3
-    x = model.points[first : first + ops.n_local // 3] - model.points.mean(axis=0)
-    x = x / np.abs(model.points - model.points.mean(axis=0)).max()
+    x = model.points - model.points.mean(axis=0)
+    x = own_points(ops, x) / np.abs(x).max()
     a, b, c = x.T
     weight = np.column_stack(
         [1.0 + a + 0.7 * b**2 - c**3, 0.9 - b + 0.8 * c**2 + a**3, 0.8 + c - 0.6 * a**2 + b**3]
@@ -150,14 +132,14 @@ def canonical_columns(ops: Operators, E: Array, model: FEModel) -> Array:
     return E * np.where(sign == 0, 1.0, sign)
 
 
-def _integrals(model: FEModel, ops: Operators, E: Array) -> InertiaIntegrals:
-    first = ops.first // 3
-    total = inertia_integrals(ops, model.points[first : first + ops.n_local // 3], E)
+def carried_integrals(model: FEModel, ops: Operators, E: Array) -> list[InertiaIntegrals]:
+    """Integrals of what each attachment carries, under shapes E (n_local, r)."""
+    found = []
     for attachment in model.attachments:
         points, masses, N = carried_displacements(attachment, model)
         dofs = model.interfaces[attachment.interface].dofs
-        total = total + point_integrals(points, masses, N @ ops.rows(E, dofs))
-    return total
+        found.append(point_integrals(points, masses, N @ ops.rows(E, dofs)))
+    return found
 
 
 def _marker(ops: Operators, interface: Interface, tie: Any, E: Array) -> Marker:
@@ -184,7 +166,17 @@ def _surface(ops: Operators, model: FEModel, E: Array) -> Surface | None:
     return Surface(model.points[nodes], model.surface.triangles, ops.rows(E, dofs))
 
 
-def _recovery(model: FEModel, E: Array, missing: Array | None) -> StressRecovery:
+def stress_recovery(model: FEModel, E: Array, missing: Array | None = None) -> StressRecovery:
+    """Stress on the surface at small deflection.
+
+    Args:
+        model: supplies points, surface and material.
+        E: (n_local, r) nodal displacement per unit of each coordinate.
+        missing: (n_local, 12 + r) that of the modes left out, see `rom.body.recovery`.
+
+    Raises:
+        ConfigError: if the model has no finite elements or no surface.
+    """
     nodes = stressed_nodes(model)
     shapes = E if missing is None else np.hstack([E, missing])
     operator = model.stresses.at_nodes(shapes, nodes).reshape(6 * nodes.size, -1)

@@ -1,5 +1,6 @@
 """The certificate: what was measured to show that the reduced body stands for the full model."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -9,8 +10,16 @@ from rom.body.damping import damping_rows
 from rom.body.flexible import FlexibleBody
 from rom.body.projection import Elastic
 from rom.body.reference import rigid_mass
+from rom.checks.draft import COMPARISON_STAGE, Draft
 from rom.eigen.condensed import Condensed, condensed
-from rom.eigen.verbs import Operators, given_rigid_motions, mac, quadratic, residual_errors
+from rom.eigen.verbs import (
+    Operators,
+    given_rigid_motions,
+    mac,
+    quadratic,
+    residual_errors,
+    unit_motions,
+)
 from rom.errors import InterfaceError
 from rom.model import Array, Basis, Report, Row
 from rom.process.progress import MANY_DOFS, stages
@@ -27,31 +36,18 @@ SHAPES_RATIO = 10.0  # round-off of the energy of shapes over that of rigid moti
 CLUSTER_RTOL = 1e-3  # relative distance of modes that are compared as one subspace
 
 
-def certify_body(
-    connection: Connection,
-    ops: Operators,
-    body: FlexibleBody,
-    basis: Basis,
-    elastic: Elastic,
-    *,
-    everywhere: bool = False,
-) -> tuple[Report, dict[str, Any]]:
-    """Compare a reduced body with the full model it came from.
+def certify(draft: Draft) -> None:
+    """Compare a reduced body with the full model it came from: a stage of a reduction.
 
-    Args:
-        connection: the full model in interface coordinates, so that like is compared with like.
-        ops: the full model in nodal dofs.
-        body: the reduced body.
-        basis: its basis in interface coordinates.
-        elastic: the elastic part of the basis.
-        everywhere: full modes in every support, also where they cost more than the reduction;
-            without it those of the free body are then found, and the estimates go for the others.
-
-    Returns:
-        The report, and a table {support: {"reduced": [Hz], "estimated": [relative errors],
-        "full": [Hz], "mac": []}}; the last two are empty where full modes cost too much, and
-        the estimates when the method has none.
+    Full modes are found in every support where they cost no more than the reduction, or the draft
+    asks for them; else those of the free body, and estimates go for the others. The provenance of
+    the body then has a "comparison", {support: {"reduced": [Hz], "estimated": [relative errors],
+    "full": [Hz], "mac": []}}; the last two are empty where full modes cost too much, and the
+    estimates where the method has none.
     """
+    draft.watch.begin(COMPARISON_STAGE)
+    connection, ops, body, basis = draft.connection, draft.ops, draft.body, draft.basis
+    draft.say("compare the reduced body with the full model")
     rows: list[Row] = []
     comparison = {}
     matrices = basis_matrices(connection.ops, basis)
@@ -61,7 +57,7 @@ def certify_body(
     parts = condensed_model(connection, basis, matrices[0]) if statics and constrained else None
     n_b = len(connection.labels)
     known = connection.ops.comparison_pays(len(supports), n_b, basis.Psi.shape[1] - n_b)
-    known = known or everywhere or parts is None or not _estimable(basis)
+    known = known or draft.certify == "full" or parts is None or not _estimable(basis)
     static: list[Row] = []
     with stages(len(supports), long=ops.n > MANY_DOFS) as begin:
         for fixed in supports:
@@ -82,7 +78,7 @@ def certify_body(
     elif not known:
         words = "supports estimated only; full modes cost more than the reduction"
         rows.append(Row(words, len(supports) - 1, "--", True))
-    rigid = rigid_rows(ops, body, elastic)
+    rigid = rigid_rows(ops, body, draft.elastic)
     for support, table in comparison.items():
         if table["full"]:
             round_off = _round_off(rigid[-1].value, body, table["full"])
@@ -93,7 +89,15 @@ def certify_body(
     rows += _matrix_rows(connection, basis, body, matrices)
     rows += _effective_mass(body, tuple(connection.parts)) if statics else []
     rows += damping_rows(body, N_COMPARED)
-    return Report(f"certificate of {body.name}", tuple(rows)), comparison
+    report = Report(f"certificate of {body.name}", (*rows, *draft.rows))
+    attach(draft, report, comparison, f"body {draft.name!r}")
+
+
+def attach(draft: Draft, report: Report, comparison: dict[str, Any], of: str) -> None:
+    """Give a body its certificate, and warn of what fails in it."""
+    report.warn_of_failures(f"the certificate of {of}")
+    provenance = draft.body.provenance | {"comparison": comparison}
+    draft.body = replace(draft.body, certificate=report, provenance=provenance)
 
 
 def _round_off(rigid_energy: Any, body: FlexibleBody, full: list[float]) -> float:
@@ -110,7 +114,7 @@ def compared(
     connection: Connection,
     ops: Operators,
     body: FlexibleBody,
-    reduction: tuple[Basis, Condensed | None, tuple[Array, Array]],
+    reduction: tuple[Basis, Condensed | None, tuple[Array, Array]] | None,
     fixed: tuple[str, ...],
     support: Any,
 ) -> dict[str, list[float]]:
@@ -121,7 +125,7 @@ def compared(
         ops: the full model in nodal dofs.
         body: the reduced body.
         reduction: its basis, the full model condensed to the interfaces where that is known, and
-            stiffness and mass of the basis.
+            stiffness and mass of the basis; None for frequencies alone.
         fixed: interfaces that are held.
         support: the same as `full_support` has it for the full model; None to estimate only.
     """
@@ -131,19 +135,22 @@ def compared(
     table: dict[str, list[float]] = {"full": [], "reduced": [], "mac": [], "estimated": []}
     if n <= 0 or n_rigid not in (0, 6):
         return table
+    table["reduced"] = (omega_r[n_rigid : n_rigid + n] / (2 * np.pi)).tolist()
+    Phi = None
+    if support is not None:
+        omega, Phi = connection.ops.modes(support, n + n_rigid, finished=True)
+        table["full"] = (omega[n_rigid:] / (2 * np.pi)).tolist()
+    if reduction is None:
+        return table
     # the reduced shapes again, as combinations of the columns of the basis
     basis, parts, matrices = reduction
     shapes = reduced_shapes(connection, basis, fixed, n + n_rigid, matrices)
-    table["reduced"] = (omega_r[n_rigid : n_rigid + n] / (2 * np.pi)).tolist()
     if parts is not None and _estimable(basis):
         found = residual_errors(connection.ops, parts.held, shapes[:, n_rigid:])
         table["estimated"] = found.tolist()
-    if support is not None:
-        omega, Phi = connection.ops.modes(support, n + n_rigid, finished=True)
-        omega, Phi = omega[n_rigid:], connection.ops.expand(Phi[:, n_rigid:])
-        agreement = mac(ops, Phi, connection.ops.expand(shapes))
-        table["full"] = (omega / (2 * np.pi)).tolist()
-        table["mac"] = _cluster_mac(agreement, omega_r[: n + n_rigid]).tolist()
+    if Phi is not None:
+        Phi, shapes = (connection.ops.expand(X) for X in (Phi[:, n_rigid:], shapes))
+        table["mac"] = _cluster_mac(mac(ops, Phi, shapes), omega_r[: n + n_rigid]).tolist()
     return table
 
 
@@ -245,10 +252,7 @@ def _static_row(connection: Connection, body: FlexibleBody, held: Any) -> list[R
     names = tuple(connection.parts)
     ops, first = connection.ops, names[0]
     loaded = connection.held(names[1:])
-    F = np.zeros((ops.n_local, loaded.size))
-    mine = (loaded >= ops.first) & (loaded < ops.first + ops.n_local)
-    F[loaded[mine] - ops.first, np.flatnonzero(mine)] = 1.0
-    full = ops.rows(held(F), loaded)
+    full = ops.rows(held(unit_motions(ops, loaded)), loaded)
     H, G = body.marker(first).hold, np.vstack([body.marker(name).hold for name in names[1:]])
     rigid = np.linalg.lstsq(H[:, :6], -H[:, 6:], rcond=None)[0]
     motion = G[:, :6] @ rigid + G[:, 6:]

@@ -18,7 +18,7 @@ from rom.body.nonlinear.full import N_TANGENT, HeldSolid
 from rom.body.nonlinear.ranges import Geometric, Load, axis_point, held_motions, nodal_forces
 from rom.body.nonlinear.statics import follow, free_motions
 from rom.body.projection import cauchy_recovery
-from rom.eigen.verbs import Operators
+from rom.checks.draft import COMPARISON_STAGE, Draft
 from rom.errors import ModelError
 from rom.model import Array, FEModel, Row
 from rom.rows import row
@@ -33,31 +33,23 @@ STEP_SHARES = (0.35, 0.7, 1.0)  # of the largest load
 UNTRAINED_RATIO = np.sqrt(2) - 1  # of a component to the one before, as trained nowhere
 
 
-def deflection_rows(
-    geometric: Geometric, model: FEModel, ops: Operators, connection: Any, body: FlexibleBody,
-    E: Array,
-) -> tuple[list[Row], dict[str, Any]]:  # fmt: skip
-    """Rows of the certificate, and a table {load case: its loads, errors and how far it holds}.
+def compare_deflections(draft: Draft) -> None:
+    """Compare states under the loads of a range: a stage of a reduction for large deflection.
 
-    The table has for each case "case", the share of each component of the range; "share" of the
-    load at the steps compared, and there "displacement" and "frequencies", relative errors;
+    The certificate gets rows, one of them about the mesh itself, which no comparison with the full
+    model judges; the provenance of the body gets "large deflection", a table {load case: its loads,
+    errors and how far it holds}: for each "case", the share of each component of the range; "share"
+    of the load at the steps compared, and there "displacement" and "frequencies", relative errors;
     "holds to", the share up to which all steps hold; "energy" [J] of the body there, and "turn"
-    [rad] of the interface that has turned most. One row more is about the mesh itself, which
-    no comparison with the full model judges.
-
-    Args:
-        geometric: the range of loads.
-        model: the full model.
-        ops: its operators in nodal dofs, with all it carries.
-        connection: the same in interface coordinates, so that like is compared with like.
-        body: the reduced body, seen from its reference interface.
-        E: (n_local, r) its nodal shapes.
+    [rad] of the interface that has turned most.
 
     Raises:
         ModelError: naming a load under which the body has no stable equilibrium.
     """
+    draft.watch.begin(COMPARISON_STAGE)
+    geometric, model, ops, body, E = draft.nonlinear, draft.model, draft.ops, draft.body, draft.E
     full = HeldSolid.of(
-        model, connection, body.reference, held_motions(geometric, model.interfaces),
+        model, draft.connection, body.reference, held_motions(geometric, model.interfaces),
         neo_hookean=geometric.sampling is not None,
     )  # fmt: skip
     quartic, still = body.energy(), body.mean_rows(geometric.fixed)
@@ -107,7 +99,8 @@ def deflection_rows(
     rows.append(row("energy that cells add, too coarse to bend so far", coarse, MESH_RTOL))
     most = np.degrees(max(case["turn"] for case in table.values()))
     rows.append(Row("turn of an interface that holds [degrees]", most, "information", True))
-    return rows, table
+    draft.rows = (*draft.rows, *rows)
+    body.provenance["large deflection"] = table
 
 
 def _added_by_cells(model: FEModel, U: Array) -> float:

@@ -8,10 +8,10 @@ from scipy.linalg import eigvalsh
 from rom.arguments import typed
 from rom.body.flexible import FlexibleBody
 from rom.body.reference import marker_motion, reference_motion, rigid_elastic, rigid_mass
-from rom.eigen.scipy import SciPyOperators
-from rom.eigen.verbs import given_rigid_motions, rigid_motions
+from rom.eigen.verbs import given_rigid_motions
 from rom.errors import ConfigError
 from rom.model import Array, FEModel, Report, Row
+from rom.reduction.full_model import mesh_operators
 from rom.rows import row
 
 
@@ -41,7 +41,7 @@ def check_model(model: FEModel) -> Report:
         ConfigError: if stiffness and mass are not square matrices of one size.
         ModelError: if its operators were made without geometry.
     """
-    ops: Any = model.operators or SciPyOperators(model.K, model.M, rigid_motions(model.points))
+    ops: Any = mesh_operators(model)
     R = given_rigid_motions(ops)
     KR, MR = ops.apply_K(R), ops.apply_M(R)
     x = np.sin(np.arange(ops.first, ops.first + ops.n_local) + 1.0)[:, None]

@@ -9,6 +9,7 @@ from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
+from scipy.linalg import qr
 from scipy.sparse import identity, kron
 
 from rom.errors import InterfaceError, ModelError
@@ -263,10 +264,17 @@ def unit_motions(ops: Operators, boundary: Index) -> Array:
 
 def constraint_modes(ops: Operators, held: Held, boundary: Index) -> Array:
     """(n_local, n_b) static shapes: one boundary dof moved by one, the other boundary dofs held."""
-    Psi = unit_motions(ops, boundary)
-    for some in column_blocks(boundary.size):
-        Psi[:, some] -= held(ops.apply_K(Psi[:, some]))
-    return Psi
+    return static_shapes(ops, held, unit_motions(ops, boundary))
+
+
+def static_shapes(ops: Operators, held: Held, E: Array) -> Array:
+    """(n_local, k) static answers to motions E (n_local, k) of what is held, zero elsewhere [m].
+
+    The motions themselves become the answers, in their place.
+    """
+    for some in column_blocks(E.shape[1]):
+        E[:, some] -= held(ops.apply_K(E[:, some]))
+    return E
 
 
 def orthonormal(ops: Mass, X: Array) -> Array:
@@ -340,6 +348,11 @@ def own_rows(ops: Operators, X: Array) -> Array:
     return X[ops.first : ops.first + ops.n_local]
 
 
+def own_points(ops: Operators, points: Array) -> Array:
+    """(n_local / 3, 3) nodes of this rank, of all (n / 3, 3) [m]."""
+    return points[ops.first // 3 : (ops.first + ops.n_local) // 3]
+
+
 def every_row(ops: Operators, X: Array) -> Array:
     """(n, k) rows of all ranks, on each of them, of (n_local, k) of any units."""
     return ops.rows(X, np.arange(ops.n))
@@ -377,6 +390,16 @@ def rigid_motions(points: Array) -> Array:
     R[:, 0, 4], R[:, 2, 4] = z, -x
     R[:, 0, 5], R[:, 1, 5] = -y, x
     return R.reshape(-1, 6)
+
+
+def pins(motions: Array) -> Index:
+    """(p,) rows of motions (k, m) that, held at zero, stop all combinations of them."""
+    if not motions.shape[1]:
+        return np.zeros(0, dtype=np.int64)
+    scaled = motions / np.linalg.norm(motions, axis=0)
+    R, order = qr(scaled.T, mode="r", pivoting=True)
+    size = np.abs(np.diag(R))
+    return np.sort(order[: np.count_nonzero(size > DEPENDENT_RTOL * size[0])]).astype(np.int64)
 
 
 def mean_motion(interface: Interface) -> Array:

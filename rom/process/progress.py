@@ -71,11 +71,12 @@ def in_silence(label: str) -> None:
 
 
 @contextmanager
-def stages(total: int, *, long: bool = True) -> Iterator[Callable[[str], None]]:
+def stages(total: int, begun: int = 0, *, long: bool = True) -> Iterator[Callable[[str], None]]:
     """Around work in stages, of which each is named where it begins; silent where nobody looks.
 
     Args:
         total: number of stages.
+        begun: number of those that have had a line before.
         long: whether the work is long enough for a line of progress.
 
     Yields:
@@ -84,7 +85,7 @@ def stages(total: int, *, long: bool = True) -> Iterator[Callable[[str], None]]:
     if not (long and looked_for()):
         yield in_silence
         return
-    progress, begun = Progress(total), 0
+    progress = Progress(total)
 
     def begin(label: str) -> None:
         nonlocal begun

@@ -10,7 +10,7 @@ from rom.eigen.attachments import added_mass
 from rom.eigen.band import modes_up_to
 from rom.eigen.scipy import SciPyOperators
 from rom.eigen.supports import Fixed, Springs, refuse_loose, spring_matrices, supports
-from rom.eigen.verbs import COLUMNS_AT_ONCE, Operators, rigid_motions
+from rom.eigen.verbs import COLUMNS_AT_ONCE, Operators, own_points, rigid_motions
 from rom.errors import ConfigError
 from rom.model import Array, FEModel, Index, Modes
 from rom.process.progress import MANY_DOFS, stages
@@ -64,7 +64,7 @@ def mass_properties(model: FEModel) -> MassProperties:
         1.0
     """
     ops = operators(model)
-    R = rigid_motions(model.points[ops.first // 3 : (ops.first + ops.n_local) // 3])
+    R = rigid_motions(own_points(ops, model.points))
     M = ops.gram(R, ops.apply_M(R))
     mass, first = float(np.trace(M[:3, :3])) / 3, 0.5 * (M[:3, 3:] - M[:3, 3:].T)
     centre = np.array([first[1, 2], first[2, 0], first[0, 1]]) / mass

@@ -25,8 +25,8 @@ from rom.body.stiffening import (
 from rom.components.wheels.rotation import rotation_matrices
 from rom.eigen.verbs import rigid_motions
 from rom.errors import ConfigError, ModelError, RomWarning
+from rom.reduction.full_model import operators
 from rom.reduction.interfaces.connection import connect
-from rom.workflow import operators
 
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")
 import ufl

@@ -26,9 +26,10 @@ from rom.checks.deflection import (
     DISPLACEMENT_RTOL,
     STEP_SHARES,
     Step,
-    deflection_rows,
+    compare_deflections,
     load_cases,
 )
+from rom.checks.draft import Draft
 from rom.eigen.verbs import rigid_motions
 from rom.errors import ConfigError, InterfaceError, ModelError, ResourceError, RomWarning
 
@@ -270,7 +271,7 @@ def test_a_bent_body_yields_to_a_torque_beside_its_range_as_the_full_model_does(
 
 def test_a_basis_without_derivatives_locks_and_its_certificate_fails(monkeypatch):
     model, EI = slender(50, 6, nu=0.3)
-    monkeypatch.setattr("rom.workflow.enriched", lambda *given: given[4])
+    monkeypatch.setattr("rom.stages.deflection.enriched", lambda *given: given[4])
     body = reduced(model, (0, 2 * EI, 0, 0, 0, 0), n_modes=4, certify=True)
     assert not body.certificate.ok
     failed = deflections_compared(body)["tip f_y: displacement"]
@@ -354,7 +355,10 @@ def test_a_range_holds_to_the_last_step_before_one_that_fails(
     after = cycle(steps[: n_found + 1] if n_found < 3 else steps)
     monkeypatch.setattr("rom.body.nonlinear.full.HeldSolid.of", lambda *given, **law: Known(after))
     monkeypatch.setattr("rom.checks.deflection._compared", lambda *given: given[-1][-1])
-    rows, table = deflection_rows(geometric, model, model.operators, None, body, E)
+    draft = Draft(model=model, nonlinear=geometric)
+    draft.connection, draft.body, draft.E = None, replace(body, provenance={}), E
+    compare_deflections(draft)
+    table = draft.body.provenance["large deflection"]
     one, shares = table["-tip f_z"], (0.0, *STEP_SHARES)
     assert one["holds to"] == shares[holds]
     assert one["share"] == list(STEP_SHARES[:n_found])
@@ -363,7 +367,7 @@ def test_a_range_holds_to_the_last_step_before_one_that_fails(
     path = follow(body.quartic, np.outer(STEP_SHARES, load))
     energies = [0.0, *map(body.quartic.energy, path)]
     assert_allclose(one["energy"], energies[holds], rtol=1e-6)
-    assert all(r.ok for r in rows) == (holds == 3)
+    assert all(r.ok for r in draft.rows) == (holds == 3)
 
 
 class Known:

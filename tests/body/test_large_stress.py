@@ -85,7 +85,7 @@ def bent():
         return cauchy_recovery(model, E)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("rom.workflow.cauchy_recovery", recovery)
+        patch.setattr("rom.stages.deflection.cauchy_recovery", recovery)
         body = stressed(model, load["tip"])
     return model, body, body.equilibria(load, shares=(0.5, 1.0))[-1], shapes[0], load["tip"]
 
@@ -148,7 +148,7 @@ def test_the_certificate_has_a_row_of_stress(monkeypatch):
     rows = {}
     for name in ("all", "locked"):
         if name == "locked":
-            monkeypatch.setattr("rom.workflow.enriched", lambda *given: given[4])
+            monkeypatch.setattr("rom.stages.deflection.enriched", lambda *given: given[4])
         body = stressed(model, (0, EI, 0, 0, 0, 0), n_modes=2, certify=True)
         rows[name] = next(r for r in body.certificate.rows if r.quantity == "tip f_y: stress")
     assert rows["all"].ok and rows["all"].value < 0.02

@@ -20,8 +20,8 @@ from rom.eigen import search  # noqa: E402
 from rom.eigen.condensed import condensed  # noqa: E402
 from rom.eigen.verbs import constraint_modes  # noqa: E402
 from rom.fe.elasticity import assemble  # noqa: E402
+from rom.reduction.full_model import operators  # noqa: E402
 from rom.reduction.interfaces.connection import connect  # noqa: E402
-from rom.workflow import operators  # noqa: E402
 
 STEEL = rom.Material(E=210e9, nu=0.3, rho=7850.0)
 KINDS = ("rbe2", "rbe3", rom.Polynomial(1), "full")

@@ -17,7 +17,7 @@ from cases.paths import RANKS, ROOT
 from cases.ranks.environment import ENVIRONMENT
 from rom.errors import ResourceError
 from rom.process.mpirun import mpirun
-from rom.workflow import operators
+from rom.reduction.full_model import operators
 
 pytestmark = pytest.mark.fenicsx
 STEEL = rom.Material(E=210e9, nu=0.3, rho=7850.0)

@@ -9,8 +9,8 @@ from scipy.linalg import null_space
 
 import rom
 from rom.errors import ConfigError
+from rom.reduction.full_model import operators
 from rom.reduction.interfaces.connection import connect
-from rom.workflow import operators
 
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")
 pytestmark = pytest.mark.fenicsx

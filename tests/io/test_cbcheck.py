@@ -14,8 +14,8 @@ from benchmarks.models import KINDS
 from benchmarks.models import bar as bar_of
 from cases.paths import TESTS
 from rom.eigen.verbs import rigid_motions
+from rom.reduction.full_model import operators
 from rom.reduction.interfaces.connection import connect
-from rom.workflow import operators
 
 REFERENCE = TESTS / "reference"
 N_MODES = 12

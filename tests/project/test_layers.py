@@ -40,8 +40,8 @@ ORDER = {
         "": (
             "errors notebook rotation places fields lazy names readable process plausible "
             "arguments units material model rows paths decks eigen reduction body fe checks "
-            "assembly cyclic workflow parametric updating prestress io mbs fmu view config report "
-            "doctor cli components __main__"
+            "stages workflow assembly cyclic parametric updating prestress io mbs fmu view config "
+            "report doctor cli components __main__"
         ),
         "cli": (
             "answer speech schemas options described ranks matrices model output verbs parser main"
@@ -87,8 +87,9 @@ ORDER = {
         "components.journal_bearing": ("films closed_forms oil_film statics oil record keys field"),
         "body": (
             "recovery nonlinear records inertia reference stiffening conversion frame rotating "
-            "surface flexible prestress projection correction damping spread"
+            "surface flexible prestress projection damping spread"
         ),
+        "stages": "bodies deflection",
         "reduction": "bases interfaces full_model",
         "view": "canvas figures scenes",
     }.items()

@@ -16,10 +16,10 @@ from rom.eigen.scipy import HeldSciPy
 from rom.eigen.verbs import constraint_modes, quadratic, rigid_motions
 from rom.errors import ConfigError, InterfaceError
 from rom.model import Interface
+from rom.reduction.full_model import operators
 from rom.reduction.interfaces.connection import connect
 from rom.reduction.interfaces.kinds import tie
 from rom.reduction.interfaces.polynomial import cylinder_coordinates, interface_functions
-from rom.workflow import operators
 
 
 @pytest.mark.parametrize(

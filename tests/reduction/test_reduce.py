@@ -14,8 +14,8 @@ from rom.body.reference import rigid_elastic, rigid_mass
 from rom.eigen.scipy import SciPyOperators
 from rom.eigen.verbs import mean_motion, rigid_motions
 from rom.errors import ConfigError, InterfaceError, MaterialError, ModelError
+from rom.reduction.full_model import operators
 from rom.reduction.interfaces.connection import connect
-from rom.workflow import operators
 
 KINDS = {"root": "rbe2", "tip": "rbe2"}
 SUPPORTS = [(), ("root",), ("tip",)]

@@ -6,7 +6,7 @@ import pytest
 import rom
 from cases.solid import block
 from rom.errors import ConfigError
-from rom.workflow import judged_in
+from rom.reduction.bases.method import judged_in
 
 KINDS = {"root": "rbe2", "tip": "rbe2"}
 BODIES = [  # size [m], cells

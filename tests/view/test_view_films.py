@@ -14,12 +14,12 @@ pytest.importorskip("matplotlib", reason="pictures need matplotlib")
 
 import rom
 from cases.solid import block
-from rom import workflow
 from rom.checks import certificate
 from rom.errors import ConfigError, ResourceError
 from rom.io.ours import is_ours
 from rom.process import progress
 from rom.reduction import full_model
+from rom.stages import bodies
 from rom.view.canvas.films import Film, even, film_path
 
 PAGES = np.arange(3 * 5 * 7 * 3, dtype=np.uint8).reshape(3, 5, 7, 3)
@@ -154,7 +154,7 @@ def test_stages_are_named_as_they_begin_and_cleared(monkeypatch):
 
 def test_reductions_and_modes_of_large_models_say_how_far_they_are(monkeypatch):
     """On the command line, whose -q sets the logger, as in Python."""
-    for module in (workflow, full_model, certificate):
+    for module in (bodies, full_model, certificate):
         monkeypatch.setattr(module, "MANY_DOFS", 100)
     monkeypatch.setattr(progress, "find_spec", lambda name: None)
 

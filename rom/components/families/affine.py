@@ -1,50 +1,26 @@
 """A finite element model as a sum of terms, one per region."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from rom.body.flexible import FlexibleBody
-from rom.body.inertia import InertiaIntegrals, inertia_integrals, point_integrals, weighted
+from rom.body.inertia import inertia_integrals, weighted
+from rom.body.projection import carried_integrals, stress_recovery
 from rom.body.recovery import StressRecovery
 from rom.components.families.family import Share
 from rom.components.families.layers import Stretch
 from rom.components.families.parameters import Density, Parameter, Point, factors
-from rom.eigen.attachments import added_mass, carried_displacements
-from rom.eigen.verbs import Operators
+from rom.eigen.attachments import added_mass
+from rom.eigen.verbs import Operators, own_points
 from rom.errors import ParameterError
 from rom.model import Array, FEModel, Region
 from rom.names import offered
 from rom.reduction.full_model import mesh_operators
 
 REMAINDER_RTOL = 1e-12  # share of mass and stiffness below which all belongs to named regions
-
-
-@dataclass(frozen=True, slots=True)
-class RegionOperators:
-    """The verbs that projection needs, on the matrices of one region."""
-
-    ops: Operators
-    region: Region
-
-    @property
-    def n_local(self) -> int:
-        """Number of this process's rows."""
-        return self.ops.n_local
-
-    def apply_K(self, X: Array) -> Array:
-        """K_i X."""
-        return self.ops.product(self.region.K, X)
-
-    def apply_M(self, X: Array) -> Array:
-        """M_i X."""
-        return self.ops.product(self.region.M, X)
-
-    def gram(self, X: Array, Y: Array) -> Array:
-        """X^T Y summed over the ranks."""
-        return self.ops.gram(X, Y)
 
 
 class AffineModel:
@@ -127,39 +103,28 @@ class AffineModel:
             stress: (6 p, r) stress on the surface at factors of one [Pa], or None.
         """
         ops = self.ops
-        first, K = ops.first // 3, symmetric(ops.gram(E, ops.apply_K(E)))
-        points = self.model.points[first : first + ops.n_local // 3]
+        K, points = symmetric(ops.gram(E, ops.apply_K(E))), own_points(ops, self.model.points)
         remainder = inertia_integrals(ops, points, E)
         mass, stiffness = remainder.mass, np.trace(K)
         for name, region in self.regions.items():
-            part: Any = RegionOperators(ops, region)
-            integrals = inertia_integrals(part, points, E)
+            integrals = inertia_integrals(ops, points, E, region.M)
             share = Share(
                 name,
                 integrals,
-                symmetric(part.gram(E, part.apply_K(E))),
-                None if stress is None else _stress(region.stresses, self.model, E),
+                symmetric(ops.gram(E, ops.product(region.K, E))),
+                None if stress is None else self._stress(region, E),
             )
             yield share
             remainder, K = weighted(np.array([1, -1]), [remainder, integrals]), K - share.K
             stress = None if stress is None else stress - share.stress
         if remainder.mass > REMAINDER_RTOL * mass or np.trace(K) > REMAINDER_RTOL * stiffness:
             yield Share(None, remainder, K, stress)
-        if self.model.attachments:
-            yield Share(None, self._carried(E), np.zeros_like(K), None, fixed=True)
+        if carried := carried_integrals(self.model, ops, E):
+            together = weighted(np.ones(len(carried)), carried)
+            yield Share(None, together, np.zeros_like(K), fixed=True)
 
-    def _carried(self, E: Array) -> InertiaIntegrals:
-        parts = []
-        for attachment in self.model.attachments:
-            points, masses, N = carried_displacements(attachment, self.model)
-            dofs = self.model.interfaces[attachment.interface].dofs
-            parts.append(point_integrals(points, masses, N @ self.ops.rows(E, dofs)))
-        return weighted(np.ones(len(parts)), parts)
-
-
-def _stress(stresses: Any, model: FEModel, E: Array) -> Array:
-    nodes = model.surface.nodes
-    return stresses.at_nodes(E, nodes).reshape(6 * nodes.size, -1)
+    def _stress(self, region: Region, E: Array) -> Array:
+        return stress_recovery(replace(self.model, stresses=region.stresses), E).operator
 
 
 def symmetric(A: Array) -> Array:

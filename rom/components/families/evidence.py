@@ -1,13 +1,11 @@
 """How far to trust a family: errors estimated as it grows, and compared where it was not made."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
-import numpy as np
-
-from rom.body.flexible import FlexibleBody
 from rom.body.projection import elastic_part
 from rom.checks.certificate import (
+    attach,
     basis_matrices,
     compared,
     condensed_model,
@@ -15,9 +13,9 @@ from rom.checks.certificate import (
     reduced_shapes,
     rigid_rows,
 )
+from rom.checks.draft import COMPARISON_STAGE, Draft
 from rom.components.families.affine import AffineModel
-from rom.components.families.family import BodyFamily
-from rom.components.families.parameters import scattered
+from rom.components.families.parameters import Point, scattered
 from rom.eigen.verbs import residual_errors
 from rom.model import Basis, Report, Row
 from rom.reduction.interfaces.connection import connect
@@ -25,6 +23,23 @@ from rom.reduction.interfaces.records import Connection
 from rom.rows import N_COMPARED, frequency_rows, row
 
 HELD_OUT = 3  # points of the certificate
+
+
+@dataclass(kw_only=True)
+class FamilyDraft(Draft):
+    """The reduction of a family under way; its model is that at the centre of the ranges.
+
+    Attributes:
+        affine: the model at all points.
+        tol: error of frequencies that is accepted [1].
+        samples: points whose bases have joined.
+        n_trials: number of points at which errors were estimated as the basis grew.
+    """
+
+    affine: AffineModel
+    tol: float
+    samples: list[Point]
+    n_trials: int = 0
 
 
 def _supports(connection: Connection) -> list[tuple[str, ...]]:
@@ -45,59 +60,38 @@ def estimated(connection: Connection, basis: Basis) -> float:
     return worst
 
 
-def certified(
-    affine: AffineModel,
-    family: BodyFamily,
-    connection: Connection,
-    basis: Basis,
-    interfaces: dict[str, Any],
-    tol: float,
-    *,
-    first: int,
-) -> tuple[Report, dict[str, Any]]:
-    """Bodies of a family against full models, at points that were not sampled."""
+def certify(draft: FamilyDraft) -> None:
+    """Compare bodies of the family with full models, at points that were not sampled."""
+    draft.watch.begin(COMPARISON_STAGE)
+    affine, family, basis, kinds = draft.affine, draft.body, draft.basis, draft.interfaces
+    if affine.stretch is not None:  # its interfaces are rigid at each thickness in another way
+        kinds = dict.fromkeys(kinds, "rbe2")
     rows: list[Row] = []
     comparison: dict[str, Any] = {}
-    Psi, own = connection.ops.expand(basis.Psi), replace(basis, held=None)  # of another point
-    for point in scattered(affine.parameters, HELD_OUT, first):
+    own = replace(basis, held=None)  # of another point
+    for point in scattered(affine.parameters, HELD_OUT, 1 + draft.n_trials):
         where = ", ".join(f"{name} = {value:.4g}" for name, value in point.items())
         ops, body = affine.at(point), family.at(extrapolate=False, **point)
-        here = connect(ops, affine.model_at(point), interfaces)
+        here = connect(ops, affine.model_at(point), kinds)
         found: list[Row] = []
-        parts = matrices = None
+        reduction: Any = None  # the basis of a stretched body depends on the thickness
         if affine.stretch is None:
             matrices = basis_matrices(here.ops, basis)
-            parts = condensed_model(here, own, matrices[0])
+            reduction = basis, condensed_model(here, own, matrices[0]), matrices
         for fixed in _supports(here):
-            if parts and matrices:
-                support = full_support(here, parts, fixed)
-                table = compared(here, ops, body, (basis, parts, matrices), fixed, support)
-            else:
-                table = _frequencies(here, body, fixed)
+            known = reduction is not None or here.ops.affordable
+            support = full_support(here, reduction and reduction[1], fixed) if known else None
+            table = compared(here, ops, body, reduction, fixed, support)
             if not table["reduced"]:
                 continue
             words = " + ".join(fixed) + " held" if fixed else "free"
             comparison[f"{where}: {words}"] = table
             if table["full"]:
-                found += frequency_rows(words, table, tol)
+                found += frequency_rows(words, table, draft.tol)
             elif table["estimated"]:
                 label = f"{words}: estimated error of {len(table['reduced'])} frequencies"
-                found.append(row(label, max(table["estimated"]), tol))
-        found += rigid_rows(ops, body, elastic_part(ops, Psi))
+                found.append(row(label, max(table["estimated"]), draft.tol))
+        found += rigid_rows(ops, body, elastic_part(ops, draft.Psi))
         rows += [replace(line, quantity=f"{where}: {line.quantity}") for line in found]
-    return Report(f"certificate of the family {family.body.name}", tuple(rows)), comparison
-
-
-def _frequencies(
-    connection: Connection, body: FlexibleBody, fixed: tuple[str, ...]
-) -> dict[str, list[float]]:
-    """Frequencies of both models in one support, as `compared` gives them, without shapes."""
-    omega = body.modes(fixed=fixed)[0]
-    n_rigid = int(np.count_nonzero(omega == 0.0))
-    n = min(N_COMPARED, omega.size - n_rigid)
-    table: dict[str, list[float]] = {"full": [], "reduced": [], "mac": [], "estimated": []}
-    if n > 0 and connection.ops.affordable:
-        full, _ = connection.ops.modes(connection.held(fixed), n + n_rigid)
-        table["full"] = (full[n_rigid:] / (2 * np.pi)).tolist()
-        table["reduced"] = (omega[n_rigid : n_rigid + n] / (2 * np.pi)).tolist()
-    return table
+    report = Report(f"certificate of the family {family.body.name}", tuple(rows))
+    attach(draft, report, comparison, f"family {draft.name!r}")

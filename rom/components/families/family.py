@@ -18,7 +18,7 @@ from rom.arguments import typed
 from rom.body.damping import ModalDamping, Rayleigh, damped
 from rom.body.flexible import FlexibleBody
 from rom.body.frame import reference_label
-from rom.body.inertia import InertiaIntegrals, weighted
+from rom.body.inertia import InertiaIntegrals, fields_of, weighted
 from rom.body.recovery import StressRecovery
 from rom.components.families.layers import Stretch, stretched_body
 from rom.components.families.parameters import (
@@ -146,7 +146,7 @@ class BodyFamily:
             stress = StressRecovery(stress.points, _sum(k, parts))
         return replace(
             self.body,
-            **{name: getattr(integrals, name) for name in integrals.__slots__},
+            **fields_of(integrals),
             K=_sum(k, [share.K for share in self.shares]),
             stress=stress,
             **made,

@@ -2,17 +2,17 @@
 
 import logging
 from dataclasses import replace
-from time import perf_counter
 from typing import Any
 
 import numpy as np
 
 from rom.arguments import between, typed
 from rom.body.damping import ModalDamping, Rayleigh
-from rom.body.projection import canonical_columns, elastic_part, flexible_body
+from rom.body.projection import stress_recovery
+from rom.checks.draft import Stage, run, wanted
 from rom.components.families.affine import AffineModel
-from rom.components.families.common_basis import CommonBasis, first_sample
-from rom.components.families.evidence import certified, estimated
+from rom.components.families.common_basis import first_sample
+from rom.components.families.evidence import FamilyDraft, certify, estimated
 from rom.components.families.family import BodyFamily
 from rom.components.families.parameters import (
     Parameter,
@@ -30,8 +30,8 @@ from rom.model import FEModel
 from rom.names import check_name
 from rom.reduction.bases.method import Method
 from rom.reduction.interfaces.characteristic import Characteristic
-from rom.reduction.interfaces.connection import connect
-from rom.reduction.interfaces.records import Connection
+from rom.reduction.interfaces.connection import connect as connected
+from rom.stages.bodies import connect, few_functions, make_body, place_frame, project
 
 log = logging.getLogger("rom")
 SHAPE_RATIO = 0.1  # of the square root of the tolerance: a shape dropped costs its square in energy
@@ -97,52 +97,52 @@ def reduce_parametric(  # noqa: PLR0913  one keyword per choice
         57 (2015) 483.
     """
     check_name(name, "a body")
-    clock = perf_counter()
     between("tol", tol, 0, 1, "()")
     affine = _affine(model, checked_parameters(parameters), stress)
     middle = centre(affine.parameters)
-    there, kinds = affine.model_at(middle), affine.kinds(interfaces)
-    connection = connect(affine.at(middle), there, kinds)
-    described = repr(method)
-    if isinstance(method, Characteristic):
-        interfaces = kinds = method.kinds(connection, interfaces)
-        method = method.method
-        connection = connect(affine.at(middle), there, kinds)
-    common, samples = _common_basis(affine, connection, method, kinds, tol)
-    Psi = connection.ops.expand(common.basis.Psi)
-    elastic, bare = elastic_part(affine.at(middle), Psi), affine.bare(middle)
-    provenance = model.provenance | {
-        "reduction": {
-            "method": described,
-            "full dofs": affine.ops.n,
-            "columns": list(common.basis.labels),
-            "static shapes": True,
-            "points sampled": samples,
-        },
-        "ranges": written(affine.parameters),
-    }
-    body = flexible_body(
-        there, bare, Psi, elastic, ties=connection.ties, name=name, provenance=provenance,
-        stress=(lambda _: None) if stress else None,
+    draft = FamilyDraft(
+        model=affine.model_at(middle), method=method, interfaces=affine.kinds(interfaces),
+        reference=reference, damping=damping, name=name, stress=stress, certify=certify,
+        affine=affine, tol=tol, samples=[middle],
     )  # fmt: skip
-    E = canonical_columns(bare, Psi @ elastic.V, there)
-    family = BodyFamily(
-        parameters=affine.parameters,
-        damping=damping,
-        provenance=provenance,
-        **affine.terms(body, E),
+    draft.ops, draft.bare = affine.at(middle), affine.bare(middle)
+    family = run(stages(draft), draft)
+    family.provenance["seconds to reduce"] = draft.seconds
+    return family
+
+
+def stages(draft: FamilyDraft) -> list[Stage]:
+    """What `reduce_parametric` does: most stages are those of one body, at the centre."""
+    return wanted(
+        (True, connect),
+        (isinstance(draft.method, Characteristic), few_functions),
+        (True, join_bases),
+        (True, project),
+        (True, make_body),
+        (draft.stress, recover),
+        (True, share_out),
+        (True, place_frame),
+        (draft.certify, certify),
     )
-    family = family.with_reference(reference)
-    provenance["seconds to reduce"] = round(perf_counter() - clock, 3)
-    if not certify:
-        return family
-    certificate, comparison = certified(
-        affine, family, connection, common.basis, interfaces, tol,
-        first=1 + TRIALS_PER_PARAMETER * len(affine.moving),
-    )  # fmt: skip
-    certificate.warn_of_failures(f"the certificate of family {name!r}")
-    return replace(
-        family, certificate=certificate, provenance=provenance | {"comparison": comparison}
+
+
+def recover(draft: FamilyDraft) -> None:
+    """Make stress recoverable; that of modes left out is known at one point only."""
+    draft.body = replace(draft.body, stress=stress_recovery(draft.model, draft.E))
+
+
+def share_out(draft: FamilyDraft) -> None:
+    """Take the body apart into terms, one per region: the family."""
+    provenance = draft.body.provenance
+    provenance["ranges"] = written(draft.affine.parameters)
+    reduction = provenance["reduction"]
+    reduction["points sampled"] = draft.samples
+    del reduction["frequencies of the modes kept [Hz]"]  # those of the centre, where they are known
+    draft.body = BodyFamily(
+        parameters=draft.affine.parameters,
+        damping=draft.damping,
+        provenance=provenance,
+        **draft.affine.terms(draft.body, draft.E),
     )
 
 
@@ -157,37 +157,35 @@ def _affine(model: FEModel, parameters: dict[str, Parameter], stress: bool) -> A
     return StretchedModel(model, parameters)
 
 
-def _common_basis(
-    affine: AffineModel,
-    connection: Connection,
-    method: Method,
-    kinds: dict[str, Any],
-    tol: float,
-) -> tuple[CommonBasis, list[Point]]:
-    """The bases of the centre, of the corners, and of trial points whose errors are too large."""
-    boundary = connection.boundary
-    basis = method.basis(connection.ops, boundary, connection.labels)
-    common = first_sample(connection.ops, basis, boundary, SHAPE_RATIO * np.sqrt(tol))
-    samples, moving = [centre(affine.parameters)], affine.moving
-    limit = max(tol, METHOD_ERROR_FACTOR * estimated(connection, basis)) if moving else tol
+def join_bases(draft: FamilyDraft) -> None:
+    """Join the bases of the centre, the corners, and trial points whose errors are too large."""
+    affine, connection = draft.affine, draft.connection
+    boundary, moving = connection.boundary, affine.moving
+    basis = draft.maker.basis(connection.ops, boundary, connection.labels)
+    common = first_sample(connection.ops, basis, boundary, SHAPE_RATIO * np.sqrt(draft.tol))
+    limit = draft.tol
+    if moving:
+        limit = max(limit, METHOD_ERROR_FACTOR * estimated(connection, basis))
     for ops, moved in affine.rigid_samples():
-        common = common.with_shapes(connect(ops, moved, kinds).ops.rigid, boundary)
+        rigid = connected(ops, moved, draft.interfaces).ops.rigid
+        common = common.with_shapes(rigid, boundary)
 
     def visit(point: Point, *, whatever: bool) -> bool:
         nonlocal common
-        here = connect(affine.at(point), affine.model_at(point), kinds)
+        here = connected(affine.at(point), affine.model_at(point), draft.interfaces)
         if not whatever and estimated(here, common.basis) <= limit:
             return False
-        found = method.basis(here.ops, boundary, here.labels)
+        found = draft.maker.basis(here.ops, boundary, here.labels)
         common = common.joined(found, boundary)
-        samples.append(point)
+        draft.samples.append(point)
         return True
 
     for point in corners(affine.parameters, moving):
         visit(point, whatever=True)
-    trials = scattered(affine.parameters, TRIALS_PER_PARAMETER * len(moving))
+    draft.n_trials = TRIALS_PER_PARAMETER * len(moving)
+    trials = scattered(affine.parameters, draft.n_trials)
     added = [visit(point, whatever=False) for point in trials]
+    draft.basis = common.basis
     if affine.ops.first == 0:
-        log.info("%d points sampled, %d of them trials; %d columns", len(samples), sum(added),
+        log.info("%d points sampled, %d of them trials; %d columns", len(draft.samples), sum(added),
                  common.basis.Psi.shape[1])  # fmt: skip
-    return common, samples

@@ -9,11 +9,11 @@ from scipy.sparse import identity, kron
 
 from rom.body.flexible import FlexibleBody
 from rom.body.inertia import inertia_integrals
-from rom.components.families.affine import AffineModel, RegionOperators, symmetric
+from rom.components.families.affine import AffineModel, symmetric
 from rom.components.families.family import Share
 from rom.components.families.layers import Stretch
 from rom.components.families.parameters import Parameter, Point, Thickness, centre, factor, factors
-from rom.eigen.verbs import Operators, orthonormal_in, rigid_motions
+from rom.eigen.verbs import Operators, orthonormal_in, own_points, rigid_motions
 from rom.errors import ModelError, ParameterError
 from rom.model import Array, FEModel, Interface, Layered
 from rom.reduction.interfaces.characteristic import GivenFunctions
@@ -81,7 +81,7 @@ class StretchedModel(AffineModel):
         nominal = np.ones(2 + len(self.stretch.regions))
         for w in (nominal, *(nominal + e for e in np.eye(nominal.size)[1:])):
             moved = self._moved(w)
-            rigid = rigid_motions(self._local(moved.points))
+            rigid = rigid_motions(own_points(self.ops, moved.points))
             yield self.ops.varied((1.0, []), (1.0, []), rigid), moved
 
     def _moved(self, w: Array) -> FEModel:
@@ -136,22 +136,22 @@ class StretchedModel(AffineModel):
                 (k[i] / t[i], parts.K_across),
             ]
             M.append((m[i] * t[i], region.M))
-        points = self._local(self.model_at(point).points)
+        points = own_points(self.ops, self.model_at(point).points)
         return self.ops.varied((0.0, K), (0.0, M), rigid_motions(points))
 
     def terms(self, body: FlexibleBody, E: Array) -> dict[str, Any]:
         """Fields of the family: its body at nominal points, shares and layers."""
-        points, middle = self._local(self.model.points), self.bare(centre(self.parameters))
+        points, middle = own_points(self.ops, self.model.points), self.bare(centre(self.parameters))
         X = self.stretch.fields(points)
         Phi = np.hstack([middle.rigid, E])
         columns = np.hstack([X.reshape(len(X), -1).T, Phi])
         shares = []
         for name, region in self.regions.items():
-            part: Any = RegionOperators(self.ops, region)
             parts = self.layered[name]
             matrices = (parts.K_along, parts.K_mixed, parts.K_across)
             K = [symmetric(self.ops.gram(Phi, self.ops.product(A, Phi))) for A in matrices]
-            shares.append(Share(name, inertia_integrals(part, points, columns), np.array(K)))
+            integrals = inertia_integrals(self.ops, points, columns, region.M)
+            shares.append(Share(name, integrals, np.array(K)))
         self._refuse_more(E, shares)
         rigid = np.array([self._coefficients(middle, Phi, R) for R in self.stretch.motions(points)])
         markers = {
@@ -199,7 +199,3 @@ class StretchedModel(AffineModel):
 
     def _slopes(self, point: Point) -> Array:
         return np.array([factor(self.parameters, Thickness, name, point) for name in self.regions])
-
-    def _local(self, points: Array) -> Array:
-        first = self.ops.first // 3
-        return points[first : first + self.ops.n_local // 3]

@@ -10,7 +10,7 @@ from scipy.optimize import linear_sum_assignment
 from rom.arguments import typed, whole
 from rom.components.wheels.modes import cyclic_modes
 from rom.components.wheels.sector import Complex, CyclicSector
-from rom.components.wheels.travelling import travelling_modes
+from rom.components.wheels.travelling import Waves, travelling_modes
 from rom.errors import ConfigError
 from rom.model import Array
 
@@ -20,7 +20,7 @@ SPEEDS_AT_ONCE = 8  # whose waves are kept until they are followed
 
 @typed
 @dataclass(frozen=True)
-class WheelCampbell:
+class WheelCampbell(Waves):
     """Frequencies over the speed, each column one wave.
 
     Attributes:
@@ -38,21 +38,6 @@ class WheelCampbell:
     omega: Array
     direction: Array
     mac: Array
-
-    @property
-    def frequencies(self) -> Array:
-        """(s, n) frequencies seen from the wheel [Hz]."""
-        return self.omega / (2 * np.pi)
-
-    @property
-    def forward(self) -> Array:
-        """(s, k) frequencies of the waves that run ahead [Hz]."""
-        return self.frequencies[:, self.direction > 0]
-
-    @property
-    def backward(self) -> Array:
-        """(s, k) frequencies of the waves that run back [Hz]."""
-        return self.frequencies[:, self.direction < 0]
 
 
 @typed

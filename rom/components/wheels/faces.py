@@ -3,11 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from scipy.sparse import csr_matrix
 from scipy.spatial import cKDTree
 
-from rom.arguments import unit_vector
 from rom.errors import InterfaceError
 from rom.model import Array, Interface
 
@@ -44,15 +42,6 @@ def turned(axis: Array, angle: float) -> Array:
     x, y, z = axis
     S = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     return np.eye(3) + np.sin(angle) * S + (1 - np.cos(angle)) * (S @ S)
-
-
-def unit_axis(axis: npt.ArrayLike) -> Array:
-    """The axis of rotation as a unit vector.
-
-    Raises:
-        ConfigError: if it has no direction.
-    """
-    return unit_vector("axis", axis)
 
 
 def paired(low: Interface, high: Interface, axis: Array, at: Array) -> Pairing:

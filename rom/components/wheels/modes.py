@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import eigh
-from scipy.sparse import bmat, csr_matrix
+from scipy.sparse import block_diag, bmat, csr_matrix
 
 from rom.arguments import typed, whole
 from rom.components.wheels.rotation import divergence_speed
@@ -90,7 +90,7 @@ def cyclic_modes(sector: CyclicSector, diameter: int, n: int, *, speed: float = 
         shapes = (T @ real).astype(complex)
         return CyclicModes(omega, shapes, sector=sector, diameter=diameter)
     parts = real_form(T)
-    K_2, M_2 = (parts.T @ _twice(A) @ parts for A in (K, sector.M))
+    K_2, M_2 = (parts.T @ block_diag([A, A], format="csr") @ parts for A in (K, sector.M))
     rigid = np.hstack([_stacked(R), _stacked(1j * R)])
     _, pairs = _real(sector.workers, K_2, M_2, rigid, 2 * (n + N_SPARE_MODES), held=held)
     omega, shapes = _waves(T, K, sector.M, pairs, rigid.shape[1], n)
@@ -180,10 +180,6 @@ def spinning(sector: CyclicSector, speed: float) -> csr_matrix:
 def real_form(T: csr_matrix) -> csr_matrix:
     """[[A, -B], [B, A]] of A + i B."""
     return csr_matrix(bmat([[T.real, -T.imag], [T.imag, T.real]]))
-
-
-def _twice(A: csr_matrix) -> csr_matrix:
-    return csr_matrix(bmat([[A, None], [None, A]]))
 
 
 def _stacked(Z: Complex) -> Array:

@@ -1,6 +1,6 @@
 """Component mode synthesis of one sector, good for all nodal diameters at once."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 from typing import Any
 
@@ -10,11 +10,12 @@ from scipy.sparse import csr_matrix, identity
 from scipy.spatial import cKDTree
 
 from rom.arguments import typed
+from rom.checks.draft import Draft, run
 from rom.components.wheels.certificate import sector_certificate
 from rom.components.wheels.sector import Complex, CyclicSector
-from rom.eigen.verbs import DEPENDENT_RTOL, every_row, orthonormal_in, own_rows
+from rom.eigen.verbs import DEPENDENT_RTOL, every_row, orthonormal_in, own_rows, static_shapes
 from rom.errors import ConfigError, InterfaceError
-from rom.model import Array, Interface, Report
+from rom.model import Array, Basis, Index, Interface, Report
 from rom.reduction.bases.method import CraigBampton
 from rom.reduction.interfaces.polynomial import FourierLegendre, Polynomial
 
@@ -89,7 +90,7 @@ def reduce_sector(
         orthogonal polynomial series, J. Eng. Gas Turbines Power 140 (2018); on cyclic faces ours.
     """
     if method is not None:
-        if n_modes is not None or not _by_number(method):
+        if n_modes is not None or method.n_modes is None:
             raise ConfigError(
                 f"a sector is reduced by a number of fixed-interface modes, not by {method!r}.",
                 hint="Write n_modes=60, or method=rom.CraigBampton(n_modes=60).",
@@ -102,19 +103,65 @@ def reduce_sector(
             "interface functions need the geometry of the cyclic faces.",
             hint="Make the sector with rom.CyclicSector.from_model.",
         )
-    Q = face_functions(sector, functions or Polynomial(4))
-    W = np.kron(Q, np.eye(3))
-    q = W.shape[1]
-    E = np.zeros((sector.n, 2 * q))
-    E[sector.master, :q] = W
-    E[sector.slave, q:] = sector.coupling @ W
-    E[sector.held] = 0.0
-    ops = sector.workers.operators(sector.K, sector.M, together=True)
-    inner = ops.hold(np.union1d(np.union1d(sector.slave, sector.master), sector.held))
-    omega, Phi = ops.modes(inner, n_modes)  # then solutions with the same factor
-    E = own_rows(ops, E)
-    Psi = every_row(ops, np.hstack([E - inner(ops.apply_K(E)), Phi]))
-    return projected(sector, Psi, q, omega)
+    faces = {CYCLIC_FACES: functions or Polynomial(4)}
+    draft = SectorDraft(model=sector, method=CraigBampton(n_modes), interfaces=faces)
+    return run((connect_faces, basis, project), draft)
+
+
+@dataclass(kw_only=True)
+class SectorDraft(Draft):
+    """The reduction of a sector under way, whose faces, and where it is cut, follow functions.
+
+    Attributes:
+        root: (3 k,) dofs of a further cut, and (k, m) functions on it.
+        parts: (held dofs, number of modes) of each part; one with all cuts held if missing.
+        moved: (n, c) unit motions of the cuts, zero on all other dofs.
+        held: dofs of the cuts, and those that do not move at all.
+        q: number of coordinates of either face.
+    """
+
+    root: tuple[Index, Array] | None = None
+    parts: tuple[tuple[Any, int], ...] = ()
+    moved: Array = field(init=False)
+    held: Index = field(init=False)
+    q: int = field(init=False)
+
+
+def connect_faces(draft: SectorDraft) -> None:
+    """Let both cyclic faces follow the same functions."""
+    sector = draft.model
+    W = np.kron(face_functions(sector, draft.interfaces[CYCLIC_FACES]), np.eye(3))
+    draft.q = q = W.shape[1]
+    draft.moved = np.zeros((sector.n, 2 * q))
+    draft.moved[sector.master, :q] = W
+    draft.moved[sector.slave, q:] = sector.coupling @ W
+    draft.moved[sector.held] = 0.0
+    draft.held = np.union1d(np.union1d(sector.slave, sector.master), sector.held)
+    draft.ops = sector.workers.operators(sector.K, sector.M, together=True)
+
+
+def connect_root(draft: SectorDraft) -> None:
+    """Let what is cut off follow functions where it is cut."""
+    dofs, Q = draft.root
+    moved = np.zeros((draft.model.n, 3 * Q.shape[1]))
+    moved[dofs] = np.kron(Q, np.eye(3))
+    moved[draft.model.held] = 0.0
+    draft.moved, draft.held = np.hstack([draft.moved, moved]), np.union1d(draft.held, dofs)
+
+
+def basis(draft: SectorDraft) -> None:
+    """Find modes of the parts, and static answers to the motions of the cuts."""
+    ops, inner = draft.ops, draft.ops.hold(draft.held)
+    parts = draft.parts or ((inner, draft.method.n_modes),)
+    modes = [ops.modes(held, n) for held, n in parts]  # then solutions with the same factor
+    static = static_shapes(ops, inner, own_rows(ops, draft.moved))
+    Psi = every_row(ops, np.hstack([static, *(Phi for _, Phi in modes)]))
+    draft.basis = Basis(Psi, modes[0][0], ())
+
+
+def project(draft: SectorDraft) -> None:
+    """Write the sector in the coordinates of its basis."""
+    draft.body = projected(draft.model, draft.basis.Psi, draft.q, draft.basis.omega)
 
 
 def reduced_by(
@@ -133,10 +180,6 @@ def reduced_by(
             hint=f"Write interfaces={{{CYCLIC_FACES!r}: rom.Polynomial(4)}}.",
         )
     return reduce_sector(sector, method=method, functions=interfaces.get(CYCLIC_FACES))
-
-
-def _by_number(method: Any) -> bool:
-    return isinstance(method, CraigBampton) and method.n_modes is not None
 
 
 def projected(sector: CyclicSector, Psi: Array, q: int, omega: Array) -> ReducedSector:

@@ -13,13 +13,14 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from scipy.linalg import LinAlgError, eigh, qr
+from scipy.linalg import LinAlgError, eigh
 from scipy.sparse import csr_matrix, identity, kron
 from scipy.sparse.linalg import LinearOperator, eigsh, splu
 
 from rom.arguments import typed
-from rom.components.wheels.sector import NO_DOFS, CyclicSector
+from rom.components.wheels.sector import CyclicSector
 from rom.eigen.search import MAX_DENSE_DOFS
+from rom.eigen.verbs import pins
 from rom.eigen.workers import held_solution
 from rom.errors import ConfigError, ModelError
 from rom.model import Array, FEModel, Index
@@ -104,11 +105,7 @@ def axial_pins(sector: CyclicSector) -> Index:
 
     Loads that are the same in all sectors and balance each other leave them without force.
     """
-    rigid = sector.rigid(0)[sector.free].real
-    if not rigid.shape[1]:
-        return NO_DOFS
-    scaled = rigid / np.linalg.norm(rigid, axis=0)
-    return np.sort(qr(scaled.T, mode="r", pivoting=True)[1][: rigid.shape[1]]).astype(np.int64)
+    return pins(sector.rigid(0)[sector.free].real)
 
 
 def divergence_speed(sector: CyclicSector, diameter: int) -> float:

@@ -21,8 +21,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy.sparse import block_diag, csr_matrix, identity, kron
 
-from rom.arguments import finite, matrix, typed, whole
-from rom.components.wheels.faces import paired, refuse_all_around, turned, unit_axis
+from rom.arguments import finite, matrix, typed, unit_vector, whole
+from rom.components.wheels.faces import paired, refuse_all_around, turned
 from rom.eigen.attachments import added_mass
 from rom.eigen.supports import Fixed, held_dofs
 from rom.eigen.verbs import rigid_motions
@@ -140,7 +140,7 @@ class CyclicSector:
             raise InterfaceError(
                 f"the sector has no interface {named(unknown)}; it has {offered(model.interfaces)}."
             )
-        e, at = unit_axis(axis), finite("at", at, (3,))
+        e, at = unit_vector("axis", axis), finite("at", at, (3,))
         pair = paired(model.interfaces[low], model.interfaces[high], e, at)
         refuse_all_around(model.points, e, at)
         M, dM = all_rows(model, model.M), added_mass(model, 0, model.n_dofs)

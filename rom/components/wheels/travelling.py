@@ -21,9 +21,31 @@ N_SPARE_WAVES = 4  # beyond those asked for
 MAX_DENSE_DOFS = 40  # all waves are computed at once up to here
 
 
+class Waves:
+    """Frequencies of waves that run ahead with the rotation, or back against it."""
+
+    omega: Array
+    direction: Array
+
+    @property
+    def frequencies(self) -> Array:
+        """(..., m) frequencies seen from the wheel [Hz]."""
+        return self.omega / (2 * np.pi)
+
+    @property
+    def forward(self) -> Array:
+        """(..., k) those of the waves that run ahead [Hz]."""
+        return self.frequencies[..., self.direction > 0]
+
+    @property
+    def backward(self) -> Array:
+        """(..., k) those of the waves that run back [Hz]."""
+        return self.frequencies[..., self.direction < 0]
+
+
 @typed
 @dataclass(frozen=True, kw_only=True)
-class TravellingModes(Modes):
+class TravellingModes(Waves, Modes):
     """Waves with the same number of nodal diameters on a wheel that turns steadily.
 
     Seen from the wheel; an observer at rest sees ``frequencies`` changed by the turning pattern,
@@ -44,16 +66,6 @@ class TravellingModes(Modes):
     diameter: int
     speed: float
     direction: Array
-
-    @property
-    def forward(self) -> Array:
-        """(k,) frequencies of the waves that run ahead, seen from the wheel [Hz]."""
-        return self.frequencies[self.direction > 0]
-
-    @property
-    def backward(self) -> Array:
-        """(k,) frequencies of the waves that run back, seen from the wheel [Hz]."""
-        return self.frequencies[self.direction < 0]
 
     @property
     def at_rest(self) -> Array:

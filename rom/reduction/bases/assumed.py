@@ -1,6 +1,6 @@
 """Modes of the body in one support alone: what assumed modes were before substructuring."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -10,7 +10,8 @@ from rom.eigen.supports import Fixed, refuse_loose
 from rom.eigen.verbs import Operators, given_rigid_motions, orthonormal
 from rom.errors import ConfigError
 from rom.model import Array, Basis, Index
-from rom.reduction.bases.free_interface import FreeFree, numbered
+from rom.reduction.bases.fixed_interface import numbered
+from rom.reduction.bases.free_interface import FreeFree
 from rom.reduction.bases.method import lowest_modes
 
 MEAN_AXES = ("mean-axis", "buckens", "free")  # no point of the body is held by these
@@ -67,24 +68,6 @@ class AssumedModes:
         omega, Phi = lowest_modes(ops, support, self.n_modes)
         names = [*numbered("rigid", R.shape[1]), *numbered("assumed", omega.size)]
         return Basis(np.hstack([R, Phi]), omega, tuple(names))
-
-
-def obeying(
-    method: AssumedModes, connection: Any, origins: dict[str, Array], reference: Any
-) -> AssumedModes:
-    """The method for a model and a frame.
-
-    Args:
-        method: how many modes, and what they obey.
-        connection: the model in interface coordinates.
-        origins: {interface: (3,) where it is [m]}.
-        reference: as `rom.reduce` takes it.
-
-    Raises:
-        ConfigError, InterfaceError: if the condition is none of those known here.
-    """
-    fixed = supported_by(reference, origins) if method.fixed is None else method.fixed
-    return replace(method, held=connection.held(fixed))
 
 
 def supported_by(reference: Any, origins: dict[str, Array]) -> Fixed:

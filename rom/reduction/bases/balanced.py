@@ -6,17 +6,17 @@ import numpy as np
 from scipy.linalg import qr, solve_continuous_lyapunov, svd
 
 from rom.arguments import between, matrix, typed, whole
-from rom.eigen.verbs import Operators, constraint_modes
+from rom.eigen.verbs import Held, Operators
 from rom.errors import ConfigError, ModelError, ResourceError
-from rom.model import Array, Basis, Index
-from rom.reduction.bases.free_interface import check_interfaces, numbered
+from rom.model import Array, Index
+from rom.reduction.bases.fixed_interface import Columns, Constrained, numbered
 
 MAX_COORDINATES = 600  # a Lyapunov equation of twice the size is solved in seconds up to here
 
 
 @typed
 @dataclass(frozen=True, slots=True)
-class BalancedTruncation:
+class BalancedTruncation(Constrained):
     """Constraint modes, and those combinations of fixed-interface modes that the interfaces know.
 
     Of a pool of fixed-interface modes with modal damping, moved by accelerations of the interfaces
@@ -47,31 +47,19 @@ class BalancedTruncation:
             whole("pool", self.pool, self.n_modes, reason="n_modes are chosen from it")
         between("damping_ratio", self.damping_ratio, 0, 1, "()")
 
-    def basis(self, ops: Operators, boundary: Index, labels: tuple[str, ...]) -> Basis:
-        """The basis for the interface dofs (n_b,); their columns first.
-
-        Raises:
-            ConfigError: without an interface, or for a pool beyond the dofs.
-            ResourceError: for a pool too large for dense equations.
-            InterfaceError: if the interfaces leave a rigid motion free.
-            ModelError: if the pool with its damping is not stable.
-        """
-        check_interfaces(boundary, ops.n)
-        held = ops.hold(boundary)
-        Psi_b = constraint_modes(ops, held, boundary)
+    def _completed(self, ops: Operators, held: Held, Psi_b: Array, boundary: Index) -> Columns:
         pool = min(3 * self.n_modes if self.pool is None else self.pool, held.n_free)
         whole("n_modes", self.n_modes, 0, held.n_free, reason="the dofs that are free")
         omega, Phi = ops.modes(held, pool)
         if not omega.size:
-            return Basis(Psi_b, omega, labels, held)
+            return Psi_b, omega, ()
         L = ops.gram(Phi, ops.apply_M(Psi_b))  # participation: how interfaces drive the modes
         K, D = np.diag(omega**2), np.diag(2 * self.damping_ratio * omega)
         S, R = _gramian_factors(K, np.eye(pool), D, L, L.T * omega**2)
         X = R @ svd(S.T @ R)[2].T
         V = qr(X[:, : self.n_modes], mode="economic")[0]
         lam, Y = np.linalg.eigh(V.T @ K @ V)
-        names = numbered("balanced", lam.size)
-        return Basis(np.hstack([Psi_b, Phi @ V @ Y]), np.sqrt(lam), (*labels, *names), held)
+        return np.hstack([Psi_b, Phi @ V @ Y]), np.sqrt(lam), numbered("balanced", lam.size)
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,15 +4,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rom.arguments import typed, whole
-from rom.eigen.verbs import Held, Operators, constraint_modes, quadratic
-from rom.model import Array, Basis, Index
-from rom.reduction.bases.free_interface import check_interfaces, numbered
+from rom.arguments import typed
+from rom.eigen.verbs import Held, Operators, quadratic
+from rom.model import Array, Index
+from rom.reduction.bases.fixed_interface import Columns, Constrained, Counted, numbered
 
 
 @typed
 @dataclass(frozen=True, slots=True)
-class EnhancedCraigBampton:
+class EnhancedCraigBampton(Counted, Constrained):
     """Craig-Bampton of the same size, its columns corrected to first order in the eigenvalue.
 
     With F_rs the flexibility of the fixed-interface modes left out and T_r = F_rs M Psi_b, the
@@ -32,27 +32,13 @@ class EnhancedCraigBampton:
         Kim and Lee, An enhanced Craig-Bampton method, Int. J. Numer. Meth. Eng. 103 (2015) 79.
     """
 
-    n_modes: int
-
-    def __post_init__(self) -> None:
-        whole("n_modes", self.n_modes)
-
-    def basis(self, ops: Operators, boundary: Index, labels: tuple[str, ...]) -> Basis:
-        """The basis for the interface dofs (n_b,); their columns first.
-
-        Raises:
-            ConfigError: without an interface, or for too many modes.
-            InterfaceError: if the interfaces leave a rigid motion free.
-        """
-        check_interfaces(boundary, ops.n)
-        held = ops.hold(boundary)
-        Psi_b = constraint_modes(ops, held, boundary)
+    def _completed(self, ops: Operators, held: Held, Psi_b: Array, boundary: Index) -> Columns:
         omega, Phi = ops.modes(held, self.n_modes)
         T0 = np.hstack([Psi_b, Phi])
         K0, M0 = projected(ops, T0)
         H = np.linalg.solve(M0, K0)
         T0 += residual_shapes(ops, held, Psi_b, omega, Phi) @ H[: boundary.size]
-        return Basis(T0, omega, (*labels, *numbered("enhanced", omega.size)), held)
+        return T0, omega, numbered("enhanced", omega.size)
 
 
 def residual_shapes(ops: Operators, held: Held, Psi_b: Array, omega: Array, Phi: Array) -> Array:

@@ -1,14 +1,53 @@
-"""Fixed-interface component mode synthesis."""
+"""Fixed-interface component mode synthesis: what methods with constraint modes share."""
 
+from abc import abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from rom.arguments import typed
+from rom.arguments import typed, whole
 from rom.eigen.scipy import SciPyOperators
-from rom.eigen.verbs import Operators, constraint_modes
-from rom.model import Basis
+from rom.eigen.verbs import Held, Operators, constraint_modes
+from rom.errors import ConfigError
+from rom.model import Array, Basis, Index
+
+Columns = tuple[Array, Array, Sequence[str]]
+
+
+@dataclass(frozen=True, slots=True)
+class Counted:
+    """A method that keeps so many modes."""
+
+    n_modes: int
+
+    def __post_init__(self) -> None:
+        whole("n_modes", self.n_modes)
+
+
+class Constrained:
+    """A method that begins with constraint modes, interfaces held for all others."""
+
+    __slots__ = ()
+
+    def basis(self, ops: Operators, boundary: Index, labels: tuple[str, ...]) -> Basis:
+        """The basis in interface coordinates; columns of the boundary (n_b,) first.
+
+        Raises:
+            ConfigError: without any interface, or for more modes than there are dofs.
+            InterfaceError: if the interfaces leave a rigid motion free.
+        """
+        check_interfaces(boundary, ops.n)
+        held = ops.hold(boundary)
+        Psi_b = constraint_modes(ops, held, boundary)
+        Psi, omega, names = self._completed(ops, held, Psi_b, boundary)
+        return Basis(Psi, omega, (*labels, *names), held)
+
+    @abstractmethod
+    def _completed(self, ops: Operators, held: Held, Psi_b: Array, boundary: Index) -> Columns:
+        """All columns, frequencies of the last ones [rad/s], and names of those behind Psi_b."""
 
 
 @typed
@@ -45,14 +84,29 @@ def craig_bampton(K: Any, M: Any, boundary: npt.ArrayLike, n_modes: int) -> Basi
         >>> basis.Psi[1].round(6), basis.omega.round(6)  # half of either end, and sqrt(2)
         (array([0.5, 0.5, 1. ]), array([1.414214]))
     """
-    return fixed_interface(SciPyOperators(K, M), boundary, n_modes)
-
-
-def fixed_interface(ops: Operators, boundary: npt.ArrayLike, n_modes: int) -> Basis:
-    """`craig_bampton` on operators; K_ii is factored once for both kinds of columns."""
-    b = np.asarray(boundary, dtype=np.int64).ravel()
-    held = ops.hold(b)
+    ops, b = SciPyOperators(K, M), np.asarray(boundary, dtype=np.int64).ravel()
+    held = ops.hold(b)  # factored once for both kinds of columns
     Psi_b = constraint_modes(ops, held, b)
     omega, Phi = ops.modes(held, n_modes)
-    labels = [f"constraint {d}" for d in b] + [f"fixed-interface {k + 1}" for k in range(n_modes)]
+    labels = [*(f"constraint {d}" for d in b), *numbered("fixed-interface", n_modes)]
     return Basis(np.hstack([Psi_b, Phi]), omega, tuple(labels))
+
+
+def numbered(what: str, n: int) -> list[str]:
+    """Labels "what 1" to "what n"."""
+    return [f"{what} {k + 1}" for k in range(n)]
+
+
+def check_interfaces(boundary: Index, n: int) -> None:
+    """Refuse no interface, or dofs (n_b,) of one beyond the n of the model.
+
+    Raises:
+        ConfigError: naming an example, or the range.
+    """
+    if boundary.size == 0:
+        raise ConfigError(
+            "the method needs interfaces, and none is given.",
+            hint='Name one, for example interfaces={"pin_a": "rbe2"}.',
+        )
+    if boundary.ndim != 1 or boundary.min() < 0 or boundary.max() >= n:
+        raise ConfigError(f"boundary must be a row of numbers from 0 to {n - 1}.")

@@ -7,14 +7,21 @@ from scipy.linalg import cho_factor, cho_solve, qr
 
 from rom.arguments import typed, whole
 from rom.eigen.verbs import (
+    Held,
     Operators,
-    constraint_modes,
     orthonormal,
     unit_motions,
     without_dependent,
 )
-from rom.errors import ConfigError, InterfaceError
+from rom.errors import InterfaceError
 from rom.model import Array, Basis, Index
+from rom.reduction.bases.fixed_interface import (
+    Columns,
+    Constrained,
+    Counted,
+    check_interfaces,
+    numbered,
+)
 
 RIGID_RTOL = 1e-12  # eigenvalue of a rigid motion, of a rough vector's Rayleigh quotient
 FLEXIBILITY_RTOL = 1e-12  # of the whole one: residual flexibility below is round-off
@@ -22,7 +29,7 @@ FLEXIBILITY_RTOL = 1e-12  # of the whole one: residual flexibility below is roun
 
 @typed
 @dataclass(frozen=True, slots=True)
-class Rubin:
+class Rubin(Counted):
     """Free-free modes, and what they leave of the static flexibility of the interfaces.
 
     Statics under interface loads is exact and the mass of the residual shapes is kept, so that the
@@ -40,11 +47,6 @@ class Rubin:
         (1975) 995; Craig and Chang, NASA CR-145123 (1977); inertia relief after MacNeal, Comput.
         Struct. 1 (1971) 581.
     """
-
-    n_modes: int
-
-    def __post_init__(self) -> None:
-        whole("n_modes", self.n_modes)
 
     def basis(self, ops: Operators, boundary: Index, labels: tuple[str, ...]) -> Basis:
         """The basis: columns of the interface dofs (n_b,), then rigid motions and free-free modes.
@@ -66,7 +68,7 @@ class Rubin:
 
 @typed
 @dataclass(frozen=True, slots=True)
-class Herting:
+class Herting(Counted, Constrained):
     """Constraint modes, free-free modes with the interfaces brought back, and inertia relief.
 
     Attributes:
@@ -80,32 +82,18 @@ class Herting:
         Anal. Des. 1 (1985) 153.
     """
 
-    n_modes: int
-
-    def __post_init__(self) -> None:
-        whole("n_modes", self.n_modes)
-
-    def basis(self, ops: Operators, boundary: Index, labels: tuple[str, ...]) -> Basis:
-        """The basis for the interface dofs (n_b,); their columns first.
-
-        Raises:
-            ConfigError: without an interface, or for more modes than there are dofs.
-            InterfaceError: if the interfaces leave a rigid motion free.
-        """
-        check_interfaces(boundary, ops.n)
-        held = ops.hold(boundary)
-        Psi_b = constraint_modes(ops, held, boundary)
+    def _completed(self, ops: Operators, held: Held, Psi_b: Array, boundary: Index) -> Columns:
         R, omega, Phi = free_modes(ops, self.n_modes)
         relief = held(ops.apply_M(R))
         inner = np.hstack([relief, Phi - Psi_b @ ops.rows(Phi, boundary)])
         inner, kept = without_dependent(ops, inner)
         names = [*numbered("inertia relief", R.shape[1]), *numbered("free", omega.size)]
-        return Basis(np.hstack([Psi_b, inner]), omega, (*labels, *(names[k] for k in kept)), held)
+        return np.hstack([Psi_b, inner]), omega, [names[k] for k in kept]
 
 
 @typed
 @dataclass(frozen=True, slots=True)
-class FreeFree:
+class FreeFree(Counted):
     """Free-free modes alone: modal truncation, for bodies that no joint clamps.
 
     Every one of these shapes has no force and no moment at the interfaces. A joint that transmits
@@ -122,11 +110,6 @@ class FreeFree:
         O'Shea, Jayakumar, Mechergui, Shabana and Wang, J. Comput. Nonlinear Dynam. 13 (2018)
         041007, on reference conditions and the choice of modes.
     """
-
-    n_modes: int
-
-    def __post_init__(self) -> None:
-        whole("n_modes", self.n_modes)
 
     def basis(self, ops: Operators, boundary: Index, labels: tuple[str, ...]) -> Basis:
         """The basis: rigid motions, then free-free modes; no column for the interface dofs (n_b,).
@@ -203,23 +186,3 @@ def _attached(ops: Operators, boundary: Index, G: Array) -> Array:
         )
     factor = cho_factor(scale[:, None] * G_bb * scale)
     return G @ (scale[:, None] * cho_solve(factor, np.diag(scale)))
-
-
-def numbered(what: str, n: int) -> list[str]:
-    """Labels "what 1" to "what n"."""
-    return [f"{what} {k + 1}" for k in range(n)]
-
-
-def check_interfaces(boundary: Index, n: int) -> None:
-    """Refuse no interface, or dofs (n_b,) of one beyond the n of the model.
-
-    Raises:
-        ConfigError: naming an example, or the range.
-    """
-    if boundary.size == 0:
-        raise ConfigError(
-            "the method needs interfaces, and none is given.",
-            hint='Name one, for example interfaces={"pin_a": "rbe2"}.',
-        )
-    if boundary.ndim != 1 or boundary.min() < 0 or boundary.max() >= n:
-        raise ConfigError(f"boundary must be a row of numbers from 0 to {n - 1}.")

@@ -5,17 +5,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from rom.arguments import typed, whole
-from rom.eigen.verbs import Operators, unit_motions, without_dependent
+from rom.eigen.verbs import Held, Operators, unit_motions, without_dependent
 from rom.errors import ConfigError, SolverError
-from rom.model import Basis, Index
-from rom.reduction.bases.free_interface import check_interfaces, numbered
+from rom.model import Array, Index
+from rom.reduction.bases.fixed_interface import Columns, Constrained, numbered
 
 RESONANCE_RTOL = 1e-8  # distance of a frequency from a mode
 
 
 @typed
 @dataclass(frozen=True, slots=True)
-class MomentMatching:
+class MomentMatching(Constrained):
     """Constraint modes, and the answers to moving interfaces at chosen frequencies.
 
     At s = (2 pi f)^2 the interior follows the interfaces by (K_ii - s M_ii) x = -(K_ib - s M_ib);
@@ -48,40 +48,30 @@ class MomentMatching:
                 f"frequencies = {self.frequencies!r}: needed are different numbers from 0 Hz."
             )
 
-    def basis(self, ops: Operators, boundary: Index, labels: tuple[str, ...]) -> Basis:
-        """The basis: columns of the interface dofs (n_b,), then modes of the inner part.
-
-        Raises:
-            ConfigError: without an interface.
-            InterfaceError: if the interfaces leave a rigid motion free.
-            SolverError: if a frequency is a natural one of the body with its interfaces held.
-        """
-        check_interfaces(boundary, ops.n)
-        E, still = unit_motions(ops, boundary), ops.hold(boundary)
-        blocks, Psi_b = [], E - still(ops.apply_K(E))
+    def _completed(self, ops: Operators, held: Held, Psi_b: Array, boundary: Index) -> Columns:
+        E, blocks = unit_motions(ops, boundary), []
         for f in self.frequencies:
             s = (2 * np.pi * f) ** 2
-            held = ops.hold(boundary, s) if s else still
+            shifted = ops.hold(boundary, s) if s else held
             X = Psi_b
             if s:
-                _refuse_resonance(ops, held, s, f)
-                X = E - held(ops.apply_K(E) - s * ops.apply_M(E))
+                _refuse_resonance(ops, shifted, s, f)
+                X = E - shifted(ops.apply_K(E) - s * ops.apply_M(E))
                 blocks.append(X - Psi_b)
             for _ in range(self.order - (s > 0)):
-                X = held(ops.apply_M(X))
+                X = shifted(ops.apply_M(X))
                 blocks.append(X)
         inner, _ = without_dependent(ops, np.hstack(blocks))
         K = ops.gram(inner, ops.apply_K(inner))
         lam, V = np.linalg.eigh(0.5 * (K + K.T))
-        names = numbered("moment", lam.size)
-        return Basis(np.hstack([Psi_b, inner @ V]), np.sqrt(lam), (*labels, *names), still)
+        return np.hstack([Psi_b, inner @ V]), np.sqrt(lam), numbered("moment", lam.size)
 
 
-def _refuse_resonance(ops: Operators, held: object, s: float, f: float) -> None:
+def _refuse_resonance(ops: Operators, held: Held, s: float, f: float) -> None:
     """Two inverse iterations find an eigenvalue that is as close as round-off."""
     X = np.sin(1.0 + np.arange(ops.first, ops.first + ops.n_local))[:, None]
     for _ in range(2):
-        X = held(ops.apply_M(X))  # type: ignore[operator]
+        X = held(ops.apply_M(X))
         X = X / np.sqrt(ops.gram(X, ops.apply_M(X)).item())
     gap = ops.gram(X, ops.apply_K(X)).item() - s
     if abs(gap) < RESONANCE_RTOL * s:

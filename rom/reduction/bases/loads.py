@@ -9,7 +9,7 @@ from rom.arguments import typed
 from rom.eigen.verbs import Operators, without_dependent
 from rom.errors import ConfigError
 from rom.model import Array, Basis, Index
-from rom.reduction.bases.free_interface import numbered
+from rom.reduction.bases.fixed_interface import numbered
 from rom.reduction.bases.method import Method
 
 

@@ -1,16 +1,16 @@
 """Reduction methods as small records: what `rom.reduce` is asked to do."""
 
-from dataclasses import dataclass, field
-from typing import Protocol
+from dataclasses import dataclass, field, replace
+from typing import Any, Protocol
 
 import numpy as np
 
 from rom.arguments import between, one_of, positive, typed, whole
 from rom.eigen.band import modes_up_to
-from rom.eigen.verbs import Held, Operators, constraint_modes, whole_clusters
+from rom.eigen.verbs import Held, Operators, whole_clusters
 from rom.errors import ConfigError, warn
 from rom.model import Array, Basis, Index
-from rom.reduction.bases.free_interface import check_interfaces
+from rom.reduction.bases.fixed_interface import Columns, Constrained, numbered
 from rom.reduction.bases.selection import Wanted, enough_modes
 from rom.rows import FREQUENCY_RTOL
 
@@ -29,26 +29,20 @@ class Method(Protocol):
 
 @typed
 @dataclass(frozen=True, slots=True)
-class Guyan:
+class Guyan(Constrained):
     """Constraint modes alone: exact statics, mass condensed to the interfaces.
 
     Source:
         Guyan, Reduction of stiffness and mass matrices, AIAA J. 3 (1965) 380.
     """
 
-    def basis(self, ops: Operators, boundary: Index, labels: tuple[str, ...]) -> Basis:
-        """The basis in interface coordinates, those of the boundary (n_b,).
-
-        Raises:
-            ConfigError: without any interface.
-            InterfaceError: if the interfaces leave a rigid motion free.
-        """
-        return CraigBampton(n_modes=0).basis(ops, boundary, labels)
+    def _completed(self, ops: Operators, held: Held, Psi_b: Array, boundary: Index) -> Columns:
+        return Psi_b, np.zeros(0), ()
 
 
 @typed
 @dataclass(frozen=True, slots=True)
-class CraigBampton:
+class CraigBampton(Constrained):
     """Constraint modes of the interface coordinates and fixed-interface normal modes.
 
     Without a number or a band, the fewest modes are kept with which the six lowest elastic
@@ -103,30 +97,19 @@ class CraigBampton:
         """Whether the number of modes follows from estimated errors."""
         return self.n_modes is None and (self.f_max is None or self.tol is not None)
 
-    def basis(self, ops: Operators, boundary: Index, labels: tuple[str, ...]) -> Basis:
-        """The basis in interface coordinates; columns of the boundary (n_b,) first.
-
-        Raises:
-            ConfigError: without any interface.
-            InterfaceError: if the interfaces leave a rigid motion free.
-            ModesMissedError: if a count says that a mode was skipped.
-        """
-        check_interfaces(boundary, ops.n)
-        held = ops.hold(boundary)
-        Psi_b = constraint_modes(ops, held, boundary)
+    def _completed(self, ops: Operators, held: Held, Psi_b: Array, boundary: Index) -> Columns:
         if self.chooses:
             omega, Phi = enough_modes(ops, held, Psi_b, self._wanted(), FIRST_BATCH)
         else:
-            omega, Phi = self._normal_modes(ops, held, boundary)
-        normal = [f"fixed-interface {k + 1}" for k in range(omega.size)]
-        return Basis(np.hstack([Psi_b, Phi]), omega, (*labels, *normal), held)
+            omega, Phi = self._normal_modes(ops, held)
+        return np.hstack([Psi_b, Phi]), omega, numbered("fixed-interface", omega.size)
 
     def _wanted(self) -> Wanted:
         if self.f_max is not None and self.tol is not None:
             return Wanted(self.tol, 2 * np.pi * self.f_max)
         return Wanted(ENOUGH_RTOL if self.tol is None else self.tol, supports=self.supports)
 
-    def _normal_modes(self, ops: Operators, held: Held, boundary: Index) -> tuple[Array, Array]:
+    def _normal_modes(self, ops: Operators, held: Held) -> tuple[Array, Array]:
         if self.search == SUBSTRUCTURE_SEARCH and self.f_max is not None:
             found = modes_up_to(ops, held, self.f_max, SUBSTRUCTURE_RTOL)
             return found.omega, found.shapes
@@ -141,6 +124,15 @@ class CraigBampton:
             omega, Phi = ops.modes(held, m)
         keep = int(np.searchsorted(omega, limit, side="right"))
         return omega[:keep], Phi[:, :keep]
+
+
+def judged_in(method: Any, supports: tuple[Index, ...]) -> Any:
+    """The method; if it chooses the number of its modes, so that they serve all supports."""
+    inner = getattr(method, "method", None)
+    if inner is not None:
+        return replace(method, method=judged_in(inner, supports))
+    chooses = isinstance(method, CraigBampton) and method.chooses
+    return replace(method, supports=supports) if chooses else method
 
 
 def lowest_modes(ops: Operators, held: Held, n_modes: int) -> tuple[Array, Array]:

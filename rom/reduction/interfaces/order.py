@@ -22,6 +22,15 @@ MAX_ORDER = 10  # beyond it, all dofs of an interface are the better choice
 SHIFT_RATIO = 0.02  # of the first elastic eigenvalue: makes the stiffness of a free body definite
 
 
+def open_orders(interfaces: dict[str, Any]) -> list[str]:
+    """Names of the interfaces {name: kind} whose polynomials have no order yet.
+
+    Raises:
+        ConfigError: if a kind is unknown.
+    """
+    return [name for name, kind in interfaces.items() if parsed(name, kind) == Polynomial()]
+
+
 def with_orders(
     ops: Operators, model: FEModel, interfaces: dict[str, Any], method: Any
 ) -> tuple[dict[str, Any], Any]:
@@ -33,19 +42,17 @@ def with_orders(
     Args:
         ops: operators of the model in nodal dofs.
         model: supplies the interfaces.
-        interfaces: {name: kind}; `Polynomial()` leaves the order open.
+        interfaces: {name: kind}, of which `Polynomial()` leaves the order open.
         method: `CraigBampton` with a band and a tolerance.
 
     Returns:
-        The interfaces and the method to reduce with; as given when no order is open.
+        The interfaces and the method to reduce with.
 
     Raises:
-        ConfigError: if an order is open and the method states no accuracy.
+        ConfigError: if the method states no accuracy.
         SolverError: if no order is accurate enough.
     """
-    open_ = [name for name, kind in interfaces.items() if parsed(name, kind) == Polynomial()]
-    if not open_:
-        return interfaces, method
+    open_ = open_orders(interfaces)
     if not isinstance(method, CraigBampton) or method.f_max is None or method.tol is None:
         raise ConfigError(
             f"the order of the polynomials on {open_} is open, and {method} states no accuracy.",

@@ -75,7 +75,7 @@ def test_full_modes_are_found_where_they_cost_less_than_the_reduction_or_little(
 @pytest.mark.fenicsx
 def test_a_factor_that_was_made_says_what_it_cost(monkeypatch):
     from rom.fe.operators import petsc
-    from rom.workflow import operators
+    from rom.reduction.full_model import operators
 
     model = rom.fe.model(
         "meshes/beam.geo", material=rom.Material(E=210e9, nu=0.3, rho=7850.0),

@@ -180,7 +180,7 @@ def bar(solver, size=(1.0, 0.2, 0.1), lc=0.06):
 
 def test_the_cycle_is_symmetric_and_below_the_inverse():
     """x^T P y = y^T P x, and all eigenvalues of P K in (0, 1]."""
-    from rom.workflow import operators
+    from rom.reduction.full_model import operators
 
     model = bar("iterative")
     held = operators(model).hold(model.interfaces["root"].dofs)

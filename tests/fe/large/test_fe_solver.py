@@ -43,7 +43,7 @@ def test_every_solver_gives_the_frequencies_of_the_direct_one(direct, solver):
 
 @pytest.mark.long
 def test_static_solutions_by_iteration_are_those_of_the_factor(direct):
-    from rom.workflow import operators
+    from rom.reduction.full_model import operators
 
     load = np.random.default_rng(1).standard_normal((direct.n_dofs, 3))
     held = direct.interfaces["root"].dofs
@@ -52,7 +52,7 @@ def test_static_solutions_by_iteration_are_those_of_the_factor(direct):
 
 
 def test_iteration_refuses_a_body_that_can_move(direct):
-    from rom.workflow import operators
+    from rom.reduction.full_model import operators
 
     with pytest.raises(InterfaceError, match="leave a rigid motion free"):
         operators(beam("iterative")).hold(direct.interfaces["root"].dofs[:3])

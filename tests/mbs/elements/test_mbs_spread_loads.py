@@ -21,8 +21,8 @@ from cases.solid import block
 from rom import rotation
 from rom.body.records import Surface
 from rom.errors import ConfigError, ModelError
+from rom.reduction.full_model import operators
 from rom.reduction.interfaces.connection import connect
-from rom.workflow import operators
 
 TETRAHEDRON = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
 

@@ -24,7 +24,7 @@ from rom.components.wheels.blades.records import ReducedBlade
 from rom.components.wheels.faces import interpolation
 from rom.components.wheels.rotation import arms, rotation_matrices
 from rom.components.wheels.sector import all_rows, region
-from rom.eigen.verbs import dofs_of, every_row, own_rows
+from rom.eigen.verbs import dofs_of, every_row, own_rows, static_shapes
 from rom.errors import ConfigError, InterfaceError
 from rom.model import Array, FEModel, Index, Interface
 from rom.names import check_known
@@ -86,7 +86,7 @@ def reduced_blade(
     _, Phi = ops.modes(held, n_modes)
     Psi = np.zeros((K.shape[0], E.shape[1] + n_modes))
     E = own_rows(ops, E[mine])
-    Psi[mine] = every_row(ops, np.hstack([E - held(ops.apply_K(E)), Phi]))
+    Psi[mine] = every_row(ops, np.hstack([static_shapes(ops, held, E), Phi]))
     found = blade_in(K, M, Psi, E.shape[1])
     if sector.root_moved is None:
         return found

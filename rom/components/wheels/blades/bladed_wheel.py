@@ -341,8 +341,7 @@ def _apart(K: Array, M: Array, rigid: Array) -> tuple[Array, Array]:
     """Squared frequencies and modes, rigid motions first and exact."""
     n, k = len(K), rigid.shape[1]
     if k == 0:
-        lam, Phi = eigh(K, M)
-        return lam, Phi
+        return eigh(K, M)
     R = np.zeros((n, k))
     R[: len(rigid)] = rigid
     R = np.linalg.solve(np.linalg.cholesky(R.T @ M @ R), R.T).T

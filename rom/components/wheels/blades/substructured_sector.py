@@ -5,6 +5,7 @@ from dataclasses import fields
 import numpy as np
 
 from rom.arguments import typed
+from rom.checks.draft import run
 from rom.components.wheels.blades.blade import (
     SHARED_STIFFNESS_RTOL,
     blade_in,
@@ -14,10 +15,18 @@ from rom.components.wheels.blades.blade import (
     turning,
 )
 from rom.components.wheels.blades.records import SubstructuredSector
-from rom.components.wheels.reduced import ReducedSector, face_functions, projected
+from rom.components.wheels.reduced import (
+    CYCLIC_FACES,
+    ReducedSector,
+    SectorDraft,
+    basis,
+    connect_faces,
+    connect_root,
+    project,
+)
 from rom.components.wheels.rotation import centrifugal_displacement
 from rom.components.wheels.sector import CyclicSector, all_rows, region
-from rom.eigen.verbs import dofs_of, every_row, own_rows
+from rom.eigen.verbs import dofs_of
 from rom.errors import ConfigError, InterfaceError
 from rom.model import Array, FEModel
 from rom.reduction.interfaces.polynomial import FourierLegendre, Polynomial, interface_functions
@@ -75,21 +84,12 @@ def substructured_sector(
             hint="Cut the wheel between the blades.",
         )
     face = root_of(model, nodes)
-    Q = face_functions(sector, functions or Polynomial(4))
     Q_root = interface_functions(root or Polynomial(3), face)
-    q, r = 3 * Q.shape[1], 3 * Q_root.shape[1]
-    E = np.zeros((sector.n, 2 * q + r))
-    E[sector.master, :q] = np.kron(Q, np.eye(3))
-    E[sector.slave, q : 2 * q] = sector.coupling @ E[sector.master, :q]
-    E[shared, 2 * q :] = np.kron(Q_root, np.eye(3))
-    E[sector.held] = 0.0
-    ops = sector.workers.operators(sector.K, sector.M, together=True)
-    cuts, E = np.union1d(np.union1d(faces, sector.held), shared), own_rows(ops, E)
-    static = E - ops.hold(cuts)(ops.apply_K(E))
-    omega, disk = ops.modes(np.union1d(cuts, inner), n_modes)
-    _, cantilever = ops.modes(np.setdiff1d(np.arange(sector.n), inner), n_blade_modes)
-    Psi = every_row(ops, np.hstack([static, disk, cantilever]))
-    small = projected(sector, Psi, q, omega)
+    kinds, r = {CYCLIC_FACES: functions or Polynomial(4)}, 3 * Q_root.shape[1]
+    disk = np.union1d(np.union1d(np.union1d(faces, sector.held), shared), inner)
+    parts = (disk, n_modes), (np.setdiff1d(np.arange(sector.n), inner), n_blade_modes)
+    draft = SectorDraft(model=sector, interfaces=kinds, root=(shared, Q_root), parts=parts)
+    small, q = run((connect_faces, connect_root, basis, project), draft), draft.q
     root_at = 2 * q + np.arange(r)
     modes_at = 2 * q + r + n_modes + np.arange(n_blade_modes)
     Psi = np.zeros((sector.n, r + n_blade_modes))

@@ -6,8 +6,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.sparse import csr_matrix
 
-from rom.arguments import positive, typed, whole
-from rom.components.wheels.faces import unit_axis
+from rom.arguments import positive, typed, unit_vector, whole
 from rom.components.wheels.modes import cyclic_modes
 from rom.components.wheels.prestress.heat import Heat
 from rom.components.wheels.prestress.speed_table import SpinUp, straightened
@@ -112,7 +111,7 @@ def held_solid(
         coupling=csr_matrix((0, 0)),
         held=held_dofs(model.interfaces, fixed),
         points=model.points,
-        axis=unit_axis(axis),
+        axis=unit_vector("axis", axis),
         at=np.asarray(at, dtype=float),
         workers=workers_of(model),
     )

@@ -14,7 +14,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from scipy.linalg import qr
 from scipy.sparse import block_diag, csr_matrix, identity
 
 from rom.arguments import typed
@@ -23,13 +22,12 @@ from rom.components.wheels.prestress.heat import Heat
 from rom.components.wheels.rotation import axial_pins, largest_ratio
 from rom.components.wheels.sector import CyclicSector, all_rows, workers_of
 from rom.eigen.supports import Fixed, held_dofs
-from rom.eigen.verbs import dofs_of, rigid_motions
+from rom.eigen.verbs import dofs_of, pins, rigid_motions
 from rom.eigen.workers import Workers, held_solution
 from rom.errors import ConfigError, ModelError
 from rom.model import Array, FEModel, Index
 
 LARGEST_STRAIN = 0.5  # of heat, far beyond what a linear solid can say
-RANK_RTOL = 1e-9  # of the largest: remainder of a motion that others contain
 
 
 @typed
@@ -179,17 +177,7 @@ def _six_dofs(points: Array) -> Index:
     """Six dofs that stop every rigid motion and carry nothing when stress balances itself."""
     nodes = np.unique(np.r_[points.argmin(axis=0), points.argmax(axis=0)])
     dofs = dofs_of(nodes)
-    return dofs[_pins(rigid_motions(points[nodes] - points.mean(axis=0)))]
-
-
-def _pins(motions: Array) -> Index:
-    """Rows that, held at zero, stop all combinations of some columns."""
-    if not motions.shape[1]:
-        return np.zeros(0, dtype=np.int64)
-    scaled = motions / np.linalg.norm(motions, axis=0)
-    R, order = qr(scaled.T, mode="r", pivoting=True)
-    size = np.abs(np.diag(R))
-    return np.sort(order[: np.count_nonzero(size > RANK_RTOL * size[0])]).astype(np.int64)
+    return dofs[pins(rigid_motions(points[nodes] - points.mean(axis=0)))]
 
 
 def _carried_along(K_geo: csr_matrix, held: Index, R: Array) -> csr_matrix:
@@ -199,7 +187,7 @@ def _carried_along(K_geo: csr_matrix, held: Index, R: Array) -> csr_matrix:
     would resist; with W^T R = I on six of their dofs, F is taken off by
     - F W^T - W F^T + W (F^T R) W^T. Supports that are held do not feel it.
     """
-    six = held[_pins(R[held])]
+    six = held[pins(R[held])]
     F, W = np.zeros_like(R), np.zeros_like(R)
     F[held] = (K_geo @ R)[held]
     W[six] = np.linalg.inv(R[six]).T
@@ -217,7 +205,7 @@ def _waves(sector: CyclicSector, diameter: int, *matrices: Any) -> tuple[csr_mat
     T = T if standing else real_form(T)
     R = R[:, np.linalg.norm(R, axis=0) > 0]
     whole = (T.T @ (A if standing else block_diag([A, A], format="csr")) @ T for A in matrices)
-    return _loose(_pins(R), *(csr_matrix(0.5 * (A + A.T)) for A in whole))
+    return _loose(pins(R), *(csr_matrix(0.5 * (A + A.T)) for A in whole))
 
 
 def _refuse_buckled(parts: Iterable[tuple[csr_matrix, ...]], heat: Heat, workers: Workers) -> None:
