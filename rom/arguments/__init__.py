@@ -1,11 +1,25 @@
 """Checks of what a user hands over: types by annotation, values by name.
 
-`border` asks for the types of all arguments, `kinds` says what an annotation takes, `values` checks
-numbers, words, shapes and rotations.
+`border` asks for the types of all arguments, `kinds` says what an annotation takes, `quantities`
+are units and limits in annotations, `values` checks numbers, words, shapes and rotations.
 """
 
 from rom.arguments.border import typed
 from rom.arguments.kinds import AnyBody, AnyFamily, AnyMechanism, AnySector, AnySolution
+from rom.arguments.quantities import (
+    Angle,
+    Between,
+    Count,
+    Direction,
+    Length,
+    NotNegative,
+    Number,
+    Point,
+    Positive,
+    Quantity,
+    Share,
+    Whole,
+)
 from rom.arguments.values import (
     between,
     finite,
@@ -29,11 +43,23 @@ from rom.arguments.values import (
 )
 
 __all__ = [
+    "Angle",
     "AnyBody",
     "AnyFamily",
     "AnyMechanism",
     "AnySector",
     "AnySolution",
+    "Between",
+    "Count",
+    "Direction",
+    "Length",
+    "NotNegative",
+    "Number",
+    "Point",
+    "Positive",
+    "Quantity",
+    "Share",
+    "Whole",
     "between",
     "finite",
     "is_number",

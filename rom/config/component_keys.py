@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+from rom.arguments import Positive, Quantity, Whole
 from rom.config.keys import (
     Anything,
     Either,
@@ -13,11 +14,9 @@ from rom.config.keys import (
     Named,
     OutputPath,
     Place,
-    Quantity,
     Table,
     Text,
     Variants,
-    Whole,
     Words,
 )
 from rom.config.methods import METHODS
@@ -126,7 +125,7 @@ TABLE = Table("A component.", (
         "Surfaces through which it touches others, and their kinds."),
     Key("attachments", Named(Table("A rigid body on an interface.", (
         Key("interface", Text(), "Which carries it.", ...),
-        Key("mass", Quantity("kg", positive=True), "Mass.", ...),
+        Key("mass", Positive("kg"), "Mass.", ...),
         Key("inertia", Quantity("kg m^2", ((3, 3),)), "About its mass centre; none for a point."),
         Key("at", Quantity("m", ((3,),)), "Mass centre; the middle of the interface if missing."),
     )), "attachments"), "Rigid bodies and point masses it carries."),
@@ -134,8 +133,8 @@ TABLE = Table("A component.", (
         Key("method", Text(tuple(METHODS)), "Which modes are kept.", "craig-bampton"),
         Key("modes", Whole(), "How many; if missing, as many as the certificate needs, of methods "
             "other than craig-bampton 20, of moment-matching blocks 2."),
-        Key("f_max", Quantity("Hz", positive=True), "Craig-Bampton: all modes up to here instead."),
-        Key("tol", Quantity("1", positive=True),
+        Key("f_max", Positive("Hz"), "Craig-Bampton: all modes up to here instead."),
+        Key("tol", Positive("1"),
             "The fewest modes with this relative error up to f_max, or of the lowest six."),
         Key("at", Quantity("Hz", ((None,),)), "Moment-matching: where to be exact; 0 if missing."),
         Key("characteristic", Whole(), "Full interfaces follow so many characteristic modes."),
@@ -149,7 +148,7 @@ TABLE = Table("A component.", (
                 Key("moment", Quantity("N m", ((3,),)), "About the same axes.", (0.0,) * 3),
             )), "loads"), "Largest loads by interface.", ...),
             Key("modes", Whole(), "So many of the lowest modes drag others along.", 4),
-            Key("tol", Quantity("1", positive=True), "Share of the states left out.", 1e-4),
+            Key("tol", Positive("1"), "Share of the states left out.", 1e-4),
             Key("shapes", Whole(1), "So many shapes are added; as tol asks if missing."),
             Key("steps", Whole(1), "States on the way to the largest load.", 4),
             Key("fixed", Words(), "Held beside the reference, wholly or as `name:yz`.", ()),
@@ -158,7 +157,7 @@ TABLE = Table("A component.", (
             Key("about", Quantity("m", ((3,),)), "A point of its axis; the reference if missing."),
             Key("snapshots", Flag(), "Full solutions at the largest loads are shapes as well.",
                 False),
-            Key("sampling", Quantity("1", positive=True),
+            Key("sampling", Positive("1"),
                 "The material is neo-Hookean, and few elements have its energy to this share."),
         )), "Reach large deflection."),
         Key("stress", Flag(), "Make stress on the surface recoverable.", False),

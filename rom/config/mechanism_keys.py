@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any, ClassVar, NamedTuple
 
+from rom.arguments import Positive, Quantity, Whole
 from rom.config.expressions import FormulaTable, formula_keys, formula_kind
 from rom.config.keys import (
     Either,
@@ -15,13 +16,12 @@ from rom.config.keys import (
     Kind,
     Named,
     Place,
-    Quantity,
     Table,
     Text,
     Variants,
-    Whole,
     Words,
     as_text,
+    read_value,
 )
 from rom.config.laws import ByCoordinate, law_kind
 from rom.config.python_files import PYTHON_KEYS
@@ -43,7 +43,7 @@ class MarkerName:
         """Name of the body, and name or coordinates of the marker."""
         if isinstance(value, Mapping) and len(value) == 1:
             ((body, point),) = value.items()
-            return body, POINT.read(point, place.at(body))
+            return body, read_value(POINT, point, place.at(body))
         if isinstance(value, str) and "." in value.strip("."):
             body, _, marker = value.partition(".")
             return body, marker
@@ -86,7 +86,7 @@ SPIN = Key(
     "Angular velocity of a round body in its frame, which does not turn with it.",
 )  # fmt: skip
 RIGID = Table("A rigid body by its numbers; its frame sits at the mass centre.", (
-    Key("mass", Quantity("kg", positive=True), "Mass.", ...),
+    Key("mass", Positive("kg"), "Mass.", ...),
     Key("inertia", Quantity("kg m^2", ((3,), (3, 3))), "About the mass centre, body frame.", ...),
     Key("at", POINT, "Mass centre at the start.", ...),
     *POSE,
@@ -146,11 +146,11 @@ JOINTS = {
     "point_on_plane": Table("A point in a plane of the first body.", (BETWEEN, NORMAL)),
     "distance": Table("A massless rod.", (
         BETWEEN,
-        Key("length", Quantity("m", positive=True), "That at the start if missing."),
+        Key("length", Positive("m"), "That at the start if missing."),
     )),
     "rolling": Table("A ball or wheel that rolls on a plane.", (
         BETWEEN, NORMAL,
-        Key("radius", Quantity("m", positive=True), "Of ball or wheel.", ...),
+        Key("radius", Positive("m"), "Of ball or wheel.", ...),
         Key("axis", DIRECTION, "Of a wheel; none for a ball."),
     )),
     "gear": Table("Couples the coordinates of two joints.", (
@@ -164,31 +164,31 @@ JOINTS = {
 JOINT = Key("joint", Text(), "Name of the joint.", ...)
 WHICH = Key("coordinate", Text(COORDINATES), "Which, where the joint has two.")
 LEVEL = ByCoordinate(Quantity("N m"), Quantity("N"))
-SPEED = ByCoordinate(Quantity("rad/s", positive=True), Quantity("m/s", positive=True))
+SPEED = ByCoordinate(Positive("rad/s"), Positive("m/s"))
 WAY = ByCoordinate(Quantity("rad"), Quantity("m"))
 IMPACT = (
-    Key("stiffness", Quantity("1", positive=True),
+    Key("stiffness", Positive("1"),
         "Force per depth^exponent, a plain number in SI.", ...),
-    Key("exponent", Quantity("1", positive=True), "1 for linear, 1.5 for Hertz.", 1.5),
+    Key("exponent", Positive("1"), "1 for linear, 1.5 for Hertz.", 1.5),
     Key("damping", Quantity("s/m"), "Force grows by this factor of the closing speed.", 0.0),
-    Key("restitution", Quantity("1", positive=True), "In place of damping, with impact_speed."),
-    Key("impact_speed", Quantity("m/s", positive=True), "At which restitution holds."),
+    Key("restitution", Positive("1"), "In place of damping, with impact_speed."),
+    Key("impact_speed", Positive("m/s"), "At which restitution holds."),
     Key("mu", Quantity("1"), "Coefficient of friction.", 0.0),
-    Key("transition_speed", Quantity("m/s", positive=True), "Over which friction turns.", 1e-3),
-    Key("tangential_stiffness", Quantity("1", positive=True),
+    Key("transition_speed", Positive("m/s"), "Over which friction turns.", 1e-3),
+    Key("tangential_stiffness", Positive("1"),
         "Of a spring by which friction holds, in SI; friction by the speed alone if missing."),
     Key("tangential_damping", Quantity("1"), "Of that spring, a plain number in SI.", 0.0),
 )  # fmt: skip
-RADIUS = Quantity("m", positive=True)
+RADIUS = Positive("m")
 STEEL = (
-    Key("E", Quantity("Pa", positive=True), "Young's modulus.", 206e9),
+    Key("E", Positive("Pa"), "Young's modulus.", 206e9),
     Key("nu", Quantity(), "Poisson's ratio.", 0.3),
 )
 FLEXIBLE = Key("body", Text(), "Flexible body that carries a surface.", ...)
 WHERE = Key("where", Text(), "Deformable interface that is the part of it; all of it if missing.")
 COVER = (
     Key("marker", MarkerName(), "Where the other surface is.", ...), FLEXIBLE, WHERE,
-    Key("stiffness", Quantity("1", positive=True),
+    Key("stiffness", Positive("1"),
         "Pressure per depth^exponent, a plain number in SI.", ...),
     *IMPACT[1:],
 )  # fmt: skip
@@ -380,12 +380,12 @@ BEHIND_FIELDS: dict[str, tuple[str, Kind]] = {
     "events": ("events", Variants(EVENTS, {"function": "python"})),
 }  # fmt: skip
 SIMULATION = Table("How it is moved.", (
-    Key("t_end", Quantity("s", positive=True), "End.", ...),
-    Key("dt", Quantity("s", positive=True), "Step, or interval of dop853; by rtol if missing."),
+    Key("t_end", Positive("s"), "End.", ...),
+    Key("dt", Positive("s"), "Step, or interval of dop853; by rtol if missing."),
     Key("method", Text(("generalized-alpha", "bdf", "dop853")), "Integrator.", "generalized-alpha"),
     Key("rho_inf", Quantity(), "Spectral radius at infinite frequency, 0 to 1.", 0.9),
-    Key("tolerance", Quantity("1", positive=True), "Of the Newton iteration.", 1e-9),
-    Key("rtol", Quantity("1", positive=True), "Relative tolerance of variable steps."),
+    Key("tolerance", Positive("1"), "Of the Newton iteration.", 1e-9),
+    Key("rtol", Positive("1"), "Relative tolerance of variable steps."),
     Key("save_every", Whole(1), "Keep every so many steps.", 1),
     Key("order", Whole(1, 5), "Of bdf.", 2),
     Key("stabilised", Flag(), "Keep constraints of the velocities, too.", False),
@@ -398,7 +398,7 @@ OUTPUT = Table("What `rom simulate` writes beside the table `motion.csv`.", (
         "A film: pictures, pictures by ffmpeg, to turn around in browsers, ParaView."),
     Key("picture", Flag(), "A picture of four instants.", False),
     Key("plot", Words(), "Columns of the table to draw over time, without their unit.", ()),
-    Key("magnify", Quantity("1", positive=True), "Deformations are drawn so much larger.", 1.0),
+    Key("magnify", Positive("1"), "Deformations are drawn so much larger.", 1.0),
     Key("view", DIRECTION, "Direction to the eye."),
     Key("up", DIRECTION, "Upright direction."),
 ))  # fmt: skip

@@ -2,9 +2,10 @@
 
 from typing import TYPE_CHECKING, Any
 
+from rom.arguments import Positive, Quantity, Whole
 from rom.config.component_keys import ISOTROPIC
 from rom.config.connections import check_name, pose_of
-from rom.config.keys import Key, Place, Quantity, Table, Variants, Whole
+from rom.config.keys import Key, Place, Table, Variants
 from rom.config.mechanism_keys import POINT, POSE, Section
 from rom.errors import RomError
 
@@ -13,7 +14,7 @@ if TYPE_CHECKING:
     from rom.config.connections import Entry
     from rom.model import Array
 
-LENGTH_KIND = Quantity("m", positive=True)
+LENGTH_KIND = Positive("m")
 SECTION_KINDS = {
     "circle": Table("A full circle.", (Key("diameter", LENGTH_KIND, "Diameter.", ...),)),
     "tube": Table("A circle with a bore.", (
@@ -27,7 +28,7 @@ SECTION_KINDS = {
     "numbers": Table("A section by its rigidities; it takes no material.", (
         Key("stretch", Quantity("N", ((3,),)), "GA1, GA2, EA.", ...),
         Key("bend", Quantity("N m^2", ((3,),)), "EI1, EI2, GJ.", ...),
-        Key("mass", Quantity("kg/m", positive=True), "Per length.", ...),
+        Key("mass", Positive("kg/m"), "Per length.", ...),
         Key("inertia", Quantity("kg m", ((3,),)), "Per length, about the axes.", ...),
     )),
 }  # fmt: skip

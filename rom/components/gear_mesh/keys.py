@@ -2,7 +2,8 @@
 
 from typing import TYPE_CHECKING, Any
 
-from rom.config.keys import FilePath, Flag, Key, Quantity, Table, Whole
+from rom.arguments import Positive, Quantity, Whole
+from rom.config.keys import FilePath, Flag, Key, Table
 from rom.config.mechanism_keys import DIRECTION, STEEL, Markers, Section
 from rom.config.mechanism_keys import RADIUS as LENGTH
 from rom.errors import ConfigError
@@ -24,13 +25,13 @@ GEAR_PAIR = Table("A pair of involute wheels.", (
     Key("shift", Quantity("1", TWO), "Profile shifts in modules.", [0.0, 0.0]),
     Key("centre_distance", LENGTH, "None leaves no backlash if missing."),
     Key("thinning", Quantity("m"), "Transverse backlash from thinner teeth.", 0.0),
-    Key("addendum", Quantity(positive=True), "Height above the reference circle in modules.", 1.0),
-    Key("dedendum", Quantity(positive=True), "Depth below it in modules.", 1.25),
+    Key("addendum", Positive(), "Height above the reference circle in modules.", 1.0),
+    Key("dedendum", Positive(), "Depth below it in modules.", 1.25),
 ))  # fmt: skip
 CORRECTION = Table("What is taken off the flanks, and what was measured on them.", (
     Key("relief", Quantity("m", TWO), "Depth at the tips of pinion and gear.", [0.0, 0.0]),
     Key("extent", Quantity("m", TWO), "Its length along the path of contact.", [0.0, 0.0]),
-    Key("power", Quantity("1", positive=True), "1 for linear, 2 for parabolic relief.", 1.0),
+    Key("power", Positive("1"), "1 for linear, 2 for parabolic relief.", 1.0),
     Key("crowning", Quantity("m"), "At both ends of the face.", 0.0),
     Key("slope", Quantity("m"), "Of the lead over the face.", 0.0),
     Key("pinion_pitch", Quantity("m", ((None,),)), "Errors of its teeth; positive leaves a gap."),
@@ -108,7 +109,7 @@ SECTION = Section(
         Key("correction", CORRECTION, "Of the working flanks.", {}),
         Key("damping", Quantity("s"), "Force per rate over force per deflection.", 0.0),
         Key("friction", Quantity(), "Coefficient between the flanks.", 0.0),
-        Key("transition_speed", Quantity("m/s", positive=True),
+        Key("transition_speed", Positive("m/s"),
             "Of sliding flanks, over which friction turns."),
         Key("cells", Whole(1), "Slices across the face.", 21),
         Key("phase", Quantity("rad"), "Turn of the pinion at the start; so that teeth stand in "

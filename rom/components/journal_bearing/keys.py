@@ -2,7 +2,8 @@
 
 from typing import TYPE_CHECKING, Any
 
-from rom.config.keys import Flag, Key, Named, Quantity, Table, Text, Variants, Whole
+from rom.arguments import Positive, Quantity, Whole
+from rom.config.keys import Flag, Key, Named, Table, Text, Variants
 from rom.config.mechanism_keys import DIRECTION, Markers, Section
 from rom.config.mechanism_keys import RADIUS as LENGTH
 
@@ -12,23 +13,23 @@ if TYPE_CHECKING:
 
 OILS = {
     "constant": Table("A viscosity that stays.", (
-        Key("viscosity", Quantity("Pa s", positive=True), "Dynamic.", ...),
+        Key("viscosity", Positive("Pa s"), "Dynamic.", ...),
     )),
     "grade": Table("A usual mineral oil.", (
         Key("grade", Whole(1), "ISO VG 32, 46 or 68.", ...),
     )),
     "oil": Table("Any mineral oil.", (
-        Key("nu_40", Quantity("m^2/s", positive=True), "Kinematic at 40 degrees Celsius.", ...),
-        Key("nu_100", Quantity("m^2/s", positive=True), "At 100 degrees Celsius.", ...),
-        Key("density", Quantity("kg/m^3", positive=True), "Density.", 870.0),
-        Key("heat", Quantity("J/(kg K)", positive=True), "Specific heat.", 2000.0),
+        Key("nu_40", Positive("m^2/s"), "Kinematic at 40 degrees Celsius.", ...),
+        Key("nu_100", Positive("m^2/s"), "At 100 degrees Celsius.", ...),
+        Key("density", Positive("kg/m^3"), "Density.", 870.0),
+        Key("heat", Positive("J/(kg K)"), "Specific heat.", 2000.0),
     )),
 }  # fmt: skip
 GROOVE = Table("An axial groove full of oil.", (
     Key("angle", Quantity("rad"), "Of its middle.", ...),
     Key("width", Quantity("rad"), "How far it extends around the bush.", 0.0),
     Key("pressure", Quantity("Pa"), "Of its oil.", 0.0),
-    Key("share", Quantity("1", positive=True), "Of the width of the bearing.", 1.0),
+    Key("share", Positive("1"), "Of the width of the bearing.", 1.0),
 ))  # fmt: skip
 JOURNAL_BEARING = Table("An oil film.", (
     Key("diameter", LENGTH, "Of the journal.", ...),
@@ -88,7 +89,7 @@ SECTION = Section(
         Key("roughness", Quantity("m"), "Height at which journal and bush touch.", 0.0),
         Key("carried", Quantity(), "Share of the heat that leaves with the oil.", 0.9),
         Key("felt", Quantity(), "Share of the rise that the film feels.", 0.5),
-        Key("thermal_time", Quantity("s", positive=True), "Over which its temperature follows.",
+        Key("thermal_time", Positive("s"), "Over which its temperature follows.",
             1.0),
         Key("elastic_bush", Flag(), "Whether its pressure bends the bore, which has functions.",
             False),

@@ -2,7 +2,8 @@
 
 from typing import TYPE_CHECKING, Any
 
-from rom.config.keys import Key, Quantity, Table, Variants, Whole
+from rom.arguments import Quantity, Whole
+from rom.config.keys import Key, Table, Variants
 from rom.config.mechanism_keys import AXIS, BETWEEN, STEEL, Section
 from rom.config.mechanism_keys import RADIUS as LENGTH
 

@@ -3,7 +3,8 @@
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from rom.config.keys import Key, Named, Quantity, Table, Whole, nearest
+from rom.arguments import Positive, Quantity, Whole
+from rom.config.keys import Key, Named, Table, nearest
 from rom.config.laws import law_kind
 from rom.config.mechanism_keys import DIRECTION, RADIUS, Markers, Section
 
@@ -43,14 +44,14 @@ SECTION = Section(
     "cables", Table("A cable through eyelets and over pulleys, which goes slack.", (
         Key("path", Markers(), "Markers in the order in which it passes them.", ...),
         Key("pulleys", Named(PULLEY, "pulleys"), "Which of these markers are pulleys.", {}),
-        Key("EA", Quantity("N", positive=True), "Force per strain; none if it is pulled."),
+        Key("EA", Positive("N"), "Force per strain; none if it is pulled."),
         Key("damping", Quantity("N s"), "Tension per rate of strain.", 0.0),
         Key("free_length", law_kind("m"), "Length without force, over time for a winch; that at "
             "the start if missing."),
         Key("pretension", Quantity("N"), "Tension at the start, in its place.", 0.0),
         Key("tension", law_kind("N"), "Force that pulls at its first end, in place of EA."),
         Key("friction", Quantity(), "Coefficient at all eyelets.", 0.0),
-        Key("transition_speed", Quantity("m/s", positive=True),
+        Key("transition_speed", Positive("m/s"),
             "Of the sliding cable, over which friction turns."),
     )),
     tendon,
