@@ -128,7 +128,7 @@ class _Border:
                 text, hint = unfit.place + unfit.told, ""
             if isinstance(unfit.value, type):
                 text, hint = f"{unfit.place}: {call_of(unfit.value)}", ""
-            raise ConfigError(text, where=where, hint=hint) from unfit.__cause__
+            raise unfit.error(text, where=where, hint=hint) from unfit.__cause__
         if self.usual:
             self._doubt(taken, more)
         return taken, more

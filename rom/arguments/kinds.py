@@ -19,6 +19,7 @@ import numpy.typing as npt
 
 from rom.arguments.quantities import Quantity, Whole
 from rom.arguments.values import shortened
+from rom.errors import ConfigError, RomError
 
 MAX_NUMBER = 1e150  # the square of it is still a finite number
 LARGEST_WHOLE = 2**63 - 1  # that compiled code can count to
@@ -55,15 +56,24 @@ class Unfit(Exception):
         wanted: what it must be, in words.
         place: of that part, such as ``['a']``.
         told: all that is to be said of it behind its name, where that is more than what is wanted.
+        error: class of what is raised for it.
     """
 
-    def __init__(self, value: Any, wanted: str, place: str = "", told: str = ""):
-        super().__init__(value, wanted, place, told)
-        self.value, self.wanted, self.place, self.told = value, wanted, place, told
+    def __init__(
+        self,
+        value: Any,
+        wanted: str,
+        place: str = "",
+        told: str = "",
+        error: type[RomError] = ConfigError,
+    ):
+        super().__init__(value, wanted, place, told, error)
+        self.value, self.wanted, self.place = value, wanted, place
+        self.told, self.error = told, error
 
     def within(self, place: str) -> "Unfit":
         """The same of something that has this value at a place."""
-        return Unfit(self.value, self.wanted, place + self.place, self.told)
+        return Unfit(self.value, self.wanted, place + self.place, self.told, self.error)
 
 
 @dataclass(frozen=True, slots=True)
@@ -175,7 +185,7 @@ def _limited(kind: Quantity | Whole, taken: Taken | None) -> Taken:
     def take(value: Any) -> Any:
         found = one.take(value)
         if fault := kind.fault(found):
-            raise Unfit(value, words, told=fault)
+            raise Unfit(value, words, told=fault, error=kind.error)
         return float(found) if one is PLAIN_KINDS[float] else found
 
     return Taken(words, take)

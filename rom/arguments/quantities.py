@@ -12,6 +12,8 @@ from typing import Annotated, Any
 import numpy as np
 import numpy.typing as npt
 
+from rom.errors import ConfigError, ModelError, RomError
+
 Shape = tuple[int | None, ...]
 
 
@@ -24,6 +26,7 @@ class Quantity:
         shapes: that it may have; None in a shape for any length.
         low, high: limits.
         ends: brackets of them: square ones where a limit itself is allowed.
+        error: class of what a call raises for a number beyond them.
     """
 
     unit: str = "1"
@@ -31,6 +34,7 @@ class Quantity:
     low: float = -math.inf
     high: float = math.inf
     ends: str = "()"
+    error: type[RomError] = ConfigError
 
     @property
     def summary(self) -> str:
@@ -78,10 +82,11 @@ class Quantity:
 
 @dataclass(frozen=True, slots=True)
 class Whole:
-    """A whole number within limits; None for no upper one."""
+    """A whole number within limits, None for no upper one; beyond them a call raises the error."""
 
     least: int = 0
     most: int | None = None
+    error: type[RomError] = ConfigError
 
     @property
     def summary(self) -> str:
@@ -108,9 +113,9 @@ def Number(unit: str = "1", *shapes: Shape) -> Quantity:
     return Quantity(unit, shapes or ((),))
 
 
-def Positive(unit: str = "1", *shapes: Shape) -> Quantity:
+def Positive(unit: str = "1", *shapes: Shape, error: type[RomError] = ConfigError) -> Quantity:
     """Above zero."""
-    return Quantity(unit, shapes or ((),), 0.0)
+    return Quantity(unit, shapes or ((),), 0.0, error=error)
 
 
 def NotNegative(unit: str = "1", *shapes: Shape) -> Quantity:
@@ -118,18 +123,34 @@ def NotNegative(unit: str = "1", *shapes: Shape) -> Quantity:
     return Quantity(unit, shapes or ((),), 0.0, ends="[)")
 
 
-def Between(low: float, high: float, ends: str = "[]", unit: str = "1") -> Quantity:
+def AtLeast(low: float, unit: str = "1") -> Quantity:
+    """From a number on."""
+    return Quantity(unit, ((),), low, ends="[)")
+
+
+def Between(
+    low: float,
+    high: float,
+    ends: str = "[]",
+    unit: str = "1",
+    *,
+    error: type[RomError] = ConfigError,
+) -> Quantity:
     """Within an interval, round brackets where an end is no part of it."""
-    return Quantity(unit, ((),), low, high, ends)
+    return Quantity(unit, ((),), low, high, ends, error)
 
 
-def Count(least: int = 0, most: int | None = None) -> Whole:
+def Count(least: int = 0, most: int | None = None, *, error: type[RomError] = ConfigError) -> Whole:
     """A whole number of so many or more."""
-    return Whole(least, most)
+    return Whole(least, most, error)
 
 
 Length = Annotated[float, Positive("m")]
+Size = Annotated[float, Positive("m", error=ModelError)]  # of a part that cannot be without it
 Angle = Annotated[float, Number("rad")]
 Share = Annotated[float, Between(0.0, 1.0)]
 Point = Annotated[npt.ArrayLike, Number("m", (3,))]
 Direction = Annotated[npt.ArrayLike, Number("1", (3,))]
+Orientation = Annotated[npt.ArrayLike, Number("1", (3, 3), (4,))]
+Velocity = Annotated[npt.ArrayLike, Number("m/s", (3,))]
+Omega = Annotated[npt.ArrayLike, Number("rad/s", (3,))]

@@ -18,7 +18,7 @@ from rom.mbs.kernels.coordinates import coordinate_tangent, push_coordinate
 from rom.mbs.kernels.element_calls import residuals, tangents
 from rom.mbs.kernels.tables import Address1, Array1, Index1, Scratch1, Scratch2, Table, table
 from rom.mbs.parts.foreign import ask, compiled_function, numbers
-from rom.mbs.parts.joints import Row, coordinate_of
+from rom.mbs.parts.joints import Coordinate, Row, coordinate_of
 from rom.mbs.parts.whole import Whole
 from rom.model import Array
 
@@ -51,7 +51,7 @@ def motor(
     joint: str,
     law: Callable[[float, float, float], float],
     *,
-    coordinate: str | None = None,
+    coordinate: Coordinate | None = None,
     compiled: bool | None = None,
 ) -> None:
     """Motor with a control law: force [N] or torque [N m] = ``law(t, coordinate, rate)``.

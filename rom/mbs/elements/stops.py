@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 from typing import Any
 
-from rom.arguments import number
 from rom.errors import ConfigError
 from rom.mbs.elements.contact.impact import Impact, checked_law
 from rom.mbs.elements.family import Family, Places, apart, integers, on_joint, rows_of
@@ -11,7 +10,7 @@ from rom.mbs.kernels.compiled import inner
 from rom.mbs.kernels.coordinates import coordinate_tangent, push_coordinate
 from rom.mbs.kernels.element_calls import energy, residuals, tangents
 from rom.mbs.kernels.tables import Array2, Index1, Table, table
-from rom.mbs.parts.joints import Row, coordinate_of
+from rom.mbs.parts.joints import Coordinate, Row, coordinate_of
 from rom.mbs.parts.whole import Whole
 
 
@@ -33,7 +32,7 @@ def stop(
     *,
     lower: float | None = None,
     upper: float | None = None,
-    coordinate: str | None = None,
+    coordinate: Coordinate | None = None,
 ) -> None:
     """Limit a joint coordinate by compliant stops.
 
@@ -51,7 +50,7 @@ def stop(
     row = coordinate_of(self.joints, joint, coordinate, "stop")
     law = checked_law(name, law)
     places = [(-1, lower), (1, upper)]
-    limits = [(side, number(f"limit of {name}", x)) for side, x in places if x is not None]
+    limits = [(side, float(x)) for side, x in places if x is not None]
     if not limits:
         raise ConfigError(f"stop {name!r} has no limit.", hint="Give lower or upper.")
     if len(limits) == 2 and limits[0][1] > limits[1][1]:

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -10,6 +11,8 @@ from rom.mbs.kernels.system import ALONG, ANGLE, NORMAL, POINT
 from rom.mbs.parts.bodies import Marker
 from rom.model import Array
 from rom.names import offered
+
+Coordinate = Literal["angle", "displacement", "way"]  # the last is the earlier name of the second
 
 NO_VECTOR = np.zeros(3)
 

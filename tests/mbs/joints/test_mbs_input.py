@@ -58,7 +58,7 @@ WRONG = {
     "position of two": (lambda m, *_: m.add_rigid("x", **UNIT | {"at": (0, 0)}), ConfigError,
                         "at has shape (2,)"),
     "marker of two": (lambda m, *_: m.add_rigid("x", **UNIT, markers={"tip": (0, 0)}), ConfigError,
-                      "marker tip has shape (2,)"),
+                      "markers['tip'] has shape (2,)"),
     "marker nowhere": (lambda m, *_: m.add_rigid("x", **UNIT, markers={"tip": (0, 0, np.nan)}),
                        ConfigError, "markers['tip'] = (0, 0, nan)"),
     "rates too short": (lambda m, *_: m.add_flexible("x", BODY, qd=(0, 0, 0)), ConfigError,
@@ -138,7 +138,7 @@ GOOD = {"t_end": 0.01, "dt": 1e-3}
         ({"rtol": -1.0}, "rtol = "),
         ({"atol": 0.0}, "atol = "),
         ({"save_every": 0}, "save_every = 0"),
-        ({"method": "euler"}, "method = 'euler' is none of "),
+        ({"method": "euler"}, "method = 'euler' must be "),
     ],
 )
 def test_wrong_arguments_of_a_run_are_named(options, words):
