@@ -4,7 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from rom.arguments import Positive, Quantity, Whole
+from rom.arguments import Number, Positive, Quantity, Whole
+from rom.config.declared import Declared
 from rom.config.keys import (
     Anything,
     Either,
@@ -25,18 +26,13 @@ from rom.fe.mesh.picks import picks
 from rom.units import LENGTH, SYSTEMS, UNITS
 
 LENGTHS = tuple(name for name, u in UNITS.items() if u.dimension == LENGTH)
-ISOTROPIC = Table("An isotropic solid.", (
-    Key("E", Quantity("Pa"), "Young's modulus.", ...),
-    Key("nu", Quantity(), "Poisson's ratio.", ...),
-    Key("rho", Quantity("kg/m^3"), "Density.", ...),
-))  # fmt: skip
-ORTHOTROPIC = Table("An orthotropic solid, known by its key G.", (
-    Key("E", Quantity("Pa", ((3,),)), "Young's moduli E1, E2, E3.", ...),
-    Key("nu", Quantity("1", ((3,),)), "Poisson's ratios nu12, nu13, nu23.", ...),
-    Key("G", Quantity("Pa", ((3,),)), "Shear moduli G12, G13, G23.", ...),
-    Key("rho", Quantity("kg/m^3"), "Density.", ...),
-    Key("axes", Quantity("1", ((3, 3),)), "Rows are the axes 1, 2, 3 in the geometry."),
-))  # fmt: skip
+ISOTROPIC = Declared("rom.material:Material")
+ORTHOTROPIC = Declared(
+    "rom.material:Orthotropic",
+    Key("axes", Number("1", (3, 3)), "Rows are the axes 1, 2, 3 in the geometry."),
+    about="An orthotropic solid, known by its key G.",
+)
+SHAPES = "rom.reduction.interfaces.polynomial"
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,13 +82,8 @@ INTERFACE = Either(Text(), Variants({
     "full": Table("Keeps all its dofs.", ()),
     "rbe2": Table("Moves as a rigid surface.", ()),
     "rbe3": Table("Moves freely about its mean.", ()),
-    "polynomial": Table("Deforms by polynomials.", (
-        Key("order", Whole(), "Their order; by the band and tol of the reduction if missing."),
-    )),
-    "fourier": Table("A bore: Fourier series around, Legendre polynomials along.", (
-        Key("harmonics", Whole(), "Harmonics around.", ...),
-        Key("order", Whole(), "Order along.", ...),
-    )),
+    "polynomial": Declared(f"{SHAPES}:Polynomial"),
+    "fourier": Declared(f"{SHAPES}:FourierLegendre"),
 }))  # fmt: skip
 TABLE = Table("A component.", (
     Key("name", Text(), "Name of the body; that of the file if missing."),
@@ -123,12 +114,9 @@ TABLE = Table("A component.", (
     Key("material", Solids(), "What it is made of; by region where there are several."),
     Key("interfaces", Named(INTERFACE, "interfaces"),
         "Surfaces through which it touches others, and their kinds."),
-    Key("attachments", Named(Table("A rigid body on an interface.", (
-        Key("interface", Text(), "Which carries it.", ...),
-        Key("mass", Positive("kg"), "Mass.", ...),
-        Key("inertia", Quantity("kg m^2", ((3, 3),)), "About its mass centre; none for a point."),
-        Key("at", Quantity("m", ((3,),)), "Mass centre; the middle of the interface if missing."),
-    )), "attachments"), "Rigid bodies and point masses it carries."),
+    Key("attachments", Named(Declared(
+        "rom.model:Attachment", about="A rigid body on an interface.", mass=Positive("kg"),
+    ), "attachments"), "Rigid bodies and point masses it carries."),
     Key("reduction", Table("How it is reduced.", (
         Key("method", Text(tuple(METHODS)), "Which modes are kept.", "craig-bampton"),
         Key("modes", Whole(), "How many; if missing, as many as the certificate needs, of methods "

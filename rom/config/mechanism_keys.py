@@ -141,7 +141,6 @@ CONTACTS = {kind: Declared(f"{kind} {IMPACT}", BETWEEN) for kind in ON_MARKERS.s
     for kind in ("surface_on_plane", "surface_on_sphere", "surface_on_cylinder")
 }
 MARKER = Key("marker", MarkerName(), "Where it acts.", ...)
-FRAME = Key("frame", Text(("world", "body")), "Axes of the vector.", "world")
 FACTOR = Key("factor", law_kind("1"), "A law that multiplies the vector; constant if missing.")
 MOTION = ("t", "x", "v")
 SPREAD_LOADS = {
@@ -262,12 +261,14 @@ BEFORE_FIELDS: dict[str, tuple[str, Kind]] = {  # connections and forces: what, 
     )),
 }  # fmt: skip
 BEHIND_FIELDS: dict[str, tuple[str, Kind]] = {
-    "forces": ("forces", Table("A force on a marker.", (
-        MARKER, Key("vector", Quantity("N", ((3,),)), "The force.", ...), FACTOR, FRAME,
-    ))),
-    "torques": ("torques", Table("A torque on a marker.", (
-        MARKER, Key("vector", Quantity("N m", ((3,),)), "The torque.", ...), FACTOR, FRAME,
-    ))),
+    "forces": ("forces", Declared(
+        "force", MARKER, Key("vector", Number("N", (3,)), "The force.", ...), FACTOR,
+        about="A force on a marker.",
+    )),
+    "torques": ("torques", Declared(
+        "torque", MARKER, Key("vector", Number("N m", (3,)), "The torque.", ...), FACTOR,
+        about="A torque on a marker.",
+    )),
     "frictions": ("friction in joints", Declared(
         "friction",
         JOINT,
