@@ -124,8 +124,8 @@ class _Border:
         except Unfit as unfit:
             where, hint = self._label(args, named), f"must be {unfit.wanted}."
             text = f"{unfit.place} = {shortened(unfit.value)} {hint}"
-            if unfit.told:
-                text, hint = unfit.place + unfit.told, ""
+            if unfit.sentence:
+                text, hint = unfit.place + unfit.sentence, ""
             if isinstance(unfit.value, type):
                 text, hint = f"{unfit.place}: {call_of(unfit.value)}", ""
             raise unfit.error(text, where=where, hint=hint) from unfit.__cause__

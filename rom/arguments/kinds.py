@@ -55,7 +55,7 @@ class Unfit(Exception):
         value: the value, or the part of it that is wrong.
         wanted: what it must be, in words.
         place: of that part, such as ``['a']``.
-        told: all that is to be said of it behind its name, where that is more than what is wanted.
+        sentence: what is said of it behind its name, where that is more than what is wanted.
         error: class of what is raised for it.
     """
 
@@ -64,16 +64,16 @@ class Unfit(Exception):
         value: Any,
         wanted: str,
         place: str = "",
-        told: str = "",
+        sentence: str = "",
         error: type[RomError] = ConfigError,
     ):
-        super().__init__(value, wanted, place, told, error)
+        super().__init__(value, wanted, place, sentence, error)
         self.value, self.wanted, self.place = value, wanted, place
-        self.told, self.error = told, error
+        self.sentence, self.error = sentence, error
 
     def within(self, place: str) -> "Unfit":
         """The same of something that has this value at a place."""
-        return Unfit(self.value, self.wanted, place + self.place, self.told, self.error)
+        return Unfit(self.value, self.wanted, place + self.place, self.sentence, self.error)
 
 
 @dataclass(frozen=True, slots=True)
@@ -171,7 +171,7 @@ def _in_words(words: str, taken: Taken | None) -> Taken:
         try:
             return value if taken is None else taken(value)
         except Unfit as unfit:
-            deep = unfit.place or unfit.told
+            deep = unfit.place or unfit.sentence
             raise (unfit if deep else Unfit(value, words)) from unfit.__cause__
 
     return Taken(words, take)
@@ -185,7 +185,7 @@ def _limited(kind: Quantity | Whole, taken: Taken | None) -> Taken:
     def take(value: Any) -> Any:
         found = one.take(value)
         if fault := kind.fault(found):
-            raise Unfit(value, words, told=fault, error=kind.error)
+            raise Unfit(value, words, sentence=fault, error=kind.error)
         return float(found) if one is PLAIN_KINDS[float] else found
 
     return Taken(words, take)
@@ -205,7 +205,7 @@ def _one_of(several: list[Taken | None]) -> Taken | None:
             try:
                 return one(value)
             except Unfit as unfit:
-                deepest = max(deepest, unfit, key=lambda x: (len(x.place), bool(x.told)))
+                deepest = max(deepest, unfit, key=lambda x: (len(x.place), bool(x.sentence)))
         raise deepest
 
     return Taken(words, take)

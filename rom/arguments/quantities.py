@@ -148,6 +148,7 @@ def Count(least: int = 0, most: int | None = None, *, error: type[RomError] = Co
 Length = Annotated[float, Positive("m")]
 Size = Annotated[float, Positive("m", error=ModelError)]  # of a part that cannot be without it
 Angle = Annotated[float, Number("rad")]
+Modes = Annotated[int, Count()]  # their number
 Share = Annotated[float, Between(0.0, 1.0)]
 Point = Annotated[npt.ArrayLike, Number("m", (3,))]
 Direction = Annotated[npt.ArrayLike, Number("1", (3,))]

@@ -234,19 +234,7 @@ def between(
     *,
     error: type[RomError] = ConfigError,
 ) -> float:
-    """The value as a finite float of an interval.
-
-    Args:
-        name: of the argument.
-        value: what was given.
-        low: where the interval begins.
-        high: where it ends.
-        ends: brackets of it: round ones where the end is no part of it.
-        error: class of what is raised.
-
-    Raises:
-        RomError: of that class, with the interval.
-    """
+    """The value as a finite float of an interval; round brackets where an end is no part of it."""
     return _limited(name, value, Between(low, high, ends), error)
 
 

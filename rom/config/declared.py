@@ -5,13 +5,13 @@ Keys are the arguments that a method takes by keyword alone, and all arguments o
 
 import re
 import sys
-import types
 import typing
 from collections.abc import Mapping, Sequence
 from dataclasses import is_dataclass, replace
 from functools import cached_property
 from inspect import Parameter, getdoc, signature
 from pathlib import Path
+from types import MappingProxyType, UnionType
 from typing import Any, Literal
 
 from rom.arguments import Quantity, Whole
@@ -20,15 +20,10 @@ from rom.config.keys import FilePath, Flag, Key, Kind, Named, Table, Text, Words
 from rom.fields import follow
 
 SHAPE_OR_UNIT = re.compile(r"^\([\dnr, ]+\)( or \([\d, ]+\))? | ?\[(?!degrees)[^]]*\]")
-NONE: Mapping[str, Any] = types.MappingProxyType({})
 NO_VALUE = re.compile("; None( for|:)")
-PLAIN: dict[Any, Kind] = {
-    float: Quantity(),
-    int: Whole(),
-    bool: Flag(),
-    str: Text(),
-    Path: FilePath(),
-}
+PLAIN_KINDS: dict[Any, Kind] = {
+    float: Quantity(), int: Whole(), bool: Flag(), str: Text(), Path: FilePath(),
+}  # fmt: skip
 
 
 class Declared(Table):
@@ -56,12 +51,12 @@ class Declared(Table):
         *keys: Key,
         about: str = "",
         without: str = "",
-        defaults: Mapping[str, Any] = NONE,
+        defaults: Mapping[str, Any] = MappingProxyType({}),
         **kinds: Kind,
     ) -> None:
         own = {key.name: key for key in keys}
-        told = {"about": about} if about else {}
-        given = {"own": own, "defaults": defaults, "kinds": kinds, **told}
+        stated = {"about": about} if about else {}
+        given = {"own": own, "defaults": defaults, "kinds": kinds, **stated}
         self.__dict__.update(places=places.split(), without=without.split(), **given)
 
     @cached_property
@@ -75,12 +70,11 @@ class Declared(Table):
         found = {
             key.name: self.own.get(key.name, key)
             for place in self.places
-            for key in declared_keys(_made(place), self.kinds, self.defaults)
+            for key in _keys_of(_made(place), self.kinds, self.defaults)
             if key.name not in self.without
         }
-        return tuple(
-            ({name: key for name, key in self.own.items() if name not in found} | found).values()
-        )
+        front = {name: key for name, key in self.own.items() if name not in found}
+        return tuple((front | found).values())
 
 
 def _made(place: str) -> Any:
@@ -91,18 +85,8 @@ def _made(place: str) -> Any:
     return getattr(Mechanism, place)
 
 
-def declared_keys(
-    made: Any,
-    kinds: Mapping[str, Kind] = NONE,
-    defaults: Mapping[str, Any] = NONE,
-) -> list[Key]:
-    """The keys of a function, or of all fields of a record.
-
-    Args:
-        made: function or record.
-        kinds: where they are others than those of annotations.
-        defaults: likewise.
-    """
+def _keys_of(made: Any, kinds: Mapping[str, Kind], defaults: Mapping[str, Any]) -> list[Key]:
+    """The keys of a function, or of all fields of a record."""
     sentences = _sentences(getdoc(made) or "")
     known = Names(vars(sys.modules[made.__module__]))
     found = []
@@ -123,7 +107,7 @@ def _kind(annotation: Any, known: Names) -> Kind | None:
     origin, inner = typing.get_origin(annotation), typing.get_args(annotation)
     if origin is typing.Annotated:
         return inner[1] if isinstance(inner[1], Quantity | Whole) else _kind(inner[0], known)
-    if origin in (typing.Union, types.UnionType):
+    if origin in (typing.Union, UnionType):
         kinds = (_kind(one, known) for one in inner)
         return next((kind for kind in kinds if kind is not None), None)
     if origin is Literal:
@@ -135,8 +119,8 @@ def _kind(annotation: Any, known: Names) -> Kind | None:
     if origin is tuple and isinstance(kind := _kind(inner[0], known), Quantity):
         return replace(kind, shapes=((None if inner[-1] is ... else len(inner),),))
     if is_dataclass(annotation):
-        return Table(_first_paragraph(annotation), tuple(declared_keys(annotation)))
-    return PLAIN.get(annotation)
+        return Table(_first_paragraph(annotation), tuple(_keys_of(annotation, {}, {})))
+    return PLAIN_KINDS.get(annotation)
 
 
 def _first_paragraph(made: Any) -> str:

@@ -14,7 +14,7 @@ from rom.names import check_text
 from rom.units import in_si
 
 MOST_TOLD = 20  # mistakes in one message
-LARGEST = 10**9  # whole number
+LARGEST_WHOLE = 10**9  # whole number
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,7 +106,7 @@ def _shape(value: Any) -> tuple[int, ...] | None:
 
 def _whole(kind: Whole, value: Any, place: Place) -> int:
     fits = isinstance(value, int) and not isinstance(value, bool)
-    if not fits or not kind.holds(value) or value > LARGEST:
+    if not fits or not kind.holds(value) or value > LARGEST_WHOLE:
         raise place.error(f"{place.name} = {as_text(value)} must be a {kind.summary}.")
     return int(value)
 

@@ -12,13 +12,13 @@ if TYPE_CHECKING:
     from rom.components.gear_mesh.gears.corrections import Correction
     from rom.config.connections import Entry
 
-GEARS = "rom.components.gear_mesh.gears"
+GEARS_MODULE = "rom.components.gear_mesh.gears"
 TWO = ((2,),)
 GEAR_PAIR = Declared(
-    f"{GEARS}.geometry:GearPair", without="fillet", addendum=Positive(), dedendum=Positive()
+    f"{GEARS_MODULE}.geometry:GearPair", without="fillet", addendum=Positive(), dedendum=Positive()
 )
 CORRECTION = Declared(
-    f"{GEARS}.corrections:Correction",
+    f"{GEARS_MODULE}.corrections:Correction",
     Key("pinion_pitch", Quantity("m", ((None,),)), "Errors of its teeth; positive leaves a gap."),
     Key("gear_pitch", Quantity("m", ((None,),)), "Those of the gear."),
     *(Key(f"{wheel}_{kind}", FilePath(), f"Of the {which} flanks of the {wheel} [m]: a line of "

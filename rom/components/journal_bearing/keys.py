@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from rom.components.journal_bearing.films.bearing import JournalBearing
     from rom.config.connections import Entry
 
-FILMS = "rom.components.journal_bearing.films"
+FILMS_MODULE = "rom.components.journal_bearing.films"
 OILS = {
     "constant": Table("A viscosity that stays.", (
         Key("viscosity", Positive("Pa s"), "Dynamic.", ...),
@@ -20,15 +20,15 @@ OILS = {
         Key("grade", Whole(1), "ISO VG 32, 46 or 68.", ...),
     )),
     "oil": Declared(
-        f"{FILMS}.oil:Oil",
+        f"{FILMS_MODULE}.oil:Oil",
         about="Any mineral oil.",
         nu_40=Positive("m^2/s"),
         nu_100=Positive("m^2/s"),
     ),
 }  # fmt: skip
-GROOVE = Declared(f"{FILMS}.bearing:Groove", share=Positive())
+GROOVE = Declared(f"{FILMS_MODULE}.bearing:Groove", share=Positive())
 JOURNAL_BEARING = Declared(
-    f"{FILMS}.bearing:JournalBearing",
+    f"{FILMS_MODULE}.bearing:JournalBearing",
     Key("grooves", Named(GROOVE, "grooves"), "Inlets of oil.", {}),
     Key("lobes", Whole(2), "Number of arcs of such a bore.", 2),
     Key("first_lobe", Quantity("rad"), "Middle of one of them.", 0.0),

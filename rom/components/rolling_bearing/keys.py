@@ -10,8 +10,8 @@ from rom.fields import follow
 if TYPE_CHECKING:
     from rom.config.connections import Entry
 
-RACES = "rom.components.rolling_bearing.races"
-ROWS = {"balls": f"{RACES}:BallBearing", "rollers": f"{RACES}:RollerBearing"}
+RACES_MODULE = "rom.components.rolling_bearing.races"
+ROWS = {"balls": f"{RACES_MODULE}:BallBearing", "rollers": f"{RACES_MODULE}:RollerBearing"}
 
 
 def add_bearing(entry: "Entry") -> None:

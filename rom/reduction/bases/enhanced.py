@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rom.arguments import typed, whole
+from rom.arguments import Modes, typed
 from rom.eigen.verbs import Held, Operators, constraint_modes, quadratic
 from rom.model import Array, Basis, Index
 from rom.reduction.bases.free_interface import check_interfaces, numbered
@@ -32,10 +32,7 @@ class EnhancedCraigBampton:
         Kim and Lee, An enhanced Craig-Bampton method, Int. J. Numer. Meth. Eng. 103 (2015) 79.
     """
 
-    n_modes: int
-
-    def __post_init__(self) -> None:
-        whole("n_modes", self.n_modes)
+    n_modes: Modes
 
     def basis(self, ops: Operators, boundary: Index, labels: tuple[str, ...]) -> Basis:
         """The basis for the interface dofs (n_b,); their columns first.

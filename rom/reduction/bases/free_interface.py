@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve, qr
 
-from rom.arguments import typed, whole
+from rom.arguments import Modes, typed, whole
 from rom.eigen.verbs import (
     Operators,
     constraint_modes,
@@ -41,10 +41,7 @@ class Rubin:
         Struct. 1 (1971) 581.
     """
 
-    n_modes: int
-
-    def __post_init__(self) -> None:
-        whole("n_modes", self.n_modes)
+    n_modes: Modes
 
     def basis(self, ops: Operators, boundary: Index, labels: tuple[str, ...]) -> Basis:
         """The basis: columns of the interface dofs (n_b,), then rigid motions and free-free modes.
@@ -80,10 +77,7 @@ class Herting:
         Anal. Des. 1 (1985) 153.
     """
 
-    n_modes: int
-
-    def __post_init__(self) -> None:
-        whole("n_modes", self.n_modes)
+    n_modes: Modes
 
     def basis(self, ops: Operators, boundary: Index, labels: tuple[str, ...]) -> Basis:
         """The basis for the interface dofs (n_b,); their columns first.
@@ -123,10 +117,7 @@ class FreeFree:
         041007, on reference conditions and the choice of modes.
     """
 
-    n_modes: int
-
-    def __post_init__(self) -> None:
-        whole("n_modes", self.n_modes)
+    n_modes: Modes
 
     def basis(self, ops: Operators, boundary: Index, labels: tuple[str, ...]) -> Basis:
         """The basis: rigid motions, then free-free modes; no column for the interface dofs (n_b,).
