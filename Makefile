@@ -27,6 +27,7 @@ demo: setup
 
 test: setup
 	$(PYTHON) -m ruff check .
+	$(PYTHON) -m ruff check --preview --select RUF027 . # a forgotten f before a string
 	$(PYTHON) -m ruff format --check .
 	MYPY_NUM_WORKERS=2 $(PYTHON) -m mypy
 	$(PYTHON) -m pytest -m "fenicsx or once" $(SIDE_BY_SIDE)

@@ -26,7 +26,7 @@ from rom.fields import Methods, Open, families, find
 from rom.mbs.connections import drives as joint_drives
 from rom.mbs.connections import gears, lower_pairs, rolling, universal
 from rom.mbs.connections import points as joint_points
-from rom.mbs.elements.family import Family, check_family
+from rom.mbs.elements.family import Family
 from rom.mbs.parts.bodies import GROUND, Marker, Part, flexible_part, ground_part, rigid_part
 from rom.mbs.parts.joints import Joint, Row, coordinate_of
 from rom.model import Array
@@ -284,7 +284,11 @@ class Mechanism(Methods, metaclass=Open, kind="methods", bound=bound):
             ModelError: if it holds a body that spins beside its axis.
         """
         self.check_new(name)
-        check_family(name, element, family)
+        if not isinstance(element, family.record):
+            raise ConfigError(
+                f"element = {element!r} of {name!r} must be of type {family.record.__name__}, as "
+                f"all {family.name}."
+            )
         ends = family.ends(element)
         self.check_markers(name, *ends)
         for marker in ends if len(ends) > 1 else ():  # a load acts at a place in space

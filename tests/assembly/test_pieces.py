@@ -1,7 +1,5 @@
 """One solid as several reduced bodies: statics far out, frequencies, momentum, and its refusals."""
 
-import subprocess
-import sys
 from dataclasses import replace
 
 import numpy as np
@@ -11,22 +9,17 @@ from scipy.spatial import cKDTree
 
 import rom
 from cases.beam import elastica
-from cases.paths import RANKS, ROOT
-from cases.ranks.environment import ENVIRONMENT
+from cases.long import COARSE
+from cases.paths import RANKS
+from cases.ranks.environment import on_ranks
 from rom import rotation
 from rom.assembly.pieces import Tree, together
 from rom.checks.glued import GluedSolid
 from rom.errors import ConfigError, InterfaceError, ModelError
-from rom.process.mpirun import mpirun
 
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")
 pytest.importorskip("gmsh", reason="gmsh is not installed")
-pytestmark = [
-    pytest.mark.fenicsx,
-    pytest.mark.once,
-    pytest.mark.filterwarnings("ignore:Number of integration points"),
-    pytest.mark.filterwarnings("ignore::rom.errors.RomWarning"),
-]
+pytestmark = COARSE
 E, THICK = 210e9, 0.01
 EI = E * THICK**4 / 12
 
@@ -365,11 +358,8 @@ def test_pieces_are_the_same_on_two_processes(tmp_path):
     found = []
     for n in (1, 2):
         file = tmp_path / f"{n}.npz"
-        script = str(RANKS / "pieces_under_mpi.py")
-        subprocess.run(
-            [*mpirun(n), sys.executable, script, str(file)],
-            env=ENVIRONMENT, timeout=300, check=True, capture_output=True, cwd=ROOT,
-        )  # fmt: skip
+        done = on_ranks(n, RANKS / "pieces_under_mpi.py", file, timeout=300)
+        assert file.exists(), done.stderr
         found.append(np.load(file))
     assert_allclose(found[0]["mass"], 11.775 + 0.5, rtol=1e-12)
     for name in ("a", "b", "mass"):

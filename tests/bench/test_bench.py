@@ -17,7 +17,6 @@ from cases.command import python
 from cases.paths import ROOT
 from cases.solid import block
 from rom.eigen.verbs import rigid_motions
-from rom.errors import ResourceError
 
 pytestmark = pytest.mark.once
 
@@ -95,22 +94,11 @@ def test_the_integrator_is_measured_without_fenicsx():
 
 
 @pytest.mark.long
-def test_chains_of_all_lengths_are_measured():
-    """One figure for each length, of as many elastic coordinates, and how the cost grew."""
-    figures = list(benchmarks.chain((2, 12, 24)))
-    cases = [f"{n} links of 14 modes" for n in (2, 12, 24)] + ["24 against 12 links"]
-    assert [figure.case for figure in figures] == cases
-    assert all(figure.value > 0.0 for figure in figures)
-
-
-@pytest.mark.long
 def test_a_planetary_train_is_timed_on_a_motion_that_is_right():
     mech, pair, _ = planetary_train()
     moved = rom.simulate(mech, t_end=0.02, dt=1e-5, save_every=100, progress=False)
     sun, carrier = (moved.joint(f"{name} axle").angle[-1] for name in ("sun", "carrier"))
     assert carrier == pytest.approx(sun / 4, rel=1e-2) and pair.teeth == (24, 24)
-    *speeds, ratio = benchmarks.geared(steps=100)
-    assert len(speeds) == 4 and all(figure.value > 0 for figure in (*speeds, ratio))
 
 
 @pytest.mark.long
@@ -121,16 +109,6 @@ def test_a_shaft_in_films_is_timed_on_a_motion_that_is_right():
     both = [moved.journal_bearing(f"film {k}").motion[-1] for k in range(2)]
     assert both[0][:2] == pytest.approx(both[1][:2], abs=1e-9)
     assert rom.audit(moved).ok
-
-
-@pytest.mark.long
-def test_steps_of_chosen_length_are_measured_against_those_of_one_length():
-    figures = list(benchmarks.adaptive(duration=0.5, links=2, turns=1, top_time=0.01))
-    cases = ["pendulum"] * 3 + ["2 links"] * 3 + ["slider-crank"] * 3
-    assert [figure.case for figure in figures[:-1]] == cases
-    assert figures[-1].case.startswith("top, rtol 1e-6, ")
-    for one, chosen, ratio in zip(*(figures[k:-1:3] for k in range(3)), strict=True):
-        assert ratio.value == chosen.value / one.value > 0.0
 
 
 def test_other_programs_reduce_the_same_model(bar, tmp_path):
@@ -155,17 +133,6 @@ def test_many_modes_are_the_same_both_ways(bar):
     rows = {figure.quantity: figure.value for figure in benchmarks.many_modes(3e3, (40,))}
     assert rows["largest difference"] < 1e-8
     assert 0.0 < rows["largest bound"] < 1e-6
-
-
-@pytest.mark.long
-def test_an_environment_that_cannot_be_made_is_named(tmp_path, monkeypatch):
-    from benchmarks.peers import compare
-
-    monkeypatch.setattr(compare, "PEER_FOLDER", tmp_path / "peers")
-    monkeypatch.setattr(compare, "PACKAGES", ("no-such-package-anywhere==0",))
-    with pytest.raises(ResourceError, match=r"the environment .* could not be made"):
-        compare.interpreter()
-    assert not (tmp_path / "peers" / "complete").exists()
 
 
 @pytest.mark.fenicsx

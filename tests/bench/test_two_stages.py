@@ -2,7 +2,6 @@
 
 from functools import cache
 
-import numpy as np
 import pytest
 
 import rom
@@ -34,14 +33,3 @@ def test_two_stages_carry_the_torque_and_the_weight(tabulated, bodies):
         lost = films / two_stages.SHAFT_SPEED
         assert -1e-6 * output < moment - output < lost
     assert 10.0 < films < 2000.0
-
-
-def test_its_steps_are_counted(monkeypatch, bodies):
-    monkeypatch.setattr(two_stages, "bodies", bodies)
-    monkeypatch.setattr(two_stages, "N_TEETH", 1)
-    rows = list(two_stages.stages_run((20, 4)))
-    found = {(case, quantity): value for case, quantity, value, _, _ in rows}
-    assert len(found) == len(rows) == 16
-    assert all(np.isfinite(value) and value > 0 for value in found.values())
-    per_step = [value for (_, name), value in found.items() if name == "factorisations per step"]
-    assert max(per_step) < 0.5  # films are renewed, not the whole matrix

@@ -1,8 +1,5 @@
 """Geometric stiffness of solids: rotating beams, buckling, and the same loads by another road."""
 
-import os
-import subprocess
-import sys
 import warnings
 from dataclasses import replace
 
@@ -15,7 +12,7 @@ from scipy.sparse.linalg import eigsh, spsolve
 import rom
 from cases.beam import gauss_hermite, hermite_beam
 from cases.long import SHARED_BY, few
-from cases.ranks.environment import ENVIRONMENT
+from cases.ranks.environment import on_ranks
 from rom.body.prestress import UnitLoads, _turning, centrifugal
 from rom.body.recovery import CENTRIFUGAL_LOADS
 from rom.body.rotating import rotating_matrices
@@ -28,7 +25,6 @@ from rom.body.stiffening import (
 from rom.components.wheels.rotation import rotation_matrices
 from rom.eigen.verbs import rigid_motions
 from rom.errors import ConfigError, ModelError, RomWarning
-from rom.process.mpirun import mpirun
 from rom.reduction.interfaces.connection import connect
 from rom.workflow import operators
 
@@ -384,11 +380,7 @@ def test_the_number_of_processes_does_not_matter(tmp_path):
     bodies = []
     for n in (1, *SHARED_BY):
         path = tmp_path / f"{n}.rom.npz"
-        command = [*mpirun(n), sys.executable, "-c", SCRIPT, path]
-        done = subprocess.run(
-            command, env=os.environ | ENVIRONMENT, timeout=600, capture_output=True, text=True,
-            check=False,
-        )  # fmt: skip
+        done = on_ranks(n, "-c", SCRIPT, path)
         assert path.exists(), done.stderr
         bodies.append(rom.load(path))
     one = bodies[0]

@@ -1,9 +1,7 @@
 """Bodies of large deflection: the energy of shapes, their derivatives, and beams that bend far."""
 
-import subprocess
-import sys
 import tracemalloc
-from dataclasses import fields, replace
+from dataclasses import replace
 from itertools import combinations_with_replacement, cycle
 
 import numpy as np
@@ -17,8 +15,8 @@ from scipy.special import ellipk
 import rom
 from cases.long import SHARED_BY, few
 from cases.mbs.slender import STEEL, Full, assembled, cantilever, reduced, slender, tip_of
-from cases.paths import RANKS, ROOT
-from cases.ranks.environment import ENVIRONMENT
+from cases.paths import RANKS
+from cases.ranks.environment import on_ranks
 from rom.body.nonlinear.full import rows_of
 from rom.body.nonlinear.geometric import ELLIPTIC_STRETCH, Section, foreseen
 from rom.body.nonlinear.quartic import Quartic, entries, n_entries, position
@@ -33,7 +31,6 @@ from rom.checks.deflection import (
 )
 from rom.eigen.verbs import rigid_motions
 from rom.errors import ConfigError, InterfaceError, ModelError, ResourceError, RomWarning
-from rom.process.mpirun import mpirun
 
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")
 pytestmark = [
@@ -478,27 +475,13 @@ def test_what_does_not_go_together_is_refused_by_name(change, error, says):
 
 @pytest.mark.parametrize(
     "wrong",
-    [{"loads": {}}, {"loads": {"tip": (1, 2, 3)}}, {"loads": {"tip": (0,) * 6}}, {"tol": 2.0},
-     {"loads": {"tip": (0, np.nan, 0, 0, 0, 0)}}, {"n_shapes": 0}, {"n_steps": 0},
-     {"loads": {}, "spin": (0, np.inf, 0)},
+    [{"loads": {}}, {"loads": {"tip": (1, 2, 3)}}, {"loads": {"tip": (0,) * 6}},
+     {"loads": {"tip": (0, np.nan, 0, 0, 0, 0)}},
      {"about": (0, 0, 1)}, {"loads": {}, "spin": (0, 0, 1), "about": (0, 0)}],
 )  # fmt: skip
 def test_a_range_that_is_none_is_refused(wrong):
     with pytest.raises(ConfigError):
         rom.Geometric(**{"loads": {"tip": (0, 1.0, 0, 0, 0, 0)}} | wrong)
-
-
-WRONG = (True, "x", -1, 1.5, np.nan, np.inf, 10**160, (1, 2), [[1]], 1j, {"tip": None},
-         {"tip": "x"}, {"tip": (0, 1j, 0, 0, 0, 0)}, {"tip": (1, 2, 3)},
-         {1: (0, 1, 0, 0, 0, 0)})  # fmt: skip
-
-
-@pytest.mark.parametrize("key", [one.name for one in fields(rom.Geometric) if one.name != "fixed"])
-def test_no_value_of_a_wrong_kind_passes_into_a_range(key):
-    """Whatever it is, the error is one of the package, which names what it is about."""
-    for value in WRONG[key == "snapshots" :]:  # for which the first is right
-        with pytest.raises(ConfigError, match=r"tip|loads|\b" + key):
-            rom.Geometric(**{"loads": {"tip": (0, 1.0, 0, 0, 0, 0)}} | {key: value})
 
 
 @pytest.mark.parametrize(
@@ -591,11 +574,8 @@ def test_energy_and_body_are_the_same_on_any_number_of_processes(tmp_path):
     found = {}
     for n in (1, *SHARED_BY):
         file = tmp_path / f"{n}.npz"
-        script = str(RANKS / "large_strain_under_mpi.py")
-        subprocess.run(
-            [*mpirun(n), sys.executable, script, str(file)],
-            env=ENVIRONMENT, timeout=300, check=True, capture_output=True, cwd=ROOT,
-        )  # fmt: skip
+        done = on_ranks(n, RANKS / "large_strain_under_mpi.py", file, timeout=300)
+        assert file.exists(), done.stderr
         found[n] = np.load(file)
     for n in SHARED_BY:
         assert found[1]["errors"].shape == (2, 2, 3)  # displacement and frequencies at three steps

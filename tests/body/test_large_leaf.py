@@ -14,6 +14,7 @@ from numpy.testing import assert_allclose
 from scipy.optimize import brentq
 
 from cases.beam import elastica, load_at
+from cases.long import COARSE
 from cases.mbs.slender import reduced, slender
 from rom.body.nonlinear import quartic
 from rom.body.nonlinear.quartic import Quartic
@@ -21,12 +22,7 @@ from rom.body.nonlinear.statics import follow
 from rom.errors import ModelError
 
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")
-pytestmark = [
-    pytest.mark.fenicsx,
-    pytest.mark.once,
-    pytest.mark.filterwarnings("ignore:Number of integration points"),
-    pytest.mark.filterwarnings("ignore::rom.errors.RomWarning"),
-]
+pytestmark = COARSE
 GUIDED = {"tip": "rxryrz"}
 STEEPEST = 0.5  # slope half way [rad]
 RTOL = 3e-3

@@ -5,16 +5,11 @@ import pytest
 from numpy.testing import assert_allclose
 
 import rom
-from cases.long import few
+from cases.long import COARSE, few
 from cases.mbs.slender import STEEL, assembled, reduced, tip_of
 
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")
-pytestmark = [
-    pytest.mark.fenicsx,
-    pytest.mark.once,
-    pytest.mark.filterwarnings("ignore:Number of integration points"),
-    pytest.mark.filterwarnings("ignore::rom.errors.RomWarning"),
-]
+pytestmark = COARSE
 # slope, shortening and deflection over L of the elastica at P L^2 / EI = 5
 AT_FIVE = np.array([1.215368, 0.387628, 0.713792])
 

@@ -8,16 +8,12 @@ from numpy.testing import assert_allclose
 
 import rom
 import rom.body.nonlinear.ranges
+from cases.long import COARSE
 from cases.mbs.slender import Full, assembled, slender
 from rom.errors import ConfigError, InterfaceError, ModelError, RomError, RomWarning
 
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")
-pytestmark = [
-    pytest.mark.fenicsx,
-    pytest.mark.once,
-    pytest.mark.filterwarnings("ignore:Number of integration points"),
-    pytest.mark.filterwarnings("ignore::rom.errors.RomWarning"),
-]
+pytestmark = COARSE
 
 
 @pytest.fixture(scope="module")

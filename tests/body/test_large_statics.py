@@ -6,17 +6,12 @@ from numpy.testing import assert_allclose
 from scipy.linalg import eigh, null_space
 
 import rom
-from cases.long import few
+from cases.long import COARSE, few
 from cases.mbs.slender import SYMMETRIC, Full, assembled, reduced, slender
 from rom.errors import ConfigError, InterfaceError, ModelError
 
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")
-pytestmark = [
-    pytest.mark.fenicsx,
-    pytest.mark.once,
-    pytest.mark.filterwarnings("ignore:Number of integration points"),
-    pytest.mark.filterwarnings("ignore::rom.errors.RomWarning"),
-]
+pytestmark = COARSE
 HALF, RISE, HEIGHT, PRESSED = 0.5, 0.03, 0.01, 600.0  # of a clamped arch [m], and its load [N]
 
 

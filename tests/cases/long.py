@@ -18,6 +18,13 @@ ONCE = (
     "mbs/equations/test_mbs_cache.py",
     "project/test_docs.py",
 )
+# marks of files about small meshes of finite elements, which are warned of
+COARSE = [
+    pytest.mark.fenicsx,
+    pytest.mark.once,
+    pytest.mark.filterwarnings("ignore:Number of integration points"),
+    pytest.mark.filterwarnings("ignore::rom.errors.RomWarning"),
+]
 # what the light environment has not
 ABSENT = ("dolfinx", "gmsh", "h5py", "matplotlib", "meshio", "pyvista")
 # files of `make test` that begin, so that no worker is left alone with one of them at the end

@@ -68,20 +68,11 @@ FAULTS = {
     "units without mass": (("x.geo", "--units", "SI"), "--units needs --mass"),
     "material twice": ((*CALCULIX, "--rho", "1"), "--rho is for geometries"),
     "scale": ((*CALCULIX, "--scale", "1e-3"), "--scale is for geometries"),
-    "parameter": ((*CALCULIX, "-p", "lc=1"), "--parameter is for geometries"),
-    "unknown set": ((*CALCULIX, "--fixed", "bore"), "has no set 'bore'; it has ['NALL', 'ROOT'"),
     "no set": ((*NASTRAN, "--fixed", "root"), "which nodes are the interface 'root'?",
                "--set root=11-14,20"),
     "set of nobody": ((*CALCULIX, "--set", "pin=12"), "--set pin is no interface"),
-    "set twice": ((*CALCULIX, "--set", "a=3", "--set", "a=7", "--fixed", "a"), "'a' is given"),
-    "unknown node": ((*CALCULIX, "--set", "a=3-4", "--fixed", "a"), "'a' needs nodes of the model",
-                     "[4]"),
     "label": ((*CALCULIX, "--set", "a=3-x", "--fixed", "a"), "'3-x' must be a label"),
-    "range": ((*CALCULIX, "--set", "a=7-3", "--fixed", "a"), "'7-3' must be a label"),
     "which": ((HERE / "dense.op4", *NASTRAN[1:]), "Name one, ", "FILE:NAME"),
-    "unknown name": ((f"{HERE / 'dense.op4'}:KGG", *NASTRAN[1:]), "has no matrix 'KGG'"),
-    "units": ((*CALCULIX, "--units", "inch"), "unit system = 'inch' is none of 'SI', "),
-    "missing": ((HERE / "nope.sti", *CALCULIX[1:]), "nope.sti: there is no such file"),
 }  # fmt: skip
 
 

@@ -75,18 +75,3 @@ def test_a_part_in_inches_is_as_large_as_it_says(folder):
     assert bore["radius"] == pytest.approx(12.5 * INCH, rel=1e-9)
     wrong = run_rom("mesh", "inch.step", "--face=bore=radius:0.0125", cwd=folder)
     assert wrong.returncode == 3 and "0.3175 (1 face)" in wrong.stderr
-
-
-@pytest.mark.fenicsx
-@pytest.mark.long
-def test_wrong_faces_are_refused_with_what_there_is(folder):
-    PARTS["cover"](folder / "lid.step")
-    for picks, words in [
-        (("a=40",), "there is no face 40; the part has 39 faces, numbered 1 to 39"),
-        (("a=normal:0,0,-1",), "2 plane faces have the outward normal"),
-        (("a=0.07,0,0",), "faces 2 and 6 are equally near"),
-        (("a=2", "b=0.07,0.0015,0"), "face 2 is to be called 'a' and 'b'"),
-    ]:
-        options = [f"--face={pick}" for pick in picks]
-        ended = run_rom("mesh", "lid.step", *options, cwd=folder)
-        assert ended.returncode == 3 and words in ended.stderr, ended.stderr

@@ -6,44 +6,17 @@ import numpy as np
 import pytest
 
 import rom
-from cases.files.damage import outcome
-from cases.solid import block
+from cases.files.damage import ARCHIVES, outcome
 from rom.io.archive import write_archive
-from rom.mbs.results.state import Memory, State
 
-KINDS = {"root": "rbe2", "tip": "rbe2"}
 WRONG = (None, -1, 1e308, "x", [1], {"x": 1}, True)
 pytestmark = pytest.mark.filterwarnings("ignore::rom.errors.RomWarning", "ignore::RuntimeWarning")
 
 
-def body(folder):
-    made = rom.reduce(block(cells=(2, 1, 1)), method=rom.CraigBampton(1), interfaces=KINDS)
-    return rom.save(made, folder / "x.rom.npz")
-
-
-def family(folder):
-    made = rom.reduce_parametric(
-        block(cells=(2, 1, 1)), parameters={"rho": rom.Density(None, 0.5, 2.0)}, tol=0.5,
-        method=rom.CraigBampton(1), interfaces=KINDS, damping=rom.Rayleigh(0.0, 1e-6),
-    )  # fmt: skip
-    return rom.save(made, folder / "x.rom.npz")
-
-
-def state(folder):
-    rng = np.random.default_rng(1)
-    q, v, a, lam = (rng.normal(size=n) for n in (7, 6, 6, 5))
-    memory = Memory("generalized-alpha", 1e-2, 0.0, 3, {"a": a})
-    return rom.save_state(State(t=0.3, rank=5, q=q, v=v, a=a, lam=lam, memory=memory),
-                          folder / "x.state.npz")  # fmt: skip
-
-
-FILES = {"body": (body, rom.load), "family": (family, rom.load), "state": (state, rom.load_state)}
-
-
-@pytest.fixture(scope="module", params=FILES)
+@pytest.fixture(scope="module", params=ARCHIVES)
 def file(request, tmp_path_factory):
     """(path, manifest, arrays, reader)."""
-    make, read = FILES[request.param]
+    make, read = ARCHIVES[request.param]
     path = make(tmp_path_factory.mktemp("files"))
     with np.load(path) as found:
         arrays = {name: found[name] for name in found.files}

@@ -30,12 +30,3 @@ def test_damage_is_refused_or_harmless(text, read, tmp_path):
         path.write_bytes(data)
         found.append(outcome(read, path, memory=None))
     assert sum(isinstance(x, ConfigError) for x in found) > MUTANTS // 4 and None in found
-
-
-def test_a_key_twice_is_told_with_its_line(tmp_path):
-    """Spec A03: no TOMLDecodeError."""
-    (tmp_path / "x.toml").write_text(SOLID + 'rho = "1 kg/m^3"\n')
-    with pytest.raises(ConfigError) as refused:
-        read_component(tmp_path / "x.toml")
-    assert refused.value.where == f"{tmp_path / 'x.toml'}:12"
-    assert "'material.rho' is given twice, in lines 11 and 12" in refused.value.message

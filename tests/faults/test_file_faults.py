@@ -10,7 +10,7 @@ from scipy.io import mmwrite
 from scipy.sparse import random as random_matrix
 
 import rom
-from cases.files.damage import damaged, outcome
+from cases.files.damage import ARCHIVES, damaged, outcome
 from cases.mbs.mechanisms import random_body
 from cases.paths import TESTS
 from cases.solid import block, reduced
@@ -85,7 +85,13 @@ def whole(name):
     return lambda folder: (HERE / name).read_bytes()
 
 
+def archive(make):
+    """Body, family and state files, by the makers of the table of their manifests."""
+    return lambda folder: make(folder).read_bytes()
+
+
 TEXTS = {  # case: (file name, its content, reader)
+    **{kind: ("x.npz", archive(make), read) for kind, (make, read) in ARCHIVES.items()},
     "sid": ("x.SID_FEM", sid("sid"), lambda path: read_sid(path, ge="as_written")),
     "sid-pysid": ("x.SID_FEM", sid("sid-pysid"), read_body),
     "sid-geisler": ("x.sid_fem", sid("sid-geisler"), read_body),
@@ -122,6 +128,7 @@ TEXTS = {  # case: (file name, its content, reader)
 }  # fmt: skip
 
 COMPLETE = {  # case: bytes at the end that no reader needs
+    "body": 0, "family": 0, "state": 0,
     "sid": 1, "sid-pysid": 1, "sid-geisler": 1, "op4 text": 24, "op4 sparse": 24, "op4 long": 24,
     "op4 binary": 0, "op4 binary sparse": 0, "op4 binary long": 0, "market": 0, "market dense": 0,
     "user element of a body": 0, "substructure": 0, "openfast": 22, "openfast-4": 22,

@@ -1,92 +1,111 @@
 """Faults from tables, hundreds of them: no crash, no hang, the right class, the culprit by name."""
 
+import os
 import random
-import sys
-from functools import cache
-from importlib.util import find_spec
+import shlex
+import shutil
+import warnings
 
 import pytest
-from generated.case import CLASSES, all_cases, planted
-from generated.judge import figures, verdicts
-from generated.stock import compile_kernels, fill
+from generated.case import CLASSES, Silent, Warned, Works, all_cases
+from generated.stock import PLANTED, compile_kernels, fill
 
-from cases.long import ROM_LONG
+import rom.cli.main as command_line
+from cases.paths import ROOT
+from rom.errors import QualityGateError, RomError, RomWarning
 
 pytestmark = pytest.mark.once
 
-LEAST_CASES = 400
-LEAST_NAMED = 0.98
+MOST_CHARACTERS = 5000  # of a message that somebody still reads
 CASES = all_cases()
-# Classes that share a process.
-GROUPS = ("1", "2", "3", "4", "5", "6", "7", "8", "R")
-# What of them `make test` runs, fewest of those that start processes; `make long` runs all.
-SHARES = dict.fromkeys("1348R", 1 / 6) | dict.fromkeys("567", 1 / 4)
-LEAST_SHARE = 1.0 if ROM_LONG else 0.2
+# the share of a class that `make test` runs, least of those that start processes
+SHARES = dict.fromkeys("2", 1) | dict.fromkeys("567", 1 / 4) | dict.fromkeys("1348R", 1 / 6)
 
 
-def runs_here(one):
-    return not one.fe or bool(find_spec("dolfinx"))
-
-
-def of(group):
-    """Names of the cases of some classes, of a sample where they are sampled."""
-    can = [name for name, one in CASES.items() if name[0] in group and runs_here(one)]
-    size = round(len(can) * (1.0 if ROM_LONG else SHARES.get(group, 1.0)))
-    sample = set(random.Random(group).sample(can, size))
-    return [name for name in can if name in sample]
+def sampled():
+    """All cases, those beyond the share of their class left to `make long`."""
+    for letter in CLASSES:
+        names = [name for name in CASES if name[0] == letter]
+        here = random.Random(letter).sample(names, round(SHARES[letter] * len(names)))
+        for name in names:
+            long = [pytest.mark.long] * (name not in here)
+            fe = [pytest.mark.fenicsx] * CASES[name].fe
+            yield pytest.param(CASES[name], id=name, marks=long + fe)
 
 
 @pytest.fixture(scope="module")
-def judged(tmp_path_factory):
-    """Verdicts on the cases of a group, which run when they are first asked for."""
-    folder = tmp_path_factory.mktemp("faults")
-    fill(folder / "stock")
+def stock(tmp_path_factory):
+    """The folder of valid files, with all compiled that cases call: that is no hang."""
+    folder = tmp_path_factory.mktemp("faults") / "stock"
+    fill(folder)
     compile_kernels()
-    return cache(lambda group: verdicts(folder, of(group)))
+    return folder
 
 
-def listed(verdicts):
-    return "\n" + "\n".join(f"{v.id}: {v.told}" for v in verdicts)
+@pytest.fixture
+def folder(stock, tmp_path, monkeypatch):
+    """A copy to work in; where it lies and the environment are as before afterwards."""
+    shutil.copytree(stock, tmp_path / "here")
+    monkeypatch.chdir(tmp_path / "here")
+    monkeypatch.setenv("PYTHONPATH", str(ROOT))  # of processes that cases start
+    before = dict(os.environ)
+    yield tmp_path / "here"
+    os.environ.clear()
+    os.environ.update(before)
 
 
-@pytest.mark.parametrize("group", GROUPS)
-def test_faults_do_no_harm_and_are_refused(judged, group):
-    found = judged(group)
-    lost = [v for v in found if not v.survived]
-    assert not lost, f"crashes, hangs and foreign exceptions:{listed(lost)}"
-    wrong = [v for v in found if not v.right]
-    assert not wrong, f"wrong outcomes:{listed(wrong)}"
-    open_ended = [v for v in found if not v.ended]
-    assert not open_ended, f"messages without a full stop:{listed(open_ended)}"
+@pytest.mark.timeout(60, func_only=True)
+@pytest.mark.parametrize("one", [*sampled()])
+def test_a_fault_does_no_harm_and_is_refused_by_name(one, folder, capsys, monkeypatch):
+    for prepare in one.given:
+        prepare(folder)
+    before = files(folder)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", RomWarning)
+        error = (called if callable(one.act) else typed)(one.act, folder, monkeypatch)
+    err = capsys.readouterr().err
+    told = [str(w.message) for w in caught if issubclass(w.category, RomWarning)]
+    told += [line for line in err.splitlines() if line.startswith("warning: ")]
+    said = f"{error}\n{err}" if error else " ".join(told)
+    has = all(any(w in said for w in ((x,) if isinstance(x, str) else x)) for x in one.words)
+    assert "Traceback" not in err and len(said) <= MOST_CHARACTERS
+    if error:
+        assert isinstance(error, one.accept) and error.exit_code != 1, repr(error)
+        assert all(text.rstrip().endswith(".") for text in (error.message, error.hint) if text)
+    else:
+        outcome = Warned if told else Silent
+        assert Works in one.accept or outcome in one.accept, told
+    assert has or Works in one.accept or not (error or told), said
+    found = files(folder)
+    allowed = before if error and not one.leaves else {f for f in found if f.startswith("here")}
+    bad = {name for name in found if PLANTED in name or name.endswith(".part")}
+    assert not bad | (found - allowed)
 
 
-def test_figures(judged, capsys):
-    assert sorted("".join(GROUPS)) == sorted(CLASSES)
-    found = [verdict for group in GROUPS for verdict in judged(group)]
-    with capsys.disabled():
-        sys.stdout.write(f"\n{figures(found)}\nleft out: {len(CASES) - len(found)}\n")
-    assert len(CASES) >= LEAST_CASES
-    assert len({v.id for v in found}) == len(found)
-    assert len(found) >= LEAST_SHARE * sum(map(runs_here, CASES.values()))
-    spoken = [v for v in found if v.named is not None]
-    unnamed = [v for v in spoken if not v.named]
-    assert len(unnamed) <= (1 - LEAST_NAMED) * len(spoken), f"unnamed culprits:{listed(unnamed)}"
+def called(act, folder, _):
+    """The `RomError` of a call, or nothing; other errors are failures."""
+    try:
+        act(folder)
+    except RomError as error:
+        return error
+    return None
 
 
-def test_the_judge_finds_what_is_planted(tmp_path):
-    """Whether each survives, is right, and names the culprit; the last one is all of it."""
-    fill(tmp_path / "stock")
-    found = {v.id[2:]: (v.survived, v.right, v.named) for v in verdicts(tmp_path, list(planted()))}
-    assert found == {
-        "a crash": (False, False, None),
-        "an exit": (False, False, None),
-        "a hang": (False, False, None),
-        "another exception": (False, False, None),
-        "a file that is left": (True, False, True),
-        "a file elsewhere": (True, False, None),
-        "another class": (True, False, True),
-        "another word": (True, True, False),
-        "no warning": (True, False, True),
-        "a wrong value": (True, False, None),
-        "nothing wrong": (True, True, True),
-    }
+def typed(words, _, monkeypatch):
+    """The same of a command line, whose exit code is that of the error."""
+    raised, translated = [], command_line.translated
+
+    def listen(error):
+        raised.append(translated(error))
+        return raised[-1]
+
+    monkeypatch.setattr(command_line, "translated", listen)
+    code = command_line.main(shlex.split(words))
+    error = (raised or [QualityGateError(".")])[0] if code else None
+    assert error is None or code == error.exit_code
+    return error
+
+
+def files(folder):
+    """Everything below the folder around the working folder."""
+    return {str(path.relative_to(folder.parent)) for path in folder.parent.rglob("*")}

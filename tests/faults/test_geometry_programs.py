@@ -219,14 +219,6 @@ def test_a_geometry_that_includes_itself_is_named(length, verb, here):
     assert all(name in str(caught.value) for name in chain)
 
 
-def test_a_deck_that_includes_itself_is_named(here):
-    for name, line in (("box.inp", "*INCLUDE, INPUT=box.inp"), ("box.bdf", "INCLUDE 'box.bdf'")):
-        (here / name).write_text(f"{line}\n")
-        with pytest.raises(RomError, match=name.replace(".", r"\.")) as caught:
-            read_mesh(name)
-        assert caught.value.exit_code == 3
-
-
 def test_a_volume_in_a_group_below_zero_is_a_tag_error(here):
     lay({"box.geo": BOX.replace('"body", 1', '"body", -3')}, here)
     with pytest.raises(TagError, match=r"box\.geo: volume 1 .* -3"):

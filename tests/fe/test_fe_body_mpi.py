@@ -1,8 +1,5 @@
 """The body file does not depend on the number of processes that wrote it."""
 
-import subprocess
-import sys
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -10,8 +7,7 @@ from numpy.testing import assert_allclose
 import rom
 from cases.long import ROM_LONG, SHARED_BY
 from cases.paths import ROOT
-from cases.ranks.environment import ENVIRONMENT
-from rom.process.mpirun import mpirun
+from cases.ranks.environment import on_ranks
 
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")
 pytestmark = [pytest.mark.fenicsx, pytest.mark.mpi]
@@ -33,13 +29,11 @@ def bodies(request, tmp_path_factory):
     folder, written = tmp_path_factory.mktemp("bodies"), {}
     for n in (1, *SHARED_BY):
         written[n] = folder / f"{n}.rom.npz"
-        command = [*mpirun(n), sys.executable, "-m", "rom", "reduce"]
+        command = ["-m", "rom", "reduce"]
         command += [str(ROD), "-p", f"lc={SIZE}", "--E", "210e9", "--nu", "0.3", "--rho", "7850"]
         command += [word for kind in KINDS[request.param] for word in ("-i", kind)]
         command += ["-m", "20", "--reference", "pin_a", "-q", "-o", str(written[n])]
-        done = subprocess.run(
-            command, env=ENVIRONMENT, timeout=600, capture_output=True, text=True, check=False
-        )
+        done = on_ranks(n, *command)
         assert written[n].exists(), done.stderr
     return {n: rom.load(path) for n, path in written.items()}
 
@@ -80,9 +74,6 @@ def test_a_script_that_fails_on_one_rank_after_the_model_ends_on_all():
         "parameters={'lc': 0.012}); "
         "1 / (MPI.COMM_WORLD.rank - 1); MPI.COMM_WORLD.Barrier()"
     )
-    done = subprocess.run(
-        [*mpirun(3), sys.executable, "-c", script],
-        env=ENVIRONMENT, timeout=60, capture_output=True, text=True, check=False,
-    )  # fmt: skip
+    done = on_ranks(3, "-c", script, timeout=60)
     assert done.returncode != 0
     assert done.stderr.count("ZeroDivisionError: division by zero") == 1

@@ -1,16 +1,13 @@
 """Every method gives the same frequencies on one, two and three processes."""
 
 import json
-import subprocess
-import sys
 
 import numpy as np
 import pytest
 
 from cases.long import SHARED_BY
-from cases.paths import RANKS, ROOT
-from cases.ranks.environment import ENVIRONMENT
-from rom.process.mpirun import mpirun
+from cases.paths import RANKS
+from cases.ranks.environment import on_ranks
 
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")
 pytestmark = [pytest.mark.fenicsx, pytest.mark.mpi]
@@ -22,11 +19,7 @@ def found(tmp_path_factory):
     folder, frequencies = tmp_path_factory.mktemp("methods"), {}
     for n in (1, *SHARED_BY):
         file = folder / f"{n}.json"
-        done = subprocess.run(
-            [*mpirun(n), sys.executable, str(SCRIPT), str(file)],
-            env=ENVIRONMENT, timeout=600, capture_output=True, text=True, check=False,
-            cwd=ROOT,
-        )  # fmt: skip
+        done = on_ranks(n, SCRIPT, file)
         assert file.exists(), done.stderr
         frequencies[n] = json.loads(file.read_text())
     return frequencies

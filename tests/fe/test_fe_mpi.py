@@ -1,42 +1,23 @@
 """One, two and three ranks: the same numbers, the same errors, no hang."""
 
-import os
-import subprocess
-import sys
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
 from cases.long import SHARED_BY
-from cases.paths import RANKS, TESTS
+from cases.paths import RANKS
+from cases.ranks.environment import on_ranks
 from rom.errors import MaterialError, RomError
-from rom.process.mpirun import mpirun
 
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")
 pytestmark = [pytest.mark.fenicsx, pytest.mark.mpi]
 
-HERE = TESTS
-ENVIRONMENT = os.environ | {
-    "OMP_NUM_THREADS": "1",
-    "OMPI_ALLOW_RUN_AS_ROOT": "1",
-    "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
-    "OMPI_MCA_mpi_yield_when_idle": "1",  # more ranks than cores would spin
-    "PYTHONPATH": os.pathsep.join([str(HERE.parent), str(HERE)]),
-}
-
-
-def on_ranks(n, *arguments, timeout=360):
-    command = [*mpirun(n), sys.executable, str(RANKS / "under_mpi.py")]
-    return subprocess.run(
-        [*command, *map(str, arguments)],
-        cwd=HERE, env=ENVIRONMENT, timeout=timeout, capture_output=True, text=True, check=False,
-    )  # fmt: skip
+UNDER_MPI = RANKS / "under_mpi.py"
 
 
 def run_model(folder, n, cells, degree):
     path = folder / f"{n}.npz"
-    done = on_ranks(n, "model", path, cells, degree)
+    done = on_ranks(n, UNDER_MPI, "model", path, cells, degree)
     assert done.returncode == 0, done.stderr
     return dict(np.load(path))
 
@@ -92,7 +73,7 @@ def test_fewer_cells_than_ranks(tmp_path):
     ],
 )
 def test_a_rank_that_fails_ends_all_within_seconds(kind, code, words):
-    done = on_ranks(2, "fail", kind, timeout=60)
+    done = on_ranks(2, UNDER_MPI, "fail", kind, timeout=60)
     assert done.returncode == code
     assert words in done.stderr
     assert done.stderr.count(words) == 1
@@ -124,16 +105,13 @@ def test_interfaces_of_one_rank_and_of_all_ranks(n, tmp_path):
 
 def reduced_on(n, folder):
     path = folder / f"{n}.npz"
-    done = subprocess.run(
-        [*mpirun(n), sys.executable, str(RANKS / "interfaces_under_mpi.py"), str(path)],
-        cwd=HERE, env=ENVIRONMENT, timeout=120, capture_output=True, text=True, check=False,
-    )  # fmt: skip
+    done = on_ranks(n, RANKS / "interfaces_under_mpi.py", path, timeout=120)
     assert done.returncode == 0, done.stderr
     return dict(np.load(path))
 
 
 def test_a_rank_that_dies_ends_the_others():
     """As when the machine kills the largest process: the others would wait for ever."""
-    done = on_ranks(2, "die", timeout=60)
+    done = on_ranks(2, UNDER_MPI, "die", timeout=60)
     assert done.returncode != 0
     assert "signal 9 (Killed)" in done.stdout + done.stderr

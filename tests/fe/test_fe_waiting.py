@@ -1,15 +1,13 @@
 """Ranks that wait leave their core to others, and a small model says that it needs but one."""
 
 import json
-import subprocess
-import sys
 
 import pytest
 
-from cases.paths import RANKS, ROOT
-from cases.ranks.environment import ENVIRONMENT
+from cases.paths import RANKS
+from cases.ranks.environment import ENVIRONMENT, on_ranks
 from rom.process.launcher import YIELD_VARIABLE
-from rom.process.mpirun import OPEN_MPI, found, mpirun, version
+from rom.process.mpirun import OPEN_MPI, found, version
 
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")
 pytestmark = [pytest.mark.fenicsx, pytest.mark.mpi]
@@ -21,10 +19,8 @@ def run(request, tmp_path_factory):
     """Two ranks with rom or MPI imported first, and nothing in the environment that helps them."""
     file = tmp_path_factory.mktemp("waits") / "found.json"
     plain = {name: value for name, value in ENVIRONMENT.items() if name != YIELD_VARIABLE}
-    done = subprocess.run(
-        [*mpirun(2), sys.executable, str(RANKS / "waits_under_mpi.py"), request.param, str(file)],
-        env=plain, timeout=120, capture_output=True, text=True, check=False, cwd=ROOT,
-    )  # fmt: skip
+    words = (RANKS / "waits_under_mpi.py", request.param, file)
+    done = on_ranks(2, *words, env=plain, timeout=120)
     assert file.exists(), done.stderr
     return json.loads(file.read_text()), done.stderr
 

@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 import rom
 from cases.solid import block
 from rom import rotation
-from rom.errors import ConfigError, MaterialError, MeshError, RomError
+from rom.errors import ConfigError, MaterialError, MeshError
 from rom.model import Material, Orthotropic, Report, Row
 from rom.units import unit_system
 
@@ -23,12 +23,6 @@ WOOD = {"E": (12e9, 0.8e9, 0.5e9), "nu": (0.4, 0.4, 0.3), "G": (0.7e9, 0.6e9, 0.
         ({"nu": -1.2}, "nu = -1.2 is outside"),
         ({"nu": 0.5}, "nu = 0.5 is outside"),
         ({"nu": -1.0}, "nu = -1 is outside"),
-        ({"rho": 0.0}, "rho = 0 kg/m\\^3 must be positive"),
-        ({"rho": -7850.0}, "rho = -7850 kg"),
-        ({"E": 0.0}, "E = 0 Pa must be positive"),
-        ({"E": -210e9}, "E = -2.1e\\+11 Pa must be positive"),
-        ({"E": float("nan")}, "E = nan must be a finite number"),
-        ({"E": "2.1e11"}, "E = '2.1e11' must be a finite number"),
     ],
 )
 def test_message_for_numbers_no_solid_can_have(numbers, message):
@@ -67,15 +61,6 @@ def test_an_error_survives_the_way_to_another_rank():
     again = pickle.loads(pickle.dumps(error))
     assert (type(again), str(again)) == (MeshError, "rod.msh: cell 7 has no volume. Mesh again.")
     assert again.exit_code == 3
-
-
-def test_every_error_has_a_documented_exit_code():
-    kinds, codes = [RomError], set()
-    while kinds:
-        kind = kinds.pop()
-        kinds += kind.__subclasses__()
-        codes.add(kind.exit_code)
-    assert codes == {1, 2, 3, 4, 5, 6, 7}
 
 
 def test_report_prints_what_failed():

@@ -48,7 +48,6 @@ def test_a_quantity_in_si(text, unit, value):
     [
         ("210 mm", "Pa", "is a length; a pressure or stress [Pa] is wanted"),
         ("50 Hz", "rad/s", "is a frequency; an angular speed [rad/s] is wanted"),
-        ("3 rad/s", "Hz", "is an angular speed; a frequency [Hz] is wanted"),
         ("3 %", "rad", "is a number; an angle [rad] is wanted"),
         ("30 deg", "1", "is an angle; a number without unit"),
         ("1 m^5 kg", "N", "kg m^5; a force"),
@@ -58,10 +57,8 @@ def test_a_quantity_in_si(text, unit, value):
         ("3,5 mm", "m", "a decimal point is needed"),
         ("steel", "Pa", "does not begin with a number"),
         ("1e400 m", "m", "too large"),
-        ("1e308 km", "m", "too large"),
         ("1e9999999 m", "m", "is no unit"),
         ("1 m^99", "m", "is no unit"),
-        ("1" * 200 + " m", "m", "does not begin with a number"),
         ("1 m//s", "m/s", "is no unit"),
     ],
 )

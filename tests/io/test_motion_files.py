@@ -129,12 +129,6 @@ def test_what_is_missing_is_named_with_the_cure(name, mixed, monkeypatch):
     assert "pip install 'fenicsx-rom[data]'" in caught.value.hint
 
 
-def test_a_wrong_share_of_instants_is_named(mixed):
-    pytest.importorskip("pandas", reason="pandas is not installed")
-    with pytest.raises(ConfigError, match="every = 0"):
-        mixed.to_pandas(every=0)
-
-
 @pytest.mark.once
 def test_the_tree_is_read_by_h5py(motion, tmp_path):
     hdf5 = pytest.importorskip("h5py", reason="h5py is not installed")
@@ -163,8 +157,6 @@ def test_names_with_slashes_and_dots_stay_apart(tmp_path):
 def test_what_cannot_be_written_is_named(motion, tmp_path):
     with pytest.raises(ConfigError, match=r"ending '.xls'; known: .csv, .h5, .hdf5"):
         rom.write_history(motion, tmp_path / "m.xls")
-    with pytest.raises(ConfigError, match="every = 0"):
-        rom.write_history(motion, tmp_path / "m.csv", every=0)
     with pytest.raises(ConfigError, match="does not exist"):
         rom.write_history(motion, tmp_path / "none" / "m.csv")
     with pytest.raises(ConfigError, match=r"'.fbx' is unknown"):

@@ -140,13 +140,7 @@ def test_a_file_that_claims_terabytes_is_refused_before_memory_is_taken(file, tm
         rom.load(file, limit=1000)
 
 
-def test_other_files_and_newer_versions_are_named(file, tmp_path, body):
-    (tmp_path / "text.npz").write_text("hello")
-    with pytest.raises(FileFormatError, match="not a complete body file"):
-        rom.load(tmp_path / "text.npz")
-    with pytest.raises(FileFormatError, match="no such file"):
-        rom.load(tmp_path / "missing.npz")
-
+def test_newer_versions_are_named(file, tmp_path, body):
     def newer(name, data):
         return data.replace(b'"version": [1, 7]', b'"version": [9, 0]')
 

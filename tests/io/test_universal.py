@@ -92,8 +92,6 @@ def test_functions_are_assembled_by_sensor_and_exciter(tmp_path):
 
 def test_broken_files_are_named(tmp_path):
     path = tmp_path / "x.unv"
-    with pytest.raises(FileFormatError, match="no such file"):
-        read_universal(path)
     whole = dataset(6, 1, [RE, IM])
     for bad in (whole[: len(whole) // 2], whole.replace("E+00", "Q+00"), whole[:-40] + whole[-7:]):
         path.write_text(bad)

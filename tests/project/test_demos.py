@@ -2,7 +2,6 @@
 
 import json
 import runpy
-import subprocess
 import sys
 
 import pytest
@@ -14,8 +13,7 @@ from cases.figures.pictures import faults
 from cases.files.demos import DEMOS, LONG_DEMOS, MESHED, check
 from cases.long import ROM_LONG
 from cases.paths import RANKS
-from cases.ranks.environment import ENVIRONMENT
-from rom.process.mpirun import mpirun
+from cases.ranks.environment import on_ranks
 from rom.view.canvas.picture import Picture
 
 pytestmark = [pytest.mark.fenicsx, pytest.mark.slow]
@@ -48,11 +46,8 @@ def test_what_is_left_to_make_long_exists():
 @pytest.mark.parametrize("demo", MESHED, ids=lambda path: path.stem)
 def test_demo_runs_unchanged_on_two_processes(demo, tmp_path):
     out, file = tmp_path / "out", tmp_path / "results.json"
-    done = subprocess.run(
-        [*mpirun(2), sys.executable, str(RANKS / "demo_under_mpi.py"),
-         str(file), str(demo), "--quiet", "--out", str(out)],
-        env=ENVIRONMENT, capture_output=True, text=True, timeout=1740, check=False,
-    )  # fmt: skip
+    words = (RANKS / "demo_under_mpi.py", file, demo, "--quiet", "--out", out)
+    done = on_ranks(2, *words, timeout=1740)
     assert done.returncode == 0, done.stderr
     results = json.loads(file.read_text())
     said = [line.rpartition(": ")[0] for line in done.stdout.splitlines()]

@@ -6,7 +6,6 @@ import json
 import re
 import shlex
 import shutil
-import struct
 import subprocess
 import sys
 from xml.etree import ElementTree as ET
@@ -84,42 +83,6 @@ def test_the_page_of_demos_has_each_with_its_small_picture(pages, tmp_path):
     assert "![" not in without and without.count(":::{container} demo") == len(scripts)
 
 
-def test_small_pictures_stay_small_and_are_of_demos(pages):
-    kept = sorted(pages.THUMBNAILS.iterdir())
-    assert {path.stem for path in kept} <= {path.stem for path in pages.DEMOS.glob("demo_*.py")}
-    assert sum(path.stat().st_size for path in kept) < 400_000
-    for path in kept:  # signature, then width and height of a PNG
-        head = path.read_bytes()[:24]
-        assert head[:8] == b"\x89PNG\r\n\x1a\n"
-        assert struct.unpack(">II", head[16:]) == (240, 170), path.name
-
-
-def test_a_small_picture_is_the_upper_part_of_a_sheet_or_a_whole_film(pages, tmp_path):
-    """Of three colours below each other, which fill it, and of a tall film, beside white."""
-    image = pytest.importorskip("PIL.Image", reason="small pictures need the extra [docs]")
-    import site_thumbnails
-
-    red, green, blue = colours = (200, 0, 0), (0, 150, 0), (0, 0, 200)
-    sheet = image.new("RGB", (1500, 1400), "white")
-    for k, colour in enumerate(colours):
-        sheet.paste(colour, (20, 100 + 400 * k, 1480, 500 + 400 * k))
-    sheet.save(tmp_path / "sheet.png")
-    frames = [image.new("RGB", (200, 800), colour) for colour in colours]
-    frames[0].save(tmp_path / "film.gif", save_all=True, append_images=frames[1:])
-    (tmp_path / "demo_x.py").write_text("# # X\n# Writes: `sheet.png`, `film.gif`\n")
-    seen = {"sheet.png": {(120, 2): red, (120, 72): green, (120, 140): blue},
-            "film.gif": {(120, 2): green, (120, 167): green, (40, 85): (255,) * 3}}  # fmt: skip
-    for name in ("film.gif", "sheet.png"):  # a film comes first
-        assert site_thumbnails.shown(tmp_path / "demo_x.py", (tmp_path,)) == tmp_path / name
-        site_thumbnails.thumbnail(tmp_path / name, tmp_path / "small.png")
-        with image.open(tmp_path / "small.png") as found:
-            small = found.convert("RGB")
-        assert small.size == (240, 170)
-        for place, colour in seen[name].items():
-            assert small.getpixel(place) == pytest.approx(colour, abs=8), (name, place)
-        (tmp_path / name).unlink()
-
-
 def test_the_error_page_has_every_error(pages):
     kinds = [e for e in vars(errors).values() if isinstance(e, type) and hasattr(e, "exit_code")]
     page = pages.error_page()
@@ -160,13 +123,6 @@ def test_every_public_name_stands_exactly_once_among_the_tasks(pages):
     assert page.count(":py:obj:`") + page.count(":doc:`") == len(named)
     for heading in pages.TASKS:
         assert f"\n{heading}\n{'-' * len(heading)}\n" in page
-
-
-def test_examples_stay_as_they_are_typed(pages):
-    text = "A * b.\n\nExample:\n    >>> x = 2 * a_ | b\n    4\n\nAnd c_ * d."
-    assert pages.plain(text) == (
-        "A \\* b.\n\nExample:\n    >>> x = 2 * a_ | b\n    4\n\nAnd c\\_ \\* d."
-    )
 
 
 def test_generated_pages_have_every_verb_key_and_sample(pages):
@@ -374,3 +330,10 @@ def test_claims_name_tests_that_exist():
             there = name in known or (dots and any(one.startswith(name) for one in known))
             assert there, f"{path.name} names {name}"
     assert len(re.findall(r"`test_\w+`", (DOCS / "claims.md").read_text())) > 30
+
+
+def test_lists_named_for_contributors_exist():
+    for name, path in re.findall(
+        r"`([A-Z_]+)` of `([\w./]+)`", (DOCS / "contributing.md").read_text()
+    ):
+        assert re.search(rf"^{name}\b", (ROOT / path).read_text(), re.M), f"{name} of {path}"

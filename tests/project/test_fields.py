@@ -3,8 +3,6 @@
 import ast
 import inspect
 import pickle
-import re
-import shutil
 import subprocess
 import sys
 from textwrap import dedent
@@ -158,63 +156,6 @@ def test_all_components_may_be_deleted(tmp_path):
         assert sentence in said
     assert said.count("pip install --force-reinstall fenicsx-rom") == 5
     assert "fields.toml:" in said and "VERB" in said
-
-
-EVERY_MODULE = """
-import importlib, pkgutil
-for module in pkgutil.walk_packages(rom.__path__, "rom."):
-    if not module.name.endswith("__main__"):
-        importlib.import_module(module.name)
-main(["--help"])
-"""
-QUICK = "project/test_layers.py project/test_fronts.py config/test_config_expressions.py"
-LEFT_OUT = "not lines and not says_what_is_inside and not users"  # numbers, prose and demos
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("field", ["tendons", "rolling_bearing", "cosserat", "updating"])
-def test_a_field_may_be_deleted(field, tmp_path):
-    """With its line and what imports it, among which is nothing of the core."""
-    for name in ("rom", "tests", ".ci"):
-        shutil.copytree(ROOT / name, tmp_path / name)
-    shutil.copy(ROOT / "pyproject.toml", tmp_path)
-    delete(tmp_path, field)
-    paths = tmp_path, tmp_path / "tests"
-    said = run(CORE + EVERY_MODULE, *paths, cwd=tmp_path).stdout
-    assert "exit codes:" in said and ("  update  " in said) == (field != "updating")
-    tests = [f"tests/{name}" for name in QUICK.split()]
-    done = program("-m", "pytest", "-q", *tests, "-k", LEFT_OUT, paths=paths, cwd=tmp_path)
-    assert " passed" in done.stdout
-
-
-def delete(tree, field):
-    """A component, and components and tests that import it or what went with it."""
-    gone = {f"rom.components.{field}"}
-    shutil.rmtree(tree / "rom" / "components" / field)
-    while files := [path for path in tree.rglob("*.py") if gone & imported(path)]:
-        for path in files:
-            parts = path.relative_to(tree).with_suffix("").parts
-            core = parts[0] == "rom" and parts[1] != "components"
-            assert not core, f"{path} of the core imports one of {sorted(gone)}"
-            gone.add(".".join(parts[:3] if parts[0] == "rom" else parts[1:]))
-            path.unlink(missing_ok=True)
-            if parts[0] == "rom":
-                shutil.rmtree(tree.joinpath(*parts[:3]), ignore_errors=True)
-    names = "|".join(one.removeprefix("rom.components.") for one in gone if "rom." in one)
-    whose = rf"from rom\.components(?:\.(?:{names})\b[\w.]* import| import (?:{names})\b)"
-    text = rf'    "rom\.components\.(?:{names})\..*'
-    line = re.compile(rf"^(?:{whose} (?:\([^)]*\)|.*)|{text})\n", re.M)
-    for path in (tree / "rom" / "fields.py", *tree.rglob("*.pyi")):
-        path.write_text(line.sub("", path.read_text()))
-
-
-def imported(path):
-    """Modules, packages above them too, that a file imports anywhere."""
-    nodes = list(ast.walk(ast.parse(path.read_text())))
-    found = {alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names}
-    found |= {f"{node.module}.{alias.name}" for node in nodes if isinstance(node, ast.ImportFrom)
-              for alias in node.names}  # fmt: skip
-    return {name.rsplit(".", k)[0] for name in found for k in range(name.count(".") + 1)}
 
 
 CAMS = {  # the package of a stranger

@@ -6,7 +6,6 @@ import re
 import subprocess
 import sys
 from importlib import import_module
-from inspect import ismodule
 
 import pytest
 
@@ -22,7 +21,6 @@ FOLDERS = sorted(path for path in (ROOT / "rom").rglob("__init__.py") if path.pa
 DEMOS = sorted((ROOT / "demos").glob("*.py"))
 WRITTEN = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 PAGES = [path for path in WRITTEN if "generated" not in path.parts]
-CODE = re.compile(r"^```python\n(.*?)^```$", re.M | re.S)
 
 
 def front_of(package):
@@ -89,23 +87,7 @@ def test_a_front_says_what_is_inside(path):
     assert 3 <= len(said.splitlines()) <= 22
 
 
-def imports(text):
-    """Statements that import something of rom."""
-    for node in ast.walk(ast.parse(text)):
-        if isinstance(node, ast.Import) and node.names[0].name.split(".")[0] == "rom":
-            yield node, [alias.name for alias in node.names]
-        if isinstance(node, ast.ImportFrom) and node.module.split(".")[0] == "rom":
-            yield node, [node.module]
-
-
 @pytest.mark.parametrize("path", [*DEMOS, *PAGES], ids=lambda path: path.stem)
-def test_users_are_shown_short_imports_that_work(path):
-    """At most two dots; also in demos, which are not run here."""
-    text = path.read_text()
-    blocks = [text] if path.suffix == ".py" else CODE.findall(text)
-    for node, modules in (found for block in blocks for found in imports(block)):
-        assert max(module.count(".") for module in modules) < 3, f"{path.name}: {modules}"
-        names = {}
-        exec(compile(ast.Module([node], []), str(path), "exec"), names)
-        deep = [o.__name__ for o in names.values() if ismodule(o) and o.__name__.count(".") > 2]
-        assert not [name for name in deep if name.startswith("rom.")], path.name
+def test_users_are_shown_short_imports(path):
+    """At most two dots; that they work is seen where pages and demos run."""
+    assert not re.findall(r"^ *(?:from|import) rom(?:\.\w+){3}.*", path.read_text(), re.M)

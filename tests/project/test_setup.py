@@ -166,23 +166,3 @@ def test_pip_does_not_shadow_what_debian_provides():
     assert not names & {name_of(requirement) for requirement in apart}
     debian = "gmsh h5py petsc4py slepc4py mpi4py meshio fenics-dolfinx"
     assert not names & set(debian.split()) and {"numpy", "scipy", "numba"} <= names
-
-
-def test_types_are_checked_strictly_wherever_users_call():
-    """No module is left out: kernels have no types of their own, what they call has."""
-    checked = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["mypy"]
-    assert checked["strict"] and "rom" in checked["files"]
-    assert "exclude" not in checked
-    untyped = {
-        name
-        for exception in checked["overrides"]
-        if not exception.get("disallow_untyped_defs", True)
-        for name in exception["module"]
-    }
-    for name in untyped - {"rom.mbs.kernels.*"}:
-        text = (ROOT / f"{name.replace('.', '/')}.py").read_text()
-        ways = "compiled import", "compiled_law", "numba.njit"
-        assert any(way in text for way in ways), name
-    for exception in checked["overrides"]:
-        names = exception["module"]
-        assert isinstance(names, str) or len(set(names)) == len(names)

@@ -6,6 +6,7 @@ from numpy.testing import assert_allclose
 
 import rom
 from cases.operators import KINDS
+from cases.refusals import refused
 from cases.solid import block
 from rom.errors import ConfigError, ModelError, ResourceError
 from rom.reduction.interfaces.connection import connect
@@ -86,34 +87,14 @@ def test_modes_that_interfaces_neither_move_nor_feel_leave_first():
     assert seen[0] > seen[1]
 
 
-@pytest.mark.parametrize(
-    ("arguments", "error", "words"),
-    [
-        ((np.eye(2), np.eye(2), np.zeros((2, 2)), np.ones((2, 1)), np.ones((1, 2)), 1),
-         ModelError, "not stable"),
-        ((np.eye(2), np.eye(3), np.eye(2), np.ones((2, 1)), np.ones((1, 2)), 1),
-         ConfigError, "M has shape"),
-        ((np.eye(2), np.eye(2), np.eye(2), np.ones((2, 1)), np.ones((1, 2)), 3),
-         ConfigError, "r = 3 must be a whole number from 1 to 2"),
-        ((np.eye(601),) * 3 + (np.ones((601, 1)), np.ones((1, 601)), 2),
-         ResourceError, "refused above 600"),
-        ((np.diag([1.0, 2.0]), np.eye(2), np.eye(2), [[1.0], [0.0]], [[1.0, 0.0]], 2),
-         ConfigError, "only 1 coordinates"),
-    ],
-)  # fmt: skip
-def test_messages(arguments, error, words):
-    with pytest.raises(error, match=words):
-        rom.second_order_balanced_truncation(*arguments)
+def truncated(K, M, D, r=1):
+    rom.second_order_balanced_truncation(K, M, D, np.ones((len(K), 1)), np.ones((1, len(K))), r)
 
 
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        ((5, 3), "pool = 3 must be a whole number of 5 or more"),
-        ((5, 9, 0.0), "must be above 0 and below 1"),
-        ((-1,), "n_modes = -1 must be"),
-    ],
+test_wrong_systems_are_refused = refused(
+    (lambda: truncated(np.eye(2), np.eye(2), np.zeros((2, 2))), ModelError, "not stable"),
+    (lambda: truncated(np.eye(2), np.eye(3), np.eye(2)), ConfigError, "M has shape"),
+    (lambda: truncated(*[np.eye(2)] * 3, r=3), ConfigError, "r = 3"),
+    (lambda: truncated(*[np.eye(601)] * 3), ResourceError, "above 600"),
+    (lambda: truncated(*[np.eye(2)] * 3, r=2), ConfigError, "only 1 coordinates"),
 )
-def test_messages_for_wrong_numbers(arguments, words):
-    with pytest.raises(ConfigError, match=words):
-        rom.BalancedTruncation(*arguments)

@@ -169,13 +169,6 @@ def test_messages_for_wrong_boundaries(model, method, b, error, words):
         method.basis(ops, np.array(b, dtype=int), tuple(map(str, b)))
 
 
-@pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("n", [-1, 1.5, True])
-def test_messages_for_wrong_numbers_of_modes(method, n):
-    with pytest.raises(ConfigError, match=r"n_modes = .* must be a whole number"):
-        method(n)
-
-
 def test_modes_that_spend_the_flexibility_of_the_interface_are_refused():
     model = block(cells=(3, 1, 1))
     ops = SciPyOperators(model.K, model.M, rigid_motions(model.points))

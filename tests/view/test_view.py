@@ -114,19 +114,6 @@ def test_edges_of_a_box_are_its_twelve():
     np.testing.assert_allclose(lengths, [1] * 4 + [2] * 4 + [3] * 4)
 
 
-@pytest.mark.parametrize(
-    ("solid", "volume"),
-    [
-        (view.box((1, 2, 3), (5, 5, 5)), 6.0),
-        (view.cylinder((0, 1, 0), (0, 3, 0), 2.0, sides=2000), 2 * np.pi),
-    ],
-)
-def test_solids_are_closed_and_face_outwards(solid, volume):
-    points, triangles = solid
-    a, b, c = np.moveaxis(points[triangles], 1, 0)
-    assert np.einsum("ti,ti->", a, np.cross(b, c)) / 6 == pytest.approx(volume, rel=1e-5)
-
-
 def test_mode_shapes_fill_one_panel_each(bar, tmp_path):
     view.mode_shapes(bar, tmp_path / "modes.png", n=4)
     image = pixels(tmp_path / "modes.png")

@@ -170,6 +170,24 @@ def test_curves_that_coincide_are_all_seen():
     assert not faults(view.panels([[view.Panel("Five", "x [m]", "y [m]", curves)]]))
 
 
+def test_windows_with_nothing_in_common_keep_their_own_range():
+    """Side by side in one range, each would leave most of the other empty."""
+    panels = [view.Panel(f"{x:g}", "f [Hz]", "u [m]", {"one": (x + X, X)}) for x in (0.0, 9.0)]
+    figure = view.panels([panels])
+    (first, second) = (axes.get_xlim() for axes in figure.axes)
+    assert first[1] < second[0]
+    assert len({axes.get_ylim() for axes in figure.axes}) == 1
+    assert not faults(figure)
+
+
+def test_curves_without_a_name_stay_thin():
+    """Eleven of them on one line once were a grey block; they are no curves to be told apart."""
+    curves = {f"_blade {k}": (X, 0 * X) for k in range(11)} | {"short": (X, X)}
+    figure = view.panels([[view.Panel("Tips", "f [Hz]", "u [m]", curves)]])
+    assert max(line.get_linewidth() for line in figure.axes[0].lines) < 3.0
+    assert not faults(figure)
+
+
 def box_at(x, **more):
     return view.Thing(*view.box((1.0, 1.0, 1.0), (x, 0.0, 0.0)), **more)
 

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from cases.long import few
 from cases.refusals import refused
 from rom import view
 from rom.errors import ConfigError
@@ -66,9 +67,8 @@ SHAPES = {
 }  # fmt: skip
 
 
-@pytest.mark.long
 @pytest.mark.once
-@pytest.mark.parametrize("name", SHAPES)
+@pytest.mark.parametrize("name", few(2, SHAPES))
 def test_solids_are_closed_and_face_outwards(name):
     mesh, expected = SHAPES[name]
     assert is_closed(mesh)

@@ -25,9 +25,9 @@ from rom.arguments import Angle, Direction, NotNegative, unit_vector
 from rom.components.rolling_bearing.races import BallBearing, RollerBearing
 from rom.errors import ConfigError
 from rom.mbs.elements.family import Family, Places, integers, rows_of
-from rom.mbs.elements.pair_motion import clear_tangent, followed_angle, place_tangent
 from rom.mbs.kernels.algebra import add, cross, dot, row, scale, sub, turn
 from rom.mbs.kernels.compiled import inner
+from rom.mbs.kernels.coordinates import clear_tangent, followed_angle, place_tangent
 from rom.mbs.kernels.element_calls import energy, residuals, tangents
 from rom.mbs.kernels.tables import Array2, Index1, Scratch1, Scratch2, Scratch3, Table, table
 from rom.mbs.parts.bodies import Marker

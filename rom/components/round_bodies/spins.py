@@ -27,7 +27,16 @@ from scipy.linalg import eigh
 from scipy.spatial import cKDTree
 
 from rom.errors import ModelError
-from rom.mbs.elements.family import Family, Places, apart, from_outside, integers, on_joint
+from rom.mbs.elements.family import (
+    Family,
+    Hooks,
+    Places,
+    apart,
+    from_outside,
+    integers,
+    never,
+    on_joint,
+)
 from rom.mbs.kernels.element_calls import residuals, tangents
 from rom.mbs.kernels.markers import own_corner
 from rom.mbs.kernels.tables import Array3, Index1, Table, table
@@ -275,5 +284,5 @@ def spin_tangents(s: Any, W: Any, spins: Any, _lam: Any, ck: Any, cc: Any) -> No
 
 SPINS_FAMILY = Family(
     "spins", Spin, pack, spin_forces, spin_tangents, ends=on_joint, outside=from_outside,
-    couples=apart, complete=True, potential=False,
+    couples=apart, by_rate=never, hooks=Hooks(potential=False),
 )  # fmt: skip

@@ -37,10 +37,10 @@ from rom.components.tendons.tension import (
     tension_slopes,
 )
 from rom.errors import ConfigError
-from rom.mbs.elements.family import Family, Places, integers, rows_of, starts
-from rom.mbs.elements.pair_motion import followed_angle
+from rom.mbs.elements.family import Family, Hooks, Places, integers, rows_of, starts
 from rom.mbs.kernels.algebra import cross, dot, row, sub, turn
 from rom.mbs.kernels.compiled import inner
+from rom.mbs.kernels.coordinates import followed_angle
 from rom.mbs.kernels.element_calls import energy, residuals, tangents
 from rom.mbs.kernels.tables import (
     Array1,
@@ -428,6 +428,10 @@ def tensions(tendons: Tendons) -> list[Array]:
 
 TENDONS_FAMILY = Family(
     "tendons", Tendon, pack, tendon_wrenches, tendon_tangents, tendon_energy, ends=ends,
-    couples=coupled, by_rate=lambda tendons: tendons.rated.any(), answers=tensions,
-    lost="the path of {} is lost: it has left a pulley, its places meet, or a winch took it all",
+    couples=coupled, by_rate=lambda tendons: tendons.rated.any(),
+    hooks=Hooks(
+        answers=tensions,
+        lost="the path of {} is lost: it has left a pulley, its places meet, or a winch took it "
+        "all",
+    ),
 )  # fmt: skip

@@ -17,7 +17,7 @@ from scipy.interpolate import PchipInterpolator
 from rom import rotation
 from rom.arguments import Number, Orientation, finite, one_of, unit_quaternion
 from rom.errors import ConfigError
-from rom.mbs.elements.family import Family, Places, integers, rows_of
+from rom.mbs.elements.family import Family, Hooks, Places, integers, rows_of
 from rom.mbs.kernels.algebra import (
     add,
     cross,
@@ -300,16 +300,6 @@ def bushing_wrenches(_s, W, bushings, _q, _v, _lam):
         W.power[2] += lost
 
 
-@inner
-def column(Q, p, c, dforce, dmoment, lever):
-    """Add c times a change of the wrenches on both markers to column p."""
-    for q in range(3):
-        Q[q, p] -= c * dforce[q]
-        Q[3 + q, p] -= c * (dmoment[q] + lever[q])
-        Q[6 + q, p] += c * dforce[q]
-        Q[9 + q, p] += c * dmoment[q]
-
-
 @tangents.of(Bushings)
 def bushing_tangents(s, W, bushings, _lam, ck, cc):
     """Add the stiffness (times ck) and damping (times cc) of all bushings to W.Kt and W.S.
@@ -317,58 +307,40 @@ def bushing_tangents(s, W, bushings, _lam, ck, cc):
     The change of the rates with the position is left out.
     """
     for k in range(bushings.i.size):
-        i, j = bushings.i[k], bushings.j[k]
         state = bushing_state(bushings, k, W)
-        W.Q[:] = 0.0
-        for p in range(12):
-            stiffness_column(bushings, W, k, state, p, -ck)
-        pair_stiffness(s, W, i, j, W.Kt)
-        W.Q[:] = 0.0
-        for p in range(12):
-            damping_column(bushings, W, k, state, p, -cc)
-        pair_stiffness(s, W, i, j, W.S)
+        for moved in (True, False):
+            W.Q[:] = 0.0
+            for p in range(12):
+                bushing_column(bushings, W, k, state, p, moved, ck if moved else cc)
+            pair_stiffness(s, W, bushings.i[k], bushings.j[k], W.Kt if moved else W.S)
 
 
 @inner
-def local_motion(bushings, W, k, state, p):
-    """Change of position and rotation vector in unit motion p."""
+def bushing_column(bushings, W, k, state, p, moved, c):
+    """Add c times the stiffness in unit motion p, or damping in unit velocity p, to W.Q."""
+    gap, x, theta, _, _ = state
     i, frame = bushings.i[k], bushings.frame_i[k]
     vi, wi, vj, wj = unit_twist(p)
-    dx = to_local(W, i, frame, sub(sub(vj, vi), cross(wi, state[0])))
-    return dx, inverse_tangent(state[2], 1.0, to_local(W, i, frame, sub(wj, wi)))
-
-
-@inner
-def stiffness_column(bushings, W, k, state, p, c):
-    """Add c times the change of the wrenches in unit motion p to W.Q."""
-    i, frame, x, theta = bushings.i[k], bushings.frame_i[k], state[1], state[2]
-    vi, wi, vj, _ = unit_twist(p)
-    force, moment, _ = bushing_force(bushings, k, W, state)
-    _, twist, _, brake = bushing_loads(bushings, k, state)
-    dx, dtheta = local_motion(bushings, W, k, state, p)
-    a, b = along_curves(bushings, k, x, theta, 0, 1), along_curves(bushings, k, x, theta, 3, 1)
-    pull = add(resisting(bushings.stiffness[k], dx, dtheta, 0), times(a, dx))
-    back = add(resisting(bushings.stiffness[k], dx, dtheta, 3), times(b, dtheta))
-    turning = transposed_rate(theta, dtheta, add(twist, brake))
-    back = add(inverse_tangent(theta, -1.0, back), turning)
+    dx = to_local(W, i, frame, sub(sub(vj, vi), cross(wi, gap)))
+    dtheta = inverse_tangent(theta, 1.0, to_local(W, i, frame, sub(wj, wi)))
+    A = bushings.stiffness[k] if moved else bushings.damping[k]
+    pull, twist = resisting(A, dx, dtheta, 0), resisting(A, dx, dtheta, 3)
+    force, moment, turning = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    if moved:
+        pull = add(pull, times(along_curves(bushings, k, x, theta, 0, 1), dx))
+        twist = add(twist, times(along_curves(bushings, k, x, theta, 3, 1), dtheta))
+        force, moment, _ = bushing_force(bushings, k, W, state)
+        _, back, _, brake = bushing_loads(bushings, k, state)
+        turning = transposed_rate(theta, dtheta, add(back, brake))
+    twist = add(inverse_tangent(theta, -1.0, twist), turning)
     dforce = sub(cross(wi, force), to_world(W, i, frame, pull))
-    dmoment = sub(cross(wi, moment), to_world(W, i, frame, back))
-    lever = add(cross(sub(vj, vi), force), cross(state[0], dforce))
-    column(W.Q, p, c, dforce, dmoment, lever)
-
-
-@inner
-def damping_column(bushings, W, k, state, p, c):
-    """Add c times the change of the wrenches with unit velocity p to W.Q."""
-    dx, dtheta = local_motion(bushings, W, k, state, p)
-    drag, brake = (
-        resisting(bushings.damping[k], dx, dtheta, 0),
-        resisting(bushings.damping[k], dx, dtheta, 3),
-    )
-    dforce = to_world(W, bushings.i[k], bushings.frame_i[k], scale(-1.0, drag))
-    moment = inverse_tangent(state[2], -1.0, scale(-1.0, brake))
-    dmoment = to_world(W, bushings.i[k], bushings.frame_i[k], moment)
-    column(W.Q, p, c, dforce, dmoment, cross(state[0], dforce))
+    dmoment = sub(cross(wi, moment), to_world(W, i, frame, twist))
+    lever = add(cross(sub(vj, vi), force), cross(gap, dforce))
+    for q in range(3):
+        W.Q[q, p] += c * dforce[q]
+        W.Q[3 + q, p] += c * (dmoment[q] + lever[q])
+        W.Q[6 + q, p] -= c * dforce[q]
+        W.Q[9 + q, p] -= c * dmoment[q]
 
 
 @inner
@@ -411,5 +383,5 @@ def turned_over(name: str, bushing: Bushing, t: Array, axes: Callable[[str], Arr
 
 BUSHINGS_FAMILY = Family(
     "bushings", Bushing, pack, bushing_wrenches, bushing_tangents, bushing_energy,
-    beyond=turned_over,
+    hooks=Hooks(beyond=turned_over),
 )  # fmt: skip

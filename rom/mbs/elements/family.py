@@ -8,13 +8,12 @@ that `rom.fields` knows have methods of their own; any other enters a mechanism 
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
 import numpy as np
 
-from rom.errors import ConfigError
 from rom.mbs.kernels.element_calls import ElementKernel, row_of
 from rom.mbs.kernels.system import Coordinates
 from rom.mbs.kernels.tables import Table
@@ -22,8 +21,6 @@ from rom.mbs.parts.bodies import GROUND, Marker
 from rom.mbs.parts.joints import Row
 from rom.mbs.parts.signals import Signal, clock_signal
 from rom.model import Array, Index
-
-NO_ROWS = np.zeros(0, dtype=np.int64)
 
 
 class Asked(Protocol):
@@ -33,19 +30,9 @@ class Asked(Protocol):
         """Put the answer at time t, and its derivatives, where the kernels of its family look."""
 
 
-def between(element: Any) -> tuple[Marker, ...]:
-    """The two markers of most elements."""
-    return element.i, element.j
-
-
 def on_joint(_: Any) -> tuple[Marker, ...]:
     """None of its own: the joint has them."""
     return ()
-
-
-def from_ground(_: Any) -> bool:
-    """Momentum is lost to the ground alone, if one of the markers is there."""
-    return False
 
 
 def from_outside(_: Any) -> bool:
@@ -53,29 +40,14 @@ def from_outside(_: Any) -> bool:
     return True
 
 
-def always(_: Table) -> bool:
-    """The forces depend on velocities."""
-    return True
-
-
-def pairs(table: Any, body: Index) -> Iterable[Sequence[int]]:
-    """(e, 2) bodies of the markers i and j of each of e elements.
-
-    Args:
-        table: the elements.
-        body: (m,) body of every marker.
-    """
-    return np.column_stack([body[table.i], body[table.j]])
+def never(_: Table) -> bool:
+    """The forces do not depend on velocities, or the tangents know how."""
+    return False
 
 
 def apart(_table: Any, _body: Index) -> Iterable[Sequence[int]]:
     """No bodies that a joint or a marker does not couple already."""
     return ()
-
-
-def no_rows(_: Table) -> Index:
-    """(0,) constraint rows: the forces do not depend on what joints transmit."""
-    return NO_ROWS
 
 
 def integers(values: Any) -> Index:
@@ -91,36 +63,6 @@ def starts(lengths: Any) -> Index:
 def rows_of(values: Any, *shape: int) -> Array:
     """Numbers as an array of rows of this shape, empty ones too."""
     return np.array(list(values), dtype=float).reshape(-1, *shape)
-
-
-def nothing(*_: Any) -> tuple[()]:
-    """No laws that stay in Python, or none of the user's."""
-    return ()
-
-
-def no_numbers(*_: Any) -> Array:
-    """(0,) no gap that is of the size of corrections, or nothing that goes on by whole numbers."""
-    return np.zeros(0)
-
-
-def nothing_remembered(_: Any) -> Array:
-    """(0,) no element whose forces depend on its past."""
-    return np.zeros(0, dtype=bool)
-
-
-def nothing_kept(_: Any, memory: Array) -> Array:
-    """(n_t,) no energy in what gives way for good beyond a limit [J]."""
-    return np.zeros(len(memory))
-
-
-def nothing_beyond(*_: Any) -> str:
-    """Its forces hold in any motion."""
-    return ""
-
-
-def nothing_eased(_: Table) -> AbstractContextManager[bool]:
-    """Elements that come to rest as they are."""
-    return nullcontext(False)
 
 
 @dataclass
@@ -201,7 +143,7 @@ class Places:
         self.remembered.setdefault(owner, start)
         if settling is not None:
             self.settling[owner] = settling
-        return sum(x.size for x in self._until(owner))
+        return self._own(owner).start
 
     def before(self, base: Array) -> Array:
         """(n_t, c + p) the same over time, what settles as it was at the instant before.
@@ -210,21 +152,21 @@ class Places:
         """
         base, c = base.copy(), len(self.coordinates)
         for owner in self.settling:
-            at = c + sum(x.size for x in self._until(owner))
-            mine = slice(at, at + self.remembered[owner].size)
-            base[1:, mine] = base[:-1, mine]
+            memory = base[:, c:][:, self._own(owner)]
+            memory[1:] = memory[:-1].copy()
         return base
 
-    def _until(self, owner: str) -> list[Array]:
-        """What those before an owner remember."""
-        return list(self.remembered.values())[: list(self.remembered).index(owner)]
+    def _own(self, owner: str) -> slice:
+        """Where the memory has that of an owner."""
+        before = list(self.remembered).index(owner)
+        first = sum(x.size for x in list(self.remembered.values())[:before])
+        return slice(first, first + self.remembered[owner].size)
 
     def settled(self, base: Array) -> Array:
         """(c + p,) joint coordinates and memory, the latter as an equilibrium starts from it."""
         base, c = base.copy(), len(self.coordinates)
         for owner, numbers in self.settling.items():
-            at = c + sum(x.size for x in self._until(owner))
-            base[at : at + numbers.size] = numbers
+            base[c:][self._own(owner)] = numbers
         return base
 
     def packed_coordinates(self) -> Coordinates:
@@ -239,29 +181,16 @@ class Places:
 
 
 @dataclass(frozen=True, eq=False)
-class Family:
-    """A kind of elements.
+class Hooks:
+    """What only few families have to say; None where one has nothing to say.
 
     Attributes:
-        name: of all of them, e.g. ``"springs"``.
-        record: class of one of them.
-        pack: ({name: record}, `Places`) -> table for compiled code.
-        residuals, tangents, energy, multiplier_columns, pair_tangents: kernels, see
-            `rom.mbs.kernels.element_calls`; None for forces that do not change, store no energy,
-            do not depend on multipliers, or whose tangents stay about the same over a step.
-        ends: record -> the markers it acts on.
-        outside: record -> whether it acts from outside even though no marker is on the ground.
-        couples: (table, (k,) bodies of the markers) -> groups of bodies that it couples, -1 for
-            the ground.
-        by_rate: table -> whether the forces depend on velocities.
-        complete: whether its tangents have all of their changes with the position, those of rates
-            at given velocities too.
-        potential: whether its forces, dampers aside, follow from a potential; those of films and of
-            what spins go around.
-        loaded_rows: table -> constraint rows whose multipliers they depend on.
         asked: ({name: record}, table, number of joint coordinates) -> laws that stay in Python.
-        answers: table -> (e, ...) what each law of a user answered last, None if there is none.
+        answers: table -> (e, ...) what each law of a user answered last.
         lost: what is wrong if an answer is not finite; in place of {}, the names.
+        potential: whether the forces, dampers aside, follow from a potential; those of films and of
+            what spins go around.
+        loaded_rows: table -> constraint rows whose multipliers the forces depend on.
         room: table -> (e,) gaps over those in the middle [1], which one correction towards an
             equilibrium may halve or double at most.
         eased: table -> context within which its elements find their equilibrium more easily, close
@@ -275,6 +204,42 @@ class Family:
             motions that repeat [1].
     """
 
+    asked: Callable[[Mapping[str, Any], Any, int], Sequence[Asked]] | None = None
+    answers: Callable[[Any], Sequence[Any]] | None = None
+    lost: str = "the law of {} gives no finite number"
+    potential: bool = True
+    loaded_rows: Callable[[Any], Index] | None = None
+    room: Callable[[Any], Array] | None = None
+    eased: Callable[[Any], AbstractContextManager[bool]] | None = None
+    remembers: Callable[[Any], Array] | None = None
+    kept: Callable[[Any, Array], Array] | None = None
+    beyond: Callable[[str, Any, Array, Callable[[str], Array]], str] | None = None
+    phases: Callable[[Any, Any], Array] | None = None
+
+
+NO_HOOKS = Hooks()
+
+
+@dataclass(frozen=True, eq=False)
+class Family:
+    """A kind of elements.
+
+    Attributes:
+        name: of all of them, e.g. ``"springs"``.
+        record: class of one of them.
+        pack: ({name: record}, `Places`) -> table for compiled code.
+        residuals, tangents, energy, multiplier_columns, pair_tangents: kernels, see
+            `rom.mbs.kernels.element_calls`; None for forces that do not change, store no energy,
+            do not depend on multipliers, or whose tangents stay about the same over a step.
+        ends: record -> the markers it acts on; of most ``i`` and ``j``.
+        outside: record -> whether it acts from outside even though no marker is on the ground.
+        couples: (table, (k,) bodies of the markers) -> groups of bodies that it couples, -1 for
+            the ground; of most those of the markers ``i`` and ``j``.
+        by_rate: table -> whether the forces depend on velocities in a way that the tangents do not
+            know whole: they lack the change of rates with the position.
+        hooks: what only few families have to say.
+    """
+
     name: str
     record: type
     pack: Callable[[Mapping[str, Any], Places], Table]
@@ -283,22 +248,13 @@ class Family:
     energy: ElementKernel | None = None
     multiplier_columns: ElementKernel | None = None
     pair_tangents: ElementKernel | None = None
-    ends: Callable[[Any], tuple[Marker, ...]] = between
-    outside: Callable[[Any], bool] = from_ground
-    couples: Callable[[Any, Index], Iterable[Sequence[int]]] = pairs
-    by_rate: Callable[[Any], bool] = always
-    complete: bool = False
-    potential: bool = True
-    loaded_rows: Callable[[Any], Index] = no_rows
-    asked: Callable[[Mapping[str, Any], Any, int], Sequence[Asked]] = nothing
-    answers: Callable[[Any], Sequence[Any]] = nothing
-    lost: str = "the law of {} gives no finite number"
-    room: Callable[[Any], Array] = no_numbers
-    eased: Callable[[Any], AbstractContextManager[bool]] = nothing_eased
-    remembers: Callable[[Any], Array] = nothing_remembered
-    kept: Callable[[Any, Array], Array] = nothing_kept
-    beyond: Callable[[str, Any, Array, Callable[[str], Array]], str] = nothing_beyond
-    phases: Callable[[Any, Any], Array] = no_numbers
+    ends: Callable[[Any], tuple[Marker, ...]] = lambda element: (element.i, element.j)
+    outside: Callable[[Any], bool] = lambda _: False
+    couples: Callable[[Any, Index], Iterable[Sequence[int]]] = lambda table, body: np.column_stack(
+        [body[table.i], body[table.j]]
+    )
+    by_rate: Callable[[Any], bool] = lambda _: True
+    hooks: Hooks = NO_HOOKS
 
     @property
     def kernels(self) -> list[ElementKernel]:
@@ -318,16 +274,3 @@ class Family:
     def pushes(self, element: Any) -> bool:
         """Whether an element changes the momentum of all bodies together."""
         return self.outside(element) or any(m.body == GROUND for m in self.ends(element))
-
-
-def check_family(name: str, element: Any, family: Family) -> None:
-    """Refuse what cannot enter a mechanism.
-
-    Raises:
-        ConfigError: if the family has other records.
-    """
-    if not isinstance(element, family.record):
-        raise ConfigError(
-            f"element = {element!r} of {name!r} must be of type {family.record.__name__}, as all "
-            f"{family.name}."
-        )

@@ -1,29 +1,28 @@
 """Dry and viscous friction along joint coordinates."""
 
-import math
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated
 
 from rom.arguments import AtLeast, Length, NotNegative, Positive
 from rom.errors import ConfigError
-from rom.mbs.elements.family import Family, Places, apart, integers, on_joint, rows_of
-from rom.mbs.kernels.compiled import inner
-from rom.mbs.kernels.constraints import column_of
-from rom.mbs.kernels.coordinates import coordinate_tangent, push_coordinate
-from rom.mbs.kernels.element_calls import multiplier_columns, residuals, tangents
-from rom.mbs.kernels.system import ALONG, POINT
-from rom.mbs.kernels.tables import Array2, Index1, Table, table
+from rom.mbs.elements.family import Hooks
+from rom.mbs.elements.joint_forces import FRICTION, Frictions, joint_family, load_columns
 from rom.mbs.parts.joints import Coordinate, Row, coordinate_of
 from rom.mbs.parts.whole import Whole
 
 
 @dataclass(frozen=True, slots=True)
 class Friction:
-    """Dry and viscous friction along a joint coordinate; numbers as in `Frictions`."""
+    """Dry and viscous friction along a joint coordinate; numbers of `joint_forces.friction`."""
 
     joint: str
     row: Row
     numbers: tuple[float, ...]
+
+    @property
+    def laws(self) -> tuple[tuple[float, ...], ...]:
+        """The same, as of all forces along joint coordinates."""
+        return (self.numbers,)
 
 
 def friction(  # noqa: PLR0913  one keyword per property
@@ -76,116 +75,7 @@ def friction(  # noqa: PLR0913  one keyword per property
     self.add(name, Friction(joint, row, numbers), FRICTIONS_FAMILY)
 
 
-@table
-class Frictions(Table):
-    """All frictions.
-
-    Attributes:
-        at: (f,) joint coordinates.
-        law: (f, 6) constant level [N or N m], level per load of the joint [1 or m], share by which
-            the level is higher at rest, speed over which that fades, viscous coefficient, speed
-            over which the sign changes.
-        load_first, load_count: (f,) constraint rows of the joint.
-    """
-
-    at: Index1
-    law: Array2
-    load_first: Index1
-    load_count: Index1
-
-
-def pack(frictions: Any, places: Places) -> Frictions:
-    """The frictions as arrays."""
-    found = frictions.values()
-    return Frictions(
-        integers(places.coordinate(f.joint, f.row) for f in found),
-        rows_of((f.numbers for f in found), 6),
-        integers(places.owners.index(f.joint) for f in found),
-        integers(places.owners.count(f.joint) for f in found),
-    )
-
-
-@inner
-def joint_load(s, frictions, k, lam):
-    """Resultant of the forces that the joint of friction k transmits [N]."""
-    total = 0.0
-    first = frictions.load_first[k]
-    for row in range(first, first + frictions.load_count[k]):
-        if s.rows.kind[row] in (POINT, ALONG):
-            total += lam[row] ** 2
-    return math.sqrt(total)
-
-
-@inner
-def friction_shape(law, rate):
-    """Friction per level, with Stribeck's rise towards rest, and its derivative by the rate."""
-    sign = math.tanh(rate / law[5])
-    fade = law[2] * math.exp(-((rate / law[3]) ** 2))
-    slope = (1.0 - sign * sign) / law[5] * (1.0 + fade)
-    return sign * (1.0 + fade), slope - 2.0 * rate / law[3] ** 2 * sign * fade
-
-
-@inner
-def friction_force(s, W, frictions, k, lam):
-    """Force of friction k and its derivative by the rate."""
-    law, rate = frictions.law[k], W.xd[frictions.at[k]]
-    level = law[0] + law[1] * joint_load(s, frictions, k, lam)
-    shape, slope = friction_shape(law, rate)
-    return -level * shape - law[4] * rate, -level * slope - law[4]
-
-
-@residuals.of(Frictions)
-def friction_wrenches(s, W, frictions, _q, _v, lam):
-    """Add the frictions to the wrenches on the markers; add up the power lost."""
-    for k in range(frictions.at.size):
-        at = frictions.at[k]
-        force, _ = friction_force(s, W, frictions, k, lam)
-        push_coordinate(s, W, at, force)
-        W.power[2] -= force * W.xd[at]
-
-
-@tangents.of(Frictions)
-def friction_tangents(s, W, frictions, lam, ck, cc):
-    """Add ck times the stiffness to W.Kt and cc times the damping to W.S."""
-    for k in range(frictions.at.size):
-        force, by_rate = friction_force(s, W, frictions, k, lam)
-        coordinate_tangent(s, W, frictions.at[k], (ck * force, 0.0, cc * by_rate), W.Kt, W.S)
-
-
-@multiplier_columns.of(Frictions)
-def load_columns(s, W, frictions, lam, rank):
-    """Add to W.UG what friction forces change with the multipliers of their joint."""
-    for k in range(frictions.at.size):
-        at, load = frictions.at[k], joint_load(s, frictions, k, lam)
-        if frictions.law[k, 1] == 0.0 or load == 0.0:
-            continue
-        shape, _ = friction_shape(frictions.law[k], W.xd[at])
-        first = frictions.load_first[k]
-        for row in range(first, first + frictions.load_count[k]):
-            if s.rows.kind[row] not in (POINT, ALONG):
-                continue
-            change = frictions.law[k, 1] * shape * lam[row] / load
-            for r in range(rank):
-                u = W.U_lu[r, row] if rank < lam.size else (1.0 if r == row else 0.0)
-                if u != 0.0:
-                    add_gradient(s, W, at, change * u, r)
-
-
-@inner
-def add_gradient(s, W, at, c, row):
-    """Add c times the gradient of joint coordinate ``at`` in the velocities to a row of W.UG."""
-    bodies, C = s.bodies, s.coordinates
-    for side in range(2):
-        m = C.i[at] if side == 0 else C.j[at]
-        b = s.markers.body[m]
-        first = column_of(s.graph, row, b) if s.graph.compact else bodies.v_at[b]
-        for q in range(6 + bodies.r[b] if b >= 0 else 0):
-            for p in range(6):
-                W.UG[row, first + q] += c * W.xg[at, 6 * side + p] * W.H[m, p, q]
-
-
-FRICTIONS_FAMILY = Family(
-    "frictions", Friction, pack, friction_wrenches, friction_tangents,
-    multiplier_columns=load_columns, ends=on_joint, couples=apart,
-    loaded_rows=lambda frictions: frictions.load_first[frictions.law[:, 1] != 0.0],
+FRICTIONS_FAMILY = joint_family(
+    "frictions", Friction, FRICTION, Frictions, multiplier_columns=load_columns,
+    hooks=Hooks(loaded_rows=lambda frictions: frictions.load_first[frictions.law[:, 1] != 0.0]),
 )  # fmt: skip

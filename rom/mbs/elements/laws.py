@@ -33,7 +33,7 @@ from numba.extending import intrinsic
 from rom.arguments import finite, shortened
 from rom.errors import ConfigError
 from rom.mbs.compiler.calls import called
-from rom.mbs.elements.family import Family, Places, integers, starts
+from rom.mbs.elements.family import Family, Hooks, Places, integers, starts
 from rom.mbs.elements.law_calls import DIFFERENCE_STEP, ENERGY_SIZE, MOTION_SIZE, entries
 from rom.mbs.elements.laws_in_python import AskedForce, AskedLaw
 from rom.mbs.kernels.algebra import add, cross, scale, unit
@@ -420,5 +420,5 @@ def _answers(laws: Any) -> list[Array]:
 
 LAWS_FAMILY = Family(
     "laws", Law, pack, law_wrenches, law_tangents, law_energy, ends=lambda law: law.markers,
-    outside=_outside, couples=_couples, asked=asked, answers=_answers,
+    outside=_outside, couples=_couples, hooks=Hooks(asked=asked, answers=_answers),
 )  # fmt: skip

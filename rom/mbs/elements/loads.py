@@ -7,7 +7,7 @@ from typing import Any, Literal
 import numpy as np
 
 from rom.arguments import finite
-from rom.mbs.elements.family import Family, Places, apart, from_outside, integers, rows_of
+from rom.mbs.elements.family import Family, Places, apart, from_outside, integers, never, rows_of
 from rom.mbs.kernels.algebra import add, cross, dot, place, put, row, scale, turn, unit
 from rom.mbs.kernels.compiled import inner
 from rom.mbs.kernels.constraints import pair_stiffness
@@ -119,5 +119,5 @@ def load_tangents(s, W, loads, _lam, ck, _cc):
 
 LOADS_FAMILY = Family(
     "loads", Load, pack, load_wrenches, load_tangents, ends=lambda load: (load.marker,),
-    outside=from_outside, couples=apart, by_rate=lambda loads: False,
+    outside=from_outside, couples=apart, by_rate=never,
 )  # fmt: skip

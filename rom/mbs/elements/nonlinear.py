@@ -41,7 +41,7 @@ from rom.arguments import (
 )
 from rom.errors import ConfigError, ModelError
 from rom.mbs.compiler.calls import called
-from rom.mbs.elements.family import Family, Places, integers, on_joint
+from rom.mbs.elements.family import Family, Hooks, Places, integers, on_joint
 from rom.mbs.elements.law_calls import compiled_entry
 from rom.mbs.kernels.compiled import inner
 from rom.mbs.kernels.constraints import block_of
@@ -393,6 +393,7 @@ def _outside(whole: Assembly) -> bool:
 
 NONLINEAR_FAMILY = Family(
     "nonlinear", Assembly, pack, nonlinear_residuals, nonlinear_tangents, nonlinear_energy,
-    ends=on_joint, outside=_outside, couples=_couples, answers=lambda elements: elements.forces,
+    ends=on_joint, outside=_outside, couples=_couples,
     by_rate=lambda elements: bool(elements.by_rate.any()),
+    hooks=Hooks(answers=lambda elements: elements.forces),
 )  # fmt: skip

@@ -14,6 +14,7 @@ from rom.mbs.elements.family import (
     apart,
     from_outside,
     integers,
+    never,
     on_joint,
     rows_of,
 )
@@ -221,5 +222,5 @@ def spread_tangents(s, W, loads, _lam, ck, _cc):
 
 SPREAD_LOADS_FAMILY = Family(
     "spread_loads", Spread, pack, spread_residuals, spread_tangents, ends=on_joint,
-    outside=from_outside, couples=apart, by_rate=lambda loads: False,
+    outside=from_outside, couples=apart, by_rate=never,
 )  # fmt: skip

@@ -86,85 +86,67 @@ class Packed:
     @property
     def loaded_rows(self) -> Index:
         """Constraint rows whose multipliers forces depend on."""
-        rows = [family.loaded_rows(table) for family, table in self.elements.items()]
-        return np.concatenate([np.zeros(0, dtype=np.int64), *rows])
+        return loaded_by(self.elements)
 
-    def answers(self) -> dict[tuple[Family, str], Array]:
-        """What each law of a user, by family and name, answered last."""
+    def told(self, hook: str, *given: Any) -> dict[str, Any]:
+        """What the hook of that name says of each element, of `rom.mbs.elements.family.Hooks`."""
         return {
-            (family, name): np.array(answer, dtype=float)
-            for family, table in self.elements.items()
-            for name, answer in zip(self.element_names[family], family.answers(table), strict=False)
+            name: said
+            for family, tell, table in hooked(self.elements, hook)
+            for name, said in zip(self.element_names[family], tell(table, *given), strict=True)
         }
+
+    def answers(self) -> dict[str, Array]:
+        """What each law of a user answered last."""
+        found = self.told("answers").items()
+        return {name: np.array(answer, dtype=float) for name, answer in found}
 
     @property
     def broken_laws(self) -> str:
         """In words, the elements that gave no finite number when asked last."""
+        broken = [name for name, x in self.answers().items() if not np.isfinite(x).all()]
         message = ""
-        for family in self.elements:
-            names = [
-                repr(name)
-                for (own, name), answer in self.answers().items()
-                if own is family and not np.isfinite(answer).all()
-            ]
-            message += f"; {family.lost.format(', '.join(names))}" if names else ""
+        for family, own in self.element_names.items():
+            names = [repr(name) for name in own if name in broken]
+            message += f"; {family.hooks.lost.format(', '.join(names))}" if names else ""
         return message
 
     @property
     def by_rate(self) -> bool:
         """Whether forces depend on rates in a way that the tangents do not know completely."""
-        return any(
-            not family.complete and family.by_rate(table) for family, table in self.elements.items()
-        )
+        return any(family.by_rate(table) for family, table in self.elements.items())
 
     @property
     def has_potential(self) -> bool:
         """Whether forces of elements, dampers aside, follow from a potential."""
-        return all(family.potential for family in self.elements)
+        return all(family.hooks.potential for family in self.elements)
 
     @contextmanager
     def eased(self) -> Iterator[bool]:
         """Elements come to rest more easily, as long as this lasts; says whether some do."""
         with ExitStack() as stack:
-            yield any([stack.enter_context(f.eased(table)) for f, table in self.elements.items()])
+            found = hooked(self.elements, "eased")
+            yield any([stack.enter_context(ease(table)) for _, ease, table in found])
 
     @property
     def room(self) -> dict[str, float]:
         """Gaps of elements at the last residual, over those in the middle [1]."""
-        return {
-            name: float(left)
-            for family, table in self.elements.items()
-            for name, left in zip(self.element_names[family], family.room(table), strict=False)
-        }
+        return {name: float(left) for name, left in self.told("room").items()}
 
     @property
     def remembering(self) -> tuple[str, ...]:
         """Elements whose forces depend on the past, other than by angles that go on."""
-        found = [
-            name
-            for family, table in self.elements.items()
-            for name, does in zip(self.element_names[family], family.remembers(table), strict=False)
-            if does
-        ]
-        return tuple(found)
+        return tuple(name for name, does in self.told("remembers").items() if does)
 
     def kept(self, base: Array) -> Array:
         """(n_t,) energy that springs which slip keep of the work lost, for `Solution.base` [J]."""
         memory = base[:, self.system.coordinates.kind.size :]
-        return sum(
-            (family.kept(table, memory) for family, table in self.elements.items()),
-            np.zeros(len(base)),
-        )
+        found = (keep(table, memory) for _, keep, table in hooked(self.elements, "kept"))
+        return sum(found, np.zeros(len(base)))
 
     def phases(self, W: Any) -> dict[str, float]:
         """Numbers at the last residual that go on by whole ones in motions that repeat [1]."""
-        return {
-            name: float(phase)
-            for family, table in self.elements.items()
-            for name, phase in zip(
-                self.element_names[family], family.phases(table, W), strict=False
-            )
-        }
+        return {name: float(phase) for name, phase in self.told("phases", W).items()}
 
     def rows_of(self, joint: str) -> Array:
         """Numbers of the constraint rows of a joint or drive."""
@@ -257,7 +239,7 @@ def pack(mechanism: Mechanism, *, whole: bool = False) -> Packed:
         rows,
         places.packed_coordinates(),
         integers(family.row(table) for family, table in elements.items()).reshape(-1, ROW_WORDS),
-        int(any(family.loaded_rows(table).size for family, table in elements.items())),
+        int(loaded_by(elements).size > 0),
         np.concatenate([np.zeros(0), *places.remembered.values()]),
         _renewed(elements, sum(6 + part.r for part in parts)),
     )
@@ -276,11 +258,23 @@ def pack(mechanism: Mechanism, *, whole: bool = False) -> Packed:
         {family: tuple(found) for family, found in families.items()},
         tuple(
             law
-            for family, found in families.items()
-            for law in family.asked(found, elements[family], followed)
+            for family, ask, table in hooked(elements, "asked")
+            for law in ask(families[family], table, followed)
         ),
         places,
     )
+
+
+def hooked(elements: Mapping[Family, Table], hook: str) -> list[tuple[Family, Any, Table]]:
+    """The families that have a hook of that name, with it and their tables."""
+    found = ((family, getattr(family.hooks, hook), table) for family, table in elements.items())
+    return [one for one in found if one[1] is not None]
+
+
+def loaded_by(elements: Mapping[Family, Table]) -> Index:
+    """Constraint rows whose multipliers forces depend on."""
+    rows = [find(table) for _, find, table in hooked(elements, "loaded_rows")]
+    return np.concatenate([np.zeros(0, dtype=np.int64), *rows])
 
 
 def _renewed(elements: Mapping[Family, Any], n: int) -> Index:

@@ -215,8 +215,8 @@ def _restless_law(record: Record, W: Work, step: Step, t: float) -> str:
     apply_laws(packed.asked, W, t)
     residual(packed.system, W, step.q1, step.v1, step.vd1, step.lam1)
     changes = {
-        name: np.abs(now - before[_, name]).max() / np.abs([now, before[_, name]]).max()
-        for (_, name), now in packed.answers().items()
+        name: np.abs(now - before[name]).max() / np.abs([now, before[name]]).max()
+        for name, now in packed.answers().items()
         if now.any()
     }
     name = max(changes, key=lambda name: changes[name], default="")

@@ -90,7 +90,8 @@ def _alone(solution: Any, name: str, markers: tuple[Marker, ...], rows: Index) -
     packed, places = solution.packed, solution.packed.places.copy()
     family, element = solution.mechanism.elements[name]
     table = family.pack({name: element}, places)
-    asked = tuple(family.asked({name: element}, table, len(places.coordinates)))
+    ask, c = family.hooks.asked, len(places.coordinates)
+    asked = () if ask is None else tuple(ask({name: element}, table, c))
     system = packed.system.replace(elements=np.array([family.row(table)], dtype=np.int64))
     W = workspace(system, len(places.signals))
     signals = np.concatenate([solution.signals, _sampled(solution, places)], axis=1)

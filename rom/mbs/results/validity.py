@@ -25,7 +25,8 @@ def warn_of_limits(solution: Solution) -> None:
     _warn_of_lost_turns(solution)
     axes = partial(_axes, solution)
     for name, (family, element) in solution.mechanism.elements.items():
-        warn(family.beyond(name, element, solution.t, axes))
+        if family.hooks.beyond is not None:
+            warn(family.hooks.beyond(name, element, solution.t, axes))
     for name, part in solution.mechanism.parts.items():
         if not part.r:
             continue

@@ -482,9 +482,10 @@ def fill(
 
 
 def _uncover(axes: Any) -> None:
-    """A curve that lies under another one of its dashes all along is wider, so that it shows."""
+    """A curve with a name is wider if it lies under another of its dashes, so that it shows."""
     seen = [(line, line.get_linestyle(), axes.transData.transform(line.get_xydata()))
-            for line in axes.lines if line.get_linestyle() != "None"]  # fmt: skip
+            for line in axes.lines
+            if line.get_linestyle() != "None" and not line.get_label().startswith("_")]  # fmt: skip
     for k, (line, dashes, x) in enumerate(seen):
         above = sum(dashes == other and x.shape == y.shape
                     and np.allclose(x, y, 0.0, COVER_DISTANCE, equal_nan=True)
@@ -493,7 +494,10 @@ def _uncover(axes: Any) -> None:
 
 
 def one_scale(areas: Sequence[Any]) -> None:
-    """The same limits for diagrams whose axes have the same names: they are compared."""
+    """The same limits for diagrams whose axes have the same names: they are compared.
+
+    Ranges of x that have nothing in common stay: each would leave the others empty.
+    """
     groups: dict[tuple[str, ...], list[Any]] = {}
     for axes in areas:
         names = axes.get_xlabel(), axes.get_ylabel()
@@ -502,7 +506,8 @@ def one_scale(areas: Sequence[Any]) -> None:
     for alike in (group for group in groups.values() if len(group) > 1):
         x, y = ([getattr(axes, f"get_{k}lim")() for axes in alike] for k in "xy")
         for axes in alike:
-            axes.set_xlim(np.min(x), np.max(x))
+            if np.max(x, axis=0)[0] < np.min(x, axis=0)[1]:
+                axes.set_xlim(np.min(x), np.max(x))
             axes.set_ylim(np.min(y), np.max(y))
 
 

@@ -109,11 +109,13 @@ def _compared(diagrams: list[Axes]) -> list[list[Axes]]:
 
 
 def _scales(alike: list[Axes]) -> list[str]:
-    limits = np.array([[*axes.get_xlim(), *axes.get_ylim()] for axes in alike])
-    size = np.abs(limits).max() or 1.0
+    limits = np.array([[axes.get_xlim(), axes.get_ylim()] for axes in alike])
+    first, size = limits[0], np.abs(limits).max() or 1.0
+    apart = (limits[:, 0, 0] > first[0, 1]) | (limits[:, 0, 1] < first[0, 0])  # other windows of x
+    unlike = np.abs(limits - first).max(axis=2) > 1e-9 * size
     return [f"{_title(alike[0])!r} and {_title(axes)!r} are compared and have two scales"
-            for axes, own in zip(alike, limits, strict=True)
-            if np.abs(own - limits[0]).max() > 1e-9 * size]  # fmt: skip
+            for axes, x, y in zip(alike, unlike[:, 0] & ~apart, unlike[:, 1], strict=True)
+            if x or y]  # fmt: skip
 
 
 def _drawn(axes: Axes) -> Bbox | None:

@@ -190,66 +190,14 @@ def bodies(thing):
 @cache
 def raised(thing):
     """Names of the errors that the body of a function, or of what makes an object, raises."""
-    return {name for body in bodies(thing) if has_source(body) for name in raises_in(tree(body))}
-
-
-def has_source(function):
-    return not function.__code__.co_filename.startswith("<")
-
-
-def raises_in(node):
-    """Errors made in raise statements, inside of what completes them too."""
-    for line, caught in with_handlers(node):
-        for made in ast.walk(line.exc) if isinstance(line, ast.Raise) and line.exc else ():
-            name = getattr(made, "id", "")
-            kind = getattr(errors, name, getattr(builtins, name, None))
-            if inspect.isclass(kind) and issubclass(kind, Exception) and name not in caught:
-                yield name
-
-
-def with_handlers(node, caught=frozenset()):
-    """Every node below, with the names of the errors that handlers around it catch."""
-    yield node, caught
-    inside = caught
-    if isinstance(node, ast.Try):
-        names = {n.id for h in node.handlers if h.type for n in ast.walk(h.type)
-                 if isinstance(n, ast.Name)}  # fmt: skip
-        inside = caught | names
-    for name, value in ast.iter_fields(node):
-        for child in value if isinstance(value, list) else [value]:
-            if isinstance(child, ast.AST):
-                yield from with_handlers(child, inside if name == "body" else caught)
-
-
-@cache
-def called_by(thing):
-    """Pairs of what a body calls by a name it can see and the errors it catches there."""
-    found = set()
-    for body in bodies(thing):
-        for node, caught in with_handlers(tree(body)) if has_source(body) else ():
-            called = seen(node.func, body) if isinstance(node, ast.Call) else None
-            if getattr(called, "__module__", None) and is_documented(called):
-                if called.__module__.startswith("rom."):
-                    found.add((called, caught))
-    return found
-
-
-def seen(node, body):
-    if isinstance(node, ast.Name):
-        return body.__globals__.get(node.id)
-    if isinstance(node, ast.Attribute):
-        owner = seen(node.value, body)
-        if isinstance(node.value, ast.Name) and node.value.id in ("self", "cls"):
-            return own_method(body, node.attr)
-        return getattr(owner, node.attr, None) if owner is not None else None
-    return None
-
-
-def own_method(body, name):
-    owner = importlib.import_module(body.__module__)
-    for part in body.__qualname__.split(".")[:-1]:
-        owner = getattr(owner, part, None)
-    return getattr(owner, name, None)
+    names = {
+        getattr(made, "id", "")
+        for body in bodies(thing) if not body.__code__.co_filename.startswith("<")
+        for line in ast.walk(tree(body)) if isinstance(line, ast.Raise) and line.exc
+        for made in ast.walk(line.exc)
+    }  # fmt: skip
+    kinds = {name: getattr(errors, name, getattr(builtins, name, None)) for name in names}
+    return {n for n, kind in kinds.items() if inspect.isclass(kind) and issubclass(kind, Exception)}
 
 
 # --- what users read ---

@@ -2,7 +2,9 @@
 
 import os
 
-from cases.paths import PYTHONPATH
+from cases.command import python
+from cases.paths import PYTHONPATH, ROOT
+from rom.process.mpirun import mpirun
 
 ENVIRONMENT = os.environ | {
     "PYTHONPATH": PYTHONPATH,
@@ -11,3 +13,9 @@ ENVIRONMENT = os.environ | {
     "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
     "OMPI_MCA_mpi_yield_when_idle": "1",
 }
+
+
+def on_ranks(n, *words, **options):
+    """A finished process of Python on n ranks, its texts captured."""
+    options = {"env": ENVIRONMENT, "cwd": ROOT, "timeout": 600} | options
+    return python(*words, launcher=mpirun(n), **options)

@@ -1,4 +1,4 @@
-"""Faults generated from tables, and the judge who counts what becomes of them.
+"""Faults generated from tables.
 
 A case is one line in a `cases_*.py`: a name, what is done, what may come of it, and the words that
 name the culprit. What is done is a command line behind ``rom``, or a function of the folder it runs

@@ -1,6 +1,5 @@
 """Sizes beyond all bounds are refused at once, before memory or time are spent."""
 
-import io
 import zipfile
 
 import numpy as np
@@ -24,7 +23,6 @@ REDUCE = f"reduce {MATRICES} -o a.npz"
 TOLD = str(HUGE)
 LINES = {
     "modes": (REDUCE.replace("-m 4", f"-m {HUGE}"), TOLD),
-    "modes of forty digits": (REDUCE.replace("-m 4", "-m " + 40 * "9"), "999"),
     "modes of five thousand digits": (REDUCE.replace("-m 4", "-m " + 5000 * "9"), "999"),
     "nodes in a set": (f"{REDUCE} --set root=1-{HUGE}", f"1-{HUGE}"),
     "labels beyond integers": (f"{REDUCE} --set root={10**30}", "1000000"),
@@ -36,25 +34,17 @@ LINES = {
 }  # fmt: skip
 CALLS = {
     "modes": (lambda: rom.modes(model(), HUGE), TOLD),
-    "modes of a method": (lambda: body(method=rom.CraigBampton(HUGE)), TOLD),
     "modes of free-free": (lambda: body(method=rom.FreeFree(HUGE)), TOLD),
-    "modes of Rubin": (lambda: body(method=rom.Rubin(HUGE)), TOLD),
-    "dofs of a boundary": (lambda: rom.craig_bampton(model().K, model().M, [HUGE], 1), TOLD),
     "orders of a polynomial": (
         lambda: body(interfaces={"root": rom.Polynomial(10**6), "tip": "rbe2"}), "1000000"),
     "frames": (lambda: rom.write_animation(moved(), "a.glb", frames=0), "0"),
-    "load steps": (lambda: rom.equilibrium(pendulum(), steps=HUGE), "steps"),
     "mass": (lambda: moved(mass=1e308), ("bob", "mass", "t = ")),
     "distances": (lambda: moved(at=(1e200, 0, 0)), ("bob", "hinge")),
     "speeds": (lambda: moved(omega=(0, 0, 1e200)), ("t = ", "omega")),
     "gravity": (lambda: falling(1e300), ("gravity", "t = ")),
-    "whole numbers": (lambda: rom.simulate(pendulum(), t_end=10**400, dt=0.01), "t_end"),
-    "whole numbers of modes": (lambda: rom.modes(model(), 10**400), "modes"),
 }  # fmt: skip
 HEADER = "%%MatrixMarket matrix coordinate real general\n"
 TEXTS = {
-    "rows": (HEADER + f"{HUGE} {HUGE} 1\n1 1 1.0\n", "K.mtx"),
-    "entries": (HEADER + f"36 36 {HUGE}\n1 1 1.0\n", "K.mtx"),
     "a dense matrix": (HEADER.replace("coordinate", "array") + f"{10**6} {10**6}\n1.0\n", "K.mtx"),
     "a line": (HEADER + "9" * 10**6 + "\n", "K.mtx"),
 }
@@ -70,20 +60,6 @@ def falling(g):
     mech = rom.Mechanism(gravity=(0, 0, -g))
     mech.add_rigid("stone", mass=1e10, inertia=(1.0,) * 3, at=(0, 0, 0))
     return rom.simulate(mech, t_end=0.1, dt=0.01)
-
-
-def claiming(shape):
-    """A body whose stiffness claims a shape and has eight numbers."""
-
-    def prepare(folder):
-        header = io.BytesIO()
-        np.lib.format.write_array_header_1_0(
-            header, {"descr": "<f8", "fortran_order": False, "shape": shape}
-        )
-        with zipfile.ZipFile(folder / "good.npz", "w") as archive:
-            archive.writestr("K.npy", header.getvalue() + np.zeros(8).tobytes())
-
-    return prepare
 
 
 def bomb(folder):
@@ -123,8 +99,6 @@ CASES = [
       for name, (f, *words) in CALLS.items()),
     *(case(f"{name} in a matrix file", REDUCE, REFUSED, *words,
            given=write("K.mtx", text)) for name, (text, *words) in TEXTS.items()),
-    *(case(f"a stiffness of shape {shape}", "check good.npz", REFUSED, "good.npz", given=claiming(shape))
-      for shape in ((3 * 10**9,), (10**9, 10**9), (2**40, 2**40, 2**40), (-1,), (0,))),
     case("a body that unpacks to a gigabyte", "check good.npz", REFUSED, "good.npz", given=bomb),
     case("a body of many arrays", "check good.npz", REFUSED, "good.npz", given=members),
     *(case(f"ten gigabytes as {name}", line, REFUSED, name, given=sparse(name), fe="mesh" in line)

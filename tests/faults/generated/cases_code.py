@@ -1,22 +1,15 @@
 """Code that lies in the working folder, or comes in a file that should hold none, is not run."""
 
 import io
-import os
 import zipfile
 
 import numpy as np
 
-from generated.case import Silent, arrays_changed, case, write
+from generated.case import Silent, arrays_changed, case
 from generated.stock import STEEL
 from rom.errors import ConfigError, FileFormatError, UnsafeFileError
 
-SHELL = 'SystemCall "touch pwned";'
 OPENED = (UnsafeFileError, FileFormatError)
-
-
-def home(folder):
-    """The folder as the home of the user, where gmsh looks for its options."""
-    os.environ["HOME"] = str(folder)
 
 
 def pickled(member):
@@ -39,9 +32,6 @@ def renamed(member):
 
 TRUST = ("trust",)
 CASES = [
-    *(case(f"{name} beside a mesh", "mesh box.msh", Silent, fe=True,
-           given=(home, write(name, f"{SHELL}\n")))
-      for name in (".gmshrc", ".gmsh-options")),
     case("a builder, rom modes", f"modes build.py {STEEL}", UnsafeFileError, *TRUST, fe=True),
     case("a builder, rom reduce", f"reduce build.py {STEEL} -i root=rbe2 -o a.npz",
          UnsafeFileError, *TRUST, fe=True),

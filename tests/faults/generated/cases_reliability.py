@@ -4,10 +4,11 @@ Those that stand in another class as well are left to it.
 """
 
 import os
-import resource
+import re
 import subprocess
 import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
@@ -161,12 +162,18 @@ def rigid_modes(folder):
     return rom.Mechanism().add_flexible("rod", wrong)
 
 
+def peak():
+    """Most memory that was resident [kB]."""
+    return int(re.search(r"VmHWM:\s*(\d+)", Path("/proc/self/status").read_text())[1])
+
+
 def growth(folder):
     """Memory of many steps of which few are kept: below a kilobyte a step."""
     rom.simulate(pendulum(), t_end=1.0, dt=1e-3, save_every=100)
-    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    Path("/proc/self/clear_refs").write_text("5")  # the peak begins anew
+    before = peak()
     rom.simulate(pendulum(), t_end=50.0, dt=1e-3, save_every=10_000)
-    grown = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 50_000
+    grown = (peak() - before) / 50_000
     require(grown < 1, f"{grown} kB a step")
 
 
@@ -206,8 +213,8 @@ CASES = [
          (ConfigError, SolverError), "tolerance"),
     case("F11 one", lambda folder: rom.simulate(pendulum(), t_end=0.1, dt=0.01, tolerance=10.0), ConfigError, "tolerance"),
     case("H07", read_only, Works),
-    case("H11", drawn, Works, fe=True, seconds=60),
+    case("H11", drawn, Works, fe=True),
     case("I01", explicit, (SolverError, Silent), "bob"),
     case("I07", rigid_modes, (ConfigError, ModelError), "rod"),
-    case("I13", growth, Works, seconds=60),
+    case("I13", growth, Works),
 ]  # fmt: skip

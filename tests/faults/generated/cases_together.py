@@ -3,20 +3,17 @@
 import os
 import subprocess
 import sys
-import threading
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
 import rom
 from generated.case import Silent, Works, case, require
-from generated.stock import KINDS, STEEL, body, model, pendulum
+from generated.stock import KINDS, body, model, pendulum
 from rom.cli.main import main
 from rom.errors import ConfigError, FileFormatError, ResourceError, RomError
 
 MISSING = {  # a library, a command that needs it, and a word of the refusal
-    "dolfinx": f"modes box.msh {STEEL}",
-    "petsc4py": f"modes box.msh {STEEL}",
     "h5py": "simulate pendulum.toml --history h5 -o out",
     "pyvista": "view good.npz -o a.png",
     "matplotlib": "view good.npz -o a.png",
@@ -160,26 +157,8 @@ def again(folder):
     require(np.isfinite(body().frequencies(8)).all(), "no frequencies")
 
 
-def unloaded(folder):
-    """A body is loaded in a thread while another one is."""
-    errors = []
-
-    def load():
-        try:
-            rom.load(folder / "good.npz")
-        except BaseException as error:
-            errors.append(error)
-
-    pool = [threading.Thread(target=load) for _ in range(8)]
-    for thread in pool:
-        thread.start()
-    for thread in pool:
-        thread.join()
-    require(not errors, errors)
-
-
 CASES = [
-    *(case(f"without {name}", without(name, words), ResourceError, name, fe=name == "petsc4py", leaves=True)
+    *(case(f"without {name}", without(name, words), ResourceError, name, leaves=True)
       for name, words in MISSING.items()),
     *(case(f"{what} with {name}", in_circumstances(environment, LIGHT[what]), Works)
       for name, environment in CIRCUMSTANCES.items()
@@ -190,7 +169,6 @@ CASES = [
     case("motions in threads", threads(motion), Works),
     case("reductions in threads", threads(frequencies), Works),
     case("one file from several threads", threads(written), Works),
-    case("one file read by several threads", unloaded, Works),
     case("a folder that is gone", gone, Works),
     case("a folder that is gone as output", gone_output, (ConfigError, ResourceError), ("a.npz", "folder")),
     case("two processes, the same bits", same_bits, Works),

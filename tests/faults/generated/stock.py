@@ -3,15 +3,12 @@
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from scipy.io import mmwrite
 
 import rom
+from cases.files import damage
 from cases.files.cells import blocks_of, solid, write_msh
 from cases.solid import block
-from rom.io.matrices.dmig import write_dmig
-from rom.io.matrices.op4 import write_op4
-from rom.mbs.results.state import Memory, State
 
 PLANTED = "pwned"  # part of the name of every file that planted code makes
 KINDS = {"root": "rbe2", "tip": "rbe2"}
@@ -116,12 +113,11 @@ def fill(folder: Path) -> None:
         (folder / name).write_text(content)
     box = solid()
     write_msh(folder / "box.msh", box.points, *blocks_of(box))
-    deck(folder / "box.inp", box)
     rom.save(body(), folder / "good.npz")
     rom.export(body(), folder / "good.SID_FEM")
     matrices(folder)
-    rom.save_state(state(), folder / "good.state.npz")
-    rom.save(family(), folder / "family.npz")
+    damage.state(folder).rename(folder / "good.state.npz")
+    damage.family(folder).rename(folder / "family.npz")
 
 
 def model(cells: Any = (2, 1, 1)) -> Any:
@@ -133,21 +129,6 @@ def body(**options: Any) -> Any:
     """The block, reduced."""
     keywords = {"method": rom.CraigBampton(4), "interfaces": KINDS, "certify": False} | options
     return rom.reduce(model((4, 1, 1)), **keywords)
-
-
-def family() -> Any:
-    """The block with a density that may change."""
-    return rom.reduce_parametric(
-        model(), parameters={"rho": rom.Density(None, 0.5, 2.0)}, tol=0.5, interfaces=KINDS,
-        method=rom.CraigBampton(1), damping=rom.Rayleigh(0.0, 1e-6),
-    )  # fmt: skip
-
-
-def state() -> State:
-    """A state as a motion leaves it, made by hand: nothing needs to be compiled for it."""
-    q, v, a, lam = (np.linspace(0.1, 1.0, n) for n in (7, 6, 6, 5))
-    memory = Memory("generalized-alpha", 1e-2, 0.0, 3, {"a": a})
-    return State(t=0.3, rank=5, q=q, v=v, a=a, lam=lam, memory=memory)
 
 
 def pendulum(**bob: Any) -> Any:
@@ -177,27 +158,13 @@ def origin(mech: Any) -> Any:
 
 
 def matrices(folder: Path) -> None:
-    """Stiffness and mass of the block in three formats, and its nodes in two."""
+    """Stiffness and mass of the block, and its nodes."""
     made = model()
-    labels = np.arange(1, len(made.points) + 1)
-    dofs = np.column_stack([np.repeat(labels, 3), np.tile([1, 2, 3], labels.size)])
-    pair = {"KAA": made.K.toarray(), "MAA": made.M.toarray()}
     mmwrite(str(folder / "K.mtx"), made.K, symmetry="symmetric")
     mmwrite(str(folder / "M.mtx"), made.M, symmetry="symmetric")
-    write_op4(pair, folder / "both.op4")
-    write_dmig(pair, dofs, folder / "both.dmig")
     rows = [f"{n}, " + ", ".join(map(repr, map(float, x))) for n, x in enumerate(made.points, 1)]
-    (folder / "nodes.csv").write_text("\n".join(["# label, x, y, z", *rows]) + "\n")
     sets = [
         f"*NSET, NSET={name}\n" + ", ".join(map(str, interface.nodes + 1))
         for name, interface in made.interfaces.items()
     ]
     (folder / "deck.inp").write_text("\n".join(["*NODE", *rows, *sets]) + "\n")
-
-
-def deck(path: Path, box: Any) -> None:
-    """The box as an Abaqus deck with one element set."""
-    nodes = [f"{n}, {x}, {y}, {z}" for n, (x, y, z) in enumerate(box.points, 1)]
-    cells = [f"{n}, " + ", ".join(map(str, row + 1)) for n, row in enumerate(box.cells, 1)]
-    lines = ["*NODE", *nodes, "*ELEMENT, TYPE=C3D4, ELSET=body", *cells]
-    path.write_text("\n".join(lines) + "\n")

@@ -1,16 +1,12 @@
 """The path without a factor finds the same on any number of processes, and as a factor does."""
 
-import subprocess
-import sys
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
 from cases.long import SHARED_BY
-from cases.paths import RANKS, ROOT
-from cases.ranks.environment import ENVIRONMENT
-from rom.process.mpirun import mpirun
+from cases.paths import RANKS
+from cases.ranks.environment import on_ranks
 
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")
 pytestmark = [pytest.mark.fenicsx, pytest.mark.mpi]
@@ -23,10 +19,7 @@ def runs(tmp_path_factory):
     script = str(RANKS / "iterative_under_mpi.py")
     for solver, ranks in (("direct", 1), *(("iterative", n) for n in (1, *SHARED_BY))):
         file = folder / f"{solver}{ranks}.npz"
-        done = subprocess.run(
-            [*mpirun(ranks), sys.executable, script, solver, str(file)],
-            env=ENVIRONMENT, timeout=300, capture_output=True, text=True, check=False, cwd=ROOT,
-        )  # fmt: skip
+        done = on_ranks(ranks, script, solver, file, timeout=300)
         assert file.exists(), done.stderr
         found[solver, ranks] = dict(np.load(file))
     return found

@@ -1,8 +1,6 @@
 """The factor that ranks share as substructures: beside dense solutions, and when it is not made."""
 
 import json
-import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -10,9 +8,8 @@ from numpy.testing import assert_allclose
 from scipy.sparse import coo_matrix, csr_matrix, random, triu
 
 from cases.long import SHARED_BY
-from cases.paths import RANKS, ROOT
-from cases.ranks.environment import ENVIRONMENT
-from rom.process.mpirun import mpirun
+from cases.paths import RANKS
+from cases.ranks.environment import on_ranks
 
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")
 pytestmark = [pytest.mark.fenicsx, pytest.mark.mpi]
@@ -34,10 +31,7 @@ def found(tmp_path_factory):
     folder, answers = tmp_path_factory.mktemp("substructured"), {}
     for n in SHARED_BY:
         file = folder / f"{n}.json"
-        done = subprocess.run(
-            [*mpirun(n), sys.executable, str(SCRIPT), str(file)],
-            env=ENVIRONMENT, timeout=300, capture_output=True, text=True, check=False, cwd=ROOT,
-        )  # fmt: skip
+        done = on_ranks(n, SCRIPT, file, timeout=300)
         assert file.exists(), done.stderr
         answers[n] = json.loads(file.read_text())
     return answers

@@ -163,14 +163,6 @@ def test_nastran_skin_elements_and_fixed_fields(tmp_path):
     assert (found.points[found.facets["spc_4"], 0] == 1.0).all()
 
 
-def test_a_wedge_in_nastran_is_refused(tmp_path):
-    grid = [f"GRID,{i + 1},,{i % 3}.,{i // 3}.,{i * i}." for i in range(6)]
-    cards = ["BEGIN BULK", *grid, "CPENTA,1,1,1,2,3,4,5,6", "ENDDATA", ""]
-    (tmp_path / "w.bdf").write_text("\n".join(cards))
-    with pytest.raises(FileFormatError, match=r"not read, CPENTA \(1, w.bdf line 8\)"):
-        read_mesh(tmp_path / "w.bdf")
-
-
 def test_a_missing_library_is_named(tmp_path, monkeypatch):
     from rom.errors import ResourceError
     from rom.fe.mesh.sources import readers

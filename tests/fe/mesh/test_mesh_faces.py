@@ -167,6 +167,7 @@ REFUSED = {
     "normal:0.01,0,1": r"no plane face has the outward normal 0.01,0,1\. The nearest are",
     "0,0,1": "the nearest face is 0.99 m from the point 0,0,1, the body 0.117 m long",
     "0,0,0": r"faces \d and \d are equally near to the point 0,0,0.* or a number",
+    (0, 0, 0, 1e-5, 1e-5, 1e-5): "'a': no face lies inside of the box",
     "1,2,3": r"Faces of these numbers are '1\+2\+3'",
 }
 

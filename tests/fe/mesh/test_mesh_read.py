@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from cases.files.cells import blocks_of, solid, write_msh
 from cases.measures import areas, volume
 from cases.paths import ROOT
-from rom.errors import ConfigError, RomWarning, TagError
+from rom.errors import ConfigError, RomWarning
 from rom.fe.mesh.quality import scaled_jacobian
 from rom.fe.mesh.read import read_mesh
 from rom.fe.mesh.sources.gmsh_session import session
@@ -206,23 +206,6 @@ def test_impossible_element_size_is_refused(folder, lc, culprit):
     with pytest.raises(ConfigError) as caught:
         read_mesh(folder / "plate.step", parameters={"lc": lc})
     assert culprit in str(caught.value)
-
-
-@pytest.mark.parametrize(
-    ("face", "culprit"),
-    [
-        ((1.0, 1.0, 1.0), "the nearest face is"),
-        ((0.0, 0.0, 0.005), "equally near"),
-        (99, "there is no face 99"),
-        ([0, 0, 0, 1e-5, 1e-5, 1e-5], "no face lies inside"),
-        ((1.0, 2.0), "a point has 3 numbers, a box 6"),
-        ("left", "'left' is no face"),
-    ],
-)
-def test_a_face_that_is_not_there_is_named(folder, face, culprit):
-    with pytest.raises((TagError, ConfigError)) as caught:
-        read_mesh(folder / "plate.step", faces={"pin": face})
-    assert "'pin'" in str(caught.value) and culprit in str(caught.value)
 
 
 def test_faces_named_in_the_step_file_are_found(folder, tmp_path):

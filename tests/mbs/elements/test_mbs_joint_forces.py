@@ -241,10 +241,8 @@ def test_tangents_are_derivatives_of_the_forces(seed):
     columns_at(s, W, lam)
     assert_allclose(W.UG.T, by_load, atol=1e-6 * np.abs(by_load).max())
     assert np.abs(W.UG - W.G).max() > 0.01
-    v[:], packed.elements[motors.MOTORS_FAMILY].answer[:] = (
-        0.0,
-        0.0,
-    )  # the turning of a torque axis holds where the joint is closed
+    v[:] = 0.0  # the turning of a torque axis holds where the joint is closed
+    packed.elements[motors.MOTORS_FAMILY].answer[:] = 0.0
     K = difference(lambda x: at(x, no, still), n)
     tangents_at(s, W, q, v, a, lam, (0.0, 0.0, 1.0))
     assert_allclose(W.Kt, K, atol=1e-6 * np.abs(K).max())

@@ -9,6 +9,7 @@ import pytest
 from cases.mbs.mechanisms import lattice, lattice_body, simulate_quietly, slider_crank
 from rom.errors import RomWarning
 from rom.mbs.elements.bushings import BUSHINGS_FAMILY
+from rom.mbs.elements.family import Hooks
 from rom.mbs.integrate.simulation import simulate
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.results.audit import audit
@@ -119,8 +120,8 @@ def test_an_element_from_outside_says_itself_what_it_cannot_bear():
     ball = mech.add_rigid("ball", mass=1.0, inertia=(1, 1, 1), at=(0, 0, 0), omega=(0, 0, 7.0))
     mech.bushing("rubber", mech.ground.marker((0, 0, 0)), ball.marker((0, 0, 0)),
                  stiffness=(1e3, 1e3, 1e3, 0, 0, 1e-3))  # fmt: skip
-    mine = replace(BUSHINGS_FAMILY, beyond=lambda name, _e, t, axes: (
-        f"{name} after {t[-1]:g} s at {axes('ball')[-1, 0, 0]:.3f}"))  # fmt: skip
+    mine = replace(BUSHINGS_FAMILY, hooks=Hooks(beyond=lambda name, _e, t, axes: (
+        f"{name} after {t[-1]:g} s at {axes('ball')[-1, 0, 0]:.3f}")))  # fmt: skip
     mech.elements["rubber"] = mine, mech.elements["rubber"][1]
     with pytest.warns(RomWarning, match=r"^rubber after 0\.01 s at 0\.998$"):
         simulate(mech, t_end=0.01, dt=1e-3)

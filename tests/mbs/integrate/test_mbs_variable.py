@@ -50,15 +50,19 @@ STATISTICS = ("steps", "iterations", "factorisations", "rejected", "shortest", "
     ("build", "t_end", "step"), [(heavy_top, 0.1, 5e-4), (free_crank, 0.05, 1.25e-4)]
 )
 def test_half_the_step_has_a_quarter_of_the_error(method, build, t_end, step):
-    """Coordinates, velocities, accelerations and multipliers, large rotations and a loop."""
+    """Coordinates, velocities, accelerations and multipliers, large rotations and a loop.
+
+    The start sets off vibrations of order h^3 in the multipliers, which 0.9 keeps for long.
+    """
     exact = simulate_quietly(build(), t_end=t_end, dt=t_end / 10, method="dop853")
+    damped = {"rho_inf": 0.6} if method == "generalized-alpha" else {}
     table = []
     for h in (step, step / 2, step / 4):
-        options = {"dt": h, "method": method, "tolerance": 1e-11}
+        options = {"dt": h, "method": method, "tolerance": 1e-11, **damped}
         sol = simulate_quietly(build(), t_end=t_end, save_every=round(t_end / 10 / h), **options)
         table.append(errors(sol, exact))
     order = np.log2(np.array(table)[:-1] / np.array(table)[1:])
-    assert_allclose(order[-1], 2.0, atol=0.1)
+    assert_allclose(order[-1], 2.0, atol=0.03)
 
 
 def test_dop853_has_its_order_in_the_error_per_tolerance():

@@ -36,7 +36,7 @@ from rom.components.gear_mesh.gears.table import (
 from rom.components.gear_mesh.gears.teeth import mesh_energy, mesh_tangents, mesh_wrenches
 from rom.components.round_bodies.cylinders import Cylinder, cylinder_of, pack_cylinders
 from rom.errors import ConfigError
-from rom.mbs.elements.family import Family, Places, integers, rows_of
+from rom.mbs.elements.family import Family, Hooks, Places, integers, rows_of
 from rom.mbs.parts.bodies import Marker, Part
 from rom.mbs.parts.whole import Whole
 from rom.model import Array
@@ -364,7 +364,9 @@ def _passed(meshes: Meshes, W: Any) -> Array:
 
 GEAR_MESHES_FAMILY = Family(
     "gear_meshes", GearMesh, pack, mesh_wrenches, mesh_tangents, mesh_energy,
-    by_rate=lambda meshes: meshes.law[:, DAMPING : SPEED].any(), answers=lambda meshes: meshes.load,
-    lost="the wheels of {} are so close that they have no common tangent", room=_room,
-    phases=_passed,
+    by_rate=lambda meshes: meshes.law[:, DAMPING : SPEED].any(),
+    hooks=Hooks(
+        answers=lambda meshes: meshes.load, room=_room, phases=_passed,
+        lost="the wheels of {} are so close that they have no common tangent",
+    ),
 )  # fmt: skip

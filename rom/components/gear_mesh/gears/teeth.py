@@ -95,8 +95,8 @@ from rom.components.gear_mesh.gears.wheels import (
     stiffen_wheels,
     turn_forces,
 )
-from rom.mbs.elements.pair_motion import clear_tangent, place_tangent
 from rom.mbs.kernels.compiled import inner
+from rom.mbs.kernels.coordinates import clear_tangent, place_tangent
 from rom.mbs.kernels.element_calls import energy, residuals, tangents
 
 

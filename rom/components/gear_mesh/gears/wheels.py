@@ -23,9 +23,9 @@ from rom.components.gear_mesh.gears.table import (
     TURN_1,
     TURN_2,
 )
-from rom.mbs.elements.pair_motion import followed_angle
 from rom.mbs.kernels.algebra import add, cross, dot, row, scale, sub, turn
 from rom.mbs.kernels.compiled import inner
+from rom.mbs.kernels.coordinates import followed_angle
 
 
 @inner

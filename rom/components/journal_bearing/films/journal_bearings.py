@@ -27,7 +27,7 @@ from rom.components.journal_bearing.films.journals import (
 from rom.components.journal_bearing.films.oil import Oil
 from rom.components.journal_bearing.films.tabulated import N_READ, N_VALUES, table_of
 from rom.errors import ConfigError
-from rom.mbs.elements.family import Family, Places, integers, rows_of
+from rom.mbs.elements.family import Family, Hooks, Places, integers, never, rows_of
 from rom.mbs.parts.bodies import Marker
 from rom.mbs.parts.whole import Whole
 from rom.model import Array, Index
@@ -249,10 +249,11 @@ def oil_everywhere(journals: Journals) -> Iterator[bool]:
 
 JOURNAL_BEARINGS_FAMILY = Family(
     "journal_bearings", OilFilm, pack, film_wrenches, film_tangents,
-    pair_tangents=film_pair_tangents, complete=True, potential=False,
-    answers=lambda journals: journals.largest,
-    room=lambda journals: journals.thinnest / journals.films.size[:, CLEARANCE],
-    lost="the journal touches its bush in {}, its film finds no pressure or leaves its table",
-    eased=oil_everywhere,
-    remembers=lambda journals: (journals.films.law == JFO) | (journals.oil[:, CONSTANT] == 0.0),
+    pair_tangents=film_pair_tangents, by_rate=never,
+    hooks=Hooks(
+        answers=lambda journals: journals.largest, potential=False, eased=oil_everywhere,
+        room=lambda journals: journals.thinnest / journals.films.size[:, CLEARANCE],
+        lost="the journal touches its bush in {}, its film finds no pressure or leaves its table",
+        remembers=lambda journals: (journals.films.law == JFO) | (journals.oil[:, CONSTANT] == 0.0),
+    ),
 )  # fmt: skip

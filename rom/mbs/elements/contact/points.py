@@ -26,7 +26,7 @@ from rom.mbs.elements.contact.bristles import (
 )
 from rom.mbs.elements.contact.impact import Impact, checked_law
 from rom.mbs.elements.contact.segments import across_of
-from rom.mbs.elements.family import Family, Places, integers, rows_of
+from rom.mbs.elements.family import Family, Hooks, Places, integers, rows_of
 from rom.mbs.kernels.algebra import add, cross, dot, row, scale, sub, turn, unit_twist
 from rom.mbs.kernels.compiled import inner
 from rom.mbs.kernels.constraints import pair_stiffness
@@ -401,5 +401,5 @@ def contact_energy(_s, W, contacts, _q, _v):
 
 CONTACTS_FAMILY = Family(
     "contacts", Contact, pack, contact_wrenches, contact_tangents, contact_energy,
-    remembers=lambda contacts: contacts.remembered >= 0, kept=kept,
+    hooks=Hooks(remembers=lambda contacts: contacts.remembered >= 0, kept=kept),
 )  # fmt: skip

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from rom.mbs.elements.family import Family, Places, apart, integers, on_joint
+from rom.mbs.elements.family import Family, Places, apart, integers, never, on_joint
 from rom.mbs.kernels.compiled import inner
 from rom.mbs.kernels.element_calls import energy, residuals, tangents
 from rom.mbs.kernels.markers import own_corner
@@ -138,5 +138,5 @@ def quartic_energy(s, _W, quartics, q, _v):
 
 QUARTICS_FAMILY = Family(
     "bodies of large deflection", LargeDeflection, pack, quartic_residuals, quartic_tangents,
-    quartic_energy, ends=on_joint, couples=apart, by_rate=lambda _: False, complete=True,
+    quartic_energy, ends=on_joint, couples=apart, by_rate=never,
 )  # fmt: skip

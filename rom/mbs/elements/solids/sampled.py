@@ -13,7 +13,7 @@ from math import log1p, nan
 import numpy as np
 
 from rom.errors import ModelError
-from rom.mbs.elements.family import Family, Places, apart, integers, on_joint
+from rom.mbs.elements.family import Family, Places, apart, integers, never, on_joint
 from rom.mbs.elements.solids.quartics import QUARTICS_FAMILY, LargeDeflection
 from rom.mbs.kernels.compiled import inner
 from rom.mbs.kernels.element_calls import energy, residuals, tangents
@@ -173,7 +173,7 @@ def sample_energy(s, _W, samples, q, _v):
 
 SAMPLES_FAMILY = Family(
     "bodies of sampled elements", LargeDeflection, pack, sample_residuals, sample_tangents,
-    sample_energy, ends=on_joint, couples=apart, by_rate=lambda _: False, complete=True,
+    sample_energy, ends=on_joint, couples=apart, by_rate=never,
 )  # fmt: skip
 
 
