@@ -3,12 +3,12 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import sqrt
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import numpy.typing as npt
 
-from rom.arguments import finite, is_number, shortened
+from rom.arguments import Number, finite, is_number, shortened
 from rom.errors import MaterialError, warn
 from rom.plausible import (
     FOAM_SPEED,
@@ -45,9 +45,9 @@ class Material:
         7850.0
     """
 
-    E: float
+    E: Annotated[float, Number("Pa")]
     nu: float
-    rho: float
+    rho: Annotated[float, Number("kg/m^3")]
 
     def __post_init__(self) -> None:
         for name in ("E", "nu", "rho"):
@@ -121,10 +121,10 @@ class Orthotropic:
         RomWarning: if sound would travel in it as in no solid: wrong units.
     """
 
-    E: tuple[float, float, float]
+    E: Annotated[tuple[float, float, float], Number("Pa", (3,))]
     nu: tuple[float, float, float]
-    G: tuple[float, float, float]
-    rho: float
+    G: Annotated[tuple[float, float, float], Number("Pa", (3,))]
+    rho: Annotated[float, Number("kg/m^3")]
     axes: Any = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
     def __post_init__(self) -> None:

@@ -3,13 +3,13 @@
 import operator
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Any, TypeVar
+from typing import Annotated, Any, TypeVar
 from weakref import WeakSet
 
 import numpy as np
 import numpy.typing as npt
 
-from rom.arguments import matrix, typed
+from rom.arguments import Number, Point, matrix, typed
 from rom.errors import InterfaceError, warn
 from rom.material import PAIRS as PAIRS
 from rom.material import Material as Material
@@ -84,9 +84,9 @@ class Attachment:
     """
 
     interface: str
-    mass: float
-    inertia: Any = ((0.0,) * 3,) * 3
-    at: Any = None
+    mass: Annotated[float, Number("kg")]
+    inertia: Annotated[npt.ArrayLike, Number("kg m^2", (3, 3))] = ((0.0,) * 3,) * 3
+    at: Point | None = None
 
 
 @typed

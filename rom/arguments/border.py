@@ -124,9 +124,11 @@ class _Border:
         except Unfit as unfit:
             where, hint = self._label(args, named), f"must be {unfit.wanted}."
             text = f"{unfit.place} = {shortened(unfit.value)} {hint}"
+            if unfit.sentence:
+                text, hint = unfit.place + unfit.sentence, ""
             if isinstance(unfit.value, type):
                 text, hint = f"{unfit.place}: {call_of(unfit.value)}", ""
-            raise ConfigError(text, where=where, hint=hint) from unfit.__cause__
+            raise unfit.error(text, where=where, hint=hint) from unfit.__cause__
         if self.usual:
             self._doubt(taken, more)
         return taken, more
@@ -160,4 +162,4 @@ def _taken(name: str, take: Taken | None, value: Any) -> Any:
     try:
         return take(value)
     except Unfit as unfit:
-        raise Unfit(unfit.value, unfit.wanted, name + unfit.place) from unfit.__cause__
+        raise unfit.within(name) from unfit.__cause__

@@ -17,7 +17,9 @@ from typing import Annotated, Any
 import numpy as np
 import numpy.typing as npt
 
+from rom.arguments.quantities import Quantity, Whole
 from rom.arguments.values import shortened
+from rom.errors import ConfigError, RomError
 
 MAX_NUMBER = 1e150  # the square of it is still a finite number
 LARGEST_WHOLE = 2**63 - 1  # that compiled code can count to
@@ -53,11 +55,25 @@ class Unfit(Exception):
         value: the value, or the part of it that is wrong.
         wanted: what it must be, in words.
         place: of that part, such as ``['a']``.
+        sentence: what is said of it behind its name, where that is more than what is wanted.
+        error: class of what is raised for it.
     """
 
-    def __init__(self, value: Any, wanted: str, place: str = ""):
-        super().__init__(value, wanted, place)
+    def __init__(
+        self,
+        value: Any,
+        wanted: str,
+        place: str = "",
+        sentence: str = "",
+        error: type[RomError] = ConfigError,
+    ):
+        super().__init__(value, wanted, place, sentence, error)
         self.value, self.wanted, self.place = value, wanted, place
+        self.sentence, self.error = sentence, error
+
+    def within(self, place: str) -> "Unfit":
+        """The same of something that has this value at a place."""
+        return Unfit(self.value, self.wanted, place + self.place, self.sentence, self.error)
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,10 +129,8 @@ def taken_by(annotation: Any, known: Names) -> Taken | None:
     origin, inner = typing.get_origin(annotation), typing.get_args(annotation)
     if annotation in PLAIN_KINDS:
         return PLAIN_KINDS[annotation]
-    if origin is Annotated and isinstance(inner[1], type):
-        return _instance(inner[1])
     if origin is Annotated:
-        return _in_words(inner[1], taken_by(inner[0], known))
+        return _annotated(inner[0], inner[1], known)
     if origin in (typing.Union, types.UnionType):
         return _one_of([taken_by(kind, known) for kind in _alternatives(inner)])
     if origin is typing.Literal:
@@ -134,6 +148,14 @@ def taken_by(annotation: Any, known: Names) -> Taken | None:
     return _instance(annotation) if isinstance(annotation, type) else None
 
 
+def _annotated(kind: Any, more: Any, known: Names) -> Taken:
+    """A class by its name; or what a kind takes, in other words or within limits."""
+    if isinstance(more, type):
+        return _instance(more)
+    taken = taken_by(kind, known)
+    return _limited(more, taken) if isinstance(more, Quantity | Whole) else _in_words(more, taken)
+
+
 def _alternatives(kinds: Iterable[Any]) -> list[Any]:
     """Members of a union; those that make up an array-like or a path stand for one thing."""
     found = list(kinds)
@@ -149,7 +171,22 @@ def _in_words(words: str, taken: Taken | None) -> Taken:
         try:
             return value if taken is None else taken(value)
         except Unfit as unfit:
-            raise (unfit if unfit.place else Unfit(value, words)) from unfit.__cause__
+            deep = unfit.place or unfit.sentence
+            raise (unfit if deep else Unfit(value, words)) from unfit.__cause__
+
+    return Taken(words, take)
+
+
+def _limited(kind: Quantity | Whole, taken: Taken | None) -> Taken:
+    """Numbers of a shape and within limits; one that has a unit is a float."""
+    one = taken or ANY_VALUE
+    words = kind.words if isinstance(kind, Whole) else one.words
+
+    def take(value: Any) -> Any:
+        found = one.take(value)
+        if fault := kind.fault(found):
+            raise Unfit(value, words, sentence=fault, error=kind.error)
+        return float(found) if one is PLAIN_KINDS[float] else found
 
     return Taken(words, take)
 
@@ -168,7 +205,7 @@ def _one_of(several: list[Taken | None]) -> Taken | None:
             try:
                 return one(value)
             except Unfit as unfit:
-                deepest = unfit if len(unfit.place) > len(deepest.place) else deepest
+                deepest = max(deepest, unfit, key=lambda x: (len(x.place), bool(x.sentence)))
         raise deepest
 
     return Taken(words, take)
@@ -243,8 +280,7 @@ def _each(one: Taken, items: Iterable[tuple[Any, Any]]) -> Iterator[Any]:
         try:
             yield one(x)
         except Unfit as unfit:
-            place = f"[{shortened(key)}]{unfit.place}"
-            raise Unfit(unfit.value, unfit.wanted, place) from unfit.__cause__
+            raise unfit.within(f"[{shortened(key)}]") from unfit.__cause__
 
 
 def _mapping(key: Taken | None, one: Taken | None) -> Taken:

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rom import rotation
+from rom.arguments.quantities import Between, NotNegative, Positive, Quantity, Whole
 from rom.errors import ConfigError, QualityGateError, RomError
 
 Array = npt.NDArray[np.float64]  # not from rom.model, whose records are checked here
@@ -41,12 +42,11 @@ def whole(name: str, value: Any, low: int = 0, high: int | None = None, *, reaso
     Raises:
         ConfigError: for anything else; 3.0 is not a whole number.
     """
-    fits = isinstance(value, Integral) and not isinstance(value, bool)
-    if fits and low <= operator.index(value) and (high is None or operator.index(value) <= high):
+    kind, fits = Whole(low, high), isinstance(value, Integral) and not isinstance(value, bool)
+    if fits and kind.holds(operator.index(value)):
         return operator.index(value)
-    span = f"of {low} or more" if high is None else f"from {low} to {high}"
     why = f": {reason}" if reason else ""
-    raise ConfigError(f"{name} = {shortened(value)} must be a whole number {span}{why}.")
+    raise ConfigError(f"{name} = {shortened(value)} must be {kind.words}{why}.")
 
 
 def lowest(n: int | None) -> slice:
@@ -217,18 +217,12 @@ def number(name: str, value: Any, *, error: type[RomError] = ConfigError) -> flo
 
 def positive(name: str, value: Any, *, error: type[RomError] = ConfigError) -> float:
     """The value as a finite positive float."""
-    x = number(name, value, error=error)
-    if x <= 0.0:
-        raise error(f"{name} = {x:g} must be positive.")
-    return x
+    return _limited(name, value, Positive(), error)
 
 
 def not_negative(name: str, value: Any, *, error: type[RomError] = ConfigError) -> float:
     """The value as a finite float of zero or more."""
-    x = number(name, value, error=error)
-    if x < 0.0:
-        raise error(f"{name} = {x:g} must not be negative.")
-    return x
+    return _limited(name, value, NotNegative(), error)
 
 
 def between(
@@ -240,25 +234,15 @@ def between(
     *,
     error: type[RomError] = ConfigError,
 ) -> float:
-    """The value as a finite float of an interval.
+    """The value as a finite float of an interval; round brackets where an end is no part of it."""
+    return _limited(name, value, Between(low, high, ends), error)
 
-    Args:
-        name: of the argument.
-        value: what was given.
-        low: where the interval begins.
-        high: where it ends.
-        ends: brackets of it: round ones where the end is no part of it.
-        error: class of what is raised.
 
-    Raises:
-        RomError: of that class, with the interval.
-    """
+def _limited(name: str, value: Any, kind: Quantity, error: type[RomError]) -> float:
     x = number(name, value, error=error)
-    if low <= x <= high and (x != low or ends[0] == "[") and (x != high or ends[1] == "]"):
-        return x
-    lowest_words = f"{'at least' if ends[0] == '[' else 'above'} {low:.6g}"
-    highest_words = f"{'at most' if ends[1] == ']' else 'below'} {high:.6g}"
-    raise error(f"{name} = {x:g} must be {lowest_words} and {highest_words}.")
+    if fault := kind.fault(x):
+        raise error(name + fault)
+    return x
 
 
 def unit_vector(name: str, value: Any) -> Array:

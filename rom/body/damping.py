@@ -1,18 +1,19 @@
 """Structural damping: of the deformation, whatever the frame and without rigid motions."""
 
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 import numpy as np
 import numpy.typing as npt
 from scipy.linalg import eigh
 
-from rom.arguments import one_each, typed
+from rom.arguments import NotNegative, one_each, typed
 from rom.body.flexible import FlexibleBody
 from rom.body.records import still_motions
 from rom.body.reference import rigid_elastic, rigid_mass
 from rom.eigen.supports import Fixed
 from rom.model import Array, Row
-from rom.plausible import DAMPING_RATIO, check_damping_ratio, refuse_negative, warn_outside
+from rom.plausible import DAMPING_RATIO, check_damping_ratio, warn_outside
 
 
 @typed
@@ -32,12 +33,8 @@ class Rayleigh:
         ConfigError: for a factor that is negative or not finite.
     """
 
-    alpha: float = 0.0
-    beta: float = 0.0
-
-    def __post_init__(self) -> None:
-        for name in ("alpha", "beta"):
-            refuse_negative(f"damping {name}", getattr(self, name))
+    alpha: Annotated[float, NotNegative("1/s")] = 0.0
+    beta: Annotated[float, NotNegative("s")] = 0.0
 
     def matrix(self, body: FlexibleBody) -> Array:
         """(r, r) damping [N s/m]."""

@@ -18,30 +18,18 @@ COMMON_OPTIONS = {
 }  # fmt: skip
 COMMON_OPTIONS |= {"trust", "time_limit", "memory_limit"}  # no file may say them
 Changes = dict[tuple[str, ...], Any]
+SECTION_KEYS = {  # section: keys whose options are called as they are
+    "material": "E nu rho",
+    "geometry": "degree order solver",
+    "reduction": "method modes f_max tol at characteristic gravity_shapes reference stiffening "
+    "stress",
+    "modes": "number fixed spring",
+}
 PLACES: dict[str, tuple[str, ...]] = {  # option: key
-    "E": ("material", "E"),
-    "nu": ("material", "nu"),
-    "rho": ("material", "rho"),
-    "degree": ("geometry", "degree"),
-    "order": ("geometry", "order"),
-    "solver": ("geometry", "solver"),
-    "method": ("reduction", "method"),
-    "modes": ("reduction", "modes"),
-    "f_max": ("reduction", "f_max"),
-    "tol": ("reduction", "tol"),
-    "at": ("reduction", "at"),
-    "characteristic": ("reduction", "characteristic"),
-    "gravity_shapes": ("reduction", "gravity_shapes"),
-    "reference": ("reduction", "reference"),
-    "stiffening": ("reduction", "stiffening"),
-    "stress": ("reduction", "stress"),
+    "name": ("name",),
     "damping_ratio": ("damping", "ratio"),
     "damping_fixed": ("damping", "fixed"),
-    "name": ("name",),
-    "number": ("modes", "number"),
-    "fixed": ("modes", "fixed"),
-    "spring": ("modes", "spring"),
-}
+} | {key: (section, key) for section, keys in SECTION_KEYS.items() for key in keys.split()}
 MOTION_KEYS: dict[str, tuple[str, ...]] = {
     "gravity": ("gravity",),
     "t_end": ("simulation", "t_end"),

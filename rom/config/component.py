@@ -5,10 +5,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rom.arguments import typed
+from rom.arguments import Quantity, typed
 from rom.config.component_keys import TABLE
 from rom.config.document import Document, KeyPath, read_document
-from rom.config.keys import Place, Quantity, as_text, read_table
+from rom.config.keys import Place, as_text, read_table, read_value
 from rom.config.methods import chosen
 from rom.errors import ConfigError, RomError
 from rom.units import LENGTH, in_si, unit
@@ -201,7 +201,7 @@ class Component(Described):
             return value  # a text of its own, e.g. for a geometry written in Python
         place = Place(self.document, ("geometry", "parameters", name))
         if found.dimension == LENGTH:
-            return Quantity("m").read(value, place) / scale
+            return float(read_value(Quantity("m"), value, place)) / scale
         try:
             return in_si(value, _si(found.dimension))
         except ConfigError as error:

@@ -4,6 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+from rom.arguments import Number, Positive, Quantity, Whole
+from rom.config.declared import Declared
 from rom.config.keys import (
     Anything,
     Either,
@@ -13,11 +15,9 @@ from rom.config.keys import (
     Named,
     OutputPath,
     Place,
-    Quantity,
     Table,
     Text,
     Variants,
-    Whole,
     Words,
 )
 from rom.config.methods import METHODS
@@ -26,18 +26,13 @@ from rom.fe.mesh.picks import picks
 from rom.units import LENGTH, SYSTEMS, UNITS
 
 LENGTHS = tuple(name for name, u in UNITS.items() if u.dimension == LENGTH)
-ISOTROPIC = Table("An isotropic solid.", (
-    Key("E", Quantity("Pa"), "Young's modulus.", ...),
-    Key("nu", Quantity(), "Poisson's ratio.", ...),
-    Key("rho", Quantity("kg/m^3"), "Density.", ...),
-))  # fmt: skip
-ORTHOTROPIC = Table("An orthotropic solid, known by its key G.", (
-    Key("E", Quantity("Pa", ((3,),)), "Young's moduli E1, E2, E3.", ...),
-    Key("nu", Quantity("1", ((3,),)), "Poisson's ratios nu12, nu13, nu23.", ...),
-    Key("G", Quantity("Pa", ((3,),)), "Shear moduli G12, G13, G23.", ...),
-    Key("rho", Quantity("kg/m^3"), "Density.", ...),
-    Key("axes", Quantity("1", ((3, 3),)), "Rows are the axes 1, 2, 3 in the geometry."),
-))  # fmt: skip
+ISOTROPIC = Declared("rom.material:Material")
+ORTHOTROPIC = Declared(
+    "rom.material:Orthotropic",
+    Key("axes", Number("1", (3, 3)), "Rows are the axes 1, 2, 3 in the geometry."),
+    about="An orthotropic solid, known by its key G.",
+)
+SHAPES = "rom.reduction.interfaces.polynomial"
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,13 +82,8 @@ INTERFACE = Either(Text(), Variants({
     "full": Table("Keeps all its dofs.", ()),
     "rbe2": Table("Moves as a rigid surface.", ()),
     "rbe3": Table("Moves freely about its mean.", ()),
-    "polynomial": Table("Deforms by polynomials.", (
-        Key("order", Whole(), "Their order; by the band and tol of the reduction if missing."),
-    )),
-    "fourier": Table("A bore: Fourier series around, Legendre polynomials along.", (
-        Key("harmonics", Whole(), "Harmonics around.", ...),
-        Key("order", Whole(), "Order along.", ...),
-    )),
+    "polynomial": Declared(f"{SHAPES}:Polynomial"),
+    "fourier": Declared(f"{SHAPES}:FourierLegendre"),
 }))  # fmt: skip
 TABLE = Table("A component.", (
     Key("name", Text(), "Name of the body; that of the file if missing."),
@@ -124,18 +114,15 @@ TABLE = Table("A component.", (
     Key("material", Solids(), "What it is made of; by region where there are several."),
     Key("interfaces", Named(INTERFACE, "interfaces"),
         "Surfaces through which it touches others, and their kinds."),
-    Key("attachments", Named(Table("A rigid body on an interface.", (
-        Key("interface", Text(), "Which carries it.", ...),
-        Key("mass", Quantity("kg", positive=True), "Mass.", ...),
-        Key("inertia", Quantity("kg m^2", ((3, 3),)), "About its mass centre; none for a point."),
-        Key("at", Quantity("m", ((3,),)), "Mass centre; the middle of the interface if missing."),
-    )), "attachments"), "Rigid bodies and point masses it carries."),
+    Key("attachments", Named(Declared(
+        "rom.model:Attachment", about="A rigid body on an interface.", mass=Positive("kg"),
+    ), "attachments"), "Rigid bodies and point masses it carries."),
     Key("reduction", Table("How it is reduced.", (
         Key("method", Text(tuple(METHODS)), "Which modes are kept.", "craig-bampton"),
         Key("modes", Whole(), "How many; if missing, as many as the certificate needs, of methods "
             "other than craig-bampton 20, of moment-matching blocks 2."),
-        Key("f_max", Quantity("Hz", positive=True), "Craig-Bampton: all modes up to here instead."),
-        Key("tol", Quantity("1", positive=True),
+        Key("f_max", Positive("Hz"), "Craig-Bampton: all modes up to here instead."),
+        Key("tol", Positive("1"),
             "The fewest modes with this relative error up to f_max, or of the lowest six."),
         Key("at", Quantity("Hz", ((None,),)), "Moment-matching: where to be exact; 0 if missing."),
         Key("characteristic", Whole(), "Full interfaces follow so many characteristic modes."),
@@ -149,7 +136,7 @@ TABLE = Table("A component.", (
                 Key("moment", Quantity("N m", ((3,),)), "About the same axes.", (0.0,) * 3),
             )), "loads"), "Largest loads by interface.", ...),
             Key("modes", Whole(), "So many of the lowest modes drag others along.", 4),
-            Key("tol", Quantity("1", positive=True), "Share of the states left out.", 1e-4),
+            Key("tol", Positive("1"), "Share of the states left out.", 1e-4),
             Key("shapes", Whole(1), "So many shapes are added; as tol asks if missing."),
             Key("steps", Whole(1), "States on the way to the largest load.", 4),
             Key("fixed", Words(), "Held beside the reference, wholly or as `name:yz`.", ()),
@@ -158,7 +145,7 @@ TABLE = Table("A component.", (
             Key("about", Quantity("m", ((3,),)), "A point of its axis; the reference if missing."),
             Key("snapshots", Flag(), "Full solutions at the largest loads are shapes as well.",
                 False),
-            Key("sampling", Quantity("1", positive=True),
+            Key("sampling", Positive("1"),
                 "The material is neo-Hookean, and few elements have its energy to this share."),
         )), "Reach large deflection."),
         Key("stress", Flag(), "Make stress on the surface recoverable.", False),

@@ -2,28 +2,23 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from inspect import signature
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
-from rom.config.keys import Place, nearest
+from rom.config.keys import Place, Variants, nearest
 from rom.config.laws import Law, law_of
-from rom.config.mechanism_keys import IMPACT, POSE, sections
+from rom.config.mechanism_keys import sections
 from rom.config.python_files import function_of, plain_function_of
 from rom.errors import ConfigError
+from rom.fields import follow
 
 if TYPE_CHECKING:
-    from rom.mbs.elements.contact.impact import Impact
     from rom.mbs.elements.formulas.programs import Formula
     from rom.mbs.integrate.events import Instant
     from rom.mbs.mechanism import Mechanism
     from rom.mbs.parts.bodies import Part
 
-METHODS = {  # section: method of a mechanism; in the others the kind of the entry
-    "springs": "spring_damper",
-    "rotational_springs": "rotational_spring",
-    "bushings": "bushing",
-    "frictions": "friction",
-}
 Measured = tuple[float, float]  # value and rate
 GROUND = "ground"
 DIRECTIONS = {"rising": 1, "falling": -1, "both": 0}
@@ -67,12 +62,10 @@ class Entry:
         """The law under a key."""
         return law_of(self.values[key], self.place.at(key), t_end=self.t_end, trust=self.trust)
 
-    def take_impact(self) -> "Impact":
-        """The law of penetration, whose numbers leave the values."""
-        from rom.mbs.elements.contact.impact import Impact
-
-        numbers = {k.name: self.values.pop(k.name) for k in IMPACT if k.name in self.values}
-        return Impact(**numbers)
+    def take(self, record: Callable[..., Any]) -> Any:
+        """A record of the values under the names of its fields, which leave the values."""
+        names = [name for name in signature(record).parameters if name in self.values]
+        return record(**{name: self.values.pop(name) for name in names})
 
     def take_body(self) -> "Part":
         """The flexible body under "body", which leaves the values.
@@ -91,8 +84,14 @@ class Entry:
 
 
 def _plainly(entry: Entry) -> None:
-    method = METHODS.get(entry.section) or entry.values.pop("kind")
-    getattr(entry.made, method)(entry.name, *entry.ends, **entry.values)
+    """The method that declares the keys, with the records that declare some behind the ends."""
+    table: Any = sections()[entry.section].kind
+    if isinstance(table, Variants):
+        table = table.tables[entry.values.pop("kind")]
+    method, *records = table.places
+    body = [entry.take_body()] if "body" in entry.values else []
+    given = [entry.take(follow(record)) for record in records]
+    getattr(entry.made, method)(entry.name, *entry.ends, *body, *given, **entry.values)
 
 
 def _drive(entry: Entry) -> None:
@@ -156,17 +155,6 @@ def _bushing(entry: Entry) -> None:
     for key in ("stiffness", "damping"):
         entry.values[key] = [*entry.values[key], *entry.values.pop(f"turning_{key}")]
     _plainly(entry)
-
-
-def _stop(entry: Entry) -> None:
-    (joint,) = entry.ends
-    entry.made.stop(entry.name, joint, entry.take_impact(), **entry.values)
-
-
-def _contact(entry: Entry) -> None:
-    kind, impact = entry.values.pop("kind"), entry.take_impact()
-    body = [entry.take_body()] if "body" in entry.values else []
-    getattr(entry.made, kind)(entry.name, *entry.ends, *body, impact, **entry.values)
 
 
 def _law(entry: Entry) -> None:
@@ -304,8 +292,6 @@ CALLS: dict[str, Callable[[Entry], None]] = {
     "torques": _load,
     "spread_loads": _spread,
     "bushings": _bushing,
-    "stops": _stop,
-    "contacts": _contact,
     "laws": _law,
     "events": _event,
 }
@@ -332,7 +318,7 @@ def pose_of(values: Mapping[str, Any]) -> dict[str, Any]:
     from rom import rotation
     from rom.arguments import unit_vector
 
-    pose = {key: values[key] for key in ("at", *(key.name for key in POSE)) if key in values}
+    pose = {key: values[key] for key in ("at", "orientation", "velocity", "omega") if key in values}
     turned = pose.get("orientation")
     if isinstance(turned, Mapping):
         axis = unit_vector("axis", turned["axis"])

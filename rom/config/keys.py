@@ -7,12 +7,14 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, Protocol
 
+from rom.arguments import Quantity, Whole
 from rom.config.document import Document, KeyPath
 from rom.errors import ConfigError
 from rom.names import check_text
 from rom.units import in_si
 
 MOST_TOLD = 20  # mistakes in one message
+LARGEST_WHOLE = 10**9  # whole number
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,8 +39,8 @@ class Place:
         return ConfigError(message, where=self.document.where(self.path), hint=hint)
 
 
-class Kind(Protocol):
-    """How the value of a key is written."""
+class Written(Protocol):
+    """How the value of a key is written, where it is no number."""
 
     @property
     def summary(self) -> str:
@@ -52,53 +54,43 @@ class Kind(Protocol):
         """
 
 
-@dataclass(frozen=True, slots=True)
-class Quantity:
-    """A number with a unit: text, or a plain number in SI; or an array of them.
+def read_value(kind: "Kind", value: Any, place: Place) -> Any:
+    """The value of a key, checked and in SI.
 
-    Attributes:
-        unit: SI unit of the dimension it must have; "1" for none.
-        shapes: of an array, e.g. ((3,), (3, 3)); None in a shape for any length.
-        positive: whether it must be above zero.
+    Raises:
+        ConfigError: if it is none of this kind.
     """
+    if isinstance(kind, Quantity):
+        return _quantity(kind, value, place)
+    if isinstance(kind, Whole):
+        return _whole(kind, value, place)
+    return kind.read(value, place)
 
-    unit: str = "1"
-    shapes: tuple[tuple[int | None, ...], ...] = ((),)
-    positive: bool = False
 
-    @property
-    def summary(self) -> str:
-        """Number, vector or matrix, and unit."""
-        forms = {0: "number", 1: "list", 2: "matrix"}
-        sizes = ["x".join("n" if n is None else str(n) for n in s) for s in self.shapes]
-        shapes = zip(self.shapes, sizes, strict=True)
-        words = [f"{forms[len(s)]} {size}".strip() for s, size in shapes]
-        unit = "" if self.unit == "1" else f" [{self.unit}]"
-        return " or ".join(words) + unit + (", positive" if self.positive else "")
+def _quantity(kind: Quantity, value: Any, place: Place) -> Any:
+    """Number or nested lists of numbers, each a text with its unit or plain in SI."""
+    found = _shape(value)
+    if found is None or not kind.has_shape(found):
+        raise place.error(f"{place.name} = {as_text(value)}: needed is a {kind.summary}.")
+    return _number(kind, value, place)
 
-    def read(self, value: Any, place: Place) -> Any:
-        """Number or nested lists of numbers in SI."""
-        found = _shape(value)
-        if not any(_matches(found, shape) for shape in self.shapes):
-            raise place.error(f"{place.name} = {as_text(value)}: needed is a {self.summary}.")
-        return self._number(value, place)
 
-    def _number(self, value: Any, place: Place) -> Any:
-        if isinstance(value, list):
-            return [self._number(item, place) for item in value]
-        if isinstance(value, str):
-            try:
-                x = in_si(value, self.unit)
-            except ConfigError as error:
-                raise place.error(f"{place.name}: {error.message}", error.hint) from None
-        elif isinstance(value, int | float) and not isinstance(value, bool):
-            x = float(value) if abs(value) <= 1e300 else math.inf
-        else:
-            raise place.error(f"{place.name} = {as_text(value)} must be a {self.summary}.")
-        if not math.isfinite(x) or (self.positive and x <= 0):
-            what = "positive" if math.isfinite(x) else "a finite number"
-            raise place.error(f"{place.name} = {as_text(value)} must be {what}.")
-        return x
+def _number(kind: Quantity, value: Any, place: Place) -> Any:
+    if isinstance(value, list):
+        return [_number(kind, item, place) for item in value]
+    if isinstance(value, str):
+        try:
+            x = in_si(value, kind.unit)
+        except ConfigError as error:
+            raise place.error(f"{place.name}: {error.message}", error.hint) from None
+    elif isinstance(value, int | float) and not isinstance(value, bool):
+        x = float(value) if abs(value) <= 1e300 else math.inf
+    else:
+        raise place.error(f"{place.name} = {as_text(value)} must be a {kind.summary}.")
+    if not math.isfinite(x) or not kind.holds(x):
+        must = kind.must if math.isfinite(x) else "must be a finite number"
+        raise place.error(f"{place.name} = {as_text(value)} {must}.")
+    return x
 
 
 def _shape(value: Any) -> tuple[int, ...] | None:
@@ -112,30 +104,14 @@ def _shape(value: Any) -> tuple[int, ...] | None:
     return (len(value), *first)
 
 
-def _matches(found: tuple[int, ...] | None, shape: tuple[int | None, ...]) -> bool:
-    if found is None or len(found) != len(shape):
-        return False
-    return all(n in (None, m) for m, n in zip(found, shape, strict=True))
+def _whole(kind: Whole, value: Any, place: Place) -> int:
+    fits = isinstance(value, int) and not isinstance(value, bool)
+    if not fits or not kind.holds(value) or value > LARGEST_WHOLE:
+        raise place.error(f"{place.name} = {as_text(value)} must be a {kind.summary}.")
+    return int(value)
 
 
-@dataclass(frozen=True, slots=True)
-class Whole:
-    """A whole number."""
-
-    least: int = 0
-    most: int = 10**9
-
-    @property
-    def summary(self) -> str:
-        """Whole number from the least one on."""
-        return f"whole number from {self.least}"
-
-    def read(self, value: Any, place: Place) -> int:
-        """The number."""
-        fits = isinstance(value, int) and not isinstance(value, bool)
-        if not fits or not self.least <= value <= self.most:
-            raise place.error(f"{place.name} = {as_text(value)} must be a {self.summary}.")
-        return value
+Kind = Written | Quantity | Whole
 
 
 @dataclass(frozen=True, slots=True)
@@ -362,13 +338,13 @@ class Either:
 
     def read(self, value: Any, place: Place) -> Any:
         """Either form."""
-        return (self.table if isinstance(value, Mapping) else self.short).read(value, place)
+        return read_value(self.table if isinstance(value, Mapping) else self.short, value, place)
 
 
 def collect(found: dict[str, Any], name: str, kind: Kind, value: Any, place: Place) -> None:
     """Read one value into a dictionary; a mistake goes to the others."""
     try:
-        found[name] = kind.read(value, place.at(name))
+        found[name] = read_value(kind, value, place.at(name))
     except ConfigError as error:
         place.mistakes.append(error)
 

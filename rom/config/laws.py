@@ -5,8 +5,9 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
+from rom.arguments import Positive, Quantity
 from rom.config.expressions import formula_kind
-from rom.config.keys import Either, Key, Kind, Place, Quantity, Table, Variants, raise_mistakes
+from rom.config.keys import Either, Key, Kind, Place, Table, Variants, raise_mistakes, read_value
 from rom.config.python_files import PYTHON_KEYS, function_of
 from rom.errors import ConfigError
 
@@ -39,7 +40,7 @@ def law_kind(unit: str, variables: tuple[str, ...] = ("t",)) -> Kind:
             "From rest to a steady rate, without a jolt: the rate is that of a cycloid, "
             "rate (s - sin(2 pi s) / 2 pi) with s = t / duration.", (
             Key("rate", rate, "Rate at the end.", ...),
-            Key("duration", Quantity("s", positive=True), "Time until then.", ...),
+            Key("duration", Positive("s"), "Time until then.", ...),
         )),
         "ramp": Table(
             "From one value to another on a cycloid, from + (to - from) (s - sin(2 pi s) / 2 pi) "
@@ -47,11 +48,11 @@ def law_kind(unit: str, variables: tuple[str, ...] = ("t",)) -> Kind:
             Key("from", value, "Value before.", still),
             Key("to", value, "Value after.", ...),
             Key("start", Quantity("s"), "When it begins.", still),
-            Key("duration", Quantity("s", positive=True), "How long it takes.", ...),
+            Key("duration", Positive("s"), "How long it takes.", ...),
         )),
         "harmonic": Table("mean + amplitude sin(2 pi frequency t + phase).", (
             Key("amplitude", value, "Amplitude.", ...),
-            Key("frequency", Quantity("Hz", positive=True), "Frequency.", ...),
+            Key("frequency", Positive("Hz"), "Frequency.", ...),
             Key("phase", Quantity("rad"), "Phase.", still),
             Key("mean", value, "Mean.", still),
         )),
@@ -85,7 +86,7 @@ class Pending:
             ConfigError: if it has the unit of the other one.
         """
         place = Place(self.place.document, self.place.path)
-        found = self.kinds[0 if turns else 1].read(self.value, place)
+        found = read_value(self.kinds[0 if turns else 1], self.value, place)
         raise_mistakes(place)
         return found
 

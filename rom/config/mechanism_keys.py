@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any, ClassVar, NamedTuple
 
+from rom.arguments import NotNegative, Number, Positive, Quantity
+from rom.config.declared import Declared
 from rom.config.expressions import FormulaTable, formula_keys, formula_kind
 from rom.config.keys import (
     Either,
@@ -15,13 +17,12 @@ from rom.config.keys import (
     Kind,
     Named,
     Place,
-    Quantity,
     Table,
     Text,
     Variants,
-    Whole,
     Words,
     as_text,
+    read_value,
 )
 from rom.config.laws import ByCoordinate, law_kind
 from rom.config.python_files import PYTHON_KEYS
@@ -43,7 +44,7 @@ class MarkerName:
         """Name of the body, and name or coordinates of the marker."""
         if isinstance(value, Mapping) and len(value) == 1:
             ((body, point),) = value.items()
-            return body, POINT.read(point, place.at(body))
+            return body, read_value(POINT, point, place.at(body))
         if isinstance(value, str) and "." in value.strip("."):
             body, _, marker = value.partition(".")
             return body, marker
@@ -73,36 +74,24 @@ class Markers:
         return [MarkerName().read(item, place) for item in value]
 
 
-POSE = (
-    Key("orientation", Either(Quantity("1", ((4,), (3, 3))), Table("A rotation.", (
-        Key("axis", DIRECTION, "Axis.", ...),
-        Key("angle", Quantity("rad"), "Angle, right-handed.", ...),
-    ))), "Body to world: quaternion (scalar first), matrix, or { axis, angle }; none if missing."),
-    Key("velocity", Quantity("m/s", ((3,),)), "At the start, in the world; at rest if missing."),
-    Key("omega", Quantity("rad/s", ((3,),)), "Angular velocity at the start, in the body frame."),
+ORIENTATION = Key("orientation", Either(Number("1", (4,), (3, 3)), Table("A rotation.", (
+    Key("axis", DIRECTION, "Axis.", ...),
+    Key("angle", Quantity("rad"), "Angle, right-handed.", ...),
+))), "Body to world: quaternion (scalar first), matrix, or { axis, angle }."
 )  # fmt: skip
-SPIN = Key(
-    "spin", Quantity("rad/s", ((3,),)),
-    "Angular velocity of a round body in its frame, which does not turn with it.",
-)  # fmt: skip
-RIGID = Table("A rigid body by its numbers; its frame sits at the mass centre.", (
-    Key("mass", Quantity("kg", positive=True), "Mass.", ...),
-    Key("inertia", Quantity("kg m^2", ((3,), (3, 3))), "About the mass centre, body frame.", ...),
-    Key("at", POINT, "Mass centre at the start.", ...),
-    *POSE,
-    SPIN,
+RIGID = Declared(
+    "add_rigid",
+    ORIENTATION,
     Key("markers", Named(POINT, "points"), "Points from the mass centre, body frame.", {}),
-))  # fmt: skip
-FROM_FILE = Table("A body from a file; its frame is that of its geometry.", (
+)
+FROM_FILE = Declared(
+    "add_flexible",
     Key("file", FilePath(), "A body file `.rom.npz`, or a component file `.toml`.", ...),
     Key("rigid", Flag(), "Take mass, inertia and interfaces of it only.", False),
     Key("reference", Words(), "Another floating frame, see the component file."),
-    Key("at", POINT, "Origin of its frame at the start.", [0.0, 0.0, 0.0]),
-    *POSE,
-    SPIN,
-    Key("q", Quantity("1", ((None,),)), "Elastic coordinates at the start; zero if missing."),
-    Key("qd", Quantity("1", ((None,),)), "Their rates at the start; zero if missing."),
-))  # fmt: skip
+    ORIENTATION,
+    about="A body from a file; its frame is that of its geometry.",
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,111 +113,34 @@ BETWEEN = Key(
     "Its markers; forces and coordinates are those of the second.",
     ...,
 )
-AXIS = Key("axis", DIRECTION, "In the world at the start.", ...)
-NORMAL = Key("normal", DIRECTION, "In the world at the start.", ...)
-COORDINATES = ("angle", "displacement", "way")  # the last is the earlier name of the second
+JOINT = Key("joint", Text(), "Name of the joint.", ...)
+MOVING = "revolute cylindrical prismatic spherical universal fixed planar screw point_on_line"
 JOINTS = {
-    "revolute": Table("A hinge.", (BETWEEN, AXIS)),
-    "cylindrical": Table("Turns about and slides along an axis.", (BETWEEN, AXIS)),
-    "prismatic": Table("Slides along an axis.", (BETWEEN, AXIS)),
-    "spherical": Table("A ball joint.", (BETWEEN,)),
-    "universal": Table("A Cardan joint.", (
-        BETWEEN,
-        Key("axis1", DIRECTION, "On the first body.", ...),
-        Key("axis2", DIRECTION, "On the second body, perpendicular.", ...),
-    )),
-    "fixed": Table("A weld.", (BETWEEN,)),
-    "planar": Table("Slides in a plane and turns about its normal.", (BETWEEN, NORMAL)),
-    "screw": Table("Advances as it turns.", (
-        BETWEEN, AXIS, Key("pitch", Quantity("m"), "Advance per turn.", ...),
-    )),
-    "point_on_line": Table("A point on a line of the first body.", (BETWEEN, AXIS)),
-    "point_on_plane": Table("A point in a plane of the first body.", (BETWEEN, NORMAL)),
-    "distance": Table("A massless rod.", (
-        BETWEEN,
-        Key("length", Quantity("m", positive=True), "That at the start if missing."),
-    )),
-    "rolling": Table("A ball or wheel that rolls on a plane.", (
-        BETWEEN, NORMAL,
-        Key("radius", Quantity("m", positive=True), "Of ball or wheel.", ...),
-        Key("axis", DIRECTION, "Of a wheel; none for a ball."),
-    )),
-    "gear": Table("Couples the coordinates of two joints.", (
+    kind: Declared(kind, BETWEEN) for kind in f"{MOVING} point_on_plane distance rolling".split()
+} | {
+    "gear": Declared(
+        "gear",
         Key("joint1", Text(), "Driving joint.", ...),
         Key("joint2", Text(), "Driven joint.", ...),
-        Key("ratio", Quantity(), "Coordinate 2 over coordinate 1 [rad/rad, m/rad, ...].", ...),
-        Key("coordinate1", Text(COORDINATES), "Which, where a joint has two."),
-        Key("coordinate2", Text(COORDINATES), "Likewise."),
-    )),
-}  # fmt: skip
-JOINT = Key("joint", Text(), "Name of the joint.", ...)
-WHICH = Key("coordinate", Text(COORDINATES), "Which, where the joint has two.")
-LEVEL = ByCoordinate(Quantity("N m"), Quantity("N"))
-SPEED = ByCoordinate(Quantity("rad/s", positive=True), Quantity("m/s", positive=True))
+    ),
+}
+WHICH = Key("coordinate", Text(("angle", "displacement", "way")), "Which, where it has two.")
 WAY = ByCoordinate(Quantity("rad"), Quantity("m"))
-IMPACT = (
-    Key("stiffness", Quantity("1", positive=True),
-        "Force per depth^exponent, a plain number in SI.", ...),
-    Key("exponent", Quantity("1", positive=True), "1 for linear, 1.5 for Hertz.", 1.5),
-    Key("damping", Quantity("s/m"), "Force grows by this factor of the closing speed.", 0.0),
-    Key("restitution", Quantity("1", positive=True), "In place of damping, with impact_speed."),
-    Key("impact_speed", Quantity("m/s", positive=True), "At which restitution holds."),
-    Key("mu", Quantity("1"), "Coefficient of friction.", 0.0),
-    Key("transition_speed", Quantity("m/s", positive=True), "Over which friction turns.", 1e-3),
-    Key("tangential_stiffness", Quantity("1", positive=True),
-        "Of a spring by which friction holds, in SI; friction by the speed alone if missing."),
-    Key("tangential_damping", Quantity("1"), "Of that spring, a plain number in SI.", 0.0),
-)  # fmt: skip
-RADIUS = Quantity("m", positive=True)
-STEEL = (
-    Key("E", Quantity("Pa", positive=True), "Young's modulus.", 206e9),
-    Key("nu", Quantity(), "Poisson's ratio.", 0.3),
-)
+SPEED = ByCoordinate(Positive("rad/s"), Positive("m/s"))
+IMPACT = "rom.mbs.elements.contact.impact:Impact"
 FLEXIBLE = Key("body", Text(), "Flexible body that carries a surface.", ...)
 WHERE = Key("where", Text(), "Deformable interface that is the part of it; all of it if missing.")
-COVER = (
-    Key("marker", MarkerName(), "Where the other surface is.", ...), FLEXIBLE, WHERE,
-    Key("stiffness", Quantity("1", positive=True),
-        "Pressure per depth^exponent, a plain number in SI.", ...),
-    *IMPACT[1:],
-)  # fmt: skip
-CONTACTS = {
-    "sphere_on_plane": Table("A sphere about the second marker, a plane through the first.", (
-        BETWEEN, NORMAL, Key("radius", RADIUS, "Of the sphere.", ...), *IMPACT,
-    )),
-    "disc_on_plane": Table("The rim of a disc about the second marker on such a plane.", (
-        BETWEEN, NORMAL, AXIS, Key("radius", RADIUS, "Of the disc.", ...), *IMPACT,
-    )),
-    "sphere_on_sphere": Table("Spheres about both markers.", (
-        BETWEEN, Key("radius1", RADIUS, "First one.", ...),
-        Key("radius2", RADIUS, "Second one.", ...), *IMPACT,
-    )),
-    "sphere_on_cylinder": Table("A sphere about the second marker, a cylinder about the first.", (
-        BETWEEN, AXIS, Key("radius1", RADIUS, "Of the cylinder.", ...),
-        Key("radius2", RADIUS, "Of the sphere.", ...),
-        Key("inside", Flag(), "Whether it is in the bore.", False), *IMPACT,
-    )),
-    "capsule_on_capsule": Table("Round bars with round ends about both markers, or spheres.", (
-        BETWEEN, Key("radius1", RADIUS, "First one.", ...),
-        Key("radius2", RADIUS, "Second one.", ...),
-        Key("axis1", DIRECTION, "Of the first one, world at the start; missing for a sphere."),
-        Key("axis2", DIRECTION, "Of the second one."),
-        Key("length1", Quantity("m"), "Between the middles of its ends.", 0.0),
-        Key("length2", Quantity("m"), "Of the second one.", 0.0), *IMPACT,
-    )),
-    "surface_on_plane": Table("The surface of a body on a plane through the marker.", (
-        *COVER, Key("normal", DIRECTION, "Towards the body, world at the start.", ...),
-    )),
-    "surface_on_sphere": Table("The surface of a body on a sphere about the marker.", (
-        *COVER, Key("radius", RADIUS, "Of the sphere.", ...),
-    )),
-    "surface_on_cylinder": Table("The surface of a body on a cylinder about the marker.", (
-        *COVER, AXIS, Key("radius", RADIUS, "Of the cylinder.", ...),
-        Key("inside", Flag(), "Whether it is in the bore.", False),
-    )),
-}  # fmt: skip
+ON_MARKERS = "sphere_on_plane disc_on_plane sphere_on_sphere sphere_on_cylinder capsule_on_capsule"
+CONTACTS = {kind: Declared(f"{kind} {IMPACT}", BETWEEN) for kind in ON_MARKERS.split()} | {
+    kind: Declared(
+        f"{kind} {IMPACT}",
+        Key("marker", MarkerName(), "Where the other surface is.", ...),
+        FLEXIBLE,
+        WHERE,
+    )
+    for kind in ("surface_on_plane", "surface_on_sphere", "surface_on_cylinder")
+}
 MARKER = Key("marker", MarkerName(), "Where it acts.", ...)
-FRAME = Key("frame", Text(("world", "body")), "Axes of the vector.", "world")
 FACTOR = Key("factor", law_kind("1"), "A law that multiplies the vector; constant if missing.")
 MOTION = ("t", "x", "v")
 SPREAD_LOADS = {
@@ -323,52 +235,49 @@ BEFORE_FIELDS: dict[str, tuple[str, Kind]] = {  # connections and forces: what, 
         JOINT,
         Key("law", ByCoordinate(law_kind("rad"), law_kind("m")), "Coordinate over time.", ...),
     ))),
-    "motors": ("forces along joint coordinates", Table("A torque or force along a coordinate.", (
-        JOINT, WHICH,
+    "motors": ("forces along joint coordinates", Declared(
+        "motor",
+        JOINT,
         Key("law", ByCoordinate(law_kind("N m", MOTION), law_kind("N", MOTION)),
             "Force over time; formulas and Python also by coordinate x and rate v.", ...),
-    ))),
-    "springs": ("springs and dampers between markers", Table("A spring and damper.", (
+        about="A torque or force along a coordinate.",
+        without="compiled",
+    )),
+    "springs": (
+        "springs and dampers between markers",
+        Declared("spring_damper", BETWEEN, defaults={"stiffness": 0.0}),
+    ),
+    "rotational_springs": (
+        "springs about joints", Declared("rotational_spring", JOINT, defaults={"stiffness": 0.0}),
+    ),
+    "bushings": ("bushings", Declared(
+        "bushing",
         BETWEEN,
-        Key("stiffness", Quantity("N/m"), "Stiffness.", 0.0),
-        Key("damping", Quantity("N s/m"), "Damping.", 0.0),
-        Key("free_length", Quantity("m"), "Length without force; that at the start if missing."),
-    ))),
-    "rotational_springs": ("springs about joints", Table("A spring and damper about a joint.", (
-        JOINT,
-        Key("stiffness", Quantity("N m/rad"), "Stiffness.", 0.0),
-        Key("damping", Quantity("N m s/rad"), "Damping.", 0.0),
-        Key("free_angle", Quantity("rad"), "Angle without torque.", 0.0),
-    ))),
-    "bushings": ("bushings", Table("Six springs and dampers between two markers.", (
-        BETWEEN,
-        Key("stiffness", Quantity("N/m", ((3,),)), "Along x, y, z.", ...),
-        Key("turning_stiffness", Quantity("N m/rad", ((3,),)), "About them.", [0.0, 0.0, 0.0]),
-        Key("damping", Quantity("N s/m", ((3,),)), "Along them.", [0.0, 0.0, 0.0]),
-        Key("turning_damping", Quantity("N m s/rad", ((3,),)), "About them.", [0.0, 0.0, 0.0]),
-        Key("axes", Quantity("1", ((4,), (3, 3))), "Axes to world at the start; world if missing."),
-    ))),
+        Key("stiffness", Number("N/m", (3,)), "Along x, y, z.", ...),
+        Key("turning_stiffness", Number("N m/rad", (3,)), "About them.", [0.0, 0.0, 0.0]),
+        Key("damping", Number("N s/m", (3,)), "Along them.", [0.0, 0.0, 0.0]),
+        Key("turning_damping", Number("N m s/rad", (3,)), "About them.", [0.0, 0.0, 0.0]),
+        without="curves",
+    )),
 }  # fmt: skip
 BEHIND_FIELDS: dict[str, tuple[str, Kind]] = {
-    "forces": ("forces", Table("A force on a marker.", (
-        MARKER, Key("vector", Quantity("N", ((3,),)), "The force.", ...), FACTOR, FRAME,
-    ))),
-    "torques": ("torques", Table("A torque on a marker.", (
-        MARKER, Key("vector", Quantity("N m", ((3,),)), "The torque.", ...), FACTOR, FRAME,
-    ))),
-    "frictions": ("friction in joints", Table("Dry and viscous friction along a coordinate.", (
-        JOINT, WHICH,
-        Key("transition_speed", SPEED, "Over which it changes its sign.", ...),
-        Key("coulomb", LEVEL, "Level that is always there."),
-        Key("mu", Quantity(), "Coefficient of friction, times the force in the joint.", 0.0),
-        Key("radius", RADIUS, "Of the pin, for mu on an angle."),
-        Key("static", Quantity(), "Level at rest over that of fast motion.", 1.0),
-        Key("stribeck_speed", SPEED, "Over which this fades."),
-        Key("viscous", ByCoordinate(Quantity("N m s/rad"), Quantity("N s/m")), "Viscous part."),
-    ))),
-    "stops": ("stops of joints", Table("Compliant limits of a joint coordinate.", (
-        JOINT, WHICH, Key("lower", WAY, "Lower limit."), Key("upper", WAY, "Upper limit."), *IMPACT,
-    ))),
+    "forces": ("forces", Declared(
+        "force", MARKER, Key("vector", Number("N", (3,)), "The force.", ...), FACTOR,
+        about="A force on a marker.",
+    )),
+    "torques": ("torques", Declared(
+        "torque", MARKER, Key("vector", Number("N m", (3,)), "The torque.", ...), FACTOR,
+        about="A torque on a marker.",
+    )),
+    "frictions": ("friction in joints", Declared(
+        "friction",
+        JOINT,
+        transition_speed=SPEED,
+        coulomb=ByCoordinate(NotNegative("N m"), NotNegative("N")),
+        stribeck_speed=SPEED,
+        viscous=ByCoordinate(NotNegative("N m s/rad"), NotNegative("N s/m")),
+    )),
+    "stops": ("stops of joints", Declared(f"stop {IMPACT}", JOINT, lower=WAY, upper=WAY)),
     "contacts": ("contacts", Variants(CONTACTS)),
     "spread_loads": ("loads spread over bodies", Variants({
         kind: Table(table.about, (*table.keys, *SPREAD_KEYS))
@@ -379,18 +288,12 @@ BEHIND_FIELDS: dict[str, tuple[str, Kind]] = {
     })),
     "events": ("events", Variants(EVENTS, {"function": "python"})),
 }  # fmt: skip
-SIMULATION = Table("How it is moved.", (
-    Key("t_end", Quantity("s", positive=True), "End.", ...),
-    Key("dt", Quantity("s", positive=True), "Step, or interval of dop853; by rtol if missing."),
-    Key("method", Text(("generalized-alpha", "bdf", "dop853")), "Integrator.", "generalized-alpha"),
-    Key("rho_inf", Quantity(), "Spectral radius at infinite frequency, 0 to 1.", 0.9),
-    Key("tolerance", Quantity("1", positive=True), "Of the Newton iteration.", 1e-9),
-    Key("rtol", Quantity("1", positive=True), "Relative tolerance of variable steps."),
-    Key("save_every", Whole(1), "Keep every so many steps.", 1),
-    Key("order", Whole(1, 5), "Of bdf.", 2),
-    Key("stabilised", Flag(), "Keep constraints of the velocities, too.", False),
-    Key("assemble", Flag(), "Move the start to where joints and drives want it.", False),
-))  # fmt: skip
+SIMULATION = Declared(
+    "rom.mbs.integrate.simulation:simulate",
+    about="How it is moved.",
+    without="atol progress t_start state keep",
+    t_end=Positive("s"),
+)
 OUTPUT = Table("What `rom simulate` writes beside the table `motion.csv`.", (
     Key("history", Text(("csv", "h5")), "Form of the table of all motions, loads and energies.",
         "csv"),
@@ -398,7 +301,7 @@ OUTPUT = Table("What `rom simulate` writes beside the table `motion.csv`.", (
         "A film: pictures, pictures by ffmpeg, to turn around in browsers, ParaView."),
     Key("picture", Flag(), "A picture of four instants.", False),
     Key("plot", Words(), "Columns of the table to draw over time, without their unit.", ()),
-    Key("magnify", Quantity("1", positive=True), "Deformations are drawn so much larger.", 1.0),
+    Key("magnify", Positive("1"), "Deformations are drawn so much larger.", 1.0),
     Key("view", DIRECTION, "Direction to the eye."),
     Key("up", DIRECTION, "Upright direction."),
 ))  # fmt: skip

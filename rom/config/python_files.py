@@ -8,8 +8,9 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
+from rom.arguments import Quantity
 from rom.config.document import Document, KeyPath
-from rom.config.keys import FilePath, Key, Place, Quantity, Text, nearest
+from rom.config.keys import FilePath, Key, Place, Text, nearest
 from rom.errors import RomError, UnsafeFileError
 from rom.io.files import check_readable
 

@@ -85,7 +85,8 @@ class Outputs:
 
     def _joint(self, mechanism: Mechanism, name: str) -> None:
         joint = mechanism.joints[name]
-        for what, row, unit in (("angle", joint.turn, "rad"), ("way", joint.displacement, "m")):
+        ways: Any = (("angle", joint.turn, "rad"), ("way", joint.displacement, "m"))
+        for what, row, unit in ways:
             if row is None:
                 continue
             k = len(mechanism.frictions)

@@ -2,13 +2,25 @@
 
 from collections.abc import Callable, Iterator, MutableMapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Generic, TypeVar
+from typing import Annotated, Any, Generic, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
 from rom import rotation
-from rom.arguments import AnyBody, finite, matrix33, positive, start_pose, typed
+from rom.arguments import (
+    AnyBody,
+    Number,
+    Omega,
+    Orientation,
+    Point,
+    Positive,
+    Velocity,
+    finite,
+    matrix33,
+    start_pose,
+    typed,
+)
 from rom.errors import ConfigError
 from rom.fields import Methods, Open, families, find
 from rom.mbs.connections import drives as joint_drives
@@ -156,14 +168,14 @@ class Mechanism(Methods, metaclass=Open, kind="methods", bound=bound):
         self,
         name: str,
         *,
-        mass: float,
-        inertia: npt.ArrayLike,
-        at: npt.ArrayLike,
-        orientation: npt.ArrayLike | None = None,
-        markers: dict[str, npt.ArrayLike] | None = None,
-        velocity: npt.ArrayLike | None = None,
-        omega: npt.ArrayLike | None = None,
-        spin: npt.ArrayLike | None = None,
+        mass: Annotated[float, Positive("kg")],
+        inertia: Annotated[npt.ArrayLike, Number("kg m^2", (3,), (3, 3))],
+        at: Point,
+        orientation: Orientation | None = None,
+        markers: dict[str, Point] | None = None,
+        velocity: Velocity | None = None,
+        omega: Omega | None = None,
+        spin: Omega | None = None,
     ) -> Part:
         """Add a rigid body; its frame sits at the mass centre.
 
@@ -197,7 +209,7 @@ class Mechanism(Methods, metaclass=Open, kind="methods", bound=bound):
             check_text(key, "a marker"): finite(f"marker {key}", x, (3,))
             for key, x in (markers or {}).items()
         }
-        part = rigid_part(name, positive("mass", mass), matrix33("inertia", inertia), pose, points)
+        part = rigid_part(name, mass, matrix33("inertia", inertia), pose, points)
         return self._enter(part, spin)
 
     def add_flexible(  # noqa: PLR0913  one keyword per property of a body
@@ -205,13 +217,13 @@ class Mechanism(Methods, metaclass=Open, kind="methods", bound=bound):
         name: str,
         body: AnyBody,
         *,
-        at: npt.ArrayLike = (0.0, 0.0, 0.0),
-        orientation: npt.ArrayLike | None = None,
-        velocity: npt.ArrayLike | None = None,
-        omega: npt.ArrayLike | None = None,
-        q: npt.ArrayLike | None = None,
-        qd: npt.ArrayLike | None = None,
-        spin: npt.ArrayLike | None = None,
+        at: Point = (0.0, 0.0, 0.0),
+        orientation: Orientation | None = None,
+        velocity: Velocity | None = None,
+        omega: Omega | None = None,
+        q: Annotated[npt.ArrayLike, Number("1", (None,))] | None = None,
+        qd: Annotated[npt.ArrayLike, Number("1", (None,))] | None = None,
+        spin: Omega | None = None,
     ) -> Part:
         """Add a flexible body.
 

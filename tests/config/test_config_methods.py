@@ -1,6 +1,7 @@
 """Whatever a mechanism can do in Python, its file can say: an entry for every method that adds."""
 
 import inspect
+from functools import wraps
 
 import numpy as np
 import pytest
@@ -140,6 +141,7 @@ def test_an_entry_calls_the_method(method, soft, tmp_path, monkeypatch):
     (tmp_path / "m.toml").write_text(BASE + ENTRIES[method])
     calls, plain = [], getattr(Mechanism, method)
 
+    @wraps(plain)
     def noted(self, name, *arguments, **named):
         calls.append(name)
         return plain(self, name, *arguments, **named)

@@ -14,8 +14,9 @@ import pytest
 
 import rom
 from cases.solid import block, reduced
+from rom.arguments import Quantity
 from rom.cli.main import main
-from rom.config.keys import Named, Quantity
+from rom.config.keys import Named
 from rom.errors import ConfigError, FileFormatError, InterfaceError, RomError
 from rom.io.archive import Kind, read_archive, write_archive
 from rom.io.native import FIELDS, SCHEMA_NAME, VERSION, body_arrays, body_manifest

@@ -323,7 +323,7 @@ def test_what_hangs_on_an_interface_is_not_far_larger_than_the_model(inertia, at
 
 
 def test_a_negative_length_is_refused_with_its_spring():
-    with pytest.raises(ConfigError, match="free_length of 'soft' = -1 m"):
+    with pytest.raises(ConfigError, match="'soft': free_length = -1 must"):
         SPRINGS["spring"](pendulum(), stiffness=1.0, free_length=-1.0)
 
 

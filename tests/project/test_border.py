@@ -227,7 +227,7 @@ def test_every_function_refuses_what_its_annotations_rule_out():
             ruled += 1
             try:
                 function(*own, **{argument: WRONG[kind]})
-            except rom.ConfigError as error:
+            except RomError as error:
                 bad += [f"{name}: {argument}={kind}: {error}"] * (argument not in str(error))
             else:
                 bad.append(f"{name}: {argument}={kind} is taken")

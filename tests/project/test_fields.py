@@ -175,7 +175,8 @@ CAMS = {  # the package of a stranger
         """Say how stiff a cam is."""
         from dataclasses import replace
         from rom.cli.answer import Answer
-        from rom.config.keys import Key, Quantity, Table
+        from rom.arguments import Quantity
+        from rom.config.keys import Key, Table
         from rom.config.mechanism_keys import BETWEEN, Section
         from rom.mbs.elements.springs import SPRINGS_FAMILY, Spring
 

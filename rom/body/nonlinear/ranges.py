@@ -3,11 +3,11 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import combinations, product
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
-from rom.arguments import between, finite, typed, whole
+from rom.arguments import Between, Count, Modes, finite, typed, whole
 from rom.body.recovery import CENTRIFUGAL_LOADS, PRODUCTS, centrifugal
 from rom.eigen.supports import DIRECTIONS, Fixed, supports
 from rom.eigen.verbs import Operators, mean_motion
@@ -87,24 +87,19 @@ class Geometric:
     TAKEN_BY: ClassVar[str] = "rom.reduce, rom.reduce_pieces and rom.certify_pieces"
 
     loads: Mapping[str, Any]
-    n_modes: int = 4
-    tol: float = 1e-4
+    n_modes: Modes = 4
+    tol: Annotated[float, Between(0, 1, "()")] = 1e-4
     n_shapes: int | None = None
-    n_steps: int = 4
+    n_steps: Annotated[int, Count(1, MOST_STEPS)] = 4
     fixed: Fixed = ()
     spin: tuple[float, float, float] = (0.0, 0.0, 0.0)
     about: tuple[float, float, float] | None = None
-    sampling: float | None = None
+    sampling: Annotated[float, Between(0, 1, "()")] | None = None
     snapshots: bool = False
 
     def __post_init__(self) -> None:
-        whole("n_steps", self.n_steps, 1, MOST_STEPS)
-        whole("n_modes", self.n_modes)
         if self.n_shapes is not None:
             whole("n_shapes", self.n_shapes, 1, reason="without any the basis locks")
-        between("tol", self.tol, 0, 1, "()")
-        if self.sampling is not None:
-            between("sampling", self.sampling, 0, 1, "()")
         for name, load in self.loads.items():
             if not finite(f"the range of loads at {name!r}", load, (6,)).any():
                 raise ConfigError(f"the range of loads at {name!r} is {load!r}: it needs a force.")

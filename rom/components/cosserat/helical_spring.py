@@ -10,13 +10,13 @@ Source:
 """
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import numpy.typing as npt
 
 from rom import rotation
-from rom.arguments import positive, typed
+from rom.arguments import Positive, Size, typed
 from rom.components.cosserat import Rod, along, clamped, linearised, reference, straight
 from rom.errors import ModelError
 from rom.model import Array
@@ -40,19 +40,15 @@ class HelicalSpring:
         ModelError: if a size is not positive, or the coils touch already when it is free.
     """
 
-    wire: float
-    diameter: float
-    coils: float
-    length: float
-    E: float = 200e9
+    wire: Size
+    diameter: Size
+    coils: Annotated[float, Positive(error=ModelError)]
+    length: Size
+    E: Annotated[float, Positive("Pa", error=ModelError)] = 200e9
     nu: float = 0.3
     total_coils: float | None = None
 
     def __post_init__(self) -> None:
-        sizes = {"wire": self.wire, "diameter": self.diameter, "coils": self.coils,
-                 "length": self.length, "E": self.E}  # fmt: skip
-        for name, value in sizes.items():
-            positive(f"{name} of a spring", value, error=ModelError)
         if self.diameter <= self.wire:
             raise ModelError(
                 f"wire = {self.wire:g} m must be below diameter = {self.diameter:g} m."

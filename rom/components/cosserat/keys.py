@@ -2,10 +2,12 @@
 
 from typing import TYPE_CHECKING, Any
 
+from rom.arguments import Positive, Quantity, Whole
 from rom.config.component_keys import ISOTROPIC
 from rom.config.connections import check_name, pose_of
-from rom.config.keys import Key, Place, Quantity, Table, Variants, Whole
-from rom.config.mechanism_keys import POINT, POSE, Section
+from rom.config.declared import Declared
+from rom.config.keys import Key, Place, Table, Variants
+from rom.config.mechanism_keys import ORIENTATION, Section
 from rom.errors import RomError
 
 if TYPE_CHECKING:
@@ -13,7 +15,7 @@ if TYPE_CHECKING:
     from rom.config.connections import Entry
     from rom.model import Array
 
-LENGTH_KIND = Quantity("m", positive=True)
+LENGTH_KIND = Positive("m")
 SECTION_KINDS = {
     "circle": Table("A full circle.", (Key("diameter", LENGTH_KIND, "Diameter.", ...),)),
     "tube": Table("A circle with a bore.", (
@@ -27,7 +29,7 @@ SECTION_KINDS = {
     "numbers": Table("A section by its rigidities; it takes no material.", (
         Key("stretch", Quantity("N", ((3,),)), "GA1, GA2, EA.", ...),
         Key("bend", Quantity("N m^2", ((3,),)), "EI1, EI2, GJ.", ...),
-        Key("mass", Quantity("kg/m", positive=True), "Per length.", ...),
+        Key("mass", Positive("kg/m"), "Per length.", ...),
         Key("inertia", Quantity("kg m", ((3,),)), "Per length, about the axes.", ...),
     )),
 }  # fmt: skip
@@ -207,11 +209,12 @@ def add_rod(entry: "Entry") -> None:
     entry.made.add_nonlinear(entry.name, body(rod_of(entry.values, entry.place)), **pose)
 
 
-SECTION = Section("rods", Table(
-    "A geometrically exact rod. Markers are its ends, `rod.start` and `rod.end`, and its frames by "
-    "number, `rod.0`, `rod.1`, ...", (
-    *ROD_KEYS,
-    Key("at", POINT, "Origin of its frame at the start.", [0.0, 0.0, 0.0]),
-    *POSE,
-)), add_rod, bodies=True,
-    summary="Slender bodies of any deflection.")  # fmt: skip
+SECTION = Section(
+    "rods",
+    Declared(
+        "add_nonlinear", *ROD_KEYS, ORIENTATION,
+        about="A geometrically exact rod. Markers are its ends, `rod.start` and `rod.end`, and its "
+        "frames by number, `rod.0`, `rod.1`, ...",
+    ),
+    add_rod, bodies=True, summary="Slender bodies of any deflection.",
+)  # fmt: skip

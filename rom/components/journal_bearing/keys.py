@@ -2,49 +2,41 @@
 
 from typing import TYPE_CHECKING, Any
 
-from rom.config.keys import Flag, Key, Named, Quantity, Table, Text, Variants, Whole
-from rom.config.mechanism_keys import DIRECTION, Markers, Section
-from rom.config.mechanism_keys import RADIUS as LENGTH
+from rom.arguments import Positive, Quantity, Whole
+from rom.config.declared import Declared
+from rom.config.keys import Key, Named, Table, Variants
+from rom.config.mechanism_keys import Markers, Section
 
 if TYPE_CHECKING:
     from rom.components.journal_bearing.films.bearing import JournalBearing
     from rom.config.connections import Entry
 
+FILMS_MODULE = "rom.components.journal_bearing.films"
 OILS = {
     "constant": Table("A viscosity that stays.", (
-        Key("viscosity", Quantity("Pa s", positive=True), "Dynamic.", ...),
+        Key("viscosity", Positive("Pa s"), "Dynamic.", ...),
     )),
     "grade": Table("A usual mineral oil.", (
         Key("grade", Whole(1), "ISO VG 32, 46 or 68.", ...),
     )),
-    "oil": Table("Any mineral oil.", (
-        Key("nu_40", Quantity("m^2/s", positive=True), "Kinematic at 40 degrees Celsius.", ...),
-        Key("nu_100", Quantity("m^2/s", positive=True), "At 100 degrees Celsius.", ...),
-        Key("density", Quantity("kg/m^3", positive=True), "Density.", 870.0),
-        Key("heat", Quantity("J/(kg K)", positive=True), "Specific heat.", 2000.0),
-    )),
+    "oil": Declared(
+        f"{FILMS_MODULE}.oil:Oil",
+        about="Any mineral oil.",
+        nu_40=Positive("m^2/s"),
+        nu_100=Positive("m^2/s"),
+    ),
 }  # fmt: skip
-GROOVE = Table("An axial groove full of oil.", (
-    Key("angle", Quantity("rad"), "Of its middle.", ...),
-    Key("width", Quantity("rad"), "How far it extends around the bush.", 0.0),
-    Key("pressure", Quantity("Pa"), "Of its oil.", 0.0),
-    Key("share", Quantity("1", positive=True), "Of the width of the bearing.", 1.0),
-))  # fmt: skip
-JOURNAL_BEARING = Table("An oil film.", (
-    Key("diameter", LENGTH, "Of the journal.", ...),
-    Key("length", LENGTH, "Of the bush.", ...),
-    Key("clearance", LENGTH, "Radius of the bush less that of the journal.",
-        ...),
+GROOVE = Declared(f"{FILMS_MODULE}.bearing:Groove", share=Positive())
+JOURNAL_BEARING = Declared(
+    f"{FILMS_MODULE}.bearing:JournalBearing",
     Key("grooves", Named(GROOVE, "grooves"), "Inlets of oil.", {}),
-    Key("cavitation", Text(("none", "reynolds", "jfo")), "What happens where oil would have to "
-        "pull: it does, it ends, it is conserved.", "reynolds"),
-    Key("preload", Quantity(), "Of a lobed bore, in clearances.", 0.0),
     Key("lobes", Whole(2), "Number of arcs of such a bore.", 2),
     Key("first_lobe", Quantity("rad"), "Middle of one of them.", 0.0),
     Key("cells_around", Whole(12), "Of the film.", 120),
     Key("cells_along", Whole(2), "Of its width, or of half of it.", 8),
-    Key("aligned", Flag(), "The journal never tilts: cells on half the width.", False),
-))  # fmt: skip
+    about="An oil film.",
+    without="cells",
+)
 
 
 def journal_bearing(values: dict[str, Any]) -> "JournalBearing":
@@ -76,23 +68,14 @@ def add_film(entry: "Entry") -> None:
 
 
 SECTION = Section(
-    "journal bearings", Table("An oil film between journal and bush.", (
+    "journal bearings",
+    Declared(
+        "journal_bearing",
         Key("between", Markers(two=True), "On the axis of the journal, and in the middle of the "
             "bush.", ...),
-        Key("axis", DIRECTION, "Of both, in the world at the start.", ...),
-        Key("reference", DIRECTION, "From where angles count, across the axis; X if missing."),
         Key("bearing", JOURNAL_BEARING, "Its sizes.", ...),
         Key("oil", Variants(OILS, {"viscosity": "constant", "grade": "grade", "nu_40": "oil"}),
             "In it.", ...),
-        Key("inlet", Quantity(), "Temperature of the oil that comes in [degrees Celsius]."),
-        Key("roughness", Quantity("m"), "Height at which journal and bush touch.", 0.0),
-        Key("carried", Quantity(), "Share of the heat that leaves with the oil.", 0.9),
-        Key("felt", Quantity(), "Share of the rise that the film feels.", 0.5),
-        Key("thermal_time", Quantity("s", positive=True), "Over which its temperature follows.",
-            1.0),
-        Key("elastic_bush", Flag(), "Whether its pressure bends the bore, which has functions.",
-            False),
-        Key("tabulated", Flag(), "Whether it is read from a table.", False),
-    )),
+    ),
     add_film,
 )  # fmt: skip

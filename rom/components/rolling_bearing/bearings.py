@@ -17,12 +17,11 @@ included, so that momentum and energy are kept.
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
-import numpy.typing as npt
 
-from rom.arguments import not_negative, number, unit_vector
+from rom.arguments import Angle, Direction, NotNegative, unit_vector
 from rom.components.rolling_bearing.races import BallBearing, RollerBearing
 from rom.errors import ConfigError
 from rom.mbs.elements.family import Family, Places, integers, rows_of
@@ -216,10 +215,10 @@ def rolling_bearing(  # noqa: PLR0913  one keyword per property
     inner: Marker,
     outer: Marker,
     *,
-    axis: npt.ArrayLike,
+    axis: Direction,
     bearing: BallBearing | RollerBearing,
-    damping: float = 0.0,
-    phase: float = 0.0,
+    damping: Annotated[float, NotNegative("s/m")] = 0.0,
+    phase: Angle = 0.0,
 ) -> None:
     """Balls or rollers between an inner and an outer ring, by Hertz, with play or preload.
 
@@ -242,7 +241,6 @@ def rolling_bearing(  # noqa: PLR0913  one keyword per property
     """
     self.check_apart(name, inner, outer)
     z = unit_vector(f"axis of {name}", axis)
-    not_negative(f"damping of bearing {name!r}", damping)
     apart = float(np.linalg.norm(self.design_point(inner) - self.design_point(outer)))
     if apart > PLACE_RTOL * bearing.pitch_diameter:
         raise ConfigError(
@@ -257,7 +255,7 @@ def rolling_bearing(  # noqa: PLR0913  one keyword per property
     spins = [part.spin_about(name, axes[2 * k]) for k, part in enumerate(parts)]
     spin = spins[1] + b.cage * (spins[0] - spins[1])
     race = (b.stiffness, b.exponent, b.curvature_distance, *b.offset, b.radius, b.cage,
-            float(damping), number("phase", phase), spin)  # fmt: skip
+            damping, phase, spin)  # fmt: skip
     self.add(name, RollingBearing(inner, outer, bearing, axes, race), ROLLING_BEARINGS_FAMILY)
 
 

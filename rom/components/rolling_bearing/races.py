@@ -7,15 +7,17 @@ Source:
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Annotated
 
 import numpy as np
 from scipy.optimize import brentq
 from scipy.special import ellipe, ellipk
 
-from rom.arguments import between, positive, typed
+from rom.arguments import Angle, Between, Count, Number, Positive, Size, between, typed
 from rom.errors import ModelError
 from rom.model import Array
 
+Balls = Annotated[int, Count(3, error=ModelError)]
 PALMGREN_STIFFNESS = 8.06e4 * 1e3 ** (10 / 9 + 8 / 9)  # [N/m^2], of steel rollers between two races
 
 
@@ -37,14 +39,14 @@ class BallBearing:
         ModelError: for numbers that no bearing has.
     """
 
-    balls: int
-    ball_diameter: float
-    pitch_diameter: float
+    balls: Balls
+    ball_diameter: Size
+    pitch_diameter: Size
     conformity: tuple[float, float] = (0.52, 0.52)
-    contact_angle: float = 0.0
-    clearance: float = 0.0
-    E: float = 206e9
-    nu: float = 0.3
+    contact_angle: Angle = 0.0
+    clearance: Annotated[float, Number("m")] = 0.0
+    E: Annotated[float, Positive("Pa", error=ModelError)] = 206e9
+    nu: Annotated[float, Between(-1, 0.5, "(]", error=ModelError)] = 0.3
 
     def __post_init__(self) -> None:
         _check_row(self.balls, self.ball_diameter, self.pitch_diameter, self.clearance)
@@ -58,8 +60,6 @@ class BallBearing:
                 f"contact angle {self.contact_angle:g} rad is not below 80 degrees.",
                 hint="Angles are in radians; a thrust bearing is not one of these.",
             )
-        positive("E", self.E, error=ModelError)
-        between("nu", self.nu, -1, 0.5, "(]", error=ModelError)
 
     @property
     def count(self) -> int:
@@ -126,15 +126,14 @@ class RollerBearing:
         ModelError: for numbers that no bearing has.
     """
 
-    rollers: int
-    roller_diameter: float
-    length: float
-    pitch_diameter: float
-    clearance: float = 0.0
+    rollers: Balls
+    roller_diameter: Size
+    length: Size
+    pitch_diameter: Size
+    clearance: Annotated[float, Number("m")] = 0.0
 
     def __post_init__(self) -> None:
         _check_row(self.rollers, self.roller_diameter, self.pitch_diameter, self.clearance)
-        positive("length", self.length, error=ModelError)
 
     @property
     def count(self) -> int:
@@ -199,10 +198,9 @@ def _difference(m: float, wanted: float) -> float:
 
 def _check_row(number: int, diameter: float, pitch: float, clearance: float) -> None:
     """Refuse balls or rollers that do not fit on their circle."""
-    if number < 3 or not (diameter > 0 and pitch > diameter):
+    if not pitch > diameter:
         raise ModelError(
-            f"no bearing has {number} balls or rollers of {diameter:g} m on one of {pitch:g} m; "
-            "needed are at least 3, smaller than their circle."
+            f"no bearing has {number} balls or rollers of {diameter:g} m on one of {pitch:g} m."
         )
     if diameter > pitch * np.sin(np.pi / number):
         raise ModelError(

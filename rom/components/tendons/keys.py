@@ -3,20 +3,19 @@
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from rom.config.keys import Key, Named, Quantity, Table, Whole, nearest
+from rom.config.declared import Declared
+from rom.config.keys import Key, Named, nearest
 from rom.config.laws import law_kind
-from rom.config.mechanism_keys import DIRECTION, RADIUS, Markers, Section
+from rom.config.mechanism_keys import Markers, Section
 
 if TYPE_CHECKING:
     from rom.config.connections import Entry
 
-PULLEY = Table("A pulley in place of an eyelet.", (
-    Key("radius", RADIUS, "Of the cable.", ...),
-    Key("axis", DIRECTION, "In the world at the start; the cable goes around it in the positive "
-        "sense.", ...),
-    Key("friction", Quantity(), "Coefficient between cable and pulley.", 0.0),
-    Key("turns", Whole(0), "Whole turns beyond the wrap of less than one.", 0),
-))  # fmt: skip
+PULLEY = Declared(
+    "rom.components.tendons.tendons:Pulley",
+    about="A pulley in place of an eyelet.",
+    without="marker",
+)
 
 
 def tendon(entry: "Entry") -> None:
@@ -40,18 +39,13 @@ def tendon(entry: "Entry") -> None:
 
 
 SECTION = Section(
-    "cables", Table("A cable through eyelets and over pulleys, which goes slack.", (
+    "cables",
+    Declared(
+        "tendon",
         Key("path", Markers(), "Markers in the order in which it passes them.", ...),
         Key("pulleys", Named(PULLEY, "pulleys"), "Which of these markers are pulleys.", {}),
-        Key("EA", Quantity("N", positive=True), "Force per strain; none if it is pulled."),
-        Key("damping", Quantity("N s"), "Tension per rate of strain.", 0.0),
-        Key("free_length", law_kind("m"), "Length without force, over time for a winch; that at "
-            "the start if missing."),
-        Key("pretension", Quantity("N"), "Tension at the start, in its place.", 0.0),
-        Key("tension", law_kind("N"), "Force that pulls at its first end, in place of EA."),
-        Key("friction", Quantity(), "Coefficient at all eyelets.", 0.0),
-        Key("transition_speed", Quantity("m/s", positive=True),
-            "Of the sliding cable, over which friction turns."),
-    )),
+        free_length=law_kind("m"),
+        tension=law_kind("N"),
+    ),
     tendon,
-)  # fmt: skip
+)

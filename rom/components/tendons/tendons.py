@@ -4,11 +4,21 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
-from rom.arguments import not_negative, positive, typed, unit_vector, whole
+from rom.arguments import (
+    Count,
+    Direction,
+    Length,
+    NotNegative,
+    Positive,
+    not_negative,
+    positive,
+    typed,
+    unit_vector,
+)
 from rom.components.tendons.paths import Place, path_through
 from rom.components.tendons.routing import (
     bearing_angle,
@@ -48,6 +58,7 @@ from rom.model import Array, Index
 from rom.rotation import matrix
 
 MAX_TURNS = 1000  # of a cable about a pulley
+Coefficient = Annotated[float, NotNegative()]  # of friction
 
 
 @typed
@@ -66,10 +77,10 @@ class Pulley:
     """
 
     marker: Marker
-    radius: float
-    axis: Any
-    friction: float = 0.0
-    turns: int = 0
+    radius: Length
+    axis: Direction
+    friction: Coefficient = 0.0
+    turns: Annotated[int, Count(0, MAX_TURNS)] = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,13 +109,13 @@ def tendon(  # noqa: PLR0913  one keyword per property
     name: str,
     path: Sequence[Marker | Pulley],
     *,
-    EA: float | None = None,
-    damping: float = 0.0,
+    EA: Annotated[float, Positive("N")] | None = None,
+    damping: Annotated[float, NotNegative("N s")] = 0.0,
     free_length: Any = None,
-    pretension: float = 0.0,
+    pretension: Annotated[float, NotNegative("N")] = 0.0,
     tension: Any = None,
-    friction: float = 0.0,
-    transition_speed: float | None = None,
+    friction: Coefficient = 0.0,
+    transition_speed: Annotated[float, Positive("m/s")] | None = None,
 ) -> None:
     """Cable that pulls along a path through eyelets and over pulleys, and goes slack.
 
@@ -136,40 +147,33 @@ def tendon(  # noqa: PLR0913  one keyword per property
             f"tendon {name!r} has friction, but no transition_speed.",
             hint="Take a hundredth of the speed with which it slides.",
         )
-    speed = 1.0 if transition_speed is None else positive("transition_speed", transition_speed)
+    speed = transition_speed or 1.0
     if (EA is None) == (tension is None):
         raise ConfigError(f"tendon {name!r} needs either EA or tension.")
     if EA is None:
         _refuse_stretch(name, damping, free_length, pretension)
-        function, given = _given(name, "tension", tension)
+        function, given = _given(name, tension)
         numbers = (0.0, 0.0, given, speed)
     else:
-        stiffness, loss = positive("EA", EA), _not_negative(name, "damping", damping)
-        slack = length / (1.0 + _not_negative(name, "pretension", pretension) / stiffness)
+        slack = length / (1.0 + pretension / EA)
         if pretension and free_length is not None:
             raise ConfigError(f"tendon {name!r} has pretension and free_length; give only one.")
         function, given = _free(slack, free_length)
-        numbers = (stiffness, loss, given, speed)
+        numbers = (EA, damping, given, speed)
     self.add(name, Tendon(stations, numbers, EA is None, function), TENDONS_FAMILY)
 
 
 def _station(mechanism: Whole, name: str, place: Any, friction: float) -> Station:
     """A place of the path in the axes of its marker."""
-    mu = _not_negative(name, "friction", getattr(place, "friction", friction))
     if isinstance(place, Marker):
         mechanism.check_markers(name, place)
-        return Station(place, np.eye(3)[:2], 0.0, mu, 0)
+        return Station(place, np.eye(3)[:2], 0.0, friction, 0)
     mechanism.check_markers(name, place.marker)
-    whole(f"turns of a pulley of {name!r}", place.turns, 0, MAX_TURNS)
     n = unit_vector(f"axis of a pulley of {name}", place.axis)
     e = np.cross(n, np.eye(3)[np.argmin(np.abs(n))])
     e /= np.linalg.norm(e)
     axes = np.array([n, e]) @ matrix(mechanism.part(place.marker.body).p)
-    return Station(place.marker, axes, positive("radius", place.radius), mu, place.turns)
-
-
-def _not_negative(name: str, what: str, value: Any) -> float:
-    return not_negative(f"{what} of tendon {name!r}", value)
+    return Station(place.marker, axes, place.radius, place.friction, place.turns)
 
 
 def _refuse_stretch(name: str, damping: Any, free_length: Any, pretension: Any) -> None:
@@ -180,9 +184,11 @@ def _refuse_stretch(name: str, damping: Any, free_length: Any, pretension: Any) 
         )
 
 
-def _given(name: str, what: str, value: Any) -> tuple[Callable[[float], Any] | None, float]:
+def _given(name: str, tension: Any) -> tuple[Callable[[float], Any] | None, float]:
     """A function of time, or a number that is not negative."""
-    return (value, 0.0) if callable(value) else (None, _not_negative(name, what, value))
+    if callable(tension):
+        return tension, 0.0
+    return None, not_negative(f"tension of tendon {name!r}", tension)
 
 
 def _free(slack: float, free: Any) -> tuple[Callable[[float], Any] | None, float]:

@@ -3,7 +3,7 @@
 from rom.errors import ConfigError
 from rom.mbs.connections.ends import not_zero
 from rom.mbs.kernels.system import COUPLING
-from rom.mbs.parts.joints import NO_VECTOR, Joint, Row, coordinate_of
+from rom.mbs.parts.joints import NO_VECTOR, Coordinate, Joint, Row, coordinate_of
 from rom.mbs.parts.whole import Whole
 
 
@@ -14,8 +14,8 @@ def gear(
     joint2: str,
     *,
     ratio: float,
-    coordinate1: str | None = None,
-    coordinate2: str | None = None,
+    coordinate1: Coordinate | None = None,
+    coordinate2: Coordinate | None = None,
 ) -> None:
     """Couple two joints: coordinate of the second = ``ratio`` times that of the first.
 
@@ -29,7 +29,7 @@ def gear(
             ``joint2``.
         joint1: driving joint.
         joint2: driven joint.
-        ratio: d(coordinate 2) / d(coordinate 1) [1, m/rad or rad/m].
+        ratio: of the changes of coordinate 2 and coordinate 1 [1, m/rad or rad/m].
         coordinate1: "angle" or "displacement"; None for the only or the first one.
         coordinate2: likewise of ``joint2``.
 

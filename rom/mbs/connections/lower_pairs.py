@@ -1,8 +1,10 @@
 """Joints whose bodies share a surface: Reuleaux's lower pairs, and the weld."""
 
-import numpy as np
-import numpy.typing as npt
+from typing import Annotated
 
+import numpy as np
+
+from rom.arguments import Direction, Number
 from rom.mbs.connections.ends import Ends, ends_of, enter, not_zero
 from rom.mbs.kernels.system import COUPLING
 from rom.mbs.parts.bodies import Marker
@@ -13,7 +15,7 @@ from rom.model import Array
 FULL_TURN = 2 * np.pi
 
 
-def revolute(self: Whole, name: str, m1: Marker, m2: Marker, *, axis: npt.ArrayLike) -> None:
+def revolute(self: Whole, name: str, m1: Marker, m2: Marker, *, axis: Direction) -> None:
     """Hinge about an axis; five constraints.
 
     Args:
@@ -40,7 +42,7 @@ def revolute(self: Whole, name: str, m1: Marker, m2: Marker, *, axis: npt.ArrayL
     enter(self, Joint(name, "revolute", ends.markers, rows, angle, angle))
 
 
-def cylindrical(self: Whole, name: str, m1: Marker, m2: Marker, *, axis: npt.ArrayLike) -> None:
+def cylindrical(self: Whole, name: str, m1: Marker, m2: Marker, *, axis: Direction) -> None:
     """Rotation about and sliding along an axis; four constraints.
 
     Args:
@@ -66,7 +68,13 @@ def _coaxial(ends: Ends, axis: Array) -> tuple[tuple[Row, ...], Row, Row]:
 
 
 def screw(
-    self: Whole, name: str, m1: Marker, m2: Marker, *, axis: npt.ArrayLike, pitch: float
+    self: Whole,
+    name: str,
+    m1: Marker,
+    m2: Marker,
+    *,
+    axis: Direction,
+    pitch: Annotated[float, Number("m")],
 ) -> None:
     """Cylindrical joint that advances as it turns; five constraints.
 
@@ -93,7 +101,7 @@ def screw(
     enter(self, Joint(name, "screw", ends.markers, rows, angle, angle, displacement))
 
 
-def prismatic(self: Whole, name: str, m1: Marker, m2: Marker, *, axis: npt.ArrayLike) -> None:
+def prismatic(self: Whole, name: str, m1: Marker, m2: Marker, *, axis: Direction) -> None:
     """Sliding along an axis; five constraints.
 
     Args:
@@ -123,7 +131,7 @@ def spherical(self: Whole, name: str, m1: Marker, m2: Marker) -> None:
     enter(self, Joint(name, "spherical", ends_of(self, name, m1, m2).markers, coincidence()))
 
 
-def planar(self: Whole, name: str, m1: Marker, m2: Marker, *, normal: npt.ArrayLike) -> None:
+def planar(self: Whole, name: str, m1: Marker, m2: Marker, *, normal: Direction) -> None:
     """Sliding in a plane through m1, turning about its normal; three constraints.
 
     Args:

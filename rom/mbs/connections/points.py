@@ -1,9 +1,8 @@
 """Joints that hold one point only: on a line, in a plane, at a distance."""
 
 import numpy as np
-import numpy.typing as npt
 
-from rom.arguments import positive
+from rom.arguments import Direction, Length
 from rom.errors import ConfigError
 from rom.mbs.connections.ends import ends_of, enter
 from rom.mbs.kernels.system import DISTANCE
@@ -12,7 +11,7 @@ from rom.mbs.parts.joints import NO_VECTOR, Joint, Row
 from rom.mbs.parts.whole import Whole
 
 
-def point_on_line(self: Whole, name: str, m1: Marker, m2: Marker, *, axis: npt.ArrayLike) -> None:
+def point_on_line(self: Whole, name: str, m1: Marker, m2: Marker, *, axis: Direction) -> None:
     """The point m2 slides on a line through m1; two constraints.
 
     Args:
@@ -34,9 +33,7 @@ def point_on_line(self: Whole, name: str, m1: Marker, m2: Marker, *, axis: npt.A
     enter(self, Joint(name, "point on line", ends.markers, rows, displacement, None, displacement))
 
 
-def point_on_plane(
-    self: Whole, name: str, m1: Marker, m2: Marker, *, normal: npt.ArrayLike
-) -> None:
+def point_on_plane(self: Whole, name: str, m1: Marker, m2: Marker, *, normal: Direction) -> None:
     """The point m2 slides in a plane through m1; one constraint.
 
     Args:
@@ -55,7 +52,7 @@ def point_on_plane(
 
 
 def distance(
-    self: Whole, name: str, m1: Marker, m2: Marker, *, length: float | None = None
+    self: Whole, name: str, m1: Marker, m2: Marker, *, length: Length | None = None
 ) -> None:
     """Massless rod between two points; one constraint.
 
@@ -63,12 +60,11 @@ def distance(
         name: name of the joint.
         m1: one end.
         m2: other end.
-        length: [m]; None for the distance at the start.
+        length: of the rod [m]; None for the distance at the start.
 
     Raises:
         ConfigError: if the points coincide.
     """
-    long = None if length is None else positive("length", length)
     ends = ends_of(self, name, m1, m2)
     apart = float(np.linalg.norm(ends.gap))
     if apart == 0.0:
@@ -76,5 +72,5 @@ def distance(
             f"the points of joint {name!r} coincide: a rod of length zero has no direction.",
             hint="Use a spherical joint.",
         )
-    row = Row(DISTANCE, NO_VECTOR, NO_VECTOR, NO_VECTOR, apart if long is None else long)
+    row = Row(DISTANCE, NO_VECTOR, NO_VECTOR, NO_VECTOR, apart if length is None else length)
     enter(self, Joint(name, "distance", ends.markers, (row,)))

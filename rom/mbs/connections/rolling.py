@@ -1,8 +1,6 @@
 """Balls and wheels that roll on planes."""
 
-import numpy.typing as npt
-
-from rom.arguments import positive
+from rom.arguments import Direction, Length
 from rom.errors import ConfigError
 from rom.mbs.connections.ends import ends_of, enter
 from rom.mbs.kernels.system import ROLL, TOUCH
@@ -19,9 +17,9 @@ def rolling(
     m1: Marker,
     m2: Marker,
     *,
-    normal: npt.ArrayLike,
-    radius: float,
-    axis: npt.ArrayLike | None = None,
+    normal: Direction,
+    radius: Length,
+    axis: Direction | None = None,
 ) -> None:
     """A ball or thin wheel touches a plane and rolls on it without slip.
 
@@ -40,7 +38,6 @@ def rolling(
         ConfigError: if the wheel lies flat on the plane.
         ModelError: if a body has free-free modes only, which carry no moment to an interface.
     """
-    radius = positive("radius", radius)
     ends = ends_of(self, name, m1, m2)
     for marker in ends.markers:
         self.part(marker.body).refuse_spin(f"rolling joint {name!r}", "it would not roll")

@@ -1,7 +1,6 @@
 """Universal joints: a cross between two shafts."""
 
-import numpy.typing as npt
-
+from rom.arguments import Direction
 from rom.errors import ConfigError
 from rom.mbs.connections.ends import ends_of, enter
 from rom.mbs.kernels.system import NORMAL
@@ -18,8 +17,8 @@ def universal(
     m1: Marker,
     m2: Marker,
     *,
-    axis1: npt.ArrayLike,
-    axis2: npt.ArrayLike,
+    axis1: Direction,
+    axis2: Direction,
 ) -> None:
     """Cardan joint: one axis on m1 stays perpendicular to another on m2; four constraints.
 

@@ -8,14 +8,14 @@ has a potential whatever the rotation.
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import numpy.typing as npt
 from scipy.interpolate import PchipInterpolator
 
 from rom import rotation
-from rom.arguments import finite, one_of, unit_quaternion
+from rom.arguments import Number, Orientation, finite, one_of, unit_quaternion
 from rom.errors import ConfigError
 from rom.mbs.elements.family import Family, Hooks, Places, integers, rows_of
 from rom.mbs.kernels.algebra import (
@@ -65,9 +65,9 @@ def bushing(  # noqa: PLR0913  one keyword per property
     m1: Marker,
     m2: Marker,
     *,
-    stiffness: npt.ArrayLike,
-    damping: npt.ArrayLike | None = None,
-    axes: npt.ArrayLike | None = None,
+    stiffness: Annotated[npt.ArrayLike, Number("1", (6,), (6, 6))],
+    damping: Annotated[npt.ArrayLike, Number("1", (6,), (6, 6))] | None = None,
+    axes: Orientation | None = None,
     curves: Curves | None = None,
 ) -> None:
     """Elastic and damped connection in six directions, without force at the start.

@@ -1,12 +1,13 @@
 """Dry and viscous friction along joint coordinates."""
 
 from dataclasses import dataclass
+from typing import Annotated
 
-from rom.arguments import not_negative, number, positive
+from rom.arguments import AtLeast, Length, NotNegative, Positive
 from rom.errors import ConfigError
 from rom.mbs.elements.family import Hooks
 from rom.mbs.elements.joint_forces import FRICTION, Frictions, joint_family, load_columns
-from rom.mbs.parts.joints import Row, coordinate_of
+from rom.mbs.parts.joints import Coordinate, Row, coordinate_of
 from rom.mbs.parts.whole import Whole
 
 
@@ -29,14 +30,14 @@ def friction(  # noqa: PLR0913  one keyword per property
     name: str,
     joint: str,
     *,
-    transition_speed: float,
-    coulomb: float = 0.0,
-    mu: float = 0.0,
-    radius: float | None = None,
-    static: float = 1.0,
-    stribeck_speed: float | None = None,
-    viscous: float = 0.0,
-    coordinate: str | None = None,
+    transition_speed: Annotated[float, Positive()],
+    coulomb: Annotated[float, NotNegative()] = 0.0,
+    mu: Annotated[float, NotNegative()] = 0.0,
+    radius: Length | None = None,
+    static: Annotated[float, AtLeast(1.0)] = 1.0,
+    stribeck_speed: Annotated[float, Positive()] | None = None,
+    viscous: Annotated[float, NotNegative()] = 0.0,
+    coordinate: Coordinate | None = None,
 ) -> None:
     """Friction along a joint coordinate x: - level s(x') - viscous x'.
 
@@ -55,30 +56,23 @@ def friction(  # noqa: PLR0913  one keyword per property
             displacement.
         static: level at rest over that of fast motion, at least 1 [1].
         stribeck_speed: speed over which this fades [m/s or rad/s].
-        viscous: [N s/m or N m s/rad].
+        viscous: force per speed [N s/m or N m s/rad].
         coordinate: "angle" or "displacement"; None for the only or the first one.
 
     Raises:
         ConfigError: for a joint without such a coordinate, or numbers no friction has.
     """
     row = coordinate_of(self.joints, joint, coordinate, "friction")
-    for what, value in (("coulomb", coulomb), ("mu", mu), ("viscous", viscous)):
-        not_negative(f"{what} of friction {name!r}", value)
     turns = row is self.joints[joint].turn
     if mu and turns and radius is None:
         raise ConfigError(f"friction {name!r} with mu on an angle needs the radius of the pin.")
     if radius is not None and not turns:
         raise ConfigError(f"friction {name!r} acts along a displacement; leave radius out.")
-    if number("static", static) < 1.0 or (static > 1.0 and stribeck_speed is None):
-        raise ConfigError(
-            f"static = {static:g} of friction {name!r} must be at least 1, and above 1 it "
-            "needs stribeck_speed."
-        )
-    arm = positive("radius", radius) if radius is not None else 1.0
-    fade = positive("stribeck_speed", stribeck_speed) if stribeck_speed is not None else 1.0
-    speed = positive("transition_speed", transition_speed)
-    numbers = (coulomb, mu * arm, static - 1.0, fade, viscous, speed)
-    self.add(name, Friction(joint, row, tuple(float(x) for x in numbers)), FRICTIONS_FAMILY)
+    if static > 1.0 and stribeck_speed is None:
+        raise ConfigError(f"static = {static:g} of friction {name!r} needs stribeck_speed.")
+    level, fade = mu * (1.0 if radius is None else radius), stribeck_speed or 1.0
+    numbers = (coulomb, level, static - 1.0, fade, viscous, transition_speed)
+    self.add(name, Friction(joint, row, numbers), FRICTIONS_FAMILY)
 
 
 FRICTIONS_FAMILY = joint_family(

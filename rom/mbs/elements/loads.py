@@ -2,11 +2,11 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
-from rom.arguments import finite, one_of
+from rom.arguments import finite
 from rom.mbs.elements.family import Family, Places, apart, from_outside, integers, never, rows_of
 from rom.mbs.kernels.algebra import add, cross, dot, place, put, row, scale, turn, unit
 from rom.mbs.kernels.compiled import inner
@@ -17,6 +17,7 @@ from rom.mbs.parts.bodies import Marker
 from rom.mbs.parts.whole import Whole
 from rom.model import Array
 
+Axes = Literal["world", "body"]
 # kinds of loads
 FORCE_WORLD, FORCE_BODY, TORQUE_WORLD, TORQUE_BODY = 0, 1, 2, 3
 
@@ -31,7 +32,7 @@ class Load:
     function: Callable[[float], Any] | None
 
 
-def force(self: Whole, name: str, marker: Marker, vector: Any, *, frame: str = "world") -> None:
+def force(self: Whole, name: str, marker: Marker, vector: Any, *, frame: Axes = "world") -> None:
     """Force at a marker: (3,) [N], or a function of time; axes of the world or the marker.
 
     Raises:
@@ -40,7 +41,7 @@ def force(self: Whole, name: str, marker: Marker, vector: Any, *, frame: str = "
     _load(self, name, marker, vector, frame, FORCE_WORLD)
 
 
-def torque(self: Whole, name: str, marker: Marker, vector: Any, *, frame: str = "world") -> None:
+def torque(self: Whole, name: str, marker: Marker, vector: Any, *, frame: Axes = "world") -> None:
     """Torque at a marker: (3,) [N m], or a function of time; axes of world or marker.
 
     Raises:
@@ -50,7 +51,6 @@ def torque(self: Whole, name: str, marker: Marker, vector: Any, *, frame: str = 
 
 
 def _load(self: Whole, name: str, marker: Marker, vector: Any, frame: str, kind: int) -> None:
-    one_of(f"frame of {name!r}", frame, ("world", "body"))
     function = vector if callable(vector) else None
     constant = np.zeros(3) if function else finite(f"vector of {name}", vector, (3,))
     self.add(name, Load(marker, kind + (frame == "body"), constant, function), LOADS_FAMILY)

@@ -12,7 +12,7 @@ from rom.mbs.elements.formulas.programs import Formula
 from rom.mbs.elements.joint_forces import MOTOR, NO_PROGRAM, Motors, joint_family
 from rom.mbs.elements.law_calls import DIFFERENCE_STEP
 from rom.mbs.parts.foreign import ask, compiled_function, numbers
-from rom.mbs.parts.joints import Row, coordinate_of
+from rom.mbs.parts.joints import Coordinate, Row, coordinate_of
 from rom.mbs.parts.whole import Whole
 from rom.model import Array
 
@@ -50,7 +50,7 @@ def motor(
     joint: str,
     law: Callable[[float, float, float], float],
     *,
-    coordinate: str | None = None,
+    coordinate: Coordinate | None = None,
     compiled: bool | None = None,
 ) -> None:
     """Motor with a control law: force [N] or torque [N m] = ``law(t, coordinate, rate)``.

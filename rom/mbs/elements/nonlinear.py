@@ -25,12 +25,20 @@ from itertools import pairwise
 from typing import Any, Protocol
 
 import numpy as np
-import numpy.typing as npt
 from numba import types
 from numba.extending import intrinsic
 
 from rom import rotation
-from rom.arguments import finite, start_pose, typed, whole
+from rom.arguments import (
+    Omega,
+    Orientation,
+    Point,
+    Velocity,
+    finite,
+    start_pose,
+    typed,
+    whole,
+)
 from rom.errors import ConfigError, ModelError
 from rom.mbs.compiler.calls import called
 from rom.mbs.elements.family import Family, Hooks, Places, integers, on_joint
@@ -174,10 +182,10 @@ def add_nonlinear(
     name: str,
     body: NonlinearBody,
     *,
-    at: npt.ArrayLike = (0.0, 0.0, 0.0),
-    orientation: npt.ArrayLike | None = None,
-    velocity: npt.ArrayLike | None = None,
-    omega: npt.ArrayLike | None = None,
+    at: Point = (0.0, 0.0, 0.0),
+    orientation: Orientation | None = None,
+    velocity: Velocity | None = None,
+    omega: Omega | None = None,
 ) -> Assembly:
     """Add a non-linear flexible body, e.g. a rod; see `rom.components.cosserat.body`.
 

@@ -1,10 +1,11 @@
 """Rotational springs and dampers about the axes of joints."""
 
 from dataclasses import dataclass
+from typing import Annotated
 
-from rom.arguments import number
+from rom.arguments import Angle, Number
 from rom.mbs.elements.joint_forces import LINEAR, joint_energy, joint_family
-from rom.mbs.elements.springs import stiffness_and_damping
+from rom.mbs.elements.springs import doubt
 from rom.mbs.parts.joints import coordinate_of
 from rom.mbs.parts.whole import Whole
 
@@ -29,9 +30,9 @@ def rotational_spring(
     name: str,
     joint: str,
     *,
-    stiffness: float,
-    damping: float = 0.0,
-    free_angle: float = 0.0,
+    stiffness: Annotated[float, Number("N m/rad")],
+    damping: Annotated[float, Number("N m s/rad")] = 0.0,
+    free_angle: Angle = 0.0,
 ) -> None:
     """Spring and damper about the axis of a joint that turns.
 
@@ -46,8 +47,8 @@ def rotational_spring(
         ConfigError: for a name in use, or a joint that is unknown or does not turn.
     """
     coordinate_of(self.joints, joint, "angle", f"rotational spring {name!r}")
-    k, c = stiffness_and_damping(name, stiffness, damping)
-    self.add(name, Turn(joint, k, c, number("free_angle", free_angle)), TURNS_FAMILY)
+    doubt(name, stiffness, damping)
+    self.add(name, Turn(joint, stiffness, damping, free_angle), TURNS_FAMILY)
 
 
 TURNS_FAMILY = joint_family(

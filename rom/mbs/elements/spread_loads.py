@@ -2,11 +2,11 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
-from rom.arguments import number, one_of
+from rom.arguments import number
 from rom.errors import ConfigError
 from rom.mbs.elements.family import (
     Family,
@@ -50,7 +50,7 @@ def spread_load(
     load: Any,
     amplitude: Any = 1.0,
     *,
-    frame: str = "body",
+    frame: Literal["body", "world"] = "body",
 ) -> None:
     """Load on all points of a flexible body: pressure, traction, force per mass.
 
@@ -70,7 +70,6 @@ def spread_load(
         ConfigError: for a name in use, a load of another body, or a wrong frame or amplitude.
     """
     part = self.part(str(getattr(part, "name", part)))
-    one_of(f"frame of {name!r}", frame, ("world", "body"))
     shapes = getattr(load, "shapes", None)
     if shapes is None or shapes.shape != (part.r, 3, 3) or part.flexible is None:
         raise ConfigError(

@@ -2,11 +2,11 @@
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
-from rom.arguments import not_negative, number
+from rom.arguments import NotNegative, Number
 from rom.mbs.elements.family import Family, Places, integers, rows_of
 from rom.mbs.kernels.algebra import add, dot, put, row, scale, sub, unit
 from rom.mbs.kernels.compiled import inner
@@ -35,9 +35,9 @@ def spring_damper(
     m1: Marker,
     m2: Marker,
     *,
-    stiffness: float,
-    damping: float = 0.0,
-    free_length: float | None = None,
+    stiffness: Annotated[float, Number("N/m")],
+    damping: Annotated[float, Number("N s/m")] = 0.0,
+    free_length: Annotated[float, NotNegative("m")] | None = None,
 ) -> None:
     """Spring [N/m] and damper [N s/m] along the line between two markers.
 
@@ -52,20 +52,17 @@ def spring_damper(
     Raises:
         ConfigError: for a name in use, an unknown marker, or a length below zero.
     """
-    gap = self.design_point(m2) - self.design_point(m1)
-    free = np.linalg.norm(gap)
-    if free_length is not None:
-        free = not_negative(f"free_length of {name!r}", free_length)
-    k, c = stiffness_and_damping(name, stiffness, damping)
-    self.add(name, Spring(m1, m2, k, c, float(free)), SPRINGS_FAMILY)
+    if free_length is None:
+        gap = self.design_point(m2) - self.design_point(m1)
+        free_length = float(np.linalg.norm(gap))
+    doubt(name, stiffness, damping)
+    self.add(name, Spring(m1, m2, stiffness, damping, free_length), SPRINGS_FAMILY)
 
 
-def stiffness_and_damping(name: str, stiffness: Any, damping: Any) -> tuple[float, float]:
-    """Both numbers of a spring, doubted aloud where they would drive the motion."""
-    k, c = number("stiffness", stiffness), number("damping", damping)
-    warn_outside(STIFFNESS, k, repr(name))
-    warn_outside(DAMPING, c, repr(name))
-    return k, c
+def doubt(name: str, stiffness: float, damping: float) -> None:
+    """Warn of numbers of a spring that would drive the motion."""
+    warn_outside(STIFFNESS, stiffness, repr(name))
+    warn_outside(DAMPING, damping, repr(name))
 
 
 @table

@@ -2,11 +2,10 @@
 
 from dataclasses import dataclass
 
-from rom.arguments import number
 from rom.errors import ConfigError
 from rom.mbs.elements.contact.impact import Impact, checked_law
 from rom.mbs.elements.joint_forces import STOP, joint_energy, joint_family
-from rom.mbs.parts.joints import Row, coordinate_of
+from rom.mbs.parts.joints import Coordinate, Row, coordinate_of
 from rom.mbs.parts.whole import Whole
 
 
@@ -34,7 +33,7 @@ def stop(
     *,
     lower: float | None = None,
     upper: float | None = None,
-    coordinate: str | None = None,
+    coordinate: Coordinate | None = None,
 ) -> None:
     """Limit a joint coordinate by compliant stops.
 
@@ -52,7 +51,7 @@ def stop(
     row = coordinate_of(self.joints, joint, coordinate, "stop")
     law = checked_law(name, law)
     places = [(-1, lower), (1, upper)]
-    limits = [(side, number(f"limit of {name}", x)) for side, x in places if x is not None]
+    limits = [(side, float(x)) for side, x in places if x is not None]
     if not limits:
         raise ConfigError(f"stop {name!r} has no limit.", hint="Give lower or upper.")
     if len(limits) == 2 and limits[0][1] > limits[1][1]:

@@ -3,14 +3,15 @@
 from contextlib import suppress
 from dataclasses import replace
 from time import perf_counter
-from typing import Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 
-from rom.arguments import one_of, typed
+from rom.arguments import Between, Count, Number, Positive, Share, typed
 from rom.errors import ConfigError, InterruptedRun, ResourceError, RomError, RomWarning
 from rom.mbs.equations.packing import Packed, pack
 from rom.mbs.integrate.adaptive_step import run_variable
+from rom.mbs.integrate.bdf import LARGEST_ORDER
 from rom.mbs.integrate.consistent_start import initial_state
 from rom.mbs.integrate.dop853 import run_explicit
 from rom.mbs.integrate.events import watch_of
@@ -27,6 +28,7 @@ from rom.process.interruption import terminable
 
 METHODS = {"generalized-alpha": run_implicit, "bdf": run_implicit, "dop853": run_explicit}
 # tolerance of variable steps, of the explicit method and of implicit ones
+TOLERANCES = (1e-14, 1e-2)  # of the Newton iteration: round-off, and no solution at all
 METHOD_RTOL = {"dop853": 1e-12, "bdf": 1e-4, "generalized-alpha": 1e-4}
 
 
@@ -34,18 +36,18 @@ METHOD_RTOL = {"dop853": 1e-12, "bdf": 1e-4, "generalized-alpha": 1e-4}
 def simulate(  # noqa: PLR0913  keywords of the one entry, most have defaults
     mechanism: Mechanism,
     *,
-    t_end: float,
-    dt: float | None = None,
-    method: str = "generalized-alpha",
-    rho_inf: float = 0.9,
-    tolerance: float = 1e-9,
-    rtol: float | None = None,
-    atol: float = 1e-12,
+    t_end: Annotated[float, Number("s")],
+    dt: Annotated[float, Positive("s")] | None = None,
+    method: Literal["generalized-alpha", "bdf", "dop853"] = "generalized-alpha",
+    rho_inf: Share = 0.9,
+    tolerance: Annotated[float, Between(*TOLERANCES)] = 1e-9,
+    rtol: Annotated[float, Positive()] | None = None,
+    atol: Annotated[float, Positive()] = 1e-12,
     progress: bool = False,
-    save_every: int = 1,
-    t_start: float | None = None,
+    save_every: Annotated[int, Count(1)] = 1,
+    t_start: Annotated[float, Number("s")] | None = None,
     state: State | None = None,
-    order: int = 2,
+    order: Annotated[int, Count(1, LARGEST_ORDER)] = 2,
     stabilised: bool = False,
     keep: Keeping | None = None,
     assemble: bool = False,
@@ -124,7 +126,6 @@ def simulate(  # noqa: PLR0913  keywords of the one entry, most have defaults
         >>> round(float(sol.position("ball")[-1, 2]), 6)  # - g t^2 / 2
         -4.905
     """
-    one_of("method", method, METHODS)
     if t_start is None:
         t_start = 0.0 if state is None else state.t
     rtol = METHOD_RTOL[method] if rtol is None else rtol

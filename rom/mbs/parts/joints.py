@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from rom.mbs.parts.bodies import Marker
 from rom.model import Array
 from rom.names import offered
 
+Coordinate = Literal["angle", "displacement", "way"]  # the last is the earlier name of the second
 NO_VECTOR = np.zeros(3)
 
 
@@ -114,8 +116,8 @@ def coordinate_of(joints: Mapping[str, Joint], joint: str, which: str | None, wh
     """
     if joint not in joints:
         raise ConfigError(f"{what}: no joint {joint!r}; there are {offered(joints, joint)}.")
-    names = {None: "coordinate", "angle": "turn", "displacement": "displacement"}
-    names["way"] = "displacement"  # as it was called before
+    names: dict[str | None, str] = dict.fromkeys(("displacement", "way"), "displacement")
+    names |= {None: "coordinate", "angle": "turn"}
     if which not in names:
         raise ConfigError(f"coordinate {which!r} of {joint!r} must be 'angle' or 'displacement'.")
     row: Row | None = getattr(joints[joint], names[which])

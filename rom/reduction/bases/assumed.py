@@ -1,11 +1,11 @@
 """Modes of the body in one support alone: what assumed modes were before substructuring."""
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
-from rom.arguments import typed, whole
+from rom.arguments import Count, typed, whole
 from rom.eigen.supports import Fixed, refuse_loose
 from rom.eigen.verbs import Operators, given_rigid_motions, orthonormal
 from rom.errors import ConfigError
@@ -45,12 +45,9 @@ class AssumedModes:
         AssumedModes(n_modes=8, fixed={'root': 'xyz rx', 'tip': 'yz'})
     """
 
-    n_modes: int
+    n_modes: Annotated[int, Count(1)]
     fixed: Fixed | None = None
     held: Index | None = field(default=None, repr=False, compare=False)
-
-    def __post_init__(self) -> None:
-        whole("n_modes", self.n_modes, 1)
 
     def basis(self, ops: Operators, boundary: Index, labels: tuple[str, ...]) -> Basis:
         """Rigid motions, then the modes; no column for the interface dofs (n_b,).

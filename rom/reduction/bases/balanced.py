@@ -1,11 +1,12 @@
 """Second-order balanced truncation: what is both moved by the input and felt at the output."""
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from scipy.linalg import qr, solve_continuous_lyapunov, svd
 
-from rom.arguments import between, matrix, typed, whole
+from rom.arguments import Between, Modes, matrix, typed, whole
 from rom.eigen.verbs import Held, Operators
 from rom.errors import ConfigError, ModelError, ResourceError
 from rom.model import Array, Index
@@ -37,15 +38,13 @@ class BalancedTruncation(Constrained):
         Algebra Appl. 415 (2006) 373.
     """
 
-    n_modes: int
+    n_modes: Modes
     pool: int | None = None
-    damping_ratio: float = 0.01
+    damping_ratio: Annotated[float, Between(0, 1, "()")] = 0.01
 
     def __post_init__(self) -> None:
-        whole("n_modes", self.n_modes)
         if self.pool is not None:
             whole("pool", self.pool, self.n_modes, reason="n_modes are chosen from it")
-        between("damping_ratio", self.damping_ratio, 0, 1, "()")
 
     def _completed(self, ops: Operators, held: Held, Psi_b: Array, boundary: Index) -> Columns:
         pool = min(3 * self.n_modes if self.pool is None else self.pool, held.n_free)

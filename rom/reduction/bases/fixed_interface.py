@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rom.arguments import typed, whole
+from rom.arguments import Modes, typed
 from rom.eigen.scipy import SciPyOperators
 from rom.eigen.verbs import Held, Operators, constraint_modes
 from rom.errors import ConfigError
@@ -21,10 +21,7 @@ Columns = tuple[Array, Array, Sequence[str]]
 class Counted:
     """A method that keeps so many modes."""
 
-    n_modes: int
-
-    def __post_init__(self) -> None:
-        whole("n_modes", self.n_modes)
+    n_modes: Modes
 
 
 class Constrained:

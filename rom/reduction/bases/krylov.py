@@ -1,10 +1,11 @@
 """Moment matching: a rational Krylov space that is exact at chosen frequencies."""
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
-from rom.arguments import typed, whole
+from rom.arguments import Count, typed
 from rom.eigen.verbs import Held, Operators, unit_motions, without_dependent
 from rom.errors import ConfigError, SolverError
 from rom.model import Array, Index
@@ -36,10 +37,9 @@ class MomentMatching(Constrained):
     """
 
     frequencies: tuple[float, ...] = (0.0,)
-    order: int = 1
+    order: Annotated[int, Count(1)] = 1
 
     def __post_init__(self) -> None:
-        whole("order", self.order, 1)
         f = np.asarray(self.frequencies, dtype=float)
         if not f.size:
             raise ConfigError("MomentMatching needs a frequency.")

@@ -1,11 +1,11 @@
 """Reduction methods as small records: what `rom.reduce` is asked to do."""
 
 from dataclasses import dataclass, field, replace
-from typing import Any, Protocol
+from typing import Annotated, Any, Literal, Protocol
 
 import numpy as np
 
-from rom.arguments import between, one_of, positive, typed, whole
+from rom.arguments import Between, Modes, Positive, typed, whole
 from rom.eigen.band import modes_up_to
 from rom.eigen.verbs import Held, Operators, whole_clusters
 from rom.errors import ConfigError, warn
@@ -16,7 +16,8 @@ from rom.rows import FREQUENCY_RTOL
 
 FIRST_BATCH = 16  # modes computed first where their number is looked for
 ENOUGH_RTOL = 0.5 * FREQUENCY_RTOL  # the estimate is none below half the limit of certificates
-LANCZOS_SEARCH, SUBSTRUCTURE_SEARCH = "lanczos", "substructures"
+LANCZOS_SEARCH: Literal["lanczos"] = "lanczos"
+SUBSTRUCTURE_SEARCH = "substructures"
 SUBSTRUCTURE_RTOL = 1e-3  # of frequencies, by their bounds; most are far better
 
 
@@ -71,24 +72,17 @@ class CraigBampton(Constrained):
         CraigBampton(n_modes=None, f_max=3000.0, tol=0.001, search='lanczos')
     """
 
-    n_modes: int | None = None
-    f_max: float | None = None
-    tol: float | None = None
-    search: str = LANCZOS_SEARCH
+    n_modes: Modes | None = None
+    f_max: Annotated[float, Positive("Hz")] | None = None
+    tol: Annotated[float, Between(0, 1, "()")] | None = None
+    search: Literal["lanczos", "substructures"] = LANCZOS_SEARCH
     supports: tuple[Index, ...] = field(default=(), repr=False, compare=False)
 
     def __post_init__(self) -> None:
         if self.n_modes is not None and self.f_max is not None:
             raise ConfigError("CraigBampton takes n_modes or f_max, not both.")
-        if self.n_modes is not None:
-            whole("n_modes", self.n_modes)
-        if self.f_max is not None:
-            positive("f_max", self.f_max)
-        if self.tol is not None:
-            between("tol", self.tol, 0, 1, "()")
-            if self.n_modes is not None:
-                raise ConfigError("CraigBampton takes n_modes or tol, not both.")
-        one_of("search", self.search, (LANCZOS_SEARCH, SUBSTRUCTURE_SEARCH))
+        if self.n_modes is not None and self.tol is not None:
+            raise ConfigError("CraigBampton takes n_modes or tol, not both.")
         if self.search == SUBSTRUCTURE_SEARCH and (self.f_max is None or self.tol is not None):
             raise ConfigError('search="substructures" needs f_max, and takes no tol.')
 

@@ -101,7 +101,7 @@ def test_stress_and_clearance():
 
 
 def test_impossible_springs_are_named():
-    with pytest.raises(ModelError, match="wire of a spring = 0 must be positive"):
+    with pytest.raises(ModelError, match="wire = 0 must be positive"):
         spring(0, 10, 6, 15)
     with pytest.raises(ModelError, match=r"must be below diameter = 0\.01"):
         spring(10, 10, 1, 15)

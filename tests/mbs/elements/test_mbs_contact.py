@@ -277,7 +277,7 @@ WRONG = {
     "itself": (lambda m, a, b: m.sphere_on_sphere("s", b, b, Impact(1), radius1=1, radius2=1),
                "with itself"),
     "no capsule": (lambda m, a, b: m.capsule_on_capsule("s", a, b, Impact(1), radius1=1, radius2=1,
-                                                        length1=2), "length1 = 2 m with axis1"),
+                                                        length1=2), "length1 = 2 m without axis1"),
     "crossing": (lambda m, a, b: m.capsule_on_capsule("s", a, b, Impact(1), radius1=1, radius2=1),
                  "the axes cross"),
     "soft": (lambda m, a, b: hertz_stiffness(0, 0.3, 1, 0.3, 1), "E1 = 0"),

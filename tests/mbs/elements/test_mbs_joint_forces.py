@@ -418,7 +418,7 @@ WRONG = {
     "law that must compile": (lambda m: m.motor("s", "axle", lambda t, x, v: {}.get(t),
                                                 compiled=True), "cannot be compiled"),
     "friction that drives": (lambda m: m.friction("s", "axle", coulomb=-1, transition_speed=1),
-                             "coulomb of friction 's' = -1"),
+                             "friction 's': coulomb = -1"),
     "pin without radius": (lambda m: m.friction("s", "axle", mu=0.1, transition_speed=1), "radius"),
     "way with radius": (lambda m: m.friction("s", "tube", coordinate="way", radius=1, mu=0.1,
                                              transition_speed=1), "leave radius out"),

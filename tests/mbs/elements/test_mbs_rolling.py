@@ -225,7 +225,7 @@ def test_damping_takes_energy_and_never_gives_any(damping):
 
 
 @pytest.mark.parametrize(("numbers", "message"), [
-    ({"balls": 2}, "no bearing has 2 balls"),
+    ({"balls": 2}, "balls = 2 must be"),
     ({"ball_diameter": 0.07}, "no bearing has 9 balls"),
     ({"balls": 20}, "do not fit on a circle"),
     ({"clearance": 2e-3}, "clearance = 0.002 must"),
@@ -246,7 +246,7 @@ def test_rings_that_are_not_at_one_place_are_refused():
         mech.rolling_bearing("b", a, b, axis=Z, bearing=BALLS)
     with pytest.raises(ConfigError, match="axis of b has length zero"):
         mech.rolling_bearing("b", a, mech.ground.marker(ORIGIN), axis=ORIGIN, bearing=BALLS)
-    with pytest.raises(ConfigError, match="damping of bearing 'b' = -1"):
+    with pytest.raises(ConfigError, match="'b': damping = -1"):
         mech.rolling_bearing("b", a, mech.ground.marker(ORIGIN), axis=Z, bearing=BALLS, damping=-1)
     with pytest.raises(ConfigError, match="connects body 'shaft' with itself"):
         mech.rolling_bearing("b", a, a, axis=Z, bearing=BALLS)

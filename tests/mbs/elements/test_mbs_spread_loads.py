@@ -178,7 +178,7 @@ def test_messages():
         rom.surface_load(inside_out, pressure=1.0)
     with pytest.raises(ModelError, match="carries no surface"):
         rom.surface_load(replace(body, surface=None), pressure=1.0)
-    with pytest.raises(ConfigError, match="frame of 'pull' = 'marker'"):
+    with pytest.raises(ConfigError, match="'pull': frame = 'marker'"):
         mech.spread_load("pull", part, load, frame="marker")
     box = mech.add_rigid("box", mass=1.0, inertia=(1, 1, 1), at=(0, 0, 0))
     with pytest.raises(ConfigError, match="is not one of body 'box'"):

@@ -52,7 +52,7 @@ WRONG = {
     "mirror as orientation": (lambda m, *_: m.add_rigid(
         "x", **UNIT, orientation=np.diag([1, 1, -1])), ConfigError, "orientation"),
     "marker of two": (lambda m, *_: m.add_rigid("x", **UNIT, markers={"tip": (0, 0)}), ConfigError,
-                      "marker tip has shape (2,)"),
+                      "markers['tip'] has shape (2,)"),
     "marker nowhere": (lambda m, *_: m.add_rigid("x", **UNIT, markers={"tip": (0, 0, np.nan)}),
                        ConfigError, "markers['tip'] = (0, 0, nan)"),
     "rates too short": (lambda m, *_: m.add_flexible("x", BODY, qd=(0, 0, 0)), ConfigError,

@@ -2,14 +2,16 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
+from rom.arguments import Number, Positive, typed
 from rom.errors import ModelError
 from rom.model import Array
 
 
+@typed
 @dataclass(frozen=True, slots=True)
 class Correction:
     """What is taken off the flanks of a pair.
@@ -33,11 +35,11 @@ class Correction:
             axis, from where the wheels mesh at the start, in the sense of the axis.
     """
 
-    relief: tuple[float, float] = (0.0, 0.0)
-    extent: tuple[float, float] = (0.0, 0.0)
-    power: float = 1.0
-    crowning: float = 0.0
-    slope: float = 0.0
+    relief: Annotated[tuple[float, float], Number("m", (2,))] = (0.0, 0.0)
+    extent: Annotated[tuple[float, float], Number("m", (2,))] = (0.0, 0.0)
+    power: Annotated[float, Positive()] = 1.0
+    crowning: Annotated[float, Number("m")] = 0.0
+    slope: Annotated[float, Number("m")] = 0.0
     pitch: tuple[Any, Any] = ((), ())
     maps: tuple[Any, Any] = (None, None)
     back_maps: tuple[Any, Any] = (None, None)

@@ -9,12 +9,13 @@ distance, as in ISO 21771: then all formulas are those of external gears.
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Annotated
 
 import numpy as np
 import numpy.typing as npt
 from scipy.optimize import brentq
 
-from rom.arguments import positive, typed
+from rom.arguments import Angle, Number, Size, typed
 from rom.errors import ModelError
 from rom.model import Array
 
@@ -48,24 +49,21 @@ class GearPair:
     """
 
     teeth: tuple[float, float]  # parts of teeth in sections across the flank
-    module: float
-    width: float
-    helix: float = 0.0
-    pressure_angle: float = float(np.radians(20.0))
+    module: Size
+    width: Size
+    helix: Angle = 0.0
+    pressure_angle: Angle = float(np.radians(20.0))
     shift: tuple[float, float] = (0.0, 0.0)
-    centre_distance: float | None = None
-    thinning: float = 0.0
+    centre_distance: Size | None = None
+    thinning: Annotated[float, Number("m")] = 0.0
     addendum: float = 1.0
     dedendum: float = 1.25
     fillet: float = 0.4
-    gear_helix: float | None = None
+    gear_helix: Angle | None = None
 
     def __post_init__(self) -> None:
-        if min(map(abs, self.teeth)) < 4 or not (self.module > 0 and self.width > 0):
-            raise ModelError(
-                f"no gears have {self.teeth} teeth of module {self.module} m, {self.width} m wide; "
-                "needed are at least 4 teeth, and module and width > 0."
-            )
+        if min(map(abs, self.teeth)) < 4:
+            raise ModelError(f"no gears have {self.teeth} teeth; needed are at least 4.")
         if not abs(self.helix) < 0.9 or not 0.1 < self.pressure_angle < 0.7:
             raise ModelError(
                 f"helix {self.helix} and pressure angle {self.pressure_angle} must be in radians, "
@@ -84,8 +82,6 @@ class GearPair:
                 f"no pinion of {self.teeth[0]} teeth turns in a gear of {self.teeth[1]}.",
                 hint="Of an internal gear the number is negative, and larger than the pinion's.",
             )
-        if self.centre_distance is not None:
-            positive("centre_distance", self.centre_distance, error=ModelError)
         self._check_teeth()
         if not self.cos_working < 1:
             raise ModelError(

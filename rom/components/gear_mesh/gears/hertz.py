@@ -1,11 +1,12 @@
 """Contact of teeth that gives way by Hertz, more slowly than the load grows."""
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated
 
 import numpy as np
+import numpy.typing as npt
 
-from rom.arguments import between, positive, typed
+from rom.arguments import Between, Positive, typed
 from rom.components.gear_mesh.gears.geometry import GearPair
 from rom.components.gear_mesh.gears.racks import RackPair
 from rom.errors import ModelError
@@ -30,9 +31,9 @@ class Hertz:
         Weber and Banaschek, VDI-Bericht 1953.
     """
 
-    depths: Any
-    E: float = 206e9
-    nu: float = 0.3
+    depths: Annotated[npt.ArrayLike, Positive("m", (2,), (None, 2), error=ModelError)]
+    E: Annotated[float, Positive("Pa", error=ModelError)] = 206e9
+    nu: Annotated[float, Between(0, 0.5, "[)", error=ModelError)] = 0.3
 
     @property
     def compliance(self) -> float:
@@ -52,10 +53,6 @@ class Hertz:
             ModelError: for depths and constants that no teeth have.
         """
         h = np.atleast_2d(np.asarray(self.depths, dtype=float))
-        if h.ndim != 2 or h.shape[1] != 2 or not (np.isfinite(h).all() and (h > 0).all()):
-            raise ModelError(f"depths {self.depths} of Hertz's contact must be (2,) or (n, 2) > 0.")
-        positive("E", self.E, error=ModelError)
-        between("nu", self.nu, 0, 0.5, "[)", error=ModelError)
         share = np.linspace(0, 1, N_PLACES)
         h = np.stack([np.interp(share, np.linspace(0, 1, len(h)), column) for column in h.T])
         s = pair.path[0] + share * (pair.path[1] - pair.path[0])

@@ -2,12 +2,23 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import numpy.typing as npt
 
-from rom.arguments import between, finite, not_negative, number, positive, unit_vector, whole
+from rom.arguments import (
+    Angle,
+    Between,
+    Count,
+    Direction,
+    NotNegative,
+    Positive,
+    between,
+    finite,
+    unit_vector,
+    vector,
+)
 from rom.components.gear_mesh.gears.corrections import Correction, checked_map
 from rom.components.gear_mesh.gears.geometry import GearPair
 from rom.components.gear_mesh.gears.hertz import Hertz
@@ -72,19 +83,19 @@ def gear_mesh(  # noqa: PLR0913  one keyword per property
     wheel_a: Marker,
     wheel_b: Marker,
     *,
-    axis: npt.ArrayLike,
+    axis: Direction,
     pair: GearPair | RackPair,
-    stiffness: npt.ArrayLike,
+    stiffness: Annotated[npt.ArrayLike, Positive("N/m^2", (), (None,))],
     correction: Correction | None = None,
-    damping: float = 0.0,
-    friction: float = 0.0,
-    transition_speed: float | None = None,
-    cells: int = 21,
-    phase: float | None = None,
-    entry: float = 0.02,
+    damping: Annotated[float, NotNegative("s")] = 0.0,
+    friction: Annotated[float, NotNegative()] = 0.0,
+    transition_speed: Annotated[float, Positive("m/s")] | None = None,
+    cells: Annotated[int, Count(1, MAX_CELLS)] = 21,
+    phase: Angle | None = None,
+    entry: Annotated[float, Between(0, MAX_ENTRY)] = 0.02,
     conservative: bool | None = None,
     hertz: Hertz | None = None,
-    coupling: float = 0.0,
+    coupling: Annotated[float, NotNegative("m")] = 0.0,
 ) -> None:
     """Involute teeth of two wheels in contact, on both flanks, with backlash and loss of contact.
 
@@ -140,13 +151,18 @@ def gear_mesh(  # noqa: PLR0913  one keyword per property
     turned = [matrix(self.part(wheel.body).p) for wheel in (wheel_a, wheel_b)]
     along = np.cross(z, c) if isinstance(pair, RackPair) else -c
     axes = np.array([z @ turned[0], c @ turned[0], z @ turned[1], along @ turned[1]])
-    whole(f"cells of mesh {name!r}", cells, 1, MAX_CELLS)
     follows = _follows_energy(name, pair, entry, conservative)
+    if friction and transition_speed is None:
+        raise ConfigError(
+            f"mesh {name!r} has friction, but no transition_speed.",
+            hint="Take a hundredth of the speed with which its flanks slide.",
+        )
+    between(f"coupling [m] of mesh {name!r} and its width", coupling, 0, pair.width)
     numbers = (
-        *_law(name, damping, friction, transition_speed), follows,
-        _coupling(name, coupling, pair), hertz.compliance if hertz else 0.0,
+        damping, friction, transition_speed or 1.0, follows, coupling,
+        hertz.compliance if hertz else 0.0,
     )  # fmt: skip
-    stiffness = _stiffness(name, stiffness)
+    stiffness = vector(f"stiffness of the teeth of {name!r}", stiffness)
     flanks = Correction() if correction is None else correction
     _check_correction(name, pair, flanks)
     if hertz:
@@ -154,7 +170,7 @@ def gear_mesh(  # noqa: PLR0913  one keyword per property
     parts = self.part(wheel_a.body), self.part(wheel_b.body)
     mesh = GearMesh(
         wheel_a, wheel_b, pair, stiffness, flanks, numbers, cells, axes, np.array([0.0, np.pi]),
-        float(D @ z), number("phase", phase or 0.0), entry * pair.base_pitch,
+        float(D @ z), phase or 0.0, entry * pair.base_pitch,
         _rims(parts, (wheel_a, wheel_b), axes, pair), hertz, _spins(name, parts, axes, pair),
     )  # fmt: skip
     if phase is None:
@@ -201,7 +217,6 @@ def _follows_energy(
     name: str, pair: GearPair | RackPair, entry: Any, conservative: bool | None
 ) -> float:
     """1 for forces that follow the energy along the path, 0 for those along involutes."""
-    between(f"entry of mesh {name!r}", entry, 0, MAX_ENTRY)
     jumps = entry == 0.0 and pair.helix == 0.0
     if conservative and jumps:
         raise ConfigError(
@@ -210,11 +225,6 @@ def _follows_energy(
             hint="Let teeth take up their load over an entry of 0.02, or give conservative=False.",
         )
     return float(not jumps if conservative is None else conservative)
-
-
-def _coupling(name: str, length: Any, pair: GearPair | RackPair) -> float:
-    """Length over which slices carry each other [m]."""
-    return between(f"coupling [m] of mesh {name!r} and its width", length, 0, pair.width)
 
 
 def _check_place(name: str, pair: GearPair | RackPair, D: Array, z: Array) -> None:
@@ -232,30 +242,6 @@ def _check_place(name: str, pair: GearPair | RackPair, D: Array, z: Array) -> No
             f"the faces of mesh {name!r} are {abs(D @ z) * 1e3:.4g} mm beside each other; wheel_a "
             "and wheel_b must be the middles of the common face.",
         )
-
-
-def _law(name: str, damping: Any, friction: Any, speed: Any) -> tuple[float, ...]:
-    """Damping, friction and transition speed."""
-    for what, value in (("damping", damping), ("friction", friction)):
-        not_negative(f"{what} of mesh {name!r}", value)
-    if friction and speed is None:
-        raise ConfigError(
-            f"mesh {name!r} has friction, but no transition_speed.",
-            hint="Take a hundredth of the speed with which its flanks slide.",
-        )
-    return (
-        float(damping),
-        float(friction),
-        1.0 if speed is None else positive("transition_speed", speed),
-    )
-
-
-def _stiffness(name: str, given: Any) -> Array:
-    """(n,) stiffness from first to last contact [N/m^2]."""
-    k = np.atleast_1d(np.asarray(given, dtype=float))
-    if not (k.ndim == 1 and k.size and np.isfinite(k).all() and (k > 0.0).all()):
-        raise ConfigError(f"stiffness of the teeth of {name!r} must be positive numbers [N/m^2].")
-    return k
 
 
 def _check_correction(name: str, pair: GearPair | RackPair, correction: Correction) -> None:

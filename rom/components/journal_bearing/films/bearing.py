@@ -7,12 +7,12 @@ h = c bore - (ex + z phi_y) cos theta - (ey - z phi_x) sin theta.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Literal, NamedTuple
+from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from rom.arguments import typed
+from rom.arguments import Angle, Number, Size, typed
 from rom.errors import ModelError
 from rom.model import Array, Index
 
@@ -57,9 +57,9 @@ class Groove:
         share: of the width of the bearing, about its middle [1].
     """
 
-    angle: float
-    width: float = 0.0
-    pressure: float = 0.0
+    angle: Angle
+    width: Angle = 0.0
+    pressure: Annotated[float, Number("Pa")] = 0.0
     share: float = 1.0
 
 
@@ -87,9 +87,9 @@ class JournalBearing:
         ModelError: for numbers that no bearing has, or grooves that its cavitation needs and lacks.
     """
 
-    diameter: float
-    length: float
-    clearance: float
+    diameter: Size
+    length: Size
+    clearance: Size
     grooves: Sequence[Groove] = ()
     cavitation: Cavitation = "reynolds"
     preload: float = 0.0
@@ -100,8 +100,7 @@ class JournalBearing:
     grid: Grid = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        size = (self.diameter, self.length, self.clearance)
-        if min(size) <= 0 or self.clearance > 0.05 * self.diameter:
+        if self.clearance > 0.05 * self.diameter:
             raise ModelError(
                 f"no bearing has diameter {self.diameter} m, length {self.length} m and clearance "
                 f"{self.clearance} m: a film is thin against the journal.",

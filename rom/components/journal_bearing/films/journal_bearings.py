@@ -3,12 +3,12 @@
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import numpy.typing as npt
 
-from rom.arguments import between, finite, number, positive, unit_vector
+from rom.arguments import Direction, NotNegative, Positive, Share, finite, positive, unit_vector
 from rom.components.journal_bearing.films.bearing import JFO, REYNOLDS, JournalBearing
 from rom.components.journal_bearing.films.bores import bore_of
 from rom.components.journal_bearing.films.cells import CLEARANCE, N_ANSWERS, cells_of
@@ -61,15 +61,15 @@ def journal_bearing(  # noqa: PLR0913  one keyword per property
     journal: Marker,
     bush: Marker,
     *,
-    axis: npt.ArrayLike,
+    axis: Direction,
     bearing: JournalBearing,
     oil: Oil | float,
     inlet: float | None = None,
-    reference: npt.ArrayLike | None = None,
-    roughness: float = 0.0,
-    carried: float = 0.9,
-    felt: float = 0.5,
-    thermal_time: float = 1.0,
+    reference: Direction | None = None,
+    roughness: Annotated[float, NotNegative("m")] = 0.0,
+    carried: Share = 0.9,
+    felt: Share = 0.5,
+    thermal_time: Annotated[float, Positive("s")] = 1.0,
     elastic_bush: bool = False,
     tabulated: bool = False,
 ) -> None:
@@ -114,8 +114,7 @@ def journal_bearing(  # noqa: PLR0913  one keyword per property
     axes = np.array([z @ turned[0], z @ turned[1], x @ turned[1]])
     D = self.design_point(journal) - self.design_point(bush)
     _check_gap(name, bearing, np.array([D @ x, D @ np.cross(z, x)]), roughness)
-    heat = _heat(name, carried, felt, thermal_time)
-    numbers = (*_oil(name, oil, inlet), *heat, float(roughness))
+    numbers = (*_oil(name, oil, inlet), carried * felt, thermal_time, roughness)
     self.part(bush.body).refuse_spin(f"the bush of bearing {name!r}", "grooves would turn in it")
     turning = self.part(journal.body).spin_about(name, axes[0])
     film = OilFilm(journal, bush, bearing, axes, oil, numbers, turning)
@@ -151,7 +150,7 @@ def _directions(name: str, axis: npt.ArrayLike, reference: npt.ArrayLike | None)
 def _check_gap(name: str, bearing: JournalBearing, place: Array, roughness: float) -> None:
     """Refuse a journal that touches its bush at the start, or always would."""
     c = bearing.clearance
-    if not 0.0 <= number("roughness", roughness) < bearing.thinnest(np.zeros(2)):
+    if not roughness < bearing.thinnest(np.zeros(2)):
         raise ConfigError(
             f"roughness of bearing {name!r} is {roughness * 1e6:.3g} micrometres, and its film "
             f"{bearing.thinnest(np.zeros(2)) * 1e6:.3g} at most.",
@@ -171,7 +170,7 @@ def _oil(name: str, oil: Oil | float, inlet: float | None) -> tuple[float, ...]:
     if isinstance(oil, Oil):
         if inlet is None:
             raise ConfigError(f"bearing {name!r} has an oil; give its inlet temperature.")
-        if not float(oil.viscosity(number("inlet", inlet))) > 0.0:
+        if not float(oil.viscosity(inlet)) > 0.0:
             raise ConfigError(
                 f"inlet = {inlet} of {name!r}: the oil boils before; give degrees Celsius."
             )
@@ -183,13 +182,6 @@ def _oil(name: str, oil: Oil | float, inlet: float | None) -> tuple[float, ...]:
         )
     positive(f"oil of bearing {name!r} [Pa s]", oil)
     return (float(oil), 0.0, 0.0, 1.0, 1.0, 0.0)
-
-
-def _heat(name: str, carried: float, felt: float, lag: float) -> tuple[float, float]:
-    """Share of the heat that the temperature feels, and its lag."""
-    for what, value in (("carried", carried), ("felt", felt)):
-        between(f"{what} of bearing {name!r}", value, 0, 1)
-    return float(carried) * float(felt), positive("thermal_time", lag)
 
 
 def circles(_: Any, __: str, film: OilFilm) -> list[Any]:

@@ -5,11 +5,12 @@ Source:
 """
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 import numpy.typing as npt
 
-from rom.arguments import typed
+from rom.arguments import Positive, typed
 from rom.errors import ModelError
 from rom.model import Array
 
@@ -33,14 +34,14 @@ class Oil:
 
     nu_40: float
     nu_100: float
-    density: float = 870.0
-    heat: float = 2000.0
+    density: Annotated[float, Positive("kg/m^3", error=ModelError)] = 870.0
+    heat: Annotated[float, Positive("J/(kg K)", error=ModelError)] = 2000.0
 
     def __post_init__(self) -> None:
-        if not (self.nu_40 > self.nu_100 > 0.3 and self.density > 0 and self.heat > 0):
+        if not self.nu_40 > self.nu_100 > 0.3:
             raise ModelError(
                 f"no oil has {self.nu_40} mm2/s at 40 C and {self.nu_100} mm2/s at 100 C: hot oil "
-                "is thinner; needed are nu_40 > nu_100 > 0.3, density > 0 and heat > 0."
+                "is thinner; needed are nu_40 > nu_100 > 0.3."
             )
 
     def law(self) -> tuple[float, float]:

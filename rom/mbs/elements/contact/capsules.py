@@ -1,9 +1,10 @@
 """Contact of capsules: round bars with ends that are half spheres."""
 
-import numpy as np
-import numpy.typing as npt
+from typing import Annotated
 
-from rom.arguments import number, positive, unit_vector
+import numpy as np
+
+from rom.arguments import Direction, Length, NotNegative, unit_vector
 from rom.errors import ConfigError
 from rom.mbs.elements.contact.impact import Impact
 from rom.mbs.elements.contact.points import CAPSULE, enter_contact
@@ -19,12 +20,12 @@ def capsule_on_capsule(  # noqa: PLR0913  two bodies and a law
     m2: Marker,
     law: Impact,
     *,
-    radius1: float,
-    radius2: float,
-    axis1: npt.ArrayLike | None = None,
-    axis2: npt.ArrayLike | None = None,
-    length1: float = 0.0,
-    length2: float = 0.0,
+    radius1: Length,
+    radius2: Length,
+    axis1: Direction | None = None,
+    axis2: Direction | None = None,
+    length1: Annotated[float, NotNegative("m")] = 0.0,
+    length2: Annotated[float, NotNegative("m")] = 0.0,
 ) -> None:
     """Round bars with ends that are half spheres, which touch where they are nearest.
 
@@ -49,18 +50,17 @@ def capsule_on_capsule(  # noqa: PLR0913  two bodies and a law
     """
     sizes = ((axis1, length1), (axis2, length2))
     for k, (axis, length) in enumerate(sizes, start=1):
-        if number(f"length{k}", length) < 0.0 or (length > 0.0 and axis is None):
+        if length > 0.0 and axis is None:
             raise ConfigError(
-                f"contact {name!r}: length{k} = {length:g} m with axis{k} = {axis!r} is no bar.",
+                f"contact {name!r}: length{k} = {length:g} m without axis{k} is no bar.",
                 hint="Give a positive length and an axis, or neither for a sphere.",
             )
     axes = [np.array([0.0, 0.0, 1.0]) if axis is None else axis for axis, _ in sizes]
-    radii = positive("radius2", radius2), positive("radius1", radius1)
-    half = 0.5 * float(length2), 0.5 * float(length1)
+    half = 0.5 * length2, 0.5 * length1
     self.check_markers(name, m1, m2)
     gap = self.design_point(m2) - self.design_point(m1)
     e, s = (unit_vector(f"axis of {name}", axis) for axis in axes)
     if not distance(gap, e, s, half[1], half[0]) > 0.0:
         raise ConfigError(f"contact {name!r}: the axes cross at the start; nothing tells the side "
                           "on which the bodies touch.", hint="Move one of them away.")  # fmt: skip
-    enter_contact(self, name, CAPSULE, (m1, m2), law, axes, radii, half)
+    enter_contact(self, name, CAPSULE, (m1, m2), law, axes, (radius2, radius1), half)

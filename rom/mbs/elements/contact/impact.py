@@ -1,12 +1,12 @@
 """Laws of compliant impact: stiffness from Hertz, damping from the coefficient of restitution."""
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from scipy.optimize import brentq
 
-from rom.arguments import between, not_negative, positive, typed
+from rom.arguments import AtLeast, Between, NotNegative, Positive, between, positive, typed
 from rom.errors import ConfigError
 from rom.mbs.parts.bodies import Part
 
@@ -21,7 +21,7 @@ class Impact:
     is 3 (1 - e) / 2. Slower impacts lose less.
 
     Args:
-        stiffness: [N/m^exponent], or [N m/rad^exponent] on an angle.
+        stiffness: force per depth^exponent, in SI [N/m^exponent; N m/rad^exponent on an angle].
         exponent: 1 for linear, 3/2 for Hertz [1].
         damping: factor of the closing speed [s/m]; or give the next two.
         restitution: speed after over speed before, above 0 and at most 1 [1].
@@ -40,33 +40,27 @@ class Impact:
         Hunt, Crossley, J. Appl. Mech. 42 (1975) 440; integrated exactly in `damping_of`.
     """
 
-    stiffness: float
-    exponent: float = 1.5
-    damping: float = 0.0
-    restitution: float | None = None
-    impact_speed: float | None = None
-    mu: float = 0.0
-    transition_speed: float = 1e-3
-    tangential_stiffness: float | None = None
-    tangential_damping: float = 0.0
+    stiffness: Annotated[float, Positive()]
+    exponent: Annotated[float, AtLeast(1.0)] = 1.5
+    damping: Annotated[float, NotNegative("s/m")] = 0.0
+    restitution: Annotated[float, Between(0.0, 1.0, "(]")] | None = None
+    impact_speed: Annotated[float, Positive("m/s")] | None = None
+    mu: Annotated[float, NotNegative()] = 0.0
+    transition_speed: Annotated[float, Positive("m/s")] = 1e-3
+    tangential_stiffness: Annotated[float, Positive()] | None = None
+    tangential_damping: Annotated[float, NotNegative()] = 0.0
 
     def __post_init__(self) -> None:
-        for name in ("stiffness", "exponent", "transition_speed"):
-            positive(name, getattr(self, name))
-        for name in ("damping", "mu", "tangential_damping"):
-            not_negative(name, getattr(self, name))
-        if self.exponent < 1.0:
-            raise ConfigError(f"exponent = {self.exponent:g} must be at least 1: infinitely stiff.")
         self._check_spring()
         if (self.restitution is None) != (self.impact_speed is None):
             raise ConfigError(
                 f"restitution = {self.restitution} needs the impact speed at which it holds, "
                 f"got impact_speed = {self.impact_speed}, and the other way round."
             )
-        if self.restitution is not None:
+        if self.restitution is not None and self.impact_speed is not None:
             if self.damping:
                 raise ConfigError(f"damping = {self.damping:g} and restitution; give only one.")
-            factor = damping_of(self.restitution, positive("impact_speed", self.impact_speed))
+            factor = damping_of(self.restitution, self.impact_speed)
             object.__setattr__(self, "damping", factor)
 
     def _check_spring(self) -> None:
@@ -74,7 +68,7 @@ class Impact:
         k, c = self.tangential_stiffness, self.tangential_damping
         if k is None and c:
             raise ConfigError(f"tangential_damping = {c:g} needs a tangential_stiffness.")
-        if k is not None and positive("tangential_stiffness", k) and not self.mu:
+        if k is not None and not self.mu:
             raise ConfigError(
                 f"tangential_stiffness = {k:g} N/m without friction holds nothing.",
                 hint="Give mu above zero, or no tangential_stiffness.",

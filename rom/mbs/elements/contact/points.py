@@ -12,10 +12,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from rom import rotation
-from rom.arguments import positive, unit_vector
+from rom.arguments import Direction, Length, unit_vector
 from rom.errors import ConfigError
 from rom.mbs.elements.contact.bristles import (
     N_REMEMBERED,
@@ -63,8 +62,8 @@ def sphere_on_plane(
     m2: Marker,
     law: Impact,
     *,
-    normal: npt.ArrayLike,
-    radius: float,
+    normal: Direction,
+    radius: Length,
 ) -> None:
     """Sphere about m2 against the plane through m1.
 
@@ -90,9 +89,9 @@ def disc_on_plane(  # noqa: PLR0913  two surfaces and a law
     m2: Marker,
     law: Impact,
     *,
-    normal: npt.ArrayLike,
-    axis: npt.ArrayLike,
-    radius: float,
+    normal: Direction,
+    axis: Direction,
+    radius: Length,
 ) -> None:
     """Rim of a thin disc about m2 against the plane through m1; two make a cylinder.
 
@@ -119,8 +118,8 @@ def sphere_on_sphere(
     m2: Marker,
     law: Impact,
     *,
-    radius1: float,
-    radius2: float,
+    radius1: Length,
+    radius2: Length,
 ) -> None:
     """Spheres of radius1 about m1 and radius2 about m2 [m].
 
@@ -128,8 +127,7 @@ def sphere_on_sphere(
         ConfigError: for a name in use, an unknown marker, one body twice, a law that is no
             `rom.mbs.Impact`, or a radius not above zero.
     """
-    radii = positive("radius2", radius2), positive("radius1", radius1)
-    enter_contact(self, name, SPHERE, (m1, m2), law, (None, None), radii)
+    enter_contact(self, name, SPHERE, (m1, m2), law, (None, None), (radius2, radius1))
 
 
 def sphere_on_cylinder(  # noqa: PLR0913  two surfaces and a law
@@ -139,9 +137,9 @@ def sphere_on_cylinder(  # noqa: PLR0913  two surfaces and a law
     m2: Marker,
     law: Impact,
     *,
-    axis: npt.ArrayLike,
-    radius1: float,
-    radius2: float,
+    axis: Direction,
+    radius1: Length,
+    radius2: Length,
     inside: bool = False,
 ) -> None:
     """Sphere about m2 against an endless cylinder about m1, or its bore.
@@ -162,13 +160,13 @@ def sphere_on_cylinder(  # noqa: PLR0913  two surfaces and a law
         ConfigError: for a sphere that does not fit into the bore, a name in use, an unknown marker,
             one body twice, a law that is no `rom.mbs.Impact`, or no direction.
     """
-    radii = positive("radius2", radius2), positive("radius1", radius1)
-    if inside and radii[0] >= radii[1]:
+    if inside and radius2 >= radius1:
         raise ConfigError(
-            f"contact {name!r}: the sphere of {radii[0]:g} m must be smaller than the bore of "
-            f"{radii[1]:g} m; leave inside out for a sphere outside."
+            f"contact {name!r}: the sphere of {radius2:g} m must be smaller than the bore of "
+            f"{radius1:g} m; leave inside out for a sphere outside."
         )
-    enter_contact(self, name, BORE if inside else CYLINDER, (m1, m2), law, (axis, None), radii)
+    kind, radii = BORE if inside else CYLINDER, (radius2, radius1)
+    enter_contact(self, name, kind, (m1, m2), law, (axis, None), radii)
 
 
 def enter_contact(  # noqa: PLR0913  what the record holds
@@ -183,7 +181,6 @@ def enter_contact(  # noqa: PLR0913  what the record holds
 ) -> None:
     """Add a contact whose axes are given in the world at the start; None where it has none."""
     self.check_apart(name, *markers)
-    positive("radius", radius[0])
     directions = [
         np.zeros(3)
         if axis is None

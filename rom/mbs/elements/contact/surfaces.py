@@ -14,10 +14,9 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from rom import rotation
-from rom.arguments import positive, unit_vector
+from rom.arguments import Direction, Length, unit_vector
 from rom.errors import ConfigError
 from rom.mbs.elements.contact.impact import Impact, checked_law
 from rom.mbs.elements.contact.points import BORE, CONTACTS_FAMILY, CYLINDER, PLANE, SPHERE, Contact
@@ -35,7 +34,7 @@ def surface_on_plane(
     part: Part,
     law: Impact,
     *,
-    normal: npt.ArrayLike,
+    normal: Direction,
     where: Where = None,
 ) -> None:
     """Surface of a flexible body against the plane through m1.
@@ -62,7 +61,7 @@ def surface_on_sphere(
     part: Part,
     law: Impact,
     *,
-    radius: float,
+    radius: Length,
     where: Where = None,
 ) -> None:
     """Surface of a flexible body against a sphere about m1.
@@ -79,7 +78,7 @@ def surface_on_sphere(
         ConfigError: for a wrong argument.
         ModelError: if the body carries no surface.
     """
-    _cover(self, name, SPHERE, m1, part, (law, None, positive("radius", radius), where))
+    _cover(self, name, SPHERE, m1, part, (law, None, radius, where))
 
 
 def surface_on_cylinder(  # noqa: PLR0913  two surfaces and a law
@@ -89,8 +88,8 @@ def surface_on_cylinder(  # noqa: PLR0913  two surfaces and a law
     part: Part,
     law: Impact,
     *,
-    axis: npt.ArrayLike,
-    radius: float,
+    axis: Direction,
+    radius: Length,
     inside: bool = False,
     where: Where = None,
 ) -> None:
@@ -111,7 +110,7 @@ def surface_on_cylinder(  # noqa: PLR0913  two surfaces and a law
         ModelError: if the body carries no surface.
     """
     kind = BORE if inside else CYLINDER
-    _cover(self, name, kind, m1, part, (law, axis, positive("radius", radius), where))
+    _cover(self, name, kind, m1, part, (law, axis, radius, where))
 
 
 def _cover(

@@ -294,7 +294,7 @@ def test_wheels_pressed_into_each_other_are_named():
 WRONG = [
     ({"axis": (0, 0, 0)}, "axis of mesh has length zero"),
     ({"stiffness": []}, "stiffness of the teeth of 'mesh'"),
-    ({"cells": 0}, "cells of mesh 'mesh' = 0"),
+    ({"cells": 0}, "'mesh': cells = 0"),
     ({"correction": Correction(pitch=((0.0, 1.0), ()))}, "pitch errors of 'mesh' has shape"),
 ]
 

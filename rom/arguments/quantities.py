@@ -1,0 +1,157 @@
+"""Numbers as signatures declare them: unit, shapes and limits, once for all who ask.
+
+``stiffness: Annotated[float, Positive("N/m")]`` is checked at each call, see
+`rom.arguments.border`, and is a key of that unit in files, see `rom.config.keys`. A number that may
+be missing is ``Annotated[float, Positive("m")] | None``.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rom.errors import ConfigError, ModelError, RomError
+
+Shape = tuple[int | None, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """A number with a unit, or an array of them.
+
+    Attributes:
+        unit: in SI; "1" for none.
+        shapes: that it may have; None in a shape for any length.
+        low, high: limits.
+        ends: brackets of them: square ones where a limit itself is allowed.
+        error: class of what a call raises for a number beyond them.
+    """
+
+    unit: str = "1"
+    shapes: tuple[Shape, ...] = ((),)
+    low: float = -math.inf
+    high: float = math.inf
+    ends: str = "()"
+    error: type[RomError] = ConfigError
+
+    @property
+    def summary(self) -> str:
+        """Number, vector or matrix, with unit and limits."""
+        forms = {0: "number", 1: "list", 2: "matrix"}
+        sizes = ["x".join("n" if n is None else str(n) for n in s) for s in self.shapes]
+        shapes = zip(self.shapes, sizes, strict=True)
+        words = [f"{forms[len(s)]} {size}".strip() for s, size in shapes]
+        unit = "" if self.unit == "1" else f" [{self.unit}]"
+        limits = self.must.replace("must not be", "not").removeprefix("must be ")
+        return " or ".join(words) + unit + (f", {limits}" if limits else "")
+
+    @property
+    def must(self) -> str:
+        """What the limits ask for, as the rest of a sentence."""
+        if (self.low, self.high) == (0.0, math.inf):
+            return "must not be negative" if self.ends[0] == "[" else "must be positive"
+        low = f"{'at least' if self.ends[0] == '[' else 'above'} {self.low:.6g}"
+        high = f"{'at most' if self.ends[1] == ']' else 'below'} {self.high:.6g}"
+        words = [low] * math.isfinite(self.low) + [high] * math.isfinite(self.high)
+        return f"must be {' and '.join(words)}" if words else ""
+
+    def holds(self, x: float) -> bool:
+        """Whether a number is within the limits."""
+        above = x >= self.low if self.ends[0] == "[" else x > self.low
+        return above and (x <= self.high if self.ends[1] == "]" else x < self.high)
+
+    def has_shape(self, found: tuple[int, ...]) -> bool:
+        """Whether that is one of the shapes."""
+        return any(
+            len(found) == len(shape)
+            and all(n in (None, m) for n, m in zip(shape, found, strict=True))
+            for shape in self.shapes
+        )
+
+    def fault(self, value: Any) -> str:
+        """What is wrong with finite numbers, to be said behind their name; nothing if they fit."""
+        array = np.asarray(value, dtype=float)
+        if not self.has_shape(array.shape):
+            shapes = " or ".join(str(shape).replace("None", "n") for shape in self.shapes)
+            return f" has shape {array.shape}, needed is {shapes}."
+        wrong = (x for x in array.flat if not self.holds(x))
+        return "".join(f" = {x:g} {self.must}." for x in [*wrong][:1])
+
+
+@dataclass(frozen=True, slots=True)
+class Whole:
+    """A whole number within limits, None for no upper one; beyond them a call raises the error."""
+
+    least: int = 0
+    most: int | None = None
+    error: type[RomError] = ConfigError
+
+    @property
+    def summary(self) -> str:
+        """Whole number from the least one on."""
+        return f"whole number from {self.least}"
+
+    @property
+    def words(self) -> str:
+        """What it must be."""
+        span = f"of {self.least} or more" if self.most is None else f"from {self.least} to "
+        return f"a whole number {span}{'' if self.most is None else self.most}"
+
+    def holds(self, n: int) -> bool:
+        """Whether a number is within the limits."""
+        return self.least <= n and (self.most is None or n <= self.most)
+
+    def fault(self, value: int) -> str:
+        """What is wrong with a whole number; nothing if it fits."""
+        return "" if self.holds(value) else f" = {value} must be {self.words}."
+
+
+def Number(unit: str = "1", *shapes: Shape) -> Quantity:
+    """Any number."""
+    return Quantity(unit, shapes or ((),))
+
+
+def Positive(unit: str = "1", *shapes: Shape, error: type[RomError] = ConfigError) -> Quantity:
+    """Above zero."""
+    return Quantity(unit, shapes or ((),), 0.0, error=error)
+
+
+def NotNegative(unit: str = "1", *shapes: Shape) -> Quantity:
+    """Zero or more."""
+    return Quantity(unit, shapes or ((),), 0.0, ends="[)")
+
+
+def AtLeast(low: float, unit: str = "1") -> Quantity:
+    """From a number on."""
+    return Quantity(unit, ((),), low, ends="[)")
+
+
+def Between(
+    low: float,
+    high: float,
+    ends: str = "[]",
+    unit: str = "1",
+    *,
+    error: type[RomError] = ConfigError,
+) -> Quantity:
+    """Within an interval, round brackets where an end is no part of it."""
+    return Quantity(unit, ((),), low, high, ends, error)
+
+
+def Count(least: int = 0, most: int | None = None, *, error: type[RomError] = ConfigError) -> Whole:
+    """A whole number of so many or more."""
+    return Whole(least, most, error)
+
+
+Length = Annotated[float, Positive("m")]
+Size = Annotated[float, Positive("m", error=ModelError)]  # of a part that cannot be without it
+Angle = Annotated[float, Number("rad")]
+Modes = Annotated[int, Count()]  # their number
+Share = Annotated[float, Between(0.0, 1.0)]
+Point = Annotated[npt.ArrayLike, Number("m", (3,))]
+Direction = Annotated[npt.ArrayLike, Number("1", (3,))]
+Orientation = Annotated[npt.ArrayLike, Number("1", (3, 3), (4,))]
+Velocity = Annotated[npt.ArrayLike, Number("m/s", (3,))]
+Omega = Annotated[npt.ArrayLike, Number("rad/s", (3,))]
