@@ -14,6 +14,7 @@ from scipy.sparse import bmat, csc_matrix, csr_matrix, diags, identity
 from scipy.sparse.linalg import LinearOperator, eigs, eigsh
 
 from rom.arguments import finite, whole
+from rom.eigen.verbs import count_shift
 from rom.errors import ConfigError, ModelError, ModesMissedError, SolverError
 from rom.mbs.analysis.local_equations import Instant
 from rom.mbs.equations.signature import signature
@@ -192,7 +193,8 @@ class Pencil:
             shift = 0.5j * (low + high)
             k = self.count(high**2) - self.count(low**2)
         every, Z = self.damped(shift, k + 2 * N_SPARE)
-        zero = self._rate_round_off(Z)
+        mass = np.einsum("ik,ik->k", Z.conj(), self.M @ Z).real
+        zero = np.sqrt(self.round_off(Z / np.sqrt(mass)))
         every = np.where(np.abs(every) <= zero, 0.0, every)
         real = np.flatnonzero(np.abs(every.imag) <= zero)
         real = real[np.argsort(-every[real].real)][: (real.size + 1) // 2]
@@ -207,11 +209,6 @@ class Pencil:
             if not kept.size:
                 wanted.refuse(roots.imag)
         return self._in_real_motions(roots[kept], Z[:, order[kept]])
-
-    def _rate_round_off(self, Z: Array) -> Array:
-        """(k,) eigenvalues [1/s] that may be round-off."""
-        mass = np.einsum("ik,ik->k", Z.conj(), self.M @ Z).real
-        return np.sqrt(self.round_off(Z / np.sqrt(mass)))
 
     def _in_real_motions(self, roots: Array, Z: Array) -> tuple[Array, Array, Array]:
         """Shapes as combinations (2 k, k) of real motions (n, 2 k) of unit mass."""
@@ -300,11 +297,18 @@ class Pencil:
 
         Raises:
             ModesMissedError: if the signature counts others than were found.
+            SolverError: if the modes found have one frequency, so that none can be counted apart.
         """
         k = min(n + N_SPARE, self.n_free)
         squares, X = self.near(self.low_shift(), k)
         if k > n:
-            found, at = _gap(squares, n)
+            found, at = count_shift(squares, n)
+            gap, size = squares[found] - squares[found - 1], np.abs(squares).max()
+            if gap < MIN_GAP * max(abs(squares[found]), 1e-12 * size):
+                raise SolverError(
+                    f"modes {n} to {k} have one frequency: they cannot be counted apart.",
+                    hint="Ask for a few modes more or less.",
+                )
             self.confirm(found, at, self.count(at))
         return squares[:n], X[:, :n]
 
@@ -356,17 +360,3 @@ class Pencil:
         start = inverse(inverse(np.sin(1.0 + np.arange(2.0 * n)).astype(kind)))
         inverses, Z = eigs(operator, k, v0=start, tol=0.0)
         return shift + 1 / inverses, Z[:n]
-
-
-def _gap(squares: Array, n: int) -> tuple[int, float]:
-    """Number of eigenvalues below the widest gap behind the n-th, and the middle of the gap."""
-    upper, lower = squares[n:], squares[n - 1 : -1]
-    size = np.abs(squares).max()
-    gaps = (upper - lower) / np.maximum(np.abs(upper), 1e-12 * size)
-    j = int(np.argmax(gaps))
-    if gaps[j] < MIN_GAP:
-        raise SolverError(
-            f"modes {n} to {squares.size} have one frequency: they cannot be counted apart.",
-            hint="Ask for a few modes more or less.",
-        )
-    return n + j, float(0.5 * (upper[j] + lower[j]))
