@@ -14,7 +14,6 @@ from scipy.sparse import bmat, csc_matrix, csr_matrix, diags, identity
 from scipy.sparse.linalg import LinearOperator, eigs, eigsh
 
 from rom.arguments import finite, whole
-from rom.eigen.verbs import count_shift
 from rom.errors import ConfigError, ModelError, ModesMissedError, SolverError
 from rom.mbs.analysis.local_equations import Instant
 from rom.mbs.equations.signature import signature
@@ -302,13 +301,7 @@ class Pencil:
         k = min(n + N_SPARE, self.n_free)
         squares, X = self.near(self.low_shift(), k)
         if k > n:
-            found, at = count_shift(squares, n)
-            gap, size = squares[found] - squares[found - 1], np.abs(squares).max()
-            if gap < MIN_GAP * max(abs(squares[found]), 1e-12 * size):
-                raise SolverError(
-                    f"modes {n} to {k} have one frequency: they cannot be counted apart.",
-                    hint="Ask for a few modes more or less.",
-                )
+            found, at = _gap(squares, n)
             self.confirm(found, at, self.count(at))
         return squares[:n], X[:, :n]
 
@@ -360,3 +353,17 @@ class Pencil:
         start = inverse(inverse(np.sin(1.0 + np.arange(2.0 * n)).astype(kind)))
         inverses, Z = eigs(operator, k, v0=start, tol=0.0)
         return shift + 1 / inverses, Z[:n]
+
+
+def _gap(squares: Array, n: int) -> tuple[int, float]:
+    """Number of eigenvalues below the widest gap behind the n-th, and the middle of the gap."""
+    upper, lower = squares[n:], squares[n - 1 : -1]
+    size = np.abs(squares).max()
+    gaps = (upper - lower) / np.maximum(np.abs(upper), 1e-12 * size)
+    j = int(np.argmax(gaps))
+    if gaps[j] < MIN_GAP:
+        raise SolverError(
+            f"modes {n} to {squares.size} have one frequency: they cannot be counted apart.",
+            hint="Ask for a few modes more or less.",
+        )
+    return n + j, float(0.5 * (upper[j] + lower[j]))
