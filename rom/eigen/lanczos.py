@@ -131,7 +131,8 @@ class BlockLanczos:
         these = slice(first, self.size)
         G = self.ops.gram(self.MV[:, these], W)
         H[these] += G @ R
-        return _less(np.asfortranarray(W), self.V[:, these], G)
+        W, V = np.asfortranarray(W), self.V[:, these]
+        return dgemm(-1.0, V, G, 1.0, W, overwrite_c=True) if W.size and V.size else W
 
     def _normalised(
         self, W: Array, MW: Array, R: Array, length: float
@@ -199,11 +200,6 @@ class BlockLanczos:
             self.found = theta[::-1], np.asfortranarray(S[:, ::-1])  # which BLAS takes as it is
         theta, S = self.found
         return theta[:k], S[:, :k]
-
-
-def _less(W: Array, V: Array, G: Array) -> Array:
-    """W - V G in the place of W, arrays by columns."""
-    return dgemm(-1.0, V, G, 1.0, W, overwrite_c=True) if W.size and V.size else W
 
 
 def _combined(W: Array, U: Array) -> Array:

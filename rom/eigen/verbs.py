@@ -46,7 +46,7 @@ class Mass(Protocol):
         """
 
 
-class Operators(Protocol):
+class Operators(Mass, Protocol):
     """Stiffness and mass of one body, wherever their rows live.
 
     Attributes:
@@ -68,15 +68,6 @@ class Operators(Protocol):
 
     def apply_K(self, X: Array) -> Array:
         """K X, (n_local, k), in units of K times those of X (n_local, k)."""
-
-    def apply_M(self, X: Array) -> Array:
-        """M X, (n_local, k), in units of M times those of X (n_local, k)."""
-
-    def gram(self, X: Array, Y: Array) -> Array:
-        """(k, l) X^T Y summed over the ranks, in units of their product.
-
-        Any two arrays (n_local, k) and (n_local, l) with equally distributed rows.
-        """
 
     def comparison_pays(self, n_supports: int, n_interface: int, n_modes: int) -> bool:
         """Whether full modes in so many supports cost less than the reduction did, or little.

@@ -1,4 +1,4 @@
 """Paths of solutions over a parameter.
 
-`arc_length` follows any path, past limit points, for whoever brings the equations.
+`arc_length` follows any path past limit points, `load_steps` one of a load that grows.
 """

@@ -7,7 +7,7 @@ Source:
 
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -116,8 +116,7 @@ class Curve:
                 break
             at, p = self.problem.moved(at, step, p + dp), p + dp
             if size < self.tol or (size < STALLED_TOL and size > 0.5 * last):
-                found = self.point(at, p, slope, (point.step, point.rate))
-                return Point(at, p, found.step, found.rate, k + 1)
+                return replace(self.point(at, p, slope, (point.step, point.rate)), passes=k + 1)
             last = size
         raise SolverError("no point of the path was found.")
 
@@ -131,16 +130,16 @@ class Curve:
         while True:
             try:
                 new = self.ahead(point, h)
+                goes = self.smooth(point, new) or h <= MIN_STEP_RATIO * longest
             except SolverError:
-                h /= 2
-                if h < MIN_STEP_RATIO * longest:
+                goes = False
+                if h < 2 * MIN_STEP_RATIO * longest:
                     raise
-                continue
-            if not self.smooth(point, new) and h > MIN_STEP_RATIO * longest:
+            if goes:
+                yield point, h, new
+                point, h = new, min(longest, h * np.clip(AIM_PASSES / new.passes, 0.5, 2.0))
+            else:
                 h /= 2
-                continue
-            yield point, h, new
-            point, h = new, min(longest, h * np.clip(AIM_PASSES / new.passes, 0.5, 2.0))
 
     def smooth(self, one: Point, two: Point) -> bool:
         """Whether the path keeps its direction between two points; a branch only begins to."""

@@ -12,12 +12,13 @@ from rom.body.nonlinear.ranges import Load
 from rom.eigen.verbs import mean_motion
 from rom.eigen.workers import ONE_PROCESS, Workers
 from rom.model import Array, FEModel, Index, Interface
+from rom.paths.load_steps import load_steps
 
 N_TANGENT = 3  # lowest frequencies compared there
 MAX_ITERATIONS = 30  # of Newton's method on the full model
 INCREMENT_RTOL = 1e-8  # last increment of it; the next one is its square
 COVARIANCE_STEP = 1e-6  # of differences [1]
-MIN_LOAD_STEP = 2.0**-8  # at which a path of the full model is given up
+MIN_LOAD_STEP = 2.0**-10  # at which a path of the full model is given up
 
 
 @dataclass(frozen=True)
@@ -121,17 +122,11 @@ class HeldSolid:
 
     def _from_rest(self, W: Array) -> Array | None:
         """The same by steps of the load, halved where Newton's method fails."""
-        a, done, step = np.zeros(self.T.shape[1]), 0.0, 0.25
-        while done < 1.0:
-            step = min(step, 1.0 - done)
-            ahead = self._newton(a, (done + step) * W)
-            if ahead is not None:
-                a, done = ahead, done + step
-            elif step < MIN_LOAD_STEP:
-                return None
-            else:
-                step /= 2
-        return a
+        done, a = load_steps(
+            lambda a, share: self._newton(a, share * W), np.zeros(self.T.shape[1]),
+            least=MIN_LOAD_STEP, first=0.25,
+        )  # fmt: skip
+        return a if done == 1.0 else None
 
     def _newton(self, a: Array, W: Array) -> Array | None:
         """The equilibrium near a (m,), None if Newton's method does not find it."""

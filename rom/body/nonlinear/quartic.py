@@ -6,6 +6,7 @@
 T3 and T4 are symmetric in all indices, and only entries with i <= j <= k <= l are kept.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from math import comb
@@ -17,8 +18,32 @@ from rom.model import Array, Index
 BLOCK_ENTRIES = 4_000_000  # products of coordinates at many instants that are held at once
 
 
+class Energy:
+    """Strain energy of elastic coordinates q (r,), known by its `expansion` about any of them."""
+
+    K: Array
+    expansion: Callable[[Array], tuple[float, Array, Array]]
+
+    @property
+    def n(self) -> int:
+        """Number r of coordinates."""
+        return len(self.K)
+
+    def energy(self, q: Array) -> float:
+        """Strain energy [J] at the coordinates (r,)."""
+        return self.expansion(q)[0]
+
+    def force(self, q: Array) -> Array:
+        """(r,) derivative of the energy [N] at the coordinates (r,)."""
+        return self.expansion(q)[1]
+
+    def tangent(self, q: Array) -> Array:
+        """(r, r) second derivative of the energy [N/m] at the coordinates (r,)."""
+        return self.expansion(q)[2]
+
+
 @dataclass(frozen=True)
-class Quartic:
+class Quartic(Energy):
     """Strain energy of elastic coordinates q (r,).
 
     Attributes:
@@ -52,15 +77,6 @@ class Quartic:
         shapes = self.K.shape, self.cubic.shape, self.quartic.shape
         return shapes == ((r, r), (n_entries(r, 3),), (n_entries(r, 4),))
 
-    @property
-    def n(self) -> int:
-        """Number r of coordinates."""
-        return len(self.K)
-
-    def energy(self, q: Array) -> float:
-        """Strain energy [J] at the coordinates (r,)."""
-        return self.expansion(q)[0]
-
     def energies(self, Q: Array) -> Array:
         """(t,) strain energies [J] at the coordinates (t, r)."""
         i, j = np.triu_indices(self.n)
@@ -71,14 +87,6 @@ class Quartic:
             higher = q @ by_one.T + square @ by_two
             found.append((square * (0.5 * self.K[i, j] + higher)).sum(axis=1))
         return np.concatenate(found)
-
-    def force(self, q: Array) -> Array:
-        """(r,) derivative of the energy [N] at the coordinates (r,)."""
-        return self.expansion(q)[1]
-
-    def tangent(self, q: Array) -> Array:
-        """(r, r) second derivative of the energy [N/m] at the coordinates (r,)."""
-        return self.expansion(q)[2]
 
     def expansion(self, q: Array) -> tuple[float, Array, Array]:
         """Energy [J], force (r,) [N] and tangent (r, r) [N/m] at the coordinates (r,) at once."""

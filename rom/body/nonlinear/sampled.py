@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import nnls
 
+from rom.body.nonlinear.quartic import Energy
 from rom.body.nonlinear.ranges import Geometric
 from rom.body.nonlinear.statics import follow
 from rom.errors import ConfigError, ModelError, ParallelError
@@ -31,7 +32,7 @@ STEP_SHARES = (0.1, 0.4, 0.7, 1.0)  # of the loads at which states are trained
 
 
 @dataclass(frozen=True)
-class Sampled:
+class Sampled(Energy):
     """Strain energy of elastic coordinates q (r,), summed over weighted points.
 
     Attributes:
@@ -46,31 +47,14 @@ class Sampled:
     weights: Array
     lame: Array
 
-    @property
-    def n(self) -> int:
-        """Number r of coordinates."""
-        return len(self.K)
-
     def fits(self, r: int) -> bool:
         """Whether it is an energy of r coordinates."""
         p = len(self.weights)
         return self.K.shape == (r, r) and self.gradients.shape == (p, 9, r)
 
-    def energy(self, q: Array) -> float:
-        """Strain energy [J] at the coordinates (r,)."""
-        return self.expansion(q)[0]
-
     def energies(self, Q: Array) -> Array:
         """(t,) strain energies [J] at the coordinates (t, r)."""
         return np.array([self.energy(q) for q in Q])
-
-    def force(self, q: Array) -> Array:
-        """(r,) derivative of the energy [N] at the coordinates (r,)."""
-        return self.expansion(q)[1]
-
-    def tangent(self, q: Array) -> Array:
-        """(r, r) second derivative of the energy [N/m] at the coordinates (r,)."""
-        return self.expansion(q)[2]
 
     def expansion(self, q: Array) -> tuple[float, Array, Array]:
         """Energy [J], force (r,) [N] and tangent (r, r) [N/m]; infinite where J <= 0."""

@@ -11,11 +11,12 @@ from scipy.linalg import eigh, null_space
 from rom.errors import ModelError, SolverError
 from rom.model import Array
 from rom.paths.arc_length import Curve, Point
+from rom.paths.load_steps import load_steps
 
 MAX_ITERATIONS = 60  # of Newton's method in one step of load
 INCREMENT_RTOL = 1e-10  # last increment, of the coordinates in the norm of the energy
 MIN_STEP = 2.0**-20  # of an increment, where a descent is given up
-MIN_LOAD_STEP = 2.0**-5  # of the loads, from where on a path is followed by its arc length
+MIN_LOAD_STEP = 2.0**-6  # of the loads, at which a path is followed by its arc length instead
 SUFFICIENT_DESCENT = 1e-4  # share of the slope that a step has to keep (Armijo)
 LONGEST_STEP = 0.2  # of the deflection that small loads would cause
 LOCATION_RTOL = 1e-7  # of a step, to which a stiffness that vanishes is found
@@ -90,17 +91,11 @@ def passages(energy: Any, loads: Array, held: Array | None = None) -> list[Array
 
 def _led_to(body: Held, y: Array, start: Array, end: Array) -> list[Array]:
     """The equilibrium at the end of a stretch of load, halved where Newton's method fails."""
-    done, step = 0.0, 1.0
-    while done < 1.0:
-        step = min(step, 1.0 - done)
-        near = newton(body, y, start + (done + step) * (end - start))
-        if near is None:
-            step /= 2
-            if step < MIN_LOAD_STEP:
-                return _beyond(body, y, (start, end), done)
-        else:
-            y, done, step = near, done + step, 2 * step
-    return [y]
+    done, y = load_steps(
+        lambda y, share: newton(body, y, start + share * (end - start)),
+        y, least=MIN_LOAD_STEP, growth=2.0,
+    )  # fmt: skip
+    return [y] if done == 1.0 else _beyond(body, y, (start, end), done)
 
 
 def _beyond(body: Held, y: Array, stretch: tuple[Array, Array], done: float) -> list[Array]:

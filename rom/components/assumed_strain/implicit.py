@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
-from scipy.sparse import coo_matrix, csr_matrix
+from scipy.sparse import csr_matrix
 from scipy.sparse.linalg import spsolve
 
 from rom.arguments import between, finite, typed
@@ -17,7 +17,7 @@ from rom.components.assumed_strain import kernels
 from rom.components.assumed_strain.actions import Actions, Load, nodal, prepared
 from rom.components.assumed_strain.contact import touch
 from rom.components.assumed_strain.motion import Metal, depth_of, forces, mass, tangent
-from rom.components.assumed_strain.triangles import Sheet
+from rom.components.assumed_strain.triangles import Sheet, placed
 from rom.errors import ConfigError, SolverError, warn
 from rom.model import Array, Index
 
@@ -366,7 +366,7 @@ class _Way:
         K = tangent(self.body, self.metal, x, now.history)
         for nodes, A in trial.entries:
             dofs = 2 * nodes[:, None] + np.arange(2)
-            K = K + _placed(A, dofs, dofs, x.size)
+            K = K + placed(A, dofs, dofs, x.size)
         if len(self.acts.sides):
             K = K - self.turning(x, t)
         if self.M is None:
@@ -390,7 +390,7 @@ class _Way:
             A[:, :, 2] += more
         first, second = (2 * e[:, None] + np.arange(2) for e in (i, j))
         ends = np.concatenate([first, second], axis=1)
-        return _placed(A, first, ends, x.size) + _placed(A, second, ends, x.size)
+        return placed(A, first, ends, x.size) + placed(A, second, ends, x.size)
 
 
 def _refuse_free(body: Sheet, actions: Actions) -> None:
@@ -436,10 +436,3 @@ def _stretch_ratio(body: Sheet, x: Array) -> Array:
 def _grown(now: _Now, then: _Now) -> float:
     """Most plastic strain that has grown anywhere in a step [1]."""
     return float((then.history - now.history)[..., 4].max())
-
-
-def _placed(A: Array, rows: Array, columns: Array, n: int) -> csr_matrix:
-    """Small matrices (k, r, c) added at dofs (k, r) and (k, c)."""
-    place = (np.repeat(rows, columns.shape[1], axis=1).ravel(),
-             np.tile(columns, (1, rows.shape[1])).ravel())  # fmt: skip
-    return coo_matrix((A.ravel(), place), shape=(n, n)).tocsr()

@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.sparse import coo_matrix, csr_matrix, identity, kron
+from scipy.sparse import csr_matrix, identity, kron
 
 from rom.arguments import finite, is_number, positive, shortened, typed, whole
 from rom.components.assumed_strain import kernels
 from rom.components.assumed_strain.actions import Actions, dofs_of, nodal, prepared
-from rom.components.assumed_strain.triangles import STATES, Sheet
+from rom.components.assumed_strain.triangles import STATES, Sheet, placed
 from rom.errors import MaterialError, SolverError
 from rom.model import Array
 
@@ -90,9 +90,7 @@ def tangent(body: Sheet, metal: Metal, x: Array, history: Array | None = None) -
     K, x = np.zeros((len(body.patch), 12, 12)), nodal("positions", x, body)
     kernels.tangents(x, *_parts(body, metal, history), K)
     dofs = (2 * body.patch[:, :, None] + np.arange(2)).reshape(-1, 12)
-    rows, columns = np.repeat(dofs, 12, axis=1).ravel(), np.tile(dofs, (1, 12)).ravel()
-    K = 0.5 * (K + np.swapaxes(K, 1, 2))
-    return coo_matrix((K.ravel(), (rows, columns)), shape=(2 * len(x),) * 2).tocsr()
+    return placed(0.5 * (K + np.swapaxes(K, 1, 2)), dofs, dofs, 2 * len(x))
 
 
 @typed
@@ -122,11 +120,9 @@ def forces(
 @typed
 def mass(body: Sheet, metal: Metal) -> csr_matrix:
     """(2n, 2n) consistent mass [kg]; lumped by its row sums in `fly`."""
-    m = body.weights.sum(axis=1) * metal.rho / 12
-    T = body.triangles
-    data = (m[:, None, None] * (1 + np.eye(3))).ravel()
-    place = (np.repeat(T, 3, axis=1).ravel(), np.tile(T, (1, 3)).ravel())
-    return kron(coo_matrix((data, place), shape=(len(body.points),) * 2), identity(2), "csr")
+    m, T = body.weights.sum(axis=1) * metal.rho / 12, body.triangles
+    each = m[:, None, None] * (1 + np.eye(3))
+    return kron(placed(each, T, T, len(body.points)), identity(2), "csr")
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,7 +17,7 @@ import numpy.typing as npt
 from scipy.sparse import coo_matrix, csr_matrix, eye, vstack
 
 from rom.components.assumed_strain.motion import Metal
-from rom.components.assumed_strain.triangles import Sheet, sides_of
+from rom.components.assumed_strain.triangles import Sheet, placed, sides_of
 from rom.model import Array, Index
 
 Mask = npt.NDArray[np.bool_]
@@ -46,8 +46,7 @@ def bending(body: Sheet, metal: Metal, parts: tuple[Index, ...] = ()) -> csr_mat
     for t in np.flatnonzero(~inner[side].all(axis=1)):
         _free_slopes(K[t], 3 + np.flatnonzero(~inner[side[t]]))
     dofs = np.hstack([body.triangles, n + side])
-    place = (np.repeat(dofs, 6, axis=1).ravel(), np.tile(dofs, (1, 6)).ravel())
-    whole = coo_matrix((K.ravel(), place), shape=(n + len(ends),) * 2).tocsr()
+    whole = placed(K, dofs, dofs, n + len(ends))
     slopes = vstack([eye(n), _fitted_slopes(body, side, inner, normal, parts)], "csr")
     return (slopes.T @ whole @ slopes).tocsr()
 

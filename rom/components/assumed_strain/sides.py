@@ -1,11 +1,11 @@
 """The linear stiffness of a sheet summed side by side, in shares for several processes."""
 
 import numpy as np
-from scipy.sparse import coo_matrix, csr_matrix
+from scipy.sparse import csr_matrix
 
 from rom.arguments import typed
 from rom.components.assumed_strain.motion import Metal
-from rom.components.assumed_strain.triangles import Sheet, constant_gradients, sides_of
+from rom.components.assumed_strain.triangles import Sheet, constant_gradients, placed, sides_of
 from rom.errors import ConfigError
 from rom.model import Array, Index
 
@@ -43,8 +43,7 @@ def stiffness_by_sides(body: Sheet, metal: Metal, *, share: tuple[int, int] = (0
     K = np.swapaxes(B, 1, 2) @ (volume[:, None, None] * (_elasticity(body, metal) @ B))
     nodes = body.triangles[triangles].reshape(-1, 6)  # some twice: their entries add up
     dofs = (2 * nodes[:, :, None] + np.arange(2)).reshape(-1, 12)
-    rows, columns = np.repeat(dofs, 12, axis=1).ravel(), np.tile(dofs, (1, 12)).ravel()
-    return coo_matrix((K.ravel(), (rows, columns)), shape=(2 * len(body.points),) * 2).tocsr()
+    return placed(K, dofs, dofs, 2 * len(body.points))
 
 
 def _triangles_at_sides(T: Index) -> tuple[Index, Array]:

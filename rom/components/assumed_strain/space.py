@@ -6,7 +6,7 @@ from scipy.sparse import coo_matrix, csr_matrix, identity, kron
 from rom.arguments import typed
 from rom.components.assumed_strain.motion import Metal, mass, tangent
 from rom.components.assumed_strain.plates import bending
-from rom.components.assumed_strain.triangles import Sheet
+from rom.components.assumed_strain.triangles import Sheet, placed
 from rom.errors import ConfigError, InterfaceError
 from rom.model import Array, FEModel, Index, Interface, SurfaceMesh
 
@@ -65,8 +65,6 @@ def _interface(name: str, nodes: Index, body: Sheet, points: Array) -> Interface
             hint="Add the next row of nodes.",
         )
     T, area = np.searchsorted(nodes, body.triangles[inside]), body.area[inside]
-    data = (area[:, None, None] / 12 * (1 + np.eye(3))).ravel()
-    place = (np.repeat(T, 3, axis=1).ravel(), np.tile(T, (1, 3)).ravel())
-    S = coo_matrix((data, place), shape=(nodes.size,) * 2).tocsr()
+    S = placed(area[:, None, None] / 12 * (1 + np.eye(3)), T, T, nodes.size)
     origin = S.sum(axis=0) @ points[nodes] / S.sum()
     return Interface(name, nodes, points[nodes], S, np.asarray(origin).ravel())

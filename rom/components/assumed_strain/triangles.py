@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+from scipy.sparse import coo_matrix, csr_matrix
 
 from rom.arguments import finite, one_of, positive, shortened, typed
 from rom.errors import ConfigError, MeshError
@@ -148,6 +149,13 @@ def constant_gradients(X: Array, T: Index) -> tuple[Array, Array]:
     for k, side in enumerate((c - b, a - c, b - a)):
         G[:, k] = np.column_stack([-side[:, 1], side[:, 0]]) / (2 * area[:, None])
     return G, area
+
+
+def placed(A: Array, rows: Index, columns: Index, n: int) -> csr_matrix:
+    """Small matrices (k, r, c) added at rows (k, r) and columns (k, c) of one (n, n)."""
+    place = (np.repeat(rows, columns.shape[1], axis=1).ravel(),
+             np.tile(columns, (1, rows.shape[1])).ravel())  # fmt: skip
+    return coo_matrix((A.ravel(), place), shape=(n, n)).tocsr()
 
 
 def sides_of(T: Index) -> Index:

@@ -233,7 +233,7 @@ def curvature_geometry(S, W):
 
 
 @inner
-def add_element(W, C, viscous, weight, rate, at, v):
+def add_element(W, C, viscous, weight, at, v):
     """Add force and tangent of one element, whose nine dofs start at ``at``."""
     for k in range(3):
         for c in range(9):
@@ -245,16 +245,15 @@ def add_element(W, C, viscous, weight, rate, at, v):
         for d in range(9):
             total = W.H[c, d]
             for k in range(3):
-                total += weight * (C[k] + rate * viscous[k]) * W.D[k, c] * W.D[k, d]
+                total += weight * C[k] * W.D[k, c] * W.D[k, d]
             W.A[at + c, d - c + HALF_BANDWIDTH] += total
 
 
 @kernel
-def internal(rod, x, p, v, rate, W):
-    """Set the internal forces W.r and the band W.A of their tangent to the coordinates.
+def internal(rod, x, p, v, W):
+    """Set the internal forces W.r, viscous ones by velocities v, and the band W.A of elastic ones.
 
-    ``rate`` is the change of the velocities v per change of the coordinates in a time step, zero
-    in statics. The tangent is exact but for the change of the directions of viscous forces.
+    The tangent is the exact derivative of the elastic forces.
     """
     W.r[:] = 0.0
     W.A[:] = 0.0
@@ -262,11 +261,11 @@ def internal(rod, x, p, v, rate, W):
         stretch_of(rod, x, p, n, W)
         stretch_geometry(rod.h[n], W)
         at = 6 * n + 3
-        add_element(W, rod.stretch[n], rod.viscous_stretch[n], rod.h[n], rate, at, v)
+        add_element(W, rod.stretch[n], rod.viscous_stretch[n], rod.h[n], at, v)
     for i in range(rod.l.size):
         curvature_of(rod, p, i, W)
         curvature_geometry(rod.S[i], W)
-        add_element(W, rod.bend[i], rod.viscous_bend[i], rod.l[i], rate, 6 * i, v)
+        add_element(W, rod.bend[i], rod.viscous_bend[i], rod.l[i], 6 * i, v)
     for k in range(rod.h.size + 2):  # the gradient turns with the section
         add_turning(W.A, 6 * k, 0.5, W.r[6 * k : 6 * k + 3])
 

@@ -229,7 +229,7 @@ def _motion(rod: Rod, found: Solution, acting: Any, free: Mask) -> Motion:
     v = np.roll(v, 3, axis=2).reshape(len(found.t), -1)[:, :-3]
     W, root = work(rod), np.zeros((len(found.t), 6))
     for k, t in enumerate(found.t):
-        internal(rod, x[k], p[k], v[k], 0.0, W)
+        internal(rod, x[k], p[k], v[k], W)
         add_loads(p[k], *acting(float(t)), W)
         root[k] = np.roll(np.where(free[:6], 0.0, W.r[:6]), 3)
     return Motion(rod, found.t, x, p, v, root, int(found.statistics["iterations"]))

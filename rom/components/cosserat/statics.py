@@ -22,11 +22,12 @@ from rom.components.cosserat.energy import (
 from rom.components.cosserat.shapes import Shape, reference
 from rom.errors import ConfigError, SolverError
 from rom.model import Array, Mask
+from rom.paths.load_steps import load_steps
 
 MAX_ROTATION = 0.2  # rotation of an iteration [rad]: larger steps jump to other equilibria
 INCREMENT_RTOL = 1e-8  # last increment, in rad and lengths of the rod; the next one is its square
 MAX_ITERATIONS = 200
-MIN_LOAD_STEP = 1e-4  # part of the load that is tried before giving up
+MIN_LOAD_STEP = 5e-5  # part of the load at which it is given up
 
 
 @kernel
@@ -100,7 +101,7 @@ def newton(rod, x, p, load, spin, free, W):
     length = rod.h.sum()
     rest = np.zeros(W.r.size)
     for iteration in range(MAX_ITERATIONS):
-        internal(rod, x, p, rest, 0.0, W)
+        internal(rod, x, p, rest, W)
         add_loads(p, load[0], load[1], W)
         add_spin(rod, x, p, spin, W)
         for k in range(W.r.size):
@@ -200,27 +201,20 @@ def equilibrium(
     shape = reference(rod) if start is None else Shape(start.x.copy(), start.p.copy())
     (force, moment), free = fitting(rod, load, free)
     W, speed = work(rod), np.array(spin, dtype=float)
-    share, part = (0.0, 1.0 / steps) if start is None else (0.0, 1.0)
-    while share < 1.0:
-        part = min(part, 1.0 - share)
-        x, p = shape.x.copy(), shape.p.copy()
-        now = min(share + part, 1.0)
-        if newton(rod, x, p, (now * force, now * moment), np.sqrt(now) * speed, free, W) > 0:
-            share, shape = now, Shape(x, p)
-            if 1.0 - share < 1e-12:
-                break
-        elif part > MIN_LOAD_STEP:
-            part /= 2
-        else:
-            raise _stuck(shape, share)
+
+    def ahead(shape: Shape, share: float) -> Shape | None:
+        x, p, now = shape.x.copy(), shape.p.copy(), (share * force, share * moment)
+        return Shape(x, p) if newton(rod, x, p, now, np.sqrt(share) * speed, free, W) > 0 else None
+
+    first = 1.0 / steps if start is None else 1.0
+    share, shape = load_steps(ahead, shape, least=MIN_LOAD_STEP, first=first)
+    if share < 1.0:
+        error = SolverError(f"no equilibrium beyond {100 * share:.4g} % of the load.",
+                            hint="The rod buckles or a mechanism is left free.",
+                            solution=shape)  # fmt: skip
+        error.share = share  # type: ignore[attr-defined]
+        raise error
     return shape
-
-
-def _stuck(shape: Shape, share: float) -> SolverError:
-    error = SolverError(f"no equilibrium beyond {100 * share:.4g} % of the load.", solution=shape,
-                        hint="The rod buckles or a mechanism is left free.")  # fmt: skip
-    error.share = share  # type: ignore[attr-defined]
-    return error
 
 
 def linearised(
@@ -245,7 +239,7 @@ def linearised(
     """
     W = work(rod)
     n = W.r.size
-    internal(rod, shape.x, shape.p, np.zeros(n), 0.0, W)
+    internal(rod, shape.x, shape.p, np.zeros(n), W)
     if load is not None:
         add_loads(shape.p, *load, W)
     add_spin(rod, shape.x, shape.p, np.array(spin, dtype=float), W)

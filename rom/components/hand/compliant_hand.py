@@ -21,16 +21,17 @@ from rom import rotation
 from rom.arguments import between
 from rom.components.cosserat import Rod, Shape, clamped, linearised, loads, reference, rod
 from rom.components.cosserat.helical_spring import HelicalSpring
+from rom.components.cosserat.statics import MAX_ROTATION
 from rom.components.hand.cable import Hole, Tendon
 from rom.errors import ConfigError, ModelError, SolverError
 from rom.model import Array, Mask
+from rom.paths.load_steps import load_steps
 
 PHALANX_RIGIDITY_RATIO = 1e5  # rigidity of a phalanx over that of the springs
 STOP_STIFFNESS_RATIO = 50.0  # stiffness of touching coils over that of the spring
-MAX_ROTATION = 0.2  # of an iteration [rad]
 INCREMENT_RTOL = 1e-9  # last increment, in rad and lengths of the rod
 MAX_ITERATIONS = 80
-MAX_HALVINGS = 8  # of the load step
+MIN_STEP = 0.5**9  # of the way, at which it is given up
 HAND_SPRING = HelicalSpring(0.7e-3, 7e-3, 5, 8e-3)
 INDEX_LENGTHS = (18e-3, 12e-3, 10e-3)  # m
 LENGTHS = {  # m, of whole fingers
@@ -242,18 +243,14 @@ def close(
     first = here.pull if drawn else here.tension
     goal = np.append(np.asarray(load, dtype=float), (tension or 0.0) if pull is None else pull)
     begin = np.append(here.load, first)
-    share, part = 0.0, 1.0
-    while share < 1.0:
-        now = begin + min(share + part, 1.0) * (goal - begin)
-        found = _balance(finger, here, now, drawn, way, extra)
-        if found is not None:
-            share, here = min(share + part, 1.0), found
-        elif part > 0.5**MAX_HALVINGS:
-            part /= 2
-        else:
-            raise SolverError(f"no posture beyond {100 * share:.3g} % of the way.",
-                              hint="A joint buckles, or the load is too large.",
-                              solution=here)  # fmt: skip
+    share, here = load_steps(
+        lambda at, x: _balance(finger, at, begin + x * (goal - begin), drawn, way, extra),
+        here, least=MIN_STEP,
+    )  # fmt: skip
+    if share < 1.0:
+        raise SolverError(f"no posture beyond {100 * share:.3g} % of the way.",
+                          hint="A joint buckles, or the load is too large.",
+                          solution=here)  # fmt: skip
     return here
 
 

@@ -5,6 +5,7 @@ Either each cable has a motor, or the drums of one shaft draw in several.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -86,7 +87,7 @@ def winches(
     t = dt * np.arange(len(reached))
     base = drive or Drive()
     return {
-        name: replace(base, tension=None, pull=_Held(PchipInterpolator(t, y), t[-1]))
+        name: replace(base, tension=None, pull=partial(_held, PchipInterpolator(t, y), t[-1]))
         for name, y in zip(names, reached.T, strict=True)
     }
 
@@ -109,7 +110,9 @@ def shaft(
     """
     base = drive or Drive()
     return {
-        name: replace(base, tension=None, pull=_Drum(angle, positive(f"radius of {name}", r)))
+        name: replace(
+            base, tension=None, pull=partial(_drawn, positive(f"radius of {name}", r), angle)
+        )
         for name, r in radii.items()
     }
 
@@ -136,23 +139,11 @@ def motor_force(solution: Any, name: str) -> Array:
     return np.linalg.norm(first, axis=1)
 
 
-@dataclass(frozen=True)
-class _Drum:
-    """What runs onto a drum of a shaft."""
-
-    angle: Callable[[float], float]
-    radius: float
-
-    def __call__(self, t: float) -> float:
-        return self.radius * self.angle(t)
+def _drawn(radius: float, angle: Callable[[float], float], t: float) -> float:
+    """What has run onto a drum of a shaft [m]."""
+    return radius * angle(t)
 
 
-@dataclass(frozen=True)
-class _Held:
-    """A pull over time that stays what it was at the end."""
-
-    curve: PchipInterpolator
-    last: float
-
-    def __call__(self, t: float) -> float:
-        return float(self.curve(min(max(t, 0.0), self.last)))
+def _held(curve: PchipInterpolator, last: float, t: float) -> float:
+    """A pull over time that stays what it was at the end [m]."""
+    return float(curve(min(max(t, 0.0), last)))

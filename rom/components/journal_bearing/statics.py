@@ -83,23 +83,19 @@ def _settled(bearing: JournalBearing, W: Array, x: Array, speed: float, viscosit
         x = x + step
         if bearing.thinnest(x) < MIN_FILM_RATIO * c:
             break
-    raise SolverError(_no_film(bearing, now, size), hint=_cure(bearing))
+    raise _no_film(bearing, now, size)
 
 
-def _no_film(bearing: JournalBearing, film: Film, load: float) -> str:
+def _no_film(bearing: JournalBearing, film: Film, load: float) -> SolverError:
     where = ", ".join(f"{np.degrees(g.angle):.0f}" for g in bearing.grooves)
     there = f" with oil from grooves at {where} degrees" if bearing.grooves else ""
     carried = float(np.hypot(*film.force[:2]))
-    return (
+    cures = {"jfo": "Move the inlet out of the loaded arc, upstream of it, or lower the load."}
+    return SolverError(
         f"no film carries {load:.4g} N{there}: at {film.eccentricity:.3f} clearances, "
-        f"{bearing.thinnest(film.motion) * 1e6:.3g} micrometres thin, it carries {carried:.4g} N."
+        f"{bearing.thinnest(film.motion) * 1e6:.3g} micrometres thin, it carries {carried:.4g} N.",
+        hint=cures.get(bearing.cavitation, "Lower the load, or raise speed, viscosity or length."),
     )
-
-
-def _cure(bearing: JournalBearing) -> str:
-    if bearing.cavitation == "jfo":
-        return "Move the inlet out of the loaded arc, upstream of it, or lower the load."
-    return "Lower the load, or raise speed, viscosity or length."
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,7 +20,7 @@ from rom import rotation
 from rom.components.orbits.beside import Beside
 from rom.components.orbits.flow import Start
 from rom.components.orbits.shooting import Return, energy
-from rom.mbs.analysis.local_equations import MAX_DENSE
+from rom.mbs.analysis.local_equations import MAX_DENSE, difference
 from rom.mbs.kernels.system import ROLL
 from rom.model import Array
 
@@ -108,13 +108,8 @@ class Tangent:
     def energy_slope(self) -> Array:
         """(f,) derivative of the energy by the coordinates of the start [J]."""
         chart, mechanism = self.around.chart, self.around.flow.mechanism
-        return np.array(
-            [
-                (energy(mechanism, chart.moved(e)) - energy(mechanism, chart.moved(-e)))
-                / (2 * PROBE_RTOL)
-                for e in np.eye(chart.size) * PROBE_RTOL
-            ]
-        )
+        step = np.full(chart.size, PROBE_RTOL)
+        return difference(lambda y: energy(mechanism, chart.moved(y)), step).ravel()
 
     def solved(
         self, rate: tuple[Array, Array] | None, *sides: Array, energy_gap: float | None = None

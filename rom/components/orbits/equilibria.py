@@ -222,7 +222,8 @@ class _Equilibria:
             squares, U = _all(pencil)
             negative = int(np.sum(squares < -none))
         else:
-            squares, U = _nearest(pencil, -none)
+            k, nothing = min(N_NEAREST, pencil.n_free), np.zeros((pencil.M.shape[0], 0))
+            squares, U = pencil.near(-none, k) if k else (np.zeros(0), nothing)
             negative = pencil.count(-none)
         below = negative - int(np.sum(squares < -none))
         squares = np.where(np.abs(squares) <= none, 0.0, squares)
@@ -254,12 +255,6 @@ class _Curvatures:
         """Stiffness nearest to zero, and its motion (n,)."""
         k = np.argmin(np.abs(self.squares))
         return float(self.squares[k]), self.motions[:, k]
-
-
-def _nearest(pencil: Pencil, shift: float) -> tuple[Array, Array]:
-    """Some stiffnesses (k,) [1/s^2] around a shift, and their motions (n, k)."""
-    k = min(N_NEAREST, pencil.n_free)
-    return pencil.near(shift, k) if k else (np.zeros(0), np.zeros((pencil.M.shape[0], 0)))
 
 
 def _all(pencil: Pencil) -> tuple[Array, Array]:

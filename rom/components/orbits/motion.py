@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -171,12 +170,24 @@ def periodic_motion(  # noqa: PLR0913  one keyword per choice, most have default
     whole("settle", settle, 0, MAX_SETTLE)
     if conservative and period is not None:
         raise ConfigError("conservative is for motions that nothing drives; leave period out.")
+    whole("steps", steps, 4, MAX_STEPS)
+    positive("tolerance", tolerance)
+    between("rho_inf", rho_inf, 0, 1)
+    for name, time in (("period", period), ("guess", guess)):
+        if time is not None:
+            positive(name, time)
+    known = None
+    if isinstance(start, PeriodicMotion):
+        known, guess = start.derivatives, guess or start.period
+    state = start.state if isinstance(start, PeriodicMotion) else start
+    if t_start is None:
+        t_start = 0.0 if state is None else state.t
     for more in range(MAX_TRIALS):
-        shooting, flow, begin = prepared(
-            mechanism, period, start, turns, steps + more, rho_inf, guess, t_start, tolerance,
-            progress,
-        )  # fmt: skip
-        known = start.derivatives if isinstance(start, PeriodicMotion) else None
+        numbers = (float(t_start), steps + more, rho_inf, tolerance)
+        shooting = Shooting(mechanism, period, *numbers, turns, progress)
+        flow = shooting.flow(period or guess or _guessed(mechanism, state))
+        begin = flow.initial() if state is None else state
+        check_state(begin, flow.packed)
         try:
             return _near(shooting, flow, begin, known, settle, conservative)
         except SolverError:
@@ -202,41 +213,6 @@ def _near(
     if conservative:
         shooting = replace(shooting, energy=energy(shooting.mechanism, at))
     return recorded(shooting, *shooting.closed(flow, at, turning, known))
-
-
-def prepared(  # noqa: PLR0913  the arguments of the verb
-    mechanism: Any,
-    period: float | None,
-    start: Any,
-    turns: Any,
-    steps: int,
-    rho_inf: float,
-    guess: float | None,
-    t_start: float | None,
-    tolerance: float,
-    progress: bool,
-) -> tuple[Shooting, Flow, State]:
-    """Checked arguments: how to look for the motion, what moves, and the state to begin with."""
-    state = start.state if isinstance(start, PeriodicMotion) else start
-    if t_start is None:
-        t_start = 0.0 if state is None else state.t
-    whole("steps", steps, 4, MAX_STEPS)
-    positive("tolerance", tolerance)
-    between("rho_inf", rho_inf, 0, 1)
-    if period is not None:
-        positive("period", period)
-    if guess is not None:
-        positive("guess", guess)
-    if guess is None and isinstance(start, PeriodicMotion):
-        guess = start.period
-    numbers = (float(t_start), steps, rho_inf, tolerance)
-    shooting = Shooting(mechanism, period, *numbers, turns, progress)
-    first = period or guess or _guessed(mechanism, state)
-    flow = shooting.flow(first)
-    if state is None:
-        state = flow.initial()
-    check_state(state, flow.packed)
-    return shooting, flow, state
 
 
 def _guessed(mechanism: Mechanism, state: State | None) -> float:

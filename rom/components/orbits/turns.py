@@ -115,7 +115,10 @@ def turns_of(mechanism: Mechanism, turns: Mapping[str, float | None] | None, sta
     for given, angle in (turns or {}).items():
         name = _joint_of(mechanism, given)
         body, axis, point, sign = _hinged(mechanism, name, state, places)
-        if angle is not None and abs(_beyond_turns(angle)) < WHOLE_TURN_TOL:
+        if (
+            angle is not None
+            and abs(np.remainder(angle + np.pi, FULL_TURN) - np.pi) < WHOLE_TURN_TOL
+        ):
             continue  # the same place
         part = mechanism.parts[body]
         _refuse_unequal(name, part, axis, point, angle)
@@ -138,11 +141,6 @@ def _joint_of(mechanism: Mechanism, name: str) -> str:
     joints = mechanism.joints.values()
     found = [x.name for x in joints if x.turn and name in [m.body for m in x.markers]]
     return found[0] if name in mechanism.parts and len(found) == 1 else name
-
-
-def _beyond_turns(angle: float) -> float:
-    """An angle without its whole turns [rad]."""
-    return float((angle + np.pi) % FULL_TURN - np.pi)
 
 
 def _hinged(

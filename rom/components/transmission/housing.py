@@ -9,10 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.linalg import eigh
 
 from rom.body.flexible import FlexibleBody
-from rom.body.records import still_motions
 from rom.body.reference import marker_motion
 from rom.errors import ModelError
 from rom.model import Array
@@ -65,21 +63,19 @@ class Housing:
         A = np.asarray(axes, dtype=float)
         if A.shape != (3, 3) or not np.allclose(A @ A.T, np.eye(3), atol=1e-9):
             raise ModelError(f"axes {A.tolist()} of the unit must be orthonormal rows.")
-        M, K = body.full_matrices()
-        N = still_motions(np.vstack([body.marker(name).hold for name in fixed]))
-        omega2, V = eigh(N.T @ K @ N, N.T @ M @ N)
-        if omega2[0] < 1e-9 * omega2[-1]:
+        omega, V = body.modes(fixed=fixed)
+        if omega[0] ** 2 < 1e-9 * omega[-1] ** 2:
             raise ModelError(
                 f"the housing {body.name!r} moves as a whole although {fixed} are held.",
                 hint="Hold an interface that stops all six rigid motions.",
             )
-        N = np.sqrt(body.mass) * N @ V
+        N = np.sqrt(body.mass) * V
         turn = np.kron(np.eye(2), A)
         left, right = (
             {node: turn @ motion_of(body, name) @ N for node, name in where.items()}
             for where in (pinion, gear)
         )
-        return cls(body.mass * np.eye(omega2.size), np.diag(body.mass * omega2), (left, right))
+        return cls(body.mass * np.eye(omega.size), np.diag(body.mass * omega**2), (left, right))
 
     def check(self, *bearings: Mapping[int, object]) -> None:
         """See that every bearing has a bush.

@@ -15,7 +15,6 @@ from rom.components.transmission.mechanism import coordinates_of, mechanism_of, 
 from rom.components.transmission.motion import teeth_and_heat
 from rom.components.transmission.unit import Rest, Transmission
 from rom.errors import ModelError, reached
-from rom.mbs.mechanism import Mechanism
 from rom.model import Array
 
 GAP_TOL = 1e-10  # in rad or lengths of the unit
@@ -99,8 +98,10 @@ def steady(start: Rest | Steady, *, steps: int = 60) -> Steady:
     unit = start.unit
     q, v = (start.q, 0.0 * start.q) if isinstance(start, Rest) else (start.q[0], start.v[0])
     mech, near = mechanism_of(unit, q, v), None if isinstance(start, Rest) else start.motion
-    if near is not None and not _same_modes(mech, near.solution.mechanism):
-        near = None
+    if near is not None:
+        both = ([part.moving for part in m.parts.values()] for m in (mech, near.solution.mechanism))
+        if not all(np.array_equal(a.K, b.K) for a, b in zip(*both, strict=True)):
+            near = None  # the coordinates of both do not mean the same
     found = periodic_motion(
         mech, period=unit.mesh_period, start=near, steps=steps,
         rho_inf=RHO_INF, t_start=start.theta / unit.speed, tolerance=GAP_TOL,
@@ -112,12 +113,6 @@ def steady(start: Rest | Steady, *, steps: int = 60) -> Steady:
         *teeth_and_heat(unit, found.solution, q), found.multipliers, found.passes,
         float(ends.max() / np.abs(q).max()), found,
     )  # fmt: skip
-
-
-def _same_modes(one: Mechanism, two: Mechanism) -> bool:
-    """Whether the coordinates of both mechanisms mean the same."""
-    both = ([part.moving for part in mech.parts.values()] for mech in (one, two))
-    return all(np.array_equal(a.K, b.K) for a, b in zip(*both, strict=True))
 
 
 def sweep(unit: Transmission, speeds: Iterable[float], *, steps: int = 60) -> list[Steady]:

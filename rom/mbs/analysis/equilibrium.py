@@ -1,6 +1,6 @@
 """Equilibrium of a mechanism, at rest or turning as one, by Newton's method with load steps."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -20,6 +20,7 @@ from rom.mbs.mechanism import Mechanism
 from rom.mbs.results.state import State, check_state
 from rom.mbs.results.validity import warn_of_range
 from rom.model import Array
+from rom.paths.load_steps import load_steps
 
 MAX_PASSES = 150
 MAX_IDLE = 25  # that lead neither down nor nearer; what is found at all is found in as many
@@ -28,7 +29,7 @@ PROGRESS_RTOL = 1e-6  # round-off of both
 MAX_WAY = 30.0  # of the search, in rad and sizes of the mechanism
 MAX_TRIALS = 40  # of Newton's corrections where the potential curves downwards
 MOST_STEPS = 100_000  # of the load; where thousands do not help, another start may
-MIN_LOAD_STEP = 1 / 64  # part of a load step at which the search is given up
+MIN_LOAD_STEP = 1 / 128  # part of a load step at which the search is given up
 CORRECTION_TOL = 1e-12  # of the last correction
 LEAST_BENDING = 1e-3  # of the inertia in a motion, from which a body counts as deforming
 MAX_TURN = 2 * np.pi  # after which what turned meets the same forces again [rad]
@@ -102,8 +103,8 @@ def equilibrium(
     found = search.start(state, assemble or state is not None)
     with reached(lambda: found):
         nearby = search.eased(found, steps) if state is None else None
-        for at_load in search.loaded(found, steps) if nearby is None else (nearby,):
-            found = at_load
+    found = search.loaded(found, steps) if nearby is None else nearby
+    with reached(lambda: found):
         search.judge(found)
     if isinstance(spin, Mapping) and found.lam.size:  # else supports turn along, and drives
         now.gradient(found.q, found.v)
@@ -154,37 +155,39 @@ class _Search:
         if not changed:
             return None
         with suppress(SolverError):
-            return [*self.loaded(state, steps, least=1.0)][-1]
+            return self.loaded(state, steps, least=0.5)
         with suppress(SolverError):
             with self.now.packed.eased():
-                nearby = [*self.loaded(state, steps)][-1]
-            return [*self.loaded(self.start(nearby), 1)][-1]
+                nearby = self.loaded(state, steps)
+            return self.loaded(self.start(nearby), 1)
         return None
 
-    def loaded(self, state: State, steps: int, *, least: float = MIN_LOAD_STEP) -> Iterator[State]:
-        """Equilibria at growing shares of the loads, the last at all of them.
+    def loaded(self, state: State, steps: int, *, least: float = MIN_LOAD_STEP) -> State:
+        """Equilibrium under all of the loads, by growing shares of them.
 
         Args:
             state: where the search starts.
             steps: number of load steps.
-            least: part of a step which is not halved any more.
+            least: part of a step at which it is given up.
 
         Raises:
-            SolverError: if Newton's method fails, even after small steps.
+            SolverError: if Newton's method fails, even after small steps; ``error.solution`` is the
+                equilibrium at the share before.
         """
-        done, width = 0.0, 1.0 / steps
-        while done < 1.0:
-            load = min(done + width, 1.0)
-            load = load if load < 1.0 - 1e-9 else 1.0
+        failed: list[SolverError] = []
+
+        def ahead(at: State, load: float) -> State | None:
             try:
-                state = self.settled(state, load, beside=done > 0.0)
-            except SolverError:
-                width /= 2
-                if width < least / steps:
-                    raise
-                continue
-            done = load
-            yield state
+                with reached(lambda: at):
+                    return self.settled(at, load, beside=at is not state)
+            except SolverError as error:
+                failed[:] = [error]
+                return None
+
+        share, found = load_steps(ahead, state, least=least / steps, first=1.0 / steps)
+        if share < 1.0:
+            raise failed[0]
+        return found
 
     def settled(self, state: State, load: float, *, beside: bool) -> State:
         """Equilibrium at a share of the loads, a stable one if it is found.

@@ -192,7 +192,8 @@ class Pencil:
             shift = 0.5j * (low + high)
             k = self.count(high**2) - self.count(low**2)
         every, Z = self.damped(shift, k + 2 * N_SPARE)
-        zero = self._rate_round_off(Z)
+        mass = np.einsum("ik,ik->k", Z.conj(), self.M @ Z).real
+        zero = np.sqrt(self.round_off(Z / np.sqrt(mass)))
         every = np.where(np.abs(every) <= zero, 0.0, every)
         real = np.flatnonzero(np.abs(every.imag) <= zero)
         real = real[np.argsort(-every[real].real)][: (real.size + 1) // 2]
@@ -207,11 +208,6 @@ class Pencil:
             if not kept.size:
                 wanted.refuse(roots.imag)
         return self._in_real_motions(roots[kept], Z[:, order[kept]])
-
-    def _rate_round_off(self, Z: Array) -> Array:
-        """(k,) eigenvalues [1/s] that may be round-off."""
-        mass = np.einsum("ik,ik->k", Z.conj(), self.M @ Z).real
-        return np.sqrt(self.round_off(Z / np.sqrt(mass)))
 
     def _in_real_motions(self, roots: Array, Z: Array) -> tuple[Array, Array, Array]:
         """Shapes as combinations (2 k, k) of real motions (n, 2 k) of unit mass."""
@@ -300,6 +296,7 @@ class Pencil:
 
         Raises:
             ModesMissedError: if the signature counts others than were found.
+            SolverError: if the modes found have one frequency, so that none can be counted apart.
         """
         k = min(n + N_SPARE, self.n_free)
         squares, X = self.near(self.low_shift(), k)

@@ -11,7 +11,6 @@ from rom.arguments import typed
 from rom.errors import ConfigError, ModelError, warn
 from rom.mbs.analysis.few_modes import Pencil, Wanted
 from rom.mbs.analysis.local_equations import (
-    DIFFERENCE_STEP,
     Instant,
     consistent,
     free_motions,
@@ -352,9 +351,7 @@ class _Path:
     @cached_property
     def rate(self) -> float:
         """Speed of the mechanism in radians, or sizes, per second."""
-        size = self.now.probe() / DIFFERENCE_STEP
-        v, a = np.abs(self.state.v) / size, np.abs(self.state.a) / size
-        return float(max(v.max(initial=0.0), np.sqrt(a.max(initial=0.0))))
+        return self.now.rate(self.state)
 
     def ahead(self, h: float) -> Array:
         """Coordinates a time h later."""

@@ -191,6 +191,12 @@ class Instant:
         self.W.base[: self.W.x.size] = self.W.x
         return replace(state, q=q, lam=state.lam + dlam, base=self.W.base.copy())
 
+    def rate(self, state: State) -> float:
+        """Speed of the mechanism in radians, or in its sizes, per second [1/s]."""
+        size = self.probe() / DIFFERENCE_STEP
+        v, a = np.abs(state.v) / size, np.abs(state.a) / size
+        return float(max(v.max(initial=0.0), np.sqrt(a.max(initial=0.0))))
+
     def probe(self) -> Array:
         """(n,) small motion of each coordinate for differences."""
         bodies, length = self.packed.system.bodies, self.packed.length

@@ -133,9 +133,12 @@ def transmissibility(
     now = instant(mechanism, around.state.t)
     now.W.base[:] = around.state.base
     M, C, K = now.matrices(around.state)
-    enforced = _forced(
-        now.gradient(around.state.q, around.state.v)[1], now.packed, drive, now.probe()
-    )
+    G, scale = now.gradient(around.state.q, around.state.v)[1], now.probe()
+    unit = np.zeros(G.shape[0])
+    unit[now.packed.rows_of(drive)] = 1.0
+    enforced = scale * np.linalg.lstsq(G * scale, unit, rcond=1e-9)[0]  # and no other joint
+    if np.abs(G @ enforced - unit).max() > 1e-8:
+        raise _blocked(drive)
     s = 2j * np.pi * f[:, None]
     load = -(s**2 * (M @ enforced) + s * (C @ enforced) + K @ enforced) @ around.test
     y = _solved(around, f, load[:, :, None])[:, :, 0]
@@ -232,16 +235,6 @@ def _blocked(drive: str) -> ModelError:
         where=drive,
         hint="Take out the joint that holds it, or drive another one.",
     )
-
-
-def _forced(G: Array, packed: Any, drive: str, scale: Array) -> Array:
-    """(n,) smallest motion that moves the drive by one unit and no other joint."""
-    unit = np.zeros(G.shape[0])
-    unit[packed.rows_of(drive)] = 1.0
-    enforced = scale * np.linalg.lstsq(G * scale, unit, rcond=1e-9)[0]
-    if np.abs(G @ enforced - unit).max() > 1e-8:
-        raise _blocked(drive)
-    return enforced
 
 
 def _checked(frequencies: npt.ArrayLike) -> Array:

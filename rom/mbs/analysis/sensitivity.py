@@ -211,7 +211,8 @@ def _path(build: Builder, values: dict[str, float], name: str, state: State) -> 
         now.W.base[:] = state.base
         sides.append((sign, mechanism, now))
     tangent = Tangent.of(instant(build(**values), state.t), state, AT_REST)
-    forces, gaps = ([f(now) for _, _, now in sides] for f in _balance_of(state))
+    forces = [now.residual(state.q, state.v, state.a, state.lam) for _, _, now in sides]
+    gaps = [now.gradient(state.q, state.v)[0] for _, _, now in sides]
     force, gap = tangent.T.T @ (forces[1] - forces[0]) / 2, (gaps[1] - gaps[0]) / 2
     change = replace(tangent, r=force, gap=gap).balanced()
     moved = []
@@ -219,14 +220,6 @@ def _path(build: Builder, values: dict[str, float], name: str, state: State) -> 
         q = now.shifted(state.q, sign * change[0])
         moved.append((mechanism, now, replace(state, q=q, lam=state.lam + sign * change[1])))
     return _Path(step, tuple(moved))
-
-
-def _balance_of(state: State) -> tuple[Callable[[Instant], Array], Callable[[Instant], Array]]:
-    """Forces out of balance, and gaps, of another mechanism in the same position."""
-    return (
-        lambda now: now.residual(state.q, state.v, state.a, state.lam),
-        lambda now: now.gradient(state.q, state.v)[0],
-    )
 
 
 def _matrices(_: Mechanism, now: Instant, state: State) -> Array:
@@ -276,23 +269,21 @@ def _ridders(
 ) -> tuple[Array, float]:
     """Derivative by one parameter, and its estimated relative error."""
     step = positive("step", MAX_STEP * (abs(values[name]) or 1.0))
-    best, error, last = np.zeros(0), np.inf, None
+    best, error, last, before = np.zeros(0), np.inf, None, None
     for _ in range(MAX_HALVINGS):
         ends = [np.asarray(result(**{**values, name: values[name] + x})) for x in (-step, step)]
         if ends[0].shape != ends[1].shape:
             raise ConfigError(f"the result must have the same shape for another {name!r}.")
         slope = (ends[1] - ends[0]) / (2 * step)
         if last is not None:
-            better = slope + (slope - last[0]) / 3
+            better = slope + (slope - last) / 3
             size = max(float(np.abs(better).max(initial=0.0)), 1e-300)
-            if last[1] is not None:
-                miss = float(np.abs(better - last[1]).max(initial=0.0)) / size
+            if before is not None:
+                miss = float(np.abs(better - before).max(initial=0.0)) / size
                 if miss < error:
                     best, error = better, miss
                 if error < ERROR_RTOL or miss > 10 * error:
                     break
-            last = (slope, better)
-        else:
-            last = (slope, None)
-        step /= 2
+            before = better
+        last, step = slope, step / 2
     return best, error

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from scipy.linalg import null_space
 
 from rom.arguments import typed
 from rom.errors import SolverError, warn
@@ -94,12 +95,13 @@ def steady_motion(
     axes = chosen(frame, now.packed.names)
     state = consistent(now, state, assemble)
     size = now.probe() / DIFFERENCE_STEP
-    rate = _rate(state, size)
+    rate = now.rate(state) or 1.0
     both = np.concatenate([size, size * rate])
     motions = tuple(T.toarray() for T in small_motions(now.packed, state, axes))
     A = _first_order(now, state, motions, rate) * both / both[:, None]
     B = _bound(now, state, motions) * both
-    N = _null_space(B)
+    rows = np.linalg.norm(B, axis=1, keepdims=True)
+    N = null_space(B / np.where(rows > 0, rows, 1.0), RANK_RTOL) if B.size else np.eye(B.shape[1])
     reduced = N.T @ A @ N
     away = np.abs(A @ N - N @ reduced).max(initial=0.0)
     if away > CONSTRAINT_RATE_RTOL * max(rate, np.abs(reduced).max(initial=0.0)):
@@ -109,12 +111,6 @@ def steady_motion(
         )
     roots = np.linalg.eigvals(reduced).astype(complex)
     return SteadyMotion(state, roots[np.lexsort((roots.imag, np.round(np.abs(roots), 9)))], rate)
-
-
-def _rate(state: State, size: Array) -> float:
-    v, a = np.abs(state.v) / size, np.abs(state.a) / size
-    found = float(max(v.max(initial=0.0), np.sqrt(a.max(initial=0.0))))
-    return found or 1.0
 
 
 def _first_order(now: Instant, state: State, motions: tuple[Array, ...], rate: float) -> Array:
@@ -155,12 +151,3 @@ def _bound(now: Instant, state: State, motions: tuple[Array, ...]) -> Array:
     change = difference(sliding, now.probe())
     positions = np.hstack([G @ T, 0 * G])[held]
     return np.vstack([positions, np.hstack([change @ T + G @ T1, G @ T])])
-
-
-def _null_space(B: Array) -> Array:
-    """(2n, k) orthonormal columns that the rows of B do not see."""
-    if not B.size:
-        return np.eye(B.shape[1])
-    norms = np.linalg.norm(B, axis=1)
-    _, s, V = np.linalg.svd(B / np.where(norms > 0, norms, 1.0)[:, None])
-    return V[int((s > RANK_RTOL * s[0]).sum()) :].T

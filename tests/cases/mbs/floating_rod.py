@@ -154,7 +154,7 @@ def accelerations(
     """
     J, (C, rate), M = jacobian(now), conditions(rod, now), lumped_mass(rod)
     W = work(rod)
-    internal(rod, now.xi, now.theta, now.z[FRAME_DOFS:], 0.0, W)
+    internal(rod, now.xi, now.theta, now.z[FRAME_DOFS:], W)
     f = np.zeros((len(rod.p), 6))
     f[:-1, 3:] = load[0]
     sections = now.shape.p
@@ -228,7 +228,7 @@ def swing(rod: Rod, t: float, load: tuple[Array, Array], free: Array) -> Shape:
     def rates(_: float, y: Array) -> Array:
         x, p, v = parts(y)
         rows = np.append(v, np.zeros(3)).reshape(-1, 6)
-        internal(rod, x, p, v, 0.0, W)
+        internal(rod, x, p, v, W)
         add_loads(p, *load, W)
         spin = np.zeros_like(rows)
         spin[:, :3] = np.cross(rows[:, :3], rod.inertia * rows[:, :3])

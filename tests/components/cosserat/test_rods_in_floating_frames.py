@@ -95,13 +95,13 @@ def test_forces_of_the_rod_do_not_notice_the_frame(rod, motion):
     now = motion[1][-1]
     W = energy.work(rod)
     still = np.zeros(W.r.size)
-    energy.internal(rod, now.xi, now.theta, still, 0.0, W)
+    energy.internal(rod, now.xi, now.theta, still, W)
     seen = np.append(W.r, np.zeros(3)).reshape(-1, 6)
     force = seen[:-1, 3:]
     turned = [rotation.matrix(q) @ m for q, m in zip(now.theta, seen[:, :3], strict=True)]
     assert_allclose(force.sum(axis=0), 0.0, atol=1e-11)
     assert_allclose(np.cross(now.xi, force).sum(axis=0) + np.sum(turned, axis=0), 0.0, atol=1e-11)
-    energy.internal(rod, now.shape.x, now.shape.p, still, 0.0, W)
+    energy.internal(rod, now.shape.x, now.shape.p, still, W)
     world = np.append(W.r, np.zeros(3)).reshape(-1, 6)
     assert_allclose(world[:-1, 3:], force @ rotation.matrix(now.P).T, atol=1e-11)
     assert_allclose(world[:, :3], seen[:, :3], atol=1e-11)

@@ -16,11 +16,12 @@ from scipy.sparse import csr_matrix
 from rom.components.wheels.rotation import axial_pins, rotation_matrices
 from rom.components.wheels.sector import CyclicSector
 from rom.model import Array
+from rom.paths.load_steps import load_steps
 
 MAX_ITERATIONS = 25
 INCREMENT_RTOL = 1e-9  # last increment, of the displacement; the next one is its square
 NOISE_RTOL = 1e-12  # of the extent; smaller increments are noise, which an instability amplifies
-MIN_LOAD_STEP = 1 / 256  # of a stretch of load, at which a path is given up
+MIN_LOAD_STEP = 1 / 512  # of a stretch of load, at which a path is given up
 
 
 class SteadyRotation:
@@ -101,16 +102,16 @@ class SteadyRotation:
         Returns:
             The equilibrium (f,) [m] and its load, which falls short of the end where the path does.
         """
-        now, step, slope = start, end - start, np.zeros_like(a)
-        while now != end:
-            ahead = end if abs(end - now) <= abs(step) * (1 + 1e-9) else now + step
-            load(ahead)
-            found = self.newton(a + slope * (ahead - now))
-            if found is not None:
-                slope, a, now = (found - a) / (ahead - now), found, ahead
-            elif abs(step) > MIN_LOAD_STEP * abs(end - start):
-                step /= 2
-            else:
-                load(now)
-                break
-        return a, now
+
+        def ahead(
+            at: tuple[Array, Array, float], share: float
+        ) -> tuple[Array, Array, float] | None:
+            a, slope, before = at
+            load((1 - share) * start + share * end)
+            found = self.newton(a + slope * (share - before))
+            return None if found is None else (found, (found - a) / (share - before), share)
+
+        share, (a, _, _) = load_steps(ahead, (a, 0.0 * a, 0.0), least=MIN_LOAD_STEP)
+        reached = (1 - share) * start + share * end
+        load(reached)
+        return a, reached
