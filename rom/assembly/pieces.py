@@ -6,6 +6,8 @@ them, warping and lateral strain, stays free. A piece is trained for the loads t
 of the whole, moved to its far section, and turned, because its frame turns::
 
     f,   m + arm x f    at the section, of each the largest of either sign
+
+See docs/theory/pieces.md.
 """
 
 from collections.abc import Iterable, Mapping

@@ -103,7 +103,7 @@ def without_errors(one):
 
 def is_method(one):
     """A function of a module, or a class that reduces."""
-    is_class_or_module = "basis" in vars(one.thing) if inspect.isclass(one.thing) else True
+    is_class_or_module = hasattr(one.thing, "basis") if inspect.isclass(one.thing) else True
     return is_class_or_module and one.name.rpartition(".")[0].islower()
 
 

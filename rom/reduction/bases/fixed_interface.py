@@ -24,6 +24,7 @@ class Counted:
     n_modes: Modes
 
 
+@typed
 class Constrained:
     """A method that begins with constraint modes, interfaces held for all others."""
 

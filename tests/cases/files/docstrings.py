@@ -118,13 +118,13 @@ def with_members(name, thing):
 
 
 def members(cls):
+    """Methods and properties; a function that is the default of a field is none."""
+    fields = getattr(cls, "__dataclass_fields__", {})
     for base in cls.__mro__:
         if base.__module__.startswith("rom."):
             for key, member in vars(base).items():
-                if (
-                    not key.startswith("_")
-                    and getattr(cls, "__dict__", {}).get(key, member) is member
-                ):
+                own = key not in fields and not key.startswith("_")
+                if own and getattr(cls, "__dict__", {}).get(key, member) is member:
                     yield key, member
 
 

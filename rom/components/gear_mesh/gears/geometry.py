@@ -37,7 +37,7 @@ class GearPair:
         helix: angle at the reference circle [rad]; positive for a right-handed pinion.
         pressure_angle: normal [rad].
         shift: profile shifts in modules [1].
-        centre_distance: [m], above zero; None leaves no backlash.
+        centre_distance: of the axes, above zero [m]; None leaves no backlash.
         thinning: transverse backlash from thinner teeth, along the line of action [m].
         addendum, dedendum, fillet: height of the teeth above and below the reference circle, and
             radius at their roots, in modules [1].
