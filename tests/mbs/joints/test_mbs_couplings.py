@@ -303,7 +303,7 @@ WRONG = {
     "way of a hinge": (lambda m, a, b: m.gear("s", "hinge", "tube", ratio=1, coordinate1="way"),
                        "no coordinate 'way'"),
     "side of a hinge": (lambda m, a, b: m.gear("s", "hinge", "tube", ratio=1, coordinate1="x"),
-                        "coordinate 'x'"),
+                        "coordinate1 = 'x'"),
 }  # fmt: skip
 
 
