@@ -122,10 +122,16 @@ AnySector = Annotated[Any, _Named("CyclicSector", (), {})]
 AnySolution = Annotated[Any, _Named("Solution", (), {})]
 
 
+def evaluated(annotation: Any, known: Names) -> Any:
+    """What an annotation stands for that is written as text."""
+    if isinstance(annotation, str):
+        return eval(annotation, {}, known)  # our own source, as Python would
+    return annotation
+
+
 def taken_by(annotation: Any, known: Names) -> Taken | None:
     """What an annotation takes; None for anything."""
-    if isinstance(annotation, str):
-        annotation = eval(annotation, {}, known)  # our own source, as Python would
+    annotation = evaluated(annotation, known)
     origin, inner = typing.get_origin(annotation), typing.get_args(annotation)
     if annotation in PLAIN_KINDS:
         return PLAIN_KINDS[annotation]

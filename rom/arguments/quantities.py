@@ -76,8 +76,10 @@ class Quantity:
         if not self.has_shape(array.shape):
             shapes = " or ".join(str(shape).replace("None", "n") for shape in self.shapes)
             return f" has shape {array.shape}, needed is {shapes}."
-        wrong = (x for x in array.flat if not self.holds(x))
-        return "".join(f" = {x:g} {self.must}." for x in [*wrong][:1])
+        if not array.size or (self.holds(array.min()) and self.holds(array.max())):
+            return ""
+        wrong = next(x for x in array.flat if not self.holds(x))
+        return f" = {wrong:g} {self.must}."
 
 
 @dataclass(frozen=True, slots=True)

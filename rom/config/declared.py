@@ -15,7 +15,7 @@ from types import MappingProxyType, UnionType
 from typing import Any, Literal
 
 from rom.arguments import Quantity, Whole
-from rom.arguments.kinds import Names
+from rom.arguments.kinds import Names, evaluated
 from rom.config.keys import FilePath, Flag, Key, Kind, Named, Table, Text, Words
 from rom.fields import follow
 
@@ -102,8 +102,7 @@ def _keys_of(made: Any, kinds: Mapping[str, Kind], defaults: Mapping[str, Any]) 
 
 def _kind(annotation: Any, known: Names) -> Kind | None:
     """How a value of an annotation is written; None if it is written in no way."""
-    if isinstance(annotation, str):
-        annotation = eval(annotation, {}, known)  # our own source, as Python would
+    annotation = evaluated(annotation, known)
     origin, inner = typing.get_origin(annotation), typing.get_args(annotation)
     if origin is typing.Annotated:
         return inner[1] if isinstance(inner[1], Quantity | Whole) else _kind(inner[0], known)

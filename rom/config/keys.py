@@ -14,7 +14,7 @@ from rom.names import check_text
 from rom.units import in_si
 
 MOST_TOLD = 20  # mistakes in one message
-LARGEST_WHOLE = 10**9  # whole number
+LARGEST_WHOLE = 10**9  # whole number that a file may hold
 
 
 @dataclass(frozen=True, slots=True)
