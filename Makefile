@@ -3,7 +3,8 @@
 # make demo    the main job: a flexible slider-crank; pictures and a report in out/
 # make test    style, types, the tests that need FEniCSx, then those of the light half without it
 # make long    what takes minutes: all demos under mpirun, signals at ten instants; and each test of
-#              the light half in the environment where `make test` does not run it
+#              the light half in the environment where `make test` does not run it; `make -k long`
+#              goes on with the next part where one has failed
 # make docs    the site, in build/site/; runs its notebooks; pictures of demos that have run stand in it
 # make pictures  run every demo, for the site; takes minutes
 # make thumbnails  small copies of these pictures, kept in docs/thumbnails/
@@ -18,7 +19,7 @@ LIGHT = .venv-light/bin/python
 # what Python compiles of sources is kept even where the system would not
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: setup demo test long docs pictures thumbnails bench clean
+.PHONY: setup demo test long long-marked long-more long-light-here long-light docs pictures thumbnails bench clean
 setup:
 	@.ci/setup.sh
 
@@ -33,10 +34,18 @@ test: setup
 	$(PYTHON) -m pytest -m "fenicsx or once" $(SIDE_BY_SIDE)
 	$(LIGHT) -m pytest -m "not fenicsx and not once" -p no:cacheprovider $(SIDE_BY_SIDE)
 
-long: setup
+long: long-marked long-more long-light-here long-light
+
+long-marked: setup
 	ROM_LONG=1 $(PYTHON) -m pytest -m long $(SIDE_BY_SIDE)
+
+long-more: setup
 	ROM_LONG=1 $(PYTHON) -m pytest -m "not long" $(MORE) $(SIDE_BY_SIDE)
+
+long-light-here: setup
 	$(PYTHON) -m pytest -m "not fenicsx and not once" $(SIDE_BY_SIDE)
+
+long-light: setup
 	ROM_LONG=1 $(LIGHT) -m pytest -m "not fenicsx and once" -p no:cacheprovider $(SIDE_BY_SIDE)
 
 docs: setup
