@@ -11,24 +11,16 @@ import numpy as np
 from scipy.sparse import csr_matrix
 
 from rom.arguments import positive
-from rom.eigen.verbs import mean_motion, rigid_motions
+from rom.eigen.verbs import coupled, mean_motion, rigid_motions
 from rom.errors import InterfaceError, MaterialError
 from rom.model import Array, Attachment, FEModel
 from rom.plausible import REACH, warn_outside
 
 
 def point_masses(attachment: Attachment, origin: Array) -> tuple[Array, Array]:
-    """Six points and masses with the mass, centre and inertia of the attachment.
+    """Points (6, 3) [m] and masses (6,) [kg] with the mass, centre and inertia of the attachment.
 
-    Args:
-        attachment: mass [kg] and inertia [kg m^2].
-        origin: (3,) where the mass centre is when ``attachment.at`` is None [m].
-
-    Returns:
-        points (6, 3) [m] and masses (6,) [kg].
-
-    Raises:
-        MaterialError: if the mass is not positive or no real body has this inertia.
+    The origin (3,) is where the mass centre is when ``attachment.at`` is None [m].
     """
     m, J = attachment.mass, np.asarray(attachment.inertia, dtype=float)
     at = origin if attachment.at is None else np.asarray(attachment.at, dtype=float)
@@ -64,10 +56,6 @@ def added_mass(model: FEModel, first: int, n_local: int) -> csr_matrix | None:
     dM: Any = csr_matrix((n_local, model.n_dofs))
     for attachment in model.attachments:
         _, masses, N = carried_displacements(attachment, model)
-        dofs = model.interfaces[attachment.interface].dofs
         block = N.T @ (np.repeat(masses, 3)[:, None] * N)
-        mine = (dofs >= first) & (dofs < first + n_local)
-        rows = np.repeat(dofs[mine] - first, dofs.size)
-        columns = np.tile(dofs, int(mine.sum()))
-        dM = dM + csr_matrix((block[mine].ravel(), (rows, columns)), shape=dM.shape)
+        dM = dM + coupled(dM.shape, first, model.interfaces[attachment.interface].dofs, block)
     return dM

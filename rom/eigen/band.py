@@ -9,7 +9,8 @@ from scipy.sparse import issparse
 from rom.arguments import between, positive
 from rom.eigen.held import HeldBody
 from rom.eigen.lanczos import capacity
-from rom.eigen.scipy import SciPyOperators, SymmetricLU, dof_set
+from rom.eigen.scipy import SciPyOperators, SymmetricLU
+from rom.eigen.search import dof_set
 from rom.eigen.verbs import column_blocks
 from rom.errors import ModesMissedError, ParallelError, ResourceError, SolverError
 from rom.model import Array, Modes
@@ -124,15 +125,10 @@ def _refuse_beyond_memory(k: int, n: int) -> None:
 
 
 def lehmann_bounds(theta: Array, residual: Array, rho: float) -> Array:
-    """(m,) lower bounds of the eigenvalues below rho, whose number is that of the theta below.
+    """(m,) lower bounds of the eigenvalues below rho, of Lehmann; see `substructured_modes`.
 
-    Args:
-        theta: (k,) Ritz values of mass-normalised vectors x, ascending [rad^2/s^2].
-        residual: (k, k) scalar products of K x - theta M x in M^-1 [rad^4/s^4].
-        rho: no eigenvalue, so that as many lie below it as Ritz values [rad^2/s^2].
-
-    Source:
-        Lehmann, Optimale Eigenwerteinschliessungen, Numer. Math. 5 (1963) 246.
+    As many of the ascending Ritz values theta (k,) [rad^2/s^2] must lie below rho as eigenvalues;
+    ``residual`` (k, k) has the scalar products of K x - theta M x in M^-1 [rad^4/s^4].
     """
     B = np.diag((theta - rho) ** 2) + residual
     tau = eigh(np.diag(theta - rho), 0.5 * (B + B.T), eigvals_only=True) if theta.size else theta

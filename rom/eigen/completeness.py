@@ -1,4 +1,4 @@
-"""How surely a search from a random block of vectors has missed no mode.
+"""Random columns with which searches begin, and how surely such a search has missed no mode.
 
 With the inverse B = K^-1 M of eigenvalues theta, a search spans the powers B^a W of a Gaussian
 block W (n, b). An eigenvalue theta_i >= theta_m that was missed has left no trace above s, the
@@ -17,6 +17,8 @@ Source:
     SIAM J. Numer. Anal. 17 (1980) 687, for blocks.
 """
 
+from typing import Any
+
 import numpy as np
 from scipy.special import gammainc
 
@@ -29,16 +31,40 @@ LEAST_SHARE = 0.05  # variance of a component of W: eigenvalues of diag(M)^-1 M 
 MAX_MISS_PROBABILITY = 1e-9  # beyond it a search goes on, or modes are counted
 SAFETY_FACTOR = 100.0  # on c^2, for Ritz vectors that are not exact
 MAX_POWER = 8  # of theta in the polynomials tried
+PLACE_SCALE = 2.0**40  # places that differ by less are one
+COUNTER_STEP = np.uint64(0x9E3779B97F4A7C15)  # 2^64 over the golden ratio: steps of the counter
+MIXING_STEPS = (  # Steele, Lea and Flood, OOPSLA 2014, with the constants of Stafford
+    (np.uint64(30), np.uint64(0xBF58476D1CE4E5B9)),
+    (np.uint64(27), np.uint64(0x94D049BB133111EB)),
+)
+
+
+def gaussian_block(ops: Any, k: int, n_before: int = 0) -> Array:
+    """(n_local, k) Gaussian columns with components of about one in all modes.
+
+    The numbers depend on the place of a dof, mixed beyond recognition, and not on its rank. Blocks
+    are independent when each is given how many columns were drawn before it.
+    """
+    key = np.round(ops.fixed * PLACE_SCALE).astype(np.int64).view(np.uint64)
+    numbers = np.arange(1 + 2 * n_before, 1 + 2 * (n_before + k), dtype=np.uint64)
+    counter = key[:, None] + COUNTER_STEP * numbers
+    u = (_mixed(counter) >> np.uint64(11)).astype(float) * 2.0**-53 + 2.0**-54
+    normal = np.sqrt(-2.0 * np.log(u[:, :k])) * np.cos(2.0 * np.pi * u[:, k:])  # Box and Muller
+    return normal / np.sqrt(np.maximum(ops.mass_diagonal, np.finfo(float).tiny))[:, None]
+
+
+def _mixed(x: Any) -> Any:
+    """64 bits of which each depends on all those given: the finaliser of SplitMix64."""
+    for shift, factor in MIXING_STEPS:
+        x = (x ^ (x >> shift)) * factor
+    return x ^ (x >> np.uint64(31))
 
 
 def miss_probability(T: Array, start: Array, residual: Array, m: int) -> float:
     """Bound of the probability that one of the lowest m modes is not among those found.
 
-    Args:
-        T: (N, N) projection of B on the space searched, whose first b columns span W.
-        start: (b, b) components of W in these columns.
-        residual: (N,) of its Ritz values, the largest first, over them.
-        m: number of modes asked for, the lowest.
+    T (N, N) is the projection of B on the space searched, whose first b columns span W with the
+    components ``start`` (b, b); the residuals (N,) of its Ritz values are relative, largest first.
     """
     k, c2 = unseen_part(T, start, residual, m)
     b = start.shape[0]

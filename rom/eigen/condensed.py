@@ -10,6 +10,7 @@ from rom.eigen.verbs import (
     Operators,
     column_blocks,
     constraint_modes,
+    owned,
     quadratic,
     unit_motions,
 )
@@ -42,13 +43,9 @@ class Condensed:
     alone: Array
 
     def support(self, dofs: Index) -> "Supported":
-        """The body with some interface coordinates held, or with none.
+        """The body with some interface coordinates held, dofs (k,) of ``boundary``, or with none.
 
-        Args:
-            dofs: (k,) numbers of those held, some of ``boundary``.
-
-        Raises:
-            InterfaceError: if a motion other than the six of the free body has no stiffness.
+        Refused where a motion other than the six of the free body has no stiffness.
         """
         free = np.flatnonzero(~np.isin(self.boundary, dofs))
         scale = 1.0 / np.sqrt(self.alone[free])
@@ -86,9 +83,7 @@ class Supported:
     @property
     def mine(self) -> Index:
         """Rows of this rank that are held."""
-        ops = self.body.ops
-        here = (self.dofs >= ops.first) & (self.dofs < ops.first + ops.n_local)
-        return self.dofs[here] - ops.first
+        return self.dofs[owned(self.body.ops, self.dofs)] - self.body.ops.first
 
     def __call__(self, F: Array) -> Array:
         """(n_local, k) displacements under loads (n_local, k)."""
@@ -107,14 +102,10 @@ class Supported:
 def condensed(
     ops: Operators, held: Held, boundary: Index, Psi: Array, S: Array | None = None
 ) -> Condensed:
-    """The body condensed to its boundary.
+    """The body condensed to its boundary, see `Condensed`.
 
-    Args:
-        ops: the body in interface coordinates.
-        held: the same with its boundary held, factored.
-        boundary: (n_b,) dof numbers of the interface coordinates.
-        Psi: (n_local, n_b) shapes; constraint modes of this very body are taken, others replaced.
-        S: (n_b, n_b) Psi^T K Psi where it is known.
+    Shapes Psi (n_local, n_b) that are constraint modes of this very body are taken, others
+    replaced; S is Psi^T K Psi where it is known.
     """
     S = quadratic(ops, ops.apply_K, Psi) if S is None else S
     E, forces, alone = unit_motions(ops, boundary), np.empty_like(S), np.empty(boundary.size)

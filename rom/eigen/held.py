@@ -1,15 +1,19 @@
-"""A body with some dofs held: its stiffness factored once, for many answers."""
+"""A body with some dofs held: its stiffness factored once, for many answers; and what moves."""
 
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
+from rom.eigen.verbs import held_rows
 from rom.errors import InterfaceError
 from rom.model import Array, Index
 
 RIGID_RTOL = 1e-13  # energy of a motion over that of its dofs alone, below which it has none
 SHIFT_RTOL = 1e-9  # of the largest eigenvalue: below zero, where a singular stiffness has a factor
+X_Y_Z = ((1, 5, 1.0), (0, 5, -1.0), (1, 3, -1.0))  # row of a node, column of a rotation, and sign
+ROWS_RTOL = 1e-9  # of a node's rows in the rigid motions from unit translations
+MOVING_RATIO = 1e-3  # of the largest motion: less is that of a part at rest
 
 
 class HeldBody:
@@ -25,10 +29,11 @@ class HeldBody:
     """
 
     make: Callable[[], None]
+    factorable = True  # whether another factor may be made to name a place
 
     def __init__(self, ops: Any, held: Index, shift: float = 0.0):
         self.ops, self.held, self.shift = ops, held, shift
-        self.mine = np.flatnonzero(~np.isin(np.arange(ops.first, ops.first + ops.n_local), held))
+        self.mine = np.flatnonzero(~held_rows(ops, held))
         self.n_free = ops.n - held.size
         self.inner: Any = ops.part(self.mine) if self.n_free else None
         self.factor: Any = None
@@ -51,11 +56,7 @@ class HeldBody:
         return np.asarray(self.factor.solve(F))
 
     def refuse_free_motion(self) -> None:
-        """What is not held moves, after one inverse iteration from anywhere, without stiffness.
-
-        Raises:
-            InterfaceError: with the place that moves most, where it is known.
-        """
+        """What is not held moves, after one inverse iteration from anywhere, without stiffness."""
         ops, stiff, X = self.ops, False, np.zeros((self.mine.size, 1))
         if self.factor.ok:
             X = self.coarsely_solved(ops.apply_M(ops.fixed[:, None])[self.mine])
@@ -67,11 +68,6 @@ class HeldBody:
             if not self.factor.ok and self.factorable:
                 X = self._loose()
             raise self.singular(X)
-
-    @property
-    def factorable(self) -> bool:
-        """Whether another factor may be made to name a place."""
-        return True
 
     def _loose(self) -> Array:
         """(n_free here, 1) the motion without stiffness on which a factor broke down."""
@@ -98,3 +94,44 @@ class HeldBody:
         if self.factor is not None:
             self.factor.release()
         self.factor = None
+
+
+def moves_most(ops: Any, X: Array, rows: Index | None = None) -> str:
+    """Words for the node that moves most in the columns X, and for the part that moves with it.
+
+    X (n_local, k) has motions on these rows of ``ops``, whose rigid motions tell where nodes are.
+    """
+    node = (np.arange(X.shape[0]) if rows is None else rows) // 3
+    square = np.square(np.where(np.isfinite(X), X, 0.0)).max(axis=1, initial=0.0)
+    size = np.sqrt(np.bincount(node, square, minlength=1))
+    at = int(np.argmax(size))
+    largest = float(size[at])
+    point = _point(ops.rigid, 3 * at) if largest > 0.0 else None
+    largest, found = max(ops.from_all((largest, point)), key=lambda pair: pair[0])
+    if found is None:
+        return ""
+    loose = np.flatnonzero(size > MOVING_RATIO * largest)
+    return f" It moves most at {_words(found)}, {_part(ops, loose)}."
+
+
+def _part(ops: Any, loose: Index) -> str:
+    """Words for some nodes of this rank and those of the others: how many, and where."""
+    points = [_point(ops.rigid, 3 * int(node)) for node in loose]
+    there = np.array([point for point in points if point is not None]).reshape(-1, 3)
+    there = np.vstack(ops.from_all(there))
+    share = f"{len(there)} of {ops.n // 3} nodes move"
+    return f"and {share}, between {_words(there.min(axis=0))} and {_words(there.max(axis=0))}"
+
+
+def _words(point: Array) -> str:
+    """A place as it is printed."""
+    return f"({', '.join(f'{x:.4g}' for x in point + 0.0)}) m"
+
+
+def _point(rigid: Array, first: int) -> Array | None:
+    """(3,) place of the node whose rows begin there, from u = omega x p in its rotations."""
+    rows = rigid[first : first + 3]
+    if rows.shape[0] < 3 or np.abs(rows[:, :3] - np.eye(3)).max() > ROWS_RTOL:
+        return None
+    point: Array = np.array([sign * rows[row, column] for row, column, sign in X_Y_Z])
+    return point + 0.0

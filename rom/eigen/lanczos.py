@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 from scipy.linalg.blas import dgemm
 
-from rom.eigen.completeness import MAX_MISS_PROBABILITY, miss_probability
-from rom.eigen.gaussian import gaussian_block
+from rom.eigen.completeness import MAX_MISS_PROBABILITY, gaussian_block, miss_probability
 from rom.errors import SolverError
 from rom.model import Array
 from rom.process.stopwatch import MISS_NOTE, note
@@ -26,15 +25,11 @@ EIGENVALUE_RTOLS = 1e-7, 1e-5  # of modes sought and spare ones, whose error is 
 
 
 class BlockLanczos:
-    """Krylov space of (K - sigma M)^-1 M, orthogonal to deflated columns.
+    """Krylov space of (K - sigma M)^-1 M, orthogonal to M-orthonormal modes, deflated (n_local, d).
 
-    Args:
-        ops: operators of the body, as `gaussian_block` wants them.
-        factor: solves with K - sigma M.
-        sigma: the shift, below all eigenvalues sought.
-        deflated: (n_local, d) M-orthonormal modes to leave out.
-        start: (n_local, p) random columns; so many are solved for at once.
-        tolerance: (k,) residuals allowed of the modes sought, over the inverse's eigenvalues.
+    The shift lies below all eigenvalues sought, ``factor`` solves with K - sigma M for as many
+    columns at once as there are random ones to start from (n_local, p); ``tolerance`` (k,) allows
+    residuals of the modes sought, over the inverse's eigenvalues.
 
     Source:
         Grimes, Lewis and Simon, A shifted block Lanczos algorithm for solving sparse symmetric
@@ -59,11 +54,7 @@ class BlockLanczos:
         self._append(W, MW)
 
     def solve(self) -> None:
-        """Let the space grow until the k leading pairs have converged.
-
-        Raises:
-            SolverError: if they do not.
-        """
+        """Let the space grow until the k leading pairs have converged."""
         for _ in range(MAX_RESTARTS):
             while self.size + self.width <= self.V.shape[1]:
                 self._grow()

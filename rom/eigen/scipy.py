@@ -11,23 +11,18 @@ from scipy.sparse import csc_matrix, csr_matrix
 from scipy.sparse.linalg import splu
 
 from rom.arguments import matrix, symmetric
-from rom.eigen.held import RIGID_RTOL, HeldBody
-from rom.eigen.place import moves_most
+from rom.eigen.held import RIGID_RTOL, HeldBody, moves_most
 from rom.eigen.search import (
     ESTIMATE_SHIFT,
     NO_INERTIA,
     ModeSearch,
     estimated_by_iteration,
     indefinite,
+    shift_is_eigenvalue,
 )
-from rom.eigen.verbs import Weighted, canonical_signs
-from rom.errors import (
-    ConfigError,
-    QualityGateError,
-    SolverError,
-)
+from rom.eigen.verbs import canonical_signs
+from rom.errors import ConfigError, QualityGateError, SolverError
 from rom.model import Array, Index
-from rom.names import named
 from rom.process.stopwatch import FACTORISATION_PIECE, piece
 
 ENTRY_HINT = "Look where it was assembled: a number was missing, or divided by zero."
@@ -40,12 +35,7 @@ SYMMETRIC_LU = {
 class SymmetricLU:
     """L D L^T of a symmetric matrix by SuperLU, with pivots on its diagonal where that is possible.
 
-    Args:
-        A: (n, n) symmetric.
-        pivoting: where its diagonal has zeros.
-
-    Raises:
-        RuntimeError: if the matrix is singular.
+    With ``pivoting`` elsewhere, where the diagonal has zeros; RuntimeError if A is singular.
     """
 
     def __init__(self, A: Any, *, pivoting: bool = False):
@@ -130,6 +120,7 @@ class SciPyOperators(ModeSearch):
     first = 0
     last = True
     affordable = True
+    held_kind = HeldSciPy
 
     def __init__(self, K: Any, M: Any, rigid: Array | None = None, T: csr_matrix | None = None):
         self.K, self.M = _symmetric("K", K), _symmetric("M", M)
@@ -143,14 +134,6 @@ class SciPyOperators(ModeSearch):
         """Always: matrices whose origin is unknown are compared in every support."""
         return True
 
-    def apply_K(self, X: Array) -> Array:
-        """K X."""
-        return self.K @ X
-
-    def apply_M(self, X: Array) -> Array:
-        """M X."""
-        return self.M @ X
-
     def gram(self, X: Array, Y: Array) -> Array:
         """X^T Y."""
         return X.T @ Y
@@ -159,44 +142,30 @@ class SciPyOperators(ModeSearch):
         """X[dofs]."""
         return X[np.asarray(dofs, dtype=np.int64)]
 
-    def hold(self, dofs: npt.ArrayLike, shift: float = 0.0) -> HeldSciPy:
-        """Eliminate the held dofs and factor the rest of K - shift M."""
-        return HeldSciPy(self, dof_set(dofs, self.n), shift)
-
     def transform(self, T: Any, rigid: Array) -> "SciPyOperators":
         """The same body in the coordinates a of u = T a."""
         T = csr_matrix(T)
         return SciPyOperators(T.T @ self.K @ T, T.T @ self.M @ T, rigid, T)
 
-    def expand(self, A: Array) -> Array:
-        """T A."""
-        return A if self.T is None else self.T @ A
-
     def restrict(self, F: Array) -> Array:
         """T^T F."""
         return F if self.T is None else self.T.T @ F
 
-    def plus_mass(self, dM: Any) -> "SciPyOperators":
-        """The same body with the mass M + dM."""
-        return SciPyOperators(self.K, self.M + csr_matrix(dM), self.rigid, self.T)
+    def like(self, K: Any, M: Any, rigid: Array | None) -> "SciPyOperators":
+        """Other matrices in the same coordinates."""
+        return SciPyOperators(K, M, rigid, self.T)
 
-    def on_springs(self, dK: Any) -> "SciPyOperators":
-        """The body held by springs to the ground: stiffness K + dK, no rigid motion of its own."""
-        return SciPyOperators(self.K + csr_matrix(dK), self.M, None, self.T)
+    def plus(self, A: csr_matrix, dA: Any) -> csr_matrix:
+        """A + dA."""
+        return A + csr_matrix(dA)
+
+    def weighted(self, A: csr_matrix, weight: float, parts: list[tuple[float, Any]]) -> csr_matrix:
+        """Weight A + sum of the weighted parts."""
+        return weight * A + sum(c * csr_matrix(part) for c, part in parts)
 
     def product(self, A: Any, X: Array) -> Array:
         """A X."""
         return A @ X
-
-    def varied(
-        self, stiffness: Weighted, mass: Weighted, rigid: Array | None = None
-    ) -> "SciPyOperators":
-        """The same dofs with k K + sum k_i K_i and m M + sum m_i M_i."""
-        K, M = (
-            weight * A + sum(c * csr_matrix(part) for c, part in parts)
-            for A, (weight, parts) in ((self.K, stiffness), (self.M, mass))
-        )
-        return SciPyOperators(K, M, self.rigid if rigid is None else rigid, self.T)
 
     def part(self, rows: Index) -> "SciPyOperators":
         """The body with all dofs held but these."""
@@ -211,27 +180,18 @@ class SciPyOperators(ModeSearch):
         return SymmetricLU(self.K - sigma * self.M)
 
     def indefinite(self, shift: float) -> SymmetricLU:
-        """(K - shift M)^-1 for a shift among the eigenvalues.
-
-        Raises:
-            SolverError: if the shift is an eigenvalue.
-        """
+        """(K - shift M)^-1 for a shift among the eigenvalues."""
         try:
             return SymmetricLU(self.K - shift * self.M, pivoting=True)
         except RuntimeError as error:
-            message = f"K - {shift:.6g} M is singular: the shift is an eigenvalue."
-            raise SolverError(message) from error
+            raise shift_is_eigenvalue(shift) from error
 
     def count_below(self, sigma: float, spent: Any = None) -> int:
         """Number of eigenvalues below sigma, by the inertia of K - sigma M (Sylvester)."""
         return negative_count(self.K - sigma * self.M)
 
     def refuse_wrong_mass(self) -> None:
-        """Say so where a motion has no inertia.
-
-        Raises:
-            QualityGateError: with the number of such motions.
-        """
+        """Say so where a motion has no inertia."""
         if n_negative := negative_count(self.M):
             raise indefinite("M", n_negative, NO_INERTIA)
 
@@ -251,10 +211,6 @@ class SciPyOperators(ModeSearch):
         """What each process has: this one alone."""
         return [mine]
 
-    def all_finite(self, X: Array) -> bool:
-        """True when X is finite."""
-        return bool(np.isfinite(X).all())
-
     def first_elastic(self, R: Array) -> float:
         """Estimate of the first elastic eigenvalue by inverse iteration on a small block."""
         lu = self.shift_inverse(-ESTIMATE_SHIFT * self.largest())
@@ -269,26 +225,6 @@ class SciPyOperators(ModeSearch):
     def mass_diagonal(self) -> Array:
         """(n,) diagonal of M."""
         return np.asarray(self.M.diagonal())
-
-    def largest(self) -> float:
-        """Estimate of the largest eigenvalue from the diagonals."""
-        return float(np.max(self.K.diagonal() / self.M.diagonal()))
-
-
-def dof_set(dofs: npt.ArrayLike, n: int) -> Index:
-    """Dof numbers as given, checked: distinct, within 0..n-1.
-
-    Raises:
-        ConfigError: naming the first wrong number.
-    """
-    b = np.asarray(dofs, dtype=np.int64).ravel()
-    if b.size and (b.min() < 0 or b.max() >= n):
-        outside = named(b[(b < 0) | (b >= n)].tolist())
-        raise ConfigError(f"boundary dof {outside} must be from 0 to {n - 1}.")
-    if np.unique(b).size != b.size:
-        twice = named(np.flatnonzero(np.bincount(b) > 1).tolist())
-        raise ConfigError(f"boundary dof {twice} must be listed only once.")
-    return b
 
 
 def _symmetric(name: str, A: Any) -> csr_matrix:

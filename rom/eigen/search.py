@@ -9,16 +9,18 @@ from itertools import pairwise
 from typing import Any, cast
 
 import numpy as np
+import numpy.typing as npt
 from scipy.linalg import LinAlgError, eigh, eigvalsh
 
 from rom.arguments import whole
+from rom.eigen.completeness import gaussian_block
 from rom.eigen.condensed import Supported
-from rom.eigen.gaussian import gaussian_block
 from rom.eigen.held import RIGID_RTOL, HeldBody
 from rom.eigen.lanczos import BLOCK_SIZE, EIGENVALUE_RTOLS, BlockLanczos, capacity
-from rom.eigen.verbs import Operators, count_shift, every_row, orthonormal, own_rows
-from rom.errors import ModelError, ModesMissedError, QualityGateError, SolverError
-from rom.model import Array
+from rom.eigen.verbs import Operators, Weighted, count_shift, every_row, orthonormal, own_rows
+from rom.errors import ConfigError, ModelError, ModesMissedError, QualityGateError, SolverError
+from rom.model import Array, Index
+from rom.names import named
 from rom.process.stopwatch import SEARCH_PIECE, piece
 
 N_SPARE_MODES = 3  # beyond the ones asked for, so that a gap for counting is found
@@ -36,17 +38,26 @@ Seek = Callable[[int, Array], tuple[Array, Array, bool]]
 
 
 class ModeSearch:
-    """What operators search by: `rom.eigen.scipy.SciPyOperators` and those of PETSc.
+    """What `rom.eigen.scipy.SciPyOperators` and those of PETSc have in common: verbs and search.
 
     Beside the verbs they know ``fixed``, (n_local,) numbers that depend on the place of a dof,
-    and the diagonals of their matrices, ``stiffness_diagonal`` and ``mass_diagonal``.
+    the diagonals of their matrices, ``stiffness_diagonal`` and ``mass_diagonal``, the map T to the
+    coordinates they came from, or None, and ``like``, other matrices in the same coordinates.
     """
 
     n: int
     n_local: int
     rigid: Array | None
     fixed: Array
-    hold: Any
+    K: Any
+    M: Any
+    T: Any
+    held_kind: Any
+    like: Any
+    plus: Callable[[Any, Any], Any]
+    weighted: Callable[..., Any]
+    product: Callable[[Any, Array], Array]
+    from_all: Callable[[Any], list[Any]]
     gram: Callable[[Array, Array], Array]
     signed: Callable[[Array], Array]
     shift_inverse: Callable[[float], Any]
@@ -56,13 +67,46 @@ class ModeSearch:
     stiffness_diagonal: Any
     mass_diagonal: Any
 
+    def apply_K(self, X: Array) -> Array:
+        """K X."""
+        return self.product(self.K, X)
+
+    def apply_M(self, X: Array) -> Array:
+        """M X."""
+        return self.product(self.M, X)
+
+    def expand(self, A: Array) -> Array:
+        """T A."""
+        return A if self.T is None else self.product(self.T, A)
+
+    def hold(self, dofs: npt.ArrayLike, shift: float = 0.0) -> Any:
+        """Eliminate the held dofs and factor the rest of K - shift M."""
+        return self.held_kind(self, dof_set(dofs, self.n), shift)
+
+    def plus_mass(self, dM: Any) -> Any:
+        """The same body with the mass M + dM."""
+        return self.like(self.K, self.plus(self.M, dM), self.rigid)
+
+    def on_springs(self, dK: Any) -> Any:
+        """The body held by springs to the ground: stiffness K + dK, no rigid motion of its own."""
+        return self.like(self.plus(self.K, dK), self.M, None)
+
+    def varied(self, stiffness: Weighted, mass: Weighted, rigid: Array | None = None) -> Any:
+        """The same dofs with k K + sum k_i K_i and m M + sum m_i M_i."""
+        K, M = self.weighted(self.K, *stiffness), self.weighted(self.M, *mass)
+        return self.like(K, M, self.rigid if rigid is None else rigid)
+
+    def all_finite(self, X: Array) -> bool:
+        """True when X is finite on every rank."""
+        return all(self.from_all(bool(np.isfinite(X).all())))
+
+    def largest(self) -> float:
+        """Estimate of the largest eigenvalue from the diagonals."""
+        ratio = self.stiffness_diagonal / self.mass_diagonal
+        return float(max(self.from_all(ratio.max(initial=0.0))))
+
     def modes(
-        self,
-        held: Any,
-        m: int,
-        sigma: float | None = None,
-        *,
-        finished: bool = False,
+        self, held: Any, m: int, sigma: float | None = None, *, finished: bool = False
     ) -> tuple[Array, Array]:
         """Lowest m modes, mass-normalised: omega (m,) [rad/s] and Phi (n_local, m)."""
         if isinstance(held, Supported):
@@ -188,17 +232,9 @@ class ModeSearch:
     ) -> tuple[Array, Array]:
         """At least m eigenpairs, ascending, none of the lowest missing.
 
-        What does not come to an end is left, for a small body, to a dense solution.
-
-        Args:
-            m: number of modes wanted.
-            deflated: (n_local, d) modes known before, which the count leaves out.
-            seek: finds so many eigenpairs beside those given, some more, and whether surely all.
-            count: number of eigenvalues below a shift; None where nothing can be counted.
-
-        Raises:
-            ModesMissedError: if search and count do not come to agree.
-            SolverError: if a search does not converge.
+        What does not come to an end is left, for a small body, to a dense solution. ``seek`` finds
+        so many eigenpairs beside those given, some more, and whether surely all; ``count`` says how
+        many lie below a shift, without the deflated ones (n_local, d), or None.
         """
         try:
             return self._counted(m, deflated, seek, count)
@@ -238,11 +274,7 @@ class ModeSearch:
         )
 
     def all_modes(self) -> tuple[Array, Array]:
-        """All eigenpairs of a small body, solved densely on every rank.
-
-        Raises:
-            QualityGateError: if its mass is not positive definite.
-        """
+        """All eigenpairs of a small body, solved densely on every rank."""
         ops, E = cast(Operators, self), np.eye(self.n)
         K, M = (every_row(ops, apply(own_rows(ops, E))) for apply in (ops.apply_K, ops.apply_M))
         try:
@@ -295,14 +327,13 @@ def indefinite(name: str, n_negative: int, meaning: str) -> QualityGateError:
     )
 
 
-def settled(ops: Any, lam: Array, Phi: Array) -> Array:
-    """Modes with equal frequencies turned within their plane to the same place on any machine.
+def shift_is_eigenvalue(shift: float) -> SolverError:
+    """The error of K - shift M that has no inverse."""
+    return SolverError(f"K - {shift:.6g} M is singular: the shift is an eigenvalue.")
 
-    Args:
-        ops: the operators the modes belong to.
-        lam: (m,) ascending eigenvalues.
-        Phi: (n_local, m) mass-normalised modes.
-    """
+
+def settled(ops: Any, lam: Array, Phi: Array) -> Array:
+    """Modes with equal frequencies turned within their plane to the same place on any machine."""
     Phi = Phi.copy()
     apart = np.diff(lam) > CLUSTER_RTOL * np.abs(lam[1:])
     edges = np.concatenate([[0], np.flatnonzero(apart) + 1, [lam.size]])
@@ -317,10 +348,8 @@ def settled(ops: Any, lam: Array, Phi: Array) -> Array:
 def estimated_by_iteration(ops: Any, factor: Any, R: Array) -> float:
     """The least eigenvalue that is not zero, estimated without geometry.
 
-    Args:
-        ops: the operators of the body.
-        factor: of its stiffness with a little mass, `ESTIMATE_SHIFT`.
-        R: (n_local, r) M-orthonormal motions to leave out.
+    The factor is of the stiffness with a little mass, `ESTIMATE_SHIFT`; the M-orthonormal motions
+    R (n_local, r) are left out.
     """
     X = gaussian_block(ops, BLOCK_SIZE)
     for _ in range(ESTIMATE_STEPS):
@@ -331,3 +360,15 @@ def estimated_by_iteration(ops: Any, factor: Any, R: Array) -> float:
     floor = RIGID_RTOL * np.diag(ops.gram(X, ops.stiffness_diagonal[:, None] * X))
     elastic = lam[lam > floor]
     return float(elastic.min() if elastic.size else ALL_LOOSE_RATIO * floor.max())
+
+
+def dof_set(dofs: npt.ArrayLike, n: int) -> Index:
+    """Dof numbers as given, checked: distinct, within 0..n-1."""
+    b = np.asarray(dofs, dtype=np.int64).ravel()
+    if b.size and (b.min() < 0 or b.max() >= n):
+        outside = named(b[(b < 0) | (b >= n)].tolist())
+        raise ConfigError(f"boundary dof {outside} must be from 0 to {n - 1}.")
+    if np.unique(b).size != b.size:
+        twice = named(np.flatnonzero(np.bincount(b) > 1).tolist())
+        raise ConfigError(f"boundary dof {twice} must be listed only once.")
+    return b

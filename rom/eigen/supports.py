@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from rom.arguments import finite, shortened
-from rom.eigen.verbs import Operators
+from rom.eigen.verbs import Operators, held_rows
 from rom.errors import ConfigError, InterfaceError
 from rom.model import Array, Index, Interface
 from rom.names import named, offered
@@ -75,17 +75,7 @@ def _directions(name: str, words: str) -> tuple[str, ...]:
 
 
 def held_coordinates(name: str, kind: str, n: int, directions: tuple[str, ...]) -> Index:
-    """Positions, among the n coordinates of an interface, of those held.
-
-    Args:
-        name: of the interface.
-        kind: of its coordinates, as a marker or a tie has it.
-        n: number of coordinates.
-        directions: what is held, from `supports`.
-
-    Raises:
-        InterfaceError: if such an interface has no such coordinates.
-    """
+    """Positions, among the n coordinates of an interface of a kind, of those held by `supports`."""
     if not directions:
         return np.arange(n)
     if kind in SIX_KINDS:
@@ -136,11 +126,7 @@ def spring_matrices(springs: Springs | None, known: Iterable[str], owner: str) -
 
 
 def held_dofs(interfaces: Mapping[str, Interface], fixed: Fixed) -> Index:
-    """Ascending dofs of a model, node by node, that supports hold.
-
-    Raises:
-        ConfigError, InterfaceError: see `supports` and `held_coordinates`.
-    """
+    """Ascending dofs of a model, node by node, that supports hold."""
     found = [np.zeros(0, dtype=np.int64)]
     for name, directions in supports(fixed, interfaces).items():
         dofs = interfaces[name].dofs
@@ -149,20 +135,15 @@ def held_dofs(interfaces: Mapping[str, Interface], fixed: Fixed) -> Index:
 
 
 def refuse_loose(ops: Operators, held: Index) -> None:
-    """Name the motion that stays free where some dofs are held, but not the body.
-
-    Raises:
-        InterfaceError: if there is one.
-    """
+    """Name the motion that stays free where some dofs are held, but not the body."""
     if not held.size or ops.rigid is None:
         return
-    mine = np.isin(np.arange(ops.first, ops.first + ops.n_local), held)
     G, centred = ops.gram(ops.rigid, ops.rigid), np.eye(6)
     centred[:3, 3:] = -np.linalg.solve(G[:3, :3], G[:3, 3:])  # however far the origin is
     own = ops.rigid @ centred
     size, T = np.linalg.eigh(ops.gram(own, own))
     T = T / np.sqrt(size)  # orthonormal on all dofs
-    R, T = np.where(mine[:, None], own @ T, 0.0), centred @ T
+    R, T = np.where(held_rows(ops, held)[:, None], own @ T, 0.0), centred @ T
     squares, V = np.linalg.eigh(ops.gram(R, R))
     free = T @ V[:, squares < LOOSE_RTOL * squares[-1]]
     if free.shape[1]:

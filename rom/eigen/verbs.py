@@ -10,10 +10,10 @@ from typing import Any, Protocol
 import numpy as np
 import numpy.typing as npt
 from scipy.linalg import qr
-from scipy.sparse import identity, kron
+from scipy.sparse import csr_matrix, identity, kron
 
 from rom.errors import InterfaceError, ModelError
-from rom.model import Array, Index, Interface
+from rom.model import Array, Index, Interface, Mask
 
 Product = Callable[[Array, Array], Array]
 Weighted = tuple[float, list[tuple[float, Any]]]
@@ -235,20 +235,13 @@ def column_blocks(n: int) -> list[slice]:
 
 
 def quadratic(ops: Operators, apply: Callable[[Array], Array], X: Array) -> Array:
-    """(k, k) X^T A X summed over the ranks, in units of A times those of X squared.
-
-    Args:
-        ops: sum over the ranks.
-        apply: (n_local, l) -> (n_local, l), the product with A, taken of few columns at a time.
-        X: (n_local, k) columns.
-    """
+    """(k, k) X^T A X summed over the ranks; ``apply`` is the product with A, of few columns."""
     return np.hstack([ops.gram(X, apply(X[:, some])) for some in column_blocks(X.shape[1])])
 
 
 def unit_motions(ops: Operators, boundary: Index) -> Array:
     """(n_local, n_b) columns of the identity: one boundary dof moved, everything else at rest."""
-    E = np.zeros((ops.n_local, boundary.size))
-    mine = (boundary >= ops.first) & (boundary < ops.first + ops.n_local)
+    E, mine = np.zeros((ops.n_local, boundary.size)), owned(ops, boundary)
     E[boundary[mine] - ops.first, np.flatnonzero(mine)] = 1.0
     return E
 
@@ -303,10 +296,6 @@ def independent(X: Array, product: Product) -> tuple[Array, list[int]]:
     """Columns of X, orthonormal in their order, and the numbers of those that add something.
 
     The order makes bases of growing degree nested, so that frequencies fall with it.
-
-    Args:
-        X: (n_local, m) columns.
-        product: (k, l) scalar products of (n_local, k) and (n_local, l) columns.
     """
     Q, kept = X[:, :0], list[int]()
     for k in range(X.shape[1]):
@@ -332,6 +321,23 @@ def new_part(Q: Array, x: Array, product: Product) -> tuple[Array, float]:
 
 def _length(x: Array, product: Product) -> float:
     return float(np.sqrt(max(product(x, x).item(), 0.0)))
+
+
+def owned(ops: Operators, dofs: Index) -> Mask:
+    """(k,) whether dofs of the model are rows of this rank."""
+    return (dofs >= ops.first) & (dofs < ops.first + ops.n_local)
+
+
+def held_rows(ops: Operators, dofs: Index) -> Mask:
+    """(n_local,) whether rows of this rank are among some dofs of the model."""
+    return np.isin(np.arange(ops.first, ops.first + ops.n_local), dofs)
+
+
+def coupled(shape: tuple[int, int], first: int, dofs: Index, block: Array) -> csr_matrix:
+    """(n_local, n) rows from one on of a matrix that is a block (k, k) between dofs (k,)."""
+    mine = (dofs >= first) & (dofs < first + shape[0])
+    rows, columns = np.repeat(dofs[mine] - first, dofs.size), np.tile(dofs, int(mine.sum()))
+    return csr_matrix((block[mine].ravel(), (rows, columns)), shape=shape)
 
 
 def own_rows(ops: Operators, X: Array) -> Array:

@@ -30,19 +30,14 @@ class Workers(Protocol):
     ) -> Any:
         """`rom.eigen.verbs.Operators` of matrices (n, n) of SciPy, by this process alone.
 
-        Args:
-            K: (n, n) stiffness, symmetric.
-            M: (n, n) mass, symmetric positive definite.
-            rigid: (n, r) motions without stiffness, or None.
-            together: ranks share the rows, and all of them must ask.
+        ``rigid`` (n, r) are motions without stiffness; ``together`` ranks share the rows, and all
+        of them must ask.
         """
 
     def factor(self, A: Any, *, pivoting: bool = False) -> Factored | None:
-        """A factor that all ranks make together and all must ask; None if A is singular.
+        """A factor that all ranks make together and all must ask; None if A (n, n) is singular.
 
-        Args:
-            A: (n, n) symmetric, the same on all ranks.
-            pivoting: where its diagonal has zeros; ``definite`` is not known then.
+        With ``pivoting``, where its diagonal has zeros, ``definite`` is not known.
         """
 
     def each(
@@ -84,16 +79,9 @@ class OneProcess:
 
 
 def held_solution(workers: Workers, matrices: tuple[Any, Any], held: Index, f: Array) -> Array:
-    """(n,) K^-1 f on all ranks with some dofs at rest.
+    """(n,) K^-1 f on all ranks, which all ask, with some dofs at rest.
 
-    Args:
-        workers: ranks that all have the same matrices, and all ask.
-        matrices: stiffness and mass (n, n); the mass tells a motion that nothing holds.
-        held: dofs at rest.
-        f: (n,) loads, in units of the displacement times those of K.
-
-    Raises:
-        InterfaceError: if a rigid motion stays free.
+    Of the matrices (n, n), stiffness and mass, the second tells a motion that nothing holds.
     """
     ops = workers.operators(*matrices, together=True)
     solution: Array = every_row(ops, ops.hold(held)(own_rows(ops, f[:, None])))[:, 0]

@@ -32,12 +32,7 @@ def lagrange(mesh: Any, degree: int) -> Any:
 
 
 def per_cell(mesh: Any, values: Array) -> Any:
-    """A coefficient with one number or tensor per cell.
-
-    Args:
-        mesh: the mesh.
-        values: (cells of this rank with ghosts, ...) values.
-    """
+    """A coefficient with one number or tensor (cells of this rank with ghosts, ...) per cell."""
     shape = values.shape[1:]
     if hasattr(fem, "functionspace"):
         space = fem.functionspace(mesh, ("DG", 0, shape) if shape else ("DG", 0))
@@ -146,12 +141,7 @@ def versions() -> dict[str, str]:
 def create_mesh(comm: Any, cells: Integers, points: Array, shape: str, degree: int) -> Any:
     """Distributed mesh from arrays on rank 0; the other ranks give none.
 
-    Args:
-        comm: the ranks.
-        cells: (m, k) node numbers in the order of dolfinx.
-        points: (n, 3) node coordinates [m].
-        shape: "tetrahedron" or "hexahedron".
-        degree: polynomial degree of the geometry.
+    Cells (m, k) in the order of dolfinx, points (n, 3) [m], and the degree of the geometry.
     """
     from dolfinx.mesh import create_mesh
 
@@ -173,13 +163,9 @@ def gmsh_order(shape: str, n_nodes: int) -> Integers:
 
 
 def tag_entities(mesh: Any, dim: int, nodes: Integers, values: Integers) -> Any:
-    """MeshTags of cells or facets that rank 0 knows by their nodes.
+    """MeshTags (e,) of cells, dim 3, or facets, 2, that rank 0 knows by their nodes (e, k).
 
-    Args:
-        mesh: the mesh.
-        dim: 3 for cells, 2 for facets.
-        nodes: (e, k) node numbers given to `create_mesh`, in the order of dolfinx.
-        values: (e,) tags.
+    Nodes have the numbers given to `create_mesh`, in the order of dolfinx.
     """
     from dolfinx.mesh import meshtags_from_entities
 
@@ -231,11 +217,7 @@ def node_coordinates(space: Any) -> Array:
 def degree_of_slopes(mesh: Any, degree: int, power: int, in_bricks: int | None = None) -> int:
     """Quadrature degree for a power of the gradient of displacements, exact on straight tetrahedra.
 
-    Args:
-        mesh: the mesh; curved cells get more.
-        degree: of the displacement.
-        power: of the gradient.
-        in_bricks: the power that counts on hexahedra, where it is another one.
+    Curved cells get more; on hexahedra another power may count, ``in_bricks``.
     """
     curved = geometry_degree(mesh) - 1
     if cell_name(mesh) == "tetrahedron":

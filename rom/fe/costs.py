@@ -24,21 +24,13 @@ REST_SECONDS = 4e-6  # per dof: interfaces, energies, the body
 
 @dataclass(frozen=True, slots=True)
 class FactorCost:
-    """A factor of the stiffness of a body, and what is done with it in one process.
-
-    Attributes:
-        flops: of the factorisation.
-        entries: of one triangle of the factor.
-        memory: that it takes [bytes].
-        seconds: of the factorisation.
-        solution_seconds: of solving for eight columns.
-    """
+    """A factor of the stiffness of a body, and what is done with it in one process."""
 
     flops: float
-    entries: float
-    memory: float
-    seconds: float
-    solution_seconds: float
+    entries: float  # of one triangle of the factor
+    memory: float  # [bytes]
+    seconds: float  # of the factorisation
+    solution_seconds: float  # of solving for eight columns
 
 
 def factor_cost(n: float) -> FactorCost:
@@ -65,11 +57,7 @@ def reduction_seconds(
 ) -> float:
     """Time of a reduction without certificate in one process [s].
 
-    Args:
-        n: number of dofs.
-        n_interface: interface coordinates, each a solution.
-        n_modes: fixed-interface modes.
-        cost: of the factor, where it is known; of a beam without.
+    Each interface coordinate is a solution; without ``cost`` the factor is that of a beam.
     """
     cost = cost or factor_cost(n)
     n_passes = n_interface / PASS_COLUMNS + PASSES_PER_MODE * n_modes

@@ -106,14 +106,9 @@ def usable_cache() -> Path:
 
 
 def clear_stale_cache(directory: Path | None = None, age: float = STALE_AFTER) -> list[Path]:
-    """Remove what a killed compilation left behind.
+    """Remove what a killed compilation left behind in the cache, or that of dolfinx; the sources.
 
-    Args:
-        directory: the cache; that of dolfinx when not given.
-        age: seconds a source must be old; younger ones are waited for, somebody may be at work.
-
-    Returns:
-        The sources removed.
+    They must be so many seconds old; younger ones are waited for, somebody may be at work.
     """
     removed = []
     for source in sorted((directory or cache_directory()).glob("libffcx_*.c")):

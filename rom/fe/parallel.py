@@ -20,18 +20,9 @@ GRACE_PERIOD = 1.0  # [s] that other ranks leave rank 0 to print an error all of
 
 
 def on_root(comm: MPI.Comm, function: Callable[..., T], *arguments: Any, **named: Any) -> T:
-    """Call a function on rank 0 and give its value to all ranks.
+    """Call a function on rank 0 and give its value, which must survive pickling, to all ranks.
 
-    Args:
-        comm: the ranks; all of them must call.
-        function: called on rank 0 only; its value must survive pickling.
-        arguments: passed on.
-        named: passed on.
-
-    Raises:
-        RomError: on all ranks, when the function raised one.
-        ParallelError: on all ranks, when the function raised anything else under mpirun, or when
-            mpirun is that of another MPI.
+    All ranks must call, and raise what it raised: a RomError, or a ParallelError under mpirun.
     """
     check_launcher()
     value: Any = None
@@ -46,11 +37,7 @@ def on_root(comm: MPI.Comm, function: Callable[..., T], *arguments: Any, **named
 
 
 def check_launcher() -> None:
-    """Make sure that the processes mpirun has started know of each other.
-
-    Raises:
-        ParallelError: if not: each would do all of the work, and write the same files.
-    """
+    """Refuse processes of another mpirun: each would do all the work, and write the same files."""
     started, known = ranks()[1], MPI.COMM_WORLD.size
     if known == 1 < started:
         library = MPI.Get_library_version().split(",")[0].splitlines()[0]
@@ -71,11 +58,8 @@ def collective(comm: MPI.Comm) -> Iterator[None]:
     """Raise on all ranks what any rank raised inside; the lowest rank's error is shown.
 
     Also usable as a decorator. The body must not wait for other ranks after the line that can
-    fail, or the ranks that did not fail never get out of it.
-
-    Raises:
-        RomError: on all ranks, when any rank raised one.
-        ParallelError: on all ranks, when any rank raised anything else under mpirun.
+    fail, or the ranks that did not fail never get out of it. What is no RomError is raised as a
+    ParallelError under mpirun.
     """
     error = None
     try:
@@ -90,9 +74,6 @@ def meet(comm: MPI.Comm) -> None:
 
     Whoever comes first may wait for minutes, while one rank meshes or reads, on a machine whose
     cores others need. A wait is prolonged by about its own length at most, and by `LONGEST_SLEEP`.
-
-    Args:
-        comm: the ranks; all of them must call.
     """
     if comm.size == 1:
         return
@@ -154,10 +135,6 @@ def stop_all_ranks(code: int, print_error: Callable[[], None]) -> None:
 
     Rank 0 complains at once; another rank does only when rank 0 has not ended it within
     `GRACE_PERIOD`, because then it is alone with its error.
-
-    Args:
-        code: exit code.
-        print_error: prints the error.
     """
     if ranks()[0] > 0:
         time.sleep(GRACE_PERIOD)

@@ -10,7 +10,7 @@ from rom.eigen.attachments import added_mass
 from rom.eigen.band import modes_up_to
 from rom.eigen.scipy import SciPyOperators
 from rom.eigen.supports import Fixed, Springs, refuse_loose, spring_matrices, supports
-from rom.eigen.verbs import COLUMNS_AT_ONCE, Operators, own_points, rigid_motions
+from rom.eigen.verbs import Operators, column_blocks, held_rows, own_points, rigid_motions
 from rom.errors import ConfigError
 from rom.model import Array, FEModel, Index, Modes
 from rom.process.progress import MANY_DOFS, stages
@@ -142,10 +142,8 @@ def modes(
 
 def _residual(ops: Operators, held: Index, omega: Array, Phi: Array) -> Array:
     """norm(K phi - lambda M phi) / (lambda norm(M phi)) on the free dofs."""
-    free = ~np.isin(np.arange(ops.first, ops.first + ops.n_local), held)[:, None]
-    norms = np.zeros((2, omega.size))
-    for first in range(0, omega.size, COLUMNS_AT_ONCE):
-        few = slice(first, first + COLUMNS_AT_ONCE)
+    free, norms = ~held_rows(ops, held)[:, None], np.zeros((2, omega.size))
+    for few in column_blocks(omega.size):
         inertia = ops.apply_M(Phi[:, few])
         residual = ops.apply_K(Phi[:, few]) - inertia * omega[few] ** 2
         norms[:, few] = [

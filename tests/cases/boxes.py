@@ -39,12 +39,6 @@ def distort(mesh, amount=0.1, seed=0):
     return mesh
 
 
-def dofs(model, where, axes):
-    """Dofs along some axes of the nodes for which ``where(x, y, z)`` holds."""
-    nodes = np.flatnonzero(where(*model.points.T))
-    return (3 * nodes[:, None] + np.array(axes)).ravel()
-
-
 def faces_held(model, held):
     """Dofs of {face of the bounding box: axes}, each once."""
     low, high = model.points.min(axis=0), model.points.max(axis=0)

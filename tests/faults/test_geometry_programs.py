@@ -177,7 +177,7 @@ def test_a_confined_process_has_threads_and_its_folder_and_nothing_else(tmp_path
     code = f"""
 import os, socket, subprocess, threading
 from pathlib import Path
-from rom.fe.mesh.sources.confinement import confine
+from rom.fe.mesh.sources.script import confine
 folder, outside = Path({str(tmp_path)!r}, "in"), Path({str(tmp_path)!r}, "out")
 folder.mkdir()
 confine(folder)

@@ -1,8 +1,5 @@
 """Curved cells: mass, frequencies, interfaces and pictures of round bodies against closed forms."""
 
-import json
-import subprocess
-import sys
 from functools import cache
 
 import numpy as np
@@ -12,10 +9,10 @@ from numpy.polynomial.legendre import leggauss
 from numpy.testing import assert_allclose, assert_array_equal
 
 import rom
-from cases.command import environment
 from cases.files.cells import second_order, solid
 from cases.long import few
 from cases.paths import RANKS, ROOT
+from cases.ranks.environment import written_on
 from rom import rotation
 from rom.eigen.verbs import rigid_motions
 from rom.errors import MeshError
@@ -25,6 +22,7 @@ pytestmark = [pytest.mark.fenicsx, pytest.mark.filterwarnings("ignore:linear tet
 
 from rom.fe.elasticity import assemble, model  # noqa: E402
 from rom.fe.forms import region  # noqa: E402
+from rom.fe.mesh.input_deck import input_deck  # noqa: E402
 from rom.fe.mesh.read import read_mesh, to_dolfinx  # noqa: E402
 from rom.fe.mesh.summary import cell_volumes  # noqa: E402
 
@@ -34,9 +32,7 @@ SetFactory("OpenCASCADE");
 DefineConstant[ lc = {0.01, Name "lc"} ];
 Mesh.MeshSizeMin = lc; Mesh.MeshSizeMax = lc;
 """
-PLATE = (
-    HEAD
-    + """
+PLATE = """
 Box(1) = {-0.03, -0.025, 0, 0.08, 0.05, 0.016};
 Cylinder(2) = {0, 0, -0.01, 0, 0, 0.03, 0.02};
 BooleanDifference(3) = { Volume{1}; Delete; }{ Volume{2}; Delete; };
@@ -44,24 +40,20 @@ Physical Surface("bore") = Surface In BoundingBox{-0.021, -0.021, -1, 0.021, 0.0
 Physical Surface("end") = Surface In BoundingBox{0.049, -1, -1, 0.051, 1, 1};
 Physical Volume("body") = {3};
 """
-)
-TUBE = (
-    HEAD
-    + """
+TUBE = """
 DefineConstant[ L = {0.1, Name "L"} ];
 Cylinder(1) = {0, 0, 0, 0, 0, L, 0.04};
 Cylinder(2) = {0, 0, -0.1, 0, 0, 1, 0.02};
 BooleanDifference(3) = { Volume{1}; Delete; }{ Volume{2}; Delete; };
 Physical Volume("body") = {3};
 """
-)
-ROD = HEAD + 'Cylinder(1) = {0, 0, 0, 0, 0, 0.1, 0.01}; Physical Volume("body") = {1};\n'
-BALL = HEAD + 'Sphere(1) = {0, 0, 0, 0.02}; Physical Volume("body") = {1};\n'
+ROD = 'Cylinder(1) = {0, 0, 0, 0, 0, 0.1, 0.01}; Physical Volume("body") = {1};\n'
+BALL = 'Sphere(1) = {0, 0, 0, 0.02}; Physical Volume("body") = {1};\n'
 
 
 def written(folder, text):
     path = folder / "body.geo"
-    path.write_text(text)
+    path.write_text(HEAD + text)
     return path
 
 
@@ -341,9 +333,6 @@ def test_pictures_of_a_bore_are_round(tmp_path):
 
 def test_second_order_meshes_come_back_from_files_as_curved_as_they_were(tmp_path):
     """A deck with quadratic elements, for CalculiX and Abaqus."""
-    from rom.fe.mesh.input_deck import input_deck
-    from rom.fe.mesh.summary import cell_volumes
-
     mesh = read_mesh(written(tmp_path, PLATE), parameters=round_bore(12))
     (tmp_path / "body.inp").write_text(input_deck(mesh))
     back = read_mesh(tmp_path / "body.inp")
@@ -356,8 +345,6 @@ def test_second_order_meshes_come_back_from_files_as_curved_as_they_were(tmp_pat
 
 def test_straight_second_order_meshes_are_read_as_straight(tmp_path):
     """Nodes amid straight edges say nothing; elements of degree 1 can do without them."""
-    from rom.fe.mesh.input_deck import input_deck
-
     box, fine = solid("tet4"), tmp_path / "box.inp"
     fine.write_text(input_deck(second_order(box)))
     made = {k: model(fine, material=STEEL, degree=k) for k in (1, 2)}
@@ -371,12 +358,7 @@ def test_curved_models_are_the_same_on_any_number_of_ranks(tmp_path):
     path, found = written(tmp_path, PLATE), {}
     for n in (1, 2, 3):
         out = tmp_path / f"{n}.json"
-        command = ["mpirun", "--oversubscribe", "-n", str(n), sys.executable,
-                   str(RANKS / "curved_under_mpi.py"), str(path), str(out)]  # fmt: skip
-        done = subprocess.run(command, cwd=ROOT, env=environment(), timeout=300,
-                              capture_output=True, text=True, check=False)  # fmt: skip
-        assert done.returncode == 0, done.stderr
-        found[n] = json.loads(out.read_text())
+        found[n] = written_on(n, out, RANKS / "curved_under_mpi.py", path, out, timeout=300)
     for n in (2, 3):
         assert set(found[n]) == set(found[1])
         for name, values in found[1].items():

@@ -1,18 +1,25 @@
 """The cache of compiled forms survives killed runs, read-only folders and planted options."""
 
 import os
+import sys
 import time
+from types import SimpleNamespace
 
 import pytest
 
-from rom.errors import ResourceError, RomWarning
+import rom.fe
+from cases.boxes import box
+from rom.errors import ConfigError, ResourceError, RomWarning
 
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")
 pytestmark = pytest.mark.fenicsx
 
 from mpi4py import MPI  # noqa: E402
 
+import ufl  # noqa: E402
+
 from rom.fe import jit  # noqa: E402
+from rom.fe.compat import assemble_matrix, lagrange  # noqa: E402
 
 NAME = "libffcx_forms_0123456789abcdef0123456789abcdef01234567"
 
@@ -39,11 +46,6 @@ def test_a_compilation_under_way_is_waited_for(tmp_path):
 
 def test_a_form_whose_compilation_was_killed_is_compiled_again(tmp_path, monkeypatch):
     """Without the clearing, dolfinx waits for the library and gives up."""
-    import ufl
-
-    from cases.boxes import box
-    from rom.fe.compat import assemble_matrix, lagrange
-
     monkeypatch.setattr(jit, "cache_directory", lambda: tmp_path)
     mesh, _ = box(cells=(1, 1, 1))
     with jit.compiling(MPI.COMM_SELF):
@@ -70,11 +72,6 @@ def test_a_cache_that_cannot_be_written_is_replaced(tmp_path, monkeypatch):
 
 
 def test_a_missing_library_is_named_with_its_package(monkeypatch):
-    import sys
-
-    import rom.fe
-    from rom.errors import ConfigError
-
     for name in ("elasticity", "forms.region"):
         monkeypatch.delitem(sys.modules, f"rom.fe.{name}", raising=False)
     monkeypatch.setitem(sys.modules, "ufl", None)
@@ -88,8 +85,6 @@ def test_what_forms_are_compiled_with_is_named_where_it_is_missing(
     tmp_path, monkeypatch, there, named
 ):
     """Packages of pip need the headers of Python and a compiler, and bring neither."""
-    from types import SimpleNamespace
-
     (tmp_path / there).touch()
     places = SimpleNamespace(get_path=lambda kind: str(tmp_path), get_config_var=lambda name: "sh")
     monkeypatch.setattr(jit, "sysconfig", places)

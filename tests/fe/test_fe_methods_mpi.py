@@ -1,13 +1,11 @@
 """Every method gives the same frequencies on one, two and three processes."""
 
-import json
-
 import numpy as np
 import pytest
 
 from cases.long import SHARED_BY
 from cases.paths import RANKS
-from cases.ranks.environment import on_ranks
+from cases.ranks.environment import written_on
 
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")
 pytestmark = [pytest.mark.fenicsx, pytest.mark.mpi]
@@ -16,13 +14,8 @@ SCRIPT = RANKS / "methods_under_mpi.py"
 
 @pytest.fixture(scope="module")
 def found(tmp_path_factory):
-    folder, frequencies = tmp_path_factory.mktemp("methods"), {}
-    for n in (1, *SHARED_BY):
-        file = folder / f"{n}.json"
-        done = on_ranks(n, SCRIPT, file)
-        assert file.exists(), done.stderr
-        frequencies[n] = json.loads(file.read_text())
-    return frequencies
+    files = {n: tmp_path_factory.mktemp("methods") / f"{n}.json" for n in (1, *SHARED_BY)}
+    return {n: written_on(n, file, SCRIPT, file) for n, file in files.items()}
 
 
 @pytest.mark.long

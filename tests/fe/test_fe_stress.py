@@ -8,6 +8,7 @@ from numpy.testing import assert_allclose
 from scipy.linalg import null_space
 
 import rom
+from benchmarks.models import bar
 from rom.errors import ConfigError
 from rom.reduction.full_model import operators
 from rom.reduction.interfaces.connection import connect
@@ -26,6 +27,14 @@ def beam(degree=2, lc=0.02):
 @pytest.fixture(scope="module")
 def model():
     return beam()
+
+
+KINDS = {"root": "rbe2", "tip": "rbe2"}
+
+
+def stressed(model, n=4, kinds=KINDS, **options):
+    options = {"method": rom.CraigBampton(n), "stress": True, "certify": False} | options
+    return rom.reduce(model, interfaces=kinds, **options)
 
 
 def displacement(model, gradient):
@@ -65,10 +74,7 @@ def test_pure_bending_is_linear_over_the_height(model):
 def test_the_reduced_static_stress_is_the_full_one(model, kind, reference):
     """Loads on the tip, the root held: constraint modes are exact, and so is their stress."""
     kinds = {"root": "rbe2", "tip": kind}
-    body = rom.reduce(
-        model, method=rom.CraigBampton(3), interfaces=kinds, reference=reference, stress=True,
-        certify=False,
-    )  # fmt: skip
+    body = stressed(model, 3, kinds, reference=reference)
     connection = connect(operators(model), model, kinds)
     ops, root, tip = connection.ops, connection.held(("root",)), connection.held(("tip",))
     F = np.zeros((ops.n_local, 6))
@@ -84,10 +90,7 @@ def test_the_reduced_static_stress_is_the_full_one(model, kind, reference):
 
 
 def test_stress_survives_a_file_and_a_change_of_frame(model, tmp_path):
-    kinds = {"root": "rbe2", "tip": "rbe2"}
-    body = rom.reduce(
-        model, method=rom.CraigBampton(4), interfaces=kinds, stress=True, certify=False
-    )
+    body = stressed(model)
     q = np.linspace(1.0, 2.0, body.n_modes)
     rom.save(body, tmp_path / "beam.rom.npz")
     again = rom.load(tmp_path / "beam.rom.npz")
@@ -106,11 +109,7 @@ def test_stress_survives_a_file_and_a_change_of_frame(model, tmp_path):
 
 def test_paraview_reads_the_stress(model, tmp_path):
     meshio = pytest.importorskip("meshio", reason="meshio is not installed")
-
-    kinds = {"root": "rbe2", "tip": "rbe2"}
-    body = rom.reduce(
-        model, method=rom.CraigBampton(4), interfaces=kinds, stress=True, certify=False
-    )
+    body = stressed(model)
     q = np.linspace(1.0, 2.0, body.n_modes)
     rom.write_stress(body, q, tmp_path / "beam.vtu")
     seen = meshio.read(tmp_path / "beam.vtu").point_data
@@ -120,20 +119,13 @@ def test_paraview_reads_the_stress(model, tmp_path):
 
 
 def test_messages(model):
-    kinds = {"root": "rbe2", "tip": "rbe2"}
-    body = rom.reduce(
-        model, method=rom.CraigBampton(2), interfaces=kinds, stress=True, certify=False
-    )
+    body = stressed(model, 2)
     with pytest.raises(ConfigError, match="cannot be recovered"):
         rom.write_stress(replace(body, stress=None), np.zeros(8), "x.vtu")
     with pytest.raises(ConfigError, match=r"q has shape \(3,\)"):
         body.stress.field(np.zeros(3))
-    from benchmarks.models import bar
-
     with pytest.raises(ConfigError, match="has no finite elements"):
-        rom.reduce(
-            bar((0.4, 0.05, 0.03), (4, 1, 1)), method=rom.Guyan(), interfaces=kinds, stress=True
-        )
+        stressed(bar((0.4, 0.05, 0.03), (4, 1, 1)), method=rom.Guyan())
 
 
 def inertial_load(model, a, alpha, omega):
@@ -156,8 +148,7 @@ def test_modes_left_out_follow_inertia(model, method):
     held = ops.hold(connection.held(("root",)))
     U = ops.expand(held(ops.restrict(inertial_load(model, **MOVING))))
     full = model.stresses.at_nodes(U, model.surface.nodes)[:, :, 0]
-    kinds = {"root": "full", "tip": "rbe2"}
-    body = rom.reduce(model, method=method, interfaces=kinds, stress=True, certify=False)
+    body = stressed(model, kinds={"root": "full", "tip": "rbe2"}, method=method)
     for reference in ("mean-axis", "tip"):
         seen = body.with_reference(reference)
         q, rigid = at_rest(seen, **MOVING)
@@ -181,11 +172,7 @@ def at_rest(body, a, alpha, omega):
 
 def test_a_vibrating_body_has_the_stress_of_the_full_mode(model):
     """With the accelerations of a free mode, in any frame, errors fall by an order or more."""
-    kinds = {"root": "rbe2", "tip": "rbe2"}
-    body = rom.reduce(
-        model, method=rom.CraigBampton(4), interfaces=kinds, stress=True, certify=False
-    )
-    full = rom.modes(model, 10, interfaces=kinds)
+    body, full = stressed(model), rom.modes(model, 10, interfaces=KINDS)
     exact = model.stresses.at_nodes(full.shapes[:, 6:], model.surface.nodes)
     for reference in ("mean-axis", "root"):
         seen = body.with_reference(reference)
@@ -201,8 +188,7 @@ def test_a_vibrating_body_has_the_stress_of_the_full_mode(model):
 
 
 def test_the_correction_needs_constraint_modes(model):
-    kinds = {"root": "rbe2", "tip": "rbe2"}
-    body = rom.reduce(model, method=rom.Rubin(5), interfaces=kinds, stress=True, certify=False)
+    body = stressed(model, method=rom.Rubin(5))
     with pytest.raises(ConfigError, match="stress of the modes it left out"):
         body.stress.field(np.zeros(body.n_modes), np.zeros(12 + body.n_modes))
 
@@ -210,10 +196,7 @@ def test_the_correction_needs_constraint_modes(model):
 def test_a_bar_that_spins_in_free_fall_has_the_stress_of_closed_form(model, tmp_path):
     """sigma = rho omega^2 (L^2 / 8) (1 - (2 x / L)^2) along it; falling adds none."""
     pv = pytest.importorskip("pyvista", reason="pictures need pyvista")
-    kinds = {"root": "rbe2", "tip": "rbe2"}
-    body = rom.reduce(model, method=rom.CraigBampton(2), interfaces=kinds, stress=True,
-                      damping=rom.Rayleigh(beta=1e-4), certify=False)  # fmt: skip
-    speed = 100.0
+    body, speed = stressed(model, 2, damping=rom.Rayleigh(beta=1e-4)), 100.0
     mech = rom.Mechanism(gravity=(0, 0, -9810.0))  # so strong that one forgotten would show
     mech.add_flexible("bar", body, omega=(0, 0, speed), velocity=(0, -speed * L / 2, 0))
     sol = rom.simulate(mech, t_end=0.02, dt=2e-4)

@@ -25,6 +25,7 @@ ROOTS = {  # at the root, at the tip, (k L)^2 of the lowest bending along z
     "pinned, pinned": ("xyz" + PIN, "yz" + PIN, np.pi**2),
     "pinned, guided": ("xyz" + PIN, "y" + GUIDE, np.pi**2 / 4),
 }
+KINDS = {"root": "rbe2", "tip": "rbe2"}
 
 
 def beam(length=L, nx=20):
@@ -41,8 +42,7 @@ def model():
 
 @pytest.fixture(scope="module")
 def body(model):
-    return rom.reduce(model, method=rom.CraigBampton(12), certify=False,
-                      interfaces={"root": "rbe2", "tip": "rbe2"})  # fmt: skip
+    return rom.reduce(model, method=rom.CraigBampton(12), certify=False, interfaces=KINDS)
 
 
 def along_z(model, shapes):
@@ -54,8 +54,8 @@ def along_z(model, shapes):
 @pytest.mark.parametrize("name", ROOTS)
 def test_beams_have_the_roots_of_their_ends_whole_and_reduced(name, model, body):
     root, tip, factor = ROOTS[name]
-    fixed, kinds = {"root": root, "tip": tip}, {"root": "rbe2", "tip": "rbe2"}
-    found = rom.modes(model, 4, fixed=fixed, interfaces=kinds)
+    fixed = {"root": root, "tip": tip}
+    found = rom.modes(model, 4, fixed=fixed, interfaces=KINDS)
     k = along_z(model, found.shapes)
     assert_allclose(found.frequencies[k], factor * UNIT, rtol=2e-3)  # and shear of slender beams
     assert_allclose(body.frequencies(4, fixed=fixed), found.frequencies, rtol=5e-4)
@@ -75,17 +75,17 @@ def test_halves_on_planes_of_symmetry_have_the_modes_of_the_whole(model):
 
 
 def test_a_body_that_stays_loose_is_refused_whole_and_has_zeros_reduced(model, body):
-    kinds, guides = {"root": "rbe2", "tip": "rbe2"}, {"root": "xy" + GUIDE, "tip": "y" + GUIDE}
+    guides = {"root": "xy" + GUIDE, "tip": "y" + GUIDE}
     with pytest.raises(InterfaceError, match=r"leave 1 of six motions .* slides along \(0, 0, 1\)"):
-        rom.modes(model, 3, fixed=guides, interfaces=kinds)
+        rom.modes(model, 3, fixed=guides, interfaces=KINDS)
     f = body.frequencies(3, fixed=guides)
     assert f[0] == 0.0 < f[1]
     hinge = {"tip": "xyz" + PIN}
     with pytest.raises(InterfaceError, match=r"turns about \(0, 1, 0\) through \(1, 0, 0\) m"):
-        rom.modes(model, 3, fixed=hinge, interfaces=kinds)
+        rom.modes(model, 3, fixed=hinge, interfaces=KINDS)
     assert np.count_nonzero(body.frequencies(8, fixed=hinge) == 0.0) == 1
     with pytest.raises(InterfaceError, match=r"leave 2 of six .* slides along \(0, 0, 1\)"):
-        rom.modes(model, 3, fixed={"root": "xy" + PIN}, interfaces=kinds)
+        rom.modes(model, 3, fixed={"root": "xy" + PIN}, interfaces=KINDS)
     with pytest.raises(InterfaceError, match="leave 4 of six motions"):
         rom.modes(model, 3, fixed={"tip": "yz"}, interfaces={"tip": "rbe2"})
 
@@ -98,7 +98,7 @@ def test_rotating_and_parametric_bodies_take_the_same_supports(model, body):
         body.rotating_frequencies(10.0, (0, 0, 1), fixed={"root": "xyz"})
     family = rom.reduce_parametric(
         model, parameters={"E": rom.YoungsModulus(None, 0.5, 2.0)}, method=rom.CraigBampton(12),
-        interfaces={"root": "rbe2", "tip": "rbe2"}, certify=False,
+        interfaces=KINDS, certify=False,
     )  # fmt: skip
     for E in (0.5, 2.0):
         f = family.frequencies(6, fixed=fixed, E=E)
@@ -109,7 +109,7 @@ def test_rotating_and_parametric_bodies_take_the_same_supports(model, body):
 def test_a_beam_between_supports_that_turn_is_pulled_by_what_they_carry(model, tip, tension):
     """Flapping: N(x) = m W^2 (tension L^2 - x^2) / 2, with a tip that slides or is held."""
     body = rom.reduce(model, method=rom.CraigBampton(12), certify=False, stiffening=True,
-                      interfaces={"root": "rbe2", "tip": "rbe2"}, reference="root")  # fmt: skip
+                      interfaces=KINDS, reference="root")  # fmt: skip
     square = 200.0  # of W, times m L^4 / EI
     speed = np.sqrt(square) * 2 * np.pi * UNIT
     K, M = hermite_beam()
@@ -147,7 +147,7 @@ def test_a_spring_at_the_tip_of_a_clamped_beam(model, body, stiffness):
     across = brentq(bent, 1.8, 3.93) ** 2 * UNIT
     axial = brentq(lambda b: b * np.cos(b) + stiffness * np.sin(b), np.pi / 2, np.pi - 1e-9)
     axial *= np.sqrt(210e9 / 7850.0) / L / (2 * np.pi)
-    ends = {"interfaces": {"root": "rbe2", "tip": "rbe2"}, "fixed": ("root",)}
+    ends = {"interfaces": KINDS, "fixed": ("root",)}
     for k, exact in ((stiffness * EI / L**3 * Z, across), (stiffness * EA / L * X, axial)):
         whole = rom.modes(model, 16, springs={"tip": k}, **ends).frequencies
         assert np.abs(whole / exact - 1).min() < 3e-3

@@ -49,7 +49,7 @@ ORDER = {
         "fe": "costs parallel jit compat operators forms mesh elasticity probe",
         "fe.operators": (
             "solver memory disk aij foreseen factor substructures held spectrum "
-            "iterative krylov_schur workers petsc"
+            "iterative workers petsc"
         ),
         "fe.mesh": (
             "cell_types topology picks cad solid sources child curving quality repair validate "

@@ -14,6 +14,7 @@ from cases.solid import block
 from rom.errors import ConfigError, InterfaceError
 
 LEVELS = ("system", "local")
+BOTH = {"root": "full", "tip": "full"}
 
 
 @pytest.fixture(scope="module")
@@ -39,6 +40,12 @@ def dense_reference(n, m=12):
     _, chi = eigh(Psi.T @ K @ Psi, Psi.T @ M @ Psi)
     T = np.hstack([Psi @ chi[:, :n], np.eye(free.size)[:, i]])
     return np.sqrt(eigh(T.T @ K @ T, T.T @ M @ T, eigvals_only=True)[:m]) / (2 * np.pi)
+
+
+def reduced(n_modes, kinds, **shape):
+    """A block with its full interfaces."""
+    method = rom.CraigBampton(n_modes)
+    return rom.reduce(block(**shape), method=method, interfaces=kinds, certify=False)
 
 
 @pytest.mark.parametrize("n", [5, 9, 27])
@@ -94,13 +101,8 @@ def test_functions_of_the_whole_come_out_as_its_interface_modes(assembly):
 
 
 def test_a_chain_of_three_is_reduced_on_both_cuts():
-    bodies = {
-        f"part {k}": rom.reduce(
-            block(size=(0.3, 0.1, 0.08), cells=(3, 2, 2), origin=(0.3 * k, 0, 0)),
-            method=rom.CraigBampton(15), interfaces={"root": "full", "tip": "full"}, certify=False,
-        )
-        for k in range(3)
-    }  # fmt: skip
+    shape = {"size": (0.3, 0.1, 0.08), "cells": (3, 2, 2)}
+    bodies = {f"part {k}": reduced(15, BOTH, origin=(0.3 * k, 0, 0), **shape) for k in range(3)}
     couplings = tuple(((f"part {k}", "tip"), (f"part {k + 1}", "root")) for k in range(2))
     chain = rom.Assembly(bodies, couplings)
     root = (("part 0", "root"),)
@@ -113,13 +115,9 @@ def test_a_chain_of_three_is_reduced_on_both_cuts():
 
 def test_a_repeated_frequency_is_kept_whole_and_said_so(caplog):
     """A square section bends alike in two directions."""
-    bodies = {}
-    for side, origin in (("left", 0.0), ("right", 0.5)):
-        model = block(size=(0.5, 0.1, 0.1), cells=(4, 2, 2), origin=(origin, 0, 0))
-        bodies[side] = rom.reduce(
-            model, method=rom.CraigBampton(10), interfaces={"root": "full", "tip": "full"},
-            certify=False,
-        )  # fmt: skip
+    shape = {"size": (0.5, 0.1, 0.1), "cells": (4, 2, 2)}
+    bodies = {side: reduced(10, BOTH, origin=(x, 0, 0), **shape)
+              for side, x in (("left", 0.0), ("right", 0.5))}  # fmt: skip
     square = rom.Assembly(bodies, COUPLED)
     with caplog.at_level(logging.INFO, logger="rom"):
         condensed = square.reduced(1, fixed=(ROOT,))
@@ -181,9 +179,6 @@ def body(kinds, n=None, m=15, **options):
     method = rom.CraigBampton(m) if n is None else rom.Characteristic(rom.CraigBampton(m), n)
     options = {"certify": False} | options
     return rom.reduce(block(cells=(6, 3, 3)), method=method, interfaces=kinds, **options)
-
-
-BOTH = {"root": "full", "tip": "full"}
 
 
 def test_functions_of_one_body_lead_to_its_full_interfaces():

@@ -160,11 +160,8 @@ def cantilever(span=0.12, stagger=20.0, twist=30.0, n=30):
 def test_the_held_blade_bends_like_a_twisted_beam():
     """Below it, for root and platform give way and the beam does not shear; torsion is no beam."""
     for stagger, twist in ((20.0, 30.0), (20.0, 0.0)):
-        model = rom.fe.model(
-            GEOMETRY,
-            material=TITANIUM,
-            parameters=COARSE | {"stagger": stagger, "twist": twist},
-        )
+        turned = COARSE | {"stagger": stagger, "twist": twist}
+        model = rom.fe.model(GEOMETRY, material=TITANIUM, parameters=turned)
         f = rom.modes(model, 2, fixed=FLANKS).frequencies
         beam = cantilever(stagger=stagger, twist=twist)
         assert 150 < f[0] < 600
@@ -195,10 +192,8 @@ def test_a_tenth_of_the_dofs_gives_ten_modes(blade):
 def test_a_crown_costs_the_functions_of_a_quadric(blade):
     model, _, crown = blade
     for name in FLANKS:
-        ranks = [
-            interface_functions(Polynomial(p), model.interfaces[name]).shape[1]
-            for p in (1, 2, 3, 4)
-        ]
+        face = model.interfaces[name]
+        ranks = [interface_functions(Polynomial(p), face).shape[1] for p in (1, 2, 3, 4)]
         assert ranks == ([4, 9, 16, 25] if crown else [3, 6, 10, 15])
 
 

@@ -95,10 +95,6 @@ def test_all_modes_make_every_basis_the_full_model(method):
     assert_allclose(lam[2:], eigh(K, M, eigvals_only=True)[2:], rtol=1e-8)
 
 
-def boundary_of_faces(model):
-    return np.concatenate([model.interfaces[name].dofs for name in ("root", "tip")])
-
-
 def test_rubin_and_herting_span_one_space():
     """Inertia relief from the interfaces and residual flexibility describe the same shapes."""
     model = block(cells=(6, 2, 2))
@@ -172,7 +168,7 @@ def test_messages_for_wrong_boundaries(model, method, b, error, words):
 def test_modes_that_spend_the_flexibility_of_the_interface_are_refused():
     model = block(cells=(3, 1, 1))
     ops = SciPyOperators(model.K, model.M, rigid_motions(model.points))
-    b = boundary_of_faces(model)
+    b = np.concatenate([model.interfaces[name].dofs for name in ("root", "tip")])
     with pytest.raises(InterfaceError, match="residual flexibility of the 24 boundary dofs"):
         rom.Rubin(model.n_dofs - 6).basis(ops, b, ("",) * 24)
 
@@ -188,16 +184,3 @@ def test_modes_by_substructures_are_those_by_lanczos(ops, model):
     S = ops.gram(Phi, ops.apply_M(Psi))
     assert_allclose(np.linalg.svd(S, compute_uv=False), 1.0, atol=1e-4)
     assert_allclose(found.Psi[:, : b.size], known.Psi[:, : b.size], atol=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("given", "said"),
-    [
-        ({"f_max": 1e3, "search": "arnoldi"}, "search"),
-        ({"n_modes": 3, "search": "substructures"}, "needs f_max"),
-        ({"f_max": 1e3, "tol": 1e-3, "search": "substructures"}, "takes no tol"),
-    ],
-)
-def test_a_search_that_does_not_suit_is_refused(given, said):
-    with pytest.raises(ConfigError, match=said):
-        rom.CraigBampton(**given)

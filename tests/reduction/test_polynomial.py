@@ -21,17 +21,11 @@ from rom.reduction.interfaces.connection import connect
 from rom.reduction.interfaces.kinds import tie
 from rom.reduction.interfaces.polynomial import cylinder_coordinates, interface_functions
 
+FLAT, QUADRIC, OTHER = [3, 6, 10, 15], [4, 9, 16, 25], [4, 10, 20, 35]
+RANKS = {"plane": FLAT, "strip": FLAT, "cylinder": QUADRIC, "sphere": QUADRIC, "wave": OTHER}
 
-@pytest.mark.parametrize(
-    ("name", "ranks"),
-    [
-        ("plane", [3, 6, 10, 15]),
-        ("strip", [3, 6, 10, 15]),
-        ("cylinder", [4, 9, 16, 25]),
-        ("sphere", [4, 9, 16, 25]),
-        ("wave", [4, 10, 20, 35]),
-    ],
-)
+
+@pytest.mark.parametrize(("name", "ranks"), RANKS.items())
 def test_number_of_functions_is_the_rank_of_the_polynomials_on_the_surface(name, ranks):
     """(p+1)(p+2)/2 on planes, (p+1)^2 on quadrics, (p+1)(p+2)(p+3)/6 elsewhere."""
     interface = surface(name)
@@ -98,13 +92,8 @@ def test_two_bodies_around_one_bore_choose_the_same_functions():
 
 
 def frequencies(model, kind, n=6, m=15):
-    body = rom.reduce(
-        model,
-        method=rom.CraigBampton(m),
-        interfaces={"root": kind, "tip": kind},
-        reference="mean-axis",
-        certify=False,
-    )
+    kinds = {"root": kind, "tip": kind}
+    body = rom.reduce(model, method=rom.CraigBampton(m), interfaces=kinds, certify=False)
     return body.frequencies(6 + n)[6:]
 
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import rom
+from cases.refusals import refused
 from cases.solid import block
 from rom.errors import ConfigError
 from rom.reduction.bases.method import judged_in
@@ -91,14 +92,18 @@ def test_the_default_passes_its_certificate():
     assert not rom.reduce(model, method=rom.CraigBampton(1), interfaces=KINDS).certificate.ok
 
 
-@pytest.mark.fenicsx
-def test_the_selection_works_on_meshes_too():
-    """PETSc operators, rbe3 and orthogonal functions as interfaces."""
+def meshed(size, cells):
     from cases.boxes import box
     from rom.fe.elasticity import assemble
 
-    mesh, tags = box((1.0, 0.1, 0.08), (10, 2, 2))
-    model = assemble(mesh, None, tags, material=rom.Material(E=210e9, nu=0.3, rho=7850.0))
+    mesh, tags = box(size, cells)
+    return assemble(mesh, None, tags, material=rom.Material(E=210e9, nu=0.3, rho=7850.0))
+
+
+@pytest.mark.fenicsx
+def test_the_selection_works_on_meshes_too():
+    """PETSc operators, rbe3 and orthogonal functions as interfaces."""
+    model = meshed((1.0, 0.1, 0.08), (10, 2, 2))
     kinds = {"x0": "rbe3", "x1": "polynomial:1"}
     exact = rom.modes(model, 12, interfaces=kinds).frequencies[6:]
     method = rom.CraigBampton(f_max=1.001 * exact[-1], tol=1e-3)
@@ -111,11 +116,7 @@ def test_the_selection_works_on_meshes_too():
 @pytest.mark.long
 def test_the_order_is_chosen_on_meshes_too():
     """Beside an averaging interface, which PETSc has to project."""
-    from cases.boxes import box
-    from rom.fe.elasticity import assemble
-
-    mesh, tags = box((0.3, 0.2, 0.1), (4, 3, 2))
-    model = assemble(mesh, None, tags, material=rom.Material(E=210e9, nu=0.3, rho=7850.0))
+    model = meshed((0.3, 0.2, 0.1), (4, 3, 2))
     kinds = {"x0": "rbe3", "x1": rom.Polynomial()}
     exact = rom.modes(model, 12, interfaces={"x0": "rbe3"}).frequencies[6:]
     method = rom.CraigBampton(f_max=1.001 * exact[-1], tol=1e-3)
@@ -124,17 +125,19 @@ def test_the_order_is_chosen_on_meshes_too():
     assert body.marker("x1").kind in ("polynomial:2", "polynomial:3", "polynomial:4")
 
 
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        ({"n_modes": 3, "f_max": 1e3}, "n_modes or f_max, not both"),
-        ({"n_modes": 3, "tol": 1e-3}, "n_modes or tol, not both"),
-        ({"tol": 1.0}, "tol = 1 must"),
-    ],
+def asked(**options):
+    return lambda: rom.CraigBampton(**options)
+
+
+test_wishes_that_exclude_each_other_are_refused = refused(
+    (asked(n_modes=3, f_max=1e3), "n_modes or f_max, not both"),
+    (asked(n_modes=3, tol=1e-3), "n_modes or tol, not both"),
+    (asked(tol=1.0), "tol = 1 must"),
+    (asked(f_max=1e3, search="arnoldi"), "search"),
+    (asked(n_modes=3, search="substructures"), "needs f_max"),
+    (asked(f_max=1e3, tol=1e-3, search="substructures"), "takes no tol"),
+    error=ConfigError,
 )
-def test_messages_for_wrong_tolerances(options, words):
-    with pytest.raises(ConfigError, match=words):
-        rom.CraigBampton(**options)
 
 
 def surface_error(model, kinds, exact, method):

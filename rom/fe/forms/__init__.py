@@ -1,5 +1,5 @@
 """What is integrated over cells.
 
-`material` and `region` say of what, `stress` and `finite_strain` how it resists, `large_strain`
-has the energy of shapes, `nodes` finds interfaces and the outer surface.
+`material` and `region` say of what, `stress` and `large_strain` how it resists, `nodes` finds
+interfaces and the outer surface.
 """

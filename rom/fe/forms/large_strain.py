@@ -1,7 +1,13 @@
-"""Strain energy of shapes at finite strain, a polynomial of fourth order in their amplitudes.
+"""Solids at finite strain: forces and stiffness in large motion with heat, and energy of shapes.
 
-St. Venant-Kirchhoff material, u = sum_i psi_i q_i, with L(u) = sym grad u and
-Q(a, b) = sym(grad a^T grad b)::
+St. Venant-Kirchhoff material in the total Lagrangian description, with the stiffness C of the
+linear model and theta the free thermal strain::
+
+    F = I + grad u,   E = (F^T F - I) / 2,   S = C : (E - theta I)
+    f . v = integral of F S : grad v
+
+The strain energy of shapes is a polynomial of fourth order in their amplitudes,
+u = sum_i psi_i q_i, with L(u) = sym grad u and Q(a, b) = sym(grad a^T grad b)::
 
     E = sum_i L_i q_i + sum_jk Q_jk q_j q_k / 2,     U = integral of E : C : E / 2
 
@@ -13,6 +19,7 @@ Source:
 """
 
 from collections.abc import Iterator
+from functools import cached_property
 from typing import Any
 
 from mpi4py import MPI
@@ -20,30 +27,156 @@ from mpi4py import MPI
 import numpy as np
 import ufl
 from dolfinx import fem
+from scipy.sparse import csr_matrix
 
 from rom.fe.compat import (
+    assemble_matrix,
     assembled_vector,
     compiled,
     degree_of_slopes,
     evaluated,
     give_own,
+    per_cell,
     quadrature_rule,
 )
-from rom.fe.forms.material import stiffness, stress
+from rom.fe.forms.material import geometric_stiffness, stiffness, stress
+from rom.fe.forms.nodes import gathered as gathered_rows
 from rom.fe.jit import compiling
+from rom.fe.operators.aij import aij, gathered, symmetric, wrapped
 from rom.model import PAIRS, Array, Index, Integers
 
 BLOCK_BYTES = 64e6  # of the columns of a block of cells, of which a few copies are made
 
 
-class LargeStrain:
-    """Energy of shapes at finite strain, and the forces of second order that shapes cause.
+class FiniteStrain:
+    """Forces and stiffness of a solid at any displacement.
 
-    Args:
-        V: displacement space.
-        numbers: coefficients of the material, see `rom.fe.forms.material.coefficients`.
-        degree: of the displacement.
+    Displacements, forces and matrices are those of the whole solid, on every rank. All forms share
+    one quadrature, so that a solid in equilibrium has rigid motions without stiffness to round-off.
+    ``numbers`` are of `rom.fe.forms.material.coefficients`, tags (cells,) and {region: tag} say
+    where regions are; ``neo_hookean`` is the law of `rom.body.nonlinear.sampled`, for isotropic
+    cold material.
     """
+
+    def __init__(
+        self, V: Any, numbers: dict[str, Any], degree: int, tags: Array, names: dict[str, int],
+        *, neo_hookean: bool = False,
+    ):  # fmt: skip
+        self.neo_hookean = neo_hookean
+        self.V, self.mesh, self.numbers = V, V.mesh, numbers
+        self.tags, self.names = tags, names
+        cold = np.zeros(tags.size)
+        self.u, self.at_nodes = fem.Function(V), fem.Function(V)
+        with compiling(self.mesh.comm):
+            self.expansion, self.in_cells = per_cell(self.mesh, cold), per_cell(self.mesh, cold)
+        # the first component is the temperature: nodes of another space have other numbers
+        self.share = fem.Constant(self.mesh, 1.0)
+        self.theta = self.share * self.expansion * (self.in_cells + self.at_nodes[0])
+        # on straight tetrahedra exact: forces have the fourth power of grad u
+        order = degree_of_slopes(self.mesh, degree, 4, in_bricks=3)
+        self.dx = ufl.Measure("dx", domain=self.mesh, metadata={"quadrature_degree": order})
+
+    def warm(self, share: float) -> None:
+        """Apply a share of the heat from now on."""
+        self.share.value = share
+
+    def heat(self, expansion: dict[str, float], change: dict[str, float], nodes: Array) -> None:
+        """Set the free thermal strain alpha dT of the forms.
+
+        Of all regions {region: alpha [1/K]} and {region: dT [K]}, to which nodes (n / 3,) add [K].
+        """
+        for function, table in ((self.expansion, expansion), (self.in_cells, change)):
+            values = np.zeros(self.tags.size)
+            for name, tag in self.names.items():
+                values[self.tags == tag] = table[name]
+            function.x.array[:] = per_cell(self.mesh, values).x.array
+        self._give(self.at_nodes, np.repeat(nodes, 3))
+
+    def force(self, u: Array) -> Array:
+        """(n,) forces that hold the solid at a displacement (n,) [N]."""
+        self._give(self.u, u)
+        return gathered_rows(self.mesh.comm, assembled_vector(self._force))
+
+    def tangent(self, u: Array) -> csr_matrix:
+        """(n, n) derivative of the forces at a displacement (n,) [N/m]."""
+        self._give(self.u, u)
+        return self._matrix(self._tangent)
+
+    def geometric(self, u: Array) -> csr_matrix:
+        """(n, n) geometric stiffness of the stress C : (eps(u) - theta I) [N/m]."""
+        self._give(self.u, u)
+        return self._matrix(self._geometric)
+
+    def layout(self, A: csr_matrix) -> Any:
+        """The same matrix for the operators of the model."""
+        if self.mesh.comm.size == 1:
+            return wrapped(A)
+        rows, n = A[slice(*self._own)], A.shape[0]
+        size = (rows.shape[0], n)
+        return aij(rows, (size, size), self.mesh.comm, 3)
+
+    @property
+    def _own(self) -> tuple[int, int]:
+        """First dof of this rank, and the first of the next."""
+        first, end = self.V.dofmap.index_map.local_range
+        return 3 * first, 3 * end
+
+    def _give(self, function: Any, u: Array) -> None:
+        """Let a function of the displacement's space have the values (n,) of the whole solid."""
+        give_own(function, u[slice(*self._own)])
+
+    def _matrix(self, form: Any) -> csr_matrix:
+        A = assemble_matrix(form)
+        if self.mesh.comm.size == 1:
+            return symmetric(A)
+        found = gathered(A)
+        A.destroy()
+        return found
+
+    @cached_property
+    def _force(self) -> Any:
+        v = ufl.TestFunction(self.V)
+        return self._compiled(ufl.inner(ufl.dot(self._F, self._S), ufl.grad(v)))
+
+    @cached_property
+    def _tangent(self) -> Any:
+        w, v = ufl.TrialFunction(self.V), ufl.TestFunction(self.V)
+        if self.neo_hookean:
+            force = ufl.inner(ufl.dot(self._F, self._S), ufl.grad(v))
+            return self._compiled(ufl.derivative(force, self.u, w))
+        dE, dE_v = (ufl.sym(ufl.dot(self._F.T, ufl.grad(x))) for x in (w, v))
+        material = ufl.inner(stress(dE, self.numbers), dE_v)
+        return self._compiled(material + ufl.inner(ufl.dot(ufl.grad(w), self._S), ufl.grad(v)))
+
+    @cached_property
+    def _geometric(self) -> Any:
+        w, v = ufl.TrialFunction(self.V), ufl.TestFunction(self.V)
+        sigma = self._stress(ufl.sym(ufl.grad(self.u)))
+        return self._compiled(geometric_stiffness(w, v, sigma))
+
+    @property
+    def _F(self) -> Any:
+        return ufl.Identity(3) + ufl.grad(self.u)
+
+    @property
+    def _S(self) -> Any:
+        if self.neo_hookean:
+            inverse, log = ufl.inv(ufl.dot(self._F.T, self._F)), ufl.ln(ufl.det(self._F))
+            lam, mu = self.numbers["lam"], self.numbers["mu"]
+            return mu * (ufl.Identity(3) - inverse) + lam * log * inverse
+        H = ufl.grad(self.u)  # F^T F - I would leave small strains no digits
+        return self._stress(ufl.sym(H) + 0.5 * ufl.dot(H.T, H))
+
+    def _stress(self, strain: Any) -> Any:
+        return stress(strain - self.theta * ufl.Identity(3), self.numbers)
+
+    def _compiled(self, integrand: Any) -> Any:
+        with compiling(self.mesh.comm):
+            return compiled(integrand * self.dx)
+
+
+class LargeStrain:
+    """Energy of shapes at finite strain, and the forces of second order that shapes cause."""
 
     def __init__(self, V: Any, numbers: dict[str, Any], degree: int):
         self.V, self.mesh, self.numbers = V, V.mesh, numbers
@@ -59,15 +192,11 @@ class LargeStrain:
         return len(quadrature_rule(self.mesh, self.few)[1]) * n_cells
 
     def gram(self, E: Array, *, exact: bool = True) -> Array:
-        """(N, N) integrals of Z^T C Z, with the columns L_i, then Q_jk for j <= k [N m].
+        """(N, N) integrals of Z^T C Z of shapes E (n_local, r) [m], equal on all ranks [N m].
 
-        Args:
-            E: (n_local, r) shapes [m]; N = r + r (r + 1) / 2.
-            exact: with points enough for fourth order; otherwise for linear stiffness, which does
-                to choose shapes by, as rotations still strain nothing.
-
-        Returns:
-            The matrix, equal on all ranks; row by row of the upper triangle for the pairs.
+        Z has the columns L_i, then Q_jk for j <= k, row by row of the upper triangle, so that
+        N = r + r (r + 1) / 2. Points are enough for fourth order if ``exact``; otherwise for linear
+        stiffness, which does to choose shapes by, as rotations still strain nothing.
         """
         r = E.shape[1]
         N = r + r * (r + 1) // 2
@@ -112,11 +241,7 @@ class LargeStrain:
         return np.asarray(sums[1] / np.maximum(sums[0], 1e-300))
 
     def at_points(self, E: Array) -> tuple[Array, Array, Array, Array]:
-        """Of this process: gradients (p, 9, r), weights (p,), cells (p,) and stiffness (p, 6, 6).
-
-        Args:
-            E: (n_local, r) shapes [m].
-        """
+        """Of this process: gradients (p, 9, r), weights (p,), cells (p,), stiffness (p, 6, 6)."""
         every: list[Integers] = [np.arange(self.n_cells, dtype=np.int32)]
         blocks = list(self._gradients(E, every, self.order))
         H, w, C = (np.concatenate(parts) for parts in zip(*blocks, strict=True))
@@ -130,12 +255,7 @@ class LargeStrain:
         return np.array_split(np.arange(self.n_cells, dtype=np.int32), n_blocks)
 
     def second_forces(self, U: Array, pairs: Index) -> Array:
-        """(n_local, p) forces D^2 f [u_i, u_j] at no displacement [N].
-
-        Args:
-            U: (n_local, m) displacements [m].
-            pairs: (p, 2) numbers i and j.
-        """
+        """(n_local, p) forces D^2 f [u_i, u_j] at no displacement [N], of pairs (p, 2) i and j."""
         a, b, v = fem.Function(self.V), fem.Function(self.V), ufl.TestFunction(self.V)
 
         def L(u: Any) -> Any:
@@ -199,11 +319,7 @@ def linear_strain(H: Array) -> Array:
 
 
 def quadratic_strain(H: Array) -> Array:
-    """(p, 6, r (r + 1) / 2) Voigt columns of sym(grad a^T grad b), shear doubled [1].
-
-    Args:
-        H: (p, 3, 3, r) gradients of the shapes [1].
-    """
+    """(p, 6, r (r + 1) / 2) Voigt columns of sym(grad a^T grad b), shear doubled [1]."""
     p, r = H.shape[0], H.shape[3]
     flat = H.reshape(p, 3, 3 * r)
     products = np.matmul(flat.transpose(0, 2, 1), flat).reshape(p, 3, r, 3, r)

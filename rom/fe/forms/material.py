@@ -21,12 +21,7 @@ MAX_STIFFNESS_RATIO = 1e8  # beyond it, conditioning costs half the digits
 
 
 def by_region(material: Any, regions: dict[str, int]) -> dict[int, Solid]:
-    """{tag: material}, from one material for all or from {region name: material}.
-
-    Raises:
-        MaterialError: if the material is no material, or names a region the mesh does not have.
-        TagError: if a region is left without material.
-    """
+    """{tag: material}, from one material for all or from {region name: material}."""
     if isinstance(material, Solid):
         return dict.fromkeys(regions.values(), material)
     if not isinstance(material, dict):
@@ -92,12 +87,7 @@ def _numbers(solid: Solid, isotropic: bool) -> dict[str, Any]:
 
 
 def stress(strain: Any, numbers: dict[str, Any]) -> Any:
-    """Stress of Hooke's law, isotropic or with the (6, 6) stiffness C.
-
-    Args:
-        strain: (3, 3) symmetric strain, a ufl expression.
-        numbers: see `coefficients`.
-    """
+    """Stress of Hooke's law, isotropic or with the (6, 6) stiffness C, of a ufl strain (3, 3)."""
     if "C" not in numbers:
         return 2 * numbers["mu"] * strain + numbers["lam"] * ufl.tr(strain) * ufl.Identity(3)
     e = strain
@@ -135,11 +125,7 @@ def geometric_stiffness(u: Any, v: Any, sigma: Any) -> Any:
 def doubts(solids: dict[str, Solid], size: float, cell: str, degree: int) -> Iterator[str]:
     """Sentences about input that is legal but unusual.
 
-    Args:
-        solids: {region name: material}.
-        size: longest edge of the bounding box [m].
-        cell: shape of the cells.
-        degree: polynomial degree of the displacement.
+    Of {region name: material}, and of the longest edge of the bounding box [m].
     """
     if degree == 1 and cell == "tetrahedron":
         yield (

@@ -44,17 +44,7 @@ def by_position(points: Array, size: float) -> Index:
 
 
 def interface(name: str, tags: Any, V: Any, points: Array) -> Interface:
-    """The nodes, surface mass and centroid of a tagged surface.
-
-    Args:
-        name: name of the surface.
-        tags: dolfinx MeshTags of its facets.
-        V: displacement space.
-        points: (n/3, 3) coordinates of all nodes [m].
-
-    Raises:
-        InterfaceError: if the surface has no facet, or lies inside the solid.
-    """
+    """The nodes, surface mass and centroid of a surface, tagged by MeshTags of its facets."""
     comm, facets = V.mesh.comm, tags.indices
     if comm.allreduce(facets.size) == 0:
         raise InterfaceError(f"the interface {name!r} has no facet; use tags of the mesh.")

@@ -25,12 +25,7 @@ LAYER_GAP_RTOL = 1e-9  # of the extent: gap between cells of one layer
 class Regions(Mapping[str, Region]):
     """Shares of the regions, assembled when they are asked for; on all ranks together.
 
-    Args:
-        V: displacement space.
-        tags: (cells of this rank with ghosts,) region of each cell.
-        solids: {tag: material}.
-        names: {region: tag}.
-        degree: of the displacement.
+    Regions are tags (cells of this rank with ghosts,), {tag: material} and {region: tag}.
     """
 
     def __init__(
@@ -97,11 +92,8 @@ def stretched_forms(
 
     (a, c), (b, d) = strains(u), strains(v)
     mixed = ufl.inner(stress(a, numbers), d) + ufl.inner(stress(c, numbers), b)
-    return (
-        ufl.inner(stress(a, numbers), b) * dx,
-        mixed * dx,
-        ufl.inner(stress(c, numbers), d) * dx,
-    )
+    along, across = ufl.inner(stress(a, numbers), b), ufl.inner(stress(c, numbers), d)
+    return along * dx, mixed * dx, across * dx
 
 
 def joined(ends: Array) -> tuple[tuple[float, float], ...]:

@@ -19,8 +19,7 @@ from rom.fe.compat import (
     reference_points,
     to_global,
 )
-from rom.fe.forms.finite_strain import FiniteStrain
-from rom.fe.forms.large_strain import LargeStrain
+from rom.fe.forms.large_strain import FiniteStrain, LargeStrain
 from rom.fe.forms.material import geometric_stiffness, stiffness, stress
 from rom.fe.jit import compiling
 from rom.fe.operators.aij import gathered
@@ -30,13 +29,9 @@ from rom.model import PAIRS, Array, Index, Integers
 
 
 class Stresses:
-    """Hooke's law on the mesh of a model.
+    """Hooke's law on the mesh of a model, with the numbers of `material.coefficients`.
 
-    Args:
-        V: displacement space.
-        numbers: coefficients of the material, see `rom.fe.forms.material.coefficients`.
-        degree: of the displacement.
-        regions: (cells,) region of each cell and {region: tag}; None where they are not known.
+    ``regions`` are the region (cells,) of each cell and {region: tag}; None where not known.
     """
 
     def __init__(self, V: Any, numbers: dict[str, Any], degree: int, regions: Any = None):
@@ -85,16 +80,9 @@ class Stresses:
     ) -> tuple[Array, Index, Index, Array]:
         """Means over the cells of one group at nodes, for all pairs of the two that exist.
 
-        Args:
-            of: the numbers, a ufl vector, of a displacement.
-            width: how many.
-            U: (n_local, k) displacements [m].
-            nodes: (p,) node numbers, equal on all ranks.
-            group: (cells,) group of each cell of this rank.
-
-        Returns:
-            (s, width, k) means; number of the node, group, and number of cells of each of the s
-            pairs, node by node; equal on all ranks.
+        ``of`` makes a ufl vector of so many numbers of a displacement; ``group`` has that of each
+        cell of this rank. Returned are means (s, width, k), and number of the node, group, and
+        number of cells of each of the s pairs, node by node; equal on all ranks.
         """
         cells, table = self._cells_at(nodes)
         X = reference_points(self.V)
@@ -189,7 +177,7 @@ class Stresses:
         return K_geo
 
     def finite_strain(self, *, neo_hookean: bool = False) -> Any:
-        """The same solid in large motion, `finite_strain.FiniteStrain`."""
+        """The same solid in large motion, `large_strain.FiniteStrain`."""
         return FiniteStrain(
             self.V, self.numbers, self.degree, *self.regions, neo_hookean=neo_hookean
         )

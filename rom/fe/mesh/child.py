@@ -8,7 +8,7 @@ typed error. The result returns as an ``.npz`` without pickles.
 import json
 import math
 import sys
-from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -23,9 +23,9 @@ from rom.errors import (
     UnsafeFileError,
     in_file,
 )
+from rom.fe import GMSH_LIBRARIES
 from rom.fe.mesh.solid import GEOMETRIES, Read
 from rom.fe.mesh.sources.builder import unmeshable
-from rom.fe.mesh.sources.readers import read
 from rom.process import child
 from rom.process.memory import total_bytes
 
@@ -37,21 +37,6 @@ MAX_MEMORY_SHARE = 0.8  # of the memory of the machine, for a mesher
 VARIABLES = {"OMP_NUM_THREADS": "1", "LC_ALL": "C.UTF-8"}
 
 
-@dataclass(frozen=True, slots=True)
-class Reading:
-    """A request under its limits, for what is said when it fails.
-
-    Attributes:
-        geometry: whether the file is one, which is meshed here.
-        given: whether it was given parameters.
-        limits: what the reader may take.
-    """
-
-    geometry: bool
-    given: bool
-    limits: child.Limits
-
-
 def read_apart(
     request: dict[str, Any],
     *,
@@ -60,26 +45,12 @@ def read_apart(
     time_limit: float | None = None,
     memory_limit: float | None = None,
 ) -> Read:
-    """Run a reader in a child process.
+    """Run `read` in a child process: what a request asks for that fits into JSON.
 
-    Args:
-        request: path, reader, parameters, faces, order; must fit into JSON.
-        where: name of the file, for messages.
-        size: size of the file [bytes]; sets the limits for finished meshes.
-        time_limit: of a mesher [s]; 0 or infinity for none.
-        memory_limit: of a mesher [bytes]; 0 or infinity for none.
-
-    Returns:
-        The arrays and the notes of `rom.fe.mesh.sources.readers.read`.
-
-    Raises:
-        RomError: of the class the reader raised.
-        UnsafeFileError: the geometry tried to start a process.
-        FileFormatError, MeshError: the reader crashed.
-        ResourceError: it ran out of time or memory.
+    The size of the file [bytes] sets the limits for finished meshes, the others are those of a
+    mesher, 0 or infinity for none. Raised is what the reader raised, or what its end means.
     """
     limits = _limits(request["reader"], size, time_limit, memory_limit)
-    reading = Reading(request["reader"] in GEOMETRIES, bool(request["parameters"]), limits)
     with child.scratch("mesh") as folder, in_file(where):
         try:
             text = json.dumps(request | {"folder": str(folder)}, default=_plain)
@@ -88,7 +59,7 @@ def read_apart(
         (folder / "request.json").write_text(text)
         command = child.python("rom.fe.mesh.child", str(folder))
         done = child.run(command, limits=limits, variables=VARIABLES)
-        return _result(folder, done, reading)
+        return _result(folder, done, request, limits)
 
 
 def _plain(value: Any) -> Any:
@@ -124,25 +95,25 @@ def _chosen(name: str, value: float | None, default: float) -> float:
     return 0.0 if math.isinf(value) else float(value)
 
 
-def _result(folder: Path, done: child.Ended, reading: Reading) -> Read:
+def _result(folder: Path, done: child.Ended, request: dict[str, Any], limits: child.Limits) -> Read:
     answer = folder / "answer.json"
     if not answer.exists():
-        raise _died(done, reading)
+        raise _died(done, request, limits)
     notes = json.loads(answer.read_text())
     if notes.get("error") == MemoryError.__name__:
-        raise _too_large(reading)
+        raise _too_large(request, limits)
     if "error" in notes:
         raise getattr(errors, notes.pop("error"))(notes.pop("message"), **notes)
     with np.load(folder / "arrays.npz", allow_pickle=False) as arrays:
         return dict(arrays), notes
 
 
-def _died(done: child.Ended, reading: Reading) -> BaseException:
+def _died(done: child.Ended, request: dict[str, Any], limits: child.Limits) -> BaseException:
     """What a reader without an answer means."""
     if done.overtime or done.signal == "SIGXCPU":
-        return _too_long(reading)
+        return _too_long(request, limits)
     if "bad_alloc" in done.err:
-        return _too_large(reading)
+        return _too_large(request, limits)
     if done.signal == "SIGSYS":
         return UnsafeFileError(
             "tries to start a process, which a geometry may not.",
@@ -151,19 +122,21 @@ def _died(done: child.Ended, reading: Reading) -> BaseException:
     if done.signal == "SIGINT":
         return KeyboardInterrupt()
     if done.signal in ("SIGKILL", "SIGTERM"):
-        return ResourceError(
-            "the mesh reader was killed, most likely for lack of memory.",
-            hint="Use larger elements.",
-        )
+        text = "the mesh reader was killed, most likely for lack of memory."
+        return ResourceError(text, hint="Use larger elements.")
     if done.code > 0 and "Traceback" in done.err:
         return RuntimeError(f"the mesh reader failed:\n{done.err}")
-    return _crashed(done.signal or f"exit code {done.code}", reading)
+    how = done.signal or f"exit code {done.code}"
+    if request["reader"] in GEOMETRIES:
+        return unmeshable(how, given=bool(request["parameters"]))
+    text = f"the reader crashed ({how}): the file is damaged."
+    return FileFormatError(text, hint="Open it in gmsh and save it again.")
 
 
-def _too_long(reading: Reading) -> RomError:
-    if reading.geometry:
+def _too_long(request: dict[str, Any], limits: child.Limits) -> RomError:
+    if request["reader"] in GEOMETRIES:
         return ResourceError(
-            f"meshing did not end within the limit of {reading.limits.seconds:g} s.",
+            f"meshing did not end within the limit of {limits.seconds:g} s.",
             hint="Does the geometry loop without end? Else use larger elements, or raise the limit "
             "by --time-limit SECONDS or time_limit=.",
         )
@@ -171,22 +144,14 @@ def _too_long(reading: Reading) -> RomError:
     return FileFormatError(text, hint=WRITE_AGAIN)
 
 
-def _too_large(reading: Reading) -> RomError:
-    if reading.geometry:
-        limit = reading.limits.memory / BYTES_PER_GIGABYTE
+def _too_large(request: dict[str, Any], limits: child.Limits) -> RomError:
+    if request["reader"] in GEOMETRIES:
         return ResourceError(
-            f"meshing needs more than the limit of {limit:.3g} GB.",
+            f"meshing needs more than the limit of {limits.memory / BYTES_PER_GIGABYTE:.3g} GB.",
             hint="Use larger elements, or raise the limit by --memory-limit GIGABYTES or "
             "memory_limit= [bytes].",
         )
     return FileFormatError("asks for more memory than its size can need.", hint=WRITE_AGAIN)
-
-
-def _crashed(how: str, reading: Reading) -> RomError:
-    if reading.geometry:
-        return unmeshable(how, given=reading.given)
-    text = f"the reader crashed ({how}): the file is damaged."
-    return FileFormatError(text, hint="Open it in gmsh and save it again.")
 
 
 def main(folder: str) -> None:
@@ -199,6 +164,39 @@ def main(folder: str) -> None:
         return
     np.savez(Path(folder, "arrays.npz"), **arrays)
     _answer(folder, notes)
+
+
+def read(request: dict[str, Any]) -> Read:
+    """Read or make the mesh a request asks for; what the child does.
+
+    Returns:
+        Arrays ``points``, ``cells``, ``regions``, ``cell_ids`` and ``facets 0``, ``facets 1``, ...;
+        notes ``cell_type``, ``region_names``, ``facet_names``, ``provenance``, ``warnings``.
+    """
+    reader = request["reader"]
+    try:
+        if reader in ("abaqus", "nastran"):  # only its own libraries are loaded
+            return import_module(f"rom.fe.mesh.sources.{reader}").read(request["path"])
+        return import_module("rom.fe.mesh.sources.gmsh_session").run(request)
+    except (RomError, MemoryError):
+        raise
+    except ModuleNotFoundError as error:
+        raise ResourceError(
+            f"reading this file needs {error.name}, which is not installed.",
+            hint=f"On Debian: apt-get install python3-{error.name}; else pip install {error.name}.",
+        ) from error
+    except OSError as error:
+        if reader not in GEOMETRIES or ".so" not in str(error):
+            raise
+        raise ResourceError(
+            f"gmsh cannot be loaded: {error}.", hint=f"On Debian: apt-get install {GMSH_LIBRARIES}."
+        ) from error
+    except Exception as error:  # parsers raise whatever the broken line provokes
+        if reader in GEOMETRIES:
+            raise
+        raise FileFormatError(
+            f"is not a readable {request['reader']} file ({type(error).__name__}: {error})."
+        ) from error
 
 
 def _described(error: RomError | MemoryError) -> dict[str, str]:

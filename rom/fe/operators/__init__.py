@@ -1,8 +1,7 @@
 """The verbs of `rom.eigen` with PETSc and SLEPc, on any number of ranks.
 
 `petsc` has them on matrices of `aij`, also in new coordinates; a `solver` is chosen by what is
-`foreseen` of `memory` and `disk`: `held` and `factor` solve, over ranks the folder
-`substructures`; `krylov_schur` finds modes with a shift of `spectrum`, `factor` proves that none is
-missed; the folder `iterative` does all of it without a factor. `workers` are ranks that each have
-whole matrices.
+`foreseen` of `memory` and `disk`: `held` and `factor` solve, over ranks `substructures`; `spectrum`
+finds modes with a shift, `factor` proves that none is missed; `iterative` does all of it without a
+factor. `workers` are ranks that each have whole matrices.
 """

@@ -63,13 +63,9 @@ def wrapped(A: csr_matrix) -> PETSc.Mat:
 
 
 def aij(A: csr_matrix, sizes: Any, comm: MPI.Comm, block_size: int = 1) -> PETSc.Mat:
-    """The rows of this rank of a distributed matrix.
+    """A distributed matrix of the rows A (n_local, columns) of each rank.
 
-    Args:
-        A: (n_local, columns) these rows.
-        sizes: ((local, all) rows, (local, all) columns).
-        comm: the ranks.
-        block_size: dofs of a node.
+    The sizes are ((local, all) rows, (local, all) columns); a block has the dofs of a node.
     """
     index = PETSc.IntType
     csr = (A.indptr.astype(index), A.indices.astype(index), A.data)
@@ -109,9 +105,7 @@ def _whole_nodes(dofs: Index, comm: MPI.Comm) -> bool:
 def gathered(A: PETSc.Mat) -> csr_matrix:
     """All rows of a distributed square matrix, on every rank; symmetric to the last digit.
 
-    Raises:
-        ResourceError: on all ranks, if each of them having the whole and a factor of two such
-            matrices side by side would not fit.
+    Refused where each rank having the whole and a factor of two such matrices would not fit.
     """
     comm, (n, _) = A.comm.tompi4py(), A.getSize()
     starts, columns, values = A.getValuesCSR()
@@ -124,22 +118,15 @@ def gathered(A: PETSc.Mat) -> csr_matrix:
             f"{need / 2**30:.2f} GiB; {there / 2**30:.2f} GiB may be used by each.",
             hint="Use fewer ranks, which share the memory, or a coarser mesh.",
         )
-    lengths = _from_all(comm, np.diff(starts).astype(np.int64), None)
-    whole = csr_matrix(
-        (
-            _from_all(comm, 0.5 * values, counts),
-            _from_all(comm, columns.astype(np.int64), counts),
-            np.concatenate([[0], np.cumsum(lengths)]),
-        ),
-        shape=(n, n),
-    )
+    lengths = np.concatenate(comm.allgather(np.diff(starts).astype(np.int64)))
+    halves = _from_all(comm, 0.5 * values, counts)
+    columns = _from_all(comm, columns.astype(np.int64), counts)
+    whole = csr_matrix((halves, columns, np.r_[0, np.cumsum(lengths)]), shape=(n, n))
     return (whole + whole.T).tocsr()
 
 
-def _from_all(comm: MPI.Comm, mine: Numbers, counts: Index | None) -> Numbers:
-    """The arrays of all ranks in their order, one after the other."""
-    if counts is None:
-        counts = np.array(comm.allgather(mine.size))
+def _from_all(comm: MPI.Comm, mine: Numbers, counts: Index) -> Numbers:
+    """The arrays of all ranks in their order, one after the other, of any size."""
     every = np.empty(counts.sum(), dtype=mine.dtype)
     comm.Allgatherv(np.ascontiguousarray(mine), (every, counts))
     return every

@@ -41,16 +41,8 @@ def reserve_disk(need: float, n: int, comm: MPI.Comm) -> None:
     """Try whether the disk can hold a factor, by files as large as those MUMPS will write.
 
     MUMPS writes in a thread of its own, and when the disk is full it may wait for that thread for
-    ever: nobody could then say what is wrong.
-
-    Args:
-        need: what the factor takes, on all ranks together [bytes].
-        n: number of dofs factored.
-        comm: the ranks; all of them must call.
-
-    Raises:
-        ResourceError: on all ranks, when the folder, the disk, a quota or a limit on the size of
-            files refuses one of them.
+    ever: nobody could then say what is wrong. All ranks, which together need so many bytes, must
+    call, and all raise when folder, disk, a quota or a limit on the size of files refuses one.
     """
     reason = _refusal(need / comm.size)
     refused = [reason for reason in comm.allgather(reason) if reason]

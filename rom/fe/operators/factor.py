@@ -14,10 +14,10 @@ from scipy.linalg import lu_factor, lu_solve
 
 from rom.errors import SolverError
 from rom.fe.compat import same_layout
-from rom.fe.operators.disk import DISK_ERRORS, disk_too_small, watched
+from rom.fe.operators.disk import DISK_ERRORS, disk_too_small, reserve_disk, watched
 from rom.fe.operators.foreseen import (
+    analysed,
     by_mumps,
-    check_disk,
     entry_count,
     stored_entries,
     too_large,
@@ -35,26 +35,16 @@ MEMORY_ERRORS = (-8, -9, -11, -13, -19)  # INFOG(1) of MUMPS: work space or allo
 
 
 class Factor:
-    """L D L^T of a symmetric PETSc matrix by MUMPS.
+    """L D L^T of a symmetric PETSc matrix by MUMPS, without pivoting where it is ``definite``.
 
-    Args:
-        A: the matrix.
-        definite: promise that it is positive definite: no pivoting.
-        solver: says whether blocks of the factor are compressed, and where it lives.
-
-    Attributes:
-        ksp: the PETSc solver that holds the factor.
-        counted: its flops and entries, as MUMPS has counted them.
-        ok: False when MUMPS met a pivot it could not divide by.
-
-    Raises:
-        ResourceError: if MUMPS runs out of memory or disk.
+    ``counted`` are its flops and entries, as MUMPS has counted them; ``ok`` is False when MUMPS met
+    a pivot it could not divide by. ResourceError if it runs out of memory or disk.
     """
 
     def __init__(self, A: PETSc.Mat, *, definite: bool, solver: Solver = DIRECT_SOLVER):
         self.A, self.solver = A, solver
         if solver.out_of_core:
-            check_disk(A, solver)
+            reserve_disk(analysed(A, solver).on_disk, A.getSize()[0], A.comm.tompi4py())
         self.allowed = allowed_bytes(A.comm.tompi4py())
         predicted = WORKSPACE_RATIO * factor_bytes(A.getSize()[0]) / A.comm.size
         self._offer(min(predicted + LEAST_WORKSPACE, self.allowed))
@@ -78,11 +68,7 @@ class Factor:
         self.factor.setMumpsIcntl(23, max(int(workspace / 1e6), 1))  # obeyed after the analysis
 
     def compute(self, *, definite: bool) -> None:
-        """Factor A; again when its values have changed, without a new analysis.
-
-        Raises:
-            ResourceError: if MUMPS runs out of memory or disk.
-        """
+        """Factor A; again when its values have changed, without a new analysis."""
         self.factor.setMumpsCntl(1, 0.0 if definite else PIVOT_THRESHOLD)
         watch = watched() if self.solver.out_of_core else nullcontext()
         with watch, piece(FACTORISATION_PIECE):
@@ -97,8 +83,7 @@ class Factor:
             need = 1e6 * self.factor.getMumpsInfog(17)  # on all ranks, from the analysis
             raise too_large(self.A.getSize()[0], need, self.allowed * self.A.comm.size)
         elif code in DISK_ERRORS:
-            need = 8.0 * entry_count(self.factor)
-            raise disk_too_small(self.A.getSize()[0], need)
+            raise disk_too_small(self.A.getSize()[0], 8.0 * entry_count(self.factor))
         else:
             self.ok = code >= 0
             self.counted = self.factor.getMumpsRinfog(3), entry_count(self.factor)
@@ -127,11 +112,7 @@ class Factor:
         give_back()
 
     def negative_pivots(self) -> int:
-        """Number of negative eigenvalues of A.
-
-        Raises:
-            SolverError: if the factorisation broke down.
-        """
+        """Number of negative eigenvalues of A."""
         if not self.ok:
             raise SolverError("the matrix K - sigma M could not be factored to count modes.")
         return int(self.factor.getInertia()[0])
@@ -141,13 +122,8 @@ class Corrected:
     """(A + V E + E^T V^T + E^T D E)^-1, d rows in E, with the factor of A.
 
     With W = (V / c, E^T) that matrix is A + W C W^T, C = ((0, c), (c, D)), and its inverse
-    A^-1 - Y S^-1 Y^T, Y = A^-1 W, S = C^-1 + W^T Y; c makes both halves of S as large.
-
-    Args:
-        factor: of A.
-        gram: X^T Y summed over the ranks.
-        V, E_T: (n_local, d).
-        D: (d, d).
+    A^-1 - Y S^-1 Y^T, Y = A^-1 W, S = C^-1 + W^T Y; c makes both halves of S as large. V and E_T
+    are (n_local, d), ``gram`` is X^T Y summed over the ranks.
 
     Source:
         Woodbury, Inverting modified matrices, Princeton University, Statistical Research Group,
@@ -185,12 +161,8 @@ class Corrected:
 def count_below(ops: Any, sigma: float, spent: Any = None) -> int | None:
     """Number of eigenvalues below sigma, the inertia of K - sigma M (Sylvester).
 
-    Without a factor there is nothing to count; `definite` looks for missed modes instead.
-
-    Args:
-        ops: `PETScOperators` of the body.
-        sigma: the shift [rad^2/s^2].
-        spent: a factor of K that nobody needs any more and that gives its place.
+    Without a factor there is nothing to count; `iterative.search` looks for missed modes instead. A
+    factor of K that nobody needs any more, ``spent``, gives its place.
     """
     if ops.solver.iterative:
         return None
@@ -248,6 +220,17 @@ def dense_rows(A: PETSc.Mat, X: Array) -> Array:
     Y = A.matMult(B)
     out = Y.getDenseArray().copy(order="F")
     B.destroy(), Y.destroy()
+    return out
+
+
+def transposed_rows(A: PETSc.Mat, F: Array) -> Array:
+    """A^T F for (n_local, k) rows."""
+    x, y = A.createVecs()
+    out = np.zeros((x.getLocalSize(), F.shape[1]))
+    for k, column in enumerate(F.T):
+        y.array[:] = column
+        A.multTranspose(y, x)
+        out[:, k] = x.array
     return out
 
 

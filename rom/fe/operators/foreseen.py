@@ -6,7 +6,7 @@ from typing import Any
 from petsc4py import PETSc
 
 from rom.errors import ResourceError
-from rom.fe.operators.disk import free_disk_bytes, reserve_disk, scratch_folder
+from rom.fe.operators.disk import free_disk_bytes, scratch_folder
 from rom.fe.operators.memory import MAX_MEMORY_SHARE, allowed_bytes, factor_bytes, give_back
 from rom.fe.operators.solver import DIRECT_SOLVER, Solver
 
@@ -22,16 +22,10 @@ TOTAL_MEMORY = {"plain": (17, 27), "low-rank": (37, 39)}  # INFOG of MUMPS, in c
 
 @dataclass(frozen=True, slots=True)
 class Foreseen:
-    """What a factor will take, on all ranks together [bytes].
-
-    Attributes:
-        in_core: memory of the factor.
-        out_of_core: memory when the factor is on disk.
-        on_disk: disk it then takes.
-    """
+    """What a factor will take, on all ranks together [bytes]."""
 
     in_core: float
-    out_of_core: float
+    out_of_core: float  # memory when the factor is on disk
     on_disk: float
 
 
@@ -89,17 +83,9 @@ def multigrid_bytes(A: PETSc.Mat) -> float:
 
 
 def check_factor_memory(A: PETSc.Mat, n_columns: int, solver: Solver) -> None:
-    """Refuse a factorisation that would not fit.
+    """Refuse a factorisation that would not fit beside so many dense columns of its length.
 
     Where even the factor of a block with as many dofs fits twice, nothing is analysed.
-
-    Args:
-        A: the matrix.
-        n_columns: dense columns of its length that are kept beside the factor.
-        solver: where the factor is to live.
-
-    Raises:
-        ResourceError: with the need and what there is.
     """
     n, comm = A.getSize()[0], A.comm.tompi4py()
     there, beside = allowed_bytes(comm) * comm.size, beside_factor(A, n_columns, 1)
@@ -111,24 +97,8 @@ def check_factor_memory(A: PETSc.Mat, n_columns: int, solver: Solver) -> None:
         raise too_large(n, need, there)
 
 
-def check_disk(A: PETSc.Mat, solver: Solver) -> None:
-    """Refuse a factor that the disk cannot hold.
-
-    Raises:
-        ResourceError: with folder, size and reason.
-    """
-    reserve_disk(analysed(A, solver).on_disk, A.getSize()[0], A.comm.tompi4py())
-
-
 def automatic(ops: Any) -> tuple[Solver, str]:
-    """The first of direct, out-of-core and iterative that fits, and why, in words.
-
-    Args:
-        ops: `PETScOperators` of the whole body.
-
-    Raises:
-        ResourceError: if none of them fits, with what each would take.
-    """
+    """The first of direct, out-of-core and iterative that fits, and why, in words."""
     K, comm = ops.K, ops.comm
     there, beside = allowed_bytes(comm) * comm.size, beside_factor(K, 0, N_MATRICES)
     if MAX_BLOCK_RATIO * factor_bytes(ops.n) + beside <= there:

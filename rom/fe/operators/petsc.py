@@ -15,23 +15,21 @@ import numpy as np
 import numpy.typing as npt
 from scipy.sparse import csr_matrix
 
-from rom.eigen.place import moves_most
-from rom.eigen.scipy import ENTRY_HINT, dof_set
-from rom.eigen.search import N_SPARE_MODES, ModeSearch
-from rom.eigen.verbs import Weighted
+from rom.eigen.held import moves_most
+from rom.eigen.scipy import ENTRY_HINT
+from rom.eigen.search import N_SPARE_MODES, ModeSearch, shift_is_eigenvalue
 from rom.errors import ConfigError, SolverError
 from rom.fe.costs import comparison_pays, cost_of
 from rom.fe.operators.aij import aij, chosen, gathered, symmetrized, weighted
-from rom.fe.operators.factor import Corrected, Factor, count_below, dense_rows
+from rom.fe.operators.factor import Corrected, Factor, count_below, dense_rows, transposed_rows
 from rom.fe.operators.foreseen import check_factor_memory
 from rom.fe.operators.held import HeldPETSc
 from rom.fe.operators.iterative.gradients import ConjugateGradients, Inverse, refined
 from rom.fe.operators.iterative.multigrid import multigrid
 from rom.fe.operators.iterative.search import lowest_modes
-from rom.fe.operators.krylov_schur import krylov_schur
 from rom.fe.operators.memory import give_back
 from rom.fe.operators.solver import DIRECT_SOLVER, Solver
-from rom.fe.operators.spectrum import first_elastic, fixed_vector, signed
+from rom.fe.operators.spectrum import first_elastic, fixed_vector, krylov_schur, signed
 from rom.fe.operators.substructures.shared import substructured
 from rom.fe.operators.workers import AllRanks
 from rom.model import Array, Index
@@ -51,11 +49,9 @@ class PETScOperators(ModeSearch):
             when not given.
         parent: the operators in the coordinates these came from.
         solver: how equations are solved.
-
-    Raises:
-        SolverError: if an entry is not finite.
     """
 
+    held_kind = HeldPETSc
     counted: tuple[float, float] | None = None  # flops and entries of the last factor
 
     def __init__(
@@ -88,14 +84,6 @@ class PETScOperators(ModeSearch):
         cost = None if self.counted is None else cost_of(*self.counted)
         return self.affordable and comparison_pays(self.n, n_supports, n_interface, n_modes, cost)
 
-    def apply_K(self, X: Array) -> Array:
-        """K X."""
-        return dense_rows(self.K, X)
-
-    def apply_M(self, X: Array) -> Array:
-        """M X."""
-        return dense_rows(self.M, X)
-
     def gram(self, X: Array, Y: Array) -> Array:
         """X^T Y summed over the ranks."""
         product = np.ascontiguousarray(X.T @ Y)
@@ -111,19 +99,6 @@ class PETScOperators(ModeSearch):
         self.comm.Allreduce(MPI.IN_PLACE, out)
         return out
 
-    def all_finite(self, X: Array) -> bool:
-        """True when X is finite on every rank."""
-        return bool(self.comm.allreduce(bool(np.isfinite(X).all()), op=MPI.LAND))
-
-    def largest(self) -> float:
-        """Estimate of the largest eigenvalue from the diagonals."""
-        ratio = self.stiffness_diagonal / self.mass_diagonal
-        return float(self.comm.allreduce(ratio.max(initial=0.0), op=MPI.MAX))
-
-    def hold(self, dofs: npt.ArrayLike, shift: float = 0.0) -> HeldPETSc:
-        """Eliminate the held dofs and factor the rest of K - shift M."""
-        return HeldPETSc(self, dof_set(dofs, self.n), shift)
-
     def part(self, rows: Index) -> "PETScOperators":
         """The body with all dofs held but these: numbers on this rank."""
         some = chosen(self.first + rows, self.n, self.comm)
@@ -134,31 +109,12 @@ class PETScOperators(ModeSearch):
         """The same body in the coordinates a of u = T a."""
         return TiedOperators(self, csr_matrix(T), rigid)
 
-    def expand(self, A: Array) -> Array:
-        """T A."""
-        return A if self.T is None else dense_rows(self.T, A)
-
     def restrict(self, F: Array) -> Array:
         """T^T F."""
-        if self.T is None:
-            return F
-        out = np.zeros((self.n_local, F.shape[1]))
-        x, y = self.T.createVecs()
-        for k, column in enumerate(F.T):
-            y.array[:] = column
-            self.T.multTranspose(y, x)
-            out[:, k] = x.array
-        return out
+        return F if self.T is None else transposed_rows(self.T, F)
 
-    def plus_mass(self, dM: Any) -> "PETScOperators":
-        """The same body with the mass M + dM."""
-        return self._like(self.K, self._plus(self.M, dM), self.rigid)
-
-    def on_springs(self, dK: Any) -> "PETScOperators":
-        """The body held by springs to the ground: stiffness K + dK, no rigid motion of its own."""
-        return self._like(self._plus(self.K, dK), self.M, None)
-
-    def _plus(self, A: PETSc.Mat, dA: Any) -> PETSc.Mat:
+    def plus(self, A: PETSc.Mat, dA: Any) -> PETSc.Mat:
+        """A + dA, the rows of this rank."""
         B, size = A.copy(), (self.n_local, self.n)
         B.axpy(1.0, aij(csr_matrix(dA), (size, size), self.comm))
         return B
@@ -173,26 +129,15 @@ class PETScOperators(ModeSearch):
         """Who solves with matrices that `gathered` has given to all ranks."""
         return AllRanks(self.comm.size, WholeOperators)
 
-    def gathered(self, A: PETSc.Mat) -> csr_matrix:
-        """All rows of a matrix with the layout of K, on every rank."""
-        return gathered(A)
-
-    def product(self, A: PETSc.Mat, X: Array) -> Array:
-        """A X."""
-        return dense_rows(A, X)
-
-    def varied(
-        self, stiffness: Weighted, mass: Weighted, rigid: Array | None = None
-    ) -> "PETScOperators":
-        """The same dofs with k K + sum k_i K_i and m M + sum m_i M_i."""
-        K, M = weighted(self.K, *stiffness), weighted(self.M, *mass)
-        return self._like(K, M, self.rigid if rigid is None else rigid)
+    gathered = staticmethod(gathered)
+    product = staticmethod(dense_rows)
+    weighted = staticmethod(weighted)
 
     def solved_by(self, solver: Solver) -> "PETScOperators":
         """The same body, its equations solved another way."""
-        return self._like(self.K, self.M, self.rigid, solver)
+        return self.like(self.K, self.M, self.rigid, solver)
 
-    def _like(
+    def like(
         self, K: PETSc.Mat, M: PETSc.Mat, rigid: Array | None, solver: Solver | None = None
     ) -> "PETScOperators":
         """Other matrices in the same coordinates."""
@@ -202,14 +147,8 @@ class PETScOperators(ModeSearch):
     def inverse(self, A: PETSc.Mat, near_null: Array | None, n_columns: int = 0) -> Inverse:
         """A^-1 of a positive definite matrix by the solver chosen.
 
-        Args:
-            A: the matrix.
-            near_null: (n_local, 6) rigid motions on its rows, which multigrid needs.
-            n_columns: dense columns of that length that will be kept beside a factor.
-
-        Raises:
-            ResourceError: if a factor would not fit.
-            ConfigError: if multigrid has no geometry to go by.
+        Multigrid needs rigid motions (n_local, 6) on its rows, near_null; beside a factor so many
+        dense columns of that length will be kept.
         """
         if self.solver.iterative:
             if near_null is None:
@@ -227,12 +166,7 @@ class PETScOperators(ModeSearch):
         return self.inverse(self.K, near_null, n_columns)
 
     def indefinite(self, shift: float) -> Factor:
-        """(K - shift M)^-1 for a shift among the eigenvalues.
-
-        Raises:
-            ConfigError: by iteration, which needs a positive definite matrix.
-            SolverError: if the shift is an eigenvalue.
-        """
+        """(K - shift M)^-1 for a shift among the eigenvalues."""
         if self.solver.iterative:
             raise ConfigError(
                 "answers at a frequency above zero need a factor.",
@@ -240,7 +174,7 @@ class PETScOperators(ModeSearch):
             )
         factor = Factor(self.shifted(shift), definite=False, solver=DIRECT_SOLVER)
         if not factor.ok:
-            raise SolverError(f"K - {shift:.6g} M is singular: the shift is an eigenvalue.")
+            raise shift_is_eigenvalue(shift)
         return factor
 
     def shifted(self, sigma: float) -> PETSc.Mat:
@@ -272,17 +206,9 @@ class PETScOperators(ModeSearch):
             return *self.lowest(m + N_SPARE_MODES, sigma, inverse, deflated), False
         return super().by_blocks(m, sigma, inverse, deflated)
 
-    def first_elastic(self, R: Array) -> float:
-        """Estimate of the first elastic eigenvalue, for the choice of a shift."""
-        return first_elastic(self)
-
-    def count_below(self, sigma: float, spent: Any = None) -> int | None:
-        """Number of eigenvalues below sigma, see `factor.count_below`."""
-        return count_below(self, sigma, spent)
-
-    def signed(self, Phi: Array) -> Array:
-        """Columns with their largest entry, over all ranks, positive."""
-        return signed(self, Phi)
+    first_elastic = first_elastic
+    count_below = count_below
+    signed = signed
 
     def where(self, Phi: Array, rows: Index | None = None) -> str:
         """Words for the place that moves most."""
@@ -314,12 +240,8 @@ class TiedOperators(PETScOperators):
     """A body in the coordinates a of u = T a.
 
     T^T K T is formed when it is needed. A reduction whose interface coordinates are all held needs
-    the rows of dofs that T leaves alone, and those stand in K already.
-
-    Args:
-        parent: operators in the coordinates u.
-        T: (n_local of u, n of a) rows of the map.
-        rigid: (n_local, 6) rigid motions in the coordinates a.
+    the rows of dofs that T leaves alone, and those stand in K already. T (n_local of u, n of a) has
+    the rows of this rank, the rigid motions (n_local, 6) are in the coordinates a.
     """
 
     parent: PETScOperators
@@ -333,10 +255,7 @@ class TiedOperators(PETScOperators):
         self.n = T.shape[1]
         self.first, end = self.T.getOwnershipRangeColumn()
         self.n_local, self.last = end - self.first, parent.last
-        x, y = self.T.createVecs()
-        y.array[:] = parent.fixed
-        self.T.multTranspose(y, x)
-        self.fixed = x.array.copy()
+        self.fixed = self.restrict(parent.fixed[:, None])[:, 0]
         self.own = self._own(T)
 
     def _own(self, T: csr_matrix) -> Index:
@@ -386,11 +305,9 @@ class TiedOperators(PETScOperators):
         starts, columns, values = squares.getValuesCSR()
         squares.setValuesCSR(starts, columns, values**2)
         squares.assemble()
-        x, y = self.T.createVecs()
-        y.array[:] = diagonal
-        squares.multTranspose(y, x)
+        found = transposed_rows(squares, diagonal[:, None])[:, 0]
         squares.destroy()
-        return x.array.copy()
+        return found
 
     def apply_K(self, X: Array) -> Array:
         """T^T K T X."""
@@ -420,13 +337,8 @@ class CarryingOperators(TiedOperators):
     """The inside of a body, dofs u = P a, that carries a few more, d = E a.
 
     The stiffness P^T K P + P^T K E + E^T K P + E^T K E has dense blocks, one for each interface of
-    averaged motion; the first term is as sparse as K, and is all that is factored.
-
-    Args:
-        whole: the body, in the coordinates of the interfaces.
-        T: (n of u and d, n of a) P + E.
-        own: rows of P on this rank.
-        carried: rows of E on this rank.
+    averaged motion; the first term is as sparse as K, and is all that is factored. T is P + E, with
+    the rows ``own`` of P and ``carried`` of E on this rank.
     """
 
     def __init__(self, whole: TiedOperators, T: PETSc.Mat, own: Index, carried: Index):

@@ -68,11 +68,7 @@ class AssumedModes:
 
 
 def supported_by(reference: Any, origins: dict[str, Array]) -> Fixed:
-    """What a reference condition holds: nothing, an interface, or a chord along an axis.
-
-    Raises:
-        ConfigError: for other conditions.
-    """
+    """What a reference condition holds: nothing, an interface, or a chord along an axis."""
     if isinstance(reference, str):
         return () if reference in MEAN_AXES else (reference,)
     if len(reference) == 2 and set(reference) <= set(origins):

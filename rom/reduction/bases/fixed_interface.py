@@ -96,11 +96,7 @@ def numbered(what: str, n: int) -> list[str]:
 
 
 def check_interfaces(boundary: Index, n: int) -> None:
-    """Refuse no interface, or dofs (n_b,) of one beyond the n of the model.
-
-    Raises:
-        ConfigError: naming an example, or the range.
-    """
+    """Refuse no interface, or dofs (n_b,) of one beyond the n of the model."""
     if boundary.size == 0:
         raise ConfigError(
             "the method needs interfaces, and none is given.",

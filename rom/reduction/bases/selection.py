@@ -20,17 +20,11 @@ NOTHING_HELD = np.zeros(0, dtype=np.int64)
 
 @dataclass(frozen=True, slots=True)
 class Wanted:
-    """The natural frequencies that are to be accurate.
+    """The natural frequencies that are to be accurate."""
 
-    Attributes:
-        tol: relative error of a frequency that is accepted.
-        omega_max: upper end of the band [rad/s]; None for the lowest `N_COMPARED` elastic ones.
-        supports: interface columns held, for each support beside the free body.
-    """
-
-    tol: float
-    omega_max: float | None = None
-    supports: Sequence[Index] = ()
+    tol: float  # relative error of a frequency that is accepted
+    omega_max: float | None = None  # end of the band [rad/s]; None: the `N_COMPARED` lowest elastic
+    supports: Sequence[Index] = ()  # interface columns held, for each support beside the free body
 
 
 def enough_modes(
@@ -39,17 +33,8 @@ def enough_modes(
     """The fewest fixed-interface modes with which all frequencies wanted are accurate.
 
     Accuracy is estimated a posteriori, see `rom.eigen.residual_errors`; half the relative error of
-    an eigenvalue is that of a frequency.
-
-    Args:
-        ops: operators in interface coordinates.
-        held: their stiffness with the interfaces held.
-        Psi_b: (n_local, n_b) constraint modes.
-        wanted: which frequencies, and how accurate.
-        first: number of modes computed first.
-
-    Returns:
-        omega (m,) [rad/s] and Phi (n_local, m).
+    an eigenvalue is that of a frequency. Psi_b (n_local, n_b) are constraint modes; so many modes
+    as ``first`` says are computed first. Returned are omega (m,) [rad/s] and Phi (n_local, m).
     """
     m = min(max(first, 1), held.n_free)
     while True:

@@ -21,7 +21,7 @@ from rom.model import Array, Interface
 from rom.reduction.bases.method import Guyan, Method
 
 if TYPE_CHECKING:
-    from rom.reduction.interfaces.records import Connection
+    from rom.reduction.interfaces.connection import Connection
 
 log = logging.getLogger("rom")
 
@@ -113,13 +113,9 @@ def _interface_modes(ops: Operators, Psi: Array, rigid: Array) -> tuple[Array, A
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CharacteristicFunctions:
-    """Motions of one interface in the modes of all.
+    """Motions of one interface in the modes of all."""
 
-    Attributes:
-        values: (3k, m) displacements of the dofs of the surface.
-    """
-
-    values: Array
+    values: Array  # (3k, m) displacements of the dofs of the surface
 
     def functions(self, interface: Interface) -> Array:
         """(3k, n) rigid motions, then the modes; orthonormal over the area, none dependent."""

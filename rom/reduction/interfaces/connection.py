@@ -5,35 +5,78 @@ modes, certificate) sees an ordinary model whose interface coordinates are dofs 
 """
 
 from collections.abc import Iterable
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix
 
-from rom.eigen.verbs import Operators, given_rigid_motions, rigid_motions
+from rom.eigen.supports import SIX_KINDS, Fixed, held_coordinates, supports
+from rom.eigen.verbs import (
+    Operators,
+    coupled,
+    given_rigid_motions,
+    held_rows,
+    owned,
+    rigid_motions,
+)
 from rom.errors import InterfaceError
-from rom.model import FEModel, Index, Interface
+from rom.model import Array, FEModel, Index, Interface
 from rom.names import named, offered
-from rom.reduction.interfaces.kinds import tie
-from rom.reduction.interfaces.records import Connection, Tie
+from rom.reduction.interfaces.kinds import Tie, tie
+
+
+@dataclass(frozen=True, slots=True)
+class Connection:
+    """A model written in interface coordinates.
+
+    Attributes:
+        ops: operators in the coordinates a of u = T a; ``ops.expand`` leads back.
+        boundary: (n_b,) dof numbers in a of all interface coordinates, interface by interface.
+        parts: {interface: positions in ``boundary``}.
+        labels: (n_b,) what each coordinate is, e.g. "pin_a rbe2 uz".
+        ties: {interface: how its coordinates govern its dofs}.
+    """
+
+    ops: Operators
+    boundary: Index
+    parts: dict[str, Index]
+    labels: tuple[str, ...]
+    ties: dict[str, Tie]
+
+    def held(self, fixed: Fixed) -> Index:
+        """Dof numbers that are zero when these interfaces are held, see `rom.eigen.supports`."""
+        return self.boundary[self.held_parts(fixed)]
+
+    def on_springs(self, stiffness: dict[str, Array]) -> "Connection":
+        """The model on springs to the ground: {interface: (6, 6)} for its six coordinates."""
+        ops = self.ops
+        dK = csr_matrix((ops.n_local, ops.n))
+        for name, k in stiffness.items():
+            if self.ties[name].label not in SIX_KINDS:
+                raise InterfaceError(
+                    f"interface {name!r} has the kind {self.ties[name].label!r}; a spring acts on "
+                    "six coordinates.",
+                    hint='Give it the kind "rbe2" or "rbe3".',
+                )
+            dK = dK + coupled(dK.shape, ops.first, self.boundary[self.parts[name]], k)
+        return replace(self, ops=ops.on_springs(dK))
+
+    def held_parts(self, fixed: Fixed) -> Index:
+        """The same as positions in ``boundary``."""
+        found = [np.zeros(0, dtype=np.int64)]
+        for name, directions in supports(fixed, self.parts).items():
+            part, tie = self.parts[name], self.ties[name]
+            found.append(part[held_coordinates(name, tie.label, part.size, directions)])
+        return np.concatenate(found)
 
 
 def connect(ops: Operators, model: FEModel, interfaces: dict[str, Any]) -> Connection:
-    """Write a model in the coordinates of its interfaces.
+    """Write a model in the coordinates of its interfaces, {name: kind}.
 
-    Args:
-        ops: operators of the model in nodal dofs.
-        model: supplies the interfaces.
-        interfaces: {name: kind}; "full" keeps every dof, "rbe2" makes the surface rigid (six
-            coordinates), "rbe3" adds six coordinates that follow the area-weighted mean motion of
-            the surface and leave it deformable; `Polynomial`, `FourierLegendre` and `Snapshots`
-            let the surface follow orthogonal functions.
-
-    Raises:
-        InterfaceError: if a name is unknown, two interfaces share nodes, or a surface cannot carry
-            the functions asked for.
-        ConfigError: if a kind is unknown.
-        ResourceError: if an averaging interface has too many dofs.
+    "full" keeps every dof, "rbe2" makes the surface rigid (six coordinates), "rbe3" adds six
+    coordinates that follow the area-weighted mean motion of the surface and leave it deformable;
+    `Polynomial`, `FourierLegendre` and `Snapshots` let the surface follow orthogonal functions.
     """
     chosen = found(model, interfaces)
     _refuse_shared_nodes(chosen)
@@ -44,11 +87,7 @@ def connect(ops: Operators, model: FEModel, interfaces: dict[str, Any]) -> Conne
 
 
 def found(model: FEModel, names: Iterable[str]) -> list[Interface]:
-    """The interfaces of these names.
-
-    Raises:
-        InterfaceError: listing those that do not exist and those that do.
-    """
+    """The interfaces of these names."""
     names = list(names)
     if unknown := [name for name in names if name not in model.interfaces]:
         raise InterfaceError(
@@ -79,28 +118,22 @@ def _refuse_shared_nodes(interfaces: list[Interface]) -> None:
 def _transform(ops: Operators, chosen: list[Interface], ties: dict[str, Tie]) -> Operators:
     """Kept dofs keep their order and their rank; masters come last, on the last rank."""
     removed = np.sort(np.concatenate([t.removed for t in ties.values()]))
-    mine = np.arange(ops.first, ops.first + ops.n_local)
-    stays = ~np.isin(mine, removed)
-    n_masters = sum(t.n_masters for t in ties.values())
-    n_kept = ops.n - removed.size
-    rows, columns, values = [np.flatnonzero(stays)], [_renumber(mine[stays], removed)], []
-    values.append(np.ones(rows[0].size))
-    first_master = n_kept
+    stays, first_master = ~held_rows(ops, removed), ops.n - removed.size
+    n_columns = first_master + sum(t.n_masters for t in ties.values())
+    kept = np.flatnonzero(stays)
+    rows, columns, values = [kept], [_renumber(ops.first + kept, removed)], [np.ones(kept.size)]
     for t in ties.values():
-        here = (t.removed >= ops.first) & (t.removed < ops.first + ops.n_local)
+        here = owned(ops, t.removed)
         row = t.removed[here] - ops.first
         masters = first_master + np.arange(t.n_masters)
-        for block, column in (
-            (t.by_masters, masters),
-            (t.by_kept, _renumber(t.kept, removed)),
-        ):
+        for block, column in ((t.by_masters, masters), (t.by_kept, _renumber(t.kept, removed))):
             part = coo_matrix(block[here])
             rows.append(row[part.row])
             columns.append(column[part.col])
             values.append(part.data)
         first_master += t.n_masters
     entries = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
-    T = csr_matrix(coo_matrix(entries, shape=(ops.n_local, n_kept + n_masters)))
+    T = csr_matrix(coo_matrix(entries, shape=(ops.n_local, n_columns)))
     T.eliminate_zeros()
     rigid = [given_rigid_motions(ops)[stays]]
     if ops.last:

@@ -1,6 +1,7 @@
 """Kinds of interfaces: how a few coordinates c = L u govern the dofs u of a surface."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -9,11 +10,10 @@ from scipy.sparse import identity, kron
 
 from rom.eigen.verbs import mean_motion, rigid_motions
 from rom.errors import ConfigError, ResourceError
-from rom.model import Array, Interface
+from rom.model import Array, Index, Interface
 from rom.names import is_whole
 from rom.reduction.interfaces.characteristic import CharacteristicFunctions
 from rom.reduction.interfaces.polynomial import FourierLegendre, Polynomial, interface_functions
-from rom.reduction.interfaces.records import Tie
 from rom.reduction.interfaces.snapshots import Snapshots, snapshot_functions
 
 RBE3_DOFS = 6000  # an averaging interface couples all its dofs: 6000 of them fill 0.3 GB
@@ -22,16 +22,41 @@ KNOWN_KINDS = (
     '"full", "rbe2", "rbe3", rom.Polynomial(order) or "polynomial:3", '
     'rom.FourierLegendre(harmonics, order) or "fourier:3,2", rom.Snapshots(values, n=…)'
 )
+SIX_LABELS = ("ux", "uy", "uz", "rx", "ry", "rz")
+NO_DOFS = np.zeros(0, dtype=np.int64)
+
+
+@dataclass(frozen=True, slots=True)
+class Tie:
+    """One interface: dofs that leave, and how they follow from masters and dofs that stay.
+
+    Attributes:
+        label: name of the kind.
+        names: (m,) what each coordinate is.
+        coordinates: (m, 3k) map L from the dofs of the surface to its coordinates.
+        removed: (d,) dofs replaced; none when the coordinates are the dofs themselves.
+        by_masters: (d, m) how they follow from the coordinates; sparse where a function moves one
+            direction only.
+        kept: (s,) dofs that stay and take part.
+        by_kept: (d, s) how the removed ones follow from them.
+    """
+
+    label: str
+    names: tuple[str, ...]
+    coordinates: Any
+    removed: Index
+    by_masters: Any
+    kept: Index
+    by_kept: Array
+
+    @property
+    def n_masters(self) -> int:
+        """Number of new dofs."""
+        return self.by_masters.shape[1] if self.removed.size else 0
 
 
 def tie(interface: Interface, kind: Any) -> Tie:
-    """The tie of an interface of that kind.
-
-    Raises:
-        ConfigError: if the kind is unknown.
-        InterfaceError: if the surface cannot carry it.
-        ResourceError: if an averaging interface has too many dofs.
-    """
+    """The tie of an interface of that kind."""
     kind = parsed(interface.name, kind)
     if kind == "full":
         return _full(interface)
@@ -48,10 +73,6 @@ def tie(interface: Interface, kind: Any) -> Tie:
     names = [f"{axis}{j + 1}" for j in range(Q.shape[1]) for axis in "xyz"]
     L = kron((interface.surface_mass @ Q).T, identity(3), format="csr")
     return _stiff(interface, _label(kind), tuple(names), L, kron(Q, identity(3), format="csr"))
-
-
-SIX_LABELS = ("ux", "uy", "uz", "rx", "ry", "rz")
-NO_DOFS = np.zeros(0, dtype=np.int64)
 
 
 def _full(interface: Interface) -> Tie:
@@ -72,10 +93,7 @@ def _stiff(
 def _found(interface: Interface, word: str, Q: Array) -> Tie:
     """Computed functions with all three directions, the six rigid motions first."""
     mean_motion(interface)  # refuses surfaces whose rotation is undetermined
-    names = (
-        *(f"rigid {j + 1}" for j in range(6)),
-        *(f"{word} {j}" for j in range(7, Q.shape[1] + 1)),
-    )
+    names = tuple(f"{'rigid' if j < 7 else word} {j}" for j in range(1, Q.shape[1] + 1))
     L = (kron(interface.surface_mass, identity(3), format="csr") @ Q).T
     return _stiff(interface, f"{word}:{Q.shape[1]}", names, L, Q)
 
@@ -109,11 +127,7 @@ def _label(kind: Polynomial | FourierLegendre) -> str:
 
 
 def by_name(interfaces: Any) -> dict[str, Any]:
-    """The kinds of interfaces as a dictionary.
-
-    Raises:
-        ConfigError: if they are no mapping from names to kinds.
-    """
+    """The kinds of interfaces as a dictionary."""
     if not isinstance(interfaces, Mapping):
         raise ConfigError(
             f"interfaces = {interfaces!r} tells no interface its kind.",
@@ -123,11 +137,7 @@ def by_name(interfaces: Any) -> dict[str, Any]:
 
 
 def parsed(name: str, kind: Any) -> Any:
-    """The kind of an interface as a record, or one of the words "full", "rbe2", "rbe3".
-
-    Raises:
-        ConfigError: if it is unknown.
-    """
+    """The kind of an interface as a record, or one of the words "full", "rbe2", "rbe3"."""
     if isinstance(kind, RECORDS) or kind in ("full", "rbe2", "rbe3"):
         return kind
     if kind == "polynomial":

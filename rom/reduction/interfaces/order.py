@@ -23,11 +23,7 @@ SHIFT_RATIO = 0.02  # of the first elastic eigenvalue: makes the stiffness of a 
 
 
 def open_orders(interfaces: dict[str, Any]) -> list[str]:
-    """Names of the interfaces {name: kind} whose polynomials have no order yet.
-
-    Raises:
-        ConfigError: if a kind is unknown.
-    """
+    """Names of the interfaces {name: kind} whose polynomials have no order yet."""
     return [name for name, kind in interfaces.items() if parsed(name, kind) == Polynomial()]
 
 
@@ -37,20 +33,8 @@ def with_orders(
     """Interfaces whose order was left open, with the lowest order that is accurate enough.
 
     The reduced modes of the free body leave a residual in the model whose surfaces keep all dofs;
-    it measures what modes and surfaces miss together. Half of the tolerance goes to the modes.
-
-    Args:
-        ops: operators of the model in nodal dofs.
-        model: supplies the interfaces.
-        interfaces: {name: kind}, of which `Polynomial()` leaves the order open.
-        method: `CraigBampton` with a band and a tolerance.
-
-    Returns:
-        The interfaces and the method to reduce with.
-
-    Raises:
-        ConfigError: if the method states no accuracy.
-        SolverError: if no order is accurate enough.
+    it measures what modes and surfaces miss together. Half of the tolerance goes to the modes, in
+    the method returned beside the interfaces {name: kind}.
     """
     open_ = open_orders(interfaces)
     if not isinstance(method, CraigBampton) or method.f_max is None or method.tol is None:

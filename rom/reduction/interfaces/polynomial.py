@@ -11,6 +11,7 @@ Source:
 """
 
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 from numpy.polynomial.legendre import legvander
@@ -69,12 +70,9 @@ class Polynomial:
         p = self.order
         _refuse_many((p + 1) * (p + 2) * (p + 3) // 6, interface, f"order {p}")
         x = _local(interface)
-        values = [legvander(column, self.order) for column in x.T]
-        degrees = sorted(
-            ((i, j, k) for i in range(self.order + 1) for j in range(self.order + 1 - i)
-             for k in range(self.order + 1 - i - j)),
-            key=sum,
-        )  # fmt: skip
+        values = [legvander(column, p) for column in x.T]
+        every = product(range(p + 1), repeat=3)
+        degrees = sorted((degree for degree in every if sum(degree) <= p), key=sum)
         return np.column_stack(
             [values[0][:, i] * values[1][:, j] * values[2][:, k] for i, j, k in degrees]
         )
@@ -123,11 +121,7 @@ class FourierLegendre:
 
 
 def interface_functions(kind: Polynomial | FourierLegendre, interface: Interface) -> Array:
-    """(k, m) functions with Q^T S Q = I, S the surface mass; dependent ones are left out.
-
-    Raises:
-        InterfaceError: if the functions cannot move the surface as a rigid body: nodes on a line.
-    """
+    """(k, m) functions with Q^T S Q = I, S the surface mass; dependent ones are left out."""
     S, V = interface.surface_mass, kind.functions(interface)
     size = np.sqrt(S.sum())  # of the constant function; all others reach one
     norms = np.sqrt(np.einsum("km,km->m", V, S @ V))
@@ -151,15 +145,9 @@ def cylinder_coordinates(interface: Interface) -> tuple[Array, Array]:
     The axis is that of the geometry where it is known; else the principal direction of the area
     whose moment differs from the two others, through the centroid. The angle counts from the
     ambient axis farthest from it.
-
-    Raises:
-        InterfaceError: if no direction stands out.
     """
-    if interface.axis is None:
-        x = interface.points - _centroid(interface)
-        axis = _principal_axis(interface, x)
-    else:
-        x, axis = interface.points - interface.origin, interface.axis
+    x = interface.points - (_centroid(interface) if interface.axis is None else interface.origin)
+    axis = _principal_axis(interface, x) if interface.axis is None else interface.axis
     size = np.round(np.abs(axis), 6)  # bodies that share the surface must choose alike
     axis = axis * np.sign(axis[np.argmax(size)])
     e = np.eye(3)[np.argmin(size)]

@@ -65,11 +65,7 @@ class Snapshots:
 
 
 def snapshot_functions(kind: Snapshots, interface: Interface) -> Array:
-    """(3k, m) functions with Q^T (S x I_3) Q = I, rigid motions first, then by falling energy.
-
-    Raises:
-        ConfigError: if the snapshots belong to another surface or do not hold n functions.
-    """
+    """(3k, m) functions with Q^T (S x I_3) Q = I, rigid motions first, then by falling energy."""
     if kind.values.shape[0] != interface.dofs.size:
         raise ConfigError(
             f"snapshots of {kind.values.shape[0]} dofs do not fit interface {interface.name!r} "

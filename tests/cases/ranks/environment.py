@@ -1,6 +1,9 @@
 """What a process under mpirun is started with."""
 
+import json
 import os
+
+import numpy as np
 
 from cases.command import python
 from cases.paths import PYTHONPATH, ROOT
@@ -19,3 +22,10 @@ def on_ranks(n, *words, **options):
     """A finished process of Python on n ranks, its texts captured."""
     options = {"env": ENVIRONMENT, "cwd": ROOT, "timeout": 600} | options
     return python(*words, launcher=mpirun(n), **options)
+
+
+def written_on(n, file, *words, **options):
+    """What a script on n ranks, whose words name the file, has written into it, .npz or .json."""
+    done = on_ranks(n, *words, **options)
+    assert file.exists(), done.stderr
+    return json.loads(file.read_text()) if file.suffix == ".json" else dict(np.load(file))

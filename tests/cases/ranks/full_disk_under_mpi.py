@@ -11,19 +11,19 @@ STEEL = rom.Material(E=210e9, nu=0.3, rho=7850.0)
 BLOCK = {"L": 1.0, "b": 0.5, "h": 0.3, "lc": float(sys.argv[1])}
 LEFT_BYTES = int(sys.argv[2])  # of a disk that others have filled
 model = rom.fe.model("meshes/beam.geo", material=STEEL, parameters=BLOCK, solver="out-of-core")
-comm, tried = model.operators.comm, factor.check_disk
+comm, tried = model.operators.comm, factor.reserve_disk
 
 
-def fills(A, solver):
+def fills(*wanted):
     """The disk is large enough, and then it is not."""
-    tried(A, solver)
+    tried(*wanted)
     if comm.rank == 0:
         size = disk_usage(scratch_folder()).free - LEFT_BYTES
         (scratch_folder() / "another").write_bytes(bytes(size))
     comm.Barrier()
 
 
-factor.check_disk = fills
+factor.reserve_disk = fills
 sys.stdout.write("begins\n")
 sys.stdout.flush()
 model.operators.hold(model.interfaces["root"].dofs)

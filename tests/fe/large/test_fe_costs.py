@@ -72,15 +72,17 @@ def test_full_modes_are_found_where_they_cost_less_than_the_reduction_or_little(
     assert costs.comparison_pays(299_967, 13, n_interface=72, n_modes=20, cost=thin)
 
 
+def bar(b, h):
+    steel, sizes = rom.Material(E=210e9, nu=0.3, rho=7850.0), {"L": 1.0, "b": b, "h": h, "lc": 0.1}
+    return rom.fe.model("meshes/beam.geo", material=steel, parameters=sizes)
+
+
 @pytest.mark.fenicsx
 def test_a_factor_that_was_made_says_what_it_cost(monkeypatch):
     from rom.fe.operators import petsc
     from rom.reduction.full_model import operators
 
-    model = rom.fe.model(
-        "meshes/beam.geo", material=rom.Material(E=210e9, nu=0.3, rho=7850.0),
-        parameters={"L": 1.0, "b": 1.0, "h": 0.02, "lc": 0.1},
-    )  # fmt: skip
+    model = bar(b=1.0, h=0.02)
     ops, asked = operators(model), []
     monkeypatch.setattr(petsc, "comparison_pays", lambda *a: asked.append(a[-1]) or True)
     assert ops.comparison_pays(3, 12, 20) and asked == [None]
@@ -92,16 +94,10 @@ def test_a_factor_that_was_made_says_what_it_cost(monkeypatch):
 
 @pytest.mark.fenicsx
 def test_where_full_modes_are_dear_other_supports_have_the_estimates_alone(monkeypatch):
-    model = rom.fe.model(
-        "meshes/beam.geo", material=rom.Material(E=210e9, nu=0.3, rho=7850.0),
-        parameters={"L": 1.0, "b": 0.2, "h": 0.1, "lc": 0.1},
-    )  # fmt: skip
+    model, kinds = bar(b=0.2, h=0.1), {"root": "rbe2", "tip": "rbe2"}
 
     def certified(certify):
-        return rom.reduce(
-            model, method=rom.CraigBampton(8), interfaces={"root": "rbe2", "tip": "rbe2"},
-            certify=certify,
-        )  # fmt: skip
+        return rom.reduce(model, method=rom.CraigBampton(8), interfaces=kinds, certify=certify)
 
     known = certified(True)
     monkeypatch.setattr(costs, "LONG_COMPARISON", 0.0)

@@ -1,5 +1,7 @@
 """The path without a factor: known spectra, planted misses, and the factor's own answers."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -7,9 +9,19 @@ from scipy import sparse
 
 import rom
 from cases.long import few
+from cases.operators import petsc_operators
 from rom.errors import ModesMissedError
 
+pytest.importorskip("dolfinx", reason="dolfinx is not installed")
 pytestmark = pytest.mark.fenicsx
+
+from rom.eigen.completeness import gaussian_block  # noqa: E402
+from rom.fe.operators.iterative import multigrid  # noqa: E402
+from rom.fe.operators.iterative import search as module  # noqa: E402
+from rom.fe.operators.iterative.gradients import ConjugateGradients  # noqa: E402
+from rom.fe.operators.iterative.search import BlockSearch  # noqa: E402
+from rom.reduction.full_model import operators  # noqa: E402
+
 STEEL = rom.Material(E=210e9, nu=0.3, rho=7850.0)
 EDGE = 8  # points of a cube's edge
 MASS = 2.0
@@ -21,18 +33,13 @@ def chain():
 
 def cube():
     """The Laplacian on a cube: most eigenvalues are three or six times there, in closed form."""
-    from mpi4py import MPI
-
-    from rom.fe.operators.petsc import PETScOperators, aij
-
-    n, line = EDGE**3, sparse.identity(EDGE)
+    line = sparse.identity(EDGE)
     K = sum(
         sparse.kron(sparse.kron(a, b), c)
         for a, b, c in ((chain(), line, line), (line, chain(), line), (line, line, chain()))
     )
-    mats = [aij(sparse.csr_matrix(A), ((n, n), (n, n)), MPI.COMM_SELF)
-            for A in (K, MASS * sparse.identity(n))]  # fmt: skip
-    return PETScOperators(*mats), K.toarray()
+    body = SimpleNamespace(K=K, M=MASS * sparse.identity(EDGE**3), points=None)
+    return petsc_operators(body), K.toarray()
 
 
 def eigenvalues():
@@ -43,16 +50,12 @@ def eigenvalues():
 @pytest.fixture(scope="module")
 def problem():
     """The cube, with an approximate inverse that errs by half at the lowest eigenvalue."""
-    from rom.fe.operators.iterative.gradients import ConjugateGradients
-
     ops, K = cube()
     P = np.linalg.inv(K + 0.4 * np.eye(K.shape[0]))
     return ops, ConjugateGradients(ops.K, lambda F: P @ F, lambda: None), K, P
 
 
 def found(problem, m, spare=3):
-    from rom.fe.operators.iterative.search import BlockSearch
-
     ops, inverse = problem[:2]
     search = BlockSearch(ops, inverse, np.zeros((ops.n, 0)), m, spare)
     search.solve()
@@ -77,18 +80,16 @@ def test_static_solutions_are_those_of_a_dense_solver(problem):
 
 def verdict(problem, missing, m=11, gap=0.5):
     """What is said of the exact modes when some of them are withheld."""
-    from rom.fe.operators.iterative.definite import N_COLUMNS, searched, spectral_bounds
-
     ops, inverse, K, _ = problem
     lam, Phi = np.linalg.eigh(K)
     kept = np.setdiff1d(np.arange(m), missing)
     lam, beyond = lam[:m] / MASS, lam[m] / MASS
     Phi = Phi[:, kept] / np.sqrt(MASS)
-    loads = np.random.default_rng(5).standard_normal((ops.n, N_COLUMNS)) * np.sqrt(MASS)
+    loads = np.random.default_rng(5).standard_normal((ops.n, module.N_COLUMNS)) * np.sqrt(MASS)
     sigma = lam[-1] + gap * (beyond - lam[-1])
-    bounds = spectral_bounds(ops, inverse, loads)
+    bounds = module.spectral_bounds(ops, inverse, loads)
     modes = (Phi, MASS * Phi, lam[-1])
-    return searched(ops, inverse, modes, sigma, loads, bounds), sigma, Phi
+    return module.searched(ops, inverse, modes, sigma, loads, bounds), sigma, Phi
 
 
 @pytest.mark.parametrize("missing", [[0], [1], [2, 3], [6], [10], [0, 5, 10]])
@@ -108,27 +109,23 @@ def test_nothing_missing_is_said_with_its_probability(problem):
 
 
 def test_the_bounds_of_the_preconditioned_matrix_hold_its_eigenvalues(problem):
-    from rom.fe.operators.iterative.definite import spectral_bounds
-
     ops, inverse, K, _ = problem
     lam = np.linalg.eigvalsh(K)
     loads = np.random.default_rng(2).standard_normal((ops.n, 2))
-    least, largest = spectral_bounds(ops, inverse, loads)
+    least, largest = module.spectral_bounds(ops, inverse, loads)
     assert 0.4 * lam[0] / (lam[0] + 0.4) < least < lam[0] / (lam[0] + 0.4)
     assert lam[-1] / (lam[-1] + 0.4) < largest < 1.1
 
 
 def test_the_probability_follows_its_formula(problem, monkeypatch):
     """After ten steps, by numbers of its own: Chebyshev's polynomial by NumPy."""
-    from rom.fe.operators.iterative import definite
-
-    monkeypatch.setattr(definite, "MAX_STEPS", 10)
-    monkeypatch.setattr(definite, "LEAST_SHARE", 1e7)  # so that the bound is below one
+    monkeypatch.setattr(module, "MAX_STEPS", 10)
+    monkeypatch.setattr(module, "LEAST_SHARE", 1e7)  # so that the bound is below one
     ops, inverse, K, P = problem
     said, sigma, _ = verdict(problem, [], gap=0.9)
     theta = np.linalg.eigvalsh(K)[10] / MASS
     loads = np.random.default_rng(5).standard_normal((ops.n, 4)) * np.sqrt(MASS)
-    delta, largest = definite.spectral_bounds(ops, inverse, loads)
+    delta, largest = module.spectral_bounds(ops, inverse, loads)
     mu = (sigma / theta - 1.0) * delta
     growth = np.polynomial.Chebyshev.basis(9)(1.0 + 2.0 * mu / largest)
     c = np.sqrt(largest * np.einsum("ij,ij->j", loads, P @ loads) / mu) / growth
@@ -139,8 +136,6 @@ def test_the_probability_follows_its_formula(problem, monkeypatch):
 
 def forgetful(monkeypatch, times):
     """The search loses its third mode, that often."""
-    from rom.fe.operators.iterative.search import BlockSearch
-
     solve, left = BlockSearch.solve, [times]
 
     def forgetting(self):
@@ -180,8 +175,6 @@ def bar(solver, size=(1.0, 0.2, 0.1), lc=0.06):
 
 def test_the_cycle_is_symmetric_and_below_the_inverse():
     """x^T P y = y^T P x, and all eigenvalues of P K in (0, 1]."""
-    from rom.reduction.full_model import operators
-
     model = bar("iterative")
     held = operators(model).hold(model.interfaces["root"].dofs)
     P, K = held.factor.approximate, held.inner.apply_K
@@ -222,8 +215,6 @@ def test_frequencies_and_shapes_are_those_of_the_factor(size, kind):
 
 def test_the_smoother_is_the_polynomial_of_the_fourth_kind(problem):
     """What it leaves of an eigenvector: sin((k + 1/2) phi) / ((2k + 1) sin(phi / 2))."""
-    from rom.fe.operators.iterative import multigrid
-
     ops, _, K, _ = problem
     level = multigrid.Level(ops.K, ops.M)
     lam, V = np.linalg.eigh(K / 6.0)  # the diagonal is six everywhere
@@ -236,9 +227,6 @@ def test_the_smoother_is_the_polynomial_of_the_fourth_kind(problem):
 
 
 def test_loads_are_independent_of_the_search_and_as_heavy_as_the_mass(problem, monkeypatch):
-    from rom.eigen.gaussian import gaussian_block
-    from rom.fe.operators.iterative import search as module
-
     seen, said = [], module.searched
     monkeypatch.setattr(module, "searched", lambda *a: seen.append(a) or said(*a))
     search = found(problem, 11)
@@ -253,8 +241,6 @@ def test_loads_are_independent_of_the_search_and_as_heavy_as_the_mass(problem, m
 
 
 def test_what_was_missed_stands_in_the_block(problem, monkeypatch):
-    from rom.fe.operators.iterative.search import BlockSearch
-
     forgetful(monkeypatch, 1)
     search, taken, take = found(problem, 11), [], BlockSearch._take
     monkeypatch.setattr(BlockSearch, "_take", lambda self, X: taken.append(X) or take(self, X))
@@ -274,9 +260,7 @@ def test_directions_that_depend_on_others_are_dropped(problem):
 
 def test_modes_left_alone_are_looked_at_once_more(problem, monkeypatch):
     """One that has converged is spoilt behind the back of the search."""
-    from rom.fe.operators.iterative import search as module
-
-    improve, spoilt = module.BlockSearch._improve, []
+    improve, spoilt = BlockSearch._improve, []
 
     def spoiling(self, Y, wanted):
         improve(self, Y, wanted)
@@ -285,7 +269,7 @@ def test_modes_left_alone_are_looked_at_once_more(problem, monkeypatch):
             for A in (self.X, self.AX, self.MX):
                 A[:, 0] += 1e-4 * A[:, -1]
 
-    monkeypatch.setattr(module.BlockSearch, "_improve", spoiling)
+    monkeypatch.setattr(BlockSearch, "_improve", spoiling)
     monkeypatch.setattr(module, "N_BETWEEN_REFRESHES", 40)
     search = found(problem, 11)
     assert spoilt

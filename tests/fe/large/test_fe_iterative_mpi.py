@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 
 from cases.long import SHARED_BY
 from cases.paths import RANKS
-from cases.ranks.environment import on_ranks
+from cases.ranks.environment import written_on
 
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")
 pytestmark = [pytest.mark.fenicsx, pytest.mark.mpi]
@@ -19,9 +19,7 @@ def runs(tmp_path_factory):
     script = str(RANKS / "iterative_under_mpi.py")
     for solver, ranks in (("direct", 1), *(("iterative", n) for n in (1, *SHARED_BY))):
         file = folder / f"{solver}{ranks}.npz"
-        done = on_ranks(ranks, script, solver, file, timeout=300)
-        assert file.exists(), done.stderr
-        found[solver, ranks] = dict(np.load(file))
+        found[solver, ranks] = written_on(ranks, file, script, solver, file, timeout=300)
     return found
 
 

@@ -1,7 +1,5 @@
 """The factor that ranks share as substructures: beside dense solutions, and when it is not made."""
 
-import json
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -9,62 +7,46 @@ from scipy.sparse import coo_matrix, csr_matrix, random, triu
 
 from cases.long import SHARED_BY
 from cases.paths import RANKS
-from cases.ranks.environment import on_ranks
+from cases.ranks.environment import written_on
 
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")
 pytestmark = [pytest.mark.fenicsx, pytest.mark.mpi]
+
+from mpi4py import MPI  # noqa: E402
+
+from rom.fe.operators.substructures import mumps  # noqa: E402
+
 SCRIPT = RANKS / "substructured_under_mpi.py"
 N_VERTICES, N_LAST = 60, 7
 
 
 @pytest.fixture(scope="module")
 def library():
-    from mpi4py import MPI
-
-    from rom.fe.operators.substructures import mumps
-
     return mumps.library(MPI.COMM_SELF)
 
 
 @pytest.fixture(scope="module")
 def found(tmp_path_factory):
-    folder, answers = tmp_path_factory.mktemp("substructured"), {}
-    for n in SHARED_BY:
-        file = folder / f"{n}.json"
-        done = on_ranks(n, SCRIPT, file, timeout=300)
-        assert file.exists(), done.stderr
-        answers[n] = json.loads(file.read_text())
-    return answers
+    files = {n: tmp_path_factory.mktemp("substructured") / f"{n}.json" for n in SHARED_BY}
+    return {n: written_on(n, file, SCRIPT, file, timeout=300) for n, file in files.items()}
+
+
+LEFT_TO_MUMPS = ["on disk", "low rank", "full", "apart", "costly", "no room", "room runs out"]
+NOT_DEFINITE = ["loose", "negative", "without stiffness"]
 
 
 @pytest.mark.parametrize("n", SHARED_BY)
 def test_solutions_are_those_of_the_whole_matrix(found, n):
+    """No entry joins two insides; one dof is joined to ten of the next rank at each joint."""
     assert len(found[n]["errors"]) == 5
     assert max(found[n]["errors"]) < 1e-12
-
-
-@pytest.mark.parametrize("n", SHARED_BY)
-def test_no_entry_joins_two_insides(found, n):
     assert found[n]["joined"] == [0] * 5
-
-
-@pytest.mark.parametrize("n", SHARED_BY)
-def test_the_border_is_small(found, n):
-    """One dof joined to ten of the next rank, at each of the n - 1 joints."""
     assert found[n]["border of stars"] == n - 1
 
 
 @pytest.mark.parametrize("n", SHARED_BY)
-@pytest.mark.parametrize(
-    "case", ["on disk", "low rank", "full", "apart", "costly", "no room", "room runs out"]
-)
-def test_it_leaves_what_it_is_not_made_for_to_mumps(found, n, case):
-    assert found[n][case]
-
-
-@pytest.mark.parametrize("n", SHARED_BY)
-@pytest.mark.parametrize("case", ["loose", "negative", "without stiffness"])
-def test_a_matrix_that_is_not_positive_definite_is_noticed(found, n, case):
+@pytest.mark.parametrize("case", LEFT_TO_MUMPS + NOT_DEFINITE)
+def test_it_leaves_what_it_is_not_made_for_and_notices_what_is_not_definite(found, n, case):
     assert found[n][case]
 
 
@@ -89,8 +71,6 @@ def generated(seed):
 @pytest.mark.parametrize("seed", range(8))
 def test_given_unknowns_come_last_at_no_further_fill(library, seed):
     """Beside the order of MUMPS itself, the entries of the factor counted by elimination."""
-    from rom.fe.operators.substructures import mumps
-
     pattern = generated(seed)
     places = mumps.elimination_order(library, pattern, N_LAST)
     assert sorted(places) == list(range(N_VERTICES))
@@ -102,8 +82,6 @@ def test_given_unknowns_come_last_at_no_further_fill(library, seed):
 
 def test_an_order_with_less_fill_is_not_found_by_chance(library):
     """The count of fill tells a good order from one at random."""
-    from rom.fe.operators.substructures import mumps
-
     pattern, rng = generated(0), np.random.default_rng(0)
     places = mumps.elimination_order(library, pattern, N_LAST)
     at_random = [fill(pattern, rng.permutation(N_VERTICES)) for _ in range(20)]
@@ -112,8 +90,6 @@ def test_an_order_with_less_fill_is_not_found_by_chance(library):
 
 @pytest.mark.parametrize("m", [1, 5, 30])
 def test_a_solution_in_two_halves_around_a_border(library, m):
-    from rom.fe.operators.substructures import mumps
-
     rng, n = np.random.default_rng(m), 40
     A = rng.standard_normal((n + m, n + m))
     K = A @ A.T + np.eye(n + m)
@@ -133,10 +109,6 @@ def test_a_solution_in_two_halves_around_a_border(library, m):
 
 
 def test_without_the_library_mumps_shares_the_factor_as_petsc_calls_it(monkeypatch):
-    from mpi4py import MPI
-
-    from rom.fe.operators.substructures import mumps
-
     monkeypatch.setattr(mumps, "mapped_files", list)
     assert mumps.library(MPI.COMM_SELF) is None
     monkeypatch.setattr(mumps, "mapped_files", lambda: ["/nowhere/libdmumps.so"])

@@ -7,6 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from cases.files.cells import solid
+from cases.refusals import refused
 from rom.errors import ConfigError, MeshError, TagError
 from rom.fe.mesh.cell_types import CELL_TYPES
 from rom.fe.mesh.cut import cut
@@ -57,22 +58,20 @@ def crossed():
     return replace(mesh, facets=mesh.facets | {"side": side})
 
 
-@pytest.mark.parametrize(
-    "mesh, asked, error, says",
-    [
-        (solid("hex8", (2, 1, 1), SIZE), (3, (1, 0, 0)), MeshError, "piece 2 of 3 .* no cells"),
-        (solid("tet4", (4, 1, 1), SIZE), (2, (1, 0.4, 0)), MeshError, "'cut 1' is not flat"),
-        (solid("hex8", (2, 1, 1), SIZE), (None, None), TagError, "one region"),
-        (solid("hex8", (2, 1, 1), SIZE), (2, None), ConfigError, "n = 2 and axis = None"),
-        (solid("hex8", (2, 1, 1), SIZE), (None, (1, 0, 0)), ConfigError, "n = None and axis"),
-        (solid("hex8", (2, 1, 1), SIZE), (1, (1, 0, 0)), ConfigError, "one piece is the whole"),
-        (solid("hex8", (2, 1, 1), SIZE), (2, (0, 0, 0)), ConfigError, "say no cuts"),
-        (crossed(), (2, (1, 0, 0)), TagError, "'side' lies partly on piece '1'"),
-    ],
+def cutting(n, axis, mesh=None):
+    return lambda: cut(mesh or solid("hex8", (2, 1, 1), SIZE), n, axis)
+
+
+test_cuts_that_cannot_be_made_are_refused_by_name = refused(
+    (cutting(3, (1, 0, 0)), MeshError, "piece 2 of 3 .* no cells"),
+    (cutting(2, (1, 0.4, 0), solid("tet4", (4, 1, 1), SIZE)), MeshError, "'cut 1' is not flat"),
+    (cutting(None, None), TagError, "one region"),
+    (cutting(2, None), ConfigError, "n = 2 and axis = None"),
+    (cutting(None, (1, 0, 0)), ConfigError, "n = None and axis"),
+    (cutting(1, (1, 0, 0)), ConfigError, "one piece is the whole"),
+    (cutting(2, (0, 0, 0)), ConfigError, "say no cuts"),
+    (cutting(2, (1, 0, 0), crossed()), TagError, "'side' lies partly on piece '1'"),
 )
-def test_cuts_that_cannot_be_made_are_refused_by_name(mesh, asked, error, says):
-    with pytest.raises(error, match=says):
-        cut(mesh, *asked)
 
 
 def test_surfaces_with_the_name_or_the_place_of_a_cut_are_refused():

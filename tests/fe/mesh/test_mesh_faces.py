@@ -19,8 +19,8 @@ from cases.paths import ROOT
 from rom.errors import ConfigError, MeshError, TagError
 from rom.fe.mesh.picks import picks
 from rom.fe.mesh.read import read_mesh
+from rom.fe.mesh.sources.cad_faces import Picker, pick
 from rom.fe.mesh.sources.gmsh_session import session
-from rom.fe.mesh.sources.picking import Picker, pick
 from rom.fe.mesh.sources.step import make
 from rom.fe.mesh.summary import surface_triangles
 from rom.rotation import exp, matrix

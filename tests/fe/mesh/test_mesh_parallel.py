@@ -1,9 +1,7 @@
 """From the record to dolfinx: node order, tags, any number of ranks, errors on all of them."""
 
 import json
-import os
-import subprocess
-import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,12 +9,17 @@ from numpy.testing import assert_allclose
 
 from cases.files.cells import solid
 from cases.long import few
-from cases.paths import TESTS
-from rom.errors import MeshError
-from rom.process.mpirun import mpirun
+from cases.ranks.environment import on_ranks
 
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")
 pytestmark = pytest.mark.fenicsx
+
+from mpi4py import MPI  # noqa: E402
+
+import ufl  # noqa: E402
+from dolfinx import fem  # noqa: E402
+
+from rom.fe.mesh.read import to_dolfinx  # noqa: E402
 
 PROGRAM = """
 import json, sys
@@ -72,11 +75,7 @@ EXACT = [1.0, 1.5, 1.25, 3.25, 4.5, 0.0, 0.0]
 @pytest.mark.parametrize("ranks", few(2, [1, 2, 4]))
 def test_integrals_tags_and_errors_are_the_same_on_any_number_of_ranks(ranks):
     """Two bricks on four ranks: some ranks own no cell."""
-    here = TESTS
-    allowed = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
-    env = os.environ | allowed | {"OMP_NUM_THREADS": "1", "PYTHONPATH": f"{here}:{here.parent}"}
-    command = [*mpirun(ranks), sys.executable, "-c", PROGRAM]
-    done = subprocess.run(command, env=env, capture_output=True, text=True, timeout=600)
+    done = on_ranks(ranks, "-c", PROGRAM)
     lines = [line for line in done.stdout.splitlines() if line.startswith("RESULT ")]
     assert lines, done.stderr[-2000:]
     size, found, texts = json.loads(lines[0].removeprefix("RESULT "))
@@ -90,15 +89,6 @@ def test_integrals_tags_and_errors_are_the_same_on_any_number_of_ranks(ranks):
 @pytest.mark.parametrize("kind", ["tet10", "hex27"])
 def test_curved_cells_keep_their_middle_nodes(kind):
     """A quadratic map is reproduced exactly only if every node lands at its place."""
-    from dataclasses import replace
-
-    from mpi4py import MPI
-
-    import ufl
-    from dolfinx import fem
-
-    from rom.fe.mesh.read import to_dolfinx
-
     box = solid(kind, (2, 2, 2), (2.0, 1.0, 1.0))
     x, y, z = box.points.T
     bent = replace(box, points=np.column_stack([x, y + 0.1 * x * x, z + 0.2 * x * y]))
@@ -108,18 +98,3 @@ def test_curved_cells_keep_their_middle_nodes(kind):
     X = ufl.SpatialCoordinate(mesh)
     assert volume == pytest.approx(2.0, rel=1e-12)  # the map has determinant 1
     assert fem.assemble_scalar(fem.form(X[1] * X[2] * ds(1))) == pytest.approx(0.25, rel=1e-12)
-
-
-def test_a_mesh_made_by_hand_is_checked_before_dolfinx_sees_it():
-    """dolfinx 0.5 hangs on this one."""
-    from dataclasses import replace
-
-    from mpi4py import MPI
-
-    from rom.fe.mesh.read import to_dolfinx
-
-    mesh = solid()
-    cells = mesh.cells.copy()
-    cells[0, 0] = 10_000
-    with pytest.raises(MeshError, match="outside 0 to 35"):
-        to_dolfinx(replace(mesh, cells=cells), MPI.COMM_SELF)

@@ -29,7 +29,7 @@ class SteadyRotation:
 
     Args:
         sector: the sector; its points are those without load.
-        solid: its elements in large motion, see `rom.fe.forms.finite_strain.FiniteStrain`.
+        solid: its elements in large motion, see `rom.fe.forms.large_strain.FiniteStrain`.
 
     Attributes:
         softening: (n, n) spin softening M (I (x) P) per (rad/s)^2 [kg].

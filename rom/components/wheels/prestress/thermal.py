@@ -117,7 +117,7 @@ def thermal_buckling(model: FEModel, heat: Heat, *, fixed: Fixed = ()) -> float:
 
 
 def finite_solid(model: FEModel, heat: Heat | None = None) -> Any:
-    """The solid in large motion, heated, see `rom.fe.forms.finite_strain.FiniteStrain`.
+    """The solid in large motion, heated, see `rom.fe.forms.large_strain.FiniteStrain`.
 
     Raises:
         ConfigError: if the model has no finite elements.

@@ -62,7 +62,7 @@ class Deck(Nodes):
 
 
 def read(path: str) -> Read:
-    """Read a deck; see `rom.fe.mesh.sources.readers.read`.
+    """Read a deck; see `rom.fe.mesh.child.read`.
 
     Raises:
         FileFormatError: the deck is damaged, or has keywords whose mass or stiffness would be lost.

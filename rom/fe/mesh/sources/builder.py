@@ -15,16 +15,7 @@ from rom.names import named
 
 
 def make(gmsh: Any, path: Path, request: dict[str, Any]) -> Made:
-    """Call ``build(gmsh, **parameters)`` of the file.
-
-    Returns:
-        The parameters used, and their defaults.
-
-    Raises:
-        FileFormatError: the file is no Python, or has no function build.
-        ConfigError: build has no parameter of that name, or needs one that was not given.
-        MeshError: build failed.
-    """
+    """Call ``build(gmsh, **parameters)`` of the file; the parameters used, and their defaults."""
     build = getattr(_load(path), "build", None)
     if not callable(build):
         raise FileFormatError(f"{path.name} has no function build(gmsh, **parameters).")
@@ -93,9 +84,7 @@ def _place(error: Exception, path: Path) -> str:
 def unmeshable(how: str, *, given: bool) -> MeshError:
     """What is said of a geometry without a mesh: it is a program and does what its values ask for.
 
-    Args:
-        how: how gmsh ended, by a crash or in its own words.
-        given: whether the geometry was given parameters.
+    ``how`` gmsh ended, by a crash or in its own words, with the parameters ``given`` or its own.
     """
     cause = "with these parameters" if given else "with the values it holds"
     return MeshError(

@@ -1,4 +1,7 @@
-"""From an open gmsh model to arrays: cells by region, facets by name; runs in the child process."""
+"""From an open gmsh model to arrays: cells by region, facets by name; runs in the child process.
+
+Of plane sections, triangles, curves and surfaces.
+"""
 
 import re
 from pathlib import Path
@@ -8,11 +11,13 @@ import numpy as np
 
 from rom.errors import FileFormatError, MeshError, TagError
 from rom.fe.mesh.solid import Read, packed
-from rom.model import Index
+from rom.model import Array, Index
 
 # gmsh element types
 SOLIDS = {4: "tet4", 5: "hex8", 11: "tet10", 12: "hex27", 17: "hex20"}
 NAMES = re.compile(rb'^\s*([0-3])\s+(\d{1,18})\s+"([^"\r\n]*)"\s*$', re.MULTILINE)
+LINE, TRIANGLE = 1, 2  # likewise
+FLAT_RTOL = 1e-9  # height over the extent of a plane section
 DIMENSIONS = ("point", "curve", "surface", "volume")
 Blocks = dict[int, tuple[Index, Index]]  # numbers and nodes of the elements of each volume
 Groups = dict[tuple[int, int], str]  # names by dimension and tag
@@ -27,11 +32,7 @@ def declared_groups(path: Path) -> list[tuple[int, int, str]]:
 
 
 def check_declared(gmsh: Any, declared: Path) -> None:
-    """Refuse what gmsh drops in silence: empty groups, and the second group of a name.
-
-    Raises:
-        TagError: naming the group.
-    """
+    """Refuse what gmsh drops in silence: empty groups, and the second group of a name."""
     present, groups = set(gmsh.model.getPhysicalGroups()), declared_groups(declared)
     _check_names({(dim, tag): name for dim, tag, name in groups})
     for dim, tag, name in groups:
@@ -51,19 +52,15 @@ def version(path: Path) -> int:
 
 
 def collect(gmsh: Any, declared: Path, *, strict: bool, repeated: bool) -> Read:
-    """Arrays and notes of the mesh, as `rom.fe.mesh.sources.readers.read` returns them.
+    """Arrays and notes of the mesh, as `rom.fe.mesh.child.read` returns them.
 
-    Args:
-        gmsh: the module, with a meshed model.
-        declared: ``.msh`` file whose header lists the names of the groups.
-        strict: named surfaces without a named volume are an error.
-        repeated: the file lists a facet once for each of its groups, as version 2 does.
+    The header of a ``.msh`` file, ``declared``, lists the names of the groups; ``strict`` where
+    named surfaces without a named volume are an error; ``repeated`` where the file lists a facet
+    once for each of its groups, as version 2 does.
     """
     check_declared(gmsh, declared)
     groups = _group_names(gmsh)
-    tags, x, _ = gmsh.model.mesh.getNodes()
-    order = np.argsort(tags, kind="stable")
-    tags, points = tags[order].astype(np.int64), x.reshape(-1, 3)[order]
+    tags, points = _nodes(gmsh)
     kind, blocks = _solids(gmsh)
     region = _regions(gmsh, blocks, groups, strict=strict)
     cells = np.vstack([nodes for _, nodes in blocks.values()])
@@ -83,6 +80,13 @@ def collect(gmsh: Any, declared: Path, *, strict: bool, repeated: bool) -> Read:
         region_names={tag: name for (dim, tag), name in groups.items() if dim == 3} or {1: "body"},
         warnings=_remarks(groups) if strict else [],
     )
+
+
+def _nodes(gmsh: Any) -> tuple[Index, Array]:
+    """Tags, ascending, and (n, 3) points of all nodes."""
+    tags, x, _ = gmsh.model.mesh.getNodes()
+    order = np.argsort(tags, kind="stable")
+    return tags[order].astype(np.int64), x.reshape(-1, 3)[order]
 
 
 def _group_names(gmsh: Any) -> Groups:
@@ -244,3 +248,70 @@ def _rows(tags: Index, nodes: Index, what: str) -> Index:
         missing = np.setdiff1d(nodes, tags)[:3].tolist()
         raise FileFormatError(f"{what} names the nodes {missing}, which the file does not define.")
     return place
+
+
+def triangles(gmsh: Any) -> Read:
+    """Arrays and notes as `collect` returns them, of triangles in z = 0, facets being curves."""
+    tags, points = _nodes(gmsh)
+    cells, ids = _triangles(gmsh, tags)
+    surfaces = _plane_surfaces(gmsh, ids)
+    used, cells = np.unique(cells, return_inverse=True)
+    points, cells = points[used], cells.reshape(-1, 3)
+    extent = np.ptp(points, axis=0)
+    if np.abs(points[:, 2]).max() > FLAT_RTOL * extent.max():
+        raise MeshError(f"the mesh leaves the plane z = 0 by {np.abs(points[:, 2]).max():.3g} m.",
+                        hint="Draw a plane section in x and y.")  # fmt: skip
+    place = np.full(tags.size, -1)
+    place[used] = np.arange(used.size)
+    curves = {
+        gmsh.model.getPhysicalName(dim, tag) or f"curve_{tag}": _lines(gmsh, tag, tags, place)
+        for dim, tag in gmsh.model.getPhysicalGroups(1)
+    }
+    arrays, notes = packed(
+        points, cells, "tri3", np.ones(len(cells), dtype=int), ids, facets=curves,
+        region_names={1: "body"}, surface_names=list(surfaces), warnings=[],
+    )  # fmt: skip
+    return arrays | {f"surface {i}": rows for i, rows in enumerate(surfaces.values())}, notes
+
+
+def _triangles(gmsh: Any, tags: Index) -> tuple[Index, Index]:
+    """Corners as positions among the tags, and numbers, of all triangles."""
+    kinds, ids, nodes = gmsh.model.mesh.getElements(2)
+    others = [gmsh.model.mesh.getElementProperties(kind)[0] for kind in kinds if kind != TRIANGLE]
+    if others:
+        raise MeshError(f"cells of the type {others[0]}: triangles with three nodes are needed.",
+                        hint="Leave out Recombine, and keep Mesh.ElementOrder = 1.")  # fmt: skip
+    if not len(kinds):
+        raise MeshError("there are no triangles: the geometry has no plane surface.",
+                        hint="Add Plane Surface(1) = {...};")  # fmt: skip
+    return np.searchsorted(tags, nodes[0].astype(np.int64)).reshape(-1, 3), ids[0].astype(np.int64)
+
+
+def _plane_surfaces(gmsh: Any, ids: Index) -> dict[str, Index]:
+    """Triangles of each plane surface: those of physical ones if there are any, or of all."""
+    named: dict[str, int] = {}
+    for dim, tag in gmsh.model.getPhysicalGroups(2):
+        parts = [int(part) for part in gmsh.model.getEntitiesForPhysicalGroup(dim, tag)]
+        name = gmsh.model.getPhysicalName(dim, tag) or f"surface_{tag}"
+        single = len(parts) == 1
+        named |= {name if single else f"{name} {k}": part for k, part in enumerate(parts, 1)}
+    named = named or {f"surface {tag}": tag for _, tag in gmsh.model.getEntities(2)}
+    order = np.argsort(ids, kind="stable")
+    return {name: order[np.searchsorted(ids[order], _triangle_ids(gmsh, tag))]
+            for name, tag in named.items()}  # fmt: skip
+
+
+def _triangle_ids(gmsh: Any, surface: int) -> Index:
+    found = gmsh.model.mesh.getElements(2, surface)[1]
+    return np.concatenate([np.zeros(0, dtype=np.int64), *(x.astype(np.int64) for x in found)])
+
+
+def _lines(gmsh: Any, tag: int, tags: Index, place: Array) -> Index:
+    """(k, 2) nodes of the sides of a physical curve."""
+    found = [np.zeros((0, 2), dtype=np.int64)]
+    for curve in gmsh.model.getEntitiesForPhysicalGroup(1, tag):
+        kinds, _, nodes = gmsh.model.mesh.getElements(1, curve)
+        for kind, rows in zip(kinds, nodes, strict=True):
+            if kind == LINE:
+                found.append(place[np.searchsorted(tags, rows.astype(np.int64))].reshape(-1, 2))
+    return np.vstack(found)

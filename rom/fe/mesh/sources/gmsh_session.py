@@ -11,12 +11,9 @@ from rom.errors import ConfigError, FileFormatError, MeshError, RomError, Unsafe
 from rom.fe.mesh.picks import EVERY_FACE
 from rom.fe.mesh.solid import PROGRAMS, Made, Read
 from rom.fe.mesh.sources import builder, step
-from rom.fe.mesh.sources.cad_faces import axes, faces
-from rom.fe.mesh.sources.confinement import confine
-from rom.fe.mesh.sources.gmsh_groups import check_declared, collect, version
-from rom.fe.mesh.sources.gmsh_triangles import triangles
-from rom.fe.mesh.sources.picking import pick
-from rom.fe.mesh.sources.script import check_script
+from rom.fe.mesh.sources.cad_faces import axes, faces, pick
+from rom.fe.mesh.sources.gmsh_groups import check_declared, collect, triangles, version
+from rom.fe.mesh.sources.script import check_script, confine
 from rom.plausible import scaled_doubt
 
 HIGHEST_ORDER = 2  # of cells, see `rom.fe.mesh.sources.gmsh_groups.SOLIDS`
@@ -27,7 +24,7 @@ MSH_START = (b"$MeshFormat", b"$Comments")
 
 
 def run(request: dict[str, Any]) -> Read:
-    """Answer a request for ``.geo``, ``.py``, ``.step`` or ``.msh``; see `readers.read`."""
+    """Answer a request for ``.geo``, ``.py``, ``.step`` or ``.msh``, see `child.read`."""
     import gmsh
 
     path, reader = Path(request["path"]), request["reader"]
@@ -106,10 +103,7 @@ def _geo(gmsh: Any, path: Path, request: dict[str, Any]) -> Made:
     known = geo_parameters(gmsh)
     chosen = {_full_name(name, known, path): v for name, v in request["parameters"].items()}
     for name, value in chosen.items():
-        if isinstance(known[name], str):
-            gmsh.onelab.setString(name, [_text(name, value, path)])
-        else:
-            gmsh.onelab.setNumber(name, [_number(name, value, path)])
+        _set(gmsh, name, value, path, as_text=isinstance(known[name], str))
     if chosen:
         gmsh.clear()
         # the file was readable with its own values, so the new ones are at fault
@@ -140,16 +134,15 @@ def _full_name(name: str, known: dict[str, Any], path: Path) -> str:
     raise builder.no_parameter(path, [name], known, hint=cure)
 
 
-def _number(name: str, value: Any, path: Path) -> float:
-    if isinstance(value, bool | int | float) and value - value == 0:
-        return float(value)
-    raise ConfigError(f"parameter {name!r} of {path.name} must be a finite number, got {value!r}.")
-
-
-def _text(name: str, value: Any, path: Path) -> str:
-    if isinstance(value, str):
-        return value
-    raise ConfigError(f"parameter {name!r} of {path.name} must be a text, got {value!r}.")
+def _set(gmsh: Any, name: str, value: Any, path: Path, *, as_text: bool) -> None:
+    """Give a parameter a value of its kind."""
+    if as_text and isinstance(value, str):
+        gmsh.onelab.setString(name, [value])
+    elif not as_text and isinstance(value, bool | int | float) and value - value == 0:
+        gmsh.onelab.setNumber(name, [float(value)])
+    else:
+        kind = "text" if as_text else "finite number"
+        raise ConfigError(f"parameter {name!r} of {path.name} must be a {kind}, got {value!r}.")
 
 
 def _msh(gmsh: Any, path: Path, request: dict[str, Any]) -> Made:

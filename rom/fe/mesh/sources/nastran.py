@@ -41,7 +41,7 @@ LOAD_CARDS = set(
 
 
 def read(path: str) -> Read:
-    """Read bulk data; see `rom.fe.mesh.sources.readers.read`.
+    """Read bulk data; see `rom.fe.mesh.child.read`.
 
     Raises:
         FileFormatError: the file is damaged, solids have no property, or there are cards whose mass

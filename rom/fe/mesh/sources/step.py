@@ -14,7 +14,7 @@ from scipy.sparse.csgraph import connected_components
 
 from rom.errors import ConfigError, FileFormatError, MeshError, TagError
 from rom.fe.mesh.solid import Made, shown
-from rom.fe.mesh.sources.cad_faces import surfaces
+from rom.fe.mesh.sources.cad_faces import diagonal, group, surfaces
 from rom.names import named
 
 FACE_PATTERN = re.compile(r"#(\d+)\s*=\s*ADVANCED_FACE\s*\(\s*'((?:[^']|'')*)'", re.IGNORECASE)
@@ -29,16 +29,7 @@ MOST_CELLS = 3e7  # beyond what a machine with 100 GB can mesh
 
 
 def make(gmsh: Any, path: Path, request: dict[str, Any]) -> Made:
-    """Import the file and name its faces.
-
-    Returns:
-        The element size used, and its default.
-
-    Raises:
-        FileFormatError: the file is no STEP file.
-        MeshError: it contains no solid.
-        ConfigError: a parameter other than lc.
-    """
+    """Import the file and name its faces; the element size used, and its default."""
     unknown = sorted(set(request["parameters"]) - {"lc"})
     if unknown:
         raise ConfigError(f"a .step file has no parameter {named(unknown)}; there is ['lc'].")
@@ -121,15 +112,3 @@ def _name_faces(gmsh: Any, text: str) -> None:
     for name in sorted(set(named.values()) - {"NONE"}):
         tags = [s for f, s in zip(listed, surfaces, strict=True) if named.get(f) == name]
         group(gmsh, name, tags)
-
-
-def group(gmsh: Any, name: str, tags: list[int]) -> None:
-    """Give surfaces a name."""
-    number = gmsh.model.addPhysicalGroup(2, tags)
-    gmsh.model.setPhysicalName(2, number, name)
-
-
-def diagonal(gmsh: Any) -> float:
-    """Of the box around the geometry [m]."""
-    box = np.array(gmsh.model.getBoundingBox(-1, -1))
-    return float(np.linalg.norm(box[3:] - box[:3]))

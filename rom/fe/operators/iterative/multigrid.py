@@ -11,8 +11,7 @@ from petsc4py import PETSc
 import numpy as np
 
 from rom.fe.operators.factor import dense_rows
-from rom.fe.operators.iterative.gradients import ConjugateGradients
-from rom.fe.operators.iterative.recurrence import Recurrence
+from rom.fe.operators.iterative.gradients import ConjugateGradients, Recurrence
 from rom.model import Array
 
 SMOOTHING_DEGREE = 3  # of the polynomial, before and after the coarse correction; measured best
@@ -29,11 +28,9 @@ MULTIGRID_OPTIONS = {
 
 
 def multigrid(A: PETSc.Mat, near_null: Array) -> ConjugateGradients:
-    """Conjugate gradients preconditioned by smoothed aggregation.
+    """Conjugate gradients preconditioned by smoothed aggregation, of a positive definite matrix.
 
-    Args:
-        A: positive definite.
-        near_null: (n_local, 6) rigid motions on the rows of A: what coarse levels must represent.
+    Coarse levels must represent rigid motions (n_local, 6) on its rows, near_null.
 
     Source:
         Vanek, Mandel and Brezina, Computing 56 (1996) 179, levels as implemented in PETSc.
@@ -57,12 +54,7 @@ def multigrid(A: PETSc.Mat, near_null: Array) -> ConjugateGradients:
 
 
 class Level:
-    """One level above the coarsest: its matrix, the way down and up, and its smoother.
-
-    Args:
-        A: (n, n) matrix of this level.
-        P: (n, n of the next coarser level) interpolation.
-    """
+    """One level above the coarsest: its matrix A, the way down R and up P, and its smoother."""
 
     def __init__(self, A: PETSc.Mat, P: PETSc.Mat):
         self.A, self.P = A, P
@@ -74,9 +66,7 @@ class Level:
     def smoothed(self, R: Array, *, residual: bool) -> tuple[Array, Array]:
         """A polynomial of D^-1 A times D^-1 R, near A^-1 R for rough R, and what is left of R.
 
-        Args:
-            R: (n_local, k) right-hand sides; overwritten.
-            residual: whether what is left is wanted; else it is not up to date.
+        R (n_local, k) is overwritten; what is left is not up to date without ``residual``.
 
         Source:
             Lottes, Optimal polynomial smoothers for multigrid V-cycles, Numer. Linear Algebra
@@ -95,11 +85,7 @@ class Level:
 
 
 class Cycle:
-    """One V-cycle: call it with (n_local, k) right-hand sides.
-
-    Args:
-        pc: PETSc's preconditioner, set up; it holds the matrices.
-    """
+    """One V-cycle with the matrices of PETSc's preconditioner: call it with (n_local, k) loads."""
 
     def __init__(self, pc: PETSc.PC):
         self.pc, self.comm = pc, pc.comm.tompi4py()
