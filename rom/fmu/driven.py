@@ -136,7 +136,7 @@ class Driven:
         dt, begun = h / n, self._jumped(self.state)
         if begun.memory is not None and abs(begun.memory.h - dt) < TIME_RTOL * dt:
             dt = begun.memory.h  # callers subtract times; one step length needs one factorisation
-        how = {"dt": dt, "rho_inf": float(self.parameters[1]), "save_every": n}
+        how: dict[str, Any] = {"dt": dt, "rho_inf": float(self.parameters[1]), "save_every": n}
         motion = simulate(self.mechanism, t_end=begun.t + n * dt, state=begun, **how)
         if abs(motion.final.t - begun.t - h) > 2 * TIME_RTOL * h:
             raise SolverError(f"the mechanism ended its run: {motion.status}", solution=motion)
@@ -177,9 +177,9 @@ class Driven:
         self.inputs.values[:] = now
         a, lam = after.a - before.a, after.lam - before.lam
         arrays = state.memory.arrays | {"before": state.memory.arrays["before"] + a}
-        memory, algorithmic = replace(state.memory, arrays=arrays), state.algorithmic + a
-        return replace(state, a=state.a + a, lam=state.lam + lam, algorithmic=algorithmic,
-                       memory=memory)  # fmt: skip
+        jumped: dict[str, Any] = {"a": state.a + a, "lam": state.lam + lam}
+        jumped |= {"algorithmic": state.algorithmic + a}
+        return replace(state, memory=replace(state.memory, arrays=arrays), **jumped)
 
     def _outputs(self) -> Array:
         if self.state is None:

@@ -71,9 +71,9 @@ class Inputs:
 
     def __init__(self, mechanism: Mechanism, names: tuple[str, ...]):
         self.starts: list[tuple[Held, Callable[[float], tuple[float, float]]]] = []
-        families = mechanism.loads, mechanism.spread_loads, mechanism.motors, mechanism.drives
-        ways = zip(families, (_load, _spread, _motor, _drive), strict=True)
-        kinds = {name: kind for family, kind in ways for name in family}
+        kinds = dict.fromkeys(mechanism.loads, _load)
+        kinds |= dict.fromkeys(mechanism.spread_loads, _spread)
+        kinds |= dict.fromkeys(mechanism.motors, _motor) | dict.fromkeys(mechanism.drives, _drive)
         check_once(names, "the input")
         for name in names:
             check_known(name, kinds, f"no input {name!r}; the loads, motors and drives are")

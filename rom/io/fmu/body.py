@@ -107,5 +107,5 @@ def _variables(body: FlexibleBody) -> list[Variable]:
     wanted = [(structured(name, what), "input", unit) for name in names for what, unit in INPUTS]
     wanted.append(("gravity", "input", "m/s2"))
     wanted += [(structured(name, what), "output", unit) for name in names for what, unit in OUTPUTS]
-    starts = {"input": [0.0] * 3, "output": [None] * 3}
+    starts: dict[str, list[float | None]] = {"input": [0.0] * 3, "output": [None] * 3}
     return [v for name, kind, unit in wanted for v in components(name, kind, unit, starts[kind])]
