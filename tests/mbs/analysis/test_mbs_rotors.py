@@ -8,6 +8,7 @@ from numpy.polynomial import Polynomial
 from numpy.testing import assert_allclose
 
 import rom
+from cases.refusals import refused
 from rom import rotation
 from rom.errors import ConfigError, RomWarning
 from rom.mbs.analysis.local_equations import instant
@@ -109,10 +110,8 @@ def test_flapping_blades_whirl_at_their_own_frequency_more_and_less_than_the_spe
     nu = np.sqrt((BLADE_INERTIA - THIN + BLADE_MASS * ARM**2 + HUB_RADIUS * S) / I)
     sway = np.sqrt(SUPPORT / (NACELLE_MASS + HUB_MASS + n * BLADE_MASS))
     rates = {"alike": nu, "backward": nu - 1, "forward": nu + 1}
-    near = {
-        name: np.isclose(found.eigenvalues, 1j * rate * speeds[:, None], rtol=1e-7)
-        for name, rate in rates.items()
-    }
+    turn = 1j * speeds[:, None]
+    near = {k: np.isclose(found.eigenvalues, r * turn, rtol=1e-7) for k, r in rates.items()}
     for k, name in enumerate(rates):
         assert near[name].all(axis=0).sum() == (2 if n == 4 and name == "alike" else 1)
         if n == 3 or name != "alike":  # of four, two motions share the frequency
@@ -162,9 +161,8 @@ def test_what_turns_as_a_whole_may_be_told_either_way():
     mech = leaning(7.0)
     for name in ("support", "push"):
         del mech.elements[name]
-    mech.fixed(
-        "support", mech.ground.marker((0.2, 0.1, 0)), mech.parts["nacelle"].marker((0, 0, 0))
-    )
+    foot = mech.parts["nacelle"].marker((0, 0, 0))
+    mech.fixed("support", mech.ground.marker((0.2, 0.1, 0)), foot)
     whole = rom.equilibrium(mech, spin=(0, 0, 7.0), about=(0.2, 0.1, 0))
     behind = rom.equilibrium(mech, spin={"bearing": 7.0})
     assert_allclose(behind.q, whole.q, atol=1e-12)
@@ -180,35 +178,27 @@ def adrift():
     return mech
 
 
-@pytest.mark.parametrize(
-    ("build", "spin", "message"),
-    [
-        (lambda: leaning(1.0), {"bearings": 1.0}, "no joint 'bearings'"),
-        (lambda: leaning(1.0), {"bearing": 1.0, "hinge 0": 1.0}, "held elsewhere, too: .'hub'"),
-        (adrift, {"bearing": 1.0}, "only forces hold body 'disc'"),
-    ],
-)
-def test_spins_that_make_no_sense_are_refused(build, spin, message):
-    with pytest.raises(ConfigError, match=message):
-        rom.equilibrium(build(), spin=spin)
+def counted(named):
+    return lambda: rom.linearize(*turning(4, 5.0, hinge="lag"), blades=named)
 
 
-@pytest.mark.parametrize(
-    ("named", "message"),
-    [
-        (blades(2), "3 or more"),
-        ("blade", "3 or more"),
-        (["blade 0", "blade 1", "blade 9"], "no body 'blade 9'"),
-        (["blade 0", "blade 1", "blade 1"], "listed once"),
-        (["blade 0", "blade 1", "hub"], "alike"),
-        ([["blade 0", "hub"], ["blade 1"], ["blade 2"]], "alike"),
-        ([f"blade {k}" for k in (0, 2, 1, 3)], "does not stand"),  # across instead of around
-    ],
+def spun(mech, spin):
+    return lambda: rom.equilibrium(mech(), spin=spin)
+
+
+test_spins_and_blades_that_are_none_are_refused = refused(
+    (spun(lambda: leaning(1.0), {"bearings": 1.0}), "no joint 'bearings'"),
+    (spun(lambda: leaning(1.0), {"bearing": 1.0, "hinge 0": 1.0}), "held elsewhere, too: .'hub'"),
+    (spun(adrift, {"bearing": 1.0}), "only forces hold body 'disc'"),
+    (counted(blades(2)), "3 or more"),
+    (counted("blade"), "3 or more"),
+    (counted(["blade 0", "blade 1", "blade 9"]), "no body 'blade 9'"),
+    (counted(["blade 0", "blade 1", "blade 1"]), "listed once"),
+    (counted(["blade 0", "blade 1", "hub"]), "alike"),
+    (counted([["blade 0", "hub"], ["blade 1"], ["blade 2"]]), "alike"),
+    (counted([f"blade {k}" for k in (0, 2, 1, 3)]), "does not stand"),  # across, not around
+    error=ConfigError,
 )
-def test_blades_that_are_none_are_refused(named, message):
-    mech, state = turning(4, 5.0, hinge="lag")
-    with pytest.raises(ConfigError, match=message):
-        rom.linearize(mech, state, blades=named)
 
 
 def test_the_order_of_blades_may_be_either_sense():
@@ -230,10 +220,8 @@ def test_steady_velocities_change_as_small_motions_say():
     T, T1, T3 = spins.motions(now, state)
     for _ in range(4):
         p = 1e-6 * rng.normal(size=state.v.size)
-        sides = [
-            spins.steady(now, replace(state, q=now.shifted(state.q, sign * (T @ p))))
-            for sign in (-1, 1)
-        ]
+        moved = (replace(state, q=now.shifted(state.q, sign * (T @ p))) for sign in (-1, 1))
+        sides = [spins.steady(now, there) for there in moved]
         for change, of in ((T1 @ p, "v"), (T3 @ p, "a")):
             seen = (getattr(sides[1], of) - getattr(sides[0], of)) / 2
             assert_allclose(change, seen, atol=1e-8 * np.abs(seen).max())
