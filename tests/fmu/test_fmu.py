@@ -15,6 +15,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 import rom
 from cases.mbs.fmu_instance import Instance, fmpy
 from cases.mbs.mechanisms import random_body, simulate_quietly
+from cases.mbs.parts import ORIGIN, on_guide
 from cases.mbs.trusses import truss
 from cases.paths import ROOT
 from rom.errors import ConfigError, ResourceError, RomWarning
@@ -58,17 +59,17 @@ def python_with_rom(monkeypatch):
     monkeypatch.delenv("ROM_PYTHON", raising=False)
 
 
+def written(folder, script, name="m", **options):
+    (folder / "m.py").write_text(script)
+    return rom.write_fmu(folder / "m.py", folder / f"{name}.fmu", **{"dt": 1e-3, **options})
+
+
 @pytest.fixture(scope="module")
 def crank(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("crank")
-    script = folder / "crank.py"
-    script.write_text(CRANK)
+    folder, asked = tmp_path_factory.mktemp("crank"), {"outputs": ["slider.b", "main"]}
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("PYTHONPATH", str(ROOT / "tests"))
-        return rom.write_fmu(
-            script, folder / "slider crank.fmu", inputs=["gas"], outputs=["slider.b", "main"],
-            dt=1e-3,
-        )  # fmt: skip
+        return written(folder, CRANK, "slider crank", inputs=["gas"], **asked)
 
 
 def built(text, file=""):
@@ -164,14 +165,11 @@ def test_a_jump_of_an_input_costs_no_order():
 
 def flywheel():
     """A wheel of 0.2 kg m^2 on an axle, a sledge of 2 kg on rails."""
-    mech = Mechanism(gravity=(0.0, 0.0, 0.0))
-    o, z = mech.ground.marker((0, 0, 0)), (0, 0, 1)
-    wheel = mech.add_rigid("wheel", mass=1.0, inertia=(0.1, 0.1, 0.2), at=(0, 0, 0),
-                           markers={"hub": (0, 0, 0), "rim": (0.5, 0, 0)})  # fmt: skip
-    sledge = mech.add_rigid("sledge", mass=2.0, inertia=(1, 1, 1), at=(0, 0, 0),
-                            markers={"c": (0, 0, 0)})  # fmt: skip
-    mech.revolute("axle", o, wheel.marker("hub"), axis=z)
-    mech.prismatic("rails", o, sledge.marker("c"), axis=(1, 0, 0))
+    mech, marks = Mechanism(gravity=ORIGIN), {"hub": ORIGIN, "rim": (0.5, 0, 0)}
+    solid = {"mass": 1.0, "inertia": (0.1, 0.1, 0.2), "markers": marks}
+    wheel = mech.add_rigid("wheel", at=ORIGIN, **solid)
+    mech.revolute("axle", mech.ground.marker(ORIGIN), wheel.marker("hub"), axis=(0, 0, 1))
+    on_guide(mech, "sledge", mass=2.0, guide="rails")
     return mech
 
 
@@ -206,7 +204,7 @@ def test_motors_torques_and_forces_follow_their_inputs():
     mech = flywheel()
     mech.motor("engine", "axle", lambda t, x, xd: -1e3 * x)
     mech.torque("brake", mech.parts["wheel"].marker("hub"), lambda t: (0.0, 0.0, 7.0))
-    mech.force("pull", mech.parts["sledge"].marker("c"), (3.0, 0.0, 0.0), frame="body")
+    mech.force("pull", mech.parts["sledge"].marker(ORIGIN), (3.0, 0.0, 0.0), frame="body")
     driven = Driven(mech, inputs=("engine", "brake", "pull"), outputs=("axle", "rails"), dt=1e-2)
     assert_allclose(driven.get(np.arange(2, 9)), [0, 0, 0, 7, 3, 0, 0])
     driven.start(0.0)
@@ -239,14 +237,11 @@ def test_a_spread_load_follows_its_amplitude():
 @pytest.fixture(scope="module")
 def hanging(tmp_path_factory):
     """A flexible body in a file of its own."""
-    folder = tmp_path_factory.mktemp("hanging")
+    folder, asked = tmp_path_factory.mktemp("hanging"), {"inputs": ["pull"], "outputs": ["one.b"]}
     body = rom.save(random_body(np.random.default_rng(3)), folder / "one.rom.npz")
-    script = folder / "hanging.py"
-    script.write_text(FLEXIBLE)
     with pytest.MonkeyPatch.context() as patch:
         patch.delenv("PYTHONPATH", raising=False)
-        return rom.write_fmu(script, folder / "hanging.fmu", inputs=["pull"], outputs=["one.b"],
-                             dt=1e-2, files=[body])  # fmt: skip
+        return written(folder, FLEXIBLE, "hanging", dt=1e-2, files=[body], **asked)
 
 
 FAR = """
@@ -267,15 +262,12 @@ def mechanism():
 def test_a_body_of_large_deflection_on_a_fitted_marker_moves_in_it_as_here(tmp_path):
     """With its energy and the surface to which its marker is fitted, from its file."""
     body = rom.save(truss(), tmp_path / "truss.rom.npz")
-    script = tmp_path / "far.py"
-    script.write_text(FAR)
-    file = rom.write_fmu(
-        script, tmp_path / "far.fmu", inputs=["pull"], outputs=["truss.n3"], dt=1e-2, files=[body]
-    )
+    asked = {"inputs": ["pull"], "outputs": ["truss.n3"]}
+    file = written(tmp_path, FAR, dt=1e-2, files=[body], **asked)
     names = [f"truss.n3.position[{k}]" for k in (1, 2, 3)]
     one = Instance(file, tmp_path).begin(rho_inf=0.9)
     one.fmu.doStep(0.0, 0.3)
-    there = rom.simulate(built(FAR, script), t_end=0.3, dt=1e-2, rho_inf=0.9)
+    there = rom.simulate(built(FAR, tmp_path / "m.py"), t_end=0.3, dt=1e-2, rho_inf=0.9)
     moved = there.position("truss", "n3")
     assert np.linalg.norm(moved[-1] - moved[0]) > 0.04
     assert_allclose(one.get(*names), moved[-1], rtol=SAME_CODE, atol=SAME_CODE)
@@ -373,6 +365,14 @@ def test_the_end_of_its_process_is_an_error_and_no_crash(hanging, tmp_path):
     other.fmu.freeInstance()
 
 
+def why_not(*given, **more):
+    """What an FMU that cannot start says."""
+    log = []
+    with pytest.raises(Exception, match="instantiate"):
+        Instance(*given, log=log, **more)
+    return log[0]
+
+
 @pytest.mark.parametrize(
     ("python", "guid", "message"),
     [
@@ -383,10 +383,7 @@ def test_the_end_of_its_process_is_an_error_and_no_crash(hanging, tmp_path):
 )
 def test_an_fmu_that_cannot_start_says_why(hanging, tmp_path, monkeypatch, python, guid, message):
     monkeypatch.setenv("ROM_PYTHON", python)
-    log = []
-    with pytest.raises(Exception, match="instantiate"):
-        Instance(hanging, tmp_path, guid=guid, log=log)
-    assert message in log[0]
+    assert message in why_not(hanging, tmp_path, guid=guid)
 
 
 def test_where_its_writer_is_gone_the_usual_python_runs_it(hanging, tmp_path, monkeypatch):
@@ -398,29 +395,19 @@ def test_where_its_writer_is_gone_the_usual_python_runs_it(hanging, tmp_path, mo
     (tmp_path / "python3").chmod(0o755)
     monkeypatch.setenv("PATH", f"{tmp_path}:{os.environ['PATH']}")
     monkeypatch.setattr(fmpy, "extract", lambda *a: folder)
-    log = []
-    with pytest.raises(Exception, match="instantiate"):
-        Instance(hanging, tmp_path, log=log)
-    assert "python3 ended at once" in log[0]
+    assert "python3 ended at once" in why_not(hanging, tmp_path)
 
 
 @pytest.mark.long
 @pytest.mark.once
-def test_a_mechanism_that_cannot_start_says_why(tmp_path):
+def test_a_mechanism_that_cannot_start_says_why(tmp_path, monkeypatch):
     """Here its file is gone from the resources."""
     path = written(tmp_path, CRANK, outputs=["slider.b"])
     folder = fmpy.extract(str(path), str(tmp_path / "a folder"))
     (Path(folder) / "resources" / "model" / "m.py").unlink()
-    log = []
-    with pytest.MonkeyPatch.context() as patch, pytest.raises(Exception, match="instantiate"):
-        patch.setattr(fmpy, "extract", lambda *a: folder)
-        Instance(path, tmp_path, log=log)
-    assert "FileNotFoundError" in log[0] and "m.py" in log[0]
-
-
-def written(tmp_path, script, **options):
-    (tmp_path / "m.py").write_text(script)
-    return rom.write_fmu(tmp_path / "m.py", tmp_path / "m.fmu", **{"dt": 1e-3, **options})
+    monkeypatch.setattr(fmpy, "extract", lambda *a: folder)
+    why = why_not(path, tmp_path)
+    assert "FileNotFoundError" in why and "m.py" in why
 
 
 @pytest.mark.once

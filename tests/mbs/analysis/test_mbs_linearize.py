@@ -55,14 +55,13 @@ def test_a_ladder_slides_down_its_walls(rate):
     length, m, angle = 1.2, 3.0, 0.9
     foot, top = length * np.array([np.cos(angle), 0, 0]), length * np.array([0, 0, np.sin(angle)])
     mech = Mechanism(gravity=(0, 0, -g))
-    marks = {"foot": (foot - top) / 2, "top": (top - foot) / 2}
-    rod = mech.add_rigid("rod", mass=m, inertia=(0.2, m * length**2 / 12, 0.2),
-                         at=(foot + top) / 2, markers=marks, omega=(0, rate, 0),
-                         velocity=rate / 2 * np.array([-top[2], 0, foot[0]]))  # fmt: skip
-    corner = mech.ground.marker((0, 0, 0))
-    mech.planar("room", corner, rod.marker("foot"), normal=Y)
-    mech.point_on_plane("floor", corner, rod.marker("foot"), normal=Z)
-    mech.point_on_plane("wall", corner, rod.marker("top"), normal=X)
+    motion = {"omega": rate * Y, "velocity": rate / 2 * np.array([-top[2], 0, foot[0]])}
+    solid = {"mass": m, "inertia": (0.2, m * length**2 / 12, 0.2)}
+    rod = mech.add_rigid("rod", **solid, at=(foot + top) / 2, **motion)
+    corner, low = mech.ground.marker(ORIGIN), rod.marker((foot - top) / 2)
+    mech.planar("room", corner, low, normal=Y)
+    mech.point_on_plane("floor", corner, low, normal=Z)
+    mech.point_on_plane("wall", corner, rod.marker((top - foot) / 2), normal=X)
     found = rom.linearize(mech)
     assert_allclose(found.K, [[-1.5 * g / length * np.sin(angle)]], rtol=1e-6)
     assert_allclose(found.C, 0.0, atol=2e-5)
@@ -81,19 +80,19 @@ def test_eigenvalues_of_matrices_without_symmetry():
 def test_double_pendulum():
     """omega^2 = (g / L)(2 -+ sqrt 2) for equal masses and lengths; shapes 1 : +-sqrt 2."""
     length, mech = 0.5, Mechanism(gravity=(0, 0, -g))
-    marks = {"up": (0, 0, length), "low": (0, 0, 0)}
-    one = mech.add_rigid("one", mass=1.5, inertia=TINY, at=(0, 0, -length), markers=marks)
-    two = mech.add_rigid("two", mass=1.5, inertia=TINY, at=(0, 0, -2 * length), markers=marks)
-    mech.revolute("upper", mech.ground.marker((0, 0, 0)), one.marker("up"), axis=Y)
-    mech.revolute("lower", one.marker("low"), two.marker("up"), axis=Y)
+    last = mech.ground.marker(ORIGIN)
+    for k in (1, 2):
+        bob = mech.add_rigid(f"bob {k}", mass=1.5, inertia=TINY, at=-k * length * Z)
+        mech.revolute(f"hinge {k}", last, bob.marker(length * Z), axis=Y)
+        last = bob.marker(ORIGIN)
     found = linearize(mech)
     squares = g / length * np.array([2 - np.sqrt(2), 2 + np.sqrt(2)])
     assert_allclose((2 * np.pi * found.frequencies) ** 2, squares, rtol=1e-8)
     ratio = found.shapes[10] / found.shapes[4]
     assert_allclose(ratio, [np.sqrt(2), -np.sqrt(2)], rtol=1e-8)
     assert found.shapes[6, 0] > 0 and found.shapes[10, 1] > 0  # the largest part is positive
-    assert_allclose(found.shapes.T @ np.diag([1.5] * 3 + [1e-12] * 3 + [1.5] * 3 + [1e-12] * 3)
-                    @ found.shapes, np.eye(2), atol=1e-8)  # fmt: skip
+    mass = np.diag(([1.5] * 3 + [1e-12] * 3) * 2)
+    assert_allclose(found.shapes.T @ mass @ found.shapes, np.eye(2), atol=1e-8)
 
 
 def chain(n=3, *, mass=2.0, stiffness=50.0, damping=0.0, held=True):
@@ -113,10 +112,9 @@ def test_chains_held_and_free():
     k = np.arange(3)
     held = 2 * np.sqrt(25.0) * np.sin((2 * k + 1) * np.pi / 14)
     assert_allclose(2 * np.pi * linearize(chain()).frequencies, held, rtol=1e-8)
-    free = linearize(chain(held=False))
+    free, rates = linearize(chain(held=False)), 2 * np.sqrt(25.0) * np.sin(k * np.pi / 6)
     assert free.frequencies[0] == 0.0 and free.damping_ratios[0] == 0.0
-    assert_allclose(2 * np.pi * free.frequencies, 2 * np.sqrt(25.0) * np.sin(k * np.pi / 6),
-                    rtol=1e-8)  # fmt: skip
+    assert_allclose(2 * np.pi * free.frequencies, rates, rtol=1e-8)
 
 
 @pytest.mark.parametrize("c", [3.0, 40.0])
@@ -161,12 +159,11 @@ def turning_beam(eta, axis, hub=0.0):
     mech = Mechanism(gravity=(0, 0, 0))
     turn = eta * np.array(axis, dtype=float)
     at = np.array([hub, 0, 0])
-    beam = mech.add_flexible("beam", stiffened_beam(), at=at, velocity=np.cross(turn, at),
-                             omega=turn)  # fmt: skip
-    disc = mech.add_rigid("hub", mass=1.0, inertia=(1, 1, 1), at=(0, 0, 0), omega=turn,
-                          markers={"rim": at, "axle": (0, 0, 0)})  # fmt: skip
-    mech.fixed("clamp", disc.marker("rim"), beam.marker("root"))
-    mech.revolute("axle", mech.ground.marker((0, 0, 0)), disc.marker("axle"), axis=axis)
+    motion = {"velocity": np.cross(turn, at), "omega": turn}
+    beam = mech.add_flexible("beam", stiffened_beam(), at=at, **motion)
+    disc = mech.add_rigid("hub", mass=1.0, inertia=(1, 1, 1), at=ORIGIN, omega=turn)
+    mech.fixed("clamp", disc.marker(at), beam.marker("root"))
+    mech.revolute("axle", mech.ground.marker(ORIGIN), disc.marker(ORIGIN), axis=axis)
     mech.drive("motor", "axle", lambda t: eta * t, rate=lambda t: eta, acceleration=lambda t: 0)
     return mech
 
@@ -339,9 +336,9 @@ def test_a_sleeping_top_stands_if_it_spins_fast_enough(speed):
     """A w^2 - C W w + m g l = 0: two precessions, or growth below W = sqrt(4 A m g l) / C."""
     m, length, A, C = 2.0, 0.3, 0.05 + 2.0 * 0.09, 0.04
     mech = Mechanism(gravity=(0, 0, -g))
-    top = mech.add_rigid("top", mass=m, inertia=(0.05, 0.05, C), at=(0, 0, length),
-                         omega=(0, 0, speed), markers={"foot": (0, 0, -length)})  # fmt: skip
-    mech.spherical("foot", mech.ground.marker((0, 0, 0)), top.marker("foot"))
+    solid = {"mass": m, "inertia": (0.05, 0.05, C)}
+    top = mech.add_rigid("top", **solid, at=length * Z, omega=speed * Z)
+    mech.spherical("foot", mech.ground.marker(ORIGIN), top.marker(-length * Z))
     found = rom.linearize(mech, frame="world")
     roots = np.roots([A, -C * speed, m * g * length])
     assert found.stable == (speed > 100)
