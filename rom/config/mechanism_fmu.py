@@ -11,7 +11,7 @@ from rom.config.mechanism import MechanismFile
 from rom.config.python_files import python_entries
 from rom.errors import ConfigError
 from rom.fmu.export import write_fmu
-from rom.fmu.outputs import output_names
+from rom.fmu.variables import output_names
 from rom.io.files import check_readable
 from rom.io.native import save
 from rom.mbs.mechanism import Mechanism

@@ -6,8 +6,7 @@ Numba, so that the FMU of a mechanism needs Python and rom where it runs, as the
 Java programs need those. Its library does not load Python into the program that runs it, where two
 Pythons, two BLAS or a crash would meet: it starts a Python process of its own for each instance
 and talks with it over a socket. Errors in that process come back as fmi2Error with their message.
-`export` writes the archive, `server` is that process: a `driven` mechanism, its `inputs` and
-`outputs`.
+`export` writes the archive, `driven` is that process, `variables` are inputs and outputs.
 
 The archive holds the Python file that builds the mechanism and the files it reads, the library,
 compiled at export by gcc for POSIX systems, and the C source of the library. The interpreter is the

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from rom.errors import RomError, RomWarning
-from rom.fmu.server import driven, serve
+from rom.fmu.driven import driven, serve
 
 
 def main(resources: Path, *description: str) -> int:

@@ -7,11 +7,10 @@ from typing import Any
 
 from rom.arguments import between, positive, typed
 from rom.errors import ConfigError, warn
-from rom.fmu.server import SETTINGS_FILE
+from rom.fmu.driven import SETTINGS_FILE
 from rom.io.files import check_writable
 from rom.io.fmu.archive import write_archive
-from rom.io.fmu.description import Content
-from rom.io.fmu.variables import Variable
+from rom.io.fmu.description import Content, Variable
 from rom.names import check_ending
 from rom.process.child import Limits, python, run, scratch
 

@@ -23,6 +23,7 @@ from rom.mbs.analysis.inverse_dynamics import inverse_dynamics as inverse_dynami
 from rom.mbs.analysis.law_check import check_law as check_law
 from rom.mbs.analysis.linearize import Linearization as Linearization
 from rom.mbs.analysis.linearize import linearize as linearize
+from rom.mbs.analysis.local_equations import snapshot as snapshot
 from rom.mbs.analysis.response import FrequencyResponse as FrequencyResponse
 from rom.mbs.analysis.response import frequency_response as frequency_response
 from rom.mbs.analysis.response import transmissibility as transmissibility
@@ -30,7 +31,6 @@ from rom.mbs.analysis.sensitivity import Sensitivity as Sensitivity
 from rom.mbs.analysis.sensitivity import equilibrium_sensitivity as equilibrium_sensitivity
 from rom.mbs.analysis.sensitivity import frequency_sensitivity as frequency_sensitivity
 from rom.mbs.analysis.sensitivity import motion_sensitivity as motion_sensitivity
-from rom.mbs.analysis.snapshot import snapshot as snapshot
 from rom.mbs.analysis.steady_motion import SteadyMotion as SteadyMotion
 from rom.mbs.analysis.steady_motion import steady_motion as steady_motion
 from rom.mbs.elements.contact.impact import Impact as Impact

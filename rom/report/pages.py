@@ -52,16 +52,10 @@ def describe(
 ) -> tuple[str, Sections]:
     """Title and sections of a report, for `rom.report.html.write_report`.
 
-    Args:
-        source: a body file, a component or mechanism file, or the folder of a run.
-        command: what was typed, for the record.
-        version: of rom, for the record.
-        move: move the mechanism of a file, and show its motion.
-        progress: report on the motion on stderr.
-        meshing: ``trust``, ``time_limit``, ``memory_limit`` of `rom.read_component`.
-
-    Raises:
-        RomError: if the source is none of these; what cannot be drawn is said in the report.
+    The source is a body file, a component or mechanism file, or the folder of a run; what is drawn
+    of it but cannot be is said in the report. Command and version are for the record. The mechanism
+    of a file is moved if asked for, with progress on stderr. ``meshing`` holds ``trust``,
+    ``time_limit`` and ``memory_limit`` of `rom.read_component`.
     """
     made = {"rom": version} | versions()
     described = source.suffix.lower() == ".toml" and not source.is_dir()
@@ -89,10 +83,8 @@ def describe(
 
 def how(command: str, made: dict[str, str]) -> list[str]:
     """Command and versions."""
-    return [
-        html.source(command),
-        html.table(("", "version"), list(made.items()), "What the numbers were made with."),
-    ]
+    versions = html.table(("", "version"), list(made.items()), "What the numbers were made with.")
+    return [html.source(command), versions]
 
 
 def of_body(body: "FlexibleBody", made: list[str]) -> tuple[str, Sections]:
@@ -145,11 +137,8 @@ def _mass_table(body: "FlexibleBody") -> str:
 
 
 def _frequency_blocks(body: "FlexibleBody") -> list[str]:
-    comparison = {
-        support: found
-        for support, found in body.provenance.get("comparison", {}).items()
-        if found.get("full")
-    }
+    every = body.provenance.get("comparison", {})
+    comparison = {support: found for support, found in every.items() if found.get("full")}
     if not comparison:
         free = body.frequencies(N_FREQUENCIES + 6)[6:]
         rows = [(k + 1, float(f)) for k, f in enumerate(free)]
@@ -180,17 +169,10 @@ def _interface_table(body: "FlexibleBody") -> str:
 
 def _mode_figure(body: "FlexibleBody", size: int = SHAPE_BYTES) -> list[str]:
     """Modes that swing and turn; and the picture of some of them, for those who see no such."""
+    from rom.view.scenes.mode_shapes import mode_shapes
 
-    def draw(path: Path) -> None:
-        from rom.view.scenes.mode_shapes import mode_shapes
-
-        mode_shapes(body, path)
-
-    return turning(
-        lambda: modes_scene(body, size=size),
-        drawn(draw, "Its lowest elastic modes."),
-        modes_words(body.name),
-    )
+    still = drawn(lambda path: mode_shapes(body, path), "Its lowest elastic modes.")
+    return turning(lambda: modes_scene(body, size=size), still, modes_words(body.name))
 
 
 def turning(make: Callable[[], dict[str, Any]], still: list[str], caption: str) -> list[str]:
@@ -202,18 +184,16 @@ def turning(make: Callable[[], dict[str, Any]], still: list[str], caption: str) 
 
 
 def _provenance(body: "FlexibleBody") -> list[str]:
-    known = {key: body.provenance[key] for key in SHOWN_KEYS if key in body.provenance}
-    known |= {
-        f"{name}, when the body was made": version
-        for name, version in dict(body.provenance.get("versions", {})).items()
-    }
-    if "seconds to reduce" in body.provenance:
-        known["seconds to reduce"] = body.provenance["seconds to reduce"]
+    said = body.provenance
+    known = {key: said[key] for key in SHOWN_KEYS if key in said}
+    versions = dict(said.get("versions", {})).items()
+    known |= {f"{name}, when the body was made": version for name, version in versions}
+    known |= {key: said[key] for key in ("seconds to reduce",) if key in said}
     if not known:
         return [html.paragraph("The body file does not say what it was made from.")]
     rows = [(key, _plain(value)) for key, value in known.items()]
     origin = html.table(("", "made from"), rows, "What the body file says of its origin.")
-    return [origin, *_stages(body.provenance.get("stages", {}))]
+    return [origin, *_stages(said.get("stages", {}))]
 
 
 def _stages(stages: dict[str, dict[str, float]]) -> list[str]:
@@ -245,10 +225,8 @@ def _piece(stage: dict[str, float], name: str) -> str:
 def _plain(value: Any) -> str:
     """A value for a reader: 1,2 for lists, a: 1, b: 2 for tables."""
     if isinstance(value, dict):
-        return ", ".join(
-            f"{key} ({_plain(inner)})" if isinstance(inner, dict) else f"{key}: {_plain(inner)}"
-            for key, inner in value.items()
-        )
+        words = {True: "{} ({})", False: "{}: {}"}
+        return ", ".join(words[isinstance(x, dict)].format(k, _plain(x)) for k, x in value.items())
     if isinstance(value, list | tuple):
         return "+".join(map(_plain, value))
     return f"{value:.6g}" if isinstance(value, float) else str(value)
@@ -263,29 +241,21 @@ def of_mechanism(
         (name, "flexible" if part.r else "rigid", float(part.mass), part.r, ", ".join(part.names))
         for name, part in mechanism.parts.items()
     ]
-    header = ("body", "kind", "mass [kg]", "elastic coordinates", "markers")
+    header = (BODY_COLUMNS[0], "kind", *BODY_COLUMNS[1:])
     total = sum(part.mass for part in mechanism.parts.values())
     words = (
         f"{file.name} has {len(bodies)} bodies of together {total:.5g} kg and "
         f"{len(mechanism.joints)} joints; gravity is {file.values['gravity']} m/s^2."
     )
 
-    look = look_of(file)
+    from rom.view.scenes.film import start
 
-    def draw(path: Path) -> None:
-        from rom.view.scenes.mechanisms import start
-
-        start(mechanism, path, title=f"Mechanism {file.name}", **look)
-
+    look, title = look_of(file), f"Mechanism {file.name}"
+    placed = "As its bodies are placed."
+    still = drawn(lambda path: start(mechanism, path, title=title, **look), placed)
+    turns = turning(lambda: start_scene(mechanism, title=title, **look), still, START_WORDS)
     sections: Sections = {
-        "What it is": [
-            html.paragraph(words),
-            *turning(
-                lambda: start_scene(mechanism, title=f"Mechanism {file.name}", **look),
-                drawn(draw, "As its bodies are placed."),
-                START_WORDS,
-            ),
-        ],
+        "What it is": [html.paragraph(words), *turns],
         "Bodies": [html.table(header, bodies, "Bodies, and the names joints may use.")],
         "Joints and forces": [_connection_table(file)],
     }
@@ -298,30 +268,21 @@ def of_mechanism(
             *_frequency_blocks(body), _interface_table(body),
         ]  # fmt: skip
     written = file.document.path.read_text(encoding="utf-8")
-    return f"Mechanism {file.name}", sections | {
-        "How it was made": [*made, html.source(written)]
-    }  # fmt: skip
+    return title, sections | {"How it was made": [*made, html.source(written)]}
 
 
 def _motion(moved: Run, look: dict[str, Any]) -> list[str]:
     """The motion that was computed for the report, and whether it is to be believed."""
     solution, how = moved.solution, look | {"magnify": moved.file.values["output"]["magnify"]}
 
-    def draw(path: Path) -> None:
-        from rom.view.scenes.film import instants
-
-        instants(solution.mechanism, solution, path, **how)
+    from rom.view.scenes.film import instants
 
     title = f"Motion of {moved.file.name}"
-    return [
-        html.paragraph(solution.status),
-        *turning(
-            lambda: motion_scene(solution, title=title, **how),
-            drawn(draw, "Instants at which the bodies are farthest from each other."),
-            MOTION_WORDS,
-        ),
-        html.checks(moved.audit, "Is the computed motion believable?"),
-    ]
+    words = "Instants at which the bodies are farthest from each other."
+    still = drawn(lambda path: instants(solution.mechanism, solution, path, **how), words)
+    turns = turning(lambda: motion_scene(solution, title=title, **how), still, MOTION_WORDS)
+    checks = html.checks(moved.audit, "Is the computed motion believable?")
+    return [html.paragraph(solution.status), *turns, checks]
 
 
 def _connection_table(file: "MechanismFile") -> str:
@@ -330,8 +291,8 @@ def _connection_table(file: "MechanismFile") -> str:
     rows = []
     for section in sections():
         for name, values in file.values[section].items():
-            ends = values.get("between") or values.get("markers") or []
-            ends = [*ends, *(values[k] for k in ("marker",) if k in values)]
+            ends = list(values.get("between") or values.get("markers") or [])
+            ends += [values["marker"]] if "marker" in values else []
             where = [f"{body}.{m}" if isinstance(m, str) else f"{body} {m}" for body, m in ends]
             named = ("joint", "joint1", "joint2", "body")
             where += [values[key] for key in named if key in values]
@@ -418,14 +379,15 @@ def _energy(folder: Path, record: dict[str, Any]) -> list[str]:
     rows = [(f"{name} [J]", float(y[0]), float(y.min()), float(y.max()), float(y[-1]))
             for name, y in curves.items()]  # fmt: skip
 
-    def draw(target: Path) -> None:
-        from rom.view.figures.curves import history
+    from rom.view.figures.curves import history
 
-        words = f"Energies of {record['name']}: motion, deformation, height, and their sum."
-        history(numbers[:, 0], [("energy [J]", curves)], target, title="Energy", caption=words)
-
+    words = f"Energies of {record['name']}: motion, deformation, height, and their sum."
+    panels, look = [("energy [J]", curves)], dict[str, Any](title="Energy", caption=words)
     header = ("energy", "start", "lowest", "highest", "end")
-    return [*drawn(draw, "Energies over time."), html.table(header, rows, "Energies.")]
+    return [
+        *drawn(lambda path: history(numbers[:, 0], panels, path, **look), "Energies over time."),
+        html.table(header, rows, "Energies."),
+    ]
 
 
 def drawn(draw: Callable[[Path], object], caption: str) -> list[str]:

@@ -15,7 +15,7 @@ from rom.checks.glued import GluedSolid
 from rom.errors import ConfigError, ModelError, SolverError
 from rom.mbs.analysis.equilibrium import equilibrium
 from rom.mbs.analysis.linearize import linearize
-from rom.mbs.analysis.snapshot import snapshot
+from rom.mbs.analysis.local_equations import snapshot
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.results.state import State
 from rom.model import Array, FEModel, Report, Row
@@ -131,9 +131,7 @@ class _AtRest:
         return found
 
 
-def _compared(
-    rest: _AtRest, solid: GluedSolid, full: HeldSolid, at: tuple[Array, Array]
-) -> Step:  # fmt: skip
+def _compared(rest: _AtRest, solid: GluedSolid, full: HeldSolid, at: tuple[Array, Array]) -> Step:
     """The pieces against the whole at a displacement (n,) under a load."""
     (a, W), found, known = at, [], []
     for key, u in rest.displacements().items():

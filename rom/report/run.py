@@ -148,8 +148,7 @@ class Run:
         panels: dict[str, dict[str, Any]] = {}
         found = columns(self.solution)
         for name in self.file.values["output"]["plot"]:
-            unit, values = found[name]
-            panels.setdefault(unit, {})[name] = values
+            panels.setdefault(found[name][0], {})[name] = found[name][1]
         title = f"Motion of {self.file.name}"
         groups = [(f"[{unit}]", curves) for unit, curves in panels.items()]
         caption = (
@@ -198,17 +197,10 @@ def run(
     progress: bool = False,
     keep: "Keeping | None" = None,
 ) -> Run:
-    """Move the mechanism of a file.
+    """Move the mechanism of a file; command and version are for the record, progress on stderr.
 
-    Args:
-        file: the description.
-        command: what was typed, for the record.
-        version: of rom, for the record.
-        progress: report on stderr.
-        keep: folder that is written while the run lasts, see `made_from`.
-
-    Raises:
-        RomError: as `MechanismFile.simulate`; for an unknown column to plot before the run.
+    ``keep`` is a folder that is written while the run lasts, see `made_from`. An unknown column to
+    plot is refused before the run.
     """
     from rom.mbs.results.audit import audit
 

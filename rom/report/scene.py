@@ -6,6 +6,7 @@ coordinates: the page computes the place of a point from x = r + A (X + S q), as
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
+from itertools import cycle
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,8 +21,8 @@ from rom.report.coarse import array, coarsened, corners, quantised_column, quant
 from rom.rotation import matrix
 from rom.view.canvas.scene import aimed, sharp_edges
 from rom.view.canvas.solids import Mesh
+from rom.view.figures.things import COLOURS
 from rom.view.scenes.film import METAL_COLOURS, shades_of
-from rom.view.scenes.mechanisms import COLOURS
 from rom.view.scenes.mode_shapes import AMPLITUDE_RATIO, displacement
 from rom.view.scenes.places import placed
 from rom.view.scenes.rigid import bars, check_bodies, ends_of
@@ -81,32 +82,24 @@ class Thing:
 def modes_scene(body: "FlexibleBody", *, size: int = SHAPE_BYTES) -> dict[str, Any]:
     """The modes of a body in each support of its comparison, and its elastic coordinates.
 
-    Args:
-        body: a flexible body.
-        size: bytes its shapes may take; a finer surface is made coarser.
-
-    Raises:
-        ConfigError: if the body has no surface.
+    A surface whose shapes take more bytes than ``size`` is made coarser.
     """
     body = body.in_units("SI")
     surface, stress, found = _surface(body), _stress(body), list(_modes(body))
     if surface is None:
         raise ConfigError(f"body {body.name!r} carries no surface; only meshed ones are drawn.")
     Q = np.array([mode["q"] for mode in found]).reshape(len(found), -1)
-    far = [
-        float(np.abs(displacement(body, np.r_[mode["rigid"], mode["q"]])).max()) for mode in found
-    ]
-    kept = np.union1d(
-        _felt(surface.shape, stress, Q, np.array(far)), np.arange(body.n_modes)[:N_COORDINATES]
-    ).astype(int)
+    moved = (displacement(body, np.r_[mode["rigid"], mode["q"]]) for mode in found)
+    far = [float(np.abs(u).max()) for u in moved]
+    shown = np.arange(min(body.n_modes, N_COORDINATES))
+    kept = np.union1d(_felt(surface.shape, stress, Q, np.array(far)), shown).astype(int)
     for mode, unit in zip(found, far, strict=True):
         mode["rigid"] = [float(f"{x / unit:.7g}") for x in mode["rigid"]]
         mode["q"] = [float(f"{x / unit:.7g}") for x in mode["q"][kept]]
-    thing = Thing(
-        body.name, ELASTIC_COLOURS[0], surface.points, surface.triangles, np.zeros((1, 3)),
-        NO_TURN, surface.shape[:, kept], None if stress is None else stress[:, kept],
-        np.zeros((1, len(kept))),
-    )  # fmt: skip
+    stress = None if stress is None else stress[:, kept]
+    mesh, still = (surface.points, surface.triangles), (np.zeros((1, 3)), NO_TURN)
+    shapes, q = surface.shape[:, kept], np.zeros((1, len(kept)))
+    thing = Thing(body.name, ELASTIC_COLOURS[0], *mesh, *still, shapes, stress, q)
     coordinates = [
         {"group": "Elastic coordinates", "label": f"q{k + 1}: {f:.5g} Hz", "coordinate": k}
         for k, f in enumerate(body.omega[:N_COORDINATES] / (2 * np.pi))
@@ -142,14 +135,11 @@ def motion_scene(
         )
         for (name, part), colour in zip(mechanism.parts.items(), _colours(mechanism), strict=True)
     ]  # fmt: skip
-    limits = [_limits(thing) for thing in things]
-    largest = {
-        key: max((limit[key] for limit in limits), default=0.0)
-        for key in ("displacement", "stress")
-    }
+    limits, t = [_limits(thing) for thing in things], solution.t[steps]
+    keys = "displacement", "stress"
+    largest = {key: max((one[key] for one in limits), default=0.0) for key in keys}
     look = {"view": view, "up": up, "gravity": mechanism.gravity, "magnify": magnify}
     scene = _scene(title, things, SHAPE_BYTES, look)
-    t = solution.t[steps]
     return scene | {"times": array(t - t[0], "float32"), "start": float(t[0]), "limits": largest}
 
 
@@ -210,20 +200,14 @@ def _modes(body: "FlexibleBody") -> Iterator[dict[str, Any]]:
         omega, V = body.modes(fixed=fixed)
         for i, k in enumerate(np.flatnonzero(omega > 0)[: n or N_MODES]):
             label = f"{support}, mode {i + 1}: {omega[k] / (2 * np.pi):.5g} Hz"
-            yield {
-                "group": support.capitalize() if not fixed else support,
-                "label": label, "rigid": V[:6, k], "q": V[6:, k],
-            }  # fmt: skip
+            group = support if fixed else support.capitalize()
+            yield {"group": group, "label": label, "rigid": V[:6, k], "q": V[6:, k]}
 
 
 def _felt(shapes: Array, stress: Array | None, Q: Array, far: Array) -> Index:
     """Numbers of the elastic coordinates that are seen in any of the states Q (m, r).
 
-    Args:
-        shapes: (3 s, r).
-        stress: (6 s, r) or None.
-        Q: (m, r) elastic coordinates.
-        far: (m,) largest displacement in each state.
+    By shapes (3 s, r) and stress (6 s, r), against the largest displacements (m,) of the states.
     """
     seen = np.abs(Q) * np.abs(shapes).max(axis=0) > SMALLEST_SHARE * far[:, None]
     if stress is not None:
@@ -240,13 +224,9 @@ def _steps(solution: "Solution") -> Index:
 
 
 def _colours(mechanism: "Mechanism") -> list[str]:
-    shades, elastic, found = shades_of(mechanism), 0, []
-    for name, part in mechanism.parts.items():
-        flexible = _surface(part.flexible) is not None
-        colour = ELASTIC_COLOURS[elastic % len(ELASTIC_COLOURS)]
-        found.append(colour if flexible else METAL_COLOURS[shades[name]])
-        elastic += flexible
-    return found
+    shades, elastic = shades_of(mechanism), cycle(ELASTIC_COLOURS)
+    bare = {name for name, part in mechanism.parts.items() if _surface(part.flexible) is None}
+    return [METAL_COLOURS[shades[n]] if n in bare else next(elastic) for n in mechanism.parts]
 
 
 def _bars(mechanism: "Mechanism", name: str) -> Mesh:
@@ -280,12 +260,11 @@ def _chunked(of: Callable[[Array], float], columns: Array, q: Array) -> Iterator
 def _limits(thing: Thing) -> dict[str, float]:
     """Largest displacement relative to the frame [m] and equivalent stress [Pa] of a motion."""
     far = _chunked(lambda u: np.linalg.norm(u.reshape(-1, 3), axis=1).max(), thing.shapes, thing.q)
-    if thing.stress is None or not thing.stress.size:
-        high: Iterator[float] = iter(())
-    else:
+    high: Iterator[float] = iter(())
+    if thing.stress is not None and thing.stress.size:
         high = _chunked(lambda s: von_mises(s.reshape(-1, 6)).max(), thing.stress, thing.q)
-    far = far if thing.shapes.size else iter(())
-    return {"displacement": max(far, default=0.0), "stress": max(high, default=0.0)}
+    displacement = max(far, default=0.0) if thing.shapes.size else 0.0
+    return {"displacement": displacement, "stress": max(high, default=0.0)}
 
 
 def _scene(title: str, things: Sequence[Thing], size: int, look: dict[str, Any]) -> dict[str, Any]:
@@ -306,10 +285,8 @@ def _scene(title: str, things: Sequence[Thing], size: int, look: dict[str, Any])
 
 def _view(seen: Array, view: Any, up: Any, gravity: Any) -> tuple[dict[str, Any], Array]:
     """The eye, and the middle of what it sees; upright is an axis, unless something says more."""
-    view, up = (
-        value if value is None else finite(name, value, (3,))
-        for name, value in (("view", view), ("up", up))
-    )
+    view = None if view is None else finite("view", view, (3,))
+    up = None if up is None else finite("up", up, (3,))
     if up is None and gravity is not None and np.any(gravity):
         up = -np.asarray(gravity, dtype=float)
         toward = aimed(seen, 1000, view=view).toward
@@ -317,9 +294,7 @@ def _view(seen: Array, view: Any, up: Any, gravity: Any) -> tuple[dict[str, Any]
             up = None
     camera = aimed(seen, 1000, view=view, up=up, heights=(0.02, 50.0))
     k = np.argmax(np.abs(camera.up))
-    upright = np.eye(3)[k] * np.sign(camera.up[k])
-    if up is not None:
-        upright = np.asarray(up, dtype=float) / np.linalg.norm(up)
+    upright = np.eye(3)[k] * np.sign(camera.up[k]) if up is None else up / np.linalg.norm(up)
     radius = float(np.linalg.norm(seen - camera.focus, axis=1).max()) or 1.0
     found = {
         "toward": camera.toward.tolist(), "up": upright.tolist(), "radius": radius,

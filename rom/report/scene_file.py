@@ -22,23 +22,13 @@ VIEW_KEYS = {"toward": 3, "up": 3, "radius": 0, "tall": 0, "wide": 0}  # and how
 
 
 def write_scene(scene: dict[str, Any], path: Path) -> None:
-    """Write the scene of a motion.
-
-    Raises:
-        ConfigError: if the place is not writable.
-        ResourceError: if the disk is full.
-    """
+    """Write the scene of a motion."""
     text = json.dumps(scene, separators=(",", ":"))
     write_whole(path, lambda file: file.write(text.encode()))
 
 
 def read_scene(path: Path) -> dict[str, Any]:
-    """The scene of a motion, looked at before a browser gets it.
-
-    Raises:
-        FileFormatError: if it is no such scene, or its arrays do not fit each other.
-        UnsafeFileError: if it is too large.
-    """
+    """The scene of a motion, looked at before a browser gets it."""
     text = check_readable(path, MAX_BYTES).read_bytes()
     try:
         scene = json.loads(text)

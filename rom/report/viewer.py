@@ -93,13 +93,7 @@ START_WORDS = (
 
 
 def figure(scene: dict[str, Any], still: Sequence[str], caption: str) -> str:
-    """A scene as a block of a report.
-
-    Args:
-        scene: of `rom.report.scene`.
-        still: blocks that are shown in print, and where scenes cannot be drawn.
-        caption: plain text.
-    """
+    """A scene as a block of a report; in print, and where none can be drawn, the still blocks."""
     arrays: dict[str, str] = {}
     text = json.dumps(_referred(scene, arrays), separators=(",", ":"))
     text = text.replace("<", "\\u003c")  # nothing in a name may end the element
@@ -109,7 +103,7 @@ def figure(scene: dict[str, Any], still: Sequence[str], caption: str) -> str:
         for name, code in arrays.items()
     )
     return (
-        f"<figure class='scene{' pictured' if pictured else ''}'>"
+        f"<figure class='scene{' pictured' * pictured}'>"
         f"<div class='still'>{''.join(still)}</div>"
         f"<p class='message'>{escaping.escape(MESSAGES[pictured])}</p>"
         f"<figcaption>{escaping.escape(caption)}</figcaption>{data}"

@@ -14,12 +14,13 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import rom
 from cases.mbs.fmu_instance import Instance, fmpy
-from cases.mbs.mechanisms import random_body, simulate_quietly, slider_crank
+from cases.mbs.mechanisms import random_body, simulate_quietly
+from cases.mbs.parts import ORIGIN, on_guide
 from cases.mbs.trusses import truss
 from cases.paths import ROOT
 from rom.errors import ConfigError, ResourceError, RomWarning
 from rom.fmu.driven import Driven
-from rom.io.fmu.variables import structured
+from rom.io.fmu.description import structured
 from rom.mbs.mechanism import Mechanism
 
 # two processes of which one has just compiled the kernels and the other read them from the cache
@@ -58,25 +59,31 @@ def python_with_rom(monkeypatch):
     monkeypatch.delenv("ROM_PYTHON", raising=False)
 
 
+def written(folder, script, name="m", **options):
+    (folder / "m.py").write_text(script)
+    return rom.write_fmu(folder / "m.py", folder / f"{name}.fmu", **{"dt": 1e-3, **options})
+
+
 @pytest.fixture(scope="module")
 def crank(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("crank")
-    script = folder / "crank.py"
-    script.write_text(CRANK)
+    folder, asked = tmp_path_factory.mktemp("crank"), {"outputs": ["slider.b", "main"]}
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("PYTHONPATH", str(ROOT / "tests"))
-        return rom.write_fmu(
-            script, folder / "slider crank.fmu", inputs=["gas"], outputs=["slider.b", "main"],
-            dt=1e-3,
-        )  # fmt: skip
+        return written(folder, CRANK, "slider crank", inputs=["gas"], **asked)
+
+
+def built(text, file=""):
+    """The mechanism of a Python file, built here."""
+    space = {"__file__": str(file)}
+    exec(text, space)
+    return space["mechanism"]()
 
 
 def crank_by_hand(function=None):
-    """The mechanism of the file above."""
-    mech = slider_crank(gravity=9.81)
-    mech.drives.clear()
-    mech.rotational_spring("coil", "main", stiffness=3.0, damping=0.01)
-    mech.force("gas", mech.parts["slider"].marker("b"), function or (0.0, 0.0, 0.0))
+    """The mechanism of the file above, its force a function of time."""
+    mech = built(CRANK)
+    if function:
+        mech.loads["gas"] = replace(mech.loads["gas"], function=function)
     return mech
 
 
@@ -158,14 +165,11 @@ def test_a_jump_of_an_input_costs_no_order():
 
 def flywheel():
     """A wheel of 0.2 kg m^2 on an axle, a sledge of 2 kg on rails."""
-    mech = Mechanism(gravity=(0.0, 0.0, 0.0))
-    o, z = mech.ground.marker((0, 0, 0)), (0, 0, 1)
-    wheel = mech.add_rigid("wheel", mass=1.0, inertia=(0.1, 0.1, 0.2), at=(0, 0, 0),
-                           markers={"hub": (0, 0, 0), "rim": (0.5, 0, 0)})  # fmt: skip
-    sledge = mech.add_rigid("sledge", mass=2.0, inertia=(1, 1, 1), at=(0, 0, 0),
-                            markers={"c": (0, 0, 0)})  # fmt: skip
-    mech.revolute("axle", o, wheel.marker("hub"), axis=z)
-    mech.prismatic("rails", o, sledge.marker("c"), axis=(1, 0, 0))
+    mech, marks = Mechanism(gravity=ORIGIN), {"hub": ORIGIN, "rim": (0.5, 0, 0)}
+    solid = {"mass": 1.0, "inertia": (0.1, 0.1, 0.2), "markers": marks}
+    wheel = mech.add_rigid("wheel", at=ORIGIN, **solid)
+    mech.revolute("axle", mech.ground.marker(ORIGIN), wheel.marker("hub"), axis=(0, 0, 1))
+    on_guide(mech, "sledge", mass=2.0, guide="rails")
     return mech
 
 
@@ -178,9 +182,8 @@ def test_a_drive_follows_its_acceleration_without_jumps():
     mech = flywheel()
     mech.drive("turn", "axle", lambda t: 0.3 * t, rate=lambda t: 0.3, acceleration=lambda t: 0.0)
     driven = Driven(mech, inputs=("turn",), outputs=("axle", "turn", "wheel.rim"), dt=1e-3)
-    assert [v.name for v in driven.variables][2:5] == [
-        "turn.acceleration", "axle.angle", "axle.angle_rate",
-    ]  # fmt: skip
+    named = [v.name for v in driven.variables]
+    assert named[2:5] == ["turn.acceleration", "axle.angle", "axle.angle_rate"]
     driven.start(0.0)
     for k, a in enumerate((5.0, -2.0)):
         driven.set([2], [a])
@@ -201,7 +204,7 @@ def test_motors_torques_and_forces_follow_their_inputs():
     mech = flywheel()
     mech.motor("engine", "axle", lambda t, x, xd: -1e3 * x)
     mech.torque("brake", mech.parts["wheel"].marker("hub"), lambda t: (0.0, 0.0, 7.0))
-    mech.force("pull", mech.parts["sledge"].marker("c"), (3.0, 0.0, 0.0), frame="body")
+    mech.force("pull", mech.parts["sledge"].marker(ORIGIN), (3.0, 0.0, 0.0), frame="body")
     driven = Driven(mech, inputs=("engine", "brake", "pull"), outputs=("axle", "rails"), dt=1e-2)
     assert_allclose(driven.get(np.arange(2, 9)), [0, 0, 0, 7, 3, 0, 0])
     driven.start(0.0)
@@ -234,14 +237,11 @@ def test_a_spread_load_follows_its_amplitude():
 @pytest.fixture(scope="module")
 def hanging(tmp_path_factory):
     """A flexible body in a file of its own."""
-    folder = tmp_path_factory.mktemp("hanging")
+    folder, asked = tmp_path_factory.mktemp("hanging"), {"inputs": ["pull"], "outputs": ["one.b"]}
     body = rom.save(random_body(np.random.default_rng(3)), folder / "one.rom.npz")
-    script = folder / "hanging.py"
-    script.write_text(FLEXIBLE)
     with pytest.MonkeyPatch.context() as patch:
         patch.delenv("PYTHONPATH", raising=False)
-        return rom.write_fmu(script, folder / "hanging.fmu", inputs=["pull"], outputs=["one.b"],
-                             dt=1e-2, files=[body])  # fmt: skip
+        return written(folder, FLEXIBLE, "hanging", dt=1e-2, files=[body], **asked)
 
 
 FAR = """
@@ -262,17 +262,12 @@ def mechanism():
 def test_a_body_of_large_deflection_on_a_fitted_marker_moves_in_it_as_here(tmp_path):
     """With its energy and the surface to which its marker is fitted, from its file."""
     body = rom.save(truss(), tmp_path / "truss.rom.npz")
-    script = tmp_path / "far.py"
-    script.write_text(FAR)
-    file = rom.write_fmu(
-        script, tmp_path / "far.fmu", inputs=["pull"], outputs=["truss.n3"], dt=1e-2, files=[body]
-    )
+    asked = {"inputs": ["pull"], "outputs": ["truss.n3"]}
+    file = written(tmp_path, FAR, dt=1e-2, files=[body], **asked)
     names = [f"truss.n3.position[{k}]" for k in (1, 2, 3)]
     one = Instance(file, tmp_path).begin(rho_inf=0.9)
     one.fmu.doStep(0.0, 0.3)
-    space = {"Path": Path, "__file__": str(script), "rom": rom}
-    exec(FAR, space)
-    there = rom.simulate(space["mechanism"](), t_end=0.3, dt=1e-2, rho_inf=0.9)
+    there = rom.simulate(built(FAR, tmp_path / "m.py"), t_end=0.3, dt=1e-2, rho_inf=0.9)
     moved = there.position("truss", "n3")
     assert np.linalg.norm(moved[-1] - moved[0]) > 0.04
     assert_allclose(one.get(*names), moved[-1], rtol=SAME_CODE, atol=SAME_CODE)
@@ -297,11 +292,8 @@ def test_a_flexible_body_travels_inside_and_states_can_be_taken_back(hanging, tm
     assert_array_equal(one.get(*names), first)
     one.fmu.freeFMUstate(state)
     assert "this state was freed" in one.fails(one.fmu.setFMUstate, state)
-    mech = Mechanism()
-    body = mech.add_flexible("one", random_body(np.random.default_rng(3)), omega=(1.0, 2.0, 3.0))
-    place = mech.design_point(body.marker("a"))
-    mech.spherical("hook", mech.ground.marker(place), body.marker("a"))
-    mech.force("pull", body.marker("b"), (1.0, 2.0, 3.0), frame="body")
+    rom.save(random_body(np.random.default_rng(3)), tmp_path / "one.rom.npz")
+    mech = built(FLEXIBLE, tmp_path / "hanging.py")
     half = simulate_quietly(mech, t_end=0.05, dt=1e-2, rho_inf=0.8)
     assert_allclose(begun, half.position("one", "b")[-1], atol=SAME_CODE)
     mech.loads["pull"] = replace(mech.loads["pull"], vector=np.array([-4.0, 2.0, 3.0]))
@@ -324,9 +316,8 @@ def test_what_is_wrong_is_told_and_the_instance_goes_on(hanging, tmp_path):
     assert "must be at least 0 and at most 1" in one.fails(one.set, "rho_inf", 1.5)
     one.begin()
     assert "pull[2] = nan is not finite" in one.fails(one.set, "pull[2]", np.nan)
-    assert "the output 'one.b.position[1]' cannot be set" in one.fails(
-        one.set, "one.b.position[1]", 0.0
-    )
+    place = "one.b.position[1]"
+    assert f"the output {place!r} cannot be set" in one.fails(one.set, place, 0.0)
     assert "value reference 99 cannot be set" in one.fails(one.fmu.setReal, [99], [0.0])
     assert "no variable has the value reference 99" in one.fails(one.fmu.getReal, [99])
     assert "fmi2GetInteger is not offered" in one.fails(one.fmu.getInteger, [0])
@@ -334,11 +325,11 @@ def test_what_is_wrong_is_told_and_the_instance_goes_on(hanging, tmp_path):
     assert "must be positive" in one.fails(one.fmu.doStep, 0.0, -0.1)
     one.fmu.doStep(0.0, 0.1)
     assert "must be set before the first step" in one.fails(one.set, "dt", 1e-3)
-    before = one.get("one.b.position[1]")
+    before = one.get(place)
     one.set("pull[1]", 1e200)
     assert "at t = 0.11 s" in one.fails(one.fmu.doStep, 0.1, 0.1)
     one.set("pull[1]", 1.0)
-    assert_array_equal(one.get("one.b.position[1]"), before)
+    assert_array_equal(one.get(place), before)
     one.fmu.doStep(0.1, 0.1)
     one.fmu.terminate()
     assert "after its end" in one.fails(one.fmu.doStep, 0.2, 0.1)
@@ -374,6 +365,14 @@ def test_the_end_of_its_process_is_an_error_and_no_crash(hanging, tmp_path):
     other.fmu.freeInstance()
 
 
+def why_not(*given, **more):
+    """What an FMU that cannot start says."""
+    log = []
+    with pytest.raises(Exception, match="instantiate"):
+        Instance(*given, log=log, **more)
+    return log[0]
+
+
 @pytest.mark.parametrize(
     ("python", "guid", "message"),
     [
@@ -384,10 +383,7 @@ def test_the_end_of_its_process_is_an_error_and_no_crash(hanging, tmp_path):
 )
 def test_an_fmu_that_cannot_start_says_why(hanging, tmp_path, monkeypatch, python, guid, message):
     monkeypatch.setenv("ROM_PYTHON", python)
-    log = []
-    with pytest.raises(Exception, match="instantiate"):
-        Instance(hanging, tmp_path, guid=guid, log=log)
-    assert message in log[0]
+    assert message in why_not(hanging, tmp_path, guid=guid)
 
 
 def test_where_its_writer_is_gone_the_usual_python_runs_it(hanging, tmp_path, monkeypatch):
@@ -399,29 +395,19 @@ def test_where_its_writer_is_gone_the_usual_python_runs_it(hanging, tmp_path, mo
     (tmp_path / "python3").chmod(0o755)
     monkeypatch.setenv("PATH", f"{tmp_path}:{os.environ['PATH']}")
     monkeypatch.setattr(fmpy, "extract", lambda *a: folder)
-    log = []
-    with pytest.raises(Exception, match="instantiate"):
-        Instance(hanging, tmp_path, log=log)
-    assert "python3 ended at once" in log[0]
+    assert "python3 ended at once" in why_not(hanging, tmp_path)
 
 
 @pytest.mark.long
 @pytest.mark.once
-def test_a_mechanism_that_cannot_start_says_why(tmp_path):
+def test_a_mechanism_that_cannot_start_says_why(tmp_path, monkeypatch):
     """Here its file is gone from the resources."""
     path = written(tmp_path, CRANK, outputs=["slider.b"])
     folder = fmpy.extract(str(path), str(tmp_path / "a folder"))
     (Path(folder) / "resources" / "model" / "m.py").unlink()
-    log = []
-    with pytest.MonkeyPatch.context() as patch, pytest.raises(Exception, match="instantiate"):
-        patch.setattr(fmpy, "extract", lambda *a: folder)
-        Instance(path, tmp_path, log=log)
-    assert "FileNotFoundError" in log[0] and "m.py" in log[0]
-
-
-def written(tmp_path, script, **options):
-    (tmp_path / "m.py").write_text(script)
-    return rom.write_fmu(tmp_path / "m.py", tmp_path / "m.fmu", **{"dt": 1e-3, **options})
+    monkeypatch.setattr(fmpy, "extract", lambda *a: folder)
+    why = why_not(path, tmp_path)
+    assert "FileNotFoundError" in why and "m.py" in why
 
 
 @pytest.mark.once

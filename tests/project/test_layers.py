@@ -64,9 +64,8 @@ ORDER = {
             "analysis"
         ),
         "mbs.analysis": (
-            "quadratic_eigen local_equations rotors few_modes tangent sparse_tangent equilibrium "
-            "linearize campbell response snapshot steady_motion sensitivity inverse_dynamics "
-            "law_check"
+            "local_equations rotors few_modes tangent sparse_tangent equilibrium linearize "
+            "campbell response steady_motion sensitivity inverse_dynamics law_check"
         ),
         "mbs.elements": (
             "field family law_calls joint_forces springs rotational_springs loads "

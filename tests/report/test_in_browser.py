@@ -1,6 +1,5 @@
 """Reports in a real browser: what a stranger sees who opens one, turns it and lets it move."""
 
-import base64
 import struct
 from dataclasses import replace
 
@@ -10,31 +9,18 @@ from numpy.testing import assert_allclose
 
 import rom
 from cases.files.browser import PROGRAM, REASON, WITH_WEBGL, WITHOUT_WEBGL, browser
-from cases.solid import block
+from cases.files.reports import PIXEL, bar_that_bends
+from cases.mbs.parts import ORIGIN, Z, on_hinge
 from rom import report
-from rom.body.recovery import StressRecovery
 from rom.view import box
 
 pytestmark = [pytest.mark.once, pytest.mark.skipif(PROGRAM is None, reason=REASON)]
 
 NAME = "</script><b>bar"
-PIXEL = base64.b64decode(
-    "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAQAAAC1HAwCAAAAC0lEQVR42mNk+M8AAAMBAQDJ/pLvAAAAAElFTkSuQmCC"
-)
 MODES, MOTION, TURN = "#modes", "#motion", "#turn"
 LENGTH, QUARTER = 1.0, 0.1  # of the bar [m]; time of a quarter of a turn [s]
 MAGNIFY = 2000.0  # of the cantilever, which sags by a few hundredths of a millimetre
 SMALL = (640, 560)  # window [pixel]: the processor draws
-
-
-def bar_that_bends():
-    """A body whose stress is made up: per metre, 1 GPa of xx along y, and of xy along z."""
-    made = rom.reduce(block(cells=(8, 2, 2)), method=rom.CraigBampton(6), reference="root",
-                      interfaces={"root": "rbe2", "tip": "rbe2"}, name="bar")  # fmt: skip
-    operator = np.zeros((6 * len(made.surface.points), made.n_modes))
-    operator[0::6] = 1e9 * made.surface.shape[1::3]
-    operator[5::6] = 1e9 * made.surface.shape[2::3]
-    return replace(made, name=NAME, stress=StressRecovery(made.surface.points, operator))
 
 
 def cantilever(body):
@@ -48,11 +34,9 @@ def cantilever(body):
 def quarter_turn():
     """A box at +x that turns about z to +y."""
     mech = rom.Mechanism(gravity=(0, 0, 0))
-    arm = mech.add_rigid("arm", mass=1.0, inertia=(1e-2,) * 3, at=(0, 0, 0),
-                         markers={"hub": (0, 0, 0)})  # fmt: skip
-    mech.revolute("hub", mech.ground.marker((0, 0, 0)), arm.marker("hub"), axis=(0, 0, 1))
+    on_hinge(mech, ORIGIN, "arm", mass=1.0, inertia=(1e-2,) * 3, axis=Z)
     s = 2 * np.pi / QUARTER  # starts and ends without a jolt
-    mech.drive("motor", "hub", lambda t: (s * t - np.sin(s * t)) / 4)
+    mech.drive("motor", "hinge", lambda t: (s * t - np.sin(s * t)) / 4)
     return rom.simulate(mech, t_end=QUARTER, dt=1e-3)
 
 
@@ -60,18 +44,15 @@ def quarter_turn():
 def page(tmp_path_factory):
     folder = tmp_path_factory.mktemp("page")
     (folder / "still.png").write_bytes(PIXEL)
-    body, side = bar_that_bends(), {"view": (0, 0, 1), "up": (0, 1, 0)}
+    body, side = replace(bar_that_bends(), name=NAME), {"view": (0, 0, 1), "up": (0, 1, 0)}
     bent = cantilever(body)
     shapes = {"arm": box((0.2, 0.1, 0.1), (1.0, 0.0, 0.0))}
-    blocks = [
-        report.modes(body, folder / "still.png"),
-        report.motion(bent, folder / "still.png", magnify=MAGNIFY, **side),
-        report.motion(quarter_turn(), shapes=shapes, **side),
-    ]
-    blocks = [
-        f"<div id='{name[1:]}'>{figure}</div>"
-        for figure, name in zip(blocks, (MODES, MOTION, TURN), strict=True)
-    ]
+    figures = {
+        MODES: report.modes(body, folder / "still.png"),
+        MOTION: report.motion(bent, folder / "still.png", magnify=MAGNIFY, **side),
+        TURN: report.motion(quarter_turn(), shapes=shapes, **side),
+    }
+    blocks = [f"<div id='{name[1:]}'>{figure}</div>" for name, figure in figures.items()]
     path = report.write_report({NAME: blocks}, folder / "report.html", title=NAME)
     return path, bent
 
@@ -110,6 +91,10 @@ def lowest(bent):
     return bent.t[np.argmin(bent.position("<b>bar", "tip")[:, 1])] / bent.t[-1]
 
 
+def text(shown, selector):
+    return shown.run(f"document.querySelector('{selector}').textContent")
+
+
 def differ(a, b):
     return int((np.abs(a - b).max(axis=-1) > 8).sum())
 
@@ -138,9 +123,9 @@ def test_the_policy_keeps_other_scripts_and_the_network_out(shown):
 def test_names_are_text(shown):
     assert shown.run("document.querySelector('h1').textContent") == NAME
     assert shown.run("document.querySelectorAll('b').length") == 0
-    assert NAME in shown.run(f"document.querySelector('{MODES} figcaption').textContent")
+    assert NAME in text(shown, f"{MODES} figcaption")
     shown.set(f"{MOTION} .colour", "")
-    assert shown.run(f"document.querySelector('{MOTION} .legend').textContent") == "<b>bar"
+    assert text(shown, f"{MOTION} .legend") == "<b>bar"
 
 
 def test_play_moves_and_pause_stops(shown):
@@ -154,7 +139,7 @@ def test_play_moves_and_pause_stops(shown):
         _, after = look(shown, figure)
         shown.settle()
         assert differ(after, look(shown, figure)[1]) == 0
-    assert "Play" in shown.run(f"document.querySelector('{MOTION} .play').textContent")
+    assert "Play" in text(shown, f"{MOTION} .play")
     assert not shown.complaints
 
 
@@ -243,7 +228,7 @@ def test_colours_follow_the_deformation_and_the_legend_has_units(shown, page):
         columns = np.flatnonzero(seen.any(axis=0))
         root, tip = (pixels[:, k][seen[:, k]].mean(axis=0) for k in (columns[8], columns[-8]))
         assert root[2] > root[1] and tip[1] > 1.5 * tip[2], kind  # violet to yellow
-        words = shown.run(f"document.querySelector('{MOTION} .legend').textContent")
+        words = text(shown, f"{MOTION} .legend")
         assert unit in words, words
     bent = page[1]
     surface = bent.mechanism.parts["<b>bar"].flexible.surface
@@ -275,7 +260,7 @@ def test_it_turns_and_zooms_by_mouse_and_keys_and_comes_back(shown):
     shown.key(".")
     assert shown.run(f"document.querySelector('{MODES} .mode').value") == "1"
     shown.key(" ")
-    assert "Pause" in shown.run(f"document.querySelector('{MODES} .play').textContent")
+    assert "Pause" in text(shown, f"{MODES} .play")
 
 
 def test_the_scale_is_true(shown):

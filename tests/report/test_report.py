@@ -2,16 +2,12 @@
 
 import base64
 
-import pytest
-
+from cases.files.reports import PIXEL as PNG
 from cases.files.reports import read
+from cases.refusals import refused
 from rom.errors import ConfigError
 from rom.model import Report, Row
 from rom.report import html
-
-PNG = base64.b64decode(
-    "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAQAAAC1HAwCAAAAC0lEQVR42mNk+M8AAAMBAQDJ/pLvAAAAAElFTkSuQmCC"
-)
 
 
 def test_the_report_needs_no_other_file(tmp_path):
@@ -34,12 +30,10 @@ def test_the_report_needs_no_other_file(tmp_path):
         assert words in reader.text
 
 
-def test_a_report_that_cannot_be_written_is_refused(tmp_path):
-    with pytest.raises(ConfigError, match=r"\.html"):
-        html.write_report({}, tmp_path / "r.txt", title="")
-    with pytest.raises(ConfigError, match="does not exist"):
-        html.write_report({}, tmp_path / "no" / "r.html", title="")
-    with pytest.raises(ConfigError, match="must be a picture"):
-        html.picture(tmp_path / "missing.png", "")
-    with pytest.raises(ConfigError, match="1 cells of the row"):
-        html.table(("a", "b"), [(1,)], "")
+test_a_report_that_cannot_be_written_is_refused = refused(
+    (lambda: html.write_report({}, "r.txt", title=""), r"\.html"),
+    (lambda: html.write_report({}, "no such folder/r.html", title=""), "does not exist"),
+    (lambda: html.picture("missing.png", ""), "must be a picture"),
+    (lambda: html.table(("a", "b"), [(1,)], ""), "1 cells of the row"),
+    error=ConfigError,
+)

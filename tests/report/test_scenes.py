@@ -10,10 +10,10 @@ from numpy.testing import assert_allclose
 from scipy.sparse.linalg import spsolve
 
 import rom
+from cases.files.reports import bar_that_bends
 from cases.long import few
 from cases.solid import block
 from rom import report
-from rom.body.recovery import StressRecovery
 from rom.errors import ConfigError, FileFormatError
 from rom.report import coarse, scene
 from rom.report.scene_file import read_scene, write_scene
@@ -24,12 +24,7 @@ SUPPORTS = ("root held", "tip held")
 
 @pytest.fixture(scope="module")
 def body():
-    """A bar whose stress is made up: xx is 1 GPa per metre of displacement along y."""
-    made = rom.reduce(block(cells=(8, 2, 2)), method=rom.CraigBampton(6), reference="root",
-                      interfaces={"root": "rbe2", "tip": "rbe2"}, name="bar")  # fmt: skip
-    operator = np.zeros((6 * len(made.surface.points), made.n_modes))
-    operator[0::6] = 1e9 * made.surface.shape[1::3]
-    return replace(made, stress=StressRecovery(made.surface.points, operator))
+    return bar_that_bends()
 
 
 @pytest.fixture(scope="module")
@@ -215,22 +210,21 @@ def test_coordinates_that_do_nothing_are_not_sent(solution, monkeypatch):
     """Of a hundred coordinates a motion excites a few."""
     bar, _ = scene.motion_scene(solution)["bodies"]
     part = solution.mechanism.parts["bar"]
-    reach = np.abs(solution.elastic("bar")).max(axis=0) * np.abs(
-        part.flexible.surface.shape
-    ).max(axis=0)  # fmt: skip
+    q, shapes = np.abs(solution.elastic("bar")), np.abs(part.flexible.surface.shape)
+    reach = q.max(axis=0) * shapes.max(axis=0)
     assert 0 < len(bar["shapes"]) < part.r
     assert len(bar["shapes"]) >= (reach > 1e-3 * reach.max()).sum()
 
 
 def test_what_cannot_be_drawn_is_refused(body, solution):
-    with pytest.raises(ConfigError, match="body 'bar' carries no surface"):
-        report.modes(replace(body, surface=None, stress=None))
-    with pytest.raises(ConfigError, match="shapes: no body 'wheel'"):
-        report.motion(solution, shapes={"wheel": sphere(4)})
-    with pytest.raises(ConfigError, match="must be a picture of the kinds"):
-        report.motion(solution, "none.png")
-    with pytest.raises(ConfigError, match="are no two directions"):
-        report.motion(solution, view=(0, 1, 0), up=(0, 1, 0))
+    for words, draw in {
+        "'bar' carries no surface": lambda: report.modes(replace(body, surface=None, stress=None)),
+        "shapes: no body 'wheel'": lambda: report.motion(solution, shapes={"wheel": sphere(4)}),
+        "must be a picture of the kinds": lambda: report.motion(solution, "none.png"),
+        "are no two directions": lambda: report.motion(solution, view=(0, 1, 0), up=(0, 1, 0)),
+    }.items():
+        with pytest.raises(ConfigError, match=words):
+            draw()
 
 
 def test_a_scene_of_a_run_comes_back(solution, tmp_path):

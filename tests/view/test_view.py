@@ -10,6 +10,7 @@ pyvista = pytest.importorskip("pyvista", reason="pictures need pyvista")
 pytest.importorskip("matplotlib", reason="pictures need matplotlib")
 from dataclasses import replace  # noqa: E402
 
+from matplotlib.figure import Figure  # noqa: E402
 from PIL import Image  # noqa: E402
 
 from cases.mbs.drawn import lattice_bar, squeezed, swinging  # noqa: E402
@@ -22,14 +23,20 @@ from rom.mbs.mechanism import Mechanism  # noqa: E402
 from rom.model import FEModel, Interface, SurfaceMesh  # noqa: E402
 from rom.view.canvas.offscreen import render  # noqa: E402
 from rom.view.canvas.scene import Actor, Camera, aimed, sharp_edges  # noqa: E402
-from rom.view.figures.curves import _apart  # noqa: E402
+from rom.view.figures.curves import _apart, near_ticks  # noqa: E402
 from rom.view.scenes.film import Look, _stage, _words  # noqa: E402
+
+BLUE, RED, YELLOW = (0x2F, 0x7F, 0x9F), (0xD1, 0x49, 0x5B), (0xED, 0xAE, 0x49)
 
 
 def pixels(path, frame=0):
     picture = Image.open(path)
     picture.seek(frame)
     return np.asarray(picture.convert("RGB")).astype(int)
+
+
+def seen(**directions):
+    return aimed(np.eye(3), 100, **directions)
 
 
 def colourful(image):
@@ -128,12 +135,11 @@ def test_the_colours_of_a_mesh_are_those_of_its_interfaces(tmp_path):
     right = np.flatnonzero(points[:, 0] > 0)
     face = Interface("tip", right, points[right], None, points[right].mean(axis=0))
     model = FEModel(None, None, points, {"tip": face}, surface=SurfaceMesh(np.arange(8), triangles))
-    view.mesh(model, tmp_path / "box.png", view=(1, 0.2, 0.3), up=(0, 0, 1))
-    red = pixels(tmp_path / "box.png")
-    assert ((red[..., 0] - red[..., 1]) > 80).mean() > 0.1
-    view.mesh(model, tmp_path / "box.png", view=(-1, 0.2, 0.3), up=(0, 0, 1))
-    red = pixels(tmp_path / "box.png")
-    assert ((red[..., 0] - red[..., 1]) > 80).mean() < 0.01
+    shares = []
+    for side in (1, -1):
+        red = pixels(view.mesh(model, tmp_path / "box.png", view=(side, 0.2, 0.3), up=(0, 0, 1)))
+        shares.append(((red[..., 0] - red[..., 1]) > 80).mean())
+    assert shares[0] > 0.1 and shares[1] < 0.01
 
 
 @pytest.mark.long
@@ -183,47 +189,48 @@ def test_instants_are_drawn_side_by_side(bar, tmp_path):
     assert image[:, image.shape[1] // 2 :].any()
 
 
-def test_histories_show_every_curve(tmp_path):
-    t = np.linspace(0, 2, 50)
-    panels = [("angle [rad]", {"one": np.sin(t), "two": np.cos(t)}), ("force [N]", {"": t})]
-    panels[0][1]["points"] = ([0.5, 1.5], [0.5, -0.5])
-    view.history(t, panels, tmp_path / "h.png", title="Title", caption="Words.")
-    image = pixels(tmp_path / "h.png")
-    for colour, least in (((0x2F, 0x7F, 0x9F), 300), ((0xD1, 0x49, 0x5B), 300),
-                          ((0xED, 0xAE, 0x49), 60)):  # fmt: skip
-        assert (np.abs(image - colour).max(axis=2) < 12).sum() > least
+T = np.linspace(0, 2, 50)
+WORDS = {"title": "Title", "caption": "Words."}
+ANGLES = {"one": np.sin(T), "two": np.cos(T), "points": ([0.5, 1.5], [0.5, -0.5])}
+ERRORS = {"one": ([1, 2, 4], [1e-1, 1e-2, 0.0]), "two": ([1, 2, 4], [1e-2, 1e-3, 1e-4])}
 
 
-def test_errors_of_frequencies_are_drawn_per_support(tmp_path):
-    table = {"free": {"full": [1.0, 2.0], "reduced": [1.0001, 2.01]}}
-    view.frequencies(table, tmp_path / "f.png", title="Title")
-    assert (np.abs(pixels(tmp_path / "f.png") - (0x2F, 0x7F, 0x9F)).max(axis=2) < 12).sum() > 100
+CURVES = {  # function: what is drawn, least pixels of each colour, words
+    "history": ([T, [("angle [rad]", ANGLES), ("force [N]", {"": T})]], (300, 300, 60), WORDS),
+    "frequencies": ([{"free": {"full": [1.0, 2.0], "reduced": [1.0001, 2.01]}}], (100,), {}),
+    "convergence": ([[("error", ERRORS)] * 2], (300, 300), WORDS | {"xlabel": "modes"}),
+}
+
+
+@pytest.mark.parametrize("name", CURVES)
+def test_every_curve_is_drawn(name, tmp_path):
+    things, least, words = CURVES[name]
+    image = pixels(getattr(view, name)(*things, tmp_path / "c.png", **words))
+    for colour, n in zip((BLUE, RED, YELLOW), least, strict=False):
+        assert (np.abs(image - colour).max(axis=2) < 12).sum() > n
 
 
 def test_wrong_requests_are_refused(bar, tmp_path):
     mech, sol = swinging(bar)
-    with pytest.raises(ConfigError, match=r"ending '.jpg'"):
-        view.mode_shapes(bar, tmp_path / "modes.jpg")
-    with pytest.raises(ConfigError, match="does not exist"):
-        view.animate(mech, sol, tmp_path / "nowhere" / "film.gif")
-    with pytest.raises(ConfigError, match="no body 'boll'"):
-        view.animate(mech, sol, tmp_path / "film.gif", shapes={"boll": view.box((1, 1, 1))})
-    with pytest.raises(ConfigError, match="no surface"):
-        view.mode_shapes(replace(bar, surface=None), tmp_path / "modes.png")
-    with pytest.raises(InterfaceError, match="no interface 'tip'"):
-        view.mode_shapes(bar, tmp_path / "modes.png", fixed=("tip",))
-    with pytest.raises(ConfigError, match="no two directions"):
-        view.mode_shapes(bar, tmp_path / "modes.png", view=(0, 0, 1), up=(0, 0, 2))
-    for wrong, words in [
-        ({"view": (0, 1)}, r"view has shape \(2,\), needed is \(3,\).*three numbers"),
-        ({"up": "z"}, r"up = 'z' is not made of numbers.*e.g. \(0, 0, 1\)"),
-        ({"up": (0, np.nan, 1)}, "up = .*nan.* is not finite"),
-        ({"view": (0, 0, 0)}, r"view = \(0, 0, 0\) and up = None are no two directions.*not zero"),
-    ]:
-        with pytest.raises(ConfigError, match=f"(?s){words}"):
-            aimed(np.eye(3), 100, **wrong)
-    with pytest.raises(ConfigError, match="3 values of 'one' for 2 times"):
-        view.history([0, 1], [("x", {"one": [1, 2, 3]})], tmp_path / "h.png", title="", caption="")
+    wrong, film, picture = {"boll": view.box((1, 1, 1))}, tmp_path / "a.gif", tmp_path / "a.png"
+    long, short = [("x", {"one": [1, 2, 3]})], [("error", {"x": ([1, 2], [1.0])})]
+    for words, draw in {
+        "ending '.jpg'": lambda: view.mode_shapes(bar, tmp_path / "modes.jpg"),
+        "does not exist": lambda: view.animate(mech, sol, tmp_path / "nowhere" / "film.gif"),
+        "no body 'boll'": lambda: view.animate(mech, sol, film, shapes=wrong),
+        "no surface": lambda: view.mode_shapes(replace(bar, surface=None), picture),
+        "no interface 'tip'": lambda: view.mode_shapes(bar, picture, fixed=("tip",)),
+        "no two directions": lambda: view.mode_shapes(bar, picture, view=(0, 0, 1), up=(0, 0, 2)),
+        "3 values of 'one' for 2 times": lambda: view.history([0, 1], long, picture),
+        "1 errors of 'x' for 2 sizes": lambda: view.convergence(short, picture, xlabel="modes"),
+        r"view has shape \(2,\), needed is \(3,\).*three numbers": lambda: seen(view=(0, 1)),
+        r"up = 'z' is not made of numbers.*e.g. \(0, 0, 1\)": lambda: seen(up="z"),
+        "up = .*nan.* is not finite": lambda: seen(up=(0, np.nan, 1)),
+        r"view = \(0, 0, 0\) and up = None are no two.*not zero": lambda: seen(view=(0, 0, 0)),
+    }.items():
+        kind = InterfaceError if "interface" in words else ConfigError
+        with pytest.raises(kind, match=f"(?s){words}"):
+            draw()
     assert not list(tmp_path.iterdir())
 
 
@@ -251,10 +258,6 @@ def test_a_process_that_cannot_draw_says_so(bar, tmp_path, monkeypatch):
 
 
 def test_values_within_two_decades_have_ticks_at_one_two_five():
-    from matplotlib.figure import Figure
-
-    from rom.view.figures.curves import near_ticks
-
     axes = Figure().subplots()
     axes.loglog([1, 10], [2.5, 40])
     axes.set_ylim(2.5, 40)
@@ -272,29 +275,11 @@ def test_ticks_too_close_for_words_have_none():
     assert _apart(sizes, 1500 / 11) == [f"{x}" * (x not in (96, 99)) for x in sizes]
 
 
-def test_convergence_is_drawn_per_panel_and_curve(tmp_path):
-    curves = {"one": ([1, 2, 4], [1e-1, 1e-2, 0.0]), "two": ([1, 2, 4], [1e-2, 1e-3, 1e-4])}
-    look = {"xlabel": "modes", "title": "Title", "caption": "Words."}
-    view.convergence([("error", curves)] * 2, tmp_path / "c.png", **look)
-    image = pixels(tmp_path / "c.png")
-    for colour in ((0x2F, 0x7F, 0x9F), (0xD1, 0x49, 0x5B)):
-        assert (np.abs(image - colour).max(axis=2) < 12).sum() > 300
-    with pytest.raises(ConfigError, match="1 errors of 'x' for 2 sizes"):
-        view.convergence([("error", {"x": ([1, 2], [1.0])})], tmp_path / "d.png", **look)
-
-
 def test_a_panel_may_have_logarithmic_scales():
-    from rom.view.canvas import page
-    from rom.view.figures.panels import _draw
-
-    line = view.Panel(
-        "Cost", "links", "time [ms]", curves={"one": ([1, 1000], [0.1, 100])}, log=True
-    )
-    with page.styled():
-        axes = page.area(page.sheet(400, 300), 50, 50, 300, 200)
-        _draw(axes, line, {"one": 0})
-        assert (axes.get_xscale(), axes.get_yscale()) == ("log", "log")
-        assert axes.get_xlim()[0] < 1 and axes.get_xlim()[1] > 1000
+    curves = {"one": ([1, 1000], [0.1, 100])}
+    (axes,) = view.panels([[view.Panel("Cost", "links", "time [ms]", curves, log=True)]]).axes
+    assert (axes.get_xscale(), axes.get_yscale()) == ("log", "log")
+    assert axes.get_xlim()[0] < 1 and axes.get_xlim()[1] > 1000
 
 
 def test_panels_stand_in_rows_with_lines_points_and_bars(tmp_path):
@@ -302,7 +287,7 @@ def test_panels_stand_in_rows_with_lines_points_and_bars(tmp_path):
     path = view.Panel("Path", "x [m]", "y [m]", {"one": (x, x)}, {"seen": (x, 1 - x)}, equal=True)
     bars = view.Panel("Bars", "change [%]", bars={"first": (-2.0, 3.0), "second": (-1.0, 1.0)})
     view.panels([[path, bars], [path]], tmp_path / "p.png", title="Title", caption="Words.")
-    blue = np.abs(pixels(tmp_path / "p.png") - (0x2F, 0x7F, 0x9F)).max(axis=2) < 12
+    blue = np.abs(pixels(tmp_path / "p.png") - BLUE).max(axis=2) < 12
     middle = blue.shape[0] // 2
     assert blue[middle:].sum() > 300
     assert blue[:middle, :700].sum() > 100
@@ -338,7 +323,7 @@ def test_a_campbell_diagram_shows_modes_multiples_and_where_they_meet(tmp_path):
     words = {"title": "Rotor", "caption": "Two modes."}
     file = view.campbell(diagram, tmp_path / "c.png", orders=(1, 2), names=("up", "down"), **words)
     image = pixels(file)
-    for colour in ((0x2F, 0x7F, 0x9F), (0xD1, 0x49, 0x5B)):  # in both panels
+    for colour in (BLUE, RED):  # in both panels
         rows = np.flatnonzero((np.abs(image - colour).max(axis=2) < 8).any(axis=1))
         assert np.ptp(rows) > 330
     undamped = Campbell(speeds, 1j * modes.imag, np.ones((10, 2)))

@@ -140,12 +140,8 @@ def staged(monkeypatch, stream, **options):
 def test_stages_are_named_as_they_begin_and_cleared(monkeypatch):
     monkeypatch.setattr(progress, "find_spec", lambda name: None)
     text = staged(monkeypatch, Terminal())
-    assert [part.strip() for part in text.split("\r")[1:]] == [
-        "factor    0 %",
-        "solve   50 %",
-        "",
-        "",
-    ]
+    shown = [part.strip() for part in text.split("\r")[1:]]
+    assert shown == ["factor    0 %", "solve   50 %", "", ""]
     assert staged(monkeypatch, Terminal(), long=False) == ""
     assert staged(monkeypatch, io.StringIO()) == ""
     monkeypatch.setattr(progress, "ranks", lambda: (1, 2))

@@ -10,6 +10,7 @@ from numpy.testing import assert_allclose
 import rom
 from benchmarks.units import as_mechanism
 from cases.gear_unit import rigid_unit
+from cases.refusals import refused
 from rom import view
 from rom.components.gear_mesh import GearPair
 from rom.components.journal_bearing import film, iso_vg
@@ -95,6 +96,13 @@ def test_a_shaft_is_as_long_as_its_markers_and_has_its_wheel_where_it_stands():
         assert triangles.max() == len(points) - 1
 
 
+def area(wall):
+    """Of a mesh [m^2]."""
+    points, triangles = wall
+    a, b, c = np.moveaxis(points[triangles], 1, 0)
+    return 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1).sum()
+
+
 def towards_gear(unit):
     """(2,) the pinion turns counter-clockwise and pushes the gear up and away along this."""
     return np.array([np.sin(unit.mesh.pair.alpha), np.cos(unit.mesh.pair.alpha)])
@@ -104,11 +112,9 @@ def test_walls_on_teeth_stand_on_the_path_of_contact_and_have_the_area_of_the_fo
     unit, _, sol = still()
     pair, n = unit.mesh.pair, towards_gear(unit)
     loads = rom.mbs.tooth_loads(sol, "mesh")[0]
-    points, triangles = view.tooth_walls(sol, "mesh", scale=SCALE, direction=(0, 2.0, 0))
-    a, b, c = np.moveaxis(points[triangles], 1, 0)
-    size = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1).sum()
-    assert size == pytest.approx(SCALE * loads.force.sum(), rel=1e-9)
-    walls = np.split(points, np.unique(loads.place.round(9)).size)
+    wall = view.tooth_walls(sol, "mesh", scale=SCALE, direction=(0, 2.0, 0))
+    assert area(wall) == pytest.approx(SCALE * loads.force.sum(), rel=1e-9)
+    walls = np.split(wall[0], np.unique(loads.place.round(9)).size)
     for wall in walls:
         foot, top = np.split(wall, 2)
         assert_allclose(np.cross(foot[:, :2], n), pair.rb[0], rtol=1e-3)
@@ -148,9 +154,7 @@ def test_walls_are_those_of_the_instant_that_is_asked_for():
     assert forces[hardest] > 1.1 * forces[0]
     for at in (0, hardest, hardest - len(forces)):
         wall = view.tooth_walls(moving, "mesh", scale=SCALE, direction=(0, 1, 0), at=at)
-        a, b, c = np.moveaxis(wall[0][wall[1]], 1, 0)
-        size = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1).sum()
-        assert size == pytest.approx(SCALE * forces[at], rel=1e-9)
+        assert area(wall) == pytest.approx(SCALE * forces[at], rel=1e-9)
         foot, top = np.split(view.film_wall(moving, "gear low", scale=1e-8, at=at)[0], 2)
         height = np.linalg.norm(top - foot, axis=1)[:-1]
         assert_allclose(height, 1e-8 * pressures[at, :, 2], rtol=1e-6, atol=1e-12)
@@ -208,24 +212,27 @@ def test_walls_in_a_ring_stand_where_its_pinion_is_nearest():
         view.toothed_shaft(mech, "pinion")
 
 
-def test_what_has_no_teeth_or_no_film_is_refused():
-    _, mech, sol = still()
-    with pytest.raises(ConfigError, match="'shaft' turns in no journal bearing"):
-        view.toothed_shaft(mech, "shaft")
-    with pytest.raises(ConfigError, match="no gear mesh 'low'"):
-        view.tooth_walls(sol, "low", scale=SCALE, direction=(0, 1, 0))
-    with pytest.raises(ConfigError, match="no journal bearing 'mesh'"):
-        rom.mbs.film_pressures(sol, "mesh")
-    with pytest.raises(ConfigError, match="direction has length zero"):
-        view.tooth_walls(sol, "mesh", scale=SCALE, direction=(0, 0, 0))
-    with pytest.raises(ConfigError, match="'pinion low' is read from a table"):
-        view.film_wall(still(tabulated=True)[2], "pinion low", scale=1e-8)
+def tabulated():
+    return still(tabulated=True)[2]
 
 
-def test_helical_wheels_are_not_drawn_as_spur_wheels():
-    mech = as_mechanism(rigid_unit(helix=0.2))
-    with pytest.raises(ConfigError, match="'mesh' must be spur wheels"):
-        view.toothed_shaft(mech, "gear")
+def helical():
+    return as_mechanism(rigid_unit(helix=0.2))
+
+
+def walls(name, direction):
+    return view.tooth_walls(still()[2], name, scale=SCALE, direction=direction)
+
+
+test_what_has_no_teeth_or_no_film_is_refused = refused(
+    (lambda: view.toothed_shaft(still()[1], "shaft"), "'shaft' turns in no journal bearing"),
+    (lambda: walls("low", (0, 1, 0)), "no gear mesh 'low'"),
+    (lambda: walls("mesh", (0, 0, 0)), "direction has length zero"),
+    (lambda: rom.mbs.film_pressures(still()[2], "mesh"), "no journal bearing 'mesh'"),
+    (lambda: view.film_wall(tabulated(), "pinion low", scale=1e-8), "'pinion low' is read from"),
+    (lambda: view.toothed_shaft(helical(), "gear"), "'mesh' must be spur wheels"),
+    error=ConfigError,
+)
 
 
 def test_lines_of_helical_teeth_lie_on_the_base_plane_at_the_base_helix():

@@ -64,16 +64,8 @@ PICTURES = {  # function -> what is drawn, words
         WORDS | {"structure": STRUCTURE, "label": "displacement per force [m/N]"}),
     "wheel_modes": lambda: ([*wheel()], WORDS | {"hidden": ("root", "tip")}),
 }  # fmt: skip
-AXES = {
-    "campbell": 2,
-    "convergence": 1,
-    "deformed": 2,
-    "frequencies": 1,
-    "history": 1,
-    "panels": 1,
-    "plane": 1,
-    "updating": 4,
-}  # that each of what is above wants
+ALONE = "convergence", "frequencies", "history", "panels", "plane"
+AXES = dict.fromkeys(ALONE, 1) | {"campbell": 2, "deformed": 2, "updating": 4}  # that each wants
 FILMS = {
     "animate": lambda: ([*moved()], {"frames": 2}),
     "film": lambda: ([np.array([0.0]), view.Scene("box", {"steel": view.box((0.1, 0.1, 0.2))})],
@@ -82,9 +74,7 @@ FILMS = {
                      {"caption": "What a stranger has to know."}),
 }  # fmt: skip
 # seconds each; "mesh" and "start" are drawn by a child process in `make test`, too
-DRAWN_BY_A_CHILD = {
-    "faces", "instants", "mesh", "mode_shapes", "start", "updating", "wheel_modes"
-}  # fmt: skip
+DRAWN_BY_A_CHILD = "faces instants mesh mode_shapes start updating wheel_modes".split()
 WRITERS = ("io/programs", "io/matrices", "io/sid", "io/fields", "io/native.py", "io/bodies.py",
            "io/export.py", "io/history.py", "io/fmu/body.py", "fmu/export.py", "report/html.py",
            "mbs/results/checkpoint.py", "view/scenes")  # fmt: skip
@@ -110,9 +100,12 @@ def test_things_come_first_then_the_path_then_words_by_name(name):
     assert parameters(name)["path"].default is None
 
 
-@pytest.mark.parametrize(
-    "name", [pytest.param(n, marks=[pytest.mark.long] * (n in DRAWN_BY_A_CHILD)) for n in PICTURES]
-)
+def each(names):
+    """Those that take seconds where there is time only."""
+    return [pytest.param(n, marks=[pytest.mark.long] * (n in DRAWN_BY_A_CHILD)) for n in names]
+
+
+@pytest.mark.parametrize("name", each(PICTURES))
 def test_a_picture_is_the_same_seen_and_written(name, tmp_path):
     (things, words), draw, file = PICTURES[name](), getattr(view, name), tmp_path / "a.png"
     seen = draw(*things, **words)
@@ -124,9 +117,7 @@ def test_a_picture_is_the_same_seen_and_written(name, tmp_path):
     assert seen._repr_png_() == seen.save(tmp_path / "b.png").read_bytes() == file.read_bytes()
 
 
-@pytest.mark.parametrize(
-    "name", [pytest.param(n, marks=[pytest.mark.long] * (n in DRAWN_BY_A_CHILD)) for n in AXES]
-)
+@pytest.mark.parametrize("name", each(AXES))
 def test_curves_are_drawn_into_axes_of_the_caller(name, tmp_path):
     """His figure comes back, holds what is drawn, and is written where he says only."""
     (things, words), draw = PICTURES[name](), getattr(view, name)

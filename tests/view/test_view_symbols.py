@@ -8,13 +8,13 @@ import pytest
 
 import rom
 from cases.mbs.drawn import lattice_bar, swinging
+from cases.mbs.parts import on_guide, on_hinge
 from rom import view
 from rom.components.gear_mesh import RackPair
 from rom.errors import ConfigError
 from rom.view.canvas import symbols
-from rom.view.canvas.corner import BAR_SIZE, scale
 from rom.view.canvas.scene import HEIGHTS, aimed
-from rom.view.figures.things import seen
+from rom.view.figures.things import BAR_SIZE, scale, seen
 from rom.view.scenes.connections import SPRING_COLOUR, connections, stretched
 from rom.view.scenes.film import Look, _stage
 from rom.view.scenes.ground import GROUND_COLOUR, JOINT_COLOUR, PLANE_OPACITY
@@ -36,9 +36,8 @@ def drawn(mech, surfaces=None):
 
 
 def of(actors, colour, opacity=1.0):
-    return [
-        a for a in actors if a.colour == colour and a.opacity == opacity and a.cells.shape[1] == 3
-    ]
+    solid = (a for a in actors if a.colour == colour and a.cells.shape[1] == 3)
+    return [a for a in solid if a.opacity == opacity]
 
 
 def middle(actor):
@@ -91,11 +90,8 @@ def test_a_hinge_on_the_ground_stands_on_it_and_one_that_carries_hangs_from_it()
 
 
 def test_what_slides_on_the_ground_has_a_rail_below_all_of_its_way():
-    mech = rom.Mechanism(gravity=(0, 0, 0))
-    block = mech.add_rigid(
-        "block", mass=1.0, inertia=(1e-3,) * 3, at=(1, 0, 0.2), velocity=(2, 0, 0)
-    )
-    mech.prismatic("j", mech.ground.marker((0, 0, 0.2)), block.marker((0, 0, 0)), axis=(1, 0, 0))
+    mech, place = rom.Mechanism(gravity=(0, 0, 0)), {"at": (1, 0, 0.2), "velocity": (2, 0, 0)}
+    on_guide(mech, "block", base=(0, 0, 0.2), **place)
     sol = rom.simulate(mech, t_end=0.5, dt=0.05)
     shape = view.box((0.2, 0.3, 0.1))
     stage = _stage(mech, sol, np.array([0, 5, 10]), Look({"block": shape}, up=UP))
@@ -108,10 +104,7 @@ def test_what_slides_on_the_ground_has_a_rail_below_all_of_its_way():
 
 def test_the_bearing_of_a_shaft_is_around_its_nearer_end():
     mech = rom.Mechanism()
-    part = mech.add_rigid(
-        "shaft", mass=1.0, inertia=(1e-2,) * 3, at=(0, 0, 0), markers={"c": (0, 0, 0)}
-    )
-    mech.revolute("j", mech.ground.marker((0, 0, 0)), part.marker("c"), axis=(0, 1, 0))
+    on_hinge(mech, (0, 0, 0), "shaft", inertia=(1e-2,) * 3)
     shaft = view.cylinder((0, -0.3, 0), (0, 0.8, 0), 0.1)[0]
     actors = drawn(mech, {"shaft": shaft})
     bush = next(a for a in of(actors, JOINT_COLOUR) if abs(middle(a)[2]) < 1e-6)
@@ -209,11 +202,10 @@ def test_a_trace_is_the_whole_way_of_a_body():
 def test_instants_that_are_chosen_differ():
     """A pendulum over two periods: its start, and places far from it and from each other."""
     mech = rom.Mechanism()
-    part = rod(mech)
-    mech.revolute("j", mech.ground.marker((0, 0, 0)), part.marker("a"), axis=(0, 1, 0))
+    on_hinge(mech, (0.5, 0, 0), "rod", mass=1.0, inertia=(1e-3, 0.1, 0.1))
     sol = rom.simulate(mech, t_end=3.4, dt=0.01)
     times = different(sol, 4)
-    tip = np.array([sol.position("rod", "b")[np.argmin(np.abs(sol.t - t))] for t in times])
+    tip = np.array([2 * sol.position("rod")[np.argmin(np.abs(sol.t - t))] for t in times])
     apart = np.linalg.norm(tip[:, None] - tip, axis=2)[np.triu_indices(4, 1)]
     assert times.size == 4 and times[0] == 0.0 and (np.diff(times) > 0).all()
     assert apart.min() > 0.5
@@ -265,15 +257,13 @@ def test_a_plotter_is_had_where_dolfinx_is_not_loaded_only(monkeypatch):
 def test_a_cable_runs_along_tangents_and_arcs_at_all_instants():
     mech = rom.Mechanism(gravity=(0, 0, 0))
     wheel = rom.mbs.Pulley(mech.ground.marker((0, 0, 0)), 0.2, (0, 1, 0))
-    load = rod(mech, at=(0.2, 0, -1.0), velocity=(0, 0, 1.0))
-    mech.prismatic("slide", mech.ground.marker((0.2, 0, -1.0)), load.marker((0, 0, 0)),
-                   axis=(0, 0, 1))  # fmt: skip
-    mech.tendon("rope", [mech.ground.marker((-0.2, 0, -1.0)), wheel, load.marker((0, 0, 0))], EA=1)
+    place = {"at": (0.2, 0, -1.0), "velocity": (0, 0, 1.0)}
+    load = on_guide(mech, "rod", axis=UP, base=(0.2, 0, -1.0), **place)
+    mech.tendon("rope", [mech.ground.marker((-0.2, 0, -1.0)), wheel, load], EA=1)
     moved = rom.simulate(mech, t_end=0.5, dt=0.01, progress=False)
     places = moving(mech, moved, [0, 50], 1.0)
-    *_, line, circle = connections(
-        places, {"rod": np.array([[-0.5, 0, 0], [0.5, 0, 0]])}, set(), UP
-    )
+    drawn = {"rod": np.array([[-0.5, 0, 0], [0.5, 0, 0]])}
+    *_, line, circle = connections(places, drawn, set(), UP)
     x = line.points
     for f, end in enumerate((-1.0, -0.5)):
         np.testing.assert_allclose(x[f, 0], [-0.2, 0, -1.0])

@@ -1,4 +1,4 @@
-"""Things in space beside curves, their films, and legends that hide nothing."""
+"""Things in space beside curves, wheels, channels, films, and legends that hide nothing."""
 
 from dataclasses import replace
 
@@ -9,7 +9,9 @@ pytest.importorskip("pyvista", reason="pictures need pyvista")
 pytest.importorskip("matplotlib", reason="pictures need matplotlib")
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
+from numpy.testing import assert_allclose
 
+from cases.figures.pictures import crowded, written_in
 from cases.solid import block
 from rom import view
 from rom.errors import ConfigError
@@ -18,31 +20,18 @@ from rom.view.canvas.scene import aimed
 from rom.view.figures.curves import LINES
 from rom.view.figures.things import COLOURS, _seen, actors_of
 from rom.view.scenes.meshes import in_sight
+from rom.view.scenes.mode_shapes import _joined, _outside
 
 X = np.linspace(0.0, 1.0, 20)
 BOX = view.box((0.3, 0.2, 0.1))
 LONG_NAMES = [f"a curve with quite a long name, {k}" for k in range(5)]
 
 
-def boxes(figure):
-    """Extents on the page of all words, legends row by row."""
-    figure.canvas.draw()
-    renderer = figure.canvas.get_renderer()
-    texts = list(figure.texts)
-    for axes in figure.axes:
-        texts += [axes._left_title, axes.xaxis.label, axes.yaxis.label, *axes.texts]
-        texts += axes.get_legend().get_texts() if axes.get_legend() else []
-    return {t.get_text(): t.get_window_extent(renderer) for t in texts if t.get_text().strip()}
-
-
 def no_words_overlap_or_leave_the_page(figure):
-    found = boxes(figure)
-    wide, tall = figure.get_size_inches() * figure.dpi
-    for name, box in found.items():
-        assert 0 <= box.x0 and box.x1 <= wide and 0 <= box.y0 and box.y1 <= tall, name
-    pairs = [(a, b) for a in found for b in found if a < b and "\u25a0" not in (a, b)]
-    assert [(a, b) for a, b in pairs if found[a].shrunk(0.98, 0.9).overlaps(found[b])] == []
-    return found
+    """All words of a figure that draws them where they can be read."""
+    figure.canvas.draw()
+    assert crowded(figure) == []
+    return {text.get_text() for text in written_in(figure)}
 
 
 def test_legends_stand_above_the_curves_and_hide_nothing():
@@ -173,7 +162,7 @@ def test_a_film_shows_what_moves_from_one_place_and_leaves_the_rest():
     places = [np.nonzero(frame)[1].mean() for frame in red]
     steps = np.diff(places)
     metre = 0.94 * film.pages.shape[2] / 1.0  # the ground is a metre wide, with margins of 3 %
-    np.testing.assert_allclose(steps, 0.2 * metre, rtol=0.02)
+    assert_allclose(steps, 0.2 * metre, rtol=0.02)
 
 
 def test_plates_are_their_outlines_made_thick_and_move_with_them():
@@ -185,7 +174,7 @@ def test_plates_are_their_outlines_made_thick_and_move_with_them():
     assert np.sum(p * np.cross(q, r)) / 6 == pytest.approx(2 * 0.4 * 0.2 * 0.5)
     second = thing.values == 2.0
     step = thing.points[1] - thing.points[0]
-    np.testing.assert_allclose(step[second], [(0.0, 0.3, 0.0)] * second.sum(), atol=1e-15)
+    assert_allclose(step[second], [(0.0, 0.3, 0.0)] * second.sum(), atol=1e-15)
     np.testing.assert_array_equal(step[~second], 0.0)
     assert np.ptp(thing.points[..., 2]) == pytest.approx(0.5)
     with pytest.raises(ConfigError, match=r"1 values for 2 plates"):
@@ -208,7 +197,7 @@ def test_what_is_left_of_an_update_has_a_scale_of_its_own():
     assert {"found", "true", "sensors", "exciters"} <= set(found)
     (errors,) = [a for a in figure.axes if a.get_xlabel() == "found - true [%]"]
     ends = [segment[:, 0] for segment in errors.collections[0].get_segments()]
-    np.testing.assert_allclose(ends, [(0.0, 0.2), (-0.04, 0.04)], atol=1e-12)
+    assert_allclose(ends, [(0.0, 0.2), (-0.04, 0.04)], atol=1e-12)
     assert np.ptp(errors.get_xlim()) < 0.3
     responses = figure.axes[0].lines
     assert [line.get_xdata().size for line in responses] == [X.size, fine.size]
@@ -241,3 +230,101 @@ def test_cameras_do_not_look_at_points_between_which_nothing_is():
     alone, more = (_seen(actors_of(view.Scene("A box", {"_a": (X, triangles)})))
                    for X in (points, beside))  # fmt: skip
     assert np.abs(more).max() == np.abs(alone).max() < 1.0
+
+
+WORDS = {"title": "Wheel", "caption": "A test.", "hidden": ("root", "tip")}
+
+
+def sector():
+    return block((0.3, 0.1, 0.08), (3, 2, 2), origin=(-0.15, 0.2, 0.0))
+
+
+@pytest.mark.long
+def test_a_wheel_is_drawn_from_one_sector():
+    """Waves that differ give pictures that differ; faces inside the wheel are left out."""
+    model = sector()
+    nodes, triangles = _outside(model, WORDS["hidden"])
+    inside = np.concatenate([model.interfaces[name].nodes for name in WORDS["hidden"]])
+    assert not np.isin(nodes[triangles], inside).all(axis=1).any()
+    assert len(triangles) == len(model.surface.triangles) - 2 * 8
+    rng = np.random.default_rng(0)
+    shapes = {f"mode {k}": rng.normal(size=(6, model.n_dofs)) for k in (1, 2)}
+    one = view.wheel_modes(model, shapes, **WORDS)._repr_png_()
+    shapes["mode 2"] = shapes["mode 1"]
+    assert view.wheel_modes(model, shapes, **WORDS)._repr_png_() != one
+    first, joined = _joined(np.array([[0.0, 0, 0], [1, 0, 0], [0, 0, 1e-9]]), np.array([[0, 1, 2]]))
+    assert sorted(first) == [0, 1]
+    assert joined[0, 0] == joined[0, 2] != joined[0, 1]
+
+
+def test_a_wheel_and_its_sectors_are_things_with_their_displacements():
+    """A rotation about the axis moves each point by its radius times the angle."""
+    model = sector()
+    hidden, N, angle = WORDS["hidden"], 6, 1e-3
+    whole = view.wheel([model] * N, hidden=hidden)
+    one = view.wheel([model] * N, sectors=[2], hidden=hidden)
+    assert len(whole.cells) == N * len(one.cells)
+    assert whole.values is None
+    middle = np.array([0.0, 0.25])  # of the block, turned by 120 degrees
+    c, s = np.cos(2 * np.pi / 3), np.sin(2 * np.pi / 3)
+    centre = (one.points.min(axis=0) + one.points.max(axis=0)) / 2
+    assert_allclose(centre[:2], [[c, -s], [s, c]] @ middle, atol=1e-12)
+    shape = []
+    for at in 2 * np.pi * np.arange(N) / N:
+        turn = np.array([[np.cos(at), -np.sin(at), 0], [np.sin(at), np.cos(at), 0], [0, 0, 1]])
+        shape.append(np.cross([0, 0, angle], model.points @ turn.T))
+    turned = view.wheel([model] * N, shape=shape, magnify=2.0, scale=1e3, hidden=hidden)
+    radius = np.linalg.norm(whole.points[:, :2], axis=1)
+    assert_allclose(turned.values, 1e3 * angle * radius, rtol=1e-12)
+    step = turned.points - whole.points
+    assert_allclose(np.linalg.norm(step, axis=1), 2 * angle * radius, rtol=1e-9)
+    assert_allclose(np.sum(step * whole.points, axis=1), 0.0, atol=1e-15)
+    for words, more in {
+        "numbers per sector": {"shape": shape[:5]},
+        r"sectors \[6\] must be from 0 to 5": {"sectors": [6]},
+    }.items():
+        with pytest.raises(ConfigError, match=words):
+            view.wheel([model] * N, hidden=hidden, **more)
+    for words, shapes in {
+        "one mode of the wheel": {},
+        f"needs {model.n_dofs} numbers per sector": {"one": np.zeros((6, 5))},
+    }.items():
+        with pytest.raises(ConfigError, match=words):
+            view.wheel_modes(model, shapes, **WORDS)
+
+
+BAR = view.box((1.0, 0.1, 0.08))
+
+
+def test_a_bar_points_along_its_channel():
+    """From its point, nine hundredths of the body long; what lies on the surface has no gap."""
+    x = BAR[0][[0]]
+    scene = view.channels(BAR, {"sensors": (x, [[0, 3, 4]])}, title="plan")
+    assert list(scene.things) == ["body", "sensors"]
+    points = scene.things["sensors"][0] - x
+    along = points @ [0, 0.6, 0.8]
+    assert_allclose(along.max(), 0.09, rtol=1e-6)
+    far = points[along > 0.05]
+    assert np.linalg.norm(far - along[along > 0.05, None] * [0, 0.6, 0.8], axis=1).max() < 0.005
+
+
+def test_a_point_off_the_body_is_led_to_the_one_that_is_taken():
+    x = BAR[0][[1]] + [0.0, 0.0, 0.2]
+    scene = view.channels(BAR, {"test": (x, [[0, 0, 1]])})
+    line = scene.things["test, off the surface"][0]
+    ends = np.linalg.norm(line - x, axis=1).min(), np.linalg.norm(line - BAR[0][1], axis=1).min()
+    assert max(ends) < 0.005
+
+
+@pytest.mark.once
+def test_the_scene_is_drawn(tmp_path):
+    both = {"sensors": (BAR[0][:3], np.eye(3)), "forces": (BAR[0][4:5], [[0, 0, 1]])}
+    path = tmp_path / "plan.png"
+    view.plane([view.channels(BAR, both)], path, title="plan", caption="words")
+    assert path.stat().st_size > 5000
+
+
+def test_wrong_groups_are_named():
+    for along, words in (([[0, 0, 1]] * 2, r"\(1, 3\) points, \(2, 3\)"), ([[0, 0, 0]], "")):
+        with pytest.raises(ConfigError, match=f"'sensors': {words}"):
+            view.channels(BAR, {"sensors": ([[0, 0, 0]], along)})

@@ -76,7 +76,7 @@ def _subject(args: argparse.Namespace) -> tuple[str, Callable[[Path], Any], Call
     from rom.config.document import read_document
 
     if "bodies" in read_document(args.file).data:
-        from rom.view.scenes.mechanisms import start, start_actors
+        from rom.view.scenes.film import start, start_actors
 
         file = mechanism(args)
         made, look = file.mechanism(), file.values["output"]

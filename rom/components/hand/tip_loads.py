@@ -8,7 +8,7 @@ import numpy.typing as npt
 from rom.components.hand.compliant_hand import Finger
 from rom.components.hand.moving_hand import Drive, Seat, moving_hand
 from rom.mbs.analysis.equilibrium import equilibrium
-from rom.mbs.analysis.snapshot import snapshot
+from rom.mbs.analysis.local_equations import snapshot
 from rom.mbs.mechanism import Mechanism
 from rom.model import Array
 

@@ -13,8 +13,7 @@ import numpy as np
 
 from rom.components.orbits.flow import Flow, Start
 from rom.components.orbits.turns import Turns
-from rom.mbs.analysis.local_equations import free_motions
-from rom.mbs.analysis.snapshot import snapshot
+from rom.mbs.analysis.local_equations import free_motions, snapshot
 from rom.mbs.analysis.tangent import sizes
 from rom.mbs.kernels.system import ROLL
 from rom.mbs.mechanism import Mechanism

@@ -18,7 +18,7 @@ from rom.components.round_bodies.spins import SPINS_FAMILY, Spin
 from rom.components.transmission.unit import Rest, Transmission
 from rom.errors import RomError, SolverError
 from rom.mbs.analysis.equilibrium import equilibrium
-from rom.mbs.analysis.snapshot import snapshot
+from rom.mbs.analysis.local_equations import snapshot
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.results.solution import Solution
 from rom.mbs.results.state import State

@@ -22,19 +22,13 @@ ZIP_EPOCH = (1980, 1, 1, 0, 0, 0)  # the same archive from the same content
 
 
 def write_archive(path: Path, content: Content) -> Path:
-    """Compile and pack, whole or not at all.
-
-    Raises:
-        ConfigError: if the place is not writable.
-        ResourceError: if there is no C compiler, or it fails.
-    """
+    """Compile and pack, whole or not at all."""
     check_text(content.name, "a model")
     identifier = re.sub(r"\W", "_", content.name, flags=re.ASCII)
     identifier = identifier if identifier[:1].isalpha() else f"m{identifier}"
     names = ("fmi2.c", content.core)
-    sources = {
-        name: (SOURCES / name).read_bytes() for name in (*names, "model.h", *content.headers)
-    }
+    files = (*names, "model.h", *content.headers)
+    sources = {name: (SOURCES / name).read_bytes() for name in files}
     guid = _guid(sources, content)
     sources["config.h"] = f'#define GUID "{guid}"\n'.encode()
     if content.data:
@@ -72,17 +66,12 @@ def _library(sources: dict[str, bytes], names: tuple[str, ...]) -> bytes:
         for name, data in sources.items():
             (folder / name).write_bytes(data)
         command = [compiler, *OPTIONS, *names, "-lm", "-o", "out.so"]
+        limits = Limits(seconds=COMPILE_TIME_LIMIT)
         # what the compiler puts aside goes when the folder goes
-        variables = {"TMPDIR": str(folder)}
-        done = run(
-            command, folder=folder, limits=Limits(seconds=COMPILE_TIME_LIMIT), variables=variables
-        )
-        if done.overtime:
-            raise ResourceError(
-                f"{compiler} has not compiled the FMU within {COMPILE_TIME_LIMIT:g} s."
-            )
-        if done.code:
-            raise ResourceError(f"{compiler} cannot compile the FMU: {done.err.strip()}")
+        done = run(command, folder=folder, limits=limits, variables={"TMPDIR": str(folder)})
+        if done.code or done.overtime:
+            why = f"no end within {COMPILE_TIME_LIMIT:g} s" if done.overtime else done.err.strip()
+            raise ResourceError(f"{compiler} cannot compile the FMU: {why}.")
         return (folder / "out.so").read_bytes()
 
 

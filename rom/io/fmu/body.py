@@ -16,8 +16,7 @@ from rom.body.reference import marker_motion
 from rom.errors import ConfigError
 from rom.io.files import check_writable
 from rom.io.fmu.archive import write_archive
-from rom.io.fmu.description import Content
-from rom.io.fmu.variables import Variable, structured
+from rom.io.fmu.description import Content, Variable, components, structured
 from rom.model import Array
 
 INPUTS = (("force", "N"), ("torque", "N.m"))
@@ -105,13 +104,8 @@ def arrays(tables: dict[str, Array]) -> str:
 
 def _variables(body: FlexibleBody) -> list[Variable]:
     names = body.interface_names
-    inputs = [_three((name, what), "input", unit) for name in names for what, unit in INPUTS]
-    inputs.append(_three(("gravity",), "input", "m/s2"))
-    outputs = [_three((name, what), "output", unit) for name in names for what, unit in OUTPUTS]
-    return [variable for several in inputs + outputs for variable in several]
-
-
-def _three(parts: tuple[str, ...], causality: str, unit: str) -> list[Variable]:
-    start = 0.0 if causality == "input" else None
-    name = structured(*parts)
-    return [Variable(f"{name}[{k}]", causality, unit, start) for k in (1, 2, 3)]
+    wanted = [(structured(name, what), "input", unit) for name in names for what, unit in INPUTS]
+    wanted.append(("gravity", "input", "m/s2"))
+    wanted += [(structured(name, what), "output", unit) for name in names for what, unit in OUTPUTS]
+    starts: dict[str, list[float | None]] = {"input": [0.0] * 3, "output": [None] * 3}
+    return [v for name, kind, unit in wanted for v in components(name, kind, unit, starts[kind])]

@@ -1,13 +1,12 @@
-"""The description of an FMU, ``modelDescription.xml`` of FMI 2.0.
+"""The description of an FMU, ``modelDescription.xml`` of FMI 2.0, and its variables.
 
 Source:
     Functional Mock-up Interface for Model Exchange and Co-Simulation 2.0, sections 2.2 and 4.3.
 """
 
 import xml.etree.ElementTree as ET
+from collections.abc import Iterable
 from dataclasses import dataclass, field
-
-from rom.io.fmu.variables import Variable
 
 # exponents of kg, m, s, rad
 UNITS = {
@@ -23,6 +22,49 @@ UNITS = {
     "N.m": {"kg": 1, "m": 2, "s": -2},
     "Pa": {"kg": 1, "m": -1, "s": -2},
 }
+
+
+@dataclass(frozen=True, slots=True)
+class Variable:
+    """A real variable; its place in the list is its value reference.
+
+    Attributes:
+        name: e.g. ``rod.b.position[1]``.
+        causality: "parameter", "input" or "output".
+        unit: e.g. "m/s".
+        start: value at the start; None for outputs, which follow from the others.
+        description: one phrase.
+    """
+
+    name: str
+    causality: str
+    unit: str
+    start: float | None = None
+    description: str = ""
+
+
+def structured(*parts: str) -> str:
+    """A name of the structured naming convention: what is no identifier is put in quotes."""
+    return ".".join(map(_identified, parts))
+
+
+def _identified(part: str) -> str:
+    if part.isascii() and part.isidentifier():
+        return part
+    kept = "".join(c if c.isascii() and c.isprintable() else "_" for c in part)
+    for mark in ("\\", "'", '"'):
+        kept = kept.replace(mark, "\\" + mark)
+    return f"'{kept}'"
+
+
+def components(
+    name: str, causality: str, unit: str, starts: Iterable[float | None], description: str = ""
+) -> list[Variable]:
+    """The numbers of a vector, ``name[1]`` and so on, by their values at the start."""
+    return [
+        Variable(f"{name}[{k}]", causality, unit, x if x is None else float(x), description)
+        for k, x in enumerate(starts, 1)
+    ]
 
 
 @dataclass(frozen=True)

@@ -1,8 +1,7 @@
 """Answers without a time integration.
 
 Rest, tangents and modes: `equilibrium`, `linearize`, `campbell`, `response`, `steady_motion`,
-`sensitivity`, `inverse_dynamics`; `local_equations`, `tangent` and `quadratic_eigen` are what they
-are made of, `sparse_tangent` and `few_modes` where there are many coordinates. `rotors` has what
-turns: steady motions and the axes of small ones. `snapshot` asks one state what motions are asked,
-`law_check` looks for mistakes in laws of the user.
+`sensitivity`, `inverse_dynamics`; `local_equations`, `tangent` and `few_modes` are what they are
+made of, `sparse_tangent` where there are many coordinates. `rotors` has what turns: steady motions
+and the axes of small ones. `law_check` looks for mistakes in laws of the user.
 """

@@ -117,12 +117,12 @@ def campbell(
         follow, mac = _follow(one, two, orders[-1])
         orders.append(follow)
         likeness.append(mac)
-    values = np.array([x.eigenvalues[order] for x, order in zip(found, orders, strict=True)])
+    ordered = list(zip(found, orders, strict=True))
+    values = np.array([x.eigenvalues[order] for x, order in ordered])
     kept = np.flatnonzero(np.abs(values).max(axis=0) > 0)[:n]
     waves = None
     if blades is not None:
-        every = [_waves(x, blades)[order] for x, order in zip(found, orders, strict=True)]
-        waves = np.array(every)[:, kept]
+        waves = np.array([_waves(x, blades)[order][kept] for x, order in ordered])
     return Campbell(speeds, values[:, kept], np.array(likeness)[:, kept], waves)
 
 

@@ -163,16 +163,10 @@ class _Search:
         return None
 
     def loaded(self, state: State, steps: int, *, least: float = MIN_LOAD_STEP) -> State:
-        """Equilibrium under all of the loads, by growing shares of them.
+        """Equilibrium under all of the loads, by steps, of which ``least`` is the smallest part.
 
-        Args:
-            state: where the search starts.
-            steps: number of load steps.
-            least: part of a step at which it is given up.
-
-        Raises:
-            SolverError: if Newton's method fails, even after small steps; ``error.solution`` is the
-                equilibrium at the share before.
+        Raises SolverError where Newton's method fails; ``error.solution`` is the equilibrium at the
+        share before.
         """
         failed: list[SolverError] = []
 
@@ -192,10 +186,7 @@ class _Search:
     def settled(self, state: State, load: float, *, beside: bool) -> State:
         """Equilibrium at a share of the loads, a stable one if it is found.
 
-        Args:
-            state: where the search starts.
-            load: the share.
-            beside: whether that is an equilibrium at another share, next to which one may be taken.
+        Beside one at another share, an unstable one next to it may be taken.
         """
         try:
             return self.settle(state, load)
@@ -206,16 +197,10 @@ class _Search:
             raise
 
     def settle(self, state: State, load: float, *, directly: bool = False) -> State:
-        """Equilibrium at a share of the loads.
+        """Equilibrium at a share of the loads; directly: by Newton's corrections while they shrink.
 
-        Args:
-            state: where the search starts.
-            load: the share.
-            directly: by Newton's corrections as they are, as long as they shrink.
-
-        Raises:
-            SolverError: if Newton's method fails.
-            ModelError: if a body turns on and on, as a rotor does against whose drag nothing holds.
+        Raises ModelError if a body turns on and on, as a rotor does against whose drag nothing
+        holds.
         """
         now, last, trials = self.now.scaled(load), np.inf, MAX_TRIALS
         turned, length = np.zeros((now.packed.system.bodies.mass.size, 3)), 0.0
@@ -231,11 +216,8 @@ class _Search:
             if straight is None and trials and not equations.rises:
                 found, trials = self.tried(now, state, equations), trials - 1
             if found is None:
-                correction = straight or equations.correction()
-                size, motion, state = self.corrected(now, state, correction)
-                beyond = None
-            else:
-                (size, motion, state), beyond = found
+                found = self.corrected(now, state, straight or equations.correction()), None
+            (size, motion, state), beyond = found
             if not np.isfinite(size) or (directly and size > max(last, STALLED_TOL)):
                 break
             if size < CORRECTION_TOL or (size < STALLED_TOL and size > 0.5 * last):
@@ -269,11 +251,7 @@ class _Search:
     def within_room(
         self, now: Instant, state: State, correction: tuple[Array, Array], factor: float
     ) -> tuple[float, State]:
-        """The state after a correction, halved until no gap halves or doubles; the share taken.
-
-        Raises:
-            SolverError: naming the element whose gap has closed.
-        """
+        """The state after a correction, halved until no gap halves or doubles; the share taken."""
         (step, dlam), before, share = correction, self.room(now, state), 1.0
         for name, room in before.items():
             if not room > MIN_ROOM:
@@ -299,7 +277,7 @@ class _Search:
 
     def tried(
         self, now: Instant, state: State, equations: Equations
-    ) -> tuple[tuple[float, Array, State], Equations] | None:
+    ) -> tuple[tuple[float, Array, State], Equations | None] | None:
         """Newton's correction although the potential curves downwards, with what is behind it.
 
         Only one that can be taken whole and leads to where the potential curves upwards: what is
@@ -315,15 +293,12 @@ class _Search:
     def judge(self, state: State) -> None:
         """Refuse free motions, and warn of unstable ones."""
         weakest = self.tangent(self.now.scaled(1.0), state).weakest()
-        free = [
-            k
-            for k in np.flatnonzero(weakest.loose)
-            if not self.along_spin(weakest.motions[:, k], state)
-        ]
+        loose = [weakest.motions[:, k] for k in np.flatnonzero(weakest.loose)]
+        free = [motion for motion in loose if not self.along_spin(motion, state)]
         if free:
             raise ModelError(
-                f"{_described(self.now.packed, weakest.motions[:, free[0]])} and no force opposes "
-                f"({len(free)} free motions): there is no unique equilibrium.",
+                f"{_described(self.now.packed, free[0])} and no force opposes ({len(free)} free "
+                "motions): there is no unique equilibrium.",
                 hint="Hold it by a joint or a spring, or give its place by a drive.",
             )
         if weakest.squares.size and weakest.squares[0] < 0.0 and self.statics_decide:

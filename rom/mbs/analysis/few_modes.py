@@ -1,6 +1,7 @@
-"""The lowest modes under constraints, or those in a band, from sparse matrices; none is missed.
+"""Modes: all of small matrices of second order, or a few under constraints of sparse ones.
 
-Shift-invert Lanczos; undamped modes are counted by the signature of the stiffness at two shifts.
+Few are found by shift-invert Lanczos; undamped ones are counted by the signature of the stiffness
+at two shifts, so that none is missed.
 """
 
 from collections.abc import Sequence
@@ -9,7 +10,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from scipy.linalg import eigh
+from scipy.linalg import eig, eigh
 from scipy.sparse import bmat, csc_matrix, csr_matrix, diags, identity
 from scipy.sparse.linalg import LinearOperator, eigs, eigsh
 
@@ -33,6 +34,54 @@ SAME_MOTIONS_RTOL = 1e-8  # share of motions that joints of another instant woul
 MAX_WHOLE = 12  # motions up to which all are computed
 MIN_RATIO = 4  # motions per mode from which Lanczos is quicker than all modes at once
 SPAN_RTOL = 1e-13  # square of a direction, of the largest, that shapes of one space still have
+ASYMMETRY_RTOL = 1e-9  # of small matrices
+
+
+def modes(C: Array, K: Array, zero: float) -> tuple[Array, Array, Array]:
+    """Eigenvalue and vector per mode of y'' + C y' + K y = 0, and all 2 f eigenvalues.
+
+    Frequencies ascend. A pair of real eigenvalues is one mode, its larger value is given.
+    Below the share ``zero`` of the highest frequency counts as a motion that nothing holds.
+    """
+    symmetric = np.abs(K - K.T).max(initial=0.0) <= ASYMMETRY_RTOL * np.abs(K).max(initial=0.0)
+    if symmetric and not C.any():
+        squares, V = np.linalg.eigh(0.5 * (K + K.T))
+        roots = np.sqrt((-squares).astype(complex))
+        every = np.concatenate([roots, -roots])
+        roots[np.abs(roots) < zero * np.abs(every).max(initial=0.0)] = 0.0
+        order = np.lexsort((-roots.real, roots.imag))
+        return roots[order], V[:, order], every
+    n, s = len(K), max(np.sqrt(np.linalg.norm(K, 2)), np.linalg.norm(C, 2))
+    every, X = eig(np.block([[np.zeros((n, n)), s * np.eye(n)], [-K / s, -C]]))
+    limit = zero * np.abs(every).max(initial=0.0)
+    order, roots = _one_per_mode(every, limit)
+    roots[np.abs(roots) < limit] = 0.0
+    V = X[:n, order]
+    return roots, V / np.linalg.norm(V, axis=0), every
+
+
+def _one_per_mode(every: Array, zero: Any) -> tuple[Index, Array]:
+    """Numbers and values of real eigenvalues, the larger of each pair, then of those that swing."""
+    real = np.flatnonzero(np.abs(every.imag) <= zero)
+    real = real[np.argsort(-every[real].real)][: (real.size + 1) // 2]
+    swing = np.flatnonzero(every.imag > zero)
+    order = np.concatenate([real, swing[np.argsort(every[swing].imag)]])
+    roots = every[order]
+    roots[: real.size] = roots[: real.size].real
+    return order, roots
+
+
+def phases(X: Array) -> Array:
+    """(f,) factors of size one that make the largest entry of each column real and positive."""
+    if not X.size:
+        return np.ones(X.shape[1])
+    largest = X[np.abs(X).argmax(axis=0), np.arange(X.shape[1])]
+    return np.abs(largest) / largest
+
+
+def _probes(n: int, k: int) -> Array:
+    """(n, k) motions to begin a search with, always the same."""
+    return np.sin(np.outer(1.0 + np.arange(n), 1.0 + np.arange(k)))
 
 
 @dataclass(frozen=True)
@@ -49,11 +98,7 @@ class Wanted:
 
     @classmethod
     def of(cls, n: Any, band: Any) -> "Wanted | None":
-        """What the caller says; None for all modes.
-
-        Raises:
-            ConfigError: if it makes no sense.
-        """
+        """What the caller says; None for all modes."""
         if n is None and band is None:
             return None
         if band is None:
@@ -66,11 +111,7 @@ class Wanted:
         return cls(0, (2 * np.pi * low, 2 * np.pi * high))
 
     def among(self, roots: Array) -> Index:
-        """Numbers of those wanted among all eigenvalues (f,) in ascending order [rad/s].
-
-        Raises:
-            ConfigError, ModelError: if there are none, or fewer.
-        """
+        """Numbers of those wanted among all eigenvalues (f,) in ascending order [rad/s]."""
         if self.n > roots.size:
             whole("n", self.n, 1, roots.size, reason="the motions that the joints leave")
         low, high = self.band
@@ -80,11 +121,7 @@ class Wanted:
         return kept[: self.n] if self.n else kept
 
     def refuse(self, near: Array) -> None:
-        """Say that the band is empty, and which rates [rad/s] are near.
-
-        Raises:
-            ModelError: always.
-        """
+        """Say that the band is empty, and which rates [rad/s] are near."""
         low, high = np.array(self.band) / (2 * np.pi)
         middle = 0.5 * sum(self.band)
         found = sorted(sorted(np.unique(near), key=lambda w: abs(w - middle))[:2])
@@ -166,10 +203,12 @@ class Pencil:
 
     def affords(self, wanted: Wanted) -> bool:
         """Whether the modes are few of many: otherwise all together are cheaper."""
-        n = wanted.n
-        if not n:
-            n = self.count(wanted.band[1] ** 2) - self.count(wanted.band[0] ** 2)
+        n = wanted.n or self.within(*wanted.band)
         return MIN_RATIO * (n + 2 * N_SPARE) < self.n_free
+
+    def within(self, low: float, high: float) -> int:
+        """Number of undamped modes between two rates [rad/s]."""
+        return self.count(high**2) - self.count(low**2)
 
     def wanted(self, wanted: Wanted) -> tuple[Array, Array]:
         """Squares [1/s^2] and shapes (n, k) of undamped modes; round-off is zero."""
@@ -189,24 +228,13 @@ class Pencil:
         if wanted.n:
             shift, k = np.sqrt(-self.low_shift()), 2 * wanted.n
         else:
-            shift = 0.5j * (low + high)
-            k = self.count(high**2) - self.count(low**2)
+            shift, k = 0.5j * (low + high), self.within(low, high)
         every, Z = self.damped(shift, k + 2 * N_SPARE)
         mass = np.einsum("ik,ik->k", Z.conj(), self.M @ Z).real
         zero = np.sqrt(self.round_off(Z / np.sqrt(mass)))
         every = np.where(np.abs(every) <= zero, 0.0, every)
-        real = np.flatnonzero(np.abs(every.imag) <= zero)
-        real = real[np.argsort(-every[real].real)][: (real.size + 1) // 2]
-        swing = np.flatnonzero(every.imag > zero)
-        order = np.concatenate([real, swing[np.argsort(every[swing].imag)]])
-        roots = every[order]
-        roots[: real.size] = roots[: real.size].real
-        if wanted.n:
-            kept = np.arange(roots.size)[: wanted.n]
-        else:
-            kept = np.flatnonzero((roots.imag >= low) & (roots.imag < high))
-            if not kept.size:
-                wanted.refuse(roots.imag)
+        order, roots = _one_per_mode(every, zero)
+        kept = wanted.among(roots)
         return self._in_real_motions(roots[kept], Z[:, order[kept]])
 
     def _in_real_motions(self, roots: Array, Z: Array) -> tuple[Array, Array, Array]:
@@ -233,8 +261,7 @@ class Pencil:
         if other is self or not self.G.shape[0]:
             return True
         n = self.M.shape[0]
-        X = np.sin(np.outer(1.0 + np.arange(n), 1.0 + np.arange(N_PASSES)))
-        U = self.inverse(identity(n)).solve(X)[0]
+        U = self.inverse(identity(n)).solve(_probes(n, N_PASSES))[0]
         return bool(np.abs(other.G @ U).max() <= SAME_MOTIONS_RTOL * np.abs(U).max())
 
     def seen_in(self, Q: Array) -> tuple[Array, Array]:
@@ -255,7 +282,7 @@ class Pencil:
         solve = self.inverse(self.even - shift * self.M).solve
         n = self.M.shape[0]
         operator = LinearOperator((n, n), matvec=lambda x: solve(x)[0], dtype=float)
-        start = solve(np.sin(1.0 + np.arange(n)))[0]
+        start = solve(_probes(n, 1)[:, 0])[0]
         squares, X = eigsh(self.even, k, self.M, shift, OPinv=operator, v0=start, tol=0.0)
         order = np.argsort(squares)
         return squares[order], X[:, order]
@@ -264,15 +291,18 @@ class Pencil:
     def _whole(self) -> tuple[Array, Array]:
         """All undamped modes, where the joints leave too few motions for Lanczos."""
         n = self.M.shape[0]
-        X = np.sin(np.outer(1.0 + np.arange(n), 1.0 + np.arange(self.n_free)))
-        Z = np.linalg.qr(self.inverse(identity(n)).solve(X)[0])[0]
-        squares, V = eigh(Z.T @ (self.even @ Z), Z.T @ (self.M @ Z))
-        return squares, Z @ V
+        X = self.inverse(identity(n)).solve(_probes(n, self.n_free))[0]
+        return self._modes_in(np.linalg.qr(X)[0])
+
+    def _modes_in(self, X: Array) -> tuple[Array, Array]:
+        """Undamped modes in some motions (n, k): squares (k,) and shapes (n, k)."""
+        squares, V = eigh(X.T @ (self.even @ X), X.T @ (self.M @ X))
+        return squares, X @ V
 
     def low_shift(self) -> float:
         """A shift below all modes, and no further from the lowest elastic one than needed."""
         shift, n = -abs(self.scale), self.M.shape[0]
-        X = np.sin(np.outer(1.0 + np.arange(n), 1.0 + np.arange(min(N_PROBES, self.n_free))))
+        X = _probes(n, min(N_PROBES, self.n_free))
         for _ in range(MAX_SHIFTS):
             if self._ritz(shift, X) > -shift:
                 break
@@ -286,17 +316,15 @@ class Pencil:
         solve = self.inverse(self.even - shift * self.M).solve
         for _ in range(N_PASSES):
             X = np.linalg.qr(solve(self.M @ X)[0])[0]
-        squares, V = eigh(X.T @ (self.even @ X), X.T @ (self.M @ X))
-        noise = self.round_off(X @ V)
+        squares, X = self._modes_in(X)
+        noise = self.round_off(X)
         real = np.abs(squares) > noise
         return float(np.abs(squares[real]).min()) if real.any() else float(noise.max())
 
     def lowest(self, n: int) -> tuple[Array, Array]:
         """The n lowest undamped modes: squares of rates [1/s^2], shapes of unit mass.
 
-        Raises:
-            ModesMissedError: if the signature counts others than were found.
-            SolverError: if the modes found have one frequency, so that none can be counted apart.
+        Raises ModesMissedError if the signature counts others than were found.
         """
         k = min(n + N_SPARE, self.n_free)
         squares, X = self.near(self.low_shift(), k)
@@ -306,11 +334,7 @@ class Pencil:
         return squares[:n], X[:, :n]
 
     def between(self, low: float, high: float) -> tuple[Array, Array]:
-        """The undamped modes with squares of rates [1/s^2] between two bounds.
-
-        Raises:
-            ModesMissedError: if the signature counts others than were found.
-        """
+        """The undamped modes with squares of rates [1/s^2] between two bounds; see `lowest`."""
         n = self.count(high) - self.count(low)
         if n == 0:
             return np.zeros(0), np.zeros((self.M.shape[0], 0))
@@ -350,7 +374,7 @@ class Pencil:
 
         kind = complex if np.iscomplexobj(shift) else float
         operator = LinearOperator((2 * n, 2 * n), matvec=inverse, dtype=kind)
-        start = inverse(inverse(np.sin(1.0 + np.arange(2.0 * n)).astype(kind)))
+        start = inverse(inverse(_probes(2 * n, 1)[:, 0].astype(kind)))
         inverses, Z = eigs(operator, k, v0=start, tol=0.0)
         return shift + 1 / inverses, Z[:n]
 

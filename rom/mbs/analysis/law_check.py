@@ -79,8 +79,8 @@ class _Finding:
 
     @property
     def row(self) -> Row:
-        where = f": {self.where}" if self.where and not self.value <= self.limit else ""
         ok = bool(self.value <= self.limit)
+        where = "" if ok or not self.where else f": {self.where}"
         return Row(f"{self.what}{where}", self.value, f"<= {self.limit:g}", ok)
 
 
@@ -115,28 +115,21 @@ class _Asked:
         return self._call(1, motion, self.law.memory, np.zeros(2 * n * n)).reshape(2, n, n)
 
     def _call(self, which: int, motion: Array, memory: Array, out: Array) -> Array:
-        entry = self.law.compiled[which]
-        given = [_guarded(x) for x in (self.law.parameters, motion, memory, out)]
+        entry, mine = self.law.compiled[which], slice(GUARD_SIZE, -GUARD_SIZE)
+        arrays = [np.asarray(x, dtype=float) for x in (self.law.parameters, motion, memory, out)]
+        given = [np.pad(x, GUARD_SIZE, constant_values=GUARD_VALUE) for x in arrays]
         before = [x.copy() for x in given]
         if entry is not None:
-            inner = [x[GUARD_SIZE:].ctypes.data for x in given]
-            LAW_ENTRY(entry.address)(self.t, *inner)
+            LAW_ENTRY(entry.address)(self.t, *(x[GUARD_SIZE:].ctypes.data for x in given))
         else:
-            self._ask_python(*(x[GUARD_SIZE:-GUARD_SIZE] for x in given))
+            n, m, _ = self.law.sizes
+            parameters, motion, memory, out = (x[mine] for x in given)
+            answer = answer_of(out, n, m)
+            self.law.function(self.t, parameters, motion_of(motion, n), memory, answer)
         for x, y in zip(given[:3], before[:3], strict=True):
             self.harm += float((x != y).sum())
-        mine = slice(GUARD_SIZE, -GUARD_SIZE)
         self.harm += float((given[3] != GUARD_VALUE).sum() - (given[3][mine] != GUARD_VALUE).sum())
         return given[3][mine].copy()
-
-    def _ask_python(self, parameters: Array, motion: Array, memory: Array, out: Array) -> None:
-        n, m, _ = self.law.sizes
-        moved = motion_of(motion, n)
-        self.law.function(self.t, parameters, moved, memory, answer_of(out, n, m))
-
-
-def _guarded(x: Array) -> Array:
-    return np.pad(np.asarray(x, dtype=float), GUARD_SIZE, constant_values=GUARD_VALUE)
 
 
 def _motions(mechanism: Mechanism, law: Law, samples: int, rng: np.random.Generator) -> Any:

@@ -9,7 +9,7 @@ from scipy.sparse import csr_matrix
 
 from rom.arguments import typed
 from rom.errors import ConfigError, ModelError, warn
-from rom.mbs.analysis.few_modes import Pencil, Wanted
+from rom.mbs.analysis.few_modes import Pencil, Wanted, modes, phases
 from rom.mbs.analysis.local_equations import (
     Instant,
     consistent,
@@ -18,7 +18,6 @@ from rom.mbs.analysis.local_equations import (
     of_instant,
     of_unit_mass,
 )
-from rom.mbs.analysis.quadratic_eigen import modes, phases
 from rom.mbs.analysis.rotors.blades import Blades
 from rom.mbs.analysis.rotors.moving_axes import Axes, chosen, small_motions
 from rom.mbs.analysis.tangent import load_stiffness, sizes
@@ -145,11 +144,7 @@ class Linearization:
 
 
 def jacobian(packed: Packed, H: Array, marker: Marker) -> Array:
-    """(6, n) motion of a marker per coordinate, from those of all markers H (k, 6, 6 + R).
-
-    Raises:
-        ConfigError: if the marker is not one of the mechanism.
-    """
+    """(6, n) motion of a marker per coordinate, from those of all markers H (k, 6, 6 + R)."""
     if packed.markers.get(marker, len(H)) >= len(H):
         raise ConfigError(
             f"{marker!r} is not a marker of the mechanism.",
@@ -236,12 +231,10 @@ def linearize(  # noqa: PLR0913  keywords of the one entry, all have defaults
     if blades is not None:
         axes = replace(axes, blades=Blades.of(blades, now.packed, state))
     still = of_instant(mechanism, now, state)
-    if wanted is None:
-        found = _reduced(now, state, axes)
-    elif not (few := _few(now, state, axes, wanted)):
+    few = _few(now, state, axes, wanted) if wanted else None
+    if wanted and not few:
         return _part(linearize(mechanism, state, t=t, frame=frame, blades=blades), wanted)
-    else:
-        found = few
+    found = few or _reduced(now, state, axes)
     shares = {name: pressed(still, name) for name, part in mechanism.parts.items() if part.r}
     return replace(found, pressed={name: x for name, x in shares.items() if x is not None})
 
@@ -251,15 +244,14 @@ def _few(now: Instant, state: State, axes: Axes, wanted: Wanted) -> Linearizatio
     pencil, later, rate = sparse_equations(now, state, axes)
     if pencil is None or not pencil.affords(wanted):
         return None
+    known = None
     if pencil.symmetric:
         squares, Q = pencil.wanted(wanted)
-        known = None
+        K, C = np.diag(squares), np.zeros((squares.size, squares.size))
     else:
         roots, Y, Q = pencil.wanted_damped(wanted)
         known = roots, Y, np.concatenate([roots, roots.conj()])
-    K, C = pencil.seen_in(Q)
-    if known is None:
-        K, C = np.diag(squares), 0 * C
+        K, C = pencil.seen_in(Q)
     if state.v.any():
         _warn_of_drift((K, C), later.seen_in(Q), rate)
     now.evaluate(state.q, state.v)
@@ -292,7 +284,7 @@ def _rests(now: Instant, state: State, basis: Any, solve: Any) -> bool:
     """Whether a state has no velocity, and is so near to balance that its accelerations vanish.
 
     Light pieces of stiff bodies turn round-off of forces into accelerations of any size. ``solve``
-    gives the motions in the basis, of unit mass, under a load, for a stiffness added [1/s^2].
+    gives the motions in the basis, of unit mass, for a stiffness added [1/s^2] and a load.
     """
     if state.v.any() or not state.a.any():
         return not state.v.any()
@@ -326,12 +318,11 @@ def _reduced(now: Instant, state: State, axes: Axes) -> Linearization:
 
 def _warn_of_drift(now: tuple[Array, Array], later: tuple[Array, Array], rate: float) -> None:
     """Warn if stiffness and damping change within `PROBE_ANGLE`."""
-    weights = (1.0, rate)
-    sizes, changes = (
-        [w * np.abs(A).max(initial=0.0) for w, A in zip(weights, pair, strict=True)]
-        for pair in (now, [b - a for a, b in zip(now, later, strict=True)])
-    )
-    size, change = max(*sizes, rate**2), max(changes)
+
+    def largest(K: Array, C: Array) -> float:
+        return float(max(np.abs(K).max(initial=0.0), rate * np.abs(C).max(initial=0.0)))
+
+    size, change = max(largest(*now), rate**2), largest(later[0] - now[0], later[1] - now[1])
     if change > DRIFT_RTOL * PROBE_ANGLE * size:
         warn(
             f"the linear equations change with time, by {change / PROBE_ANGLE / size:.2g} of "
@@ -370,15 +361,13 @@ class _Path:
 
     def rates(self) -> tuple[Array, Array]:
         """First and second time derivative of the free motions."""
-        if self.rate == 0.0 or not self.Z.size:
-            return 0 * self.Z, 0 * self.Z
-        h = PROBE_ANGLE / self.rate
-        _, before = self.at(-h)
-        _, after = self.at(h)
-        change = max(np.abs(after - self.Z).max(), np.abs(before - self.Z).max())
-        if change < STEADY_RTOL * np.abs(self.Z).max():
-            return 0 * self.Z, 0 * self.Z
-        return (after - before) / (2 * h), (after - 2 * self.Z + before) / h**2
+        if self.rate > 0.0 and self.Z.size:
+            h = PROBE_ANGLE / self.rate
+            before, after = self.at(-h)[1], self.at(h)[1]
+            change = max(np.abs(after - self.Z).max(), np.abs(before - self.Z).max())
+            if change >= STEADY_RTOL * np.abs(self.Z).max():
+                return (after - before) / (2 * h), (after - 2 * self.Z + before) / h**2
+        return 0 * self.Z, 0 * self.Z
 
     def later(self) -> "_Path":
         """The same a little later."""

@@ -1,4 +1,7 @@
-"""How the equations of motion change around one state, and which motions the joints leave."""
+"""How the equations of motion change around one state, and which motions the joints leave.
+
+`snapshot` is such a state as a motion of one instant, which answers whatever motions answer.
+"""
 
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -7,7 +10,7 @@ from typing import Any
 import numpy as np
 from scipy.linalg import solve_triangular
 
-from rom.arguments import number
+from rom.arguments import number, typed
 from rom.errors import ConfigError, ModelError, SolverError
 from rom.mbs.equations.equations import (
     evaluate,
@@ -68,15 +71,10 @@ class Instant:
         return replace(self, load=load)
 
     def at(self, t: float) -> "Instant":
-        """The same at another time; the memory is shared.
-
-        Raises:
-            SolverError: if a drive or load is not finite then.
-        """
-        table = sample_all(
-            self.packed.signals, np.array([t]), (-np.inf, np.inf), DIFFERENCE_SPACING
-        )
-        good, failure = first_failure(self.packed.signals, np.array([t]), table)
+        """The same at another time; the memory is shared."""
+        signals, times = self.packed.signals, np.array([t])
+        table = sample_all(signals, times, (-np.inf, np.inf), DIFFERENCE_SPACING)
+        good, failure = first_failure(signals, times, table)
         if not good:
             raise failure
         self.W.signal[:] = table[0]
@@ -99,17 +97,13 @@ class Instant:
         apply_laws(self.laws, self.W, self.t)
 
     def residual(self, q: Array, v: Array, a: Array, lam: Array) -> Array:
-        """(n,) equations of motion M a + h - Q + G^T lam.
-
-        Raises:
-            SolverError: naming the law of a user that gives no finite number.
-        """
+        """(n,) equations of motion M a + h - Q + G^T lam."""
         self.evaluate(q, v)
         residual(self.system, self.W, q, v, a, lam)
         if self.packed.broken_laws:
-            what = f"no forces at t = {self.t:.9g} s{self.packed.broken_laws}."
             raise SolverError(
-                what, hint="Begin closer; what is wrong with a law of yours rom.check_law finds."
+                f"no forces at t = {self.t:.9g} s{self.packed.broken_laws}.",
+                hint="Begin closer; what is wrong with a law of yours rom.check_law finds.",
             )
         return self.W.residual.copy()
 
@@ -169,11 +163,7 @@ class Instant:
         return out
 
     def remember(self, state: State) -> None:
-        """Count the joint coordinates from those of a state.
-
-        Raises:
-            ConfigError: if the state belongs to another mechanism.
-        """
+        """Count the joint coordinates from those of a state."""
         if state.base is None:
             return
         if np.size(state.base) != self.W.base.size:
@@ -216,17 +206,7 @@ def difference(f: Any, step: Array) -> Array:
 
 
 def instant(mechanism: Any, t: float, *, sparse: bool | None = False) -> Instant:
-    """The mechanism with its drives and loads at time t.
-
-    Args:
-        mechanism: a `rom.Mechanism`.
-        t: time [s].
-        sparse: give sparse matrices; None for those of mechanisms with many coordinates.
-
-    Raises:
-        ConfigError: if it is no Mechanism, or t is not finite.
-        SolverError: if a drive or load is not finite.
-    """
+    """The mechanism with its drives and loads at time t [s]; sparse: None for large ones only."""
     if not isinstance(mechanism, Mechanism):
         raise ConfigError(f"{mechanism!r} must be a rom.Mechanism.")
     number("t", t)
@@ -244,14 +224,7 @@ def instant(mechanism: Any, t: float, *, sparse: bool | None = False) -> Instant
 def consistent(now: Instant, state: Any, assemble: bool = False) -> State:
     """The state with velocities, accelerations and multipliers that belong together.
 
-    Args:
-        now: the mechanism.
-        state: the state, None for the start.
-        assemble: see `rom.simulate`.
-
-    Raises:
-        ConfigError: if the state belongs to another mechanism.
-        ModelError: naming the joint that is open, or whose velocity contradicts it.
+    Raises ModelError naming the joint that is open, or whose velocity contradicts it.
     """
     packed, W = now.packed, now.W
     if state is None:
@@ -284,22 +257,16 @@ def _check(packed: Packed, miss: Array, limit: float, what: str) -> None:
 
 def free_motions(G: Array, scale: Array, rank: int) -> Array:
     """(n, n - rank) motions that the constraints G allow, orthonormal when divided by ``scale``."""
+    if not rank:
+        return np.diag(scale)
     A = G * scale
     norms = np.linalg.norm(A, axis=1)
-    V = (
-        np.linalg.svd(A / np.where(norms > 0, norms, 1.0)[:, None])[2]
-        if rank
-        else np.eye(len(scale))
-    )
+    V = np.linalg.svd(A / np.where(norms > 0, norms, 1.0)[:, None])[2]
     return scale[:, None] * V[rank:].T
 
 
 def of_unit_mass(Z: Array, mass: Array) -> Array:
-    """The same motions, combined so that Z^T mass Z is the unit matrix.
-
-    Raises:
-        SolverError: if the mass matrix is not positive definite.
-    """
+    """The same motions, combined so that Z^T mass Z is the unit matrix."""
     try:
         L = np.linalg.cholesky(Z.T @ mass @ Z)
     except np.linalg.LinAlgError as error:
@@ -312,9 +279,31 @@ def of_unit_mass(Z: Array, mass: Array) -> Array:
 
 def of_instant(mechanism: Mechanism, now: Instant, at: State) -> Solution:
     """A consistent state as a motion of one instant."""
-    W, works, status = now.W, np.zeros((1, len(WORK))), f"One instant, t = {at.t:g} s."
+    works, rank = np.zeros((1, len(WORK))), {"rank": at.rank}
+    status = f"One instant, t = {at.t:g} s."
     t, q, v, a, lam, base, signals = (
-        np.array([row]) for row in (at.t, at.q, at.v, at.a, at.lam, W.base, W.signal)
+        np.array([x]) for x in (at.t, at.q, at.v, at.a, at.lam, now.W.base, now.W.signal)
     )
-    rank = {"rank": at.rank}
     return Solution(mechanism, now.packed, t, q, v, a, lam, works, base, signals, rank, status, at)
+
+
+@typed
+def snapshot(mechanism: Mechanism, state: State) -> Solution:
+    """Ask an equilibrium, or any other state, for positions, reactions, loads and energies.
+
+    Accelerations and reactions are those that belong to the position and the velocities.
+
+    Args:
+        mechanism: the mechanism.
+        state: a state of it, as of `equilibrium` or ``solution.final``.
+
+    Returns:
+        A motion of one instant: its arrays have one row.
+
+    Raises:
+        ConfigError: if the state belongs to another mechanism.
+        ModelError: naming the joint that is open, or whose velocity contradicts it.
+        SolverError: if a drive or load is not finite then.
+    """
+    now = instant(mechanism, state.t)
+    return of_instant(mechanism, now, consistent(now, state))

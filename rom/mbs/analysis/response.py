@@ -185,15 +185,10 @@ class _Large:
 
     def motions(self, f: Array, load: Callable[[complex], Array], seen: Array) -> Array:
         """(f, k, l) motions seen (k, n) under loads (n, l), which depend on i omega."""
-        rates = 2j * np.pi * f
-        return np.array([seen @ self.amplitudes(s, load(s)) for s in rates])
+        return np.array([seen @ self.amplitudes(s, load(s)) for s in 2j * np.pi * f])
 
     def amplitudes(self, s: complex, load: Array) -> Array:
-        """(n, l) motions under harmonic loads; the error of the solution says if it is one.
-
-        Raises:
-            SolverError: where the response is infinite.
-        """
+        """(n, l) motions under harmonic loads; the error of the solution says if it is one."""
         p = self.pencil
         try:
             equations = p.inverse(p.K + s * p.C + s * s * p.M)

@@ -1,6 +1,7 @@
 """How results change with the parameters of a mechanism."""
 
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from inspect import signature
 from typing import Any
@@ -50,24 +51,6 @@ class Sensitivity:
         return self.derivative[..., self.names.index(name)]
 
 
-@dataclass(frozen=True)
-class _Path:
-    """Equilibria of a mechanism along one parameter, to first order.
-
-    Attributes:
-        step: of the parameter.
-        sides: mechanism, instant and state at minus and plus one step.
-    """
-
-    step: float
-    sides: tuple[tuple[Mechanism, Instant, State], ...]
-
-    def slope(self, f: Callable[[Mechanism, Instant, State], Any]) -> Any:
-        """Total derivative of a quantity by the parameter."""
-        before, after = (np.asarray(f(*side)) for side in self.sides)
-        return (after - before) / (2 * self.step)
-
-
 @typed
 def equilibrium_sensitivity(
     build: Builder, parameters: Mapping[str, float], output: Output, **options: Any
@@ -93,13 +76,12 @@ def equilibrium_sensitivity(
         ConfigError: for wrong parameters, or mechanisms of different size.
         ModelError: if the equilibrium spins, or is not unique.
     """
-    values = _checked(parameters, build=build)
+    values = _checked(parameters, "build", build)
     mechanism, state = _rest(build, values, options)
     value = np.asarray(output(mechanism, state))
     if value.dtype.kind not in "iufc":
         raise ConfigError(f"output gives {shortened(value)}; a number or an array is needed.")
-    paths = [_path(build, values, name, state) for name in values]
-    slopes = [path.slope(lambda mech, _, at: output(mech, at)) for path in paths]
+    slopes = [_slope(lambda mech, _, at: output(mech, at), build, values, k, state) for k in values]
     return _collected(values, value, slopes)
 
 
@@ -132,14 +114,14 @@ def frequency_sensitivity(
         Murthy and Haftka, Derivatives of eigenvalues and eigenvectors of a general complex matrix,
         Int. J. Numer. Meth. Engng. 26 (1988) 293.
     """
-    values = _checked(parameters, build=build)
+    values = _checked(parameters, "build", build)
     mechanism, state = _rest(build, values, options)
     now, linear = instant(mechanism, state.t), linearize(mechanism, state)
     here = _matrices(mechanism, now, state)
     triples = [_vectors(here, linear, k) for k in range(linear.eigenvalues.size)]
     slopes = []
     for name in values:
-        change = _path(build, values, name, state).slope(_matrices)
+        change = _slope(_matrices, build, values, name, state)
         slopes.append(np.array([_rate(here, change, *triple) for triple in triples]))
     return _collected(values, linear.eigenvalues, slopes)
 
@@ -162,26 +144,26 @@ def motion_sensitivity(result: Callable[..., Any], parameters: Mapping[str, floa
     Source:
         Ridders, Accurate computation of F'(x) and F'(x)F''(x), Adv. Eng. Software 4 (1982) 75.
     """
-    values = _checked(parameters, result=result)
+    values = _checked(parameters, "result", result)
     found = [_ridders(result, values, name) for name in values]
     value = np.asarray(result(**values), dtype=float)
     whole = _collected(values, value, [slope for slope, _ in found])
     return replace(whole, error=np.array([error for _, error in found]))
 
 
-def _checked(parameters: Mapping[str, float], **called: Callable[..., Any]) -> dict[str, float]:
+def _checked(
+    parameters: Mapping[str, float], name: str, called: Callable[..., Any]
+) -> dict[str, float]:
     """The parameters, if there are some and a function takes them by name."""
     if not parameters:
         raise ConfigError(f"parameters = {parameters!r} must be {{name: value}}.")
-    for name, function in called.items():
+    with suppress(ValueError):  # written in C, without a signature
         try:
-            signature(function).bind(**parameters)
+            signature(called).bind(**parameters)
         except TypeError as error:
             raise ConfigError(
                 f"{name} must take the parameters {sorted(parameters)} by name: {error}."
             ) from error
-        except ValueError:  # written in C, without a signature
-            continue
     return dict(parameters)
 
 
@@ -199,8 +181,17 @@ def _rest(
     return mechanism, state
 
 
-def _path(build: Builder, values: dict[str, float], name: str, state: State) -> _Path:
-    """The equilibria one step of a parameter before and after, by the implicit function theorem."""
+def _slope(
+    of: Callable[[Mechanism, Instant, State], Any],
+    build: Builder,
+    values: dict[str, float],
+    name: str,
+    state: State,
+) -> Any:
+    """Total derivative by a parameter: between the equilibria one step of it before and after.
+
+    They are there to first order, by the implicit function theorem.
+    """
     step = DIFFERENCE_STEP * (abs(values[name]) or 1.0)
     sides = []
     for sign in (-1, 1):
@@ -215,11 +206,12 @@ def _path(build: Builder, values: dict[str, float], name: str, state: State) -> 
     gaps = [now.gradient(state.q, state.v)[0] for _, _, now in sides]
     force, gap = tangent.T.T @ (forces[1] - forces[0]) / 2, (gaps[1] - gaps[0]) / 2
     change = replace(tangent, r=force, gap=gap).balanced()
-    moved = []
+    ends = []
     for sign, mechanism, now in sides:
         q = now.shifted(state.q, sign * change[0])
-        moved.append((mechanism, now, replace(state, q=q, lam=state.lam + sign * change[1])))
-    return _Path(step, tuple(moved))
+        moved = replace(state, q=q, lam=state.lam + sign * change[1])
+        ends.append(np.asarray(of(mechanism, now, moved)))
+    return (ends[1] - ends[0]) / (2 * step)
 
 
 def _matrices(_: Mechanism, now: Instant, state: State) -> Array:
@@ -234,22 +226,16 @@ def _matrices(_: Mechanism, now: Instant, state: State) -> Array:
 
 
 def _vectors(E: Array, linear: Linearization, k: int) -> tuple[complex, Array, Array]:
-    """Eigenvalue k with its right and left vector.
-
-    Raises:
-        ModelError: if another eigenvalue is equal.
-    """
+    """Eigenvalue k with its right and left vector."""
     s, every = linear.eigenvalues[k], linear.eigenvalues
-    others = np.delete(every, k)
-    near = np.abs(others - s).min(initial=np.inf)
+    near = np.abs(np.delete(every, k) - s).min(initial=np.inf)
     if near < SEPARATE_RTOL * np.abs(every).max():
         raise ModelError(
             f"two eigenvalues are equal ({abs(s):.6g} rad/s): neither has a derivative of its own.",
             hint="Let the parameters break the symmetry a little.",
         )
     n = linear.basis.shape[0]
-    full = np.array([s**2, s, 1.0]) @ E.reshape(3, -1)
-    full = full.reshape(E.shape[1:])
+    full = (np.array([s**2, s, 1.0]) @ E.reshape(3, -1)).reshape(E.shape[1:])
     U, _, V = np.linalg.svd(s**2 * linear.M + s * linear.C + linear.K)
     right, left = linear.basis @ V[-1].conj(), linear.test @ U[:, -1]
     A, block = full[n:, :n], full[:n, :n]

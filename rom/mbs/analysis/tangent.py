@@ -65,11 +65,8 @@ class Tangent:
 
     def none(self, squares: Array) -> float:
         """Stiffness that counts as none."""
-        return max(
-            STIFFNESS_RTOL * np.abs(squares).max(initial=0.0),
-            LOAD_STIFFNESS_RTOL * self.pull,
-            1e-300,
-        )
+        largest = np.abs(squares).max(initial=0.0)
+        return max(STIFFNESS_RTOL * largest, LOAD_STIFFNESS_RTOL * self.pull, 1e-300)
 
     def weakest(self) -> "Weakest":
         """All free motions."""
@@ -216,6 +213,5 @@ def sizes(packed: Packed, step: Array) -> tuple[float, float]:
         bend = step[first : first + r] * np.sqrt(modal / bodies.mass[b])
         shifts.append(float(np.linalg.norm(bend)) / packed.length)
     turn, shift = max(turns), max(shifts)
-    return float(max(turn, shift)), float(
-        1 / max(1.0, turn / MAX_ROTATION, shift / MAX_DISPLACEMENT)
-    )
+    share = 1 / max(1.0, turn / MAX_ROTATION, shift / MAX_DISPLACEMENT)
+    return float(max(turn, shift)), float(share)

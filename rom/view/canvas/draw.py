@@ -20,9 +20,7 @@ def main(folder: Path) -> None:
     """Draw every frame of the scene."""
     import pyvista
 
-    scene = json.loads((folder / "scene.json").read_text())
-    with np.load(folder / "arrays.npz", allow_pickle=False) as file:
-        arrays = dict(file)
+    scene, arrays = read(folder)
     (width, height), times = scene["size"], scene["oversampling"]
     plotter: Any = pyvista.Plotter(off_screen=True, window_size=[times * width, times * height])
     plotter.set_background("white")
@@ -41,6 +39,12 @@ def main(folder: Path) -> None:
             count.write(b".")
     np.save(folder / "pictures.npy", pictures)
     plotter.close()
+
+
+def read(folder: Path) -> tuple[dict[str, Any], dict[str, Any]]:
+    """A scene and its arrays, as `rom.view.canvas.offscreen.write_scene` leaves them."""
+    with np.load(folder / "arrays.npz", allow_pickle=False) as file:
+        return json.loads((folder / "scene.json").read_text()), dict(file)
 
 
 def averaged(fine: Any, times: int) -> Any:
@@ -67,31 +71,26 @@ def aim(plotter: Any, scene: dict[str, Any], arrays: dict[str, Any]) -> None:
 def add(plotter: Any, scene: dict[str, Any], arrays: dict[str, Any], k: int, frame: int) -> None:
     """Add an actor, or replace it by the one of the next frame."""
     style, values = scene["actors"][k], arrays.get(f"values {k}")
-    points = arrays[f"points {k}"][frame]
-    if arrays[f"cells {k}"].shape[1] < 3:  # lines and dots lie in front of the faces they are on
+    points, cells = arrays[f"points {k}"][frame], arrays[f"cells {k}"]
+    if cells.shape[1] < 3:  # lines and dots lie in front of the faces they are on
         points = points + EDGE_OFFSET * scene["height"] * arrays["toward"].astype(np.float32)
-    grid = _grid(points, arrays[f"cells {k}"])
-    look: dict[str, Any] = {
-        "opacity": style["opacity"],
-        "reset_camera": False,
-        "render": False,
-        "name": f"{k}",
-    }
+    grid = _grid(points, cells)
+    look: dict[str, Any] = {"opacity": style["opacity"], "name": f"{k}"}
+    look |= {"reset_camera": False, "render": False}
     if values is None:
         look["color"] = style["colour"]
     else:
         grid.point_data["value"] = values[min(frame, len(values) - 1)]
         look |= {"scalars": "value", "cmap": scene["colours"], "clim": scene["limits"]}
         look["show_scalar_bar"] = False
-    if arrays[f"cells {k}"].shape[1] < 3:
+    if cells.shape[1] < 3:
         look |= {"lighting": False, "line_width": scene["oversampling"] * style["width"]}
         look |= {"point_size": look["line_width"], "render_points_as_spheres": True}
     elif not style["lit"]:
         look |= {"lighting": False}
     else:
-        grid = grid.compute_normals(
-            feature_angle=CREASE_ANGLE, split_vertices=True, cell_normals=False
-        )
+        split = {"feature_angle": CREASE_ANGLE, "split_vertices": True}
+        grid = grid.compute_normals(cell_normals=False, **split)
         look |= {"smooth_shading": True, "ambient": 0.4, "diffuse": 0.65, "specular": 0.1}
     plotter.add_mesh(grid, **look)
 

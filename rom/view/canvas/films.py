@@ -15,7 +15,7 @@ from rom.io.files import write_whole
 from rom.names import ORIGIN_MARK
 from rom.process.child import run, scratch
 from rom.view.canvas.offscreen import Image, require
-from rom.view.canvas.style import checked
+from rom.view.canvas.page import checked
 
 ENDINGS = (".gif", ".mp4")
 ENCODER_PROGRAM = "ffmpeg"
@@ -63,12 +63,7 @@ class Film:
 
 
 def film_path(path: str | Path) -> Path:
-    """The path, if a film of that ending can be made and written; to be asked before drawing.
-
-    Raises:
-        ConfigError: naming the endings, or what is wrong with the folder.
-        ResourceError: if it takes ffmpeg, which is not there.
-    """
+    """The path, if a film of that ending can be made and written; to be asked before drawing."""
     place = checked(path, *ENDINGS)
     if place.suffix.lower() == ".mp4":
         encoder()
@@ -87,11 +82,7 @@ def finished(pages: Image, duration: float, path: Path | None) -> Film:
 
 
 def encoder() -> str:
-    """The program that makes .mp4.
-
-    Raises:
-        ResourceError: if it is not on the PATH.
-    """
+    """The program that makes .mp4."""
     found = shutil.which(ENCODER_PROGRAM)
     if found is None:
         raise ResourceError(
@@ -102,11 +93,7 @@ def encoder() -> str:
 
 
 def mp4(film: Film) -> bytes:
-    """The bytes of a film in H.264, for every player.
-
-    Raises:
-        ResourceError: if ffmpeg is missing or fails.
-    """
+    """The bytes of a film in H.264, for every player."""
     pages = even(film.pages)
     height, width = pages.shape[1:3]
     with scratch("film") as folder:
@@ -132,12 +119,7 @@ def even(pages: Image) -> Image:
 
 
 def gif(pages: Image, duration: float) -> bytes:
-    """The bytes of a film; one palette for all pictures, so that colours do not flicker.
-
-    Args:
-        pages: (f, height, width, 3) pictures.
-        duration: of each [s].
-    """
+    """The bytes of a film; one palette for all pictures, so that colours do not flicker."""
     require("PIL")
     from PIL import Image as Picture
 
@@ -145,18 +127,10 @@ def gif(pages: Image, duration: float) -> bytes:
     colours = pages[:: max(1, len(pages) // 8)].reshape(-1, 3)
     drawn = colours[colours.min(axis=1) < 250]  # white paper would take most of the palette
     sample = np.vstack([drawn, np.full((len(drawn) // 100 + 1, 3), 255, np.uint8)])
-    palette = Picture.fromarray(sample[None]).quantize(
-        256, method=Picture.Quantize.MEDIANCUT, kmeans=2
-    )
-    frames = [p.quantize(palette=palette, dither=Picture.Dither.NONE) for p in pictures]
+    how = Picture.Quantize.MEDIANCUT
+    palette = Picture.fromarray(sample[None]).quantize(256, method=how, kmeans=2)
+    first, *others = (p.quantize(palette=palette, dither=Picture.Dither.NONE) for p in pictures)
     buffer = io.BytesIO()
-    frames[0].save(
-        buffer,
-        format="GIF",
-        save_all=True,
-        append_images=frames[1:],
-        duration=max(20, round(1000 * duration)),
-        loop=0,
-        comment=ORIGIN_MARK.encode(),
-    )
+    told = {"duration": max(20, round(1000 * duration)), "comment": ORIGIN_MARK.encode()}
+    first.save(buffer, format="GIF", save_all=True, append_images=others, loop=0, **told)
     return buffer.getvalue()

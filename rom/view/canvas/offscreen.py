@@ -28,20 +28,10 @@ def render(
     limits: tuple[float, float] = (0.0, 1.0),
     oversampling: int = OVERSAMPLING,
 ) -> Image:
-    """Draw all frames of a scene.
+    """(f, height, width, 3) pixels of all frames of a scene; what has one frame stays.
 
-    Args:
-        actors: what is seen; those with one frame stay while the others move.
-        camera: from where.
-        limits: values at the ends of the colour map.
-        oversampling: pictures are drawn so many times larger and averaged.
-
-    Returns:
-        (f, height, width, 3) pixels.
-
-    Raises:
-        ResourceError: if pyvista is missing.
-        ConfigError: if it cannot draw on this machine.
+    The limits are values at the ends of the colour map. Pictures are drawn so many times larger as
+    ``oversampling`` says and averaged.
     """
     require("pyvista")
     with scratch("view") as folder:
@@ -57,15 +47,10 @@ def render(
 
 
 def require(package: str) -> None:
-    """Make sure that a package for pictures is there.
-
-    Raises:
-        ResourceError: naming it.
-    """
+    """Make sure that a package for pictures is there."""
     if find_spec(package) is None:
-        raise ResourceError(
-            f"pictures need {package}, which is not installed.", hint=f"{INSTALL_COMMAND}."
-        )
+        what = f"pictures need {package}, which is not installed."
+        raise ResourceError(what, hint=f"{INSTALL_COMMAND}.")
 
 
 def write_scene(
@@ -76,11 +61,8 @@ def write_scene(
     oversampling: int = OVERSAMPLING,
 ) -> None:
     """Leave a scene where a child process finds it."""
-    arrays: dict[str, npt.NDArray[Any]] = {
-        "focus": camera.focus,
-        "toward": camera.toward,
-        "up": camera.up,
-    }
+    arrays: dict[str, npt.NDArray[Any]]
+    arrays = {"focus": camera.focus, "toward": camera.toward, "up": camera.up}
     for k, actor in enumerate(actors):
         arrays |= {f"points {k}": actor.points.astype(np.float32), f"cells {k}": actor.cells}
         if actor.values is not None:

@@ -1,4 +1,7 @@
-"""Sheets of paper: pictures, words and colour bars, laid out in pixels from the top left."""
+"""Sheets of paper: pictures, words and colour bars, laid out in pixels from the top left.
+
+How they look, and where they may be written.
+"""
 
 import textwrap
 from collections.abc import Sequence
@@ -9,10 +12,9 @@ import numpy as np
 
 from rom.arguments import shortened
 from rom.errors import ConfigError
+from rom.io.files import check_writable
 from rom.view.canvas.offscreen import COLOUR_MAP, Image, require
 from rom.view.canvas.scene import TEXT_COLOUR
-from rom.view.canvas.style import checked as checked
-from rom.view.canvas.style import styled as styled
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -25,14 +27,30 @@ LINE_HEIGHT = 26  # of small text [pixel]
 LETTER_WIDTH = 0.545 * SMALL_SIZE * DPI / 72  # of small text, on the average [pixel]
 TICK_WIDTH = 45  # of a tick below a colour bar, with its number [pixel]
 HANDLE_WIDTH, ROW_HEIGHT = 80, 27  # of a legend: beside its names, and of a row [pixel]
+PAGE_STYLE = {"font.family": "DejaVu Sans", "axes.edgecolor": "#5c636e", "axes.linewidth": 0.8} | {
+    key: TEXT_COLOUR for key in ("text.color", "axes.labelcolor", "xtick.color", "ytick.color")
+}
+
+
+def styled() -> Any:
+    """Context in which axes and words get the look of the house."""
+    require("matplotlib")
+    from matplotlib import rc_context
+
+    return rc_context(PAGE_STYLE)
+
+
+def checked(path: str | Path, *endings: str) -> Path:
+    """The path, if pictures of that ending are made and it can be written."""
+    path = check_writable(path)
+    if path.suffix.lower() not in endings:
+        known = " or ".join(endings)
+        raise ConfigError(f"{path}: the ending {path.suffix!r} is unknown.", hint=f"Use {known}.")
+    return path
 
 
 def sheet(width: int, height: int) -> "Picture":
-    """A white sheet of that many pixels.
-
-    Raises:
-        ConfigError: if matplotlib is missing.
-    """
+    """A white sheet of that many pixels."""
     require("matplotlib")
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
@@ -44,11 +62,7 @@ def sheet(width: int, height: int) -> "Picture":
 
 
 def wanted(path: str | Path | None) -> Path | None:
-    """The path of a picture, checked, if it is to be written.
-
-    Raises:
-        ConfigError: see `checked`.
-    """
+    """The path of a picture, checked, if it is to be written."""
     return None if path is None else checked(path, ".png")
 
 
@@ -130,11 +144,9 @@ def legend_above(axes: Any, width: float, height: int = 0) -> None:
                     loc="lower left", bbox_to_anchor=(0.0, 1.0), borderpad=0.2, borderaxespad=0.1,
                     handlelength=2.0, handletextpad=0.6, columnspacing=1.3, labelspacing=0.35,
                     )  # fmt: skip
-    title = axes.get_title(loc="left")
-    if title:
-        axes.set_title(
-            title, loc="left", size=BODY_SIZE, pad=8 + max(height, rows * ROW_HEIGHT) * 72 / DPI
-        )
+    if title := axes.get_title(loc="left"):
+        pad = 8 + max(height, rows * ROW_HEIGHT) * 72 / DPI
+        axes.set_title(title, loc="left", size=BODY_SIZE, pad=pad)
 
 
 def colour_bar(
@@ -145,9 +157,8 @@ def colour_bar(
 ) -> None:
     """Horizontal colour bar with its scale below; the rectangle is that of the bar."""
     axes = area(figure, *rectangle)
-    axes.imshow(
-        np.linspace(0, 1, 512)[None], aspect="auto", cmap=COLOUR_MAP, extent=(*limits, 0.0, 1.0)
-    )
+    shade = np.linspace(0, 1, 512)[None]
+    axes.imshow(shade, aspect="auto", cmap=COLOUR_MAP, extent=(*limits, 0.0, 1.0))
     axes.set_yticks([])
     axes.tick_params(labelsize=SMALL_SIZE, pad=3, length=4)
     axes.locator_params(axis="x", nbins=int(np.clip(rectangle[2] // TICK_WIDTH, 1, 6)))
@@ -161,16 +172,7 @@ def pixels(figure: "Figure") -> Image:
 
 
 def taken(ax: Any, n: int, name: str) -> tuple["Figure", list[Any]]:
-    """The axes of a caller, one for each of n diagrams, and their figure.
-
-    Args:
-        ax: Axes of matplotlib, or several of them.
-        n: number of diagrams.
-        name: of the function that draws.
-
-    Raises:
-        ConfigError: if they are not so many.
-    """
+    """The axes of a caller of a function, one for each of n diagrams, and their figure."""
     require("matplotlib")
     from matplotlib.axes import Axes
 

@@ -19,13 +19,8 @@ DEGREES = (0.1, 3600.0)  # sizes of angles that are read in degrees
 def prefixed(size: float, unit: str) -> tuple[float, str]:
     """Factor and unit in which a size is read off: between 1 and 1000, angles in degrees.
 
-    Args:
-        size: largest value, in ``unit``.
-        unit: m, Pa, N, Hz, s, W, J or rad, or products and quotients that begin with one of them;
-            others stay as they are, and so do units that have a prefix already.
-
-    Returns:
-        What values are multiplied by, and the unit they have then.
+    Units are m, Pa, N, Hz, s, W, J or rad, or products and quotients that begin with one of them;
+    others stay as they are, and so do units that have a prefix already.
     """
     found = UNIT_PATTERN.match(unit)
     if not found or not 0.0 < size < np.inf:
@@ -58,38 +53,28 @@ def round_length(largest: float) -> float:
 
 
 def without_round_off(curves: Sequence[Array]) -> list[Array]:
-    """The curves of one panel; those that vary by round-off alone are constant.
+    """The curves (n,) of one panel and unit; those that vary by round-off alone are constant.
 
-    Args:
-        curves: (n,) values each, all in one unit; NaN leaves a gap.
+    NaN leaves a gap.
     """
     seen = [y[np.isfinite(y)] for y in curves]
-    size = max((np.abs(y).max(initial=0.0) for y in seen), default=0.0)
-    limit = ROUND_OFF * size
     every = np.concatenate([*seen, np.zeros(0)])
+    limit = ROUND_OFF * np.abs(every).max(initial=0.0)
     if every.size and np.ptp(every) <= limit:  # all of them are one constant
         return [np.where(np.isfinite(y), np.median(every), y) for y in curves]
-    return [
-        np.where(np.isfinite(y), _constant(known, limit), y)
-        if known.size and np.ptp(known) <= limit
-        else y
-        for y, known in zip(curves, seen, strict=True)
-    ]
-
-
-def _constant(y: Array, limit: float) -> float:
-    middle = float(np.median(y))
-    return 0.0 if abs(middle) <= limit else middle
+    flat = list(curves)
+    for k, known in enumerate(seen):
+        if known.size and np.ptp(known) <= limit:
+            middle = np.median(known) if abs(np.median(known)) > limit else 0.0
+            flat[k] = np.where(np.isfinite(flat[k]), middle, flat[k])
+    return flat
 
 
 def readable(axes: Any, *, alike: bool = False) -> None:
     """Ticks and labels of linear axes in prefixed units, where a label ends with "[unit]".
 
-    What is drawn stays in the unit of the label, so that more can be added in the same.
-
-    Args:
-        axes: of matplotlib, with labels and limits.
-        alike: whether both axes have one scale, and so one unit.
+    What is drawn stays in the unit of the label, so that more can be added in the same. Axes that
+    are alike have one scale, and so one unit.
     """
     sizes = [float(np.abs(axis.get_view_interval()).max()) for axis in (axes.xaxis, axes.yaxis)]
     for axis, size in zip((axes.xaxis, axes.yaxis), sizes, strict=True):

@@ -75,28 +75,21 @@ def aimed(
     up: npt.ArrayLike | None = None,
     heights: tuple[float, float] = HEIGHTS,
 ) -> Camera:
-    """A camera that sees all points with little space wasted.
+    """A camera that sees all points (..., 3) [m] with little space wasted.
 
-    Args:
-        points: (..., 3) everything to be seen [m].
-        width: of the picture [pixel].
-        view: (3,) direction from the things to the eye; None: mainly along the shortest extent.
-        up: (3,) upright direction; None: across the longest extent.
-        heights: bounds of the height of the picture, as shares of its width.
-
-    Raises:
-        ConfigError: if a direction is not three numbers, or they are parallel or zero.
+    Width [pixel] and bounds of the height, as shares of it, are those of the picture. Without
+    ``view`` it looks mainly along the shortest extent; without ``up`` the longest lies across.
     """
     points = np.asarray(points, dtype=float).reshape(-1, 3)
     toward, upright = _directions(points, view, up)
-    right = np.cross(upright, toward)
-    seen = points @ np.column_stack([right, upright, toward])
+    axes = np.column_stack([np.cross(upright, toward), upright, toward])
+    seen = points @ axes
     low, high = seen.min(axis=0), seen.max(axis=0)
     extent = np.maximum(high - low, 1e-6 * np.ptp(seen) + 1e-12)
     wide, tall = extent[:2] + 2 * MARGIN_RATIO * extent[:2].max()
     pixels = 2 * round(width * float(np.clip(tall / wide, *heights)) / 2)
-    focus = np.column_stack([right, upright, toward]) @ (0.5 * (low + high))
-    return Camera(focus, toward, upright, max(tall, wide * pixels / width), (width, pixels))
+    focus, height = axes @ (0.5 * (low + high)), max(tall, wide * pixels / width)
+    return Camera(focus, toward, upright, height, (width, pixels))
 
 
 def _directions(

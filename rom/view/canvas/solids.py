@@ -72,7 +72,6 @@ def cylinder(a: npt.ArrayLike, b: npt.ArrayLike, diameter: float, *, sides: int 
     Returns:
         (2 sides + 2, 3) points and (4 sides, 3) triangles.
     """
-    a, b = np.asarray(a, dtype=float), np.asarray(b, dtype=float)
     return tube(np.stack([a, b]), diameter, sides=sides)
 
 
@@ -98,9 +97,8 @@ def ring(
     if not 0.0 < inner < outer:
         raise ConfigError(f"a bore of {inner:g} m must be smaller than its ring of {outer:g} m.")
     x, y, _ = across(a, b)
-    loops = [_circle(x, y, d / 2, sides) for d in (inner, outer, outer, inner)]
-    ends = (a, a, b, b)
-    points = np.vstack([np.asarray(end) + loop for end, loop in zip(ends, loops, strict=True)])
+    corners = ((a, inner), (a, outer), (b, outer), (b, inner))
+    points = np.vstack([np.asarray(end) + _circle(x, y, d / 2, sides) for end, d in corners])
     i = np.arange(sides)
     return points, np.vstack([_band(k * sides + i, (k + 1) % 4 * sides + i) for k in range(4)])
 
@@ -178,8 +176,7 @@ def coil(
     Raises:
         ConfigError: if the wire is thicker than its bends allow.
     """
-    return wound(np.stack([np.asarray(a, dtype=float), np.asarray(b, dtype=float)]), diameter,
-                 wire, turns=turns)  # fmt: skip
+    return wound(np.stack([a, b]), diameter, wire, turns=turns)
 
 
 @typed
@@ -209,11 +206,7 @@ def wound(line: npt.ArrayLike, diameter: float, wire: float, *, turns: float = 6
 
 
 def _curve(line: npt.ArrayLike) -> tuple[Array, Array]:
-    """(k, 3) points of a curve and (k,) way along it [m].
-
-    Raises:
-        ConfigError: if the points are no curve.
-    """
+    """(k, 3) points of a curve and (k,) way along it [m]."""
     X = finite("the line of a tube", line, (None, 3))
     whole("points of the line of a tube", len(X), 2)
     lengths = np.linalg.norm(np.diff(X, axis=0), axis=1)
@@ -342,18 +335,14 @@ def involute(angle: Any) -> Any:
 @typed
 def joined(meshes: Sequence[Mesh]) -> Mesh:
     """Several surfaces as one."""
-    first = np.cumsum([0, *(len(points) for points, _ in meshes)])[:-1]
-    return np.vstack([points for points, _ in meshes]), np.vstack(
-        [triangles + n for n, (_, triangles) in zip(first, meshes, strict=True)]
-    )
+    points, triangles = zip(*meshes, strict=True)
+    first = np.cumsum([0, *map(len, points)])[:-1]
+    moved = [several + n for several, n in zip(triangles, first, strict=True)]
+    return np.vstack(points), np.vstack(moved)
 
 
 def across(a: npt.ArrayLike, b: npt.ArrayLike) -> tuple[Array, Array, Array]:
-    """Right-handed unit vectors x, y and z with z from one point towards the other.
-
-    Raises:
-        ConfigError: if both are in one place.
-    """
+    """Right-handed unit vectors x, y and z with z from one point towards the other."""
     z = np.asarray(b, dtype=float) - np.asarray(a, dtype=float)
     length = np.linalg.norm(z)
     if not length > 0.0:

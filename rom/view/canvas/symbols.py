@@ -56,11 +56,7 @@ def spiral(size: float) -> Lines:
 
 
 def pedestal(size: float, width: float) -> tuple[Mesh, tuple[Mesh, Lines]]:
-    """Support of a joint at the origin: a wedge on a hatched plate below it, its edges along x.
-
-    Returns:
-        The wedge, and the plate with its hatching.
-    """
+    """Support of a joint at the origin: a wedge, its edges along x, and a hatched plate below."""
     wedge = extruded([(-1.5 * size, -1.2 * size), (1.5 * size, -1.2 * size), (0.35 * size, size),
                       (-0.35 * size, size)], width)  # fmt: skip
     points = np.roll(wedge[0], 1, axis=1) - (0, 0, size)  # the outline from x, y to y, z

@@ -54,10 +54,8 @@ def history(  # noqa: PLR0913  keywords of one picture
         title: heading.
         caption: what a stranger has to know; not written into axes of yours.
         over: label of the horizontal axis, with its unit, when that is not time.
-        beside: what the curves belong to, or several scenes from top to bottom; None for curves
-            alone.
-        ax: Axes of matplotlib to draw into, one for each panel and one for each scene beside
-            them; None for a page of its own.
+        beside: one or more scenes from top to bottom to which the curves belong.
+        ax: Axes of matplotlib, one for each panel, then each scene; None for a page of its own.
 
     Returns:
         The figure; that of ``ax`` where it is given.
@@ -86,30 +84,30 @@ def numbered(panels: Sequence[Sequence[str]]) -> list[list[int]]:
     for names in panels:
         taken = {known[name] for name in names if name in known}
         free = iter(k for k in range(len(names) + len(known)) if k not in taken)
-        own = [known[name] if name in known else next(free) for name in names]
-        known |= {name: k for name, k in zip(names, own, strict=True) if name}
-        numbers.append(own)
+        numbers.append([known[name] if name in known else next(free) for name in names])
+        known |= {name: k for name, k in zip(names, numbers[-1], strict=True) if name}
     return numbers
 
 
 def _histories(axes: Any, t: Array, curves: dict[str, Any], numbers: Sequence[int]) -> None:
-    pairs = [isinstance(values, tuple) for values in curves.values()]
-    levels = [not pair and np.ndim(v) == 0 for v, pair in zip(curves.values(), pairs, strict=True)]
-    lines = []
-    for (name, values), pair, level in zip(curves.items(), pairs, levels, strict=True):
-        values = np.full_like(t, values) if level else values
-        if not pair and np.asarray(values).dtype.kind == "U":
+    lines, looks = [], []
+    for (name, values), number in zip(curves.items(), numbers, strict=True):
+        look, where = line_look(number), t
+        if isinstance(values, tuple):
+            where, values = values
+            look |= {"ls": "none", "marker": "o", "ms": 7, "clip_on": False}
+        elif np.ndim(values) == 0:
+            values = np.full_like(t, values)
+            look |= LEVEL_STYLE
+        elif np.asarray(values).dtype.kind == "U":
             values = _rows(axes, values)
-        x, y = (np.asarray(v, dtype=float) for v in (values if pair else (t, values)))
+        x, y = (np.asarray(v, dtype=float) for v in (where, values))
         one_each(f"values of {name!r}", y.shape, "times", x.shape)
         lines.append((x, y))
+        looks.append(look | {"label": name})
     flat = without_round_off([y for _, y in lines])
-    for k, (name, (x, _), y) in enumerate(zip(curves, lines, flat, strict=True)):
-        number = numbers[k]
-        look = line_look(number)
-        look |= {"ls": "none", "marker": "o", "ms": 7, "clip_on": False} if pairs[k] else {}
-        look |= LEVEL_STYLE if levels[k] else {}
-        axes.plot(x, y, label=name, **look)
+    for (x, _), y, look in zip(lines, flat, looks, strict=True):
+        axes.plot(x, y, **look)
 
 
 def line_look(k: int) -> dict[str, Any]:
@@ -142,9 +140,9 @@ def _complete(areas: Sequence[Any], xlabel: str, ax: Any) -> None:
     for axes, once in zip(areas, _once(names), strict=True):
         if once:
             page.legend_above(axes, axes.get_window_extent().width)
-    for axes in areas[:-1]:
-        axes.set_xlabel("")
-        axes.tick_params(labelbottom=False)
+        if axes is not areas[-1]:
+            axes.set_xlabel("")
+            axes.tick_params(labelbottom=False)
 
 
 @typed
@@ -162,8 +160,8 @@ def frequencies(
         comparison: {support: {"full": [Hz], "reduced": [Hz]}}, as in the provenance of a body.
         path: picture to write, .png; None to write nothing.
         title: heading.
-        beside: what vibrates, or several scenes from top to bottom; None for curves alone.
-        ax: Axes of matplotlib to draw into, and one for each scene; None for a page of its own.
+        beside: one or more scenes from top to bottom of what vibrates.
+        ax: Axes of matplotlib, and one for each scene; None for a page of its own.
 
     Returns:
         The figure; that of ``ax`` where it is given.
@@ -188,9 +186,9 @@ def frequencies(
             error = np.maximum(np.abs(reduced / full - 1), MIN_ERROR)
             longest = max(longest, full.size)
             look = line_look(k) | {"marker": MARKERS[k % len(MARKERS)]}
-            look |= {"ms": max(4, 10 - 2 * k)}  # curves may coincide
+            look["ms"] = max(4, 10 - 2 * k)  # curves may coincide
             axes.semilogy(np.arange(1, full.size + 1), error, label=support, **look)
-        axes.axhline(1e-3, color="#5c636e", lw=1.0, ls="--")
+        axes.axhline(1e-3, color=GREY, lw=1.0, ls="--")
         axes.set_xticks(range(1, longest + 1))
         axes.set_ylabel("relative error")
         _complete([axes], "elastic mode", ax)
@@ -217,10 +215,8 @@ def convergence(
         xlabel: what the sizes count.
         title: heading.
         caption: what a stranger has to know; not written into axes of yours.
-        beside: what the errors belong to, or several scenes from top to bottom; None for curves
-            alone.
-        ax: Axes of matplotlib to draw into, one for each panel and one for each scene beside
-            them; None for a page of its own.
+        beside: one or more scenes from top to bottom to which the errors belong.
+        ax: Axes of matplotlib, one for each panel, then each scene; None for a page of its own.
 
     Returns:
         The figure; that of ``ax`` where it is given.
@@ -271,10 +267,9 @@ def campbell(  # noqa: PLR0913  keywords of one picture
         marks: {name: speed [rad/s]} drawn as upright lines.
         title: heading.
         caption: what a stranger has to know; not written into axes of yours.
-        beside: what vibrates, or several scenes from top to bottom; None for curves
-            alone.
-        ax: Axes of matplotlib to draw into, two if there is damping, and one for each scene
-            beside them; None for a page of its own.
+        beside: one or more scenes from top to bottom of what vibrates.
+        ax: Axes of matplotlib, two if there is damping, then one for each scene; None for a page
+            of its own.
 
     Returns:
         The figure; that of ``ax`` where it is given.
@@ -365,11 +360,7 @@ def _same_sizes(areas: Sequence[Any], sizes: list[Any]) -> None:
 
 
 def near_ticks(axis: Any) -> None:
-    """Ticks at 1, 2 and 5 where the values on a logarithmic axis span too little for powers of ten.
-
-    Args:
-        axis: of matplotlib, horizontal or vertical.
-    """
+    """Ticks at 1, 2 and 5 where values on a logarithmic axis span too little for powers of ten."""
     from matplotlib.ticker import NullFormatter
 
     low, high = axis.get_view_interval()
@@ -400,16 +391,7 @@ def _panels(
     caption: str,
     beside: Scene | Sequence[Scene] | None,
 ) -> tuple[Any, list[Any]]:
-    """Figure and axes: those of the caller, or one below the other on a page.
-
-    Args:
-        ax: of the caller.
-        legends: names of the curves of each panel.
-        name: of the function that draws.
-        title: heading.
-        caption: what a stranger has to know.
-        beside: what stands beside the panels, from top to bottom.
-    """
+    """Figure and axes: those of the caller, or one below the other on a page with their legends."""
     scenes, n = [beside] if isinstance(beside, Scene) else list(beside or ()), len(legends)
     if ax is not None:
         figure, areas = page.taken(ax, n + len(scenes), name)
@@ -424,9 +406,9 @@ def _panels(
     figure = page.titled(PAGE_WIDTH, int(feet[-1]) + 85, title, caption)
     areas = [page.area(figure, 150, foot - PANEL_HEIGHT, width, PANEL_HEIGHT) for foot in feet]
     tall = (feet[-1] - 45 + SCENE_GAP) / max(1, len(scenes))
+    left = PAGE_WIDTH - BESIDE_WIDTH - 20
     for k, scene in enumerate(scenes):
-        left, top = PAGE_WIDTH - BESIDE_WIDTH - 20, 105 + k * tall
-        area = page.area(figure, left, top, BESIDE_WIDTH, tall - SCENE_GAP)
+        area = page.area(figure, left, 105 + k * tall, BESIDE_WIDTH, tall - SCENE_GAP)
         draw_scene(figure, area, scene, scenes)
     return figure, areas
 
@@ -479,9 +461,10 @@ def fill(
 
 def _uncover(axes: Any) -> None:
     """A curve with a name is wider if it lies under another of its dashes, so that it shows."""
-    seen = [(line, line.get_linestyle(), axes.transData.transform(line.get_xydata()))
-            for line in axes.lines
-            if line.get_linestyle() != "None" and not line.get_label().startswith("_")]  # fmt: skip
+    pixels = axes.transData.transform
+    named = [line for line in axes.lines if not line.get_label().startswith("_")]
+    seen = [(line, line.get_linestyle(), pixels(line.get_xydata())) for line in named]
+    seen = [one for one in seen if one[1] != "None"]
     for k, (line, dashes, x) in enumerate(seen):
         above = sum(dashes == other and x.shape == y.shape
                     and np.allclose(x, y, 0.0, COVER_DISTANCE, equal_nan=True)

@@ -112,9 +112,8 @@ def plane(
         areas = []
         for k, drawing in enumerate(drawings):
             row, column = divmod(k, columns)
-            left = 95 + column * (width + COLUMN_GAP)
+            left, top = 95 + column * (width + COLUMN_GAP), 110 + row * (height + gap)
             narrow = BAR_WIDTH if isinstance(drawing, Drawing) and drawing.label else 0
-            top = 110 + row * (height + gap)
             areas.append(page.area(figure, left, top, width - narrow, height))
         fill(figure, areas, drawings, _draw, legend=False)
         return page.save(figure, path)
@@ -189,10 +188,11 @@ def _fill(axes: Any, drawing: Drawing) -> None:
 
     look: dict[str, Any] = {"edgecolor": EDGE_COLOUR, "linewidth": 0.8}
     if drawing.values is None:
-        axes.add_collection(PolyCollection(drawing.polygons, facecolor=STONE_COLOUR, **look))
+        look["facecolor"] = STONE_COLOUR
     else:
-        values = np.asarray(drawing.values, dtype=float)
-        blocks = PolyCollection(drawing.polygons, array=values, cmap=COLOUR_MAP, **look)
-        axes.add_collection(blocks)
+        look |= {"array": np.asarray(drawing.values, dtype=float), "cmap": COLOUR_MAP}
+    blocks = PolyCollection(drawing.polygons, **look)
+    axes.add_collection(blocks)
+    if drawing.values is not None:
         _colour_bar(axes, blocks, drawing)
     axes.autoscale_view()

@@ -128,11 +128,10 @@ def _columns(row: Sequence[Panel | Scene]) -> list[tuple[float, float]]:
     others = widths.count(0.0)
     columns, end = [], float(RIGHT_MARGIN)
     for panel, own in zip(row, widths, strict=True):
-        width = whole / len(row) if not others else own or (whole - sum(widths)) / others
-        left = end + (LEFT_MARGIN if isinstance(panel, Panel) else 0)
-        if isinstance(panel, Panel) and panel.bars:
-            left += page.LETTER_WIDTH * max(map(len, panel.bars)) + 25 - LEFT_MARGIN
-        end += width
+        left, bars = end, getattr(panel, "bars", ())
+        if isinstance(panel, Panel):
+            left += page.LETTER_WIDTH * max(map(len, bars)) + 25 if bars else LEFT_MARGIN
+        end += whole / len(row) if not others else own or (whole - sum(widths)) / others
         columns.append((left, end - RIGHT_MARGIN - left))
     return columns
 
@@ -185,8 +184,7 @@ def _draw(axes: Any, panel: Panel, numbers: Mapping[str, int]) -> None:
     axes.set_xlabel(panel.xlabel)
     axes.set_ylabel(panel.ylabel)
     if panel.log:
-        axes.set_xscale("log")
-        axes.set_yscale("log")
+        axes.loglog()
         near_ticks(axes.xaxis)
         near_ticks(axes.yaxis)
     if not (panel.xlabel or panel.ylabel):
@@ -195,22 +193,20 @@ def _draw(axes: Any, panel: Panel, numbers: Mapping[str, int]) -> None:
 
 def _lines(panel: Panel) -> tuple[dict[str, Line], dict[str, Line]]:
     """Curves and points; along linear axes without round-off."""
-    given = [(name, line) for lines in (panel.curves, panel.points) for name, line in lines.items()]
-    names, lines = [name for name, _ in given], [_paired(name, line) for name, line in given]
+    lines = [_paired(*one) for some in (panel.curves, panel.points) for one in some.items()]
     if not panel.log and lines:
         x, y = (without_round_off(list(values)) for values in zip(*lines, strict=True))
         lines = list(zip(x, y, strict=True))
     n = len(panel.curves)
-    return dict(zip(names[:n], lines[:n], strict=True)), dict(
-        zip(names[n:], lines[n:], strict=True)
-    )
+    curves = dict(zip(panel.curves, lines[:n], strict=True))
+    return curves, dict(zip(panel.points, lines[n:], strict=True))
 
 
 def _draw_bars(axes: Any, bars: Mapping[str, tuple[float, float]], ends: Any) -> None:
     low, high = np.array(list(bars.values()), dtype=float).T
-    parts = (
-        [(low, high - low, None)] if ends is None else [(0.0, low, ends[0]), (0.0, high, ends[1])]
-    )
+    parts: list[Any] = [(low, high - low, None)]
+    if ends is not None:
+        parts = [(0.0, low, ends[0]), (0.0, high, ends[1])]
     for k, (left, width, name) in enumerate(parts):
         axes.barh(np.arange(len(bars)), width, left=left, height=0.6, color=LINES[k], label=name)
     axes.axvline(0.0, color="#22262b", lw=0.8)

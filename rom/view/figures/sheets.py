@@ -118,10 +118,7 @@ def deformed(  # noqa: PLR0913  keywords of one picture
 
 
 def _tending(
-    axes: Any,
-    curves: dict[str, tuple[Any, Any]],
-    limit: tuple[str, float],
-    labels: tuple[str, str],
+    axes: Any, curves: dict[str, tuple[Any, Any]], limit: tuple[str, float], labels: Sequence[str]
 ) -> None:
     """Curves and the limit they tend to."""
     for k, (name, (x, y)) in enumerate(curves.items()):

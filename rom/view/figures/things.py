@@ -12,11 +12,10 @@ from rom.arguments import one_each, typed
 from rom.errors import ConfigError
 from rom.model import Array, Index
 from rom.view.canvas import page
-from rom.view.canvas.corner import BAR_SIZE, STRIP_HEIGHT, TRIAD_SIZE, corner
 from rom.view.canvas.films import Film, finished, wanted
 from rom.view.canvas.offscreen import Image, render
-from rom.view.canvas.scales import clock_texts
-from rom.view.canvas.scene import HEIGHTS, Actor, Camera, aimed, sharp_edges
+from rom.view.canvas.scales import clock_texts, round_length, written
+from rom.view.canvas.scene import HEIGHTS, TEXT_COLOUR, Actor, Camera, aimed, sharp_edges
 from rom.view.canvas.solids import Mesh, extruded, joined
 
 # of things without one
@@ -27,6 +26,10 @@ LEAST_COLOURED = 40  # of what shows values, the longer side, or its colours are
 ROW_HEIGHT = 32  # of names [pixel]
 PAGE_TOP, STILL_WIDTH = 80, 740  # of a page with a heading; of one of several pictures [pixel]
 NO_LINES = np.zeros((0, 2), dtype=int)
+AXIS_COLOURS = ("#c0392b", "#3a8f4d", "#2f6fb0")  # of x, y and z
+TRIAD_SIZE, BAR_SIZE = 96, 130  # of the square of the axes, and of the longest bar [pixel]
+STRIP_HEIGHT = 100  # of the strip that holds both [pixel]
+HIDDEN_LENGTH = 0.12  # of an axis towards the eye, which is a dot
 
 
 @typed
@@ -106,10 +109,11 @@ def plates(
     counts = [len(points) for points, _ in frames[0]] if frames else []
     if not counts or any([len(p) for p, _ in still] != counts for still in frames):
         raise ConfigError("at least one plate is needed, with as many corners in each picture.")
-    per_plate = None if values is None else np.atleast_1d(np.asarray(values, dtype=float))
-    if per_plate is not None:
+    of_points = None
+    if values is not None:
+        per_plate = np.atleast_1d(np.asarray(values, dtype=float))
         one_each("values", per_plate.shape, "plates", (len(counts),))
-    of_points = None if per_plate is None else np.repeat(per_plate, counts)
+        of_points = np.repeat(per_plate, counts)
     points = np.stack([joined(still)[0] for still in frames])
     return Thing(points, joined(frames[0])[1], colour, values=of_points)
 
@@ -167,11 +171,7 @@ def film(
 
 
 def draw_scene(figure: Any, axes: Any, scene: Scene, among: Sequence[Scene] = ()) -> None:
-    """Draw the first picture of a scene, among others, into axes; what stands below it, too.
-
-    Raises:
-        ConfigError: if something is no thing, or pictures cannot be made here.
-    """
+    """Draw the first picture of a scene, among others, into axes; what stands below it, too."""
     wide, tall = figure.get_size_inches() * page.DPI
     place = axes.get_position()
     left, right, top = place.x0 * wide, place.x1 * wide, (1 - place.y1) * tall
@@ -247,20 +247,14 @@ def below_height(scene: Scene, width: int) -> int:
 
 def actors_of(scene: Scene) -> list[Actor]:
     """What is drawn: each thing, and its edges."""
-    drawn = []
-    for (name, thing), colour in zip(scene.things.items(), _colours(scene).values(), strict=True):
-        drawn += thing_actors(name, thing, colour)
+    drawn = [thing_actors(name, scene.things[name], c) for name, c in _colours(scene).items()]
     if not drawn:
         raise ConfigError(f"there is nothing to draw in {scene.title!r}; give it a thing.")
-    return drawn
+    return [actor for several in drawn for actor in several]
 
 
 def thing_actors(name: str, thing: Thing | Mesh, colour: str) -> list[Actor]:
-    """A thing and its edges.
-
-    Raises:
-        ConfigError: for numbers of another shape, or cells between points that are not there.
-    """
+    """A thing and its edges."""
     thing = thing if isinstance(thing, Thing) else Thing(*thing)
     points, cells = np.asarray(thing.points, dtype=float), np.asarray(thing.cells)
     points = points[None] if points.ndim == 2 else points
@@ -271,9 +265,9 @@ def thing_actors(name: str, thing: Thing | Mesh, colour: str) -> list[Actor]:
         raise ConfigError(f"{name!r}: cells must be (m, 1), (m, 2) or (m, 3) from 0 to {n - 1}"
                           f", got {cells.dtype} {cells.shape}.")  # fmt: skip
     values = None if thing.values is None else np.atleast_2d(np.asarray(thing.values, dtype=float))
-    if values is not None and values.shape not in ((1, n), points.shape[:2]):
-        raise ConfigError(f"{name!r} has {values.shape} values, needed are {points.shape[:2]}.")
     if values is not None:
+        if values.shape not in ((1, n), points.shape[:2]):
+            raise ConfigError(f"{name!r} has {values.shape} values, needed are {points.shape[:2]}.")
         values = np.broadcast_to(values, points.shape[:2])
     body = Actor(points, cells, values, colour, thing.width, thing.opacity)
     return [body, *_edges(name, thing, points, cells)]
@@ -306,25 +300,21 @@ def _colours(scene: Scene) -> dict[str, str]:
     """Of each thing: its own, or the next one of the house."""
     chosen: dict[str, str] = {}
     for name, thing in scene.things.items():
-        own = thing.colour if isinstance(thing, Thing) else ""
-        free = len([c for c in chosen.values() if c in COLOURS])
-        chosen[name] = own or COLOURS[free % len(COLOURS)]
+        taken = sum(colour in COLOURS for colour in chosen.values())
+        chosen[name] = getattr(thing, "colour", "") or COLOURS[taken % len(COLOURS)]
     return chosen
 
 
 def _legend(scene: Scene) -> list[str]:
-    return [
-        name
-        for name, thing in scene.things.items()
-        if not name.startswith("_") and getattr(thing, "values", None) is None
-    ]
+    plain = (name for name, thing in scene.things.items() if getattr(thing, "values", None) is None)
+    return [name for name in plain if not name.startswith("_")]
 
 
 def _limits(actors: Sequence[Actor]) -> tuple[float, float]:
     values = [actor.values for actor in actors if actor.values is not None]
     low = min((float(v.min()) for v in values), default=0.0)
-    high = max((float(v.max()) for v in values), default=1.0)
-    return min(0.0, low), high if high > min(0.0, low) else min(0.0, low) + 1.0
+    low, high = min(0.0, low), max((float(v.max()) for v in values), default=1.0)
+    return low, high if high > low else low + 1.0
 
 
 def _seen(actors: Sequence[Actor], frames: slice = slice(None)) -> Array:
@@ -346,6 +336,46 @@ def below_view(figure: Any, view: View, strip: tuple[float, float, float]) -> No
         at, level = left + at, top + STRIP_HEIGHT + ROW_HEIGHT * row
         page.words(figure, "\u25a0", at, level - 3, color=colours[name], size=page.TITLE_SIZE)
         page.words(figure, name, at + 26, level, size=page.SMALL_SIZE)
+
+
+def corner(figure: Any, camera: Camera, left: float, right: float, top: float) -> None:
+    """Axes of the world at the left end of a strip, a round length at its right end [pixel]."""
+    triad(page.area(figure, left, top, TRIAD_SIZE, TRIAD_SIZE), camera)
+    length, wide = scale(camera)
+    x = right - (BAR_SIZE + wide) / 2
+    bar = page.area(figure, x, top + 52, wide, 10)
+    bar.set_axis_off()
+    bar.plot([0, 0, 0, 1, 1, 1], [0, 1, 0.5, 0.5, 1, 0], color=TEXT_COLOUR, lw=1.4, clip_on=False)
+    bar.set_xlim(0, 1)
+    bar.set_ylim(0, 1)
+    page.words(figure, written(length, "m"), right - BAR_SIZE / 2, top + 24, size=page.SMALL_SIZE,
+               ha="center")  # fmt: skip
+
+
+def scale(camera: Camera) -> tuple[float, float]:
+    """A round length [m] and how many pixels of the picture it takes."""
+    length = round_length(BAR_SIZE / camera.metre)
+    return length, length * camera.metre
+
+
+def triad(axes: Any, camera: Camera) -> None:
+    """The axes of the world as the camera sees them, the nearest one last."""
+    axes.set_axis_off()
+    axes.set_xlim(-1.45, 1.45)
+    axes.set_ylim(-1.45, 1.45)
+    seen = camera.axes
+    for k in np.argsort(seen[:, 2]):
+        x, y = seen[k, :2]
+        colour, long = AXIS_COLOURS[k], float(np.hypot(x, y))
+        if long > HIDDEN_LENGTH:
+            arrow = {"arrowstyle": "-|>", "color": colour, "lw": 1.6, "shrinkA": 0, "shrinkB": 0,
+                     "mutation_scale": 8}  # fmt: skip
+            axes.annotate("", (x, y), (0, 0), arrowprops=arrow)
+            x, y = x * (1 + 0.26 / long), y * (1 + 0.26 / long)
+        else:  # it points at the reader, or away from him
+            axes.plot(0, 0, "o", color=colour, ms=5)
+            x, y = -0.3, -0.3
+        axes.text(x, y, "xyz"[k], color=colour, size=page.SMALL_SIZE, ha="center", va="center")
 
 
 def scene_page(view: View, caption: str) -> Any:

@@ -12,10 +12,10 @@ from rom.errors import ConfigError
 from rom.io.fields.gltf import MovingMesh, write_glb
 from rom.io.fields.vtkhdf import write_vtkhdf
 from rom.model import Array
+from rom.view.canvas.page import checked
 from rom.view.canvas.solids import Mesh
-from rom.view.canvas.style import checked
 from rom.view.scenes.film import shades_of, upright
-from rom.view.scenes.places import placed
+from rom.view.scenes.places import evenly, placed
 from rom.view.scenes.rigid import check_bodies, form_of
 
 METAL_COLOURS = ((0.42, 0.48, 0.55), (0.62, 0.66, 0.70), (0.30, 0.34, 0.39))  # rigid bodies
@@ -56,7 +56,7 @@ def write_animation(
     check_bodies(solution.mechanism, "shapes", shapes)
     if min(frames, solution.t.size) < 2 or (seconds is not None and not 0 < seconds < np.inf):
         raise ConfigError(f"a film needs 2 frames in more than 0 s, got {frames} in {seconds} s.")
-    steps = np.linspace(0, solution.t.size - 1, min(frames, solution.t.size)).round().astype(int)
+    steps = evenly(solution.t.size, min(frames, solution.t.size))
     bodies = _bodies(solution, steps, shapes, magnify)
     t = solution.t[steps]
     if path.suffix.lower() == ".vtkhdf":
@@ -65,8 +65,9 @@ def write_animation(
     if seconds is not None:
         times *= seconds / times[-1]
     title = "motion" if magnify == 1.0 else f"motion, deformation drawn {magnify:g} times larger"
-    up = upright(solution.mechanism) if up is None else unit_vector("up", up)
-    return write_glb(bodies, times, path, up=np.eye(3)[2] if up is None else up, title=title)
+    upward = upright(solution.mechanism, None if up is None else unit_vector("up", up))
+    upward = np.eye(3)[2] if upward is None else upward
+    return write_glb(bodies, times, path, up=upward, title=title)
 
 
 def _bodies(solution: Any, steps: Any, shapes: dict[str, Mesh], magnify: float) -> list[MovingMesh]:

@@ -45,13 +45,9 @@ PLANE_KINDS = ("planar", "point on plane", "rolling")
 def connections(
     places: Places, drawn: dict[str, Array], surfaces: set[str], up: Array
 ) -> list[Actor]:
-    """Symbols of everything between the bodies of a mechanism.
+    """Symbols of everything between the bodies of a mechanism, upright along ``up`` (3,).
 
-    Args:
-        places: where bodies are.
-        drawn: {body: (n, 3)} points that bodies are drawn by, in their frames [m].
-        surfaces: bodies whose surface is drawn, which may hide symbols.
-        up: (3,) upright direction.
+    Bodies are drawn by points (n, 3) in their frames [m]; surfaces of some may hide symbols.
     """
     shapes = {name: X for name, X in drawn.items() if name in surfaces}
     scenery = Scenery(places, shapes, symbol_size(places, drawn), up / np.linalg.norm(up))
@@ -164,10 +160,8 @@ def _towards(scenery: Scenery, marker: Marker) -> Array:
     A = scenery.places.pose(marker.body)[1][0]
     centre = np.asarray(part.first) / part.mass - part.point(marker)
     k = int(np.argmax(np.abs(centre)))
-    if not np.abs(centre[k]) > 1e-9 * scenery.size:
-        return scenery.up
-    direction: Array = np.sign(centre[k]) * A[:, k]
-    return direction
+    along: Array = np.sign(centre[k]) * A[:, k]
+    return along if np.abs(centre[k]) > 1e-9 * scenery.size else scenery.up
 
 
 def _on_plane(scenery: Scenery, joint: Any, normal: Array) -> Iterator[Actor]:
@@ -213,8 +207,7 @@ def spring(scenery: Scenery, _: str, spring: Any) -> Iterator[Actor]:
         yield from bushing(scenery, "", spring)
         return
     if spring.stiffness:
-        shape = symbols.spring(scenery.size)
-        yield stretched(shape, ends, SPRING_COLOUR)
+        yield stretched(symbols.spring(scenery.size), ends, SPRING_COLOUR)
     if spring.damping:
         yield stretched(symbols.dashpot(scenery.size), ends, DAMPER_COLOUR)
     for k, marker in enumerate((spring.i, spring.j)):
@@ -260,12 +253,8 @@ def _contacts(scenery: Scenery) -> Iterator[Actor]:
             rounds.add((*key, contact.radius[1]))
         elif contact.kind == CAPSULE:
             ends = zip((contact.j, contact.i), (contact.s, contact.e), strict=True)
-            capsules |= {
-                (marker, tuple(np.asarray(axis).tolist()), radius, half)
-                for (marker, axis), radius, half in zip(
-                    ends, contact.radius, contact.half, strict=True
-                )
-            }
+            for (marker, axis), *size in zip(ends, contact.radius, contact.half, strict=True):
+                capsules.add((marker, tuple(np.asarray(axis).tolist()), *size))
             continue
         if contact.radius[0] and contact.kind != DISC and contact.j.body not in scenery.solid:
             yield from _ball(scenery.places, contact.j, contact.radius[0])

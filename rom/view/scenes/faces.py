@@ -30,6 +30,8 @@ LEAST_SEEN = 2.0  # [pixel] from the edges of what is seen of a face
 ROOM_SHARE = 0.9  # of the greatest such distance, from which a label may stand
 WAYS = ((0, -1), (1, 0), (0, 1), (-1, 0), (1, -1), (1, 1), (-1, 1), (-1, -1))  # labels are moved
 MAX_STEPS = 12  # steps of half a label, that it is moved at most
+# (k, 2) half labels from the middle of a face, further and further away
+AWAY = np.array([(0, 0), *((i * k, j * k) for k in range(2, MAX_STEPS) for i, j in WAYS)])
 
 
 @typed
@@ -64,10 +66,8 @@ def faces(
     camera = aimed(x[used], PAGE_WIDTH, view=view, up=up, heights=(0.2, 0.6))
     both = np.stack([x, _turned(x, camera)])
     images = render(list(_actors(both, triangles)), camera)
-    placed = [
-        _placed(_spots(numbers, list(triangles)), camera.size)
-        for numbers in _numbers(both, triangles, camera)
-    ]
+    sides = _numbers(both, triangles, camera)
+    placed = [_placed(_spots(side, list(triangles)), camera.size) for side in sides]
     with page.styled():
         return page.save(_sheet(images, placed, _words(x[used], triangles, placed), title), path)
 
@@ -92,11 +92,8 @@ def _actors(x: Array, triangles: Mapping[str, Index]) -> Iterator[Actor]:
 
 def _numbers(x: Array, triangles: Mapping[str, Index], camera: Camera) -> Index:
     """(2, height, width) from 1 on, the face seen in each pixel; other numbers at edges."""
-    flat = [
-        Actor(x, t, colour=f"#{k:06x}", lit=False)
-        for k, t in enumerate(triangles.values(), 1)
-        if len(t)
-    ]
+    every = enumerate(triangles.values(), 1)
+    flat = [Actor(x, t, colour=f"#{k:06x}", lit=False) for k, t in every if len(t)]
     r, g, b = np.moveaxis(render(flat, camera, oversampling=1).astype(np.int64), -1, 0)
     numbers = (r << 16) + (g << 8) + b
     return np.where(numbers <= len(triangles), numbers, 0)
@@ -133,31 +130,17 @@ Labels = list[tuple[Spot, tuple[float, float]]]  # and where the middle of each 
 
 def _placed(spots: list[Spot], size: tuple[int, int]) -> Labels:
     """Where the middle of each label goes [pixel], none upon another; the roomiest faces first."""
-    boxes: list[tuple[float, float, float, float]] = []
-    found = []
+    boxes, found = np.zeros((0, 2, 2)), []
     for spot in sorted(spots, key=lambda spot: -spot.room):
-        wide, tall = LETTER_SIZE[0] * len(spot.label) + 8, LETTER_SIZE[1] + 4
-        for x, y in _places(spot, 0.5 * wide, 0.5 * tall):
-            box = (x - 0.5 * wide, y - 0.5 * tall, x + 0.5 * wide, y + 0.5 * tall)
-            inside = box[0] >= 0 and box[1] >= 0 and box[2] <= size[0] and box[3] <= size[1]
-            if inside and not any(_overlap(box, other) for other in boxes):
-                boxes.append(box)
-                found.append((spot, (x, y)))
+        half = 0.5 * np.array([LETTER_SIZE[0] * len(spot.label) + 8, LETTER_SIZE[1] + 4])
+        for at in (spot.at + AWAY * half).tolist():
+            low, high = at - half, at + half
+            apart = ((high <= boxes[:, 0]) | (low >= boxes[:, 1])).any(axis=1)
+            if (low >= 0).all() and (high <= size).all() and apart.all():
+                boxes = np.append(boxes, [[low, high]], axis=0)
+                found.append((spot, (at[0], at[1])))
                 break
     return found
-
-
-def _places(spot: Spot, wide: float, tall: float) -> Iterator[tuple[float, float]]:
-    """The middle of the face, then places around it, further and further away."""
-    x, y = spot.at
-    yield x, y
-    for step in range(2, MAX_STEPS):
-        for i, j in WAYS:
-            yield x + i * step * wide, y + j * step * tall
-
-
-def _overlap(a: tuple[float, ...], b: tuple[float, ...]) -> bool:
-    return a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]
 
 
 def _words(x: Array, triangles: Mapping[str, Index], placed: list[Labels]) -> str:

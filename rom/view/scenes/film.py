@@ -1,4 +1,4 @@
-"""Films and series of instants of a moving mechanism."""
+"""A mechanism as its bodies are placed; films and series of instants of how it moves."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -16,16 +16,21 @@ from rom.view.canvas.scene import Actor, sharp_edges
 from rom.view.canvas.solids import Mesh
 from rom.view.canvas.symbols import polyline
 from rom.view.figures.things import (
+    COLOURS,
     FILM_WIDTH,
+    NO_LINES,
     STILL_WIDTH,
     Scene,
+    Thing,
+    actors_of,
     as_thing,
     film,
+    scene_page,
     seen,
     series_page,
 )
 from rom.view.scenes.connections import connections
-from rom.view.scenes.places import Places, different, moving, placed
+from rom.view.scenes.places import Places, at_start, different, evenly, moving, placed
 from rom.view.scenes.rigid import BOX_OPACITY, check_bodies, form_of
 
 if TYPE_CHECKING:
@@ -36,6 +41,8 @@ METAL_COLOURS = ("#9aa5b1", "#c3c9d0", "#7d8791")  # rigid bodies
 EDGE_COLOUR, TRACE_COLOUR = "#3a414b", "#d1495b"
 TRACE_POINTS = 1000
 POSED_AMONG = 60  # instants of a motion from which the colours of one of them follow
+START_WIDTH = 1200  # of the picture of a start [pixel]
+MAX_LEGEND_BODIES = 16  # bodies in the legend
 
 
 @typed
@@ -81,10 +88,10 @@ def animate(  # noqa: PLR0913  keywords of one picture, all with defaults
         ResourceError: for .mp4 without ffmpeg.
     """
     path = wanted(path)
-    steps = np.linspace(0, solution.t.size - 1, min(frames, solution.t.size)).round().astype(int)
-    up = upright(mechanism) if up is None else up
-    stage = _stage(mechanism, solution, steps, Look(shapes or {}, magnify, symbols, traces, up))
-    scene = stage.scene(title, view, up)
+    steps = evenly(solution.t.size, min(frames, solution.t.size))
+    look = Look(shapes or {}, magnify, symbols, traces, upright(mechanism, up))
+    stage = _stage(mechanism, solution, steps, look)
+    scene = stage.scene(title, view, look.up)
     words = _words(stage, magnify, coloured=seen(scene, FILM_WIDTH).coloured)
     return film(solution.t[steps], scene, path, seconds=seconds, caption=words)
 
@@ -116,9 +123,9 @@ def instants(  # noqa: PLR0913  keywords of one picture, all with defaults
     path = page.wanted(path)
     given = different(solution, N_INSTANTS) if times is None else np.asarray(times, dtype=float)
     steps = np.array([int(np.argmin(np.abs(solution.t - t))) for t in given.ravel()])
-    up = upright(mechanism) if up is None else up
-    stage = _stage(mechanism, solution, steps, Look(shapes or {}, magnify, symbols, traces, up))
-    series = seen(stage.scene("", view, up), STILL_WIDTH)
+    look = Look(shapes or {}, magnify, symbols, traces, upright(mechanism, up))
+    stage = _stage(mechanism, solution, steps, look)
+    series = seen(stage.scene("", view, look.up), STILL_WIDTH)
     with page.styled():
         words = f"{caption} {_words(stage, magnify, coloured=series.coloured)}".lstrip()
         return page.save(series_page(series, clock_texts(solution.t[steps]), words), path)
@@ -146,11 +153,10 @@ def posed(  # noqa: PLR0913  keywords of one picture, all with defaults
         ConfigError: for an unknown body.
     """
     step = int(np.argmin(np.abs(solution.t - time)))
-    others = np.linspace(0, solution.t.size - 1, POSED_AMONG).round().astype(int)
-    up = upright(mechanism) if up is None else up
-    look = Look(shapes or {}, magnify, symbols, traces, up)
-    stage = _stage(mechanism, solution, np.array([step, *others]), look)
-    scene = stage.scene(title, view, up, slice(1))
+    steps = np.array([step, *evenly(solution.t.size, POSED_AMONG)])
+    look = Look(shapes or {}, magnify, symbols, traces, upright(mechanism, up))
+    stage = _stage(mechanism, solution, steps, look)
+    scene = stage.scene(title, view, look.up, slice(1))
     return replace(scene, label=f"deformation [{stage.unit}]")
 
 
@@ -195,14 +201,8 @@ def _stage(mechanism: Any, solution: Any, steps: Any, look: Look) -> Stage:
     check_bodies(mechanism, "traces", look.traces)
     places = moving(mechanism, solution, steps, look.magnify)
     drawn = {name: _body(places, name, look) for name in mechanism.parts}
-    actors: list[Actor] = []
-    flexible: dict[str, int] = {}
-    for name, (surface, edges, *_) in drawn.items():
-        if surface.values is not None:
-            flexible[name] = len(actors)
-        actors += [surface, edges]
-    stage = _scaled(actors, flexible)
-    more = [actor for _, _, *rest in drawn.values() for actor in rest]
+    stage = _scaled({name: actors[:2] for name, actors in drawn.items()})
+    more = [actor for actors in drawn.values() for actor in actors[2:]]
     more += symbols_of(places, look) if look.symbols else []
     more += [_trace(solution.position(name)) for name in look.traces]
     grey = "rigid bodies and rods" if mechanism.nonlinear else stage.grey
@@ -229,8 +229,7 @@ def _body(places: Places, name: str, look: Look) -> list[Actor]:
 
 def _trace(way: Array) -> Actor:
     """A line through at most `TRACE_POINTS` of the places (n_t, 3) where a point has been."""
-    few = way[np.unique(np.linspace(0, len(way) - 1, TRACE_POINTS).round().astype(int))]
-    points, pairs = polyline(few)
+    points, pairs = polyline(way[np.unique(evenly(len(way), TRACE_POINTS))])
     return Actor(points[None], pairs, colour=TRACE_COLOUR, width=1.6)
 
 
@@ -243,36 +242,32 @@ def symbols_of(places: Places, look: Look) -> list[Actor]:
     return connections(places, drawn, surfaces, up)
 
 
-def upright(mechanism: Any) -> Array | None:
-    """(3,) against gravity; None without."""
+def upright(mechanism: Any, up: Any = None) -> Any:
+    """(3,) what is asked for, or against gravity; None without."""
     gravity = np.asarray(mechanism.gravity, dtype=float)
-    return -gravity if gravity.any() else None
+    return -gravity if up is None and gravity.any() else up
 
 
 def shades_of(mechanism: Any) -> dict[str, int]:
     """Number of the grey of each body; all frames of a non-linear body have one."""
     whole = {part.name: name for name, all_ in mechanism.nonlinear.items() for part in all_.parts}
-    things = dict.fromkeys(
-        whole.get(name, name) for name, part in mechanism.parts.items() if part.flexible is None
-    )
-    number = {name: k for k, name in enumerate(things)}
-    return {
-        name: number.get(whole.get(name, name), 0) % len(METAL_COLOURS) for name in mechanism.parts
-    }
+    owner = {name: whole.get(name, name) for name in mechanism.parts}
+    rigid = dict.fromkeys(owner[n] for n, part in mechanism.parts.items() if part.flexible is None)
+    number = {name: k % len(METAL_COLOURS) for k, name in enumerate(rigid)}
+    return {name: number.get(thing, 0) for name, thing in owner.items()}
 
 
-def _scaled(actors: list[Actor], flexible: dict[str, int]) -> Stage:
+def _scaled(bodies: dict[str, list[Actor]]) -> Stage:
     """Colours in a unit in which the largest deformation is between 1 and 1000."""
-    if not flexible:
+    actors = [actor for surface_and_edges in bodies.values() for actor in surface_and_edges]
+    sizes = {name: v for name, (surface, _) in bodies.items() if (v := surface.values) is not None}
+    if not sizes:
         return Stage(together(actors), (0.0, 1.0), "m", "")
-    sizes = {k: v for k in flexible.values() if (v := actors[k].values) is not None}
     largest = max(float(v.max()) for v in sizes.values())
     factor, unit = prefixed(largest, "m")
-    for k, v in sizes.items():
-        scaled: Array = v * factor
-        actors[k] = Actor(actors[k].points, actors[k].cells, scaled, actors[k].colour)
+    scaled = [a if a.values is None else replace(a, values=a.values * factor) for a in actors]
     limits = 0.0, max(largest * factor, 1e-12)
-    return Stage(together(actors), limits, unit, " and ".join(flexible))
+    return Stage(together(scaled), limits, unit, " and ".join(sizes))
 
 
 def together(actors: list[Actor]) -> list[Actor]:
@@ -283,11 +278,11 @@ def together(actors: list[Actor]) -> list[Actor]:
         if actor.values is None:
             look = actor.colour, actor.width, actor.opacity
             plain.setdefault((*look, actor.cells.shape[1], len(actor.points)), []).append(actor)
-    for (colour, width, opacity, *_), alike in plain.items():
+    for alike in plain.values():
         first = np.cumsum([0, *(actor.points.shape[1] for actor in alike)])
         cells = np.vstack([a.cells + n for a, n in zip(alike, first[:-1], strict=True)])
         points = np.concatenate([actor.points for actor in alike], axis=1)
-        kept.append(Actor(points, cells, None, colour, width, opacity))
+        kept.append(replace(alike[0], points=points, cells=cells))
     return kept
 
 
@@ -300,3 +295,59 @@ def _words(stage: Stage, magnify: float, *, coloured: bool = True) -> str:
         words += " Colours: displacement relative to the floating frame, in "
         words += f"{stage.unit}; grey are {stage.grey}."
     return words
+
+
+@typed
+def start(
+    mechanism: AnyMechanism,
+    path: str | Path | None = None,
+    *,
+    title: str = "Mechanism at its start",
+    symbols: bool = True,
+    view: npt.ArrayLike | None = None,
+    up: npt.ArrayLike | None = None,
+) -> "Figure":
+    """Draw a mechanism before it moves: flexible bodies by their surface, rigid ones as tubes.
+
+    Args:
+        mechanism: a `Mechanism`.
+        path: picture to write, .png; None to write nothing.
+        title: heading.
+        symbols: draw joints, springs, planes of contact and the ground, too.
+        view: (3,) direction from the things to the eye [1]; None: mainly along the shortest extent.
+        up: (3,) upright direction [1]; None: against gravity, or across the longest extent without.
+
+    Raises:
+        ConfigError: if pictures cannot be made here.
+    """
+    path = page.wanted(path)
+    up = upright(mechanism, up)
+    things = _things(mechanism, symbols=symbols, up=up)
+    whole = seen(Scene(title, things, view=view, up=up), START_WIDTH)
+    words = (
+        f"{len(mechanism.parts)} bodies as they are placed, before joints pull them together. "
+        "Flexible bodies are drawn by their surface, rigid ones as tubes from the mass centre to "
+        "their markers, in a block of the same mass and inertia."
+    )
+    with page.styled():
+        return page.save(scene_page(whole, words), path)
+
+
+def start_actors(mechanism: Any) -> list[Actor]:
+    """Bodies as they are placed, their sharp edges, and the symbols between them."""
+    return actors_of(Scene("", _things(mechanism, symbols=True, up=None)))
+
+
+def _things(mechanism: Any, *, symbols: bool, up: Any) -> dict[str, Thing | Mesh]:
+    places = at_start(mechanism)
+    things: dict[str, Thing | Mesh] = {}
+    for k, part in enumerate(mechanism.parts.values()):
+        form, pose = form_of(mechanism, part.name, {}), places.pose(part.name)
+        name, colour = part.name if k < MAX_LEGEND_BODIES else f"_{k}", COLOURS[k % len(COLOURS)]
+        points = placed(form.points[None], pose)
+        things[name] = Thing(points, form.triangles, colour, opacity=form.opacity)
+        if form.block is not None:
+            block = placed(form.block[0][None], pose), form.block[1]
+            things[f"_block {k}"] = Thing(*block, colour, None, BOX_OPACITY, 1.0, NO_LINES)
+    more = together(symbols_of(places, Look({}, up=up))) if symbols else []
+    return things | {f"_symbol {k}": as_thing(actor) for k, actor in enumerate(more)}

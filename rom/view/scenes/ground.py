@@ -98,13 +98,9 @@ def support(
 
 
 def wall(scenery: Scenery, point: Array, normal: Array, foot: float = 0.0) -> Iterator[Actor]:
-    """Hatched ground whose surface is at a point (3,) and faces along a normal.
+    """Hatched ground whose surface is at a point (3,) and faces along a normal (3,).
 
-    Args:
-        scenery: what symbols are drawn with.
-        point: (3,) on its surface [m].
-        normal: (3,) out of it.
-        foot: width of what stands on it [m].
+    The foot is the width of what stands on it [m].
     """
     axes = np.roll(upright(normal, scenery.up), -1, axis=1)  # the normal last
     size = max(5.0 * scenery.size, WALL_RATIO * foot)
@@ -115,11 +111,7 @@ def wall(scenery: Scenery, point: Array, normal: Array, foot: float = 0.0) -> It
 def guide(scenery: Scenery, first: Marker, second: Marker, axis: Array) -> Iterator[Actor]:
     """What a marker slides along: a line on a body that moves, a hatched rail on the ground.
 
-    Args:
-        scenery: what symbols are drawn with.
-        first: marker that carries the axis.
-        second: what slides.
-        axis: (3,) in the frame of the first body.
+    The first marker carries the axis (3,), which is in the frame of its body; the second slides.
     """
     places, size = scenery.places, scenery.size
     way = scenery.seen_from(first, [second]) @ axis
@@ -139,11 +131,10 @@ def guide(scenery: Scenery, first: Marker, second: Marker, axis: Array) -> Itera
     down = across_rail @ axes[:, 2] - below
     place = places.point(first)[0] + 0.5 * (low + high) * axis + middle + down * axes[:, 2]
     wide = sum(sides)
-    strips = (
-        [0.0] if wide < 3 * size else [-(1 - STRIP_RATIO) / 2 * wide, (1 - STRIP_RATIO) / 2 * wide]
-    )
-    for beside in strips:  # under a block two, between which something may swing
-        width = 3 * size if len(strips) == 1 else STRIP_RATIO * wide
+    strips, width = [0.0], 3 * size
+    if wide >= 3 * size:  # under a block two, between which something may swing
+        strips, width = [s * (1 - STRIP_RATIO) / 2 * wide for s in (-1, 1)], STRIP_RATIO * wide
+    for beside in strips:
         plate = symbols.ground_plate(high - low, width, 0.8 * size)
         yield from _hatched(plate, at((place + beside * axes[:, 1])[None], axes[None]))
 
@@ -153,11 +144,8 @@ def plane(
 ) -> Iterator[Actor]:
     """The plane of a contact, as large as what moves on it; hatched on the ground.
 
-    Args:
-        scenery: what symbols are drawn with.
-        first: point of the plane.
-        normal: (3,) in the frame of its body.
-        touching: markers on the plane, and the radius about each [m].
+    Its normal (3,) is in the frame of the body of its first marker; the markers that touch it have
+    a radius each [m].
     """
     places = scenery.places
     seen = scenery.seen_from(first, [marker for marker, _ in touching])

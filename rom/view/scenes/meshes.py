@@ -83,11 +83,7 @@ def meshed(model: FEModel) -> dict[str, Thing]:
 
 
 def surface_of(thing: Any) -> Any:
-    """The surface of a body or a model.
-
-    Raises:
-        ConfigError: if it has none.
-    """
+    """The surface of a body or a model."""
     if thing.surface is None:
         raise ConfigError(
             f"{getattr(thing, 'name', 'the model')} has no surface to draw.",
@@ -109,9 +105,5 @@ def in_sight(model: FEModel, name: str, camera: Camera) -> bool:
 
 
 def mesh_actors(model: FEModel) -> list[Actor]:
-    """The outer surface, its elements, and its interfaces in colour.
-
-    Raises:
-        ConfigError: if the model has no surface.
-    """
+    """The outer surface, its elements, and its interfaces in colour."""
     return actors_of(Scene("mesh", meshed(model)))

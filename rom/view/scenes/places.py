@@ -12,8 +12,6 @@ from rom.rotation import matrix
 Pose = tuple[Array, Array]  # (f, 3) origins and (f, 3, 3) axes, as columns in the world
 MAX_CANDIDATES = 400  # instants that are compared
 SAME_PLACE_RATIO = 0.02  # of the longest way, below which two places are one
-
-
 NO_TURN, NO_SHIFT = np.eye(3), np.zeros(3)
 
 
@@ -65,15 +63,17 @@ def at_start(mechanism: Any) -> Places:
 
 def moving(mechanism: Any, solution: Any, steps: Any, magnify: float) -> Places:
     """Bodies at some of the instants of a motion."""
-    poses = {
-        name: (
-            solution.position(name)[steps],
-            np.array([matrix(p) for p in solution.orientation(name)[steps]]),
-        )
-        for name in mechanism.parts
-    }
-    elastic = {name: solution.elastic(name)[steps] for name in mechanism.parts}
+    poses, elastic = {}, {}
+    for name in mechanism.parts:
+        axes = np.array([matrix(p) for p in solution.orientation(name)[steps]])
+        poses[name] = solution.position(name)[steps], axes
+        elastic[name] = solution.elastic(name)[steps]
     return Places(mechanism, poses, elastic, magnify)
+
+
+def evenly(size: int, n: int) -> Any:
+    """(n,) numbers of so many instants, evenly over all of a motion."""
+    return np.linspace(0, size - 1, n).round().astype(int)
 
 
 def at(r: Array, A: Array) -> Pose:
@@ -92,19 +92,11 @@ def different(solution: Any, n: int) -> Array:
     """(n,) instants [s] at which a mechanism differs most: each the farthest from those before.
 
     The first one is the start. Fewer where the motion has no more places.
-
-    Args:
-        solution: the motion.
-        n: number of instants.
     """
-    steps = np.unique(np.linspace(0, solution.t.size - 1, MAX_CANDIDATES).round().astype(int))
-    places = moving(solution.mechanism, solution, steps, 1.0)
+    steps = np.unique(evenly(solution.t.size, MAX_CANDIDATES))
+    places, parts = moving(solution.mechanism, solution, steps, 1.0), solution.mechanism.parts
     points = [r for r, _ in places.poses.values()]
-    points += [
-        places.point(part.marker(name))
-        for part in solution.mechanism.parts.values()
-        for name in part.names
-    ]
+    points += [places.point(part.marker(name)) for part in parts.values() for name in part.names]
     X = np.concatenate(points, axis=1) if points else np.zeros((steps.size, 3))
     chosen, away = [0], np.linalg.norm(X - X[0], axis=1)
     least = SAME_PLACE_RATIO * away.max()

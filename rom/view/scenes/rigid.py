@@ -1,11 +1,16 @@
-"""What bodies of a mechanism are drawn by: a surface, a given shape, or tubes to their markers."""
+"""What bodies of a mechanism are drawn by: a surface, a given shape, or tubes to their markers.
+
+Those of a rod are boxes.
+"""
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
+from rom.arguments import typed
 from rom.errors import ConfigError
 from rom.model import Array
 from rom.names import named, offered
@@ -49,11 +54,7 @@ def form_of(mechanism: Any, name: str, shapes: Mapping[str, Mesh]) -> Form:
 
 
 def check_bodies(mechanism: Any, what: str, names: Collection[str]) -> None:
-    """Refuse names of bodies that a mechanism does not have.
-
-    Raises:
-        ConfigError: listing those there are.
-    """
+    """Refuse names of bodies that a mechanism does not have."""
     if unknown := set(names) - set(mechanism.parts):
         there = offered(mechanism.parts)
         raise ConfigError(f"{what}: no body {named(sorted(unknown))}; there are {there}.")
@@ -82,10 +83,8 @@ def bars(part: Any, ends: list[Array]) -> Mesh:
 def shadow(part: Any, ends: list[Array]) -> Mesh | None:
     """What is drawn half-transparent beside the bars: the box of the inertia, unless it is huge."""
     reach = max((float(np.linalg.norm(p)) for p in ends), default=0.0)
-    points, triangles = inertia_box(part)
-    if not reach or np.ptp(points, axis=0).max() > MAX_BOX_RATIO * reach:
-        return None
-    return points, triangles
+    block = inertia_box(part)
+    return block if reach and np.ptp(block[0], axis=0).max() <= MAX_BOX_RATIO * reach else None
 
 
 def inertia_box(part: Any) -> Mesh:
@@ -101,3 +100,32 @@ def block_of(second: Array, mass: float) -> tuple[Array, Array]:
     edges = np.sqrt(12 * np.maximum(moments, 0.0) / mass)
     axes[:, 2] *= np.sign(np.linalg.det(axes))
     return np.maximum(edges, 1e-3 * edges.max()), axes
+
+
+@typed
+def sleeves(rod: Any, widths: npt.ArrayLike) -> dict[str, Mesh]:
+    """Boxes around the segments of a rod, as ``shapes`` of `animate` and `save_motion`.
+
+    Args:
+        rod: what `rom.Mechanism.add_nonlinear` returned for a rod.
+        widths: (2,) or (N, 2) of the segments along the first two axes of their sections [m].
+
+    Returns:
+        {body: (points, triangles)}; the plates at the ends are leaves of no thickness.
+
+    Raises:
+        ConfigError: for widths of another shape or that are not positive.
+    """
+    along = np.linalg.norm(np.diff(rod.body.rod.x, axis=0), axis=1)
+    try:
+        sides = np.broadcast_to(np.asarray(widths, dtype=float), (along.size, 2))
+    except ValueError:
+        sides = np.zeros((1, 2))
+    if not (sides > 0.0).all():
+        raise ConfigError(f"widths must be (2,) or ({along.size}, 2) and positive, got {widths!r}.")
+    lengths = np.concatenate([[0.0], along, [0.0]])
+    sides = np.vstack([sides[:1], sides, sides[-1:]])
+    return {
+        part.name: box((*side, max(h, 1e-6 * side.max())), (0.0, 0.0, -h / 2))
+        for part, side, h in zip(rod.parts, sides, lengths, strict=True)
+    }

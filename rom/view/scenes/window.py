@@ -18,10 +18,10 @@ from rom.arguments import AnyBody, AnyMechanism, typed, whole
 from rom.errors import ConfigError
 from rom.model import FEModel
 from rom.process.child import python, run, scratch
-from rom.view.canvas.draw import add, aim
+from rom.view.canvas.draw import add, aim, read
 from rom.view.canvas.offscreen import child_failure, require, write_scene
 from rom.view.canvas.scene import Actor, aimed, sharp_edges
-from rom.view.scenes.mechanisms import start_actors
+from rom.view.scenes.film import start_actors
 from rom.view.scenes.meshes import mesh_actors, surface_of
 from rom.view.scenes.mode_shapes import AMPLITUDE_RATIO, displacement
 
@@ -46,12 +46,7 @@ def has_display() -> bool:
 
 
 def mode_scenes(body: Any, n: int, fixed: tuple[str, ...] = ()) -> list[Scene]:
-    """The lowest elastic modes of a body, moving.
-
-    Raises:
-        ConfigError: if the body has no surface.
-        InterfaceError: if an interface is unknown.
-    """
+    """The lowest elastic modes of a body, moving."""
     surface_of(body)
     body = body.in_units("SI")
     omega, V = body.modes(fixed=fixed)
@@ -99,11 +94,8 @@ def plotter(thing: AnyBody | FEModel | AnyMechanism, *, n: int = 1) -> Any:
     made: Any = pyvista.Plotter(window_size=[WINDOW_WIDTH, 3 * WINDOW_WIDTH // 4])
     made.set_background("white")
     with scratch("view") as folder:
-        seen = np.concatenate([actor.points.reshape(-1, 3) for actor in actors])
-        write_scene(folder, actors, aimed(seen, WINDOW_WIDTH), (0.0, 1.0))
-        scene = json.loads((folder / "scene.json").read_text())
-        with np.load(folder / "arrays.npz", allow_pickle=False) as file:
-            arrays = dict(file)
+        _left(folder, actors)
+        scene, arrays = read(folder)
     for k in range(len(actors)):
         add(made, scene, arrays, k, 0)
     aim(made, scene, arrays)
@@ -124,11 +116,7 @@ def _actors(thing: Any, n: int) -> list[Actor]:
 
 
 def show(scenes: Sequence[Scene]) -> None:
-    """Open a window and wait until it is closed.
-
-    Raises:
-        ConfigError: if pyvista is missing, or no window opens here.
-    """
+    """Open a window and wait until it is closed."""
     require("pyvista")
     with scratch("view") as folder:
         leave(scenes, folder)
@@ -141,9 +129,14 @@ def leave(scenes: Sequence[Scene], folder: Path) -> None:
     """Write the scenes where the process of the window finds them."""
     for k, scene in enumerate(scenes):
         (folder / str(k)).mkdir()
-        seen = np.concatenate([actor.points.reshape(-1, 3) for actor in scene.actors])
-        write_scene(folder / str(k), scene.actors, aimed(seen, WINDOW_WIDTH), (0.0, 1.0))
+        _left(folder / str(k), scene.actors)
     (folder / "titles.json").write_text(json.dumps([scene.title for scene in scenes]))
+
+
+def _left(folder: Path, actors: Sequence[Actor]) -> None:
+    """Write what is seen from where into a folder."""
+    seen = np.concatenate([actor.points.reshape(-1, 3) for actor in actors])
+    write_scene(folder, actors, aimed(seen, WINDOW_WIDTH), (0.0, 1.0))
 
 
 class Window:
@@ -163,10 +156,7 @@ class Window:
     def go(self, step: int) -> None:
         """Show the scene so many further on."""
         self.at, self.frame = (self.at + step) % len(self.titles), 0
-        folder = self.folder / str(self.at)
-        self.scene = json.loads((folder / "scene.json").read_text())
-        with np.load(folder / "arrays.npz", allow_pickle=False) as file:
-            self.arrays = dict(file)
+        self.scene, self.arrays = read(self.folder / str(self.at))
         self.plotter.clear_actors()
         for k in range(len(self.scene["actors"])):
             add(self.plotter, self.scene, self.arrays, k, 0)

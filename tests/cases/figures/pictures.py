@@ -40,7 +40,7 @@ def faults(figure: Figure) -> list[str]:
     ]  # fmt: skip
     found += [fault for alike in _compared(diagrams) for fault in (*_scales(alike), *_empty(alike))]
     found += [fault for axes in shown if not axes.axison for fault in _bare(axes)]
-    return found + _crowded(figure)
+    return found + crowded(figure)
 
 
 def _title(axes: Axes) -> str:
@@ -228,8 +228,8 @@ def _within(box: Bbox, room: Bbox) -> bool:
     return bool(np.all(box.min >= room.min) and np.all(box.max <= room.max))
 
 
-def _crowded(figure: Figure) -> list[str]:
-    """Words that leave the page or lie on each other; ticks of one axis are told once."""
+def written_in(figure: Figure) -> list[Text]:
+    """All words of a figure; ticks of one axis are told once."""
     written = [text for text in figure.texts if text.get_text().strip()]
     for axes in figure.axes:
         if not axes.get_visible():
@@ -246,11 +246,15 @@ def _crowded(figure: Figure) -> list[str]:
             written += [tick.label1 for tick in axis.get_major_ticks()
                         if tick.label1.get_visible() and tick.label1.get_text()
                         and low <= tick.get_loc() <= high]  # fmt: skip
-    boxes = [(text, _extent(text)) for text in written]
+    return written
+
+
+def crowded(figure: Figure) -> list[str]:
+    """Words that leave the page or lie on each other."""
+    boxes = [(text, _extent(text)) for text in written_in(figure)]
     page = figure.bbox.padded(SLACK)
-    found = [
-        f"{text.get_text()!r} leaves the page" for text, box in boxes if not _within(box, page)
-    ]
+    away = (text.get_text() for text, box in boxes if not _within(box, page))
+    found = [f"{words!r} leaves the page" for words in away]
     for (a, one), (b, other) in combinations(boxes, 2):
         both = Bbox.intersection(one, other)
         if both is not None and min(both.width, both.height) > SLACK:

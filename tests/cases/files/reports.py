@@ -1,6 +1,28 @@
-"""Reports, read back."""
+"""Reports, read back; a picture and a body for them."""
 
+import base64
+from dataclasses import replace
 from html.parser import HTMLParser
+
+import numpy as np
+
+import rom
+from cases.solid import block
+from rom.body.recovery import StressRecovery
+
+PIXEL = base64.b64decode(
+    "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAQAAAC1HAwCAAAAC0lEQVR42mNk+M8AAAMBAQDJ/pLvAAAAAElFTkSuQmCC"
+)
+
+
+def bar_that_bends():
+    """A body whose stress is made up: per metre, 1 GPa of xx along y, and of xy along z."""
+    made = rom.reduce(block(cells=(8, 2, 2)), method=rom.CraigBampton(6), reference="root",
+                      interfaces={"root": "rbe2", "tip": "rbe2"}, name="bar")  # fmt: skip
+    operator = np.zeros((6 * len(made.surface.points), made.n_modes))
+    operator[0::6] = 1e9 * made.surface.shape[1::3]
+    operator[5::6] = 1e9 * made.surface.shape[2::3]
+    return replace(made, stress=StressRecovery(made.surface.points, operator))
 
 
 class Reader(HTMLParser):

@@ -35,11 +35,10 @@ def flexible_pair(seed=3):
     mech = Mechanism(gravity=(0, 0, -1e-3))
     last = mech.ground.marker((0, 0, 0))
     for name in ("one", "two"):
-        flexible = random_body(rng, 12, damped=False)
-        part = mech.add_flexible(name, flexible)
-        first, *_, end = flexible.markers
-        mech.bushing(f"to {name}", last, part.marker(first),
-                     stiffness=(1e3, 2e3, 3e3, 50.0, 60.0, 70.0))  # fmt: skip
+        part = mech.add_flexible(name, random_body(rng, 12, damped=False))
+        first, *_, end = part.flexible.markers
+        stiffness = (1e3, 2e3, 3e3, 50.0, 60.0, 70.0)
+        mech.bushing(f"to {name}", last, part.marker(first), stiffness=stiffness)
         last = part.marker(end)
     return mech
 
@@ -153,15 +152,14 @@ def test_a_mode_that_lanczos_leaves_out_is_missed(monkeypatch):
 
 
 def test_wrong_wishes_are_refused():
-    mech = rod_on("fixed", 5)
-    for wish, why in (
-        ({"n": 0}, "n = 0"),
-        ({"n": 500}, "from 1 to 33: the motions that the joints leave"),
-        ({"n": 3, "band": (1, 2)}, "at most one of n and band"),
-        ({"band": (3.0, 2.0)}, "two growing frequencies"),
-    ):
+    for why, wish in {
+        "n = 0": {"n": 0},
+        "from 1 to 33: the motions that the joints leave": {"n": 500},
+        "at most one of n and band": {"n": 3, "band": (1, 2)},
+        "two growing frequencies": {"band": (3.0, 2.0)},
+    }.items():
         with pytest.raises(ConfigError, match=why):
-            rom.linearize(mech, **wish)
+            rom.linearize(rod_on("fixed", 5), **wish)
     for n in (5, 40):
         low = rom.linearize(rod_on("fixed", n)).frequencies
         empty = (low[1] + 0.1, low[2] - 0.1)
@@ -248,12 +246,9 @@ def test_mattiassons_table_of_the_elastica(load, deflection, shortening):
 def test_slender_rods_need_no_more_corrections_than_stocky_ones(many, monkeypatch):
     """What they are stretched by finite corrections looks like buckling, and is none."""
     monkeypatch.setattr(local_equations, "MAX_DENSE", 0 if many else 10**6)
-    counted = []
-    moved = local_equations.Instant.moved
-    monkeypatch.setattr(
-        local_equations.Instant, "moved", lambda *given: counted.append(1) or moved(*given)
-    )
-    needed = []
+    counted, needed, moved = [], [], local_equations.Instant.moved
+    count = lambda *given: counted.append(1) or moved(*given)  # noqa: E731
+    monkeypatch.setattr(local_equations.Instant, "moved", count)
     for stretch in (1e4, 1e7):
         mech, rod = held_rod(30, stretch=stretch, bend=1.0, mass=1.0, inertia=1e-4)
         mech.force("tip", rod.marker("end"), (10.0, 0, 0))
@@ -324,9 +319,7 @@ def shaken_rod(viscosity=1e-3, n=12):
 
 
 def test_responses_of_large_mechanisms_are_those_of_dense_matrices(monkeypatch):
-    f = np.array([0.0, 0.7, 3.1, 25.0])
-    rod, tip = shaken_rod()
-    pair = flexible_pair()
+    f, (rod, tip), pair = np.array([0.0, 0.7, 3.1, 25.0]), shaken_rod(), flexible_pair()
     marks = [pair.parts[k].marker(list(pair.parts[k].flexible.markers)[-1]) for k in ("one", "two")]
     answers = []
     for size in (200, 0):
@@ -335,9 +328,8 @@ def test_responses_of_large_mechanisms_are_those_of_dense_matrices(monkeypatch):
         answers.append((
             rom.frequency_response(rod, state, f, force=tip, motion=tip).receptance,
             rom.frequency_response(pair, other, f, force=marks[0], motion=marks[1]).receptance,
-            rom.transmissibility(rod, state, f, drive="shaker", motion=tip),
-            rom.transmissibility(rod, state, f, drive="shaker",
-                                 motion=rod.parts["table"].marker(ORIGIN)),
+            *(rom.transmissibility(rod, state, f, drive="shaker", motion=at)
+              for at in (tip, rod.parts["table"].marker(ORIGIN))),
         ))  # fmt: skip
     assert_allclose(answers[1][3][:, 0], 1.0, rtol=1e-9)  # the table moves as its drive does
     for whole, sparse in zip(*answers, strict=True):
@@ -360,9 +352,8 @@ def test_an_infinite_response_of_a_large_mechanism_is_named(monkeypatch):
     mech, tip = shaken_rod(viscosity=0.0)
     resonance = rom.linearize(mech, n=2).frequencies[1]
     ends = {"force": tip, "motion": tip}
-    assert np.isfinite(
-        rom.frequency_response(mech, None, 1.01 * resonance, **ends).receptance
-    ).all()
+    near = rom.frequency_response(mech, None, 1.01 * resonance, **ends)
+    assert np.isfinite(near.receptance).all()
     with pytest.raises(SolverError, match=f"at {resonance:.9g} Hz"):
         rom.frequency_response(mech, None, resonance, **ends)
     free = rod_on(None, gravity=(0, 0, 0))
@@ -392,9 +383,8 @@ def test_a_campbell_diagram_of_some_modes_is_that_of_all(monkeypatch):
 
 def test_a_row_of_cranks_swings_as_one_whose_joints_repeat_each_other():
     """One motion of 234 coordinates, 19 constraints that repeat others: a compound pendulum."""
-    n, mech = 20, Mechanism(gravity=(0, 0, -9.81))
+    n, mech, before = 20, Mechanism(gravity=(0, 0, -9.81)), None
     solid = {"mass": 1.0, "inertia": (0.1, 0.1, 0.1)}
-    before = None
     for k in range(n):
         crank = mech.add_rigid(f"crank {k}", **solid, at=(k, 0, -0.5))
         mech.revolute(f"hinge {k}", mech.ground.marker((k, 0, 0)), crank.marker(Z / 2), axis=Y)

@@ -8,6 +8,8 @@ from numpy.polynomial import Polynomial
 from numpy.testing import assert_allclose
 
 import rom
+from cases.mbs.parts import ORIGIN, Y, Z
+from cases.refusals import refused
 from rom import rotation
 from rom.errors import ConfigError, RomWarning
 from rom.mbs.analysis.local_equations import instant
@@ -24,29 +26,30 @@ def helicopter(n, speed, *, hinge, damping=0.0, azimuth=0.3):
 
     Lag hinges are upright, too; flap hinges lie in the plane and across the blade.
     """
-    mech = rom.Mechanism(gravity=(0, 0, 0))
-    nacelle = mech.add_rigid("nacelle", mass=NACELLE_MASS, inertia=(5.0,) * 3, at=(0, 0, 0))
-    ground, centre = mech.ground.marker((0, 0, 0)), nacelle.marker((0, 0, 0))
+    mech = rom.Mechanism(gravity=ORIGIN)
+    nacelle = mech.add_rigid("nacelle", mass=NACELLE_MASS, inertia=(5.0,) * 3, at=ORIGIN)
+    ground, centre = mech.ground.marker(ORIGIN), nacelle.marker(ORIGIN)
     mech.planar("table", ground, centre, normal=(0, 0, 1))
     mech.bushing("support", ground, centre, stiffness=(SUPPORT, SUPPORT, 0, 0, 0, 1e6))
-    hub = mech.add_rigid("hub", mass=HUB_MASS, inertia=(1.0, 1.0, 2.0), at=(0, 0, 0))
-    mech.revolute("bearing", centre, hub.marker((0, 0, 0)), axis=(0, 0, 1))
+    hub = mech.add_rigid("hub", mass=HUB_MASS, inertia=(1.0, 1.0, 2.0), at=ORIGIN)
+    mech.revolute("bearing", centre, hub.marker(ORIGIN), axis=Z)
     mech.drive("speed", "bearing", lambda t: speed * t, rate=lambda t: speed)
     for k in range(n):
-        psi = azimuth + 2 * np.pi * k / n
-        A = rotation.matrix(rotation.exp([0, 0, psi]))
-        out, across = A @ [1.0, 0, 0], A @ [0, 1.0, 0]
-        one = mech.add_rigid(
-            f"blade {k}", mass=BLADE_MASS, inertia=(THIN, BLADE_INERTIA, BLADE_INERTIA),
-            at=(HUB_RADIUS + ARM) * out, orientation=A,
-        )  # fmt: skip
-        axis = (0, 0, 1) if hinge == "lag" else across
-        root = one.marker((-ARM, 0, 0))
-        mech.revolute(f"hinge {k}", hub.marker(HUB_RADIUS * out), root, axis=axis)
+        axis = Z if hinge == "lag" else Y
+        add_blade(mech, hub, k, 2 * np.pi * k / n + azimuth, axis, (-ARM, 0, 0))
         if hinge == "lag":
             spring = {"stiffness": LAG_SPRING, "damping": damping}
             mech.rotational_spring(f"spring {k}", f"hinge {k}", **spring)
     return mech
+
+
+def add_blade(mech, hub, k, azimuth, axis, root, centre=ORIGIN):
+    """One on a hinge at its root (3,), as everything here in its own axes, to a hub at a place."""
+    A = rotation.matrix(rotation.exp([0, 0, azimuth]))
+    out, inertia = A @ [HUB_RADIUS, 0, 0], (THIN, BLADE_INERTIA, BLADE_INERTIA)
+    one = mech.add_rigid(f"blade {k}", mass=BLADE_MASS, inertia=inertia, orientation=A,
+                         at=np.add(centre, out) - A @ root)  # fmt: skip
+    mech.revolute(f"hinge {k}", hub.marker(out), one.marker(root), axis=A @ axis)
 
 
 def blades(n):
@@ -109,10 +112,8 @@ def test_flapping_blades_whirl_at_their_own_frequency_more_and_less_than_the_spe
     nu = np.sqrt((BLADE_INERTIA - THIN + BLADE_MASS * ARM**2 + HUB_RADIUS * S) / I)
     sway = np.sqrt(SUPPORT / (NACELLE_MASS + HUB_MASS + n * BLADE_MASS))
     rates = {"alike": nu, "backward": nu - 1, "forward": nu + 1}
-    near = {
-        name: np.isclose(found.eigenvalues, 1j * rate * speeds[:, None], rtol=1e-7)
-        for name, rate in rates.items()
-    }
+    turn = 1j * speeds[:, None]
+    near = {k: np.isclose(found.eigenvalues, r * turn, rtol=1e-7) for k, r in rates.items()}
     for k, name in enumerate(rates):
         assert near[name].all(axis=0).sum() == (2 if n == 4 and name == "alike" else 1)
         if n == 3 or name != "alike":  # of four, two motions share the frequency
@@ -122,21 +123,17 @@ def test_flapping_blades_whirl_at_their_own_frequency_more_and_less_than_the_spe
 
 def leaning(speed, springs=300.0):
     """Flapping blades on a nacelle that a force and a moment push out of its place."""
-    mech = rom.Mechanism(gravity=(0, 0, 0))
+    mech = rom.Mechanism(gravity=ORIGIN)
     nacelle = mech.add_rigid("nacelle", mass=50.0, inertia=(5.0,) * 3, at=(0.2, 0.1, 0))
-    ground = mech.ground.marker((0, 0, 0))
+    ground = mech.ground.marker(ORIGIN)
     stiff = (3e4, 4e4, 5e4, 2e4, 3e4, 4e4)
     mech.bushing("support", ground, nacelle.marker((-0.2, -0.1, 0)), stiffness=stiff)
-    mech.force("push", nacelle.marker((0, 0, 0)), (1800.0, -1000.0, 2000.0))
+    mech.force("push", nacelle.marker(ORIGIN), (1800.0, -1000.0, 2000.0))
     hub = mech.add_rigid("hub", mass=20.0, inertia=(1.0, 1.0, 2.0), at=(0.2, 0.1, 0.5))
-    mech.revolute("bearing", nacelle.marker((0, 0, 0.5)), hub.marker((0, 0, 0)), axis=(0, 0, 1))
+    mech.revolute("bearing", nacelle.marker((0, 0, 0.5)), hub.marker(ORIGIN), axis=Z)
     mech.drive("speed", "bearing", lambda t: speed * t, rate=lambda t: speed)
     for k in range(3):
-        A = rotation.matrix(rotation.exp([0, 0, 2 * np.pi * k / 3]))
-        one = mech.add_rigid(f"blade {k}", mass=3.0, inertia=(0.1, 2.0, 2.0), orientation=A,
-                             at=(0.2, 0.1, 0.5) + A @ [1.9, 0, 0.4])  # fmt: skip
-        root = one.marker((-1.5, 0, -0.4))
-        mech.revolute(f"hinge {k}", hub.marker(A @ [0.4, 0, 0]), root, axis=A @ [0, 1.0, 0])
+        add_blade(mech, hub, k, 2 * np.pi * k / 3, Y, (-1.5, 0, -0.4), (0.2, 0.1, 0.5))
         mech.rotational_spring(f"spring {k}", f"hinge {k}", stiffness=springs)
     return mech
 
@@ -162,9 +159,8 @@ def test_what_turns_as_a_whole_may_be_told_either_way():
     mech = leaning(7.0)
     for name in ("support", "push"):
         del mech.elements[name]
-    mech.fixed(
-        "support", mech.ground.marker((0.2, 0.1, 0)), mech.parts["nacelle"].marker((0, 0, 0))
-    )
+    foot = mech.parts["nacelle"].marker(ORIGIN)
+    mech.fixed("support", mech.ground.marker((0.2, 0.1, 0)), foot)
     whole = rom.equilibrium(mech, spin=(0, 0, 7.0), about=(0.2, 0.1, 0))
     behind = rom.equilibrium(mech, spin={"bearing": 7.0})
     assert_allclose(behind.q, whole.q, atol=1e-12)
@@ -175,40 +171,32 @@ def adrift():
     mech = leaning(1.0)
     disc = mech.add_rigid("disc", mass=1.0, inertia=(0.1,) * 3, at=(0, 0, 2))
     for name in ("nacelle", "hub"):
-        mech.bushing(f"to {name}", mech.parts[name].marker((0, 0, 0)), disc.marker((0, 0, 0)),
+        mech.bushing(f"to {name}", mech.parts[name].marker(ORIGIN), disc.marker(ORIGIN),
                      stiffness=(1e3,) * 6)  # fmt: skip
     return mech
 
 
-@pytest.mark.parametrize(
-    ("build", "spin", "message"),
-    [
-        (lambda: leaning(1.0), {"bearings": 1.0}, "no joint 'bearings'"),
-        (lambda: leaning(1.0), {"bearing": 1.0, "hinge 0": 1.0}, "held elsewhere, too: .'hub'"),
-        (adrift, {"bearing": 1.0}, "only forces hold body 'disc'"),
-    ],
-)
-def test_spins_that_make_no_sense_are_refused(build, spin, message):
-    with pytest.raises(ConfigError, match=message):
-        rom.equilibrium(build(), spin=spin)
+def counted(named):
+    return lambda: rom.linearize(*turning(4, 5.0, hinge="lag"), blades=named)
 
 
-@pytest.mark.parametrize(
-    ("named", "message"),
-    [
-        (blades(2), "3 or more"),
-        ("blade", "3 or more"),
-        (["blade 0", "blade 1", "blade 9"], "no body 'blade 9'"),
-        (["blade 0", "blade 1", "blade 1"], "listed once"),
-        (["blade 0", "blade 1", "hub"], "alike"),
-        ([["blade 0", "hub"], ["blade 1"], ["blade 2"]], "alike"),
-        ([f"blade {k}" for k in (0, 2, 1, 3)], "does not stand"),  # across instead of around
-    ],
+def spun(mech, spin):
+    return lambda: rom.equilibrium(mech(), spin=spin)
+
+
+test_spins_and_blades_that_are_none_are_refused = refused(
+    (spun(lambda: leaning(1.0), {"bearings": 1.0}), "no joint 'bearings'"),
+    (spun(lambda: leaning(1.0), {"bearing": 1.0, "hinge 0": 1.0}), "held elsewhere, too: .'hub'"),
+    (spun(adrift, {"bearing": 1.0}), "only forces hold body 'disc'"),
+    (counted(blades(2)), "3 or more"),
+    (counted("blade"), "3 or more"),
+    (counted(["blade 0", "blade 1", "blade 9"]), "no body 'blade 9'"),
+    (counted(["blade 0", "blade 1", "blade 1"]), "listed once"),
+    (counted(["blade 0", "blade 1", "hub"]), "alike"),
+    (counted([["blade 0", "hub"], ["blade 1"], ["blade 2"]]), "alike"),
+    (counted([f"blade {k}" for k in (0, 2, 1, 3)]), "does not stand"),  # across, not around
+    error=ConfigError,
 )
-def test_blades_that_are_none_are_refused(named, message):
-    mech, state = turning(4, 5.0, hinge="lag")
-    with pytest.raises(ConfigError, match=message):
-        rom.linearize(mech, state, blades=named)
 
 
 def test_the_order_of_blades_may_be_either_sense():
@@ -225,15 +213,13 @@ def test_steady_velocities_change_as_small_motions_say():
     """What moves the nacelle moves the axis, and with it all that turns: central differences."""
     mech, speed, rng = leaning(9.0), 9.0, np.random.default_rng(3)
     now = instant(mech, 0.0)
-    spins = Spins.of(mech, now, {"bearing": speed}, (0, 0, 0))
+    spins = Spins.of(mech, now, {"bearing": speed}, ORIGIN)
     state = spins.steady(now, rom.equilibrium(mech, spin={"bearing": speed}))
     T, T1, T3 = spins.motions(now, state)
     for _ in range(4):
         p = 1e-6 * rng.normal(size=state.v.size)
-        sides = [
-            spins.steady(now, replace(state, q=now.shifted(state.q, sign * (T @ p))))
-            for sign in (-1, 1)
-        ]
+        moved = (replace(state, q=now.shifted(state.q, sign * (T @ p))) for sign in (-1, 1))
+        sides = [spins.steady(now, there) for there in moved]
         for change, of in ((T1 @ p, "v"), (T3 @ p, "a")):
             seen = (getattr(sides[1], of) - getattr(sides[0], of)) / 2
             assert_allclose(change, seen, atol=1e-8 * np.abs(seen).max())

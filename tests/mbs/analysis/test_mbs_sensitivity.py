@@ -10,6 +10,7 @@ from cases.mbs.parts import ORIGIN, X, Z, on_guide, on_hinge
 from rom.errors import ConfigError, ModelError
 
 G = 9.81
+BAR = {"length": 1.0, "mass": 2.0, "lean": 0.3, "coil": 30.0}
 
 
 def hung(mass=1.3, stiffness=200.0, damping=4.0):
@@ -37,8 +38,7 @@ def angle_of(mechanism, state):
 
 def test_a_bar_on_a_coil_turns_as_the_implicit_function_says():
     """coil (a - lean) + m g l/2 cos a = 0 for large angles; all parameters, joint moved too."""
-    p = {"length": 1.0, "mass": 2.0, "lean": 0.3, "coil": 30.0}
-    found = rom.equilibrium_sensitivity(bar, p, angle_of)
+    p, found = BAR, rom.equilibrium_sensitivity(bar, BAR, angle_of)
     a, moment = float(found.value), p["mass"] * G * p["length"] / 2
     assert_allclose(p["coil"] * (a - p["lean"]) + moment * np.cos(a), 0, atol=1e-8)
     curve = p["coil"] - moment * np.sin(a)
@@ -76,11 +76,8 @@ def test_a_joint_that_moves_takes_the_forces_with_it():
 
 def test_reactions_have_derivatives_too():
     """The hinge carries the weight."""
-
-    def weight(mech, state):
-        return np.linalg.norm(state.lam[:3])
-
-    found = rom.equilibrium_sensitivity(bar, {"mass": 2.0, "coil": 30.0}, weight)
+    weight = {"output": lambda mech, state: np.linalg.norm(state.lam[:3])}
+    found = rom.equilibrium_sensitivity(bar, {"mass": 2.0, "coil": 30.0}, **weight)
     assert_allclose([found["mass"], found["coil"]], [G, 0], atol=1e-6)
 
 
@@ -102,9 +99,8 @@ def test_a_damped_oscillator_has_the_derivatives_of_its_root():
 
 def test_the_frequency_of_a_bar_changes_with_the_equilibrium_that_moves():
     """I w^2 = coil - m g l/2 sin a(p): both the matrices and the angle count."""
-    p = {"length": 1.0, "mass": 2.0, "lean": 0.3, "coil": 30.0}
-    found = rom.frequency_sensitivity(bar, p)
-    turn = rom.equilibrium_sensitivity(bar, p, angle_of)
+    p, found = BAR, rom.frequency_sensitivity(bar, BAR)
+    turn = rom.equilibrium_sensitivity(bar, BAR, angle_of)
     a, inertia, moment = float(turn.value), 2.0 / 3, G
     w = np.sqrt((30.0 - moment * np.sin(a)) / inertia)
     assert_allclose(found.value, [1j * w], rtol=1e-9)

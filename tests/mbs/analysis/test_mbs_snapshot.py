@@ -70,9 +70,8 @@ def test_the_end_of_a_motion_answers_as_the_motion_does():
     mech.revolute("pin", mech.ground.marker(mech.design_point(body.marker("a"))),
                   body.marker("a"), axis=(0, 0, 1))  # fmt: skip
     mech.drive("speed", "pin", lambda t: 2.0 * t**2)
-    mech.user_force(
-        "push", lambda t, state: ((0.0, 3.0 + t, 0.0), (0.0, 0.0, 0.0)), body.marker("b")
-    )
+    push = lambda t, state: ((0.0, 3.0 + t, 0.0), (0.0, 0.0, 0.0))  # noqa: E731
+    mech.user_force("push", push, body.marker("b"))
     sol = rom.simulate(mech, t_end=0.1, dt=1e-3)
     last = rom.snapshot(mech, sol.final)
     assert last.t == sol.t[-1]

@@ -5,6 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import rom
+from cases.mbs.parts import ORIGIN, X, Y, Z, on_guide
 from rom.errors import RomWarning
 
 G, R, MASS = 9.81, 0.3, 2.0
@@ -15,17 +16,10 @@ def wheel(kind, speed):
     """A thin wheel that rolls upright along x."""
     across, along = (share * MASS * R**2 for share in SHARES[kind])
     mech = rom.Mechanism(gravity=(0, 0, -G))
-    body = mech.add_rigid(
-        "wheel",
-        mass=MASS,
-        inertia=(across, along, across),
-        at=(0, 0, R),
-        velocity=(speed, 0, 0),
-        omega=(0, speed / R, 0),
-    )
-    centre = body.marker((0, 0, 0))
-    floor = mech.ground.marker((0, 0, 0))
-    mech.rolling("roll", floor, centre, normal=(0, 0, 1), radius=R, axis=(0, 1, 0))
+    motion = {"at": (0, 0, R), "velocity": (speed, 0, 0), "omega": (0, speed / R, 0)}
+    body = mech.add_rigid("wheel", mass=MASS, inertia=(across, along, across), **motion)
+    floor, centre = mech.ground.marker(ORIGIN), body.marker(ORIGIN)
+    mech.rolling("roll", floor, centre, normal=Z, radius=R, axis=Y)
     return mech
 
 
@@ -64,13 +58,10 @@ def test_the_lean_grows_in_a_simulation_as_the_eigenvalue_says():
 
 def rotor(speed):
     """An overhung disc on a shaft of springs: gyroscopic, but nothing rolls."""
-    mech = rom.Mechanism(gravity=(0, 0, 0))
-    disc = mech.add_rigid(
-        "disc", mass=3.0, inertia=(0.03, 0.03, 0.05), at=(0, 0, 0), omega=(0, 0, speed)
-    )
-    hub = disc.marker((0, 0, 0))
+    mech, solid = rom.Mechanism(gravity=ORIGIN), {"mass": 3.0, "inertia": (0.03, 0.03, 0.05)}
+    hub = mech.add_rigid("disc", **solid, at=ORIGIN, omega=speed * Z).marker(ORIGIN)
     stiffness = (2e4, 2e4, 3e4, 90.0, 90.0, 0.0)
-    mech.bushing("shaft", mech.ground.marker((0, 0, 0)), hub, stiffness=stiffness)
+    mech.bushing("shaft", mech.ground.marker(ORIGIN), hub, stiffness=stiffness)
     return mech
 
 
@@ -87,13 +78,11 @@ def test_a_rotor_has_the_eigenvalues_of_its_linearization():
 def test_a_mass_on_a_driven_arm_softens_with_the_speed():
     """Counted in the axes of the arm: s^2 = W^2 - k/m."""
     speed, stiffness, mass = 7.0, 300.0, 2.0
-    mech = rom.Mechanism(gravity=(0, 0, 0))
-    arm = mech.add_rigid("arm", mass=1.0, inertia=(0.1, 0.1, 0.1), at=(0, 0, 0))
-    box = mech.add_rigid("box", mass=mass, inertia=(0.1, 0.2, 0.2), at=(0.5, 0, 0))
-    o, hub, end = mech.ground.marker((0, 0, 0)), arm.marker((0, 0, 0)), box.marker((0, 0, 0))
-    mech.revolute("axle", o, hub, axis=(0, 0, 1))
+    mech = rom.Mechanism(gravity=ORIGIN)
+    hub = mech.add_rigid("arm", mass=1.0, inertia=(0.1, 0.1, 0.1), at=ORIGIN).marker(ORIGIN)
+    mech.revolute("axle", mech.ground.marker(ORIGIN), hub, axis=Z)
     mech.drive("motor", "axle", lambda t: speed * t)
-    mech.prismatic("slide", hub, end, axis=(1, 0, 0))
+    end = on_guide(mech, "box", mass=mass, at=0.5 * X, base=hub)
     mech.spring_damper("coil", hub, end, stiffness=stiffness)
     state = rom.equilibrium(mech, spin=(0, 0, speed))
     motion = rom.steady_motion(mech, state, frame="body")

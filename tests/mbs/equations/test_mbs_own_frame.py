@@ -13,7 +13,7 @@ from rom import rotation
 from rom.body.spread import mass_load
 from rom.errors import ConfigError
 from rom.mbs.analysis.equilibrium import equilibrium
-from rom.mbs.analysis.snapshot import snapshot
+from rom.mbs.analysis.local_equations import snapshot
 from rom.mbs.integrate.events import Instant
 from rom.mbs.integrate.simulation import simulate
 from rom.mbs.mechanism import Mechanism

@@ -15,8 +15,7 @@ from rom.components.updating.observers.tracking import Observer
 from rom.io.files import check_writable
 from rom.io.fmu.archive import write_archive
 from rom.io.fmu.body import arrays
-from rom.io.fmu.description import Content
-from rom.io.fmu.variables import Variable, structured
+from rom.io.fmu.description import Content, Variable, structured
 
 
 @typed

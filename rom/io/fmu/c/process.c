@@ -1,6 +1,6 @@
 /* A model that lives in a Python process of its own: "python3 -m rom.fmu <resources>" at the other
    end of a socket. A request is (verb, references, values), an answer (status, values, text); the
-   verbs are those of rom/fmu/server.py. Nothing of Python enters the program that runs the FMU. */
+   verbs are those of rom/fmu/driven.py. Nothing of Python enters the program that runs the FMU. */
 #define _GNU_SOURCE
 #include <errno.h>
 #include <signal.h>

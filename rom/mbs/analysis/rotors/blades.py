@@ -52,18 +52,11 @@ class Blades:
 
     @classmethod
     def of(cls, blades: Any, packed: Packed, state: State) -> "Blades":
-        """Blades that the caller names, one after the other around the axis.
-
-        Raises:
-            ConfigError: for less than three, for bodies that do not exist or differ from blade to
-                blade, for blades that are not evenly spaced.
-        """
+        """Blades that the caller names, one after the other around the axis."""
         rows = _bodies(blades, packed)
         bodies = packed.system.bodies
-        count = np.atleast_1d(6 + bodies.r)
-        coordinates = np.array(
-            [np.concatenate([bodies.v_at[b] + np.arange(count[b]) for b in row]) for row in rows]
-        )
+        own = [at + np.arange(6 + r) for at, r in zip(bodies.v_at, bodies.r, strict=True)]
+        coordinates = np.array([np.concatenate([own[b] for b in row]) for row in rows])
         q_at, v_at = (int(at[rows[0, 0]]) + 3 for at in (bodies.q_at, bodies.v_at))
         quaternions = (bodies.q_at[b] + 3 + np.arange(4) for b in rows[:, 0])
         axes = [rotation.matrix(state.q[at]) for at in quaternions]
@@ -119,11 +112,8 @@ class Blades:
     def waves(self, shapes: Array, state: State) -> Array:
         """(f, 3) shares of the motion of the blades [1]: all alike, backward and forward waves.
 
-        Args:
-            shapes: (n, f) modes in all coordinates, of comparable units.
-            state: around which.
-
-        Waves run around the support, forward in the sense in which the rotor turns. The motion +
+        The shapes (n, f) are modes in all coordinates, of comparable units, around the state. Waves
+        run around the support, forward in the sense in which the rotor turns. The motion +
         and - in turn of an even number runs nowhere: its share is missing in the sum.
         """
         N = len(self.coordinates)
@@ -136,11 +126,7 @@ class Blades:
 
 
 def _bodies(blades: Any, packed: Packed) -> Index:
-    """(N, bodies of a blade) numbers of bodies.
-
-    Raises:
-        ConfigError: if they are no identical blades.
-    """
+    """(N, bodies of a blade) numbers of bodies, refused if they are no identical blades."""
     if isinstance(blades, str) or not isinstance(blades, Sequence) or len(blades) < MIN_BLADES:
         raise ConfigError(
             f"blades must be {MIN_BLADES} or more, each named by its bodies.",

@@ -34,11 +34,7 @@ IN_BODIES = Axes()
 
 
 def chosen(frame: Any, names: tuple[str, ...]) -> Axes:
-    """The axes that the caller of an analysis names.
-
-    Raises:
-        ConfigError: for another word, or a body that does not exist.
-    """
+    """The axes that the caller of an analysis names."""
     table = frame if isinstance(frame, dict) else dict.fromkeys(names, frame)
     unknown = set(table) - set(names)
     if unknown:
@@ -54,11 +50,8 @@ def small_motions(packed: Any, state: State, axes: Axes) -> tuple[Any, ...]:
     T d2p/dt2 + T2 dp/dt + T3 p. In body axes p turns with the body: what is at rest beside a
     rotating blade has constant p. In world axes p stays: what a spinning disc, which looks the
     same from all sides, does in its bearings has constant coefficients. All are sparse.
-    Blades are counted together, see `rom.mbs.analysis.rotors.blades`.
-
-    Raises:
-        ModelError: naming a body that deforms and spins in axes of the world: its elastic
-            coordinates turn with it.
+    Blades are counted together, see `rom.mbs.analysis.rotors.blades`. A body that deforms and
+    spins in axes of the world is refused: its elastic coordinates turn with it.
     """
     bodies, n = packed.system.bodies, state.v.size
     at = bodies.v_at[:, None]

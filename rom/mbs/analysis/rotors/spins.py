@@ -54,24 +54,17 @@ class Spins:
 
     @classmethod
     def of(cls, mechanism: Mechanism, now: Instant, spin: Any, about: npt.ArrayLike) -> "Spins":
-        """What the caller of `equilibrium` says.
-
-        Raises:
-            ConfigError: for a vector or a speed that is none, a joint without an axis, bodies that
-                joints on both sides hold.
-            ModelError: if something rolls.
-        """
-        point = finite("about", about, (3,))
+        """What the caller of `equilibrium` says."""
+        found = cls(np.zeros(3), finite("about", about, (3,)))
         if isinstance(spin, Mapping):
-            found = cls(np.zeros(3), point, _turning(mechanism, now, spin))
-        else:
-            found = cls(np.zeros(3) if spin is None else finite("spin", spin, (3,)), point)
+            found = replace(found, turning=_turning(mechanism, now, spin))
+        elif spin is not None:
+            found = replace(found, whole=finite("spin", spin, (3,)))
         rolls = now.packed.system.rows.kind == ROLL
         if found.any and rolls.any():
-            name = now.packed.row_owner[int(np.argmax(rolls))]
             raise ModelError(
                 "what rolls has no equilibrium while it spins; use rom.simulate instead.",
-                where=name,
+                where=now.packed.row_owner[int(np.argmax(rolls))],
             )
         return found
 
@@ -105,8 +98,7 @@ class Spins:
     def motions(self, now: Instant, state: State) -> tuple[Any, Any, Any]:
         """Matrices (n, n) of small steady motions p to variations T p, velocities, accelerations.
 
-        Bodies that turn carry their p with them; where p moves what carries a joint, its axis goes
-        along.
+        Bodies that turn carry their p with them; an axis goes along with what carries its joint.
         """
         T, T1, _, T3 = small_motions(now.packed, state, IN_BODIES)
         if not self.turning:
@@ -132,9 +124,8 @@ class Spins:
                 tilt = -W @ turn  # change of omega
                 move = -W @ shift - rotation.skew(arm) @ tilt
                 V[row : row + 3, columns] = move
-                V[row + 3 : row + 6, columns] = (
-                    rotation.matrix(state.q[q_at + 3 : q_at + 7]).T @ tilt
-                )
+                axes = rotation.matrix(state.q[q_at + 3 : q_at + 7])
+                V[row + 3 : row + 6, columns] = axes.T @ tilt
                 A[row : row + 3, columns] = W @ move - rotation.skew(W @ arm) @ tilt
         return V.tocsr(), A.tocsr()
 
@@ -154,10 +145,7 @@ def _turning(mechanism: Mechanism, now: Instant, spin: Mapping[str, Any]) -> tup
         for name, joint in mechanism.joints.items()
         if name not in spin and all(row.kind != COUPLING for row in joint.rows)
     ]
-    fixed += [
-        {number_of[part.name] for part in mechanism.nonlinear[name].parts}
-        for name in mechanism.nonlinear
-    ]
+    fixed += [{number_of[p.name] for p in whole.parts} for whole in mechanism.nonlinear.values()]
     sides = [tuple(number_of[m.body] for m in joint.markers) for joint in joints]
     groups = [_joined({-1, *(carrier for carrier, _ in sides)}, fixed)]
     for joint, (_, turned) in zip(joints, sides, strict=True):

@@ -1,4 +1,7 @@
-"""Inputs in place of the functions of time of loads, motors and drives."""
+"""Inputs in place of the functions of time of loads, motors and drives; outputs.
+
+Outputs are the motion of markers, joint coordinates, and loads of drives.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -6,15 +9,28 @@ from typing import Any
 
 import numpy as np
 
-from rom.io.fmu.variables import Variable, structured
+from rom.io.fmu.description import Variable, components, structured
 from rom.mbs.connections.drives import Drive
+from rom.mbs.elements import frictions
+from rom.mbs.equations.packing import Packed
+from rom.mbs.kernels.work import Work
 from rom.mbs.mechanism import Mechanism
+from rom.mbs.parts.bodies import Marker
 from rom.mbs.parts.signals import drive_signal
 from rom.model import Array
 from rom.names import check_known, check_once
+from rom.rotation import quaternion
 
 INFINITE_SPAN = (-np.inf, np.inf)
 DIFFERENCE_SPACING = 1e-4  # of the differences for the speed of a drive at the start [s]
+# reads (W, lam, packed) at an instant
+Reading = Callable[[Work, Array, Packed], Any]
+MARKER_OUTPUTS = (
+    ("position", 3, "m", "world"),
+    ("velocity", 3, "m/s", "world"),
+    ("quaternion", 4, "1", "marker to world, scalar first"),
+    ("angular_velocity", 3, "rad/s", "world"),
+)
 
 
 @dataclass
@@ -51,34 +67,22 @@ class Held:
 
 
 class Inputs:
-    """The inputs of a mechanism, whose functions of time they replace.
-
-    Args:
-        mechanism: it is changed.
-        names: of loads, spread loads, motors or drives.
-
-    Raises:
-        ConfigError: for a name that has no input, or twice the same.
-    """
+    """The inputs of a mechanism, whose functions of time they replace, by name."""
 
     def __init__(self, mechanism: Mechanism, names: tuple[str, ...]):
         self.starts: list[tuple[Held, Callable[[float], tuple[float, float]]]] = []
-        kinds = {
-            **dict.fromkeys(mechanism.loads, _load),
-            **dict.fromkeys(mechanism.spread_loads, _spread),
-            **dict.fromkeys(mechanism.motors, _motor),
-            **dict.fromkeys(mechanism.drives, _drive),
-        }
+        kinds = dict.fromkeys(mechanism.loads, _load)
+        kinds |= dict.fromkeys(mechanism.spread_loads, _spread)
+        kinds |= dict.fromkeys(mechanism.motors, _motor) | dict.fromkeys(mechanism.drives, _drive)
         check_once(names, "the input")
         for name in names:
             check_known(name, kinds, f"no input {name!r}; the loads, motors and drives are")
         found = {name: kinds[name](mechanism, name) for name in names}
         self.variables = [variable for several in found.values() for variable in several]
         self.values = np.array([v.start for v in self.variables], dtype=float)
-        first = 0
-        for name, several in found.items():
-            self._connect(mechanism, name, self.values[first : first + len(several)])
-            first += len(several)
+        ends = np.cumsum([len(several) for several in found.values()])
+        for name, values in zip(found, np.split(self.values, ends), strict=False):
+            self._connect(mechanism, name, values)
 
     def _connect(self, mechanism: Mechanism, name: str, values: Array) -> None:
         """Let what has this name read the values."""
@@ -86,10 +90,8 @@ class Inputs:
             load = mechanism.loads[name]
             mechanism.loads[name] = replace(load, function=lambda t: values, vector=np.zeros(3))
         elif name in mechanism.spread_loads:
-            spread = mechanism.spread_loads[name]
-            mechanism.spread_loads[name] = replace(
-                spread, function=lambda t: values[0], amplitude=0.0
-            )
+            spread = replace(mechanism.spread_loads[name], function=lambda t: values[0])
+            mechanism.spread_loads[name] = replace(spread, amplitude=0.0)
         elif name in mechanism.motors:  # compiled, it would keep the value of now
             motor = mechanism.motors[name]
             mechanism.motors[name] = replace(motor, law=lambda t, x, xd: values[0], compiled=None)
@@ -130,12 +132,8 @@ def _load(mechanism: Mechanism, name: str) -> list[Variable]:
     value = np.asarray(load.function(0.0) if load.function else load.vector, dtype=float)
     what, unit = ("force", "N") if load.kind < 2 else ("torque", "N.m")
     frame = "world" if load.kind % 2 == 0 else "marker"
-    return [
-        Variable(
-            f"{structured(name)}[{k}]", "input", unit, float(x), f"{what}, axes of the {frame}"
-        )
-        for k, x in enumerate(value, 1)
-    ]
+    about = f"{what}, axes of the {frame}"
+    return components(structured(name), "input", unit, value, about)
 
 
 def _spread(mechanism: Mechanism, name: str) -> list[Variable]:
@@ -159,3 +157,80 @@ def _drive(mechanism: Mechanism, name: str) -> list[Variable]:
     start = float(_at(drive_signal(name, drive), 0.0)[2])
     about = f"acceleration of the coordinate of {drive.joint}"
     return [Variable(structured(name, "acceleration"), "input", unit, start, about)]
+
+
+def output_names(mechanism: Mechanism) -> list[str]:
+    """All outputs there can be: markers with names, joints with a coordinate, drives."""
+    joints = [name for name, joint in mechanism.joints.items() if joint.coordinate is not None]
+    return [*_places(mechanism), *joints, *mechanism.drives]
+
+
+def _places(mechanism: Mechanism) -> dict[str, Marker]:
+    """All markers with names, as "body.marker"."""
+    parts = mechanism.parts.values()
+    return {f"{part.name}.{place}": part.marker(place) for part in parts for place in part.names}
+
+
+class Outputs:
+    """What an FMU tells of its mechanism: of the names of `output_names` that are given.
+
+    Joints among them get a friction of zero, which lets the integrator count their angles over
+    whole turns.
+    """
+
+    def __init__(self, mechanism: Mechanism, names: tuple[str, ...]):
+        self.variables: list[Variable] = []
+        self.readings: list[Reading] = []
+        places, known = _places(mechanism), output_names(mechanism)
+        check_once(names, "the output")
+        for name in names:
+            check_known(name, known, f"no output {name!r}; there are")
+            if name in places:
+                self._marker(places[name])
+            elif name in mechanism.joints:
+                self._joint(mechanism, name)
+            else:
+                self._drive(mechanism, name)
+
+    def values(self, W: Work, lam: Array, packed: Packed) -> Array:
+        """(n,) all outputs after an evaluation of the mechanism."""
+        found = [np.ravel(read(W, lam, packed)) for read in self.readings]
+        return np.concatenate(found) if found else np.zeros(0)
+
+    def _marker(self, marker: Marker) -> None:
+        for what, count, unit, axes in MARKER_OUTPUTS:
+            name = structured(marker.body, str(marker.place), what)
+            self.variables += components(name, "output", unit, [None] * count, axes)
+        self.readings += [
+            lambda W, lam, packed: W.P[packed.row(marker)],
+            lambda W, lam, packed: W.V[packed.row(marker), :3],
+            lambda W, lam, packed: quaternion(W.E[packed.row(marker)]),
+            lambda W, lam, packed: W.V[packed.row(marker), 3:],
+        ]
+
+    def _joint(self, mechanism: Mechanism, name: str) -> None:
+        joint = mechanism.joints[name]
+        ways: Any = (("angle", joint.turn, "rad"), ("way", joint.displacement, "m"))
+        for what, row, unit in ways:
+            if row is None:
+                continue
+            k = len(mechanism.frictions)
+            mechanism.friction(f"{what} of {name}", name, transition_speed=1.0, coordinate=what)
+            self.variables += [
+                Variable(structured(name, what), "output", unit, description="from the start"),
+                Variable(structured(name, f"{what}_rate"), "output", f"{unit}/s"),
+            ]
+            self.readings += [_coordinate("x", k), _coordinate("xd", k)]
+
+    def _drive(self, mechanism: Mechanism, name: str) -> None:
+        joint = mechanism.joints[mechanism.drives[name].joint]
+        unit = "N.m" if joint.coordinate is joint.turn else "N"
+        about = "that the drive supplies along its joint coordinate"
+        self.variables.append(Variable(structured(name, "load"), "output", unit, None, about))
+        self.readings.append(lambda W, lam, packed: -lam[packed.rows_of(name)[0]])
+
+
+def _coordinate(what: str, k: int) -> Reading:
+    """Coordinate or rate that friction k follows."""
+    family = frictions.FRICTIONS_FAMILY
+    return lambda W, lam, packed: getattr(W, what)[packed.elements[family].at[k]]
