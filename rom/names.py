@@ -40,9 +40,6 @@ def check_text(name: object, what: str, error: type[RomError] = ConfigError) -> 
         name: as read, from whatever file.
         what: what it names, for the message, e.g. "an interface".
         error: class of what is raised.
-
-    Raises:
-        RomError: of that class, showing the name.
     """
     if not isinstance(name, str) or not name.strip():
         raise error(f"the name of {what} must be a text that is not empty, got {name!r}.")
@@ -84,9 +81,6 @@ def file_name(name: str, ending: str = "") -> str:
     Args:
         name: of the thing, e.g. of a body.
         ending: put behind, e.g. ".csv".
-
-    Raises:
-        ConfigError: if no file can have it, or it would lie in another folder.
     """
     found = f"{check_name(name, 'a file')}{ending}"
     size = len(found.encode()) + TEMPORARY_BYTES
@@ -106,9 +100,6 @@ def check_ending(path: str | Path, what: str, *endings: str) -> Path:
         path: as given.
         what: is written, for the message.
         endings: with their dots, the usual one first.
-
-    Raises:
-        ConfigError: naming them.
     """
     path = Path(path)
     if path.suffix.lower() not in endings:
@@ -126,11 +117,7 @@ def csv_cell(text: str) -> str:
 
 
 def inside(folder: str | Path, name: str, ending: str = "") -> Path:
-    """Path of a file for a thing of this name, in a folder and nowhere else.
-
-    Raises:
-        ConfigError: as `file_name`.
-    """
+    """Path of a file for a thing of this name, in a folder and nowhere else."""
     folder = Path(folder)
     path = folder / file_name(name, ending)
     if path.parent.resolve() != folder.resolve():
@@ -170,9 +157,6 @@ def check_known(
         known: the names there are.
         text: what the error says before it lists them.
         error: class of what is raised.
-
-    Raises:
-        RomError: of that class.
     """
     if name not in known:
         raise error(f"{text} {offered(known, name)}.")

@@ -178,9 +178,6 @@ def check_damping_ratio(ratio: Any, of: str = "", *, stilled: bool = False) -> N
         of: whose it is.
         stilled: take one at its word: so are residual shapes stilled.
 
-    Raises:
-        ConfigError: for no number, one below zero, or one above one, which is per cent.
-
     Warns:
         RomWarning: for one that no structure has.
     """
@@ -197,11 +194,7 @@ def check_damping_ratio(ratio: Any, of: str = "", *, stilled: bool = False) -> N
 
 
 def refuse_negative(name: str, value: Any) -> None:
-    """Refuse what is no finite number from zero on.
-
-    Raises:
-        ConfigError: naming it.
-    """
+    """Refuse what is no finite number from zero on."""
     if isinstance(value, bool) or not isinstance(value, Real) or not math.isfinite(value):
         raise ConfigError(f"{name} = {value!r} must be a finite number.")
     if value < 0.0:

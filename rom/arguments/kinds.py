@@ -89,11 +89,7 @@ class Taken:
     take: Callable[[Any], Any]
 
     def __call__(self, value: Any) -> Any:
-        """The value as the function gets it.
-
-        Raises:
-            Unfit: in these words.
-        """
+        """The value as the function gets it."""
         try:
             return self.take(value)
         except (TypeError, ValueError, OverflowError, AttributeError) as error:

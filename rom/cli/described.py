@@ -56,9 +56,6 @@ def component(args: argparse.Namespace, *extra: str) -> "Component":
     Args:
         args: the options.
         extra: options the verb looks after itself.
-
-    Raises:
-        ConfigError: for an option that has no key, and as `rom.read_component`.
     """
     from rom.config.component import read_component
 
@@ -71,9 +68,6 @@ def mechanism(args: argparse.Namespace, *extra: str) -> "MechanismFile":
     Args:
         args: the options.
         extra: options the verb looks after itself.
-
-    Raises:
-        ConfigError: for an option that has no key, and as `rom.read_mechanism`.
     """
     from rom.config.mechanism import read_mechanism
 
@@ -113,11 +107,7 @@ def _faces(pairs: list[tuple[str, str]]) -> Changes:
 
 
 def rayleigh(text: str) -> dict[str, float]:
-    """The factors of D = alpha M + beta K.
-
-    Raises:
-        ConfigError: for what is not two numbers.
-    """
+    """The factors of D = alpha M + beta K."""
     try:
         alpha, beta = map(float, text.split(","))
     except ValueError:

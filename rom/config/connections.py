@@ -50,11 +50,7 @@ class Entry:
     trust: bool
 
     def connect(self) -> None:
-        """Call the method of the mechanism.
-
-        Raises:
-            RomError: for what the mechanism refuses.
-        """
+        """Call the method of the mechanism."""
         connect = sections()[self.section].connect or CALLS.get(self.section, _plainly)
         connect(self)
 
@@ -68,11 +64,7 @@ class Entry:
         return record(**{name: self.values.pop(name) for name in names})
 
     def take_body(self) -> "Part":
-        """The flexible body under "body", which leaves the values.
-
-        Raises:
-            ConfigError: if there is none of that name.
-        """
+        """The flexible body under "body", which leaves the values."""
         name, parts = self.values.pop("body"), self.made.parts
         flexible = [key for key, part in parts.items() if part.flexible is not None]
         if name not in flexible:
@@ -248,11 +240,7 @@ class Condition:
 
 
 def condition_of(ends: list[Any], values: dict[str, Any], place: Place) -> Condition:
-    """The condition of an entry of [events].
-
-    Raises:
-        ConfigError: for a value and a formula, or neither; or an axis of length zero.
-    """
+    """The condition of an entry of [events]."""
     if ("value" in values) == ("expression" in values):
         what = "both a value and an expression" if "value" in values else "no value it passes"
         raise place.error(f"{place.name} has {what}.", "Give one of value and expression.")
@@ -304,11 +292,7 @@ LAWS: dict[str, Callable[[Entry], None]] = {
 
 
 def check_name(name: str) -> None:
-    """Refuse names of bodies and rods that markers could not name.
-
-    Raises:
-        ConfigError: for one with a dot, or that of the ground.
-    """
+    """Refuse names of bodies and rods that markers could not name."""
     if "." in name or name == GROUND:
         raise ConfigError(f"{name!r} is no name for a body; use one without a dot, not {GROUND!r}.")
 

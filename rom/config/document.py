@@ -41,12 +41,7 @@ class Document:
 
 
 def read_document(path: str | Path) -> Document:
-    """Read a TOML file.
-
-    Raises:
-        FileFormatError: if it is missing, too large, or no text.
-        ConfigError: naming the line that is no TOML, or the key that is given twice.
-    """
+    """Read a TOML file."""
     path = check_readable(path)
     if path.stat().st_size > MAX_BYTES:
         raise FileFormatError(f"more than {MAX_BYTES} bytes are no description.", where=str(path))
@@ -58,11 +53,7 @@ def read_document(path: str | Path) -> Document:
 
 
 def parsed(text: str, path: Path) -> Document:
-    """The document of a text.
-
-    Raises:
-        ConfigError: as `read_document`.
-    """
+    """The document of a text."""
     found = list(statements(text))
     _check_depth(text, path)
     for key, line in found:

@@ -73,11 +73,7 @@ class Reader:
         return [*self.variables, *self.constants, *CONSTANTS, *FUNCTIONS]
 
     def code(self) -> Code:
-        """Its instructions.
-
-        Raises:
-            ConfigError: naming what is wrong and where, with a caret below it.
-        """
+        """Its instructions."""
         if len(self.text) > MAX_LETTERS:
             raise self.place.error(
                 f"{self.place.name} has {len(self.text)} letters; {MAX_LETTERS} are the most.",

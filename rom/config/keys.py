@@ -55,11 +55,7 @@ class Written(Protocol):
 
 
 def read_value(kind: "Kind", value: Any, place: Place) -> Any:
-    """The value of a key, checked and in SI.
-
-    Raises:
-        ConfigError: if it is none of this kind.
-    """
+    """The value of a key, checked and in SI."""
     if isinstance(kind, Quantity):
         return _quantity(kind, value, place)
     if isinstance(kind, Whole):
@@ -369,11 +365,7 @@ def as_text(value: Any) -> str:
 
 
 def read_table(table: Table, document: Document) -> dict[str, Any]:
-    """The values of a document.
-
-    Raises:
-        ConfigError: with every mistake, and its line.
-    """
+    """The values of a document."""
     place = Place(document)
     values = table.read(document.data, place)
     raise_mistakes(place)
@@ -381,11 +373,7 @@ def read_table(table: Table, document: Document) -> dict[str, Any]:
 
 
 def raise_mistakes(place: Place) -> None:
-    """Raise what has been collected, the first mistake in front.
-
-    Raises:
-        ConfigError: if there is any.
-    """
+    """Raise what has been collected, the first mistake in front."""
     found = place.mistakes
     if len(found) == 1:
         raise found[0]

@@ -32,9 +32,6 @@ def chosen(settings: dict[str, Any], *, full: bool) -> "Method | Characteristic"
     Args:
         settings: values by the keys of `SETTINGS`; those that nobody chose are missing.
         full: whether any interface keeps all its dofs.
-
-    Raises:
-        ConfigError: if they contradict each other.
     """
     from rom.reduction.bases.loads import WithLoads
     from rom.reduction.interfaces.characteristic import Characteristic

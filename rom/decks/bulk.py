@@ -117,10 +117,6 @@ def grids(found: dict[str, list[Card]]) -> tuple[Index, Array, Index]:
 
     Args:
         found: the cards of `POINTS` by their names.
-
-    Raises:
-        FileFormatError: naming the line, for damaged cards, labels that come twice, and systems
-            that are missing, flat or defined by themselves.
     """
     default = next(iter(found.get("GRDSET", ())), Card("GRDSET", [], (Path(), 0)))
     own, turned = default.whole(1, 0), default.whole(5, 0)

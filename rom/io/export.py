@@ -121,11 +121,7 @@ def export(
 
 
 def format_of(path: str | Path, to: str | None = None) -> str:
-    """The name of the format that a file will have.
-
-    Raises:
-        ConfigError: listing what is known.
-    """
+    """The name of the format that a file will have."""
     if to is not None:
         return one_of("format", to, FORMATS)
     ending = Path(path).suffix.lower()

@@ -15,9 +15,6 @@ def h5py(otherwise: str) -> Any:
 
     Args:
         otherwise: ending of files that do without.
-
-    Raises:
-        ResourceError: if h5py is missing, or does not load beside what is there.
     """
     try:
         return import_module("h5py")

@@ -184,11 +184,7 @@ def body_of(manifest: dict[str, Any], arrays: dict[str, Array]) -> FlexibleBody:
 
 
 def report_of(entry: dict[str, Any] | None) -> Report | None:
-    """The report of a manifest, each row judged anew by its value and its limit.
-
-    Raises:
-        ValueError: for a row that is none, see `stated`.
-    """
+    """The report of a manifest, each row judged anew by its value and its limit."""
     if entry is None:
         return None
     rows = tuple(Row(**row) for row in entry["rows"])

@@ -58,10 +58,6 @@ def check_replaceable(
         kind: of what will be written: a key of `FILE_SIGNS`, or a format of `rom.export`.
         inputs: files that are read; these are never written.
         force: replace whatever else is there.
-
-    Raises:
-        ConfigError: if there is a file that rom did not write as one of this kind, it is an input,
-            or the place is not writable.
     """
     path = check_writable(path)
     for source in inputs:

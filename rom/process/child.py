@@ -98,9 +98,6 @@ def run(
         limits: what it may take.
         variables: of its environment, beside those of this process.
         given: bytes on its standard input, which is empty without.
-
-    Raises:
-        OSError: if there is no such program.
     """
     limits = limits or Limits()
     with terminable():
@@ -186,9 +183,6 @@ def scratch(kind: str) -> Iterator[Path]:
 
     Args:
         kind: one word of its name.
-
-    Raises:
-        ResourceError: whatever failed inside, if the temporary folder is full.
     """
     made: tuple[Path, int] | None = None
     with terminable():

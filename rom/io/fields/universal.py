@@ -58,11 +58,7 @@ class Function:
     abscissa: str = ""
 
     def receptance(self) -> npt.NDArray[np.complex128]:
-        """(n,) displacement per force [m/N], whatever was measured.
-
-        Raises:
-            ConfigError: if this is no motion per force.
-        """
+        """(n,) displacement per force [m/N], whatever was measured."""
         if self.kind != FREQUENCY_RESPONSE or self.denominator != FORCE_TYPE:
             raise ConfigError(f"{_name(self)}: the function must be a response to a force.")
         if self.numerator not in PER_RECEPTANCE:
@@ -96,10 +92,6 @@ def scan(path: str | Path) -> tuple[tuple[Function, ...], dict[str, list[list[st
 
     Args:
         path: the file, .unv or .uff.
-
-    Raises:
-        FileFormatError: if the file is missing, or a dataset is cut.
-        UnsafeFileError: if it is larger than 1 GiB.
     """
     path = check_readable(path, MAX_BYTES)
     data, place = path.read_bytes(), 0
@@ -137,9 +129,6 @@ def assemble(
         functions: as read.
         responses: (n_s) nodes and directions of the sensors.
         references: (n_e) nodes and directions of the exciters.
-
-    Raises:
-        ConfigError: if a function is missing or has other frequencies.
     """
     known = {_key(f): f for f in functions if f.kind == FREQUENCY_RESPONSE}
     columns: list[npt.NDArray[np.complex128]] = []

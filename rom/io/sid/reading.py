@@ -78,12 +78,7 @@ class _Lines:
 
 
 def read_raw(path: str | Path) -> RawFile:
-    """The content of a file as written, its sizes checked before memory is taken.
-
-    Raises:
-        FileFormatError: naming the line, if the file is missing, cut, or no SID.
-        UnsafeFileError: if it is larger than 256 MiB or has more than 1000 coordinates.
-    """
+    """The content of a file as written, its sizes checked before memory is taken."""
     file = RawFile(check_readable(path, MAX_BYTES))
     lines = _Lines(file, file.path.read_bytes().decode("ascii", "replace"))
     file.title = HEAD_PATTERN.sub("", lines.next()).strip().removesuffix(f"; {ORIGIN_MARK}")
