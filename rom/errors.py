@@ -63,11 +63,7 @@ def last_clause(message: str) -> str:
 
 @contextmanager
 def reached(found: Callable[[], Any]) -> Iterator[None]:
-    """Errors from within carry what was found before, as ``error.solution``.
-
-    Args:
-        found: gives it, in the form in which the function that fails would have returned it.
-    """
+    """Errors from within carry what was found before, as the function would have returned it."""
     try:
         yield
     except RomError as error:
@@ -189,9 +185,7 @@ class RomWarning(UserWarning):
 def warn(sentence: str, kind: type[Warning] = RomWarning) -> None:
     """Warn once: on the first of several ranks, at the line outside the package that caused it.
 
-    Args:
-        sentence: what a user wants to know; nothing happens without one.
-        kind: of the warning.
+    Nothing happens without a sentence.
     """
     rank = next((int(os.environ[name]) for name in RANKS if name in os.environ), 0)
     if not sentence or rank:

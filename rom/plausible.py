@@ -171,15 +171,9 @@ def warn_outside(limits: Range, value: float, of: str = "") -> None:
 
 
 def check_damping_ratio(ratio: Any, of: str = "", *, stilled: bool = False) -> None:
-    """Take a share of critical damping at the border.
+    """Take a share of critical damping at the border; warn of one that no structure has.
 
-    Args:
-        ratio: damping over critical damping [1].
-        of: whose it is.
-        stilled: take one at its word: so are residual shapes stilled.
-
-    Warns:
-        RomWarning: for one that no structure has.
+    Stilled takes one at its word: so are residual shapes stilled.
     """
     refuse_negative(f"the damping ratio of {of}" if of else "damping ratio", ratio)
     if ratio > 1.0:

@@ -49,14 +49,9 @@ ARRAY_LIKE = frozenset(typing.get_args(npt.ArrayLike))  # none from NumPy 2.5 on
 
 
 class Unfit(Exception):
-    """A value is not what is wanted.
+    """A value is not what is wanted, in words; or its part at a place, such as ``['a']``.
 
-    Args:
-        value: the value, or the part of it that is wrong.
-        wanted: what it must be, in words.
-        place: of that part, such as ``['a']``.
-        sentence: what is said of it behind its name, where that is more than what is wanted.
-        error: class of what is raised for it.
+    A sentence is said of it behind its name where that is more than what is wanted.
     """
 
     def __init__(

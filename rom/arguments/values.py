@@ -30,15 +30,7 @@ def shortened(value: Any) -> str:
 
 
 def whole(name: str, value: Any, low: int = 0, high: int | None = None, *, reason: str = "") -> int:
-    """The value as a whole number within a range.
-
-    Args:
-        name: of the argument.
-        value: what was given.
-        low: smallest that is allowed.
-        high: largest that is allowed; None for no limit.
-        reason: why there is such a range, as the rest of a sentence.
-    """
+    """The value as a whole number within a range; a reason for that is the rest of a sentence."""
     kind, fits = Whole(low, high), isinstance(value, Integral) and not isinstance(value, bool)
     if fits and kind.holds(operator.index(value)):
         return operator.index(value)
@@ -79,14 +71,9 @@ def symmetric(
     where: str = "",
     error: type[RomError] = QualityGateError,
 ) -> None:
-    """Refuse a matrix, sparse or dense, that belongs to no energy.
+    """Refuse a matrix (n, n), sparse or dense, of a file, that belongs to no energy.
 
-    Args:
-        name: of the matrix.
-        A: (n, n).
-        rtol: difference of its halves over its largest entry [1] that is round-off.
-        where: the file it comes from.
-        error: class of what is raised.
+    Round-off is a difference of its halves up to rtol [1] of its largest entry.
     """
     gap, size = (abs(X).max() if A.shape[0] else 0.0 for X in (A - A.T, A))
     if gap > rtol * size:
@@ -163,15 +150,7 @@ def shape_words(shape: tuple[int | None, ...]) -> str:
 def one_each(
     what: str, given: Any, each: str, wanted: Any, *, error: type[RomError] = ConfigError
 ) -> None:
-    """Refuse things that are not one for each of others.
-
-    Args:
-        what: their name, in the plural.
-        given: their number, or shape.
-        each: name of the others.
-        wanted: the number of these, or their shape.
-        error: class of what is raised.
-    """
+    """Refuse things, by their name in the plural, whose number or shape is not that of others."""
     if given != wanted:
         n, m = (x[0] if isinstance(x, tuple) and len(x) == 1 else x for x in (given, wanted))
         raise error(f"{n} {what} for {m} {each}; give one for each.")

@@ -51,24 +51,14 @@ def described(args: argparse.Namespace) -> bool:
 
 
 def component(args: argparse.Namespace, *extra: str) -> "Component":
-    """The component of the file, with what the command line changes.
-
-    Args:
-        args: the options.
-        extra: options the verb looks after itself.
-    """
+    """The component of the file, with what the command line changes but for extra options."""
     from rom.config.component import read_component
 
     return read_component(args.file, changes(args.given, PLACES, extra), **meshing(args))
 
 
 def mechanism(args: argparse.Namespace, *extra: str) -> "MechanismFile":
-    """The mechanism of the file, with what the command line changes.
-
-    Args:
-        args: the options.
-        extra: options the verb looks after itself.
-    """
+    """The mechanism of the file, with what the command line changes but for extra options."""
     from rom.config.mechanism import read_mechanism
 
     return read_mechanism(args.file, changes(args.given, MOTION_KEYS, extra), **meshing(args))

@@ -104,14 +104,9 @@ def unique(pairs: list[tuple[str, Any]], option: str) -> dict[str, Any]:
 
 
 def option(to: Any, words: str, about: str, kind: Any = None, **more: Any) -> None:
-    """Add an option; one without a kind is a flag.
+    """Add an option to a parser or group, by its flags and, if need be, what stands for the value.
 
-    Args:
-        to: parser, or a group of it.
-        words: its flags and, if that is not its name, what stands for the value, with blanks.
-        about: its help.
-        kind: what makes the value from a text; assignments may be repeated, names be missing.
-        more: as of ``add_argument``.
+    One without a kind is a flag; assignments may be repeated, names be missing.
     """
     flags = [word for word in words.split() if word.startswith("-")]
     shown = [word for word in words.split() if word not in flags]

@@ -24,13 +24,8 @@ def checked(
 ) -> Path:
     """The path, if the verb may write it; to be asked before the computation.
 
-    One rank writes, and looks for all.
-
-    Args:
-        args: the options, whose files are inputs, too.
-        path: file to write.
-        kind: of it, a key of `rom.io.ours.FILE_SIGNS`; from its ending if not given.
-        inputs: files that are read and named elsewhere.
+    One rank writes, and looks for all. Options and inputs name what is read. The kind is a key of
+    `rom.io.ours.FILE_SIGNS`; that of the ending if not given.
     """
     from rom.io.ours import check_replaceable
 

@@ -70,14 +70,9 @@ def print_error(error: RomError, options: OutputOptions, rank: int = 0) -> None:
 
 @contextmanager
 def speaking(options: OutputOptions, *, verbose: bool) -> Iterator[list[str]]:
-    """Progress and warnings on stderr; with ``--strict`` the first warning is an error.
+    """Progress and warnings on stderr, but for silent ranks; gives the list that collects warnings.
 
-    Args:
-        options: how.
-        verbose: False on ranks that keep silent.
-
-    Yields:
-        The list that collects the warnings.
+    With ``--strict`` the first of them is an error.
     """
     remarks: list[str] = []
 

@@ -110,14 +110,7 @@ class ByCoordinate:
 
 
 def law_of(values: Any, place: Place, *, t_end: float | None = None, trust: bool = False) -> Law:
-    """The functions of a law.
-
-    Args:
-        values: what `law_kind` has read: a number, or a table with its kind.
-        place: its place in the file.
-        t_end: until when it is asked for [s].
-        trust: run a function of a Python file.
-    """
+    """The functions of a law, as `law_kind` has read it, asked for until t_end [s]."""
     import numpy as np
 
     values = dict(values) if isinstance(values, Mapping) else {"kind": "constant", "value": values}

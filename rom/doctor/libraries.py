@@ -46,12 +46,7 @@ def light() -> list[Finding]:
 
 
 def fenicsx(found: dict[str, dict[str, Any]], ending: str) -> list[Finding]:
-    """One finding per library.
-
-    Args:
-        found: answers of the probe by name; a name that is missing was not reached.
-        ending: how the probe ended, "" if well.
-    """
+    """One finding per library, of the answers of a probe that ended well, "", or otherwise."""
     findings = [_finding(name, found.get(name), ending) for name in PACKAGES]
     findings.insert(1, _launcher(found.get("MPI", {}).get("version", "")))
     if any(f.state == "missing" for f in findings):
@@ -80,11 +75,7 @@ def _repair(name: str, error: str) -> str:
 
 
 def _launcher(library: str) -> Finding:
-    """The program that starts ranks, and whether it is of the MPI that Python loads.
-
-    Args:
-        library: what that MPI says of itself; empty without one.
-    """
+    """The program that starts ranks; whether it is of the MPI that Python loads, by its words."""
     program = mpirun.found()
     if not program:
         state = "missing" if library else "ok"
@@ -104,12 +95,7 @@ def _launcher(library: str) -> Finding:
 
 
 def command(debian: str, pip: str) -> str:
-    """What to type for a library: of Debian where this Python looks for its packages, else of pip.
-
-    Args:
-        debian: name of the package there.
-        pip: names of the wheels.
-    """
+    """What to type for a library: of Debian where this Python looks for packages, else of pip."""
     if not sees_debian() and sys.version_info >= WHEELS_NEED:
         return f"pip install {pip}"
     return f"sudo apt-get install {debian}"

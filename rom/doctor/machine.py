@@ -23,11 +23,7 @@ END_OF_PICKLE = b"."
 
 
 def blas(mapped: list[str]) -> list[Finding]:
-    """Which BLAS does the work, and how fast it is.
-
-    Args:
-        mapped: library files a process with PETSc has loaded; those of this one when empty.
-    """
+    """Which BLAS of the files a process with PETSc has mapped, or this one, and how fast it is."""
     speed = _gigaflops()
     files = sorted({f for f in mapped or mapped_files() if BLAS_FILE.search(f)})
     slow = [f for f in files if not FAST_BLAS.search(f)]
@@ -63,11 +59,9 @@ def machine() -> list[Finding]:
 
 
 def caches(forms: dict[str, Any], *, fix: bool) -> list[Finding]:
-    """State of the cache of compiled forms and of Numba's.
+    """State of the cache of compiled forms, by what the probe says, and of Numba's.
 
-    Args:
-        forms: what the probe says about the cache of forms; empty without dolfinx.
-        fix: remove damaged files; those of forms have been removed by the probe.
+    To fix is to remove damaged files; the probe has removed those of forms.
     """
     found = [_form_cache(forms, fix)] if "path" in forms else []
     damaged = [path for folder in numba_folders() for path in damaged_files(folder)]

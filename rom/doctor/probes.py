@@ -75,12 +75,7 @@ def say(name: str, **found: Any) -> None:
 def compiled(module: str, cases: Sequence[str]) -> Iterator[Finding]:
     """Let a module do its cases, each in a process of its own, as many at once as there are cores.
 
-    Args:
-        module: writes one JSON line for the case it is given, with functions and seconds.
-        cases: names.
-
-    Yields:
-        One finding per case as soon as it has ended.
+    It writes a JSON line with functions and seconds; one finding comes as soon as a case has ended.
     """
     cores, waiting = len(os.sched_getaffinity(0)), list(cases)
     running: dict[str, subprocess.Popen[bytes]] = {}  # noqa: TID251  a type

@@ -195,13 +195,7 @@ def _head(found: tuple[Channel, ...]) -> list[str]:
 
 
 def table(head: list[str], values: Array, number: str) -> bytes:
-    """Text of a table, its head with commas and quotes in names as CSV has them.
-
-    Args:
-        head: (c,) names of the columns.
-        values: (n, c) numbers.
-        number: how one is written, e.g. "%.10g".
-    """
+    """Text of a table (n, c) below its head, with commas and quotes in names as CSV has them."""
     text = io.StringIO()
     text.write(",".join(map(csv_cell, head)) + "\n")
     np.savetxt(text, values, number, ",")

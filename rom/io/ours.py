@@ -51,13 +51,8 @@ def check_replaceable(
 ) -> Path:
     """The path, if a file of that name can be written and none of somebody else's is lost.
 
-    To be asked before a long computation.
-
-    Args:
-        path: file to write.
-        kind: of what will be written: a key of `FILE_SIGNS`, or a format of `rom.export`.
-        inputs: files that are read; these are never written.
-        force: replace whatever else is there.
+    To be asked before a long computation. What will be written is of a kind, a key of `FILE_SIGNS`
+    or a format of `rom.export`; inputs are never written, whatever else is there if forced.
     """
     path = check_writable(path)
     for source in inputs:

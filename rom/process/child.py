@@ -92,12 +92,8 @@ def run(
 ) -> Ended:
     """Run a command to its end; whatever interrupts this process ends the child with all its own.
 
-    Args:
-        command: program and arguments; see `python`.
-        folder: where it runs; here by default.
-        limits: what it may take.
-        variables: of its environment, beside those of this process.
-        given: bytes on its standard input, which is empty without.
+    In a folder, here by default, within limits, with variables beside those of this process, and
+    with bytes given to its standard input, which is empty without.
     """
     limits = limits or Limits()
     with terminable():
@@ -164,11 +160,7 @@ def _end(process: subprocess.Popen[bytes]) -> None:
 
 
 def environment(*, own: bool = True) -> dict[str, str]:
-    """Variables of a child.
-
-    Args:
-        own: whether it runs modules of rom; other programs are not shown where rom lies.
-    """
+    """Variables of a child; programs that are not our own are not shown where rom lies."""
     kept = {k: v for k, v in os.environ.items() if not k.startswith(MPI_VARIABLES)}
     given = [p for p in kept.pop("PYTHONPATH", "").split(os.pathsep) if os.path.isabs(p)]
     if own and os.path.basename(ROOT_FOLDER) not in INSTALL_FOLDERS:
@@ -179,11 +171,7 @@ def environment(*, own: bool = True) -> dict[str, str]:
 
 @contextmanager
 def scratch(kind: str) -> Iterator[Path]:
-    """A folder for the files of a child, removed whatever happens.
-
-    Args:
-        kind: one word of its name.
-    """
+    """A folder for the files of a child, its kind a word of its name, removed whatever happens."""
     made: tuple[Path, int] | None = None
     with terminable():
         try:

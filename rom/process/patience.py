@@ -17,10 +17,8 @@ class Patience:
     """How long a user waits for one kind of work, by the clock.
 
     A line is logged as a warning, on the first rank, when some seconds have passed and more are to
-    come; another one only when far more have passed than were foretold.
-
-    Args:
-        rate: seconds per unit of size on some machine, from which the first seconds start.
+    come; another one only when far more have passed than were foretold. At first a rate counts, the
+    seconds per unit of size on some machine.
     """
 
     def __init__(self, rate: float):
@@ -38,13 +36,7 @@ class Patience:
         self._spent, self._began = self._so_far(), None
 
     def advance(self, size: int, rest: Callable[[], int], say: Callable[[int], str]) -> None:
-        """Note that a part is done, and say how long the rest will take if that is long.
-
-        Args:
-            size: of the part, in any unit that time grows with.
-            rest: gives the size of all parts to come.
-            say: gives the line from the seconds to come.
-        """
+        """Note that a part of a size is done, and say how long the rest will take if long."""
         self._done += size
         spent = self._so_far()
         if spent < self._foretold or ranks()[0]:

@@ -24,12 +24,7 @@ class Turns:
     def take(self, path: Path, *, wait: bool = True) -> bool:
         """Take the turn to make a file, or wait until whoever makes it has done so or died.
 
-        Args:
-            path: the file that will be made.
-            wait: False to ask only.
-
-        Returns:
-            Whether it is ours; False where there are no locks.
+        Whether it is ours; False where there are no locks. Without waiting it is only asked for.
         """
         if not self._lock(path, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB)):
             return False

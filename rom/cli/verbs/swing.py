@@ -155,14 +155,10 @@ def planned(
     *,
     axis: Any = None,
 ) -> Swing:
-    """The swing of a body from rest, for one period of the rigid pendulum.
+    """The swing of a body from rest, for one period of the rigid pendulum if nobody says how long.
 
-    Args:
-        rigid: its mass, mass centre and inertia.
-        point: (3,) the hinge [m].
-        gravity: (3,) [m/s^2]; None for 9.81 along the coordinate axis most across the body.
-        t_end: duration [s]; None for one period.
-        axis: (3,) unit direction about which it turns; None for the one across gravity.
+    About the hinge at a point (3,) [m] and its unit axis (3,), or the one across gravity (3,)
+    [m/s^2]; this is 9.81 along the coordinate axis most across the body if not given.
     """
     import numpy as np
 
@@ -243,11 +239,9 @@ def pendulum(body: "FlexibleBody", hinge: str, *, axis: Any, gravity: Any) -> "M
 
 
 def magnification(body: "FlexibleBody", q: Any) -> float:
-    """1, 2 or 5 times a power of ten, with which the largest deformation is seen; at least 1.
+    """1, 2 or 5 times a power of ten, at least 1, with which the largest deformation is seen.
 
-    Args:
-        body: the body, with its surface.
-        q: (n_t, r) elastic coordinates.
+    Of a body with its surface, over elastic coordinates q (n_t, r).
     """
     import numpy as np
 

@@ -88,11 +88,7 @@ def read_universal(path: str | Path) -> tuple[Function, ...]:
 
 
 def scan(path: str | Path) -> tuple[tuple[Function, ...], dict[str, list[list[str]]]]:
-    """All datasets of a universal file: functions, and lines of the others by their number.
-
-    Args:
-        path: the file, .unv or .uff.
-    """
+    """All datasets of a universal file: functions, and lines of the others by their number."""
     path = check_readable(path, MAX_BYTES)
     data, place = path.read_bytes(), 0
     found: list[Function] = []
@@ -123,12 +119,8 @@ def assemble(
 ) -> tuple[Array, npt.NDArray[np.complex128]]:
     """Frequencies (n_f,) [Hz] and receptances (n_f, n_s, n_e) [m/N] of chosen dofs.
 
-    A dof measured against its direction counts with the opposite sign.
-
-    Args:
-        functions: as read.
-        responses: (n_s) nodes and directions of the sensors.
-        references: (n_e) nodes and directions of the exciters.
+    Sensors (n_s) and exciters (n_e) are nodes and directions; a dof measured against its direction
+    counts with the opposite sign.
     """
     known = {_key(f): f for f in functions if f.kind == FREQUENCY_RESPONSE}
     columns: list[npt.NDArray[np.complex128]] = []

@@ -122,14 +122,10 @@ def grid(
     at_points: dict[str, Any] | None = None,
     at_cells: dict[str, Any] | None = None,
 ) -> str:
-    """Text of a file with cells of one kind.
+    """Text of a file with cells of one kind, VTK's number of it.
 
-    Args:
-        points: (n, 3) positions [m].
-        cells: (m, k) node numbers in VTK's order.
-        kind: VTK's number of the cell.
-        at_points: {name: (n,) or (n, c) values}.
-        at_cells: {name: (m,) or (m, c) values}.
+    Points (n, 3) [m], their numbers in cells (m, k) in VTK's order; values {name: (n,) or (n, c)}
+    at points, {name: (m,) or (m, c)} at cells.
     """
     m, k = cells.shape
     topology = {
