@@ -34,11 +34,8 @@ class RomError(Exception):
     solution: Any = None
 
     def __init__(self, message: str, *, where: str = "", hint: str = "", solution: Any = None):
-        self.message, self.where, self.hint = (
-            message,
-            where,
-            hint or self.advice or last_clause(message),
-        )
+        self.message, self.where = message, where
+        self.hint = hint or self.advice or last_clause(message)
         self.solution = solution
         super().__init__(message, where, hint)
 

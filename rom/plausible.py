@@ -175,9 +175,12 @@ def check_damping_ratio(ratio: Any, of: str = "", *, stilled: bool = False) -> N
 
     Stilled takes one at its word: so are residual shapes stilled.
     """
-    refuse_negative(f"the damping ratio of {of}" if of else "damping ratio", ratio)
+    name = f"the damping ratio of {of}" if of else "damping ratio"
+    if isinstance(ratio, bool) or not isinstance(ratio, Real) or not math.isfinite(ratio):
+        raise ConfigError(f"{name} = {ratio!r} must be a finite number.")
+    if ratio < 0.0:
+        raise ConfigError(f"{name} = {ratio:g} is negative: it must be >= 0, not to drive.")
     if ratio > 1.0:
-        name = f"the damping ratio of {of}" if of else "damping ratio"
         raise ConfigError(
             f"{name} = {ratio:g} is beyond critical damping (1): nothing would vibrate.",
             hint=f"For {ratio:g} per cent write {ratio / 100:g}; to damp beyond one on purpose, "
@@ -185,11 +188,3 @@ def check_damping_ratio(ratio: Any, of: str = "", *, stilled: bool = False) -> N
         )
     if ratio < 1.0 or not stilled:
         warn_outside(DAMPING_RATIO, ratio, of)
-
-
-def refuse_negative(name: str, value: Any) -> None:
-    """Refuse what is no finite number from zero on."""
-    if isinstance(value, bool) or not isinstance(value, Real) or not math.isfinite(value):
-        raise ConfigError(f"{name} = {value!r} must be a finite number.")
-    if value < 0.0:
-        raise ConfigError(f"{name} = {value:g} is negative: it must be >= 0, not to drive.")

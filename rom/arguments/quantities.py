@@ -142,11 +142,7 @@ def Between(
     return Quantity(unit, ((),), low, high, ends, error)
 
 
-def Count(least: int = 0, most: int | None = None, *, error: type[RomError] = ConfigError) -> Whole:
-    """A whole number of so many or more."""
-    return Whole(least, most, error)
-
-
+Count = Whole  # a whole number of so many or more
 Length = Annotated[float, Positive("m")]
 Size = Annotated[float, Positive("m", error=ModelError)]  # of a part that cannot be without it
 Angle = Annotated[float, Number("rad")]

@@ -37,7 +37,7 @@ def checked(
 
 def claim(args: argparse.Namespace) -> Path:
     """The folder of ``-o``, kept from other runs until the files of this one are written."""
-    from rom.io.claim import claimed
+    from rom.io.ours import claimed
 
     folder: Path = args.output
     on_first_rank(lambda: args.claims.enter_context(claimed(folder)))

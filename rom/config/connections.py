@@ -58,6 +58,11 @@ class Entry:
         """The law under a key."""
         return law_of(self.values[key], self.place.at(key), t_end=self.t_end, trust=self.trust)
 
+    def times(self, constant: Any) -> Callable[[float], Any]:
+        """The law under "factor" times a constant."""
+        factor = self.law("factor").value
+        return lambda t: float(factor(t)) * constant
+
     def take(self, record: Callable[..., Any]) -> Any:
         """A record of the values under the names of its fields, which leave the values."""
         names = [name for name in signature(record).parameters if name in self.values]
@@ -115,11 +120,7 @@ def _load(entry: Entry) -> None:
 
     vector: Any = np.array(entry.values["vector"])
     if "factor" in entry.values:
-        factor, constant = entry.law("factor").value, vector
-
-        def vector(t: float) -> Any:
-            return float(factor(t)) * constant
-
+        vector = entry.times(vector)
     method = entry.section.removesuffix("s")
     getattr(entry.made, method)(entry.name, *entry.ends, vector, frame=entry.values["frame"])
 
@@ -133,13 +134,7 @@ def _spread(entry: Entry) -> None:
         load = mass_load(part.flexible, values[kind])
     else:
         load = surface_load(part.flexible, where=values.get("where"), **{kind: values[kind]})
-    factor: Any = 1.0
-    if "factor" in values:
-        law = entry.law("factor").value
-
-        def factor(t: float) -> float:
-            return float(law(t))
-
+    factor = entry.times(1.0) if "factor" in values else 1.0
     entry.made.spread_load(entry.name, part, load, factor, frame=values["frame"])
 
 

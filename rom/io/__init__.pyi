@@ -15,12 +15,12 @@ from rom.io.fields.vtu import write_stress_history as write_stress_history
 from rom.io.fields.vtu import write_vtu as write_vtu
 from rom.io.fmu.body import write_body_fmu as write_body_fmu
 from rom.io.history import write_history as write_history
-from rom.io.matrices.calculix import read_stored_matrix as read_stored_matrix
 from rom.io.matrices.dmig import read_dmig as read_dmig
 from rom.io.matrices.dmig import read_grids as read_grids
 from rom.io.matrices.dmig import write_dmig as write_dmig
-from rom.io.matrices.market import read_market as read_market
+from rom.io.matrices.matrix_files import read_market as read_market
 from rom.io.matrices.matrix_files import read_matrix as read_matrix
+from rom.io.matrices.matrix_files import read_stored_matrix as read_stored_matrix
 from rom.io.matrices.matrix_files import write_abaqus_matrix as write_abaqus_matrix
 from rom.io.matrices.node_files import read_node_sets as read_node_sets
 from rom.io.matrices.node_files import read_nodes as read_nodes
@@ -33,9 +33,9 @@ from rom.io.programs.exudyn import write_exudyn as write_exudyn
 from rom.io.programs.interface_form import InterfaceForm as InterfaceForm
 from rom.io.programs.interface_form import interface_form as interface_form
 from rom.io.programs.mbdyn import write_mbdyn as write_mbdyn
+from rom.io.programs.openfast import Superelement as Superelement
+from rom.io.programs.openfast import read_openfast as read_openfast
 from rom.io.programs.openfast import write_openfast as write_openfast
-from rom.io.programs.openfast_reading import Superelement as Superelement
-from rom.io.programs.openfast_reading import read_openfast as read_openfast
 from rom.io.programs.radioss import write_radioss as write_radioss
 from rom.io.programs.simscape import write_simscape as write_simscape
 from rom.io.sid.body import sid_body as sid_body

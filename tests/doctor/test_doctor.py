@@ -13,8 +13,16 @@ from cases.command import environment
 from cases.command import rom as command
 from rom.doctor import libraries
 from rom.doctor.core import abilities, better
-from rom.doctor.libraries import OLD_NUMPY, PACKAGES, fenicsx, light, pictures, sees_debian
-from rom.doctor.machine import blas, damaged_files
+from rom.doctor.libraries import (
+    OLD_NUMPY,
+    PACKAGES,
+    blas,
+    damaged_files,
+    fenicsx,
+    light,
+    pictures,
+    sees_debian,
+)
 from rom.fe import GMSH_LIBRARIES, HELPER_MODULE, WHEEL_PACKAGES
 
 OPENBLAS = "/usr/lib/x86_64-linux-gnu/openblas-pthread/libblas.so.3"
@@ -191,10 +199,8 @@ def test_the_abilities_of_a_processor_are_read_from_its_first_core(tmp_path):
 
 
 def test_a_mistaken_openblas_is_reported_with_its_cure(monkeypatch):
-    from rom.doctor import machine
-
-    monkeypatch.setattr(machine, "taken_for", lambda: "Prescott")
-    monkeypatch.setattr(machine, "abilities", lambda: {"avx2", "fma"})
+    monkeypatch.setattr(libraries, "taken_for", lambda: "Prescott")
+    monkeypatch.setattr(libraries, "abilities", lambda: {"avx2", "fma"})
     note = next(finding for finding in blas([OPENBLAS]) if finding.name == "processor")
     assert (note.state, note.advice[-7:]) == ("note", "Haswell")
 

@@ -17,13 +17,12 @@ from cases.solid import block, reduced
 from rom.errors import ConfigError, FileFormatError
 from rom.io.export import read_body
 from rom.io.fields.universal import read_universal
-from rom.io.matrices.calculix import read_stored_matrix
 from rom.io.matrices.dmig import read_dmig, read_grids
-from rom.io.matrices.matrix_files import read_matrix, write_abaqus_matrix
+from rom.io.matrices.matrix_files import read_matrix, read_stored_matrix, write_abaqus_matrix
 from rom.io.matrices.node_files import read_node_sets, read_nodes
 from rom.io.matrices.op4 import read_op4
 from rom.io.matrices.user_element import read_user_element
-from rom.io.programs.openfast_reading import read_openfast
+from rom.io.programs.openfast import read_openfast
 from rom.io.sid.dialect import read_sid
 
 HERE = TESTS / "reference" / "foreign"

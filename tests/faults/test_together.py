@@ -21,8 +21,8 @@ from cases.paths import TESTS
 from cases.solid import block, reduced
 from rom.cli.main import main
 from rom.errors import ConfigError, ResourceError
-from rom.io.claim import LOCK_NAME, claimed
 from rom.io.files import write_whole
+from rom.io.ours import LOCK_NAME, claimed
 from rom.process.mpirun import found, mpirun
 from rom.process.turns import Turns
 from rom.report.html import paragraph, write_report

@@ -18,8 +18,7 @@ from cases.files.decks import BY_HAND
 from cases.paths import TESTS
 from cases.solid import block, reduced
 from rom.errors import ConfigError, FileFormatError, RomError, UnsafeFileError
-from rom.io.matrices.calculix import read_stored_matrix
-from rom.io.matrices.matrix_files import read_matrix
+from rom.io.matrices.matrix_files import read_matrix, read_stored_matrix
 from rom.io.matrices.node_files import read_nodes
 from rom.io.matrices.user_element import read_user_element, write_user_element
 from rom.io.programs.interface_form import interface_form

@@ -18,7 +18,7 @@ from rom.io.matrices.dmig import read_dmig, read_grids
 from rom.io.matrices.node_files import read_nodes
 from rom.io.matrices.op4 import read_op4
 from rom.io.matrices.user_element import read_user_element
-from rom.io.programs.openfast_reading import read_openfast
+from rom.io.programs.openfast import read_openfast
 
 KINDS = {"root": "rbe2", "tip": "rbe3"}
 WHOLE = ("npz", "sid", "sid-pysid", "sid-geisler")

@@ -10,8 +10,7 @@ from cases.paths import TESTS
 from cases.solid import block, reduced
 from rom.cli.main import main
 from rom.errors import ConfigError, FileFormatError, QualityGateError, UnsafeFileError
-from rom.io.programs.openfast import LOAD_DURATION, superelement, write_openfast
-from rom.io.programs.openfast_reading import read_openfast
+from rom.io.programs.openfast import LOAD_DURATION, read_openfast, superelement, write_openfast
 
 HERE = TESTS / "reference" / "foreign"
 KINDS = {"root": "rbe2", "tip": "rbe2"}

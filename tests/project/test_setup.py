@@ -12,8 +12,7 @@ import pytest
 
 from cases.long import LONGEST_FIRST, ONCE
 from cases.paths import ROOT, TESTS
-from rom.doctor.libraries import PACKAGES, SYSTEM_COMMAND
-from rom.doctor.machine import SLOW_ADVICE
+from rom.doctor.libraries import PACKAGES, SLOW_ADVICE, SYSTEM_COMMAND
 from rom.fe import DEBIAN_PACKAGES, GMSH_LIBRARIES, WHEEL_PACKAGES
 
 pytestmark = pytest.mark.once
