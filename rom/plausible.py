@@ -14,22 +14,14 @@ from rom.errors import ConfigError, warn
 
 @dataclass(frozen=True, slots=True)
 class Range:
-    """What a quantity is in machines, buildings and instruments.
+    """What a quantity is in machines, buildings and instruments."""
 
-    Attributes:
-        quantity: its name in a sentence.
-        low, high: limits, in ``unit``; None for no limit.
-        unit: SI unit, empty for a plain number.
-        known: what lies at the limits.
-        cure: what to look at; if empty, the unit that the value seems to have.
-    """
-
-    quantity: str
-    low: float | None
+    quantity: str  # its name in a sentence
+    low: float | None  # None for no limit
     high: float | None
-    unit: str
-    known: str
-    cure: str
+    unit: str  # in SI; empty for a plain number
+    known: str  # what lies at the limits
+    cure: str  # what to look at; if empty, the unit that the value seems to have
 
     def includes(self, value: float) -> bool:
         """Whether the value lies inside."""
@@ -170,7 +162,7 @@ def warn_outside(limits: Range, value: float, of: str = "") -> None:
     warn(limits.doubt(value, of))
 
 
-def check_damping_ratio(ratio: Any, of: str = "", *, stilled: bool = False) -> None:
+def check_damping_ratio(ratio: float, of: str = "", *, stilled: bool = False) -> None:
     """Take a share of critical damping at the border; warn of one that no structure has.
 
     Stilled takes one at its word: so are residual shapes stilled.

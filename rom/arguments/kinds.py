@@ -68,15 +68,10 @@ class Unfit(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Taken:
-    """What a function takes for one argument.
-
-    Attributes:
-        words: what that is.
-        take: the value as the function gets it; raises `Unfit`, or whatever the value raises.
-    """
+    """What a function takes for one argument."""
 
     words: str
-    take: Callable[[Any], Any]
+    take: Callable[[Any], Any]  # gives what the function gets, or raises
 
     def __call__(self, value: Any) -> Any:
         """The value as the function gets it."""

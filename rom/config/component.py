@@ -23,16 +23,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Described:
-    """What a file describes.
-
-    Attributes:
-        document: the file.
-        values: its values in SI, by the keys of its table.
-        meshing: ``trust`` and limits of `rom.fe.mesh.read.read_mesh`, which no file can say.
-    """
+    """What a file describes."""
 
     document: Document
-    values: dict[str, Any]
+    values: dict[str, Any]  # in SI, by the keys of its table
+    # ``trust`` and limits of `read_mesh`, which no file can say
     meshing: dict[str, Any] = field(default_factory=dict)
 
     @property

@@ -26,28 +26,17 @@ DIRECTIONS = {"rising": 1, "falling": -1, "both": 0}
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """An entry with its markers and joints found.
-
-    Attributes:
-        made: the mechanism.
-        section, name: of the entry.
-        ends: markers, or joints.
-        marker_names: "body.marker" of the markers, as they are written.
-        values: its other values, in SI.
-        place: in the file.
-        t_end: until when functions of time are asked for [s].
-        trust: run functions of Python files.
-    """
+    """An entry with its markers and joints found."""
 
     made: "Mechanism"
     section: str
     name: str
-    ends: list[Any]
-    marker_names: list[str]
-    values: dict[str, Any]
+    ends: list[Any]  # markers, or joints
+    marker_names: list[str]  # "body.marker", as written
+    values: dict[str, Any]  # its other values, in SI
     place: Place
-    t_end: float
-    trust: bool
+    t_end: float  # until when functions of time are asked for [s]
+    trust: bool  # run functions of Python files
 
     def connect(self) -> None:
         """Call the method of the mechanism."""
@@ -191,21 +180,13 @@ def _user_force(entry: Entry) -> None:
 
 @dataclass(frozen=True)
 class Condition:
-    """A measured value x with its rate v, and what of it must be zero.
+    """A measured value x with its rate v, and what of it must be zero."""
 
-    Attributes:
-        kind: "coordinate", "position" or "distance".
-        follow: the joint with its coordinate, or the markers.
-        axis: (3,) unit vector, for a position.
-        value: that x passes.
-        formula: of t, x and v, in place of a value.
-    """
-
-    kind: str
-    follow: tuple[Any, ...]
-    axis: Any
-    value: float
-    formula: "Formula | None"
+    kind: str  # "coordinate", "position" or "distance"
+    follow: tuple[Any, ...]  # the joint with its coordinate, or the markers
+    axis: Any  # (3,) unit vector, for a position
+    value: float  # that x passes
+    formula: "Formula | None"  # of t, x and v, in place of a value
 
     def __call__(self, t: float, instant: "Instant") -> float:
         """What passes through zero."""

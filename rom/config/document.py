@@ -20,17 +20,11 @@ KeyPath = tuple[str, ...]
 
 @dataclass(frozen=True, slots=True)
 class Document:
-    """What a file says, and where.
-
-    Attributes:
-        path: the file.
-        data: its tables.
-        lines: line of each key, as far as keys stand on lines of their own.
-    """
+    """What a file says, and where."""
 
     path: Path
     data: dict[str, Any]
-    lines: dict[KeyPath, int] = field(default_factory=dict)
+    lines: dict[KeyPath, int] = field(default_factory=dict)  # of keys on lines of their own
 
     def where(self, path: KeyPath) -> str:
         """File and line of a key, of the table around it, or of the last key."""

@@ -204,32 +204,19 @@ class Anything:
 
 @dataclass(frozen=True, slots=True)
 class Key:
-    """One key of a table.
-
-    Attributes:
-        name: as written.
-        kind: how its value is written.
-        about: one sentence.
-        default: value when it is not given; None for no value, ``...`` when it must be given, {}
-            for a table of defaults.
-    """
+    """One key of a table."""
 
     name: str
     kind: Kind
-    about: str
-    default: Any = None
+    about: str  # one sentence
+    default: Any = None  # ... where a value must be given, {} for a table of defaults
 
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """The keys a table may hold.
+    """The keys a table may hold."""
 
-    Attributes:
-        about: one sentence.
-        keys: what it knows.
-    """
-
-    about: str
+    about: str  # one sentence
     keys: tuple[Key, ...]
 
     @property
@@ -292,14 +279,10 @@ class Named:
 
 @dataclass(frozen=True, slots=True)
 class Variants:
-    """Tables told apart by their key ``kind``.
-
-    Attributes:
-        tables: by kind.
-        telling: {key: kind it stands for where none is written}.
-    """
+    """Tables told apart by their key ``kind``."""
 
     tables: Mapping[str, Table]
+    # {key: kind it stands for where none is written}
     telling: Mapping[str, str] = field(default_factory=dict)
 
     @property

@@ -21,34 +21,21 @@ ONE_THREAD = {"OMP_NUM_THREADS": "1"}
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One thing looked at, a line of the report.
+    """One thing looked at, a line of the report."""
 
-    Attributes:
-        topic: heading it stands under.
-        name: what was looked at.
-        value: version, place or number found.
-        state: "ok"; "note": works, and could be better; "missing": a part of rom cannot be used;
-            "broken": installed or found, and does not work.
-        advice: what to type.
-    """
-
-    topic: str
+    topic: str  # heading it stands under
     name: str
-    value: str
-    state: str = "ok"
-    advice: str = ""
+    value: str  # version, place or number found
+    state: str = "ok"  # or "note": could be better; "missing": a part cannot be used; "broken"
+    advice: str = ""  # what to type
 
 
 @dataclass
 class Probe:
-    """A process that writes one JSON object with a name per line.
-
-    Attributes:
-        ending: "" after a good end, else what happened.
-    """
+    """A process that writes one JSON object with a name per line."""
 
     process: subprocess.Popen[bytes]  # noqa: TID251  a type
-    ending: str = ""
+    ending: str = ""  # what happened before a good end
 
     def answer(self) -> dict[str, dict[str, Any]]:
         """What the process found, by name."""

@@ -36,8 +36,8 @@ from rom.io.programs.mbdyn import write_mbdyn as write_mbdyn
 from rom.io.programs.openfast import Superelement as Superelement
 from rom.io.programs.openfast import read_openfast as read_openfast
 from rom.io.programs.openfast import write_openfast as write_openfast
-from rom.io.programs.radioss import write_radioss as write_radioss
-from rom.io.programs.simscape import write_simscape as write_simscape
+from rom.io.programs.superelements import write_radioss as write_radioss
+from rom.io.programs.superelements import write_simscape as write_simscape
 from rom.io.sid.body import sid_body as sid_body
 from rom.io.sid.body import standard_input as standard_input
 from rom.io.sid.dialect import check_sid as check_sid

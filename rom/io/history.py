@@ -27,19 +27,12 @@ ENERGIES = ("kinetic", "strain", "potential", "drives", "forces", "damping", "to
 
 @dataclass(frozen=True, slots=True)
 class Channel:
-    """One quantity over time.
+    """One quantity over time."""
 
-    Attributes:
-        path: where it stands, outermost first, e.g. ("bodies", "rod", "position").
-        unit: its unit; a comma separates those of the columns when they differ.
-        columns: name of each column.
-        values: (n_t, c) its history.
-    """
-
-    path: tuple[str, ...]
-    unit: str
-    columns: tuple[str, ...]
-    values: Array
+    path: tuple[str, ...]  # outermost first, e.g. ("bodies", "rod", "position")
+    unit: str  # a comma separates those of columns that differ
+    columns: tuple[str, ...]  # their names
+    values: Array  # (n_t, c)
 
 
 @typed

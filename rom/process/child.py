@@ -37,34 +37,21 @@ MPI_VARIABLES = ("OMPI_", "PMIX_", "PMI_", "MPI_", "PRTE_", "HYDRA_", "SLURM_")
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """What a child may take; 0 for no limit.
+    """What a child may take; 0 for no limit."""
 
-    Attributes:
-        seconds: time by the clock [s].
-        processor: time of the processor [s].
-        memory: address space [bytes].
-    """
-
-    seconds: float = 0.0
-    processor: int = 0
-    memory: int = 0
+    seconds: float = 0.0  # by the clock [s]
+    processor: int = 0  # time of the processor [s]
+    memory: int = 0  # address space [bytes]
 
 
 @dataclass(frozen=True, slots=True)
 class Ended:
-    """How a child ended and what it said.
+    """How a child ended and what it said."""
 
-    Attributes:
-        code: its exit code; below zero the number of the signal that ended it.
-        out: its standard output.
-        err: its standard error.
-        overtime: whether it was ended because its time by the clock was over.
-    """
-
-    code: int
+    code: int  # exit code; below zero the number of the signal that ended it
     out: str = ""
     err: str = ""
-    overtime: bool = False
+    overtime: bool = False  # whether its time by the clock was over
 
     @property
     def last(self) -> str:

@@ -149,6 +149,6 @@ def test_a_modal_joint_is_the_same_body(body, tmp_path):
 
 
 def test_every_format_is_here_or_has_a_test_of_its_own():
-    """Elsewhere: vtu in test_vtu, exudyn in test_exudyn_module, fmu in test_fmu_body."""
+    """Elsewhere: vtu in test_universal, exudyn in test_programs, fmu in test_fmu_body."""
     here = {*WHOLE, *READERS, "openfast", "openfast-4", "mbdyn"}
     assert set(FORMATS) - here == {"vtu", "exudyn", "fmu", "radioss"}

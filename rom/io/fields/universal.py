@@ -29,33 +29,20 @@ COMPLEX_TYPES, DOUBLE_TYPES = (5, 6), (4, 6)  # types of ordinate
 
 @dataclass(frozen=True, slots=True)
 class Function:
-    """One dataset 58.
+    """One dataset 58."""
 
-    Attributes:
-        kind: type of function; 4 is a frequency response, 6 a coherence, 1 a time response.
-        x: (n,) abscissa, mostly frequency [Hz] or time [s].
-        y: (n,) real or complex ordinate.
-        response: node and direction (1 to 3 translation, 4 to 6 rotation, negative against it).
-        reference: node and direction of the force.
-        numerator: type of the ordinate: 8 displacement, 11 velocity, 12 acceleration, 13 force.
-        denominator: type of what it is divided by.
-        labels: the first five lines, stripped.
-        units: labels of the units of numerator and denominator, stripped.
-        entities: names of what response and reference belong to, stripped; "NONE" without one.
-        abscissa: label of the unit of the abscissa, stripped.
-    """
-
-    kind: int
-    x: Array
-    y: Any
+    kind: int  # 4 is a frequency response, 6 a coherence, 1 a time response
+    x: Array  # (n,) abscissa, mostly frequency [Hz] or time [s]
+    y: Any  # (n,) real or complex ordinate
+    # node and direction: 1 to 3 translation, 4 to 6 rotation, negative against it
     response: tuple[int, int]
-    reference: tuple[int, int]
-    numerator: int
-    denominator: int
-    labels: tuple[str, ...]
-    units: tuple[str, str] = ("", "")
-    entities: tuple[str, str] = ("", "")
-    abscissa: str = ""
+    reference: tuple[int, int]  # the same of the force
+    numerator: int  # 8 displacement, 11 velocity, 12 acceleration, 13 force
+    denominator: int  # type of what it is divided by
+    labels: tuple[str, ...]  # first five lines, stripped
+    units: tuple[str, str] = ("", "")  # labels, of numerator and denominator
+    entities: tuple[str, str] = ("", "")  # of response and reference; "NONE" without one
+    abscissa: str = ""  # label of its unit
 
     def receptance(self) -> npt.NDArray[np.complex128]:
         """(n,) displacement per force [m/N], whatever was measured."""

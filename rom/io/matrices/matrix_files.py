@@ -45,17 +45,11 @@ HEAD_BYTES = 10_000  # among which a user element is announced
 
 @dataclass(frozen=True, slots=True)
 class NamedMatrix:
-    """A matrix of another program.
+    """A matrix of another program."""
 
-    Attributes:
-        where: file and name, for messages.
-        A: (n, n) sparse, as written: of a symmetric one there may be one triangle only.
-        dofs: (n, 2) label and component 1 to 6 of each row; None for rows in the order of nodes.
-    """
-
-    where: str
-    A: csr_matrix
-    dofs: Dofs | None = None
+    where: str  # file and name, for messages
+    A: csr_matrix  # (n, n) as written: of a symmetric one there may be one triangle only
+    dofs: Dofs | None = None  # (n, 2) label, component 1 to 6; None for rows in the order of nodes
 
 
 def read_matrix(source: Any) -> NamedMatrix:
