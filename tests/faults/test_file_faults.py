@@ -1,4 +1,4 @@
-"""Damaged and hostile files of every reader of `rom.io`: typed errors that name the file."""
+"""Damaged and hostile files: a typed error, a model or a mechanism, never a crash."""
 
 import os
 import shutil
@@ -11,9 +11,12 @@ from scipy.sparse import random as random_matrix
 
 import rom
 from cases.files.damage import ARCHIVES, damaged, outcome
+from cases.files.toml_files import ALL, CRANK, MORE, PENDULUM, SOLID
 from cases.mbs.mechanisms import random_body
 from cases.paths import TESTS
 from cases.solid import block, reduced
+from rom.config.component import read_component
+from rom.config.mechanism import read_mechanism
 from rom.errors import ConfigError, FileFormatError
 from rom.io.export import read_body
 from rom.io.fields.universal import read_universal
@@ -217,3 +220,22 @@ HUGE = "9" * 20  # no eight bytes hold it
 def test_labels_that_fit_no_integer_are_refused(name, content, read, tmp_path):
     (tmp_path / name).write_text(content)
     assert isinstance(outcome(read, tmp_path / name), FileFormatError)
+
+
+def part(path):
+    component = read_component(path)
+    assert component.mesh and component.material()
+
+
+@pytest.mark.parametrize(
+    ("text", "read"),
+    [(SOLID, part), (PENDULUM, lambda path: read_mechanism(path).mechanism()),
+     (CRANK, read_mechanism), (ALL, read_mechanism), (MORE, read_mechanism)],
+    ids=["component", "pendulum", "crank", "everything", "more"],
+)  # fmt: skip
+def test_damage_of_a_description_is_refused_or_harmless(text, read, tmp_path):
+    path, found = tmp_path / "x.toml", []
+    for _, data in damaged(text.encode(), np.random.default_rng(8), 200):
+        path.write_bytes(data)
+        found.append(outcome(read, path, memory=None))
+    assert sum(isinstance(x, ConfigError) for x in found) > 50 and None in found
