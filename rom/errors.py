@@ -34,11 +34,8 @@ class RomError(Exception):
     solution: Any = None
 
     def __init__(self, message: str, *, where: str = "", hint: str = "", solution: Any = None):
-        self.message, self.where, self.hint = (
-            message,
-            where,
-            hint or self.advice or last_clause(message),
-        )
+        self.message, self.where = message, where
+        self.hint = hint or self.advice or last_clause(message)
         self.solution = solution
         super().__init__(message, where, hint)
 
@@ -63,11 +60,7 @@ def last_clause(message: str) -> str:
 
 @contextmanager
 def reached(found: Callable[[], Any]) -> Iterator[None]:
-    """Errors from within carry what was found before, as ``error.solution``.
-
-    Args:
-        found: gives it, in the form in which the function that fails would have returned it.
-    """
+    """Errors from within carry what was found before, as the function would have returned it."""
     try:
         yield
     except RomError as error:
@@ -189,9 +182,7 @@ class RomWarning(UserWarning):
 def warn(sentence: str, kind: type[Warning] = RomWarning) -> None:
     """Warn once: on the first of several ranks, at the line outside the package that caused it.
 
-    Args:
-        sentence: what a user wants to know; nothing happens without one.
-        kind: of the warning.
+    Nothing happens without a sentence.
     """
     rank = next((int(os.environ[name]) for name in RANKS if name in os.environ), 0)
     if not sentence or rank:

@@ -139,11 +139,7 @@ def names(kind: str) -> dict[str, str]:
 
 
 def find(kind: str, name: str) -> Any:
-    """What a field has of that kind and name; None if no field has it.
-
-    Raises:
-        UnknownNameError: if the field that has it is not installed, or cannot be imported.
-    """
+    """What a field has of that kind and name; None if no field has it."""
     own = [place for place, words in FIELDS.items() if name in words.split()]
     for place in own or [place for place, words in FIELDS.items() if not words] + list(brought()):
         found = record(place)

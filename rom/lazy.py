@@ -81,11 +81,7 @@ sys.meta_path.append(Moved())  # type: ignore[arg-type]
 
 
 def front(package: str) -> None:
-    """Let a package have the names of the stub beside it, which is the only list of them.
-
-    Args:
-        package: name of the package that is being imported.
-    """
+    """Let a package have the names of the stub beside it, which is the only list of them."""
     module: Any = sys.modules[package]
     named = _named(package, module.__path__[0])
     module.PACKAGES = tuple(name for name, place in named.items() if place == package)

@@ -1,6 +1,5 @@
 """Linear elastic solids, and whether one has such numbers."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from math import sqrt
 from typing import Annotated, Any
@@ -8,7 +7,7 @@ from typing import Annotated, Any
 import numpy as np
 import numpy.typing as npt
 
-from rom.arguments import Number, finite, is_number, shortened
+from rom.arguments import Number, finite, number, positive
 from rom.errors import MaterialError, warn
 from rom.plausible import (
     FOAM_SPEED,
@@ -50,10 +49,9 @@ class Material:
     rho: Annotated[float, Number("kg/m^3")]
 
     def __post_init__(self) -> None:
-        for name in ("E", "nu", "rho"):
-            _check_number(name, getattr(self, name))
-        _check_positive("E", self.E, "Pa")
-        _check_positive("rho", self.rho, "kg/m^3")
+        positive("E", self.E, error=MaterialError)
+        positive("rho", self.rho, error=MaterialError)
+        number("nu", self.nu, error=MaterialError)
         if not -1.0 < self.nu < 0.5:
             raise MaterialError(
                 f"nu = {self.nu:g} is outside (-1, 0.5): the strain energy would be negative.",
@@ -76,8 +74,7 @@ class Material:
             MaterialError: as for numbers in SI.
         """
         unit = unit_system(units)
-        for name, value in (("E", E), ("rho", rho)):
-            _check_number(name, value)
+        E, rho = (number(name, x, error=MaterialError) for name, x in (("E", E), ("rho", rho)))
         return cls(E * unit.pressure, nu, rho * unit.density)
 
     @property
@@ -129,11 +126,10 @@ class Orthotropic:
 
     def __post_init__(self) -> None:
         for name in ("E", "nu", "G"):
-            _check_three(name, getattr(self, name))
-        for value in (*self.E, *self.G):
-            _check_positive("E or G", value, "Pa")
-        _check_number("rho", self.rho)
-        _check_positive("rho", self.rho, "kg/m^3")
+            lowest = finite(name, getattr(self, name), (3,), error=MaterialError).min()
+            if name != "nu":
+                positive(name, lowest, error=MaterialError)
+        positive("rho", self.rho, error=MaterialError)
         axes = finite("axes", self.axes, None)
         if axes.shape != (3, 3) or not np.allclose(axes @ axes.T, np.eye(3), atol=1e-9):
             raise MaterialError("axes must be a (3, 3) matrix of orthonormal rows.")
@@ -165,12 +161,12 @@ class Orthotropic:
             MaterialError: as for numbers in SI.
         """
         unit = unit_system(units)
-        _check_number("rho", rho)
-        for name, values in (("E", E), ("G", G)):
-            _check_three(name, values)
-        moduli = (tuple(x * unit.pressure for x in values) for values in (E, G))
-        turned = {} if axes is None else {"axes": axes}
-        return cls(next(moduli), nu, next(moduli), rho * unit.density, **turned)
+        rho = number("rho", rho, error=MaterialError) * unit.density
+        E, G = (
+            tuple((finite(name, x, (3,), error=MaterialError) * unit.pressure).tolist())
+            for name, x in (("E", E), ("G", G))
+        )
+        return cls(E, nu, G, rho, **({} if axes is None else {"axes": axes}))
 
     @property
     def doubt(self) -> str:
@@ -230,20 +226,3 @@ def _strain_rotation(Q: Array) -> Array:
             value = Q[i, k] * Q[j, m] + (Q[i, m] * Q[j, k] if k != m else 0.0)
             T[row, column] = value * (1.0 if i == j else 2.0) / (1.0 if k == m else 2.0)
     return T
-
-
-def _check_number(name: str, value: Any) -> None:
-    if not is_number(value):
-        raise MaterialError(f"{name} = {shortened(value)} must be a finite number.")
-
-
-def _check_three(name: str, values: Any) -> None:
-    if not isinstance(values, Sequence | np.ndarray) or len(values) != 3:
-        raise MaterialError(f"{name} needs three numbers, got {shortened(values)}.")
-    for value in values:
-        _check_number(name, value)
-
-
-def _check_positive(name: str, value: float, unit: str) -> None:
-    if value <= 0:
-        raise MaterialError(f"{name} = {value:g} {unit} must be positive.")

@@ -34,15 +34,9 @@ NAME_ALPHABET = (
 
 
 def check_text(name: object, what: str, error: type[RomError] = ConfigError) -> str:
-    """The name, if it is a text of one line that can be seen.
+    """The name as read, if it is a text of one line that can be seen.
 
-    Args:
-        name: as read, from whatever file.
-        what: what it names, for the message, e.g. "an interface".
-        error: class of what is raised.
-
-    Raises:
-        RomError: of that class, showing the name.
+    Messages say what it names, e.g. "an interface".
     """
     if not isinstance(name, str) or not name.strip():
         raise error(f"the name of {what} must be a text that is not empty, got {name!r}.")
@@ -79,15 +73,7 @@ def check_name(name: object, what: str, error: type[RomError] = ConfigError) -> 
 
 
 def file_name(name: str, ending: str = "") -> str:
-    """The name of a file for a thing of this name, without a folder.
-
-    Args:
-        name: of the thing, e.g. of a body.
-        ending: put behind, e.g. ".csv".
-
-    Raises:
-        ConfigError: if no file can have it, or it would lie in another folder.
-    """
+    """The name of a file for a thing of this name, in no folder, with an ending such as ".csv"."""
     found = f"{check_name(name, 'a file')}{ending}"
     size = len(found.encode()) + TEMPORARY_BYTES
     if size > MAX_FILE_NAME_BYTES:
@@ -100,16 +86,7 @@ def file_name(name: str, ending: str = "") -> str:
 
 
 def check_ending(path: str | Path, what: str, *endings: str) -> Path:
-    """The path, if it has one of the endings that such a file is written with.
-
-    Args:
-        path: as given.
-        what: is written, for the message.
-        endings: with their dots, the usual one first.
-
-    Raises:
-        ConfigError: naming them.
-    """
+    """The path, if it has one of the endings that such a file is written with, usual one first."""
     path = Path(path)
     if path.suffix.lower() not in endings:
         raise ConfigError(
@@ -126,11 +103,7 @@ def csv_cell(text: str) -> str:
 
 
 def inside(folder: str | Path, name: str, ending: str = "") -> Path:
-    """Path of a file for a thing of this name, in a folder and nowhere else.
-
-    Raises:
-        ConfigError: as `file_name`.
-    """
+    """Path of a file for a thing of this name, in a folder and nowhere else."""
     folder = Path(folder)
     path = folder / file_name(name, ending)
     if path.parent.resolve() != folder.resolve():
@@ -163,16 +136,6 @@ def check_once(names: Iterable[object], what: str, error: type[RomError] = Confi
 def check_known(
     name: object, known: Iterable[object], text: str, error: type[RomError] = ConfigError
 ) -> None:
-    """Refuse a name that is not among those known.
-
-    Args:
-        name: what was asked for.
-        known: the names there are.
-        text: what the error says before it lists them.
-        error: class of what is raised.
-
-    Raises:
-        RomError: of that class.
-    """
+    """Refuse a name that is not among those known, in a text that goes on with a list of them."""
     if name not in known:
         raise error(f"{text} {offered(known, name)}.")

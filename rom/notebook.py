@@ -8,13 +8,7 @@ MAX_ROWS = 20  # rows shown
 
 
 def html_table(title: str, header: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
-    """A title and a table in HTML; beyond `MAX_ROWS` rows it says how many there are.
-
-    Args:
-        title: one line of text.
-        header: names of the columns.
-        rows: texts and numbers, which are written with five digits.
-    """
+    """A title and a table in HTML; beyond `MAX_ROWS` rows it says how many there are."""
     listed = list(rows)
     lines = [_line("td", row) for row in listed[:MAX_ROWS]]
     if len(listed) > MAX_ROWS:

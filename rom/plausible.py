@@ -14,22 +14,14 @@ from rom.errors import ConfigError, warn
 
 @dataclass(frozen=True, slots=True)
 class Range:
-    """What a quantity is in machines, buildings and instruments.
+    """What a quantity is in machines, buildings and instruments."""
 
-    Attributes:
-        quantity: its name in a sentence.
-        low, high: limits, in ``unit``; None for no limit.
-        unit: SI unit, empty for a plain number.
-        known: what lies at the limits.
-        cure: what to look at; if empty, the unit that the value seems to have.
-    """
-
-    quantity: str
-    low: float | None
+    quantity: str  # its name in a sentence
+    low: float | None  # None for no limit
     high: float | None
-    unit: str
-    known: str
-    cure: str
+    unit: str  # in SI; empty for a plain number
+    known: str  # what lies at the limits
+    cure: str  # what to look at; if empty, the unit that the value seems to have
 
     def includes(self, value: float) -> bool:
         """Whether the value lies inside."""
@@ -170,23 +162,17 @@ def warn_outside(limits: Range, value: float, of: str = "") -> None:
     warn(limits.doubt(value, of))
 
 
-def check_damping_ratio(ratio: Any, of: str = "", *, stilled: bool = False) -> None:
-    """Take a share of critical damping at the border.
+def check_damping_ratio(ratio: float, of: str = "", *, stilled: bool = False) -> None:
+    """Take a share of critical damping at the border; warn of one that no structure has.
 
-    Args:
-        ratio: damping over critical damping [1].
-        of: whose it is.
-        stilled: take one at its word: so are residual shapes stilled.
-
-    Raises:
-        ConfigError: for no number, one below zero, or one above one, which is per cent.
-
-    Warns:
-        RomWarning: for one that no structure has.
+    Stilled takes one at its word: so are residual shapes stilled.
     """
-    refuse_negative(f"the damping ratio of {of}" if of else "damping ratio", ratio)
+    name = f"the damping ratio of {of}" if of else "damping ratio"
+    if isinstance(ratio, bool) or not isinstance(ratio, Real) or not math.isfinite(ratio):
+        raise ConfigError(f"{name} = {ratio!r} must be a finite number.")
+    if ratio < 0.0:
+        raise ConfigError(f"{name} = {ratio:g} is negative: it must be >= 0, not to drive.")
     if ratio > 1.0:
-        name = f"the damping ratio of {of}" if of else "damping ratio"
         raise ConfigError(
             f"{name} = {ratio:g} is beyond critical damping (1): nothing would vibrate.",
             hint=f"For {ratio:g} per cent write {ratio / 100:g}; to damp beyond one on purpose, "
@@ -194,15 +180,3 @@ def check_damping_ratio(ratio: Any, of: str = "", *, stilled: bool = False) -> N
         )
     if ratio < 1.0 or not stilled:
         warn_outside(DAMPING_RATIO, ratio, of)
-
-
-def refuse_negative(name: str, value: Any) -> None:
-    """Refuse what is no finite number from zero on.
-
-    Raises:
-        ConfigError: naming it.
-    """
-    if isinstance(value, bool) or not isinstance(value, Real) or not math.isfinite(value):
-        raise ConfigError(f"{name} = {value!r} must be a finite number.")
-    if value < 0.0:
-        raise ConfigError(f"{name} = {value:g} is negative: it must be >= 0, not to drive.")

@@ -25,11 +25,8 @@ def frequency_rows(
 ) -> list[Row]:
     """Errors of frequencies, and of shapes where they are compared, against the full model.
 
-    Args:
-        support: what both models are held by, or which of their modes are compared.
-        table: "reduced" and "full" frequencies, and "mac" of the shapes, which may be empty.
-        limit: relative error of a frequency that is accepted.
-        round_off: by which a reduced frequency may lie below the full one.
+    In a support, or of some modes: a table of "reduced" and "full" frequencies, and "mac" of the
+    shapes, which may be empty; relative errors accepted, and the round-off below the full ones.
     """
     error = np.array(table["reduced"]) / np.array(table["full"]) - 1
     n = error.size

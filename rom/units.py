@@ -13,19 +13,12 @@ from rom.errors import ConfigError
 
 @dataclass(frozen=True, slots=True)
 class UnitSystem:
-    """A consistent system of units.
-
-    Attributes:
-        name: as written in files.
-        length: its unit of length [m].
-        mass: its unit of mass [kg].
-        time: its unit of time [s].
-    """
+    """A consistent system of units."""
 
     name: str
-    length: float
-    mass: float
-    time: float
+    length: float  # its unit [m]
+    mass: float  # its unit [kg]
+    time: float  # its unit [s]
 
     @property
     def force(self) -> float:
@@ -73,15 +66,10 @@ ENERGY, POWER = (1, 2, -2, 0, 0), (1, 2, -3, 0, 0)
 
 @dataclass(frozen=True, slots=True)
 class Unit:
-    """A unit: so many of the SI unit of its dimension.
+    """A unit: so many of the SI unit of its dimension."""
 
-    Attributes:
-        factor: how many SI units it is [1]; an exact fraction, or a float where pi is in it.
-        dimension: (5,) exponents of `BASES`.
-    """
-
-    factor: Fraction | float
-    dimension: Dimension
+    factor: Fraction | float  # how many SI units it is [1]; a float where pi is in it
+    dimension: Dimension  # (5,) exponents of `BASES`
 
 
 def _family(dimension: Dimension, **factors: str) -> dict[str, Unit]:

@@ -20,11 +20,7 @@ ENOUGH_MODES = CraigBampton()  # as many as the certificate needs
 
 
 def stages(draft: Draft) -> list[Stage]:
-    """What `rom.reduce` does with a draft, in its order: method and options add stages.
-
-    Raises:
-        ConfigError: for options that do not go together.
-    """
+    """What `rom.reduce` does with a draft, in its order: method and options add stages."""
     if draft.nonlinear is not None:
         from rom.stages import deflection
 

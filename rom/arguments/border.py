@@ -107,11 +107,7 @@ class _Border:
     def passed(
         self, args: tuple[Any, ...], named: dict[str, Any]
     ) -> tuple[list[Any], dict[str, Any]]:
-        """The arguments as the function gets them.
-
-        Raises:
-            ConfigError: naming the one that it does not take.
-        """
+        """The arguments as the function gets them."""
         for name, value in named.items():
             owners = getattr(type(value), "TAKEN_BY", None)
             if owners and name not in self.takes and not self.more:

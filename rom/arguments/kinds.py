@@ -8,7 +8,7 @@ import os
 import types
 import typing
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from inspect import Parameter, signature
 from numbers import Integral, Real
 from pathlib import Path
@@ -48,52 +48,33 @@ EXAMPLE_VALUES = {"n_modes": 20, "order": 3}  # of arguments, in what a message 
 ARRAY_LIKE = frozenset(typing.get_args(npt.ArrayLike))  # none from NumPy 2.5 on: a kind by itself
 
 
+@dataclass(eq=False)
 class Unfit(Exception):
-    """A value is not what is wanted.
+    """A value is not what is wanted, in words; or its part at a place, such as ``['a']``.
 
-    Args:
-        value: the value, or the part of it that is wrong.
-        wanted: what it must be, in words.
-        place: of that part, such as ``['a']``.
-        sentence: what is said of it behind its name, where that is more than what is wanted.
-        error: class of what is raised for it.
+    A sentence is said of it behind its name where that is more than what is wanted.
     """
 
-    def __init__(
-        self,
-        value: Any,
-        wanted: str,
-        place: str = "",
-        sentence: str = "",
-        error: type[RomError] = ConfigError,
-    ):
-        super().__init__(value, wanted, place, sentence, error)
-        self.value, self.wanted, self.place = value, wanted, place
-        self.sentence, self.error = sentence, error
+    value: Any
+    wanted: str
+    place: str = ""
+    sentence: str = ""
+    error: type[RomError] = ConfigError
 
     def within(self, place: str) -> "Unfit":
         """The same of something that has this value at a place."""
-        return Unfit(self.value, self.wanted, place + self.place, self.sentence, self.error)
+        return replace(self, place=place + self.place)
 
 
 @dataclass(frozen=True, slots=True)
 class Taken:
-    """What a function takes for one argument.
-
-    Attributes:
-        words: what that is.
-        take: the value as the function gets it; raises `Unfit`, or whatever the value raises.
-    """
+    """What a function takes for one argument."""
 
     words: str
-    take: Callable[[Any], Any]
+    take: Callable[[Any], Any]  # gives what the function gets, or raises
 
     def __call__(self, value: Any) -> Any:
-        """The value as the function gets it.
-
-        Raises:
-            Unfit: in these words.
-        """
+        """The value as the function gets it."""
         try:
             return self.take(value)
         except (TypeError, ValueError, OverflowError, AttributeError) as error:
@@ -222,7 +203,12 @@ def _either(words: list[str]) -> str:
 
 
 def _word_of(known: tuple[Any, ...]) -> Taken:
-    return Taken(_either(list(map(repr, known))), lambda value: known[known.index(value)])
+    def take(value: Any) -> Any:
+        if np.ndim(value):  # which NumPy would compare entry by entry
+            raise TypeError(value)
+        return known[known.index(value)]
+
+    return Taken(_either(list(map(repr, known))), take)
 
 
 def _instance(kind: type) -> Taken:
@@ -372,10 +358,15 @@ def _path(value: Any) -> Any:
     return value
 
 
-def _function(value: Any) -> Any:
-    if not callable(value):
-        raise TypeError(value)
-    return value
+def _such(fits: Callable[[Any], bool]) -> Callable[[Any], Any]:
+    """Takes what fits as it is."""
+
+    def take(value: Any) -> Any:
+        if not fits(value):
+            raise TypeError(value)
+        return value
+
+    return take
 
 
 def _text(value: Any) -> str:
@@ -385,15 +376,10 @@ def _text(value: Any) -> str:
     return value
 
 
-def _nothing(value: Any) -> None:
-    if value is not None:
-        raise TypeError(value)
-
-
 ANY_VALUE = Taken("anything", lambda value: value)
-NONE_ONLY = Taken("None", _nothing)
+NONE_ONLY = Taken("None", _such(lambda value: value is None))
 ANY_TEXT = Taken("a text", _text)
-ANY_FUNCTION = Taken("a function", _function)
+ANY_FUNCTION = Taken("a function", _such(callable))
 PLAIN_KINDS: dict[Any, Taken | None] = {
     float: Taken("a finite number", _number),
     int: Taken("a whole number", _whole),

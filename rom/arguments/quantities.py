@@ -19,22 +19,14 @@ Shape = tuple[int | None, ...]
 
 @dataclass(frozen=True, slots=True)
 class Quantity:
-    """A number with a unit, or an array of them.
+    """A number with a unit, or an array of them."""
 
-    Attributes:
-        unit: in SI; "1" for none.
-        shapes: that it may have; None in a shape for any length.
-        low, high: limits.
-        ends: brackets of them: square ones where a limit itself is allowed.
-        error: class of what a call raises for a number beyond them.
-    """
-
-    unit: str = "1"
-    shapes: tuple[Shape, ...] = ((),)
+    unit: str = "1"  # in SI
+    shapes: tuple[Shape, ...] = ((),)  # None in one for any length
     low: float = -math.inf
     high: float = math.inf
-    ends: str = "()"
-    error: type[RomError] = ConfigError
+    ends: str = "()"  # square ones where a limit itself is allowed
+    error: type[RomError] = ConfigError  # of what a call raises for a number beyond the limits
 
     @property
     def summary(self) -> str:
@@ -142,11 +134,7 @@ def Between(
     return Quantity(unit, ((),), low, high, ends, error)
 
 
-def Count(least: int = 0, most: int | None = None, *, error: type[RomError] = ConfigError) -> Whole:
-    """A whole number of so many or more."""
-    return Whole(least, most, error)
-
-
+Count = Whole  # a whole number of so many or more
 Length = Annotated[float, Positive("m")]
 Size = Annotated[float, Positive("m", error=ModelError)]  # of a part that cannot be without it
 Angle = Annotated[float, Number("rad")]

@@ -30,18 +30,7 @@ def shortened(value: Any) -> str:
 
 
 def whole(name: str, value: Any, low: int = 0, high: int | None = None, *, reason: str = "") -> int:
-    """The value as a whole number within a range.
-
-    Args:
-        name: of the argument.
-        value: what was given.
-        low: smallest that is allowed.
-        high: largest that is allowed; None for no limit.
-        reason: why there is such a range, as the rest of a sentence.
-
-    Raises:
-        ConfigError: for anything else; 3.0 is not a whole number.
-    """
+    """The value as a whole number within a range; a reason for that is the rest of a sentence."""
     kind, fits = Whole(low, high), isinstance(value, Integral) and not isinstance(value, bool)
     if fits and kind.holds(operator.index(value)):
         return operator.index(value)
@@ -50,20 +39,12 @@ def whole(name: str, value: Any, low: int = 0, high: int | None = None, *, reaso
 
 
 def lowest(n: int | None) -> slice:
-    """Which modes are wanted: the n lowest ones, or all without a number.
-
-    Raises:
-        ConfigError: for a number below zero.
-    """
+    """Which modes are wanted: the n lowest ones, or all without a number."""
     return slice(None if n is None else whole("n", n))
 
 
 def vector(name: str, value: Any, n: int | None = None) -> Array:
-    """The value as (n,) finite numbers; without n as any number of them, one number alone too.
-
-    Raises:
-        ConfigError: for another shape, or entries that are not finite numbers.
-    """
+    """The value as (n,) finite numbers; without n as any number of them, one number alone too."""
     array = finite(name, [value] if n is None and np.isscalar(value) else value, None)
     if array.ndim != 1 or not array.size or n not in (None, array.size):
         needed = "at least one number" if n is None else f"{n} numbers"
@@ -72,11 +53,7 @@ def vector(name: str, value: Any, n: int | None = None) -> Array:
 
 
 def matrix(name: str, value: Any, shape: tuple[int | None, int | None] = (None, None)) -> Any:
-    """The value as a matrix, sparse or dense, of this shape; None for any length.
-
-    Raises:
-        ConfigError: for anything else.
-    """
+    """The value as a matrix, sparse or dense, of this shape; None for any length."""
     given = hasattr(value, "dot") and hasattr(value, "dtype")
     found = value if given else finite(name, value, None)
     if len(found.shape) != 2 or found.dtype.kind not in "iuf":
@@ -94,17 +71,9 @@ def symmetric(
     where: str = "",
     error: type[RomError] = QualityGateError,
 ) -> None:
-    """Refuse a matrix, sparse or dense, that belongs to no energy.
+    """Refuse a matrix (n, n), sparse or dense, of a file, that belongs to no energy.
 
-    Args:
-        name: of the matrix.
-        A: (n, n).
-        rtol: difference of its halves over its largest entry [1] that is round-off.
-        where: the file it comes from.
-        error: class of what is raised.
-
-    Raises:
-        RomError: of that class, with the difference.
+    Round-off is a difference of its halves up to rtol [1] of its largest entry.
     """
     gap, size = (abs(X).max() if A.shape[0] else 0.0 for X in (A - A.T, A))
     if gap > rtol * size:
@@ -117,11 +86,7 @@ def symmetric(
 
 
 def rows_at(name: str, at: Any, A: npt.NDArray[Any]) -> npt.NDArray[Any]:
-    """(p, k) rows of A (n, k): at places (p,) that count from 0, or combined by (p, n) numbers.
-
-    Raises:
-        ConfigError: for places beyond the rows, or numbers that do not fit them.
-    """
+    """(p, k) rows of A (n, k): at places (p,) that count from 0, or combined by (p, n) numbers."""
     wanted, n = finite(name, at, None), A.shape[0]
     if wanted.ndim == 2 and wanted.shape[1] == n and wanted.size:
         return np.asarray(wanted @ A)
@@ -144,11 +109,7 @@ def is_number(value: Any) -> bool:
 def one_of(
     name: str, value: Any, words: Iterable[str], *, error: type[RomError] = ConfigError
 ) -> str:
-    """The value as one of some words.
-
-    Raises:
-        RomError: listing them, of the class ``error``.
-    """
+    """The value as one of some words."""
     known = list(words)
     if isinstance(value, str) and value in known:
         return value
@@ -162,11 +123,7 @@ def finite(
     *,
     error: type[RomError] = ConfigError,
 ) -> Array:
-    """The value as a float array of this shape; None for any, or for any length.
-
-    Raises:
-        RomError: of the class ``error``, for another shape, or entries that are not finite numbers.
-    """
+    """The value as a float array of this shape; None for any, or for any length."""
     try:
         array = np.array(value, dtype=float)
         fits = not array.size or np.array(value).dtype.kind in "iuf"
@@ -193,18 +150,7 @@ def shape_words(shape: tuple[int | None, ...]) -> str:
 def one_each(
     what: str, given: Any, each: str, wanted: Any, *, error: type[RomError] = ConfigError
 ) -> None:
-    """Refuse things that are not one for each of others.
-
-    Args:
-        what: their name, in the plural.
-        given: their number, or shape.
-        each: name of the others.
-        wanted: the number of these, or their shape.
-        error: class of what is raised.
-
-    Raises:
-        RomError: of that class, with both numbers.
-    """
+    """Refuse things, by their name in the plural, whose number or shape is not that of others."""
     if given != wanted:
         n, m = (x[0] if isinstance(x, tuple) and len(x) == 1 else x for x in (given, wanted))
         raise error(f"{n} {what} for {m} {each}; give one for each.")
@@ -262,11 +208,7 @@ def matrix33(name: str, value: Any) -> Array:
 
 
 def unit_quaternion(value: Any) -> Array:
-    """(4,) unit quaternion from a (3, 3) rotation matrix, a quaternion, or None.
-
-    Raises:
-        ConfigError: if it is farther than 1e-3 from a rotation.
-    """
+    """(4,) unit quaternion from a (3, 3) rotation matrix, a quaternion, or None."""
     if value is None:
         return np.array([1.0, 0.0, 0.0, 0.0])
     if np.shape(value) == (4,):

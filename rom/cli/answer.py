@@ -11,19 +11,12 @@ from rom.model import Report
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """Result of a verb; nothing is printed or written before the verb has come to its end.
+    """Result of a verb; nothing is printed or written before the verb has come to its end."""
 
-    Attributes:
-        data: for ``--json``; plain numbers, texts, lists and dictionaries.
-        text: for people.
-        write: makes the output files; called on one rank.
-        failed: what did not hold; the exit code is then 5.
-    """
-
-    data: dict[str, Any]
-    text: str
-    write: Callable[[], object] | None = None
-    failed: tuple[str, ...] = field(default=())
+    data: dict[str, Any]  # for ``--json``: plain numbers, texts, lists, dictionaries
+    text: str  # for people
+    write: Callable[[], object] | None = None  # makes the output files, on one rank
+    failed: tuple[str, ...] = field(default=())  # what did not hold: exit code 5
 
 
 def table(header: Iterable[str], rows: Iterable[Iterable[str]]) -> str:

@@ -51,30 +51,14 @@ def described(args: argparse.Namespace) -> bool:
 
 
 def component(args: argparse.Namespace, *extra: str) -> "Component":
-    """The component of the file, with what the command line changes.
-
-    Args:
-        args: the options.
-        extra: options the verb looks after itself.
-
-    Raises:
-        ConfigError: for an option that has no key, and as `rom.read_component`.
-    """
+    """The component of the file, with what the command line changes but for extra options."""
     from rom.config.component import read_component
 
     return read_component(args.file, changes(args.given, PLACES, extra), **meshing(args))
 
 
 def mechanism(args: argparse.Namespace, *extra: str) -> "MechanismFile":
-    """The mechanism of the file, with what the command line changes.
-
-    Args:
-        args: the options.
-        extra: options the verb looks after itself.
-
-    Raises:
-        ConfigError: for an option that has no key, and as `rom.read_mechanism`.
-    """
+    """The mechanism of the file, with what the command line changes but for extra options."""
     from rom.config.mechanism import read_mechanism
 
     return read_mechanism(args.file, changes(args.given, MOTION_KEYS, extra), **meshing(args))
@@ -113,11 +97,7 @@ def _faces(pairs: list[tuple[str, str]]) -> Changes:
 
 
 def rayleigh(text: str) -> dict[str, float]:
-    """The factors of D = alpha M + beta K.
-
-    Raises:
-        ConfigError: for what is not two numbers.
-    """
+    """The factors of D = alpha M + beta K."""
     try:
         alpha, beta = map(float, text.split(","))
     except ValueError:

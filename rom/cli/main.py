@@ -30,14 +30,7 @@ class InternalError(RomError):
 
 
 def main(argv: list[str] | None = None) -> int:
-    """Run the command line.
-
-    Args:
-        argv: what stands behind ``rom``; from the system when not given.
-
-    Returns:
-        The exit code.
-    """
+    """Run what stands behind ``rom``, from the system when not given; the exit code."""
     argv = sys.argv[1:] if argv is None else argv
     with terminable():
         return _run(argv, output_options(argv))

@@ -1,10 +1,10 @@
-"""Options for the matrices of another program in place of a geometry."""
+"""The model that options ask for, of a geometry or of matrices of another program."""
 
 import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rom.cli.options import assignment, require, unique
+from rom.cli.options import assignment, material, option, reading, require, unique
 from rom.errors import ConfigError
 from rom.names import is_whole, named
 
@@ -35,25 +35,15 @@ def add_matrices(parser: argparse.ArgumentParser) -> None:
         "FILE is then the stiffness: .mtx, .mm, .sti, .op4, .bdf, .dat, .pch or .dmig, with :NAME "
         "behind where it holds several; interfaces are node sets of the .inp, or --set",
     )
-    group.add_argument("--mass", metavar="FILE[:NAME]", help="mass matrix")
-    group.add_argument("--nodes", metavar="FILE", type=Path, help=".inp, .bdf, .dat or .csv")
-    group.add_argument(
-        "--set",
-        metavar="NAME=LABELS",
-        type=assignment,
-        action="append",
-        default=[],
-        help="nodes of an interface, e.g. pin=11-14,20; may be repeated",
-    )
-    group.add_argument("--units", help="SI (default), mm-t-s or mm-kg-ms")
+    option(group, "--mass FILE[:NAME]", "mass matrix", str)
+    option(group, "--nodes FILE", ".inp, .bdf, .dat or .csv", Path)
+    about = "nodes of an interface, e.g. pin=11-14,20; may be repeated"
+    option(group, "--set NAME=LABELS", about, assignment)
+    option(group, "--units", "SI (default), mm-t-s or mm-kg-ms", str)
 
 
 def check_geometry(args: argparse.Namespace) -> None:
-    """A geometry needs a material, and options of matrices need a mass.
-
-    Raises:
-        ConfigError: naming what is missing or superfluous.
-    """
+    """A geometry needs a material, and options of matrices need a mass."""
     given = [f"--{name}" for name in ("nodes", "set", "units") if getattr(args, name)]
     if given:
         raise ConfigError(f"{given[0]} needs --mass FILE: it is for matrices.")
@@ -67,13 +57,20 @@ def solid_options(args: argparse.Namespace) -> dict[str, float | None]:
     return {f"--{name}": getattr(args, name) for name in names}
 
 
-def read_matrices(args: argparse.Namespace) -> "FEModel":
-    """The model of the matrices the options name.
+def read_model(args: argparse.Namespace) -> "FEModel":
+    """The model that options ask for, of a geometry or of matrices."""
+    if args.mass is not None:
+        return read_matrices(args)
+    check_geometry(args)
+    numbers = {"material": material(args), "degree": args.degree, "solver": args.solver}
+    how = numbers | reading(args)  # refused before dolfinx is loaded
+    from rom.fe.elasticity import model
 
-    Raises:
-        ConfigError: for an option of geometries, missing nodes, or an interface without a set.
-        RomError: of `rom.read_model`.
-    """
+    return model(args.file, **how)
+
+
+def read_matrices(args: argparse.Namespace) -> "FEModel":
+    """The model of the matrices the options name."""
     from rom.io.matrices.read_model import read_model
 
     odd = [
@@ -119,11 +116,7 @@ def _sets(args: argparse.Namespace, names: list[str]) -> dict[str, Any]:
 
 
 def labels(text: str) -> list[int]:
-    """Labels of nodes from 11-14,20.
-
-    Raises:
-        ConfigError: if it is no such list.
-    """
+    """Labels of nodes from 11-14,20."""
     found: list[int] = []
     for part in text.split(","):
         first, dash, last = part.strip().partition("-")

@@ -30,11 +30,7 @@ def number(text: str) -> float:
 
 
 def typed_number(option: str, text: str) -> float:
-    """A finite number in the value of an option.
-
-    Raises:
-        ConfigError: naming what is none.
-    """
+    """A finite number in the value of an option."""
     try:
         return number(text)
     except argparse.ArgumentTypeError as error:
@@ -79,11 +75,7 @@ def names(text: str) -> tuple[str, ...]:
 
 
 def require(needed: Mapping[str, Any], hint: str = "") -> None:
-    """Name at once all options that a verb needs and nobody gave.
-
-    Raises:
-        ConfigError: if there are any.
-    """
+    """Name at once all options that a verb needs and nobody gave."""
     if missing := [name for name, value in needed.items() if value is None or value == []]:
         raise ConfigError(f"the following arguments are required: {', '.join(missing)}.", hint=hint)
 
@@ -106,45 +98,47 @@ def number_or_text(pair: tuple[str, str]) -> tuple[str, Any]:
 
 
 def unique(pairs: list[tuple[str, Any]], option: str) -> dict[str, Any]:
-    """A dictionary of assignments.
-
-    Raises:
-        ConfigError: if a name is given twice.
-    """
+    """A dictionary of assignments."""
     check_once([name for name, _ in pairs], option)
     return dict(pairs)
+
+
+def option(to: Any, words: str, about: str, kind: Any = None, **more: Any) -> None:
+    """Add an option to a parser or group, by its flags and, if need be, what stands for the value.
+
+    One without a kind is a flag; assignments may be repeated, names be missing.
+    """
+    flags = [word for word in words.split() if word.startswith("-")]
+    shown = [word for word in words.split() if word not in flags]
+    how = {"action": "store_true"} if kind is None else {"type": kind} | NOT_GIVEN.get(kind, {})
+    how |= {"metavar": shown[0]} if shown else {}
+    to.add_argument(*flags, help=about, **(how | more))
+
+
+NOT_GIVEN: dict[Any, dict[str, Any]] = {
+    assignment: {"action": "append", "default": []},
+    names: {"default": ()},
+}
 
 
 def add_geometry(parser: argparse.ArgumentParser) -> None:
     """The file and how to read it."""
     parser.add_argument("file", type=Path, help=".geo, .py, .step, .msh, .inp or .bdf")
-    parser.add_argument(
-        "-p",
-        "--parameter",
-        metavar="NAME=VALUE",
-        type=assignment,
-        action="append",
-        default=[],
-        help="parameter of the geometry, e.g. lc=4e-3; may be repeated",
+    about = "parameter of the geometry, e.g. lc=4e-3; may be repeated"
+    option(parser, "-p --parameter NAME=VALUE", about, assignment)
+    about = (
+        "name a face of a .step file: its number, as 12; a point X,Y,Z on it [m]; radius:R [m] for "
+        "all cylinders of that radius; normal:X,Y,Z for the plane that looks there; several as "
+        "3+4; may be repeated"
     )
-    parser.add_argument(
-        "--face",
-        metavar="NAME=FACE",
-        type=assignment,
-        action="append",
-        default=[],
-        help="name a face of a .step file: its number, as 12; a point X,Y,Z on it [m]; radius:R "
-        "[m] for all cylinders of that radius; normal:X,Y,Z for the plane that looks there; "
-        "several as 3+4; may be repeated",
+    option(parser, "--face NAME=FACE", about, assignment)
+    about = "factor on coordinates; 1e-3 for mm (default 1)"
+    option(parser, "--scale", about, positive, default=1.0)
+    about = (
+        "degree of the cells' edges: 1 straight, 2 curved (default: 2 where the geometry is curved "
+        "and --degree is not 1)"
     )
-    parser.add_argument(
-        "--scale", type=positive, default=1.0, help="factor on coordinates; 1e-3 for mm (default 1)"
-    )
-    parser.add_argument(
-        "--order", type=count, choices=(1, 2),
-        help="degree of the cells' edges: 1 straight, 2 curved (default: 2 where the geometry is "
-        "curved and --degree is not 1)",
-    )  # fmt: skip
+    option(parser, "--order", about, count, choices=(1, 2))
     add_meshing(parser)
 
 
@@ -155,49 +149,38 @@ def add_meshing(parser: argparse.ArgumentParser) -> None:
         "A .geo or .step is run in a process of its own, which can neither start others nor write "
         "files; a .geo that says it would is refused. A .py can do what you can.",
     )
-    group.add_argument("--trust", action="store_true", help="run .py files; read them first")
-    group.add_argument(
-        "--time-limit", metavar="SECONDS", type=limit, help="of meshing (default 1800, 0 for none)"
-    )
-    group.add_argument(
-        "--memory-limit", metavar="GIGABYTES", type=limit,
-        help="of meshing (default 80 %% of the machine's, 0 for none)",
-    )  # fmt: skip
+    option(group, "--trust", "run .py files; read them first")
+    option(group, "--time-limit SECONDS", "of meshing (default 1800, 0 for none)", limit)
+    about = "of meshing (default 80 %% of the machine's, 0 for none)"
+    option(group, "--memory-limit GIGABYTES", about, limit)
 
 
 def add_solid(parser: argparse.ArgumentParser) -> None:
     """Numbers of an elastic solid."""
-    parser.add_argument("--E", type=number, help="Young's modulus [Pa]")
-    parser.add_argument("--nu", type=number, help="Poisson's ratio")
-    parser.add_argument("--rho", type=number, help="density [kg/m^3]")
+    option(parser, "--E", "Young's modulus [Pa]", number)
+    option(parser, "--nu", "Poisson's ratio", number)
+    option(parser, "--rho", "density [kg/m^3]", number)
 
 
 def add_material(parser: argparse.ArgumentParser) -> None:
     """Elastic solid and element degree."""
     add_solid(parser)
-    parser.add_argument(
-        "--degree", type=count, default=2, help="degree of the displacement, 1 to 3 (default 2)"
+    about = "degree of the displacement, 1 to 3 (default 2)"
+    option(parser, "--degree", about, count, default=2)
+    about = (
+        "auto (default: direct where its factor fits, else out-of-core, else iterative), direct, "
+        "low-rank, out-of-core, low-rank+out-of-core, iterative"
     )
-    parser.add_argument(
-        "--solver",
-        default="auto",
-        help="auto (default: direct where its factor fits, else out-of-core, else iterative), "
-        "direct, low-rank, out-of-core, low-rank+out-of-core, iterative",
-    )
+    option(parser, "--solver", about, str, default="auto")
 
 
 def add_interfaces(parser: argparse.ArgumentParser) -> None:
     """Interfaces by name and kind."""
-    parser.add_argument(
-        "-i",
-        "--interface",
-        metavar="NAME=KIND",
-        type=assignment,
-        action="append",
-        default=[],
-        help="interface and its kind: full, rbe2 (stiff), rbe3 (average), polynomial:ORDER "
-        "(polynomial alone: chosen with --tol) or fourier:HARMONICS,ORDER; may be repeated",
+    about = (
+        "interface and its kind: full, rbe2 (stiff), rbe3 (average), polynomial:ORDER (polynomial "
+        "alone: chosen with --tol) or fourier:HARMONICS,ORDER; may be repeated"
     )
+    option(parser, "-i --interface NAME=KIND", about, assignment)
 
 
 def reading(args: argparse.Namespace) -> dict[str, Any]:
@@ -213,11 +196,7 @@ def reading(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def faces(pairs: list[tuple[str, str]]) -> dict[str, str]:
-    """What picks each face, by name.
-
-    Raises:
-        ConfigError: if a name is given twice, or nothing is picked by what is written.
-    """
+    """What picks each face, by name."""
     found = unique(pairs, "--face")
     for text in found.values():
         face(text, "--face")
@@ -225,11 +204,7 @@ def faces(pairs: list[tuple[str, str]]) -> dict[str, str]:
 
 
 def face(text: str, option: str) -> str:
-    """The text, if it picks a face.
-
-    Raises:
-        ConfigError: naming the option.
-    """
+    """The text, if it picks a face."""
     from rom.fe.mesh.picks import picks
 
     try:

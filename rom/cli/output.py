@@ -6,6 +6,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
+from rom.cli.options import option
 from rom.cli.ranks import on_first_rank
 
 KIND_OF_ENDING = {"hdf5": "h5"}  # endings that are not the name of their kind
@@ -15,9 +16,7 @@ OTHER_OPTIONS = ("argv", "given", "run", "claims", "verb")
 
 def add_force(parser: argparse.ArgumentParser) -> None:
     """The option of every verb that writes."""
-    parser.add_argument(
-        "--force", action="store_true", help="replace files that rom has not written itself"
-    )
+    option(parser, "--force", "replace files that rom has not written itself")
 
 
 def checked(
@@ -25,16 +24,8 @@ def checked(
 ) -> Path:
     """The path, if the verb may write it; to be asked before the computation.
 
-    One rank writes, and looks for all.
-
-    Args:
-        args: the options, whose files are inputs, too.
-        path: file to write.
-        kind: of it, a key of `rom.io.ours.FILE_SIGNS`; from its ending if not given.
-        inputs: files that are read and named elsewhere.
-
-    Raises:
-        ConfigError: as `rom.io.ours.check_replaceable`.
+    One rank writes, and looks for all. Options and inputs name what is read. The kind is a key of
+    `rom.io.ours.FILE_SIGNS`; that of the ending if not given.
     """
     from rom.io.ours import check_replaceable
 
@@ -45,13 +36,8 @@ def checked(
 
 
 def claim(args: argparse.Namespace) -> Path:
-    """The folder of ``-o``, kept from other runs until the files of this one are written.
-
-    Raises:
-        ConfigError: if it is no folder, or may not be made or written.
-        ResourceError: if another run is writing into it.
-    """
-    from rom.io.claim import claimed
+    """The folder of ``-o``, kept from other runs until the files of this one are written."""
+    from rom.io.ours import claimed
 
     folder: Path = args.output
     on_first_rank(lambda: args.claims.enter_context(claimed(folder)))

@@ -52,17 +52,8 @@ def print_error(error: RomError, options: OutputOptions, rank: int = 0) -> None:
     where = f"{error.where}: " if error.where else ""
     cause = " ".join(f"{where}{error.message}".split())
     if options.json:
-        say(
-            to_json(
-                {
-                    "ok": False,
-                    "error": type(error).__name__,
-                    "message": cause,
-                    "hint": error.hint,
-                    "exit_code": error.exit_code,
-                }
-            )
-        )
+        own = {"message": cause, "hint": error.hint, "exit_code": error.exit_code}
+        say(to_json({"ok": False, "error": type(error).__name__, **own}))
     print_to_stderr("error: " + (f"rank {rank}: " if rank else "") + cause)
     if error.told_hint:
         print_to_stderr(f"hint: {' '.join(error.told_hint.split())}")
@@ -70,14 +61,9 @@ def print_error(error: RomError, options: OutputOptions, rank: int = 0) -> None:
 
 @contextmanager
 def speaking(options: OutputOptions, *, verbose: bool) -> Iterator[list[str]]:
-    """Progress and warnings on stderr; with ``--strict`` the first warning is an error.
+    """Progress and warnings on stderr, but for silent ranks; gives the list that collects warnings.
 
-    Args:
-        options: how.
-        verbose: False on ranks that keep silent.
-
-    Yields:
-        The list that collects the warnings.
+    With ``--strict`` the first of them is an error.
     """
     remarks: list[str] = []
 

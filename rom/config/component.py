@@ -1,6 +1,7 @@
 """The component file: a geometry, its material, and how it becomes a flexible body."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -22,16 +23,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Described:
-    """What a file describes.
-
-    Attributes:
-        document: the file.
-        values: its values in SI, by the keys of its table.
-        meshing: ``trust`` and limits of `rom.fe.mesh.read.read_mesh`, which no file can say.
-    """
+    """What a file describes."""
 
     document: Document
-    values: dict[str, Any]
+    values: dict[str, Any]  # in SI, by the keys of its table
+    # ``trust`` and limits of `read_mesh`, which no file can say
     meshing: dict[str, Any] = field(default_factory=dict)
 
     @property
@@ -39,9 +35,9 @@ class Described:
         """Name of the body or mechanism."""
         return str(self.values.get("name") or self.document.path.stem)
 
-    def at(self, *path: str) -> "Located":
+    def at(self, *path: str) -> AbstractContextManager[None]:
         """Context that tells the line of a key in errors raised below it."""
-        return Located(self.document, path)
+        return located(self.document, path)
 
 
 class Component(Described):
@@ -195,15 +191,16 @@ class Component(Described):
     def _parameter(self, name: str, value: Any, scale: float) -> Any:
         if not isinstance(value, str):
             return value
+        symbol = value.lstrip("+-.0123456789eE ") or "1"
         try:
-            found = unit(value.lstrip("+-.0123456789eE ") or "1")
+            found = unit(symbol)
         except ConfigError:
             return value  # a text of its own, e.g. for a geometry written in Python
         place = Place(self.document, ("geometry", "parameters", name))
         if found.dimension == LENGTH:
             return float(read_value(Quantity("m"), value, place)) / scale
         try:
-            return in_si(value, _si(found.dimension))
+            return in_si(value, symbol)
         except ConfigError as error:
             raise place.error(f"{place.name}: {error.message}", error.hint) from None
 
@@ -240,29 +237,20 @@ class Component(Described):
         return str(folder / text)
 
 
-class Located:
+@contextmanager
+def located(document: Document, path: KeyPath) -> Iterator[None]:
     """Context that puts file and line in front of errors raised inside."""
-
-    def __init__(self, document: Document, path: KeyPath) -> None:
-        self.document, self.path = document, path
-
-    def __enter__(self) -> None:
-        return None
-
-    def __exit__(self, kind: Any, error: BaseException | None, _: Any) -> None:
-        if isinstance(error, RomError) and not error.where.startswith(str(self.document.path)):
-            where = self.document.where(self.path)
+    try:
+        yield
+    except RomError as error:
+        if not error.where.startswith(str(document.path)):
+            where = document.where(path)
             error.where = f"{where}: {error.where}" if error.where else where
+        raise
 
 
 def _tuples(value: Any) -> Any:
     return tuple(map(_tuples, value)) if isinstance(value, list) else value
-
-
-def _si(dimension: tuple[int, ...]) -> str:
-    """A unit of SI of that dimension."""
-    bases = ("kg", "m", "s", "rad", "Hz s")
-    return " ".join(f"{b}^{n}" for b, n in zip(bases, dimension, strict=True) if n) or "1"
 
 
 @typed

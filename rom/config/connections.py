@@ -26,35 +26,20 @@ DIRECTIONS = {"rising": 1, "falling": -1, "both": 0}
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """An entry with its markers and joints found.
-
-    Attributes:
-        made: the mechanism.
-        section, name: of the entry.
-        ends: markers, or joints.
-        marker_names: "body.marker" of the markers, as they are written.
-        values: its other values, in SI.
-        place: in the file.
-        t_end: until when functions of time are asked for [s].
-        trust: run functions of Python files.
-    """
+    """An entry with its markers and joints found."""
 
     made: "Mechanism"
     section: str
     name: str
-    ends: list[Any]
-    marker_names: list[str]
-    values: dict[str, Any]
+    ends: list[Any]  # markers, or joints
+    marker_names: list[str]  # "body.marker", as written
+    values: dict[str, Any]  # its other values, in SI
     place: Place
-    t_end: float
-    trust: bool
+    t_end: float  # until when functions of time are asked for [s]
+    trust: bool  # run functions of Python files
 
     def connect(self) -> None:
-        """Call the method of the mechanism.
-
-        Raises:
-            RomError: for what the mechanism refuses.
-        """
+        """Call the method of the mechanism."""
         connect = sections()[self.section].connect or CALLS.get(self.section, _plainly)
         connect(self)
 
@@ -62,17 +47,18 @@ class Entry:
         """The law under a key."""
         return law_of(self.values[key], self.place.at(key), t_end=self.t_end, trust=self.trust)
 
+    def times(self, constant: Any) -> Callable[[float], Any]:
+        """The law under "factor" times a constant."""
+        factor = self.law("factor").value
+        return lambda t: float(factor(t)) * constant
+
     def take(self, record: Callable[..., Any]) -> Any:
         """A record of the values under the names of its fields, which leave the values."""
         names = [name for name in signature(record).parameters if name in self.values]
         return record(**{name: self.values.pop(name) for name in names})
 
     def take_body(self) -> "Part":
-        """The flexible body under "body", which leaves the values.
-
-        Raises:
-            ConfigError: if there is none of that name.
-        """
+        """The flexible body under "body", which leaves the values."""
         name, parts = self.values.pop("body"), self.made.parts
         flexible = [key for key, part in parts.items() if part.flexible is not None]
         if name not in flexible:
@@ -123,11 +109,7 @@ def _load(entry: Entry) -> None:
 
     vector: Any = np.array(entry.values["vector"])
     if "factor" in entry.values:
-        factor, constant = entry.law("factor").value, vector
-
-        def vector(t: float) -> Any:
-            return float(factor(t)) * constant
-
+        vector = entry.times(vector)
     method = entry.section.removesuffix("s")
     getattr(entry.made, method)(entry.name, *entry.ends, vector, frame=entry.values["frame"])
 
@@ -141,13 +123,7 @@ def _spread(entry: Entry) -> None:
         load = mass_load(part.flexible, values[kind])
     else:
         load = surface_load(part.flexible, where=values.get("where"), **{kind: values[kind]})
-    factor: Any = 1.0
-    if "factor" in values:
-        law = entry.law("factor").value
-
-        def factor(t: float) -> float:
-            return float(law(t))
-
+    factor = entry.times(1.0) if "factor" in values else 1.0
     entry.made.spread_load(entry.name, part, load, factor, frame=values["frame"])
 
 
@@ -204,21 +180,13 @@ def _user_force(entry: Entry) -> None:
 
 @dataclass(frozen=True)
 class Condition:
-    """A measured value x with its rate v, and what of it must be zero.
+    """A measured value x with its rate v, and what of it must be zero."""
 
-    Attributes:
-        kind: "coordinate", "position" or "distance".
-        follow: the joint with its coordinate, or the markers.
-        axis: (3,) unit vector, for a position.
-        value: that x passes.
-        formula: of t, x and v, in place of a value.
-    """
-
-    kind: str
-    follow: tuple[Any, ...]
-    axis: Any
-    value: float
-    formula: "Formula | None"
+    kind: str  # "coordinate", "position" or "distance"
+    follow: tuple[Any, ...]  # the joint with its coordinate, or the markers
+    axis: Any  # (3,) unit vector, for a position
+    value: float  # that x passes
+    formula: "Formula | None"  # of t, x and v, in place of a value
 
     def __call__(self, t: float, instant: "Instant") -> float:
         """What passes through zero."""
@@ -248,11 +216,7 @@ class Condition:
 
 
 def condition_of(ends: list[Any], values: dict[str, Any], place: Place) -> Condition:
-    """The condition of an entry of [events].
-
-    Raises:
-        ConfigError: for a value and a formula, or neither; or an axis of length zero.
-    """
+    """The condition of an entry of [events]."""
     if ("value" in values) == ("expression" in values):
         what = "both a value and an expression" if "value" in values else "no value it passes"
         raise place.error(f"{place.name} has {what}.", "Give one of value and expression.")
@@ -304,11 +268,7 @@ LAWS: dict[str, Callable[[Entry], None]] = {
 
 
 def check_name(name: str) -> None:
-    """Refuse names of bodies and rods that markers could not name.
-
-    Raises:
-        ConfigError: for one with a dot, or that of the ground.
-    """
+    """Refuse names of bodies and rods that markers could not name."""
     if "." in name or name == GROUND:
         raise ConfigError(f"{name!r} is no name for a body; use one without a dot, not {GROUND!r}.")
 

@@ -20,17 +20,11 @@ KeyPath = tuple[str, ...]
 
 @dataclass(frozen=True, slots=True)
 class Document:
-    """What a file says, and where.
-
-    Attributes:
-        path: the file.
-        data: its tables.
-        lines: line of each key, as far as keys stand on lines of their own.
-    """
+    """What a file says, and where."""
 
     path: Path
     data: dict[str, Any]
-    lines: dict[KeyPath, int] = field(default_factory=dict)
+    lines: dict[KeyPath, int] = field(default_factory=dict)  # of keys on lines of their own
 
     def where(self, path: KeyPath) -> str:
         """File and line of a key, of the table around it, or of the last key."""
@@ -41,12 +35,7 @@ class Document:
 
 
 def read_document(path: str | Path) -> Document:
-    """Read a TOML file.
-
-    Raises:
-        FileFormatError: if it is missing, too large, or no text.
-        ConfigError: naming the line that is no TOML, or the key that is given twice.
-    """
+    """Read a TOML file."""
     path = check_readable(path)
     if path.stat().st_size > MAX_BYTES:
         raise FileFormatError(f"more than {MAX_BYTES} bytes are no description.", where=str(path))
@@ -58,11 +47,7 @@ def read_document(path: str | Path) -> Document:
 
 
 def parsed(text: str, path: Path) -> Document:
-    """The document of a text.
-
-    Raises:
-        ConfigError: as `read_document`.
-    """
+    """The document of a text."""
     found = list(statements(text))
     _check_depth(text, path)
     for key, line in found:

@@ -53,18 +53,11 @@ class Token(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Reader:
-    """A formula at its place in a file.
-
-    Attributes:
-        text: as written.
-        variables: names it may have, of `rom.mbs.elements.formulas.codes.VARIABLES`.
-        constants: values of the other names.
-        place: in the file.
-    """
+    """A formula at its place in a file."""
 
     text: str
-    variables: tuple[str, ...]
-    constants: Mapping[str, float]
+    variables: tuple[str, ...]  # names it may have
+    constants: Mapping[str, float]  # values of the other names
     place: Place
 
     @property
@@ -73,11 +66,7 @@ class Reader:
         return [*self.variables, *self.constants, *CONSTANTS, *FUNCTIONS]
 
     def code(self) -> Code:
-        """Its instructions.
-
-        Raises:
-            ConfigError: naming what is wrong and where, with a caret below it.
-        """
+        """Its instructions."""
         if len(self.text) > MAX_LETTERS:
             raise self.place.error(
                 f"{self.place.name} has {len(self.text)} letters; {MAX_LETTERS} are the most.",
@@ -240,13 +229,9 @@ class AnyQuantity:
 
 @dataclass(frozen=True, slots=True)
 class UnitName:
-    """A unit of a dimension.
+    """A unit of a dimension."""
 
-    Attributes:
-        unit: SI unit of the dimension.
-    """
-
-    unit: str
+    unit: str  # in SI, of the dimension
 
     @property
     def summary(self) -> str:
@@ -264,11 +249,7 @@ class UnitName:
 
 @dataclass(frozen=True, slots=True)
 class FormulaTable(Table):
-    """A table whose key ``expression`` is a formula of some variables.
-
-    Attributes:
-        variables: names it may have.
-    """
+    """A table whose key ``expression`` is a formula of some variables."""
 
     variables: tuple[str, ...] = ("t",)
 

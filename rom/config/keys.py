@@ -55,11 +55,7 @@ class Written(Protocol):
 
 
 def read_value(kind: "Kind", value: Any, place: Place) -> Any:
-    """The value of a key, checked and in SI.
-
-    Raises:
-        ConfigError: if it is none of this kind.
-    """
+    """The value of a key, checked and in SI."""
     if isinstance(kind, Quantity):
         return _quantity(kind, value, place)
     if isinstance(kind, Whole):
@@ -208,32 +204,19 @@ class Anything:
 
 @dataclass(frozen=True, slots=True)
 class Key:
-    """One key of a table.
-
-    Attributes:
-        name: as written.
-        kind: how its value is written.
-        about: one sentence.
-        default: value when it is not given; None for no value, ``...`` when it must be given, {}
-            for a table of defaults.
-    """
+    """One key of a table."""
 
     name: str
     kind: Kind
-    about: str
-    default: Any = None
+    about: str  # one sentence
+    default: Any = None  # ... where a value must be given, {} for a table of defaults
 
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """The keys a table may hold.
+    """The keys a table may hold."""
 
-    Attributes:
-        about: one sentence.
-        keys: what it knows.
-    """
-
-    about: str
+    about: str  # one sentence
     keys: tuple[Key, ...]
 
     @property
@@ -296,14 +279,10 @@ class Named:
 
 @dataclass(frozen=True, slots=True)
 class Variants:
-    """Tables told apart by their key ``kind``.
-
-    Attributes:
-        tables: by kind.
-        telling: {key: kind it stands for where none is written}.
-    """
+    """Tables told apart by their key ``kind``."""
 
     tables: Mapping[str, Table]
+    # {key: kind it stands for where none is written}
     telling: Mapping[str, str] = field(default_factory=dict)
 
     @property
@@ -369,11 +348,7 @@ def as_text(value: Any) -> str:
 
 
 def read_table(table: Table, document: Document) -> dict[str, Any]:
-    """The values of a document.
-
-    Raises:
-        ConfigError: with every mistake, and its line.
-    """
+    """The values of a document."""
     place = Place(document)
     values = table.read(document.data, place)
     raise_mistakes(place)
@@ -381,11 +356,7 @@ def read_table(table: Table, document: Document) -> dict[str, Any]:
 
 
 def raise_mistakes(place: Place) -> None:
-    """Raise what has been collected, the first mistake in front.
-
-    Raises:
-        ConfigError: if there is any.
-    """
+    """Raise what has been collected, the first mistake in front."""
     found = place.mistakes
     if len(found) == 1:
         raise found[0]

@@ -80,11 +80,7 @@ class Pending:
     kinds: tuple[Kind, Kind]
 
     def of(self, *, turns: bool) -> Any:
-        """The value for an angle, or for a way.
-
-        Raises:
-            ConfigError: if it has the unit of the other one.
-        """
+        """The value for an angle, or for a way."""
         place = Place(self.place.document, self.place.path)
         found = read_value(self.kinds[0 if turns else 1], self.value, place)
         raise_mistakes(place)
@@ -114,18 +110,7 @@ class ByCoordinate:
 
 
 def law_of(values: Any, place: Place, *, t_end: float | None = None, trust: bool = False) -> Law:
-    """The functions of a law.
-
-    Args:
-        values: what `law_kind` has read: a number, or a table with its kind.
-        place: its place in the file.
-        t_end: until when it is asked for [s].
-        trust: run a function of a Python file.
-
-    Raises:
-        ConfigError: for a table of points that is none, or that ends too early.
-        UnsafeFileError: for a Python file that is not trusted.
-    """
+    """The functions of a law, as `law_kind` has read it, asked for until t_end [s]."""
     import numpy as np
 
     values = dict(values) if isinstance(values, Mapping) else {"kind": "constant", "value": values}

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rom.arguments import typed
-from rom.config.component import Described, Located, change, read_component
+from rom.config.component import Described, change, located, read_component
 from rom.config.connections import GROUND, Entry, check_name, pose_of
 from rom.config.document import read_document
 from rom.config.keys import Place, nearest, raise_mistakes, read_table
@@ -292,7 +292,7 @@ def read_mechanism(
             "bodies is missing.", where=document.where(()), hint="Add [bodies.NAME].",
         )  # fmt: skip
     for name in document.data.keys() - sections().keys():
-        with Located(document, (name,)):
+        with located(document, (name,)):
             find("sections", name)  # of a field that is not here
     for key, value in (changes or {}).items():
         change(document.data, key, value)

@@ -27,15 +27,7 @@ SETTINGS = ("method", "modes", *OWN_SETTINGS, "characteristic", "gravity_shapes"
 
 
 def chosen(settings: dict[str, Any], *, full: bool) -> "Method | Characteristic":
-    """The method of a table [reduction].
-
-    Args:
-        settings: values by the keys of `SETTINGS`; those that nobody chose are missing.
-        full: whether any interface keeps all its dofs.
-
-    Raises:
-        ConfigError: if they contradict each other.
-    """
+    """The method of a table [reduction], by the keys of `SETTINGS` that somebody chose."""
     from rom.reduction.bases.loads import WithLoads
     from rom.reduction.interfaces.characteristic import Characteristic
 

@@ -25,12 +25,7 @@ relative to the folder of the file they stand in.
 
 
 def page(component: str, mechanism: str) -> str:
-    """The page, in Markdown.
-
-    Args:
-        component: text of a component file that serves as example.
-        mechanism: text of a mechanism file.
-    """
+    """The page, in Markdown, with the texts of a component and a mechanism file as examples."""
     parts = [PAGE_HEADER, "## A component", f"```toml\n{component.strip()}\n```"]
     parts += list(_sections(COMPONENT))
     parts += ["## A mechanism", f"```toml\n{mechanism.strip()}\n```"]

@@ -23,12 +23,7 @@ PYTHON_KEYS = (
 
 
 def function_of(values: Mapping[str, Any], place: Place, *, trust: bool) -> Callable[..., Any]:
-    """The function, with its parameters behind the other arguments.
-
-    Raises:
-        ConfigError: if the file cannot be run, or has no such function.
-        UnsafeFileError: if it is not trusted.
-    """
+    """The function, with its parameters behind the other arguments."""
     function = plain_function_of(values, place, trust=trust)
     given = tuple(values["parameters"])
     return (lambda *arguments: function(*arguments, *given)) if given else function
@@ -68,11 +63,7 @@ def plain_function_of(
 
 
 def check_trust(path: Path, place: Place, *, trust: bool) -> None:
-    """Refuse a Python file that is not trusted.
-
-    Raises:
-        UnsafeFileError: naming the file.
-    """
+    """Refuse a Python file that is not trusted."""
     if trust is not True:
         raise UnsafeFileError(
             f"{place.name}: {path} is a Python program, which can do to this machine whatever "

@@ -115,12 +115,7 @@ def _fields(line: str, place: Place) -> tuple[str, list[str], str]:
 def grids(found: dict[str, list[Card]]) -> tuple[Index, Array, Index]:
     """Labels (k,), positions (k, 3) in the basic system, and (k,) systems of displacements.
 
-    Args:
-        found: the cards of `POINTS` by their names.
-
-    Raises:
-        FileFormatError: naming the line, for damaged cards, labels that come twice, and systems
-            that are missing, flat or defined by themselves.
+    Of the cards of `POINTS` by their names.
     """
     default = next(iter(found.get("GRDSET", ())), Card("GRDSET", [], (Path(), 0)))
     own, turned = default.whole(1, 0), default.whole(5, 0)

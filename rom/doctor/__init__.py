@@ -1,5 +1,5 @@
 """What is installed, what works, and what to type for the rest.
 
-`machine` and `core`, the kind of processor, are looked at first, then `libraries`; `probes` are
+`core` knows the kind of processor, `libraries` machine, caches and packages; `probes` are
 processes that try what may crash, or compile ahead the cases of `first_use`.
 """

@@ -38,12 +38,7 @@ def abilities(cpuinfo: Path = Path("/proc/cpuinfo")) -> set[str]:
 
 
 def better(core: str, flags: set[str]) -> str:
-    """The core OpenBLAS should work for; empty when it knows.
-
-    Args:
-        core: what it takes the processor for.
-        flags: instruction sets of the processor.
-    """
+    """The core OpenBLAS should work for by these flags; empty when the one it takes is right."""
     able = [name for name, needed in CORE_FLAGS.items() if needed <= flags]
     return able[0] if core in MISTAKEN_CORES and able else ""
 

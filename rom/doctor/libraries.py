@@ -1,19 +1,27 @@
-"""Python and the libraries beside it: which are installed, which work, what to type for the rest.
+"""The machine, Python and libraries: what is installed, what works, what to type for the rest.
 
 ``python -m rom.doctor.libraries`` draws a sphere off-screen and says which window drew it.
 """
 
+import os
 import platform
+import re
 import shutil
 import sys
+import time
+from collections.abc import Iterator
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from time import perf_counter
 from typing import Any
 
+import numpy as np
+
+from rom.doctor.core import abilities, better, taken_for
 from rom.doctor.probes import Finding, say
 from rom.fe import GMSH_LIBRARIES, WHEEL_PACKAGES
+from rom.places import PACKAGE
 from rom.process import mpirun
+from rom.process.memory import free_bytes, mapped_files
 
 PACKAGES = {  # of Debian, and of pip
     "MPI": ("python3-mpi4py", "mpi4py mpich"),
@@ -31,6 +39,12 @@ INSTALL_COMMAND = "pip install pyvista matplotlib"
 BESIDE_DEBIAN = ' "vtk==9.5.2"'  # later ones abort beside its dolfinx
 SYSTEM_COMMAND = "sudo apt-get install libgl1 libegl1 libxrender1"
 MIN_CONTRAST = 1.0  # standard deviation of grey levels; a lit sphere has about 50
+BLAS_FILE = re.compile(r"/lib(blas|openblas|scipy_openblas|mkl_rt|blis|flexiblas|cblas)[^/]*\.so")
+FAST_BLAS = re.compile(r"openblas|mkl|blis|atlas", re.IGNORECASE)
+SLOW_ADVICE = "5 to 9 times faster: sudo apt-get install libopenblas0-pthread"
+REMOVE_COMMAND = "rom doctor --fix"
+AT_WORK = 60.0  # seconds after which nobody is still writing a temporary file
+END_OF_PICKLE = b"."
 
 
 def light() -> list[Finding]:
@@ -46,12 +60,7 @@ def light() -> list[Finding]:
 
 
 def fenicsx(found: dict[str, dict[str, Any]], ending: str) -> list[Finding]:
-    """One finding per library.
-
-    Args:
-        found: answers of the probe by name; a name that is missing was not reached.
-        ending: how the probe ended, "" if well.
-    """
+    """One finding per library, of the answers of a probe that ended well, "", or otherwise."""
     findings = [_finding(name, found.get(name), ending) for name in PACKAGES]
     findings.insert(1, _launcher(found.get("MPI", {}).get("version", "")))
     if any(f.state == "missing" for f in findings):
@@ -80,11 +89,7 @@ def _repair(name: str, error: str) -> str:
 
 
 def _launcher(library: str) -> Finding:
-    """The program that starts ranks, and whether it is of the MPI that Python loads.
-
-    Args:
-        library: what that MPI says of itself; empty without one.
-    """
+    """The program that starts ranks; whether it is of the MPI that Python loads, by its words."""
     program = mpirun.found()
     if not program:
         state = "missing" if library else "ok"
@@ -104,12 +109,7 @@ def _launcher(library: str) -> Finding:
 
 
 def command(debian: str, pip: str) -> str:
-    """What to type for a library: of Debian where this Python looks for its packages, else of pip.
-
-    Args:
-        debian: name of the package there.
-        pip: names of the wheels.
-    """
+    """What to type for a library: of Debian where this Python looks for packages, else of pip."""
     if not sees_debian() and sys.version_info >= WHEELS_NEED:
         return f"pip install {pip}"
     return f"sudo apt-get install {debian}"
@@ -176,6 +176,93 @@ def _display(picture: dict[str, Any] | None, ending: str) -> Finding:
     return Finding("pictures", name, f"{picture['window']}, {picture['seconds']} s")
 
 
+def blas(mapped: list[str]) -> list[Finding]:
+    """Which BLAS of the files a process with PETSc has mapped, or this one, and how fast it is."""
+    speed = _gigaflops()
+    files = sorted({f for f in mapped or mapped_files() if BLAS_FILE.search(f)})
+    slow = [f for f in files if not FAST_BLAS.search(f)]
+    named = ", ".join(slow or files) or "not found in the memory map"
+    found = [Finding("BLAS", "library", named)]
+    if slow:
+        found = [Finding("BLAS", "library", f"reference, {named}", "note", SLOW_ADVICE)]
+    wanted = better(taken_for(), abilities())
+    if wanted:
+        advice = f"several times faster: export OPENBLAS_CORETYPE={wanted}"
+        found.append(Finding("BLAS", "processor", f"taken for a {taken_for()}", "note", advice))
+    return [*found, Finding("BLAS", "matrix product", f"{speed:.1f} GFlop/s")]
+
+
+def _gigaflops(n: int = 400) -> float:
+    A = np.ones((n, n))
+    A @ A
+    began = time.perf_counter()
+    A @ A
+    return 2e-9 * n**3 / (time.perf_counter() - began)
+
+
+def machine() -> list[Finding]:
+    """Memory and cores."""
+    total = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 2**30
+    free = free_bytes() / 2**30
+    cores = len(os.sched_getaffinity(0))
+    threads = os.environ.get("OMP_NUM_THREADS", "not set")
+    return [
+        Finding("machine", "memory", f"{total:.1f} GiB, of which {free:.1f} GiB may be taken"),
+        Finding("machine", "cores", f"{cores}, OMP_NUM_THREADS {threads}"),
+    ]
+
+
+def caches(forms: dict[str, Any], *, fix: bool) -> list[Finding]:
+    """State of the cache of compiled forms, by what the probe says, and of Numba's.
+
+    To fix is to remove damaged files; the probe has removed those of forms.
+    """
+    found = [_form_cache(forms, fix)] if "path" in forms else []
+    damaged = [path for folder in numba_folders() for path in damaged_files(folder)]
+    if fix:
+        for path in damaged:
+            path.unlink(missing_ok=True)
+    return [*found, _cache("compiled by Numba", "", damaged, fix)]
+
+
+def _form_cache(forms: dict[str, Any], fix: bool) -> Finding:
+    if not forms["writable"]:
+        value = f"{forms['path']} cannot be written; forms are compiled in every run"
+        return Finding("caches", "compiled forms", value, "note", f"chown it: {forms['path']}")
+    return _cache("compiled forms", forms["path"], forms["stale"], fix)
+
+
+def _cache(name: str, where: str, damaged: list[Any], fix: bool) -> Finding:
+    if not damaged:
+        return Finding("caches", name, f"{where} healthy".strip())
+    if fix:
+        return Finding("caches", name, f"{len(damaged)} damaged files removed {where}".strip())
+    value = f"{len(damaged)} damaged files, e.g. {damaged[0]}"
+    return Finding("caches", name, value, "note", REMOVE_COMMAND)
+
+
+def numba_folders() -> Iterator[Path]:
+    """Where Numba may keep what it compiled for rom."""
+    own = os.environ.get("NUMBA_CACHE_DIR")
+    if own:
+        yield Path(own)
+    yield PACKAGE
+
+
+def damaged_files(folder: Path) -> Iterator[Path]:
+    """Index and code files that end in the middle, and temporary ones nobody writes any more."""
+    for path in sorted(folder.rglob("*.nb[ic]*")):
+        try:
+            if ".tmp." in path.name:
+                damaged = time.time() - path.stat().st_mtime > AT_WORK
+            else:
+                damaged = path.read_bytes()[-1:] != END_OF_PICKLE
+        except OSError:
+            continue
+        if damaged:
+            yield path
+
+
 def draw() -> None:
     """Write one JSON line per thing found."""
     import pyvista
@@ -183,11 +270,11 @@ def draw() -> None:
 
     say("pyvista", version=pyvista.__version__)
     say("vtk", version=vtkVersion().GetVTKVersion())
-    began = perf_counter()
+    began = time.perf_counter()
     plotter: Any = pyvista.Plotter(off_screen=True, window_size=[200, 200])
     plotter.add_mesh(pyvista.Sphere())
     contrast = float(plotter.screenshot(return_img=True).std())
-    seconds = round(perf_counter() - began, 2)
+    seconds = round(time.perf_counter() - began, 2)
     say("picture", window=plotter.ren_win.GetClassName(), contrast=contrast, seconds=seconds)
     plotter.close()
 

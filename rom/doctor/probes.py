@@ -21,34 +21,21 @@ ONE_THREAD = {"OMP_NUM_THREADS": "1"}
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One thing looked at, a line of the report.
+    """One thing looked at, a line of the report."""
 
-    Attributes:
-        topic: heading it stands under.
-        name: what was looked at.
-        value: version, place or number found.
-        state: "ok"; "note": works, and could be better; "missing": a part of rom cannot be used;
-            "broken": installed or found, and does not work.
-        advice: what to type.
-    """
-
-    topic: str
+    topic: str  # heading it stands under
     name: str
-    value: str
-    state: str = "ok"
-    advice: str = ""
+    value: str  # version, place or number found
+    state: str = "ok"  # or "note": could be better; "missing": a part cannot be used; "broken"
+    advice: str = ""  # what to type
 
 
 @dataclass
 class Probe:
-    """A process that writes one JSON object with a name per line.
-
-    Attributes:
-        ending: "" after a good end, else what happened.
-    """
+    """A process that writes one JSON object with a name per line."""
 
     process: subprocess.Popen[bytes]  # noqa: TID251  a type
-    ending: str = ""
+    ending: str = ""  # what happened before a good end
 
     def answer(self) -> dict[str, dict[str, Any]]:
         """What the process found, by name."""
@@ -75,12 +62,7 @@ def say(name: str, **found: Any) -> None:
 def compiled(module: str, cases: Sequence[str]) -> Iterator[Finding]:
     """Let a module do its cases, each in a process of its own, as many at once as there are cores.
 
-    Args:
-        module: writes one JSON line for the case it is given, with functions and seconds.
-        cases: names.
-
-    Yields:
-        One finding per case as soon as it has ended.
+    It writes a JSON line with functions and seconds; one finding comes as soon as a case has ended.
     """
     cores, waiting = len(os.sched_getaffinity(0)), list(cases)
     running: dict[str, subprocess.Popen[bytes]] = {}  # noqa: TID251  a type

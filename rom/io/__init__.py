@@ -2,7 +2,7 @@
 
 `native` is the file of a body, an `archive`, as is all that stands for `bodies`; `export` picks one
 of `programs`, `sid`, `matrices`, `fields` or `fmu` by name, `history` writes motions. `files` are
-written whole, `ours` says which may be replaced, `claim` who writes in a folder, `hdf5` loads h5py
+written whole, `ours` says which may be replaced and keeps a folder for one run, `hdf5` loads h5py
 beside dolfinx.
 """
 

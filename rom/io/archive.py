@@ -34,17 +34,11 @@ MAX_BYTES = 4 * 1024**3  # that the arrays may have in memory before reading is 
 
 
 class Kind(NamedTuple):
-    """What a file must be.
+    """What a file must be."""
 
-    Attributes:
-        schemas: {schema: version} that can be read.
-        what: what to call such a file.
-        needed: arrays that must be there.
-    """
-
-    schemas: dict[str, tuple[int, int]]
-    what: str
-    needed: tuple[str, ...]
+    schemas: dict[str, tuple[int, int]]  # {schema: version} that can be read
+    what: str  # what to call such a file
+    needed: tuple[str, ...]  # arrays that must be there
 
 
 def write_archive(
@@ -107,8 +101,7 @@ def _checked(path: Path, kind: Kind, limit: int) -> tuple[dict[str, Any], dict[s
     """Manifest and arrays as they are."""
     try:
         with zipfile.ZipFile(path) as archive:
-            _refuse_oversize(archive, limit)
-            _refuse_paths(archive)
+            _refuse_hostile(archive, limit)
             manifest = _read_manifest(archive, kind)
             names = sorted(_digests(manifest, kind))
             _refuse_missing(archive, names)
@@ -137,20 +130,17 @@ def digest(A: Array) -> str:
     return hashlib.sha256(f"{A.dtype.str}{A.shape}".encode() + A.tobytes()).hexdigest()
 
 
-def _refuse_paths(archive: zipfile.ZipFile) -> None:
-    """Whoever unpacks such a file by other means would write elsewhere."""
-    for name in archive.namelist():
-        if name.startswith("/") or "\\" in name or ".." in name.split("/"):
-            raise UnsafeFileError(f"the member {name[:60]!r} leads elsewhere.")
-
-
-def _refuse_oversize(archive: zipfile.ZipFile, limit: int) -> None:
+def _refuse_hostile(archive: zipfile.ZipFile, limit: int) -> None:
+    """What fills the memory, or is written elsewhere by whoever unpacks it by other means."""
     total = sum(info.file_size for info in archive.infolist())
     if total > limit:
         raise UnsafeFileError(
             f"the file unpacks to {total / 1e9:.2f} GB, above the limit of {limit / 1e9:.2f} GB.",
             hint="If it is yours, pass a larger limit to load.",
         )
+    for name in archive.namelist():
+        if name.startswith("/") or "\\" in name or ".." in name.split("/"):
+            raise UnsafeFileError(f"the member {name[:60]!r} leads elsewhere.")
 
 
 def _refuse_missing(archive: zipfile.ZipFile, names: list[str]) -> None:

@@ -18,8 +18,7 @@ from rom.io.programs.exudyn import write_exudyn
 from rom.io.programs.interface_form import InterfaceForm, interface_form
 from rom.io.programs.mbdyn import write_mbdyn
 from rom.io.programs.openfast import write_openfast
-from rom.io.programs.radioss import write_radioss
-from rom.io.programs.simscape import write_simscape
+from rom.io.programs.superelements import write_radioss, write_simscape
 from rom.io.sid.body import sid_body, standard_input
 from rom.io.sid.dialect import read_sid
 from rom.io.sid.format import write_sid
@@ -121,11 +120,7 @@ def export(
 
 
 def format_of(path: str | Path, to: str | None = None) -> str:
-    """The name of the format that a file will have.
-
-    Raises:
-        ConfigError: listing what is known.
-    """
+    """The name of the format that a file will have."""
     if to is not None:
         return one_of("format", to, FORMATS)
     ending = Path(path).suffix.lower()

@@ -46,11 +46,7 @@ def write_whole(path: str | Path, content: bytes | Callable[[IO[bytes]], object]
 
 
 def check_writable(path: str | Path) -> Path:
-    """The path, if a file of that name can be written; to be asked before a long computation.
-
-    Raises:
-        ConfigError: if the folder does not exist or may not be written, or the name is a folder.
-    """
+    """The path, if a file of that name can be written; to be asked before a long computation."""
     path = Path(path)
     _check_possible(path)
     if path.is_dir():
@@ -79,11 +75,7 @@ def _check_possible(path: Path) -> None:
 
 
 def check_last_line(path: Path) -> None:
-    """For programs that end every line: a number that is cut would still be a number.
-
-    Raises:
-        FileFormatError: if the file is missing or empty, or its last line is not ended.
-    """
+    """For programs that end every line: a number that is cut would still be a number."""
     with check_readable(path).open("rb") as file:
         size = file.seek(0, os.SEEK_END)
         file.seek(max(size - 1, 0))

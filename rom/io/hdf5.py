@@ -8,16 +8,10 @@ from rom.errors import ResourceError
 
 
 def h5py(otherwise: str) -> Any:
-    """The module.
+    """The module; otherwise is the ending of files that do without.
 
     Wheels of h5py and dolfinx bring an HDF5 each. From ``dolfinx.fem.petsc`` on, every library of
     the process sees that of dolfinx, and h5py refuses it; loaded before, h5py keeps its own.
-
-    Args:
-        otherwise: ending of files that do without.
-
-    Raises:
-        ResourceError: if h5py is missing, or does not load beside what is there.
     """
     try:
         return import_module("h5py")

@@ -27,19 +27,12 @@ ENERGIES = ("kinetic", "strain", "potential", "drives", "forces", "damping", "to
 
 @dataclass(frozen=True, slots=True)
 class Channel:
-    """One quantity over time.
+    """One quantity over time."""
 
-    Attributes:
-        path: where it stands, outermost first, e.g. ("bodies", "rod", "position").
-        unit: its unit; a comma separates those of the columns when they differ.
-        columns: name of each column.
-        values: (n_t, c) its history.
-    """
-
-    path: tuple[str, ...]
-    unit: str
-    columns: tuple[str, ...]
-    values: Array
+    path: tuple[str, ...]  # outermost first, e.g. ("bodies", "rod", "position")
+    unit: str  # a comma separates those of columns that differ
+    columns: tuple[str, ...]  # their names
+    values: Array  # (n_t, c)
 
 
 @typed
@@ -195,13 +188,7 @@ def _head(found: tuple[Channel, ...]) -> list[str]:
 
 
 def table(head: list[str], values: Array, number: str) -> bytes:
-    """Text of a table, its head with commas and quotes in names as CSV has them.
-
-    Args:
-        head: (c,) names of the columns.
-        values: (n, c) numbers.
-        number: how one is written, e.g. "%.10g".
-    """
+    """Text of a table (n, c) below its head, with commas and quotes in names as CSV has them."""
     text = io.StringIO()
     text.write(",".join(map(csv_cell, head)) + "\n")
     np.savetxt(text, values, number, ",")

@@ -4,7 +4,7 @@ The manifest is a JSON text stored as bytes: schema and version, units, names, p
 certificate, and the SHA-256 of every array. A reader needs NumPy and this page only.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
@@ -81,44 +81,41 @@ def _check_numbers(manifest: dict[str, Any], arrays: dict[str, Array]) -> None:
 
 def body_arrays(body: FlexibleBody) -> dict[str, Array]:
     """The arrays of a body by their names in the file."""
-    arrays = {name: getattr(body, name) for name in FIELDS}
-    arrays["mass"] = np.array(body.mass)
-    for name, A in body.K_geo.items():
-        arrays[f"K_geo/{name}"] = A
     if isinstance(body.quartic, Sampled):
         raise ConfigError(
             f"body {body.name!r} has the energy of sampled elements, which no file holds.",
             hint="Reduce it where it is used, or leave sampling out.",
         )
-    if body.quartic is not None:
-        arrays |= {f"quartic/{part}": getattr(body.quartic, part) for part in QUARTIC_ARRAYS}
+    arrays = _parts("", body, (*FIELDS, "mass"))
+    arrays |= {f"K_geo/{name}": A for name, A in body.K_geo.items()}
+    arrays |= _parts("quartic/", body.quartic, QUARTIC_ARRAYS)
     for i, marker in enumerate(body.markers.values()):
-        for part in MARKER_ARRAYS:
-            arrays[f"marker/{i}/{part}"] = getattr(marker, part)
-        arrays |= {f"marker/{i}/{part}": A for part, A in _patch_arrays(marker.patch).items()}
-        if marker.covariance is not None:
-            arrays[f"marker/{i}/covariance"] = marker.covariance
-    if body.surface is not None:
-        for part in SURFACE_ARRAYS:
-            arrays[f"surface/{part}"] = getattr(body.surface, part)
-    if body.stress is not None:
-        far = isinstance(body.stress, CauchyRecovery)
-        for part in CAUCHY_ARRAYS if far else ("points", "operator"):
-            arrays[f"stress/{part}"] = getattr(body.stress, part)
-        if body.stress.inertial is not None:
-            arrays["stress/inertial"] = body.stress.inertial
+        place = f"marker/{i}/"
+        arrays |= _parts(place, marker, MARKER_ARRAYS) | _patch_arrays(place, marker.patch)
+        arrays |= _parts(place, marker, ("covariance",))
+    far = isinstance(body.stress, CauchyRecovery)
+    arrays |= _parts("surface/", body.surface, SURFACE_ARRAYS)
+    arrays |= _parts(
+        "stress/", body.stress, (*(CAUCHY_ARRAYS if far else ("points", "operator")), "inertial")
+    )
     return {
         n: np.asarray(A, dtype=np.int64 if A.dtype.kind == "i" else float)
         for n, A in arrays.items()
     }
 
 
-def _patch_arrays(patch: Patch | None) -> dict[str, Array]:
+def _parts(place: str, thing: Any, names: Sequence[str]) -> dict[str, Array]:
+    """Arrays of a record by their names in the file, of those that it has."""
+    found = ((name, getattr(thing, name, None)) for name in names)
+    return {f"{place}{name}": np.asarray(A) for name, A in found if A is not None}
+
+
+def _patch_arrays(place: str, patch: Patch | None) -> dict[str, Array]:
     if patch is None:
         return {}
     S = coo_matrix(patch.surface_mass)
-    arrays = {"points": patch.points, "area": S.data, "area_nodes": np.array([S.row, S.col])}
-    return arrays if patch.shapes is None else arrays | {"shapes": patch.shapes}
+    area = {f"{place}area": S.data, f"{place}area_nodes": np.array([S.row, S.col])}
+    return _parts(place, patch, ("points",)) | area | _parts(place, patch, ("shapes",))
 
 
 def _patch(arrays: dict[str, Array], place: str) -> Patch | None:
@@ -184,11 +181,7 @@ def body_of(manifest: dict[str, Any], arrays: dict[str, Array]) -> FlexibleBody:
 
 
 def report_of(entry: dict[str, Any] | None) -> Report | None:
-    """The report of a manifest, each row judged anew by its value and its limit.
-
-    Raises:
-        ValueError: for a row that is none, see `stated`.
-    """
+    """The report of a manifest, each row judged anew by its value and its limit."""
     if entry is None:
         return None
     rows = tuple(Row(**row) for row in entry["rows"])

@@ -37,34 +37,21 @@ MPI_VARIABLES = ("OMPI_", "PMIX_", "PMI_", "MPI_", "PRTE_", "HYDRA_", "SLURM_")
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """What a child may take; 0 for no limit.
+    """What a child may take; 0 for no limit."""
 
-    Attributes:
-        seconds: time by the clock [s].
-        processor: time of the processor [s].
-        memory: address space [bytes].
-    """
-
-    seconds: float = 0.0
-    processor: int = 0
-    memory: int = 0
+    seconds: float = 0.0  # by the clock [s]
+    processor: int = 0  # time of the processor [s]
+    memory: int = 0  # address space [bytes]
 
 
 @dataclass(frozen=True, slots=True)
 class Ended:
-    """How a child ended and what it said.
+    """How a child ended and what it said."""
 
-    Attributes:
-        code: its exit code; below zero the number of the signal that ended it.
-        out: its standard output.
-        err: its standard error.
-        overtime: whether it was ended because its time by the clock was over.
-    """
-
-    code: int
+    code: int  # exit code; below zero the number of the signal that ended it
     out: str = ""
     err: str = ""
-    overtime: bool = False
+    overtime: bool = False  # whether its time by the clock was over
 
     @property
     def last(self) -> str:
@@ -92,15 +79,8 @@ def run(
 ) -> Ended:
     """Run a command to its end; whatever interrupts this process ends the child with all its own.
 
-    Args:
-        command: program and arguments; see `python`.
-        folder: where it runs; here by default.
-        limits: what it may take.
-        variables: of its environment, beside those of this process.
-        given: bytes on its standard input, which is empty without.
-
-    Raises:
-        OSError: if there is no such program.
+    In a folder, here by default, within limits, with variables beside those of this process, and
+    with bytes given to its standard input, which is empty without.
     """
     limits = limits or Limits()
     with terminable():
@@ -167,11 +147,7 @@ def _end(process: subprocess.Popen[bytes]) -> None:
 
 
 def environment(*, own: bool = True) -> dict[str, str]:
-    """Variables of a child.
-
-    Args:
-        own: whether it runs modules of rom; other programs are not shown where rom lies.
-    """
+    """Variables of a child; programs that are not our own are not shown where rom lies."""
     kept = {k: v for k, v in os.environ.items() if not k.startswith(MPI_VARIABLES)}
     given = [p for p in kept.pop("PYTHONPATH", "").split(os.pathsep) if os.path.isabs(p)]
     if own and os.path.basename(ROOT_FOLDER) not in INSTALL_FOLDERS:
@@ -182,14 +158,7 @@ def environment(*, own: bool = True) -> dict[str, str]:
 
 @contextmanager
 def scratch(kind: str) -> Iterator[Path]:
-    """A folder for the files of a child, removed whatever happens.
-
-    Args:
-        kind: one word of its name.
-
-    Raises:
-        ResourceError: whatever failed inside, if the temporary folder is full.
-    """
+    """A folder for the files of a child, its kind a word of its name, removed whatever happens."""
     made: tuple[Path, int] | None = None
     with terminable():
         try:

@@ -41,11 +41,7 @@ def version(program: str) -> str:
 
 
 def mpirun(n: int) -> list[str]:
-    """What stands before a command that runs as n processes, also on fewer cores.
-
-    Raises:
-        ResourceError: if no launcher is installed.
-    """
+    """What stands before a command that runs as n processes, also on fewer cores."""
     program = found()
     if not program:
         raise ResourceError(

@@ -18,11 +18,7 @@ TIME_FORMAT = "{percentage:3.0f}%|{bar}| {desc} [{elapsed}<{remaining}]"
 
 
 class Progress:
-    """A line of progress, written over itself.
-
-    Args:
-        total: amount of all work.
-    """
+    """A line of progress, written over itself."""
 
     def __init__(self, total: float):
         self.total = total
@@ -72,15 +68,9 @@ def in_silence(label: str) -> None:
 
 @contextmanager
 def stages(total: int, begun: int = 0, *, long: bool = True) -> Iterator[Callable[[str], None]]:
-    """Around work in stages, of which each is named where it begins; silent where nobody looks.
+    """Around work in stages, begun of which had a line before; silent where nobody looks.
 
-    Args:
-        total: number of stages.
-        begun: number of those that have had a line before.
-        long: whether the work is long enough for a line of progress.
-
-    Yields:
-        What takes the name of a stage at its begin.
+    Gives what takes the name of a stage at its begin.
     """
     if not (long and looked_for()):
         yield in_silence
@@ -100,13 +90,7 @@ def stages(total: int, begun: int = 0, *, long: bool = True) -> Iterator[Callabl
 
 @contextmanager
 def followed(total: int, label: str, done: Callable[[], int]) -> Iterator[None]:
-    """Around waiting for another process, whose progress is asked for now and then.
-
-    Args:
-        total: amount of its work.
-        label: what it does.
-        done: gives the amount that is done.
-    """
+    """Around waiting for another process, whose progress is asked for now and then."""
     if total < 2 or not looked_for():
         yield
         return

@@ -2,8 +2,9 @@
 
 import json
 import os
-import subprocess
 import sys
+from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,11 +12,16 @@ from numpy.testing import assert_allclose
 from scipy.linalg import eigh
 
 import rom
-from benchmarks import benchmarks, updating, wheel
+from benchmarks import benchmarks, two_stages, updating, wheel
+from benchmarks import large_deflection as bench
 from benchmarks.models import planetary_train, shaft_in_films
-from cases.command import python
+from benchmarks.peers import compare, spin_up
+from cases.command import python, ran
 from cases.paths import ROOT
 from cases.solid import block
+from rom import rotation
+from rom.components.cosserat import straight
+from rom.components.wind.wind_turbine import ramp
 from rom.eigen.verbs import rigid_motions
 
 pytestmark = pytest.mark.once
@@ -118,10 +124,8 @@ def test_other_programs_reduce_the_same_model(bar, tmp_path):
 
     file = tmp_path / "matrices.npz"
     save_matrices(bar, str(file), tuple(benchmarks.KINDS))
-    done = subprocess.run(
-        [sys.executable, str(SCRIPT_FILE), str(file), "superlu", "rbe2", "8"],
-        capture_output=True, text=True, timeout=600, check=True,
-    )  # fmt: skip
+    words = file, "superlu", "rbe2", 8
+    done = ran(sys.executable, SCRIPT_FILE, *words, timeout=600, check=True)
     found = json.loads(done.stdout)
     body = rom.reduce(bar, method=rom.CraigBampton(8), interfaces=benchmarks.KINDS, certify=False)
     assert_allclose(found["frequencies"], body.frequencies()[6:16], rtol=1e-8)
@@ -178,3 +182,88 @@ def test_compiled_loops_are_timed_on_motions_that_are_right():
     assert 5.5 < figures["Taylor's bar: radius of its foot"].value < 7.1
     assert figures["gallery: largest error of them"].value < 0.01
     assert figures["power curve of the 5 MW turbine: largest power"].value == pytest.approx(5)
+
+
+def test_rods_and_their_beams_are_the_bar_of_the_paper(monkeypatch):
+    """Kane, Ryan and Banerjee: EA = 2.8e7 N, EI = 1.4e4 N m^2, 1.2 kg/m, 10 m."""
+    given = spin_up.beams(4)
+    assert given["stiffness"][0][0] == 2.8e7 and given["stiffness"][0][4:] == [1.4e4] * 2
+    assert_allclose([sum(given["length"]), np.dot(given["mass"], given["length"])], [10, 12])
+    along, across, _ = rotation.matrix(np.array(given["nodes"][2][3:])).T
+    assert_allclose(given["nodes"][2][:3], [0, 5, 0])
+    assert_allclose(along, [0, 1, 0], atol=1e-12)
+    assert_allclose(across, [-1, 0, 0], atol=1e-12)
+    made = {}
+    monkeypatch.setattr(spin_up, "straight", lambda *a, **k: made.update(k) or straight(*a, **k))
+    mech = bench.Mechanism()
+    spin_up.rod(4)(mech)
+    first = [2, 0, 1]
+    assert np.array(made["stretch"])[first].tolist() == given["stiffness"][0][:3]
+    assert np.array(made["bend"])[first].tolist() == given["stiffness"][0][3:]
+    assert np.array(made["inertia"])[first].tolist() == given["inertia"][0]
+    assert made["mass"] == given["mass"][0]
+    assert_allclose(made["frame"][:, 2], [1, 0, 0])
+
+
+def test_the_deflection_of_a_beam_is_read_from_the_places_of_its_tip(monkeypatch):
+    """A stiff bar has none; one that lags by 0.2 m has that."""
+    angle = ramp(spin_up.FINAL_SPEED, spin_up.RISE_TIME)[1]
+    t = np.linspace(0.0, spin_up.RISE_TIME, 31)
+    turned = [rotation.matrix(rotation.exp([angle(s), 0, 0])) for s in t]
+    tip = np.array([A @ [0, 10.0, -0.2] for A in turned])
+    assert_allclose(spin_up.lag(tip), -0.2, atol=1e-12)
+    described = {}
+
+    def answer(command):
+        described.update(json.loads(Path(command[2]).read_text()))
+        return {"tips": tip[:, None].tolist(), "seconds": 2.0, "version": "1"}
+
+    monkeypatch.setattr(compare, "interpreter", lambda: "python")
+    monkeypatch.setattr(compare, "answer_of", answer)
+    assert_allclose(spin_up.by_exudyn(4)[1], 1 - 0.2 / 0.57379)
+    assert described["steps"] == described["samples"] == 3000 and described["final"] == 6.0
+
+
+def test_a_rod_spins_up_as_the_exact_beam_does():
+    """The error falls with the square of the length of its segments."""
+    errors = [spin_up.spun_up(spin_up.rod(n), t_end=7.0).error for n in (8, 16)]
+    assert errors[1] < 1e-2 and 3 < errors[0] / errors[1] < 5
+
+
+@pytest.mark.long
+@pytest.mark.fenicsx
+@pytest.mark.filterwarnings("ignore:Number of integration points")
+def test_the_bar_of_a_few_cells_is_measured():
+    stocky = {"L": 1.0, "b": 0.2, "h": 0.1, "lc": 0.1}
+    rows = list(bench.measured(stocky, (8, 1), (10, 1), (8,), ()))
+    assert all(row[2] >= 0 for row in rows)
+    of_bodies = [row[2] for row in rows if "dofs by" in row[0] and "error" in row[1]]
+    assert len(of_bodies) == 2 and max(of_bodies) < 1e-2
+    assert len(rows) == 2 + 4 + 10 + 1 + 3
+
+
+@pytest.fixture(scope="module")
+def bodies():
+    """Of coarse meshes, once for each kind of rims."""
+    with pytest.MonkeyPatch.context() as coarse:
+        for sizes in (two_stages.HOUSING_SIZES, *two_stages.SHAFT_SIZES.values()):
+            coarse.setitem(sizes, "lc", 1.6 * sizes["lc"])
+        yield cache(two_stages.bodies)
+
+
+@pytest.mark.fenicsx
+@pytest.mark.long
+@pytest.mark.parametrize("tabulated", [False, True])
+def test_two_stages_carry_the_torque_and_the_weight(tabulated, bodies):
+    """Moments about the shafts are as the numbers of teeth, but for what the films take."""
+    mech = two_stages.machine(bodies("rbe3"), (60, 4), tabulated=tabulated)
+    still = rom.mbs.snapshot(mech, rom.equilibrium(mech))
+    films = sum(still.journal_bearing(name).power[0] for name in mech.journal_bearings)
+    output, ratio = two_stages.INPUT_TORQUE, 1.0
+    for name, pair in zip(mech.gear_meshes, two_stages.WHEEL_PAIRS.values(), strict=True):
+        force = rom.mbs.tooth_loads(still, name)[0].force.sum()
+        ratio *= pair.teeth[0] / pair.teeth[1]
+        moment = force * pair.rb[1] * ratio
+        lost = films / two_stages.SHAFT_SPEED
+        assert -1e-6 * output < moment - output < lost
+    assert 10.0 < films < 2000.0

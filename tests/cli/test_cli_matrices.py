@@ -15,13 +15,8 @@ from rom.cli.matrices import labels, source
 from rom.errors import ConfigError
 
 HERE = TESTS / "reference" / "foreign"
-CALCULIX = (
-    HERE / "calculix.sti",
-    "--mass",
-    HERE / "calculix.mas",
-    "--nodes",
-    HERE / "calculix.inp",
-)
+CALCULIX = (HERE / "calculix.sti", "--mass", HERE / "calculix.mas", "--nodes",
+            HERE / "calculix.inp")  # fmt: skip
 NASTRAN = (f"{HERE / 'dense.op4'}:KAA", "--mass", f"{HERE / 'dense.op4'}:maa", "--nodes",
            HERE / "brick.bdf")  # fmt: skip
 SETS = ("--set", "root=3,7,12,20", "--set", "tip=41, 55,60-60,101")

@@ -66,13 +66,6 @@ def folder(bar, tmp_path, monkeypatch):
     return tmp_path
 
 
-def refusal(text, tmp_path):
-    (tmp_path / "part.toml").write_text(text)
-    with pytest.raises(ConfigError) as refused:
-        read_component(tmp_path / "part.toml")
-    return str(refused.value).replace(f"{tmp_path}/", "")
-
-
 def test_the_body_is_that_of_python(folder, bar):
     body = read_component("bar.toml").body()
     same = rom.reduce(
@@ -160,39 +153,34 @@ def test_a_changed_value_stands_in_for_the_one_of_the_file(tmp_path):
     assert part.material().E == 70e9
 
 
-MISTAKES = {
-    "wrong dimension": (
-        SOLID.replace('"210 GPa"', '"210 mm"'),
-        "part.toml:9: material.E: '210 mm' is a length; a pressure or stress [Pa] is wanted.",
-    ),
-    "misspelt key": (
-        SOLID.replace("nu =", "nuu ="),
-        "part.toml:8: 2 mistakes. line 8: nu is missing in [material]. "
-        "line 10: there is no key 'nuu' in [material].",
-    ),
-    "misspelt table": (
-        SOLID.replace("[geometry.", "[geometri."),
-        "part.toml:4: there is no key 'geometri'. Did you mean geometry?",
-    ),
-    "twice": (
-        SOLID.replace("nu = 0.3", 'E = "70 GPa"'),
-        "part.toml:10: 'material.E' is given twice, in lines 9 and 10. Keep one of them.",
-    ),
-    "no text": (SOLID.replace('"mm"', "mm"), "part.toml:3: this is no TOML: invalid value."),
-    "number for a table": ("material = 3\n", "part.toml:1: material = 3: needed is a table"),
-    "kind": ('[interfaces]\nbore = { kind = "polynomal", order = 3 }\n',
-             "part.toml:2: interfaces.bore.kind = 'polynomal' does not exist. Did you mean "
-             "polynomial?"),
-    "kind missing": ("[interfaces]\nbore = { order = 3 }\n", "missing in [interfaces.bore]"),
-    "negative count": ("[reduction]\nmodes = -1\n", "must be a whole number from 0"),
-    "a mechanism": ("[bodies.a]\n", "part.toml:1: this is a mechanism; a component is needed"),
+HELD = '[interfaces]\na = "rbe2"\n'
+MISTAKES = {  # what stands in the file, what instead, and what is said
+    "wrong dimension": ('"210 GPa"', '"210 mm"', "part.toml:9: material.E: '210 mm' is a length; "
+                        "a pressure or stress [Pa] is wanted."),
+    "misspelt key": ("nu =", "nuu =", "part.toml:8: 2 mistakes. line 8: nu is missing in [material]"
+                     ". line 10: there is no key 'nuu' in [material]."),
+    "misspelt table": ("[geometry.", "[geometri.",
+                       "part.toml:4: there is no key 'geometri'. Did you mean geometry?"),
+    "twice": ("nu = 0.3", 'E = "70 GPa"', "part.toml:10: 'material.E' is given twice, in lines 9 "
+              "and 10. Keep one of them."),
+    "no text": ('"mm"', "mm", "part.toml:3: this is no TOML: invalid value."),
+    "number for a table": (SOLID, "material = 3\n", "part.toml:1: material = 3: needed is a table"),
+    "kind": (SOLID, HELD.replace('"rbe2"', '{ kind = "polynomal", order = 3 }'),
+             "part.toml:2: interfaces.a.kind = 'polynomal' does not exist. Did you mean poly"),
+    "kind missing": (SOLID, HELD.replace('"rbe2"', "{ order = 3 }"), "missing in [interfaces.a]"),
+    "negative count": (SOLID, "[reduction]\nmodes = -1\n", "must be a whole number from 0"),
+    "a mechanism": (SOLID, "[bodies.a]\n",
+                    "part.toml:1: this is a mechanism; a component is needed"),
 }  # fmt: skip
 
 
 @pytest.mark.parametrize("case", MISTAKES)
 def test_a_mistake_is_told_with_file_and_line(case, tmp_path):
-    text, expected = MISTAKES[case]
-    assert expected in refusal(text, tmp_path)
+    old, new, expected = MISTAKES[case]
+    (tmp_path / "part.toml").write_text(SOLID.replace(old, new))
+    with pytest.raises(ConfigError) as refused:
+        read_component(tmp_path / "part.toml")
+    assert expected in str(refused.value).replace(f"{tmp_path}/", "")
 
 
 def test_missing_and_unreadable_files(tmp_path):
@@ -212,17 +200,14 @@ def test_missing_and_unreadable_files(tmp_path):
         ("", "neither geometry nor matrices"),
         (SOLID + '[matrices]\nstiffness="a"\nmass="b"\nnodes="c.csv"\n', "both geometry and"),
         (SOLID, "the component has no interface"),
-        (SOLID + '[interfaces]\na = "rbe4"\n', "part.toml:13: interface 'a' has the kind 'rbe4'"),
-        (SOLID + '[interfaces]\na = "rbe2"\n[reduction]\nf_max = 10\nmethod = "rubin"\n',
+        (SOLID + HELD.replace("rbe2", "rbe4"), "part.toml:13: interface 'a' has the kind 'rbe4'"),
+        (SOLID + HELD + '[reduction]\nf_max = 10\nmethod = "rubin"\n',
          "part.toml:14: f_max belongs to craig-bampton, not to rubin"),
-        (SOLID + '[interfaces]\na = "rbe2"\n[reduction]\nf_max = 10\nmodes = 3\n',
+        (SOLID + HELD + "[reduction]\nf_max = 10\nmodes = 3\n",
          "craig-bampton has f_max; leave modes out"),
-        (SOLID + '[interfaces]\na = "rbe2"\n[damping]\nalpha = 1\nratio = 1\n',
-         "part.toml:14: [damping] needs either ratio"),
-        (SOLID + '[interfaces]\na = "rbe2"\n[damping]\nalpha = 1\nfixed = ["a"]\n',
-         "part.toml:14: [damping] needs either ratio"),
-        (SOLID.replace("nu = 0.3", "nu = 0.7") + '[interfaces]\na = "rbe2"\n',
-         "part.toml:8: nu = 0.7 is outside"),
+        (SOLID + HELD + "[damping]\nalpha = 1\nratio = 1\n", "part.toml:14: [damping] needs eit"),
+        (SOLID + HELD + '[damping]\nalpha = 1\nfixed = ["a"]\n', "part.toml:14: [damping] needs"),
+        (SOLID.replace("nu = 0.3", "nu = 0.7") + HELD, "part.toml:8: nu = 0.7 is outside"),
     ],
 )  # fmt: skip
 def test_what_contradicts_itself_is_told_before_anything_is_meshed(text, words, tmp_path):

@@ -98,7 +98,7 @@ def test_forces_of_length_and_rate_balance_their_energy(expression, lost, tmp_pa
 
 def test_a_force_of_the_time_is_an_applied_force(tmp_path):
     """m x'' = F sin(w t) from rest: x = F (w t - sin w t) / m w^2."""
-    law = '[laws.s]\nbetween = ["ground.wall", "block.p"]\nexpression = "3*sin(20*t)"\n'
+    law = f'{LINE}expression = "3*sin(20*t)"\n'
     file = file_of(tmp_path, BLOCK + law, t_end=0.5, dt=5e-4)
     made = file.mechanism()
     assert not made.laws["s"].stores and rom.check_law(made, "s").ok
@@ -389,26 +389,24 @@ def test_what_is_wrong_with_a_python_file_is_told(case, tmp_path):
     assert message in str(refused.value)
 
 
+LINE = '[laws.s]\nbetween = ["ground.wall", "block.p"]\n'
+MOTOR = '[motors.m]\njoint = "guide"\nlaw = '
+EVENT = '[events.e]\nkind = "coordinate"\njoint = "guide"\nvalue = 1\n'
 MISTAKES = {
-    "unknown name": ('[motors.m]\njoint = "guide"\nlaw = { expression = "3*y" }\n',
+    "unknown name": (MOTOR + '{ expression = "3*y" }\n',
                      "m.toml:16: motors.m.law.expression: there is no 'y'.\n    3*y\n      ^"),
-    "x in a drive": ('[drives.m]\njoint = "guide"\nlaw = { expression = "x" }\n', "no 'x'"),
-    "constant that is a function": (
-        '[motors.m]\njoint = "guide"\nlaw = { expression = "1", constants = { sin = 2 } }\n',
-        "'sin' cannot be a constant"),
-    "law without force": ('[laws.s]\nbetween = ["ground.wall", "block.p"]\n',
-                          "kind is missing in [laws.s]"),
-    "line without length": ('[laws.s]\nbetween = [{ ground = [1.1, 0, 0] }, "block.p"]\n'
-                            'expression = "x"\n', "are in one place at the start"),
-    "falling lengths": ('[laws.s]\nbetween = ["ground.wall", "block.p"]\nx = [2, 1]\n'
-                        "values = [1, 2]\n", "must ascend"),
-    "lengths and values": ('[laws.s]\nbetween = ["ground.wall", "block.p"]\nx = [2, 1]\n'
-                           "values = [1]\n", "needs two lengths"),
-    "event of nothing": ('[events.e]\nkind = "distance"\nbetween = ["ground.wall", "block.p"]\n',
+    "x in a drive": (MOTOR.replace("motors", "drives") + '{ expression = "x" }\n', "no 'x'"),
+    "constant that is a function": (MOTOR + '{ expression = "1", constants = { sin = 2 } }\n',
+                                    "'sin' cannot be a constant"),
+    "law without force": (LINE, "kind is missing in [laws.s]"),
+    "line without length": (LINE.replace('"ground.wall"', "{ ground = [1.1, 0, 0] }")
+                            + 'expression = "x"\n', "are in one place at the start"),
+    "falling lengths": (LINE + "x = [2, 1]\nvalues = [1, 2]\n", "must ascend"),
+    "lengths and values": (LINE + "x = [2, 1]\nvalues = [1]\n", "needs two lengths"),
+    "event of nothing": (LINE.replace("laws.s", "events.e") + 'kind = "distance"\n',
                          "has no value it passes"),
-    "event of two": ('[events.e]\nkind = "coordinate"\njoint = "guide"\nvalue = 1\n'
-                     'expression = "x"\n', "has both a value and an expression"),
-    "unknown joint of an event": ('[events.e]\nkind = "coordinate"\njoint = "guid"\nvalue = 1\n',
+    "event of two": (EVENT + 'expression = "x"\n', "has both a value and an expression"),
+    "unknown joint of an event": (EVENT.replace("guide", "guid"),
                                   "no joint 'guid'. Did you mean guide?"),
     "spread over a rigid body": ('[spread_loads.p]\nbody = "block"\nacceleration = [0, 0, 1]\n',
                                  "no flexible body 'block'"),

@@ -237,16 +237,17 @@ def test_a_mistake_is_told_with_file_and_line(case, tmp_path):
     assert expected in str(refused.value).replace(f"{tmp_path}/", "")
 
 
+DRIVE = '[drives.m]\njoint = "pivot"\nlaw = '
 JOINTED = {
-    "unknown joint": ('[drives.m]\njoint = "pivto"\nlaw = 1\n',
+    "unknown joint": (DRIVE.replace("pivot", "pivto") + "1\n",
                       "there is no joint 'pivto'. Did you mean pivot?"),
-    "a way for an angle": ('[drives.m]\njoint = "pivot"\nlaw = "1 m"\n',
+    "a way for an angle": (DRIVE + '"1 m"\n',
                            "drives.m.law: '1 m' is a length; an angle [rad] is wanted"),
-    "short table": ('[drives.m]\njoint = "pivot"\nlaw = { kind = "table", t = [0, 0.1], values = '
-                    "[0, 1] }\n", "cover 0 s to 0.1 s; the run needs 0 s to 0.5 s"),
-    "table that falls": ('[drives.m]\njoint = "pivot"\nlaw = { kind = "table", t = [0, 2, 1], '
-                         "values = [0, 1, 2] }\n", "must ascend"),
-    "name twice": ('[drives.pivot]\njoint = "pivot"\nlaw = 1\n', "the name 'pivot' is used twice"),
+    "short table": (DRIVE + '{ kind = "table", t = [0, 0.1], values = [0, 1] }\n',
+                    "cover 0 s to 0.1 s; the run needs 0 s to 0.5 s"),
+    "table that falls": (DRIVE + '{ kind = "table", t = [0, 2, 1], values = [0, 1, 2] }\n',
+                         "must ascend"),
+    "name twice": (DRIVE.replace(".m", ".pivot") + "1\n", "the name 'pivot' is used twice"),
     "stop without limit": ('[stops.m]\njoint = "pivot"\nstiffness = 1\n', "has no limit"),
     "missing file": ('[bodies.x]\nfile = "nope.rom.npz"\n', "nope.rom.npz"),
 }  # fmt: skip

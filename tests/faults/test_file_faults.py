@@ -1,4 +1,4 @@
-"""Damaged and hostile files of every reader of `rom.io`: typed errors that name the file."""
+"""Damaged and hostile files: a typed error, a model or a mechanism, never a crash."""
 
 import os
 import shutil
@@ -11,19 +11,21 @@ from scipy.sparse import random as random_matrix
 
 import rom
 from cases.files.damage import ARCHIVES, damaged, outcome
+from cases.files.toml_files import ALL, CRANK, MORE, PENDULUM, SOLID
 from cases.mbs.mechanisms import random_body
 from cases.paths import TESTS
 from cases.solid import block, reduced
+from rom.config.component import read_component
+from rom.config.mechanism import read_mechanism
 from rom.errors import ConfigError, FileFormatError
 from rom.io.export import read_body
 from rom.io.fields.universal import read_universal
-from rom.io.matrices.calculix import read_stored_matrix
 from rom.io.matrices.dmig import read_dmig, read_grids
-from rom.io.matrices.matrix_files import read_matrix, write_abaqus_matrix
+from rom.io.matrices.matrix_files import read_matrix, read_stored_matrix, write_abaqus_matrix
 from rom.io.matrices.node_files import read_node_sets, read_nodes
 from rom.io.matrices.op4 import read_op4
 from rom.io.matrices.user_element import read_user_element
-from rom.io.programs.openfast_reading import read_openfast
+from rom.io.programs.openfast import read_openfast
 from rom.io.sid.dialect import read_sid
 
 HERE = TESTS / "reference" / "foreign"
@@ -218,3 +220,22 @@ HUGE = "9" * 20  # no eight bytes hold it
 def test_labels_that_fit_no_integer_are_refused(name, content, read, tmp_path):
     (tmp_path / name).write_text(content)
     assert isinstance(outcome(read, tmp_path / name), FileFormatError)
+
+
+def part(path):
+    component = read_component(path)
+    assert component.mesh and component.material()
+
+
+@pytest.mark.parametrize(
+    ("text", "read"),
+    [(SOLID, part), (PENDULUM, lambda path: read_mechanism(path).mechanism()),
+     (CRANK, read_mechanism), (ALL, read_mechanism), (MORE, read_mechanism)],
+    ids=["component", "pendulum", "crank", "everything", "more"],
+)  # fmt: skip
+def test_damage_of_a_description_is_refused_or_harmless(text, read, tmp_path):
+    path, found = tmp_path / "x.toml", []
+    for _, data in damaged(text.encode(), np.random.default_rng(8), 200):
+        path.write_bytes(data)
+        found.append(outcome(read, path, memory=None))
+    assert sum(isinstance(x, ConfigError) for x in found) > 50 and None in found

@@ -139,6 +139,13 @@ def test_a_geometry_that_does_more_is_refused(case, here):
     assert (here / name).read_text() == files[name]
 
 
+def be_blind(monkeypatch, more=""):
+    """Take the look at the text away."""
+    code = "import sys, rom.fe.mesh.sources.gmsh_session as g, rom.fe.mesh.child as c\n"
+    code += f"g.check_script = lambda path: None\n{more}\nc.main(sys.argv[1])"
+    monkeypatch.setattr(child, "python", lambda _, folder: [sys.executable, "-c", code, folder])
+
+
 @LINUX
 @pytest.mark.parametrize("case", few(6, [*STARTERS, *WRITERS]))
 def test_what_the_text_hides_the_process_cannot_do(case, here, monkeypatch):
@@ -147,10 +154,7 @@ def test_what_the_text_hides_the_process_cannot_do(case, here, monkeypatch):
     name = lay(files, here)
     if name == "box.py":
         return
-    blind = "import sys, rom.fe.mesh.sources.gmsh_session as g, rom.fe.mesh.child as c\n"
-    blind += "g.check_script = lambda path: None\ng.MSH_START = (b'',)\n"
-    blind += "c.main(sys.argv[1])"
-    monkeypatch.setattr(child, "python", lambda _, folder: [sys.executable, "-c", blind, folder])
+    be_blind(monkeypatch, "g.MSH_START = (b'',)")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RomWarning)
         try:
@@ -165,9 +169,7 @@ def test_what_the_text_hides_the_process_cannot_do(case, here, monkeypatch):
 @LINUX
 def test_a_process_killed_for_starting_another_is_called_unsafe(here, monkeypatch):
     lay(STARTERS["directly"], here)
-    blind = "import sys, rom.fe.mesh.sources.gmsh_session as g, rom.fe.mesh.child as c\n"
-    blind += "g.check_script = lambda path: None\nc.main(sys.argv[1])"
-    monkeypatch.setattr(child, "python", lambda _, folder: [sys.executable, "-c", blind, folder])
+    be_blind(monkeypatch)
     with pytest.raises(UnsafeFileError, match=r"^box\.geo: tries to start a process"):
         read_mesh("box.geo")
 

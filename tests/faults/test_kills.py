@@ -9,12 +9,13 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import suppress
 from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
 
-from cases.command import environment
+from cases.command import alive, environment, wait_until
 from cases.long import ROM_LONG, few
 from rom.process import child
 
@@ -57,12 +58,9 @@ def processes(mark):
     """Numbers of living processes that have the mark in their environment."""
     found = []
     for path in Path("/proc").glob("[0-9]*"):
-        try:
-            living = (path / "stat").read_text().rpartition(")")[2].split()[0] not in "ZX"
-            if living and mark in (path / "environ").read_bytes():
+        with suppress(OSError):
+            if alive(path.name) and mark in (path / "environ").read_bytes():
                 found.append(int(path.name))
-        except OSError:
-            pass
     return found
 
 
@@ -127,10 +125,7 @@ def test_a_signal_while_the_mesher_works_is_survived_by_nobody(number, tmp_path)
     command = [sys.executable, "-m", "rom", "mesh", "slow.geo"]
     process = subprocess.Popen(command, env=env, cwd=tmp_path, stdout=subprocess.DEVNULL,
                                stderr=subprocess.PIPE)  # fmt: skip
-    end = time.monotonic() + 30
-    while not any(map(meshes, processes(mark.encode()))):
-        assert time.monotonic() < end
-        time.sleep(0.02)
+    wait_until(lambda: any(map(meshes, processes(mark.encode()))), 30)
     time.sleep(0.3)  # now it reads the script
     process.send_signal(number)
     process.communicate(timeout=20)

@@ -8,7 +8,6 @@ import json
 import os
 import shutil
 import signal
-import subprocess
 import sys
 import tempfile
 import threading
@@ -23,7 +22,7 @@ import pytest
 
 import rom
 from cases.boxes import BOX_GEO
-from cases.command import ROOT, environment, python
+from cases.command import ROOT, alive, environment, python, ran
 from cases.long import ROM_LONG, few
 from cases.solid import block, reduced
 from rom.process import child
@@ -112,8 +111,7 @@ def test_no_verb_runs_what_lies_in_the_folder(verb, form, planted):
         for name in loaded_by_python():
             Path(f"{name}.py").unlink(missing_ok=True)
     # rom itself comes from its folder, named in full; the installed form needs no such thing
-    done = subprocess.run([*FORMS[form], verb, *VERBS[verb]], env=environment(), timeout=180,
-                          capture_output=True, text=True, check=False)  # fmt: skip
+    done = ran(*FORMS[form], verb, *VERBS[verb], env=environment())
     assert left(planted) == []
     assert "trapped" not in done.stdout + done.stderr
     assert done.returncode == 0 or verb in MAY_FAIL, done.stderr
@@ -170,7 +168,7 @@ def test_a_child_imports_where_no_settings_lie(planted, tmp_path):
 
 
 def test_the_traps_work(planted):
-    subprocess.run([sys.executable, "-c", "import gmsh"], check=False, capture_output=True)
+    ran(sys.executable, "-c", "import gmsh")
     assert left(planted) == ["gmsh"]
 
 
@@ -248,14 +246,6 @@ def test_a_child_that_ignores_the_polite_signal_ends_with_its_own_children(tmp_p
     assert len(pids) == 2 and not any(map(alive, pids))
 
 
-def alive(pid):
-    """Whether a process runs; one that only waits to be collected does not."""
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] not in "ZX"
-    except OSError:
-        return False
-
-
 def test_only_abandoned_folders_of_our_own_are_swept(tmp_path, monkeypatch):
     """By what a process killed by SIGKILL leaves, what lives, what others own, and links."""
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
@@ -264,7 +254,7 @@ def test_only_abandoned_folders_of_our_own_are_swept(tmp_path, monkeypatch):
         "with child.scratch('dead') as f: (f / 'x').touch(); os.kill(os.getpid(), signal.SIGKILL)"
     )
     env = environment(TMPDIR=str(tmp_path))
-    done = subprocess.run([sys.executable, "-c", code], env=env, check=False)
+    done = ran(sys.executable, "-c", code, env=env)
     assert done.returncode == -signal.SIGKILL
     (dead,) = tmp_path.glob("rom-dead-*")
     other = tmp_path / "rom-results"

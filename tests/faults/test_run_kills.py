@@ -26,11 +26,8 @@ mass = 1.0
 inertia = [0.1, 0.1, 0.1]
 at = [0.5, 0, 0]
 markers = { a = [-0.5, 0, 0], b = [0.5, 0, 0] }
-[bodies.two]
-mass = 1.0
-inertia = [0.1, 0.1, 0.1]
-at = [1.5, 0, 0]
-markers = { a = [-0.5, 0, 0] }
+[bodies]
+two = { mass = 1.0, inertia = [0.1, 0.1, 0.1], at = [1.5, 0, 0], markers = { a = [-0.5, 0, 0] } }
 [joints]
 hinge = { kind = "revolute", between = ["ground.place", "one.a"], axis = [0, 1, 0] }
 knee = { kind = "revolute", between = ["one.b", "two.a"], axis = [0, 1, 0] }

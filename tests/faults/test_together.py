@@ -14,17 +14,17 @@ import numpy as np
 import pytest
 
 import rom
-from cases.command import environment
+from cases.command import environment, ran, wait_until
 from cases.command import rom as command
 from cases.long import few
 from cases.paths import TESTS
 from cases.solid import block, reduced
 from rom.cli.main import main
 from rom.errors import ConfigError, ResourceError
-from rom.io.claim import LOCK_NAME, claimed
 from rom.io.files import write_whole
+from rom.io.ours import LOCK_NAME, claimed
 from rom.process.mpirun import found, mpirun
-from rom.process.turns import Turns
+from rom.process.patience import Turns
 from rom.report.html import paragraph, write_report
 
 pytestmark = pytest.mark.once
@@ -89,13 +89,6 @@ def test_a_writer_that_is_killed_leaves_the_file_of_the_other(tmp_path):
     os.kill(process.pid, signal.SIGKILL)
     process.join()
     assert path.read_bytes() == b"whole"
-
-
-def wait_until(true, seconds=20):
-    end = time.monotonic() + seconds
-    while not true():
-        assert time.monotonic() < end
-        time.sleep(0.01)
 
 
 def hold(folder):
@@ -248,8 +241,7 @@ def test_kernels_asked_for_by_several_processes_at_once_are_compiled_once_and_ke
     assert not any(process.returncode for process in run), said
     counts = [int(line.split()[1]) for out, _ in said for line in out.splitlines()]
     assert len(counts) == 3 and sum(counts) == 2
-    last = subprocess.run(command, env=environment(), text=True,
-                          capture_output=True, timeout=60, check=True)  # fmt: skip
+    last = ran(*command, env=environment(), check=True)
     assert last.stdout.split() == ["2", "0"], "the last one has nothing to compile"
 
 
@@ -337,12 +329,12 @@ def test_a_rank_has_one_thread_unless_the_user_chooses(numpy_comes, chosen):
     env = {k: v for k, v in environment().items() if not k.endswith("_NUM_THREADS")}
     env |= {} if chosen is None else {"OMP_NUM_THREADS": chosen}
     line = [sys.executable, "-c", THREADS, numpy_comes]
-    alone = subprocess.run(line, env=env, capture_output=True, text=True, timeout=60, check=True)
+    alone = ran(*line, env=env, check=True)
     if alone.stdout.strip() != "2" and not (alone.stdout.strip() and chosen is None):
         pytest.skip("this NumPy has another BLAS than OpenBLAS")
     # the environment tells a rank what it is; mpirun itself would bind it to one core
     rank = env | {"OMPI_COMM_WORLD_RANK": "0", "OMPI_COMM_WORLD_SIZE": "2"}
-    done = subprocess.run(line, env=rank, capture_output=True, text=True, timeout=60, check=True)
+    done = ran(*line, env=rank, check=True)
     assert done.stdout.strip() == (chosen or "1")
 
 

@@ -1,17 +1,20 @@
-"""Materials, errors and units."""
+"""Materials, errors, units and rotations: exact numbers, and refusals that name the dimension."""
 
+import itertools
+import math
 import pickle
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scipy.linalg import expm
 
 import rom
 from cases.solid import block
 from rom import rotation
 from rom.errors import ConfigError, MaterialError, MeshError
 from rom.model import Material, Orthotropic, Report, Row
-from rom.units import unit_system
+from rom.units import UNITS, in_si, unit_system
 
 WOOD = {"E": (12e9, 0.8e9, 0.5e9), "nu": (0.4, 0.4, 0.3), "G": (0.7e9, 0.6e9, 0.06e9), "rho": 450.0}
 
@@ -35,7 +38,7 @@ def test_message_for_an_orthotropic_stiffness_that_releases_energy():
         Orthotropic(**(WOOD | {"nu": (5.0, 0.4, 0.3)}))
     with pytest.raises(MaterialError, match="orthonormal rows"):
         Orthotropic(**WOOD, axes=np.ones((3, 3)))
-    with pytest.raises(MaterialError, match="E needs three numbers"):
+    with pytest.raises(MaterialError, match="E has shape"):
         Orthotropic(**(WOOD | {"E": (1.0, 2.0)}))
 
 
@@ -92,3 +95,104 @@ def test_modes_of_everything_are_one_record():
         assert modes.omega is omega and omega.shape == (8,)
         assert "8 modes" in repr(modes) and "frequency [Hz]" in modes._repr_html_()
     assert issubclass(rom.CyclicModes, rom.Modes) and issubclass(rom.TravellingModes, rom.Modes)
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "value"),
+    [
+        ("210 GPa", "Pa", 210e9),
+        ("4 mm", "m", 0.004),
+        ("5.5mm", "m", 0.0055),
+        ("7.85 g/cm^3", "kg/m^3", 7850.0),
+        ("7.85 t/m³", "kg/m^3", 7850.0),
+        ("1 N/mm^2", "Pa", 1e6),
+        ("2 kN/mm", "N/m", 2e6),
+        ("36 km/h", "m/s", 10.0),
+        ("9.81 m s^-2", "m/s^2", 9.81),
+        ("3 N m", "N m", 3.0),
+        ("3 Nm/rad", "N m/rad", 3.0),
+        ("3 N m", "N m/rad", 3.0),
+        ("180 deg", "rad", math.pi),
+        ("3000 rpm", "rad/s", 100 * math.pi),
+        ("1 rev/s", "rad/s", 2 * math.pi),
+        ("3 µm", "m", 3e-6),
+        ("3 μs", "s", 3e-6),
+        ("3 kHz", "Hz", 3000.0),
+        ("1 %", "1", 0.01),
+        ("2", "1", 2.0),
+        ("1 kg*mm^2", "kg m^2", 1e-6),
+        ("12 in", "m", 0.3048),
+        ("-1.5e-3 s", "s", -0.0015),
+        ("5 1/s", "1/s", 5.0),
+        ("1 lbf", "N", 4.4482216152605),
+    ],
+)
+def test_a_quantity_in_si(text, unit, value):
+    """Decimal units are exact: the nearest double of the true value, not of a product."""
+    assert in_si(text, unit) == (value if "rad" not in unit else pytest.approx(value, rel=1e-15))
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "words"),
+    [
+        ("210 mm", "Pa", "is a length; a pressure or stress [Pa] is wanted"),
+        ("50 Hz", "rad/s", "is a frequency; an angular speed [rad/s] is wanted"),
+        ("3 %", "rad", "is a number; an angle [rad] is wanted"),
+        ("30 deg", "1", "is an angle; a number without unit"),
+        ("1 m^5 kg", "N", "kg m^5; a force"),
+        ("210", "Pa", "has no unit; Pa is wanted"),
+        ("1 gpa", "Pa", "'gpa' in 'gpa' is no unit. Did you mean GPa?"),
+        ("1 N/m s", "N s/m", "several factors behind a /"),
+        ("3,5 mm", "m", "a decimal point is needed"),
+        ("steel", "Pa", "does not begin with a number"),
+        ("1e400 m", "m", "too large"),
+        ("1e9999999 m", "m", "is no unit"),
+        ("1 m^99", "m", "is no unit"),
+        ("1 m//s", "m/s", "is no unit"),
+    ],
+)
+def test_what_is_no_such_quantity_is_refused(text, unit, words):
+    with pytest.raises(ConfigError) as refused:
+        in_si(text, unit)
+    assert words in str(refused.value)
+
+
+def test_every_unit_is_understood_by_itself():
+    from rom.units import unit
+
+    for name, expected in UNITS.items():
+        found = unit(name)
+        assert found.dimension == expected.dimension and found.factor == expected.factor
+
+
+@pytest.fixture
+def vectors():
+    rng = np.random.default_rng(1)
+    return [rng.normal(size=3) for _ in range(20)] + [np.zeros(3), np.array([np.pi, 0, 0])]
+
+
+def test_skew_is_the_cross_product(vectors):
+    for a, b in itertools.pairwise(vectors):
+        assert_allclose(rotation.skew(a) @ b, np.cross(a, b))
+        assert_allclose(rotation.axial(rotation.skew(a)), a)
+
+
+def test_exp_matrix_and_log_agree_with_the_matrix_exponential(vectors):
+    for theta in vectors:
+        p = rotation.exp(theta)
+        assert_allclose(rotation.matrix(p), expm(rotation.skew(theta)), atol=1e-14)
+        back = rotation.matrix(rotation.exp(rotation.log(p)))
+        assert_allclose(back, rotation.matrix(p), atol=1e-14)
+
+
+def test_quaternion_is_found_for_every_largest_component():
+    for theta in [*(np.eye(3) * 3.0).tolist(), [0.1, 0.2, 0.3], [0, 0, 0]]:
+        A = expm(rotation.skew(theta))
+        assert_allclose(rotation.matrix(rotation.quaternion(A)), A, atol=1e-14)
+
+
+def test_product_of_quaternions_is_product_of_matrices(vectors):
+    for a, b in itertools.pairwise(vectors):
+        p, q = rotation.exp(a), rotation.exp(b)
+        product = rotation.matrix(rotation.multiply(p, q))
+        assert_allclose(product, rotation.matrix(p) @ rotation.matrix(q), atol=1e-14)

@@ -22,7 +22,6 @@ from rom.io.archive import Kind, read_archive, write_archive
 from rom.io.native import FIELDS, SCHEMA_NAME, VERSION, body_arrays, body_manifest
 from rom.names import MAX_CHARACTERS, check_name, check_text, file_name, inside, named, offered
 
-KINDS = {"root": "rbe2", "tip": "rbe2"}
 UNSEEN = ["a\0b", "a\nb", "a\rb", "a\x1b[2Jb", "\u202egnp.x", "a\u200bb", "a\u2028b", "\ud800",
           "x" * 300, "", " "]  # fmt: skip
 ELSEWHERE = ["../../x", "/etc/x", "a/b", "..", ".", "~root/x", "-rf", "a\\b", ".x", "x ", " x"]
@@ -135,27 +134,28 @@ def test_a_body_file_with_a_slash_in_an_interface_stays_readable(body, tmp_path)
     assert rom.load(forged(body, tmp_path / "b.npz", "b", "pin/a")).interface_names[0] == "pin/a"
 
 
-GIVEN = {
-    "reduce": lambda name, body: rom.reduce(
-        block(cells=(1, 1, 1)), method=rom.Guyan(), interfaces=KINDS, name=name, certify=False
-    ),
-    "rigid body": lambda name, body: rom.Mechanism().add_rigid(
-        name, mass=1.0, inertia=(1, 1, 1), at=(0, 0, 0)
-    ),
-    "flexible body": lambda name, body: rom.Mechanism().add_flexible(name, body),
-    "joint": lambda name, body: jointed(name, body),
-    "force": lambda name, body: loaded(name, body),
-}
+def mech_with(body):
+    mech = rom.Mechanism()
+    return mech, mech.ground.marker((0, 0, 0)), mech.add_flexible("b", body).marker("root")
 
 
 def jointed(name, body):
-    mech = rom.Mechanism()
-    mech.fixed(name, mech.ground.marker((0, 0, 0)), mech.add_flexible("b", body).marker("root"))
+    mech, ground, root = mech_with(body)
+    mech.fixed(name, ground, root)
 
 
 def loaded(name, body):
-    mech = rom.Mechanism()
-    mech.force(name, mech.add_flexible("b", body).marker("root"), (0, 0, 1.0))
+    mech, _, root = mech_with(body)
+    mech.force(name, root, (0, 0, 1.0))
+
+
+GIVEN = {
+    "reduce": lambda name, body: reduced(0, block(cells=(1, 1, 1)), name=name),
+    "rigid body": lambda name, body: rom.Mechanism().add_rigid(
+        name, mass=1.0, inertia=(1, 1, 1), at=(0, 0, 0)),
+    "flexible body": lambda name, body: rom.Mechanism().add_flexible(name, body),
+    "joint": jointed, "force": loaded,
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("way", GIVEN)

@@ -10,13 +10,12 @@ import pytest
 
 from cases.command import environment
 from rom.process import patience
-from rom.process.patience import Patience
-from rom.process.turns import LOCK_FILE, Turns
+from rom.process.patience import LOCK_FILE, Patience, Turns
 
 HOLD = """
 import sys, time
 from pathlib import Path
-from rom.process.turns import Turns
+from rom.process.patience import Turns
 turns = Turns()
 for name in sys.argv[1].split(","):
     print(turns.take(Path(name)), flush=True)

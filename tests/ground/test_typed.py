@@ -1,4 +1,4 @@
-"""`typed` takes what stands for the same thing as it, and refuses the rest by name and value."""
+"""Arguments: what stands for the same thing is taken, the rest is refused by name and value."""
 
 import inspect
 from collections.abc import Mapping
@@ -9,10 +9,13 @@ from typing import Literal
 
 import numpy as np
 import pytest
+from scipy.sparse import csr_matrix
 
 import rom
-from rom.arguments import typed
+from rom.arguments import between, finite, not_negative, one_each, symmetric, typed
+from rom.errors import ConfigError, FileFormatError, ModelError, QualityGateError
 from rom.model import Array
+from rom.names import check_ending, check_once
 
 NO_NUMBERS = np.zeros(0)
 
@@ -82,6 +85,8 @@ def test_values_that_are_made_when_they_are_asked_for_are_not_asked_for():
         ({"path": 3}, "path = 3 must be a path"),
         ({"path": "a\0b"}, "must be a path"),
         ({"way": "left"}, "way = 'left' must be 'up' or 'down'"),
+        ({"way": np.array(["up", "down"])}, "must be 'up' or 'down'"),
+        ({"way": np.zeros(2)}, "must be 'up' or 'down'"),
         ({"k": "x"}, "k = 'x' must be a finite number"),
     ],
 )
@@ -107,3 +112,67 @@ def test_a_typed_function_keeps_its_signature_and_costs_microseconds():
         timeit(lambda: taken(1.0, 2, ("a", "b"), path="x"), number=calls_made) for _ in range(5)
     )
     assert seconds / calls_made < 1e-4
+
+
+SKEW = np.array([[2.0, 1.0], [0.0, 4.0]])
+
+
+@pytest.mark.once
+@pytest.mark.parametrize("ends", ["[]", "[)", "(]", "()"])
+@pytest.mark.parametrize("x", [-1.0, 0.0, 0.5, 1.0, 2.0])
+def test_an_interval_has_the_ends_that_its_brackets_say(ends, x):
+    inside = 0.0 < x < 1.0 or (x == 0.0 and ends[0] == "[") or (x == 1.0 and ends[1] == "]")
+    if inside:
+        assert between("x", x, 0, 1, ends) == x
+        return
+    low = "at least 0" if ends[0] == "[" else "above 0"
+    high = "at most 1" if ends[1] == "]" else "below 1"
+    with pytest.raises(ConfigError) as caught:
+        between("x", x, 0, 1, ends)
+    assert str(caught.value) == f"x = {x:g} must be {low} and {high}."
+
+
+@pytest.mark.once
+def test_what_is_taken_is_a_float():
+    assert type(between("x", np.int64(1), 0, 1)) is float and between("x", 1, 0, 1) == 1.0
+    assert not_negative("x", 0) == 0.0
+    assert finite("x", np.zeros((4, 3)), (None, 3)).shape == (4, 3)
+    assert check_ending("a.b.PNG", "a picture", ".png").name == "a.b.PNG"
+    for A in (SKEW + SKEW.T, csr_matrix(SKEW + SKEW.T), np.zeros((0, 0)), csr_matrix((3, 3))):
+        symmetric("A", A, 0.0)
+    symmetric("A", SKEW, 0.25)  # 1 of 4: the difference of the halves over the largest entry
+    one_each("names", 3, "modes", 3)
+    check_once(["a", "b"], "the input")
+
+
+WRONG = {  # call: class of the error, and what is said
+    "not_negative('x', -0.5, error=ModelError)": (ModelError, "x = -0.5 must not be negative"),
+    "between('x', np.nan, 0, 1, error=ModelError)": (
+        ModelError, "x = nan is not finite; give finite numbers"),
+    "not_negative('x', True)": (ConfigError, "x = True is not made of numbers, needed is shape ()"),
+    "finite('x', np.ones(3), (None, 3))": (ConfigError, "x has shape (3,), needed is (n, 3)"),
+    "finite('x', np.ones((2, 2)), (None, 3), error=ModelError)": (
+        ModelError, "x has shape (2, 2), needed is (n, 3)"),
+    "finite('x', [[1], [1, 2]], None)": (
+        ConfigError, "x = [[1], [1, 2]] is not made of numbers, needed is finite numbers"),
+    "one_each('names', 2, 'modes', 3)": (ConfigError, "2 names for 3 modes; give one for each"),
+    "one_each('names', (2,), 'modes', (3, 2), error=ModelError)": (
+        ModelError, "2 names for (3, 2) modes; give one for each"),
+    "symmetric('K', SKEW, 0.24, where='f')": (
+        QualityGateError, "f: K is not symmetric: its halves differ by 0.25 of its largest entry"),
+    "symmetric('S', csr_matrix(SKEW), 0.24, error=ModelError)": (
+        ModelError, "S is not symmetric: its halves differ by 0.25"),
+    "check_ending('a/b.txt', 'a picture', '.png', '.gif')": (
+        ConfigError, "a/b.txt: a picture is written as .png, .gif. Write b.png"),
+    "check_once(['a', 'b', 'a'], 'the input', FileFormatError)": (
+        FileFormatError, "the input 'a' is given twice; use each once"),
+}  # fmt: skip
+
+
+@pytest.mark.once
+@pytest.mark.parametrize("call", WRONG)
+def test_what_is_refused_is_said_with_what_is_wanted(call):
+    kind, said = WRONG[call]
+    with pytest.raises(kind) as caught:
+        eval(call)
+    assert type(caught.value) is kind and said in str(caught.value)

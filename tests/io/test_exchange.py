@@ -18,7 +18,7 @@ from rom.io.matrices.dmig import read_dmig, read_grids
 from rom.io.matrices.node_files import read_nodes
 from rom.io.matrices.op4 import read_op4
 from rom.io.matrices.user_element import read_user_element
-from rom.io.programs.openfast_reading import read_openfast
+from rom.io.programs.openfast import read_openfast
 
 KINDS = {"root": "rbe2", "tip": "rbe3"}
 WHOLE = ("npz", "sid", "sid-pysid", "sid-geisler")
@@ -149,6 +149,6 @@ def test_a_modal_joint_is_the_same_body(body, tmp_path):
 
 
 def test_every_format_is_here_or_has_a_test_of_its_own():
-    """Elsewhere: vtu in test_vtu, exudyn in test_exudyn_module, fmu in test_fmu_body."""
+    """Elsewhere: vtu in test_universal, exudyn in test_programs, fmu in test_fmu_body."""
     here = {*WHOLE, *READERS, "openfast", "openfast-4", "mbdyn"}
     assert set(FORMATS) - here == {"vtu", "exudyn", "fmu", "radioss"}

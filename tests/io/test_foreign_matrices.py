@@ -136,23 +136,18 @@ def test_sets_of_nodes_in_the_deck_are_interfaces(brick, tmp_path):
         assert_array_equal(np.sort(found), np.sort(labels))
         assert model.interfaces[name].area == pytest.approx(1.0)
     assert_allclose(model.points, brick.points[np.argsort(LABELS)])
-    for wanted, error, message in (
-        (
-            ("root", "pin"),
-            InterfaceError,
-            r"no set 'pin'; it has \['LEFT', 'ROOT', 'TIP', 'UPPER'\]",
-        ),
-        ("other", FileFormatError, "the set 'lost' is unknown"),
-        ("self", FileFormatError, "the set 'Self' is in itself"),
-        ("huge", UnsafeFileError, "has 2000000000 nodes"),
-        ("odd", FileFormatError, r"b\.inp, line \d+: \*NSET .* a label is a whole number"),
-    ):
-        more = "*NSET, NSET=self\nself\n*NSET, NSET=other\nlost\n"
-        more += "*NSET, NSET=huge, GENERATE\n1, 2000000000, 1\n"
-        more += "*NSET, NSET=odd, GENERATE\n1, x\n" if wanted == "odd" else ""
-        (tmp_path / "b.inp").write_text(DECK + more.replace("self\nself", "self\nSelf"))
-        if wanted == ("root", "pin"):
-            (tmp_path / "b.inp").write_text(DECK)
+    more = "*NSET, NSET=self\nSelf\n*NSET, NSET=other\nlost\n"
+    more += "*NSET, NSET=huge, GENERATE\n1, 2000000000, 1\n"
+    for wanted, sets, error, message in (
+        (("root", "pin"), "", InterfaceError,
+         r"no set 'pin'; it has \['LEFT', 'ROOT', 'TIP', 'UPPER'\]"),
+        ("other", more, FileFormatError, "the set 'lost' is unknown"),
+        ("self", more, FileFormatError, "the set 'Self' is in itself"),
+        ("huge", more, UnsafeFileError, "has 2000000000 nodes"),
+        ("odd", f"{more}*NSET, NSET=odd, GENERATE\n1, x\n", FileFormatError,
+         r"b\.inp, line \d+: \*NSET .* a label is a whole number"),
+    ):  # fmt: skip
+        (tmp_path / "b.inp").write_text(DECK + sets)
         with pytest.raises(error, match=message):
             read_model(K, M, nodes=tmp_path / "b.inp", interfaces=wanted)
     with pytest.raises(ConfigError, match=r"read from \.inp, not from"):
@@ -238,41 +233,37 @@ def test_what_does_not_fit_is_named(brick, tmp_path):
         given = {"K": K, "M": M, "nodes": nodes, "interfaces": SIDES} | other
         return read_model(given.pop("K"), given.pop("M"), **given)
 
-    with pytest.raises(ConfigError, match=r"2 matrices: KAA .*line 1\), MAA .*line 220\)"):
-        read(K=HERE / "dense.op4")
-    with pytest.raises(ConfigError, match="has no matrix 'KGG'"):
-        read(K=(HERE / "dense.op4", "KGG"))
-    with pytest.raises(ConfigError, match="unit system"):
-        read(units="inch")
-    with pytest.raises(InterfaceError, match=r"'tip' needs nodes of the model; unknown are \[8\]"):
-        read(interfaces={"tip": [7, 8]})
+    def written(name, A):
+        return write_op4({"X": A}, tmp_path / f"{name}.op4")
+
     labels, points = read_grids(nodes)
-    with pytest.raises(FileFormatError, match="24 rows are neither 3 nor 6 for each of 7"):
-        read(nodes=(labels[1:], points[1:]))
-    with pytest.raises(FileFormatError, match=r"nodes that are not given: \[3\]"):
-        read(K=SOURCES["dmig"][0], nodes=(labels[1:], points[1:]))
-    with pytest.raises(FileFormatError, match="occurs twice"):
-        read(nodes=(np.r_[labels[1:], 7], points))
-    with pytest.raises(QualityGateError, match="a rigid motion meets the stiffness"):
-        read(nodes=(labels, points[::-1]))
-    with pytest.raises(ConfigError, match=r"ending '\.xyz'"):
-        (tmp_path / "K.xyz").write_text("")
-        read(K=tmp_path / "K.xyz")
-    turning = with_rotations(by_label(brick.K))
+    turning, skew = with_rotations(by_label(brick.K)), by_label(brick.K)
     turning[3, 3] = 1.0
-    path = write_op4({"K": turning}, tmp_path / "t.op4")
-    with pytest.raises(ModelError, match="node 3 has the component 4: nodes that turn"):
-        read(K=path)
-    supported = by_label(brick.K) + np.diag(np.r_[1e9, np.zeros(23)])
-    with pytest.raises(QualityGateError, match="the body is supported"):
-        read(K=write_op4({"K": supported}, tmp_path / "s.op4"))
-    uneven = by_label(brick.M) + np.diag(np.r_[1.0, np.zeros(23)])
-    with pytest.raises(ModelError, match="not the same along x, y and z"):
-        read(M=write_op4({"M": uneven}, tmp_path / "m.op4"))
-    skew = by_label(brick.K)
     skew[0, 5] += 1e9
-    with pytest.raises(QualityGateError, match="not symmetric"):
-        read(K=write_op4({"K": skew}, tmp_path / "n.op4"))
+    supported, uneven = by_label(brick.K), by_label(brick.M)
+    supported[0, 0] += 1e9
+    uneven[0, 0] += 1.0
+    (tmp_path / "K.xyz").write_text("")
+    dense, less = HERE / "dense.op4", (labels[1:], points[1:])
+    for error, message, given in (
+        (ConfigError, r"2 matrices: KAA .*line 1\), MAA .*line 220\)", {"K": dense}),
+        (ConfigError, "has no matrix 'KGG'", {"K": (dense, "KGG")}),
+        (ConfigError, "unit system", {"units": "inch"}),
+        (InterfaceError, r"'tip' needs nodes of the model; unknown are \[8\]",
+         {"interfaces": {"tip": [7, 8]}}),
+        (FileFormatError, "24 rows are neither 3 nor 6 for each of 7", {"nodes": less}),
+        (FileFormatError, r"nodes that are not given: \[3\]",
+         {"K": SOURCES["dmig"][0], "nodes": less}),
+        (FileFormatError, "occurs twice", {"nodes": (np.r_[labels[1:], 7], points)}),
+        (QualityGateError, "a rigid motion meets the stiffness", {"nodes": (labels, points[::-1])}),
+        (ConfigError, r"ending '\.xyz'", {"K": tmp_path / "K.xyz"}),
+        (ModelError, "node 3 has the component 4: nodes that turn", {"K": written("t", turning)}),
+        (QualityGateError, "the body is supported", {"K": written("s", supported)}),
+        (ModelError, "not the same along x, y and z", {"M": written("m", uneven)}),
+        (QualityGateError, "not symmetric", {"K": written("n", skew)}),
+    ):  # fmt: skip
+        with pytest.raises(error, match=message):
+            read(**given)
 
 
 def test_hostile_sizes_take_no_memory(tmp_path):
@@ -285,17 +276,15 @@ def test_hostile_sizes_take_no_memory(tmp_path):
     with pytest.raises(FileFormatError, match="not real"):
         read_matrix(market)
     text = (HERE / "dense.op4").read_text()
-    (tmp_path / "a.op4").write_text(text.replace("      24", "99999999", 1))
-    with pytest.raises(UnsafeFileError, match="rows and 99999999 columns"):
-        read_op4(tmp_path / "a.op4")
-    (tmp_path / "a.op4").write_text(
-        text.replace("       1       1      2", "       1       1 999992")
-    )
-    with pytest.raises(FileFormatError, match=r"a\.op4, line 2: .*9999\d+ values"):
-        read_op4(tmp_path / "a.op4")
-    (tmp_path / "a.op4").write_text(text.replace("       2KAA", "       5KAA", 1))
-    with pytest.raises(FileFormatError, match=r"KAA .*unknown type 5"):
-        read_op4(tmp_path / "a.op4")
+    for old, new, error, message in (
+        ("      24", "99999999", UnsafeFileError, "rows and 99999999 columns"),
+        ("       1       1      2", "       1       1 999992", FileFormatError,
+         r"a\.op4, line 2: .*9999\d+ values"),
+        ("       2KAA", "       5KAA", FileFormatError, "KAA .*unknown type 5"),
+    ):  # fmt: skip
+        (tmp_path / "a.op4").write_text(text.replace(old, new, 1))
+        with pytest.raises(error, match=message):
+            read_op4(tmp_path / "a.op4")
 
 
 @pytest.fixture(scope="module")

@@ -10,8 +10,7 @@ from cases.paths import TESTS
 from cases.solid import block, reduced
 from rom.cli.main import main
 from rom.errors import ConfigError, FileFormatError, QualityGateError, UnsafeFileError
-from rom.io.programs.openfast import LOAD_DURATION, superelement, write_openfast
-from rom.io.programs.openfast_reading import read_openfast
+from rom.io.programs.openfast import LOAD_DURATION, read_openfast, superelement, write_openfast
 
 HERE = TESTS / "reference" / "foreign"
 KINDS = {"root": "rbe2", "tip": "rbe2"}
@@ -76,11 +75,15 @@ def test_the_interface_has_the_condensed_stiffness_and_the_exact_sag(model, path
                     atol=1e-9 * np.abs(sag).max())  # fmt: skip
 
 
+def floating(model, m, folder):
+    """A body with m modes and its tip alone, and what is read of it."""
+    body = rom.reduce(model, method=rom.CraigBampton(m), interfaces={"tip": "rbe2"}, certify=False)
+    return body, read_openfast(rom.export(body, folder / "float.dat", to="openfast"))
+
+
 def test_a_floating_body_is_free_and_has_its_weight(model, tmp_path):
     """The moment of the weight is about the interface; the identities OpenFAST 5 asks for."""
-    body = rom.reduce(model, method=rom.CraigBampton(5), interfaces={"tip": "rbe2"},
-                      certify=False)  # fmt: skip
-    found = read_openfast(rom.export(body, tmp_path / "float.dat", to="openfast"))
+    body, found = floating(model, 5, tmp_path)
     assert_array_equal(found.K[:6], 0.0)
     m, (x, y, z) = body.mass, body.first_moment / body.mass - body.marker("tip").point
     W, K_W = found.weight, found.K_W
@@ -102,9 +105,7 @@ def test_a_floating_body_is_free_and_has_its_weight(model, tmp_path):
 
 def test_the_weight_turns_with_the_frame(model, tmp_path):
     """Finite rotation of the whole model: the loads on interface and modes seen from the frame."""
-    body = rom.reduce(model, method=rom.CraigBampton(3), interfaces={"tip": "rbe2"},
-                      certify=False)  # fmt: skip
-    found = read_openfast(rom.export(body, tmp_path / "float.dat", to="openfast"))
+    body, found = floating(model, 3, tmp_path)
     theta, h = np.array([0.2, -0.5, 0.3]), 1e-6
     turned = []
     for sign in (1, -1):
@@ -194,16 +195,16 @@ def test_what_openfast_would_misread_is_named(old, new, error, message, tmp_path
 
 def test_one_interface_is_free(body, tmp_path, capsys):
     path = tmp_path / "a.dat"
-    with pytest.raises(ConfigError, match=r"has 2 free interfaces, \['root', 'tip'\]"):
-        rom.export(body, path, to="openfast")
-    with pytest.raises(ConfigError, match="'bore' cannot be held"):
-        rom.export(body, path, to="openfast", held=["bore"])
-    with pytest.raises(ConfigError, match="has 0 free interfaces"):
-        write_openfast(body, path, held=("root", "tip"))
+    for message, how in (
+        (r"has 2 free interfaces, \['root', 'tip'\]", {}),
+        ("'bore' cannot be held", {"held": ["bore"]}),
+        ("has 0 free interfaces", {"held": ("root", "tip")}),
+        ("dmig holds no interfaces, openfast does", {"held": ["root"], "to": "dmig"}),
+    ):
+        with pytest.raises(ConfigError, match=message):
+            rom.export(body, path, **{"to": "openfast"} | how)
     with pytest.raises(ConfigError, match="version 3 of OpenFAST is unknown"):
         write_openfast(body, path, held=["root"], version=3)
-    with pytest.raises(ConfigError, match="dmig holds no interfaces, openfast does"):
-        rom.export(body, tmp_path / "a.dmig", held=["root"])
     file = rom.save(body, tmp_path / "b.rom.npz")
     assert main(["export", str(file), str(path), "--to", "openfast", "--held", "root"]) == 0
     assert "as openfast" in capsys.readouterr().out

@@ -6,7 +6,6 @@ import json
 import re
 import shlex
 import shutil
-import subprocess
 import sys
 from xml.etree import ElementTree as ET
 
@@ -15,6 +14,7 @@ import pytest
 
 import rom
 from cases import command
+from cases.command import ran
 from cases.paths import ROOT
 from cases.solid import block, composite
 from rom import errors
@@ -166,8 +166,7 @@ def test_the_site_builds_without_warnings(tmp_path):
         DOCS, source, ignore=shutil.ignore_patterns("generated", "__pycache__", "*.npz")
     )
     command = [sys.executable, "-m", "sphinx", "-W", "-n", "-q", "--keep-going", source]
-    done = subprocess.run([*command, tmp_path / "site"], capture_output=True, text=True,
-                          timeout=600, check=False)  # fmt: skip
+    done = ran(*command, tmp_path / "site", timeout=600)
     assert done.returncode == 0, done.stderr
     site = {p.relative_to(tmp_path / "site").as_posix(): p for p in tmp_path.rglob("*.html")}
     assert {"index.html", "generated/errors.html", "generated/demo_beam.html"} <= set(site)

@@ -3,8 +3,6 @@
 import ast
 import inspect
 import pickle
-import subprocess
-import sys
 from textwrap import dedent
 
 import pytest
@@ -25,24 +23,12 @@ mech.revolute("pin", hinge, bob.marker("p"), axis=(0, 1, 0))
 sol = rom.simulate(mech, t_end=0.01, dt=1e-3, progress=False)
 """
 FILE = """
-[ground]
-o = [0, 0, 0]
-[bodies.bob]
-mass = 1
-inertia = [1, 1, 1]
-at = [1, 0, 0]
-markers = { p = [-1, 0, 0] }
-[joints.pin]
-kind = "revolute"
-between = ["ground.o", "bob.p"]
-axis = [0, 1, 0]
-[simulation]
-t_end = "1 ms"
-dt = "1 ms"
+ground = { o = [0, 0, 0] }
+bodies.bob = { mass = 1, inertia = [1, 1, 1], at = [1, 0, 0], markers = { p = [-1, 0, 0] } }
+joints.pin = { kind = "revolute", between = ["ground.o", "bob.p"], axis = [0, 1, 0] }
+simulation = { t_end = "1 ms", dt = "1 ms" }
 """
-CORE = (
-    PENDULUM
-    + """
+CORE = f"""{PENDULUM}
 from pathlib import Path
 from cases.mbs.trusses import truss
 from rom.cli.main import main
@@ -50,10 +36,9 @@ body = mech.add_flexible("beam", truss())
 mech.spring_damper("s", hinge, body.marker("mean"), stiffness=1.0)
 print(rom.simulate(mech, t_end=2e-3, dt=1e-3, progress=False).elastic("beam").shape)
 file = Path("fields.toml")
-file.write_text(FILE)
+file.write_text({FILE!r})
 rom.read_mechanism(file).simulate()
-""".replace("FILE", repr(FILE))
-)
+"""
 NO_COMPONENTS = "import sys; sys.modules['rom.components'] = None\n"  # as if they were deleted
 
 
@@ -127,10 +112,7 @@ def test_families_keep_their_order_whatever_is_added_first():
 
 def test_all_components_may_be_deleted(tmp_path):
     """A pendulum moves, a body bends, a file is read; the rest is told by the name of its field."""
-    code = (
-        NO_COMPONENTS
-        + CORE
-        + """
+    code = NO_COMPONENTS + CORE + dedent("""
     from rom.cli.parser import build_parser
     def told(call):
         try:
@@ -144,8 +126,7 @@ def test_all_components_may_be_deleted(tmp_path):
     told(lambda: rom.read_mechanism(file))
     told(lambda: build_parser().parse_args(["update", "test.uff"]))
     print(main(["--help"]) or 0, "rom.components" in str([m for m in sys.modules.values() if m]))
-    """.replace("\n    ", "\n")
-    )
+    """)  # fmt: skip
     said = run(code, ROOT / "tests", cwd=tmp_path).stdout
     whose = {"gear_mesh": "gear_mesh", "spin": "round_bodies", "Pulley": "tendons",
              "rods": "cosserat", "update": "updating"}  # fmt: skip
@@ -228,9 +209,7 @@ def test_a_stranger_brings_a_field_in_three_files_beside_one_that_fails(tmp_path
     """Method, elements, file, symbol, column and verb; what fails is told once by name."""
     install(tmp_path, CAMS)
     install(tmp_path, BROKEN)
-    code = (
-        PENDULUM
-        + """
+    code = PENDULUM + dedent("""
     import inspect, sys
     from pathlib import Path
     from rom.cli.main import main
@@ -262,10 +241,7 @@ def test_a_stranger_brings_a_field_in_three_files_beside_one_that_fails(tmp_path
         main(["--help"])
     except SystemExit:
         pass
-    """.replace("FILE", repr(FILE))
-        .replace("FOLDER", repr(str(tmp_path)))
-        .replace("\n    ", "\n")
-    )
+    """).replace("FILE", repr(FILE)).replace("FOLDER", repr(str(tmp_path)))  # fmt: skip
     done = run(code, tmp_path)
     assert '"stiffness": 3.0' in done.stdout and "say how stiff a cam is" in done.stdout
     assert "told: Mechanism.cam 'd': stiffness = 'soft'" in done.stdout
@@ -275,24 +251,19 @@ def test_a_stranger_brings_a_field_in_three_files_beside_one_that_fails(tmp_path
 
 
 def test_a_field_of_ours_that_cannot_be_imported_takes_no_other_down():
-    code = (
-        """
+    code = dedent("""
     import sys
     class Cut:
         def find_spec(self, name, *_):
             if name == "rom.components.tendons.field":
                 raise RuntimeError("cut")
     sys.meta_path.insert(0, Cut())
-    """.replace("\n    ", "\n")
-        + PENDULUM
-        + """
+    """) + PENDULUM + dedent("""
     mech.spring_damper("s", hinge, bob.marker("p"), stiffness=1.0)
     print(mech.gear_mesh.__name__, hasattr(mech, "tendon"), list(mech.families()))
     mech.tendon
-    """.replace("\n    ", "\n")
-    )
-    command = [sys.executable, "-c", code]
-    done = subprocess.run(command, env=environment(), text=True, capture_output=True, check=False)
+    """)  # fmt: skip
+    done = python("-c", code)
     assert "gear_mesh False" in done.stdout and done.returncode == 1
     assert "'tendon' belongs to the field 'rom.components.tendons', which cannot be" in done.stderr
     assert "RuntimeError: cut" in done.stderr

@@ -1,16 +1,14 @@
 """Who may import whom, and what works without FEniCSx."""
 
 import ast
-import os
 import re
-import subprocess
-import sys
 import tomllib
 from functools import cache
 from pathlib import Path
 
 import pytest
 
+from cases.command import python
 from cases.paths import ROOT
 
 pytestmark = pytest.mark.once
@@ -34,64 +32,37 @@ ALONE = {
 }  # fmt: skip
 # inside each folder that has folders, what lies lower stands first; a file imports its own folder
 # or a lower one
+ORDERED = """
+rom: errors notebook rotation places fields lazy names readable process plausible arguments units
+  material model rows paths decks eigen reduction body fe checks stages workflow assembly cyclic
+  parametric updating prestress io mbs fmu view config report doctor cli components __main__
+cli: answer speech schemas options described ranks matrices output verbs parser main
+fe: costs parallel jit compat operators forms mesh elasticity probe
+fe.operators: solver memory disk aij foreseen factor substructures held spectrum iterative
+  krylov_schur workers petsc
+fe.mesh: cell_types topology picks cad solid sources child curving quality repair validate cut read
+  summary input_deck
+io: files hdf5 archive native fields matrices sid programs fmu bodies history export ours
+mbs: compiler kernels parts connections elements mechanism equations results integrate analysis
+mbs.analysis: quadratic_eigen local_equations rotors few_modes tangent sparse_tangent equilibrium
+  linearize campbell response snapshot steady_motion sensitivity inverse_dynamics law_check
+mbs.elements: field family law_calls joint_forces springs rotational_springs loads laws_in_python
+  laws formulas motors frictions contact stops bushings spread_loads nonlinear solids
+components.gear_mesh: gears compliance tooth_elements contact tooth_loads symbols keys field
+components.wheels: faces sector rotation modes gyroscopic travelling supports campbell certificate
+  reduced blades prestress field
+components.updating: frf_data measured responses airframe models methods family_model
+  normal_equations equations verdict estimate comparison placement observers pictures verb field
+components.journal_bearing: films closed_forms oil_film statics oil record keys field
+body: recovery nonlinear records inertia reference stiffening conversion frame rotating surface
+  flexible prestress projection damping spread
+stages: bodies deflection
+reduction: bases interfaces full_model
+view: canvas figures scenes
+"""
 ORDER = {
-    level: tuple(names.split())
-    for level, names in {
-        "": (
-            "errors notebook rotation places fields lazy names readable process plausible "
-            "arguments units material model rows paths decks eigen reduction body fe checks "
-            "stages workflow assembly cyclic parametric updating prestress io mbs fmu view config "
-            "report doctor cli components __main__"
-        ),
-        "cli": (
-            "answer speech schemas options described ranks matrices model output verbs parser main"
-        ),
-        "fe": "costs parallel jit compat operators forms mesh elasticity probe",
-        "fe.operators": (
-            "solver memory disk aij foreseen factor substructures held spectrum "
-            "iterative workers petsc"
-        ),
-        "fe.mesh": (
-            "cell_types topology picks cad solid sources child curving quality repair validate "
-            "cut read summary input_deck"
-        ),
-        "io": (
-            "files hdf5 archive native fields matrices sid programs fmu bodies history "
-            "export claim ours"
-        ),
-        "mbs": (
-            "compiler kernels parts connections elements mechanism equations results integrate "
-            "analysis"
-        ),
-        "mbs.analysis": (
-            "local_equations rotors few_modes tangent sparse_tangent equilibrium linearize "
-            "campbell response steady_motion sensitivity inverse_dynamics law_check"
-        ),
-        "mbs.elements": (
-            "field family law_calls joint_forces springs rotational_springs loads "
-            "laws_in_python laws formulas motors frictions contact stops bushings spread_loads "
-            "nonlinear solids"
-        ),
-        "components.gear_mesh": (
-            "gears compliance tooth_elements contact tooth_loads symbols keys field"
-        ),
-        "components.wheels": (
-            "faces sector rotation modes gyroscopic travelling supports campbell certificate "
-            "reduced blades prestress field"
-        ),
-        "components.updating": (
-            "frf_data measured responses airframe models methods family_model normal_equations "
-            "equations verdict estimate comparison placement observers pictures verb field"
-        ),
-        "components.journal_bearing": ("films closed_forms oil_film statics oil record keys field"),
-        "body": (
-            "recovery nonlinear records inertia reference stiffening conversion frame rotating "
-            "surface flexible prestress projection damping spread"
-        ),
-        "stages": "bodies deflection",
-        "reduction": "bases interfaces full_model",
-        "view": "canvas figures scenes",
-    }.items()
+    "" if level == "rom" else level: tuple(names.split())
+    for level, names in re.findall(r"^(\S+): (.+(?:\n  .+)*)", ORDERED, re.M)
 }
 TYPES = "rom.components.methods"  # a stub alone, which is read by who checks types
 MODULES, TESTS = sorted((ROOT / "rom").rglob("*.py")), ROOT / "tests"
@@ -233,11 +204,7 @@ def test_folders_hold_no_more_than_one_can_look_over():
 def run_blocked(code, *, blocked):
     """Run code in a process where some packages cannot be imported."""
     block = f"import sys; sys.modules.update(dict.fromkeys({sorted(blocked)!r}))\n"
-    environment = os.environ | {"PYTHONPATH": str(ROOT)}
-    return subprocess.run(
-        [sys.executable, "-c", block + code],
-        env=environment, capture_output=True, text=True, timeout=60, check=False,
-    )  # fmt: skip
+    return python("-c", block + code)
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,6 @@
 import os
 import re
 import shutil
-import subprocess
 import sys
 import tomllib
 import zipfile
@@ -14,6 +13,7 @@ import numpy as np
 import pytest
 
 import rom
+from cases.command import ran
 from cases.paths import ROOT
 from cases.solid import block, reduced
 
@@ -45,8 +45,7 @@ print(*sol.position("slider")[:, 0])
 def hook(name, folder, out):
     """Call a build hook in a process of its own, as every installer does."""
     code = f"from setuptools import build_meta; print(build_meta.{name}({str(out)!r}))"
-    done = subprocess.run([sys.executable, "-c", code], cwd=folder, capture_output=True, text=True,
-                          timeout=600, check=True)  # fmt: skip
+    done = ran(sys.executable, "-c", code, cwd=folder, timeout=600, check=True)
     return out / done.stdout.splitlines()[-1]
 
 
@@ -70,15 +69,16 @@ def shipped(tmp_path_factory):
 def installed(shipped, tmp_path_factory):
     """Folder with nothing but what pip takes out of the wheel."""
     folder = tmp_path_factory.mktemp("installed")
-    subprocess.run([sys.executable, "-m", "pip", "install", "-q", "--no-deps", "--no-index",
-                    "--disable-pip-version-check", "--no-compile", "--target", folder, shipped[1]],
-                   check=True, timeout=600)  # fmt: skip
+    options = "--no-deps --no-index --disable-pip-version-check --no-compile --target".split()
+    ran(sys.executable, "-m", "pip", "install", "-q", *options, folder, shipped[1], check=True)
     return folder
 
 
-def environment(folder):
+def started(place, folder, *words):
+    """Python in a folder, with rom from a place."""
     # 20 steps in plain Python take a second; a fresh place would compile for two minutes
-    return os.environ | {"PYTHONPATH": str(folder), "NUMBA_DISABLE_JIT": "1"}
+    env = os.environ | {"PYTHONPATH": str(place), "NUMBA_DISABLE_JIT": "1"}
+    return ran(sys.executable, *words, cwd=folder, env=env, timeout=600)
 
 
 @pytest.mark.once
@@ -104,9 +104,7 @@ def test_benchmarks_are_in_the_source_and_said_to_be_where_they_are_not(installe
     """The verb stays in both: one sentence and exit code 2, or what there is to measure."""
     said = {}
     for place in (installed, ROOT):
-        command = [sys.executable, "-P", "-m", "rom", "bench", "--list"]
-        said[place] = subprocess.run(command, cwd=tmp_path, text=True, capture_output=True,
-                                     env=environment(place), timeout=120, check=False)  # fmt: skip
+        said[place] = started(place, tmp_path, "-P", "-m", "rom", "bench", "--list")
     assert said[installed].returncode == 2
     assert "Benchmarks come with the source of rom" in said[installed].stderr
     assert "make bench NAME=motion" in said[installed].stderr
@@ -117,9 +115,7 @@ def test_a_saved_slider_crank_runs_from_the_wheel_alone(installed, tmp_path):
     """The slider is where rigid kinematics has it: the chord of a stiff rod keeps its length."""
     rod = reduced(2, block(size=(L2, 0.02, 0.02), cells=(12, 1, 1)), reference=("root", "tip"))
     rom.save(rod, tmp_path / "rod.rom.npz")
-    done = subprocess.run([sys.executable, "-c", SLIDER_CRANK], cwd=tmp_path, text=True,
-                          capture_output=True, env=environment(installed), timeout=600,
-                          check=False)  # fmt: skip
+    done = started(installed, tmp_path, "-c", SLIDER_CRANK)
     assert done.returncode == 0, done.stderr
     place, line = done.stdout.splitlines()[-2:]
     assert Path(place).is_relative_to(installed)
@@ -131,9 +127,7 @@ def test_a_saved_slider_crank_runs_from_the_wheel_alone(installed, tmp_path):
 
 
 def test_the_command_comes_with_the_wheel(installed, tmp_path):
-    done = subprocess.run([sys.executable, installed / "bin" / "rom", "--version"], cwd=tmp_path,
-                          capture_output=True, text=True, env=environment(installed), timeout=60,
-                          check=False)  # fmt: skip
+    done = started(installed, tmp_path, installed / "bin" / "rom", "--version")
     assert done.stdout.split() == ["rom", rom.__version__], done.stderr
 
 

@@ -2,7 +2,6 @@
 
 import os
 import re
-import subprocess
 import time
 import tomllib
 from itertools import chain
@@ -10,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
+from cases.command import ran
 from cases.long import LONGEST_FIRST, ONCE
 from cases.paths import ROOT, TESTS
-from rom.doctor.libraries import PACKAGES, SYSTEM_COMMAND
-from rom.doctor.machine import SLOW_ADVICE
+from rom.doctor.libraries import PACKAGES, SLOW_ADVICE, SYSTEM_COMMAND
 from rom.fe import DEBIAN_PACKAGES, GMSH_LIBRARIES, WHEEL_PACKAGES
 
 pytestmark = pytest.mark.once
@@ -47,8 +46,7 @@ def test_a_second_run_takes_seconds_and_no_network(tmp_path):
         pytest.skip("this tree was not set up with 'make setup'")
     before = [stamp.stat().st_mtime_ns for stamp in stamps]
     start = time.perf_counter()
-    done = subprocess.run([SETUP], env=deny_network(tmp_path), capture_output=True, text=True,
-                          timeout=60, check=False)  # fmt: skip
+    done = ran(SETUP, env=deny_network(tmp_path))
     assert (done.returncode, done.stdout) == (0, ""), done.stderr
     assert time.perf_counter() - start < 30
     assert [stamp.stat().st_mtime_ns for stamp in stamps] == before
@@ -57,8 +55,7 @@ def test_a_second_run_takes_seconds_and_no_network(tmp_path):
 def test_a_system_without_debian_packages_is_told_so(tmp_path):
     for name in ("sh", "dirname"):
         (tmp_path / name).symlink_to(f"/bin/{name}" if name == "sh" else f"/usr/bin/{name}")
-    done = subprocess.run(["/bin/sh", SETUP], env={"PATH": str(tmp_path)}, capture_output=True,
-                          text=True, timeout=20, check=False)  # fmt: skip
+    done = ran("/bin/sh", SETUP, env={"PATH": str(tmp_path)})
     assert done.returncode == 1
     assert "no Debian" in done.stderr and "README" in done.stderr
 
@@ -67,8 +64,7 @@ def test_programs_to_compare_with_are_not_needed(tmp_path):
     """The function of the script, where nothing is installed and nothing can be."""
     function = re.search(r"^try_optional\(\) \{.*?^\}$", SETUP.read_text(), re.S | re.M).group()
     script = f"set -eu\noptional=calculix-ccx\ninstalled() {{ false; }}\n{function}\ntry_optional\n"
-    done = subprocess.run(["sh", "-c", script], env=deny_network(tmp_path), capture_output=True,
-                          text=True, timeout=20, check=False)  # fmt: skip
+    done = ran("sh", "-c", script, env=deny_network(tmp_path))
     assert (done.returncode, done.stdout) == (0, "")
     assert "not installed: calculix-ccx; some tests are skipped" in done.stderr
     assert 'optional="calculix-ccx chromium"' in SETUP.read_text()
@@ -83,7 +79,7 @@ def compile_ahead(folder, code, sources="one"):
     python.chmod(0o755)
     (folder / "calls").write_text("")
     script = f"set -eu\nmade_of={sources}\n{function}\ncompile_ahead .venv || exit 9\n"
-    done = subprocess.run(["sh", "-c", script], cwd=folder, timeout=20, check=False)
+    done = ran("sh", "-c", script, cwd=folder)
     return done.returncode, (folder / "calls").read_text().splitlines()
 
 
@@ -99,7 +95,7 @@ def test_what_first_motions_need_is_compiled_until_it_is_and_when_sources_change
 def test_scripts_are_valid_shell():
     for script in (ROOT / ".ci" / "run", *(ROOT / ".ci").glob("*.sh")):
         assert os.access(script, os.X_OK), f"{script} is not executable"
-        subprocess.run(["sh", "-n", script], check=True)
+        ran("sh", "-n", script, check=True)
 
 
 def recipe(target):

@@ -7,7 +7,6 @@ import importlib.util
 import re
 import shlex
 import shutil
-import subprocess
 
 import pytest
 
@@ -15,6 +14,7 @@ import rom
 from benchmarks import two_stages
 from benchmarks.benchmarks import BENCHMARKS
 from cases import command
+from cases.command import ran
 from cases.paths import ROOT
 from cases.solid import block, reduced
 from rom.errors import ResourceError
@@ -90,8 +90,7 @@ def test_a_target_of_make_starts_modules_and_files_that_are_there(target, tmp_pa
         (tmp_path / program).write_text(STUB.format(log=log))
         (tmp_path / program).chmod(0o755)
     given = [f"PYTHON={tmp_path}/python", f"LIGHT={tmp_path}/python", "NAME=motion"]
-    done = subprocess.run(["make", "-C", tmp_path, target, *given], capture_output=True, text=True,
-                          timeout=120, check=False)  # fmt: skip
+    done = ran("make", "-C", tmp_path, target, *given)
     assert done.returncode == 0, done.stderr
     lines = log.read_text().splitlines() if log.exists() else []
     assert lines or target == "clean"

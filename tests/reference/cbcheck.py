@@ -4,7 +4,7 @@ Run with a Python that has pyyeti (1.4.7 when the numbers were made)::
 
     python tests/reference/cbcheck.py
 
-The matrices are those of `tests/io/test_cbcheck.py`, which writes them when called as a script.
+The matrices are those of `tests/io/test_matrices.py`, which writes them when called as a script.
 """
 
 import io

@@ -9,6 +9,7 @@ from dataclasses import asdict
 from typing import Any
 
 from rom.cli.answer import Answer, table
+from rom.cli.options import option
 from rom.errors import ConfigError
 from rom.places import FOLDER_ABOVE
 
@@ -24,7 +25,7 @@ EXAMPLES = """\
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Options of the verb."""
     parser.add_argument("names", metavar="NAME", nargs="*", help="benchmarks; all of them if none")
-    parser.add_argument("--list", action="store_true", help="say what there is and leave")
+    option(parser, "--list", "say what there is and leave")
 
 
 def run(args: argparse.Namespace) -> Answer:
@@ -37,11 +38,7 @@ def run(args: argparse.Namespace) -> Answer:
 
 
 def _of_the_source() -> Any:
-    """The module of all benchmarks, which stand beside the package and are not installed with it.
-
-    Raises:
-        ConfigError: where there is the package alone.
-    """
+    """The module of all benchmarks, which stand beside the package and are not installed."""
     if not all((FOLDER_ABOVE / file).is_file() for file in SOURCE_FILES):
         raise ConfigError(
             "Benchmarks come with the source of rom, not with the installed package.",

@@ -45,7 +45,7 @@ def run(args: argparse.Namespace) -> Answer:
 
 def _diagnosed(fix: bool) -> "list[Finding]":
     """Findings in the order of the report; what could crash runs in a process of its own."""
-    from rom.doctor import libraries, machine
+    from rom.doctor import libraries
     from rom.doctor.probes import start
 
     fe = start("rom.fe.probe", *(["--fix"] if fix else []))
@@ -54,10 +54,10 @@ def _diagnosed(fix: bool) -> "list[Finding]":
     return [
         *found,
         *libraries.fenicsx(answers, fe.ending),
-        *machine.blas(answers.get("mapped", {}).get("value", [])),
+        *libraries.blas(answers.get("mapped", {}).get("value", [])),
         *libraries.pictures(drawing.answer(), drawing.ending),
-        *machine.caches(answers.get("forms", {}), fix=fix),
-        *machine.machine(),
+        *libraries.caches(answers.get("forms", {}), fix=fix),
+        *libraries.machine(),
     ]
 
 

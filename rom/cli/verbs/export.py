@@ -8,7 +8,7 @@ from pathlib import Path
 
 from rom.cli.answer import Answer
 from rom.cli.described import described, mechanism
-from rom.cli.options import add_meshing, names, positive
+from rom.cli.options import add_meshing, names, option, positive
 from rom.cli.output import add_force, checked, files_in
 from rom.errors import ConfigError
 
@@ -28,19 +28,13 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     """Options of the verb."""
     parser.add_argument("file", type=Path, help="body, .rom.npz or .SID_FEM; mechanism, .toml")
     parser.add_argument("output", type=Path, help="file to write")
-    parser.add_argument("--to", metavar="FORMAT", help="format, if the ending does not tell")
-    parser.add_argument(
-        "--held", metavar="NAME,...", type=names, default=(), help="interfaces held, for openfast"
-    )
-    parser.add_argument(
-        "--inputs", metavar="NAME,...", type=names, default=(),
-        help="loads, motors, drives of a mechanism that follow inputs",
-    )  # fmt: skip
-    parser.add_argument(
-        "--outputs", metavar="NAME,...", type=names,
-        help="body.marker, joints, drives of a mechanism; all if missing",
-    )  # fmt: skip
-    parser.add_argument("--dt", type=positive, help="longest time step of a mechanism [s]")
+    option(parser, "--to FORMAT", "format, if the ending does not tell", str)
+    option(parser, "--held NAME,...", "interfaces held, for openfast", names)
+    about = "loads, motors, drives of a mechanism that follow inputs"
+    option(parser, "--inputs NAME,...", about, names)
+    about = "body.marker, joints, drives of a mechanism; all if missing"
+    option(parser, "--outputs NAME,...", about, names, default=None)
+    option(parser, "--dt", "longest time step of a mechanism [s]", positive)
     add_force(parser)
     add_meshing(parser)
 

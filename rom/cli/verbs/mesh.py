@@ -7,12 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from rom.cli.answer import Answer, table
 from rom.cli.described import component, described
-from rom.cli.options import (
-    add_geometry,
-    add_solid,
-    material,
-    reading,
-)
+from rom.cli.options import add_geometry, add_solid, material, option, reading
 from rom.cli.output import add_force, checked
 from rom.errors import ConfigError
 from rom.names import check_ending
@@ -38,19 +33,14 @@ EXAMPLES = """\
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Options of the verb."""
     add_geometry(parser)
-    parser.add_argument(
-        "--faces",
-        action="store_true",
-        help="list every face of a .step file: number, kind, radius, axis or normal, area, middle",
+    about = "list every face of a .step file: number, kind, radius, axis or normal, area, middle"
+    option(parser, "--faces", about)
+    about = (
+        ".png for a picture of the interfaces, with --faces of all faces and their numbers; .vtu "
+        "for ParaView; .inp for CalculiX and Abaqus, and with --E, --nu, --rho CalculiX runs it "
+        "and leaves matrices for rom modes and rom reduce"
     )
-    parser.add_argument(
-        "--save",
-        metavar="FILE",
-        type=Path,
-        help=".png for a picture of the interfaces, with --faces of all faces and their numbers; "
-        ".vtu for ParaView; .inp for CalculiX and Abaqus, and with --E, --nu, --rho CalculiX "
-        "runs it and leaves matrices for rom modes and rom reduce",
-    )
+    option(parser, "--save FILE", about, Path)
     add_solid(parser)
     add_force(parser)
 

@@ -4,8 +4,7 @@ import argparse
 
 from rom.cli.answer import Answer, table
 from rom.cli.described import component, described
-from rom.cli.matrices import add_matrices
-from rom.cli.model import read_model
+from rom.cli.matrices import add_matrices, read_model
 from rom.cli.options import (
     add_geometry,
     add_interfaces,
@@ -13,6 +12,7 @@ from rom.cli.options import (
     assignment,
     count,
     names,
+    option,
     typed_number,
     unique,
 )
@@ -35,25 +35,14 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     add_material(parser)
     add_interfaces(parser)
     add_matrices(parser)
-    parser.add_argument(
-        "-n", "--number", type=count, default=12, help="number of modes; rigid ones count too"
+    about = "number of modes; rigid ones count too"
+    option(parser, "-n --number", about, count, default=12)
+    option(parser, "--fixed NAME,...", "interfaces held, wholly or as NAME:yz", names)
+    about = (
+        "stiffness from an interface to the ground, three translations [N/m] or those and three "
+        "rotations [N m/rad]"
     )
-    parser.add_argument(
-        "--fixed",
-        metavar="NAME,...",
-        type=names,
-        default=(),
-        help="interfaces held, wholly or as NAME:yz",
-    )
-    parser.add_argument(
-        "--spring",
-        metavar="NAME=KX,KY,KZ,...",
-        type=assignment,
-        action="append",
-        default=[],
-        help="stiffness from an interface to the ground, three translations [N/m] or those and "
-        "three rotations [N m/rad]",
-    )
+    option(parser, "--spring NAME=KX,KY,KZ,...", about, assignment)
 
 
 def run(args: argparse.Namespace) -> Answer:

@@ -11,19 +11,22 @@ from typing import TYPE_CHECKING, Any
 
 from rom.cli.answer import Answer, failures, report_data
 from rom.cli.described import component, described, rayleigh
-from rom.cli.matrices import add_matrices, solid_options
-from rom.cli.model import read_model
+from rom.cli.matrices import add_matrices, read_model, solid_options
 from rom.cli.options import (
     OUTPUT_FLAG,
     add_geometry,
     add_interfaces,
     add_material,
+    count,
     names,
     number,
+    option,
+    positive,
     require,
     unique,
 )
 from rom.cli.output import add_force, checked, files_in
+from rom.config.methods import CRAIG_BAMPTON, METHODS, SETTINGS, chosen
 from rom.errors import ConfigError
 from rom.names import check_name
 
@@ -32,16 +35,6 @@ if TYPE_CHECKING:
 
     from rom.body.damping import ModalDamping, Rayleigh
     from rom.body.flexible import FlexibleBody
-
-from typing import TYPE_CHECKING
-
-from rom.cli.options import count, positive
-from rom.config.methods import CRAIG_BAMPTON, METHODS, SETTINGS, chosen
-
-if TYPE_CHECKING:
-    from rom.reduction.bases.method import Method
-    from rom.reduction.interfaces.characteristic import Characteristic
-
 
 SUMMARY = "reduce a model to a flexible body, with its certificate"
 EXAMPLES = """\
@@ -64,42 +57,22 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     add_interfaces(parser)
     add_matrices(parser)
     add_method(parser)
-    parser.add_argument(
-        "--reference",
-        metavar="FRAME",
-        type=names,
-        default=("mean-axis",),
-        help="frame: mean-axis, an interface, or two interfaces A,B (default mean-axis)",
-    )
+    about = "frame: mean-axis, an interface, or two interfaces A,B (default mean-axis)"
+    option(parser, "--reference FRAME", about, names, default=("mean-axis",))
     damping = parser.add_mutually_exclusive_group()
-    damping.add_argument(
-        "--damping-ratio", type=number, help="of every mode of the free body, e.g. 0.01"
-    )
-    damping.add_argument("--rayleigh", metavar="ALPHA,BETA", help="D = ALPHA M + BETA K [1/s], [s]")
-    parser.add_argument(
-        "--damping-fixed",
-        metavar="NAME,...",
-        type=names,
-        default=(),
-        help="of every mode with these interfaces held, wholly or as NAME:yz",
-    )
-    parser.add_argument(
-        "--stiffening",
-        action="store_true",
-        help="add the geometric stiffness of rotation and of loads on the interfaces",
-    )
-    parser.add_argument("--name", help="name of the body (default: that of the file)")
-    parser.add_argument("--stress", action="store_true", help="make surface stress recoverable")
+    option(damping, "--damping-ratio", "of every mode of the free body, e.g. 0.01", number)
+    option(damping, "--rayleigh ALPHA,BETA", "D = ALPHA M + BETA K [1/s], [s]", str)
+    about = "of every mode with these interfaces held, wholly or as NAME:yz"
+    option(parser, "--damping-fixed NAME,...", about, names)
+    about = "add the geometric stiffness of rotation and of loads on the interfaces"
+    option(parser, "--stiffening", about)
+    option(parser, "--name", "name of the body (default: that of the file)", str)
+    option(parser, "--stress", "make surface stress recoverable")
     evidence = parser.add_mutually_exclusive_group()
-    evidence.add_argument("--no-certificate", action="store_true", help="skip the comparison")
-    evidence.add_argument(
-        "--full-certificate",
-        action="store_true",
-        help="full modes in every support, however long it takes",
-    )
-    parser.add_argument(
-        "-o", "--output", type=Path, help="e.g. rod.rom.npz; may be said by a .toml file"
-    )
+    option(evidence, "--no-certificate", "skip the comparison")
+    about = "full modes in every support, however long it takes"
+    option(evidence, "--full-certificate", about)
+    option(parser, "-o --output", "e.g. rod.rom.npz; may be said by a .toml file", Path)
     add_force(parser)
 
 
@@ -199,53 +172,34 @@ def frequencies(text: str) -> tuple[float, ...]:
 
 def add_method(parser: argparse.ArgumentParser) -> None:
     """What is kept of the body."""
-    parser.add_argument(
-        "--method",
-        choices=METHODS,
-        default=CRAIG_BAMPTON,
-        help="craig-bampton (default), enhanced (the same, corrected), guyan (statics only), "
+    about = (
+        "craig-bampton (default), enhanced (the same, corrected), guyan (statics only), "
         "rubin or herting (free-free modes and statics), moment-matching (exact at --at), "
         "balanced (what the interfaces know of the modes), free-free (no joint may clamp it), "
-        "assumed (modes under the --reference alone)",
+        "assumed (modes under the --reference alone)"
     )
+    option(parser, "--method", about, str, choices=METHODS, default=CRAIG_BAMPTON)
     kept = parser.add_mutually_exclusive_group()
-    kept.add_argument(
-        "-m",
-        "--modes",
-        type=count,
-        help="modes kept; if missing, as many as the certificate needs for craig-bampton, 20 for "
-        "others; blocks per frequency for moment-matching (default 2)",
+    about = (
+        "modes kept; if missing, as many as the certificate needs for craig-bampton, 20 for "
+        "others; blocks per frequency for moment-matching (default 2)"
     )
-    kept.add_argument(
-        "--f-max", type=positive, help="craig-bampton: keep all modes up to this frequency [Hz]"
+    option(kept, "-m --modes", about, count)
+    about = "craig-bampton: keep all modes up to this frequency [Hz]"
+    option(kept, "--f-max", about, positive)
+    about = (
+        "craig-bampton: the fewest modes with this relative error of all frequencies up to "
+        "--f-max, or else of the lowest six in every support (default 5e-4)"
     )
-    parser.add_argument(
-        "--tol",
-        type=positive,
-        help="craig-bampton: the fewest modes with this relative error of all frequencies up to "
-        "--f-max, or else of the lowest six in every support (default 5e-4)",
-    )
-    parser.add_argument(
-        "--at", metavar="HZ,…", type=frequencies, help="moment-matching: where (default 0) [Hz]"
-    )
-    parser.add_argument(
-        "--characteristic",
-        metavar="N",
-        type=count,
-        help="full interfaces follow N characteristic constraint modes",
-    )
-    parser.add_argument(
-        "--gravity-shapes",
-        action="store_true",
-        help="keep the answers to gravity along each axis (static correction)",
-    )
+    option(parser, "--tol", about, positive)
+    option(parser, "--at HZ,…", "moment-matching: where (default 0) [Hz]", frequencies)
+    about = "full interfaces follow N characteristic constraint modes"
+    option(parser, "--characteristic N", about, count)
+    about = "keep the answers to gravity along each axis (static correction)"
+    option(parser, "--gravity-shapes", about)
 
 
-def method(args: argparse.Namespace) -> "Method | Characteristic":
-    """The method the options ask for.
-
-    Raises:
-        ConfigError: if they contradict each other.
-    """
+def method(args: argparse.Namespace) -> Any:
+    """The method the options ask for; `rom.config.methods.chosen` refuses contradictions."""
     settings = {key: getattr(args, key) for key in SETTINGS if getattr(args, key) is not None}
     return chosen(settings, full=any(kind == "full" for _, kind in args.interface))

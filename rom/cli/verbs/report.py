@@ -9,7 +9,7 @@ from pathlib import Path
 from shlex import quote
 
 from rom.cli.answer import Answer
-from rom.cli.options import add_meshing, meshing
+from rom.cli.options import add_meshing, meshing, option
 from rom.cli.output import add_force, checked
 from rom.names import check_ending
 
@@ -26,10 +26,8 @@ EXAMPLES = """\
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Options of the verb."""
     parser.add_argument("file", type=Path, help="body file, .toml file, or folder of a run")
-    parser.add_argument("-o", "--output", type=Path, required=True, help="report, .html")
-    parser.add_argument(
-        "--move", action="store_true", help="move the mechanism of a file, and show the motion"
-    )
+    option(parser, "-o --output", "report, .html", Path, required=True)
+    option(parser, "--move", "move the mechanism of a file, and show the motion")
     add_force(parser)
     add_meshing(parser)
 

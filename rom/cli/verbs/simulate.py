@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from rom.cli.answer import Answer, failures, report_data
 from rom.cli.described import described, mechanism
-from rom.cli.options import OUTPUT_FLAG, add_meshing, positive, require, vector
+from rom.cli.options import OUTPUT_FLAG, add_meshing, option, positive, require, vector
 from rom.cli.output import add_force, checked, claim, files_in
 from rom.cli.ranks import ranks
 from rom.cli.verbs.swing import pendulum
@@ -46,27 +46,20 @@ Mechanisms of several bodies are described in a file, or built in Python, see de
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Options of the verb."""
     parser.add_argument("file", type=Path, help="mechanism, .toml, or body, e.g. rod.rom.npz")
-    parser.add_argument("--hinge", help="interface the body hangs on")
-    parser.add_argument("--axis", type=vector, default=(0.0, 0.0, 1.0), help="default 0,0,1")
-    parser.add_argument(
-        "--gravity", type=vector, default=(0.0, -9.81, 0.0), help="[m/s^2], default 0,-9.81,0"
-    )
-    parser.add_argument("--t-end", type=positive, help="duration [s]")
-    parser.add_argument("--dt", type=positive, help="time step [s]")
-    parser.add_argument(
-        "--film",
-        choices=("gif", "mp4", "glb", "vtkhdf"),
-        help="pictures, pictures by ffmpeg, to turn around in browsers, or for ParaView",
-    )
-    parser.add_argument(
-        "--history", choices=("csv", "h5"), help="every marker, reaction and energy, too"
-    )
-    parser.add_argument("-o", "--output", type=Path, help="folder, made if missing")
+    option(parser, "--hinge", "interface the body hangs on", str)
+    option(parser, "--axis", "default 0,0,1", vector, default=(0.0, 0.0, 1.0))
+    about = "[m/s^2], default 0,-9.81,0"
+    option(parser, "--gravity", about, vector, default=(0.0, -9.81, 0.0))
+    option(parser, "--t-end", "duration [s]", positive)
+    option(parser, "--dt", "time step [s]", positive)
+    about = "pictures, pictures by ffmpeg, to turn around in browsers, or for ParaView"
+    option(parser, "--film", about, str, choices=("gif", "mp4", "glb", "vtkhdf"))
+    about = "every marker, reaction and energy, too"
+    option(parser, "--history", about, str, choices=("csv", "h5"))
+    option(parser, "-o --output", "folder, made if missing", Path)
     add_force(parser)
     add_meshing(parser)
-    parser.add_argument(
-        "--resume", action="store_true", help="go on with the run that ended early in this folder"
-    )
+    option(parser, "--resume", "go on with the run that ended early in this folder")
 
 
 def run(args: argparse.Namespace) -> Answer:

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rom.cli.answer import Answer, failures, report_data
-from rom.cli.options import add_geometry, count, face, positive, reading, unique, vector
+from rom.cli.options import add_geometry, count, face, option, positive, reading, unique, vector
 from rom.cli.output import add_force, checked, claim
 from rom.errors import ConfigError
 from rom.names import inside
@@ -49,29 +49,19 @@ DRAWN_DEFORMATION_RATIO = 0.05  # largest deformation as drawn, of the body's si
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Options of the verb."""
     add_geometry(parser)
-    parser.add_argument(
-        "--hinge", metavar="FACE", required=True,
-        help="face it hangs on: a name, or in a .step file what --face takes, e.g. 12 or "
-        "radius:0.006",
-    )  # fmt: skip
-    parser.add_argument(
-        "--material", choices=sorted(MATERIALS), default="steel", help="default steel"
+    about = (
+        "face it hangs on: a name, or in a .step file what --face takes, e.g. 12 or radius:0.006"
     )
-    parser.add_argument(
-        "-m", "--modes", type=count, help="modes kept (default: as many as are needed)"
-    )
-    parser.add_argument(
-        "--gravity",
-        type=vector,
-        help="[m/s^2], default 9.81 along the axis most across the part and across its bore",
-    )
-    parser.add_argument("--t-end", type=positive, help="duration [s], default one swing")
-    parser.add_argument(
-        "--magnify", type=positive, help="of deformations, default so that they are seen"
-    )
-    parser.add_argument("--film", action="store_true", help="a film, too; half a second a picture")
-    parser.add_argument("--mp4", action="store_true", help="a film as .mp4, by ffmpeg")
-    parser.add_argument("-o", "--output", type=Path, required=True, help="folder, made if missing")
+    option(parser, "--hinge FACE", about, str, required=True)
+    option(parser, "--material", "default steel", str, choices=sorted(MATERIALS), default="steel")
+    option(parser, "-m --modes", "modes kept (default: as many as are needed)", count)
+    about = "[m/s^2], default 9.81 along the axis most across the part and across its bore"
+    option(parser, "--gravity", about, vector)
+    option(parser, "--t-end", "duration [s], default one swing", positive)
+    option(parser, "--magnify", "of deformations, default so that they are seen", positive)
+    option(parser, "--film", "a film, too; half a second a picture")
+    option(parser, "--mp4", "a film as .mp4, by ffmpeg")
+    option(parser, "-o --output", "folder, made if missing", Path, required=True)
     add_force(parser)
 
 
@@ -165,17 +155,10 @@ def planned(
     *,
     axis: Any = None,
 ) -> Swing:
-    """The swing of a body from rest, for one period of the rigid pendulum.
+    """The swing of a body from rest, for one period of the rigid pendulum if nobody says how long.
 
-    Args:
-        rigid: its mass, mass centre and inertia.
-        point: (3,) the hinge [m].
-        gravity: (3,) [m/s^2]; None for 9.81 along the coordinate axis most across the body.
-        t_end: duration [s]; None for one period.
-        axis: (3,) unit direction about which it turns; None for the one across gravity.
-
-    Raises:
-        ConfigError: if the body hangs at rest already.
+    About the hinge at a point (3,) [m] and its unit axis (3,), or the one across gravity (3,)
+    [m/s^2]; this is 9.81 along the coordinate axis most across the body if not given.
     """
     import numpy as np
 
@@ -256,11 +239,9 @@ def pendulum(body: "FlexibleBody", hinge: str, *, axis: Any, gravity: Any) -> "M
 
 
 def magnification(body: "FlexibleBody", q: Any) -> float:
-    """1, 2 or 5 times a power of ten, with which the largest deformation is seen; at least 1.
+    """1, 2 or 5 times a power of ten, at least 1, with which the largest deformation is seen.
 
-    Args:
-        body: the body, with its surface.
-        q: (n_t, r) elastic coordinates.
+    Of a body with its surface, over elastic coordinates q (n_t, r).
     """
     import numpy as np
 

@@ -10,7 +10,7 @@ from typing import Any
 
 from rom.cli.answer import Answer
 from rom.cli.described import component, described, mechanism
-from rom.cli.options import add_meshing, count, names
+from rom.cli.options import add_meshing, count, names, option
 from rom.cli.output import add_force, checked
 from rom.names import check_ending
 
@@ -26,15 +26,9 @@ EXAMPLES = """\
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Options of the verb."""
     parser.add_argument("file", type=Path, help="body file, e.g. rod.rom.npz, or .toml file")
-    parser.add_argument("-n", "--number", type=count, default=6, help="number of modes (default 6)")
-    parser.add_argument(
-        "--fixed",
-        metavar="NAME,...",
-        type=names,
-        default=(),
-        help="interfaces held, wholly or as NAME:yz, for modes",
-    )
-    parser.add_argument("-o", "--output", type=Path, help="picture, .png, and no window")
+    option(parser, "-n --number", "number of modes (default 6)", count, default=6)
+    option(parser, "--fixed NAME,...", "interfaces held, wholly or as NAME:yz, for modes", names)
+    option(parser, "-o --output", "picture, .png, and no window", Path)
     add_meshing(parser)
     add_force(parser)
 

@@ -42,7 +42,7 @@ def input_deck(
     """The text of a deck in SI: nodes, elements, sets, and with a material a step to run.
 
     Stiffness is that of `rom.fe.model`, for straight elements and the same degree. The mass of
-    CalculiX is not: see `rom.io.matrices.calculix`.
+    CalculiX is not: see `rom.io.matrices.matrix_files`.
 
     Args:
         mesh: tetrahedra, as `rom.fe.mesh.read.read_mesh` gives them.

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from rom import rotation
 from rom.io.files import write_whole
 from rom.model import Array, Index
 
@@ -137,7 +138,7 @@ def _add(document: _Document, body: MovingMesh, clock: int, motion: dict[str, An
             {"POSITION": document.accessor(u, target=VERTICES_TARGET, bounds=True)} for u in shapes
         ]
         mesh["weights"] = weights[0].tolist()
-    quaternion = _scalar_last(_continuous(body.orientation))
+    quaternion = _scalar_last(rotation.continuous(body.orientation))
     node = {"name": body.name, "mesh": document.put("meshes", mesh)}
     node |= {"translation": body.origin[0].tolist(), "rotation": quaternion[0]}
     number = document.put("nodes", node)
@@ -164,12 +165,6 @@ def _targets(body: MovingMesh) -> tuple[list[Array], Array]:
 def _material(colour: tuple[float, float, float]) -> dict[str, Any]:
     surface = {"baseColorFactor": [*colour, 1.0], "metallicFactor": 0.2, "roughnessFactor": 0.6}
     return {"pbrMetallicRoughness": surface, "doubleSided": True}
-
-
-def _continuous(p: Array) -> Array:
-    """Signs of quaternions such that neighbours are near."""
-    flips = np.where(np.einsum("fi,fi->f", p[1:], p[:-1]) < 0, -1.0, 1.0)
-    return p * np.cumprod(np.r_[1.0, flips])[:, None]
 
 
 def _scalar_last(p: Array) -> Any:

@@ -29,40 +29,23 @@ COMPLEX_TYPES, DOUBLE_TYPES = (5, 6), (4, 6)  # types of ordinate
 
 @dataclass(frozen=True, slots=True)
 class Function:
-    """One dataset 58.
+    """One dataset 58."""
 
-    Attributes:
-        kind: type of function; 4 is a frequency response, 6 a coherence, 1 a time response.
-        x: (n,) abscissa, mostly frequency [Hz] or time [s].
-        y: (n,) real or complex ordinate.
-        response: node and direction (1 to 3 translation, 4 to 6 rotation, negative against it).
-        reference: node and direction of the force.
-        numerator: type of the ordinate: 8 displacement, 11 velocity, 12 acceleration, 13 force.
-        denominator: type of what it is divided by.
-        labels: the first five lines, stripped.
-        units: labels of the units of numerator and denominator, stripped.
-        entities: names of what response and reference belong to, stripped; "NONE" without one.
-        abscissa: label of the unit of the abscissa, stripped.
-    """
-
-    kind: int
-    x: Array
-    y: Any
+    kind: int  # 4 is a frequency response, 6 a coherence, 1 a time response
+    x: Array  # (n,) abscissa, mostly frequency [Hz] or time [s]
+    y: Any  # (n,) real or complex ordinate
+    # node and direction: 1 to 3 translation, 4 to 6 rotation, negative against it
     response: tuple[int, int]
-    reference: tuple[int, int]
-    numerator: int
-    denominator: int
-    labels: tuple[str, ...]
-    units: tuple[str, str] = ("", "")
-    entities: tuple[str, str] = ("", "")
-    abscissa: str = ""
+    reference: tuple[int, int]  # the same of the force
+    numerator: int  # 8 displacement, 11 velocity, 12 acceleration, 13 force
+    denominator: int  # type of what it is divided by
+    labels: tuple[str, ...]  # first five lines, stripped
+    units: tuple[str, str] = ("", "")  # labels, of numerator and denominator
+    entities: tuple[str, str] = ("", "")  # of response and reference; "NONE" without one
+    abscissa: str = ""  # label of its unit
 
     def receptance(self) -> npt.NDArray[np.complex128]:
-        """(n,) displacement per force [m/N], whatever was measured.
-
-        Raises:
-            ConfigError: if this is no motion per force.
-        """
+        """(n,) displacement per force [m/N], whatever was measured."""
         if self.kind != FREQUENCY_RESPONSE or self.denominator != FORCE_TYPE:
             raise ConfigError(f"{_name(self)}: the function must be a response to a force.")
         if self.numerator not in PER_RECEPTANCE:
@@ -92,15 +75,7 @@ def read_universal(path: str | Path) -> tuple[Function, ...]:
 
 
 def scan(path: str | Path) -> tuple[tuple[Function, ...], dict[str, list[list[str]]]]:
-    """All datasets of a universal file: functions, and lines of the others by their number.
-
-    Args:
-        path: the file, .unv or .uff.
-
-    Raises:
-        FileFormatError: if the file is missing, or a dataset is cut.
-        UnsafeFileError: if it is larger than 1 GiB.
-    """
+    """All datasets of a universal file: functions, and lines of the others by their number."""
     path = check_readable(path, MAX_BYTES)
     data, place = path.read_bytes(), 0
     found: list[Function] = []
@@ -131,15 +106,8 @@ def assemble(
 ) -> tuple[Array, npt.NDArray[np.complex128]]:
     """Frequencies (n_f,) [Hz] and receptances (n_f, n_s, n_e) [m/N] of chosen dofs.
 
-    A dof measured against its direction counts with the opposite sign.
-
-    Args:
-        functions: as read.
-        responses: (n_s) nodes and directions of the sensors.
-        references: (n_e) nodes and directions of the exciters.
-
-    Raises:
-        ConfigError: if a function is missing or has other frequencies.
+    Sensors (n_s) and exciters (n_e) are nodes and directions; a dof measured against its direction
+    counts with the opposite sign.
     """
     known = {_key(f): f for f in functions if f.kind == FREQUENCY_RESPONSE}
     columns: list[npt.NDArray[np.complex128]] = []

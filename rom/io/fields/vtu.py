@@ -2,12 +2,12 @@
 
 import base64
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from rom.arguments import AnySolution, typed, whole
+from rom.arguments import AnySolution, Count, typed
 from rom.body.flexible import FlexibleBody
 from rom.body.records import Surface
 from rom.body.recovery import von_mises
@@ -39,8 +39,7 @@ def write_vtu(body: FlexibleBody, path: str | Path) -> Path:
         f"{label}, {omega / (2 * np.pi):.6g} Hz": shapes[:, :, k]
         for k, (label, omega) in enumerate(zip(body.labels, body.omega, strict=True))
     }
-    text = grid(surface.points, surface.triangles, VTK_TRIANGLE, at_points=fields)
-    return write_whole(path, text.encode())
+    return write_whole(path, _drawn(surface, fields))
 
 
 @typed
@@ -71,7 +70,7 @@ def write_stress(
 
 @typed
 def write_stress_history(
-    solution: AnySolution, body: str, path: str | Path, *, every: int = 1
+    solution: AnySolution, body: str, path: str | Path, *, every: Annotated[int, Count(1)] = 1
 ) -> Path:
     """Write stress and displacement of a moving body as a series for ParaView.
 
@@ -87,7 +86,6 @@ def write_stress_history(
         ConfigError: if the stress of the body cannot be recovered, or the place is not writable.
         ResourceError: if the disk is full.
     """
-    whole("every", every, 1)
     path = check_ending(path, "a motion", ".pvd")
     part = solution.mechanism.part(body)
     folder, lines = path.with_suffix(""), []
@@ -105,13 +103,17 @@ def write_stress_history(
 
 
 def _stressed(surface: Surface, q: Array, stress: Array) -> bytes:
+    motion = (surface.shape @ np.asarray(q, dtype=float)).reshape(-1, 3)
     fields = {
         "stress xx yy zz yz xz xy [Pa]": stress,
         "von Mises stress [Pa]": von_mises(stress),
-        "displacement [m]": (surface.shape @ np.asarray(q, dtype=float)).reshape(-1, 3),
+        "displacement [m]": motion,
     }
-    text = grid(surface.points, surface.triangles, VTK_TRIANGLE, at_points=fields)
-    return text.encode()
+    return _drawn(surface, fields)
+
+
+def _drawn(surface: Surface, fields: dict[str, Any]) -> bytes:
+    return grid(surface.points, surface.triangles, VTK_TRIANGLE, at_points=fields).encode()
 
 
 def grid(
@@ -122,14 +124,10 @@ def grid(
     at_points: dict[str, Any] | None = None,
     at_cells: dict[str, Any] | None = None,
 ) -> str:
-    """Text of a file with cells of one kind.
+    """Text of a file with cells of one kind, VTK's number of it.
 
-    Args:
-        points: (n, 3) positions [m].
-        cells: (m, k) node numbers in VTK's order.
-        kind: VTK's number of the cell.
-        at_points: {name: (n,) or (n, c) values}.
-        at_cells: {name: (m,) or (m, c) values}.
+    Points (n, 3) [m], their numbers in cells (m, k) in VTK's order; values {name: (n,) or (n, c)}
+    at points, {name: (m,) or (m, c)} at cells.
     """
     m, k = cells.shape
     topology = {

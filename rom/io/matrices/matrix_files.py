@@ -1,5 +1,23 @@
-"""Square matrices of other finite element programs, each in its own kind of file."""
+"""Square matrices of other finite element programs, each in its own kind of file.
 
+Matrix Market is read here and not by SciPy: on a damaged file its version 1.17 ends the whole
+process, and 1.10 takes the memory that a wrong head announces.
+
+CalculiX stores by ``*FREQUENCY, SOLVER=MATRIXSTORAGE``: stiffness ``.sti`` and mass ``.mas`` hold
+lines ``row column value`` of the upper triangle, rows counted from 1, every diagonal entry among
+them; ``.dof`` of the same name holds a line ``node.component`` for each row. Rows of supports and
+of dependent nodes are left out. It integrates the mass with the Gauss points of the stiffness: one
+for C3D4, four for C3D10. Straight elements have the stiffness of `rom.fe` to round-off but too
+little inertia in short waves: ten frequencies of a coarse beam are up to 0.2 % (C3D10) and 9 %
+(C3D4) above those with exact mass.
+
+Source:
+    R. F. Boisvert, R. Pozo, K. A. Remington, The Matrix Market Exchange Formats, NISTIR 5935, 1996.
+    CalculiX CrunchiX user's manual, *FREQUENCY; files and matrices of version 2.20.
+"""
+
+import re
+import warnings
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -8,31 +26,30 @@ import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix
 
 from rom.decks.lines import whole
-from rom.errors import ConfigError, FileFormatError
+from rom.errors import ConfigError, FileFormatError, UnsafeFileError, in_file
 from rom.io.files import check_last_line, check_readable, write_whole
-from rom.io.matrices.calculix import MATRIX_ENDINGS, read_stored_matrix
 from rom.io.matrices.dmig import Dofs, labelled, read_dmig
-from rom.io.matrices.market import BANNER_TEXT, read_market
 from rom.io.matrices.op4 import Matrices, read_op4
 from rom.io.matrices.user_element import read_user_element
+from rom.model import Array, Index
 from rom.names import offered
 
+BANNER_TEXT = b"%%MatrixMarket"
+MOST_ROWS = 10_000_000
+SIGNS = {"general": 0.0, "symmetric": 1.0, "hermitian": 1.0, "skew-symmetric": -1.0}
+MATRIX_ENDINGS = (".sti", ".mas")
+LABEL_PATTERN = re.compile(r"(\d{1,18})\.([1-6])")
+REWRITE_HINT = "Let CalculiX write .sti, .mas and .dof again; they belong together."
 HEAD_BYTES = 10_000  # among which a user element is announced
 
 
 @dataclass(frozen=True, slots=True)
 class NamedMatrix:
-    """A matrix of another program.
+    """A matrix of another program."""
 
-    Attributes:
-        where: file and name, for messages.
-        A: (n, n) sparse, as written: of a symmetric one there may be one triangle only.
-        dofs: (n, 2) label and component 1 to 6 of each row; None for rows in the order of nodes.
-    """
-
-    where: str
-    A: csr_matrix
-    dofs: Dofs | None = None
+    where: str  # file and name, for messages
+    A: csr_matrix  # (n, n) as written: of a symmetric one there may be one triangle only
+    dofs: Dofs | None = None  # (n, 2) label, component 1 to 6; None for rows in the order of nodes
 
 
 def read_matrix(source: Any) -> NamedMatrix:
@@ -147,3 +164,155 @@ def _finite(A: Any, path: Path) -> Any:
     if not np.isfinite(A.data).all():
         raise FileFormatError("a number is not finite.", where=str(path))
     return A
+
+
+def read_market(path: str | Path) -> csr_matrix:
+    """The whole matrix, both triangles of a symmetric one.
+
+    Raises:
+        FileFormatError: if the file is no such file, cut, or holds a matrix that is not real.
+        UnsafeFileError: if its head announces more numbers than the file can hold.
+    """
+    path = Path(path)
+    check_last_line(path)
+    with in_file(path), path.open(encoding="latin1") as file:
+        words = file.readline(200).lower().split()[1:]
+        line = file.readline(2000)
+        while line.startswith("%") or (line and not line.strip()):
+            line = file.readline(2000)
+        if words[:1] != ["matrix"] or len(words) != 4 or words[2] not in ("real", "integer"):
+            raise FileFormatError("the matrix is not real.")
+        _, form, _, symmetry = words
+        try:
+            if form not in ("coordinate", "array") or symmetry not in SIGNS:
+                raise ValueError(f"'{form} {words[2]} {symmetry}' is unknown")
+            sizes = _sizes(line, 3 if form == "coordinate" else 2)
+            if max(sizes[:2]) > MOST_ROWS or 2 * sizes[-1] > path.stat().st_size:
+                raise UnsafeFileError(f"sizes {sizes} do not fit the file.")
+            table = _market_table(file)
+            read = _coordinates if form == "coordinate" else _dense
+            i, j, values = read(table, sizes, SIGNS[symmetry])
+        except (ValueError, OverflowError) as error:
+            raise FileFormatError(f"this is no Matrix Market file: {error}.") from error
+    mirrored = SIGNS[symmetry] * values * (i != j)
+    both = (np.r_[values, mirrored], (np.r_[i, j], np.r_[j, i])) if SIGNS[symmetry] else (
+        values, (i, j))  # fmt: skip
+    return coo_matrix(both, shape=sizes[:2]).tocsr()
+
+
+def _sizes(line: str, n: int) -> tuple[int, ...]:
+    """Rows and columns, and entries of coordinates."""
+    sizes = tuple(int(word) for word in line.split())
+    if len(sizes) != n or min(sizes) < 0 or min(sizes[:2]) < 1:
+        raise ValueError(f"{line.strip()!r} are no sizes")
+    return sizes
+
+
+def _market_table(file: Any) -> Array:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # of NumPy, if there is no line
+        return np.loadtxt(file, comments="%", ndmin=2)
+
+
+def _coordinates(table: Array, sizes: tuple[int, ...], _: float) -> tuple[Index, Index, Array]:
+    """Rows and columns from zero, and values."""
+    if table.size != 3 * sizes[2] or table.shape[1] not in (0, 3):
+        raise ValueError(f"{len(table)} lines where {sizes[2]} entries are announced")
+    place = table.reshape(-1, 3)[:, :2]
+    if not ((place >= 1) & (place <= sizes[:2]) & (place % 1 == 0)).all():
+        raise ValueError(f"an entry is outside of {sizes[0]} x {sizes[1]}")
+    i, j = place.astype(np.int64).T - 1
+    return i, j, table.reshape(-1, 3)[:, 2]
+
+
+def _dense(table: Array, sizes: tuple[int, ...], sign: float) -> tuple[Index, Index, Array]:
+    """Column by column; of symmetric matrices the lower triangle, of skew ones without diagonal."""
+    rows, columns = sizes
+    n = rows * columns if not sign else rows * (rows + int(sign)) // 2
+    if table.size != n:
+        raise ValueError(f"{table.size} numbers where {n} are announced")
+    if not sign:
+        j, i = np.divmod(np.arange(n), rows)
+        return i, j, table.ravel()
+    if rows != columns:
+        raise ValueError(f"{rows} x {columns} is not square")
+    j, i = np.triu_indices(rows, 0 if sign > 0 else 1)
+    return i, j, table.ravel()
+
+
+def read_stored_matrix(path: str | Path) -> tuple[csr_matrix, Dofs]:
+    """The upper triangle (n, n) and (n, 2) node and component of each row.
+
+    Args:
+        path: ``.sti`` or ``.mas``; the ``.dof`` stands beside.
+
+    Raises:
+        FileFormatError: naming the line, if one of the two is missing, damaged or cut, or they do
+            not fit together.
+    """
+    path = Path(path)
+    dofs = _dofs(path.with_suffix(".dof"))
+    table = _table(path)
+    place = table[:, :2].astype(np.int64)
+    outside = (place < 1) | (place > len(dofs)) | (place != table[:, :2])
+    if outside.any():
+        line = int(np.flatnonzero(outside.any(axis=1))[0])
+        raise FileFormatError(
+            f"rows and columns are 1 to {len(dofs)}, as {path.stem}.dof lists them.",
+            where=f"{path}, line {line + 1}",
+            hint=REWRITE_HINT,
+        )
+    i, j = place.T - 1
+    missing = np.setdiff1d(np.arange(len(dofs)), i[i == j])
+    twice = len(place) - len(np.unique(i * len(dofs) + j))
+    if missing.size or twice:
+        raise FileFormatError(
+            f"{missing.size} of {len(dofs)} diagonal entries are missing and {twice} entries "
+            "come twice: the file is cut or changed.",
+            where=str(path),
+            hint=REWRITE_HINT,
+        )
+    return coo_matrix((table[:, 2], (i, j)), shape=(len(dofs),) * 2).tocsr(), dofs
+
+
+def _table(path: Path) -> Array:
+    """(entries, 3) row, column, value."""
+    check_last_line(path)
+    try:
+        table = np.loadtxt(path, comments=None, ndmin=2, encoding="latin1")
+        if table.shape[1] == 3:
+            return table
+    except ValueError:
+        pass
+    with path.open(encoding="latin1") as file:
+        number = next((k for k, line in enumerate(file, 1) if not _is_entry(line)), 1)
+    raise FileFormatError(
+        "an entry is row, column, value.", where=f"{path}, line {number}", hint=REWRITE_HINT
+    )
+
+
+def _is_entry(line: str) -> bool:
+    try:
+        return len([float(word) for word in line.split()]) == 3
+    except ValueError:
+        return False
+
+
+def _dofs(path: Path) -> Dofs:
+    """(n, 2); the label is text: read as a number, 12.10 would be 12.1."""
+    check_last_line(path)
+    rows = []
+    with path.open(encoding="latin1") as file:
+        for number, line in enumerate(file, 1):
+            found = LABEL_PATTERN.fullmatch(line.strip())
+            if not found:
+                raise FileFormatError(
+                    "a row is node.component, with 1 to 6 for the component.",
+                    where=f"{path}, line {number}",
+                    hint=REWRITE_HINT,
+                )
+            rows.append((int(found[1]), int(found[2])))
+    dofs = np.array(rows, dtype=np.int64)
+    if len(np.unique(dofs, axis=0)) < len(dofs):
+        raise FileFormatError("a row is listed twice.", where=str(path), hint=REWRITE_HINT)
+    return dofs

@@ -35,15 +35,10 @@ DIALECTS = {  # mode is the second index of m1; columns of Gr and of Ge axis by 
 
 @dataclass(frozen=True, slots=True)
 class Taylor:
-    """A matrix of first order in the elastic coordinates.
+    """A matrix of first order in the elastic coordinates."""
 
-    Attributes:
-        M0: (n, m) its value for the undeformed body.
-        M1: (r, n, m) its change per unit of each elastic coordinate; None for order zero.
-    """
-
-    M0: Array
-    M1: Array | None = None
+    M0: Array  # (n, m) for the undeformed body
+    M1: Array | None = None  # (r, n, m) change per elastic coordinate; None for order zero
 
 
 @dataclass(frozen=True, slots=True)

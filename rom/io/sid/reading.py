@@ -24,20 +24,12 @@ LONGEST_MESSAGE = 200  # characters that quote a damaged file
 
 @dataclass(slots=True)
 class RawBlock:
-    """A block as written; the order of the three indices of m1 is not known yet.
-
-    Attributes:
-        name: of the block.
-        sizes: order, nrow, ncol, nq, nqn, structure.
-        m0: {(row, column): value}, from one.
-        m1: {(row, second, third): value}, from one.
-        line: where it begins.
-    """
+    """A block as written; the order of the three indices of m1 is not known yet."""
 
     name: str
-    line: int
-    sizes: dict[str, int] = field(default_factory=dict)
-    m0: dict[tuple[int, int], float] = field(default_factory=dict)
+    line: int  # where it begins
+    sizes: dict[str, int] = field(default_factory=dict)  # order, nrow, ncol, nq, nqn, structure
+    m0: dict[tuple[int, int], float] = field(default_factory=dict)  # indices from one
     m1: dict[tuple[int, int, int], float] = field(default_factory=dict)
     dropped: int = 0
 
@@ -78,12 +70,7 @@ class _Lines:
 
 
 def read_raw(path: str | Path) -> RawFile:
-    """The content of a file as written, its sizes checked before memory is taken.
-
-    Raises:
-        FileFormatError: naming the line, if the file is missing, cut, or no SID.
-        UnsafeFileError: if it is larger than 256 MiB or has more than 1000 coordinates.
-    """
+    """The content of a file as written, its sizes checked before memory is taken."""
     file = RawFile(check_readable(path, MAX_BYTES))
     lines = _Lines(file, file.path.read_bytes().decode("ascii", "replace"))
     file.title = HEAD_PATTERN.sub("", lines.next()).strip().removesuffix(f"; {ORIGIN_MARK}")

@@ -22,8 +22,7 @@ from numba.core.compiler_lock import global_compiler_lock
 
 from rom.places import PACKAGE
 from rom.process.child import lasting_scratch, trusted
-from rom.process.patience import Patience
-from rom.process.turns import Turns
+from rom.process.patience import Patience, Turns
 
 IMPORTS = re.compile(rb"^from (rom[.\w]*) import (\([^)]*\)|.*)", re.MULTILINE)
 # in sources of kernels, and the folders of what they contain and are made by

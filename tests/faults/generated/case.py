@@ -40,25 +40,17 @@ def require(holds: object, what: object) -> None:
 
 @dataclass(frozen=True)
 class Case:
-    """A fault.
+    """A fault."""
 
-    Attributes:
-        name: what is wrong, unique in its class.
-        act: a command line behind ``rom``, or a function of the working folder.
-        accept: error classes, `Works`, `Warned` or `Silent`.
-        words: all must stand in the message; of a tuple one will do.
-        given: functions of the folder that prepare it.
-        fe: whether it needs FEniCSx.
-        leaves: whether files may stay although an error is raised.
-    """
-
-    name: str
-    act: str | Callable[[Path], Any]
-    accept: tuple[type, ...]
-    words: tuple[str | tuple[str, ...], ...] = ()
-    given: tuple[Callable[[Path], object], ...] = field(default=(), repr=False)
-    fe: bool = False
-    leaves: bool = False
+    name: str  # what is wrong, unique in its class
+    act: str | Callable[[Path], Any]  # a command line behind ``rom``, or a function of the folder
+    accept: tuple[type, ...]  # error classes, `Works`, `Warned` or `Silent`
+    words: tuple[str | tuple[str, ...], ...] = ()  # all stand in the message, of a tuple one
+    given: tuple[Callable[[Path], object], ...] = field(
+        default=(), repr=False
+    )  # prepare the folder
+    fe: bool = False  # needs FEniCSx
+    leaves: bool = False  # files may stay although an error is raised
 
 
 def case(name: str, act: Any, accept: Any, *words: Any, given: Any = (), **options: Any) -> Case:

@@ -8,6 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 
 import rom
+from cases.command import python, ran
 from generated.case import Silent, Works, case, require
 from generated.stock import KINDS, body, model, pendulum
 from rom.cli.main import main
@@ -40,8 +41,7 @@ CIRCUMSTANCES = {  # of the environment: none of them changes what is computed
 def started(*words, **environment):
     """A finished process of rom, with some variables changed or taken away."""
     env = {k: v for k, v in (os.environ | environment).items() if v is not None}
-    return subprocess.run([sys.executable, "-m", "rom", *words], env=env, capture_output=True,
-                          timeout=60, check=False, stdin=subprocess.DEVNULL)  # fmt: skip
+    return python("-m", "rom", *words, env=env, stdin=subprocess.DEVNULL)
 
 
 def beginning(*words):
@@ -57,9 +57,7 @@ def without(library, words):
             f"import sys; sys.modules[{library!r}] = None; from rom.cli.main import main; "
             f"sys.exit(main({words.split()!r}))"
         )
-        done = subprocess.run(
-            [sys.executable, "-P", "-c", code], capture_output=True, text=True, check=False
-        )
+        done = ran(sys.executable, "-P", "-c", code)
         require("Traceback" not in done.stderr, done.stderr[-500:])
         require(done.returncode == 6, f"exit code {done.returncode}: {done.stderr[-300:]}")
         raise ResourceError(done.stderr)
@@ -113,28 +111,21 @@ def written(folder, k):
     return rom.load(folder / "same.npz").K
 
 
-def gone(folder):
+def in_a_gone_folder(call, wanted):
     """The working folder is deleted while one works in it."""
-    inner = folder / "inner"
-    inner.mkdir()
-    os.chdir(inner)
-    inner.rmdir()
-    try:
-        code = main(["check", str(folder / "good.npz"), "-q"])
-    finally:
-        os.chdir(folder)
-    require(code == 0, f"exit code {code}")
 
+    def act(folder):
+        inner = folder / "inner"
+        inner.mkdir()
+        os.chdir(inner)
+        inner.rmdir()
+        try:
+            found = call(folder)
+        finally:
+            os.chdir(folder)
+        require(found == wanted, found)
 
-def gone_output(folder):
-    inner = folder / "inner"
-    inner.mkdir()
-    os.chdir(inner)
-    inner.rmdir()
-    try:
-        rom.save(body(), "a.npz")
-    finally:
-        os.chdir(folder)
+    return act
 
 
 def same_bits(folder):
@@ -142,9 +133,8 @@ def same_bits(folder):
     for name, seed in (("a", "1"), ("b", "2")):
         done = started("simulate", "pendulum.toml", "-o", name, "-q", PYTHONHASHSEED=seed)
         require(done.returncode == 0, done.stderr[-300:])
-    require(
-        (folder / "a/motion.csv").read_bytes() == (folder / "b/motion.csv").read_bytes(), "bits"
-    )
+    one, other = ((folder / name / "motion.csv").read_bytes() for name in "ab")
+    require(one == other, "bits")
 
 
 def again(folder):
@@ -169,8 +159,10 @@ CASES = [
     case("motions in threads", threads(motion), Works),
     case("reductions in threads", threads(frequencies), Works),
     case("one file from several threads", threads(written), Works),
-    case("a folder that is gone", gone, Works),
-    case("a folder that is gone as output", gone_output, (ConfigError, ResourceError), ("a.npz", "folder")),
+    case("a folder that is gone", in_a_gone_folder(
+        lambda folder: main(["check", str(folder / "good.npz"), "-q"]), 0), Works),
+    case("a folder that is gone as output",
+         in_a_gone_folder(lambda folder: rom.save(body(), "a.npz"), None), (ConfigError, ResourceError), ("a.npz", "folder")),
     case("two processes, the same bits", same_bits, Works),
     case("a call after an error", again, Works),
     case("a folder instead of a motion", "report out -o a.html", (FileFormatError, ConfigError), "out",

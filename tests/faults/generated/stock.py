@@ -74,30 +74,15 @@ t_end = 0.05
 dt = 0.01
 """
 LOCK = """gravity = [0, 0, 0]
-[bodies.a]
-mass = 1.0
-inertia = [1e-3, 1e-3, 1e-3]
-at = [0.1, 0, 0]
-markers.c = [0, 0, 0]
-[bodies.b]
-mass = 1.0
-inertia = [1e-3, 1e-3, 1e-3]
-at = [0, 0.2, 0]
-markers.c = [0, 0, 0]
-[joints.x]
-kind = "prismatic"
-between = [{ ground = [0, 0, 0] }, "a.c"]
-axis = [1, 0, 0]
-[joints.y]
-kind = "prismatic"
-between = [{ ground = [0, 0, 0] }, "b.c"]
-axis = [0, 1, 0]
-[joints.rod]
-kind = "distance"
-between = ["a.c", "b.c"]
-[drives.push]
-joint = "x"
-law = { kind = "run-up", rate = 1.0, duration = 0.05 }
+[bodies]
+a = { mass = 1.0, inertia = [1e-3, 1e-3, 1e-3], at = [0.1, 0, 0], markers.c = [0, 0, 0] }
+b = { mass = 1.0, inertia = [1e-3, 1e-3, 1e-3], at = [0, 0.2, 0], markers.c = [0, 0, 0] }
+[joints]
+x = { kind = "prismatic", between = [{ ground = [0, 0, 0] }, "a.c"], axis = [1, 0, 0] }
+y = { kind = "prismatic", between = [{ ground = [0, 0, 0] }, "b.c"], axis = [0, 1, 0] }
+rod = { kind = "distance", between = ["a.c", "b.c"] }
+[drives]
+push = { joint = "x", law = { kind = "run-up", rate = 1.0, duration = 0.05 } }
 [simulation]
 t_end = 1.0
 dt = 0.005

@@ -1,30 +1,70 @@
-"""A statically reduced body as flexible body ``/FXBODY`` of OpenRadioss, a punch file ``.pch``.
+"""Bodies in the coordinates of their interfaces for Simscape Multibody and OpenRadioss."""
 
-Its reader takes KAAX and MAAX as DMIG cards in fields of 16 characters and nothing else: no nodes,
-no damping, no modes. Every label is a node of its model; three must not lie on one line.
-
-Source:
-    Radioss reference guide, /FXBODY; what OpenRadioss reads from each line.
-"""
-
+import io
 from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
+from scipy.io import savemat
 
 from rom.body.flexible import FlexibleBody
 from rom.errors import ConfigError
+from rom.io.files import write_whole
 from rom.io.matrices.dmig import write_dmig
 from rom.io.programs.interface_form import interface_form
+from rom.names import ORIGIN_MARK
 
 MIN_POINTS = 3
 COLLINEAR_RTOL = 1e-6  # second over first singular value of points on one line
 
 
+def write_simscape(body: FlexibleBody, path: str | Path) -> Path:
+    """Write a body for the block Reduced Order Flexible Solid (``.mat``, version 5).
+
+    In MATLAB: ``rod = load("rod.mat")``, then ``rod.K`` and so on in the fields of the block, with
+    the units of ``rod.units``: six rows for each frame (translation, rotation), then the modes,
+    rigid motions included. All frames are parallel to the body.
+
+    Args:
+        body: with interfaces of six coordinates each.
+        path: file ending in ``.mat``.
+
+    Raises:
+        ConfigError: if an interface is not rigid or averaged, or the place is not writable.
+        ModelError: if the shapes of the body do not let its interfaces move one by one.
+        ResourceError: if the disk is full.
+    """
+    form = interface_form(body)
+    variables = {
+        "K": form.K,
+        "M": form.M,
+        "C": form.D,
+        "origins": np.array(list(form.points.values())),
+        "quaternions": np.tile([1.0, 0.0, 0.0, 0.0], (len(form.names), 1)),
+        "interfaces": np.array(form.names, dtype=object)[:, None],
+        "frequencies": form.omega[:, None] / (2 * np.pi),  # interfaces held [Hz]
+        "mass": body.mass,
+        "centre": body.first_moment / body.mass,
+        "units": "m, kg, s, rad; frequencies in Hz",
+        "name": body.name,
+    }
+    memory = io.BytesIO()
+    savemat(memory, variables)
+    # the text at the head of a file has the date, which would make every file a new one
+    content = f"MATLAB 5.0 MAT-file, {ORIGIN_MARK}".encode().ljust(116) + memory.getvalue()[116:]
+    return write_whole(path, content)
+
+
 def write_radioss(
     body: FlexibleBody, path: str | Path, *, nodes: Mapping[str, int] | None = None
 ) -> Path:
-    """Write stiffness and mass of the interfaces, six components each, ten digits.
+    """Write a statically reduced body as flexible body ``/FXBODY``, with ten digits.
+
+    Its reader takes KAAX and MAAX as DMIG cards in fields of 16 characters and nothing else: no
+    nodes, no damping, no modes. Every label is a node of its model; three must not lie on one line.
+
+    Source:
+        Radioss reference guide, /FXBODY; what OpenRadioss reads from each line.
 
     Args:
         body: reduced by `rom.Guyan`, with at least three interfaces of six coordinates.
