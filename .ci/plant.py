@@ -39,7 +39,6 @@ TESTS = {
     "rom/components/tendons": ["tests/mbs/elements/test_mbs_tendons.py"],
     "rom/mbs/elements/": ["tests/mbs/elements/test_mbs_joint_forces.py", "tests/mbs"],
     "rom/mbs/kernels/constraints": ["tests/mbs/joints", "tests/mbs"],
-    "rom/mbs/kernels/rolling": ["tests/mbs/joints/test_mbs_couplings.py", "tests/mbs"],
     "rom/mbs/results/": ["tests/mbs/integrate/test_mbs_audit.py", "tests/mbs"],
     "rom/mbs/kernels/second_order": [
         "tests/mbs/published/test_mbs_stiffening.py",

@@ -10,9 +10,9 @@ from rom.errors import ConfigError, SolverError
 from rom.fmu.inputs import Inputs
 from rom.fmu.outputs import Outputs
 from rom.io.fmu.variables import Variable
+from rom.mbs.elements.family import apply_laws
 from rom.mbs.equations.equations import evaluate
 from rom.mbs.equations.packing import Packed, pack
-from rom.mbs.equations.python_laws import apply_laws
 from rom.mbs.integrate.consistent_start import initial_state, with_accelerations
 from rom.mbs.integrate.simulation import simulate
 from rom.mbs.kernels.work import Work, workspace

@@ -24,8 +24,7 @@ from rom.arguments import (
 from rom.errors import ConfigError
 from rom.fields import Methods, Open, families, find
 from rom.mbs.connections import drives as joint_drives
-from rom.mbs.connections import gears, lower_pairs, rolling, universal
-from rom.mbs.connections import points as joint_points
+from rom.mbs.connections import lower_pairs, points
 from rom.mbs.elements.family import Family
 from rom.mbs.parts.bodies import GROUND, Marker, Part, flexible_part, ground_part, rigid_part
 from rom.mbs.parts.joints import Joint, Row, coordinate_of
@@ -137,15 +136,15 @@ class Mechanism(Methods, metaclass=Open, kind="methods", bound=bound):
     cylindrical = lower_pairs.cylindrical
     prismatic = lower_pairs.prismatic
     spherical = lower_pairs.spherical
-    universal = universal.universal
+    universal = points.universal
     fixed = lower_pairs.fixed
     planar = lower_pairs.planar
     screw = lower_pairs.screw
-    point_on_line = joint_points.point_on_line
-    point_on_plane = joint_points.point_on_plane
-    distance = joint_points.distance
-    rolling = rolling.rolling
-    gear = gears.gear
+    point_on_line = points.point_on_line
+    point_on_plane = points.point_on_plane
+    distance = points.distance
+    rolling = points.rolling
+    gear = joint_drives.gear
     drive = joint_drives.drive
 
     def __post_init__(self) -> None:
@@ -205,11 +204,11 @@ class Mechanism(Methods, metaclass=Open, kind="methods", bound=bound):
             array([1.1, 0. , 0. ])
         """
         pose = start_pose(at, orientation, velocity, omega)
-        points = {
+        places = {
             check_text(key, "a marker"): finite(f"marker {key}", x, (3,))
             for key, x in (markers or {}).items()
         }
-        part = rigid_part(name, mass, matrix33("inertia", inertia), pose, points)
+        part = rigid_part(name, mass, matrix33("inertia", inertia), pose, places)
         return self._enter(part, spin)
 
     def add_flexible(  # noqa: PLR0913  one keyword per property of a body

@@ -9,6 +9,7 @@ from scipy.linalg import solve_triangular
 
 from rom.arguments import number
 from rom.errors import ConfigError, ModelError, SolverError
+from rom.mbs.elements.family import Laws, apply_laws
 from rom.mbs.equations.equations import (
     evaluate,
     linearize_constraints,
@@ -18,7 +19,6 @@ from rom.mbs.equations.equations import (
 )
 from rom.mbs.equations.packing import Packed, pack
 from rom.mbs.equations.pattern import Pattern
-from rom.mbs.equations.python_laws import Laws, apply_laws
 from rom.mbs.integrate.consistent_start import (
     fitting_velocity,
     independent,

@@ -25,6 +25,7 @@ from rom.mbs.kernels.algebra import (
     inverse_tangent,
     mtv,
     mv,
+    place,
     row,
     scale,
     sub,
@@ -34,7 +35,7 @@ from rom.mbs.kernels.algebra import (
     unit_twist,
 )
 from rom.mbs.kernels.compiled import inner
-from rom.mbs.kernels.constraints import pair_stiffness
+from rom.mbs.kernels.constraints import pair_stiffness, push_pair
 from rom.mbs.kernels.element_calls import energy, residuals, tangents
 from rom.mbs.kernels.tables import Array2, Array3, Index1, Index2, Table, table
 from rom.mbs.parts.bodies import Marker
@@ -291,12 +292,7 @@ def bushing_wrenches(_s, W, bushings, _q, _v, _lam):
         i, j = bushings.i[k], bushings.j[k]
         state = bushing_state(bushings, k, W)
         force, moment, lost = bushing_force(bushings, k, W, state)
-        turned = add(moment, cross(state[0], force))
-        for p in range(3):
-            W.wrench[j, p] += force[p]
-            W.wrench[j, 3 + p] += moment[p]
-            W.wrench[i, p] -= force[p]
-            W.wrench[i, 3 + p] -= turned[p]
+        push_pair(W, i, j, force, add(moment, cross(state[0], force)), moment)
         W.power[2] += lost
 
 
@@ -336,11 +332,10 @@ def bushing_column(bushings, W, k, state, p, moved, c):
     dforce = sub(cross(wi, force), to_world(W, i, frame, pull))
     dmoment = sub(cross(wi, moment), to_world(W, i, frame, twist))
     lever = add(cross(sub(vj, vi), force), cross(gap, dforce))
-    for q in range(3):
-        W.Q[q, p] += c * dforce[q]
-        W.Q[3 + q, p] += c * (dmoment[q] + lever[q])
-        W.Q[6 + q, p] -= c * dforce[q]
-        W.Q[9 + q, p] -= c * dmoment[q]
+    place(W.Q, 0, p, c, dforce)
+    place(W.Q, 3, p, c, add(dmoment, lever))
+    place(W.Q, 6, p, -c, dforce)
+    place(W.Q, 9, p, -c, dmoment)
 
 
 @inner

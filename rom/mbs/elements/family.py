@@ -17,6 +17,7 @@ import numpy as np
 from rom.mbs.kernels.element_calls import ElementKernel, row_of
 from rom.mbs.kernels.system import Coordinates
 from rom.mbs.kernels.tables import Table
+from rom.mbs.kernels.work import Work
 from rom.mbs.parts.bodies import GROUND, Marker
 from rom.mbs.parts.joints import Row
 from rom.mbs.parts.signals import Signal, clock_signal
@@ -28,6 +29,15 @@ class Asked(Protocol):
 
     def apply(self, W: Any, t: float, *, slopes: bool) -> None:
         """Put the answer at time t, and its derivatives, where the kernels of its family look."""
+
+
+Laws = tuple[Asked, ...]
+
+
+def apply_laws(forces: Laws, W: Work, t: float, *, slopes: bool = False) -> None:
+    """Let all laws answer for the motion in W at a time [s], with slopes if tangents follow."""
+    for law in forces:
+        law.apply(W, t, slopes=slopes)
 
 
 def on_joint(_: Any) -> tuple[Marker, ...]:

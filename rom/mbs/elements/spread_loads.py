@@ -18,10 +18,22 @@ from rom.mbs.elements.family import (
     on_joint,
     rows_of,
 )
-from rom.mbs.kernels.algebra import add, cross, dot, mtv, mv, place, put, scale, unit, vec
+from rom.mbs.kernels.algebra import (
+    add,
+    cross,
+    dot,
+    dual,
+    mtv,
+    mv,
+    place,
+    put,
+    scale,
+    trace,
+    unit,
+    vec,
+)
 from rom.mbs.kernels.compiled import inner
 from rom.mbs.kernels.element_calls import residuals, tangents
-from rom.mbs.kernels.integrals import dual, trace
 from rom.mbs.kernels.markers import own_block
 from rom.mbs.kernels.tables import Array1, Array2, Array3, Index1, Scratch2, Table, table
 from rom.mbs.parts.bodies import Part

@@ -11,8 +11,10 @@ from numba import types
 from rom.mbs.kernels.algebra import (
     add,
     col,
+    contract,
     cross,
     dot,
+    dual,
     mtv,
     mv,
     place,
@@ -21,11 +23,13 @@ from rom.mbs.kernels.algebra import (
     rotation,
     scale,
     sub,
+    times,
+    trace,
+    transposed_times,
     unit,
     vec,
 )
 from rom.mbs.kernels.compiled import inner
-from rom.mbs.kernels.integrals import contract, dual, times, trace, transposed_times
 from rom.mbs.kernels.second_order import (
     bend,
     bent_coordinates,

@@ -15,9 +15,18 @@ the mass matrix are exact.
 
 from numba import types
 
-from rom.mbs.kernels.algebra import dot, place, scale, spatial_tangent, sub, vec
+from rom.mbs.kernels.algebra import (
+    contract,
+    dot,
+    place,
+    scale,
+    spatial_tangent,
+    sub,
+    times,
+    trace,
+    vec,
+)
 from rom.mbs.kernels.compiled import inner
-from rom.mbs.kernels.integrals import contract, times, trace
 from rom.mbs.kernels.stages import REAL_BLOCK, REAL_VECTOR, stage
 from rom.mbs.kernels.system import System
 from rom.mbs.kernels.work import Work

@@ -78,7 +78,7 @@ class Work(Table):
     Q: Array2  # (12, 12) stiffness of a pair of markers
     QH: Array2  # (12, 12 + 2 R)
     lu: Array2  # (n + m, n + m)
-    factor: Array1  # the factor by blocks, see rom.mbs.kernels.plan.Plan
+    factor: Array1  # the factor by blocks, see rom.mbs.kernels.system.Plan
     by_blocks: Index1  # (1,) whether the factor at hand is the one by blocks
     pivot: Index1  # (n + m,)
     spare: Array1  # (n + m,)

@@ -17,12 +17,16 @@ from rom.mbs.mechanism import Mechanism
 from rom.mbs.parts.bodies import Marker
 from rom.mbs.parts.joints import joint_with_axis
 from rom.mbs.parts.signals import sample_all
-from rom.mbs.results.element_record import ElementRecord, element_record, markers_of
-from rom.mbs.results.interface_loads import marker_loads, of_body
+from rom.mbs.results.element_record import (
+    ElementRecord,
+    LawRecord,
+    element_record,
+    law_record,
+    markers_of,
+)
 from rom.mbs.results.interpolation import Point, between
 from rom.mbs.results.joint_motion import JointMotion, joint_motion
-from rom.mbs.results.law_record import LawRecord, law_record
-from rom.mbs.results.recomputed import Tracks, follow
+from rom.mbs.results.recomputed import Tracks, follow, marker_loads, of_body
 from rom.mbs.results.state import State
 from rom.model import Array
 from rom.names import check_known, offered

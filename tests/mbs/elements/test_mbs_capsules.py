@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose
 from scipy.optimize import minimize
 
 from rom.mbs.elements.contact.impact import Impact, hertz_stiffness
-from rom.mbs.elements.contact.segments import across_of, nearest
+from rom.mbs.elements.contact.points import across_of, nearest
 from rom.mbs.integrate.simulation import simulate
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.results.audit import audit

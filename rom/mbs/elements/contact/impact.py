@@ -4,7 +4,6 @@ from dataclasses import dataclass
 from typing import Annotated, Any
 
 import numpy as np
-from scipy.optimize import brentq
 
 from rom.arguments import AtLeast, Between, NotNegative, Positive, between, positive, typed
 from rom.errors import ConfigError
@@ -94,6 +93,8 @@ def damping_of(restitution: float, speed: float) -> float:
     Raises:
         ConfigError: if the coefficient is not above 0 and at most 1.
     """
+    from scipy.optimize import brentq
+
     e = between("restitution", restitution, 0, 1, "(]")
     if e > 1.0 - 1e-9:
         return 0.0
