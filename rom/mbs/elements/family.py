@@ -143,12 +143,10 @@ class Places:
         return self.time
 
     def memory(self, owner: str, start: Array, *, settling: Array | None = None) -> int:
-        """First of (m,) numbers that are kept from one instant to the next, in their own units.
+        """First of (m,) numbers that an owner keeps from instant to instant, in their own units.
 
-        Args:
-            owner: whose.
-            start: (m,) numbers at the start.
-            settling: (m,) what an equilibrium starts from, whatever its state remembers.
+        They begin with ``start``, and in an equilibrium, whatever its state remembers, with
+        ``settling``.
         """
         self.remembered.setdefault(owner, start)
         if settling is not None:

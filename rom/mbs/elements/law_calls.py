@@ -105,12 +105,9 @@ def _compiled(
 
 
 def entry_of(function: Any, sizes: tuple[int, int, int, int], *, tangents: bool = False) -> Any:
-    """A function of C that calls a compiled law with its arguments in their shapes.
+    """A function of C that calls a compiled law, or its tangents, with arguments in their shapes.
 
-    Args:
-        function: compiled by Numba.
-        sizes: numbers of parameters, markers, remembered numbers, outputs.
-        tangents: whether it is that of the tangents.
+    Sizes are the numbers of parameters, markers, remembered numbers, outputs.
     """
     p, n, m, o = sizes
     taken, answered = _motion_of, _answer_of
@@ -131,11 +128,6 @@ def entry_of(function: Any, sizes: tuple[int, int, int, int], *, tangents: bool 
 
 
 def compiled_entry(function: Any, types: str) -> Any:
-    """A function of C, compiled and kept; it makes arrays of pointers.
-
-    Args:
-        function: in Python, of a module.
-        types: of its arguments, as ``numba.cfunc`` takes them.
-    """
+    """A function of C, compiled of one of a module and kept; it makes arrays of pointers."""
     options = {name: value for name, value in OPTIONS.items() if name != "cache"} | {"_nrt": True}
     return c_function(function, types, options)

@@ -104,14 +104,7 @@ class Elements:
 
     @classmethod
     def of(cls, law: Any, frames: Index, numbers: Array, *, by_rate: bool = True) -> "Elements":
-        """Elements with a law of `compiled_law`.
-
-        Args:
-            law: the law.
-            frames: (e, k) frames that each element connects.
-            numbers: (e, c) what the law knows of each element, in its own units.
-            by_rate: whether forces depend on velocities.
-        """
+        """Elements with a law of `compiled_law`."""
         return cls(law.address, frames, numbers, law, by_rate)
 
 

@@ -180,12 +180,9 @@ class Ordering:
 
 
 def graph_of(system: Any, coupled: Sequence[Any], *, whole: bool = False) -> Graph:
-    """Storage and elimination plan of a mechanism whose other arrays are complete.
+    """Storage and elimination plan of a system whose other arrays are complete.
 
-    Args:
-        system: the arrays of the mechanism.
-        coupled: groups of bodies that elements couple.
-        whole: store whole matrices whatever they cost.
+    ``coupled`` are groups of bodies that elements couple; ``whole`` stores whole matrices anyhow.
     """
     neighbours, groups = _neighbours(system, coupled), _groups(system)
     plan = None if whole else _plan(system, neighbours, groups)

@@ -14,7 +14,7 @@ import math
 
 from numba import types
 
-from rom.mbs.kernels.algebra import back_substitute, factorise, range_basis
+from rom.mbs.kernels.algebra import back_substitute, factorise, range_basis, subtract_row
 from rom.mbs.kernels.compiled import inner
 from rom.mbs.kernels.markers import own_corner
 from rom.mbs.kernels.stages import REAL_MATRIX, REAL_VECTOR, stage
@@ -92,21 +92,15 @@ def divide(A, turns, X):
             X[k, j], X[p, j] = X[p, j], X[k, j]
     for i in range(d):
         for k in range(i):
-            subtract_row(A[i, k], X, k, i)
+            if A[i, k] != 0.0:
+                subtract_row(A[i, k], X, i, k, 0, c)
     for i in range(d - 1, -1, -1):
         for k in range(i + 1, d):
-            subtract_row(A[i, k], X, k, i)
+            if A[i, k] != 0.0:
+                subtract_row(A[i, k], X, i, k, 0, c)
         f = 1.0 / A[i, i]
         for j in range(c):
             X[i, j] *= f
-
-
-@inner
-def subtract_row(f, X, k, i):
-    """Subtract f times row k of X from row i."""
-    if f != 0.0:
-        for j in range(X.shape[1]):
-            X[i, j] -= f * X[k, j]
 
 
 @inner
@@ -151,7 +145,8 @@ def substitute(P, F, pivot, x, y):
         y[P.position[i]] = x[i]
     for k in range(P.size.size):
         d, at, L = P.size[k], P.start[k], P.below[k]
-        back(F, P.pivot[k], d, pivot, at, y)
+        A = F[P.pivot[k] : P.pivot[k] + d * d].reshape((d, d))
+        back_substitute(A, d, pivot[at : at + d], y[at : at + d])
         for p in range(P.next_first[k], P.next_first[k + 1]):
             to = P.start[P.next[p]]
             for i in range(P.size[P.next[p]]):
@@ -172,39 +167,16 @@ def substitute(P, F, pivot, x, y):
         x[i] = y[P.position[i]]
 
 
-@inner
-def back(F, A, d, pivot, at, y):
-    """Replace y[at:at+d] by the solution with the factorised node at F[A:A+d*d]."""
-    for k in range(d):
-        p = pivot[at + k]
-        if p != k:
-            y[at + k], y[at + p] = y[at + p], y[at + k]
-    for i in range(d):
-        total = y[at + i]
-        for j in range(i):
-            total -= F[A + i * d + j] * y[at + j]
-        y[at + i] = total
-    for i in range(d - 1, -1, -1):
-        total = y[at + i]
-        for j in range(i + 1, d):
-            total -= F[A + i * d + j] * y[at + j]
-        y[at + i] = total / F[A + i * d + i]
-
-
 def may_repeat_constraints(system):
     """Whether constraints may depend on each other."""
     return not system.graph.compact or system.graph.shares
-
-
-def _has_whole_matrices(system):
-    return not system.graph.compact
 
 
 def _shares_in_blocks(system):
     return system.graph.compact and system.graph.shares
 
 
-@stage(types.void, System, Work, types.int64, REAL_MATRIX, needed=_has_whole_matrices)
+@stage(types.void, System, Work, types.int64, REAL_MATRIX, needed=lambda s: not s.graph.compact)
 def constraint_range(s, W, rank, U):
     """Set the leading rows of U (rank, m) to an orthonormal basis of the range of W.G."""
     range_basis(W.G, rank, W.remainder, U)

@@ -206,11 +206,7 @@ class Packed:
 
 
 def pack(mechanism: Mechanism, *, whole: bool = False) -> Packed:
-    """Write the mechanism into arrays.
-
-    Args:
-        mechanism: bodies, joints, forces.
-        whole: store whole matrices (n, n) in any case, not the blocks of bodies and joints alone.
+    """Write the mechanism into arrays; whole matrices (n, n) if wanted, else blocks where they pay.
 
     Raises:
         ConfigError: if there is no body.

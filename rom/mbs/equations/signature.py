@@ -42,12 +42,10 @@ class _Remainder(NamedTuple):
 
 
 def signature(A: csc_matrix, groups: Sequence[Index], zero_rtol: float = ZERO_RTOL) -> Signature:
-    """Count the signs of the eigenvalues of A.
+    """Count the signs of the eigenvalues of A (n, n), symmetric, entries of both triangles stored.
 
-    Args:
-        A: (n, n) symmetric, every entry of both triangles stored; in any units.
-        groups: numbers of the unknowns that go together, all of them, in the order of elimination.
-        zero_rtol: last pivot that counts as zero, of the largest entry beside it.
+    Groups of unknowns that go together are in the order of elimination; a last pivot of less than
+    ``zero_rtol`` of the largest entry beside it counts as zero.
     """
     order = np.concatenate(groups)
     first = np.concatenate([[0], np.cumsum([group.size for group in groups])])
@@ -88,8 +86,7 @@ class _Fronts:
     def front(self, a: int, b: int, left: list[_Remainder]) -> tuple[Array, int, Index]:
         """Lower triangle for what waited, unknowns a to b, and what is coupled.
 
-        Returns:
-            Matrix (n, n), number p of the former, unknowns (n - p,).
+        It comes with the number p of the former, and unknowns (n - p,).
         """
         mine = slice(self.start[a], self.start[b])
         rows, here = self.rows[mine], self.here

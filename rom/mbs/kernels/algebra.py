@@ -220,7 +220,7 @@ def factorise(A, n, pivot):
         for k in range(first, last):
             for i in range(k + 1, last):
                 if A[i, k] != 0.0:
-                    subtract_row(A, i, k, last, n)
+                    subtract_row(A[i, k], A, i, k, last, n)
         for i in range(last, n, 2):
             eliminate_pair(A, i, min(i + 1, n - 1), first, n)
     return True
@@ -243,13 +243,12 @@ def eliminate_column(A, k, n, last):
     for i in range(k + 1, n):
         if A[i, k] != 0.0:
             A[i, k] *= inverse
-            subtract_row(A, i, k, k + 1, last)
+            subtract_row(A[i, k], A, i, k, k + 1, last)
 
 
 @inner
-def subtract_row(A, i, k, first, last):
-    """Subtract A[i, k] times row k from row i, in columns first to last."""
-    f = A[i, k]
+def subtract_row(f, A, i, k, first, last):
+    """Subtract f times row k from row i, in columns first to last."""
     for j in range(first, last):
         A[i, j] -= f * A[k, j]
 

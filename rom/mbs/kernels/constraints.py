@@ -48,6 +48,14 @@ def normal_rates(a, b, Oi, Oj, ci, cj):
 
 
 @inner
+def along_rates(a, gap, slide, pull, Oi, ci):
+    """Rate of a . gap for an axis a of i, and the convective term of its second derivative."""
+    da = cross(Oi, a)
+    swing = add(cross(ci, a), cross(Oi, da))
+    return dot(a, slide) + dot(da, gap), dot(a, pull) + 2 * dot(da, slide) + dot(swing, gap)
+
+
+@inner
 def angle_state(a, c, b, Oi, Oj, ci, cj):
     """Angle of b seen in the axes (a, c), its rate, convective term and the torque axis.
 
@@ -179,11 +187,9 @@ def row_states(s, W):
             continue
         a = turn(W.E, i, a)
         if kind == ALONG:
-            da = cross(Oi, a)
             slide = sub(row(W.V, j, 0), row(W.V, i, 0))
-            swing = add(cross(qi, a), cross(Oi, da))
             W.value[k] = dot(a, gap) - target
-            W.gamma[k] = dot(a, pull) + 2 * dot(da, slide) + dot(swing, gap)
+            W.gamma[k] = along_rates(a, gap, slide, pull, Oi, qi)[1]
             set_gradient(W.g, k, scale(-1.0, a), cross(a, gap), a, zero)
             continue
         b = turn(W.E, j, row(rows.b, k, 0))
@@ -237,11 +243,7 @@ def column_of(graph, k, b):
 
 @inner
 def block_of(graph, b, c):
-    """Number of the block of bodies b and c.
-
-    Raises:
-        IndexError: if the graph does not know that something couples them.
-    """
+    """Number of the block of bodies b and c; IndexError if the graph does not know it."""
     low, high = graph.first[b], graph.first[b + 1]
     while low < high:
         middle = (low + high) // 2

@@ -293,11 +293,15 @@ def fitted_motion(s, W, m, q, v):
         W.move[m, 3, k], W.move[m, 4, k], W.move[m, 5, k] = w
     C = times_transposed(matrix_sum(table[:, 1:], v, t, r), R)
     w = rows_dot(inverse, double_axial(C))
+    return rows_dot(inverse, add(double_axial(spun(w, C)), spread_rate(C, P, w, w)))
+
+
+@inner
+def spread_rate(C, P, w, x):
+    """Rate of P - tr(P) 1, times x, while the surface turns by w."""
     still = spun(w, P)
     rate = (add(C[0], still[0]), add(C[1], still[1]), add(C[2], still[2]))
-    trace = rate[0][0] + rate[1][1] + rate[2][2]
-    turned = add(double_axial(spun(w, C)), sub(rows_dot(rate, w), scale(trace, w)))
-    return rows_dot(inverse, turned)
+    return sub(rows_dot(rate, x), scale(rate[0][0] + rate[1][1] + rate[2][2], x))
 
 
 @inner
@@ -324,10 +328,7 @@ def fitted_wrench_stiffness(s, W, m, n, c, S):
                 sub(scale(x[1], C[0]), scale(x[0], C[1])),
             )
         )
-        still = spun(w, P)
-        rate = (add(C[0], still[0]), add(C[1], still[1]), add(C[2], still[2]))
-        trace = rate[0][0] + rate[1][1] + rate[2][2]
-        second = sub(rows_dot(rate, x), scale(trace, x))
+        second = spread_rate(C, P, w, x)
         for l in range(r):
             u = col(spins, l)
             S[6 + k, 6 + l] -= c * dot(first, u)

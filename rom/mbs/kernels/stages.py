@@ -87,12 +87,9 @@ class Stage:
 def stage(
     *types_: Any, asked: type | None = None, needed: Callable[[Any], Any] = _always
 ) -> Callable[[Any], Stage]:
-    """Make a function a stage.
+    """Make a function a stage, of the types of its result and arguments: tables or types of Numba.
 
-    Args:
-        types_: of the result and of the arguments, classes of tables or types of Numba.
-        asked: class of the tables that may need it; None for systems.
-        needed: table -> whether it needs this stage; always unless told.
+    Tables of the class ``asked``, systems unless told, may need it; ``needed`` says if one does.
     """
     return lambda function: Stage(function, types_, asked or types_[1], needed)
 

@@ -106,11 +106,7 @@ class Part:
         return Marker(self.name, (float(point[0]), float(point[1]), float(point[2])))
 
     def point(self, marker: Marker) -> Array:
-        """(3,) undeformed position of a marker in the body frame [m].
-
-        Raises:
-            ConfigError: if the body has no such marker.
-        """
+        """(3,) undeformed position of a marker in the body frame [m]."""
         row = self._surface_row(marker.place)
         if row is not None:
             return np.asarray(self.flexible.surface.points[row], dtype=float)
@@ -124,14 +120,10 @@ class Part:
         return np.asarray(self.flexible.markers[marker.place].point, dtype=float)
 
     def spin_about(self, name: str, axis: Array) -> float:
-        """Angular velocity of the material through the frame about an axis [rad/s].
-
-        Args:
-            name: of the element that asks.
-            axis: (3,) body frame [1].
+        """Angular velocity of the material through the frame about an axis (3,) of it [rad/s].
 
         Raises:
-            ConfigError: if the body spins about another axis.
+            ConfigError: naming the element that asks, if the body spins about another axis.
         """
         speed = float(axis @ self.spin)
         if np.linalg.norm(self.spin - speed * axis) > SPIN_RTOL * np.linalg.norm(self.spin):
@@ -142,11 +134,7 @@ class Part:
         return speed
 
     def refuse_spin(self, what: str, why: str) -> None:
-        """Refuse a body that spins, for what knows nothing of it.
-
-        Raises:
-            ConfigError: saying why.
-        """
+        """Refuse a body that spins, for what knows nothing of it, and say why."""
         if self.spin.any():
             raise ConfigError(
                 f"{what} is of body {self.name!r}, which spins in its frame: {why}.",
@@ -154,11 +142,7 @@ class Part:
             )
 
     def check_on_axis(self, name: str, marker: Marker) -> None:
-        """Refuse to hold a body that spins at a point which goes round with its material.
-
-        Args:
-            name: of what holds it.
-            marker: of this body.
+        """Let nothing, by name, hold a body that spins at a point beside its axis.
 
         Raises:
             ModelError: if the marker lies beside the axis through the mass centre.

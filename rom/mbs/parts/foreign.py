@@ -20,13 +20,7 @@ KEPT_HINT = "The motion up to there is kept in error.solution."
 
 
 def ask(what: str, t: float, function: Callable[..., Any], *arguments: Any) -> Any:
-    """What a function of the user answers.
-
-    Args:
-        what: its name in the mechanism, e.g. ``user force 'drag'``.
-        t: time it is asked for [s].
-        function: to be called.
-        arguments: of the function.
+    """What a function of the user, by its name in the mechanism, answers at a time [s].
 
     Raises:
         ConfigError: if it does not take these arguments.
@@ -56,12 +50,8 @@ def compiled_function(
 ) -> Any:
     """What ``make`` compiles a function of the user to; None when it is left to Python.
 
-    Args:
-        what: its name, e.g. ``law of motor 'servo'``.
-        law: a function, or one of Numba.
-        make: compiles a plain function.
-        wanted: True to insist, False to leave it to Python, None for what works.
-        hint: what it may be made of.
+    True to insist, False to leave it to Python, None for what works; the hint says what it may be
+    made of.
 
     Raises:
         ConfigError: if it must be compiled and cannot be.
@@ -81,14 +71,7 @@ def compiled_function(
 
 
 def numbers(what: str, t: float, value: Any, shape: tuple[int, ...], needed: str) -> Array:
-    """The answer as finite numbers.
-
-    Args:
-        what: name of the function.
-        t: time of the answer [s].
-        value: the answer.
-        shape: it must have.
-        needed: what that is in words.
+    """The answer of a function at a time [s] as finite numbers of a shape, which ``needed`` words.
 
     Raises:
         ConfigError: if it is made of something else, or has another shape.

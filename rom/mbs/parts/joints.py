@@ -99,21 +99,13 @@ def coincidence() -> tuple[Row, ...]:
 
 
 def joint_with_axis(joints: Mapping[str, Joint], joint: str, what: str) -> Joint:
-    """The joint of a name, which must have a coordinate.
-
-    Raises:
-        ConfigError: if it is unknown, or has none.
-    """
+    """The joint of a name, which must have a coordinate."""
     coordinate_of(joints, joint, None, what)
     return joints[joint]
 
 
 def coordinate_of(joints: Mapping[str, Joint], joint: str, which: str | None, what: str) -> Row:
-    """The row of the coordinate "angle" or "displacement" of a joint; None for the first.
-
-    Raises:
-        ConfigError: if the joint is unknown, or has no such coordinate.
-    """
+    """The row of the coordinate "angle" or "displacement" of a joint; None for the first."""
     if joint not in joints:
         raise ConfigError(f"{what}: no joint {joint!r}; there are {offered(joints, joint)}.")
     names: dict[str | None, str] = dict.fromkeys(("displacement", "way"), "displacement")

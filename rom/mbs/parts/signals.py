@@ -58,13 +58,9 @@ class Jump:
 
 
 def largest_jump(f: Function, t: Array, width: float, small: float) -> Jump | None:
-    """The largest jump of a function, None if it is continuous.
+    """The largest jump of a function of times (n,), equally spaced; None if it is continuous.
 
-    Args:
-        f: values (n,) at times (n,).
-        t: (n,) equally spaced times.
-        width: intervals are halved down to it [s].
-        small: size below which a jump does not count.
+    Intervals are halved down to a width [s]; jumps below a small size do not count.
     """
     values = f(t)
     if not np.isfinite(values).all() or np.ptp(values) <= small:
@@ -127,11 +123,7 @@ class Examined:
         self.until = self.start
 
     def up_to(self, time: float, spacing: float) -> tuple[float, ModelError] | None:
-        """Look on to a time by intervals of a spacing [s]; returns ``end``.
-
-        Warns:
-            RomWarning: if the velocity jumps, or is not the one that is given.
-        """
+        """Look on to a time by intervals of a spacing [s], warn of kinks; returns ``end``."""
         if self.end is None and time > self.until:
             first = max(self.start, self.until - spacing)
             n = int(np.clip(np.ceil((time - first) / spacing), FEW_INTERVALS, MAX_INTERVALS))
@@ -233,10 +225,7 @@ class Signal:
     def end(self, span: Span, time: float, spacing: float) -> tuple[float, RomError] | None:
         """When a drive stops to be a motion [s], and the error; None if it does not.
 
-        Args:
-            span: no time before the first or after the second one is asked for.
-            time: up to which to look [s].
-            spacing: of the times that are looked at [s].
+        Up to a time, at times a spacing [s] apart; within the span alone it is asked.
         """
         if self.width == 3:
             return None
@@ -249,15 +238,9 @@ class Signal:
         return lambda t: self._values(function, t)[:, 0]
 
     def sample(self, t: Array, span: Span, spacing: float) -> Array:
-        """Value, rate and acceleration of a drive, or the vectors of a load.
+        """(n, 3) value [m or rad] of a drive and its rates, or force [N] or moment [N m].
 
-        Args:
-            t: (n,) times [s].
-            span: no time before the first or after the second one is asked for.
-            spacing: of the finite differences for missing derivatives [s].
-
-        Returns:
-            (n, 3): value [m or rad] and its rates per second, or force [N] or moment [N m].
+        At times (n,) within a span, with differences of a spacing [s] for missing derivatives.
         """
         t = np.clip(t, *span)
         if self.width == 3:
@@ -363,15 +346,9 @@ def sampled(
 ) -> tuple[Array, RomError | None]:
     """(k, s, 3) all signals at the times before the first one at which one of them fails.
 
-    Args:
-        signals: drives and loads.
-        t: (n,) ascending times.
-        span: first and last time of the run.
-        spacing: of finite differences [s].
-        step: of the run [s], to look through drives for jumps; None where that has been done.
-
-    Returns:
-        Their values, and the error of the failure; None if k is the number of times.
+    With the error of the failure; None if k is the number of times. They are asked within the
+    span of the run, by differences of a spacing [s], and looked through for jumps by its step [s],
+    None where that has been done.
     """
     try:
         table = sample_all(signals, t, span, spacing)
@@ -409,12 +386,8 @@ def first_failure(
 ) -> tuple[int, RomError]:
     """Number of good instants before the first one that is no motion, and its error.
 
-    Args:
-        signals: drives and loads.
-        t: (n,) ascending times.
-        table: (n, s, 3) their samples.
-        span: first and last time of the run; drives are looked through for jumps if it is finite.
-        spacing: of the steps of the run [s].
+    Of samples (n, s, 3) at ascending times (n,). Drives are looked through for jumps by steps of a
+    spacing [s] if the span of the run is finite.
     """
     bad = ~np.isfinite(table).all(axis=2)
     asked = signals if np.isfinite(span).all() else ()

@@ -97,11 +97,7 @@ def _said(solution: Any, table: Any, mine: slice, sizes: tuple[int, int]) -> lis
 
 
 def element_record(solution: Any, name: str) -> ElementRecord:
-    """Evaluate one element along a motion.
-
-    Raises:
-        ConfigError: if there is no such element, or it acts on no markers.
-    """
+    """Evaluate one element along a motion."""
     mechanism = solution.mechanism
     if name not in mechanism.elements:
         raise ConfigError(f"no element {name!r}; there are {offered(mechanism.elements, name)}.")

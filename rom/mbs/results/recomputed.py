@@ -92,12 +92,7 @@ def body_momentum(bodies, W, b, q, v, out):
 
 
 def marker_loads(solution: Any) -> Array:
-    """Loads on all k markers along a motion.
-
-    Returns:
-        (n_t, k, 6) force [N] and moment about the marker [N m], world, of joints, drives, loads
-        and all elements together.
-    """
+    """(n_t, k, 6) force [N] and moment [N m] of all that acts on each marker, about it, world."""
     return np.array([W.wrench.copy() for W in at_instants(solution)])
 
 

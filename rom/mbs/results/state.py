@@ -74,11 +74,7 @@ class State:
 
 
 def check_state(state: State, packed: Any, *, joints: bool = True) -> None:
-    """Refuse a state of other bodies or joints, or of bodies in frames of an older version.
-
-    Raises:
-        ConfigError: with the numbers, or naming the bodies.
-    """
+    """Refuse a state of other bodies or joints, or of bodies in frames of an older version."""
     needed = (packed.q.size, packed.v.size, packed.system.rows.kind.size)
     sizes: Any = tuple(np.size(getattr(state, x, 0.0)) for x in ("q", "v", "lam"))
     if not isinstance(state, State) or sizes[: 2 + joints] != needed[: 2 + joints]:
@@ -154,11 +150,7 @@ def load_state(path: str | Path, *, limit: int = MAX_BYTES) -> State:
 
 
 def unpacked_state(manifest: dict[str, Any], arrays: dict[str, Array], path: str | Path) -> State:
-    """The state of a manifest and its arrays.
-
-    Raises:
-        FileFormatError: if something is missing.
-    """
+    """The state of a manifest and its arrays."""
     with stated(path):
         fields: dict[str, Any] = {name: arrays[name] for name in NEEDED_FIELDS}
         fields |= {name: arrays.get(name) for name in OPTIONAL_FIELDS}

@@ -189,10 +189,7 @@ def softening(solution: Solution, name: str) -> float:
 def deformation(solution: Solution, name: str, *, surface: bool = True) -> float:
     """Largest elastic displacement relative to the size of the body.
 
-    Args:
-        solution: the motion.
-        name: of the body.
-        surface: look at all points of the outer surface, not only at the interfaces.
+    Of all points of the outer surface, or of the interfaces alone.
     """
     part: Any = solution.mechanism.parts[name]
     body, q = part.flexible, solution.elastic(name)

@@ -75,11 +75,7 @@ class Impact:
 
 
 def checked_law(name: str, law: Any, *parts: Part) -> Impact:
-    """The law, if it is one, and bodies that touch show how fast they slide.
-
-    Raises:
-        ConfigError: if not.
-    """
+    """The law, if it is one, and bodies that touch show how fast they slide."""
     if not isinstance(law, Impact):
         raise ConfigError(f"law of {name!r} is {law!r}; a rom.mbs.Impact is needed.")
     for part in parts if law.mu else ():
@@ -88,11 +84,7 @@ def checked_law(name: str, law: Any, *parts: Part) -> Impact:
 
 
 def damping_of(restitution: float, speed: float) -> float:
-    """Damping factor [s/m] that gives a coefficient of restitution at a speed of impact [m/s].
-
-    Raises:
-        ConfigError: if the coefficient is not above 0 and at most 1.
-    """
+    """Damping factor [s/m] that gives a coefficient of restitution at a speed of impact [m/s]."""
     from scipy.optimize import brentq
 
     e = between("restitution", restitution, 0, 1, "(]")

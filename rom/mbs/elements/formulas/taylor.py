@@ -215,12 +215,9 @@ def of_two(code, a, b):
 
 @inner
 def run(program, t, x, v, stack):
-    """Value and derivatives of a program.
+    """Value and derivatives of a program of variables t, x, v with theirs; stack (MAX_STACK, 3).
 
-    Args:
-        program: number of instructions, (instruction, number) of each, and tables behind them.
-        t, x, v: variables with their derivatives.
-        stack: (MAX_STACK, 3) memory.
+    The program has the number of instructions, (instruction, number) of each, and tables behind.
     """
     top = -1
     for k in range(int(program[0])):
