@@ -29,7 +29,7 @@ from rom.mbs.elements.family import Family
 from rom.mbs.parts.bodies import GROUND, Marker, Part, flexible_part, ground_part, rigid_part
 from rom.mbs.parts.joints import Joint, Row, coordinate_of
 from rom.model import Array
-from rom.names import check_name, check_text, offered
+from rom.names import check_known, check_name, check_text, offered
 from rom.notebook import html_table, listed
 from rom.plausible import GRAVITY, SPEED, warn_outside
 
@@ -356,8 +356,7 @@ class Mechanism(Methods, metaclass=Open, kind="methods", bound=bound):
         """
         if name == GROUND:
             return self.ground
-        if name not in self.parts:
-            raise ConfigError(f"no body {name!r}; the mechanism has {offered(self.parts, name)}.")
+        check_known(name, self.parts, f"no body {name!r}; the mechanism has")
         return self.parts[name]
 
     def _enter(self, part: Part, spin: npt.ArrayLike | None) -> Part:
@@ -379,13 +378,9 @@ class Mechanism(Methods, metaclass=Open, kind="methods", bound=bound):
             ConfigError: listing the names in use.
         """
         check_name(name, "a part of the mechanism")
-        taken = [
-            *(GROUND, *self.parts, *self.joints, *self.drives, *self.elements, *self.events),
-        ]
+        taken = [GROUND, *self.parts, *self.joints, *self.drives, *self.elements, *self.events]
         if name in taken:
-            raise ConfigError(
-                f"the name {name!r} is used twice; in use are {offered(taken, name)}."
-            )
+            raise ConfigError(f"name {name!r} is used twice; in use are {offered(taken, name)}.")
 
     def check_markers(self, name: str, *markers: Marker) -> None:
         """Refuse markers of bodies that are not in this mechanism, or of places they have not.

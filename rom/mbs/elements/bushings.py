@@ -202,8 +202,7 @@ def rotation_vector(bushings, k, W):
 @inner
 def to_local(W, i, frame, x):
     """World vector in the bushing axes on marker i."""
-    y = mtv(W.E[i], x)
-    return mtv(frame, y)
+    return mtv(frame, mtv(W.E[i], x))
 
 
 @inner

@@ -20,7 +20,7 @@ from rom.mbs.kernels.tables import Table
 from rom.mbs.kernels.work import Work
 from rom.mbs.parts.bodies import GROUND, Marker
 from rom.mbs.parts.joints import Row
-from rom.mbs.parts.signals import Signal, clock_signal
+from rom.mbs.parts.signals import Signal
 from rom.model import Array, Index
 
 
@@ -105,9 +105,8 @@ class Places:
 
     def copy(self) -> "Places":
         """The same places, to which more can be added without changing these."""
-        kept = {name: list(getattr(self, name)) for name in ("owners", "signals", "coordinates")}
-        memory = {"remembered": dict(self.remembered), "settling": dict(self.settling)}
-        return replace(self, **kept, **memory)
+        own = ("owners", "signals", "coordinates", "remembered", "settling")
+        return replace(self, **{name: getattr(self, name).copy() for name in own})
 
     def coordinate(self, joint: str, row: Row) -> int:
         """Number of a coordinate of a joint."""
@@ -123,24 +122,22 @@ class Places:
 
     def signal(self, name: str, function: Callable[[float], Any] | None) -> int:
         """Number of a function of time with values (3,), -1 for none."""
-        if function is None:
-            return -1
-        self.signals.append(Signal(name, function, width=3))
-        return len(self.signals) - 1
+        return -1 if function is None else self._follow(Signal(name, function, width=3))
 
     def motion(self, name: str, function: Callable[[float], Any] | None) -> int:
         """Number of a prescribed length and its rate, -1 for none; it must not jump."""
-        if function is None:
-            return -1
-        self.signals.append(Signal(name, function))
-        return len(self.signals) - 1
+        return -1 if function is None else self._follow(Signal(name, function))
 
     def clock(self) -> int:
         """Number of the function that tells the time."""
         if self.time < 0:
-            self.signals.append(clock_signal())
-            self.time = len(self.signals) - 1
+            parts = (lambda t: t, lambda t: 1.0 + 0.0 * t, lambda t: 0.0 * t)
+            self.time = self._follow(Signal("clock", *parts))
         return self.time
+
+    def _follow(self, signal: Signal) -> int:
+        self.signals.append(signal)
+        return len(self.signals) - 1
 
     def memory(self, owner: str, start: Array, *, settling: Array | None = None) -> int:
         """First of (m,) numbers that an owner keeps from instant to instant, in their own units.

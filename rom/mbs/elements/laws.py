@@ -124,22 +124,20 @@ def law(  # noqa: PLR0913  one keyword per property
     Raises:
         ConfigError: for no marker, or a law that cannot be compiled although it must.
     """
-    _check_function("function", function, name)
-    if tangents is not None:
-        _check_function("tangents", tangents, name)
-    given = finite(f"parameters of {name}", parameters, (np.size(parameters),))
+    for what, one in (
+        ("function", function),
+        ("tangents", function if tangents is None else tangents),
+    ):
+        if not callable(one) and not hasattr(one, "address"):
+            raise ConfigError(f"{what} = {shortened(one)} of {name!r} must be a function.")
+    numbers = finite(f"parameters of {name}", parameters, (np.size(parameters),))
     kept = finite(f"memory of {name}", memory, (np.size(memory),))
     if not markers:
         raise ConfigError(f"law {name!r} needs a marker to act on.")
     sizes = len(markers), kept.size, len(outputs)
-    called = entries(name, (function, tangents), (given.size, *sizes), compiled)
-    element = Law(function, tangents, markers, given, kept, tuple(outputs), energy, called)
+    called = entries(name, (function, tangents), (numbers.size, *sizes), compiled)
+    element = Law(function, tangents, markers, numbers, kept, tuple(outputs), energy, called)
     self.add(name, element, LAWS_FAMILY)
-
-
-def _check_function(what: str, function: Any, name: str) -> None:
-    if not callable(function) and not hasattr(function, "address"):
-        raise ConfigError(f"{what} = {shortened(function)} of {name!r} must be a function.")
 
 
 def user_force(
@@ -209,7 +207,7 @@ def pack(laws: Mapping[str, Law], places: Places) -> Laws:
     remembered = [law.memory.size for law in found]
     derivatives = starts([72 * len(x.markers) ** 2 if x.compiled[0] is None else 0 for x in found])
     return Laws(
-        *(integers(_address(law.compiled[k]) for law in found) for k in (0, 1)),
+        *(integers(getattr(law.compiled[k], "address", 0) for law in found) for k in (0, 1)),
         integers(len(law.markers) for law in found),
         marker,
         starts([law.parameters.size for law in found]),
@@ -226,10 +224,6 @@ def pack(laws: Mapping[str, Law], places: Places) -> Laws:
         derivatives,
         np.zeros(derivatives[-1]),
     )
-
-
-def _address(entry: Any) -> int:
-    return 0 if entry is None else int(entry.address)
 
 
 @intrinsic
@@ -414,11 +408,8 @@ def _couples(laws: Any, body: Index) -> list[Index]:
     return [body[at[:n]] for at, n in zip(laws.marker, laws.count, strict=True)]
 
 
-def _answers(laws: Any) -> list[Array]:
-    return [laws.answer[i:j] for i, j in pairwise(laws.answer_at)]
-
-
 LAWS_FAMILY = Family(
     "laws", Law, pack, law_wrenches, law_tangents, law_energy, ends=lambda law: law.markers,
-    outside=_outside, couples=_couples, hooks=Hooks(asked=asked, answers=_answers),
+    outside=_outside, couples=_couples, hooks=Hooks(
+        asked=asked, answers=lambda laws: [laws.answer[i:j] for i, j in pairwise(laws.answer_at)]),
 )  # fmt: skip

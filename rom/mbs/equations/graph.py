@@ -81,10 +81,9 @@ class Ordering:
         cost: multiplications and additions of a factorisation.
     """
 
-    def __init__(
-        self, size: list[int], neighbours: list[list[int]], groups: list[Group], trees: Forest
-    ):
-        self.size, self.groups, self.trees = size, groups, trees
+    def __init__(self, width: Index, neighbours: list[list[int]], groups: list[Group]):
+        self.size = [*map(int, width), *(len(group.rows) for group in groups)]
+        self.groups, self.trees = groups, forest(groups, len(width))
         self.sequence: list[int] = []
         self.later: dict[int, set[int]] = {}
         self.cost, self.n = 0.0, len(neighbours)
@@ -251,14 +250,9 @@ def _touched(system: Any, compact: bool) -> tuple[Index, Index]:
 
 def _plan(system: Any, neighbours: list[list[int]], groups: list[Group]) -> Plan | None:
     """The elimination plan, or None if whole matrices are quicker."""
-    width = 6 + system.bodies.r
-    size = [*map(int, width), *(len(group.rows) for group in groups)]
-    total = sum(size)
-    limit = 2 / 3 * total**3 / BLOCK_GAIN
-    ordering = Ordering(size, neighbours, groups, forest(groups, len(width)))
-    if not ordering.run(limit):
-        return None
-    return _tables(system, ordering, neighbours, groups)
+    ordering = Ordering(6 + system.bodies.r, neighbours, groups)
+    limit = 2 / 3 * sum(ordering.size) ** 3 / BLOCK_GAIN
+    return _tables(system, ordering, neighbours, groups) if ordering.run(limit) else None
 
 
 def _tables(
@@ -317,8 +311,7 @@ def elimination_order(system: Any, coupled: Sequence[Any]) -> list[Index]:
     """Unknowns of each body and each joint, rows of constraints after all velocities, in turn."""
     neighbours, groups = _neighbours(system, coupled), _groups(system)
     width, v_at = 6 + system.bodies.r, system.bodies.v_at
-    size = [*map(int, width), *(len(group.rows) for group in groups)]
-    ordering = Ordering(size, neighbours, groups, forest(groups, len(width)))
+    ordering = Ordering(width, neighbours, groups)
     ordering.run(np.inf)
     n, total = len(width), int(width.sum())
     found = [

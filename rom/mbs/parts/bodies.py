@@ -221,21 +221,16 @@ def rigid_part(name: str, mass: float, inertia: Array, pose: Any, points: dict[s
             f"{moments[0] + moments[1]:g} kg m^2: no body has this inertia.",
             where=name,
         )
-    _doubt_inertia(name, float(moments[2]), mass, points)
-    second = 0.5 * np.trace(inertia) * np.eye(3) - inertia
-    at, p, velocity, omega = pose
-    return Part(name, mass, np.zeros(3), second, at, p, velocity, omega, points)
-
-
-def _doubt_inertia(name: str, moment: float, mass: float, points: dict[str, Array]) -> None:
-    """Warn if the mass lies far beyond all markers; a marker in its centre says nothing."""
     reach = max((float(np.linalg.norm(x)) for x in points.values()), default=0.0)
-    radius = float(np.sqrt(moment / mass))
-    sizes = f"body {name!r}, {radius:.4g} m over {reach:.4g} m,"
-    if reach > 0.0:
+    radius = float(np.sqrt(moments[2] / mass))
+    if reach > 0.0:  # a marker in the mass centre says nothing
+        sizes = f"body {name!r}, {radius:.4g} m over {reach:.4g} m,"
         warn_outside(GYRATION, radius / reach, sizes)
     else:
         warn_outside(SIZE, radius, f"body {name!r} by its inertia")
+    second = 0.5 * np.trace(inertia) * np.eye(3) - inertia
+    at, p, velocity, omega = pose
+    return Part(name, mass, np.zeros(3), second, at, p, velocity, omega, points)
 
 
 def flexible_part(name: str, body: Any, moving: Any, pose: Any, elastic: Any) -> Part:

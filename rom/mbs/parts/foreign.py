@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from rom.arguments import shortened
 from rom.errors import ConfigError, RomError, SolverError
 from rom.model import Array
 
@@ -88,7 +89,8 @@ def real(what: str, t: float, value: Any, shape: tuple[int, ...], needed: str) -
     A = _floats(value)
     if A is None or A.size != math.prod(shape) or (len(shape) > 1 and A.shape[0] != shape[0]):
         raise ConfigError(
-            f"{what} returned {_short(value)} at t = {t:.9g} s; needed is {needed}.", hint=KEPT_HINT
+            f"{what} returned {shortened(value)} at t = {t:.9g} s; needed is {needed}.",
+            hint=KEPT_HINT,
         )
     return A.reshape(shape)
 
@@ -102,11 +104,6 @@ def _floats(value: Any) -> Array | None:
         return A.astype(float) if A.dtype.kind in "biuf" else None
     except (TypeError, ValueError, OverflowError):
         return None
-
-
-def _short(value: Any) -> str:
-    text = " ".join(repr(value).split())
-    return text if len(text) <= 80 else f"{text[:77]}..."
 
 
 def _failure(what: str, t: float, error: BaseException) -> RomError:

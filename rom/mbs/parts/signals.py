@@ -56,6 +56,10 @@ class Jump:
         """Difference of the values."""
         return self.after - self.before
 
+    def __str__(self) -> str:
+        ends = f"from {self.before:.6g} to {self.after:.6g}"
+        return f"jumps by {self.size:.4g} at t = {self.t:.9g} s, {ends}"
+
 
 def largest_jump(f: Function, t: Array, width: float, small: float) -> Jump | None:
     """The largest jump of a function of times (n,), equally spaced; None if it is continuous.
@@ -68,16 +72,13 @@ def largest_jump(f: Function, t: Array, width: float, small: float) -> Jump | No
     bend = np.abs(np.diff(values, 2))  # what a straight line does not explain
     inner = np.argsort(bend)[::-1][:N_SUSPECTS]
     places = {int(k) for j in inner if bend[j] > 0.1 * small for k in (j, j + 1)}
-    found = [_wider(f, _halved(f, t[k], t[k + 1], width), width, t) for k in sorted(places)]
+    halves = (_halved(f, t[k], t[k + 1], width) for k in sorted(places))
+    found = [
+        Jump(float(b), *map(float, f(np.clip([a - width, b + width], t[0], t[-1]))))
+        for a, b in halves  # with what surrounds them
+    ]
     jumps = [jump for jump in found if abs(jump.size) > max(small, 0.1 * bend.max(initial=0.0))]
     return max(jumps, key=lambda jump: abs(jump.size), default=None)
-
-
-def _wider(f: Function, place: tuple[float, float], width: float, t: Array) -> Jump:
-    """What an interval and its surroundings hold of a jump."""
-    ends = np.clip([place[0] - width, place[1] + width], t[0], t[-1])
-    before, after = f(ends)
-    return Jump(float(place[1]), float(before), float(after))
 
 
 def _halved(f: Function, a: float, b: float, width: float) -> tuple[float, float]:
@@ -141,7 +142,12 @@ class Examined:
         width = max(JUMP_WIDTH_RTOL * (t[-1] - t[0]), TIME_RTOL * float(np.abs(t).max()))
         jump = largest_jump(self.function, t, width, small)
         if jump is not None:
-            self.end = jump.t, _refusal(self.name, jump)
+            refusal = ModelError(
+                f"drive {self.name!r} {jump}: the bodies would need infinite velocity.",
+                hint="Let it move there over several steps, or release a spring instead. The "
+                "motion up to there is kept in error.solution.",
+            )
+            self.end = jump.t, refusal
         elif not self.doubted:
             self._look_at_rate(t, largest)
 
@@ -156,28 +162,14 @@ class Examined:
         ):
             return
         kink = largest_jump(speed, t, 4 * DIFFERENCE_SPACING * interval, SMALL_KINK * self.top)
-        doubt = "" if kink is None else _kink(self.name, kink)
+        doubt = kink and (
+            f"the velocity of drive {self.name!r} {kink}: the reactions there are those of an "
+            "impact, and depend on the time step. Round the corner over several steps."
+        )
         if self.rate is not None and not doubt:
             doubt = _contradiction(self.name, t, values, quotient(t))
-        warn(doubt)
+        warn(doubt or "")
         self.doubted = bool(doubt)
-
-
-def _kink(name: str, kink: Jump) -> str:
-    return (
-        f"the velocity of drive {name!r} jumps by {kink.size:.4g} at t = {kink.t:.6g} s, from "
-        f"{kink.before:.4g} to {kink.after:.4g}: the reactions there are those of an impact, "
-        "and depend on the time step. Round the corner over several steps."
-    )
-
-
-def _refusal(name: str, jump: Jump) -> ModelError:
-    return ModelError(
-        f"drive {name!r} jumps by {jump.size:.4g} at t = {jump.t:.9g} s, from {jump.before:.6g} to "
-        f"{jump.after:.6g}: the bodies would need infinite velocity.",
-        hint="Let it move there over several steps, or release a spring instead. The motion up to "
-        "there is kept in error.solution.",
-    )
 
 
 def _quotient(function: Function, span: tuple[float, float], apart: float) -> Function:
@@ -297,11 +289,6 @@ def _at_once(function: Callable[[Any], Any], t: Array, width: int) -> Array | No
 def drive_signal(name: str, drive: Any) -> Signal:
     """Signal of a prescribed joint coordinate."""
     return Signal(name, drive.function, drive.rate, drive.acceleration)
-
-
-def clock_signal() -> Signal:
-    """The time itself, for laws that ask for it."""
-    return Signal("clock", lambda t: t, lambda t: 1.0 + 0.0 * t, lambda t: 0.0 * t)
 
 
 def transition(low: float, high: float, duration: float, start: float = 0.0) -> Motion:

@@ -29,7 +29,7 @@ from rom.mbs.results.joint_motion import JointMotion, joint_motion
 from rom.mbs.results.recomputed import Tracks, follow, marker_loads, of_body
 from rom.mbs.results.state import State
 from rom.model import Array
-from rom.names import check_known, offered
+from rom.names import check_known
 from rom.notebook import html_table, listed
 from rom.rotation import continuous, matrix, quaternion
 
@@ -310,13 +310,8 @@ class Solution(Columns, metaclass=Open, kind="columns", bound=typed):
             >>> round(float(sol.reaction("hook")[-1, 2]), 6)  # its weight
             19.62
         """
-        rows = self.packed.rows_of(name)
-        if not rows.size:
-            raise ConfigError(
-                f"no joint or drive {name!r}; there are "
-                f"{offered(set(self.packed.row_owner), name)}."
-            )
-        return self._follow(rows=rows).reaction
+        check_known(name, set(self.packed.row_owner), f"no joint or drive {name!r}; there are")
+        return self._follow(rows=self.packed.rows_of(name)).reaction
 
     def joint(self, name: str) -> JointMotion:
         """Angle and displacement of a joint over time, with their rates.
@@ -365,8 +360,7 @@ class Solution(Columns, metaclass=Open, kind="columns", bound=typed):
         Raises:
             ConfigError: for a name that no law has.
         """
-        if name not in self.mechanism.laws:
-            raise ConfigError(f"no law {name!r}; there are {offered(self.mechanism.laws, name)}.")
+        check_known(name, self.mechanism.laws, f"no law {name!r}; there are")
         return law_record(self, name)
 
     def element(self, name: str) -> ElementRecord:
