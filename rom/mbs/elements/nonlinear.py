@@ -29,16 +29,7 @@ from numba import types
 from numba.extending import intrinsic
 
 from rom import rotation
-from rom.arguments import (
-    Omega,
-    Orientation,
-    Point,
-    Velocity,
-    finite,
-    start_pose,
-    typed,
-    whole,
-)
+from rom.arguments import Omega, Orientation, Point, Velocity, finite, start_pose, typed, whole
 from rom.errors import ConfigError, ModelError
 from rom.mbs.compiler.calls import called
 from rom.mbs.elements.family import Family, Hooks, Places, integers, on_joint

@@ -100,10 +100,8 @@ def _by_the_frame(part: Part, load: Any) -> Array:
     if part.own_frame is None:
         return np.zeros((part.r, 3, 3))
     move, turn = part.shapes(part.own_frame)
-    sums = (
-        np.outer(t, load.force) + skew(w) @ load.first for t, w in zip(move.T, turn.T, strict=True)
-    )
-    return np.array(list(sums))
+    return np.array([np.outer(t, load.force) + skew(w) @ load.first
+                     for t, w in zip(move.T, turn.T, strict=True)])  # fmt: skip
 
 
 @table
@@ -142,14 +140,12 @@ def pack(loads: Any, places: Places) -> SpreadLoads:
         rows_of((load.first.ravel() for load in found), 9),
         shapes,
         np.array([load.amplitude for load in found], dtype=float),
-        integers(places.signal(name, _as_vector(load.function)) for name, load in loads.items()),
+        integers(
+            places.signal(name, f and (lambda t, f=f: (f(t), 0.0, 0.0)))  # of three components
+            for name, f in ((name, load.function) for name, load in loads.items())
+        ),
         np.zeros((len(found), 9)),
     )
-
-
-def _as_vector(function: Callable[[float], Any] | None) -> Any:
-    """The function of time as the first of three components."""
-    return None if function is None else lambda t: (function(t), 0.0, 0.0)
 
 
 @inner

@@ -125,18 +125,10 @@ def clear_tangent(tangent):
 
 
 @inner
-def scaled_tangent(W, tangent, kind, factor):
-    """Write a factor times one of them to W.Q."""
-    for p in range(12):
-        for q in range(12):
-            W.Q[p, q] = factor * tangent[kind, p, q]
-
-
-@inner
 def place_tangent(s, W, pair, tangent, ck, cc):
     """Add ck times the first of them to W.Kt and cc times the second to W.S."""
-    i, j = pair
-    scaled_tangent(W, tangent, 0, ck)
-    pair_stiffness(s, W, i, j, W.Kt)
-    scaled_tangent(W, tangent, 1, cc)
-    pair_stiffness(s, W, i, j, W.S)
+    for kind in range(2):
+        for p in range(12):
+            for q in range(12):
+                W.Q[p, q] = (ck if kind == 0 else cc) * tangent[kind, p, q]
+        pair_stiffness(s, W, pair[0], pair[1], W.Kt if kind == 0 else W.S)

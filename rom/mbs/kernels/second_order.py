@@ -32,6 +32,7 @@ from rom.mbs.kernels.system import System
 from rom.mbs.kernels.work import Work
 
 REAL_3 = types.UniTuple(types.float64, 3)
+OF_BODY = (types.void, System, Work, types.int64)  # what a stage for one body or marker takes first
 
 
 def has_stiffened(system):
@@ -53,7 +54,7 @@ def bend(bodies, b, x, at, out):
             row += r
 
 
-@stage(types.void, System, Work, types.int64, REAL_VECTOR, REAL_VECTOR, needed=has_stiffened)
+@stage(*OF_BODY, REAL_VECTOR, REAL_VECTOR, needed=has_stiffened)
 def bent_coordinates(s, W, b, q, v):
     """Set W.y, W.yd, and the derivatives of y and yd by q, W.Y and W.Yd."""
     r, at, vt = s.bodies.r[b], s.bodies.q_at[b] + 7, s.bodies.v_at[b] + 6
@@ -78,7 +79,7 @@ def bent_rates(W, b, r, vt, v, a):
         W.ydd[b, m] = total
 
 
-@stage(types.void, System, Work, types.int64, needed=has_stiffened)
+@stage(*OF_BODY, needed=has_stiffened)
 def bent_integrals(s, W, b):
     """Add what no combination of shapes contains to W.SP and W.J (before its trace), set W.T1d."""
     bodies = s.bodies
@@ -131,10 +132,7 @@ def bent_sum(bend, p, x, at, r):
     return a0, a1, a2
 
 
-@stage(
-    *(types.UniTuple(REAL_3, 2), System, Work, types.int64, REAL_VECTOR, REAL_VECTOR),
-    needed=has_stiffened,
-)
+@stage(types.UniTuple(REAL_3, 2), *OF_BODY[1:], REAL_VECTOR, REAL_VECTOR, needed=has_stiffened)
 def bent_motion(s, W, m, q, v):
     """Set W.move to what elastic rates do to a marker; its accelerations of second order."""
     bodies, bend, b = s.bodies, s.markers.bend[m], s.markers.body[m]
@@ -143,10 +141,7 @@ def bent_motion(s, W, m, q, v):
     return bent_sum(bend, 0, v, t, r), bent_sum(bend, 3, v, t, r)
 
 
-@stage(
-    *(types.void, System, Work, types.int64, REAL_3, REAL_3, types.float64, REAL_BLOCK),
-    needed=has_stiffened,
-)
+@stage(*OF_BODY, REAL_3, REAL_3, types.float64, REAL_BLOCK, needed=has_stiffened)
 def bent_wrench_stiffness(s, W, m, f, n, c, S):
     """Stiffness that the force and moment on a marker give to its body, in its block S."""
     bend, theta, r = s.markers.bend[m], vec(W.theta[m], 0), s.bodies.r[s.markers.body[m]]

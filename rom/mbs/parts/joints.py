@@ -108,8 +108,8 @@ def coordinate_of(joints: Mapping[str, Joint], joint: str, which: str | None, wh
     """The row of the coordinate "angle" or "displacement" of a joint; None for the first."""
     if joint not in joints:
         raise ConfigError(f"{what}: no joint {joint!r}; there are {offered(joints, joint)}.")
-    names: dict[str | None, str] = dict.fromkeys(("displacement", "way"), "displacement")
-    names |= {None: "coordinate", "angle": "turn"}
+    names = {None: "coordinate", "angle": "turn", "displacement": "displacement"}
+    names["way"] = "displacement"
     if which not in names:
         raise ConfigError(f"coordinate {which!r} of {joint!r} must be 'angle' or 'displacement'.")
     row: Row | None = getattr(joints[joint], names[which])

@@ -32,7 +32,9 @@ def warn_of_limits(solution: Solution) -> None:
             continue
         if getattr(part.flexible, "quartic", None) is not None:
             _warn_of_turned_markers(solution, name)
-            _warn_of_range(solution, name)
+            if found := part.flexible.beyond_range(solution.elastic(name)):
+                when = f"at {solution.t[found[0]]:.4g} s: {found[1]}"
+                warn(f"body {name!r} left the range of its certificate {when}")
             continue
         share, bent = softening(solution, name), deformation(solution, name, surface=False)
         if share >= 1.0:
@@ -87,14 +89,6 @@ def pressed(solution: Solution, name: str) -> float | None:
             "stiffness knows. Reduce it with stiffening=True."
         )
     return share
-
-
-def _warn_of_range(solution: Solution, name: str) -> None:
-    """Bodies of large deflection that store more energy than where they were compared."""
-    body: Any = solution.mechanism.parts[name].flexible
-    if found := body.beyond_range(solution.elastic(name)):
-        k, why = found
-        warn(f"body {name!r} left the range of its certificate at {solution.t[k]:.4g} s: {why}")
 
 
 def _warn_of_turned_markers(solution: Solution, name: str) -> None:

@@ -50,7 +50,14 @@ class Impact:
     tangential_damping: Annotated[float, NotNegative()] = 0.0
 
     def __post_init__(self) -> None:
-        self._check_spring()
+        k, c = self.tangential_stiffness, self.tangential_damping
+        if k is None and c:
+            raise ConfigError(f"tangential_damping = {c:g} needs a tangential_stiffness.")
+        if k is not None and not self.mu:
+            raise ConfigError(
+                f"tangential_stiffness = {k:g} N/m without friction holds nothing.",
+                hint="Give mu above zero, or no tangential_stiffness.",
+            )
         if (self.restitution is None) != (self.impact_speed is None):
             raise ConfigError(
                 f"restitution = {self.restitution} needs the impact speed at which it holds, "
@@ -61,17 +68,6 @@ class Impact:
                 raise ConfigError(f"damping = {self.damping:g} and restitution; give only one.")
             factor = damping_of(self.restitution, self.impact_speed)
             object.__setattr__(self, "damping", factor)
-
-    def _check_spring(self) -> None:
-        """Refuse a spring of friction without friction, and its damping without a spring."""
-        k, c = self.tangential_stiffness, self.tangential_damping
-        if k is None and c:
-            raise ConfigError(f"tangential_damping = {c:g} needs a tangential_stiffness.")
-        if k is not None and not self.mu:
-            raise ConfigError(
-                f"tangential_stiffness = {k:g} N/m without friction holds nothing.",
-                hint="Give mu above zero, or no tangential_stiffness.",
-            )
 
 
 def checked_law(name: str, law: Any, *parts: Part) -> Impact:
