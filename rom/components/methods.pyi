@@ -11,7 +11,6 @@ from rom.mbs.elements import (
     loads,
     motors,
     nonlinear,
-    spread_loads,
     springs,
 )
 from rom.mbs.elements.contact import points, shapes
@@ -36,7 +35,7 @@ class Methods:
     surface_on_plane = shapes.surface_on_plane
     surface_on_sphere = shapes.surface_on_sphere
     surface_on_cylinder = shapes.surface_on_cylinder
-    spread_load = spread_loads.spread_load
+    spread_load = loads.spread_load
     tendon = tendons.tendon
     gear_mesh = meshes.gear_mesh
     rolling_bearing = bearings.rolling_bearing
@@ -45,6 +44,7 @@ class Methods:
 
     springs: ElementsOf[springs.Spring]
     turns: ElementsOf[joint_laws.Turn]
+    spread_loads: ElementsOf[loads.Spread]
     loads: ElementsOf[loads.Load]
     user_forces: ElementsOf[laws.UserForce]
     laws: ElementsOf[laws.Law]
@@ -53,7 +53,6 @@ class Methods:
     stops: ElementsOf[joint_laws.Stop]
     bushings: ElementsOf[bushings.Bushing]
     contacts: ElementsOf[points.Contact]
-    spread_loads: ElementsOf[spread_loads.Spread]
     tendons: ElementsOf[tendons.Tendon]
     gear_meshes: ElementsOf[meshes.GearMesh]
     rolling_bearings: ElementsOf[bearings.RollingBearing]

@@ -69,8 +69,8 @@ ORDER = {
             "law_check"
         ),
         "mbs.elements": (
-            "field family law_calls joint_forces springs loads laws_in_python laws formulas motors "
-            "contact joint_laws bushings spread_loads nonlinear solids"
+            "field family law_calls joint_forces springs loads laws formulas motors contact "
+            "joint_laws bushings nonlinear solids"
         ),
         "components.gear_mesh": (
             "gears compliance tooth_elements contact tooth_loads symbols keys field"

@@ -18,7 +18,7 @@ from rom.mbs.equations.equations import (
     tangents,
 )
 from rom.mbs.equations.packing import Packed, pack
-from rom.mbs.equations.pattern import Pattern
+from rom.mbs.equations.sparse_solve import Pattern
 from rom.mbs.integrate.consistent_start import (
     fitting_velocity,
     independent,

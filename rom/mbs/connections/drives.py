@@ -7,8 +7,15 @@ from typing import Any
 from rom.errors import ConfigError
 from rom.mbs.connections.ends import not_zero
 from rom.mbs.kernels.system import COUPLING
-from rom.mbs.parts.joints import NO_VECTOR, Coordinate, Joint, Row, coordinate_of, joint_with_axis
-from rom.mbs.parts.whole import Whole
+from rom.mbs.parts.joints import (
+    NO_VECTOR,
+    Coordinate,
+    Joint,
+    Row,
+    Whole,
+    coordinate_of,
+    joint_with_axis,
+)
 
 TimeFunction = Callable[[float], Any]
 

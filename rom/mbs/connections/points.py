@@ -7,8 +7,7 @@ from rom.errors import ConfigError
 from rom.mbs.connections.ends import ends_of, enter
 from rom.mbs.kernels.system import DISTANCE, NORMAL, ROLL, TOUCH
 from rom.mbs.parts.bodies import Marker
-from rom.mbs.parts.joints import NO_VECTOR, Joint, Row, coincidence
-from rom.mbs.parts.whole import Whole
+from rom.mbs.parts.joints import NO_VECTOR, Joint, Row, Whole, coincidence
 
 NORMAL_ATOL = 1e-6  # cosine of the angle between the axes of the cross
 FLAT_COSINE = 1 - 1e-6  # of the angle between the axis of a wheel that lies flat and the normal

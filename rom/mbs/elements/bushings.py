@@ -39,7 +39,7 @@ from rom.mbs.kernels.constraints import pair_stiffness, push_pair
 from rom.mbs.kernels.element_calls import energy, residuals, tangents
 from rom.mbs.kernels.tables import Array2, Array3, Index1, Index2, Table, table
 from rom.mbs.parts.bodies import Marker
-from rom.mbs.parts.whole import Whole
+from rom.mbs.parts.joints import Whole
 from rom.model import Array
 
 DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")

@@ -7,14 +7,14 @@ FIELD = Field(
     families=tuple(f"{ELEMENTS_MODULE}.{place}_FAMILY" for place in (
         "springs:SPRINGS", "joint_laws:TURNS", "loads:LOADS", "laws:LAWS", "motors:MOTORS",
         "joint_laws:FRICTIONS", "joint_laws:STOPS", "bushings:BUSHINGS", "contact.points:CONTACTS",
-        "spread_loads:SPREAD_LOADS", "nonlinear:NONLINEAR", "solids:QUARTICS", "solids:SAMPLES",
+        "loads:SPREAD_LOADS", "nonlinear:NONLINEAR", "solids:QUARTICS", "solids:SAMPLES",
     )),
     bodies={"deflection": f"{ELEMENTS_MODULE}.solids:deflection_of"},
     methods={name.partition(" ")[0]: f"{ELEMENTS_MODULE}.{name.partition(' ')[2]}" for name in (
         "springs springs:Spring", "turns joint_laws:Turn", "loads loads:Load", "laws laws:Law",
         "user_forces laws:UserForce", "motors motors:Motor", "frictions joint_laws:Friction",
         "stops joint_laws:Stop", "bushings bushings:Bushing", "contacts contact.points:Contact",
-        "spread_loads spread_loads:Spread", "nonlinear nonlinear:Assembly",
+        "spread_loads loads:Spread", "nonlinear nonlinear:Assembly",
     )} | {place.partition(":")[2]: f"{ELEMENTS_MODULE}.{place}" for place in (
         "springs:spring_damper", "joint_laws:rotational_spring", "loads:force", "loads:torque",
         "laws:law", "laws:user_force", "motors:motor", "joint_laws:friction", "joint_laws:stop",
@@ -22,7 +22,7 @@ FIELD = Field(
         "contact.shapes:disc_on_plane", "contact.shapes:sphere_on_sphere",
         "contact.shapes:sphere_on_cylinder", "contact.shapes:capsule_on_capsule",
         "contact.shapes:surface_on_plane", "contact.shapes:surface_on_sphere",
-        "contact.shapes:surface_on_cylinder", "spread_loads:spread_load",
+        "contact.shapes:surface_on_cylinder", "loads:spread_load",
         "nonlinear:add_nonlinear",
     )},
     symbols={family: f"rom.view.scenes.connections:{shape}" for family, shape in (

@@ -17,8 +17,7 @@ from rom.mbs.elements.joint_forces import (
     load_columns,
 )
 from rom.mbs.elements.springs import doubt
-from rom.mbs.parts.joints import Coordinate, Row, coordinate_of
-from rom.mbs.parts.whole import Whole
+from rom.mbs.parts.joints import Coordinate, Row, Whole, coordinate_of
 
 
 @dataclass(frozen=True, slots=True)

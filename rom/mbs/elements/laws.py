@@ -34,8 +34,14 @@ from rom.arguments import finite, shortened
 from rom.errors import ConfigError
 from rom.mbs.compiler.calls import called
 from rom.mbs.elements.family import Family, Hooks, Places, integers, starts
-from rom.mbs.elements.law_calls import DIFFERENCE_STEP, ENERGY_SIZE, MOTION_SIZE, entries
-from rom.mbs.elements.laws_in_python import AskedForce, AskedLaw
+from rom.mbs.elements.law_calls import (
+    DIFFERENCE_STEP,
+    ENERGY_SIZE,
+    MOTION_SIZE,
+    AskedForce,
+    AskedLaw,
+    entries,
+)
 from rom.mbs.kernels.algebra import add, cross, scale, unit
 from rom.mbs.kernels.compiled import inner
 from rom.mbs.kernels.constraints import pair_stiffness
@@ -51,7 +57,7 @@ from rom.mbs.kernels.tables import (
     table,
 )
 from rom.mbs.parts.bodies import Marker
-from rom.mbs.parts.whole import Whole
+from rom.mbs.parts.joints import Whole
 from rom.model import Array, Index
 
 
@@ -149,7 +155,7 @@ def user_force(
 ) -> None:
     """Force law in Python: ``function(t, a)`` or ``function(t, a, b)``.
 
-    ``a`` and ``b`` are `rom.mbs.elements.laws_in_python.MarkerMotion`. The function returns
+    ``a`` and ``b`` are `rom.mbs.elements.law_calls.MarkerMotion`. The function returns
     (force, moment) in the world that act on the first marker; the reaction, at the same place in
     space, acts on the body of the second one, so that momentum is conserved whatever the law.
     """

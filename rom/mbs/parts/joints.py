@@ -1,14 +1,14 @@
 """What a joint is: scalar constraints between two markers, and the coordinates it leaves."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal, Protocol
 
 import numpy as np
 
 from rom.errors import ConfigError
 from rom.mbs.kernels.system import ALONG, ANGLE, NORMAL, POINT
-from rom.mbs.parts.bodies import Marker
+from rom.mbs.parts.bodies import Marker, Part
 from rom.model import Array
 from rom.names import offered
 
@@ -121,3 +121,43 @@ def coordinate_of(joints: Mapping[str, Joint], joint: str, which: str | None, wh
             hint=f"Joints that have one: {offered(able, joint)}.",
         )
     return row
+
+
+class Whole(Protocol):
+    """A `rom.mbs.mechanism.Mechanism`, whose methods the functions on it become.
+
+    Attributes:
+        parts, joints, drives: {name: body, joint or drive}.
+        elements: {name: (family, element)}.
+    """
+
+    parts: dict[str, Part]
+    joints: dict[str, Joint]
+    drives: dict[str, Any]
+    elements: dict[str, tuple[Any, Any]]
+
+    @property
+    def spherical(self) -> Callable[[str, Marker, Marker], None]:
+        """Make a ball joint."""
+
+    @property
+    def law(self) -> Callable[..., None]:
+        """Add a law of force, see `rom.mbs.elements.laws.law`."""
+
+    def add(self, name: str, element: Any, family: Any) -> None:
+        """Enter an element."""
+
+    def part(self, name: str) -> Part:
+        """The body of a name."""
+
+    def design_point(self, marker: Marker) -> Array:
+        """(3,) position of a marker where its body was added."""
+
+    def check_new(self, name: str) -> None:
+        """Refuse a name in use."""
+
+    def check_markers(self, name: str, *markers: Marker) -> None:
+        """Refuse markers that do not exist."""
+
+    def check_apart(self, name: str, m1: Marker, m2: Marker) -> None:
+        """Refuse such markers, or both of one body."""

@@ -25,8 +25,14 @@ from rom.mbs.results.element_record import (
     markers_of,
 )
 from rom.mbs.results.interpolation import Point, between
-from rom.mbs.results.joint_motion import JointMotion, joint_motion
-from rom.mbs.results.recomputed import Tracks, follow, marker_loads, of_body
+from rom.mbs.results.recomputed import (
+    JointMotion,
+    Tracks,
+    follow,
+    joint_motion,
+    marker_loads,
+    of_body,
+)
 from rom.mbs.results.state import State
 from rom.model import Array
 from rom.names import check_known

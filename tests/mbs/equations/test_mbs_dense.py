@@ -8,7 +8,7 @@ from numba import njit
 from numpy.testing import assert_allclose
 from scipy.sparse import csc_matrix
 
-from rom.mbs.equations.signature import signature
+from rom.mbs.equations.sparse_solve import signature
 from rom.mbs.kernels.algebra import PANEL_WIDTH, back_substitute, factorise
 
 

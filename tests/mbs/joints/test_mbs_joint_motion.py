@@ -15,7 +15,7 @@ from rom.mbs.kernels.system import ALONG
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.parts.joints import NO_VECTOR, Row
 from rom.mbs.parts.signals import Signal
-from rom.mbs.results.joint_motion import displacements
+from rom.mbs.results.recomputed import displacements
 
 AXIS = np.array([1.0, 2.0, 2.0]) / 3
 

@@ -32,7 +32,7 @@ from rom.mbs.elements.contact.points import (
     distance,
 )
 from rom.mbs.parts.bodies import Marker, Part, surface_place
-from rom.mbs.parts.whole import Whole
+from rom.mbs.parts.joints import Whole
 from rom.model import Array
 
 Where = Callable[[Array], Any] | str | None  # as rom.surface_load takes it

@@ -22,7 +22,7 @@ from rom.mbs.elements.formulas.taylor import run
 from rom.mbs.elements.law_calls import LAW_TYPES, compiled_entry
 from rom.mbs.kernels.compiled import inner
 from rom.mbs.parts.bodies import Marker
-from rom.mbs.parts.whole import Whole
+from rom.mbs.parts.joints import Whole
 from rom.model import Array
 
 # of Lobatto: with the ends among the points no jump hides between the last one and the end
