@@ -103,8 +103,7 @@ def bushing(  # noqa: PLR0913  one keyword per property
 
 def _matrix66(name: str, value: Any) -> Array:
     """Symmetric, not negative (6, 6) matrix from itself or its diagonal."""
-    A = np.diag(finite(name, value, (6,))) if np.shape(value) == (6,) else None
-    A = finite(name, value, (6, 6)) if A is None else A
+    A = finite(name, np.diag(value) if np.shape(value) == (6,) else value, (6, 6))
     size = np.abs(A).max()
     if np.abs(A - A.T).max() > 1e-9 * size:
         raise ConfigError(

@@ -164,15 +164,7 @@ class MarkerMotion:
 
 @dataclass(frozen=True, slots=True)
 class AskedLaw:
-    """A law that stays in Python.
-
-    Attributes:
-        name: of the law.
-        law: as the user described it.
-        e: its number.
-        laws: the table of all of them.
-        followed: number of joint coordinates, behind which memories are kept.
-    """
+    """A law that stays in Python, number e of a table, its memories behind coordinates followed."""
 
     name: str
     law: Any

@@ -330,8 +330,7 @@ def set_derivatives(s, W, laws, e):
             laws.D[k] = laws.derivatives[laws.derivatives_at[e] + k]
         return
     if laws.slopes[e] != 0:
-        for k in range(72 * n * n):
-            laws.D[k] = 0.0
+        laws.D[: 72 * n * n] = 0.0
         parameters, memory, t = begin(s, laws, e, W, laws.probe[0])
         call(laws.slopes[e], t, parameters, laws.motion, memory, laws.D)
         return

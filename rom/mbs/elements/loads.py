@@ -26,6 +26,7 @@ from rom.mbs.kernels.algebra import (
     mtv,
     mv,
     place,
+    place_row,
     put,
     row,
     scale,
@@ -331,9 +332,7 @@ def spread_tangents(s, W, loads, _lam, ck, _cc):
             x = seen(loads.shapes[k, j], A, world)
             place(block, 3, 6 + j, ca, dual(x, 0))
             if world == 1:
-                twist = dual(x, 0)
-                for p in range(3):
-                    block[6 + j, 3 + p] += ca * twist[p]
+                place_row(block, 6 + j, 3, ca, dual(x, 0))
 
 
 SPREAD_LOADS_FAMILY = Family(

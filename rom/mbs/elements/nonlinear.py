@@ -324,8 +324,7 @@ def ask_element(elements, e, wanted):
 @residuals.of(Nonlinear)
 def nonlinear_residuals(s, W, elements, q, v, _lam):
     """Add the forces of all elements to W.residual, and the power they lose to W.power[2]."""
-    for k in range(elements.forces.size):
-        elements.forces[k] = 0.0
+    elements.forces[:] = 0.0
     for e in range(elements.address.size):
         take_frames(s, elements, e, q, v)
         ask_element(elements, e, 0)

@@ -32,30 +32,21 @@ class Group(NamedTuple):
     couples: bool
 
 
-class Forest(NamedTuple):
-    """Trees of bodies.
+def forest(groups: list[Group], n_bodies: int) -> tuple[list[int], list[int]]:
+    """Trees along joints of two bodies, breadth first, from all bodies joined to the ground.
 
-    Attributes:
-        parent: body towards the root, -1 for roots.
-        joint: group towards the root or the ground, -1 for a free root.
+    Of each body the one towards the root, -1 for roots, and the group towards the root or the
+    ground, -1 for a free root.
     """
-
-    parent: list[int]
-    joint: list[int]
-
-
-def forest(groups: list[Group], n_bodies: int) -> Forest:
-    """Trees along joints of two bodies, breadth first, from all bodies joined to the ground."""
     parent, joint = [-1] * n_bodies, [-1] * n_bodies
     edges: list[list[tuple[int, int]]] = [[] for _ in range(n_bodies)]
+    grounded: dict[int, int] = {}
     for g, group in enumerate(groups):
         if group.rows and not group.couples:
             for a, b in zip(group.bodies, reversed(group.bodies), strict=True):
                 edges[a].append((b, g))
-    grounded: dict[int, int] = {}
-    for g, group in enumerate(groups):
-        if group.rows and not group.couples and len(group.bodies) == 1:
-            grounded.setdefault(group.bodies[0], g)
+            if len(group.bodies) == 1:
+                grounded.setdefault(group.bodies[0], g)
     for b, g in grounded.items():
         joint[b] = g
     reached: set[int] = set()
@@ -68,7 +59,7 @@ def forest(groups: list[Group], n_bodies: int) -> Forest:
                     reached.add(b)
                     parent[b], joint[b] = a, g
                     queue.append(b)
-    return Forest(parent, joint)
+    return parent, joint
 
 
 class Ordering:
@@ -83,7 +74,7 @@ class Ordering:
 
     def __init__(self, width: Index, neighbours: list[list[int]], groups: list[Group]):
         self.size = [*map(int, width), *(len(group.rows) for group in groups)]
-        self.groups, self.trees = groups, forest(groups, len(width))
+        self.groups, (self.parent, self.joint) = groups, forest(groups, len(width))
         self.sequence: list[int] = []
         self.later: dict[int, set[int]] = {}
         self.cost, self.n = 0.0, len(neighbours)
@@ -97,7 +88,7 @@ class Ordering:
     def run(self, limit: float) -> bool:
         """Eliminate all nodes; False as soon as that costs more than the limit."""
         children = [0] * self.n
-        for p in self.trees.parent:
+        for p in self.parent:
             if p >= 0:
                 children[p] += 1
         self.waiting, self.waits = self._loops()
@@ -112,7 +103,7 @@ class Ordering:
             self._eliminate_with_joints(b)
             if self.cost > limit:
                 return False
-            parent = self.trees.parent[b]
+            parent = self.parent[b]
             if parent >= 0:
                 children[parent] -= 1
                 if not children[parent]:
@@ -122,8 +113,8 @@ class Ordering:
     def _eliminate_with_joints(self, b: int) -> None:
         """A body, the joint towards its root, and the loops that come together in it."""
         self._eliminate(b)
-        if self.trees.joint[b] >= 0:
-            self._eliminate(self.n + self.trees.joint[b])
+        if self.joint[b] >= 0:
+            self._eliminate(self.n + self.joint[b])
         for g in self.waiting.get(b, ()):
             self.waits[g] -= 1
             if not self.waits[g]:
@@ -145,7 +136,7 @@ class Ordering:
 
     def _loops(self) -> tuple[dict[int, list[int]], dict[int, int]]:
         """Groups that wait for each body, and for how many bodies each group waits."""
-        in_trees, waits = set(self.trees.joint), {}
+        in_trees, waits = set(self.joint), {}
         waiting: dict[int, list[int]] = {}
         for g, group in enumerate(self.groups):
             if not group.rows or g in in_trees:
@@ -160,8 +151,8 @@ class Ordering:
         depth = [-1] * self.n
         for b in range(self.n):
             path = [b]
-            while depth[path[-1]] < 0 and self.trees.parent[path[-1]] >= 0:
-                path.append(self.trees.parent[path[-1]])
+            while depth[path[-1]] < 0 and self.parent[path[-1]] >= 0:
+                path.append(self.parent[path[-1]])
             top = max(depth[path[-1]], 0)
             for up, node in enumerate(reversed(path)):
                 depth[node] = top + up
@@ -169,7 +160,7 @@ class Ordering:
 
     def _tops(self, bodies: tuple[int, ...]) -> set[int]:
         """Where paths from the bodies towards the ground meet, or the roots of different trees."""
-        tops, parent = set(bodies), self.trees.parent
+        tops, parent = set(bodies), self.parent
         while len(tops) > 1:
             low = max(tops, key=lambda b: self.depth[b])
             if parent[low] < 0:

@@ -118,10 +118,7 @@ def followed_angle(s, W, at, angle):
 @inner
 def clear_tangent(tangent):
     """Empty the tangents (2, 12, 12) by motions and velocities of a pair of markers."""
-    for kind in range(2):
-        for p in range(12):
-            for q in range(12):
-                tangent[kind, p, q] = 0.0
+    tangent[:] = 0.0
 
 
 @inner

@@ -363,9 +363,7 @@ def elastic_stiffness(s, W, b, v, a, c, S):
     f, r, t = bodies.flex[b], bodies.r[b], bodies.v_at[b]
     w, dw, A = vec(v, t + 3), vec(a, t + 3), W.A[b]
     a_minus_g = mtv(A, sub(vec(a, t), vec(bodies.gravity, 0)))
-    for k in range(r):
-        for p in range(9):
-            W.Sa[k, p] = 0.0
+    W.Sa[:r] = 0.0
     contract(bodies.S2[f], W.ydd[b], r, W.line, W.Sa)
     for l in range(r):
         SP, e, S_l = W.SP[b, l], 6 + l, col(bodies.S[f], l)

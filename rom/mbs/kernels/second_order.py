@@ -44,9 +44,7 @@ def has_stiffened(system):
 def bend(bodies, b, x, at, out):
     """Set out to the sum of H_mkl x_l, m its row and k its column."""
     r, row = bodies.r[b], bodies.H_at[bodies.flex[b]]
-    for m in range(r):
-        for k in range(r):
-            out[m, k] = 0.0
+    out[:r, :r] = 0.0
     for l in range(r):
         for m in range(r):
             for k in range(r):

@@ -43,14 +43,7 @@ class Stage:
     """A kernel with a fixed signature, callable from Python and, once linked, from kernels.
 
     Its first argument is the system. A call in a kernel does nothing, and answers 0, unless some
-    system, or step, of this process needed it.
-
-    Attributes:
-        signature: types of result and arguments.
-        kernel: the compiled function.
-        asked: class of the table that needs it or not.
-        needed: whether such a table does.
-        slot: its place in `STAGE_ADDRESSES`.
+    system, or step, of this process ``needed`` it, a table of the class ``asked``.
     """
 
     def __init__(

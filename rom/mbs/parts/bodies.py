@@ -157,12 +157,10 @@ class Part:
             raise ModelError(
                 f"marker {marker.place!r} of body {self.name!r} lies {apart:.4g} m beside the axis "
                 f"about which the body spins, and {name!r} holds it there: with the material it "
-                f"would go round, an unbalance of {self.mass * apart:.4g} kg m that a frame which "
-                "does not turn cannot have.",
+                f"would go round, an unbalance of {self.mass * apart:.4g} kg m.",
                 where=self.name,
-                hint="Let its frame turn: give omega instead of spin. Or put the marker on the "
-                f"axis and give the unbalance as a force that turns, of "
-                f"{self.mass * apart * speed**2:.4g} N at this speed.",
+                hint="Let its frame turn: give omega instead of spin. Or put the marker on "
+                f"the axis and let a force of {self.mass * apart * speed**2:.4g} N turn.",
             )
 
     @property
@@ -245,7 +243,23 @@ def flexible_part(name: str, body: Any, moving: Any, pose: Any, elastic: Any) ->
     at, p, velocity, omega = pose
     still = name, float(body.mass), first, second, at, p
     part = Part(*still, velocity, omega, {}, body, moving, *elastic)
-    _check_mass(part)
+    M = mass_at_rest(part)
+    if not np.isfinite(M).all() or np.diag(M).min() <= 0.0:
+        raise ModelError(
+            "the mass matrix must be finite, with a positive diagonal.",
+            where=part.name,
+            hint="Reduce the body again; rom.check names what is wrong with one of a file.",
+        )
+    scale = 1 / np.sqrt(np.diag(M))
+    spectrum = np.linalg.eigvalsh(M * scale * scale[:, None])
+    if spectrum[0] < SINGULAR_MASS * spectrum[-1]:
+        raise ModelError(
+            f"the mass matrix of the frame and the {part.r} elastic coordinates is singular "
+            f"(eigenvalue ratio {spectrum[0] / spectrum[-1]:.2g}): a rigid motion was left in the "
+            "elastic shapes, which the floating frame already describes.",
+            where=part.name,
+            hint="Give the body a reference condition: body.with_reference('mean-axis').",
+        )
     return part
 
 
@@ -268,26 +282,6 @@ def moving_start(part: Part) -> tuple[Array, Array]:
         at = part.at - A @ shift
         velocity = part.velocity - A @ (np.cross(omega, shift) + slip)
     return np.r_[at, p, part.q], np.r_[velocity, omega, part.qd]
-
-
-def _check_mass(part: Part) -> None:
-    M = mass_at_rest(part)
-    if not np.isfinite(M).all() or np.diag(M).min() <= 0.0:
-        raise ModelError(
-            "the mass matrix must be finite, with a positive diagonal.",
-            where=part.name,
-            hint="Reduce the body again; rom.check names what is wrong with one of a file.",
-        )
-    scale = 1 / np.sqrt(np.diag(M))
-    spectrum = np.linalg.eigvalsh(M * scale * scale[:, None])
-    if spectrum[0] < SINGULAR_MASS * spectrum[-1]:
-        raise ModelError(
-            f"the mass matrix of the frame and the {part.r} elastic coordinates is singular "
-            f"(eigenvalue ratio {spectrum[0] / spectrum[-1]:.2g}): a rigid motion was left in the "
-            "elastic shapes, which the floating frame already describes.",
-            where=part.name,
-            hint="Give the body a reference condition: body.with_reference('mean-axis').",
-        )
 
 
 def mass_at_rest(part: Part) -> Array:

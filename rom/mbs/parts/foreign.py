@@ -40,12 +40,6 @@ def ask(what: str, t: float, function: Callable[..., Any], *arguments: Any) -> A
         raise _failure(what, t, error) from error
 
 
-def why_not_compiled(error: Exception) -> str:
-    """The line in which Numba says what it cannot compile."""
-    lines = (line.strip() for line in str(error).splitlines())
-    return next((x for x in lines if x and not x.startswith("Failed in")), type(error).__name__)
-
-
 def compiled_function(
     what: str, law: Any, make: Callable[[Any], Any], wanted: bool | None, hint: str
 ) -> Any:
@@ -67,7 +61,9 @@ def compiled_function(
     except Exception as error:  # Numba raises errors of many kinds for what it cannot compile
         if not wanted:
             return None
-        why = why_not_compiled(error)
+        lines = (line.strip() for line in str(error).splitlines())
+        told = (line for line in lines if line and not line.startswith("Failed in"))
+        why = next(told, type(error).__name__)
         raise ConfigError(f"{what} cannot be compiled: {why}", hint=hint) from error
 
 

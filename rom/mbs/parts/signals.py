@@ -40,12 +40,7 @@ Function = Callable[[Array], Array]
 
 @dataclass(frozen=True, slots=True)
 class Jump:
-    """Where a function of time jumps.
-
-    Attributes:
-        t: time just behind it [s].
-        before, after: values.
-    """
+    """Where a function of time jumps: just behind it [s], and the values on both sides."""
 
     t: float
     before: float
@@ -97,16 +92,8 @@ def _halved(f: Function, a: float, b: float, width: float) -> tuple[float, float
 class Examined:
     """A drive and what was found in it so far; never asked for times that the run has not reached.
 
-    Attributes:
-        name: of the drive.
-        function: its values (n,) at times (n,).
-        rate: its derivative, if it is given.
-        start: first time of the run [s].
-        until: time up to which it was looked at [s].
-        low, high: least and largest value.
-        top: largest rate.
-        doubted: whether a doubt was said; one is enough.
-        end: time from which on the drive is no motion, and the error that says so.
+    It was looked at from ``start`` ``until`` a time [s], where its values and rates reach so far;
+    ``doubted`` once a doubt was said; ``end`` is when it stops to be a motion, and why.
     """
 
     name: str

@@ -155,19 +155,14 @@ def _numbers(solution: Solution) -> list[Row]:
     return rows
 
 
-def _certified(name: str, certificate: Report | None) -> list[Row]:
-    """Whether a body stands for its full model, with the worst row by name where it does not."""
-    if certificate is None:
-        return []
-    n = len(certificate.failures)
-    worst = f", worst: {certificate.worst.quantity}" if n else ""
-    return [_row(f"rows of the certificate of {name} that fail{worst}", n, 0)]
-
-
 def _limits(solution: Solution, name: str, body: Any) -> list[Row]:
     """Whether a body stays within what it was made for."""
     bent = deformation(solution, name)
-    certified = _certified(name, getattr(body, "certificate", None))
+    certified, certificate = list[Row](), getattr(body, "certificate", None)
+    if certificate is not None:
+        n = len(certificate.failures)
+        worst = f", worst: {certificate.worst.quantity}" if n else ""
+        certified = [_row(f"rows of the certificate of {name} that fail{worst}", n, 0)]
     if getattr(body, "quartic", None) is not None:
         rows = [*certified, Row(f"largest deformation of {name} / size", bent, "information", True)]
         most = body.certified_energy

@@ -120,12 +120,10 @@ def save_state(state: State, path: str | Path) -> Path:
 
 def packed_state(state: State) -> tuple[dict[str, Any], dict[str, Array]]:
     """Manifest and arrays of a state."""
-    arrays: dict[str, Array] = {name: getattr(state, name) for name in NEEDED_FIELDS}
-    given = {name: getattr(state, name) for name in OPTIONAL_FIELDS}
-    arrays |= {name: A for name, A in given.items() if A is not None}
+    given = {name: getattr(state, name) for name in (*NEEDED_FIELDS, *OPTIONAL_FIELDS)}
+    arrays = {name: A for name, A in given.items() if A is not None}
     manifest: dict[str, Any] = {"schema": SCHEMA_NAME, "version": list(VERSION)}
-    manifest["t"] = float(state.t).hex()
-    manifest["rank"] = int(state.rank)
+    manifest |= {"t": float(state.t).hex(), "rank": int(state.rank)}
     if state.memory is not None:
         m = state.memory
         arrays |= {MEMORY_PREFIX + name: A for name, A in m.arrays.items()}
