@@ -158,7 +158,6 @@ def test_a_curve_of_points_on_a_line_is_a_spring_and_a_bent_one_keeps_its_energy
 WRONG = {
     "not symmetric": ({"stiffness": np.eye(6) + np.eye(6, k=1)}, "is not symmetric"),
     "negative": ({"stiffness": (1, 1, 1, 1, 1, -1)}, "negative in a direction"),
-    "five": ({"stiffness": (1, 1, 1, 1, 1)}, "has shape (5,)"),
     "driving damper": ({"stiffness": np.ones(6), "damping": -np.ones(6)}, "damping of s"),
     "curve of nothing": ({"stiffness": np.ones(6), "curves": {"w": ([0, 1], [0, 1])}}, "'w'"),
     "curve back": ({"stiffness": np.ones(6), "curves": {"x": ([0, 0], [0, 1])}}, "ascending"),

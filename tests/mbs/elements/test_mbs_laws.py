@@ -3,6 +3,7 @@
 import ctypes
 import shutil
 import subprocess
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from scipy.integrate import trapezoid
 
 import rom
 from cases.mbs.mechanisms import prepared, random_body, random_pose, random_state, simulate_quietly
+from cases.mbs.parts import on_axle, on_guide
 from cases.mbs.tangents import check_tangents
 from rom.errors import ConfigError, SolverError
 from rom.mbs.elements import laws
@@ -37,9 +39,7 @@ def slipping(t, parameters, motion, memory, out):
 def shaken(*, compiled=True, law=slipping, cycles=None, **options):
     """A block that is driven to and fro against the law."""
     mech = rom.Mechanism(gravity=(0, 0, 0))
-    block = mech.add_rigid("block", mass=1.0, inertia=(1, 1, 1), at=(0, 0, 0))
-    ground, end = mech.ground.marker((0, 0, 0)), block.marker((0, 0, 0))
-    mech.prismatic("guide", ground, end, axis=(1, 0, 0))
+    ground, end = mech.ground.marker((0, 0, 0)), on_guide(mech, "block")
     mech.drive("shake", "guide", lambda t: REACH * np.sin(2 * np.pi * t))
     more = {"parameters": (STIFFNESS, YIELD), "memory": [0.0], "outputs": ["slip"], "energy": True}
     mech.law("damper", law, ground, end, compiled=compiled, **more | options)
@@ -128,14 +128,6 @@ void slopes(double t, const double *p, const double *x, const double *memory, do
 """
 
 
-class Entry:
-    """A function of a shared library."""
-
-    def __init__(self, library, name):
-        self.library = library
-        self.address = ctypes.cast(getattr(library, name), ctypes.c_void_p).value
-
-
 def built(folder, sign="+"):
     if not shutil.which("cc"):
         pytest.skip("no compiler of C here")
@@ -143,7 +135,10 @@ def built(folder, sign="+"):
     subprocess.run(["cc", "-O2", "-shared", "-fPIC", "law.c", "-o", "law.so", "-lm"], cwd=folder,
                    check=True)  # fmt: skip
     library = ctypes.CDLL(str(folder / "law.so"))
-    return Entry(library, "spring"), Entry(library, "slopes")
+    return [
+        SimpleNamespace(library=library, address=ctypes.cast(function, ctypes.c_void_p).value)
+        for function in (library.spring, library.slopes)
+    ]
 
 
 def hung(add):
@@ -186,8 +181,7 @@ def twisted(t, parameters, motion, memory, out):
 def twisted_still(t, parameters, motion, memory, out):
     for k in range(3):
         j = (k + 1) % 3
-        gap = motion.position[j] - motion.position[k]
-        axis = motion.axes[k, :, 0]
+        gap, axis = motion.position[j] - motion.position[k], motion.axes[k, :, 0]
         out.force[k] = 3.0 * gap + 0.7 * np.cross(axis, motion.axes[j, :, 1])
         out.moment[k] = np.cross(gap, axis) * np.sum(gap**2)
 
@@ -241,9 +235,8 @@ def test_a_law_that_never_is_a_number_is_named_at_once(start):
 
 def test_a_motor_that_stops_to_be_a_number_is_named():
     mech = rom.Mechanism()
-    part = mech.add_rigid("arm", mass=1.0, inertia=(1, 1, 1), at=(0, 0, 0))
-    mech.revolute("hinge", mech.ground.marker((0, 0, 0)), part.marker((0, 0, 0)), axis=(0, 0, 1))
-    mech.motor("servo", "hinge", lambda t, x, v: np.sqrt(0.01 - t), compiled=True)
+    on_axle(mech)
+    mech.motor("servo", "axle", lambda t, x, v: np.sqrt(0.01 - t), compiled=True)
     with pytest.raises(SolverError, match="the law of 'servo' gives no finite number"):
         simulate_quietly(mech, t_end=0.1, dt=1e-3)
 

@@ -164,13 +164,13 @@ ELEMENTS = {  # family -> what asks for it
     "contacts": lambda m, a, b: m.sphere_on_sphere("e", a, b, LAW, radius1=0.1, radius2=0.1),
     "spread_loads": lambda m, a, b: loaded_body(m),
     "nonlinear": lambda m, a, b: m.add_nonlinear("e", body(straight(1.0, 2, **ROD))),
+    "bodies of large deflection": lambda m, a, b: bending_body(m),
+    "bodies of sampled elements": lambda m, a, b: rubber_body(m),
     "tendons": lambda m, a, b: m.tendon("e", [a, b], EA=1.0),
     "gear_meshes": lambda m, a, b: m.gear_mesh("e", a, b, **WHEELS),
     "rolling_bearings": lambda m, a, b: m.rolling_bearing("e", a, ground(m), **BALLS),
     "journal_bearings": lambda m, a, b: m.journal_bearing("e", a, ground(m), **FILM),
     "spins": lambda m, a, b: m.add_rigid("e", **WHEEL),
-    "bodies of large deflection": lambda m, a, b: bending_body(m),
-    "bodies of sampled elements": lambda m, a, b: rubber_body(m),
 }
 KERNELS = ("residuals", "tangents", "energy", "multiplier_columns", "pair_tangents")
 
