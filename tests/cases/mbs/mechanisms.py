@@ -104,6 +104,16 @@ def random_pose(rng):
     }
 
 
+def two_soft(rng, gravity=(0, 0, 0), *, damped=True, stiffened=False):
+    """A mechanism of two flexible bodies, anywhere and in any motion, and both of them."""
+    mech = Mechanism(gravity=gravity)
+    bodies = (("one", {"stiffened": stiffened}), ("two", {"r": 3}))
+    return mech, *(
+        mech.add_flexible(name, random_body(rng, damped=damped, **kind), **random_pose(rng))
+        for name, kind in bodies
+    )
+
+
 def random_state(rng, packed):
     """Coordinates with unit quaternions, velocities, accelerations, multipliers."""
     q = packed.q.copy()

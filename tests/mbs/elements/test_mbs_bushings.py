@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import rom
-from cases.mbs.mechanisms import prepared, random_body, random_pose, tangents_at
+from cases.mbs.mechanisms import prepared, tangents_at, two_soft
 from cases.mbs.tangents import check_tangents, difference, energy_gradient, forces_at, near
 from rom import rotation
 from rom.errors import ConfigError
@@ -27,9 +27,7 @@ def full_matrix(rng, size=30.0):
 
 def bushed(rng, damped=False):
     """Two flexible bodies on a bushing with a full matrix, tilted axes and two curves."""
-    mech = Mechanism(gravity=(0, 0, 0))
-    one = mech.add_flexible("one", random_body(rng, damped=False), **random_pose(rng))
-    two = mech.add_flexible("two", random_body(rng, r=3, damped=False), **random_pose(rng))
+    mech, one, two = two_soft(rng, damped=False)
     x = np.linspace(-0.6, 0.6, 5)
     mech.bushing("rubber", one.marker("a"), two.marker("b"), stiffness=full_matrix(rng), axes=TILT,
                  damping=full_matrix(rng, 2.0) if damped else None,

@@ -13,12 +13,11 @@ from scipy.special import gamma
 import rom
 from cases.mbs.mechanisms import (
     prepared,
-    random_body,
-    random_pose,
     random_state,
     residual_at,
     stored_at,
     tangents_at,
+    two_soft,
 )
 from cases.mbs.tangents import difference, energy_gradient, forces_at, shifted
 from cases.solid import block, reduced
@@ -58,9 +57,7 @@ def touching(kind, mech, m1, m2, law):
 def random_contact(kind, law):
     """Two flexible bodies in contact, anywhere and in any motion."""
     rng = np.random.default_rng(5)
-    mech = Mechanism(gravity=(0, 0, 0))
-    one = mech.add_flexible("one", random_body(rng, damped=False), **random_pose(rng))
-    two = mech.add_flexible("two", random_body(rng, r=3, damped=False), **random_pose(rng))
+    mech, one, two = two_soft(rng, damped=False)
     touching(kind, mech, one.marker("a"), two.marker("b"), law)
     packed, W = prepared(mech)
     packed.system.markers.twist[:] *= 1e-3

@@ -10,12 +10,11 @@ from cases.mbs.mechanisms import (
     lattice,
     lattice_body,
     prepared,
-    random_body,
-    random_pose,
     random_state,
     simulate_quietly,
     slider_crank,
     tangents_at,
+    two_soft,
 )
 from cases.mbs.parts import on_axle, on_guide
 from cases.mbs.tangents import difference, forces_at, shifted
@@ -198,9 +197,7 @@ def test_a_sliding_block_stops_after_v_over_mu_g(method):
 
 def loaded(rng):
     """Two flexible bodies and the ground on joints with every force of this page."""
-    mech = Mechanism()
-    one = mech.add_flexible("one", random_body(rng), **random_pose(rng))
-    two = mech.add_flexible("two", random_body(rng, r=3), **random_pose(rng))
+    mech, one, two = two_soft(rng, (0, 0, -g))
     mech.cylindrical("tube", one.marker("a"), two.marker("b"), axis=(1, 2, 2))
     mech.prismatic("guide", mech.ground.marker((0, 1, 0)), one.marker("b"), axis=X)
     mech.friction("pin", "tube", mu=0.3, radius=0.2, coulomb=0.4, static=1.5, stribeck_speed=2.0,

@@ -17,6 +17,7 @@ from cases.mbs.mechanisms import (
     random_pose,
     random_state,
     tangents_at,
+    two_soft,
 )
 from cases.mbs.tangents import GRAVITY, check_tangents, constraint_derivatives
 from rom import rotation
@@ -71,16 +72,9 @@ def test_frame_equations_equal_direct_nodal_dynamics():
 
 def everything(rng, *, angles=True):
     """Two flexible bodies, one of them stiffened, and a rigid one with every joint and load."""
-    mech = Mechanism(gravity=GRAVITY)
-    one = mech.add_flexible("one", random_body(rng, stiffened=True), **random_pose(rng))
-    two = mech.add_flexible("two", random_body(rng, r=3), **random_pose(rng))
-    box = mech.add_rigid(
-        "box",
-        mass=2.0,
-        inertia=(1.0, 1.5, 2.0),
-        markers={"a": (0.3, 0.2, -0.1)},
-        **random_pose(rng),
-    )
+    mech, one, two = two_soft(rng, GRAVITY, stiffened=True)
+    box = mech.add_rigid("box", mass=2.0, inertia=(1.0, 1.5, 2.0),
+                         markers={"a": (0.3, 0.2, -0.1)}, **random_pose(rng))  # fmt: skip
     m1, m2, m3 = one.marker("a"), two.marker("b"), box.marker("a")
     x, y = np.array([1.0, 2, 2]) / 3, np.array([2.0, 1, -2]) / 3
     mech.revolute("revolute", m1, m2, axis=x)
@@ -142,9 +136,7 @@ def test_a_rotating_body_is_linearised_as_it_moves():
 
 def test_stiffness_of_drives_and_coils_is_exact_where_the_joint_is_closed():
     rng = np.random.default_rng(4)
-    mech = Mechanism(gravity=GRAVITY)
-    one = mech.add_flexible("one", random_body(rng), **random_pose(rng))
-    two = mech.add_flexible("two", random_body(rng, r=3), **random_pose(rng))
+    mech, one, two = two_soft(rng, GRAVITY)
     mech.revolute("hinge", one.marker("a"), two.marker("b"), axis=(1.0, 2.0, 2.0))
     mech.drive("motor", "hinge", lambda t: 0.4 + t)
     mech.rotational_spring("coil", "hinge", stiffness=5.0, damping=0.4)

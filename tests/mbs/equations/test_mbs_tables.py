@@ -104,13 +104,8 @@ def chain(n):
     mech = rom.Mechanism(gravity=(0, 0, -9.81))
     above = mech.ground.marker((0, 0, 0))
     for k in range(n):
-        bar = mech.add_rigid(
-            f"link {k}",
-            mass=1.0,
-            inertia=(0.1,) * 3,
-            at=(k + 0.5, 0, 0),
-            markers={"top": (-0.5, 0, 0), "end": (0.5, 0, 0)},
-        )
+        bar = mech.add_rigid(f"link {k}", mass=1.0, inertia=(0.1,) * 3, at=(k + 0.5, 0, 0),
+                             markers={"top": (-0.5, 0, 0), "end": (0.5, 0, 0)})  # fmt: skip
         mech.revolute(f"hinge {k}", above, bar.marker("top"), axis=(0, 1, 0))
         above = bar.marker("end")
     return mech

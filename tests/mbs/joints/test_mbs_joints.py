@@ -28,21 +28,16 @@ def two_bodies(join):
     mech = Mechanism(gravity=(0, 0, -9.81))
     one = mech.add_flexible("one", random_body(rng), omega=(2.0, -1.0, 3.0))
     place = mech.design_point(one.marker("b"))
-    two = mech.add_rigid(
-        "two", mass=2.0, inertia=(1.0, 1.5, 2.0), at=place + np.array([0.4, -0.3, 0.2]),
-        orientation=rotation.matrix(np.array([0.8, 0.6, 0, 0])), velocity=(1.0, 0.5, -0.5),
-        omega=(-1.0, 2.0, 1.0), markers={"a": _body_point([-0.4, 0.3, -0.2])},
-    )  # fmt: skip
+    arm, A = np.array([0.4, -0.3, 0.2]), rotation.matrix(np.array([0.8, 0.6, 0, 0]))
+    two = mech.add_rigid("two", mass=2.0, inertia=(1.0, 1.5, 2.0), at=place + arm, orientation=A,
+                         velocity=(1.0, 0.5, -0.5), omega=(-1.0, 2.0, 1.0),
+                         markers={"a": A.T @ -arm})  # fmt: skip
     join(mech, one.marker("b"), two.marker("a"))
     sol = simulate(mech, t_end=0.4, dt=1e-3, assemble=True)
     assert np.abs(sol.energy.balance).max() < 1e-4 * np.ptp(sol.energy.potential)
     gap = sol.position("two", "a") - sol.position("one", "b")
     E1, E2 = sol.axes("one", "b"), sol.axes("two", "a")
     return sol, gap, np.einsum("tba,tbc->tac", E1, E2), E1
-
-
-def _body_point(world):
-    return rotation.matrix(np.array([0.8, 0.6, 0, 0])).T @ np.array(world)
 
 
 def turned(relative):

@@ -171,16 +171,13 @@ def beam():
     return reduced(4, model, reference="root")
 
 
-def hinged(body, tip_mass=0.5, scale=1.0):
-    """The body on a hinge about z with a ball at its tip, gravity across."""
-    mech = Mechanism(gravity=(0, -9.81 * scale, 0))
-    bar = mech.add_flexible("bar", body, at=-body.marker("root").point)
-    length = body.marker("tip").point - body.marker("root").point
-    ball = mech.add_rigid(
-        "ball", mass=tip_mass, inertia=(1e-4,) * 3, at=length, markers={"c": (0, 0, 0)}
-    )
+def hinged(length, add):
+    """What ``add`` makes a bar, on a hinge about z with a ball at its tip, gravity across."""
+    mech = Mechanism(gravity=(0, -9.81, 0))
+    bar = add(mech)
+    ball = mech.add_rigid("ball", mass=0.5, inertia=(1e-4,) * 3, at=length)
     mech.revolute("hinge", mech.ground.marker((0, 0, 0)), bar.marker("root"), axis=(0, 0, 1))
-    mech.fixed("weld", bar.marker("tip"), ball.marker("c"))
+    mech.fixed("weld", bar.marker("tip"), ball.marker((0, 0, 0)))
     return mech
 
 
@@ -225,20 +222,14 @@ def beam_sway(body, motion):
 def test_the_stiff_limit_is_the_rigid_body(beam):
     """Modulus times 1e6: the trajectory of the same mechanism with a rigid bar to 1e-5."""
     stiff = replace(beam, K=1e6 * beam.K, omega=1e3 * beam.omega)
-    flexible = simulate(hinged(stiff), t_end=0.3, dt=1e-3, rho_inf=0.5)
+    root, tip = beam.marker("root").point, beam.marker("tip").point
+    mech = hinged(tip - root, lambda mech: mech.add_flexible("bar", stiff, at=-root))
+    flexible = simulate(mech, t_end=0.3, dt=1e-3, rho_inf=0.5)
     c = beam.first_moment / beam.mass
     central = beam.inertia - beam.mass * (c @ c * np.eye(3) - np.outer(c, c))
-    mech = Mechanism(gravity=(0, -9.81, 0))
-    root, tip = beam.marker("root").point, beam.marker("tip").point
-    bar = mech.add_rigid(
-        "bar", mass=beam.mass, inertia=central, at=c - root,
-        markers={"root": root - c, "tip": tip - c},
-    )  # fmt: skip
-    ball = mech.add_rigid(
-        "ball", mass=0.5, inertia=(1e-4,) * 3, at=tip - root, markers={"c": (0, 0, 0)}
-    )
-    mech.revolute("hinge", mech.ground.marker((0, 0, 0)), bar.marker("root"), axis=(0, 0, 1))
-    mech.fixed("weld", bar.marker("tip"), ball.marker("c"))
+    solid = {"mass": beam.mass, "inertia": central, "at": c - root}
+    ends = {"root": root - c, "tip": tip - c}
+    mech = hinged(tip - root, lambda mech: mech.add_rigid("bar", **solid, markers=ends))
     rigid = simulate_quietly(mech, t_end=0.3, dt=1e-3, rho_inf=0.5)
     assert_allclose(flexible.position("ball"), rigid.position("ball"), atol=1e-5)
     assert np.abs(rigid.position("ball")[-1] - rigid.position("ball")[0]).max() > 0.1
