@@ -34,31 +34,24 @@ from rom.mbs.results.audit import audit
 X, Y, Z = np.eye(3)
 TILTED = np.array([1.0, 2.0, 2.0]) / 3
 g = 9.81
-KINDS = ("plane", "disc", "sphere", "cylinder", "bore", "capsules", "ends")
-
-
-def touching(kind, mech, m1, m2, law):
-    if kind == "plane":
-        mech.sphere_on_plane("c", m1, m2, law, normal=TILTED, radius=9.0)
-    elif kind == "disc":
-        mech.disc_on_plane("c", m1, m2, law, normal=TILTED, axis=X, radius=15.0)
-    elif kind == "sphere":
-        mech.sphere_on_sphere("c", m1, m2, law, radius1=7.0, radius2=5.0)
-    elif kind in ("capsules", "ends"):  # which touch along them, and where both end
-        length1, length2 = (40.0, 30.0) if kind == "capsules" else (0.5, 0.3)
-        mech.capsule_on_capsule("c", m1, m2, law, radius1=7.0, radius2=5.0, axis1=TILTED, axis2=X,
-                                length1=length1, length2=length2)  # fmt: skip
-    else:
-        inside = kind == "bore"
-        radii = {"radius1": 0.4, "radius2": 0.3} if inside else {"radius1": 9.0, "radius2": 6.0}
-        mech.sphere_on_cylinder("c", m1, m2, law, axis=TILTED, inside=inside, **radii)
+CAPSULES, INSIDE = {"radius1": 7.0, "radius2": 5.0, "axis1": TILTED, "axis2": X}, {"inside": True}
+KINDS = {  # of which capsules touch along them, and where both end
+    "plane": ("sphere_on_plane", {"normal": TILTED, "radius": 9.0}),
+    "disc": ("disc_on_plane", {"normal": TILTED, "axis": X, "radius": 15.0}),
+    "sphere": ("sphere_on_sphere", {"radius1": 7.0, "radius2": 5.0}),
+    "cylinder": ("sphere_on_cylinder", {"axis": TILTED, "radius1": 9.0, "radius2": 6.0}),
+    "bore": ("sphere_on_cylinder", {"axis": TILTED, "radius1": 0.4, "radius2": 0.3} | INSIDE),
+    "capsules": ("capsule_on_capsule", CAPSULES | {"length1": 40.0, "length2": 30.0}),
+    "ends": ("capsule_on_capsule", CAPSULES | {"length1": 0.5, "length2": 0.3}),
+}
 
 
 def random_contact(kind, law):
     """Two flexible bodies in contact, anywhere and in any motion."""
     rng = np.random.default_rng(5)
     mech, one, two = two_soft(rng, damped=False)
-    touching(kind, mech, one.marker("a"), two.marker("b"), law)
+    method, shape = KINDS[kind]
+    getattr(mech, method)("c", one.marker("a"), two.marker("b"), law, **shape)
     packed, W = prepared(mech)
     packed.system.markers.twist[:] *= 1e-3
     q, v, a, lam = random_state(rng, packed)
@@ -463,6 +456,11 @@ def on_floor(brick, law=LAW, **start):
     return mech, part
 
 
+def at_point(sol, k):
+    """(n_t, 3) position of a point of the surface."""
+    return sol.position("brick", Marker("brick", surface_place(int(k))))
+
+
 def guide(mech, part):
     """Let one end go up and down only."""
     place = mech.design_point(part.marker("root"))
@@ -484,7 +482,7 @@ def test_points_of_the_surface_move_with_its_shapes(brick):
     bent = brick.surface.points + (brick.surface.shape @ q).reshape(-1, 3)
     wanted = [0.1, 0, 1.0] + bent @ rotation.matrix([0.6, 0, 0.8, 0]).T
     for k in np.flatnonzero(brick.surface_areas(below)):
-        at = sol.position("brick", Marker("brick", surface_place(int(k))))[0]
+        at = at_point(sol, k)[0]
         assert_allclose(at, wanted[k], atol=1e-12)
 
 
@@ -497,7 +495,7 @@ def test_a_brick_sinks_into_its_foundation_by_its_weight(brick):
     depth = WEIGHT / (4e8 * 0.12)
     corners = np.flatnonzero(brick.surface_areas(below))
     for k in corners:
-        height = sol.position("brick", Marker("brick", surface_place(int(k))))[:, 2]
+        height = at_point(sol, k)[:, 2]
         assert_allclose(height, -depth, rtol=0.02)
     load = sol.interface_loads("ground")[(0.0, 0.0, 0.0)]
     assert_allclose(load[0, 2], -WEIGHT, rtol=1e-9)
@@ -530,7 +528,7 @@ def test_a_brick_pushed_along_the_floor_rests_by_springs_per_area(brick):
     areas, start = brick.surface_areas(below), rom.simulate(mech, t_end=1e-9, dt=1e-9)
     found = rom.snapshot(mech, rom.equilibrium(mech))
     way = sum(
-        areas[k] * (sol.position("brick", Marker("brick", surface_place(int(k))))[0, 0] * sign)
+        areas[k] * (at_point(sol, k)[0, 0] * sign)
         for sol, sign in ((found, 1), (start, -1)) for k in np.flatnonzero(areas)
     ) / areas.sum()  # fmt: skip
     assert_allclose(way, F / (2e8 * 0.12), rtol=1e-4)
@@ -558,7 +556,7 @@ def test_a_round_thing_presses_as_the_sum_over_the_points(brick, kind):
     sol = rom.simulate(mech, t_end=1e-5, dt=1e-5, state=state)
     areas, total = brick.surface_areas(below), np.zeros(3)
     for k in np.flatnonzero(areas):
-        at = sol.position("brick", Marker("brick", surface_place(int(k))))[0] - centre
+        at = at_point(sol, k)[0] - centre
         across = at if kind == "sphere" else at - axis * at[1]
         far = np.linalg.norm(across)
         depth = max(radius - far if kind != "bore" else far - radius, 0.0)

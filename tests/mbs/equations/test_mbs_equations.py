@@ -11,6 +11,7 @@ from scipy.sparse import csc_matrix
 
 from cases.mbs.mechanisms import (
     nodal_body,
+    nodal_residual,
     prepared,
     random_body,
     random_nodes,
@@ -30,27 +31,16 @@ from rom.mbs.kernels.algebra import PANEL_WIDTH, back_substitute, factorise
 from rom.mbs.mechanism import Mechanism
 
 
-def nodal_accelerations(nodes, q_f, qd, p, w):
+def nodal_accelerations(nodes, *state):
     """Accelerations of frame and elastic coordinates from the nodes themselves.
 
-    Nodes at r + A (x + sum q phi), with the full scalar mass matrix; the equations are the normal
-    equations of Gauss's principle, no inertia integral occurs.
+    No inertia integral occurs in their equations, which are linear in the accelerations.
     """
-    x, Ms, phi, K, D = nodes
-    r, n = phi.shape[0], x.shape[0]
-    A = rotation.matrix(p)
-    P = x + np.einsum("k,kia->ia", q_f, phi)
-    Pd = np.einsum("k,kia->ia", qd, phi)
-    J = np.zeros((3 * n, 6 + r))
-    for i in range(n):
-        J[3 * i : 3 * i + 3, :3] = np.eye(3)
-        J[3 * i : 3 * i + 3, 3:6] = -A @ rotation.skew(P[i])
-        J[3 * i : 3 * i + 3, 6:] = A @ phi[:, i].T
-    conv = (np.cross(w, np.cross(w, P)) + 2 * np.cross(w, Pd)) @ A.T
-    M = np.kron(Ms, np.eye(3))
-    force = J.T @ M @ (np.tile(GRAVITY, n) - conv.ravel())
-    force[6:] -= K @ q_f + D @ qd
-    return np.linalg.solve(J.T @ M @ J, force)
+    psi, n = np.zeros((4, 4, *nodes[0].shape)), 10
+    pull, *columns = (
+        nodal_residual(nodes, psi, state, a, GRAVITY) for a in (np.zeros(n), *np.eye(n))
+    )
+    return np.linalg.solve(np.array(columns).T - pull[:, None], -pull)
 
 
 def test_frame_equations_equal_direct_nodal_dynamics():

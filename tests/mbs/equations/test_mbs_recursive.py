@@ -135,14 +135,20 @@ def driven():
 
 def geared():
     """Two chains on the ground whose first hinges are coupled."""
-    mech = chain(4)
-    before = mech.ground.marker((0, 0.5, 0))
-    for k in range(4):
-        link = add_link(mech, f"other {k}", (0.3 * k, 0.5, 0), flexible=k % 2 == 0)
-        mech.revolute(f"hinge {k}", before, link.marker("a"), axis=Z)
-        before = link.marker("b")
+    mech, _ = side_by_side(4, flexible=lambda k: k % 2 == 0)
     mech.gear("gear", "pin 0", "hinge 0", ratio=-2.0)
     return mech
+
+
+def side_by_side(n, flexible=lambda k: True):
+    """Two chains on the ground, and the ends of the links of the second."""
+    mech = chain(n)
+    ends = [mech.ground.marker((0, 0.5, 0))]
+    for k in range(n):
+        link = add_link(mech, f"other {k}", (0.3 * k, 0.5, 0), flexible(k))
+        mech.revolute(f"hinge {k}", ends[-1], link.marker("a"), axis=Z)
+        ends.append(link.marker("b"))
+    return mech, ends[1:]
 
 
 def bridge():
@@ -289,13 +295,9 @@ def lengths(mech):
 
 def ladder(n):
     """Two chains side by side with a spring from each link to its neighbour."""
-    mech = chain(n)
-    before = mech.ground.marker((0, 0.5, 0))
-    for k in range(n):
-        link = add_link(mech, f"other {k}", (0.3 * k, 0.5, 0))
-        mech.revolute(f"hinge {k}", before, link.marker("a"), axis=Z)
-        before = link.marker("b")
-        mech.spring_damper(f"rung {k}", mech.parts[f"link {k}"].marker("b"), before, stiffness=9.0)
+    mech, ends = side_by_side(n)
+    for k, end in enumerate(ends):
+        mech.spring_damper(f"rung {k}", mech.parts[f"link {k}"].marker("b"), end, stiffness=9.0)
     return mech
 
 

@@ -121,18 +121,13 @@ def loaded_body(mech):
     mech.spread_load("weight", part, rom.mass_load(soft, (0, 0, -1.0)))
 
 
-def bending_body(mech):
+def bending_body(mech, *, sampled=False):
+    """A flexible body whose energy is a quartic, or that of two points."""
     soft = random_body(np.random.default_rng(1), damped=False)
     energy = Quartic(soft.K, *(np.ones(n_entries(len(soft.K), order)) for order in (3, 4)))
-    mech.add_flexible("c", replace(soft, quartic=energy))
-
-
-def rubber_body(mech):
-    """A flexible body whose energy is that of two points."""
-    soft = random_body(np.random.default_rng(1), damped=False)
-    rng = np.random.default_rng(0)
-    r = soft.n_modes
-    energy = Sampled(soft.K, rng.standard_normal((2, 9, r)), np.ones(2), np.ones((2, 2)))
+    if sampled:
+        gradients = np.random.default_rng(0).standard_normal((2, 9, soft.n_modes))
+        energy = Sampled(soft.K, gradients, np.ones(2), np.ones((2, 2)))
     mech.add_flexible("c", replace(soft, quartic=energy))
 
 
@@ -160,7 +155,7 @@ ELEMENTS = {  # family -> what asks for it
     "spread_loads": lambda m, a, b: loaded_body(m),
     "nonlinear": lambda m, a, b: m.add_nonlinear("e", body(straight(1.0, 2, **ROD))),
     "bodies of large deflection": lambda m, a, b: bending_body(m),
-    "bodies of sampled elements": lambda m, a, b: rubber_body(m),
+    "bodies of sampled elements": lambda m, a, b: bending_body(m, sampled=True),
     "tendons": lambda m, a, b: m.tendon("e", [a, b], EA=1.0),
     "gear_meshes": lambda m, a, b: m.gear_mesh("e", a, b, **WHEELS),
     "rolling_bearings": lambda m, a, b: m.rolling_bearing("e", a, ground(m), **BALLS),

@@ -280,7 +280,6 @@ WRONG = {
     "flat wheel": (lambda m, a, b: m.rolling("s", a, b, normal=Z, radius=1, axis=Z), "lies flat"),
     "gear on itself": (lambda m, a, b: m.gear("s", "hinge", "hinge", ratio=2), "with itself"),
     "gear on nothing": (lambda m, a, b: m.gear("s", "hinge", "door", ratio=2), "no joint 'door'"),
-    "gear on a ball": (lambda m, a, b: m.gear("s", "hinge", "ball", ratio=2), "is spherical"),
     "gear that locks": (lambda m, a, b: m.gear("s", "hinge", "tube", ratio=0), "ratio = 0"),
     "way of a hinge": (lambda m, a, b: m.gear("s", "hinge", "tube", ratio=1, coordinate1="way"),
                        "no coordinate 'way'"),

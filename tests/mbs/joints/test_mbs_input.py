@@ -45,12 +45,8 @@ WRONG = {
         "x", **UNIT | {"inertia": [[1, 0.5, 0], [0, 1, 0], [0, 0, 1]]}), ModelError, "symmetric"),
     "quaternion zero": (lambda m, *_: m.add_rigid("x", **UNIT, orientation=(0, 0, 0, 0)),
                         ConfigError, "quaternion [0.0, 0.0, 0.0, 0.0]"),
-    "quaternion of length 1.1": (lambda m, *_: m.add_rigid("x", **UNIT, orientation=(1.1, 0, 0, 0)),
-                                 ConfigError, "quaternion"),
     "stretch as orientation": (lambda m, *_: m.add_rigid(
         "x", **UNIT, orientation=np.diag([2, 1, 1])), ConfigError, "orientation"),
-    "mirror as orientation": (lambda m, *_: m.add_rigid(
-        "x", **UNIT, orientation=np.diag([1, 1, -1])), ConfigError, "orientation"),
     "marker nowhere": (lambda m, *_: m.add_rigid("x", **UNIT, markers={"tip": (0, 0, np.nan)}),
                        ConfigError, "markers['tip'] = (0, 0, nan)"),
     "rates too short": (lambda m, *_: m.add_flexible("x", BODY, qd=(0, 0, 0)), ConfigError,
@@ -70,15 +66,8 @@ WRONG = {
     "axes not perpendicular": (lambda m, box, bar: m.universal(
         "j", box.marker("a"), bar.marker("a"), axis1=Z, axis2=(0, 1, 1)), ConfigError,
         "must be perpendicular"),
-    "drive of a ball": (lambda m, *_: m.drive("d", "ball", lambda t: t), ConfigError,
-                        "'ball' is spherical"),
     "drive of nothing": (lambda m, *_: m.drive("d", "hunge", lambda t: t), ConfigError,
                          "no joint 'hunge'"),
-    "cross without arm": (lambda m, box, bar: m.universal(
-        "j", box.marker("a"), bar.marker("a"), axis1=Z, axis2=(0, 0, 0)), ConfigError,
-        "axis2 of j has length zero"),
-    "joint twice": (lambda m, box, bar: m.revolute(
-        "hinge", box.marker("a"), bar.marker("a"), axis=Z), ConfigError, "'hinge' is used twice"),
     "joint like a body": (lambda m, box, bar: m.fixed("box", box.marker("a"), bar.marker("a")),
                           ConfigError, "'box' is used twice"),
     "load like a joint": (lambda m, box, bar: m.force("ball", box.marker("a"), Z), ConfigError,
@@ -86,13 +75,9 @@ WRONG = {
     "coil on a ball": (lambda m, *_: m.rotational_spring("c", "ball", stiffness=1.0), ConfigError,
                        "'ball' is spherical"),
     "coil on a slide": (lambda m, box, bar: (
-        m.prismatic("slide", mechanism_ground(m), bar.marker("b"), axis=Z),
+        m.prismatic("slide", m.ground.marker((0, 0, 0)), bar.marker("b"), axis=Z),
         m.rotational_spring("coil", "slide", stiffness=1.0)), ConfigError, "no coordinate 'angle'"),
 }  # fmt: skip
-
-
-def mechanism_ground(m):
-    return m.ground.marker((0, 0, 0))
 
 
 @pytest.mark.parametrize("case", WRONG)

@@ -170,22 +170,6 @@ def test_hinges_that_contradict_each_other_are_refused_by_name():
         simulate(mech, t_end=0.1, dt=0.01)
 
 
-def test_a_start_in_line_is_refused():
-    """A parallelogram folded flat could go on as a parallelogram or as an antiparallelogram."""
-    mech = Mechanism(gravity=(0, 0, 0))
-    bar = {"inertia": (1e-3, 1e-3, 1e-3), "mass": 1.0}
-    ends = {"a": (-0.5, 0, 0), "b": (0.5, 0, 0)}
-    left = mech.add_rigid("left", at=(0.5, 0, 0), markers=ends, **bar)
-    rod = mech.add_rigid("rod", at=(2.0, 0, 0), markers={"a": (-1, 0, 0), "b": (1, 0, 0)}, **bar)
-    right = mech.add_rigid("right", at=(2.5, 0, 0), markers=ends, **bar)
-    mech.revolute("A", mech.ground.marker((0, 0, 0)), left.marker("a"), axis=Z)
-    mech.revolute("B", left.marker("b"), rod.marker("a"), axis=Z)
-    mech.revolute("C", rod.marker("b"), right.marker("b"), axis=Z)
-    mech.revolute("D", mech.ground.marker((2, 0, 0)), right.marker("a"), axis=Z)
-    with pytest.warns(RomWarning), pytest.raises(ModelError, match="singular position"):
-        simulate(mech, t_end=0.1, dt=0.01)
-
-
 def spinning_ball(speed, join):
     """A ball that nothing but a joint acts on, turning about its axis and moving along it."""
     mech = Mechanism(gravity=(0, 0, 0))

@@ -12,13 +12,13 @@ import rom
 from cases.beam import elastica, gauss_hermite, spin_up, stiffened_beam
 from cases.mbs.mechanisms import (
     nodal_body,
+    nodal_residual,
     prepared,
     random_body,
     random_nodes,
     random_pose,
     residual_at,
 )
-from rom import rotation
 from rom.body.stiffening import SecondOrder
 from rom.eigen.verbs import rigid_motions
 from rom.errors import ConfigError, RomWarning
@@ -158,25 +158,6 @@ def test_energy_and_momentum_of_a_stiffened_free_body_are_exact():
     assert np.ptp(sol.energy.total) < 1e-8 * sol.energy.kinetic[0]
     for momentum in sol.momentum:
         assert_allclose(momentum, momentum[[0]].repeat(len(sol.t), axis=0), atol=1e-7)
-
-
-def nodal_residual(nodes, psi, state, a, gravity):
-    """Equations of motion of nodes at x + phi q + psi q q / 2, by d'Alembert's principle."""
-    x, Ms, phi, K, D = nodes
-    q, qd, p, w = state
-    A, r, n = rotation.matrix(p), len(phi), len(x)
-    shape = phi + np.einsum("klia,l->kia", psi, q)
-    P = x + np.einsum("k,kia->ia", q, 0.5 * (phi + shape))
-    Pd = np.einsum("k,kia->ia", qd, shape)
-    J = np.zeros((3 * n, 6 + r))
-    for i in range(n):
-        J[3 * i : 3 * i + 3, :3], J[3 * i : 3 * i + 3, 6:] = np.eye(3), A @ shape[:, i].T
-        J[3 * i : 3 * i + 3, 3:6] = -A @ rotation.skew(P[i])
-    curved = np.einsum("klia,k,l->ia", psi, qd, qd)
-    conv = (np.cross(w, np.cross(w, P)) + 2 * np.cross(w, Pd) + curved) @ A.T
-    found = J.T @ np.kron(Ms, np.eye(3)) @ (J @ a + conv.ravel() - np.tile(gravity, n))
-    found[6:] += K @ q + D @ qd
-    return found
 
 
 def without_rigid(nodes, fields):

@@ -276,13 +276,20 @@ def test_what_would_be_wrong_is_refused_by_name():
         truss().rotating_frequencies(3.0, (0, 0, 1), fixed=("n0",))
 
 
+def pulled(**bodies):
+    """Trusses side by side, each held at its first node, the last of them pulled."""
+    mech = rom.Mechanism(gravity=(0, 0, 0))
+    for k, (name, body) in enumerate(bodies.items()):
+        part = mech.add_flexible(name, body, at=(5.0 * k, 0, 0))
+        mech.fixed(f"{name} held", mech.ground.marker((5.0 * k, 0, 0)), part.marker("n0"))
+    mech.force("pull", part.marker("n3"), (2.0, -3.0, 4.0))
+    return mech
+
+
 def test_a_motion_that_leaves_the_range_of_the_certificate_says_so_with_body_and_time():
     """From rest at a node that is pulled: by its energy, which is that of the bars."""
     body = truss()
-    mech = rom.Mechanism(gravity=(0, 0, 0))
-    part = mech.add_flexible("truss", body)
-    mech.fixed("held", mech.ground.marker((0, 0, 0)), part.marker("n0"))
-    mech.force("pull", part.marker("n3"), (2.0, -3.0, 4.0))
+    mech = pulled(truss=body)
     free = rom.simulate(mech, t_end=0.2, dt=0.01)
     q = free.elastic("truss")
     energy = body.quartic.energies(q)
@@ -305,11 +312,7 @@ def test_a_motion_that_leaves_the_range_of_the_certificate_says_so_with_body_and
 def test_a_rest_beyond_the_range_of_the_certificate_says_so_with_the_body():
     """Of two bodies, the one that is pulled; its energy is known from its own coordinates."""
     body, still = truss(), truss()
-    mech = rom.Mechanism(gravity=(0, 0, 0))
-    for name, one, x in (("still", still, 0.0), ("pulled", body, 5.0)):
-        part = mech.add_flexible(name, one, at=(x, 0, 0))
-        mech.fixed(f"{name} held", mech.ground.marker((x, 0, 0)), part.marker("n0"))
-    mech.force("pull", part.marker("n3"), (2.0, -3.0, 4.0))
+    mech = pulled(still=still, pulled=body)
     energy = float(body.quartic.energy(rom.equilibrium(mech).q[-6:]))
     still.provenance["large deflection"] = {"n3 f_z": {"energy": 1e-9}}
     body.provenance["large deflection"] = {"n3 f_z": {"energy": 0.9 * energy}}
