@@ -18,8 +18,6 @@ GROUND = "ground"
 SINGULAR_MASS = 1e-11
 SPIN_RTOL = 1e-6  # of an axis, from that about which a body spins, and of a marker on it
 MESHED_RTOL = 1e-3  # the same of a meshed body: gear shafts of 4000 nodes miss 4e-6
-
-
 SURFACE_PREFIX = "surface point "  # markers that a contact puts on the surface of a flexible body
 
 

@@ -93,11 +93,6 @@ def body_momentum(bodies, W, b, q, v, out):
     put(out, 3, add(mv(A, angular), cross(vec(q, bodies.q_at[b]), p)))
 
 
-def marker_loads(solution: Any) -> Array:
-    """(n_t, k, 6) force [N] and moment [N m] of all that acts on each marker, about it, world."""
-    return np.array([W.wrench.copy() for W in at_instants(solution)])
-
-
 def at_instants(solution: Any) -> Iterator[Work]:
     """The memory after the equations of motion were evaluated at each instant, one by one."""
     packed, system = solution.packed, solution.packed.seen

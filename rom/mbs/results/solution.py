@@ -28,9 +28,9 @@ from rom.mbs.results.interpolation import Point, between
 from rom.mbs.results.recomputed import (
     JointMotion,
     Tracks,
+    at_instants,
     follow,
     joint_motion,
-    marker_loads,
     of_body,
 )
 from rom.mbs.results.state import State
@@ -385,7 +385,8 @@ class Solution(Columns, metaclass=Open, kind="columns", bound=typed):
 
     @cached_property
     def _marker_loads(self) -> Array:
-        return marker_loads(self)
+        """(n_t, k, 6) force [N] and moment [N m] of all that acts on each marker, world."""
+        return np.array([W.wrench.copy() for W in at_instants(self)])
 
     @cached_property
     def energy(self) -> Energy:
