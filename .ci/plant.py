@@ -28,7 +28,7 @@ TESTS = {
     "rom/mbs/elements/contact": ["tests/mbs/elements/test_mbs_contact.py"],
     "rom/mbs/elements/laws": ["tests/mbs/elements/test_mbs_laws.py"],
     "rom/mbs/elements/bushings": ["tests/mbs/elements/test_mbs_bushings.py"],
-    "rom/mbs/elements/spread": ["tests/mbs/elements/test_mbs_spread_loads.py"],
+    "rom/mbs/elements/loads": ["tests/mbs/elements/test_mbs_spread_loads.py"],
     "rom/mbs/elements/nonlinear": ["tests/components/cosserat"],
     "rom/components/cosserat": ["tests/components/cosserat"],
     "rom/components/gear_mesh/gears": ["tests/mbs/elements/gears"],
