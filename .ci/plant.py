@@ -28,7 +28,7 @@ TESTS = {
     "rom/mbs/elements/contact": ["tests/mbs/elements/test_mbs_contact.py"],
     "rom/mbs/elements/laws": ["tests/mbs/elements/test_mbs_laws.py"],
     "rom/mbs/elements/bushings": ["tests/mbs/elements/test_mbs_bushings.py"],
-    "rom/mbs/elements/spread": ["tests/mbs/elements/test_mbs_spread_loads.py"],
+    "rom/mbs/elements/loads": ["tests/mbs/elements/test_mbs_spread_loads.py"],
     "rom/mbs/elements/nonlinear": ["tests/components/cosserat"],
     "rom/components/cosserat": ["tests/components/cosserat"],
     "rom/components/gear_mesh/gears": ["tests/mbs/elements/gears"],
@@ -39,7 +39,6 @@ TESTS = {
     "rom/components/tendons": ["tests/mbs/elements/test_mbs_tendons.py"],
     "rom/mbs/elements/": ["tests/mbs/elements/test_mbs_joint_forces.py", "tests/mbs"],
     "rom/mbs/kernels/constraints": ["tests/mbs/joints", "tests/mbs"],
-    "rom/mbs/kernels/rolling": ["tests/mbs/joints/test_mbs_couplings.py", "tests/mbs"],
     "rom/mbs/results/": ["tests/mbs/integrate/test_mbs_audit.py", "tests/mbs"],
     "rom/mbs/kernels/second_order": [
         "tests/mbs/published/test_mbs_stiffening.py",

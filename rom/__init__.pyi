@@ -119,8 +119,8 @@ from rom.mbs.integrate.simulation import release as release
 from rom.mbs.integrate.simulation import simulate as simulate
 from rom.mbs.mechanism import Mechanism as Mechanism
 from rom.mbs.results.audit import audit as audit
-from rom.mbs.results.checkpoint import load_state as load_state
-from rom.mbs.results.checkpoint import save_state as save_state
+from rom.mbs.results.state import load_state as load_state
+from rom.mbs.results.state import save_state as save_state
 from rom.model import Attachment as Attachment
 from rom.model import Basis as Basis
 from rom.model import FEModel as FEModel

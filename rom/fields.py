@@ -29,7 +29,6 @@ FIELDS = {
     "rom.components.rolling_bearing.field": "rolling_bearing rolling_bearings",
     "rom.components.journal_bearing.field": "journal_bearing journal_bearings",
     "rom.components.round_bodies.field": "spin",
-    "rom.mbs.elements.solids.field": "",
     "rom.components.cosserat.field": "rods",
     "rom.components.assumed_strain.field": "assumed_strain",
     "rom.components.best_matching.field": "best_matching",

@@ -6,39 +6,36 @@ from rom.components.rolling_bearing import bearings
 from rom.components.tendons import tendons
 from rom.mbs.elements import (
     bushings,
-    frictions,
+    joint_laws,
     laws,
     loads,
     motors,
     nonlinear,
-    rotational_springs,
-    spread_loads,
     springs,
-    stops,
 )
-from rom.mbs.elements.contact import capsules, points, surfaces
+from rom.mbs.elements.contact import points, shapes
 from rom.mbs.mechanism import ElementsOf
 
 class Methods:
     spring_damper = springs.spring_damper
-    rotational_spring = rotational_springs.rotational_spring
+    rotational_spring = joint_laws.rotational_spring
     force = loads.force
     torque = loads.torque
     law = laws.law
     user_force = laws.user_force
     motor = motors.motor
-    friction = frictions.friction
-    stop = stops.stop
+    friction = joint_laws.friction
+    stop = joint_laws.stop
     bushing = bushings.bushing
-    sphere_on_plane = points.sphere_on_plane
-    disc_on_plane = points.disc_on_plane
-    sphere_on_sphere = points.sphere_on_sphere
-    sphere_on_cylinder = points.sphere_on_cylinder
-    capsule_on_capsule = capsules.capsule_on_capsule
-    surface_on_plane = surfaces.surface_on_plane
-    surface_on_sphere = surfaces.surface_on_sphere
-    surface_on_cylinder = surfaces.surface_on_cylinder
-    spread_load = spread_loads.spread_load
+    sphere_on_plane = shapes.sphere_on_plane
+    disc_on_plane = shapes.disc_on_plane
+    sphere_on_sphere = shapes.sphere_on_sphere
+    sphere_on_cylinder = shapes.sphere_on_cylinder
+    capsule_on_capsule = shapes.capsule_on_capsule
+    surface_on_plane = shapes.surface_on_plane
+    surface_on_sphere = shapes.surface_on_sphere
+    surface_on_cylinder = shapes.surface_on_cylinder
+    spread_load = loads.spread_load
     tendon = tendons.tendon
     gear_mesh = meshes.gear_mesh
     rolling_bearing = bearings.rolling_bearing
@@ -46,16 +43,16 @@ class Methods:
     add_nonlinear = nonlinear.add_nonlinear
 
     springs: ElementsOf[springs.Spring]
-    turns: ElementsOf[rotational_springs.Turn]
+    turns: ElementsOf[joint_laws.Turn]
+    spread_loads: ElementsOf[loads.Spread]
     loads: ElementsOf[loads.Load]
     user_forces: ElementsOf[laws.UserForce]
     laws: ElementsOf[laws.Law]
     motors: ElementsOf[motors.Motor]
-    frictions: ElementsOf[frictions.Friction]
-    stops: ElementsOf[stops.Stop]
+    frictions: ElementsOf[joint_laws.Friction]
+    stops: ElementsOf[joint_laws.Stop]
     bushings: ElementsOf[bushings.Bushing]
     contacts: ElementsOf[points.Contact]
-    spread_loads: ElementsOf[spread_loads.Spread]
     tendons: ElementsOf[tendons.Tendon]
     gear_meshes: ElementsOf[meshes.GearMesh]
     rolling_bearings: ElementsOf[bearings.RollingBearing]

@@ -23,9 +23,9 @@ from rom.arguments import between, number, positive
 from rom.errors import ConfigError, RomError, RomWarning, SolverError
 from rom.fmu.variables import Inputs, Outputs
 from rom.io.fmu.description import Variable
+from rom.mbs.elements.family import apply_laws
 from rom.mbs.equations.equations import evaluate
 from rom.mbs.equations.packing import Packed, pack
-from rom.mbs.equations.python_laws import apply_laws
 from rom.mbs.integrate.consistent_start import initial_state, with_accelerations
 from rom.mbs.integrate.simulation import simulate
 from rom.mbs.kernels.work import Work, workspace

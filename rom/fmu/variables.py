@@ -11,7 +11,7 @@ import numpy as np
 
 from rom.io.fmu.description import Variable, components, structured
 from rom.mbs.connections.drives import Drive
-from rom.mbs.elements import frictions
+from rom.mbs.elements.joint_laws import FRICTIONS_FAMILY
 from rom.mbs.equations.packing import Packed
 from rom.mbs.kernels.work import Work
 from rom.mbs.mechanism import Mechanism
@@ -232,5 +232,4 @@ class Outputs:
 
 def _coordinate(what: str, k: int) -> Reading:
     """Coordinate or rate that friction k follows."""
-    family = frictions.FRICTIONS_FAMILY
-    return lambda W, lam, packed: getattr(W, what)[packed.elements[family].at[k]]
+    return lambda W, lam, packed: getattr(W, what)[packed.elements[FRICTIONS_FAMILY].at[k]]

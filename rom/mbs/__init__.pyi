@@ -48,9 +48,9 @@ from rom.mbs.parts.bodies import Marker as Marker
 from rom.mbs.parts.bodies import Part as Part
 from rom.mbs.parts.signals import Signal as Signal
 from rom.mbs.results.audit import audit as audit
-from rom.mbs.results.checkpoint import load_state as load_state
-from rom.mbs.results.checkpoint import save_state as save_state
 from rom.mbs.results.solution import Energy as Energy
 from rom.mbs.results.solution import Occurrences as Occurrences
 from rom.mbs.results.solution import Solution as Solution
 from rom.mbs.results.state import State as State
+from rom.mbs.results.state import load_state as load_state
+from rom.mbs.results.state import save_state as save_state

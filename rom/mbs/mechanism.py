@@ -24,13 +24,12 @@ from rom.arguments import (
 from rom.errors import ConfigError
 from rom.fields import Methods, Open, families, find
 from rom.mbs.connections import drives as joint_drives
-from rom.mbs.connections import gears, lower_pairs, rolling, universal
-from rom.mbs.connections import points as joint_points
+from rom.mbs.connections import lower_pairs, points
 from rom.mbs.elements.family import Family
 from rom.mbs.parts.bodies import GROUND, Marker, Part, flexible_part, ground_part, rigid_part
 from rom.mbs.parts.joints import Joint, Row, coordinate_of
 from rom.model import Array
-from rom.names import check_name, check_text, offered
+from rom.names import check_known, check_name, check_text, offered
 from rom.notebook import html_table, listed
 from rom.plausible import GRAVITY, SPEED, warn_outside
 
@@ -137,15 +136,15 @@ class Mechanism(Methods, metaclass=Open, kind="methods", bound=bound):
     cylindrical = lower_pairs.cylindrical
     prismatic = lower_pairs.prismatic
     spherical = lower_pairs.spherical
-    universal = universal.universal
+    universal = points.universal
     fixed = lower_pairs.fixed
     planar = lower_pairs.planar
     screw = lower_pairs.screw
-    point_on_line = joint_points.point_on_line
-    point_on_plane = joint_points.point_on_plane
-    distance = joint_points.distance
-    rolling = rolling.rolling
-    gear = gears.gear
+    point_on_line = points.point_on_line
+    point_on_plane = points.point_on_plane
+    distance = points.distance
+    rolling = points.rolling
+    gear = joint_drives.gear
     drive = joint_drives.drive
 
     def __post_init__(self) -> None:
@@ -205,11 +204,11 @@ class Mechanism(Methods, metaclass=Open, kind="methods", bound=bound):
             array([1.1, 0. , 0. ])
         """
         pose = start_pose(at, orientation, velocity, omega)
-        points = {
+        places = {
             check_text(key, "a marker"): finite(f"marker {key}", x, (3,))
             for key, x in (markers or {}).items()
         }
-        part = rigid_part(name, mass, matrix33("inertia", inertia), pose, points)
+        part = rigid_part(name, mass, matrix33("inertia", inertia), pose, places)
         return self._enter(part, spin)
 
     def add_flexible(  # noqa: PLR0913  one keyword per property of a body
@@ -357,8 +356,7 @@ class Mechanism(Methods, metaclass=Open, kind="methods", bound=bound):
         """
         if name == GROUND:
             return self.ground
-        if name not in self.parts:
-            raise ConfigError(f"no body {name!r}; the mechanism has {offered(self.parts, name)}.")
+        check_known(name, self.parts, f"no body {name!r}; the mechanism has")
         return self.parts[name]
 
     def _enter(self, part: Part, spin: npt.ArrayLike | None) -> Part:
@@ -380,13 +378,9 @@ class Mechanism(Methods, metaclass=Open, kind="methods", bound=bound):
             ConfigError: listing the names in use.
         """
         check_name(name, "a part of the mechanism")
-        taken = [
-            *(GROUND, *self.parts, *self.joints, *self.drives, *self.elements, *self.events),
-        ]
+        taken = [GROUND, *self.parts, *self.joints, *self.drives, *self.elements, *self.events]
         if name in taken:
-            raise ConfigError(
-                f"the name {name!r} is used twice; in use are {offered(taken, name)}."
-            )
+            raise ConfigError(f"name {name!r} is used twice; in use are {offered(taken, name)}.")
 
     def check_markers(self, name: str, *markers: Marker) -> None:
         """Refuse markers of bodies that are not in this mechanism, or of places they have not.

@@ -25,7 +25,7 @@ from rom.io.matrices.op4 import write_op4
 from rom.io.native import body_arrays
 from rom.mbs import BallBearing, Groove, JournalBearing, Oil, Pulley, RollerBearing
 from rom.mbs.elements.contact.impact import Impact
-from rom.mbs.parts.jumps import Examined
+from rom.mbs.parts.signals import Examined
 from rom.plausible import far_doubt, scaled_doubt
 from rom.units import unit_system
 

@@ -9,7 +9,7 @@ import numpy.typing as npt
 from rom.arguments import typed
 from rom.components.gear_mesh.gears.meshes import GEAR_MESHES_FAMILY
 from rom.components.gear_mesh.gears.table import HEIGHT, LENGTH, LOAD, PLACE, SIDE
-from rom.mbs.results.interface_loads import at_instants
+from rom.mbs.results.recomputed import at_instants
 from rom.mbs.results.solution import Solution
 from rom.model import Array
 from rom.names import check_known

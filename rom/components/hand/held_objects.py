@@ -12,7 +12,7 @@ import numpy as np
 from rom.arguments import finite, positive, unit_vector
 from rom.errors import ConfigError
 from rom.mbs.elements.contact.impact import Impact
-from rom.mbs.elements.contact.segments import distance
+from rom.mbs.elements.contact.points import distance
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.parts.bodies import Marker, Part
 from rom.model import Array

@@ -21,7 +21,7 @@ from rom.components.journal_bearing.films.journals import (
 )
 from rom.components.journal_bearing.films.oil import Oil
 from rom.errors import ConfigError
-from rom.mbs.results.interface_loads import at_instants
+from rom.mbs.results.recomputed import at_instants
 from rom.mbs.results.solution import Solution
 from rom.model import Array
 from rom.names import check_known

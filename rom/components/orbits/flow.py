@@ -11,9 +11,9 @@ import numpy as np
 from rom import rotation
 from rom.components.orbits.beside import Beside
 from rom.mbs.analysis.local_equations import DIFFERENCE_STEP, Instant
+from rom.mbs.elements.family import apply_laws
 from rom.mbs.equations.equations import evaluate, retract
 from rom.mbs.equations.packing import Packed, pack
-from rom.mbs.equations.python_laws import apply_laws
 from rom.mbs.integrate import generalized_alpha as alpha
 from rom.mbs.integrate.consistent_start import (
     assembled,

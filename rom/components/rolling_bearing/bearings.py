@@ -31,7 +31,7 @@ from rom.mbs.kernels.coordinates import clear_tangent, followed_angle, place_tan
 from rom.mbs.kernels.element_calls import energy, residuals, tangents
 from rom.mbs.kernels.tables import Array2, Index1, Scratch1, Scratch2, Scratch3, Table, table
 from rom.mbs.parts.bodies import Marker
-from rom.mbs.parts.whole import Whole
+from rom.mbs.parts.joints import Whole
 from rom.model import Array
 from rom.rotation import matrix
 

@@ -53,7 +53,7 @@ from rom.mbs.kernels.tables import (
     table,
 )
 from rom.mbs.parts.bodies import Marker
-from rom.mbs.parts.whole import Whole
+from rom.mbs.parts.joints import Whole
 from rom.model import Array, Index
 from rom.rotation import matrix
 

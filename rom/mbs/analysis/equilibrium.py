@@ -17,8 +17,8 @@ from rom.mbs.analysis.tangent import Tangent, best_reactions, faint_force, sizes
 from rom.mbs.equations.packing import Packed
 from rom.mbs.integrate.consistent_start import assembled, check_velocity, initial_state
 from rom.mbs.mechanism import Mechanism
+from rom.mbs.results.audit import warn_of_range
 from rom.mbs.results.state import State, check_state
-from rom.mbs.results.validity import warn_of_range
 from rom.model import Array
 from rom.paths.load_steps import load_steps
 

@@ -17,8 +17,7 @@ from scipy.sparse.linalg import LinearOperator, eigs, eigsh
 from rom.arguments import finite, whole
 from rom.errors import ConfigError, ModelError, ModesMissedError, SolverError
 from rom.mbs.analysis.local_equations import Instant
-from rom.mbs.equations.signature import signature
-from rom.mbs.equations.sparse_solve import Constrained, bordered, unit_rows
+from rom.mbs.equations.sparse_solve import Constrained, bordered, signature, unit_rows
 from rom.mbs.integrate.consistent_start import RANK_PIVOT_RTOL
 from rom.mbs.results.state import State
 from rom.model import Array, Index

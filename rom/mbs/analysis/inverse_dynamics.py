@@ -8,9 +8,9 @@ import numpy.typing as npt
 
 from rom.arguments import typed
 from rom.errors import ConfigError, ModelError, reached
+from rom.mbs.elements.family import Laws, apply_laws
 from rom.mbs.equations.equations import evaluate, retract
 from rom.mbs.equations.packing import Packed, pack
-from rom.mbs.equations.python_laws import Laws, apply_laws
 from rom.mbs.integrate.consistent_start import (
     assembled,
     fitting_velocity,

@@ -9,9 +9,8 @@ import numpy as np
 from rom import rotation
 from rom.arguments import typed, whole
 from rom.errors import ConfigError
-from rom.mbs.elements.law_calls import ENERGY_SIZE, MOTION_SIZE, answer_of, motion_of
+from rom.mbs.elements.law_calls import ENERGY_SIZE, MOTION_SIZE, answer_of, differences, motion_of
 from rom.mbs.elements.laws import Law, UserForce
-from rom.mbs.elements.laws_in_python import differences
 from rom.mbs.mechanism import Mechanism
 from rom.model import Array, Mask, Report, Row
 

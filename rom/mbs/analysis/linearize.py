@@ -26,8 +26,8 @@ from rom.mbs.integrate.consistent_start import fitting_velocity, with_accelerati
 from rom.mbs.kernels.system import ROLL
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.parts.bodies import Marker
+from rom.mbs.results.audit import pressed
 from rom.mbs.results.state import State
-from rom.mbs.results.validity import pressed
 from rom.model import Array
 
 PROBE_ANGLE = 1e-3  # by which the joints are moved to see how their free motions change [rad]

@@ -12,6 +12,7 @@ from scipy.linalg import solve_triangular
 
 from rom.arguments import number, typed
 from rom.errors import ConfigError, ModelError, SolverError
+from rom.mbs.elements.family import Laws, apply_laws
 from rom.mbs.equations.equations import (
     evaluate,
     linearize_constraints,
@@ -20,8 +21,7 @@ from rom.mbs.equations.equations import (
     tangents,
 )
 from rom.mbs.equations.packing import Packed, pack
-from rom.mbs.equations.pattern import Pattern
-from rom.mbs.equations.python_laws import Laws, apply_laws
+from rom.mbs.equations.sparse_solve import Pattern
 from rom.mbs.integrate.consistent_start import (
     fitting_velocity,
     independent,

@@ -8,8 +8,7 @@ from rom import rotation
 from rom.arguments import number, unit_vector
 from rom.errors import ConfigError, ModelError
 from rom.mbs.parts.bodies import Marker
-from rom.mbs.parts.joints import Joint, Triad, triad
-from rom.mbs.parts.whole import Whole
+from rom.mbs.parts.joints import Joint, Triad, Whole, triad
 from rom.model import Array
 
 MOMENT_FREE = ("spherical", "distance")  # joints that bodies without static shapes may have

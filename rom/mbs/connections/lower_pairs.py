@@ -8,8 +8,7 @@ from rom.arguments import Direction, Number
 from rom.mbs.connections.ends import Ends, ends_of, enter, not_zero
 from rom.mbs.kernels.system import COUPLING
 from rom.mbs.parts.bodies import Marker
-from rom.mbs.parts.joints import NO_VECTOR, Joint, Row, coincidence
-from rom.mbs.parts.whole import Whole
+from rom.mbs.parts.joints import NO_VECTOR, Joint, Row, Whole, coincidence
 from rom.model import Array
 
 FULL_TURN = 2 * np.pi

@@ -1,14 +1,16 @@
-"""Joints that hold one point only: on a line, in a plane, at a distance."""
+"""Joints that hold one point: on a line, in a plane, at a distance, in a cross, on what rolls."""
 
 import numpy as np
 
 from rom.arguments import Direction, Length
 from rom.errors import ConfigError
 from rom.mbs.connections.ends import ends_of, enter
-from rom.mbs.kernels.system import DISTANCE
+from rom.mbs.kernels.system import DISTANCE, NORMAL, ROLL, TOUCH
 from rom.mbs.parts.bodies import Marker
-from rom.mbs.parts.joints import NO_VECTOR, Joint, Row
-from rom.mbs.parts.whole import Whole
+from rom.mbs.parts.joints import NO_VECTOR, Joint, Row, Whole, coincidence
+
+NORMAL_ATOL = 1e-6  # cosine of the angle between the axes of the cross
+FLAT_COSINE = 1 - 1e-6  # of the angle between the axis of a wheel that lies flat and the normal
 
 
 def point_on_line(self: Whole, name: str, m1: Marker, m2: Marker, *, axis: Direction) -> None:
@@ -26,11 +28,8 @@ def point_on_line(self: Whole, name: str, m1: Marker, m2: Marker, *, axis: Direc
     """
     ends = ends_of(self, name, m1, m2)
     t = ends.triad(ends.direction("axis", axis))
-    rows, displacement = (
-        (t.along(0, NO_VECTOR), t.along(1, NO_VECTOR)),
-        t.along(2, ends.gap_of_first),
-    )
-    enter(self, Joint(name, "point on line", ends.markers, rows, displacement, None, displacement))
+    rows, way = (t.along(0, NO_VECTOR), t.along(1, NO_VECTOR)), t.along(2, ends.gap_of_first)
+    enter(self, Joint(name, "point on line", ends.markers, rows, way, None, way))
 
 
 def point_on_plane(self: Whole, name: str, m1: Marker, m2: Marker, *, normal: Direction) -> None:
@@ -74,3 +73,75 @@ def distance(
         )
     row = Row(DISTANCE, NO_VECTOR, NO_VECTOR, NO_VECTOR, apart if length is None else length)
     enter(self, Joint(name, "distance", ends.markers, (row,)))
+
+
+def universal(
+    self: Whole,
+    name: str,
+    m1: Marker,
+    m2: Marker,
+    *,
+    axis1: Direction,
+    axis2: Direction,
+) -> None:
+    """Cardan joint: one axis on m1 stays perpendicular to another on m2; four constraints.
+
+    Args:
+        name: name of the joint.
+        m1: one side.
+        m2: other side.
+        axis1: (3,) direction fixed to the first body, world at the start [1].
+        axis2: (3,) direction fixed to the second body, world at the start [1].
+
+    Raises:
+        ConfigError: if the axes are not perpendicular at the start; for a name in use, an unknown
+            marker, one body twice, or no direction.
+        ModelError: if a body has free-free modes only, which carry no moment to an interface.
+    """
+    ends = ends_of(self, name, m1, m2)
+    one, two = ends.direction("axis1", axis1), ends.direction("axis2", axis2)
+    if abs(one @ two) > NORMAL_ATOL:
+        raise ConfigError(f"axes of joint {name!r} must be perpendicular: cosine {one @ two:.3g}.")
+    cross = Row(NORMAL, ends.frames[0].T @ one, ends.frames[1].T @ two, NO_VECTOR)
+    enter(self, Joint(name, "universal", ends.markers, (*coincidence(), cross)))
+
+
+def rolling(
+    self: Whole,
+    name: str,
+    m1: Marker,
+    m2: Marker,
+    *,
+    normal: Direction,
+    radius: Length,
+    axis: Direction | None = None,
+) -> None:
+    """A ball or thin wheel touches a plane and rolls on it without slip.
+
+    One constraint of position and two of velocity (not holonomic). Spin about the normal is
+    free.
+
+    Args:
+        name: name of the joint.
+        m1: point of the plane.
+        m2: centre of the ball or wheel.
+        normal: (3,) of the plane towards the centre, world at the start [1].
+        radius: [m].
+        axis: (3,) axis of a wheel, world at the start [1]; None for a ball.
+
+    Raises:
+        ConfigError: if the wheel lies flat on the plane.
+        ModelError: if a body has free-free modes only, which carry no moment to an interface.
+    """
+    ends = ends_of(self, name, m1, m2)
+    for marker in ends.markers:
+        self.part(marker.body).refuse_spin(f"rolling joint {name!r}", "it would not roll")
+    up = ends.direction("normal", normal)
+    spin = None if axis is None else ends.direction("axis", axis)
+    if spin is not None and abs(up @ spin) > FLAT_COSINE:
+        raise ConfigError(f"the wheel of {name!r} lies flat; give an axis along the plane.")
+    t = ends.triad(up)
+    n, s = t.one[:, 2], NO_VECTOR if spin is None else ends.frames[1].T @ spin
+    touch = Row(TOUCH, n, s, n, radius=radius)
+    rows = tuple(Row(ROLL, t.one[:, i], s, n, radius=radius) for i in (0, 1))
+    enter(self, Joint(name, "rolling", ends.markers, (touch, *rows)))

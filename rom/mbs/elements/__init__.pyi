@@ -7,4 +7,4 @@ from rom.mbs.elements.family import Places as Places
 from rom.mbs.elements.law_calls import Answer as Answer
 from rom.mbs.elements.law_calls import Motion as Motion
 from rom.mbs.elements.laws import Law as Law
-from rom.mbs.elements.spread_loads import Spread as Spread
+from rom.mbs.elements.loads import Spread as Spread

@@ -25,6 +25,7 @@ from rom.mbs.kernels.algebra import (
     inverse_tangent,
     mtv,
     mv,
+    place,
     row,
     scale,
     sub,
@@ -34,11 +35,11 @@ from rom.mbs.kernels.algebra import (
     unit_twist,
 )
 from rom.mbs.kernels.compiled import inner
-from rom.mbs.kernels.constraints import pair_stiffness
+from rom.mbs.kernels.constraints import pair_stiffness, push_pair
 from rom.mbs.kernels.element_calls import energy, residuals, tangents
 from rom.mbs.kernels.tables import Array2, Array3, Index1, Index2, Table, table
 from rom.mbs.parts.bodies import Marker
-from rom.mbs.parts.whole import Whole
+from rom.mbs.parts.joints import Whole
 from rom.model import Array
 
 DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
@@ -102,8 +103,7 @@ def bushing(  # noqa: PLR0913  one keyword per property
 
 def _matrix66(name: str, value: Any) -> Array:
     """Symmetric, not negative (6, 6) matrix from itself or its diagonal."""
-    A = np.diag(finite(name, value, (6,))) if np.shape(value) == (6,) else None
-    A = finite(name, value, (6, 6)) if A is None else A
+    A = finite(name, np.diag(value) if np.shape(value) == (6,) else value, (6, 6))
     size = np.abs(A).max()
     if np.abs(A - A.T).max() > 1e-9 * size:
         raise ConfigError(
@@ -201,8 +201,7 @@ def rotation_vector(bushings, k, W):
 @inner
 def to_local(W, i, frame, x):
     """World vector in the bushing axes on marker i."""
-    y = mtv(W.E[i], x)
-    return mtv(frame, y)
+    return mtv(frame, mtv(W.E[i], x))
 
 
 @inner
@@ -291,12 +290,7 @@ def bushing_wrenches(_s, W, bushings, _q, _v, _lam):
         i, j = bushings.i[k], bushings.j[k]
         state = bushing_state(bushings, k, W)
         force, moment, lost = bushing_force(bushings, k, W, state)
-        turned = add(moment, cross(state[0], force))
-        for p in range(3):
-            W.wrench[j, p] += force[p]
-            W.wrench[j, 3 + p] += moment[p]
-            W.wrench[i, p] -= force[p]
-            W.wrench[i, 3 + p] -= turned[p]
+        push_pair(W, i, j, force, add(moment, cross(state[0], force)), moment)
         W.power[2] += lost
 
 
@@ -336,11 +330,10 @@ def bushing_column(bushings, W, k, state, p, moved, c):
     dforce = sub(cross(wi, force), to_world(W, i, frame, pull))
     dmoment = sub(cross(wi, moment), to_world(W, i, frame, twist))
     lever = add(cross(sub(vj, vi), force), cross(gap, dforce))
-    for q in range(3):
-        W.Q[q, p] += c * dforce[q]
-        W.Q[3 + q, p] += c * (dmoment[q] + lever[q])
-        W.Q[6 + q, p] -= c * dforce[q]
-        W.Q[9 + q, p] -= c * dmoment[q]
+    place(W.Q, 0, p, c, dforce)
+    place(W.Q, 3, p, c, add(dmoment, lever))
+    place(W.Q, 6, p, -c, dforce)
+    place(W.Q, 9, p, -c, dmoment)
 
 
 @inner

@@ -17,9 +17,10 @@ import numpy as np
 from rom.mbs.kernels.element_calls import ElementKernel, row_of
 from rom.mbs.kernels.system import Coordinates
 from rom.mbs.kernels.tables import Table
+from rom.mbs.kernels.work import Work
 from rom.mbs.parts.bodies import GROUND, Marker
 from rom.mbs.parts.joints import Row
-from rom.mbs.parts.signals import Signal, clock_signal
+from rom.mbs.parts.signals import Signal
 from rom.model import Array, Index
 
 
@@ -28,6 +29,15 @@ class Asked(Protocol):
 
     def apply(self, W: Any, t: float, *, slopes: bool) -> None:
         """Put the answer at time t, and its derivatives, where the kernels of its family look."""
+
+
+Laws = tuple[Asked, ...]
+
+
+def apply_laws(forces: Laws, W: Work, t: float, *, slopes: bool = False) -> None:
+    """Let all laws answer for the motion in W at a time [s], with slopes if tangents follow."""
+    for law in forces:
+        law.apply(W, t, slopes=slopes)
 
 
 def on_joint(_: Any) -> tuple[Marker, ...]:
@@ -95,9 +105,8 @@ class Places:
 
     def copy(self) -> "Places":
         """The same places, to which more can be added without changing these."""
-        kept = {name: list(getattr(self, name)) for name in ("owners", "signals", "coordinates")}
-        memory = {"remembered": dict(self.remembered), "settling": dict(self.settling)}
-        return replace(self, **kept, **memory)
+        own = ("owners", "signals", "coordinates", "remembered", "settling")
+        return replace(self, **{name: getattr(self, name).copy() for name in own})
 
     def coordinate(self, joint: str, row: Row) -> int:
         """Number of a coordinate of a joint."""
@@ -113,32 +122,28 @@ class Places:
 
     def signal(self, name: str, function: Callable[[float], Any] | None) -> int:
         """Number of a function of time with values (3,), -1 for none."""
-        if function is None:
-            return -1
-        self.signals.append(Signal(name, function, width=3))
-        return len(self.signals) - 1
+        return -1 if function is None else self._follow(Signal(name, function, width=3))
 
     def motion(self, name: str, function: Callable[[float], Any] | None) -> int:
         """Number of a prescribed length and its rate, -1 for none; it must not jump."""
-        if function is None:
-            return -1
-        self.signals.append(Signal(name, function))
-        return len(self.signals) - 1
+        return -1 if function is None else self._follow(Signal(name, function))
 
     def clock(self) -> int:
         """Number of the function that tells the time."""
         if self.time < 0:
-            self.signals.append(clock_signal())
-            self.time = len(self.signals) - 1
+            parts = (lambda t: t, lambda t: 1.0 + 0.0 * t, lambda t: 0.0 * t)
+            self.time = self._follow(Signal("clock", *parts))
         return self.time
 
-    def memory(self, owner: str, start: Array, *, settling: Array | None = None) -> int:
-        """First of (m,) numbers that are kept from one instant to the next, in their own units.
+    def _follow(self, signal: Signal) -> int:
+        self.signals.append(signal)
+        return len(self.signals) - 1
 
-        Args:
-            owner: whose.
-            start: (m,) numbers at the start.
-            settling: (m,) what an equilibrium starts from, whatever its state remembers.
+    def memory(self, owner: str, start: Array, *, settling: Array | None = None) -> int:
+        """First of (m,) numbers that an owner keeps from instant to instant, in their own units.
+
+        They begin with ``start``, and in an equilibrium, whatever its state remembers, with
+        ``settling``.
         """
         self.remembered.setdefault(owner, start)
         if settling is not None:

@@ -91,14 +91,10 @@ class Motors(JointForces):
 def pack(
     made: type[JointForces], kind: int, elements: Mapping[str, Any], places: Places
 ) -> JointForces:
-    """The table of a kind of forces.
+    """The table, of class ``made``, of all forces with a kind of laws.
 
-    Args:
-        made: its class.
-        kind: of the laws.
-        elements: records with a ``joint`` and the numbers of their ``laws``; they may have a
-            ``row``, if it is not the angle of the joint, and ``address`` and ``program`` of a law.
-        places: where the arrays have what they speak of.
+    They have a ``joint`` and the numbers of their ``laws``; they may have a ``row``, if it is not
+    the angle of the joint, and ``address`` and ``program`` of a law.
     """
     found = [(one, law) for one in elements.values() for law in one.laws]
     forces, laws = zip(*found, strict=True)

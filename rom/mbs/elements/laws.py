@@ -34,8 +34,14 @@ from rom.arguments import finite, shortened
 from rom.errors import ConfigError
 from rom.mbs.compiler.calls import called
 from rom.mbs.elements.family import Family, Hooks, Places, integers, starts
-from rom.mbs.elements.law_calls import DIFFERENCE_STEP, ENERGY_SIZE, MOTION_SIZE, entries
-from rom.mbs.elements.laws_in_python import AskedForce, AskedLaw
+from rom.mbs.elements.law_calls import (
+    DIFFERENCE_STEP,
+    ENERGY_SIZE,
+    MOTION_SIZE,
+    AskedForce,
+    AskedLaw,
+    entries,
+)
 from rom.mbs.kernels.algebra import add, cross, scale, unit
 from rom.mbs.kernels.compiled import inner
 from rom.mbs.kernels.constraints import pair_stiffness
@@ -51,7 +57,7 @@ from rom.mbs.kernels.tables import (
     table,
 )
 from rom.mbs.parts.bodies import Marker
-from rom.mbs.parts.whole import Whole
+from rom.mbs.parts.joints import Whole
 from rom.model import Array, Index
 
 
@@ -124,22 +130,20 @@ def law(  # noqa: PLR0913  one keyword per property
     Raises:
         ConfigError: for no marker, or a law that cannot be compiled although it must.
     """
-    _check_function("function", function, name)
-    if tangents is not None:
-        _check_function("tangents", tangents, name)
-    given = finite(f"parameters of {name}", parameters, (np.size(parameters),))
+    for what, one in (
+        ("function", function),
+        ("tangents", function if tangents is None else tangents),
+    ):
+        if not callable(one) and not hasattr(one, "address"):
+            raise ConfigError(f"{what} = {shortened(one)} of {name!r} must be a function.")
+    numbers = finite(f"parameters of {name}", parameters, (np.size(parameters),))
     kept = finite(f"memory of {name}", memory, (np.size(memory),))
     if not markers:
         raise ConfigError(f"law {name!r} needs a marker to act on.")
     sizes = len(markers), kept.size, len(outputs)
-    called = entries(name, (function, tangents), (given.size, *sizes), compiled)
-    element = Law(function, tangents, markers, given, kept, tuple(outputs), energy, called)
+    called = entries(name, (function, tangents), (numbers.size, *sizes), compiled)
+    element = Law(function, tangents, markers, numbers, kept, tuple(outputs), energy, called)
     self.add(name, element, LAWS_FAMILY)
-
-
-def _check_function(what: str, function: Any, name: str) -> None:
-    if not callable(function) and not hasattr(function, "address"):
-        raise ConfigError(f"{what} = {shortened(function)} of {name!r} must be a function.")
 
 
 def user_force(
@@ -151,7 +155,7 @@ def user_force(
 ) -> None:
     """Force law in Python: ``function(t, a)`` or ``function(t, a, b)``.
 
-    ``a`` and ``b`` are `rom.mbs.elements.laws_in_python.MarkerMotion`. The function returns
+    ``a`` and ``b`` are `rom.mbs.elements.law_calls.MarkerMotion`. The function returns
     (force, moment) in the world that act on the first marker; the reaction, at the same place in
     space, acts on the body of the second one, so that momentum is conserved whatever the law.
     """
@@ -209,7 +213,7 @@ def pack(laws: Mapping[str, Law], places: Places) -> Laws:
     remembered = [law.memory.size for law in found]
     derivatives = starts([72 * len(x.markers) ** 2 if x.compiled[0] is None else 0 for x in found])
     return Laws(
-        *(integers(_address(law.compiled[k]) for law in found) for k in (0, 1)),
+        *(integers(getattr(law.compiled[k], "address", 0) for law in found) for k in (0, 1)),
         integers(len(law.markers) for law in found),
         marker,
         starts([law.parameters.size for law in found]),
@@ -226,10 +230,6 @@ def pack(laws: Mapping[str, Law], places: Places) -> Laws:
         derivatives,
         np.zeros(derivatives[-1]),
     )
-
-
-def _address(entry: Any) -> int:
-    return 0 if entry is None else int(entry.address)
 
 
 @intrinsic
@@ -330,8 +330,7 @@ def set_derivatives(s, W, laws, e):
             laws.D[k] = laws.derivatives[laws.derivatives_at[e] + k]
         return
     if laws.slopes[e] != 0:
-        for k in range(72 * n * n):
-            laws.D[k] = 0.0
+        laws.D[: 72 * n * n] = 0.0
         parameters, memory, t = begin(s, laws, e, W, laws.probe[0])
         call(laws.slopes[e], t, parameters, laws.motion, memory, laws.D)
         return
@@ -414,11 +413,8 @@ def _couples(laws: Any, body: Index) -> list[Index]:
     return [body[at[:n]] for at, n in zip(laws.marker, laws.count, strict=True)]
 
 
-def _answers(laws: Any) -> list[Array]:
-    return [laws.answer[i:j] for i, j in pairwise(laws.answer_at)]
-
-
 LAWS_FAMILY = Family(
     "laws", Law, pack, law_wrenches, law_tangents, law_energy, ends=lambda law: law.markers,
-    outside=_outside, couples=_couples, hooks=Hooks(asked=asked, answers=_answers),
+    outside=_outside, couples=_couples, hooks=Hooks(
+        asked=asked, answers=lambda laws: [laws.answer[i:j] for i, j in pairwise(laws.answer_at)]),
 )  # fmt: skip

@@ -1,4 +1,4 @@
-"""Forces and torques on markers: constant, or functions of time."""
+"""Forces and torques on markers, loads spread over bodies: constant, or functions of time."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -6,16 +6,44 @@ from typing import Any, Literal
 
 import numpy as np
 
-from rom.arguments import finite
-from rom.mbs.elements.family import Family, Places, apart, from_outside, integers, never, rows_of
-from rom.mbs.kernels.algebra import add, cross, dot, place, put, row, scale, turn, unit
+from rom.arguments import finite, number
+from rom.errors import ConfigError
+from rom.mbs.elements.family import (
+    Family,
+    Places,
+    apart,
+    from_outside,
+    integers,
+    never,
+    on_joint,
+    rows_of,
+)
+from rom.mbs.kernels.algebra import (
+    add,
+    cross,
+    dot,
+    dual,
+    mtv,
+    mv,
+    place,
+    place_row,
+    put,
+    row,
+    scale,
+    trace,
+    turn,
+    unit,
+    vec,
+)
 from rom.mbs.kernels.compiled import inner
 from rom.mbs.kernels.constraints import pair_stiffness
 from rom.mbs.kernels.element_calls import residuals, tangents
-from rom.mbs.kernels.tables import Array2, Index1, Table, table
-from rom.mbs.parts.bodies import Marker
-from rom.mbs.parts.whole import Whole
+from rom.mbs.kernels.markers import own_block
+from rom.mbs.kernels.tables import Array1, Array2, Array3, Index1, Scratch2, Table, table
+from rom.mbs.parts.bodies import Marker, Part
+from rom.mbs.parts.joints import Whole
 from rom.model import Array
+from rom.rotation import skew
 
 Axes = Literal["world", "body"]
 # kinds of loads
@@ -119,5 +147,195 @@ def load_tangents(s, W, loads, _lam, ck, _cc):
 
 LOADS_FAMILY = Family(
     "loads", Load, pack, load_wrenches, load_tangents, ends=lambda load: (load.marker,),
+    outside=from_outside, couples=apart, by_rate=never,
+)  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Spread:
+    """A load on all points of a body; arrays as in `rom.body.spread.SpreadLoad`."""
+
+    body: str
+    force: Array
+    first: Array
+    shapes: Array
+    amplitude: float
+    function: Callable[[float], Any] | None
+    world: int
+
+
+def spread_load(
+    self: Whole,
+    name: str,
+    part: Part,
+    load: Any,
+    amplitude: Any = 1.0,
+    *,
+    frame: Literal["body", "world"] = "body",
+) -> None:
+    """Load on all points of a flexible body: pressure, traction, force per mass.
+
+    In the frame "body" the forces turn with its mean axes, as a pressure does, at large deflection
+    with its frame; in the "world" they keep their direction, given in the axes of the world.
+    Either way they act on the points as they deform, which changes moments; the area they were
+    reduced for stays the undeformed one.
+
+    Args:
+        name: name of the load.
+        part: what `add_flexible` returned.
+        load: from `rom.surface_load` or `rom.mass_load` of the same reduced body.
+        amplitude: a number, or a function of time.
+        frame: "body" or "world".
+
+    Raises:
+        ConfigError: for a name in use, a load of another body, or a wrong frame or amplitude.
+    """
+    part = self.part(str(getattr(part, "name", part)))
+    shapes = getattr(load, "shapes", None)
+    if shapes is None or shapes.shape != (part.r, 3, 3) or part.flexible is None:
+        raise ConfigError(
+            f"load {name!r} is not one of body {part.name!r} with {part.r} coordinates.",
+            hint="Make it with rom.surface_load or rom.mass_load from that body.",
+        )
+    function = amplitude if callable(amplitude) else None
+    constant = 0.0 if function else number("amplitude", amplitude)
+    arrays = (load.force, load.first, shapes + _by_the_frame(part, load))
+    spread = Spread(part.name, *arrays, constant, function, int(frame == "world"))
+    self.add(name, spread, SPREAD_LOADS_FAMILY)
+
+
+def _by_the_frame(part: Part, load: Any) -> Array:
+    """(r, 3, 3) what the sums of shapes and forces gain from the frame that is integrated."""
+    if part.own_frame is None:
+        return np.zeros((part.r, 3, 3))
+    move, turn = part.shapes(part.own_frame)
+    return np.array([np.outer(t, load.force) + skew(w) @ load.first
+                     for t, w in zip(move.T, turn.T, strict=True)])  # fmt: skip
+
+
+@table
+class SpreadLoads(Table):
+    """All spread loads.
+
+    Attributes:
+        body: (l,) body; world: (l,) 1 if the forces keep their direction in the world, else 0.
+        force: (l, 3) sum of the forces f [N].
+        first: (l, 9) entry 3 a + b: sum of X_a f_b [N m].
+        shapes: (l, R, 9) entry 3 a + b: sum of phi_k,a f_b.
+        amplitude: (l,) factor; signal: (l,) function of time added to it, -1 for none.
+        arm: (l, 9) sum of positions and forces at the last residual, body frame.
+    """
+
+    body: Index1
+    world: Index1
+    force: Array2
+    first: Array2
+    shapes: Array3
+    amplitude: Array1
+    signal: Index1
+    arm: Scratch2
+
+
+def pack_spread(loads: Any, places: Places) -> SpreadLoads:
+    """The spread loads as arrays."""
+    found = loads.values()
+    shapes = np.zeros((len(found), places.R, 9))
+    for k, load in enumerate(found):
+        shapes[k, : len(load.shapes)] = load.shapes.reshape(-1, 9)
+    return SpreadLoads(
+        integers(places.body[load.body] for load in found),
+        integers(load.world for load in found),
+        rows_of((load.force for load in found), 3),
+        rows_of((load.first.ravel() for load in found), 9),
+        shapes,
+        np.array([load.amplitude for load in found], dtype=float),
+        integers(
+            places.signal(name, f and (lambda t, f=f: (f(t), 0.0, 0.0)))  # of three components
+            for name, f in ((name, load.function) for name, load in loads.items())
+        ),
+        np.zeros((len(found), 9)),
+    )
+
+
+@inner
+def amplitude(loads, k, W):
+    """Factor of load k, its signal included."""
+    a = loads.amplitude[k]
+    if loads.signal[k] >= 0:
+        a += W.signal[loads.signal[k], 0]
+    return W.load[0] * a
+
+
+@inner
+def seen(x, A, world):
+    """A sum [a, b] of lengths and forces, nine entries, with the forces in the axes of the body."""
+    if world == 0:
+        return x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8]
+    a = mtv(A, (x[0], x[1], x[2]))
+    b = mtv(A, (x[3], x[4], x[5]))
+    c = mtv(A, (x[6], x[7], x[8]))
+    return a[0], a[1], a[2], b[0], b[1], b[2], c[0], c[1], c[2]
+
+
+@inner
+def spread_arm(s, W, loads, k, q):
+    """Sum [a, b] of positions and forces of load k, of the deformed body, axes of the body."""
+    b, world = loads.body[k], loads.world[k]
+    N = seen(loads.first[k], W.A[b], world)
+    for j in range(s.bodies.r[b]):
+        x = seen(loads.shapes[k, j], W.A[b], world)
+        f = q[s.bodies.q_at[b] + 7 + j]
+        N = (
+            N[0] + f * x[0], N[1] + f * x[1], N[2] + f * x[2],
+            N[3] + f * x[3], N[4] + f * x[4], N[5] + f * x[5],
+            N[6] + f * x[6], N[7] + f * x[7], N[8] + f * x[8],
+        )  # fmt: skip
+    return N
+
+
+@residuals.of(SpreadLoads)
+def spread_residuals(s, W, loads, q, v, _lam):
+    """Subtract all spread loads from W.residual, and add their power to W.power[1]."""
+    for k in range(loads.body.size):
+        b, world, a = loads.body[k], loads.world[k], amplitude(loads, k, W)
+        t, A = s.bodies.v_at[b], W.A[b]
+        given = vec(loads.force[k], 0)
+        force = scale(a, given if world == 1 else mv(A, given))
+        N = spread_arm(s, W, loads, k, q)
+        for p in range(9):
+            loads.arm[k, p] = N[p]
+        moment = scale(a, dual(N, 0))
+        put(W.residual, t, scale(-1.0, force))
+        put(W.residual, t + 3, scale(-1.0, moment))
+        W.power[1] += dot(force, vec(v, t)) + dot(moment, vec(v, t + 3))
+        for j in range(s.bodies.r[b]):
+            modal_force = a * trace(seen(loads.shapes[k, j], A, world), 0)
+            W.residual[t + 6 + j] -= modal_force
+            W.power[1] += modal_force * v[t + 6 + j]
+
+
+@tangents.of(SpreadLoads)
+def spread_tangents(s, W, loads, _lam, ck, _cc):
+    """Add ck times the derivative by the coordinates to W.Kt; `spread_residuals` first."""
+    for k in range(loads.body.size):
+        b, world = loads.body[k], loads.world[k]
+        A, r, block = W.A[b], s.bodies.r[b], own_block(s, b, W.Kt)
+        ca = -ck * amplitude(loads, k, W)
+        for p in range(3):
+            e = unit(p)
+            if world == 0:
+                place(block, 0, 3 + p, ca, mv(A, cross(e, vec(loads.force[k], 0))))
+            else:
+                turned = add(vec(loads.arm[k], 3 * p), scale(-trace(loads.arm[k], 0), e))
+                place(block, 3, 3 + p, ca, turned)
+        for j in range(r):
+            x = seen(loads.shapes[k, j], A, world)
+            place(block, 3, 6 + j, ca, dual(x, 0))
+            if world == 1:
+                place_row(block, 6 + j, 3, ca, dual(x, 0))
+
+
+SPREAD_LOADS_FAMILY = Family(
+    "spread_loads", Spread, pack_spread, spread_residuals, spread_tangents, ends=on_joint,
     outside=from_outside, couples=apart, by_rate=never,
 )  # fmt: skip

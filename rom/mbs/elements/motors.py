@@ -12,8 +12,7 @@ from rom.mbs.elements.formulas.programs import Formula
 from rom.mbs.elements.joint_forces import MOTOR, NO_PROGRAM, Motors, joint_family
 from rom.mbs.elements.law_calls import DIFFERENCE_STEP
 from rom.mbs.parts.foreign import ask, compiled_function, numbers
-from rom.mbs.parts.joints import Coordinate, Row, coordinate_of
-from rom.mbs.parts.whole import Whole
+from rom.mbs.parts.joints import Coordinate, Row, Whole, coordinate_of
 from rom.model import Array
 
 

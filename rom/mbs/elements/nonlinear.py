@@ -29,16 +29,7 @@ from numba import types
 from numba.extending import intrinsic
 
 from rom import rotation
-from rom.arguments import (
-    Omega,
-    Orientation,
-    Point,
-    Velocity,
-    finite,
-    start_pose,
-    typed,
-    whole,
-)
+from rom.arguments import Omega, Orientation, Point, Velocity, finite, start_pose, typed, whole
 from rom.errors import ConfigError, ModelError
 from rom.mbs.compiler.calls import called
 from rom.mbs.elements.family import Family, Hooks, Places, integers, on_joint
@@ -57,7 +48,7 @@ from rom.mbs.kernels.tables import (
     table,
 )
 from rom.mbs.parts.bodies import Marker, Part
-from rom.mbs.parts.whole import Whole
+from rom.mbs.parts.joints import Whole
 from rom.model import Array, Index
 from rom.names import offered
 
@@ -104,14 +95,7 @@ class Elements:
 
     @classmethod
     def of(cls, law: Any, frames: Index, numbers: Array, *, by_rate: bool = True) -> "Elements":
-        """Elements with a law of `compiled_law`.
-
-        Args:
-            law: the law.
-            frames: (e, k) frames that each element connects.
-            numbers: (e, c) what the law knows of each element, in its own units.
-            by_rate: whether forces depend on velocities.
-        """
+        """Elements with a law of `compiled_law`."""
         return cls(law.address, frames, numbers, law, by_rate)
 
 
@@ -340,8 +324,7 @@ def ask_element(elements, e, wanted):
 @residuals.of(Nonlinear)
 def nonlinear_residuals(s, W, elements, q, v, _lam):
     """Add the forces of all elements to W.residual, and the power they lose to W.power[2]."""
-    for k in range(elements.forces.size):
-        elements.forces[k] = 0.0
+    elements.forces[:] = 0.0
     for e in range(elements.address.size):
         take_frames(s, elements, e, q, v)
         ask_element(elements, e, 0)

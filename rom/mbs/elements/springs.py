@@ -14,7 +14,7 @@ from rom.mbs.kernels.constraints import pair_stiffness, place_relative
 from rom.mbs.kernels.element_calls import energy, residuals, tangents
 from rom.mbs.kernels.tables import Array2, Index1, Table, table
 from rom.mbs.parts.bodies import Marker
-from rom.mbs.parts.whole import Whole
+from rom.mbs.parts.joints import Whole
 from rom.plausible import DAMPING, STIFFNESS, warn_outside
 
 

@@ -1,7 +1,6 @@
 """The equations of motion.
 
-`packing` makes arrays of a mechanism along its `graph`; `equations` has residual and tangents, with
-forces of `python_laws`; `elimination` and `linear_solve` solve with them, in the `ordering` found
-before, and `renewal` with films that change. Large statics have the same blocks as sparse matrices
-by `pattern`, solved by `sparse_solve`; `signature` counts signs of eigenvalues.
+`packing` makes arrays of a mechanism along its `graph`, in whose order `linear_solve` solves with
+residual and tangents of `equations`, and `renewal` with films that change. Large statics have the
+same blocks as sparse matrices, in `sparse_solve`.
 """

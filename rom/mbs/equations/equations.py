@@ -19,11 +19,7 @@ from rom.mbs.kernels.constraints import (
     row_states,
 )
 from rom.mbs.kernels.coordinates import coordinate_states, coupling_stiffness, follow_coordinates
-from rom.mbs.kernels.element_calls import (
-    energy,
-    multiplier_columns,
-    residuals,
-)
+from rom.mbs.kernels.element_calls import energy, multiplier_columns, residuals
 from rom.mbs.kernels.element_calls import tangents as element_tangents
 from rom.mbs.kernels.inertia import (
     body_damping,

@@ -1,16 +1,22 @@
 """The graph of a mechanism: storage of its blocks, and the choice of how its equations are solved.
 
 Whole matrices are quicker for a few bodies.
+
+Bodies hang in trees whose roots are bodies joined to the ground. Of those whose outer bodies are
+gone, the one coupled to the fewest unknowns is next, the outermost of equals, and the joint towards
+its root follows it: a tree then gets no new couplings. The other joints close loops. Each waits for
+the body in which its loop comes together, or for the roots of all trees it connects: until then its
+multipliers are not determined.
 """
 
+import heapq
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from rom.mbs.elements.family import integers, starts
-from rom.mbs.equations.ordering import Group, Ordering, forest
-from rom.mbs.kernels.plan import Graph, Plan
+from rom.mbs.kernels.system import Graph, Plan
 from rom.model import Index
 
 # operations of a whole factorisation over those by blocks, from which blocks are quicker: measured
@@ -18,13 +24,155 @@ from rom.model import Index
 BLOCK_GAIN = 4.0
 
 
-def graph_of(system: Any, coupled: Sequence[Any], *, whole: bool = False) -> Graph:
-    """Storage and elimination plan of a mechanism whose other arrays are complete.
+class Group(NamedTuple):
+    """Constraint rows of one joint, the bodies they move, and whether all are couplings."""
 
-    Args:
-        system: the arrays of the mechanism.
-        coupled: groups of bodies that elements couple.
-        whole: store whole matrices whatever they cost.
+    rows: tuple[int, ...]
+    bodies: tuple[int, ...]
+    couples: bool
+
+
+def forest(groups: list[Group], n_bodies: int) -> tuple[list[int], list[int]]:
+    """Trees along joints of two bodies, breadth first, from all bodies joined to the ground.
+
+    Of each body the one towards the root, -1 for roots, and the group towards the root or the
+    ground, -1 for a free root.
+    """
+    parent, joint = [-1] * n_bodies, [-1] * n_bodies
+    edges: list[list[tuple[int, int]]] = [[] for _ in range(n_bodies)]
+    grounded: dict[int, int] = {}
+    for g, group in enumerate(groups):
+        if group.rows and not group.couples:
+            for a, b in zip(group.bodies, reversed(group.bodies), strict=True):
+                edges[a].append((b, g))
+            if len(group.bodies) == 1:
+                grounded.setdefault(group.bodies[0], g)
+    for b, g in grounded.items():
+        joint[b] = g
+    reached: set[int] = set()
+    for roots in (list(grounded), *([b] for b in range(n_bodies))):
+        queue = [b for b in roots if b not in reached]
+        reached.update(queue)
+        for a in queue:
+            for b, g in edges[a]:
+                if b not in reached:
+                    reached.add(b)
+                    parent[b], joint[b] = a, g
+                    queue.append(b)
+    return parent, joint
+
+
+class Ordering:
+    """Elimination on paper: which nodes each one is coupled to when its turn comes.
+
+    Attributes:
+        size: unknowns of each node: bodies, then groups of constraint rows.
+        sequence: nodes in the order of elimination.
+        later: nodes coupled to each node when it goes.
+        cost: multiplications and additions of a factorisation.
+    """
+
+    def __init__(self, width: Index, neighbours: list[list[int]], groups: list[Group]):
+        self.size = [*map(int, width), *(len(group.rows) for group in groups)]
+        self.groups, (self.parent, self.joint) = groups, forest(groups, len(width))
+        self.sequence: list[int] = []
+        self.later: dict[int, set[int]] = {}
+        self.cost, self.n = 0.0, len(neighbours)
+        self.depth = self._depths()
+        self.coupled = [set(others) - {b} for b, others in enumerate(neighbours)]
+        self.coupled += [set(group.bodies) for group in groups]
+        for g, group in enumerate(groups):
+            for b in group.bodies:
+                self.coupled[b].add(self.n + g)
+
+    def run(self, limit: float) -> bool:
+        """Eliminate all nodes; False as soon as that costs more than the limit."""
+        children = [0] * self.n
+        for p in self.parent:
+            if p >= 0:
+                children[p] += 1
+        self.waiting, self.waits = self._loops()
+        queue = [self._turn(b) for b in range(self.n) if not children[b]]
+        heapq.heapify(queue)
+        while queue:
+            turn = heapq.heappop(queue)
+            b = turn[-1]
+            if turn < self._turn(b):  # others have coupled it to more since
+                heapq.heappush(queue, self._turn(b))
+                continue
+            self._eliminate_with_joints(b)
+            if self.cost > limit:
+                return False
+            parent = self.parent[b]
+            if parent >= 0:
+                children[parent] -= 1
+                if not children[parent]:
+                    heapq.heappush(queue, self._turn(parent))
+        return True
+
+    def _eliminate_with_joints(self, b: int) -> None:
+        """A body, the joint towards its root, and the loops that come together in it."""
+        self._eliminate(b)
+        if self.joint[b] >= 0:
+            self._eliminate(self.n + self.joint[b])
+        for g in self.waiting.get(b, ()):
+            self.waits[g] -= 1
+            if not self.waits[g]:
+                self._eliminate(self.n + g)
+
+    def _eliminate(self, node: int) -> None:
+        others = self.coupled[node]
+        for other in others:
+            self.coupled[other] |= others
+            self.coupled[other] -= {node, other}
+        self.sequence.append(node)
+        self.later[node] = others
+        d, c = self.size[node], sum(self.size[other] for other in others)
+        self.cost += 2 / 3 * d**3 + 2 * d * d * c + 2 * d * c * c
+
+    def _turn(self, b: int) -> tuple[int, int, int]:
+        """What decides who is next: unknowns coupled to a body, then how far out it is."""
+        return sum(self.size[other] for other in self.coupled[b]), -self.depth[b], b
+
+    def _loops(self) -> tuple[dict[int, list[int]], dict[int, int]]:
+        """Groups that wait for each body, and for how many bodies each group waits."""
+        in_trees, waits = set(self.joint), {}
+        waiting: dict[int, list[int]] = {}
+        for g, group in enumerate(self.groups):
+            if not group.rows or g in in_trees:
+                continue
+            tops = self._tops(group.bodies)
+            waits[g] = len(tops)
+            for b in tops:
+                waiting.setdefault(b, []).append(g)
+        return waiting, waits
+
+    def _depths(self) -> list[int]:
+        depth = [-1] * self.n
+        for b in range(self.n):
+            path = [b]
+            while depth[path[-1]] < 0 and self.parent[path[-1]] >= 0:
+                path.append(self.parent[path[-1]])
+            top = max(depth[path[-1]], 0)
+            for up, node in enumerate(reversed(path)):
+                depth[node] = top + up
+        return depth
+
+    def _tops(self, bodies: tuple[int, ...]) -> set[int]:
+        """Where paths from the bodies towards the ground meet, or the roots of different trees."""
+        tops, parent = set(bodies), self.parent
+        while len(tops) > 1:
+            low = max(tops, key=lambda b: self.depth[b])
+            if parent[low] < 0:
+                return tops
+            tops = (tops - {low}) | {parent[low]}
+        return tops
+
+
+def graph_of(system: Any, coupled: Sequence[Any], *, whole: bool = False) -> Graph:
+    """Storage and elimination plan of a system whose other arrays are complete.
+
+    ``coupled`` are groups of bodies that elements couple; ``whole`` stores whole matrices anyhow.
     """
     neighbours, groups = _neighbours(system, coupled), _groups(system)
     plan = None if whole else _plan(system, neighbours, groups)
@@ -93,14 +241,9 @@ def _touched(system: Any, compact: bool) -> tuple[Index, Index]:
 
 def _plan(system: Any, neighbours: list[list[int]], groups: list[Group]) -> Plan | None:
     """The elimination plan, or None if whole matrices are quicker."""
-    width = 6 + system.bodies.r
-    size = [*map(int, width), *(len(group.rows) for group in groups)]
-    total = sum(size)
-    limit = 2 / 3 * total**3 / BLOCK_GAIN
-    ordering = Ordering(size, neighbours, groups, forest(groups, len(width)))
-    if not ordering.run(limit):
-        return None
-    return _tables(system, ordering, neighbours, groups)
+    ordering = Ordering(6 + system.bodies.r, neighbours, groups)
+    limit = 2 / 3 * sum(ordering.size) ** 3 / BLOCK_GAIN
+    return _tables(system, ordering, neighbours, groups) if ordering.run(limit) else None
 
 
 def _tables(
@@ -159,8 +302,7 @@ def elimination_order(system: Any, coupled: Sequence[Any]) -> list[Index]:
     """Unknowns of each body and each joint, rows of constraints after all velocities, in turn."""
     neighbours, groups = _neighbours(system, coupled), _groups(system)
     width, v_at = 6 + system.bodies.r, system.bodies.v_at
-    size = [*map(int, width), *(len(group.rows) for group in groups)]
-    ordering = Ordering(size, neighbours, groups, forest(groups, len(width)))
+    ordering = Ordering(width, neighbours, groups)
     ordering.run(np.inf)
     n, total = len(width), int(width.sum())
     found = [

@@ -14,14 +14,7 @@ from rom.mbs.equations import renewal
 from rom.mbs.equations.graph import graph_of
 from rom.mbs.kernels.element_calls import ROW_WORDS
 from rom.mbs.kernels.stages import STAGE_ADDRESSES
-from rom.mbs.kernels.system import (
-    ALONG,
-    LENGTHS,
-    Bodies,
-    Markers,
-    Rows,
-    System,
-)
+from rom.mbs.kernels.system import ALONG, LENGTHS, Bodies, Markers, Rows, System
 from rom.mbs.kernels.tables import Table
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.parts.bodies import GROUND, Marker, Part, moving_start
@@ -30,11 +23,8 @@ from rom.mbs.parts.signals import Signal, drive_signal
 from rom.model import OWN_FRAME, Array, Index
 
 FAR_JOINTS = 1e4  # sizes from the origin; reactions of a pendulum there miss 2e-5 of its weight
-
-
-MAX_SHARING_WHOLE = (
-    100  # coordinates up to which whole matrices are quicker where constraints repeat
-)
+# coordinates up to which whole matrices are quicker where constraints repeat
+MAX_SHARING_WHOLE = 100
 
 
 @dataclass(frozen=True)
@@ -206,11 +196,7 @@ class Packed:
 
 
 def pack(mechanism: Mechanism, *, whole: bool = False) -> Packed:
-    """Write the mechanism into arrays.
-
-    Args:
-        mechanism: bodies, joints, forces.
-        whole: store whole matrices (n, n) in any case, not the blocks of bodies and joints alone.
+    """Write the mechanism into arrays; whole matrices (n, n) if wanted, else blocks where they pay.
 
     Raises:
         ConfigError: if there is no body.
@@ -340,9 +326,7 @@ def _bodies(parts: tuple[Part, ...], R: int, gravity: Array) -> Bodies:
         starts(6 + r)[:-1],
         r,
         flex,
-        np.array([part.mass for part in parts]),
-        np.array([part.first for part in parts]),
-        np.array([part.second for part in parts]),
+        *(np.array([getattr(part, x) for part in parts]) for x in ("mass", "first", "second")),
         *tables,
         np.array([bent(part) for part in parts], dtype=np.int64),
         *_second_order(flexible, max(len(flexible), 1), R),
@@ -383,44 +367,27 @@ def _second_order(parts: list[Part], n: int, R: int) -> tuple[Index, Array, Arra
     return H_at, np.concatenate(H), T1
 
 
-def _bends(mechanism: Mechanism, handles: list[Marker], R: int) -> Array:
-    """(k, 6, R, R) second-order motion of markers; empty when no body is stiffened."""
-    bodies = {name: part for name, part in mechanism.parts.items() if bent(part)}
-    motions = {name: part.moving.second_order().markers for name, part in bodies.items()}
-    bend = np.zeros((len(handles), 6, *2 * (R if bodies else 0,)))
-    for k, marker in enumerate(handles):
-        if marker.body in bodies and marker.place in motions[marker.body]:
-            r = bodies[marker.body].r
-            bend[k, :, :r, :r] = motions[marker.body][marker.place]
-    return bend
-
-
 def _markers(mechanism: Mechanism, handles: list[Marker], R: int) -> Markers:
     order = {name: b for b, name in enumerate(mechanism.parts)} | {GROUND: -1}
-    shape, twist = np.zeros((len(handles), 3, R)), np.zeros((len(handles), 3, R))
-    for k, marker in enumerate(handles):
-        part = mechanism.part(marker.body)
-        shape[k, :, : part.r], twist[k, :, : part.r] = part.shapes(marker)
-    return Markers(
-        np.array([order[m.body] for m in handles], dtype=np.int64),
-        np.array([mechanism.part(m.body).point(m) for m in handles]),
-        shape,
-        twist,
-        _bends(mechanism, handles, R),
-        *_fits(mechanism, handles, R),
-    )
-
-
-def _fits(mechanism: Mechanism, handles: list[Marker], R: int) -> tuple[Index, Array]:
-    """Tables fit and covariance of `rom.mbs.kernels.system.Markers`."""
-    fit, found = np.full(len(handles), -1, dtype=np.int64), list[Array]()
-    for k, marker in enumerate(handles):
-        covariance = mechanism.part(marker.body).covariance(marker)
+    parts, n = [mechanism.part(marker.body) for marker in handles], len(handles)
+    stiffened = {name: part.moving for name, part in mechanism.parts.items() if bent(part)}
+    motions = {name: body.second_order().markers for name, body in stiffened.items()}
+    shape, twist = np.zeros((n, 3, R)), np.zeros((n, 3, R))
+    bend = np.zeros((n, 6, *2 * (R if motions else 0,)))
+    fit, fitted = np.full(n, -1, dtype=np.int64), list[Array]()
+    for k, (marker, part) in enumerate(zip(handles, parts, strict=True)):
+        r = part.r
+        shape[k, :, :r], twist[k, :, :r] = part.shapes(marker)
+        if marker.place in motions.get(marker.body, ()):
+            bend[k, :, :r, :r] = motions[marker.body][marker.place]
+        covariance = part.covariance(marker)
         if covariance is not None:
-            fit[k] = len(found)
-            missing = 1 + R - covariance.shape[2]
-            found.append(np.pad(covariance.reshape(9, -1), ((0, 0), (0, missing))))
-    return fit, np.array(found).reshape(len(found), 9, 1 + R)
+            fit[k] = len(fitted)
+            fitted.append(np.pad(covariance.reshape(9, -1), ((0, 0), (0, R - r))))
+    body = integers(order[marker.body] for marker in handles)
+    points = np.array([part.point(m) for m, part in zip(handles, parts, strict=True)])
+    covariances = np.array(fitted).reshape(len(fitted), 9, 1 + R)
+    return Markers(body, points, shape, twist, bend, fit, covariances)
 
 
 def _rows(mechanism: Mechanism, places: Places) -> Rows:
@@ -434,7 +401,7 @@ def _rows(mechanism: Mechanism, places: Places) -> Rows:
         entries.append((name, pair, joint, joint.coordinate, len(places.signals)))
         places.signals.append(drive_signal(name, drive))
     sides = [[_marker(index, joint, row, k) for _, _, joint, row, _ in entries] for k in range(4)]
-    joint_sides = [[index[j.markers[side]] for j in mechanism.joints.values()] for side in (0, 1)]
+    joints = mechanism.joints.values()
     rows = [row for _, _, _, row, _ in entries]
     terms = [_terms(joint, row, places) for _, _, joint, row, _ in entries]
     places.owners.extend(entry[0] for entry in entries)
@@ -445,10 +412,8 @@ def _rows(mechanism: Mechanism, places: Places) -> Rows:
         integers([at for at, _ in terms]).reshape(-1, 2),
         np.array([factor for _, factor in terms], dtype=float).reshape(-1, 2),
         np.array([row.offset for row in rows], dtype=float),
-        integers([entry[4] for entry in entries]),
-        integers([entry[1] for entry in entries]),
-        integers(joint_sides[0]),
-        integers(joint_sides[1]),
+        *(integers(entry[k] for entry in entries) for k in (4, 1)),
+        *(integers(index[joint.markers[side]] for joint in joints) for side in (0, 1)),
     )
 
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from rom.errors import SolverError
-from rom.mbs.equations.python_laws import apply_laws
+from rom.mbs.elements.family import apply_laws
 from rom.mbs.integrate import generalized_alpha as alpha
 from rom.mbs.integrate import step_control as control
 from rom.mbs.integrate.consistent_start import check_velocity

@@ -11,9 +11,7 @@ from rom.errors import ModelError, SolverError, warn
 from rom.mbs.equations.equations import evaluate, linearize_constraints, rates, retract
 from rom.mbs.equations.linear_solve import factorise_bordered, gradient_times, solve_bordered
 from rom.mbs.equations.packing import Packed
-from rom.mbs.equations.pattern import Pattern
-from rom.mbs.equations.signature import signature
-from rom.mbs.equations.sparse_solve import Constrained, unit_rows
+from rom.mbs.equations.sparse_solve import Constrained, Pattern, signature, unit_rows
 from rom.mbs.kernels.system import ROLL
 from rom.mbs.kernels.work import Work, workspace
 from rom.mbs.parts.signals import first_failure, sample_all

@@ -11,8 +11,8 @@ import numpy as np
 from scipy.integrate import DOP853
 
 from rom.errors import SolverError
+from rom.mbs.elements.family import apply_laws
 from rom.mbs.equations.equations import evaluate, rates
-from rom.mbs.equations.python_laws import apply_laws
 from rom.mbs.integrate.run import RUN_KEY, Record, standing_at
 from rom.mbs.kernels.work import Work
 from rom.mbs.parts.signals import sampled

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from rom.errors import RomError
-from rom.mbs.equations.python_laws import Laws
+from rom.mbs.elements.family import Laws
 from rom.mbs.integrate.consistent_start import assembled, fitting_velocity
 from rom.mbs.integrate.run import Record
 from rom.mbs.integrate.step_memory import accelerated, signals_at

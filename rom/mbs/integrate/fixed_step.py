@@ -6,8 +6,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rom.errors import RomError, SolverError
+from rom.mbs.elements.family import Laws, apply_laws
 from rom.mbs.equations.equations import evaluate, residual
-from rom.mbs.equations.python_laws import Laws, apply_laws
 from rom.mbs.integrate import generalized_alpha as alpha
 from rom.mbs.integrate.event_end import kept_before_the_end
 from rom.mbs.integrate.events import Noted

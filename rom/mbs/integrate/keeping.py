@@ -20,9 +20,8 @@ from rom.io.archive import Kind, digest, read_archive, stated, write_archive
 from rom.mbs.equations.packing import Packed
 from rom.mbs.integrate.events import Noted
 from rom.mbs.kernels.tables import Table
-from rom.mbs.results.checkpoint import STATE_KIND as STATE
-from rom.mbs.results.checkpoint import packed_state, unpacked_state
-from rom.mbs.results.state import Memory, State
+from rom.mbs.results.state import STATE_KIND as STATE
+from rom.mbs.results.state import Memory, State, packed_state, unpacked_state
 from rom.model import Array
 
 SCHEMA_NAME, VERSION = "rom-motion", (1, 0)

@@ -20,10 +20,9 @@ from rom.mbs.integrate.keeping import Keeping, digests_of
 from rom.mbs.integrate.run import Record, Settings
 from rom.mbs.kernels.work import workspace
 from rom.mbs.mechanism import Mechanism
-from rom.mbs.results.audit import warn_of_failures
+from rom.mbs.results.audit import warn_of_failures, warn_of_limits
 from rom.mbs.results.solution import Solution
 from rom.mbs.results.state import State, check_state
-from rom.mbs.results.validity import warn_of_limits
 from rom.process.interruption import terminable
 
 METHODS = {"generalized-alpha": run_implicit, "bdf": run_implicit, "dop853": run_explicit}

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 
 from rom.errors import SolverError
+from rom.mbs.elements.family import Laws, apply_laws
 from rom.mbs.equations.equations import evaluate, linearize_constraints, retract
 from rom.mbs.equations.linear_solve import gradient_times
-from rom.mbs.equations.python_laws import Laws, apply_laws
 from rom.mbs.integrate import generalized_alpha as alpha
 from rom.mbs.integrate.bdf import multistep_coefficients
 from rom.mbs.integrate.consistent_start import factorised, least_motion, with_accelerations

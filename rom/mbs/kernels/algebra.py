@@ -1,4 +1,7 @@
-"""Compiled algebra of 3-vectors (tuples of three numbers), rotations and dense systems."""
+"""Compiled algebra of 3-vectors (tuples of three numbers), rotations and dense systems.
+
+Integrals S(U, V) of rho U V^T are nine numbers in a row.
+"""
 
 import math
 
@@ -217,7 +220,7 @@ def factorise(A, n, pivot):
         for k in range(first, last):
             for i in range(k + 1, last):
                 if A[i, k] != 0.0:
-                    subtract_row(A, i, k, last, n)
+                    subtract_row(A[i, k], A, i, k, last, n)
         for i in range(last, n, 2):
             eliminate_pair(A, i, min(i + 1, n - 1), first, n)
     return True
@@ -240,13 +243,12 @@ def eliminate_column(A, k, n, last):
     for i in range(k + 1, n):
         if A[i, k] != 0.0:
             A[i, k] *= inverse
-            subtract_row(A, i, k, k + 1, last)
+            subtract_row(A[i, k], A, i, k, k + 1, last)
 
 
 @inner
-def subtract_row(A, i, k, first, last):
-    """Subtract A[i, k] times row k from row i, in columns first to last."""
-    f = A[i, k]
+def subtract_row(f, A, i, k, first, last):
+    """Subtract f times row k from row i, in columns first to last."""
     for j in range(first, last):
         A[i, j] -= f * A[k, j]
 
@@ -281,20 +283,26 @@ def eliminate_pair(A, i, p, k, n):
 @inner
 def back_substitute(A, n, pivot, x):
     """Solve in place with the factors of `factorise`."""
+    back_substitute_at(A.reshape(A.size), 0, A.shape[1], n, pivot, 0, x)
+
+
+@inner
+def back_substitute_at(F, A, wide, n, pivot, at, x):
+    """The same for x[at:at+n], with factors in rows of F that begin at A, ``wide`` apart."""
     for k in range(n):
-        p = pivot[k]
+        p = pivot[at + k]
         if p != k:
-            x[k], x[p] = x[p], x[k]
+            x[at + k], x[at + p] = x[at + p], x[at + k]
     for i in range(n):
-        s = x[i]
+        s = x[at + i]
         for j in range(i):
-            s -= A[i, j] * x[j]
-        x[i] = s
+            s -= F[A + i * wide + j] * x[at + j]
+        x[at + i] = s
     for i in range(n - 1, -1, -1):
-        s = x[i]
+        s = x[at + i]
         for j in range(i + 1, n):
-            s -= A[i, j] * x[j]
-        x[i] = s / A[i, i]
+            s -= F[A + i * wide + j] * x[at + j]
+        x[at + i] = s / F[A + i * wide + i]
 
 
 @inner
@@ -379,3 +387,55 @@ def transposed_rate(theta, d, x):
     both = add(cross(d, once), cross(theta, cross(d, x)))
     along = scale(2.0 * dc * dot(theta, d), cross(theta, once))
     return add(add(scale(0.5, cross(d, x)), scale(c, both)), along)
+
+
+@inner
+def dual(s, at):
+    """Integral of rho U x V from the nine entries of S(U, V)."""
+    return s[at + 5] - s[at + 7], s[at + 6] - s[at + 2], s[at + 1] - s[at + 3]
+
+
+@inner
+def trace(s, at):
+    """Trace of nine entries."""
+    return s[at] + s[at + 4] + s[at + 8]
+
+
+@inner
+def times(s, x):
+    """Nine entries, as a matrix, times x."""
+    return (
+        s[0] * x[0] + s[1] * x[1] + s[2] * x[2],
+        s[3] * x[0] + s[4] * x[1] + s[5] * x[2],
+        s[6] * x[0] + s[7] * x[1] + s[8] * x[2],
+    )
+
+
+@inner
+def transposed_times(s, x):
+    """Nine entries, as a matrix, transposed, times x."""
+    return (
+        s[0] * x[0] + s[3] * x[1] + s[6] * x[2],
+        s[1] * x[0] + s[4] * x[1] + s[7] * x[2],
+        s[2] * x[0] + s[5] * x[1] + s[8] * x[2],
+    )
+
+
+@inner
+def add_multiple(factor, x, n, out):
+    """Add a multiple of the first n numbers of x to those of out: one loop, for vector units."""
+    for j in range(n):
+        out[j] += factor * x[j]
+
+
+@inner
+def contract(S2, x, r, line, out):
+    """Add S(x, phi_k) for x = sum x_l phi_l to the rows of out; ``line`` is working memory."""
+    n = 9 * r
+    for j in range(n):
+        line[j] = 0.0
+    for l in range(r):
+        add_multiple(x[l], S2[l], n, line)
+    for k in range(r):
+        for p in range(9):
+            out[k, p] += line[9 * k + p]

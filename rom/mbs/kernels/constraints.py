@@ -1,12 +1,12 @@
-"""Constraint rows: residual, gradient, convective term and stiffness."""
+"""Constraint rows: residual, gradient, convective term and stiffness; those of what rolls, too."""
 
 import math
 
+import numpy as np
 from numba import types
 
-from rom.mbs.kernels.algebra import add, cross, dot, place, row, scale, sub, turn, unit
+from rom.mbs.kernels.algebra import add, cross, dot, place, row, scale, sub, turn, unit, unit_twist
 from rom.mbs.kernels.compiled import inner
-from rom.mbs.kernels.rolling import rolling_row, rolling_stiffness
 from rom.mbs.kernels.stages import stage
 from rom.mbs.kernels.system import (
     ALONG,
@@ -48,6 +48,14 @@ def normal_rates(a, b, Oi, Oj, ci, cj):
 
 
 @inner
+def along_rates(a, gap, slide, pull, Oi, ci):
+    """Rate of a . gap for an axis a of i, and the convective term of its second derivative."""
+    da = cross(Oi, a)
+    swing = add(cross(ci, a), cross(Oi, da))
+    return dot(a, slide) + dot(da, gap), dot(a, pull) + 2 * dot(da, slide) + dot(swing, gap)
+
+
+@inner
 def angle_state(a, c, b, Oi, Oj, ci, cj):
     """Angle of b seen in the axes (a, c), its rate, convective term and the torque axis.
 
@@ -62,6 +70,90 @@ def angle_state(a, c, b, Oi, Oj, ci, cj):
     rate = (x * dy - y * dx) / n
     second = (x * ddy - y * ddx - 2 * rate * (x * dx + y * dy)) / n
     return math.atan2(y, x), rate, second, axis
+
+
+def _has_rolling(system):
+    return np.isin(system.rows.kind, (TOUCH, ROLL)).any()
+
+
+@inner
+def lowest(n, s, radius):
+    """From the centre to the point nearest to the plane of normal n.
+
+    For a ball (s = 0), or for a wheel that spins about s: in the plane of the wheel, downwards.
+    """
+    c = dot(n, s)
+    if 1.0 - c * c <= 0.0:
+        return scale(0.0, n)
+    return scale(radius / math.sqrt(1.0 - c * c), sub(scale(c, s), n))
+
+
+@inner
+def lowest_rate(n, s, dn, ds, radius):
+    """Rate of `lowest` while n and s change with the rates dn and ds."""
+    c = dot(n, s)
+    if 1.0 - c * c <= 0.0:
+        return scale(0.0, n)
+    dc, w = dot(dn, s) + dot(n, ds), 1.0 / math.sqrt(1.0 - c * c)
+    change = sub(add(scale(dc, s), scale(c, ds)), dn)
+    return add(scale(radius * w, change), scale(radius * c * dc * w * w * w, sub(scale(c, s), n)))
+
+
+@inner
+def rolling_vectors(rows, k, W):
+    """Direction, normal, wheel axis, gap of the markers and vector to the lowest point of row k."""
+    i, j = rows.i[k], rows.j[k]
+    a, n = turn(W.E, i, row(rows.a, k, 0)), turn(W.E, i, row(rows.c, k, 0))
+    s = turn(W.E, j, row(rows.b, k, 0))
+    return a, n, s, sub(row(W.P, j, 0), row(W.P, i, 0)), lowest(n, s, rows.factor[k, 0])
+
+
+@inner
+def gradient_rate(vectors, radius, slide, Oi, Oj):
+    """Rate of the gradient of a row while the markers move: of its four vectors."""
+    a, n, s, gap, down = vectors
+    da, sink = cross(Oi, a), lowest_rate(n, s, cross(Oi, n), cross(Oj, s), radius)
+    arm = add(gap, down)
+    turning = add(cross(add(slide, sink), a), cross(arm, da))
+    return scale(-1.0, da), scale(-1.0, turning), da, add(cross(sink, a), cross(down, da))
+
+
+@stage(types.void, System, Work, types.int64, needed=_has_rolling)
+def rolling_row(s, W, k):
+    """Residual, gradient and convective term of a row of kind TOUCH or ROLL.
+
+    Both have the gradient of the velocity of the touching material point along the direction a:
+    for the height this is so because the lowest point is lowest.
+    """
+    rows = s.rows
+    i, j = rows.i[k], rows.j[k]
+    vectors = rolling_vectors(rows, k, W)
+    a, _, _, gap, down = vectors
+    arm = add(gap, down)
+    four = (scale(-1.0, a), scale(-1.0, cross(arm, a)), a, cross(down, a))
+    slide = sub(row(W.V, j, 0), row(W.V, i, 0))
+    rates = gradient_rate(vectors, rows.factor[k, 0], slide, row(W.V, i, 3), row(W.V, j, 3))
+    W.gamma[k], sliding = 0.0, 0.0
+    for side in range(4):
+        m, at = (i if side < 2 else j), 3 * (side % 2)
+        W.gamma[k] += dot(four[side], row(W.conv, m, at)) + dot(rates[side], row(W.V, m, at))
+        sliding += dot(four[side], row(W.V, m, at))
+        for p in range(3):
+            W.g[k, 3 * side + p] = four[side][p]
+    W.value[k] = sliding if rows.kind[k] == ROLL else dot(a, arm)
+
+
+@stage(types.void, System, Work, types.int64, types.float64, needed=_has_rolling)
+def rolling_stiffness(s, W, k, c):
+    """Add c times the derivative of the gradient of row k to W.Q."""
+    rows = s.rows
+    vectors = rolling_vectors(rows, k, W)
+    for p in range(12):
+        vi, Oi, vj, Oj = unit_twist(p)
+        rates = gradient_rate(vectors, rows.factor[k, 0], sub(vj, vi), Oi, Oj)
+        for side in range(4):
+            for q in range(3):
+                W.Q[3 * side + q, p] += c * rates[side][q]
 
 
 @inner
@@ -95,11 +187,9 @@ def row_states(s, W):
             continue
         a = turn(W.E, i, a)
         if kind == ALONG:
-            da = cross(Oi, a)
             slide = sub(row(W.V, j, 0), row(W.V, i, 0))
-            swing = add(cross(qi, a), cross(Oi, da))
             W.value[k] = dot(a, gap) - target
-            W.gamma[k] = dot(a, pull) + 2 * dot(da, slide) + dot(swing, gap)
+            W.gamma[k] = along_rates(a, gap, slide, pull, Oi, qi)[1]
             set_gradient(W.g, k, scale(-1.0, a), cross(a, gap), a, zero)
             continue
         b = turn(W.E, j, row(rows.b, k, 0))
@@ -153,11 +243,7 @@ def column_of(graph, k, b):
 
 @inner
 def block_of(graph, b, c):
-    """Number of the block of bodies b and c.
-
-    Raises:
-        IndexError: if the graph does not know that something couples them.
-    """
+    """Number of the block of bodies b and c; IndexError if the graph does not know it."""
     low, high = graph.first[b], graph.first[b + 1]
     while low < high:
         middle = (low + high) // 2
@@ -249,6 +335,16 @@ def row_stiffness(kind, a, b, gap, axis, c, Q):
             x = cross(axis, unit(p))
             place(Q, 3, 3 + p, c, x)
             place(Q, 9, 3 + p, -c, x)
+
+
+@inner
+def push_pair(W, i, j, force, at_i, at_j):
+    """Push marker j and marker i back: wrenches of a force with its moments about both."""
+    for p in range(3):
+        W.wrench[j, p] += force[p]
+        W.wrench[j, 3 + p] += at_j[p]
+        W.wrench[i, p] -= force[p]
+        W.wrench[i, 3 + p] -= at_i[p]
 
 
 @inner

@@ -5,9 +5,10 @@ Elements between two markers follow angles as joints do, and have tangents of bo
 
 from numba import types
 
-from rom.mbs.kernels.algebra import add, cross, dot, row, scale, sub, turn
+from rom.mbs.kernels.algebra import cross, dot, row, scale, sub, turn
 from rom.mbs.kernels.compiled import inner
 from rom.mbs.kernels.constraints import (
+    along_rates,
     angle_state,
     has_couplings,
     pair_stiffness,
@@ -31,11 +32,9 @@ def coordinate_states(s, W):
         qi, qj = row(W.conv, i, 3), row(W.conv, j, 3)
         if C.kind[k] == ALONG:
             gap, slide = sub(row(W.P, j, 0), row(W.P, i, 0)), sub(row(W.V, j, 0), Vi)
-            pull, da = sub(row(W.conv, j, 0), row(W.conv, i, 0)), cross(Oi, a)
-            swing = add(cross(qi, a), cross(Oi, da))
+            pull = sub(row(W.conv, j, 0), row(W.conv, i, 0))
             W.x[k] = dot(a, gap) - C.offset[k]
-            W.xd[k] = dot(a, slide) + dot(da, gap)
-            W.xc[k] = dot(a, pull) + 2 * dot(da, slide) + dot(swing, gap)
+            W.xd[k], W.xc[k] = along_rates(a, gap, slide, pull, Oi, qi)
             set_gradient(W.xg, k, scale(-1.0, a), cross(a, gap), a, zero)
         else:
             b, c = turn(W.E, j, row(C.b, k, 0)), turn(W.E, i, row(C.c, k, 0))
@@ -119,25 +118,14 @@ def followed_angle(s, W, at, angle):
 @inner
 def clear_tangent(tangent):
     """Empty the tangents (2, 12, 12) by motions and velocities of a pair of markers."""
-    for kind in range(2):
-        for p in range(12):
-            for q in range(12):
-                tangent[kind, p, q] = 0.0
-
-
-@inner
-def scaled_tangent(W, tangent, kind, factor):
-    """Write a factor times one of them to W.Q."""
-    for p in range(12):
-        for q in range(12):
-            W.Q[p, q] = factor * tangent[kind, p, q]
+    tangent[:] = 0.0
 
 
 @inner
 def place_tangent(s, W, pair, tangent, ck, cc):
     """Add ck times the first of them to W.Kt and cc times the second to W.S."""
-    i, j = pair
-    scaled_tangent(W, tangent, 0, ck)
-    pair_stiffness(s, W, i, j, W.Kt)
-    scaled_tangent(W, tangent, 1, cc)
-    pair_stiffness(s, W, i, j, W.S)
+    for kind in range(2):
+        for p in range(12):
+            for q in range(12):
+                W.Q[p, q] = (ck if kind == 0 else cc) * tangent[kind, p, q]
+        pair_stiffness(s, W, pair[0], pair[1], W.Kt if kind == 0 else W.S)

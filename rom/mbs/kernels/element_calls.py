@@ -24,12 +24,7 @@ SYSTEM_TYPE, WORK_TYPE = System._numba_type_, Work._numba_type_
 
 
 class ElementKernel:
-    """A kernel of one family, compiled when it is first needed.
-
-    Attributes:
-        kernel: the function, which takes system, work, and the table of the family first.
-        signature: its types.
-    """
+    """A kernel of one family, which takes system, work and its table; compiled when needed."""
 
     def __init__(self, function: Callable[..., Any], signature: Any):
         compiler = njit(**OPTIONS, no_cpython_wrapper=True, no_cfunc_wrapper=True)
@@ -49,10 +44,7 @@ class ElementKernel:
 class Role:
     """What a kernel is for: ``role(s, k, W, ...)`` in a kernel calls that of family k.
 
-    Args:
-        column: of the row of a family.
-        result: type.
-        types_: of the arguments behind system, work and table.
+    It stands in a column of the row of a family; types are of what follows system, work and table.
     """
 
     def __init__(self, column: int, result: Any, *types_: Any):

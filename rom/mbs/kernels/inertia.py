@@ -11,8 +11,10 @@ from numba import types
 from rom.mbs.kernels.algebra import (
     add,
     col,
+    contract,
     cross,
     dot,
+    dual,
     mtv,
     mv,
     place,
@@ -21,12 +23,15 @@ from rom.mbs.kernels.algebra import (
     rotation,
     scale,
     sub,
+    times,
+    trace,
+    transposed_times,
     unit,
     vec,
 )
 from rom.mbs.kernels.compiled import inner
-from rom.mbs.kernels.integrals import contract, dual, times, trace, transposed_times
 from rom.mbs.kernels.second_order import (
+    OF_BODY,
     bend,
     bent_coordinates,
     bent_integrals,
@@ -35,8 +40,6 @@ from rom.mbs.kernels.second_order import (
     spread_stiffness,
 )
 from rom.mbs.kernels.stages import REAL_BLOCK, REAL_VECTOR, stage
-from rom.mbs.kernels.system import System
-from rom.mbs.kernels.work import Work
 
 
 def _has_elastic(system):
@@ -191,7 +194,7 @@ def shape_mass(bodies, W, b, c, S):
             S[e, 6 + l] += c * bodies.M[f, k, l]
 
 
-@stage(*(types.void, System, Work, types.int64, types.float64, REAL_BLOCK), needed=has_stiffened)
+@stage(*OF_BODY, types.float64, REAL_BLOCK, needed=has_stiffened)
 def bent_mass(s, W, b, c, S):
     """Add c times the mass matrix of a stiffened body to S: that of y by the chain rule."""
     n, of_y, G = 6 + s.bodies.r[b], W.of_y[0], W.of_y[3]
@@ -245,10 +248,7 @@ def body_damping(s, W, b, v, c, S):
             S[6 + k, 6 + l] += c * bodies.C[f, k, l]
 
 
-@stage(
-    *(types.void, System, Work, types.int64, REAL_VECTOR, types.float64, REAL_BLOCK),
-    needed=has_stiffened,
-)
+@stage(*OF_BODY, REAL_VECTOR, types.float64, REAL_BLOCK, needed=has_stiffened)
 def bent_damping(s, W, b, v, c, S):
     """Add c times the derivative of the inertia of a stiffened body by its velocities to S."""
     n, Y, G = 6 + s.bodies.r[b], W.Y[b], W.of_y[3]
@@ -278,10 +278,7 @@ def shape_damping(s, W, b, v, c, S):
         elastic_damping(s, W, b, v, c, S)
 
 
-@stage(
-    *(types.void, System, Work, types.int64, REAL_VECTOR, types.float64, REAL_BLOCK),
-    needed=_has_elastic,
-)
+@stage(*OF_BODY, REAL_VECTOR, types.float64, REAL_BLOCK, needed=_has_elastic)
 def elastic_damping(s, W, b, v, c, S):
     """The rows and columns of `shape_damping` that belong to the elastic coordinates."""
     bodies, A = s.bodies, W.A[b]
@@ -315,10 +312,7 @@ def body_stiffness(s, W, b, v, a, c, S):
             S[6 + k, 6 + l] += c * bodies.K[f, k, l]
 
 
-@stage(
-    *(types.void, System, Work, types.int64, REAL_VECTOR, REAL_VECTOR, types.float64, REAL_BLOCK),
-    needed=has_stiffened,
-)
+@stage(*OF_BODY, REAL_VECTOR, REAL_VECTOR, types.float64, REAL_BLOCK, needed=has_stiffened)
 def bent_stiffness(s, W, b, v, a, c, S):
     """Add c times the derivative of the inertia of a stiffened body by its coordinates to S."""
     bodies = s.bodies
@@ -362,19 +356,14 @@ def shape_stiffness(s, W, b, v, a, c, S):
         elastic_stiffness(s, W, b, v, a, c, S)
 
 
-@stage(
-    *(types.void, System, Work, types.int64, REAL_VECTOR, REAL_VECTOR, types.float64, REAL_BLOCK),
-    needed=_has_elastic,
-)
+@stage(*OF_BODY, REAL_VECTOR, REAL_VECTOR, types.float64, REAL_BLOCK, needed=_has_elastic)
 def elastic_stiffness(s, W, b, v, a, c, S):
     """The columns of `shape_stiffness` that belong to the elastic coordinates."""
     bodies = s.bodies
     f, r, t = bodies.flex[b], bodies.r[b], bodies.v_at[b]
     w, dw, A = vec(v, t + 3), vec(a, t + 3), W.A[b]
     a_minus_g = mtv(A, sub(vec(a, t), vec(bodies.gravity, 0)))
-    for k in range(r):
-        for p in range(9):
-            W.Sa[k, p] = 0.0
+    W.Sa[:r] = 0.0
     contract(bodies.S2[f], W.ydd[b], r, W.line, W.Sa)
     for l in range(r):
         SP, e, S_l = W.SP[b, l], 6 + l, col(bodies.S[f], l)

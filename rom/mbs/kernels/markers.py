@@ -21,7 +21,7 @@ from rom.mbs.kernels.algebra import (
     vec,
 )
 from rom.mbs.kernels.compiled import inner, spliced
-from rom.mbs.kernels.second_order import REAL_3, bent_motion, bent_wrench_stiffness
+from rom.mbs.kernels.second_order import OF_BODY, REAL_3, bent_motion, bent_wrench_stiffness
 from rom.mbs.kernels.stages import REAL_BLOCK, REAL_VECTOR, stage
 from rom.mbs.kernels.system import System
 from rom.mbs.kernels.work import Work
@@ -293,11 +293,15 @@ def fitted_motion(s, W, m, q, v):
         W.move[m, 3, k], W.move[m, 4, k], W.move[m, 5, k] = w
     C = times_transposed(matrix_sum(table[:, 1:], v, t, r), R)
     w = rows_dot(inverse, double_axial(C))
+    return rows_dot(inverse, add(double_axial(spun(w, C)), spread_rate(C, P, w, w)))
+
+
+@inner
+def spread_rate(C, P, w, x):
+    """Rate of P - tr(P) 1, times x, while the surface turns by w."""
     still = spun(w, P)
     rate = (add(C[0], still[0]), add(C[1], still[1]), add(C[2], still[2]))
-    trace = rate[0][0] + rate[1][1] + rate[2][2]
-    turned = add(double_axial(spun(w, C)), sub(rows_dot(rate, w), scale(trace, w)))
-    return rows_dot(inverse, turned)
+    return sub(rows_dot(rate, x), scale(rate[0][0] + rate[1][1] + rate[2][2], x))
 
 
 @inner
@@ -306,9 +310,7 @@ def column_matrix(table, k):
     return col(table[0:3], k), col(table[3:6], k), col(table[6:9], k)
 
 
-@stage(
-    *(types.void, System, Work, types.int64, REAL_3, types.float64, REAL_BLOCK), needed=has_fitted
-)
+@stage(*OF_BODY, REAL_3, types.float64, REAL_BLOCK, needed=has_fitted)
 def fitted_wrench_stiffness(s, W, m, n, c, S):
     """Stiffness that the moment n on a fitted marker gives to its body, in its block S."""
     b, table, spins = s.markers.body[m], s.markers.covariance[s.markers.fit[m]], W.move[m, 3:]
@@ -317,17 +319,9 @@ def fitted_wrench_stiffness(s, W, m, n, c, S):
     x = rows_dot(inverse, n)
     for k in range(r):
         C, w = times_transposed(column_matrix(table, 1 + k), R), col(spins, k)
-        first = double_axial(
-            (
-                sub(scale(x[2], C[1]), scale(x[1], C[2])),
-                sub(scale(x[0], C[2]), scale(x[2], C[0])),
-                sub(scale(x[1], C[0]), scale(x[0], C[1])),
-            )
-        )
-        still = spun(w, P)
-        rate = (add(C[0], still[0]), add(C[1], still[1]), add(C[2], still[2]))
-        trace = rate[0][0] + rate[1][1] + rate[2][2]
-        second = sub(rows_dot(rate, x), scale(trace, x))
+        X, Y = sub(scale(x[2], C[1]), scale(x[1], C[2])), sub(scale(x[0], C[2]), scale(x[2], C[0]))
+        first = double_axial((X, Y, sub(scale(x[1], C[0]), scale(x[0], C[1]))))
+        second = spread_rate(C, P, w, x)
         for l in range(r):
             u = col(spins, l)
             S[6 + k, 6 + l] -= c * dot(first, u)

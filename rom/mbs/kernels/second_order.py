@@ -15,14 +15,24 @@ the mass matrix are exact.
 
 from numba import types
 
-from rom.mbs.kernels.algebra import dot, place, scale, spatial_tangent, sub, vec
+from rom.mbs.kernels.algebra import (
+    contract,
+    dot,
+    place,
+    scale,
+    spatial_tangent,
+    sub,
+    times,
+    trace,
+    vec,
+)
 from rom.mbs.kernels.compiled import inner
-from rom.mbs.kernels.integrals import contract, times, trace
 from rom.mbs.kernels.stages import REAL_BLOCK, REAL_VECTOR, stage
 from rom.mbs.kernels.system import System
 from rom.mbs.kernels.work import Work
 
 REAL_3 = types.UniTuple(types.float64, 3)
+OF_BODY = (types.void, System, Work, types.int64)  # what a stage for one body or marker takes first
 
 
 def has_stiffened(system):
@@ -34,9 +44,7 @@ def has_stiffened(system):
 def bend(bodies, b, x, at, out):
     """Set out to the sum of H_mkl x_l, m its row and k its column."""
     r, row = bodies.r[b], bodies.H_at[bodies.flex[b]]
-    for m in range(r):
-        for k in range(r):
-            out[m, k] = 0.0
+    out[:r, :r] = 0.0
     for l in range(r):
         for m in range(r):
             for k in range(r):
@@ -44,7 +52,7 @@ def bend(bodies, b, x, at, out):
             row += r
 
 
-@stage(types.void, System, Work, types.int64, REAL_VECTOR, REAL_VECTOR, needed=has_stiffened)
+@stage(*OF_BODY, REAL_VECTOR, REAL_VECTOR, needed=has_stiffened)
 def bent_coordinates(s, W, b, q, v):
     """Set W.y, W.yd, and the derivatives of y and yd by q, W.Y and W.Yd."""
     r, at, vt = s.bodies.r[b], s.bodies.q_at[b] + 7, s.bodies.v_at[b] + 6
@@ -69,7 +77,7 @@ def bent_rates(W, b, r, vt, v, a):
         W.ydd[b, m] = total
 
 
-@stage(types.void, System, Work, types.int64, needed=has_stiffened)
+@stage(*OF_BODY, needed=has_stiffened)
 def bent_integrals(s, W, b):
     """Add what no combination of shapes contains to W.SP and W.J (before its trace), set W.T1d."""
     bodies = s.bodies
@@ -122,10 +130,7 @@ def bent_sum(bend, p, x, at, r):
     return a0, a1, a2
 
 
-@stage(
-    *(types.UniTuple(REAL_3, 2), System, Work, types.int64, REAL_VECTOR, REAL_VECTOR),
-    needed=has_stiffened,
-)
+@stage(types.UniTuple(REAL_3, 2), *OF_BODY[1:], REAL_VECTOR, REAL_VECTOR, needed=has_stiffened)
 def bent_motion(s, W, m, q, v):
     """Set W.move to what elastic rates do to a marker; its accelerations of second order."""
     bodies, bend, b = s.bodies, s.markers.bend[m], s.markers.body[m]
@@ -134,10 +139,7 @@ def bent_motion(s, W, m, q, v):
     return bent_sum(bend, 0, v, t, r), bent_sum(bend, 3, v, t, r)
 
 
-@stage(
-    *(types.void, System, Work, types.int64, REAL_3, REAL_3, types.float64, REAL_BLOCK),
-    needed=has_stiffened,
-)
+@stage(*OF_BODY, REAL_3, REAL_3, types.float64, REAL_BLOCK, needed=has_stiffened)
 def bent_wrench_stiffness(s, W, m, f, n, c, S):
     """Stiffness that the force and moment on a marker give to its body, in its block S."""
     bend, theta, r = s.markers.bend[m], vec(W.theta[m], 0), s.bodies.r[s.markers.body[m]]

@@ -43,14 +43,7 @@ class Stage:
     """A kernel with a fixed signature, callable from Python and, once linked, from kernels.
 
     Its first argument is the system. A call in a kernel does nothing, and answers 0, unless some
-    system, or step, of this process needed it.
-
-    Attributes:
-        signature: types of result and arguments.
-        kernel: the compiled function.
-        asked: class of the table that needs it or not.
-        needed: whether such a table does.
-        slot: its place in `STAGE_ADDRESSES`.
+    system, or step, of this process ``needed`` it, a table of the class ``asked``.
     """
 
     def __init__(
@@ -87,12 +80,9 @@ class Stage:
 def stage(
     *types_: Any, asked: type | None = None, needed: Callable[[Any], Any] = _always
 ) -> Callable[[Any], Stage]:
-    """Make a function a stage.
+    """Make a function a stage, of the types of its result and arguments: tables or types of Numba.
 
-    Args:
-        types_: of the result and of the arguments, classes of tables or types of Numba.
-        asked: class of the tables that may need it; None for systems.
-        needed: table -> whether it needs this stage; always unless told.
+    Tables of the class ``asked``, systems unless told, may need it; ``needed`` says if one does.
     """
     return lambda function: Stage(function, types_, asked or types_[1], needed)
 

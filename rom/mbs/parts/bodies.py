@@ -18,8 +18,6 @@ GROUND = "ground"
 SINGULAR_MASS = 1e-11
 SPIN_RTOL = 1e-6  # of an axis, from that about which a body spins, and of a marker on it
 MESHED_RTOL = 1e-3  # the same of a meshed body: gear shafts of 4000 nodes miss 4e-6
-
-
 SURFACE_PREFIX = "surface point "  # markers that a contact puts on the surface of a flexible body
 
 
@@ -106,11 +104,7 @@ class Part:
         return Marker(self.name, (float(point[0]), float(point[1]), float(point[2])))
 
     def point(self, marker: Marker) -> Array:
-        """(3,) undeformed position of a marker in the body frame [m].
-
-        Raises:
-            ConfigError: if the body has no such marker.
-        """
+        """(3,) undeformed position of a marker in the body frame [m]."""
         row = self._surface_row(marker.place)
         if row is not None:
             return np.asarray(self.flexible.surface.points[row], dtype=float)
@@ -124,14 +118,10 @@ class Part:
         return np.asarray(self.flexible.markers[marker.place].point, dtype=float)
 
     def spin_about(self, name: str, axis: Array) -> float:
-        """Angular velocity of the material through the frame about an axis [rad/s].
-
-        Args:
-            name: of the element that asks.
-            axis: (3,) body frame [1].
+        """Angular velocity of the material through the frame about an axis (3,) of it [rad/s].
 
         Raises:
-            ConfigError: if the body spins about another axis.
+            ConfigError: naming the element that asks, if the body spins about another axis.
         """
         speed = float(axis @ self.spin)
         if np.linalg.norm(self.spin - speed * axis) > SPIN_RTOL * np.linalg.norm(self.spin):
@@ -142,11 +132,7 @@ class Part:
         return speed
 
     def refuse_spin(self, what: str, why: str) -> None:
-        """Refuse a body that spins, for what knows nothing of it.
-
-        Raises:
-            ConfigError: saying why.
-        """
+        """Refuse a body that spins, for what knows nothing of it, and say why."""
         if self.spin.any():
             raise ConfigError(
                 f"{what} is of body {self.name!r}, which spins in its frame: {why}.",
@@ -154,11 +140,7 @@ class Part:
             )
 
     def check_on_axis(self, name: str, marker: Marker) -> None:
-        """Refuse to hold a body that spins at a point which goes round with its material.
-
-        Args:
-            name: of what holds it.
-            marker: of this body.
+        """Let nothing, by name, hold a body that spins at a point beside its axis.
 
         Raises:
             ModelError: if the marker lies beside the axis through the mass centre.
@@ -173,12 +155,10 @@ class Part:
             raise ModelError(
                 f"marker {marker.place!r} of body {self.name!r} lies {apart:.4g} m beside the axis "
                 f"about which the body spins, and {name!r} holds it there: with the material it "
-                f"would go round, an unbalance of {self.mass * apart:.4g} kg m that a frame which "
-                "does not turn cannot have.",
+                f"would go round, an unbalance of {self.mass * apart:.4g} kg m.",
                 where=self.name,
-                hint="Let its frame turn: give omega instead of spin. Or put the marker on the "
-                f"axis and give the unbalance as a force that turns, of "
-                f"{self.mass * apart * speed**2:.4g} N at this speed.",
+                hint="Let its frame turn: give omega instead of spin. Or put the marker on "
+                f"the axis and let a force of {self.mass * apart * speed**2:.4g} N turn.",
             )
 
     @property
@@ -237,21 +217,16 @@ def rigid_part(name: str, mass: float, inertia: Array, pose: Any, points: dict[s
             f"{moments[0] + moments[1]:g} kg m^2: no body has this inertia.",
             where=name,
         )
-    _doubt_inertia(name, float(moments[2]), mass, points)
-    second = 0.5 * np.trace(inertia) * np.eye(3) - inertia
-    at, p, velocity, omega = pose
-    return Part(name, mass, np.zeros(3), second, at, p, velocity, omega, points)
-
-
-def _doubt_inertia(name: str, moment: float, mass: float, points: dict[str, Array]) -> None:
-    """Warn if the mass lies far beyond all markers; a marker in its centre says nothing."""
     reach = max((float(np.linalg.norm(x)) for x in points.values()), default=0.0)
-    radius = float(np.sqrt(moment / mass))
-    sizes = f"body {name!r}, {radius:.4g} m over {reach:.4g} m,"
-    if reach > 0.0:
+    radius = float(np.sqrt(moments[2] / mass))
+    if reach > 0.0:  # a marker in the mass centre says nothing
+        sizes = f"body {name!r}, {radius:.4g} m over {reach:.4g} m,"
         warn_outside(GYRATION, radius / reach, sizes)
     else:
         warn_outside(SIZE, radius, f"body {name!r} by its inertia")
+    second = 0.5 * np.trace(inertia) * np.eye(3) - inertia
+    at, p, velocity, omega = pose
+    return Part(name, mass, np.zeros(3), second, at, p, velocity, omega, points)
 
 
 def flexible_part(name: str, body: Any, moving: Any, pose: Any, elastic: Any) -> Part:
@@ -266,7 +241,23 @@ def flexible_part(name: str, body: Any, moving: Any, pose: Any, elastic: Any) ->
     at, p, velocity, omega = pose
     still = name, float(body.mass), first, second, at, p
     part = Part(*still, velocity, omega, {}, body, moving, *elastic)
-    _check_mass(part)
+    M = mass_at_rest(part)
+    if not np.isfinite(M).all() or np.diag(M).min() <= 0.0:
+        raise ModelError(
+            "the mass matrix must be finite, with a positive diagonal.",
+            where=part.name,
+            hint="Reduce the body again; rom.check names what is wrong with one of a file.",
+        )
+    scale = 1 / np.sqrt(np.diag(M))
+    spectrum = np.linalg.eigvalsh(M * scale * scale[:, None])
+    if spectrum[0] < SINGULAR_MASS * spectrum[-1]:
+        raise ModelError(
+            f"the mass matrix of the frame and the {part.r} elastic coordinates is singular "
+            f"(eigenvalue ratio {spectrum[0] / spectrum[-1]:.2g}): a rigid motion was left in the "
+            "elastic shapes, which the floating frame already describes.",
+            where=part.name,
+            hint="Give the body a reference condition: body.with_reference('mean-axis').",
+        )
     return part
 
 
@@ -289,26 +280,6 @@ def moving_start(part: Part) -> tuple[Array, Array]:
         at = part.at - A @ shift
         velocity = part.velocity - A @ (np.cross(omega, shift) + slip)
     return np.r_[at, p, part.q], np.r_[velocity, omega, part.qd]
-
-
-def _check_mass(part: Part) -> None:
-    M = mass_at_rest(part)
-    if not np.isfinite(M).all() or np.diag(M).min() <= 0.0:
-        raise ModelError(
-            "the mass matrix must be finite, with a positive diagonal.",
-            where=part.name,
-            hint="Reduce the body again; rom.check names what is wrong with one of a file.",
-        )
-    scale = 1 / np.sqrt(np.diag(M))
-    spectrum = np.linalg.eigvalsh(M * scale * scale[:, None])
-    if spectrum[0] < SINGULAR_MASS * spectrum[-1]:
-        raise ModelError(
-            f"the mass matrix of the frame and the {part.r} elastic coordinates is singular "
-            f"(eigenvalue ratio {spectrum[0] / spectrum[-1]:.2g}): a rigid motion was left in the "
-            "elastic shapes, which the floating frame already describes.",
-            where=part.name,
-            hint="Give the body a reference condition: body.with_reference('mean-axis').",
-        )
 
 
 def mass_at_rest(part: Part) -> Array:

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from rom.arguments import shortened
 from rom.errors import ConfigError, RomError, SolverError
 from rom.model import Array
 
@@ -20,13 +21,7 @@ KEPT_HINT = "The motion up to there is kept in error.solution."
 
 
 def ask(what: str, t: float, function: Callable[..., Any], *arguments: Any) -> Any:
-    """What a function of the user answers.
-
-    Args:
-        what: its name in the mechanism, e.g. ``user force 'drag'``.
-        t: time it is asked for [s].
-        function: to be called.
-        arguments: of the function.
+    """What a function of the user, by its name in the mechanism, answers at a time [s].
 
     Raises:
         ConfigError: if it does not take these arguments.
@@ -45,23 +40,13 @@ def ask(what: str, t: float, function: Callable[..., Any], *arguments: Any) -> A
         raise _failure(what, t, error) from error
 
 
-def why_not_compiled(error: Exception) -> str:
-    """The line in which Numba says what it cannot compile."""
-    lines = (line.strip() for line in str(error).splitlines())
-    return next((x for x in lines if x and not x.startswith("Failed in")), type(error).__name__)
-
-
 def compiled_function(
     what: str, law: Any, make: Callable[[Any], Any], wanted: bool | None, hint: str
 ) -> Any:
     """What ``make`` compiles a function of the user to; None when it is left to Python.
 
-    Args:
-        what: its name, e.g. ``law of motor 'servo'``.
-        law: a function, or one of Numba.
-        make: compiles a plain function.
-        wanted: True to insist, False to leave it to Python, None for what works.
-        hint: what it may be made of.
+    True to insist, False to leave it to Python, None for what works; the hint says what it may be
+    made of.
 
     Raises:
         ConfigError: if it must be compiled and cannot be.
@@ -76,19 +61,14 @@ def compiled_function(
     except Exception as error:  # Numba raises errors of many kinds for what it cannot compile
         if not wanted:
             return None
-        why = why_not_compiled(error)
+        lines = (line.strip() for line in str(error).splitlines())
+        told = (line for line in lines if line and not line.startswith("Failed in"))
+        why = next(told, type(error).__name__)
         raise ConfigError(f"{what} cannot be compiled: {why}", hint=hint) from error
 
 
 def numbers(what: str, t: float, value: Any, shape: tuple[int, ...], needed: str) -> Array:
-    """The answer as finite numbers.
-
-    Args:
-        what: name of the function.
-        t: time of the answer [s].
-        value: the answer.
-        shape: it must have.
-        needed: what that is in words.
+    """The answer of a function at a time [s] as finite numbers of a shape, which ``needed`` words.
 
     Raises:
         ConfigError: if it is made of something else, or has another shape.
@@ -105,7 +85,8 @@ def real(what: str, t: float, value: Any, shape: tuple[int, ...], needed: str) -
     A = _floats(value)
     if A is None or A.size != math.prod(shape) or (len(shape) > 1 and A.shape[0] != shape[0]):
         raise ConfigError(
-            f"{what} returned {_short(value)} at t = {t:.9g} s; needed is {needed}.", hint=KEPT_HINT
+            f"{what} returned {shortened(value)} at t = {t:.9g} s; needed is {needed}.",
+            hint=KEPT_HINT,
         )
     return A.reshape(shape)
 
@@ -119,11 +100,6 @@ def _floats(value: Any) -> Array | None:
         return A.astype(float) if A.dtype.kind in "biuf" else None
     except (TypeError, ValueError, OverflowError):
         return None
-
-
-def _short(value: Any) -> str:
-    text = " ".join(repr(value).split())
-    return text if len(text) <= 80 else f"{text[:77]}..."
 
 
 def _failure(what: str, t: float, error: BaseException) -> RomError:

@@ -1,14 +1,14 @@
 """What a joint is: scalar constraints between two markers, and the coordinates it leaves."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal, Protocol
 
 import numpy as np
 
 from rom.errors import ConfigError
 from rom.mbs.kernels.system import ALONG, ANGLE, NORMAL, POINT
-from rom.mbs.parts.bodies import Marker
+from rom.mbs.parts.bodies import Marker, Part
 from rom.model import Array
 from rom.names import offered
 
@@ -99,25 +99,17 @@ def coincidence() -> tuple[Row, ...]:
 
 
 def joint_with_axis(joints: Mapping[str, Joint], joint: str, what: str) -> Joint:
-    """The joint of a name, which must have a coordinate.
-
-    Raises:
-        ConfigError: if it is unknown, or has none.
-    """
+    """The joint of a name, which must have a coordinate."""
     coordinate_of(joints, joint, None, what)
     return joints[joint]
 
 
 def coordinate_of(joints: Mapping[str, Joint], joint: str, which: str | None, what: str) -> Row:
-    """The row of the coordinate "angle" or "displacement" of a joint; None for the first.
-
-    Raises:
-        ConfigError: if the joint is unknown, or has no such coordinate.
-    """
+    """The row of the coordinate "angle" or "displacement" of a joint; None for the first."""
     if joint not in joints:
         raise ConfigError(f"{what}: no joint {joint!r}; there are {offered(joints, joint)}.")
-    names: dict[str | None, str] = dict.fromkeys(("displacement", "way"), "displacement")
-    names |= {None: "coordinate", "angle": "turn"}
+    names = {None: "coordinate", "angle": "turn", "displacement": "displacement"}
+    names["way"] = "displacement"
     if which not in names:
         raise ConfigError(f"coordinate {which!r} of {joint!r} must be 'angle' or 'displacement'.")
     row: Row | None = getattr(joints[joint], names[which])
@@ -129,3 +121,43 @@ def coordinate_of(joints: Mapping[str, Joint], joint: str, which: str | None, wh
             hint=f"Joints that have one: {offered(able, joint)}.",
         )
     return row
+
+
+class Whole(Protocol):
+    """A `rom.mbs.mechanism.Mechanism`, whose methods the functions on it become.
+
+    Attributes:
+        parts, joints, drives: {name: body, joint or drive}.
+        elements: {name: (family, element)}.
+    """
+
+    parts: dict[str, Part]
+    joints: dict[str, Joint]
+    drives: dict[str, Any]
+    elements: dict[str, tuple[Any, Any]]
+
+    @property
+    def spherical(self) -> Callable[[str, Marker, Marker], None]:
+        """Make a ball joint."""
+
+    @property
+    def law(self) -> Callable[..., None]:
+        """Add a law of force, see `rom.mbs.elements.laws.law`."""
+
+    def add(self, name: str, element: Any, family: Any) -> None:
+        """Enter an element."""
+
+    def part(self, name: str) -> Part:
+        """The body of a name."""
+
+    def design_point(self, marker: Marker) -> Array:
+        """(3,) position of a marker where its body was added."""
+
+    def check_new(self, name: str) -> None:
+        """Refuse a name in use."""
+
+    def check_markers(self, name: str, *markers: Marker) -> None:
+        """Refuse markers that do not exist."""
+
+    def check_apart(self, name: str, m1: Marker, m2: Marker) -> None:
+        """Refuse such markers, or both of one body."""

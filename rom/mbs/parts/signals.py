@@ -6,9 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from rom.errors import RomError, SolverError
+from rom.errors import ModelError, RomError, SolverError, warn
 from rom.mbs.parts.foreign import KEPT_HINT, ask, real
-from rom.mbs.parts.jumps import Examined
 from rom.model import Array
 
 # a function of time (numbers and arrays) with its rate and acceleration
@@ -22,6 +21,165 @@ BACKWARD_WEIGHTS = np.array([[3.0, -16.0, 36.0, -48.0, 25.0], [11.0, -56.0, 114.
 # weights of f(t - 2 s), ... f(t + 2 s), fourth order
 CENTRAL_WEIGHTS = np.array([[1.0, -8.0, 0.0, 8.0, -1.0], [-1.0, 16.0, -30.0, 16.0, -1.0]])
 NO_SAMPLES = np.zeros((0, 0, 3))
+
+
+MAX_INTERVALS = 4096  # in one pass
+FEW_INTERVALS = 8  # at least
+N_SUSPECTS = 4  # sharpest places that are looked at closely
+JUMP_WIDTH_RTOL = 1e-9  # of the time looked at: both sides of a jump of the value
+TIME_RTOL = 1e-15  # of a time, below which two times are one
+DIFFERENCE_SPACING = 1e-4  # of an interval: points of a difference quotient
+ROUND_OFF = 2e-12  # of value over rate: they lie further apart than that, or say nothing
+NO_MOTION = 1e-15  # a jump [rad or m] smaller than any body: differences of numbers about one
+SMALL_JUMP = 1e-6  # of the range of the values so far, that no reaction shows
+VALUE_RTOL = 1e-12  # of the largest value
+SMALL_KINK = 1e-2  # of the largest rate so far
+RATE_RTOL = 0.05  # of the largest rate: difference of a given rate from that of the value
+Function = Callable[[Array], Array]
+
+
+@dataclass(frozen=True, slots=True)
+class Jump:
+    """Where a function of time jumps: just behind it [s], and the values on both sides."""
+
+    t: float
+    before: float
+    after: float
+
+    @property
+    def size(self) -> float:
+        """Difference of the values."""
+        return self.after - self.before
+
+    def __str__(self) -> str:
+        ends = f"from {self.before:.6g} to {self.after:.6g}"
+        return f"jumps by {self.size:.4g} at t = {self.t:.9g} s, {ends}"
+
+
+def largest_jump(f: Function, t: Array, width: float, small: float) -> Jump | None:
+    """The largest jump of a function of times (n,), equally spaced; None if it is continuous.
+
+    Intervals are halved down to a width [s]; jumps below a small size do not count.
+    """
+    values = f(t)
+    if not np.isfinite(values).all() or np.ptp(values) <= small:
+        return None
+    bend = np.abs(np.diff(values, 2))  # what a straight line does not explain
+    inner = np.argsort(bend)[::-1][:N_SUSPECTS]
+    places = {int(k) for j in inner if bend[j] > 0.1 * small for k in (j, j + 1)}
+    halves = (_halved(f, t[k], t[k + 1], width) for k in sorted(places))
+    found = [
+        Jump(float(b), *map(float, f(np.clip([a - width, b + width], t[0], t[-1]))))
+        for a, b in halves  # with what surrounds them
+    ]
+    jumps = [jump for jump in found if abs(jump.size) > max(small, 0.1 * bend.max(initial=0.0))]
+    return max(jumps, key=lambda jump: abs(jump.size), default=None)
+
+
+def _halved(f: Function, a: float, b: float, width: float) -> tuple[float, float]:
+    """The steeper half of the steeper half ... of an interval."""
+    before, after = f(np.array([a, b]))
+    while b - a > width and a < (middle := 0.5 * (a + b)) < b:
+        value = f(np.array([middle]))[0]
+        if abs(after - value) > abs(value - before):
+            a, before = middle, value
+        else:
+            b, after = middle, value
+    return float(a), float(b)
+
+
+@dataclass
+class Examined:
+    """A drive and what was found in it so far; never asked for times that the run has not reached.
+
+    It was looked at from ``start`` ``until`` a time [s], where its values and rates reach so far;
+    ``doubted`` once a doubt was said; ``end`` is when it stops to be a motion, and why.
+    """
+
+    name: str
+    function: Function
+    rate: Function | None
+    start: float
+    until: float = field(init=False)
+    low: float = np.inf
+    high: float = -np.inf
+    top: float = 0.0
+    doubted: bool = False
+    end: tuple[float, ModelError] | None = None
+
+    def __post_init__(self) -> None:
+        self.until = self.start
+
+    def up_to(self, time: float, spacing: float) -> tuple[float, ModelError] | None:
+        """Look on to a time by intervals of a spacing [s], warn of kinks; returns ``end``."""
+        if self.end is None and time > self.until:
+            first = max(self.start, self.until - spacing)
+            n = int(np.clip(np.ceil((time - first) / spacing), FEW_INTERVALS, MAX_INTERVALS))
+            t = np.linspace(first, time, n + 1)
+            values = self.function(t)
+            if np.isfinite(values).all():
+                self.until = time
+                self._look_at(t, values)
+        return self.end
+
+    def _look_at(self, t: Array, values: Array) -> None:
+        self.low, self.high = min(self.low, values.min()), max(self.high, values.max())
+        largest = max(abs(self.low), abs(self.high))
+        small = max(SMALL_JUMP * (self.high - self.low), VALUE_RTOL * largest, NO_MOTION)
+        width = max(JUMP_WIDTH_RTOL * (t[-1] - t[0]), TIME_RTOL * float(np.abs(t).max()))
+        jump = largest_jump(self.function, t, width, small)
+        if jump is not None:
+            refusal = ModelError(
+                f"drive {self.name!r} {jump}: the bodies would need infinite velocity.",
+                hint="Let it move there over several steps, or release a spring instead. The "
+                "motion up to there is kept in error.solution.",
+            )
+            self.end = jump.t, refusal
+        elif not self.doubted:
+            self._look_at_rate(t, largest)
+
+    def _look_at_rate(self, t: Array, largest: float) -> None:
+        interval = t[1] - t[0]
+        quotient = _quotient(self.function, (self.start, t[-1]), DIFFERENCE_SPACING * interval)
+        speed = quotient if self.rate is None else self.rate
+        values = speed(t)
+        self.top = max(self.top, float(np.abs(values).max()))
+        if not np.isfinite(values).all() or DIFFERENCE_SPACING * interval * self.top < max(
+            ROUND_OFF * largest, NO_MOTION
+        ):
+            return
+        kink = largest_jump(speed, t, 4 * DIFFERENCE_SPACING * interval, SMALL_KINK * self.top)
+        doubt = kink and (
+            f"the velocity of drive {self.name!r} {kink}: the reactions there are those of an "
+            "impact, and depend on the time step. Round the corner over several steps."
+        )
+        if self.rate is not None and not doubt:
+            doubt = _contradiction(self.name, t, values, quotient(t))
+        warn(doubt or "")
+        self.doubted = bool(doubt)
+
+
+def _quotient(function: Function, span: tuple[float, float], apart: float) -> Function:
+    """Difference quotient of a function that is asked within its span only."""
+
+    def rate(t: Array) -> Array:
+        ends = np.clip(t - apart, *span), np.clip(t + apart, *span)
+        low, high = (function(end) for end in ends)
+        return (high - low) / (ends[1] - ends[0])
+
+    return rate
+
+
+def _contradiction(name: str, t: Array, given: Array, found: Array) -> str:
+    miss = np.abs(given - found)
+    k = int(np.argmax(miss))
+    if miss[k] <= RATE_RTOL * max(np.abs(found).max(), np.abs(given).max()):
+        return ""
+    return (
+        f"the rate given for drive {name!r} is {given[k]:.4g} at t = {t[k]:.6g} s, where its "
+        f"value changes by {found[k]:.4g} per second: joint and velocity contradict each "
+        "other. Check signs and units of the rate."
+    )
 
 
 @dataclass(frozen=True)
@@ -46,10 +204,7 @@ class Signal:
     def end(self, span: Span, time: float, spacing: float) -> tuple[float, RomError] | None:
         """When a drive stops to be a motion [s], and the error; None if it does not.
 
-        Args:
-            span: no time before the first or after the second one is asked for.
-            time: up to which to look [s].
-            spacing: of the times that are looked at [s].
+        Up to a time, at times a spacing [s] apart; within the span alone it is asked.
         """
         if self.width == 3:
             return None
@@ -62,15 +217,9 @@ class Signal:
         return lambda t: self._values(function, t)[:, 0]
 
     def sample(self, t: Array, span: Span, spacing: float) -> Array:
-        """Value, rate and acceleration of a drive, or the vectors of a load.
+        """(n, 3) value [m or rad] of a drive and its rates, or force [N] or moment [N m].
 
-        Args:
-            t: (n,) times [s].
-            span: no time before the first or after the second one is asked for.
-            spacing: of the finite differences for missing derivatives [s].
-
-        Returns:
-            (n, 3): value [m or rad] and its rates per second, or force [N] or moment [N m].
+        At times (n,) within a span, with differences of a spacing [s] for missing derivatives.
         """
         t = np.clip(t, *span)
         if self.width == 3:
@@ -129,11 +278,6 @@ def drive_signal(name: str, drive: Any) -> Signal:
     return Signal(name, drive.function, drive.rate, drive.acceleration)
 
 
-def clock_signal() -> Signal:
-    """The time itself, for laws that ask for it."""
-    return Signal("clock", lambda t: t, lambda t: 1.0 + 0.0 * t, lambda t: 0.0 * t)
-
-
 def transition(low: float, high: float, duration: float, start: float = 0.0) -> Motion:
     """From one value to another on a cycloid, in a time [s] from a start [s] on.
 
@@ -176,15 +320,9 @@ def sampled(
 ) -> tuple[Array, RomError | None]:
     """(k, s, 3) all signals at the times before the first one at which one of them fails.
 
-    Args:
-        signals: drives and loads.
-        t: (n,) ascending times.
-        span: first and last time of the run.
-        spacing: of finite differences [s].
-        step: of the run [s], to look through drives for jumps; None where that has been done.
-
-    Returns:
-        Their values, and the error of the failure; None if k is the number of times.
+    With the error of the failure; None if k is the number of times. They are asked within the
+    span of the run, by differences of a spacing [s], and looked through for jumps by its step [s],
+    None where that has been done.
     """
     try:
         table = sample_all(signals, t, span, spacing)
@@ -222,12 +360,8 @@ def first_failure(
 ) -> tuple[int, RomError]:
     """Number of good instants before the first one that is no motion, and its error.
 
-    Args:
-        signals: drives and loads.
-        t: (n,) ascending times.
-        table: (n, s, 3) their samples.
-        span: first and last time of the run; drives are looked through for jumps if it is finite.
-        spacing: of the steps of the run [s].
+    Of samples (n, s, 3) at ascending times (n,). Drives are looked through for jumps by steps of a
+    spacing [s] if the span of the run is finite.
     """
     bad = ~np.isfinite(table).all(axis=2)
     asked = signals if np.isfinite(span).all() else ()

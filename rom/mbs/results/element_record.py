@@ -1,15 +1,15 @@
-"""What a single force element does along a motion, evaluated again at its instants."""
+"""What a single force element, or law of the user, does along a motion: asked again."""
 
-from dataclasses import dataclass
-from typing import Any, NamedTuple
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from rom.errors import ConfigError
-from rom.mbs.elements.family import Family, Places
+from rom.mbs.elements.family import Family, Places, apply_laws
+from rom.mbs.elements.law_calls import answer_of
 from rom.mbs.elements.laws import LAWS_FAMILY
 from rom.mbs.equations.equations import element_energy
-from rom.mbs.equations.python_laws import apply_laws
 from rom.mbs.kernels.compiled import copy, inner, kernel
 from rom.mbs.kernels.element_calls import residuals
 from rom.mbs.kernels.system import ALONG
@@ -17,11 +17,9 @@ from rom.mbs.kernels.work import workspace
 from rom.mbs.parts.bodies import Marker
 from rom.mbs.parts.joints import Row
 from rom.mbs.parts.signals import sample_all
-from rom.mbs.results.interface_loads import at_instants
-from rom.mbs.results.law_record import law_record
-from rom.mbs.results.recomputed import evaluate_at
+from rom.mbs.results.recomputed import at_instants, evaluate_at
 from rom.model import Array, Index
-from rom.names import offered
+from rom.names import check_known
 
 INSTANT_SPACING = 1e-6  # of differences of drives about a single instant [s]
 
@@ -54,15 +52,54 @@ class ElementRecord:
     lost: Array
 
 
-def element_record(solution: Any, name: str) -> ElementRecord:
-    """Evaluate one element along a motion.
+@dataclass(frozen=True)
+class LawRecord:
+    """One law over time.
 
-    Raises:
-        ConfigError: if there is no such element, or it acts on no markers.
+    Attributes:
+        t: (n_t,) times [s].
+        force, moment: (n_t, K, 3) on each of its markers, about it, world [N, N m].
+        energy: (n_t,) stored [J]; lost: (n_t,) power turned into heat [W].
+        memory: (n_t, m) what it remembers.
+        outputs: {name: (n_t,)} its own outputs; they and the losses follow from what it remembered
+            at the saved instant before.
     """
+
+    t: Array
+    force: Array
+    moment: Array
+    energy: Array
+    lost: Array
+    memory: Array
+    outputs: dict[str, Array]
+
+
+def law_record(solution: Any, name: str) -> LawRecord:
+    """Ask a law again at all instants of a motion."""
+    law = solution.mechanism.laws[name]
+    table = solution.packed.elements[LAWS_FAMILY]
+    e = list(solution.mechanism.families()[LAWS_FAMILY]).index(name)
+    mine = slice(*table.answer_at[e : e + 2])
+    c, base = solution.packed.system.coordinates.kind.size, solution.base.copy()
+    base[1:, c:] = solution.base[:-1, c:]
+    n, m, _ = law.sizes
+    force, moment, energy, _, memory, _ = _said(solution, table, mine, (n, m))
+    _, _, _, lost, _, outputs = _said(replace(solution, base=base), table, mine, (n, m))
+    own = dict(zip(law.outputs, outputs.T, strict=True))
+    return LawRecord(solution.t, force, moment, energy[:, 0], lost[:, 0], memory, own)
+
+
+def _said(solution: Any, table: Any, mine: slice, sizes: tuple[int, int]) -> list[Array]:
+    """The fields of the answers at all instants."""
+    rows = [table.answer[mine].copy() for _ in at_instants(solution)]
+    answers = (answer_of(row, *sizes) for row in rows)
+    return [np.array(field) for field in zip(*answers, strict=True)]
+
+
+def element_record(solution: Any, name: str) -> ElementRecord:
+    """Evaluate one element along a motion."""
     mechanism = solution.mechanism
-    if name not in mechanism.elements:
-        raise ConfigError(f"no element {name!r}; there are {offered(mechanism.elements, name)}.")
+    check_known(name, mechanism.elements, f"no element {name!r}; there are")
     family, element = mechanism.elements[name]
     markers = markers_of(mechanism, family, element)
     if not markers:
@@ -98,43 +135,31 @@ def _alone(solution: Any, name: str, markers: tuple[Marker, ...], rows: Index) -
     row = coordinate_row(solution.mechanism, element)
     c = -1 if row is None else places.coordinate(element.joint, row)
     n = solution.t.size
-    found = ElementTracks(*(np.zeros(x) for x in ((n, rows.size, 6), (n, rows.size, 3), (n, 3))))
+    # wrenches and positions of the markers; energy, power lost, force along the joint coordinate
+    found = tuple(np.zeros(x) for x in ((n, rows.size, 6), (n, rows.size, 3), (n, 3)))
     base = places.before(solution.base)
     motion = (solution.q, solution.v, solution.lam, base, signals)
     for k in range(n) if asked else ():
         answered = tuple(x[k : k + 1] for x in motion)
         evaluate_at(system, W, solution.q[k], solution.v[k], base[k], signals[k])
         apply_laws(asked, W, float(solution.t[k]))
-        track_element(system, W, answered, rows, c, ElementTracks(*(x[k : k + 1] for x in found)))
+        track_element(system, W, answered, rows, c, tuple(x[k : k + 1] for x in found))
     if not asked:
         track_element(system, W, motion, rows, c, found)
-    force, moment = found.wrench[..., :3], found.wrench[..., 3:]
-    energy, lost, along = found.scalars.T
+    (wrench, position, scalars), unit = found, "N" if row is None or row.kind == ALONG else "N m"
+    force, moment, (energy, lost, along) = wrench[..., :3], wrench[..., 3:], scalars.T
     if row is None:
-        forces = force, moment, pull(found.position, force), "N", False
+        forces = force, moment, pull(position, force), unit, False
     else:
-        forces = force, moment, along, "N" if row.kind == ALONG else "N m", True
+        forces = force, moment, along, unit, True
     return ElementRecord(solution.t, markers, *forces, energy, lost)
-
-
-class ElementTracks(NamedTuple):
-    """One row per instant.
-
-    Attributes:
-        wrench: (n_t, K, 6) on the markers of the element.
-        position: (n_t, K, 3) of them.
-        scalars: (n_t, 3) stored energy, power lost, force along the joint coordinate.
-    """
-
-    wrench: Array
-    position: Array
-    scalars: Array
 
 
 @kernel
 def track_element(s, W, motion, rows, c, out):
     """Fill the tracks of a system of one element, which acts along coordinate c if there is one."""
     Q, V, L, base, signals = motion
+    wrench, position, scalars = out
     for k in range(Q.shape[0]):
         evaluate_at(s, W, Q[k], V[k], base[k], signals[k])
         W.wrench[:] = 0.0
@@ -142,13 +167,13 @@ def track_element(s, W, motion, rows, c, out):
         W.driven[0] = 0.0
         for e in range(s.elements.shape[0]):
             residuals(s, e, W, Q[k], V[k], L[k])
-        out.scalars[k, 0] = element_energy(s, W, Q[k], V[k])
-        out.scalars[k, 1] = W.power[2]
+        scalars[k, 0] = element_energy(s, W, Q[k], V[k])
+        scalars[k, 1] = W.power[2]
         for m in range(rows.size):
-            copy(W.wrench[rows[m]], out.wrench[k, m])
-            copy(W.P[rows[m]], out.position[k, m])
+            copy(W.wrench[rows[m]], wrench[k, m])
+            copy(W.P[rows[m]], position[k, m])
         if c >= 0:
-            out.scalars[k, 2] = along_coordinate(out.wrench[k], W.xg[c])
+            scalars[k, 2] = along_coordinate(wrench[k], W.xg[c])
 
 
 @inner

@@ -1,15 +1,20 @@
-"""Quantities along a motion, evaluated again from coordinates and velocities."""
+"""Quantities and loads along a motion, evaluated again from coordinates and velocities."""
 
+from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from rom.mbs.equations.equations import element_energy, evaluate
-from rom.mbs.kernels.algebra import add, cross, mtv, mv, put, scale, vec
+from rom import rotation
+from rom.mbs.elements.family import apply_laws
+from rom.mbs.equations.equations import element_energy, evaluate, residual
+from rom.mbs.kernels.algebra import add, cross, dual, mtv, mv, put, scale, vec
 from rom.mbs.kernels.compiled import copy, inner, kernel
 from rom.mbs.kernels.inertia import body_energy
-from rom.mbs.kernels.integrals import dual
-from rom.mbs.kernels.work import workspace
+from rom.mbs.kernels.work import Work, workspace
+from rom.mbs.parts.bodies import GROUND
+from rom.mbs.parts.joints import Joint, Row
 from rom.model import Array
 
 
@@ -86,3 +91,85 @@ def body_momentum(bodies, W, b, q, v, out):
     p = mv(A, linear)
     put(out, 0, p)
     put(out, 3, add(mv(A, angular), cross(vec(q, bodies.q_at[b]), p)))
+
+
+def at_instants(solution: Any) -> Iterator[Work]:
+    """The memory after the equations of motion were evaluated at each instant, one by one."""
+    packed, system = solution.packed, solution.packed.seen
+    W, forces = workspace(system, len(packed.signals)), packed.asked
+    rows = zip(
+        *(solution.t, solution.q, solution.v, solution.a, solution.lam),
+        *(solution.signals, packed.places.before(solution.base)),
+        strict=True,
+    )
+    for t, q, v, a, lam, signals, base in rows:
+        evaluate_at(system, W, q, v, base, signals)
+        apply_laws(forces, W, float(t))
+        residual(system, W, q, v, a, lam)
+        yield W
+
+
+def of_body(solution: Any, body: str, wrench: Array, frame: str) -> dict[Any, Array]:
+    """{place: (n_t, 6)} loads on the markers of one body that carry any, in the axes asked for."""
+    turned, found = frame == "body" and body != GROUND, {}
+    axes: Any = rotation.matrix(solution.orientation(body).T) if turned else None
+    for marker, k in solution.packed.markers.items():
+        if marker.body == body and wrench[:, k].any():
+            both = wrench[:, k].reshape(-1, 2, 3)
+            if turned:
+                both = np.einsum("ban,nsb->nsa", axes, both)
+            found[marker.place] = both.reshape(-1, 6)
+    return found
+
+
+@dataclass(frozen=True)
+class JointMotion:
+    """The coordinates of one joint over time, zero as it was described; None what it has not.
+
+    Attributes:
+        t: (n_t,) times [s].
+        angle: (n_t,) by which the second body has turned against the first about the axis,
+            whole turns counted from the first instant [rad].
+        angle_rate: (n_t,) its rate [rad/s].
+        displacement: (n_t,) of the second body along the axis [m].
+        displacement_rate: (n_t,) its rate [m/s].
+    """
+
+    t: Array
+    angle: Array | None
+    angle_rate: Array | None
+    displacement: Array | None
+    displacement_rate: Array | None
+
+
+def joint_motion(t: Array, joint: Joint, one: Any, two: Any) -> JointMotion:
+    """Measure a joint again, from the `rom.mbs.results.recomputed.Tracks` of its markers."""
+    angle = (None, None) if joint.turn is None else angles(joint.turn, t, one, two)
+    slide = joint.displacement
+    displacement = (None, None) if slide is None else displacements(slide, one, two)
+    return JointMotion(t, *angle, *displacement)
+
+
+def angles(row: Row, t: Array, one: Any, two: Any) -> tuple[Array, Array]:
+    """(n_t,) angle of b seen in the axes a and c, and its rate.
+
+    Between two instants the angle changes by what the trapezoidal rule makes of the rates, to less
+    than half a turn; that is how turns are counted.
+    """
+    a, c, b = one.axes @ row.a, one.axes @ row.c, two.axes @ row.b
+    x, y = (a * b).sum(1), (c * b).sum(1)
+    axis = np.cross(b, x[:, None] * c - y[:, None] * a) / (x * x + y * y)[:, None]
+    rate = (axis * (two.twist[:, 3:] - one.twist[:, 3:])).sum(1)
+    angle = np.arctan2(y, x) - row.offset
+    order = np.argsort(t, kind="stable")
+    expected = 0.5 * np.diff(t[order]) * (rate[order][1:] + rate[order][:-1])
+    turns = np.cumsum(np.round((expected - np.diff(angle[order])) / (2 * np.pi)))
+    angle[order[1:]] += 2 * np.pi * turns
+    return angle, rate
+
+
+def displacements(row: Row, one: Any, two: Any) -> tuple[Array, Array]:
+    """(n_t,) distance along the axis a, which the first body carries, and its rate."""
+    a, gap = one.axes @ row.a, two.position - one.position
+    slide, turn = two.twist[:, :3] - one.twist[:, :3], np.cross(one.twist[:, 3:], a)
+    return (a * gap).sum(1) - row.offset, (a * slide + turn * gap).sum(1)

@@ -17,15 +17,25 @@ from rom.mbs.mechanism import Mechanism
 from rom.mbs.parts.bodies import Marker
 from rom.mbs.parts.joints import joint_with_axis
 from rom.mbs.parts.signals import sample_all
-from rom.mbs.results.element_record import ElementRecord, element_record, markers_of
-from rom.mbs.results.interface_loads import marker_loads, of_body
+from rom.mbs.results.element_record import (
+    ElementRecord,
+    LawRecord,
+    element_record,
+    law_record,
+    markers_of,
+)
 from rom.mbs.results.interpolation import Point, between
-from rom.mbs.results.joint_motion import JointMotion, joint_motion
-from rom.mbs.results.law_record import LawRecord, law_record
-from rom.mbs.results.recomputed import Tracks, follow
+from rom.mbs.results.recomputed import (
+    JointMotion,
+    Tracks,
+    at_instants,
+    follow,
+    joint_motion,
+    of_body,
+)
 from rom.mbs.results.state import State
 from rom.model import Array
-from rom.names import check_known, offered
+from rom.names import check_known
 from rom.notebook import html_table, listed
 from rom.rotation import continuous, matrix, quaternion
 
@@ -306,13 +316,8 @@ class Solution(Columns, metaclass=Open, kind="columns", bound=typed):
             >>> round(float(sol.reaction("hook")[-1, 2]), 6)  # its weight
             19.62
         """
-        rows = self.packed.rows_of(name)
-        if not rows.size:
-            raise ConfigError(
-                f"no joint or drive {name!r}; there are "
-                f"{offered(set(self.packed.row_owner), name)}."
-            )
-        return self._follow(rows=rows).reaction
+        check_known(name, set(self.packed.row_owner), f"no joint or drive {name!r}; there are")
+        return self._follow(rows=self.packed.rows_of(name)).reaction
 
     def joint(self, name: str) -> JointMotion:
         """Angle and displacement of a joint over time, with their rates.
@@ -361,8 +366,7 @@ class Solution(Columns, metaclass=Open, kind="columns", bound=typed):
         Raises:
             ConfigError: for a name that no law has.
         """
-        if name not in self.mechanism.laws:
-            raise ConfigError(f"no law {name!r}; there are {offered(self.mechanism.laws, name)}.")
+        check_known(name, self.mechanism.laws, f"no law {name!r}; there are")
         return law_record(self, name)
 
     def element(self, name: str) -> ElementRecord:
@@ -381,7 +385,8 @@ class Solution(Columns, metaclass=Open, kind="columns", bound=typed):
 
     @cached_property
     def _marker_loads(self) -> Array:
-        return marker_loads(self)
+        """(n_t, k, 6) force [N] and moment [N m] of all that acts on each marker, world."""
+        return np.array([W.wrench.copy() for W in at_instants(self)])
 
     @cached_property
     def energy(self) -> Energy:

@@ -8,6 +8,7 @@ from numba import njit
 from scipy.integrate import solve_ivp
 from scipy.linalg import block_diag, eigh
 
+from rom import rotation
 from rom.body.flexible import FlexibleBody
 from rom.body.records import Marker
 from rom.body.stiffening import elastic_loads, known_loads
@@ -70,6 +71,25 @@ def nodal_body(x, Ms, phi, K=None, D=None, markers=None, name="body"):
     )
 
 
+def nodal_residual(nodes, psi, state, a, gravity):
+    """Equations of motion of nodes at x + phi q + psi q q / 2, by d'Alembert's principle."""
+    x, Ms, phi, K, D = nodes
+    q, qd, p, w = state
+    A, r, n = rotation.matrix(p), len(phi), len(x)
+    shape = phi + np.einsum("klia,l->kia", psi, q)
+    P = x + np.einsum("k,kia->ia", q, 0.5 * (phi + shape))
+    Pd = np.einsum("k,kia->ia", qd, shape)
+    J = np.zeros((3 * n, 6 + r))
+    for i in range(n):
+        J[3 * i : 3 * i + 3, :3], J[3 * i : 3 * i + 3, 6:] = np.eye(3), A @ shape[:, i].T
+        J[3 * i : 3 * i + 3, 3:6] = -A @ rotation.skew(P[i])
+    curved = np.einsum("klia,k,l->ia", psi, qd, qd)
+    conv = (np.cross(w, np.cross(w, P)) + 2 * np.cross(w, Pd) + curved) @ A.T
+    found = J.T @ np.kron(Ms, np.eye(3)) @ (J @ a + conv.ravel() - np.tile(gravity, n))
+    found[6:] += K @ q + D @ qd
+    return found
+
+
 def random_nodes(rng, n=7, r=4):
     """Nodes, scalar mass with off-diagonal entries, shapes, stiffness, damping."""
     x, phi = rng.normal(size=(n, 3)), 0.3 * rng.normal(size=(r, n, 3))
@@ -102,6 +122,16 @@ def random_pose(rng):
         "velocity": rng.normal(size=3),
         "omega": rng.normal(size=3),
     }
+
+
+def two_soft(rng, gravity=(0, 0, 0), *, damped=True, stiffened=False):
+    """A mechanism of two flexible bodies, anywhere and in any motion, and both of them."""
+    mech = Mechanism(gravity=gravity)
+    bodies = (("one", {"stiffened": stiffened}), ("two", {"r": 3}))
+    return mech, *(
+        mech.add_flexible(name, random_body(rng, damped=damped, **kind), **random_pose(rng))
+        for name, kind in bodies
+    )
 
 
 def random_state(rng, packed):

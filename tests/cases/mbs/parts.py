@@ -25,6 +25,32 @@ def on_hinge(mech, at, name="bob", *, mass=2.0, inertia, axis=Y, pivot=None, **m
     return part
 
 
+def on_axle(mech, name="wheel", *, inertia=(1, 1, 0.5), axle="axle", **more):
+    """Centre of a wheel in the origin that turns about z on the ground."""
+    given = {"mass": 1.0, "at": ORIGIN} | more
+    centre = mech.add_rigid(name, inertia=inertia, **given).marker(ORIGIN)
+    mech.revolute(axle, mech.ground.marker(given["at"]), centre, axis=Z)
+    return centre
+
+
+def turned(angle):
+    """Rotation about z."""
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, -s, 0], [s, c, 0], [0, 0, 1.0]])
+
+
+def slender(mech, name, start, end, mass=1.0, **motion):
+    """A slender uniform rod in the xy plane with a marker at each end."""
+    start, end = np.append(start, 0.0), np.append(end, 0.0)
+    length = np.linalg.norm(end - start)
+    J, half = mass * length**2 / 12, 0.5 * length * X
+    return mech.add_rigid(
+        name, mass=mass, inertia=(1e-3 * J, J, J), at=0.5 * (start + end),
+        orientation=turned(np.arctan2(*(end - start)[1::-1])),
+        markers={"a": -half, "b": half}, **motion,
+    )  # fmt: skip
+
+
 def below(angle, length=1.0):
     """A place at an angle from straight below the origin, about y."""
     return length * np.array([np.sin(angle), 0, -np.cos(angle)])

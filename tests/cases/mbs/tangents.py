@@ -4,7 +4,7 @@ import numpy as np
 from numpy.testing import assert_allclose
 
 from cases.mbs.mechanisms import random_state, residual_at, stored_at, tangents_at
-from rom.mbs.elements import rotational_springs, springs
+from rom.mbs.elements import joint_laws, springs
 from rom.mbs.equations.equations import evaluate, linearize_constraints, retract
 
 GRAVITY, NONE = np.array([0.3, -9.0, 2.0]), np.zeros(0)
@@ -101,7 +101,7 @@ def check_tangents(packed, W, state, motions, tolerance):
     C = difference(lambda x: at(zero, x, zero), v.size)
     tangents_at(s, W, q, v, a, lam, (0.0, 1.0, 0.0))
     assert_allclose(W.S, C, atol=1e-7 * np.abs(C).max())
-    for family in (springs.SPRINGS_FAMILY, rotational_springs.TURNS_FAMILY):
+    for family in (springs.SPRINGS_FAMILY, joint_laws.TURNS_FAMILY):
         if family in packed.elements:
             packed.elements[family].law[:, 1] = 0.0
     M = difference(lambda x: at(zero, zero, x), v.size)

@@ -1,58 +1,57 @@
-"""Contact of spheres, discs, planes and cylinders against closed forms and quadrature."""
+"""Contact of simple shapes, capsules and surfaces against closed forms and quadrature."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from numba import njit
 from numpy.testing import assert_allclose
 from scipy.integrate import quad, solve_ivp
+from scipy.optimize import minimize
 from scipy.special import gamma
 
+import rom
 from cases.mbs.mechanisms import (
     prepared,
-    random_body,
-    random_pose,
     random_state,
     residual_at,
     stored_at,
     tangents_at,
+    two_soft,
 )
 from cases.mbs.tangents import difference, energy_gradient, forces_at, shifted
-from rom.errors import ConfigError
+from cases.solid import block, reduced
+from rom import rotation
+from rom.errors import ConfigError, ModelError
 from rom.mbs.elements.contact import points
 from rom.mbs.elements.contact.impact import Impact, damping_of, hertz_stiffness
+from rom.mbs.elements.contact.points import across_of, nearest
 from rom.mbs.integrate.simulation import simulate
 from rom.mbs.mechanism import Mechanism
+from rom.mbs.parts.bodies import Marker, surface_place
 from rom.mbs.results.audit import audit
 
 X, Y, Z = np.eye(3)
 TILTED = np.array([1.0, 2.0, 2.0]) / 3
 g = 9.81
-KINDS = ("plane", "disc", "sphere", "cylinder", "bore", "capsules", "ends")
-
-
-def touching(kind, mech, m1, m2, law):
-    if kind == "plane":
-        mech.sphere_on_plane("c", m1, m2, law, normal=TILTED, radius=9.0)
-    elif kind == "disc":
-        mech.disc_on_plane("c", m1, m2, law, normal=TILTED, axis=X, radius=15.0)
-    elif kind == "sphere":
-        mech.sphere_on_sphere("c", m1, m2, law, radius1=7.0, radius2=5.0)
-    elif kind in ("capsules", "ends"):  # which touch along them, and where both end
-        length1, length2 = (40.0, 30.0) if kind == "capsules" else (0.5, 0.3)
-        mech.capsule_on_capsule("c", m1, m2, law, radius1=7.0, radius2=5.0, axis1=TILTED, axis2=X,
-                                length1=length1, length2=length2)  # fmt: skip
-    else:
-        inside = kind == "bore"
-        radii = {"radius1": 0.4, "radius2": 0.3} if inside else {"radius1": 9.0, "radius2": 6.0}
-        mech.sphere_on_cylinder("c", m1, m2, law, axis=TILTED, inside=inside, **radii)
+CAPSULES, INSIDE = {"radius1": 7.0, "radius2": 5.0, "axis1": TILTED, "axis2": X}, {"inside": True}
+KINDS = {  # of which capsules touch along them, and where both end
+    "plane": ("sphere_on_plane", {"normal": TILTED, "radius": 9.0}),
+    "disc": ("disc_on_plane", {"normal": TILTED, "axis": X, "radius": 15.0}),
+    "sphere": ("sphere_on_sphere", {"radius1": 7.0, "radius2": 5.0}),
+    "cylinder": ("sphere_on_cylinder", {"axis": TILTED, "radius1": 9.0, "radius2": 6.0}),
+    "bore": ("sphere_on_cylinder", {"axis": TILTED, "radius1": 0.4, "radius2": 0.3} | INSIDE),
+    "capsules": ("capsule_on_capsule", CAPSULES | {"length1": 40.0, "length2": 30.0}),
+    "ends": ("capsule_on_capsule", CAPSULES | {"length1": 0.5, "length2": 0.3}),
+}
 
 
 def random_contact(kind, law):
     """Two flexible bodies in contact, anywhere and in any motion."""
     rng = np.random.default_rng(5)
-    mech = Mechanism(gravity=(0, 0, 0))
-    one = mech.add_flexible("one", random_body(rng, damped=False), **random_pose(rng))
-    two = mech.add_flexible("two", random_body(rng, r=3, damped=False), **random_pose(rng))
-    touching(kind, mech, one.marker("a"), two.marker("b"), law)
+    mech, one, two = two_soft(rng, damped=False)
+    method, shape = KINDS[kind]
+    getattr(mech, method)("c", one.marker("a"), two.marker("b"), law, **shape)
     packed, W = prepared(mech)
     packed.system.markers.twist[:] *= 1e-3
     q, v, a, lam = random_state(rng, packed)
@@ -268,8 +267,6 @@ def test_two_discs_are_a_cylinder_that_rolls_down_a_slope():
 
 
 WRONG = {
-    "no size": (lambda m, a, b: m.sphere_on_plane("s", a, b, Impact(1), normal=Z, radius=0),
-                "radius = 0"),
     "no axis": (lambda m, a, b: m.disc_on_plane("s", a, b, Impact(1), normal=Z, axis=0 * Z,
                                                 radius=1), "axis of s"),
     "too large": (lambda m, a, b: m.sphere_on_cylinder("s", a, b, Impact(1), axis=Z, radius1=1,
@@ -294,3 +291,295 @@ def test_wrong_contacts_are_refused_by_name(case):
         act(mech, mech.ground.marker((0, 0, 0)), part.marker((0, 0, 0)))
     assert words in str(caught.value)
     assert not mech.contacts
+
+
+@njit
+def touched(gap, e, s, half_i, half_j):
+    """Places along both, vector between them, and from the middle of the second."""
+    return nearest(gap, e, s, half_i, half_j), across_of(gap, e, s, half_i, half_j)
+
+
+def unit(x):
+    return x / np.linalg.norm(x)
+
+
+def test_nearest_points_are_those_of_a_search():
+    """Bounded minimisation of the distance by another program, from the middles."""
+    rng, ends = np.random.default_rng(3), 0
+    for _ in range(60):
+        gap, e, s = 2.0 * rng.normal(size=3), unit(rng.normal(size=3)), unit(rng.normal(size=3))
+        half = rng.uniform(0.2, 2.0, 2)
+
+        def square(x, gap=gap, e=e, s=s):
+            d = gap + x[1] * s - x[0] * e
+            return d @ d
+
+        found = minimize(square, np.zeros(2), bounds=[(-h, h) for h in half], tol=1e-14)
+        (a, b), found_there = touched(*(tuple(x.tolist()) for x in (gap, e, s)), *half)
+        d, out = map(np.array, found_there)
+        assert_allclose(d @ d, found.fun, rtol=1e-7, atol=1e-10)
+        assert_allclose(out, b * s)
+        ends += (abs(a) == half[0]) + (abs(b) == half[1])
+    assert 20 < ends < 100
+
+
+@pytest.mark.parametrize(("way", "place"), [(0.0, 0.0), (1.5, 0.75), (-1.5, -0.75), (5.0, 1.0)])
+def test_parallel_capsules_touch_in_the_middle_of_where_they_are_side_by_side(way, place):
+    (a, b), _ = touched((way, 0.3, 0.0), (1.0, 0.0, 0.0), (1.0, 0.0, 0.0), 1.0, 1.0)
+    assert_allclose([a, way + b], [place, place if way < 4 else way - 1.0])
+
+
+def crossing(law, *, mass=1.0, x=0.0, depth=0.0, velocity=(0, 0, 0)):
+    """A bar along y, which hardly turns, on a fixed bar along x."""
+    mech = Mechanism(gravity=(0, 0, -g))
+    bar = mech.add_rigid("bar", mass=mass, inertia=(1e6,) * 3, at=(x, 0, 0.15 - depth),
+                         velocity=velocity)  # fmt: skip
+    mech.capsule_on_capsule("c", mech.ground.marker((0, 0, 0)), bar.marker((0, 0, 0)), law,
+                            radius1=0.1, radius2=0.05, axis1=X, axis2=Y, length1=4.0,
+                            length2=1.0)  # fmt: skip
+    return mech
+
+
+def test_a_bar_that_slides_along_another_is_slowed_by_coulomb():
+    mu, v, k = 0.3, 1.0, 1e5
+    law = Impact(k, exponent=1.0, mu=mu, transition_speed=1e-3)
+    mech = crossing(law, x=-0.5, depth=g / k, velocity=(v, 0, 0))
+    sol = simulate(mech, t_end=0.5, dt=1e-3)
+    stop = v / (mu * g)
+    moving = sol.t < 0.95 * stop
+    assert_allclose(sol.velocity("bar")[moving, 0], v - mu * g * sol.t[moving], atol=1e-3)
+    assert_allclose(sol.position("bar")[-1, 0], -0.5 + v**2 / (2 * mu * g), atol=5e-4)
+    force = sol.element("c").force
+    assert_allclose(force[:, 0], -force[:, 1], atol=1e-12)
+    assert_allclose(force[-1, 1, 2], g, rtol=1e-9)
+    assert audit(sol).ok, audit(sol)
+
+
+def test_a_bar_at_rest_on_another_sinks_by_the_law():
+    k = 1e6
+    mech = crossing(Impact(k), depth=(g / k) ** (2 / 3))
+    sol = simulate(mech, t_end=0.1, dt=1e-3)
+    assert_allclose(sol.position("bar")[:, 2], 0.15 - (g / k) ** (2 / 3), atol=1e-12)
+
+
+def test_balls_of_steel_meet_as_hertz_says():
+    """Deepest penetration and duration of an impact; momenta before and after.
+
+    Source: Johnson, Contact Mechanics (1985), equations 11.22 to 11.24.
+    """
+    E, nu, R, m, v = 210e9, 0.3, 0.02, 0.26, 0.5
+    k = hertz_stiffness(E, nu, E, nu, R / 2)
+    mech = Mechanism(gravity=(0, 0, 0))
+    law = Impact(k, mu=0.0)
+    gap = 1e-6
+    one, two = (
+        mech.add_rigid(name, mass=m, inertia=(1e-5,) * 3, at=at, velocity=(u, 0, 0))
+        for name, at, u in (("one", (0, 0, 0), v), ("two", (2 * R + gap, 0, 0), 0.0))
+    )
+    mech.capsule_on_capsule("c", one.marker((0, 0, 0)), two.marker((0, 0, 0)), law, radius1=R,
+                            radius2=R)  # fmt: skip
+    sol = simulate(mech, t_end=2e-4, dt=1e-7, method="dop853")
+    depth = 2 * R - (sol.position("two") - sol.position("one"))[:, 0]
+    deepest = (15 * (m / 2) * v**2 / (16 * np.sqrt(R / 2) * (E / (1 - nu**2) / 2))) ** 0.4
+    assert_allclose(depth.max(), deepest, rtol=1e-4)
+    assert_allclose(np.ptp(sol.t[depth > 0]), 2.943 * deepest / v, rtol=5e-3)
+    assert_allclose([sol.velocity("one")[-1, 0], sol.velocity("two")[-1, 0]], [0, v], atol=1e-7)
+
+
+def test_momentum_and_energy_of_capsules_that_meet_in_space():
+    """Oblique, with friction and loss: both momenta stay, the energy goes where it is booked."""
+    mech = Mechanism(gravity=(0, 0, 0))
+    law = Impact(1e5, damping=0.3, mu=0.4, transition_speed=1e-2)
+    one = mech.add_rigid("one", mass=1.0, inertia=(1e-2, 1e-2, 1e-3), at=(0, 0, 0))
+    two = mech.add_rigid("two", mass=0.5, inertia=(1e-3, 5e-3, 5e-3), at=(0.05, 0.2, 0.1),
+                         velocity=(0.3, -2.0, 0.2), omega=(0, 1.0, 0))  # fmt: skip
+    mech.capsule_on_capsule("c", one.marker((0, 0, 0)), two.marker((0, 0, 0)), law, radius1=0.05,
+                            radius2=0.04, axis1=Z, axis2=X, length1=0.5, length2=0.3)  # fmt: skip
+    sol = simulate(mech, t_end=0.2, dt=1e-4, method="dop853")
+    linear, angular = sol.momentum
+    assert np.ptp(sol.velocity("one")[:, 1]) > 0.3
+    assert_allclose(linear - linear[0], 0, atol=1e-10)
+    assert_allclose(angular - angular[0], 0, atol=1e-10)
+    assert sol.energy.damping[-1] > 1e-2
+    assert_allclose(sol.energy.balance, 0, atol=1e-6)
+
+
+@pytest.mark.parametrize("share", [0.3, 0.9, 1.5])
+def test_a_clamped_bar_creeps_or_slips_as_the_law_says(share):
+    """Between two jaws: weight = share of the limit; creep v0 r / sqrt(1 - r^2), or falling."""
+    N, mu, v0 = 20.0, 0.5, 1e-2
+    weight = share * 2 * mu * N
+    k, radius = 1e5, 0.05
+    law = Impact(k, exponent=1.0, mu=mu, transition_speed=v0)
+    mech = Mechanism(gravity=(0, 0, -g))
+    depth = N / k
+    bar = mech.add_rigid("bar", mass=weight / g, inertia=(1.0,) * 3, at=(0, 0, 0))
+    for side in (-1, 1):
+        jaw = mech.ground.marker((0, side * (2 * radius - depth), 0))
+        mech.capsule_on_capsule(f"jaw {side}", jaw, bar.marker((0, 0, 0)), law, radius1=radius,
+                                radius2=radius, axis1=X, axis2=Z, length1=0.4,
+                                length2=4.0)  # fmt: skip
+    sol = simulate(mech, t_end=0.1, dt=2e-4, rho_inf=0.5)
+    v = sol.velocity("bar")[:, 2]
+    if share < 1.0:
+        assert_allclose(v[-1], -v0 * share / np.sqrt(1 - share**2), rtol=1e-4)
+    else:
+        late = sol.t > 0.05
+        fall = -np.diff(v[late]).mean() / 2e-4
+        assert_allclose(fall, g * (1 - 1 / share), rtol=3e-3)
+    for jaw in ("jaw -1", "jaw 1"):
+        force = sol.element(jaw).force[-1, 1]
+        assert_allclose(abs(force[1]), N, rtol=1e-6)
+        assert_allclose(force[2], min(weight / 2, mu * N), rtol=1e-3)
+
+
+SIZE = (0.4, 0.3, 0.2)
+WEIGHT = 7850.0 * 0.4 * 0.3 * 0.2 * g
+LAW = Impact(stiffness=4e8, exponent=1.0, damping=20.0, mu=0.3, transition_speed=1e-3)
+
+
+def below(points):
+    return points[:, 2] < 1e-9
+
+
+@pytest.fixture(scope="module")
+def brick():
+    model = block(size=SIZE, cells=(3, 2, 2))
+    return reduced(2, model)
+
+
+def on_floor(brick, law=LAW, **start):
+    mech = rom.Mechanism(gravity=(0, 0, -g))
+    part = mech.add_flexible("brick", brick, **start)
+    floor = mech.ground.marker((0.0, 0.0, 0.0))
+    mech.surface_on_plane("floor", floor, part, law, normal=(0, 0, 1), where=below)
+    return mech, part
+
+
+def at_point(sol, k):
+    """(n_t, 3) position of a point of the surface."""
+    return sol.position("brick", Marker("brick", surface_place(int(k))))
+
+
+def guide(mech, part):
+    """Let one end go up and down only."""
+    place = mech.design_point(part.marker("root"))
+    mech.prismatic("guide", mech.ground.marker(place), part.marker("root"), axis=(0, 0, 1))
+
+
+def test_the_areas_of_the_points_are_those_of_the_face(brick):
+    areas = brick.surface_areas(below)
+    assert_allclose(areas.sum(), 0.4 * 0.3)
+    assert (brick.surface.points[areas > 0, 2] < 1e-9).all()
+    assert_allclose(brick.surface_areas().sum(), 2 * (0.12 + 0.08 + 0.06))
+
+
+def test_points_of_the_surface_move_with_its_shapes(brick):
+    rng = np.random.default_rng(4)
+    q = 1e-3 * rng.normal(size=brick.n_modes)
+    mech, _ = on_floor(brick, at=(0.1, 0, 1.0), orientation=(0.6, 0, 0.8, 0), q=q)
+    sol = rom.simulate(mech, t_end=1e-6, dt=1e-6)
+    bent = brick.surface.points + (brick.surface.shape @ q).reshape(-1, 3)
+    wanted = [0.1, 0, 1.0] + bent @ rotation.matrix([0.6, 0, 0.8, 0]).T
+    for k in np.flatnonzero(brick.surface_areas(below)):
+        at = at_point(sol, k)[0]
+        assert_allclose(at, wanted[k], atol=1e-12)
+
+
+def test_a_brick_sinks_into_its_foundation_by_its_weight(brick):
+    """A steel brick on a soft foundation stays flat: depth W / (k A) everywhere."""
+    mech, part = on_floor(brick)
+    guide(mech, part)
+    state = rom.equilibrium(mech)
+    sol = rom.simulate(mech, t_end=1e-3, dt=1e-4, state=state)
+    depth = WEIGHT / (4e8 * 0.12)
+    corners = np.flatnonzero(brick.surface_areas(below))
+    for k in corners:
+        height = at_point(sol, k)[:, 2]
+        assert_allclose(height, -depth, rtol=0.02)
+    load = sol.interface_loads("ground")[(0.0, 0.0, 0.0)]
+    assert_allclose(load[0, 2], -WEIGHT, rtol=1e-9)
+    assert_allclose(sol.v, 0, atol=1e-9)
+
+
+def test_a_sliding_brick_slows_down_by_friction(brick):
+    """Deceleration mu g while it slides, whatever the share of each point."""
+    mech, part = on_floor(brick)
+    guide(mech, part)
+    q = rom.equilibrium(mech).q
+    mech, _ = on_floor(brick, at=q[:3], orientation=q[3:7], q=q[7:], velocity=(1.0, 0, 0))
+    sol = rom.simulate(mech, t_end=0.1, dt=5e-4, rho_inf=0.5)
+    speed = sol.velocity("brick", "root")[:, 0]
+    assert_allclose(np.polyfit(sol.t, speed, 1)[0], -0.3 * g, rtol=0.01)
+    load = sol.interface_loads("ground")[(0.0, 0.0, 0.0)]
+    assert_allclose(load[:, 0].mean(), 0.3 * WEIGHT, rtol=0.01)
+    lost = sol.energy.damping[-1]
+    assert_allclose(lost, 0.5 * WEIGHT / g * (1 - speed[-1] ** 2), rtol=0.01)
+
+
+def test_a_brick_pushed_along_the_floor_rests_by_springs_per_area(brick):
+    """Their way, averaged over the area, is F / (k_t A), however it tilts."""
+    mech, part = on_floor(brick)
+    guide(mech, part)
+    q, F = rom.equilibrium(mech).q, 0.1 * WEIGHT
+    law = replace(LAW, tangential_stiffness=2e8, tangential_damping=1e6)
+    mech, part = on_floor(brick, law, at=q[:3], orientation=q[3:7], q=q[7:])
+    mech.force("push", part.marker("root"), (F, 0.0, 0.0))
+    areas, start = brick.surface_areas(below), rom.simulate(mech, t_end=1e-9, dt=1e-9)
+    found = rom.snapshot(mech, rom.equilibrium(mech))
+    way = sum(
+        areas[k] * (at_point(sol, k)[0, 0] * sign)
+        for sol, sign in ((found, 1), (start, -1)) for k in np.flatnonzero(areas)
+    ) / areas.sum()  # fmt: skip
+    assert_allclose(way, F / (2e8 * 0.12), rtol=1e-4)
+    dropped = rom.simulate(mech, t_end=0.1, dt=5e-4, rho_inf=0.5)
+    assert_allclose(dropped.velocity("brick")[-1], 0.0, atol=1e-6)
+
+
+@pytest.mark.parametrize("kind", ["sphere", "cylinder", "bore"])
+def test_a_round_thing_presses_as_the_sum_over_the_points(brick, kind):
+    """Against the sum of k a_i depth_i^1.5 along the normals, from the positions alone."""
+    mech = rom.Mechanism(gravity=(0, 0, -g))
+    part = mech.add_flexible("brick", brick)
+    guide(mech, part)
+    law = Impact(stiffness=5e9, exponent=1.5)
+    radius, centre = 1.0, np.array([0.2, 0.15, -0.97])
+    if kind == "bore":
+        centre = np.array([0.2, 0.15, 0.98])
+    m1, axis = mech.ground.marker(tuple(centre)), np.array([0, 1.0, 0])
+    if kind == "sphere":
+        mech.surface_on_sphere("round", m1, part, law, radius=radius, where=below)
+    else:
+        inside = {"axis": axis, "inside": kind == "bore"}
+        mech.surface_on_cylinder("round", m1, part, law, radius=radius, where=below, **inside)
+    state = rom.equilibrium(mech)
+    sol = rom.simulate(mech, t_end=1e-5, dt=1e-5, state=state)
+    areas, total = brick.surface_areas(below), np.zeros(3)
+    for k in np.flatnonzero(areas):
+        at = at_point(sol, k)[0] - centre
+        across = at if kind == "sphere" else at - axis * at[1]
+        far = np.linalg.norm(across)
+        depth = max(radius - far if kind != "bore" else far - radius, 0.0)
+        sign = -1 if kind == "bore" else 1
+        total += sign * 5e9 * areas[k] * depth**1.5 * across / far
+    load = sol.interface_loads("ground")[tuple(centre)]
+    assert_allclose(load[0, :3], -total, rtol=1e-8, atol=1e-8 * WEIGHT)
+    assert_allclose(total[2], WEIGHT, rtol=1e-8)
+
+
+def test_messages(brick):
+    mech, part = on_floor(brick)
+    floor = mech.ground.marker((0, 0, 0))
+    with pytest.raises(ConfigError, match="used twice"):
+        mech.surface_on_plane("floor", floor, part, LAW, normal=(0, 0, 1), where=below)
+    box = mech.add_rigid("box", mass=1.0, inertia=(1, 1, 1), at=(0, 0, 0))
+    with pytest.raises(ConfigError, match="body 'box' is rigid, it has no surface"):
+        mech.surface_on_sphere("ball", floor, box, LAW, radius=1.0)
+    with pytest.raises(ConfigError, match="with itself"):
+        mech.surface_on_sphere("ball", part.marker("root"), part, LAW, radius=1.0)
+    with pytest.raises(ConfigError, match="is flexible; use its markers"):
+        part.marker((0.0, 0.0, 0.0))
+    bare = rom.Mechanism()
+    bald = bare.add_flexible("brick", replace(brick, surface=None))
+    with pytest.raises(ModelError, match="carries no surface"):
+        bare.surface_on_sphere("ball", floor, bald, LAW, radius=1.0)

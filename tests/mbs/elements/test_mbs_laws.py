@@ -3,6 +3,7 @@
 import ctypes
 import shutil
 import subprocess
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from scipy.integrate import trapezoid
 
 import rom
 from cases.mbs.mechanisms import prepared, random_body, random_pose, random_state, simulate_quietly
+from cases.mbs.parts import on_axle, on_guide
 from cases.mbs.tangents import check_tangents
 from rom.errors import ConfigError, SolverError
 from rom.mbs.elements import laws
@@ -37,9 +39,7 @@ def slipping(t, parameters, motion, memory, out):
 def shaken(*, compiled=True, law=slipping, cycles=None, **options):
     """A block that is driven to and fro against the law."""
     mech = rom.Mechanism(gravity=(0, 0, 0))
-    block = mech.add_rigid("block", mass=1.0, inertia=(1, 1, 1), at=(0, 0, 0))
-    ground, end = mech.ground.marker((0, 0, 0)), block.marker((0, 0, 0))
-    mech.prismatic("guide", ground, end, axis=(1, 0, 0))
+    ground, end = mech.ground.marker((0, 0, 0)), on_guide(mech, "block")
     mech.drive("shake", "guide", lambda t: REACH * np.sin(2 * np.pi * t))
     more = {"parameters": (STIFFNESS, YIELD), "memory": [0.0], "outputs": ["slip"], "energy": True}
     mech.law("damper", law, ground, end, compiled=compiled, **more | options)
@@ -103,10 +103,13 @@ def test_a_state_without_the_memory_is_refused():
 
 C_LAW = r"""
 #include <math.h>
+static double line(const double *x, double *gap) {
+    double square = 0;
+    for (int i = 0; i < 3; i++) { gap[i] = x[3 + i] - x[i]; square += gap[i] * gap[i]; }
+    return sqrt(square);
+}
 void spring(double t, const double *p, const double *x, const double *memory, double *out) {
-    double gap[3], length = 0;
-    for (int i = 0; i < 3; i++) { gap[i] = x[3 + i] - x[i]; length += gap[i] * gap[i]; }
-    length = sqrt(length);
+    double gap[3], length = line(x, gap);
     for (int i = 0; i < 3; i++) {
         double f = p[0] * (length - p[1]) * gap[i] / length;
         out[i] = f; out[3 + i] = -f;
@@ -115,9 +118,7 @@ void spring(double t, const double *p, const double *x, const double *memory, do
     out[14] = length;
 }
 void slopes(double t, const double *p, const double *x, const double *memory, double *out) {
-    double gap[3], length = 0;
-    for (int i = 0; i < 3; i++) { gap[i] = x[3 + i] - x[i]; length += gap[i] * gap[i]; }
-    length = sqrt(length);
+    double gap[3], length = line(x, gap);
     for (int i = 0; i < 3; i++) for (int j = 0; j < 3; j++) {
         double e = gap[i] * gap[j] / length / length;
         double k = p[0] * (e + (1 - p[1] / length) * ((i == j) - e));
@@ -128,14 +129,6 @@ void slopes(double t, const double *p, const double *x, const double *memory, do
 """
 
 
-class Entry:
-    """A function of a shared library."""
-
-    def __init__(self, library, name):
-        self.library = library
-        self.address = ctypes.cast(getattr(library, name), ctypes.c_void_p).value
-
-
 def built(folder, sign="+"):
     if not shutil.which("cc"):
         pytest.skip("no compiler of C here")
@@ -143,7 +136,10 @@ def built(folder, sign="+"):
     subprocess.run(["cc", "-O2", "-shared", "-fPIC", "law.c", "-o", "law.so", "-lm"], cwd=folder,
                    check=True)  # fmt: skip
     library = ctypes.CDLL(str(folder / "law.so"))
-    return Entry(library, "spring"), Entry(library, "slopes")
+    return [
+        SimpleNamespace(library=library, address=ctypes.cast(function, ctypes.c_void_p).value)
+        for function in (library.spring, library.slopes)
+    ]
 
 
 def hung(add):
@@ -186,8 +182,7 @@ def twisted(t, parameters, motion, memory, out):
 def twisted_still(t, parameters, motion, memory, out):
     for k in range(3):
         j = (k + 1) % 3
-        gap = motion.position[j] - motion.position[k]
-        axis = motion.axes[k, :, 0]
+        gap, axis = motion.position[j] - motion.position[k], motion.axes[k, :, 0]
         out.force[k] = 3.0 * gap + 0.7 * np.cross(axis, motion.axes[j, :, 1])
         out.moment[k] = np.cross(gap, axis) * np.sum(gap**2)
 
@@ -234,16 +229,15 @@ STARTS = {
 
 @pytest.mark.parametrize("start", STARTS)
 def test_a_law_that_never_is_a_number_is_named_at_once(start):
-    mech = hung(lambda m, a, b: m.law("hole", gives_nan, a, b, compiled=True))
+    mech = hung(lambda m, a, b: m.law("hole", spoiled, a, b, parameters=[NAN], compiled=True))
     with pytest.raises(SolverError, match="the law of 'hole' gives no finite number"):
         STARTS[start](mech)
 
 
 def test_a_motor_that_stops_to_be_a_number_is_named():
     mech = rom.Mechanism()
-    part = mech.add_rigid("arm", mass=1.0, inertia=(1, 1, 1), at=(0, 0, 0))
-    mech.revolute("hinge", mech.ground.marker((0, 0, 0)), part.marker((0, 0, 0)), axis=(0, 0, 1))
-    mech.motor("servo", "hinge", lambda t, x, v: np.sqrt(0.01 - t), compiled=True)
+    on_axle(mech)
+    mech.motor("servo", "axle", lambda t, x, v: np.sqrt(0.01 - t), compiled=True)
     with pytest.raises(SolverError, match="the law of 'servo' gives no finite number"):
         simulate_quietly(mech, t_end=0.1, dt=1e-3)
 
@@ -297,56 +291,46 @@ def wrong_slopes(t, parameters, motion, memory, K, C):
     K[7, 1] *= 1.001
 
 
-def wrong_energy(t, parameters, motion, memory, out):
+ENERGY, LOSSES, OWN_MEMORY, BEYOND, COUNTS, NAN = range(1, 7)
+
+
+def spoiled(t, parameters, motion, memory, out):
+    """The same law with one mistake."""
     pulling(t, parameters, motion, memory, out)
-    out.energy[0] *= 2.0
-
-
-def wrong_losses(t, parameters, motion, memory, out):
-    pulling(t, parameters, motion, memory, out)
-    out.lost[0] = -out.lost[0]
-
-
-def writes_to_its_memory(t, parameters, motion, memory, out):
-    pulling(t, parameters, motion, memory, out)
-    memory[0] = 1.0
-
-
-def writes_beyond(t, parameters, motion, memory, out):
-    pulling(t, parameters, motion, memory, out)
-    for k in range(5):
-        out.outputs[k] = 1.0
-
-
-def counts(t, parameters, motion, memory, out):
-    pulling(t, parameters, motion, memory, out)
-    out.memory[0] = memory[0] + 1.0
-
-
-def gives_nan(t, parameters, motion, memory, out):
-    pulling(t, parameters, motion, memory, out)
-    out.moment[1, 2] = np.nan
+    if parameters[0] == ENERGY:
+        out.energy[0] *= 2.0
+    elif parameters[0] == LOSSES:
+        out.lost[0] = -out.lost[0]
+    elif parameters[0] == OWN_MEMORY:
+        memory[0] = 1.0
+    elif parameters[0] == BEYOND:
+        for k in range(5):
+            out.outputs[k] = 1.0
+    elif parameters[0] == COUNTS:
+        out.memory[0] = memory[0] + 1.0
+    elif parameters[0] == NAN:
+        out.moment[1, 2] = np.nan
 
 
 FOUND = {
-    "tangents": (pulling, wrong_slopes, "error of the stiffness / largest: force on marker 1, y"),
-    "energy": (wrong_energy, None, "power + stored + lost / largest"),
-    "losses": (wrong_losses, None, "power + stored + lost / largest"),
-    "memory": (writes_to_its_memory, None, "numbers written where none may be"),
-    "beyond": (writes_beyond, None, "numbers written where none may be"),
-    "counts": (counts, None, "answers that change when it finds its own memory: memory 0"),
-    "nan": (gives_nan, None, "numbers that are not finite: moment on marker 1, z"),
+    0: "error of the stiffness / largest: force on marker 1, y",
+    ENERGY: "power + stored + lost / largest",
+    LOSSES: "power + stored + lost / largest",
+    OWN_MEMORY: "numbers written where none may be",
+    BEYOND: "numbers written where none may be",
+    COUNTS: "answers that change when it finds its own memory: memory 0",
+    NAN: "numbers that are not finite: moment on marker 1, z",
 }
 
 
 @pytest.mark.once
-@pytest.mark.parametrize("kind", FOUND)
-def test_the_check_names_what_is_wrong(kind):
-    law, slopes, text = FOUND[kind]
-    mech = hung(lambda m, a, b: m.law("l", law, a, b, tangents=slopes, energy=True, memory=[0.0],
-                                      compiled=True))  # fmt: skip
+@pytest.mark.parametrize("mistake", FOUND)
+def test_the_check_names_what_is_wrong(mistake):
+    slopes = None if mistake else wrong_slopes
+    more = {"parameters": [mistake], "memory": [0.0], "tangents": slopes}
+    mech = hung(lambda m, a, b: m.law("l", spoiled, a, b, energy=True, compiled=True, **more))
     report = rom.check_law(mech, "l")
-    assert not report.ok and report.failures[0].quantity.startswith(text), str(report)
+    assert not report.ok and report.failures[0].quantity.startswith(FOUND[mistake]), str(report)
 
 
 def test_the_check_finds_nothing_in_a_right_law():

@@ -165,21 +165,21 @@ def test_messages():
     mech = rom.Mechanism()
     part = mech.add_flexible("one", body)
     load = rom.mass_load(body, (0, 0, 1.0))
-    with pytest.raises(ConfigError, match="exactly one of pressure, traction and forces"):
-        rom.surface_load(body, pressure=1.0, traction=(0, 0, 1))
-    with pytest.raises(ConfigError, match="chooses no triangle of the 4"):
-        rom.surface_load(body, pressure=1.0, where=lambda points: points[:, 0] > 1e9)
-    with pytest.raises(ConfigError, match="no deformable interface 'top'"):
-        rom.surface_load(body, pressure=1.0, where="top")
-    with pytest.raises(ConfigError, match=r"needed is \(7, 3\)"):
-        rom.surface_load(body, forces=np.zeros(3))
     inside_out = replace(body, surface=replace(body.surface, triangles=TETRAHEDRON[:3]))
-    with pytest.raises(ModelError, match="do not tell its inside from its outside"):
-        rom.surface_load(inside_out, pressure=1.0)
-    with pytest.raises(ModelError, match="carries no surface"):
-        rom.surface_load(replace(body, surface=None), pressure=1.0)
+    box = mech.add_rigid("box", mass=1.0, inertia=(1, 1, 1), at=(0, 0, 0))
+    for error, words, on, given in (
+        (ConfigError, "exactly one of pressure, traction and forces", body,
+         {"pressure": 1.0, "traction": (0, 0, 1)}),
+        (ConfigError, "chooses no triangle of the 4", body,
+         {"pressure": 1.0, "where": lambda points: points[:, 0] > 1e9}),
+        (ConfigError, "no deformable interface 'top'", body, {"pressure": 1.0, "where": "top"}),
+        (ConfigError, r"needed is \(7, 3\)", body, {"forces": np.zeros(3)}),
+        (ModelError, "do not tell its inside from its outside", inside_out, {"pressure": 1.0}),
+        (ModelError, "carries no surface", replace(body, surface=None), {"pressure": 1.0}),
+    ):  # fmt: skip
+        with pytest.raises(error, match=words):
+            rom.surface_load(on, **given)
     with pytest.raises(ConfigError, match="'pull': frame = 'marker'"):
         mech.spread_load("pull", part, load, frame="marker")
-    box = mech.add_rigid("box", mass=1.0, inertia=(1, 1, 1), at=(0, 0, 0))
     with pytest.raises(ConfigError, match="is not one of body 'box'"):
         mech.spread_load("pull", box, load)

@@ -1,49 +1,46 @@
-"""The equations of motion: against direct nodal dynamics and finite differences."""
+"""The equations of motion: against nodal dynamics and differences; dense systems, signatures."""
+
+from itertools import pairwise
 
 import numpy as np
 import pytest
+from numba import njit
 from numpy.testing import assert_allclose
 from scipy.linalg import null_space
+from scipy.sparse import csc_matrix
 
 from cases.mbs.mechanisms import (
     nodal_body,
+    nodal_residual,
     prepared,
     random_body,
     random_nodes,
     random_pose,
     random_state,
     tangents_at,
+    two_soft,
 )
 from cases.mbs.tangents import GRAVITY, check_tangents, constraint_derivatives
 from rom import rotation
 from rom.body.rotating import rotating_matrices
 from rom.body.stiffening import elastic_loads
 from rom.mbs.equations.equations import linearize_constraints, rates
+from rom.mbs.equations.sparse_solve import signature
 from rom.mbs.integrate.consistent_start import initial_state
+from rom.mbs.kernels.algebra import PANEL_WIDTH, back_substitute, factorise
 from rom.mbs.mechanism import Mechanism
 
 
-def nodal_accelerations(nodes, q_f, qd, p, w):
+def nodal_accelerations(nodes, *state):
     """Accelerations of frame and elastic coordinates from the nodes themselves.
 
-    Nodes at r + A (x + sum q phi), with the full scalar mass matrix; the equations are the normal
-    equations of Gauss's principle, no inertia integral occurs.
+    No inertia integral occurs in their equations, which are linear in the accelerations.
     """
-    x, Ms, phi, K, D = nodes
-    r, n = phi.shape[0], x.shape[0]
-    A = rotation.matrix(p)
-    P = x + np.einsum("k,kia->ia", q_f, phi)
-    Pd = np.einsum("k,kia->ia", qd, phi)
-    J = np.zeros((3 * n, 6 + r))
-    for i in range(n):
-        J[3 * i : 3 * i + 3, :3] = np.eye(3)
-        J[3 * i : 3 * i + 3, 3:6] = -A @ rotation.skew(P[i])
-        J[3 * i : 3 * i + 3, 6:] = A @ phi[:, i].T
-    conv = (np.cross(w, np.cross(w, P)) + 2 * np.cross(w, Pd)) @ A.T
-    M = np.kron(Ms, np.eye(3))
-    force = J.T @ M @ (np.tile(GRAVITY, n) - conv.ravel())
-    force[6:] -= K @ q_f + D @ qd
-    return np.linalg.solve(J.T @ M @ J, force)
+    psi, n = np.zeros((4, 4, *nodes[0].shape)), 10
+    pull, *columns = (
+        nodal_residual(nodes, psi, state, a, GRAVITY) for a in (np.zeros(n), *np.eye(n))
+    )
+    return np.linalg.solve(np.array(columns).T - pull[:, None], -pull)
 
 
 def test_frame_equations_equal_direct_nodal_dynamics():
@@ -65,16 +62,9 @@ def test_frame_equations_equal_direct_nodal_dynamics():
 
 def everything(rng, *, angles=True):
     """Two flexible bodies, one of them stiffened, and a rigid one with every joint and load."""
-    mech = Mechanism(gravity=GRAVITY)
-    one = mech.add_flexible("one", random_body(rng, stiffened=True), **random_pose(rng))
-    two = mech.add_flexible("two", random_body(rng, r=3), **random_pose(rng))
-    box = mech.add_rigid(
-        "box",
-        mass=2.0,
-        inertia=(1.0, 1.5, 2.0),
-        markers={"a": (0.3, 0.2, -0.1)},
-        **random_pose(rng),
-    )
+    mech, one, two = two_soft(rng, GRAVITY, stiffened=True)
+    box = mech.add_rigid("box", mass=2.0, inertia=(1.0, 1.5, 2.0),
+                         markers={"a": (0.3, 0.2, -0.1)}, **random_pose(rng))  # fmt: skip
     m1, m2, m3 = one.marker("a"), two.marker("b"), box.marker("a")
     x, y = np.array([1.0, 2, 2]) / 3, np.array([2.0, 1, -2]) / 3
     mech.revolute("revolute", m1, m2, axis=x)
@@ -136,9 +126,7 @@ def test_a_rotating_body_is_linearised_as_it_moves():
 
 def test_stiffness_of_drives_and_coils_is_exact_where_the_joint_is_closed():
     rng = np.random.default_rng(4)
-    mech = Mechanism(gravity=GRAVITY)
-    one = mech.add_flexible("one", random_body(rng), **random_pose(rng))
-    two = mech.add_flexible("two", random_body(rng, r=3), **random_pose(rng))
+    mech, one, two = two_soft(rng, GRAVITY)
     mech.revolute("hinge", one.marker("a"), two.marker("b"), axis=(1.0, 2.0, 2.0))
     mech.drive("motor", "hinge", lambda t: 0.4 + t)
     mech.rotational_spring("coil", "hinge", stiffness=5.0, damping=0.4)
@@ -151,3 +139,83 @@ def test_stiffness_of_drives_and_coils_is_exact_where_the_joint_is_closed():
     motions = null_space(W.G[:5])
     _, v, a, lam = random_state(rng, packed)
     check_tangents(packed, W, (start.q, v, a, lam), motions, 1e-6)
+
+
+@njit
+def solve(A, n, pivot, x):
+    if not factorise(A, n, pivot):
+        return False
+    back_substitute(A, n, pivot, x)
+    return True
+
+
+def solved(A, b, n):
+    """The solution with the leading (n, n) block, and what else the array holds afterwards."""
+    work, x = A.copy(), b[:n].copy()
+    assert solve(work, n, np.zeros(n, dtype=np.int64), x)
+    return x, work
+
+
+@pytest.mark.parametrize("n", [*range(1, 3 * PANEL_WIDTH + 2), 100])
+@pytest.mark.parametrize("share", [1.0, 0.15])
+def test_solutions_are_those_of_numpy(n, share):
+    rng = np.random.default_rng(n)
+    A = rng.standard_normal((n + 3, n + 3)) * (rng.random((n + 3, n + 3)) < share)
+    A[:n, :n] += np.roll(np.diag(np.full(n, 3.0)), 1, axis=0)  # pivots off the diagonal
+    b = rng.standard_normal(n + 3)
+    x, work = solved(A, b, n)
+    condition = np.linalg.cond(A[:n, :n])
+    expected = np.linalg.solve(A[:n, :n], b[:n])
+    assert_allclose(x, expected, atol=1e-13 * condition * np.abs(expected).max())
+    assert np.array_equal(work[n:], A[n:])
+    assert np.array_equal(work[:, n:], A[:, n:])
+
+
+@pytest.mark.parametrize("column", [0, 7, 8, 18])
+def test_a_pivot_that_vanishes_is_said(column):
+    A = np.random.default_rng(1).standard_normal((19, 19))
+    A[:, column] = 0.0
+    assert not solve(A, 19, np.zeros(19, dtype=np.int64), np.ones(19))
+    A[3, 3] = np.nan
+    assert not solve(A, 19, np.zeros(19, dtype=np.int64), np.ones(19))
+
+
+def random_symmetric(rng, n_groups, *, massless):
+    """A sparse matrix of groups of three to five unknowns, between them ones without a diagonal."""
+    sizes = rng.integers(3, 6, n_groups)
+    sizes[1::3] = rng.integers(1, 3, sizes[1::3].size)
+    first = np.concatenate([[0], np.cumsum(sizes)])
+    groups = [np.arange(a, b) for a, b in pairwise(first)]
+    A = np.zeros((first[-1],) * 2)
+    for k, rows in enumerate(groups):
+        light = massless and k % 3 == 1
+        others = [j for j in (k - 1, (k + 1) % n_groups) if light or rng.random() < 0.7]
+        for j in others if light else [*others, k]:
+            block = rng.normal(size=(sizes[k], sizes[j])) * 10.0 ** rng.uniform(-2, 2)
+            A[np.ix_(rows, groups[j])] += block
+    A = A + A.T
+    for rows in groups[1::3] if massless else ():  # almost without: pivots that nothing survives
+        A[rows, rows] = 1e-13
+    return A, groups
+
+
+@pytest.mark.parametrize("massless", [False, True])
+@pytest.mark.parametrize("seed", range(12))
+def test_signs_of_eigenvalues_are_counted_in_any_order(seed, massless):
+    rng = np.random.default_rng(seed)
+    A, groups = random_symmetric(rng, 40, massless=massless)
+    exact = np.linalg.eigvalsh(A)
+    assert np.abs(exact).min() > 1e-8 * np.abs(exact).max()  # none of them is zero
+    for order in (groups, groups[::-1], [groups[k] for k in rng.permutation(len(groups))]):
+        found = signature(csc_matrix(A), order)
+        assert found == (np.sum(exact < 0), 0, np.sum(exact > 0))
+
+
+@pytest.mark.parametrize("copies", [0, 1, 5])
+def test_constraints_that_repeat_others_are_counted_as_zero(copies):
+    rng = np.random.default_rng(copies)
+    G = rng.normal(size=(7, 30))
+    G = np.vstack([G, rng.normal(size=(copies, 7)) @ G])
+    A = np.block([[np.diag(rng.uniform(1, 9, 30)), G.T], [G, np.zeros((len(G),) * 2)]])
+    groups = [np.arange(a, a + 5) for a in range(0, 30, 5)] + [np.arange(30, len(A))]
+    assert signature(csc_matrix(A), groups, 1e-10) == (7, copies, 30)

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from numba import njit
 from numpy.testing import assert_allclose
 
 import rom
@@ -42,16 +41,6 @@ def _small(monkeypatch):
     monkeypatch.setattr(renewal, "MIN_VELOCITIES", 0)
 
 
-@njit
-def factorise(s, W, rank):
-    return factorise_bordered(s, W, rank)
-
-
-@njit
-def solve(s, W, rank, x, lam):
-    solve_bordered(s, W, rank, x, lam)
-
-
 def matrix(now, v, factors):
     """Iteration matrix at the start with those velocities, dense."""
     s, W, q, still, none = now.packed.system, now.W, now.packed.q, np.zeros(v.size), np.zeros(0)
@@ -69,14 +58,14 @@ def solutions(mech, factors):
     fast, none = start.copy(), np.zeros(0)
     fast[[0, 1, 6, 13]] += 0.02, -0.05, 0.03, 0.01  # nothing turns otherwise
     matrix(now, start, factors)
-    assert factorise(s, W, 0)
+    assert factorise_bordered(s, W, 0)
     keep_pair_tangents(s, W, factors[2], factors[1])
     load, x = np.random.default_rng(1).standard_normal(start.size), np.zeros(start.size)
     evaluate(s, W, q, fast)
     residual(s, W, q, fast, np.zeros(fast.size), none)
     assert renew_pair_tangents(s, W, factors[2], factors[1], 0)
     W.rhs[:] = load
-    solve(s, W, 0, x, none)
+    solve_bordered(s, W, 0, x, none)
     old = x.copy()
     add_renewed(s, W, x, none)
     return old, x, np.linalg.solve(matrix(now, fast, factors), load)

@@ -104,13 +104,8 @@ def chain(n):
     mech = rom.Mechanism(gravity=(0, 0, -9.81))
     above = mech.ground.marker((0, 0, 0))
     for k in range(n):
-        bar = mech.add_rigid(
-            f"link {k}",
-            mass=1.0,
-            inertia=(0.1,) * 3,
-            at=(k + 0.5, 0, 0),
-            markers={"top": (-0.5, 0, 0), "end": (0.5, 0, 0)},
-        )
+        bar = mech.add_rigid(f"link {k}", mass=1.0, inertia=(0.1,) * 3, at=(k + 0.5, 0, 0),
+                             markers={"top": (-0.5, 0, 0), "end": (0.5, 0, 0)})  # fmt: skip
         mech.revolute(f"hinge {k}", above, bar.marker("top"), axis=(0, 1, 0))
         above = bar.marker("end")
     return mech
@@ -126,18 +121,13 @@ def loaded_body(mech):
     mech.spread_load("weight", part, rom.mass_load(soft, (0, 0, -1.0)))
 
 
-def bending_body(mech):
+def bending_body(mech, *, sampled=False):
+    """A flexible body whose energy is a quartic, or that of two points."""
     soft = random_body(np.random.default_rng(1), damped=False)
     energy = Quartic(soft.K, *(np.ones(n_entries(len(soft.K), order)) for order in (3, 4)))
-    mech.add_flexible("c", replace(soft, quartic=energy))
-
-
-def rubber_body(mech):
-    """A flexible body whose energy is that of two points."""
-    soft = random_body(np.random.default_rng(1), damped=False)
-    rng = np.random.default_rng(0)
-    r = soft.n_modes
-    energy = Sampled(soft.K, rng.standard_normal((2, 9, r)), np.ones(2), np.ones((2, 2)))
+    if sampled:
+        gradients = np.random.default_rng(0).standard_normal((2, 9, soft.n_modes))
+        energy = Sampled(soft.K, gradients, np.ones(2), np.ones((2, 2)))
     mech.add_flexible("c", replace(soft, quartic=energy))
 
 
@@ -164,13 +154,13 @@ ELEMENTS = {  # family -> what asks for it
     "contacts": lambda m, a, b: m.sphere_on_sphere("e", a, b, LAW, radius1=0.1, radius2=0.1),
     "spread_loads": lambda m, a, b: loaded_body(m),
     "nonlinear": lambda m, a, b: m.add_nonlinear("e", body(straight(1.0, 2, **ROD))),
+    "bodies of large deflection": lambda m, a, b: bending_body(m),
+    "bodies of sampled elements": lambda m, a, b: bending_body(m, sampled=True),
     "tendons": lambda m, a, b: m.tendon("e", [a, b], EA=1.0),
     "gear_meshes": lambda m, a, b: m.gear_mesh("e", a, b, **WHEELS),
     "rolling_bearings": lambda m, a, b: m.rolling_bearing("e", a, ground(m), **BALLS),
     "journal_bearings": lambda m, a, b: m.journal_bearing("e", a, ground(m), **FILM),
     "spins": lambda m, a, b: m.add_rigid("e", **WHEEL),
-    "bodies of large deflection": lambda m, a, b: bending_body(m),
-    "bodies of sampled elements": lambda m, a, b: rubber_body(m),
 }
 KERNELS = ("residuals", "tangents", "energy", "multiplier_columns", "pair_tangents")
 

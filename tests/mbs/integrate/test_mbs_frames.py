@@ -150,7 +150,7 @@ def test_a_state_of_an_older_file_is_refused_where_frames_have_changed(tmp_path,
         mech = drawn(0, frame)
         state = moved(mech, dt=1e-2).final
         with monkeypatch.context() as patched:
-            patched.setattr("rom.mbs.results.checkpoint.VERSION", (2, 0))
+            patched.setattr("rom.mbs.results.state.VERSION", (2, 0))
             rom.save_state(state, tmp_path / "old.state.npz")
         old = rom.load_state(tmp_path / "old.state.npz")
         goes_on = {

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from cases.mbs.mechanisms import prepared, random_body, random_pose, random_state, simulate_quietly
+from cases.mbs.mechanisms import prepared, random_pose, random_state, simulate_quietly, two_soft
 from cases.mbs.tangents import GRAVITY, check_tangents, constraint_derivatives
 from rom.errors import ConfigError, ModelError, SolverError
 from rom.mbs.equations.equations import evaluate, linearize_constraints
@@ -20,9 +20,7 @@ BALL = (0.2, 0.2, 0.2)
 
 def everything(rng):
     """Every connection of this page, between flexible bodies, a rigid one and the ground."""
-    mech = Mechanism(gravity=GRAVITY)
-    one = mech.add_flexible("one", random_body(rng), **random_pose(rng))
-    two = mech.add_flexible("two", random_body(rng, r=3), **random_pose(rng))
+    mech, one, two = two_soft(rng, GRAVITY)
     box = mech.add_rigid("box", mass=2.0, inertia=(1.0, 1.5, 2.0),
                          markers={"a": (0.3, 0.2, -0.1)}, **random_pose(rng))  # fmt: skip
     m1, m2, m3 = one.marker("a"), two.marker("b"), box.marker("a")
@@ -55,24 +53,22 @@ def test_gradient_and_convective_term_are_derivatives(seed):
     assert np.abs(W.G).max(axis=1).min() > 0.01
 
 
-@pytest.mark.parametrize("kind", ["distance", "roll", "wheel", "line", "rack"])
+STIFF = {  # kind -> what joins places of two flexible bodies
+    "distance": lambda m, a, b, *_: m.distance("rod", a, b),
+    "roll": lambda m, a, b, *_: m.rolling("roll", a, b, normal=AXIS, radius=0.3),
+    "wheel": lambda m, a, b, *_: m.rolling("roll", a, b, normal=AXIS, radius=0.3, axis=ACROSS),
+    "line": lambda m, a, b, *_: m.point_on_line("line", a, b, axis=AXIS),
+    "rack": lambda m, a, b, c, d: (
+        m.point_on_line("line", a, b, axis=AXIS), m.point_on_line("other", c, d, axis=ACROSS),
+        m.gear("rack", "line", "other", ratio=0.3)),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", STIFF)
 def test_constraint_stiffness_is_the_derivative_of_the_constraint_forces(kind):
     rng = np.random.default_rng(7)
-    mech = Mechanism(gravity=GRAVITY)
-    one = mech.add_flexible("one", random_body(rng), **random_pose(rng))
-    two = mech.add_flexible("two", random_body(rng, r=3), **random_pose(rng))
-    a, b, c = one.marker("a"), two.marker("b"), two.marker("a")
-    if kind == "distance":
-        mech.distance("rod", a, b)
-    elif kind in ("roll", "wheel"):
-        mech.rolling(
-            "roll", a, b, normal=AXIS, radius=0.3, axis=ACROSS if kind == "wheel" else None
-        )
-    else:
-        mech.point_on_line("line", a, b, axis=AXIS)
-        if kind == "rack":
-            mech.point_on_line("other", c, one.marker("b"), axis=ACROSS)
-            mech.gear("rack", "line", "other", ratio=0.3)
+    mech, one, two = two_soft(rng, GRAVITY)
+    STIFF[kind](mech, one.marker("a"), two.marker("b"), two.marker("a"), one.marker("b"))
     packed, W = prepared(mech)
     packed.system.markers.twist[:] *= 1e-3
     check_tangents(packed, W, random_state(rng, packed), np.eye(packed.v.size), 1e-6)
@@ -214,27 +210,15 @@ def test_a_rod_between_points_is_a_pendulum():
     assert_allclose(pull, -1.3 * 9.81 * np.cos(start), rtol=1e-9)
 
 
-def slope(build, angle=0.3, radius=0.2, J=0.4):
-    """Something of mass 1 that rolls down a plane inclined by ``angle``."""
-    mech = Mechanism(gravity=(9.81 * np.sin(angle), 0, -9.81 * np.cos(angle)))
-    body = mech.add_rigid("body", mass=1.0, inertia=(J * radius**2,) * 3, at=(0, 0, radius),
-                          markers={"o": (0, 0, 0)})  # fmt: skip
-    build(mech, mech.ground.marker((0, 0, 0)), body.marker("o"), radius)
-    return mech
-
-
-ROLLERS = {
-    "ball": (lambda m, a, b, r: m.rolling("roll", a, b, normal=Z, radius=r), 2 / 5),
-    "wheel": (lambda m, a, b, r: m.rolling("roll", a, b, normal=Z, radius=r, axis=Y), 1 / 2),
-}
-
-
 @pytest.mark.parametrize("method", ["generalized-alpha", "dop853"])
-@pytest.mark.parametrize("roller", ROLLERS)
-def test_what_rolls_down_a_slope_has_the_acceleration_of_the_closed_form(roller, method):
+@pytest.mark.parametrize(("axis", "J"), [(None, 2 / 5), (Y, 1 / 2)])
+def test_what_rolls_down_a_slope_has_the_acceleration_of_the_closed_form(axis, J, method):
     """A = g sin / (1 + J / (m r^2)): 5/7 for the ball, 2/3 for the disc."""
-    build, J = ROLLERS[roller]
-    sol = simulate(slope(build, J=J), t_end=1.0, dt=1e-3, method=method)
+    mech = Mechanism(gravity=(9.81 * np.sin(0.3), 0, -9.81 * np.cos(0.3)))
+    body = mech.add_rigid("body", mass=1.0, inertia=(J * 0.2**2,) * 3, at=(0, 0, 0.2))
+    floor, centre = mech.ground.marker((0, 0, 0)), body.marker((0, 0, 0))
+    mech.rolling("roll", floor, centre, normal=Z, radius=0.2, axis=axis)
+    sol = simulate(mech, t_end=1.0, dt=1e-3, method=method)
     a = 9.81 * np.sin(0.3) / (1 + J)
     assert_allclose(sol.position("body")[:, 0], 0.5 * a * sol.t**2, atol=1e-8)
     assert_allclose(sol.omega("body")[:, 1], a / 0.2 * sol.t, atol=1e-7)
@@ -293,17 +277,12 @@ def test_a_thrown_hoop_wobbles_without_loss_and_touches_the_plane():
 WRONG = {
     "screw without pitch": (lambda m, a, b: m.screw("s", a, b, axis=Z, pitch=0.0), "pitch = 0"),
     "rod of length zero": (lambda m, a, b: m.distance("s", a, b), "coincide"),
-    "rod of negative length": (lambda m, a, b: m.distance("s", a, b, length=-1), "length = -1"),
     "flat wheel": (lambda m, a, b: m.rolling("s", a, b, normal=Z, radius=1, axis=Z), "lies flat"),
-    "ball of no size": (lambda m, a, b: m.rolling("s", a, b, normal=Z, radius=0), "radius = 0"),
     "gear on itself": (lambda m, a, b: m.gear("s", "hinge", "hinge", ratio=2), "with itself"),
     "gear on nothing": (lambda m, a, b: m.gear("s", "hinge", "door", ratio=2), "no joint 'door'"),
-    "gear on a ball": (lambda m, a, b: m.gear("s", "hinge", "ball", ratio=2), "is spherical"),
     "gear that locks": (lambda m, a, b: m.gear("s", "hinge", "tube", ratio=0), "ratio = 0"),
     "way of a hinge": (lambda m, a, b: m.gear("s", "hinge", "tube", ratio=1, coordinate1="way"),
                        "no coordinate 'way'"),
-    "side of a hinge": (lambda m, a, b: m.gear("s", "hinge", "tube", ratio=1, coordinate1="x"),
-                        "coordinate1 = 'x'"),
 }  # fmt: skip
 
 

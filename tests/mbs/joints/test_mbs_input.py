@@ -10,6 +10,7 @@ from cases.mbs.mechanisms import (
     simulate_quietly,
     slider_crank,
 )
+from cases.mbs.parts import on_axle
 from rom.errors import ConfigError, ModelError, SolverError
 from rom.mbs.integrate.simulation import simulate
 from rom.mbs.mechanism import Mechanism
@@ -36,7 +37,6 @@ def singular_body():
 
 
 WRONG = {
-    "mass zero": (lambda m, *_: m.add_rigid("x", **UNIT | {"mass": 0}), ConfigError, "mass"),
     "inertia negative": (lambda m, *_: m.add_rigid("x", **UNIT | {"inertia": (1, 1, -1)}),
                          ModelError, "principal moments"),
     "inertia of no body": (lambda m, *_: m.add_rigid("x", **UNIT | {"inertia": (1, 1, 3)}),
@@ -45,20 +45,12 @@ WRONG = {
         "x", **UNIT | {"inertia": [[1, 0.5, 0], [0, 1, 0], [0, 0, 1]]}), ModelError, "symmetric"),
     "quaternion zero": (lambda m, *_: m.add_rigid("x", **UNIT, orientation=(0, 0, 0, 0)),
                         ConfigError, "quaternion [0.0, 0.0, 0.0, 0.0]"),
-    "quaternion of length 1.1": (lambda m, *_: m.add_rigid("x", **UNIT, orientation=(1.1, 0, 0, 0)),
-                                 ConfigError, "quaternion"),
     "stretch as orientation": (lambda m, *_: m.add_rigid(
         "x", **UNIT, orientation=np.diag([2, 1, 1])), ConfigError, "orientation"),
-    "mirror as orientation": (lambda m, *_: m.add_rigid(
-        "x", **UNIT, orientation=np.diag([1, 1, -1])), ConfigError, "orientation"),
-    "marker of two": (lambda m, *_: m.add_rigid("x", **UNIT, markers={"tip": (0, 0)}), ConfigError,
-                      "markers['tip'] has shape (2,)"),
     "marker nowhere": (lambda m, *_: m.add_rigid("x", **UNIT, markers={"tip": (0, 0, np.nan)}),
                        ConfigError, "markers['tip'] = (0, 0, nan)"),
     "rates too short": (lambda m, *_: m.add_flexible("x", BODY, qd=(0, 0, 0)), ConfigError,
                         "qd has shape (3,), needed is (4,)"),
-    "turning of two": (lambda m, *_: m.add_flexible("x", BODY, omega=(0, 0)), ConfigError,
-                       "omega has shape (2,)"),
     "name twice": (lambda m, *_: m.add_rigid("box", **UNIT), ConfigError, "'box' is used twice"),
     "name of the ground": (lambda m, *_: m.add_rigid("ground", **UNIT), ConfigError, "ground"),
     "name empty": (lambda m, *_: m.add_rigid("", **UNIT), ConfigError, "name"),
@@ -67,8 +59,6 @@ WRONG = {
                                       "is flexible"),
     "rigid motion in the shapes": (lambda m, *_: m.add_flexible("x", singular_body()), ModelError,
                                    "singular"),
-    "elastic start too short": (lambda m, *_: m.add_flexible("x", BODY, q=(1.0,)), ConfigError,
-                                "q has shape (1,)"),
     "axis zero": (lambda m, box, bar: m.revolute(
         "j", box.marker("a"), bar.marker("a"), axis=(0, 0, 0)), ConfigError, "axis of j"),
     "joint with itself": (lambda m, box, bar: m.spherical(
@@ -76,15 +66,8 @@ WRONG = {
     "axes not perpendicular": (lambda m, box, bar: m.universal(
         "j", box.marker("a"), bar.marker("a"), axis1=Z, axis2=(0, 1, 1)), ConfigError,
         "must be perpendicular"),
-    "drive of a ball": (lambda m, *_: m.drive("d", "ball", lambda t: t), ConfigError,
-                        "'ball' is spherical"),
     "drive of nothing": (lambda m, *_: m.drive("d", "hunge", lambda t: t), ConfigError,
                          "no joint 'hunge'"),
-    "cross without arm": (lambda m, box, bar: m.universal(
-        "j", box.marker("a"), bar.marker("a"), axis1=Z, axis2=(0, 0, 0)), ConfigError,
-        "axis2 of j has length zero"),
-    "joint twice": (lambda m, box, bar: m.revolute(
-        "hinge", box.marker("a"), bar.marker("a"), axis=Z), ConfigError, "'hinge' is used twice"),
     "joint like a body": (lambda m, box, bar: m.fixed("box", box.marker("a"), bar.marker("a")),
                           ConfigError, "'box' is used twice"),
     "load like a joint": (lambda m, box, bar: m.force("ball", box.marker("a"), Z), ConfigError,
@@ -92,13 +75,9 @@ WRONG = {
     "coil on a ball": (lambda m, *_: m.rotational_spring("c", "ball", stiffness=1.0), ConfigError,
                        "'ball' is spherical"),
     "coil on a slide": (lambda m, box, bar: (
-        m.prismatic("slide", mechanism_ground(m), bar.marker("b"), axis=Z),
+        m.prismatic("slide", m.ground.marker((0, 0, 0)), bar.marker("b"), axis=Z),
         m.rotational_spring("coil", "slide", stiffness=1.0)), ConfigError, "no coordinate 'angle'"),
 }  # fmt: skip
-
-
-def mechanism_ground(m):
-    return m.ground.marker((0, 0, 0))
 
 
 @pytest.mark.parametrize("case", WRONG)
@@ -117,31 +96,9 @@ def test_wrong_parts_of_a_mechanism_are_refused_where_they_are_made(case):
 GOOD = {"t_end": 0.01, "dt": 1e-3}
 
 
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        ({"dt": 0.0}, "dt = 0"),
-        ({"t_end": 0.0}, "t_end = 0 s is not after 0 s"),
-        ({"rho_inf": 1.1}, "rho_inf = 1.1"),
-        ({"rho_inf": -0.1}, "rho_inf = -0.1"),
-        ({"tolerance": 0.0}, "tolerance = 0"),
-        ({"atol": 0.0}, "atol = "),
-        ({"save_every": 0}, "save_every = 0"),
-    ],
-)
-def test_wrong_arguments_of_a_run_are_named(options, words):
-    with pytest.raises(ConfigError) as caught:
-        simulate(slider_crank(), **GOOD | options)
-    assert words in str(caught.value)
-
-
-def test_a_state_of_another_mechanism_is_refused():
-    state = simulate_quietly(slider_crank(), **GOOD).final
-    with pytest.raises(ConfigError, match="the state has 21 coordinates, 18 velocities"):
-        simulate(mechanism()[0], t_end=1.0, dt=0.1, state=state)
-
-
-def test_an_empty_mechanism_is_refused():
+def test_a_run_that_ends_where_it_starts_or_has_no_body_is_refused():
+    with pytest.raises(ConfigError, match="t_end = 0 s is not after 0 s"):
+        simulate(slider_crank(), t_end=0.0, dt=1e-3)
     with pytest.raises(ConfigError, match="bod"):
         simulate(Mechanism(), **GOOD)
 
@@ -194,8 +151,7 @@ def test_numbers_of_numpy_are_numbers():
 def driven(function):
     """A box on a hinge."""
     mech = Mechanism(gravity=(0, 0, 0))
-    box = mech.add_rigid("box", **UNIT)
-    mech.revolute("hinge", mech.ground.marker((0, 0, 0)), box.marker((0, 0, 0)), axis=Z)
+    on_axle(mech, "box", axle="hinge")
     mech.drive("motor", "hinge", function)
     return mech
 

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from cases.long import ROM_LONG
 from cases.mbs.mechanisms import simeon_crank, simulate_quietly, slider_crank
 from cases.paths import TESTS
 
@@ -32,23 +31,21 @@ def compare(sol, want, positions, velocities):
 
 @pytest.mark.long
 @pytest.mark.once
-def test_published_solution_of_the_flexible_slider_crank():
-    """C2: 13 digits of an independent formulation, with its own inertia integrals."""
-    sol = simulate_quietly(
-        simeon_crank(), t_end=0.1, dt=0.1, method="dop853", rtol=1e-11, atol=1e-13
-    )
-    compare(sol, REFERENCE["published"], 2e-9, 2e-8)
+@pytest.mark.parametrize(
+    ("kind", "divisor", "rtol", "limits"),
+    [("published", 1.0, 1e-11, (2e-9, 2e-8)), ("physical", 15.0, 1e-9, (1e-6, 1e-5))],
+)
+def test_published_solution_of_the_flexible_slider_crank(kind, divisor, rtol, limits):
+    """C2: 13 digits of an independent formulation, with its own inertia integrals.
 
-
-@pytest.mark.once
-@pytest.mark.slow
-@pytest.mark.skipif(not ROM_LONG, reason="half a minute; the same kernels as above")
-def test_physical_flexible_slider_crank():
-    """With the consistent axial mass, fifteen times lighter and four times faster."""
-    sol = simulate_quietly(
-        simeon_crank(15.0), t_end=0.1, dt=0.1, method="dop853", rtol=1e-9, atol=1e-11
+    And with the consistent axial mass, fifteen times lighter and four times faster.
+    """
+    options = {"method": "dop853", "rtol": rtol, "atol": rtol / 100}
+    compare(
+        simulate_quietly(simeon_crank(divisor), t_end=0.1, dt=0.1, **options),
+        REFERENCE[kind],
+        *limits,
     )
-    compare(sol, REFERENCE["physical"], 1e-6, 1e-5)
 
 
 def test_largest_bending_of_the_published_crank_with_generalized_alpha():

@@ -13,6 +13,7 @@ from scipy.special import ellipj, ellipk
 
 from cases.mbs.lagrange import jacobian, lagrange, potential_force
 from cases.mbs.mechanisms import simulate_quietly
+from cases.mbs.parts import slender, turned
 from rom.errors import RomWarning
 from rom.mbs.integrate.simulation import simulate
 from rom.mbs.mechanism import Mechanism
@@ -20,24 +21,6 @@ from rom.mbs.results.audit import audit
 
 X, Y, Z = np.eye(3)
 g = 9.81
-
-
-def turned(angle):
-    """Rotation about z."""
-    c, s = np.cos(angle), np.sin(angle)
-    return np.array([[c, -s, 0], [s, c, 0], [0, 0, 1.0]])
-
-
-def rod(mech, name, start, end, mass=1.0, **motion):
-    """A slender uniform rod in the xy plane with a marker at each end."""
-    start, end = np.append(start, 0.0), np.append(end, 0.0)
-    length = np.linalg.norm(end - start)
-    J, half = mass * length**2 / 12, 0.5 * length * X
-    return mech.add_rigid(
-        name, mass=mass, inertia=(1e-3 * J, J, J), at=0.5 * (start + end),
-        orientation=turned(np.arctan2(*(end - start)[1::-1])),
-        markers={"a": -half, "b": half}, **motion,
-    )  # fmt: skip
 
 
 def rod_points(a, b, mass=1.0):
@@ -71,11 +54,11 @@ def four_bars(n, speed=1.0):
     mech = Mechanism(gravity=(0, -g, 0))
     last = None
     for k in range(n + 1):
-        crank = rod(mech, f"crank {k}", (k, 0.0), (k, 1.0), velocity=0.5 * speed * X,
+        crank = slender(mech, f"crank {k}", (k, 0.0), (k, 1.0), velocity=0.5 * speed * X,
                     omega=-speed * Z)  # fmt: skip
         mech.revolute(f"A{k}", mech.ground.marker((k, 0, 0)), crank.marker("a"), axis=Z)
         if last is not None:
-            bar = rod(mech, f"bar {k}", (k - 1, 1.0), (k, 1.0), velocity=speed * X)
+            bar = slender(mech, f"bar {k}", (k - 1, 1.0), (k, 1.0), velocity=speed * X)
             mech.revolute(f"B{k}", last.marker("b"), bar.marker("a"), axis=Z)
             mech.revolute(f"C{k}", bar.marker("b"), crank.marker("b"), axis=Z)
         last = crank
@@ -357,7 +340,7 @@ def test_a_folded_chain_falls():
     mech = Mechanism(gravity=(0, -g, 0))
     P, last = joints(start), mech.ground.marker((0, 0, 0))
     for k in range(n):
-        link = rod(mech, f"link {k}", P[k], P[k + 1])
+        link = slender(mech, f"link {k}", P[k], P[k + 1])
         mech.revolute(f"pin {k}", last, link.marker("a"), axis=Z)
         last = link.marker("b")
     sol = simulate(mech, t_end=0.45, dt=5e-4, rho_inf=1.0)

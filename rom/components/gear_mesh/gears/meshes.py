@@ -38,7 +38,7 @@ from rom.components.round_bodies.cylinders import Cylinder, cylinder_of, pack_cy
 from rom.errors import ConfigError
 from rom.mbs.elements.family import Family, Hooks, Places, integers, rows_of
 from rom.mbs.parts.bodies import Marker, Part
-from rom.mbs.parts.whole import Whole
+from rom.mbs.parts.joints import Whole
 from rom.model import Array
 from rom.plausible import USUAL, Range
 from rom.rotation import matrix

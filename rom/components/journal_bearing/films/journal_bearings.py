@@ -29,7 +29,7 @@ from rom.components.journal_bearing.films.tabulated import N_READ, N_VALUES, tab
 from rom.errors import ConfigError
 from rom.mbs.elements.family import Family, Hooks, Places, integers, never, rows_of
 from rom.mbs.parts.bodies import Marker
-from rom.mbs.parts.whole import Whole
+from rom.mbs.parts.joints import Whole
 from rom.model import Array, Index
 from rom.rotation import matrix
 

@@ -1,5 +1,4 @@
-"""Contact of bodies: the laws of `impact`, bodies of simple shape in `points`, `surfaces`.
+"""Contact of bodies: the laws of `impact`, simple `shapes` that touch, and how in `points`.
 
 What touches is pushed apart by a force that grows with the depth of penetration; none pulls.
-`capsules` touch where `segments`, their axes, are nearest; `bristles` let friction hold.
 """

@@ -4,7 +4,6 @@ from dataclasses import dataclass
 from typing import Annotated, Any
 
 import numpy as np
-from scipy.optimize import brentq
 
 from rom.arguments import AtLeast, Between, NotNegative, Positive, between, positive, typed
 from rom.errors import ConfigError
@@ -51,7 +50,14 @@ class Impact:
     tangential_damping: Annotated[float, NotNegative()] = 0.0
 
     def __post_init__(self) -> None:
-        self._check_spring()
+        k, c = self.tangential_stiffness, self.tangential_damping
+        if k is None and c:
+            raise ConfigError(f"tangential_damping = {c:g} needs a tangential_stiffness.")
+        if k is not None and not self.mu:
+            raise ConfigError(
+                f"tangential_stiffness = {k:g} N/m without friction holds nothing.",
+                hint="Give mu above zero, or no tangential_stiffness.",
+            )
         if (self.restitution is None) != (self.impact_speed is None):
             raise ConfigError(
                 f"restitution = {self.restitution} needs the impact speed at which it holds, "
@@ -63,24 +69,9 @@ class Impact:
             factor = damping_of(self.restitution, self.impact_speed)
             object.__setattr__(self, "damping", factor)
 
-    def _check_spring(self) -> None:
-        """Refuse a spring of friction without friction, and its damping without a spring."""
-        k, c = self.tangential_stiffness, self.tangential_damping
-        if k is None and c:
-            raise ConfigError(f"tangential_damping = {c:g} needs a tangential_stiffness.")
-        if k is not None and not self.mu:
-            raise ConfigError(
-                f"tangential_stiffness = {k:g} N/m without friction holds nothing.",
-                hint="Give mu above zero, or no tangential_stiffness.",
-            )
-
 
 def checked_law(name: str, law: Any, *parts: Part) -> Impact:
-    """The law, if it is one, and bodies that touch show how fast they slide.
-
-    Raises:
-        ConfigError: if not.
-    """
+    """The law, if it is one, and bodies that touch show how fast they slide."""
     if not isinstance(law, Impact):
         raise ConfigError(f"law of {name!r} is {law!r}; a rom.mbs.Impact is needed.")
     for part in parts if law.mu else ():
@@ -89,11 +80,9 @@ def checked_law(name: str, law: Any, *parts: Part) -> Impact:
 
 
 def damping_of(restitution: float, speed: float) -> float:
-    """Damping factor [s/m] that gives a coefficient of restitution at a speed of impact [m/s].
+    """Damping factor [s/m] that gives a coefficient of restitution at a speed of impact [m/s]."""
+    from scipy.optimize import brentq
 
-    Raises:
-        ConfigError: if the coefficient is not above 0 and at most 1.
-    """
     e = between("restitution", restitution, 0, 1, "(]")
     if e > 1.0 - 1e-9:
         return 0.0

@@ -3,42 +3,55 @@
 All functions of one contact take real or complex numbers: the tangents are imaginary parts after
 an imaginary step, exact to round-off.
 
+Friction that truly holds has springs along the surfaces, which slip at Coulomb's limit. A spring
+runs from a point of body i to a point of body j. Both are where the bodies touched at the last
+accepted instant, less what the spring is stretched; seen from there the bodies slide by the way of
+their points, whatever the step. What lies along the normal is dropped.
+
 Source:
     Hunt, Crossley, Coefficient of restitution interpreted as damping in vibroimpact, J. Appl.
-    Mech. 42 (1975) 440. Complex step: Squire, Trapp, SIAM Review 40 (1998) 110.
+    Mech. 42 (1975) 440. Complex step: Squire, Trapp, SIAM Review 40 (1998) 110. Jenkins, J. Appl.
+    Mech. 29 (1962) 327 (spring and slider); Cundall, Strack, Geotechnique 29 (1979) 47 (in
+    contacts that move); stiffness: Mindlin, J. Appl. Mech. 16 (1949) 259.
 """
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from rom import rotation
-from rom.arguments import Direction, Length, unit_vector
-from rom.errors import ConfigError
-from rom.mbs.elements.contact.bristles import (
-    N_REMEMBERED,
-    STORED,
-    ends_of_spring,
-    forget_spring,
-    keep_spring,
-    spring_and_slider,
-)
-from rom.mbs.elements.contact.impact import Impact, checked_law
-from rom.mbs.elements.contact.segments import across_of
+from rom.mbs.elements.contact.impact import Impact
 from rom.mbs.elements.family import Family, Hooks, Places, integers, rows_of
-from rom.mbs.kernels.algebra import add, cross, dot, row, scale, sub, turn, unit_twist
-from rom.mbs.kernels.compiled import inner
-from rom.mbs.kernels.constraints import pair_stiffness
+from rom.mbs.kernels.algebra import (
+    add,
+    cross,
+    dot,
+    mtv,
+    put,
+    row,
+    scale,
+    sub,
+    turn,
+    unit_twist,
+    vec,
+)
+from rom.mbs.kernels.compiled import inner, kernel
+from rom.mbs.kernels.constraints import pair_stiffness, push_pair
 from rom.mbs.kernels.element_calls import energy, residuals, tangents
 from rom.mbs.kernels.tables import Array2, Index1, Table, table
 from rom.mbs.parts.bodies import Marker
-from rom.mbs.parts.whole import Whole
 from rom.model import Array
 
 # kinds of contacts
 PLANE, SPHERE, CYLINDER, BORE, DISC, CAPSULE = range(6)
 COMPLEX_STEP = 1e-30
+# what a contact remembers: whether it touched, ends of its spring in the axes of i and j [m],
+# energy in the spring [J]
+HELD, ON_I, ON_J, STORED = 0, 1, 4, 7
+N_REMEMBERED = 8
+STICK_RTOL = 1e-9  # what slid to the limit sticks there when it is looked at again
+PARALLEL_SQUARE = 1e-12  # squared sine between axes, below which the nearest points are not unique
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,143 +66,6 @@ class Contact:
     radius: tuple[float, float]
     law: Impact
     half: tuple[float, float] = (0.0, 0.0)
-
-
-def sphere_on_plane(
-    self: Whole,
-    name: str,
-    m1: Marker,
-    m2: Marker,
-    law: Impact,
-    *,
-    normal: Direction,
-    radius: Length,
-) -> None:
-    """Sphere about m2 against the plane through m1.
-
-    Args:
-        name: name of the contact.
-        m1: point of the plane.
-        m2: centre of the sphere.
-        law: force of the penetration.
-        normal: (3,) of the plane towards the sphere, world at the start [1].
-        radius: of the sphere [m].
-
-    Raises:
-        ConfigError: for a name in use, an unknown marker, one body twice, a law that is no
-            `rom.mbs.Impact`, or no direction.
-    """
-    enter_contact(self, name, PLANE, (m1, m2), law, (normal, None), (radius, 0.0))
-
-
-def disc_on_plane(  # noqa: PLR0913  two surfaces and a law
-    self: Whole,
-    name: str,
-    m1: Marker,
-    m2: Marker,
-    law: Impact,
-    *,
-    normal: Direction,
-    axis: Direction,
-    radius: Length,
-) -> None:
-    """Rim of a thin disc about m2 against the plane through m1; two make a cylinder.
-
-    Args:
-        name: name of the contact.
-        m1: point of the plane.
-        m2: centre of the disc, which must not lie flat.
-        law: force of the penetration.
-        normal: (3,) of the plane towards the disc, world at the start [1].
-        axis: (3,) of the disc, world at the start [1].
-        radius: of the disc [m].
-
-    Raises:
-        ConfigError: for a name in use, an unknown marker, one body twice, a law that is no
-            `rom.mbs.Impact`, or no direction.
-    """
-    enter_contact(self, name, DISC, (m1, m2), law, (normal, axis), (radius, 0.0))
-
-
-def sphere_on_sphere(
-    self: Whole,
-    name: str,
-    m1: Marker,
-    m2: Marker,
-    law: Impact,
-    *,
-    radius1: Length,
-    radius2: Length,
-) -> None:
-    """Spheres of radius1 about m1 and radius2 about m2 [m].
-
-    Raises:
-        ConfigError: for a name in use, an unknown marker, one body twice, a law that is no
-            `rom.mbs.Impact`, or a radius not above zero.
-    """
-    enter_contact(self, name, SPHERE, (m1, m2), law, (None, None), (radius2, radius1))
-
-
-def sphere_on_cylinder(  # noqa: PLR0913  two surfaces and a law
-    self: Whole,
-    name: str,
-    m1: Marker,
-    m2: Marker,
-    law: Impact,
-    *,
-    axis: Direction,
-    radius1: Length,
-    radius2: Length,
-    inside: bool = False,
-) -> None:
-    """Sphere about m2 against an endless cylinder about m1, or its bore.
-
-    A disc across a bore with its radius is a pin with clearance.
-
-    Args:
-        name: name of the contact.
-        m1: point of the axis of the cylinder.
-        m2: centre of the sphere.
-        law: force of the penetration.
-        axis: (3,) of the cylinder, world at the start [1].
-        radius1: of the cylinder [m].
-        radius2: of the sphere [m].
-        inside: the sphere is in the bore.
-
-    Raises:
-        ConfigError: for a sphere that does not fit into the bore, a name in use, an unknown marker,
-            one body twice, a law that is no `rom.mbs.Impact`, or no direction.
-    """
-    if inside and radius2 >= radius1:
-        raise ConfigError(
-            f"contact {name!r}: the sphere of {radius2:g} m must be smaller than the bore of "
-            f"{radius1:g} m; leave inside out for a sphere outside."
-        )
-    kind, radii = BORE if inside else CYLINDER, (radius2, radius1)
-    enter_contact(self, name, kind, (m1, m2), law, (axis, None), radii)
-
-
-def enter_contact(  # noqa: PLR0913  what the record holds
-    self: Whole,
-    name: str,
-    kind: int,
-    markers: Any,
-    law: Impact,
-    axes: Any,
-    radius: Any,
-    half: tuple[float, float] = (0.0, 0.0),
-) -> None:
-    """Add a contact whose axes are given in the world at the start; None where it has none."""
-    self.check_apart(name, *markers)
-    directions = [
-        np.zeros(3)
-        if axis is None
-        else rotation.matrix(self.part(marker.body).p).T @ unit_vector(f"axis of {name}", axis)
-        for marker, axis in zip(markers, axes, strict=True)
-    ]
-    i, j = markers
-    law = checked_law(name, law, self.part(i.body), self.part(j.body))
-    self.add(name, Contact(kind, i, j, *directions, radius, law, half), CONTACTS_FAMILY)
 
 
 @table
@@ -244,6 +120,102 @@ def kept(contacts: "Contacts", memory: Array) -> Array:
     """(n_t,) energy in springs of friction, from what is remembered (n_t, p) [J]."""
     total: Array = memory[:, contacts.remembered[contacts.remembered >= 0] + STORED].sum(axis=1)
     return total
+
+
+@inner
+def within(x, half):
+    """The number nearest to x between -half and half."""
+    if x.real > half:
+        return 0.0 * x + half
+    if x.real < -half:
+        return 0.0 * x - half
+    return x
+
+
+@inner
+def middle_of_overlap(x, half_i, half_j):
+    """Place on the first of two parallel pieces, the second one's middle x along it."""
+    low = max(-half_i, x.real - half_j)
+    high = min(half_i, x.real + half_j)
+    return within(0.0 * x + 0.5 * (low + high), half_i)
+
+
+@inner
+def nearest(gap, e, s, half_i, half_j):
+    """Places on both pieces, from their middles, between which they are nearest.
+
+    The pieces are a e, |a| <= half_i, and gap + b s, |b| <= half_j. Where both places are inside,
+    d = gap + b s - a e is normal to both axes; else one is held at its end, and the other is the
+    foot of the perpendicular, or its own end.
+
+    Source:
+        Ericson, Real-Time Collision Detection (2005), section 5.1.9.
+    """
+    x, y, c = dot(gap, e), dot(gap, s), dot(e, s)
+    sine = 1.0 - c * c
+    if sine.real > PARALLEL_SQUARE:
+        a = within((x - c * y) / sine, half_i)
+    else:
+        a = middle_of_overlap(x, half_i, half_j)
+    b = within(c * a - y, half_j)
+    return within(c * b + x, half_i), b
+
+
+@inner
+def across_of(gap, e, s, half_i, half_j):
+    """Vector between the nearest points of two pieces, and that from the middle of the second."""
+    a, b = nearest(gap, e, s, half_i, half_j)
+    out = scale(b, s)
+    return sub(add(gap, out), scale(a, e)), out
+
+
+@kernel
+def distance(gap, e, s, half_i, half_j):
+    """Between two pieces, for arrays (3,)."""
+    d = across_of(vec(gap, 0), vec(e, 0), vec(s, 0), half_i, half_j)[0]
+    return math.sqrt(dot(d, d))
+
+
+@inner
+def shortened(x, limit):
+    """The vector x, or one of length ``limit`` in its direction if it is longer."""
+    size = np.sqrt(dot(x, x))
+    if size.real > (1.0 + STICK_RTOL) * limit.real:
+        return scale(limit / size, x)
+    return x
+
+
+@inner
+def spring_and_slider(bristle, limit, stretch, slide):
+    """Friction on j, and the stretch that remains; ``bristle`` is stiffness and damping."""
+    stretch = shortened(stretch, limit / bristle[0])
+    load = add(scale(bristle[0], stretch), scale(bristle[1], slide))
+    return scale(-1.0, shortened(load, limit)), stretch
+
+
+@inner
+def ends_of_spring(W, at, i, j):
+    """One if bodies touched at the last instant, else zero; ends from their markers, world."""
+    on_i, on_j = turn(W.E, i, vec(W.base, at + ON_I)), turn(W.E, j, vec(W.base, at + ON_J))
+    return W.base[at + HELD], on_i, on_j
+
+
+@inner
+def keep_spring(W, at, markers, touching, stretch, stiffness):
+    """Remember a spring; ``touching`` is the vector from each marker to the touching point."""
+    i, j = markers
+    W.fresh[at + HELD] = 1.0
+    for p in range(3):
+        W.fresh[at + ON_I + p] = W.fresh[at + ON_J + p] = 0.0
+    put(W.fresh, at + ON_I, mtv(W.E[i], sub(touching[0], stretch)))
+    put(W.fresh, at + ON_J, mtv(W.E[j], touching[1]))
+    W.fresh[at + STORED] = 0.5 * stiffness * dot(stretch, stretch)
+
+
+@inner
+def forget_spring(W, at):
+    """The bodies are apart."""
+    W.fresh[at + HELD] = W.fresh[at + STORED] = 0.0
 
 
 @inner
@@ -325,11 +297,7 @@ def contact_wrenches(_s, W, contacts, _q, _v, _lam):
         if at >= 0:
             keep_spring(W, at, (i, j), arms, stretch, bristle[0])
         at_i, at_j = cross(arms[0], force), cross(arms[1], force)
-        for p in range(3):
-            W.wrench[j, p] += force[p]
-            W.wrench[j, 3 + p] += at_j[p]
-            W.wrench[i, p] -= force[p]
-            W.wrench[i, 3 + p] -= at_i[p]
+        push_pair(W, i, j, force, at_i, at_j)
         W.power[2] -= dot(force, u) + elastic * closing
 
 
@@ -373,14 +341,11 @@ def contact_tangents(s, W, contacts, _lam, ck, cc):
         e, axle, motion, _ = contact_state(contacts, k, W)
         if not touch(contacts.kind[k], contacts.size[k], motion[0], e, axle)[1] > 0.0:
             continue
-        W.Q[:] = 0.0
-        for p in range(12):
-            contact_column(contacts, W, k, p, True, -ck)
-        pair_stiffness(s, W, contacts.i[k], contacts.j[k], W.Kt)
-        W.Q[:] = 0.0
-        for p in range(12):
-            contact_column(contacts, W, k, p, False, -cc)
-        pair_stiffness(s, W, contacts.i[k], contacts.j[k], W.S)
+        for by_position in (True, False):
+            W.Q[:] = 0.0
+            for p in range(12):
+                contact_column(contacts, W, k, p, by_position, -ck if by_position else -cc)
+            pair_stiffness(s, W, contacts.i[k], contacts.j[k], W.Kt if by_position else W.S)
 
 
 @energy.of(Contacts)

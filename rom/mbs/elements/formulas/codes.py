@@ -5,26 +5,13 @@ ADD, SUB, MUL, DIV, POW, NEG = range(5, 11)
 SIN, COS, TAN, ASIN, ACOS, ATAN, ATAN2 = range(11, 18)
 EXP, LOG, SQRT, ABS, SIGN, MIN, MAX = range(18, 25)
 SINH, COSH, TANH, STEP = range(25, 29)
-FUNCTIONS = {  # name: instruction, fewest and most arguments; None for any number
-    "sin": (SIN, 1, 1),
-    "cos": (COS, 1, 1),
-    "tan": (TAN, 1, 1),
-    "asin": (ASIN, 1, 1),
-    "acos": (ACOS, 1, 1),
-    "atan": (ATAN, 1, 1),
-    "atan2": (ATAN2, 2, 2),
-    "exp": (EXP, 1, 1),
-    "log": (LOG, 1, 1),
-    "sqrt": (SQRT, 1, 1),
-    "abs": (ABS, 1, 1),
-    "sign": (SIGN, 1, 1),
-    "min": (MIN, 2, None),
-    "max": (MAX, 2, None),
-    "sinh": (SINH, 1, 1),
-    "cosh": (COSH, 1, 1),
-    "tanh": (TANH, 1, 1),
-    "step": (STEP, 3, 3),
+NAMES = "sin cos tan asin acos atan atan2 exp log sqrt abs sign min max sinh cosh tanh step".split()
+COUNTS: dict[str, tuple[int, int | None]] = {
+    **dict.fromkeys(NAMES, (1, 1)),
+    **{"atan2": (2, 2), "min": (2, None), "max": (2, None), "step": (3, 3)},
 }
+# name: instruction, fewest and most arguments; None for any number
+FUNCTIONS = {name: (code, *COUNTS[name]) for code, name in enumerate(NAMES, start=SIN)}
 VARIABLES = {"t": T, "x": X, "v": V}
 # instruction: by how much the stack grows
 STACK_GROWTH = {

@@ -22,7 +22,7 @@ from rom.mbs.elements.formulas.taylor import run
 from rom.mbs.elements.law_calls import LAW_TYPES, compiled_entry
 from rom.mbs.kernels.compiled import inner
 from rom.mbs.parts.bodies import Marker
-from rom.mbs.parts.whole import Whole
+from rom.mbs.parts.joints import Whole
 from rom.model import Array
 
 # of Lobatto: with the ends among the points no jump hides between the last one and the end
@@ -143,15 +143,9 @@ def line_law(
     force: Formula,
     potential: Formula | None = None,
 ) -> None:
-    """Add a force along the line between two markers.
+    """Add a force of t, length x [m] and rate v [m/s] that pushes two markers apart [N] as a law.
 
-    Args:
-        mechanism: gets it as a law.
-        name: of the law.
-        m1: one end.
-        m2: other end; apart from the first at the start.
-        force: of t, length x [m] and rate v [m/s], pushing the ends apart [N].
-        potential: integral of the force over x, if it is known [N m].
+    Its potential is the integral of the force over x, if it is known [N m].
 
     Raises:
         ConfigError: for a name in use, or two markers in one place, which have no direction.
@@ -174,13 +168,10 @@ def line_law(
 def through_points(
     x: npt.ArrayLike, values: npt.ArrayLike, interpolation: str
 ) -> tuple[Formula, Formula]:
-    """A curve through points, straight beyond its ends, and its integral.
+    """A curve through points (n,), x ascending, straight beyond its ends, and its integral.
 
-    Args:
-        x: (n,) ascending.
-        values: (n,) there.
-        interpolation: "monotone" for one that nowhere leaves the range of neighbours, "cubic" for a
-            spline with continuous curvature.
+    "monotone" interpolation nowhere leaves the range of neighbours, "cubic" is a spline with
+    continuous curvature.
 
     Source:
         Fritsch, Butland, SIAM J. Sci. Stat. Comput. 5 (1984) 300, for the monotone one.

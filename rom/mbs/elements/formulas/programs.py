@@ -89,10 +89,7 @@ def formula(code: Code, factor: float = 1.0) -> Formula:
 def piecewise(knots: Array, centres: Array, coefficients: Array) -> Formula:
     """Piecewise polynomials of x, the first and the last of which reach on for ever.
 
-    Args:
-        knots: (n - 1,) where one ends and the next begins, ascending.
-        centres: (n,) about which they are developed.
-        coefficients: (n, k) of each, highest power first.
+    They meet at knots (n - 1,), ascending; coefficients (n, k) about centres (n,), highest first.
     """
     n, k = coefficients.shape
     table = np.column_stack([centres, coefficients]).ravel()

@@ -37,6 +37,7 @@ from rom.mbs.elements.formulas.codes import (
     V,
     X,
 )
+from rom.mbs.kernels.algebra import add, row, sub
 from rom.mbs.kernels.compiled import inner
 
 
@@ -95,10 +96,7 @@ def angle(y, x):
 @inner
 def smooth_step(a, start, end):
     """0 before the start, 1 behind the end, 10 s^3 - 15 s^4 + 6 s^5 in between."""
-    s = quotient(
-        (a[0] - start[0], a[1] - start[1], a[2] - start[2]),
-        (end[0] - start[0], end[1] - start[1], end[2] - start[2]),
-    )
+    s = quotient(sub(a, start), sub(end, start))
     u = s[0]
     if u <= 0.0:
         return 0.0, 0.0, 0.0
@@ -197,9 +195,9 @@ def of_one(code, a):
 def of_two(code, a, b):
     """A function of two numbers."""
     if code == ADD:
-        return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+        return add(a, b)
     if code == SUB:
-        return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+        return sub(a, b)
     if code == MUL:
         return product(a, b)
     if code == DIV:
@@ -215,12 +213,9 @@ def of_two(code, a, b):
 
 @inner
 def run(program, t, x, v, stack):
-    """Value and derivatives of a program.
+    """Value and derivatives of a program of variables t, x, v with theirs; stack (MAX_STACK, 3).
 
-    Args:
-        program: number of instructions, (instruction, number) of each, and tables behind them.
-        t, x, v: variables with their derivatives.
-        stack: (MAX_STACK, 3) memory.
+    The program has the number of instructions, (instruction, number) of each, and tables behind.
     """
     top = -1
     for k in range(int(program[0])):
@@ -232,16 +227,13 @@ def run(program, t, x, v, stack):
                 a = t if code == T else x if code == X else v
         elif code in (ADD, SUB, MUL, DIV, POW, ATAN2, MIN, MAX):
             top -= 1
-            a = of_two(code, (stack[top, 0], stack[top, 1], stack[top, 2]),
-                       (stack[top + 1, 0], stack[top + 1, 1], stack[top + 1, 2]))  # fmt: skip
+            a = of_two(code, row(stack, top, 0), row(stack, top + 1, 0))
         elif code == STEP:
             top -= 2
-            a = smooth_step((stack[top, 0], stack[top, 1], stack[top, 2]),
-                            (stack[top + 1, 0], stack[top + 1, 1], stack[top + 1, 2]),
-                            (stack[top + 2, 0], stack[top + 2, 1], stack[top + 2, 2]))  # fmt: skip
+            a = smooth_step(row(stack, top, 0), row(stack, top + 1, 0), row(stack, top + 2, 0))
         elif code == PIECES:
-            a = pieces(program, int(number), (stack[top, 0], stack[top, 1], stack[top, 2]))
+            a = pieces(program, int(number), row(stack, top, 0))
         else:
-            a = of_one(code, (stack[top, 0], stack[top, 1], stack[top, 2]))
+            a = of_one(code, row(stack, top, 0))
         stack[top, 0], stack[top, 1], stack[top, 2] = a
-    return stack[0, 0], stack[0, 1], stack[0, 2]
+    return row(stack, 0, 0)
