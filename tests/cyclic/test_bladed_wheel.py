@@ -9,7 +9,7 @@ from scipy.sparse import csr_matrix
 
 import rom
 from cases.wheels import MARKS, bladed_model
-from rom.components.wheels.blades.blade import cut, region, root_of
+from rom.components.wheels.blades.substructured_sector import cut, region, root_of
 from rom.eigen.scipy import SciPyOperators
 from rom.eigen.verbs import dofs_of
 from rom.errors import ConfigError, InterfaceError, ModelError

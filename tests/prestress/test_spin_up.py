@@ -11,7 +11,7 @@ from scipy.integrate import solve_bvp
 import rom
 from cases.wheels import bladed_model
 from rom.components import cosserat
-from rom.components.wheels.prestress.speed_table import lagrange
+from rom.components.wheels.prestress.spin_up import lagrange
 from rom.components.wheels.prestress.steady_rotation import SteadyRotation
 from rom.components.wheels.prestress.thermal import finite_solid
 from rom.components.wheels.rotation import centrifugal_displacement

@@ -6,8 +6,8 @@ it, at each instant as in steady flow. The force follows the motion of the strip
 damps flapping: it is a law of one frame.
 
 Source:
-    Hansen, Aerodynamics of Wind Turbines, 2008, chapters 6 and 9; `momentum` and `inflow` say whose
-    balance and dam.
+    Hansen, Aerodynamics of Wind Turbines, 2008, chapters 6 and 9; `momentum` and `blading` say
+    whose balance and dam.
 """
 
 import math
@@ -28,11 +28,14 @@ from rom.components.wind.blading import (
     ELEMENT_LENGTH,
     ELEMENT_PROFILE,
     ELEMENT_TWIST,
+    NO_TOWER,
     RADIUS,
     ROTOR_RADIUS,
+    TOWER_TUBE,
+    slope_of_wind,
     strip_load,
+    wind_at,
 )
-from rom.components.wind.inflow import NO_TOWER, TOWER_TUBE, slope_of_wind, wind_at
 from rom.components.wind.momentum import STRIP_WIDTH, slowed
 from rom.components.wind.profiles import profiles
 from rom.components.wind.wind_turbine import (

@@ -16,7 +16,7 @@ from rom.components.assumed_strain import (
     quasi_static,
     sheet,
 )
-from rom.components.assumed_strain.plates import bending
+from rom.components.assumed_strain.space import bending
 from rom.errors import ConfigError, MeshError, TagError, UnsafeFileError
 from rom.fe.mesh import read_triangles
 

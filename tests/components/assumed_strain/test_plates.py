@@ -11,7 +11,7 @@ from scipy.spatial import Delaunay
 import rom
 from cases.sheets import distorted, strip
 from rom.components.assumed_strain import Metal, in_space, mass, rectangle, sheet
-from rom.components.assumed_strain.plates import bending
+from rom.components.assumed_strain.space import bending
 from rom.errors import InterfaceError
 
 SQUARE = [(0, 0), (1, 0), (1, 1), (0, 1)]

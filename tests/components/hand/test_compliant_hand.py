@@ -10,12 +10,13 @@ from rom.components.cosserat.helical_spring import HelicalSpring, plate_complian
 from rom.components.hand.cable import Hole, Tendon
 from rom.components.hand.compliant_hand import (
     PHALANX_RIGIDITY_RATIO,
+    Bar,
     Finger,
     close,
+    grasp,
     hand,
     rest,
 )
-from rom.components.hand.grasp import Bar, grasp
 from rom.errors import ConfigError, ModelError, SolverError
 
 MM = 1e-3

@@ -25,8 +25,7 @@ from rom.components.hand.held_objects import (
     hold,
     table,
 )
-from rom.components.hand.moving_hand import Build, Drive, Seat, moving_hand
-from rom.components.hand.tip_loads import one_finger, tip_marker
+from rom.components.hand.moving_hand import Build, Drive, Seat, moving_hand, one_finger, tip_marker
 from rom.components.hand.winches import Motor, winches
 from rom.errors import ConfigError
 

@@ -10,8 +10,15 @@ from rom import rotation
 from rom.components.cosserat.bodies import POSE_SIZE
 from rom.components.cosserat.coils import add_bending, bend_of
 from rom.components.hand.compliant_hand import LENGTHS, Finger, close, hand
-from rom.components.hand.moving_hand import SEATS, Build, Drive, Seat, moving_hand
-from rom.components.hand.tip_loads import deflections, one_finger
+from rom.components.hand.moving_hand import (
+    SEATS,
+    Build,
+    Drive,
+    Seat,
+    deflections,
+    moving_hand,
+    one_finger,
+)
 from rom.components.hand.winches import motor_force, shaft, shaft_moment
 from rom.errors import ConfigError, ModelError, SolverError
 

@@ -9,9 +9,16 @@ from numpy.testing import assert_allclose
 import rom
 from cases.refusals import refused
 from rom import rotation
-from rom.components.wind.blading import BETZ_LIMIT, CHORD, blading, rotor_load
+from rom.components.wind.blading import (
+    BETZ_LIMIT,
+    CHORD,
+    TOWER_TUBE,
+    blading,
+    rotor_load,
+    slope_of_wind,
+    wind_at,
+)
 from rom.components.wind.control import power_curve, steady
-from rom.components.wind.inflow import TOWER_TUBE, slope_of_wind, wind_at
 from rom.components.wind.momentum import skewed
 from rom.components.wind.profiles import Profile, profile, profiles
 from rom.components.wind.whole_turbine import turbine

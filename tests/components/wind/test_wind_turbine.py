@@ -6,17 +6,15 @@ from numpy.testing import assert_allclose
 
 from rom import rotation
 from rom.components.cosserat import equilibrium, loads, modes, reference, simulate
-from rom.components.wind.drivetrain import (
-    ROTOR_INERTIA,
-    SHAFT_STIFFNESS,
-    SLOW_GENERATOR_INERTIA,
-    rotor,
-)
 from rom.components.wind.wind_turbine import (
     BLADE_LENGTH,
     RATED_SPEED,
+    ROTOR_INERTIA,
+    SHAFT_STIFFNESS,
+    SLOW_GENERATOR_INERTIA,
     blade,
     ramp,
+    rotor,
     run_up,
     stations,
     tower,

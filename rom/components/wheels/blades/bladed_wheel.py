@@ -27,15 +27,72 @@ import numpy.typing as npt
 from scipy.linalg import block_diag, eigh
 
 from rom.arguments import lowest, matrix, one_each, rows_at, typed, vector
-from rom.components.wheels.blades.records import ReducedBlade, SubstructuredSector
+from rom.components.wheels.blades.substructured_sector import ReducedBlade, SubstructuredSector
 from rom.components.wheels.certificate import wheel_certificate
-from rom.components.wheels.gyroscopic import GyroscopicModes, gyroscopic_modes
 from rom.components.wheels.sector import Complex
 from rom.errors import ConfigError, ModelError
 from rom.model import Array, Modes, Report
 from rom.plausible import check_damping_ratio
 
 RIGID_RTOL = 1e-9  # of the largest squared frequency: what is less negative is a rigid motion
+
+
+@dataclass(frozen=True)
+class GyroscopicModes:
+    """Motions exp(i w t) of q'' + g q' + omega^2 q = p in mass-normalised modes q.
+
+    With y = [q'; omega q] it is y' = S y + [p; 0] of a skew S = [[-g, -omega], [omega, 0]], which
+    has the eigenvalues i w with orthonormal eigenvectors: nothing grows.
+
+    Attributes:
+        w: (2n,) circular frequencies [rad/s], ascending, of both signs.
+        velocities: (n, 2n) q' of each [1], where |q'|^2 + |omega q|^2 = 1.
+        shapes: (n, 2n) q of each [s].
+    """
+
+    w: Array
+    velocities: Complex
+    shapes: Complex
+
+    def waves(self) -> tuple[Array, Complex]:
+        """The motions that turn with exp(i w t), w > 0.
+
+        Returns:
+            w (n,) [rad/s], ascending, and shapes (n, n) of length 1 [1].
+        """
+        n = len(self.shapes)
+        q = self.shapes[:, n:]
+        return self.w[n:], q / np.linalg.norm(q, axis=0)
+
+    def response(self, p: Complex, sweep: Array, damping: float) -> Complex:
+        """(w, n) answers q [kg^1/2 m] to p exp(i omega t), each motion with its share of damping.
+
+        Args:
+            p: (n,) forces on mass-normalised modes [N kg^-1/2].
+            sweep: (w,) circular frequencies omega [rad/s].
+            damping: a motion decays at this share zeta [1] of its w, as exp(i w sqrt(1 - zeta^2)
+                t).
+        """
+        slower = np.sqrt(1.0 - damping**2)
+        met = self.velocities.conj().T @ p
+        gap = 1j * (sweep[:, None] - slower * self.w) + damping * np.abs(self.w)
+        return (met / gap) @ self.shapes.T / slower
+
+
+def gyroscopic_modes(omega: Array, g: Array) -> GyroscopicModes:
+    """Motions of q'' + g q' + omega^2 q = 0.
+
+    Args:
+        omega: (n,) circular frequencies without g, positive [rad/s].
+        g: (n, n) skew-symmetric [rad/s].
+
+    Source:
+        Meirovitch, A new method of solution of the eigenvalue problem for gyroscopic systems,
+        AIAA J. 12 (1974) 1337.
+    """
+    n, D = omega.size, np.diag(omega)
+    w, W = eigh(-1j * np.block([[-g, -D], [D, np.zeros((n, n))]]))
+    return GyroscopicModes(w, W[:n], W[n:] / omega[:, None])
 
 
 @typed
