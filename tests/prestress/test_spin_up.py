@@ -9,6 +9,7 @@ from numpy.testing import assert_allclose
 from scipy.integrate import solve_bvp
 
 import rom
+from cases.refusals import refuses
 from cases.wheels import bladed_model
 from rom.components import cosserat
 from rom.components.wheels.prestress.spin_up import lagrange
@@ -249,7 +250,7 @@ def test_a_shaft_beyond_its_critical_speed_is_refused():
     model = straight(nx=4)
     shaft = rom.held_solid(model, fixed=("root",), axis=(1.0, 0.0, 0.0))
     limit = rom.cyclic_modes(shaft, 0, 1).omega[0]
-    with pytest.raises(ModelError, match=r"above ([\d.]+) rad/s: rotation has used up") as caught:
+    with pytest.raises(ModelError, match=r"above [\d.]+ rad/s") as caught:
         rom.spin_up(shaft, model, speed=1.1 * limit, n_states=3)
     reached = float(str(caught.value).split("above ")[1].split()[0])
     assert 0.998 * limit < reached < limit
@@ -262,17 +263,12 @@ def test_wrong_arguments_are_named(bent, blade, run_up):
         ({"speed": np.nan}, "speed = nan must be a finite number"),
         ({"speed": 1.0, "n_states": 1}, "n_states = 1 must be a whole number of 2 or more"),
     ):
-        with pytest.raises(ConfigError, match=match):
-            rom.spin_up(blade, bent, **wrong)
+        refuses(ConfigError, match, rom.spin_up, blade, bent, **wrong)
     carrying = replace(bent, attachments=(rom.Attachment("tip", 1.0),))
-    with pytest.raises(ConfigError, match="carries 1 attachments"):
-        rom.spin_up(blade, carrying, speed=1.0)
-    with pytest.raises(ConfigError, match=r"beyond the speeds known, up to 141"):
-        run_up.at(1.1 * run_up.top)
-    with pytest.raises(ConfigError, match="needs a support"):
-        rom.held_solid(bent, fixed=())
-    with pytest.raises(InterfaceError, match="no interface 'rim'"):
-        rom.held_solid(bent, fixed="rim")
+    refuses(ConfigError, "carries 1 attachments", rom.spin_up, blade, carrying, speed=1.0)
+    refuses(ConfigError, r"beyond the 141", run_up.at, 1.1 * run_up.top)
+    refuses(ConfigError, "needs a support", rom.held_solid, bent, fixed=())
+    refuses(InterfaceError, "no interface 'rim'", rom.held_solid, bent, fixed="rim")
     with pytest.raises(ConfigError, match="no finite elements"):
         rom.spin_up(blade, replace(bent, stresses=None), speed=1.0)
 

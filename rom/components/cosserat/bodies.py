@@ -45,9 +45,9 @@ PLATE_INERTIA_SHARE = 0.25
 def memory(space):
     """Arrays of an element in the memory of the law."""
     R, D = space[0:9].reshape((3, 3)), space[9:36].reshape((3, 9))
-    H, unused = space[36:117].reshape((9, 9)), space[129:130]
+    H, unused = space[36:117].reshape((9, 9)), space[127:128]
     return Work(R, D, H, space[117:120], space[120:123], space[123:127], unused,
-                space[130:131].reshape((1, 1)), space[131:132].reshape((1, 1)))  # fmt: skip
+                unused.reshape((1, 1)))  # fmt: skip
 
 
 @inner

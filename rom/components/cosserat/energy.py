@@ -25,7 +25,7 @@ from rom.mbs.kernels.compiled import inner, kernel
 from rom.model import Array
 
 HALF_BANDWIDTH = 8  # columns on either side of the diagonal
-BAND_WIDTH = 3 * HALF_BANDWIDTH + 1  # columns of the band with room for pivoting
+BAND_WIDTH = 2 * HALF_BANDWIDTH + 1
 
 
 class Rod(NamedTuple):
@@ -70,7 +70,6 @@ class Work(NamedTuple):
             element.
         r: (n,) forces out of balance, n = 6 N + 9.
         A: (n, BAND_WIDTH) band of the tangent, A[i, j - i + HALF_BANDWIDTH].
-        d: (n, 1) increments.
     """
 
     R: Array
@@ -81,13 +80,12 @@ class Work(NamedTuple):
     e: Array
     r: Array
     A: Array
-    d: Array
 
 
 def work(rod: Rod) -> Work:
     """Memory for a rod."""
     n = 6 * rod.h.size + 9
-    shapes = ((3, 3), (3, 9), (9, 9), (3,), (3,), (4,), (n,), (n, BAND_WIDTH), (n, 1))
+    shapes = ((3, 3), (3, 9), (9, 9), (3,), (3,), (4,), (n,), (n, BAND_WIDTH))
     return Work(*(np.zeros(shape) for shape in shapes))
 
 

@@ -22,7 +22,7 @@ from rom.arguments import between, positive
 from rom.components.cosserat.bodies import body
 from rom.components.cosserat.energy import Rod, energy, internal, work
 from rom.components.cosserat.shapes import Shape, reference
-from rom.components.cosserat.statics import add_loads, fitting, loads
+from rom.components.cosserat.statics import Loads, add_loads, fitting, loads
 from rom.errors import ConfigError, RomError
 from rom.mbs.connections.ends import enter
 from rom.mbs.integrate.simulation import simulate as simulate_mechanism
@@ -35,7 +35,6 @@ from rom.model import Array, Mask
 LEAST_COSINE = 0.1  # between an axis of a root that is led and its mean direction
 LEAST_MASS_SHARE, LEAST_INERTIA_SHARE = 1e-4, 1e-2  # of what has none, see above
 
-Loads = tuple[Array, Array]
 Placement = tuple[npt.ArrayLike, npt.ArrayLike, npt.ArrayLike, npt.ArrayLike]
 
 

@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 from rom.arguments import typed
 from rom.checks.draft import Draft, run
 from rom.components.wheels.certificate import sector_certificate
-from rom.components.wheels.sector import Complex, CyclicSector
+from rom.components.wheels.sector import NO_DOFS, Complex, CyclicSector
 from rom.eigen.verbs import DEPENDENT_RTOL, every_row, orthonormal_in, own_rows, static_shapes
 from rom.errors import ConfigError, InterfaceError
 from rom.model import Array, Basis, Index, Interface, Report
@@ -89,22 +89,18 @@ def reduce_sector(
         Carassale and Maurici, Interface reduction in Craig-Bampton component mode synthesis by
         orthogonal polynomial series, J. Eng. Gas Turbines Power 140 (2018); on cyclic faces ours.
     """
-    if method is not None:
-        if n_modes is not None or method.n_modes is None:
-            raise ConfigError(
-                f"a sector is reduced by a number of fixed-interface modes, not by {method!r}.",
-                hint="Write n_modes=60, or method=rom.CraigBampton(n_modes=60).",
-            )
-        n_modes = method.n_modes
-    if n_modes is None:
-        raise ConfigError("the number of fixed-interface modes is needed, for example n_modes=60.")
+    if (n_modes is None) == (method is None) or (method and method.n_modes is None):
+        raise ConfigError(
+            f"a sector is reduced by a number of fixed-interface modes, not {n_modes}, {method!r}.",
+            hint="Write n_modes=60, or method=rom.CraigBampton(n_modes=60).",
+        )
     if sector.face is None:
         raise ConfigError(
             "interface functions need the geometry of the cyclic faces.",
             hint="Make the sector with rom.CyclicSector.from_model.",
         )
     faces = {CYCLIC_FACES: functions or Polynomial(4)}
-    draft = SectorDraft(model=sector, method=CraigBampton(n_modes), interfaces=faces)
+    draft = SectorDraft(model=sector, method=method or CraigBampton(n_modes), interfaces=faces)
     return run((connect_faces, basis, project), draft)
 
 
@@ -170,8 +166,7 @@ def reduced_by(
     """A sector by what is given to `rom.reduce`: a method and the functions on its cyclic faces."""
     if of_bodies:
         raise ConfigError(
-            "reference, damping, stress, stiffening and nonlinear belong to bodies in motion; a "
-            "sector has none of them.",
+            "reference, damping, stress, stiffening and nonlinear belong to bodies in motion.",
             hint="Give a sector the matrices of its rotation by rom.rotating_sector.",
         )
     if set(interfaces) - {CYCLIC_FACES}:
@@ -201,7 +196,7 @@ def projected(sector: CyclicSector, Psi: Array, q: int, omega: Array) -> Reduced
             "slave": np.arange(q, 2 * q),
             "master": np.arange(q),
             "coupling": identity(q, format="csr"),
-            "held": np.zeros(0, dtype=np.int64),
+            "held": NO_DOFS,
             "points": None,
             "motions": motions,
             "coriolis": small(sector.coriolis),
@@ -226,8 +221,7 @@ def face_functions(sector: CyclicSector, functions: Polynomial | FourierLegendre
     at_rest = np.isin(face.dofs[::3], sector.held)
     if at_rest.all():
         raise InterfaceError(
-            f"all nodes of the cyclic face {face.name!r} are held.",
-            hint="Hold another interface; of this face nothing is left to reduce.",
+            f"all nodes of the cyclic face {face.name!r} are held; hold another interface."
         )
     if at_rest.any():
         V = V * fading(face, at_rest)[:, None]

@@ -13,7 +13,7 @@ from scipy.optimize import linear_sum_assignment
 from scipy.sparse import csc_matrix, csr_matrix
 from scipy.sparse.linalg import LinearOperator, eigs, splu
 
-from rom.arguments import typed, whole
+from rom.arguments import not_negative, typed, vector, whole
 from rom.components.wheels.modes import cyclic_modes, real_form, spinning
 from rom.components.wheels.sector import Complex, CyclicSector
 from rom.eigen.scipy import negative_count
@@ -106,8 +106,8 @@ def travelling_modes(
     """
     K = spinning(sector, speed)
     T = sector.harmonic(sector.checked(diameter))
-    if speed == 0.0 or not np.isfinite(speed):
-        raise ConfigError(f"speed = {speed!r}; give one in rad/s, at rest use cyclic_modes.")
+    if speed == 0.0:
+        raise ConfigError("speed = 0 has waves that stand: at rest use cyclic_modes.")
     standing = sector.standing(diameter)
     n = whole("n", n, 1, T.shape[1] if standing else 2 * T.shape[1])
     wanted = 2 * n if standing else n
@@ -121,14 +121,8 @@ def travelling_modes(
     lam, U = lam[keep], U[:, keep]
     ahead = np.zeros(lam.size) if standing else -np.sign(lam.imag) * np.sign(speed)
     size = np.sqrt(np.einsum("fm,fm->m", U.conj(), M @ U).real)
-    return TravellingModes(
-        abs(lam.imag),
-        T @ (U / size),
-        sector=sector,
-        diameter=diameter,
-        speed=abs(speed),
-        direction=ahead,
-    )
+    about = {"sector": sector, "diameter": diameter, "speed": abs(speed), "direction": ahead}
+    return TravellingModes(abs(lam.imag), T @ (U / size), **about)
 
 
 def _lowest(
@@ -144,10 +138,8 @@ def _lowest(
     try:
         solve = splu(csc_matrix(K + shift * G + shift**2 * M, dtype=complex)).solve
     except RuntimeError as error:
-        raise ModelError(
-            "rotation has used up the stiffness of the wheel exactly.",
-            hint="Take another speed, below that of divergence_speed.",
-        ) from error
+        text = "rotation has used up the stiffness of the wheel: stay below divergence_speed."
+        raise ModelError(text) from error
 
     def inverse(y: Complex) -> Complex:
         a, b = y[:f].ravel(), y[f:].ravel()
@@ -181,9 +173,8 @@ def _refuse_growth(lam: Complex, diameter: int, speed: float) -> None:
     if growth > GROWTH_RATE_RTOL * abs(lam).max(initial=0.0):
         worst = lam[lam.real.argmax()]
         raise ModelError(
-            f"at {speed:g} rad/s a motion with {diameter} nodal diameters grows by "
-            f"{growth:.3g} 1/s at {abs(worst.imag) / (2 * np.pi):.4g} Hz: the speed is above that "
-            "of an instability.",
+            f"at {speed:g} rad/s a motion with {diameter} nodal diameters grows by {growth:.3g} "
+            f"1/s at {abs(worst.imag) / (2 * np.pi):.4g} Hz: it is unstable.",
             hint="rom.cyclic.divergence_speed tells where stiffness is used up.",
         )
 
@@ -208,8 +199,8 @@ def _verify(M: csr_matrix, G: csr_matrix, K: csr_matrix, lam: Complex, U: Comple
         true = negative_count(csc_matrix(real_form(A))) // 2
         if true != start + falls.sum():
             raise ModesMissedError(
-                f"{falls.size} waves of one direction were found below {w / (2 * np.pi):.6g} Hz, "
-                f"which does not agree with the inertia of the system, {true} from {start} on.",
+                f"the inertia of the system, {true} from {start} on, does not agree with "
+                f"{falls.size} waves below {w / (2 * np.pi):.6g} Hz.",
                 hint="Ask for more waves.",
             )
 
@@ -263,9 +254,8 @@ def wheel_campbell(
         Campbell, The protection of steam-turbine disk wheels from axial vibration, Trans. ASME
         46 (1924) 31; see docs/theory/rotating_solids.md.
     """
-    Omega = np.atleast_1d(np.asarray(speeds, dtype=float))
-    if Omega.ndim != 1 or not Omega.size or not np.isfinite(Omega).all() or Omega.min() < 0.0:
-        raise ConfigError(f"speeds = {speeds!r}; give angular speeds [rad/s], none below 0.")
+    Omega = vector("speeds", speeds)
+    not_negative("speeds", Omega.min())
     omega, direction, shapes = _waves(sector, diameter, n, Omega[0])
     omega, direction, shapes = omega[:n], direction[:n], shapes[:, :n]
     found, likeness = [omega], [np.ones(n)]

@@ -1,11 +1,12 @@
 """The blades of a rotor as strips, and what the wind does to them at a steady speed.
 
 The shaft may be tilted and the blades coned; a strip then meets other air at each azimuth, and the
-balance of momentum is struck strip by strip and azimuth by azimuth. The tower dams the wind ahead.
+balance of momentum is struck strip by strip and azimuth by azimuth. The tower dams the wind ahead,
+as the potential flow round a circular cylinder in each horizontal plane.
 
 Source:
     Jonkman, Butterfield, Musial, Scott, NREL/TP-500-38060, 2009, table 3-1: the blade.
-    Hansen, Aerodynamics of Wind Turbines, 2008, chapters 6 and 9: elements of a blade.
+    Hansen, Aerodynamics of Wind Turbines, 2008, chapters 6, 8 and 9: elements of a blade, tower.
 """
 
 import math

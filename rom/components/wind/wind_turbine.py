@@ -222,7 +222,10 @@ RIGID_STIFFNESS = 1e12  # [N], [N m^2] of what does not bend; the root of a blad
 
 @dataclass(frozen=True)
 class Rotor:
-    """One third of a rotor.
+    """One third of generator, shaft and hub, and one blade: a rotor that a torque drives.
+
+    Without gravity the three blades move alike. All of it is one rod: the generator is the plate at
+    its start, the shaft twists, the hub is a corner and a link that do not bend.
 
     Attributes:
         rod: generator plate, two segments of shaft along the first axis, hub link, blade.

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from cases.refusals import refuses
 from cases.sheets import distorted
 from rom.components.assumed_strain import (
     Actions,
@@ -472,17 +473,14 @@ ABOVE = box((-1, 1), (2, 2))
     ],
 )  # fmt: skip
 def test_actions_that_do_not_fit_are_named(actions, error, words):
-    with pytest.raises(error, match=words):
-        prepared(SMALL, Actions(**actions))
+    refuses(error, words, lambda: prepared(SMALL, Actions(**actions)))
 
 
 def test_wrong_runs_are_named():
-    with pytest.raises(ConfigError, match=r"times of the shape \(1,\)"):
-        quasi_static(SMALL, SOFT, Actions(), [0.0])
+    refuses(ConfigError, "times of", lambda: quasi_static(SMALL, SOFT, Actions(), [0.0]))
     with pytest.raises(ConfigError, match="rho_inf = 2"):
         implicit_motion(SMALL, SOFT, Actions(), [0.0, 1.0], rho_inf=2)
-    with pytest.raises(ConfigError, match=r"radius \[m\] = -1 must"):
-        disc((0, 0), -1)
+    refuses(ConfigError, r"radius \[m\] = -1 must", disc, (0, 0), -1)
     with pytest.raises(ConfigError, match="impacts would gain energy"):
         implicit_motion(SMALL, SOFT, Actions(tools=[Tool("pad", ABOVE)]), [0, 1], rho_inf=0.8)
     tear = Actions(range(6), drives=[Drive(range(6, 18), ((0, 1), (0, 30.0)))])

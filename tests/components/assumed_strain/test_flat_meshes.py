@@ -6,6 +6,7 @@ from numpy.testing import assert_allclose
 from scipy.linalg import eigh
 
 from cases.paths import ROOT
+from cases.refusals import refuses
 from rom.components.assumed_strain import (
     Actions,
     Metal,
@@ -149,13 +150,11 @@ def test_what_is_no_section_is_named(drawn, tmp_path):
     with pytest.raises(UnsafeFileError, match="Python program"):
         (tmp_path / "a.py").write_text("")
         read_triangles(tmp_path / "a.py")
-    with pytest.raises(ConfigError, match="depth"):
-        read_triangles(BILLET, parameters={"depth": 1.0})
+    refuses(ConfigError, "depth", read_triangles, BILLET, parameters={"depth": 1.0})
     with pytest.raises(MeshError, match="no triangles: the geometry has no plane surface"):
         read_triangles(drawn("Point(1) = {0, 0, 0};\nPoint(2) = {1, 0, 0};\nLine(1) = {1, 2};\n"))
     square = 'SetFactory("OpenCASCADE");\nRectangle(1) = {0, 0, %s, 1, 1};\n%s\n'
-    with pytest.raises(MeshError, match=r"leaves the plane z = 0 by 0\.3 m"):
-        read_triangles(drawn(square % ("0.3", "")))
+    refuses(MeshError, r"by 0\.3 m", lambda: read_triangles(drawn(square % ("0.3", ""))))
     with pytest.raises(MeshError, match="Quadrilateral 4: triangles"):
         read_triangles(drawn(square % ("0", "Recombine Surface {1};")))
     with pytest.raises(TagError, match=r"no curve 'edge'; there are \[\]"):

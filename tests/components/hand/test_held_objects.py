@@ -8,6 +8,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import rom
+from cases.refusals import refuses
 from rom.components.hand.budgets import (
     mass_budget,
     phalanx_stress,
@@ -237,13 +238,8 @@ def test_what_cannot_be_held_is_named():
         ({"radius": 0.0}, "radius = 0"),
         ({"mass": -1.0}, "mass = -1"),
     ):
-        with pytest.raises(ConfigError, match=words):
-            hold(mech, "ball", replace(BALL, **change))
-    with pytest.raises(ConfigError, match="nothing holds 'ball'"):
-        hold(rom.Mechanism(), "ball", BALL)
-    with pytest.raises(ConfigError, match="'ball' on a table needs gravity"):
-        table(mech, "ball", BALL, leaves=1.0)
-    with pytest.raises(ConfigError, match=r"mu = -0\.1 must not be negative"):
-        replace(SKIN_CONTACT, mu=-0.1)
-    with pytest.raises(ConfigError, match=r"shape \(10, 4\), needed is \(n, 5\)"):
-        winches(np.zeros((10, 4)), 1e-3)
+        refuses(ConfigError, words, hold, mech, "ball", replace(BALL, **change))
+    refuses(ConfigError, "nothing holds 'ball'", lambda: hold(rom.Mechanism(), "ball", BALL))
+    refuses(ConfigError, "'ball' on a table needs gravity", table, mech, "ball", BALL, leaves=1.0)
+    refuses(ConfigError, r"mu = -0\.1 must not be negative", replace, SKIN_CONTACT, mu=-0.1)
+    refuses(ConfigError, r"shape \(10, 4\), needed is \(n, 5\)", winches, np.zeros((10, 4)), 1e-3)

@@ -6,6 +6,7 @@ from numba import njit
 from numpy.testing import assert_allclose
 
 import rom
+from cases.refusals import refuses
 from rom import rotation
 from rom.components.cosserat.bodies import POSE_SIZE
 from rom.components.cosserat.coils import add_bending, bend_of
@@ -248,8 +249,7 @@ def test_what_no_hand_can_do_is_named():
     finger = {"index": Finger(n=2)}
     with pytest.raises(ConfigError, match="drive of 'toe'"):
         moving_hand(finger, drives={"toe": Drive(tension=1.0)})
-    with pytest.raises(ConfigError, match="seat of 'toe'"):
-        moving_hand({"toe": Finger(n=2)})
+    refuses(ConfigError, "seat of 'toe'", lambda: moving_hand({"toe": Finger(n=2)}))
     with pytest.raises(ConfigError, match="either a tension or a pull"):
         moving_hand(finger, drives={"index": Drive()})
     with pytest.raises(ConfigError, match="either a tension or a pull"):
@@ -262,8 +262,7 @@ def test_what_no_hand_can_do_is_named():
         moving_hand(finger, drives={"index": Drive(tension=1.0, conduit=2 * ((0.0, 0.0, -0.1),))})
     with pytest.raises(ModelError, match="'index' ends in a bare plate"):
         moving_hand({"index": Finger(phalanges=(0.02, 0.02, 0.0), n=2)})
-    with pytest.raises(ConfigError, match="thickness = 0"):
-        moving_hand(finger, build=Build(thickness=0.0))
+    refuses(ConfigError, "thickness = 0", lambda: moving_hand(finger, build=Build(thickness=0.0)))
     with pytest.raises(ConfigError, match="not in a conduit on the palm"):
         moving_hand(finger, drives={"index joint 1": Drive(tension=1.0, conduit=((0, 0, -0.1),))})
     with pytest.raises(ConfigError, match="drive of 'index joint 4'"):

@@ -6,6 +6,7 @@ from numpy.testing import assert_allclose
 
 import rom
 from cases.mbs.stiff_blades import on_driven_hub, same_strips, stiff_body
+from cases.refusals import refuses
 from rom import rotation
 from rom.components.wind.blading import rotor_load
 from rom.components.wind.control import Controller, generator_torque, steady
@@ -194,16 +195,13 @@ def test_the_actuator_is_that_of_the_report():
     ],
 )
 def test_a_wind_that_cannot_be_is_named(wind, said):
-    with pytest.raises(ConfigError, match=said):
-        turbine(2, wind=wind, late_wake=True)
+    refuses(ConfigError, said, turbine, 2, wind=wind, late_wake=True)
 
 
 @pytest.mark.parametrize("wind", [26.0, [[0.0, 8.0], [9.0, 26.0]]])
 def test_no_controller_works_beyond_its_wind(wind):
-    with pytest.raises(ConfigError, match="no controller works in a wind of 26 m/s"):
-        turbine(2, wind=wind, late_wake=True, controlled=True)
+    refuses(ConfigError, "wind of 26", turbine, 2, wind=wind, late_wake=True, controlled=True)
 
 
 def test_a_wind_that_changes_needs_a_wake_that_is_late():
-    with pytest.raises(ConfigError, match="meets a late wake"):
-        turbine(2, wind=[[0.0, 8.0], [1.0, 9.0]])
+    refuses(ConfigError, "meets a late wake", turbine, 2, wind=[[0.0, 8.0], [1.0, 9.0]])

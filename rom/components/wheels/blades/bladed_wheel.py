@@ -20,13 +20,13 @@ Source:
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import numpy.typing as npt
 from scipy.linalg import block_diag, eigh
 
-from rom.arguments import lowest, matrix, one_each, rows_at, typed, vector
+from rom.arguments import Between, lowest, matrix, one_each, rows_at, typed, vector
 from rom.components.wheels.blades.substructured_sector import ReducedBlade, SubstructuredSector
 from rom.components.wheels.certificate import wheel_certificate
 from rom.components.wheels.sector import Complex
@@ -156,11 +156,10 @@ class BladedWheel:
         return self._joined("coriolis", blades)
 
     def _check(self, blades: Sequence[ReducedBlade]) -> None:
-        N, r, _ = self.roots.shape
-        if len(blades) != N or any(blade.n_root != r for blade in blades):
+        (N, r, _), found = self.roots.shape, [blade.n_root for blade in blades]
+        if found != [r] * N:
             raise ConfigError(
-                f"{len(blades)} blades, with {sorted({b.n_root for b in blades})} root "
-                f"coordinates: give {N} with {r}.",
+                f"{len(found)} blades with {sorted(set(found))} root coordinates, not {N} with {r}.",
                 hint="Take sector.blade, its varied(…), or rom.reduced_blade(sector, …).",
             )
 
@@ -224,20 +223,16 @@ class BladedWheel:
         """
         if speed and not self.sector.supported:
             raise ConfigError(
-                "a free wheel of different blades has no modes at speed: nothing holds it on its "
-                "axis.",
+                "a free wheel of different blades has no modes at speed.",
                 hint="Hold the disk, fixed=(…), or put it on springs, rom.supported_sector.",
             )
         K, M = self.matrices(blades, speed=speed)
         lam, Phi = _apart(K, M, self.rigid)
         if lam[0] < -RIGID_RTOL * lam[-1] or (speed and lam[0] <= 0.0):
-            raise ModelError(
-                f"at {speed:g} rad/s the wheel with these blades is above its instability: spin "
-                "softening has used up its stiffness."
-                if speed
-                else "these blades leave a motion without stiffness.",
-                hint="Turn more slowly." if speed else "Look for a deviation of -1 or below.",
-            )
+            text, hint = "", "Look for a deviation of -1 or below."
+            if speed:
+                text, hint = f"at {speed:g} rad/s spin softening and ", "Turn more slowly."
+            raise ModelError(f"{text}these blades leave a motion without stiffness.", hint=hint)
         kept = lowest(n)
         return Modes(np.sqrt(np.maximum(lam[kept], 0.0)), Phi[:, kept])
 
@@ -275,9 +270,8 @@ class BladedWheel:
             ModelError: if a motion has no stiffness.
         """
         _, Phi = self.modes(blades)
-        each = np.array([np.einsum("am,ab,bm->m", q, blade.K, q)
-                         for blade, q in zip(blades, self.of_blades(blades, Phi[:, :n]),
-                                             strict=True)])  # fmt: skip
+        moved = zip(blades, self.of_blades(blades, Phi[:, :n]), strict=True)
+        each = np.array([np.einsum("am,ab,bm->m", q, blade.K, q) for blade, q in moved])
         return (each / each.sum(axis=0)).T
 
     def response(
@@ -287,7 +281,7 @@ class BladedWheel:
         *,
         engine_order: int,
         omega: npt.ArrayLike,
-        damping: float,
+        damping: Annotated[float, Between(0.0, 1.0, "()")],
         at: Any,
         speed: float = 0.0,
     ) -> Complex:
@@ -315,10 +309,6 @@ class BladedWheel:
             ConfigError: for damping not between 0 and 1, or a force or place off the blades.
             ModelError: if a motion has no stiffness.
         """
-        if not 0.0 < damping < 1.0:
-            raise ConfigError(
-                f"damping = {damping!r} must be a positive share of critical damping, below 1."
-            )
         check_damping_ratio(damping, "the wheel")
         N, sweep = self.sector.n_sectors, vector("omega", omega)
         if speed:
@@ -329,8 +319,8 @@ class BladedWheel:
         forces, rows = _each(force, N), _each(at, N)
         phase = np.exp(1j * engine_order * self.sector.angle * np.arange(N))
         load = sum(
-            phase[j] * (q.T @ (blade.Psi.T @ _on(blade, forces[j], j)))
-            for j, (blade, q) in enumerate(zip(blades, moved, strict=True))
+            phase[j] * (moved[j].T @ (blade.Psi.T @ _on(blade, forces[j], j)))
+            for j, blade in enumerate(blades)
         )
         if speed:
             amplitude = motions.response(load, sweep, damping)

@@ -96,21 +96,13 @@ class ReducedBlade:
         if all_of_them.min() <= -1.0:
             raise ConfigError(f"deviations {all_of_them}: each must be a number above -1.")
         if delta.size > self.n_modes:
-            raise ConfigError(
-                f"{delta.size} deviations of cantilever frequencies; the blade has {self.n_modes} "
-                "cantilever modes."
-            )
+            raise ConfigError(f"{delta.size} deviations for {self.n_modes} cantilever modes.")
         K = (1.0 + stiffness) * self.K
         modes = self.n_root + np.arange(delta.size)
         K[modes, modes] *= (1.0 + delta) ** 2
-        heavier = 1.0 + density
-        return replace(
-            self,
-            K=K,
-            M=heavier * self.M,
-            coriolis=None if self.coriolis is None else heavier * self.coriolis,
-            centrifugal=None if self.centrifugal is None else heavier * self.centrifugal,
-        )
+        grown = {name: getattr(self, name) for name in ("M", "coriolis", "centrifugal")}
+        heavy = {name: (1.0 + density) * A for name, A in grown.items() if A is not None}
+        return replace(self, K=K, **heavy)
 
 
 @dataclass(frozen=True)
@@ -202,22 +194,14 @@ def reduced_blade(
 
 def blade_in(K: csr_matrix, M: csr_matrix, Psi: Array, n_root: int) -> ReducedBlade:
     """The blade with these matrices in the coordinates of Psi; K is free of root-mode coupling."""
-    K_small, M_small = Psi.T @ (K @ Psi), Psi.T @ (M @ Psi)
+    K_small, M_small = (0.5 * (A + A.T) for A in (Psi.T @ (B @ Psi) for B in (K, M)))
     K_small[:n_root, n_root:] = 0.0  # by orthogonality; what is there is round-off
     K_small[n_root:, :n_root] = 0.0
-    return ReducedBlade(0.5 * (K_small + K_small.T), 0.5 * (M_small + M_small.T), Psi, n_root)
+    return ReducedBlade(K_small, M_small, Psi, n_root)
 
 
 def turning(blade: ReducedBlade, M: csr_matrix, stresses: Any, axis: Array, u: Array) -> Any:
-    """The blade with the matrices of its rotation.
-
-    Args:
-        blade: at rest.
-        M: (n, n) its mass [kg].
-        stresses: of its elements alone.
-        axis: (3,) unit vector.
-        u: (n,) displacement at 1 rad/s [m].
-    """
+    """The blade with the matrices of its rotation about a unit vector; u (n,) at 1 rad/s [m]."""
     G, softening = rotation_matrices(M, axis)
     Psi = blade.Psi
     C = Psi.T @ ((stresses.prestress(u) - softening) @ Psi)
@@ -233,8 +217,7 @@ def stresses_of(model: FEModel, blade: str | None) -> Any:
     found = (model if blade is None else model.regions[blade]).stresses
     if found is None:
         raise ConfigError(
-            "the model of the blade has no finite elements, from which alone the stiffness of "
-            "centrifugal stress follows.",
+            "the stiffness of centrifugal stress follows from finite elements of the blade alone.",
             hint="Make it with rom.fe.model, or its disk without rom.rotating_sector.",
         )
     return found
@@ -251,8 +234,7 @@ def cut(K: csr_matrix, K_blade: csr_matrix, name: str) -> tuple[Index, Index]:
     nodes = np.flatnonzero(shared.reshape(-1, 3).any(axis=1))
     if nodes.size == 0:
         raise InterfaceError(
-            f"region {name!r} shares no node with the rest of the sector.",
-            hint="Mesh blade and disk as one solid, so that they have the nodes of the root alike.",
+            f"region {name!r} shares no node with the rest of the sector; mesh both as one solid."
         )
     return np.setdiff1d(np.flatnonzero(mine > 0.0), dofs_of(nodes)), nodes
 
@@ -276,9 +258,8 @@ def _same_surface(sector: SubstructuredSector, points: Array) -> csr_matrix:
     apart = np.abs(boxes[0] - boxes[1]).max()
     if apart > ROOT_MATCH_RTOL * size:
         raise InterfaceError(
-            f"the root of this blade ends up to {apart:.3g} m from that of the sector, which is "
-            f"{size:.3g} m wide.",
-            hint="Only above the root may blades differ in shape.",
+            f"the root of this blade ends up to {apart:.3g} m from that of the sector, "
+            f"{size:.3g} m wide; only above it may blades differ in shape."
         )
     return interpolation(own, points)
 
@@ -331,8 +312,7 @@ def substructured_sector(
     shared, faces = dofs_of(nodes), np.union1d(sector.slave, sector.master)
     if np.intersect1d(np.union1d(inner, shared), faces).size:
         raise InterfaceError(
-            f"the blade {blade!r} reaches a cyclic face, on which sectors meet.",
-            hint="Cut the wheel between the blades.",
+            f"the blade {blade!r} reaches a cyclic face; cut the wheel between the blades."
         )
     face = root_of(model, nodes)
     Q_root = interface_functions(root or Polynomial(3), face)
@@ -367,7 +347,6 @@ def _refuse_stiffened(sector: CyclicSector, model: FEModel, of_blade: Array) -> 
     own = all_rows(model, model.K).diagonal()[of_blade]
     if np.any(abs(sector.K.diagonal()[of_blade] - own) > SHARED_STIFFNESS_RTOL * own):
         raise ConfigError(
-            "the blade of the sector does not have the stiffness of its finite elements: what "
-            "rom.heated_sector adds cannot be shared out between disk and blade.",
+            "what rom.heated_sector adds cannot be shared out between disk and blade.",
             hint="Substructure the sector without heat, or reduce it whole by rom.reduce_sector.",
         )

@@ -1,20 +1,26 @@
-"""From a model to its steady states in rotation."""
+"""Steady states of a solid between rest and a speed, and vibrations about them, full and reduced.
+
+Displacements and reduced matrices are interpolated by polynomials in tau = s / (s + omega_1^2), s
+the square of the speed and omega_1 the lowest frequency at rest: a thin blade that rotation
+straightens has a pole near s = -omega_1^2, of which tau knows nothing.
+"""
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Annotated
 
 import numpy as np
 import numpy.typing as npt
 from scipy.optimize import linear_sum_assignment
 from scipy.sparse import csr_matrix
 
-from rom.arguments import positive, typed, unit_vector, whole
+from rom.arguments import Count, Positive, typed, unit_vector
 from rom.components.wheels.modes import CyclicModes, cyclic_modes
 from rom.components.wheels.prestress.steady_rotation import SteadyRotation
 from rom.components.wheels.prestress.thermal import Heat, finite_solid
 from rom.components.wheels.reduced import ReducedSector, projected, reduce_sector
-from rom.components.wheels.rotation import rotation_matrices
+from rom.components.wheels.rotation import refuse_attachments, rotation_matrices
 from rom.components.wheels.sector import NO_DOFS, CyclicSector, all_rows, workers_of
 from rom.components.wheels.travelling import TravellingModes, travelling_modes
 from rom.eigen.supports import Fixed, held_dofs
@@ -54,8 +60,7 @@ class SpeedTable(ABC):
         """
         if not abs(speed) <= self.top * (1 + 1e-12):
             raise ConfigError(
-                f"{speed!r} rad/s is beyond the speeds known, up to {self.top:g} rad/s.",
-                hint="Give rom.spin_up a higher speed.",
+                f"{speed!r} rad/s is beyond the {self.top:g} rad/s of rom.spin_up; give it more."
             )
         return lagrange(straightened(self.speeds, self.omega), straightened(speed, self.omega))
 
@@ -82,8 +87,6 @@ class ReducedSpinUp(SpeedTable):
     """Few coordinates that follow the steady state, `SpinUp.reduced`.
 
     Attributes:
-        speeds: (k,) tabulated angular speeds [rad/s], ascending from zero.
-        omega: lowest circular frequency at rest, which sets the scale [rad/s].
         sectors: the reduced sector at each tabulated speed, in coordinates that correspond.
         error: relative error [1] of the lowest frequencies half-way between the two speeds in the
             middle, against the full model in its own steady state there.
@@ -96,14 +99,13 @@ class ReducedSpinUp(SpeedTable):
     def certificate(self) -> Report:
         """The sectors at rest and at the highest speed against the full ones, and the error."""
         rows = [
-            replace(line, quantity=f"state at {speed:.5g} rad/s, {line.quantity}")
-            for speed, sector in ((self.speeds[0], self.sectors[0]), (self.top, self.sectors[-1]))
-            for line in sector.certificate.rows
+            replace(line, quantity=f"state at {self.speeds[k]:.5g} rad/s, {line.quantity}")
+            for k in (0, -1)
+            for line in self.sectors[k].certificate.rows
         ]
-        between = row(
-            f"between states: worst error of {N_CHECKED} frequencies", self.error, FREQUENCY_RTOL
-        )
-        return Report("certificate of the spin-up", (*rows, between))
+        what = f"between states: worst error of {N_CHECKED} frequencies"
+        rows.append(row(what, self.error, FREQUENCY_RTOL))
+        return Report("certificate of the spin-up", tuple(rows))
 
     def at(self, speed: float) -> ReducedSector:
         """The reduced sector at a speed [rad/s], interpolated.
@@ -111,13 +113,9 @@ class ReducedSpinUp(SpeedTable):
         Raises:
             ConfigError: if the speed is above the highest.
         """
-        weights = self.weights(speed)
-        mean = {
-            name: sum(
-                w * getattr(sector, name) for w, sector in zip(weights, self.sectors, strict=True)
-            )
-            for name in ("K", "M", "coriolis", "centrifugal", "Psi")
-        }
+        states = list(zip(self.weights(speed), self.sectors, strict=True))
+        names = ("K", "M", "coriolis", "centrifugal", "Psi")
+        mean = {name: sum(w * getattr(sector, name) for w, sector in states) for name in names}
         return replace(self.sectors[0], **mean)
 
 
@@ -156,8 +154,7 @@ class SpinUp(SpeedTable):
             a, reached = self.steady.follow(start, self.speeds[k] ** 2, square, self.steady.load)
             if reached < square:
                 raise ModelError(
-                    f"no stable steady state was found at {speed:.5g} rad/s.",
-                    hint=f"Stay below {reached**0.5:.5g} rad/s, up to where one was found.",
+                    f"no stable state at {speed:.5g} rad/s, the last at {reached**0.5:.5g} rad/s.",
                     solution=self.steady.T @ a,
                 )
         return self.steady.T @ a
@@ -258,8 +255,8 @@ def spin_up(
     sector: CyclicSector,
     model: FEModel,
     *,
-    speed: float,
-    n_states: int = 9,
+    speed: Annotated[float, Positive("rad/s")],
+    n_states: Annotated[int, Count(2)] = 9,
     heat: Heat | None = None,
 ) -> SpinUp:
     """Steady states up to a speed, at large displacement and with the load that follows it.
@@ -283,13 +280,7 @@ def spin_up(
         St. Venant-Kirchhoff solid with forces that follow, Newton's method along the speed:
         Wriggers, Nonlinear Finite Element Methods (2008); see docs/theory/rotating_solids.md.
     """
-    positive("speed", speed)
-    whole("n_states", n_states, 2, reason="rest and the top")
-    if model.attachments:
-        raise ConfigError(
-            f"the model carries {len(model.attachments)} attachments, whose rotation is not known.",
-            hint="Mesh them as a region of their own density.",
-        )
+    refuse_attachments(model)
     steady = SteadyRotation(sector, finite_solid(model, heat))
     a = steady.at_rest if heat is None else _warmed(steady, heat)
     coriolis = rotation_matrices(sector.M, sector.axis)[0]
@@ -365,8 +356,7 @@ def _next(steady: SteadyRotation, a: Array, start: float, end: float) -> Array:
     a, square = steady.follow(a, start, end, steady.load)
     if square < end:
         raise ModelError(
-            f"no stable steady state was found above {np.sqrt(square):.5g} rad/s: rotation has "
-            "used up the stiffness there.",
+            f"no stable steady state was found above {np.sqrt(square):.5g} rad/s.",
             hint="Ask for a lower speed, or hold the solid more firmly.",
         )
     return a

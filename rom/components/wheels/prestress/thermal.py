@@ -51,16 +51,9 @@ class Heat:
     temperature: Temperature | None = None
 
     def __post_init__(self) -> None:
-        if self.expansion is None:
-            raise ConfigError(
-                "a temperature is given without a coefficient of expansion.",
-                hint="Steel has expansion=12e-6 per kelvin.",
-            )
-        if self.temperature is None:
-            raise ConfigError(
-                "a coefficient of expansion is given without a change of temperature.",
-                hint="Give temperature=... in kelvin.",
-            )
+        for name, like in (("expansion", "12e-6 per kelvin, of steel"), ("temperature", "80 K")):
+            if getattr(self, name) is None:
+                raise ConfigError(f"heat needs its {name}, such as {like}.")
 
     def on(self, model: FEModel) -> tuple[dict[str, float], dict[str, float], Array]:
         """Expansion [1/K] and temperature [K] of each region; what nodes (n / 3,) add to this [K].
