@@ -206,7 +206,7 @@ def test_wrong_arguments_are_named(model, full, small, disk):
     refuses(InterfaceError, r"root of this blade ends", rom.reduced_blade, small, moved, n_modes=2)
     refuses(ConfigError, "each must be a number above -1", small.blade.varied, stiffness=-1.0)
     refuses(ConfigError, "26 deviations", small.blade.varied, cantilever=np.zeros(26))
-    refuses(ConfigError, r"5 blades with .* not 6 with 57", disk.modes, [small.blade] * 5)
+    refuses(ConfigError, r"5 blades with .* not 6 of 57", disk.modes, [small.blade] * 5)
     refuses(ConfigError, "n_waves = 1000", rom.bladed_wheel, small, 1000)
     refuses(ConfigError, "n_root = 58", rom.bladed_wheel, small, 2, n_root=58)
     drive = {"engine_order": 1, "omega": [1.0], "damping": 1e-3, "at": [0]}

@@ -6,13 +6,13 @@ Source:
 """
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import numpy.typing as npt
 from scipy.sparse import csr_matrix, identity, kron
 
-from rom.arguments import finite, is_number, positive, shortened, typed, whole
+from rom.arguments import Count, Positive, finite, is_number, shortened, typed
 from rom.components.assumed_strain import kernels
 from rom.components.assumed_strain.actions import Actions, dofs_of, nodal, prepared
 from rom.components.assumed_strain.triangles import (
@@ -157,8 +157,9 @@ class Flight:
 
 @typed
 def fly(
-    body: Sheet, metal: Metal, v: Array, held: npt.ArrayLike, t_end: float, *,
-    pictures: int = 41, actions: Actions | None = None,
+    body: Sheet, metal: Metal, v: Array, held: npt.ArrayLike,
+    t_end: Annotated[float, Positive("s")], *,
+    pictures: Annotated[int, Count(2)] = 41, actions: Actions | None = None,
 ) -> Flight:  # fmt: skip
     """Explicit motion from rest lengths.
 
@@ -178,11 +179,8 @@ def fly(
         MeshError: if a tool begins inside the sheet.
         SolverError: if the motion is lost; ``error.solution`` holds the pictures before.
     """
-    v, held = nodal("velocities", v, body), dofs_of(held, body)
-    positive("t_end [s]", t_end)
-    whole("pictures", pictures, 2)
-    actions = actions or Actions()
-    held = np.union1d(held, dofs_of(actions.held, body))
+    v, actions = nodal("velocities", v, body), actions or Actions()
+    held = np.union1d(dofs_of(held, body), dofs_of(actions.held, body))
     acts = prepared(body, replace(actions, held=held), (0.0, t_end))
     lumped = np.asarray(mass(body, metal).sum(axis=1)).ravel()[::2]
     free, x, parts = np.ones(v.shape, dtype=bool), body.points.copy(), _parts(body, metal, None)
@@ -195,17 +193,15 @@ def fly(
         metal.wave_speed, (acts.times, acts.table, acts.forces, depth_of(body), acts.driven,
                            acts.columns, acts.tools), t, (parts[6], parts[6].copy()), seen,
     )  # fmt: skip
-    path, plastic, tool_forces, reactions = seen
+    path, plastic = seen[:2]
     if steps < 0 or not np.isfinite(path).all():
         k = int(np.append(np.isfinite(path).all(axis=(1, 2)), False).argmin())
         raise SolverError(
             "the explicit motion was lost.",
             hint="Use the element F1, or finer time.",
-            solution=Flight(
-                t[:k], path[:k], plastic[:k], work, steps, tool_forces[:k], reactions[:k]
-            ),
+            solution=Flight(t[:k], path[:k], plastic[:k], work, steps, *(x[:k] for x in seen[2:])),
         )
-    return Flight(t, path, plastic, work, steps, tool_forces, reactions)
+    return Flight(t, path, plastic, work, steps, *seen[2:])
 
 
 def depth_of(body: Sheet) -> float:

@@ -43,9 +43,8 @@ def in_space(body: Sheet, metal: Metal, interfaces: dict[str, Index]) -> FEModel
         raise ConfigError(f"a sheet in space must be in plane stress, not {body.state}.")
     n, parts = len(body.points), tuple(np.unique(nodes) for nodes in interfaces.values())
     points = np.column_stack([body.points, np.zeros(n)])
-    K = _placed(tangent(body, metal, body.points), (0, 1)) + _placed(
-        bending(body, metal, parts), (2,)
-    )
+    K = _placed(tangent(body, metal, body.points), (0, 1))
+    K += _placed(bending(body, metal, parts), (2,))
     M = kron(mass(body, metal)[::2, ::2], identity(3), "csr")
     faces = {name: _interface(name, nodes, body, points)
              for name, nodes in zip(interfaces, parts, strict=True)}  # fmt: skip
@@ -65,16 +64,13 @@ def _placed(A: csr_matrix, axes: tuple[int, ...]) -> csr_matrix:
 def _interface(name: str, nodes: Index, body: Sheet, points: Array) -> Interface:
     if nodes.size and not 0 <= nodes[0] <= nodes[-1] < len(points):
         raise InterfaceError(
-            f"interface {name!r} names the nodes {nodes[0]} to {nodes[-1]}; "
-            f"there are {len(points)} points.",
-            hint="Count nodes from zero.",
+            f"interface {name!r} names the nodes {nodes[0]} to {nodes[-1]}; there are 0 to "
+            f"{len(points) - 1}."
         )
     inside = np.isin(body.triangles, nodes).all(axis=1)
     if not inside.any():
         raise InterfaceError(
-            f"interface {name!r} has no triangle among its {nodes.size} nodes: a line could turn "
-            "about itself.",
-            hint="Add the next row of nodes.",
+            f"interface {name!r} has no triangle among its {nodes.size} nodes; add the next row."
         )
     T, area = np.searchsorted(nodes, body.triangles[inside]), body.area[inside]
     S = placed(area[:, None, None] / 12 * (1 + np.eye(3)), T, T, nodes.size)
@@ -88,16 +84,10 @@ QUADRATIC_RTOL = 1e-3  # least singular value of a fit, relative: below, its nod
 
 
 def bending(body: Sheet, metal: Metal, parts: tuple[Index, ...] = ()) -> csr_matrix:
-    """(n, n) stiffness against deflection w [N/m], without rotations as unknowns.
+    """(n, n) stiffness against deflection w [N/m], without rotations as unknowns; edges are free.
 
-    The same order on meshes with diagonals one way, crossed ones and irregular ones: frequencies
-    err by h^2. All edges are free.
-
-    Args:
-        body: the sheet; of its points and triangles, not of its element.
-        metal: its material.
-        parts: nodes (k,) of parts that are moved or held as one; slopes of their sides are fitted
-            to their own nodes, so that a held part clamps the sheet where it ends.
+    Frequencies err by h^2 on any mesh. Parts are nodes (k,) moved or held as one; slopes of their
+    sides are fitted to their own nodes, so that a held part clamps the sheet where it ends.
     """
     n = len(body.points)
     ends, side, inner = _sides(body.triangles)

@@ -92,13 +92,10 @@ def sheet(
     G = np.zeros((len(T), 3, 6, 2))
     for k in range(3):
         G[:, k] = _side_gradients(X, patch, constant, k)
-    G = (
-        constant[:, None, None]
-        if element == "CST"
-        else G[:, None]
-        if element == "F1"
-        else G[:, :, None]
-    )
+    if element == "CST":
+        G = constant[:, None, None]
+    else:
+        G = G[:, None] if element == "F1" else G[:, :, None]
     alone = patch < 0
     patch = np.where(alone, np.hstack([T, T]), patch)
     depth = 2 * np.pi * X[T, 0].mean(axis=1) if state == "axisymmetric" else thickness
@@ -123,9 +120,7 @@ def whole_numbers(name: str, value: npt.ArrayLike) -> Index:
 
 def _refuse_no_mesh(X: Array, T: Index, state: str) -> None:
     if X.ndim != 2 or X.shape[1] != 2 or T.ndim != 2 or T.shape[1] != 3 or not len(T):
-        raise MeshError(
-            f"points {X.shape} and triangles {T.shape} where (n, 2) and (t, 3) were expected."
-        )
+        raise MeshError(f"points {X.shape} and triangles {T.shape} must be (n, 2) and (t, 3).")
     if T.min() < 0 or T.max() >= len(X):
         raise MeshError(
             f"triangles name the nodes {T.min()} to {T.max()}; there are {len(X)} points.",
@@ -133,8 +128,7 @@ def _refuse_no_mesh(X: Array, T: Index, state: str) -> None:
         )
     if state == "axisymmetric" and X[:, 0].min() < 0:
         raise MeshError(
-            f"the radius of node {int(X[:, 0].argmin())} is {X[:, 0].min():.3g} m.",
-            hint="The first coordinate of an axisymmetric solid is its radius.",
+            f"the first coordinate, {X[:, 0].min():.3g} m of node {X[:, 0].argmin()}, is a radius."
         )
 
 

@@ -16,11 +16,11 @@ Source:
     Multibody Syst. Dyn. 25 (2011) 285; the reference rotation at the vertices is ours.
 """
 
-import math
 from typing import NamedTuple
 
 import numpy as np
 
+from rom.mbs.kernels.algebra import rotation
 from rom.mbs.kernels.compiled import inner, kernel
 from rom.model import Array
 
@@ -90,17 +90,6 @@ def work(rod: Rod) -> Work:
 
 
 @inner
-def rotation_of(p, R):
-    """Set R to the rotation matrix of a unit quaternion."""
-    e0, e1, e2, e3 = p[0], p[1], p[2], p[3]
-    R[0, 0], R[0, 1] = 1 - 2 * (e2 * e2 + e3 * e3), 2 * (e1 * e2 - e0 * e3)
-    R[0, 2], R[1, 0] = 2 * (e1 * e3 + e0 * e2), 2 * (e1 * e2 + e0 * e3)
-    R[1, 1], R[1, 2] = 1 - 2 * (e1 * e1 + e3 * e3), 2 * (e2 * e3 - e0 * e1)
-    R[2, 0], R[2, 1] = 2 * (e1 * e3 - e0 * e2), 2 * (e2 * e3 + e0 * e1)
-    R[2, 2] = 1 - 2 * (e1 * e1 + e2 * e2)
-
-
-@inner
 def product(p, q):
     """Components of the quaternion p o q."""
     return (
@@ -109,17 +98,6 @@ def product(p, q):
         p[0] * q[2] + q[0] * p[2] + p[3] * q[1] - p[1] * q[3],
         p[0] * q[3] + q[0] * p[3] + p[1] * q[2] - p[2] * q[1],
     )
-
-
-@inner
-def turn(p, x, y, z, out):
-    """Set out to p o exp(phi) of unit length."""
-    angle = math.sqrt(x * x + y * y + z * z)
-    share = 0.5 if angle < 1e-8 else math.sin(0.5 * angle) / angle
-    e = product(p, (math.cos(0.5 * angle), share * x, share * y, share * z))
-    size = math.sqrt(e[0] * e[0] + e[1] * e[1] + e[2] * e[2] + e[3] * e[3])
-    for k in range(4):
-        out[k] = e[k] / size
 
 
 @inner
@@ -145,7 +123,7 @@ def add_turning(A, row, factor, a):
 @inner
 def stretched(h, C, a0, start, end, p, W):
     """Set a, the force C (a - a0) and the gradient D of a by start, rotation and end."""
-    rotation_of(p, W.R)
+    rotation(p, 0, W.R)
     W.D[:] = 0.0
     for i in range(3):
         W.a[i] = 0.0
@@ -266,21 +244,6 @@ def internal(rod, x, p, v, W):
         add_element(W, rod.bend[i], rod.viscous_bend[i], rod.l[i], 6 * i, v)
     for k in range(rod.h.size + 2):  # the gradient turns with the section
         add_turning(W.A, 6 * k, 0.5, W.r[6 * k : 6 * k + 3])
-
-
-@kernel
-def energy(rod, x, p, W):
-    """Energy of stretch, and of bending [J]."""
-    stretched = bent = 0.0
-    for n in range(rod.h.size):
-        stretch_of(rod, x, p, n, W)
-        for k in range(3):
-            stretched += 0.5 * rod.h[n] * W.f[k] * (W.a[k] - rod.a0[n, k])
-    for i in range(rod.l.size):
-        curvature_of(rod, p, i, W)
-        for k in range(3):
-            bent += 0.5 * rod.l[i] * W.f[k] * W.a[k]
-    return stretched, bent
 
 
 @kernel

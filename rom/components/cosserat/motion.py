@@ -11,17 +11,17 @@ Source:
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, partial
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import numpy.typing as npt
 from scipy.interpolate import CubicHermiteSpline
 
 from rom import rotation
-from rom.arguments import between, positive
+from rom.arguments import Positive, Share, typed
 from rom.components.cosserat.bodies import body
-from rom.components.cosserat.energy import Rod, energy, internal, work
-from rom.components.cosserat.shapes import Shape, reference
+from rom.components.cosserat.energy import Rod, internal, work
+from rom.components.cosserat.shapes import Shape, elastic_energy, reference
 from rom.components.cosserat.statics import Loads, add_loads, fitting, loads
 from rom.errors import ConfigError, RomError
 from rom.mbs.connections.ends import enter
@@ -71,21 +71,21 @@ class Motion:
         v = np.concatenate([self.v, np.zeros((len(self.t), 3))], axis=1).reshape(len(self.t), -1, 6)
         kinetic = 0.5 * np.einsum("tkc,kc,tkc->t", v[:, :, :3], self.rod.inertia, v[:, :, :3])
         kinetic += 0.5 * np.einsum("tkc,k,tkc->t", v[:, :-1, 3:], self.rod.mass, v[:, :-1, 3:])
-        W = work(self.rod)
-        elastic = [sum(energy(self.rod, x, p, W)) for x, p in zip(self.x, self.p, strict=True)]
+        elastic = [elastic_energy(self.rod, self.shape(k)) for k in range(len(self.t))]
         return np.column_stack([kinetic, elastic])
 
 
+@typed
 def simulate(  # noqa: PLR0913  keywords of one run, all with defaults
     rod: Rod,
-    t_end: float,
-    dt: float,
+    t_end: Annotated[float, Positive("s")],
+    dt: Annotated[float, Positive("s")],
     *,
     load: Loads | Callable[[float], Loads] | None = None,
     root: Callable[[float], Placement] | None = None,
     start: Shape | None = None,
     free: npt.ArrayLike | None = None,
-    rho_inf: float = 0.9,
+    rho_inf: Share = 0.9,
     save_every: int = 1,
 ) -> Motion:
     """Motion of a rod from rest, or from the velocity of its root as a rigid body.
@@ -110,9 +110,6 @@ def simulate(  # noqa: PLR0913  keywords of one run, all with defaults
         ModelError: if the rod has no mass at all.
         SolverError: if a step has no solution; its ``solution`` is what came before.
     """
-    positive("dt", dt)
-    positive("t_end", t_end)
-    between("rho_inf", rho_inf, 0, 1)
     constant = loads(rod) if load is None else load
     acting: Any = cache(load) if callable(load) else lambda _: constant
     moving = fitting(rod, acting(0.0), free)[1]

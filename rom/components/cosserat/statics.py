@@ -18,12 +18,11 @@ from rom.components.cosserat.energy import (
     Work,
     add_turning,
     internal,
-    rotation_of,
-    turn,
     work,
 )
 from rom.components.cosserat.shapes import Shape, reference
 from rom.errors import ConfigError, SolverError
+from rom.mbs.kernels.algebra import rotation, turned, vec
 from rom.model import Array, Mask
 from rom.paths.load_steps import load_steps
 
@@ -43,7 +42,7 @@ def add_loads(p, force, moment, W):
         for c in range(3):
             W.r[6 * i + 3 + c] -= force[i, c]
     for k in range(moment.shape[0]):
-        rotation_of(p[k], W.R)
+        rotation(p[k], 0, W.R)
         for c in range(3):
             W.a[c] = 0.0
             for d in range(3):
@@ -65,7 +64,7 @@ def add_spin(rod, x, p, spin, W):
             W.A[at + c, d - c + HALF_BANDWIDTH] += rod.mass[i] * spin[c] * spin[d]
             W.A[at + c, e - c + HALF_BANDWIDTH] += rod.mass[i] * spin[c] * spin[e]
     for k in range(rod.inertia.shape[0]):
-        rotation_of(p[k], W.R)
+        rotation(p[k], 0, W.R)
         w, J, at = W.a, rod.inertia[k], 6 * k
         for c in range(3):
             w[c] = W.R[0, c] * spin[0] + W.R[1, c] * spin[1] + W.R[2, c] * spin[2]
@@ -90,7 +89,7 @@ def balance(rod, x, p, load, spin, W):
 def turn_all(p, phi):
     """Turn quaternions by rotations about their own axes."""
     for k in range(p.shape[0]):
-        turn(p[k], phi[k, 0], phi[k, 1], phi[k, 2], p[k])
+        turned(p[k], 0, vec(phi[k], 0), p[k])
 
 
 def newton(rod: Rod, shape: Shape, load: Loads, spin: Array, free: Mask, W: Work) -> Shape | None:
@@ -107,13 +106,13 @@ def newton(rod: Rod, shape: Shape, load: Loads, spin: Array, free: Mask, W: Work
             return None
         right = np.where(free, -W.r, 0.0)
         d[:-3] = dgbtrs(lu, HALF_BANDWIDTH, HALF_BANDWIDTH, right, pivots, trans=1)[0]
-        turned, moved = np.abs(turns).max(), np.abs(ways).max() / length
-        if not np.isfinite(turned + moved):
+        angle, moved = np.abs(turns).max(), np.abs(ways).max() / length
+        if not np.isfinite(angle + moved):
             return None
-        factor = min(1.0, MAX_ROTATION / max(turned, MAX_ROTATION))
+        factor = min(1.0, MAX_ROTATION / max(angle, MAX_ROTATION))
         x += factor * ways[:-1]
         turn_all(p, factor * turns)
-        if max(turned, moved) < INCREMENT_RTOL:
+        if max(angle, moved) < INCREMENT_RTOL:
             return Shape(x, p)
     return None
 

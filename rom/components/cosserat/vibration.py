@@ -76,7 +76,7 @@ def modes(
         SolverError: if the shape is not stable, or the modes of a rotating rod were not found.
     """
     free = clamped(rod) if free is None else np.asarray(free, dtype=bool)
-    n = whole("n", n, 1, int(free.sum()))
+    whole("n", n, 1, int(free.sum()))
     K = linearised(rod, shape, load, spin)[1][np.ix_(free, free)]
     K, M = (K + K.T) / 2, lumped_mass(rod)[free]
     if np.any(spin):
@@ -95,8 +95,7 @@ def _resting(K: Array, M: Array, m: int) -> tuple[Array, Array]:
     try:
         flexible, Phi = eigh(np.diag(M), K, subset_by_index=(n - m, n - 1))
     except np.linalg.LinAlgError:
-        raise SolverError("the shape is not stable: it leaves a way that needs no force.",
-                          hint="Hold it, or find an equilibrium that lasts.") from None  # fmt: skip
+        raise SolverError("the shape is not stable; hold it, or find one that lasts.") from None
     omega = 1 / np.sqrt(flexible[::-1])
     return omega, Phi[:, ::-1] * omega
 

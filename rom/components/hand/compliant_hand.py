@@ -13,15 +13,16 @@ Source:
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Annotated
 
 import numpy as np
 import numpy.typing as npt
 
 from rom import rotation
-from rom.arguments import between
+from rom.arguments import NotNegative, between, typed
 from rom.components.cosserat import Rod, Shape, clamped, linearised, loads, reference, rod
 from rom.components.cosserat.helical_spring import HelicalSpring
-from rom.components.cosserat.statics import MAX_ROTATION
+from rom.components.cosserat.statics import MAX_ROTATION, turn_all
 from rom.components.hand.cable import Hole, Tendon
 from rom.errors import ConfigError, ModelError, SolverError
 from rom.model import Array, Mask
@@ -83,10 +84,7 @@ class Finger:
     @cached_property
     def rod(self) -> Rod:
         """The finger as a rod."""
-        h: list[float] = []
-        stretch: list[Array] = []
-        cells: list[Array] = []
-        bends: list[bool] = []
+        h, stretch, cells, bends = [], [], [], []
         for spring, link in zip(self.springs, self.phalanges, strict=True):
             own = {k: np.array(v) for k, v in spring.rigidities().items()}
             own["stretch"][1] *= self.stiffener
@@ -203,10 +201,11 @@ def rest(finger: Finger) -> Posture:
     return Posture(finger, reference(finger.rod), 0.0, 0.0)
 
 
+@typed
 def close(
     finger: Finger,
     *,
-    tension: float | None = None,
+    tension: Annotated[float, NotNegative("N")] | None = None,
     pull: float | None = None,
     load: npt.ArrayLike = (0.0, 0.0, 0.0),
     start: Posture | None = None,
@@ -233,16 +232,13 @@ def close(
     """
     if tension is not None and pull is not None:
         raise ConfigError("both tension and pull are given.", hint="One follows from the other.")
-    if tension is not None and tension < 0:
-        raise ConfigError(f"tension {tension:g} N: a cable does not push.", hint="Slack is zero.")
-    limit = 0.9 * sum(s.length for s in finger.springs)
     if pull is not None:
+        limit = 0.9 * sum(s.length for s in finger.springs)
         between("pull [m] of springs so long", pull, 0, limit, "[)")
     here = rest(finger) if start is None else start
     drawn = pull is not None
-    first = here.pull if drawn else here.tension
-    goal = np.append(np.asarray(load, dtype=float), (tension or 0.0) if pull is None else pull)
-    begin = np.append(here.load, first)
+    goal = np.append(np.asarray(load, dtype=float), pull if drawn else tension or 0.0)
+    begin = np.append(here.load, here.pull if drawn else here.tension)
     share, here = load_steps(
         lambda at, x: _balance(finger, at, begin + x * (goal - begin), drawn, way, extra),
         here, least=MIN_STEP,
@@ -281,20 +277,14 @@ def _balance(finger: Finger, start: Posture, goal: Array, drawn: bool, way: floa
         turned = np.abs(rows[:, :3]).max()
         if not np.isfinite(turned):
             return None
-        factor = min(1.0, MAX_ROTATION / max(turned, MAX_ROTATION))
-        shape = _moved(shape, factor * rows)
+        factor, p = min(1.0, MAX_ROTATION / max(turned, MAX_ROTATION)), shape.p.copy()
+        turn_all(p, factor * rows[:, :3])
+        shape = Shape(shape.x + factor * rows[:-1, 3:], p)
         tension += factor * change
         if max(turned, np.abs(rows[:-1, 3:]).max() / one.x[-1, 2]) < INCREMENT_RTOL:
             pull = length - cable.length(shape)
             return Posture(finger, shape, tension, pull, tuple(goal[:3]))
     return None
-
-
-def _moved(shape: Shape, rows: Array) -> Shape:
-    """A shape after increments, rotation and translation in each row."""
-    turns = [rotation.exp(phi) for phi in rows[:, :3]]
-    p = [rotation.multiply(q, turn) for q, turn in zip(shape.p, turns, strict=True)]
-    return Shape(shape.x + rows[:-1, 3:], np.array(p))
 
 
 def hand(friction: float = 0.0, n: int = 8) -> dict[str, Finger]:

@@ -11,16 +11,17 @@ Source:
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import numpy.typing as npt
 
 from rom import rotation
+from rom.arguments import Count, typed
 from rom.body import FlexibleBody
 from rom.components.cosserat import body
 from rom.components.wind.blade_element import in_wind
-from rom.components.wind.blading import check_pitch
+from rom.components.wind.blading import Pitch
 from rom.components.wind.control import CUT_OUT_WIND
 from rom.components.wind.controlled import add_control
 from rom.components.wind.wake import in_late_wind, over_time
@@ -131,10 +132,11 @@ class Turbine:
         return seen @ basis.T
 
 
+@typed
 def turbine(  # noqa: PLR0913  one keyword per choice, all with defaults
-    segments: int = 48,
+    segments: Annotated[int, Count(1)] = 48,
     *,
-    tower_segments: int = 16,
+    tower_segments: Annotated[int, Count()] = 16,
     gravity: float = 9.80665,
     tilt: float = SHAFT_TILT,
     cone: float = CONE_ANGLE,
@@ -142,7 +144,7 @@ def turbine(  # noqa: PLR0913  one keyword per choice, all with defaults
     wind: npt.ArrayLike | None = None,
     late_wake: bool = False,
     controlled: bool = False,
-    pitch: float = 0.0,
+    pitch: Pitch = 0.0,
     speed: float = 0.0,
     shaft: tuple[float, float] = (SHAFT_STIFFNESS, SHAFT_DAMPING),
     hub_body: FlexibleBody | None = None,
@@ -179,10 +181,6 @@ def turbine(  # noqa: PLR0913  one keyword per choice, all with defaults
             is no hub, a wind that changes without a late wake, or one in which no controller works.
         ModelError: if a rod is none, see `cosserat.rod`.
     """
-    if segments < 1 or tower_segments < 0:
-        raise ConfigError(f"{segments} segments of a blade and {tower_segments} of the tower.",
-                          hint="A blade has one or more, a stiff tower none.")  # fmt: skip
-    check_pitch(pitch)
     if controlled and wind is not None and (most := over_time(wind)[:, 1].max()) > CUT_OUT_WIND:
         raise ConfigError(f"no controller works in a wind of {most:g} m/s, above 25 m/s.",
                           hint="Stand in it without: controlled=False.")  # fmt: skip
@@ -260,8 +258,8 @@ def _hub(mech: Mechanism, solid: FlexibleBody | None, at: Array, lean: Array, sp
 
 def _bearing(nacelle: Part, hub: Array, axis: Array) -> Marker:
     """The place of the nacelle on the axis of the shaft."""
-    behind = nacelle.at
-    return nacelle.marker(hub + axis * (axis @ (behind - hub)) - behind)
+    way = nacelle.at - hub
+    return nacelle.marker(axis * (axis @ way) - way)
 
 
 def _train(
@@ -276,18 +274,15 @@ def _train(
     hub, axis = place
     bearing = _bearing(nacelle, hub, axis)
     at = mech.design_point(bearing)
-    slow, fast = speed * axis, GEAR_RATIO * speed * axis
-    wheel = mech.add_rigid(
-        "wheel", mass=WHEEL_MASS, inertia=(WHEEL_INERTIA,) * 3, at=at, omega=slow
-    )
-    generator = mech.add_rigid(
-        "generator", mass=GENERATOR_MASS, inertia=(GENERATOR_INERTIA,) * 3, at=at, omega=fast
-    )
-    mech.revolute("slow", bearing, wheel.marker(NO_VELOCITY), axis=axis)
-    mech.revolute("fast", bearing, generator.marker(NO_VELOCITY), axis=axis)
+    for name, turns, mass, inertia, omega in (
+        ("wheel", "slow", WHEEL_MASS, WHEEL_INERTIA, speed * axis),
+        ("generator", "fast", GENERATOR_MASS, GENERATOR_INERTIA, GEAR_RATIO * speed * axis),
+    ):
+        part = mech.add_rigid(name, mass=mass, inertia=(inertia,) * 3, at=at, omega=omega)
+        mech.revolute(turns, bearing, part.marker(NO_VELOCITY), axis=axis)
     mech.gear("gear", "slow", "fast", ratio=GEAR_RATIO)
     end = turning.marker(NO_VELOCITY if turning.flexible is None else "shaft")
-    mech.revolute("shaft", wheel.marker(mech.design_point(end) - at), end, axis=axis)
+    mech.revolute("shaft", mech.part("wheel").marker(mech.design_point(end) - at), end, axis=axis)
     mech.rotational_spring("twist", "shaft", stiffness=shaft[0], damping=shaft[1])
 
 

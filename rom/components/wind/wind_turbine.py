@@ -78,9 +78,8 @@ def blade(
 
     def place(s: float) -> tuple[Array, Array]:
         twist = float(np.radians(at("twist_deg", s)))  # leading edge into the wind
-        return turn @ [0, 0, HUB_RADIUS + BLADE_LENGTH * s], turn @ rotation.matrix(
-            rotation.exp([0, 0, -twist])
-        )
+        axes = turn @ rotation.matrix(rotation.exp([0, 0, -twist]))
+        return turn @ [0, 0, HUB_RADIUS + BLADE_LENGTH * s], axes
 
     edge, flap = at("inertia_edge", middles), at("inertia_flap", middles)
     return along(
@@ -198,15 +197,11 @@ def run_up(
         return x, rotation.multiply(turn, home[1]), np.cross([speed(t), 0, 0], x), speed(t) * axis
 
     weight = loads(rod, weight=(0, 0, -gravity))
-    given: dict[str, Any] = {
-        "load": weight,
-        "start": equilibrium(rod, weight) if gravity else None,
-    } | options
-    motion = simulate(rod, t_end, dt, root=root, **given)
+    start = equilibrium(rod, weight) if gravity else None
+    motion = simulate(rod, t_end, dt, root=root, **{"load": weight, "start": start} | options)
     angles = np.array([angle(t) for t in motion.t])
     outward = rod.x[-1] / np.linalg.norm(rod.x[-1])
-    behind = np.cross(outward, [1.0, 0, 0])
-    basis = np.array([[1.0, 0, 0], behind, outward])
+    basis = np.array([[1.0, 0, 0], np.cross(outward, [1.0, 0, 0]), outward])
     back = [rotation.matrix(rotation.exp([-a, 0, 0])) for a in angles]
     ends = [A @ x - rod.x[-1] for A, x in zip(back, motion.x[:, -1], strict=True)]
     about = [np.cross(x[0], r[:3]) + rotation.matrix(p[0]) @ r[3:]
@@ -215,7 +210,6 @@ def run_up(
     return RunUp(motion, angles, speeds, np.array(ends) @ basis.T, np.array(about)[:, 0])
 
 
-ROTOR_INERTIA = HUB_INERTIA
 SLOW_GENERATOR_INERTIA = GENERATOR_INERTIA * GEAR_RATIO**2  # kg m^2, on the slow side of the gear
 RIGID_STIFFNESS = 1e12  # [N], [N m^2] of what does not bend; the root of a blade has 2e10
 
@@ -273,9 +267,8 @@ def rotor(n: int = 24, *, blade_rod: Rod | None = None) -> Rotor:
     along = rotation.quaternion(np.array([[0.0, 0, 1], [0, 1, 0], [-1, 0, 0]]))  # third axis: x
     x = np.concatenate([[[-HUB_OVERHANG, 0, 0], [-HUB_OVERHANG / 2, 0, 0], [0, 0, 0]], one.x])
     p = np.concatenate([[along] * 3, one.p[:1], one.p[1:]])
-    twist = (
-        0.75 * HUB_OVERHANG * SHAFT_STIFFNESS / N_BLADES
-    )  # of the half and the whole segment that twist
+    # of the half and the whole segment that twist
+    twist = 0.75 * HUB_OVERHANG * SHAFT_STIFFNESS / N_BLADES
     stiff = [RIGID_STIFFNESS] * 3
     whole = rod(
         x, p, stretch=np.concatenate([[stiff] * 3, one.stretch]),
@@ -284,7 +277,7 @@ def rotor(n: int = 24, *, blade_rod: Rod | None = None) -> Rotor:
     )  # fmt: skip
     inertia = np.concatenate([np.zeros((4, 3)), one.inertia[1:]])
     inertia[0, 2] = SLOW_GENERATOR_INERTIA / N_BLADES
-    inertia[3, :2] = ROTOR_INERTIA / N_BLADES  # both, since the sections of the root are turned
+    inertia[3, :2] = HUB_INERTIA / N_BLADES  # both, since the sections of the root are turned
     viscous = np.concatenate([np.zeros((3, 3)), one.viscous_bend])
     viscous[:2, 2] = twist * SHAFT_DAMPING / SHAFT_STIFFNESS
     stretched = np.concatenate([np.zeros((3, 3)), one.viscous_stretch])

@@ -451,7 +451,7 @@ ABOVE = box((-1, 1), (2, 2))
     ("actions", "error", "words"),
     [
         ({"tools": [Tool("punch", box((0.2, 0.9), (0.8, 2)))]}, MeshError,
-         "tool 'punch' starts 0.1 m inside the sheet, at node 7"),
+         "tool 'punch' starts 0.1 m inside the sheet at node 7"),
         ({"tools": [Tool("wedge", [(0.6, 0.8), (0.9, 2), (0.6, 2)])]}, MeshError,
          "corner 0 of the tool 'wedge' starts inside the sheet"),
         ({"tools": [Tool("pad", ABOVE[::-1])]}, ConfigError, "'pad': .* not convex, or clockwise"),

@@ -413,7 +413,7 @@ test_messages_name_what_is_wrong = refused(
     (lambda: sheet(SMALL.points.T, SMALL.triangles), MeshError, r"points \(2, 9\)"),
     (lambda: sheet(*distorted((2, 2)), thickness=0.0), ConfigError, r"thickness \[m\] = 0"),
     (lambda: sheet(SMALL.points - 2, SMALL.triangles, state="axisymmetric"), MeshError,
-     "radius of node 0 is -2 m"),
+     "-2 m of node 0, is a radius"),
     (lambda: forces(SMALL, SOFT, SMALL.points[:3]), ConfigError, r"has shape \(3, 2\)"),
     (lambda: tangent(SMALL, SOFT, np.nan * SMALL.points), ConfigError, "is not finite"),
     (lambda: fly(SMALL, SOFT, np.zeros((3, 2)), [0], 1.0), ConfigError, "velocities has"),

@@ -189,8 +189,8 @@ def test_the_actuator_is_that_of_the_report():
         ([[0.0, 8.0], [0.0, 9.0]], "instants of a wind must ascend"),
         ([[0.0, np.nan]], "finite"),
         (lambda t: 8.0, "wind"),
-        ([8.0, 9.0], "no speed over time"),
-        (np.zeros((0, 2)), "no speed over time"),
+        ([8.0, 9.0], "neither a speed"),
+        (np.zeros((0, 2)), "neither a speed"),
         (-8.0, "must not be negative"),
     ],
 )

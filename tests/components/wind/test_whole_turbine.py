@@ -159,4 +159,4 @@ def test_work_of_the_torque_is_the_energy(driven):
 
 
 def test_a_turbine_without_blades_is_refused():
-    refuses(ConfigError, "0 segments of a blade", turbine, 0)
+    refuses(ConfigError, "segments = 0", turbine, 0)

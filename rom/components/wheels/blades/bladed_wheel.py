@@ -159,7 +159,7 @@ class BladedWheel:
         (N, r, _), found = self.roots.shape, [blade.n_root for blade in blades]
         if found != [r] * N:
             raise ConfigError(
-                f"{len(found)} blades with {sorted(set(found))} root coordinates, not {N} with {r}.",
+                f"{len(found)} blades with {sorted(set(found))} root coordinates, not {N} of {r}.",
                 hint="Take sector.blade, its varied(…), or rom.reduced_blade(sector, …).",
             )
 
