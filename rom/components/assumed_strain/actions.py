@@ -318,8 +318,7 @@ def _refuse_overlap(body: Sheet, made: Prepared) -> None:
         corner = _covered(body, faces[:, :2] + offset)
         if corner >= 0:
             raise MeshError(
-                f"corner {corner} of the tool {name!r} starts inside the sheet.",
-                hint="Move the tool until it only touches.",
+                f"corner {corner} of the tool {name!r} starts inside the sheet; move it."
             )
 
 

@@ -154,8 +154,7 @@ def implicit_motion(
     """
     if actions.tools and rho_inf > MAX_RHO_OF_IMPACTS:
         raise ConfigError(
-            f"rho_inf = {rho_inf} with tools: impacts would gain energy.",
-            hint=f"At most {MAX_RHO_OF_IMPACTS} beside tools.",
+            f"rho_inf = {rho_inf} with tools: impacts gain energy above {MAX_RHO_OF_IMPACTS}."
         )
     start = np.zeros_like(body.points) if v is None else nodal("velocities", v, body)
     t, M = _instants(times), mass(body, metal)

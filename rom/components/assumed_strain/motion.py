@@ -58,10 +58,8 @@ class Metal:
             raise MaterialError(f"linear = {shortened(self.linear)} must be True or False.")
         plastic = self.yield_stress > 0 and self.hardening >= 0
         if not (self.E > 0 and -1 < self.nu < 0.5 and self.rho > 0 and plastic):
-            raise MaterialError(
-                f"no solid is {self}.",
-                hint="E, rho, yield_stress > 0; -1 < nu < 0.5; hardening >= 0.",
-            )
+            hint = "E, rho, yield_stress > 0; -1 < nu < 0.5; hardening >= 0."
+            raise MaterialError(f"no solid is {self}.", hint=hint)
 
     @property
     def numbers(self) -> Array:

@@ -86,8 +86,7 @@ def sheet(
     loose = np.setdiff1d(np.arange(len(X)), T)
     if loose.size:
         raise MeshError(
-            f"{loose.size} of {len(X)} points belong to no triangle, the first is {loose[0]}.",
-            hint="Leave them out: they have no mass, and nothing holds them.",
+            f"{loose.size} of {len(X)} points belong to no triangle, the first is {loose[0]}."
         )
     G = np.zeros((len(T), 3, 6, 2))
     for k in range(3):
@@ -123,8 +122,7 @@ def _refuse_no_mesh(X: Array, T: Index, state: str) -> None:
         raise MeshError(f"points {X.shape} and triangles {T.shape} must be (n, 2) and (t, 3).")
     if T.min() < 0 or T.max() >= len(X):
         raise MeshError(
-            f"triangles name the nodes {T.min()} to {T.max()}; there are {len(X)} points.",
-            hint="Count nodes from zero.",
+            f"triangles name the nodes {T.min()} to {T.max()}; there are 0 to {len(X) - 1}."
         )
     if state == "axisymmetric" and X[:, 0].min() < 0:
         raise MeshError(

@@ -51,19 +51,13 @@ def memory(space):
 
 
 @inner
-def rate_of(pose, place):
-    """Velocity of one of the twelve dofs of two frames."""
-    return pose[POSE_SIZE * (place // 6) + 7 + place % 6]
-
-
-@inner
 def answer_of(W, C, viscous, weight, at, pose, wanted, answer):  # noqa: PLR0913
     """Write energy, lost power, forces and their derivatives of one element."""
     answer[:] = 0.0
     for k in range(3):
         rate = 0.0
         for c in range(9):
-            rate += W.D[k, c] * rate_of(pose, at[c])
+            rate += W.D[k, c] * pose[POSE_SIZE * (at[c] // 6) + 7 + at[c] % 6]
         answer[0] += 0.5 * weight * W.f[k] * W.f[k] / C[k]
         answer[1] += weight * viscous[k] * rate * rate
         W.f[k] += viscous[k] * rate

@@ -135,12 +135,6 @@ def stretched(h, C, a0, start, end, p, W):
 
 
 @inner
-def stretch_of(rod, x, p, n, W):
-    """The quantities of `stretched` for segment n."""
-    stretched(rod.h[n], rod.stretch[n], rod.a0[n], x[n], x[n + 1], p[n + 1], W)
-
-
-@inner
 def stretch_geometry(h, W):
     """Set H to the second derivatives of a, times the force, times h."""
     n, a = W.f, W.a
@@ -179,12 +173,6 @@ def curved(l, B, s, S, p, q, W):
                 unit = W.e[0] if k == m else 0.0
                 W.D[k, j] -= (unit - W.R[k, m]) * S[j, m] / l
                 W.D[k, 6 + j] += (unit + W.R[k, m]) * S[m, j] / l
-
-
-@inner
-def curvature_of(rod, p, i, W):
-    """The quantities of `curved` for vertex i."""
-    curved(rod.l[i], rod.bend[i], rod.s[i], rod.S[i], p[i], p[i + 1], W)
 
 
 @inner
@@ -234,12 +222,12 @@ def internal(rod, x, p, v, W):
     W.r[:] = 0.0
     W.A[:] = 0.0
     for n in range(rod.h.size):
-        stretch_of(rod, x, p, n, W)
+        stretched(rod.h[n], rod.stretch[n], rod.a0[n], x[n], x[n + 1], p[n + 1], W)
         stretch_geometry(rod.h[n], W)
         at = 6 * n + 3
         add_element(W, rod.stretch[n], rod.viscous_stretch[n], rod.h[n], at, v)
     for i in range(rod.l.size):
-        curvature_of(rod, p, i, W)
+        curved(rod.l[i], rod.bend[i], rod.s[i], rod.S[i], p[i], p[i + 1], W)
         curvature_geometry(rod.S[i], W)
         add_element(W, rod.bend[i], rod.viscous_bend[i], rod.l[i], 6 * i, v)
     for k in range(rod.h.size + 2):  # the gradient turns with the section
@@ -250,10 +238,10 @@ def internal(rod, x, p, v, W):
 def strains(rod, x, p, W, a, k):
     """Set stretch and shear a - a0 of all segments and bending k of all vertices."""
     for n in range(rod.h.size):
-        stretch_of(rod, x, p, n, W)
+        stretched(rod.h[n], rod.stretch[n], rod.a0[n], x[n], x[n + 1], p[n + 1], W)
         for c in range(3):
             a[n, c] = W.a[c] - rod.a0[n, c]
     for i in range(rod.l.size):
-        curvature_of(rod, p, i, W)
+        curved(rod.l[i], rod.bend[i], rod.s[i], rod.S[i], p[i], p[i + 1], W)
         for c in range(3):
             k[i, c] = W.a[c]

@@ -167,20 +167,16 @@ def _lead(mech: Mechanism, root: Callable[[float], Placement], times: Array) -> 
                           hint="Cut the run in two.")  # fmt: skip
     (c, s), (dc, ds) = (A[:, 1:, 1].T for A in (seen, change))
     angle, rate = np.unwrap(np.arctan2(s, c)), (c * ds - s * dc) / (c * c + s * s)
-    way = CubicHermiteSpline(times, np.column_stack([x, angle, seen[:, 0, 1:]]),
-                             np.column_stack([v, rate, change[:, 0, 1:]]))  # fmt: skip
+    values = np.column_stack([x, angle, seen[:, 0, 1:]])
+    rates = np.column_stack([v, rate, change[:, 0, 1:]])
     rows = [Row(POINT, e, NO_VECTOR, NO_VECTOR) for e in np.eye(3)]
     rows += [Row(ANGLE, world[:, 1], own[1], world[:, 2])]
     rows += [Row(NORMAL, world[:, 0], b, NO_VECTOR) for b in own[1:]]
     ends = mech.ground.marker((0.0, 0.0, 0.0)), mech.nonlinear["rod"].marker("start")
     for k, row in enumerate(rows):
         enter(mech, Joint(f"root {k}", "guide", ends, (), row))
-        value, first = (partial(_column, of, k) for of in (way, way.derivative()))
-        mech.drive(f"way of root {k}", f"root {k}", value, rate=first)
-
-
-def _column(function: Callable[[Any], Array], k: int, t: Any) -> Any:
-    return function(t)[..., k]
+        way = CubicHermiteSpline(times, values[:, k], rates[:, k])
+        mech.drive(f"way of root {k}", f"root {k}", way, rate=way.derivative())
 
 
 def _hold(mech: Mechanism, free: Mask, *, led: bool) -> None:

@@ -5,11 +5,11 @@ An object is free in space. Every phalanx is a round bar with round ends; the pa
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
-from rom.arguments import finite, positive, unit_vector
+from rom.arguments import Length, Positive, finite, typed, unit_vector
 from rom.errors import ConfigError
 from rom.mbs.elements.contact.impact import Impact
 from rom.mbs.elements.contact.segments import distance
@@ -28,6 +28,7 @@ TABLE_MASS = 0.1  # [kg]; its motion is given
 RAMP_TIME = 0.1  # over which the table gathers speed [s]
 
 
+@typed
 @dataclass(frozen=True)
 class Held:
     """A ball, or a round bar with round ends.
@@ -41,8 +42,8 @@ class Held:
     """
 
     centre: tuple[float, float, float]
-    radius: float
-    mass: float
+    radius: Length
+    mass: Annotated[float, Positive("kg")]
     axis: tuple[float, float, float] | None = None
     length: float = 0.0
 
@@ -84,8 +85,6 @@ def hold(mech: Mechanism, name: str, held: Held, *, law: Impact = SKIN_CONTACT,
         Force of the contacts: Hunt and Crossley, J. Appl. Mech. 42 (1975) 440; stiffness along the
         surface: Mindlin, J. Appl. Mech. 16 (1949) 259.
     """
-    positive("mass", held.mass)
-    positive("radius", held.radius)
     phalanges = [part for part in mech.parts.values() if "distal" in part.points]
     if not phalanges:
         raise ConfigError(f"nothing holds {name!r}: the mechanism needs fingers of `moving_hand`.")
@@ -218,8 +217,7 @@ def contact_forces(solution: Any, name: str) -> dict[str, Array]:
 def grip(solution: Any, name: str, fingers: Iterable[str]) -> dict[str, Array]:
     """{finger: (n_t,) sizes of the forces of its phalanges on an object, added up [N]}."""
     forces = contact_forces(solution, name)
-    return {
-        finger: sum((np.linalg.norm(f, axis=1) for key, f in forces.items()
-                     if key.startswith(f"{finger} phalanx")), np.zeros(solution.t.size))
-        for finger in fingers
-    }  # fmt: skip
+    sizes = {key: np.linalg.norm(f, axis=1) for key, f in forces.items()}
+    none = np.zeros(solution.t.size)
+    return {one: sum((f for key, f in sizes.items() if key.startswith(f"{one} phalanx")), none)
+            for one in fingers}  # fmt: skip

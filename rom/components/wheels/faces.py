@@ -92,10 +92,8 @@ def _sectors(low: Interface, high: Interface, axis: Array, at: Array) -> tuple[i
         across = x - np.outer(x @ axis, axis)
         size = np.ptp(x, axis=0).max()
         if on_axis := (np.linalg.norm(across, axis=1) < COINCIDENT_RTOL * size).sum():
-            raise InterfaceError(
-                f"{on_axis} nodes of the cyclic face {face.name!r} lie on the axis of rotation.",
-                hint="Leave a small bore around the axis.",
-            )
+            text = f"{on_axis} nodes of the cyclic face {face.name!r} lie on the axis of rotation."
+            raise InterfaceError(text, hint="Leave a small bore.")
         weights = np.asarray(face.surface_mass.sum(axis=1)).ravel()
         arms.append(weights @ across / weights.sum())
     angle = np.arctan2(axis @ np.cross(*arms), arms[0] @ arms[1])

@@ -144,10 +144,7 @@ def wheel_modes(
 
 def _refuse_divergence(sector: CyclicSector, diameter: int, K: csr_matrix, speed: float) -> None:
     if sector.motions is not None:
-        raise ConfigError(
-            "nothing but Coriolis forces stiffens the floating motion of a free wheel at speed.",
-            hint="Use rom.travelling_modes.",
-        )
+        raise ConfigError("a free wheel at speed has no modes; use rom.travelling_modes.")
     T = sector.harmonic(diameter)
     K = csr_matrix(T.conj().T @ K @ T)
     if negative_count(K if sector.standing(diameter) else real_form(K)):

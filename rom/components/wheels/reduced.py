@@ -95,10 +95,7 @@ def reduce_sector(
             hint="Write n_modes=60, or method=rom.CraigBampton(n_modes=60).",
         )
     if sector.face is None:
-        raise ConfigError(
-            "interface functions need the geometry of the cyclic faces.",
-            hint="Make the sector with rom.CyclicSector.from_model.",
-        )
+        raise ConfigError("a sector without cyclic faces has no geometry: CyclicSector.from_model.")
     faces = {CYCLIC_FACES: functions or Polynomial(4)}
     draft = SectorDraft(model=sector, method=method or CraigBampton(n_modes), interfaces=faces)
     return run((connect_faces, basis, project), draft)

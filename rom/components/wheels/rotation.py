@@ -50,7 +50,7 @@ def rotating_sector(sector: CyclicSector, model: FEModel) -> CyclicSector:
         docs/theory/rotating_solids.md.
     """
     if model.stresses is None:
-        raise ConfigError("geometric stiffness follows from finite elements alone: rom.fe.model.")
+        raise ConfigError("the model has no finite elements; make it with rom.fe.model.")
     refuse_attachments(model)
     K_geo = model.stresses.prestress(centrifugal_displacement(sector))
     coriolis, softening = rotation_matrices(sector.M, sector.axis)

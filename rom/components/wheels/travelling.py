@@ -173,9 +173,8 @@ def _refuse_growth(lam: Complex, diameter: int, speed: float) -> None:
     if growth > GROWTH_RATE_RTOL * abs(lam).max(initial=0.0):
         worst = lam[lam.real.argmax()]
         raise ModelError(
-            f"at {speed:g} rad/s a motion with {diameter} nodal diameters grows by {growth:.3g} "
-            f"1/s at {abs(worst.imag) / (2 * np.pi):.4g} Hz: it is unstable.",
-            hint="rom.cyclic.divergence_speed tells where stiffness is used up.",
+            f"at {speed:g} rad/s a motion with {diameter} nodal diameters is unstable, it grows by "
+            f"{growth:.3g} 1/s at {abs(worst.imag) / (2 * np.pi):.4g} Hz; see divergence_speed."
         )
 
 
@@ -200,8 +199,7 @@ def _verify(M: csr_matrix, G: csr_matrix, K: csr_matrix, lam: Complex, U: Comple
         if true != start + falls.sum():
             raise ModesMissedError(
                 f"the inertia of the system, {true} from {start} on, does not agree with "
-                f"{falls.size} waves below {w / (2 * np.pi):.6g} Hz.",
-                hint="Ask for more waves.",
+                f"{falls.size} waves below {w / (2 * np.pi):.6g} Hz; ask for more."
             )
 
 

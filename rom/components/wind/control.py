@@ -91,12 +91,6 @@ def controller_step(state, speed, dt):
     advance(state, speed, dt)
 
 
-@kernel
-def torque_at(speed, pitch):
-    """`asked_torque` for Python."""
-    return asked_torque(speed, pitch)
-
-
 @typed
 def generator_torque(speed: float, pitch: float = 0.0) -> float:
     """Torque of the generator at its speed [rad/s], on the fast shaft [N m].
@@ -108,7 +102,7 @@ def generator_torque(speed: float, pitch: float = 0.0) -> float:
     Raises:
         ConfigError: for a speed or a pitch that is not finite.
     """
-    return float(torque_at(float(speed), float(pitch)))
+    return float(asked_torque.py_func(speed, pitch))
 
 
 def gain_factor(pitch: float) -> float:

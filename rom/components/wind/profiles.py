@@ -57,10 +57,8 @@ class Profile:
         _check(self.name, a, self.lift, self.drag)
         if a[0] > ROUND_ATOL - np.pi or a[-1] < np.pi - ROUND_ATOL:
             first, last = np.degrees(a[[0, -1]])
-            raise ConfigError(f"profile {self.name!r} is known from {first:g} to {last:g} degrees; "
-                              "flow beyond has no lift and drag.",
-                              hint="rom.components.wind.profiles.profile carries a table on past "
-                              "stall.")  # fmt: skip
+            text = f"profile {self.name!r} is known from {first:g} to {last:g} degrees."
+            raise ConfigError(text, hint="wind.profiles.profile carries a table on past stall.")
 
     @property
     def table(self) -> Array:

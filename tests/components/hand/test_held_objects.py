@@ -198,7 +198,7 @@ def test_palm_and_phalanges_weigh_as_blocks_and_bars():
     m, r, h = 1200 * np.pi * 25e-6 * 0.018, 5e-3, 0.018
     assert_allclose(bone.mass, m)
     assert_allclose(bone.second, m * np.diag([r * r / 4, r * r / 4, h * h / 12]), atol=1e-15)
-    with pytest.raises(ConfigError, match=r"it takes in 0 to 0\.0216 m"):
+    with pytest.raises(ConfigError, match=r"0 to 0\.0216 m"):
         moving_hand({"index": Finger(n=2)}, drives={"index": Drive(pull=22 * MM)})
 
 

@@ -10,10 +10,15 @@ from cases.refusals import refuses
 from rom import rotation
 from rom.components.wind.blading import rotor_load
 from rom.components.wind.control import Controller, generator_torque, steady
-from rom.components.wind.controlled import PITCH_DAMPING, PITCH_STIFFNESS
 from rom.components.wind.operation import operate
 from rom.components.wind.wake import in_late_wind
-from rom.components.wind.whole_turbine import GEAR_RATIO, N_BLADES, turbine
+from rom.components.wind.whole_turbine import (
+    GEAR_RATIO,
+    N_BLADES,
+    PITCH_DAMPING,
+    PITCH_STIFFNESS,
+    turbine,
+)
 from rom.components.wind.wind_turbine import ramp
 from rom.errors import ConfigError
 

@@ -168,10 +168,7 @@ class BladedWheel:
         disk, own = getattr(self, name), [getattr(blade, name) for blade in blades]
         if disk is None or any(B is None for B in own):
             place = "disk" if disk is None else f"blade {[B is None for B in own].index(True)}"
-            raise ConfigError(
-                f"the {place} has no matrices of rotation.",
-                hint="Substructure a sector of rom.rotating_sector, and reduce blades on it.",
-            )
+            raise ConfigError(f"the {place} has no matrices of rotation; see rom.rotating_sector.")
         N, r, c = self.roots.shape
         d, X = len(disk), self.roots.reshape(N * r, c)
         each = list(zip(own, self.roots, strict=True))
@@ -229,10 +226,10 @@ class BladedWheel:
         K, M = self.matrices(blades, speed=speed)
         lam, Phi = _apart(K, M, self.rigid)
         if lam[0] < -RIGID_RTOL * lam[-1] or (speed and lam[0] <= 0.0):
-            text, hint = "", "Look for a deviation of -1 or below."
+            text = "these blades leave a motion without stiffness; look for a deviation of -1."
             if speed:
-                text, hint = f"at {speed:g} rad/s spin softening and ", "Turn more slowly."
-            raise ModelError(f"{text}these blades leave a motion without stiffness.", hint=hint)
+                text = f"at {speed:g} rad/s the wheel is above its instability; turn more slowly."
+            raise ModelError(text)
         kept = lowest(n)
         return Modes(np.sqrt(np.maximum(lam[kept], 0.0)), Phi[:, kept])
 

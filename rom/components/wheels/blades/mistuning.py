@@ -103,10 +103,8 @@ class MistunedWheel:
         """
         lam, V = np.linalg.eigh(self.stiffness(deviations))
         if lam.min() < -1e-9 * lam.max():
-            raise ModelError(
-                f"deviations from {np.min(deviations):g} on leave a motion without stiffness; take "
-                "smaller ones."
-            )
+            least = np.min(deviations)
+            raise ModelError(f"deviations from {least:g} on leave a motion without stiffness.")
         kept = lowest(n)
         return Modes(np.sqrt(np.maximum(lam[..., kept], 0.0)), V[..., kept])
 

@@ -216,10 +216,7 @@ def stresses_of(model: FEModel, blade: str | None) -> Any:
     """
     found = (model if blade is None else model.regions[blade]).stresses
     if found is None:
-        raise ConfigError(
-            "the stiffness of centrifugal stress follows from finite elements of the blade alone.",
-            hint="Make it with rom.fe.model, or its disk without rom.rotating_sector.",
-        )
+        raise ConfigError("the blade has no finite elements; make it with rom.fe.model.")
     return found
 
 
@@ -302,10 +299,7 @@ def substructured_sector(
         the interfaces as in `rom.reduce_sector`.
     """
     if sector.face is None or sector.n != model.n_dofs:
-        raise ConfigError(
-            "substructures need the full sector and the model it was made from.",
-            hint="Make the sector with rom.CyclicSector.from_model.",
-        )
+        raise ConfigError("substructures need the full sector of this model: from_model.")
     K_blade, M_blade = region(model, blade)
     _refuse_stiffened(sector, model, K_blade.diagonal() > 0.0)
     inner, nodes = cut(sector.K, K_blade, blade)
@@ -347,6 +341,6 @@ def _refuse_stiffened(sector: CyclicSector, model: FEModel, of_blade: Array) -> 
     own = all_rows(model, model.K).diagonal()[of_blade]
     if np.any(abs(sector.K.diagonal()[of_blade] - own) > SHARED_STIFFNESS_RTOL * own):
         raise ConfigError(
-            "what rom.heated_sector adds cannot be shared out between disk and blade.",
+            "the blade has more than the stiffness of its finite elements: see rom.heated_sector.",
             hint="Substructure the sector without heat, or reduce it whole by rom.reduce_sector.",
         )

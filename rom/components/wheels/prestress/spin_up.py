@@ -346,8 +346,7 @@ def _warmed(steady: SteadyRotation, heat: Heat) -> Array:
     a, share = steady.follow(steady.at_rest, 0.0, 1.0, steady.solid.warm)
     if share < 1.0:
         raise ModelError(
-            f"no stable state beyond {heat.described(share)}: the solid buckles.",
-            hint="rom.thermal_buckling tells where that of the linear solid does.",
+            f"no stable state beyond {heat.described(share)}: it buckles, see rom.thermal_buckling."
         )
     return a
 

@@ -188,10 +188,7 @@ def finite_solid(model: FEModel, heat: Heat | None = None) -> Any:
         ConfigError: if the model has no finite elements.
     """
     if model.stresses is None:
-        raise ConfigError(
-            "the model has no finite elements, from which alone its stress follows.",
-            hint="Make it with rom.fe.model.",
-        )
+        raise ConfigError("the model has no finite elements; make it with rom.fe.model.")
     solid = model.stresses.finite_strain()
     if heat is not None:
         solid.heat(*heat.on(model))
@@ -278,11 +275,8 @@ def _refuse_buckled(parts: Iterable[tuple[csr_matrix, ...]], heat: Heat, workers
     shares = [critical_factor(*part) for part in parts if not _stiff(sum(part), workers)]
     share = min(shares, default=None)
     if share is not None:
-        raise ModelError(
-            f"the heated solid buckles at {heat.described(share)}: thermal stress has then used up "
-            "its stiffness.",
-            hint="Hold it more loosely, or follow its bent shape with rom.spin_up.",
-        )
+        text = f"the heated solid buckles at {heat.described(share)}."
+        raise ModelError(text, hint="Hold it more loosely, or follow its shape with rom.spin_up.")
 
 
 def _stiff(K: csr_matrix, workers: Workers) -> bool:
