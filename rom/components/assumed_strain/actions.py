@@ -138,11 +138,6 @@ class Prepared:
         """What `kernels.applied` takes."""
         return self.loads, self.sides, self.stress, self.of_side
 
-    @property
-    def tools(self) -> tuple[Array, Index, Array]:
-        """What `kernels.fly` takes of tools."""
-        return self.faces, self.first, self.friction
-
     def faces_of(self, k: int) -> Array:
         """(f, 7) faces of a tool."""
         return self.faces[self.first[k] : self.first[k + 1]]

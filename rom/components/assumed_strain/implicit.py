@@ -209,7 +209,7 @@ class _Way:
                 end = min(now.t + part * (t[k] - t[k - 1]), t[k])
                 end = t[k] if t[k] - end < 1e-9 * (t[k] - t[k - 1]) else end
                 found = self.step(now, end)
-                grown = 0.0 if found is None else _grown(now, found)
+                grown = 0.0 if found is None else (found.history - now.history)[..., 4].max()
                 if found is not None and grown <= MAX_STRAIN_STEP:
                     now, part = found, min(part * (1 + (2 * grown <= MAX_STRAIN_STEP)), 1.0)
                 elif part > MIN_STEP:
@@ -425,8 +425,3 @@ def _stretch_ratio(body: Sheet, x: Array) -> Array:
     largest = (C[0, 0] + C[1, 1]) / 2 + np.hypot((C[0, 0] - C[1, 1]) / 2, C[0, 1])
     ratio: Array = largest / np.sqrt(np.maximum(C[0, 0] * C[1, 1] - C[0, 1] ** 2, 1e-300))
     return ratio
-
-
-def _grown(now: _Now, then: _Now) -> float:
-    """Most plastic strain that has grown anywhere in a step [1]."""
-    return float((then.history - now.history)[..., 4].max())

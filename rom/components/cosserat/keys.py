@@ -2,6 +2,8 @@
 
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from rom.arguments import Positive, Quantity, Whole
 from rom.config.component_keys import ISOTROPIC
 from rom.config.connections import check_name, pose_of
@@ -102,8 +104,6 @@ def _rigidities(values: dict[str, Any], place: Place) -> dict[str, Any]:
 
 def _rectangle(width: float, height: float, nu: float) -> tuple[float, ...]:
     """Area, second moments, torsion constant, and share that carries shear."""
-    import numpy as np
-
     a, b = max(width, height), min(width, height)
     n = np.arange(1, 100, 2)
     series = float((np.tanh(n * np.pi * a / (2 * b)) / n**5).sum())
@@ -114,8 +114,6 @@ def _rectangle(width: float, height: float, nu: float) -> tuple[float, ...]:
 
 def _ring(section: dict[str, float], place: Place, nu: float) -> tuple[float, ...]:
     """The same of a circle, with or without a bore."""
-    import numpy as np
-
     outer = section["diameter"] / 2
     inner = outer - section.get("thickness", outer)
     if inner < 0.0:
@@ -131,7 +129,6 @@ def _ring(section: dict[str, float], place: Place, nu: float) -> tuple[float, ..
 
 def _curve(values: dict[str, Any], place: Place) -> tuple["Array", "Array"]:
     """(N + 1, 3) vertices, and (N + 2, 4) quaternions of plates and segments."""
-    import numpy as np
     from scipy.interpolate import CubicSpline
 
     points = np.array(values["points"])
@@ -160,8 +157,6 @@ def _frames(x: "Array", tangents: "Array", normal: Any, place: Place) -> "Array"
     Source:
         Wang et al., ACM Trans. Graph. 27 (2008) 2, double reflection.
     """
-    import numpy as np
-
     from rom.rotation import quaternion
 
     t = tangents[0]

@@ -4,8 +4,7 @@ What has no mass or inertia gets some, too little to matter: a ten-thousandth of
 vertex, a hundredth of mass times square of the length of a segment.
 
 Source:
-    Lang, Linn and Arnold, Multi-body dynamics simulation of geometrically exact Cosserat rods,
-    Multibody Syst. Dyn. 25 (2011) 285; see docs/theory/rods.md.
+    See docs/theory/rods.md.
 """
 
 from collections.abc import Callable

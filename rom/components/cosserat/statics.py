@@ -1,8 +1,7 @@
 """Equilibrium of rods under dead loads: Newton's method with capped rotations, and continuation.
 
 Source:
-    Lang, Linn and Arnold, Multi-body dynamics simulation of geometrically exact Cosserat rods,
-    Multibody Syst. Dyn. 25 (2011) 285; see docs/theory/rods.md.
+    See docs/theory/rods.md.
 """
 
 import numpy as np
@@ -240,10 +239,5 @@ def linearised(
     W = work(rod)
     given = loads(rod) if load is None else load
     balance(rod, shape.x, shape.p, given, np.array(spin, dtype=float), W)
-    return W.r, dense(W.A)
-
-
-def dense(A: Array) -> Array:
-    """(n, n) matrix of a band."""
     offsets = np.arange(HALF_BANDWIDTH, -HALF_BANDWIDTH - 1, -1)
-    return dia_array((A.T, offsets), (len(A), len(A))).toarray().T
+    return W.r, dia_array((W.A.T, offsets), (W.r.size, W.r.size)).toarray().T

@@ -1,8 +1,7 @@
 """Small vibrations of a rod about a shape at rest or in steady rotation.
 
 Source:
-    Lang, Linn and Arnold, Multi-body dynamics simulation of geometrically exact Cosserat rods,
-    Multibody Syst. Dyn. 25 (2011) 285; see docs/theory/rods.md.
+    See docs/theory/rods.md.
 """
 
 from dataclasses import dataclass

@@ -125,12 +125,12 @@ class _Winch:
     """A pull that a winch can do, as a function of time."""
 
     name: str
-    pull: Callable[[float], float]
+    pull: Callable[[float], float] | float
     most: float
 
     def __call__(self, t: float) -> float:
         """The pull [m]."""
-        pull = float(self.pull(t))
+        pull = float(self.pull(t) if callable(self.pull) else self.pull)
         if not -1e-9 <= pull <= self.most:
             text = f"the winch of {self.name!r} is to take in {pull:g} m at {t:g} s"
             raise ConfigError(f"{text}; its springs give way by 0 to {self.most:g} m.")
@@ -278,7 +278,7 @@ def _cable(
     if drive.pull is None:
         mech.tendon(f"{name} cable", path, tension=drive.tension, **how)
         return
-    pull = drive.pull if callable(drive.pull) else _constant(number("pull", drive.pull))
+    pull = drive.pull if callable(drive.pull) else number("pull", drive.pull)
     pull = _Winch(name, pull, PULL_SHARE * springs)
     points = np.array([mech.design_point(marker) for marker in path])
     length = float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
@@ -287,10 +287,6 @@ def _cable(
     EA = positive("EA", drive.EA) * length / (length + drive.sleeve)
     mech.tendon(f"{name} cable", path, EA=EA, damping=drive.damping,
                 free_length=lambda t: length - pull(t), **how)  # fmt: skip
-
-
-def _constant(value: float) -> Callable[[float], float]:
-    return lambda t: value
 
 
 def one_finger(finger: Finger, tension: float = 0.0, load: Any = (0.0, 0.0, 0.0)) -> Mechanism:

@@ -185,26 +185,12 @@ def projected(sector: CyclicSector, Psi: Array, q: int, omega: Array) -> Reduced
     motions = None
     if sector.motions is not None:
         motions = np.linalg.solve(M.toarray(), Psi.T @ (sector.M @ sector.motions))
-    return ReducedSector(
-        **kept
-        | {
-            "K": K,
-            "M": M,
-            "slave": np.arange(q, 2 * q),
-            "master": np.arange(q),
-            "coupling": identity(q, format="csr"),
-            "held": NO_DOFS,
-            "points": None,
-            "motions": motions,
-            "coriolis": small(sector.coriolis),
-            "centrifugal": small(sector.centrifugal),
-            "regions": {name: small(A) for name, A in sector.regions.items()},
-            "face": None,
-        },
-        Psi=Psi,
-        full=sector,
-        omega=omega,
-    )
+    regions = {name: small(A) for name, A in sector.regions.items()}
+    kept |= {"K": K, "M": M, "motions": motions, "points": None, "face": None, "regions": regions}
+    kept |= {"slave": np.arange(q, 2 * q), "master": np.arange(q), "held": NO_DOFS}
+    kept |= {"coupling": identity(q, format="csr")}
+    kept |= {name: small(getattr(sector, name)) for name in ("coriolis", "centrifugal")}
+    return ReducedSector(**kept, Psi=Psi, full=sector, omega=omega)
 
 
 def face_functions(sector: CyclicSector, functions: Polynomial | FourierLegendre) -> Array:

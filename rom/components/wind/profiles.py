@@ -15,11 +15,12 @@ import csv
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 import numpy.typing as npt
 
-from rom.arguments import not_negative, typed, vector
+from rom.arguments import Positive, not_negative, typed, vector
 from rom.errors import ConfigError
 from rom.model import Array
 
@@ -109,7 +110,7 @@ def profile(
     lift: npt.ArrayLike,
     drag: npt.ArrayLike,
     *,
-    aspect: float = BLADE_ASPECT_RATIO,
+    aspect: Annotated[float, Positive()] = BLADE_ASPECT_RATIO,
 ) -> Profile:
     """A profile from a table that may end at stall.
 
@@ -135,8 +136,6 @@ def profile(
     a, cl, cd = (vector(f"{what} of profile {name!r}", x) for what, x in
                  (("angle", angle), ("lift", lift), ("drag", drag)))  # fmt: skip
     _check(name, a, cl, cd)
-    if not aspect > 0.0:
-        raise ConfigError(f"aspect = {aspect:g} of profile {name!r} must be positive.")
     if a[0] <= ROUND_ATOL - np.pi and a[-1] >= np.pi - ROUND_ATOL:
         return Profile(name, a, cl, cd)
     return _carried_on(name, (a, cl, cd), 1.11 + 0.018 * aspect)

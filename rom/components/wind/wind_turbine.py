@@ -50,6 +50,12 @@ def stations() -> dict[str, Array]:
     return dict(zip(COLUMNS, np.loadtxt(STATIONS, delimiter=",").T, strict=True))
 
 
+def _places(n: int) -> tuple[Array, Array, Array]:
+    """Vertices, middles of segments, and of what bends at a vertex, along a length of one."""
+    s = np.linspace(0, 1, n + 1)
+    return s, (s[1:] + s[:-1]) / 2, np.concatenate(([s[1] / 4], s[1:-1], [1 - s[1] / 4]))
+
+
 def blade(
     n: int = 48,
     *,
@@ -68,9 +74,7 @@ def blade(
         torsion: factor of the torsional rigidity [1]; a thousand keeps sections from turning.
     """
     table = stations()
-    eta = np.linspace(0, 1, n + 1)
-    middles = (eta[1:] + eta[:-1]) / 2
-    cells = np.concatenate(([eta[1] / 4], eta[1:-1], [1 - eta[1] / 4]))  # what bends at a vertex
+    eta, middles, cells = _places(n)
     turn = rotation.matrix(rotation.exp([azimuth, 0, 0]))
 
     def at(name: str, where: float | Array) -> Array:
@@ -104,8 +108,7 @@ def tower(n: int = 40, *, top: float = 0.0, shear: float = 1.0, torsion: float =
         shear: factor of the shear rigidity [1], see `blade`.
         torsion: factor of the torsional rigidity [1].
     """
-    s = np.linspace(0, 1, n + 1)
-    middles, cells = (s[1:] + s[:-1]) / 2, np.concatenate(([s[1] / 4], s[1:-1], [1 - s[1] / 4]))
+    s, middles, cells = _places(n)
 
     def tube(where: Array) -> tuple[Array, Array]:
         """Area, and second moment of area about a diameter."""

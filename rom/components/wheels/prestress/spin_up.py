@@ -282,7 +282,14 @@ def spin_up(
     """
     refuse_attachments(model)
     steady = SteadyRotation(sector, finite_solid(model, heat))
-    a = steady.at_rest if heat is None else _warmed(steady, heat)
+    a = steady.at_rest
+    if heat is not None:
+        a, share = steady.follow(a, 0.0, 1.0, steady.solid.warm)
+        if share < 1.0:
+            raise ModelError(
+                f"no stable state beyond {heat.described(share)}: it buckles, see "
+                "rom.thermal_buckling."
+            )
     coriolis = rotation_matrices(sector.M, sector.axis)[0]
     base = replace(sector, coriolis=coriolis, centrifugal=csr_matrix(-steady.softening))
     omega = cyclic_modes(sector, 0, min(3, sector.free.size)).omega
@@ -297,7 +304,13 @@ def spin_up(
 
     with reached(table):
         for k in range(1, n_states):
-            found.append(_next(steady, found[-1], squares[k - 1], squares[k]))
+            a, square = steady.follow(found[-1], squares[k - 1], squares[k], steady.load)
+            if square < squares[k]:
+                raise ModelError(
+                    f"no stable steady state was found above {np.sqrt(square):.5g} rad/s.",
+                    hint="Ask for a lower speed, or hold the solid more firmly.",
+                )
+            found.append(a)
     return table()
 
 
@@ -340,22 +353,3 @@ def held_solid(
         at=np.asarray(at, dtype=float),
         workers=workers_of(model),
     )
-
-
-def _warmed(steady: SteadyRotation, heat: Heat) -> Array:
-    a, share = steady.follow(steady.at_rest, 0.0, 1.0, steady.solid.warm)
-    if share < 1.0:
-        raise ModelError(
-            f"no stable state beyond {heat.described(share)}: it buckles, see rom.thermal_buckling."
-        )
-    return a
-
-
-def _next(steady: SteadyRotation, a: Array, start: float, end: float) -> Array:
-    a, square = steady.follow(a, start, end, steady.load)
-    if square < end:
-        raise ModelError(
-            f"no stable steady state was found above {np.sqrt(square):.5g} rad/s.",
-            hint="Ask for a lower speed, or hold the solid more firmly.",
-        )
-    return a

@@ -272,14 +272,9 @@ def _waves(sector: CyclicSector, diameter: int, *matrices: Any) -> tuple[csr_mat
 
 def _refuse_buckled(parts: Iterable[tuple[csr_matrix, ...]], heat: Heat, workers: Workers) -> None:
     """Raise if a part of the solid has K + K_geo with negative eigenvalues, naming the worst."""
-    shares = [critical_factor(*part) for part in parts if not _stiff(sum(part), workers)]
+    shares = [critical_factor(*part) for part in parts
+              if not ((factor := workers.factor(sum(part))) and factor.definite)]  # fmt: skip
     share = min(shares, default=None)
     if share is not None:
         text = f"the heated solid buckles at {heat.described(share)}."
         raise ModelError(text, hint="Hold it more loosely, or follow its shape with rom.spin_up.")
-
-
-def _stiff(K: csr_matrix, workers: Workers) -> bool:
-    """Whether a stiffness is positive definite."""
-    factor = workers.factor(K)
-    return factor is not None and factor.definite
