@@ -83,7 +83,7 @@ def simulate(  # noqa: PLR0913  keywords of one run, all with defaults
     load: Loads | Callable[[float], Loads] | None = None,
     root: Callable[[float], Placement] | None = None,
     start: Shape | None = None,
-    free: npt.ArrayLike | None = None,
+    free: Mask | npt.ArrayLike | None = None,
     rho_inf: Share = 0.9,
     save_every: int = 1,
 ) -> Motion:

@@ -418,9 +418,9 @@ test_messages_name_what_is_wrong = refused(
     (lambda: tangent(SMALL, SOFT, np.nan * SMALL.points), ConfigError, "is not finite"),
     (lambda: fly(SMALL, SOFT, np.zeros((3, 2)), [0], 1.0), ConfigError, "velocities has"),
     (lambda: fly(SMALL, SOFT, 0 * SMALL.points, [18], 1.0), ConfigError, "held dofs 18 to 18"),
-    (lambda: fly(SMALL, SOFT, 0 * SMALL.points, [0], -1.0), ConfigError, r"t_end \[s\] = -1"),
+    (lambda: fly(SMALL, SOFT, 0 * SMALL.points, [0], -1.0), ConfigError, "t_end = -1"),
     (lambda: equilibrium(SMALL, SOFT, np.zeros(3), [0]), ConfigError, "forces of load 0"),
-    (lambda: equilibrium(SMALL, SOFT, 0 * SMALL.points, [0], steps=0), ConfigError, "0 load"),
+    (lambda: equilibrium(SMALL, SOFT, 0 * SMALL.points, [0], steps=0), ConfigError, "steps = 0"),
 )  # fmt: skip
 
 
@@ -439,4 +439,4 @@ def test_wrong_input_is_named():
     with pytest.raises(ConfigError, match="axisymmetric"):
         stiffness_by_sides(sheet(X, T, state="axisymmetric"), STEEL)
     body, f, held, _ = cook(2, "/", 1e6, state="plane strain")
-    refuses(SolverError, "instant 1 of 1", lambda: equilibrium(body, Metal(240.0, 0.3), f, held))
+    refuses(SolverError, "instant 1", lambda: equilibrium(body, Metal(240.0, 0.3), f, held))

@@ -270,7 +270,8 @@ def test_bad_runs_are_refused_and_lost_ones_kept():
     refuses(ConfigError, r"rho_inf = 1\.5 must be", simulate, one, 1.0, 0.1, rho_inf=1.5)
     with pytest.raises(SolverError, match="did not converge") as error:
         simulate(one, 100.0, 10.0, load=loads(one, tip=(1e4, 0, 0)))
-    assert error.value.solution.t.tolist() == [0.0, 10.0]
+    t = error.value.solution.t
+    assert t.size > 1 and t.tolist() == (10.0 * np.arange(t.size)).tolist()
     unstable = straight(1.0, 20, stretch=1e4, bend=1.0, mass=1.0, inertia=1e-3)
     load = loads(unstable, tip=(0, 0, -3.0))
     with pytest.raises(SolverError, match="the shape is not stable"):
