@@ -205,12 +205,8 @@ def _press(mech: Mechanism, acting: Callable[[float], Loads], times: Array) -> N
         ever = np.any([np.any(acting(float(t))[kind], axis=1) for t in times], axis=0)
         for k in np.flatnonzero(ever):
             name, marker = f"{('force', 'moment')[kind]} {k}", parts[k].marker((0.0, 0.0, 0.0))
-            one = partial(_part, acting, kind, k)
+            one = partial(lambda kind, k, t: acting(t)[kind][k], kind, k)
             add(name, marker, one(0.0) if constant else one)
-
-
-def _part(acting: Callable[[float], Loads], kind: int, k: int, t: float) -> Array:
-    return acting(t)[kind][k]
 
 
 def _motion(rod: Rod, found: Solution, acting: Any, free: Mask) -> Motion:

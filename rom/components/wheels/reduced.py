@@ -1,7 +1,8 @@
 """Component mode synthesis of one sector, good for all nodal diameters at once."""
 
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -11,13 +12,14 @@ from scipy.spatial import cKDTree
 
 from rom.arguments import typed
 from rom.checks.draft import Draft, run
-from rom.components.wheels.certificate import sector_certificate
-from rom.components.wheels.sector import NO_DOFS, Complex, CyclicSector
+from rom.components.wheels.modes import cyclic_modes, wheel_modes
+from rom.components.wheels.sector import NO_DOFS, Complex, CyclicSector, each_diameter
 from rom.eigen.verbs import DEPENDENT_RTOL, every_row, orthonormal_in, own_rows, static_shapes
 from rom.errors import ConfigError, InterfaceError
-from rom.model import Array, Basis, Index, Interface, Report
+from rom.model import Array, Basis, Index, Interface, Report, Row
 from rom.reduction.bases.method import CraigBampton
 from rom.reduction.interfaces.polynomial import FourierLegendre, Polynomial
+from rom.rows import FREQUENCY_RTOL, N_COMPARED, frequency_rows
 
 CYCLIC_FACES = "cyclic"  # what the faces are called where sectors of a wheel meet
 
@@ -236,3 +238,57 @@ def distance(points: Array, line: Array) -> Array:
         beside = arm - np.clip(share, 0.0, 1.0)[:, None] * edge
         found = np.minimum(found, np.linalg.norm(beside, axis=1))
     return found
+
+
+N_FAMILIES = 2  # modes per number of nodal diameters, whose union is compared with a wheel
+STIFFER_BLADES = 0.05  # of all blades: the wheel stays cyclic, so that its truth is one sector
+
+
+def sector_certificate(small: CyclicSector, full: CyclicSector) -> Report:
+    """Frequencies of a reduced sector against the full one, for a few numbers of diameters."""
+    diameters = list(small.diameters)
+    chosen = sorted({0, 1, len(diameters) // 2, diameters[-1]} & set(diameters))
+
+    def rows(d: int) -> list[Row]:
+        n = min(N_COMPARED, small.harmonic(d).shape[1])
+        reduced, exact = (cyclic_modes(sector, d, n).frequencies for sector in (small, full))
+        return _rows(f"{d} nodal diameters", reduced, exact)
+
+    found = each_diameter(full, rows, chosen)
+    return Report("certificate of the sector", tuple(chain.from_iterable(found)))
+
+
+def wheel_certificate(frequencies: Array, full: CyclicSector) -> Report:
+    """Frequencies [Hz] of a wheel of equal blades, ascending, against the full sector."""
+    return Report("certificate of the wheel", tuple(_of_wheel("equal blades", frequencies, full)))
+
+
+def mistuned_certificate(wheel: Any) -> Report:
+    """Frequencies of a wheel whose blades are all a little stiffer, or softer, against its sector.
+
+    Args:
+        wheel: the `MistunedWheel`.
+    """
+    rows: list[Row] = []
+    for change in (STIFFER_BLADES, -STIFFER_BLADES):
+        exact = replace(wheel.sector, K=wheel.sector.K + change * wheel.blade_stiffness)
+        found = wheel.modes(np.full(wheel.sector.n_sectors, change)).frequencies
+        rows += _of_wheel(f"all blades {100 * change:+g} %", found, exact, wheel.speed)
+    return Report("certificate of the mistuned wheel", tuple(rows))
+
+
+def _of_wheel(what: str, found: Array, sector: CyclicSector, speed: float = 0.0) -> list[Row]:
+    """The lowest frequencies of a wheel against the union of those of its sector."""
+    exact, complete = [], np.inf
+    for modes in wheel_modes(sector, N_FAMILIES, speed=speed):
+        exact += [*modes.frequencies] * modes.multiplicity
+        complete = min(complete, modes.frequencies[-1])  # above it some diameters miss theirs
+    union = np.sort([f for f in exact if f <= complete * (1 + FREQUENCY_RTOL)])
+    return _rows(what, found[: union.size], union)
+
+
+def _rows(what: str, reduced: Array, exact: Array) -> list[Row]:
+    """Elastic frequencies compared; rigid motions are zero in both."""
+    elastic = exact > 0
+    table = {"reduced": reduced[elastic].tolist(), "full": exact[elastic].tolist()}
+    return frequency_rows(what, table) if elastic.any() else []

@@ -28,7 +28,7 @@ from scipy.linalg import block_diag, eigh
 
 from rom.arguments import Between, lowest, matrix, one_each, rows_at, typed, vector
 from rom.components.wheels.blades.substructured_sector import ReducedBlade, SubstructuredSector
-from rom.components.wheels.certificate import wheel_certificate
+from rom.components.wheels.reduced import wheel_certificate
 from rom.components.wheels.sector import Complex
 from rom.errors import ConfigError, ModelError
 from rom.model import Array, Modes, Report

@@ -27,8 +27,8 @@ import numpy.typing as npt
 from scipy.linalg import eigh
 
 from rom.arguments import Positive, lowest, matrix, one_each, rows_at, typed, vector
-from rom.components.wheels.certificate import mistuned_certificate
 from rom.components.wheels.modes import cyclic_modes, spinning
+from rom.components.wheels.reduced import mistuned_certificate
 from rom.components.wheels.sector import Complex, CyclicSector, each_diameter
 from rom.errors import ConfigError, ModelError
 from rom.model import Array, Index, Modes, Report
