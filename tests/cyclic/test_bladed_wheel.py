@@ -1,6 +1,7 @@
 """Blades as substructures: the whole wheel of finite elements with the same blades."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -194,16 +195,14 @@ def test_a_blade_of_another_mesh_fits_on_the_root(model, small, disk):
 
 
 def test_wrong_arguments_are_named(model, full, small, disk):
-    few = {"n_modes": 2, "n_blade_modes": 2}
-    with pytest.raises(ConfigError, match=r"no region 'wing'; it has \['blade', 'disk'\]"):
-        rom.substructured_sector(full, model, blade="wing", **few)
+    few, moved = {"n_modes": 2, "n_blade_modes": 2}, replace(model, points=model.points + 0.01)
+    cut_off = partial(rom.substructured_sector, full, model, **few)
+    refuses(ConfigError, r"no region 'wing'; it has \['blade', 'disk'\]", cut_off, blade="wing")
     refuses(ConfigError, "need the full sector", rom.substructured_sector, small, model, **few)
-    with pytest.raises(InterfaceError, match="'disk' reaches a cyclic face"):
-        rom.substructured_sector(full, model, blade="disk", **few)
-    with pytest.raises(InterfaceError, match="no interface 'foot'"):
-        rom.reduced_blade(small, model, n_modes=2, blade=None, root="foot")
-    moved = replace(model, points=model.points + 0.01)
-    refuses(InterfaceError, r"root of this blade ends", rom.reduced_blade, small, moved, n_modes=2)
+    refuses(InterfaceError, "'disk' reaches a cyclic face", cut_off, blade="disk")
+    alone = {"n_modes": 2, "blade": None, "root": "foot"}
+    refuses(InterfaceError, "no interface 'foot'", rom.reduced_blade, small, model, **alone)
+    refuses(InterfaceError, r"root .* up to 0\.01 m", rom.reduced_blade, small, moved, n_modes=2)
     refuses(ConfigError, "each must be a number above -1", small.blade.varied, stiffness=-1.0)
     refuses(ConfigError, "26 deviations", small.blade.varied, cantilever=np.zeros(26))
     refuses(ConfigError, r"5 blades with .* not 6 of 57", disk.modes, [small.blade] * 5)
@@ -212,15 +211,16 @@ def test_wrong_arguments_are_named(model, full, small, disk):
     drive = {"engine_order": 1, "omega": [1.0], "damping": 1e-3, "at": [0]}
     alike, force = [small.blade] * N, np.zeros(full.n)
     tip = 3 * int(np.argmax(np.hypot(*model.points[:, :2].T)))
-    refuses(
-        ConfigError, "damping = 0 must", disk.response, alike, force, **drive | {"damping": 0.0}
-    )
-    refuses(ConfigError, "not those of blade 0", disk.response, alike, force, **drive)
-    refuses(ConfigError, r"3 forces on blade 0 for", disk.response, alike, np.ones(3), **drive)
-    refuses(ConfigError, "2 forces or places", disk.response, alike, [force, force], **drive)
-    refuses(ConfigError, "dofs of the disk", disk.response, alike, force + 1.0, **drive)
-    with pytest.raises(ConfigError, match="does not move the tuned wheel"):
-        disk.amplification(alike, force, **drive | {"at": [tip]})
+    for words, pushed, change in (
+        ("damping = 0 must", force, {"damping": 0.0}),
+        ("not those of blade 0", force, {}),
+        ("3 forces on blade 0 for", np.ones(3), {}),
+        ("2 forces or places for 6 blades", [force, force], {}),
+        ("dofs of the disk", force + 1.0, {}),
+    ):
+        refuses(ConfigError, words, disk.response, alike, pushed, **drive | change)
+    there = drive | {"at": [tip]}
+    refuses(ConfigError, "does not move the tuned", disk.amplification, alike, force, **there)
     soft = replace(small.blade, K=-small.blade.K)
     refuses(ModelError, "without stiffness", disk.modes, [soft] * N)
 

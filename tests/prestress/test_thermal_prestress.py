@@ -182,10 +182,9 @@ def test_wrong_heat_is_named(bar):
     ):
         refuses(ConfigError, match, rom.heated, bar, wrong)
     refuses(ConfigError, r"temperature = nan must be .* a finite number", rom.Heat, 1e-5, np.nan)
-    with pytest.raises(InterfaceError, match="no interface 'rim'"):
-        rom.heated(bar, rom.Heat(1e-5, 20.0), fixed="rim")
-    with pytest.raises(ConfigError, match="no finite elements"):
-        rom.heated(replace(bar, stresses=None), rom.Heat(1e-5, 20.0))
+    heat, bare = rom.Heat(1e-5, 20.0), replace(bar, stresses=None)
+    refuses(InterfaceError, "no interface 'rim'", rom.heated, bar, heat, fixed="rim")
+    refuses(ConfigError, "no finite elements", rom.heated, bare, heat)
 
 
 def test_more_of_one_heat_is_another_factor(bar):

@@ -166,9 +166,8 @@ def shooting(turn, curvature, length, rigidities, force):
 
     def end(moment, n):
         start = np.concatenate([np.zeros(3), turn, moment])
-        return solve_ivp(rates, (0, length), start, "DOP853", args=(n,), rtol=1e-9, atol=1e-9).y[
-            :, -1
-        ]
+        way = solve_ivp(rates, (0, length), start, "DOP853", args=(n,), rtol=1e-9, atol=1e-9)
+        return way.y[:, -1]
 
     moment = np.zeros(3)
     for share in np.linspace(0.5, 1, 2):
@@ -326,8 +325,8 @@ def test_what_is_no_rod_is_named():
     turned = np.tile([1.0, 0, 0, 0], (4, 1))
     refuses(ModelError, "segment 1", rod, [[0, 0, 0], [0, 0, 1], [0, 0, 1]], turned, **section)
     refuses(ModelError, "segment 0", straight, 1.0, 2, stretch=[[1, 1, 0], [1, 1, 1]], bend=1.0)
-    with pytest.raises(ModelError, match="vertex 1 of the rod has a bending rigidity"):
-        straight(1.0, 2, stretch=1.0, bend=[[1, 1, 1], [1, -1, 1], [1, 1, 1]])
+    weak = [[1, 1, 1], [1, -1, 1], [1, 1, 1]]
+    refuses(ModelError, "vertex 1 .* a bending rig", straight, 1.0, 2, stretch=1.0, bend=weak)
     back = turned.copy()
     back[2:] = [0, 1, 0, 0]
     refuses(ModelError, "vertex 1", rod, [[0, 0, 0], [0, 0, 1], [0, 0, 0]], back, **section)
@@ -377,5 +376,5 @@ def test_what_cannot_be_cut_or_found_is_named():
     one = straight(1.0, 4, stretch=1e4, bend=1.0)
     assert [piece.h.size for piece in cut(one, 3)] == [1, 2, 1]
     refuses(ConfigError, "5 pieces of a rod of 4 segments", cut, one, 5)
-    with pytest.raises(SolverError, match="2 linear pieces found no equilibrium"):
-        bend_in_pieces(one, 2, np.outer([0, 0, 0, 0, 1.0], [30.0, 0, -60.0]))
+    load = np.outer([0, 0, 0, 0, 1.0], [30.0, 0, -60.0])
+    refuses(SolverError, "2 linear pieces found no equilibrium", bend_in_pieces, one, 2, load)
