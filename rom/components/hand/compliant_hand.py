@@ -231,7 +231,7 @@ def close(
         SolverError: if no posture was found; ``error.solution`` is the last good one.
     """
     if tension is not None and pull is not None:
-        raise ConfigError("both tension and pull are given.", hint="One follows from the other.")
+        raise ConfigError("both tension and pull are given; one follows from the other.")
     if pull is not None:
         limit = 0.9 * sum(s.length for s in finger.springs)
         between("pull [m] of springs so long", pull, 0, limit, "[)")
@@ -390,8 +390,7 @@ def grasp(finger: Finger, bar: Bar, tensions: npt.ArrayLike) -> list[Posture]:
     posture = rest(finger)
     gap = bar.gaps(finger, posture.shape)[0].min()
     if gap < 0:
-        raise ConfigError(f"the bar reaches {-gap:g} m into the straight finger.",
-                          hint="Move its centre away.")  # fmt: skip
+        raise ConfigError(f"the bar reaches {-gap:g} m into the straight finger; move it away.")
     contact, found = bar.contact(finger), []
     for tension in np.asarray(tensions, dtype=float):
         posture = close(finger, tension=float(tension), start=posture, extra=contact)

@@ -98,8 +98,7 @@ def hold(mech: Mechanism, name: str, held: Held, *, law: Impact = SKIN_CONTACT,
     for other, depth in depths.items():
         inside = 1e3 * (depth + held.radius)
         if inside > 0.0:
-            raise ConfigError(f"{name!r} reaches {inside:.3g} mm into {other!r} at the start.",
-                              hint="Move its centre away.")  # fmt: skip
+            raise ConfigError(f"{name!r} reaches {inside:.3g} mm into {other!r}; move it away.")
     _check_reach(mech, phalanges, name, held)
     made = mech.add_rigid(name, mass=held.mass, inertia=held.inertia, at=held.centre)
     middle = made.marker((0.0, 0.0, 0.0))
@@ -142,8 +141,7 @@ def _check_reach(mech: Mechanism, bones: list[Part], name: str, held: Held) -> N
             length = max(np.linalg.norm(tip - root) for tip in tips)
             over.append(_far(held, root, np.array([1.0, 0.0, 0.0]), 0.0) - held.radius - length)
     if min(over) > 0.0:
-        raise ConfigError(f"{name!r} is {min(over) * 1e3:.3g} mm beyond the reach of all fingers.",
-                          hint="Move its centre closer.")  # fmt: skip
+        raise ConfigError(f"{name!r} is {min(over) * 1e3:.3g} mm beyond the reach; move it closer.")
 
 
 def table(mech: Mechanism, name: str, held: Held, *, leaves: float, speed: float = 0.1,

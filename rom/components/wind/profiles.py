@@ -147,8 +147,7 @@ def _check(name: str, a: Array, cl: Array, cd: Array) -> None:
         raise ConfigError(f"profile {name!r} has {a.size} angles, {cl.size} lifts and {cd.size} "
                           "drags; as many of each, two or more.")  # fmt: skip
     if (np.diff(a) <= 0.0).any() or a[0] < -np.pi - ROUND_ATOL or a[-1] > np.pi + ROUND_ATOL:
-        raise ConfigError(f"angles of profile {name!r} do not ascend within -pi to pi.",
-                          hint="Angles of attack are in radians.")  # fmt: skip
+        raise ConfigError(f"angles of profile {name!r} do not ascend within -pi to pi [rad].")
     if (cd < 0.0).any():
         raise ConfigError(f"profile {name!r} has a drag of {cd.min():g}; it must not be negative.")
     if not 0.0 < a[-1] < np.pi / 2 and a[-1] < np.pi - ROUND_ATOL:

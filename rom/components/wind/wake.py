@@ -187,8 +187,8 @@ def over_time(wind: npt.ArrayLike) -> Array:
     given = finite("wind", wind, None)
     winds = np.array([[0.0, given]]) if given.ndim == 0 else given
     if winds.ndim != 2 or winds.shape[1:] != (2,) or not len(winds):
-        raise ConfigError(f"a wind of shape {given.shape} is neither a speed nor rows of an "
-                          "instant and a speed.")  # fmt: skip
+        text = f"a wind of shape {given.shape} is neither a speed nor rows of instant and speed."
+        raise ConfigError(text)
     if (np.diff(winds[:, 0]) <= 0.0).any():
         raise ConfigError("instants of a wind must ascend.")
     not_negative("wind [m/s]", winds[:, 1].min())
