@@ -291,8 +291,7 @@ def _table(actions: Actions, moved: list[int], span: tuple[float, float]) -> tup
     asked += [(f"traction {k}", x.history, 1) for k, x in enumerate(actions.tractions)]
     asked += [(f"drive {k}", x.history, moved[k]) for k, x in enumerate(actions.drives)]
     asked += [(f"tool {x.name!r}", x.history, 2) for x in actions.tools]
-    lines = [straightened(name, history, span, n, rows=name.startswith("tool"))
-             for name, history, n in asked]  # fmt: skip
+    lines = [straightened(n, h, span, k, rows=n.startswith("tool")) for n, h, k in asked]
     times = np.unique(np.concatenate([[0.0], *(t for t, _ in lines)]))
     times = np.append(times, times[-1] + 1.0)
     columns = [np.interp(times, t, column) for t, y in lines for column in y.T]

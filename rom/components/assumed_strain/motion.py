@@ -186,11 +186,11 @@ def fly(
     t, kept = np.linspace(0, t_end, pictures), (pictures, *x.shape)
     seen = (np.full(kept, np.nan), np.zeros((pictures, *body.weights.shape)),
             np.zeros((pictures, len(acts.friction), 2)), np.zeros(kept))  # fmt: skip
-    given = (acts.times, acts.table, acts.forces, depth_of(body), acts.driven, acts.columns,
-             (acts.faces, acts.first, acts.friction))  # fmt: skip
-    parts, histories = (*parts[:4], body.area, *parts[4:6]), (parts[6], parts[6].copy())
-    steps, work = kernels.fly(x, np.where(free, v, 0.0), lumped, free, parts[:5], *parts[5:],
-                              metal.wave_speed, given, t, histories, seen)  # fmt: skip
+    acting = acts.times, acts.table, acts.forces, depth_of(body), acts.driven, acts.columns
+    tools, histories = (acts.faces, acts.first, acts.friction), (parts[6], parts[6].copy())
+    solid = (*parts[:4], body.area), *parts[4:6], metal.wave_speed
+    start = x, np.where(free, v, 0.0), lumped, free
+    steps, work = kernels.fly(*start, *solid, (*acting, tools), t, histories, seen)
     path, plastic = seen[:2]
     if steps < 0 or not np.isfinite(path).all():
         k = int(np.append(np.isfinite(path).all(axis=(1, 2)), False).argmin())

@@ -46,8 +46,8 @@ def memory(space):
     """Arrays of an element in the memory of the law."""
     R, D = space[0:9].reshape((3, 3)), space[9:36].reshape((3, 9))
     H, unused = space[36:117].reshape((9, 9)), space[127:128]
-    return Work(R, D, H, space[117:120], space[120:123], space[123:127], unused,
-                unused.reshape((1, 1)))  # fmt: skip
+    a, f, e = space[117:120], space[120:123], space[123:127]
+    return Work(R, D, H, a, f, e, unused, unused.reshape((1, 1)))
 
 
 @inner

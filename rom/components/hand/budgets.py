@@ -122,8 +122,8 @@ def stress_budget(
             shear, bending = (stress.max() for stress in wire_stress(spring, *loads))
             strength = wire_strength(spring)
             what = f"{name} spring {k}, {{}} of the wire [Pa]".format
-            rows += [_row(what("shear"), shear, TORSION_SHARE * strength),
-                     _row(what("bending"), bending, BENDING_SHARE * strength)]  # fmt: skip
+            rows.append(_row(what("shear"), shear, TORSION_SHARE * strength))
+            rows.append(_row(what("bending"), bending, BENDING_SHARE * strength))
         worst = max(phalanx_stress(solution, name, k + 1, thickness)
                     for k in range(len(finger.phalanges)))  # fmt: skip
         rows.append(_row(f"{name} phalanges, bending [Pa]", worst, bone))

@@ -237,7 +237,7 @@ def close(
         between("pull [m] of springs so long", pull, 0, limit, "[)")
     here = rest(finger) if start is None else start
     drawn = pull is not None
-    goal = np.append(np.asarray(load, dtype=float), pull if drawn else tension or 0.0)
+    goal = np.append(np.asarray(load, dtype=float), (tension or 0.0) if pull is None else pull)
     begin = np.append(here.load, here.pull if drawn else here.tension)
     share, here = load_steps(
         lambda at, x: _balance(finger, at, begin + x * (goal - begin), drawn, way, extra),

@@ -216,6 +216,7 @@ def grip(solution: Any, name: str, fingers: Iterable[str]) -> dict[str, Array]:
     """{finger: (n_t,) sizes of the forces of its phalanges on an object, added up [N]}."""
     forces = contact_forces(solution, name)
     sizes = {key: np.linalg.norm(f, axis=1) for key, f in forces.items()}
-    none = np.zeros(solution.t.size)
-    return {one: sum((f for key, f in sizes.items() if key.startswith(f"{one} phalanx")), none)
-            for one in fingers}  # fmt: skip
+    none, found = np.zeros(solution.t.size), {}
+    for one in fingers:
+        found[one] = sum((f for key, f in sizes.items() if key.startswith(f"{one} phalanx")), none)
+    return found

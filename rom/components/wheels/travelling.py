@@ -5,6 +5,7 @@ Over the speed they are followed by their shapes and not by their order.
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -121,8 +122,8 @@ def travelling_modes(
     lam, U = lam[keep], U[:, keep]
     ahead = np.zeros(lam.size) if standing else -np.sign(lam.imag) * np.sign(speed)
     size = np.sqrt(np.einsum("fm,fm->m", U.conj(), M @ U).real)
-    about = {"sector": sector, "diameter": diameter, "speed": abs(speed), "direction": ahead}
-    return TravellingModes(abs(lam.imag), T @ (U / size), **about)
+    about: dict[str, Any] = {"sector": sector, "diameter": diameter, "direction": ahead}
+    return TravellingModes(abs(lam.imag), T @ (U / size), speed=abs(speed), **about)
 
 
 def _lowest(
@@ -173,8 +174,8 @@ def _refuse_growth(lam: Complex, diameter: int, speed: float) -> None:
     if growth > GROWTH_RATE_RTOL * abs(lam).max(initial=0.0):
         worst = lam[lam.real.argmax()]
         raise ModelError(
-            f"at {speed:g} rad/s a motion with {diameter} nodal diameters is unstable, it grows by "
-            f"{growth:.3g} 1/s at {abs(worst.imag) / (2 * np.pi):.4g} Hz; see divergence_speed."
+            f"at {speed:g} rad/s a motion with {diameter} nodal diameters grows by {growth:.3g} "
+            f"1/s at {abs(worst.imag) / (2 * np.pi):.4g} Hz, an instability; see divergence_speed."
         )
 
 

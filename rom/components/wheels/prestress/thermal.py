@@ -272,8 +272,11 @@ def _waves(sector: CyclicSector, diameter: int, *matrices: Any) -> tuple[csr_mat
 
 def _refuse_buckled(parts: Iterable[tuple[csr_matrix, ...]], heat: Heat, workers: Workers) -> None:
     """Raise if a part of the solid has K + K_geo with negative eigenvalues, naming the worst."""
-    shares = [critical_factor(*part) for part in parts
-              if not ((factor := workers.factor(sum(part))) and factor.definite)]  # fmt: skip
+    shares = []
+    for part in parts:
+        factor = workers.factor(sum(part))
+        if factor is None or not factor.definite:
+            shares.append(critical_factor(*part))
     share = min(shares, default=None)
     if share is not None:
         text = f"the heated solid buckles at {heat.described(share)}."
