@@ -10,7 +10,7 @@ from scipy.sparse import block_diag, csr_matrix, diags, identity
 
 import rom
 from cases.refusals import refuses
-from cases.wheels import beam_ring, bladed_model, mass_ring
+from cases.wheels import MARKS, beam_ring, bladed_model, mass_ring
 from rom.components.wheels.rotation import divergence_speed, rotation_matrices
 from rom.components.wheels.sector import CyclicSector
 from rom.errors import ConfigError, ModelError, ModesMissedError
@@ -18,10 +18,7 @@ from rom.errors import ConfigError, ModelError, ModesMissedError
 N, SPEED = 6, 900.0
 ALUMINIUM = {"E": 70e9, "nu": 0.3, "rho": 2700.0}
 needs_fenicsx = pytest.mark.fenicsx
-pytestmark = [
-    pytest.mark.filterwarnings("ignore::rom.errors.RomWarning"),
-    pytest.mark.filterwarnings("ignore:Number of integration points"),
-]
+pytestmark = MARKS[1:]  # of which some have finite elements
 
 
 @pytest.mark.parametrize("n", [2, 3, 5])
