@@ -42,34 +42,34 @@ from rom.components.orbits.equilibria import continuation as continuation
 from rom.components.orbits.motion import periodic_motion as periodic_motion
 from rom.components.orbits.path import periodic_path as periodic_path
 from rom.components.updating.estimate import update as update
-from rom.components.wheels.blades.blade import reduced_blade as reduced_blade
 from rom.components.wheels.blades.bladed_wheel import BladedWheel as BladedWheel
 from rom.components.wheels.blades.disk import bladed_wheel as bladed_wheel
 from rom.components.wheels.blades.mistuning import MistunedWheel as MistunedWheel
 from rom.components.wheels.blades.mistuning import mistuned_wheel as mistuned_wheel
-from rom.components.wheels.blades.records import ReducedBlade as ReducedBlade
+from rom.components.wheels.blades.substructured_sector import ReducedBlade as ReducedBlade
+from rom.components.wheels.blades.substructured_sector import reduced_blade as reduced_blade
 from rom.components.wheels.blades.substructured_sector import (
     substructured_sector as substructured_sector,
 )
-from rom.components.wheels.campbell import WheelCampbell as WheelCampbell
-from rom.components.wheels.campbell import wheel_campbell as wheel_campbell
 from rom.components.wheels.modes import CyclicModes as CyclicModes
 from rom.components.wheels.modes import cyclic_modes as cyclic_modes
 from rom.components.wheels.modes import wheel_modes as wheel_modes
-from rom.components.wheels.prestress.heat import Heat as Heat
-from rom.components.wheels.prestress.speed_table import ReducedSpinUp as ReducedSpinUp
-from rom.components.wheels.prestress.speed_table import SpinUp as SpinUp
+from rom.components.wheels.prestress.spin_up import ReducedSpinUp as ReducedSpinUp
+from rom.components.wheels.prestress.spin_up import SpinUp as SpinUp
 from rom.components.wheels.prestress.spin_up import held_solid as held_solid
 from rom.components.wheels.prestress.spin_up import spin_up as spin_up
+from rom.components.wheels.prestress.thermal import Heat as Heat
 from rom.components.wheels.prestress.thermal import heated as heated
 from rom.components.wheels.prestress.thermal import heated_sector as heated_sector
 from rom.components.wheels.prestress.thermal import thermal_buckling as thermal_buckling
 from rom.components.wheels.reduced import reduce_sector as reduce_sector
 from rom.components.wheels.rotation import rotating_sector as rotating_sector
+from rom.components.wheels.rotation import supported_sector as supported_sector
 from rom.components.wheels.sector import CyclicSector as CyclicSector
-from rom.components.wheels.supports import supported_sector as supported_sector
 from rom.components.wheels.travelling import TravellingModes as TravellingModes
+from rom.components.wheels.travelling import WheelCampbell as WheelCampbell
 from rom.components.wheels.travelling import travelling_modes as travelling_modes
+from rom.components.wheels.travelling import wheel_campbell as wheel_campbell
 from rom.config.component import read_component as read_component
 from rom.config.mechanism import read_mechanism as read_mechanism
 from rom.config.mechanism_fmu import write_mechanism_fmu as write_mechanism_fmu

@@ -1,9 +1,9 @@
-from rom.components.wheels.prestress.heat import Heat as Heat
-from rom.components.wheels.prestress.speed_table import ReducedSpinUp as ReducedSpinUp
-from rom.components.wheels.prestress.speed_table import SpinUp as SpinUp
+from rom.components.wheels.prestress.spin_up import ReducedSpinUp as ReducedSpinUp
+from rom.components.wheels.prestress.spin_up import SpinUp as SpinUp
 from rom.components.wheels.prestress.spin_up import held_solid as held_solid
 from rom.components.wheels.prestress.spin_up import spin_up as spin_up
 from rom.components.wheels.prestress.steady_rotation import SteadyRotation as SteadyRotation
+from rom.components.wheels.prestress.thermal import Heat as Heat
 from rom.components.wheels.prestress.thermal import heated as heated
 from rom.components.wheels.prestress.thermal import heated_sector as heated_sector
 from rom.components.wheels.prestress.thermal import thermal_buckling as thermal_buckling

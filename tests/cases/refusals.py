@@ -18,3 +18,9 @@ def refused(*rows, error=None):
             call()
 
     return test
+
+
+def refuses(error, words, call, *args, **keywords):
+    """Assert that a call is refused, by the class of the error and what its message must match."""
+    with pytest.raises(error, match=words):
+        call(*args, **keywords)

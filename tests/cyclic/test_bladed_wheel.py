@@ -1,6 +1,7 @@
 """Blades as substructures: the whole wheel of finite elements with the same blades."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -8,8 +9,9 @@ from numpy.testing import assert_allclose
 from scipy.sparse import csr_matrix
 
 import rom
+from cases.refusals import refuses
 from cases.wheels import MARKS, bladed_model
-from rom.components.wheels.blades.blade import cut, region, root_of
+from rom.components.wheels.blades.substructured_sector import cut, region, root_of
 from rom.eigen.scipy import SciPyOperators
 from rom.eigen.verbs import dofs_of
 from rom.errors import ConfigError, InterfaceError, ModelError
@@ -193,46 +195,34 @@ def test_a_blade_of_another_mesh_fits_on_the_root(model, small, disk):
 
 
 def test_wrong_arguments_are_named(model, full, small, disk):
-    few = {"n_modes": 2, "n_blade_modes": 2}
-    with pytest.raises(ConfigError, match=r"no region 'wing'; it has \['blade', 'disk'\]"):
-        rom.substructured_sector(full, model, blade="wing", **few)
-    with pytest.raises(ConfigError, match="the full sector and the model"):
-        rom.substructured_sector(small, model, **few)
-    with pytest.raises(InterfaceError, match="'disk' reaches a cyclic face"):
-        rom.substructured_sector(full, model, blade="disk", **few)
-    with pytest.raises(InterfaceError, match="no interface 'foot'"):
-        rom.reduced_blade(small, model, n_modes=2, blade=None, root="foot")
-    moved = replace(model, points=model.points + 0.01)
-    with pytest.raises(InterfaceError, match=r"root of this blade ends up to 0\.01 m"):
-        rom.reduced_blade(small, moved, n_modes=2)
-    with pytest.raises(ConfigError, match="each must be a number above -1"):
-        small.blade.varied(stiffness=-1.0)
-    with pytest.raises(ConfigError, match="26 deviations"):
-        small.blade.varied(cantilever=np.zeros(26))
-    with pytest.raises(ConfigError, match=r"5 blades, with .* give 6 with 57"):
-        disk.modes([small.blade] * 5)
-    with pytest.raises(ConfigError, match="n_waves = 1000"):
-        rom.bladed_wheel(small, 1000)
-    with pytest.raises(ConfigError, match="n_root = 58 must be a whole number from 1 to 57"):
-        rom.bladed_wheel(small, 2, n_root=58)
+    few, moved = {"n_modes": 2, "n_blade_modes": 2}, replace(model, points=model.points + 0.01)
+    cut_off = partial(rom.substructured_sector, full, model, **few)
+    refuses(ConfigError, r"no region 'wing'; it has \['blade', 'disk'\]", cut_off, blade="wing")
+    refuses(ConfigError, "need the full sector", rom.substructured_sector, small, model, **few)
+    refuses(InterfaceError, "'disk' reaches a cyclic face", cut_off, blade="disk")
+    alone = {"n_modes": 2, "blade": None, "root": "foot"}
+    refuses(InterfaceError, "no interface 'foot'", rom.reduced_blade, small, model, **alone)
+    refuses(InterfaceError, r"root .* up to 0\.01 m", rom.reduced_blade, small, moved, n_modes=2)
+    refuses(ConfigError, "each must be a number above -1", small.blade.varied, stiffness=-1.0)
+    refuses(ConfigError, "26 deviations", small.blade.varied, cantilever=np.zeros(26))
+    refuses(ConfigError, r"5 blades with .* not 6 of 57", disk.modes, [small.blade] * 5)
+    refuses(ConfigError, "n_waves = 1000", rom.bladed_wheel, small, 1000)
+    refuses(ConfigError, "n_root = 58", rom.bladed_wheel, small, 2, n_root=58)
     drive = {"engine_order": 1, "omega": [1.0], "damping": 1e-3, "at": [0]}
     alike, force = [small.blade] * N, np.zeros(full.n)
     tip = 3 * int(np.argmax(np.hypot(*model.points[:, :2].T)))
-    with pytest.raises(ConfigError, match=r"damping = 0\.0"):
-        disk.response(alike, force, **drive | {"damping": 0.0})
-    with pytest.raises(ConfigError, match="not those of blade 0"):
-        disk.response(alike, force, **drive)
-    with pytest.raises(ConfigError, match=r"3 forces on blade 0 for"):
-        disk.response(alike, np.ones(3), **drive)
-    with pytest.raises(ConfigError, match="2 forces or places for 6 blades"):
-        disk.response(alike, [force, force], **drive)
-    with pytest.raises(ConfigError, match="dofs of the disk"):
-        disk.response(alike, force + 1.0, **drive)
-    with pytest.raises(ConfigError, match="does not move the tuned wheel"):
-        disk.amplification(alike, force, **drive | {"at": [tip]})
+    for words, pushed, change in (
+        ("damping = 0 must", force, {"damping": 0.0}),
+        ("not those of blade 0", force, {}),
+        ("3 forces on blade 0 for", np.ones(3), {}),
+        ("2 forces or places for 6 blades", [force, force], {}),
+        ("dofs of the disk", force + 1.0, {}),
+    ):
+        refuses(ConfigError, words, disk.response, alike, pushed, **drive | change)
+    there = drive | {"at": [tip]}
+    refuses(ConfigError, "does not move the tuned", disk.amplification, alike, force, **there)
     soft = replace(small.blade, K=-small.blade.K)
-    with pytest.raises(ModelError, match="without stiffness"):
-        disk.modes([soft] * N)
+    refuses(ModelError, "without stiffness", disk.modes, [soft] * N)
 
 
 def test_dofs_of_nodes_count_three_per_node_in_the_order_of_the_axes():

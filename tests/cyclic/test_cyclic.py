@@ -9,6 +9,7 @@ from scipy.linalg import eigh
 from scipy.sparse import csr_matrix, identity
 
 import rom
+from cases.refusals import refuses
 from cases.solid import block
 from cases.wheels import beam_ring, mass_ring, ring_frequency
 from rom.components.wheels.faces import interpolation, paired
@@ -137,27 +138,18 @@ def test_interpolation_is_exact_for_quadratic_fields_on_any_plane():
     ],
 )
 def test_faces_that_cannot_close_a_wheel_are_refused(high, message):
-    with pytest.raises(InterfaceError, match=message):
-        paired(face("low", 0.0), high, Z, ORIGIN)
+    refuses(InterfaceError, message, lambda: paired(face("low", 0.0), high, Z, ORIGIN))
 
 
 def test_wrong_arguments_are_named():
     ring, model = mass_ring(6), block()
-    with pytest.raises(ConfigError, match="diameter = 4 must"):
-        rom.cyclic_modes(ring, 4, 1)
-    with pytest.raises(ConfigError, match="n = 2 must be a whole number from 1 to 1"):
-        rom.cyclic_modes(ring, 1, 2)
-    with pytest.raises(ConfigError, match="no matrices of rotation"):
-        rom.cyclic_modes(ring, 1, 1, speed=10.0)
-    with pytest.raises(ConfigError, match="n_sectors = 1 must be a whole number of 2"):
-        mass_ring(1)
-    with pytest.raises(InterfaceError, match="both cyclic faces"):
-        replace(ring, slave=np.array([0]))
-    with pytest.raises(ConfigError, match="coupling has shape"):
-        replace(ring, coupling=identity(2))
-    with pytest.raises(InterfaceError, match="no interface 'cyclic_low', 'cyclic_high'; it has"):
-        rom.CyclicSector.from_model(model)
-    with pytest.raises(ConfigError, match="length zero"):
-        rom.CyclicSector.from_model(model, low="root", high="tip", axis=(0, 0, 0))
-    with pytest.raises(InterfaceError, match="does not divide"):
-        rom.CyclicSector.from_model(model, low="root", high="tip", at=(0.3, -2.0, 0))
+    refuses(ConfigError, "diameter = 4 must", rom.cyclic_modes, ring, 4, 1)
+    refuses(ConfigError, "n = 2 must be a whole number from 1 to 1", rom.cyclic_modes, ring, 1, 2)
+    refuses(ConfigError, "no matrices of rotation", rom.cyclic_modes, ring, 1, 1, speed=10.0)
+    refuses(ConfigError, "n_sectors = 1 must be a whole number of 2", mass_ring, 1)
+    refuses(InterfaceError, "both cyclic faces", replace, ring, slave=np.array([0]))
+    refuses(ConfigError, "coupling has shape", lambda: replace(ring, coupling=identity(2)))
+    refuses(InterfaceError, "no interface 'cyclic_low'", rom.CyclicSector.from_model, model)
+    made, faces = rom.CyclicSector.from_model, {"low": "root", "high": "tip"}
+    refuses(ConfigError, "length zero", made, model, **faces, axis=(0, 0, 0))
+    refuses(InterfaceError, "does not divide", made, model, **faces, at=(0.3, -2.0, 0))

@@ -8,6 +8,7 @@ from numpy.testing import assert_allclose
 from scipy.sparse import identity
 
 import rom
+from cases.refusals import refuses
 from cases.solid import block
 from cases.wheels import mass_ring
 from rom.components.wheels.reduced import distance, face_functions, fading
@@ -67,13 +68,11 @@ def test_a_sector_is_reduced_like_a_body():
     for options, words in (
         ({"interfaces": {"root": "rbe2"}}, "one interface, 'cyclic', not"),
         ({"stress": True}, "belong to bodies in motion"),
-        ({"method": rom.CraigBampton(f_max=10.0)}, "a number of fixed-interface modes, not by"),
+        ({"method": rom.CraigBampton(f_max=10.0)}, "fixed-interface modes, not None, CraigB"),
         ({"method": rom.Rubin(3)}, r"method = Rubin\(n_modes=3\) must be of type CraigBampton"),
     ):
-        with pytest.raises(ConfigError, match=words):
-            rom.reduce(bar, **({"method": rom.CraigBampton(8)} | options))
-    with pytest.raises(ConfigError, match="number of fixed-interface modes is needed"):
-        rom.reduce_sector(bar)
+        refuses(ConfigError, words, rom.reduce, bar, **{"method": rom.CraigBampton(8)} | options)
+    refuses(ConfigError, "number of fixed-interface modes, not None", rom.reduce_sector, bar)
 
 
 def test_a_certificate_tells_good_from_poor_and_wrong():
@@ -85,9 +84,8 @@ def test_a_certificate_tells_good_from_poor_and_wrong():
     said = [line.value for line in good.certificate.rows if "worst error" in line.quantity]
     assert_allclose(said, worst, rtol=1e-6)
     poor = rom.reduce_sector(bar, n_modes=2, functions=rom.Polynomial(1)).certificate
-    assert {line.quantity.partition(": ")[2] for line in poor.failures} == {
-        "worst error of 6 frequencies"
-    }
+    failed = {line.quantity.split(": ")[1] for line in poor.failures}
+    assert failed == {"worst error of 6 frequencies"}
     wrong = replace(good, K=0.98 * good.K).certificate
     assert any("never below full" in line.quantity for line in wrong.failures)
 
@@ -133,9 +131,7 @@ def test_shapes_expand_to_the_whole_wheel():
 
 def test_what_cannot_be_reduced_is_named():
     bar = periodic_bar()
-    with pytest.raises(ConfigError, match="geometry of the cyclic faces"):
-        rom.reduce_sector(mass_ring(5), n_modes=0)
-    with pytest.raises(InterfaceError, match="'root' are held"):
-        rom.reduce_sector(replace(bar, held=np.union1d(bar.slave, bar.master)), n_modes=2)
-    with pytest.raises(ConfigError, match="must be a whole number from"):
-        rom.reduce_sector(bar, n_modes=10_000)
+    refuses(ConfigError, "geometry", lambda: rom.reduce_sector(mass_ring(5), n_modes=0))
+    still = replace(bar, held=np.union1d(bar.slave, bar.master))
+    refuses(InterfaceError, "'root' are held", rom.reduce_sector, still, n_modes=2)
+    refuses(ConfigError, "must be a whole number from", rom.reduce_sector, bar, n_modes=10_000)

@@ -9,9 +9,10 @@ from numpy.testing import assert_allclose
 from scipy.integrate import solve_bvp
 
 import rom
+from cases.refusals import refuses
 from cases.wheels import bladed_model
 from rom.components import cosserat
-from rom.components.wheels.prestress.speed_table import lagrange
+from rom.components.wheels.prestress.spin_up import lagrange
 from rom.components.wheels.prestress.steady_rotation import SteadyRotation
 from rom.components.wheels.prestress.thermal import finite_solid
 from rom.components.wheels.rotation import centrifugal_displacement
@@ -205,9 +206,8 @@ def test_one_sector_is_the_whole_wheel(wheel):
 
 
 def test_a_reduced_wheel_follows_the_speed(wheel):
-    part, _ = wheel
-    sector = rom.CyclicSector.from_model(part, fixed=("bore",))
-    states = rom.spin_up(sector, part, speed=1500.0, n_states=5)
+    sector = rom.CyclicSector.from_model(wheel[0], fixed=("bore",))
+    states = rom.spin_up(sector, wheel[0], speed=1500.0, n_states=5)
     small = states.reduced(30, functions=rom.Polynomial(3))
     assert small.error < 2e-3
     for n in (1, 3):
@@ -229,15 +229,14 @@ def test_a_free_wheel_spins_up(wheel):
 
 def test_heat_joins_in():
     """A bar clamped at both ends, heated to a third of its buckling temperature."""
-    model = straight(h=0.01)
-    ends = ("root", "tip")
+    model, ends = straight(h=0.01), ("root", "tip")
     heat = rom.Heat(23e-6, rom.thermal_buckling(model, rom.Heat(23e-6, 1.0), fixed=ends) / 3)
     hot = rom.modes(rom.heated(model, heat, fixed=ends), 2, fixed=ends).omega
     solid = rom.held_solid(model, fixed=ends, axis=(1.0, 0.0, 0.0))
     states = rom.spin_up(solid, model, speed=1.0, n_states=2, heat=heat)
     assert_allclose(states.modes(2, speed=1.0).omega, hot, rtol=2e-3)
-    with pytest.raises(ModelError, match=r"no stable state beyond a temperature change of"):
-        rom.spin_up(solid, model, speed=1.0, n_states=2, heat=replace(heat, expansion=92e-6))
+    hotter = {"speed": 1.0, "n_states": 2, "heat": replace(heat, expansion=92e-6)}
+    refuses(ModelError, "beyond a temperature change of", rom.spin_up, solid, model, **hotter)
 
 
 def test_a_shaft_beyond_its_critical_speed_is_refused():
@@ -249,7 +248,7 @@ def test_a_shaft_beyond_its_critical_speed_is_refused():
     model = straight(nx=4)
     shaft = rom.held_solid(model, fixed=("root",), axis=(1.0, 0.0, 0.0))
     limit = rom.cyclic_modes(shaft, 0, 1).omega[0]
-    with pytest.raises(ModelError, match=r"above ([\d.]+) rad/s: rotation has used up") as caught:
+    with pytest.raises(ModelError, match=r"above [\d.]+ rad/s") as caught:
         rom.spin_up(shaft, model, speed=1.1 * limit, n_states=3)
     reached = float(str(caught.value).split("above ")[1].split()[0])
     assert 0.998 * limit < reached < limit
@@ -262,19 +261,14 @@ def test_wrong_arguments_are_named(bent, blade, run_up):
         ({"speed": np.nan}, "speed = nan must be a finite number"),
         ({"speed": 1.0, "n_states": 1}, "n_states = 1 must be a whole number of 2 or more"),
     ):
-        with pytest.raises(ConfigError, match=match):
-            rom.spin_up(blade, bent, **wrong)
+        refuses(ConfigError, match, rom.spin_up, blade, bent, **wrong)
     carrying = replace(bent, attachments=(rom.Attachment("tip", 1.0),))
-    with pytest.raises(ConfigError, match="carries 1 attachments"):
-        rom.spin_up(blade, carrying, speed=1.0)
-    with pytest.raises(ConfigError, match=r"beyond the speeds known, up to 141"):
-        run_up.at(1.1 * run_up.top)
-    with pytest.raises(ConfigError, match="needs a support"):
-        rom.held_solid(bent, fixed=())
-    with pytest.raises(InterfaceError, match="no interface 'rim'"):
-        rom.held_solid(bent, fixed="rim")
-    with pytest.raises(ConfigError, match="no finite elements"):
-        rom.spin_up(blade, replace(bent, stresses=None), speed=1.0)
+    refuses(ConfigError, "carries 1 attachments", rom.spin_up, blade, carrying, speed=1.0)
+    refuses(ConfigError, r"beyond the 141", run_up.at, 1.1 * run_up.top)
+    refuses(ConfigError, "needs a support", rom.held_solid, bent, fixed=())
+    refuses(InterfaceError, "no interface 'rim'", rom.held_solid, bent, fixed="rim")
+    bare = replace(bent, stresses=None)
+    refuses(ConfigError, "no finite elements", rom.spin_up, blade, bare, speed=1.0)
 
 
 def test_weights_are_one_at_their_nodes():

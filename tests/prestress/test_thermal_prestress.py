@@ -11,6 +11,7 @@ from scipy.sparse import identity
 from scipy.sparse.linalg import eigsh
 
 import rom
+from cases.refusals import refuses
 from cases.wheels import MARKS, bladed_model
 from rom.components.wheels.prestress.thermal import _stressed, _thermal, finite_solid
 from rom.eigen.verbs import rigid_motions
@@ -166,29 +167,24 @@ def test_blades_hotter_than_the_disc_by_region_and_by_node():
 
 
 def test_beyond_buckling_the_temperature_is_named(bar):
-    with pytest.raises(ModelError, match=r"buckles at a temperature change of 14\.3\d* K"):
-        rom.heated(bar, rom.Heat(ALPHA, 40.0), fixed=ENDS)
+    hot = rom.Heat(ALPHA, 40.0)
+    refuses(ModelError, r"temperature change of 14\.3\d* K", rom.heated, bar, hot, fixed=ENDS)
 
 
 def test_wrong_heat_is_named(bar):
-    with pytest.raises(ConfigError, match="expansion is given without a change of temperature"):
-        rom.Heat(expansion=12e-6)
-    with pytest.raises(ConfigError, match="without a coefficient of expansion"):
-        rom.Heat(temperature=20.0)
+    refuses(ConfigError, "needs its temperature", rom.Heat, expansion=12e-6)
+    refuses(ConfigError, "needs its expansion", rom.Heat, temperature=20.0)
     for wrong, match in (
         (rom.Heat({"blade": 1e-5}, 20.0), r"expansion names the region 'blade'; .*\['body'\]"),
         (rom.Heat(1e-5, {"rim": 20.0}), "temperature names the region 'rim'"),
         (rom.Heat(1e-5, np.ones(7)), r"shape \(7,\)"),
         (rom.Heat(1e-5, lambda x: x), "needed is"),
     ):
-        with pytest.raises(ConfigError, match=match):
-            rom.heated(bar, wrong)
-    with pytest.raises(ConfigError, match=r"temperature = nan must be .* a finite number"):
-        rom.Heat(1e-5, np.nan)
-    with pytest.raises(InterfaceError, match="no interface 'rim'"):
-        rom.heated(bar, rom.Heat(1e-5, 20.0), fixed="rim")
-    with pytest.raises(ConfigError, match="no finite elements"):
-        rom.heated(replace(bar, stresses=None), rom.Heat(1e-5, 20.0))
+        refuses(ConfigError, match, rom.heated, bar, wrong)
+    refuses(ConfigError, r"temperature = nan must be .* a finite number", rom.Heat, 1e-5, np.nan)
+    heat, bare = rom.Heat(1e-5, 20.0), replace(bar, stresses=None)
+    refuses(InterfaceError, "no interface 'rim'", rom.heated, bar, heat, fixed="rim")
+    refuses(ConfigError, "no finite elements", rom.heated, bare, heat)
 
 
 def test_more_of_one_heat_is_another_factor(bar):

@@ -276,7 +276,7 @@ def test_a_field_of_ours_that_cannot_be_imported_takes_no_other_down():
      (rom.updating.Responses, "updating.measured", "updating.measured"),
      (rom.mbs.PeriodicMotion, "orbits.motion", "mbs.analysis.periodic.motion"),
      (rom.CyclicSector, "wheels.sector", "cyclic.sector"),
-     (rom.SpinUp, "wheels.prestress.speed_table", "prestress.speed_table"),
+     (rom.SpinUp, "wheels.prestress.spin_up", "prestress.speed_table"),
      (rom.BodyFamily, "families.family", "parametric.family"),
      (rom.io.read_responses, "updating.responses.reading", "io.responses.reading")],
 )  # fmt: skip

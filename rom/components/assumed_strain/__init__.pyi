@@ -14,8 +14,8 @@ from rom.components.assumed_strain.motion import Metal as Metal
 from rom.components.assumed_strain.motion import fly as fly
 from rom.components.assumed_strain.motion import forces as forces
 from rom.components.assumed_strain.motion import mass as mass
+from rom.components.assumed_strain.motion import stiffness_by_sides as stiffness_by_sides
 from rom.components.assumed_strain.motion import tangent as tangent
-from rom.components.assumed_strain.sides import stiffness_by_sides as stiffness_by_sides
 from rom.components.assumed_strain.space import in_space as in_space
 from rom.components.assumed_strain.triangles import Sheet as Sheet
 from rom.components.assumed_strain.triangles import rectangle as rectangle

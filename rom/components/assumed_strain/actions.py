@@ -41,7 +41,7 @@ class Traction:
         sides: (k, 2) node numbers, rows of `outer_sides` [1].
         pressure: into the solid [Pa].
         shear: along the sides, with the solid on the left [Pa].
-        history: factor [1]: a number, a function of times, or times [s] and factors (m,).
+        history: factor, as of `Load` [1].
     """
 
     sides: npt.ArrayLike
@@ -82,6 +82,7 @@ class Tool:
     history: History = ((0.0,), ((0.0, 0.0),))
 
 
+@typed
 @dataclass(frozen=True, slots=True)
 class Actions:
     """All that acts on a sheet.
@@ -136,11 +137,6 @@ class Prepared:
     def forces(self) -> tuple[Array, Index, Array, Index]:
         """What `kernels.applied` takes."""
         return self.loads, self.sides, self.stress, self.of_side
-
-    @property
-    def tools(self) -> tuple[Array, Index, Array]:
-        """What `kernels.fly` takes of tools."""
-        return self.faces, self.first, self.friction
 
     def faces_of(self, k: int) -> Array:
         """(f, 7) faces of a tool."""
@@ -197,7 +193,6 @@ def prepared(body: Sheet, actions: Actions, span: tuple[float, float] = (0.0, 1.
         ConfigError: if histories, dofs, sides or tools do not fit; naming which.
         MeshError: if a tool begins inside the sheet, or the sheet in it.
     """
-    _refuse_strangers(actions)
     loads = np.zeros((len(actions.loads), *body.points.shape))
     for k, load in enumerate(actions.loads):
         loads[k] = nodal(f"forces of load {k}", load.forces, body)
@@ -206,7 +201,7 @@ def prepared(body: Sheet, actions: Actions, span: tuple[float, float] = (0.0, 1.
     of = np.repeat(np.arange(len(sides)), [len(s) for s in sides])
     moved = [dofs_of(x.dofs, body, f"drive {k}:") for k, x in enumerate(actions.drives)]
     driven, columns = _driven(dofs_of(actions.held, body), moved, len(loads) + len(sides))
-    times, table = _table(_histories(actions, [m.size for m in moved], span))
+    times, table = _table(actions, [m.size for m in moved], span)
     faces = [_faces(tool) for tool in actions.tools]
     made = Prepared(
         times, table, loads, np.vstack([np.zeros((0, 2), dtype=np.int64), *sides]),
@@ -217,21 +212,6 @@ def prepared(body: Sheet, actions: Actions, span: tuple[float, float] = (0.0, 1.
     )  # fmt: skip
     _refuse_overlap(body, made)
     return made
-
-
-def _refuse_strangers(actions: Actions) -> None:
-    """Every list of actions holds records of its kind."""
-    kinds = {"loads": Load, "tractions": Traction, "drives": Drive, "tools": Tool}
-    for name, kind in kinds.items():
-        given = getattr(actions, name)
-        if not isinstance(given, Sequence) or isinstance(given, str):
-            raise ConfigError(
-                f"{name} = {shortened(given)} of the actions is no list.",
-                hint=f"Write [{kind.__name__}(...)], also of one.",
-            )
-        for k, one in enumerate(given):
-            if not isinstance(one, kind):
-                raise ConfigError(f"{name}[{k}] = {shortened(one)} must be a {kind.__name__}.")
 
 
 def _driven(held: Index, moved: list[Index], first: int) -> tuple[Index, Index]:
@@ -246,11 +226,7 @@ def _driven(held: Index, moved: list[Index], first: int) -> tuple[Index, Index]:
 
 
 def nodal(name: str, values: npt.ArrayLike, body: Sheet) -> Array:
-    """Finite values (n, 2) at the nodes of the sheet; kernels check no bounds.
-
-    Raises:
-        ConfigError: if they do not fit the sheet.
-    """
+    """Finite values (n, 2) at the nodes of the sheet; kernels check no bounds."""
     return np.ascontiguousarray(finite(name, values, body.points.shape))
 
 
@@ -277,12 +253,12 @@ def _outer(body: Sheet, k: int, traction: Traction) -> Index:
     if not (is_number(traction.pressure) and is_number(traction.shear)):
         raise ConfigError(f"traction {k} needs finite pressure and shear.")
     there = {tuple(side) for side in outer_sides(body).tolist()}
-    for side in wanted.tolist():
-        if tuple(side) not in there:
-            raise ConfigError(
-                f"traction {k}: the side {side[0]}-{side[1]} is not an outer one.",
-                hint="Take rows of outer_sides, which have the solid on the left.",
-            )
+    if strange := [side for side in wanted.tolist() if tuple(side) not in there]:
+        a, b = strange[0]
+        raise ConfigError(
+            f"traction {k}: the side {a}-{b} is not an outer one; take rows of outer_sides, which "
+            "have the solid on the left."
+        )
     return wanted
 
 
@@ -293,46 +269,32 @@ def _faces(tool: Tool) -> Array:
     whole(f"{name}: corners of the outline", len(X), 3)
     rough = isinstance(tool.friction, float) and tool.friction == np.inf
     if not (rough or (is_number(tool.friction) and tool.friction >= 0)):
-        raise ConfigError(
-            f"tool {tool.name!r}: the friction {shortened(tool.friction)} must be a number from 0 "
-            "on, or infinite."
-        )
+        given = shortened(tool.friction)
+        raise ConfigError(f"{name}: the friction {given} must be 0 or more, or infinite.")
     along = np.roll(X, -1, axis=0) - X
     length = np.linalg.norm(along, axis=1)
     if not length.min() > 0:
-        raise ConfigError(
-            f"tool {tool.name!r}: a corner of the outline is there twice; use it once."
-        )
+        raise ConfigError(f"{name}: a corner of the outline is there twice; use it once.")
     t = along / length[:, None]
     turn = np.roll(t, -1, axis=0)
     if np.any(t[:, 0] * turn[:, 1] - t[:, 1] * turn[:, 0] < -1e-9):
         raise ConfigError(
-            f"tool {tool.name!r}: the outline is not convex, or clockwise.",
+            f"{name}: the outline is not convex, or clockwise.",
             hint="Order the corners counter-clockwise; make a hollow tool of several.",
         )
     return np.column_stack([X, t, t[:, 1], -t[:, 0], length])
 
 
-def _histories(
-    actions: Actions, moved: list[int], span: tuple[float, float]
-) -> list[tuple[str, Array, Array]]:
-    """Name, times and values (m, columns) of every history, in the order of the table."""
+def _table(actions: Actions, moved: list[int], span: tuple[float, float]) -> tuple[Array, Array]:
+    """Times and values of all histories together, constant before the first and after the last."""
     asked = [(f"load {k}", x.history, 1) for k, x in enumerate(actions.loads)]
     asked += [(f"traction {k}", x.history, 1) for k, x in enumerate(actions.tractions)]
     asked += [(f"drive {k}", x.history, moved[k]) for k, x in enumerate(actions.drives)]
     asked += [(f"tool {x.name!r}", x.history, 2) for x in actions.tools]
-    return [
-        (name, *straightened(name, history, span, n, rows=name.startswith("tool")))
-        for name, history, n in asked
-    ]
-
-
-def _table(histories: list[tuple[str, Array, Array]]) -> tuple[Array, Array]:
-    """Corners of all histories together; constant before the first and after the last."""
-    corners = [t for _, t, _ in histories]
-    times = np.unique(np.concatenate([[0.0], *corners]))
+    lines = [straightened(n, h, span, k, rows=n.startswith("tool")) for n, h, k in asked]
+    times = np.unique(np.concatenate([[0.0], *(t for t, _ in lines)]))
     times = np.append(times, times[-1] + 1.0)
-    columns = [np.interp(times, t, y[:, k]) for _, t, y in histories for k in range(y.shape[1])]
+    columns = [np.interp(times, t, column) for t, y in lines for column in y.T]
     return times, np.array(columns).T.reshape(len(times), -1).copy()
 
 
@@ -344,15 +306,13 @@ def _refuse_overlap(body: Sheet, made: Prepared) -> None:
         gap = np.einsum("nfa,fa->nf", X[:, None] - offset - faces[:, :2], faces[:, 4:6]).max(axis=1)
         if gap.min() < -TOUCH_RTOL * faces[:, 6].max():
             raise MeshError(
-                f"tool {name!r} starts {-gap.min():.3g} m inside the sheet, at node "
-                f"{int(gap.argmin())}.",
+                f"tool {name!r} starts {-gap.min():.3g} m inside the sheet at node {gap.argmin()}.",
                 hint="Move the tool until it only touches.",
             )
         corner = _covered(body, faces[:, :2] + offset)
         if corner >= 0:
             raise MeshError(
-                f"corner {corner} of the tool {name!r} starts inside the sheet.",
-                hint="Move the tool until it only touches.",
+                f"corner {corner} of the tool {name!r} starts inside the sheet; move it."
             )
 
 

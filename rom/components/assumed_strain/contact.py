@@ -31,15 +31,10 @@ class Touch:
 def touch(
     x: Array, moved: Array, slip: Array, faces: Array, friction: float, stiff: Array
 ) -> Touch:
-    """Forces and stiffness of a tool.
+    """Forces and stiffness of a tool of faces (f, 7): corner, tangent, outer normal, length.
 
-    Args:
-        x: (n, 2) positions seen from the tool [m].
-        moved: (n, 2) how far they moved along the tool in this step [m].
-        slip: (n,) elastic slip before [m].
-        faces: (f, 7) of the tool: corner, tangent, outer normal, length.
-        friction: Coulomb's coefficient [1].
-        stiff: (n,) stiffness across a face [N/m].
+    Positions x (n, 2) [m] are seen from the tool, along which they ``moved`` (n, 2) in this step,
+    with the elastic slip (n,) before it; ``stiff`` (n,) is the stiffness across a face [N/m].
     """
     gaps = np.einsum("nfa,fa->nf", x[:, None] - faces[:, :2], faces[:, 4:6])
     face, depth = gaps.argmax(axis=1), np.maximum(-gaps.max(axis=1), 0.0)

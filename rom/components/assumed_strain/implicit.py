@@ -6,13 +6,14 @@ Source:
 """
 
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 import numpy as np
 import numpy.typing as npt
 from scipy.sparse import csr_matrix
 from scipy.sparse.linalg import spsolve
 
-from rom.arguments import between, finite, typed
+from rom.arguments import Count, Share, finite, typed
 from rom.components.assumed_strain import kernels
 from rom.components.assumed_strain.actions import Actions, Load, nodal, prepared
 from rom.components.assumed_strain.contact import touch
@@ -21,6 +22,7 @@ from rom.components.assumed_strain.triangles import Sheet, placed
 from rom.errors import ConfigError, SolverError, warn
 from rom.model import Array, Index
 
+Steps = Annotated[int, Count(1)]  # of the load
 PENALTY_RATIO = 20.0  # stiffness of a face at a node, over Young's modulus times depth
 RESIDUAL_RTOL = 1e-9  # of the forces that are in balance
 ROUND_OFF_ULPS = 2  # of forces at rest: 0.8 to 1.1 found, times the root of the number of nodes
@@ -104,7 +106,7 @@ def quasi_static(body: Sheet, metal: Metal, actions: Actions, times: npt.ArrayLi
 
 @typed
 def equilibrium(
-    body: Sheet, metal: Metal, load: Array, held: npt.ArrayLike, *, steps: int = 1
+    body: Sheet, metal: Metal, load: Array, held: npt.ArrayLike, *, steps: Steps = 1
 ) -> tuple[Array, Array, int]:
     """Rest under dead loads, which grow in equal steps; `quasi_static` has all other actions.
 
@@ -123,8 +125,6 @@ def equilibrium(
         SolverError: if Newton's method does not find equilibrium, even in halves of a step;
             ``error.solution`` holds the steps before.
     """
-    if steps < 1:
-        raise ConfigError(f"{steps} load steps: one or more are needed.")
     actions = Actions(held, loads=[Load(load, ((0, 1), (0, 1)))])
     course = quasi_static(body, metal, actions, np.linspace(0, 1, steps + 1))
     return course.x[-1], course.history, course.iterations
@@ -133,7 +133,7 @@ def equilibrium(
 @typed
 def implicit_motion(
     body: Sheet, metal: Metal, actions: Actions, times: npt.ArrayLike, *,
-    v: npt.ArrayLike | None = None, rho_inf: float = 0.5,
+    v: npt.ArrayLike | None = None, rho_inf: Share = 0.5,
 ) -> Course:  # fmt: skip
     """Motion with inertia by generalized-alpha steps, from one instant to the next.
 
@@ -152,11 +152,9 @@ def implicit_motion(
         SolverError: if no motion is found, or plastic strain leaps even in the shortest steps;
             ``error.solution`` holds the instants before.
     """
-    between("rho_inf", rho_inf, 0, 1)
     if actions.tools and rho_inf > MAX_RHO_OF_IMPACTS:
         raise ConfigError(
-            f"rho_inf = {rho_inf} with tools: impacts would gain energy.",
-            hint=f"At most {MAX_RHO_OF_IMPACTS} beside tools.",
+            f"rho_inf = {rho_inf} with tools: impacts gain energy above {MAX_RHO_OF_IMPACTS}."
         )
     start = np.zeros_like(body.points) if v is None else nodal("velocities", v, body)
     t, M = _instants(times), mass(body, metal)
@@ -211,7 +209,7 @@ class _Way:
                 end = min(now.t + part * (t[k] - t[k - 1]), t[k])
                 end = t[k] if t[k] - end < 1e-9 * (t[k] - t[k - 1]) else end
                 found = self.step(now, end)
-                grown = 0.0 if found is None else _grown(now, found)
+                grown = 0.0 if found is None else (found.history - now.history)[..., 4].max()
                 if found is not None and grown <= MAX_STRAIN_STEP:
                     now, part = found, min(part * (1 + (2 * grown <= MAX_STRAIN_STEP)), 1.0)
                 elif part > MIN_STEP:
@@ -221,8 +219,7 @@ class _Way:
                         f"plastic strain grows by {grown:.2g}, more than {MAX_STRAIN_STEP} a step,"
                     )  # fmt: skip
                     raise SolverError(
-                        f"{what} between {now.t:.4g} s and {end:.4g} s, instant {k} of "
-                        f"{len(t) - 1}.",
+                        f"{what} between {now.t:.4g} s and {end:.4g} s, instant {k}.",
                         hint="Take more instants, or less load; the sheet may be free to move.",
                         solution=self.course(kept),
                     )
@@ -244,8 +241,8 @@ class _Way:
                 warn(
                     f"from {some[k].t:.4g} s on triangle {int(ratio[k].argmax())} is stretched "
                     f"{ratio[k].max():.3g} times as much along one axis as along the other: beyond "
-                    f"{MAX_STRETCH_RATIO:g}, a square at 0.31 of its height, meshes of F1 lean "
-                    "over, and forces come out too low, by 1 % at 11 and 10 % at 13. Stop before."
+                    f"{MAX_STRETCH_RATIO:g} meshes of F1 lean over, and forces are too low, by 1 % "
+                    "at 11 and 10 % at 13. Stop before."
                 )
                 return
 
@@ -351,13 +348,14 @@ class _Way:
 
     def arrived(self, now: _Now, trial: "_Trial") -> _Now:
         """State at the end of a step, with what supports and drives give."""
-        then, driven, reactions = trial.then, self.acts.driven, np.zeros(trial.whole.size)
-        reactions[driven] = -then.balance[driven]
+        then, dt, reactions = trial.then, trial.then.t - now.t, np.zeros(trial.whole.size)
+        held = -then.balance
         if self.M is None:
-            v = (then.x - now.x) / (then.t - now.t)
-            return replace(then, v=v, reactions=reactions.reshape(-1, 2))
-        reactions[driven] += (self.M @ then.a.ravel())[driven]
-        v = now.v + (then.t - now.t) * ((1 - self.gamma) * now.a + self.gamma * then.a)
+            v = (then.x - now.x) / dt
+        else:
+            held += self.M @ then.a.ravel()
+            v = now.v + dt * ((1 - self.gamma) * now.a + self.gamma * then.a)
+        reactions[self.acts.driven] = held[self.acts.driven]
         return replace(then, v=v, reactions=reactions.reshape(-1, 2))
 
     def stiffness(self, now: _Now, trial: "_Trial") -> csr_matrix:
@@ -402,15 +400,11 @@ def _refuse_free(body: Sheet, actions: Actions) -> None:
     motions = np.zeros((body.points.size, 3))
     motions[::2, 0] = motions[1::2, 1] = np.abs(place).max()
     motions[::2, 2], motions[1::2, 2] = -place[:, 1], place[:, 0]
+    stopped = np.linalg.matrix_rank(motions[way.driven], tol=1e-9) if way.driven.size else 0
     if body.state == "axisymmetric":
         if not np.any(way.driven % 2):
-            raise ConfigError(
-                "held and driven dofs leave the solid free to slide along its axis.",
-                hint="Hold the second dof of a node.",
-            )
-        return
-    stopped = np.linalg.matrix_rank(motions[way.driven], tol=1e-9) if way.driven.size else 0
-    if stopped < 3:
+            raise ConfigError("the solid can slide along its axis; hold the second dof of a node.")
+    elif stopped < 3:
         raise ConfigError(
             f"{way.driven.size} held and driven dofs leave {3 - stopped} of three rigid motions.",
             hint="Hold two dofs of one node and one of another, or more.",
@@ -431,8 +425,3 @@ def _stretch_ratio(body: Sheet, x: Array) -> Array:
     largest = (C[0, 0] + C[1, 1]) / 2 + np.hypot((C[0, 0] - C[1, 1]) / 2, C[0, 1])
     ratio: Array = largest / np.sqrt(np.maximum(C[0, 0] * C[1, 1] - C[0, 1] ** 2, 1e-300))
     return ratio
-
-
-def _grown(now: _Now, then: _Now) -> float:
-    """Most plastic strain that has grown anywhere in a step [1]."""
-    return float((then.history - now.history)[..., 4].max())

@@ -21,15 +21,10 @@ def _returned(e11, e22, e12, e33, ep, numbers):
     K, mu = numbers[0], numbers[1]
     a, b, c, d = e11 - ep[0], e22 - ep[1], e33 - ep[3], e12 - ep[2]
     third = (a + b + c) / 3
-    s11, s22, s33, s12 = (
-        2 * mu * (a - third),
-        2 * mu * (b - third),
-        2 * mu * (c - third),
-        2 * mu * d,
-    )
+    s11, s22 = 2 * mu * (a - third), 2 * mu * (b - third)
+    s33, s12 = 2 * mu * (c - third), 2 * mu * d
     q = np.sqrt(1.5 * (s11 * s11 + s22 * s22 + s33 * s33 + 2 * s12 * s12))
-    over, step = q - numbers[2] - numbers[3] * ep[4], 0.0
-    left = 1.0
+    over, step, left = q - numbers[2] - numbers[3] * ep[4], 0.0, 1.0
     if over > 0:
         step = over / (3 * mu + numbers[3])
         left = 1 - 3 * mu * step / q
@@ -102,11 +97,9 @@ def _deformed(x, nodes, G, F):
 @inner
 def _hoop(x, nodes, radius):
     """Stretch around the axis at the centroid; 1 without axial symmetry."""
-    return (
-        (x[nodes[0], 0] + x[nodes[1], 0] + x[nodes[2], 0]) / (3 * radius)
-        if radius < np.inf
-        else 1.0
-    )
+    if radius == np.inf:
+        return 1.0
+    return (x[nodes[0], 0] + x[nodes[1], 0] + x[nodes[2], 0]) / (3 * radius)
 
 
 @kernel
@@ -148,9 +141,8 @@ def tangents(x, patch, G, weights, radius, numbers, state, history, K):
             for j in range(4):
                 for sign in range(2):
                     c = C.copy()
-                    c[j] += (
-                        (2 if j != 2 else 1) * STRAIN_INCREMENT * (1 - 2 * sign)
-                    )  # of 2 E12 it is E12
+                    part = 2 if j != 2 else 1  # of 2 E12 it is E12
+                    c[j] += part * STRAIN_INCREMENT * (1 - 2 * sign)
                     _stress(c[0], c[1], c[2], c[3], history[e, p], numbers, state, out)
                     two[sign] = out[:4]
                 D[:, j] = (two[0] - two[1]) / (2 * STRAIN_INCREMENT)
@@ -253,12 +245,8 @@ def fly(x, v, mass, free, parts, numbers, state, speed, acts, times, histories, 
     corners, table, actions, depth, driven, columns, tools = acts
     path, plastic, tool_forces, reactions = seen
     old, new = histories
-    f, g, start, impulse = (
-        np.zeros(x.shape),
-        np.zeros(x.shape),
-        x.copy(),
-        np.zeros(tool_forces[0].shape),
-    )
+    f, g, start = np.zeros(x.shape), np.zeros(x.shape), x.copy()
+    impulse = np.zeros(tool_forces[0].shape)
     y, before = np.zeros(table.shape[1]), np.zeros(table.shape[1])
     _row(corners, table, 0.0, before)
     t, dt, steps, shot, spent, since = 0.0, 0.0, 0, 0, 0.0, 0.0
@@ -309,7 +297,6 @@ def _shortest(x, patch, area):
         a, b, c = patch[e, 0], patch[e, 1], patch[e, 2]
         ux, uy, vx, vy = x[b, 0] - x[a, 0], x[b, 1] - x[a, 1], x[c, 0] - x[a, 0], x[c, 1] - x[a, 1]
         side = max(ux * ux + uy * uy, vx * vx + vy * vy, (ux - vx) ** 2 + (uy - vy) ** 2)
-        least = min(
-            least, max(abs(ux * vy - uy * vx), 2 * MIN_AREA_RATIO * area[e]) / np.sqrt(side)
-        )
+        twice = max(abs(ux * vy - uy * vx), 2 * MIN_AREA_RATIO * area[e])
+        least = min(least, twice / np.sqrt(side))
     return least

@@ -6,18 +6,24 @@ Source:
 """
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import numpy.typing as npt
 from scipy.sparse import csr_matrix, identity, kron
 
-from rom.arguments import finite, is_number, positive, shortened, typed, whole
+from rom.arguments import Count, Positive, finite, is_number, shortened, typed
 from rom.components.assumed_strain import kernels
 from rom.components.assumed_strain.actions import Actions, dofs_of, nodal, prepared
-from rom.components.assumed_strain.triangles import STATES, Sheet, placed
-from rom.errors import MaterialError, SolverError
-from rom.model import Array
+from rom.components.assumed_strain.triangles import (
+    STATES,
+    Sheet,
+    constant_gradients,
+    placed,
+    sides_of,
+)
+from rom.errors import ConfigError, MaterialError, SolverError
+from rom.model import Array, Index
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,10 +58,8 @@ class Metal:
             raise MaterialError(f"linear = {shortened(self.linear)} must be True or False.")
         plastic = self.yield_stress > 0 and self.hardening >= 0
         if not (self.E > 0 and -1 < self.nu < 0.5 and self.rho > 0 and plastic):
-            raise MaterialError(
-                f"no solid is {self}.",
-                hint="E, rho, yield_stress > 0; -1 < nu < 0.5; hardening >= 0.",
-            )
+            hint = "E, rho, yield_stress > 0; -1 < nu < 0.5; hardening >= 0."
+            raise MaterialError(f"no solid is {self}.", hint=hint)
 
     @property
     def numbers(self) -> Array:
@@ -151,8 +155,9 @@ class Flight:
 
 @typed
 def fly(
-    body: Sheet, metal: Metal, v: Array, held: npt.ArrayLike, t_end: float, *,
-    pictures: int = 41, actions: Actions | None = None,
+    body: Sheet, metal: Metal, v: Array, held: npt.ArrayLike,
+    t_end: Annotated[float, Positive("s")], *,
+    pictures: Annotated[int, Count(2)] = 41, actions: Actions | None = None,
 ) -> Flight:  # fmt: skip
     """Explicit motion from rest lengths.
 
@@ -172,11 +177,8 @@ def fly(
         MeshError: if a tool begins inside the sheet.
         SolverError: if the motion is lost; ``error.solution`` holds the pictures before.
     """
-    v, held = nodal("velocities", v, body), dofs_of(held, body)
-    positive("t_end [s]", t_end)
-    whole("pictures", pictures, 2)
-    actions = actions or Actions()
-    held = np.union1d(held, dofs_of(actions.held, body))
+    v, actions = nodal("velocities", v, body), actions or Actions()
+    held = np.union1d(dofs_of(held, body), dofs_of(actions.held, body))
     acts = prepared(body, replace(actions, held=held), (0.0, t_end))
     lumped = np.asarray(mass(body, metal).sum(axis=1)).ravel()[::2]
     free, x, parts = np.ones(v.shape, dtype=bool), body.points.copy(), _parts(body, metal, None)
@@ -184,22 +186,20 @@ def fly(
     t, kept = np.linspace(0, t_end, pictures), (pictures, *x.shape)
     seen = (np.full(kept, np.nan), np.zeros((pictures, *body.weights.shape)),
             np.zeros((pictures, len(acts.friction), 2)), np.zeros(kept))  # fmt: skip
-    steps, work = kernels.fly(
-        x, np.where(free, v, 0.0), lumped, free, (*parts[:4], body.area), *parts[4:6],
-        metal.wave_speed, (acts.times, acts.table, acts.forces, depth_of(body), acts.driven,
-                           acts.columns, acts.tools), t, (parts[6], parts[6].copy()), seen,
-    )  # fmt: skip
-    path, plastic, tool_forces, reactions = seen
+    acting = acts.times, acts.table, acts.forces, depth_of(body), acts.driven, acts.columns
+    tools, histories = (acts.faces, acts.first, acts.friction), (parts[6], parts[6].copy())
+    solid = (*parts[:4], body.area), *parts[4:6], metal.wave_speed
+    start = x, np.where(free, v, 0.0), lumped, free
+    steps, work = kernels.fly(*start, *solid, (*acting, tools), t, histories, seen)
+    path, plastic = seen[:2]
     if steps < 0 or not np.isfinite(path).all():
         k = int(np.append(np.isfinite(path).all(axis=(1, 2)), False).argmin())
         raise SolverError(
             "the explicit motion was lost.",
             hint="Use the element F1, or finer time.",
-            solution=Flight(
-                t[:k], path[:k], plastic[:k], work, steps, tool_forces[:k], reactions[:k]
-            ),
+            solution=Flight(t[:k], path[:k], plastic[:k], work, steps, *(x[:k] for x in seen[2:])),
         )
-    return Flight(t, path, plastic, work, steps, tool_forces, reactions)
+    return Flight(t, path, plastic, work, steps, *seen[2:])
 
 
 def depth_of(body: Sheet) -> float:
@@ -213,3 +213,66 @@ def _parts(body: Sheet, metal: Metal, history: Array | None) -> tuple[Any, ...]:
     history = np.zeros(shape) if history is None else finite("history", history, shape)
     numbers, state = metal.numbers, STATES[body.state]
     return body.patch, body.gradients, body.weights, body.radius, numbers, state, history
+
+
+@typed
+def stiffness_by_sides(body: Sheet, metal: Metal, *, share: tuple[int, int] = (0, 1)) -> csr_matrix:
+    """(2n, 2n) linear stiffness of the element "F3" where the sheet began [N/m].
+
+    K = sum over sides of V/3 B^T D B, V the volume of the triangles at the side. Its gradient is
+    theirs, averaged by area: the same as that of the four nodes in a patch. A side needs nothing
+    but its triangles, so that processes can share the sides; their matrices add up to K.
+
+    Args:
+        body: a plane sheet; of its points and triangles, not of its element.
+        metal: its material.
+        share: (number of this process, number of processes).
+
+    Raises:
+        ConfigError: with axial symmetry, or for a share that does not exist.
+        MeshError: if a triangle is turned over.
+
+    Source:
+        Edge-based smoothed elements: Liu, Nguyen-Thoi and Lam, J. Sound Vib. 320 (2009) 1100.
+    """
+    mine, of = share
+    if not 0 <= mine < of or body.state == "axisymmetric":
+        raise ConfigError(f"share {mine} of {of}, {body.state}: needed is a share of a plane one.")
+    triangles, there = (rows[mine::of] for rows in _triangles_at_sides(body.triangles))
+    G, area = constant_gradients(body.points, body.triangles)
+    parts = area[triangles] * there
+    whole = parts.sum(axis=1)
+    gradient = (parts / whole[:, None])[..., None, None] * G[triangles, :3]
+    B = _strains(gradient.reshape(-1, 6, 2))
+    volume = whole / 3 * body.thickness
+    K = np.swapaxes(B, 1, 2) @ (volume[:, None, None] * (_elasticity(body, metal) @ B))
+    nodes = body.triangles[triangles].reshape(-1, 6)  # some twice: their entries add up
+    dofs = (2 * nodes[:, :, None] + np.arange(2)).reshape(-1, 12)
+    return placed(K, dofs, dofs, 2 * len(body.points))
+
+
+def _triangles_at_sides(T: Index) -> tuple[Index, Array]:
+    """(m, 2) triangles at each side, and whether they are there; at an edge one is named twice."""
+    sides = np.sort(sides_of(T), axis=1)
+    side = np.unique(sides, axis=0, return_inverse=True)[1].ravel()
+    order, t = np.argsort(side, kind="stable"), np.tile(np.arange(len(T)), 3)
+    first = np.flatnonzero(np.diff(side[order], prepend=-1))
+    last = np.append(first[1:], side.size) - 1
+    pair = np.column_stack([t[order[first]], t[order[last]]])
+    return pair, np.column_stack([np.ones(len(pair)), last > first])
+
+
+def _strains(gradient: Array) -> Array:
+    """B (m, 3, 12) from gradients (m, 6, 2): strains along both axes, and the shear angle."""
+    B = np.zeros((len(gradient), 3, 12))
+    B[:, 0, ::2] = B[:, 2, 1::2] = gradient[..., 0]
+    B[:, 1, 1::2] = B[:, 2, ::2] = gradient[..., 1]
+    return B
+
+
+def _elasticity(body: Sheet, metal: Metal) -> Array:
+    """(3, 3) Hooke's law in the plane [Pa]."""
+    E, nu = metal.E, metal.nu
+    if body.state == "plane strain":
+        E, nu = E / (1 - nu**2), nu / (1 - nu)
+    return E / (1 - nu**2) * np.array([[1, nu, 0], [nu, 1, 0], [0, 0, (1 - nu) / 2]])

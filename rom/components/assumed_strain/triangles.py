@@ -86,19 +86,15 @@ def sheet(
     loose = np.setdiff1d(np.arange(len(X)), T)
     if loose.size:
         raise MeshError(
-            f"{loose.size} of {len(X)} points belong to no triangle, the first is {loose[0]}.",
-            hint="Leave them out: they have no mass, and nothing holds them.",
+            f"{loose.size} of {len(X)} points belong to no triangle, the first is {loose[0]}."
         )
     G = np.zeros((len(T), 3, 6, 2))
     for k in range(3):
         G[:, k] = _side_gradients(X, patch, constant, k)
-    G = (
-        constant[:, None, None]
-        if element == "CST"
-        else G[:, None]
-        if element == "F1"
-        else G[:, :, None]
-    )
+    if element == "CST":
+        G = constant[:, None, None]
+    else:
+        G = G[:, None] if element == "F1" else G[:, :, None]
     alone = patch < 0
     patch = np.where(alone, np.hstack([T, T]), patch)
     depth = 2 * np.pi * X[T, 0].mean(axis=1) if state == "axisymmetric" else thickness
@@ -123,18 +119,14 @@ def whole_numbers(name: str, value: npt.ArrayLike) -> Index:
 
 def _refuse_no_mesh(X: Array, T: Index, state: str) -> None:
     if X.ndim != 2 or X.shape[1] != 2 or T.ndim != 2 or T.shape[1] != 3 or not len(T):
-        raise MeshError(
-            f"points {X.shape} and triangles {T.shape} where (n, 2) and (t, 3) were expected."
-        )
+        raise MeshError(f"points {X.shape} and triangles {T.shape} must be (n, 2) and (t, 3).")
     if T.min() < 0 or T.max() >= len(X):
         raise MeshError(
-            f"triangles name the nodes {T.min()} to {T.max()}; there are {len(X)} points.",
-            hint="Count nodes from zero.",
+            f"triangles name the nodes {T.min()} to {T.max()}; there are 0 to {len(X) - 1}."
         )
     if state == "axisymmetric" and X[:, 0].min() < 0:
         raise MeshError(
-            f"the radius of node {int(X[:, 0].argmin())} is {X[:, 0].min():.3g} m.",
-            hint="The first coordinate of an axisymmetric solid is its radius.",
+            f"the first coordinate, {X[:, 0].min():.3g} m of node {X[:, 0].argmin()}, is a radius."
         )
 
 

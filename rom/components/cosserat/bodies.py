@@ -45,15 +45,9 @@ PLATE_INERTIA_SHARE = 0.25
 def memory(space):
     """Arrays of an element in the memory of the law."""
     R, D = space[0:9].reshape((3, 3)), space[9:36].reshape((3, 9))
-    H, unused = space[36:117].reshape((9, 9)), space[129:130]
-    return Work(R, D, H, space[117:120], space[120:123], space[123:127], unused,
-                space[130:131].reshape((1, 1)), space[131:132].reshape((1, 1)))  # fmt: skip
-
-
-@inner
-def rate_of(pose, place):
-    """Velocity of one of the twelve dofs of two frames."""
-    return pose[POSE_SIZE * (place // 6) + 7 + place % 6]
+    H, unused = space[36:117].reshape((9, 9)), space[127:128]
+    a, f, e = space[117:120], space[120:123], space[123:127]
+    return Work(R, D, H, a, f, e, unused, unused.reshape((1, 1)))
 
 
 @inner
@@ -63,7 +57,7 @@ def answer_of(W, C, viscous, weight, at, pose, wanted, answer):  # noqa: PLR0913
     for k in range(3):
         rate = 0.0
         for c in range(9):
-            rate += W.D[k, c] * rate_of(pose, at[c])
+            rate += W.D[k, c] * pose[POSE_SIZE * (at[c] // 6) + 7 + at[c] % 6]
         answer[0] += 0.5 * weight * W.f[k] * W.f[k] / C[k]
         answer[1] += weight * viscous[k] * rate * rate
         W.f[k] += viscous[k] * rate

@@ -87,11 +87,7 @@ def add_bending(frames, angle, axis, factor, K):
     for p in range(3):
         for q in range(3):
             across = c * ((1.0 if p == q else 0.0) - axis[p] * axis[q])
-            spin = 0.0
-            if q == (p + 1) % 3:
-                spin = -0.5 * axis[(p + 2) % 3]
-            elif q == (p + 2) % 3:
-                spin = 0.5 * axis[(p + 1) % 3]
+            spin = 0.0 if p == q else (0.5 if q == (p + 2) % 3 else -0.5) * axis[3 - p - q]
             K[3 + p, last + q] += factor * (across + spin)
             K[3 + p, 3 + q] += factor * (spin - across)
             K[last + p, last + q] -= factor * (across + spin)
@@ -133,16 +129,10 @@ def _law() -> Any:
 
 
 def with_coils(body: RodBody, *, radius: float, solid: float, stiffness: float) -> RodBody:
-    """A rod as a body of a mechanism whose coils stop it where they touch.
+    """The body of the rod of a spring with coils that stop it where they touch.
 
-    Args:
-        body: what `rom.components.cosserat.bodies.body` made of the rod of a spring.
-        radius: from the centre line to the outside of the coils [m].
-        solid: length of the coils when all touch, zero where they pass each other [m].
-        stiffness: of coils that touch [N/m].
-
-    Raises:
-        ConfigError: for numbers that no spring has.
+    The radius [m] is that of the outside, ``solid`` [m] the length when all touch, zero where they
+    pass each other, the stiffness [N/m] that of coils that touch.
     """
     n = len(body.frames.x)
     not_negative("solid", solid)

@@ -16,16 +16,16 @@ Source:
     Multibody Syst. Dyn. 25 (2011) 285; the reference rotation at the vertices is ours.
 """
 
-import math
 from typing import NamedTuple
 
 import numpy as np
 
+from rom.mbs.kernels.algebra import rotation
 from rom.mbs.kernels.compiled import inner, kernel
 from rom.model import Array
 
 HALF_BANDWIDTH = 8  # columns on either side of the diagonal
-BAND_WIDTH = 3 * HALF_BANDWIDTH + 1  # columns of the band with room for pivoting
+BAND_WIDTH = 2 * HALF_BANDWIDTH + 1
 
 
 class Rod(NamedTuple):
@@ -70,7 +70,6 @@ class Work(NamedTuple):
             element.
         r: (n,) forces out of balance, n = 6 N + 9.
         A: (n, BAND_WIDTH) band of the tangent, A[i, j - i + HALF_BANDWIDTH].
-        d: (n, 1) increments.
     """
 
     R: Array
@@ -81,25 +80,13 @@ class Work(NamedTuple):
     e: Array
     r: Array
     A: Array
-    d: Array
 
 
 def work(rod: Rod) -> Work:
     """Memory for a rod."""
     n = 6 * rod.h.size + 9
-    shapes = ((3, 3), (3, 9), (9, 9), (3,), (3,), (4,), (n,), (n, BAND_WIDTH), (n, 1))
+    shapes = ((3, 3), (3, 9), (9, 9), (3,), (3,), (4,), (n,), (n, BAND_WIDTH))
     return Work(*(np.zeros(shape) for shape in shapes))
-
-
-@inner
-def rotation_of(p, R):
-    """Set R to the rotation matrix of a unit quaternion."""
-    e0, e1, e2, e3 = p[0], p[1], p[2], p[3]
-    R[0, 0], R[0, 1] = 1 - 2 * (e2 * e2 + e3 * e3), 2 * (e1 * e2 - e0 * e3)
-    R[0, 2], R[1, 0] = 2 * (e1 * e3 + e0 * e2), 2 * (e1 * e2 + e0 * e3)
-    R[1, 1], R[1, 2] = 1 - 2 * (e1 * e1 + e3 * e3), 2 * (e2 * e3 - e0 * e1)
-    R[2, 0], R[2, 1] = 2 * (e1 * e3 - e0 * e2), 2 * (e2 * e3 + e0 * e1)
-    R[2, 2] = 1 - 2 * (e1 * e1 + e2 * e2)
 
 
 @inner
@@ -111,17 +98,6 @@ def product(p, q):
         p[0] * q[2] + q[0] * p[2] + p[3] * q[1] - p[1] * q[3],
         p[0] * q[3] + q[0] * p[3] + p[1] * q[2] - p[2] * q[1],
     )
-
-
-@inner
-def turn(p, x, y, z, out):
-    """Set out to p o exp(phi) of unit length."""
-    angle = math.sqrt(x * x + y * y + z * z)
-    share = 0.5 if angle < 1e-8 else math.sin(0.5 * angle) / angle
-    e = product(p, (math.cos(0.5 * angle), share * x, share * y, share * z))
-    size = math.sqrt(e[0] * e[0] + e[1] * e[1] + e[2] * e[2] + e[3] * e[3])
-    for k in range(4):
-        out[k] = e[k] / size
 
 
 @inner
@@ -147,7 +123,7 @@ def add_turning(A, row, factor, a):
 @inner
 def stretched(h, C, a0, start, end, p, W):
     """Set a, the force C (a - a0) and the gradient D of a by start, rotation and end."""
-    rotation_of(p, W.R)
+    rotation(p, 0, W.R)
     W.D[:] = 0.0
     for i in range(3):
         W.a[i] = 0.0
@@ -156,12 +132,6 @@ def stretched(h, C, a0, start, end, p, W):
             W.D[i, j], W.D[i, 6 + j] = -W.R[j, i] / h, W.R[j, i] / h
         W.f[i] = C[i] * (W.a[i] - a0[i])
     add_cross(W.D, 0, 3, 1.0, W.a)
-
-
-@inner
-def stretch_of(rod, x, p, n, W):
-    """The quantities of `stretched` for segment n."""
-    stretched(rod.h[n], rod.stretch[n], rod.a0[n], x[n], x[n + 1], p[n + 1], W)
 
 
 @inner
@@ -203,12 +173,6 @@ def curved(l, B, s, S, p, q, W):
                 unit = W.e[0] if k == m else 0.0
                 W.D[k, j] -= (unit - W.R[k, m]) * S[j, m] / l
                 W.D[k, 6 + j] += (unit + W.R[k, m]) * S[m, j] / l
-
-
-@inner
-def curvature_of(rod, p, i, W):
-    """The quantities of `curved` for vertex i."""
-    curved(rod.l[i], rod.bend[i], rod.s[i], rod.S[i], p[i], p[i + 1], W)
 
 
 @inner
@@ -258,12 +222,12 @@ def internal(rod, x, p, v, W):
     W.r[:] = 0.0
     W.A[:] = 0.0
     for n in range(rod.h.size):
-        stretch_of(rod, x, p, n, W)
+        stretched(rod.h[n], rod.stretch[n], rod.a0[n], x[n], x[n + 1], p[n + 1], W)
         stretch_geometry(rod.h[n], W)
         at = 6 * n + 3
         add_element(W, rod.stretch[n], rod.viscous_stretch[n], rod.h[n], at, v)
     for i in range(rod.l.size):
-        curvature_of(rod, p, i, W)
+        curved(rod.l[i], rod.bend[i], rod.s[i], rod.S[i], p[i], p[i + 1], W)
         curvature_geometry(rod.S[i], W)
         add_element(W, rod.bend[i], rod.viscous_bend[i], rod.l[i], 6 * i, v)
     for k in range(rod.h.size + 2):  # the gradient turns with the section
@@ -271,28 +235,13 @@ def internal(rod, x, p, v, W):
 
 
 @kernel
-def energy(rod, x, p, W):
-    """Energy of stretch, and of bending [J]."""
-    stretched = bent = 0.0
-    for n in range(rod.h.size):
-        stretch_of(rod, x, p, n, W)
-        for k in range(3):
-            stretched += 0.5 * rod.h[n] * W.f[k] * (W.a[k] - rod.a0[n, k])
-    for i in range(rod.l.size):
-        curvature_of(rod, p, i, W)
-        for k in range(3):
-            bent += 0.5 * rod.l[i] * W.f[k] * W.a[k]
-    return stretched, bent
-
-
-@kernel
 def strains(rod, x, p, W, a, k):
     """Set stretch and shear a - a0 of all segments and bending k of all vertices."""
     for n in range(rod.h.size):
-        stretch_of(rod, x, p, n, W)
+        stretched(rod.h[n], rod.stretch[n], rod.a0[n], x[n], x[n + 1], p[n + 1], W)
         for c in range(3):
             a[n, c] = W.a[c] - rod.a0[n, c]
     for i in range(rod.l.size):
-        curvature_of(rod, p, i, W)
+        curved(rod.l[i], rod.bend[i], rod.s[i], rod.S[i], p[i], p[i + 1], W)
         for c in range(3):
             k[i, c] = W.a[c]

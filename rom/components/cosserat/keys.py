@@ -2,6 +2,8 @@
 
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from rom.arguments import Positive, Quantity, Whole
 from rom.config.component_keys import ISOTROPIC
 from rom.config.connections import check_name, pose_of
@@ -102,8 +104,6 @@ def _rigidities(values: dict[str, Any], place: Place) -> dict[str, Any]:
 
 def _rectangle(width: float, height: float, nu: float) -> tuple[float, ...]:
     """Area, second moments, torsion constant, and share that carries shear."""
-    import numpy as np
-
     a, b = max(width, height), min(width, height)
     n = np.arange(1, 100, 2)
     series = float((np.tanh(n * np.pi * a / (2 * b)) / n**5).sum())
@@ -114,8 +114,6 @@ def _rectangle(width: float, height: float, nu: float) -> tuple[float, ...]:
 
 def _ring(section: dict[str, float], place: Place, nu: float) -> tuple[float, ...]:
     """The same of a circle, with or without a bore."""
-    import numpy as np
-
     outer = section["diameter"] / 2
     inner = outer - section.get("thickness", outer)
     if inner < 0.0:
@@ -131,7 +129,7 @@ def _ring(section: dict[str, float], place: Place, nu: float) -> tuple[float, ..
 
 def _curve(values: dict[str, Any], place: Place) -> tuple["Array", "Array"]:
     """(N + 1, 3) vertices, and (N + 2, 4) quaternions of plates and segments."""
-    import numpy as np
+    from scipy.interpolate import CubicSpline
 
     points = np.array(values["points"])
     if not 2 <= len(points) <= MAX_POINTS:
@@ -140,37 +138,17 @@ def _curve(values: dict[str, Any], place: Place) -> tuple["Array", "Array"]:
     if chords.min() <= 0.0:
         k = int(np.argmin(chords))
         raise place.at("points").error(f"points {k} and {k + 1} are one.", "Take one of them out.")
-    along, tangent, end = _spline(points, chords)
-    n = values["elements"]
+    u, n = np.concatenate([[0.0], np.cumsum(chords)]), values["elements"]
+    along, end = CubicSpline(u, points), float(u[-1])
     fine = np.linspace(0.0, end, FINE_STEPS * max(n, len(points)) + 1)
     lengths = np.linalg.norm(np.diff(along(fine), axis=0), axis=1)
     s = np.concatenate([[0.0], np.cumsum(lengths)])
     stations = np.interp(np.linspace(0.0, s[-1], 2 * n + 1), s, fine)
     vertices = along(stations[::2])
     at = np.concatenate([[0.0], stations[1::2], [end]])
-    return vertices, _frames(along(at), tangent(at), values.get("normal"), place)
-
-
-def _spline(points: "Array", chords: "Array") -> tuple[Any, Any, float]:
-    """Place and direction along the curve through points, and where it ends."""
-    import numpy as np
-    from scipy.interpolate import CubicSpline
-
-    u = np.concatenate([[0.0], np.cumsum(chords)])
-    if len(points) == 2:
-        direction = (points[1] - points[0]) / chords[0]
-        return (
-            lambda s: points[0] + np.multiply.outer(s, direction),
-            lambda s: np.multiply.outer(np.ones_like(s), direction),
-            float(u[-1]),
-        )
-    curve = CubicSpline(u, points)
-
-    def tangent(s: Any) -> Any:
-        slopes = curve(s, 1)
-        return slopes / np.linalg.norm(slopes, axis=-1)[..., None]
-
-    return curve, tangent, float(u[-1])
+    slopes = along(at, 1)
+    slopes /= np.linalg.norm(slopes, axis=1)[:, None]
+    return vertices, _frames(along(at), slopes, values.get("normal"), place)
 
 
 def _frames(x: "Array", tangents: "Array", normal: Any, place: Place) -> "Array":
@@ -179,8 +157,6 @@ def _frames(x: "Array", tangents: "Array", normal: Any, place: Place) -> "Array"
     Source:
         Wang et al., ACM Trans. Graph. 27 (2008) 2, double reflection.
     """
-    import numpy as np
-
     from rom.rotation import quaternion
 
     t = tangents[0]

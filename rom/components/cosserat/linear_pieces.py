@@ -4,8 +4,7 @@ Each piece deforms linearly in a frame that moves with its root, as reduced bodi
 frames are exact. With one piece this is linear theory; with many the rod itself comes back.
 
 Source:
-    The rod is that of Lang, Linn and Arnold, Multibody Syst. Dyn. 25 (2011) 285, see
-    docs/theory/rods.md; its pieces are ours.
+    See docs/theory/rods.md for the rod; its pieces are ours.
 """
 
 from itertools import pairwise

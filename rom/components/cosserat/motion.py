@@ -4,25 +4,24 @@ What has no mass or inertia gets some, too little to matter: a ten-thousandth of
 vertex, a hundredth of mass times square of the length of a segment.
 
 Source:
-    Lang, Linn and Arnold, Multi-body dynamics simulation of geometrically exact Cosserat rods,
-    Multibody Syst. Dyn. 25 (2011) 285; see docs/theory/rods.md.
+    See docs/theory/rods.md.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, partial
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import numpy.typing as npt
 from scipy.interpolate import CubicHermiteSpline
 
 from rom import rotation
-from rom.arguments import between, positive
+from rom.arguments import Positive, Share, typed
 from rom.components.cosserat.bodies import body
-from rom.components.cosserat.energy import Rod, energy, internal, work
-from rom.components.cosserat.shapes import Shape, reference
-from rom.components.cosserat.statics import add_loads, fitting, loads
+from rom.components.cosserat.energy import Rod, internal, work
+from rom.components.cosserat.shapes import Shape, elastic_energy, reference
+from rom.components.cosserat.statics import Loads, add_loads, fitting, loads
 from rom.errors import ConfigError, RomError
 from rom.mbs.connections.ends import enter
 from rom.mbs.integrate.simulation import simulate as simulate_mechanism
@@ -35,7 +34,6 @@ from rom.model import Array, Mask
 LEAST_COSINE = 0.1  # between an axis of a root that is led and its mean direction
 LEAST_MASS_SHARE, LEAST_INERTIA_SHARE = 1e-4, 1e-2  # of what has none, see above
 
-Loads = tuple[Array, Array]
 Placement = tuple[npt.ArrayLike, npt.ArrayLike, npt.ArrayLike, npt.ArrayLike]
 
 
@@ -72,21 +70,21 @@ class Motion:
         v = np.concatenate([self.v, np.zeros((len(self.t), 3))], axis=1).reshape(len(self.t), -1, 6)
         kinetic = 0.5 * np.einsum("tkc,kc,tkc->t", v[:, :, :3], self.rod.inertia, v[:, :, :3])
         kinetic += 0.5 * np.einsum("tkc,k,tkc->t", v[:, :-1, 3:], self.rod.mass, v[:, :-1, 3:])
-        W = work(self.rod)
-        elastic = [sum(energy(self.rod, x, p, W)) for x, p in zip(self.x, self.p, strict=True)]
+        elastic = [elastic_energy(self.rod, self.shape(k)) for k in range(len(self.t))]
         return np.column_stack([kinetic, elastic])
 
 
+@typed
 def simulate(  # noqa: PLR0913  keywords of one run, all with defaults
     rod: Rod,
-    t_end: float,
-    dt: float,
+    t_end: Annotated[float, Positive("s")],
+    dt: Annotated[float, Positive("s")],
     *,
     load: Loads | Callable[[float], Loads] | None = None,
     root: Callable[[float], Placement] | None = None,
     start: Shape | None = None,
-    free: npt.ArrayLike | None = None,
-    rho_inf: float = 0.9,
+    free: Mask | npt.ArrayLike | None = None,
+    rho_inf: Share = 0.9,
     save_every: int = 1,
 ) -> Motion:
     """Motion of a rod from rest, or from the velocity of its root as a rigid body.
@@ -111,9 +109,6 @@ def simulate(  # noqa: PLR0913  keywords of one run, all with defaults
         ModelError: if the rod has no mass at all.
         SolverError: if a step has no solution; its ``solution`` is what came before.
     """
-    positive("dt", dt)
-    positive("t_end", t_end)
-    between("rho_inf", rho_inf, 0, 1)
     constant = loads(rod) if load is None else load
     acting: Any = cache(load) if callable(load) else lambda _: constant
     moving = fitting(rod, acting(0.0), free)[1]
@@ -171,20 +166,16 @@ def _lead(mech: Mechanism, root: Callable[[float], Placement], times: Array) -> 
                           hint="Cut the run in two.")  # fmt: skip
     (c, s), (dc, ds) = (A[:, 1:, 1].T for A in (seen, change))
     angle, rate = np.unwrap(np.arctan2(s, c)), (c * ds - s * dc) / (c * c + s * s)
-    way = CubicHermiteSpline(times, np.column_stack([x, angle, seen[:, 0, 1:]]),
-                             np.column_stack([v, rate, change[:, 0, 1:]]))  # fmt: skip
+    values = np.column_stack([x, angle, seen[:, 0, 1:]])
+    rates = np.column_stack([v, rate, change[:, 0, 1:]])
     rows = [Row(POINT, e, NO_VECTOR, NO_VECTOR) for e in np.eye(3)]
     rows += [Row(ANGLE, world[:, 1], own[1], world[:, 2])]
     rows += [Row(NORMAL, world[:, 0], b, NO_VECTOR) for b in own[1:]]
     ends = mech.ground.marker((0.0, 0.0, 0.0)), mech.nonlinear["rod"].marker("start")
     for k, row in enumerate(rows):
         enter(mech, Joint(f"root {k}", "guide", ends, (), row))
-        value, first = (partial(_column, of, k) for of in (way, way.derivative()))
-        mech.drive(f"way of root {k}", f"root {k}", value, rate=first)
-
-
-def _column(function: Callable[[Any], Array], k: int, t: Any) -> Any:
-    return function(t)[..., k]
+        way = CubicHermiteSpline(times, values[:, k], rates[:, k])
+        mech.drive(f"way of root {k}", f"root {k}", way, rate=way.derivative())
 
 
 def _hold(mech: Mechanism, free: Mask, *, led: bool) -> None:
@@ -214,12 +205,8 @@ def _press(mech: Mechanism, acting: Callable[[float], Loads], times: Array) -> N
         ever = np.any([np.any(acting(float(t))[kind], axis=1) for t in times], axis=0)
         for k in np.flatnonzero(ever):
             name, marker = f"{('force', 'moment')[kind]} {k}", parts[k].marker((0.0, 0.0, 0.0))
-            one = partial(_part, acting, kind, k)
+            one = partial(lambda kind, k, t: acting(t)[kind][k], kind, k)
             add(name, marker, one(0.0) if constant else one)
-
-
-def _part(acting: Callable[[float], Loads], kind: int, k: int, t: float) -> Array:
-    return acting(t)[kind][k]
 
 
 def _motion(rod: Rod, found: Solution, acting: Any, free: Mask) -> Motion:

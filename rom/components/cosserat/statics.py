@@ -1,26 +1,27 @@
 """Equilibrium of rods under dead loads: Newton's method with capped rotations, and continuation.
 
 Source:
-    Lang, Linn and Arnold, Multi-body dynamics simulation of geometrically exact Cosserat rods,
-    Multibody Syst. Dyn. 25 (2011) 285; see docs/theory/rods.md.
+    See docs/theory/rods.md.
 """
 
 import numpy as np
 import numpy.typing as npt
+from scipy.linalg.lapack import dgbtrf, dgbtrs
+from scipy.sparse import dia_array
 
-from rom.components.compiled import inner, kernel
-from rom.components.cosserat.band import hold, solve
+from rom.components.compiled import kernel
 from rom.components.cosserat.energy import (
+    BAND_WIDTH,
     HALF_BANDWIDTH,
     Rod,
+    Work,
     add_turning,
     internal,
-    rotation_of,
-    turn,
     work,
 )
 from rom.components.cosserat.shapes import Shape, reference
 from rom.errors import ConfigError, SolverError
+from rom.mbs.kernels.algebra import rotation, turned, vec
 from rom.model import Array, Mask
 from rom.paths.load_steps import load_steps
 
@@ -28,6 +29,9 @@ MAX_ROTATION = 0.2  # rotation of an iteration [rad]: larger steps jump to other
 INCREMENT_RTOL = 1e-8  # last increment, in rad and lengths of the rod; the next one is its square
 MAX_ITERATIONS = 200
 MIN_LOAD_STEP = 5e-5  # part of the load at which it is given up
+UNIT_ROW = np.arange(BAND_WIDTH) == HALF_BANDWIDTH  # of a dof that is held
+
+Loads = tuple[Array, Array]
 
 
 @kernel
@@ -37,7 +41,7 @@ def add_loads(p, force, moment, W):
         for c in range(3):
             W.r[6 * i + 3 + c] -= force[i, c]
     for k in range(moment.shape[0]):
-        rotation_of(p[k], W.R)
+        rotation(p[k], 0, W.R)
         for c in range(3):
             W.a[c] = 0.0
             for d in range(3):
@@ -59,7 +63,7 @@ def add_spin(rod, x, p, spin, W):
             W.A[at + c, d - c + HALF_BANDWIDTH] += rod.mass[i] * spin[c] * spin[d]
             W.A[at + c, e - c + HALF_BANDWIDTH] += rod.mass[i] * spin[c] * spin[e]
     for k in range(rod.inertia.shape[0]):
-        rotation_of(p[k], W.R)
+        rotation(p[k], 0, W.R)
         w, J, at = W.a, rod.inertia[k], 6 * k
         for c in range(3):
             w[c] = W.R[0, c] * spin[0] + W.R[1, c] * spin[1] + W.R[2, c] * spin[2]
@@ -72,50 +76,44 @@ def add_spin(rod, x, p, spin, W):
             W.A[at + c, e - c + HALF_BANDWIDTH] -= more * w[e] * w[c]
 
 
-@inner
-def largest(d, length):
-    """Largest rotation, and largest displacement per length."""
-    turned = moved = 0.0
-    for k in range(d.shape[0]):
-        if (k // 3) % 2 == 0:
-            turned = max(turned, abs(d[k, 0]))
-        else:
-            moved = max(moved, abs(d[k, 0]) / length)
-    return turned, moved
-
-
-@inner
-def move(x, p, d, factor):
-    """Apply increments to positions and rotations."""
-    for i in range(x.shape[0]):
-        for c in range(3):
-            x[i, c] += factor * d[6 * i + 3 + c, 0]
-    for k in range(p.shape[0]):
-        a, b, c = d[6 * k, 0], d[6 * k + 1, 0], d[6 * k + 2, 0]
-        turn(p[k], factor * a, factor * b, factor * c, p[k])
+@kernel
+def balance(rod, x, p, load, spin, W):
+    """Set forces out of balance W.r and their tangent W.A at rest in turning axes."""
+    internal(rod, x, p, np.zeros(W.r.size), W)
+    add_loads(p, load[0], load[1], W)
+    add_spin(rod, x, p, spin, W)
 
 
 @kernel
-def newton(rod, x, p, load, spin, free, W):
-    """Find equilibrium in place; the number of iterations, -1 if it was not found."""
-    length = rod.h.sum()
-    rest = np.zeros(W.r.size)
-    for iteration in range(MAX_ITERATIONS):
-        internal(rod, x, p, rest, W)
-        add_loads(p, load[0], load[1], W)
-        add_spin(rod, x, p, spin, W)
-        for k in range(W.r.size):
-            W.d[k, 0] = -W.r[k]
-        hold(W.A, W.d, free)
-        if solve(W.A, W.d) == 0:
-            return -1
-        turned, moved = largest(W.d, length)
-        if not np.isfinite(turned + moved):
-            return -1
-        move(x, p, W.d, min(1.0, MAX_ROTATION / max(turned, MAX_ROTATION)))
-        if max(turned, moved) < INCREMENT_RTOL:
-            return iteration + 1
-    return -1
+def turn_all(p, phi):
+    """Turn quaternions by rotations about their own axes."""
+    for k in range(p.shape[0]):
+        turned(p[k], 0, vec(phi[k], 0), p[k])
+
+
+def newton(rod: Rod, shape: Shape, load: Loads, spin: Array, free: Mask, W: Work) -> Shape | None:
+    """The equilibrium near a shape; None if it was not found."""
+    x, p, length = shape.x.copy(), shape.p.copy(), rod.h.sum()
+    d, band = np.zeros(W.r.size + 3), np.zeros((3 * HALF_BANDWIDTH + 1, W.r.size), order="F")
+    turns, ways = d.reshape(-1, 2, 3).swapaxes(0, 1)
+    for _ in range(MAX_ITERATIONS):
+        balance(rod, x, p, load, spin, W)
+        W.A[~free] = UNIT_ROW
+        band[HALF_BANDWIDTH:] = W.A.T  # that of the transposed tangent, as LAPACK stores it
+        lu, pivots, singular = dgbtrf(band, HALF_BANDWIDTH, HALF_BANDWIDTH, overwrite_ab=True)
+        if singular:
+            return None
+        right = np.where(free, -W.r, 0.0)
+        d[:-3] = dgbtrs(lu, HALF_BANDWIDTH, HALF_BANDWIDTH, right, pivots, trans=1)[0]
+        angle, moved = np.abs(turns).max(), np.abs(ways).max() / length
+        if not np.isfinite(angle + moved):
+            return None
+        factor = min(1.0, MAX_ROTATION / max(angle, MAX_ROTATION))
+        x += factor * ways[:-1]
+        turn_all(p, factor * turns)
+        if max(angle, moved) < INCREMENT_RTOL:
+            return Shape(x, p)
+    return None
 
 
 def clamped(rod: Rod, *, start: bool = True, end: bool = False) -> Mask:
@@ -162,11 +160,12 @@ def fitting(
     """
     free = clamped(rod) if free is None else np.asarray(free, dtype=bool)
     force, moment = (np.array(part, dtype=float) for part in load)
-    if (force.shape, moment.shape, free.shape) != (rod.x.shape, (len(rod.p), 3),
-                                                   (6 * rod.h.size + 9,)):  # fmt: skip
-        raise ConfigError(f"loads of shape {force.shape} and {moment.shape} and {free.size} dofs "
-                          f"for a rod of {rod.h.size} segments; needed are {rod.x.shape}, "
-                          f"{(len(rod.p), 3)} and {6 * rod.h.size + 9} dofs.")  # fmt: skip
+    found, needed = (force.shape, moment.shape), (rod.x.shape, (len(rod.p), 3))
+    n = 6 * rod.h.size + 9
+    if found != needed or free.shape != (n,):
+        raise ConfigError(
+            f"loads of shapes {found} and {free.size} dofs; needed are {needed} and {n} dofs."
+        )
     return (force, moment), free
 
 
@@ -198,13 +197,13 @@ def equilibrium(
         SolverError: if no equilibrium was found; its ``solution`` is the last good shape and
             its ``share`` the part of the load it carries.
     """
-    shape = reference(rod) if start is None else Shape(start.x.copy(), start.p.copy())
+    shape = reference(rod) if start is None else start
     (force, moment), free = fitting(rod, load, free)
     W, speed = work(rod), np.array(spin, dtype=float)
 
     def ahead(shape: Shape, share: float) -> Shape | None:
-        x, p, now = shape.x.copy(), shape.p.copy(), (share * force, share * moment)
-        return Shape(x, p) if newton(rod, x, p, now, np.sqrt(share) * speed, free, W) > 0 else None
+        now = share * force, share * moment
+        return newton(rod, shape, now, np.sqrt(share) * speed, free, W)
 
     first = 1.0 / steps if start is None else 1.0
     share, shape = load_steps(ahead, shape, least=MIN_LOAD_STEP, first=first)
@@ -238,19 +237,7 @@ def linearised(
         (n,) forces and moments [N, N m] and (n, n) tangent [N/m, N/rad, N m/rad].
     """
     W = work(rod)
-    n = W.r.size
-    internal(rod, shape.x, shape.p, np.zeros(n), W)
-    if load is not None:
-        add_loads(shape.p, *load, W)
-    add_spin(rod, shape.x, shape.p, np.array(spin, dtype=float), W)
-    return W.r, dense(W.A)
-
-
-def dense(A: Array) -> Array:
-    """(n, n) matrix of a band."""
-    n = len(A)
-    K = np.zeros((n, n))
-    for k in range(-HALF_BANDWIDTH, HALF_BANDWIDTH + 1):
-        rows = np.arange(max(0, -k), min(n, n - k))
-        K[rows, rows + k] = A[rows, k + HALF_BANDWIDTH]
-    return K
+    given = loads(rod) if load is None else load
+    balance(rod, shape.x, shape.p, given, np.array(spin, dtype=float), W)
+    offsets = np.arange(HALF_BANDWIDTH, -HALF_BANDWIDTH - 1, -1)
+    return W.r, dia_array((W.A.T, offsets), (W.r.size, W.r.size)).toarray().T

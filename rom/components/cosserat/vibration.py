@@ -1,8 +1,7 @@
 """Small vibrations of a rod about a shape at rest or in steady rotation.
 
 Source:
-    Lang, Linn and Arnold, Multi-body dynamics simulation of geometrically exact Cosserat rods,
-    Multibody Syst. Dyn. 25 (2011) 285; see docs/theory/rods.md.
+    See docs/theory/rods.md.
 """
 
 from dataclasses import dataclass
@@ -76,7 +75,7 @@ def modes(
         SolverError: if the shape is not stable, or the modes of a rotating rod were not found.
     """
     free = clamped(rod) if free is None else np.asarray(free, dtype=bool)
-    n = whole("n", n, 1, int(free.sum()))
+    whole("n", n, 1, int(free.sum()))
     K = linearised(rod, shape, load, spin)[1][np.ix_(free, free)]
     K, M = (K + K.T) / 2, lumped_mass(rod)[free]
     if np.any(spin):
@@ -95,8 +94,7 @@ def _resting(K: Array, M: Array, m: int) -> tuple[Array, Array]:
     try:
         flexible, Phi = eigh(np.diag(M), K, subset_by_index=(n - m, n - 1))
     except np.linalg.LinAlgError:
-        raise SolverError("the shape is not stable: it leaves a way that needs no force.",
-                          hint="Hold it, or find an equilibrium that lasts.") from None  # fmt: skip
+        raise SolverError("the shape is not stable; hold it, or find one that lasts.") from None
     omega = 1 / np.sqrt(flexible[::-1])
     return omega, Phi[:, ::-1] * omega
 

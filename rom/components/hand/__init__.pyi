@@ -5,9 +5,11 @@ from rom.components.hand.cable import Tendon as Tendon
 from rom.components.hand.compliant_hand import HAND_SPRING as HAND_SPRING
 from rom.components.hand.compliant_hand import INDEX_LENGTHS as INDEX_LENGTHS
 from rom.components.hand.compliant_hand import LENGTHS as LENGTHS
+from rom.components.hand.compliant_hand import Bar as Bar
 from rom.components.hand.compliant_hand import Finger as Finger
 from rom.components.hand.compliant_hand import Posture as Posture
 from rom.components.hand.compliant_hand import close as close
+from rom.components.hand.compliant_hand import grasp as grasp
 from rom.components.hand.compliant_hand import hand as hand
 from rom.components.hand.compliant_hand import rest as rest
 from rom.components.hand.control_chart import GROUPS as GROUPS
@@ -15,8 +17,6 @@ from rom.components.hand.control_chart import Chart as Chart
 from rom.components.hand.control_chart import Commands as Commands
 from rom.components.hand.control_chart import envelope as envelope
 from rom.components.hand.control_chart import muscle as muscle
-from rom.components.hand.grasp import Bar as Bar
-from rom.components.hand.grasp import grasp as grasp
 from rom.components.hand.held_objects import SKIN_CONTACT as SKIN_CONTACT
 from rom.components.hand.held_objects import Held as Held
 from rom.components.hand.held_objects import contact_forces as contact_forces
@@ -27,13 +27,13 @@ from rom.components.hand.moving_hand import SEATS as SEATS
 from rom.components.hand.moving_hand import Build as Build
 from rom.components.hand.moving_hand import Drive as Drive
 from rom.components.hand.moving_hand import Seat as Seat
+from rom.components.hand.moving_hand import deflections as deflections
 from rom.components.hand.moving_hand import moving_hand as moving_hand
 from rom.components.hand.solid_finger import heavy_spring as heavy_spring
 from rom.components.hand.solid_finger import link_compliance as link_compliance
 from rom.components.hand.solid_finger import parts_of_compliance as parts_of_compliance
 from rom.components.hand.solid_finger import solid_finger as solid_finger
 from rom.components.hand.solid_finger import tip_compliance as tip_compliance
-from rom.components.hand.tip_loads import deflections as deflections
 from rom.components.hand.winches import Motor as Motor
 from rom.components.hand.winches import motor_force as motor_force
 from rom.components.hand.winches import shaft as shaft

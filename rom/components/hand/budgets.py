@@ -6,6 +6,7 @@ import numpy as np
 
 from rom.components.cosserat.helical_spring import HelicalSpring
 from rom.components.hand.compliant_hand import Finger
+from rom.components.hand.winches import motor_force
 from rom.mbs.mechanism import Mechanism
 from rom.model import Array, Report, Row
 
@@ -41,11 +42,7 @@ def mass_budget(mechanism: Mechanism, *, most: float) -> Report:
 
 
 def wahl(spring: HelicalSpring) -> float:
-    """Wahl's factor of the shear stress on the inner side of the coils.
-
-    Source:
-        Wahl, Mechanical Springs (1963): (4 C - 1) / (4 C - 4) + 0.615 / C, C = D / d.
-    """
+    """Factor of the shear stress on the inner side of the coils: Wahl, Mechanical Springs, 1963."""
     C = spring.diameter / spring.wire
     return (4 * C - 1) / (4 * C - 4) + 0.615 / C
 
@@ -57,15 +54,7 @@ def bending_factor(spring: HelicalSpring) -> float:
 
 
 def wire_stress(spring: HelicalSpring, force: Any, moment: Any) -> tuple[Array, Array]:
-    """Shear and bending stress of the wire.
-
-    Args:
-        spring: the spring.
-        force: (...,) along the axis of the spring [N].
-        moment: (...,) that bends it [N m].
-
-    Returns:
-        (...,) shear stress 8 K P D / (pi d^3) and (...,) bending stress 32 K M / (pi d^3) [Pa].
+    """(...,) shear and bending stress [Pa] by forces along a spring [N] and moments across [N m].
 
     Source:
         Budynas, Nisbett, Shigley's Mechanical Engineering Design (2011), equations 10-7 and 10-44.
@@ -85,13 +74,7 @@ def wire_strength(spring: HelicalSpring) -> float:
 
 
 def spring_loads(solution: Any, name: str, k: int) -> tuple[Array, Array]:
-    """(n_t,) force along a spring [N] and moment that bends it [N m], the larger of its ends.
-
-    Args:
-        solution: motion of a moving hand.
-        name: of the finger.
-        k: number of the joint, from 1.
-    """
+    """(n_t,) force along spring k of a finger [N], moment across [N m], the larger of its ends."""
     ends = [_load_at(solution, f"{name} {kind} {k}") for kind in ("joint", "plate")]
     return np.maximum(ends[0][0], ends[1][0]), np.maximum(ends[0][1], ends[1][1])
 
@@ -106,14 +89,7 @@ def _load_at(solution: Any, joint: str) -> tuple[Array, Array]:
 
 
 def phalanx_stress(solution: Any, name: str, k: int, thickness: float = 5e-3) -> float:
-    """Largest bending stress of a phalanx as a round bar, from its plate [Pa].
-
-    Args:
-        solution: motion of a moving hand.
-        name: of the finger.
-        k: number of the phalanx, from 1.
-        thickness: its radius [m].
-    """
+    """Largest bending stress of phalanx k of a finger as a bar of this radius, from its plate."""
     moment = _load_at(solution, f"{name} plate {k}")[1].max()
     return float(4 * moment / (np.pi * thickness**3))
 
@@ -145,16 +121,14 @@ def stress_budget(
             loads = spring_loads(solution, name, k)
             shear, bending = (stress.max() for stress in wire_stress(spring, *loads))
             strength = wire_strength(spring)
-            for what, stress, share in (("shear", shear, TORSION_SHARE),
-                                        ("bending", bending, BENDING_SHARE)):  # fmt: skip
-                rows.append(_row(f"{name} spring {k}, {what} of the wire [Pa]", stress,
-                                 share * strength))  # fmt: skip
+            what = f"{name} spring {k}, {{}} of the wire [Pa]".format
+            rows.append(_row(what("shear"), shear, TORSION_SHARE * strength))
+            rows.append(_row(what("bending"), bending, BENDING_SHARE * strength))
         worst = max(phalanx_stress(solution, name, k + 1, thickness)
                     for k in range(len(finger.phalanges)))  # fmt: skip
         rows.append(_row(f"{name} phalanges, bending [Pa]", worst, bone))
         if f"{name} cable" in solution.mechanism.tendons:
-            pull = np.linalg.norm(solution.element(f"{name} cable").force[:, 0], axis=1).max()
-            rows.append(_row(f"{name} motor [N]", float(pull), motor))
+            rows.append(_row(f"{name} motor [N]", motor_force(solution, name).max(), motor))
     return Report("stress of the hand", tuple(rows))
 
 

@@ -10,7 +10,6 @@ Source:
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from rom import rotation
 from rom.arguments import not_negative, typed
@@ -126,12 +125,7 @@ def _piece(shape: Shape, a: Hole, b: Hole) -> tuple[Array, Array]:
     g = D.T @ c
     H = D.T @ (np.eye(3) - np.outer(c, c)) @ D / l
     for at, R, arm, sign in ((3, A, a.arm, -1.0), (9, B, b.arm, 1.0)):
-        H[at : at + 3, at : at + 3] += _turned(sign * R.T @ c, np.asarray(arm))
-        H[at : at + 3, at : at + 3] += 0.5 * rotation.skew(g[at : at + 3])
+        w, e = sign * R.T @ c, np.asarray(arm)  # w . (R e) has second derivatives by turns of R
+        turned = 0.5 * (np.outer(w, e) + np.outer(e, w)) - (w @ e) * np.eye(3)
+        H[at : at + 3, at : at + 3] += turned + 0.5 * rotation.skew(g[at : at + 3])
     return g, H
-
-
-def _turned(w: Array, arm: npt.ArrayLike) -> Array:
-    """Second derivatives of w . (R e) for turns of R."""
-    e = np.asarray(arm)
-    return 0.5 * (np.outer(w, e) + np.outer(e, w)) - (w @ e) * np.eye(3)

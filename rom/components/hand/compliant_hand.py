@@ -13,15 +13,16 @@ Source:
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Annotated
 
 import numpy as np
 import numpy.typing as npt
 
 from rom import rotation
-from rom.arguments import between
+from rom.arguments import NotNegative, between, typed
 from rom.components.cosserat import Rod, Shape, clamped, linearised, loads, reference, rod
 from rom.components.cosserat.helical_spring import HelicalSpring
-from rom.components.cosserat.statics import MAX_ROTATION
+from rom.components.cosserat.statics import MAX_ROTATION, turn_all
 from rom.components.hand.cable import Hole, Tendon
 from rom.errors import ConfigError, ModelError, SolverError
 from rom.model import Array, Mask
@@ -83,10 +84,7 @@ class Finger:
     @cached_property
     def rod(self) -> Rod:
         """The finger as a rod."""
-        h: list[float] = []
-        stretch: list[Array] = []
-        cells: list[Array] = []
-        bends: list[bool] = []
+        h, stretch, cells, bends = [], [], [], []
         for spring, link in zip(self.springs, self.phalanges, strict=True):
             own = {k: np.array(v) for k, v in spring.rigidities().items()}
             own["stretch"][1] *= self.stiffener
@@ -203,10 +201,11 @@ def rest(finger: Finger) -> Posture:
     return Posture(finger, reference(finger.rod), 0.0, 0.0)
 
 
+@typed
 def close(
     finger: Finger,
     *,
-    tension: float | None = None,
+    tension: Annotated[float, NotNegative("N")] | None = None,
     pull: float | None = None,
     load: npt.ArrayLike = (0.0, 0.0, 0.0),
     start: Posture | None = None,
@@ -232,17 +231,14 @@ def close(
         SolverError: if no posture was found; ``error.solution`` is the last good one.
     """
     if tension is not None and pull is not None:
-        raise ConfigError("both tension and pull are given.", hint="One follows from the other.")
-    if tension is not None and tension < 0:
-        raise ConfigError(f"tension {tension:g} N: a cable does not push.", hint="Slack is zero.")
-    limit = 0.9 * sum(s.length for s in finger.springs)
+        raise ConfigError("both tension and pull are given; one follows from the other.")
     if pull is not None:
+        limit = 0.9 * sum(s.length for s in finger.springs)
         between("pull [m] of springs so long", pull, 0, limit, "[)")
     here = rest(finger) if start is None else start
     drawn = pull is not None
-    first = here.pull if drawn else here.tension
     goal = np.append(np.asarray(load, dtype=float), (tension or 0.0) if pull is None else pull)
-    begin = np.append(here.load, first)
+    begin = np.append(here.load, here.pull if drawn else here.tension)
     share, here = load_steps(
         lambda at, x: _balance(finger, at, begin + x * (goal - begin), drawn, way, extra),
         here, least=MIN_STEP,
@@ -281,20 +277,14 @@ def _balance(finger: Finger, start: Posture, goal: Array, drawn: bool, way: floa
         turned = np.abs(rows[:, :3]).max()
         if not np.isfinite(turned):
             return None
-        factor = min(1.0, MAX_ROTATION / max(turned, MAX_ROTATION))
-        shape = _moved(shape, factor * rows)
+        factor, p = min(1.0, MAX_ROTATION / max(turned, MAX_ROTATION)), shape.p.copy()
+        turn_all(p, factor * rows[:, :3])
+        shape = Shape(shape.x + factor * rows[:-1, 3:], p)
         tension += factor * change
         if max(turned, np.abs(rows[:-1, 3:]).max() / one.x[-1, 2]) < INCREMENT_RTOL:
             pull = length - cable.length(shape)
             return Posture(finger, shape, tension, pull, tuple(goal[:3]))
     return None
-
-
-def _moved(shape: Shape, rows: Array) -> Shape:
-    """A shape after increments, rotation and translation in each row."""
-    turns = [rotation.exp(phi) for phi in rows[:, :3]]
-    p = [rotation.multiply(q, turn) for q, turn in zip(shape.p, turns, strict=True)]
-    return Shape(shape.x + rows[:-1, 3:], np.array(p))
 
 
 def hand(friction: float = 0.0, n: int = 8) -> dict[str, Finger]:
@@ -313,3 +303,96 @@ def hand(friction: float = 0.0, n: int = 8) -> dict[str, Finger]:
         name: Finger(phalanges=tuple(shares * (length - springs)), friction=friction, n=n)
         for name, length in LENGTHS.items()
     }
+
+
+ON_A_LINK = np.linspace(0, 1, 7)[1:-1]  # places on a phalanx that are watched, beside its ends
+
+
+@dataclass(frozen=True)
+class Bar:
+    """A fixed cylinder across the finger, its axis along the second axis.
+
+    Attributes:
+        centre: (2,) in the plane of the finger, towards the palm and along [m].
+        radius: of the bar [m].
+        thickness: half that of the finger [m].
+        stiffness: of the skin, per watched place [N/m].
+    """
+
+    centre: tuple[float, float]
+    radius: float
+    thickness: float = 5e-3
+    stiffness: float = 3e3
+
+    def places(self, finger: Finger) -> tuple[Array, Array, Array]:
+        """Watched places of the finger.
+
+        Returns:
+            (k,) vertex, (k,) share of the way to the next one [1], and (k, 2) shares of both [1].
+        """
+        n = finger.rod.h.size
+        links = [top for (_, _, top, _) in finger.joints if top < n]
+        vertex = np.concatenate(
+            [np.arange(n), *(np.full(ON_A_LINK.size, i) for i in links), [n - 1]]
+        )
+        share = np.concatenate([np.zeros(n), np.tile(ON_A_LINK, len(links)), [1.0]])
+        return vertex, share, np.column_stack([1 - share, share])
+
+    def gaps(self, finger: Finger, shape: Shape) -> tuple[Array, Array]:
+        """Gap (k,) at the watched places [m], negative in contact, and (k, 2) direction outward."""
+        vertex, share, _ = self.places(finger)
+        points = shape.x[vertex] + share[:, None] * (shape.x[vertex + 1] - shape.x[vertex])
+        d = points[:, [0, 2]] - self.centre
+        distance = np.linalg.norm(d, axis=1)
+        return distance - self.radius - self.thickness, d / distance[:, None]
+
+    def contact(self, finger: Finger) -> Callable[[Shape], tuple[Array, Array]]:
+        """Forces out of balance and tangent of the contact, for `compliant_hand.close`."""
+        vertex, _, halves = self.places(finger)
+        n = 6 * finger.rod.h.size + 9
+
+        def forces(shape: Shape) -> tuple[Array, Array]:
+            r, K = np.zeros(n), np.zeros((n, n))
+            gaps, normals = self.gaps(finger, shape)
+            for k in np.flatnonzero(gaps < 0):
+                e, gap = normals[k], gaps[k]
+                rows = 6 * vertex[k] + np.array([3, 5, 9, 11])
+                D = np.hstack([halves[k, 0] * np.eye(2), halves[k, 1] * np.eye(2)])
+                distance = gap + self.radius + self.thickness
+                H = np.outer(e, e) + gap / distance * (np.eye(2) - np.outer(e, e))
+                r[rows] += self.stiffness * gap * D.T @ e
+                K[np.ix_(rows, rows)] += self.stiffness * D.T @ H @ D
+            return r, K
+
+        return forces
+
+    def pressure(self, posture: Posture) -> tuple[Array, Array]:
+        """Force (k,) of the bar on the watched places [N], and its direction (k, 2)."""
+        gaps, normals = self.gaps(posture.finger, posture.shape)
+        return self.stiffness * np.maximum(-gaps, 0.0), normals
+
+
+def grasp(finger: Finger, bar: Bar, tensions: npt.ArrayLike) -> list[Posture]:
+    """Postures while the cable is tightened around a bar.
+
+    Args:
+        finger: the finger, straight at the start.
+        bar: what it closes on.
+        tensions: (n,) growing tensions of the cable [N].
+
+    Raises:
+        ConfigError: if the bar is in the way of the straight finger.
+        SolverError: if no posture was found; ``error.solution`` is the last good one.
+
+    Source:
+        Contact by a penalty: Wriggers, Computational Contact Mechanics (2006).
+    """
+    posture = rest(finger)
+    gap = bar.gaps(finger, posture.shape)[0].min()
+    if gap < 0:
+        raise ConfigError(f"the bar reaches {-gap:g} m into the straight finger; move it away.")
+    contact, found = bar.contact(finger), []
+    for tension in np.asarray(tensions, dtype=float):
+        posture = close(finger, tension=float(tension), start=posture, extra=contact)
+        found.append(posture)
+    return found

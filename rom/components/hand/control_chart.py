@@ -90,7 +90,8 @@ class Chart:
             waited = 0.0 if now in (NO_GROUP, group) or self._near(a, b, group) else waited + dt
             if group == NO_GROUP or waited > self.dwell:
                 group, waited = now, 0.0
-            strong = min(a, b) > self.together[0] and self._both(a, b)
+            aside = abs(np.arctan2(b, a) - np.pi / 4)
+            strong = min(a, b) > self.together[0] and aside < self.middle
             both = both + dt if strong else 0.0
             armed = armed or not strong
             if armed and both > self.together[1]:
@@ -108,9 +109,6 @@ class Chart:
         width = np.pi / 2 / len(GROUPS)
         away = np.arctan2(y, x) - width * group
         return group != NO_GROUP and -self.margin < away < width + self.margin
-
-    def _both(self, x: float, y: float) -> bool:
-        return abs(np.arctan2(y, x) - np.pi / 4) < self.middle
 
 
 @dataclass(frozen=True)

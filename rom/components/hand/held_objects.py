@@ -5,11 +5,11 @@ An object is free in space. Every phalanx is a round bar with round ends; the pa
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
-from rom.arguments import finite, positive, unit_vector
+from rom.arguments import Length, Positive, finite, typed, unit_vector
 from rom.errors import ConfigError
 from rom.mbs.elements.contact.impact import Impact
 from rom.mbs.elements.contact.points import distance
@@ -28,6 +28,7 @@ TABLE_MASS = 0.1  # [kg]; its motion is given
 RAMP_TIME = 0.1  # over which the table gathers speed [s]
 
 
+@typed
 @dataclass(frozen=True)
 class Held:
     """A ball, or a round bar with round ends.
@@ -41,8 +42,8 @@ class Held:
     """
 
     centre: tuple[float, float, float]
-    radius: float
-    mass: float
+    radius: Length
+    mass: Annotated[float, Positive("kg")]
     axis: tuple[float, float, float] | None = None
     length: float = 0.0
 
@@ -84,8 +85,6 @@ def hold(mech: Mechanism, name: str, held: Held, *, law: Impact = SKIN_CONTACT,
         Force of the contacts: Hunt and Crossley, J. Appl. Mech. 42 (1975) 440; stiffness along the
         surface: Mindlin, J. Appl. Mech. 16 (1949) 259.
     """
-    positive("mass", held.mass)
-    positive("radius", held.radius)
     phalanges = [part for part in mech.parts.values() if "distal" in part.points]
     if not phalanges:
         raise ConfigError(f"nothing holds {name!r}: the mechanism needs fingers of `moving_hand`.")
@@ -99,8 +98,7 @@ def hold(mech: Mechanism, name: str, held: Held, *, law: Impact = SKIN_CONTACT,
     for other, depth in depths.items():
         inside = 1e3 * (depth + held.radius)
         if inside > 0.0:
-            raise ConfigError(f"{name!r} reaches {inside:.3g} mm into {other!r} at the start.",
-                              hint="Move its centre away.")  # fmt: skip
+            raise ConfigError(f"{name!r} reaches {inside:.3g} mm into {other!r}; move it away.")
     _check_reach(mech, phalanges, name, held)
     made = mech.add_rigid(name, mass=held.mass, inertia=held.inertia, at=held.centre)
     middle = made.marker((0.0, 0.0, 0.0))
@@ -143,8 +141,7 @@ def _check_reach(mech: Mechanism, bones: list[Part], name: str, held: Held) -> N
             length = max(np.linalg.norm(tip - root) for tip in tips)
             over.append(_far(held, root, np.array([1.0, 0.0, 0.0]), 0.0) - held.radius - length)
     if min(over) > 0.0:
-        raise ConfigError(f"{name!r} is {min(over) * 1e3:.3g} mm beyond the reach of all fingers.",
-                          hint="Move its centre closer.")  # fmt: skip
+        raise ConfigError(f"{name!r} is {min(over) * 1e3:.3g} mm beyond the reach; move it closer.")
 
 
 def table(mech: Mechanism, name: str, held: Held, *, leaves: float, speed: float = 0.1,
@@ -218,8 +215,8 @@ def contact_forces(solution: Any, name: str) -> dict[str, Array]:
 def grip(solution: Any, name: str, fingers: Iterable[str]) -> dict[str, Array]:
     """{finger: (n_t,) sizes of the forces of its phalanges on an object, added up [N]}."""
     forces = contact_forces(solution, name)
-    return {
-        finger: sum((np.linalg.norm(f, axis=1) for key, f in forces.items()
-                     if key.startswith(f"{finger} phalanx")), np.zeros(solution.t.size))
-        for finger in fingers
-    }  # fmt: skip
+    sizes = {key: np.linalg.norm(f, axis=1) for key, f in forces.items()}
+    none, found = np.zeros(solution.t.size), {}
+    for one in fingers:
+        found[one] = sum((f for key, f in sizes.items() if key.startswith(f"{one} phalanx")), none)
+    return found

@@ -9,7 +9,7 @@ first plate.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -22,6 +22,8 @@ from rom.components.cosserat.helical_spring import HelicalSpring
 from rom.components.hand.compliant_hand import STOP_STIFFNESS_RATIO, Finger, hand
 from rom.components.hand.solid_finger import STEEL_DENSITY, heavy_spring
 from rom.errors import ConfigError, ModelError
+from rom.mbs.analysis.equilibrium import equilibrium
+from rom.mbs.analysis.snapshot import snapshot
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.parts.bodies import Marker, Part
 from rom.model import Array
@@ -55,10 +57,10 @@ class Seat:
         z, x = finite("along", self.along, (3,)), finite("palmar", self.palmar, (3,))
         y = np.cross(z, x)
         if not np.linalg.norm(y) > 1e-6 * np.linalg.norm(z) * np.linalg.norm(x):
-            raise ConfigError(
-                f"a finger along {self.along} cannot close towards {self.palmar}.",
-                hint="Give a palmar direction across the finger.",
+            text = (
+                f"a finger along {self.along} cannot close towards {self.palmar}; give one across."
             )
+            raise ConfigError(text)
         z, y = z / np.linalg.norm(z), y / np.linalg.norm(y)
         return np.column_stack([np.cross(y, z), y, z])
 
@@ -123,31 +125,16 @@ class _Winch:
     """A pull that a winch can do, as a function of time."""
 
     name: str
-    pull: Callable[[float], float]
+    pull: Callable[[float], float] | float
     most: float
 
     def __call__(self, t: float) -> float:
-        """The pull [m].
-
-        Raises:
-            ConfigError: if springs are not that long.
-        """
-        pull = float(self.pull(t))
+        """The pull [m]."""
+        pull = float(self.pull(t) if callable(self.pull) else self.pull)
         if not -1e-9 <= pull <= self.most:
-            raise ConfigError(
-                f"the winch of {self.name!r} is to take in {pull:g} m at {t:g} s; it takes in 0 to "
-                f"{self.most:g} m: its springs are not longer."
-            )
+            text = f"the winch of {self.name!r} is to take in {pull:g} m at {t:g} s"
+            raise ConfigError(f"{text}; its springs give way by 0 to {self.most:g} m.")
         return pull
-
-
-@dataclass
-class _Assembly:
-    """A hand that is being put together."""
-
-    mech: Mechanism
-    build: Build
-    paths: dict[str, list[Marker]] = field(default_factory=dict)
 
 
 def moving_hand(
@@ -180,55 +167,51 @@ def moving_hand(
     drives, seats = drives or {}, SEATS if seats is None else seats
     joints = {f"{name} joint {k}" for name, one in fingers.items()
               for k in range(1, len(one.springs) + 1)}  # fmt: skip
-    for kind, names, known in (
-        ("drive", drives, {*fingers, *joints}),
-        ("seat", fingers, seats),
-    ):
+    for kind, names, known in (("drive", drives, {*fingers, *joints}), ("seat", fingers, seats)):
         for name in names:
             check_known(name, known, f"{kind} of {name!r}: there are")
-    made = _Assembly(Mechanism(gravity=gravity), build or Build())
-    palm = _palm(made, [seats[name] for name in fingers])
+    mech, build = Mechanism(gravity=gravity), build or Build()
+    palm = _palm(mech, build, [seats[name] for name in fingers])
     if held:
-        made.mech.fixed("wrist", made.mech.ground.marker((0.0, 0.0, 0.0)),
-                        palm.marker(-palm.at))  # fmt: skip
+        mech.fixed("wrist", mech.ground.marker((0.0, 0.0, 0.0)), palm.marker(-palm.at))
     for name, finger in fingers.items():
-        _finger(made, name, finger, seats[name], palm)
-        _cables(made, name, finger, drives, palm)
-    return made.mech
+        path = _finger(mech, build, name, finger, seats[name])
+        _cables(mech, name, finger, drives, path)
+    return mech
 
 
-def _palm(made: _Assembly, seats: list[Seat]) -> Part:
+def _palm(mech: Mechanism, build: Build, seats: list[Seat]) -> Part:
     """A block behind the first plates."""
-    size = finite("palm_size", made.build.palm_size, (3,))
+    size = finite("palm_size", build.palm_size, (3,))
     middle = np.mean([seat.at for seat in seats], axis=0)
     along = np.mean([seat.axes[:, 2] for seat in seats], axis=0)
-    mass = positive("palm", made.build.palm)
+    mass = positive("palm", build.palm)
     inertia = mass / 12 * (size @ size - size**2)
-    return made.mech.add_rigid("palm", mass=mass, inertia=inertia,
-                               at=middle - 0.5 * size[2] * along)  # fmt: skip
+    at = middle - 0.5 * size[2] * along
+    return mech.add_rigid("palm", mass=mass, inertia=inertia, at=at)
 
 
-def _finger(made: _Assembly, name: str, finger: Finger, seat: Seat, palm: Part) -> None:
-    """Springs and phalanges in turn, and the holes of the cable."""
+def _finger(mech: Mechanism, build: Build, name: str, finger: Finger, seat: Seat) -> list[Marker]:
+    """Springs and phalanges in turn; the holes of the cable."""
     if finger.phalanges[-1] <= 0.0:
         raise ModelError(f"finger {name!r} ends in a bare plate, which has no mass.",
                          hint="Give its last phalanx a length.")  # fmt: skip
-    A, mech = seat.axes, made.mech
+    A, palm = seat.axes, mech.parts["palm"]
     at, hole = np.asarray(seat.at, dtype=float), np.array([finger.offset, 0.0, 0.0])
     before = _on_palm(palm, at)
     path = [_on_palm(palm, at + A @ hole)]
     pairs = zip(finger.springs, finger.phalanges, strict=True)
     for k, (spring, link) in enumerate(pairs, start=1):
-        joint = mech.add_nonlinear(f"{name} spring {k}", spring_body(finger, spring, made.build),
-                                   at=at, orientation=A)  # fmt: skip
+        wire = spring_body(finger, spring, build)
+        joint = mech.add_nonlinear(f"{name} spring {k}", wire, at=at, orientation=A)
         mech.fixed(f"{name} joint {k}", before, joint.marker("start"))
         at = at + spring.length * A[:, 2]
-        bone = _phalanx(made, f"{name} phalanx {k}", link, at, A)
+        bone = _phalanx(mech, build, f"{name} phalanx {k}", link, at, A)
         mech.fixed(f"{name} plate {k}", joint.marker("end"), bone.marker("proximal"))
         half = np.array([0.0, 0.0, 0.5 * link])
         path += [bone.marker(hole - half), bone.marker(hole + half)]
         at, before = at + link * A[:, 2], bone.marker("distal")
-    made.paths[name] = path[:-1]
+    return path[:-1]
 
 
 def _on_palm(palm: Part, point: Array) -> Marker:
@@ -252,36 +235,34 @@ def spring_body(finger: Finger, spring: HelicalSpring, build: Build) -> Any:
     )
 
 
-def _phalanx(made: _Assembly, name: str, link: float, at: Array, A: Array) -> Part:
+def _phalanx(mech: Mechanism, build: Build, name: str, link: float, at: Array, A: Array) -> Part:
     """A round bar from a plate on."""
-    build, half = made.build, np.array([0.0, 0.0, 0.5 * link])
+    half = np.array([0.0, 0.0, 0.5 * link])
     r = positive("thickness", build.thickness)
     mass = positive("bone_density", build.bone_density) * np.pi * r**2 * link
     across = mass * (link**2 / 12 + r**2 / 4)
-    return made.mech.add_rigid(
+    return mech.add_rigid(
         name, mass=mass, inertia=(across, across, 0.5 * mass * r**2), at=at + A @ half,
         orientation=A, markers={"proximal": -half, "distal": half},
     )  # fmt: skip
 
 
 def _cables(
-    made: _Assembly, name: str, finger: Finger, drives: Mapping[str, Drive], palm: Part
+    mech: Mechanism, name: str, finger: Finger, drives: Mapping[str, Drive], holes: list[Marker]
 ) -> None:
     """The tendon of a finger, and those of its joints."""
-    holes, lengths = made.paths[name], [spring.length for spring in finger.springs]
+    lengths, palm = [spring.length for spring in finger.springs], mech.parts["palm"]
     if name in drives:
         conduit = [_on_palm(palm, finite("conduit", x, (3,))) for x in drives[name].conduit]
-        _cable(made.mech, name, drives[name], [*conduit, *holes],
-               (finger.friction, sum(lengths)))  # fmt: skip
+        limits = finger.friction, sum(lengths)
+        _cable(mech, name, drives[name], [*conduit, *holes], limits)
     for k, length in enumerate(lengths, start=1):
         joint = f"{name} joint {k}"
         if joint in drives:
             if drives[joint].conduit:
-                raise ConfigError(
-                    f"the cable of {joint!r} alone runs in a sleeve, not in a conduit on the palm.",
-                    hint="Give its sleeve a length.",
-                )
-            _cable(made.mech, joint, drives[joint], holes[2 * k - 2 : 2 * k], (0.0, length))
+                text = f"the cable of {joint!r} alone runs in a sleeve, not in a conduit."
+                raise ConfigError(text, hint="Give its sleeve a length.")
+            _cable(mech, joint, drives[joint], holes[2 * k - 2 : 2 * k], (0.0, length))
 
 
 def _cable(
@@ -297,7 +278,7 @@ def _cable(
     if drive.pull is None:
         mech.tendon(f"{name} cable", path, tension=drive.tension, **how)
         return
-    pull = drive.pull if callable(drive.pull) else _constant(number("pull", drive.pull))
+    pull = drive.pull if callable(drive.pull) else number("pull", drive.pull)
     pull = _Winch(name, pull, PULL_SHARE * springs)
     points = np.array([mech.design_point(marker) for marker in path])
     length = float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
@@ -308,5 +289,39 @@ def _cable(
                 free_length=lambda t: length - pull(t), **how)  # fmt: skip
 
 
-def _constant(value: float) -> Callable[[float], float]:
-    return lambda t: value
+def one_finger(finger: Finger, tension: float = 0.0, load: Any = (0.0, 0.0, 0.0)) -> Mechanism:
+    """A finger as a mechanism, its cable under a tension [N] and a force (3,) on its tip [N]."""
+    drives = {"finger": Drive(tension=tension)}
+    mech = moving_hand({"finger": finger}, seats={"finger": Seat()}, drives=drives)
+    mech.force("load", tip_marker(mech, finger), load)
+    return mech
+
+
+def tip_marker(mech: Mechanism, finger: Finger, name: str = "finger") -> Any:
+    """Marker of the tip of a finger."""
+    return mech.parts[f"{name} phalanx {len(finger.phalanges)}"].marker("distal")
+
+
+def deflections(
+    finger: Finger, direction: npt.ArrayLike, forces: npt.ArrayLike, *, tension: float = 0.0
+) -> Array:
+    """(n, 3) way of the tip under forces (n,) [N] along a direction, from where it is without [m].
+
+    Args:
+        finger: the finger.
+        direction: (3,) of the force, world [1].
+        forces: (n,) [N].
+        tension: of the cable, held [N].
+
+    Source:
+        In three directions as Potratz and others measured, J. Biomech. Eng. 127 (2005) 934.
+    """
+    e, sizes = np.asarray(direction, dtype=float), np.asarray(forces, dtype=float)
+    times = np.arange(sizes.size, dtype=float)
+    mech = one_finger(finger, tension, lambda t: np.interp(t, times, sizes) * e)
+    marker, found, state = tip_marker(mech, finger), [], None
+    for t in times:
+        state = equilibrium(mech, state, t=t)
+        found.append(snapshot(mech, state).position(marker.body, "distal")[-1])
+    start = snapshot(mech, equilibrium(one_finger(finger, tension)))
+    return np.array(found) - start.position(marker.body, "distal")[-1]

@@ -85,11 +85,8 @@ def winches(
     whole("instants of pulls", len(commands), 2)
     reached = (motor or Motor()).follow(commands, dt)
     t = dt * np.arange(len(reached))
-    base = drive or Drive()
-    return {
-        name: replace(base, tension=None, pull=partial(_held, PchipInterpolator(t, y), t[-1]))
-        for name, y in zip(names, reached.T, strict=True)
-    }
+    curves = {name: PchipInterpolator(t, y) for name, y in zip(names, reached.T, strict=True)}
+    return _pulled(drive, {name: partial(_held, curve, t[-1]) for name, curve in curves.items()})
 
 
 def shaft(
@@ -108,13 +105,9 @@ def shaft(
     Raises:
         ConfigError: for a radius that is none.
     """
-    base = drive or Drive()
-    return {
-        name: replace(
-            base, tension=None, pull=partial(_drawn, positive(f"radius of {name}", r), angle)
-        )
-        for name, r in radii.items()
-    }
+    for name, r in radii.items():
+        positive(f"radius of {name}", r)
+    return _pulled(drive, {name: partial(_drawn, r, angle) for name, r in radii.items()})
 
 
 def shaft_moment(solution: Any, radii: Mapping[str, float]) -> Array:
@@ -137,6 +130,11 @@ def motor_force(solution: Any, name: str) -> Array:
     """
     first: Array = solution.element(f"{name} cable").force[:, 0]
     return np.linalg.norm(first, axis=1)
+
+
+def _pulled(drive: Drive | None, pulls: Mapping[str, Any]) -> Mapping[str, Drive]:
+    base = replace(drive or Drive(), tension=None)
+    return {name: replace(base, pull=pull) for name, pull in pulls.items()}
 
 
 def _drawn(radius: float, angle: Callable[[float], float], t: float) -> float:

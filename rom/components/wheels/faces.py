@@ -45,13 +45,7 @@ def turned(axis: Array, angle: float) -> Array:
 
 
 def paired(low: Interface, high: Interface, axis: Array, at: Array) -> Pairing:
-    """Pair two faces that one sector turns into each other.
-
-    Args:
-        low: one cyclic face.
-        high: the other; which of them comes first around the axis does not matter.
-        axis: (3,) unit vector.
-        at: (3,) a point of the axis [m].
+    """Pair two faces, in any order, that one sector turns into each other about a unit vector.
 
     Raises:
         InterfaceError: if the angle between them does not divide the circle, a face touches the
@@ -81,12 +75,11 @@ def refuse_all_around(points: Array, axis: Array, at: Array) -> None:
     """
     x = points - at
     across = x - np.outer(x @ axis, axis)
-    if np.linalg.norm(across.mean(axis=0)) < MIN_CENTRE_RATIO * np.sqrt(
-        (across**2).sum(axis=1).mean()
-    ):
+    spread = np.sqrt((across**2).sum(axis=1).mean())
+    if np.linalg.norm(across.mean(axis=0)) < MIN_CENTRE_RATIO * spread:
         raise InterfaceError(
             f"the axis {np.round(axis, 6).tolist()} through {np.asarray(at).tolist()} m runs "
-            "through the middle of the sector, which would fill all of the circle.",
+            "through the middle of the sector.",
             hint="Check axis=… and at=….",
         )
 
@@ -98,14 +91,9 @@ def _sectors(low: Interface, high: Interface, axis: Array, at: Array) -> tuple[i
         x = face.points - at
         across = x - np.outer(x @ axis, axis)
         size = np.ptp(x, axis=0).max()
-        if (
-            on_axis := np.flatnonzero(np.linalg.norm(across, axis=1) < COINCIDENT_RTOL * size)
-        ).size:
-            raise InterfaceError(
-                f"{on_axis.size} nodes of the cyclic face {face.name!r} lie on the axis of "
-                "rotation, where all sectors meet.",
-                hint="Leave a small bore around the axis.",
-            )
+        if on_axis := (np.linalg.norm(across, axis=1) < COINCIDENT_RTOL * size).sum():
+            text = f"{on_axis} nodes of the cyclic face {face.name!r} lie on the axis of rotation."
+            raise InterfaceError(text, hint="Leave a small bore.")
         weights = np.asarray(face.surface_mass.sum(axis=1)).ravel()
         arms.append(weights @ across / weights.sum())
     angle = np.arctan2(axis @ np.cross(*arms), arms[0] @ arms[1])
@@ -144,17 +132,10 @@ def _spread(S: csr_matrix, points: Array) -> Array:
 
 
 def interpolation(points: Array, targets: Array) -> csr_matrix:
-    """Values at points of a surface from those at scattered nodes of it.
+    """(t, m) weights: values at (t, 3) points of a surface from those at scattered nodes (m, 3).
 
     Around each target a cubic polyharmonic spline with quadratic polynomials goes through the
     nearest nodes; linear and quadratic fields are exact, and a target on a node takes its value.
-
-    Args:
-        points: (m, 3) nodes.
-        targets: (t, 3) points.
-
-    Returns:
-        (t, m) weights.
 
     Source:
         Flyer, Fornberg, Bayona and Barnett, On the role of polynomials in RBF-FD approximations,

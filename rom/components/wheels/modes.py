@@ -79,11 +79,10 @@ def cyclic_modes(sector: CyclicSector, diameter: int, n: int, *, speed: float = 
     """
     n = whole("n", n, 1, sector.free.size)
     T = sector.harmonic(sector.checked(diameter))
+    K, R, held = spinning(sector, speed), sector.rigid(diameter)[sector.free], sector.supported
     if speed:
-        _refuse_divergence(sector, diameter, speed)
-    K = sector.K if speed == 0.0 else spinning(sector, speed)
-    R = sector.rigid(diameter) if speed == 0.0 else np.zeros((sector.n, 0), dtype=complex)
-    R, held = R[sector.free], sector.supported
+        _refuse_divergence(sector, diameter, K, speed)
+        R = R[:, :0]
     if sector.standing(diameter):
         A, B = (T.T @ matrix @ T for matrix in (K, sector.M))
         omega, real = _real(sector.workers, A, B, real_span(R), n, held=held)
@@ -143,22 +142,16 @@ def wheel_modes(
     return tuple(CyclicModes(*pair, sector=sector, diameter=d) for d, pair in each)
 
 
-def _refuse_divergence(sector: CyclicSector, diameter: int, speed: float) -> None:
-    K = spinning(sector, speed)
+def _refuse_divergence(sector: CyclicSector, diameter: int, K: csr_matrix, speed: float) -> None:
     if sector.motions is not None:
-        raise ConfigError(
-            "a free wheel at speed has no modes without Coriolis forces: its floating motion has "
-            "no other stiffness.",
-            hint="Use rom.travelling_modes.",
-        )
+        raise ConfigError("a free wheel at speed has no modes; use rom.travelling_modes.")
     T = sector.harmonic(diameter)
     K = csr_matrix(T.conj().T @ K @ T)
     if negative_count(K if sector.standing(diameter) else real_form(K)):
         limit = divergence_speed(sector, diameter)
         raise ModelError(
-            f"at {speed:g} rad/s the wheel is above its instability: spin softening has used up "
-            f"the stiffness against {diameter} nodal diameters at {limit:.6g} rad/s.",
-            hint="Give a speed below that.",
+            f"{speed:g} rad/s is too fast: spin softening has used up the stiffness against "
+            f"{diameter} nodal diameters at {limit:.6g} rad/s, an instability."
         )
 
 
@@ -166,14 +159,12 @@ def spinning(sector: CyclicSector, speed: float) -> csr_matrix:
     """(n, n) stiffness at an angular speed [rad/s].
 
     Raises:
-        ConfigError: if the sector has no matrices of rotation, or the speed is no number.
+        ConfigError: if the sector has no matrices of rotation.
     """
-    if not np.isfinite(speed):
-        raise ConfigError(f"speed = {speed!r}; give an angular speed in rad/s.")
+    if speed == 0.0:
+        return sector.K
     if sector.centrifugal is None:
-        raise ConfigError(
-            "the sector has no matrices of rotation.", hint="Make it with rom.rotating_sector."
-        )
+        raise ConfigError("the sector has no matrices of rotation; see rom.rotating_sector.")
     return sector.K + speed**2 * sector.centrifugal
 
 

@@ -1,7 +1,8 @@
 """Component mode synthesis of one sector, good for all nodal diameters at once."""
 
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -11,13 +12,14 @@ from scipy.spatial import cKDTree
 
 from rom.arguments import typed
 from rom.checks.draft import Draft, run
-from rom.components.wheels.certificate import sector_certificate
-from rom.components.wheels.sector import Complex, CyclicSector
+from rom.components.wheels.modes import cyclic_modes, wheel_modes
+from rom.components.wheels.sector import NO_DOFS, Complex, CyclicSector, each_diameter
 from rom.eigen.verbs import DEPENDENT_RTOL, every_row, orthonormal_in, own_rows, static_shapes
 from rom.errors import ConfigError, InterfaceError
-from rom.model import Array, Basis, Index, Interface, Report
+from rom.model import Array, Basis, Index, Interface, Report, Row
 from rom.reduction.bases.method import CraigBampton
 from rom.reduction.interfaces.polynomial import FourierLegendre, Polynomial
+from rom.rows import FREQUENCY_RTOL, N_COMPARED, frequency_rows
 
 CYCLIC_FACES = "cyclic"  # what the faces are called where sectors of a wheel meet
 
@@ -89,22 +91,15 @@ def reduce_sector(
         Carassale and Maurici, Interface reduction in Craig-Bampton component mode synthesis by
         orthogonal polynomial series, J. Eng. Gas Turbines Power 140 (2018); on cyclic faces ours.
     """
-    if method is not None:
-        if n_modes is not None or method.n_modes is None:
-            raise ConfigError(
-                f"a sector is reduced by a number of fixed-interface modes, not by {method!r}.",
-                hint="Write n_modes=60, or method=rom.CraigBampton(n_modes=60).",
-            )
-        n_modes = method.n_modes
-    if n_modes is None:
-        raise ConfigError("the number of fixed-interface modes is needed, for example n_modes=60.")
-    if sector.face is None:
+    if (n_modes is None) == (method is None) or (method and method.n_modes is None):
         raise ConfigError(
-            "interface functions need the geometry of the cyclic faces.",
-            hint="Make the sector with rom.CyclicSector.from_model.",
+            f"a sector is reduced by a number of fixed-interface modes, not {n_modes}, {method!r}.",
+            hint="Write n_modes=60, or method=rom.CraigBampton(n_modes=60).",
         )
+    if sector.face is None:
+        raise ConfigError("a sector without cyclic faces has no geometry: CyclicSector.from_model.")
     faces = {CYCLIC_FACES: functions or Polynomial(4)}
-    draft = SectorDraft(model=sector, method=CraigBampton(n_modes), interfaces=faces)
+    draft = SectorDraft(model=sector, method=method or CraigBampton(n_modes), interfaces=faces)
     return run((connect_faces, basis, project), draft)
 
 
@@ -170,8 +165,7 @@ def reduced_by(
     """A sector by what is given to `rom.reduce`: a method and the functions on its cyclic faces."""
     if of_bodies:
         raise ConfigError(
-            "reference, damping, stress, stiffening and nonlinear belong to bodies in motion; a "
-            "sector has none of them.",
+            "reference, damping, stress, stiffening and nonlinear belong to bodies in motion.",
             hint="Give a sector the matrices of its rotation by rom.rotating_sector.",
         )
     if set(interfaces) - {CYCLIC_FACES}:
@@ -193,26 +187,12 @@ def projected(sector: CyclicSector, Psi: Array, q: int, omega: Array) -> Reduced
     motions = None
     if sector.motions is not None:
         motions = np.linalg.solve(M.toarray(), Psi.T @ (sector.M @ sector.motions))
-    return ReducedSector(
-        **kept
-        | {
-            "K": K,
-            "M": M,
-            "slave": np.arange(q, 2 * q),
-            "master": np.arange(q),
-            "coupling": identity(q, format="csr"),
-            "held": np.zeros(0, dtype=np.int64),
-            "points": None,
-            "motions": motions,
-            "coriolis": small(sector.coriolis),
-            "centrifugal": small(sector.centrifugal),
-            "regions": {name: small(A) for name, A in sector.regions.items()},
-            "face": None,
-        },
-        Psi=Psi,
-        full=sector,
-        omega=omega,
-    )
+    regions = {name: small(A) for name, A in sector.regions.items()}
+    kept |= {"K": K, "M": M, "motions": motions, "points": None, "face": None, "regions": regions}
+    kept |= {"slave": np.arange(q, 2 * q), "master": np.arange(q), "held": NO_DOFS}
+    kept |= {"coupling": identity(q, format="csr")}
+    kept |= {name: small(getattr(sector, name)) for name in ("coriolis", "centrifugal")}
+    return ReducedSector(**kept, Psi=Psi, full=sector, omega=omega)
 
 
 def face_functions(sector: CyclicSector, functions: Polynomial | FourierLegendre) -> Array:
@@ -226,8 +206,7 @@ def face_functions(sector: CyclicSector, functions: Polynomial | FourierLegendre
     at_rest = np.isin(face.dofs[::3], sector.held)
     if at_rest.all():
         raise InterfaceError(
-            f"all nodes of the cyclic face {face.name!r} are held.",
-            hint="Hold another interface; of this face nothing is left to reduce.",
+            f"all nodes of the cyclic face {face.name!r} are held; hold another interface."
         )
     if at_rest.any():
         V = V * fading(face, at_rest)[:, None]
@@ -259,3 +238,57 @@ def distance(points: Array, line: Array) -> Array:
         beside = arm - np.clip(share, 0.0, 1.0)[:, None] * edge
         found = np.minimum(found, np.linalg.norm(beside, axis=1))
     return found
+
+
+N_FAMILIES = 2  # modes per number of nodal diameters, whose union is compared with a wheel
+STIFFER_BLADES = 0.05  # of all blades: the wheel stays cyclic, so that its truth is one sector
+
+
+def sector_certificate(small: CyclicSector, full: CyclicSector) -> Report:
+    """Frequencies of a reduced sector against the full one, for a few numbers of diameters."""
+    diameters = list(small.diameters)
+    chosen = sorted({0, 1, len(diameters) // 2, diameters[-1]} & set(diameters))
+
+    def rows(d: int) -> list[Row]:
+        n = min(N_COMPARED, small.harmonic(d).shape[1])
+        reduced, exact = (cyclic_modes(sector, d, n).frequencies for sector in (small, full))
+        return _rows(f"{d} nodal diameters", reduced, exact)
+
+    found = each_diameter(full, rows, chosen)
+    return Report("certificate of the sector", tuple(chain.from_iterable(found)))
+
+
+def wheel_certificate(frequencies: Array, full: CyclicSector) -> Report:
+    """Frequencies [Hz] of a wheel of equal blades, ascending, against the full sector."""
+    return Report("certificate of the wheel", tuple(_of_wheel("equal blades", frequencies, full)))
+
+
+def mistuned_certificate(wheel: Any) -> Report:
+    """Frequencies of a wheel whose blades are all a little stiffer, or softer, against its sector.
+
+    Args:
+        wheel: the `MistunedWheel`.
+    """
+    rows: list[Row] = []
+    for change in (STIFFER_BLADES, -STIFFER_BLADES):
+        exact = replace(wheel.sector, K=wheel.sector.K + change * wheel.blade_stiffness)
+        found = wheel.modes(np.full(wheel.sector.n_sectors, change)).frequencies
+        rows += _of_wheel(f"all blades {100 * change:+g} %", found, exact, wheel.speed)
+    return Report("certificate of the mistuned wheel", tuple(rows))
+
+
+def _of_wheel(what: str, found: Array, sector: CyclicSector, speed: float = 0.0) -> list[Row]:
+    """The lowest frequencies of a wheel against the union of those of its sector."""
+    exact, complete = [], np.inf
+    for modes in wheel_modes(sector, N_FAMILIES, speed=speed):
+        exact += [*modes.frequencies] * modes.multiplicity
+        complete = min(complete, modes.frequencies[-1])  # above it some diameters miss theirs
+    union = np.sort([f for f in exact if f <= complete * (1 + FREQUENCY_RTOL)])
+    return _rows(what, found[: union.size], union)
+
+
+def _rows(what: str, reduced: Array, exact: Array) -> list[Row]:
+    """Elastic frequencies compared; rigid motions are zero in both."""
+    elastic = exact > 0
+    table = {"reduced": reduced[elastic].tolist(), "full": exact[elastic].tolist()}
+    return frequency_rows(what, table) if elastic.any() else []

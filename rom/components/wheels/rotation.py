@@ -10,22 +10,23 @@ alone, because equal functions interpolate all three directions.
 """
 
 from dataclasses import replace
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from scipy.linalg import LinAlgError, eigh
 from scipy.sparse import csr_matrix, identity, kron
 from scipy.sparse.linalg import LinearOperator, eigsh, splu
 
-from rom.arguments import typed
+from rom.arguments import NotNegative, typed
 from rom.components.wheels.sector import CyclicSector
 from rom.eigen.search import MAX_DENSE_DOFS
 from rom.eigen.verbs import pins
 from rom.eigen.workers import held_solution
-from rom.errors import ConfigError, ModelError
-from rom.model import Array, FEModel, Index
+from rom.errors import ConfigError, InterfaceError, ModelError
+from rom.model import Array, FEModel, Index, Interface
 from rom.rotation import skew
 
+Rate = Annotated[float, NotNegative("N/m")]  # of a spring
 EIGENVECTOR_RTOL = 1e-7  # residual of eigenvectors; the error of separate eigenvalues is its square
 NONE_POSITIVE = 1e-4  # of the largest size: round-off of solutions with slender solids
 
@@ -49,18 +50,20 @@ def rotating_sector(sector: CyclicSector, model: FEModel) -> CyclicSector:
         docs/theory/rotating_solids.md.
     """
     if model.stresses is None:
-        raise ConfigError(
-            "the model has no finite elements, from which alone geometric stiffness follows.",
-            hint="Make it with rom.fe.model.",
-        )
+        raise ConfigError("the model has no finite elements; make it with rom.fe.model.")
+    refuse_attachments(model)
+    K_geo = model.stresses.prestress(centrifugal_displacement(sector))
+    coriolis, softening = rotation_matrices(sector.M, sector.axis)
+    return replace(sector, coriolis=coriolis, centrifugal=csr_matrix(K_geo - softening))
+
+
+def refuse_attachments(model: FEModel) -> None:
+    """Nobody knows how what is attached turns."""
     if model.attachments:
         raise ConfigError(
             f"the model carries {len(model.attachments)} attachments, whose rotation is not known.",
             hint="Mesh them as a region of their own density.",
         )
-    K_geo = model.stresses.prestress(centrifugal_displacement(sector))
-    coriolis, softening = rotation_matrices(sector.M, sector.axis)
-    return replace(sector, coriolis=coriolis, centrifugal=csr_matrix(K_geo - softening))
 
 
 def rotation_matrices(M: Any, axis: Array) -> tuple[csr_matrix, csr_matrix]:
@@ -156,7 +159,40 @@ def _largest(C: Array, K: Array) -> float:
     try:
         return float(eigh(C, K, eigvals_only=True)[-1])
     except LinAlgError as error:
-        raise ModelError(
-            "nothing holds the wheel, even at rest.",
-            hint="Hold the hub by fixed=, or put it on springs by rom.supported_sector.",
-        ) from error
+        text = "nothing holds the wheel, even at rest: see fixed= and rom.supported_sector."
+        raise ModelError(text) from error
+
+
+@typed
+def supported_sector(
+    sector: CyclicSector, face: Interface, *, across: Rate = 0.0, along: Rate = 0.0
+) -> CyclicSector:
+    """The sector of a wheel or rotor that rests on springs, spread evenly over a face of it.
+
+    Springs that are the same for all directions across the axis look the same from axes that turn
+    with the wheel: this is an isotropic bearing. Give a rotor its matrices of rotation before.
+
+    Args:
+        sector: with or without matrices of rotation.
+        face: interface of the model the sector was made from, where it rests.
+        across: stiffness of the whole wheel's support across the axis [N/m].
+        along: along the axis [N/m].
+
+    Raises:
+        ConfigError: if the stiffness is not positive in any direction, or negative in one.
+        InterfaceError: if the sector has no such nodes.
+
+    Source:
+        Isotropic bearings seen from the rotor: Friswell, Penny, Garvey and Lees, Dynamics of
+        Rotating Machines (2010); see docs/theory/rotating_solids.md.
+    """
+    if across + along == 0.0:
+        raise ConfigError("springs of 0 N/m across and along the axis hold nothing; give one.")
+    if sector.points is None or face.dofs.max() >= sector.n:
+        raise InterfaceError(f"{face.name!r} is no interface of the model of the sector.")
+    e = sector.axis
+    each = across * (np.eye(3) - np.outer(e, e)) + along * np.outer(e, e)
+    share = kron(face.surface_mass / face.area, each / sector.n_sectors, format="coo")
+    at = face.dofs
+    K = csr_matrix((share.data, (at[share.row], at[share.col])), shape=sector.K.shape)
+    return replace(sector, K=csr_matrix(sector.K + K), motions=None, sprung=True)

@@ -27,9 +27,9 @@ from rom.eigen.attachments import added_mass
 from rom.eigen.supports import Fixed, held_dofs
 from rom.eigen.verbs import rigid_motions
 from rom.eigen.workers import ONE_PROCESS, Workers
-from rom.errors import ConfigError, InterfaceError
+from rom.errors import InterfaceError
 from rom.model import Array, FEModel, Index, Interface
-from rom.names import named, offered
+from rom.names import check_known
 
 Complex = npt.NDArray[np.complex128]
 Value = TypeVar("Value")
@@ -94,10 +94,7 @@ class CyclicSector:
     def __post_init__(self) -> None:
         whole("n_sectors", self.n_sectors, 2)
         if np.intersect1d(self.slave, self.master).size:
-            raise InterfaceError(
-                "a dof is on both cyclic faces: sectors would be without width.",
-                hint="Name two faces that meet at most on the axis.",
-            )
+            raise InterfaceError("a dof is on both cyclic faces; they meet at most on the axis.")
         matrix("coupling", self.coupling, (self.slave.size, self.master.size))
 
     @classmethod
@@ -136,10 +133,9 @@ class CyclicSector:
                 the circle, they are no images of each other, or the axis runs through the sector.
             ResourceError: on all ranks, if the sector does not fit on each of them.
         """
-        if unknown := [name for name in (low, high) if name not in model.interfaces]:
-            raise InterfaceError(
-                f"the sector has no interface {named(unknown)}; it has {offered(model.interfaces)}."
-            )
+        for name in (low, high):
+            text = f"the sector has no interface {name!r}; it has"
+            check_known(name, model.interfaces, text, InterfaceError)
         e, at = unit_vector("axis", axis), finite("at", at, (3,))
         pair = paired(model.interfaces[low], model.interfaces[high], e, at)
         refuse_all_around(model.points, e, at)
@@ -209,8 +205,7 @@ class CyclicSector:
             ConfigError: if not.
         """
         most = self.n_sectors // 2
-        whole("diameter", diameter, 0, most, reason="what so many sectors can tell apart")
-        return int(diameter)
+        return whole("diameter", diameter, 0, most, reason="what so many sectors can tell apart")
 
     def parts(self) -> tuple[csr_matrix, csr_matrix]:
         """Own and next, (n, f) each: u_j = own a_j + next a_(j + step) of independent dofs a."""
@@ -235,8 +230,7 @@ class CyclicSector:
         if self.motions is None:
             return np.zeros((self.n, 0), dtype=complex)
         e1 = np.eye(3)[np.argmin(np.abs(self.axis))]
-        e1 = np.cross(np.cross(self.axis, e1), self.axis)
-        e1 /= np.linalg.norm(e1)
+        e1 = unit_vector("axis", np.cross(np.cross(self.axis, e1), self.axis))
         across = e1 + 1j * np.cross(self.axis, e1)
         columns = [
             self.motions[:, 3 * turning : 3 * turning + 3] @ direction
@@ -295,12 +289,9 @@ def each_diameter(
     function: Callable[[int], Value],
     diameters: Sequence[int] | None = None,
 ) -> list[Value]:
-    """Values of a function of each number of nodal diameters, on all ranks, shared by them.
+    """Values of a function of each number of nodal diameters, or those given, shared by all ranks.
 
-    Args:
-        sector: whose workers share.
-        function: must not wait for other ranks.
-        diameters: all the wheel can have, unless given.
+    The function must not wait for other ranks.
 
     Raises:
         ConfigError: if the wheel cannot have one of them.
@@ -316,11 +307,7 @@ def region(model: FEModel, name: str) -> tuple[csr_matrix, csr_matrix]:
     Raises:
         ConfigError: if it is unknown.
     """
-    if name not in model.regions:
-        raise ConfigError(
-            f"the sector has no region {name!r}; it has {offered(model.regions, name)}.",
-            hint="Name the volume of the blade in the geometry.",
-        )
+    check_known(name, model.regions, f"the sector has no region {name!r}; it has")
     share = model.regions[name]
     return all_rows(model, share.K), all_rows(model, share.M)
 

@@ -1,14 +1,21 @@
-"""Waves that travel around a rotating wheel, with Coriolis forces."""
+"""Waves that travel around a rotating wheel, with Coriolis forces.
 
+Over the speed they are followed by their shapes and not by their order.
+"""
+
+from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 from scipy.linalg import eig
+from scipy.optimize import linear_sum_assignment
 from scipy.sparse import csc_matrix, csr_matrix
 from scipy.sparse.linalg import LinearOperator, eigs, splu
 
-from rom.arguments import typed, whole
-from rom.components.wheels.modes import real_form, spinning
+from rom.arguments import not_negative, typed, vector, whole
+from rom.components.wheels.modes import cyclic_modes, real_form, spinning
 from rom.components.wheels.sector import Complex, CyclicSector
 from rom.eigen.scipy import negative_count
 from rom.eigen.verbs import count_shift
@@ -17,7 +24,7 @@ from rom.model import Array, Modes
 
 GROWTH_RATE_RTOL = 1e-4  # growth rate of an unstable motion, of the largest frequency found
 RIGID_RTOL = 0.01  # of the speed: distance of a rigid motion's frequency from zero or the speed
-N_SPARE_WAVES = 4  # beyond those asked for
+N_SPARE_WAVES = 4  # beyond those asked for, or followed: waves from above may cross them
 MAX_DENSE_DOFS = 40  # all waves are computed at once up to here
 
 
@@ -100,8 +107,8 @@ def travelling_modes(
     """
     K = spinning(sector, speed)
     T = sector.harmonic(sector.checked(diameter))
-    if speed == 0.0 or not np.isfinite(speed):
-        raise ConfigError(f"speed = {speed!r}; give one in rad/s, at rest use cyclic_modes.")
+    if speed == 0.0:
+        raise ConfigError("speed = 0 has waves that stand: at rest use cyclic_modes.")
     standing = sector.standing(diameter)
     n = whole("n", n, 1, T.shape[1] if standing else 2 * T.shape[1])
     wanted = 2 * n if standing else n
@@ -115,14 +122,8 @@ def travelling_modes(
     lam, U = lam[keep], U[:, keep]
     ahead = np.zeros(lam.size) if standing else -np.sign(lam.imag) * np.sign(speed)
     size = np.sqrt(np.einsum("fm,fm->m", U.conj(), M @ U).real)
-    return TravellingModes(
-        abs(lam.imag),
-        T @ (U / size),
-        sector=sector,
-        diameter=diameter,
-        speed=abs(speed),
-        direction=ahead,
-    )
+    about: dict[str, Any] = {"sector": sector, "diameter": diameter, "direction": ahead}
+    return TravellingModes(abs(lam.imag), T @ (U / size), speed=abs(speed), **about)
 
 
 def _lowest(
@@ -138,10 +139,8 @@ def _lowest(
     try:
         solve = splu(csc_matrix(K + shift * G + shift**2 * M, dtype=complex)).solve
     except RuntimeError as error:
-        raise ModelError(
-            "rotation has used up the stiffness of the wheel exactly.",
-            hint="Take another speed, below that of divergence_speed.",
-        ) from error
+        text = "rotation has used up the stiffness of the wheel: stay below divergence_speed."
+        raise ModelError(text) from error
 
     def inverse(y: Complex) -> Complex:
         a, b = y[:f].ravel(), y[f:].ravel()
@@ -175,10 +174,8 @@ def _refuse_growth(lam: Complex, diameter: int, speed: float) -> None:
     if growth > GROWTH_RATE_RTOL * abs(lam).max(initial=0.0):
         worst = lam[lam.real.argmax()]
         raise ModelError(
-            f"at {speed:g} rad/s a motion with {diameter} nodal diameters grows by "
-            f"{growth:.3g} 1/s at {abs(worst.imag) / (2 * np.pi):.4g} Hz: the speed is above that "
-            "of an instability.",
-            hint="rom.cyclic.divergence_speed tells where stiffness is used up.",
+            f"at {speed:g} rad/s a motion with {diameter} nodal diameters grows by {growth:.3g} "
+            f"1/s at {abs(worst.imag) / (2 * np.pi):.4g} Hz, an instability; see divergence_speed."
         )
 
 
@@ -202,7 +199,99 @@ def _verify(M: csr_matrix, G: csr_matrix, K: csr_matrix, lam: Complex, U: Comple
         true = negative_count(csc_matrix(real_form(A))) // 2
         if true != start + falls.sum():
             raise ModesMissedError(
-                f"{falls.size} waves of one direction were found below {w / (2 * np.pi):.6g} Hz, "
-                f"which does not agree with the inertia of the system, {true} from {start} on.",
-                hint="Ask for more waves.",
+                f"the inertia of the system, {true} from {start} on, does not agree with "
+                f"{falls.size} waves below {w / (2 * np.pi):.6g} Hz; ask for more."
             )
+
+
+SPEEDS_AT_ONCE = 8  # whose waves are kept until they are followed
+
+
+@typed
+@dataclass(frozen=True)
+class WheelCampbell(Waves):
+    """Frequencies over the speed, each column one wave.
+
+    Attributes:
+        speeds: (s,) [rad/s].
+        diameter: number of nodal diameters.
+        omega: (s, n) circular frequencies seen from the wheel [rad/s]; a column may cross others.
+        direction: (n,) [1] +1 for waves that run ahead with the rotation, -1 against it, 0
+            standing.
+        mac: (s, n) likeness [1], 0 to 1, of each shape to that at the speed before; where it is
+            near one half two waves change their shapes, and the speeds are too far apart.
+    """
+
+    speeds: Array
+    diameter: int
+    omega: Array
+    direction: Array
+    mac: Array
+
+
+@typed
+def wheel_campbell(
+    sector: CyclicSector, diameter: int, n: int, *, speeds: npt.ArrayLike
+) -> WheelCampbell:
+    """Follow the lowest waves of the first speed through all others by their shapes.
+
+    From speed to speed each wave takes the one of its direction that is most like it, no two the
+    same: the modal assurance criterion |a^H M b|^2 of mass-normalised shapes, summed over all, is
+    the largest there is. Under mpirun the ranks share the speeds, and all must call.
+
+    Args:
+        sector: with matrices of rotation, see `rom.rotating_sector`; full or reduced.
+        diameter: number of nodal diameters.
+        n: number of waves, counting both directions.
+        speeds: (s,) angular speeds [rad/s], not negative; the first may be zero.
+
+    Raises:
+        ConfigError: if a speed is negative, or the wheel has not so many waves.
+        ModelError, ModesMissedError: see `rom.travelling_modes`.
+
+    Source:
+        Campbell, The protection of steam-turbine disk wheels from axial vibration, Trans. ASME
+        46 (1924) 31; see docs/theory/rotating_solids.md.
+    """
+    Omega = vector("speeds", speeds)
+    not_negative("speeds", Omega.min())
+    omega, direction, shapes = _waves(sector, diameter, n, Omega[0])
+    omega, direction, shapes = omega[:n], direction[:n], shapes[:, :n]
+    found, likeness = [omega], [np.ones(n)]
+    for w, sides, U in _followed(sector, diameter, n, Omega[1:]):
+        mac = np.abs(shapes.conj().T @ (sector.M @ U)) ** 2
+        mac[direction[:, None] != sides] = -1.0
+        kept = linear_sum_assignment(-mac)[1]
+        found.append(w[kept])
+        likeness.append(mac[np.arange(n), kept])
+        shapes = U[:, kept]
+    return WheelCampbell(Omega, diameter, np.array(found), direction, np.array(likeness))
+
+
+def _followed(
+    sector: CyclicSector, diameter: int, n: int, speeds: Array
+) -> Iterator[tuple[Array, Array, Complex]]:
+    """The waves at one speed after the other; ranks share a few speeds at a time."""
+    for first in range(0, speeds.size, SPEEDS_AT_ONCE):
+        some = speeds[first : first + SPEEDS_AT_ONCE].tolist()
+        yield from sector.workers.each(
+            lambda speed: _waves(sector, diameter, n, speed), some, [1.0] * len(some)
+        )
+
+
+def _waves(
+    sector: CyclicSector, diameter: int, n: int, speed: float
+) -> tuple[Array, Array, Complex]:
+    """Circular frequencies, directions and mass-normalised shapes of n waves and a few more."""
+    standing, free = sector.standing(diameter), sector.free.size
+    most = free if standing else 2 * free
+    n = whole("n", n, 1, most)
+    if speed:
+        waves = travelling_modes(sector, diameter, min(n + N_SPARE_WAVES, most), speed=speed)
+        return waves.omega, waves.direction, waves.shapes
+    if standing:
+        modes = cyclic_modes(sector, diameter, min(n + N_SPARE_WAVES, free))
+        return modes.omega, np.zeros(modes.omega.size), modes.shapes
+    modes = cyclic_modes(sector, diameter, min((n + 1) // 2 + N_SPARE_WAVES, free))
+    both = np.tile([1.0, -1.0], modes.omega.size)  # at rest a wave runs either way
+    return np.repeat(modes.omega, 2), both, np.repeat(modes.shapes, 2, axis=1)

@@ -11,8 +11,6 @@ from rom.components.wind.control import gain_factor as gain_factor
 from rom.components.wind.control import generator_torque as generator_torque
 from rom.components.wind.control import power_curve as power_curve
 from rom.components.wind.control import steady as steady
-from rom.components.wind.drivetrain import Rotor as Rotor
-from rom.components.wind.drivetrain import rotor as rotor
 from rom.components.wind.operation import Operation as Operation
 from rom.components.wind.operation import operate as operate
 from rom.components.wind.profiles import Profile as Profile
@@ -26,9 +24,11 @@ from rom.components.wind.whole_turbine import turbine as turbine
 from rom.components.wind.wind_turbine import HUB_RADIUS as HUB_RADIUS
 from rom.components.wind.wind_turbine import RATED_SPEED as RATED_SPEED
 from rom.components.wind.wind_turbine import SHAFT_STIFFNESS as SHAFT_STIFFNESS
+from rom.components.wind.wind_turbine import Rotor as Rotor
 from rom.components.wind.wind_turbine import RunUp as RunUp
 from rom.components.wind.wind_turbine import blade as blade
 from rom.components.wind.wind_turbine import ramp as ramp
+from rom.components.wind.wind_turbine import rotor as rotor
 from rom.components.wind.wind_turbine import run_up as run_up
 from rom.components.wind.wind_turbine import stations as stations
 from rom.components.wind.wind_turbine import tower as tower

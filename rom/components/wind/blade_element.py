@@ -6,8 +6,8 @@ it, at each instant as in steady flow. The force follows the motion of the strip
 damps flapping: it is a law of one frame.
 
 Source:
-    Hansen, Aerodynamics of Wind Turbines, 2008, chapters 6 and 9; `momentum` and `inflow` say whose
-    balance and dam.
+    Hansen, Aerodynamics of Wind Turbines, 2008, chapters 6 and 9; `momentum` and `blading` say
+    whose balance and dam.
 """
 
 import math
@@ -21,18 +21,20 @@ from numba import carray
 
 from rom.arguments import finite, positive, unit_vector
 from rom.components.cosserat.bodies import RodBody
-from rom.components.cosserat.energy import rotation_of
 from rom.components.wind.blading import (
     AIR_DENSITY,
     CHORD,
     ELEMENT_LENGTH,
     ELEMENT_PROFILE,
     ELEMENT_TWIST,
+    NO_TOWER,
     RADIUS,
     ROTOR_RADIUS,
+    TOWER_TUBE,
+    slope_of_wind,
     strip_load,
+    wind_at,
 )
-from rom.components.wind.inflow import NO_TOWER, TOWER_TUBE, slope_of_wind, wind_at
 from rom.components.wind.momentum import STRIP_WIDTH, slowed
 from rom.components.wind.profiles import profiles
 from rom.components.wind.wind_turbine import (
@@ -44,6 +46,7 @@ from rom.components.wind.wind_turbine import (
 )
 from rom.errors import ConfigError
 from rom.mbs.elements.nonlinear import Elements, compiled_law
+from rom.mbs.kernels.algebra import rotation, unit
 from rom.mbs.kernels.compiled import inner
 from rom.model import Array
 
@@ -96,22 +99,21 @@ def section_slopes(g, k, u, m, lee, out):
         for j in range(2):
             out[4 * i + j] = 2.0 * ahead[i] * u[j] / air
             out[4 * i + 2 + j] = 0.0
-    section_force(g, k, speed, flow + SLOPE_STEP, turned, lee, ahead)
-    section_force(g, k, speed, flow - SLOPE_STEP, turned, lee, behind)
-    for i in range(2):
-        slope = (ahead[i] - behind[i]) / (2.0 * SLOPE_STEP)
-        out[4 * i] += slope * u[1] / air
-        out[4 * i + 1] -= slope * u[0] / air
-    section_force(g, k, speed, flow, turned + SLOPE_STEP, lee, ahead)
-    section_force(g, k, speed, flow, turned - SLOPE_STEP, lee, behind)
-    for i in range(2):
-        slope = (ahead[i] - behind[i]) / (2.0 * SLOPE_STEP)
-        out[4 * i + 2] = -slope * m[1] / size
-        out[4 * i + 3] = slope * m[0] / size
-    section_force(g, k, speed, flow, turned, (lee[0], lee[1] + SLOPE_STEP), ahead)
-    section_force(g, k, speed, flow, turned, (lee[0], lee[1] - SLOPE_STEP), behind)
-    for i in range(2):
-        out[8 + i] = (ahead[i] - behind[i]) / (2.0 * SLOPE_STEP)
+    for angle in range(3):
+        a, b, c = unit(angle)
+        a, b, c = SLOPE_STEP * a, SLOPE_STEP * b, SLOPE_STEP * c
+        section_force(g, k, speed, flow + a, turned + b, (lee[0], lee[1] + c), ahead)
+        section_force(g, k, speed, flow - a, turned - b, (lee[0], lee[1] - c), behind)
+        for i in range(2):
+            slope = (ahead[i] - behind[i]) / (2.0 * SLOPE_STEP)
+            if angle == 0:
+                out[4 * i] += slope * u[1] / air
+                out[4 * i + 1] -= slope * u[0] / air
+            elif angle == 1:
+                out[4 * i + 2] = -slope * m[1] / size
+                out[4 * i + 3] = slope * m[0] / size
+            else:
+                out[8 + i] = slope
 
 
 @inner
@@ -198,7 +200,7 @@ def strip(numbers, pose, wanted, answer, space):
     out[:] = 0.0
     R, L, W = room[0:9].reshape((3, 3)), room[9:18].reshape((3, 3)), room[18:27].reshape((3, 3))
     u, m, lean, force, J = room[30:33], room[33:36], room[36:39], room[39:41], room[41:55]
-    rotation_of(s[3:7], R)
+    rotation(s, 3, R)
     yaw = meet(g, 1.0, s[0:3], s[7:10], R, room[27:39])
     speed = math.sqrt(u[0] * u[0] + u[1] * u[1])
     if speed == 0.0 or m[0] * m[0] + m[1] * m[1] == 0.0:
@@ -268,25 +270,18 @@ def far_away(
 
 def strip_rows(blade: RodBody, far: list[float], cone: float) -> list[Array]:
     """The numbers of the strip of each vertex, see PROFILE_START."""
-    return [_strip_of(row, far, cone) for row in zip(*strips(blade), strict=True)]
+    return [_strip_of(*row, far, math.cos(cone)) for row in zip(*strips(blade), strict=True)]
 
 
-def _strip_of(row: tuple[float, ...], far: list[float], cone: float) -> Array:
+def _strip_of(
+    radius: float, length: float, chord: float, twist: float, far: list[float], c: float
+) -> Array:
     """Numbers of a strip from its middle, length, chord and twist in the frame."""
-    radius, length, chord, twist = row
     at = np.searchsorted(HUB_RADIUS + np.cumsum(ELEMENT_LENGTH), radius)
     profile = profiles()[ELEMENT_PROFILE[min(int(at), len(ELEMENT_PROFILE) - 1)]]
-    c = math.cos(cone)
-    of_strip = [
-        c * radius,
-        chord,
-        c * ROTOR_RADIUS,
-        c * HUB_RADIUS,
-        N_BLADES,
-        twist,
-        profile.angle.size,
-    ]
-    return np.concatenate([far[:1], [length], far[1:], of_strip, profile.table.ravel()])
+    of_strip = [c * radius, chord, c * ROTOR_RADIUS, c * HUB_RADIUS, N_BLADES]
+    known = [far[0], length, *far[1:], *of_strip, twist, profile.angle.size]
+    return np.concatenate([known, profile.table.ravel()])
 
 
 def strips(blade: RodBody) -> tuple[Array, Array, Array, Array]:

@@ -1,23 +1,23 @@
 """The blades of a rotor as strips, and what the wind does to them at a steady speed.
 
 The shaft may be tilted and the blades coned; a strip then meets other air at each azimuth, and the
-balance of momentum is struck strip by strip and azimuth by azimuth. The tower dams the wind ahead.
+balance of momentum is struck strip by strip and azimuth by azimuth. The tower dams the wind ahead,
+as the potential flow round a circular cylinder in each horizontal plane.
 
 Source:
     Jonkman, Butterfield, Musial, Scott, NREL/TP-500-38060, 2009, table 3-1: the blade.
-    Hansen, Aerodynamics of Wind Turbines, 2008, chapters 6 and 9: elements of a blade.
+    Hansen, Aerodynamics of Wind Turbines, 2008, chapters 6, 8 and 9: elements of a blade, tower.
 """
 
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from rom.arguments import not_negative, one_each, typed
+from rom.arguments import Between, Count, NotNegative, Positive, one_each, typed
 from rom.components.compiled import inner, kernel
-from rom.components.wind.inflow import NO_TOWER, TOWER_TUBE, wind_at
 from rom.components.wind.momentum import CHORD_COLUMN, coefficients, slowed
 from rom.components.wind.profiles import Profile, profiles
 from rom.components.wind.wind_turbine import (
@@ -28,9 +28,52 @@ from rom.components.wind.wind_turbine import (
     SHAFT_HEIGHT,
     SHAFT_TILT,
     TOWER_HEIGHT,
+    TUBE_SIZES,
 )
 from rom.errors import ConfigError
 from rom.model import Array
+
+# radius of the tower at foot and top [m], its height [m]; zero: no dam
+TOWER_TUBE = (TUBE_SIZES["diameter"][0] / 2, TUBE_SIZES["diameter"][1] / 2, TOWER_HEIGHT)
+NO_TOWER = (0.0, 0.0, TOWER_HEIGHT)
+
+
+@inner
+def wind_at(tower, x, y, z, v):
+    """Turn the wind v far away into that at a place; the axis of the tower is x = y = 0.
+
+    With Z = x + i y, U = v_x + i v_y and the radius a, the flow is conj(U) - U a^2 / Z^2.
+    """
+    foot, top, height = tower
+    square = x * x + y * y
+    if foot <= 0.0 or z > height or z < 0.0 or square == 0.0:
+        return
+    a = foot + (top - foot) * z / height
+    share = a * a / max(square, a * a) / square  # inside the tower as on its face
+    c, s = share * (x * x - y * y), -share * 2 * x * y  # a^2 / Z^2
+    u, w = v[0], v[1]
+    v[0] = u - (u * c - w * s)
+    v[1] = w + u * s + w * c
+
+
+@inner
+def slope_of_wind(tower, place, wind, out):
+    """(3, 3) how the wind at a place grows with the place."""
+    foot, top, height = tower
+    x, y, z = place
+    for i in range(3):
+        for j in range(3):
+            out[i, j] = 0.0
+    square = x * x + y * y
+    a = foot + (top - foot) * z / height
+    if foot <= 0.0 or z > height or z < 0.0 or square <= a * a:
+        return
+    p = complex(wind[0], wind[1]) / complex(x, y) ** 2
+    along = 2 * a * a * p / complex(x, y)
+    up = -2 * a * (top - foot) / height * p
+    out[0, 0], out[0, 1], out[0, 2] = along.real, -along.imag, up.real
+    out[1, 0], out[1, 1], out[1, 2] = -along.imag, -along.real, -up.imag
+
 
 # table 3-1: middle of an element from the axis [m], its length along the blade [m], its chord [m],
 # its twist [deg]
@@ -47,6 +90,8 @@ ROTOR_RADIUS = 63.0  # m
 AIR_DENSITY = 1.225  # [kg/m^3]
 BETZ_LIMIT = 16 / 27  # of the power in the wind
 LARGEST_ANGLE = 2 * math.pi  # of pitch, either way [rad]
+Pitch = Annotated[float, Between(-LARGEST_ANGLE, LARGEST_ANGLE, unit="rad")]
+Slant = Annotated[float, Between(-math.pi / 4, math.pi / 4, "()", "rad")]
 N_AZIMUTHS = 24  # of a turn, a multiple of three blades
 
 
@@ -70,16 +115,16 @@ class Blading:
     """
 
     radius: Array
-    length: Array
-    chord: Array
+    length: Annotated[Array, Positive("m", (None,))]
+    chord: Annotated[Array, Positive("m", (None,))]
     twist: Array
     profile: tuple[Profile, ...]
     rotor_radius: float = ROTOR_RADIUS
     hub_radius: float = HUB_RADIUS
-    n_blades: int = N_BLADES
-    tilt: float = SHAFT_TILT
-    cone: float = CONE_ANGLE
-    density: float = AIR_DENSITY
+    n_blades: Annotated[int, Count(1)] = N_BLADES
+    tilt: Slant = SHAFT_TILT
+    cone: Slant = CONE_ANGLE
+    density: Annotated[float, Positive("kg/m^3")] = AIR_DENSITY
 
     def __post_init__(self) -> None:
         """Refuse blades that cannot be."""
@@ -91,14 +136,6 @@ class Blading:
             raise ConfigError(f"strips lie from {self.radius.min():g} to {self.radius.max():g} m, "
                               f"blades from {self.hub_radius:g} to {self.rotor_radius:g} m.",
                               hint="Radii are those of the middles of strips.")  # fmt: skip
-        if not ((self.chord > 0.0).all() and (self.length > 0.0).all() and self.density > 0.0
-                and self.n_blades >= 1):  # fmt: skip
-            raise ConfigError("chords, lengths, the density of the air and the number of blades "
-                              "must be positive.")  # fmt: skip
-        if not (abs(self.tilt) < np.pi / 4 and abs(self.cone) < np.pi / 4):
-            raise ConfigError(f"a shaft tilted by {self.tilt:g} rad and blades coned by "
-                              f"{self.cone:g} rad are beyond this model.",
-                              hint="Angles are in radians, below 0.78.")  # fmt: skip
 
     @property
     def area(self) -> float:
@@ -222,28 +259,17 @@ def turn(strips, tables, counts, shape, angles, wind, motion, tower, out):  # no
             row[5] = 1.0 - flow[0] / far if far != 0.0 else 0.0
 
 
-def check_pitch(pitch: float) -> None:
-    """Refuse a pitch [rad] of more than a turn, which are degrees, and none.
-
-    Raises:
-        ConfigError: naming it.
-    """
-    if not abs(pitch) <= LARGEST_ANGLE:
-        raise ConfigError(f"a pitch of {pitch:g} rad is no angle of a blade.",
-                          hint="Pitch is in radians.")  # fmt: skip
-
-
 @typed
 def rotor_load(  # noqa: PLR0913  one keyword per choice, all with defaults
     blades: Blading,
-    wind: float,
-    speed: float,
-    pitch: float = 0.0,
+    wind: Annotated[float, NotNegative("m/s")],
+    speed: Annotated[float, NotNegative("rad/s")],
+    pitch: Pitch = 0.0,
     *,
-    yaw: float = 0.0,
+    yaw: Slant = 0.0,
     skew: bool = True,
     tower: bool = False,
-    n_azimuths: int = N_AZIMUTHS,
+    n_azimuths: Annotated[int, Count(1)] = N_AZIMUTHS,
 ) -> RotorLoad:
     """Loads of a rotor in steady wind, by momentum balance on every strip and azimuth.
 
@@ -267,14 +293,6 @@ def rotor_load(  # noqa: PLR0913  one keyword per choice, all with defaults
         ConfigError: for a wind or a speed below zero or not finite, a pitch of more than a turn,
             a yaw beyond the model, or no azimuths.
     """
-    for name, value in (("wind", wind), ("speed of the rotor", speed)):
-        not_negative(name, value)
-    check_pitch(pitch)
-    if not abs(yaw) < np.pi / 4:
-        raise ConfigError(f"a wind from {yaw:g} rad aside is beyond this model.",
-                          hint="Yaw is in radians, below 0.78.")  # fmt: skip
-    if n_azimuths < 1:
-        raise ConfigError(f"a turn of {n_azimuths} azimuths; it has one or more.")
     out = np.zeros((n_azimuths, len(blades.profile), 6))
     turn(blades.strips, *blades.tables, (blades.twist, blades.radius),
          (blades.tilt, blades.cone, HUB_OVERHANG, TOWER_HEIGHT + SHAFT_HEIGHT),

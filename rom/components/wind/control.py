@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import brentq
 
-from rom.arguments import number, typed, vector
+from rom.arguments import typed, vector
 from rom.components.compiled import inner, kernel
 from rom.components.wind.blading import ROTOR_RADIUS, Blading, RotorLoad, blading, rotor_load
 from rom.components.wind.wind_turbine import GEAR_RATIO, N_BLADES, RATED_SPEED
@@ -91,12 +91,6 @@ def controller_step(state, speed, dt):
     advance(state, speed, dt)
 
 
-@kernel
-def torque_at(speed, pitch):
-    """`asked_torque` for Python."""
-    return asked_torque(speed, pitch)
-
-
 @typed
 def generator_torque(speed: float, pitch: float = 0.0) -> float:
     """Torque of the generator at its speed [rad/s], on the fast shaft [N m].
@@ -108,9 +102,7 @@ def generator_torque(speed: float, pitch: float = 0.0) -> float:
     Raises:
         ConfigError: for a speed or a pitch that is not finite.
     """
-    number("speed", speed)
-    number("pitch", pitch)
-    return float(torque_at(float(speed), float(pitch)))
+    return float(asked_torque.py_func(speed, pitch))
 
 
 def gain_factor(pitch: float) -> float:
@@ -160,13 +152,20 @@ def check_rotor(blades: Blading) -> None:
     ratio = blades.rotor_radius / ROTOR_RADIUS
     if abs(ratio - 1.0) > MAX_RADIUS_CHANGE or blades.n_blades != N_BLADES:
         raise ConfigError(
-            f"the controller is that of the NREL 5 MW turbine, of {N_BLADES} blades up to "
-            f"{ROTOR_RADIUS:g} m at {RATED_SPEED:.4g} rad/s: {blades.n_blades} blades up to "
-            f"{blades.rotor_radius:g} m would have tips of "
-            f"{RATED_SPEED * blades.rotor_radius:.4g} m/s and a torque of another turbine.",
+            f"the controller is that of {N_BLADES} blades up to {ROTOR_RADIUS:g} m at "
+            f"{RATED_SPEED:.4g} rad/s: {blades.n_blades} blades up to {blades.rotor_radius:g} m "
+            f"would have tips of {RATED_SPEED * blades.rotor_radius:.4g} m/s.",
             hint="Give speed and pitch yourself, held=lambda wind: (speed, pitch), over the time "
             "in operate: a usual rule is 80 m/s over the radius.",
         )
+
+
+def working(wind: float, when: str = "") -> float:
+    """The wind, if the turbine works in it [m/s]."""
+    if not CUT_IN_WIND <= wind <= CUT_OUT_WIND:
+        raise ConfigError(f"the turbine is parked in a wind of {wind:g} m/s{when}.",
+                          hint="It works from 3 to 25 m/s.")  # fmt: skip
+    return wind
 
 
 @typed
@@ -188,9 +187,7 @@ def steady(
     """
     if held is not None:
         return rotor_load(blading() if blades is None else blades, wind, *held(wind), tower=tower)
-    if not CUT_IN_WIND <= wind <= CUT_OUT_WIND:
-        raise ConfigError(f"the turbine is parked in a wind of {wind:g} m/s.",
-                          hint="It works from 3 to 25 m/s.")  # fmt: skip
+    working(wind)
     blades = blading() if blades is None else blades
     check_rotor(blades)
     load = partial(rotor_load, blades, float(wind), tower=tower)

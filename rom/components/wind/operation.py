@@ -10,23 +10,17 @@ Source:
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
-from rom.arguments import between, not_negative, positive, typed
+from rom.arguments import Between, Positive, between, not_negative, typed
 from rom.components.compiled import kernel
-from rom.components.wind.blading import Blading, blading, check_pitch, strip_load
-from rom.components.wind.control import (
-    CUT_IN_WIND,
-    CUT_OUT_WIND,
-    GENERATOR_EFFICIENCY,
-    Controller,
-    steady,
-)
+from rom.components.wind.blading import LARGEST_ANGLE, Blading, blading, strip_load
+from rom.components.wind.control import GENERATOR_EFFICIENCY, Controller, steady, working
 from rom.components.wind.momentum import RADIUS_COLUMN, induced
 from rom.components.wind.wake import follow
 from rom.components.wind.wind_turbine import GEAR_RATIO
-from rom.errors import ConfigError
 from rom.model import Array
 
 DRIVE_INERTIA = 43_784_725.0  # of rotor and generator about the slow shaft [kg m^2], section 7
@@ -79,9 +73,9 @@ def wake_step(blades, flow, state, dt, out):
 @typed
 def operate(
     wind: Callable[[float], float],
-    t_end: float,
+    t_end: Annotated[float, Positive("s")],
     *,
-    dt: float = 0.05,
+    dt: Annotated[float, Between(0.0, MAX_STEP, "(]", "s")] = 0.05,
     blades: Blading | None = None,
     dynamic: bool = True,
     held: Callable[[float], tuple[float, float]] | None = None,
@@ -106,25 +100,14 @@ def operate(
             with its time, or a speed or a pitch to hold that is none, or blades of another turbine
             that are not held.
     """
-    positive("t_end", t_end)
-    between("dt", dt, 0, MAX_STEP, "(]")
     blades = blading() if blades is None else blades
     t = dt * np.arange(round(t_end / dt) + 1)
-    blows = np.array([_wind_at(wind, s) for s in t])
+    blows = np.array([working(float(wind(s)), f", at {s:g} s") for s in t])
     run = _Run(blades, blows[0], dynamic, held)
     rows = np.array([run.step(s, v, dt if k else 0.0)
                      for k, (s, v) in enumerate(zip(t, blows, strict=True))])  # fmt: skip
     speed, pitch, power, torque, thrust = rows[:, :5].T
     return Operation(t, blows, speed, pitch, power, torque, thrust, rows[:, 5:])
-
-
-def _wind_at(wind: Callable[[float], float], t: float) -> float:
-    """The wind at a time, within what the turbine works in."""
-    speed = float(wind(t))
-    if not CUT_IN_WIND <= speed <= CUT_OUT_WIND:
-        raise ConfigError(f"the turbine is parked in a wind of {speed:g} m/s, at {t:g} s.",
-                          hint="It works from 3 to 25 m/s.")  # fmt: skip
-    return speed
 
 
 class _Run:
@@ -140,10 +123,7 @@ class _Run:
         self.blades, self.dynamic, self.held = blades, dynamic, held
         self.cosines = math.cos(blades.cone), math.cos(blades.tilt)
         self.given = (blades.strips, *blades.tables, blades.twist)
-        self.wake, self.loads = (
-            np.zeros((blades.radius.size, 6)),
-            np.zeros((blades.radius.size, 2)),
-        )
+        self.wake, self.loads = (np.zeros((blades.radius.size, n)) for n in (6, 2))
         if held is not None:  # no controller acts, whose rotor it would have to be
             self.speed, self.control = 0.0, Controller.at(0.0)
             return
@@ -155,7 +135,7 @@ class _Run:
         """Speed, pitch, power, torque and thrust at a time, and what the wake takes away."""
         if self.held is not None:
             self.speed, self.control.pitch = self.held(t)
-            check_pitch(self.control.pitch)
+            between(f"pitch held at {t:g} s", self.control.pitch, -LARGEST_ANGLE, LARGEST_ANGLE)
             not_negative(f"speed held at {t:g} s", self.speed)
         cone, tilt = self.cosines
         flow = (wind * cone * tilt, self.speed, self.control.pitch, 0.5 * self.blades.density)

@@ -15,11 +15,12 @@ import csv
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 import numpy.typing as npt
 
-from rom.arguments import not_negative, typed, vector
+from rom.arguments import Positive, not_negative, typed, vector
 from rom.errors import ConfigError
 from rom.model import Array
 
@@ -57,10 +58,8 @@ class Profile:
         _check(self.name, a, self.lift, self.drag)
         if a[0] > ROUND_ATOL - np.pi or a[-1] < np.pi - ROUND_ATOL:
             first, last = np.degrees(a[[0, -1]])
-            raise ConfigError(f"profile {self.name!r} is known from {first:g} to {last:g} degrees; "
-                              "flow beyond has no lift and drag.",
-                              hint="rom.components.wind.profiles.profile carries a table on past "
-                              "stall.")  # fmt: skip
+            text = f"profile {self.name!r} is known from {first:g} to {last:g} degrees."
+            raise ConfigError(text, hint="wind.profiles.profile carries a table on past stall.")
 
     @property
     def table(self) -> Array:
@@ -111,7 +110,7 @@ def profile(
     lift: npt.ArrayLike,
     drag: npt.ArrayLike,
     *,
-    aspect: float = BLADE_ASPECT_RATIO,
+    aspect: Annotated[float, Positive()] = BLADE_ASPECT_RATIO,
 ) -> Profile:
     """A profile from a table that may end at stall.
 
@@ -137,8 +136,6 @@ def profile(
     a, cl, cd = (vector(f"{what} of profile {name!r}", x) for what, x in
                  (("angle", angle), ("lift", lift), ("drag", drag)))  # fmt: skip
     _check(name, a, cl, cd)
-    if not aspect > 0.0:
-        raise ConfigError(f"aspect = {aspect:g} of profile {name!r} must be positive.")
     if a[0] <= ROUND_ATOL - np.pi and a[-1] >= np.pi - ROUND_ATOL:
         return Profile(name, a, cl, cd)
     return _carried_on(name, (a, cl, cd), 1.11 + 0.018 * aspect)
@@ -150,8 +147,7 @@ def _check(name: str, a: Array, cl: Array, cd: Array) -> None:
         raise ConfigError(f"profile {name!r} has {a.size} angles, {cl.size} lifts and {cd.size} "
                           "drags; as many of each, two or more.")  # fmt: skip
     if (np.diff(a) <= 0.0).any() or a[0] < -np.pi - ROUND_ATOL or a[-1] > np.pi + ROUND_ATOL:
-        raise ConfigError(f"angles of profile {name!r} do not ascend within -pi to pi.",
-                          hint="Angles of attack are in radians.")  # fmt: skip
+        raise ConfigError(f"angles of profile {name!r} do not ascend within -pi to pi [rad].")
     if (cd < 0.0).any():
         raise ConfigError(f"profile {name!r} has a drag of {cd.min():g}; it must not be negative.")
     if not 0.0 < a[-1] < np.pi / 2 and a[-1] < np.pi - ROUND_ATOL:

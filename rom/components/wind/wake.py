@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 from numba import carray
 
-from rom.arguments import finite
+from rom.arguments import finite, not_negative
 from rom.components.cosserat.bodies import RodBody
 from rom.components.wind.blade_element import (
     PROFILE_START,
@@ -187,10 +187,9 @@ def over_time(wind: npt.ArrayLike) -> Array:
     given = finite("wind", wind, None)
     winds = np.array([[0.0, given]]) if given.ndim == 0 else given
     if winds.ndim != 2 or winds.shape[1:] != (2,) or not len(winds):
-        raise ConfigError(f"a wind of shape {given.shape} is no speed over time.",
-                          hint="Give one speed, or rows of an instant and a speed.")  # fmt: skip
+        text = f"a wind of shape {given.shape} is neither a speed nor rows of instant and speed."
+        raise ConfigError(text)
     if (np.diff(winds[:, 0]) <= 0.0).any():
         raise ConfigError("instants of a wind must ascend.")
-    if (winds[:, 1] < 0.0).any():
-        raise ConfigError(f"the wind of {winds[:, 1].min():g} m/s must not be negative.")
+    not_negative("wind [m/s]", winds[:, 1].min())
     return winds

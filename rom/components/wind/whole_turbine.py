@@ -9,21 +9,24 @@ Source:
     system development, NREL/TP-500-38060, 2009.
 """
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from functools import cache
+from typing import Annotated, Any
 
 import numpy as np
 import numpy.typing as npt
+from numba import carray
 
 from rom import rotation
+from rom.arguments import Count, typed
 from rom.body import FlexibleBody
 from rom.components.cosserat import body
 from rom.components.wind.blade_element import in_wind
-from rom.components.wind.blading import check_pitch
-from rom.components.wind.control import CUT_OUT_WIND
-from rom.components.wind.controlled import add_control
-from rom.components.wind.wake import in_late_wind, over_time
+from rom.components.wind.blading import Pitch
+from rom.components.wind.control import CUT_OUT_WIND, Controller, advance
+from rom.components.wind.wake import NEVER_BEFORE, in_late_wind, over_time
 from rom.components.wind.wind_turbine import (
     CONE_ANGLE,
     GEAR_RATIO,
@@ -41,7 +44,9 @@ from rom.components.wind.wind_turbine import (
 )
 from rom.errors import ConfigError
 from rom.mbs.analysis.equilibrium import equilibrium
+from rom.mbs.elements.law_calls import LAW_TYPES, compiled_entry
 from rom.mbs.elements.nonlinear import Assembly
+from rom.mbs.kernels.compiled import inner
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.parts.bodies import Marker, Part
 from rom.mbs.results.solution import Solution
@@ -131,10 +136,11 @@ class Turbine:
         return seen @ basis.T
 
 
+@typed
 def turbine(  # noqa: PLR0913  one keyword per choice, all with defaults
-    segments: int = 48,
+    segments: Annotated[int, Count(1)] = 48,
     *,
-    tower_segments: int = 16,
+    tower_segments: Annotated[int, Count()] = 16,
     gravity: float = 9.80665,
     tilt: float = SHAFT_TILT,
     cone: float = CONE_ANGLE,
@@ -142,7 +148,7 @@ def turbine(  # noqa: PLR0913  one keyword per choice, all with defaults
     wind: npt.ArrayLike | None = None,
     late_wake: bool = False,
     controlled: bool = False,
-    pitch: float = 0.0,
+    pitch: Pitch = 0.0,
     speed: float = 0.0,
     shaft: tuple[float, float] = (SHAFT_STIFFNESS, SHAFT_DAMPING),
     hub_body: FlexibleBody | None = None,
@@ -179,10 +185,6 @@ def turbine(  # noqa: PLR0913  one keyword per choice, all with defaults
             is no hub, a wind that changes without a late wake, or one in which no controller works.
         ModelError: if a rod is none, see `cosserat.rod`.
     """
-    if segments < 1 or tower_segments < 0:
-        raise ConfigError(f"{segments} segments of a blade and {tower_segments} of the tower.",
-                          hint="A blade has one or more, a stiff tower none.")  # fmt: skip
-    check_pitch(pitch)
     if controlled and wind is not None and (most := over_time(wind)[:, 1].max()) > CUT_OUT_WIND:
         raise ConfigError(f"no controller works in a wind of {most:g} m/s, above 25 m/s.",
                           hint="Stand in it without: controlled=False.")  # fmt: skip
@@ -260,8 +262,8 @@ def _hub(mech: Mechanism, solid: FlexibleBody | None, at: Array, lean: Array, sp
 
 def _bearing(nacelle: Part, hub: Array, axis: Array) -> Marker:
     """The place of the nacelle on the axis of the shaft."""
-    behind = nacelle.at
-    return nacelle.marker(hub + axis * (axis @ (behind - hub)) - behind)
+    way = nacelle.at - hub
+    return nacelle.marker(axis * (axis @ way) - way)
 
 
 def _train(
@@ -276,18 +278,15 @@ def _train(
     hub, axis = place
     bearing = _bearing(nacelle, hub, axis)
     at = mech.design_point(bearing)
-    slow, fast = speed * axis, GEAR_RATIO * speed * axis
-    wheel = mech.add_rigid(
-        "wheel", mass=WHEEL_MASS, inertia=(WHEEL_INERTIA,) * 3, at=at, omega=slow
-    )
-    generator = mech.add_rigid(
-        "generator", mass=GENERATOR_MASS, inertia=(GENERATOR_INERTIA,) * 3, at=at, omega=fast
-    )
-    mech.revolute("slow", bearing, wheel.marker(NO_VELOCITY), axis=axis)
-    mech.revolute("fast", bearing, generator.marker(NO_VELOCITY), axis=axis)
+    for name, turns, mass, inertia, omega in (
+        ("wheel", "slow", WHEEL_MASS, WHEEL_INERTIA, speed * axis),
+        ("generator", "fast", GENERATOR_MASS, GENERATOR_INERTIA, GEAR_RATIO * speed * axis),
+    ):
+        part = mech.add_rigid(name, mass=mass, inertia=(inertia,) * 3, at=at, omega=omega)
+        mech.revolute(turns, bearing, part.marker(NO_VELOCITY), axis=axis)
     mech.gear("gear", "slow", "fast", ratio=GEAR_RATIO)
     end = turning.marker(NO_VELOCITY if turning.flexible is None else "shaft")
-    mech.revolute("shaft", wheel.marker(mech.design_point(end) - at), end, axis=axis)
+    mech.revolute("shaft", mech.part("wheel").marker(mech.design_point(end) - at), end, axis=axis)
     mech.rotational_spring("twist", "shaft", stiffness=shaft[0], damping=shaft[1])
 
 
@@ -314,3 +313,96 @@ def _mount(
     else:
         mech.fixed(f"root {k + 1}", flange, root)
     return flange, root
+
+
+# between the pitch that is asked for and that of a blade [N m/rad, N m s/rad]: 30 Hz and two
+# percent of critical damping with the inertia of a blade
+PITCH_STIFFNESS, PITCH_DAMPING = 971.35e6, 0.206e6
+CONTROLLER_SIZE = 5  # remembered: filtered speed, integral, pitch, torque, and the instant
+# markers: nacelle, generator, and flange and root of each blade; numbers of the axis, the first
+# pitch, and two directions of each blade without further pitch
+N_MARKERS, N_NUMBERS = 2 + 2 * N_BLADES, 4 + 6 * N_BLADES
+
+
+@inner
+def turn_of_blade(flange, root, given, out):
+    """How far a blade has pitched further [rad], positive as the controller counts.
+
+    ``flange`` and ``root`` have axes (3, 3); ``given`` (6,) the first two axes of the root at the
+    start, in axes of the flange. Fills (3,) the axis of the bearing.
+    """
+    along = beside = 0.0
+    for i in range(3):
+        out[i] = root[3 * i + 2]
+        for j in range(3):
+            along += root[3 * i] * flange[3 * i + j] * given[j]
+            beside += root[3 * i] * flange[3 * i + j] * given[3 + j]
+    return math.atan2(-beside, along)
+
+
+def control(t, parameters, motion, memory, out):
+    """Torque of the generator and moments of the actuators, a law of N_MARKERS markers."""
+    n = N_MARKERS
+    given, known = carray(parameters, (N_NUMBERS,)), carray(memory, (CONTROLLER_SIZE,))
+    moved, answer = carray(motion, (18 * n,)), carray(out, (6 * n + 2 + CONTROLLER_SIZE + 2,))
+    axes, omega = moved[3 * n : 12 * n], moved[15 * n : 18 * n]
+    moment, kept = answer[3 * n : 6 * n], answer[6 * n + 2 :]
+    axis, state, speed = np.empty(3), np.empty(4), 0.0
+    for i in range(3):
+        axis[i] = axes[3 * i] * given[0] + axes[3 * i + 1] * given[1] + axes[3 * i + 2] * given[2]
+        speed += (omega[3 + i] - omega[i]) * axis[i]
+    for i in range(4):
+        state[i] = known[i]
+    if known[4] > NEVER_BEFORE and t > known[4]:
+        advance(state, speed, t - known[4])
+    for i in range(4):
+        kept[i] = state[i]
+    kept[4] = max(t, known[4])
+    kept[5], kept[6] = state[2], state[3]
+    for i in range(3):
+        moment[i] = state[3] * axis[i]
+        moment[3 + i] = -state[3] * axis[i]
+    for k in range(N_BLADES):
+        a, b = 2 + 2 * k, 3 + 2 * k
+        flange, root = axes[9 * a : 9 * a + 9], axes[9 * b : 9 * b + 9]
+        angle = given[3] + turn_of_blade(flange, root, given[4 + 6 * k : 10 + 6 * k], axis)
+        rate = 0.0
+        for i in range(3):
+            rate -= (omega[3 * b + i] - omega[3 * a + i]) * axis[i]
+        held = PITCH_STIFFNESS * (state[2] - angle) - PITCH_DAMPING * rate
+        for i in range(3):
+            moment[3 * b + i] = -held * axis[i]
+            moment[3 * a + i] = held * axis[i]
+
+
+@cache
+def compiled_control() -> Any:
+    """The compiled law."""
+    return compiled_entry(control, LAW_TYPES)
+
+
+def add_control(
+    mechanism: Mechanism,
+    markers: tuple[Marker, ...],
+    axis: Array,
+    start: tuple[float, float],
+) -> None:
+    """Let the published controller work as the law "control".
+
+    It measures the speed of the generator, remembers what a `Controller` does from one accepted
+    step to the next, brakes the generator against the nacelle, and turns each blade on its bearing
+    to the pitch that is asked for, by a spring and a damper. Markers are those of nacelle and
+    generator, then of hub and root of each blade; it starts at a speed of the rotor and a pitch.
+    """
+    speed, pitch = start
+    axes = [rotation.matrix(mechanism.part(m.body).p) for m in markers]
+    one = Controller.at(GEAR_RATIO * speed, pitch)
+    turned = [(A.T @ B)[:, :2].T.ravel() for A, B in zip(axes[2::2], axes[3::2], strict=True)]
+    mechanism.law(
+        "control",
+        compiled_control(),
+        *markers,
+        parameters=np.concatenate([axes[0].T @ axis, [pitch], *turned]),
+        memory=[one.filtered, one.integral, one.pitch, one.torque, NEVER_BEFORE],
+        outputs=["pitch", "torque"],
+    )

@@ -15,9 +15,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from rom import rotation
-from rom.components.cosserat import Motion, Rod, along, equilibrium, loads, simulate
+from rom.components.cosserat import Motion, Rod, along, equilibrium, loads, rod, simulate
 from rom.mbs.parts import signals
 from rom.model import Array
 
@@ -49,6 +50,12 @@ def stations() -> dict[str, Array]:
     return dict(zip(COLUMNS, np.loadtxt(STATIONS, delimiter=",").T, strict=True))
 
 
+def _places(n: int) -> tuple[Array, Array, Array]:
+    """Vertices, middles of segments, and of what bends at a vertex, along a length of one."""
+    s = np.linspace(0, 1, n + 1)
+    return s, (s[1:] + s[:-1]) / 2, np.concatenate(([s[1] / 4], s[1:-1], [1 - s[1] / 4]))
+
+
 def blade(
     n: int = 48,
     *,
@@ -67,9 +74,7 @@ def blade(
         torsion: factor of the torsional rigidity [1]; a thousand keeps sections from turning.
     """
     table = stations()
-    eta = np.linspace(0, 1, n + 1)
-    middles = (eta[1:] + eta[:-1]) / 2
-    cells = np.concatenate(([eta[1] / 4], eta[1:-1], [1 - eta[1] / 4]))  # what bends at a vertex
+    eta, middles, cells = _places(n)
     turn = rotation.matrix(rotation.exp([azimuth, 0, 0]))
 
     def at(name: str, where: float | Array) -> Array:
@@ -77,9 +82,8 @@ def blade(
 
     def place(s: float) -> tuple[Array, Array]:
         twist = float(np.radians(at("twist_deg", s)))  # leading edge into the wind
-        return turn @ [0, 0, HUB_RADIUS + BLADE_LENGTH * s], turn @ rotation.matrix(
-            rotation.exp([0, 0, -twist])
-        )
+        axes = turn @ rotation.matrix(rotation.exp([0, 0, -twist]))
+        return turn @ [0, 0, HUB_RADIUS + BLADE_LENGTH * s], axes
 
     edge, flap = at("inertia_edge", middles), at("inertia_flap", middles)
     return along(
@@ -104,8 +108,7 @@ def tower(n: int = 40, *, top: float = 0.0, shear: float = 1.0, torsion: float =
         shear: factor of the shear rigidity [1], see `blade`.
         torsion: factor of the torsional rigidity [1].
     """
-    s = np.linspace(0, 1, n + 1)
-    middles, cells = (s[1:] + s[:-1]) / 2, np.concatenate(([s[1] / 4], s[1:-1], [1 - s[1] / 4]))
+    s, middles, cells = _places(n)
 
     def tube(where: Array) -> tuple[Array, Array]:
         """Area, and second moment of area about a diameter."""
@@ -197,18 +200,94 @@ def run_up(
         return x, rotation.multiply(turn, home[1]), np.cross([speed(t), 0, 0], x), speed(t) * axis
 
     weight = loads(rod, weight=(0, 0, -gravity))
-    given: dict[str, Any] = {
-        "load": weight,
-        "start": equilibrium(rod, weight) if gravity else None,
-    } | options
-    motion = simulate(rod, t_end, dt, root=root, **given)
+    start = equilibrium(rod, weight) if gravity else None
+    motion = simulate(rod, t_end, dt, root=root, **{"load": weight, "start": start} | options)
     angles = np.array([angle(t) for t in motion.t])
     outward = rod.x[-1] / np.linalg.norm(rod.x[-1])
-    behind = np.cross(outward, [1.0, 0, 0])
-    basis = np.array([[1.0, 0, 0], behind, outward])
+    basis = np.array([[1.0, 0, 0], np.cross(outward, [1.0, 0, 0]), outward])
     back = [rotation.matrix(rotation.exp([-a, 0, 0])) for a in angles]
     ends = [A @ x - rod.x[-1] for A, x in zip(back, motion.x[:, -1], strict=True)]
     about = [np.cross(x[0], r[:3]) + rotation.matrix(p[0]) @ r[3:]
              for x, p, r in zip(motion.x, motion.p, motion.root, strict=True)]  # fmt: skip
     speeds = np.array([speed(t) for t in motion.t])
     return RunUp(motion, angles, speeds, np.array(ends) @ basis.T, np.array(about)[:, 0])
+
+
+SLOW_GENERATOR_INERTIA = GENERATOR_INERTIA * GEAR_RATIO**2  # kg m^2, on the slow side of the gear
+RIGID_STIFFNESS = 1e12  # [N], [N m^2] of what does not bend; the root of a blade has 2e10
+
+
+@dataclass(frozen=True)
+class Rotor:
+    """One third of generator, shaft and hub, and one blade: a rotor that a torque drives.
+
+    Without gravity the three blades move alike. All of it is one rod: the generator is the plate at
+    its start, the shaft twists, the hub is a corner and a link that do not bend.
+
+    Attributes:
+        rod: generator plate, two segments of shaft along the first axis, hub link, blade.
+        free: (6 N + 9,) which dofs may move: generator and hub stay on the axis.
+    """
+
+    rod: Rod
+    free: npt.NDArray[np.bool_]
+
+    def torque(self, total: float) -> tuple[Array, Array]:
+        """Loads (N + 1, 3), (N + 2, 3) of a torque of the whole rotor on the generator [N m]."""
+        moment = np.zeros((len(self.rod.p), 3))
+        moment[0, 0] = total / N_BLADES
+        return np.zeros_like(self.rod.x), moment
+
+    def speeds(self, motion: Motion) -> Array:
+        """(k, 2) angular velocity of generator and hub about the axis [rad/s]."""
+        hub = [rotation.matrix(p)[0] @ w for p, w in zip(motion.p[:, 3], motion.v[:, 18:21],
+                                                        strict=True)]  # fmt: skip
+        return np.column_stack([motion.v[:, 2], hub])
+
+    def momentum(self, motion: Motion) -> Array:
+        """(k,) angular momentum of the whole rotor about its axis [kg m^2/s]."""
+        v = np.concatenate([motion.v, np.zeros((len(motion.t), 3))], axis=1)
+        v = v.reshape(len(motion.t), -1, 6)
+        x, u, mass = motion.x, v[:, :-1, 3:], self.rod.mass
+        orbital = (mass * (x[:, :, 1] * u[:, :, 2] - x[:, :, 2] * u[:, :, 1])).sum(axis=1)
+        own = self.rod.inertia * v[:, :, :3]
+        first = [[rotation.matrix(p)[0] for p in row] for row in motion.p]
+        return N_BLADES * (orbital + np.einsum("tkc,tkc->t", np.array(first), own))
+
+
+def rotor(n: int = 24, *, blade_rod: Rod | None = None) -> Rotor:
+    """The rotor of the NREL 5 MW turbine.
+
+    Args:
+        n: segments of the blade.
+        blade_rod: another blade, upright, whose root is on the hub.
+
+    Raises:
+        ModelError: as `cosserat.rod`.
+    """
+    one = blade(n) if blade_rod is None else blade_rod
+    n = one.h.size
+    along = rotation.quaternion(np.array([[0.0, 0, 1], [0, 1, 0], [-1, 0, 0]]))  # third axis: x
+    x = np.concatenate([[[-HUB_OVERHANG, 0, 0], [-HUB_OVERHANG / 2, 0, 0], [0, 0, 0]], one.x])
+    p = np.concatenate([[along] * 3, one.p[:1], one.p[1:]])
+    # of the half and the whole segment that twist
+    twist = 0.75 * HUB_OVERHANG * SHAFT_STIFFNESS / N_BLADES
+    stiff = [RIGID_STIFFNESS] * 3
+    whole = rod(
+        x, p, stretch=np.concatenate([[stiff] * 3, one.stretch]),
+        bend=np.concatenate([[[RIGID_STIFFNESS, RIGID_STIFFNESS, twist]] * 2, [stiff], one.bend]),
+        bends=[True, True, False] + [True] * n,
+    )  # fmt: skip
+    inertia = np.concatenate([np.zeros((4, 3)), one.inertia[1:]])
+    inertia[0, 2] = SLOW_GENERATOR_INERTIA / N_BLADES
+    inertia[3, :2] = HUB_INERTIA / N_BLADES  # both, since the sections of the root are turned
+    viscous = np.concatenate([np.zeros((3, 3)), one.viscous_bend])
+    viscous[:2, 2] = twist * SHAFT_DAMPING / SHAFT_STIFFNESS
+    stretched = np.concatenate([np.zeros((3, 3)), one.viscous_stretch])
+    whole = whole._replace(
+        mass=np.concatenate([np.zeros(3), one.mass]), inertia=inertia,
+        viscous_bend=viscous, viscous_stretch=stretched,
+    )  # fmt: skip
+    free = np.ones(6 * (n + 3) + 9, dtype=bool)
+    free[[0, 1]] = free[3:6] = free[15:18] = False  # generator and hub centre
+    return Rotor(whole, free)

@@ -10,7 +10,7 @@ import rom
 from cases.long import few
 from cases.paths import RANKS
 from cases.ranks.environment import on_ranks
-from cases.refusals import refused
+from cases.refusals import refused, refuses
 from cases.sheets import distorted, strip
 from rom.components.assumed_strain import (
     Metal,
@@ -400,7 +400,8 @@ def test_plane_matrices_reduce_as_they_are():
 
 
 CORNERS = [(0, 0), (1, 0), (1, 1), (0, 1)]
-SMALL, SOFT = sheet(*distorted((2, 2))), Metal(1.0, 0.3)
+X, T = distorted((2, 2))
+SMALL, SOFT = sheet(X, T), Metal(1.0, 0.3)
 
 
 test_messages_name_what_is_wrong = refused(
@@ -409,37 +410,29 @@ test_messages_name_what_is_wrong = refused(
     (lambda: Metal(1.0, 0.3, 1.0, 1.0, -2.0), MaterialError, "hardening=-2.0"),
     (lambda: rectangle((0, 2), CORNERS), ConfigError, r"n = \(0, 2\)"),
     (lambda: rectangle((1, 2), CORNERS, "y"), ConfigError, "diagonal = 'y'"),
-    (lambda: sheet(SMALL.points, SMALL.triangles + 5), MeshError, "nodes 5 to 13; there are 9"),
+    (lambda: sheet(SMALL.points, SMALL.triangles + 5), MeshError, "nodes 5 to 13; there are 0"),
     (lambda: sheet(SMALL.points.T, SMALL.triangles), MeshError, r"points \(2, 9\)"),
     (lambda: sheet(*distorted((2, 2)), thickness=0.0), ConfigError, r"thickness \[m\] = 0"),
     (lambda: sheet(SMALL.points - 2, SMALL.triangles, state="axisymmetric"), MeshError,
-     "radius of node 0 is -2 m"),
+     "-2 m of node 0, is a radius"),
     (lambda: forces(SMALL, SOFT, SMALL.points[:3]), ConfigError, r"has shape \(3, 2\)"),
     (lambda: tangent(SMALL, SOFT, np.nan * SMALL.points), ConfigError, "is not finite"),
     (lambda: fly(SMALL, SOFT, np.zeros((3, 2)), [0], 1.0), ConfigError, "velocities has"),
     (lambda: fly(SMALL, SOFT, 0 * SMALL.points, [18], 1.0), ConfigError, "held dofs 18 to 18"),
-    (lambda: fly(SMALL, SOFT, 0 * SMALL.points, [0], -1.0), ConfigError, r"t_end \[s\] = -1"),
+    (lambda: fly(SMALL, SOFT, 0 * SMALL.points, [0], -1.0), ConfigError, "t_end = -1"),
     (lambda: equilibrium(SMALL, SOFT, np.zeros(3), [0]), ConfigError, "forces of load 0"),
-    (lambda: equilibrium(SMALL, SOFT, 0 * SMALL.points, [0], steps=0), ConfigError, "0 load"),
+    (lambda: equilibrium(SMALL, SOFT, 0 * SMALL.points, [0], steps=0), ConfigError, "steps = 0"),
+    (lambda: sheet(X, T, element="F2"), ConfigError, "F2"),
+    (lambda: sheet(X, T[:, ::-1]), MeshError, "triangle 0 has the area"),
+    (lambda: sheet(np.vstack([X, X[:1] - 1]), [*T, T[0], T[0]]), MeshError, "belongs to 4"),
+    (lambda: in_space(sheet(X, T, state="plane strain"), STEEL, {}), ConfigError, "plane strain"),
+    (lambda: in_space(SMALL, STEEL, {"edge": np.flatnonzero(X[:, 0] < 1e-9)}), InterfaceError,
+     "'edge' has no triangle"),
+    (lambda: stiffness_by_sides(SMALL, STEEL, share=(2, 2)), ConfigError, "share 2 of 2"),
+    (lambda: stiffness_by_sides(sheet(X, T, state="axisymmetric"), STEEL), ConfigError, "axisymm"),
 )  # fmt: skip
 
 
-def test_wrong_input_is_named():
-    X, T = distorted((2, 2))
-    with pytest.raises(ConfigError, match="F2"):
-        sheet(X, T, element="F2")
-    with pytest.raises(MeshError, match="triangle 0 has the area"):
-        sheet(X, T[:, ::-1])
-    with pytest.raises(MeshError, match="belongs to 4"):
-        sheet(np.vstack([X, X[:1] - 1]), np.vstack([T, T[:1], T[:1]]))
-    with pytest.raises(ConfigError, match="plane strain"):
-        in_space(sheet(X, T, state="plane strain"), STEEL, {})
-    with pytest.raises(InterfaceError, match="'edge' has no triangle"):
-        in_space(sheet(X, T), STEEL, {"edge": np.flatnonzero(X[:, 0] < 1e-9)})
-    with pytest.raises(ConfigError, match="share 2 of 2"):
-        stiffness_by_sides(sheet(X, T), STEEL, share=(2, 2))
-    with pytest.raises(ConfigError, match="axisymmetric"):
-        stiffness_by_sides(sheet(X, T, state="axisymmetric"), STEEL)
+def test_an_equilibrium_that_is_not_found_names_its_instant():
     body, f, held, _ = cook(2, "/", 1e6, state="plane strain")
-    with pytest.raises(SolverError, match="instant 1 of 1"):
-        equilibrium(body, Metal(240.0, 0.3), f, held)
+    refuses(SolverError, "instant 1", lambda: equilibrium(body, Metal(240.0, 0.3), f, held))

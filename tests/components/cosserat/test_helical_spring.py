@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from cases.refusals import refuses
 from rom.components.cosserat import clamped, equilibrium, linearised, loads, reference
 from rom.components.cosserat.helical_spring import (
     HelicalSpring,
@@ -101,12 +102,9 @@ def test_stress_and_clearance():
 
 
 def test_impossible_springs_are_named():
-    with pytest.raises(ModelError, match="wire = 0 must be positive"):
-        spring(0, 10, 6, 15)
-    with pytest.raises(ModelError, match=r"must be below diameter = 0\.01"):
-        spring(10, 10, 1, 15)
-    with pytest.raises(ModelError, match=r"free length 0\.006 m is not above the solid length"):
-        spring(1, 10, 6, 6)
+    refuses(ModelError, "wire = 0 must be positive", spring, 0, 10, 6, 15)
+    refuses(ModelError, r"must be below diameter = 0\.01", spring, 10, 10, 1, 15)
+    refuses(ModelError, r"free length 0\.006 m is not above the solid length", spring, 1, 10, 6, 6)
 
 
 def test_a_load_that_closes_the_spring_shortens_it_in_proportion():

@@ -4,18 +4,20 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from cases.refusals import refuses
 from rom import rotation
 from rom.components.cosserat import Shape, elastic_energy, linearised, reference, straight
 from rom.components.cosserat.helical_spring import HelicalSpring, plate_compliance, spring_rod
 from rom.components.hand.cable import Hole, Tendon
 from rom.components.hand.compliant_hand import (
     PHALANX_RIGIDITY_RATIO,
+    Bar,
     Finger,
     close,
+    grasp,
     hand,
     rest,
 )
-from rom.components.hand.grasp import Bar, grasp
 from rom.errors import ConfigError, ModelError, SolverError
 
 MM = 1e-3
@@ -43,9 +45,8 @@ def test_one_joint_under_tension():
         posture = close(bench(), tension=tension, start=posture)
         assert_allclose(np.degrees(posture.angles), [angle], rtol=1e-3)
         assert_allclose(posture.tip / MM, [x, 0, z], rtol=2e-3, atol=1e-9)
-        assert_allclose(
-            posture.finger.tendon.length(posture.shape) / MM, cable, rtol=1e-3, atol=5e-3
-        )
+        length = posture.finger.tendon.length(posture.shape)
+        assert_allclose(length / MM, cable, rtol=1e-3, atol=5e-3)
         assert_allclose(posture.pull / MM, pull, rtol=1e-3)
 
 
@@ -212,20 +213,14 @@ def test_the_hand_has_fifteen_joints():
 
 def test_what_no_finger_can_do_is_named():
     finger = Finger(n=4)
-    with pytest.raises(ConfigError, match="a cable does not push"):
-        close(finger, tension=-1.0)
-    with pytest.raises(ConfigError, match="both tension and pull"):
-        close(finger, tension=1.0, pull=1.0)
-    with pytest.raises(ModelError, match="3 springs and 2 phalanges"):
-        Finger(phalanges=(1.0, 1.0))
-    with pytest.raises(ModelError, match="the last >= 0"):
-        Finger(phalanges=(0.0, 1.0, 1.0))
-    with pytest.raises(ModelError, match="a tendon of 1 holes"):
-        Tendon((Hole(0, 0, (0, 0, 0)),))
-    with pytest.raises(ModelError, match="must not be negative"):
-        Tendon((Hole(0, 0, (0, 0, 0)), Hole(1, 1, (0, 0, 0))), friction=-0.1)
-    with pytest.raises(ConfigError, match=r"pull .* = 0\.5 must be at least 0 and below 0\.0216"):
-        close(finger, pull=0.5)
+    refuses(ConfigError, "tension = -1 must not", close, finger, tension=-1.0)
+    refuses(ConfigError, "both tension and pull", close, finger, tension=1.0, pull=1.0)
+    refuses(ModelError, "3 springs and 2 phalanges", Finger, phalanges=(1.0, 1.0))
+    refuses(ModelError, "the last >= 0", Finger, phalanges=(0.0, 1.0, 1.0))
+    refuses(ModelError, "a tendon of 1 holes", lambda: Tendon((Hole(0, 0, (0, 0, 0)),)))
+    holes = Hole(0, 0, (0, 0, 0)), Hole(1, 1, (0, 0, 0))
+    refuses(ModelError, "must not be negative", Tendon, holes, friction=-0.1)
+    refuses(ConfigError, r"0\.5 must .* below 0\.0216", close, finger, pull=0.5)
 
     def lost(shape):
         r, K = finger.stops(shape)
@@ -263,6 +258,6 @@ def test_contact_with_a_bar_has_its_tangent_and_balances():
     there, back = (Shape(last.shape.x + s * d[:-1, 3:], last.shape.p) for s in (1, -1))
     change = (contact(there)[0] - contact(back)[0]) / 2
     assert_allclose(K @ d.ravel()[:-3], change, rtol=1e-4, atol=1e-9 * np.abs(r).max())
-    with pytest.raises(ConfigError, match=r"the bar reaches 0\.005 m into"):
-        grasp(finger, Bar((20 * MM, 34 * MM), 20 * MM), [1.0])
+    close_by = Bar((20 * MM, 34 * MM), 20 * MM)
+    refuses(ConfigError, r"the bar reaches 0\.005 m into", grasp, finger, close_by, [1.0])
     assert bar.pressure(held)[0].max() == 0.0

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from cases.refusals import refuses
 from rom.components.hand.control_chart import COUPLINGS, GROUPS, NO_GROUP, Chart, envelope, muscle
 from rom.errors import ConfigError
 
@@ -86,7 +87,5 @@ def test_envelope_of_noise_is_its_strength():
 
 
 def test_signals_that_do_not_fit_are_refused():
-    with pytest.raises(ConfigError, match="2 samples of the extensor for 3"):
-        Chart().follow(np.zeros(3), np.zeros(2), DT)
-    with pytest.raises(ConfigError, match="miss 450 Hz"):
-        envelope(np.zeros(10), 2e-3)
+    refuses(ConfigError, "2 samples", lambda: Chart().follow(np.zeros(3), np.zeros(2), DT))
+    refuses(ConfigError, "miss 450 Hz", envelope, np.zeros(10), 2e-3)

@@ -8,6 +8,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import rom
+from cases.refusals import refuses
 from rom.components.hand.budgets import (
     mass_budget,
     phalanx_stress,
@@ -25,8 +26,7 @@ from rom.components.hand.held_objects import (
     hold,
     table,
 )
-from rom.components.hand.moving_hand import Build, Drive, Seat, moving_hand
-from rom.components.hand.tip_loads import one_finger, tip_marker
+from rom.components.hand.moving_hand import Build, Drive, Seat, moving_hand, one_finger, tip_marker
 from rom.components.hand.winches import Motor, winches
 from rom.errors import ConfigError
 
@@ -35,6 +35,10 @@ THREE = ("thumb", "index", "middle")
 BAR = Held((26 * MM, 20 * MM, 28 * MM), 20 * MM, 0.05, axis=(0, 1, 0), length=0.06)
 BALL = Held((26 * MM, 20 * MM, 28 * MM), 20 * MM, 0.05)
 TIMES = {"t_end": 1.2, "dt": 1e-3, "rho_inf": 0.5}
+
+
+def at_rest(mech):
+    return rom.snapshot(mech, rom.equilibrium(mech))
 
 
 def gripping(held, mu, gravity, leaves=None):
@@ -94,9 +98,8 @@ def test_a_bar_slips_where_friction_is_below_its_weight_over_the_pressure():
     across = [np.linalg.norm(f[-1][[0, 2]]) for f in contact_forces(upright(0.8), "thing").values()]
     limit = weight / sum(across)
     held, slips = upright(1.6 * limit), upright(0.7 * limit)
-    assert_allclose(
-        sum(f[-1, 1] for f in contact_forces(held, "thing").values()), weight, rtol=0.01
-    )
+    lifted = sum(f[-1, 1] for f in contact_forces(held, "thing").values())
+    assert_allclose(lifted, weight, rtol=0.01)
     fallen = [sol.position("thing")[-1, 1] - BAR.centre[1] for sol in (held, slips)]
     assert fallen[0] > -5 * MM and fallen[1] < -20 * MM
 
@@ -134,10 +137,9 @@ def test_a_table_goes_down_smoothly_and_things_stand_on_it():
 
 def test_springs_bear_the_cable_and_the_weight_that_hangs():
     """Straight finger, hanging: force along a spring = tension of the cable less what hangs."""
-    finger, T = Finger(n=4), 0.0
-    mech = moving_hand({"index": finger}, seats={"index": Seat()}, gravity=(0, 0, g),
-                       drives={"index": Drive(tension=T)})  # fmt: skip
-    found = rom.snapshot(mech, rom.equilibrium(mech))
+    slack = {"index": Drive(tension=0.0)}
+    mech = moving_hand({"index": Finger(n=4)}, gravity=(0, 0, g), drives=slack)
+    found = at_rest(mech)
     below = [part.mass for name, part in mech.parts.items() if name != "palm"]
     assert_allclose(spring_loads(found, "index", 1)[0][-1], sum(below) * g, rtol=1e-6)
     C = 10.0
@@ -149,24 +151,21 @@ def test_springs_bear_the_cable_and_the_weight_that_hangs():
 def test_loads_across_the_tip_bend_the_last_spring_and_phalanx():
     """Lever arms of 18 mm to the far end of the spring, 10 mm to its plate; a twist bends not."""
     finger, F = Finger(n=4), 5e-3
-    mech = one_finger(finger, 0.0, (0.0, F, 0.0))
-    found = rom.snapshot(mech, rom.equilibrium(mech))
+    found = at_rest(one_finger(finger, 0.0, (0.0, F, 0.0)))
     assert_allclose(spring_loads(found, "finger", 3)[1][-1], F * 18 * MM, rtol=3e-3)
     stress = 4 * F * 10 * MM / (np.pi * (5 * MM) ** 3)
     assert_allclose(phalanx_stress(found, "finger", 3), stress, rtol=3e-3)
     mech = one_finger(finger)
     mech.torque("twist", tip_marker(mech, finger), (0.0, 0.0, 1e-4))
-    found = rom.snapshot(mech, rom.equilibrium(mech))
-    assert spring_loads(found, "finger", 3)[1][-1] < 1e-7
+    assert spring_loads(at_rest(mech), "finger", 3)[1][-1] < 1e-7
 
 
 def test_wire_is_judged_by_shares_of_its_strength():
     """Music wire of 0.7 mm: 2211 / 0.7^0.145 MPa; 45 % of it in shear, 75 % in bending."""
     strength = 2211e6 / 0.7**0.145
-    mech = one_finger(Finger(n=2), 2.0)
-    found = rom.snapshot(mech, rom.equilibrium(mech))
-    said = {row.quantity: row.limit for row in stress_budget(
-        found, {"finger": Finger(n=2)}, motor=3.0, bone=5e7).rows}  # fmt: skip
+    found, fingers = at_rest(one_finger(Finger(n=2), 2.0)), {"finger": Finger(n=2)}
+    rows = stress_budget(found, fingers, motor=3.0, bone=5e7).rows
+    said = {row.quantity: row.limit for row in rows}
     for what, share in (("shear", 0.45), ("bending", 0.75)):
         limit = said[f"finger spring 1, {what} of the wire [Pa]"]
         assert_allclose(float(limit.removeprefix("<= ")), share * strength, rtol=1e-3)
@@ -198,22 +197,20 @@ def test_palm_and_phalanges_weigh_as_blocks_and_bars():
     m, r, h = 1200 * np.pi * 25e-6 * 0.018, 5e-3, 0.018
     assert_allclose(bone.mass, m)
     assert_allclose(bone.second, m * np.diag([r * r / 4, r * r / 4, h * h / 12]), atol=1e-15)
-    with pytest.raises(ConfigError, match=r"it takes in 0 to 0\.0216 m"):
-        moving_hand({"index": Finger(n=2)}, drives={"index": Drive(pull=22 * MM)})
+    drives = {"index": Drive(pull=22 * MM)}
+    refuses(ConfigError, r"0 to 0\.0216 m", moving_hand, {"index": Finger(n=2)}, drives=drives)
 
 
 def test_budgets_add_up_and_say_what_is_too_much():
     """Masses of bars, wire and cable; limits of motor and bone that are exceeded."""
-    finger = Finger(n=4)
-    mech = moving_hand({"index": finger}, seats={"index": Seat()},
-                       drives={"index": Drive(tension=2.0)}, build=Build(palm=0.1))  # fmt: skip
+    finger, drives = Finger(n=4), {"index": Drive(tension=2.0)}
+    mech = moving_hand({"index": finger}, drives=drives, build=Build(palm=0.1))
     mass = mass_budget(mech, most=0.1)
     bones = 1200 * np.pi * 5e-3**2 * 0.04
     wire = 3 * 7850 * np.pi / 4 * 0.7e-3**2 * np.hypot(np.pi * 7e-3 * 5, 8e-3)
     assert_allclose(mass.rows[-1].value, 0.1 + bones + wire + 1.6e-3 * 0.054, rtol=2e-3)
     assert not mass.ok and mass_budget(mech, most=0.11).ok
-    found = rom.snapshot(mech, rom.equilibrium(mech))
-    stress = stress_budget(found, {"index": finger}, motor=1.9, bone=50e6)
+    stress = stress_budget(at_rest(mech), {"index": finger}, motor=1.9, bone=50e6)
     assert [row.quantity for row in stress.rows if not row.ok] == ["index motor [N]"]
     assert_allclose(stress.rows[-1].value, 2.0, rtol=1e-9)
 
@@ -240,11 +237,7 @@ def test_what_cannot_be_held_is_named():
     ):
         with pytest.raises(ConfigError, match=words):
             hold(mech, "ball", replace(BALL, **change))
-    with pytest.raises(ConfigError, match="nothing holds 'ball'"):
-        hold(rom.Mechanism(), "ball", BALL)
-    with pytest.raises(ConfigError, match="'ball' on a table needs gravity"):
-        table(mech, "ball", BALL, leaves=1.0)
-    with pytest.raises(ConfigError, match=r"mu = -0\.1 must not be negative"):
-        replace(SKIN_CONTACT, mu=-0.1)
-    with pytest.raises(ConfigError, match=r"shape \(10, 4\), needed is \(n, 5\)"):
-        winches(np.zeros((10, 4)), 1e-3)
+    refuses(ConfigError, "nothing holds 'ball'", lambda: hold(rom.Mechanism(), "ball", BALL))
+    refuses(ConfigError, "'ball' on a table needs gravity", table, mech, "ball", BALL, leaves=1.0)
+    refuses(ConfigError, r"mu = -0\.1 must not be negative", replace, SKIN_CONTACT, mu=-0.1)
+    refuses(ConfigError, r"shape \(10, 4\), needed is \(n, 5\)", winches, np.zeros((10, 4)), 1e-3)

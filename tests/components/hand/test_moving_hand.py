@@ -6,12 +6,20 @@ from numba import njit
 from numpy.testing import assert_allclose
 
 import rom
+from cases.refusals import refuses
 from rom import rotation
 from rom.components.cosserat.bodies import POSE_SIZE
 from rom.components.cosserat.coils import add_bending, bend_of
 from rom.components.hand.compliant_hand import LENGTHS, Finger, close, hand
-from rom.components.hand.moving_hand import SEATS, Build, Drive, Seat, moving_hand
-from rom.components.hand.tip_loads import deflections, one_finger
+from rom.components.hand.moving_hand import (
+    SEATS,
+    Build,
+    Drive,
+    Seat,
+    deflections,
+    moving_hand,
+    one_finger,
+)
 from rom.components.hand.winches import motor_force, shaft, shaft_moment
 from rom.errors import ConfigError, ModelError, SolverError
 
@@ -25,6 +33,16 @@ INDEX = {  # tension [N]: angle of a joint [deg], x, z of the tip, pull [mm]; ma
 
 def tip_of(solution, name="finger"):
     return solution.position(f"{name} phalanx 3", "distal")[-1]
+
+
+def driven(finger, drive, name="index", seat=None):
+    """A hand of one finger, or of the index of which one joint is driven."""
+    one = name.split()[0]
+    return moving_hand({one: finger}, seats={one: seat or Seat()}, drives={name: drive})
+
+
+def at_rest(mech):
+    return rom.snapshot(mech, rom.equilibrium(mech))
 
 
 def cable_length(solution, name="finger"):
@@ -44,8 +62,7 @@ def angle_of(solution, name, k):
 @pytest.mark.parametrize("tension", INDEX)
 def test_a_finger_in_a_mechanism_has_the_postures_of_the_boundary_value_problem(tension):
     angle, x, z, pull = INDEX[tension]
-    mech = one_finger(Finger(n=16), tension)
-    found = rom.snapshot(mech, rom.equilibrium(mech))
+    found = at_rest(one_finger(Finger(n=16), tension))
     assert_allclose([np.degrees(angle_of(found, "finger", k)) for k in (1, 2, 3)], 3 * [angle],
                     rtol=3e-4)  # fmt: skip
     assert_allclose(tip_of(found) / MM, [x, 0, z], rtol=5e-4, atol=1e-9)
@@ -56,8 +73,7 @@ def test_a_finger_in_a_mechanism_has_the_postures_of_the_boundary_value_problem(
 def test_a_finger_in_a_mechanism_gives_way_as_by_itself(stiffener, load):
     finger = Finger(n=4, stiffener=stiffener)
     alone = close(finger, tension=1.5, load=load)
-    mech = one_finger(finger, 1.5, load)
-    found = rom.snapshot(mech, rom.equilibrium(mech))
+    found = at_rest(one_finger(finger, 1.5, load))
     assert_allclose(tip_of(found), alone.tip, atol=1e-6 * LENGTHS["index"])
     angles = [angle_of(found, "finger", k) for k in (1, 2, 3)]
     assert_allclose(angles, alone.angles, rtol=1e-6)
@@ -120,12 +136,10 @@ def test_the_axis_of_a_bend_turns_with_its_plates_as_differences_say():
 
 def test_the_work_of_a_winch_goes_into_springs_losses_and_friction():
     """The balance of the energies, and the friction of the cable alone as what springs keep not."""
-    mu = 0.3
-    lost = []
+    mu, lost = 0.3, []
     for friction in (0.0, mu):
         drive = Drive(pull=lambda t: 9 * MM * np.sin(np.pi / 2 * min(t / 0.3, 1.0)) ** 2, EA=2e3)
-        mech = moving_hand({"index": Finger(n=2, friction=friction)}, seats={"index": Seat()},
-                           drives={"index": drive})  # fmt: skip
+        mech = driven(Finger(n=2, friction=friction), drive)
         sol = rom.simulate(mech, t_end=0.3, dt=1e-4, rho_inf=0.8)
         assert np.abs(sol.energy.balance).max() < 1e-6 * sol.energy.drives[-1]
         lost.append(sol.energy.damping[-1])
@@ -136,9 +150,7 @@ def test_the_work_of_a_winch_goes_into_springs_losses_and_friction():
 def test_a_winch_draws_in_what_the_finger_gives():
     finger = Finger(n=4)
     alone = close(finger, pull=8 * MM)
-    mech = moving_hand({"index": finger}, seats={"index": Seat()},
-                       drives={"index": Drive(pull=8 * MM, EA=1e5)})  # fmt: skip
-    found = rom.snapshot(mech, rom.equilibrium(mech))
+    found = at_rest(driven(finger, Drive(pull=8 * MM, EA=1e5)))
     pulled = motor_force(found, "index")[0]
     stretch = pulled / 1e5 * (54 - 8) * MM
     at = close(finger, pull=8 * MM - stretch)
@@ -150,9 +162,7 @@ def test_a_winch_draws_in_what_the_finger_gives():
 def test_a_seat_turns_a_finger_and_nothing_else():
     finger = Finger(n=4)
     seat = Seat((0.1, -0.2, 0.3), along=(1.0, 2.0, -1.0), palmar=(0.5, 1.0, 3.0))
-    mech = moving_hand({"thumb": finger}, seats={"thumb": seat},
-                       drives={"thumb": Drive(tension=1.0)})  # fmt: skip
-    found = rom.snapshot(mech, rom.equilibrium(mech))
+    found = at_rest(driven(finger, Drive(tension=1.0), "thumb", seat))
     alone = close(finger, tension=1.0).tip
     assert_allclose(seat.axes.T @ seat.axes, np.eye(3), atol=1e-14)
     assert_allclose(np.linalg.det(seat.axes), 1.0)
@@ -166,8 +176,7 @@ def test_a_conduit_that_bends_takes_its_share_of_the_force():
     quarter = np.linspace(np.pi / 2, 0, 9)
     arc = [(4.5 * MM + R * (1 - np.cos(a)), 0.0, -10 * MM - R * np.sin(a)) for a in quarter]
     drive = Drive(tension=lambda t: 40.0 * t, conduit=tuple(arc), transition_speed=1e-8)
-    mech = moving_hand({"index": Finger(n=3, friction=mu)}, seats={"index": Seat()},
-                       drives={"index": drive})  # fmt: skip
+    mech = driven(Finger(n=3, friction=mu), drive)
     sol = rom.simulate(mech, t_end=0.01, dt=1e-4, rho_inf=0.5)
     force = np.linalg.norm(sol.element("index cable").force[-1], axis=1)
     stations = sol.mechanism.tendons["index cable"].stations
@@ -181,10 +190,7 @@ def test_a_conduit_that_bends_takes_its_share_of_the_force():
 
 def test_a_joint_that_is_drawn_alone_bends_alone():
     """As a finger of that joint only; rigid bodies before and behind it."""
-    finger = Finger(n=16)
-    mech = moving_hand({"index": finger}, seats={"index": Seat()},
-                       drives={"index joint 2": Drive(tension=1.0)})  # fmt: skip
-    found = rom.snapshot(mech, rom.equilibrium(mech))
+    found = at_rest(driven(Finger(n=16), Drive(tension=1.0), "index joint 2"))
     angles = [angle_of(found, "index", k) for k in (1, 2, 3)]
     assert_allclose(np.degrees(angles), [0, 14.2067, 0], rtol=3e-4, atol=1e-6)
     plate = found.position("index phalanx 2", "proximal")[-1]
@@ -196,11 +202,8 @@ def test_a_joint_that_is_drawn_alone_bends_alone():
 def test_the_cable_in_a_sleeve_gives_way_like_a_spring_before_the_finger(sleeve):
     """Work of the winch = energy of springs and cable; stretch = tension times length over EA."""
     finger, EA, pull = Finger(n=4), 2e2, 4 * MM
-    mech = moving_hand({"index": finger}, seats={"index": Seat()},
-                       drives={"index": Drive(pull=pull, EA=EA, sleeve=sleeve)})  # fmt: skip
-    found = rom.snapshot(mech, rom.equilibrium(mech))
-    pulled = motor_force(found, "index")[0]
-    length = 54 * MM
+    found = at_rest(driven(finger, Drive(pull=pull, EA=EA, sleeve=sleeve)))
+    pulled, length = motor_force(found, "index")[0], 54 * MM
     stretch = pulled / EA * (length - pull) * (length + sleeve) / length
     held = close(finger, pull=pull - stretch)
     assert_allclose(pulled, held.tension, rtol=1e-6)
@@ -238,31 +241,24 @@ def test_one_shaft_draws_five_cables():
 
 
 def test_what_no_hand_can_do_is_named():
-    finger = {"index": Finger(n=2)}
-    with pytest.raises(ConfigError, match="drive of 'toe'"):
-        moving_hand(finger, drives={"toe": Drive(tension=1.0)})
-    with pytest.raises(ConfigError, match="seat of 'toe'"):
-        moving_hand({"toe": Finger(n=2)})
-    with pytest.raises(ConfigError, match="either a tension or a pull"):
-        moving_hand(finger, drives={"index": Drive()})
-    with pytest.raises(ConfigError, match="either a tension or a pull"):
-        moving_hand(finger, drives={"index": Drive(tension=1.0, pull=1 * MM)})
-    with pytest.raises(ConfigError, match=r"winch of 'index' is to take in 0\.03 m"):
-        moving_hand(finger, drives={"index": Drive(pull=30 * MM)})
-    with pytest.raises(ConfigError, match="cannot close towards"):
-        moving_hand(finger, seats={"index": Seat(palmar=(0.0, 0.0, 2.0))})
-    with pytest.raises(ConfigError, match="'index cable' are at one point"):
-        moving_hand(finger, drives={"index": Drive(tension=1.0, conduit=2 * ((0.0, 0.0, -0.1),))})
-    with pytest.raises(ModelError, match="'index' ends in a bare plate"):
-        moving_hand({"index": Finger(phalanges=(0.02, 0.02, 0.0), n=2)})
-    with pytest.raises(ConfigError, match="thickness = 0"):
-        moving_hand(finger, build=Build(thickness=0.0))
-    with pytest.raises(ConfigError, match="not in a conduit on the palm"):
-        moving_hand(finger, drives={"index joint 1": Drive(tension=1.0, conduit=((0, 0, -0.1),))})
-    with pytest.raises(ConfigError, match="drive of 'index joint 4'"):
-        moving_hand(finger, drives={"index joint 4": Drive(tension=1.0)})
-    with pytest.raises(ConfigError, match=r"sleeve of 'index' = -0.1 must"):
-        moving_hand(finger, drives={"index": Drive(pull=0.0, sleeve=-0.1)})
+    finger, force = {"index": Finger(n=2)}, {"tension": 1.0}
+    for words, drives in (
+        ("drive of 'toe'", {"toe": Drive(**force)}),
+        ("either a tension or a pull", {"index": Drive()}),
+        ("either a tension or a pull", {"index": Drive(**force, pull=1 * MM)}),
+        (r"winch of 'index' is to take in 0\.03 m", {"index": Drive(pull=30 * MM)}),
+        ("'index cable' are at one point", {"index": Drive(**force, conduit=2 * ((0, 0, -0.1),))}),
+        ("not in a conduit", {"index joint 1": Drive(**force, conduit=((0, 0, -0.1),))}),
+        ("drive of 'index joint 4'", {"index joint 4": Drive(**force)}),
+        (r"sleeve of 'index' = -0.1 must", {"index": Drive(pull=0.0, sleeve=-0.1)}),
+    ):
+        refuses(ConfigError, words, moving_hand, finger, drives=drives)
+    refuses(ConfigError, "seat of 'toe'", lambda: moving_hand({"toe": Finger(n=2)}))
+    aside = {"index": Seat(palmar=(0.0, 0.0, 2.0))}
+    refuses(ConfigError, "cannot close towards", moving_hand, finger, seats=aside)
+    bare = {"index": Finger(phalanges=(0.02, 0.02, 0.0), n=2)}
+    refuses(ModelError, "'index' ends in a bare plate", moving_hand, bare)
+    refuses(ConfigError, "thickness = 0", lambda: moving_hand(finger, build=Build(thickness=0.0)))
     mech = moving_hand(finger, drives={"index": Drive(pull=lambda t: 400.0 * t * t)})
-    with pytest.raises((ConfigError, SolverError), match=r"winch of 'index' is to take in 0\.02"):
-        rom.simulate(mech, t_end=0.1, dt=1e-3)
+    errors, words = (ConfigError, SolverError), r"winch of 'index' is to take in 0\.02"
+    refuses(errors, words, rom.simulate, mech, t_end=0.1, dt=1e-3)

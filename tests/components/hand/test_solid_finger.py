@@ -7,6 +7,7 @@ from numpy.testing import assert_allclose
 import rom
 from benchmarks.models import bar
 from cases.paths import ROOT
+from cases.refusals import refuses
 from rom import rotation
 from rom.components.cosserat.helical_spring import HelicalSpring
 from rom.components.hand.compliant_hand import HAND_SPRING, INDEX_LENGTHS, Finger, rest
@@ -101,12 +102,9 @@ def test_hanging_finger_stretches_under_its_weight():
 
 def test_what_does_not_fit_is_named():
     solids = bars(SOFT, INDEX_LENGTHS[:2])
-    with pytest.raises(ModelError, match="3 springs and 2 phalanges"):
-        solid_finger(solids, SPRINGS, ends=ENDS)
-    with pytest.raises(ModelError, match="3 springs and 2 phalanges"):
-        parts_of_compliance(solids, SPRINGS, ends=ENDS)
-    with pytest.raises(InterfaceError, match="proximal"):
-        solid_finger(solids, SPRINGS[:2])
+    refuses(ModelError, "3 springs and 2 phalanges", solid_finger, solids, SPRINGS, ends=ENDS)
+    refuses(ModelError, "3 springs", parts_of_compliance, solids, SPRINGS, ends=ENDS)
+    refuses(InterfaceError, "proximal", solid_finger, solids, SPRINGS[:2])
 
 
 @pytest.mark.long

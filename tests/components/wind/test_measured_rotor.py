@@ -1,9 +1,9 @@
 """Torque and thrust of a rotor that was measured in a wind tunnel, and profiles that turn."""
 
 import numpy as np
-import pytest
 from numpy.testing import assert_allclose
 
+from cases.refusals import refuses
 from rom.components.wind import Blading, profile, profiles, rotor_load
 from rom.errors import ConfigError
 
@@ -82,5 +82,4 @@ def test_a_profile_that_turns_has_a_share_of_what_lacks_to_potential_flow():
 
 
 def test_a_ratio_that_is_none_is_named():
-    with pytest.raises(ConfigError, match=r"chord_over_radius = -0\.1"):
-        profiles()["NACA64"].rotating(-0.1)
+    refuses(ConfigError, r"chord_over_radius = -0\.1", lambda: profiles()["NACA64"].rotating(-0.1))

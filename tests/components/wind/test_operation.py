@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from cases.refusals import refused
+from cases.refusals import refused, refuses
 from rom.components.histories import Table, recorded
 from rom.components.wind.blading import BETZ_LIMIT, blading, rotor_load
 from rom.components.wind.control import (
@@ -42,16 +42,11 @@ def test_steady_wind_leaves_the_turbine_where_its_laws_balance(wind):
 
 def test_filters_answer_a_step_as_their_equations_do():
     """W_int + t1 W_int' = 1 after a share k at once; W + t2 W' = W_int: closed form."""
-    k, slow, fast, dt = 0.6, 8.0, 2.5, 0.01
-    state = np.zeros(3)
-    found = []
+    slow, fast, dt, state, found = 8.0, 2.5, 0.01, np.zeros(3), []
     for _ in range(4000):
         LATE(state, 1.0, dt, slow, fast)
         found.append(state[2])
-    t = dt * np.arange(1, 4001)
-    first, second = np.exp(-t / slow), np.exp(-t / fast)
-    exact = 1 - second - (1 - k) * slow / (slow - fast) * (first - second)
-    assert_allclose(found, exact, atol=3e-3)
+    assert_allclose(found, answer(dt * np.arange(1, 4001), slow, fast), atol=3e-3)
 
 
 def answer(t, slow, fast):
@@ -68,9 +63,8 @@ def after_a_step(before, then, dt, cone=0.0):
     blades = blading(0.0, cone)
     rows = [rotor_load(blades, wind, SPEED, pitch, n_azimuths=1).strip[0] for wind, pitch in (
         before, then)]  # fmt: skip
-    axial = [
-        wind * np.cos(cone) - row[:, 2] for row, (wind, _) in zip(rows, (before, then), strict=True)
-    ]
+    winds = np.cos(cone) * np.array([before[0], then[0]])
+    axial = [wind - row[:, 2] for row, wind in zip(rows, winds, strict=True)]
     swirl = [row[:, 3] - SPEED * blades.radius for row in rows]
     start = round(1.0 / dt)
     run = operate(lambda t: (before, then)[int(t >= 1.0 - 1e-9)][0], 25.0, dt=dt, blades=blades,
@@ -193,7 +187,7 @@ test_what_cannot_be_is_named = refused(
     (lambda: operate(Table([0.0, 5.0], [8.0, 9.0]), 10.0), "from 0 s to 5 s; asked is t = 5.05"),
     (lambda: operate(recorded([0.0, 1.0, 2.0, 5.0], [8.0] * 4), 5.0), "a gap from 2 s to 5 s"),
     (lambda: operate(lambda t: 8.0, 1.0, held=lambda t: (np.nan, 0.0)), "held at 0 s = nan"),
-    (lambda: operate(lambda t: 8.0, 1.0, held=lambda t: (1.0, 20.0)), "pitch of 20 rad"),
+    (lambda: operate(lambda t: 8.0, 1.0, held=lambda t: (1.0, 20.0)), "pitch .* = 20"),
     error=ConfigError,
 )
 
@@ -212,10 +206,8 @@ def scaled(k):
 ])  # fmt: skip
 def test_another_rotor_needs_a_controller_of_its_own(call):
     """The published one would turn blades of 126 m with tips of 160 m/s, without a word."""
-    with pytest.raises(ConfigError, match=r"3 blades up to 126 m would have tips of 159\.7 m/s"):
-        call(scaled(2.0))
-    with pytest.raises(ConfigError, match="2 blades"):
-        call(replace(blading(), n_blades=2))
+    refuses(ConfigError, r"126 m would have tips of 159\.7 m/s", lambda: call(scaled(2.0)))
+    refuses(ConfigError, "2 blades", lambda: call(replace(blading(), n_blades=2)))
     call(scaled(1.05))
 
 
@@ -236,8 +228,7 @@ def test_the_power_curve_of_another_rotor_follows_a_controller_that_is_handed_ov
     assert_allclose(large["speed"], [0.22, 0.99, 1.2, 1.2], rtol=1e-12)
     assert_allclose(large["power"], [4 * 0.944 * one.power for one in small], rtol=1e-3)
     assert steady(9.0, scaled(2.0), held=law).torque == pytest.approx(large["torque"][1])
-    with pytest.raises(ConfigError, match="nan"):
-        steady(9.0, scaled(2.0), held=lambda wind: (np.nan, 0.0))
+    refuses(ConfigError, "nan", lambda: steady(9.0, scaled(2.0), held=lambda wind: (np.nan, 0.0)))
 
 
 RPM = np.pi / 30
@@ -356,8 +347,7 @@ def test_the_filter_loses_three_decibels_at_a_quarter_hertz():
 
 @pytest.mark.parametrize("wind", [2.9, 25.1, -8.0])
 def test_wind_beyond_the_curve_is_named(wind):
-    with pytest.raises(ConfigError, match="parked in a wind of"):
-        steady(wind)
+    refuses(ConfigError, "parked in a wind of", steady, wind)
     with pytest.raises(ConfigError):
         power_curve([8.0, wind])
 

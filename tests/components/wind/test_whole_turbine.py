@@ -5,6 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import rom
+from cases.refusals import refuses
 from rom.components.wind.whole_turbine import (
     GEAR_RATIO,
     GENERATOR_INERTIA,
@@ -125,8 +126,7 @@ def test_blades_whirl_on_a_stiff_tower_as_one_of_them_swings():
 
 
 def test_weight_leaves_no_steady_motion():
-    with pytest.raises(ConfigError, match="no steady motion"):
-        turbine(4).turning(RATED_SPEED)
+    refuses(ConfigError, "no steady motion", lambda: turbine(4).turning(RATED_SPEED))
 
 
 @pytest.fixture(scope="module")
@@ -159,5 +159,4 @@ def test_work_of_the_torque_is_the_energy(driven):
 
 
 def test_a_turbine_without_blades_is_refused():
-    with pytest.raises(ConfigError, match="0 segments of a blade"):
-        turbine(0)
+    refuses(ConfigError, "segments = 0", turbine, 0)

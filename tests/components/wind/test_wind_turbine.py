@@ -6,17 +6,15 @@ from numpy.testing import assert_allclose
 
 from rom import rotation
 from rom.components.cosserat import equilibrium, loads, modes, reference, simulate
-from rom.components.wind.drivetrain import (
-    ROTOR_INERTIA,
-    SHAFT_STIFFNESS,
-    SLOW_GENERATOR_INERTIA,
-    rotor,
-)
 from rom.components.wind.wind_turbine import (
     BLADE_LENGTH,
+    HUB_INERTIA,
     RATED_SPEED,
+    SHAFT_STIFFNESS,
+    SLOW_GENERATOR_INERTIA,
     blade,
     ramp,
+    rotor,
     run_up,
     stations,
     tower,
@@ -149,7 +147,7 @@ def test_a_locked_generator_leaves_the_shaft_to_twist():
     locked = model.free.copy()
     locked[2] = False
     f = modes(model.rod, reference(model.rod), 1, free=locked).frequencies[0]
-    inertia = inertia_of_blades(one) + ROTOR_INERTIA
+    inertia = inertia_of_blades(one) + HUB_INERTIA
     assert_allclose(2 * np.pi * f, np.sqrt(SHAFT_STIFFNESS / inertia), rtol=5e-3)
 
 
@@ -166,7 +164,7 @@ def test_momentum_is_the_impulse_of_the_torque(run):
     model, motion = run
     impulse = TORQUE * (20.0 - RISE / 2)
     assert_allclose(model.momentum(motion)[-1], impulse, rtol=1e-3)
-    inertia = inertia_of_blades(blade(16)) + ROTOR_INERTIA + SLOW_GENERATOR_INERTIA
+    inertia = inertia_of_blades(blade(16)) + HUB_INERTIA + SLOW_GENERATOR_INERTIA
     assert_allclose(model.speeds(motion)[-200:, 0].mean(), TORQUE * (18.0 - RISE / 2) / inertia,
                     rtol=0.02)  # fmt: skip
 
@@ -187,6 +185,6 @@ def test_the_shaft_twists_as_the_rotor_needs(run):
     """Steady gain of speed: the shaft carries the share of hub and blades."""
     motion = run[1]
     turned = [rotation.log(rotation.multiply(p[0] * [1, -1, -1, -1], p[2])) for p in motion.p]
-    inertia = inertia_of_blades(blade(16)) + ROTOR_INERTIA
+    inertia = inertia_of_blades(blade(16)) + HUB_INERTIA
     share = inertia / (inertia + SLOW_GENERATOR_INERTIA)
     assert_allclose(-np.array(turned)[-400:, 2].mean(), share * TORQUE / SHAFT_STIFFNESS, rtol=0.05)

@@ -1,5 +1,5 @@
 """Wheels whose blades differ.
 
-`blade` reduces one, `substructured_sector` what is left, `disk` the rest without blades, as
-`records`; `bladed_wheel` puts any together, `mistuning` varies them a little.
+`substructured_sector` reduces one and what is left, `disk` the rest without blades; `bladed_wheel`
+puts any together, `mistuning` varies them a little.
 """

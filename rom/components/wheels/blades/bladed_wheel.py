@@ -20,22 +20,79 @@ Source:
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import numpy.typing as npt
 from scipy.linalg import block_diag, eigh
 
-from rom.arguments import lowest, matrix, one_each, rows_at, typed, vector
-from rom.components.wheels.blades.records import ReducedBlade, SubstructuredSector
-from rom.components.wheels.certificate import wheel_certificate
-from rom.components.wheels.gyroscopic import GyroscopicModes, gyroscopic_modes
+from rom.arguments import Between, lowest, matrix, one_each, rows_at, typed, vector
+from rom.components.wheels.blades.substructured_sector import ReducedBlade, SubstructuredSector
+from rom.components.wheels.reduced import wheel_certificate
 from rom.components.wheels.sector import Complex
 from rom.errors import ConfigError, ModelError
 from rom.model import Array, Modes, Report
 from rom.plausible import check_damping_ratio
 
 RIGID_RTOL = 1e-9  # of the largest squared frequency: what is less negative is a rigid motion
+
+
+@dataclass(frozen=True)
+class GyroscopicModes:
+    """Motions exp(i w t) of q'' + g q' + omega^2 q = p in mass-normalised modes q.
+
+    With y = [q'; omega q] it is y' = S y + [p; 0] of a skew S = [[-g, -omega], [omega, 0]], which
+    has the eigenvalues i w with orthonormal eigenvectors: nothing grows.
+
+    Attributes:
+        w: (2n,) circular frequencies [rad/s], ascending, of both signs.
+        velocities: (n, 2n) q' of each [1], where |q'|^2 + |omega q|^2 = 1.
+        shapes: (n, 2n) q of each [s].
+    """
+
+    w: Array
+    velocities: Complex
+    shapes: Complex
+
+    def waves(self) -> tuple[Array, Complex]:
+        """The motions that turn with exp(i w t), w > 0.
+
+        Returns:
+            w (n,) [rad/s], ascending, and shapes (n, n) of length 1 [1].
+        """
+        n = len(self.shapes)
+        q = self.shapes[:, n:]
+        return self.w[n:], q / np.linalg.norm(q, axis=0)
+
+    def response(self, p: Complex, sweep: Array, damping: float) -> Complex:
+        """(w, n) answers q [kg^1/2 m] to p exp(i omega t), each motion with its share of damping.
+
+        Args:
+            p: (n,) forces on mass-normalised modes [N kg^-1/2].
+            sweep: (w,) circular frequencies omega [rad/s].
+            damping: a motion decays at this share zeta [1] of its w, as exp(i w sqrt(1 - zeta^2)
+                t).
+        """
+        slower = np.sqrt(1.0 - damping**2)
+        met = self.velocities.conj().T @ p
+        gap = 1j * (sweep[:, None] - slower * self.w) + damping * np.abs(self.w)
+        return (met / gap) @ self.shapes.T / slower
+
+
+def gyroscopic_modes(omega: Array, g: Array) -> GyroscopicModes:
+    """Motions of q'' + g q' + omega^2 q = 0.
+
+    Args:
+        omega: (n,) circular frequencies without g, positive [rad/s].
+        g: (n, n) skew-symmetric [rad/s].
+
+    Source:
+        Meirovitch, A new method of solution of the eigenvalue problem for gyroscopic systems,
+        AIAA J. 12 (1974) 1337.
+    """
+    n, D = omega.size, np.diag(omega)
+    w, W = eigh(-1j * np.block([[-g, -D], [D, np.zeros((n, n))]]))
+    return GyroscopicModes(w, W[:n], W[n:] / omega[:, None])
 
 
 @typed
@@ -99,11 +156,10 @@ class BladedWheel:
         return self._joined("coriolis", blades)
 
     def _check(self, blades: Sequence[ReducedBlade]) -> None:
-        N, r, _ = self.roots.shape
-        if len(blades) != N or any(blade.n_root != r for blade in blades):
+        (N, r, _), found = self.roots.shape, [blade.n_root for blade in blades]
+        if found != [r] * N:
             raise ConfigError(
-                f"{len(blades)} blades, with {sorted({b.n_root for b in blades})} root "
-                f"coordinates: give {N} with {r}.",
+                f"{len(found)} blades with {sorted(set(found))} root coordinates, not {N} of {r}.",
                 hint="Take sector.blade, its varied(…), or rom.reduced_blade(sector, …).",
             )
 
@@ -112,10 +168,7 @@ class BladedWheel:
         disk, own = getattr(self, name), [getattr(blade, name) for blade in blades]
         if disk is None or any(B is None for B in own):
             place = "disk" if disk is None else f"blade {[B is None for B in own].index(True)}"
-            raise ConfigError(
-                f"the {place} has no matrices of rotation.",
-                hint="Substructure a sector of rom.rotating_sector, and reduce blades on it.",
-            )
+            raise ConfigError(f"the {place} has no matrices of rotation; see rom.rotating_sector.")
         N, r, c = self.roots.shape
         d, X = len(disk), self.roots.reshape(N * r, c)
         each = list(zip(own, self.roots, strict=True))
@@ -167,20 +220,16 @@ class BladedWheel:
         """
         if speed and not self.sector.supported:
             raise ConfigError(
-                "a free wheel of different blades has no modes at speed: nothing holds it on its "
-                "axis.",
+                "a free wheel of different blades has no modes at speed.",
                 hint="Hold the disk, fixed=(…), or put it on springs, rom.supported_sector.",
             )
         K, M = self.matrices(blades, speed=speed)
         lam, Phi = _apart(K, M, self.rigid)
         if lam[0] < -RIGID_RTOL * lam[-1] or (speed and lam[0] <= 0.0):
-            raise ModelError(
-                f"at {speed:g} rad/s the wheel with these blades is above its instability: spin "
-                "softening has used up its stiffness."
-                if speed
-                else "these blades leave a motion without stiffness.",
-                hint="Turn more slowly." if speed else "Look for a deviation of -1 or below.",
-            )
+            text = "these blades leave a motion without stiffness; look for a deviation of -1."
+            if speed:
+                text = f"at {speed:g} rad/s the wheel is above its instability; turn more slowly."
+            raise ModelError(text)
         kept = lowest(n)
         return Modes(np.sqrt(np.maximum(lam[kept], 0.0)), Phi[:, kept])
 
@@ -218,9 +267,8 @@ class BladedWheel:
             ModelError: if a motion has no stiffness.
         """
         _, Phi = self.modes(blades)
-        each = np.array([np.einsum("am,ab,bm->m", q, blade.K, q)
-                         for blade, q in zip(blades, self.of_blades(blades, Phi[:, :n]),
-                                             strict=True)])  # fmt: skip
+        moved = zip(blades, self.of_blades(blades, Phi[:, :n]), strict=True)
+        each = np.array([np.einsum("am,ab,bm->m", q, blade.K, q) for blade, q in moved])
         return (each / each.sum(axis=0)).T
 
     def response(
@@ -230,7 +278,7 @@ class BladedWheel:
         *,
         engine_order: int,
         omega: npt.ArrayLike,
-        damping: float,
+        damping: Annotated[float, Between(0.0, 1.0, "()")],
         at: Any,
         speed: float = 0.0,
     ) -> Complex:
@@ -258,10 +306,6 @@ class BladedWheel:
             ConfigError: for damping not between 0 and 1, or a force or place off the blades.
             ModelError: if a motion has no stiffness.
         """
-        if not 0.0 < damping < 1.0:
-            raise ConfigError(
-                f"damping = {damping!r} must be a positive share of critical damping, below 1."
-            )
         check_damping_ratio(damping, "the wheel")
         N, sweep = self.sector.n_sectors, vector("omega", omega)
         if speed:
@@ -272,8 +316,8 @@ class BladedWheel:
         forces, rows = _each(force, N), _each(at, N)
         phase = np.exp(1j * engine_order * self.sector.angle * np.arange(N))
         load = sum(
-            phase[j] * (q.T @ (blade.Psi.T @ _on(blade, forces[j], j)))
-            for j, (blade, q) in enumerate(zip(blades, moved, strict=True))
+            phase[j] * (moved[j].T @ (blade.Psi.T @ _on(blade, forces[j], j)))
+            for j, blade in enumerate(blades)
         )
         if speed:
             amplitude = motions.response(load, sweep, damping)

@@ -7,7 +7,7 @@ from scipy.linalg import block_diag, eigh
 
 from rom.arguments import typed, whole
 from rom.components.wheels.blades.bladed_wheel import BladedWheel
-from rom.components.wheels.blades.records import SubstructuredSector
+from rom.components.wheels.blades.substructured_sector import SubstructuredSector
 from rom.components.wheels.modes import real_span
 from rom.components.wheels.sector import Complex
 from rom.model import Array

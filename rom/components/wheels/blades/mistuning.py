@@ -20,22 +20,24 @@ Source:
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import numpy.typing as npt
 from scipy.linalg import eigh
 
-from rom.arguments import lowest, matrix, one_each, rows_at, typed, vector
-from rom.components.wheels.certificate import mistuned_certificate
+from rom.arguments import Positive, lowest, matrix, one_each, rows_at, typed, vector
 from rom.components.wheels.modes import cyclic_modes, spinning
+from rom.components.wheels.reduced import mistuned_certificate
 from rom.components.wheels.sector import Complex, CyclicSector, each_diameter
 from rom.errors import ConfigError, ModelError
 from rom.model import Array, Index, Modes, Report
+from rom.names import check_known
 from rom.plausible import check_damping_ratio
 
 STIFFNESS_CHANGE = 0.1  # of all blades, relative, that enriches the basis
 NEW_SHARE_TOL = 1e-12  # squared share of a mode that is new, below which it is round-off
+Damping = Annotated[float, Positive()]  # share of the critical one
 AT_ONCE = 1_000_000  # complex numbers held by one batch of wheels
 
 
@@ -101,10 +103,8 @@ class MistunedWheel:
         """
         lam, V = np.linalg.eigh(self.stiffness(deviations))
         if lam.min() < -1e-9 * lam.max():
-            raise ModelError(
-                "blades with these deviations leave a motion without stiffness.",
-                hint=f"The least deviation is {np.min(deviations):g}; take smaller ones.",
-            )
+            least = np.min(deviations)
+            raise ModelError(f"deviations from {least:g} on leave a motion without stiffness.")
         kept = lowest(n)
         return Modes(np.sqrt(np.maximum(lam[..., kept], 0.0)), V[..., kept])
 
@@ -115,7 +115,7 @@ class MistunedWheel:
         *,
         engine_order: int,
         omega: npt.ArrayLike,
-        damping: float,
+        damping: Damping,
         at: npt.ArrayLike,
     ) -> Complex:
         """Answer of all blades to forces that travel around the wheel.
@@ -139,8 +139,7 @@ class MistunedWheel:
             ConfigError: for wrong deviations, or damping that is not positive.
             ModelError: if a deviation leaves a motion without stiffness.
         """
-        drive = self._drive(force, engine_order)
-        rows = self._rows(at)
+        drive, rows = self._drive(force, engine_order), rows_at("at", at, self.shapes)
         lam, V = self.modes(deviations)
         q = self._modal(lam, V, drive, vector("omega", omega), damping)  # (w, r)
         return self._seen(q @ V.T, rows)
@@ -152,7 +151,7 @@ class MistunedWheel:
         *,
         engine_order: int,
         omega: npt.ArrayLike,
-        damping: float,
+        damping: Damping,
         at: npt.ArrayLike,
     ) -> Array:
         """Largest amplitude of any blade of mistuned wheels, as a multiple of the tuned one.
@@ -174,7 +173,7 @@ class MistunedWheel:
         """
         many = np.atleast_2d(np.asarray(deviations, dtype=float))
         N, sweep = self.sector.n_sectors, vector("omega", omega)
-        drive, rows = self._drive(force, engine_order), self._rows(at)
+        drive, rows = self._drive(force, engine_order), rows_at("at", at, self.shapes)
         tuned = self._peaks(np.zeros((1, N)), drive, sweep, damping, rows)[0]
         if not tuned > 0.0:
             raise ConfigError("the force does not move the tuned wheel at the dofs wanted.")
@@ -191,14 +190,8 @@ class MistunedWheel:
         met = (self.harmonics - engine_order) % N == 0
         return np.where(met, N * (self.shapes.conj().T @ f), 0.0)
 
-    def _rows(self, at: npt.ArrayLike) -> Complex:
-        """(p, r) displacements wanted of each wave, on sector 0."""
-        return rows_at("at", at, self.shapes)
-
     def _modal(self, w: Array, V: Complex, drive: Complex, sweep: Array, zeta: float) -> Complex:
         """(..., w, r) modal amplitudes."""
-        if not zeta > 0.0:
-            raise ConfigError(f"damping = {zeta!r} must be a positive share of critical damping.")
         check_damping_ratio(zeta, "the wheel")
         load = np.einsum("...km,k->...m", V.conj(), drive)
         gap = w[..., None, :] ** 2 - sweep[:, None] ** 2
@@ -241,16 +234,12 @@ def mistuned_wheel(
         Lim, Bladh, Castanier and Pierre, Compact, generalized component mode mistuning
         representation for modeling bladed disk vibration, AIAA J. 45 (2007) 2285.
     """
-    if isinstance(blade, str) and blade not in sector.regions:
-        raise ConfigError(
-            f"the sector has no region {blade!r}; it has {sorted(sector.regions)}.",
-            hint="Name the volume of the blade in the geometry.",
-        )
-    given = sector.regions[blade] if isinstance(blade, str) else blade
-    K_blade = matrix("blade", given, (sector.n, sector.n))
+    if isinstance(blade, str):
+        check_known(blade, sector.regions, f"the sector has no region {blade!r}; it has")
+        blade = sector.regions[blade]
+    K_blade = matrix("blade", blade, (sector.n, sector.n))
     N = sector.n_sectors
-    harmonics: list[int] = []
-    omega, shapes = [], []
+    harmonics, omega, shapes = [], [], []
     tuned = each_diameter(sector, lambda d: _tuned(sector, K_blade, d, n, speed))
     for d, (lam, U) in zip(sector.diameters, tuned, strict=True):
         for sign in (1,) if sector.standing(d) else (1, -1):
@@ -275,8 +264,7 @@ def _tuned(
     weight, V = np.linalg.eigh(more.conj().T @ (sector.M @ more))
     new = weight > NEW_SHARE_TOL
     Z = np.hstack([Phi, more @ (V[:, new] / np.sqrt(weight[new]))])
-    K = sector.K if speed == 0.0 else spinning(sector, speed)
-    lam, V = eigh(Z.conj().T @ (K @ Z), Z.conj().T @ (sector.M @ Z))
+    lam, V = eigh(Z.conj().T @ (spinning(sector, speed) @ Z), Z.conj().T @ (sector.M @ Z))
     return lam, Z @ V
 
 

@@ -9,16 +9,16 @@ A homogeneous solid that is free to expand has stress only where its temperature
 function of place.
 """
 
-from collections.abc import Iterable, Mapping
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 from scipy.sparse import block_diag, csr_matrix, identity
 
-from rom.arguments import typed
+from rom.arguments import finite, number, typed
 from rom.components.wheels.modes import real_form
-from rom.components.wheels.prestress.heat import Heat
 from rom.components.wheels.rotation import axial_pins, largest_ratio
 from rom.components.wheels.sector import CyclicSector, all_rows, workers_of
 from rom.eigen.supports import Fixed, held_dofs
@@ -26,6 +26,71 @@ from rom.eigen.verbs import dofs_of, pins, rigid_motions
 from rom.eigen.workers import Workers, held_solution
 from rom.errors import ConfigError, ModelError
 from rom.model import Array, FEModel, Index
+from rom.names import check_known
+
+Temperature = float | Mapping[str, float] | npt.ArrayLike | Callable[[Array], Any]
+
+
+@typed
+@dataclass(frozen=True)
+class Heat:
+    """Free thermal expansion of a solid, alpha dT in all directions.
+
+    Attributes:
+        expansion: coefficient of linear expansion alpha [1/K], or {region: alpha}; regions left
+            out do not expand.
+        temperature: change of temperature since the solid was free of stress [K], negative where
+            it cooled: one number, {region: number} with regions left out at zero, (n / 3,) numbers
+            at the nodes of the model, or a function of points (k, 3) [m].
+
+    Raises:
+        ConfigError: if one of the two is missing.
+    """
+
+    expansion: float | Mapping[str, float] | None = None
+    temperature: Temperature | None = None
+
+    def __post_init__(self) -> None:
+        for name, like in (("expansion", "12e-6 per kelvin, of steel"), ("temperature", "80 K")):
+            if getattr(self, name) is None:
+                raise ConfigError(f"heat needs its {name}, such as {like}.")
+
+    def on(self, model: FEModel) -> tuple[dict[str, float], dict[str, float], Array]:
+        """Expansion [1/K] and temperature [K] of each region; what nodes (n / 3,) add to this [K].
+
+        Raises:
+            ConfigError: if a region is unknown, numbers are not finite or do not fit the nodes.
+        """
+        names, cold = tuple(model.regions), np.zeros(len(model.points))
+        alpha = _by_region("expansion", self.expansion, names)
+        given = self.temperature
+        if not callable(given) and (isinstance(given, Mapping) or np.ndim(given) == 0):
+            return alpha, _by_region("temperature", given, names), cold
+        values = given(model.points) if callable(given) else given
+        values = finite("the temperature at the nodes", values, cold.shape)
+        return alpha, dict.fromkeys(names, 0.0), values
+
+    def largest_strain(self, model: FEModel) -> float:
+        """Largest free expansion [1], of region and nodes together."""
+        alpha, by_region, at_nodes = self.on(model)
+        more = float(np.abs(at_nodes).max(initial=0.0))
+        return max((abs(alpha[r]) * (abs(T) + more) for r, T in by_region.items()), default=0.0)
+
+    def described(self, share: float) -> str:
+        """A share [1] of the temperature, for messages."""
+        given = self.temperature
+        if not isinstance(given, Mapping) and not callable(given) and np.ndim(given) == 0:
+            return f"a temperature change of {share * float(given):.5g} K"  # type: ignore[arg-type]
+        return f"{share:.4g} times the temperature change given"
+
+
+def _by_region(what: str, given: Any, names: tuple[str, ...]) -> dict[str, float]:
+    table = dict(given) if isinstance(given, Mapping) else dict.fromkeys(names, given)
+    for name, value in table.items():
+        check_known(name, names, f"the {what} names the region {name!r}; the model has")
+        number(f"the {what} of region {name!r}", value)
+    return {name: float(table.get(name, 0.0)) for name in names}
+
 
 LARGEST_STRAIN = 0.5  # of heat, far beyond what a linear solid can say
 
@@ -123,10 +188,7 @@ def finite_solid(model: FEModel, heat: Heat | None = None) -> Any:
         ConfigError: if the model has no finite elements.
     """
     if model.stresses is None:
-        raise ConfigError(
-            "the model has no finite elements, from which alone its stress follows.",
-            hint="Make it with rom.fe.model.",
-        )
+        raise ConfigError("the model has no finite elements; make it with rom.fe.model.")
     solid = model.stresses.finite_strain()
     if heat is not None:
         solid.heat(*heat.on(model))
@@ -210,17 +272,12 @@ def _waves(sector: CyclicSector, diameter: int, *matrices: Any) -> tuple[csr_mat
 
 def _refuse_buckled(parts: Iterable[tuple[csr_matrix, ...]], heat: Heat, workers: Workers) -> None:
     """Raise if a part of the solid has K + K_geo with negative eigenvalues, naming the worst."""
-    shares = [critical_factor(*part) for part in parts if not _stiff(sum(part), workers)]
+    shares = []
+    for part in parts:
+        factor = workers.factor(sum(part))
+        if factor is None or not factor.definite:
+            shares.append(critical_factor(*part))
     share = min(shares, default=None)
     if share is not None:
-        raise ModelError(
-            f"the heated solid buckles at {heat.described(share)}: thermal stress has then used up "
-            "its stiffness.",
-            hint="Hold it more loosely, or follow its bent shape with rom.spin_up.",
-        )
-
-
-def _stiff(K: csr_matrix, workers: Workers) -> bool:
-    """Whether a stiffness is positive definite."""
-    factor = workers.factor(K)
-    return factor is not None and factor.definite
+        text = f"the heated solid buckles at {heat.described(share)}."
+        raise ModelError(text, hint="Hold it more loosely, or follow its shape with rom.spin_up.")
