@@ -100,10 +100,11 @@ def with_boulder(g: Gallery, boulder: Mass, height: float | None = None) -> Gall
     Raises:
         ConfigError: for a mass or a height that is not positive.
     """
-    ratio, c, is_layer = (boulder / g.boulder) ** (1 / 3), g.cushion, isinstance(g.cushion, Layer)
-    size = {"radius": c.radius * ratio} if is_layer else {"stiffness": c.stiffness * ratio**0.5}
+    ratio, c = (boulder / g.boulder) ** (1 / 3), g.cushion
+    cushion = (replace(c, radius=c.radius * ratio) if isinstance(c, Layer)
+               else replace(c, stiffness=c.stiffness * ratio**0.5))  # fmt: skip
     height = g.height if height is None else height
-    return replace(g, boulder=boulder, cushion=replace(c, **size), height=height)
+    return replace(g, boulder=boulder, cushion=cushion, height=height)
 
 
 def capacity_map(g: Gallery, boulders: Any, heights: Any, **allowed: float) -> list[list[Verdict]]:

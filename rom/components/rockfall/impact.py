@@ -283,8 +283,9 @@ def _refuse(g: Gallery, out: Array, last: Array, step: float, over: bool) -> Non
 
 def _impact(out: Array, last: Array) -> Impact:
     t, z, v, forces, energy, modal = np.split(out, PARTS, axis=1)
-    sizes, state = map(float, last[3:6]), STATES[int(last[6])]
-    return Impact(t[:, 0], z, v, forces, energy, last[:3], *sizes, state, modal)
+    deepest, most, stays = map(float, last[3:6])
+    state = STATES[int(last[6])]
+    return Impact(t[:, 0], z, v, forces, energy, last[:3], deepest, most, stays, state, modal)
 
 
 VARIED_NUMBERS = {  # what can be changed: where it stands, and the power of the factor there
