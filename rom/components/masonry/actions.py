@@ -9,12 +9,12 @@ Source:
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.spatial import Delaunay
 
-from rom.arguments import finite, number, shortened, typed, whole
+from rom.arguments import typed, whole
 from rom.components.histories import History, ramp, values_at
 from rom.components.masonry.discontinuous_deformation import Drive
 from rom.components.masonry.stones import Masonry, touching
@@ -63,14 +63,11 @@ class PointLoad:
             ConfigError: if there is no such stone, or the point lies outside of it.
         """
         block = _moving(self.name, self.stone, masonry)
-        place = finite(f"place of {self.name}", self.at, (2,))
-        corner, share = _place(self.name, masonry, block, place)
-        force = finite(f"force of {self.name}", self.force, (2,))
+        corner, share = _place(self.name, masonry, block, np.array(self.at))
 
         def at(t: Array) -> Forces:
-            return _fixed(len(t), [block], [corner], [share], [0])._replace(
-                force=values_at(self.name, self.history, t)[:, None, None] * force
-            )
+            factor = values_at(self.name, self.history, t)[:, None, None]
+            return _forces([block], corner, share, factor * np.array(self.force))
 
         return at
 
@@ -100,31 +97,23 @@ class MovingLoad:
         """
         first = masonry.first_corners()
         top, who = _tops(masonry)
-        force = finite(f"force of {self.name}", self.force, (2,))
-        finite(f"speed and start of {self.name}", (self.speed, self.start), (2,))
-        beyond = self.start > top[:, 1, 0].max() if self.speed >= 0 else False
-        before = self.start < top[:, 0, 0].min() if self.speed <= 0 else False
-        if beyond or before:
-            raise ConfigError(
-                f"{self.name} starts at x = {self.start} m and never comes upon the stones; give "
-                f"from x = {top[:, 0, 0].min():.6g} m to {top[:, 1, 0].max():.6g} m."
-            )
+        low, high = top[:, 0, 0].min(), top[:, 1, 0].max()
+        if (self.speed >= 0 and self.start > high) or (self.speed <= 0 and self.start < low):
+            text = f"{self.name} starts at x = {self.start} m and never comes upon the stones"
+            raise ConfigError(f"{text}; give from x = {low:.6g} m to {high:.6g} m.")
 
         def at(t: Array) -> Forces:
-            x = (self.start + self.speed * t)[:, None]
+            x, rows = (self.start + self.speed * t)[:, None], np.arange(len(t))
             w = (x - top[:, 0, 0]) / (top[:, 1, 0] - top[:, 0, 0])
-            y = np.where((w >= 0) & (w <= 1), top[:, 0, 1] + w * (top[:, 1, 1] - top[:, 0, 1]),
-                         -np.inf)  # fmt: skip
+            y = top[:, 0, 1] + w * (top[:, 1, 1] - top[:, 0, 1])
+            y[(w < 0) | (w > 1)] = -np.inf
             k = np.argmax(y, axis=1)
-            rows = np.arange(len(t))
-            share = np.stack([1 - w[rows, k], w[rows, k], 0 * w[rows, k]], axis=1)
+            here = w[rows, k]
+            share = np.stack([1 - here, here, 0 * here], axis=1)
             block = np.where(np.isfinite(y[rows, k]), who[k, 0], -1)
             corner = first[who[k, 0]][:, None] + who[k][:, [1, 2, 2]]
-            found = _fixed(len(t), [0], [corner[0]], [share[0]], [0])
-            return found._replace(
-                block=block[:, None], corner=corner[:, None], share=share[:, None],
-                force=np.tile(force, (len(t), 1, 1)),
-            )  # fmt: skip
+            force = np.tile(self.force, (len(t), 1, 1))
+            return _forces(block[:, None], corner[:, None], share[:, None], force)
 
         return at
 
@@ -150,23 +139,21 @@ class Wind:
         Raises:
             ConfigError: if there is no such stone or edge.
         """
-        first, rows = masonry.first_corners(), []
+        first, corner, force = masonry.first_corners(), [], []
         for stone, edge in self.edges:
             outline = masonry.stones[_moving(self.name, stone, masonry)].outline
             whole(f"edge of stone {stone} for {self.name}", edge, 0, len(outline) - 1)
             o = (edge + 1) % len(outline)
             along = outline[o] - outline[edge]
-            inward = masonry.thickness * np.array([-along[1], along[0]])
-            rows.append((stone, first[stone] + np.array([edge, o, o]), inward))
-        if not rows:
+            corner.append(first[stone] + np.array([edge, o, o]))
+            force.append(masonry.thickness * np.array([-along[1], along[0]]))
+        if not corner:
             raise ConfigError(f"{self.name} blows on no edge; give some.")
-        block, corner, force = (list(x) for x in zip(*rows, strict=True))
-        n = len(rows)
+        block = [stone for stone, _ in self.edges]
 
         def at(t: Array) -> Forces:
-            found = _fixed(len(t), block, corner, [np.array([0.5, 0.5, 0.0])] * n, [1] * n)
-            pressure = values_at(self.name, self.pressure, t)
-            return found._replace(force=pressure[:, None, None] * np.array(force))
+            pressure = values_at(self.name, self.pressure, t)[:, None, None]
+            return _forces(block, corner, [0.5, 0.5, 0.0], pressure * np.array(force), turns=1)
 
         return at
 
@@ -196,28 +183,19 @@ class SupportMotion:
         Raises:
             ConfigError: if a stone is not held or touches nothing, or does not start where it is.
         """
-        end = np.r_[finite(f"shift of {self.name}", self.shift, (2,)), self.turn]
-        number(f"turn of {self.name}", self.turn)
-        touched = set(np.unique(touching(masonry).who[:, [0, 2]]).tolist())
+        touched = touching(masonry).who[:, [0, 2]]
         for stone in self.stones:
             if stone not in masonry.held:
-                raise ConfigError(
-                    f"{self.name} moves {stone}, which must be of the held {masonry.held}."
-                )
+                text = f"{self.name} moves {stone}, which must be of the held {masonry.held}."
+                raise ConfigError(text)
             if stone not in touched:
                 raise ConfigError(f"{self.name} moves stone {stone}, which must support another.")
-        if abs(values_at(self.name, self.history, np.zeros(1))[0]) > 0.0:
-            raise ConfigError(
-                f"{self.name} begins away from where its stones lie.",
-                hint="Let its history be 0 at t = 0.",
-            )
-        chosen = np.isin(np.arange(len(masonry.stones)), self.stones)[:, None] * end
-
-        def between(t: Array) -> Array:
-            share = np.diff(values_at(self.name, self.history, t))
-            return np.asarray(share[:, None, None] * chosen)
-
-        return between
+        if values_at(self.name, self.history, np.zeros(1))[0] != 0.0:
+            text = f"{self.name} begins away from where its stones lie."
+            raise ConfigError(text, hint="Let its history be 0 at t = 0.")
+        chosen = np.isin(np.arange(len(masonry.stones)), self.stones)[:, None]
+        moved = chosen * np.array([*self.shift, self.turn])
+        return lambda t: np.diff(values_at(self.name, self.history, t))[:, None, None] * moved
 
 
 @typed
@@ -241,10 +219,9 @@ class BaseMotion:
         Raises:
             ConfigError: if the direction is none, or no stone is held by the ground.
         """
-        direction = finite(f"direction of {self.name}", self.direction, (2,))
         if not masonry.held:
             raise ConfigError(f"{self.name}: a stone must be held, to stand on the ground.")
-        return lambda t: values_at(self.name, self.acceleration, t)[:, None] * direction
+        return lambda t: values_at(self.name, self.acceleration, t)[:, None] * self.direction
 
 
 Action = PointLoad | MovingLoad | Wind | SupportMotion | BaseMotion
@@ -263,13 +240,12 @@ def facing(masonry: Masonry, direction: tuple[float, float]) -> tuple[tuple[int,
     Raises:
         ConfigError: if the direction is none.
     """
-    d = finite("direction of the wind", direction, (2,))
-    if not np.any(d):
+    if not any(direction):
         raise ConfigError("wind needs a direction that is not zero.")
-    d = d / np.linalg.norm(d)
+    d = np.array(direction) / np.linalg.norm(direction)
     edges = [(b, k) for b, s in enumerate(masonry.stones) for k in range(len(s.outline))]
-    start = np.array([masonry.stones[b].outline[k] for b, k in edges])
-    end = np.array([np.roll(masonry.stones[b].outline, -1, axis=0)[k] for b, k in edges])
+    start = np.vstack([s.outline for s in masonry.stones])
+    end = np.vstack([np.roll(s.outline, -1, axis=0) for s in masonry.stones])
     owner, middle, along = np.array([b for b, _ in edges]), (start + end) / 2, end - start
     outward = np.column_stack([along[:, 1], -along[:, 0]])
     found = []
@@ -291,15 +267,9 @@ def driver(masonry: Masonry, actions: Sequence[Action]) -> Callable[[Array], Dri
     """What acts in the steps between times (n + 1,).
 
     Raises:
-        ConfigError: if an action is none or cannot be, or two move the same support; while it
-            runs, if a support jumps in one step.
+        ConfigError: if an action cannot be, or two move the same support; while it runs, if a
+            support jumps in one step.
     """
-    for k, one in enumerate(actions):
-        if not isinstance(one, Action):
-            raise ConfigError(
-                f"action {k} is {shortened(one)}, which does nothing to masonry.",
-                hint="Give loads, wind, motion of supports or of the ground.",
-            )
     moved = [s for a in actions if isinstance(a, SupportMotion) for s in a.stones]
     twice = sorted({s for s in moved if moved.count(s) > 1})
     if twice:
@@ -313,19 +283,18 @@ def driver(masonry: Masonry, actions: Sequence[Action]) -> Callable[[Array], Dri
     def at(t: Array) -> Drive:
         middle = (t[1:] + t[:-1]) / 2
         n = len(middle)
-        empty = _fixed(n, [], np.zeros((0, 3)), np.zeros((0, 3)), [])
-        parts = [empty, *(load(middle) for load in loads)]
-        columns = list(zip(*parts, strict=True))[:4]
+        parts = [_forces([], [], [], np.zeros((n, 0, 2))), *(load(middle) for load in loads)]
+        *columns, turned = zip(*parts, strict=True)
         block, corner, share, force = (np.concatenate(x, axis=1) for x in columns)
-        turns = np.concatenate([part.turns for part in parts])
+        turns = np.concatenate(turned)
         ground = np.sum([np.zeros((n, 2)), *(g(middle) for g in grounds)], axis=0)
         shift = np.sum([np.zeros((n, n_blocks, 3)), *(s(t) for s in supports)], axis=0)
         jump = np.hypot(shift[..., 0], shift[..., 1]) + np.abs(shift[..., 2]) * size
         if jump.size and jump.max() > 0.5 * reach:
             k, stone = np.unravel_index(np.argmax(jump), jump.shape)
+            how = f"moves by {jump.max():.3g} m in the step before t = {t[k + 1]:g} s"
             raise ConfigError(
-                f"support {stone} moves by {jump.max():.3g} m in the step before "
-                f"t = {t[k + 1]:g} s; corners watch edges within {reach:.3g} m.",
+                f"support {stone} {how}; corners watch edges within {reach:.3g} m.",
                 hint="Let its history be smooth, the step shorter, or reach longer.",
             )
         return Drive(block, corner, share, force, turns, ground, shift)
@@ -333,17 +302,16 @@ def driver(masonry: Masonry, actions: Sequence[Action]) -> Callable[[Array], Dri
     return at
 
 
-def _fixed(n: int, block: Sequence[int], corner: Sequence[Index] | Array,
-           share: Sequence[Array] | Array, turns: Sequence[int]) -> Forces:  # fmt: skip
-    """Places of forces that stay, n times; forces of zero."""
-    count = len(block)
-    whole = np.int64
+def _forces(block: Any, corner: Any, share: Any, force: Array, *, turns: int = 0) -> Forces:
+    """Forces (n, L, 2) at places that are given for each of the n times, or for all of them."""
+    n, count = force.shape[:2]
+    wide = (n, count, 3) if count else (n, 0)
     return Forces(
-        np.tile(np.array(block, dtype=whole), (n, 1)),
-        np.tile(np.array(corner, dtype=whole).reshape(count, 3), (n, 1, 1)),
-        np.tile(np.array(share, dtype=float).reshape(count, 3), (n, 1, 1)),
-        np.zeros((n, count, 2)),
-        np.array(turns, dtype=whole),
+        np.broadcast_to(np.array(block, dtype=np.int64), (n, count)),
+        np.broadcast_to(np.array(corner, dtype=np.int64), wide).reshape(n, count, 3),
+        np.broadcast_to(np.array(share, dtype=float), wide).reshape(n, count, 3),
+        force,
+        np.full(count, turns),
     )
 
 
@@ -358,12 +326,12 @@ def _tops(masonry: Masonry) -> tuple[Array, Index]:
     """(n, 2, 2) ends of edges that look upwards, left to right, and (n, 3) stone and corners."""
     ends, who = [], []
     for b, s in enumerate(masonry.stones):
-        for k in range(len(s.outline)):
-            o = (k + 1) % len(s.outline)
-            if s.outline[o, 0] < s.outline[k, 0] - ON_EDGE_RTOL * np.ptp(s.outline):
-                ends.append(s.outline[[o, k]])
-                who.append((b, o, k))
-    return np.array(ends), np.array(who)
+        k = np.arange(len(s.outline))
+        o, x = (k + 1) % k.size, s.outline[:, 0]
+        up = x[o] < x - ON_EDGE_RTOL * np.ptp(s.outline)
+        who.append(np.column_stack([np.full(k.size, b), o, k])[up])
+        ends.append(s.outline[who[-1][:, 1:]])
+    return np.vstack(ends), np.vstack(who)
 
 
 def _place(name: str, masonry: Masonry, stone: int, x: Array) -> tuple[Index, Array]:

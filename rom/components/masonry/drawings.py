@@ -1,6 +1,8 @@
 """Stones drawn as plane surfaces, in gmsh for instance: outlines, joints and what is wrong."""
 
 from collections.abc import Mapping, Sequence
+from itertools import product
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -13,6 +15,7 @@ from rom.errors import ConfigError, ModelError
 from rom.model import Array, Index
 
 STRAIGHT_RTOL = 1e-6  # sine of the turn below which a node is no corner: round-off of meshes
+SHARED_HINT = "Draw joints once, as lines that both stones share."
 OVERLAP_RTOL = 1e-6  # of the size of all stones: deeper corners were drawn wrong
 
 
@@ -44,35 +47,30 @@ def drawn(
             if numbers of nodes or triangles do not exist.
     """
     x = finite("points", points, (None, 2), error=ModelError)
-    T = _numbers_below("triangles", triangles, len(x))
-    if T.ndim != 2 or T.shape[1] != 3:
-        raise ModelError(f"triangles of the shape {T.shape}: needed is (t, 3).")
-    rows = {name: _numbers_below(f"stone {name!r}", chosen, len(T)).ravel()
+    T = _numbers_below("triangles", triangles, (None, 3), len(x))
+    rows = {name: _numbers_below(f"stone {name!r}", chosen, None, len(T)).ravel()
             for name, chosen in surfaces.items()}  # fmt: skip
     rock, names = rock or Rock(), list(rows)
     outlines = [x[_outline(name, x, T[chosen])] for name, chosen in rows.items()]
     fixed = {k for name in held for k in _numbers(name, names)}
     if len(fixed) == len(names):
-        raise ConfigError(
-            f"all stones are held: {', '.join(names) or 'there is none'}.",
-            hint="Leave one free to move, or draw it.",
-        )
+        text = f"all stones are held: {', '.join(names) or 'there is none'}."
+        raise ConfigError(text, hint="Leave one free to move, or draw it.")
     masonry = rock.masonry([rock.stone(o) for o in outlines], tuple(sorted(fixed)))
     _check_apart(names, outlines, x[T].mean(axis=1), list(rows.values()))
     _check_joints(names, masonry)
     return masonry
 
 
-def _numbers_below(what: str, given: npt.ArrayLike, count: int) -> Index:
+def _numbers_below(what: str, given: npt.ArrayLike, shape: Any, count: int) -> Index:
     """Whole numbers that count from 0."""
-    found = finite(what, given, None)
+    found = finite(what, given, shape, error=ModelError)
     numbers = found.astype(np.int64)
     if (numbers != found).any():
         raise ModelError(f"{what}: {found[numbers != found][0]} must be a whole number.")
     if numbers.size and not 0 <= numbers.min() <= numbers.max() < count:
-        raise ModelError(
-            f"{what} must be 0 to {count - 1}, got {numbers.min()} to {numbers.max()}."
-        )
+        got = f"{numbers.min()} to {numbers.max()}"
+        raise ModelError(f"{what} must be 0 to {count - 1}, got {got}.")
     return numbers
 
 
@@ -110,16 +108,12 @@ def _check_apart(
     names: list[str], outlines: list[Array], centres: Array, rows: Sequence[Index]
 ) -> None:
     """Refuse stones of which triangles lie in others; ``centres`` (t, 2) of all triangles."""
-    for one, outline in enumerate(outlines):
-        low, high = outline.min(axis=0), outline.max(axis=0)
-        for other, mine in enumerate(rows):
-            x = centres[mine] if other != one else np.zeros((0, 2))
-            x = x[((x > low) & (x < high)).all(axis=1)]
-            if any(is_inside(outline, point) for point in x):
-                raise ModelError(
-                    f"stones {names[one]!r} and {names[other]!r} overlap.",
-                    hint="Draw joints once, as lines that both stones share.",
-                )
+    for (one, outline), (other, mine) in product(enumerate(outlines), enumerate(rows)):
+        x, low, high = centres[mine], outline.min(axis=0), outline.max(axis=0)
+        x = x[((x > low) & (x < high)).all(axis=1)]
+        if one != other and any(is_inside(outline, point) for point in x):
+            text = f"stones {names[one]!r} and {names[other]!r} overlap."
+            raise ModelError(text, hint=SHARED_HINT)
 
 
 def _check_joints(names: list[str], masonry: Masonry) -> None:
@@ -129,14 +123,12 @@ def _check_joints(names: list[str], masonry: Masonry) -> None:
     if len(C.gap) and C.gap.min() < -OVERLAP_RTOL * size:
         k = int(np.argmin(C.gap))
         one, other = (names[C.who[k, side]] for side in (0, 2))
-        raise ModelError(f"stones {one!r} and {other!r} overlap by {-C.gap[k]:.3g} m.",
-                         hint="Draw joints once, as lines that both stones share.")  # fmt: skip
+        text = f"stones {one!r} and {other!r} overlap by {-C.gap[k]:.3g} m."
+        raise ModelError(text, hint=SHARED_HINT)
     close = np.abs(C.gap) < OVERLAP_RTOL * size
     joined = {*C.who[close][:, [0, 2]].ravel().tolist(), *masonry.held}
     for k, name in enumerate(names):
         if k not in joined:
-            gap = min((C.gap[i] for i in np.flatnonzero((C.who[:, [0, 2]] == k).any(axis=1))),
-                      default=np.inf)  # fmt: skip
+            gap = C.gap[(C.who[:, [0, 2]] == k).any(axis=1)].min(initial=np.inf)
             near = f"the nearest is {gap:.3g} m away" if np.isfinite(gap) else "none is near"
-            raise ModelError(f"stone {name!r} touches no other; {near}.",
-                             hint="Draw joints once, as lines that both stones share.")  # fmt: skip
+            raise ModelError(f"stone {name!r} touches no other; {near}.", hint=SHARED_HINT)

@@ -12,10 +12,11 @@ import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
+from rom.arguments import NotNegative, typed
 from rom.components.masonry.block_contact import Bonds, Contacts
 from rom.errors import ConfigError, FileFormatError, RomError
 from rom.model import Array, Index
@@ -23,9 +24,11 @@ from rom.units import in_si
 
 # of the distance at which corners are watched: stones nearer than that are glued
 BOND_GAP_RATIO = 0.02
+Strength = Annotated[float, NotNegative("Pa")]
 LAW_KEYS = {"between", "friction", "cohesion", "tension"}
 
 
+@typed
 @dataclass(frozen=True, slots=True)
 class Joint:
     """Law of joints.
@@ -40,19 +43,10 @@ class Joint:
         ConfigError: for numbers below zero.
     """
 
-    friction: float
-    cohesion: float = 0.0
-    tension: float = 0.0
+    friction: Annotated[float, NotNegative()]
+    cohesion: Strength = 0.0
+    tension: Strength = 0.0
     between: tuple[tuple[int, int], ...] | None = None
-
-    def __post_init__(self) -> None:
-        numbers = (self.friction, self.cohesion, self.tension)
-        if not all(0 <= x < np.inf for x in numbers):
-            raise ConfigError(
-                f"no joint has friction = {self.friction}, cohesion = {self.cohesion} Pa, "
-                f"tension = {self.tension} Pa.",
-                hint="All three are numbers of zero or more.",
-            )
 
 
 def read_joints(path: str | Path) -> tuple[Joint, ...]:
@@ -87,10 +81,8 @@ def read_joints(path: str | Path) -> tuple[Joint, ...]:
 def _law(where: str, law: Any) -> Joint:
     if not isinstance(law, Mapping) or not {"friction"} <= set(law) <= LAW_KEYS:
         keys = sorted(law) if isinstance(law, Mapping) else law
-        raise FileFormatError(
-            f"{where} has {keys}.",
-            hint="It needs friction, and may have between, cohesion and tension.",
-        )
+        needed = "It needs friction, and may have between, cohesion and tension."
+        raise FileFormatError(f"{where} has {keys}.", hint=needed)
     units = {"friction": "1", "cohesion": "Pa", "tension": "Pa"}
     try:
         numbers = {key: _number(law[key], unit) for key, unit in units.items() if key in law}
@@ -190,8 +182,6 @@ def _check_touch(joints: Sequence[Joint], touching: Index, n: int) -> None:
         rows = _pairs(joint, n) if joint.cohesion or joint.tension else None
         for pair in [] if rows is None else np.sort(rows, axis=1).tolist():
             if tuple(pair) not in there:
-                raise ConfigError(
-                    f"stones {pair[0]} and {pair[1]} have no joint that could be glued: they do "
-                    "not touch along an edge at the start.",
-                    hint="Name pairs that touch, or lay the stones closer.",
-                )
+                text = f"stones {pair[0]} and {pair[1]} do not touch along an edge at the start"
+                raise ConfigError(f"{text}: no joint of theirs could be glued.",
+                                  hint="Name pairs that touch, or lay them closer.")  # fmt: skip

@@ -15,13 +15,13 @@ Source:
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from scipy.optimize import brentq, linprog, minimize_scalar
 from scipy.sparse import coo_matrix, hstack
 
-from rom.arguments import between, positive, typed, whole
+from rom.arguments import Between, Count, Length, Positive, between, typed
 from rom.components.masonry.actions import BaseMotion, MovingLoad, PointLoad, Wind
 from rom.components.masonry.stones import Masonry, Stone, stone, touching
 from rom.errors import ConfigError, SolverError
@@ -72,11 +72,11 @@ class Rock:
 
 @typed
 def arch(
-    n: int,
-    radius: float,
+    n: Annotated[int, Count(2)],
+    radius: Length,
     thickness: float,
     *,
-    half_angle: float = np.pi / 2,
+    half_angle: Annotated[float, Between(0.0, np.pi, "()", "rad")] = np.pi / 2,
     rock: Rock | None = None,
 ) -> Masonry:
     """Circular arch of n equal voussoirs with radial joints, between two held springers.
@@ -93,17 +93,12 @@ def arch(
     Raises:
         ConfigError: if this is no arch.
     """
-    whole("n", n, 2)
-    between("thickness", thickness, 0, 2 * positive("radius", radius), "()")
-    between("half_angle", half_angle, 0, np.pi, "()")
+    between("thickness", thickness, 0, 2 * radius, "()")
     rock = rock or Rock()
     joints = np.linspace(-half_angle, half_angle, n + 1)
     inner, outer = radius - thickness / 2, radius + thickness / 2
-    stones = [
-        rock.stone(_sector(inner, outer, joints[[k, k + 1]]),
-                   _sector(inner, outer, np.linspace(joints[k], joints[k + 1], 33)))
-        for k in range(n)
-    ]  # fmt: skip
+    stones = [rock.stone(*(_sector(inner, outer, np.linspace(*ends, m)) for m in (2, 33)))
+              for ends in pairwise(joints)]  # fmt: skip
     left, right = (_springer(inner, outer, half_angle * side) for side in (-1, 1))
     return rock.masonry([rock.stone(left), *stones, rock.stone(right)], (0, n + 1))
 
@@ -126,10 +121,10 @@ def _springer(inner: float, outer: float, angle: float) -> Array:
 
 @typed
 def wall(
-    length: float,
-    courses: int,
+    length: Length,
+    courses: Annotated[int, Count(1)],
     *,
-    brick: tuple[float, float] = (0.5, 0.25),
+    brick: Annotated[tuple[float, float], Positive("m", (2,))] = (0.5, 0.25),
     openings: Sequence[tuple[float, float, int, int]] = (),
     rock: Rock | None = None,
 ) -> Masonry:
@@ -148,8 +143,6 @@ def wall(
         ConfigError: if nothing of the wall is left, an opening is not inside it, or two meet.
     """
     rock, (b, h) = rock or Rock(), brick
-    if not (length > 0 and courses >= 1 and min(brick) > 0):
-        raise ConfigError(f"no wall is {length} m long with {courses} courses of {brick}; use > 0.")
     for opening in openings:
         left, right, low, top = opening
         if not (0 < left < right < length and 0 <= low <= top < courses):
@@ -162,8 +155,8 @@ def wall(
         holes = sorted((x - b / 2 * (r == top), y + b / 2 * (r == top), r == top)
                        for x, y, low, top in openings if low <= r <= top)  # fmt: skip
         if any(one[1] > other[0] + 1e-9 for one, other in pairwise(holes)):
-            raise ConfigError(f"in course {r} of the wall two of the openings {openings} meet.",
-                              hint="Leave a brick between two lintels.")  # fmt: skip
+            text = f"in course {r} of the wall two of the openings {openings} meet."
+            raise ConfigError(text, hint="Leave a brick between two lintels.")
         cuts = np.r_[0.0, np.arange(b / 2 if r % 2 else b, length - 1e-9, b), length]
         spans = list(pairwise(cuts))
         for x, y, _ in holes:
@@ -250,16 +243,13 @@ def _free_rows(masonry: Masonry) -> tuple[Index, Array]:
 def _joint_forces(masonry: Masonry) -> _System:
     B, C, bonds = masonry.blocks(), touching(masonry), masonry.law.bonds
     row, scale = _free_rows(masonry)
-    n, entries = int(C.used[0]), []
-    for one in range(2):
-        at = row[C.who[:, 2 * one]]
-        for k in np.flatnonzero(at >= 0):
-            for p in range(3):
-                entries.append((at[k] + p, k, scale[p] * C.n[k, one, p]))
-                entries.append((at[k] + p, n + k, scale[p] * C.t[k, one, p]))
-    i, j, values = np.array(entries).T
+    n, first = int(C.used[0]), row[C.who[:, [0, 2]]]
+    k, one = np.nonzero(first >= 0)
+    i = first[k, one][:, None] + np.arange(3)
+    values = [scale * g[k, one, :3] for g in (C.n, C.t)]
+    places = [np.ravel([i, i]), np.repeat(np.r_[k, n + k], 3)]
     shape = (3 * int((row >= 0).sum()), 2 * n)
-    balance = coo_matrix((values, (i.astype(int), j.astype(int))), shape=shape)
+    balance = coo_matrix((np.ravel(values), places), shape=shape)
     k, ones, mu = np.arange(n), np.ones(n), C.friction
     slip = coo_matrix(
         (np.r_[-mu, ones, -mu, -ones], (np.r_[k, k, n + k, n + k], np.r_[k, n + k, k, n + k]))
@@ -358,9 +348,7 @@ def minimum_thickness(*, half_angle: float = np.pi / 2, true_weight: bool = True
         return best.fun - (1 - ratio / 2), best.x, H
 
     if not 0 < half_angle < np.pi or lowest(1e-6)[0] >= 0 or lowest(MAX_RATIO)[0] <= 0:
-        raise ConfigError(
-            f"half_angle = {half_angle} rad: it must lie between 0 and pi, not too flat for "
-            f"hinges, and not so far round that the arch is thicker than {MAX_RATIO} of its radius."
-        )
+        text = f"half_angle = {half_angle} rad: it must lie between 0 and pi, not too flat for"
+        raise ConfigError(f"{text} hinges, nor so far round that thickness is {MAX_RATIO} radii.")
     ratio = brentq(lambda x: lowest(x)[0], 1e-6, MAX_RATIO, xtol=1e-15)
     return Limit(float(ratio), *map(float, lowest(ratio)[1:]))

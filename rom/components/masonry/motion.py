@@ -2,17 +2,20 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Annotated, Any
 
 import numpy as np
 import numpy.typing as npt
 
-from rom.arguments import finite, shortened
+from rom.arguments import Count, Positive, finite, typed
 from rom.components.masonry.actions import Action, driver
 from rom.components.masonry.block_contact import OPEN, SLIDES, Contacts, contacts
 from rom.components.masonry.discontinuous_deformation import advance, work
 from rom.components.masonry.stones import SHEAR_STIFFNESS_RATIO, Masonry, polygon_moments
 from rom.errors import ConfigError, SolverError
 from rom.model import Array, Index
+
+Time = Annotated[float, Positive("s")]
 
 
 @dataclass(frozen=True)
@@ -83,14 +86,15 @@ def _turned(angle: float) -> Array:
     return np.array([[c, -s], [s, c]])
 
 
+@typed
 def simulate(  # noqa: PLR0913  all that a run needs
     masonry: Masonry,
     *,
-    t_end: float,
-    dt: float,
+    t_end: Time,
+    dt: Time,
     actions: Sequence[Action] = (),
-    damping: float = 0.0,
-    save_every: int = 1,
+    damping: Any = 0.0,
+    save_every: Annotated[int, Count(1)] = 1,
     q: npt.ArrayLike | None = None,
     v: npt.ArrayLike | None = None,
 ) -> Motion:
@@ -116,26 +120,25 @@ def simulate(  # noqa: PLR0913  all that a run needs
     Source:
         After Shi (1988), as in `rom.components.masonry.discontinuous_deformation`.
     """
-    if not isinstance(actions, Sequence):
-        raise ConfigError(f"actions = {shortened(actions)}: a list of them is needed.")
-    B, law = masonry.blocks(), masonry.law
-    n = _steps(t_end, dt, damping, save_every)
+    B, law, n = masonry.blocks(), masonry.law, round(t_end / dt)
+    if n < 1 or not damping >= 0:
+        needed = "needed are a step or more, and a damping that does not drive the stones, >= 0"
+        raise ConfigError(f"{n} steps with damping = {damping} 1/s: {needed}.")
     W, acting = work(B), driver(masonry, actions)
     for name, given, target in (("q", q, W.q), ("v", v, W.v)):
         start = masonry.start() * (name == "q") if given is None else given
         target[:] = finite(name, start, target.shape)
     C, old = (contacts(8 * len(B.corner), B.load.shape[1], len(B.size)) for _ in range(2))
     cuts, kept = np.zeros(1, dtype=np.int64), np.array([0, *range(save_every, n + 1, save_every)])
-    found = Motion(
-        masonry, dt * kept, np.zeros((len(kept), *W.q.shape)), np.zeros((len(kept), *W.q.shape)),
-        np.full(len(kept), np.nan), C, 0, np.zeros(len(kept), dtype=np.int64),
-    )  # fmt: skip
-    found.q[0], found.v[0] = W.q, W.v
+    Q, V = np.zeros((2, kept.size, *W.q.shape))
+    energy, broken = np.full(kept.size, np.nan), np.zeros(kept.size, dtype=np.int64)
+    found = Motion(masonry, dt * kept, Q, V, energy, C, 0, broken)
+    Q[0], V[0] = W.q, W.v
     for k in range(1, len(kept)):
         driven = acting(dt * np.arange(kept[k - 1], kept[k] + 1))
-        found.energy[k] = advance(B, law, C, old, W, dt, driven, damping, cuts)
-        found.q[k], found.v[k], found.broken[k] = W.q, W.v, np.sum(law.bonds.intact == 0)
-        if not np.isfinite(found.energy[k]):
+        energy[k] = advance(B, law, C, old, W, dt, driven, float(damping), cuts)
+        Q[k], V[k], broken[k] = W.q, W.v, np.sum(law.bonds.intact == 0)
+        if not np.isfinite(energy[k]):
             raise SolverError(
                 f"contacts do not settle near t = {found.t[k]:.6g} s, even in steps of "
                 f"{dt / 3**8:.2g} s.",
@@ -143,17 +146,6 @@ def simulate(  # noqa: PLR0913  all that a run needs
                 solution=_first(found, k, int(cuts[0])),
             )
     return _first(found, len(kept), int(cuts[0]))
-
-
-def _steps(t_end: float, dt: float, damping: float, save_every: int) -> int:
-    if not (0 < dt < np.inf and abs(t_end) < np.inf):
-        raise ConfigError(f"t_end = {t_end} s in steps of dt = {dt} s: both must be positive.")
-    n = round(t_end / dt)
-    if n < 1 or save_every < 1:
-        raise ConfigError(f"{n} steps, save_every = {save_every}: both must be at least 1.")
-    if not damping >= 0:
-        raise ConfigError(f"damping = {damping} 1/s would drive the stones; give 0 or more.")
-    return n
 
 
 def _first(found: Motion, k: int, cuts: int) -> Motion:

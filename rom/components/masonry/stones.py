@@ -10,14 +10,14 @@ Source:
 """
 
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import numpy.typing as npt
 from scipy.sparse import coo_matrix, csr_matrix
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
-from rom.arguments import finite, positive, typed
+from rom.arguments import Between, Length, NotNegative, Positive, finite, typed
 from rom.body.flexible import FlexibleBody
 from rom.body.surface import surface_of
 from rom.components.masonry.block_contact import (
@@ -62,10 +62,10 @@ class Stone:
 def stone(
     outline: npt.ArrayLike,
     *,
-    E: float,
-    nu: float,
-    rho: float,
-    thickness: float = 1.0,
+    E: Annotated[float, Positive("Pa", error=MaterialError)],
+    nu: Annotated[float, Between(-1.0, 0.5, "()", error=MaterialError)],
+    rho: Annotated[float, Positive("kg/m^3", error=MaterialError)],
+    thickness: Annotated[float, Positive("m", error=MaterialError)] = 1.0,
     state: Literal["plane stress", "plane strain"] = "plane stress",
     solid: npt.ArrayLike | None = None,
 ) -> Stone:
@@ -84,11 +84,6 @@ def stone(
         ConfigError, MaterialError: for an unknown state; if no stone has these numbers.
         ModelError: if the outline does not enclose an area counterclockwise.
     """
-    if not (E > 0 and -1 < nu < 0.5 and rho > 0 and thickness > 0):
-        raise MaterialError(
-            f"no stone has E = {E} Pa, nu = {nu}, rho = {rho} kg/m^3, thickness = {thickness} m.",
-            hint="E, rho, thickness > 0; -1 < nu < 0.5.",
-        )
     corners = _corners(outline)
     area, centre, S = polygon_moments(corners if solid is None else _corners(solid))
     Sx, Sy, Sxy = S[0, 0], S[1, 1], S[0, 1]
@@ -109,18 +104,14 @@ def stone(
 def _corners(outline: npt.ArrayLike) -> Array:
     """(k, 2) corners of a polygon that encloses an area, counterclockwise."""
     x = finite("the outline of a stone", outline, (None, 2), error=ModelError)
-    if len(x) < 3:
-        raise ModelError(f"an outline must have at least three corners, got {len(x)}.")
-    sides = np.linalg.norm(np.roll(x, -1, axis=0) - x, axis=1)
-    if not sides.all():
-        raise ModelError(f"corner {int(sides.argmin())} is listed twice in turn; leave one out.")
     y = np.roll(x, -1, axis=0)
+    sides = np.linalg.norm(y - x, axis=1)
+    if len(x) > 2 and not sides.all():
+        raise ModelError(f"corner {int(sides.argmin())} is listed twice in turn; leave one out.")
     area = float((x[:, 0] * y[:, 1] - x[:, 1] * y[:, 0]).sum() / 2)
     if not area > 0:
-        raise ModelError(
-            f"a stone of {len(x)} corners encloses {area:.4g} m2.",
-            hint="List three corners or more, counterclockwise.",
-        )
+        text = f"an outline of {len(x)} corners encloses {area:.4g} m2."
+        raise ModelError(text, hint="List at least three corners, counterclockwise.")
     return x
 
 
@@ -190,29 +181,19 @@ class Masonry:
 
     stones: tuple[Stone, ...]
     held: tuple[int, ...]
-    stiffness: float
-    friction: float
+    stiffness: Annotated[float, Positive("N/m")]
+    friction: Annotated[float, NotNegative()]
     gravity: tuple[float, float] = (0.0, -9.81)
-    reach: float | None = None
+    reach: Length | None = None
     joints: tuple[Joint, ...] = ()
-    thickness: float = 1.0
+    thickness: Length = 1.0
 
     def __post_init__(self) -> None:
-        if not (self.stiffness > 0 and self.friction >= 0):
-            raise ConfigError(
-                f"stiffness = {self.stiffness} N/m, friction = {self.friction}: needed are > 0, "
-                ">= 0."
-            )
         if not set(self.held) <= set(range(len(self.stones))):
             raise ConfigError(f"held = {self.held} must be of stones 0 to {len(self.stones) - 1}.")
         if len(set(self.held)) == len(self.stones):
-            raise ConfigError(
-                f"all of {len(self.stones)} stones are held.", hint="Leave one free to move."
-            )
-        positive("thickness", self.thickness)
-        if self.reach is not None:
-            positive("reach", self.reach)
-        finite("gravity", self.gravity, (2,))
+            text = f"all of {len(self.stones)} stones are held."
+            raise ConfigError(text, hint="Leave one free to move.")
 
     @property
     def law(self) -> Law:
@@ -221,9 +202,9 @@ class Masonry:
         if not any(joint.cohesion or joint.tension for joint in self.joints):
             return law
         C, corners = touching(self), np.vstack([s.outline for s in self.stones])
-        found = bonds(self.joints, C, corners, len(self.stones), law.reach)
-        pull, cohesion = self.thickness * found.pull, self.thickness * found.cohesion
-        return law._replace(bonds=found._replace(pull=pull, cohesion=cohesion))
+        b = bonds(self.joints, C, corners, len(self.stones), law.reach)
+        t = self.thickness
+        return law._replace(bonds=b._replace(pull=t * b.pull, cohesion=t * b.cohesion))
 
     def _watch(self) -> Law:
         edges = [np.linalg.norm(s.outline - np.roll(s.outline, 1, axis=0), axis=1).min()

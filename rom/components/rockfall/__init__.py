@@ -12,8 +12,8 @@ of a slab, such as those of a reduced finite element body, can take the place of
 q'' + 2 zeta omega q' + omega^2 q = phi F_2, z_3 = phi . q.
 
 `laws` has simple laws of cushion and plug, `layer` the cushion as a layer of sand from its
-geometry, `impact` the motion and what decides over it, `calibration` fits parameters to measured
-histories, `design` says what a gallery bears, `waves` which force arrives below the sand, `kernels`
+geometry, and which force arrives below it, `impact` the motion and what decides over it,
+`calibration` fits parameters to measured histories, `design` says what a gallery bears, `kernels`
 are compiled, ahead by `field`. Published tests, and how far they are met: docs/theory/rockfall.md.
 
 Source:

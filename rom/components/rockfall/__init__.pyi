@@ -16,6 +16,6 @@ from rom.components.rockfall.laws import Cushion as Cushion
 from rom.components.rockfall.laws import CushionForce as CushionForce
 from rom.components.rockfall.laws import Shear as Shear
 from rom.components.rockfall.layer import Layer as Layer
+from rom.components.rockfall.layer import arriving as arriving
 from rom.components.rockfall.layer import bearing_pressure as bearing_pressure
-from rom.components.rockfall.waves import arriving as arriving
-from rom.components.rockfall.waves import wave_delay as wave_delay
+from rom.components.rockfall.layer import wave_delay as wave_delay

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import least_squares
 
+from rom.components.histories import Table
 from rom.components.rockfall.impact import Gallery, Impact, scaled, strike
 from rom.errors import ConfigError, ModelError, SolverError
 from rom.model import Array
@@ -56,24 +57,16 @@ class History:
     deviation: float | None = None
 
     def __post_init__(self) -> None:
+        Table(self.t, self.values)
         t, x = np.asarray(self.t, dtype=float), np.asarray(self.values, dtype=float)
-        if t.ndim != 1 or t.shape != x.shape or t.size < MIN_INSTANTS:
-            raise ConfigError(
-                f"a history needs as many times as values, {MIN_INSTANTS} at least; got "
-                f"{t.shape} and {x.shape}."
-            )
-        bad = np.flatnonzero(~(np.isfinite(t) & np.isfinite(x)))
-        if bad.size:
-            raise ConfigError(f"value {bad[0]} of {t.size} of the history is not finite; leave "
-                              "it out, or cut the history there.")  # fmt: skip
+        if t.size < MIN_INSTANTS or t[0] < 0:
+            got = f"{t.size} from {t[0]:g} s on"
+            raise ConfigError(f"a history needs {MIN_INSTANTS} values or more, t >= 0; got {got}.")
         steps = np.diff(t)
-        if (steps <= 0).any() or t[0] < 0:
-            k = int(np.argmax(steps <= 0))
-            raise ConfigError(f"times of a history increase from contact, t >= 0; see {t[k]:g} s.")
-        if (steps > MAX_GAP * np.median(steps)).any():
-            k = int(steps.argmax())
-            raise ConfigError(f"the history has a gap from {t[k]:g} s to {t[k + 1]:g} s; take it "
-                              "as two, cut there.")  # fmt: skip
+        k = int(steps.argmax())
+        if steps[k] > MAX_GAP * np.median(steps):
+            gap = f"a gap from {t[k]:g} s to {t[k + 1]:g} s"
+            raise ConfigError(f"the history has {gap}; take it as two, cut there.")
         if not x.any() or not (self.deviation is None or self.deviation > 0):
             raise ConfigError("a history needs values that are not zero, and a positive deviation.")
 
@@ -145,17 +138,17 @@ def calibrate(
             return [np.full(h.t.size, FAR_RATIO * np.abs(h.values).max()) for _, h in pieces]
         return [np.interp(h.t, impact.t, CHANNELS[c](trial, impact)) - h.values for c, h in pieces]
 
+    def weighed(x: Array, deviations: list[float]) -> Array:
+        return np.concatenate([r / d for r, d in zip(residuals(x), deviations, strict=True)])
+
     x, scales = np.zeros(len(names)), [float(np.abs(h.values).max()) for _, h in pieces]
+    bounds = _bounds(g, names)
     for weights in (scales, None):  # by size first, by scatter then
         deviations = weights or _scatter(residuals(x), pieces, len(names))
-        fit = least_squares(
-            lambda y, s=deviations: np.concatenate(
-                [r / d for r, d in zip(residuals(y), s, strict=True)]
-            ),
-            x, jac="3-point", bounds=_bounds(g, names), diff_step=DERIVATIVE_STEP, x_scale=1.0,
-        )  # fmt: skip
+        fit = least_squares(weighed, x, "3-point", bounds, diff_step=DERIVATIVE_STEP,
+                            args=(deviations,))  # fmt: skip
         x = fit.x
-    cov = _covariance(fit.jac, x, names, _bounds(g, names))
+    cov = _covariance(fit.jac, x, names, bounds)
     sigma = np.sqrt(np.diag(cov))
     left = {c: float(np.sqrt(np.mean(r**2)) / s)
             for (c, _), r, s in zip(pieces, residuals(x), scales, strict=True)}  # fmt: skip
@@ -191,11 +184,9 @@ def _scatter(left: list[Array], pieces: list[tuple[str, History]], n: int) -> li
 
 def _bounds(g: Gallery, names: Sequence[str]) -> tuple[Array, Array]:
     """Logarithms of the factors; nothing gives back more than it takes."""
-    high = np.full(len(names), np.log(MAX_FACTOR))
-    for k, name in enumerate(names):
-        if name == "recovery of the cushion":
-            high[k] = min(high[k], 1e-9 - np.log(g.cushion.recovery))
-    return np.full(len(names), -np.log(MAX_FACTOR)), high
+    most = np.log(MAX_FACTOR)
+    limits = {"recovery of the cushion": min(most, 1e-9 - np.log(g.cushion.recovery))}
+    return np.full(len(names), -most), np.array([limits.get(name, most) for name in names])
 
 
 def _covariance(J: Array, x: Array, names: Sequence[str], bounds: tuple[Array, Array]) -> Array:

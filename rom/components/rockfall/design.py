@@ -7,13 +7,14 @@ Source:
 """
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from scipy.optimize import brentq
 
-from rom.arguments import positive
+from rom.arguments import Between, Positive, typed
 from rom.components.rockfall.impact import Gallery, strike
+from rom.components.rockfall.laws import Mass
 from rom.components.rockfall.layer import Layer
 from rom.errors import ConfigError, SolverError
 from rom.model import Array
@@ -50,7 +51,13 @@ class Verdict:
         return max(shares, key=lambda name: shares[name])
 
 
-def design_check(g: Gallery, *, ductility: float = 1.0, depth: float = 1.0) -> Verdict:
+@typed
+def design_check(
+    g: Gallery,
+    *,
+    ductility: Annotated[float, Positive()] = 1.0,
+    depth: Annotated[float, Between(0.0, 1.0, "(]")] = 1.0,
+) -> Verdict:
     """Strike and compare with what cushion, plug and slab bear.
 
     A plug that has cracked carries less, so the force in shear is that of one that does not.
@@ -63,18 +70,11 @@ def design_check(g: Gallery, *, ductility: float = 1.0, depth: float = 1.0) -> V
     Raises:
         ConfigError: for an allowance that is not positive, or a depth beyond the cushion.
     """
-    if not (0 < ductility < np.inf and 0 < depth <= 1):
-        raise ConfigError(f"ductility = {ductility}, depth = {depth}: needed are ductility > 0 and "
-                          "0 < depth <= 1.")  # fmt: skip
     try:
         got = strike(replace(g, shear=replace(g.shear, capacity=np.inf)))
-    except SolverError as error:
-        if not error.solution.through(g):
+    except (ConfigError, SolverError) as error:  # the first: no such cushion takes up the fall
+        if isinstance(error, SolverError) and not error.solution.through(g):
             raise
-        got = None
-    except ConfigError:  # a fall that no cushion of this kind takes up
-        got = None
-    if got is None:
         return Verdict(np.inf, np.inf, np.inf, "through")
     shear = float(got.peaks[1]) / g.shear.capacity
     return Verdict(
@@ -85,7 +85,8 @@ def design_check(g: Gallery, *, ductility: float = 1.0, depth: float = 1.0) -> V
     )
 
 
-def with_boulder(g: Gallery, boulder: float, height: float | None = None) -> Gallery:
+@typed
+def with_boulder(g: Gallery, boulder: Mass, height: float | None = None) -> Gallery:
     """The gallery under another boulder of the same shape and density.
 
     Its radius goes by the cube root of the mass: that of a `Layer`, or, under its square root, the
@@ -99,13 +100,11 @@ def with_boulder(g: Gallery, boulder: float, height: float | None = None) -> Gal
     Raises:
         ConfigError: for a mass or a height that is not positive.
     """
-    positive("boulder [kg]", boulder)
     ratio, c = (boulder / g.boulder) ** (1 / 3), g.cushion
     cushion = (replace(c, radius=c.radius * ratio) if isinstance(c, Layer)
                else replace(c, stiffness=c.stiffness * ratio**0.5))  # fmt: skip
-    return replace(
-        g, boulder=boulder, cushion=cushion, height=g.height if height is None else height
-    )
+    height = g.height if height is None else height
+    return replace(g, boulder=boulder, cushion=cushion, height=height)
 
 
 def capacity_map(g: Gallery, boulders: Any, heights: Any, **allowed: float) -> list[list[Verdict]]:
@@ -139,17 +138,15 @@ def capacity_heights(g: Gallery, boulders: Any, **allowed: float) -> Array:
     """
     if not (g.cushion.limit < np.inf or g.shear.capacity < np.inf or g.slab.capacity < np.inf):
         raise ConfigError("the gallery bears anything: it needs a limit or a capacity.")
-    found = []
-    for m in boulders:
 
-        def excess(h: float, m: float = m) -> float:
-            return min(design_check(with_boulder(g, m, h), **allowed).share, 2.0) - 1
+    def excess(h: float, m: float) -> float:
+        return min(design_check(with_boulder(g, m, h), **allowed).share, 2.0) - 1
 
-        low, high = HEIGHT_XTOL, MAX_FALL
-        if excess(high) < 0:
-            found.append(np.inf)
-        elif excess(low) > 0:
-            found.append(0.0)
-        else:
-            found.append(float(brentq(excess, low, high, xtol=HEIGHT_XTOL)))
-    return np.array(found)
+    def height(m: float) -> float:
+        if excess(MAX_FALL, m) < 0:
+            return np.inf
+        if excess(HEIGHT_XTOL, m) > 0:
+            return 0.0
+        return float(brentq(excess, HEIGHT_XTOL, MAX_FALL, (m,), xtol=HEIGHT_XTOL))
+
+    return np.array([height(m) for m in boulders])

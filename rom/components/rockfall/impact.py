@@ -5,19 +5,20 @@ Source:
 """
 
 from dataclasses import astuple, dataclass, replace
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from scipy.linalg import eigh
 
-from rom.arguments import positive
+from rom.arguments import Count, Length, Positive, finite, typed
 from rom.components.rockfall import kernels
-from rom.components.rockfall.laws import GRAVITY, Cushion, Shear
+from rom.components.rockfall.laws import GRAVITY, Cushion, Mass, Shear
 from rom.components.rockfall.layer import Layer
 from rom.errors import ConfigError, ModelError, SolverError
 from rom.model import Array
 from rom.rotation import skew
 
+Time = Annotated[float, Positive("s")]
 STEP_RATIO = 0.1  # time step times the highest frequency
 STATES = ("whole", "cracked", "punched")
 # with no `t_end`: the longest periods in which no peak may have grown before an impact is over,
@@ -51,27 +52,29 @@ class Slab:
     capacity: float = np.inf
 
     def __post_init__(self) -> None:
-        if np.size(self.phi) != np.size(self.omega) or not (np.asarray(self.omega) > 0).all():
+        phi, omega = (finite("the modes of a slab", x, (None,), error=ModelError)
+                      for x in (self.phi, self.omega))  # fmt: skip
+        if phi.size != omega.size or not (omega > 0).all():
             raise ModelError("a slab needs as many phi as omega, and supports that hold it.")
-        if not (np.isfinite(self.phi).all() and np.isfinite(self.omega).all()):
-            raise ModelError("the modes of the slab must be finite.")
         if not np.any(self.phi):
             raise ModelError("no mode of the slab moves under the plug; choose another place.")
         if not (self.capacity > 0 and 0 <= self.damping < np.inf):
-            raise ModelError(
-                f"capacity = {self.capacity} N, damping = {self.damping}: needed are capacity > 0, "
-                "damping >= 0."
-            )
+            given = f"capacity = {self.capacity} N, damping = {self.damping}"
+            raise ModelError(f"{given}: needed are capacity > 0, damping >= 0.")
 
     @classmethod
-    def of_mass(cls, mass: float, stiffness: float, **more: float) -> "Slab":
+    @typed
+    def of_mass(
+        cls,
+        mass: Annotated[float, Positive("kg", error=ModelError)],
+        stiffness: Annotated[float, Positive("N/m", error=ModelError)],
+        **more: Any,
+    ) -> "Slab":
         """The last mass and spring of the three [kg, N/m].
 
         Raises:
             ModelError: if one is not positive.
         """
-        positive("mass [kg]", mass, error=ModelError)
-        positive("stiffness [N/m]", stiffness, error=ModelError)
         return cls(np.array([mass**-0.5]), np.array([np.sqrt(stiffness / mass)]), **more)
 
     @classmethod
@@ -101,6 +104,7 @@ class Slab:
         return float(1 / np.square(np.divide(self.phi, self.omega)).sum())
 
 
+@typed
 @dataclass(frozen=True, slots=True)
 class Gallery:
     """A boulder about to strike.
@@ -115,17 +119,13 @@ class Gallery:
         ConfigError: for a mass or a height that is not positive.
     """
 
-    boulder: float
-    height: float
-    plug: float
+    boulder: Mass
+    height: Length
+    plug: Mass
     cushion: Cushion | Layer
     shear: Shear
     slab: Slab
     weight: bool = True
-
-    def __post_init__(self) -> None:
-        for name, unit in (("boulder", "kg"), ("plug", "kg"), ("height", "m")):
-            positive(f"{name} [{unit}]", getattr(self, name))
 
     @property
     def speed(self) -> float:
@@ -200,8 +200,7 @@ class Impact:
     @property
     def rebound(self) -> float:
         """Share of the boulder's energy with which it leaves, at most [1]."""
-        up = np.minimum(self.v[:, 0], 0.0)
-        return float((up.min() / self.v[0, 0]) ** 2)
+        return float((min(self.v[:, 0].min(), 0.0) / self.v[0, 0]) ** 2)
 
     def exceeds(self, other: "Impact") -> bool:
         """Whether one of the peaks or the deflection is larger than in another motion."""
@@ -214,9 +213,11 @@ class Impact:
         return g.cushion.limit < np.inf and reach > NEARLY_THROUGH * g.cushion.limit
 
 
+@typed
 def strike(
-    g: Gallery, *, t_end: float | None = None, dt: float | None = None, keep: int = 1000
-) -> Impact:
+    g: Gallery, *, t_end: Time | None = None, dt: Time | None = None,
+    keep: Annotated[int, Count(1)] = 1000,
+) -> Impact:  # fmt: skip
     """Let the boulder strike: central differences, damping at mid-step.
 
     Args:
@@ -233,10 +234,6 @@ def strike(
         SolverError: if the motion grows without bound because dt is too large, the boulder is
             through the cushion, or the impact does not end; ``error.solution`` is what was finite.
     """
-    if not (
-        (t_end is None or 0 < t_end < np.inf) and keep >= 1 and (dt is None or 0 < dt < np.inf)
-    ):
-        raise ConfigError(f"t_end = {t_end} s, dt = {dt} s, keep = {keep}: all must be positive.")
     h = STEP_RATIO / g.highest_frequency() if dt is None else dt
     if t_end is not None:
         n = int(np.ceil(t_end / h))
@@ -280,20 +277,15 @@ def _refuse(g: Gallery, out: Array, last: Array, step: float, over: bool) -> Non
             reason = f"the boulder is through the cushion of {g.cushion.limit:g} m."
         raise SolverError(reason, solution=before)
     if not over:
-        raise SolverError(
-            f"the peaks of the impact still grow after {out[-1, 0]:.3g} s.",
-            hint="Give t_end.",
-            solution=_impact(out, last),
-        )
+        text = f"the peaks of the impact still grow after {out[-1, 0]:.3g} s."
+        raise SolverError(text, hint="Give t_end.", solution=_impact(out, last))
 
 
 def _impact(out: Array, last: Array) -> Impact:
     t, z, v, forces, energy, modal = np.split(out, PARTS, axis=1)
-    deepest, deflection, plastic = map(float, last[3:6])
+    deepest, most, stays = map(float, last[3:6])
     state = STATES[int(last[6])]
-    return Impact(
-        t[:, 0], z, v, forces, energy, last[:3], deepest, deflection, plastic, state, modal
-    )
+    return Impact(t[:, 0], z, v, forces, energy, last[:3], deepest, most, stays, state, modal)
 
 
 VARIED_NUMBERS = {  # what can be changed: where it stands, and the power of the factor there

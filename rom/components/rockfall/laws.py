@@ -2,17 +2,20 @@
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
-from rom.arguments import unit_vector
+from rom.arguments import Positive, typed, unit_vector
 from rom.components.rockfall import kernels
 from rom.errors import ConfigError
 from rom.model import Array
 
+Mass = Annotated[float, Positive("kg")]
+Modulus = Annotated[float, Positive("Pa")]
+Density = Annotated[float, Positive("kg/m^3")]
 GRAVITY = 9.81  # m/s^2
 ROCK_DENSITY = 2600.0  # [kg/m^3]
 # share of the energy that sand gives back: a boulder returns with a sixth of its speed, as the
@@ -55,9 +58,8 @@ class Resistance(ABC):
             low, left = high, -rest
         raise ConfigError(
             f"energy = {energy:.3g} J: the cushion takes up {energy - left:.3g} J before it is "
-            f"pressed through to {self.limit:g} m. Take a thicker or a stiffer one, or a smaller "
-            "boulder."
-        )
+            f"pressed through to {self.limit:g} m.", hint="Take a thicker or a stiffer one.",
+        )  # fmt: skip
 
     def _marks(self) -> Array:
         """Penetrations that close in on the limit, or grow without one."""
@@ -97,8 +99,9 @@ class Cushion(Resistance):
             raise ConfigError(f"{self}: needed are {needed}.")
 
     @classmethod
+    @typed
     def of_sand(
-        cls, boulder: float, lame: float, *, rock: float = ROCK_DENSITY, **more: Any
+        cls, boulder: Mass, lame: Modulus, *, rock: Density = ROCK_DENSITY, **more: Any
     ) -> "Cushion":
         """Hertz's half space, with equal Lame constants, under a spherical boulder.
 
@@ -114,12 +117,7 @@ class Cushion(Resistance):
         Raises:
             ConfigError: if a number is not positive.
         """
-        if not (boulder > 0 and lame > 0 and rock > 0):
-            raise ConfigError(
-                f"boulder = {boulder} kg, lame = {lame} Pa, rock = {rock} kg/m^3: all must be > 0."
-            )
-        radius = ball_radius(boulder, rock)
-        return cls(4 / 3 * 2.5 * lame / (1 - 0.25**2) * np.sqrt(radius), **more)
+        return cls(4 / 3 * 2.5 * lame / (1 - 0.25**2) * np.sqrt(ball_radius(boulder, rock)), **more)
 
     @property
     def law(self) -> tuple[float, ...]:
@@ -177,9 +175,7 @@ class CushionForce:
 
     def __init__(self, cushion: Resistance, down: Any, gap: float, reach: float = np.inf):
         if not (0.0 <= gap < np.inf and reach > 0.0):
-            raise ConfigError(
-                f"gap = {gap} m, reach = {reach} m: needed are gap >= 0 and reach > 0."
-            )
+            raise ConfigError(f"gap = {gap} m must be 0 or more, reach = {reach} m positive.")
         self.cushion, self.down = cushion, unit_vector("down", down)
         self.gap, self.reach = gap, reach
         self.t, self.trial, self.deepest = -np.inf, 0.0, 0.0
@@ -192,6 +188,6 @@ class CushionForce:
         self.trial = self.gap - float(arm @ self.down)
         aside = float(np.linalg.norm(arm - (arm @ self.down) * self.down))
         if self.trial > 0.0 and aside > self.reach:
-            raise ConfigError(f"the boulder comes down {aside:.3g} m aside at t = {t:.4g} s, "
-                              f"beyond the slab; at most {self.reach:g} m are on it.")  # fmt: skip
+            where = f"{aside:.3g} m aside at t = {t:.4g} s, beyond the slab"
+            raise ConfigError(f"the boulder comes down {where}; {self.reach:g} m are on it.")
         return -self.cushion.force(self.trial, self.deepest) * self.down, np.zeros(3)

@@ -1,28 +1,38 @@
 """The cushion as a layer: contact that grows with depth, load that spreads, plug beneath it.
 
+Waves: the layer is a column that does not spread and does not fail, with the mass of its sand; its
+floor gives back a share of each. This is what a cushion without mass leaves out, and it does not
+act back on the boulder.
+
 Source:
     Cones in place of half spaces: Wolf and Deeks, Foundation Vibration Analysis, a Strength of
     Materials Approach, Elsevier (2004). Load spread by 2:1 in sand: any textbook of foundations.
+    Waves: d'Alembert's solution, as in Achenbach, Wave Propagation in Elastic Solids (1973), ch. 1.
 """
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+import numpy.typing as npt
 
-from rom.arguments import between, positive
+from rom.arguments import Between, Length, Positive, Share, between, typed, vector
 from rom.components.rockfall import kernels
 from rom.components.rockfall.laws import (
     GRAVITY,
     ROCK_DENSITY,
     SAND_RECOVERY,
-    Cushion,
+    Density,
+    Mass,
+    Modulus,
     Resistance,
     Shear,
     ball_radius,
 )
 from rom.errors import ConfigError
+from rom.model import Array
 
+MAX_PASSAGES = 10_000  # of waves in a history; more are no longer a pulse on a layer
 SAND_DENSITY, CONCRETE_DENSITY = 1800.0, 2500.0  # [kg/m^3]
 PUNCHING_SLOPE = 1.0  # of the cone that is punched out of the concrete, 45 degrees
 
@@ -71,10 +81,9 @@ class Layer(Resistance):
         between("angle [rad]", self.angle, 0, np.pi / 2, "()")
 
     @classmethod
-    def of_sand(
-        cls, boulder: float, lame: float, thickness: float, *, rock: float = ROCK_DENSITY,
-        **more: Any,
-    ) -> "Layer":  # fmt: skip
+    @typed
+    def of_sand(cls, boulder: Mass, lame: Modulus, thickness: float, *,
+                rock: Density = ROCK_DENSITY, **more: Any) -> "Layer":  # fmt: skip
         """The sand of `Cushion.of_sand`, E = 2.5 lame, in a layer.
 
         Args:
@@ -87,7 +96,6 @@ class Layer(Resistance):
         Raises:
             ConfigError: if a number is not positive.
         """
-        Cushion.of_sand(boulder, lame, rock=rock)
         return cls(2.5 * lame, ball_radius(boulder, rock), thickness, **more)
 
     @property
@@ -125,7 +133,8 @@ class Layer(Resistance):
         """
         return self.contact(d) + float(np.tan(self.angle)) * (self.thickness - d)
 
-    def plug(self, d: float, slab: float, *, concrete: float = CONCRETE_DENSITY) -> float:
+    @typed
+    def plug(self, d: float, slab: Length, *, concrete: Density = CONCRETE_DENSITY) -> float:
         """Mass [kg] of the sand under the boulder and of the cone of concrete below it.
 
         Args:
@@ -136,16 +145,14 @@ class Layer(Resistance):
         Raises:
             ConfigError: for a size that is not positive, or a boulder through the layer.
         """
-        if not (slab > 0 and concrete > 0):
-            raise ConfigError(f"slab = {slab} m, concrete = {concrete} kg/m^3: both must be > 0.")
         top, bottom = self.contact(d), self.spread(d)
         sand = _frustum(top, bottom, self.thickness - d)
-        return self.density * sand + concrete * _frustum(
-            bottom, bottom + PUNCHING_SLOPE * slab, slab
-        )
+        cone = _frustum(bottom, bottom + PUNCHING_SLOPE * slab, slab)
+        return self.density * sand + concrete * cone
 
-    def shear(self, d: float, slab: float, *, modulus: float, strength: float,
-              **more: float) -> Shear:  # fmt: skip
+    @typed
+    def shear(self, d: float, slab: Length, *, modulus: Modulus, strength: Modulus,
+              **more: Any) -> Shear:  # fmt: skip
         """The plug's ring of concrete in shear, from the load's edge a thickness outwards.
 
         A ring of radii r and r + h that only shears has 2 pi G h / log(1 + h / r); it cracks at
@@ -161,18 +168,18 @@ class Layer(Resistance):
         Raises:
             ConfigError: for a number that is not positive, or a boulder through the layer.
         """
-        if not (slab > 0 and modulus > 0 and strength > 0):
-            raise ConfigError(
-                f"slab = {slab} m, modulus = {modulus} Pa, strength = {strength} Pa: "
-                "all must be > 0."
-            )
         r = self.spread(d)
         stiffness = 2 * np.pi * modulus * slab / np.log1p(PUNCHING_SLOPE * slab / r)
         capacity = strength * 2 * np.pi * (r + 0.5 * PUNCHING_SLOPE * slab) * slab
         return Shear(float(stiffness), float(capacity), **more)
 
 
-def bearing_pressure(friction: float, radius: float, density: float = SAND_DENSITY) -> float:
+@typed
+def bearing_pressure(
+    friction: Annotated[float, Between(0.0, np.pi / 3, "()", "rad")],
+    radius: Length,
+    density: Density = SAND_DENSITY,
+) -> float:
     """Pressure [Pa] under which dry sand fails below a disc on its surface.
 
     0.6 rho g R N with N = 2 (N_q + 1) tan(phi), N_q = exp(pi tan(phi)) tan^2(pi / 4 + phi / 2),
@@ -190,9 +197,6 @@ def bearing_pressure(friction: float, radius: float, density: float = SAND_DENSI
         Vesic, Analysis of ultimate loads of shallow foundations, J. Soil Mech. Found. Div. ASCE
         99 (1973) 45.
     """
-    between("friction [rad]", friction, 0, np.pi / 3, "()")
-    positive("radius [m]", radius)
-    positive("density [kg/m^3]", density)
     slope = np.tan(friction)
     n_q = np.exp(np.pi * slope) * np.tan(np.pi / 4 + friction / 2) ** 2
     return float(0.6 * density * GRAVITY * radius * 2 * (n_q + 1) * slope)
@@ -201,3 +205,63 @@ def bearing_pressure(friction: float, radius: float, density: float = SAND_DENSI
 def _frustum(top: float, bottom: float, height: float) -> float:
     """Volume of a truncated cone."""
     return np.pi * height / 3 * (top**2 + top * bottom + bottom**2)
+
+
+@typed
+def wave_delay(layer: Layer, d: float = 0.0) -> float:
+    """Time [s] that a wave takes through the sand left at a penetration.
+
+    The speed is the root of modulus over density, with the modulus of loading.
+
+    Args:
+        layer: the sand.
+        d: penetration [m].
+
+    Raises:
+        ConfigError: for a penetration that is negative or through the layer.
+    """
+    between("d [m]", d, 0, layer.thickness, "[)")
+    return float((layer.thickness - d) * np.sqrt(layer.density / layer.modulus))
+
+
+@typed
+def arriving(
+    t: npt.ArrayLike,
+    force: npt.ArrayLike,
+    delay: Annotated[float, Positive("s")],
+    *,
+    reflection: Share = 1.0,
+) -> Array:
+    """(n,) force on the floor of a column of sand on which a given force acts [N].
+
+    A wave runs down in the delay; the floor gives back the share r of it, and the top, where the
+    force is given, all of it with the other sign::
+
+        F_below(t) = (1 + r) sum_n (-r)^n F(t - (2 n + 1) delay)
+
+    A force that grows slowly arrives as it is, a short one (1 + r) times. The column has no damping
+    and pulls as well, which sand cannot: what comes after the first pull counts no more.
+
+    Args:
+        t: (n,) instants from the first contact on [s].
+        force: (n,) on top at these instants, straight between, none before [N].
+        delay: time of a wave from top to floor [s], see `wave_delay`.
+        reflection: r, 1 for a floor that does not give way, 0 for one like the sand [1].
+
+    Raises:
+        ConfigError: for histories that do not fit, a delay that is not positive or far shorter than
+            the history, or a share that is none.
+    """
+    t, force = vector("t", t), vector("force", force)
+    if t.shape != force.shape or t.size < 2 or not (np.diff(t) > 0).all():
+        text = f"{t.size} instants with {force.size} forces"
+        raise ConfigError(f"{text}: needed are instants that grow, and a force at each.")
+    passages = int(np.ceil((t[-1] - t[0]) / delay / 2)) + 1
+    if passages > MAX_PASSAGES:
+        text = f"{passages} passages of a wave of {delay:.3g} s in {t[-1] - t[0]:.3g} s"
+        raise ConfigError(f"{text}; at most {MAX_PASSAGES} are followed.")
+    below = np.zeros(t.size)
+    for n in range(passages):
+        late = np.interp(t - (2 * n + 1) * delay, t, force, left=0.0)
+        below += (1 + reflection) * (-reflection) ** n * late
+    return below

@@ -243,10 +243,8 @@ def rolling_bearing(  # noqa: PLR0913  one keyword per property
     z = unit_vector(f"axis of {name}", axis)
     apart = float(np.linalg.norm(self.design_point(inner) - self.design_point(outer)))
     if apart > PLACE_RTOL * bearing.pitch_diameter:
-        raise ConfigError(
-            f"the rings of bearing {name!r} are {apart * 1e3:.4g} mm apart; they must be at one "
-            "place where the bodies are added."
-        )
+        text = f"the rings of bearing {name!r} are {apart * 1e3:.4g} mm apart"
+        raise ConfigError(f"{text}; they must be at one place where the bodies are added.")
     e = np.cross(z, np.eye(3)[np.argmin(np.abs(z))])
     e /= np.linalg.norm(e)
     turned = [matrix(self.part(ring.body).p) for ring in (inner, outer)]
@@ -275,9 +273,7 @@ def pack(bearings: Mapping[str, RollingBearing], places: Places) -> Bearings:
         rows_of((one.race for one in found), 10),
         integers([places.clock()]),
         integers(places.memory(name, np.zeros(1)) for name in bearings),
-        np.zeros(len(found)),
-        np.zeros((2, 12)),
-        np.zeros((2, 12, 12)),
+        *(np.zeros(shape) for shape in (len(found), (2, 12), (2, 12, 12))),
     )
 
 

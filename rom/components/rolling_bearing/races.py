@@ -51,10 +51,8 @@ class BallBearing:
     def __post_init__(self) -> None:
         _check_row(self.balls, self.ball_diameter, self.pitch_diameter, self.clearance)
         if not 0.5 < min(self.conformity) <= max(self.conformity) <= 1.0:
-            raise ModelError(
-                f"conformity {self.conformity} must be above 0.5 and at most 1: a "
-                "groove is a little wider than its ball, by 0.52 as a rule."
-            )
+            text = f"conformity {self.conformity} must be above 0.5 and at most 1"
+            raise ModelError(f"{text}: a groove is a little wider than its ball, by 0.52.")
         if not abs(self.contact_angle) < 1.4:
             raise ModelError(
                 f"contact angle {self.contact_angle:g} rad is not below 80 degrees.",
@@ -199,9 +197,8 @@ def _difference(m: float, wanted: float) -> float:
 def _check_row(number: int, diameter: float, pitch: float, clearance: float) -> None:
     """Refuse balls or rollers that do not fit on their circle."""
     if not pitch > diameter:
-        raise ModelError(
-            f"no bearing has {number} balls or rollers of {diameter:g} m on one of {pitch:g} m."
-        )
+        text = f"{number} balls or rollers of {diameter:g} m on one of {pitch:g} m"
+        raise ModelError(f"no bearing has {text}.")
     if diameter > pitch * np.sin(np.pi / number):
         raise ModelError(
             f"{number} balls or rollers of {diameter * 1e3:.4g} mm do not fit on a circle of "

@@ -15,14 +15,14 @@ Source:
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.polynomial.legendre import legvander
 
 from rom.errors import ConfigError, warn
-from rom.mbs.elements.family import integers
+from rom.mbs.elements.family import integers, rows_of
 from rom.mbs.kernels.algebra import mtv, mv
 from rom.mbs.kernels.compiled import inner
 from rom.mbs.kernels.constraints import block_of
@@ -30,9 +30,7 @@ from rom.mbs.kernels.tables import Array1, Array4, Index2, Scratch2, Scratch3, T
 from rom.mbs.parts.bodies import Marker, Part
 from rom.model import Array
 
-MAX_MISSED_RATIO = (
-    0.02  # of the deformation, which harmonics and polynomials may miss without a word
-)
+MAX_MISSED_RATIO = 0.02  # of the deformation, which functions may miss without a word
 MOST_HARMONICS, MOST_ORDER = 12, 8  # of a surface whose functions do not say how many it has
 
 
@@ -80,11 +78,7 @@ def deformable(part: Part, marker: Marker) -> Any:
 def cylinder_of(part: Part, marker: Marker, axis: Array, across: Array) -> Cylinder | None:
     """The deformation of the surface behind a marker; None of a rigid one.
 
-    Args:
-        part: the body.
-        marker: of a deformable interface.
-        axis: (3,) of the surface, body frame.
-        across: (3,) direction at right angles to it, body frame.
+    Its axis (3,) and a direction (3,) across are in the body frame.
 
     Raises:
         ConfigError: if the surface has no length along the axis.
@@ -99,10 +93,8 @@ def cylinder_of(part: Part, marker: Marker, axis: Array, across: Array) -> Cylin
     local = (patch.points - surface.point) @ axes.T
     theta, z = np.arctan2(local[:, 1], local[:, 0]), local[:, 2]
     if not np.ptp(z) > 0.0:
-        raise ConfigError(
-            f"interface {marker.place!r} of {part.name!r} is flat across the axis: no forces can "
-            "be spread along it; take the cylinder face, or another axis."
-        )
+        text = f"interface {marker.place!r} of {part.name!r} is flat across the axis"
+        raise ConfigError(f"{text}: take the cylinder face, or another axis.")
     harmonics, order = _numbers(surface.kind)
     middle, half = 0.5 * (z.max() + z.min()), 0.5 * float(np.ptp(z))
     found = Cylinder(harmonics, order, middle, half, axes, np.zeros((0, 3, 0)), 0.0)
@@ -114,10 +106,9 @@ def cylinder_of(part: Part, marker: Marker, axis: Array, across: Array) -> Cylin
         warn(
             f"{100 * missed:.0f} % of the deformation of interface {marker.place!r} of body "
             f"{part.name!r} is in no harmonic up to {harmonics} and no polynomial up to {order}, "
-            f"and stays unloaded: reduce it with such functions.",
+            "and stays unloaded: reduce it with such functions."
         )
-    shapes = C.reshape(len(C), 3, -1)
-    return Cylinder(harmonics, order, middle, half, axes, shapes, missed)
+    return replace(found, shapes=C.reshape(len(C), 3, -1), missed=missed)
 
 
 def _numbers(kind: str) -> tuple[int, int]:
@@ -179,13 +170,9 @@ class Cylinders(Table):
 def pack_cylinders(
     sides: Sequence[Sequence[tuple[Cylinder, float] | None]], R: int, places: int
 ) -> Cylinders:
-    """The surfaces as arrays.
+    """The surfaces of both sides of each element, and the angle over which forces spread [rad].
 
-    Args:
-        sides: of each element, the surface of both sides with the angle over which its forces are
-            spread [rad]; None for a rigid one.
-        R: largest number of elastic coordinates of a body.
-        places: that are loaded at a time.
+    Bodies have R elastic coordinates at most, and so many places are loaded at a time.
     """
     found = [one for pair in sides for one in pair if one is not None]
     number = {id(one): c for c, one in enumerate(found)}
@@ -197,9 +184,7 @@ def pack_cylinders(
     return Cylinders(
         integers(x for pair in of for x in pair).reshape(-1, 2),
         integers(x for one, _ in found for x in (one.harmonics, one.order)).reshape(-1, 2),
-        np.array([one.middle for one, _ in found], dtype=float),
-        np.array([one.half_length for one, _ in found], dtype=float),
-        np.array([width for _, width in found], dtype=float),
+        *rows_of(((one.middle, one.half_length, width) for one, width in found), 3).T.copy(),
         shapes,
         *np.zeros((3, len(found), 3 * F)),
         np.zeros((places, 2, F)),
@@ -224,14 +209,9 @@ def deform(s, cylinders, c, body, q, v):
 
 @inner
 def set_basis(cylinders, c, place, theta, z):
-    """Write the functions at a place, mean values over the angle of a force.
+    """Write the functions at a place (number, side) at theta [rad] and z from the marker [m].
 
-    Args:
-        cylinders: the surfaces.
-        c: which.
-        place: its number and side.
-        theta: angle around the axis [rad].
-        z: along it, from the marker [m].
+    They are mean values over the angle of a force.
     """
     harmonics, order = cylinders.size[c, 0], cylinders.size[c, 1]
     zeta = (z - cylinders.middle[c]) / cylinders.half_length[c]
@@ -290,13 +270,8 @@ def spread_surface_loads(s, W, cylinders, c, body):
 def set_gradient(s, W, cylinders, place, marker, direction, lever):
     """Write what moves along a direction per velocity of the body of a marker to gradient[row].
 
-    Args:
-        s, W: system and work.
-        cylinders: the surfaces.
-        place: row of the gradient; surface, -1 of a rigid one; number of the place and side.
-        marker: on the body.
-        direction: (3,) in the world.
-        lever: (3,) what turns of the marker move along it.
+    The place has the row, the surface, -1 of a rigid one, number and side; by the lever (3,) turns
+    of the marker move along the direction (3,) in the world.
     """
     at, c, where, side = place
     b, gradient, H = s.markers.body[marker], cylinders.gradient, W.H
@@ -311,13 +286,11 @@ def set_gradient(s, W, cylinders, place, marker, direction, lever):
     if c < 0:
         return
     x, shapes = mtv(W.A[b], direction), cylinders.shapes
-    for f in range((2 * cylinders.size[c, 0] + 1) * (cylinders.size[c, 1] + 1)):
+    for f in range(n_functions(cylinders, c)):
         value = cylinders.basis[where, side, f]
         for k in range(r):
-            along = (
-                x[0] * shapes[c, f, 0, k] + x[1] * shapes[c, f, 1, k] + x[2] * shapes[c, f, 2, k]
-            )
-            gradient[at, 6 + k] += value * along
+            along = x[0] * shapes[c, f, 0, k] + x[1] * shapes[c, f, 1, k]
+            gradient[at, 6 + k] += value * (along + x[2] * shapes[c, f, 2, k])
 
 
 @inner

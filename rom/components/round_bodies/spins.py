@@ -75,11 +75,6 @@ def spin_matrices(body: Any, axis: Array) -> tuple[Array, Array]:
     return 0.5 * (whole - whole.T)[3:, 3:], body.D @ turning[6:, 6:]
 
 
-def rigid_gyroscopic(inertia: Array, axis: Array) -> Array:
-    """(3, 3) moments on a round rigid body per angular velocity of its frame and speed."""
-    return skew(inertia @ axis)
-
-
 def check_round(name: str, mass: float, first: Array, inertia: Array, axis: Array) -> None:
     """Refuse a body whose material cannot turn through its frame.
 
@@ -88,8 +83,8 @@ def check_round(name: str, mass: float, first: Array, inertia: Array, axis: Arra
     """
     polar = axis @ inertia @ axis
     tilted = np.abs(inertia @ axis - polar * axis).max()
-    across = np.linalg.eigvalsh((np.eye(3) - np.outer(axis, axis)) @ inertia
-                                @ (np.eye(3) - np.outer(axis, axis)))[1:]  # fmt: skip
+    flat = np.eye(3) - np.outer(axis, axis)
+    across = np.linalg.eigvalsh(flat @ inertia @ flat)[1:]
     apart = float(np.linalg.norm(np.cross(axis, first)) / mass)
     size = np.sqrt(np.trace(inertia) / mass)
     if max(across[1] - across[0], tilted) > ROUND_RTOL * across[1] or apart > MESHED_RTOL * size:
@@ -135,12 +130,9 @@ def _turned_modes(body: Any, axis: Array, V: Array) -> Array:
     """(m, m) the elastic modes of V (6 + r, m) turned by the test angle, in multiples of them."""
     surface = body.surface
     if surface is None:
-        raise ModelError(
-            "a round body that turns through its frame needs a surface, which tells how its shapes "
-            "look from all sides.",
-            where=body.name,
-            hint="Reduce it from a mesh; reductions of bare matrices have none.",
-        )
+        text = "a round body that turns through its frame needs a surface to show its shapes."
+        hint = "Reduce it from a mesh; reductions of bare matrices have none."
+        raise ModelError(text, where=body.name, hint=hint)
     X, centre = surface.points, body.first_moment / body.mass
     fields = _fields(X, surface.shape, V)
     R = matrix(exp(TEST_TURN * axis))
@@ -162,9 +154,8 @@ def _places(X: Array, triangles: Any, points: Array) -> tuple[Any, Array]:
     """(s, 3) corners of the triangles that hold points (s, 3), and (s, 3) their shares."""
     corners = X[triangles]
     near = cKDTree(corners.mean(axis=1)).query(points, min(N_NEAREST, len(triangles)))[1]
-    a, e, f = (corners[near, 0], corners[near, 1] - corners[near, 0],
-               corners[near, 2] - corners[near, 0])  # fmt: skip
-    d = points[:, None] - a
+    a, e, f = np.moveaxis(corners[near], 2, 0)
+    d, e, f = points[:, None] - a, e - a, f - a
     ee, ef, ff = (np.einsum("skx,skx->sk", *x) for x in ((e, e), (e, f), (f, f)))
     de, df = (np.einsum("skx,skx->sk", d, x) for x in (e, f))
     det = np.maximum(ee * ff - ef**2, 1e-300)
@@ -220,7 +211,7 @@ def spin_of(part: Part) -> tuple[Spin, Family]:
     if part.flexible is None:
         inertia = np.trace(part.second) * np.eye(3) - part.second
         check_round(part.name, part.mass, part.first, inertia, axis)
-        gyroscopic, circulatory = rigid_gyroscopic(inertia, axis), np.zeros((0, 0))
+        gyroscopic, circulatory = skew(inertia @ axis), np.zeros((0, 0))
     else:
         gyroscopic, circulatory = spin_matrices(part.moving, axis)
     return Spin(part.name, speed * gyroscopic, speed * circulatory), SPINS_FAMILY
@@ -243,8 +234,8 @@ class Spins(Table):
 
 def pack(spins: Mapping[str, Spin], places: Places) -> Spins:
     """The spins as arrays."""
-    k, R = len(spins), places.R
-    G, C = np.zeros((k, 3 + R, 3 + R)), np.zeros((k, R, R))
+    n, R = len(spins), places.R
+    G, C = np.zeros((n, 3 + R, 3 + R)), np.zeros((n, R, R))
     for k, one in enumerate(spins.values()):
         r = len(one.circulatory)
         G[k, : 3 + r, : 3 + r], C[k, :r, :r] = one.gyroscopic, one.circulatory

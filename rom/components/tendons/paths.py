@@ -45,11 +45,7 @@ class Path:
 
 
 def path_through(name: str, places: Sequence[Place]) -> Path:
-    """Where a cable runs, see `rom.components.tendons.routing`.
-
-    Args:
-        name: of the tendon, for errors.
-        places: in its order.
+    """Where a cable runs, see `rom.components.tendons.routing`; the name is for errors.
 
     Raises:
         ConfigError: if it cannot run there.
@@ -107,14 +103,11 @@ def _check_apart(name: str, k: int, ends: tuple[Place, Place], shift: float) -> 
     """Refuse neighbours between which no cable can be straight."""
     D = ends[1].x - ends[0].x
     if np.linalg.norm(D) <= 1e-12:
-        raise ConfigError(
-            f"places {k + 1} and {k + 2} of {name!r} are at one point; leave one out."
-        )
+        raise ConfigError(f"places {k + 1} and {k + 2} of {name!r} are at one point.")
     for one in ends:
         n = one.axes[0]
         if one.radius and np.linalg.norm(D - (D @ n) * n) <= abs(shift):
             raise ConfigError(
                 f"between places {k + 1} and {k + 2} of tendon {name!r} there is no room: one lies "
-                "within the pulley of the other, or pulleys that it crosses over overlap. Take a "
-                "smaller radius."
+                "within the pulley of the other, or pulleys overlap. Take a smaller radius."
             )

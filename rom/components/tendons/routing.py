@@ -24,15 +24,10 @@ DIFFERENCE_STEP_RATIO = 1e-5  # of central differences over the length of D; the
 
 @inner
 def departure(D, n, shift):
-    """Where a piece leaves a circle: angle from D, and the gradient of its direction by D.
+    """Where a piece leaves a circle: angle from D [rad], and gradient of its direction by D.
 
-    Args:
-        D: vector between the centres [m].
-        n: axis of the circle.
-        shift: R_a - s R_b where it leaves, s R_a - R_b where it arrives [m].
-
-    Returns:
-        Angle [rad] and gradient [rad/m]; NaN if the other end lies within the circle.
+    The shift is R_a - s R_b where it leaves, s R_a - R_b where it arrives. NaN if the other end
+    lies within the circle of axis n.
     """
     flat = sub(D, scale(dot(D, n), n))
     rho2 = dot(flat, flat)
@@ -43,15 +38,9 @@ def departure(D, n, shift):
 
 @inner
 def piece(D, na, nb, Ra, Rb):
-    """Length of a piece, and the gradients of its length between points of the pulleys.
+    """Length of a piece along D, and its gradients by the centre of b, rotations of a and of b.
 
-    Args:
-        D: from the centre of a to that of b [m].
-        na: axis of a; that of b, nb.
-        Ra: radius of a [m], 0 for an eyelet; that of b, Rb.
-
-    Returns:
-        Length [m]; gradient by the centre of b [1], by rotations of a and of b [m].
+    Axes are na and nb, radii Ra and Rb, 0 for an eyelet; it is between points of the pulleys.
     """
     s = -1.0 if dot(na, nb) < 0.0 else 1.0
     shift, zero = Ra - s * Rb, (0.0, 0.0, 0.0)

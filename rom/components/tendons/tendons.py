@@ -147,19 +147,24 @@ def tendon(  # noqa: PLR0913  one keyword per property
             f"tendon {name!r} has friction, but no transition_speed.",
             hint="Take a hundredth of the speed with which it slides.",
         )
-    speed = transition_speed or 1.0
     if (EA is None) == (tension is None):
         raise ConfigError(f"tendon {name!r} needs either EA or tension.")
-    if EA is None:
-        _refuse_stretch(name, damping, free_length, pretension)
-        function, given = _given(name, tension)
-        numbers = (0.0, 0.0, given, speed)
+    if EA is None and (damping or pretension or free_length is not None):
+        raise ConfigError(
+            f"tendon {name!r} is pulled by a given tension and does not stretch; leave damping, "
+            "free_length and pretension out."
+        )
+    if pretension and free_length is not None:
+        raise ConfigError(f"tendon {name!r} has pretension and free_length; give only one.")
+    given = free_length if EA else tension
+    if callable(given):
+        number = 0.0
+    elif EA is None:
+        number = not_negative(f"tension of tendon {name!r}", given)
     else:
-        slack = length / (1.0 + pretension / EA)
-        if pretension and free_length is not None:
-            raise ConfigError(f"tendon {name!r} has pretension and free_length; give only one.")
-        function, given = _free(slack, free_length)
-        numbers = (EA, damping, given, speed)
+        number = length / (1 + pretension / EA) if given is None else positive("free_length", given)
+    numbers = (EA or 0.0, damping, number, transition_speed or 1.0)
+    function = given if callable(given) else None
     self.add(name, Tendon(stations, numbers, EA is None, function), TENDONS_FAMILY)
 
 
@@ -176,28 +181,6 @@ def _station(mechanism: Whole, name: str, place: Any, friction: float) -> Statio
     return Station(place.marker, axes, place.radius, place.friction, place.turns)
 
 
-def _refuse_stretch(name: str, damping: Any, free_length: Any, pretension: Any) -> None:
-    if damping or pretension or free_length is not None:
-        raise ConfigError(
-            f"tendon {name!r} is pulled by a given tension and does not stretch; leave damping, "
-            "free_length and pretension out."
-        )
-
-
-def _given(name: str, tension: Any) -> tuple[Callable[[float], Any] | None, float]:
-    """A function of time, or a number that is not negative."""
-    if callable(tension):
-        return tension, 0.0
-    return None, not_negative(f"tension of tendon {name!r}", tension)
-
-
-def _free(slack: float, free: Any) -> tuple[Callable[[float], Any] | None, float]:
-    """Function and number of the free length, the latter that of the start if none is given [m]."""
-    if free is None:
-        return None, slack
-    return (free, 0.0) if callable(free) else (None, positive("free_length", free))
-
-
 def _design_length(whole: Whole, name: str, stations: Sequence[Station]) -> float:
     """Length of the path where the bodies were added.
 
@@ -207,9 +190,8 @@ def _design_length(whole: Whole, name: str, stations: Sequence[Station]) -> floa
     if len(stations) < 2:
         raise ConfigError(f"tendon {name!r} needs at least two places, got {len(stations)}.")
     if stations[0].radius or stations[-1].radius:
-        raise ConfigError(
-            f"tendon {name!r} ends at a pulley.", hint="It is fixed at a marker at both ends."
-        )
+        text = f"tendon {name!r} ends at a pulley."
+        raise ConfigError(text, hint="It is fixed at a marker at both ends.")
     path = path_through(name, [_placed(whole, one) for one in stations])
     arcs = (one.radius * (wrap + 2 * np.pi * one.turns)
             for one, wrap in zip(stations, path.wrap, strict=True))  # fmt: skip
@@ -282,10 +264,11 @@ class Tendons(Table):
 
 def pack(tendons: Mapping[str, Tendon], places: Places) -> Tendons:
     """The tendons as arrays."""
-    stations = [one for tendon in tendons.values() for one in tendon.stations]
+    named = [(f"place {k} of {name}", one) for name, tendon in tendons.items()
+             for k, one in enumerate(tendon.stations)]  # fmt: skip
+    stations = [one for _, one in named]
     sizes = [len(tendon.stations) for tendon in tendons.values()]
     p, m = len(stations), max(sizes)
-    radius = np.array([one.radius for one in stations])
     return Tendons(
         starts(sizes),
         rows_of((tendon.numbers for tendon in tendons.values()), 4),
@@ -294,9 +277,9 @@ def pack(tendons: Mapping[str, Tendon], places: Places) -> Tendons:
         integers(_rated(tendon) for tendon in tendons.values()),
         integers(places.marker[one.marker] for one in stations),
         rows_of((one.axes.ravel() for one in stations), 6),
-        radius,
+        np.array([one.radius for one in stations]),
         np.array([one.friction for one in stations]),
-        integers(_remembered(*one, places) for one in _named(tendons)),
+        integers(_remembered(*one, places) for one in named),
         *(np.zeros(x) for x in (p, p, (p, 12), (p, 3), p, (p, 18), p, p, p, (p, 12), (p, 36))),
         *(np.zeros(x) for x in ((3, m, m), (2, 6 * m), (6 * m, 6 * m), (6 * m, 6 * m))),
     )
@@ -311,15 +294,6 @@ def _signal(name: str, tendon: Tendon, places: Places) -> int:
     if function is None or not tendon.pulled:
         return places.motion(name, function)
     return places.signal(name, lambda t: (function(t), 0.0, 0.0))
-
-
-def _named(tendons: Mapping[str, Tendon]) -> Iterable[tuple[str, Station]]:
-    """All stations, with a name of their own."""
-    return (
-        (f"place {k} of {name}", one)
-        for name, tendon in tendons.items()
-        for k, one in enumerate(tendon.stations)
-    )
 
 
 def _remembered(name: str, one: Station, places: Places) -> int:

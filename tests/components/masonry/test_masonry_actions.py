@@ -429,7 +429,7 @@ ONE = Masonry((stone(box(), **SOFT),), (), 1e9, 0.5)
         ([PointLoad(1, (1.4, 0.5), (0.0, -1.0), name="crane")], "crane at .* lies 0.4 m outside"),
         ([PointLoad(0, (0.0, 0.0), (0.0, -1.0))], "acts on stone 0, which is held"),
         ([PointLoad(7, (0.0, 0.0), (0.0, -1.0))], "stone of point load = 7"),
-        ([STONE], "action 0 is .* which does nothing to masonry"),
+        ([STONE], r"actions\[0\] = .* must be of type PointLoad"),
         ([PointLoad(*STONE, history=Table([0.0, 0.05], [0.0, 1.0]))], "from 0 s to 0.05 s; asked"),
         ([PointLoad(*STONE, history=lambda t: np.full(t.shape, np.inf))], "is inf at t ="),
         ([PointLoad(*STONE, history=lambda t: 1.0)], "gives the shape"),
@@ -462,7 +462,7 @@ test_what_is_no_masonry_and_no_action_is_named_where_it_is_made = refused(
     (lambda: replace(ONE, reach=-1.0), "reach = -1 must"),
     (lambda: replace(ONE, stiffness=np.inf), "stiffness = inf"),
     (lambda: simulate(ONE, t_end=1.0, dt=0.1, actions=BaseMotion(1.0)), "actions = "),
-    (lambda: simulate(ONE, t_end=1.0, dt=0.1, v=np.full((1, 6), np.nan)), "v = .* not finite"),
+    (lambda: simulate(ONE, t_end=1.0, dt=0.1, v=np.full((1, 6), np.nan)), "v = .* must be finite"),
     error=(ConfigError, ModelError),
 )  # fmt: skip
 
@@ -488,7 +488,7 @@ test_histories_with_gaps_are_named = refused(
     (lambda: sine(1.0, 0.0), "period = "),
     (lambda: rectangle(1.0, -1.0), "duration = "),
     (lambda: ramp(0.0), "no ramp takes"),
-    (lambda: minimum_thickness(half_angle=np.radians(140)), "not so far round"),
+    (lambda: minimum_thickness(half_angle=np.radians(140)), "nor so far round"),
     (lambda: arch(10, 5.0, 0.5, half_angle=3.2), "must be"),
     error=ConfigError,
 )

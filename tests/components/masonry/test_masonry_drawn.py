@@ -102,7 +102,7 @@ RING = [(0, 1, 5), (0, 5, 4), (1, 2, 6), (1, 6, 5), (2, 3, 7), (2, 7, 6), (3, 0,
         (stones_of(square(), square(at=(0, 1.0))), ("stone",), "held: stone 0, stone 1"),
         ((*stones_of(square())[:2], {}), (), "all stones are held: there is none"),
         ((np.ones((4, 3)), [(0, 1, 2)], {"one": [0]}), (), r"points has shape \(4, 3\)"),
-        ((square(), [(0, 1, 2, 3)], {"one": [0]}), (), r"triangles of the shape \(1, 4\)"),
+        ((square(), [(0, 1, 2, 3)], {"one": [0]}), (), r"triangles has shape \(1, 4\)"),
         ((square(), [(0, 1, 2)], {"one": [0.5]}), (), "'one': 0.5 must be a whole number"),
     ],
 )  # fmt: skip

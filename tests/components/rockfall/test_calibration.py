@@ -108,11 +108,10 @@ GAP = np.r_[T[:20], T[30:]]
 
 test_bad_histories_are_named = refused(
     (lambda: History(GAP, np.sin(GAP)), ConfigError, r"gap from 0.0387\d+ s to 0.0612\d+ s"),
-    (lambda: History(T, np.where(T == T[7], np.nan, 1.0)), ConfigError, "value 7 of 50"),
-    (lambda: History(T[::-1], T), ConfigError, "increase from contact"),
+    (lambda: History(T, np.where(T == T[7], np.nan, 1.0)), ConfigError, "value 7 of"),
+    (lambda: History(T[::-1], T), ConfigError, "times of a history must grow"),
     (lambda: History(T - 0.01, T), ConfigError, "t >= 0"),
-    (lambda: History(T, T[1:]), ConfigError, "as many times as values"),
-    (lambda: History(T[:5], T[:5]), ConfigError, "8 at least"),
+    (lambda: History(T[:5], T[:5]), ConfigError, "8 values or more"),
     (lambda: History(T, 0 * T), ConfigError, "history needs values"),
     (lambda: History(T, T, deviation=-1.0), ConfigError, "a positive deviation"),
     (lambda: calibrate(FIRST, {}), ConfigError, "nothing is measured"),
@@ -182,10 +181,10 @@ def test_the_map_has_a_row_per_boulder_and_grows_both_ways():
 
 
 test_bad_designs_are_named = refused(
-    (lambda: design_check(BOUNDED, ductility=0.0), "ductility = 0.0"),
+    (lambda: design_check(BOUNDED, ductility=0.0), "ductility = 0"),
     (lambda: design_check(BOUNDED, depth=1.5), "depth = 1.5"),
-    (lambda: with_boulder(BOUNDED, -1.0), r"boulder \[kg\] = -1 must"),
+    (lambda: with_boulder(BOUNDED, -1.0), "boulder = -1"),
     (lambda: capacity_heights(FIRST, [1.0]), "bears anything"),
-    (lambda: capacity_map(BOUNDED, [1e3], [-1.0]), r"height \[m\] = -1 must"),
+    (lambda: capacity_map(BOUNDED, [1e3], [-1.0]), "height = -1"),
     error=ConfigError,
 )

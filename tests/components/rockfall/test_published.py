@@ -148,8 +148,8 @@ def test_sand_bears_as_vesic_says(degrees, factor):
 
 
 test_bad_numbers_are_named = refused(
-    (lambda: bearing_pressure(40.0, 1.0), r"friction \[rad\] = 40 must"),
-    (lambda: bearing_pressure(0.7, -1.0), r"radius \[m\] = -1 must"),
+    (lambda: bearing_pressure(40.0, 1.0), "friction = 40"),
+    (lambda: bearing_pressure(0.7, -1.0), "radius = -1"),
     (lambda: Layer(1e6, 1.0, 1.0, strength=0.0), "density and strength > 0"),
     (lambda: calibrate(
         full_size(granular(40)),
