@@ -2,16 +2,20 @@
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from rom.arguments import one_of, positive, typed
+from rom.arguments.quantities import Positive, Quantity
 from rom.errors import ModelError
 from rom.model import Array, Index
 
 Elastic = Literal["held", "free"] | float  # see `Linkage.inertia`
+Mass = Annotated[float, Quantity("kg", low=0.0, ends="[)", error=ModelError)]
+Inertia = Annotated[float, Quantity("kg m^2", low=0.0, ends="[)", error=ModelError)]
+MovedMass = Annotated[float, Positive("kg", error=ModelError)]  # without which nothing resists
 MIN_HEIGHT = 1e-6  # of the tip over the way between the elbows: flatter, and it counts as one line
 CHUNK_SIZE = 8192  # configurations at once: elastic links need (3 + r) (2 + sum r) numbers for each
 
@@ -86,13 +90,6 @@ def left_of(x: Array) -> Array:
     return np.stack([-x[..., 1], x[..., 0]], axis=-1)
 
 
-def unit_rows(n: int, *ones: int) -> Array:
-    """(1, n) zeros, and ones where said."""
-    row = np.zeros((1, n))
-    row[0, list(ones)] = 1.0
-    return row
-
-
 def gram(X: Array, Y: Array) -> Array:
     """X^T Y of stacks of matrices."""
     return np.swapaxes(X, -1, -2) @ Y
@@ -146,13 +143,12 @@ class Linkage(ABC):
         links, (q1, q2) = as_elastic(self._links, elastic), both(q1, q2)
         x, y, out = q1.ravel(), q2.ravel(), np.empty((q1.size, 2, 2))
         at = 2 + np.cumsum([0, *(link.r for link in links)])
-        for k in range(0, q1.size, CHUNK_SIZE):
-            motion = self._moved(links, (x[k : k + CHUNK_SIZE], y[k : k + CHUNK_SIZE]), at)
+        for some in (slice(k, k + CHUNK_SIZE) for k in range(0, q1.size, CHUNK_SIZE)):
+            motion = self._moved(links, (x[some], y[some]), at)
             A = motion.A + self.payload * gram(motion.pin, motion.pin)
-            freed = (
-                A[:, :2, 2:] @ np.linalg.solve(A[:, 2:, 2:], A[:, 2:, :2]) if at[-1] > 2 else 0.0
-            )
-            out[k : k + CHUNK_SIZE] = A[:, :2, :2] - freed
+            out[some] = A[:, :2, :2]
+            if at[-1] > 2:
+                out[some] -= A[:, :2, 2:] @ np.linalg.solve(A[:, 2:, 2:], A[:, 2:, :2])
         return out.reshape(*q1.shape, 2, 2)
 
     @property
@@ -172,6 +168,10 @@ class ClosedLinkage(Linkage):
     __slots__ = ()
     couplers: tuple[Link, Link]
     side: int
+
+    def __post_init__(self) -> None:
+        if self.side not in (1, -1):
+            raise ModelError(f"side = {self.side}: needed is 1 or -1.")
 
     def tip(self, q1: npt.ArrayLike, q2: npt.ArrayLike) -> Array:
         """(..., 2) where the tool is at coordinates (...) [m]; q1 and q2 in [rad or m].

@@ -17,12 +17,13 @@ Source:
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import numpy.typing as npt
 
 from rom.arguments import shortened, typed
+from rom.arguments.quantities import Count, Positive
 from rom.errors import ConfigError, ModelError, SolverError
 from rom.model import Array, Index
 
@@ -31,6 +32,8 @@ Inertia = Callable[[Array, Array], Array]  # angles of equal shape (...) -> (...
 Range = tuple[float, float] | None  # of a coordinate [rad or m]; None: a whole turn
 Ranges = tuple[Range, Range]
 TURNS: Ranges = (None, None)
+Lengths = Annotated[npt.ArrayLike, Positive("1", (2,))]
+Cells = Annotated[int, Count(4)]  # of a turn or a range
 DIFFERENCE_STEP = 1e-5  # of central differences [rad]
 # least Jacobian of the normalised equations for an isotropic point that stands alone
 MIN_JACOBIAN = 1e-6
@@ -39,7 +42,7 @@ DETERMINANT_RTOL = 1e-12  # of the squared trace: round-off by which a determina
 
 
 @typed
-def isotropy_index(A: Array, *, lengths: npt.ArrayLike = (1.0, 1.0)) -> Array:
+def isotropy_index(A: Array, *, lengths: Lengths = (1.0, 1.0)) -> Array:
     """(...,) index 2 sqrt(det A) / tr A [1], one where isotropic; independent of the scale of A.
 
     Args:
@@ -50,21 +53,8 @@ def isotropy_index(A: Array, *, lengths: npt.ArrayLike = (1.0, 1.0)) -> Array:
     Raises:
         ConfigError, ModelError: for lengths that are not positive; for an inertia that is not.
     """
-    scale = positive_pair(lengths)
-    _, trace, determinant = _positive(np.asarray(A, dtype=float) / np.multiply.outer(scale, scale))
+    _, trace, determinant = _positive(A / np.multiply.outer(lengths, lengths))
     return 2 * np.sqrt(np.maximum(determinant, 0.0)) / trace
-
-
-def positive_pair(lengths: npt.ArrayLike) -> Array:
-    """(2,) lengths of both coordinates [1 or m].
-
-    Raises:
-        ConfigError: unless they are two positive numbers.
-    """
-    scale = np.asarray(lengths, dtype=float)
-    if scale.shape != (2,) or not (scale > 0).all() or not np.isfinite(scale).all():
-        raise ConfigError(f"lengths = {lengths!r}: two positive numbers are needed.")
-    return scale
 
 
 @typed
@@ -84,7 +74,7 @@ def derivatives(function: Inertia, q: Array) -> Array:
 
 
 @typed
-def angle_grid(n: int, ranges: Ranges = TURNS) -> tuple[Array, Array]:
+def angle_grid(n: Cells, ranges: Ranges = TURNS) -> tuple[Array, Array]:
     """(n, n), (n, n) coordinates of both drives [rad or m], the first along the rows.
 
     Args:
@@ -94,8 +84,6 @@ def angle_grid(n: int, ranges: Ranges = TURNS) -> tuple[Array, Array]:
     Raises:
         ConfigError: for less than four nodes, or ranges that cannot be.
     """
-    if n < 4:
-        raise ConfigError(f"n = {n}: a turn needs four cells or more, a range as well.")
     at = (
         2 * np.pi * np.arange(n) / n if r is None else np.linspace(*r, n) for r in checked(ranges)
     )
@@ -104,11 +92,7 @@ def angle_grid(n: int, ranges: Ranges = TURNS) -> tuple[Array, Array]:
 
 
 def checked(ranges: Ranges) -> Ranges:
-    """The ranges (low, high) [rad or m] if they can be.
-
-    Raises:
-        ConfigError: if one has no width.
-    """
+    """The ranges (low, high) [rad or m] if they can be."""
     for r in ranges:
         if r is not None and not (np.isfinite(r).all() and r[0] < r[1]):
             raise ConfigError(f"a range {r!r} must be (low, high), low < high, or None for a turn.")
@@ -135,8 +119,8 @@ def index_map(
     inertia: Inertia,
     ranges: Ranges = TURNS,
     *,
-    lengths: npt.ArrayLike = (1.0, 1.0),
-    n: int = 400,
+    lengths: Lengths = (1.0, 1.0),
+    n: Cells = 400,
     assembles: Assembles | None = None,
 ) -> Array:
     """(n, n) isotropy index on `angle_grid` [1], zero where the mechanism cannot be assembled.
@@ -163,11 +147,7 @@ def index_map(
 
 
 def _there(assembles: Assembles | None, q1: Array, q2: Array, n: int) -> Array:
-    """(n, n) where the mechanism can be assembled.
-
-    Raises:
-        ModelError: if there is no such place.
-    """
+    """(n, n) where the mechanism can be assembled, if there is such a place."""
     there = np.ones(q1.shape, bool) if assembles is None else np.asarray(assembles(q1, q2), bool)
     if not there.any():
         raise ModelError(
@@ -179,7 +159,7 @@ def _there(assembles: Assembles | None, q1: Array, q2: Array, n: int) -> Array:
 
 @typed
 def isotropic_configurations(
-    inertia: Inertia, *, n: int = 400, assembles: Assembles | None = None
+    inertia: Inertia, *, n: Cells = 400, assembles: Assembles | None = None
 ) -> Isotropic:
     """All isotropic configurations on the torus of two angles, or on a part of it.
 
@@ -242,31 +222,13 @@ def around(assembles: Assembles, q: Array) -> npt.NDArray[np.bool_]:
 
 
 def anisotropy(inertia: Inertia, q1: Array, q2: Array) -> Array:
-    """(..., 2) half the difference of the diagonal, and the coupling, over half the trace.
-
-    Args:
-        inertia: function of two arrays (...) of coordinates that returns (..., 2, 2).
-        q1: (...) first coordinate [rad or m].
-        q2: (...) second coordinate [rad or m].
-
-    Raises:
-        ModelError: if the function returns no inertia.
-    """
+    """(..., 2) half the difference of the diagonal, and the coupling, over half the trace."""
     A, trace, _ = _positive(inertia_at(inertia, q1, q2))
     return np.stack([(A[..., 0, 0] - A[..., 1, 1]) / trace, 2 * A[..., 0, 1] / trace], axis=-1)
 
 
 def inertia_at(inertia: Inertia, q1: Array, q2: Array) -> Array:
-    """(..., 2, 2) what a function returns at coordinates (...), if it is one inertia for each.
-
-    Args:
-        inertia: function of two arrays (...) of coordinates that returns (..., 2, 2).
-        q1: (...) first coordinate [rad or m].
-        q2: (...) second coordinate [rad or m].
-
-    Raises:
-        ModelError: if it is not.
-    """
+    """(..., 2, 2) what a function returns at coordinates (...), if it is one inertia for each."""
     A, wanted = inertia(q1, q2), (*np.shape(q1), 2, 2)
     if np.shape(A) != wanted or np.asarray(A).dtype.kind not in "iuf":
         raise ModelError(

@@ -17,16 +17,19 @@ Source:
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from rom.arguments import typed
+from rom.arguments.quantities import Count
 from rom.components.linkages.dynamic_isotropy import (
     TURNS,
     Assembles,
+    Cells,
     Inertia,
+    Lengths,
     Ranges,
     angle_grid,
     anisotropy,
@@ -37,9 +40,8 @@ from rom.components.linkages.dynamic_isotropy import (
     inertia_at,
     isotropic_configurations,
     isotropy_index,
-    positive_pair,
 )
-from rom.errors import ConfigError, ModelError
+from rom.errors import ModelError
 from rom.model import Array, Index
 
 Tip = Callable[[Array, Array], Array]  # coordinates of equal shape (...) -> (..., 2)
@@ -69,8 +71,8 @@ def isotropic_set(
     inertia: Inertia,
     ranges: Ranges = TURNS,
     *,
-    lengths: npt.ArrayLike = (1.0, 1.0),
-    n: int = 120,
+    lengths: Lengths = (1.0, 1.0),
+    n: Cells = 120,
     assembles: Assembles | None = None,
 ) -> IsotropicSet:
     """The isotropic postures of a mechanism, and of what kind they are.
@@ -90,7 +92,7 @@ def isotropic_set(
         SolverError: if the windings of isolated points of a torus do not add up to zero.
     """
     q1, q2 = angle_grid(n)
-    there = _Stretched(checked(ranges), n, inertia, positive_pair(lengths), assembles)
+    there = _Stretched(checked(ranges), n, inertia, lengths, assembles)
     inside = there.assembles(q1, q2)
     if inside.any():
         q = np.column_stack([q1[inside], q2[inside]])
@@ -98,9 +100,8 @@ def isotropic_set(
             A = there.inertia(*q.T)[:, 0, 0]
             return IsotropicSet("everywhere", there.coordinates(q), A, np.zeros(len(q), int))
     whole = ranges == TURNS and assembles is None
-    found = isotropic_configurations(
-        there.inertia, n=n, assembles=None if whole else there.assembles
-    )
+    inside_of = None if whole else there.assembles
+    found = isotropic_configurations(there.inertia, n=n, assembles=inside_of)
     goes_on = _goes_on(there, found.q[found.winding == 0])
     kind: Literal["none", "points", "curves"] = "points" if len(found.q) else "none"
     kind = "curves" if goes_on.any() else kind
@@ -147,7 +148,7 @@ def tool_isotropy(
     tip: Tip,
     ranges: Ranges = TURNS,
     *,
-    n: int = 200,
+    n: Annotated[int, Count(1)] = 200,
     assembles: Assembles | None = None,
 ) -> ToolIsotropy:
     """Mean isotropy of the inertia at the tool, weighted by the area it reaches.
@@ -170,11 +171,9 @@ def tool_isotropy(
         ModelError: if it can be assembled nowhere, has no inertia or place of the tool, or the tool
             moves along a line.
     """
-    if n < 1:
-        raise ConfigError(f"n = {n}: the midpoint rule needs a cell.")
-    there = _Stretched(checked(ranges), n, inertia, np.ones(2), assembles, closed=True)
-    q = np.stack(np.meshgrid(*2 * [2 * np.pi * (np.arange(n) + 0.5) / n], indexing="ij"), axis=-1)
-    q = q.reshape(-1, 2)
+    there = _Stretched(checked(ranges), n, inertia, (1.0, 1.0), assembles, closed=True)
+    middles = 2 * np.pi * (np.arange(n) + 0.5) / n
+    q = np.stack(np.meshgrid(middles, middles, indexing="ij"), axis=-1).reshape(-1, 2)
     q = q[around(there.assembles, q)]
     if not len(q):
         raise ModelError("none of the postures can be assembled: the tool reaches nothing.")
@@ -212,7 +211,7 @@ class _Stretched:
     ranges: Ranges
     n: int
     of: Inertia
-    lengths: Array
+    lengths: npt.ArrayLike
     there: Assembles | None
     closed: bool = False
 

@@ -13,28 +13,20 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from rom.arguments import not_negative, positive, typed
+from rom.arguments import typed
 from rom.components.linkages.chains import (
     ClosedLinkage,
+    Inertia,
     Link,
     Linkage,
+    Mass,
     Motion,
+    MovedMass,
     both,
     directions,
-    unit_rows,
-)
+)  # fmt: skip
 from rom.errors import ModelError
 from rom.model import Array, Index
-
-
-def _not_negative(name: str, **numbers: float) -> None:
-    for key, value in numbers.items():
-        not_negative(f"{key} of the {name}", value, error=ModelError)
-
-
-def _positive(name: str, **numbers: float) -> None:
-    for key, value in numbers.items():
-        positive(f"{key} of the {name}", value, error=ModelError)
 
 
 @typed
@@ -51,15 +43,11 @@ class CrossSlides:
         ModelError: for a mass that is negative, a second slide without mass, or parallel guides.
     """
 
-    masses: tuple[float, float]
+    masses: tuple[Mass, MovedMass]
     angle: float = np.pi / 2
-    motors: tuple[float, float] = (0.0, 0.0)
+    motors: tuple[Mass, Mass] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
-        _positive("cross slides", second_slide=self.masses[1])
-        _not_negative(
-            "cross slides", first_slide=self.masses[0], motor=self.motors[0], other=self.motors[1]
-        )
         if not abs(np.sin(self.angle)) > 1e-9:
             raise ModelError(f"angle = {self.angle:g} rad: guides must not be parallel.")
 
@@ -72,8 +60,8 @@ class CrossSlides:
 
     def tip(self, q1: npt.ArrayLike, q2: npt.ArrayLike) -> Array:
         """(..., 2) where the tool is at displacements (...) [m]; q1 and q2 in [m]."""
-        q1, q2 = both(q1, q2)
-        return np.stack([q1, 0 * q1], axis=-1) + q2[..., None] * directions(np.array(self.angle))
+        q1, q2 = (q[..., None] for q in both(q1, q2))
+        return q1 * [1.0, 0.0] + q2 * directions(np.array(self.angle))
 
 
 @typed
@@ -92,15 +80,11 @@ class PolarArm:
         ModelError: for a slide without mass, or a mass or inertia that is negative.
     """
 
-    guide: float
-    slide: float
-    spin: float = 0.0
+    guide: Inertia
+    slide: MovedMass
+    spin: Inertia = 0.0
     offset: float = 0.0
-    motor: float = 0.0
-
-    def __post_init__(self) -> None:
-        _positive("polar arm", slide=self.slide)
-        _not_negative("polar arm", guide=self.guide, spin=self.spin, motor=self.motor)
+    motor: Mass = 0.0
 
     def inertia(self, q1: npt.ArrayLike, q2: npt.ArrayLike) -> Array:
         """(..., 2, 2) generalised inertia [kg m^2, kg m, kg].
@@ -119,8 +103,7 @@ class PolarArm:
     def tip(self, q1: npt.ArrayLike, q2: npt.ArrayLike) -> Array:
         """(..., 2) where the centre of the slide is [m]; q1 in [rad], q2 in [m]."""
         q1, s = both(q1, q2)
-        across = directions(q1 + np.pi / 2)
-        return s[..., None] * directions(q1) + self.offset * across
+        return s[..., None] * directions(q1) + self.offset * directions(q1 + np.pi / 2)
 
     def isotropic_reach(self, length: float) -> float | None:
         """Displacement [m] at which the arm is isotropic for a characteristic length [m], or None.
@@ -145,12 +128,9 @@ class SlideArm(Linkage):
         ModelError: for a mass that is negative.
     """
 
-    slide: float
+    slide: Mass
     link: Link
-    payload: float = 0.0
-
-    def __post_init__(self) -> None:
-        _not_negative("slide with an arm", slide=self.slide, payload=self.payload)
+    payload: Mass = 0.0
 
     @property
     def _links(self) -> tuple[Link, ...]:
@@ -159,13 +139,13 @@ class SlideArm(Linkage):
     def tip(self, q1: npt.ArrayLike, q2: npt.ArrayLike) -> Array:
         """(..., 2) where the end of the link is [m]; q1 in [m], q2 in [rad]."""
         q1, q2 = both(q1, q2)
-        return np.stack([q1, 0 * q1], axis=-1) + self.link.length * directions(q2)
+        return q1[..., None] * [1.0, 0.0] + self.link.length * directions(q2)
 
     def _moved(self, links: tuple[Link, ...], q: tuple[Array, Array], at: Index) -> Motion:
         motion = Motion.at_rest(q[0].size, int(at[-1]))
         motion.pin[:, 0, 0] = 1.0
         motion.A[:, 0, 0] = self.slide
-        motion.add(links[0], q[1], unit_rows(int(at[-1]), 1), 2)
+        motion.add(links[0], q[1], np.eye(int(at[-1]))[[1]], 2)
         return motion
 
 
@@ -189,16 +169,10 @@ class SlideFiveBar(ClosedLinkage):
     """
 
     rails: tuple[tuple[float, float, float], tuple[float, float, float]]
-    slides: tuple[float, float]
+    slides: tuple[Mass, Mass]
     couplers: tuple[Link, Link]
-    payload: float = 0.0
+    payload: Mass = 0.0
     side: int = 1
-
-    def __post_init__(self) -> None:
-        left, right = self.slides
-        _not_negative("five-bar on rails", left=left, right=right, payload=self.payload)
-        if self.side not in (1, -1):
-            raise ModelError(f"side = {self.side}: needed is 1 or -1.")
 
     @property
     def _links(self) -> tuple[Link, ...]:

@@ -8,23 +8,26 @@ the same from the mass matrix and the constraints of any `rom.Mechanism`.
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 import numpy.typing as npt
 from scipy.linalg import null_space
 
-from rom.arguments import finite, not_negative, one_of, positive, typed
+from rom.arguments import one_of, typed
+from rom.arguments.quantities import Quantity, Size
 from rom.body.flexible import FlexibleBody
 from rom.components.linkages.chains import (
     ClosedLinkage,
+    Inertia,
     Link,
     Linkage,
+    Mass,
     Motion,
+    MovedMass,
     both,
     directions,
-    unit_rows,
-)
+)  # fmt: skip
 from rom.errors import ConfigError, ModelError
 from rom.mbs.equations.equations import linearize_constraints
 from rom.mbs.equations.packing import pack
@@ -36,10 +39,11 @@ from rom.model import Array, Index
 KEPT_POSTURES = 4096  # whose inertia is known: asking whether it exists costs nothing more
 # of a drive between two assemblies [rad, or sizes of the mechanism]: farther, it closes elsewhere
 MAX_FOLLOWED = 0.5
+Centre = Annotated[npt.ArrayLike, Quantity("m", ((2,),), error=ModelError)]
 
 
 @typed
-def rigid_link(mass: float, length: float, centre: npt.ArrayLike, inertia: float) -> Link:
+def rigid_link(mass: MovedMass, length: Size, centre: Centre, inertia: Inertia) -> Link:
     """A rigid link.
 
     Args:
@@ -52,17 +56,13 @@ def rigid_link(mass: float, length: float, centre: npt.ArrayLike, inertia: float
         ModelError: if a number is not that of a real link.
     """
     x, y = np.asarray(centre, dtype=float)
-    finite("centre", [x, y], (2,), error=ModelError)
-    positive("mass [kg]", mass, error=ModelError)
-    positive("length [m]", length, error=ModelError)
-    not_negative("inertia [kg m^2]", inertia, error=ModelError)
     J = inertia + mass * (x * x + y * y)
     M = np.array([[mass, 0, -mass * y], [0, mass, mass * x], [-mass * y, mass * x, J]])
-    return Link(float(length), M, np.zeros((2, 0)), np.zeros((0, 0)))
+    return Link(length, M, np.zeros((2, 0)), np.zeros((0, 0)))
 
 
 @typed
-def rod(mass: float, length: float) -> Link:
+def rod(mass: MovedMass, length: Size) -> Link:
     """A uniform slender rod of that mass [kg] and length [m].
 
     Raises:
@@ -122,11 +122,8 @@ class TwoLink(Linkage):
 
     first: Link
     second: Link
-    payload: float = 0.0
+    payload: Mass = 0.0
     relative: bool = False
-
-    def __post_init__(self) -> None:
-        not_negative("payload [kg]", self.payload, error=ModelError)
 
     @property
     def _links(self) -> tuple[Link, ...]:
@@ -135,15 +132,14 @@ class TwoLink(Linkage):
     def tip(self, q1: npt.ArrayLike, q2: npt.ArrayLike) -> Array:
         """(..., 2) where the end of the chain is at angles (...) [m]; q1 and q2 in [rad]."""
         q1, q2 = both(q1, q2)
-        angle = q2 + q1 if self.relative else q2
+        angle = q2 + self.relative * q1
         return self.first.length * directions(q1) + self.second.length * directions(angle)
 
     def _moved(self, links: tuple[Link, ...], q: tuple[Array, Array], at: Index) -> Motion:
-        n, (q1, q2) = int(at[-1]), q
-        motion, angle = Motion.at_rest(q1.size, n), q2 + q1 if self.relative else q2
-        spin = unit_rows(n, 0, 1) if self.relative else unit_rows(n, 1)
-        motion.add(links[0], q1, unit_rows(n, 0), at[0])
-        motion.add(links[1], angle, spin, at[1])
+        (q1, q2), rates = q, np.eye(int(at[-1]))[:, None]
+        motion = Motion.at_rest(q1.size, int(at[-1]))
+        motion.add(links[0], q1, rates[0], at[0])
+        motion.add(links[1], q2 + self.relative * q1, rates[1] + self.relative * rates[0], at[1])
         return motion
 
 
@@ -164,18 +160,11 @@ class FiveBar(ClosedLinkage):
         ModelError: for a payload or a base that is negative, or an unknown side.
     """
 
-    base: float
+    base: Annotated[float, Quantity("m", low=0.0, ends="[)", error=ModelError)]
     cranks: tuple[Link, Link]
     couplers: tuple[Link, Link]
-    payload: float = 0.0
+    payload: Mass = 0.0
     side: int = 1
-
-    def __post_init__(self) -> None:
-        if not (self.payload >= 0 and self.base >= 0 and self.side in (1, -1)):
-            raise ModelError(
-                f"base = {self.base} m, payload = {self.payload} kg, side = {self.side}: needed "
-                "are >= 0, >= 0, and 1 or -1."
-            )
 
     @property
     def _links(self) -> tuple[Link, ...]:
@@ -206,7 +195,7 @@ class FiveBar(ClosedLinkage):
 
     def _side(self, k: int, link: Link, q: Array, at: Index) -> Motion:
         side = Motion.at_rest(q.size, int(at[-1]))
-        side.add(link, q, unit_rows(int(at[-1]), k), at[k])
+        side.add(link, q, np.eye(int(at[-1]))[[k]], at[k])
         return side
 
 
