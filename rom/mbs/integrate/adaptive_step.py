@@ -15,8 +15,7 @@ from rom.mbs.elements.family import apply_laws
 from rom.mbs.integrate import generalized_alpha as alpha
 from rom.mbs.integrate import step_control as control
 from rom.mbs.integrate.consistent_start import check_velocity
-from rom.mbs.integrate.event_end import kept_before_the_end
-from rom.mbs.integrate.fixed_step import CHUNK_SECONDS, LARGEST_CHUNK, counts, failed_step
+from rom.mbs.integrate.fixed_step import counts, failed_step, in_chunks, kept_before_the_end
 from rom.mbs.integrate.run import FIRST_STEP_RATIO, RUN_KEY, Record, of, standing_at
 from rom.mbs.integrate.step_control import Control, Trial
 from rom.mbs.integrate.step_memory import FACTOR_FIELDS, begin, recall, remember
@@ -25,7 +24,6 @@ from rom.mbs.parts.signals import padded, sampled
 from rom.mbs.results.state import Memory, State
 from rom.model import Array
 
-FIRST_CHUNK = 16  # steps, before it is known how long they take
 # what a run remembers beside its step memory, whose arrays have this in front of their names
 NUMBERS = (control.LENGTH, control.BEFORE, control.ERROR_BEFORE, control.SHORTEST, control.LONGEST)
 COUNTS = (control.REJECTED, control.UNEVEN)
@@ -43,13 +41,7 @@ def run_variable(record: Record, W: Work, state: State) -> None:
     alpha.advance.link()
     goes_on = record.settings.begun > 0
     run = _Run(record, W, state if goes_on else replace(state, algorithmic=None, memory=None))
-    limit = FIRST_CHUNK
-    while record.t < record.settings.t_end and not record.stopped:
-        clock = perf_counter()
-        taken = run.chunk(limit)
-        spent = max(perf_counter() - clock, 1e-6)
-        limit = int(np.clip(CHUNK_SECONDS / spent * taken, 1, LARGEST_CHUNK))
-        record.pause()
+    in_chunks(record, run.chunk, lambda: record.t < record.settings.t_end)
     record.reach(replace(record.final, memory=None))
     if not record.stopped and record.blocks[-1][0][-1] < record.t:
         record.keep_state(record.final, run.T.work)
@@ -144,11 +136,7 @@ class _Run:
         return int(count[control.TAKEN])
 
     def take(self) -> None:
-        """Take steps, and do all that they come back for.
-
-        Raises:
-            RomError: of a step that cannot be taken, a signal or a law.
-        """
+        """Take steps, and do all that they come back for; what cannot be done raises RomError."""
         record, now = self.record, self.now
         rank = record.packed.rows_solved(record.final.rank)
         tables = (self.W, self.beside, now, self.back, self.trial)
@@ -176,8 +164,7 @@ class _Run:
     def sample(self) -> None:
         """Sample signals at the time of the step, and at those to come if its length stays.
 
-        Raises:
-            RomError: of a signal that fails at the time of the step; a later one may never be met.
+        One that fails later may never be met: it raises RomError when its time has come.
         """
         settings, (t, h) = self.record.settings, self.now.number[[control.REACHED, control.LENGTH]]
         used_up = 0 < self.now.count[control.KNOWN] == self.now.count[control.ROW]
@@ -251,9 +238,8 @@ class _Run:
         t, *out = self.columns(self.trial.rows[:kept])
         steps = int(self.T.count[alpha.STEPS]) - np.arange(kept)[::-1]
         saved = steps % every == 0 if record.watch else np.full(kept, True)
-        if record.watch and kept_before_the_end(
-            record, self.beside, self.forces, t, tuple(out), saved
-        ):
+        steps_seen = self.beside, self.forces, t, tuple(out), saved
+        if record.watch and kept_before_the_end(record, *steps_seen):
             return
         if saved.any():
             record.keep(t[saved], *(x[saved] for x in out))
@@ -269,14 +255,8 @@ def _control(W: Work, step: alpha.Step, start: State) -> tuple[Work, Control]:
     The memory keeps of a step its factor, and what belongs to it.
     """
     base = W.base if start.base is None else start.base
-    own: dict[str, Any] = {
-        "v": start.v,
-        "a": start.a,
-        "lam": start.lam,
-        "base": base,
-        "jerk": 0 * start.v,
-    }
-    own["number"] = np.zeros(control.ERROR + 1)
+    own: dict[str, Any] = {"v": start.v, "a": start.a, "lam": start.lam, "base": base}
+    own |= {"jerk": 0 * start.v, "number": np.zeros(control.ERROR + 1)}
     counts = {"count": np.zeros(control.ANSWER + 1, dtype=np.int64)}
     kept = {f"W {name}": getattr(W, name) for name in ("base", *FACTOR_FIELDS, "factor")}
     steps = {f"step {name}": x for name, x in step.items()}

@@ -47,18 +47,10 @@ def initial_state(
 ) -> State:
     """Positions and velocities nearest to the given ones that satisfy all joints and drives.
 
-    Bodies are moved as they are, and strained where that does not suffice.
-
-    Args:
-        packed: the mechanism.
-        t: start time [s].
-        spacing: of finite differences of drives [s].
-        assemble: close gaps of any size, and change given velocities by as much as it takes.
-        placing: drives say where bodies are and how they move; what was given contradicts nothing.
-
-    Raises:
-        ModelError: naming the joint that cannot be satisfied, or that contradicts what was given.
-        SolverError: if a drive or load is not finite at the start.
+    Bodies are moved as they are, and strained where that does not suffice. Drives are sampled
+    with a spacing [s] of finite differences. With ``assemble`` gaps of any size are closed, and
+    given velocities change by as much as it takes; with ``placing`` drives say where bodies are and
+    how they move: what was given contradicts nothing.
     """
     table = sample_all(packed.signals, np.array([t]), (t, np.inf), spacing)
     good, failure = first_failure(packed.signals, np.array([t]), table)
@@ -87,28 +79,27 @@ def _start(packed: Packed, signal: Array, t: float, asked: tuple[bool, bool]) ->
 def _told(packed: Packed, W: Work, q: Array, v: Array, assemble: bool, placing: bool) -> float:
     """Largest change of what was given, of the size or of velocities, after telling it.
 
-    Bodies that were given no velocity have the one that joints and drives give them.
-
-    Raises:
-        ModelError: naming what has to change by more than a slip of the pen, unless asked for.
+    What has to change by more than a slip of the pen is refused, unless asked for. Bodies that were
+    given no velocity have the one that joints and drives give them.
     """
     given = v if placing else packed.v
     changes = [_opened(packed, W, placing), *_bent_and_hurried(packed, W, q, v, given)]
     moved = [(what, where) for change, what, where in changes if change > WARNING_RTOL]
     largest = max(change for change, *_ in changes)
+    if assemble or not moved:
+        return largest
     summary = f"{'; '.join(what for what, _ in moved)}."
-    if largest > REFUSAL_RTOL and not assemble:
+    if largest > REFUSAL_RTOL:
         raise ModelError(
             f"the start contradicts joints and drives: {summary}",
             where=moved[0][1],
             hint="Let places and drives fit, and velocities: omega about a pin moves the origin, "
             "too. Or let the start be moved (assemble=True; in a file, assemble = true).",
         )
-    if moved and not assemble:
-        warn(
-            f"the start was moved to fit joints and drives: {summary} Draw the bodies so "
-            "that joints are closed and drives begin where they are, or ask for it (assemble=True)."
-        )
+    warn(
+        f"the start was moved to fit joints and drives: {summary} Draw the bodies so that "
+        "joints are closed and drives begin where they are, or ask for it (assemble=True)."
+    )
     return largest
 
 
@@ -166,11 +157,7 @@ def independent(packed: Packed) -> bool:
 
 
 def with_accelerations(packed: Packed, W: Work, state: State) -> State:
-    """The state with consistent accelerations and multipliers.
-
-    Raises:
-        SolverError: if the equations of motion are singular there.
-    """
+    """The state with consistent accelerations and multipliers, where there are any."""
     a, lam = np.zeros(state.v.size), np.zeros(state.lam.size)
     y = np.concatenate([state.q, state.v, np.zeros(3)])
     rows = packed.rows_solved(state.rank)
@@ -181,11 +168,7 @@ def with_accelerations(packed: Packed, W: Work, state: State) -> State:
 
 
 def assembled(packed: Packed, W: Work, q: Array) -> Array:
-    """Coordinates that satisfy the constraints, by weighted Gauss-Newton corrections.
-
-    Raises:
-        ModelError: naming the joint with the largest gap that remains.
-    """
+    """Coordinates that satisfy the constraints, by weighted Gauss-Newton corrections."""
     if not W.value.size:
         return q.copy()
     for elastic in ELASTIC_WEIGHTS:
@@ -199,7 +182,13 @@ def assembled(packed: Packed, W: Work, q: Array) -> Array:
         gap = W.value / packed.row_scale
         if np.abs(gap).max() <= GAP_TOLERANCE or not packed.system.bodies.r.any():
             break
-    _check_gap(packed, gap)
+    largest, where, size = _largest(packed, gap)
+    if not np.isfinite(gap).all() or largest > GAP_TOLERANCE:
+        raise ModelError(
+            f"the mechanism cannot be assembled: {where!r} stays open by {size}.",
+            where=where,
+            hint="Joints contradict each other: check positions, axes and drives.",
+        )
     return closed
 
 
@@ -222,21 +211,14 @@ def _closed(packed: Packed, W: Work, q: Array, elastic: float) -> Array:
 
 def _limited(packed: Packed, step: Array) -> Array:
     """The step, shortened to half a radian and to the size of the mechanism."""
-    largest = 0.0
+    return step / max([1.0, *(max(turn / 0.5, shift) for turn, shift in _reach(packed, step))])
+
+
+def _reach(packed: Packed, step: Array) -> Iterator[tuple[float, float]]:
+    """How far each body turns [rad], and shifts in lengths of the mechanism."""
     for t in packed.system.bodies.v_at:
         turn, shift = (float(np.linalg.norm(step[i : i + 3])) for i in (t + 3, t))
-        largest = max(largest, turn / 0.5, shift / packed.length)
-    return step / max(largest, 1.0)
-
-
-def _check_gap(packed: Packed, gaps: Array) -> None:
-    gap, where, size = _largest(packed, gaps)
-    if not np.isfinite(gaps).all() or gap > GAP_TOLERANCE:
-        raise ModelError(
-            f"the mechanism cannot be assembled: {where!r} stays open by {size}.",
-            where=where,
-            hint="Joints contradict each other: check positions, axes and drives.",
-        )
+        yield turn, shift / packed.length
 
 
 def _weights(packed: Packed, W: Work, elastic: float = ELASTIC_WEIGHTS[-1]) -> Array:
@@ -262,11 +244,10 @@ def _least_change(packed: Packed, W: Work, gap: Array, weight: Array, rows: Inte
             raise SolverError("constraints that were independent became dependent.")
         return least_motion(packed.system, W, gap)
     scale = packed.row_scale[rows]
-    G, gap = W.G[rows] / scale[:, None], gap[rows] / scale
-    rows = np.linalg.norm(G * weight, axis=1)
-    rows = np.where(rows > 0, rows, 1.0)
-    A = G * weight / rows[:, None]
-    return weight * np.linalg.lstsq(A, gap / rows, rcond=RANK_TOLERANCE)[0]
+    A, gap = W.G[rows] / scale[:, None] * weight, gap[rows] / scale
+    size = np.linalg.norm(A, axis=1)
+    size = np.where(size > 0, size, 1.0)
+    return weight * np.linalg.lstsq(A / size[:, None], gap / size, rcond=RANK_TOLERANCE)[0]
 
 
 def _diagonal(s: Any) -> tuple[Integers, Integers]:
@@ -305,22 +286,14 @@ def least_motion(s: Any, W: Work, gap: Array) -> Array:
 
 
 def fitting_velocity(packed: Packed, W: Work, q: Array, v: Array, *, led: bool = False) -> Array:
-    """The velocities nearest to v that satisfy joints and drives.
+    """The velocities nearest to v (n,) that satisfy joints and drives.
 
-    Args:
-        packed: the mechanism.
-        W: its memory.
-        q: where it is.
-        v: (n,) velocities that were given.
-        led: bodies that were given none are led by the others, and do not slow them down.
-
-    Raises:
-        ModelError: naming a joint or drive that contradicts others.
+    ``led``: bodies that were given none are led by the others, and do not slow them down.
     """
     if not W.value.size:
         return v.copy()
     linearize_constraints(packed.system, W, q, v)
-    weight, wanted = _weights(packed, W), _prescribed(packed, W, 1)
+    weight, wanted = _weights(packed, W), _prescribed(packed, W)
     now, every, given = np.zeros_like(wanted), np.arange(wanted.size), v
     if led:
         bodies = packed.system.bodies
@@ -334,18 +307,11 @@ def fitting_velocity(packed: Packed, W: Work, q: Array, v: Array, *, led: bool =
 
 
 def check_velocity(packed: Packed, W: Work, v: Array, given: Array | None = None) -> None:
-    """Refuse velocities that do not satisfy joints and drives as linearised last.
+    """Refuse velocities v (n,) that do not satisfy joints and drives as linearised last.
 
-    Args:
-        packed: the mechanism.
-        W: its memory.
-        v: (n,) the velocities.
-        given: (n,) those they were fitted from: where all come to rest, v is their round-off.
-
-    Raises:
-        ModelError: naming a joint or drive that contradicts others.
+    They were fitted from given ones (n,): where all come to rest, v is their round-off.
     """
-    wanted = _prescribed(packed, W, 1)
+    wanted = _prescribed(packed, W)
     now, size = np.zeros_like(wanted), np.zeros_like(wanted)
     gradient_times(packed.system, W, v, False, now)
     gradient_times(packed.system, W, v, True, size)
@@ -364,11 +330,12 @@ def check_velocity(packed: Packed, W: Work, v: Array, given: Array | None = None
         )
 
 
-def _prescribed(packed: Packed, W: Work, derivative: int) -> Array:
+def _prescribed(packed: Packed, W: Work) -> Array:
+    """(m,) rates of the drives, zero for constraints that none prescribes."""
     signal = packed.system.rows.signal
     if not W.signal.shape[0]:
         return np.zeros(signal.size)
-    return np.where(signal >= 0, W.signal[np.maximum(signal, 0), derivative], 0.0)
+    return np.where(signal >= 0, W.signal[np.maximum(signal, 0), 1], 0.0)
 
 
 @dataclass(frozen=True)
@@ -394,8 +361,7 @@ def _constraints(packed: Packed, W: Work, q: Array) -> _Constraints:
 
 def _by_matrix(A: Array, weight: Array) -> _Constraints:
     norms = np.linalg.norm(A, axis=1)
-    A = A / np.where(norms > 0, norms, 1.0)[:, None]
-    U, s, V = np.linalg.svd(A)
+    U, s, V = np.linalg.svd(A / np.where(norms > 0, norms, 1.0)[:, None])
     rank = int((s > RANK_TOLERANCE * s.max(initial=0.0)).sum())
     share = np.abs(U[:, rank:]).max(axis=1, initial=0.0)
     return _Constraints(rank, share, weight * V[rank:].sum(axis=0))
@@ -445,18 +411,11 @@ def _refuse_shared_friction(packed: Packed, names: Any) -> None:
 
 
 def _check_start(packed: Packed, W: Work, q: Array, rank: int) -> None:
-    """Refuse a start in a singular position, where the rank is less than beside it.
-
-    Raises:
-        ModelError: if a small motion along the free directions raises the rank.
-    """
-    if rank == W.value.size or rank == 0:
+    """Refuse a singular position: where a small motion along free directions raises the rank."""
+    if rank in (0, W.value.size, packed.v.size):
         return
-    if rank == packed.v.size:
-        return
-    step = _constraints(packed, W, q).step
-    reach = max(_largest_turn(packed, step), 1e-300)
-    beside = np.empty_like(q)
+    step, beside = _constraints(packed, W, q).step, np.empty_like(q)
+    reach = max([1e-300, *(max(far) for far in _reach(packed, step))])
     retract(packed.system, q, step * (1e-2 / reach), beside)
     try:
         beside = assembled(packed, W, beside)
@@ -469,10 +428,3 @@ def _check_start(packed: Packed, W: Work, q: Array, rank: int) -> None:
             f"{raised} beside it; its motion could branch.",
             hint="Start from a position in which the parts are not all in line.",
         )
-
-
-def _largest_turn(packed: Packed, step: Array) -> float:
-    bodies: Any = packed.system.bodies
-    turns = [np.linalg.norm(step[t + 3 : t + 6]) for t in bodies.v_at]
-    shifts = [np.linalg.norm(step[t : t + 3]) / packed.length for t in bodies.v_at]
-    return float(max(*turns, *shifts))

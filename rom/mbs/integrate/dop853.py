@@ -1,23 +1,30 @@
-"""Accelerations from the equations of motion, integrated by an explicit method of high order.
+"""Accelerations from the equations of motion, integrated by methods of SciPy.
 
-Constraints enter on acceleration level; their drift stays at the tolerance of the integrator.
-Instants of output are a given interval apart, interpolated, or else the ends of the steps.
+Whole motions by DOP853, explicit and of high order, the first instants of a multistep method by
+Radau IIA. Constraints enter on acceleration level; their drift stays at the tolerance of the
+integrator. Instants of output are a given interval apart, interpolated, or else ends of steps.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 from time import perf_counter
+from typing import Any
 
 import numpy as np
-from scipy.integrate import DOP853
+from scipy.integrate import DOP853, solve_ivp
 
-from rom.errors import SolverError
-from rom.mbs.elements.family import apply_laws
+from rom import rotation
+from rom.errors import ConfigError, SolverError
 from rom.mbs.equations.equations import evaluate, rates
+from rom.mbs.elements.family import apply_laws
+from rom.mbs.integrate.consistent_start import assembled, fitting_velocity
 from rom.mbs.integrate.run import RUN_KEY, Record, standing_at
-from rom.mbs.kernels.work import Work
+from rom.mbs.kernels.work import STEPS, Step, Work
 from rom.mbs.parts.signals import sampled
 from rom.mbs.results.state import Memory, State
 from rom.model import Array
+
+RADAU_RTOL, RADAU_ATOL = 1e-11, 1e-13
 
 
 class Equations:
@@ -34,16 +41,14 @@ class Equations:
     def __call__(self, t: float, y: Array, *, accepted: bool = False) -> Array:
         """Rates at time t; ``accepted`` for a state of the motion, not a trial.
 
-        Raises:
-            SolverError: if a prescribed function is not finite, or at an accepted state a force
-                is not, or the equations are singular.
+        Refuses prescribed functions that are not finite, and accepted states in which a force is
+        not, or the equations are singular.
         """
         packed, settings = self.record.packed, self.record.settings
         y = np.ascontiguousarray(y)  # SciPy hands over columns
         if packed.signals:
-            times = np.array([t])
             h = settings.spacing
-            table, failure = sampled(packed.signals, times, settings.span, h, h)
+            table, failure = sampled(packed.signals, np.array([t]), settings.span, h, h)
             if failure is not None:
                 raise failure
             self.W.signal[:] = table[0]
@@ -68,7 +73,7 @@ def run_explicit(record: Record, W: Work, state: State) -> None:
     settings = record.settings
     W.base[:] = state.base
     equations, goes_on = Equations(record, W, state), settings.begun > 0
-    y = np.concatenate([state.q, state.v, np.zeros(3)])
+    y = _coordinates(state)
     if not goes_on:
         equations(state.t, y, accepted=True)
         state = _state_of(equations, state.t, y)
@@ -94,12 +99,10 @@ def _solver(equations: Equations, state: State) -> tuple[DOP853, int, int]:
     record, settings = equations.record, equations.record.settings
     options = {"rtol": settings.rtol, "atol": settings.atol}
     if state.memory is None:
-        y = np.concatenate([state.q, state.v, np.zeros(3)])
-        return DOP853(equations, state.t, y, settings.t_end, **options), 1, 0
+        return DOP853(equations, state.t, _coordinates(state), settings.t_end, **options), 1, 0
     arrays, base = state.memory.arrays, equations.W.base.copy()
     step = float(arrays["step"][0])
-    left = settings.t_end - state.t
-    options["first_step"] = min(step, left)
+    options["first_step"] = min(step, settings.t_end - state.t)
     solver = DOP853(equations, state.t, arrays["y"].copy(), settings.t_end, **options)
     solver.f, solver.h_abs = arrays["f"].copy(), step
     solver.nfev, steps, due = (int(x) for x in arrays["counts"])
@@ -156,6 +159,11 @@ def _first_event(record: Record, equations: Equations, solver: DOP853) -> float 
     return record.watch.stop[1] if record.watch.stop else None
 
 
+def _coordinates(state: State) -> Array:
+    """What is integrated: coordinates, velocities, and the works from here on."""
+    return np.concatenate([state.q, state.v, np.zeros(3)])
+
+
 def _unit(record: Record, y: Array) -> Array:
     """The same with quaternions of unit length."""
     for at in record.packed.system.bodies.q_at:
@@ -195,3 +203,73 @@ def _state_of(equations: Equations, t: float, y: Array, memory: Memory | None = 
     n_q, n = equations.n_q, equations.n
     q, v, a, lam = (x.copy() for x in (y[:n_q], y[n_q : n_q + n], equations.a, equations.lam))
     return State(t, q, v, a, lam, equations.rank, None, equations.W.base.copy(), memory)
+
+
+def first_steps(record: Record, W: Work, step: Step) -> tuple[Array, tuple[Array, ...]]:
+    """Take the steps before a multistep formula can begin, and give T its past.
+
+    A formula of order k needs k instants before it may step. Radau IIA finds them to far more
+    digits than the steps will keep, stiff bodies included. Returns their times and rows of q, v,
+    vd, lam, work and base; refuses a run that has fewer steps.
+    """
+    start, count = record.final, step.past.shape[1]
+    if count > record.settings.steps:
+        raise ConfigError(
+            f"bdf of order {count + 1} needs {count} steps to begin with, the run has "
+            f"{record.settings.steps}.",
+            hint="Take shorter steps or a lower order.",
+        )
+    t = record.settings.time(np.arange(count + 1))
+    equations = Equations(record, W, start)
+    W.base[:] = start.base
+    past = [_instant(record, equations, t[0], _coordinates(start))]
+    if count:
+        options = {"method": "Radau", "rtol": RADAU_RTOL, "atol": RADAU_ATOL, "t_eval": t[1:]}
+        found: Any = solve_ivp(equations, (t[0], t[-1]), _coordinates(past[0][0]), **options)
+        if not found.success:
+            raise SolverError(
+                f"the first steps failed after t = {t[0]:.9g} s: {found.message}",
+                hint="Take bdf of order two, or generalized-alpha.",
+            )
+        past += [
+            _instant(record, equations, float(x), y) for x, y in zip(t[1:], found.y.T, strict=True)
+        ]
+    states, works = zip(*past, strict=True)
+    _remember(record, W, step, states, works[-1])
+    rows = [[getattr(x, name) for x in states[1:]] for name in ("q", "v", "a", "lam")]
+    rows += [list(works[1:]), [x.base for x in states[1:]]]
+    return t[1:], tuple(np.array(x) for x in rows)
+
+
+def _instant(record: Record, equations: Equations, t: float, y: Array) -> tuple[State, Array]:
+    """The state that fits the constraints at a time, and the works up to there."""
+    packed, n_q, n = record.packed, equations.n_q, equations.n
+    equations(t, _unit(record, y))
+    q = assembled(packed, equations.W, y[:n_q])
+    v = fitting_velocity(packed, equations.W, q, y[n_q : n_q + n])
+    y = np.concatenate([q, v, y[-3:]])
+    equations(t, y, accepted=True)
+    return _state_of(equations, t, y), y[-3:]
+
+
+def _remember(record: Record, W: Work, step: Step, states: Sequence[State], work: Array) -> None:
+    """Let T stand at the last state and know the ones before it."""
+    now = states[-1]
+    for name, x in (("q", now.q), ("v", now.v), ("vd", now.a), ("lam", now.lam), ("work", work)):
+        getattr(step, name)[:] = x
+    step.lost[:] = W.power
+    step.count[STEPS] = len(states) - 1
+    for j, state in enumerate(states[-2::-1]):
+        step.past[0, j], step.past[1, j] = _seen(record, now.q, state.q), state.v
+
+
+def _seen(record: Record, q: Array, other: Array) -> Array:
+    """(n,) increment that leads from coordinates q to other ones."""
+    bodies: Any = record.packed.system.bodies
+    out = np.zeros(record.packed.v.size)
+    for at, vt, r in zip(bodies.q_at, bodies.v_at, bodies.r, strict=True):
+        back = q[at + 3 : at + 7] * np.array([1.0, -1.0, -1.0, -1.0])
+        out[vt : vt + 3] = other[at : at + 3] - q[at : at + 3]
+        out[vt + 3 : vt + 6] = rotation.log(rotation.multiply(back, other[at + 3 : at + 7]))
+        out[vt + 6 : vt + 6 + r] = other[at + 7 : at + 7 + r] - q[at + 7 : at + 7 + r]
+    return out

@@ -55,7 +55,7 @@ class Instant:
         marker = self._frame(body) if marker is None else marker
         if marker is not None:
             return self._evaluated(body).P[self._row(body, marker)].copy()
-        at = self._start(body, self._packed.system.bodies.q_at)
+        at = self._q_at(body)
         return self.q[at : at + 3].copy()
 
     def velocity(self, body: str, marker: Any = None) -> Array:
@@ -67,7 +67,7 @@ class Instant:
         marker = self._frame(body) if marker is None else marker
         if marker is not None:
             return self._evaluated(body).V[self._row(body, marker), :3].copy()
-        at = self._start(body, self._packed.system.bodies.v_at)
+        at = self._v_at(body)
         return self.v[at : at + 3].copy()
 
     def axes(self, body: str, marker: Any) -> Array:
@@ -84,7 +84,7 @@ class Instant:
         Raises:
             ConfigError: if the body is unknown.
         """
-        at = self._start(body, self._packed.system.bodies.q_at) + 3
+        at = self._q_at(body) + 3
         if frame := self._frame(body):
             return quaternion(self.axes(body, frame))
         return self.q[at : at + 4].copy()
@@ -95,7 +95,7 @@ class Instant:
         Raises:
             ConfigError: if the body is unknown.
         """
-        at = self._start(body, self._packed.system.bodies.v_at) + 3
+        at = self._v_at(body) + 3
         if frame := self._frame(body):
             row = self._row(body, frame)
             return self._evaluated(body).E[row].T @ self.W.V[row, 3:]
@@ -107,7 +107,7 @@ class Instant:
         Raises:
             ConfigError: if the body is unknown.
         """
-        at = self._start(body, self._packed.system.bodies.q_at) + 7
+        at = self._q_at(body) + 7
         return self.q[at : at + self._mechanism.part(body).r].copy()
 
     def joint(self, name: str, coordinate: str | None = None) -> tuple[float, float]:
@@ -129,14 +129,20 @@ class Instant:
 
     def _frame(self, body: str) -> Marker | None:
         """Marker that is the frame of the body, where its motion is that of another frame."""
-        self._start(body, self._packed.system.bodies.q_at)
+        self._number(body)
         return self._mechanism.part(body).own_frame
 
-    def _start(self, body: str, starts: Any) -> int:
+    def _number(self, body: str) -> int:
         names = self._packed.names
         if body not in names:
             raise ConfigError(f"no body {body!r}; the mechanism has {offered(names, body)}.")
-        return int(starts[names.index(body)])
+        return names.index(body)
+
+    def _q_at(self, body: str) -> int:
+        return int(self._packed.system.bodies.q_at[self._number(body)])
+
+    def _v_at(self, body: str) -> int:
+        return int(self._packed.system.bodies.v_at[self._number(body)])
 
     def _row(self, body: str, place: Any) -> int:
         marker = place if isinstance(place, Marker) else self._mechanism.part(body).marker(place)
@@ -149,7 +155,7 @@ class Instant:
 
     def _evaluated(self, body: str) -> Any:
         if body != GROUND:
-            self._start(body, self._packed.system.bodies.q_at)
+            self._number(body)
         self._evaluate()
         return self.W
 
@@ -195,11 +201,7 @@ class Watch:
         self.signs = {n: np.sign(self.value(n, self.start, q, v)) for n in self.events}
 
     def value(self, name: str, t: float, q: Array, v: Array) -> float:
-        """The function of an event.
-
-        Raises:
-            RomError: as `rom.mbs.parts.foreign.ask` and `rom.mbs.parts.foreign.numbers`.
-        """
+        """The function of an event, refused where it fails or is no number."""
         what = f"the function of event {name!r}"
         answer = ask(what, t, self.events[name].function, t, self.instant.set(t, q, v))
         return float(numbers(what, t, answer, (), "a number"))
@@ -207,11 +209,8 @@ class Watch:
     def step(self, t0: float, t1: float, motion: Motion, exact: Motion | None = None) -> bool:
         """Look for zeros in one step, wholly or not at all; True when one of them ends the run.
 
-        Args:
-            t0: beginning of the step [s].
-            t1: its end [s].
-            motion: coordinates and velocities at a time in between.
-            exact: the same, corrected to satisfy the constraints; None if motion does.
+        Between the times t0 and t1 [s]; ``exact`` is the motion corrected to satisfy the
+        constraints, None if motion does.
         """
         before = self.noted()
         try:
@@ -261,20 +260,11 @@ class Watch:
     @property
     def occurrences(self) -> dict[str, Occurrences]:
         """All events by name, those that never happened with no times."""
-        widths = (self.packed.q.size, self.packed.v.size)
-        return {name: _stacked(items, *widths) for name, items in self.found.items()}
-
-    @property
-    def sentence(self) -> str:
-        """How the run ended, if an event ended it."""
-        return (
-            "" if self.stop is None else "Stopped by event {!r} at t = {:.9g} s.".format(*self.stop)
-        )
-
-
-def _stacked(items: list[tuple[float, Array, Array]], n_q: int, n: int) -> Occurrences:
-    t, q, v = (np.array([item[k] for item in items]) for k in range(3))
-    return Occurrences(t, q.reshape(-1, n_q), v.reshape(-1, n))
+        shapes, found = ((-1,), (-1, self.packed.q.size), (-1, self.packed.v.size)), {}
+        for name, items in self.found.items():
+            columns = (np.array([item[k] for item in items]) for k in range(3))
+            found[name] = Occurrences(*map(np.reshape, columns, shapes))
+        return found
 
 
 def watch_of(mechanism: Mechanism, packed: Packed, start: float) -> Watch | None:

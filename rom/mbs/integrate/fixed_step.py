@@ -1,5 +1,7 @@
 """Implicit methods with steps of one length: compiled steps in chunks, or around Python forces."""
 
+from collections.abc import Callable
+from dataclasses import replace
 from time import perf_counter
 from typing import Any, NamedTuple
 
@@ -9,24 +11,31 @@ from rom.errors import RomError, SolverError
 from rom.mbs.elements.family import Laws, apply_laws
 from rom.mbs.equations.equations import evaluate, residual
 from rom.mbs.integrate import generalized_alpha as alpha
-from rom.mbs.integrate.event_end import kept_before_the_end
+from rom.mbs.integrate.consistent_start import assembled, fitting_velocity
+from rom.mbs.integrate.dop853 import first_steps
 from rom.mbs.integrate.events import Noted
 from rom.mbs.integrate.generalized_alpha import Step
-from rom.mbs.integrate.radau_start import first_steps
 from rom.mbs.integrate.run import Record, standing_at
-from rom.mbs.integrate.step_memory import begin, copied, recall, remember
+from rom.mbs.integrate.step_memory import (
+    RUN_COUNTS,
+    accelerated,
+    begin,
+    copied,
+    recall,
+    remember,
+    signals_at,
+)
 from rom.mbs.kernels.system import ANGLE
 from rom.mbs.kernels.work import Work
 from rom.mbs.parts.signals import padded, sampled
+from rom.mbs.results.interpolation import Point, between
 from rom.mbs.results.state import State
 from rom.model import Array
 
-# seconds between looks at the keyboard and the progress line
-CHUNK_SECONDS = 0.2
-LARGEST_CHUNK = 4096
-RESTLESS_LAW_TEXT = (
-    1e-2  # change of a law by the last correction, of its size, that keeps a step from ending
-)
+# seconds between looks at the keyboard and the progress line; steps between them, at first and most
+CHUNK_SECONDS, FIRST_CHUNK, LARGEST_CHUNK = 0.2, 16, 4096
+# change of a law by the last correction, of its size, that keeps a step from ending
+RESTLESS_LAW_RTOL = 1e-2
 LOSING_SHARE = 0.9  # of half a turn a step, from where on one that gains speed may exceed it
 
 
@@ -37,22 +46,31 @@ def run_implicit(record: Record, W: Work, state: State) -> None:
     alpha.advance.link()
     record.start(state, step.work)
     record.clock = perf_counter()
-    done, chunk, n = settings.begun, 16, settings.steps
+    done, n = settings.begun, settings.steps
     if step.bdf.size != 3 and not step.count[alpha.HAS_FACTOR]:
         with standing_at(record, record.given):
             done = _first(record, W, step, forces)
-    while done < n and not record.stopped:
-        clock = perf_counter()
-        taken = _chunk(record, W, step, forces, done, min(chunk, n - done))
+
+    def take(most: int) -> int:
+        nonlocal done
+        taken = _chunk(record, W, step, forces, done, min(most, n - done))
         done += taken
-        spent = max(perf_counter() - clock, 1e-6)
-        chunk = int(np.clip(CHUNK_SECONDS / spent * taken, 1, LARGEST_CHUNK))
-        record.pause()
+        return taken
+
+    in_chunks(record, take, lambda: done < n)
     if n % settings.save_every and not record.stopped:
-        record.keep(
-            record.t,
-            *(x[None].copy() for x in (step.q, step.v, step.vd, step.lam, step.work, W.base)),
-        )
+        record.keep(record.t, *(x[None].copy() for x in _saved(W, step)))
+
+
+def in_chunks(record: Record, take: Callable[[int], int], goes_on: Callable[[], bool]) -> None:
+    """Take steps, up to so many at once as `CHUNK_SECONDS` has time for, until the run ends."""
+    most = FIRST_CHUNK
+    while goes_on() and not record.stopped:
+        clock = perf_counter()
+        taken = take(most)
+        spent = max(perf_counter() - clock, 1e-6)
+        most = int(np.clip(CHUNK_SECONDS / spent * taken, 1, LARGEST_CHUNK))
+        record.pause()
 
 
 def _first(record: Record, W: Work, step: Step, forces: Laws) -> int:
@@ -66,11 +84,14 @@ def _first(record: Record, W: Work, step: Step, forces: Laws) -> int:
     return t.size
 
 
+def _saved(W: Work, step: Step) -> tuple[Array, ...]:
+    """What is kept of an instant: q, v, vd, lam, work and base."""
+    return step.q, step.v, step.vd, step.lam, step.work, W.base
+
+
 def space(W: Work, step: Step, rows: int) -> tuple[Array, ...]:
-    """Arrays for q, v, vd, lam, work and base of so many instants."""
-    return tuple(
-        np.zeros((rows, x.size)) for x in (step.q, step.v, step.vd, step.lam, step.work, W.base)
-    )
+    """Arrays for what is kept of so many instants."""
+    return tuple(np.zeros((rows, x.size)) for x in _saved(W, step))
 
 
 def _chunk(record: Record, W: Work, step: Step, forces: Laws, done: int, count: int) -> int:
@@ -153,9 +174,8 @@ def _advance(record: Record, W: Work, step: Step, forces: Laws, chunk: tuple[Any
 
 def counts(step: Step) -> dict[str, float]:
     """Steps, Newton iterations and factorisations so far."""
-    names = {"steps": alpha.STEPS, "iterations": alpha.ITERATIONS}
-    names["factorisations"] = alpha.FACTORISATIONS
-    return {name: int(step.count[k]) for name, k in names.items()}
+    names = ("steps", "iterations", "factorisations")
+    return dict(zip(names, step.count[list(RUN_COUNTS)].tolist(), strict=True))
 
 
 def _note(
@@ -220,7 +240,7 @@ def _restless_law(record: Record, W: Work, step: Step, t: float) -> str:
         if now.any()
     }
     name = max(changes, key=lambda name: changes[name], default="")
-    if not name or not changes[name] > RESTLESS_LAW_TEXT:
+    if not name or not changes[name] > RESTLESS_LAW_RTOL:
         return ""
     return f"; the law of {name!r} still changes by {changes[name]:.2g} of itself"
 
@@ -242,3 +262,85 @@ def _lost_turn(record: Record, W: Work, h: float) -> str:
         "their joint, with the gear or spring that acts on it, loses turns from pi on: take steps "
         f"below {np.pi * h / turns[k]:.3g} s."
     )
+
+
+def kept_before_the_end(
+    record: Record, W: Work, forces: Laws, t: Array, out: tuple[Array, ...], saved: Array
+) -> bool:
+    """Look for events in some steps; True, and all that counts kept, if one ends the run.
+
+    Steps go on from the last state of the record to times t (k,), with one row each of q, v, a,
+    lam, work and base; saved (k,) says which are kept. What came before an event function that
+    fails is kept, too.
+    """
+    f = record.final
+    first = record.t, f.q, f.v, f.a, f.lam, record.blocks[-1][5][-1], f.base
+    k, failure = _look(record, first, t, out)
+    if k == t.size:
+        return False
+    rows = (t[:k], *(x[:k] for x in out))
+    if saved[:k].any():
+        record.keep(*(x[saved[:k]] for x in rows))
+    last = tuple(x[-1] for x in rows) if k else first
+    now, q, v, a, lam, _, base = last
+    state = State(now, q, v, a, lam, record.final.rank, None, base)
+    if failure:
+        record.t, record.final = state.t, state
+        raise failure
+    ends = Point(*last[:4]), Point(t[k], *(x[k] for x in out[:3]))
+    _finish(record, W, forces, state, ends, (last[5], out[4][k]))
+    return True
+
+
+def _projected(record: Record, W: Work, ends: tuple[Point, Point], t: float) -> tuple[Array, Array]:
+    """Coordinates and velocities between two instants that satisfy the constraints."""
+    packed = record.packed
+    q, v, _ = between(packed.system, *ends, t)
+    signals_at(record, W, t)
+    q = assembled(packed, W, q)
+    return q, fitting_velocity(packed, W, q, v)
+
+
+def _look(
+    record: Record, first: tuple[Any, ...], t: Array, out: tuple[Array, ...]
+) -> tuple[int, BaseException | None]:
+    """Number of steps before the one that an event ends, or that an event function refuses."""
+    # not the memory of the steps: its factorisation must stay
+    left, base, W = Point(*first[:4]), first[6], record.watch.instant.W
+    for k in range(t.size):
+        right = Point(t[k], *(x[k] for x in out[:3]))
+
+        def motion(x: float, left: Point = left, right: Point = right) -> tuple[Array, Array]:
+            if x == right.t:
+                return right.q, right.v
+            return between(record.packed.system, left, right, x)[:2]
+
+        def exact(x: float, ends: tuple[Point, Point] = (left, right)) -> tuple[Array, Array]:
+            return _projected(record, W, ends, x)
+
+        W.base[:] = base
+        try:
+            if record.watch.step(left.t, right.t, motion, exact):
+                return k, None
+        except (RomError, KeyboardInterrupt) as failure:
+            return k, failure
+        left, base = right, out[5][k]
+    return t.size, None
+
+
+def _finish(
+    record: Record,
+    W: Work,
+    forces: Laws,
+    state: State,
+    ends: tuple[Point, Point],
+    works: tuple[Array, Array],
+) -> None:
+    """Keep the instant of the event: in between, corrected to satisfy the constraints."""
+    (left, right), t = ends, record.stopped
+    W.base[:] = state.base
+    q, v = _projected(record, W, ends, t)
+    state = replace(state, t=t, q=q, v=v)
+    record.t, record.final = t, accelerated(record, W, state, forces, 0.0, np.zeros_like(v))
+    share = (t - left.t) / (right.t - left.t)
+    record.keep_state(record.final, works[0] + share * (works[1] - works[0]))

@@ -448,10 +448,9 @@ def advance(s, W, step, rank, signals, every, out):
             return answer
         if answer == CONVERGED:
             accept(s, W, step, rank)
-            if step.count[STEPS] % every == 0:
-                save(
-                    W, step, out, step.count[STEPS] // every - step.count[STEPS_BEFORE] // every - 1
-                )
+            done, before = step.count[STEPS], step.count[STEPS_BEFORE]
+            if done % every == 0:
+                save(W, step, out, done // every - before // every - 1)
     return CONVERGED
 
 

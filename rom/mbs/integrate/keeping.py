@@ -123,16 +123,6 @@ class Keeping:
             self._parts = int(manifest["parts"])
             origin = None if origin is None else float.fromhex(origin)
             noted = _noted(manifest["signs"], arrays)
-        self._refuse_others(digests)
-        state = unpacked_state(manifest, arrays, self.state)
-        if state.memory is None:
-            raise FileFormatError("the state has no memory of its run.", where=str(self.state))
-        parts = (self._part(k) for k in range(1, self._parts + 1))
-        blocks = _joined(list(parts), state.t)
-        self._blocks = len(blocks)
-        return Kept(origin, int(taken), state, state.memory, blocks, noted)
-
-    def _refuse_others(self, digests: Mapping[str, str]) -> None:
         ours = self._manifest["digests"]
         names = [name for name in {**ours, **digests} if ours.get(name) != digests.get(name)]
         if names:
@@ -141,10 +131,13 @@ class Keeping:
                 hint="Resume it with what it was begun with; t_end alone may differ. Or remove "
                 "the folder to begin anew.",
             )
-
-    def _part(self, k: int) -> Block:
-        _, arrays = read_archive(self._path(k), PART_KIND)
-        return tuple(arrays[name] for name in COLUMNS)
+        state = unpacked_state(manifest, arrays, self.state)
+        if state.memory is None:
+            raise FileFormatError("the state has no memory of its run.", where=str(self.state))
+        parts = [read_archive(self._path(k), PART_KIND)[1] for k in range(1, self._parts + 1)]
+        blocks = _joined([tuple(part[name] for name in COLUMNS) for part in parts], state.t)
+        self._blocks = len(blocks)
+        return Kept(origin, int(taken), state, state.memory, blocks, noted)
 
     def _path(self, k: int) -> Path:
         return self.folder / f"part-{k:06d}.npz"
@@ -189,10 +182,8 @@ class Keeping:
         write_archive(self.state, manifest | more, arrays | events, "the state")
         self._parts, self._blocks = parts, count
         now = perf_counter()
-        pause = max(
-            MIN_INTERVAL, WRITE_TIME_FACTOR * (now - begun), MAX_LOSS_RATIO * (now - self._first)
-        )
-        self._next = now + pause
+        least = WRITE_TIME_FACTOR * (now - begun), MAX_LOSS_RATIO * (now - self._first)
+        self._next = now + max(MIN_INTERVAL, *least)
 
     def remove(self) -> None:
         """Remove what was kept, once the motion is written elsewhere."""
@@ -211,9 +202,7 @@ def digests_of(packed: Packed, arguments: Mapping[str, Any]) -> dict[str, str]:
     tables = (packed.system, *packed.elements.values())
     for A in (*(A for table in tables for A in _numbers(table)), packed.q, packed.v):
         hashed.update(digest(A).encode())
-    return {name: repr(value) for name, value in arguments.items()} | {
-        "mechanism": hashed.hexdigest()
-    }
+    return {**{name: repr(x) for name, x in arguments.items()}, "mechanism": hashed.hexdigest()}
 
 
 def _numbers(table: Table) -> list[Array]:
@@ -241,13 +230,13 @@ def until(block: Block, t: float) -> Block:
 
 def _arrays(noted: Noted) -> dict[str, Array]:
     """What happened, by the names of the events."""
-    out = {}
-    for k, (name, items) in enumerate(noted.found.items()):
-        for part, what in enumerate(("t", "q", "v")):
-            rows = [item[part] for item in items[: noted.counts[name]]]
-            if rows:
-                out[f"{EVENTS_PREFIX}{k}/{what}"] = np.array(rows, dtype=float)
-    return out
+    happened = (items[: noted.counts[name]] for name, items in noted.found.items())
+    return {
+        f"{EVENTS_PREFIX}{k}/{what}": np.array([item[part] for item in items], dtype=float)
+        for k, items in enumerate(happened)
+        if items
+        for part, what in enumerate("tqv")
+    }
 
 
 def _noted(signs: Sequence[tuple[str, float]] | None, arrays: Mapping[str, Array]) -> Noted | None:
@@ -255,6 +244,6 @@ def _noted(signs: Sequence[tuple[str, float]] | None, arrays: Mapping[str, Array
         return None
     found: dict[str, list[tuple[float, Array, Array]]] = {}
     for k, (name, _) in enumerate(signs):
-        columns = [arrays.get(f"{EVENTS_PREFIX}{k}/{what}", ()) for what in ("t", "q", "v")]
+        columns = [arrays.get(f"{EVENTS_PREFIX}{k}/{what}", ()) for what in "tqv"]
         found[name] = [(float(t), q, v) for t, q, v in zip(*columns, strict=True)]
     return Noted(dict(signs), {name: len(items) for name, items in found.items()}, found)

@@ -57,19 +57,19 @@ class Settings:
                 hint="It is the time at the end, not how long the motion lasts.",
             )
         self._check_kind()
-        self._check_steps()
+        self._check_steps(self.t_end - self.t_start)
 
-    def _check_steps(self) -> None:
+    def _check_steps(self, duration: float) -> None:
         """Steps must be told apart by the clock, and come to an end."""
-        if self.dt is not None and not (self.t_end - self.t_start) / self.dt <= MAX_STEPS:
+        if self.dt is not None and not duration / self.dt <= MAX_STEPS:
             raise ConfigError(
-                f"dt = {self.dt:g} s takes {(self.t_end - self.t_start) / self.dt:.3g} steps to "
-                f"t_end = {self.t_end:g} s; at most {MAX_STEPS:.0e} are taken.",
+                f"dt = {self.dt:g} s takes {duration / self.dt:.3g} steps to t_end = "
+                f"{self.t_end:g} s; at most {MAX_STEPS:.0e} are taken.",
                 hint="Take longer steps. They need to resolve what moves, not more.",
             )
         end = max(abs(self.t_start), abs(self.t_end))
-        step = FIRST_STEP_RATIO * (self.t_end - self.t_start) if self.dt is None else self.dt
-        if end + step == end or not np.isfinite(self.t_end - self.t_start):
+        step = FIRST_STEP_RATIO * duration if self.dt is None else self.dt
+        if end + step == end or not np.isfinite(duration):
             what = "the first step" if self.dt is None else "dt"
             raise ConfigError(
                 f"{what} = {step:g} s is lost beside t = {end:g} s: numbers have sixteen digits.",
@@ -85,11 +85,7 @@ class Settings:
         return {"method": self.method, **exact, "stabilised": self.stabilised}
 
     def check_room(self, packed: Packed) -> None:
-        """Refuse to keep more instants than memory holds, before any of them is computed.
-
-        Raises:
-            ResourceError: with their number and size.
-        """
+        """Refuse to keep more instants than memory holds, before any of them is computed."""
         rows = 2 + (0 if self.dt is None else self.steps // int(self.save_every))
         signals, followed = len(packed.signals), packed.followed
         wide = 4 + packed.q.size + 2 * packed.v.size + packed.system.rows.kind.size + followed
@@ -107,13 +103,11 @@ class Settings:
         """Order and stabilisation must be offered by the method."""
         if self.order != 2 and self.method != "bdf":
             raise ConfigError(
-                f"{self.method} has one order; order = {self.order} is for bdf only.",
-                hint='Leave it out, or take method="bdf".',
+                f"order = {self.order} is for bdf only.", hint='Leave it out, or take method="bdf".'
             )
         if self.order != 2 and self.dt is None:
             raise ConfigError(
-                f"bdf of order {self.order} needs steps of one length dt; steps of chosen length "
-                "have order two."
+                f"order = {self.order} needs steps of one length dt; chosen ones have order two."
             )
         if self.stabilised and self.method == "dop853":
             raise ConfigError(
@@ -150,9 +144,8 @@ class Settings:
         if self.dt is None:
             return duration
         round_off = 1e-13 * duration + 1e-15 * (abs(self.t_start) + abs(self.t_end))
-        return (
-            self.dt if abs(self.steps * self.dt - duration) < round_off else duration / self.steps
-        )
+        whole = abs(self.steps * self.dt - duration) < round_off
+        return self.dt if whole else duration / self.steps
 
     @property
     def spacing(self) -> float:
@@ -233,17 +226,17 @@ class Record:
     def keep_state(self, state: State, work: Array) -> None:
         """Add a state as a saved instant."""
         arrays: tuple[Any, ...] = (state.q, state.v, state.a, state.lam, work, state.base)
-        self.keep(np.array([state.t]), *(x[None].copy() for x in arrays))
+        self.keep(state.t, *(x[None].copy() for x in arrays))
 
     def start(self, state: State, work: Array) -> None:
         """Save the first instant, unless the run goes on behind what it kept already."""
         self.t = state.t
         if not self.blocks:
             self.keep_state(state, work)
-        if self.watch and self.noted is None:
-            self.watch.begin(state)
-        elif self.watch and self.noted:
+        if self.watch and self.noted:
             self.watch.recall(self.noted)
+        elif self.watch:
+            self.watch.begin(state)
         self.reach(state)
 
     def stand_still(self, state: State) -> None:
@@ -265,11 +258,9 @@ class Record:
     def keep_last(self) -> None:
         """Save the last state of a run that ends early, if it lies behind what was saved."""
         f = self.final
-        if f.memory is None or not f.t > self.blocks[-1][0][-1]:
-            return
-        arrays = f.memory.arrays
-        work = arrays["y"][-3:] if "y" in arrays else arrays["work"]
-        self.keep_state(f, work)
+        if f.memory is not None and f.t > self.blocks[-1][0][-1]:
+            arrays = f.memory.arrays
+            self.keep_state(f, arrays["y"][-3:] if "y" in arrays else arrays["work"])
 
     @property
     def stopped(self) -> float | None:
@@ -288,20 +279,14 @@ class Record:
             self.progress.reach(self.t - self.settings.t_start, f"t = {self.t:.6g} s")
 
     def solution(self, status: str, *, failed: bool = False) -> Solution:
-        """The motion so far.
-
-        Args:
-            status: how it ended.
-            failed: prescribed functions that fail now are not a number where they do.
-        """
+        """The motion so far; of one that failed, prescribed functions are NaN where they do."""
         if self.progress is not None:
             self.progress.end()
         pieces = zip(*self.blocks, strict=True)
         t, q, v, a, lam, work, base = (np.concatenate(piece) for piece in pieces)
         signals = np.full((t.size, len(self.packed.signals), 3), np.nan)
-        table, failure = sampled(
-            self.packed.signals, padded(t), self.settings.span, self.settings.spacing
-        )
+        span, spacing = self.settings.span, self.settings.spacing
+        table, failure = sampled(self.packed.signals, padded(t), span, spacing)
         if failure is not None and not failed:
             raise failure
         signals[: len(table)] = table[: t.size]

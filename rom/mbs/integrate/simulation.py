@@ -172,8 +172,6 @@ def release(mechanism: Mechanism, state: State, *, assemble: bool = False) -> St
         ModelError: naming a joint that is open there.
     """
     packed = pack(mechanism)
-    if not isinstance(state, State):
-        raise ConfigError(f"{state!r} is no State.", hint="Take rom.equilibrium(...) or sol.final.")
     check_state(state, packed, joints=False)
     placed = replace(packed, q=state.q.copy(), v=state.v.copy())
     return initial_state(placed, state.t, assemble=assemble)
@@ -197,31 +195,28 @@ def _moved(record: Record, t_start: float) -> Solution:
         record.stand_still(state)
     else:
         run(record, workspace(packed.system, len(packed.signals)), state)
-    stopped = "" if record.watch is None else record.watch.sentence
-    solution = record.solution(stopped or f"Reached t = {settings.t_end:g} s.")
+    stop = record.watch.stop if record.watch else None
+    reached = f"Reached t = {settings.t_end:g} s."
+    stopped = "Stopped by event {!r} at t = {:.9g} s."
+    solution = record.solution(stopped.format(*stop) if stop else reached)
     warn_of_limits(solution)
     warn_of_failures(solution)
     return solution
 
 
 def _go_on(record: Record, keeping: Keeping) -> None:
-    """Let the record stand where an interrupted run left what it kept.
-
-    Raises:
-        ConfigError: if that was another run, or another end would change its steps.
-    """
+    """Let the record stand where an interrupted run left what it kept."""
     settings = record.settings
-    digests = digests_of(record.packed, settings.arguments)
-    keeping.begin(settings.origin, settings.taken, digests)
+    keeping.begin(settings.origin, settings.taken, digests_of(record.packed, settings.arguments))
     if not keeping.resume:
         return
     kept = keeping.read()
-    memory, begun = kept.memory, kept.memory.taken - kept.taken
-    if settings.dt is not None and kept.state.t < settings.t_end and memory.h != settings.h:
+    h, begun = kept.memory.h, kept.memory.taken - kept.taken
+    if settings.dt is not None and kept.state.t < settings.t_end and h != settings.h:
         raise ConfigError(
             f"t_end = {settings.t_end:g} s would change the steps of the interrupted run from "
-            f"{memory.h:.9g} s to {settings.h:.9g} s: it cannot go on.",
-            hint=f"Take its own t_end, or a multiple of {memory.h:.9g} s.",
+            f"{h:.9g} s to {settings.h:.9g} s: it cannot go on.",
+            hint=f"Take its own t_end, or a multiple of {h:.9g} s.",
         )
     record.settings = replace(settings, origin=kept.origin, taken=kept.taken, begun=begun)
     record.given, record.blocks, record.noted = kept.state, kept.blocks, kept.noted
@@ -237,8 +232,7 @@ def _translated(raised: BaseException, record: Record) -> Any:
     if isinstance(raised, MemoryError):
         return ResourceError(
             f"the memory ran out at t = {record.t:.6g} s.",
-            hint="Keep fewer instants (save_every). The motion up to there is kept in "
-            "error.solution.",
+            hint="Keep fewer instants (save_every). error.solution is the motion up to there.",
         )
     return raised
 

@@ -28,6 +28,9 @@ FACTOR_FIELDS = (
 FACTOR_COUNTS = (alpha.LAST_ITERATIONS, alpha.HAS_FACTOR, alpha.FACTOR_USES)
 # counts of a whole run
 RUN_COUNTS = (alpha.STEPS, alpha.ITERATIONS, alpha.FACTORISATIONS)
+# of the step itself, and what memories call its algorithmic accelerations
+STEP_FIELDS = {name: name for name in ("method", "bdf", "psi", "past", "work", "lost")}
+STEP_FIELDS["before"] = "a"
 
 
 def begin(record: Record, W: Work, state: State, forces: Laws, h: float) -> tuple[Step, State]:
@@ -68,25 +71,30 @@ def begin(record: Record, W: Work, state: State, forces: Laws, h: float) -> tupl
     copies = (x.copy() for x in (state.q, v, before, state.a, state.lam))
     count, work = np.zeros(12, dtype=np.int64), np.zeros(3)
     count[alpha.USES_LAWS], count[alpha.BOTH_LEVELS] = bool(forces), settings.both
-    power = _power(record, W, state, forces)
+    signals_at(record, W, state.t)
+    evaluate(record.packed.system, W, state.q, state.v)
+    apply_laws(forces, W, state.t)
+    with_accelerations(record.packed, W, state)
+    power = W.power.copy()  # of drives, forces and dampers
     past = np.zeros((2, weights.size - 2, n))
     step = Step(*copies, *zeros, work, power, count, size, method, weights, past, np.zeros(n))
     link(step)
-    if goes_on:
-        recall(state.memory, W, step)
-    if goes_on and settings.begun:
-        W.base[:] = state.base
-        go_on(state.memory, step)
-    return step, state if goes_on else replace(state, memory=None)
+    if not goes_on:
+        return step, replace(state, memory=None)
+    recall(state.memory, W, step)
+    if settings.begun:  # counts and works go on from those of a run that was interrupted
+        W.base[:], kept = state.base, state.memory.arrays
+        step.work[:], step.lost[:] = kept["work"], kept["lost"]
+        step.count[list(RUN_COUNTS)] = kept["counts"]
+    return step, state
 
 
 def _method(settings: Settings, h: float) -> tuple[Array, Array]:
     """The five numbers of the method, and its weights if it is BDF."""
     if settings.method != "bdf":
         return alpha.coefficients(h, settings.rho_inf), np.zeros(3)
-    if settings.order == 2:
-        return alpha.bdf_coefficients(h, h)
-    return multistep_coefficients(h, settings.order)
+    order = settings.order
+    return alpha.bdf_coefficients(h, h) if order == 2 else multistep_coefficients(h, order)
 
 
 def shift_ahead(record: Record, state: State, method: Array, jerk: Array) -> Array:
@@ -108,35 +116,23 @@ def across(record: Record, W: Work, state: State, shift: Array) -> Array:
     """The part of a velocity that changes the gaps of the constraints."""
     linearize_constraints(record.packed.system, W, state.q, state.v)
     if record.packed.by_blocks:
-        return _across_by_blocks(record, W, shift)
+        system, gap = record.packed.system, np.zeros(W.value.size)
+        if not factorised(system, W, 0.0):
+            raise SolverError("the equations of motion are singular where constraints are met.")
+        gradient_times(system, W, shift, False, gap)
+        return least_motion(system, W, gap)
     A = W.G @ np.linalg.solve(W.S, W.G.T)
     rolling = record.packed.system.rows.kind == ROLL  # velocities across these are zero already
     y = np.linalg.lstsq(A, np.where(rolling, 0.0, W.G @ shift), rcond=1e-10)[0]
     return np.linalg.solve(W.S, W.G.T @ y)
 
 
-def _across_by_blocks(record: Record, W: Work, shift: Array) -> Array:
-    """The same from the blocks of masses and gradients at hand."""
-    system, gap = record.packed.system, np.zeros(W.value.size)
-    if not factorised(system, W, 0.0):
-        raise SolverError("the equations of motion are singular where constraints are met.")
-    gradient_times(system, W, shift, False, gap)
-    return least_motion(system, W, gap)
-
-
 def remember(settings: Settings, W: Work, step: Step, steps: int) -> Memory:
     """All that the next step depends on and the state does not tell."""
     names = (*FACTOR_FIELDS, "factor" if W.by_blocks[0] else "lu")
     arrays = {name: getattr(W, name).copy() for name in names}
-    arrays["method"], arrays["bdf"] = step.method.copy(), step.bdf.copy()
-    arrays["before"], arrays["psi"], arrays["past"] = (
-        step.a.copy(),
-        step.psi.copy(),
-        step.past.copy(),
-    )
-    arrays["count"] = step.count[list(FACTOR_COUNTS)]
-    arrays["work"], arrays["lost"] = step.work.copy(), step.lost.copy()
-    arrays["counts"] = step.count[list(RUN_COUNTS)]
+    arrays |= {name: getattr(step, field).copy() for name, field in STEP_FIELDS.items()}
+    arrays["count"], arrays["counts"] = (step.count[list(k)] for k in (FACTOR_COUNTS, RUN_COUNTS))
     origin = settings.t_start if settings.origin is None else settings.origin
     return Memory(settings.kind, settings.h, origin, settings.taken + steps, arrays)
 
@@ -150,12 +146,6 @@ def recall(memory: Memory, W: Work, step: Step) -> None:
     step.count[list(FACTOR_COUNTS)] = memory.arrays["count"]
 
 
-def go_on(memory: Memory, step: Step) -> None:
-    """Count steps and works on from those of a run that was interrupted."""
-    step.work[:], step.lost[:] = memory.arrays["work"], memory.arrays["lost"]
-    step.count[list(RUN_COUNTS)] = memory.arrays["counts"]
-
-
 def copied(step: Step) -> Step:
     """A step memory of its own with the same content."""
     return Step(*(x.copy() for _, x in step.items()))
@@ -164,21 +154,8 @@ def copied(step: Step) -> Step:
 def fits(memory: Memory | None, method: Array, weights: Array) -> bool:
     """Whether what is remembered belongs to the same method and step."""
     kept = {} if memory is None else memory.arrays
-    same = (
-        np.array_equal(kept.get("method", ()), method),
-        np.array_equal(kept.get("bdf"), weights),
-    )
-    return all(same)
-
-
-def _power(record: Record, W: Work, state: State, forces: Laws) -> Array:
-    """(3,) powers of drives, forces and dampers at a state."""
-    system = record.packed.system
-    signals_at(record, W, state.t)
-    evaluate(system, W, state.q, state.v)
-    apply_laws(forces, W, state.t)
-    with_accelerations(record.packed, W, state)
-    return W.power.copy()
+    wanted = {"method": method, "bdf": weights}
+    return all(np.array_equal(kept.get(name, ()), x) for name, x in wanted.items())
 
 
 def signals_at(record: Record, W: Work, t: float) -> None:

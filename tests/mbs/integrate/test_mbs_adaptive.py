@@ -22,7 +22,7 @@ from cases.mbs.motions import (
     wound_drive,
 )
 from rom.errors import ModelError, SolverError
-from rom.mbs.integrate import adaptive_step
+from rom.mbs.integrate import adaptive_step, fixed_step
 from rom.mbs.integrate.run import Record
 from rom.mbs.integrate.simulation import simulate
 from rom.mbs.mechanism import Mechanism
@@ -112,8 +112,8 @@ def test_how_many_steps_a_call_takes_changes_no_bit(build, t_end, rtol, options,
     """Nor where it stops between two steps for something outside."""
     runs = []
     for most in (1, 2, 4096):
-        monkeypatch.setattr(adaptive_step, "LARGEST_CHUNK", most)
-        monkeypatch.setattr(adaptive_step, "FIRST_CHUNK", most)
+        monkeypatch.setattr(fixed_step, "LARGEST_CHUNK", most)
+        monkeypatch.setattr(fixed_step, "FIRST_CHUNK", most)
         runs.append(simulate_quietly(build(), t_end=t_end, rtol=rtol, **options))
     for run in runs[1:]:
         for name in (*PARTS, "work"):
@@ -171,8 +171,8 @@ def test_a_step_that_breaks_gives_back_all_that_it_had_changed(method, monkeypat
     """The factors, too: what is remembered is what a run by single steps remembers there."""
     options, found = {"t_end": 0.3, "rtol": 1e-4, "method": method}, {}
     with monkeypatch.context() as patch:
-        patch.setattr(adaptive_step, "FIRST_CHUNK", 1)
-        patch.setattr(adaptive_step, "LARGEST_CHUNK", 1)
+        patch.setattr(fixed_step, "FIRST_CHUNK", 1)
+        patch.setattr(fixed_step, "LARGEST_CHUNK", 1)
         patch.setattr(Record, "pause", lambda self: found.update({self.t: self.final.memory}))
         count = Brake(pushes_at=0.18)
         simulate(braked(count, pendulum), **options)
