@@ -23,7 +23,7 @@ from rom.components.hand.compliant_hand import STOP_STIFFNESS_RATIO, Finger, han
 from rom.components.hand.solid_finger import STEEL_DENSITY, heavy_spring
 from rom.errors import ConfigError, ModelError
 from rom.mbs.analysis.equilibrium import equilibrium
-from rom.mbs.analysis.snapshot import snapshot
+from rom.mbs.analysis.local_equations import snapshot
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.parts.bodies import Marker, Part
 from rom.model import Array

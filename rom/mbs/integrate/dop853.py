@@ -15,8 +15,8 @@ from scipy.integrate import DOP853, solve_ivp
 
 from rom import rotation
 from rom.errors import ConfigError, SolverError
-from rom.mbs.equations.equations import evaluate, rates
 from rom.mbs.elements.family import apply_laws
+from rom.mbs.equations.equations import evaluate, rates
 from rom.mbs.integrate.consistent_start import assembled, fitting_velocity
 from rom.mbs.integrate.run import RUN_KEY, Record, standing_at
 from rom.mbs.kernels.work import STEPS, Step, Work
