@@ -14,8 +14,8 @@ from cases.paths import RANKS
 from cases.ranks.environment import on_ranks
 from cases.solid import STEEL, block
 from rom.body.reference import rigid_elastic
+from rom.components.families.affine import StretchedModel
 from rom.components.families.layers import Stretch
-from rom.components.families.stretched import StretchedModel
 from rom.eigen.verbs import rigid_motions
 from rom.errors import FileFormatError, ParameterError
 
