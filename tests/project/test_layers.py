@@ -82,7 +82,7 @@ ORDER = {
         ),
         "components.updating": (
             "frf_data measured responses airframe models methods family_model normal_equations "
-            "equations verdict estimate comparison placement observers pictures verb field"
+            "verdict estimate comparison placement observers pictures verb field"
         ),
         "components.journal_bearing": ("films closed_forms oil_film statics oil record keys field"),
         "body": (
