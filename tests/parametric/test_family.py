@@ -11,6 +11,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.optimize import brentq
 
 import rom
+from cases.components.updating import refuse
 from cases.paths import ROOT
 from cases.solid import STEEL, block, composite
 from rom.body.reference import rigid_elastic
@@ -44,11 +45,16 @@ def made(E_web=1.0, rho_all=1.0, rho_web=1.0):
     return composite(materials, lambda c: "web" if c[0] < 4 else "rest", SIZE, CELLS, ORIGIN)
 
 
+def family_of(parameters, n_modes, model=None, **options):
+    """The family of the block, or of another model, by Craig and Bampton."""
+    model, method = made() if model is None else model, rom.CraigBampton(n_modes)
+    options = {"method": method, "interfaces": KINDS} | options
+    return rom.reduce_parametric(model, parameters=parameters, **options)
+
+
 @pytest.fixture(scope="module")
 def family():
-    return rom.reduce_parametric(
-        made(), parameters=PARAMETERS, method=rom.CraigBampton(24), interfaces=KINDS, tol=TOL
-    )
+    return family_of(PARAMETERS, 24, tol=TOL)
 
 
 def two_boxes(rho_all, rho_web, E_web):
@@ -106,9 +112,7 @@ def test_two_rods_in_a_row_ring_as_the_closed_form_says():
     size, cells = (1.0, 0.02, 0.02), (80, 1, 1)
     model = composite({"pad": soft, "rod": hard}, lambda c: ("pad", "rod")[c[0] >= 32], size, cells)
     parameters = {"E": rom.YoungsModulus("pad", 0.5, 4.0), "rho": rom.Density("rod", 0.5, 2.0)}
-    family = rom.reduce_parametric(
-        model, parameters=parameters, method=rom.CraigBampton(40), interfaces=KINDS, certify=False
-    )
+    family = family_of(parameters, 40, model, certify=False)
     for E, rho in ((0.6, 0.7), (1.0, 1.0), (3.5, 1.7)):
         k1, k2 = np.sqrt(1200.0 / (E * 3e9)), np.sqrt(rho * 2700.0 / 70e9)
 
@@ -124,9 +128,7 @@ def test_two_rods_in_a_row_ring_as_the_closed_form_says():
 
 def test_all_moduli_times_s_raise_frequencies_by_its_root():
     parameters = {"E": rom.YoungsModulus(None, 0.1, 10.0), "rho": rom.Density(None, 0.1, 10.0)}
-    family = rom.reduce_parametric(
-        made(), parameters=parameters, method=rom.CraigBampton(8), interfaces=KINDS
-    )
+    family = family_of(parameters, 8)
     assert len(family.provenance["reduction"]["points sampled"]) == 1
     nominal = family.at().frequencies()[6:]
     for s in (0.1, 0.37, 7.0):
@@ -157,10 +159,7 @@ def test_the_frame_follows_its_condition_at_every_point(family, reference):
 def test_what_interfaces_carry_keeps_its_mass():
     carried = rom.Attachment("tip", 3.0, np.diag([0.01, 0.02, 0.03]), at=(1.35, -0.15, 0.14))
     model = replace(made(), attachments=(carried,))
-    parameters = {"rho": rom.Density(None, 0.5, 2.0)}
-    family = rom.reduce_parametric(
-        model, parameters=parameters, method=rom.CraigBampton(24), interfaces=KINDS
-    )
+    family = family_of({"rho": rom.Density(None, 0.5, 2.0)}, 24, model)
     assert family.certificate.ok, family.certificate
     for rho in (0.5, 1.4):
         body, other = family.at(rho=rho), replace(made(rho_all=rho), attachments=(carried,))
@@ -189,21 +188,14 @@ def test_the_certificate_compares_away_from_the_points_sampled(family):
     assert len(sampled) >= 5
     for where in tables:
         assert all(f"E_web = {point['E_web']:.4g}," not in where for point in sampled[:5])
-    poor = rom.reduce_parametric(
-        made(), parameters=PARAMETERS, method=rom.CraigBampton(2), interfaces=KINDS, tol=TOL
-    )
-    assert not poor.certificate.ok
+    assert not family_of(PARAMETERS, 2, tol=TOL).certificate.ok
 
 
 def test_points_between_join_where_the_estimate_says_so(monkeypatch):
     """Without the corners one basis must not do for a range of a million."""
     monkeypatch.setattr(rom.components.families.reduce, "corners", lambda *_: [])
     wide = {"E": rom.YoungsModulus("web", 1e-3, 1e3)}
-    arguments = {"parameters": wide, "interfaces": KINDS, "certify": False}
-    coarse, fine = (
-        rom.reduce_parametric(made(), method=rom.CraigBampton(30), tol=tol, **arguments)
-        for tol in (0.99, TOL)
-    )
+    coarse, fine = (family_of(wide, 30, tol=tol, certify=False) for tol in (0.99, TOL))
     points = [len(f.provenance["reduction"]["points sampled"]) for f in (coarse, fine)]
     assert points[0] == 1 and points[1] > 1
     E = fine.provenance["reduction"]["points sampled"][-1]["E"]
@@ -229,31 +221,19 @@ def test_factors_outside_the_range_are_refused_or_announced(family):
 
 
 def test_wrong_parameters_are_named():
-    with pytest.raises(ParameterError, match="YoungsModulus of web: needed is"):
-        rom.YoungsModulus("web", 2.0, 1.0)
-    with pytest.raises(ParameterError, match="low of Density of the whole body = nan"):
-        rom.Density(None, np.nan, 1.0)
-    arguments = {"method": rom.CraigBampton(2), "interfaces": KINDS}
-    half = rom.Density("web", 0.5, 1.0)
-    for parameters, what in (
-        ({}, "needs a parameter"),
-        ({"rho": 2.0}, r"parameters\['rho'\] = 2.0 must be of type Parameter"),
-        ({"2rho": half}, "'2rho' names no parameter"),
-        (
-            {"rho": rom.Density("wbe", 0.5, 1.0)},
-            r"no region 'wbe'; the model has \['rest', 'web'\]",
-        ),
-    ):
-        with pytest.raises(ConfigError, match=what):
-            rom.reduce_parametric(made(), parameters=parameters, **arguments)
-    with pytest.raises(ConfigError, match="tol = 0 must be above 0"):
-        rom.reduce_parametric(made(), parameters={"rho": half}, tol=0, **arguments)
-    with pytest.raises(ConfigError, match="which this method does not keep"):
-        rom.reduce_parametric(
-            made(), parameters={"rho": half}, method=rom.FreeFree(4), interfaces=KINDS
-        )
-    with pytest.raises(ParameterError, match=r"no region 'web'; the model has \[\]"):
-        rom.reduce_parametric(block(), parameters={"rho": half}, **arguments)
+    half, other = ({"rho": rom.Density(name, 0.5, 1.0)} for name in ("web", "wbe"))
+    refuse(
+        (lambda: rom.YoungsModulus("web", 2.0, 1.0), "YoungsModulus of web: needed is"),
+        (lambda: rom.Density(None, np.nan, 1.0), "low of Density of the whole body = nan"),
+        (lambda: family_of({"2rho": half["rho"]}, 2), "'2rho' names no parameter"),
+        (lambda: family_of(other, 2), r"no region 'wbe'; the model has \['rest', 'web'\]"),
+        (lambda: family_of(half, 2, block()), r"no region 'web'; the model has \[\]"),
+        (lambda: family_of({}, 2), ConfigError, "needs a parameter"),
+        (lambda: family_of({"rho": 2.0}, 2), ConfigError, r"\['rho'\] = 2.0 must be of type Param"),
+        (lambda: family_of(half, 2, tol=0), ConfigError, "tol = 0 must be above 0"),
+        (lambda: family_of(half, 2, method=rom.FreeFree(4)), ConfigError, "does not keep"),
+        error=ParameterError,
+    )
 
 
 def test_a_family_read_equals_the_one_written(family, tmp_path):

@@ -30,14 +30,12 @@ def model():
 
 @pytest.fixture(scope="module")
 def family(model):
-    return rom.reduce_parametric(
-        model,
-        parameters=PARAMETERS,
-        method=rom.CraigBampton(30),
-        interfaces=KINDS,
-        stress=True,
-        tol=5e-3,
-    )
+    return family_of(model, stress=True)
+
+
+def family_of(model, **options):
+    method, options = rom.CraigBampton(30), {"interfaces": KINDS, "tol": 5e-3} | options
+    return rom.reduce_parametric(model, parameters=PARAMETERS, method=method, **options)
 
 
 @pytest.mark.long
@@ -98,14 +96,7 @@ def test_petsc_and_scipy_say_the_same(model, family):
     plain = replace(model, operators=None, regions=regions, stresses=None)
     assert isinstance(mesh_operators(plain), SciPyOperators)
     assert np.abs(regions["core"].K @ rigid_motions(model.points)).max() < 1e-3
-    other = rom.reduce_parametric(
-        plain,
-        parameters=PARAMETERS,
-        method=rom.CraigBampton(30),
-        interfaces=KINDS,
-        tol=5e-3,
-        certify=False,
-    )
+    other = family_of(plain, certify=False)
     found, expected = (f.at(**POINT).frequencies(16)[6:] for f in (other, family))
     assert_allclose(found, expected, rtol=1e-8)
 
@@ -126,11 +117,9 @@ def test_a_sweep_never_returns_to_the_finite_elements(family, monkeypatch):
     def gone(*arguments, **options):
         raise AssertionError("the finite elements were asked")
 
+    operators = rom.fe.operators.petsc.PETScOperators
     for owner, names in (
-        (
-            rom.fe.operators.petsc.PETScOperators,
-            ("apply_K", "apply_M", "gram", "hold", "modes", "varied"),
-        ),
+        (operators, ("apply_K", "apply_M", "gram", "hold", "modes", "varied")),
         (rom.fe.operators.factor.Factor, ("__init__", "solve")),
         (rom.fe.forms.stress.Stresses, ("__init__", "at_nodes")),
         (rom.fe.elasticity, ("assemble", "assemble_matrix", "model")),

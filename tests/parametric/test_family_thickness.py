@@ -8,14 +8,15 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.sparse import csr_matrix
 
 import rom
+from cases.components.updating import refuse
 from cases.layers import KINDS, LAYERS, families, panel
 from cases.long import ROM_LONG, SHARED_BY
 from cases.paths import RANKS
 from cases.ranks.environment import on_ranks
 from cases.solid import STEEL, block
 from rom.body.reference import rigid_elastic
+from rom.components.families.affine import StretchedModel
 from rom.components.families.layers import Stretch
-from rom.components.families.stretched import StretchedModel
 from rom.eigen.verbs import rigid_motions
 from rom.errors import FileFormatError, ParameterError
 
@@ -45,6 +46,11 @@ def layered(material, axis, size, cells, origin):
     return replace(model, regions={"all": region})
 
 
+def family_of(model, parameters, n_modes, **options):
+    method, options = rom.CraigBampton(n_modes), {"interfaces": KINDS} | options
+    return rom.reduce_parametric(model, parameters=parameters, method=method, **options)
+
+
 @pytest.mark.parametrize("axis", [1, 2])
 def test_a_block_of_another_thickness(axis):
     """Plain matrices, away from the origin; inertia in closed form, frequencies of a new block."""
@@ -54,9 +60,7 @@ def test_a_block_of_another_thickness(axis):
         "t": rom.Thickness("all", 0.5, 2.0, axis=AXES[axis]),
         "E": rom.YoungsModulus("all", 0.5, 2.0),
     }
-    family = rom.reduce_parametric(
-        model, parameters=parameters, method=rom.CraigBampton(40), interfaces=KINDS
-    )
+    family = family_of(model, parameters, 40)
     assert family.certificate.ok, family.certificate
     for t, E in ((0.55, 1.0), (1.0, 1.3), (1.9, 0.6)):
         length, low = np.array(size), np.array(origin)
@@ -91,11 +95,8 @@ def test_with_all_modes_every_integral_is_that_of_the_stretched_block(reference)
     """Two square bases span the same; sums over mass-normalised coordinates do not see which."""
     size, cells, origin = (0.6, 0.1, 0.08), (3, 1, 1), (0.1, -0.03, -0.02)
     model = layered(STEEL, 2, size, cells, origin)
-    family = rom.reduce_parametric(
-        model, parameters={"t": rom.Thickness(None, 0.5, 2.0)}, method=rom.CraigBampton(24),
-        interfaces=KINDS, reference=reference, certify=False,
-    )  # fmt: skip
-    t = 1.6
+    t, thickness = 1.6, {"t": rom.Thickness(None, 0.5, 2.0)}
+    family = family_of(model, thickness, 24, reference=reference, certify=False)
     again = block((0.6, 0.1, 0.08 * t), cells, STEEL, (0.1, -0.03, -0.02 * t))
     full = rom.reduce(
         again, method=rom.CraigBampton(24), interfaces=KINDS, reference=reference, certify=False
@@ -119,10 +120,7 @@ def test_shapes_and_markers_are_those_of_the_thickness_it_has():
     """Bodies that move with an interface: the marker follows the nodes, rigid at its thickness."""
     size, cells, origin = (1.0, 0.1, 0.08), (6, 2, 2), (0.0, -0.03, -0.04)
     model = layered(STEEL, 2, size, cells, origin)
-    family = rom.reduce_parametric(
-        model, parameters={"t": rom.Thickness(None, 0.5, 2.0)}, method=rom.CraigBampton(6),
-        interfaces=KINDS, certify=False,
-    )  # fmt: skip
+    family = family_of(model, {"t": rom.Thickness(None, 0.5, 2.0)}, 6, certify=False)
     body = family.at(t=1.7)
     for name, x in (("root", 0.0), ("tip", 1.0)):
         marker = body.marker(name)
@@ -157,41 +155,30 @@ def test_points_follow_their_layers():
 def test_what_thickness_does_not_go_with_is_named():
     model = layered(STEEL, 2, (1.0, 0.1, 0.08), (4, 1, 1), (0.0, 0.0, 0.0))
     half = {"t": rom.Thickness(None, 0.5, 1.0)}
-    arguments = {"parameters": half, "method": rom.CraigBampton(2)}
-    cases = (
-        (model, KINDS | {"tip": "full"}, {}, "interface 'tip' has the kind 'full'"),
-        (model, KINDS, {"stress": True}, "stress is not recovered"),
-        (
-            replace(model, attachments=(rom.Attachment("tip", 1.0),)),
-            KINDS,
-            {},
-            "attached masses",
-        ),
-        (replace(model, regions={}), KINDS, {}, "do not tell how they are stretched"),
-        (replace(model, K=2 * model.K), KINDS, {}, "are not the whole model"),
-    )
-    for case, kinds, more, what in cases:
-        with pytest.raises(ParameterError, match=what):
-            rom.reduce_parametric(case, interfaces=kinds, **arguments, **more)
-    part = rom.Region(
-        model.K, model.M, stretched=lambda _: rom.Layered(((0.0, 0.02),), *[model.K] * 3)
-    )
+    carrying = replace(model, attachments=(rom.Attachment("tip", 1.0),))
+    bare, more = replace(model, regions={}), replace(model, K=2 * model.K)
+    rib = lambda _: rom.Layered(((0.0, 0.02),), *[model.K] * 3)  # noqa: E731
+    part = rom.Region(model.K, model.M, stretched=rib)
     beside = replace(model, regions=model.regions | {"rib": part})
-    with pytest.raises(ParameterError, match=r"'rib' is no layer of its own: 'all' lies beside it"):
-        StretchedModel(beside, {"t": rom.Thickness("rib", 0.5, 1.0)})
-    with pytest.raises(ParameterError, match="the whole body = 'w' is none of 'x', 'y', 'z'"):
-        rom.Thickness(None, 0.5, 1.0, axis="w")
-    with pytest.raises(ParameterError, match="choose one axis"):
-        both = half | {"u": rom.Thickness(None, 0.5, 1.0, axis="x")}
-        rom.reduce_parametric(model, parameters=both, method=rom.CraigBampton(2), interfaces=KINDS)
+    rib = {"t": rom.Thickness("rib", 0.5, 1.0)}
+    both = half | {"u": rom.Thickness(None, 0.5, 1.0, axis="x")}
+    full = KINDS | {"tip": "full"}
+    refuse(
+        (lambda: family_of(model, half, 2, interfaces=full), "'tip' has the kind 'full'"),
+        (lambda: family_of(model, half, 2, stress=True), "stress is not recovered"),
+        (lambda: family_of(carrying, half, 2), "attached masses"),
+        (lambda: family_of(bare, half, 2), "do not tell how they are stretched"),
+        (lambda: family_of(more, half, 2), "are not the whole model"),
+        (lambda: StretchedModel(beside, rib), "'rib' is no layer of its own: 'all' lies beside it"),
+        (lambda: rom.Thickness(None, 0.5, 1.0, axis="w"), "body = 'w' is none of 'x', 'y', 'z'"),
+        (lambda: family_of(model, both, 2), "choose one axis"),
+        error=ParameterError,
+    )
 
 
 def test_a_family_with_layers_travels(tmp_path):
     model = layered(STEEL, 2, (1.0, 0.1, 0.08), (4, 1, 1), (0.0, 0.0, 0.0))
-    family = rom.reduce_parametric(
-        model, parameters={"t": rom.Thickness("all", 0.5, 2.0)}, method=rom.CraigBampton(4),
-        interfaces=KINDS, reference="root",
-    )  # fmt: skip
+    family = family_of(model, {"t": rom.Thickness("all", 0.5, 2.0)}, 4, reference="root")
     again = rom.load(rom.save(family, tmp_path / "family.npz"))
     one, other = again.at(t=1.3), family.at(t=1.3)
     for name in ("mass", "first_moment", "inertia", "S", "Ibar_kl", "S_kl", "K", "omega"):
@@ -230,10 +217,7 @@ def test_core_and_faces_of_a_panel_change_their_thickness():
 @pytest.mark.fenicsx
 def test_faces_of_one_thickness_move_with_the_core():
     """Nothing stretches the faces, but the rigid motions of the whole change."""
-    family = rom.reduce_parametric(
-        panel(), parameters={"t": rom.Thickness("core", 0.7, 1.8)}, method=rom.CraigBampton(16),
-        interfaces=KINDS, certify=False,
-    )  # fmt: skip
+    family = family_of(panel(), {"t": rom.Thickness("core", 0.7, 1.8)}, 16, certify=False)
     body, full = family.at(t=1.5), panel(t_core=1.5)
     expected = rom.modes(full, 4, fixed=("root",), interfaces=KINDS).frequencies
     assert_allclose(body.frequencies(4, fixed=("root",)), expected, rtol=3e-3)

@@ -9,8 +9,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import rom
-from cases.components.updating import BOLTS, family_of, noisy_test
-from cases.components.updating import halves as halves_of
+from cases.components.updating import BOLTS, assert_right, crossed, family_of, halves, noisy_test
 from cases.files.schema import errors
 from cases.long import ROM_LONG
 from rom.cli.main import main
@@ -43,17 +42,15 @@ def folder(tmp_path_factory):
     family = family_of(PARAMETERS, (8, 1, 1), 8)
     rom.save(family, path / "family.rom.npz")
     rom.save(family.body, path / "body.rom.npz")
-    points = [[x, y, 0.08] for x in (0.5, 0.75, 1.0) for y in (0.0, 0.1)]
-    sensors = Channels(np.repeat(points, 2, axis=0), np.tile([[0, 1, 0], [0, 0, 1]], (6, 1)))
+    sensors = crossed([[x, y, 0.08] for x in (0.5, 0.75, 1.0) for y in (0.0, 0.1)])
     true = family.at(**TRUE)
     omega, Phi = true.modes(fixed=("root",))
     f = np.linspace(20, 900, 80)
     w = 2 * np.pi * f[:, None]
     own = np.delete(np.arange(12), 10)  # of two along y on the rigid face of the tip one is enough
-    independent = Channels(sensors.points[own], sensors.directions[own])
     for name, seeing, force in (
         ("test.h5", sensors, Channels([[0.75, 0.1, 0.0]], [[0, 1, 2]])),
-        ("driven.h5", independent, Channels(sensors.points[7], sensors.directions[7])),
+        ("driven.h5", sensors.some(own), sensors.some([7])),
     ):
         seen, driven = (c.rows(true, "sensor") @ Phi for c in (seeing, force))
         H = np.einsum("sn,fn,en->fse", seen, 1 / (omega**2 - w**2 + 0.04j * w * omega), driven)
@@ -69,43 +66,62 @@ def there(folder, monkeypatch):
 
 
 def answered(words, capsys, code=0, file="test.h5"):
+    return told(["update", file, *WORDS, *words, "--json"], capsys, code)
+
+
+def told(words, capsys, code=0):
     capsys.readouterr()
-    assert main(["update", file, *WORDS, *words, "--json"]) == code
+    assert main(words) == code
     found = json.loads(capsys.readouterr().out)
     assert errors(found, schema("update")) == []
     return found
 
 
+def refused(words, message, capsys):
+    """What is wrong is said, by the parser or by the verb."""
+    capsys.readouterr()
+    try:
+        code = main(["update", *words])
+    except SystemExit as end:
+        code = end.code
+    assert code == 2
+    assert message in capsys.readouterr().err
+
+
+def updated(file="test.h5", **options):
+    """What the function finds."""
+    family, test = rom.load("family.rom.npz"), rom.io.read_responses(file)
+    noise = {name: options.pop(name) for name in ("force_noise", "estimator") if name in options}
+    return rom.update(family, replace(test, **noise), fixed=("root",), damping=0.02, **options)
+
+
+def assert_same(found, same):
+    assert found["factors"] == same.factors and found["deviations"] == same.deviations
+
+
 def test_the_verb_finds_what_the_function_finds_and_writes_the_body(capsys):
     found = answered(["-o", "updated.rom.npz"], capsys)
-    family, test = rom.load("family.rom.npz"), rom.io.read_responses("test.h5")
-    same = rom.update(family, test, fixed=("root",), damping=0.02)
-    assert found["factors"] == same.factors and found["deviations"] == same.deviations
+    family, same = rom.load("family.rom.npz"), updated()
+    assert_same(found, same)
     assert found["report"]["ok"] and "failed" not in found
-    for name, value in TRUE.items():
-        assert abs(np.log(found["factors"][name] / value)) < 4 * found["deviations"][name]
+    assert_right(same, TRUE)
     body = rom.load("updated.rom.npz")
     assert_allclose(body.modes(4).omega, family.at(**same.factors).modes(4).omega, rtol=1e-12)
-    told = body.provenance["updating"]
-    assert told["deviations"] == same.deviations and told["verdict holds"] is True
-    assert told["lines"] == 80 and told["sensors"] == 12
+    own = body.provenance["updating"]
+    assert own["deviations"] == same.deviations and own["verdict holds"] is True
+    assert own["lines"] == 80 and own["sensors"] == 12
 
 
 def test_noise_of_forces_is_taken(capsys):
     found = answered(["--force-noise", "0.03", "--estimator", "H1"], capsys)
-    test = replace(rom.io.read_responses("test.h5"), force_noise=0.03, estimator="H1")
-    same = rom.update(rom.load("family.rom.npz"), test, fixed=("root",), damping=0.02)
-    assert found["factors"] == same.factors and found["deviations"] == same.deviations
+    assert_same(found, updated(force_noise=0.03, estimator="H1"))
 
 
 def test_springs_masses_candidates_and_priors_are_taken(capsys):
     found = answered([*ATTACHED, "--candidate", "cable", "--free", "inner",
                       "--prior", "inner=0.5"], capsys, code=5)  # fmt: skip
-    same = rom.update(
-        rom.load("family.rom.npz"), rom.io.read_responses("test.h5"), fixed=("root",),
-        free=("inner",), attached={"soil": SPRING}, candidates={"cable": MASS},
-        prior={"inner": 0.5}, damping=0.02,
-    )  # fmt: skip
+    options = {"free": ("inner",), "prior": {"inner": 0.5}}
+    same = updated(attached={"soil": SPRING}, candidates={"cable": MASS}, **options)
     assert found["factors"] == same.factors and found["scores"] == same.scores
     assert set(found["scores"]) == {"outer", "cable"} and found["failed"]
 
@@ -113,11 +129,7 @@ def test_springs_masses_candidates_and_priors_are_taken(capsys):
 def test_equations_are_taken_with_their_rank_and_a_prior(capsys):
     words = ["--residual", "equations", "--rank", "7", "--prior", "inner=0.01"]
     found = answered(words, capsys, code=5, file="driven.h5")
-    same = rom.update(
-        rom.load("family.rom.npz"), rom.io.read_responses("driven.h5"), fixed=("root",),
-        damping=0.02, residual="equations", rank=7, prior={"inner": 0.01},
-    )  # fmt: skip
-    assert found["factors"] == same.factors and found["deviations"] == same.deviations
+    assert_same(found, updated("driven.h5", residual="equations", rank=7, prior={"inner": 0.01}))
     free = answered(words[:4], capsys, code=5, file="driven.h5")
     unbiased = answered(["--residual", "response-function"], capsys, file="driven.h5")
     assert unbiased["factors"]["inner"] == pytest.approx(TRUE["inner"], rel=0.01)
@@ -128,9 +140,7 @@ def test_equations_are_taken_with_their_rank_and_a_prior(capsys):
 def test_a_test_is_planned(capsys, ending):
     words = ["--plan", "5,2", "--lines", "20:900", "--noise", "0.02", "--prior", "inner=0.3",
              *ATTACHED[:2], "-o", f"plan.{ending}"]  # fmt: skip
-    assert main(["update", *WORDS, *words, "--force", "--json"]) == 0
-    found = json.loads(capsys.readouterr().out)
-    assert errors(found, schema("update")) == []
+    found = told(["update", *WORDS, *words, "--force", "--json"], capsys)
     family = rom.load("family.rom.npz")
     offered = candidates(family.body, 20, fixed=("root",))
     same = place(
@@ -146,11 +156,11 @@ def test_a_test_is_planned(capsys, ending):
 
 def test_a_plan_is_drawn_and_has_a_size_of_its_own(capsys):
     words = ["--plan", "--lines", "20:900", "--floor", "0.02", "-o", "plan.png"]
-    assert main(["update", *WORDS, *words, "--force", "--json"]) == 0
-    found = json.loads(capsys.readouterr().out)
+    found = told(["update", *WORDS, *words, "--force", "--json"], capsys)
     assert [len(found["plan"][name]) for name in ("sensors", "inputs")] == [8, 1]
     assert Path("plan.png").read_bytes()[:4] == b"\x89PNG"
-    quiet = answered_plan([*words[:4], "0"], capsys)  # without a floor antiresonances tell too much
+    # without a floor antiresonances tell too much
+    quiet = told(["update", *WORDS, *words[:4], "0", "--json"], capsys)
     for name in TRUE:
         assert found["deviations"][name] > 2 * quiet["deviations"][name]
 
@@ -174,99 +184,77 @@ def test_points_are_drawn_also_where_they_are_off_the_body(capsys, monkeypatch):
     assert "picture is written as .png" in capsys.readouterr().err
 
 
-def answered_plan(words, capsys):
-    assert main(["update", *WORDS, *words, "--json"]) == 0
-    return json.loads(capsys.readouterr().out)
-
-
-def test_wrong_plans_are_said(capsys):
-    def refused(words, message):
-        capsys.readouterr()
-        try:
-            code = main(["update", *WORDS, *words])
-        except SystemExit as end:
-            code = end.code
-        assert code == 2
-        assert message in capsys.readouterr().err
-
-    lines = ["--lines", "20:900"]
-    refused([], "required: file")
-    refused(["--plan", "5,1"], "required: --lines")
-    refused(["test.h5", "--plan", *lines], "neither a test nor")
-    refused(["--plan", "5", *lines], "is not two whole numbers")
-    refused(["--plan", "5,1", "--lines", "900:20"], "does not ascend")
-    refused(["test.h5", "--plan", "5,1", *lines], "neither a test nor")
-    refused(["--plan", "5,1", *lines, "-o", "plan.txt"], "written as .csv, .uff, .png")
-    refused(["--plan", "500,1", *lines], "n_sensors = 500")
+LINES = ["--lines", "20:900"]
+PLAN = ["--plan", "5,1", *LINES]
+WRONG_WORDS = (
+    ([], "required: file"),
+    (["--plan", "5,1"], "required: --lines"),
+    (["test.h5", "--plan", *LINES], "neither a test nor"),
+    (["--plan", "5", *LINES], "is not two whole numbers"),
+    (["--plan", "5,1", "--lines", "900:20"], "does not ascend"),
+    (["test.h5", *PLAN], "neither a test nor"),
+    ([*PLAN, "-o", "plan.txt"], "written as .csv, .uff, .png"),
+    (["--plan", "500,1", *LINES], "n_sensors = 500"),
+    (["test.h5", "--spring", "soil=tip:2e5:0.1"], "must be written INTERFACE:VALUE:LOW:HIGH"),
+    (["test.h5", "--mass", "cable=tip:heavy:0.1:10"], "--mass: 'heavy' is not a number"),
+    (
+        ["test.h5", *ATTACHED[:2], "--mass", "soil=tip:1:0.1:10"],
+        "--mass soil needs a name",
+    ),
+    (["test.h5", "--rank", "3"], "rank needs residual="),
+    (["test.h5", "--residual", "equations"], "input 0 has no sensor at its point"),
+    (
+        ["test.h5", "--candidate", "cable"],
+        "--candidate cable must name a --spring",
+    ),
+    (
+        ["test.h5", "--family", "body.rom.npz"],
+        "--family family.rom.npz, body.rom.npz:",
+    ),
+    (["test.h5", "--joint", "j=a.tip,b.tip:1,1,1:0.1:1"], "need an assembly"),
+    (["test.h5", "--force-noise", "0.1"], "the estimator of H is not named"),
+    (["test.h5", "-o", "family.rom.npz"], "family.rom.npz"),
+)
 
 
 def test_what_is_wrong_with_the_options_is_said(capsys):
-    def refused(words, message, file="test.h5"):
-        capsys.readouterr()
-        assert main(["update", file, *WORDS, *words]) == 2
-        assert message in capsys.readouterr().err
-
-    refused(["--spring", "soil=tip:2e5:0.1"], "must be written INTERFACE:VALUE:LOW:HIGH")
-    refused(["--mass", "cable=tip:heavy:0.1:10"], "--mass: 'heavy' is not a number")
-    same = "--mass soil needs a name of its own"
-    refused([*ATTACHED[:2], "--mass", "soil=tip:1:0.1:10"], same)
-    refused(["--rank", "3"], "rank needs residual=")
-    refused(["--residual", "equations"], "input 0 has no sensor at its point")
-    refused(["--candidate", "cable"], "--candidate cable must name a --spring, --joint or --mass")
-    refused(["--family", "body.rom.npz"], "--family family.rom.npz, body.rom.npz: of several each")
-    refused(["--joint", "j=a.tip,b.tip:1,1,1:0.1:1"], "need an assembly")
-    refused(["--force-noise", "0.1"], "the estimator of H is not named")
-    refused(["-o", "family.rom.npz"], "family.rom.npz")
+    for words, message in WRONG_WORDS:
+        refused([*WORDS, *words], message, capsys)
 
 
 HALVES = ["--family", "frame=frame.rom.npz", "--family", "arm=arm.rom.npz",
           "--fixed", "frame.root", "--damping", "0.02"]  # fmt: skip
+LOOSE = {"frame.E": 1.2, "arm.E": 0.9, "bolts": 0.5}
 JOINT = ["--joint", "bolts=frame.tip,arm.root:4e8,4e8,4e8,2e5,1e5,1e5:0.1:10"]
 
 
 @pytest.fixture(scope="module")
 def bolted(folder):
     """Two families in files, their assembly, and a test of it in which a sensor names its body."""
-    families = halves_of(8)
+    families = halves(8)
     for name, family in families.items():
         rom.save(family, folder / f"{name}.rom.npz")
     points = [[x, y, 0.08] for x in (0.25, 0.5, 0.75, 1.0) for y in (0.0, 0.1)]
-    sensors = Channels(
-        np.repeat(points, 2, axis=0), np.tile([[0, 1, 0], [0, 0, 1]], (8, 1)),
-        ("frame",) * 8 + ("arm",) * 8,
-    )  # fmt: skip
-    force = Channels([[0.75, 0.1, 0.0]], [[0, 1, 2]])
-    whole, f = FamilyAssembly(families), np.linspace(20, 900, 100)
-    how = {
-        "level": 0.03,
-        "averages": 50,
-        "seed": 4,
-        "attached": {"bolts": BOLTS},
-        "fixed": (("frame", "root"),),
-    }
-    test = noisy_test(
-        whole, {"frame.E": 1.2, "arm.E": 0.9, "bolts": 0.5}, (sensors, force), f, **how
+    channels = (
+        crossed(points, ("frame",) * 8 + ("arm",) * 8),
+        Channels([[0.75, 0.1, 0]], [[0, 1, 2]]),
     )
+    whole, f = FamilyAssembly(families), np.linspace(20, 900, 100)
+    how = {"level": 0.03, "averages": 50, "seed": 4, "fixed": (("frame", "root"),)}
+    test = noisy_test(whole, LOOSE, channels, f, attached={"bolts": BOLTS}, **how)
     rom.io.write_responses(test, folder / "bolted.h5")
     return whole
 
 
-def halves(words, capsys, code=0):
-    capsys.readouterr()
-    assert main(["update", *words, "--json"]) == code
-    return json.loads(capsys.readouterr().out)
-
-
 def test_families_on_a_joint_are_updated_and_written_one_by_one(bolted, capsys):
-    found = halves(["bolted.h5", *HALVES, *JOINT, "-o", "new.rom.npz"], capsys)
-    assert errors(found, schema("update")) == []
+    words = ["bolted.h5", *HALVES, *JOINT, "-o", "new.rom.npz", "--json"]
+    found = told(["update", *words], capsys)
     test = rom.io.read_responses("bolted.h5")
     assert test.sensors.bodies == ("frame",) * 8 + ("arm",) * 8 and test.inputs.bodies is None
     same = rom.update(bolted, test, fixed=(("frame", "root"),), attached={"bolts": BOLTS},
                       damping=0.02)  # fmt: skip
-    assert found["factors"] == same.factors and found["deviations"] == same.deviations
-    for name, value in (("frame.E", 1.2), ("arm.E", 0.9), ("bolts", 0.5)):
-        assert abs(np.log(found["factors"][name] / value)) < 4 * found["deviations"][name]
+    assert_same(found, same)
+    assert_right(same, LOOSE)
     for name, body in same.assembly.bodies.items():
         written = rom.load(f"new.{name}.rom.npz")
         assert_allclose(written.frequencies(4), body.frequencies(4), rtol=1e-12)
@@ -275,8 +263,7 @@ def test_families_on_a_joint_are_updated_and_written_one_by_one(bolted, capsys):
 def test_a_coupled_assembly_is_planned(bolted, capsys, monkeypatch):
     monkeypatch.setattr("rom.components.updating.verb.PLAN_POINTS", 6)
     words = ["--plan", "4,1", "--lines", "20:900", "--couple", "frame.tip=arm.root", *HALVES]
-    found = halves([*words, "-o", "halves.png", "--force"], capsys)
-    assert errors(found, schema("update")) == []
+    found = told(["update", *words, "-o", "halves.png", "--force", "--json"], capsys)
     assert {"frame.E", "arm.E"} <= set(found["deviations"])
     assert Path("halves.png").read_bytes()[:4] == b"\x89PNG"
 
@@ -312,14 +299,12 @@ def test_a_wrong_value_of_an_option_is_named(bolted, capsys, option):
 
 
 def test_families_that_are_no_assembly_are_named(bolted, capsys):
-    def refused(words, message):
-        capsys.readouterr()
-        assert main(["update", "bolted.h5", *words]) == 2
-        assert message in capsys.readouterr().err
-
-    refused(HALVES[:2] * 2, "--family 'frame' is given twice")
-    refused([*HALVES, *JOINT, "--spring", "q=tip:1,1,1:1:2"], "'tip' must be BODY.INTERFACE")
-    refused([*HALVES[:4], "--fixed", "root"], "--fixed 'root' must be BODY.INTERFACE, of")
-    refused([*HALVES, "--joint", "q=frame.tip:1,1,1:1:2"], "names 1 places, needed are 2")
-    refused([*HALVES, "--mass", "q=frame.tip:1,1:1:2"], "a mass must be one number")
-    refused(["--family", "a=body.rom.npz"], "body.rom.npz holds one body, without parameters")
+    for words, message in (
+        (HALVES[:2] * 2, "--family 'frame' is given twice"),
+        ([*HALVES, *JOINT, "--spring", "q=tip:1,1,1:1:2"], "'tip' must be BODY.INTERFACE"),
+        ([*HALVES[:4], "--fixed", "root"], "--fixed 'root' must be BODY.INTERFACE, of"),
+        ([*HALVES, "--joint", "q=frame.tip:1,1,1:1:2"], "names 1 places, needed are 2"),
+        ([*HALVES, "--mass", "q=frame.tip:1,1:1:2"], "a mass must be one number"),
+        (["--family", "a=body.rom.npz"], "body.rom.npz holds one body, without parameters"),
+    ):
+        refused(["bolted.h5", *words], message, capsys)

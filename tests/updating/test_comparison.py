@@ -7,10 +7,10 @@ import pytest
 from numpy.testing import assert_allclose
 
 import rom
-from cases.components.updating import exact_responses, family_of, model_of, noisy_test
+from cases.components.updating import exact_responses, family_of, model_of, noisy_test, refuse
 from cases.long import few
 from rom.components.updating.frf_data import estimators
-from rom.errors import ConfigError, ParameterError
+from rom.errors import ParameterError
 from rom.updating import AddedMass, Channels, Comparison, GroundSpring, Responses, compare
 
 REGIONS = ("inner", "middle", "outer")
@@ -107,14 +107,13 @@ def test_a_set_is_worse_by_its_paired_difference():
 
 def test_what_cannot_be_compared_is_named(family):
     test = measured(family, 0, {})
-    with pytest.raises(ConfigError, match="at least one set"):
-        compare(family, test, {}, **COMMON)
-    with pytest.raises(ConfigError, match="folds = 1"):
-        compare(family, test, SETS, folds=1, **COMMON)
-    with pytest.raises(ConfigError, match="folds = 84"):
-        compare(family, test, SETS, folds=84, **COMMON)
-    with pytest.raises(ParameterError, match="no parameter 'E'"):
-        compare(family, test, {"wrong": {"free": ("E",)}}, **COMMON)
+    wrong = {"wrong": {"free": ("E",)}}
+    refuse(
+        (lambda: compare(family, test, {}, **COMMON), "at least one set"),
+        (lambda: compare(family, test, SETS, folds=1, **COMMON), "folds = 1"),
+        (lambda: compare(family, test, SETS, folds=84, **COMMON), "folds = 84"),
+        (lambda: compare(family, test, wrong, **COMMON), ParameterError, "no parameter 'E'"),
+    )
 
 
 def test_coherence_of_each_line_goes_with_it(family):

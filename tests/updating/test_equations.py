@@ -8,14 +8,12 @@ from numpy.testing import assert_allclose
 from scipy.linalg import null_space
 
 import rom
-from cases.components.updating import model_of
+from cases.components.updating import model_of, refuse
 from cases.solid import STEEL, composite
-from rom.components.updating.equations import in_sensors
 from rom.components.updating.frf_data import noisy
 from rom.components.updating.methods import update_by_input
 from rom.components.updating.models import AtSensors, Measurement, ParametricModel, modal
-from rom.components.updating.normal_equations import responses_at
-from rom.errors import ConfigError
+from rom.components.updating.normal_equations import in_sensors, responses_at
 from rom.updating import Channels, Responses
 
 PARAMETERS = {
@@ -192,7 +190,7 @@ def test_the_response_function_method_finds_what_is_true(family, model):
     """
     whole = measured(family, model)
     few = [1, 4, 7, 10]
-    sensors = Channels(whole.sensors.points[few], whole.sensors.directions[few])
+    sensors = whole.sensors.some(few)
     test = replace(whole, H=whole.H[:, few], coherence=whole.coherence[:, few], sensors=sensors)
     found = rom.update(family, test, fixed=("root",), residual="response-function", damping=0.02)
     assert_allclose(list(found.factors.values()), TRUE, rtol=1e-8)
@@ -240,24 +238,24 @@ def test_the_bias_of_the_condensation_is_seen_by_the_verdict(family, model):
 def test_what_equations_need_is_named(family, model):
     test = replace(measured(family, model), coherence=0.99)
 
-    def refused(words, test=test, **options):
-        with pytest.raises(ConfigError, match=words):
-            rom.update(family, test, fixed=("root",), **{"residual": "equations"} | options)
+    def updated(test=test, **options):
+        return rom.update(family, test, fixed=("root",), **{"residual": "equations"} | options)
 
-    refused("residual = 'force'", residual="force")
-    refused("rank needs", rank=3, residual="responses")
-    refused("rank needs", rank=3, residual="response-function")
-    refused("prior of E_inner = -0.1 must be positive", prior={"E_inner": -0.1})
-    refused("rank = 99", rank=99)
-    refused("rank = 1.5", rank=1.5)
-    away = Channels([[1.0, 0.1, 0.08]], [[0, 1, 1]])
-    refused("input 0 has no sensor", replace(test, inputs=away))
-    n = [*range(14), 4]
-    twice = Channels(np.asarray(test.sensors.points)[n], np.asarray(test.sensors.directions)[n])
-    refused("sensors (4|14) of 15 follow from others", replace(test, H=test.H[:, n], sensors=twice))
+    away = replace(test, inputs=Channels([[1.0, 0.1, 0.08]], [[0, 1, 1]]))
+    n, m = [*range(14), 4], [5, 4]
+    twice = replace(test, H=test.H[:, n], sensors=test.sensors.some(n))
+    few = replace(test, H=test.H[:, m], sensors=test.sensors.some(m))
     c = np.full(test.H.shape, 0.99)
     c[:, 3] = 0.0
-    refused("no line counts for all", replace(test, coherence=c))
-    few = Channels(np.asarray(test.sensors.points)[[5, 4]],
-                   np.asarray(test.sensors.directions)[[5, 4]])  # fmt: skip
-    refused("2 sensors for . modes", replace(test, H=test.H[:, [5, 4]], sensors=few))
+    refuse(
+        (lambda: updated(residual="force"), "residual = 'force'"),
+        (lambda: updated(rank=3, residual="responses"), "rank needs"),
+        (lambda: updated(rank=3, residual="response-function"), "rank needs"),
+        (lambda: updated(prior={"E_inner": -0.1}), "prior of E_inner = -0.1 must be positive"),
+        (lambda: updated(rank=99), "rank = 99"),
+        (lambda: updated(rank=1.5), "rank = 1.5"),
+        (lambda: updated(away), "input 0 has no sensor"),
+        (lambda: updated(twice), "sensors (4|14) of 15 follow from others"),
+        (lambda: updated(replace(test, coherence=c)), "no line counts for all"),
+        (lambda: updated(few), "2 sensors for . modes"),
+    )

@@ -8,13 +8,13 @@ from numpy.testing import assert_allclose
 from scipy.stats import chi2
 
 import rom
-from cases.components.updating import family_of
+from cases.components.updating import assert_alike, family_of, refuse
 from cases.mbs.fmu_instance import Instance, fmpy
 from rom.body.recovery import StressRecovery
 from rom.components.updating.observers import parameter_tracking
 from rom.components.updating.observers.operation import discrete
 from rom.components.updating.observers.parameter_tracking import LINEAR_REACH
-from rom.errors import ConfigError, ParameterError, SolverError
+from rom.errors import ParameterError, SolverError
 from rom.updating import (
     Channels,
     Drift,
@@ -130,10 +130,7 @@ def test_held_factors_are_those_of_the_body_there(family, factors, damping):
     body = replace(body, D=held_ratios.matrix(body))
     own = tracker(body, few, force, WANTED, dt=DT, walk=3000.0, fixed=("root",))
     y = 50 * np.sqrt(held.R) * np.random.default_rng(1).standard_normal((300, 3))
-    a, b = held.run(y), own.run(y)
-    for name in ("values", "deviations", "forces"):
-        scale = np.abs(getattr(b, name)).max(axis=0)
-        assert_allclose(getattr(a, name) / scale, getattr(b, name) / scale, atol=1e-6)
+    assert_alike(held.run(y), own.run(y), ("values", "deviations", "forces"), 1e-6)
 
 
 def test_the_filter_is_an_extended_one_linearised_at_every_step(filter_, monkeypatch):
@@ -204,12 +201,8 @@ def inside(total, freedom):
 def test_noise_wrong_by_a_tenth_leaves_the_band(filter_, noise, side):
     """A filter that thinks too little of sensors and forces fails as one that thinks too much."""
     n, n_t, assumed = 8, 300, filter_.assumed
-    assumed = replace(
-        assumed,
-        walk=noise * assumed.walk,
-        unmodelled=noise * assumed.unmodelled,
-        first=assumed.walk,
-    )
+    walk, white = noise * assumed.walk, noise * assumed.unmodelled
+    assumed = replace(assumed, walk=walk, unmodelled=white, first=assumed.walk)
     wrong = replace(filter_, R=filter_.R * noise**2, assumed=assumed)
     surprise, _, _ = totals(filter_, wrong, n, n_t, 12)
     low, high = chi2.ppf([1e-3, 1 - 1e-3], 3 * n * n_t)
@@ -289,26 +282,21 @@ def test_the_fmu_names_the_parameter_that_leaves_its_range(family, tmp_path):
 
 
 def test_what_cannot_be_followed_is_named(family, filter_):
-    def refused(words, kind=ConfigError, **options):
-        with pytest.raises(kind, match=words):
-            made(family, **options)
-
-    refused("no parameter 'E_outer'.*clamp", parameters={"E_outer": Drift(0.1)})
-    refused("no parameter changes", parameters={})
-    refused("must be of type Drift", parameters={"clamp": 0.1})
-    with pytest.raises(ConfigError, match="first"):
-        Drift(0.0)
-    with pytest.raises(ConfigError, match="walk = -1"):
-        Drift(0.1, -1.0)
-    with pytest.raises(ConfigError, match=r"samples \(5, 2\)"):
-        filter_.run(np.zeros((5, 2)))
-    with pytest.raises(ParameterError, match=r"'E' must be of 'E_inner'"):
-        filter_.held(E=1.0)
     wide = {name: Drift(0.3) for name in DRIFTS}
     _, _, y = walked(replace(filter_, drifts=wide), np.random.default_rng(0), 200)
     narrow = {"clamp": GroundSpring("tip", (0.0, 0.0, 4e6), 0.98, 1.02)}
-    with pytest.raises(SolverError, match=r"'clamp' has reached the factor .* 0\.98 to 1\.02"):
-        made(family, parameters=wide, attached=narrow).run(y)
+    lost, left = made(family, parameters=wide, attached=narrow), r"has reached .* 0\.98 to 1\.02"
+    unknown, junk = {"E_outer": Drift(0.1)}, {"clamp": 0.1}
+    refuse(
+        (lambda: made(family, parameters=unknown), "no parameter 'E_outer'.*clamp"),
+        (lambda: made(family, parameters={}), "no parameter changes"),
+        (lambda: made(family, parameters=junk), "must be of type Drift"),
+        (lambda: Drift(0.0), "first"),
+        (lambda: Drift(0.1, -1.0), "walk = -1"),
+        (lambda: filter_.run(np.zeros((5, 2))), r"samples \(5, 2\)"),
+        (lambda: filter_.held(E=1.0), ParameterError, "'E' must be of 'E_inner'"),
+        (lambda: lost.run(y), SolverError, f"'clamp' {left}"),
+    )
 
 
 def test_a_record_without_samples_is_empty(filter_):

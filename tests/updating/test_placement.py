@@ -8,12 +8,12 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.stats import chi2
 
 import rom
-from cases.components.updating import PARAMETERS, exact_responses, family_of, model_of
+from cases.components.updating import PARAMETERS, exact_responses, family_of, model_of, refuse
 from cases.long import few
 from rom.components.updating.frf_data import noisy
 from rom.components.updating.normal_equations import responses_at
 from rom.components.updating.placement import eliminated, gain
-from rom.errors import ConfigError, ModelError, ParameterError
+from rom.errors import ModelError, ParameterError
 from rom.updating import Channels, Responses, candidates, independent, place
 
 LINES = np.linspace(20, 1400, 60)
@@ -136,30 +136,27 @@ def test_the_plan_is_written(family):
 def test_wrong_plans_are_named(family):
     offered = candidates(family.body, 4, fixed=("root",))
 
-    def refused(words, call, kind=ConfigError):
-        with pytest.raises(kind, match=words):
-            call()
+    def plan(n=3, at=offered, **options):
+        return planned(family, at, n, **options)
 
-    refused("off the body", lambda: planned(family, Channels([[9.0, 0, 0]], [[1, 0, 0]]), 1))
-    refused("n_sensors = 13", lambda: planned(family, offered, 13))
-    refused("n_inputs = 4", lambda: planned(family, offered, 3, n_inputs=4))
-    refused("one of them must be positive", lambda: planned(family, offered, 3, floor=0.0))
-    refused(
-        "above zero", lambda: place(family, offered, SHAKERS, [0.0, 1.0], n_sensors=2, noise=0.1)
-    )
-    refused(
-        "no parameter 'E'", lambda: planned(family, offered, 3, prior={"E": 1.0}), ParameterError
-    )
-    refused("must be positive", lambda: planned(family, offered, 3, prior={"E_inner": 0.0}))
-    refused("n = 2 ", lambda: independent(family.body, offered, 2, modes=3, fixed=("root",)))
+    def kept(n, at=offered):
+        return independent(family.body, at, n, modes=3, fixed=("root",))
+
     along = offered.some(np.arange(0, 12, 3))
     one = Channels(np.repeat(np.asarray(along.points)[:1], 4, axis=0), along.directions)
-    refused(
-        "modes apart",
-        lambda: independent(family.body, one, 4, modes=3, fixed=("root",)),
-        ModelError,
+    far = Channels([[9.0, 0, 0]], [[1, 0, 0]])
+    refuse(
+        (lambda: plan(1, far), "off the body"),
+        (lambda: plan(13), "n_sensors = 13"),
+        (lambda: plan(n_inputs=4), "n_inputs = 4"),
+        (lambda: plan(floor=0.0), "one of them must be positive"),
+        (lambda: place(family, offered, SHAKERS, [0.0, 1.0], n_sensors=2, noise=0.1), "above zero"),
+        (lambda: plan(prior={"E": 1.0}), ParameterError, "no parameter 'E'"),
+        (lambda: plan(prior={"E_inner": 0.0}), "must be positive"),
+        (lambda: kept(2), "n = 2 "),
+        (lambda: kept(4, one), ModelError, "modes apart"),
+        (lambda: candidates(family.body, 5000), "n = 5000"),
     )
-    refused("n = 5000", lambda: candidates(family.body, 5000))
 
 
 REGIONS = ("inner", "middle", "outer")

@@ -189,17 +189,28 @@ def two(**second):
     return first + dataset(6, 1, [RE, IM], **{"response": (8, 1)} | second)
 
 
+def read(path, text=None, **options):
+    """A test of five averages, of a text that is written first."""
+    if text is not None:
+        path.write_text(text)
+    return rom.io.read_responses(path, **{"averages": 5, "coherence": 0.9} | options)
+
+
+def labelled(unit, kind=12):
+    """The functions, the second half of the labels of an axis being a unit."""
+    head = f"{kind:10d}{0:5d}{0:5d}{0:5d} {'NONE':<20} "
+    return two().replace(head + f"{'NONE':<20}", head + f"{unit:<20}")
+
+
 def test_what_a_universal_file_lacks_is_named(tmp_path):
     path = tmp_path / "x.unv"
 
     def refused(text, words, kind=FileFormatError, **options):
-        path.write_text(text)
         with pytest.raises(kind, match=words):
-            rom.io.read_responses(path, **{"averages": 5, "coherence": 0.9} | options)
+            read(path, text, **options)
 
     whole = two()
-    path.write_text(whole)
-    test = rom.io.read_responses(path, averages=5, coherence=0.9)
+    test = read(path, whole)
     assert test.H.shape == (X.size, 2, 1) and (test.coherence == 0.9).all()
     refused(whole, "averages is missing", ConfigError, averages=None)
     refused(whole, r"no coherence of 7\+Z/11-Z, 8\+X/11-Z", coherence=None)
@@ -207,22 +218,15 @@ def test_what_a_universal_file_lacks_is_named(tmp_path):
     refused(two(response=(8, 4)), r"function of 8\+4 by 11-Z is no translation")
     refused(two(response=(7, 3)), r"7\+Z/11-Z is there twice")
     refused(two(numerator=13), "13 must be of")
-    refused(whole.replace(f"{12:10d}{0:5d}{0:5d}{0:5d} {'NONE':<20} {'NONE':<20}",
-                          f"{12:10d}{0:5d}{0:5d}{0:5d} {'NONE':<20} {'V':<20}"),
-            "the unit 'V' is no motion.*calibrate")  # fmt: skip
-    refused(whole.replace(f"{12:10d}{0:5d}{0:5d}{0:5d} {'NONE':<20} {'NONE':<20}",
-                          f"{12:10d}{0:5d}{0:5d}{0:5d} {'NONE':<20} {'mm':<20}"),
-            "numerator needs unit 12, got 'mm'")  # fmt: skip
+    refused(labelled("V"), "the unit 'V' is no motion.*calibrate")
+    refused(labelled("mm"), "numerator needs unit 12, got 'mm'")
     refused(whole.replace(f"{2.0:13.5e}{0.5:13.5e}", f"{2.0:13.5e}{0.6:13.5e}", 1), "other lines")
     units = f"{-1:6d}\n{164:6d}\n{1:10d}{'SI':>20}{1:10d}\n" + 3 * f"{1.0:25.17e}" + f"\n{-1:6d}\n"
-    labelled = whole.replace(f"{12:10d}{0:5d}{0:5d}{0:5d} {'NONE':<20} {'NONE':<20}",
-                             f"{12:10d}{0:5d}{0:5d}{0:5d} {'NONE':<20} {'mm/s^2':<20}")  # fmt: skip
-    refused(units + labelled, "0.001 times that of dataset 164")
+    refused(units + labelled("mm/s^2"), "0.001 times that of dataset 164")
     axes = f"{-1:6d}\n{2420:6d}\n{1:10d}\n{-1:6d}\n"
     turned = whole.replace(f"{8:10d}{0:10d}{0:10d}", f"{8:10d}{0:10d}{3:10d}")
     refused(axes + turned, "node 8 is in the local coordinate system 3")
-    path.write_text(axes + whole)  # local axes that no node uses
-    rom.io.read_responses(path, averages=5, coherence=0.9)
+    read(path, axes + whole)  # local axes that no node uses
     with pytest.raises(FileFormatError, match="no mode"):
         rom.io.read_modes(path)
     with pytest.raises(ConfigError, match="ending must be one of"):
@@ -263,17 +267,13 @@ def test_a_coordinate_system_that_is_the_global_one_is_no_obstacle(case, tmp_pat
     for place in (10, 20):  # where a node is given, and where it is measured
         text = f"{8:10d}{0:10d}{0:10d}"
         node = text[:place] + f"{3:10d}" + text[place + 10 :]
-        (tmp_path / "x.unv").write_text(
-            f"{-1:6d}\n{18:6d}\n{given}{-1:6d}\n" + two().replace(text, node)
-        )
+        text = f"{-1:6d}\n{18:6d}\n{given}{-1:6d}\n" + two().replace(text, node)
         if same:
-            test = rom.io.read_responses(tmp_path / "x.unv", averages=5, coherence=0.9)
-            (tmp_path / "y.unv").write_text(two())  # without systems
-            plain = rom.io.read_responses(tmp_path / "y.unv", averages=5, coherence=0.9)
+            test, plain = read(tmp_path / "x.unv", text), read(tmp_path / "y.unv", two())
             assert_array_equal(test.sensors.points, plain.sensors.points)
             continue
         with pytest.raises(FileFormatError, match="node 8 is in the local coordinate system 3 HUB"):
-            rom.io.read_responses(tmp_path / "x.unv", averages=5, coherence=0.9)
+            read(tmp_path / "x.unv", text)
 
 
 @pytest.mark.parametrize(("turned", "same"), [(0.0, True), (1e-3, False)])
@@ -282,21 +282,19 @@ def test_a_coordinate_system_of_dataset_2420(turned, same, tmp_path):
     A[0, 1] = turned
     given = f"{1:10d}\nPART\n" + systems(2420, 3, 0, 0, A)
     node = two().replace(f"{8:10d}{0:10d}{0:10d}", f"{8:10d}{3:10d}{3:10d}")
-    (tmp_path / "x.unv").write_text(f"{-1:6d}\n{2420:6d}\n{given}{-1:6d}\n{node}")
+    path, text = tmp_path / "x.unv", f"{-1:6d}\n{2420:6d}\n{given}{-1:6d}\n{node}"
     if same:
-        rom.io.read_responses(tmp_path / "x.unv", averages=5, coherence=0.9)
+        read(path, text)
     else:
         with pytest.raises(FileFormatError, match="node 8 is in the local coordinate system 3 HUB"):
-            rom.io.read_responses(tmp_path / "x.unv", averages=5, coherence=0.9)
-    (tmp_path / "x.unv").write_text(f"{-1:6d}\n{18:6d}\n{3:10d}\n{-1:6d}\n{node}")
+            read(path, text)
     with pytest.raises(FileFormatError, match="dataset 18 or 2420 is cut"):
-        rom.io.read_responses(tmp_path / "x.unv", averages=5, coherence=0.9)
+        read(path, f"{-1:6d}\n{18:6d}\n{3:10d}\n{-1:6d}\n{node}")
 
 
 def test_pairs_that_were_not_measured_do_not_count(tmp_path):
     """Sensor 7 by force 11, and 8 by 7: two of four responses."""
-    (tmp_path / "x.unv").write_text(two(reference=(7, 2)))
-    test = rom.io.read_responses(tmp_path / "x.unv", averages=5, coherence=0.9)
+    test = read(tmp_path / "x.unv", two(reference=(7, 2)))
     assert test.H.shape == (X.size, 2, 2)
     assert_array_equal(test.coherence[0] > 0, [[False, True], [True, False]])
     assert isinstance(test, Responses) and np.isfinite(test.H[:, [0, 1], [1, 0]]).all()
@@ -338,13 +336,10 @@ def test_lines_in_other_units_and_texts_in_other_alphabets_are_read(tmp_path):
         path.write_text(whole.replace("[Hz]", new).replace("0,02", "0.02", new == "[Hz]"))
         with pytest.raises(FileFormatError, match=words):
             rom.io.read_responses(path, **options)
-    path, label = tmp_path / "x.unv", f"{18:10d}{0:5d}{0:5d}{0:5d} {'NONE':<20} {'NONE':<20}"
-    options = {"averages": 5, "coherence": 0.9}
-    path.write_text(two().replace(label, label[:-20] + f"{'rad/s':<20}"))
-    assert_allclose(rom.io.read_responses(path, **options).frequencies, X / (2 * np.pi))
-    path.write_text(two().replace(label, label[:-20] + f"{'rpm':<20}"))
+    path = tmp_path / "x.unv"
+    assert_allclose(read(path, labelled("rad/s", 18)).frequencies, X / (2 * np.pi))
     with pytest.raises(FileFormatError, match="the unit 'rpm' is no frequency"):
-        rom.io.read_responses(path, **options)
+        read(path, labelled("rpm", 18))
 
 
 def test_values_that_are_no_responses_are_refused(tmp_path):

@@ -10,7 +10,7 @@ The rest has no momentum and no angular momentum: the condition of Tisserand. A 
 over a reference obeys that of Eckart; in a flexible body this is the mean-axis frame, and for small
 deformations both are. The toys of N bodies, which are Newton's, show what remains of mechanics:
 shapes, and a time read off them. Nothing here is about gravity as geometry. `projection` matches,
-`bodies` are the toys, `shapes` those of three, `linking` the one system of which the motions of
+`bodies` are the toys and the shapes of three, `linking` the one system of which the motions of
 Newton and of shapes are two gauges, `field` what the doctor compiles.
 
 Source:

@@ -1,4 +1,5 @@
 from rom.components.best_matching.bodies import Bodies as Bodies
+from rom.components.best_matching.bodies import ShapeSphere as ShapeSphere
 from rom.components.best_matching.linking import Extended as Extended
 from rom.components.best_matching.linking import Linking as Linking
 from rom.components.best_matching.linking import newton_gauge as newton_gauge
@@ -10,4 +11,3 @@ from rom.components.best_matching.projection import generators as generators
 from rom.components.best_matching.projection import match as match
 from rom.components.best_matching.projection import rigid_part as rigid_part
 from rom.components.best_matching.projection import stacked as stacked
-from rom.components.best_matching.shapes import ShapeSphere as ShapeSphere

@@ -125,14 +125,13 @@ class Linking:
         T, V = bodies.kinetic(v), bodies.potential(x)
         p = bodies.mass[:, None] * v
         span, motion = np.sqrt(bodies.size(x)), np.sqrt(2 * T * bodies.mass.sum())
-        wrong = {
+        whole = {
             "energy": abs(T + V) / max(T, -V),
             "momentum": np.abs(p.sum(axis=0)).max() / max(motion, 1e-300),
             "angular momentum": np.abs(np.cross(x, p).sum(axis=0)).max()
             / max(span * np.sqrt(2 * T), 1e-300),
         }
-        wrong = {name: float(size) for name, size in wrong.items() if not size < MOMENTUM_RTOL}
-        if wrong:
+        if wrong := {name: float(x) for name, x in whole.items() if not x < MOMENTUM_RTOL}:
             raise ModelError(
                 f"not zero, relative to their scale: {wrong}.",
                 hint="`Bodies.at_rest_as_a_whole` takes them out.",
@@ -195,9 +194,8 @@ class Linking:
         """
         x, p = self.bodies.centred(x), configuration(p)
         self.bodies.potential(x)
-        if abs(self.bodies.size(x) - 1) > SIZE_RTOL or abs((x * p).sum()) > SIZE_RTOL * max(
-            1.0, float(np.abs(p).max())
-        ):
+        growth = abs((x * p).sum()) / max(1.0, float(np.abs(p).max()))
+        if max(abs(self.bodies.size(x) - 1), growth) > SIZE_RTOL:
             raise ModelError("shapes must have the size sum m x^2 = 1 and no growth sum x . p.")
         y = np.concatenate([x.ravel(), p.ravel()])
         Y = integrated(self._shape_rates, y, D).reshape(len(D), 2, -1, 3)

@@ -192,5 +192,4 @@ def _weighted(mass: Any, V: Array) -> Array:
 
 def configuration(x: Array) -> Array:
     """Finite positions or velocities (n, 3)."""
-    x = np.ascontiguousarray(finite("a configuration", x, (None, 3)))
-    return x
+    return np.ascontiguousarray(finite("a configuration", x, (None, 3)))

@@ -144,13 +144,8 @@ class BodyFamily:
         if stress is not None and fields:
             parts = [share.stress for share in self.shares]
             stress = StressRecovery(stress.points, _sum(k, parts))
-        return replace(
-            self.body,
-            **fields_of(integrals),
-            K=_sum(k, [share.K for share in self.shares]),
-            stress=stress,
-            **made,
-        )
+        K = _sum(k, [share.K for share in self.shares])
+        return replace(self.body, **fields_of(integrals), K=K, stress=stress, **made)
 
     def _stretched(
         self, stretch: Stretch, point: Point, factors: tuple[Array, Array]
@@ -162,11 +157,9 @@ class BodyFamily:
         return stretched_body(self.body, stretch, terms, (*factors, np.array(t)), (w, at_centre))
 
     def __str__(self) -> str:
-        ranges = [
-            f"{name}: {p} times {p.low:g} to {p.high:g}" for name, p in self.parameters.items()
-        ]
-        frame = reference_label(self.reference)
+        frame, each = reference_label(self.reference), self.parameters.items()
         head = f"{self.body.name}: {self.body.n_modes} elastic coordinates, {frame} frame"
+        ranges = [f"{name}: {p} times {p.low:g} to {p.high:g}" for name, p in each]
         return "\n  ".join([head, *ranges])
 
 

@@ -48,12 +48,11 @@ class Stretch:
     def fields(self, points: Array) -> Array:
         """(2 + number of regions, k, 3): the part that stays, outside all layers, in each region.
 
-        Args:
-            points: (k, 3) nominal positions [m].
+        Points are nominal positions (k, 3) [m].
         """
         x = points[:, self.axis]
         lengths = [
-            sum(np.clip(x, low, high) - np.clip(0.0, low, high) for low, high in intervals)
+            sum(np.clip(x, *ends) - np.clip(0.0, *ends) for ends in intervals)
             for intervals in self.layers
         ]
         X = np.zeros((2 + len(lengths), *points.shape))
@@ -98,8 +97,7 @@ def stretched_body(
         factors: of stiffness, mass and thickness per region.
         weights: of the fields at this point and at the centre.
     """
-    (integrals, stiffness), (k, m, t) = terms, factors
-    w, at_centre = weights
+    (integrals, stiffness), (k, m, t), (w, at_centre) = terms, factors, weights
     n = w.size
     mass = float((m * t) @ [part.mass for part in integrals])
     S: Any = sum(c * part.S for c, part in zip(m * t, integrals, strict=True))
@@ -129,12 +127,9 @@ def stretched_body(
 
 
 def _coordinates(body: FlexibleBody, R: Array, M: Array) -> Array:
-    """(6 + r, r') motions that keep the interfaces rigid and have no momentum.
+    """(6 + r, r') motions that keep the interfaces rigid, as markers know them, without momentum.
 
-    Args:
-        body: its markers know the coordinates of the interfaces.
-        R: (6 + r, 6) rigid motions.
-        M: (6 + r, 6 + r) mass.
+    By rigid motions (6 + r, 6) and mass (6 + r, 6 + r).
     """
     scale = 1 / np.sqrt(np.diag(M))
     rows = []

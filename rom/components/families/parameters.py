@@ -44,12 +44,10 @@ class Parameter:
     def __post_init__(self) -> None:
         if self.region is not None:
             check_text(self.region, "a region")
-        for name in ("low", "high"):
-            number(f"{name} of {self}", getattr(self, name), error=ParameterError)
-        if not 0.0 < self.low <= self.high:
-            raise ParameterError(
-                f"{self}: needed is 0 < low <= high, got {self.low:g}, {self.high:g}."
-            )
+        low = number(f"low of {self}", self.low, error=ParameterError)
+        high = number(f"high of {self}", self.high, error=ParameterError)
+        if not 0.0 < low <= high:
+            raise ParameterError(f"{self}: needed is 0 < low <= high, got {low:g}, {high:g}.")
         for end in dict.fromkeys((self.low, self.high)):
             warn_outside(FACTOR, end, str(self))
 
@@ -122,11 +120,7 @@ KINDS = {kind.__name__: kind for kind in (YoungsModulus, Density, Thickness)}
 
 
 def checked_parameters(parameters: dict[str, Any]) -> dict[str, Parameter]:
-    """The parameters by name.
-
-    Raises:
-        ParameterError: if there is none, or a name or a parameter is none.
-    """
+    """The parameters by name, if they are such."""
     for name, value in parameters.items():
         if type(value) not in KINDS.values():
             raise ParameterError(
@@ -148,24 +142,16 @@ def checked_parameters(parameters: dict[str, Any]) -> dict[str, Parameter]:
 def complete(
     parameters: dict[str, Parameter], values: dict[str, Any], *, extrapolate: bool = False
 ) -> Point:
-    """Factors of all parameters; one for those not given.
+    """Factors of all parameters, positive and within their ranges; one for those not given.
 
-    Args:
-        parameters: by name.
-        values: {name: factor}.
-        extrapolate: warn about factors outside the range instead of refusing them.
-
-    Raises:
-        ParameterError: if a name is unknown, or a factor no positive number or out of its range.
+    Those outside a range are refused, or announced where one extrapolates.
     """
     if unknown := sorted(set(values) - set(parameters)):
         raise ParameterError(
             f"there is no parameter {named(unknown)}; the family has {sorted(parameters)}."
         )
-    return {
-        name: _checked(name, parameter, values.get(name, 1.0), extrapolate)
-        for name, parameter in parameters.items()
-    }
+    each = parameters.items()
+    return {name: _checked(name, p, values.get(name, 1.0), extrapolate) for name, p in each}
 
 
 def _checked(name: str, parameter: Parameter, value: Any, extrapolate: bool) -> float:
@@ -221,12 +207,8 @@ def _inverse(k: int, base: int) -> float:
 
 def factor(parameters: dict[str, Parameter], kind: type, region: str | None, point: Point) -> float:
     """Product of all factors of that kind that act on a region; None for what no region names."""
-    acting = [
-        point[name]
-        for name, parameter in parameters.items()
-        if isinstance(parameter, kind) and parameter.region in (None, region)
-    ]
-    return float(np.prod(acting))
+    alike = {name: p.region for name, p in parameters.items() if isinstance(p, kind)}
+    return float(np.prod([point[name] for name in alike if alike[name] in (None, region)]))
 
 
 def factors(
@@ -245,7 +227,5 @@ def written(parameters: dict[str, Parameter]) -> dict[str, Any]:
 
 def read(text: dict[str, Any]) -> dict[str, Parameter]:
     """The parameters that were `written`."""
-    return {
-        name: KINDS[entry["kind"]](**{key: value for key, value in entry.items() if key != "kind"})
-        for name, entry in text.items()
-    }
+    fields = {name: dict(entry) for name, entry in text.items()}
+    return {name: KINDS[entry.pop("kind")](**entry) for name, entry in fields.items()}

@@ -1,18 +1,35 @@
-"""The short road for parameters: one reduction for a range of them."""
+"""The short road for parameters: one reduction for a range of them.
+
+Bases at several points join into one, without what repeats. All keep the interface coordinates, so
+that a shape of one point minus the constraint modes of the first, moved as its interfaces are,
+leaves the interfaces at rest::
+
+    Psi = [ Psi_b(p_0)  Phi(p_0)  Y ],   span Y of  Psi(p_s) - Psi_b(p_0) [Psi(p_s)]_b
+
+The constraint modes of the first point contain the rigid motions, at every other point too. Errors
+are estimated as the basis grows, and compared with full models where it was not made.
+"""
 
 import logging
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from rom.arguments import between, typed
 from rom.body.damping import ModalDamping, Rayleigh
-from rom.body.projection import stress_recovery
-from rom.checks.draft import Stage, run, wanted
-from rom.components.families.affine import AffineModel
-from rom.components.families.common_basis import first_sample
-from rom.components.families.evidence import FamilyDraft, certify, estimated
+from rom.body.projection import elastic_part, stress_recovery
+from rom.checks.certificate import (
+    attach,
+    basis_matrices,
+    compared,
+    condensed_model,
+    full_support,
+    reduced_shapes,
+    rigid_rows,
+)
+from rom.checks.draft import COMPARISON_STAGE, Draft, Stage, run, wanted
+from rom.components.families.affine import AffineModel, StretchedModel
 from rom.components.families.family import BodyFamily
 from rom.components.families.parameters import (
     Parameter,
@@ -24,19 +41,41 @@ from rom.components.families.parameters import (
     scattered,
     written,
 )
-from rom.components.families.stretched import StretchedModel
-from rom.errors import ParameterError
-from rom.model import FEModel
+from rom.eigen.verbs import Operators, residual_errors
+from rom.errors import ConfigError, ParameterError
+from rom.model import Array, Basis, FEModel, Index, Report, Row
 from rom.names import check_name
 from rom.reduction.bases.method import Method
 from rom.reduction.interfaces.characteristic import Characteristic
 from rom.reduction.interfaces.connection import connect as connected
+from rom.reduction.interfaces.records import Connection
+from rom.rows import N_COMPARED, frequency_rows, row
 from rom.stages.bodies import connect, few_functions, make_body, place_frame, project
 
 log = logging.getLogger("rom")
 SHAPE_RATIO = 0.1  # of the square root of the tolerance: a shape dropped costs its square in energy
 TRIALS_PER_PARAMETER = 2  # points at which errors are estimated while the basis grows
 METHOD_ERROR_FACTOR = 2.0  # times the error at the centre, which more points do not reduce
+LAST_MODE_SHARE = 0.3  # part of the last normal mode, by size, that is too little to be kept
+SHAPE_RTOL = 1e-7  # of a shape's own size: remainders below are round-off
+HELD_OUT = 3  # points of the certificate
+
+
+@dataclass(kw_only=True)
+class FamilyDraft(Draft):
+    """The reduction of a family under way; its model is that at the centre of the ranges.
+
+    Attributes:
+        affine: the model at all points.
+        tol: error of frequencies that is accepted [1].
+        samples: points whose bases have joined.
+        n_trials: number of points at which errors were estimated as the basis grew.
+    """
+
+    affine: AffineModel
+    tol: float
+    samples: list[Point]
+    n_trials: int = 0
 
 
 @typed
@@ -189,3 +228,137 @@ def join_bases(draft: FamilyDraft) -> None:
     if affine.ops.first == 0:
         log.info("%d points sampled, %d of them trials; %d columns", len(draft.samples), sum(added),
                  common.basis.Psi.shape[1])  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class CommonBasis:
+    """A basis that grows by the bases of further points.
+
+    Attributes:
+        ops: operators at the first point, in interface coordinates.
+        basis: interface columns first.
+        n_b: number of interface coordinates.
+        weight: factor of M in the inner product K + weight M [rad^2/s^2].
+        small: size of what is dropped, of the shape it belongs to; errors of frequencies are its
+            square.
+    """
+
+    ops: Operators
+    basis: Basis
+    n_b: int
+    weight: float
+    small: float
+
+    def joined(self, other: Basis, boundary: Index) -> "CommonBasis":
+        """With what is new of a basis at another point; dofs (n_b,) of the interface coordinates.
+
+        The error that a normal mode leaves falls with the square of its frequency, and the method
+        stopped at the last one: of the others the more must be kept the lower they are.
+        """
+        weight = np.ones(other.Psi.shape[1])
+        if other.omega.size:
+            falling = self.small / LAST_MODE_SHARE * (other.omega[-1] / other.omega) ** 2
+            weight[-other.omega.size :] = np.minimum(falling, 1.0)
+        return self.with_shapes(other.Psi * weight, boundary, max(self.small, SHAPE_RTOL), weight)
+
+    def with_shapes(
+        self, shapes: Array, boundary: Index, small: float = SHAPE_RTOL, weight: Array | float = 1.0
+    ) -> "CommonBasis":
+        """With what is new in shapes (n_local, k), dropped below a size of those of weight one."""
+        ops, Psi = self.ops, self.basis.Psi
+        inner = self._orthonormal(Psi[:, self.n_b :], 0.0)
+        size = np.sqrt(np.diag(self._product(shapes, shapes))) / weight
+        X = (shapes - Psi[:, : self.n_b] @ ops.rows(shapes, boundary)) / size
+        for _ in range(2):
+            X = X - inner @ self._product(inner, X)
+        Y = self._orthonormal(X, small)
+        first = Psi.shape[1] - self.n_b
+        labels = tuple(f"sampled {first + k + 1}" for k in range(Y.shape[1]))
+        basis = Basis(np.hstack([Psi, Y]), self.basis.omega, self.basis.labels + labels)
+        return replace(self, basis=basis)
+
+    def _product(self, X: Array, Y: Array) -> Array:
+        ops = self.ops
+        return ops.gram(X, ops.apply_K(Y) + self.weight * ops.apply_M(Y))
+
+    def _orthonormal(self, X: Array, small: float) -> Array:
+        """Orthonormal columns of the span of X, principal directions below a size left out."""
+        if not X.shape[1]:
+            return X
+        G = self._product(X, X)
+        scale = 1 / np.sqrt(np.diag(G)) if small == 0.0 else np.ones(X.shape[1])
+        lam, U = np.linalg.eigh(scale[:, None] * (0.5 * (G + G.T)) * scale)
+        kept = np.flatnonzero(lam > max(small**2, 1e-14 * lam[-1]))[::-1]
+        return X @ (scale[:, None] * U[:, kept] / np.sqrt(lam[kept]))
+
+
+def first_sample(ops: Operators, basis: Basis, boundary: Index, small: float) -> CommonBasis:
+    """The basis of the first point, by a method that keeps interface coordinates, dofs (n_b,)."""
+    n_b = boundary.size
+    moved = ops.rows(basis.Psi[:, :n_b], boundary) if basis.Psi.shape[1] >= n_b > 0 else None
+    if moved is None or np.abs(moved - np.eye(n_b)).max() > 1e-9:
+        raise ConfigError(
+            "the bases of several parameters join in their interface coordinates, which this "
+            "method does not keep.",
+            hint="Use CraigBampton, Guyan or MomentMatching, and name an interface.",
+        )
+    X = basis.Psi
+    K, M = (np.diag(ops.gram(X, AX)) for AX in (ops.apply_K(X), ops.apply_M(X)))
+    elastic = K > 1e-9 * (K / M).max() * M
+    weight = float((K[elastic] / M[elastic]).min(initial=np.inf))
+    return CommonBasis(ops, basis, n_b, weight if np.isfinite(weight) else 1.0, small)
+
+
+def _supports(connection: Connection) -> list[tuple[str, ...]]:
+    return [(), *((name,) for name in connection.parts)]
+
+
+def estimated(connection: Connection, basis: Basis) -> float:
+    """The largest estimated error of the first frequencies, free and on each interface."""
+    ops, worst = connection.ops, 0.0
+    inner = ops.hold(connection.boundary)
+    for fixed in _supports(connection):
+        n_rigid = 0 if fixed else 6
+        held = sum(connection.parts[name].size for name in fixed)
+        n = min(N_COMPARED, basis.Psi.shape[1] - held - n_rigid)
+        if n > 0:
+            shapes = reduced_shapes(connection, basis, fixed, n + n_rigid)[:, n_rigid:]
+            worst = max(worst, float(residual_errors(ops, inner, shapes).max()))
+    return worst
+
+
+def certify(draft: FamilyDraft) -> None:
+    """Compare bodies of the family with full models, at points that were not sampled."""
+    draft.watch.begin(COMPARISON_STAGE)
+    affine, family, basis, kinds = draft.affine, draft.body, draft.basis, draft.interfaces
+    if affine.stretch is not None:  # its interfaces are rigid at each thickness in another way
+        kinds = dict.fromkeys(kinds, "rbe2")
+    rows: list[Row] = []
+    comparison: dict[str, Any] = {}
+    own = replace(basis, held=None)  # of another point
+    for point in scattered(affine.parameters, HELD_OUT, 1 + draft.n_trials):
+        where = ", ".join(f"{name} = {value:.4g}" for name, value in point.items())
+        ops, body = affine.at(point), family.at(extrapolate=False, **point)
+        here = connected(ops, affine.model_at(point), kinds)
+        found: list[Row] = []
+        reduction: Any = None  # the basis of a stretched body depends on the thickness
+        if affine.stretch is None:
+            matrices = basis_matrices(here.ops, basis)
+            reduction = basis, condensed_model(here, own, matrices[0]), matrices
+        for fixed in _supports(here):
+            known = reduction is not None or here.ops.affordable
+            support = full_support(here, reduction and reduction[1], fixed) if known else None
+            table = compared(here, ops, body, reduction, fixed, support)
+            if not table["reduced"]:
+                continue
+            words = " + ".join(fixed) + " held" if fixed else "free"
+            comparison[f"{where}: {words}"] = table
+            if table["full"]:
+                found += frequency_rows(words, table, draft.tol)
+            elif table["estimated"]:
+                label = f"{words}: estimated error of {len(table['reduced'])} frequencies"
+                found.append(row(label, max(table["estimated"]), draft.tol))
+        found += rigid_rows(ops, body, elastic_part(ops, draft.Psi))
+        rows += [replace(line, quantity=f"{where}: {line.quantity}") for line in found]
+    report = Report(f"certificate of the family {family.body.name}", tuple(rows))
+    attach(draft, report, comparison, f"family {draft.name!r}")

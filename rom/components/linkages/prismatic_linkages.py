@@ -24,7 +24,7 @@ from rom.components.linkages.chains import (
     MovedMass,
     both,
     directions,
-)  # fmt: skip
+)
 from rom.errors import ModelError
 from rom.model import Array, Index
 

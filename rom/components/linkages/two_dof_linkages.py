@@ -27,7 +27,7 @@ from rom.components.linkages.chains import (
     MovedMass,
     both,
     directions,
-)  # fmt: skip
+)
 from rom.errors import ConfigError, ModelError
 from rom.mbs.equations.equations import linearize_constraints
 from rom.mbs.equations.packing import pack

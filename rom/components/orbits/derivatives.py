@@ -17,8 +17,7 @@ import numpy.typing as npt
 from scipy.linalg import block_diag
 
 from rom import rotation
-from rom.components.orbits.beside import Beside
-from rom.components.orbits.flow import Start
+from rom.components.orbits.flow import Beside, Start
 from rom.components.orbits.shooting import Return, energy
 from rom.mbs.analysis.local_equations import MAX_DENSE, difference
 from rom.mbs.kernels.system import ROLL
@@ -73,11 +72,7 @@ class Tangent:
         return replace(self, E=self.E + np.outer(missed, y) / size, own=False)
 
     def measured(self, Y: Array, d: float = NEAR_PROBE_RTOL) -> tuple["Tangent", float]:
-        """The same with what motions at a distance do in directions (f, k); largest difference.
-
-        Raises:
-            SolverError: if a step fails.
-        """
+        """The same with what motions at a distance do in directions (f, k); largest difference."""
         if not Y.size:
             return self, 0.0
         X = np.linalg.solve(self.B, Y)
@@ -179,14 +174,8 @@ def confirmed(found: Return, known: Tangent | None = None) -> Tangent:
 
     One pair of them moves in all shapes at once. If it ends elsewhere, derivatives are differences
     of such motions: teeth come or go between others, or tangents of steps leave something out.
-    With these, shapes that may be next to growing are moved through the period themselves.
-
-    Args:
-        found: the motion.
-        known: its derivatives as far as they are known.
-
-    Raises:
-        SolverError: if a step fails.
+    With these, shapes that may be next to growing are moved through the period themselves. Known
+    are derivatives of the motion found, or None.
     """
     carried = follows(found)
     if known is None or not known.of(found) or known.carried != carried:
@@ -213,25 +202,19 @@ def confirmed(found: Return, known: Tangent | None = None) -> Tangent:
 
 
 def by_differences(found: Return, d: float = PROBE_RTOL) -> Tangent:
-    """Central differences in each coordinate, of motions that begin at a distance d.
-
-    Raises:
-        SolverError: if a step fails.
-    """
+    """Central differences in each coordinate, of motions that begin at a distance d."""
     f = found.chart.size
-    columns = [varied(found, e, d) for e in np.eye(f)]
-    both = np.array(columns).reshape(f, 2, f)
+    both = np.array([varied(found, e, d) for e in np.eye(f)]).reshape(f, 2, f)
     return Tangent(found, both[:, 0].T, both[:, 1].T)
 
 
 def varied(found: Return, y: Array, d: float) -> tuple[Array, Array]:
     """(f,) derivatives of start and end in a direction (f,), by two motions beside."""
-    chart, starts, ends = found.chart, [], []
-    for x in (d * y, -d * y):
-        beside = Return.of(found.flow, found.turns, chart.moved(x))
-        starts.append(chart.of_state(beside.start.state))
-        ends.append(chart.of_state(beside.turned))
-    return (starts[0] - starts[1]) / (2 * d), (ends[0] - ends[1]) / (2 * d)
+    chart = found.chart
+    pair = [Return.of(found.flow, found.turns, chart.moved(x)) for x in (d * y, -d * y)]
+    ends = np.array([[chart.of_state(s) for s in (one.start.state, one.turned)] for one in pair])
+    start, end = (ends[0] - ends[1]) / (2 * d)
+    return start, end
 
 
 def by_steps(found: Return) -> Tangent:

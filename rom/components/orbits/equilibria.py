@@ -3,12 +3,14 @@
 import warnings
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Annotated
 
 import numpy as np
 import numpy.typing as npt
 from scipy.linalg import eig, eigh, null_space
 
-from rom.arguments import finite, positive, typed, whole
+from rom.arguments import finite, typed
+from rom.arguments.quantities import Count, Positive
 from rom.errors import ConfigError, RomWarning, SolverError, reached
 from rom.mbs.analysis.equilibrium import equilibrium
 from rom.mbs.analysis.few_modes import Pencil
@@ -90,8 +92,8 @@ def continuation(
     *,
     state: State | None = None,
     along: npt.ArrayLike | None = None,
-    n: int = 500,
-    step: float = 0.1,
+    n: Annotated[int, Count(2, MAX_POINTS)] = 500,
+    step: Annotated[float, Positive()] = 0.1,
 ) -> EquilibriumPath:
     """Follow equilibria while loads and drives change, also where no load path is left to follow.
 
@@ -135,8 +137,6 @@ def continuation(
     first, last = finite("span", span, (2,))
     if first == last:
         raise ConfigError(f"span = ({first:g}, {last:g}) s needs two values that differ.")
-    whole("n", n, 2, MAX_POINTS)
-    longest = positive("step", step)
     now = instant(mechanism, first, sparse=True)
     march = _March(_Equilibria.of(now, abs(last - first)), (first, last))
     if along is None:
@@ -148,7 +148,7 @@ def continuation(
     else:
         begin = march.branch(state, finite("along", along, state.v.shape))
     with reached(lambda: march.path):
-        march.go(begin, longest, n)
+        march.go(begin, step, n)
     return march.path
 
 
@@ -295,12 +295,7 @@ class _March:
         return self.curve.start(self.still(state), state.t, self.forwards)
 
     def branch(self, state: State, along: Array) -> Point:
-        """The first point, from which only the bodies move.
-
-        Raises:
-            ConfigError: if they do not, or the state lies outside the span, or is of another
-                mechanism.
-        """
+        """The first point, from which only the bodies move."""
         now = self.problem.now
         now.remember(state)
         if (np.size(state.q), np.size(state.lam)) != (now.packed.q.size, now.W.value.size):
@@ -319,11 +314,7 @@ class _March:
         return self.problem.moved(state, np.zeros(state.v.size + state.lam.size), state.t)
 
     def go(self, point: Point, longest: float, n: int) -> None:
-        """Follow the path from a point until time leaves the span, or there are n points.
-
-        Raises:
-            SolverError: where the path ends.
-        """
+        """Follow the path from a point until time leaves the span, or there are n points."""
         self.add(point)
         try:
             for one, h, two in self.curve.steps(point, longest):

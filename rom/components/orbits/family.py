@@ -10,10 +10,8 @@ from scipy.integrate import trapezoid
 from rom.arguments import positive
 from rom.components.orbits.derivatives import Tangent, by_differences, by_steps, follows
 from rom.components.orbits.flow import Flow, Start
-from rom.components.orbits.motion import PeriodicMotion
-from rom.components.orbits.search import GOOD_RATIO, Shooting
-from rom.components.orbits.shooting import Return
-from rom.components.orbits.turns import Turns, turns_of
+from rom.components.orbits.motion import GOOD_RATIO, PeriodicMotion, Shooting
+from rom.components.orbits.shooting import Return, Turns, turns_of
 from rom.errors import ConfigError, ModelError, SolverError
 from rom.mbs.mechanism import Mechanism
 from rom.model import Array
@@ -26,11 +24,7 @@ Period = float | Callable[[float], float] | None
 
 
 def period_at(period: Period, p: float) -> float | None:
-    """The period at a parameter [s]; None where it is found.
-
-    Raises:
-        ConfigError: if it is not positive.
-    """
+    """The period at a parameter [s]; None where it is found."""
     if period is None:
         return None
     return positive("period", period(p) if callable(period) else period)
@@ -95,17 +89,13 @@ class Family:
             T = period_at(self.period, p)
             t0 = self.first.state.t
             made = Flow(self.build(p), t0, T or period, self.steps, self.rho_inf)
-            self._check_size(made, p)
+            if made.packed.q.size != self.first.solution.q.shape[1]:
+                raise ConfigError(f"the bodies at {p:g} must be those at the first value.")
             self.flows[p] = made
             for old in list(self.flows)[:-4]:
                 del self.flows[old]
         flow = self.flows[p]
         return flow if flow.period == period or not self.free else flow.lasting(period)
-
-    def _check_size(self, flow: Flow, p: float) -> None:
-        q = self.first.solution.q
-        if flow.packed.q.size != q.shape[1]:
-            raise ConfigError(f"the bodies at {p:g} must be those at the first value.")
 
     def turning(self, flow: Flow, start: Start) -> Turns:
         """What advances."""
@@ -143,12 +133,10 @@ class Family:
         chart, flow, still = found.chart, self.flow(p + d, T), 0.0 * found.start.state.v
         start = flow.moved(found.start, still, self.faster(found.flow.period, T))
         later = self.returned(Member(start, T), p + d, chart)
-        moved = chart.of_state(later.turned) - chart.of_state(start.state) - chart.seen(
-            still, found.start.ahead)  # fmt: skip
-        self.tangent, self.by_p = (
-            (by_steps if follows(found) else by_differences)(found),
-            (moved - found.gap) / d,
-        )
+        moved = chart.of_state(later.turned) - chart.of_state(start.state)
+        moved = moved - chart.seen(still, found.start.ahead)
+        self.tangent = (by_steps if follows(found) else by_differences)(found)
+        self.by_p = (moved - found.gap) / d
         return found
 
     def _step(self, found: Return, y: Array) -> Array:
@@ -159,11 +147,7 @@ class Family:
         return np.concatenate([dq / self.scale, chart.time * dv / self.scale, [dT]])
 
     def moved(self, at: Member, step: Array, p: float) -> Member:
-        """The start after a step.
-
-        Raises:
-            SolverError: if no state nearby satisfies the joints.
-        """
+        """The start after a step."""
         n = at.start.state.v.size
         period = at.period * (1 + step[-1]) if self.free else (period_at(self.period, p) or 0.0)
         if not 0.5 * at.period < period < 2 * at.period:

@@ -1,4 +1,13 @@
-"""One period of a mechanism in compiled steps, from any start, without what a run keeps."""
+"""One period of a mechanism in compiled steps, from any start, without what a run keeps.
+
+Small motions beside go along by the tangents of its time steps: a step of generalised-alpha moves
+positions, velocities and accelerations so that the equations of motion hold at its end. Their
+derivatives say how a small change of all that goes on, for all changes at once.
+
+Source:
+    Bruels, Cardona, Arnold, Lie group generalized-alpha time integration of constrained flexible
+    multibody systems, Mech. Mach. Theory 48 (2012) 121.
+"""
 
 from copy import copy
 from dataclasses import dataclass, replace
@@ -9,10 +18,9 @@ from typing import Any
 import numpy as np
 
 from rom import rotation
-from rom.components.orbits.beside import Beside
 from rom.mbs.analysis.local_equations import DIFFERENCE_STEP, Instant
 from rom.mbs.elements.family import apply_laws
-from rom.mbs.equations.equations import evaluate, retract
+from rom.mbs.equations.equations import evaluate, retract, tangents
 from rom.mbs.equations.packing import Packed, pack
 from rom.mbs.integrate import generalized_alpha as alpha
 from rom.mbs.integrate.consistent_start import (
@@ -32,6 +40,7 @@ from rom.model import Array
 
 # of Newton's method in a step, of what accelerations move: derivatives are differences of ends
 STEP_TOLERANCE = 1e-13
+REDUNDANT_RTOL = 1e-12  # singular value of constraints that repeat others, of the largest one
 LAWS_OWNER = "laws"  # owner of the only numbers that elements remember and that are no angles
 
 
@@ -51,18 +60,7 @@ class Start:
 
 
 class Flow:
-    """A mechanism that moves through a time again and again.
-
-    Args:
-        mechanism: what moves.
-        t0: time at which it begins [s].
-        period: its length [s].
-        steps: number of time steps.
-        rho_inf: of generalised-alpha.
-
-    Raises:
-        SolverError: if a drive or load is not finite.
-    """
+    """A mechanism that moves through a period from t0 [s] again and again, in a number of steps."""
 
     def __init__(self, mechanism: Mechanism, t0: float, period: float, steps: int, rho_inf: float):
         numbers = (t0, t0 + period, period / steps, steps, rho_inf, STEP_TOLERANCE, 1e-4, 1e-12)
@@ -112,8 +110,8 @@ class Flow:
     @property
     def law_memory(self) -> slice:
         """Where `State.base` has what laws of the user remember."""
-        remembered, at = self.packed.places.remembered, self.packed.system.coordinates.kind.size
-        for owner, numbers in remembered.items():
+        at = self.packed.system.coordinates.kind.size
+        for owner, numbers in self.packed.places.remembered.items():
             if owner == LAWS_OWNER:
                 return slice(at, at + numbers.size)
             at += numbers.size
@@ -124,19 +122,14 @@ class Flow:
         return initial_state(self.packed, self.t0, self.settings.spacing, placing=True)
 
     def begun(self, state: State) -> Start:
-        """A state as the start of a run would have it.
-
-        Raises:
-            ModelError: if the state does not satisfy the joints.
-        """
+        """A state as the start of a run would have it."""
         ready = self.packed.of_rank(state.rank)
         if ready is not self.packed:
             self._take(ready)
         state = replace(state, t=self.t0, memory=None, algorithmic=None)
         state = self._fitted(state.q, state.v, state)
         self.step, found = begin(self.record, self.W, state, self.packed.asked, self.settings.h)
-        ahead = self.step.v - found.v
-        return Start(found, ahead, self.step.a - found.a)
+        return Start(found, self.step.v - found.v, self.step.a - found.a)
 
     def _fitted(self, q: Array, v: Array, like: State) -> State:
         """The nearest state that satisfies the constraints, with its accelerations."""
@@ -171,12 +164,8 @@ class Flow:
         retract(self.packed.system, start.state.q, np.ascontiguousarray(dq), q)
         return self.at(q, start.state.v + dv, start)
 
-    def end(self, start: Start, beside: Beside | None = None) -> State:
-        """The state a period later; small motions beside it go along.
-
-        Raises:
-            SolverError: if a step fails.
-        """
+    def end(self, start: Start, beside: "Beside | None" = None) -> State:
+        """The state a period later; small motions beside it go along."""
         step, table = self._reset(start), self.table[1:]
         out = space(self.W, step, 1)
         for signals in (table,) if beside is None else table[:, None]:
@@ -250,3 +239,72 @@ class Flow:
             out[to + 3 : to + 6] = rotation.log(turn / np.linalg.norm(turn))
             out[to + 6 : to + 6 + r] = two.q[at + 7 : at + 7 + r] - one.q[at + 7 : at + 7 + r]
         return out
+
+
+@dataclass
+class Beside:
+    """Changes of the state of the method, columns.
+
+    Attributes:
+        now: the equations.
+        q, v, vd, a: (n, f) of positions, as motions of the bodies, of velocities, accelerations,
+            and the acceleration-like variable.
+    """
+
+    now: Instant
+    q: Array
+    v: Array
+    vd: Array
+    a: Array
+
+    def follow(self, step: Step, base: Array, signal: Array) -> None:
+        """Go through a step that was taken, from what was remembered (c,) to drives at its end."""
+        h, beta, gamma, alpha_m, alpha_f = step.method
+        known = (alpha_f * self.vd - alpha_m * self.a) / (1 - alpha_m)
+        share = (1 - alpha_f) / (1 - alpha_m)
+        still_v = self.v + h * ((1 - gamma) * self.a + gamma * known)
+        psi = h * self.v + h * h * ((0.5 - beta) * self.a + beta * known)
+        back, turn = self._turning(step.psi)
+        still_q = back @ self.q + turn @ psi
+        M, C, K, G = self._matrices(step, base, signal)
+        by_v, by_q = gamma * h * share, beta * h * h * share * turn
+        x = _bordered(
+            M + by_v * C + K @ by_q, G, G @ by_q, -K @ still_q - C @ still_v, -G @ still_q
+        )
+        self.q, self.v, self.vd = still_q + by_q @ x, still_v + by_v * x, x
+        self.a = known + share * x
+
+    def _matrices(self, step: Any, base: Array, signal: Array) -> tuple[Array, Array, Array, Array]:
+        """Derivatives by accelerations, velocities and positions; gradient of the constraints."""
+        now, W = self.now, self.now.W
+        W.base[:], W.signal[:] = base, signal
+        now.residual(step.q, step.v, step.vd, step.lam)
+        tangents(now.system, W, step.v, step.vd, step.lam, (1.0, 0.0, 1.0))
+        M, K = W.S.copy(), W.Kt.copy()
+        tangents(now.system, W, step.v, step.vd, step.lam, (0.0, 1.0, 0.0))
+        return M, W.S.copy(), K, now.gradient(step.q, step.v)[1]
+
+    def _turning(self, psi: Array) -> tuple[Array, Array]:
+        """(n, n) change of the position at the end of a step by that before, and by increments."""
+        back, turn = np.eye(psi.size), np.eye(psi.size)
+        for first in self.now.system.bodies.v_at + 3:
+            at = slice(first, first + 3)
+            back[at, at] = rotation.matrix(rotation.exp(psi[at])).T
+            turn[at, at] = rotation.spatial_tangent(-psi[at])
+        return back, turn
+
+
+def _bordered(A: Array, G: Array, by: Array, force: Array, gap: Array) -> Array:
+    """(n, f) answers x of A x + G^T y = force, by x = gap; constraints may repeat others."""
+    if not len(G):
+        return np.linalg.solve(A, force)
+    size = np.sqrt(np.abs(np.diag(A)))
+    rows = np.maximum(np.linalg.norm(by / size, axis=1), 1e-300)
+    columns = np.maximum(np.linalg.norm(G / size, axis=1), 1e-300)
+    whole = np.block([
+        [A / np.outer(size, size), (G / size / columns[:, None]).T],
+        [by / size / rows[:, None], np.zeros((len(G), len(G)))],
+    ])  # fmt: skip
+    right = np.vstack([force / size[:, None], gap / rows[:, None]])
+    found = np.linalg.lstsq(whole, right, rcond=REDUNDANT_RTOL)[0]
+    return found[: size.size] / size[:, None]

@@ -3,12 +3,13 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import numpy.typing as npt
 
-from rom.arguments import finite, positive, typed, whole
+from rom.arguments import finite, typed
+from rom.arguments.quantities import Count, Positive
 from rom.components.orbits.derivatives import confirmed
 from rom.components.orbits.family import Family, Period, period_at
 from rom.components.orbits.flow import Flow
@@ -102,8 +103,8 @@ def periodic_path(  # noqa: PLR0913  one keyword per choice, most have defaults
     rho_inf: float = RHO_INF,
     guess: float | None = None,
     settle: int = 0,
-    n: int = 500,
-    step: float = 0.1,
+    n: Annotated[int, Count(2, MAX_POINTS)] = 500,
+    step: Annotated[float, Positive()] = 0.1,
     progress: bool = False,
 ) -> PeriodicPath:
     """Follow a motion that repeats while a parameter changes, also where it turns back.
@@ -141,8 +142,6 @@ def periodic_path(  # noqa: PLR0913  one keyword per choice, most have defaults
     first, last = finite("span", span, (2,))
     if first == last:
         raise ConfigError(f"span = ({first:g}, {last:g}) needs two values that differ.")
-    whole("n", n, 2, MAX_POINTS)
-    longest = positive("step", step)
     T = period_at(period, first)
     begin = periodic_motion(
         build(first), period=T, start=start, turns=turns, steps=steps, rho_inf=rho_inf,
@@ -153,7 +152,7 @@ def periodic_path(  # noqa: PLR0913  one keyword per choice, most have defaults
                      0.0 * scale)  # fmt: skip
     march = _March(family, (first, last), progress)
     with reached(lambda: march.path):
-        march.go(begin, longest, n)
+        march.go(begin, step, n)
     return march.path
 
 
@@ -174,11 +173,7 @@ class _March:
         return PeriodicPath(np.array(self.p), tuple(self.motions), tuple(self.critical))
 
     def go(self, begin: PeriodicMotion, longest: float, n: int) -> None:
-        """Follow the path until the parameter leaves the span, or there are n motions.
-
-        Raises:
-            SolverError: where the path is lost.
-        """
+        """Follow the path until the parameter leaves the span, or there are n motions."""
         family = self.family
         point = self.curve.start(family.member(begin, self.first), self.first, self._forwards)
         self.add(point)
@@ -260,11 +255,8 @@ def _pairs(motion: PeriodicMotion) -> float:
     """Product over pairs of complex multipliers of their size minus one; NaN without any."""
     found = motion.deviations
     beyond = np.abs(found[found.imag > REAL_TOL]) - 1.0
-    return (
-        float(np.prod(np.where(np.abs(beyond) < STABLE_TOL, 0.0, beyond)))
-        if beyond.size
-        else np.nan
-    )
+    beyond = np.where(np.abs(beyond) < STABLE_TOL, 0.0, beyond)
+    return float(np.prod(beyond)) if beyond.size else np.nan
 
 
 # what changes its sign where a multiplier crosses the circle, and distances from where it crosses

@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from rom.components.orbits.flow import Flow, Start
-from rom.components.orbits.shooting import Return
-from rom.components.orbits.turns import FULL_TURN, Turns
+from rom.components.orbits.shooting import FULL_TURN, Return, Turns
 from rom.errors import ModelError
 from rom.mbs.kernels.system import ANGLE
 from rom.mbs.parts.signals import Signal
@@ -26,14 +25,7 @@ LATER_RTOL = 1e-2  # the same at the end of a motion whose gap is closed: contac
 def refuse_what_changes(flow: Flow, turns: Turns, start: Start, driven: bool) -> None:
     """Refuse drives, loads and laws that are not the same a period later.
 
-    Args:
-        flow: the mechanism.
-        turns: what advances.
-        start: a state of it.
-        driven: whether the period is given; if not, nothing may depend on time.
-
-    Raises:
-        ModelError: naming the drive, load or law.
+    Where the period is not given, nothing is driven: nothing may depend on time.
     """
     _refuse_memory(flow)
     shift = flow.period if driven else flow.period * np.sqrt(2)  # no period of anything
@@ -77,14 +69,12 @@ def _refuse_parts(one: dict[str, float], two: dict[str, float]) -> None:
 def _refuse_signal(flow: Flow, turns: Turns, signal: Signal, shift: float, driven: bool) -> None:
     t = flow.t0 + SHARES * flow.period
     both = np.concatenate([t, t + shift])
-    spacing = flow.settings.spacing
-    found = signal.sample(both, (-np.inf, np.inf), spacing)
-    one, two = found[: t.size], found[t.size :]
-    change = two - one
+    found = signal.sample(both, (-np.inf, np.inf), flow.settings.spacing)
+    one, change = found[: t.size], found[t.size :] - found[: t.size]
     if signal.width == 1:
         change = change[:, :2]
         change[:, 0] = _beyond(flow, turns, signal.name, change[:, 0])
-        scale = np.abs(one[:, :2]).max(axis=0) + np.array([1e-3, 1e-3]) * np.abs(one[:, 0]).max()
+        scale = np.abs(one[:, :2]).max(axis=0) + 1e-3 * np.abs(one[:, 0]).max()
         scale[1] += scale[0] / flow.period
     else:
         scale = np.abs(found).max()
@@ -93,18 +83,18 @@ def _refuse_signal(flow: Flow, turns: Turns, signal: Signal, shift: float, drive
         change = _much_later(flow, turns, signal, one[:1, : change.shape[1]])
     if np.all(np.abs(change) <= REPEAT_RTOL * np.maximum(scale, 1e-300)):
         return
-    if driven:
-        raise ModelError(
-            f"{signal.name!r} does not repeat with the period {flow.period:.9g} s: a period later "
-            f"it differs by {np.abs(change).max():.3g}.",
-            where=signal.name,
-            hint="Give the period of all drives and loads; turns= says by how much joints advance.",
-        )
-    raise ModelError(
-        f"{signal.name!r} changes with time, so that the period is not free.",
-        where=signal.name,
-        hint="Give period= that of drives and loads.",
-    )
+    by = f"a period later it differs by {np.abs(change).max():.3g}"
+    cure = "Give the period of all drives and loads; turns= says by how much joints advance."
+    raise _changing(flow, signal.name, f"{signal.name!r}", driven, by, cure)
+
+
+def _changing(flow: Flow, name: str, what: str, driven: bool, by: str, cure: str) -> ModelError:
+    """The refusal of what is not the same a period later, or at any time where none is given."""
+    text, hint = f"{what} does not repeat with the period {flow.period:.9g} s: {by}.", cure
+    if not driven:
+        text = f"{what} changes with time, so that the period is not free."
+        hint = "Give period= that of drives, loads and laws."
+    return ModelError(text, where=name, hint=hint)
 
 
 def _much_later(flow: Flow, turns: Turns, signal: Signal, now: Array) -> Array:
@@ -146,27 +136,15 @@ def _refuse_forces(flow: Flow, start: Start, shift: float, driven: bool) -> None
         near = [flow.forces(replace(start.state, t=t * x)) for x in (1 - TIME_RTOL, 1 + TIME_RTOL)]
         if abs(two[k] - one[k]) <= max(np.abs(x - two)[k] for x in near):
             continue
-        name = _body(flow, k)
-        if driven:
-            raise ModelError(
-                f"the forces on {name!r} do not repeat with the period {flow.period:.9g} s.",
-                where=name,
-                hint="Give the period of all laws that depend on time.",
-            )
-        raise ModelError(
-            f"the forces on {name!r} change with time, so that the period is not free.",
-            where=name,
-            hint="Give period= that of the laws.",
-        )
+        name, by = _body(flow, k), f"they differ by {abs(two[k] - one[k]):.3g}"
+        cure = "Give the period of all laws that depend on time."
+        raise _changing(flow, name, f"the sum of forces on {name!r}", driven, by, cure)
 
 
 def refuse_other_forces(found: Return) -> None:
     """Refuse a motion at whose end other forces act than at its start.
 
     Elements follow angles over whole turns, and know one tooth from the next.
-
-    Raises:
-        ModelError: naming the body.
     """
     flow, end = found.flow, found.end
     later = replace(end, algorithmic=flow.forces(end))  # forces turn with the frames, as rates do

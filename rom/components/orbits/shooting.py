@@ -1,26 +1,207 @@
 """Shooting: the state after a period is a function of the state before it, and shall be equal.
 
+What advances while the motion repeats is turned back before states are compared.
+
 Source:
     Nayfeh and Balachandran, Applied Nonlinear Dynamics (1995), chapter 6; Seydel, Practical
     Bifurcation and Stability Analysis (2010), chapter 7.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
+from rom import rotation
 from rom.components.orbits.flow import Flow, Start
-from rom.components.orbits.turns import Turns
+from rom.errors import ConfigError, ModelError
 from rom.mbs.analysis.local_equations import free_motions, snapshot
 from rom.mbs.analysis.tangent import sizes
-from rom.mbs.kernels.system import ROLL
+from rom.mbs.kernels.system import ANGLE, ROLL
 from rom.mbs.mechanism import Mechanism
+from rom.mbs.parts.bodies import GROUND, Part
+from rom.mbs.parts.joints import Joint
 from rom.mbs.results.state import State
 from rom.model import Array
+from rom.names import offered
 
 RANK_RTOL = 1e-9  # singular value of constraints that repeat others, of the largest one
+SYMMETRY_RTOL = 1e-8  # of inertia: by which a body may look different after its turn
+WHOLE_TURN_TOL = 1e-9  # [rad]
+FULL_TURN = 2 * np.pi
+
+
+@dataclass(frozen=True)
+class Turn:
+    """A body that advances about an axis of its own.
+
+    Attributes:
+        name: joint in which it turns, or the body where there is none.
+        body: its number.
+        axis: (3,) in its frame [1].
+        angle: by which it advances in a period about the axis [rad]; None for whatever it does.
+        prescribed: the same as the angle of the joint counts.
+        first, first_velocity: its places in q and v.
+    """
+
+    name: str
+    body: int
+    axis: Array
+    angle: float | None
+    prescribed: float | None
+    first: int
+    first_velocity: int
+
+    def advanced(self, one: State, two: State) -> float:
+        """Angle about the axis from one state to another [rad], within half a turn."""
+        at = slice(self.first + 3, self.first + 7)
+        turn = rotation.multiply(one.q[at] * [1.0, -1.0, -1.0, -1.0], two.q[at])
+        return 2 * float(np.arctan2(turn[1:] @ self.axis, turn[0]))
+
+    def back(self, state: State, angle: float) -> State:
+        """The state with the frame of the body turned back about its axis.
+
+        What looks the same after the turn has then moved nowhere: its frame is another one, in
+        which the same angular velocity has other components.
+        """
+        q, rows = state.q.copy(), slice(self.first_velocity + 3, self.first_velocity + 6)
+        at = slice(self.first + 3, self.first + 7)
+        q[at] = rotation.multiply(q[at], rotation.exp(-angle * self.axis))
+        R = rotation.matrix(rotation.exp(angle * self.axis))
+        rates = {}
+        for name in ("v", "a", "algorithmic"):
+            value = getattr(state, name)
+            if value is not None:
+                rates[name] = value.copy()
+                rates[name][rows] = R @ value[rows]
+        return replace(state, q=q, **rates)
+
+
+@dataclass(frozen=True)
+class Turns:
+    """All that advances."""
+
+    every: tuple[Turn, ...] = ()
+
+    def angles(self, one: State, two: State) -> tuple[float, ...]:
+        """By how much each advances from one state to another [rad]."""
+        return tuple(
+            turn.advanced(one, two) if turn.angle is None else turn.angle for turn in self.every
+        )
+
+    def back(self, state: State, angles: tuple[float, ...]) -> State:
+        """The state with all turned back."""
+        for turn, angle in zip(self.every, angles, strict=True):
+            state = turn.back(state, angle)
+        return state
+
+    @property
+    def prescribed(self) -> bool:
+        """Whether all angles are given."""
+        return all(turn.angle is not None for turn in self.every)
+
+    def turned(self, change: Array, angles: tuple[float, ...]) -> Array:
+        """(n, f) small motions or changes of velocities after all was turned back."""
+        found = change.copy()
+        for turn, angle in zip(self.every, angles, strict=True):
+            rows = slice(turn.first_velocity + 3, turn.first_velocity + 6)
+            found[rows] = rotation.matrix(rotation.exp(angle * turn.axis)) @ found[rows]
+        return found
+
+    def of(self, joint: str) -> float | None:
+        """Angle by which the drive of a joint may advance; zero for others, None for any."""
+        found = [turn.prescribed for turn in self.every if turn.name == joint]
+        return found[0] if found else 0.0
+
+
+def turns_of(mechanism: Mechanism, turns: Mapping[str, float | None] | None, state: State) -> Turns:
+    """What the user says advances."""
+    names, found, places = list(mechanism.parts), [], _places(mechanism)
+    for given, angle in (turns or {}).items():
+        name = _joint_of(mechanism, given)
+        body, axis, point, sign = _hinged(mechanism, name, state, places)
+        beyond = 1.0 if angle is None else np.remainder(angle + np.pi, FULL_TURN) - np.pi
+        if abs(beyond) < WHOLE_TURN_TOL:
+            continue  # the same place
+        _refuse_unequal(name, mechanism.parts[body], axis, point, angle)
+        signed = None if angle is None else sign * angle
+        found.append(Turn(name, names.index(body), axis, signed, angle, *places[body]))
+    return Turns(tuple(found))
+
+
+def _places(mechanism: Mechanism) -> dict[str, tuple[int, int]]:
+    """Places of each body in q and v."""
+    found, q, v = {}, 0, 0
+    for name, part in mechanism.parts.items():
+        found[name] = (q, v)
+        q, v = q + 7 + part.r, v + 6 + part.r
+    return found
+
+
+def _joint_of(mechanism: Mechanism, name: str) -> str:
+    """The only joint with an angle in which a body turns; else what the user named."""
+    joints = mechanism.joints.values()
+    found = [x.name for x in joints if x.turn and name in [m.body for m in x.markers]]
+    return found[0] if name in mechanism.parts and len(found) == 1 else name
+
+
+def _hinged(
+    mechanism: Mechanism, name: str, state: State, places: dict[str, tuple[int, int]]
+) -> tuple[str, Array, Array, float]:
+    """Body, axis and a point of it in the frame of the body, and the sign of its angle."""
+    if name in mechanism.joints:
+        return _of_joint(mechanism, mechanism.joints[name])
+    if name not in mechanism.parts:
+        known = [*(n for n, j in mechanism.joints.items() if j.turn), *mechanism.parts]
+        raise ConfigError(f"turns: no joint or body {name!r}; there are {offered(known, name)}.")
+    at = places[name][1]
+    return name, _own_axis(mechanism.parts[name], state.v[at + 3 : at + 6]), np.zeros(3), 1.0
+
+
+def _of_joint(mechanism: Mechanism, joint: Joint) -> tuple[str, Array, Array, float]:
+    if joint.turn is None or joint.turn.kind != ANGLE:
+        raise ConfigError(f"turns: {joint.name!r} is {joint.kind}; take a revolute joint.")
+    one, two = joint.markers[:2]
+    marker, sign = (one, -1.0) if two.body == GROUND else (two, 1.0)
+    base, part = mechanism.part(one.body), mechanism.part(marker.body)
+    axis = rotation.matrix(base.p) @ np.cross(joint.turn.a, joint.turn.c)
+    return part.name, rotation.matrix(part.p).T @ axis, part.point(marker), sign
+
+
+def _own_axis(part: Part, spin: Array) -> Array:
+    """(3,) axis about which the inertia of a body is the same all round, along its spin."""
+    values, axes = np.linalg.eigh(part.second)
+    size = SYMMETRY_RTOL * values.max()
+    equal = [abs(values[k - 2] - values[k - 1]) <= size for k in range(3)]
+    if not any(equal) or not spin.any():
+        raise ModelError(
+            f"no axis of its own is known about which {part.name!r} advances.",
+            where=part.name,
+            hint="Name the joint it turns in, or let it spin at the start.",
+        )
+    axis = spin / np.linalg.norm(spin) if all(equal) else axes[:, equal.index(True)]
+    return axis if axis @ spin > 0.0 else -axis
+
+
+def _refuse_unequal(name: str, part: Part, axis: Array, point: Array, angle: float | None) -> None:
+    """Refuse a body that looks different after its turn."""
+    how, what = "any angle" if angle is None else f"{angle:.6g} rad", ""
+    R = rotation.matrix(rotation.exp((1.0 if angle is None else angle) * axis))
+    size = SYMMETRY_RTOL * max(float(np.trace(part.second)), 1e-300)
+    if part.mass * float(np.square(np.cross(axis, point)).sum()) > size:
+        what = "its mass centre is beside the axis"
+    if np.abs(R @ part.second @ R.T - part.second).max() > size:
+        what = "its inertia is not the same about axes across the one it turns about"
+    if part.r:
+        what = "it is flexible, and its elastic coordinates describe other shapes"
+    if what:
+        raise ModelError(
+            f"turns: after {how} of {name!r} the body {part.name!r} is another one: {what}.",
+            where=part.name,
+            hint="Take a period of whole revolutions of this body.",
+        )
 
 
 @dataclass(frozen=True)
@@ -105,11 +286,7 @@ class Return:
 
     @classmethod
     def of(cls, flow: Flow, turns: Turns, start: Start, basis: Chart | None = None) -> "Return":
-        """Move through one period.
-
-        Raises:
-            SolverError: if a step fails.
-        """
+        """Move through one period."""
         end = flow.end(start)
         turned = turns.back(end, turns.angles(start.state, end))
         return cls(flow, turns, start, end, turned, basis)
@@ -163,10 +340,9 @@ class Return:
     @cached_property
     def rate(self) -> tuple[Array, Array]:
         """(f,) each: change of the coordinates per radian of the period, at start and end."""
-        time, found = self.flow.period / (2 * np.pi), []
-        for state in (self.start.state, self.turned):
-            found.append(self.chart.seen(time * state.v, time * state.a))
-        return found[0], found[1]
+        time, pair = self.flow.period / (2 * np.pi), (self.start.state, self.turned)
+        start, end = (self.chart.seen(time * state.v, time * state.a) for state in pair)
+        return start, end
 
 
 def energy(mechanism: Mechanism, start: Start) -> float:
@@ -174,20 +350,12 @@ def energy(mechanism: Mechanism, start: Start) -> float:
     return float(snapshot(mechanism, start.state).energy.total[0])
 
 
-def share(flow: Flow, dq: Array, dv: Array, time: float) -> float:
-    """Part of a correction that may be taken at once."""
-    return min(sizes(flow.packed, dq)[1], sizes(flow.packed, time * dv)[1])
-
-
 def moved_by(found: Return, y: Array) -> Start:
-    """A start after a correction (f,), with what method and laws had at the end of the period."""
-    chart = found.chart
-    dq, dv = chart.motion(y)
-    part = share(found.flow, dq, dv, chart.time)
-    return found.flow.moved(ready(found), part * dq, part * dv)
+    """A start after as much of a correction (f,) as may be taken at once.
 
-
-def ready(found: Return) -> Start:
-    """The start with what method and laws had at the end of the period."""
-    state = replace(found.start.state, base=found.base)
-    return Start(state, found.back.ahead, found.later)
+    It has what method and laws had at the end of the period.
+    """
+    flow, (dq, dv) = found.flow, found.chart.motion(y)
+    part = min(sizes(flow.packed, dq)[1], sizes(flow.packed, found.chart.time * dv)[1])
+    ready = Start(replace(found.start.state, base=found.base), found.back.ahead, found.later)
+    return flow.moved(ready, part * dq, part * dv)

@@ -1,8 +1,8 @@
 """Updating of models by measured frequency responses.
 
 `estimate` updates a family of bodies: what was `measured`, of files of `responses`, with errors as
-`frf_data` has them, beside the `family_model`, summed line by line in `normal_equations`, or by
-`equations` at the sensors. What the data say is in `verdict`, which parameters they support in
+`frf_data` has them, beside the `family_model`, by `normal_equations` of responses or of equations
+at the sensors. What the data say is in `verdict`, which parameters they support in
 `comparison`; a test is planned by `placement`. `verb` is that of the command line with its
 `pictures`, `field` the record. `observers` follow a body in operation.
 Small models with matrices of their own, after Berriet, Fillod and Bouhaddi: `models`, `methods` and

@@ -134,7 +134,7 @@ def airframe(
     """
     if not (size > 0 and joints > 0):
         raise ConfigError(f"size = {size} m, joints = {joints} N m/rad: both must be positive.")
-    points, beams, owners = _meshed(size)
+    points, beams = _meshed(size)
     T = _linked(points, np.isinf(joints))
     K, M = {}, {}
     if np.isfinite(joints):
@@ -142,27 +142,24 @@ def airframe(
             a, b = (T[6 * n + 3 : 6 * n + 6] for n in _ends(points, link))
             K[part.name, "joint"] = joints * (a - b).T @ (a - b)
     for part in PARTS:
-        own = [b for b, owner in zip(beams, owners, strict=True) if owner == part.name]
-        for kind in KINDS:
-            K[part.name, kind] = T.T @ _summed(points, own, part, material, kind) @ T
-        M[part.name] = T.T @ _summed(points, own, part, material, "mass") @ T
-    return Airframe(points, np.array(beams), K, M, T)
+        own = points, beams[part.name], part, material
+        K |= {(part.name, kind): T.T @ _summed(*own, kind) @ T for kind in KINDS}
+        M[part.name] = T.T @ _summed(*own, "mass") @ T
+    return Airframe(points, np.vstack(list(beams.values())), K, M, T)
 
 
-def _meshed(size: float) -> tuple[Array, list[tuple[int, int]], list[str]]:
+def _meshed(size: float) -> tuple[Array, dict[str, Index]]:
+    """Nodes (n, 3), and those (m, 2) of the elements of each part."""
     points: list[Array] = []
-    beams: list[tuple[int, int]] = []
-    owners: list[str] = []
+    beams = {}
     for part in PARTS:
-        path = np.array(part.path, dtype=float)
+        path, first = np.array(part.path, dtype=float), len(points)
         points.append(path[0])
         for a, b in pairwise(path):
             n = int(np.ceil(np.linalg.norm(b - a) / size - 1e-9))
-            for k in range(1, n + 1):
-                points.append(a + (b - a) * k / n)
-                beams.append((len(points) - 2, len(points) - 1))
-                owners.append(part.name)
-    return np.array(points), beams, owners
+            points += [a + (b - a) * k / n for k in range(1, n + 1)]
+        beams[part.name] = first + np.array(list(pairwise(range(len(points) - first))))
+    return np.array(points), beams
 
 
 def _linked(points: Array, rigid: bool) -> Array:
@@ -187,9 +184,7 @@ def _ends(points: Array, link: npt.ArrayLike) -> tuple[int, int]:
     return first, second
 
 
-def _summed(
-    points: Array, beams: list[tuple[int, int]], part: Part, material: Material, what: str
-) -> Array:
+def _summed(points: Array, beams: Index, part: Part, material: Material, what: str) -> Array:
     A = np.zeros((6 * len(points),) * 2)
     for i, j in beams:
         along = points[j] - points[i]

@@ -65,12 +65,10 @@ class Comparison:
         return self.names[min(enough, key=lambda k: (self.n_unknowns[k], self.by_line[k].sum()))]
 
     def __str__(self) -> str:
-        rows = zip(self.names, self.n_unknowns, self.misfit.values(), self.worse.values(),
-                   strict=True)  # fmt: skip
         lines = [
-            f"  {name}: {n} unknowns, lines kept aside {misfit:.4g} of noise, "
-            f"{worse:.1f} deviations worse than the best"
-            for name, n, misfit, worse in rows
+            f"  {name}: {n} unknowns, lines kept aside {self.misfit[name]:.4g} of noise, "
+            f"{self.worse[name]:.1f} deviations worse than the best"
+            for name, n in zip(self.names, self.n_unknowns, strict=True)
         ]
         return "\n".join(["sets of parameters", *lines, f"enough: {self.best}"])
 
@@ -105,8 +103,8 @@ def compare(
     for k, own in enumerate(sets.values()):
         for first in range(folds):
             aside = np.arange(first, n_f, folds)
-            found = update(family, _some(test, np.setdiff1d(np.arange(n_f), aside)),
-                           **{**common, **own})  # fmt: skip
+            others = _some(test, np.setdiff1d(np.arange(n_f), aside))
+            found = update(family, others, **{**common, **own})
             left = sums(found.model, found.logarithms, found.zeta, data.lines(aside))
             by_line[k, aside] = left.squares.sum(axis=(1, 2))
         n_unknowns.append(len(found.names))
@@ -115,11 +113,6 @@ def compare(
 
 
 def _some(test: Responses, lines: Index) -> Responses:
-    c, noise = np.asarray(test.coherence), np.asarray(test.force_noise)
-    return replace(
-        test,
-        frequencies=test.frequencies[lines],
-        H=test.H[lines],
-        coherence=c[lines] if c.ndim else test.coherence,
-        force_noise=noise[lines] if noise.ndim else test.force_noise,
-    )
+    names = ("frequencies", "H", "coherence", "force_noise")
+    of_lines: dict[str, Any] = {name: np.asarray(getattr(test, name)) for name in names}
+    return replace(test, **{name: A[lines] for name, A in of_lines.items() if A.ndim})

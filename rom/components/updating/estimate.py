@@ -7,13 +7,13 @@ Source:
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from scipy.linalg import block_diag
 
-from rom.arguments import between, one_of, positive, typed
-from rom.components.updating.equations import by_equations, by_response_functions
+from rom.arguments import positive, typed
+from rom.arguments.quantities import Between, Positive
 from rom.components.updating.family_model import (
     Attached,
     Family,
@@ -27,7 +27,14 @@ from rom.components.updating.frf_data import Complex, beside_poles
 from rom.components.updating.measured import Responses
 from rom.components.updating.methods import Update
 from rom.components.updating.models import chi_row, likeness
-from rom.components.updating.normal_equations import Data, Sums, responses_at, sums
+from rom.components.updating.normal_equations import (
+    Data,
+    Sums,
+    by_equations,
+    by_response_functions,
+    responses_at,
+    sums,
+)
 from rom.components.updating.verdict import (
     LEFT_LOG_LEVEL,
     Updated,
@@ -54,7 +61,6 @@ NEAR_STIFFNESS = 1e-9  # the same, close to the end
 MAX_STIFFNESS = 1e10  # beyond it no shorter step lowers the residual
 BOUND_ATOL = 1e-9  # distance of a logarithm from the end of its range
 DAMPING_LOG_DEVIATION = 1.5  # of ratios about their start, before the test: a factor of 20 in two
-RESIDUALS = ("responses", "equations", "response-function")
 DAMPING_RANGE = (1e-6, 0.9)  # ratios that are tried
 
 
@@ -67,12 +73,12 @@ def update(  # noqa: PLR0913  keywords of one call
     fixed: Any = (),
     attached: Attached | None = None,
     candidates: Attached | None = None,
-    damping: float = 0.01,
+    damping: Annotated[float, Between(*DAMPING_RANGE)] = 0.01,
     prior: dict[str, float] | Updated | None = None,
     tolerance: float | None = None,
-    residual: str = "responses",
+    residual: Literal["responses", "equations", "response-function"] = "responses",
     rank: int | None = None,
-    beside_poles: float | None = None,
+    beside_poles: Annotated[float, Positive()] | None = None,
 ) -> Updated:
     """Find the factors of a family, and damping ratios, that explain measured responses.
 
@@ -118,10 +124,8 @@ def update(  # noqa: PLR0913  keywords of one call
         Berriet, Fillod and Bouhaddi, for weighted responses with modal damping.
     """
     check_damping_ratio(damping)
-    one_of("residual", residual, RESIDUALS)
     if rank is not None and residual != "equations":
         raise ConfigError('rank needs residual="equations".')
-    between("damping", damping, *DAMPING_RANGE)
     check_units(family)
     bodies = Parts.of(family).bodies
     attached, candidates = dict(attached or {}), dict(candidates or {})
@@ -134,7 +138,7 @@ def update(  # noqa: PLR0913  keywords of one call
     search = _Search.begun(model, test, unknown, damping, before)
     check_channels(search.extremes(), search.data.roughly())
     if beside_poles is not None:
-        search = search.near().beside(positive("beside_poles", beside_poles))
+        search = search.near().beside(beside_poles)
     if residual == "responses":
         return _found(family, search.run())
     root = np.sqrt(np.diag(before.precision))
@@ -178,18 +182,13 @@ class _Before:
 
     @staticmethod
     def of(prior: dict[str, float] | Updated, model: FamilyModel) -> "_Before":
-        """From standard deviations about one, or from the update by another test.
-
-        Raises:
-            ConfigError, ParameterError: for a deviation that is not positive, an unknown name, or
-                a test that found none of the parameters.
-        """
+        """From standard deviations about one, or from the update by another test."""
         names, precision = model.names, np.zeros((len(model.names),) * 2)
         if not isinstance(prior, Updated):
             check_prior(prior, names)
-            sigma = np.array([prior.get(name, np.inf) for name in names])
             for name in prior:
                 positive(f"prior of {name}", prior[name])
+            sigma = np.array([prior.get(name, np.inf) for name in names])
             return _Before(np.zeros(len(names)), np.diag(sigma**-2.0))
         known = [name for name in prior.names if name in names]
         if not known:
@@ -307,18 +306,11 @@ class _Search:
         return self
 
     def _end(self) -> None:
-        """Descend on all lines.
-
-        Raises:
-            SolverError: if that does not end though the model fits.
-        """
+        """Descend on all lines, which must end where the model fits."""
         cost = self._descend(NEAR_STIFFNESS)
         if not self.settled and cost <= MAX_MISFIT * self.data.n_values:
-            raise SolverError(
-                f"updating did not settle in {MAX_STEPS} steps.",
-                hint="Start from better values, or give a prior; see which parameters are "
-                "correlated.",
-            )
+            cure = "Start from better values, or give a prior; see which parameters are correlated."
+            raise SolverError(f"updating did not settle in {MAX_STEPS} steps.", hint=cure)
 
     def _descend(self, mu: float) -> float:
         """Levenberg-Marquardt until the expected gain vanishes; the cost there."""
@@ -363,9 +355,7 @@ def _found(family: Family, search: _Search) -> Updated:
     width = np.r_[np.log(model.high / model.low), np.ones(search.theta.size - n)][free]
     low, high = search.bounds
     ends = np.minimum(search.x - low[:n], high[:n] - search.x) <= BOUND_ATOL
-    at_bound = tuple(
-        name for name, end in zip(model.names, ends & search.free[:n], strict=True) if end
-    )
+    at_bound = tuple(np.array(model.names)[ends & search.free[:n]].tolist())
     missing = scores(N, g, free, model.names)
     factors = np.where(model.present, np.exp(search.x), 0.0)
     own = N[np.ix_(free, free)]

@@ -22,7 +22,7 @@ from rom.body.recovery import StressRecovery
 from rom.body.reference import marker_motion
 from rom.components.families.assembled import FamilyAssembly
 from rom.components.families.family import BodyFamily
-from rom.components.families.parameters import Density, Parameter, YoungsModulus
+from rom.components.families.parameters import Density, YoungsModulus
 from rom.components.updating.models import Modal, ParametricModel, modal
 from rom.eigen.supports import spring_matrices
 from rom.errors import ConfigError, ParameterError
@@ -53,19 +53,16 @@ class Parts:
         """Those of an assembly, or of a body alone."""
         if isinstance(structure, Parts):
             return structure
-        found = parts_of(structure)
-        return Parts(
-            {k: one if isinstance(one, FlexibleBody) else one.body for k, one in found.items()}
-        )
+        each = parts_of(structure).items()
+        return Parts({k: one if isinstance(one, FlexibleBody) else one.body for k, one in each})
 
     @property
     def columns(self) -> dict[str, slice]:
         """Where the coordinates of each body stand."""
-        ends = np.cumsum([6 + body.n_modes for body in self.bodies.values()])
-        return {
-            name: slice(int(end) - 6 - body.n_modes, int(end))
-            for (name, body), end in zip(self.bodies.items(), ends, strict=True)
-        }
+        found, first = {}, 0
+        for name, body in self.bodies.items():
+            found[name] = slice(first, first := first + 6 + body.n_modes)
+        return found
 
     @property
     def n(self) -> int:
@@ -79,12 +76,7 @@ class Parts:
         return np.concatenate(first), np.tile(np.r_[np.ones(3), np.full(3, 1 / size)], len(first))
 
     def marker(self, place: Place) -> tuple[str, Marker]:
-        """Name of the body and its interface.
-
-        Raises:
-            ConfigError: for a place of another kind, or an unknown body.
-            InterfaceError: for a wrong interface.
-        """
+        """Name of the body and its interface."""
         if "" in self.bodies:
             return "", self.bodies[""].marker(str(place))
         body, interface = place if isinstance(place, tuple) and len(place) == 2 else ("", "")
@@ -93,22 +85,16 @@ class Parts:
         return body, self.bodies[body].marker(interface)
 
     def motion(self, place: Place) -> Array:
-        """(6, n) translation and rotation of an interface by all coordinates.
-
-        Raises:
-            ConfigError, InterfaceError: see `marker`.
-        """
+        """(6, n) translation and rotation of an interface by all coordinates."""
         body, marker = self.marker(place)
         H = np.zeros((6, self.n))
         H[:, self.columns[body]] = np.hstack(marker_motion(marker, self.bodies[body].n_modes))
         return H
 
 
-def parts_of(structure: Structure) -> dict[str, BodyFamily] | dict[str, FlexibleBody]:
+def parts_of(structure: Structure) -> Mapping[str, BodyFamily | FlexibleBody]:
     """{name: family or body} of an assembly; of one alone, without a name."""
-    if isinstance(structure, BodyFamily):
-        return {"": structure}
-    if isinstance(structure, FlexibleBody):
+    if isinstance(structure, BodyFamily | FlexibleBody):
         return {"": structure}
     return structure.families if isinstance(structure, FamilyAssembly) else structure.bodies
 
@@ -237,31 +223,19 @@ class AddedMass:
 
 
 def check_units(structure: Structure) -> None:
-    """Refuse bodies in other units than those of what was measured.
-
-    Raises:
-        ConfigError: if they are not in SI units.
-    """
+    """Refuse bodies in other units than those of what was measured."""
     if other := {body.units for body in Parts.of(structure).bodies.values()} - {"SI"}:
         raise ConfigError(f"the body is in {other.pop()}; use SI units, as body.in_units gives it.")
 
 
 def check_prior(prior: Iterable[str], names: tuple[str, ...]) -> None:
-    """Refuse a prior of parameters that there are not.
-
-    Raises:
-        ParameterError: listing those there are.
-    """
+    """Refuse a prior of parameters that there are not."""
     for name in prior:
         check_known(name, names, f"prior: no parameter {name!r}; there are", ParameterError)
 
 
 def check_range(what: str, low: float, high: float) -> None:
-    """Refuse a range that is not one of positive factors.
-
-    Raises:
-        ConfigError: naming what has it.
-    """
+    """Refuse a range that is not one of positive factors."""
     if not 0 < finite("low", low, ()) <= finite("high", high, ()):
         raise ConfigError(f"{what} has the range {low} to {high}, needed is 0 < low <= high.")
 
@@ -310,8 +284,7 @@ class FamilyModel:
     def present(self) -> Mask:
         """(n_p,) whether a parameter is part of the model: not a candidate."""
         n = len(self.names)
-        absent = int(np.count_nonzero(self.amount == 0))
-        return np.arange(n) < n - absent
+        return np.arange(n) < n - np.count_nonzero(self.amount == 0)
 
     @property
     def n_elastic(self) -> int:
@@ -352,18 +325,14 @@ class FamilyModel:
         return min(int(np.count_nonzero(lam < (BAND_RATIO * highest) ** 2)) + 1, lam.size)
 
     def reduced(self, T: Array, free: Mask, x: Array, seen: Array) -> "FamilyModel":
-        """The same in coordinates T (n, r), of some free parameters (n_p,), the others kept at x.
+        """The same in coordinates T (n, r), of parameters that stay free (n_p,), others kept at x.
 
-        Args:
-            T: coordinates of the family per new one [1].
-            free: which parameters stay unknown.
-            x: (n_p,) logarithms of the factors of the others.
-            seen: (n_s, r) rows of the sensors.
+        Rows of the sensors are given as (n_s, r).
         """
         kept = np.where(free, 0.0, x)
         K, M = ((T.T @ A @ T) * np.exp(powers @ kept)[:, None, None]
                 for A, powers in ((self.K, self.k_powers), (self.M, self.m_powers)))  # fmt: skip
-        names = tuple(name for name, one in zip(self.names, free, strict=True) if one)
+        names = tuple(np.array(self.names)[free].tolist())
         return replace(
             self, K=K, M=M, k_powers=self.k_powers[:, free], m_powers=self.m_powers[:, free],
             seen=seen, driven=self.driven @ T, names=names, low=self.low[free],
@@ -374,11 +343,7 @@ class FamilyModel:
 def summed(terms: Array, powers: Array, x: Array, amount: Any = 1.0) -> tuple[Array, Array]:
     """A sum of terms (n_t, ...) with factors, and its derivatives (n_p, ...) by their logarithms.
 
-    Args:
-        terms: at factors of one.
-        powers: (n_t, n_p) one where a parameter multiplies a term.
-        x: (n_p,) logarithms of the factors.
-        amount: (n_t,) of the terms in the sum; derivatives have all of them [1].
+    Powers are as of `FamilyModel`; derivatives have all terms, whatever their amount in the sum.
     """
     c = np.exp(powers @ x)
     return np.tensordot(amount * c, terms, 1), np.tensordot(powers.T * c, terms, 1)
@@ -391,19 +356,10 @@ def family_model(
     candidates: Attached,
     fixed: Any,
 ) -> FamilyModel:
-    """A family, body or assembly seen at sensors and driven at inputs.
+    """A family, body or assembly seen at sensors and driven at inputs, see `rom.update`.
 
-    Args:
-        family: without parameters of thickness.
-        rows: (n_s, n) of the sensors and (n_e, n) of the inputs, by rigid and elastic coordinates
-            of one body after another.
-        attached: springs and masses with unknown factors, by name.
-        candidates: springs and masses that may be missing; not part of the model.
-        fixed: what is held, see `FlexibleBody.frequencies` and `rom.Assembly.frequencies`.
-
-    Raises:
-        ConfigError: for a parameter of thickness, or a name that is taken.
-        InterfaceError: if an interface is unknown.
+    Rows (n_s, n) of the sensors and (n_e, n) of the inputs are those by rigid and elastic
+    coordinates of one body after another. Candidates are not part of the model.
     """
     parts = Parts.of(family)
     if any(isinstance(p, BodyFamily) and p.stretch is not None for p in parts_of(family).values()):
@@ -415,15 +371,15 @@ def family_model(
     own: dict[str, Any] = {} if isinstance(family, FlexibleBody | Assembly) else family.parameters
     if len(outside) < len(attached) + len(candidates) or set(outside) & set(own):
         raise ParameterError(f"{named(outside)}: one names two parameters; use another name.")
-    pairs = [
-        [_placed(A, parts.columns[name], parts.n) for A in term.full_matrices()]
-        for name, term in terms_of(family)
-    ]
-    added = [item.term(parts) for item in outside.values()]
-    M, K = (np.array([p[i] for p in pairs] + [p[1 - i] for p in added]) for i in (0, 1))
-    held = _conditions(family, fixed)
+    terms, columns = terms_of(family), parts.columns
+    M, K = np.zeros((2, len(terms) + len(outside), parts.n, parts.n))
+    for k, (name, term) in enumerate(terms):
+        at = k, columns[name], columns[name]
+        M[at], K[at] = term.full_matrices()
+    for k, item in enumerate(outside.values(), len(terms)):
+        K[k], M[k] = item.term(parts)
+    held, known = _conditions(family, fixed), {**own, **outside}
     N = still_motions(held)
-    known = {**own, **outside}
     powers = [_own_powers(one) for one in parts_of(family).values()] + [(np.eye(len(outside)),) * 2]
     k_powers, m_powers = (block_diag(*(pair[i] for pair in powers)) for i in (0, 1))
     return FamilyModel(
@@ -442,13 +398,6 @@ def family_model(
     )
 
 
-def _placed(A: Array, columns: slice, n: int) -> Array:
-    """A matrix of one body among the coordinates (n, n) of all."""
-    whole = np.zeros((n, n))
-    whole[columns, columns] = A
-    return whole
-
-
 def _own_powers(family: BodyFamily | FlexibleBody) -> tuple[Array, Array]:
     """Which parameters multiply which terms of the stiffness and of the mass."""
     if isinstance(family, FlexibleBody):
@@ -456,13 +405,10 @@ def _own_powers(family: BodyFamily | FlexibleBody) -> tuple[Array, Array]:
     k, m = np.zeros((2, len(family.shares), len(family.parameters)))
     for i, share in enumerate(family.shares):
         for j, p in enumerate(family.parameters.values()):
-            k[i, j] = _acts(p, YoungsModulus, share.region)
-            m[i, j] = _acts(p, Density, share.region) and not share.fixed
+            acts = p.region in (None, share.region)
+            k[i, j] = acts and isinstance(p, YoungsModulus)
+            m[i, j] = acts and isinstance(p, Density) and not share.fixed
     return k, m
-
-
-def _acts(parameter: Parameter, kind: type, region: str | None) -> bool:
-    return isinstance(parameter, kind) and parameter.region in (None, region)
 
 
 def _conditions(family: Structure, fixed: Any) -> Array:

@@ -79,10 +79,9 @@ def estimators(
     Source:
         Wicks and Vold, The Hs frequency response function estimator, IMAC IV (1986).
     """
-    if len(x) < 2 or np.shape(x) != np.shape(f):
-        raise ConfigError(
-            f"{np.shape(x)}, {np.shape(f)}: at least two averages of both are needed."
-        )
+    shapes = np.shape(x), np.shape(f)
+    if len(x) < 2 or shapes[0] != shapes[1]:
+        raise ConfigError(f"{shapes[0]}, {shapes[1]}: at least two averages of both are needed.")
     not_negative("ratio", ratio)
     S_ff, S_xx = ((np.abs(a) ** 2).mean(axis=0) for a in (f, x))
     S_fx = (f.conj() * x).mean(axis=0)
@@ -289,10 +288,7 @@ def pooled(total: Array, used: Mask, n_averages: int) -> tuple[Array, Array, Arr
 def _normal_part(level: Array, used: Mask, least: float) -> tuple[Array, Array, Mask]:
     """Mean and variance (1, n_s, n_e) of lines (n_f, n_s, n_e) without those that lie far out.
 
-    Args:
-        level: of each line [1].
-        used: which count.
-        least: variance that chance alone makes [1].
+    The variance is at least that which chance alone makes.
     """
     risk = norm.isf(POOL_RISK / np.maximum(used.sum(axis=0, keepdims=True), 1))
     with np.errstate(invalid="ignore"), warnings.catch_warnings():

@@ -2,16 +2,17 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import numpy.typing as npt
 from scipy.spatial import cKDTree
 
 from rom.arguments import finite, one_each, one_of, typed, whole
+from rom.arguments.quantities import Count
 from rom.body.flexible import FlexibleBody
 from rom.body.surface import strain_rows, surface_of
-from rom.components.updating.frf_data import FREEDOM_LOST, POWERS, Complex, Noise
+from rom.components.updating.frf_data import FREEDOM_LOST, Complex, Noise
 from rom.errors import ConfigError
 from rom.model import Array, Index
 from rom.names import named
@@ -73,9 +74,8 @@ class Channels:
     def some(self, chosen: Any) -> "Channels":
         """Those with chosen numbers (j,)."""
         bodies = None if self.bodies is None else tuple(self.bodies[k] for k in chosen)
-        return Channels(
-            np.asarray(self.points)[chosen], np.asarray(self.directions)[chosen], bodies
-        )
+        points, directions = (np.asarray(A)[chosen] for A in (self.points, self.directions))
+        return Channels(points, directions, bodies)
 
     def _elsewhere(self, names: tuple[str, ...], what: str) -> Array:
         """(n_b, k) zero for a body on which a channel may lie, infinite for another one."""
@@ -91,16 +91,7 @@ class Channels:
     def owners(
         self, bodies: Mapping[str, FlexibleBody], what: str, tolerance: float | None = None
     ) -> list[str]:
-        """(k,) the body on which each channel lies: that named, or the nearest one.
-
-        Args:
-            bodies: with their outer surfaces; of one alone none is needed.
-            what: they are, for messages.
-            tolerance: see `rows` [m].
-
-        Raises:
-            ConfigError, ModelError: see `rows`.
-        """
+        """(k,) the body on which each channel lies: that named, or the nearest one, see `rows`."""
         names, k = list(bodies), len(np.asarray(self.points))
         if len(names) == 1 and self.bodies is None:
             return names * k
@@ -176,18 +167,6 @@ class Channels:
         return owners, nearest[owners, np.arange(len(points))]
 
 
-def _complex(H: Any) -> Complex:
-    """Responses as complex numbers, which may be NaN.
-
-    Raises:
-        ConfigError: for anything else.
-    """
-    try:
-        return np.asarray(H, dtype=complex)
-    except (TypeError, ValueError) as error:
-        raise ConfigError("H must hold numbers.") from error
-
-
 def _check_lengths(points: Array, surface: cKDTree, reach: float, what: str) -> None:
     """Refuse points that are off a body, or all in one spot, and on it by another unit."""
     spread, now = np.ptp(points, axis=0).max(), surface.query(points)[0]
@@ -235,24 +214,22 @@ class Responses:
     sensors: Channels
     inputs: Channels
     coherence: Any
-    averages: int
+    averages: Annotated[int, Count(1)]
     quantity: str | tuple[str, ...] = "displacement"
     force_noise: Any = 0.0
-    estimator: str | None = None
+    estimator: Literal["H1", "Hv", "H2"] | None = None
 
     def __post_init__(self) -> None:
         f = finite("frequencies", self.frequencies, None)
         object.__setattr__(self, "frequencies", f)
-        object.__setattr__(self, "H", _complex(self.H))
+        object.__setattr__(self, "H", np.asarray(self.H, dtype=complex))
         for one in self.quantities:
             one_of("quantity", one, (*DERIVATIVES, "strain"))
         if f.ndim != 1 or not f.size or f[0] <= 0 or (np.diff(f) <= 0).any():
             raise ConfigError("frequencies must ascend and lie above zero.")
         wanted = (f.size, len(np.asarray(self.sensors.points)), len(np.asarray(self.inputs.points)))
         if self.H.shape != wanted:
-            raise ConfigError(
-                f"H is {self.H.shape}, needed are lines, sensors, inputs {wanted}.",
-            )
+            raise ConfigError(f"H is {self.H.shape}, needed are lines, sensors, inputs {wanted}.")
         one_each("quantities", len(self.quantities), "sensors", wanted[1])
         c = finite("coherence", self.coherence, None)
         if c.shape not in ((), wanted) or not ((c >= 0) & (c < 1)).all():
@@ -260,25 +237,17 @@ class Responses:
                 f"coherence {c.shape} must be one number or {wanted}, from 0 up to below 1.",
                 hint="A coherence of exactly one comes of a single average: it says nothing.",
             )
-        whole("averages", self.averages, 1, None)
         if c.shape and self.averages <= FREEDOM_LOST:
             raise ConfigError(
                 f"coherence estimated from {self.averages} averages says nothing of the noise.",
                 hint="Average more, or give one number that is known.",
             )
-        self._check_forces()
-        self._check_values()
-
-    def _check_forces(self) -> None:
-        """See that noise of forces and the estimator are such."""
-        noise, one = finite("force_noise", self.force_noise, None), np.ndim(self.force_noise) == 0
-        if not one and noise.shape != self.H.shape[::2]:
-            raise ConfigError(f"force_noise {noise.shape} must be a number or {self.H.shape[::2]}.")
+        noise = finite("force_noise", self.force_noise, None)
+        if noise.shape not in ((), wanted[::2]):
+            raise ConfigError(f"force_noise {noise.shape} must be a number or {wanted[::2]}.")
         if not (noise >= 0).all():
-            least = self.force_noise if one else float(noise.min())
-            raise ConfigError(f"force_noise = {least} must be zero or more.")
-        if self.estimator is not None:
-            one_of("estimator", self.estimator, tuple(POWERS))
+            raise ConfigError(f"force_noise = {noise.min():g} must be zero or more.")
+        self._check_values()
 
     def _check_values(self) -> None:
         used = self.noise.used
@@ -317,22 +286,16 @@ class Responses:
             ConfigError, ModelError: see `Channels.rows`.
         """
         gauges = [quantity == "strain" for quantity in self.quantities]
-        return (
-            self.sensors.rows(bodies, "sensor", tolerance, gauges),
-            self.inputs.rows(bodies, "input", tolerance),
-        )
+        seen = self.sensors.rows(bodies, "sensor", tolerance, gauges)
+        return seen, self.inputs.rows(bodies, "input", tolerance)
 
     @property
     def noise(self) -> Noise:
         """Its powers."""
         c = np.maximum(np.asarray(self.coherence, dtype=float), 1e-12)
         force = np.broadcast_to(np.asarray(self.force_noise, dtype=float), self.H.shape[::2])
-        return Noise(
-            np.broadcast_to((1 - c) / c, self.H.shape),
-            np.square(force[:, None]),
-            self.averages,
-            np.ndim(self.coherence) > 0,
-        )
+        incoherent = np.broadcast_to((1 - c) / c, self.H.shape)
+        return Noise(incoherent, np.square(force[:, None]), self.averages, np.ndim(c) > 0)
 
     def logarithm(self) -> Complex:
         """(n_f, n_s, n_e) ln of displacement [m/N] or strain [1/N]; zero where H is not used.

@@ -1,9 +1,7 @@
 """Least squares over responses and over equations, and the response function method.
 
 Source:
-    After Berriet, Fillod and Bouhaddi; the response function method is that of Lin and Ewins,
-    Analytical model improvement using frequency response functions, Mech. Syst. Signal Process.
-    8 (1994) 437.
+    After Berriet, Fillod and Bouhaddi; the response function method is that of Lin and Ewins.
 """
 
 from collections.abc import Callable, Iterator
@@ -88,28 +86,20 @@ def responses(
     here = model.at(p)
     if not set(inputs) <= set(range(len(here.sensors))) or not np.isfinite(omega).all():
         raise ConfigError(f"inputs = {inputs} must be 0 to {len(here.sensors) - 1}, omega finite.")
-    return _receptance(here, modal(here, zeta), omega, inputs)
+    modes = modal(here, zeta)
+    seen = here.sensors @ modes.Phi
+    return receptance(seen, modes.g(omega), seen[list(inputs)])
 
 
 def receptance(seen: Array, g: Complex, driven: Array) -> Complex:
-    """(n_f, n_s, n_e) sum over the modes of seen, receptance and driven [m/N].
+    """(n_f, n_s, n_e) of modes [m/N], (n_s, n) at the sensors, (n_e, n) at the inputs [kg^-1/2].
 
-    Args:
-        seen: (n_s, n) modes at the sensors [kg^-1/2].
-        g: (n_f, n) receptance of each mode [s^2].
-        driven: (n_e, n) modes at the inputs [kg^-1/2].
+    The receptance of each mode is (n_f, n) [s^2].
     """
     H = np.empty((len(g), len(seen), len(driven)), dtype=complex)
     for block in blocks(len(g)):
         H[block] = (seen * g[block][:, None, :]) @ driven.T
     return H
-
-
-def _receptance(
-    model: ParametricModel, modes: Modal, omega: Array, inputs: tuple[int, ...]
-) -> Complex:
-    seen = model.sensors @ modes.Phi
-    return receptance(seen, modes.g(omega), seen[list(inputs)])
 
 
 def _modal_sensitivity(model: ParametricModel, modes: Modal) -> tuple[Array, Array, Array]:
@@ -134,13 +124,9 @@ def through_modes(
 ) -> Callable[[Any, Any, Array], Complex]:
     """The function of sides (n_f, a, n), (n_f, n, b) and lines (n_f,) that gives side dZ side.
 
-    Derivatives (n_f, a, b, n_p + m) are those by p and by m logarithms of damping ratios.
-
-    Args:
-        model: at its origin.
-        modes: of the model.
-        m: number of the lowest elastic modes whose damping is unknown.
-        shared: whether the last of these ratios is that of all other modes too.
+    Derivatives (n_f, a, b, n_p + m) are those by p, at the origin of the model, and by logarithms
+    of the damping ratios of its m lowest elastic modes; the last of these may be shared by all
+    other modes.
     """
     by_p, last = _modal_sensitivity(model, modes), model.n_rigid + m - 1
     e, others = slice(model.n_rigid, last + (not shared)), slice(last, None)
@@ -306,13 +292,12 @@ def solved(
             and residual, n + 1 columns; or of n instruments before them, which noise of the
             derivatives leaves alone: the residual is made normal to these, and they take the place
             of the derivatives as soon as a step is not half as long as the one before.
-        start: p (n_p,) [1] and zeta (m,) [1].
+        start: p (n_p,) and zeta (m,).
         n_values: number of residuals.
-        limits: of p [1].
-        prior: (n_p,) standard deviation of p about zero before the test [1]; it weighs against
-            the residual that is left.
-        prior_damping: ratio before the test and standard deviation of its logarithm [1].
-        enough: length of a step in standard deviations that is the last one [1].
+        limits: of p.
+        prior: (n_p,) standard deviation of p about zero before the test, against what is left.
+        prior_damping: ratio before the test and standard deviation of its logarithm.
+        enough: length of a step in standard deviations that is the last one.
     """
     (x, ratios), path = start, []
     before = np.r_[np.zeros(x.size), np.full(ratios.size, np.log(prior_damping[0]))]
@@ -343,7 +328,8 @@ def solved(
 def _equations(here: ParametricModel, test: Measurement, ratios: Array, rank: int) -> Array:
     """(n + 1, n + 1) triangle with the R^T R of derivatives and residual of all lines together."""
     modes = modal(here, ratios)
-    H = _receptance(here, modes, test.omega, test.inputs)
+    at_sensors = here.sensors @ modes.Phi
+    H = receptance(at_sensors, modes.g(test.omega), at_sensors[list(test.inputs)])
     U, R = common_basis(test.H, H, rank), np.zeros((0, len(here.dK) + ratios.size + 1))
     weights = test.weights / np.linalg.norm(test.H, axis=(1, 2), keepdims=True)
     weights = weights.mean(axis=1, keepdims=True)

@@ -56,9 +56,8 @@ class ParametricModel:
 
     def __post_init__(self) -> None:
         n, n_p = len(self.K), len(self.dK)
-        wanted = {"M": (n, n), "dK": (n_p, n, n), "dM": (n_p, n, n)}
-        wanted["sensors"] = (len(self.sensors), n)
-        for name, shape in wanted.items():
+        shapes = (n, n), (n_p, n, n), (n_p, n, n), (None, n)
+        for name, shape in zip(("M", "dK", "dM", "sensors"), shapes, strict=True):
             finite(name, getattr(self, name), shape)
 
     def at(self, p: ArrayLike) -> "ParametricModel":
@@ -118,9 +117,8 @@ class AtSensors:
         try:
             K_oo = cho_factor(model.K[np.ix_(o, o)])
         except LinAlgError as error:
-            raise ModelError(
-                "held at its sensors it still moves; it needs more of them."
-            ) from error
+            text = "held at its sensors it still moves; it needs more of them."
+            raise ModelError(text) from error
         T = np.zeros((len(model.K), s.size))
         T[s], T[o] = np.eye(s.size), -cho_solve(K_oo, model.K[np.ix_(o, s)])
         dT = -np.array([cho_solve(K_oo, (dK @ T)[o]) for dK in model.dK])  # rows o; s do not move
@@ -153,27 +151,22 @@ class Measurement:
     weights: Any = 1.0
 
     def __post_init__(self) -> None:
-        if np.ndim(self.H) != 3 or self.H.shape[::2] != (len(self.omega), len(self.inputs)):
-            n = (len(self.omega), len(self.inputs))
+        n = len(self.omega), len(self.inputs)
+        if np.ndim(self.H) != 3 or self.H.shape[::2] != n:
             raise ConfigError(f"H is {np.shape(self.H)}, needed are {n[0]} lines, {n[1]} exciters.")
-        if not np.isfinite(self.H).all() or not np.abs(self.H).min() > 0:
+        if not np.isfinite(self.H).all() or not self.H.all():
             raise ConfigError("H is zero or not finite somewhere: a dead channel; leave it out.")
         if not set(self.inputs) <= set(range(self.H.shape[1])):
             raise ConfigError(f"inputs = {self.inputs} must be from 0 to {self.H.shape[1] - 1}.")
         w = np.shape(self.weights)
         if w not in ((), self.H.shape, (len(self.omega), 1, 1)):
             raise ConfigError(f"weights {w} must be one number, or of the shape {self.H.shape}.")
-        self._check_levels()
-
-    def _check_levels(self) -> None:
-        """Refuse channels that only round-off moves: the logarithm of that is anything."""
-        level = np.abs(self.H).max(axis=0)
+        level = np.abs(self.H).max(axis=0) / np.abs(self.H).max()
         trusted = np.broadcast_to(self.weights, self.H.shape).any(axis=0)
-        for sensor, exciter in np.argwhere((level < DEAD_RATIO * level.max()) & trusted):
+        for at in map(tuple, np.argwhere((level < DEAD_RATIO) & trusted)):  # the logarithm of noise
             raise ConfigError(
-                f"under exciter {exciter} sensor {sensor} moves by "
-                f"{level[sensor, exciter] / level.max():.1e} of the largest response: a dead "
-                "channel, kept at rest by symmetry or a support.",
+                f"under exciter {at[1]} sensor {at[0]} moves by {level[at]:.1e} of the largest "
+                "response: a dead channel, kept at rest by symmetry or a support.",
                 hint="Give it the weight 0 there, or leave it out.",
             )
 
@@ -219,21 +212,20 @@ def modal(model: ParametricModel, zeta: ArrayLike) -> Modal:
         lam, Phi = eigh(model.K, model.M)
     except LinAlgError as error:
         raise ModelError("the changes must leave a mass matrix that is positive.") from error
-    elastic = slice(model.n_rigid, None)
-    rigid = np.abs(lam[: model.n_rigid]).max(initial=0.0)
-    if rigid > RIGID_RTOL * np.abs(lam[elastic]).min(initial=np.inf):
+    elastic, rigid = lam[model.n_rigid :], np.abs(lam[: model.n_rigid]).max(initial=0.0)
+    if rigid > RIGID_RTOL * np.abs(elastic).min(initial=np.inf):
         raise ModelError(
             f"n_rigid = {model.n_rigid}, but a motion among them has the frequency "
             f"{np.sqrt(rigid):.4g} rad/s: the structure is held; take n_rigid of what is free."
         )
     lam[: model.n_rigid] = 0.0
-    if not (lam[elastic] > 0).all():
+    if not (elastic > 0).all():
         raise ModelError(
-            f"{model.n_rigid} rigid motions leave the eigenvalue {lam[elastic].min():.3g}"
-            " rad^2/s^2: the stiffness must be positive."
+            f"{model.n_rigid} rigid motions leave the eigenvalue {elastic.min():.3g} rad^2/s^2: "
+            "the stiffness must be positive."
         )
     zeta, d = np.asarray(zeta, dtype=float), np.zeros(lam.size)
-    if zeta.size > (n := lam.size - model.n_rigid):
+    if zeta.size > (n := elastic.size):
         raise ConfigError(f"at most {n} damping ratios, of the elastic modes, got {zeta.size}.")
     damped = slice(model.n_rigid, model.n_rigid + zeta.size)
     d[damped] = 2 * zeta * np.sqrt(lam[damped])
@@ -271,11 +263,7 @@ def parametric_basis(model: ParametricModel, n_modes: int, samples: ArrayLike) -
 
 
 def sensor_dofs(model: ParametricModel) -> Any:
-    """(n_s,) the dofs that the sensors are.
-
-    Raises:
-        ConfigError: if they are none.
-    """
+    """(n_s,) the dofs that the sensors are, if they are such."""
     s = model.sensors.argmax(axis=1)
     if not np.array_equal(model.sensors, np.eye(len(model.K))[s]):
         raise ConfigError("the sensors must be dofs of the model; condense before reducing.")
@@ -286,12 +274,7 @@ def explained(H: Complex, test: Measurement, n: int) -> Report:
     """Whether the responses of a corrected model leave noise alone, of a size that is not known.
 
     What is left of noise with the weights of the test has one size at all sensors and in all
-    bands, and the responses are alike.
-
-    Args:
-        H: (n_f, n_s, n_e) of the corrected model [m/N].
-        test: what was measured.
-        n: number of unknowns.
+    bands, and the responses (n_f, n_s, n_e) of the model with n unknowns are alike.
     """
     weight = np.broadcast_to(np.asarray(test.weights, dtype=float), test.H.shape)
     used = weight > 0
@@ -305,25 +288,15 @@ def explained(H: Complex, test: Measurement, n: int) -> Report:
 
 
 def likeness(H: Complex, measured: Complex, used: Mask) -> Row:
-    """One less the median FRAC of all pairs of channels, over the lines that count.
-
-    Args:
-        H: (n_f, n_s, n_e) of the corrected model [m/N].
-        measured: (n_f, n_s, n_e) responses [m/N].
-        used: (n_f, n_s, n_e) which count.
-    """
+    """One less the median FRAC of all pairs of channels (n_f, n_s, n_e), over lines that count."""
     value = frac(H * used, np.where(used, measured, 0.0))[used.any(axis=0)]
     return row("one less the median FRAC", 1.0 - float(np.median(value)), MAX_UNLIKE)
 
 
 def worst_rows(squares: Array, used: Mask, omega: Array, **known: Any) -> list[Row]:
-    """Chi-square of the sensor and of the band of lines that deviate most.
+    """Chi-square of the sensor and of the band of lines that deviate most, see `chi_row`.
 
-    Args:
-        squares: (n_f, n_s, n_e) squared residuals [1].
-        used: (n_f, n_s, n_e) which count.
-        omega: (n_f,) lines [rad/s].
-        **known: see `chi_row`.
+    Of squared residuals (n_f, n_s, n_e), those used, at lines (n_f,) [rad/s].
     """
     blocks = np.array_split(np.arange(omega.size), min(N_BANDS, omega.size))
     f, rows = omega / (2 * np.pi), []

@@ -1,7 +1,10 @@
-"""Residuals of responses and their sums over lines: memory does not grow with their number.
+"""Residuals of families: of responses, summed over lines, and of equations at the sensors.
 
-The residual is ln(H / H_measured) over its standard deviation, real and imaginary part. Circular
-noise leaves the mean of the logarithm where it is, as all powers of it have the mean zero.
+That of responses is ln(H / H_measured) over its standard deviation, real and imaginary part.
+Circular noise leaves the mean of the logarithm where it is, as all powers of it have the mean zero.
+Equations of motion need the model condensed statically to the sensors, which is wrong by inertia
+between them however good the data are; the verdict, of responses of the model that is not
+condensed, says how much.
 """
 
 from collections.abc import Callable
@@ -9,15 +12,33 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from scipy.linalg import null_space, qr
 
+from rom.arguments import whole
 from rom.components.updating.family_model import FamilyModel
 from rom.components.updating.frf_data import Complex
 from rom.components.updating.measured import Responses
-from rom.components.updating.methods import blocks, receptance, transfer
-from rom.model import Array, Index
+from rom.components.updating.methods import (
+    Update,
+    blocks,
+    folded,
+    receptance,
+    solved,
+    through_modes,
+    transfer,
+    update_by_input,
+    weighted,
+)
+from rom.components.updating.models import AtSensors, Measurement
+from rom.errors import ConfigError
+from rom.model import Array, Index, Mask
+from rom.names import named
 
 ROUGH_LINES = 500  # at most: enough to see resonances
 ROUGH_ERROR = 0.3  # of responses, with which the search begins
+SENSOR_RTOL = 1e-8  # singular value of sensors that follow others, over the largest
+LAST_STEP = 1e-3  # in standard deviations
+COLLOCATED_RTOL = 1e-8  # of the row of a sensor that measures what an input drives
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,13 +112,9 @@ class Sums:
 
 
 def responses_at(model: FamilyModel, x: Array, ratios: Array, omega: Array) -> Complex:
-    """(n_f, n_s, n_e) receptances [m/N].
+    """(n_f, n_s, n_e) receptances [m/N] at lines (n_f,) [rad/s] and logarithms x (n_p,) of factors.
 
-    Args:
-        model: the family with its sensors.
-        x: (n_p,) logarithms of its factors.
-        ratios: (m,) damping ratios of the lowest elastic modes, the last one of all others too [1].
-        omega: (n_f,) lines [rad/s].
+    Damping ratios (m,) are those of the lowest elastic modes, the last one of all others too [1].
     """
     modes = model.modal(model.at(x), ratios)
     return receptance(model.seen @ modes.Phi, modes.g(omega), model.driven @ modes.Phi)
@@ -113,14 +130,7 @@ def sensitivity(
 
 
 def sums(model: FamilyModel, x: Array, ratios: Array, data: Data) -> Sums:
-    """J^T J and J^T r by the logarithms of factors and of damping ratios.
-
-    Args:
-        model: see `responses_at`.
-        x: see `responses_at`.
-        ratios: see `responses_at`.
-        data: what was measured.
-    """
+    """J^T J and J^T r by logarithms of factors and of damping ratios, as of `responses_at`."""
     n = x.size + ratios.size
     normal, varied, gradient = np.zeros((n, n)), np.zeros((n, n)), np.zeros(n)
     squares = np.zeros(data.weight.shape)
@@ -150,13 +160,7 @@ def unsure(J: Complex, weight: Array, common: Any, varied: Any) -> Complex:
 
     With V = D^-1 + c^2 1 1^T and own variances d = 1 / D that vary by (v d)^2, estimates by
     weights that vary have the covariance N^-1 + N^-1 Q N^-1, to second order, where
-    Q = J^T V^-1 diag(V^-1) v^2 d^2 V^-1 J.
-
-    Args:
-        J: (n_f, n_s, n_e, n) of residuals that are white.
-        weight: see `white`.
-        common: see `white`.
-        varied: (n_f, n_s, n_e) relative standard deviation of own variances.
+    Q = J^T V^-1 diag(V^-1) v^2 d^2 V^-1 J. J is that of residuals that are white, see `white`.
 
     Source:
         Kackar and Harville, Approximations for standard errors of estimators of fixed and random
@@ -173,11 +177,7 @@ def white(log: Complex, weight: Array, common: Any) -> Complex:
 
     Errors have the covariance D^-1 + c^2 1 1^T over the sensors, D = weight^2. With s the
     sum of D and k = 1 - 1 / sqrt(1 + c^2 s), D^(1/2) (1 - k 1 1^T D / s) makes it the identity.
-
-    Args:
-        log: (n_f, n_s, n_e, n) logarithms.
-        weight: (n_f, n_s, n_e) one over the errors of the sensors.
-        common: (n_f, 1, n_e) or one error that they share.
+    Weights and the errors c in common are those of `Data`.
     """
     if np.any(common):
         d = weight[..., None] ** 2
@@ -190,3 +190,140 @@ def white(log: Complex, weight: Array, common: Any) -> Complex:
 def wrapped(log: Complex) -> Complex:
     """The logarithm with its phase between -pi and pi."""
     return log - 2j * np.pi * np.round(log.imag / (2 * np.pi))
+
+
+def in_sensors(model: FamilyModel, x: Array, free: Mask) -> FamilyModel:
+    """A family in coordinates of which the first are its sensors, the others no sensor sees.
+
+    Of logarithms x (n_p,) of factors those that are not sought stay.
+    """
+    S = model.seen
+    if follow := sorted(_followers(S)):
+        raise ConfigError(
+            f"sensors {named(follow)} of {len(S)} follow from others in a family of "
+            f"{S.shape[1]} coordinates: equations need independent ones.",
+            hint="Leave them out, reduce with more modes, or update by responses.",
+        )
+    basis = np.hstack([np.linalg.pinv(S), null_space(S)])
+    return model.reduced(basis, free, x, np.eye(len(S), S.shape[1]))
+
+
+def by_equations(
+    model: FamilyModel,
+    data: Data,
+    x: Array,
+    free: Mask,
+    damping: float,
+    *,
+    prior: Array,
+    rank: int | None,
+) -> Update:
+    """Logarithms of factors, and damping ratios of the modes up to the highest line.
+
+    Those free (n_p,) are sought from x (n_p,) on, about zero with prior standard deviations (n_p,),
+    by a basis of a rank that tests and models share; None for what the modes need. Lines with a
+    value that does not count are left out.
+    """
+    lines = _whole_lines(data)
+    inputs, signs = _collocated(model)
+    m = int(np.count_nonzero(model.elastic(x) <= data.omega[lines[-1]] ** 2))
+    n_s, needed = len(model.seen), m + model.n_rigid
+    if n_s < needed:
+        raise ConfigError(
+            f"{n_s} sensors for {needed} modes up to the highest line, rigid ones included: "
+            "equations at the sensors need one for each.",
+            hint="Leave out the highest lines, or update by responses.",
+        )
+    H = np.exp(data.logarithm[lines]) * signs
+    test = Measurement(data.omega[lines], H, inputs, data.weight[lines])
+    inside = in_sensors(model, x, free)
+    small = AtSensors(inside)
+    rank = whole("rank", min(n_s, needed) if rank is None else rank, 1, n_s, reason="sensors")
+    start = x[free], np.full(m, damping)
+    return update_by_input(small, test, *start, rank=rank, limits=inside.ends, prior=prior[free])
+
+
+def by_response_functions(
+    model: FamilyModel,
+    data: Data,
+    x: Array,
+    free: Mask,
+    ratios: Array,
+    *,
+    prior: Array,
+    prior_damping: tuple[float, float],
+) -> Update:
+    """Logarithms of factors, and damping ratios, by H - H_test = H dZ H_test, linear in each step.
+
+    What is not measured of H_test follows its sensors as the model at the last step says, so that
+    nothing is condensed; inputs need no sensors. Noise of H_test is in these derivatives too: they
+    lead, and those of the model, which have none, say where the end is. All is divided by H_test,
+    as the mean of H / H_test is one where errors are circular. Ratios to start from are as of
+    `responses_at`; that before the test comes with the deviation of its logarithm.
+
+    Source:
+        Lin and Ewins, Analytical model improvement using frequency response functions, Mech. Syst.
+        Signal Process. 8 (1994) 437; instruments: Soderstrom and Stoica, System identification
+        (1989), chapter 8.
+    """
+    used = data.lines(_whole_lines(data))
+    inside, n_s = in_sensors(model, x, free), len(model.seen)
+    F = inside.driven.T
+
+    def triangle(x: Array, ratios: Array) -> Array:
+        here = inside.at(x)
+        modes = model.modal(here, ratios)
+        change = through_modes(here, modes, ratios.size, shared=True)
+        MPhi = here.M @ modes.Phi
+        driven, n = modes.Phi.T @ F, x.size + ratios.size
+        C, R = (MPhi * modes.d) @ MPhi.T, np.zeros((0, 2 * n + 1))
+        for block in blocks(used.omega.size):
+            some = used.lines(block)
+            w, test, g = some.omega, np.exp(some.logarithm), modes.g(some.omega)
+            Z = here.K - w[:, None, None] ** 2 * here.M + 1j * w[:, None, None] * C
+            unseen = np.linalg.solve(Z[:, n_s:, n_s:], F[n_s:] - Z[:, n_s:, :n_s] @ test)
+            left = modes.Phi[:n_s] * g[:, None, :]
+            H = left @ driven
+            instruments = change(left, g[:, :, None] * driven, w) / H[..., None]
+            J = change(left, MPhi.T @ np.concatenate([test, unseen], axis=1), w) / test[..., None]
+            columns = np.concatenate([instruments, J, (1 - H / test)[..., None]], axis=-1)
+            R = folded(R, weighted(1.0, white(columns, some.weight, some.common)))
+        return R
+
+    options = 2 * used.logarithm.size, inside.ends, prior[free], prior_damping
+    return solved(triangle, (x[free], ratios), *options, enough=LAST_STEP)
+
+
+def _whole_lines(data: Data) -> Index:
+    """Numbers of the lines of which every value counts."""
+    lines = np.flatnonzero((data.weight > 0).all(axis=(1, 2)))
+    if not lines.size:
+        raise ConfigError(
+            "no line counts for all sensors and inputs.",
+            hint="Leave out the sensor of low coherence, or update by responses.",
+        )
+    return lines
+
+
+def _followers(S: Array) -> list[int]:
+    """Numbers of the rows (n_s, n) that follow from the others."""
+    R, order = qr(S.T, mode="r", pivoting=True)
+    size = np.abs(np.diag(R))
+    rank = int(np.count_nonzero(size > SENSOR_RTOL * size[0]))
+    return [int(k) for k in order[rank:]]
+
+
+def _collocated(model: FamilyModel) -> tuple[tuple[int, ...], Array]:
+    """Numbers of the sensors at which inputs act, and (n_e,) the signs of their directions."""
+    found = []
+    for k, row in enumerate(model.driven):
+        signs = np.array([1.0, -1.0])[:, None]
+        off = np.linalg.norm(model.seen[None] - signs[..., None] * row, axis=2)
+        sign, sensor = np.unravel_index(off.argmin(), off.shape)
+        if off.min() > COLLOCATED_RTOL * np.linalg.norm(row):
+            raise ConfigError(
+                f"input {k} has no sensor at its point and along its direction.",
+                hint="Equations at the sensors need one there; update by responses without.",
+            )
+        found.append((int(sensor), signs[int(sign), 0]))
+    return tuple(sensor for sensor, _ in found), np.array([sign for _, sign in found])

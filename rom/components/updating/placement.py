@@ -9,13 +9,13 @@ Source:
     large space structures, J. Guidance 14 (1991) 251.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
-from rom.arguments import finite, one_of, typed, whole
+from rom.arguments import finite, typed, whole
 from rom.body.flexible import FlexibleBody
 from rom.body.surface import surface_of
 from rom.components.updating.estimate import DAMPING_LOG_DEVIATION
@@ -44,6 +44,7 @@ MAX_EXCHANGES = 50  # rounds; three are usual
 DYNAMIC_RANGE = 1e-3  # of responses that are measured at once, over the largest: 60 dB
 BLOCK_VALUES = 2_000_000  # derivatives at once: 32 MB
 GAIN_ATOL = 1e-9  # of the logarithm of a determinant
+Error = Callable[[Complex, Array], Array]  # of responses at lines
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,15 +122,11 @@ def candidates(body: FlexibleBody | Family, n: int, *, fixed: Any = ()) -> Chann
         ModelError: if a body carries no surface.
     """
     parts = Parts.of(body)
-    points = np.vstack([surface_of(one).points for one in parts.bodies.values()])
-    counts = [len(surface_of(one).points) for one in parts.bodies.values()]
-    owners = np.repeat(np.array(list(parts.bodies)), counts)
-    alone = parts.bodies.get("")
-    everywhere = Channels(
-        np.repeat(points, 3, axis=0),
-        np.tile(np.eye(3), (len(points), 1)),
-        None if alone else tuple(np.repeat(owners, 3).tolist()),
-    )
+    each = {name: surface_of(one).points for name, one in parts.bodies.items()}
+    points = np.vstack(list(each.values()))
+    owners = tuple(name for name, own in each.items() for _ in range(3 * len(own)))
+    axes = np.tile(np.eye(3), (len(points), 1))
+    everywhere = Channels(np.repeat(points, 3, axis=0), axes, None if "" in each else owners)
     nothing = np.zeros((0, parts.n))
     V = family_model(body, (nothing, nothing), {}, {}, fixed).motions
     motion = np.linalg.norm(everywhere.rows(parts.bodies, "candidate") @ V, axis=1).reshape(-1, 3)
@@ -196,7 +193,7 @@ def place(  # noqa: PLR0913  keywords of one call
     n_inputs: int = 1,
     noise: float = 0.0,
     floor: float | None = None,
-    quantity: str = "acceleration",
+    quantity: Literal["displacement", "velocity", "acceleration"] = "acceleration",
     fixed: Any = (),
     attached: Attached | None = None,
     damping: float = 0.01,
@@ -234,7 +231,6 @@ def place(  # noqa: PLR0913  keywords of one call
         InterfaceError: if an interface is unknown.
     """
     check_damping_ratio(damping)
-    one_of("quantity", quantity, tuple(DERIVATIVES))
     bodies = Parts.of(family).bodies
     check_units(family)
     least = 0.0 if floor is None else floor
@@ -250,7 +246,11 @@ def place(  # noqa: PLR0913  keywords of one call
     order = DERIVATIVES[quantity]
     if floor is None:
         floor = DYNAMIC_RANGE * _largest(model, omega, damping, order)
-    error = _Error(noise, floor, order)
+
+    def error(H: Complex, w: Array) -> Array:
+        """Standard deviation (n_f, n_s, n_e) of displacement per force, both parts [m/N]."""
+        return np.hypot(noise * np.abs(H), floor / w[:, None, None] ** order)
+
     told, known, names = _information(model, omega, damping, prior or {}, error)
     s, e = _chosen(told, known, len(model.names), n_sensors, n_inputs)
     N = known + told[np.ix_(s, e)].sum(axis=(0, 1))
@@ -267,19 +267,6 @@ def place(  # noqa: PLR0913  keywords of one call
     )
 
 
-@dataclass(frozen=True, slots=True)
-class _Error:
-    """Of measured values: a share of the value, and what is there without a value."""
-
-    noise: float
-    floor: float
-    order: int
-
-    def of(self, H: Complex, omega: Array) -> Array:
-        """Standard deviation (n_f, n_s, n_e) of displacement per force, both parts [m/N]."""
-        return np.hypot(self.noise * np.abs(H), self.floor / omega[:, None, None] ** self.order)
-
-
 def _largest(model: FamilyModel, omega: Array, damping: float, order: int) -> float:
     """Largest response at factors of one, a derivative of this order [1/N]."""
     x = np.clip(np.zeros(len(model.names)), *model.ends)
@@ -292,7 +279,7 @@ def _largest(model: FamilyModel, omega: Array, damping: float, order: int) -> fl
 
 
 def _information(
-    model: FamilyModel, omega: Array, damping: float, prior: Mapping[str, float], error: _Error
+    model: FamilyModel, omega: Array, damping: float, prior: Mapping[str, float], error: Error
 ) -> tuple[Array, Array, tuple[str, ...]]:
     """What each pair of channels tells (n_s, n_e, n, n), the prior (n, n), and the names (n,)."""
     check_prior(prior, model.names)
@@ -304,7 +291,7 @@ def _information(
     lines = max(1, BLOCK_VALUES // (n_s * n_e * n))
     for w in (omega[block] for block in blocks(omega.size, lines)):
         H, J = at(w)
-        J = np.moveaxis(J / error.of(H, w)[..., None], 0, 2)
+        J = np.moveaxis(J / error(H, w)[..., None], 0, 2)
         told += (np.swapaxes(J.conj(), 2, 3) @ J).real
         size = np.maximum(size, np.abs(H).max(axis=0))
     told[size < DEAD_RATIO * size.max()] = 0.0  # relative noise makes nothing of round-off
@@ -331,8 +318,8 @@ def _chosen(
         value = gain(known + by_input[e].sum(axis=0) + by_input, n_p)
         value[e] = -np.inf
         e.append(int(value.argmax()))
-    s = _exchanged(known, blocks[:, e].sum(axis=1), eliminated(known, blocks[:, e].sum(axis=1),
-                   n_p, n_sensors), n_p)  # fmt: skip
+    by_sensor = blocks[:, e].sum(axis=1)
+    s = _exchanged(known, by_sensor, eliminated(known, by_sensor, n_p, n_sensors), n_p)
     for _ in range(MAX_EXCHANGES):
         before = s, e
         e = _exchanged(known, blocks[s].sum(axis=0), e, n_p)
@@ -347,8 +334,7 @@ def eliminated(known: Array, blocks: Array, n_p: int, n: int) -> list[int]:
     kept = list(range(len(blocks)))
     N = known + blocks.sum(axis=0)
     while len(kept) > n:
-        worst = int(gain(N - blocks[kept], n_p).argmax())
-        kept.pop(worst)
+        kept.pop(int(gain(N - blocks[kept], n_p).argmax()))
         N = known + blocks[kept].sum(axis=0)
     return kept
 

@@ -250,11 +250,7 @@ def _outputs(args: argparse.Namespace, family: "Family") -> dict[str, Path]:
 
 
 def _files(args: argparse.Namespace) -> dict[str, Path]:
-    """{name: file} of the families; one alone has no name.
-
-    Raises:
-        ConfigError: for several of which one has no name, or two the same.
-    """
+    """{name: file} of the families; one alone has no name."""
     pairs = []
     for text in args.family:
         name, _, file = text.partition("=")
@@ -268,11 +264,7 @@ def _files(args: argparse.Namespace) -> dict[str, Path]:
 
 
 def _family(args: argparse.Namespace) -> "Family":
-    """The family, or the assembly of several.
-
-    Raises:
-        ConfigError: for a file of one body, or couplings of one family alone.
-    """
+    """The family, or the assembly of several."""
     from rom.components.families.assembled import FamilyAssembly
     from rom.components.families.family import BodyFamily
     from rom.io.bodies import load
@@ -288,19 +280,12 @@ def _family(args: argparse.Namespace) -> "Family":
         if args.couple or args.joint:
             raise ConfigError("--couple and --joint need an assembly of several families.")
         return families[""]
-    pairs = [
-        (_place("--couple", one, families), _place("--couple", other, families))
-        for one, other in args.couple
-    ]
-    return FamilyAssembly(families, tuple(pairs))
+    pairs = tuple(tuple(_place("--couple", x, families) for x in pair) for pair in args.couple)
+    return FamilyAssembly(families, pairs)
 
 
 def _place(option: str, text: str, bodies: Collection[str]) -> Any:
-    """The interface of a body alone, (body, interface) of an assembly.
-
-    Raises:
-        ConfigError: for a place without its body.
-    """
+    """The interface of a body alone, (body, interface) of an assembly."""
     if "" in bodies:
         return text
     for name in bodies:
@@ -323,11 +308,7 @@ def _common(args: argparse.Namespace, family: "Family") -> dict[str, Any]:
 
 
 def _plan(args: argparse.Namespace) -> Answer:
-    """Choose the channels of a test.
-
-    Raises:
-        ConfigError: for a test that is there, no lines, or an output of another kind.
-    """
+    """Choose the channels of a test."""
     import numpy as np
 
     from rom.components.updating.placement import candidates, place
@@ -355,20 +336,20 @@ def _plan(args: argparse.Namespace) -> Answer:
     }
     if not output:
         return Answer(data, f"{plan}\n{plan.csv()}")
-    if output.suffix.lower() == ".png":
-        from rom.components.updating.pictures import drawn
 
-        left = ", ".join(f"{name} to {100 * d:.2g} %" for name, d in plan.deviations.items()
-                         if name in family.parameters)  # fmt: skip
-        title, more = "Plan of a vibration test", f"The test will leave deviations: {left}."
-        return Answer(
-            data, str(plan),
-            lambda: drawn(family, (plan.sensors, plan.inputs), output, title, more),
-        )  # fmt: skip
-    text = plan.uff() if output.suffix.lower() == ".uff" else plan.csv()
-    return Answer(
-        data, str(plan), lambda: write_whole(output, lambda out: out.write(text.encode()))
-    )
+    def write() -> None:
+        if output.suffix.lower() == ".png":
+            from rom.components.updating.pictures import drawn
+
+            own = [(name, d) for name, d in plan.deviations.items() if name in family.parameters]
+            left = ", ".join(f"{name} to {100 * d:.2g} %" for name, d in own)
+            title, more = "Plan of a vibration test", f"The test will leave deviations: {left}."
+            drawn(family, (plan.sensors, plan.inputs), output, title, more)
+        else:
+            text = plan.uff() if output.suffix.lower() == ".uff" else plan.csv()
+            write_whole(output, lambda out: out.write(text.encode()))
+
+    return Answer(data, str(plan), write)
 
 
 def _two_counts(text: str) -> tuple[int, int]:
@@ -390,47 +371,32 @@ def _range(text: str) -> tuple[float, float]:
 
 def _data(args: argparse.Namespace, found: "Updated | Plan") -> dict[str, Any]:
     """What an update and a plan tell."""
-    data = {
-        "family": ", ".join(args.family),
-        "deviations": found.deviations,
-        "unseen": list(found.unseen),
-    }
-    return data | ({} if args.output is None else {"output": str(args.output)})
+    data = {"family": ", ".join(args.family), "deviations": found.deviations}
+    data |= {} if args.output is None else {"output": str(args.output)}
+    return data | {"unseen": list(found.unseen)}
 
 
 def _outside(args: argparse.Namespace, family: "Family") -> "Attached":
-    """Springs, joints and masses by their names.
-
-    Raises:
-        ConfigError: naming the option that is not as it is shown.
-    """
+    """Springs, joints and masses by their names."""
     from rom.components.updating.family_model import AddedMass, GroundSpring, JointSpring, Parts
 
-    bodies = Parts.of(family).bodies
-    found: dict[str, GroundSpring | JointSpring | AddedMass] = {}
-    for option, several in (("--spring", args.spring), ("--joint", args.joint),
-                            ("--mass", args.mass)):  # fmt: skip
-        for name, text in unique(several, option).items():
+    bodies, found = Parts.of(family).bodies, dict[str, Any]()
+    kinds = {"spring": GroundSpring, "joint": JointSpring, "mass": AddedMass}
+    for option, kind in kinds.items():
+        for name, text in unique(getattr(args, option), f"--{option}").items():
+            shown = f"--{option} {text!r}"
             if name in found:
-                raise ConfigError(f"{option} {name} needs a name of its own.")
-            at, value, low, high = _parts(option, text)
-            places = [_place(option, part, bodies) for part in at.split(",")]
-            if len(places) != (n := 1 + (option == "--joint")):
-                raise ConfigError(f"{option} {text!r} names {len(places)} places, needed are {n}.")
-            numbers = [typed_number(option, part) for part in value.split(",")]
-            if option == "--spring":
-                found[name] = GroundSpring(places[0], numbers, low, high)
-            elif option == "--joint":
-                found[name] = JointSpring(places[0], places[1], numbers, low, high)
-            elif len(numbers) == 1:
-                found[name] = AddedMass(places[0], numbers[0], low, high)
-            else:
-                raise ConfigError(f"{option} {text!r}: a mass must be one number [kg].")
+                raise ConfigError(f"--{option} {name} needs a name of its own.")
+            if len(parts := text.split(":")) != 4:
+                raise ConfigError(f"{shown} must be written INTERFACE:VALUE:LOW:HIGH.")
+            places = [_place(f"--{option}", part, bodies) for part in parts[0].split(",")]
+            if len(places) != (n := 1 + (option == "joint")):
+                raise ConfigError(f"{shown} names {len(places)} places, needed are {n}.")
+            low, high = (typed_number(f"--{option}", part) for part in parts[2:])
+            value: Any = [typed_number(f"--{option}", part) for part in parts[1].split(",")]
+            if option == "mass":
+                if len(value) != 1:
+                    raise ConfigError(f"{shown}: a mass must be one number [kg].")
+                value = value[0]
+            found[name] = kind(*places, value, low, high)
     return found
-
-
-def _parts(option: str, text: str) -> tuple[str, str, float, float]:
-    parts = text.split(":")
-    if len(parts) != 4:
-        raise ConfigError(f"{option} {text!r} must be written INTERFACE:VALUE:LOW:HIGH.")
-    return parts[0], parts[1], typed_number(option, parts[2]), typed_number(option, parts[3])

@@ -191,15 +191,10 @@ class Updated:
 
 
 def check_channels(models: Iterable[Complex], data: Data) -> None:
-    """Refuse responses whose scale or sign no model explains.
+    """Refuse responses whose scale or sign no model explains, by sensor, factor and likely reason.
 
-    Args:
-        models: (n_f, n_s, n_e) responses before updating, then with one factor after another at
-            the ends of its range, which are only asked for where the first ones do not fit [m/N].
-        data: what was measured.
-
-    Raises:
-        ConfigError: naming the sensor, the factor and its likely reason.
+    Models are responses (n_f, n_s, n_e) before updating, then with one factor after another at the
+    ends of its range, which are only asked for where the first ones do not fit [m/N].
     """
     found: dict[str, tuple[str, str]] = {}
     for k, H in enumerate(models):
@@ -216,11 +211,8 @@ def suspects(
 ) -> dict[str, tuple[str, str]]:
     """{"level 3", "sign of input 1": (message, hint)} of channels that differ from a model.
 
-    Args:
-        H: (n_f, n_s, n_e) of the model [m/N].
-        data: what was measured.
-        most: logarithm of a level that is taken.
-        unsure: whether signs are listed too that the model says little about.
+    By responses (n_f, n_s, n_e) of the model [m/N] and the logarithm of the largest level that is
+    taken; signs that the model says little about are listed where one is unsure.
     """
     used, found = data.weight > 0, {}
     size = np.abs(H).max(axis=(0, 2))
@@ -238,11 +230,7 @@ def suspects(
 def _levels(log: Array, used: Mask, most: float, lines: Array) -> dict[str, tuple[str, str]]:
     """Sensors beside all of them, inputs beside the other ones, and all beside the model.
 
-    Args:
-        log: (n_f, n_s, n_e) logarithms of levels over those of the model.
-        used: (n_f, n_s, n_e) which count.
-        most: see `suspects`.
-        lines: (n_f,) logarithms of frequencies.
+    By logarithms (n_f, n_s, n_e) of levels over those of the model, and (n_f,) of frequencies.
     """
     found = {}
     sensors, inputs = (_medians(log, used, axis) for axis in (1, 2))
@@ -323,11 +311,7 @@ def _turned(cosine: Array, used: Mask, unsure: bool) -> dict[str, tuple[str, str
 def scores(normal: Array, gradient: Array, free: Index, names: tuple[str, ...]) -> dict[str, float]:
     """{name: score in standard deviations} of parameters not updated; positive: more of it.
 
-    Args:
-        normal: (n, n) J^T J.
-        gradient: (n,) J^T r.
-        free: numbers of what was updated.
-        names: of the parameters, the first of all unknowns.
+    By J^T J (n, n) and J^T r (n,), of which the parameters are the first.
     """
     own = np.linalg.pinv(normal[np.ix_(free, free)], hermitian=True)
     found = {}
@@ -345,10 +329,7 @@ def unseen_directions(
 ) -> tuple[dict[str, float], ...]:
     """Directions whose standard deviation exceeds half the range of the parameters.
 
-    Args:
-        normal: (n, n) information on the logarithms of the unknowns.
-        width: (n,) ranges of these logarithms.
-        names: (n,) of the unknowns.
+    By the information (n, n) on the logarithms of the unknowns, and their ranges (n,).
     """
     lam, V = np.linalg.eigh(normal * np.outer(width, width))
     unseen = V[:, lam < UNSEEN_RTOL**-2.0]
@@ -358,33 +339,20 @@ def unseen_directions(
 
 
 def verdict(s: Sums, data: Data, n: int, missing: dict[str, float], doubts: list[Row]) -> Report:
-    """Whether noise alone explains what is left.
-
-    Args:
-        s: sums at the end of the search.
-        data: what was measured.
-        n: number of unknowns.
-        missing: scores of parameters not updated.
-        doubts: rows beside those of residuals.
-    """
+    """Whether noise alone explains what is left by n unknowns, with scores of what is missing."""
     freedom = data.n_values - n
     rows = [chi_row("chi-square of all residuals", s.chi_square, freedom, 1, data)]
     rows += worst_rows(s.squares, data.weight > 0, data.omega, data=data)
     if missing:
-        worst_name = max(missing, key=lambda name: abs(missing[name]))
-        quantity = f"largest score, {worst_name} [deviations]"
-        rows.append(row(quantity, abs(missing[worst_name]), MAX_SCORE))
+        name, score = max(missing.items(), key=lambda item: abs(item[1]))
+        rows.append(row(f"largest score, {name} [deviations]", abs(score), MAX_SCORE))
     return Report("updating", (*rows, *doubts))
 
 
 def band(frequencies: Array, highest: float) -> Row:
     """The highest line over the middle one of the frequencies of the updated model.
 
-    Of the frequencies of a basis the lower half is trusted, as of vectors that are iterated.
-
-    Args:
-        frequencies: (n,) ascending, of elastic modes of the updated model [Hz].
-        highest: line that counts [Hz].
+    Of these (n,), ascending [Hz], the lower half is trusted, as of vectors that are iterated.
 
     Source:
         Bathe, Finite element procedures (1996), 11.6: twice as many vectors as modes.

@@ -1,13 +1,16 @@
 """Families of steel blocks to be updated, and their tests with noise."""
 
 import numpy as np
+import pytest
+from numpy.testing import assert_allclose
 
 import rom
 from cases.solid import STEEL, composite
 from rom.components.updating.family_model import Parts, family_model
 from rom.components.updating.frf_data import noisy
 from rom.components.updating.normal_equations import responses_at
-from rom.updating import JointSpring, Responses
+from rom.errors import ConfigError
+from rom.updating import Channels, JointSpring, Responses
 
 BEAM = (1.0, 0.1, 0.08)
 KINDS = {"root": "rbe2", "tip": "rbe2"}
@@ -17,6 +20,32 @@ PARAMETERS = {
     "E_outer": rom.YoungsModulus("outer", 0.4, 2.5),
     "rho_outer": rom.Density("outer", 0.5, 2.0),
 }
+
+
+def refuse(*rows, error=ConfigError):
+    """See that each call is refused: the call, the class where it is another one, and words."""
+    for call, *kind, words in rows:
+        with pytest.raises(*kind or [error], match=words):
+            call()
+
+
+def crossed(points, bodies=None):
+    """Channels along y and along z at each point."""
+    axes = np.tile([[0, 1, 0], [0, 0, 1]], (len(points), 1))
+    return Channels(np.repeat(points, 2, axis=0), axes, bodies)
+
+
+def assert_right(found, true):
+    """Factors that were found within four of their deviations."""
+    for name, value in true.items():
+        assert abs(np.log(found.factors[name] / value)) < 4 * found.deviations[name]
+
+
+def assert_alike(one, other, names, atol):
+    """Records of filters are the same, over the largest of each number."""
+    for name in names:
+        scale = np.abs(getattr(other, name)).max(axis=0)
+        assert_allclose(getattr(one, name) / scale, getattr(other, name) / scale, atol=atol)
 
 
 def family_of(parameters, cells, n_modes, regions=("inner", "outer"), *, size=BEAM, **options):

@@ -470,6 +470,21 @@ def test_loci_within_a_window_are_those_of_the_torus():
 # --- what cannot be ---
 
 
+NOWHERE = ((0, 0.1), (1.3, 1.5))
+
+
+def glided(search, *functions, **options):
+    return search(GLIDE.inertia, *functions, NOWHERE, assembles=GLIDE.assembles, **options)
+
+
+def core_of(*drives, **tool):
+    return Driven(polar_of_the_core(), drives, **tool)
+
+
+def flat(a, s):
+    return ARM.tip(0 * a, s)
+
+
 test_what_is_no_linkage_is_refused = refused(
     (lambda: CrossSlides((1.0, 0.0)), ModelError, "must be positive"),
     (lambda: CrossSlides((-1.0, 1.0)), ModelError, "must not be negative"),
@@ -480,41 +495,19 @@ test_what_is_no_linkage_is_refused = refused(
     (lambda: replace(GLIDE, side=0), ModelError, "needed is 1 or -1"),
     (lambda: replace(GLIDE, slides=(1.0, -1.0)), ModelError, "slides.1. = -1"),
     (lambda: GLIDE.inertia(0.0, 1.3), ModelError, "do not meet"),
-    (
-        lambda: isotropic_set(
-            GLIDE.inertia, ((0, 0.1), (1.3, 1.5)), n=10, assembles=GLIDE.assembles
-        ),
-        ModelError,
-        "none of 10 by 10",
-    ),
-    (
-        lambda: tool_isotropy(
-            GLIDE.inertia, GLIDE.tip, ((0, 0.1), (1.3, 1.5)), assembles=GLIDE.assembles
-        ),
-        ModelError,
-        "reaches nothing",
-    ),
+    (lambda: glided(isotropic_set, n=10), ModelError, "none of 10 by 10"),
+    (lambda: glided(tool_isotropy, GLIDE.tip), ModelError, "reaches nothing"),
     (lambda: isotropic_set(ARM.inertia, (None, (1, 1))), ConfigError, "low < high"),
     (lambda: isotropic_set(ARM.inertia, lengths=(1, 0)), ConfigError, "lengths = 0 must"),
     (lambda: isotropic_set(ARM.inertia, n=2), ConfigError, "n = 2 must"),
     (lambda: tool_isotropy(ARM.inertia, ARM.tip, n=0), ConfigError, "n = 0 must"),
-    (
-        lambda: tool_isotropy(ARM.inertia, lambda a, s: ARM.tip(0 * a, s), (None, (0.1, 1))),
-        ModelError,
-        "along a line",
-    ),
-    (
-        lambda: Driven(polar_of_the_core(), ("turn", "feed"), tool="x"), ConfigError,
-        "none of",
-    ),
-    (
-        lambda: Driven(polar_of_the_core(), ("turn", "feed")).tip(0, 0), ConfigError,
-        "no tool",
-    ),
-    (lambda: Driven(polar_of_the_core(), ("turn", "x")), ConfigError, "x"),
-    (lambda: Driven(polar_of_the_core(), ("turn", "feed", "feed")), ConfigError, "must be two"),
-    (lambda: Driven(polar_of_the_core(), ("turn",)), ConfigError, "must be two"),
-)  # fmt: skip
+    (lambda: tool_isotropy(ARM.inertia, flat, (None, (0.1, 1))), ModelError, "along a line"),
+    (lambda: core_of("turn", "feed", tool="x"), ConfigError, "none of"),
+    (lambda: core_of("turn", "feed").tip(0, 0), ConfigError, "no tool"),
+    (lambda: core_of("turn", "x"), ConfigError, "x"),
+    (lambda: core_of("turn", "feed", "feed"), ConfigError, "must be two"),
+    (lambda: core_of("turn"), ConfigError, "must be two"),
+)
 
 
 def eyes(q1, q2):

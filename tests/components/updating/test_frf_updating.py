@@ -432,6 +432,7 @@ def test_a_wing_alone_is_a_free_beam():
     assert torsion_constant(0.1, 10) == pytest.approx(10 * 0.1**3 / 3 * 0.9937, rel=1e-4)
 
 
+FIVE = Measurement(OMEGA, EXACT[:, :5], (2, 4))
 test_wrong_input_is_named = refused(
     (lambda: BEAM.at([0.0]), r"needed is \(9,\)"),
     (lambda: Measurement(OMEGA, EXACT, (2,)), "180 lines, 1 exciters"),
@@ -447,7 +448,7 @@ test_wrong_input_is_named = refused(
     (lambda: update_by_output(BEAM, measured(), START, -GUESS), "ratios to start from"),
     (lambda: update_by_output(BEAM, measured(), START[:3], GUESS), r"needed is \(9,\)"),
     (
-        lambda: update_by_output(BEAM, Measurement(OMEGA, EXACT[:, :5], (2, 4)), START, GUESS),
+        lambda: update_by_output(BEAM, FIVE, START, GUESS),
         "8 sensors of the model for 5 of the test",
     ),
     (lambda: response_function_method(BEAM, measured(), START, np.eye(3)), "needed is .48"),

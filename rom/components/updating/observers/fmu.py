@@ -9,9 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from rom.arguments import typed
-from rom.components.updating.observers.operation import UNITS
 from rom.components.updating.observers.parameter_tracking import LINEAR_REACH, ParameterTracker
-from rom.components.updating.observers.tracking import Observer
+from rom.components.updating.observers.tracking import Observer, named_values
 from rom.io.files import check_writable
 from rom.io.fmu.archive import write_archive
 from rom.io.fmu.body import arrays
@@ -59,24 +58,15 @@ Names = tuple[tuple[str, str], ...]
 
 def _names(tracker: ParameterTracker) -> tuple[Names, Names]:
     """Names and units of samples (n_y,), and of what is wanted, of forces and factors (n_v,)."""
-    inputs, wanted = (
-        tuple((name, UNITS[s.quantity]) for s in several for name in s.names)
-        for several in (tracker.sensors, tracker.wanted)
-    )
     forces = [(f"force[{k}]", "N") for k in range(1, tracker.operation.driven.shape[1] + 1)]
     factors = [(structured("factor", name), "1") for name in tracker.names]
-    return inputs, (*wanted, *forces, *factors)
+    return named_values(tracker.sensors), (*named_values(tracker.wanted), *forces, *factors)
 
 
 def _steady(o: Observer) -> str:
     """Tables of a filter in its steady state."""
-    tables = {
-        "DT": np.array([o.dt]),
-        "CLOSED": o.A - o.A @ o.G @ o.C,
-        "DRIVEN": o.A @ o.G,
-        "WANTED": o.W,
-        "DEVIATIONS": o.deviations,
-    }
+    tables = {"DT": np.array([o.dt]), "CLOSED": o.A - o.A @ o.G @ o.C, "DRIVEN": o.A @ o.G}
+    tables |= {"WANTED": o.W, "DEVIATIONS": o.deviations}
     n_v, n = o.W.shape
     sizes = f"enum {{ STATES = {n}, SENSORS = {len(o.C)}, VALUES = {n_v} }};\n"
     return sizes + arrays(tables)

@@ -15,12 +15,13 @@ Source:
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from scipy.linalg import eigh, expm, expm_frechet
 
-from rom.arguments import not_negative, one_of
+from rom.arguments import typed
+from rom.arguments.quantities import NotNegative
 from rom.body.flexible import FlexibleBody
 from rom.body.recovery import StressRecovery
 from rom.components.updating.family_model import (
@@ -44,6 +45,7 @@ DAMPED_RTOL = 1e-9  # decay over frequency from which on an unseen motion dies o
 MAX_NORM = 0.5  # of a matrix whose exponential is summed; longer steps are doublings
 
 
+@typed
 @dataclass(frozen=True, slots=True)
 class Sensors:
     """Channels of one kind, measured or wanted.
@@ -59,12 +61,8 @@ class Sensors:
     """
 
     channels: Channels
-    quantity: str
-    noise: float = 0.0
-
-    def __post_init__(self) -> None:
-        one_of("quantity", self.quantity, tuple(UNITS))
-        not_negative("noise", self.noise)
+    quantity: Literal["displacement", "velocity", "acceleration", "strain", "stress"]
+    noise: Annotated[float, NotNegative()] = 0.0
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -152,9 +150,8 @@ class Operation:
         """The equations at logarithms x (n_p,) of factors."""
         m, n_e = self.driven.shape
         acc, dacc = self._accelerations(x)
-        A, at = np.zeros((2 * m + n_e,) * 2), np.arange(m)
-        A[at, m + at] = self.scale
-        A[m : 2 * m] = acc
+        A = np.zeros((2 * m + n_e,) * 2)
+        A[:m, m : 2 * m], A[m : 2 * m] = np.diag(self.scale), acc
         dA = np.zeros((x.size, *A.shape))
         dA[:, m : 2 * m] = dacc
         found = []
@@ -185,19 +182,10 @@ def operation(
     damping: float | None,
     fixed: Any,
 ) -> Operation:
-    """The equations of a body, an assembly or a family.
+    """The equations of a body, an assembly or a family, see `tracker` and `parameter_tracker`.
 
-    Args:
-        structure: families are without parameters of thickness.
-        names: of parameters that change; others stay at factors of one.
-        attached: springs and masses, by name.
-        channels: sensors, forces and what is wanted.
-        damping: ratio of all modes at factors of one [1]; None for that of the bodies.
-        fixed: what is held, see `FlexibleBody.frequencies`.
-
-    Raises:
-        ConfigError: if nothing can move, for channels off the body, or an unknown name.
-        ModelError: if a body has no surface or stress where they are needed.
+    Names are those of parameters that change; channels are sensors, forces and what is wanted. The
+    damping ratio of all modes at factors of one is that of the bodies where it is None.
     """
     parts = Parts.of(structure)
     nothing = np.eye(parts.n), np.zeros((0, parts.n))
@@ -222,16 +210,14 @@ def operation(
     chosen = [model.names.index(name) for name in names]
     sensors, forces, wanted = channels
     terms = terms_of(structure)
-    groups = [
-        _rows(parts, terms, V, several, what, len(attached))
-        for several, what in ((sensors, "sensor"), (wanted, "wanted value"))
-    ]
+    seen = _rows(parts, terms, V, sensors, "sensor", len(attached))
+    asked = _rows(parts, terms, V, wanted, "wanted value", len(attached))
     return Operation(
         tuple(names), np.log(model.low[chosen]), np.log(model.high[chosen]), omega,
         K=U.T @ model.K @ U, M=U.T @ model.M @ U,
         k_powers=model.k_powers[:, chosen], m_powers=model.m_powers[:, chosen],
         XI=XI, driven=(forces.rows(parts.bodies, "force") @ V).T,
-        seen=groups[0], wanted=groups[1],
+        seen=seen, wanted=asked,
     )  # fmt: skip
 
 
@@ -270,24 +256,13 @@ def stress_rows(
 ) -> tuple[Array, Array]:
     """Normal stress along channels by elastic coordinates (k, r) [Pa], and by accelerations.
 
-    The latter (k, 6 + r), of rigid and elastic coordinates, is that of modes left out.
-
-    Args:
-        body: with stress on its surface.
-        channels: where, and along which direction.
-        what: they are, for messages.
-        chosen: (k,) numbers of channels; None for all.
-
-    Raises:
-        ConfigError: if a channel is off the body.
-        ModelError: if the body knows no stress.
+    The latter (k, 6 + r), of rigid and elastic coordinates, is that of modes left out. Of chosen
+    channels (k,), or all.
     """
     recovery = _linear_stress(body)
     reach = POINT_RTOL * np.ptp(recovery.points, axis=0).max()
-    n_r = body.n_modes
-    extra = recovery.inertial
-    left_out = np.zeros((len(recovery.operator), 6 + n_r))
-    if extra is not None:
+    n_r, left_out = body.n_modes, np.zeros((len(recovery.operator), 6 + body.n_modes))
+    if (extra := recovery.inertial) is not None:
         left_out = np.hstack([extra[:, :6], extra[:, -n_r:]])
     static, inertial = [np.zeros((0, n_r))], [np.zeros((0, 6 + n_r))]
     for k in range(len(np.asarray(channels.points))) if chosen is None else chosen:
@@ -295,9 +270,8 @@ def stress_rows(
         far = np.linalg.norm(recovery.points - x, axis=1)
         n = int(far.argmin())
         if far[n] > reach:
-            raise ConfigError(
-                f"{what} {k} is {far[n]:.3g} m off the body; at most {reach:.3g} m may be."
-            )
+            text = f"{what} {k} is {far[n]:.3g} m off the body; at most {reach:.3g} m may be."
+            raise ConfigError(text)
         a, b, c = d / np.linalg.norm(d)
         along = np.array([a * a, b * b, c * c, 2 * b * c, 2 * a * c, 2 * a * b])
         static.append(along @ recovery.operator[None, 6 * n : 6 * n + 6])
@@ -319,11 +293,7 @@ def _linear_stress(body: FlexibleBody) -> StressRecovery:
 
 
 def check_seen(at: Linear, body: Operation) -> None:
-    """Refuse what lasts and is not seen: at each undamped root of A, after Popov and Hautus.
-
-    Raises:
-        ModelError: naming the force or the motion.
-    """
+    """Refuse what lasts and is not seen: at each undamped root of A, after Popov and Hautus."""
     m, n_e = body.driven.shape
     scale = np.r_[np.ones(2 * m), 1 / np.maximum(np.abs(body.driven).max(axis=0), 1e-300)]
     A, C = at.A * scale / scale[:, None], at.C * scale
@@ -352,11 +322,6 @@ def discrete(A: Array, white: Array, dt: float) -> tuple[Array, Array]:
 
     A short step by Van Loan's exponential, then doublings, which do not overflow for modes far
     above the samples.
-
-    Args:
-        A: (n, n) rates of the state [1/s].
-        white: (n, n) intensity of the noise.
-        dt: step [s].
     """
     n = len(A)
     halvings = max(0, int(np.ceil(np.log2(max(np.abs(A).sum(axis=1).max() * dt / MAX_NORM, 1.0)))))

@@ -11,13 +11,14 @@ Source:
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Annotated, Any
 
 import numpy as np
 from scipy.linalg import block_diag
 
-from rom.arguments import not_negative, positive, typed
+from rom.arguments import positive, typed
+from rom.arguments.quantities import NotNegative, Positive
 from rom.components.updating.family_model import Attached, Family, check_units
 from rom.components.updating.measured import Channels
 from rom.components.updating.observers.operation import (
@@ -30,8 +31,12 @@ from rom.components.updating.observers.operation import (
 )  # fmt: skip
 from rom.components.updating.observers.tracking import (
     Assumed,
+    First,
+    Step,
     Track,
     Tracker,
+    Walk,
+    White,
     checked_record,
     linear_tracker,
     recorded,
@@ -44,6 +49,7 @@ from rom.plausible import check_damping_ratio
 LINEAR_REACH = 5e-3  # of a logarithm, within which transitions are linear in it
 
 
+@typed
 @dataclass(frozen=True, slots=True)
 class Drift:
     """How a factor may change.
@@ -56,12 +62,8 @@ class Drift:
         ConfigError: if the first is not positive, or the walk negative.
     """
 
-    first: float
-    walk: float = 0.0
-
-    def __post_init__(self) -> None:
-        positive("first", self.first)
-        not_negative("walk", self.walk)
+    first: Annotated[float, Positive()]
+    walk: Annotated[float, NotNegative()] = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,20 +115,18 @@ class ParameterTracker:
             SolverError: if a parameter has left its range.
         """
         o, dt = self.operation, self.assumed.dt
-        if wrong := [j for j in range(x.size) if not o.low[j] <= x[j] <= o.high[j]]:
-            j = wrong[0]
+        for j in np.flatnonzero(~((o.low <= x) & (x <= o.high)))[:1]:
+            here, low, high = (f"{np.exp(y):.4g}" for y in (x[j], o.low[j], o.high[j]))
             raise SolverError(
-                f"parameter {o.names[j]!r} has reached the factor {np.exp(x[j]):.4g}; the family "
-                f"goes from {np.exp(o.low[j]):.4g} to {np.exp(o.high[j]):.4g}.",
+                f"parameter {o.names[j]!r} has reached the factor {here}; the family goes from "
+                f"{low} to {high}.",
                 hint="See whether forces, noise and support are those of the body, then make a "
                 "family with a wider range.",
             )
         rates = o.at(x)
         step, Q = discrete(rates.A, self.assumed.white(o), dt)
         walks = np.array([d.walk for d in self.drifts.values()])
-        at = Linear(
-            step, step_derivatives(rates.A, rates.dA, dt), rates.C, rates.dC, rates.W, rates.dW
-        )
+        at = replace(rates, A=step, dA=step_derivatives(rates.A, rates.dA, dt))
         return x.copy(), at, block_diag(Q, np.diag(walks**2 * dt))
 
     def held(self, **factors: float) -> Tracker:
@@ -152,13 +152,13 @@ def parameter_tracker(  # noqa: PLR0913  keywords of one call
     wanted: Sequence[Sensors],
     *,
     parameters: Mapping[str, Drift],
-    dt: float,
-    walk: float,
+    dt: Step,
+    walk: Walk,
     damping: float = 0.01,
     attached: Attached | None = None,
     fixed: Any = (),
-    unmodelled: float = 0.0,
-    first: float | None = None,
+    unmodelled: White = 0.0,
+    first: First = None,
 ) -> ParameterTracker:
     """A filter that also follows parameters: a joint that loosens, a mass that grows.
 
@@ -187,11 +187,8 @@ def parameter_tracker(  # noqa: PLR0913  keywords of one call
     if not parameters:
         raise ConfigError("no parameter changes.", hint="Use tracker for a body that stays.")
     check_damping_ratio(damping)
-    channels = sensors, forces, wanted
-    motion = operation(family, tuple(parameters), dict(attached or {}), channels, damping, fixed)
+    channels, names = (sensors, forces, wanted), tuple(parameters)
+    motion = operation(family, names, dict(attached or {}), channels, damping, fixed)
     assumed = Assumed(dt, walk, unmodelled, first)
-    start = np.zeros(len(parameters))
-    checked = linear_tracker(motion, start, assumed, sensors, wanted)
-    return ParameterTracker(
-        motion, assumed, dict(parameters), checked.R, tuple(sensors), tuple(wanted)
-    )
+    R = linear_tracker(motion, np.zeros(len(names)), assumed, sensors, wanted).R
+    return ParameterTracker(motion, assumed, dict(parameters), R, tuple(sensors), tuple(wanted))

@@ -12,11 +12,12 @@ Source:
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
-from rom.arguments import finite, not_negative, positive, typed
+from rom.arguments import finite, typed
+from rom.arguments.quantities import NotNegative, Positive
 from rom.assembly.assembly import Assembly
 from rom.body.flexible import FlexibleBody
 from rom.components.updating.family_model import check_units
@@ -37,6 +38,10 @@ from rom.model import Array
 TIME_RTOL = 1e-6  # of steps that count as equal
 SETTLED_RTOL = 1e-12  # change of variances from one doubling to the next
 MAX_DOUBLINGS = 60  # of the steps behind a steady state; twenty are usual
+Step = Annotated[float, Positive("s")]
+Walk = Annotated[float, Positive("N/s^(1/2)")]
+White = Annotated[float, NotNegative("m kg^(1/2)/s^(3/2)")]
+First = Annotated[float, Positive("N")] | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -171,14 +176,7 @@ class Tracker:
 def steady(A: Array, C: Array, Q: Array, R: Array) -> Array:
     """(n, n) covariance before a sample, after infinitely many: the discrete Riccati equation.
 
-    Args:
-        A: (n, n) transition.
-        C: (n_y, n) what sensors see.
-        Q: (n, n) covariance of what a step adds.
-        R: (n_y,) variances of samples.
-
-    Raises:
-        SolverError: if there is none.
+    Arguments are as of `Tracker`.
 
     Source:
         Doubling: Anderson, Second-order convergent algorithms for the steady-state Riccati
@@ -251,23 +249,17 @@ def recorded(
 
 
 def checked_record(samples: Any, times: Any, n_y: int, dt: float) -> Array:
-    """(n_t, n_y) samples on equal steps.
-
-    Raises:
-        ConfigError: for another number of sensors, infinite samples, or unequal steps.
-    """
+    """(n_t, n_y) samples on equal steps."""
     y = np.ascontiguousarray(samples, dtype=float)
     if y.ndim != 2 or y.shape[1] != n_y or np.isinf(y).any():
         raise ConfigError(f"samples {y.shape} must be (n_t, {n_y}) numbers, or NaN.")
     if times is None:
         return y
     times = finite("times", times, (len(y),))
-    wrong = np.flatnonzero(np.abs(np.diff(times) - dt) > TIME_RTOL * dt)
-    if wrong.size:
-        k = int(wrong[0])
+    steps = np.diff(times)
+    for k in np.flatnonzero(np.abs(steps - dt) > TIME_RTOL * dt)[:1]:
         raise ConfigError(
-            f"the step after t = {times[k]:.9g} s is {times[k + 1] - times[k]:.6g} s, that of "
-            f"the tracker {dt:.6g} s.",
+            f"the step after t = {times[k]:.9g} s is {steps[k]:.6g} s; it must be {dt:.6g} s.",
             hint="Put the record on equal steps, with NaN where nothing was measured.",
         )
     return y
@@ -283,20 +275,12 @@ class Assumed:
         unmodelled: intensity of white accelerations of each mode [m kg^(1/2)/s^(3/2)].
         first: standard deviation of the forces before the first sample [N]; None for a second of
             their walk.
-
-    Raises:
-        ConfigError: for numbers that are not positive.
     """
 
     dt: float
     walk: float
     unmodelled: float = 0.0
     first: float | None = None
-
-    def __post_init__(self) -> None:
-        for name in ("dt", "walk") + ("first",) * (self.first is not None):
-            positive(name, getattr(self, name))
-        not_negative("unmodelled", self.unmodelled)
 
     def white(self, operation: Operation) -> Array:
         """(n, n) intensity of the noise of the state."""
@@ -311,6 +295,11 @@ class Assumed:
         return np.diag(np.repeat([0.0, first**2], [2 * m, n_e]))
 
 
+def named_values(several: Sequence[Sensors]) -> tuple[tuple[str, str], ...]:
+    """Name and unit of each channel."""
+    return tuple((name, UNITS[s.quantity]) for s in several for name in s.names)
+
+
 def linear_tracker(
     operation: Operation,
     x: Array,
@@ -318,12 +307,7 @@ def linear_tracker(
     sensors: Sequence[Sensors],
     wanted: Sequence[Sensors],
 ) -> Tracker:
-    """The filter at logarithms x (n_p,) of factors, which stay.
-
-    Raises:
-        ConfigError: for fewer sensors than forces, or sensors without noise.
-        ModelError: if sensors do not see a force or a motion that lasts.
-    """
+    """The filter at logarithms x (n_p,) of factors, which stay."""
     at, n_e = operation.at(x), operation.driven.shape[1]
     if len(at.C) < n_e:
         raise ConfigError(
@@ -335,12 +319,8 @@ def linear_tracker(
         raise ConfigError("a sensor has no noise; give its standard deviation.")
     check_seen(at, operation)
     step, Q = discrete(at.A, assumed.white(operation), assumed.dt)
-    inputs, outputs = (
-        tuple((name, UNITS[s.quantity]) for s in several for name in s.names)
-        for several in (sensors, wanted)
-    )
-    P = assumed.before(operation)
-    return Tracker(assumed.dt, step, Q, at.C, R, at.W, P, n_e, inputs, outputs)
+    P, names = assumed.before(operation), (named_values(sensors), named_values(wanted))
+    return Tracker(assumed.dt, step, Q, at.C, R, at.W, P, n_e, *names)
 
 
 @typed
@@ -350,11 +330,11 @@ def tracker(  # noqa: PLR0913  keywords of one call
     forces: Channels,
     wanted: Sequence[Sensors],
     *,
-    dt: float,
-    walk: float,
+    dt: Step,
+    walk: Walk,
     fixed: Any = (),
-    unmodelled: float = 0.0,
-    first: float | None = None,
+    unmodelled: White = 0.0,
+    first: First = None,
 ) -> Tracker:
     """A filter that estimates forces, and motion and stress anywhere, from a few sensors.
 

@@ -30,16 +30,8 @@ def side_by_side(
 ) -> Responses:
     """Responses of all sensors to all forces; pairs that are missing have the coherence zero.
 
-    Args:
-        functions: frequency responses in SI units, and their coherences.
-        points: {node: (3,) point [m]}.
-        averages: behind all functions.
-        coherence: of all values where the file says nothing [1].
-        bodies: to which nodes belong.
-
-    Raises:
-        FileFormatError: if functions, lines or points do not fit each other.
-        ConfigError: as `Responses`.
+    Functions, in SI units, are frequency responses and their coherences; one number instead is that
+    of all values. Points are {node: (3,) [m]}.
     """
     bodies = bodies.of(functions)
     found = _by_pair([f for f in functions if f.kind == FREQUENCY_RESPONSE], bodies)
@@ -86,11 +78,7 @@ class Bodies:
         return self if entities & {_entity(name) for name in self.names} else Bodies(self.of_nodes)
 
     def dof(self, dof: tuple[int, int], entity: str) -> Dof:
-        """Node and direction with the name of the body.
-
-        Raises:
-            FileFormatError: for an entity that is not one body.
-        """
+        """Node and direction with the name of the body, as which the entity counts."""
         node, axis = dof
         if node in self.of_nodes or not self.names:
             return node, axis, self.of_nodes.get(node, "")
@@ -110,13 +98,10 @@ def _entity(name: str) -> str:
 def _by_pair(functions: list[Function], bodies: Bodies) -> dict[tuple[Dof, Dof], Function]:
     known: dict[tuple[Dof, Dof], Function] = {}
     for f in functions:
-        dofs = zip((f.response, f.reference), f.entities, strict=True)
-        one, other = (bodies.dof(dof, entity) for dof, entity in dofs)
-        pair = one, other
+        pair = bodies.dof(f.response, f.entities[0]), bodies.dof(f.reference, f.entities[1])
         if not all(1 <= abs(dof[1]) <= 3 for dof in pair):
-            raise FileFormatError(
-                f"the function of {_dof(pair[0])} by {_dof(pair[1])} is no translation by a force."
-            )
+            one, other = map(_dof, pair)
+            raise FileFormatError(f"the function of {one} by {other} is no translation by a force.")
         if pair in known:
             raise FileFormatError(
                 f"{_some([pair])} is there twice.", hint="Keep one run, or average them before."
@@ -141,10 +126,8 @@ def _rounded(f: Function, x: Array) -> Array:
 
 def _check_lines(f: Function, x: Array) -> None:
     if f.x.shape != x.shape or not np.allclose(f.x, x, rtol=LINES_RTOL, atol=0):
-        raise FileFormatError(
-            f"{_some([((*f.response, ''), (*f.reference, ''))])} has other lines than the first "
-            "function."
-        )
+        pair = (*f.response, ""), (*f.reference, "")
+        raise FileFormatError(f"{_some([pair])} has other lines than the first function.")
 
 
 def _channels(dofs: list[Dof], points: Points) -> Channels:

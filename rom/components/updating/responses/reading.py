@@ -1,23 +1,45 @@
 """Tests of vibration from files: the reader is chosen by the ending.
 
+HDF5 has the names of `rom.updating.Responses`: data sets are frequencies (n_f,), H (n_f, n_s, n_e)
+complex, coherence (one number or as H), and sensors and inputs, groups with points and directions
+(k, 3); attributes of the file are averages, quantity (of all sensors, or of each with commas
+between), force_noise (zero where it is missing; of lines and inputs (n_f, n_e) a data set),
+estimator (H1, H2 or Hv) and bodies of sensors and inputs (one name a line) where they are named,
+units, always SI, and checksum, SHA-256 of the data sets, which is compared where it is there.
+Headers of HDF5 1.8 have checksums of their own: without them, and by texts in its heap, a byte that
+is wrong can end the process.
+
 See docs/theory/updating.md.
 """
 
-from collections.abc import Collection, Iterator
+import io
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
+from hashlib import sha256
 from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 from rom.arguments import typed
-from rom.components.updating.measured import MeasuredModes, Responses
+from rom.components.updating.measured import Channels, MeasuredModes, Responses
 from rom.components.updating.responses.grid import Bodies, side_by_side
-from rom.errors import ConfigError, FileFormatError
+from rom.components.updating.responses.tables import functions_of, points_of
+from rom.components.updating.responses.universal_test import functions_and_points, modes_of
+from rom.errors import ConfigError, FileFormatError, UnsafeFileError
+from rom.io.files import check_readable, write_whole
+from rom.io.hdf5 import h5py
 from rom.model import Array
 
-UNIVERSAL_ENDINGS, TABLE_ENDINGS, ARRAY_ENDINGS = (
-    (".uff", ".unv", ".uf"),
-    (".csv", ".txt"),
-    (".h5", ".hdf5"),
-)
+UNIVERSAL_ENDINGS, TABLE_ENDINGS = (".uff", ".unv", ".uf"), (".csv", ".txt")
+ARRAY_ENDINGS = (".h5", ".hdf5")
+HEADERS = ("v108", "v108")  # oldest and newest version of HDF5 that is written
+KINDS = {"fiu": "real numbers", "c": "complex numbers"}  # by the letters of NumPy
+MAX_ARRAY_BYTES = 2**32  # of all arrays of a test
+DATA_SETS = ("frequencies", "H", "coherence", "sensors/points", "sensors/directions",
+          "inputs/points", "inputs/directions")  # fmt: skip
+TEXTS = ("estimator", "bodies of sensors", "bodies of inputs")  # attributes that may be missing
+FORCE_NOISE = "force_noise"  # a data set where it differs between lines
 
 
 @typed
@@ -52,18 +74,17 @@ def read_responses(
     Source:
         SDRC, Universal file datasets, as published by the University of Cincinnati.
     """
-    from rom.components.updating.responses.tables import functions_of
-    from rom.components.updating.responses.universal_test import functions_and_points
-
     path = Path(path)
     ending = path.suffix.lower()
     if ending in ARRAY_ENDINGS:
-        from rom.components.updating.responses.arrays import read
-
         if averages is not None or coherence is not None or points is not None:
             raise ConfigError(f"{path} says averages, coherence and points itself; leave them out.")
         with _of(path):
-            return read(path)
+            try:
+                with h5py(".uff").File(check_readable(path), "r") as file:
+                    return _test(file)
+            except (OSError, RuntimeError, KeyError, TypeError, ValueError) as error:
+                raise FileFormatError(f"this is no whole HDF5 file: {error}.") from error
     if ending not in UNIVERSAL_ENDINGS + TABLE_ENDINGS:
         raise _unknown(path, UNIVERSAL_ENDINGS + TABLE_ENDINGS + ARRAY_ENDINGS)
     if averages is None:
@@ -94,8 +115,6 @@ def read_modes(path: str | Path, *, points: str | Path | None = None) -> Measure
     Source:
         SDRC, Universal file datasets, as published by the University of Cincinnati.
     """
-    from rom.components.updating.responses.universal_test import modes_of
-
     places, _ = _points(points)
     with _of(Path(path)):
         return modes_of(Path(path), places)
@@ -113,11 +132,30 @@ def write_responses(test: Responses, path: str | Path) -> Path:
         ConfigError: for another ending, or if the folder is missing or not writable.
         ResourceError: if the disk is full, or h5py is missing.
     """
-    from rom.components.updating.responses.arrays import written
-
-    if Path(path).suffix.lower() not in ARRAY_ENDINGS:
-        raise _unknown(Path(path), ARRAY_ENDINGS)
-    return written(test, Path(path))
+    path = Path(path)
+    if path.suffix.lower() not in ARRAY_ENDINGS:
+        raise _unknown(path, ARRAY_ENDINGS)
+    sides = ("sensors", test.sensors), ("inputs", test.inputs)
+    places = (x for _, channels in sides for x in (channels.points, channels.directions))
+    values = (test.frequencies, test.H, test.coherence, *places)
+    arrays: dict[str, Any] = dict(zip(DATA_SETS, values, strict=True))
+    texts = {"quantity": ",".join(test.quantities), "units": "SI"}
+    texts |= {f"bodies of {k}": "\n".join(x.bodies) for k, x in sides if x.bodies is not None}
+    if test.estimator is not None:
+        texts["estimator"] = test.estimator
+    numbers = {"averages": test.averages, FORCE_NOISE: test.force_noise}
+    if np.ndim(test.force_noise):
+        arrays[FORCE_NOISE] = numbers.pop(FORCE_NOISE)
+    texts["checksum"] = _checksum(list(arrays.values()))
+    data = io.BytesIO()
+    with h5py(".uff").File(data, "w", libver=HEADERS) as file:
+        for name, value in arrays.items():
+            file[name] = np.asarray(value)
+        for name, text in texts.items():
+            file.attrs[name] = np.bytes_(text.encode())
+        file.attrs.update(numbers)
+    write_whole(path, lambda out: out.write(data.getvalue()))
+    return path
 
 
 @contextmanager
@@ -134,9 +172,6 @@ def _of(path: Path) -> Iterator[None]:
 
 
 def _points(path: str | Path | None) -> tuple[dict[int, Array], dict[int, str]]:
-    from rom.components.updating.responses.tables import points_of
-    from rom.components.updating.responses.universal_test import functions_and_points
-
     if path is None:
         return {}, {}
     path = Path(path)
@@ -148,3 +183,58 @@ def _points(path: str | Path | None) -> tuple[dict[int, Array], dict[int, str]]:
 
 def _unknown(path: Path, known: tuple[str, ...]) -> ConfigError:
     return ConfigError(f"{path}: the ending must be one of {', '.join(known)}.")
+
+
+def _test(file: Any) -> Responses:
+    h5 = h5py(".uff")
+    if missing := [name for name in DATA_SETS if not isinstance(file.get(name), h5.Dataset)]:
+        raise FileFormatError(f"there is no data set {missing[0]!r}.")
+    if missing := [name for name in ("averages", "quantity", "units") if name not in file.attrs]:
+        raise FileFormatError(f"the file has no attribute {missing[0]!r}.")
+    if (units := _text(file.attrs["units"])) != "SI":
+        raise FileFormatError(f"units are {units!r}, not 'SI'.")
+    names = (*DATA_SETS, *[FORCE_NOISE] * isinstance(file.get(FORCE_NOISE), h5.Dataset))
+    if sum(file[name].nbytes for name in names) > MAX_ARRAY_BYTES:
+        raise UnsafeFileError("its arrays take more than 4 GiB.")
+    for name in names:
+        kinds = "c" if name == "H" else "fiu"
+        if file[name].dtype.kind not in kinds:
+            raise FileFormatError(f"{name!r} holds no {KINDS[kinds]}.")
+    f, H, c, *where = values = [file[name][()] for name in names]
+    if "checksum" in file.attrs and _text(file.attrs["checksum"]) != _checksum(values):
+        text = "the arrays are not those of its checksum: it was damaged or changed."
+        raise FileFormatError(text)
+    texts: dict[str, Any] = {name: _text(file.attrs[name]) for name in TEXTS if name in file.attrs}
+    bodies = [tuple(texts[k].split("\n")) if k in texts else None for k in TEXTS[1:]]
+    sensors = Channels(where[0], where[1], bodies[0])
+    inputs = Channels(where[2], where[3], bodies[1])
+    averages = _number(file, "averages")
+    if averages != int(averages):
+        raise FileFormatError(f"averages = {averages} is no whole number.")
+    noise: Any = where[4] if where[4:] else 0.0
+    if FORCE_NOISE in file.attrs:
+        noise = _number(file, FORCE_NOISE)
+    quantity, *several = _text(file.attrs["quantity"]).split(",")
+    each = (quantity, *several) if several else quantity
+    estimator = texts.get("estimator")
+    return Responses(f, H, sensors, inputs, c, int(averages), each, noise, estimator)
+
+
+def _checksum(values: Sequence[Any]) -> str:
+    """SHA-256 of the bytes of all arrays, one after another."""
+    whole = sha256()
+    for value in values:
+        whole.update(np.ascontiguousarray(value).tobytes())
+    return whole.hexdigest()
+
+
+def _text(value: Any) -> str:
+    """An attribute of fixed or free length."""
+    return value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
+
+
+def _number(file: Any, name: str) -> float:
+    value = np.asarray(file.attrs[name])
+    if value.shape or value.dtype.kind not in "fiu" or not np.isfinite(value):
+        raise FileFormatError(f"{name} = {file.attrs[name]} is no number.")
+    return float(value)

@@ -28,19 +28,15 @@ COLUMN_NAME = re.compile(
 POINT_COLUMN = re.compile(r"([xyz])\s*[\[(](.+)[\])]", re.IGNORECASE)
 ANGLES = {"deg": np.pi / 180, "rad": 1.0}
 NAME_HINT = (
-    "A column is named as in 12+Z/3-Y real [m/s^2/N]; parts are real and imag, or magnitude "
+    "A column is named as in 12+Z/3-Y real [m/s^2/N]; parts are real and imag, or magnitude and "
+    "phase [deg], and coherence."
 )
-NAME_HINT += "and phase [deg], and coherence."
 Row = list[str]
 Pair = tuple[tuple[int, int], tuple[int, int]]  # node and direction of sensor and force
 
 
 def functions_of(path: Path) -> tuple[Function, ...]:
-    """All functions of a table, in SI units.
-
-    Raises:
-        FileFormatError: naming line or column that is not as described.
-    """
+    """All functions of a table, in SI units."""
     names, rows, separator = _cells(path, re.compile(r"freq", re.IGNORECASE))
     values = _numbers(rows, separator)
     if label := re.search(r"[\[(]([^\])]+)[\])]", names[0]):
@@ -60,13 +56,7 @@ def functions_of(path: Path) -> tuple[Function, ...]:
 
 
 def points_of(path: Path) -> tuple[dict[int, Array], dict[int, str]]:
-    """{node: point [m]} of a table with the columns node, x [m], y [m] and z [m]; {node: body}.
-
-    The latter where there is a last column, body.
-
-    Raises:
-        FileFormatError: naming line or column that is not as described.
-    """
+    """{node: point [m]} by columns node, x [m], y [m] and z [m]; {node: body} where one is body."""
     names, rows, separator = _cells(path, re.compile(r"node", re.IGNORECASE))
     named = names[-1].lower() == "body"
     owners = [cells.pop().strip().strip('"') for _, cells in rows] if named else []
@@ -105,14 +95,11 @@ def _functions(pair: Pair, own: dict[str, tuple[str, Array]], x: Array) -> list[
             raise FileFormatError(f"of {pair} the phase has the unit {other!r}.", hint=NAME_HINT)
         kind, factor = motion_per_force(unit)
         y = a + 1j * b if first == "real" else a * np.exp(1j * b * ANGLES[other])
-        found.append(_function(FREQUENCY_RESPONSE, pair, x, y * factor, kind))
+        found.append(Function(FREQUENCY_RESPONSE, x, y * factor, *pair, kind, FORCE_TYPE, ()))
     if "coherence" in own:
-        found.append(_function(COHERENCE_KIND, pair, x, own["coherence"][1], 0))
+        c: Any = own["coherence"][1]
+        found.append(Function(COHERENCE_KIND, x, c, *pair, 0, FORCE_TYPE, ()))
     return found
-
-
-def _function(kind: int, pair: Pair, x: Array, y: Any, numerator: int) -> Function:
-    return Function(kind, x, y, *pair, numerator, FORCE_TYPE, ())
 
 
 def _cells(path: Path, first: re.Pattern[str]) -> tuple[Row, list[tuple[int, Row]], str]:
@@ -132,10 +119,8 @@ def _cells(path: Path, first: re.Pattern[str]) -> tuple[Row, list[tuple[int, Row
             continue
         cells = line.split(separator)
         rows.append((number, cells))
-        if len(cells) != len(names):
-            raise FileFormatError(
-                f"line {number} has {len(cells)} numbers under {len(names)} names."
-            )
+        if len(cells) != (n := len(names)):
+            raise FileFormatError(f"line {number} has {len(cells)} numbers under {n} names.")
     if not rows:
         raise FileFormatError("there are no numbers under the names.")
     return names, rows, separator

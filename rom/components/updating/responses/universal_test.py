@@ -33,29 +33,17 @@ UNITS_RTOL = 1e-3  # of factors that say the same
 
 
 def functions_and_points(path: Path) -> tuple[tuple[Function, ...], dict[int, Array]]:
-    """Functions in SI units, and {node: point [m]}.
-
-    Raises:
-        FileFormatError: if a dataset is cut, or its units contradict each other.
-    """
+    """Functions in SI units, and {node: point [m]}."""
     functions, others = scan(path)
     factors = _factors(others)
     return tuple(_in_si(f, factors) for f in functions), _points(others, factors)
 
 
 def modes_of(path: Path, points: dict[int, Array] | None = None) -> MeasuredModes:
-    """Measured modes of all datasets 55 that hold one.
-
-    Args:
-        path: the file.
-        points: {node: point [m]} where the file has none.
-
-    Raises:
-        FileFormatError: if there is none, or it does not fit the others.
-    """
+    """Measured modes of all datasets 55 that hold one, with points {node: [m]} of another file."""
     _, others = scan(path)
     places = _points(others, _factors(others)) | (points or {})
-    found = [s for lines in others.get("55", []) if (s := _shape(lines)) is not None]
+    found = list(filter(None, map(_shape, others.get("55", []))))
     if not found:
         raise FileFormatError("there is no mode (dataset 55).")
     nodes = sorted({node for _, _, values in found for node in values})
@@ -92,7 +80,7 @@ def _points(others: SETS, factors: tuple[float, float] | None) -> dict[int, Arra
     local = any(name in others for name in AXES_SETS)
     for name in NODE_SETS:
         for lines in others.get(name, []):
-            records = lines if name == "15" else [a + b for a, b in _pairs(lines)]
+            records = lines if name == "15" else _pairs(lines)
             width = 13 if name == "15" else 25
             for line in records:
                 node, system, turned, x = _node(name, line, width)
@@ -143,10 +131,10 @@ def _node(name: str, line: str, width: int) -> tuple[int, int, int, Array]:
     return whole[0], whole[1], whole[2], np.array(x)
 
 
-def _pairs(lines: list[str]) -> list[tuple[str, str]]:
+def _pairs(lines: list[str]) -> list[str]:
     if len(lines) % 2:
         raise FileFormatError("dataset 2411 is cut: it has an odd line.")
-    return [(f"{a:<40}"[:40], b) for a, b in zip(lines[::2], lines[1::2], strict=True)]
+    return [f"{a:<40}"[:40] + b for a, b in zip(lines[::2], lines[1::2], strict=True)]
 
 
 def _in_si(f: Function, factors: tuple[float, float] | None) -> Function:
