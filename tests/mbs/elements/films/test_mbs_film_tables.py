@@ -223,7 +223,7 @@ def test_the_temperature_is_that_of_the_film_that_is_solved():
 ])  # fmt: skip
 def test_films_that_are_more_than_a_table_are_refused(given, words):
     with pytest.raises(ConfigError, match=words):
-        on_ground(bearing(), name="main", tabulated=True, **given)
+        on_ground(name="main", tabulated=True, **{"bearing": bearing()} | given)
 
 
 FILE = """

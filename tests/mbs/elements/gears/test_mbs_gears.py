@@ -276,9 +276,6 @@ def test_what_is_no_mesh_is_refused(more, message):
         mech.gear_mesh("mesh", *ends, **{"axis": Z, "pair": SPUR, "stiffness": K} | more)
     with pytest.raises(ConfigError, match="connects body 'a' with itself"):
         mech.gear_mesh("mesh", ends[0], ends[0], axis=Z, pair=SPUR, stiffness=K)
-    beside = mech.add_rigid("c", mass=1.0, inertia=(1e-3,) * 3, at=(SPUR.distance, 0, 0.01))
-    with pytest.raises(ConfigError, match="10 mm beside each other"):
-        mech.gear_mesh("mesh", ends[0], beside.marker(ORIGIN), axis=Z, pair=SPUR, stiffness=K)
     assert not mech.gear_meshes
 
 
@@ -299,17 +296,6 @@ def test_an_internal_gear_is_one_of_negative_radii():
         stiffness_table(RING, force=1e5)
     with pytest.raises(ModelError, match=r"use Mechanism\.gear_mesh"):
         Mesh(RING, K)
-
-
-@pytest.mark.parametrize("numbers", [(-20, 40), (40, -40), (40, -30), (3, 40), (20, -3)])
-def test_wheels_that_do_not_turn_in_each_other_are_refused(numbers):
-    with pytest.raises(ModelError, match=r"no pinion of|no gears have"):
-        GearPair(numbers, 2e-3, 0.02)
-
-
-def test_interference_inside_a_ring_is_refused():
-    with pytest.raises(ModelError, match=r"teeth interfere: tips of the gear .* from -"):
-        GearPair((20, -62), 2e-3, 0.02)
 
 
 def gaps_behind(z1, z2, addendum):
@@ -412,13 +398,9 @@ def flank(centre, radius, start, length, turn):
 
 
 def approach_of_curves(pair, s, moved_to, turns):
-    """How far two involutes that touch at s on the path overlap along their common normal [m].
+    """How far two involutes that touch at s from T1 overlap along their common normal [m].
 
-    Args:
-        pair: the wheels.
-        s: place of the contact at the datum, from T1.
-        moved_to: (2,) centre of the gear from where it was.
-        turns: of pinion and gear.
+    The centre of the gear has moved (2,) from where it was, and both wheels have turned.
     """
     alpha, r1, r2 = pair.alpha, pair.rb[0], abs(pair.rb[1])
     behind = pair.tangents if not pair.internal else -abs(pair.tangents)
@@ -484,11 +466,8 @@ PUBLISHED = {
     "sun": (0.4, 0.39), "ring": (2.35, 3.0), "carrier": (5.43, 6.29), "planet": (0.66, 0.61),
 }  # fmt: skip
 FREQUENCIES = {  # number of planets -> [Hz]: rotational modes, then pairs of translational ones
-    3: ((1475.7, 1930.3, 2658.3, 7462.8, 11775.3), (743.2, 1102.4, 1896.0, 2276.4, 6986.3, 9647.9)),
-    4: (
-        (1536.6, 1970.6, 2625.7, 7773.6, 13071.1),
-        (727.0, 1091.0, 1892.8, 2342.5, 7189.9, 10437.6),
-    ),
+    3: ((1475.7, 1930.3, 2658.3, 7462.8, 11775.3), (743.2, 1102.4, 1896, 2276.4, 6986.3, 9647.9)),
+    4: ((1536.6, 1970.6, 2625.7, 7773.6, 13071.1), (727, 1091, 1892.8, 2342.5, 7189.9, 10437.6)),
 }
 BODIES = ("sun", "ring", "carrier")
 
