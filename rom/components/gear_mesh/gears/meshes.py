@@ -242,14 +242,10 @@ def _rims(
     parts: tuple[Part, Part], wheels: tuple[Marker, Marker], axes: Array, pair: GearPair
 ) -> tuple[tuple[Cylinder, float] | None, ...]:
     """How the rims of flexible wheels deform, and the angle that a tooth takes on each [rad]."""
-    found: list[tuple[Cylinder, float] | None] = []
-    for side in range(2):
-        if not pair.teeth[side]:
-            found.append(None)
-            continue
-        rim = cylinder_of(parts[side], wheels[side], *axes[2 * side : 2 * side + 2])
-        found.append(None if rim is None else (rim, np.pi / abs(pair.teeth[side])))
-    return tuple(found)
+    rims = [cylinder_of(parts[k], wheels[k], *axes[2 * k : 2 * k + 2]) if z else None
+            for k, z in enumerate(pair.teeth)]  # fmt: skip
+    both = zip(rims, pair.teeth, strict=True)
+    return tuple(None if rim is None else (rim, np.pi / abs(z)) for rim, z in both)
 
 
 def _spins(
