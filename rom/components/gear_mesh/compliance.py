@@ -67,14 +67,11 @@ def tooth_compliance(
     half = float(_half_angle(pair, gear, np.array([radius]))[0])
     gamma = float(np.arccos(min(pair.rb[gear] / radius, 1.0))) - half
     height, tan2 = pair.rb[gear] / np.cos(gamma), np.tan(gamma) ** 2
-    k = y <= height
+    k, u = y <= height, height - y[0]
     bending = 10.92 * trapezoid((height - y[k]) ** 2 / t[k] ** 3, y[k])
     bending += 3.1 * (1 + 0.294 * tan2) * trapezoid(1 / t[k], y[k])
-    u = height - y[0]
-    if body == "weber":
-        x = u / t[0]
-        foundation = 5.2 * x**2 + x + 1.4 * (1 + 0.294 * tan2)
-    else:
+    foundation = 5.2 * (u / t[0]) ** 2 + u / t[0] + 1.4 * (1 + 0.294 * tan2)
+    if body != "weber":
         foundation = _sainsot(pair, gear, t[0], u, tan2, bore)
     cos2 = np.cos(gamma) ** 2
     return float(cos2 * bending), float(cos2 * foundation), radius * np.sin(half) / np.cos(gamma)
@@ -116,14 +113,9 @@ def normal_section(pair: GearPair) -> GearPair:
 
 
 def in_normal_section(pair: GearPair, s: float) -> tuple[Array, Array]:
-    """Where teeth touch in their normal section: radii on the virtual gears, and of curvature.
+    """Where teeth that touch at s from T1 do so in their normal section, on the virtual gears.
 
-    Args:
-        pair: spur or helical gears.
-        s: place on the path of contact, from T1 [m].
-
-    Returns:
-        (2,) radii of equal height over the reference circle [m], (2,) radii of curvature [m].
+    (2,) radii of equal height over the reference circles, (2,) radii of curvature [m].
     """
     rho = np.array([s, pair.tangents - s])
     height, normal = np.hypot(pair.rb, rho) - pair.r, normal_section(pair)
@@ -148,11 +140,22 @@ def pair_stiffness(
     Raises:
         ModelError: if the pair does not touch there.
     """
-    radii, rho = in_normal_section(pair, s)
-    teeth = normal_section(pair)
+    own, depths, rho = _both_teeth(pair, s, body)
+    return float(E / (own + contact_compliance(rho, depths, force, E)))
+
+
+def _both_teeth(pair: GearPair, s: float, body: Body) -> tuple[float, list[float], Array]:
+    """E times what both teeth give way without contact; depths, and radii of curvature [m]."""
+    (radii, rho), teeth = in_normal_section(pair, s), normal_section(pair)
     parts = [tooth_compliance(teeth, g, float(radii[g]), body) for g in (0, 1)]
     own = sum(bending + foundation for bending, foundation, _ in parts)
-    return float(E / (own + contact_compliance(rho, [p[2] for p in parts], force, E)))
+    return own, [depth for _, _, depth in parts], rho
+
+
+def places_of_contact(pair: GearPair, n: int) -> Array:
+    """(n,) from first to last contact, both of which are inside [m]."""
+    A, B = pair.path
+    return np.linspace(A + 1e-9 * (B - A), B - 1e-9 * (B - A), n)
 
 
 def stiffness_table(
@@ -163,9 +166,8 @@ def stiffness_table(
     Raises:
         ModelError: as `pair_stiffness`.
     """
-    A, B = pair.path
-    inside = np.linspace(A + 1e-9 * (B - A), B - 1e-9 * (B - A), n)
-    return np.array([pair_stiffness(pair, s, force=force, E=E, body=body) for s in inside])
+    places = places_of_contact(pair, n)
+    return np.array([pair_stiffness(pair, s, force=force, E=E, body=body) for s in places])
 
 
 def bending_table(
@@ -188,14 +190,9 @@ def bending_table(
     Raises:
         ModelError: as `pair_stiffness`.
     """
-    A, B = pair.path
-    k, depths, teeth = np.zeros(n), np.zeros((n, 2)), normal_section(pair)
-    for at, s in enumerate(np.linspace(A + 1e-9 * (B - A), B - 1e-9 * (B - A), n)):
-        radii, _ = in_normal_section(pair, s)
-        parts = [tooth_compliance(teeth, g, float(radii[g]), body) for g in (0, 1)]
-        k[at] = E / sum(bending + foundation for bending, foundation, _ in parts)
-        depths[at] = [part[2] for part in parts]
-    return k, Hertz(depths, E, nu)
+    teeth = (_both_teeth(pair, s, body) for s in places_of_contact(pair, n))
+    own, depths, _ = zip(*teeth, strict=True)
+    return E / np.array(own), Hertz(np.array(depths), E, nu)
 
 
 def iso_stiffness(pair: GearPair) -> tuple[float, float, float]:
@@ -223,9 +220,7 @@ def _half_angle(pair: GearPair, gear: int, radius: Array) -> Array:
 def _sainsot(pair: GearPair, gear: int, root: float, u: float, tan2: float, bore: float) -> float:
     theta = float(np.arcsin(root / (2 * pair.rf[gear])))
     h = pair.rf[gear] / (bore * pair.r[gear])
-    L, M, P, Q = (
-        a / theta**2 + b * h**2 + c * h / theta + d / theta + e * h + f
-        for a, b, c, d, e, f in RIM_COEFFICIENTS.values()
-    )
+    terms = np.array([1 / theta**2, h**2, h / theta, 1 / theta, h, 1.0])
+    L, M, P, Q = np.array(list(RIM_COEFFICIENTS.values())) @ terms
     x = u / (2 * pair.rf[gear] * theta)
     return float(L * x**2 + M * x + P * (1 + Q * tan2))

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rom.arguments import positive
+from rom.arguments import one_each, positive
 from rom.components.gear_mesh.gears.corrections import Correction
 from rom.components.gear_mesh.gears.geometry import GearPair, path_of_contact
 from rom.components.gear_mesh.gears.meshes import GEAR_MESHES_FAMILY
@@ -101,8 +101,8 @@ class Mesh:
         if not (k.size and np.isfinite(k).all() and (k > 0).all()):
             raise ModelError(f"stiffness {self.stiffness} of the teeth must be positive [N/m^2].")
         for errors, z in zip(self.correction.pitch, self.pair.teeth, strict=True):
-            if len(errors) not in (0, z):
-                raise ModelError(f"{len(errors)} pitch errors for {z} teeth; give one per tooth.")
+            if len(errors):
+                one_each("pitch errors", len(errors), "teeth", z, error=ModelError)
 
     def least_gap(self, theta: float) -> float:
         """How far the working flanks are apart at the datum, along the line of action [m]."""
@@ -167,11 +167,8 @@ class Mesh:
     def _wheels(self) -> Instant:
         """The element between two free wheels at the datum."""
         mech = Mechanism(gravity=(0.0, 0.0, 0.0))
-        places = {"pinion": (0.0, 0.0, 0.0), "gear": (self.pair.distance, 0.0, 0.0)}
-        ends = [
-            mech.add_rigid(name, mass=1.0, inertia=(1.0, 1.0, 1.0), at=at).marker((0, 0, 0))
-            for name, at in places.items()
-        ]
+        ends = [mech.add_rigid(name, mass=1.0, inertia=(1, 1, 1), at=(x, 0, 0)).marker((0, 0, 0))
+                for name, x in (("pinion", 0.0), ("gear", self.pair.distance))]  # fmt: skip
         mech.gear_mesh("teeth", *ends, axis=(0, 0, 1), pair=self.pair, stiffness=self.stiffness,
                        correction=self.correction, damping=self.damping, entry=0.0,
                        conservative=False, cells=self.cells, phase=0.0)  # fmt: skip

@@ -17,6 +17,7 @@ from rom.components.gear_mesh.compliance import (
     contact_compliance,
     in_normal_section,
     normal_section,
+    places_of_contact,
     profile,
     tooth_compliance,
 )
@@ -122,8 +123,8 @@ def element_table(
     """
     teeth = normal_section(pair)
     models = [tooth_model(teeth, gear, bore=bore) for gear in (0, 1)]
-    (A, B), table = pair.path, []
-    for s in np.linspace(A + 1e-9 * (B - A), B - 1e-9 * (B - A), n):
+    table = []
+    for s in places_of_contact(pair, n):
         radii, rho = in_normal_section(pair, s)
         own = sum(model.compliance(r) for model, r in zip(models, radii, strict=True))
         depths = [tooth_compliance(teeth, g, float(radii[g]))[2] for g in (0, 1)]

@@ -9,13 +9,13 @@ from rom.components.journal_bearing.films.bearing import Groove as Groove
 from rom.components.journal_bearing.films.bearing import JournalBearing as JournalBearing
 from rom.components.journal_bearing.films.oil import Oil as Oil
 from rom.components.journal_bearing.films.oil import iso_vg as iso_vg
-from rom.components.journal_bearing.oil import Warm as Warm
-from rom.components.journal_bearing.oil import warm_bearing as warm_bearing
-from rom.components.journal_bearing.oil import warm_equilibrium as warm_equilibrium
 from rom.components.journal_bearing.oil_film import Film as Film
 from rom.components.journal_bearing.oil_film import film as film
 from rom.components.journal_bearing.statics import Stability as Stability
+from rom.components.journal_bearing.statics import Warm as Warm
 from rom.components.journal_bearing.statics import coefficients as coefficients
 from rom.components.journal_bearing.statics import equilibrium as equilibrium
 from rom.components.journal_bearing.statics import stability as stability
 from rom.components.journal_bearing.statics import threshold_speed as threshold_speed
+from rom.components.journal_bearing.statics import warm_bearing as warm_bearing
+from rom.components.journal_bearing.statics import warm_equilibrium as warm_equilibrium

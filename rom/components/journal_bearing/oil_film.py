@@ -44,11 +44,9 @@ def film(
     """
     m, v = four(motion) / bearing.scale, four(rate) / (bearing.scale * speed)
     if not (speed > 0 and viscosity > 0):
-        raise ModelError(
-            f"speed {speed} rad/s and viscosity {viscosity} Pa s make no film: both must be "
-            "positive.",
-            hint="A shaft that turns the other way is described from its other end.",
-        )
+        text = f"speed {speed} rad/s and viscosity {viscosity} Pa s must be positive."
+        hint = "A shaft that turns the other way is described from its other end."
+        raise ModelError(text, hint=hint)
     if bearing.aligned and np.any([m[2:], v[2:]]):
         raise ModelError("the journal tilts, but the bearing is aligned; give it aligned=False.")
     if not bearing.thinnest(motion) > 0:

@@ -1,7 +1,4 @@
-"""What the oil film of a journal bearing was like along a motion.
-
-Pressure in the oil of journal bearings, cell by cell, during a motion.
-"""
+"""What the oil film of a journal bearing was like along a motion, and its pressure in cells."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -9,16 +6,9 @@ from typing import Any
 import numpy as np
 
 from rom.arguments import typed
+from rom.components.journal_bearing.films import journals as col
 from rom.components.journal_bearing.films.cells import CLEARANCE, N_MOTIONS, RADIUS
-from rom.components.journal_bearing.films.journal_bearings import JOURNAL_BEARINGS_FAMILY, OilFilm
-from rom.components.journal_bearing.films.journals import (
-    LARGEST,
-    MOTION,
-    POWER,
-    SIDE_FLOW,
-    TEMPERATURE,
-    THINNEST,
-)
+from rom.components.journal_bearing.films.journal_bearings import JOURNAL_BEARINGS_FAMILY
 from rom.components.journal_bearing.films.oil import Oil
 from rom.errors import ConfigError
 from rom.mbs.results.recomputed import at_instants
@@ -50,15 +40,10 @@ def film_pressures(solution: Solution, name: str) -> Array:
             f"the film of {name!r} is read from a table, which has no pressure in cells.",
             hint="Leave out tabulated=True.",
         )
-    return np.array([_of_table(table, k) for _ in at_instants(solution)])
-
-
-def _of_table(table: Any, k: int) -> Array:
-    """(nt, nz) what the last residual found [Pa]."""
     films, (nt, nz) = table.films, table.films.shape[k]
-    unit = table.viscosity[k] * (films.size[k, RADIUS] / films.size[k, CLEARANCE]) ** 2
-    pressure: Array = unit * films.P[k, : nt * nz].reshape(nt, nz)
-    return pressure
+    ratio2 = (films.size[k, RADIUS] / films.size[k, CLEARANCE]) ** 2
+    pressure = [table.viscosity[k] * ratio2 * films.P[k] for _ in at_instants(solution)]
+    return np.array(pressure)[:, : nt * nz].reshape(-1, nt, nz)
 
 
 @dataclass(frozen=True)
@@ -103,22 +88,12 @@ def journal_bearing(self: Any, name: str) -> BearingRecord:
     packed, element = self.packed, films[name]
     first = len(packed.places.coordinates) + packed.places.memory(name, np.zeros(0))
     found = self.base[:, first:]
-    temperature = found[:, TEMPERATURE] if isinstance(element.liquid, Oil) else np.nan * self.t
-    return BearingRecord(
-        self.t,
-        found[:, MOTION : MOTION + N_MOTIONS],
-        found[:, THINNEST],
-        found[:, LARGEST],
-        temperature,
-        found[:, POWER],
-        found[:, SIDE_FLOW],
-        _bore(self, element),
-    )
-
-
-def _bore(solution: Any, element: OilFilm) -> tuple[Array, Array] | None:
-    functions, amplitudes = element.bore
-    if not functions.size:
-        return None
-    moved = solution.elastic(element.j.body) @ amplitudes.T
-    return functions.reshape(*element.bearing.cells, -1), moved
+    temperature = found[:, col.TEMPERATURE] if isinstance(element.liquid, Oil) else np.nan * self.t
+    motion = found[:, col.MOTION : col.MOTION + N_MOTIONS]
+    thinnest, largest = found.T[[col.THINNEST, col.LARGEST]]
+    power, flow = found.T[[col.POWER, col.SIDE_FLOW]]
+    bore, (functions, amplitudes) = None, element.bore
+    if functions.size:
+        moved = self.elastic(element.j.body) @ amplitudes.T
+        bore = functions.reshape(*element.bearing.cells, -1), moved
+    return BearingRecord(self.t, motion, thinnest, largest, temperature, power, flow, bore)

@@ -1,16 +1,18 @@
-"""Where a loaded journal comes to rest, and how long it stays there: stability of whirl.
+"""Where a loaded journal comes to rest, how long it stays there, and how warm its film gets.
 
 Source:
-    Friswell, Penny, Garvey and Lees, Dynamics of Rotating Machines (2010).
+    Friswell, Penny, Garvey and Lees, Dynamics of Rotating Machines (2010), for stability of whirl;
+    the effective temperature as in Raimondi and Boyd, ASLE Trans. 1 (1958) 159.
 """
 
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
 from rom.components.journal_bearing.films.bearing import JournalBearing
+from rom.components.journal_bearing.films.oil import Oil
 from rom.components.journal_bearing.oil_film import Film, film
 from rom.errors import ModelError, SolverError
 from rom.model import Array
@@ -83,17 +85,13 @@ def _settled(bearing: JournalBearing, W: Array, x: Array, speed: float, viscosit
         x = x + step
         if bearing.thinnest(x) < MIN_FILM_RATIO * c:
             break
-    raise _no_film(bearing, now, size)
-
-
-def _no_film(bearing: JournalBearing, film: Film, load: float) -> SolverError:
     where = ", ".join(f"{np.degrees(g.angle):.0f}" for g in bearing.grooves)
     there = f" with oil from grooves at {where} degrees" if bearing.grooves else ""
-    carried = float(np.hypot(*film.force[:2]))
     cures = {"jfo": "Move the inlet out of the loaded arc, upstream of it, or lower the load."}
-    return SolverError(
-        f"no film carries {load:.4g} N{there}: at {film.eccentricity:.3f} clearances, "
-        f"{bearing.thinnest(film.motion) * 1e6:.3g} micrometres thin, it carries {carried:.4g} N.",
+    raise SolverError(
+        f"no film carries {size:.4g} N{there}: at {now.eccentricity:.3f} clearances, "
+        f"{bearing.thinnest(now.motion) * 1e6:.3g} micrometres thin, it carries "
+        f"{np.hypot(*now.force[:2]):.4g} N.",
         hint=cures.get(bearing.cavitation, "Lower the load, or raise speed, viscosity or length."),
     )
 
@@ -161,3 +159,92 @@ def coefficients(film: Film) -> tuple[Array, Array]:
     each = film.bearing.clearance / size
     K, C = film.stiffness[:2, :2], film.damping[:2, :2]
     return each * A.T @ K @ A, each * film.speed * A.T @ C @ A
+
+
+@dataclass(frozen=True, slots=True)
+class Warm:
+    """A film at the temperature it makes.
+
+    Attributes:
+        film: at rest under the load.
+        temperature: that its viscosity belongs to [degrees Celsius].
+        rise: of the oil from inlet to outlet [K].
+        power: that is lost [W].
+    """
+
+    film: Film
+    temperature: float
+    rise: float
+    power: float
+
+
+def warm_equilibrium(
+    bearing: JournalBearing,
+    load: npt.ArrayLike,
+    oil: Oil,
+    *,
+    speed: float,
+    inlet: float,
+    carried: float = 0.9,
+    felt: float = 0.5,
+) -> Warm:
+    """The loaded film, its viscosity that of oil warmed by the film itself.
+
+    Power lost warms the oil that leaves at the ends; fixed point, half of each change.
+
+    Args:
+        bearing: the bearing.
+        load: (2,) on the journal [N].
+        oil: in it.
+        speed: [rad/s].
+        inlet: temperature of the oil that comes in [degrees Celsius].
+        carried: share of the heat that leaves with the oil [1].
+        felt: share of the rise that the effective viscosity feels [1]; 0.5 is the mean of inlet and
+            outlet, as Raimondi and Boyd take it.
+
+    Raises:
+        SolverError: if no film carries the load, or the temperature does not settle.
+        ModelError: without a load.
+    """
+    T, start = inlet, None
+    for _ in range(60):
+        mu = float(oil.viscosity(T))
+        now = equilibrium(bearing, load, speed=speed, viscosity=mu, start=start)
+        power, start = now.dissipated, now.motion[:2]
+        rise = carried * power / (oil.density * oil.heat * now.side_flow)
+        change = inlet + felt * rise - T
+        if abs(change) < 1e-6:
+            return Warm(now, T, rise, power)
+        T += 0.5 * change
+    text = f"the temperature of the film, {T:.1f} degrees Celsius, still changes by {change:.2g} K."
+    raise SolverError(text, hint="Check the flow of oil: little flow, great heat.")
+
+
+def warm_bearing(
+    bearing: JournalBearing,
+    *,
+    bush: float,
+    shaft: float,
+    expansion: tuple[float, float] = (11.7e-6, 11.7e-6),
+    free: float = 1.0,
+) -> JournalBearing:
+    """The bearing with the clearance it has when bush and shaft are warm.
+
+    Args:
+        bearing: cold.
+        bush: how much warmer it is [K].
+        shaft: how much warmer it is [K].
+        expansion: coefficients of bush and shaft [1/K].
+        free: share of its expansion that the fit lets the bush have [1].
+
+    Raises:
+        ModelError: if no clearance is left.
+    """
+    growth = bearing.radius * (expansion[0] * bush * free - expansion[1] * shaft)
+    if bearing.clearance + growth <= 0:
+        raise ModelError(
+            f"the shaft seizes: {shaft} K on the shaft and {bush} K on the bush change the "
+            f"clearance of {bearing.clearance * 1e6:.3g} micrometres by {growth * 1e6:.3g}.",
+            hint="Warm the bush too, or fit with more clearance.",
+        )
+    return replace(bearing, clearance=bearing.clearance + growth)

@@ -125,14 +125,9 @@ def friction_of_pairs(joints: Sequence[Joint], friction: float, n: int) -> Array
 
 
 def bonds(joints: Sequence[Joint], C: Contacts, corners: Array, n: int, reach: float) -> Bonds:
-    """What glues stones that touch: strengths times the length that falls to each contact.
+    """What glues n stones that touch: strengths times the length that falls to each contact.
 
-    Args:
-        joints: laws; the last one that fits a pair counts.
-        C: contacts at the start.
-        corners: (V, 2) positions of the corners [m].
-        n: number of stones.
-        reach: distance from which corners are watched [m].
+    The last law that fits a pair counts; corners (V, 2) are places that watch within reach [m].
 
     Raises:
         ConfigError: if a law glues stones that do not touch.

@@ -11,7 +11,7 @@ Source:
 """
 
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -64,6 +64,7 @@ class Layer(Resistance):
         ConfigError: for a number out of its range.
     """
 
+    exponent: ClassVar[float] = 1.5  # of unloading [1]
     modulus: float
     radius: float
     thickness: float
@@ -102,11 +103,6 @@ class Layer(Resistance):
     def limit(self) -> float:  # type: ignore[override]
         """Penetration at which the boulder is through [m]."""
         return self.thickness
-
-    @property
-    def exponent(self) -> float:
-        """Of unloading [1]."""
-        return 1.5
 
     @property
     def law(self) -> tuple[float, ...]:

@@ -7,7 +7,7 @@ Source:
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import numpy as np
 from scipy.optimize import brentq
@@ -39,6 +39,7 @@ class BallBearing:
         ModelError: for numbers that no bearing has.
     """
 
+    exponent: ClassVar[float] = 1.5  # of the depth in the force [1]
     balls: Balls
     ball_diameter: Size
     pitch_diameter: Size
@@ -63,11 +64,6 @@ class BallBearing:
     def count(self) -> int:
         """Number of balls."""
         return self.balls
-
-    @property
-    def exponent(self) -> float:
-        """Of the depth in the force [1]."""
-        return 1.5
 
     @property
     def curvature_distance(self) -> float:
@@ -124,6 +120,8 @@ class RollerBearing:
         ModelError: for numbers that no bearing has.
     """
 
+    exponent: ClassVar[float] = 10 / 9  # of the depth in the force [1]
+    curvature_distance: ClassVar[float] = 0.0  # the races are straight
     rollers: Balls
     roller_diameter: Size
     length: Size
@@ -137,16 +135,6 @@ class RollerBearing:
     def count(self) -> int:
         """Number of rollers."""
         return self.rollers
-
-    @property
-    def exponent(self) -> float:
-        """Of the depth in the force [1]."""
-        return 10 / 9
-
-    @property
-    def curvature_distance(self) -> float:
-        """None: the races are straight."""
-        return 0.0
 
     @property
     def offset(self) -> tuple[float, float]:
@@ -172,10 +160,8 @@ class RollerBearing:
 def elliptic_stiffness(curvatures: Array, modulus: float) -> float:
     """Force per depth^1.5 of two bodies that touch in a point [N/m^1.5].
 
-    Args:
-        curvatures: (4,) of the one body and of the other in two planes, the first and third in one
-            plane [1/m]; negative for a hollow.
-        modulus: 1 / ((1 - nu1^2) / E1 + (1 - nu2^2) / E2) [Pa].
+    Curvatures (4,) are of the one body and of the other in two planes, the first and third in one
+    plane [1/m], negative for a hollow; the modulus is 1 / ((1 - nu1^2) / E1 + (1 - nu2^2) / E2).
 
     Source:
         Hertz, J. reine angew. Math. 92 (1881) 156, with complete elliptic integrals.

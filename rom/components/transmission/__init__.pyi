@@ -1,13 +1,13 @@
 from rom.components.transmission.housing import Housing as Housing
 from rom.components.transmission.mechanism import rest as rest
+from rom.components.transmission.motion import Response as Response
 from rom.components.transmission.motion import Run as Run
 from rom.components.transmission.motion import Whirl as Whirl
 from rom.components.transmission.motion import linearised as linearised
+from rom.components.transmission.motion import mesh_response as mesh_response
 from rom.components.transmission.motion import simulate as simulate
 from rom.components.transmission.motion import threshold as threshold
 from rom.components.transmission.motion import whirl as whirl
-from rom.components.transmission.response import Response as Response
-from rom.components.transmission.response import mesh_response as mesh_response
 from rom.components.transmission.shaft import Disc as Disc
 from rom.components.transmission.shaft import Shaft as Shaft
 from rom.components.transmission.solid_shaft import SolidShaft as SolidShaft

@@ -65,10 +65,8 @@ class Housing:
             raise ModelError(f"axes {A.tolist()} of the unit must be orthonormal rows.")
         omega, V = body.modes(fixed=fixed)
         if omega[0] ** 2 < 1e-9 * omega[-1] ** 2:
-            raise ModelError(
-                f"the housing {body.name!r} moves as a whole although {fixed} are held.",
-                hint="Hold an interface that stops all six rigid motions.",
-            )
+            text = f"the housing {body.name!r} moves as a whole although {fixed} are held."
+            raise ModelError(text, hint="Hold an interface that stops all six rigid motions.")
         N = np.sqrt(body.mass) * V
         turn = np.kron(np.eye(2), A)
         left, right = (
@@ -87,11 +85,8 @@ class Housing:
             raise ModelError(f"M {self.M.shape} and K {self.K.shape} must be ({self.n}, {self.n}).")
         for name, held, there in zip(("pinion", "gear"), bearings, self.bushes, strict=True):
             if set(held) != set(there):
-                raise ModelError(
-                    f"the {name} has bearings at nodes {sorted(held)}, the housing has bushes for "
-                    f"{sorted(there)}.",
-                    hint="Name one bush per bearing.",
-                )
+                text = f"the {name} has bearings at nodes {sorted(held)}, the housing has bushes"
+                raise ModelError(f"{text} for {sorted(there)}.", hint="Name one per bearing.")
             if any(np.shape(rows) != (6, self.n) for rows in there.values()):
                 raise ModelError(f"a bush of the {name} needs rows of shape (6, {self.n}).")
 

@@ -1,12 +1,12 @@
 """Gears on oil films as they bear: toothed shafts, and walls as high as the loads on them."""
 
 from collections.abc import Iterator
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import numpy.typing as npt
 
-from rom.arguments import AnyMechanism, AnySolution, positive, typed, unit_vector
+from rom.arguments import AnyMechanism, AnySolution, Positive, typed, unit_vector
 from rom.components.gear_mesh.tooth_loads import ToothLoads, tooth_loads
 from rom.components.journal_bearing.record import film_pressures
 from rom.errors import ConfigError
@@ -39,8 +39,8 @@ def toothed_shaft(mechanism: AnyMechanism, body: str) -> Mesh:
     films = [film for film in mechanism.journal_bearings.values() if film.i.body == body]
     if not films:
         turning = {film.i.body for film in mechanism.journal_bearings.values()}
-        raise ConfigError(f"{body!r} turns in no journal bearing; there are "
-                          f"{offered(turning, body)}.")  # fmt: skip
+        there = offered(turning, body)
+        raise ConfigError(f"{body!r} turns in no journal bearing; there are {there}.")
     axis = places.direction(body, films[0].axes[0])[0]
     middle, part = places.point(films[0].i)[0], mechanism.part(body)
     surface = getattr(part.flexible, "surface", None)
@@ -98,7 +98,7 @@ def tooth_walls(
     solution: AnySolution,
     name: str,
     *,
-    scale: float,
+    scale: Annotated[float, Positive("m^2/N")],
     direction: npt.ArrayLike,
     at: int = -1,
 ) -> Mesh:
@@ -117,16 +117,15 @@ def tooth_walls(
     Raises:
         ConfigError: if there is no such mesh, or no tooth of it bears.
     """
-    upright, scale = unit_vector("direction", direction), positive("scale", scale)
+    upright = unit_vector("direction", direction)
     loads = tooth_loads(solution, name)[at]
     if not loads.force.any():
         raise ConfigError(f"no tooth of {name!r} bears at that instant; take another one of sol.t.")
     mesh = solution.mechanism.gear_meshes[name]
     places = moving(solution.mechanism, solution, [at], 1.0)
     axes, middle = _axes(places, mesh), places.point(mesh.i)[0]
-    walls = [_wall(line, scale * load, upright / np.linalg.norm(upright))
-             for line, load in _lines(mesh.pair, loads, axes)]  # fmt: skip
-    points, triangles = joined(walls)
+    lines = _lines(mesh.pair, loads, axes)
+    points, triangles = joined([_wall(line, scale * load, upright) for line, load in lines])
     return points + middle, triangles
 
 
@@ -155,7 +154,7 @@ def film_wall(
     solution: AnySolution,
     name: str,
     *,
-    scale: float,
+    scale: Annotated[float, Positive("m/Pa")],
     gap: float = 0.0,
     shift: float = 0.0,
     at: int = -1,
@@ -177,7 +176,6 @@ def film_wall(
     Raises:
         ConfigError: if there is no such bearing, or its film is read from a table.
     """
-    scale = positive("scale", scale)
     pressure = film_pressures(solution, name)[at]
     film = solution.mechanism.journal_bearings[name]
     places = moving(solution.mechanism, solution, [at], 1.0)

@@ -52,19 +52,13 @@ def rest(
     Source:
         Gears and films in one: Fargere and Velex, J. Vib. Acoust. 135 (2013) 061014.
     """
-    q, (*before, last) = np.zeros(unit.load.size), loads
-    if start is not None:
-        q, before, last = start, [], 1.0
-    for share in before:
-        q = _settled(_loaded(unit, share), theta, q).q
-    return _settled(_loaded(unit, last), theta, q)
-
-
-def _loaded(unit: Transmission, share: float) -> Transmission:
-    """The unit under a share of its load."""
-    x, y = (share * g for g in unit.gravity)
-    there = replace(unit, torque=share * unit.torque, gravity=(x, y))
-    return unit if share == 1.0 else there
+    q = np.zeros(unit.load.size) if start is None else start
+    for share in loads if start is None else (1.0,):
+        x, y = (share * g for g in unit.gravity)
+        there = replace(unit, torque=share * unit.torque, gravity=(x, y))
+        found = _settled(unit if share == 1.0 else there, theta, q)
+        q = found.q
+    return found
 
 
 def _settled(unit: Transmission, theta: float, q: Array) -> Rest:
@@ -95,15 +89,10 @@ def _rest_of(unit: Transmission, theta: float, mech: Mechanism, state: State) ->
 
 
 def mechanism_of(unit: Transmission, q: Array, v: Array) -> Mechanism:
-    """The unit as a mechanism, which starts in a position with velocities.
+    """The unit as a mechanism, which starts at coordinates q (n,) with rates v (n,).
 
     Its time is the angle of the drive over the speed. Films are called ``pinion 0`` by shaft and
     node, the teeth ``teeth``.
-
-    Args:
-        unit: two geared shafts.
-        q: (n,) coordinates [m, rad].
-        v: (n,) their rates [m/s, rad/s].
     """
     mech, matrices = Mechanism(gravity=(0.0, 0.0, 0.0)), unit.matrices
     places, origins = places_of(unit)
@@ -127,7 +116,9 @@ def mechanism_of(unit: Transmission, q: Array, v: Array) -> Mechanism:
 
 def _add_contacts(mech: Mechanism, unit: Transmission) -> None:
     """Films and teeth."""
+    mesh, wheels = unit.mesh, []
     for name, rotor, turn in (("pinion", unit.pinion, 1.0), ("gear", unit.gear, -1.0)):
+        wheels.append(mech.part(name).marker(f"node {rotor.wheel}"))
         for node, bearing in rotor.bearings.items():
             seat = mech.part(name).marker(f"node {node}")
             bush = mech.ground.marker(mech.design_point(seat))
@@ -136,11 +127,6 @@ def _add_contacts(mech: Mechanism, unit: Transmission) -> None:
             mech.journal_bearing(f"{name} {node}", seat, bush, axis=turn * Z_AXIS,
                                  reference=(1, 0, 0), bearing=bearing,
                                  oil=unit.viscosity)  # fmt: skip
-    mesh = unit.mesh
-    wheels = (
-        mech.part(name).marker(f"node {rotor.wheel}")
-        for name, rotor in (("pinion", unit.pinion), ("gear", unit.gear))
-    )
     mech.gear_mesh("teeth", *wheels, axis=Z_AXIS, pair=mesh.pair, stiffness=mesh.stiffness,
                    correction=mesh.correction, damping=mesh.damping, entry=0.0,
                    conservative=False, cells=mesh.cells)  # fmt: skip
@@ -165,18 +151,14 @@ def _modes(M: Array, K: Array) -> tuple[Array, Array]:
 
 def places_of(unit: Transmission) -> tuple[list[Rows], list[Array]]:
     """Of each part its places by name: (3,) points, and (6, n) rows of motion; and its origin."""
-    rotors, distance = (unit.pinion, unit.gear), unit.mesh.pair.distance
-    along = [
-        {node: float((one.shaft.rows(node) @ one.shaft.rigid())[0, 4])
-         for node in (*one.bearings, one.wheel)}
-        for one in rotors
-    ]  # fmt: skip
+    along: list[dict[int, float]] = []
+    places: list[Rows] = []
+    for one in (unit.pinion, unit.gear):
+        rows = {node: one.shaft.rows(node) for node in (*one.bearings, one.wheel)}
+        along.append({node: float((B @ one.shaft.rigid())[0, 4]) for node, B in rows.items()})
+        places.append({f"node {n}": (along[-1][n] * Z_AXIS, B) for n, B in rows.items()})
     beside = along[0][unit.pinion.wheel] - along[1][unit.gear.wheel]
-    origins = [np.zeros(3), np.array([distance, 0.0, beside])]
-    places: list[Rows] = [
-        {f"node {node}": (z * Z_AXIS, one.shaft.rows(node)) for node, z in heights.items()}
-        for one, heights in zip(rotors, along, strict=True)
-    ]
+    origins = [np.zeros(3), np.array([unit.mesh.pair.distance, 0.0, beside])]
     if unit.housing is not None:
         origins.append(np.zeros(3))
         places.append({

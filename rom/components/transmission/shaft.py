@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+from numpy.polynomial.polynomial import polyder, polyval
 from scipy.linalg import eig
 
 from rom.errors import ModelError
@@ -17,6 +18,7 @@ from rom.model import Array
 GAUSS_POINTS, GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(4)
 ComplexArray = npt.NDArray[np.complex128]
 STEEL = (206e9, 0.3, 7850.0)
+MIRROR = np.array([1, -1, 1, -1])  # displacements and turns of a node seen from another side
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +52,11 @@ class Disc:
         m = rho * np.pi / 4 * (outer**2 - inner**2) * width
         squares = outer**2 + inner**2
         return cls(node, m, m * (squares / 16 + width**2 / 12), m * squares / 8)
+
+    def add_to(self, M: Array, G: Array, R: Array) -> None:
+        """Add its mass and gyroscopic matrix to those of a shaft whose seat moves by R (6, n)."""
+        M += R.T @ np.diag([*[self.mass] * 3, *[self.diametral] * 2, self.polar]) @ R
+        G += self.polar * (np.outer(R[3], R[4]) - np.outer(R[4], R[3]))
 
 
 @dataclass(frozen=True)
@@ -106,23 +113,14 @@ class Shaft:
 
     def matrices(self) -> tuple[Array, Array, Array]:
         """(n, n) mass [kg], stiffness [N/m], gyroscopic matrix per speed of rotation [kg m^2]."""
-        z = np.asarray(self.z, dtype=float)
-        d, hole = (
-            np.broadcast_to(np.asarray(x, dtype=float), z.size - 1)
-            for x in (self.diameter, self.bore)
-        )
-        M, K, G = (np.zeros((self.n, self.n)) for _ in range(3))
-        for k, piece in enumerate(zip(np.diff(z), d, hole, strict=True)):
+        M, K, G = np.zeros((3, self.n, self.n))
+        sizes = np.broadcast_arrays(np.diff(np.asarray(self.z, float)), self.diameter, self.bore)
+        for k, (l, d, hole) in enumerate(np.transpose(sizes)):
             at = slice(6 * k, 6 * k + 12)
-            for whole, part in zip((M, K, G), _beam(*piece, *self.material), strict=True):
+            for whole, part in zip((M, K, G), _beam(l, d, hole, *self.material), strict=True):
                 whole[at, at] += part
         for disc in self.discs:
-            i = 6 * disc.node
-            M[range(i, i + 6), range(i, i + 6)] += (
-                *[disc.mass] * 3, *[disc.diametral] * 2, disc.polar,
-            )  # fmt: skip
-            G[i + 3, i + 4] += disc.polar
-            G[i + 4, i + 3] -= disc.polar
+            disc.add_to(M, G, self.rows(disc.node))
         return M, K, G
 
 
@@ -145,16 +143,15 @@ def _beam(
     kappa = 6 * (1 + nu) * (1 + m) ** 2 / ((7 + 6 * nu) * (1 + m) ** 2 + (20 + 12 * nu) * m)
     stiff = kappa * shear * area
     phi = 12 * E * I / (stiff * l**2)
-    M, K, G = (np.zeros((12, 12)) for _ in range(3))
+    M, K, G = np.zeros((3, 12, 12))
     for x, w in zip((1 + GAUSS_POINTS) / 2, GAUSS_WEIGHTS * l / 2, strict=True):
         N, T, dN, dT = _shapes(x, l, phi)
         ux, py, uy, px = (_row(c, v) for c, v in ((0, N), (4, T), (1, N), (3, -T)))
         M += w * rho * (area * (np.outer(ux, ux) + np.outer(uy, uy)))
         M += w * rho * I * (np.outer(px, px) + np.outer(py, py))
         G += w * 2 * rho * I * (np.outer(px, py) - np.outer(py, px))
-        for c in (0, 1):
-            bend = _row(4 if c == 0 else 3, dT)
-            slide = _row(c, dN - T)
+        for c, turn in ((0, 4), (1, 3)):
+            bend, slide = _row(turn, dT), _row(c, dN - T)
             K += w * (E * I * np.outer(bend, bend) + stiff * np.outer(slide, slide))
         line, slope = np.array([1 - x, x]), np.array([-1, 1]) / l
         for c, inertia, spring in ((2, area, E * area), (5, 2 * I, shear * 2 * I)):
@@ -166,27 +163,12 @@ def _beam(
 
 def _shapes(x: float, l: float, phi: float) -> tuple[Array, Array, Array, Array]:
     """Deflection and turn of the section per (u, turn) of both ends, and their slopes."""
-    m = 1 / (1 + phi)
-    N = m * np.array([
-        1 - 3 * x**2 + 2 * x**3 + phi * (1 - x),
-        l * (x - 2 * x**2 + x**3 + phi / 2 * (x - x**2)),
-        3 * x**2 - 2 * x**3 + phi * x,
-        l * (-(x**2) + x**3 + phi / 2 * (x**2 - x)),
-    ])  # fmt: skip
-    dN = m / l * np.array([
-        -6 * x + 6 * x**2 - phi,
-        l * (1 - 4 * x + 3 * x**2 + phi / 2 * (1 - 2 * x)),
-        6 * x - 6 * x**2 + phi,
-        l * (-2 * x + 3 * x**2 + phi / 2 * (2 * x - 1)),
-    ])  # fmt: skip
-    T = m * np.array([
-        6 / l * (x**2 - x), 1 - 4 * x + 3 * x**2 + phi * (1 - x),
-        6 / l * (x - x**2), -2 * x + 3 * x**2 + phi * x,
-    ])  # fmt: skip
-    dT = m / l * np.array([
-        6 / l * (2 * x - 1), -4 + 6 * x - phi, 6 / l * (1 - 2 * x), -2 + 6 * x + phi,
-    ])  # fmt: skip
-    return N, T, dN, dT
+    h, m = phi / 2, 1 / (1 + phi)  # rows of coefficients belong to powers of x
+    N = m * np.array([[1 + phi, 0, 0, 0], [-phi, l * (1 + h), phi, -l * h],
+                      [-3, -l * (2 + h), 3, l * (h - 1)], [2, l, -2, l]])  # fmt: skip
+    T = m * np.array([[0, 1 + phi, 0, 0], [-6 / l, -4 - phi, 6 / l, phi - 2],
+                      [6 / l, 3, -6 / l, 3]])  # fmt: skip
+    return polyval(x, N), polyval(x, T), polyval(x, polyder(N)) / l, polyval(x, polyder(T)) / l
 
 
 def _row(component: int, values: Array) -> Array:
@@ -195,9 +177,6 @@ def _row(component: int, values: Array) -> Array:
     `component` is what the row yields: 0 or 4 in the plane X-Z, 1 or 3 in the plane Y-Z, where the
     slope of u_y is -phi_x.
     """
-    row = np.zeros(12)
-    if component in (0, 4):
-        row[[0, 4, 6, 10]] = values
-    else:
-        row[[1, 3, 7, 9]] = values * [1, -1, 1, -1]
+    row, across = np.zeros(12), component in (0, 4)
+    row[[0, 4, 6, 10] if across else [1, 3, 7, 9]] = values * (1 if across else MIRROR)
     return row

@@ -96,17 +96,14 @@ class SolidShaft:
         """(n, n) mass, stiffness, and gyroscopic matrix per speed, in units of the coordinates."""
         (X, Z, T), (M, K) = self._shapes, self.body.full_matrices()
         b, n = X.shape[1], self.n
-        whole_M, whole_K, G = (np.zeros((n, n)) for _ in range(3))
+        whole_M, whole_K, G = np.zeros((3, n, n))
         parts = np.split(np.arange(n), [b, 2 * b, 2 * b + Z.shape[1]])
         for at, V in zip(parts, (X, X, Z, T), strict=True):
             whole_M[np.ix_(at, at)], whole_K[np.ix_(at, at)] = V.T @ M @ V, V.T @ K @ V
         spin = 2 * X.T @ directed_mass(self.body, np.diag([0.0, 0.0, 1.0])) @ X
         G[:b, b : 2 * b], G[b : 2 * b, :b] = spin, -spin
         for disc in self.discs:
-            R = self.rows(disc.node)
-            inertia = [disc.mass] * 3 + [disc.diametral] * 2 + [disc.polar]
-            whole_M += R.T @ np.diag(inertia) @ R
-            G += disc.polar * (np.outer(R[3], R[4]) - np.outer(R[4], R[3]))
+            disc.add_to(whole_M, G, self.rows(disc.node))
         return whole_M, whole_K, G
 
     @cached_property
@@ -125,10 +122,9 @@ class SolidShaft:
         modes = (pairs, V[:, stretched[:MAX_MODES]], V[:, twisted[:MAX_MODES]])
         flexibility = (V / omega**2) @ V.T
         found = []
-        for rows, shapes, own in zip(([0, 4], [2], [5]), modes, ([0, 4], [2], [5]), strict=True):
-            loaded = flexibility @ R[:, rows].reshape(-1, len(V)).T
-            found.append(_normalised(M, rigid[:, own], np.hstack([loaded, shapes]),
-                                     self.body.mass))  # fmt: skip
+        for own, shapes in zip(([0, 4], [2], [5]), modes, strict=True):
+            both = np.hstack([flexibility @ R[:, own].reshape(-1, len(V)).T, shapes])
+            found.append(_normalised(M, rigid[:, own], both, self.body.mass))
         return found[0], found[1], found[2]
 
     def _in_plane(self, omega: Array, V: Array, B: Array) -> Array:

@@ -89,8 +89,7 @@ def shaft_whirl(
     values, vectors = vibrations(M, C + speed * G, K)
     keep = np.flatnonzero(values.imag > 0)
     keep = keep[np.argsort(values[keep].imag, kind="stable")][:n]
-    shapes = np.zeros((shaft.n, keep.size), dtype=complex)
-    shapes[rows] = vectors[:, keep]
+    shapes = np.eye(shaft.n)[:, rows] @ vectors[:, keep]
     turn = 1.0 if speed == 0 else np.sign(speed)
     return ShaftWhirl(values[keep], shapes, _direction(shapes, M) * turn)
 
@@ -113,8 +112,7 @@ def critical_speeds(shaft: Shaft, supports: Mapping[int, Support]) -> tuple[Arra
     symmetric("the stiffness of the bearings", K, 1e-9, error=ModelError)
     inverse, vectors = eigh(M - 1j * G, K)
     keep = np.flatnonzero(inverse > 1e-12 * inverse.max())[::-1]
-    shapes = np.zeros((shaft.n, keep.size), dtype=complex)
-    shapes[rows] = vectors[:, keep]
+    shapes = np.eye(shaft.n)[:, rows] @ vectors[:, keep]
     return 1 / np.sqrt(inverse[keep]), _direction(shapes, M)
 
 

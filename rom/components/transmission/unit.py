@@ -100,11 +100,9 @@ class Transmission:
         for name in ("speed", "viscosity", "motor"):
             positive(name, getattr(self, name), error=ModelError)
         if not self.torque > 0:
-            raise ModelError(
-                f"contact is lost: a load of {self.torque} N m does not press the working flanks "
-                "together.",
-                hint="Give a positive torque; turn the unit around to drive with the gear.",
-            )
+            text = f"contact is lost: a load of {self.torque} N m opens the working flanks."
+            hint = "Give a positive torque; turn the unit around to drive with the gear."
+            raise ModelError(text, hint=hint)
         for name, rotor in (("pinion", self.pinion), ("gear", self.gear)):
             nodes = rotor.shaft.nodes
             if not rotor.bearings or not all(0 <= k < nodes for k in (*rotor.bearings, rotor.end)):
@@ -124,7 +122,7 @@ class Transmission:
     def matrices(self) -> tuple[Array, Array, Array]:
         """(n, n) mass, stiffness with the drive, gyroscopic forces per velocity."""
         n = self.parts[2].stop
-        M, K, G = (np.zeros((n, n)) for _ in range(3))
+        M, K, G = np.zeros((3, n, n))
         for k, (rotor, at) in enumerate(zip((self.pinion, self.gear), self.parts, strict=False)):
             M[at, at], K[at, at], gyroscopic = rotor.shaft.matrices()
             G[at, at] = self.spins[k] * gyroscopic
@@ -137,8 +135,12 @@ class Transmission:
 
     def rows(self, k: int, node: int) -> Array:
         """(6, n) motion of a node of the pinion, 0, or of the gear, 1, per coordinate [1]."""
-        found = np.zeros((6, self.parts[2].stop))
-        found[:, self.parts[k]] = (self.pinion, self.gear)[k].shaft.rows(node)
+        return self._of_part(k, (self.pinion, self.gear)[k].shaft.rows(node).T).T
+
+    def _of_part(self, k: int, columns: Array) -> Array:
+        """(n, m) numbers of one part among those of all."""
+        found = np.zeros((self.parts[2].stop, columns.shape[1]))
+        found[self.parts[k]] = columns
         return found
 
     @cached_property
@@ -149,12 +151,8 @@ class Transmission:
     @cached_property
     def rigid(self) -> tuple[Array, Array]:
         """(n, 6) rigid motions of pinion and gear about the origin of each."""
-        found = []
-        for rotor, at in zip((self.pinion, self.gear), self.parts, strict=False):
-            motion = np.zeros((self.parts[2].stop, 6))
-            motion[at] = rotor.shaft.rigid()
-            found.append(motion)
-        return found[0], found[1]
+        pinion, gear = self.pinion.shaft.rigid(), self.gear.shaft.rigid()
+        return self._of_part(0, pinion), self._of_part(1, gear)
 
     @cached_property
     def spinning(self) -> Array:
@@ -212,21 +210,16 @@ class Transmission:
         *,
         seen: Array | None = None,
     ) -> Forces:
-        """Forces of films and teeth.
+        """Forces of films and teeth at q (n,) with rates v (n,), the drive turned by theta [rad].
 
-        Args:
-            q: (n,) coordinates [m, rad].
-            v: (n,) their rates [m/s, rad/s].
-            theta: angle that the drive has turned [rad].
-            warm: films of a position nearby.
-            seen: (bearings, 4) motions of the journals in their bushes [m, rad]; None to the first
-                order of turns.
+        Films of a position nearby, ``warm``, save iterations; ``seen`` (bearings, 4) are motions of
+        the journals in their bushes [m, rad], None to the first order of turns.
 
         Raises:
             ModelError, SolverError: if a journal touches its bush, or a film is not found.
         """
-        n = q.size
-        F, K, C, films = np.zeros(n), np.zeros((n, n)), np.zeros((n, n)), []
+        n, films = q.size, []
+        F, (K, C) = np.zeros(n), np.zeros((2, n, n))
         for k, (inside, bearing, turn) in enumerate(self.journals):
             B, speed = inside[:4], abs(self.spins[0 if turn > 0 else 1])
             start, at = None if warm is None else warm[k].active, B @ q if seen is None else seen[k]

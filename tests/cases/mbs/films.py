@@ -43,6 +43,16 @@ def held_rotor(bearing, load, *, speed, oil, mass=10.0, moves=None, body=None, *
     return mech
 
 
+def on_ground(bearing, *, oil=VISCOSITY, name="film", turning=SPEED, way=ORIGIN, at=ORIGIN, **more):
+    """A shaft that turns and goes its way in a bush on the ground."""
+    mech = rom.Mechanism(gravity=ORIGIN)
+    shaft = mech.add_rigid("shaft", mass=1.0, inertia=(0.1,) * 3, at=at, omega=(0, 0, turning),
+                           velocity=way)  # fmt: skip
+    given = {"axis": (0, 0, 1), "bearing": bearing, "oil": oil} | more
+    mech.journal_bearing(name, shaft.marker(ORIGIN), mech.ground.marker(ORIGIN), **given)
+    return mech
+
+
 def resting(mech, speed):
     """The equilibrium, and stiffness and damping (2, 2) that the rotor feels in the world."""
     state = rom.equilibrium(mech, spin={"turn": speed})

@@ -56,9 +56,8 @@ def test_five_parameters_come_back_from_what_they_moved():
 def test_noise_leaves_the_uncertainty_that_is_reported():
     """Scatter over twelve sets of noise, and the chance of chi squared with 60 degrees."""
     found = [calibrate(FIRST, histories(0.05, seed)) for seed in range(12)]
-    misses = np.array(
-        [[np.log(f.factors[n] / TRUE[n]) / f.deviations[n] for n in TRUE] for f in found]
-    )
+    misses = np.array([[np.log(f.factors[n] / TRUE[n]) / f.deviations[n] for n in TRUE]
+                       for f in found])  # fmt: skip
     assert 0.5 < (misses**2).mean() < 1.7  # 60 squares: 1 within 0.18 (standard deviation)
     assert np.abs(misses).max() < 4.0
     assert all(f.residuals["deflection"] == pytest.approx(0.05, rel=0.15) for f in found)
@@ -174,10 +173,9 @@ def test_the_map_has_a_row_per_boulder_and_grows_both_ways():
     assert with_boulder(layered, 500.0).cushion.radius == pytest.approx(layered.cushion.radius / 2)
     through = design_check(with_boulder(layered, 4000.0, 200.0))
     assert through.state == "through" and through.share == np.inf
-    deep = design_check(with_boulder(layered, 500.0, 8.0), depth=0.5)
-    assert deep.cushion == pytest.approx(
-        2 * strike(with_boulder(layered, 500.0, 8.0)).deepest / 0.9
-    )
+    light = with_boulder(layered, 500.0, 8.0)
+    deepest = strike(light).deepest
+    assert design_check(light, depth=0.5).cushion == pytest.approx(2 * deepest / 0.9)
 
 
 test_bad_designs_are_named = refused(

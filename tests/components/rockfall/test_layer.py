@@ -192,9 +192,8 @@ def test_the_ring_of_concrete_shears_as_lame_says():
 
 
 def test_the_modulus_of_a_layer_is_varied_as_its_stiffness():
-    change = sensitivity(
-        baseline(cushion=Layer.of_sand(4000.0, 1e6, 5.0)), lambda g: g.cushion.force(0.1), (2.0,)
-    )
+    thick = baseline(cushion=Layer.of_sand(4000.0, 1e6, 5.0))
+    change = sensitivity(thick, lambda g: g.cushion.force(0.1), (2.0,))
     assert change["stiffness of the cushion"] == pytest.approx([1.0])
     assert change["mass of the plug"] == pytest.approx([0.0])
     assert "strength of the cushion" not in change
@@ -366,16 +365,13 @@ def test_a_force_that_grows_over_a_period_of_the_column_does_not_overshoot():
 
 def test_short_pulses_are_doubled_and_long_ones_arrive_as_they_are():
     """Half sines: doubled as long as the peak arrives before the first wave is back, T < 4 tau."""
-    for T in (0.5 * DELAY, 2 * DELAY, 4 * DELAY):
-        t, force = sampled(lambda t, T=T: np.where(t < T, np.sin(np.pi * t / T), 0.0))
-        assert arriving(t, force, DELAY).max() == pytest.approx(2.0, rel=1e-4)
-    t, force = sampled(lambda t: np.sin(np.pi * t / 3.0), end=3.0)
-    assert arriving(t, force, DELAY).max() == pytest.approx(1.0, abs=0.02)
     # between: 4 cos(w (t - 2 tau)) sin(w tau) of one reflection, and 2 sin(2 w tau) before it
-    for share, exact in ((6, np.sqrt(3)), (10, 2 * np.sin(np.pi / 5))):
+    for share, exact in ((0.5, 2), (2, 2), (4, 2), (6, np.sqrt(3)), (10, 2 * np.sin(np.pi / 5))):
         T = share * DELAY
         t, force = sampled(lambda t, T=T: np.where(t < T, np.sin(np.pi * t / T), 0.0))
         assert arriving(t, force, DELAY).max() == pytest.approx(exact, rel=1e-4)
+    t, force = sampled(lambda t: np.sin(np.pi * t / 3.0), end=3.0)
+    assert arriving(t, force, DELAY).max() == pytest.approx(1.0, abs=0.02)
 
 
 def test_the_delay_of_a_layer_is_that_of_its_bar_wave():

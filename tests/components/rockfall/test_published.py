@@ -33,6 +33,8 @@ from rom.errors import ConfigError
 RIGID = {"shear": Shear(1e11, damping=0.0), "slab": Slab.of_mass(1e3, 1e11, damping=0.0)}
 WEIGHT, HEIGHT, RADIUS = 1e4, 20.0, 0.972  # inferred
 SAND, GRAVEL, DURATION = 4.5e6, 7.5e6, 0.05  # measured
+STRENGTH = ["strength of the cushion"]
+FLAT = {"deflection": History(np.arange(9.0), np.ones(9))}
 
 
 def full_size(cushion):
@@ -68,9 +70,8 @@ def test_mass_and_height_follow_from_both_forces():
 
 def test_forces_on_sand_and_gravel_are_as_their_equivalent_constants():
     """Free of the mass and the height: the ratio is measured as 1.67."""
-    sand, gravel = (
-        strike(full_size(Cushion.of_sand(WEIGHT, lame))).peaks[0] for lame in (1.2e6, 4e6)
-    )
+    cushions = (Cushion.of_sand(WEIGHT, lame) for lame in (1.2e6, 4e6))
+    sand, gravel = (strike(full_size(cushion)).peaks[0] for cushion in cushions)
     assert gravel / sand == pytest.approx(GRAVEL / SAND, rel=0.05)
     assert sand == pytest.approx(SAND, rel=0.06)
     assert gravel == pytest.approx(GRAVEL, rel=0.02)
@@ -91,9 +92,7 @@ def test_geometry_and_strength_predict_force_and_duration_on_gravel():
     assert contact_time(blind) == pytest.approx(DURATION, rel=0.1)
     t = np.linspace(0, DURATION, 101)
     pulse = History(t, GRAVEL * np.sin(np.pi * t / DURATION))
-    found = calibrate(
-        full_size(granular(45)), {"force in the cushion": pulse}, ["strength of the cushion"]
-    )
+    found = calibrate(full_size(granular(45)), {"force in the cushion": pulse}, STRENGTH)
     adjusted = strike(found.gallery)
     assert adjusted.peaks[0] / GRAVEL == pytest.approx(1.06, abs=0.01)
     assert found.factors["strength of the cushion"] == pytest.approx(1.32, abs=0.02)
@@ -118,7 +117,7 @@ def test_a_fit_passes_by_parameters_that_stop_no_boulder():
     third = strike(full_size(granular(41)), t_end=0.04)
     history = History(t, np.interp(t, third.t, third.forces[:, 0]) / 3)
     start = full_size(granular(41))
-    found = calibrate(start, {"force in the cushion": history}, ["strength of the cushion"])
+    found = calibrate(start, {"force in the cushion": history}, STRENGTH)
     assert 0.84 < found.factors["strength of the cushion"] < 0.9
 
 
@@ -151,15 +150,8 @@ test_bad_numbers_are_named = refused(
     (lambda: bearing_pressure(40.0, 1.0), "friction = 40"),
     (lambda: bearing_pressure(0.7, -1.0), "radius = -1"),
     (lambda: Layer(1e6, 1.0, 1.0, strength=0.0), "density and strength > 0"),
-    (lambda: calibrate(
-        full_size(granular(40)),
-        {"deflection": History(np.arange(9.0), np.ones(9))}, ["strength of the cushion"],
-    ), "pressed through"),
-    (lambda: calibrate(full_size(Cushion(1e6)), {}, ["strength of the cushion"]),
-     "nothing is measured"),
-    (lambda: calibrate(
-        full_size(Cushion(1e6)),
-        {"deflection": History(np.arange(9.0), np.ones(9))}, ["strength of the cushion"],
-    ), "needs a cushion of type Layer"),
+    (lambda: calibrate(full_size(granular(40)), FLAT, STRENGTH), "pressed through"),
+    (lambda: calibrate(full_size(Cushion(1e6)), {}, STRENGTH), "nothing is measured"),
+    (lambda: calibrate(full_size(Cushion(1e6)), FLAT, STRENGTH), "needs a cushion of type Layer"),
     error=ConfigError,
 )  # fmt: skip

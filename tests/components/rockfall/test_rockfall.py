@@ -66,9 +66,8 @@ def test_penetration_takes_up_the_energy(c):
 # --- Hertz ---
 
 
-@pytest.mark.parametrize(
-    ("tonnes", "height", "expected"), [(1, 10, 610), (3, 10, 1268), (5, 20, 2701), (10, 30, 5469)]
-)
+@pytest.mark.parametrize(("tonnes", "height", "expected"), [
+    (1, 10, 610), (3, 10, 1268), (5, 20, 2701), (10, 30, 5469)])  # fmt: skip
 def test_the_handbook_formula_is_hertz(tonnes, height, expected):
     """P = 2.108 (m g)^(2/3) lame^(2/5) H^(3/5) in t, m, kN, at lame = 1 MPa."""
     found = {}
@@ -213,10 +212,8 @@ def test_a_yielding_slab_dissipates_its_capacity_times_what_stays():
 def test_a_plastic_slab_stops_as_a_rigid_plastic_one():
     """One heavy mass thrown onto a slab without elasticity: way = m v^2 / 2 F_y."""
     slab = Slab.of_mass(10.0, 1e10, damping=0.0, capacity=1e6)
-    got = strike(
-        Gallery(1e3, 5.0, 10.0, Cushion(1e10, 1.0, recovery=1.0), Shear(1e10), slab, False),
-        t_end=0.03,
-    )
+    cushion = Cushion(1e10, 1.0, recovery=1.0)
+    got = strike(Gallery(1e3, 5.0, 10.0, cushion, Shear(1e10), slab, False), t_end=0.03)
     assert got.plastic == pytest.approx(1e3 * 9.81 * 5.0 / 1e6, rel=0.02)
 
 
@@ -254,9 +251,8 @@ def test_the_plug_rings_down_at_its_share_of_critical_damping():
 def test_a_slab_yields_upwards_as_well():
     """Plug and slab exchange their energy; the first swing up is stronger than that down."""
     slab = Slab.of_mass(1e3, 1e8, damping=0.0, capacity=6e5)
-    g = Gallery(
-        300.0, 1.0, 500.0, Cushion(1e9, recovery=1.0), Shear(3e7, damping=0.0), slab, weight=False
-    )
+    springs = Cushion(1e9, recovery=1.0), Shear(3e7, damping=0.0), slab
+    g = Gallery(300.0, 1.0, 500.0, *springs, weight=False)
     got = strike(g, t_end=0.6, keep=10**4)
     assert got.forces[:, 2].min() == pytest.approx(-6e5, rel=1e-9)
     assert got.plastic < -2e-4
@@ -409,9 +405,8 @@ def test_a_mechanism_of_bodies_says_the_same(slab_body, recovery):
 @pytest.mark.fenicsx
 def test_the_slab_of_dolfinx_bends_as_its_unreduced_elements():
     """Newmark's mean acceleration on 5000 dofs under the force of the reduced impact."""
-    model = rom.fe.model(
-        MESHES / "gallery_slab.geo", material=CONCRETE, parameters={"lc": 0.5, "patch": 1.0}
-    )
+    sizes = {"lc": 0.5, "patch": 1.0}
+    model = rom.fe.model(MESHES / "gallery_slab.geo", material=CONCRETE, parameters=sizes)
     supports = ("support_left", "support_right")
     kinds = {"impact": "rbe3"} | dict.fromkeys(supports, "rbe2")
     body = rom.reduce(model, method=rom.CraigBampton(10), interfaces=kinds, certify=False)

@@ -63,18 +63,13 @@ def test_a_free_rotor_precesses_by_the_ratio_of_its_inertias():
     n, speed = s.n, 500.0
     A = np.block([[np.zeros((n, n)), np.eye(n)],
                   [-np.linalg.solve(M, K), -speed * np.linalg.solve(M, G)]])  # fmt: skip
-    turn = np.zeros(n)
-    turn[3::6], turn[1::6] = 1.0, -(NODES - 0.1)
-    spin = np.zeros(n)
-    spin[5::6] = 1.0
+    turn, spin = np.zeros((2, n))
+    turn[3::6], turn[1::6], spin[5::6] = 1.0, -(NODES - 0.1), 1.0
     ratio = (spin @ M @ spin) / (turn @ M @ turn)
     values = eigvals(A)
     assert np.abs(values - 1j * speed * ratio).min() < 5e-3 * speed * ratio
-    assert (
-        np.trace(M[0::6, 0::6])
-        < M[0::6, 0::6].sum()
-        == pytest.approx(RHO * np.pi / 4 * (0.05**2 * 0.2 + (0.3**2 - 0.05**2) * 0.04))
-    )
+    across, volume = M[0::6, 0::6], np.pi / 4 * (0.05**2 * 0.2 + (0.3**2 - 0.05**2) * 0.04)
+    assert np.trace(across) < across.sum() == pytest.approx(RHO * volume)
 
 
 def test_a_ring_has_the_inertias_of_a_ring():
@@ -209,10 +204,8 @@ def test_it_rests_as_another_program_says_and_whirls_as_its_mechanism(helix):
     assert_allclose(state.q, resting(state.unit), atol=1e-4 * np.abs(state.q).max())
     mech = mechanism_of(state.unit, state.q, 0.0 * state.q)
     found = rom.equilibrium(mech)
-    own, others = (
-        values[np.argsort(values.imag)][-np.sum(values.imag > 1.0) :]
-        for values in (whirl(state).values, rom.linearize(mech, found).eigenvalues)
-    )
+    both = whirl(state).values, rom.linearize(mech, found).eigenvalues
+    own, others = (x[np.argsort(x.imag)][-np.sum(x.imag > 1.0) :] for x in both)
     assert_allclose(others, own, rtol=2e-3)
 
 

@@ -98,9 +98,8 @@ def test_a_bearing_without_bush_is_named():
 def test_a_reduced_body_is_held_and_bends_as_a_cantilever():
     """A bar along x that is clamped at one end carries all four bushes at the other."""
     size = (0.4, 0.02, 0.03)
-    body = rom.reduce(
-        bar(size, (8, 1, 1)), method=rom.CraigBampton(4), interfaces=dict(KINDS), certify=False
-    )
+    method, kinds = rom.CraigBampton(4), dict(KINDS)
+    body = rom.reduce(bar(size, (8, 1, 1)), method=method, interfaces=kinds, certify=False)
     names = dict.fromkeys(NODES, "tip")
     axes = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
     house = Housing.of_body(body, pinion=names, gear=names, fixed=("root",), axes=axes)

@@ -37,13 +37,9 @@ FILM = 5e7  # stiffness of the films [N/m]
 
 @pytest.fixture(scope="module")
 def solid():
-    model = rom.fe.model(
-        MESHES / "gear_shaft.geo",
-        material=STEEL,
-        degree=2,
-        parameters={"lc": 0.012, "b": 0.01, "l_j": 0.01},
-        order=2,
-    )
+    sizes = {"lc": 0.012, "b": 0.01, "l_j": 0.01}
+    model = rom.fe.model(MESHES / "gear_shaft.geo", material=STEEL, degree=2, parameters=sizes,
+                         order=2)  # fmt: skip
     kinds = dict.fromkeys(SEATS, rom.FourierLegendre(2, 3))
     method = rom.CraigBampton(n_modes=20)
     return rom.reduce(model, method=method, interfaces=kinds, reference="mean-axis", certify=False)
@@ -65,10 +61,8 @@ def supported_solid(body):
     ring = Disc.of_ring(0, **RING)
     R = motion_of(body, "wheel")
     M = M + R.T @ np.diag([ring.mass] * 3 + [ring.diametral] * 2 + [ring.polar]) @ R
-    for name in ("journal_a", "journal_b"):
-        R = motion_of(body, name)[:2]
-        K = K + FILM * R.T @ R
-    return M, K
+    R = np.vstack([motion_of(body, name)[:2] for name in ("journal_a", "journal_b")])
+    return M, K + FILM * R.T @ R
 
 
 def supported_beam(z, shaft):

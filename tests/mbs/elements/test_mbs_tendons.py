@@ -322,9 +322,7 @@ def test_a_cable_that_leaves_its_pulley_is_named():
     end = weight(mech, "end", (1.0, -0.1, 0.0), axis=(0, 1, 0))
     mech.drive("move", "end slides", lambda t: t, rate=lambda t: 1.0 + 0 * t)
     mech.tendon("rope", [g((-1, 0, 0)), Pulley(g(ORIGIN), 0.2, (0, 0, -1)), end], EA=1.0)
-    with pytest.raises(
-        SolverError, match=r"the path of 'rope' is lost: it has left a pulley"
-    ) as told:
+    with pytest.raises(SolverError, match="path of 'rope' is lost: it has left a pulley") as told:
         rom.simulate(mech, t_end=1.0, dt=1e-2, progress=False)
     # it is straight where the end is on the tangent from (-1, 0)
     reached = 0.1 + np.tan(np.arcsin(0.2)) * 2.0

@@ -71,20 +71,12 @@ def flank_map(path: str | Path) -> Array:
                  for block in blocks]  # fmt: skip
         return np.array(found, dtype=float)
     except ValueError as error:
-        raise ModelError(
-            f"{path} is no map of flanks: {error}.",
-            hint="A line has the numbers of one place of the profile, with commas; all teeth, "
-            "with empty lines between them, have as many.",
-        ) from error
+        hint = "Lines have numbers with commas; all teeth, with empty lines between, have as many."
+        raise ModelError(f"{path} is no map of flanks: {error}.", hint=hint) from error
 
 
 def checked_map(given: Any, teeth: int, what: str) -> Array:
-    """(teeth or 1, n_profile, n_lead) map, empty for none [m].
-
-    Args:
-        given: what the user gave.
-        teeth: of the wheel.
-        what: to name in messages.
+    """(teeth or 1, n_profile, n_lead) map, empty for none [m], of what a user gave for a wheel.
 
     Raises:
         ModelError: for another shape, and numbers that are none.
@@ -94,13 +86,9 @@ def checked_map(given: Any, teeth: int, what: str) -> Array:
     found = np.asarray(given, dtype=float)
     found = found[None] if found.ndim == 2 else found
     if found.ndim != 3 or not found.size or found.shape[0] not in (1, abs(teeth)):
-        raise ModelError(
-            f"{what} has shape {np.shape(given)}, needed is (n_profile, n_lead) or ({abs(teeth)}, "
-            "n_profile, n_lead)."
-        )
-    if not np.isfinite(found).all():
-        raise ModelError(
-            f"{what} has {int((~np.isfinite(found)).sum())} values that are no finite numbers.",
-            hint="Fill places that were not measured from their neighbours.",
-        )
+        needed = f"(n_profile, n_lead) or ({abs(teeth)}, n_profile, n_lead)"
+        raise ModelError(f"{what} has shape {np.shape(given)}, needed is {needed}.")
+    if n := int((~np.isfinite(found)).sum()):
+        hint = "Fill places that were not measured from their neighbours."
+        raise ModelError(f"{what} has {n} values that are no finite numbers.", hint=hint)
     return found

@@ -65,10 +65,8 @@ class GearPair:
         if min(map(abs, self.teeth)) < 4:
             raise ModelError(f"no gears have {self.teeth} teeth; needed are at least 4.")
         if not abs(self.helix) < 0.9 or not 0.1 < self.pressure_angle < 0.7:
-            raise ModelError(
-                f"helix {self.helix} and pressure angle {self.pressure_angle} must be in radians, "
-                "below 0.9 and between 0.1 and 0.7."
-            )
+            text = f"helix {self.helix} and pressure angle {self.pressure_angle}"
+            raise ModelError(f"{text} must be in radians, below 0.9 and between 0.1 and 0.7.")
         fits = self.helix if self.internal else -self.helix
         if self.gear_helix is not None and not abs(self.gear_helix - fits) < 1e-9:
             raise ModelError(
@@ -83,17 +81,13 @@ class GearPair:
                 hint="Of an internal gear the number is negative, and larger than the pinion's.",
             )
         self._check_teeth()
-        if not self.cos_working < 1:
+        if not self.cos_working < 1 or self.backlash < -1e-12:
+            why = "the base circles of the wheels have no common tangent"
+            if self.cos_working < 1:
+                why = f"the teeth would need {-self.backlash * 1e6:.4g} micrometres more"
+            here, limit = abs(self.distance) * 1e3, "Up to" if self.internal else "From"
             raise ModelError(
-                f"the backlash is closed: at a centre distance of {abs(self.distance) * 1e3:.4f} "
-                "mm the base circles of the wheels have no common tangent.",
-                hint=f"Without backlash it is {abs(self.tight_distance) * 1e3:.4f} mm.",
-            )
-        if self.backlash < -1e-12:
-            limit = "Up to" if self.internal else "From"
-            raise ModelError(
-                f"the backlash is closed: at a centre distance of {abs(self.distance) * 1e3:.4f} "
-                f"mm the teeth would need {-self.backlash * 1e6:.4g} micrometres more.",
+                f"the backlash is closed: at a centre distance of {here:.4f} mm {why}.",
                 hint=f"{limit} {abs(self.tight_distance) * 1e3:.4f} mm there is backlash.",
             )
         self._check_contact()
@@ -113,8 +107,7 @@ class GearPair:
                 hint="Lower the addendum, or take more teeth for the gear.",
             )
         names = ("pinion",) if self.internal else ("pinion", "gear")
-        cut = zip(self.teeth, self.shift, names, strict=False)
-        for z, x, name in cut:
+        for z, x, name in zip(self.teeth, self.shift, names, strict=False):
             least = self.addendum - z * np.sin(self.alpha_t) ** 2 / (2 * np.cos(self.helix))
             if x < least - 1e-9:
                 raise ModelError(

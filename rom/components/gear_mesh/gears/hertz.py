@@ -45,12 +45,6 @@ class Hertz:
 
         With a^2 = A F the half width of the contact squared, C is the logarithm of
         (4 h_1 h_2 / A)^2, less 2 nu / (1 - nu).
-
-        Args:
-            pair: of gears, whose radii of curvature count.
-
-        Raises:
-            ModelError: for depths and constants that no teeth have.
         """
         h = np.atleast_2d(np.asarray(self.depths, dtype=float))
         share = np.linspace(0, 1, N_PLACES)

@@ -1,6 +1,20 @@
-"""Gear meshes as elements: what users describe, their arrays and kernels."""
+"""Gear meshes as elements: what users describe, their arrays and kernels.
 
-from collections.abc import Mapping
+Phases say where teeth stand. The working flanks of a mesh have their origins on the base circles at
+angles from the line of centres about the axis of the pinion::
+
+    gamma_1 = p - alpha,   gamma_2 = (T - r_b1 p) / r_b2 - alpha,
+
+p the phase and T the distance of the points of tangency. Half of a tooth behind them lies its
+middle, which a second mesh of the same wheel finds at the same place, on whichever flank it bears.
+Around one circle phases then step as z psi / (2 pi) of a pitch over the angles psi of the planets.
+
+Source:
+    Parker and Lin, Mesh phasing relationships in planetary and epicyclic gears, J. Mech. Des. 126
+    (2004) 365.
+"""
+
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Annotated, Any
 
@@ -19,23 +33,15 @@ from rom.arguments import (
     unit_vector,
     vector,
 )
+from rom.components.gear_mesh.gears import table as col
 from rom.components.gear_mesh.gears.corrections import Correction, checked_map
 from rom.components.gear_mesh.gears.geometry import GearPair
 from rom.components.gear_mesh.gears.hertz import Hertz
-from rom.components.gear_mesh.gears.phases import phase_from
 from rom.components.gear_mesh.gears.racks import RackPair
-from rom.components.gear_mesh.gears.table import (
-    COORDINATES,
-    DAMPING,
-    PITCH,
-    RB_1,
-    SLICE_COLUMNS,
-    SPEED,
-    Meshes,
-)
+from rom.components.gear_mesh.gears.table import Meshes
 from rom.components.gear_mesh.gears.teeth import mesh_energy, mesh_tangents, mesh_wrenches
 from rom.components.round_bodies.cylinders import Cylinder, cylinder_of, pack_cylinders
-from rom.errors import ConfigError
+from rom.errors import ConfigError, ModelError
 from rom.mbs.elements.family import Family, Hooks, Places, integers, rows_of
 from rom.mbs.parts.bodies import Marker, Part
 from rom.mbs.parts.joints import Whole
@@ -46,6 +52,8 @@ from rom.rotation import matrix
 DISTANCE_RTOL = 1e-3  # of the module: by which bodies may stand elsewhere than the pair says
 FACE_RTOL = 1e-2  # of the width: by which faces may be beside each other
 SPIN_RATIO_RTOL = 1e-6  # by which the speeds of spinning wheels may miss the ratio of the teeth
+SAME_AXIS = 1e-6  # sine of the angle between two axes of one wheel
+MAX_MISFIT = 0.02  # of a pitch, beyond the backlash, by which teeth may miss the gaps of a circle
 MAX_CELLS = 1000
 MAX_APPROACH = 0.1  # of the base pitch: a hundred times the deflection of loaded teeth
 MAX_ENTRY = 0.5  # of the base pitch
@@ -158,12 +166,10 @@ def gear_mesh(  # noqa: PLR0913  one keyword per property
             hint="Take a hundredth of the speed with which its flanks slide.",
         )
     between(f"coupling [m] of mesh {name!r} and its width", coupling, 0, pair.width)
-    numbers = (
-        damping, friction, transition_speed or 1.0, follows, coupling,
-        hertz.compliance if hertz else 0.0,
-    )  # fmt: skip
+    soft = hertz.compliance if hertz else 0.0
+    numbers = (damping, friction, transition_speed or 1.0, follows, coupling, soft)
     stiffness = vector(f"stiffness of the teeth of {name!r}", stiffness)
-    flanks = Correction() if correction is None else correction
+    flanks = correction or Correction()
     _check_correction(name, pair, flanks)
     if hertz:
         hertz.constants(pair)
@@ -174,27 +180,72 @@ def gear_mesh(  # noqa: PLR0913  one keyword per property
         _rims(parts, (wheel_a, wheel_b), axes, pair), hertz, _spins(name, parts, axes, pair),
     )  # fmt: skip
     if phase is None:
-        mesh = replace(mesh, phase=phase_from(name, mesh, _others(self)))
+        others = [(n, x) for n, (_, x) in self.elements.items() if isinstance(x, GearMesh)]
+        mesh = replace(mesh, phase=phase_from(name, mesh, others))
     self.add(name, mesh, GEAR_MESHES_FAMILY)
 
 
-def _others(whole: Whole) -> list[tuple[str, GearMesh]]:
-    """The meshes that are there already."""
-    return [(name, x) for name, (_, x) in whole.elements.items() if isinstance(x, GearMesh)]
+def phase_from(name: str, mesh: GearMesh, others: Iterable[tuple[str, GearMesh]]) -> float:
+    """Phase of a new `GearMesh` from others that its wheels have, 0 if they have none [rad].
+
+    Raises:
+        ModelError: if the teeth of both wheels do not fit: a planet that cannot be put in.
+    """
+    pair, found = mesh.pair, dict[int, tuple[float, str]]()
+    for other, known in others:
+        for side in (0, 1) if pair.teeth[1] else (0,):
+            at = _middle(mesh, side, known)
+            if side not in found and at is not None:
+                found[side] = at, other
+    pitch = pair.base_pitch / pair.rb[0]
+    phases = {side: (_phase(pair, side, at) % pitch, other) for side, (at, other) in found.items()}
+    if not phases:
+        return 0.0
+    if len(phases) == 2:
+        (one, first), (two, second) = phases.values()
+        misfit = abs((one - two + 0.5 * pitch) % pitch - 0.5 * pitch) * pair.rb[0]
+        if misfit > MAX_MISFIT * pair.base_pitch + abs(pair.backlash):
+            raise ModelError(
+                f"the teeth of mesh {name!r} miss each other's gaps by "
+                f"{misfit / pair.base_pitch:.3f} of a pitch: by meshes {first!r} and {second!r} "
+                "the wheels stand otherwise, so that no such train can be put together.",
+                where=name,
+                hint="Planets in equal steps need a sum of the teeth of sun and ring that their "
+                "number divides. To leave that alone give phase=...",
+            )
+    return phases[min(phases)][0]
+
+
+def _phase(pair: Any, side: int, middle: float) -> float:
+    """Of the mesh whose wheel has the middle of a tooth at an angle from the line of centres."""
+    origin = middle + pair.base_thickness[side] / (2 * pair.rb[side]) + pair.alpha
+    return float(origin if side == 0 else (pair.tangents - pair.rb[1] * origin) / pair.rb[0])
+
+
+def _middle(mesh: GearMesh, side: int, known: GearMesh) -> float | None:
+    """Angle of the middle of a tooth on wheel ``side`` of a mesh, from one that is known."""
+    marker, teeth = (mesh.i, mesh.j)[side], mesh.pair.teeth[side]
+    for other, place in enumerate((known.i, known.j)):
+        z, e, towards = mesh.axes[2 * side], mesh.axes[2 * side + 1], known.axes[2 * other + 1]
+        turned = float(z @ known.axes[2 * other])
+        same = place == marker and known.pair.teeth[other] == teeth
+        if same and abs(turned) > 1 - SAME_AXIS:
+            pair, at = known.pair, known.phase
+            at = at if other == 0 else (pair.tangents - pair.rb[0] * at) / pair.rb[1]
+            middle = at - pair.alpha - pair.base_thickness[other] / (2 * pair.rb[other])
+            between = np.arctan2(z @ np.cross(e, towards), e @ towards)
+            return float(between + np.sign(turned) * middle)
+    return None
 
 
 def _rims(
     parts: tuple[Part, Part], wheels: tuple[Marker, Marker], axes: Array, pair: GearPair
 ) -> tuple[tuple[Cylinder, float] | None, ...]:
     """How the rims of flexible wheels deform, and the angle that a tooth takes on each [rad]."""
-    found: list[tuple[Cylinder, float] | None] = []
-    for side in range(2):
-        if not pair.teeth[side]:
-            found.append(None)
-            continue
-        rim = cylinder_of(parts[side], wheels[side], *axes[2 * side : 2 * side + 2])
-        found.append(None if rim is None else (rim, np.pi / abs(pair.teeth[side])))
-    return tuple(found)
+    rims = [cylinder_of(parts[k], wheels[k], *axes[2 * k : 2 * k + 2]) if z else None
+            for k, z in enumerate(pair.teeth)]  # fmt: skip
+    both = zip(rims, pair.teeth, strict=True)
+    return tuple(None if rim is None else (rim, np.pi / abs(z)) for rim, z in both)
 
 
 def _spins(
@@ -206,10 +257,9 @@ def _spins(
     if two and not w:
         raise ConfigError(f"the rack of {name!r} spins at {two:.9g} rad/s; give it no spin.")
     if one and two and abs(z * one + w * two) > SPIN_RATIO_RTOL * abs(z * one):
-        raise ConfigError(
-            f"the wheels of mesh {name!r} spin at {one:.9g} and {two:.9g} rad/s about its axis: "
-            f"teeth {z} and {w} need {one:.9g} and {-one * z / w:.9g}."
-        )
+        spins = f"spin at {one:.9g} and {two:.9g} rad/s about its axis"
+        needed = f"teeth {z} and {w} need {one:.9g} and {-one * z / w:.9g}"
+        raise ConfigError(f"the wheels of mesh {name!r} {spins}: {needed}.")
     return one, two
 
 
@@ -238,10 +288,8 @@ def _check_place(name: str, pair: GearPair | RackPair, D: Array, z: Array) -> No
             "beside the axis of its pinion.",
         )
     if not abs(float(D @ z)) <= FACE_RTOL * pair.width:
-        raise ConfigError(
-            f"the faces of mesh {name!r} are {abs(D @ z) * 1e3:.4g} mm beside each other; wheel_a "
-            "and wheel_b must be the middles of the common face.",
-        )
+        text = f"the faces of mesh {name!r} are {abs(D @ z) * 1e3:.4g} mm beside each other"
+        raise ConfigError(f"{text}; wheel_a and wheel_b must be the middles of the common face.")
 
 
 def _check_correction(name: str, pair: GearPair | RackPair, correction: Correction) -> None:
@@ -251,9 +299,8 @@ def _check_correction(name: str, pair: GearPair | RackPair, correction: Correcti
             finite(f"pitch errors of {name!r}", errors, (abs(z),))
     if isinstance(pair, RackPair) and correction.run_out[1][0] != 0.0:
         raise ConfigError(f"the rack of {name!r} does not turn; give it no run-out.")
-    for amount, direction in correction.run_out:
-        ends = finite("run_out", (amount, direction), (2,))
-        if not abs(ends[0]) <= MAX_RUN_OUT * pair.module:
+    for amount, _ in finite("run_out", correction.run_out, (2, 2)):
+        if not abs(amount) <= MAX_RUN_OUT * pair.module:
             raise ConfigError(
                 f"run-out {amount:g} m of {name!r} is more than {MAX_RUN_OUT} modules.",
                 hint="Flanks with so much are no involutes about their axis: move the marker.",
@@ -273,7 +320,7 @@ def _maps(pair: GearPair | RackPair, correction: Correction, name: str) -> list[
 
 def pack(meshes: Mapping[str, GearMesh], places: Places) -> Meshes:
     """The meshes as arrays."""
-    found = list(meshes.values())
+    found, n = list(meshes.values()), col.COORDINATES
     maps = [m for name, mesh in meshes.items() for m in _maps(mesh.pair, mesh.correction, name)]
     markers = ([places.marker[getattr(mesh, side)] for mesh in found] for side in "ij")
     return Meshes(
@@ -292,18 +339,13 @@ def pack(meshes: Mapping[str, GearMesh], places: Places) -> Meshes:
         np.array([m.shape for m in maps], dtype=np.int64).reshape(-1, 3),
         integers(places.memory(name, mesh.start) for name, mesh in meshes.items()),
         rows_of((mesh.start for mesh in found), 2),
-        np.zeros(len(found)),
-        np.zeros(len(found)),
+        *np.zeros((2, len(found))),
         np.zeros((len(found), max(map(_most_slices, found)), 5)),
         np.zeros(len(found)),
         pack_cylinders([mesh.rims for mesh in found], places.R, max(mesh.cells for mesh in found)),
         np.zeros(2),
-        np.zeros((max(mesh.cells for mesh in found), SLICE_COLUMNS)),
-        *np.zeros((2, COORDINATES)),
-        np.zeros((2, COORDINATES, COORDINATES)),
-        np.zeros((COORDINATES, 12)),
-        np.zeros((2, 12)),
-        np.zeros((2, 12, 12)),
+        np.zeros((max(mesh.cells for mesh in found), col.SLICE_COLUMNS)),
+        *(np.zeros(shape) for shape in (n, n, (2, n, n), (n, 12), (2, 12), (2, 12, 12))),
     )
 
 
@@ -351,20 +393,19 @@ def _flanks(mesh: GearMesh, maps: list[Array]) -> list[float]:
 
 def _room(meshes: Meshes) -> Array:
     """(k,) share of the depth that is left which no teeth reach, and a correction must not."""
-    room: Array = 1.0 - meshes.approach / (MAX_APPROACH * meshes.size[:, PITCH])
-    return room
+    return 1.0 - np.asarray(meshes.approach / (MAX_APPROACH * meshes.size[:, col.PITCH]))
 
 
 def _passed(meshes: Meshes, W: Any) -> Array:
     """(k,) teeth of the pinions that have gone by."""
     turned = W.fresh[meshes.remembered] + meshes.spin[:, 0] * W.signal[meshes.clock[0], 0]
-    teeth: Array = meshes.size[:, RB_1] / meshes.size[:, PITCH] * turned
+    teeth: Array = meshes.size[:, col.RB_1] / meshes.size[:, col.PITCH] * turned
     return teeth
 
 
 GEAR_MESHES_FAMILY = Family(
     "gear_meshes", GearMesh, pack, mesh_wrenches, mesh_tangents, mesh_energy,
-    by_rate=lambda meshes: meshes.law[:, DAMPING : SPEED].any(),
+    by_rate=lambda meshes: meshes.law[:, col.DAMPING : col.SPEED].any(),
     hooks=Hooks(
         answers=lambda meshes: meshes.load, room=_room, phases=_passed,
         lost="the wheels of {} are so close that they have no common tangent",

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 
@@ -33,6 +34,7 @@ class RackPair:
         ModelError: if no such wheel and rack mesh.
     """
 
+    internal: ClassVar[bool] = False  # nothing is inside a rack
     pinion_teeth: int
     module: float
     width: float
@@ -47,7 +49,24 @@ class RackPair:
     gear_helix: float | None = None
 
     def __post_init__(self) -> None:
-        self._check_sizes()
+        if not (self.pinion_teeth >= 4 and self.module > 0 and self.width > 0):
+            raise ModelError(
+                f"no pinion of {self.pinion_teeth} teeth of module {self.module} m, {self.width} m "
+                "wide, turns on a rack.",
+                hint="The rack is outside: its pinion has at least 4 teeth.",
+            )
+        if self.gear_helix is not None and not abs(self.gear_helix + self.helix) < 1e-9:
+            of_rack, fits = np.degrees([self.gear_helix, -self.helix])
+            raise ModelError(
+                f"a rack of helix {of_rack:.4g} degrees does not mesh with a pinion of "
+                f"{-fits:.4g} degrees.",
+                hint=f"Their hands are opposite: {fits:.4g} degrees.",
+            )
+        if not self.tip_thickness > 0:
+            raise ModelError(
+                "the teeth of the rack are pointed: their flanks meet below the tip.",
+                hint="Lower the addendum or the pressure angle.",
+            )
         if self.backlash < -1e-12:
             raise ModelError(
                 f"the backlash is closed: {self.distance * 1e3:.4f} mm from the axis to the rack "
@@ -61,25 +80,6 @@ class RackPair:
                 hint="Lower the distance of the rack or the addendum, or take more teeth.",
             )
 
-    def _check_sizes(self) -> None:
-        if not (self.pinion_teeth >= 4 and self.module > 0 and self.width > 0):
-            raise ModelError(
-                f"no pinion of {self.pinion_teeth} teeth of module {self.module} m, {self.width} m "
-                "wide, turns on a rack.",
-                hint="The rack is outside: its pinion has at least 4 teeth.",
-            )
-        if self.gear_helix is not None and not abs(self.gear_helix + self.helix) < 1e-9:
-            raise ModelError(
-                f"a rack of helix {np.degrees(self.gear_helix):.4g} degrees does not mesh with a "
-                f"pinion of {np.degrees(self.helix):.4g} degrees.",
-                hint=f"Their hands are opposite: {-np.degrees(self.helix):.4g} degrees.",
-            )
-        if not self.tip_thickness > 0:
-            raise ModelError(
-                "the teeth of the rack are pointed: their flanks meet below the tip.",
-                hint="Lower the addendum or the pressure angle.",
-            )
-
     @cached_property
     def wheel(self) -> GearPair:
         """The pinion, with a wheel that is so large that nothing of it is refused."""
@@ -88,11 +88,6 @@ class RackPair:
             self.pressure_angle, (self.shift, 0.0), addendum=self.addendum,
             dedendum=self.dedendum, fillet=self.fillet,
         )  # fmt: skip
-
-    @property
-    def internal(self) -> bool:
-        """Nothing is inside a rack."""
-        return False
 
     @property
     def teeth(self) -> tuple[int, int]:

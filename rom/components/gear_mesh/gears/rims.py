@@ -17,12 +17,6 @@ from rom.mbs.kernels.compiled import inner
 
 
 @inner
-def has_rims(meshes, k):
-    """Whether a wheel of mesh k has a rim that deforms."""
-    return meshes.rims.of[k, 0] >= 0 or meshes.rims.of[k, 1] >= 0
-
-
-@inner
 def add_rim_tangent(s, W, meshes, at, factors, directions, arms):
     """Add a slice, by its mesh and number, between rims that deform to W.Kt and W.S."""
     (by_depth, by_rate, by_slip), (n, force, across) = factors, directions

@@ -2,29 +2,9 @@
 
 import math
 
-from rom.components.gear_mesh.gears.rims import (
-    add_rim_tangent,
-    closing_of_rims,
-    has_rims,
-    load_rims,
-)
-from rom.components.gear_mesh.gears.table import (
-    COORDINATES,
-    DAMPING,
-    DEPTH,
-    FIRST_GRADIENT,
-    FORCE,
-    FORCES,
-    FRICTION,
-    HELIX,
-    LOSS,
-    RB_1,
-    SPEED,
-    STEEP,
-    VISCOUS,
-    X,
-    Z,
-)
+from rom.components.gear_mesh.gears import table as col
+from rom.components.gear_mesh.gears.rims import add_rim_tangent, closing_of_rims, load_rims
+from rom.components.gear_mesh.gears.table import has_rims
 from rom.mbs.kernels.algebra import add, cross, dot, put, row, scale, sub
 from rom.mbs.kernels.compiled import inner
 
@@ -39,8 +19,8 @@ def contact_point(W, meshes, k, place, state):
     size = meshes.size[k]
     cosine, sine = math.cos(alpha), math.sin(alpha)
     along = add(scale(sine, c), scale(side * cosine, t))
-    n = sub(scale(math.cos(size[HELIX]), along), scale(side * math.sin(size[HELIX]), z))
-    foot = sub(scale(size[RB_1] * cosine, c), scale(side * size[RB_1] * sine, t))
+    n = sub(scale(math.cos(size[col.HELIX]), along), scale(side * math.sin(size[col.HELIX]), z))
+    foot = sub(scale(size[col.RB_1] * cosine, c), scale(side * size[col.RB_1] * sine, t))
     arm = add(add(foot, scale(x, along)), scale(height, z))  # from the middle of the pinion
     apart = sub(row(W.P, meshes.j[k], 0), row(W.P, meshes.i[k], 0))
     return (arm, sub(arm, apart)), n, cross(z, along)
@@ -76,15 +56,15 @@ def damp(s, W, meshes, k, cell, place):
 
     Flanks do not pull, and their force does not jump as they touch: it is at most the elastic one.
     """
-    rate, damping, (side, state), one = 0.0, meshes.law[k, DAMPING], place, meshes.line[cell]
+    rate, damping, (side, state), one = 0.0, meshes.law[k, col.DAMPING], place, meshes.line[cell]
     if damping == 0.0:
         return 0.0, 0.0
-    for a in range(COORDINATES):
-        rate += one[FIRST_GRADIENT + a] * meshes.speed[a]
+    for a in range(col.COORDINATES):
+        rate += one[col.FIRST_GRADIENT + a] * meshes.speed[a]
     if has_rims(meshes, k):
-        _, n, _ = contact_point(W, meshes, k, (side, one[X], one[Z]), state)
+        _, n, _ = contact_point(W, meshes, k, (side, one[col.X], one[col.Z]), state)
         rate += closing_of_rims(s, W, meshes, (k, cell), n, meshes.rims.rate)
-    return rate, min(max(damping * rate / one[DEPTH], -1.0), 1.0)
+    return rate, min(max(damping * rate / one[col.DEPTH], -1.0), 1.0)
 
 
 @inner
@@ -106,13 +86,13 @@ def sliding_speed(s, W, meshes, at, directions, axis):
 def rub(s, W, meshes, k, what, cell, place):
     """Let one slice rub, and press rims that deform, or add the tangents of that."""
     law, (side, state), one, at = meshes.law[k], place, meshes.line[cell], (k, cell)
-    directions = contact_point(W, meshes, k, (side, one[X], one[Z]), state)
+    directions = contact_point(W, meshes, k, (side, one[col.X], one[col.Z]), state)
     speed, spinning = sliding_speed(s, W, meshes, at, directions, state[0][2])
-    load = one[FORCE] + one[LOSS]
-    turned = math.tanh(speed / law[SPEED])
-    grip = law[FRICTION] * turned
+    load = one[col.FORCE] + one[col.LOSS]
+    turned = math.tanh(speed / law[col.SPEED])
+    grip = law[col.FRICTION] * turned
     arms, n, across = directions
-    if what == FORCES:
+    if what == col.FORCES:
         force = scale(load * grip, across)
         add_force(W.wrench[meshes.i[k]], arms[0], scale(-1.0, force))
         add_force(W.wrench[meshes.j[k]], arms[1], force)
@@ -120,10 +100,10 @@ def rub(s, W, meshes, k, what, cell, place):
         W.power[2] += load * grip * speed
         W.power[1] += load * grip * spinning
         return
-    stick = law[FRICTION] * load * (1.0 - turned * turned) / law[SPEED]
+    stick = law[col.FRICTION] * load * (1.0 - turned * turned) / law[col.SPEED]
     if has_rims(meshes, k):
-        along, factors = (n, add(n, scale(grip, across)), across), (one[STEEP], one[VISCOUS], stick)
-        add_rim_tangent(s, W, meshes, at, factors, along, arms)
+        along = n, add(n, scale(grip, across)), across
+        add_rim_tangent(s, W, meshes, at, (one[col.STEEP], one[col.VISCOUS], stick), along, arms)
     else:
         add_friction(meshes, one, directions, grip, stick)
 
@@ -136,8 +116,8 @@ def add_friction(meshes, one, directions, grip, stick):
     put_lever(lever, ACROSS, across, arms)
     for q in range(12):
         lever[CLOSING, q] = 0.0
-        for a in range(COORDINATES):
-            lever[CLOSING, q] += one[FIRST_GRADIENT + a] * meshes.rates[a, q]
-    add_product(tangent[0], grip * one[STEEP], lever[ACROSS], lever[CLOSING])
-    add_product(tangent[1], grip * one[VISCOUS], lever[ACROSS], lever[CLOSING])
+        for a in range(col.COORDINATES):
+            lever[CLOSING, q] += one[col.FIRST_GRADIENT + a] * meshes.rates[a, q]
+    add_product(tangent[0], grip * one[col.STEEP], lever[ACROSS], lever[CLOSING])
+    add_product(tangent[1], grip * one[col.VISCOUS], lever[ACROSS], lever[CLOSING])
     add_product(tangent[1], stick, lever[ACROSS], lever[ACROSS])

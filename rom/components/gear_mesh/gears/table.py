@@ -1,6 +1,7 @@
 """The arrays of gear meshes, and the names of their columns."""
 
 from rom.components.round_bodies.cylinders import Cylinders
+from rom.mbs.kernels.compiled import inner
 from rom.mbs.kernels.tables import (
     Array1,
     Array2,
@@ -122,3 +123,9 @@ class Meshes(Table):
     rates: Scratch2
     lever: Scratch2
     tangent: Scratch3
+
+
+@inner
+def has_rims(meshes, k):
+    """Whether a wheel of mesh k has a rim that deforms."""
+    return meshes.rims.of[k, 0] >= 0 or meshes.rims.of[k, 1] >= 0

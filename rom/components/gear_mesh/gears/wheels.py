@@ -8,21 +8,7 @@ travel along t, across which c is, in the place of a turn: D = a c + y t + o z.
 
 import math
 
-from rom.components.gear_mesh.gears.table import (
-    ALPHA,
-    COORDINATES,
-    DISTANCE,
-    OFFSET,
-    PHASE,
-    RACK,
-    RB_1,
-    RB_2,
-    SHIFT,
-    TILT_C,
-    TILT_T,
-    TURN_1,
-    TURN_2,
-)
+from rom.components.gear_mesh.gears import table as col
 from rom.mbs.kernels.algebra import add, cross, dot, row, scale, sub, turn
 from rom.mbs.kernels.compiled import inner
 from rom.mbs.kernels.coordinates import followed_angle
@@ -54,7 +40,7 @@ def line_of_centres(W, meshes, k, z):
     D = sub(row(W.P, meshes.j[k], 0), row(W.P, meshes.i[k], 0))
     shift = dot(D, z)
     flat = sub(D, scale(shift, z))
-    distance = math.copysign(math.sqrt(dot(flat, flat)), meshes.size[k, RB_2])
+    distance = math.copysign(math.sqrt(dot(flat, flat)), meshes.size[k, col.RB_2])
     c = scale(1.0 / distance, flat)
     return (c, cross(z, c), z), distance, shift
 
@@ -78,11 +64,11 @@ def set_rack(s, W, meshes, k):
     turn_1 = turned(s, W, meshes, k, 0, math.atan2(dot(e1, t), dot(e1, c)))
     turn_1 += meshes.spin[k, 0] * W.signal[meshes.clock[0], 0]
     W.fresh[meshes.remembered[k] + 1] = meshes.start[k, 1]
-    rolled = size[RB_1] * turn_1 + size[RB_2] * travel
-    opened = (distance - size[RACK]) * math.sin(size[ALPHA])
-    forward = size[RB_1] * (size[PHASE] + turn_1)
-    lean = shift - size[OFFSET], -dot(n, t), dot(n, c)
-    return (c, t, z, e1, n, u), size[ALPHA], (rolled, opened, forward), lean, (distance, travel)
+    rolled = size[col.RB_1] * turn_1 + size[col.RB_2] * travel
+    opened = (distance - size[col.RACK]) * math.sin(size[col.ALPHA])
+    forward = size[col.RB_1] * (size[col.PHASE] + turn_1)
+    lean = shift - size[col.OFFSET], -dot(n, t), dot(n, c)
+    return (c, t, z, e1, n, u), size[col.ALPHA], (rolled, opened, forward), lean, (distance, travel)
 
 
 @inner
@@ -94,21 +80,21 @@ def set_frame(s, W, meshes, k):
         what rolled together, what the flanks opened, and where a working line begins [m]; shift
         along the axis [m] and tilt of the gear along c and t; distance and travel [m].
     """
-    if meshes.size[k, RACK] > 0.0:
+    if meshes.size[k, col.RACK] > 0.0:
         return set_rack(s, W, meshes, k)
     z, e1, n2, e2 = wheel_axes(W, meshes, k)
     size = meshes.size[k]
     (c, t, z), distance, shift = line_of_centres(W, meshes, k, z)
-    both = size[RB_1] + size[RB_2]
+    both = size[col.RB_1] + size[col.RB_2]
     alpha = math.acos(both / distance) if both / distance < 1.0 else math.nan
     time = W.signal[meshes.clock[0], 0]
     turn_1 = turned(s, W, meshes, k, 0, math.atan2(dot(e1, t), dot(e1, c)))
     turn_2 = turned(s, W, meshes, k, 1, math.atan2(dot(e2, t), dot(e2, c)))
     turn_1, turn_2 = turn_1 + meshes.spin[k, 0] * time, turn_2 + meshes.spin[k, 1] * time
-    rolled = size[RB_1] * turn_1 + size[RB_2] * turn_2
-    opened = both * (involute(alpha) - involute(size[ALPHA]))
-    forward = size[RB_1] * (size[PHASE] + turn_1 + alpha - size[ALPHA])
-    lean = shift - size[OFFSET], -dot(n2, t), dot(n2, c)
+    rolled = size[col.RB_1] * turn_1 + size[col.RB_2] * turn_2
+    opened = both * (involute(alpha) - involute(size[col.ALPHA]))
+    forward = size[col.RB_1] * (size[col.PHASE] + turn_1 + alpha - size[col.ALPHA])
+    lean = shift - size[col.OFFSET], -dot(n2, t), dot(n2, c)
     return (c, t, z, e1, n2, e2), alpha, (rolled, opened, forward), lean, (distance, 0.0)
 
 
@@ -126,7 +112,7 @@ def set_rates(W, meshes, k):
 
     The line of centres turns about z by chi = (t . dD + o c . dphi_1) / a; both turns fall by it.
     """
-    if meshes.size[k, RACK] > 0.0:
+    if meshes.size[k, col.RACK] > 0.0:
         set_rack_rates(W, meshes, k)
         return
     z, _, n, e = wheel_axes(W, meshes, k)
@@ -138,13 +124,13 @@ def set_rates(W, meshes, k):
     square = p * p + q * q
     swung = scale(r / square, add(scale(p, c), scale(q, t)))
     own = scale(1.0 / square, cross(e, sub(scale(p, t), scale(q, c))))
-    put_rate(rates, TURN_1, scale(-1.0, chi), sub(z, scale(lag, c)), none)
-    put_rate(rates, TURN_2, scale(-1.0, chi), sub(swung, scale(lag, c)), own)
-    put_rate(rates, DISTANCE, c, scale(-o, t), none)
-    put_rate(rates, SHIFT, z, scale(a, t), none)
-    put_rate(rates, TILT_C, scale(n_c, chi), scale(n_c * lag - n_z, c), scale(-1.0, cross(n, t)))
-    twisted = sub(scale(n_t * lag, c), scale(n_z, t))
-    put_rate(rates, TILT_T, scale(n_t, chi), twisted, cross(n, c))
+    put_rate(rates, col.TURN_1, scale(-1.0, chi), sub(z, scale(lag, c)), none)
+    put_rate(rates, col.TURN_2, scale(-1.0, chi), sub(swung, scale(lag, c)), own)
+    put_rate(rates, col.DISTANCE, c, scale(-o, t), none)
+    put_rate(rates, col.SHIFT, z, scale(a, t), none)
+    one, two = scale(n_c * lag - n_z, c), sub(scale(n_t * lag, c), scale(n_z, t))
+    put_rate(rates, col.TILT_C, scale(n_c, chi), one, scale(-1.0, cross(n, t)))
+    put_rate(rates, col.TILT_T, scale(n_t, chi), two, cross(n, c))
 
 
 @inner
@@ -160,26 +146,26 @@ def set_rack_rates(W, meshes, k):
     flat = math.sqrt(1.0 - leans * leans)
     one, two = scale(-leans / flat, t), scale(1.0 / flat, cross(u, c))
     n_c, n_t, n_z = dot(n, c), dot(n, t), dot(n, z)
-    put_rate(rates, TURN_1, none, add(z, one), two)
-    put_rate(rates, TURN_2, t, add(scale(a, one), scale(o, c)), scale(a, two))
-    put_rate(rates, DISTANCE, c, sub(scale(-y, one), scale(o, t)), scale(-y, two))
-    put_rate(rates, SHIFT, z, sub(scale(a, t), scale(y, c)), none)
-    put_rate(rates, TILT_C, none, sub(scale(-n_c, one), scale(n_z, c)),
+    put_rate(rates, col.TURN_1, none, add(z, one), two)
+    put_rate(rates, col.TURN_2, t, add(scale(a, one), scale(o, c)), scale(a, two))
+    put_rate(rates, col.DISTANCE, c, sub(scale(-y, one), scale(o, t)), scale(-y, two))
+    put_rate(rates, col.SHIFT, z, sub(scale(a, t), scale(y, c)), none)
+    put_rate(rates, col.TILT_C, none, sub(scale(-n_c, one), scale(n_z, c)),
              sub(scale(-n_c, two), cross(n, t)))  # fmt: skip
-    put_rate(rates, TILT_T, none, sub(scale(-n_t, one), scale(n_z, t)),
+    put_rate(rates, col.TILT_T, none, sub(scale(-n_t, one), scale(n_z, t)),
              sub(cross(n, c), scale(n_t, two)))  # fmt: skip
 
 
 @inner
 def set_speed(W, meshes, k):
     """Write the rates of the coordinates."""
-    for a in range(COORDINATES):
+    for a in range(col.COORDINATES):
         meshes.speed[a] = 0.0
         for p in range(6):
             meshes.speed[a] += meshes.rates[a, p] * W.V[meshes.i[k], p]
             meshes.speed[a] += meshes.rates[a, 6 + p] * W.V[meshes.j[k], p]
-    meshes.speed[TURN_1] += meshes.spin[k, 0]
-    meshes.speed[TURN_2] += meshes.spin[k, 1]
+    meshes.speed[col.TURN_1] += meshes.spin[k, 0]
+    meshes.speed[col.TURN_2] += meshes.spin[k, 1]
 
 
 @inner
@@ -188,9 +174,9 @@ def push_wheels(W, meshes, k):
 
     What keeps wheels spinning in their frames works against it.
     """
-    W.power[1] += meshes.gradient[TURN_1] * meshes.spin[k, 0]
-    W.power[1] += meshes.gradient[TURN_2] * meshes.spin[k, 1]
-    for a in range(COORDINATES):
+    W.power[1] += meshes.gradient[col.TURN_1] * meshes.spin[k, 0]
+    W.power[1] += meshes.gradient[col.TURN_2] * meshes.spin[k, 1]
+    for a in range(col.COORDINATES):
         for p in range(6):
             W.wrench[meshes.i[k], p] -= meshes.gradient[a] * meshes.rates[a, p]
             W.wrench[meshes.j[k], p] -= meshes.gradient[a] * meshes.rates[a, 6 + p]
@@ -201,10 +187,10 @@ def stiffen_wheels(meshes):
     """Add how forces along the coordinates change to the tangents by the motions."""
     rates, tangent = meshes.rates, meshes.tangent
     for kind in range(2):
-        for a in range(COORDINATES):
+        for a in range(col.COORDINATES):
             for q in range(12):
                 total = 0.0
-                for b in range(COORDINATES):
+                for b in range(col.COORDINATES):
                     total += meshes.hessian[kind, a, b] * rates[b, q]
                 for p in range(12):
                     tangent[kind, p, q] += rates[a, p] * total
@@ -218,12 +204,11 @@ def turn_forces(meshes, axes, distance):
     h (c t + t c) / a^2 + dE/da t t / a.
     """
     (c, t), gradient, tangent = (axes[0], axes[1]), meshes.gradient, meshes.tangent
-    about = (gradient[TURN_1] + gradient[TURN_2]) / (distance * distance)
+    about = (gradient[col.TURN_1] + gradient[col.TURN_2]) / (distance * distance)
+    apart = gradient[col.DISTANCE] / distance
     for p in range(3):
         for q in range(3):
-            turning = (
-                about * (c[p] * t[q] + t[p] * c[q]) + gradient[DISTANCE] / distance * t[p] * t[q]
-            )
+            turning = about * (c[p] * t[q] + t[p] * c[q]) + apart * t[p] * t[q]
             for side in range(2):
                 tangent[0, 6 * side + p, 6 * side + q] += turning
                 tangent[0, 6 * side + p, 6 - 6 * side + q] -= turning

@@ -12,7 +12,7 @@ from typing import Annotated, Literal, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from rom.arguments import Angle, Number, Size, typed
+from rom.arguments import Angle, Between, Number, Size, typed
 from rom.errors import ModelError
 from rom.model import Array, Index
 
@@ -92,7 +92,7 @@ class JournalBearing:
     clearance: Size
     grooves: Sequence[Groove] = ()
     cavitation: Cavitation = "reynolds"
-    preload: float = 0.0
+    preload: Annotated[float, Between(0.0, 1.0, "[)", error=ModelError)] = 0.0
     lobes: float = 0.0
     cells: tuple[int, int] = (120, 8)
     aligned: bool = False
@@ -106,14 +106,11 @@ class JournalBearing:
                 f"{self.clearance} m: a film is thin against the journal.",
                 hint="Give all three in metres; the clearance is about 0.001 of the diameter.",
             )
-        if not 0 <= self.preload < 1:
-            raise ModelError(f"preload {self.preload} leaves no room; it is from 0 to below 1.")
         if self.bore is not None and self.preload:
             raise ModelError("a bearing takes a preload of lobes or a bore of its own, not both.")
         if self.cavitation == "jfo" and not self.grooves:
-            raise ModelError(
-                "a mass-conserving film without a groove has no oil.", hint="Add a Groove."
-            )
+            text = "a mass-conserving film without a groove has no oil."
+            raise ModelError(text, hint="Add a Groove.")
         if min(self.cells) < 2 or self.cells[0] < 12:
             raise ModelError(f"{self.cells} cells are too few; at least 12 around and 2 along.")
         object.__setattr__(self, "grid", _grid(self))
@@ -149,7 +146,7 @@ class JournalBearing:
             motion: (2,) or (4,) ex, ey, phi_x, phi_y of the journal in the bush [m, rad].
         """
         m = four(motion) / self.scale
-        edges = np.array([-0.5, 0.5]) if not self.aligned else np.zeros(1)
+        edges = np.zeros(1) if self.aligned else np.array([-0.5, 0.5])
         return self.clearance * float(np.min(thickness(self.grid, m, edges)))
 
 

@@ -36,17 +36,10 @@ LENGTH_RTOL = 1e-3  # of its length, by which a bearing may reach beyond its bor
 def bore_of(
     name: str, part: Part, bush: Marker, axes: Array, bearing: JournalBearing
 ) -> tuple[Array, Array]:
-    """Functions by which a bush opens its film, and their amplitudes per elastic coordinate.
+    """(n, m) functions in its cells by which a bush opens its film, and (m, r) amplitudes [m].
 
-    Args:
-        name: of the bearing.
-        part: body of the bush.
-        bush: marker of its bore.
-        axes: (2, 3) axis, and direction from which angles count, in the frame of the body.
-        bearing: whose cells.
-
-    Returns:
-        (n, m) values in the cells [1], (m, r) amplitudes [m].
+    Amplitudes are per elastic coordinate of the part; the axes (2, 3) are that of the bush, and the
+    direction from which angles count, in the frame of the part.
 
     Raises:
         ConfigError: for a bush that has no such functions, or is not the bore of this bearing.
@@ -154,14 +147,8 @@ def unit_motion(s, W, m, q, carried):
 def add_bore_rows(s, W, journals, k, first, c, S):
     """Add c times the changes of the forces on the bore of film k to S; `set_column` first.
 
-    Args:
-        s, W: system and work.
-        journals: all films.
-        k: which.
-        first: column of the slopes by amplitudes or by their rates; -1 for those by twists that
-            positions change.
-        c: factor.
-        S: stiffness or damping matrix.
+    From column ``first`` on are the slopes by amplitudes, or by their rates; -1 for those by twists
+    that positions change.
     """
     films, bores, body = journals.films, journals.bores[k], s.markers.body[journals.j[k]]
     r, size = s.bodies.r[body], films.size[k, CLEARANCE]
@@ -189,16 +176,7 @@ def add_bore_rows(s, W, journals, k, first, c, S):
 
 @inner
 def add_bore_columns(s, W, journals, k, first, c, S):
-    """Add c times the changes of both wrenches by the bore of film k, or by its rate, to S.
-
-    Args:
-        s, W: system and work.
-        journals: all films.
-        k: which.
-        first: column of the slopes by amplitudes or by their rates.
-        c: factor.
-        S: stiffness or damping matrix.
-    """
+    """Add c times the changes of both wrenches by the bore of film k, or by its rate, to S."""
     films, bores, body = journals.films, journals.bores[k], s.markers.body[journals.j[k]]
     axes, relative = journal_place(W, journals.i[k], journals.j[k], journals.axes[k])
     for f in range(films.n_functions[k]):

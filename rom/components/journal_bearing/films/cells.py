@@ -1,11 +1,13 @@
 """Films in cells: the arrays of all films of a mechanism, or of one alone."""
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from rom.components.journal_bearing.films.bearing import LAWS, JournalBearing
+from rom.mbs.kernels.compiled import inner
 from rom.mbs.kernels.tables import (
     Address2,
     Array2,
@@ -160,3 +162,33 @@ def _padded(rows: Sequence[Any], n: int) -> Any:
     for row, values in zip(padded, rows, strict=True):
         row[: len(values)] = values
     return padded
+
+
+@inner
+def cell_size(films, k):
+    """Extent of a cell around [rad] and along the width [1]."""
+    width = -2.0 * films.size[k, Z_FIRST] if films.size[k, IMAGES] == 1.0 else 0.5
+    return 2 * math.pi / films.shape[k, 0], width / films.shape[k, 1]
+
+
+@inner
+def column_before(i, nt):
+    """The column before column i of nt; quicker than a remainder."""
+    return i - 1 if i > 0 else nt - 1
+
+
+@inner
+def column_after(i, nt):
+    """The column behind column i of nt."""
+    return i + 1 if i < nt - 1 else 0
+
+
+@inner
+def per_motion(films, k, face, i, Z, m):
+    """Film opened at column i by a unit of motion m; pressure times this is the force on it."""
+    c, s = films.circle[k, i, face + COS], films.circle[k, i, face + SIN]
+    if m == 0:
+        return -c
+    if m == 1:
+        return -s
+    return Z * s if m == 2 else -Z * c

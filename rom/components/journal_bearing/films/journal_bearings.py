@@ -9,16 +9,11 @@ import numpy as np
 import numpy.typing as npt
 
 from rom.arguments import Direction, NotNegative, Positive, Share, finite, positive, unit_vector
+from rom.components.journal_bearing.films import journals as col
 from rom.components.journal_bearing.films.bearing import JFO, REYNOLDS, JournalBearing
 from rom.components.journal_bearing.films.bores import bore_of
 from rom.components.journal_bearing.films.cells import CLEARANCE, N_ANSWERS, cells_of
 from rom.components.journal_bearing.films.journals import (
-    CONSTANT,
-    FIRST_CONTENT,
-    INLET,
-    KNOWN,
-    SETTLING_MARK,
-    TEMPERATURE,
     Journals,
     film_pair_tangents,
     film_tangents,
@@ -119,10 +114,8 @@ def journal_bearing(  # noqa: PLR0913  one keyword per property
     turning = self.part(journal.body).spin_about(name, axes[0])
     film = OilFilm(journal, bush, bearing, axes, oil, numbers, turning)
     if elastic_bush and tabulated:
-        raise ConfigError(
-            f"the bush of bearing {name!r} bends: its film has no table of places.",
-            hint="Leave out elastic_bush or tabulated.",
-        )
+        text = f"the bush of bearing {name!r} bends: its film has no table of places."
+        raise ConfigError(text, hint="Leave out elastic_bush or tabulated.")
     if tabulated:
         film = replace(film, table=table_of(name, bearing))
     if elastic_bush:
@@ -134,28 +127,21 @@ def journal_bearing(  # noqa: PLR0913  one keyword per property
 def _directions(name: str, axis: npt.ArrayLike, reference: npt.ArrayLike | None) -> Array:
     """(2, 3) axis, and direction from which angles count."""
     z = unit_vector(f"axis of {name}", axis)
-    if reference is None:
-        given = np.eye(3)[1 if abs(z[0]) > PARALLEL_COSINE else 0]
-    else:
-        given = finite("reference", reference, (3,))
+    across = np.eye(3)[1 if abs(z[0]) > PARALLEL_COSINE else 0]
+    given = across if reference is None else finite("reference", reference, (3,))
     x = given - (given @ z) * z
     if not np.linalg.norm(x) > 1e-6 * np.linalg.norm(given):
-        raise ConfigError(
-            f"reference of bearing {name!r} lies along its axis; give a direction across it, from "
-            "which angles count."
-        )
+        text = f"reference of bearing {name!r} lies along its axis"
+        raise ConfigError(f"{text}; give a direction across it, from which angles count.")
     return np.array([z, x / np.linalg.norm(x)])
 
 
 def _check_gap(name: str, bearing: JournalBearing, place: Array, roughness: float) -> None:
     """Refuse a journal that touches its bush at the start, or always would."""
-    c = bearing.clearance
-    if not roughness < bearing.thinnest(np.zeros(2)):
-        raise ConfigError(
-            f"roughness of bearing {name!r} is {roughness * 1e6:.3g} micrometres, and its film "
-            f"{bearing.thinnest(np.zeros(2)) * 1e6:.3g} at most.",
-            hint="It is from 0 to below the clearance.",
-        )
+    c, most = bearing.clearance, bearing.thinnest(np.zeros(2))
+    if not roughness < most:
+        text = f"roughness of bearing {name!r} is {roughness * 1e6:.3g} micrometres"
+        raise ConfigError(f"{text}, and its film {most * 1e6:.3g} at most.")
     if not bearing.thinnest(place) > roughness:
         raise ConfigError(
             f"the journal of bearing {name!r} touches its bush at the start: it stands "
@@ -171,15 +157,12 @@ def _oil(name: str, oil: Oil | float, inlet: float | None) -> tuple[float, ...]:
         if inlet is None:
             raise ConfigError(f"bearing {name!r} has an oil; give its inlet temperature.")
         if not float(oil.viscosity(inlet)) > 0.0:
-            raise ConfigError(
-                f"inlet = {inlet} of {name!r}: the oil boils before; give degrees Celsius."
-            )
+            text = f"inlet = {inlet} of {name!r}: the oil boils before; give degrees Celsius."
+            raise ConfigError(text)
         return (0.0, *oil.law(), oil.density, oil.heat, float(inlet))
     if inlet is not None:
-        raise ConfigError(
-            f"bearing {name!r} has an inlet temperature, but a viscosity that stays.",
-            hint="Give an rom.mbs.Oil instead.",
-        )
+        text = f"bearing {name!r} has an inlet temperature, but a viscosity that stays."
+        raise ConfigError(text, hint="Give an rom.mbs.Oil instead.")
     positive(f"oil of bearing {name!r} [Pa s]", oil)
     return (float(oil), 0.0, 0.0, 1.0, 1.0, 0.0)
 
@@ -205,7 +188,7 @@ def pack(found: Mapping[str, OilFilm], places: Places) -> Journals:
         rows_of((one.oil for one in films), 9),
         integers([places.clock()]),
         integers(
-            places.memory(name, _memory(one, 0.0), settling=_memory(one, SETTLING_MARK))
+            places.memory(name, _memory(one, 0.0), settling=_memory(one, col.SETTLING_MARK))
             for name, one in found.items()
         ),
         cells,
@@ -231,8 +214,8 @@ def _tables(films: list[OilFilm]) -> tuple[Index, Array]:
 def _memory(one: OilFilm, known: float) -> Array:
     """What a film remembers at first: the temperature of its inlet, and whether that is known."""
     conserves = one.bearing.cavitation == "jfo"
-    memory = np.zeros(FIRST_CONTENT + conserves * int(np.prod(one.bearing.cells)))
-    memory[KNOWN], memory[TEMPERATURE] = known, one.oil[INLET]
+    memory = np.zeros(col.FIRST_CONTENT + conserves * int(np.prod(one.bearing.cells)))
+    memory[col.KNOWN], memory[col.TEMPERATURE] = known, one.oil[col.INLET]
     return memory
 
 
@@ -254,6 +237,6 @@ JOURNAL_BEARINGS_FAMILY = Family(
         answers=lambda journals: journals.largest, potential=False, eased=oil_everywhere,
         room=lambda journals: journals.thinnest / journals.films.size[:, CLEARANCE],
         lost="the journal touches its bush in {}, its film finds no pressure or leaves its table",
-        remembers=lambda journals: (journals.films.law == JFO) | (journals.oil[:, CONSTANT] == 0.0),
+        remembers=lambda rows: (rows.films.law == JFO) | (rows.oil[:, col.CONSTANT] == 0.0),
     ),
 )  # fmt: skip

@@ -2,6 +2,7 @@
 
 import math
 
+from rom.components.journal_bearing.films import cells as col
 from rom.components.journal_bearing.films.bearing import JFO
 from rom.components.journal_bearing.films.bores import (
     add_bore_rows,
@@ -10,19 +11,7 @@ from rom.components.journal_bearing.films.bores import (
     bore_power,
     open_film,
 )
-from rom.components.journal_bearing.films.cells import (
-    CLEARANCE,
-    CONTENT_KNOWN,
-    FIRST_OPENED,
-    IMAGES,
-    LENGTH,
-    N_ANSWERS,
-    N_MOTIONS,
-    PASSED_TIME,
-    RADIUS,
-    SPIN_COLUMN,
-    Cells,
-)
+from rom.components.journal_bearing.films.cells import Cells
 from rom.components.journal_bearing.films.kinematics import (
     answer_unit,
     carried_stiffness,
@@ -48,6 +37,7 @@ from rom.components.journal_bearing.films.tabulated import (
     thinnest_of,
 )
 from rom.mbs.elements.contact.points import COMPLEX_STEP
+from rom.mbs.kernels.algebra import row
 from rom.mbs.kernels.compiled import inner
 from rom.mbs.kernels.constraints import pair_stiffness
 from rom.mbs.kernels.element_calls import pair_tangents, residuals, tangents
@@ -57,10 +47,8 @@ from rom.mbs.kernels.tables import Array1, Array2, Array3, Index1, Scratch1, Scr
 CONSTANT, WALTHER_A, WALTHER_B, DENSITY, HEAT, INLET, HEATED, LAG, ROUGHNESS = range(9)
 # what a film remembers, before the content of its cells
 KNOWN, TIME, TEMPERATURE, THINNEST, LARGEST, POWER, SIDE_FLOW, MOTION = range(8)
-FIRST_CONTENT = MOTION + N_MOTIONS
-SETTLING_MARK = (
-    -1.0
-)  # in place of 1 for a film that is known: its temperature is the one that stays
+FIRST_CONTENT = MOTION + col.N_MOTIONS
+SETTLING_MARK = -1.0  # in place of 1 for a known film: its temperature is the one that stays
 CELSIUS_ZERO = 273.15  # [K]
 MAX_WARMINGS = 50  # of a film whose grooves have pressure
 WARMING_TOL = 1e-10  # of a temperature [K]
@@ -135,36 +123,27 @@ def oil_viscosity(oil, celsius):
 @inner
 def side_flow(journals, k):
     """Oil that leaves at the ends [m^3/s]."""
-    size = journals.films.size[k]
-    return journals.flow[k] * size[IMAGES] * size[CLEARANCE] * size[RADIUS] * size[LENGTH] / 12
+    R, L, c = row(journals.films.size, k, col.RADIUS)
+    return journals.flow[k] * journals.films.size[k, col.IMAGES] * c * R * L / 12
 
 
 @inner
 def lost_power(journals, k):
     """Power that turns into heat [W]."""
     films = journals.films
-    total = (
-        answer_unit(journals, k, TORQUE_ANSWER)
-        * films.answer[k, TORQUE_ANSWER]
-        * films.state[k, SPIN_COLUMN]
-    )
-    for m in range(N_MOTIONS):
+    total = answer_unit(journals, k, TORQUE_ANSWER) * films.answer[k, TORQUE_ANSWER]
+    total *= films.state[k, col.SPIN_COLUMN]
+    for m in range(col.N_MOTIONS):
         force = answer_unit(journals, k, m) * films.answer[k, m]
-        total -= force * journals.scale[k, m] * films.state[k, N_MOTIONS + m]
+        total -= force * journals.scale[k, m] * films.state[k, col.N_MOTIONS + m]
     return total - bore_power(journals, k)
 
 
 @inner
 def warming(journals, k):
     """Rise of the temperature of the film over inlet that its power would keep up [K]."""
-    oil, size = journals.oil[k], journals.films.size[k]
-    drag = (
-        0.5
-        * abs(journals.films.state[k, SPIN_COLUMN])
-        * size[CLEARANCE]
-        * size[RADIUS]
-        * size[LENGTH]
-    )
+    oil, (R, L, c) = journals.oil[k], row(journals.films.size, k, col.RADIUS)
+    drag = 0.5 * abs(journals.films.state[k, col.SPIN_COLUMN]) * c * R * L
     flow = max(side_flow(journals, k), LEAST_RENEWED * drag)
     if oil[CONSTANT] > 0.0 or not flow > 0.0:
         return 0.0
@@ -213,9 +192,8 @@ def settled_temperature(journals, k):
 def recall(s, W, journals, k):
     """Tell the film what it remembers; returns its temperature, NaN if that is to be found."""
     at, films = s.coordinates.kind.size + journals.remembered[k], journals.films
-    passed = W.signal[journals.clock[0], 0] - W.base[at + TIME]
-    known = W.base[at + KNOWN] == 1.0
-    films.state[k, PASSED_TIME], films.state[k, CONTENT_KNOWN] = passed, 1.0 if known else 0.0
+    films.state[k, col.PASSED_TIME] = W.signal[journals.clock[0], 0] - W.base[at + TIME]
+    films.state[k, col.CONTENT_KNOWN] = 1.0 if W.base[at + KNOWN] == 1.0 else 0.0
     for cell in range(n_remembered(films, k)):
         films.content[k, cell] = W.base[at + FIRST_CONTENT + cell]
     return math.nan if W.base[at + KNOWN] == SETTLING_MARK else W.base[at + TEMPERATURE]
@@ -233,15 +211,15 @@ def remember(W, journals, k, celsius):
     films, oil = journals.films, journals.oil[k]
     at = journals.remembered[k]
     aim = oil[INLET] + warming(journals, k)
-    if films.state[k, CONTENT_KNOWN] == 1.0 and films.state[k, PASSED_TIME] > 0.0:
-        celsius = aim + (celsius - aim) * math.exp(-films.state[k, PASSED_TIME] / oil[LAG])
+    if films.state[k, col.CONTENT_KNOWN] == 1.0 and films.state[k, col.PASSED_TIME] > 0.0:
+        celsius = aim + (celsius - aim) * math.exp(-films.state[k, col.PASSED_TIME] / oil[LAG])
     W.fresh[at + KNOWN], W.fresh[at + TIME] = 1.0, W.signal[journals.clock[0], 0]
     W.fresh[at + TEMPERATURE], W.fresh[at + THINNEST] = celsius, journals.thinnest[k]
     W.fresh[at + LARGEST], W.fresh[at + POWER] = journals.largest[k], lost_power(journals, k)
     W.fresh[at + SIDE_FLOW] = side_flow(journals, k)
-    for m in range(N_MOTIONS):
+    for m in range(col.N_MOTIONS):
         W.fresh[at + MOTION + m] = films.state[k, m] * journals.scale[k, m]
-    stays = films.state[k, CONTENT_KNOWN] == 1.0 and films.state[k, PASSED_TIME] == 0.0
+    stays = films.state[k, col.CONTENT_KNOWN] == 1.0 and films.state[k, col.PASSED_TIME] == 0.0
     for cell in range(n_remembered(films, k)):
         if stays:
             W.fresh[at + FIRST_CONTENT + cell] = films.content[k, cell]
@@ -254,18 +232,18 @@ def set_state(journals, k, place):
     """Tell the film how the journal moves."""
     motion, rate, spin = journal_motion(*place)
     state, scale = journals.films.state[k], journals.scale[k]
-    for m in range(N_MOTIONS):
-        state[m], state[N_MOTIONS + m] = motion[m] / scale[m], rate[m] / scale[m]
-    if journals.films.size[k, IMAGES] > 1.0:  # tilts are not seen
-        state[2] = state[3] = state[N_MOTIONS + 2] = state[N_MOTIONS + 3] = 0.0
-    state[SPIN_COLUMN] = spin + journals.turning[k]
+    for m in range(col.N_MOTIONS):
+        state[m], state[col.N_MOTIONS + m] = motion[m] / scale[m], rate[m] / scale[m]
+    if journals.films.size[k, col.IMAGES] > 1.0:  # tilts are not seen
+        state[2] = state[3] = state[col.N_MOTIONS + 2] = state[col.N_MOTIONS + 3] = 0.0
+    state[col.SPIN_COLUMN] = spin + journals.turning[k]
 
 
 @inner
 def largest_pressure(journals, k):
     """Largest pressure of film k [Pa]."""
     films = journals.films
-    unit = journals.viscosity[k] * (films.size[k, RADIUS] / films.size[k, CLEARANCE]) ** 2
+    unit = journals.viscosity[k] * (films.size[k, col.RADIUS] / films.size[k, col.CLEARANCE]) ** 2
     return journals.peak[k] * unit
 
 
@@ -277,7 +255,7 @@ def set_thinnest(journals, k):
         thinnest, known = thinnest_of(films, k), in_table(films, k)
     else:
         thinnest, known = set_heights(films, k), True
-    journals.thinnest[k] = films.size[k, CLEARANCE] * thinnest
+    journals.thinnest[k] = films.size[k, col.CLEARANCE] * thinnest
     return known and journals.thinnest[k] > journals.oil[k, ROUGHNESS]
 
 
@@ -328,19 +306,16 @@ def changed_answers(journals, k, motion, rate, spin):
     """Forces and torque with the imaginary step that motion, rate and spin have."""
     F, torque = film_forces(journals, k, journals.films.answer[k])
     change, slope = journals.change, journals.films.slope[k]
-    for m in range(N_ANSWERS + journals.films.n_functions[k]):
+    for m in range(col.N_ANSWERS + journals.films.n_functions[k]):
         change[m] = 0.0
-        for q in range(N_MOTIONS):
+        for q in range(col.N_MOTIONS):
             change[m] += slope[m, q] * motion[q].imag / journals.scale[k, q]
-            change[m] += slope[m, N_MOTIONS + q] * rate[q].imag / journals.scale[k, q]
-        change[m] = answer_unit(journals, k, m) * (change[m] + slope[m, SPIN_COLUMN] * spin.imag)
-    F = (
-        complex(F[0], change[0]),
-        complex(F[1], change[1]),
-        complex(F[2], change[2]),
-        complex(F[3], change[3]),
-    )
-    return F, complex(torque, change[TORQUE_ANSWER])
+            change[m] += slope[m, col.N_MOTIONS + q] * rate[q].imag / journals.scale[k, q]
+        change[m] += slope[m, col.SPIN_COLUMN] * spin.imag
+        change[m] *= answer_unit(journals, k, m)
+    first, second = complex(F[0], change[0]), complex(F[1], change[1])
+    moments = complex(F[2], change[2]), complex(F[3], change[3])
+    return (first, second, *moments), complex(torque, change[TORQUE_ANSWER])
 
 
 @inner
@@ -361,7 +336,7 @@ def set_column(W, journals, k, p, by_position):
         W.Q[6 + q, p] = shove[q]
         W.Q[9 + q, p] = -back[q]
     for f in range(journals.films.n_functions[k]):
-        journals.pressed[f, p] = journals.change[N_ANSWERS + f] / COMPLEX_STEP
+        journals.pressed[f, p] = journals.change[col.N_ANSWERS + f] / COMPLEX_STEP
 
 
 @inner
@@ -388,13 +363,13 @@ def film_tangents(s, W, journals, _lam, ck, cc):
         if not journals.largest[k] >= 0.0:
             continue
         pair = journals.i[k], journals.j[k]
-        by_rate = FIRST_OPENED + journals.films.functions.shape[2]
+        by_rate = col.FIRST_OPENED + journals.films.functions.shape[2]
         set_film_slopes(journals, k)
         for p in range(12):
             set_column(W, journals, k, p, True)
         scale_pair(W, ck)
         pair_stiffness(s, W, *pair, W.Kt)
-        add_bore_tangents(s, W, journals, k, FIRST_OPENED, ck, W.Kt)
+        add_bore_tangents(s, W, journals, k, col.FIRST_OPENED, ck, W.Kt)
         for p in range(12):
             set_column(W, journals, k, p, False)
         carried_stiffness(s, W, pair, ck, W.Kt)

@@ -24,11 +24,8 @@ ZERO = (0.0, 0.0, 0.0)
 @inner
 def journal_place(W, i, j, axes):
     """Axes x, y, z of the bush and n of the journal; D and its rate, both angular velocities."""
-    n, z, x = (
-        turn(W.E, i, row(axes, 0, 0)),
-        turn(W.E, j, row(axes, 1, 0)),
-        turn(W.E, j, row(axes, 2, 0)),
-    )
+    n, z = turn(W.E, i, row(axes, 0, 0)), turn(W.E, j, row(axes, 1, 0))
+    x = turn(W.E, j, row(axes, 2, 0))
     D, slide = sub(row(W.P, i, 0), row(W.P, j, 0)), sub(row(W.V, i, 0), row(W.V, j, 0))
     return (x, cross(z, x), z, n), (D, slide, row(W.V, i, 3), row(W.V, j, 3))
 
@@ -77,13 +74,9 @@ def answer_unit(journals, k, m):
 @inner
 def film_forces(journals, k, answer):
     """Forces that work on the motion, and the torque that brakes the spin."""
-    F = (
-        answer_unit(journals, k, 0) * answer[0],
-        answer_unit(journals, k, 1) * answer[1],
-        answer_unit(journals, k, 2) * answer[2],
-        answer_unit(journals, k, 3) * answer[3],
-    )
-    return F, answer_unit(journals, k, TORQUE_ANSWER) * answer[TORQUE_ANSWER]
+    x, y = answer_unit(journals, k, 0) * answer[0], answer_unit(journals, k, 1) * answer[1]
+    a, b = answer_unit(journals, k, 2) * answer[2], answer_unit(journals, k, 3) * answer[3]
+    return (x, y, a, b), answer_unit(journals, k, TORQUE_ANSWER) * answer[TORQUE_ANSWER]
 
 
 @inner

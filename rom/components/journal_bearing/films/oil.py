@@ -65,7 +65,6 @@ def iso_vg(grade: int) -> Oil:
         ModelError: for other grades.
     """
     if grade not in AT_100:
-        raise ModelError(
-            f"ISO VG {grade} is not listed; there are {sorted(AT_100)}.", hint="Use Oil."
-        )
+        text = f"ISO VG {grade} is not listed; there are {sorted(AT_100)}."
+        raise ModelError(text, hint="Use Oil.")
     return Oil(float(grade), AT_100[grade])

@@ -14,23 +14,9 @@ that stays.
 
 import math
 
-from rom.components.journal_bearing.films.band import back_substitute, factor
+from rom.components.journal_bearing.films import cells as col
 from rom.components.journal_bearing.films.bearing import FULL, JFO
-from rom.components.journal_bearing.films.cells import (
-    BEHIND_FACE,
-    BORE,
-    CLEARANCE,
-    CONTENT_KNOWN,
-    COS,
-    IMAGES,
-    N_MOTIONS,
-    PASSED_TIME,
-    RADIUS,
-    SIN,
-    SLENDER,
-    SPIN_COLUMN,
-    Z_FIRST,
-)
+from rom.components.journal_bearing.films.cells import cell_size, column_after, column_before
 from rom.mbs.kernels.compiled import inner
 
 MAX_ITERATIONS = 100  # changes of the cavitated region
@@ -43,39 +29,9 @@ MAX_CLOSING = 0.5
 
 
 @inner
-def cell_size(films, k):
-    """Extent of a cell around [rad] and along the width [1]."""
-    width = -2.0 * films.size[k, Z_FIRST] if films.size[k, IMAGES] == 1.0 else 0.5
-    return 2 * math.pi / films.shape[k, 0], width / films.shape[k, 1]
-
-
-@inner
-def column_before(i, nt):
-    """The column before column i of nt; quicker than a remainder."""
-    return i - 1 if i > 0 else nt - 1
-
-
-@inner
-def column_after(i, nt):
-    """The column behind column i of nt."""
-    return i + 1 if i < nt - 1 else 0
-
-
-@inner
-def per_motion(films, k, face, i, Z, m):
-    """Film opened at column i by a unit of motion m; pressure times this is the force on it."""
-    c, s = films.circle[k, i, face + COS], films.circle[k, i, face + SIN]
-    if m == 0:
-        return -c
-    if m == 1:
-        return -s
-    return Z * s if m == 2 else -Z * c
-
-
-@inner
 def line_of(films, k, face, i, at):
     """Value at Z = 0 and slope along Z of the film that motions, or rates, open at column i."""
-    c, s, x = films.circle[k, i, face + COS], films.circle[k, i, face + SIN], films.state[k]
+    c, s, x = films.circle[k, i, face + col.COS], films.circle[k, i, face + col.SIN], films.state[k]
     return -x[at] * c - x[at + 1] * s, x[at + 2] * s - x[at + 3] * c
 
 
@@ -91,14 +47,14 @@ def set_heights(films, k):
     """Set the film and the conductance of all faces; returns the thinnest film."""
     nt, nz = films.shape[k]
     dtheta, dZ = cell_size(films, k)
-    ratio, low = films.size[k, SLENDER] * dtheta / dZ, math.inf
+    ratio, low = films.size[k, col.SLENDER] * dtheta / dZ, math.inf
     for i in range(nt):
         a, b = line_of(films, k, 0, i, 0)
-        c, d = line_of(films, k, BEHIND_FACE, i, 0)
-        a, c = a + films.circle[k, i, BORE], c + films.circle[k, i, BEHIND_FACE + BORE]
+        c, d = line_of(films, k, col.BEHIND_FACE, i, 0)
+        a, c = a + films.circle[k, i, col.BORE], c + films.circle[k, i, col.BEHIND_FACE + col.BORE]
         after = column_after(i, nt)
         for j in range(nz):
-            cell, Z = i * nz + j, films.size[k, Z_FIRST] + (j + 0.5) * dZ
+            cell, Z = i * nz + j, films.size[k, col.Z_FIRST] + (j + 0.5) * dZ
             gap = films.opening[k, cell]
             h = c + Z * d + 0.5 * (gap + films.opening[k, after * nz + j])
             films.behind[k, cell], films.middle[k, cell] = h, a + Z * b + gap
@@ -106,9 +62,9 @@ def set_heights(films, k):
             low = min(low, min(h, films.middle[k, cell]))
         for j in range(nz + 1):
             gap = at_side(nz, j, films.opening[k, i * nz : (i + 1) * nz])
-            face, h = i * (nz + 1) + j, a + (films.size[k, Z_FIRST] + j * dZ) * b + gap
+            face, h = i * (nz + 1) + j, a + (films.size[k, col.Z_FIRST] + j * dZ) * b + gap
             open_end = 2.0 if j in (0, nz) else 1.0
-            if j == 0 and films.size[k, IMAGES] > 1.0:
+            if j == 0 and films.size[k, col.IMAGES] > 1.0:
                 open_end = 0.0  # the image
             films.side[k, face] = h
             films.leaks[k, face] = open_end * ratio * h * h * h
@@ -121,12 +77,12 @@ def set_storage(films, k):
     """Set what cells take up."""
     nt, nz = films.shape[k]
     dtheta, dZ = cell_size(films, k)
-    size, passed = 12 * dtheta * dZ, films.state[k, PASSED_TIME]
+    size, passed = 12 * dtheta * dZ, films.state[k, col.PASSED_TIME]
     remembers = has_memory(films, k)
     for i in range(nt):
-        a, b = line_of(films, k, 0, i, N_MOTIONS)
+        a, b = line_of(films, k, 0, i, col.N_MOTIONS)
         for j in range(nz):
-            cell, Z = i * nz + j, films.size[k, Z_FIRST] + (j + 0.5) * dZ
+            cell, Z = i * nz + j, films.size[k, col.Z_FIRST] + (j + 0.5) * dZ
             if remembers:
                 films.store[k, cell] = size * films.middle[k, cell] / passed
                 films.gain[k, cell] = size * films.content[k, cell] / passed
@@ -138,7 +94,7 @@ def set_storage(films, k):
 @inner
 def has_memory(films, k):
     """Whether the filling follows from that of the last accepted instant."""
-    known = films.state[k, CONTENT_KNOWN] == 1.0 and films.state[k, PASSED_TIME] > 0.0
+    known = films.state[k, col.CONTENT_KNOWN] == 1.0 and films.state[k, col.PASSED_TIME] > 0.0
     return known and films.law[k] == JFO
 
 
@@ -188,7 +144,7 @@ def assemble(films, k, w):
     for row in range(nt * nz):
         for m in range(2 * w + 1):
             films.band[k, row, m] = 0.0
-    drag = 6 * cell_size(films, k)[1] * films.state[k, SPIN_COLUMN]
+    drag = 6 * cell_size(films, k)[1] * films.state[k, col.SPIN_COLUMN]
     for i in range(nt):
         before, after = column_before(i, nt), column_after(i, nt)
         for j in range(nz):
@@ -250,7 +206,7 @@ def changed(films, k):
 @inner
 def set_supply(films, k, viscosity):
     """Set the pressure of the grooves in units of the film."""
-    unit = viscosity * (films.size[k, RADIUS] / films.size[k, CLEARANCE]) ** 2
+    unit = viscosity * (films.size[k, col.RADIUS] / films.size[k, col.CLEARANCE]) ** 2
     for cell in range(films.shape[k, 0] * films.shape[k, 1]):
         films.supply[k, cell] = films.inlet[k, cell] / unit
 
@@ -305,3 +261,53 @@ def peak(films, k):
     for cell in range(films.shape[k, 0] * films.shape[k, 1]):
         top = max(top, films.P[k, cell])
     return top
+
+
+@inner
+def factor(band, n, w):
+    """Triangular factors of n rows of half width w in place; columns are diagonally dominant."""
+    for k in range(n):
+        pivot = 1.0 / band[k, w]
+        for i in range(k + 1, min(n, k + w + 1)):
+            l = band[i, w + k - i] * pivot
+            if l != 0.0:
+                band[i, w + k - i] = l
+                start = w + k - i
+                for m in range(1, w + 1):
+                    band[i, start + m] -= l * band[k, w + m]
+
+
+@inner
+def back_substitute(band, w, x):
+    """Solve with the factors, in place."""
+    n = x.size
+    for i in range(n):
+        total = x[i]
+        for k in range(max(0, i - w), i):
+            total -= band[i, w + k - i] * x[k]
+        x[i] = total
+    for i in range(n - 1, -1, -1):
+        total = x[i]
+        for k in range(i + 1, min(n, i + w + 1)):
+            total -= band[i, w + k - i] * x[k]
+        x[i] = total / band[i, w]
+
+
+@inner
+def back_substitute_transposed(band, n, w, X):
+    """Solve with the transposed factors for all columns of X, in place."""
+    for i in range(n):
+        pivot = 1.0 / band[i, w]
+        for m in range(X.shape[1]):
+            X[i, m] *= pivot
+        for k in range(i + 1, min(n, i + w + 1)):
+            u = band[i, w + k - i]
+            if u != 0.0:
+                for m in range(X.shape[1]):
+                    X[k, m] -= u * X[i, m]
+    for i in range(n - 1, -1, -1):
+        for k in range(max(0, i - w), i):
+            l = band[i, w + k - i]
+            if l != 0.0:
+                for m in range(X.shape[1]):
+                    X[k, m] -= l * X[i, m]

@@ -5,38 +5,32 @@ give y = A^-T g, and the derivative by anything is y times that of b - A u. One 
 serves all motions, rates, the spin and the openings of single cells.
 """
 
-from rom.components.journal_bearing.films.band import back_substitute_transposed
+from rom.components.journal_bearing.films import cells as col
 from rom.components.journal_bearing.films.bearing import JFO
 from rom.components.journal_bearing.films.cells import (
-    BEHIND_FACE,
-    FIRST_OPENED,
-    IMAGES,
-    N_ANSWERS,
-    N_MOTIONS,
-    SPIN_COLUMN,
-    Z_FIRST,
-)
-from rom.components.journal_bearing.films.pressure import (
-    at_side,
     cell_size,
     column_after,
     column_before,
+    per_motion,
+)
+from rom.components.journal_bearing.films.pressure import (
+    at_side,
+    back_substitute_transposed,
     find_pressure,
     has_memory,
     order,
-    per_motion,
     set_heights,
     set_supply,
 )
 from rom.mbs.kernels.compiled import inner, kernel
 
-TORQUE_ANSWER = N_MOTIONS  # number of the last answer
+TORQUE_ANSWER = col.N_MOTIONS  # number of the last answer
 
 
 @inner
 def n_motions(films, k):
     """Motions that a film feels: no tilt where half of it is the image of the other half."""
-    return 2 if films.size[k, IMAGES] > 1.0 else N_MOTIONS
+    return 2 if films.size[k, col.IMAGES] > 1.0 else col.N_MOTIONS
 
 
 @inner
@@ -44,20 +38,20 @@ def set_answers(films, k):
     """Forces on motions and functions; torque of sheared oil and of pressure on its slope."""
     nt, nz = films.shape[k]
     dtheta, dZ = cell_size(films, k)
-    width = dZ * films.size[k, IMAGES]
+    width = dZ * films.size[k, col.IMAGES]
     films.answer[k, :] = 0.0
     for i in range(nt):
         for j in range(nz):
-            cell, Z = i * nz + j, films.size[k, Z_FIRST] + (j + 0.5) * dZ
+            cell, Z = i * nz + j, films.size[k, col.Z_FIRST] + (j + 0.5) * dZ
             P, west = films.P[k, cell], column_before(i, nt) * nz + j
             for m in range(n_motions(films, k)):
                 opened = per_motion(films, k, 0, i, Z, m)
                 films.answer[k, m] += width * dtheta * P * opened
             for f in range(films.n_functions[k]):
-                films.answer[k, N_ANSWERS + f] += width * dtheta * P * films.functions[k, cell, f]
-            shear = (
-                films.state[k, SPIN_COLUMN] * films.fill[k, cell] / films.middle[k, cell] * dtheta
-            )
+                opened = films.functions[k, cell, f]
+                films.answer[k, col.N_ANSWERS + f] += width * dtheta * P * opened
+            filled = films.fill[k, cell] / films.middle[k, cell]
+            shear = films.state[k, col.SPIN_COLUMN] * filled * dtheta
             rise = films.behind[k, cell] - films.behind[k, west]
             films.answer[k, TORQUE_ANSWER] += width * (shear - 0.5 * P * rise)
 
@@ -82,7 +76,7 @@ def set_weights(films, k):
     """Set how much the unknown of each cell counts in each answer."""
     nt, nz = films.shape[k]
     dtheta, dZ = cell_size(films, k)
-    width = dZ * films.size[k, IMAGES]
+    width = dZ * films.size[k, col.IMAGES]
     for i in range(nt):
         for j in range(nz):
             cell, row = i * nz + j, films.place[k, i] * nz + j
@@ -90,16 +84,16 @@ def set_weights(films, k):
             if films.fixed[k, cell] == 1:
                 continue
             if films.active[k, cell] == 1:
-                Z, west = films.size[k, Z_FIRST] + (j + 0.5) * dZ, column_before(i, nt) * nz + j
+                Z, west = films.size[k, col.Z_FIRST] + (j + 0.5) * dZ, column_before(i, nt) * nz + j
                 for m in range(n_motions(films, k)):
                     films.weight[k, row, m] = width * dtheta * per_motion(films, k, 0, i, Z, m)
                 for f in range(films.n_functions[k]):
                     opened = films.functions[k, cell, f]
-                    films.weight[k, row, N_ANSWERS + f] = width * dtheta * opened
+                    films.weight[k, row, col.N_ANSWERS + f] = width * dtheta * opened
                 rise = films.behind[k, cell] - films.behind[k, west]
                 films.weight[k, row, TORQUE_ANSWER] = -0.5 * width * rise
             elif films.law[k] == JFO:
-                shear = films.state[k, SPIN_COLUMN] * dtheta / films.middle[k, cell]
+                shear = films.state[k, col.SPIN_COLUMN] * dtheta / films.middle[k, cell]
                 films.weight[k, row, TORQUE_ANSWER] = width * shear
 
 
@@ -108,19 +102,19 @@ def add_shear_slopes(films, k, i, j):
     """What the torque of a cell changes while its pressure and filling stay."""
     nt, nz = films.shape[k]
     dtheta, dZ = cell_size(films, k)
-    cell, Z = i * nz + j, films.size[k, Z_FIRST] + (j + 0.5) * dZ
-    width, h = dZ * films.size[k, IMAGES], films.middle[k, cell]
+    cell, Z = i * nz + j, films.size[k, col.Z_FIRST] + (j + 0.5) * dZ
+    width, h = dZ * films.size[k, col.IMAGES], films.middle[k, cell]
     shear = width * dtheta * films.fill[k, cell] / h
-    films.slope[k, TORQUE_ANSWER, SPIN_COLUMN] += shear
-    thinner, slanted = shear * films.state[k, SPIN_COLUMN] / h, 0.5 * width * films.P[k, cell]
+    films.slope[k, TORQUE_ANSWER, col.SPIN_COLUMN] += shear
+    thinner, slanted = shear * films.state[k, col.SPIN_COLUMN] / h, 0.5 * width * films.P[k, cell]
     for m in range(n_motions(films, k)):
-        rise = per_motion(films, k, BEHIND_FACE, i, Z, m)
-        rise -= per_motion(films, k, BEHIND_FACE, column_before(i, nt), Z, m)
+        rise = per_motion(films, k, col.BEHIND_FACE, i, Z, m)
+        rise -= per_motion(films, k, col.BEHIND_FACE, column_before(i, nt), Z, m)
         opened = per_motion(films, k, 0, i, Z, m)
         films.slope[k, TORQUE_ANSWER, m] -= thinner * opened + slanted * rise
     east, west = column_after(i, nt) * nz + j, column_before(i, nt) * nz + j
     for f in range(films.n_functions[k]):
-        opened, g = films.functions[k, :, f], FIRST_OPENED + f
+        opened, g = films.functions[k, :, f], col.FIRST_OPENED + f
         rise = 0.5 * (opened[east] - opened[west])
         films.slope[k, TORQUE_ANSWER, g] -= thinner * opened[cell] + slanted * rise
 
@@ -128,7 +122,7 @@ def add_shear_slopes(films, k, i, j):
 @inner
 def carried(films, k, west, east):
     """Filling of what the journal drags from the cell west of a face to that east of it."""
-    return films.fill[k, west] if films.state[k, SPIN_COLUMN] > 0.0 else films.fill[k, east]
+    return films.fill[k, west] if films.state[k, col.SPIN_COLUMN] > 0.0 else films.fill[k, east]
 
 
 @inner
@@ -141,7 +135,7 @@ def balance_slopes(films, k, i, j):
     """
     nt, nz = films.shape[k]
     dtheta, dZ = cell_size(films, k)
-    cell, P, spin = i * nz + j, films.P[k, i * nz + j], films.state[k, SPIN_COLUMN]
+    cell, P, spin = i * nz + j, films.P[k, i * nz + j], films.state[k, col.SPIN_COLUMN]
     east, west = column_after(i, nt) * nz + j, column_before(i, nt) * nz + j
     h, h_west = films.behind[k, cell], films.behind[k, west]
     away, into = 6 * dZ * carried(films, k, cell, east), 6 * dZ * carried(films, k, west, cell)
@@ -171,16 +165,17 @@ def add_cell_slopes(films, k, i, j):
     """Add the weights of a cell times the change of its balance."""
     nt, nz = films.shape[k]
     dZ = cell_size(films, k)[1]
-    row, cell, Z = films.place[k, i] * nz + j, i * nz + j, films.size[k, Z_FIRST] + (j + 0.5) * dZ
+    row, cell = films.place[k, i] * nz + j, i * nz + j
+    Z = films.size[k, col.Z_FIRST] + (j + 0.5) * dZ
     by_film, by_rate, by_spin = balance_slopes(films, k, i, j)
     by_east, by_west, by_middle, low, high = by_film
     for m in range(n_motions(films, k)):
         opened = per_motion(films, k, 0, i, Z, m)
-        change = by_east * per_motion(films, k, BEHIND_FACE, i, Z, m) + by_middle * opened
-        change += by_west * per_motion(films, k, BEHIND_FACE, column_before(i, nt), Z, m)
+        change = by_east * per_motion(films, k, col.BEHIND_FACE, i, Z, m) + by_middle * opened
+        change += by_west * per_motion(films, k, col.BEHIND_FACE, column_before(i, nt), Z, m)
         change += low * per_motion(films, k, 0, i, Z - 0.5 * dZ, m)
         change += high * per_motion(films, k, 0, i, Z + 0.5 * dZ, m)
-        films.change[k, m], films.change[k, N_MOTIONS + m] = change, by_rate * opened
+        films.change[k, m], films.change[k, col.N_MOTIONS + m] = change, by_rate * opened
     east, west = column_after(i, nt) * nz + j, column_before(i, nt) * nz + j
     column = films.functions[k, i * nz : (i + 1) * nz]
     for f in range(films.n_functions[k]):
@@ -188,16 +183,16 @@ def add_cell_slopes(films, k, i, j):
         change = 0.5 * (by_east * (opened + g[east]) + by_west * (opened + g[west]))
         change += by_middle * opened
         change += low * at_side(nz, j, column[:, f]) + high * at_side(nz, j + 1, column[:, f])
-        films.change[k, FIRST_OPENED + f] = change
-        films.change[k, FIRST_OPENED + films.functions.shape[2] + f] = by_rate * opened
-    films.change[k, SPIN_COLUMN] = by_spin
+        films.change[k, col.FIRST_OPENED + f] = change
+        films.change[k, col.FIRST_OPENED + films.functions.shape[2] + f] = by_rate * opened
+    films.change[k, col.SPIN_COLUMN] = by_spin
     add_change(films, k, row)
 
 
 @inner
 def add_change(films, k, row):
     """Subtract the weights of a row times the changes of its balance."""
-    for m in range(N_ANSWERS + films.n_functions[k]):
+    for m in range(col.N_ANSWERS + films.n_functions[k]):
         weight, slope, change = films.weight[k, row, m], films.slope[k, m], films.change[k]
         if weight != 0.0:
             for q in range(change.size):

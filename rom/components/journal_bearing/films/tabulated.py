@@ -58,14 +58,10 @@ def table_of(name: str, bearing: JournalBearing) -> Array:
         "has a bore that is not round": bool((bearing.grid.bore != 1.0).any()),
         "has grooves with pressure": bool(bearing.grid.inlet.any()),
     }
-    for reason, holds in reasons.items():
-        if holds:
-            raise ConfigError(
-                f"bearing {name!r} {reason}: its film has no table of places and directions.",
-                hint="Leave out tabulated.",
-            )
-    D = bearing.diameter / bearing.length
-    grooves = tuple(bearing.grooves)
+    for reason in (reason for reason, holds in reasons.items() if holds):
+        text = f"bearing {name!r} {reason}: its film has no table of places and directions."
+        raise ConfigError(text, hint="Leave out tabulated.")
+    D, grooves = bearing.diameter / bearing.length, tuple(bearing.grooves)
     return _table(replace(bearing, diameter=D, length=1.0, clearance=1e-3 * D, grooves=grooves))
 
 
@@ -133,12 +129,8 @@ def solve_nodes(films, states, values):
 def cubic(x):
     """Weights of the four coefficients around a place, from 0 to 1 between the middle two."""
     y = 1.0 - x
-    return (
-        y * y * y / 6.0,
-        (4.0 - 6.0 * x * x + 3.0 * x * x * x) / 6.0,
-        (4.0 - 6.0 * y * y + 3.0 * y * y * y) / 6.0,
-        x * x * x / 6.0,
-    )
+    near, far = 4.0 - 6.0 * x * x + 3.0 * x * x * x, 4.0 - 6.0 * y * y + 3.0 * y * y * y
+    return y * y * y / 6.0, near / 6.0, far / 6.0, x * x * x / 6.0
 
 
 @inner

@@ -7,12 +7,12 @@ import pytest
 from numpy.testing import assert_allclose
 
 import rom
-from cases.mbs.films import held_rotor
+from cases.mbs.films import SPEED, VISCOSITY, held_rotor, on_ground
 from cases.mbs.mechanisms import prepared, residual_at
 from rom.components.journal_bearing.films.journals import FIRST_CONTENT
 from rom.mbs import Groove, JournalBearing
 
-SPEED, VISCOSITY, C = 100.0, 0.03, 1e-4
+C = 1e-4  # clearance [m]
 
 
 def bearing(grooves, cells=(60, 6), **more):
@@ -47,11 +47,7 @@ def flows(b, motion, P, fill, speed):
 
 def driven_film(b, speed, t, x, y):
     """Contents (n, nt, nz), and what comes in (n - 1, nt, nz), as a journal is led through x, y."""
-    mech = rom.Mechanism(gravity=(0, 0, 0))
-    shaft = mech.add_rigid("shaft", mass=1.0, inertia=(1,) * 3, at=(x[0], y[0], 0))
-    mech.journal_bearing("film", shaft.marker((0, 0, 0)), mech.ground.marker((0, 0, 0)),
-                         axis=(0, 0, 1), bearing=b, oil=VISCOSITY)  # fmt: skip
-    packed, W = prepared(mech)
+    packed, W = prepared(on_ground(b, at=(x[0], y[0], 0), turning=0.0))
     (table,), first = packed.elements.values(), len(packed.places.coordinates)
     q, v, content, into = packed.q.copy(), np.zeros(6), [], []
     for k, now in enumerate(t):

@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import rom
-from cases.mbs.films import NONE, ORIGIN, Pair, held_rotor, resting
+from cases.mbs.films import NONE, ORIGIN, Pair, held_rotor, on_ground, resting
 from cases.mbs.mechanisms import prepared, residual_at, tangents_at
 from rom.components.journal_bearing.films.tabulated import MAX_TILT_SHARE
 from rom.config.mechanism import read_mechanism
@@ -114,10 +114,8 @@ def test_a_full_film_is_that_of_the_cells_up_to_the_last_node():
             known, found = (loads(b, *state, tabulated=t)[0][:2] for t in (False, True))
             assert_allclose(found, known, atol=off * np.linalg.norm(known))
     # the place is stretched by a series near the middle: no step where it ends
-    near, far = (
-        loads(b, np.array([e * CLEARANCE, 0, 0, 0]), np.zeros(4), SPEED, tabulated=True)[0][:2]
-        for e in (0.009999999, 0.010000001)
-    )
+    places = np.outer([0.009999999, 0.010000001], [CLEARANCE, 0, 0, 0])
+    near, far = (loads(b, x, np.zeros(4), SPEED, tabulated=True)[0][:2] for x in places)
     assert_allclose(far, near, atol=5e-6 * np.linalg.norm(near))
 
 
@@ -224,12 +222,8 @@ def test_the_temperature_is_that_of_the_film_that_is_solved():
     ({"elastic_bush": True}, "bush of bearing 'main' bends"),
 ])  # fmt: skip
 def test_films_that_are_more_than_a_table_are_refused(given, words):
-    mech = rom.Mechanism(gravity=ORIGIN)
-    shaft = mech.add_rigid("shaft", mass=1.0, inertia=(0.1,) * 3, at=ORIGIN)
     with pytest.raises(ConfigError, match=words):
-        mech.journal_bearing("main", shaft.marker(ORIGIN), mech.ground.marker(ORIGIN),
-                             axis=(0, 0, 1), oil=OIL, tabulated=True,
-                             **{"bearing": bearing()} | given)  # fmt: skip
+        on_ground(name="main", tabulated=True, **{"bearing": bearing()} | given)
 
 
 FILE = """
@@ -255,11 +249,7 @@ def test_a_file_asks_for_a_table(tmp_path):
     """The same as from Python, for a bearing of twice the size, too; and with its line if not."""
     (tmp_path / "m.toml").write_text(FILE)
     made = read_mechanism(tmp_path / "m.toml").mechanism().journal_bearings["film"]
-    mech = rom.Mechanism(gravity=ORIGIN)
-    shaft = mech.add_rigid("shaft", mass=1.0, inertia=(0.1,) * 3, at=ORIGIN)
-    twice = JournalBearing(0.2, 0.1, 1e-4, SIDES, cells=(60, 4))
-    mech.journal_bearing("film", shaft.marker(ORIGIN), mech.ground.marker(ORIGIN), axis=(0, 0, 1),
-                         bearing=twice, oil=OIL, tabulated=True)  # fmt: skip
+    mech = on_ground(JournalBearing(0.2, 0.1, 1e-4, SIDES, cells=(60, 4)), tabulated=True)
     assert_allclose(made.table, mech.journal_bearings["film"].table, rtol=1e-9, atol=1e-12)
     (tmp_path / "m.toml").write_text(FILE.replace('"reynolds"', '"jfo"'))
     with pytest.raises(ConfigError, match=r"m.toml:7: bearing 'film' conserves its oil"):

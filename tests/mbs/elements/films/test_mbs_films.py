@@ -6,7 +6,17 @@ from numpy.testing import assert_allclose
 from scipy.integrate import quad
 
 import rom
-from cases.mbs.films import MOTION, NONE, ORIGIN, RATE, SPEED, VISCOSITY, Pair, held_rotor
+from cases.mbs.films import (
+    MOTION,
+    NONE,
+    ORIGIN,
+    RATE,
+    SPEED,
+    VISCOSITY,
+    Pair,
+    held_rotor,
+    on_ground,
+)
 from cases.mbs.mechanisms import prepared, random_body, tangents_at
 from cases.mbs.tangents import difference, forces_at, shifted
 from rom.components.journal_bearing import film
@@ -15,7 +25,7 @@ from rom.components.journal_bearing.films.journals import FIRST_CONTENT, KNOWN, 
 from rom.components.journal_bearing.films.slopes import solve_film
 from rom.errors import ConfigError, ModelError, SolverError
 from rom.mbs import Groove, JournalBearing, iso_vg
-from rom.rotation import matrix
+from rom.rotation import exp, matrix
 
 GROOVES = [Groove(1.2, 0.3, 1e5, share=0.7)]
 LAWS = ["none", "reynolds", "jfo"]
@@ -27,9 +37,7 @@ def bearing(law="reynolds", cells=(60, 8), grooves=GROOVES, slender=1.0, **more)
 
 def turned_by(vector):
     """(3, 3) rotation by a vector."""
-    angle = np.linalg.norm(vector)
-    axis = np.asarray(vector) / angle if angle else np.array([0.0, 0.0, 1.0])
-    return matrix([np.cos(angle / 2), *np.sin(angle / 2) * axis])
+    return matrix(exp(np.asarray(vector)))
 
 
 # --- the film of the component, seen from anywhere ---
@@ -142,25 +150,22 @@ def test_a_bush_that_gives_way_is_one_that_is_wider_or_moves():
     """Openings of cells: all alike as a wider bore; their rates as those of a journal."""
     motion = [0.4, 0.3, 0.1, -0.2]
     wider = bearing("jfo", bore=lambda angles: 1.2 + 0 * angles)
-    for found, known in zip(solved(bearing("jfo"), opening=0.2, motion=motion),
-                            solved(wider, motion=motion), strict=True):  # fmt: skip
-        assert_allclose(found, known, rtol=1e-10, atol=1e-10)
     angle = bearing().grid.angle[0]
     rate = np.tile(-(0.3 * angle[:, 0] - 0.2 * angle[:, 1])[:, None], 8)
-    moves = solved(bearing(), motion=motion, rate=[0.3, -0.2, 0, 0])
-    for found, known in zip(solved(bearing(), opening_rate=rate, motion=motion), moves,
-                            strict=True):  # fmt: skip
+    pairs = [(solved(bearing("jfo"), opening=0.2, motion=motion), solved(wider, motion=motion)),
+             (solved(bearing(), opening_rate=rate, motion=motion),
+              solved(bearing(), motion=motion, rate=[0.3, -0.2, 0, 0]))]  # fmt: skip
+    for found, known in (both for pair in pairs for both in zip(*pair, strict=True)):
         assert_allclose(found, known, rtol=1e-10, atol=1e-10)
     # a bump where the film is thin changes the load, one whose cells have no pressure does not
     # of one column: its neighbours see half of it at the faces between
-    bump, grid = np.zeros((60, 8)), bearing().grid
+    bump, grid, h = np.zeros((60, 8)), bearing().grid, {}
     bump[7] = 0.05 * (1 + grid.Z)
-    angle, h = bearing().grid.angle, {}
     films = cells_of([bearing()])
     films.opening[0], films.state[0, :4], films.state[0, SPIN_COLUMN] = bump.ravel(), motion, 1.0
     assert solve_film(films, 0, 1.0) > 0
     for face, cells in ((0, films.middle), (1, films.behind)):
-        c, s, Z = angle[face, :, :1], angle[face, :, 1:], bearing().grid.Z
+        c, s, Z = grid.angle[face, :, :1], grid.angle[face, :, 1:], grid.Z
         h[face] = cells[0].reshape(60, 8) - (1 - (0.4 - 0.2 * Z) * c - (0.3 - 0.1 * Z) * s)
     assert_allclose(h[0][6:9], bump[6:9], atol=1e-14)
     assert_allclose(h[1][5:9], [0 * grid.Z, bump[7] / 2, bump[7] / 2, 0 * grid.Z], atol=1e-14)
@@ -255,16 +260,6 @@ def test_two_bodies_on_a_film_keep_momentum_and_energy():
 
 # --- what is refused ---
 
-GIVEN = {"axis": (0, 0, 1), "bearing": bearing(), "oil": 0.03}
-
-
-def shaft_on_ground(at=ORIGIN, **given):
-    mech = rom.Mechanism(gravity=ORIGIN)
-    shaft = mech.add_rigid("shaft", mass=1.0, inertia=(0.1,) * 3, at=at, omega=(0, 0, 100.0))
-    ends = shaft.marker(ORIGIN), mech.ground.marker(ORIGIN)
-    mech.journal_bearing("mainbearing", *ends, **GIVEN | given)
-    return mech
-
 
 @pytest.mark.parametrize(("given", "words"), [
     ({"at": (1.1e-4, 0, 0)}, "journal .*'mainbearing' touches its bush at the start"),
@@ -282,20 +277,21 @@ def shaft_on_ground(at=ORIGIN, **given):
 ])  # fmt: skip
 def test_what_no_bearing_is_is_refused_by_name(given, words):
     with pytest.raises(ConfigError, match=words):
-        shaft_on_ground(**given)
+        on_ground(bearing(), name="mainbearing", **given)
 
 
 def test_a_body_is_no_bearing_of_itself_and_oil_needs_a_groove():
     mech = rom.Mechanism()
     shaft = mech.add_rigid("shaft", mass=1.0, inertia=(0.1,) * 3, at=ORIGIN)
     with pytest.raises(ConfigError, match="'b' connects body 'shaft' with itself"):
-        mech.journal_bearing("b", *2 * [shaft.marker(ORIGIN)], **GIVEN)
+        mech.journal_bearing("b", *2 * [shaft.marker(ORIGIN)], axis=(0, 0, 1), bearing=bearing(),
+                             oil=0.03)  # fmt: skip
     with pytest.raises(ModelError, match="without a groove has no oil"):
         bearing("jfo", grooves=())
 
 
 def test_a_journal_that_hits_its_bush_is_named_with_the_time():
-    mech = shaft_on_ground(oil=1e-6)
+    mech = on_ground(bearing(), name="mainbearing", oil=1e-6)
     mech.force("blow", mech.parts["shaft"].marker(ORIGIN), (5e3, 0, 0))
     with pytest.raises(SolverError, match=r"at t = 0\.00.*touches its bush in 'mainbearing'"):
         rom.simulate(mech, t_end=0.01, dt=1e-4, progress=False)
@@ -322,10 +318,6 @@ def test_steps_predicted_through_the_bush_are_shortened(more):
 
 
 def test_a_journal_that_is_shot_through_its_bush_is_named():
-    mech = rom.Mechanism(gravity=ORIGIN)
-    shaft = mech.add_rigid("shaft", mass=1.0, inertia=(0.01,) * 3, at=ORIGIN,
-                           velocity=(1e4, 0, 0))  # fmt: skip
-    mech.journal_bearing("mainbearing", shaft.marker(ORIGIN), mech.ground.marker(ORIGIN),
-                         axis=(0, 0, 1), bearing=bearing(), oil=1e-6)  # fmt: skip
+    mech = on_ground(bearing(), name="mainbearing", oil=1e-6, turning=0.0, way=(1e4, 0, 0))
     with pytest.raises(SolverError, match="'mainbearing'"):
         rom.simulate(mech, t_end=1e-3, dt=1e-4)

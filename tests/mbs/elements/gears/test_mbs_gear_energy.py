@@ -6,12 +6,7 @@ from numpy.testing import assert_allclose
 
 import rom
 from cases.mbs.mechanisms import prepared
-from cases.mbs.tangents import (
-    assert_forces_are_the_gradient,
-    by_position,
-    by_velocity,
-    shifted,
-)
+from cases.mbs.tangents import assert_forces_are_the_gradient, by_position, by_velocity, shifted
 from rom.components.gear_mesh import Correction, GearPair, Hertz
 from rom.components.gear_mesh.gears.meshes import GEAR_MESHES_FAMILY
 from rom.components.journal_bearing.films.bearing import Groove, JournalBearing

@@ -10,12 +10,7 @@ import rom
 from cases.gear_unit import PlaneMesh
 from cases.long import few
 from cases.mbs.mechanisms import prepared, residual_at
-from cases.mbs.tangents import (
-    assert_forces_are_the_gradient,
-    by_position,
-    by_velocity,
-    shifted,
-)
+from cases.mbs.tangents import assert_forces_are_the_gradient, by_position, by_velocity, shifted
 from rom.components.gear_mesh import Correction, GearPair, Hertz, Mesh, RackPair, stiffness_table
 from rom.components.gear_mesh.gears.meshes import GEAR_MESHES_FAMILY
 from rom.config.mechanism import read_mechanism
@@ -36,6 +31,13 @@ def free(pair, **more):
     mech.gear_mesh("mesh", *ends, axis=Z, pair=pair, stiffness=K * np.array([0.6, 1.1, 0.7]),
                    entry=0.1, cells=7, **more)  # fmt: skip
     return mech
+
+
+def pressed(packed, W, delta):
+    """The mesh after motions (12,) of pinion and rack."""
+    none = np.zeros(12)
+    residual_at(packed.system, W, shifted(packed, packed.q, delta), none, none, np.zeros(0))
+    return packed.elements[GEAR_MESHES_FAMILY]
 
 
 def placed(packed, pair, back, seed):
@@ -94,11 +96,7 @@ def test_lines_of_a_shifted_pinion_are_where_a_gear_without_end_has_them(back):
     for phase in (0.0, 0.07, 0.14, 0.21):
         loads = []
         for one in (pair, gear):
-            packed, W = prepared(free(one, phase=phase))
-            delta, none = np.zeros(12), np.zeros(12)
-            delta[5] = turn
-            residual_at(packed.system, W, shifted(packed, packed.q, delta), none, none, np.zeros(0))
-            loads.append(packed.elements[GEAR_MESHES_FAMILY].load[0])
+            loads.append(pressed(*prepared(free(one, phase=phase)), turn * np.eye(12)[5]).load[0])
         assert loads[0] == pytest.approx(loads[1], rel=1e-3)
         assert loads[0] > 1e3
 
@@ -106,18 +104,14 @@ def test_lines_of_a_shifted_pinion_are_where_a_gear_without_end_has_them(back):
 def test_a_rack_that_leans_is_felt_however_far_it_has_travelled():
     """Turned by 1e-4 about the line of centres, 2 m from its middle; not by its other end."""
     packed, W = prepared(free(replace(HELICAL, thinning=2e-4)))
-    mesh, none, loads, y = packed.elements[GEAR_MESHES_FAMILY], np.zeros(12), [], 2.0
+    mesh, loads, y = packed.elements[GEAR_MESHES_FAMILY], [], 2.0
     gap = 0.5e-4 * y * np.tan(HELICAL.base_helix)  # half of what it closes, in the plane
     mesh.start[0, 0] = (gap - y * np.cos(HELICAL.alpha)) / HELICAL.rb[0]  # turns before
     for lean in (1e-4, -1e-4):
-        delta = np.zeros(12)
-        delta[7], delta[9] = y, lean
-        residual_at(packed.system, W, shifted(packed, packed.q, delta), none, none, np.zeros(0))
-        loads.append(mesh.load[0])
+        loads.append(pressed(packed, W, y * np.eye(12)[7] + lean * np.eye(12)[9]).load[0])
     depth = gap * np.cos(HELICAL.base_helix)
     assert min(loads) == 0.0
-    line = max(loads) / (K * HELICAL.width * depth)  # of the lines together, over the width
-    assert 0.8 < line < 2.2
+    assert 0.8 < max(loads) / (K * HELICAL.width * depth) < 2.2  # lines together, over the width
 
 
 def test_a_rack_is_a_gear_without_end():
@@ -129,10 +123,8 @@ def test_a_rack_is_a_gear_without_end():
     packed, W = prepared(free(SPUR, phase=0.3))
     table = K * np.array([0.6, 1.1, 0.7])
     wanted = PlaneMesh(gear, table, cells=7)
-    q, delta = np.zeros(12), np.zeros(12)
-    q[5] = delta[5] = 1e-4
-    residual_at(packed.system, W, shifted(packed, packed.q, delta), q * 0, q * 0, np.zeros(0))
-    mesh = packed.elements[GEAR_MESHES_FAMILY]
+    q = 1e-4 * np.eye(12)[5]
+    mesh = pressed(packed, W, q)
     assert W.wrench[mesh.j[0], 1] == pytest.approx(wanted.forces(q, 0.3).force[7], rel=1e-3)
     assert W.wrench[mesh.j[0], 0] == pytest.approx(wanted.forces(q, 0.3).force[6], rel=1e-3)
 

@@ -37,6 +37,7 @@ WRONG = {  # sizes of the pair, keys of the mesh, where the other wheel stands [
     "hand in a ring": ({"teeth": [24, -72], "helix": 0.3, "gear_helix": -0.3}, {}, 0.1,
                        r"in a ring gear they are the same. The gear here needs 17\.19 degrees"),
     "ring smaller than its pinion": ({"teeth": [26, -20]}, {}, 0.01, "no pinion of 26.* turns"),
+    "ring as large as its pinion": ({"teeth": [40, -40]}, {}, 0.01, "no pinion of 40.* turns"),
     "ring as pinion": ({"teeth": [-72, 24]}, {}, 0.1, "no pinion of -72.* teeth"),
     "half a tooth": ({"teeth": [26.5, 40]}, {}, 0.133, "26.5, 40.* teeth, needed are whole"),
     "few teeth": ({"teeth": [3, 40]}, {}, 0.1, r"no gears have \(3.*, 40.*\) teeth"),

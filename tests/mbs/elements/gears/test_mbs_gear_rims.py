@@ -11,13 +11,7 @@ from scipy.sparse.linalg import splu
 
 import rom
 from cases.mbs.mechanisms import prepared, residual_at
-from cases.mbs.tangents import (
-    by_position,
-    by_velocity,
-    energy_gradient,
-    forces_at,
-    shifted,
-)
+from cases.mbs.tangents import by_position, by_velocity, energy_gradient, forces_at, shifted
 from cases.mbs.tubes import tube
 from rom.components.gear_mesh import GearPair, RackPair
 from rom.components.gear_mesh.gears.meshes import GEAR_MESHES_FAMILY
@@ -56,6 +50,16 @@ def driven(functions, phase=PHASE, turned=0.0, **more):
     mech.gear_mesh("mesh", shaft.marker("rim"), gear.marker("middle"), axis=(0, 0, 1), pair=PAIR,
                    **given)  # fmt: skip
     mech.torque("load", gear.marker("middle"), (0, 0, TORQUE))
+    return mech
+
+
+def meshed(body, place="rim", at=(0, 0, 0), pair=PAIR, **more):
+    """A free pinion of a reduced body in mesh with a rigid gear, or rack."""
+    mech = rom.Mechanism(gravity=(0, 0, 0))
+    wheel = mech.add_flexible("pinion", body, at=at)
+    other = mech.add_rigid("gear", mass=1.0, inertia=(1.0,) * 3, at=(pair.distance, 0, 0))
+    mech.gear_mesh("mesh", wheel.marker(place), other.marker((0, 0, 0)), axis=(0, 0, 1), pair=pair,
+                   stiffness=K, **more)  # fmt: skip
     return mech
 
 
@@ -141,9 +145,8 @@ def test_load_across_a_wide_face_converges_to_that_on_a_finite_element_body():
     turned, shares = full()
     assert shares.max() > 1.4 > 0.8 > shares.min()
     errors = []
-    for functions in (rom.FourierLegendre(1, 1), rom.FourierLegendre(2, 2),
-                      rom.FourierLegendre(4, 4), rom.FourierLegendre(8, 6)):  # fmt: skip
-        found, load = rest(driven(functions))
+    for numbers in ((1, 1), (2, 2), (4, 4), (8, 6)):
+        found, load = rest(driven(rom.FourierLegendre(*numbers)))
         errors.append((abs(found / turned - 1), np.abs(load - shares).max()))
     by_turn, by_share = np.array(errors).T
     assert np.all(np.diff(by_turn) < 0)
@@ -231,12 +234,8 @@ def test_a_rack_presses_a_rim_as_a_gear_without_end_does():
     """Forces and torque on the body of the pinion, as by a gear of 1e5 teeth."""
     found = []
     for pair in (RackPair(26, 3e-3, 0.06), GearPair((26, 100_000), 3e-3, 0.06)):
-        mech = rom.Mechanism(gravity=(0, 0, 0))
-        wheel = mech.add_flexible("pinion", reduced(rom.FourierLegendre(2, 2)), at=(0, 0, 0))
-        other = mech.add_rigid("other", mass=1.0, inertia=(1.0,) * 3, at=(pair.distance, 0, 0))
-        mech.gear_mesh("mesh", wheel.marker("rim"), other.marker((0, 0, 0)), axis=(0, 0, 1),
-                       pair=pair, stiffness=K, phase=PHASE, cells=5)  # fmt: skip
-        packed, W = prepared(mech)
+        body = reduced(rom.FourierLegendre(2, 2))
+        packed, W = prepared(meshed(body, pair=pair, phase=PHASE, cells=5))
         delta = np.zeros(packed.v.size)
         r = packed.system.bodies.r[0]
         delta[5], delta[6 : 6 + r] = 3e-4, 1e-9 * np.random.default_rng(3).normal(size=r)
@@ -268,40 +267,21 @@ def test_free_wheels_with_soft_rims_keep_momentum_and_energy():
 
 
 def test_surfaces_that_teeth_cannot_travel_are_named():
-    body = reduced(rom.FourierLegendre(2, 2))
-    mech = rom.Mechanism()
-    shaft = mech.add_flexible("pinion", body, at=(0, 0, 0))
-    gear = mech.add_rigid("gear", mass=1, inertia=(1, 1, 1), at=(PAIR.distance, 0, 0),
-                          markers={"middle": (0, 0, 0)})  # fmt: skip
-    mech.gear_mesh("mesh", shaft.marker("rim"), gear.marker("middle"), axis=(0, 0, 1), pair=PAIR,
-                   stiffness=K)  # fmt: skip
+    mech = meshed(reduced(rom.FourierLegendre(2, 2)))
     with pytest.raises(ConfigError, match=r"no gear mesh 'bearing'; there are \['mesh'\]"):
         rom.mbs.tooth_loads(rom.simulate(mech, t_end=1e-6, dt=1e-6), "bearing")
-
-
-def test_a_flat_interface_is_no_rim():
-    body = rom.reduce(pinion(), method=rom.Guyan(), certify=False, reference="mean-axis",
+    flat = rom.reduce(pinion(), method=rom.Guyan(), certify=False, reference="mean-axis",
                       interfaces={"high": rom.Polynomial(1)})  # fmt: skip
-    mech = rom.Mechanism()
-    shaft = mech.add_flexible("pinion", body, at=(0, 0, -LENGTH / 2))
-    gear = mech.add_rigid("gear", mass=1, inertia=(1, 1, 1), at=(PAIR.distance, 0, 0),
-                          markers={"middle": (0, 0, 0)})  # fmt: skip
     with pytest.raises(ConfigError, match="'high' of 'pinion' is flat across the axis"):
-        mech.gear_mesh("mesh", shaft.marker("high"), gear.marker("middle"), axis=(0, 0, 1),
-                       pair=PAIR, stiffness=K)  # fmt: skip
+        meshed(flat, "high", (0, 0, -LENGTH / 2))
 
 
 def test_functions_that_miss_the_deformation_are_told():
     """All nodes of a rim may move, more than harmonics and polynomials can follow."""
     body = rom.reduce(tube(INNER, RIM, LENGTH, (8, 1, 14)), method=rom.Guyan(), certify=False,
                       interfaces={"rim": "full"}, reference="mean-axis")  # fmt: skip
-    mech = rom.Mechanism()
-    shaft = mech.add_flexible("pinion", body, at=(0, 0, 0))
-    gear = mech.add_rigid("gear", mass=1, inertia=(1, 1, 1), at=(PAIR.distance, 0, 0),
-                          markers={"middle": (0, 0, 0)})  # fmt: skip
     with pytest.warns(RomWarning, match=r"of interface 'rim' of body 'pinion' is in no harmonic"):
-        mech.gear_mesh("mesh", shaft.marker("rim"), gear.marker("middle"), axis=(0, 0, 1),
-                       pair=PAIR, stiffness=K)  # fmt: skip
+        meshed(body)
 
 
 @pytest.mark.fenicsx

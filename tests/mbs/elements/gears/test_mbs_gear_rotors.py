@@ -121,9 +121,8 @@ def machine(solids, stiffness):
                          damping=(OIL, OIL, 0, 0, 0, 0))  # fmt: skip
     wheels = [mech.part(name).marker("middle") for name in ("disc 0 4", "disc 1 0")]
     mech.gear_mesh("teeth", *wheels, axis=z, pair=pair, stiffness=stiffness, entry=0.0)
-    mech.bushing(
-        "drive", mech.ground.marker((0, 0, 0)), places[0][0], stiffness=(0, 0, 0, 0, 0, 100)
-    )
+    twist = (0, 0, 0, 0, 0, 100)
+    mech.bushing("drive", mech.ground.marker((0, 0, 0)), places[0][0], stiffness=twist)
     mech.torque("load", wheels[1], RB[1] / RB[0] * z)
     return mech
 

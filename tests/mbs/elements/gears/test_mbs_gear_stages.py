@@ -47,17 +47,9 @@ def train():
             ends = mech.ground.marker(at + z * Z), shaft.marker(f"bearing {k}")
             mech.bushing(f"{name} {k}", *ends, stiffness=(*BEARING, 0, 0, 0))
     for name, pair, phase, axis, pinion, gear in MESHES:
-        mech.gear_mesh(
-            name,
-            mech.part(pinion).marker(name),
-            mech.part(gear).marker(name),
-            axis=axis,
-            pair=pair,
-            stiffness=K,
-            phase=phase,
-            entry=0.0,
-            cells=40,
-        )
+        ends = (mech.part(shaft).marker(name) for shaft in (pinion, gear))
+        mech.gear_mesh(name, *ends, axis=axis, pair=pair, stiffness=K, phase=phase, entry=0.0,
+                       cells=40)  # fmt: skip
     mech.bushing("coupling", mech.ground.marker((0, 0, 0)), mech.part("input").marker((0, 0, 0)),
                  stiffness=(0, 0, 0, 0, 0, COUPLING))  # fmt: skip
     mech.torque("load", mech.part("output").marker("two"), (0, 0, -RATIO * TORQUE))
