@@ -80,9 +80,8 @@ def test_no_name_ends_an_element(body, tmp_path):
     path = written(tmp_path, viewer.modes(body))
     assert NAME in read(path).text
     assert "b" not in elements(path).tags
-    assert path.read_text().count("</script>") == len(
-        [tag for tag, *_ in elements(path).found if tag == "script"]
-    )
+    scripts = [tag for tag, *_ in elements(path).found if tag == "script"]
+    assert path.read_text().count("</script>") == len(scripts)
 
 
 def test_arrays_that_two_figures_share_are_sent_once(body, tmp_path):

@@ -170,11 +170,11 @@ def test_pressures_are_those_of_the_oil_of_each_film():
 
 def test_walls_around_aligned_journals_have_the_pressure_in_the_middle():
     unit = rigid_unit()
-    rotors = [
-        replace(r, bearings={k: replace(b, aligned=True) for k, b in r.bearings.items()})
-        for r in (unit.pinion, unit.gear)
-    ]
-    mech = as_mechanism(replace(unit, pinion=rotors[0], gear=rotors[1]))
+    for name in ("pinion", "gear"):
+        rotor = getattr(unit, name)
+        aligned = {k: replace(b, aligned=True) for k, b in rotor.bearings.items()}
+        unit = replace(unit, **{name: replace(rotor, bearings=aligned)})
+    mech = as_mechanism(unit)
     sol = rom.mbs.snapshot(mech, rom.equilibrium(mech))
     foot, top = np.split(view.film_wall(sol, "pinion low", scale=1e-8)[0], 2)
     highest = rom.mbs.film_pressures(sol, "pinion low")[0].max()
@@ -195,15 +195,13 @@ def test_walls_in_a_ring_stand_where_its_pinion_is_nearest():
     pair, z = GearPair((24, -60), 3e-3, 0.02), (0, 0, 1)
     mech = rom.Mechanism(gravity=(0, 0, 0))
     turned = abs(pair.distance)
+    ends, solid = [], {"mass": 1.0, "inertia": (0.01,) * 3, "markers": {"middle": (0, 0, 0)}}
     for name, at in (("pinion", (turned, 0, 0)), ("ring", (0, 0, 0))):
-        part = mech.add_rigid(name, mass=1.0, inertia=(0.01,) * 3, at=at,
-                              markers={"middle": (0, 0, 0)})  # fmt: skip
-        join = mech.revolute if name == "pinion" else mech.fixed
-        axis = {"axis": z} if name == "pinion" else {}
-        join(f"of {name}", mech.ground.marker(at), part.marker("middle"), **axis)
-    ends = [mech.part(name).marker("middle") for name in ("pinion", "ring")]
+        ends.append(mech.add_rigid(name, at=at, **solid).marker("middle"))
+    mech.revolute("of pinion", mech.ground.marker((turned, 0, 0)), ends[0], axis=z)
+    mech.fixed("of ring", mech.ground.marker((0, 0, 0)), ends[1])
     mech.gear_mesh("mesh", *ends, axis=z, pair=pair, stiffness=1e10)
-    mech.torque("drive", mech.part("pinion").marker("middle"), (0, 0, 10.0))
+    mech.torque("drive", ends[0], (0, 0, 10.0))
     sol = rom.mbs.snapshot(mech, rom.equilibrium(mech))
     points = view.tooth_walls(sol, "mesh", scale=1e-12, direction=z)[0]
     assert (points[:, 0] > turned).all()

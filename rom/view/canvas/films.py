@@ -14,8 +14,7 @@ from rom.errors import ConfigError, ResourceError
 from rom.io.files import write_whole
 from rom.names import ORIGIN_MARK
 from rom.process.child import run, scratch
-from rom.view.canvas.offscreen import Image, require
-from rom.view.canvas.page import checked
+from rom.view.canvas.offscreen import Image, checked, require
 
 ENDINGS = (".gif", ".mp4")
 ENCODER_PROGRAM = "ffmpeg"

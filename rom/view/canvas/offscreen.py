@@ -1,4 +1,7 @@
-"""Draws scenes in a child process, because VTK does not live together with dolfinx."""
+"""Draws scenes in a child process, because VTK does not live together with dolfinx.
+
+With what all pictures need: packages, a look, and a place to be written.
+"""
 
 import json
 from collections.abc import Sequence
@@ -10,15 +13,19 @@ import numpy as np
 import numpy.typing as npt
 
 from rom.errors import ConfigError, ResourceError
+from rom.io.files import check_writable
 from rom.process.child import Ended, python, run, scratch
 from rom.process.progress import followed
 from rom.view.canvas.draw import COUNT_FILE
-from rom.view.canvas.scene import Actor, Camera
+from rom.view.canvas.scene import TEXT_COLOUR, Actor, Camera
 
 Image = npt.NDArray[np.uint8]
 COLOUR_MAP = "viridis"
 OVERSAMPLING = 2  # smooth edges on every driver
 INSTALL_COMMAND = "pip install 'fenicsx-rom[view]'"
+PAGE_STYLE = {"font.family": "DejaVu Sans", "axes.edgecolor": "#5c636e", "axes.linewidth": 0.8} | {
+    key: TEXT_COLOUR for key in ("text.color", "axes.labelcolor", "xtick.color", "ytick.color")
+}
 
 
 def render(
@@ -51,6 +58,23 @@ def require(package: str) -> None:
     if find_spec(package) is None:
         what = f"pictures need {package}, which is not installed."
         raise ResourceError(what, hint=f"{INSTALL_COMMAND}.")
+
+
+def styled() -> Any:
+    """Context in which axes and words get the look of the house."""
+    require("matplotlib")
+    from matplotlib import rc_context
+
+    return rc_context(PAGE_STYLE)
+
+
+def checked(path: str | Path, *endings: str) -> Path:
+    """The path, if pictures of that ending are made and it can be written."""
+    path = check_writable(path)
+    if path.suffix.lower() not in endings:
+        known = " or ".join(endings)
+        raise ConfigError(f"{path}: the ending {path.suffix!r} is unknown.", hint=f"Use {known}.")
+    return path
 
 
 def write_scene(

@@ -1,7 +1,4 @@
-"""Sheets of paper: pictures, words and colour bars, laid out in pixels from the top left.
-
-How they look, and where they may be written.
-"""
+"""Sheets of paper: pictures, words and colour bars, laid out in pixels from the top left."""
 
 import textwrap
 from collections.abc import Sequence
@@ -12,8 +9,8 @@ import numpy as np
 
 from rom.arguments import shortened
 from rom.errors import ConfigError
-from rom.io.files import check_writable
-from rom.view.canvas.offscreen import COLOUR_MAP, Image, require
+from rom.view.canvas.offscreen import COLOUR_MAP, Image, checked, require
+from rom.view.canvas.offscreen import styled as styled
 from rom.view.canvas.scene import TEXT_COLOUR
 
 if TYPE_CHECKING:
@@ -27,26 +24,6 @@ LINE_HEIGHT = 26  # of small text [pixel]
 LETTER_WIDTH = 0.545 * SMALL_SIZE * DPI / 72  # of small text, on the average [pixel]
 TICK_WIDTH = 45  # of a tick below a colour bar, with its number [pixel]
 HANDLE_WIDTH, ROW_HEIGHT = 80, 27  # of a legend: beside its names, and of a row [pixel]
-PAGE_STYLE = {"font.family": "DejaVu Sans", "axes.edgecolor": "#5c636e", "axes.linewidth": 0.8} | {
-    key: TEXT_COLOUR for key in ("text.color", "axes.labelcolor", "xtick.color", "ytick.color")
-}
-
-
-def styled() -> Any:
-    """Context in which axes and words get the look of the house."""
-    require("matplotlib")
-    from matplotlib import rc_context
-
-    return rc_context(PAGE_STYLE)
-
-
-def checked(path: str | Path, *endings: str) -> Path:
-    """The path, if pictures of that ending are made and it can be written."""
-    path = check_writable(path)
-    if path.suffix.lower() not in endings:
-        known = " or ".join(endings)
-        raise ConfigError(f"{path}: the ending {path.suffix!r} is unknown.", hint=f"Use {known}.")
-    return path
 
 
 def sheet(width: int, height: int) -> "Picture":

@@ -10,7 +10,7 @@ from matplotlib.ticker import Formatter, MaxNLocator
 
 from rom.errors import ConfigError
 from rom.io.files import write_whole
-from rom.view.canvas.page import checked, styled
+from rom.view.canvas.offscreen import checked, styled
 
 
 class Picture(Figure):

@@ -12,7 +12,7 @@ from rom.errors import ConfigError
 from rom.io.fields.gltf import MovingMesh, write_glb
 from rom.io.fields.vtkhdf import write_vtkhdf
 from rom.model import Array
-from rom.view.canvas.page import checked
+from rom.view.canvas.offscreen import checked
 from rom.view.canvas.solids import Mesh
 from rom.view.scenes.film import shades_of, upright
 from rom.view.scenes.places import evenly, placed

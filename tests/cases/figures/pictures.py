@@ -10,6 +10,7 @@
 - axes without a name, but those of sketches, colour bars and things in space.
 """
 
+from collections.abc import Sequence
 from itertools import combinations, groupby
 from typing import Any
 
@@ -249,9 +250,9 @@ def written_in(figure: Figure) -> list[Text]:
     return written
 
 
-def crowded(figure: Figure) -> list[str]:
-    """Words that leave the page or lie on each other."""
-    boxes = [(text, _extent(text)) for text in written_in(figure)]
+def crowded(figure: Figure, more: Sequence[Text] = ()) -> list[str]:
+    """Words, and more of them, that leave the page or lie on each other."""
+    boxes = [(text, _extent(text)) for text in (*written_in(figure), *more)]
     page = figure.bbox.padded(SLACK)
     away = (text.get_text() for text, box in boxes if not _within(box, page))
     found = [f"{words!r} leaves the page" for words in away]
