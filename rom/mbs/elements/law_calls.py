@@ -24,6 +24,7 @@ ENERGY_SIZE = 2  # stored energy, lost power
 DIFFERENCE_STEP = 1e-6
 # as numba.cfunc takes it
 LAW_TYPES = "void(f8, CPointer(f8), CPointer(f8), CPointer(f8), CPointer(f8))"
+PAIR_TEXT = "two vectors of three numbers: force and moment"
 
 
 class Motion(NamedTuple):
@@ -140,9 +141,6 @@ def compiled_entry(function: Any, types: str) -> Any:
     """A function of C, compiled of one of a module and kept; it makes arrays of pointers."""
     options = {name: value for name, value in OPTIONS.items() if name != "cache"} | {"_nrt": True}
     return c_function(function, types, options)
-
-
-PAIR_TEXT = "two vectors of three numbers: force and moment"
 
 
 @dataclass(frozen=True, slots=True)

@@ -23,6 +23,15 @@ from rom.mbs.equations.graph import elimination_order
 from rom.mbs.equations.packing import Packed
 from rom.model import Array, Index
 
+# what a constraint that repeats others may give way, of what the stiffest one does: the motion
+# keeps all digits but those that differences of such constraints have lost before
+COMPLIANCE_RTOL = 1e-12
+N_REFINEMENTS = 2
+# of entries of A by what an elimination leaves behind: stiffness, which is definite, never waits
+MAX_GROWTH = 10.0
+# pivot that counts as zero where nothing is left to wait for, of the largest entry beside it
+ZERO_RTOL = 1e-15
+
 
 class Pattern:
     """Where the entries of the matrices of a mechanism stand, in `Work` and in sparse matrices.
@@ -94,12 +103,6 @@ def _families(graph: Any, n_bodies: int) -> list[Index]:
     return [np.flatnonzero(family == k) for k in range(family.max() + 1)]
 
 
-# what a constraint that repeats others may give way, of what the stiffest one does: the motion
-# keeps all digits but those that differences of such constraints have lost before
-COMPLIANCE_RTOL = 1e-12
-N_REFINEMENTS = 2
-
-
 class Constrained:
     """The factorised equations.
 
@@ -162,12 +165,6 @@ def unit_rows(G: csr_matrix) -> tuple[csr_matrix, Array]:
     length = np.sqrt(np.asarray(G.multiply(G).sum(axis=1)).ravel())
     length[length == 0.0] = 1.0
     return diags(1 / length) @ G, length
-
-
-# of entries of A by what an elimination leaves behind: stiffness, which is definite, never waits
-MAX_GROWTH = 10.0
-# pivot that counts as zero where nothing is left to wait for, of the largest entry beside it
-ZERO_RTOL = 1e-15
 
 
 class Signature(NamedTuple):

@@ -1,4 +1,8 @@
-"""Functions of time that a user prescribes, sampled for compiled code."""
+"""Functions of time that a user prescribes, sampled for compiled code, and where they jump.
+
+No mass follows a jump, and no step is short enough to see it: it is what halving an interval does
+not make smaller; fast but smooth motion does get smaller.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -21,8 +25,6 @@ BACKWARD_WEIGHTS = np.array([[3.0, -16.0, 36.0, -48.0, 25.0], [11.0, -56.0, 114.
 # weights of f(t - 2 s), ... f(t + 2 s), fourth order
 CENTRAL_WEIGHTS = np.array([[1.0, -8.0, 0.0, 8.0, -1.0], [-1.0, 16.0, -30.0, 16.0, -1.0]])
 NO_SAMPLES = np.zeros((0, 0, 3))
-
-
 MAX_INTERVALS = 4096  # in one pass
 FEW_INTERVALS = 8  # at least
 N_SUSPECTS = 4  # sharpest places that are looked at closely

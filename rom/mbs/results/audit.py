@@ -23,6 +23,11 @@ QUATERNION_ATOL = 1e-12
 MOMENTUM_RTOL = 1e-5  # a second-order method conserves it to the error of its steps, not exactly
 MAX_MEAN_CORRECTIONS = 8.0
 CERTIFIED_RTOL = 1e-6  # of energy on the very edge of a range
+# of the size of the body: beyond a tenth, linear elasticity is no longer to be trusted
+MAX_DEFORMATION = 0.1
+MAX_PRESSURE = 0.1  # of the load that buckles: a frequency is lower by a twentieth there
+# of an interface against the frame [rad]: there exp(sin x) falls short of the angle x by 1.5 %
+MAX_MARKER_TURN = 0.3
 LOOK_EVERY = 4  # instants, where a run looks at its own motion
 MOTION_ARRAYS = ("t", "q", "v", "a", "lam", "work", "base", "signals")  # a row for each instant
 
@@ -180,13 +185,6 @@ def _limits(solution: Solution, name: str, body: Any) -> list[Row]:
     elif not body.K_geo:
         rows.append(_row(what, share, MAX_PRESSURE))
     return rows
-
-
-# of the size of the body: beyond a tenth, linear elasticity is no longer to be trusted
-MAX_DEFORMATION = 0.1
-MAX_PRESSURE = 0.1  # of the load that buckles: a frequency is lower by a twentieth there
-# of an interface against the frame [rad]: there exp(sin x) falls short of the angle x by 1.5 %
-MAX_MARKER_TURN = 0.3
 
 
 def warn_of_limits(solution: Solution) -> None:

@@ -15,6 +15,13 @@ from rom.io.archive import MAX_BYTES, Kind, read_archive, stated, write_archive
 from rom.model import Array
 from rom.names import named
 
+SCHEMA_NAME, VERSION = "rom-state", (2, 1)
+MEAN_AXES_SINCE = 1  # minor version from which every linear body is counted on its mean axes
+NEEDED_FIELDS = ("q", "v", "a", "lam")
+STATE_KIND = Kind({SCHEMA_NAME: VERSION}, "state file", NEEDED_FIELDS)
+OPTIONAL_FIELDS = ("algorithmic", "base")
+MEMORY_PREFIX = "memory/"
+
 
 @dataclass(frozen=True)
 class Memory:
@@ -92,14 +99,6 @@ def check_state(state: State, packed: Any, *, joints: bool = True) -> None:
             "now are integrated on mean axes, and the two differ by the deformation.",
             hint="Compute the motion up to there again; its file is of an older version.",
         )
-
-
-SCHEMA_NAME, VERSION = "rom-state", (2, 1)
-MEAN_AXES_SINCE = 1  # minor version from which every linear body is counted on its mean axes
-NEEDED_FIELDS = ("q", "v", "a", "lam")
-STATE_KIND = Kind({SCHEMA_NAME: VERSION}, "state file", NEEDED_FIELDS)
-OPTIONAL_FIELDS = ("algorithmic", "base")
-MEMORY_PREFIX = "memory/"
 
 
 @typed

@@ -336,21 +336,21 @@ def spatial_crank():
                            markers={"o": (0, 0, 0), "a": (0.1, 0, 0)})  # fmt: skip
     rod = mech.add_rigid("rod", mass=0.5, inertia=(1e-3, 4e-3, 4e-3), at=(0.25, 0, 0),
                          markers={"a": (-0.15, 0, 0), "b": (0.15, 0, 0)})  # fmt: skip
-    slider = mech.add_rigid("slider", mass=0.4, inertia=(1e-3,) * 3, at=(0.4, 0, 0),
-                            markers={"b": (0, 0, 0)})  # fmt: skip
-    nut = mech.add_rigid("nut", mass=0.3, inertia=(1e-3,) * 3, at=(0.4, 0, 0.2),
-                         markers={"o": (0, 0, 0)})  # fmt: skip
+    slider, nut = (
+        mech.add_rigid(name, mass=m, inertia=(1e-3,) * 3, at=(0.4, 0, z)).marker((0, 0, 0))
+        for name, m, z in (("slider", 0.4, 0.0), ("nut", 0.3, 0.2))
+    )
     o = mech.ground.marker((0, 0, 0))
     mech.revolute("main", o, crank.marker("o"), axis=Z)
     mech.universal("pin", crank.marker("a"), rod.marker("a"), axis1=Z, axis2=Y)
-    mech.spherical("wrist", rod.marker("b"), slider.marker("b"))
-    mech.prismatic("guide", o, slider.marker("b"), axis=X)
-    mech.screw("thread", slider.marker("b"), nut.marker("o"), axis=Z, pitch=0.1)
+    mech.spherical("wrist", rod.marker("b"), slider)
+    mech.prismatic("guide", o, slider, axis=X)
+    mech.screw("thread", slider, nut, axis=Z, pitch=0.1)
     mech.motor("motor", "main", lambda t, angle, rate: 2.0 * (10.0 - rate) + 0.2 * np.sin(5 * t))
     mech.friction("bearing", "main", mu=0.05, radius=0.02, transition_speed=0.5)
     mech.friction("shoes", "guide", mu=0.2, transition_speed=0.2, viscous=0.1, static=1.3,
                   stribeck_speed=0.5)  # fmt: skip
-    mech.bushing("rubber", slider.marker("b"), nut.marker("o"), stiffness=(0, 0, 40.0, 0, 0, 0),
+    mech.bushing("rubber", slider, nut, stiffness=(0, 0, 40.0, 0, 0, 0),
                  damping=(0, 0, 1.0, 0, 0, 0.01))  # fmt: skip
     return mech
 

@@ -1,7 +1,5 @@
 """Closed loops: few and many constraints that repeat or contradict others; states of others."""
 
-import warnings
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -18,6 +16,7 @@ from rom.mbs.integrate.simulation import simulate
 from rom.mbs.mechanism import Mechanism
 from rom.mbs.results.audit import audit
 
+pytestmark = pytest.mark.filterwarnings("ignore:.*constraints repeat others")
 X, Y, Z = np.eye(3)
 # crank, coupler, rocker, distance of the pivots [m]; start angle [rad], speed [rad/s]
 A, B, C, D = 0.1, 0.4, 0.3, 0.35
@@ -200,12 +199,6 @@ def ladder(n, *, repeated=True):
     return mech
 
 
-def quietly(f, *args, **options):
-    with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", message=".*constraints repeat others")
-        return f(*args, **options)
-
-
 @pytest.fixture
 def whole(monkeypatch):
     """Lets mechanisms of any size have whole matrices."""
@@ -225,10 +218,10 @@ METHODS = {
 def test_blocks_move_and_carry_as_whole_matrices(method, whole):
     """Positions, velocities and the reactions of least norm."""
     options = {"t_end": 0.3, **METHODS[method]}
-    blocks = quietly(rom.simulate, ladder(LOOPS), **options)
+    blocks = rom.simulate(ladder(LOOPS), **options)
     assert blocks.packed.by_blocks and blocks.statistics["redundant"] == 3 * LOOPS
     whole()
-    other = quietly(rom.simulate, ladder(LOOPS), **options)
+    other = rom.simulate(ladder(LOOPS), **options)
     assert not other.packed.by_blocks and other.statistics["rank"] == blocks.statistics["rank"]
     where = -1 if method == "steps chosen" else slice(None)
     tolerance = 1e-5 if method == "steps chosen" else 1e-8
@@ -241,7 +234,7 @@ def test_blocks_move_and_carry_as_whole_matrices(method, whole):
 def test_many_loops_move_as_those_that_repeat_nothing():
     """Twenty parallelograms: their planar loads, too."""
     options = {"t_end": 0.5, "dt": 2e-3}
-    repeated = quietly(rom.simulate, ladder(20), **options)
+    repeated = rom.simulate(ladder(20), **options)
     other = rom.simulate(ladder(20, repeated=False), **options)
     assert repeated.statistics["redundant"] == 60 and other.statistics["redundant"] == 0
     last = repeated.position("rung 19")
@@ -251,12 +244,10 @@ def test_many_loops_move_as_those_that_repeat_nothing():
 
 
 def test_statics_and_small_motions_are_those_of_joints_that_repeat_nothing():
-    here, there = (
-        quietly(rom.equilibrium, ladder(20, repeated=repeated)) for repeated in (True, False)
-    )
+    here, there = (rom.equilibrium(ladder(20, repeated=repeated)) for repeated in (True, False))
     assert_allclose(here.q, there.q, atol=1e-9)
     found = [
-        quietly(rom.linearize, ladder(20, repeated=repeated), state, n=4).frequencies
+        rom.linearize(ladder(20, repeated=repeated), state, n=4).frequencies
         for repeated, state in ((True, here), (False, there))
     ]
     assert_allclose(*found, rtol=1e-8)
@@ -283,7 +274,7 @@ def test_a_start_in_line_is_refused(others):
     mech.revolute("c", arm.marker((0.5, 0, 0)), bar.marker((-0.5, 0, 0)), axis=(0, 1, 0))
     mech.revolute("d", far.marker((0.5, 0, 0)), bar.marker((1.5, 0, 0)), axis=(0, 1, 0))
     with pytest.raises(ModelError, match="singular position"):
-        quietly(rom.simulate, mech, t_end=0.1, dt=1e-3)
+        rom.simulate(mech, t_end=0.1, dt=1e-3)
 
 
 def test_joints_that_contradict_each_other_are_named_in_large_mechanisms():
@@ -293,7 +284,7 @@ def test_joints_that_contradict_each_other_are_named_in_large_mechanisms():
     wall = mech.ground.marker((2.0, 0.01, -float(LOOPS)))
     mech.revolute("wall", wall, last.marker((1.5, 0, 0)), axis=(0, 1, 0))
     with pytest.raises(ModelError, match="cannot be assembled"):
-        quietly(rom.simulate, mech, t_end=0.1, dt=1e-3)
+        rom.simulate(mech, t_end=0.1, dt=1e-3)
 
 
 def train(n, slope=0.2, apart=0.0):
@@ -330,9 +321,9 @@ def train(n, slope=0.2, apart=0.0):
 def test_many_wheels_roll_by_blocks_as_by_whole_matrices(whole):
     """Down the slope with g sin(a) (sum of masses) / (sum of masses + J / r^2)."""
     options = {"t_end": 0.2, "dt": 1e-3}
-    blocks = quietly(rom.simulate, train(12), **options)
+    blocks = rom.simulate(train(12), **options)
     whole()
-    other = quietly(rom.simulate, train(12), **options)
+    other = rom.simulate(train(12), **options)
     assert blocks.packed.by_blocks and blocks.statistics["redundant"] > 0
     assert not other.packed.by_blocks and other.statistics["rank"] == blocks.statistics["rank"]
     assert_allclose(blocks.q, other.q, atol=1e-9)
@@ -344,9 +335,9 @@ def test_many_wheels_roll_by_blocks_as_by_whole_matrices(whole):
 
 def test_gaps_of_what_rolls_are_closed_as_by_whole_matrices(whole):
     """Bars given a centimetre beside their axles: bodies come together, wheels may slip for it."""
-    blocks = quietly(rom.simulate, train(12, apart=0.01), t_end=1e-3, dt=1e-3, assemble=True)
+    blocks = rom.simulate(train(12, apart=0.01), t_end=1e-3, dt=1e-3, assemble=True)
     whole()
-    other = quietly(rom.simulate, train(12, apart=0.01), t_end=1e-3, dt=1e-3, assemble=True)
+    other = rom.simulate(train(12, apart=0.01), t_end=1e-3, dt=1e-3, assemble=True)
     assert blocks.packed.by_blocks and not other.packed.by_blocks
     assert np.abs(blocks.position("bar 3")[0] - [3.51, 0, 0.3]).max() > 1e-3
     assert_allclose(blocks.q[0], other.q[0], atol=1e-9)

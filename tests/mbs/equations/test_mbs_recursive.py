@@ -232,11 +232,7 @@ def test_accelerations_and_reactions_are_those_of_whole_matrices(case, solved):
 
 
 def lagrange(n, t_end, speeds):
-    """Angles of n rods of 0.3 m and 0.15 kg that start along x, in minimal coordinates.
-
-    Returns:
-        (n,) angles from the x axis at the end.
-    """
+    """(n,) angles at the end of rods of 0.3 m and 0.15 kg that start along x, by Lagrange."""
     l, m, J = 0.3, 0.15, 1.2e-3
     i = np.arange(n)
     later = n - 1 - np.maximum(i[:, None], i)  # rods that hang on both

@@ -5,6 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from cases.mbs.mechanisms import prepared, random_pose, random_state, simulate_quietly, two_soft
+from cases.mbs.parts import on_axle, on_guide
 from cases.mbs.tangents import GRAVITY, check_tangents, constraint_derivatives
 from rom.errors import ConfigError, ModelError, SolverError
 from rom.mbs.equations.equations import evaluate, linearize_constraints
@@ -77,13 +78,11 @@ def test_constraint_stiffness_is_the_derivative_of_the_constraint_forces(kind):
 def gear_pair(ratio, torque, speed=0.0):
     """Two wheels on parallel axles a metre apart, the first one driven by a torque."""
     mech = Mechanism(gravity=(0, 0, 0))
-    base = mech.ground
     for name, x, J, turns in (("pinion", 0.0, 0.02, 1.0), ("wheel", 1.0, 0.3, ratio)):
-        part = mech.add_rigid(name, mass=1.0, inertia=(J, J, J), at=(x, 0, 0),
-                              omega=(0, 0, turns * speed), markers={"o": (0, 0, 0)})  # fmt: skip
-        mech.revolute(f"axle of {name}", base.marker((x, 0, 0)), part.marker("o"), axis=Z)
+        on_axle(mech, name, inertia=(J, J, J), at=(x, 0, 0), axle=f"axle of {name}",
+                omega=(0, 0, turns * speed))  # fmt: skip
     mech.gear("teeth", "axle of pinion", "axle of wheel", ratio=ratio)
-    mech.torque("engine", mech.parts["pinion"].marker("o"), (0, 0, torque))
+    mech.torque("engine", mech.parts["pinion"].marker((0, 0, 0)), (0, 0, torque))
     return mech
 
 
@@ -126,12 +125,10 @@ def test_a_pinion_drives_its_rack(ratio):
     """Way = ratio times angle: (J + m ratio^2) alpha = T, and the rack is pushed by m a."""
     J, m, torque = 0.02, 3.0, 0.7
     mech = Mechanism(gravity=(0, 0, 0))
-    pinion = mech.add_rigid("pinion", mass=1.0, inertia=(J, J, J), at=(0, 0, 0))
-    rack = mech.add_rigid("rack", mass=m, inertia=(1, 1, 1), at=(0, -0.05, 0))
-    mech.revolute("axle", mech.ground.marker((0, 0, 0)), pinion.marker((0, 0, 0)), axis=Z)
-    mech.prismatic("rail", mech.ground.marker((0, -0.05, 0)), rack.marker((0, 0, 0)), axis=X)
+    pinion = on_axle(mech, "pinion", inertia=(J, J, J))
+    on_guide(mech, "rack", mass=m, at=(0, -0.05, 0), base=(0, -0.05, 0), guide="rail")
     mech.gear("teeth", "axle", "rail", ratio=ratio)
-    mech.torque("engine", pinion.marker((0, 0, 0)), (0, 0, torque))
+    mech.torque("engine", pinion, (0, 0, torque))
     sol = simulate(mech, t_end=1.0, dt=1e-2)
     alpha = torque / (J + m * ratio**2)
     assert_allclose(sol.omega("pinion")[:, 2], alpha * sol.t, rtol=1e-9, atol=1e-9)
@@ -192,24 +189,6 @@ def test_a_planetary_gear_turns_as_willis_says():
     assert_allclose(sol.omega("carrier")[-1, 2], share * sun, rtol=1e-8)
 
 
-def test_a_rod_between_points_is_a_pendulum():
-    """Against the rigid pendulum of a point mass on the same arm, integrated by itself."""
-    from scipy.integrate import solve_ivp
-
-    L, start = 0.7, 2.0
-    mech = Mechanism(gravity=(0, -9.81, 0))
-    bob = mech.add_rigid("bob", mass=1.3, inertia=BALL, markers={"o": (0, 0, 0)},
-                         at=(L * np.sin(start), -L * np.cos(start), 0))  # fmt: skip
-    mech.distance("rod", mech.ground.marker((0, 0, 0)), bob.marker("o"))
-    sol = simulate(mech, t_end=2.0, dt=0.02, method="dop853")
-    angle = solve_ivp(lambda t, y: (y[1], -9.81 / L * np.sin(y[0])), (0, 2), (start, 0.0),
-                      method="DOP853", rtol=1e-12, atol=1e-12, t_eval=sol.t).y[0]  # fmt: skip
-    path = L * np.column_stack([np.sin(angle), -np.cos(angle), 0 * angle])
-    assert_allclose(sol.position("bob"), path, atol=1e-8)
-    pull = np.linalg.norm(sol.reaction("rod")[0, :3])
-    assert_allclose(pull, -1.3 * 9.81 * np.cos(start), rtol=1e-9)
-
-
 @pytest.mark.parametrize("method", ["generalized-alpha", "dop853"])
 @pytest.mark.parametrize(("axis", "J"), [(None, 2 / 5), (Y, 1 / 2)])
 def test_what_rolls_down_a_slope_has_the_acceleration_of_the_closed_form(axis, J, method):
@@ -236,12 +215,10 @@ def test_a_ball_on_a_turntable_circles_with_two_sevenths_of_its_speed(method):
     speed, radius = 3.0, 0.1
     mech = Mechanism(gravity=(0, 0, -9.81))
     J = 0.4 * radius**2
-    table = mech.add_rigid("table", mass=1.0, inertia=(1, 1, 1), at=(0, 0, 0),
-                           markers={"o": (0, 0, 0)})  # fmt: skip
+    table = on_axle(mech, "table", inertia=(1, 1, 1))
     ball = mech.add_rigid("ball", mass=1.0, inertia=(J, J, J), at=(0.5, 0, radius),
-                          markers={"o": (0, 0, 0)}, velocity=(0.2, 0.3, 0))  # fmt: skip
-    mech.revolute("axle", mech.ground.marker((0, 0, 0)), table.marker("o"), axis=Z)
-    mech.rolling("roll", table.marker("o"), ball.marker("o"), normal=Z, radius=radius)
+                          velocity=(0.2, 0.3, 0))  # fmt: skip
+    mech.rolling("roll", table, ball.marker((0, 0, 0)), normal=Z, radius=radius)
     mech.drive("motor", "axle", lambda t: speed * t)
     sol = simulate(mech, t_end=4.0, dt=2e-3, method=method, assemble=True)
     w, v0, x0 = 2 / 7 * speed, sol.velocity("ball")[0], sol.position("ball")[0]
