@@ -18,3 +18,9 @@ def refused(*rows, error=None):
             call()
 
     return test
+
+
+def refuses(error, says, call, *given, **named):
+    """The call is refused by the class of the error, and what its message matches."""
+    with pytest.raises(error, match=says):
+        call(*given, **named)
