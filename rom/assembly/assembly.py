@@ -8,7 +8,6 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from rom.arguments import lowest, one_of, typed, whole
-from rom.assembly.certificate import rows_of_parts
 from rom.assembly.condensed import (
     CondensedAssembly,
     Partition,
@@ -19,12 +18,12 @@ from rom.assembly.condensed import (
     partition,
     per_body,
 )
-from rom.assembly.coupling import coupled_rows
+from rom.assembly.coupling import coupled_rows, rows_of_parts
 from rom.body.flexible import FlexibleBody
 from rom.body.records import Marker, still_motions
 from rom.errors import ConfigError, warn
-from rom.model import Array, Modes, Report, Row
-from rom.names import named, offered
+from rom.model import Array, Modes, Report
+from rom.names import check_known, named
 from rom.rows import N_COMPARED, frequency_rows, row
 
 Place = tuple[str, str]  # body, interface
@@ -114,14 +113,16 @@ class Assembly:
     def _natural(self, fixed: tuple[Place, ...]) -> tuple[Array, Array]:
         """All natural modes, kept for other numbers of them."""
         key = tuple(map(tuple, fixed))
-        if key not in self._found:
+        if key not in self._known:
             (M, K), N = self._matrices(), self._free(fixed)
             omega, V = natural_modes(N.T @ M @ N, N.T @ K @ N, self._n_rigid(fixed))
-            self._found[key] = omega, N @ V
-        return self._found[key]
+            self._known[key] = omega, N @ V
+        found: tuple[Array, Array] = self._known[key]
+        return found
 
     @cached_property
-    def _found(self) -> dict[Any, tuple[Array, Array]]:
+    def _known(self) -> dict[Any, Any]:
+        """Natural modes by what is held, and interface motions by body and what is held."""
         return {}
 
     def conditions(self, fixed: tuple[Place, ...] = ()) -> Array:
@@ -162,13 +163,12 @@ class Assembly:
         one_of("level", level, ("system", "local"))
         if not self.couplings:
             raise ConfigError("nothing is coupled: interfaces to reduce need couplings.")
-        (M, K), H = self._matrices(), self._interfaces()
-        parts = self._partition(None, fixed)
+        (M, K), parts = self._matrices(), self._partition(None, fixed)
         if level == "system":
             whole("n_interface", n_interface, 1, parts.lam.size, reason=AT_MOST)
             W = parts.chi[:, : enough(parts.lam, n_interface, "interfaces of the assembly")]
         else:
-            W = joint_functions(H @ parts.C, self._traces(n_interface, fixed))
+            W = joint_functions(self._interfaces() @ parts.C, self._traces(n_interface, fixed))
         basis = np.hstack([parts.C @ W, parts.F])
         M, K = basis.T @ M @ basis, basis.T @ K @ basis
         n, n_rigid = W.shape[1], self._n_rigid(fixed)
@@ -188,16 +188,12 @@ class Assembly:
     def certificate(self) -> Report:
         """The certificates of the bodies, and whether couplings close in the lowest modes."""
         rows = rows_of_parts(self.bodies)
-        return Report("certificate of the assembly", (*rows, *self._gap_row()))
-
-    def _gap_row(self) -> list[Row]:
-        """Largest gap of the coupled coordinates over their motion, in the lowest elastic modes."""
-        if not self.couplings:
-            return []
-        V = self._natural(())[1][:, self._n_rigid(()) :][:, :N_COMPARED]
-        sides = [np.abs(self._placed(term[:1]) @ V).max() for term in self._coupled]
-        gap = np.abs(self.conditions(()) @ V).max()
-        return [row("gap of coupled interfaces, over their motion", gap / max(sides), GAP_RTOL)]
+        if self.couplings:  # in the lowest elastic modes
+            V = self._natural(())[1][:, self._n_rigid(()) :][:, :N_COMPARED]
+            sides = [np.abs(self._placed(term[:1]) @ V).max() for term in self._coupled]
+            gap = np.abs(self.conditions(()) @ V).max() / max(sides)
+            rows.append(row("gap of coupled interfaces, over their motion", gap, GAP_RTOL))
+        return Report("certificate of the assembly", tuple(rows))
 
     def _traces(self, n: int, fixed: tuple[Place, ...]) -> list[list[Array]]:
         """Per coupling, the interface motions that the modes of its two bodies ask for."""
@@ -221,8 +217,8 @@ class Assembly:
 
     def _partition(self, name: str | None, fixed: tuple[Place, ...]) -> Partition:
         """Interface motions of one body, or of the whole; kept for other numbers of functions."""
-        key = (name, tuple(map(tuple, fixed)))
-        if key not in self._partitions:
+        key = (name, tuple(map(tuple, fixed)), "partition")
+        if key not in self._known:
             if name is None:
                 N, H, matrices = self._free(fixed), self._interfaces(), self._matrices()
             else:
@@ -230,12 +226,9 @@ class Assembly:
                 body, held = self.bodies[name], [self._marker(place).hold for place in fixed]
                 N = still_motions(np.vstack([np.zeros((0, 6 + body.n_modes)), *held]))
                 H, matrices = np.vstack([*self._rows_of(name).values()]), body.full_matrices()
-            self._partitions[key] = partition(*matrices, N, H, self._n_rigid(fixed))
-        return self._partitions[key]
-
-    @cached_property
-    def _partitions(self) -> dict[Any, Partition]:
-        return {}
+            self._known[key] = partition(*matrices, N, H, self._n_rigid(fixed))
+        found: Partition = self._known[key]
+        return found
 
     def _interfaces(self) -> Array:
         """(h, n) coordinates of all coupled interfaces."""
@@ -269,27 +262,26 @@ class Assembly:
 
     def _marker(self, place: Place) -> Marker:
         body, interface = place
-        if body not in self.bodies:
-            raise ConfigError(f"no body {body!r}; the assembly has {offered(self.bodies, body)}.")
+        check_known(body, self.bodies, f"no body {body!r}; the assembly has")
         return self.bodies[body].marker(interface)
 
     def _free(self, fixed: tuple[Place, ...]) -> Array:
         """(n, m) motions of all bodies that satisfy couplings and supports."""
         size = max(body.size for body in self.bodies.values())
-        scale = np.concatenate(
-            [np.r_[np.ones(3), np.full(3, 1 / size), np.ones(b.n_modes)]
-             for b in self.bodies.values()]
-        )  # fmt: skip
+        scales = (
+            np.r_[np.ones(3), np.full(3, 1 / size), np.ones(b.n_modes)]
+            for b in self.bodies.values()
+        )
+        scale = np.concatenate(list(scales))
         return scale[:, None] * still_motions(self.conditions(fixed) * scale)
 
     def _placed(self, term: tuple[tuple[Place, Array, float], ...]) -> Array:
         """(c, n) sum of rows, each at the columns of its body."""
         widths = self._widths()
-        starts = dict(zip(widths, np.cumsum([0, *widths.values()])[:-1], strict=True))
         block = np.zeros((term[0][1].shape[0], sum(widths.values())))
+        columns = per_body(widths, block.T)  # views of it
         for place, rows, sign in term:
-            start = starts[place[0]]
-            block[:, start : start + rows.shape[1]] += sign * rows
+            columns[place[0]][:] += sign * rows.T
         return block
 
     def _n_rigid(self, fixed: tuple[Place, ...]) -> int:

@@ -102,14 +102,9 @@ def per_body(widths: dict[str, int], shapes: Array) -> dict[str, Array]:
 
 
 def partition(M: Array, K: Array, N: Array, H: Array, n_rigid: int) -> Partition:
-    """Split the motions N by whether they move the interface coordinates H.
+    """Split motions N (n, m) by whether they move the interface coordinates H (h, n).
 
-    Args:
-        M: (n, n) mass.
-        K: (n, n) stiffness.
-        N: (n, m) motions that satisfy the supports.
-        H: (h, n) coordinates of the interfaces.
-        n_rigid: rigid motions in N.
+    N satisfies the supports, and has so many rigid motions.
     """
     N = N / np.sqrt(np.einsum("ij,ij->j", N, M @ N))
     rows = H @ N
@@ -137,43 +132,31 @@ def enough(lam: Array, n: int, where: str) -> int:
 
 
 def local_traces(parts: Partition, n: int, rows: list[Array], where: str) -> list[Array]:
-    """Interface motions of the lowest characteristic constraint modes of one component.
+    """Interface motions of the n lowest characteristic constraint modes of one component, or all.
 
-    Args:
-        parts: the component with its supports.
-        n: number of modes; all if the component has fewer.
-        rows: (h_j, n_b) coordinates of each of its coupled interfaces.
-        where: name of the component, for the log.
-
-    Returns:
-        (h_j, m_j) directions per interface, scaled to one; modes that hold it are left out.
+    Of the coordinates (h_j, n_b) of each coupled interface directions (h_j, m_j), scaled to one;
+    modes that hold it are left out.
     """
     m = enough(parts.lam, min(n, parts.lam.size), f"interfaces of {where!r}")
     motion = parts.C @ parts.chi[:, :m]
     traces = [H @ motion for H in rows]
-    largest = np.max([np.linalg.norm(T, axis=0) for T in traces], axis=0)
-    scaled = []
-    for T in traces:
-        size = np.linalg.norm(T, axis=0)
-        moves = size > RANK_RTOL * largest
-        scaled.append(T[:, moves] / size[moves])
-    return scaled
+    sizes = [np.linalg.norm(T, axis=0) for T in traces]
+    moves = [size > RANK_RTOL * np.max(sizes, axis=0) for size in sizes]
+    return [T[:, k] / size[k] for T, k, size in zip(traces, moves, sizes, strict=True)]
 
 
 def joint_functions(moved: Array, traces: list[list[Array]]) -> Array:
     """(c, m) interface motions of the assembly that contain those of the components.
 
-    Both sides of an interface take the union of their functions, orthonormalised by a singular
-    value decomposition, so that they stay compatible.
-
-    Args:
-        moved: (h, c) coordinates of all interfaces, one below the other, per motion.
-        traces: per interface, the directions that its two components ask for.
+    Both sides of an interface take the union of their functions, so that they stay compatible.
+    Motions move the coordinates (h, c) of all interfaces, one below the other; traces are, per
+    interface, the directions that its two components ask for.
     """
-    unions = []
-    for both in traces:
-        U, spectrum, _ = np.linalg.svd(np.hstack(both), full_matrices=False)
-        unions.append(U[:, spectrum > RANK_RTOL * spectrum[0]])
-    X = np.linalg.lstsq(moved, block_diag(*unions), rcond=RANK_RTOL)[0]
+    unions = block_diag(*(_span(np.hstack(both)) for both in traces))
+    return _span(np.linalg.lstsq(moved, unions, rcond=RANK_RTOL)[0])
+
+
+def _span(X: Array) -> Array:
+    """(n, k) orthonormal columns that span the same."""
     Q, spectrum, _ = np.linalg.svd(X, full_matrices=False)
     return Q[:, spectrum > RANK_RTOL * spectrum[0]]

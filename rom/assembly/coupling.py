@@ -1,5 +1,10 @@
-"""Two interfaces that move together: nodes by position, coefficients, or moments of functions."""
+"""Two interfaces that move together: nodes by position, coefficients, or moments of functions.
 
+And what shows that coupled bodies stand for the whole: their certificates, put together.
+"""
+
+from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -9,11 +14,12 @@ from scipy.spatial import cKDTree
 from rom.body.records import Marker, Patch
 from rom.eigen.verbs import dofs_of, new_part
 from rom.errors import InterfaceError
-from rom.model import Array, Index, Interface
+from rom.model import Array, Index, Interface, Row
 
 SAME_PLACE = 1e-6  # distance of two nodes or interfaces, of the size of the bodies, that still meet
 SAME_SURFACE = (0.05, 0.25)  # gap of centroids over extent, and of areas, of two faceted surfaces
 SAME_FUNCTIONS = 1e-6  # difference of functions at equal nodes, of the largest value
+MISSING_ROWS = (Row("certificate", 0.0, "> 0", False),)  # of a body that has none
 MIN_COMMON_RATIO = 0.5  # norm of a function on one mesh, of that on the other, to be common to both
 
 
@@ -24,23 +30,16 @@ def coupled_rows(
 
     Nodes that coincide are coupled node by node, whatever their order; equal functions by their
     coefficients; everything else by moments of common functions, if a projection is given.
-
-    Args:
-        coupling: the two places, for messages.
-        one: first interface.
-        other: second interface.
-        size: size of the bodies [m].
-        projection: functions of the surface, e.g. ``Polynomial(4)``, or None.
-
-    Raises:
-        InterfaceError: if the kinds differ, the surfaces lie apart, or the meshes do not match and
-            no projection is given.
     """
-    if one.kind != other.kind:
-        _refuse_unequal(coupling, one, other)
-    if one.patch is None or other.patch is None:
-        if one.hold.shape[0] != other.hold.shape[0]:
-            _refuse_unequal(coupling, one, other)
+    rigid, differ = one.patch is None or other.patch is None, len(one.hold) != len(other.hold)
+    if one.kind != other.kind or (rigid and differ):
+        raise InterfaceError(
+            f"{coupling[0]} is {one.kind} with {len(one.hold)} coordinates, {coupling[1]} is "
+            f"{other.kind} with {len(other.hold)}: they cannot move together.",
+            hint="Reduce both bodies with the same kind; on meshes that do not match, with "
+            "Polynomial of the same order.",
+        )
+    if rigid:
         _refuse_gap(coupling, one.point - other.point, SAME_PLACE * size)
         return one.hold, other.hold
     order = _same_nodes(one.patch, other.patch, SAME_PLACE * size)
@@ -49,9 +48,21 @@ def coupled_rows(
     equal = _equal_coordinates(one, other, order)
     if equal is not None:
         return equal
-    if projection is None:
-        _refuse_unprojected(coupling, one, other, order)
-    return projected_rows(one, other, projection)
+    if projection is not None:
+        return projected_rows(one, other, projection)
+    n, m = (marker.patch.points.shape[0] for marker in (one, other))
+    if order is None:
+        raise InterfaceError(
+            f"{coupling[0]} has {n} nodes, {coupling[1]} has {m}, and they do not coincide: "
+            f"{one.kind} coordinates mean different motions on the two meshes.",
+            hint="Couple moments of common functions: Assembly(…, projection=rom.Polynomial(4)).",
+        )
+    raise InterfaceError(
+        f"{coupling[0]} and {coupling[1]} share {n} nodes, but each is reduced to functions of its "
+        "own: coupled node by node they would lock.",
+        hint="Reduce both with the same functions, or with full interfaces and reduce the "
+        "assembly: Assembly.reduced(…).",
+    )
 
 
 def projected_rows(one: Marker, other: Marker, projection: Any) -> tuple[Array, Array]:
@@ -83,11 +94,9 @@ def _nodal(L: Array, marker: Marker) -> Array:
 def _common_functions(a: Patch, b: Patch, projection: Any) -> tuple[Array, ...]:
     """The same functions on both meshes, in one frame and scale, and orthonormal on each.
 
-    From low to high degree; left out is what depends on earlier ones, or what the meshes see
-    differently: facets of a curved surface, and degrees beyond the resolution of one mesh.
-
-    Returns:
-        V_a (k_a, m), V_b (k_b, m), and Q_a, Q_b with Q^T S Q = I and the span of V.
+    V_a (k_a, m), V_b (k_b, m), and Q_a, Q_b with Q^T S Q = I and the span of V. From low to high
+    degree; left out is what depends on earlier ones, or what the meshes see differently: facets of
+    a curved surface, and degrees beyond the resolution of one mesh.
     """
     points = np.vstack([a.points, b.points])
     S = block_diag([a.surface_mass, b.surface_mass], format="csr")
@@ -119,9 +128,7 @@ def _equal_coordinates(
     """Rows of the coordinates, if they mean the same on both sides; None otherwise."""
     one_shapes, other_shapes = one.patch.shapes, other.patch.shapes
     if one_shapes is None or other_shapes is None:
-        if order is None:
-            return None
-        return one.hold, other.hold[dofs_of(order)]
+        return None if order is None else (one.hold, other.hold[dofs_of(order)])
     if one.hold.shape[0] != other.hold.shape[0]:
         return None
     if order is None:
@@ -132,15 +139,6 @@ def _equal_coordinates(
         there = other_shapes.reshape(order.size, -1)[order]
     same = np.abs(here - there).max() <= SAME_FUNCTIONS * np.abs(here).max()
     return (one.hold, other.hold) if same else None
-
-
-def _refuse_unequal(coupling: Any, one: Marker, other: Marker) -> None:
-    raise InterfaceError(
-        f"{coupling[0]} is {one.kind} with {one.hold.shape[0]} coordinates, {coupling[1]} is "
-        f"{other.kind} with {other.hold.shape[0]}: they cannot move together.",
-        hint="Reduce both bodies with the same kind; on meshes that do not match, with "
-        "Polynomial of the same order.",
-    )
 
 
 def _refuse_gap(coupling: Any, between: Array, limit: float) -> None:
@@ -167,17 +165,10 @@ def _refuse_other_surface(coupling: Any, a: Patch, b: Patch) -> None:
         )
 
 
-def _refuse_unprojected(coupling: Any, one: Marker, other: Marker, order: Index | None) -> None:
-    n, m = (marker.patch.points.shape[0] for marker in (one, other))
-    if order is None:
-        raise InterfaceError(
-            f"{coupling[0]} has {n} nodes, {coupling[1]} has {m}, and they do not coincide: "
-            f"{one.kind} coordinates mean different motions on the two meshes.",
-            hint="Couple moments of common functions: Assembly(…, projection=rom.Polynomial(4)).",
-        )
-    raise InterfaceError(
-        f"{coupling[0]} and {coupling[1]} share {n} nodes, but each is reduced to functions of its "
-        "own: coupled node by node they would lock.",
-        hint="Reduce both with the same functions, or with full interfaces and reduce the "
-        "assembly: Assembly.reduced(…).",
-    )
+def rows_of_parts(bodies: Mapping[str, Any]) -> list[Row]:
+    """The lines of the certificates of all bodies, each with the name of its body in front."""
+    return [
+        replace(line, quantity=f"{name}: {line.quantity}")
+        for name, body in bodies.items()
+        for line in (MISSING_ROWS if body.certificate is None else body.certificate.rows)
+    ]

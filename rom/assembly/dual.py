@@ -20,6 +20,7 @@ Source:
     Craig-Bampton method for dynamic substructuring, J. Comput. Appl. Math. 168 (2004) 383.
 """
 
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -28,11 +29,11 @@ import numpy as np
 from scipy.linalg import block_diag, eigh, null_space
 
 from rom.arguments import one_of, typed
-from rom.assembly.certificate import rows_of_parts
+from rom.assembly.coupling import rows_of_parts
 from rom.checks.draft import COMPARISON_STAGE, Draft, run, wanted
-from rom.errors import ConfigError, InterfaceError
+from rom.errors import InterfaceError
 from rom.model import Array, FEModel, Index, Report, Row
-from rom.names import check_known, offered
+from rom.names import check_known
 from rom.reduction.bases.free_interface import Rubin, free_modes, residual_flexibility
 from rom.reduction.interfaces.connection import Connection
 from rom.rows import FREQUENCY_RTOL, N_COMPARED, frequency_rows, row
@@ -141,21 +142,15 @@ class DualAssembly:
     @cached_property
     def certificate(self) -> Report:
         """The certificates of the bodies, and what it changes that the forces are unknowns."""
-        rows = rows_of_parts(self.bodies)
-        return Report("certificate of the dual assembly", (*rows, *self._kinds_row()))
-
-    def _kinds_row(self) -> list[Row]:
-        """Frequencies of dual Craig-Bampton against Rubin's, whose interfaces meet exactly."""
-        n_rigid = self._n_rigid(())
+        rows, n_rigid = rows_of_parts(self.bodies), self._n_rigid(())
         n = n_rigid + N_COMPARED
-        try:
+        with suppress(InterfaceError):  # modes that leave forces no flexibility: the kinds are one
             weak, exact = (self.frequencies(n, kind=kind)[n_rigid:] for kind in ("dual", "rubin"))
-        except InterfaceError:  # modes that leave the forces no flexibility: the kinds are one
-            return []
-        n = min(weak.size, exact.size)
-        worst = np.abs(weak[:n] / exact[:n] - 1).max(initial=0.0)
-        what = f"dual: largest change of {n} frequencies by interfaces that meet weakly"
-        return [row(what, worst, FREQUENCY_RTOL)]
+            n = min(weak.size, exact.size)
+            worst = np.abs(weak[:n] / exact[:n] - 1).max(initial=0.0)
+            what = f"dual: largest change of {n} frequencies by interfaces that meet weakly"
+            rows.append(row(what, worst, FREQUENCY_RTOL))
+        return Report("certificate of the dual assembly", tuple(rows))
 
     def frequencies(
         self, n: int | None = None, *, kind: str = "dual", fixed: tuple[Place, ...] = ()
@@ -190,7 +185,7 @@ class DualAssembly:
         """
         K, M = self.matrices(kind=kind, fixed=fixed)
         scale = 1 / np.sqrt(np.diag(M))
-        return eigh(scale[:, None] * K * scale, scale[:, None] * M * scale, eigvals_only=True)
+        return eigh(*(scale[:, None] * A * scale for A in (K, M)), eigvals_only=True)
 
     def matrices(self, *, kind: str = "dual", fixed: tuple[Place, ...] = ()) -> tuple[Array, Array]:
         """Stiffness and mass of the whole in modal coordinates, and forces for "dual".
@@ -246,17 +241,12 @@ class DualAssembly:
         """(c, n_b of all) signed selection of interface coordinates that must vanish."""
         starts = np.cumsum([0, *(len(b.rigid) for b in self.bodies.values())])
         first = dict(zip(self.bodies, starts, strict=False))
-        terms: list[tuple[tuple[Place, float], ...]] = [
-            ((one, 1.0), (other, -1.0)) for one, other in self.couplings
-        ]
-        terms += [((place, 1.0),) for place in fixed]
         blocks = [np.zeros((0, starts[-1]))]
-        for term in terms:
-            block = np.zeros((self._rows(term[0][0]).size, starts[-1]))
-            for place, sign in term:
+        for term in (*self.couplings, *((place,) for place in fixed)):
+            blocks.append(np.zeros((self._rows(term[0]).size, starts[-1])))
+            for place, sign in zip(term, (1.0, -1.0), strict=False):
                 columns = first[place[0]] + self._rows(place)
-                block[np.arange(columns.size), columns] = sign
-            blocks.append(block)
+                blocks[-1][np.arange(columns.size), columns] = sign
         return np.vstack(blocks)
 
     def _hard(self, Lam: Array, Psi: Array, Gamma: Array) -> Array:
@@ -276,15 +266,10 @@ class DualAssembly:
 
     def _rows(self, place: Place) -> Index:
         body, interface = place
-        if body not in self.bodies:
-            raise ConfigError(f"no body {body!r}; the assembly has {offered(self.bodies, body)}.")
-        check_known(
-            interface,
-            self.bodies[body].parts,
-            f"body {body!r} has no interface {interface!r}; it has",
-            InterfaceError,
-        )
-        return self.bodies[body].parts[interface]
+        check_known(body, self.bodies, f"no body {body!r}; the assembly has")
+        parts, what = self.bodies[body].parts, f"body {body!r} has no interface {interface!r}"
+        check_known(interface, parts, f"{what}; it has", InterfaceError)
+        return parts[interface]
 
 
 @typed

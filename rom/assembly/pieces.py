@@ -12,6 +12,7 @@ See docs/theory/pieces.md.
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from itertools import takewhile
 from typing import Any
 
 import numpy as np
@@ -92,23 +93,20 @@ class Pieces:
                 "belong to each piece.",
                 hint="Add the bodies one by one.",
             )
-        parts = {key: mech.add_flexible(f"{name} {key}", body, **self._pose_of(key, **pose))
+        parts = {key: mech.add_flexible(f"{name} {key}", body, **self._pose_of(key, pose))
                  for key, body in self.bodies.items()}  # fmt: skip
         for joint, (one, other) in self.joints.items():
             mech.fixed(f"{name} {joint}", parts[one].marker(joint), parts[other].marker(joint))
         return {interface: parts[key].marker(interface) for key, body in self.bodies.items()
                 for interface in body.markers if interface not in self.joints}  # fmt: skip
 
-    def _pose_of(self, key: str, **pose: Any) -> dict[str, Any]:
+    def _pose_of(self, key: str, pose: dict[str, Any]) -> dict[str, Any]:
         """The pose of one piece where the whole has another."""
         place = self.places.get(key, np.zeros(3))
         if not np.any(place):
             return pose
-        at, p, velocity, omega = start_pose(
-            *(pose.get(of, default) for of, default in (
-                ("at", (0.0, 0.0, 0.0)), ("orientation", None), ("velocity", None), ("omega", None)
-            ))
-        )  # fmt: skip
+        moving = (pose.get(of) for of in ("orientation", "velocity", "omega"))
+        at, p, velocity, omega = start_pose(pose.get("at", (0.0, 0.0, 0.0)), *moving)
         A = rotation.matrix(p)
         return {"at": at + A @ place, "orientation": p, "omega": omega,
                 "velocity": velocity + A @ np.cross(omega, place)}  # fmt: skip
@@ -134,9 +132,7 @@ class Repeated:
     ) -> "Repeated | None":
         """The first of the pieces before it that a piece repeats in nodes and matrices."""
         model, seen = models[key], tree.reference
-        for name in others:
-            if name == key:
-                return None
+        for name in takewhile(lambda name: name != key, others):
             other = models[name]
             if other.points.shape != model.points.shape or model.attachments or other.attachments:
                 continue
@@ -146,11 +142,14 @@ class Repeated:
                     for two in other.interfaces.values()
                     if np.array_equal(one.nodes, two.nodes)}  # fmt: skip
             paired = len(same) == len(model.interfaces) == len(other.interfaces)
-            if gaps > SAME_RTOL * np.ptp(model.points) or not paired:
+            if (
+                gaps > SAME_RTOL * np.ptp(model.points)
+                or not paired
+                or same[seen[key]] != seen[name]
+            ):
                 continue
-            if same[seen[key]] == seen[name] and _equal(model.K, other.K):
-                if _equal(model.M, other.M):
-                    return cls(name, shift, same)
+            if _equal(model.K, other.K) and _equal(model.M, other.M):
+                return cls(name, shift, same)
         return None
 
     def named_as(self, body: FlexibleBody, key: str) -> FlexibleBody:
@@ -182,14 +181,7 @@ class Tree:
 
     @classmethod
     def of(cls, models: Mapping[str, FEModel], reference: str) -> "Tree":
-        """That of pieces which meet in interfaces of one name.
-
-        Raises:
-            ConfigError: if there are fewer than two pieces.
-            InterfaceError: if the reference is none of one piece, three pieces have one interface,
-                or a piece hangs on nothing.
-            ModelError: if they form a ring.
-        """
+        """That of pieces which meet in interfaces of one name."""
         if len(models) < 2:
             raise ConfigError(
                 f"{len(models)} pieces are no body cut into pieces.",
@@ -203,12 +195,8 @@ class Tree:
             if len(keys) > 2:
                 raise InterfaceError(f"{interface!r} is of {named(keys)}; at most two pieces meet.")
         free = [interface for interface, keys in owners.items() if len(keys) == 1]
-        check_known(
-            reference,
-            free,
-            f"reference = {reference!r} is no interface of one piece alone; they have",
-            InterfaceError,
-        )
+        what = f"reference = {reference!r} is no interface of one piece alone; they have"
+        check_known(reference, free, what, InterfaceError)
         found, joints = {owners[reference][0]: reference}, dict[str, tuple[str, str]]()
         waiting = [owners[reference][0]]
         while waiting:
@@ -244,17 +232,7 @@ class Tree:
     def ranges(
         self, geometric: Geometric, models: Mapping[str, FEModel]
     ) -> dict[str, Geometric | None]:
-        """{piece: the loads that reach it}, None for a piece that none reaches.
-
-        Args:
-            geometric: those of the whole.
-            models: the pieces.
-
-        Raises:
-            ConfigError: for supports beside the reference, with which they depend on stiffness, and
-                for centrifugal force.
-            InterfaceError: for loads on an interface that no piece has, or on a joint.
-        """
+        """{piece: the loads of the whole that reach it}, None for a piece that none reaches."""
         if geometric.fixed:
             raise ConfigError(
                 f"fixed = {geometric.fixed!r}: with supports beside the reference, which loads "
@@ -388,7 +366,6 @@ def _turned(load: Array, turning: Mask) -> Array:
     """Largest force and moment (6,) in a frame that turns about some of the axes (3,)."""
     if np.count_nonzero(turning) > 1:
         return np.repeat([np.linalg.norm(load[:3]), np.linalg.norm(load[3:])], 3)
-    found = load.copy()
-    across = ~turning
-    found[:3][across] = np.linalg.norm(load[:3][across])
+    found, across = load.copy(), np.flatnonzero(~turning)
+    found[across] = np.linalg.norm(load[across])
     return found

@@ -19,6 +19,7 @@ from rom.model import BUCKLING_LOADS, Array
 from rom.units import UnitSystem, unit_system
 
 N_INTERFACE_COORDINATES = 6  # coordinates of a rigid or averaged interface: displacement, rotation
+SIX = np.array([1, 1, 1, 0, 0, 0])  # powers of a length in a displacement and a rotation
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,12 +65,7 @@ class Factors:
 
 
 def converted(body: Body, units: str) -> Body:
-    """The same body with all numbers in another unit system; itself in its own.
-
-    Raises:
-        ConfigError: if a unit system is unknown.
-        ModelError: naming an interface whose coordinates have unknown dimensions.
-    """
+    """The same body with all numbers in another unit system; itself in its own."""
     if units == body.units:
         return body
     f = Factors.between(unit_system(body.units), unit_system(units))
@@ -100,12 +96,10 @@ def converted(body: Body, units: str) -> Body:
 
 def _provenance(old: dict[str, Any], f: Factors) -> dict[str, Any]:
     """With the energies to which load cases at large deflection hold, and forces that buckle."""
-    found = dict(old)
+    found, energy = dict(old), f.force * f.length
     if cases := old.get("large deflection"):
-        found["large deflection"] = {
-            name: case | {"energy": case["energy"] * f.force * f.length}
-            for name, case in cases.items()
-        }
+        cases = {name: case | {"energy": case["energy"] * energy} for name, case in cases.items()}
+        found["large deflection"] = cases
     if loads := old.get(BUCKLING_LOADS):
         found[BUCKLING_LOADS] = [[one, two, load * f.force] for one, two, load in loads]
     return found
@@ -124,25 +118,25 @@ def _quartic(old: Quartic | Sampled, f: Factors) -> Quartic:
 
 
 def _marker(body: BodyData, marker: Marker, f: Factors) -> Marker:
-    rows = _coordinates(body, marker, f)[:, None]
-    rigid = np.r_[np.full(3, 1 / f.length), np.ones(3)]
-    hold = marker.hold * rows * np.r_[rigid, np.full(body.n_modes, f.shape / f.length)]
+    rows, patch, covariance = _coordinates(body, marker, f)[:, None], marker.patch, None
+    per_coordinate = np.full(body.n_modes, f.shape / f.length)
+    if marker.covariance is not None:
+        covariance = marker.covariance * np.r_[1.0, per_coordinate]
+    if patch is not None:
+        patch = Patch(
+            patch.points * f.length,
+            patch.surface_mass * f.length**2,
+            None if patch.shapes is None else patch.shapes / f.length,
+        )
     return replace(
         marker,
         point=marker.point * f.length,
         translation=marker.translation * f.shape,
         rotation=marker.rotation * (f.shape / f.length),
-        hold=hold,
-        patch=None if marker.patch is None else _patch(marker.patch, f),
-        covariance=_covariance(marker, f),
+        hold=marker.hold * rows * np.r_[(1 / f.length) ** SIX, per_coordinate],
+        patch=patch,
+        covariance=covariance,
     )
-
-
-def _covariance(marker: Marker, f: Factors) -> Array | None:
-    if marker.covariance is None:
-        return None
-    per_coordinate = np.full(marker.covariance.shape[2] - 1, f.shape / f.length)
-    return marker.covariance * np.r_[1.0, per_coordinate]
 
 
 def _coordinates(body: BodyData, marker: Marker, f: Factors) -> Array:
@@ -151,7 +145,7 @@ def _coordinates(body: BodyData, marker: Marker, f: Factors) -> Array:
     if marker.patch is not None:  # functions q with integral of q^2 = 1 have coefficients in m^2
         return np.full(n, f.length if marker.patch.shapes is None else f.length**2)
     if n == N_INTERFACE_COORDINATES:
-        return np.r_[np.full(3, f.length), np.ones(3)]
+        return np.asarray(f.length**SIX)
     raise ModelError(
         f"interface {marker.name!r} of body {body.name!r} has {n} coordinates of kind "
         f"{marker.kind!r}, whose dimensions are not known: it cannot leave {body.units}.",
@@ -159,24 +153,13 @@ def _coordinates(body: BodyData, marker: Marker, f: Factors) -> Array:
     )
 
 
-def _patch(patch: Patch, f: Factors) -> Patch:
-    shapes = None if patch.shapes is None else patch.shapes / f.length
-    return replace(
-        patch,
-        points=patch.points * f.length,
-        surface_mass=patch.surface_mass * f.length**2,
-        shapes=shapes,
-    )
-
-
 def _stress(stress: StressRecovery | CauchyRecovery, f: Factors) -> StressRecovery | CauchyRecovery:
     if isinstance(stress, CauchyRecovery):
         return stress.in_units(f.length, f.pressure, f.length / f.shape)
-    per_coordinate = f.pressure * f.shape / f.length
-    inertial = stress.inertial
+    per_coordinate, inertial = f.pressure * f.shape / f.length, stress.inertial
     if inertial is not None:
-        linear, turning = f.pressure * f.time**2 / f.length, f.pressure * f.time**2
         columns = np.full(inertial.shape[1], per_coordinate * f.time**2)
-        columns[:N_FRAME_LOADS] = np.r_[np.full(3, linear), np.full(N_FRAME_LOADS - 3, turning)]
+        columns[:N_FRAME_LOADS] = f.pressure * f.time**2
+        columns[:3] /= f.length
         inertial = inertial * columns
     return StressRecovery(stress.points * f.length, stress.operator * per_coordinate, inertial)

@@ -38,17 +38,13 @@ class Rayleigh:
 
     def matrix(self, body: FlexibleBody) -> Array:
         """(r, r) damping [N s/m]."""
-        self._warn_of_strong(body)
-        return self.alpha * _deformation_mass(body) + self.beta * body.K
-
-    def _warn_of_strong(self, body: FlexibleBody) -> None:
-        """Of the lowest mode: high ones are often damped beyond one on purpose."""
         omega, _ = _vibrations(body, ())
-        if omega.size:
+        if omega.size:  # high modes are often damped beyond one on purpose
             low = float(omega.min())
             ratio = 0.5 * (self.alpha / low + self.beta * low)
             of = f"the lowest mode of the free body {body.name!r}, at {low / (2 * np.pi):.4g} Hz,"
             warn_outside(DAMPING_RATIO, ratio, of)
+        return self.alpha * _deformation_mass(body) + self.beta * body.K
 
 
 @typed
@@ -102,8 +98,10 @@ class ModalDamping:
         if zeta.ndim > 1 or (zeta.ndim == 1 and zeta.size != body.n_modes):
             one_each("ratios of ModalDamping", zeta.shape, "elastic coordinates", (body.n_modes,))
         omega, B = _vibrations(body, self.fixed)
-        if omega.size < body.n_modes:
-            omega, B = _with_statics(body, omega, B)
+        if omega.size < body.n_modes:  # then the deformations that loads on held interfaces cause
+            C = still_motions(B.T @ body.K)
+            lam, W = eigh(C.T @ body.K @ C, C.T @ _deformation_mass(body) @ C)
+            omega, B = np.concatenate([omega, np.sqrt(lam)]), np.hstack([B, C @ W])
         shares = np.linalg.inv(B)
         return shares.T @ ((2 * zeta * omega)[:, None] * shares)
 
@@ -120,21 +118,13 @@ def _vibrations(body: FlexibleBody, fixed: Fixed) -> tuple[Array, Array]:
     return omega[omega > 0], V[6:, omega > 0]
 
 
-def _with_statics(body: FlexibleBody, omega: Array, B: Array) -> tuple[Array, Array]:
-    """Modes completed by the deformations that loads on held interfaces cause: (r,), (r, r)."""
-    C = still_motions(B.T @ body.K)
-    lam, W = eigh(C.T @ body.K @ C, C.T @ _deformation_mass(body) @ C)
-    return np.concatenate([omega, np.sqrt(lam)]), np.hstack([B, C @ W])
-
-
 def damping_rows(body: FlexibleBody, n: int) -> list[Row]:
     """The damping ratio of the n lowest elastic modes each, free and held by each interface."""
     if not body.D.any():
         return []
     held = body.markers if body.has_static_shapes else ()
-    supports = {"free": ()} | {f"{name} held": (name,) for name in held}
     rows = []
-    for support, fixed in supports.items():
+    for support, fixed in {"free": (), **{f"{name} held": (name,) for name in held}}.items():
         omega, Q = _vibrations(body, fixed)
         ratios = np.einsum("ik,ij,jk->k", Q, body.D, Q) / (2 * omega)
         rows += [
@@ -145,12 +135,5 @@ def damping_rows(body: FlexibleBody, n: int) -> list[Row]:
 
 
 def damped(body: FlexibleBody, damping: Rayleigh | ModalDamping) -> FlexibleBody:
-    """The body with this damping in place of what it had.
-
-    Raises:
-        ConfigError, InterfaceError, ModelError: see `ModalDamping.matrix`.
-
-    Warns:
-        RomWarning: for factors that damp the lowest mode as no structure is damped.
-    """
+    """The body with this damping in place of what it had."""
     return replace(body, D=damping.matrix(body))

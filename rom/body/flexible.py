@@ -180,9 +180,8 @@ class FlexibleBody(BodyData):
             >>> int((free == 0.0).sum()), int((held == 0.0).sum())  # rigid motions
             (6, 0)
         """
-        return self.modes(n, fixed=fixed, springs=springs)[0] / (
-            2 * np.pi * unit_system(self.units).time
-        )
+        rate = 2 * np.pi * unit_system(self.units).time
+        return self.modes(n, fixed=fixed, springs=springs)[0] / rate
 
     def modes(
         self, n: int | None = None, *, fixed: Fixed = (), springs: Springs | None = None
@@ -288,11 +287,8 @@ class FlexibleBody(BodyData):
         rising, energy = finite("shares", shares, None).reshape(-1), self.energy()
         found = follow(energy, np.outer(rising, self.forces_on(loads)), self.mean_rows(fixed))
         if beyond := self.beyond_range(found):
-            k, why = beyond
-            warn(
-                f"body {self.name!r} leaves the range of its certificate at {rising[k]:.4g} of "
-                f"these loads: {why}"
-            )
+            at = f"at {rising[beyond[0]]:.4g} of these loads: {beyond[1]}"
+            warn(f"body {self.name!r} leaves the range of its certificate {at}")
         return found
 
     def beyond_range(self, q: Array) -> tuple[int, str] | None:
@@ -307,9 +303,7 @@ class FlexibleBody(BodyData):
         if q.ndim != 2 or q.shape[1] != self.n_modes:
             raise ConfigError(f"q of shape {q.shape} must have the shape (s, {self.n_modes}).")
         most = self.certified_energy
-        if not np.isfinite(most):
-            return None
-        energy = self.energy().energies(q)
+        energy = self.energy().energies(q) if np.isfinite(most) else np.zeros(0)
         beyond = energy > (1 + ENERGY_RTOL) * most
         if not beyond.any():
             return None
@@ -361,18 +355,15 @@ class FlexibleBody(BodyData):
 
     def _supported(self, fixed: Fixed) -> Array:
         """(6 + r, m) basis of the motions that keep the interfaces still, rigid ones first."""
-        size = self.size
-        scale = np.r_[np.ones(3), np.full(3, 1 / size), np.ones(self.n_modes)]
-        if not fixed:
-            return np.diag(scale)
+        scale = np.r_[np.ones(3), np.full(3, 1 / self.size), np.ones(self.n_modes)]
         return scale[:, None] * still_motions(self.held_rows(fixed) * scale)
 
     def _on_springs(self, springs: Springs | None) -> list[tuple[Array, Array]]:
         """Motions (6, 6 + r) of interfaces, and stiffness (6, 6) to the ground there."""
-        owner = f"body {self.name!r}"
+        pulled = spring_matrices(springs, self.markers, f"body {self.name!r}")
         return [
-            (np.hstack(marker_motion(self.marker(name), self.n_modes)), k)
-            for name, k in spring_matrices(springs, self.markers, owner).items()
+            (np.hstack(marker_motion(self.markers[name], self.n_modes)), k)
+            for name, k in pulled.items()
         ]
 
     def _rigid_rows(self, fixed: Fixed, pulled: Any = ()) -> Array:

@@ -37,13 +37,11 @@ def on_mean_axes(body: Body) -> Body:
 
 def _moves_around_rest(body: Body) -> bool:
     """Whether neither shapes nor second order have momentum or moment of momentum."""
-    psi, r = SecondOrder.of(body), body.n_modes
+    psi, size = SecondOrder.of(body), body.size
     limit = STILL_RTOL * np.sqrt(np.diag(body.M).max(initial=0.0) * body.mass)
-    for S, X in ((body.S, body.Ibar_kl), (psi.S, psi.Ibar)):
-        turning = (X - X.swapaxes(0, 1)) / body.size
-        if max(np.abs(S).max(initial=0.0), np.abs(turning).max(initial=0.0)) > limit:
-            return False
-    return r > 0
+    turning = [(X - X.swapaxes(0, 1)) / size for X in (body.Ibar_kl, psi.Ibar)]
+    largest = max(np.abs(x).max(initial=0.0) for x in (body.S, psi.S, *turning))
+    return bool(body.n_modes > 0 and largest <= limit)
 
 
 def seen_from(body: Body, reference: Any) -> Body:
@@ -58,12 +56,7 @@ def at_large_deflection(
 ) -> tuple[Body, Array]:
     """The body in another frame with its energy at finite strain, and its nodal shapes there.
 
-    Args:
-        body: the body in the old frame.
-        reference: the reference condition of the new frame.
-        E: (n_local, r) its nodal shapes.
-        model: has the energy.
-        ops: operators of the mesh in nodal dofs.
+    Shapes E (n_local, r) are those of the old frame; operators are those of nodal dofs.
     """
     moved, X = moved_to(body, reference), reference_motion(body, reference)
     omega, V = _normal_modes(moved.K, moved.M)
@@ -87,11 +80,7 @@ def _covariance(ops: Operators, interface: Interface, E: Array) -> Array:
 
 
 def moved_to(body: Body, reference: Any) -> Body:
-    """The body in another frame, with the elastic coordinates it has.
-
-    Raises:
-        ModelError: for a body of large deflection.
-    """
+    """The body in another frame, with the elastic coordinates it has."""
     if body.quartic is not None:
         raise ModelError(
             f"body {body.name!r} of large deflection is seen from {body.reference!r} for good: "
@@ -141,13 +130,14 @@ def _recombined(body: Body, V: Array, omega: Array, reference: str) -> Body:
         surface = replace(surface, shape=surface.shape @ V)
     stress = body.stress.recombined(V) if isinstance(body.stress, StressRecovery) else None
     S_kl = np.einsum("abkl,km,ln->abmn", body.S_kl, V, V, optimize=True)
+    D = V.T @ body.D @ V
     return replace(
         body,
         S=body.S @ V,
         Ibar_kl=body.Ibar_kl @ V,
         S_kl=0.5 * (S_kl + S_kl.transpose(1, 0, 3, 2)),
         K=np.diag(omega**2),
-        D=_symmetric(V.T @ body.D @ V),
+        D=0.5 * (D + D.T),
         K_geo=recombined_stiffening(body.K_geo, V),
         markers=markers,
         surface=surface,
@@ -156,7 +146,3 @@ def _recombined(body: Body, V: Array, omega: Array, reference: str) -> Body:
         labels=tuple(f"mode {k + 1}, {reference} frame" for k in range(omega.size)),
         reference=reference,
     )
-
-
-def _symmetric(A: Array) -> Array:
-    return 0.5 * (A + A.T)

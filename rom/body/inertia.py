@@ -43,23 +43,18 @@ def fields_of(integrals: InertiaIntegrals) -> dict[str, Any]:
 
 def weighted(weights: Array, parts: Sequence[InertiaIntegrals]) -> InertiaIntegrals:
     """Integrals of bodies that share the shapes, their densities multiplied by the weights."""
-    sums = (
-        sum(w * getattr(part, name) for w, part in zip(weights, parts, strict=True))
-        for name in InertiaIntegrals.__slots__
+    pairs = list(zip(weights, map(fields_of, parts), strict=True))
+    return InertiaIntegrals(
+        *(sum(w * part[name] for w, part in pairs) for name in InertiaIntegrals.__slots__)
     )
-    return InertiaIntegrals(*sums)
 
 
 def inertia_integrals(
     ops: Operators, points: Array, Psi: Array, part: Any = None
 ) -> InertiaIntegrals:
-    """Integrals of the finite element body, or of a part of it.
+    """Integrals of the finite element body, or of a part with the mass (n, n) [kg].
 
-    Args:
-        ops: operators with the mass of the mesh, M = M_s (x) I_3.
-        points: (n_local/3, 3) coordinates of this process's nodes [m].
-        Psi: (n_local, r) shapes.
-        part: (n, n) mass of the part [kg].
+    Points (n_local / 3, 3) [m] and shapes Psi (n_local, r) are of the nodes of this process.
     """
     fields = np.column_stack([np.ones(ops.n_local), points.reshape(-1), Psi])
     n, k = fields.shape[0] // 3, fields.shape[1]
@@ -72,13 +67,7 @@ def inertia_integrals(
 
 
 def point_integrals(points: Array, masses: Array, shapes: Array) -> InertiaIntegrals:
-    """Integrals of point masses.
-
-    Args:
-        points: (p, 3) [m].
-        masses: (p,) [kg].
-        shapes: (3 p, r) displacements of the points.
-    """
+    """Integrals of point masses (p,) [kg] at points (p, 3) [m], displaced by shapes (3 p, r)."""
     fields = np.column_stack([np.ones(points.size), points.reshape(-1), shapes])
     fields = fields.reshape(points.shape[0], 3, -1)
     return _split(np.einsum("p,pak,pbl->akbl", masses, fields, fields, optimize=True))

@@ -88,18 +88,14 @@ class UnitLoads:
         """Pairs of interfaces, and the force [N] that buckles the body pressed between them.
 
         As on hinges: forces keep to the line of the pair, which holds nothing else of it. Of
-        more than `MAX_PAIRS` pairs of rigid or averaged interfaces none is looked at.
-
-        Args:
-            E: (n_local, r) mass-normalised shapes in their mean-axis frame.
-            omega: (r,) their frequencies [rad/s].
-            markers: interfaces by name.
+        more than `MAX_PAIRS` pairs of rigid or averaged interfaces none is looked at. The shapes E
+        (n_local, r) are mass-normalised in their mean-axis frame, omega (r,) [rad/s] are theirs.
         """
         pairs = list(combinations([m for m in markers.values() if m.patch is None], 2))
-        lines = [two.point - one.point for one, two in pairs]
+        lines = [(one, two, two.point - one.point) for one, two in pairs]
         pressed = [
             (one, two, line / np.linalg.norm(line))
-            for (one, two), line in zip(pairs, lines, strict=True)
+            for one, two, line in lines
             if len(pairs) <= MAX_PAIRS and line.any()
         ]
         if not pressed or not omega.size:
@@ -156,11 +152,9 @@ class UnitLoads:
 
     def _six_dofs(self) -> Index:
         """Six dofs that stop every rigid motion and, as loads are balanced, carry nothing."""
-        ops, candidates = self.connection.ops, self.connection.boundary
+        ops, candidates, x = self.connection.ops, self.connection.boundary, self.model.points
         if candidates.size == 0:
-            x = self.model.points
-            nodes = np.unique(np.r_[x.argmin(axis=0), x.argmax(axis=0)])
-            candidates = dofs_of(nodes)
+            candidates = dofs_of(np.unique(np.r_[x.argmin(axis=0), x.argmax(axis=0)]))
         return np.sort(candidates[pins(ops.rows(ops.rigid, candidates))])
 
     def _surfaces(

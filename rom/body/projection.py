@@ -48,15 +48,11 @@ class Elastic:
 
 
 def elastic_part(ops: Operators, Psi: Array) -> Elastic:
-    """Split the span of Psi into rigid motions and mass-normalised free-free modes.
-
-    Raises:
-        ModelError: if a rigid motion is not in the span, the columns are dependent, or the body
-            freed of its supports would buckle under its own stress.
-    """
+    """Split the span of Psi into rigid motions and mass-normalised free-free modes."""
     M, K = quadratic(ops, ops.apply_M, Psi), quadratic(ops, ops.apply_K, Psi)
     scale = 1 / np.sqrt(np.diag(M))
-    M, K = _scaled(M, scale), _scaled(K, scale)
+    M, K = (scale[:, None] * A * scale for A in (M, K))
+    M, K = (0.5 * (A + A.T) for A in (M, K))
     if np.linalg.eigvalsh(M)[0] < 1e-13:
         raise ModelError(
             "the basis has columns that depend on each other.",
@@ -73,11 +69,10 @@ def elastic_part(ops: Operators, Psi: Array) -> Elastic:
         )
     Z = null_space(B.T @ M)
     lam, Y = eigh(Z.T @ K @ Z, Z.T @ M @ Z)
-    if lam.size and lam[0] < -NEGATIVE_STIFFNESS_RTOL * lam[-1]:
+    if negative := np.count_nonzero(lam < -NEGATIVE_STIFFNESS_RTOL * lam.max(initial=0.0)):
         raise ModelError(
-            f"{np.count_nonzero(lam < -NEGATIVE_STIFFNESS_RTOL * lam[-1])} shapes of the free body "
-            "have negative stiffness: without its supports it would buckle under the stress it "
-            "carries.",
+            f"{negative} shapes of the free body have negative stiffness: without its supports it "
+            "would buckle under the stress it carries.",
             hint="Heat it less; rom.modes takes it with its supports held.",
         )
     V = scale[:, None] * (Z @ Y)
@@ -96,17 +91,16 @@ def flexible_body(
 ) -> FlexibleBody:
     """The body in its mean-axis frame.
 
-    Args:
-        model: supplies points, interfaces, attachments and surface.
-        ops: operators with the mass of the mesh alone, in nodal dofs.
-        E: (n_local, r) its mass-normalised shapes without rigid motion, in nodal dofs.
-        omega: (r,) their circular frequencies [rad/s].
-        ties: {interface: tie} of the interfaces that become markers; each has a ``label`` and the
-            map ``coordinates`` (n_c, 3k) from the dofs of the surface to what is zero when held.
-        name: name of the body.
-        provenance: how it was made.
+    Shapes E (n_local, r) are mass-normalised, without rigid motion and in nodal dofs, omega (r,)
+    their circular frequencies [rad/s]; operators have the mass of the mesh alone. Ties of the
+    interfaces that become markers have a ``label`` and the map ``coordinates`` (n_c, 3k) from the
+    dofs of the surface to what is zero when held.
     """
     integrals = inertia_integrals(ops, own_points(ops, model.points), E)
+    surface = None
+    if (mesh := model.surface) is not None:
+        shape = ops.rows(E, dofs_of(mesh.nodes))
+        surface = Surface(model.points[mesh.nodes], mesh.triangles, shape)
     return FlexibleBody(
         name=name,
         **fields_of(sum(carried_integrals(model, ops, E), integrals)),
@@ -115,7 +109,7 @@ def flexible_body(
         markers={n: _marker(ops, model.interfaces[n], tie, E) for n, tie in ties.items()},
         omega=omega,
         labels=tuple(f"mode {k + 1}, mean-axis frame" for k in range(omega.size)),
-        surface=_surface(ops, model, E),
+        surface=surface,
         provenance=provenance,
     )
 
@@ -146,36 +140,17 @@ def _marker(ops: Operators, interface: Interface, tie: Any, E: Array) -> Marker:
     U = ops.rows(E, interface.dofs)
     motion = mean_motion(interface) @ U
     hold = np.hstack([tie.coordinates @ rigid_motions(interface.points), tie.coordinates @ U])
-    patch = _patch(interface, tie)
+    patch = None
+    if tie.label not in ("rbe2", "rbe3"):  # its coordinates let the surface deform
+        shapes = csr_matrix(tie.by_masters).toarray() if tie.removed.size else None
+        patch = Patch(interface.points, csr_matrix(interface.surface_mass), shapes)
     return Marker(interface.name, interface.origin, motion[:3], motion[3:], tie.label, hold, patch)
 
 
-def _patch(interface: Interface, tie: Any) -> Patch | None:
-    """The surface, if its coordinates let it deform; an averaged one keeps dofs of its own."""
-    if tie.label in ("rbe2", "rbe3"):
-        return None
-    shapes = csr_matrix(tie.by_masters).toarray() if tie.removed.size else None
-    return Patch(interface.points, csr_matrix(interface.surface_mass), shapes)
-
-
-def _surface(ops: Operators, model: FEModel, E: Array) -> Surface | None:
-    if model.surface is None:
-        return None
-    nodes = model.surface.nodes
-    dofs = dofs_of(nodes)
-    return Surface(model.points[nodes], model.surface.triangles, ops.rows(E, dofs))
-
-
 def stress_recovery(model: FEModel, E: Array, missing: Array | None = None) -> StressRecovery:
-    """Stress on the surface at small deflection.
+    """Stress on the surface at small deflection, of nodal displacements E (n_local, r).
 
-    Args:
-        model: supplies points, surface and material.
-        E: (n_local, r) nodal displacement per unit of each coordinate.
-        missing: (n_local, 12 + r) that of the modes left out, see `rom.body.recovery`.
-
-    Raises:
-        ConfigError: if the model has no finite elements or no surface.
+    Those of the modes left out are missing ones (n_local, 12 + r), see `rom.body.recovery`.
     """
     nodes = stressed_nodes(model)
     shapes = E if missing is None else np.hstack([E, missing])
@@ -185,33 +160,16 @@ def stress_recovery(model: FEModel, E: Array, missing: Array | None = None) -> S
 
 
 def cauchy_recovery(model: FEModel, E: Array) -> CauchyRecovery:
-    """Stress on the surface at large deflection.
-
-    Args:
-        model: supplies points, surface and material.
-        E: (n_local, r) nodal displacement per unit of each coordinate.
-
-    Raises:
-        ConfigError: if the model has no finite elements or no surface.
-    """
+    """Stress on the surface at large deflection, of nodal displacements E (n_local, r)."""
     nodes = stressed_nodes(model)
     return CauchyRecovery(model.points[nodes], **model.stresses.gradients_at_nodes(E, nodes))
 
 
 def stressed_nodes(model: FEModel) -> Index:
-    """(p,) nodes of the surface, at which stress is recovered.
-
-    Raises:
-        ConfigError: if the model has no finite elements or no surface.
-    """
+    """(p,) nodes of the surface, at which stress is recovered."""
     if model.stresses is None or model.surface is None:
         raise ConfigError(
             "the model has no finite elements, from which alone stress follows.",
             hint="Make it with rom.fe.model, or reduce with stress=False.",
         )
     return model.surface.nodes
-
-
-def _scaled(A: Array, scale: Array) -> Array:
-    A = scale[:, None] * A * scale
-    return 0.5 * (A + A.T)

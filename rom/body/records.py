@@ -78,6 +78,17 @@ class Marker:
     covariance: Array | None = None
 
 
+def motion_of(marker: Marker) -> Array:
+    """(6, r) translation [m] and rotation [rad] of a marker per unit of each elastic coordinate."""
+    return np.vstack([marker.translation, marker.rotation])
+
+
+def rows_held(marker: Marker, directions: tuple[str, ...]) -> Array:
+    """(h, 6 + r) rows of ``hold`` of a marker in some directions, see `rom.eigen.supports`."""
+    hold = marker.hold
+    return hold[held_coordinates(marker.name, marker.kind, len(hold), directions)]
+
+
 @dataclass(frozen=True, slots=True)
 class Surface:
     """Outer surface of the body, for pictures.
@@ -160,12 +171,9 @@ class BodyData:
         Raises:
             ConfigError, InterfaceError: see `rom.eigen.supports`.
         """
-        rows = [np.zeros((0, 6 + self.n_modes))]
-        for name, directions in supports(fixed, self.markers, f"body {self.name!r}").items():
-            hold = self.markers[name].hold
-            kind = self.markers[name].kind
-            rows.append(hold[held_coordinates(name, kind, len(hold), directions)])
-        return np.vstack(rows)
+        held = supports(fixed, self.markers, f"body {self.name!r}")
+        rows = [rows_held(self.markers[name], of) for name, of in held.items()]
+        return np.vstack([np.zeros((0, 6 + self.n_modes)), *rows])
 
     def mean_rows(self, fixed: Fixed) -> Array:
         """(h, r) elastic part of the mean motion of interfaces in the directions that are held.
@@ -175,8 +183,8 @@ class BodyData:
         """
         rows = [np.zeros((0, self.n_modes))]
         for name, directions in supports(fixed, self.markers, f"body {self.name!r}").items():
-            motion = np.vstack([self.markers[name].translation, self.markers[name].rotation])
-            rows.append(motion[[DIRECTIONS.index(d) for d in directions or DIRECTIONS]])
+            at = [DIRECTIONS.index(d) for d in directions or DIRECTIONS]
+            rows.append(motion_of(self.markers[name])[at])
         return np.vstack(rows)
 
     def forces_on(self, loads: Mapping[str, Any]) -> Array:
@@ -191,7 +199,7 @@ class BodyData:
         force = np.zeros(self.n_modes)
         for name, load in loads.items():
             six, marker = finite(f"loads[{name!r}]", load, (6,)), self.marker(name)
-            force += six @ np.vstack([marker.translation, marker.rotation])
+            force += six @ motion_of(marker)
         return force
 
     @property
@@ -212,7 +220,10 @@ class BodyData:
             >>> float(rom.load("beam.rom.npz").marker("tip").point[0])  # the beam is 1 m long
             1.0
         """
-        self._refuse_unknown((name,))
+        if name not in self.markers:
+            raise InterfaceError(
+                f"body {self.name!r} has no interface {name!r}; it has {offered(self.markers)}."
+            )
         return self.markers[name]
 
     @property
@@ -220,13 +231,6 @@ class BodyData:
         """Strain energy to which some load case at large deflection holds [J]; inf if not known."""
         cases = self.provenance.get("large deflection") or {}
         return max((case["energy"] for case in cases.values()), default=np.inf)
-
-    def _refuse_unknown(self, names: tuple[str, ...]) -> None:
-        if unknown := [name for name in names if name not in self.markers]:
-            raise InterfaceError(
-                f"body {self.name!r} has no interface {named(unknown)}; it has "
-                f"{offered(self.markers)}."
-            )
 
 
 Body = TypeVar("Body", bound=BodyData)  # of whoever asks: a moved body is of the same class

@@ -127,17 +127,9 @@ def residual_motion(
     """(n_local, 12 + r) displacement of the modes left out, in nodal dofs.
 
     With the interfaces held, the inner dofs answer inertia by -K_ii^-1 (M a)_i; what the inner
-    columns of the basis can answer is taken out, because the elastic coordinates contain it.
-
-    Args:
-        ops: operators in nodal dofs.
-        connection: the model in interface coordinates.
-        basis: constraint modes first, then columns that vanish on the interfaces.
-        holds: {interface: (n_c, 6 + r)} interface coordinates of rigid and elastic motion.
-        points: (n / 3, 3) nodes [m].
-
-    Returns:
-        None for a basis without constraint modes.
+    columns of the basis can answer is taken out, because the elastic coordinates contain it. The
+    interface coordinates of rigid and elastic motion are ``holds`` (n_c, 6 + r), points (n / 3, 3)
+    are nodes [m]. None for a basis without constraint modes.
     """
     inner, n_b = connection.ops, connection.boundary.size
     Psi_b, Phi = basis.Psi[:, :n_b], basis.Psi[:, n_b:]

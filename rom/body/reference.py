@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from rom.body.records import Body, BodyData, Marker
+from rom.body.records import Body, BodyData, Marker, motion_of
 from rom.errors import ConfigError, ModelError
 from rom.model import Array
 from rom.plausible import far_doubt
@@ -28,23 +28,14 @@ MEAN_AXES = ("mean-axis", "buckens", "free")
 
 
 def reference_motion(body: BodyData, reference: Any) -> Array:
-    """(6, r) rigid motion X hidden in each shape, as the reference condition sees it.
-
-    Raises:
-        ConfigError: if the reference is neither "mean-axis", "buckens", "free", nor one to three
-            names.
-        ModelError: if the condition does not determine the frame.
-    """
+    """(6, r) rigid motion X hidden in each shape, as the reference condition sees it."""
     if isinstance(reference, str) and reference in MEAN_AXES:
         from_rigid, from_shapes = rigid_mass(body), rigid_elastic(body)
     elif isinstance(reference, str):
         from_rigid, from_shapes = marker_motion(body.marker(reference), body.n_modes)
-    elif isinstance(reference, tuple | list) and len(reference) == 2:
-        first, second = map(body.marker, reference)
-        from_rigid, from_shapes = _pins(first, second, body.n_modes)
-    elif isinstance(reference, tuple | list) and len(reference) == 3:
-        points = [body.marker(name) for name in reference]
-        from_rigid, from_shapes = _three_two_one(points, body.n_modes)
+    elif isinstance(reference, tuple | list) and len(reference) in (2, 3):
+        condition = _pins if len(reference) == 2 else _three_two_one
+        from_rigid, from_shapes = condition([body.marker(x) for x in reference], body.n_modes)
     else:
         raise ConfigError(
             f"reference = {reference!r} is not a reference condition.",
@@ -52,9 +43,8 @@ def reference_motion(body: BodyData, reference: Any) -> Array:
         )
     scale = np.r_[np.ones(3), np.full(3, 1 / body.size)]
     if np.linalg.cond(from_rigid * scale) > 1e12:
-        away = far_doubt(
-            float(np.linalg.norm(body.first_moment)) / body.mass, body.size, "the body"
-        )
+        distance = float(np.linalg.norm(body.first_moment)) / body.mass
+        away = far_doubt(distance, body.size, "the body")
         raise ModelError(
             f"the reference condition {reference!r} leaves the frame undetermined.",
             hint=away or "Pins must not coincide, three points not lie on one line.",
@@ -65,11 +55,12 @@ def reference_motion(body: BodyData, reference: Any) -> Array:
 def marker_motion(marker: Marker, r: int) -> tuple[Array, Array]:
     """The six motions of a marker under rigid motions and under the shapes."""
     rigid = np.block([[np.eye(3), -skew(marker.point)], [np.zeros((3, 3)), np.eye(3)]])
-    return rigid, np.vstack([marker.translation, marker.rotation]).reshape(6, r)
+    return rigid, motion_of(marker).reshape(6, r)
 
 
-def _pins(first: Marker, second: Marker, r: int) -> tuple[Array, Array]:
+def _pins(points: list[Marker], r: int) -> tuple[Array, Array]:
     """Chord frame: first point fixed, second on the axis, no mean twist at the first point."""
+    first, second = points
     axis = second.point - first.point
     length = np.linalg.norm(axis)
     if length == 0.0:
@@ -79,10 +70,11 @@ def _pins(first: Marker, second: Marker, r: int) -> tuple[Array, Array]:
         )
     axis = axis / length
     across = np.linalg.svd(axis[None])[2][1:]
-    rows = []
-    for one, other in zip(marker_motion(first, r), marker_motion(second, r), strict=True):
-        rows.append(np.vstack([one[:3], across @ other[:3], axis @ one[3:]]))
-    return rows[0], rows[1]
+    rigid, elastic = (
+        np.vstack([one[:3], across @ other[:3], axis @ one[3:]])
+        for one, other in zip(marker_motion(first, r), marker_motion(second, r), strict=True)
+    )
+    return rigid, elastic
 
 
 def _three_two_one(points: list[Marker], r: int) -> tuple[Array, Array]:
@@ -98,11 +90,11 @@ def _three_two_one(points: list[Marker], r: int) -> tuple[Array, Array]:
         )
     axis, normal = axis / np.linalg.norm(axis), normal / np.linalg.norm(normal)
     across = np.array([normal, np.cross(normal, axis)])
-    rows = []
-    for motions in zip(*(marker_motion(point, r) for point in points), strict=True):
-        one, other, last = (motion[:3] for motion in motions)
-        rows.append(np.vstack([one, across @ other, normal @ last]))
-    return rows[0], rows[1]
+    rigid, elastic = (
+        np.vstack([one[:3], across @ other[:3], normal @ last[:3]])
+        for one, other, last in zip(*(marker_motion(x, r) for x in points), strict=True)
+    )
+    return rigid, elastic
 
 
 def rigid_mass(body: BodyData) -> Array:
@@ -122,14 +114,11 @@ def moved_frame(body: Body, X: Array) -> Body:
     Every integral follows from those of the old shapes and of the undeformed body. Geometric
     stiffness stays as it was, see `rom.body.stiffening.moved_stiffening`.
     """
-    t, w = X[:3], X[3:]
-    W = np.einsum("abc,ck->abk", skew_tensor(), w)  # W[:, :, k] @ x = w_k x x
-    d, m = body.first_moment, body.mass
-    P = 0.5 * np.trace(body.inertia) * np.eye(3) - body.inertia  # integral of rho x x^T
-    Wd = np.einsum("abk,b->ak", W, d)
+    t, W, P = X[:3], turns_of(X), second_moment(body)
+    Wd = np.einsum("abk,b->ak", W, body.first_moment)
     S, Ibar = moved_integrals(body, X)
     cross = np.einsum("ak,bl->abkl", body.S, t) + np.einsum("cak,bcl->abkl", body.Ibar_kl, W)
-    rigid = m * np.einsum("ak,bl->abkl", t, t) + np.einsum("ak,bl->abkl", t, Wd)
+    rigid = body.mass * np.einsum("ak,bl->abkl", t, t) + np.einsum("ak,bl->abkl", t, Wd)
     rigid += np.einsum("ak,bl->abkl", Wd, t)
     rigid += np.einsum("ack,cd,bdl->abkl", W, P, W, optimize=True)
     S_kl = body.S_kl - cross - cross.transpose(1, 0, 3, 2) + rigid
@@ -143,23 +132,30 @@ def moved_frame(body: Body, X: Array) -> Body:
 
 def moved_integrals(body: BodyData, X: Array) -> tuple[Array, Array]:
     """Integrals S (3, r) and Ibar_kl (3, 3, r) of the shapes without the rigid motion X (6, r)."""
-    t, W = X[:3], np.einsum("abc,ck->abk", skew_tensor(), X[3:])
-    d = body.first_moment
-    P = 0.5 * np.trace(body.inertia) * np.eye(3) - body.inertia
+    t, W, d = X[:3], turns_of(X), body.first_moment
     S = body.S - body.mass * t - np.einsum("abk,b->ak", W, d)
-    Ibar = body.Ibar_kl - np.einsum("a,bk->abk", d, t) - np.einsum("ac,bck->abk", P, W)
-    return S, Ibar
+    Ibar = body.Ibar_kl - np.einsum("a,bk->abk", d, t)
+    return S, Ibar - np.einsum("ac,bck->abk", second_moment(body), W)
 
 
 def moved_marker(marker: Marker, X: Array) -> Marker:
     """The marker without the rigid motion X (6, r)."""
-    W = np.einsum("abc,ck->abk", skew_tensor(), X[3:])
     return replace(
         marker,
-        translation=marker.translation - X[:3] - np.einsum("abk,b->ak", W, marker.point),
+        translation=marker.translation - X[:3] - np.einsum("abk,b->ak", turns_of(X), marker.point),
         rotation=marker.rotation - X[3:],
         hold=np.hstack([marker.hold[:, :6], marker.hold[:, 6:] - marker.hold[:, :6] @ X]),
     )
+
+
+def second_moment(body: BodyData) -> Array:
+    """(3, 3) integral of rho x x^T over the undeformed body."""
+    return 0.5 * np.trace(body.inertia) * np.eye(3) - body.inertia
+
+
+def turns_of(X: Array) -> Array:
+    """(3, 3, k) W of rigid motions X (6, k), for which W[:, :, k] @ x = w_k x x."""
+    return np.einsum("abc,ck->abk", skew_tensor(), X[3:])
 
 
 def skew_tensor() -> Array:

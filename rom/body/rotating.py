@@ -6,9 +6,9 @@ from scipy.linalg import eigvals, null_space
 
 from rom.arguments import finite, unit_vector
 from rom.body.frame import seen_from
-from rom.body.records import REPEATED_ROW_RTOL, BodyData
+from rom.body.records import REPEATED_ROW_RTOL, BodyData, rows_held
 from rom.body.stiffening import SecondOrder
-from rom.eigen.supports import Fixed, held_coordinates, supports
+from rom.eigen.supports import Fixed, supports
 from rom.errors import ConfigError, ModelError, warn
 from rom.model import Array
 from rom.rotation import crossed
@@ -51,26 +51,18 @@ def rotating_frequencies(
         raise ConfigError("a rotating body needs a support: name the interfaces in fixed=(...).")
     body.check_support(fixed)
     (first, directions), *others = supports(fixed, body.markers).items()
-    if len(_rows(body, first, directions)) < len(body.marker(first).hold):
-        raise ConfigError(
-            f"interface {first!r} is held in part; the first support turns the body.",
-            hint="Name first what is held wholly.",
-        )
+    if len(rows_held(body.marker(first), directions)) < len(body.marker(first).hold):
+        why = f"interface {first!r} is held in part; the first support turns the body."
+        raise ConfigError(why, hint="Name first what is held wholly.")
     if speed and not body.K_geo:
         warn(f"body {body.name!r} has no geometric stiffness: rotation softens it only.")
     seen = seen_from(body, first)  # in its frame the first support is at rest
-    held = {name: _rows(seen, name, directions) for name, directions in others}
+    held = {name: rows_held(seen.marker(name), directions) for name, directions in others}
     H = np.vstack([_held(seen, rows) for rows in (seen.marker(first).hold, *held.values())])
     N = null_space(H, rcond=REPEATED_ROW_RTOL) if H.size else np.eye(seen.n_modes)
     K, G = rotating_matrices(seen, w, arm, held)
     M, K, G = (N.T @ A @ N for A in (seen.M, K, G))
     return _frequencies(M, K, G, f"body {body.name!r} at {speed:g} rad/s")
-
-
-def _rows(body: BodyData, name: str, directions: tuple[str, ...]) -> Array:
-    """(h, 6 + r) coordinates of an interface that are held."""
-    marker = body.marker(name)
-    return marker.hold[held_coordinates(name, marker.kind, len(marker.hold), directions)]
 
 
 def _held(body: BodyData, rows: Array) -> Array:
@@ -87,14 +79,9 @@ def rotating_matrices(
     """Stiffness and gyroscopic matrix (r, r) of small vibrations in a frame that turns steadily.
 
     Centrifugal stiffening by K_geo, spin softening by the inertia of the shapes themselves, and
-    Coriolis forces, all from the same integrals as the equations of motion.
-
-    Args:
-        body: the body, its frame turning with the angular velocity w.
-        w: (3,) angular velocity, body frame [rad/s].
-        at: (3,) a point of the axis, body frame [m].
-        held: {interface: coordinates held (h, 6 + r)} besides the frame; they pull with the force
-            they carry at rest.
+    Coriolis forces, all from the same integrals as the equations of motion. The frame turns with w
+    (3,) [rad/s] about an axis through a point (3,) [m], body frame; coordinates (h, 6 + r) of
+    interfaces held besides it pull with the force they carry at rest.
     """
     psi = SecondOrder.of(body)
     a_origin = -np.cross(w, np.cross(w, at))  # acceleration of the body origin

@@ -72,14 +72,12 @@ def surface_load(
             raise ConfigError("forces take no `where`; write zeros where there is none.")
         f = finite("forces", forces, surface.points.shape)
         return _reduced(surface.points, shapes, f)
-    if pressure is not None:
-        _refuse_inside_out(body.name, surface.triangles)
     chosen, areas = chosen_triangles(body, where)
     if pressure is not None:
+        _refuse_inside_out(body.name, surface.triangles)
         each = -float(pressure) * areas
     else:
-        t = finite("traction", traction, (3,))
-        each = np.linalg.norm(areas, axis=1)[:, None] * t
+        each = np.linalg.norm(areas, axis=1)[:, None] * finite("traction", traction, (3,))
     f = np.zeros(surface.points.shape)
     np.add.at(f, chosen.ravel(), np.repeat(each / 3, 3, axis=0))
     return _reduced(surface.points, shapes, f)
@@ -109,8 +107,7 @@ def _reduced(points: Array, shapes: Array, f: Array) -> SpreadLoad:
 def _refuse_inside_out(name: str, triangles: Index) -> None:
     """Every edge of a closed surface is passed once in each direction."""
     ends = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
-    once = np.unique(ends, axis=0)
-    back = np.unique(ends[:, ::-1], axis=0)
+    once, back = (np.unique(x, axis=0) for x in (ends, ends[:, ::-1]))
     if len(once) != len(ends) or not np.array_equal(once, back):
         raise ModelError(
             f"the triangles on body {name!r} do not tell its inside from its outside: a pressure "

@@ -29,9 +29,16 @@ from typing import Any
 import numpy as np
 
 from rom.arguments import matrix, symmetric
-from rom.body.records import BodyData, Marker
+from rom.body.records import BodyData, Marker, motion_of
 from rom.body.recovery import AXIS_NAMES, CENTRIFUGAL_LOADS, PRODUCTS
-from rom.body.reference import moved_integrals, moved_marker, reference_motion, skew_tensor
+from rom.body.reference import (
+    moved_integrals,
+    moved_marker,
+    reference_motion,
+    second_moment,
+    skew_tensor,
+    turns_of,
+)
 from rom.errors import ConfigError
 from rom.model import Array
 from rom.rotation import crossed
@@ -77,11 +84,7 @@ class SecondOrder:
 
     @classmethod
     def of(cls, body: BodyData) -> "SecondOrder":
-        """Read from the matrices of a body.
-
-        Raises:
-            ConfigError: if a load is unknown, or a matrix has the wrong shape or is not symmetric.
-        """
+        """Read from the matrices of a body, of the right shape and symmetric."""
         _check(body)
         r = body.n_modes
         K = {load: np.asarray(body.K_geo.get(load, np.zeros((r, r)))) for load in known_loads(body)}
@@ -91,11 +94,10 @@ class SecondOrder:
             # omega_x^2 pulls along y and z, so that K = -(Ibar_yy + Ibar_zz)
             half = K[load] - 0.5 * squares.sum(axis=0) if i == j else 0.5 * K[load]
             symmetric[i, j] = symmetric[j, i] = half
-        turning = 0.5 * np.einsum(
-            "abc,ckl->bakl", skew_tensor(), [K[load] for load in ANGULAR_LOADS]
-        )
-        markers = {m: -np.array([K[load] for load in interface_loads(m)]) for m in body.markers}
-        S, N = (np.array([K[load] for load in loads]) for loads in (LINEAR_LOADS, elastic_loads(r)))
+        loads = LINEAR_LOADS, ANGULAR_LOADS, elastic_loads(r), *map(interface_loads, body.markers)
+        S, turns, N, *six = (np.array([K[load] for load in some]) for some in loads)
+        turning = 0.5 * np.einsum("abc,ckl->bakl", skew_tensor(), turns)
+        markers = {m: -of for m, of in zip(body.markers, six, strict=True)}
         return cls(S, symmetric + turning, N.reshape(r, r, r), markers)
 
     def without_round_off(self, mass: float, size: float) -> "SecondOrder":
@@ -117,18 +119,12 @@ class SecondOrder:
         """Geometric stiffness per unit load; loads without any are left out."""
         X, K = self.Ibar, dict(zip(LINEAR_LOADS, self.S, strict=True))
         K |= dict(zip(elastic_loads(len(self.N)), self.N, strict=True))
-        K |= {
-            load: _product(X, i, j)
-            for (i, j), load in zip(PRODUCTS, CENTRIFUGAL_LOADS, strict=True)
-        }
+        for (i, j), load in zip(PRODUCTS, CENTRIFUGAL_LOADS, strict=True):
+            K[load] = X[i, i] - np.einsum("aakl->kl", X) if i == j else X[i, j] + X[j, i]
         K |= dict(zip(ANGULAR_LOADS, crossed(X), strict=True))
         for name, motion in self.markers.items():
             K |= dict(zip(interface_loads(name), -motion, strict=True))
         return {load: 0.5 * (A + A.T) for load, A in K.items() if np.any(A)}
-
-
-def _product(X: Array, i: int, j: int) -> Array:
-    return X[i, i] - np.einsum("aakl->kl", X) if i == j else X[i, j] + X[j, i]
 
 
 def _check(body: BodyData) -> None:
@@ -145,22 +141,14 @@ def _check(body: BodyData) -> None:
 
 
 def moved_stiffening(old: BodyData, new: BodyData, X: Array, reference: Any) -> Any:
-    """Geometric stiffness seen from another frame.
+    """Geometric stiffness seen from another frame, its shapes phi - (t + w x X), [t; w] = X (6, r).
 
     The frame turns and moves with the body: rotations compose, and what the reference condition
     sees of the second order is rigid motion too.
-
-    Args:
-        old: the body in the old frame.
-        new: the same in the new frame, shapes phi - (t + w x X) with X = [t; w].
-        X: (6, r) rigid motion taken out of each shape.
-        reference: the reference condition of the new frame.
     """
     if not old.K_geo:
         return {}
-    psi, t, w = SecondOrder.of(old), X[:3], X[3:]
-    P = 0.5 * np.trace(old.inertia) * np.eye(3) - old.inertia  # integral of rho X X^T
-    W = np.einsum("abc,ck->abk", skew_tensor(), w)
+    psi, t, W, P = SecondOrder.of(old), X[:3], turns_of(X), second_moment(old)
     WW = _symmetrised(np.einsum("abk,bcl->ackl", W, W))
     S = psi.S - _symmetrised(2 * np.einsum("abk,bl->akl", W, new.S))
     S -= np.einsum("abkl,b->akl", WW, old.first_moment)
@@ -196,28 +184,20 @@ def recombined_stiffening(K_geo: dict[str, Array], V: Array) -> dict[str, Array]
 def _without_rigid(body: BodyData, psi: SecondOrder, reference: Any) -> SecondOrder:
     """Every pair k, l counts as one shape of a body, whose frame obeys the reference condition."""
     r = body.n_modes
-    flat = {name: motion.reshape(6, -1) for name, motion in psi.markers.items()}
-    pairs = replace(
-        body,
-        S=psi.S.reshape(3, -1),
-        Ibar_kl=psi.Ibar.reshape(3, 3, -1),
-        K=np.broadcast_to(0.0, (r * r, r * r)),
-        markers={
-            name: replace(
-                marker,
-                translation=flat[name][:3],
-                rotation=flat[name][3:],
-                hold=np.zeros((0, 6 + r * r)),
-            )
-            for name, marker in body.markers.items()
-        },
-    )
+    flat, none = {m: motion.reshape(6, -1) for m, motion in psi.markers.items()}, (0, 6 + r * r)
+    markers = {
+        m: replace(old, translation=flat[m][:3], rotation=flat[m][3:], hold=np.zeros(none))
+        for m, old in body.markers.items()
+    }
+    S, Ibar = psi.S.reshape(3, -1), psi.Ibar.reshape(3, 3, -1)
+    K = np.broadcast_to(0.0, (r * r, r * r))
+    pairs = replace(body, S=S, Ibar_kl=Ibar, K=K, markers=markers)
     X = reference_motion(pairs, reference)
     S, Ibar = moved_integrals(pairs, X)
-    W = np.einsum("abc,cp->abp", skew_tensor(), X[3:])
-    N = psi.N.reshape(r, -1) - body.S.T @ X[:3] - np.einsum("bap,abm->mp", W, body.Ibar_kl)
+    N = psi.N.reshape(r, -1) - body.S.T @ X[:3]
+    N = N - np.einsum("bap,abm->mp", turns_of(X), body.Ibar_kl)
     moved = [moved_marker(marker, X) for marker in pairs.markers.values()]
-    motions = {m.name: np.vstack([m.translation, m.rotation]).reshape(6, r, r) for m in moved}
+    motions = {m.name: motion_of(m).reshape(6, r, r) for m in moved}
     return SecondOrder(S.reshape(3, r, r), Ibar.reshape(3, 3, r, r), N.reshape(r, r, r), motions)
 
 

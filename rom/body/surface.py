@@ -16,11 +16,7 @@ MAX_TILT = 0.2  # sine of the angle between a strain gauge and the surface; face
 
 
 def surface_of(body: BodyData) -> Surface:
-    """The surface of a body.
-
-    Raises:
-        ModelError: if it carries none.
-    """
+    """The surface of a body, which has to carry one."""
     if body.surface is None:
         raise ModelError(
             f"body {body.name!r} carries no surface: nothing to spread a load on.",
@@ -40,9 +36,20 @@ def point_areas(body: BodyData, where: Where = None) -> Array:
 def chosen_triangles(body: BodyData, where: Where) -> tuple[Index, Array]:
     """(t, 3) corners of the chosen triangles and their areas times the normal (t, 3)."""
     surface = surface_of(body)
-    chosen = surface.triangles[_chosen(body, where)]
-    a, b, c = np.moveaxis(surface.points[chosen], 1, 0)
-    return chosen, 0.5 * np.cross(b - a, c - a)
+    triangles, corners = surface.triangles, surface.points[surface.triangles]
+    if where is None:
+        chosen = np.ones(len(corners), dtype=bool)
+    elif isinstance(where, str):
+        chosen = _on_interface(body, where)[triangles].all(axis=1)
+    else:
+        chosen = np.asarray(where(corners.mean(axis=1)))
+    if chosen.shape != (len(corners),) or chosen.dtype != bool or not chosen.any():
+        raise ConfigError(
+            f"`where` chooses no triangle of the {len(corners)} on body {body.name!r}.",
+            hint="It takes (t, 3) points and returns (t,) booleans.",
+        )
+    a, b, c = np.moveaxis(corners[chosen], 1, 0)
+    return triangles[chosen], 0.5 * np.cross(b - a, c - a)
 
 
 def strain_rows(
@@ -50,25 +57,16 @@ def strain_rows(
 ) -> Array:
     """(k, r) normal strain along directions in the surface per elastic coordinate [1/m].
 
-    It is constant in the triangle in which the point lies, as under a gauge of its size.
-
-    Args:
-        body: with its surface.
-        points: (k, 3) places of gauges [m].
-        directions: (k, 3) their axes, of any length [1].
-        what: they are, for messages.
-        numbers: (k,) of them, for messages; None for those from zero on.
-
-    Raises:
-        ConfigError: if a gauge is off the surface, or stands up from it.
-        ModelError: if the body carries no surface.
+    It is constant in the triangle in which the point lies, as under a gauge of its size. Gauges
+    lie at points (k, 3) [m] along directions (k, 3) of any length; messages call one ``what``,
+    with its entry in ``numbers``. One that is off the surface, or stands up from it, is refused.
     """
     surface = surface_of(body)
     corners = surface.points[surface.triangles]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normals = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
     reach = GAUGE_RTOL * float(np.ptp(surface.points, axis=0).max())
-    found = []
+    found, shapes = [], surface.shape.reshape(len(surface.points), 3, -1)
     numbers = range(len(points)) if numbers is None else numbers
     for k, x, d in zip(numbers, np.asarray(points), np.asarray(directions), strict=True):
         d = d / np.linalg.norm(d)
@@ -83,7 +81,7 @@ def strain_rows(
         t = int(lies[far.argmin()])
         d = d - normals[t] * (normals[t] @ d)
         d = d / np.linalg.norm(d)
-        shape = surface.shape.reshape(len(surface.points), 3, -1)[surface.triangles[t]]
+        shape = shapes[surface.triangles[t]]
         # weights of the corners that give the derivative along d of any linear function
         weights = np.linalg.pinv(np.vstack([np.ones(3), corners[t].T - x[:, None]])) @ np.r_[0.0, d]
         found.append(np.einsum("c,i,cir->r", weights, d, shape))
@@ -110,24 +108,6 @@ def _to_line(p: Array, q: Array) -> Array:
     size = np.maximum(np.einsum("ti,ti->t", along, along), 1e-300)
     at = np.clip(-np.einsum("ti,ti->t", p, along) / size, 0.0, 1.0)
     return np.linalg.norm(p + at[:, None] * along, axis=1)
-
-
-def _chosen(body: BodyData, where: Where) -> Any:
-    """(t,) which triangles are meant."""
-    surface = surface_of(body)
-    corners = surface.points[surface.triangles]
-    if where is None:
-        chosen = np.ones(len(corners), dtype=bool)
-    elif isinstance(where, str):
-        chosen = _on_interface(body, where)[surface.triangles].all(axis=1)
-    else:
-        chosen = np.asarray(where(corners.mean(axis=1)))
-    if chosen.shape != (len(corners),) or chosen.dtype != bool or not chosen.any():
-        raise ConfigError(
-            f"`where` chooses no triangle of the {len(corners)} on body {body.name!r}.",
-            hint="It takes (t, 3) points and returns (t,) booleans.",
-        )
-    return chosen
 
 
 def _on_interface(body: BodyData, name: str) -> Any:

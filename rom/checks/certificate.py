@@ -48,17 +48,14 @@ def certify(draft: Draft) -> None:
     draft.watch.begin(COMPARISON_STAGE)
     connection, ops, body, basis = draft.connection, draft.ops, draft.body, draft.basis
     draft.say("compare the reduced body with the full model")
-    rows: list[Row] = []
-    comparison = {}
-    matrices = basis_matrices(connection.ops, basis)
-    statics = body.has_static_shapes
+    rows, static, comparison = list[Row](), list[Row](), {}
+    matrices, statics = basis_matrices(connection.ops, basis), body.has_static_shapes
     supports: list[tuple[str, ...]] = [(), *((name,) for name in connection.parts if statics)]
-    constrained = basis.labels[: len(connection.labels)] == connection.labels
-    parts = condensed_model(connection, basis, matrices[0]) if statics and constrained else None
     n_b = len(connection.labels)
+    constrained = basis.labels[:n_b] == connection.labels
+    parts = condensed_model(connection, basis, matrices[0]) if statics and constrained else None
     known = connection.ops.comparison_pays(len(supports), n_b, basis.Psi.shape[1] - n_b)
     known = known or draft.certify == "full" or parts is None or not _estimable(basis)
-    static: list[Row] = []
     with stages(len(supports), long=ops.n > MANY_DOFS) as begin:
         for fixed in supports:
             support = " + ".join(fixed) + " held" if fixed else "free"
@@ -84,9 +81,7 @@ def certify(draft: Draft) -> None:
             round_off = _round_off(rigid[-1].value, body, table["full"])
             rows += frequency_rows(support, table, round_off=round_off)
         rows += _estimate_rows(support, table)
-    rows += static
-    rows += rigid
-    rows += _matrix_rows(connection, basis, body, matrices)
+    rows += [*static, *rigid, *_matrix_rows(connection, basis, body, matrices)]
     rows += _effective_mass(body, tuple(connection.parts)) if statics else []
     rows += damping_rows(body, N_COMPARED)
     report = Report(f"certificate of {body.name}", (*rows, *draft.rows))
@@ -118,16 +113,11 @@ def compared(
     fixed: tuple[str, ...],
     support: Any,
 ) -> dict[str, list[float]]:
-    """Frequencies of both models in one support, their errors, and the agreement of shapes.
+    """Frequencies of both models with interfaces fixed, their errors, and the agreement of shapes.
 
-    Args:
-        connection: the full model in interface coordinates.
-        ops: the full model in nodal dofs.
-        body: the reduced body.
-        reduction: its basis, the full model condensed to the interfaces where that is known, and
-            stiffness and mass of the basis; None for frequencies alone.
-        fixed: interfaces that are held.
-        support: the same as `full_support` has it for the full model; None to estimate only.
+    The reduction is its basis, the full model condensed to the interfaces where that is known, and
+    stiffness and mass of the basis; None for frequencies alone. Support is what `full_support` has
+    for the full model; None to estimate only.
     """
     omega_r = body.modes(fixed=fixed)[0]
     n_rigid = int(np.count_nonzero(omega_r == 0.0))
@@ -163,12 +153,9 @@ def _estimable(basis: Basis) -> bool:
 
 
 def condensed_model(connection: Connection, basis: Basis, K: Array) -> Condensed:
-    """The full model condensed to its interfaces, with what the reduction has found.
+    """The full model condensed to its interfaces, by the stiffness K (r, r) of the basis.
 
-    Args:
-        connection: the full model in interface coordinates.
-        basis: its columns of the interfaces come first; ``held`` is of this very model.
-        K: (r, r) stiffness of the basis.
+    Its columns of the interfaces come first, and its ``held`` is of this very model.
     """
     boundary, n_b = connection.boundary, connection.boundary.size
     held = basis.held if basis.held is not None else connection.ops.hold(boundary)
@@ -198,12 +185,7 @@ def reduced_shapes(
 ) -> Array:
     """(n_local, n) shapes of the reduced model, computed from the basis and not from the body.
 
-    Args:
-        connection: the full model in interface coordinates.
-        basis: whose shapes.
-        fixed: interfaces that are held.
-        n: number of shapes.
-        matrices: stiffness and mass of the basis, where they are known.
+    Its stiffness and mass are computed where they are not known.
     """
     ops = connection.ops
     K, M = matrices or basis_matrices(ops, basis)
@@ -235,11 +217,8 @@ def _estimate_rows(support: str, table: dict[str, list[float]]) -> list[Row]:
     if not table["estimated"]:
         return []
     estimate = np.array(table["estimated"])
-    worst = row(
-        f"{support}: estimated error of {estimate.size} frequencies",
-        estimate.max(),
-        FREQUENCY_RTOL,
-    )
+    what = f"{support}: estimated error of {estimate.size} frequencies"
+    worst = row(what, estimate.max(), FREQUENCY_RTOL)
     if not table["full"]:
         return [worst]
     error = np.array(table["reduced"]) / np.array(table["full"]) - 1
@@ -267,23 +246,15 @@ def _static_row(connection: Connection, body: FlexibleBody, held: Any) -> list[R
 def rigid_rows(ops: Operators, body: FlexibleBody, elastic: Elastic) -> list[Row]:
     """Rigid motions of the body against those of the full model, their energy in the last row."""
     R = given_rigid_motions(ops)
-    KR, MR = ops.apply_K(R), ops.apply_M(R)
-    full = ops.gram(R, MR)
+    K, M = (ops.gram(R, apply(R)) for apply in (ops.apply_K, ops.apply_M))
     size = np.r_[np.ones(3), np.full(3, body.size)]
     weight = body.mass * np.outer(size, size)
-    stiffness = body.omega[0] ** 2 if body.omega.size else 1.0
+    apart = np.abs((rigid_mass(body) - M) / weight).max()
+    energy = np.abs(K / weight).max() / (body.omega[0] ** 2 if body.omega.size else 1.0)
     return [
-        row(
-            "mass, centre, inertia: body against full",
-            np.abs((rigid_mass(body) - full) / weight).max(),
-            1e-9,
-        ),
+        row("mass, centre, inertia: body against full", apart, 1e-9),
         row("rigid motions inside the basis", elastic.residual, 1e-8),
-        row(
-            "energy of rigid motions, over the first mode",
-            np.abs(ops.gram(R, KR) / weight).max() / stiffness,
-            1e-6,
-        ),
+        row("energy of rigid motions, over the first mode", energy, 1e-6),
     ]
 
 
@@ -329,10 +300,9 @@ def _asymmetry(A: Array) -> float:
 def _effective_mass(body: FlexibleBody, names: tuple[str, ...]) -> list[Row]:
     """Share of the mass that the kept modes carry when the supports shake; for information."""
     supports = {f"{names[0]} held": names[:1], "all interfaces held": names}
+    masses = {at: body.effective_mass(fixed=of)[:, :3].sum(axis=0) for at, of in supports.items()}
     return [
-        Row(f"{support}: effective mass along {axis}", float(value), "information", True)
-        for support, fixed in supports.items()
-        for axis, value in zip(
-            "xyz", body.effective_mass(fixed=fixed)[:, :3].sum(axis=0) / body.mass, strict=True
-        )
+        Row(f"{at}: effective mass along {axis}", float(share), "information", True)
+        for at, mass in masses.items()
+        for axis, share in zip("xyz", mass / body.mass, strict=True)
     ]

@@ -20,7 +20,7 @@ from rom.body.nonlinear.statics import follow, free_motions
 from rom.body.projection import cauchy_recovery
 from rom.checks.draft import COMPARISON_STAGE, Draft
 from rom.errors import ModelError
-from rom.model import Array, FEModel, Row
+from rom.model import Array, Row
 from rom.rows import row
 
 DISPLACEMENT_RTOL = 5e-3  # of the largest load, in the mean square over the mass
@@ -28,6 +28,12 @@ TANGENT_RTOL = 2e-2  # small errors of stress are large ones of the stiffness it
 COMPLIANCE_RTOL = 5e-2  # to forces and moments of all directions, beside the range as well
 STRESS_RTOL = 5e-2  # over all of the surface, of the mean square; it has the errors of slopes
 MESH_RTOL = 5e-3  # of the energy; a bent line is then stiffer by half as much again
+COMPARED = (  # of each step: attribute, words, limit
+    ("displacement", "displacement", DISPLACEMENT_RTOL),
+    ("frequencies", "frequencies about it", TANGENT_RTOL),
+    ("compliance", "compliance of interfaces about it", COMPLIANCE_RTOL),
+    ("stress", "stress", STRESS_RTOL),
+)
 SMALL_SHARE = 1e-3  # of the largest load, under which nothing turns
 STEP_SHARES = (0.35, 0.7, 1.0)  # of the largest load
 UNTRAINED_RATIO = np.sqrt(2) - 1  # of a component to the one before, as trained nowhere
@@ -42,25 +48,20 @@ def compare_deflections(draft: Draft) -> None:
     of the load at the steps compared, and there "displacement" and "frequencies", relative errors;
     "holds to", the share up to which all steps hold; "energy" [J] of the body there, and "turn"
     [rad] of the interface that has turned most.
-
-    Raises:
-        ModelError: naming a load under which the body has no stable equilibrium.
     """
     draft.watch.begin(COMPARISON_STAGE)
-    geometric, model, ops, body, E = draft.nonlinear, draft.model, draft.ops, draft.body, draft.E
-    full = HeldSolid.of(
-        model, draft.connection, body.reference, held_motions(geometric, model.interfaces),
-        neo_hookean=geometric.sampling is not None,
-    )  # fmt: skip
-    quartic, still = body.energy(), body.mean_rows(geometric.fixed)
-    E_local, ends = E, list[Array]()
-    E = full.whole(E)
+    geometric, model, ops, body = draft.nonlinear, draft.model, draft.ops, draft.body
+    held, hyperelastic = held_motions(geometric, model.interfaces), geometric.sampling is not None
+    full = HeldSolid.of(model, draft.connection, body.reference, held, neo_hookean=hyperelastic)
+    quartic, still, ends = body.energy(), body.mean_rows(geometric.fixed), list[Array]()
     about = axis_point(geometric, model, body.reference)
-    units = full.whole(nodal_forces(geometric.components(), model, ops, about))
-    held = held_motions(geometric, model.interfaces)
     further = [load for name in geometric.loads for k in range(6)
                if (load := Load(name, k)) not in held]  # fmt: skip
-    F = full.whole(nodal_forces(further, model, ops, about))
+    units, F = (
+        full.whole(nodal_forces(loads, model, ops, about))
+        for loads in (geometric.components(), further)
+    )
+    E = full.whole(draft.E)
     tangent = Tangent(body, still, E.T @ F)
     rows, table = list[Row](), dict[str, Any]()
     for name, case in load_cases(geometric).items():
@@ -95,26 +96,16 @@ def compare_deflections(draft: Draft) -> None:
             "energy": quartic.energy(path[n_held - 1]) if n_held else 0.0,
             "turn": _turn(body, path[n_held - 1]) if n_held else 0.0,
         }
-    coarse = _added_by_cells(model, E_local @ np.array(ends).T)
+    # a mesh that is too coarse for a turn stiffens, and so does the full model
+    stresses: Any = model.stresses
+    unresolved = stresses.large_strain().unresolved(draft.E @ np.array(ends).T)
+    straight, bent = unresolved.reshape(-1, 2).T
+    coarse = (bent - straight).max()
     rows.append(row("energy that cells add, too coarse to bend so far", coarse, MESH_RTOL))
     most = np.degrees(max(case["turn"] for case in table.values()))
     rows.append(Row("turn of an interface that holds [degrees]", most, "information", True))
     draft.rows = (*draft.rows, *rows)
     body.provenance["large deflection"] = table
-
-
-def _added_by_cells(model: FEModel, U: Array) -> float:
-    """Largest share of energy that is not resolved, less that under small loads.
-
-    A mesh that is too coarse for a turn stiffens, and so does the full model.
-
-    Args:
-        model: its mesh.
-        U: (n_local, 2 c) displacements under small and largest loads in turn.
-    """
-    stresses: Any = model.stresses
-    straight, bent = stresses.large_strain().unresolved(U).reshape(-1, 2).T
-    return float((bent - straight).max())
 
 
 def _turn(body: FlexibleBody, q: Array) -> float:
@@ -172,18 +163,10 @@ def case_rows(name: str, steps: list[Step]) -> list[Row]:
     """Lines of a load case, the worst of its steps; one more where the basis locks."""
     n = len(STEP_SHARES)
     rows = [row(f"{name}: full states found, of {n}", len(steps), n - 0.5, above=True)]
-    if not steps:
-        return rows
-    displacement = max(step.displacement for step in steps)
-    rows.append(row(f"{name}: displacement", displacement, DISPLACEMENT_RTOL))
-    frequencies = max(step.frequencies for step in steps)
-    rows.append(row(f"{name}: frequencies about it", frequencies, TANGENT_RTOL))
-    if yields := [step.compliance for step in steps if step.compliance is not None]:
-        quantity = f"{name}: compliance of interfaces about it"
-        rows.append(row(quantity, max(yields), COMPLIANCE_RTOL))
-    if stresses := [step.stress for step in steps if step.stress is not None]:
-        rows.append(row(f"{name}: stress", max(stresses), STRESS_RTOL))
-    reached = min(step.reached for step in steps)
+    for of, quantity, limit in COMPARED:
+        if values := [x for step in steps if (x := getattr(step, of)) is not None]:
+            rows.append(row(f"{name}: {quantity}", max(values), limit))
+    reached = min((step.reached for step in steps), default=1.0)
     if reached < 1 - DISPLACEMENT_RTOL:
         why = f"{name}: share of the full deflection; the body is too stiff, it has too few shapes"
         rows.append(row(why, reached, 1 - DISPLACEMENT_RTOL, above=True))

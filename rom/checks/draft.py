@@ -86,15 +86,10 @@ class Draft:
 
 
 def run(stages: Iterable[Stage], draft: Draft) -> Any:
-    """Do the stages of a reduction one after the other, and time them.
+    """Do the stages of a reduction one after the other, and time them; the body of the draft.
 
-    Args:
-        stages: functions of the draft, such as `rom.workflow.stages` lists; your own may be among
-            them.
-        draft: what is asked for.
-
-    Returns:
-        The body of the draft.
+    Stages are functions of the draft, such as `rom.workflow.stages` lists; your own may be among
+    them.
     """
     with stopwatch() as draft.watch:
         for stage in stages:

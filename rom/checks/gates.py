@@ -43,30 +43,18 @@ def check_model(model: FEModel) -> Report:
     """
     ops: Any = mesh_operators(model)
     R = given_rigid_motions(ops)
-    KR, MR = ops.apply_K(R), ops.apply_M(R)
     x = np.sin(np.arange(ops.first, ops.first + ops.n_local) + 1.0)[:, None]
-    Kx = ops.apply_K(x)
-    scale = np.sqrt(_square(ops, Kx) / _square(ops, x))
-    span = np.sqrt(np.diag(ops.gram(R, R)))
-    J = ops.gram(R, MR)
+    Kx, KR, J = ops.apply_K(x), ops.apply_K(R), ops.gram(R, ops.apply_M(R))
+    scale = np.sqrt(ops.gram(Kx, Kx)[0, 0] / ops.gram(x, x)[0, 0])
+    forces, span = (np.sqrt(np.diag(ops.gram(X, X))) for X in (KR, R))
     mass = np.diag(J)[:3]
-    return Report(
-        "finite element model",
-        (
-            row("stiffness against rigid motion", _rigid_residual(ops, KR, span, scale), 1e-10),
-            row("mass equal along x, y, z", np.ptp(mass) / mass.max(), 1e-10),
-            row("smallest principal inertia [kg m^2]", _central_inertia(J)[0], 0.0, above=True),
-            row("mass [kg]", model.mass(), 0.0, above=True),
-        ),
+    rows = (
+        row("stiffness against rigid motion", (forces / (span * scale)).max(), 1e-10),
+        row("mass equal along x, y, z", np.ptp(mass) / mass.max(), 1e-10),
+        row("smallest principal inertia [kg m^2]", _central_inertia(J)[0], 0.0, above=True),
+        row("mass [kg]", model.mass(), 0.0, above=True),
     )
-
-
-def _square(ops: Any, x: Array) -> float:
-    return float(ops.gram(x, x)[0, 0])
-
-
-def _rigid_residual(ops: Any, KR: Array, span: Array, scale: float) -> float:
-    return float((np.sqrt(np.diag(ops.gram(KR, KR))) / (span * scale)).max())
+    return Report("finite element model", rows)
 
 
 def _central_inertia(J: Array) -> Array:
@@ -88,43 +76,37 @@ def check_body(body: FlexibleBody) -> Report:
 
 
 def _body_rows(body: FlexibleBody) -> list[Row]:
-    M, lam = body.M, np.linalg.eigvalsh(body.K)
-    whole, _ = body.full_matrices()
+    lam, least = np.linalg.eigvalsh(body.K), np.linalg.eigvalsh(body.M)[0]
+    stiffest, (whole, _) = np.abs(lam).max(), body.full_matrices()
     scale = 1 / np.sqrt(np.maximum(np.diag(whole), 1e-300))
-    central = _central_inertia(rigid_mass(body))
+    apart = np.linalg.eigvalsh(scale[:, None] * whole * scale)[0]
+    small, middle, large = _central_inertia(rigid_mass(body))
+    squares = eigvalsh(body.K, body.M) if least > 0 else np.array(np.nan)
+    detuned = np.abs(squares - body.omega**2).max() / np.abs(squares).max()
+    # of momentum |int rho phi| over sqrt(m int rho phi^2): above one the integrals cannot be real
+    momentum = np.linalg.norm(rigid_elastic(body)[:3], axis=0)
+    bound = (momentum / np.sqrt(body.mass * np.diag(body.M))).max()
+    damping = np.linalg.eigvalsh(body.D)[0], -1e-9 * stiffest**0.5
+    swapped = body.S_kl.transpose(1, 0, 3, 2)
     return [
         row("mass [kg]", body.mass, 0.0, above=True),
-        row("smallest principal inertia [kg m^2]", central[0], 0.0, above=True),
-        row(
-            "triangle rule of principal inertias", central[2] / (central[0] + central[1]), 1 + 1e-9
-        ),
-        row("asymmetry of K", _asymmetry(body.K), 1e-12),
-        row("asymmetry of D", _asymmetry(body.D), 1e-12),
-        row("asymmetry of the inertia integrals", _swapped(body.S_kl), 1e-12),
-        row("smallest over largest stiffness", lam[0] / np.abs(lam).max(), 0.0, above=True),
-        row("frequencies of the coordinates against stiffness and mass", _detuned(body), 1e-6),
-        row(
-            "smallest damping",
-            np.linalg.eigvalsh(body.D)[0],
-            -1e-9 * np.abs(lam).max() ** 0.5,
-            above=True,
-        ),
-        row("smallest eigenvalue of M", np.linalg.eigvalsh(M)[0], 0.0, above=True),
-        row(
-            "frame and shapes together: smallest scaled mass",
-            np.linalg.eigvalsh(scale[:, None] * whole * scale)[0],
-            1e-12,
-            above=True,
-        ),
-        row("momentum of the shapes within Schwarz' bound", _schwarz(body), 1 + 1e-9),
+        row("smallest principal inertia [kg m^2]", small, 0.0, above=True),
+        row("triangle rule of principal inertias", large / (small + middle), 1 + 1e-9),
+        row("asymmetry of K", _gap(body.K, body.K.T), 1e-12),
+        row("asymmetry of D", _gap(body.D, body.D.T), 1e-12),
+        row("asymmetry of the inertia integrals", _gap(body.S_kl, swapped), 1e-12),
+        row("smallest over largest stiffness", lam[0] / stiffest, 0.0, above=True),
+        row("frequencies of the coordinates against stiffness and mass", detuned, 1e-6),
+        row("smallest damping", *damping, above=True),
+        row("smallest eigenvalue of M", least, 0.0, above=True),
+        row("frame and shapes together: smallest scaled mass", apart, 1e-12, above=True),
+        row("momentum of the shapes within Schwarz' bound", bound, 1 + 1e-9),
         *_marker_rows(body),
     ]
 
 
-def _detuned(body: FlexibleBody) -> float:
-    """Largest difference of the squared frequencies it has from those it says, of the largest."""
-    found = eigvalsh(body.K, body.M) if np.linalg.eigvalsh(body.M)[0] > 0 else np.array(np.nan)
-    return float(np.abs(found - body.omega**2).max() / np.abs(found).max())
+def _gap(A: Array, B: Array) -> float:
+    return float(np.abs(A - B).max() / max(np.abs(A).max(), 1e-300))
 
 
 def _marker_rows(body: FlexibleBody) -> list[Row]:
@@ -140,18 +122,3 @@ def _marker_rows(body: FlexibleBody) -> list[Row]:
         drift = np.abs(reference_motion(body, body.reference) * size).max() * np.sqrt(body.mass)
         rows.append(row("motion of the frame in the shapes", drift, 1e-6))
     return rows
-
-
-def _asymmetry(A: Array) -> float:
-    return float(np.abs(A - A.T).max() / max(np.abs(A).max(), 1e-300))
-
-
-def _swapped(S_kl: Array) -> float:
-    other = S_kl.transpose(1, 0, 3, 2)
-    return float(np.abs(S_kl - other).max() / max(np.abs(S_kl).max(), 1e-300))
-
-
-def _schwarz(body: FlexibleBody) -> float:
-    """Largest |int rho phi| over sqrt(m int rho phi^2); above one the integrals cannot be real."""
-    momentum = np.linalg.norm(rigid_elastic(body)[:3], axis=0)
-    return float((momentum / np.sqrt(body.mass * np.diag(body.M))).max())

@@ -36,19 +36,14 @@ class GluedSolid:
     def of(
         cls, models: Mapping[str, FEModel], joints: Mapping[str, tuple[str, str]]
     ) -> "GluedSolid":
-        """Pieces glued at the nodes of their joints.
-
-        Raises:
-            ModelError: if nodes of two pieces do not meet at a joint.
-        """
+        """Pieces glued at the nodes of their joints, which have to meet."""
         hangs = {other: (joint, one) for joint, (one, other) in joints.items()}
         number, n = dict[str, Index](), 0
         for key in [k for k in models if k not in hangs] + [other for _, other in joints.values()]:
-            model = models[key]
-            nodes = np.full(len(model.points), -1)
+            nodes = np.full(len(models[key].points), -1)
             if key in hangs:
                 joint, one = hangs[key]
-                mine, other = model.interfaces[joint], models[one].interfaces[joint]
+                mine, other = (models[k].interfaces[joint] for k in (key, one))
                 nodes[mine.nodes] = number[one][other.nodes[_meeting(mine, other)]]
             new = nodes < 0
             nodes[new] = n + np.arange(np.count_nonzero(new))
@@ -100,14 +95,12 @@ class GluedSolid:
 
     def _sum(self, parts: Mapping[str, Any]) -> csr_matrix:
         """(n, n) sum of matrices of the pieces, by their numbers in the whole."""
-        rows, columns, values = [], [], []
-        for key, part in parts.items():
-            A = coo_matrix(part)
-            rows.append(self.dofs[key][A.row])
-            columns.append(self.dofs[key][A.col])
-            values.append(A.data)
-        where = np.concatenate(rows), np.concatenate(columns)
-        return csr_matrix((np.concatenate(values), where), shape=(self.n, self.n))
+        entries = [
+            (self.dofs[key][A.row], self.dofs[key][A.col], A.data)
+            for key, A in ((key, coo_matrix(part)) for key, part in parts.items())
+        ]
+        rows, columns, values = map(np.concatenate, zip(*entries, strict=True))
+        return csr_matrix((values, (rows, columns)), shape=(self.n, self.n))
 
 
 def _meeting(one: Interface, other: Interface) -> Index:

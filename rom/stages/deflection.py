@@ -16,13 +16,19 @@ from rom.stages import bodies
 
 
 def stages(draft: Draft) -> list[Stage]:
-    """What `rom.reduce` does for large deflection, in its order.
-
-    Raises:
-        ConfigError: for options that do not go together.
-    """
-    _refuse(draft)
+    """What `rom.reduce` does for large deflection, in its order."""
     sampled = draft.nonlinear.sampling is not None
+    if draft.stiffening:
+        raise ConfigError(
+            "stiffening is that of small deflection; nonlinear has the stiffening of loads in its "
+            "energy.",
+            hint="Leave stiffening out.",
+        )
+    if sampled and draft.stress:
+        raise ConfigError(
+            "stress and sampling do not go together: most elements are left out.",
+            hint="Leave stress out, or sampling for St. Venant-Kirchhoff material.",
+        )
     return wanted(
         (draft.open_orders, bodies.choose_orders),
         (True, bodies.connect),
@@ -38,20 +44,6 @@ def stages(draft: Draft) -> list[Stage]:
         (draft.certify, compare_deflections),
         (draft.certify, certify),
     )
-
-
-def _refuse(draft: Draft) -> None:
-    if draft.stiffening:
-        raise ConfigError(
-            "stiffening is that of small deflection; nonlinear has the stiffening of loads in its "
-            "energy.",
-            hint="Leave stiffening out.",
-        )
-    if draft.nonlinear.sampling is not None and draft.stress:
-        raise ConfigError(
-            "stress and sampling do not go together: most elements are left out.",
-            hint="Leave stress out, or sampling for St. Venant-Kirchhoff material.",
-        )
 
 
 def enrich(draft: Draft) -> None:

@@ -8,6 +8,7 @@ from numpy.testing import assert_allclose
 
 import rom
 from cases.halves import COUPLED, FULL, ROOT, half, joined, study, whole
+from cases.refusals import refuses
 from cases.solid import block
 from rom.errors import ConfigError, InterfaceError
 from rom.model import Row
@@ -64,16 +65,12 @@ def test_meshes_that_do_not_match_are_coupled_by_their_functions():
 
 
 def test_a_chain_of_four_is_coupled_in_any_order():
-    quarter = [
-        block(size=(0.25, 0.1, 0.08), cells=(3, 2, 2), origin=(0.25 * k, 0, 0)) for k in range(4)
-    ]
-    bodies = {
-        f"part {k}": rom.reduce(
-            model, method=rom.CraigBampton(15),
-            interfaces={"root": "rbe2" if k == 0 else "full", "tip": "full"}, certify=False,
-        )
-        for k, model in enumerate(quarter)
-    }  # fmt: skip
+    bodies = {}
+    for k in range(4):
+        model = block(size=(0.25, 0.1, 0.08), cells=(3, 2, 2), origin=(0.25 * k, 0, 0))
+        ends = {"root": "full" if k else "rbe2", "tip": "full"}
+        body = rom.reduce(model, method=rom.CraigBampton(15), interfaces=ends, certify=False)
+        bodies[f"part {k}"] = body
     couplings = tuple(((f"part {k}", "tip"), (f"part {k + 1}", "root")) for k in range(3))
     root = (("part 0", "root"),)
     forward = rom.Assembly(bodies, couplings).frequencies(6, fixed=root)
@@ -87,18 +84,16 @@ def test_a_chain_of_four_is_coupled_in_any_order():
 
 
 def test_messages_for_couplings_that_cannot_be():
-    left, right = half("left", "full"), half("right", "full")
-    bodies = {"left": left, "right": right}
-    with pytest.raises(ConfigError, match="no body 'middle'"):
-        rom.Assembly(bodies, ((("middle", "tip"), ("right", "root")),))
-    with pytest.raises(InterfaceError, match="no interface 'top'"):
-        rom.Assembly(bodies, ((("left", "top"), ("right", "root")),))
-    with pytest.raises(ConfigError, match=r"couplings\[0\] = .* must be a row of 2"):
-        rom.Assembly(bodies, (("left", "tip", "right", "root"),))
-    with pytest.raises(InterfaceError, match=r"full with 27 .* polynomial:1 with 9: they"):
-        rom.Assembly(bodies | {"right": half("right", "polynomial:1")}, COUPLED)
-    with pytest.raises(InterfaceError, match="lie 1 m apart"):
-        rom.Assembly(bodies, ((("left", "root"), ("right", "tip")),))
+    bodies = {side: half(side, "full") for side in ("left", "right")}
+    other = {"right": half("right", "polynomial:1")}
+    for error, says, coupling, change in (
+        (ConfigError, "no body 'middle'", (("middle", "tip"), ("right", "root")), {}),
+        (InterfaceError, "no interface 'top'", (("left", "top"), ("right", "root")), {}),
+        (ConfigError, r"ings\[0\] = .* must be a row of 2", ("left", "tip", "right", "root"), {}),
+        (InterfaceError, r"full with 27 .* polynomial:1 with 9: they", *COUPLED, other),
+        (InterfaceError, "lie 1 m apart", (("left", "root"), ("right", "tip")), {}),
+    ):
+        refuses(error, says, rom.Assembly, bodies | change, (coupling,))
 
 
 STUDY = {
@@ -130,10 +125,8 @@ def test_certificates_of_an_assembly_and_of_its_few_functions():
     assert {line.quantity.partition(":")[0] for line in rows[:-1]} == {"left", "right"}
     assert rows[-1].quantity.startswith("gap of coupled interfaces") and rows[-1].value > 0
     assert assembly.reduced(20).certificate.ok
-    poor = assembly.reduced(2, fixed=(ROOT,)).certificate
-    assert [line.quantity for line in poor.failures] == [
-        "2 interface functions: worst error of 6 frequencies"
-    ]
+    (poor,) = assembly.reduced(2, fixed=(ROOT,)).certificate.failures
+    assert poor.quantity == "2 interface functions: worst error of 6 frequencies"
 
 
 def certify_of_parts(assembly):

@@ -36,39 +36,32 @@ def bare(interface):
     return Marker("s", interface.origin, none, none, "full", np.eye(n), patch)
 
 
+def right_half(model, kind, n_modes=10):
+    """The body of a model of the right half, in place of the one of `half`."""
+    ends = {"root": kind, "tip": "rbe2"}
+    return rom.reduce(model, method=rom.CraigBampton(n_modes), interfaces=ends, certify=False)
+
+
 @pytest.mark.parametrize("kind", ["full", "polynomial:2"])
 def test_nodes_are_paired_by_position_whatever_their_order(kind):
     expected = joined(kind, n_modes=10).frequencies(12)
-    model = turned(
-        block(size=(0.5, 0.1, 0.08), cells=COARSE, origin=(0.5, 0, 0)), "root",
-        np.random.default_rng(4).permutation(9),
-    )  # fmt: skip
-    model = replace(model, points=model.points + 1e-9)  # round-off of another mesher
-    i = model.interfaces["root"]
-    model = replace(
-        model, interfaces=model.interfaces | {"root": replace(i, points=i.points + 1e-9)}
-    )
-    right = rom.reduce(
-        model, method=rom.CraigBampton(10), interfaces={"root": kind, "tip": "rbe2"}, certify=False
-    )
+    model = block(size=(0.5, 0.1, 0.08), cells=COARSE, origin=(0.5, 0, 0))
+    model = turned(model, "root", np.random.default_rng(4).permutation(9))
+    i, moved = model.interfaces["root"], 1e-9  # round-off of another mesher
+    faces = model.interfaces | {"root": replace(i, points=i.points + moved)}
+    right = right_half(replace(model, points=model.points + moved, interfaces=faces), kind)
     bodies = {"left": half("left", kind, n_modes=10), "right": right}
     assert_allclose(rom.Assembly(bodies, COUPLED).frequencies(12), expected, rtol=1e-6, atol=1e-6)
 
 
 @pytest.mark.parametrize(
-    ("shape", "functions", "n"),
-    [
-        ("plane", rom.Polynomial(1), 3),
-        ("plane", rom.Polynomial(3), 10),
-        ("cylinder", rom.Polynomial(1), 4),
-        ("cylinder", rom.Polynomial(3), 16),
-        ("wave", rom.Polynomial(2), 10),
-    ],
+    ("shape", "order", "n"),
+    [("plane", 1, 3), ("plane", 3, 10), ("cylinder", 1, 4), ("cylinder", 3, 16), ("wave", 2, 10)],
 )
-def test_displacements_of_the_functions_pass_without_error(shape, functions, n):
+def test_displacements_of_the_functions_pass_without_error(shape, order, n):
     """Patch test on any two meshes of a surface: up to the order, not beyond."""
     one, other = surface(shape, 300), surface(shape, 200)
-    A, B = coupling.projected_rows(bare(one), bare(other), functions)
+    A, B = coupling.projected_rows(bare(one), bare(other), rom.Polynomial(order))
     assert A.shape[0] == B.shape[0] == 3 * n
     assert np.linalg.matrix_rank(A) == np.linalg.matrix_rank(B) == 3 * n
 
@@ -77,13 +70,12 @@ def test_displacements_of_the_functions_pass_without_error(shape, functions, n):
         return np.abs(a - b).max() / np.abs(a).max()
 
     centre, rng = one.points.mean(axis=0), np.random.default_rng(5)
-    for degree in range(1, functions.order + 1):
+    for degree in range(1, order + 1):
         C = rng.normal(size=(3, 3))
         assert gap(lambda x, C=C, d=degree: ((x - centre) @ C / 0.05) ** d) < 1e-10
     for k in range(6):
         assert gap(lambda x, k=k: rigid_motions(x)[:, k]) < 1e-10
-    beyond = functions.order + 1
-    assert gap(lambda x: ((x - centre) @ np.ones((3, 3)) / 0.05) ** beyond) > 1e-3
+    assert gap(lambda x: ((x - centre) @ np.ones((3, 3)) / 0.05) ** (order + 1)) > 1e-3
 
 
 def faceted(n, turn=0.0):
@@ -137,9 +129,8 @@ def test_moments_tend_from_below_to_coupling_node_by_node(monkeypatch):
     assert [pair.n_conditions[0] for pair in pairs] == [9, 18, 24, 27]
     assert (np.diff(found, axis=0) >= -1e-9 * exact).all()
     assert (found[0] < exact * (1 - 1e-4)).any()
-    assert_allclose(
-        found[-1], exact, rtol=1e-9
-    )  # nine nodes have nine functions: x^i y^j, i, j < 3
+    # nine nodes have nine functions: x^i y^j, i, j < 3
+    assert_allclose(found[-1], exact, rtol=1e-9)
 
 
 def test_meshes_that_do_not_match_lie_between_the_matching_ones():
@@ -183,11 +174,8 @@ def test_functions_of_unequal_surfaces_need_a_projection():
     i = model.interfaces["root"]
     wider = replace(i, surface_mass=1.05 * i.surface_mass)
     model = replace(model, interfaces=model.interfaces | {"root": wider})
-    right = rom.reduce(
-        model, method=rom.CraigBampton(10), interfaces={"root": "polynomial:2", "tip": "rbe2"},
-        certify=False,
-    )  # fmt: skip
-    bodies = {"left": half("left", "polynomial:2", n_modes=10), "right": right}
+    bodies = {"left": half("left", "polynomial:2", n_modes=10)}
+    bodies["right"] = right_half(model, "polynomial:2")
     with pytest.raises(InterfaceError, match=r"has 9 nodes, .* has 16, .* polynomial:2 coord"):
         rom.Assembly(bodies, COUPLED)
     expected = joined("polynomial:2", (COARSE, FINE), n_modes=10).frequencies(8, fixed=(ROOT,))
@@ -199,11 +187,7 @@ def test_a_saved_body_is_coupled_like_the_one_it_was(tmp_path):
     model = block(size=(0.5, 0.1, 0.08), cells=FINE, origin=(0.5, 0, 0))
     model = turned(model, "root", np.random.default_rng(6).permutation(16))
     for kind in ("full", "polynomial:2"):
-        right = rom.reduce(
-            model, method=rom.CraigBampton(10), interfaces={"root": kind, "tip": "rbe2"},
-            certify=False,
-        )  # fmt: skip
-        bodies = {"left": half("left", kind, n_modes=10), "right": right}
+        bodies = {"left": half("left", kind, n_modes=10), "right": right_half(model, kind)}
         read = {n: rom.load(rom.save(b, tmp_path / f"{n}.npz")) for n, b in bodies.items()}
         before, after = (b["right"].marker("root").patch for b in (bodies, read))
         assert_allclose(after.surface_mass.toarray(), before.surface_mass.toarray(), rtol=1e-15)
@@ -224,11 +208,7 @@ def test_messages_for_surfaces_that_do_not_meet():
         ((0.5, 0.1, 0.08), (0.5, 0.02, 0), r"lie 0\.02 m apart"),
         ((0.5, 0.12, 0.1), (0.5, -0.01, -0.01), r"area of 0\.008, .* of 0\.012: they do not cover"),
     ):
-        model = block(size=size, cells=FINE, origin=origin)
-        other = rom.reduce(
-            model, method=rom.CraigBampton(4), interfaces={"root": "full", "tip": "rbe2"},
-            certify=False,
-        )  # fmt: skip
+        other = right_half(block(size=size, cells=FINE, origin=origin), "full", 4)
         with pytest.raises(InterfaceError, match=words):
             rom.Assembly({"left": left, "right": other}, COUPLED, projection=rom.Polynomial(2))
 

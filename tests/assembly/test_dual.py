@@ -7,15 +7,14 @@ import pytest
 from numpy.testing import assert_allclose
 
 import rom
+from cases.halves import COUPLED, ROOT
+from cases.halves import whole as whole_block
 from cases.operators import KINDS
+from cases.refusals import refuses
 from cases.solid import block
 from rom.assembly.dual import free_substructure
 from rom.errors import ConfigError, InterfaceError
 from rom.reduction.interfaces.connection import connect
-
-COUPLED = ((("left", "tip"), ("right", "root")),)
-ROOT = ("left", "root")
-KIND = {"root": "rbe2", "tip": "rbe2"}
 
 
 def half(side, cells=(5, 2, 2)):
@@ -38,8 +37,7 @@ def joined(n_modes, make=None, inner="full", cells=(5, 2, 2)):
 
 
 def whole(n, fixed=("root",)):
-    model = block(size=(1.0, 0.1, 0.08), cells=(10, 2, 2))
-    return rom.modes(model, n, fixed=fixed, interfaces=KIND).frequencies
+    return whole_block((10, 2, 2), fixed, n)
 
 
 @pytest.mark.parametrize("make", KINDS)
@@ -117,9 +115,7 @@ def test_all_modes_are_the_whole():
     """Nothing is left to the residual: the forces become constraints."""
     n = half("left", (2, 1, 1)).n_dofs - (12 - 6)  # rbe2 replaces the twelve dofs of an end
     found = joined(n - 6, cells=(2, 1, 1)).frequencies(20, kind="rubin", fixed=(ROOT,))
-    model = block(size=(1.0, 0.1, 0.08), cells=(4, 1, 1))
-    exact = rom.modes(model, 20, fixed=("root",), interfaces=KIND).frequencies
-    assert_allclose(found, exact, rtol=1e-8)
+    assert_allclose(found, whole_block((4, 1, 1), n=20), rtol=1e-8)
     with pytest.raises(InterfaceError, match="find no residual flexibility"):
         joined(n - 6, cells=(2, 1, 1)).frequencies(kind="dual")
 
@@ -128,14 +124,10 @@ def test_a_slender_beam_of_two_halves_bends_as_euler_and_bernoulli_say():
     """Free: (4.730041)^2 sqrt(E I / (rho A L^4)) for the thin side, from two bodies."""
     from benchmarks.models import bar
 
-    left, right = bar((0.5, 0.02, 0.01), (8, 1, 1)), bar((0.5, 0.02, 0.01), (8, 1, 1))
-    kinds = {"root": "full", "tip": "full"}
-    bodies = {
-        name: rom.substructure(model, n_modes=12, interfaces=kinds)
-        for name, model in (("left", left), ("right", right))
-    }
-    shifted = {name: x + np.array([0.5, 0.0, 0.0]) for name, x in bodies["right"].origins.items()}
-    bodies["right"] = replace(bodies["right"], origins=shifted)
+    ends = {"root": "full", "tip": "full"}
+    left = rom.substructure(bar((0.5, 0.02, 0.01), (8, 1, 1)), n_modes=12, interfaces=ends)
+    shifted = {name: x + np.array([0.5, 0.0, 0.0]) for name, x in left.origins.items()}
+    bodies = {"left": left, "right": replace(left, origins=shifted)}
     found = rom.DualAssembly(bodies, COUPLED).frequencies(7)
     exact = 4.730041**2 * np.sqrt(210e9 * 0.01**2 / (12 * 7850.0)) / (2 * np.pi)
     assert found[6] == pytest.approx(exact, rel=3e-3)
@@ -143,13 +135,10 @@ def test_a_slender_beam_of_two_halves_bends_as_euler_and_bernoulli_say():
 
 def test_messages():
     assembly = joined(4)
-    with pytest.raises(ConfigError, match="none of 'macneal', 'rubin', 'dual'"):
-        assembly.frequencies(kind="craig")
-    with pytest.raises(ConfigError, match="no body 'middle'"):
-        assembly.frequencies(fixed=(("middle", "root"),))
+    refuses(ConfigError, "none of 'macneal', 'rubin', 'dual'", assembly.frequencies, kind="craig")
+    refuses(ConfigError, "no body 'middle'", assembly.frequencies, fixed=(("middle", "root"),))
     with pytest.raises(InterfaceError, match="has no interface 'side'"):
         assembly.frequencies(fixed=(("left", "side"),))
-    with pytest.raises(InterfaceError, match=r"27 coordinates and .* has 6"):
-        rom.DualAssembly(assembly.bodies, ((("left", "tip"), ("right", "tip")),))
-    with pytest.raises(InterfaceError, match="lie 1 m apart"):
-        rom.DualAssembly(assembly.bodies, ((("left", "root"), ("right", "tip")),))
+    for end, says in (("tip", r"27 coordinates and .* has 6"), ("root", "lie 1 m apart")):
+        couplings = ((("left", end), ("right", "tip")),)
+        refuses(InterfaceError, says, rom.DualAssembly, assembly.bodies, couplings)

@@ -6,6 +6,7 @@ from numpy.testing import assert_allclose
 
 import rom
 from cases.long import few
+from cases.refusals import refuses
 from cases.solid import block
 from rom.body.damping import damped
 from rom.errors import ConfigError, InterfaceError
@@ -36,7 +37,7 @@ def random_damping(rng, body):
 
 
 def in_motion(body, fixed):
-    """Eigenvalues of the elastic modes of a mechanism that holds the body."""
+    """Eigenvalues of the elastic modes of a mechanism that holds the body, by imaginary part."""
     mech = rom.Mechanism(gravity=(0, 0, 0))
     part = mech.add_flexible("part", body)
     for name in fixed:
@@ -44,11 +45,7 @@ def in_motion(body, fixed):
         mech.fixed(f"wall {name}", ground, part.marker(name))
     roots = rom.linearize(mech).eigenvalues
     n = np.count_nonzero(body.frequencies(fixed=fixed))
-    return by_imaginary_part(roots[roots.imag > 0])[-n:] if n else roots[:0]
-
-
-def by_imaginary_part(roots):
-    return roots[np.argsort(roots.imag)]
+    return sorted(roots[roots.imag > 0], key=np.imag)[-n:] if n else []
 
 
 @pytest.mark.parametrize("seed", few(6, range(40)))
@@ -69,7 +66,7 @@ def test_a_law_of_damping_says_the_same_in_every_frame(seed):
             roots = in_motion(one, support)
             assert_allclose(roots, everywhere.setdefault(support, roots), rtol=1e-7)
             if support == fixed:
-                assert_allclose(roots, by_imaginary_part(exact), rtol=1e-6)
+                assert_allclose(roots, sorted(exact, key=np.imag), rtol=1e-6)
 
 
 def test_the_certificate_has_the_ratio_of_each_mode_in_each_support():
@@ -79,7 +76,7 @@ def test_the_certificate_has_the_ratio_of_each_mode_in_each_support():
     body = rom.reduce(model, method=rom.CraigBampton(12), interfaces=KINDS, damping=damping)
     rows = {row.quantity: row.value for row in body.certificate.rows}
     for support, fixed in {"free": (), "root held": ("root",), "tip held": ("tip",)}.items():
-        roots = in_motion(body, fixed)[:3]
+        roots = np.array(in_motion(body, fixed)[:3])
         found = [rows[f"{support}: damping ratio of mode {k}"] for k in (1, 2, 3)]
         expected = 0.02 if fixed == ("root",) else -roots.real / np.abs(roots)
         assert_allclose(found, expected, rtol=1e-6 if fixed == ("root",) else 0.1)
@@ -92,5 +89,4 @@ def test_an_interface_where_ratios_are_meant_must_exist():
     body = random_body(np.random.default_rng(0))
     with pytest.raises(InterfaceError, match="no interface 'wall'"):
         rom.ModalDamping(0.02, fixed=("wall",)).matrix(body)
-    with pytest.raises(ConfigError, match="directions"):
-        rom.ModalDamping(0.02, fixed={"root": "q"}).matrix(body)
+    refuses(ConfigError, "directions", rom.ModalDamping(0.02, fixed={"root": "q"}).matrix, body)

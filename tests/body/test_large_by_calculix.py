@@ -13,6 +13,7 @@ from numpy.testing import assert_allclose
 from scipy.spatial import cKDTree
 
 import rom
+from cases.mbs.slender import cantilever
 
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")
 pytestmark = [
@@ -66,13 +67,9 @@ def test_an_angle_bends_and_twists_as_in_calculix(tmp_path):
     path = tmp_path / "angle.geo"
     path.write_text(ANGLE)
     model = rom.fe.model(path, material=ALUMINIUM)
-    body = rom.reduce(
-        model,
-        method=rom.CraigBampton(6),
-        interfaces={"root": "rbe2", "tip": "rbe3"},
-        reference="root",
-        nonlinear=rom.Geometric(loads={"tip": (*np.sqrt(2) * FORCE, 0, 0, 0)}),
-    )
+    ends, loads = {"root": "rbe2", "tip": "rbe3"}, {"tip": (*np.sqrt(2) * FORCE, 0, 0, 0)}
+    body = rom.reduce(model, method=rom.CraigBampton(6), interfaces=ends, reference="root",
+                      nonlinear=rom.Geometric(loads=loads))  # fmt: skip
     states = body.equilibria({"tip": (*FORCE, 0, 0, 0)}, shares=SHARES)
     ours = states @ body.marker("tip").translation.T
     theirs = by_calculix(tmp_path, path, model.interfaces["tip"])
@@ -81,10 +78,7 @@ def test_an_angle_bends_and_twists_as_in_calculix(tmp_path):
     assert (np.linalg.norm(ours - theirs, axis=1) < 1e-3 * size).all()
     linear = np.array(SHARES)[:, None] * theirs[0] / SHARES[0]
     assert np.linalg.norm(linear - theirs, axis=1)[-1] > 0.1 * size[-1]
-    mech = rom.Mechanism(gravity=(0, 0, 0))
-    part = mech.add_flexible("angle", body)
-    clamp = mech.ground.marker(body.markers["root"].point)
-    mech.fixed("clamp", clamp, part.marker("root"))
+    mech, part = cantilever(body)
     mech.force("load", part.marker("tip"), FORCE)
     elastic = rom.equilibrium(mech, steps=4).q[7:]
     assert_allclose(elastic, states[-1], atol=1e-6 * np.abs(states[-1]).max())

@@ -116,13 +116,8 @@ class Change(ast.NodeTransformer):
 
 def mutants(name):
     """Laws in which one place of a method is changed, and what that reads like."""
-    text = textwrap.dedent(
-        inspect.getsource(
-            inspect.getattr_static(Quartic, name).__func__
-            if name == "from_gram"
-            else getattr(Quartic, name)
-        )
-    )
+    method = inspect.getattr_static(Quartic, name)
+    text = textwrap.dedent(inspect.getsource(getattr(method, "__func__", method)))
     for times in (2, 3):
         for which in range(200):
             change = Change(which, times)

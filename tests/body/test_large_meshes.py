@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 
 import rom
 from cases.long import COARSE, few
-from cases.mbs.slender import STEEL, assembled, reduced, tip_of
+from cases.mbs.slender import assembled, reduced, slender, tip_of
 
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")
 pytestmark = COARSE
@@ -25,10 +25,7 @@ def test_meshes_follow_the_elastica_or_are_told_to_be_too_coarse(kind, slenderne
 
     A cell that turns by a is strained by a^2 (x^2 / l^2 - 1 / 12) / 2, though a bent line is not.
     """
-    h = 1 / slenderness
-    material = rom.Material(E=STEEL.E, nu=0.0, rho=7850.0)
-    model = assembled((1.0, h, h), (cells, 1, 1), kind=kind, material=material)
-    EI = STEEL.E * h**4 / 12
+    model, EI = slender(slenderness, cells, kind=kind)
     body = reduced(model, (0, 5 * EI, 0, 0, 0, 0), n_shapes=15, certify=True)
     assert body.n_modes <= 25
     added = next(row for row in body.certificate.rows if "too coarse" in row.quantity)

@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 import rom
 import rom.body.nonlinear.ranges
 from cases.long import COARSE
-from cases.mbs.slender import Full, assembled, slender
+from cases.mbs.slender import Full, assembled, reduced, slender
 from rom.errors import ConfigError, InterfaceError, ModelError, RomError, RomWarning
 
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")
@@ -38,18 +38,11 @@ KINDS = {
     "rigid": "rbe2",
     "found": snapshots,
 }
-METHODS = {
-    "craig-bampton": rom.CraigBampton(n_modes=4),
-    "guyan": rom.Guyan(),
-    "balanced": rom.BalancedTruncation(n_modes=4),
-    "moments": rom.MomentMatching(order=1),
-    "herting": rom.Herting(n_modes=4),
-    "rubin": rom.Rubin(n_modes=4),
-    "enhanced": rom.EnhancedCraigBampton(n_modes=4),
-    "free": rom.FreeFree(n_modes=4),
-    "assumed": rom.AssumedModes(n_modes=4),
-}
-FEW = {("rbe3", name) for name in METHODS} | {(name, "craig-bampton") for name in KINDS}
+WITH_MODES = (rom.CraigBampton, rom.BalancedTruncation, rom.Herting, rom.Rubin,
+              rom.EnhancedCraigBampton, rom.FreeFree, rom.AssumedModes)  # fmt: skip
+METHODS = {method.__name__: method(n_modes=4) for method in WITH_MODES}
+METHODS |= {"Guyan": rom.Guyan(), "MomentMatching": rom.MomentMatching(order=1)}
+FEW = {("rbe3", name) for name in METHODS} | {(name, "CraigBampton") for name in KINDS}
 
 
 @pytest.mark.parametrize("kind, method", sorted(FEW))
@@ -57,15 +50,11 @@ def test_any_kind_of_interface_and_method_is_right_or_refused_by_name(beam, kind
     model, load, known = beam
     of = KINDS[kind](model) if callable(KINDS[kind]) else KINDS[kind]
     try:
-        body = rom.reduce(
-            model, method=METHODS[method], interfaces={"root": "rbe3", "tip": of},
-            reference="root", certify=False,
-            nonlinear=rom.Geometric(loads={"tip": load}, n_modes=2, n_steps=2),
-        )  # fmt: skip
+        body = reduced(model, load, method=METHODS[method], tip=of, active=2, n_steps=2)
     except RomError as error:
         assert any(word in str(error) for word in ("interface", "method", "coordinates")), error
         assert "equilibrium" not in str(error)
-        assert (kind, method) not in {("rbe3", "craig-bampton"), ("affine", "craig-bampton")}
+        assert (kind, method) not in {("rbe3", "CraigBampton"), ("affine", "CraigBampton")}
         return
     (q,) = body.equilibria({"tip": load})
     assert_allclose(body.marker("tip").translation @ q, known, rtol=0, atol=1e-2)
@@ -78,10 +67,7 @@ REFERENCES = ("free", "mean-axis", "buckens", ("root", "tip"), "hub", "")
 def test_frames_that_are_no_interface_are_refused(beam, reference):
     model, load, _ = beam
     with pytest.raises((ConfigError, InterfaceError), match=r"reference|seen from|hub"):
-        rom.reduce(
-            model, method=rom.Guyan(), interfaces={"root": "rbe3", "tip": "rbe3"},
-            reference=reference, nonlinear=rom.Geometric(loads={"tip": load}),
-        )  # fmt: skip
+        reduced(model, load, method=rom.Guyan(), reference=reference)
 
 
 @pytest.mark.parametrize("size", [30.0, pytest.param(1e3, marks=pytest.mark.long), 1e5])
@@ -92,11 +78,8 @@ def test_a_load_beyond_what_one_body_carries_is_refused_or_fails_its_certificate
     load = np.zeros(6)
     load[component] = size * EI
     try:
-        body = rom.reduce(
-            model, method=rom.Guyan(), interfaces={"root": "rbe3", "tip": "rbe3"},
-            reference="root",
-            nonlinear=rom.Geometric(loads={"tip": load}, n_modes=0, n_steps=2, n_shapes=6),
-        )  # fmt: skip
+        options = {"active": 0, "n_steps": 2, "n_shapes": 6, "certify": True}
+        body = reduced(model, load, method=rom.Guyan(), **options)
     except ModelError as error:
         assert "of the range" in str(error) and "smaller loads" in str(error)
         return
@@ -116,11 +99,7 @@ def test_a_range_that_turns_farther_than_one_body_carries_names_pieces(load, deg
     model, EI = slender(40, 5)
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always", RomWarning)
-        rom.reduce(
-            model, method=rom.CraigBampton(n_modes=2), interfaces={"root": "rbe3", "tip": "rbe3"},
-            reference="root", nonlinear=rom.Geometric({"tip": EI * np.array(load)}, n_modes=2),
-            certify=False,
-        )  # fmt: skip
+        reduced(model, EI * np.array(load), n_modes=2, active=2)
     turns = [str(w.message) for w in said if "turns by" in str(w.message)]
     assert bool(turns) == bool(degrees)
     assert all(f"turns by {degrees} degrees" in x and "rom.reduce_pieces" in x for x in turns)
@@ -130,7 +109,4 @@ def test_models_without_finite_elements_are_refused():
     model = assembled(cells=(2, 1, 1))
     bare = rom.FEModel(model.K, model.M, model.points, model.interfaces)
     with pytest.raises(ConfigError, match="no finite elements"):
-        rom.reduce(
-            bare, method=rom.Guyan(), interfaces={"root": "rbe3", "tip": "rbe3"},
-            reference="root", nonlinear=rom.Geometric(loads={"tip": (0, 1.0, 0, 0, 0, 0)}),
-        )  # fmt: skip
+        reduced(bare, (0, 1.0, 0, 0, 0, 0), method=rom.Guyan())

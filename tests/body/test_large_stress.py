@@ -10,7 +10,9 @@ from scipy.spatial.transform import Rotation
 
 import rom
 from cases.boxes import box
-from cases.mbs.slender import E_STEEL, STEEL, Full, assembled, cantilever, slender
+from cases.long import COARSE
+from cases.mbs.slender import E_STEEL, STEEL, TIMBER, Full, assembled, cantilever, reduced, slender
+from cases.refusals import refuses
 from rom.body.nonlinear.cauchy import CauchyRecovery
 from rom.body.projection import cauchy_recovery
 from rom.body.recovery import von_mises
@@ -19,14 +21,7 @@ from rom.errors import ConfigError, FileFormatError, ModelError, ResourceError
 from rom.updating import Channels
 
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")
-pytestmark = [
-    pytest.mark.fenicsx,
-    pytest.mark.filterwarnings("ignore:Number of integration points"),
-    pytest.mark.filterwarnings("ignore::rom.errors.RomWarning"),
-]
-TIMBER = rom.Orthotropic(
-    E=(11e9, 0.9e9, 0.5e9), nu=(0.3, 0.4, 0.5), G=(0.1e9, 0.7e9, 0.6e9), rho=450.0
-)
+pytestmark = COARSE
 VOIGT = [(0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1)]
 
 
@@ -86,16 +81,8 @@ def bent():
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("rom.stages.deflection.cauchy_recovery", recovery)
-        body = stressed(model, load["tip"])
+        body = reduced(model, load["tip"], stress=True)
     return model, body, body.equilibria(load, shares=(0.5, 1.0))[-1], shapes[0], load["tip"]
-
-
-def stressed(model, load, n_modes=4, certify=False, **options):
-    return rom.reduce(
-        model, method=rom.CraigBampton(n_modes=n_modes),
-        interfaces={"root": "rbe3", "tip": "rbe3"}, reference="root",
-        nonlinear=rom.Geometric(loads={"tip": load}, **options), stress=True, certify=certify,
-    )  # fmt: skip
 
 
 def gradients(model, u):
@@ -149,7 +136,7 @@ def test_the_certificate_has_a_row_of_stress(monkeypatch):
     for name in ("all", "locked"):
         if name == "locked":
             monkeypatch.setattr("rom.stages.deflection.enriched", lambda *given: given[4])
-        body = stressed(model, (0, EI, 0, 0, 0, 0), n_modes=2, certify=True)
+        body = reduced(model, (0, EI, 0, 0, 0, 0), n_modes=2, certify=True, stress=True)
         rows[name] = next(r for r in body.certificate.rows if r.quantity == "tip f_y: stress")
     assert rows["all"].ok and rows["all"].value < 0.02
     assert not rows["locked"].ok and 0.5 < rows["locked"].value < 2.0
@@ -167,7 +154,7 @@ def test_pure_bending_has_the_stress_of_an_arc():
     """
     h, k = 1 / 50, 0.7390851332
     model, EI = slender(50, 24)
-    body = stressed(model, (0, 0, 0, 0, 0, EI), n_modes=6, n_shapes=18)
+    body = reduced(model, (0, 0, 0, 0, 0, EI), n_modes=6, n_shapes=18, stress=True)
     q = body.equilibria({"tip": (0, 0, 0, 0, 0, EI)}, shares=(0.5, 1.0))[-1]
     s, p = body.stress.field(q), body.stress.points
     for side in (0.0, h):
@@ -212,9 +199,8 @@ def test_simple_shear_has_the_closed_form(homogeneous):
     g, nu = 0.4, 0.3
     mu, lam = E_STEEL / (2 * (1 + nu)), E_STEEL * nu / ((1 + nu) * (1 - 2 * nu))
     s11, s22, s12 = lam * g**2 / 2, (lam / 2 + mu) * g**2, mu * g
-    expected = np.array([
-        [s11 + 2 * g * s12 + g**2 * s22, s12 + g * s22, 0], [s12 + g * s22, s22, 0], [0, 0, s11],
-    ])  # fmt: skip
+    expected = np.diag([s11 + 2 * g * s12 + g**2 * s22, s22, s11])
+    expected[0, 1] = expected[1, 0] = s12 + g * s22
     F = np.eye(3) + g * np.outer([1, 0, 0], [0, 1, 0])
     assert_allclose(deformed(homogeneous, F)[3], expected, atol=1e-4)
 
@@ -238,9 +224,8 @@ def layered(materials):
 
     mesh, _ = box((1.0, 0.3, 0.2), (4, 1, 1))
     middles = dm.compute_midpoints(mesh, 3, np.arange(4, dtype=np.int32))
-    tags = dm.meshtags(
-        mesh, 3, np.arange(4, dtype=np.int32), (middles[:, 0] > 0.5).astype(np.int32)
-    )
+    outer = (middles[:, 0] > 0.5).astype(np.int32)
+    tags = dm.meshtags(mesh, 3, np.arange(4, dtype=np.int32), outer)
     return assemble(mesh, cell_tags=tags, regions={"inner": 0, "outer": 1}, material=materials)
 
 
@@ -296,16 +281,13 @@ def test_a_mechanism_tells_it_at_each_instant_and_a_file_shows_it(bent, tmp_path
 
 def test_what_cannot_be_is_refused_by_name(bent, monkeypatch, homogeneous):
     model, body, q, *_ = bent
-    with pytest.raises(ConfigError, match="modes left out"):
-        body.stress.field(q, np.zeros(12 + q.size))
-    with pytest.raises(ConfigError, match=rf"q has shape .*{q.size - 1}"):
-        body.stress.field(q[1:])
-    with pytest.raises(ConfigError, match="not finite"):
-        body.stress.von_mises(q * np.nan)
+    refuses(ConfigError, "modes left out", body.stress.field, q, np.zeros(12 + q.size))
+    refuses(ConfigError, rf"q has shape .*{q.size - 1}", body.stress.field, q[1:])
+    refuses(ConfigError, "not finite", body.stress.von_mises, q * np.nan)
     with pytest.raises(ModelError, match=r"inside out: its volume is -0.2 "):
         deformed(homogeneous, np.diag([-0.2, 1.0, 1.0]))
     with pytest.raises(ModelError, match=r"'body' is that of large deflection"):
         stress_rows(body, Channels([body.stress.points[0]], [[1, 0, 0]]), "gauge")
     monkeypatch.setattr("rom.body.nonlinear.cauchy.MAX_BYTES", 1e5)
     with pytest.raises(ResourceError, match=r"takes [\d.e-]+ GB for \d+ points"):
-        stressed(model, (0, 1.0, 0, 0, 0, 0), n_shapes=2)
+        reduced(model, (0, 1.0, 0, 0, 0, 0), n_shapes=2, stress=True)

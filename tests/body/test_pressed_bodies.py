@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import rom
-from cases.mbs.slender import E_STEEL, assembled
+from cases.mbs.slender import E_STEEL, assembled, cantilever
 from rom.errors import RomWarning
 
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")
@@ -75,27 +75,21 @@ def test_a_pressed_bar_is_warned_of_from_a_tenth_on(bodies, share, recwarn):
 
 @pytest.mark.filterwarnings("ignore:.*is pressed by")
 def test_a_motion_is_audited_for_it(bodies):
-    body = bodies[False]
-    old = replace(body, provenance={})
-    rows = {}
-    for name, one in {"known": body, "old": old, "stiffened": bodies[True]}.items():
-        report = rom.audit(rom.simulate(hinged(one, 0.5), t_end=1e-3, dt=1e-4))
-        rows[name] = [row for row in report.rows if "buckles it" in row.quantity]
-        assert report.ok == (name != "known")
+    known, stiffened, rows, reports = bodies[False], bodies[True], {}, {}
+    old = replace(known, provenance={})
+    for name, one in {"known": known, "old": old, "stiffened": stiffened}.items():
+        reports[name] = rom.audit(rom.simulate(hinged(one, 0.5), t_end=1e-3, dt=1e-4))
+        rows[name] = [row for row in reports[name].rows if "buckles it" in row.quantity]
+        assert reports[name].ok == (name != "known")
     [row] = rows["known"]
     assert_allclose(row.value, 0.5, rtol=1e-2)
-    assert (
-        "stiffening=True"
-        in rom.audit(rom.simulate(hinged(body, 0.5), t_end=1e-3, dt=1e-4)).advice[0]
-    )
+    assert "stiffening=True" in reports["known"].advice[0]
     [row] = rows["old"]
     assert row.quantity.endswith("unknown") and row.limit == "information"
     assert not rows["stiffened"]
 
 
 def test_tension_and_bending_press_nothing(bodies):
-    mech = rom.Mechanism(gravity=(0, 0, 0))
-    beam = mech.add_flexible("beam", bodies[False])
-    mech.fixed("wall", mech.ground.marker(beam.point(beam.marker("root"))), beam.marker("root"))
+    mech, beam = cantilever(bodies[False])
     mech.force("pull", beam.marker("tip"), (0.5 * EULER, 0.0, 1.0))
     assert small_motions(mech).pressed["beam"] < 1e-3

@@ -8,18 +8,16 @@ from numpy.testing import assert_allclose
 from scipy.optimize import brentq
 
 import rom
+from cases.long import COARSE
 from cases.mbs.mechanisms import prepared, random_state, residual_at, stored_at, tangents_at
-from cases.mbs.slender import assembled, cantilever, reduced
+from cases.mbs.slender import TIMBER, assembled, cantilever, reduced
 from cases.mbs.tangents import difference, shifted
+from cases.refusals import refuses
 from rom.body.nonlinear.sampled import Sampled, chosen
 from rom.errors import ConfigError, ModelError
 
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")
-pytestmark = [
-    pytest.mark.fenicsx,
-    pytest.mark.filterwarnings("ignore:Number of integration points"),
-    pytest.mark.filterwarnings("ignore::rom.errors.RomWarning"),
-]
+pytestmark = COARSE
 RUBBER = rom.Material(E=3e6, nu=0.3, rho=1100.0)
 THICK = 0.04
 EI = 3e6 * THICK**4 / 12
@@ -87,10 +85,9 @@ def test_few_elements_bear_the_loads_of_the_range_as_all_do(bent):
     assert how["error of forces"] <= 1e-3 and how["elements"] < how["of"]
     assert_allclose(how["volume"], 1.0, rtol=0.1)
     assert how["elements"] == len(bent.quartic.weights) / 125
-    body = bent
-    mech, part = cantilever(body)
+    mech, part = cantilever(bent)
     mech.force("load", part.marker("tip"), LOADS[:3])
-    q = body.equilibria({"tip": LOADS}, shares=(0.5, 1.0))[-1]
+    q = bent.equilibria({"tip": LOADS}, shares=(0.5, 1.0))[-1]
     found = rom.equilibrium(mech, steps=4).q[7:]
     assert_allclose(found, q, rtol=0, atol=1e-6 * np.abs(q).max())
 
@@ -132,27 +129,23 @@ def test_forces_are_slopes_of_the_energy_in_a_mechanism_too(bent):
     for q_at, v_at in zip(packed.system.bodies.q_at, packed.system.bodies.v_at, strict=True):
         mine = slice(q_at + 7, q_at + 7 + body.n_modes)
         beyond[v_at + 6 : v_at + 6 + body.n_modes] -= body.K @ q[mine]
-    slope = difference(
-        lambda d: np.array([stored_at(packed.system, W, shifted(packed, q, d), none)]), v.size
-    )[0]
+
+    def stored(delta):
+        return np.array([stored_at(packed.system, W, shifted(packed, q, delta), none)])
+
+    slope = difference(stored, v.size)[0]
     assert_allclose(beyond, slope, atol=3e-6 * np.abs(slope).max())
 
 
 def test_what_sampled_elements_cannot_do_is_refused_by_name(bent, tmp_path):
     body, model = bent, assembled(cells=(2, 1, 1))
-    with pytest.raises(ConfigError, match="which no file holds"):
-        rom.save(body, tmp_path / "body.rom.npz")
-    with pytest.raises(ConfigError, match="one unit system"):
-        body.in_units("mm-t-s")
-    with pytest.raises(ConfigError, match="sampling = 2"):
-        rom.Geometric(loads={"tip": LOADS}, sampling=2)
+    refuses(ConfigError, "which no file holds", rom.save, body, tmp_path / "body.rom.npz")
+    refuses(ConfigError, "one unit system", body.in_units, "mm-t-s")
+    refuses(ConfigError, "sampling = 2", rom.Geometric, loads={"tip": LOADS}, sampling=2)
     with pytest.raises(ConfigError, match="sampling and spin"):
         reduced(model, LOADS, n_modes=1, active=0, n_steps=1, sampling=0.1, spin=(0, 0, 1.0))
     with pytest.raises(ConfigError, match="stress and sampling"):
-        rom.reduce(model, method=rom.Guyan(), interfaces={"root": "rbe3", "tip": "rbe3"},
-                   reference="root", stress=True, certify=False,
-                   nonlinear=rom.Geometric(loads={"tip": LOADS}, sampling=0.1))  # fmt: skip
-    wood = rom.Orthotropic(E=(11e9, 9e8, 5e8), nu=(0.3, 0.4, 0.5), G=(1e8, 7e8, 6e8), rho=450.0)
-    grown = assembled(cells=(2, 1, 1), material=wood)
+        reduced(model, LOADS, method=rom.Guyan(), stress=True, sampling=0.1)
+    grown = assembled(cells=(2, 1, 1), material=TIMBER)
     with pytest.raises(ModelError, match="is isotropic"):
         reduced(grown, (0, 1.0, 0, 0, 0, 0), n_modes=1, active=0, sampling=0.1)

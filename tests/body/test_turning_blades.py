@@ -10,6 +10,8 @@ from scipy.sparse import csc_matrix
 from scipy.sparse.linalg import eigsh, splu
 
 import rom
+from cases.long import COARSE
+from cases.refusals import refuses
 from cases.wheels import bladed_model
 from rom.components.wheels.rotation import arms, rotation_matrices
 from rom.components.wheels.sector import region
@@ -17,11 +19,7 @@ from rom.eigen.scipy import SciPyOperators
 from rom.errors import ConfigError, ModelError
 
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")
-pytestmark = [
-    pytest.mark.fenicsx,
-    pytest.mark.filterwarnings("ignore::rom.errors.RomWarning"),
-    pytest.mark.filterwarnings("ignore:Number of integration points"),
-]
+pytestmark = COARSE
 N, ORDER, SPEED = 5, 2, 1500.0
 SIZES = {"cells": (7, 2, 4, 1), "blade": (3, 4), "width": 0.01, "tip": 0.18}
 ROOM = {"n_modes": 40, "n_blade_modes": 25, "functions": rom.Polynomial(6),
@@ -66,11 +64,8 @@ def short():
 @pytest.fixture(scope="module")
 def blades(small, short):
     """One has lost a fifth of its stiffness, one is denser, one is short."""
-    found = [small.blade] * N
-    found[1] = small.blade.varied(stiffness=-0.2)
-    found[2] = small.blade.varied(density=0.15)
-    found[4] = rom.reduced_blade(small, short, n_modes=25)
-    return found
+    soft, dense = small.blade.varied(stiffness=-0.2), small.blade.varied(density=0.15)
+    return [small.blade, soft, dense, small.blade, rom.reduced_blade(small, short, n_modes=25)]
 
 
 @pytest.fixture(scope="module")
@@ -78,16 +73,13 @@ def whole(model, full, short):
     """K at speed, M and G of all finite elements with these blades, and the stress of all."""
     own = {"plain": model, "short": short}
     parts = {name: {r: region(m, r) for r in ("disk", "blade")} for name, m in own.items()}
-    kinds = [("plain", 1.0, 1.0)] * N  # model, stiffness and density of the blade
-    kinds[1], kinds[2], kinds[4] = ("plain", 0.8, 1.0), ("plain", 1.0, 1.15), ("short", 1.0, 1.0)
-    Ks, Ms = (
-        [parts[m]["disk"][i] + factor[i] * parts[m]["blade"][i] for m, *factor in kinds]
-        for i in (0, 1)
-    )
+    names, stiff, dense = ["plain"] * 4 + ["short"], [1.0, 0.8, 1.0, 1.0, 1.0], [1, 1, 1.15, 1, 1]
+    Ks, Ms = ([parts[m]["disk"][i] + x * parts[m]["blade"][i]
+               for m, x in zip(names, (stiff, dense)[i], strict=True)] for i in (0, 1))  # fmt: skip
     u = pulled(full, Ks, [M @ arms(full, own[m].points).ravel()
-                          for M, (m, *_) in zip(Ms, kinds, strict=True)])  # fmt: skip
+                          for M, m in zip(Ms, names, strict=True)])  # fmt: skip
     Gs, Cs = [], []
-    for u_j, M, (m, stiffness, _) in zip(u, Ms, kinds, strict=True):
+    for u_j, M, m, stiffness in zip(u, Ms, names, stiff, strict=True):
         G, softening = rotation_matrices(M, full.axis)
         stress = own[m].regions
         K_geo = stress["disk"].stresses.prestress(u_j)
@@ -198,20 +190,18 @@ def test_a_free_wheel_moves_rigidly_without_stiffness(model, full):
 
 
 def test_wheels_that_cannot_turn_are_named(model, full, small, disk, short):
-    alike = [small.blade] * N
+    alike, fast = [small.blade] * N, {"speed": SPEED}
     at_rest = replace(small.blade, coriolis=None, centrifugal=None)
-    with pytest.raises(ConfigError, match="the blade 2 has no matrices of rotation"):
-        disk.modes([*alike[:2], at_rest, *alike[3:]], speed=SPEED)
-    with pytest.raises(ConfigError, match="the disk has no matrices of rotation"):
-        replace(disk, coriolis=None).waves(alike, speed=SPEED)
-    with pytest.raises(ConfigError, match="speed = inf"):
-        disk.modes(alike, speed=np.inf)
+    says, still = "has no matrices of rotation", replace(disk, coriolis=None)
+    two = [*alike[:2], at_rest, *alike[3:]]
+    refuses(ConfigError, f"the blade 2 {says}", disk.modes, two, **fast)
+    refuses(ConfigError, f"the disk {says}", still.waves, alike, **fast)
+    refuses(ConfigError, "speed = inf", disk.modes, alike, speed=np.inf)
     stressed = replace(full, K=1.001 * full.K)
     with pytest.raises(ConfigError, match=r"stiffness of its finite elements: .*heated_sector"):
         rom.substructured_sector(stressed, model, **ROOM)
     softer = replace(disk, centrifugal=-disk.M)
-    with pytest.raises(ModelError, match=r"at 50000 rad/s .* above its instability"):
-        softer.modes(alike, speed=5e4)
+    refuses(ModelError, r"at 50000 rad/s .* above its instability", softer.modes, alike, speed=5e4)
     bare = replace(short, regions={"blade": replace(short.regions["blade"], stresses=None)})
     with pytest.raises(ConfigError, match="the blade has no finite elements"):
         rom.reduced_blade(small, bare, n_modes=2)

@@ -124,29 +124,22 @@ class CauchyRecovery:
 
     def _second_piola(self, H: Array) -> Array:
         """(s, 3, 3) second Piola-Kirchhoff stress of displacement gradients [Pa]."""
-        E = 0.5 * (H + H.swapaxes(1, 2) + H.swapaxes(1, 2) @ H)
-        strain = np.stack([E[:, a, b] * (1 if a == b else 2) for a, b in PAIRS], axis=1)
-        found = np.einsum("sij,sj->si", self.stiffness[self.material], strain)
-        S = np.empty_like(E)
-        for k, (a, b) in enumerate(PAIRS):
-            S[:, a, b] = S[:, b, a] = found[:, k]
+        E, (a, b) = 0.5 * (H + H.swapaxes(1, 2) + H.swapaxes(1, 2) @ H), np.transpose(PAIRS)
+        strain, S = np.ascontiguousarray(E[:, a, b] * np.where(a == b, 1, 2)), np.empty_like(E)
+        S[:, a, b] = np.einsum("sij,sj->si", self.stiffness[self.material], strain)
+        S[:, b, a] = S[:, a, b]
         return S
 
     def _at_points(self, stress: Array) -> Array:
         """(p, 6) means of the samples (s, 3, 3)."""
         out = np.zeros((len(self.points), 6))
-        np.add.at(
-            out, self.node, self.share[:, None] * np.stack([stress[:, a, b] for a, b in PAIRS], 1)
-        )
+        six = np.stack([stress[:, a, b] for a, b in PAIRS], 1)
+        np.add.at(out, self.node, self.share[:, None] * six)
         return out
 
 
 def refuse_many(n_points: int, r: int) -> None:
-    """Say what the gradients of r coordinates at so many points would take, if that is too much.
-
-    Raises:
-        ResourceError: naming both numbers.
-    """
+    """Say what the gradients of r coordinates at so many points would take, if that is too much."""
     needed = 9 * 8 * n_points * r
     if needed > MAX_BYTES:
         raise ResourceError(

@@ -116,12 +116,8 @@ class HeldSolid:
 
     def state(self, u: Array, W: Array) -> Array | None:
         """(m,) equilibrium in a under a load W [N, N m] near u (n,); None if not found."""
-        near = self.inside.solve(self.T.T @ u)
-        found = self._newton(near, W)
-        return self._from_rest(W) if found is None else found
-
-    def _from_rest(self, W: Array) -> Array | None:
-        """The same by steps of the load, halved where Newton's method fails."""
+        if (found := self._newton(self.inside.solve(self.T.T @ u), W)) is not None:
+            return found
         done, a = load_steps(
             lambda a, share: self._newton(a, share * W), np.zeros(self.T.shape[1]),
             least=MIN_LOAD_STEP, first=0.25,
@@ -131,14 +127,12 @@ class HeldSolid:
     def _newton(self, a: Array, W: Array) -> Array | None:
         """The equilibrium near a (m,), None if Newton's method does not find it."""
         for _ in range(MAX_ITERATIONS):
-            u = self.T @ a
-            gap = self.T.T @ (self._pushed(u, W) - self.solid.force(u))
-            soft = self.softness(a, W)
+            u, soft = self.T @ a, self.softness(a, W)
             if soft is None:
                 return None
+            gap = self.T.T @ (self._pushed(u, W) - self.solid.force(u))
             step = soft(np.r_[gap, -self.C @ a])
-            a = a + step
-            size = np.linalg.norm(step)
+            a, size = a + step, np.linalg.norm(step)
             if not np.isfinite(size):
                 return None
             if size <= INCREMENT_RTOL * np.linalg.norm(a):
@@ -157,13 +151,6 @@ class HeldSolid:
         if W is None or W.size == u.size:
             return iter(())
         return zip(self.sections, W[u.size :].reshape(-1, 3), strict=True)
-
-    def _bordered(self, a: Array) -> Any:
-        """Factor of the stiffness at a (m,) with the interface held by multipliers, if any."""
-        K = self.T.T @ self.solid.tangent(self.T @ a) @ self.T
-        scale = np.abs(K.diagonal()).mean() / abs(self.C).max()
-        bordered = bmat([[K, scale * self.C.T], [scale * self.C, None]])
-        return self.workers.factor(bordered, pivoting=True)
 
     def reached(self, u: Array, a: Array) -> float:
         """Part of a displacement (n,) along the state a, as a share of it."""
@@ -184,7 +171,11 @@ class HeldSolid:
         Source:
             Woodbury's formula, Golub and Van Loan, Matrix Computations (2013), section 2.1.4.
         """
-        factor, u = self._bordered(a), self.T @ a
+        u = self.T @ a
+        K = self.T.T @ self.solid.tangent(u) @ self.T
+        scale = np.abs(K.diagonal()).mean() / abs(self.C).max()
+        bordered = bmat([[K, scale * self.C.T], [scale * self.C, None]])
+        factor = self.workers.factor(bordered, pivoting=True)
         if factor is None:
             return None
 
@@ -211,9 +202,7 @@ class HeldSolid:
     ) -> Array:
         """(k,) lowest frequencies about the state with this softness [rad/s].
 
-        Args:
-            soft: see `softness`.
-            symmetric: whether the state bears no moments that turn.
+        ``symmetric`` where the state bears no moments that turn.
         """
         n, held = self.M.shape[0], np.zeros(self.C.shape[0])
         if soft is None:

@@ -31,7 +31,7 @@ from rom.body.nonlinear.statics import Held, free_motions, newton, passages
 from rom.eigen.verbs import Operators, column_blocks, mean_motion, quadratic, whole_clusters
 from rom.errors import ConfigError, InterfaceError, ModelError, ResourceError, warn
 from rom.model import Array, Basis, FEModel, Index, Interface
-from rom.names import offered
+from rom.names import check_known, offered
 
 DEPENDENT_RTOL = 1e-10  # energy of a derivative, of the largest, that the others explain
 # energy of a derivative over those of its two shapes, of the largest such, from which it is none;
@@ -111,23 +111,10 @@ def enriched(
     geometric: Geometric, model: FEModel, ops: Operators, connection: Any, basis: Basis,
     reference: Any,
 ) -> Basis:  # fmt: skip
-    """The basis with the shapes that its load range asks for.
+    """The basis with the shapes that its load range asks for, seen from a reference interface.
 
-    Args:
-        geometric: the range.
-        model: supplies interfaces and the energy of large strain.
-        ops: operators in nodal dofs.
-        connection: the model in interface coordinates.
-        basis: constraint and fixed-interface modes, with the factor of K_ii.
-        reference: the interface that carries the frame.
-
-    Raises:
-        ConfigError, InterfaceError, ResourceError: see `refuse`.
-        ModelError: if the body has no stable equilibrium within the range, or its material is
-            compressed until it loses ellipticity.
-
-    Warns:
-        RomWarning: of an interface that turns farther than one body carries.
+    It has constraint and fixed-interface modes and the factor of K_ii, and a stable equilibrium
+    everywhere within the range.
     """
     refuse(geometric, model, connection, basis, reference)
     energy = model.stresses.large_strain()
@@ -146,53 +133,42 @@ def enriched(
 def refuse(
     geometric: Geometric, model: FEModel, connection: Any, basis: Basis, reference: Any
 ) -> None:
-    """Say what does not go together with large deflection.
-
-    Raises:
-        ConfigError: for a model without finite elements, a method without fixed-interface modes, or
-            another frame, and for a load where the body is held.
-        InterfaceError: for an unknown interface, or a rigid one that turns relative to the frame.
-    """
+    """Say what does not go together with large deflection."""
     if model.stresses is None:
         raise ConfigError(
             "the model has no finite elements, from which alone large strain follows.",
             hint="Make it with rom.fe.model.",
         )
-    if basis.held is None:
+    if basis.held is None or not _held_modes(connection.ops, basis):
         raise ConfigError(
-            "large deflection takes constraint modes, and this method has none.",
+            "large deflection takes constraint modes and modes with the interfaces held, which "
+            "this method has not.",
             hint="Use rom.CraigBampton or rom.Guyan.",
         )
-    if not _held_modes(connection.ops, basis):
-        raise ConfigError(
-            "large deflection takes modes with the interfaces held, and those of this method are "
-            "others.",
-            hint="Use rom.CraigBampton or rom.Guyan.",
-        )
+    others = [name for name in connection.parts if name != reference]
     if reference not in connection.parts:
         raise ConfigError(
             f"reference = {reference!r}: large deflection is seen from an interface, here one of "
-            f"{offered(connection.parts)}.",
+            f"{offered(others)}.",
             hint="Name the interface at which the body is held, or that turns least.",
         )
     for name in geometric.loads:
-        if name not in connection.parts or name == reference:
-            raise InterfaceError(
-                f"the range of loads names {name!r}; beside the reference {reference!r} the body "
-                f"has {offered(n for n in connection.parts if n != reference)}."
-            )
-    held = held_motions(geometric, [name for name in connection.parts if name != reference])
+        known = (
+            f"the range of loads names {name!r}; beside the reference {reference!r} the body has"
+        )
+        check_known(name, others, known, InterfaceError)
+    held = held_motions(geometric, others)
     for load in geometric.components():
         if replace(load, largest=1.0) in held:
             raise ConfigError(
                 f"the range has a load {load.name} where the body is held: it deflects nothing.",
                 hint="Leave the load out, or that direction of fixed.",
             )
-    for name, tie in connection.ties.items():
-        if name != reference and not _turns(tie, model.interfaces[name]):
-            what = (
-                "is rigid" if tie.label == "rbe2" else f"has functions ({tie.label}) that hold it"
-            )
+    for name in others:
+        tie = connection.ties[name]
+        if not _turns(tie, model.interfaces[name]):
+            rigid = tie.label == "rbe2"
+            what = "is rigid" if rigid else f"has functions ({tie.label}) that hold it"
             raise InterfaceError(
                 f"interface {name!r} {what}, and a section that turns by a linear rotation "
                 "grows: at a slope of 0.03 the body would be several per cent too stiff.",
@@ -283,11 +259,7 @@ def _snapshots(
     geometric: Geometric, model: FEModel, ops: Operators, connection: Any, basis: Basis,
     reference: str,
 ) -> Array:  # fmt: skip
-    """(n_local, c) full states at the largest loads in interface coordinates, interfaces at rest.
-
-    Raises:
-        ModelError: for a load case in which the full model has no equilibrium that is found.
-    """
+    """(n_local, c) full states at the largest loads, in interface coordinates at rest there."""
     full = HeldSolid.of(model, connection, reference, held_motions(geometric, model.interfaces))
     about = axis_point(geometric, model, reference)
     units = full.whole(nodal_forces(geometric.components(), model, ops, about))
@@ -313,8 +285,7 @@ def _moments(interface: str, components: list[Load]) -> Array:
 
 def _turnable(F: Array) -> Array:
     """(n_local, 27) forces along each axis a of the part b of forces (n_local, 3) of moments k."""
-    parts = np.einsum("ac,nbk->ncabk", np.eye(3), F.reshape(-1, 3, 3))
-    return np.asarray(parts.reshape(-1, 27))
+    return np.asarray(np.einsum("ac,nbk->ncabk", np.eye(3), F.reshape(-1, 3, 3)).reshape(-1, 27))
 
 
 def _refuse_many(n: int, energy: Any) -> None:
@@ -337,10 +308,7 @@ def foreseen(n: int, n_points: int) -> tuple[float, float]:
 def _refuse_collapse(geometric: Geometric, stretches: Array, counts: list[int]) -> None:
     """Say which of the load cases compresses the material too far.
 
-    Args:
-        geometric: the range.
-        stretches: (s,) least ones of the states, load by load.
-        counts: number of states on the way to each load.
+    Stretches (s,) are the least ones of the states, so many on the way to each load.
     """
     k = int(np.argmin(stretches))
     if stretches[k] > ELLIPTIC_STRETCH:
@@ -364,16 +332,9 @@ def _derivatives(
     """(n_local, p) derivatives in interface coordinates, orthonormal in K and to normal modes.
 
     Two shapes that drag nothing along, as pull and twist of a prism, have round-off as their
-    derivative, which must not become a shape: it differs from run to run.
-
-    Args:
-        ops: operators in interface coordinates.
-        basis: supplies the held factor and the normal modes.
-        energy: at large strain.
-        dragging: (n_local, a) nodal shapes of which derivatives are taken, and (a,) twice their
-            energies [J].
-        further: (n_local, t) shapes of the same span, in interface coordinates; of each kind those
-            with much less energy than others are round-off.
+    derivative, which must not become a shape: it differs from run to run. Dragging are nodal shapes
+    (n_local, a), with (a,) twice their energies [J]; further shapes (n_local, t) of the same span
+    are in interface coordinates; of each kind those with much less energy are round-off.
     """
     active, size = dragging
     i, j = np.triu_indices(active.shape[1])

@@ -44,7 +44,7 @@ class Energy:
 
 @dataclass(frozen=True)
 class Quartic(Energy):
-    """Strain energy of elastic coordinates q (r,).
+    """Strain energy of fourth order.
 
     Attributes:
         K: (r, r) stiffness without load [N/m].
@@ -58,11 +58,9 @@ class Quartic(Energy):
 
     @classmethod
     def from_gram(cls, G: Array, r: int) -> "Quartic":
-        """The energy of the integrals of products of strains, see `rom.fe.forms.large_strain`.
+        """From the Gram matrix (N, N) of r linear strains and r (r + 1) / 2 quadratic ones [N m].
 
-        Args:
-            G: (N, N) Gram matrix of r linear strains and r (r + 1) / 2 quadratic ones [N m].
-            r: number of coordinates.
+        See `rom.fe.forms.large_strain`.
         """
         K, A, B = G[:r, :r], G[:r, r:], G[r:, r:]
         pair = pair_numbers(r)
@@ -100,15 +98,11 @@ class Quartic(Energy):
     @cached_property
     def by_pairs(self) -> tuple[Array, Array]:
         """T3 as (r (r + 1) / 2, r) and T4 as a matrix of pairs, for fast contraction."""
-        r = self.n
-        i, j = np.triu_indices(r)
-        third = np.arange(r)
-        T3 = self.cubic[
-            position(np.stack(np.broadcast_arrays(i[:, None], j[:, None], third), -1), r)
-        ]
-        four = np.broadcast_arrays(i[:, None], j[:, None], i[None], j[None])
-        T4 = self.quartic[position(np.stack(four, -1), r)]
-        return T3, T4
+        i, j = (x[:, None] for x in np.triu_indices(self.n))
+        three = np.broadcast_arrays(i, j, np.arange(self.n))
+        four = np.broadcast_arrays(i, j, i.T, j.T)
+        T3, T4 = (position(np.stack(x, -1), self.n) for x in (three, four))
+        return self.cubic[T3], self.quartic[T4]
 
     @cached_property
     def _pair(self) -> Index:
@@ -119,11 +113,10 @@ def entries(r: int, order: int) -> Index:
     """(e, order) indices i <= j <= ... < r of the entries that are kept, last one fastest."""
     found: Index = np.arange(r)[:, None]
     for _ in range(order - 1):
-        last = found[:, -1]
-        count = r - last
-        before = np.cumsum(count) - count
-        further = np.arange(count.sum()) - np.repeat(before - last, count)
-        found = np.column_stack([np.repeat(found, count, axis=0), further])
+        count = r - found[:, -1]
+        found = np.repeat(found, count, axis=0)
+        further = np.arange(len(found)) - np.repeat(np.cumsum(count) - r, count)
+        found = np.column_stack([found, further])
     return found
 
 
@@ -134,12 +127,10 @@ def n_entries(r: int, order: int) -> int:
 
 def position(indices: Index, r: int) -> Index:
     """Where the entries with these indices (..., order), in any sequence, are kept."""
-    ordered = np.sort(indices, axis=-1)
-    order = indices.shape[-1]
+    ordered, order = np.sort(indices, axis=-1), indices.shape[-1]
     at = np.full(ordered.shape[:-1], n_entries(r, order) - 1)
     for k in range(order):  # entries that come later, counted index by index
-        left = order - k
-        behind = np.array([comb(r - 1 - i + left - 1, left) for i in range(r)], dtype=np.int64)
+        behind = np.array([n_entries(r - 1 - i, order - k) for i in range(r)], dtype=np.int64)
         at = at - behind[ordered[..., k]]
     return at
 

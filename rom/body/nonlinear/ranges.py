@@ -7,7 +7,7 @@ from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
-from rom.arguments import Between, Count, Modes, finite, typed, whole
+from rom.arguments import Between, Count, Modes, finite, typed
 from rom.body.recovery import CENTRIFUGAL_LOADS, PRODUCTS, centrifugal
 from rom.eigen.supports import DIRECTIONS, Fixed, supports
 from rom.eigen.verbs import Operators, mean_motion
@@ -89,7 +89,7 @@ class Geometric:
     loads: Mapping[str, Any]
     n_modes: Modes = 4
     tol: Annotated[float, Between(0, 1, "()")] = 1e-4
-    n_shapes: int | None = None
+    n_shapes: Annotated[int, Count(1)] | None = None
     n_steps: Annotated[int, Count(1, MOST_STEPS)] = 4
     fixed: Fixed = ()
     spin: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -98,8 +98,6 @@ class Geometric:
     snapshots: bool = False
 
     def __post_init__(self) -> None:
-        if self.n_shapes is not None:
-            whole("n_shapes", self.n_shapes, 1, reason="without any the basis locks")
         for name, load in self.loads.items():
             if not finite(f"the range of loads at {name!r}", load, (6,)).any():
                 raise ConfigError(f"the range of loads at {name!r} is {load!r}: it needs a force.")
@@ -137,15 +135,7 @@ class Geometric:
 
 
 def held_motions(geometric: Geometric, known: Any) -> list[Load]:
-    """Each motion held beside the reference, as the load that would move it.
-
-    Args:
-        geometric: the range and its supports.
-        known: names of the interfaces there are.
-
-    Raises:
-        ConfigError, InterfaceError: see `rom.eigen.supports.supports`.
-    """
+    """Each motion held beside the reference, as the load that would move it."""
     return [
         Load(name, DIRECTIONS.index(direction))
         for name, directions in supports(geometric.fixed, known).items()
@@ -162,11 +152,7 @@ def axis_point(geometric: Geometric, model: FEModel, reference: str) -> Array:
 def nodal_forces(loads: list[Load], model: FEModel, ops: Operators, about: Array) -> Array:
     """(n_local, l) forces of loads at their largest on the nodes of this process [N].
 
-    Args:
-        loads: some components of a range.
-        model: supplies points and interfaces.
-        ops: its operators in nodal dofs, with all it carries.
-        about: (3,) a point of the axis of rotation [m].
+    Operators are those of nodal dofs, with all the model carries; (3,) is a point of the axis.
     """
     F, nodes = np.zeros((ops.n_local, len(loads))), slice(ops.first // 3, None)
     field = centrifugal(model.points[nodes][: ops.n_local // 3] - about)

@@ -101,16 +101,8 @@ def sampled_energy(
 ) -> tuple[Sampled, dict[str, Any]]:
     """The energy of a body of neo-Hookean material by a few elements, and how it was trained.
 
-    Args:
-        body: the reduced body, seen from its reference.
-        geometric: its range, with ``sampling``.
-        energy: its finite elements, see `rom.fe.forms.large_strain`.
-        E: (n, r) its nodal shapes.
-
-    Raises:
-        ParallelError: under mpirun.
-        ConfigError: for centrifugal force, which is not trained.
-        ModelError: for material that is not isotropic; or without equilibrium in the range.
+    The body is seen from its reference, and has nodal shapes E (n, r); its finite elements are
+    those of `rom.fe.forms.large_strain`.
     """
     if energy.mesh.comm.size > 1:
         raise ParallelError("elements are sampled on one process only; leave mpirun out.")
@@ -122,9 +114,12 @@ def sampled_energy(
     G, w, cell, C = energy.at_points(E)
     every = Sampled(body.K, G, w, np.column_stack([C[:, 0, 1], C[:, 3, 3]]))
     _refuse_grain(C, every.lame)
-    components = geometric.components()
-    units = np.array([load.largest * body.forces_on({load.interface: np.eye(6)[load.component]})
-                      for load in components])  # fmt: skip
+    units = np.array(
+        [
+            load.largest * body.forces_on({load.interface: np.eye(6)[load.component]})
+            for load in geometric.components()
+        ]
+    )
     still = body.mean_rows(geometric.fixed)
     states = np.vstack([follow(every, np.outer(STEP_SHARES, case @ units), still)
                         for case in geometric.load_cases()])  # fmt: skip
@@ -144,23 +139,17 @@ def sampled_energy(
 def chosen(every: Sampled, cell: Index, states: Array, tol: float) -> tuple[Array, float]:
     """(cells,) weights of the elements, most of them zero, and the error of forces that is left.
 
-    Elements join one after the other, that which explains most of what is missing first; weights
-    of those that have joined are the non-negative least squares.
-
-    Args:
-        every: all points.
-        cell: (p,) element of each.
-        states: (s, r) coordinates of the training.
-        tol: relative error of the forces, at which no more elements join [1].
+    Elements join one after the other, that which explains most of what is missing first, until the
+    relative error of the forces in the states (s, r) is below tol; weights of those that have
+    joined are the non-negative least squares. ``cell`` (p,) is the element of each point.
     """
     starts = np.flatnonzero(np.r_[True, np.diff(cell) > 0])
-    rows = []
-    for q in states:
-        of_cells = np.add.reduceat(every.forces_at(q), starts, axis=0)
-        # forces on coordinates are as unlike as their stiffness: energies of all count alike
-        of_cells = of_cells / np.sqrt(np.diag(every.K))
-        rows.append(of_cells.T / np.linalg.norm(of_cells.sum(axis=0)))
-    A = np.vstack(rows)
+    # forces on coordinates are as unlike as their stiffness: energies of all count alike
+    cells = [
+        np.add.reduceat(every.forces_at(q), starts, axis=0) / np.sqrt(np.diag(every.K))
+        for q in states
+    ]
+    A = np.vstack([forces.T / np.linalg.norm(forces.sum(axis=0)) for forces in cells])
     b, size = A.sum(axis=1), np.linalg.norm(A, axis=0)
     weights, active = np.zeros(A.shape[1]), np.zeros(A.shape[1], dtype=bool)
     error = 1.0

@@ -1,6 +1,5 @@
 """Deflections of a body on its supports under loads that keep their direction."""
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import Any
@@ -61,24 +60,15 @@ def free_motions(rows: Array) -> Array:
 def follow(energy: Any, loads: Array, held: Array | None = None) -> Array:
     """(s, r) coordinates in equilibrium with loads (s, r) [N], one after the other from rest.
 
-    Args:
-        energy: of the body.
-        loads: forces on the coordinates.
-        held: (h, r) rows of coordinates that supports let vanish.
-
-    Raises:
-        ModelError: if no stable equilibrium is found at a load.
+    Supports let rows (h, r) of coordinates vanish. A load without stable equilibrium is refused.
     """
     return np.array([passed[-1] for passed in passages(energy, loads, held)])
 
 
 def passages(energy: Any, loads: Array, held: Array | None = None) -> list[Array]:
-    """For each load the states (k, r) on the way to it, itself the last.
+    """For each load the states (k, r) on the way to it, itself the last; see `follow`.
 
     Where a body snaps, these are the states of its path by arc length, stable or not.
-
-    Raises:
-        ModelError: see `follow`.
     """
     body = Held(energy, free_motions(np.zeros((0, energy.n)) if held is None else held))
     y, at, found = np.zeros(body.n), np.zeros(body.n), []
@@ -103,17 +93,14 @@ def _beyond(body: Held, y: Array, stretch: tuple[Array, Array], done: float) -> 
     path = Stretch(body, *stretch)
     curve, passed = Curve(path, 1.0), list[Array]()
     try:
-        steps: Iterable[tuple[Point, float, Point]] = curve.steps(
-            curve.start(y, done, forwards=True), LONGEST_STEP
-        )
+        steps = curve.steps(curve.start(y, done, forwards=True), LONGEST_STEP)
         for _, (one, h, two) in zip(range(MAX_POINTS), steps, strict=False):
             if two.p < 1.0:
                 passed.append(two.at)
                 continue
             _, last = curve.located(one, h, lambda x: x.p - 1.0)
             stable = newton(body, last.at, stretch[1])
-            near = stable is not None and path.size(stable - last.at) < LONGEST_STEP
-            if stable is None or not near:
+            if stable is None or not path.size(stable - last.at) < LONGEST_STEP:
                 break
             return [*passed, stable]
     except SolverError as error:
@@ -181,17 +168,15 @@ class Stretch:
 def critical_shares(energy: Any, load: Array, held: Array) -> Array:
     """(k,) shares, at most one, of a load (r,) [N] at which a stiffness vanishes on the way.
 
-    In the order in which they are passed on the path by arc length, limits and bifurcations.
-
-    Raises:
-        ModelError: if the path does not lead to the load.
+    In the order in which they are passed on the path by arc length, limits and bifurcations; one
+    that does not lead to the load is refused.
     """
-    N = free_motions(held)
-    body = Held(energy, N)
-    path = Stretch(body, np.zeros(body.n), load @ N)
+    body = Held(energy, free_motions(held))
+    rest = np.zeros(body.n)
+    path = Stretch(body, rest, load @ body.N)
     curve, found = Curve(path, 1.0), list[float]()
     try:
-        steps = curve.steps(curve.start(np.zeros(body.n), 0.0, forwards=True), LONGEST_STEP)
+        steps = curve.steps(curve.start(rest, 0.0, forwards=True), LONGEST_STEP)
         for _, (one, h, two) in zip(range(MAX_POINTS), steps, strict=False):
             below = [int(np.count_nonzero(path.stiffness(x.at) < 0)) for x in (one, two)]
             points = [

@@ -6,7 +6,7 @@ import numpy as np
 
 from benchmarks.models import rigid_chain
 from cases.beam import stiffened_beam
-from cases.mbs.mechanisms import random_body, slider_crank
+from cases.mbs.mechanisms import random_body, simulate_quietly, slider_crank
 from cases.paths import TESTS
 from rom.mbs.mechanism import Mechanism
 
@@ -106,3 +106,13 @@ def hub_and_panel(frame="root"):
 
 def errors(sol, exact, names=("q", "v", "a", "lam")):
     return [np.abs(getattr(sol, x) - getattr(exact, x)).max() for x in names]
+
+
+def order_of(build, t_end, steps, exact, options):
+    """Order of a method in the errors of steps of two lengths, at ten instants that are exact."""
+    table = []
+    for h in steps:
+        every = round(t_end / 10 / h)
+        sol = simulate_quietly(build(), t_end=t_end, dt=h, save_every=every, **options)
+        table.append(errors(sol, exact))
+    return np.log2(np.array(table[0]) / table[1])

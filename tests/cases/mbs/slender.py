@@ -9,6 +9,9 @@ from cases.boxes import box, distort
 
 E_STEEL = 210e9
 STEEL = rom.Material(E=E_STEEL, nu=0.3, rho=7850.0)
+TIMBER = rom.Orthotropic(
+    E=(11e9, 0.9e9, 0.5e9), nu=(0.3, 0.4, 0.5), G=(0.1e9, 0.7e9, 0.6e9), rho=450.0
+)
 # at the crown of half an arch the other half lets it move up and down alone
 SYMMETRIC = {"tip": "xyrxryrz"}
 
@@ -29,21 +32,26 @@ def assembled(size=(1.0, 0.1, 0.08), cells=(3, 1, 1), kind="hexahedron", degree=
     return assemble(mesh, facet_tags=facets, material=material, degree=degree)
 
 
-def slender(slenderness, cells, nu=0.0):
+def slender(slenderness, cells, nu=0.0, **options):
     """A cantilever 1 m long of square section, and its bending stiffness [N m^2]."""
     h = 1.0 / slenderness
     material = rom.Material(E=E_STEEL, nu=nu, rho=7850.0)
-    return assembled((1.0, h, h), (cells, 1, 1), material=material), E_STEEL * h**4 / 12
+    model = assembled((1.0, h, h), (cells, 1, 1), material=material, **options)
+    return model, E_STEEL * h**4 / 12
 
 
 def reduced(model, loads, *, n_modes=4, kinds="rbe3", certify=False, active=4, **options):
-    """Seen from its root, for loads on its tip."""
+    """Seen from its root, for loads on its tip; options are those of its range, and of `reduce`."""
+    method = options.pop("method", rom.CraigBampton(n_modes=n_modes))
+    tip, reference = options.pop("tip", kinds), options.pop("reference", "root")
+    stress = options.pop("stress", False)
     return rom.reduce(
         model,
-        method=rom.CraigBampton(n_modes=n_modes),
-        interfaces={"root": kinds, "tip": kinds},
-        reference="root",
+        method=method,
+        interfaces={"root": kinds, "tip": tip},
+        reference=reference,
         nonlinear=rom.Geometric(loads={"tip": loads}, n_modes=active, **options),
+        stress=stress,
         certify=certify,
     )
 

@@ -17,10 +17,8 @@ MU, SPEED = 0.3, 0.35
 
 
 def block(mass=1.0, speed=SPEED):
-    mech = rom.Mechanism(gravity=(0, 0, -g))
-    part = mech.add_rigid(
-        "block", mass=mass, inertia=(mass,) * 3, at=ORIGIN, velocity=(speed, 0, 0)
-    )
+    mech, moving = rom.Mechanism(gravity=(0, 0, -g)), (speed, 0, 0)
+    part = mech.add_rigid("block", mass=mass, inertia=(mass,) * 3, at=ORIGIN, velocity=moving)
     mech.prismatic("guide", mech.ground.marker(ORIGIN), part.marker(ORIGIN), axis=X)
     return mech
 

@@ -10,6 +10,7 @@ from scipy.special import ellipk
 
 from cases.mbs.mechanisms import simulate_quietly, slider_crank
 from cases.mbs.motions import G, ball, falling, heavy_top, pendulum
+from cases.refusals import refuses
 from rom.errors import ConfigError, SolverError
 from rom.mbs.integrate.simulation import simulate
 from rom.mbs.results.interpolation import vector_rate
@@ -74,9 +75,8 @@ def test_the_end_by_an_event_satisfies_joints_and_goes_on():
     sol = simulate_quietly(mech, t_end=1.0, dt=1e-3, save_every=3)
     assert np.abs(sol.gap[-1]).max() < 1e-14
     angle = 50 * sol.t[-1]
-    assert_allclose(
-        0.1 * np.cos(angle) + np.sqrt(0.09 - 0.01 * np.sin(angle) ** 2), 0.3, atol=1e-12
-    )
+    place = 0.1 * np.cos(angle) + np.sqrt(0.09 - 0.01 * np.sin(angle) ** 2)
+    assert_allclose(place, 0.3, atol=1e-12)
     assert sol.final.memory is None and np.all(np.diff(sol.t) > 0)
     more = simulate_quietly(mech, t_end=sol.t[-1] + 1e-2, dt=1e-3, state=sol.final)
     assert more.status.startswith("Reached")
@@ -97,18 +97,16 @@ def test_an_event_function_that_fails_is_named(method):
     mech.event("broken", lambda t, x: 1.0 if t < 0.3 else np.nan)
     with pytest.raises(SolverError, match=r"event 'broken' gives nan at t = 0\.\d+ s") as caught:
         simulate(mech, t_end=1.0, dt=0.1, method=method)
-    assert caught.value.solution.t[-1] <= 0.3
-    assert caught.value.solution.final.t <= 0.3
-    mech = ball()
-    mech.event("text", lambda t, x: "high")
-    with pytest.raises(ConfigError, match="event 'text' returned 'high'"):
-        simulate(mech, t_end=1.0, dt=0.1, method=method)
+    assert max(caught.value.solution.t[-1], caught.value.solution.final.t) <= 0.3
+    for name, function, says in (
+        ("text", lambda t, x: "high", "event 'text' returned 'high'"),
+        ("who", lambda t, x: x.velocity("bell")[0], "no body 'bell'"),
+    ):
+        mech = ball()
+        mech.event(name, function)
+        refuses(ConfigError, says, simulate, mech, t_end=1.0, dt=0.1, method=method)
     with pytest.raises(ConfigError, match="direction of event 'x' is 2"):
         mech.event("x", lambda t, x: 0, direction=2)
-    with pytest.raises(ConfigError, match="no body 'bell'"):
-        mech = ball()
-        mech.event("who", lambda t, x: x.velocity("bell")[0])
-        simulate(mech, t_end=1.0, dt=0.1, method=method)
 
 
 def test_an_event_comes_before_a_failure_behind_it():
@@ -157,7 +155,4 @@ def test_at_the_instants_themselves_nothing_changes():
         assert_allclose(getattr(again, name), getattr(sol, name), rtol=1e-13, atol=1e-13)
     assert_allclose(again.reaction("main"), sol.reaction("main"), rtol=1e-12, atol=1e-9)
     assert sol.at(0.0105).position("slider").shape == (1, 3)
-    with pytest.raises(
-        ConfigError, match=r"t = 0\.03 s must be within the motion from 0 s to 0\.02 s"
-    ):
-        sol.at(0.03)
+    refuses(ConfigError, r"t = 0\.03 s must be within the motion from 0 s to 0\.02 s", sol.at, 0.03)

@@ -10,6 +10,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 import rom
 from cases.mbs.mechanisms import simeon_crank, simulate_quietly, slider_crank
 from cases.mbs.motions import PARTS, swing, wound_drive
+from cases.refusals import refuses
 from rom.errors import FileFormatError, QualityGateError
 
 CASES = [(swing, 1e-2), (simeon_crank, 1e-5), (wound_drive, 1e-3)]
@@ -51,10 +52,9 @@ def test_saving_less_often_changes_no_bit(options):
 
 def test_a_time_that_has_no_binary_form_is_met_by_counting():
     """0.1 + 0.2 is not 0.3: steps are counted from the first start, times never summed up."""
-    state = None
-    for t_end in (0.1, 0.3, 0.7):
-        sol = simulate_quietly(swing(), t_end=t_end, dt=0.1 / 7, state=state)
-        state = sol.final
+    sol = simulate_quietly(swing(), t_end=0.1, dt=0.1 / 7)
+    for t_end in (0.3, 0.7):
+        sol = simulate_quietly(swing(), t_end=t_end, dt=0.1 / 7, state=sol.final)
     whole = simulate_quietly(swing(), t_end=0.7, dt=0.1 / 7)
     assert_array_equal(sol.q[-1], whole.q[-1])
     assert sol.t[-1] == whole.t[-1] == pytest.approx(0.7, abs=1e-15)
@@ -82,14 +82,8 @@ def test_a_state_file_says_what_is_wrong_with_it(tmp_path):
     for name in ("flipped", "cut", "none"):
         with pytest.raises(FileFormatError, match=r"not a complete state file|no such file"):
             rom.load_state(tmp_path / f"{name}.npz")
-    with pytest.raises(FileFormatError, match="schema 'rom-state'"):
-        rom.load(path)
+    refuses(FileFormatError, "schema 'rom-state'", rom.load, path)
     with pytest.raises(QualityGateError, match="v of the state must be finite"):
         rom.save_state(replace(state, v=state.v * np.nan), path)
     assert path.read_bytes() == data
-    assert sorted(p.name for p in tmp_path.iterdir()) == [
-        "a.npz",
-        "b.npz",
-        "cut.npz",
-        "flipped.npz",
-    ]
+    assert {p.stem for p in tmp_path.iterdir()} == {"a", "b", "cut", "flipped"}

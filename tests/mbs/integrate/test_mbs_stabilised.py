@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose
 
 import rom
 from cases.mbs.mechanisms import simulate_quietly, slider_crank
-from cases.mbs.motions import errors, free_crank, heavy_top, swing
+from cases.mbs.motions import free_crank, heavy_top, order_of, swing
 from rom import rotation
 from rom.errors import ConfigError
 from rom.mbs.equations.equations import linearize_constraints
@@ -36,28 +36,19 @@ def velocity_gap(sol):
     return largest
 
 
-def slopes(build, t_end, steps, exact, options):
-    table = []
-    for h in steps:
-        every = round(t_end / 10 / h)
-        sol = simulate_quietly(build(), t_end=t_end, dt=h, save_every=every, **options)
-        table.append(errors(sol, exact))
-    return np.log2(np.array(table)[:-1] / np.array(table)[1:])[-1]
-
-
 @pytest.mark.parametrize("options", [*STABILISED, *BDF], ids=str)
 def test_every_method_has_its_order(options):
     """Coordinates, velocities, accelerations and multipliers of the heavy top, over all steps."""
     exact = simulate_quietly(heavy_top(), t_end=0.1, dt=0.01, method="dop853")
     order = options.get("order", 2)
-    found = slopes(heavy_top, 0.1, (5e-4, 2.5e-4), exact, {"tolerance": 1e-12, **options})
+    found = order_of(heavy_top, 0.1, (5e-4, 2.5e-4), exact, {"tolerance": 1e-12, **options})
     assert_allclose(found, order, atol=0.15)
 
 
 @pytest.mark.parametrize("options", [*STABILISED, {"method": "bdf", "order": 3}], ids=str)
 def test_order_holds_in_a_loop_of_redundant_joints(options):
     exact = simulate_quietly(free_crank(), t_end=0.05, dt=0.005, method="dop853")
-    found = slopes(free_crank, 0.05, (6.25e-5, 3.125e-5), exact, {"tolerance": 1e-11, **options})
+    found = order_of(free_crank, 0.05, (6.25e-5, 3.125e-5), exact, {"tolerance": 1e-11, **options})
     assert_allclose(found, options.get("order", 2), atol=0.2)
 
 
