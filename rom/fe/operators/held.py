@@ -15,6 +15,7 @@ class HeldPETSc(HeldBody):
 
     def __init__(self, ops: Any, held: Index, shift: float = 0.0):
         super().__init__(ops, held, shift)
+        self.factorable = not ops.solver.out_of_core
         if self.n_free:
             if ops.solver.iterative:
                 self._refuse_loose()
@@ -44,8 +45,3 @@ class HeldPETSc(HeldBody):
         if self.ops.solver.iterative:
             return np.asarray(self.factor.solve(F, COARSE_RTOL))
         return super().coarsely_solved(F)
-
-    @property
-    def factorable(self) -> bool:
-        """Whether another factor fits."""
-        return not self.ops.solver.out_of_core

@@ -2,7 +2,7 @@
 
 import logging
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from scipy.linalg import eigh, null_space, orth
@@ -19,9 +19,6 @@ from rom.eigen.verbs import (
 from rom.errors import ConfigError
 from rom.model import Array, Interface
 from rom.reduction.bases.method import Guyan, Method
-
-if TYPE_CHECKING:
-    from rom.reduction.interfaces.connection import Connection
 
 log = logging.getLogger("rom")
 
@@ -56,7 +53,7 @@ class Characteristic:
     def __post_init__(self) -> None:
         whole("n", self.n, 6, reason="the rigid motions count")
 
-    def kinds(self, connection: "Connection", interfaces: dict[str, Any]) -> dict[str, Any]:
+    def kinds(self, connection: Any, interfaces: dict[str, Any]) -> dict[str, Any]:
         """The kinds of all interfaces, functions in the place of "full".
 
         Args:
