@@ -1,5 +1,5 @@
-"""Bodies for other multibody programs, one module each.
+"""Bodies for other multibody programs.
 
-`exudyn`, `mbdyn`, `radioss`, `simscape` and `openfast` write, the last reads as well;
-`interface_form` has a body in the coordinates of its interfaces, which some of them want.
+`exudyn`, `mbdyn` and `openfast` write, the last reads as well; `superelements` are for Simscape and
+OpenRadioss; `interface_form` has a body in the coordinates of its interfaces, which some want.
 """
