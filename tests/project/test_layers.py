@@ -38,22 +38,21 @@ rom: errors notebook rotation places fields lazy names readable process plausibl
   parametric updating prestress io mbs fmu view config report doctor cli components __main__
 cli: answer speech schemas options described ranks matrices output verbs parser main
 fe: costs parallel jit compat operators forms mesh elasticity probe
-fe.operators: solver memory disk aij foreseen factor substructures held spectrum iterative
-  krylov_schur workers petsc
+fe.operators: solver memory disk aij foreseen factor substructures held spectrum iterative workers
+  petsc
 fe.mesh: cell_types topology picks cad solid sources child curving quality repair validate cut read
   summary input_deck
 io: files hdf5 archive native fields matrices sid programs fmu bodies history export ours
 mbs: compiler kernels parts connections elements mechanism equations results integrate analysis
-mbs.analysis: quadratic_eigen local_equations rotors few_modes tangent sparse_tangent equilibrium
-  linearize campbell response snapshot steady_motion sensitivity inverse_dynamics law_check
-mbs.elements: field family law_calls joint_forces springs rotational_springs loads laws_in_python
-  laws formulas motors frictions contact stops bushings spread_loads nonlinear solids
+mbs.analysis: local_equations rotors few_modes tangent sparse_tangent equilibrium linearize campbell
+  response steady_motion sensitivity inverse_dynamics law_check
+mbs.elements: field family law_calls joint_forces springs loads laws formulas motors contact
+  joint_laws bushings nonlinear solids
 components.gear_mesh: gears compliance tooth_elements contact tooth_loads symbols keys field
-components.wheels: faces sector rotation modes gyroscopic travelling supports campbell certificate
-  reduced blades prestress field
+components.wheels: faces sector rotation modes travelling reduced blades prestress field
 components.updating: frf_data measured responses airframe models methods family_model
-  normal_equations equations verdict estimate comparison placement observers pictures verb field
-components.journal_bearing: films closed_forms oil_film statics oil record keys field
+  normal_equations verdict estimate comparison placement observers pictures verb field
+components.journal_bearing: films closed_forms oil_film statics record keys field
 body: recovery nonlinear records inertia reference stiffening conversion frame rotating surface
   flexible prestress projection damping spread
 stages: bodies deflection
