@@ -118,9 +118,7 @@ def test_a_flexible_body_takes_whole_turns_only():
     root = part.marker(part.names[0])
     mech.revolute("axle", mech.ground.marker(ORIGIN), root, axis=Z)
     mech.drive("speed", "axle", lambda t: 0.1 * t)
-    with pytest.raises(
-        ModelError, match=r"1.5708 rad .*'blade' is another one: it is flexible"
-    ):
+    with pytest.raises(ModelError, match=r"1.5708 rad .*'blade' is another one: it is flexible"):
         rom.periodic_motion(mech, period=5 * np.pi, turns={"axle": np.pi / 2})
 
 
