@@ -77,8 +77,7 @@ ORDER = {
             "gears compliance tooth_elements contact tooth_loads symbols keys field"
         ),
         "components.wheels": (
-            "faces sector rotation modes gyroscopic travelling supports campbell certificate "
-            "reduced blades prestress field"
+            "faces sector rotation modes travelling reduced blades prestress field"
         ),
         "components.updating": (
             "frf_data measured responses airframe models methods family_model normal_equations "
