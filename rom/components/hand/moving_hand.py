@@ -57,10 +57,8 @@ class Seat:
         z, x = finite("along", self.along, (3,)), finite("palmar", self.palmar, (3,))
         y = np.cross(z, x)
         if not np.linalg.norm(y) > 1e-6 * np.linalg.norm(z) * np.linalg.norm(x):
-            text = (
-                f"a finger along {self.along} cannot close towards {self.palmar}; give one across."
-            )
-            raise ConfigError(text)
+            text = f"a finger along {self.along} cannot close towards {self.palmar}"
+            raise ConfigError(f"{text}; give a direction across it.")
         z, y = z / np.linalg.norm(z), y / np.linalg.norm(y)
         return np.column_stack([np.cross(y, z), y, z])
 

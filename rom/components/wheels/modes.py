@@ -156,11 +156,7 @@ def _refuse_divergence(sector: CyclicSector, diameter: int, K: csr_matrix, speed
 
 
 def spinning(sector: CyclicSector, speed: float) -> csr_matrix:
-    """(n, n) stiffness at an angular speed [rad/s].
-
-    Raises:
-        ConfigError: if the sector has no matrices of rotation.
-    """
+    """(n, n) stiffness at an angular speed [rad/s] of a sector with matrices of rotation."""
     if speed == 0.0:
         return sector.K
     if sector.centrifugal is None:
