@@ -1,7 +1,7 @@
 """What mechanisms are made of.
 
 `bodies` with markers, `joints` as rows of constraints, `signals` of time and their jumps;
-`foreign` asks the functions that users hand over; `whole` is the mechanism as its parts know it.
+`foreign` asks the functions that users hand over.
 """
 
 from rom.lazy import front
