@@ -84,7 +84,7 @@ ORDER = {
             "frf_data measured responses airframe models methods family_model normal_equations "
             "equations verdict estimate comparison placement observers pictures verb field"
         ),
-        "components.journal_bearing": ("films closed_forms oil_film statics oil record keys field"),
+        "components.journal_bearing": "films closed_forms oil_film statics record keys field",
         "body": (
             "recovery nonlinear records inertia reference stiffening conversion frame rotating "
             "surface flexible prestress projection damping spread"
