@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.integrate import quad, solve_ivp
 
-from cases.bearings import (
+from cases.components.bearings import (
     INLETS,
     LUND_THOMSEN,
     RAIMONDI_BOYD,

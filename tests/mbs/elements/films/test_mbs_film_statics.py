@@ -7,8 +7,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 import rom
-from cases.bearings import INLETS, LUND_THOMSEN, RAIMONDI_BOYD, SIDES, TWO_LOBED, bearing
-from cases.bearings import load as load_along
+from cases.components.bearings import INLETS, LUND_THOMSEN, RAIMONDI_BOYD, SIDES, TWO_LOBED, bearing
+from cases.components.bearings import load as load_along
 from cases.long import few
 from cases.mbs.films import SPEED, VISCOSITY, held_rotor, resting
 from cases.refusals import refused
