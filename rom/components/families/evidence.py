@@ -18,7 +18,8 @@ from rom.components.families.affine import AffineModel
 from rom.components.families.parameters import Point, scattered
 from rom.eigen.verbs import residual_errors
 from rom.model import Basis, Report, Row
-from rom.reduction.interfaces.connection import Connection, connect
+from rom.reduction.interfaces.connection import connect
+from rom.reduction.interfaces.records import Connection
 from rom.rows import N_COMPARED, frequency_rows, row
 
 HELD_OUT = 3  # points of the certificate
