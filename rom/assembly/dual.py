@@ -35,7 +35,7 @@ from rom.errors import InterfaceError
 from rom.model import Array, FEModel, Index, Report, Row
 from rom.names import check_known
 from rom.reduction.bases.free_interface import Rubin, free_modes, residual_flexibility
-from rom.reduction.interfaces.connection import Connection
+from rom.reduction.interfaces.records import Connection
 from rom.rows import FREQUENCY_RTOL, N_COMPARED, frequency_rows, row
 from rom.stages.bodies import connect
 

@@ -23,7 +23,7 @@ from rom.eigen.verbs import (
 from rom.errors import InterfaceError
 from rom.model import Array, Basis, Report, Row
 from rom.process.progress import MANY_DOFS, stages
-from rom.reduction.interfaces.connection import Connection
+from rom.reduction.interfaces.records import Connection
 from rom.rows import BELOW_FULL_RTOL, FREQUENCY_RTOL, N_COMPARED, frequency_rows, row
 
 # Relative to the diagonals it bounds the error of squared frequencies; round-off of a fine mesh on

@@ -2,7 +2,7 @@
 
 import logging
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.linalg import eigh, null_space, orth
@@ -19,6 +19,9 @@ from rom.eigen.verbs import (
 from rom.errors import ConfigError
 from rom.model import Array, Interface
 from rom.reduction.bases.method import Guyan, Method
+
+if TYPE_CHECKING:
+    from rom.reduction.interfaces.records import Connection
 
 log = logging.getLogger("rom")
 
@@ -53,7 +56,7 @@ class Characteristic:
     def __post_init__(self) -> None:
         whole("n", self.n, 6, reason="the rigid motions count")
 
-    def kinds(self, connection: Any, interfaces: dict[str, Any]) -> dict[str, Any]:
+    def kinds(self, connection: "Connection", interfaces: dict[str, Any]) -> dict[str, Any]:
         """The kinds of all interfaces, functions in the place of "full".
 
         Args:

@@ -5,70 +5,23 @@ modes, certificate) sees an ordinary model whose interface coordinates are dofs 
 """
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix
 
-from rom.eigen.supports import SIX_KINDS, Fixed, held_coordinates, supports
 from rom.eigen.verbs import (
     Operators,
-    coupled,
     given_rigid_motions,
     held_rows,
     owned,
     rigid_motions,
 )
 from rom.errors import InterfaceError
-from rom.model import Array, FEModel, Index, Interface
+from rom.model import FEModel, Index, Interface
 from rom.names import named, offered
-from rom.reduction.interfaces.kinds import Tie, tie
-
-
-@dataclass(frozen=True, slots=True)
-class Connection:
-    """A model written in interface coordinates.
-
-    Attributes:
-        ops: operators in the coordinates a of u = T a; ``ops.expand`` leads back.
-        boundary: (n_b,) dof numbers in a of all interface coordinates, interface by interface.
-        parts: {interface: positions in ``boundary``}.
-        labels: (n_b,) what each coordinate is, e.g. "pin_a rbe2 uz".
-        ties: {interface: how its coordinates govern its dofs}.
-    """
-
-    ops: Operators
-    boundary: Index
-    parts: dict[str, Index]
-    labels: tuple[str, ...]
-    ties: dict[str, Tie]
-
-    def held(self, fixed: Fixed) -> Index:
-        """Dof numbers that are zero when these interfaces are held, see `rom.eigen.supports`."""
-        return self.boundary[self.held_parts(fixed)]
-
-    def on_springs(self, stiffness: dict[str, Array]) -> "Connection":
-        """The model on springs to the ground: {interface: (6, 6)} for its six coordinates."""
-        ops = self.ops
-        dK = csr_matrix((ops.n_local, ops.n))
-        for name, k in stiffness.items():
-            if self.ties[name].label not in SIX_KINDS:
-                raise InterfaceError(
-                    f"interface {name!r} has the kind {self.ties[name].label!r}; a spring acts on "
-                    "six coordinates.",
-                    hint='Give it the kind "rbe2" or "rbe3".',
-                )
-            dK = dK + coupled(dK.shape, ops.first, self.boundary[self.parts[name]], k)
-        return replace(self, ops=ops.on_springs(dK))
-
-    def held_parts(self, fixed: Fixed) -> Index:
-        """The same as positions in ``boundary``."""
-        found = [np.zeros(0, dtype=np.int64)]
-        for name, directions in supports(fixed, self.parts).items():
-            part, tie = self.parts[name], self.ties[name]
-            found.append(part[held_coordinates(name, tie.label, part.size, directions)])
-        return np.concatenate(found)
+from rom.reduction.interfaces.kinds import tie
+from rom.reduction.interfaces.records import Connection, Tie
 
 
 def connect(ops: Operators, model: FEModel, interfaces: dict[str, Any]) -> Connection:

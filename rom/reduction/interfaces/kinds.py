@@ -1,7 +1,6 @@
 """Kinds of interfaces: how a few coordinates c = L u govern the dofs u of a surface."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -10,10 +9,11 @@ from scipy.sparse import identity, kron
 
 from rom.eigen.verbs import mean_motion, rigid_motions
 from rom.errors import ConfigError, ResourceError
-from rom.model import Array, Index, Interface
+from rom.model import Array, Interface
 from rom.names import is_whole
 from rom.reduction.interfaces.characteristic import CharacteristicFunctions
 from rom.reduction.interfaces.polynomial import FourierLegendre, Polynomial, interface_functions
+from rom.reduction.interfaces.records import Tie
 from rom.reduction.interfaces.snapshots import Snapshots, snapshot_functions
 
 RBE3_DOFS = 6000  # an averaging interface couples all its dofs: 6000 of them fill 0.3 GB
@@ -24,35 +24,6 @@ KNOWN_KINDS = (
 )
 SIX_LABELS = ("ux", "uy", "uz", "rx", "ry", "rz")
 NO_DOFS = np.zeros(0, dtype=np.int64)
-
-
-@dataclass(frozen=True, slots=True)
-class Tie:
-    """One interface: dofs that leave, and how they follow from masters and dofs that stay.
-
-    Attributes:
-        label: name of the kind.
-        names: (m,) what each coordinate is.
-        coordinates: (m, 3k) map L from the dofs of the surface to its coordinates.
-        removed: (d,) dofs replaced; none when the coordinates are the dofs themselves.
-        by_masters: (d, m) how they follow from the coordinates; sparse where a function moves one
-            direction only.
-        kept: (s,) dofs that stay and take part.
-        by_kept: (d, s) how the removed ones follow from them.
-    """
-
-    label: str
-    names: tuple[str, ...]
-    coordinates: Any
-    removed: Index
-    by_masters: Any
-    kept: Index
-    by_kept: Array
-
-    @property
-    def n_masters(self) -> int:
-        """Number of new dofs."""
-        return self.by_masters.shape[1] if self.removed.size else 0
 
 
 def tie(interface: Interface, kind: Any) -> Tie:

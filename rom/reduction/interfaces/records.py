@@ -1,0 +1,95 @@
+"""What a model in interface coordinates is, and how each interface governs its dofs."""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from scipy.sparse import csr_matrix
+
+from rom.eigen.supports import SIX_KINDS, Fixed, held_coordinates, supports
+from rom.eigen.verbs import Operators, coupled
+from rom.errors import InterfaceError
+from rom.model import Array, Index
+
+
+@dataclass(frozen=True, slots=True)
+class Tie:
+    """One interface: dofs that leave, and how they follow from masters and dofs that stay.
+
+    Attributes:
+        label: name of the kind.
+        names: (m,) what each coordinate is.
+        coordinates: (m, 3k) map L from the dofs of the surface to its coordinates.
+        removed: (d,) dofs replaced; none when the coordinates are the dofs themselves.
+        by_masters: (d, m) how they follow from the coordinates; sparse where a function moves one
+            direction only.
+        kept: (s,) dofs that stay and take part.
+        by_kept: (d, s) how the removed ones follow from them.
+    """
+
+    label: str
+    names: tuple[str, ...]
+    coordinates: Any
+    removed: Index
+    by_masters: Any
+    kept: Index
+    by_kept: Array
+
+    @property
+    def n_masters(self) -> int:
+        """Number of new dofs."""
+        return self.by_masters.shape[1] if self.removed.size else 0
+
+
+@dataclass(frozen=True, slots=True)
+class Connection:
+    """A model written in interface coordinates.
+
+    Attributes:
+        ops: operators in the coordinates a of u = T a; ``ops.expand`` leads back.
+        boundary: (n_b,) dof numbers in a of all interface coordinates, interface by interface.
+        parts: {interface: positions in ``boundary``}.
+        labels: (n_b,) what each coordinate is, e.g. "pin_a rbe2 uz".
+        ties: {interface: how its coordinates govern its dofs}.
+    """
+
+    ops: Operators
+    boundary: Index
+    parts: dict[str, Index]
+    labels: tuple[str, ...]
+    ties: dict[str, Tie]
+
+    def held(self, fixed: Fixed) -> Index:
+        """Dof numbers that are zero when these interfaces are held.
+
+        Raises:
+            ConfigError, InterfaceError: see `rom.eigen.supports`.
+        """
+        rows = self.held_parts(fixed)
+        return self.boundary[rows]
+
+    def on_springs(self, stiffness: dict[str, Array]) -> "Connection":
+        """The model on springs to the ground: {interface: (6, 6)} for its six coordinates.
+
+        Raises:
+            InterfaceError: if one has other coordinates.
+        """
+        ops = self.ops
+        dK = csr_matrix((ops.n_local, ops.n))
+        for name, k in stiffness.items():
+            if self.ties[name].label not in SIX_KINDS:
+                raise InterfaceError(
+                    f"interface {name!r} has the kind {self.ties[name].label!r}; a spring acts on "
+                    "six coordinates.",
+                    hint='Give it the kind "rbe2" or "rbe3".',
+                )
+            dK = dK + coupled(dK.shape, ops.first, self.boundary[self.parts[name]], k)
+        return replace(self, ops=ops.on_springs(dK))
+
+    def held_parts(self, fixed: Fixed) -> Index:
+        """The same as positions in ``boundary``."""
+        found = [np.zeros(0, dtype=np.int64)]
+        for name, directions in supports(fixed, self.parts).items():
+            part, tie = self.parts[name], self.ties[name]
+            found.append(part[held_coordinates(name, tie.label, part.size, directions)])
+        return np.concatenate(found)
