@@ -119,7 +119,9 @@ def test_study_of_interface_orders_on_two_blocks(kind):
 def test_certificates_of_an_assembly_and_of_its_few_functions():
     assembly = joined("full", n_modes=12)
     assert not assembly.certificate.ok  # its bodies were reduced without
-    own = certify_of_parts(assembly)
+    good = rom.Report("certificate", (Row("mass", 0.0, "<= 1e-09", True),))
+    bodies = {name: replace(body, certificate=good) for name, body in assembly.bodies.items()}
+    own = rom.Assembly(bodies, assembly.couplings)
     rows = own.certificate.rows
     assert own.certificate.ok
     assert {line.quantity.partition(":")[0] for line in rows[:-1]} == {"left", "right"}
@@ -127,10 +129,3 @@ def test_certificates_of_an_assembly_and_of_its_few_functions():
     assert assembly.reduced(20).certificate.ok
     (poor,) = assembly.reduced(2, fixed=(ROOT,)).certificate.failures
     assert poor.quantity == "2 interface functions: worst error of 6 frequencies"
-
-
-def certify_of_parts(assembly):
-    """The assembly of bodies that say of themselves that they are right."""
-    good = rom.Report("certificate", (Row("mass", 0.0, "<= 1e-09", True),))
-    bodies = {name: replace(body, certificate=good) for name, body in assembly.bodies.items()}
-    return rom.Assembly(bodies, assembly.couplings)

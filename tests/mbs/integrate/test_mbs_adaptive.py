@@ -234,6 +234,23 @@ def test_dop853_without_an_interval_finds_events():
         assert (np.diff(sol.t) > 0).all()
 
 
+def test_dop853_without_an_interval_goes_on_to_the_same_bits(tmp_path):
+    options = {"t_end": 0.5, "method": "dop853", "rtol": 1e-9, "save_every": 2}
+    count = Brake()
+    whole = simulate(braked(count, pendulum), **options)
+    with pytest.raises(SolverError, match="'brake' failed") as caught:
+        broken = braked(Brake(len(count.times) // 2), pendulum)
+        simulate(broken, keep=rom.Keeping(tmp_path / "a"), **options)
+    assert 2 < caught.value.solution.t.size < whole.t.size
+    keep = rom.Keeping(tmp_path / "a", resume=True)
+    rest = simulate(braked(Brake(), pendulum), keep=keep, **options)
+    for name in PARTS:
+        assert_array_equal(getattr(rest, name), getattr(whole, name), err_msg=name)
+    state = caught.value.solution.final
+    more = simulate(braked(Brake(), pendulum), state=state, **options)
+    assert_array_equal(more.q[-1], whole.q[-1])
+
+
 def linkage_that_stops():
     """A slider-crank whose drive turns it by 0.05 rad and holds it; bodies are given a push."""
     mech, z = Mechanism(gravity=(0, -9.81, 0)), (0, 0, 1)

@@ -30,7 +30,6 @@ METHODS = {
     "alpha chosen": {"rtol": 1e-3},
     "bdf chosen": {"method": "bdf", "rtol": 1e-3, "save_every": 3},
     "dop853": {"dt": 3e-3, "method": "dop853", "rtol": 1e-9},
-    "dop853 chosen": {"method": "dop853", "rtol": 1e-9},
 }
 FAULTS = {  # what a function does, and the class and the words by which the run ends
     "exception": (lambda value: 1 / 0, SolverError, "ZeroDivisionError"),
@@ -210,6 +209,7 @@ def test_a_warning_that_is_an_error_does_not_take_the_motion_with_it(monkeypatch
         ({"dt": 1e-13}, ConfigError, r"takes 1e\+13 steps"),
         ({"dt": 5e-324}, ConfigError, "takes inf steps"),
         ({"dt": 1e-11}, ResourceError, r"keeping 1e\+11 instants takes .* free.*save_every"),
+        ({"dt": 5.0, "t_end": 0.02}, ConfigError, r"5 s is longer than the motion of 0\.02 s"),
         ({"dt": 1.0, "t_start": 1e17, "t_end": 1e17 + 64}, ConfigError, "is lost beside t = 1e"),
         ({"dt": 1e-9, "t_start": 1e9 - 1, "t_end": 1e9}, ConfigError, "is lost beside t = 1e"),
     ],

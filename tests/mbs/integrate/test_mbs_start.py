@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose
 import rom
 from cases.mbs.mechanisms import lattice, lattice_body, slider_crank
 from cases.refusals import refuses
-from rom.errors import ConfigError, ModelError, RomWarning
+from rom.errors import ModelError, RomWarning
 
 Z = (0, 0, 1)
 
@@ -128,11 +128,6 @@ def test_a_strain_that_closing_needs_is_told():
     with pytest.warns(RomWarning, match="it bends 'rod' by"):
         sol = moved(flexible(gaps, held))
     assert_allclose(sol.position("rod", "n12")[0, 0], 1.0 + 1e-3, atol=1e-12)
-
-
-def test_a_step_longer_than_the_motion_is_refused():
-    with pytest.raises(ConfigError, match=r"dt = 5 s is longer than the motion of 0\.02 s"):
-        rom.simulate(rod_on_a_pin(), t_end=0.02, dt=5.0)
 
 
 def geared_disc(speed, rate=None, body=None):
