@@ -47,8 +47,8 @@ from rom.model import Array, Basis, FEModel, Index, Report, Row
 from rom.names import check_name
 from rom.reduction.bases.method import Method
 from rom.reduction.interfaces.characteristic import Characteristic
-from rom.reduction.interfaces.connection import Connection
 from rom.reduction.interfaces.connection import connect as connected
+from rom.reduction.interfaces.records import Connection
 from rom.rows import N_COMPARED, frequency_rows, row
 from rom.stages.bodies import connect, few_functions, make_body, place_frame, project
 
