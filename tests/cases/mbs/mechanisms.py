@@ -155,19 +155,8 @@ def prepared(mechanism):
 
 # Simeon, Modelling a flexible slider crank mechanism by a mixed system of DAEs and PDEs,
 # Math. Modelling of Systems 2 (1996) 1; data as in the IVP test set, problem "crank".
-CRANK = {
-    "l1": 0.15,
-    "l2": 0.30,
-    "m1": 0.36,
-    "m2": 0.151104,
-    "m3": 0.075552,
-    "J1": 0.002727,
-    "J2": 0.0045339259,
-    "E": 2e11,
-    "h": 0.008,
-    "rho": 7870.0,
-    "speed": 150.0,
-}
+CRANK = {"l1": 0.15, "l2": 0.30, "m1": 0.36, "m2": 0.151104, "m3": 0.075552, "J1": 0.002727}
+CRANK |= {"J2": 0.0045339259, "E": 2e11, "h": 0.008, "rho": 7870.0, "speed": 150.0}
 
 
 def simeon_rod(axial_mass_divisor=1.0):
@@ -185,35 +174,23 @@ def simeon_rod(axial_mass_divisor=1.0):
     K = EAl * block_diag(
         pi**4 / 24 * (h / l) ** 2, 2 * pi**4 / 3 * (h / l) ** 2, np.array([[16, -8], [-8, 7]]) / 3
     )
-    c1 = rAl * np.array([0, 0, 2 / 3, 1 / 6])
-    c2 = rAl * np.array([2 / pi, 0, 0, 0])
-    c12 = rAl * l * np.array([0, 0, 1 / 3, 1 / 6])
-    c21 = rAl * l * np.array([1 / pi, -1 / (2 * pi), 0, 0])
+    S = rAl * np.array([[0, 0, 2 / 3, 1 / 6], [2 / pi, 0, 0, 0], [0, 0, 0, 0]])
     B = np.zeros((4, 4))
     B[0, 2], B[0, 3], B[1, 3] = -16 / pi**3, 8 / pi**3 - 1 / pi, 1 / (2 * pi)
     B = rAl * (B - B.T)
-    return _planar_rod(m, l, c["J2"], M, K, c1, c2, c12, c21, B)
-
-
-def _planar_rod(m, l, J2, M, K, c1, c2, c12, c21, B):  # noqa: PLR0913  the integrals of the paper
-    axial, bending = [2, 3], [0, 1]
     Ibar, S_kl = np.zeros((3, 3, 4)), np.zeros((3, 3, 4, 4))
-    Ibar[0, 0], Ibar[0, 1] = c12, c21
-    S_kl[0, 0][np.ix_(axial, axial)] = M[np.ix_(axial, axial)]
-    S_kl[1, 1][np.ix_(bending, bending)] = M[np.ix_(bending, bending)]
-    for i in bending:
-        for k in axial:
-            # B holds integrals of phi_i x phi_k = -(bending i) (axial k)
-            S_kl[1, 0, i, k] = S_kl[0, 1, k, i] = -B[i, k]
-    tip = np.zeros((3, 4))
+    Ibar[0, :2] = rAl * l * np.array([[0, 0, 1 / 3, 1 / 6], [1 / pi, -1 / (2 * pi), 0, 0]])
+    S_kl[0, 0, 2:, 2:], S_kl[1, 1, :2, :2] = M[2:, 2:], M[:2, :2]  # axial, bending
+    # B holds integrals of phi_i x phi_k = -(bending i) (axial k)
+    S_kl[1, 0, :2, 2:], S_kl[0, 1, 2:, :2] = -B[:2, 2:], -B[:2, 2:].T
+    tip, zero = np.zeros((2, 3, 4))
     tip[0, 3] = 1.0
-    zero = np.zeros((3, 4))
     return FlexibleBody(
         name="rod",
         mass=m,
         first_moment=np.array([m * l / 2, 0, 0]),
-        inertia=np.diag([1e-3 * J2, J2, J2]),
-        S=np.array([c1, c2, 0 * c1]),
+        inertia=c["J2"] * np.diag([1e-3, 1, 1]),
+        S=S,
         Ibar_kl=Ibar,
         S_kl=S_kl,
         K=K,
@@ -234,42 +211,27 @@ def simeon_crank(axial_mass_divisor=1.0, start=None):
         [0.0, 0.0, 1.03339863e-5, 1.69327969e-5],
         [0.444896112581599, 4.634339319238670e-3, -1.78591076e-6, -2.68938672e-6],
     )
-    mech = Mechanism(gravity=(0, 0, 0))
-    crank = mech.add_rigid(
-        "crank",
-        mass=c["m1"],
-        inertia=(1e-4, c["J1"] - c["m1"] * c["l1"] ** 2 / 4, c["J1"] - c["m1"] * c["l1"] ** 2 / 4),
-        at=(c["l1"] / 2, 0, 0),
-        markers={"o": (-c["l1"] / 2, 0, 0), "a": (c["l1"] / 2, 0, 0)},
-        velocity=(0, c["speed"] * c["l1"] / 2, 0),
-        omega=(0, 0, c["speed"]),
-    )
-    rod = mech.add_flexible(
-        "rod",
-        simeon_rod(axial_mass_divisor),
-        at=(c["l1"], 0, 0),
-        velocity=(0, c["speed"] * c["l1"], 0),
-        omega=(0, 0, -74.99576703969453),
-        q=q,
-        qd=qd,
-    )
-    slider = mech.add_rigid(
-        "slider",
-        mass=c["m3"],
-        inertia=(1e-5, 1e-5, 1e-5),
-        at=(c["l1"] + c["l2"] + q[3], 0, 0),
-        markers={"b": (0, 0, 0)},
-        velocity=(qd[3], 0, 0),
-    )
+    mech, speed, l1 = Mechanism(gravity=(0, 0, 0)), c["speed"], c["l1"]
+    half, across = np.array([l1 / 2, 0, 0]), c["J1"] - c["m1"] * l1**2 / 4
+    solid = {"mass": c["m1"], "inertia": (1e-4, across, across), "at": half}
+    moving = {"velocity": (0, speed * l1 / 2, 0), "omega": (0, 0, speed)}
+    crank = mech.add_rigid("crank", **solid, markers={"o": -half, "a": half}, **moving)
+    moving = {"velocity": (0, speed * l1, 0), "omega": (0, 0, -74.99576703969453)}
+    one = simeon_rod(axial_mass_divisor)
+    rod = mech.add_flexible("rod", one, at=(l1, 0, 0), **moving, q=q, qd=qd)
+    solid = {"mass": c["m3"], "inertia": (1e-5,) * 3, "at": (l1 + c["l2"] + q[3], 0, 0)}
+    slider = mech.add_rigid("slider", **solid, markers={"b": (0, 0, 0)}, velocity=(qd[3], 0, 0))
+    return joined_crank(mech, crank, rod, slider, speed)
+
+
+def joined_crank(mech, crank, rod, slider, speed):
+    """A crank that is driven, a rod and a slider on a guide, joined."""
     z, o = (0, 0, 1), mech.ground.marker((0, 0, 0))
     mech.revolute("main", o, crank.marker("o"), axis=z)
     mech.revolute("pin", crank.marker("a"), rod.marker("a"), axis=z)
     mech.revolute("wrist", rod.marker("b"), slider.marker("b"), axis=z)
     mech.prismatic("guide", o, slider.marker("b"), axis=(1, 0, 0))
-    speed = c["speed"]
-    mech.drive(
-        "motor", "main", lambda t: speed * t, rate=lambda t: speed, acceleration=lambda t: 0.0
-    )
+    mech.drive("motor", "main", lambda t: speed * t, rate=lambda t: speed, acceleration=lambda t: 0)
     return mech
 
 
@@ -284,37 +246,34 @@ def slider_crank(l1=0.1, l2=0.3, speed=50.0, gravity=0.0, rod=None):
     """Driven slider-crank in the xy plane with a rigid rod, or a flexible one in the rod frame."""
     mech = Mechanism(gravity=(0, -gravity, 0))
     start = {"velocity": (0, speed * l1, 0), "omega": (0, 0, -speed * l1 / l2)}
-    z, o = (0, 0, 1), mech.ground.marker((0, 0, 0))
-    crank = mech.add_rigid(
-        "crank",
-        mass=1.0,
-        inertia=(1e-3, 1e-3, 2e-3),
-        at=(0, 0, 0),
-        markers={"o": (0, 0, 0), "a": (l1, 0, 0)},
-        omega=(0, 0, speed),
-    )
+    solid = {"mass": 1.0, "inertia": (1e-3, 1e-3, 2e-3), "at": (0, 0, 0), "omega": (0, 0, speed)}
+    crank = mech.add_rigid("crank", **solid, markers={"o": (0, 0, 0), "a": (l1, 0, 0)})
     if rod is None:
-        rod = mech.add_rigid(
-            "rod",
-            mass=0.5,
-            inertia=(1e-4, 4e-3, 4e-3),
-            at=(l1 + l2 / 2, 0, 0),
-            markers={"a": (-l2 / 2, 0, 0), "b": (l2 / 2, 0, 0)},
-            velocity=(0, speed * l1 / 2, 0),
-            omega=(0, 0, -speed * l1 / l2),
-        )
+        start["velocity"] = (0, speed * l1 / 2, 0)
+        solid = {"mass": 0.5, "inertia": (1e-4, 4e-3, 4e-3), "at": (l1 + l2 / 2, 0, 0)}
+        ends = {"a": (-l2 / 2, 0, 0), "b": (l2 / 2, 0, 0)}
+        rod = mech.add_rigid("rod", **solid, markers=ends, **start)
     else:
         at = np.array([l1, 0, 0]) - rod.marker("a").point  # whatever its frame is
         rod = mech.add_flexible("rod", rod, at=at, **start)
-    slider = mech.add_rigid(
-        "slider", mass=0.4, inertia=(1e-4, 1e-4, 1e-4), at=(l1 + l2, 0, 0), markers={"b": (0, 0, 0)}
-    )
-    mech.revolute("main", o, crank.marker("o"), axis=z)
-    mech.revolute("pin", crank.marker("a"), rod.marker("a"), axis=z)
-    mech.revolute("wrist", rod.marker("b"), slider.marker("b"), axis=z)
-    mech.prismatic("guide", o, slider.marker("b"), axis=(1, 0, 0))
-    mech.drive("motor", "main", lambda t: speed * t, rate=lambda t: speed, acceleration=lambda t: 0)
-    return mech
+    solid = {"mass": 0.4, "inertia": (1e-4,) * 3, "at": (l1 + l2, 0, 0)}
+    slider = mech.add_rigid("slider", **solid, markers={"b": (0, 0, 0)})
+    return joined_crank(mech, crank, rod, slider, speed)
+
+
+def crank_torque(angle, l1=0.1, l2=0.3, speed=50.0, gravity=0.0):
+    """Of the drive of `slider_crank`: Lagrange's equation, its derivatives by complex step."""
+    step = 1e-30
+    angle = angle + 1j * step
+    sine = -l1 / l2 * np.sin(angle)
+    cosine = np.sqrt(1 - sine**2)
+    turn = -l1 / l2 * np.cos(angle) / cosine  # of the rod, per radian
+    x = -l1 * np.sin(angle) - l2 / 2 * sine * turn
+    y = l1 * np.cos(angle) + l2 / 2 * cosine * turn
+    slide = -l1 * np.sin(angle) - l2 * sine * turn
+    inertia = 2e-3 + 0.5 * (x**2 + y**2) + 4e-3 * turn**2 + 0.4 * slide**2
+    height = 0.5 * gravity * (l1 * np.sin(angle) + l2 / 2 * sine)
+    return (0.5 * inertia.imag * speed**2 + height.imag) / step
 
 
 def lattice(sections=5, stiffness=4e3, length=1.0, mass=1.0):
@@ -376,15 +335,8 @@ def lattice_motion(lattice_data, times, y0, v0, outer, held=()):
         a[list(held)] = 0.0
         return np.concatenate([v, a]).ravel()
 
-    y = solve_ivp(
-        rhs,
-        (0.0, times[-1]),
-        np.concatenate([y0, v0]).ravel(),
-        method="DOP853",
-        t_eval=times,
-        rtol=1e-9,
-        atol=1e-11,
-    ).y
+    start = np.concatenate([y0, v0]).ravel()
+    y = solve_ivp(rhs, (0.0, times[-1]), start, "DOP853", times, rtol=1e-9, atol=1e-11).y
     return y.T.reshape(-1, 2, n, 3)[:, 0]
 
 

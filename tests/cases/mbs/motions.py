@@ -29,9 +29,8 @@ def pendulum(angle=1.2):
     """A ball of 1 kg and 0.1 kg m^2 on a massless rod of 1 m, held by a hinge."""
     mech = Mechanism(gravity=(0, -G, 0))
     at = np.array([np.sin(angle), -np.cos(angle), 0])
-    bob = mech.add_rigid(
-        "bob", mass=1.0, inertia=(0.1,) * 3, at=at, markers={"pin": -at, "tip": (0, 0, 0)}
-    )
+    solid = {"mass": 1.0, "inertia": (0.1,) * 3, "markers": {"pin": -at, "tip": (0, 0, 0)}}
+    bob = mech.add_rigid("bob", at=at, **solid)
     mech.revolute("hinge", mech.ground.marker((0, 0, 0)), bob.marker("pin"), axis=(0, 0, 1))
     return mech
 
@@ -67,15 +66,9 @@ TOP = json.loads((TESTS / "reference" / "heavy_top.json").read_text())
 def heavy_top():
     mech = Mechanism(gravity=(0, 0, -TOP["gravity"]))
     centre, omega = np.array(TOP["centre"]), np.array(TOP["omega"])
-    top = mech.add_rigid(
-        "top",
-        mass=TOP["mass"],
-        inertia=TOP["inertia"],
-        at=centre,
-        markers={"tip": -centre},
-        velocity=np.cross(omega, centre),
-        omega=omega,
-    )
+    solid = {"mass": TOP["mass"], "inertia": TOP["inertia"], "markers": {"tip": -centre}}
+    moving = {"at": centre, "velocity": np.cross(omega, centre), "omega": omega}
+    top = mech.add_rigid("top", **solid, **moving)
     mech.spherical("tip", mech.ground.marker((0, 0, 0)), top.marker("tip"))
     return mech
 

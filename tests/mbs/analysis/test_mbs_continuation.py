@@ -250,7 +250,6 @@ def test_what_makes_no_path_is_named():
     state = rom.equilibrium(mech)
     for wish, why in (
         ({"span": (1.0, 1.0)}, "needs two values that differ"),
-        ({"span": (0.0, 1.0), "n": 1}, "n = 1"),
         ({"span": (0.0, 1.0), "along": np.ones(6)}, "a branch leaves a state"),
         ({"span": (0.0, 1.0), "along": np.ones(5), "state": state}, "along"),
         ({"span": (0.0, 1.0), "along": np.zeros(6), "state": state}, "along needs a motion"),

@@ -6,13 +6,13 @@ from numpy.testing import assert_allclose
 from scipy.interpolate import CubicSpline
 
 import rom
-from cases.mbs.mechanisms import random_body, slider_crank
+from cases.mbs.mechanisms import crank_torque, random_body, slider_crank
 from cases.mbs.parts import X, Z, on_hinge
 from rom.errors import ConfigError, ModelError
 from rom.rotation import matrix
 
 G = 9.81
-L1, L2, SPEED = 0.1, 0.3, 50.0
+SPEED = 50.0
 
 
 def driven_pendulum(mass=2.0, reach=0.4, inertia=0.1):
@@ -37,30 +37,11 @@ def test_a_driven_pendulum_needs_the_torque_of_its_equation():
     assert_allclose(sol.omega("bar")[:, 2], rate, atol=1e-6)
 
 
-def crank_energies(angle):
-    """Reduced inertia and gravity potential of `slider_crank`, of a complex angle as well."""
-    sine = -L1 / L2 * np.sin(angle)
-    turn = -L1 / L2 * np.cos(angle) / np.sqrt(1 - sine**2)  # of the rod, per radian
-    cosine = np.sqrt(1 - sine**2)
-    x = -L1 * np.sin(angle) - L2 / 2 * sine * turn
-    y = L1 * np.cos(angle) + L2 / 2 * cosine * turn
-    slide = -L1 * np.sin(angle) - L2 * sine * turn
-    inertia = 2e-3 + 0.5 * (x**2 + y**2) + 4e-3 * turn**2 + 0.4 * slide**2
-    return inertia, 0.5 * G * (L1 * np.sin(angle) + L2 / 2 * sine)
-
-
-def crank_torque(angle):
-    """Lagrange's equation of the one coordinate at constant speed, derivatives by complex step."""
-    step = 1e-30
-    inertia, height = crank_energies(angle + 1j * step)
-    return 0.5 * inertia.imag / step * SPEED**2 + height.imag / step
-
-
 @pytest.mark.filterwarnings("ignore::rom.errors.RomWarning")
 def test_a_slider_crank_needs_the_torque_of_lagranges_equation():
     t = np.linspace(0, 0.15, 61)
-    sol = rom.inverse_dynamics(slider_crank(L1, L2, SPEED, G), t)
-    wanted = crank_torque(SPEED * t)
+    sol = rom.inverse_dynamics(slider_crank(speed=SPEED, gravity=G), t)
+    wanted = crank_torque(SPEED * t, speed=SPEED, gravity=G)
     assert np.ptp(wanted) > 10.0
     assert_allclose(sol.drive_load("motor"), wanted, atol=1e-9 * np.abs(wanted).max())
     assert_allclose(sol.reaction("motor")[:, 5], wanted, atol=1e-9 * np.abs(wanted).max())

@@ -10,6 +10,7 @@ from scipy.integrate import solve_ivp
 import rom
 from cases.beam import stiffened_beam
 from cases.mbs.parts import ORIGIN, Z
+from cases.refusals import refused
 from rom.components.gear_mesh import Correction, GearPair
 from rom.errors import ModelError
 from rom.mbs import BallBearing
@@ -90,26 +91,22 @@ def test_multipliers_of_three_teeth_are_those_of_one_to_the_third_power(conserva
     assert apart[0] / apart[1] == pytest.approx(4.0, rel=0.1)
 
 
-def test_angles_that_do_not_fit_the_teeth_are_refused():
-    speed, turns = 300.0, {"pinion axle": 2 * np.pi / 26}
-    with pytest.raises(ModelError, match="other forces act on"):
-        rom.periodic_motion(geared(speed, damping=2e-5), period=2 * np.pi / 26 / speed, turns=turns)
-    with pytest.raises(ModelError, match="'speed' does not repeat with the period"):
-        rom.periodic_motion(geared(speed), period=2 * np.pi / 26 / speed)
+def through(turns, share=1.0, **more):
+    """Ask for the motion of a part of a tooth."""
+    mech, period = geared(300.0, **more), share * 2 * np.pi / 26 / 300.0
+    return lambda: rom.periodic_motion(mech, period=period, turns=turns)
 
 
-def test_turns_of_parts_of_teeth_are_refused():
-    speed, part = 300.0, 0.7
-    turns = {"pinion axle": part * 2 * np.pi / 26, "gear axle": -part * 2 * np.pi / 40}
-    with pytest.raises(ModelError, match=r"mesh 'mesh' has gone on by 0\.7 teeth"):
-        rom.periodic_motion(geared(speed), turns=turns, period=part * 2 * np.pi / 26 / speed)
-
-
-def test_a_wheel_that_looks_different_after_a_tooth_is_refused_and_takes_whole_turns():
-    uneven = ((1e-3, 2e-3, 2e-3), (5e-3, 5e-3, 9e-3))
-    T = 2 * np.pi / 26 / 300.0
-    with pytest.raises(ModelError, match="the body 'pinion' is another one: its inertia"):
-        rom.periodic_motion(geared(300.0, uneven), period=T, turns=TURNS)
+test_gears_that_are_others_after_their_turns_are_refused = refused(
+    (through({"pinion axle": TURNS["pinion axle"]}, damping=2e-5), "other forces act on"),
+    (through(None), "'speed' does not repeat with the period"),
+    (through({k: 0.7 * x for k, x in TURNS.items()}, 0.7), r"'mesh' has gone on by 0\.7 teeth"),
+    (
+        through(TURNS, inertia=((1e-3, 2e-3, 2e-3), (5e-3, 5e-3, 9e-3))),
+        "the body 'pinion' is another one: its inertia",
+    ),
+    error=ModelError,
+)
 
 
 def test_a_flexible_body_takes_whole_turns_only():

@@ -9,17 +9,8 @@ from numpy.testing import assert_allclose
 from scipy.linalg import null_space
 from scipy.sparse import csc_matrix
 
-from cases.mbs.mechanisms import (
-    nodal_body,
-    nodal_residual,
-    prepared,
-    random_body,
-    random_nodes,
-    random_pose,
-    random_state,
-    tangents_at,
-    two_soft,
-)
+from cases.mbs import mechanisms
+from cases.mbs.mechanisms import prepared, random_pose, random_state, two_soft
 from cases.mbs.tangents import GRAVITY, check_tangents, constraint_derivatives
 from rom import rotation
 from rom.body.rotating import rotating_matrices
@@ -38,7 +29,7 @@ def nodal_accelerations(nodes, *state):
     """
     psi, n = np.zeros((4, 4, *nodes[0].shape)), 10
     pull, *columns = (
-        nodal_residual(nodes, psi, state, a, GRAVITY) for a in (np.zeros(n), *np.eye(n))
+        mechanisms.nodal_residual(nodes, psi, state, a, GRAVITY) for a in (np.zeros(n), *np.eye(n))
     )
     return np.linalg.solve(np.array(columns).T - pull[:, None], -pull)
 
@@ -47,11 +38,11 @@ def test_frame_equations_equal_direct_nodal_dynamics():
     """C1: a dropped inertia integral, sign or transpose changes the accelerations."""
     rng = np.random.default_rng(1)
     for _ in range(5):
-        nodes = random_nodes(rng)
+        nodes = mechanisms.random_nodes(rng)
         mech = Mechanism(gravity=GRAVITY)
         pose = random_pose(rng)
         q, qd = rng.normal(size=4), rng.normal(size=4)
-        mech.add_flexible("body", nodal_body(*nodes), q=q, qd=qd, **pose)
+        mech.add_flexible("body", mechanisms.nodal_body(*nodes), q=q, qd=qd, **pose)
         packed, W = prepared(mech)
         y = np.concatenate([packed.q, packed.v, np.zeros(3)])
         a = np.zeros(10)
@@ -109,7 +100,7 @@ def test_iteration_matrix_is_the_derivative_of_the_residual(seed):
 def test_a_rotating_body_is_linearised_as_it_moves():
     """Stiffness and gyroscopic matrix of the body: the derivatives of its equations of motion."""
     rng = np.random.default_rng(6)
-    body = random_body(rng, damped=False, stiffened=True).with_reference("mean-axis")
+    body = mechanisms.random_body(rng, damped=False, stiffened=True).with_reference("mean-axis")
     for load in elastic_loads(body.n_modes):  # they act on a body that is bent
         del body.K_geo[load]
     w, arm, pose = rng.normal(size=3), rng.normal(size=3), random_pose(rng)
@@ -118,7 +109,7 @@ def test_a_rotating_body_is_linearised_as_it_moves():
     packed, W = prepared(mech)
     a, none = np.zeros(10), np.zeros(0)
     a[:3] = rotation.matrix(pose["orientation"]) @ np.cross(w, np.cross(w, -arm))
-    tangents_at(packed.system, W, packed.q, packed.v, a, none, (0.0, 1.0, 1.0))
+    mechanisms.tangents_at(packed.system, W, packed.q, packed.v, a, none, (0.0, 1.0, 1.0))
     K, G = rotating_matrices(body, w, arm)
     assert_allclose(W.Kt[6:, 6:], K, atol=1e-12 * np.abs(K).max())
     assert_allclose(W.S[6:, 6:], G, atol=1e-12 * np.abs(G).max())

@@ -33,7 +33,7 @@ def elbow(phi):
     return pin, pin + along * reach / far + np.sqrt(B**2 - along**2) * across
 
 
-def four_bar(*, repeated=True, drive=True):
+def four_bar(*, repeated=True):
     """Four hinges, or hinges, a ball and a Cardan joint that only just hold it in its plane."""
     mech = Mechanism(gravity=(0, -9.81, 0))
     pin, knee = elbow(np.array(START))
@@ -48,8 +48,7 @@ def four_bar(*, repeated=True, drive=True):
         mech.universal("A", crank.marker("b"), coupler.marker("a"), axis1=Z, axis2=X)
         mech.spherical("B", coupler.marker("b"), rocker.marker("b"))
     mech.revolute("C", mech.ground.marker((D, 0, 0)), rocker.marker("a"), axis=Z)
-    if drive:
-        mech.drive("motor", "O", lambda t: SPEED * t)
+    mech.drive("motor", "O", lambda t: SPEED * t)
     return mech
 
 

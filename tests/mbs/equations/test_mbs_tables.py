@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import rom
+from benchmarks.models import rigid_chain
 from cases.command import python
 from cases.mbs.mechanisms import random_body
 from cases.mbs.trusses import truss
@@ -69,15 +70,11 @@ def test_a_table_is_copied_with_its_arrays_only():
     assert t.inner.x[0] == 0.5 and changed.blocks is t.blocks
 
 
-@pytest.mark.parametrize(
-    "wrong",
-    [
-        np.zeros(3),
-        np.zeros((2, 3, 4), dtype=int),
-        np.zeros((4, 3, 2)).T,
-        np.zeros((2, 3, 8))[..., ::2],
-    ],
-)
+WRONG = [np.zeros(3), np.zeros((2, 3, 4), dtype=int)]
+WRONG += [np.zeros((4, 3, 2)).T, np.zeros((2, 3, 8))[..., ::2]]
+
+
+@pytest.mark.parametrize("wrong", WRONG)
 def test_an_array_that_compiled_code_would_misread_is_refused(wrong):
     with pytest.raises(TypeError, match=r"Outer.blocks is an array of"):
         outer().replace(blocks=wrong)
@@ -97,18 +94,6 @@ def pair():
 
 def ground(mech):
     return mech.ground.marker((0, 0, 0))
-
-
-def chain(n):
-    """Pendulums that hang one on the other."""
-    mech = rom.Mechanism(gravity=(0, 0, -9.81))
-    above = mech.ground.marker((0, 0, 0))
-    for k in range(n):
-        bar = mech.add_rigid(f"link {k}", mass=1.0, inertia=(0.1,) * 3, at=(k + 0.5, 0, 0),
-                             markers={"top": (-0.5, 0, 0), "end": (0.5, 0, 0)})  # fmt: skip
-        mech.revolute(f"hinge {k}", above, bar.marker("top"), axis=(0, 1, 0))
-        above = bar.marker("end")
-    return mech
 
 
 def flexible_body(mech, **kind):
@@ -231,7 +216,7 @@ def test_a_mechanism_asks_for_the_stages_of_its_parts(stages, add):
 
 
 def test_a_mechanism_asks_for_the_stages_of_the_way_its_matrices_are_stored():
-    packed = pack(chain(6))
+    packed = pack(rigid_chain(6))
     for kind in (packed, packed.whole()):
         asked = needed_by(kind.system)
         assert STORAGE[kind.by_blocks] <= asked and not STORAGE[not kind.by_blocks] & asked
@@ -242,7 +227,7 @@ def test_a_mechanism_asks_for_the_stages_of_the_way_its_matrices_are_stored():
 def test_a_run_asks_for_the_stages_of_its_method(options, stages, monkeypatch):
     steps = []
     monkeypatch.setattr(step_memory, "link", lambda step: (steps.append(step), link(step)))
-    rom.simulate(chain(1), t_end=0.01, **{"dt": 1e-3} | options)
+    rom.simulate(rigid_chain(1), t_end=0.01, **{"dt": 1e-3} | options)
     assert steps and all(needed_by(step) == stages for step in steps)
 
 
@@ -266,8 +251,5 @@ mech.revolute("hinge", mech.ground.marker((0, 0, 0)), ball.marker("p"), axis=(0,
 print(rom.simulate(mech, t_end=0.01, dt=1e-3, progress=False).position("ball")[-1].tolist())
 """
     orders = [(), ("rom.mbs.elements.contact.points", "rom.mbs.equations.linear_solve")]
-    said = {
-        python("-c", code, *order, timeout=300, check=True).stdout
-        for order in orders
-    }  # fmt: skip
+    said = {python("-c", code, *order, timeout=300, check=True).stdout for order in orders}
     assert len(said) == 1

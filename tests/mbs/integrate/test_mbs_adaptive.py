@@ -8,19 +8,9 @@ from scipy.special import ellipj, ellipk
 
 import rom
 from cases.long import few
+from cases.mbs import motions
 from cases.mbs.mechanisms import simulate_quietly, slider_crank
-from cases.mbs.motions import (
-    PARTS,
-    TOP,
-    G,
-    falling,
-    four_links,
-    free_crank,
-    heavy_top,
-    pendulum,
-    swing,
-    wound_drive,
-)
+from cases.mbs.motions import PARTS, TOP, G, free_crank, heavy_top, pendulum, wound_drive
 from rom.errors import ModelError, SolverError
 from rom.mbs.integrate import adaptive_step, fixed_step
 from rom.mbs.integrate.run import Record
@@ -87,7 +77,7 @@ def test_one_call_of_compiled_code_takes_many_steps(method, build, t_end, rtol, 
 
 LEAPS = {pendulum: (0.3, 1e-3), heavy_top: (0.02, 1e-3), free_crank: (0.05, 1e-3)}
 LEAPS |= {slider_crank: (0.03, 1e-4), wound_drive: (0.03, 1e-4)}
-LEAPS |= {swing: (0.05, 1e-3), four_links: (0.3, 1e-3)}
+LEAPS |= {motions.swing: (0.05, 1e-3), motions.four_links: (0.3, 1e-3)}
 WAYS = [{}, {"method": "bdf"}, {"stabilised": True}, {"rho_inf": 0.5, "save_every": 3}]
 
 
@@ -228,7 +218,7 @@ def test_dop853_takes_the_steps_of_scipy_on_the_same_equation():
 
 def test_dop853_without_an_interval_finds_events():
     for terminal, end in ((True, np.sqrt(2 / G)), (False, 1.0)):
-        sol = simulate(falling(terminal), t_end=1.0, method="dop853")
+        sol = simulate(motions.falling(terminal), t_end=1.0, method="dop853")
         assert_allclose([sol.t[-1], *sol.events["floor"].t], [end, np.sqrt(2 / G)], atol=1e-10)
         assert sol.status.startswith("Stopped by event 'floor'") == terminal
         assert (np.diff(sol.t) > 0).all()

@@ -9,6 +9,7 @@ from numpy.testing import assert_allclose
 from cases.beam import stiffened_beam
 from cases.long import ROM_LONG, few
 from cases.mbs.motions import hub_and_panel
+from cases.mbs.parts import turned
 from cases.refusals import refuses
 from rom import rotation
 from rom.errors import ConfigError, RomWarning
@@ -19,10 +20,6 @@ FRAMES = ("root", "tip", ("root", "tip"), "mean-axis", "buckens")
 X, Z = np.array([1.0, 0, 0]), (0, 0, 1)
 SEEDS = [0, 2, 1, *range(3, 100)]  # of the mechanisms drawn
 RTOL = 1e-4
-
-
-def turned(angle):
-    return rotation.matrix(rotation.exp(np.array([0, 0, angle])))
 
 
 def beams(rng, frame, n):

@@ -9,11 +9,11 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import rom
 from cases.mbs.mechanisms import simeon_crank, simulate_quietly, slider_crank
-from cases.mbs.motions import PARTS, swing, wound_drive
+from cases.mbs.motions import PARTS, four_links, swing, wound_drive
 from cases.refusals import refuses
 from rom.errors import FileFormatError, QualityGateError
 
-CASES = [(swing, 1e-2), (simeon_crank, 1e-5), (wound_drive, 1e-3)]
+CASES = [(swing, 1e-2), (simeon_crank, 1e-5), (wound_drive, 1e-3), (four_links, 1e-3)]
 
 
 def pieces(build, dt, path, **options):

@@ -1,4 +1,4 @@
-"""Order of all methods, and steps that are chosen to meet a tolerance."""
+"""Order of single steps, and steps that are chosen to meet a tolerance."""
 
 from typing import NamedTuple
 
@@ -8,7 +8,6 @@ from numba import njit
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import solve_ivp
 
-from cases.mbs import motions
 from cases.mbs.mechanisms import prepared, random_body, simulate_quietly, slider_crank
 from cases.mbs.motions import G, errors, falling, four_links, free_crank, heavy_top, pendulum
 from rom import rotation
@@ -38,22 +37,6 @@ def increment_between(s, h, left, right, out):
 
 
 STATISTICS = ("steps", "iterations", "factorisations", "rejected", "shortest", "longest")
-
-
-@pytest.mark.parametrize("method", IMPLICIT)
-@pytest.mark.parametrize(
-    ("build", "t_end", "step"), [(heavy_top, 0.1, 5e-4), (free_crank, 0.05, 1.25e-4)]
-)
-def test_half_the_step_has_a_quarter_of_the_error(method, build, t_end, step):
-    """Coordinates, velocities, accelerations and multipliers, large rotations and a loop.
-
-    The start sets off vibrations of order h^3 in the multipliers, which 0.9 keeps for long.
-    """
-    exact = simulate_quietly(build(), t_end=t_end, dt=t_end / 10, method="dop853")
-    damped = {"rho_inf": 0.6} if method == "generalized-alpha" else {}
-    options = {"method": method, "tolerance": 1e-11, **damped}
-    found = motions.order_of(build, t_end, (step / 2, step / 4), exact, options)
-    assert_allclose(found, 2.0, atol=0.03)
 
 
 def test_dop853_has_its_order_in_the_error_per_tolerance():

@@ -3,13 +3,8 @@
 import numpy as np
 import pytest
 
-from cases.mbs.mechanisms import (
-    nodal_body,
-    random_body,
-    random_nodes,
-    simulate_quietly,
-    slider_crank,
-)
+from cases.mbs import mechanisms
+from cases.mbs.mechanisms import simulate_quietly, slider_crank
 from cases.mbs.parts import on_axle
 from rom.errors import ConfigError, ModelError, SolverError
 from rom.mbs.integrate.simulation import simulate
@@ -17,7 +12,7 @@ from rom.mbs.mechanism import Mechanism
 
 Z = (0, 0, 1)
 UNIT = {"mass": 1.0, "inertia": (1.0, 1.0, 1.0), "at": (0, 0, 0)}
-BODY = random_body(np.random.default_rng(1))
+BODY = mechanisms.random_body(np.random.default_rng(1))
 
 
 def mechanism():
@@ -31,9 +26,9 @@ def mechanism():
 
 def singular_body():
     """Shapes that move all nodes alike: a translation, which the frame already is."""
-    x, Ms, phi, K, _ = random_nodes(np.random.default_rng(2), r=2)
+    x, Ms, phi, K, _ = mechanisms.random_nodes(np.random.default_rng(2), r=2)
     phi[0] = np.array([1.0, 0, 0])
-    return nodal_body(x, Ms, phi, K)
+    return mechanisms.nodal_body(x, Ms, phi, K)
 
 
 WRONG = {

@@ -6,16 +6,12 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
+from scipy.linalg import eigh, null_space
 from scipy.sparse.linalg import splu
 
 import rom
-from cases.mbs.mechanisms import (
-    lattice,
-    lattice_body,
-    lattice_motion,
-    random_body,
-    simulate_quietly,
-)
+from cases.mbs import mechanisms
+from cases.mbs.mechanisms import lattice, lattice_body
 from cases.solid import CORNERS, GAUSS, block, reduced, shape_functions
 from rom import rotation
 from rom.mbs.integrate.simulation import simulate
@@ -40,7 +36,7 @@ def difference_of_the_pendulum(stiffness):
     x, _, _, masses = data
     times = np.linspace(0, 0.5, 26)
     weight = masses[:, None] * GRAVITY
-    full = lattice_motion(data, times, x, 0 * x, lambda t, y: weight, held=(0,))
+    full = mechanisms.lattice_motion(data, times, x, 0 * x, lambda t, y: weight, held=(0,))
     sol = simulate(pendulum(data), t_end=0.5, dt=0.02, **EXACT)
     tip = sol.position("bar", "n14")
     return np.abs(tip - full[:, 14]).max(), full[:, 14], data
@@ -88,7 +84,7 @@ def test_spinning_bar_stretches_as_the_unreduced_model_does():
     centre, spin = masses @ x / masses.sum(), np.array([0.0, 0.0, 40.0])
     times = np.linspace(0, 0.05, 51)
     v0 = np.cross(spin, x - centre)
-    full = lattice_motion(data, times, x, v0, lambda t, y: 0.0 * y)
+    full = mechanisms.lattice_motion(data, times, x, v0, lambda t, y: 0.0 * y)
     mech = Mechanism(gravity=(0, 0, 0))
     mech.add_flexible("bar", lattice_body(data), omega=spin, velocity=np.cross(spin, -centre))
     # nodes as joints of nothing: springs without stiffness make them markers of the run
@@ -155,8 +151,9 @@ def test_momentum_gets_better_with_the_step_down_to_the_smallest():
     for dt in (1e-3, 1e-4, 1e-5):
         mech = Mechanism(gravity=(0, 0, 0))
         rng = np.random.default_rng(11)
+        body = mechanisms.random_body(rng, damped=False)
         mech.add_flexible(
-            "one", random_body(rng, damped=False), at=(0.1, 0.2, 0.3), velocity=(1, 2, -1),
+            "one", body, at=(0.1, 0.2, 0.3), velocity=(1, 2, -1),
             omega=(1.0, -0.5, 0.3), q=0.01 * rng.normal(size=4), qd=0.1 * rng.normal(size=4),
         )  # fmt: skip
         sol = simulate(mech, t_end=0.2, dt=dt, rho_inf=1.0, save_every=20)
@@ -187,24 +184,17 @@ def test_small_swings_have_the_frequencies_of_the_hinged_body(beam):
     """Bending vibration of the bar on its hinge, from zero crossings, against the eigenvalue."""
     hold = beam.marker("root").hold
     M, K = beam.full_matrices()
-    # all motions but the rotation about z are held at the root
-    C = hold[[0, 1, 2, 3, 4]]
-    N = np.linalg.svd(C)[2][5:].T
-    lam, V = np.linalg.eigh(np.linalg.solve(np.linalg.cholesky(N.T @ M @ N), N.T @ K @ N)
-                            @ np.linalg.inv(np.linalg.cholesky(N.T @ M @ N)).T)  # fmt: skip
-    omega = np.sqrt(np.maximum(lam, 0.0))
-    shape = N @ np.linalg.solve(np.linalg.cholesky(N.T @ M @ N).T, V)
-    k = next(i for i in range(1, len(lam)) if abs(beam_sway(beam, shape[:, i])) > 1e-3)
+    N = null_space(hold[:5])  # all motions but the rotation about z are held at the root
+    lam, V = eigh(N.T @ K @ N, N.T @ M @ N)
+    omega, shape = np.sqrt(np.maximum(lam, 0.0)), N @ V
+    tip = beam.marker("tip")  # its deflection along y
+    sway = shape[1] + np.cross(shape[3:6].T, tip.point)[:, 1] + tip.translation[1] @ shape[6:]
+    k = 1 + np.flatnonzero(np.abs(sway[1:]) > 1e-3)[0]
     amplitude = 1e-6
     mech = Mechanism(gravity=(0, 0, 0))
     start = amplitude * shape[:, k]
-    turn = start[3:6]
-    root = beam.marker("root").point
-    bar = mech.add_flexible(
-        "bar", beam, at=-root + start[:3] + np.cross(turn, 0 * root),
-        orientation=rotation.matrix(np.r_[1.0, 0.5 * turn] / np.linalg.norm(np.r_[1, 0.5 * turn])),
-        q=start[6:],
-    )  # fmt: skip
+    place = {"at": start[:3] - beam.marker("root").point, "orientation": rotation.exp(start[3:6])}
+    bar = mech.add_flexible("bar", beam, **place, q=start[6:])
     mech.revolute("hinge", mech.ground.marker((0, 0, 0)), bar.marker("root"), axis=(0, 0, 1))
     mech.spring_damper("probe", bar.marker("root"), bar.marker("tip"), stiffness=0.0)
     period = 2 * np.pi / omega[k]
@@ -213,12 +203,6 @@ def test_small_swings_have_the_frequencies_of_the_hinged_body(beam):
     i = np.flatnonzero(np.diff(np.sign(y)))
     crossings = sol.t[i] - y[i] * (sol.t[i + 1] - sol.t[i]) / (y[i + 1] - y[i])
     assert_allclose(2 * np.diff(crossings).mean(), period, rtol=1e-3)
-
-
-def beam_sway(body, motion):
-    """Deflection of the tip along y in a small motion (6 + r,)."""
-    tip = body.marker("tip")
-    return (motion[:3] + np.cross(motion[3:6], tip.point) + tip.translation @ motion[6:])[1]
 
 
 def test_the_stiff_limit_is_the_rigid_body(beam):
@@ -232,7 +216,7 @@ def test_the_stiff_limit_is_the_rigid_body(beam):
     solid = {"mass": beam.mass, "inertia": central, "at": c - root}
     ends = {"root": root - c, "tip": tip - c}
     mech = hinged(tip - root, lambda mech: mech.add_rigid("bar", **solid, markers=ends))
-    rigid = simulate_quietly(mech, t_end=0.3, dt=1e-3, rho_inf=0.5)
+    rigid = mechanisms.simulate_quietly(mech, t_end=0.3, dt=1e-3, rho_inf=0.5)
     assert_allclose(flexible.position("ball"), rigid.position("ball"), atol=1e-5)
     assert np.abs(rigid.position("ball")[-1] - rigid.position("ball")[0]).max() > 0.1
 
