@@ -1,6 +1,7 @@
 """The command line: verbs, answers for people and programs, exit codes, start-up time."""
 
 import json
+import logging
 import resource
 import shutil
 import subprocess
@@ -13,8 +14,9 @@ import pytest
 from numpy.testing import assert_allclose
 
 import rom
-from cases.command import environment, ran
+from cases.command import ROOT, environment, ran
 from cases.command import rom as command
+from cases.files.cells import solid
 from cases.files.schema import errors
 from cases.files.step_parts import step_box, step_plate
 from cases.long import few
@@ -25,6 +27,8 @@ from rom.cli.parser import build_parser, verb_modules
 from rom.cli.schemas import schema
 from rom.cli.verbs import check
 from rom.errors import RomWarning
+from rom.fe.mesh.summary import cell_volumes, vtk_cells
+from rom.io.fields.vtu import grid
 
 STEEL = ("--E", "210e9", "--nu", "0.3", "--rho", "7850")
 NAMES = list(verb_modules())
@@ -43,8 +47,6 @@ def file(tmp_path_factory):
 def geometry(monkeypatch):
     """The geometries of the project, by the short names the README uses."""
     pytest.importorskip("dolfinx", reason="dolfinx is not installed")
-    from cases.command import ROOT
-
     monkeypatch.chdir(ROOT)
     return "meshes/beam.geo"
 
@@ -136,12 +138,6 @@ def test_json_of_check_holds_the_numbers_of_the_report(file, capsys):
     assert_allclose([row["value"] for row in rows], [row.value for row in report.rows])
 
 
-def test_export_writes_what_the_ending_asks_for(file, tmp_path, capsys):
-    found = answer(capsys, "export", file, tmp_path / "rod.vtu")
-    assert found["output"] == str(tmp_path / "rod.vtu")
-    assert (tmp_path / "rod.vtu").read_text().startswith("<VTKFile")
-
-
 def test_simulate_writes_a_film_and_a_history_when_asked(file, tmp_path, capsys):
     found = answer(
         capsys, "simulate", file, "--hinge", "root", "--t-end", 0.004, "--dt", 4e-4, "-q",
@@ -211,36 +207,36 @@ def warned(monkeypatch, text="E looks like GPa."):
     monkeypatch.setattr(check, "run", run)
 
 
-def test_warnings_are_said_once_and_go_into_the_json(monkeypatch, capsys):
+@pytest.mark.parametrize(
+    ("option", "code", "said"),
+    [
+        ("--debug", 0, ("done\n", "warning: E looks like GPa.\n")),
+        ("-q", 0, ("done\n", "")),
+        (
+            "--strict",
+            5,
+            ("", "error: E looks like GPa.\nhint: Without --strict this is a warning.\n"),
+        ),
+    ],
+)
+def test_warnings_are_said_once_or_not_at_all_or_end_it(option, code, said, monkeypatch, capsys):
     warned(monkeypatch)
-    assert main(["check", "x"]) == 0
-    assert capsys.readouterr() == ("done\n", "warning: E looks like GPa.\n")
+    assert main(["check", "x", option]) == code
+    assert capsys.readouterr() == said
+
+
+def test_warnings_go_into_the_json(monkeypatch, capsys):
+    warned(monkeypatch)
     assert main(["check", "x", "-q", "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert found["warnings"] == ["E looks like GPa."]
     assert found["value"] is None and found["array"] == [0, 1]
 
 
-def test_quiet_silences_warnings_and_progress(monkeypatch, capsys):
-    warned(monkeypatch)
-    assert main(["-q", "check", "x"]) == 0
-    assert capsys.readouterr() == ("done\n", "")
-
-
-def test_strict_turns_a_warning_into_exit_code_5(monkeypatch, capsys):
-    warned(monkeypatch)
-    assert main(["check", "x", "--strict"]) == 5
-    out, err = capsys.readouterr()
-    assert out == ""
-    assert err == "error: E looks like GPa.\nhint: Without --strict this is a warning.\n"
-
-
 @pytest.mark.parametrize(
     ("option", "seen"), [("-q", []), ("", ["info"]), ("-v", ["info", "debug"])]
 )
 def test_progress_goes_to_stderr(option, seen, monkeypatch, capsys):
-    import logging
-
     def run(args):
         logging.getLogger("rom").info("info")
         logging.getLogger("rom").debug("debug")
@@ -270,10 +266,8 @@ def test_table_aligns_names_left_and_numbers_right():
 
 
 def test_json_is_strict():
-    found = json.loads(
-        to_json({"a": [np.inf, np.float64(2.5)], "b": np.array([1.0, np.nan]), 3: "µ"})
-    )
-    assert found == {"a": [None, 2.5], "b": [1.0, None], "3": "µ"}
+    given = {"a": [np.inf, np.float64(2.5)], "b": np.array([1.0, np.nan]), 3: "µ"}
+    assert json.loads(to_json(given)) == {"a": [None, 2.5], "b": [1.0, None], "3": "µ"}
 
 
 @pytest.mark.fenicsx
@@ -357,10 +351,6 @@ def test_a_step_file_in_millimetres_with_a_picked_face(tmp_path, capsys):
 @pytest.mark.parametrize("kind", ["tet4", "tet10", "hex8", "hex27"])
 def test_volumes_and_vtk_order_of_every_cell_type(kind, tmp_path):
     """VTK's own volume of each cell is the one computed here only with the right node order."""
-    from cases.files.cells import solid
-    from rom.fe.mesh.summary import cell_volumes, vtk_cells
-    from rom.io.fields.vtu import grid
-
     pyvista = pytest.importorskip("pyvista", reason="VTK comes with the pictures")
     mesh = solid(kind, (2, 1, 1), (2.0, 1.0, 1.5))
     (tmp_path / "b.vtu").write_text(grid(mesh.points, *vtk_cells(mesh)))
@@ -368,11 +358,8 @@ def test_volumes_and_vtk_order_of_every_cell_type(kind, tmp_path):
     ours = cell_volumes(mesh)
     assert_allclose(ours.sum(), 3.0, rtol=1e-12)
     assert_allclose(read.compute_cell_sizes()["Volume"], ours, rtol=1e-6)
-    assert_allclose([np.ptp(c.points, axis=0).max() for c in read.cell], spans(mesh), rtol=1e-6)
-
-
-def spans(mesh):
-    return np.ptp(mesh.points[mesh.cells], axis=1).max(axis=1)
+    spans = np.ptp(mesh.points[mesh.cells], axis=1).max(axis=1)
+    assert_allclose([np.ptp(c.points, axis=0).max() for c in read.cell], spans, rtol=1e-6)
 
 
 @pytest.mark.fenicsx
@@ -382,9 +369,6 @@ def test_a_curved_cell_has_its_exact_volume():
     The shape function of that node integrates to (2/3)^2 over the face of the unit cube, times 1/6
     through the height.
     """
-    from cases.files.cells import solid
-    from rom.fe.mesh.summary import cell_volumes
-
     cube = solid("hex27", (1, 1, 1), (1.0, 1.0, 1.0))
     points = cube.points.copy()
     top = np.argmin(np.abs(points - [0.5, 0.5, 1.0]).sum(axis=1))
@@ -454,7 +438,9 @@ def test_reduce_then_check_then_export(geometry, tmp_path, capsys):
     assert (body.name, body.reference) == ("beam", "pins root tip")
     assert_allclose(np.diag(body.D), 0.02 * body.omega, rtol=1e-9)
     assert_allclose(found["frequencies"], body.omega / (2 * np.pi))
-    answer(capsys, "export", path, tmp_path / "beam.vtu")
+    found = answer(capsys, "export", path, tmp_path / "beam.vtu")
+    assert found["output"] == str(tmp_path / "beam.vtu")
+    assert (tmp_path / "beam.vtu").read_text().startswith("<VTKFile")
 
 
 @pytest.mark.fenicsx

@@ -58,9 +58,8 @@ def folder(bar, tmp_path, monkeypatch):
     write_op4({"KAA": bar.K, "MAA": bar.M}, tmp_path / "bar.op4")
     rows = [f"{k + 1}, {x!r}, {y!r}, {z!r}" for k, (x, y, z) in enumerate(bar.points.tolist())]
     (tmp_path / "bar.csv").write_text("\n".join(rows) + "\n")
-    labels = {
-        name: ", ".join(str(n + 1) for n in bar.interfaces[name].nodes) for name in ("root", "tip")
-    }
+    sides = bar.interfaces.items()
+    labels = {name: ", ".join(map(str, side.nodes + 1)) for name, side in sides}
     (tmp_path / "bar.toml").write_text(PART.format(**labels))
     monkeypatch.chdir(tmp_path)
     return tmp_path
@@ -188,9 +187,8 @@ def test_missing_and_unreadable_files(tmp_path):
     for name in ("no.toml", "latin.toml", "."):
         with pytest.raises(FileFormatError):
             read_component(tmp_path / name)
+    (tmp_path / "deep.toml").write_text("x = " + "[" * 500 + "]" * 500 + "\n")
     with pytest.raises(ConfigError, match="brackets may be in each other"):
-        refusal_text = "x = " + "[" * 500 + "]" * 500 + "\n"
-        (tmp_path / "deep.toml").write_text(refusal_text)
         read_component(tmp_path / "deep.toml")
 
 
@@ -285,27 +283,20 @@ moment = [0, 0, "3 N m"]
     assert read_component(file).nonlinear() is None
     file.write_text(plain + asked)
     found = read_component(file).nonlinear()
-    assert found == rom.Geometric(
-        loads={"tip": (0.0, 2000.0, 0.0, 0.0, 0.0, 3.0)}, n_modes=2, n_shapes=9
-    )
+    loads = {"tip": (0.0, 2000.0, 0.0, 0.0, 0.0, 3.0)}
+    assert found == rom.Geometric(loads=loads, n_modes=2, n_shapes=9)
     with pytest.raises(ConfigError, match="no finite elements"):
         read_component(file).body()
     file.write_text(plain + asked.replace("shapes = 9", 'tol = 0.002\nfixed = "hub:yz"'))
-    assert read_component(file).nonlinear() == replace(
-        found, n_shapes=None, tol=0.002, fixed=("hub:yz",)
-    )
+    same = replace(found, n_shapes=None, tol=0.002, fixed=("hub:yz",))
+    assert read_component(file).nonlinear() == same
     file.write_text(plain + asked.replace("shapes = 9", "steps = 7"))
     assert read_component(file).nonlinear() == replace(found, n_shapes=None, n_steps=7)
     turning = 'spin = [0, 0, "30 rpm"]\nabout = [0, "20 mm", 0]\nsnapshots = true\nsampling = 0.01'
     file.write_text(plain + asked.replace("shapes = 9", turning))
-    assert read_component(file).nonlinear() == replace(
-        found,
-        n_shapes=None,
-        spin=(0.0, 0.0, np.pi),
-        about=(0.0, 0.02, 0.0),
-        snapshots=True,
-        sampling=0.01,
-    )
+    turned = {"spin": (0.0, 0.0, np.pi), "about": (0.0, 0.02, 0.0)}
+    same = replace(found, n_shapes=None, snapshots=True, sampling=0.01, **turned)
+    assert read_component(file).nonlinear() == same
     file.write_text(plain + asked.replace("2 kN", "0 N").replace("3 N m", "0 N m"))
     with pytest.raises(ConfigError, match="it needs a force") as refused:
         read_component(file).nonlinear()

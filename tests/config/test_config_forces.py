@@ -349,10 +349,9 @@ def test_functions_of_a_python_file_run_when_they_are_trusted(tmp_path):
     assert rom.check_law(made, "spring").ok
     sol = file.simulate(made)
     mech, wall, p = block_in_python()
-    line = "-800*(x - 1) - 5*v - 10*(x - 1.1) - v"  # drag and motor act along the same line
+    # spring, drag and motor act along one line: -800*(x - 1) - 5*v - 10*(x - 1.1) - v
     mech.spring_damper("s", wall, p, stiffness=810.0, damping=6.0, free_length=1.0 + 1 / 810)
     mech.force("push", p, (6.0, 0, 0))
-    assert line
     same = rom.simulate(mech, t_end=1.0, dt=1e-3, rho_inf=1.0)
     assert_allclose(sol.q, same.q, atol=1e-7)
     assert_allclose(sol.events["late"].t, [0.25])
@@ -382,10 +381,9 @@ def test_what_is_wrong_with_a_python_file_is_told(case, tmp_path):
     for name, text in (("laws", PYTHON), ("bad", "1 / 0"), ("exit", "raise SystemExit(3)")):
         (tmp_path / f"{name}.py").write_text(text)
     law = '[motors.pull]\njoint = "guide"\nlaw = { file = "laws.py", function = "pull" }\n'
+    text = BLOCK + law.replace(old, new, 1 + (old == "pull"))
     with pytest.raises(rom.RomError) as refused:
-        file_of(
-            tmp_path, BLOCK + law.replace(old, new, 1 + (old == "pull")), trust=True
-        ).mechanism()
+        file_of(tmp_path, text, trust=True).mechanism()
     assert message in str(refused.value)
 
 

@@ -62,9 +62,8 @@ def test_a_rod_of_a_file_is_that_of_python(tmp_path):
         + 'viscosity = "2 ms"\nat = [0, 0, "5 cm"]\nnormal = [0, 1, 0]\n'
     )
     more = CLAMP.replace('"wire.start"', '"wire.0"').replace("[0, 0, 0] }", "[0, 0, 0.05] }")
-    sol = file_of(
-        tmp_path, rod, more, gravity='[0, 0, "-9.81 m/s^2"]', t_end=0.1, dt=2e-3
-    ).simulate()
+    how = {"gravity": '[0, 0, "-9.81 m/s^2"]', "t_end": 0.1, "dt": 2e-3}
+    sol = file_of(tmp_path, rod, more, **how).simulate()
     frame = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]])
     same = straight(1.0, 8, frame=frame, stretch=1e4, bend=1.0, mass=1.0, viscosity=2e-3,
                     inertia=(1e-4, 1e-4, 2e-4))  # fmt: skip
@@ -80,9 +79,8 @@ def test_a_rod_of_a_file_is_that_of_python(tmp_path):
 def torsion_of_a_rectangle(a, b):
     """J by its series in the other form, Timoshenko and Goodier, eq. 162: k1 a b^3."""
     n = np.arange(1, 2001, 2)
-    return (
-        a * b**3 / 3 * (1 - 192 * b / np.pi**5 / a * (np.tanh(n * np.pi * a / 2 / b) / n**5).sum())
-    )
+    series = (np.tanh(n * np.pi * a / 2 / b) / n**5).sum()
+    return a * b**3 / 3 * (1 - 192 * b / np.pi**5 / a * series)
 
 
 def test_a_square_in_torsion_has_the_published_constant(tmp_path):
@@ -130,9 +128,7 @@ def test_points_on_a_circle_make_an_arc(tmp_path):
     assert_allclose(frames[:, :, 0], np.tile([0.0, 0, 1], (32, 1)), atol=1e-12)
     assert_allclose(frames[[0, -1], :, 2], [[1, 0, 0], [0, 1, 0]], atol=5e-4)
     middle = np.pi / 60 * (np.arange(30) + 0.5)
-    assert_allclose(
-        frames[1:-1, :2, 2], np.column_stack([np.cos(middle), np.sin(middle)]), atol=1e-3
-    )
+    assert_allclose(frames[1:-1, :2, 2].T, [np.cos(middle), np.sin(middle)], atol=1e-3)
 
 
 def test_sections_along_a_helix_turn_by_its_torsion(tmp_path):

@@ -15,16 +15,7 @@ from cases.command import rom as command
 from cases.long import few
 from rom.doctor import first_use, libraries
 from rom.doctor.core import abilities, better
-from rom.doctor.libraries import (
-    OLD_NUMPY,
-    PACKAGES,
-    blas,
-    damaged_files,
-    fenicsx,
-    light,
-    pictures,
-    sees_debian,
-)
+from rom.doctor.libraries import blas, damaged_files, fenicsx, sees_debian
 from rom.doctor.probes import compiled
 from rom.fe import GMSH_LIBRARIES, HELPER_MODULE, WHEEL_PACKAGES
 
@@ -79,7 +70,7 @@ def test_what_is_missing_is_named_with_the_line_to_type(tmp_path):
     text = 'raise ModuleNotFoundError("No module named {0!r}", name={0!r})\n'
     found, code, _ = examine(tmp_path, fakes={name: text.format(name) for name in gone})
     assert code == 0
-    for name, packages in PACKAGES.items():
+    for name, packages in libraries.PACKAGES.items():
         assert found[name]["state"] == "missing"
         assert found[name]["advice"].endswith(packages)  # of Debian or of pip
     ways = [f["advice"] for f in found.values() if f["topic"] == "FEniCSx"]
@@ -128,7 +119,7 @@ def test_what_to_type_fits_where_this_python_looks(monkeypatch, debian, python, 
      ("gmsh", "OSError: libGLU.so.1: cannot open shared object file", True,
       "sudo apt-get install --reinstall python3-gmsh"),
      ("PETSc", "ImportError: no MPI", False, "pip install --force-reinstall dolfinx-solver-real"),
-     ("h5py", "ValueError: numpy.dtype size changed", True, OLD_NUMPY),
+     ("h5py", "ValueError: numpy.dtype size changed", True, libraries.OLD_NUMPY),
      ("h5py", "ValueError: numpy.dtype size changed", False, "pip install --force-reinstall h5py")],
 )  # fmt: skip
 def test_what_is_broken_is_repaired_from_where_it_came(monkeypatch, name, error, debian, advice):
@@ -217,7 +208,7 @@ def test_a_missing_light_library_is_essential(monkeypatch):
         return "1.0"
 
     monkeypatch.setattr("rom.doctor.libraries.version", version)
-    states = {f.name: f.state for f in light()}
+    states = {f.name: f.state for f in libraries.light()}
     assert states["numba"] == "broken" and states["numpy"] == "ok"
 
 
@@ -229,7 +220,7 @@ def test_a_missing_light_library_is_essential(monkeypatch):
 )  # fmt: skip
 def test_a_blank_picture_or_a_crash_is_a_broken_display(picture, ending, state):
     answers = {"pyvista": {"version": "1"}, "vtk": {"version": "9"}}
-    found = pictures(answers | ({"picture": picture} if picture else {}), ending)
+    found = libraries.pictures(answers | ({"picture": picture} if picture else {}), ending)
     assert found[-1].name == "drawing off-screen" and found[-1].state == state
 
 

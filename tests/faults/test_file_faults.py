@@ -11,6 +11,7 @@ from scipy.sparse import random as random_matrix
 
 import rom
 from cases.files.damage import ARCHIVES, damaged, outcome
+from cases.files.decks import BY_HAND, DECK, IM, RE, X, dataset, header
 from cases.files.toml_files import ALL, CRANK, MORE, PENDULUM, SOLID
 from cases.mbs.mechanisms import random_body
 from cases.paths import TESTS
@@ -35,8 +36,6 @@ pytestmark = pytest.mark.filterwarnings("ignore::rom.errors.RomWarning")
 
 def universal(binary):
     """Two functions as other programs write them."""
-    from cases.files.decks import IM, RE, X, dataset, header
-
     if not binary:
         return (dataset(5, 0, [X, RE, IM]) + dataset(6, 1, [RE, IM])).encode()
     packed = np.column_stack([RE, IM]).astype("<f4").tobytes()
@@ -44,16 +43,8 @@ def universal(binary):
     return f"{-1:6d}\n{head}\n{header(5, 5, 1)}".encode() + packed + b"\n    -1\n"
 
 
-def deck(_):
-    from cases.files.decks import DECK
-
-    return DECK.encode()
-
-
-def user_element(_):
-    from cases.files.decks import BY_HAND
-
-    return BY_HAND.encode()
+def typed(text):
+    return lambda folder: text.encode()
 
 
 def market(folder, **how):
@@ -67,33 +58,21 @@ def abaqus(folder):
     return write_abaqus_matrix(np.eye(6) + 1.0, dofs, folder / "m.mtx").read_bytes()
 
 
-def exported(to, held=()):
-    def content(folder):
-        body = reduced(2, block(cells=(2, 1, 1)))
-        return rom.export(body, folder / "export", to=to, held=held).read_bytes()
-
-    return content
+def exported(to, held=(), body=lambda: reduced(2, block(cells=(2, 1, 1)))):
+    return lambda folder: rom.export(body(), folder / "export", to=to, held=held).read_bytes()
 
 
 def sid(dialect):
-    def content(folder):
-        body = random_body(np.random.default_rng(1), r=2)
-        return rom.export(body, folder / "export", to=dialect).read_bytes()
-
-    return content
+    return exported(dialect, body=lambda: random_body(np.random.default_rng(1), r=2))
 
 
 def whole(name):
     return lambda folder: (HERE / name).read_bytes()
 
 
-def archive(make):
-    """Body, family and state files, by the makers of the table of their manifests."""
-    return lambda folder: make(folder).read_bytes()
-
-
 TEXTS = {  # case: (file name, its content, reader)
-    **{kind: ("x.npz", archive(make), read) for kind, (make, read) in ARCHIVES.items()},
+    **{kind: ("x.npz", lambda folder, make=make: make(folder).read_bytes(), read)
+       for kind, (make, read) in ARCHIVES.items()},
     "sid": ("x.SID_FEM", sid("sid"), lambda path: read_sid(path, ge="as_written")),
     "sid-pysid": ("x.SID_FEM", sid("sid-pysid"), read_body),
     "sid-geisler": ("x.sid_fem", sid("sid-geisler"), read_body),
@@ -109,7 +88,7 @@ TEXTS = {  # case: (file name, its content, reader)
     "market": ("x.mtx", market, read_matrix),
     "market dense": ("x.mtx", lambda folder: market(folder, dense=True), read_matrix),
     "abaqus": ("x.mtx", abaqus, read_matrix),
-    "user element": ("x.mtx", user_element, read_user_element),
+    "user element": ("x.mtx", typed(BY_HAND), read_user_element),
     "substructure": ("x.mtx", whole("calculix.mtx"), read_matrix),
     "user element of a body": ("x.inp", exported("abaqus"), read_user_element),
     "openfast": ("x.dat", exported("openfast", ["root"]), read_openfast),
@@ -120,10 +99,9 @@ TEXTS = {  # case: (file name, its content, reader)
     "modes": ("x.unv", whole("sdynpy_test.unv"), rom.io.read_modes),
     "universal binary": ("x.uff", lambda folder: universal(True), read_universal),
     "universal of another program": ("x.uff", whole("pyuff_binary.uff"), read_universal),
-    "nodes": ("x.inp", deck, read_nodes),
-    "sets": ("x.inp", deck, lambda path: read_node_sets(path, ("root", "tip"))),
-    "table of nodes": ("x.csv", lambda folder: b"1, 0, 0, 1.5\n2, 1e-1, 0, 0\n3, 0, 1, 0\n",
-                       read_nodes),
+    "nodes": ("x.inp", typed(DECK), read_nodes),
+    "sets": ("x.inp", typed(DECK), lambda path: read_node_sets(path, ("root", "tip"))),
+    "table of nodes": ("x.csv", typed("1, 0, 0, 1.5\n2, 1e-1, 0, 0\n3, 0, 1, 0\n"), read_nodes),
     "stiffness": ("calculix.sti", whole("calculix.sti"), read_stored_matrix),
     "labels": ("calculix.dof", whole("calculix.dof"),
                lambda path: read_stored_matrix(path.with_suffix(".sti"))),
@@ -213,8 +191,7 @@ HUGE = "9" * 20  # no eight bytes hold it
         ("x.bdf", f"GRID,{HUGE},,0.,0.,0.\n", read_grids),
         ("x.inp", f"*NSET, NSET=root\n{HUGE}\n", lambda path: read_node_sets(path, ("root",))),
         ("x.dmig", f"DMIG,K,0,6,1,0\nDMIG,K,{HUGE},1,,1,1,2.0\n", read_dmig),
-        ("y.mtx", user_element(None).decode().replace("** 9, 4,", f"** {HUGE}, 4,"),
-         read_user_element),
+        ("y.mtx", BY_HAND.replace("** 9, 4,", f"** {HUGE}, 4,"), read_user_element),
     ],
 )  # fmt: skip
 def test_labels_that_fit_no_integer_are_refused(name, content, read, tmp_path):

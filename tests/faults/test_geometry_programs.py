@@ -12,19 +12,11 @@ from pathlib import Path
 
 import pytest
 
+import rom
 from cases.boxes import BOX_GEO as BOX
 from cases.command import rom as command
 from cases.long import few
-from rom.errors import (
-    ConfigError,
-    FileFormatError,
-    MeshError,
-    ResourceError,
-    RomError,
-    RomWarning,
-    TagError,
-    UnsafeFileError,
-)
+from rom.errors import ConfigError, FileFormatError, ResourceError, RomError, UnsafeFileError
 from rom.fe.mesh.read import read_mesh
 from rom.process import child
 from rom.process.memory import total_bytes
@@ -156,7 +148,7 @@ def test_what_the_text_hides_the_process_cannot_do(case, here, monkeypatch):
         return
     be_blind(monkeypatch, "g.MSH_START = (b'',)")
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", RomWarning)
+        warnings.simplefilter("ignore", rom.RomWarning)
         try:
             read_mesh(name, time_limit=20)
         except RomError as error:
@@ -223,7 +215,7 @@ def test_a_geometry_that_includes_itself_is_named(length, verb, here):
 
 def test_a_volume_in_a_group_below_zero_is_a_tag_error(here):
     lay({"box.geo": BOX.replace('"body", 1', '"body", -3')}, here)
-    with pytest.raises(TagError, match=r"box\.geo: volume 1 .* -3"):
+    with pytest.raises(rom.TagError, match=r"box\.geo: volume 1 .* -3"):
         read_mesh("box.geo")
 
 
@@ -290,7 +282,7 @@ def test_what_a_geometry_ends_is_not_called_damage(content, parameters, here):
     with pytest.raises(RomError, match=r"box\.geo") as caught:
         read_mesh("box.geo", parameters=parameters, time_limit=20)
     assert "damaged" not in str(caught.value) and caught.value.exit_code in (2, 3)
-    assert isinstance(caught.value, MeshError)
+    assert isinstance(caught.value, rom.MeshError)
     assert ("with these parameters" in str(caught.value)) == bool(parameters)
 
 

@@ -13,21 +13,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import rom
 from cases.boxes import BOX_GEO as GEO
 from cases.files.cells import blocks_of, solid, write_msh
 from cases.files.damage import WAYS
 from cases.long import ROM_LONG, few
-from rom.errors import (
-    ConfigError,
-    FileFormatError,
-    MeshError,
-    ResourceError,
-    RomError,
-    RomWarning,
-    TagError,
-    UnsafeFileError,
-)
+from rom.errors import ConfigError, FileFormatError, MeshError, RomError, TagError, UnsafeFileError
 from rom.fe.mesh.read import read_mesh
+from rom.process import child
 
 pytest.importorskip("gmsh", reason="gmsh is not installed")
 pytestmark = pytest.mark.fenicsx
@@ -39,9 +32,8 @@ BLOCKS, NAMES = blocks_of(BOX)
 
 
 def text(content):
-    return lambda path: path.write_bytes(
-        content if isinstance(content, bytes) else content.encode()
-    )
+    data = content if isinstance(content, bytes) else content.encode()
+    return lambda path: path.write_bytes(data)
 
 
 def msh(points=BOX.points, blocks=BLOCKS, names=NAMES):
@@ -50,8 +42,7 @@ def msh(points=BOX.points, blocks=BLOCKS, names=NAMES):
 
 def cut(fraction):
     def make(path):
-        write_msh(path, BOX.points, BLOCKS, NAMES)
-        data = path.read_bytes()
+        data = write_msh(path, BOX.points, BLOCKS, NAMES).read_bytes()
         path.write_bytes(data[: int(fraction * len(data))])
 
     return make
@@ -64,8 +55,7 @@ def zipped(path):
 
 def replaced(old, new):
     def make(path):
-        write_msh(path, BOX.points, BLOCKS, NAMES)
-        content = path.read_text()
+        content = write_msh(path, BOX.points, BLOCKS, NAMES).read_text()
         assert old in content
         path.write_text(content.replace(old, new, 1))
 
@@ -77,8 +67,6 @@ def cells(*more):
 
 
 PIN = (2, 40, "pin")
-
-
 OTHERS = {  # name: file name, maker, error, what the message must contain
     "unknown suffix": ("box.stl", text("solid"), ConfigError, "'.stl'"),
     "zip renamed to step": ("box.step", zipped, FileFormatError, "ISO-10303-21"),
@@ -182,7 +170,7 @@ def test_bad_file_is_a_clear_error_within_seconds(case, tmp_path, monkeypatch, c
     make(tmp_path / name)
     start = time.perf_counter()
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", RomWarning)
+        warnings.simplefilter("ignore", rom.RomWarning)
         with pytest.raises(error) as caught:
             read_mesh(name, trust=True)
     assert time.perf_counter() - start < SECONDS
@@ -253,7 +241,7 @@ def test_damaged_files_never_crash_or_hang(tmp_path):
         start = time.perf_counter()
         try:
             with warnings.catch_warnings():
-                warnings.simplefilter("ignore", RomWarning)
+                warnings.simplefilter("ignore", rom.RomWarning)
                 mesh = read_mesh(path)
         except RomError as error:
             refused += 1
@@ -266,15 +254,13 @@ def test_damaged_files_never_crash_or_hang(tmp_path):
 
 def test_a_reader_that_dies_is_a_typed_error(monkeypatch, tmp_path):
     """Signals of the child: crash, out of time, killed, Ctrl-C; a geometry is no damaged file."""
-    from rom.process import child
-
     mesh = write_msh(tmp_path / "box.msh", BOX.points, BLOCKS, NAMES)
     geometry = tmp_path / "box.geo"
     geometry.write_text(GEO)
     for signal, of_mesh, of_geometry in (
         (11, FileFormatError, MeshError),
-        (24, FileFormatError, ResourceError),
-        (9, ResourceError, ResourceError),
+        (24, FileFormatError, rom.ResourceError),
+        (9, rom.ResourceError, rom.ResourceError),
         (31, UnsafeFileError, UnsafeFileError),
         (2, KeyboardInterrupt, KeyboardInterrupt),
     ):

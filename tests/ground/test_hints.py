@@ -44,12 +44,8 @@ def things(tmp_path_factory):
     model = block(cells=(2, 1, 1))
     body = random_body(np.random.default_rng(3))
     mech = rom.Mechanism(gravity=(0, 0, 0))
-    a = mech.add_rigid(
-        "a", mass=1.0, inertia=(1.0, 1.0, 1.0), at=(0, 0, 0), markers={"m": (1, 0, 0)}
-    )
-    b = mech.add_rigid(
-        "b", mass=1.0, inertia=(1.0, 1.0, 1.0), at=(0, 0, 1), markers={"m": (1, 0, 0)}
-    )
+    solid = {"mass": 1.0, "inertia": (1.0, 1.0, 1.0), "markers": {"m": (1, 0, 0)}}
+    a, b = (mech.add_rigid(name, at=(0, 0, z), **solid) for name, z in (("a", 0), ("b", 1)))
     mech.revolute("hinge", a.marker("m"), mech.ground.marker((1, 0, 0)), axis=(0, 0, 1))
     sol = rom.simulate(mech, t_end=0.02, dt=0.01)
     folder = tmp_path_factory.mktemp("files")
@@ -159,7 +155,6 @@ def test_all_warnings_go_one_way():
     """Numbers of frames are wrong as soon as a function between gets a decorator."""
     for path in (ROOT / "rom").rglob("*.py"):
         if path != ROOT / "rom/errors.py":
-            calls = (
-                n.func for n in ast.walk(ast.parse(path.read_text())) if isinstance(n, ast.Call)
-            )
+            nodes = ast.walk(ast.parse(path.read_text()))
+            calls = (node.func for node in nodes if isinstance(node, ast.Call))
             assert "warnings.warn" not in map(ast.unparse, calls), path

@@ -98,6 +98,8 @@ def test_a_report_begins_with_what_fails():
     assert [row[0] for row in Cells(report._repr_html_()).rows] == ["quantity", "bad", "good"]
     assert "FAILED" in report._repr_html_()
     assert repr(report) == "Report('gate': 1 of 2 failed)" and "bad" in str(report)
+    assert "gate: 1 of 2 failed" in str(report) and not report.ok
+    assert [row.quantity for row in report.failures] == ["bad"]
 
 
 def test_modes():

@@ -102,14 +102,9 @@ def test_a_solid_that_exists_is_taken_in_silence(way, numbers, tmp_path):
                             ("mm-kg-ms", 210.0, 7.85e-6)],
 )  # fmt: skip
 def test_limits_follow_the_units_that_are_declared(units, E, rho):
-    made = []
-    numbers = {"nu": (0.3,) * 3, "rho": rho}
+    made, three = [], {"E": (E,) * 3, "nu": (0.3,) * 3, "G": (E / 2.6,) * 3, "rho": rho}
     assert not said(lambda: made.append(rom.Material.from_units(units, E=E, nu=0.3, rho=rho)))
-    assert not said(
-        lambda: made.append(
-            rom.Orthotropic.from_units(units, E=(E,) * 3, G=(E / 2.6,) * 3, **numbers)
-        )
-    )
+    assert not said(lambda: made.append(rom.Orthotropic.from_units(units, **three)))
     for solid in made:
         assert_allclose([np.max(solid.E), solid.rho], [210e9, 7850.0], rtol=1e-14)
 
@@ -361,21 +356,14 @@ def test_strict_turns_a_doubt_into_an_error_of_its_own_code(tmp_path):
     assert done.stderr.count("9810 m/s^2;") == 1
 
 
-# ---------------------------------------------------------------- matrices of other programs
-
-
 def matrices(folder, *, k=1.0, m=1.0, x=1.0, material=STEEL, units="SI"):
     """A block as matrix files with numbers times k and m, and its nodes times x."""
-    model = block(size=(1.0, 0.1, 0.08), cells=(8, 2, 2), material=material)
+    model = block(material=material)
     write_op4({"KAA": model.K.toarray() * k, "MAA": model.M.toarray() * m}, folder / "bar.op4")
     labels = np.arange(1, len(model.points) + 1)
-    return rom.read_model(
-        (folder / "bar.op4", "KAA"),
-        (folder / "bar.op4", "MAA"),
-        nodes=(labels, model.points * x),
-        interfaces={"root": labels[model.interfaces["root"].nodes]},
-        units=units,
-    )
+    K, M = ((folder / "bar.op4", name) for name in ("KAA", "MAA"))
+    root = {"root": labels[model.interfaces["root"].nodes]}
+    return rom.read_model(K, M, nodes=(labels, model.points * x), interfaces=root, units=units)
 
 
 MATRICES = {
@@ -399,9 +387,6 @@ def test_matrices_of_other_units_are_doubted(case, tmp_path):
     assert not words or any(words in text and "bar.op4" in text for text in found)
 
 
-# ---------------------------------------------------------------- bodies of other units
-
-
 @pytest.fixture(scope="module")
 def part():
     kinds = {"root": "rbe2", "tip": rom.Polynomial(2)}
@@ -409,11 +394,8 @@ def part():
         block(cells=(4, 2, 2)), method=rom.CraigBampton(4), interfaces=kinds, certify=False
     )
     rng = np.random.default_rng(7)
-    stiffening = {}
-    for load in known_loads(body):
-        A = rng.normal(size=body.K.shape)
-        stiffening[load] = A + A.T
-    return replace(body, K_geo=stiffening, D=1e-4 * body.K)
+    drawn = {load: rng.normal(size=body.K.shape) for load in known_loads(body)}
+    return replace(body, K_geo={load: A + A.T for load, A in drawn.items()}, D=1e-4 * body.K)
 
 
 UNITS = ("mm-t-s", "mm-kg-ms")
@@ -433,13 +415,12 @@ def test_the_conversion_of_a_body_is_that_of_its_model():
     """The same beam meshed in mm, with MPa and t/mm^3."""
     kinds = {"root": "rbe2", "tip": rom.Polynomial(1)}
     si = block(size=(1.0, 0.1, 0.06), cells=(4, 1, 1))
-    L, material = 1e3, replace(rom.Material(210e9, 0.3, 7850.0))
+    L = 1e3
     options = {"method": rom.CraigBampton(3), "interfaces": kinds, "certify": False}
     body = rom.reduce(si, reference="root", **options)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        material = rom.Material(material.E * 1e-6, 0.3, material.rho * 1e-12)
-        mm = block(size=(L, 0.1 * L, 0.06 * L), cells=(4, 1, 1), material=material)
+    with pytest.warns(RomWarning, match="mm-t-s"):
+        material = rom.Material(210e9 * 1e-6, 0.3, 7850.0 * 1e-12)
+    mm = block(size=(L, 0.1 * L, 0.06 * L), cells=(4, 1, 1), material=material)
     native = rom.reduce(mm, reference="root", **options)
     found = body.in_units("mm-t-s")
     for name in ("mass", "first_moment", "inertia", "omega", "K"):
@@ -516,9 +497,6 @@ def test_bodies_of_different_units_meet_in_si(part):
     wanted = rom.Assembly(both, (pair,)).frequencies(12)
     mixed = {"left": part.in_units("mm-t-s"), "right": right.in_units("mm-kg-ms")}
     assert_allclose(rom.Assembly(mixed, (pair,)).frequencies(12)[6:], wanted[6:], rtol=1e-8)
-
-
-# ---------------------------------------------------------------- drives
 
 
 def steps(f, rate=None, span=(0.0, 1.0), n=500):

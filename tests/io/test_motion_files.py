@@ -15,9 +15,10 @@ from cases.command import ran
 from cases.mbs.mechanisms import random_body
 from cases.solid import block, reduced
 from rom.errors import ConfigError, ResourceError
-from rom.io.fields.gltf import MovingMesh, write_glb
+from rom.io.fields.gltf import MovingMesh, upright, write_glb
 from rom.io.fields.vtkhdf import write_vtkhdf
 from rom.io.hdf5 import h5py
+from rom.io.history import quoted
 from rom.rotation import matrix
 
 BOX = (
@@ -144,8 +145,6 @@ def test_the_tree_is_read_by_h5py(motion, tmp_path):
 
 
 def test_names_with_slashes_and_dots_stay_apart(tmp_path):
-    from rom.io.history import quoted
-
     assert len({quoted(name) for name in ("a/b", "a%2Fb", "a", ".", "..", "a.b")}) == 6
     assert not any("/" in quoted(name) for name in ("a/b", "/", "."))
     assert quoted("rod 1") == "rod 1" and quoted("..") == "%2E%2E"
@@ -283,8 +282,6 @@ def test_vtk_reads_the_series_in_one_file(motion, tmp_path):
 
 @pytest.mark.parametrize("up", [(0, 1, 0), (0, -1, 0), (0, 0, 1), (1, 2, -0.5)])
 def test_upright_becomes_y(up):
-    from rom.io.fields.gltf import upright
-
     p = upright(np.array(up, dtype=float))
     assert_allclose(matrix(p) @ up / np.linalg.norm(up), [0, 1, 0], atol=1e-12)
 
@@ -311,15 +308,11 @@ def test_a_film_without_flexible_bodies_or_with_one_at_rest_is_written(motion, t
 def played(path, frame):
     """{body: points (n, 3) in the film}, by the rules of glTF: morph, turn, move, turn of root."""
     film, data = chunks(path)
-
     (animation,), now = film["animations"], {}
     for channel in animation["channels"]:
         sampler, target = animation["samplers"][channel["sampler"]], channel["target"]
-        values, times = (
-            numbers(film, data, sampler["output"]),
-            len(numbers(film, data, sampler["input"])),
-        )
-        now[target["node"], target["path"]] = values.reshape(times, -1)[frame]
+        values, times = (numbers(film, data, sampler[end]) for end in ("output", "input"))
+        now[target["node"], target["path"]] = values.reshape(len(times), -1)[frame]
     root = film["nodes"][film["scenes"][0]["nodes"][0]]
     out = {}
     for k in root["children"]:
@@ -331,8 +324,8 @@ def played(path, frame):
             X = X + w * numbers(film, data, target["POSITION"])
         X = X @ matrix(np.roll(now[k, "rotation"], 1)).T + now[k, "translation"]
         out[mesh["name"]] = X @ matrix(np.roll(root["rotation"], 1)).T
-        surface = film["materials"][primitive["material"]]["pbrMetallicRoughness"]
-        colour = surface["baseColorFactor"]
+        material = film["materials"][primitive["material"]]
+        colour = material["pbrMetallicRoughness"]["baseColorFactor"]
         assert len(colour) == 4 and all(isinstance(c, float) and 0 <= c <= 1 for c in colour)
     return out
 
@@ -343,11 +336,10 @@ def test_a_film_of_given_motions_is_played_by_the_rules(tmp_path):
     poses = [(r, p / np.linalg.norm(p, axis=1, keepdims=True)) for r, p in poses]
     shapes, q = rng.normal(size=(12, 2)), rng.normal(size=(n_frames, 2))
     X, triangles = (np.asarray(part) for part in BOX)
+    stiff = np.zeros((12, 0)), np.zeros((n_frames, 0))
     bodies = [
         MovingMesh("rod", X.astype(float), triangles, *poses[0], shapes, q, (0.1, 0.4, 0.6)),
-        MovingMesh(
-            "bob", 2.0 * X, triangles, *poses[1], np.zeros((12, 0)), np.zeros((n_frames, 0))
-        ),
+        MovingMesh("bob", 2.0 * X, triangles, *poses[1], *stiff),
     ]
     times = np.linspace(0.0, 1.0, n_frames)
     path = write_glb(bodies, times, tmp_path / "m.glb", up=(0, 0, 1), title="motion")

@@ -10,14 +10,7 @@ import pytest
 
 import rom
 from cases.solid import block
-from rom.errors import (
-    ConfigError,
-    FileFormatError,
-    QualityGateError,
-    ResourceError,
-    RomError,
-    UnsafeFileError,
-)
+from rom.errors import ConfigError, FileFormatError, QualityGateError, RomError, UnsafeFileError
 from rom.io.archive import write_archive
 from rom.io.files import write_whole
 
@@ -34,8 +27,10 @@ def file(body, tmp_path):
     return rom.save(body, tmp_path / "rod.rom.npz")
 
 
-def test_what_is_read_equals_what_was_written(body, file):
-    again = rom.load(file)
+def test_what_is_read_equals_what_was_written(body, tmp_path):
+    K_geo = {"omega_z^2": np.diag(np.arange(1.0, body.n_modes + 1))}
+    again = rom.load(rom.save(replace(body, K_geo=K_geo), tmp_path / "b.npz"))
+    np.testing.assert_array_equal(again.K_geo["omega_z^2"], K_geo["omega_z^2"])
     for name in ("mass", "first_moment", "inertia", "S", "Ibar_kl", "S_kl", "K", "D", "omega"):
         np.testing.assert_array_equal(getattr(again, name), getattr(body, name))
     for name, marker in body.markers.items():
@@ -63,12 +58,6 @@ def test_a_geometric_stiffness_of_another_body_is_refused(body, tmp_path):
 def test_the_same_body_gives_the_same_bytes(body, file, tmp_path):
     other = rom.save(body, tmp_path / "other.npz")
     assert other.read_bytes() == file.read_bytes()
-
-
-def test_a_geometric_stiffness_travels(body, tmp_path):
-    K_geo = {"omega_z^2": np.diag(np.arange(1.0, body.n_modes + 1))}
-    path = rom.save(replace(body, K_geo=K_geo), tmp_path / "b.npz")
-    np.testing.assert_array_equal(rom.load(path).K_geo["omega_z^2"], K_geo["omega_z^2"])
 
 
 def test_every_flipped_or_missing_byte_is_noticed(file, tmp_path):
@@ -117,6 +106,7 @@ def npy(array, **options):
     ("member", "content", "kind", "message"),
     [
         ("K.npy", None, FileFormatError, "lacks the array .K. of its manifest"),
+        ("K.npy D.npy", None, FileFormatError, "'D', 'K' of its manifest"),
         ("manifest.npy", None, FileFormatError, "no manifest"),
         ("manifest.npy", npy(np.zeros(3, np.uint8)), FileFormatError, "manifest cannot be read"),
         ("K.npy", npy(np.array([{}], dtype=object), allow_pickle=True), UnsafeFileError, "type"),
@@ -127,7 +117,7 @@ def npy(array, **options):
     ],
 )
 def test_a_wrong_member_is_named(file, tmp_path, member, content, kind, message):
-    path = rewritten(file, tmp_path / "x.npz", lambda n, d: content if n == member else d)
+    path = rewritten(file, tmp_path / "x.npz", lambda n, d: content if n in member.split() else d)
     with pytest.raises(kind, match=message):
         rom.load(path)
 
@@ -173,7 +163,7 @@ def test_a_full_disk_leaves_the_old_file_and_nothing_else(body, file):
         with open("/dev/full", "wb", buffering=0) as full:
             full.write(b"x")
 
-    with pytest.raises(ResourceError, match="No space left"):
+    with pytest.raises(rom.ResourceError, match="No space left"):
         write_whole(file, fail)
     assert file.read_bytes() == before
     assert [p.name for p in file.parent.iterdir()] == [file.name]
@@ -220,9 +210,7 @@ def test_words_of_a_file_that_are_nonsense_are_refused(good, field, tmp_path, mo
     monkeypatch.setattr("os.fsync", lambda handle: None)
     manifest, arrays = good
     for value in WRONG:
-        if not (field == "name" and value == "nonsense") and not (
-            field == "provenance" and value == {"x": 1}
-        ):
+        if (field, value) not in (("name", "nonsense"), ("provenance", {"x": 1})):
             assert is_noticed(tmp_path / "x.npz", manifest | {field: value}, arrays), value
     twice = [manifest["markers"][0]] * 2
     assert is_noticed(tmp_path / "x.npz", manifest | {"markers": twice}, arrays)

@@ -170,12 +170,10 @@ def test_what_openradioss_does_not_take_is_named(model, body, tmp_path):
     two = {name: KINDS[name] for name in ("root", "tip")}
     with pytest.raises(ConfigError, match="has 2 interfaces"):
         rom.export(rom.reduce(model, method=rom.Guyan(), interfaces=two, certify=False), path)
-    with pytest.raises(ConfigError, match="must be one label for each interface"):
-        write_radioss(body, path, nodes={"root": 1, "tip": 2})
-    with pytest.raises(ConfigError, match="must be one label for each interface"):
-        write_radioss(body, path, nodes={"root": 1, "tip": 2, "side": 2})
-    with pytest.raises(ConfigError, match="1 to 10 digits"):
-        write_radioss(body, path, nodes={"root": 1, "tip": 2, "side": -3})
+    each = "must be one label for each interface"
+    for words, more in ((each, {}), (each, {"side": 2}), ("1 to 10 digits", {"side": -3})):
+        with pytest.raises(ConfigError, match=words):
+            write_radioss(body, path, nodes={"root": 1, "tip": 2} | more)
     assert not path.exists()
 
 
@@ -186,7 +184,7 @@ def test_interfaces_on_a_line_are_refused(model, tmp_path):
                        0.5 * (root.origin + tip.origin))  # fmt: skip
     line = block(size=(1.0, 0.3, 0.2), cells=(4, 2, 1))
     line.interfaces["middle"] = middle
-    kinds = {"root": "rbe2", "tip": "rbe2", "middle": "rbe2"}
+    kinds = dict.fromkeys(line.interfaces, "rbe2")
     body = rom.reduce(line, method=rom.Guyan(), interfaces=kinds, certify=False)
     with pytest.raises(ConfigError, match="3 that do not lie on one line"):
         rom.export(body, tmp_path / "b.pch")
@@ -230,10 +228,8 @@ def test_arrays_are_the_integrals_over_the_nodes(tmp_path):
     M, Psi = np.kron(Ms, np.eye(3)), phi.transpose(1, 2, 0).reshape(15, 3)
 
     def tilde(columns):
-        blocks = columns.reshape(5, 3, -1)
-        out = [[np.cross(blocks[n, :, k], np.eye(3)).T for k in range(blocks.shape[2])]
-               for n in range(5)]  # fmt: skip
-        return np.block(out)
+        blocks = columns.reshape(5, 3, -1).swapaxes(1, 2)
+        return np.block([[np.cross(v, np.eye(3)).T for v in row] for row in blocks])
 
     v = np.array([1.0, 2.0, 3.0])
     assert_allclose(tilde(x.ravel())[3:6] @ v, np.cross(x[1], v))

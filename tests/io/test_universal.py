@@ -1,6 +1,7 @@
 """Universal files and files for ParaView: known numbers come back, broken files are named."""
 
 import struct
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -122,8 +123,6 @@ def test_vtk_reads_points_triangles_and_shapes(body, tmp_path):
 
 
 def test_an_unknown_ending_and_a_body_without_surface_are_named(body, tmp_path):
-    from dataclasses import replace
-
     with pytest.raises(ConfigError, match=r"'.SID'; known: .npz, .vtu|ending '.sid'"):
         rom.export(body, tmp_path / "rod.SID")
     with pytest.raises(ConfigError, match="has no surface; to be drawn"):

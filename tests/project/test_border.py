@@ -1,9 +1,4 @@
-"""Wrong arguments: all public callables, argument by argument, with values that do not belong.
-
-Either a call works, because the value is legal, or it raises a RomError with an exit code of a
-user's mistake that names the argument. Missing and unknown arguments are a TypeError of Python, as
-everywhere.
-"""
+"""Wrong arguments of all public callables: legal, or a mistake of the user that is named."""
 
 import inspect
 import signal

@@ -1,15 +1,8 @@
 """Docstrings of public callables say units, shapes, errors and sources where there are any.
 
-Public is what the fronts name that users import from, with the public methods and properties of
-its classes. What a callable must say follows from its code, and every part is looked for where it
-belongs, so that one unit does not stand for five arguments:
-
-- units: each argument, field or result whose annotation holds real or complex numbers says a unit
-  in brackets in its own entry, [1] where it has none;
-- shapes: each one that is an array says its shape in parentheses;
-- errors: each error raised on purpose in the body is named below Raises;
-- source: a module of a folder of methods names who published them and when, or the page of theory
-  that does, in its docstring or in those of what it shows. `PLAIN` lists those that have no method.
+What a callable must say follows from its code: each argument, field or result of real or complex
+numbers a unit in brackets in its own entry, [1] where it has none; each array its shape; each error
+raised on purpose below Raises; a module of methods who published them, or its page of theory.
 """
 
 import importlib
@@ -52,9 +45,6 @@ SHAPE = re.compile(r"\((?:\.\.\.|[\w+\-*/ .]+)?,(?: ?(?:\.\.\.|[\w+\-*/ .]+),?)*
 LIKE = re.compile(r"\b(?:as|see|like|likewise)(?: in| of| for)? `[\w.]+|\bas in the class\b", re.I)
 COUNTED = re.compile(r"\b(?:labels|dof numbers|numbers of (?:points|nodes))\b")
 SOURCE = re.compile(r"\b1[789]\d\d\b|\b20[0-2]\d\b|\bAfter [A-Z]\w+|docs/theory/\w+\.md")
-
-
-# --- what each must say ---
 
 
 def numeric(annotation):
@@ -103,8 +93,8 @@ def without_errors(one):
 
 def is_method(one):
     """A function of a module, or a class that reduces."""
-    is_class_or_module = hasattr(one.thing, "basis") if inspect.isclass(one.thing) else True
-    return is_class_or_module and one.name.rpartition(".")[0].islower()
+    reduces = not inspect.isclass(one.thing) or hasattr(one.thing, "basis")
+    return reduces and one.name.rpartition(".")[0].islower()
 
 
 def source_in(text):

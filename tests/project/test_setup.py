@@ -1,7 +1,9 @@
-"""The set-up can be run again and again, and the lists of packages agree."""
+"""The set-up runs again and again, lists of packages agree; the script that plants errors."""
 
+import ast
 import os
 import re
+import sys
 import time
 import tomllib
 from itertools import chain
@@ -14,6 +16,9 @@ from cases.long import LONGEST_FIRST, ONCE
 from cases.paths import ROOT, TESTS
 from rom.doctor.libraries import PACKAGES, SLOW_ADVICE, SYSTEM_COMMAND
 from rom.fe import DEBIAN_PACKAGES, GMSH_LIBRARIES, WHEEL_PACKAGES
+
+sys.path.insert(0, str(ROOT / ".ci"))
+import plant
 
 pytestmark = pytest.mark.once
 SETUP = ROOT / ".ci" / "setup.sh"
@@ -119,9 +124,9 @@ def test_what_begins_exists_and_what_waits_for_make_long_is_run_there():
     apart = {TESTS / "conftest.py", Path(__file__)}
     assert all(path.name.startswith("test_") for path in importing - apart)
     assert "grep -rlE 'ROM_LONG|SHARED_BY' tests" in (ROOT / "Makefile").read_text()
-    assert "ROM_LONG=1 $(PYTHON) -m pytest -m long" in recipe("long")
-    assert 'ROM_LONG=1 $(PYTHON) -m pytest -m "not long" $(MORE)' in recipe("long")
-    assert 'ROM_LONG=1 $(LIGHT) -m pytest -m "not fenicsx and once"' in recipe("long")
+    assert "ROM_LONG=1 $(PYTHON) -m pytest -m long" in recipe("long-marked")
+    assert 'ROM_LONG=1 $(PYTHON) -m pytest -m "not long" $(MORE)' in recipe("long-more")
+    assert 'ROM_LONG=1 $(LIGHT) -m pytest -m "not fenicsx and once"' in recipe("long-light")
 
 
 def test_the_doctor_advises_packages_the_setup_installs():
@@ -162,3 +167,46 @@ def test_pip_does_not_shadow_what_debian_provides():
     assert not names & {name_of(requirement) for requirement in apart}
     debian = "gmsh h5py petsc4py slepc4py mpi4py meshio fenics-dolfinx"
     assert not names & set(debian.split()) and {"numpy", "scipy", "numba"} <= names
+
+
+PLANTED_IN = """
+@inner
+def f(x, k, out):
+    out[k + 1] += 2.0 * x - x[k - 1] / 3.0
+    return k + 1
+
+def g(x):
+    return x + x
+
+def law(x):
+    return x - 0.5
+
+compiled_law(law)
+"""
+
+
+def test_it_plants_one_sign_or_factor_of_compiled_functions_alone():
+    signs, factors = plant.places(PLANTED_IN)
+    found = [[ast.unparse(node) for node in nodes] for nodes in (signs, factors)]
+    assert found == [
+        ["out[k + 1] += 2.0 * x - x[k - 1] / 3.0", "2.0 * x - x[k - 1] / 3.0", "x - 0.5"],
+        ["2.0 * x", "x[k - 1] / 3.0"],
+    ]
+    changed = [plant.planted(PLANTED_IN, node) for node in (*signs[:2], *factors)]
+    assert [text.splitlines()[3].strip() for text in changed] == [
+        "out[k + 1] -= (2.0 * x - x[k - 1] / 3.0)",
+        "out[k + 1] += ((2.0 * x) + (x[k - 1] / 3.0))",
+        "out[k + 1] += (2.0 * (2.0 * x)) - x[k - 1] / 3.0",
+        "out[k + 1] += 2.0 * x - (2.0 * (x[k - 1] / 3.0))",
+    ]
+
+
+@pytest.mark.long
+def test_what_it_plants_is_python_and_has_tests():
+    for path in plant.files():
+        text, name = path.read_text(), str(path.relative_to(ROOT))
+        for nodes in plant.places(text):
+            for node in nodes[:1] + nodes[-1:]:
+                changed = ast.parse(plant.planted(text, node))
+                assert ast.dump(changed) != ast.dump(ast.parse(text)), name
+        assert all((ROOT / test).exists() for test in plant.tests_of(name)), name

@@ -1,4 +1,4 @@
-"""The page lets nothing in but its own scripts, and no name ends an element."""
+"""A report is one file, which lets nothing in but its own scripts; no name ends an element."""
 
 import base64
 import hashlib
@@ -8,9 +8,12 @@ from html.parser import HTMLParser
 
 import pytest
 
-from cases.files.reports import read
+from cases.files.reports import PIXEL, read
 from cases.paths import ROOT
+from cases.refusals import refused
 from cases.solid import block, reduced
+from rom.errors import ConfigError
+from rom.model import Report, Row
 from rom.report import html, viewer
 
 pytestmark = pytest.mark.once
@@ -20,8 +23,7 @@ NAME = "</script><b>bar"
 
 @pytest.fixture(scope="module")
 def body():
-    made = reduced(2, block(cells=(4, 1, 1)), name="bar")
-    return replace(made, name=NAME)
+    return replace(reduced(2, block(cells=(4, 1, 1)), name="bar"), name=NAME)
 
 
 class Elements(HTMLParser):
@@ -114,3 +116,32 @@ def test_the_bundle_names_what_the_script_uses_and_nothing_else():
     ours = (ROOT / "rom" / "report" / "viewer.js").read_text()
     named = re.findall(r"\b[A-Z]\w+\b", (VENDOR / "three_part.js").read_text().split("\n", 1)[1])
     assert set(re.findall(r"THREE\.(\w+)", ours)) == set(named)
+
+
+def test_the_report_needs_no_other_file(tmp_path):
+    (tmp_path / "a.png").write_bytes(PIXEL)
+    checks = Report("x", (Row("mass", 1.25, "<= 2", True), Row("gap & co", 3.0, "<= 2", False)))
+    path = html.write_report(
+        {
+            "One": [html.paragraph("a < b"), html.picture(tmp_path / "a.png", "It's small")],
+            "Two": [
+                html.table(("f [Hz]", "n"), [(123.456789, 3), ("x<y", 4)], "Numbers"),
+                html.checks(checks, "Checks"),
+            ],
+        },
+        tmp_path / "r.html",
+        title="Beam <1 m>",
+    )
+    reader = read(path)
+    assert [base64.b64decode(link.split(",")[1]) for link in reader.links] == [PIXEL]
+    for words in ("Beam <1 m>", "a < b", "It's small", "123.46", "x<y", "gap & co", "failed"):
+        assert words in reader.text
+
+
+test_a_report_that_cannot_be_written_is_refused = refused(
+    (lambda: html.write_report({}, "r.txt", title=""), r"\.html"),
+    (lambda: html.write_report({}, "no such folder/r.html", title=""), "does not exist"),
+    (lambda: html.picture("missing.png", ""), "must be a picture"),
+    (lambda: html.table(("a", "b"), [(1,)], ""), "1 cells of the row"),
+    error=ConfigError,
+)

@@ -105,12 +105,12 @@ class Terminal(io.StringIO):
         return True
 
 
-def followed(monkeypatch, stream, n=10):
+def followed(monkeypatch, stream):
     """What is seen of work of 10 parts, asked for while it lasts."""
     monkeypatch.setattr(sys, "stderr", stream)
     monkeypatch.setattr(progress, "LOOK_INTERVAL", 1e-3)
     asked = []
-    with progress.followed(n, "drawing", lambda: asked.append(1) or min(len(asked), n)):
+    with progress.followed(10, "drawing", lambda: asked.append(1) or min(len(asked), 10)):
         while stream.isatty() and len(asked) < 3:
             pass
     return stream.getvalue()
@@ -173,20 +173,14 @@ def test_reductions_and_modes_of_large_models_say_how_far_they_are(monkeypatch):
 
 
 @pytest.mark.parametrize("why", ["no terminal", "another rank", "quiet"])
-def test_progress_is_silent_where_nobody_wants_it(why, monkeypatch):
-    log, stream = logging.getLogger("rom"), Terminal()
-    level = log.level
-    if why == "no terminal":
-        stream = io.StringIO()
-    elif why == "another rank":
+def test_progress_is_silent_where_nobody_wants_it(why, monkeypatch, caplog):
+    stream = io.StringIO() if why == "no terminal" else Terminal()
+    if why == "another rank":
         monkeypatch.setattr(progress, "ranks", lambda: (1, 2))
-    else:
-        log.setLevel(logging.ERROR)
+    if why == "quiet":
+        caplog.set_level(logging.ERROR, logger="rom")
     monkeypatch.setattr(sys, "stderr", stream)
-    try:
-        assert not progress.looked_for()
-        with progress.followed(10, "drawing", lambda: 5):
-            pass
-    finally:
-        log.setLevel(level)
+    assert not progress.looked_for()
+    with progress.followed(10, "drawing", lambda: 5):
+        pass
     assert stream.getvalue() == ""

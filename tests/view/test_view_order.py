@@ -150,14 +150,10 @@ def test_a_film_is_the_same_seen_and_written(name, tmp_path):
     assert b64encode(file.read_bytes()).decode() in seen._repr_html_()
 
 
-def test_what_was_not_written_stands_for_no_path():
-    seen = view.history(*PICTURES["history"]()[0])
+def test_a_picture_is_no_path_before_it_is_saved_which_is_refused_in_the_same_words(tmp_path):
+    seen = view.history(*PICTURES["history"]()[0], **WORDS)
     with pytest.raises(ConfigError, match=r"picture was not written yet.*picture\.save"):
         Path(seen)
-
-
-def test_a_picture_that_is_saved_later_is_refused_in_the_same_words(tmp_path):
-    seen = view.history(*PICTURES["history"]()[0], **WORDS)
     with pytest.raises(ConfigError, match=r"ending '\.jpg' is unknown"):
         seen.save(tmp_path / "a.jpg")
     assert not list(tmp_path.iterdir())

@@ -7,14 +7,8 @@ pytest.importorskip("matplotlib", reason="pictures need matplotlib")
 from matplotlib.figure import Figure
 
 from rom import view
-from rom.view.canvas.scales import (
-    clock_texts,
-    prefixed,
-    readable,
-    round_length,
-    without_round_off,
-    written,
-)
+from rom.view.canvas import scales
+from rom.view.canvas.scales import clock_texts, prefixed, readable, without_round_off, written
 
 
 @pytest.mark.parametrize(
@@ -154,5 +148,5 @@ def test_clocks_of_a_film_have_one_unit():
 
 
 def test_lengths_and_sizes_in_words():
-    assert [round_length(x) for x in (1.0, 1.9, 4.99, 0.051, 730.0)] == [1, 1, 2, 0.05, 500]
+    assert [scales.round_length(x) for x in (1.0, 1.9, 4.99, 0.051, 730.0)] == [1, 1, 2, 0.05, 500]
     assert written(0.02, "m") == "20 mm" and written(-3e5, "N") == "-300 kN"

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from cases.long import few
+from cases.mbs.drawn import volume
 from cases.refusals import refused
 from rom import view
 from rom.errors import ConfigError
@@ -12,12 +13,6 @@ from rom.view.canvas.solids import gear_outline
 
 MODULE, WIDTH, ANGLE = 2e-3, 1e-2, np.deg2rad(20.0)
 FINE = 2000
-
-
-def volume(mesh):
-    points, triangles = mesh
-    a, b, c = np.moveaxis(points[triangles], 1, 0)
-    return float(np.einsum("ti,ti->", a, np.cross(b, c)) / 6)
 
 
 def is_closed(mesh):

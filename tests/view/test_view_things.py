@@ -12,6 +12,8 @@ from matplotlib.figure import Figure
 from numpy.testing import assert_allclose
 
 from cases.figures.pictures import crowded, written_in
+from cases.mbs.drawn import volume
+from cases.refusals import refused
 from cases.solid import block
 from rom import view
 from rom.errors import ConfigError
@@ -124,29 +126,28 @@ def test_a_scene_is_drawn_into_axes_of_the_caller():
         view.history(X, [("y [m]", {"one": X})], beside=scene, ax=one)
 
 
-@pytest.mark.parametrize(
-    ("thing", "words"),
-    [
-        (view.Thing(np.zeros((3, 2)), [[0, 1, 2]]), r"points must be \(n, 3\)"),
-        (view.Thing(np.zeros((3, 3)), [[0, 1, 3]]), "from 0 to 2"),
-        (view.Thing(np.zeros((3, 3)), [[0, 1, -1]]), "from 0 to 2"),
-        (view.Thing(np.zeros((3, 3)), [[0.0, 1.0]]), "from 0 to 2"),
-        (view.Thing(np.zeros((4, 3)), [[0, 1, 2, 3]]), "from 0 to 3"),
-        (view.Thing(*BOX, values=[1.0, 2.0]), r"has \(1, 2\) values, needed are \(1, 8\)"),
-        (view.Thing(*BOX, edges=[[0, 8]]), "edges must be pairs from 0 to 7"),
-    ],
+def film(*times, **things):
+    return lambda: view.film(times, view.Scene("S", things))
+
+
+test_wrong_things_and_films_of_nothing_are_refused_by_name = refused(
+    (film(0.0, odd=view.Thing(np.zeros((3, 2)), [[0, 1, 2]])), r"'odd'.*points must be \(n, 3\)"),
+    (film(0.0, odd=view.Thing(np.zeros((3, 3)), [[0, 1, 3]])), "'odd'.*from 0 to 2"),
+    (film(0.0, odd=view.Thing(np.zeros((3, 3)), [[0, 1, -1]])), "'odd'.*from 0 to 2"),
+    (film(0.0, odd=view.Thing(np.zeros((3, 3)), [[0.0, 1.0]])), "'odd'.*from 0 to 2"),
+    (film(0.0, odd=view.Thing(np.zeros((4, 3)), [[0, 1, 2, 3]])), "'odd'.*from 0 to 3"),
+    (
+        film(0.0, odd=view.Thing(*BOX, values=[1.0, 2.0])),
+        r"'odd' has \(1, 2\) values, needed are \(1, 8\)",
+    ),
+    (film(0.0, odd=view.Thing(*BOX, edges=[[0, 8]])), "'odd'.*edges must be pairs from 0 to 7"),
+    (
+        film(0.0, 1.0, box=view.Thing(BOX[0] + np.zeros((3, 1, 1)), BOX[1])),
+        "2 times for 3 pictures of 'S'",
+    ),
+    (film(0.0), "nothing to draw in 'S'"),
+    error=ConfigError,
 )
-def test_wrong_things_are_refused_by_name(thing, words):
-    with pytest.raises(ConfigError, match=f"'odd'.*{words}|'odd' {words}"):
-        view.film([0.0], view.Scene("S", {"odd": thing}))
-
-
-def test_a_film_needs_a_time_for_each_picture_and_something_to_draw():
-    moving = view.Thing(BOX[0] + np.zeros((3, 1, 1)), BOX[1])
-    with pytest.raises(ConfigError, match="2 times for 3 pictures of 'S'"):
-        view.film([0.0, 1.0], view.Scene("S", {"box": moving}))
-    with pytest.raises(ConfigError, match="nothing to draw in 'S'"):
-        view.film([0.0], view.Scene("S", {}))
 
 
 def test_a_film_shows_what_moves_from_one_place_and_leaves_the_rest():
@@ -171,8 +172,7 @@ def test_plates_are_their_outlines_made_thick_and_move_with_them():
     other = square + np.array([1.0, 0.5])
     frames = [[square, other], [square, other + np.array([0.0, 0.3])]]
     thing = view.plates(frames, 0.5, values=[1.0, 2.0])
-    p, q, r = np.moveaxis(thing.points[0][thing.cells], 1, 0)
-    assert np.sum(p * np.cross(q, r)) / 6 == pytest.approx(2 * 0.4 * 0.2 * 0.5)
+    assert volume((thing.points[0], thing.cells)) == pytest.approx(2 * 0.4 * 0.2 * 0.5)
     second = thing.values == 2.0
     step = thing.points[1] - thing.points[0]
     assert_allclose(step[second], [(0.0, 0.3, 0.0)] * second.sum(), atol=1e-15)
@@ -280,18 +280,15 @@ def test_a_wheel_and_its_sectors_are_things_with_their_displacements():
     step = turned.points - whole.points
     assert_allclose(np.linalg.norm(step, axis=1), 2 * angle * radius, rtol=1e-9)
     assert_allclose(np.sum(step * whole.points, axis=1), 0.0, atol=1e-15)
-    for words, more in {
-        "numbers per sector": {"shape": shape[:5]},
-        r"sectors \[6\] must be from 0 to 5": {"sectors": [6]},
+    each, wheel = [model] * N, {"one": np.zeros((6, 5))}
+    for words, draw in {
+        "numbers per sector": lambda: view.wheel(each, hidden=hidden, shape=shape[:5]),
+        r"sectors \[6\] must be from 0 to 5": lambda: view.wheel(each, hidden=hidden, sectors=[6]),
+        "one mode of the wheel": lambda: view.wheel_modes(model, {}, **WORDS),
+        f"needs {model.n_dofs} numbers per": lambda: view.wheel_modes(model, wheel, **WORDS),
     }.items():
         with pytest.raises(ConfigError, match=words):
-            view.wheel([model] * N, hidden=hidden, **more)
-    for words, shapes in {
-        "one mode of the wheel": {},
-        f"needs {model.n_dofs} numbers per sector": {"one": np.zeros((6, 5))},
-    }.items():
-        with pytest.raises(ConfigError, match=words):
-            view.wheel_modes(model, shapes, **WORDS)
+            draw()
 
 
 BAR = view.box((1.0, 0.1, 0.08))

@@ -19,25 +19,16 @@ MIDDLES = {
     "bdf": {"tet10": TETRA, "hex20": BARS + UPS + TOPS},
     "inp": {"tet10": TETRA, "hex20": BARS + TOPS + UPS},
 }
-CARDS = {  # cards that would be lost, by the name they are to be refused with
-    "RBE2": "RBE2,901,1,123456,2,3",
-    "RBE3": "RBE3,902,,1,123456,1.,123,2",
-    "RBAR": "RBAR,9,1,2,123",
-    "CONM2": "CONM2,903,1,0,2.",
-    "CONM1": "CONM1,904,1,,2.",
-    "CBUSH": "CBUSH,905,7,1,2",
-    "CELAS1": "CELAS1,906,7,1,1,2,1",
-    "CELAS2": "CELAS2,906,1.+5,1,1,2,1",
-    "NSM": "NSM,3,PSOLID,1,2.",
-    "MPC": "MPC,5,1,1,1.,2,1,-1.",
-    "PSHELL": "PSHELL,7,1,.01,1",
-    "CBEAM": "CBEAM,9,7,1,2,0.,0.,1.",
-    "PBAR": "PBAR,7,1,1.-4",
-    "CPENTA": "CPENTA,99,1,1,2,3,4,5,6",
-    "CORD3G": "CORD3G,9,E313,EQN,1,2,3",
-    "=": "=,*(1),=,*(.1),==",
-    "CTRIAR": "CTRIAR,99,7,1,2,3",
-    "BGSET": "BGSET,1,1,2,2",
+# that would be lost, by the name they are to be refused with
+CARDS = {
+    card.partition(",")[0]: card
+    for card in """
+RBE2,901,1,123456,2,3 RBE3,902,,1,123456,1.,123,2 RBAR,9,1,2,123 CONM2,903,1,0,2.
+CONM1,904,1,,2. CBUSH,905,7,1,2 CELAS1,906,7,1,1,2,1 CELAS2,906,1.+5,1,1,2,1 NSM,3,PSOLID,1,2.
+MPC,5,1,1,1.,2,1,-1. PSHELL,7,1,.01,1 CBEAM,9,7,1,2,0.,0.,1. PBAR,7,1,1.-4
+CPENTA,99,1,1,2,3,4,5,6 CORD3G,9,E313,EQN,1,2,3 =,*(1),=,*(.1),== CTRIAR,99,7,1,2,3
+BGSET,1,1,2,2
+""".split()
 }
 KEYWORDS = {
     "*EQUATION": "*EQUATION\n2\n1,1,1.,2,1,-1.",
@@ -62,16 +53,9 @@ KEYWORDS = {
 }
 HARMLESS = {
     "bdf": (
-        "FORCE,3,1,0,1.,0.,0.,1.",
-        "EIGRL,1,,,10",
-        "PARAM,POST,-1",
-        "PLOAD4,3,1,1.+5",
-        "PLOTEL,1,1,2",
-        "MAT1,1,2.1+11,,.3,7850.",
-        "TEMPD,1,20.",
-        "SUPORT,1,123456",
-        "ASET1,123,1",
-    ),
+        "FORCE,3,1,0,1.,0.,0.,1. EIGRL,1,,,10 PARAM,POST,-1 PLOAD4,3,1,1.+5 PLOTEL,1,1,2 "
+        "MAT1,1,2.1+11,,.3,7850. TEMPD,1,20. SUPORT,1,123456 ASET1,123,1"
+    ).split(),
     "inp": (
         "*HEADING\n a bar, *not a keyword",
         "*STEP\n*FREQUENCY\n10\n*BOUNDARY\n1, 1, 3\n*END STEP",
@@ -200,11 +184,8 @@ class Bulk:
                 width, side = (16 if star else 8), ">" if self.form == "small" else "<"
                 lines.append(f"{head:<8}" + "".join(f"{w:{side}{width}}" for w in row) + mark)
             # wide lines need their star
-            head = (
-                mark
-                or star
-                or ("" if self.mark in ("blank", "none") or self.form != "free" else "+")
-            )
+            plus = self.form == "free" and self.mark not in ("blank", "none")
+            head = mark or star or "+" * plus
             if self.form != "free" and not star and self.mark == "blank":
                 head = "+"
         text = "\n".join(line.rstrip() for line in lines)
@@ -241,20 +222,11 @@ class Bulk:
         files, bulk = {"deck.bdf": ""}, [*head, *grids, *cells, held, *extra]
         if rng.random() < 0.4:
             files["points.blk"] = "$ points\n" + "\n".join(grids) + "\n"
-            line = rng.choice(
-                ["INCLUDE 'points.blk'", 'include "points.blk"', "INCLUDE points.blk"]
-            )
-            bulk = [*head, line, *cells, held, *extra]
+            ways = "INCLUDE 'points.blk'", 'include "points.blk"', "INCLUDE points.blk"
+            bulk = [*head, rng.choice(ways), *cells, held, *extra]
         if rng.random() < 0.6:
-            bulk = [
-                "SOL 103",
-                "CEND",
-                "SPC = 7",
-                "TITLE = a bar, of steel",
-                "Begin Bulk",
-                *bulk,
-                "ENDDATA",
-            ]
+            head = "SOL 103\nCEND\nSPC = 7\nTITLE = a bar, of steel\nBegin Bulk"
+            bulk = [head, *bulk, "ENDDATA"]
         files["deck.bdf"] = "\n".join(bulk) + "\n"
         return files
 
@@ -295,34 +267,20 @@ class Keywords:
         nodes = [f"*{self.change('Node')}{option}", *rows]
         if rng.random() < 0.3:
             files["points.txt"] = "** points\n" + "\n".join(rows) + "\n"
-            nodes = rng.choice(
-                [f"*NODE{option}, INPUT=points.txt", f"*NODE{option}\n*Include, input=points.txt"]
-            )
-            nodes = [str(nodes)]
+            source = rng.choice([", INPUT=points.txt", "\n*Include, input=points.txt"])
+            nodes = [f"*NODE{option}{source}"]
         kind = {"hex8": "C3D8R", "tet4": "C3D4", "tet10": "C3D10", "hex20": "C3D20"}[self.kind]
-        cells = [
-            f"*Element, type={self.change(kind)}, elset={self.change('All')}",
-            *self.rows_of_cells(),
-        ]
+        element = f"*Element, type={self.change(kind)}, elset={self.change('All')}"
+        cells = [element, *self.rows_of_cells()]
         held = [f"*NSET, NSET={self.change('Root')}", *(f"{k + 1}," for k in self.root)]
         section = ["*SOLID SECTION, ELSET=aLL, MATERIAL=steel"]
         body = [*head, *nodes, *tail, *cells, *section]
         if rng.random() < 0.4:
-            body = [
-                "*Part, name=Bar",
-                *body,
-                "*Nset, nset=ROOT\n1,",
-                "*End Part",
-                "*Part, name=Other",
-                "*Node\n1, 5., 5., 5.",
-                "*End Part",
-                "*Assembly, name=A",
-                "*Instance, name=Bar-1, part=BAR",
-                "*End Instance",
-                held[0] + ", instance=Bar-1",
-                *held[1:],
-                "*End Assembly",
-            ]
+            other = "*Part, name=Other\n*Node\n1, 5., 5., 5.\n*End Part"
+            instance = "*Instance, name=Bar-1, part=BAR\n*End Instance"
+            body = ["*Part, name=Bar", *body, "*Nset, nset=ROOT\n1,\n*End Part", other]
+            body += ["*Assembly, name=A", instance, f"{held[0]}, instance=Bar-1", *held[1:]]
+            body.append("*End Assembly")
         else:
             body += held
         files["deck.inp"] = "\n".join([*body, *extra]) + "\n"
@@ -345,9 +303,7 @@ class Keywords:
             nz, rest = divmod(len(rows), nx * ny)
             dx, dy, dz = (steps[k] if k < len(rows) else 0 for k in (1, nx, nx * ny))
             dx, dy, dz = dx * (nx > 1), dy * (ny > 1), dz * (nz > 1)
-            grid = [
-                i * dx + j * dy + k * dz for k, j, i in product(range(nz), range(ny), range(nx))
-            ]
-            if not rest and np.array_equal(grid, steps):
+            k, j, i = np.indices((nz, ny, nx)).reshape(3, -1)
+            if not rest and np.array_equal(i * dx + j * dy + k * dz, steps):
                 return f"1, {nx}, {dx or 1}, 1, {ny}, {dy}, {nx}, {nz}, {dz}, {nx * ny}"
         return None

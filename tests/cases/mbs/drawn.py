@@ -1,4 +1,4 @@
-"""Things to draw: a bar that swings, a square that is squeezed."""
+"""Things to draw: a bar that swings, a square that is squeezed; the volume of a shape."""
 
 from dataclasses import replace
 
@@ -39,3 +39,9 @@ def squeezed(amount):
     triangles = np.array([[0, 1, 2], [0, 2, 3]])
     now = points * (1 - amount, 1 + amount)
     return view.Shape("square", now, triangles, points, np.array([amount, 0.0]), "strain")
+
+
+def volume(shape):
+    """Inside a closed surface of points (n, 3) and triangles (m, 3) that face outwards."""
+    a, b, c = np.moveaxis(shape[0][shape[1]], 1, 0)
+    return np.einsum("ti,ti->", a, np.cross(b, c)) / 6

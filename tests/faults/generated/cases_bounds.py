@@ -7,18 +7,10 @@ import numpy as np
 import rom
 from generated.case import Silent, Warned, Works, case, edit, write
 from generated.stock import MATRICES, STEEL, body, model, pendulum
-from rom.errors import (
-    ConfigError,
-    FileFormatError,
-    InterfaceError,
-    MeshError,
-    ModelError,
-    ResourceError,
-    UnsafeFileError,
-)
+from rom.errors import ConfigError, FileFormatError, InterfaceError, MeshError, ResourceError
 
 HUGE = 10**12
-SIZES = (ConfigError, ResourceError, ModelError)
+SIZES = (ConfigError, ResourceError, rom.ModelError)
 REDUCE = f"reduce {MATRICES} -o a.npz"
 TOLD = str(HUGE)
 LINES = {
@@ -91,7 +83,7 @@ def sparse(name):
     return prepare
 
 
-REFUSED = (FileFormatError, UnsafeFileError, ConfigError, MeshError, ResourceError)
+REFUSED = (FileFormatError, rom.UnsafeFileError, ConfigError, MeshError, ResourceError)
 CASES = [
     *(case(f"{name} on a line", line, (*SIZES, InterfaceError, FileFormatError), *words)
       for name, (line, *words) in LINES.items()),

@@ -6,19 +6,10 @@ from scipy.sparse import identity
 import rom
 from generated.case import case, edit, write
 from generated.stock import MATRICES, STEEL, model
-from rom.errors import (
-    ConfigError,
-    FileFormatError,
-    InterfaceError,
-    MaterialError,
-    ModelError,
-    ParameterError,
-    QualityGateError,
-    UnsafeFileError,
-)
+from rom.errors import ConfigError, FileFormatError, InterfaceError, MaterialError, ModelError
 from rom.io.sid.dialect import read_sid
 
-READ = (FileFormatError, QualityGateError, UnsafeFileError, ModelError)
+READ = (FileFormatError, rom.QualityGateError, rom.UnsafeFileError, ModelError)
 BODY, STATE, FAMILY, SID = "good.npz", "good.state.npz", "family.npz", "good.SID_FEM"
 READERS = {  # a file, and how it is read
     BODY: rom.load, STATE: rom.load_state, FAMILY: rom.load, SID: read_sid,
@@ -82,7 +73,7 @@ LINES = {  # command lines of which one thing is wrong
     "an unknown material": ("swing box.msh --hinge root --material wood -o out", "wood"),
     "an unknown shell": ("completion cmd", "cmd"),
 }
-ANY = (ConfigError, ModelError, InterfaceError, FileFormatError, MaterialError, ParameterError)
+ANY = (ConfigError, ModelError, InterfaceError, FileFormatError, MaterialError, rom.ParameterError)
 BYTES = {  # whole documents
     "empty": (b"", "bodies"),
     "UTF-16": ("name = 'a'".encode("utf-16"), "pendulum.toml"),
@@ -104,7 +95,7 @@ def craig_bampton(folder):
 CASES = [
     *(case(f"a parameter of {value!r}", lambda folder, x=value: rom.load(folder / FAMILY).at(rho=x), ANY,
            "rho") for value in ("five", np.nan, np.inf, [1.0, 2.0], 1j, {})),
-    case("matrices that do not fit", craig_bampton, (*ANY, QualityGateError), "36"),
+    case("matrices that do not fit", craig_bampton, (*ANY, rom.QualityGateError), "36"),
     *(case(f"a mechanism: {name}", "simulate pendulum.toml -o out", ANY, *words,
            given=edit("pendulum.toml", old, new)) for name, (old, new, *words) in MECHANISM.items()),
     *(case(f"a component: {name}", "reduce part.toml -o a.npz", ANY, *words,
@@ -112,9 +103,9 @@ CASES = [
     *(case(f"a line: {name}", line, CONFIG, *words, fe="solver" in name)
       for name, (line, *words) in LINES.items()),
     *(case(f"a document: {name}", "simulate pendulum.toml -o out",
-           (ConfigError, FileFormatError, UnsafeFileError), *words, given=write("pendulum.toml", data))
+           (ConfigError, FileFormatError, rom.UnsafeFileError), *words, given=write("pendulum.toml", data))
       for name, (data, *words) in BYTES.items()),
-    case("a warning with --strict", f"modes box.msh --strict -n 7 {STEEL} --degree 1", QualityGateError,
+    case("a warning with --strict", f"modes box.msh --strict -n 7 {STEEL} --degree 1", rom.QualityGateError,
          "linear tetrahedra", fe=True),
     *(case(f"{a} read as {b}", lambda folder, a=a, b=b: READERS[b](folder / a), (*READ, ConfigError), a)
       for a in READERS for b in READERS if READERS[a] is not READERS[b]),
