@@ -10,6 +10,7 @@ from scipy.linalg import eigh
 import rom
 from cases.halves import COUPLED, FULL, ROOT, half, joined, study
 from cases.long import few
+from cases.refusals import refuses
 from cases.solid import block
 from rom.errors import ConfigError, InterfaceError
 
@@ -137,14 +138,11 @@ def test_messages_for_functions_that_cannot_be(assembly):
         assembly.reduced(28, fixed=(ROOT,))
     with pytest.raises(ConfigError, match=r"n_interface = 28 must be .* from 1 to 27"):
         assembly.reduced(28, level="local")
-    with pytest.raises(ConfigError, match="nothing is coupled"):
-        rom.Assembly(assembly.bodies, ()).reduced(6)
+    refuses(ConfigError, "nothing is coupled", rom.Assembly(assembly.bodies, ()).reduced, 6)
     twice = rom.Assembly(assembly.bodies, (*COUPLED, *COUPLED))
-    with pytest.raises(ConfigError, match=r"\('left', 'tip'\) is coupled 2 times"):
-        twice.reduced(6, level="local")
+    refuses(ConfigError, r"\('left', 'tip'\) is coupled 2 times", twice.reduced, 6, level="local")
     assert_allclose(twice.reduced(9).frequencies(9), assembly.reduced(9).frequencies(9), atol=1e-6)
-    with pytest.raises(InterfaceError, match="no interface 'side'"):
-        assembly.reduced(6, fixed=(("left", "side"),))
+    refuses(InterfaceError, "no interface 'side'", assembly.reduced, 6, fixed=(("left", "side"),))
 
 
 # The two blocks of `study`: n asked for, functions found, largest error of ten frequencies.

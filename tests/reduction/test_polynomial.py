@@ -10,7 +10,7 @@ from scipy.sparse import diags
 import rom
 from benchmarks.models import bar
 from cases.measures import TURN, surface
-from cases.refusals import refused
+from cases.refusals import refused, refuses
 from cases.solid import block
 from rom.eigen.scipy import HeldSciPy
 from rom.eigen.verbs import constraint_modes, quadratic, rigid_motions
@@ -193,10 +193,8 @@ test_messages_for_wrong_kinds = refused(
 
 
 def test_messages_for_surfaces_that_cannot_carry_the_functions():
-    with pytest.raises(InterfaceError, match=r"'line' lie on a line"):
-        tie(surface("line"), "polynomial:2")
-    with pytest.raises(InterfaceError, match="'sphere' has no axis"):
-        tie(even_sphere(), "fourier:2,2")
+    refuses(InterfaceError, r"'line' lie on a line", tie, surface("line"), "polynomial:2")
+    refuses(InterfaceError, "'sphere' has no axis", tie, even_sphere(), "fourier:2,2")
 
 
 def even_sphere():

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import rom
-from cases.refusals import refused
+from cases.refusals import refused, refuses
 from cases.solid import block
 from rom.errors import ConfigError
 from rom.reduction.bases.method import judged_in
@@ -168,5 +168,4 @@ def test_an_open_order_needs_an_accuracy():
     for method in (rom.CraigBampton(5), rom.CraigBampton(f_max=1e3), rom.Rubin(5)):
         with pytest.raises(ConfigError, match="states no accuracy"):
             rom.reduce(model, method=method, interfaces=kinds)
-    with pytest.raises(ConfigError, match="is open"):
-        rom.modes(model, 8, interfaces=kinds)
+    refuses(ConfigError, "is open", rom.modes, model, 8, interfaces=kinds)

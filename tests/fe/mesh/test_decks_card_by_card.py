@@ -12,6 +12,7 @@ from numpy.testing import assert_allclose
 import rom
 from cases.files.random_decks import CARDS, KEYWORDS, SIZE, random_deck
 from cases.long import few
+from cases.refusals import refuses
 from rom.decks.bulk import cards
 from rom.errors import FileFormatError, RomError
 from rom.fe.mesh.read import read_mesh
@@ -181,8 +182,7 @@ def test_what_is_wrong_with_a_card_is_named(case, tmp_path):
     front, old, new, message = FAULTS[case]
     assert old in CUBE
     (tmp_path / "deck.bdf").write_text(front + CUBE.replace(old, new))
-    with pytest.raises(RomError, match=message):
-        nastran.read(str(tmp_path / "deck.bdf"))
+    refuses(RomError, message, nastran.read, str(tmp_path / "deck.bdf"))
 
 
 PART = "*PART, NAME=a\n" + RING.partition("*NODE\n")[0] + "*END PART\n"
@@ -212,8 +212,7 @@ PARTS = {
 def test_what_is_wrong_with_a_keyword_is_named(case, tmp_path):
     text, message = PARTS[case]
     (tmp_path / "ring.inp").write_text(text)
-    with pytest.raises(RomError, match=message):
-        abaqus.read(str(tmp_path / "ring.inp"))
+    refuses(RomError, message, abaqus.read, str(tmp_path / "ring.inp"))
 
 
 TURNED = CUBE.replace("GRID,2,,1.,0.,0.", "GRID,2,,1.,0.,0.,6")
@@ -225,8 +224,7 @@ ROWS = [("a.bdf", TURNED, "nodes 2 move along axes"), ("a.inp", RING + TRANSFORM
 @pytest.mark.parametrize(("name", "text", "message"), ROWS)
 def test_nodes_of_matrices_whose_rows_are_turned_are_refused(name, text, message, tmp_path):
     (tmp_path / name).write_text(text)
-    with pytest.raises(FileFormatError, match=message):
-        read_nodes(tmp_path / name)
+    refuses(FileFormatError, message, read_nodes, tmp_path / name)
 
 
 def test_loads_and_supports_are_left_aside_and_told(tmp_path):
