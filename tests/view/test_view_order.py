@@ -77,7 +77,7 @@ FILMS = {
 DRAWN_BY_A_CHILD = "faces instants mesh mode_shapes start updating wheel_modes".split()
 WRITERS = ("io/programs", "io/matrices", "io/sid", "io/fields", "io/native.py", "io/bodies.py",
            "io/export.py", "io/history.py", "io/fmu/body.py", "fmu/export.py", "report/html.py",
-           "mbs/results/checkpoint.py", "view/scenes")  # fmt: skip
+           "mbs/results/state.py", "view/scenes")  # fmt: skip
 
 
 def parameters(name):
