@@ -236,10 +236,14 @@ def _read(source: Path) -> tuple[bytes, tuple[Path, ...]]:
     text = source.read_bytes()
     paths, built_in = set(), set()
     for module, names in IMPORTS.findall(text):
-        place, words = PACKAGE.joinpath(*module.decode().split(".")[1:]), re.findall(rb"\w+", names)
-        paths |= {place / f"{word.decode()}.py" for word in words} | {place.with_suffix(".py")}
-        if any(word.isupper() for word in words):
-            built_in.add(place.with_suffix(".py"))
+        place = PACKAGE.joinpath(*module.decode().split(".")[1:])
+        for word, alias in re.findall(rb"(\w+)(?: as (\w+))?", names):
+            path = place / f"{word.decode()}.py"
+            paths |= {path, place.with_suffix(".py")}
+            if word.isupper():
+                built_in.add(place.with_suffix(".py"))
+            if re.search(rb"\b%s\.[A-Z][A-Z\d_]*\b" % (alias or word), text):
+                built_in.add(path)
     found = (path for path in paths if path.is_file() and (path in built_in or _has_kernels(path)))
     return text, tuple(sorted(found))
 

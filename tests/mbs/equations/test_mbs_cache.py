@@ -32,12 +32,13 @@ if __name__ == "__main__":
 INNER = """
 from rom.mbs.kernels.compiled import inner
 from rom.toy.plain import UNITS
+from rom.toy import scales as of, words
 from rom.toy.words import told
 SIZE = {size}
 
 @inner
 def inside(x):
-    return x + {added} * UNITS
+    return (x + {added} * UNITS) * of.SCALE_1
 """
 
 
@@ -66,8 +67,9 @@ def test_no_kernel_runs_that_was_made_of_other_sources(where, tmp_path):
     env |= place_for_code(where, tmp_path, toy)
     kept = "0" if where == "nowhere" else "1"
 
-    def answer(size, added, more="", units=1, told=1):
+    def answer(size, added, more="", units=1, told=1, scale=1):
         (toy / "plain.py").write_text(f"UNITS = {units}")
+        (toy / "scales.py").write_text(f"SCALE_1 = {scale}")
         (toy / "words.py").write_text(f"told = {told}")
         (toy / "inner.py").write_text(INNER.format(size=size, added=added))
         (toy / "outer.py").write_text(OUTER.format(more=more))
@@ -77,6 +79,7 @@ def test_no_kernel_runs_that_was_made_of_other_sources(where, tmp_path):
     assert answer(2, 1) == ["4.0", "0"]
     assert answer(2, 1) == ["4.0", kept]
     assert answer(2, 1, told=5) == ["4.0", kept]
+    assert answer(2, 1, scale=3) == ["12.0", "0"]
     assert answer(2, 1, units=5) == ["12.0", "0"]
     assert answer(3, 1) == ["6.0", "0"]
     assert answer(3, 2) == ["9.0", "0"]

@@ -1,7 +1,5 @@
 """Gear meshes between bodies: forces of the plane model, kinematics, energy, loss of contact."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -13,12 +11,9 @@ from cases.mbs.mechanisms import prepared, random_body, residual_at, tangents_at
 from cases.mbs.tangents import by_position, by_velocity, energy_gradient, forces_at, shifted
 from rom import rotation
 from rom.components.gear_mesh import Correction, GearPair, Mesh, stiffness_table
-from rom.components.gear_mesh.gears import table, teeth
 from rom.components.gear_mesh.gears.meshes import GEAR_MESHES_FAMILY
 from rom.components.gear_mesh.gears.table import PHASE
-from rom.components.journal_bearing.films import cells, journals
 from rom.errors import ConfigError, ModelError, SolverError
-from rom.mbs.compiler import cache
 
 ORIGIN, Z = (0, 0, 0), (0, 0, 1)
 SPUR = GearPair((26, 40), 4e-3, 0.03, thinning=5e-5)
@@ -588,10 +583,3 @@ def test_what_falls_beside_gears_is_called_unstable():
         mech.rotational_spring(f"spring of {name}", f"{name} axle", stiffness=10.0)
     with pytest.warns(rom.RomWarning, match="the equilibrium is unstable: body 'rod'"):
         rom.equilibrium(mech)
-
-
-@pytest.mark.parametrize(("kernels", "columns"), [(teeth, table), (journals, cells)])
-def test_kernels_are_compiled_again_when_the_columns_they_name_change(kernels, columns):
-    found = set()
-    cache._collect(Path(kernels.__file__), found)
-    assert Path(columns.__file__) in found
