@@ -163,7 +163,6 @@ def test_energy_balances_under_a_load_in_time():
 def test_messages():
     body, _, _ = covered_body(np.random.default_rng(5))
     mech = rom.Mechanism()
-    part = mech.add_flexible("one", body)
     load = rom.mass_load(body, (0, 0, 1.0))
     inside_out = replace(body, surface=replace(body.surface, triangles=TETRAHEDRON[:3]))
     box = mech.add_rigid("box", mass=1.0, inertia=(1, 1, 1), at=(0, 0, 0))
@@ -179,7 +178,5 @@ def test_messages():
     ):  # fmt: skip
         with pytest.raises(error, match=words):
             rom.surface_load(on, **given)
-    with pytest.raises(ConfigError, match="'pull': frame = 'marker'"):
-        mech.spread_load("pull", part, load, frame="marker")
     with pytest.raises(ConfigError, match="is not one of body 'box'"):
         mech.spread_load("pull", box, load)

@@ -5,13 +5,13 @@ import pytest
 from numpy.testing import assert_allclose
 
 import rom
+from cases.mbs.geared import ORIGIN, Z, free_wheels
 from cases.mbs.mechanisms import prepared
 from cases.mbs.tangents import assert_forces_are_the_gradient, by_position, by_velocity, shifted
 from rom.components.gear_mesh import Correction, GearPair, Hertz
 from rom.components.gear_mesh.gears.meshes import GEAR_MESHES_FAMILY
 from rom.components.journal_bearing.films.bearing import Groove, JournalBearing
 
-ORIGIN, Z = (0, 0, 0), (0, 0, 1)
 K = 1.3e10
 PAIRS = {
     "spur": GearPair((26, 40), 4e-3, 0.03, thinning=5e-5),
@@ -50,12 +50,8 @@ CASES = [("spur", "plain"), ("spur", "relieved"), ("spur", "measured"), ("helica
 
 def wheels(kind, options, **more):
     """Two free wheels in mesh."""
-    pair, mech = PAIRS[kind], rom.Mechanism(gravity=(0, 0, 0))
-    ends = [mech.add_rigid(name, mass=1.0, inertia=(1e-3, 1e-3, 2e-3), at=(x, 0, 0)).marker(ORIGIN)
-            for name, x in (("pinion", 0.0), ("gear", pair.distance))]  # fmt: skip
     given = {"stiffness": TABLE, "entry": 0.1, "cells": 7} | OPTIONS[options] | more
-    mech.gear_mesh("mesh", *ends, axis=Z, pair=pair, **given)
-    return mech
+    return free_wheels(PAIRS[kind], **given)
 
 
 def placed(packed, pair, back, seed, tilts=3e-4):
@@ -113,17 +109,6 @@ def test_tangents_without_tilts_know_how_forces_turn(kind, more):
     assert error[np.ix_([3, 4], [0, 1, 6, 7])].max() < limit
 
 
-def thrown(kind, spin=(0.5, 0.0), t_end=6e-4, **more):
-    """Free wheels that hit each other, part and hit again; their motion."""
-    pair, mech, ends = PAIRS[kind], rom.Mechanism(gravity=(0, 0, 0)), []
-    for name, x, w in zip(("pinion", "gear"), (0.0, pair.distance), spin, strict=True):
-        part = mech.add_rigid(name, mass=1.0, inertia=(2e-3, 2e-3, 3e-3), at=(x, 0, 0),
-                              omega=(0, 0, w))  # fmt: skip
-        ends.append(part.marker(ORIGIN))
-    mech.gear_mesh("mesh", *ends, axis=Z, pair=pair, stiffness=TABLE, cells=7, **more)
-    return rom.simulate(mech, t_end=t_end, method="dop853", rtol=1e-10, dt=2e-6, progress=False)
-
-
 @pytest.mark.parametrize("kind", PAIRS)
 @pytest.mark.parametrize("losses", [{}, LOSSES], ids=["elastic", "lossy"])
 def test_wheels_that_hit_and_part_keep_energy_and_momentum(kind, losses):
@@ -132,7 +117,9 @@ def test_wheels_that_hit_and_part_keep_energy_and_momentum(kind, losses):
     flanks = Correction((15e-6, 10e-6), (4e-3, 3e-3), 2.0, 4e-6, 5e-6, pitch,
                         run_out=((2e-6, 0.4), (0.0, 0.0)))  # fmt: skip
     spin = 40.0, -40.0 * PAIRS[kind].rb[0] / PAIRS[kind].rb[1] + 2.0
-    sol = thrown(kind, spin, correction=flanks, phase=0.1, **losses)
+    given = {"inertia": (2e-3, 2e-3, 3e-3), "spin": spin, "stiffness": TABLE, "cells": 7}
+    mech = free_wheels(PAIRS[kind], correction=flanks, phase=0.1, **given, **losses)
+    sol = rom.simulate(mech, t_end=6e-4, dt=2e-6, method="dop853", rtol=1e-10, progress=False)
     force = np.linalg.norm(sol.element("mesh").force[:, 0], axis=1)
     assert force.max() > 300
     assert (force == 0).any()
@@ -140,6 +127,8 @@ def test_wheels_that_hit_and_part_keep_energy_and_momentum(kind, losses):
     assert np.abs(sol.energy.balance).max() < 1e-6 * strain
     for of_all in sol.momentum:  # [N s, N m s]; a blow passes 1e-3 from one wheel to the other
         assert np.ptp(of_all, axis=0).max() < 1e-13
+    if losses:
+        assert (np.diff(sol.energy.damping) > -1e-12).all() and sol.energy.damping[-1] > 1e-6
     report = rom.audit(sol)
     assert report.ok, report
 

@@ -9,14 +9,14 @@ from numpy.testing import assert_allclose
 import rom
 from cases.gear_unit import PlaneMesh
 from cases.long import few
+from cases.mbs.geared import ORIGIN, Z, free_wheels
 from cases.mbs.mechanisms import prepared, residual_at
 from cases.mbs.tangents import assert_forces_are_the_gradient, by_position, by_velocity, shifted
 from rom.components.gear_mesh import Correction, GearPair, Hertz, Mesh, RackPair, stiffness_table
 from rom.components.gear_mesh.gears.meshes import GEAR_MESHES_FAMILY
-from rom.config.mechanism import read_mechanism
 from rom.errors import ConfigError, ModelError
 
-ORIGIN, X, Y, Z, K = (0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), 1.3e10
+Y, K = (0, 1, 0), 1.3e10
 LOSSES = {"damping": 1e-6, "friction": 0.1, "transition_speed": 0.1}
 SPUR = RackPair(26, 4e-3, 0.03, thinning=5e-5)
 HELICAL = RackPair(26, 4e-3, 0.04, helix=0.35, shift=0.1, thinning=5e-5)
@@ -24,13 +24,8 @@ HELICAL = RackPair(26, 4e-3, 0.04, helix=0.35, shift=0.1, thinning=5e-5)
 
 def free(pair, **more):
     """A free pinion and a free rack."""
-    mech, ends = rom.Mechanism(gravity=(0, 0, 0)), []
-    for name, x in (("pinion", 0.0), ("rack", pair.distance)):
-        part = mech.add_rigid(name, mass=1.0, inertia=(1e-3, 1e-3, 2e-3), at=(x, 0, 0))
-        ends.append(part.marker(ORIGIN))
-    mech.gear_mesh("mesh", *ends, axis=Z, pair=pair, stiffness=K * np.array([0.6, 1.1, 0.7]),
-                   entry=0.1, cells=7, **more)  # fmt: skip
-    return mech
+    given = {"stiffness": K * np.array([0.6, 1.1, 0.7]), "entry": 0.1, "cells": 7}
+    return free_wheels(pair, **given | more)
 
 
 def pressed(packed, W, delta):
@@ -129,12 +124,16 @@ def test_a_rack_is_a_gear_without_end():
     assert W.wrench[mesh.j[0], 0] == pytest.approx(wanted.forces(q, 0.3).force[6], rel=1e-3)
 
 
-def guided(pair, **more):
-    """A pinion on an axle and a rack in a guide along y."""
+def guided(pair, spin=0.0, **more):
+    """A pinion on an axle, or held where it spins in its frame, and a rack in a guide along y."""
     mech = rom.Mechanism(gravity=(0, 0, 0))
-    pinion = mech.add_rigid("pinion", mass=1.0, inertia=(2e-3,) * 3, at=ORIGIN)
+    pinion = mech.add_rigid("pinion", mass=1.0, inertia=(2e-3,) * 3, at=ORIGIN, spin=(0, 0, spin))
     rack = mech.add_rigid("rack", mass=2.0, inertia=(2e-3,) * 3, at=(pair.distance, 0, 0))
-    mech.revolute("axle", mech.ground.marker(ORIGIN), pinion.marker(ORIGIN), axis=Z)
+    rack.velocity[1] = spin * pair.r[0]
+    if spin:
+        mech.fixed("seat", mech.ground.marker(ORIGIN), pinion.marker(ORIGIN))
+    else:
+        mech.revolute("axle", mech.ground.marker(ORIGIN), pinion.marker(ORIGIN), axis=Z)
     mech.prismatic("guide", mech.ground.marker((pair.distance, 0, 0)), rack.marker(ORIGIN), axis=Y)
     mech.gear_mesh("mesh", pinion.marker(ORIGIN), rack.marker(ORIGIN), axis=Z, pair=pair,
                    stiffness=K, **more)  # fmt: skip
@@ -181,13 +180,9 @@ def test_a_torque_rests_on_the_rack_along_the_normal_of_its_teeth(helix, torque)
     ("pair", "losses"), few(2, [(SPUR, {}), (HELICAL, LOSSES), (SPUR, LOSSES), (HELICAL, {})])
 )
 def test_a_pinion_and_a_rack_that_hit_and_part_keep_energy_and_momentum(pair, losses):
-    mech, ends = rom.Mechanism(gravity=(0, 0, 0)), []
-    for name, x, v, w in (("pinion", 0.0, 0.0, 40.0), ("rack", pair.distance, 1.9, 0.0)):
-        part = mech.add_rigid(name, mass=1.0, inertia=(2e-3, 2e-3, 3e-3), at=(x, 0, 0),
-                              velocity=(0, v, 0), omega=(0, 0, w))  # fmt: skip
-        ends.append(part.marker(ORIGIN))
-    mech.gear_mesh("mesh", *ends, axis=Z, pair=pair, stiffness=K * np.array([0.6, 1.1, 0.7]),
-                   cells=7, phase=0.1, correction=FLANKS, **losses)  # fmt: skip
+    given = {"inertia": (2e-3, 2e-3, 3e-3), "spin": (40.0, 0.0), "entry": 0.02, "phase": 0.1}
+    mech = free(pair, correction=FLANKS, **given, **losses)
+    mech.parts["gear"].velocity[1] = 1.9
     exact = {"method": "dop853", "rtol": 1e-12, "atol": 1e-14}  # for loads that set in and part
     sol = rom.simulate(mech, t_end=6e-4, dt=2e-6, progress=False, **exact)
     force = np.linalg.norm(sol.element("mesh").force[:, 0], axis=1)
@@ -202,14 +197,8 @@ def test_a_pinion_and_a_rack_that_hit_and_part_keep_energy_and_momentum(pair, lo
 
 def test_a_pinion_that_spins_in_its_frame_drives_its_rack():
     """Its frame stands still; the rack follows its material, and what spins it does the work."""
-    mech, r, speed = rom.Mechanism(gravity=(0, 0, 0)), SPUR.r[0], 30.0
-    pinion = mech.add_rigid("pinion", mass=1.0, inertia=(2e-3,) * 3, at=ORIGIN, spin=(0, 0, speed))
-    rack = mech.add_rigid("rack", mass=2.0, inertia=(2e-3,) * 3, at=(SPUR.distance, 0, 0),
-                          velocity=(0, speed * r, 0))  # fmt: skip
-    mech.fixed("seat", mech.ground.marker(ORIGIN), pinion.marker(ORIGIN))
-    mech.prismatic("guide", mech.ground.marker((SPUR.distance, 0, 0)), rack.marker(ORIGIN), axis=Y)
-    mech.gear_mesh("mesh", pinion.marker(ORIGIN), rack.marker(ORIGIN), axis=Z, pair=SPUR,
-                   stiffness=K, entry=0.2)  # fmt: skip
+    r, speed = SPUR.r[0], 30.0
+    mech = guided(SPUR, speed, entry=0.2)
     mech.motor("brake", "guide", lambda t, x, v: -500.0 - 1000.0 * (v - speed * r))
     sol = rom.simulate(mech, t_end=0.1, dt=2e-5, progress=False, save_every=5)
     assert sol.joint("guide").displacement[-1] == pytest.approx(speed * r * 0.1, abs=2e-5)
@@ -223,23 +212,3 @@ def test_what_a_rack_does_not_have_is_refused():
         Mesh(SPUR, K)
     with pytest.raises(ModelError, match="racks and internal teeth are not known"):
         stiffness_table(SPUR, force=1e5)
-
-
-def test_files_give_a_rack_no_teeth(tmp_path):
-    (tmp_path / "m.toml").write_text("""
-[simulation]
-t_end = 1e-3
-dt = 1e-4
-[bodies.a]
-mass = 1
-inertia = [1, 1, 1]
-at = [0, 0, 0]
-markers = { p = [0, 0, 0] }
-[gear_meshes.m]
-between = ["a.p", { ground = ["52.4 mm", 0, 0] }]
-axis = [0, 0, 1]
-stiffness = "13 GPa"
-pair = { teeth = [26, 0], module = "4 mm", width = "3 cm", shift = [0.1, 0] }
-""")
-    mesh = read_mechanism(tmp_path / "m.toml").mechanism().gear_meshes["m"]
-    assert mesh.pair == RackPair(26, 4e-3, 0.03, shift=0.1)

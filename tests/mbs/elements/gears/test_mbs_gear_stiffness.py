@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 import rom
+from cases.mbs.parts import on_axle
 from rom.components.gear_mesh import GearPair, bending_table, stiffness_table
 
-ORIGIN, Z = (0, 0, 0), (0, 0, 1)
+Z = (0, 0, 1)
 LOAD = 3e5  # along the line of action, over the face [N/m]
 
 
@@ -16,13 +17,12 @@ def stiffness(pair, phase, law):
     The gear is held, the pinion turns on its axle under a torque.
     """
     mech = rom.Mechanism(gravity=(0, 0, 0))
-    pinion = mech.add_rigid("pinion", mass=1.0, inertia=(1e-3,) * 3, at=ORIGIN)
-    mech.revolute("axle", mech.ground.marker(ORIGIN), pinion.marker(ORIGIN), axis=Z)
-    ends = pinion.marker(ORIGIN), mech.ground.marker((pair.distance, 0, 0))
+    pinion = on_axle(mech, "pinion", inertia=(1e-3,) * 3)
+    ends = pinion, mech.ground.marker((pair.distance, 0, 0))
     mech.gear_mesh("mesh", *ends, axis=Z, pair=pair, phase=phase, entry=0.0, conservative=False,
                    **law)  # fmt: skip
     force = LOAD * pair.width
-    mech.torque("load", pinion.marker(ORIGIN), (0, 0, force * pair.rb[0]))
+    mech.torque("load", pinion, (0, 0, force * pair.rb[0]))
     state = rom.equilibrium(mech)
     approach = pair.rb[0] * rom.mbs.snapshot(mech, state).joint("axle").angle[0]
     return force / approach / pair.width

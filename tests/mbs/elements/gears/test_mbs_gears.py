@@ -7,7 +7,9 @@ from scipy.optimize import root
 
 import rom
 from cases.gear_unit import PlaneMesh
+from cases.mbs.geared import ORIGIN, Z, free_wheels
 from cases.mbs.mechanisms import prepared, random_body, residual_at, tangents_at
+from cases.mbs.parts import on_axle
 from cases.mbs.tangents import by_position, by_velocity, energy_gradient, forces_at, shifted
 from rom import rotation
 from rom.components.gear_mesh import Correction, GearPair, Mesh, stiffness_table
@@ -15,7 +17,6 @@ from rom.components.gear_mesh.gears.meshes import GEAR_MESHES_FAMILY
 from rom.components.gear_mesh.gears.table import PHASE
 from rom.errors import ConfigError, ModelError, SolverError
 
-ORIGIN, Z = (0, 0, 0), (0, 0, 1)
 SPUR = GearPair((26, 40), 4e-3, 0.03, thinning=5e-5)
 HELICAL = GearPair((26, 40), 4e-3, 0.05, helix=0.35, thinning=5e-5)
 FLANKS = Correction(relief=(15e-6, 10e-6), extent=(2e-3, 3e-3), power=1.5, crowning=4e-6,
@@ -25,16 +26,7 @@ LAW = {"stiffness": K, "entry": 0.0, "conservative": False}
 
 
 def wheels(pair=SPUR, turned=None, **more):
-    """Two free wheels in mesh, the whole placed anywhere."""
-    A = np.eye(3) if turned is None else rotation.matrix(turned)
-    mech = rom.Mechanism(gravity=(0, 0, 0))
-    ends = [
-        mech.add_rigid(name, mass=1.0, inertia=(1e-3, 1e-3, 2e-3), at=A @ (x, 0, 0),
-                       orientation=turned).marker(ORIGIN)
-        for name, x in (("pinion", 0.0), ("gear", pair.distance))
-    ]  # fmt: skip
-    mech.gear_mesh("mesh", *ends, axis=A @ Z, pair=pair, **LAW | more)
-    return mech
+    return free_wheels(pair, turned=turned, **LAW | more)
 
 
 def moved(packed, q):
@@ -99,8 +91,7 @@ def test_forces_of_helical_teeth_are_those_of_the_textbook(helix, turn):
     """
     pair = GearPair((26, 40), 4e-3, 0.05, helix=helix, thinning=5e-5)
     packed, W = prepared(wheels(pair, phase=0.4))
-    q = np.zeros(12)
-    q[5] = turn
+    q = turn * np.eye(12)[5]
     found = wrench(packed, W, moved(packed, q), np.zeros(12))
     r1, r2 = (z * 4e-3 / (2 * np.cos(helix)) for z in (26, 40))
     along = found[5] / r1
@@ -159,11 +150,10 @@ def test_tangents_are_derivatives_but_for_the_turning_of_forces(damping):
 def geared(pair=SPUR, inertia=(2e-3, 9e-3), **more):
     """Two wheels on fixed axles, in mesh."""
     mech = rom.Mechanism(gravity=(0, 0, 0))
-    ends = []
-    for name, x, J in zip(("pinion", "gear"), (0.0, pair.distance), inertia, strict=True):
-        part = mech.add_rigid(name, mass=1.0, inertia=(J, J, J), at=(x, 0, 0))
-        mech.revolute(f"{name} axle", mech.ground.marker((x, 0, 0)), part.marker(ORIGIN), axis=Z)
-        ends.append(part.marker(ORIGIN))
+    ends = [
+        on_axle(mech, name, inertia=(J, J, J), axle=f"{name} axle", at=(x, 0, 0))
+        for name, x, J in zip(("pinion", "gear"), (0.0, pair.distance), inertia, strict=True)
+    ]
     mech.gear_mesh("mesh", *ends, axis=Z, pair=pair, **LAW | more)
     return mech
 
@@ -189,9 +179,7 @@ def test_the_mesh_vibrates_as_a_spring_along_the_line_of_action():
 def state_motion(mech, state):
     """(12,) turns of both wheels."""
     angle = [rom.snapshot(mech, state).joint(f"{n} axle").angle[0] for n in ("pinion", "gear")]
-    q = np.zeros(12)
-    q[[5, 11]] = angle
-    return q
+    return np.eye(12)[[5, 11]].T @ angle
 
 
 def test_many_turns_keep_the_ratio_of_the_teeth_and_the_torque():
@@ -226,16 +214,6 @@ def test_teeth_that_lose_contact_hit_the_other_flank_and_keep_the_energy():
     assert_allclose(found, closing, rtol=1e-3)
 
 
-def test_free_wheels_keep_their_momentum_and_lose_what_slides():
-    mech = wheels(SPUR, friction=0.1, transition_speed=1e-2, damping=1e-5, phase=0.12)
-    mech.parts["pinion"].omega[:] = 0.0, 0.0, 0.3
-    sol = rom.simulate(mech, t_end=0.005, dt=1e-6, method="dop853", rtol=1e-10, progress=False)
-    for kind in sol.momentum:
-        assert np.ptp(kind, axis=0).max() < 1e-9
-    assert (np.diff(sol.energy.damping) > -1e-12).all() and sol.energy.damping[-1] > 1e-6
-    assert np.abs(sol.energy.balance).max() < 1e-6 * sol.energy.total[0]
-
-
 @pytest.mark.parametrize("turn", [1e-3, -3e-3])
 @pytest.mark.parametrize("away", [0.0, 2e-4, -5e-5])
 def test_how_deep_rigid_flanks_are_in_each_other(turn, away):
@@ -265,7 +243,6 @@ def test_wheels_pressed_into_each_other_are_named():
 @pytest.mark.parametrize(("more", "message"), [
     ({"axis": (0, 0, 0)}, "axis of mesh has length zero"),
     ({"stiffness": []}, "stiffness of the teeth of 'mesh'"),
-    ({"cells": 0}, "'mesh': cells = 0"),
     ({"correction": Correction(pitch=((0.0, 1.0), ()))}, "pitch errors of 'mesh' has shape"),
 ])  # fmt: skip
 def test_what_is_no_mesh_is_refused(more, message):
