@@ -10,7 +10,7 @@ from scipy.sparse import identity
 import rom
 from cases.halves import COUPLED, ROOT, half, halves, joined, study, whole
 from cases.measures import surface
-from cases.solid import block
+from cases.solid import block, reduced
 from rom.assembly import coupling
 from rom.body.records import Marker, Patch
 from rom.eigen.verbs import rigid_motions
@@ -38,8 +38,7 @@ def bare(interface):
 
 def right_half(model, kind, n_modes=10):
     """The body of a model of the right half, in place of the one of `half`."""
-    ends = {"root": kind, "tip": "rbe2"}
-    return rom.reduce(model, method=rom.CraigBampton(n_modes), interfaces=ends, certify=False)
+    return reduced(n_modes, model, interfaces={"root": kind, "tip": "rbe2"})
 
 
 @pytest.mark.parametrize("kind", ["full", "polynomial:2"])

@@ -11,7 +11,7 @@ import rom
 from cases.beam import elastica
 from cases.long import COARSE
 from cases.paths import RANKS
-from cases.ranks.environment import on_ranks
+from cases.ranks.environment import written_on_each
 from cases.refusals import refuses
 from rom import rotation
 from rom.assembly.pieces import Tree, together
@@ -335,12 +335,7 @@ def test_a_mechanism_takes_pieces_as_one_body_only(three):
 @pytest.mark.mpi
 @pytest.mark.long
 def test_pieces_are_the_same_on_two_processes(tmp_path):
-    found = []
-    for n in (1, 2):
-        file = tmp_path / f"{n}.npz"
-        done = on_ranks(n, RANKS / "pieces_under_mpi.py", file, timeout=300)
-        assert file.exists(), done.stderr
-        found.append(np.load(file))
-    assert_allclose(found[0]["mass"], 11.775 + 0.5, rtol=1e-12)
+    found = written_on_each((1, 2), tmp_path, RANKS / "pieces_under_mpi.py", timeout=300)
+    assert_allclose(found[1]["mass"], 11.775 + 0.5, rtol=1e-12)
     for name in ("a", "b", "mass"):
-        assert_allclose(found[1][name], found[0][name], rtol=1e-7)
+        assert_allclose(found[2][name], found[1][name], rtol=1e-7)

@@ -6,16 +6,15 @@ import numpy as np
 import pytest
 
 import rom
-from cases.solid import block
+from cases.solid import block, reduced
 from rom.errors import RomWarning
 from rom.model import Report, Row
 
-KINDS = {"root": "rbe2", "tip": "rbe2"}
 FAILS = r"certificate of body 'bar' fails in \d+ of 31 rows; worst is 'free: .*limit <= 0.001"
 
 
 def made(n):
-    return rom.reduce(block(), method=rom.CraigBampton(n), interfaces=KINDS, name="bar")
+    return reduced(n, block(), name="bar", certify=True)
 
 
 @pytest.fixture
@@ -42,8 +41,7 @@ def test_it_is_said_once_however_often_the_body_is_used(poor, tmp_path):
 @pytest.mark.parametrize("use", ["mechanism", "export"])
 def test_whoever_gets_the_body_from_a_file_is_told(use, tmp_path):
     rows = (Row("free: worst error of 6 frequencies", 0.66, "<= 0.001", False),)
-    body = rom.reduce(block(cells=(2, 1, 1)), method=rom.CraigBampton(2), interfaces=KINDS,
-                      certify=False)  # fmt: skip
+    body = reduced(2, block(cells=(2, 1, 1)))
     path = tmp_path / "bar.rom.npz"
     object.__setattr__(body, "certificate", Report(f"of {tmp_path}", rows))
     rom.save(body, path)

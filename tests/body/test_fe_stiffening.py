@@ -12,8 +12,9 @@ from scipy.sparse.linalg import eigsh, spsolve
 import rom
 from cases.beam import gauss_hermite, hermite_beam
 from cases.long import SHARED_BY, few
-from cases.ranks.environment import on_ranks
+from cases.ranks.environment import written_on_each
 from cases.refusals import refuses
+from cases.solid import reduced
 from rom.body.prestress import UnitLoads, _turning, centrifugal
 from rom.body.recovery import CENTRIFUGAL_LOADS
 from rom.body.rotating import rotating_matrices
@@ -62,10 +63,8 @@ def solid(degree=2, nu=0.3, attachments=(), **sizes):
 
 
 def stiffened(model, interfaces=ENDS, reference="root", n_modes=8, stiffening=True):
-    return rom.reduce(
-        model, method=rom.CraigBampton(n_modes), interfaces=interfaces, reference=reference,
-        stiffening=stiffening, certify=False,
-    )  # fmt: skip
+    how = {"interfaces": interfaces, "reference": reference, "stiffening": stiffening}
+    return reduced(n_modes, model, **how)
 
 
 def rotating(body, eta, axis=(0, 0, 1)):
@@ -361,17 +360,12 @@ if model.operators.first == 0:
 @pytest.mark.long
 @pytest.mark.mpi
 def test_the_number_of_processes_does_not_matter(tmp_path):
-    bodies = []
-    for n in (1, *SHARED_BY):
-        path = tmp_path / f"{n}.rom.npz"
-        done = on_ranks(n, "-c", SCRIPT, path)
-        assert path.exists(), done.stderr
-        bodies.append(rom.load(path))
-    one = bodies[0]
+    bodies = written_on_each((1, *SHARED_BY), tmp_path, "-c", SCRIPT, load=rom.load)
+    one = bodies.pop(1)
     assert len(one.K_geo) == 6 + 6 + 6 + one.n_modes
     elastic = elastic_loads(one.n_modes)  # some are round-off: all of one size
     largest = max(np.abs(one.K_geo[load]).max() for load in elastic)
-    for many in bodies[1:]:
+    for many in bodies.values():
         assert set(many.K_geo) == set(one.K_geo)
         for load, A in one.K_geo.items():
             size = largest if load in elastic else np.abs(A).max()

@@ -2,7 +2,7 @@
 
 import tracemalloc
 from dataclasses import replace
-from itertools import combinations_with_replacement, cycle
+from itertools import cycle
 
 import numpy as np
 import pytest
@@ -16,11 +16,11 @@ import rom
 from cases.long import COARSE, SHARED_BY, few
 from cases.mbs.slender import STEEL, TIMBER, Full, assembled, cantilever, reduced, slender, tip_of
 from cases.paths import RANKS
-from cases.ranks.environment import on_ranks
+from cases.ranks.environment import written_on_each
 from cases.refusals import refuses
 from rom.body.nonlinear.full import rows_of
 from rom.body.nonlinear.geometric import ELLIPTIC_STRETCH, Section, foreseen
-from rom.body.nonlinear.quartic import Quartic, entries, n_entries, position
+from rom.body.nonlinear.quartic import Quartic, position
 from rom.body.nonlinear.ranges import Load, nodal_forces
 from rom.body.nonlinear.statics import follow
 from rom.checks.deflection import DISPLACEMENT_RTOL as ALLOWED
@@ -101,16 +101,6 @@ def test_forces_of_second_order_are_those_of_the_cubic_terms():
     numbers = {(0, 1): 1, (2, 2): 5, (1, 2): 4}  # of the pairs (0, 0), (0, 1), ..., (2, 2)
     expected = np.array([6 * T3[numbers[i, j]] for i, j in pairs.tolist()]).T
     assert_allclose(E.T @ F, expected, rtol=1e-10, atol=1e-10 * np.abs(expected).max())
-
-
-@pytest.mark.parametrize("order", [3, 4])
-def test_entries_are_kept_once_in_any_sequence_of_their_indices(order):
-    r = 5
-    kept = entries(r, order)
-    assert len(kept) == n_entries(r, order) == {3: 35, 4: 70}[order]
-    for turn in (slice(None), slice(None, None, -1)):
-        assert_allclose(position(kept[:, turn], r), np.arange(len(kept)))
-    assert kept.tolist() == [list(c) for c in combinations_with_replacement(range(r), order)]
 
 
 def test_energy_force_and_tangent_at_once_are_the_sums_over_all_indices():
@@ -533,12 +523,8 @@ def test_a_cantilever_in_a_mechanism_bends_as_it_does_alone(certified):
 @pytest.mark.mpi
 @pytest.mark.long
 def test_energy_and_body_are_the_same_on_any_number_of_processes(tmp_path):
-    found = {}
-    for n in (1, *SHARED_BY):
-        file = tmp_path / f"{n}.npz"
-        done = on_ranks(n, RANKS / "large_strain_under_mpi.py", file, timeout=300)
-        assert file.exists(), done.stderr
-        found[n] = np.load(file)
+    script = RANKS / "large_strain_under_mpi.py"
+    found = written_on_each((1, *SHARED_BY), tmp_path, script, timeout=300)
     for n in SHARED_BY:
         assert found[1]["errors"].shape == (2, 2, 3)  # displacement and frequencies at three steps
         assert_allclose(found[n]["errors"], found[1]["errors"], rtol=0, atol=1e-8)
@@ -546,3 +532,37 @@ def test_energy_and_body_are_the_same_on_any_number_of_processes(tmp_path):
         for name, rtol in (*exact, ("tip", 1e-9), ("stress", 1e-8)):
             one, other = found[1][name], found[n][name]
             assert_allclose(other, one, rtol=0, atol=rtol * np.abs(one).max(), err_msg=name)
+
+
+@pytest.mark.parametrize(
+    "kind, slenderness, cells, coarse",
+    few(2, [("hexahedron", 100, 20, True), ("tetrahedron", 50, 24, False),
+            ("hexahedron", 100, 30, False), ("tetrahedron", 100, 16, True),
+            ("hexahedron", 50, 12, True), ("hexahedron", 50, 24, False)]),
+)  # fmt: skip
+def test_meshes_follow_the_elastica_or_are_told_to_be_too_coarse(kind, slenderness, cells, coarse):
+    """To 70 degrees by 25 coordinates; what a mesh adds to the energy is what its error comes from.
+
+    A cell that turns by a is strained by a^2 (x^2 / l^2 - 1 / 12) / 2, though a bent line is not.
+    """
+    model, EI = slender(slenderness, cells, kind=kind)
+    body = reduced(model, (0, 5 * EI, 0, 0, 0, 0), n_shapes=15, certify=True)
+    assert body.n_modes <= 25
+    added = next(row for row in body.certificate.rows if "too coarse" in row.quantity)
+    (q,) = body.equilibria({"tip": (0, 5 * EI, 0, 0, 0, 0)})
+    error = np.abs(tip_of(body, q) / ELASTICA[-1, 1:] - 1).max()
+    assert added.ok != coarse
+    assert error < 1e-3 + 3 * added.value
+    assert (error > 5e-3) if coarse else (error < 3e-3)
+
+
+def test_strain_that_cells_cannot_help_is_that_of_a_bent_line():
+    """Of an arc whose middle line keeps its length at the nodes, and whose sections turn."""
+    h, n, k = 0.05, 4, 0.1
+    model = assembled((1.0, h, h), (n, 1, 1), material=rom.Material(E=1.0, nu=0.0, rho=1.0))
+    x, _, z = model.points.T
+    z = z - h / 2
+    U = np.column_stack([np.sin(k * x) / k - x - z * np.sin(k * x), 0 * x,
+                         (1 - np.cos(k * x)) / k - z * (1 - np.cos(k * x))])  # fmt: skip
+    found = model.stresses.large_strain().unresolved(U.reshape(-1, 1))[0]
+    assert_allclose(found, (k / n) ** 4 / 720 / (k * h) ** 2 * 12, rtol=2e-2)

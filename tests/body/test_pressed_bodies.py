@@ -8,6 +8,7 @@ from numpy.testing import assert_allclose
 
 import rom
 from cases.mbs.slender import E_STEEL, assembled, cantilever
+from cases.solid import reduced
 from rom.errors import RomWarning
 
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")
@@ -22,9 +23,7 @@ def bodies():
     """One bar, without and with geometric stiffness."""
     steel = rom.Material(E=E_STEEL, nu=0.0, rho=7850.0)
     model = assembled((L, B, H), (12, 1, 1), material=steel)
-    made = {"method": rom.CraigBampton(n_modes=6), "certify": False, "reference": "root",
-            "interfaces": {"root": "rbe2", "tip": "rbe2"}}  # fmt: skip
-    return {known: rom.reduce(model, stiffening=known, **made) for known in (False, True)}
+    return {known: reduced(6, model, stiffening=known, reference="root") for known in (False, True)}
 
 
 def hinged(body, share):

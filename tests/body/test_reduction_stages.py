@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import rom
-from cases.solid import block
+from cases.solid import block, reduced
 from rom.process.stopwatch import FACTORISATION_PIECE as FACTORS
 from rom.process.stopwatch import FLOPS_NOTE, MISS_NOTE, REST_PIECE, piece, stopwatch
 from rom.report.pages import _stages
@@ -79,11 +79,9 @@ def test_large_deflection_has_stages_of_its_own():
 
 def test_a_body_says_where_its_time_went():
     """Stages in their order; together they are the time it took."""
-    how = {"method": rom.CraigBampton(4), "interfaces": ENDS}
-    bare = rom.reduce(block(), certify=False, **how)
-    assert list(bare.provenance["stages"]) == STAGES[:-1]
+    assert list(reduced(4, block()).provenance["stages"]) == STAGES[:-1]
     start = time.perf_counter()
-    stages = (body := rom.reduce(block(), **how)).provenance["stages"]
+    stages = (body := reduced(4, block(), certify=True)).provenance["stages"]
     taken = time.perf_counter() - start
     assert list(stages) == STAGES
     total = sum(stage["seconds"] for stage in stages.values())
@@ -96,7 +94,7 @@ def test_a_body_says_where_its_time_went():
 
 
 def test_a_body_from_a_file_and_its_report_say_so_too(tmp_path):
-    body = rom.reduce(block(), method=rom.CraigBampton(4), interfaces=ENDS)
+    body = reduced(4, block(), certify=True)
     rom.save(body, tmp_path / "body.rom.npz")
     again = rom.load(tmp_path / "body.rom.npz")
     assert again.provenance["stages"] == body.provenance["stages"]
@@ -113,8 +111,7 @@ def test_pieces_of_a_model_in_petsc_are_counted():
     import rom.fe
 
     model = rom.fe.model("meshes/beam.geo", material=rom.Material(E=210e9, nu=0.3, rho=7850.0))
-    body = rom.reduce(model, method=rom.CraigBampton(6), certify=False,
-                      interfaces=ENDS)  # fmt: skip
+    body = reduced(6, model)
     shapes = body.provenance["stages"]["shapes"]
     assert shapes["number of factorisations"] == shapes["ranks"] == 1
     assert 1e6 < shapes[FLOPS_NOTE] < 1e12 and 0.0 <= shapes[MISS_NOTE] < 1e-9

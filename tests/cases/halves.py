@@ -3,7 +3,7 @@
 import pytest
 
 import rom
-from cases.solid import STEEL, block
+from cases.solid import STEEL, block, reduced
 
 COUPLED = ((("left", "tip"), ("right", "root")),)
 
@@ -18,12 +18,7 @@ def half(side, kind, cells=(4, 2, 2), n_modes=None):
     inner, outer = ("tip", "root") if side == "left" else ("root", "tip")
     if n_modes is None:
         n_modes = model.n_dofs - sum(i.dofs.size for i in model.interfaces.values())
-    return rom.reduce(
-        model,
-        method=rom.CraigBampton(n_modes),
-        interfaces={inner: kind, outer: "rbe2"},
-        certify=False,
-    )
+    return reduced(n_modes, model, interfaces={inner: kind, outer: "rbe2"})
 
 
 def halves(kind, cells=((4, 2, 2), (4, 2, 2)), n_modes=None):
@@ -61,7 +56,5 @@ def study(kind, cells=(10, 4, 2)):
         mesh, tags = box((0.5, 0.2, 0.1), cells if name == "right" else (10, 4, 2), "hexahedron")
         mesh.geometry.x[:, 0] += start
         model = assemble(mesh, None, tags, material=STEEL, degree=2)
-        bodies[name] = rom.reduce(
-            model, method=rom.CraigBampton(30), interfaces=kinds, certify=False
-        )
+        bodies[name] = reduced(30, model, interfaces=kinds)
     return bodies, ((("left", "x1"), ("right", "x0")),)

@@ -43,7 +43,6 @@ LONGEST_FIRST = (
     "fe/test_fe_reduction.py",
     "parametric/test_family_fe.py",
     "fe/mesh/test_mesh_geometries.py",
-    "fe/test_fe_methods_mpi.py",
     "reduction/test_methods_on_components.py",
 )
 

@@ -59,9 +59,8 @@ def block(size=(1.0, 0.1, 0.08), cells=(8, 2, 2), material=STEEL, origin=(0.0, 0
 
 def reduced(n_modes, model, **how):
     """A model between rigid ends "root" and "tip", with modes of the held one, uncertified."""
-    kinds = {"root": "rbe2", "tip": "rbe2"}
-    return rom.reduce(model, method=rom.CraigBampton(n_modes), interfaces=kinds, certify=False,
-                      **how)  # fmt: skip
+    how = {"interfaces": {"root": "rbe2", "tip": "rbe2"}, "certify": False} | how
+    return rom.reduce(model, method=rom.CraigBampton(n_modes), **how)
 
 
 def composite(materials, region, size=(1.0, 0.1, 0.08), cells=(8, 2, 2), origin=(0.0, 0.0, 0.0)):

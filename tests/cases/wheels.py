@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_matrix, identity, kron
 
+from rom.components.wheels.modes import cyclic_modes
 from rom.components.wheels.sector import CyclicSector
 
 MARKS = [  # of modules on wheels of finite elements
@@ -214,3 +215,9 @@ def model_of(mesh, degree=2, material=None):
     regions = {name: tag for tag, name in mesh.region_names.items()}
     return assemble(grid, cell_tags, facet_tags, degree=degree, regions=regions,
                     material=material or rom.Material(E=114e9, nu=0.33, rho=4430.0))  # fmt: skip
+
+
+def gathered(sector, n_modes, **speed):
+    """All frequencies of a wheel [rad/s], ascending, each as often as the wheel has it."""
+    families = [cyclic_modes(sector, n, n_modes, **speed) for n in sector.diameters]
+    return np.sort(np.concatenate([np.repeat(f.omega, f.multiplicity) for f in families]))

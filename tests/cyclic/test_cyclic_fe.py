@@ -5,20 +5,13 @@ import pytest
 from numpy.testing import assert_allclose
 
 import rom
-from cases.refusals import refuses
-from cases.wheels import MARKS, bladed_model, ring_frequency
+from cases.wheels import MARKS, bladed_model, gathered, ring_frequency
 from rom.errors import InterfaceError
 
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")
 pytestmark = MARKS
 N = 6
 SIZES = {"degree": 1, "cells": (4, 2, 2, 2)}
-
-
-def gathered(sector, n_modes):
-    """All frequencies of a wheel, each as often as the wheel has it."""
-    families = [rom.cyclic_modes(sector, n, n_modes) for n in sector.diameters]
-    return np.sort(np.concatenate([np.repeat(f.omega, f.multiplicity) for f in families]))
 
 
 @pytest.fixture(scope="module")
@@ -106,24 +99,6 @@ def test_the_geometry_is_a_sector_with_a_blade(bladed_disk):
     share = np.linspace(0, 1, 2001)[1::2]
     blade = 0.07 * ((0.022 - 0.004 * share) * (0.004 - 0.002 * share)).mean()
     assert_allclose(bladed_disk.mass(), 4430.0 * (disk + blade), rtol=3e-3)
-
-
-@pytest.mark.parametrize(
-    ("geometry", "parameters", "culprit"),
-    [
-        ("bladed_disk", {"N": 7.5}, "whole number of sectors"),
-        ("bladed_disk", {"r_rim": 0.3}, "r_rim = 0.3"),
-        ("bladed_disk", {"chord": 0.05}, "foot of the blade"),
-        ("rotor", {"N": 7.5}, "whole number of sectors"),
-        ("rotor", {"d": 0.3}, "d = 0.3 < d_1 = 0.28"),
-        ("rotor", {"w": 0.5}, "discs of width w = 0.5"),
-    ],
-)
-def test_impossible_wheels_and_rotors_are_named(geometry, parameters, culprit):
-    from rom.errors import ConfigError
-    from rom.fe.mesh.read import read_mesh
-
-    refuses(ConfigError, culprit, read_mesh, f"meshes/{geometry}.geo", parameters=parameters)
 
 
 def test_an_axis_through_the_sector_is_no_axis_of_its_wheel(bladed_disk):

@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose
 from scipy.stats import chi2
 
 from rom.eigen import completeness
-from rom.eigen.completeness import log_chebyshev, miss_probability, unseen_part
+from rom.eigen.completeness import miss_probability, unseen_part
 
 BLOCK = 8
 
@@ -159,9 +159,3 @@ def test_a_narrow_gap_proves_less():
         chances.append(miss_probability(T, R, residual, 1))
     assert chances == sorted(chances)
     assert chances[0] < 1e-3 * chances[1] < 1e-6 * chances[2]
-
-
-def test_chebyshev_is_the_polynomial_of_the_books():
-    x = 1.37
-    assert_allclose(np.exp(log_chebyshev(np.array([0, 1, 2, 3]), x)),
-                    [1.0, x, 2 * x**2 - 1, 4 * x**3 - 3 * x])  # fmt: skip

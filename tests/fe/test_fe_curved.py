@@ -12,7 +12,7 @@ import rom
 from cases.files.cells import second_order, solid
 from cases.long import few
 from cases.paths import RANKS, ROOT
-from cases.ranks.environment import written_on
+from cases.ranks.environment import written_on_each
 from rom import rotation
 from rom.eigen.verbs import rigid_motions
 from rom.errors import MeshError
@@ -355,10 +355,8 @@ def test_straight_second_order_meshes_are_read_as_straight(tmp_path):
 @pytest.mark.long
 def test_curved_models_are_the_same_on_any_number_of_ranks(tmp_path):
     """Mass, frequencies, area and stress of a plate with a bore on one, two and three ranks."""
-    path, found = written(tmp_path, PLATE), {}
-    for n in (1, 2, 3):
-        out = tmp_path / f"{n}.json"
-        found[n] = written_on(n, out, RANKS / "curved_under_mpi.py", path, out, timeout=300)
+    words, more = (RANKS / "curved_under_mpi.py", written(tmp_path, PLATE)), {"ending": "json"}
+    found = written_on_each((1, 2, 3), tmp_path, *words, timeout=300, **more)
     for n in (2, 3):
         assert set(found[n]) == set(found[1])
         for name, values in found[1].items():

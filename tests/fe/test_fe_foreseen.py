@@ -15,6 +15,7 @@ from cases.command import python
 from cases.long import few
 from cases.paths import RANKS, ROOT
 from cases.ranks.environment import ENVIRONMENT
+from cases.solid import reduced
 from rom.errors import ResourceError
 from rom.process.mpirun import mpirun
 from rom.reduction.full_model import operators
@@ -29,7 +30,6 @@ from rom.fe.operators.foreseen import automatic  # noqa: E402
 from rom.fe.operators.solver import DIRECT_SOLVER, parsed  # noqa: E402
 
 STEEL = rom.Material(E=210e9, nu=0.3, rho=7850.0)
-KINDS = {"root": "rbe2", "tip": "rbe2"}
 SHAPES = {  # length, width, height, size of elements [m]
     "plate": (1.0, 1.0, 0.02, 0.05),
     "block": (1.0, 1.0, 1.0, 0.14),
@@ -71,11 +71,8 @@ def taken_and_foreseen(shape, solver):
     direct = solver == "direct"
     solved = foreseen.analysed(K).in_core if direct else foreseen.multigrid_bytes(K)
 
-    def reduction(m):
-        rom.reduce(m, method=rom.CraigBampton(20), interfaces=KINDS, certify=False)
-
-    reduction(bar((1.0, 0.1, 0.1, 0.1), solver))  # what is loaded and compiled once is not foreseen
-    return growth(lambda: reduction(model)), beside + solved
+    reduced(20, bar((1.0, 0.1, 0.1, 0.1), solver))  # compiles what is not foreseen
+    return growth(lambda: reduced(20, model)), beside + solved
 
 
 @pytest.mark.parametrize(
@@ -154,10 +151,7 @@ def test_the_way_taken_is_kept_with_the_body(block, needs, monkeypatch):
     model = bar(SHAPES["block"])
     monkeypatch.undo()
     assert model.operators.solver.out_of_core
-    found, direct = (
-        rom.reduce(m, method=rom.CraigBampton(4), interfaces=KINDS, certify=False)
-        for m in (model, block)
-    )
+    found, direct = (reduced(4, m) for m in (model, block))
     assert found.provenance["solver"] == model.provenance["solver"]
     assert found.frequencies()[6:] == pytest.approx(direct.frequencies()[6:], rel=1e-9)
 

@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 
 from cases.long import SHARED_BY
 from cases.paths import RANKS
-from cases.ranks.environment import on_ranks, written_on
+from cases.ranks.environment import on_ranks, written_on, written_on_each
 from rom.errors import MaterialError, RomError
 
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")
@@ -95,6 +95,21 @@ def test_interfaces_of_one_rank_and_of_all_ranks(n, tmp_path):
 def reduced_on(n, folder):
     path = folder / f"{n}.npz"
     return written_on(n, path, RANKS / "interfaces_under_mpi.py", path, timeout=120)
+
+
+@pytest.fixture(scope="module")
+def by_methods(tmp_path_factory):
+    folder, script = tmp_path_factory.mktemp("methods"), RANKS / "methods_under_mpi.py"
+    return written_on_each((1, *SHARED_BY), folder, script, ending="json")
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("n", SHARED_BY)
+def test_every_method_is_blind_to_the_number_of_processes(by_methods, n):
+    assert len(by_methods[1]) == 18
+    for name, one in by_methods[1].items():
+        assert len(one) >= 4, name
+        assert_allclose(by_methods[n][name], one, rtol=1e-9, err_msg=name)
 
 
 def test_a_rank_that_dies_ends_the_others():

@@ -10,6 +10,7 @@ import rom
 from cases.beam import N, gauss_hermite, hermite_beam
 from cases.paths import ROOT
 from cases.refusals import refuses
+from cases.solid import reduced
 from rom.eigen.supports import supports
 from rom.errors import ConfigError, InterfaceError
 from rom.prestress import held_solid
@@ -43,7 +44,7 @@ def model():
 
 @pytest.fixture(scope="module")
 def body(model):
-    return rom.reduce(model, method=rom.CraigBampton(12), certify=False, interfaces=KINDS)
+    return reduced(12, model)
 
 
 def along_z(model, shapes):
@@ -109,8 +110,7 @@ def test_rotating_and_parametric_bodies_take_the_same_supports(model, body):
 @pytest.mark.parametrize(("tip", "tension"), [("yz" + GUIDE, 1.0), ("xyz" + GUIDE, 1 / 3)])
 def test_a_beam_between_supports_that_turn_is_pulled_by_what_they_carry(model, tip, tension):
     """Flapping: N(x) = m W^2 (tension L^2 - x^2) / 2, with a tip that slides or is held."""
-    body = rom.reduce(model, method=rom.CraigBampton(12), certify=False, stiffening=True,
-                      interfaces=KINDS, reference="root")  # fmt: skip
+    body = reduced(12, model, stiffening=True, reference="root")
     square = 200.0  # of W, times m L^4 / EI
     speed = np.sqrt(square) * 2 * np.pi * UNIT
     K, M = hermite_beam()
@@ -152,11 +152,11 @@ def test_a_spring_at_the_tip_of_a_clamped_beam(model, body, stiffness):
     for k, exact in ((stiffness * EI / L**3 * Z, across), (stiffness * EA / L * X, axial)):
         whole = rom.modes(model, 16, springs={"tip": k}, **ends).frequencies
         assert np.abs(whole / exact - 1).min() < 3e-3
-        reduced = body.frequencies(6, fixed=("root",), springs={"tip": k})
-        assert_allclose(reduced, whole[:6], rtol=2e-3)
+        found = body.frequencies(6, fixed=("root",), springs={"tip": k})
+        assert_allclose(found, whole[:6], rtol=2e-3)
         family_like = body.with_reference("tip").frequencies(6, fixed=("root",), springs={"tip": k})
         round_off = 2e-16 * stiffness * EA * L**2 / EI  # the spring over the beam that bends
-        assert_allclose(family_like, reduced, rtol=1e-7 + 4 * round_off)
+        assert_allclose(family_like, found, rtol=1e-7 + 4 * round_off)
 
 
 def test_a_body_on_soft_springs_swings_as_a_rigid_one(model, body):

@@ -10,7 +10,8 @@ import rom
 from cases.long import SHARED_BY
 from cases.panels import ALLOY, FOAM, KINDS, PARAMETERS, panel
 from cases.paths import RANKS
-from cases.ranks.environment import on_ranks
+from cases.ranks.environment import written_on_each
+from cases.solid import reduced
 from rom.components.families.affine import AffineModel
 from rom.eigen.scipy import SciPyOperators
 from rom.eigen.verbs import rigid_motions
@@ -75,9 +76,7 @@ def test_matrices_and_stress_are_sums_over_the_regions(solids):
 def test_stress_of_the_body_is_that_of_its_material(family):
     """Modes of the stress recovery: the first bending mode, clamped at the root."""
     body, full = family.at(**POINT), panel(**POINT)
-    single = rom.reduce(
-        full, method=rom.CraigBampton(40), interfaces=KINDS, stress=True, certify=False
-    )
+    single = reduced(40, full, stress=True)
     peaks = []
     for each in (body, single):
         shape = each.modes(1, fixed=("root",))[1][6:, 0]
@@ -135,11 +134,8 @@ def test_a_sweep_never_returns_to_the_finite_elements(family, monkeypatch):
 @pytest.fixture(scope="module")
 def families(tmp_path_factory):
     """The same script on one process and on several."""
-    folder = tmp_path_factory.mktemp("families")
-    for n in (1, *SHARED_BY):
-        done = on_ranks(n, RANKS / "family_under_mpi.py", "material", folder / f"{n}.npz")
-        assert (folder / f"{n}.npz").exists(), done.stderr
-    return {n: rom.load(folder / f"{n}.npz") for n in (1, *SHARED_BY)}
+    folder, words = tmp_path_factory.mktemp("families"), (RANKS / "family_under_mpi.py", "material")
+    return written_on_each((1, *SHARED_BY), folder, *words, load=rom.load)
 
 
 @pytest.mark.long

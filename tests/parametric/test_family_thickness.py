@@ -12,8 +12,8 @@ from cases.components.updating import refuse
 from cases.layers import KINDS, LAYERS, families, panel
 from cases.long import ROM_LONG, SHARED_BY
 from cases.paths import RANKS
-from cases.ranks.environment import on_ranks
-from cases.solid import STEEL, block
+from cases.ranks.environment import written_on_each
+from cases.solid import STEEL, block, reduced
 from rom.body.reference import rigid_elastic
 from rom.components.families.affine import StretchedModel
 from rom.components.families.layers import Stretch
@@ -98,10 +98,7 @@ def test_with_all_modes_every_integral_is_that_of_the_stretched_block(reference)
     t, thickness = 1.6, {"t": rom.Thickness(None, 0.5, 2.0)}
     family = family_of(model, thickness, 24, reference=reference, certify=False)
     again = block((0.6, 0.1, 0.08 * t), cells, STEEL, (0.1, -0.03, -0.02 * t))
-    full = rom.reduce(
-        again, method=rom.CraigBampton(24), interfaces=KINDS, reference=reference, certify=False
-    )
-    body = family.at(t=t)
+    full, body = reduced(24, again, reference=reference), family.at(t=t)
     assert_allclose(body.omega, full.omega, rtol=1e-7)
     for one, other in zip(invariants(body), invariants(full), strict=True):
         assert_allclose(one, other, atol=1e-7)
@@ -241,12 +238,9 @@ def test_the_terms_of_the_stiffness_are_those_of_the_stretched_mesh():
 @pytest.mark.slow
 @pytest.mark.skipif(not ROM_LONG, reason="half a minute; families of regions are shared above all")
 def test_layers_are_blind_to_the_number_of_processes(tmp_path):
-    found = {}
-    for n in (1, *SHARED_BY):
-        path = tmp_path / f"{n}.npz"
-        done = on_ranks(n, RANKS / "family_under_mpi.py", "thickness", path)
-        assert path.exists(), done.stderr
-        family = rom.load(path)
-        found[n] = [family.at(**p).frequencies(14)[6:] for p in ({}, POINT)]
-    for n in SHARED_BY:
-        assert_allclose(found[n], found[1], rtol=1e-9)
+    words = (RANKS / "family_under_mpi.py", "thickness")
+    families = written_on_each((1, *SHARED_BY), tmp_path, *words, load=rom.load)
+    one, *others = ([family.at(**p).frequencies(14)[6:] for p in ({}, POINT)]
+                    for family in families.values())  # fmt: skip
+    for many in others:
+        assert_allclose(many, one, rtol=1e-9)

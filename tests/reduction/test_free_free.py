@@ -49,10 +49,3 @@ def test_joints_that_transmit_moments_are_refused(body, joint):
     with pytest.raises(ModelError, match=f"{joint} joint 'clamp' transmits moments"):
         getattr(mech, joint)("clamp", mech.ground.marker((0, 0, 0)), bar.marker("root"), **axis)
     mech.spherical("clamp", mech.ground.marker((0, 0, 0)), bar.marker("root"))
-
-
-def test_a_basis_with_static_shapes_is_not_refused(model):
-    for method in (rom.CraigBampton(4), rom.Rubin(4), rom.Herting(4)):
-        body = rom.reduce(model, method=method, interfaces=KINDS, certify=False)
-        assert body.has_static_shapes
-        assert body.frequencies(1, fixed=("root",))[0] > 0.0

@@ -11,7 +11,7 @@ import rom
 from benchmarks.models import bar
 from cases.measures import TURN, surface
 from cases.refusals import refused, refuses
-from cases.solid import block
+from cases.solid import block, reduced
 from rom.eigen.scipy import HeldSciPy
 from rom.eigen.verbs import constraint_modes, quadratic, rigid_motions
 from rom.errors import ConfigError, InterfaceError
@@ -92,9 +92,7 @@ def test_two_bodies_around_one_bore_choose_the_same_functions():
 
 
 def frequencies(model, kind, n=6, m=15):
-    kinds = {"root": kind, "tip": kind}
-    body = rom.reduce(model, method=rom.CraigBampton(m), interfaces=kinds, certify=False)
-    return body.frequencies(6 + n)[6:]
+    return reduced(m, model, interfaces={"root": kind, "tip": kind}).frequencies(6 + n)[6:]
 
 
 def test_frequencies_fall_with_the_order_towards_the_full_interface():

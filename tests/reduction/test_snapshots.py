@@ -7,7 +7,7 @@ from scipy.sparse import identity, kron
 
 import rom
 from cases.refusals import refused
-from cases.solid import block
+from cases.solid import block, reduced
 from rom.eigen.verbs import rigid_motions
 from rom.errors import ConfigError, InterfaceError
 from rom.reduction.interfaces.kinds import tie
@@ -26,10 +26,7 @@ def seen():
 
 
 def frequencies(kind):
-    made = rom.reduce(
-        MODEL, method=rom.CraigBampton(15), interfaces={"root": kind, "tip": "full"}, certify=False
-    )
-    found = made.frequencies(12)
+    found = reduced(15, MODEL, interfaces={"root": kind, "tip": "full"}).frequencies(12)
     assert (found[:6] == 0.0).all()
     return found[6:]
 
@@ -96,10 +93,8 @@ def test_the_kind_is_named_and_can_be_held(seen):
     kind = rom.Snapshots(seen, n=14)
     assert tie(ROOT, kind).label == "snapshots:14"
     assert repr(kind) == "Snapshots(30 of 48 dofs, n=14)"
-    made = rom.reduce(
-        MODEL, method=rom.CraigBampton(25), interfaces={"root": kind, "tip": "rbe2"},
-        reference="root",
-    )  # fmt: skip
+    kinds = {"root": kind, "tip": "rbe2"}
+    made = reduced(25, MODEL, interfaces=kinds, reference="root", certify=True)
     assert made.certificate.ok, made.certificate
     assert_allclose(made.markers["root"].translation, 0, atol=1e-9)
     assert made.frequencies(fixed=("root",))[0] > 0
@@ -124,10 +119,8 @@ test_messages_for_wrong_snapshots = refused(
 
 def test_one_surface_with_different_functions_on_its_sides_is_not_coupled(seen):
     bodies = {
-        name: rom.reduce(
-            block(cells=(6, 3, 3), origin=(origin, 0, 0)), method=rom.CraigBampton(4),
-            interfaces={face: rom.Snapshots(X, n=10)}, certify=False,
-        )
+        name: reduced(4, block(cells=(6, 3, 3), origin=(origin, 0, 0)),
+                      interfaces={face: rom.Snapshots(X, n=10)})
         for name, origin, face, X in (("a", 0.0, "tip", seen), ("b", 1.0, "root", RANDOM))
     }  # fmt: skip
     with pytest.raises(InterfaceError, match=r"share 16 nodes, but each .* functions of its own"):

@@ -24,8 +24,16 @@ def on_ranks(n, *words, **options):
     return python(*words, launcher=mpirun(n), **options)
 
 
-def written_on(n, file, *words, **options):
+def written_on(n, file, *words, load=None, **options):
     """What a script on n ranks, whose words name the file, has written into it, .npz or .json."""
     done = on_ranks(n, *words, **options)
     assert file.exists(), done.stderr
+    if load:
+        return load(file)
     return json.loads(file.read_text()) if file.suffix == ".json" else dict(np.load(file))
+
+
+def written_on_each(ranks, folder, *words, ending="npz", **options):
+    """{number of ranks: what a script, whose last word is the file, has written}."""
+    files = {n: folder / f"{n}.{ending}" for n in ranks}
+    return {n: written_on(n, file, *words, file, **options) for n, file in files.items()}

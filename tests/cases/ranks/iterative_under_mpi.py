@@ -1,4 +1,4 @@
-"""Run by test_fe_iterative_mpi.py under mpirun: a bar reduced without a factor, into one file."""
+"""Run by test_fe_iterative.py under mpirun: a bar reduced without a factor, into one file."""
 
 import sys
 

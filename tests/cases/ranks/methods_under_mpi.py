@@ -1,4 +1,4 @@
-"""Run by test_fe_methods_mpi.py under mpirun: a bar by every method, into one file."""
+"""Run by test_fe_mpi.py under mpirun: a bar by every method, into one file."""
 
 import json
 import sys

@@ -8,8 +8,11 @@ from numpy.testing import assert_allclose
 from scipy import sparse
 
 import rom
-from cases.long import few
+from cases.long import SHARED_BY, few
 from cases.operators import petsc_operators
+from cases.paths import RANKS
+from cases.ranks.environment import written_on
+from cases.solid import reduced
 from rom.errors import ModesMissedError
 
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")
@@ -200,10 +203,7 @@ def test_frequencies_and_shapes_are_those_of_the_factor(size, kind):
     ends = {"root": kind, "tip": kind}
     lc = 0.06 if size[0] > 0.5 else 0.07
     one, other = (
-        rom.reduce(
-            bar(solver, size, lc), method=rom.CraigBampton(12), interfaces=ends, certify=False
-        )
-        for solver in ("direct", "iterative")
+        reduced(12, bar(solver, size, lc), interfaces=ends) for solver in ("direct", "iterative")
     )
     assert_allclose(other.frequencies()[6:], one.frequencies()[6:], rtol=1e-8)
     n = one.K.shape[0] - 12  # constraint modes stand first
@@ -275,3 +275,32 @@ def test_modes_left_alone_are_looked_at_once_more(problem, monkeypatch):
     assert spoilt
     rest = problem[2] @ search.X[:, :11] - MASS * search.X[:, :11] * search.theta[:11]
     assert np.abs(rest).max() < 1e-7
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory):
+    """{case: what was found}, by a factor in one process, and without by one and more."""
+    folder, found = tmp_path_factory.mktemp("iterative"), {}
+    script = str(RANKS / "iterative_under_mpi.py")
+    for solver, ranks in (("direct", 1), *(("iterative", n) for n in (1, *SHARED_BY))):
+        file = folder / f"{solver}{ranks}.npz"
+        found[solver, ranks] = written_on(ranks, file, script, solver, file, timeout=300)
+    return found
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("n", (1, *SHARED_BY))
+@pytest.mark.parametrize("against", ["iterative", "direct"])
+def test_frequencies_and_stiffness_do_not_depend_on_how_many_solve(runs, n, against):
+    one, many = runs[against, 1], runs["iterative", n]
+    for name in ("free", "modes", "held"):
+        assert one[name].size >= 6
+        assert_allclose(many[name], one[name], rtol=1e-9, err_msg=name)
+    springs = one["springs"]
+    assert_allclose(many["springs"], springs, atol=1e-9 * np.abs(springs).max())
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("n", (1, *SHARED_BY))
+def test_each_says_how_surely_no_mode_is_missed(runs, n):
+    assert 0.0 < runs["iterative", n]["missed"] < 1e-9

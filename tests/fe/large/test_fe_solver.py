@@ -4,6 +4,7 @@ import pytest
 
 import rom
 from cases.long import ROM_LONG
+from cases.solid import reduced
 from rom.errors import ConfigError, InterfaceError, SolverError
 from rom.reduction.full_model import operators
 
@@ -23,15 +24,11 @@ def direct():
     return beam("direct")
 
 
-def reduced(model):
-    return rom.reduce(model, method=rom.CraigBampton(8), interfaces=KINDS, certify=False)
-
-
 @pytest.mark.long
 @pytest.mark.parametrize("solver", SOLVERS)
 def test_every_solver_gives_the_frequencies_of_the_direct_one(direct, solver):
     model = beam(solver)
-    expected, found = (reduced(m).frequencies()[6:] for m in (direct, model))
+    expected, found = (reduced(8, m).frequencies()[6:] for m in (direct, model))
     assert found == pytest.approx(expected, rel=1e-8)
     for fixed in ((), ("root",)):
         expected, found = (rom.modes(m, 10, fixed=fixed) for m in (direct, model))
@@ -51,7 +48,7 @@ def test_iteration_without_success_is_an_error(monkeypatch):
 
     monkeypatch.setattr(gradients, "MAX_ITERATIONS", 3)
     with pytest.raises(SolverError, match="1 of 1 static solutions did not converge in 3"):
-        reduced(beam("iterative"))
+        reduced(8, beam("iterative"))
 
 
 @pytest.mark.parametrize(

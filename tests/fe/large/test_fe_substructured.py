@@ -7,7 +7,7 @@ from scipy.sparse import coo_matrix, csr_matrix, random, triu
 
 from cases.long import SHARED_BY
 from cases.paths import RANKS
-from cases.ranks.environment import written_on
+from cases.ranks.environment import written_on_each
 
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")
 pytestmark = [pytest.mark.fenicsx, pytest.mark.mpi]
@@ -27,8 +27,8 @@ def library():
 
 @pytest.fixture(scope="module")
 def found(tmp_path_factory):
-    files = {n: tmp_path_factory.mktemp("substructured") / f"{n}.json" for n in SHARED_BY}
-    return {n: written_on(n, file, SCRIPT, file, timeout=300) for n, file in files.items()}
+    folder = tmp_path_factory.mktemp("substructured")
+    return written_on_each(SHARED_BY, folder, SCRIPT, ending="json", timeout=300)
 
 
 LEFT_TO_MUMPS = ["on disk", "low rank", "full", "apart", "costly", "no room", "room runs out"]
