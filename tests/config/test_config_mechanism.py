@@ -247,7 +247,7 @@ JOINTED = {
                     "cover 0 s to 0.1 s; the run needs 0 s to 0.5 s"),
     "table that falls": (DRIVE + '{ kind = "table", t = [0, 2, 1], values = [0, 1, 2] }\n',
                          "must ascend"),
-    "name twice": (DRIVE.replace(".m", ".pivot") + "1\n", "the name 'pivot' is used twice"),
+    "name twice": (DRIVE.replace(".m", ".pivot") + "1\n", "name 'pivot' is used twice"),
     "stop without limit": ('[stops.m]\njoint = "pivot"\nstiffness = 1\n', "has no limit"),
     "missing file": ('[bodies.x]\nfile = "nope.rom.npz"\n', "nope.rom.npz"),
 }  # fmt: skip

@@ -157,8 +157,8 @@ class Part:
                 f"about which the body spins, and {name!r} holds it there: with the material it "
                 f"would go round, an unbalance of {self.mass * apart:.4g} kg m.",
                 where=self.name,
-                hint="Let its frame turn: give omega instead of spin. Or put the marker on "
-                f"the axis and let a force of {self.mass * apart * speed**2:.4g} N turn.",
+                hint="Let its frame turn: give omega instead of spin. Or put the marker on the "
+                f"axis and let a force of {self.mass * apart * speed**2:.4g} N at this speed turn.",
             )
 
     @property

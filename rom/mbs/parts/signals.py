@@ -53,9 +53,10 @@ class Jump:
         """Difference of the values."""
         return self.after - self.before
 
-    def __str__(self) -> str:
+    def said(self, digits: int) -> str:
+        """Size, time by as many digits as it is known, and both values."""
         ends = f"from {self.before:.6g} to {self.after:.6g}"
-        return f"jumps by {self.size:.4g} at t = {self.t:.9g} s, {ends}"
+        return f"jumps by {self.size:.4g} at t = {self.t:.{digits}g} s, {ends}"
 
 
 def largest_jump(f: Function, t: Array, width: float, small: float) -> Jump | None:
@@ -132,7 +133,7 @@ class Examined:
         jump = largest_jump(self.function, t, width, small)
         if jump is not None:
             refusal = ModelError(
-                f"drive {self.name!r} {jump}: the bodies would need infinite velocity.",
+                f"drive {self.name!r} {jump.said(9)}: the bodies would need infinite velocity.",
                 hint="Let it move there over several steps, or release a spring instead. The "
                 "motion up to there is kept in error.solution.",
             )
@@ -152,8 +153,8 @@ class Examined:
             return
         kink = largest_jump(speed, t, 4 * DIFFERENCE_SPACING * interval, SMALL_KINK * self.top)
         doubt = kink and (
-            f"the velocity of drive {self.name!r} {kink}: the reactions there are those of an "
-            "impact, and depend on the time step. Round the corner over several steps."
+            f"the velocity of drive {self.name!r} {kink.said(6)}: the reactions there are those of "
+            "an impact, and depend on the time step. Round the corner over several steps."
         )
         if self.rate is not None and not doubt:
             doubt = _contradiction(self.name, t, values, quotient(t))
