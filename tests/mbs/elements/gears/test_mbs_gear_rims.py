@@ -174,11 +174,11 @@ def test_teeth_travel_around_a_round_rim_without_a_trace(tooth):
     assert between == pytest.approx(first, rel=2e-3)  # corners of the polygon
 
 
-def soft_wheels(method, reference, others=(), spin=(0.0, 0.0), **mesh):
+def soft_wheels(method, reference, others=(), omega=(0.0, 0.0), **mesh):
     """Two flexible wheels in mesh; other interfaces than their rims are rigid."""
     mech, wheels = rom.Mechanism(gravity=(0, 0, 0)), []
     kinds = {"rim": rom.FourierLegendre(2, 1)} | dict.fromkeys(others, "rbe2")
-    for name, x, w in zip(("pinion", "gear"), (0.0, PAIR.distance), spin, strict=True):
+    for name, x, w in zip(("pinion", "gear"), (0.0, PAIR.distance), omega, strict=True):
         given = {"interfaces": kinds, "reference": reference, "certify": False}
         body = rom.reduce(tube(INNER, RIM, LENGTH, (16, 1, 4)), method=method, **given)
         wheels.append(mech.add_flexible(name, body, at=(x, 0, 0), omega=(0, 0, w)).marker("rim"))
@@ -242,7 +242,7 @@ def test_a_rack_presses_a_rim_as_a_gear_without_end_does():
 def test_free_wheels_with_soft_rims_keep_momentum_and_energy():
     """Their teeth hit and part again; what damping and sliding take away is counted."""
     losses = {"damping": 1e-6, "friction": 0.1, "transition_speed": 0.1}
-    mech = soft_wheels(rom.Guyan(), "mean-axis", spin=(20.0, 1.0), stiffness=1e9, **losses)
+    mech = soft_wheels(rom.Guyan(), "mean-axis", omega=(20.0, 1.0), stiffness=1e9, **losses)
     sol = rom.simulate(mech, t_end=2e-4, method="dop853", rtol=1e-8, atol=1e-10)
     loads = [one.force.sum() for one in rom.mbs.tooth_loads(sol, "mesh")]
     assert max(loads) > 1000
