@@ -7,18 +7,12 @@ import pytest
 from numba import njit
 from numpy.testing import assert_allclose
 from scipy.integrate import quad, solve_ivp
+from scipy.interpolate import CubicSpline
 from scipy.optimize import minimize
 from scipy.special import gamma
 
 import rom
-from cases.mbs.mechanisms import (
-    prepared,
-    random_state,
-    residual_at,
-    stored_at,
-    tangents_at,
-    two_soft,
-)
+from cases.mbs.mechanisms import prepared, random_state, stored_at, tangents_at, two_soft
 from cases.mbs.tangents import difference, energy_gradient, forces_at, shifted
 from cases.solid import block, reduced
 from rom import rotation
@@ -121,23 +115,14 @@ def test_one_instant_of_a_spinning_ball_that_comes_down():
     law = Impact(k, damping=chi, mu=mu, transition_speed=1e-9)
     mech = ball(law, height=-depth, velocity=(0, 0, -v), omega=(0, spin, 0))
     packed, W = prepared(mech)
-    residual_at(packed.system, W, packed.q, packed.v, np.zeros(6), np.zeros(0))
+    found = -forces_at(packed, W, packed.q, packed.v)
     normal = k * depth**1.5 * (1 + chi * v)
     force = np.array([mu * normal, 0, normal])
     moment = np.cross([0, 0, -radius], force)
-    assert_allclose(-W.residual + [0, 0, 2.0 * g, 0, 0, 0], [*force, *moment], rtol=1e-9, atol=1e-9)
+    found[2] += 2.0 * g
+    assert_allclose(found, [*force, *moment], rtol=1e-9, atol=1e-9)
     lost = chi * v * k * depth**1.5 * v + mu * normal * spin * radius
     assert_allclose(W.power[2], lost, rtol=1e-9)
-
-
-def duration(t, depth):
-    """Time of the first contact [s]."""
-    inside = depth > 0
-    first = int(np.argmax(inside))
-    last = first + int(np.argmax(~inside[first:]))
-    cross = [t[i - 1] - depth[i - 1] * (t[i] - t[i - 1]) / (depth[i] - depth[i - 1])
-             for i in (first, last)]  # fmt: skip
-    return cross[1] - cross[0]
 
 
 def test_a_sphere_of_hertz_is_in_touch_for_the_time_of_the_closed_form():
@@ -156,7 +141,8 @@ def test_a_sphere_of_hertz_is_in_touch_for_the_time_of_the_closed_form():
     sol = simulate(mech, t_end=2 * time, dt=time / 400, method="dop853")
     depth = radius - sol.position("ball")[:, 2]
     assert_allclose(depth.max(), deepest, rtol=1e-4)
-    assert_allclose(duration(sol.t, depth), time, rtol=1e-3)
+    touched_and_left = CubicSpline(sol.t, depth).roots(extrapolate=False)
+    assert_allclose(np.diff(touched_and_left), [time], rtol=1e-3)
     assert_allclose(sol.velocity("ball")[-1, 2], v, rtol=1e-8)
     implicit = simulate(mech, t_end=2 * time, dt=time / 400)
     assert_allclose(implicit.velocity("ball")[-1, 2], v, rtol=1e-4)
@@ -216,18 +202,6 @@ def test_a_sliding_ball_rolls_in_the_end_with_five_sevenths_of_its_speed():
     assert_allclose(v[-1], 0.1 * w[-1], rtol=1e-2)
     assert_allclose(np.interp(0.5 * slides, sol.t, v), v0 - 0.5 * mu * g * slides, rtol=1e-3)
     assert_allclose(sol.energy.damping[-1], 0.5 * 2.0 * v0**2 * 2 / 7, rtol=3e-3)
-    assert audit(sol).ok, audit(sol)
-
-
-def test_two_equal_balls_exchange_their_speeds():
-    mech = Mechanism(gravity=(0, 0, 0))
-    for name, x, v in (("one", 0.0, 1.0), ("two", 0.5, 0.0)):
-        mech.add_rigid(name, mass=1.0, inertia=(1e-3,) * 3, at=(x, 0, 0), velocity=(v, 0, 0))
-    m1, m2 = (mech.parts[n].marker((0, 0, 0)) for n in ("one", "two"))
-    mech.sphere_on_sphere("hit", m1, m2, Impact(1e6), radius1=0.1, radius2=0.15)
-    sol = simulate(mech, t_end=0.5, dt=1e-3, method="dop853")
-    assert_allclose(sol.velocity("one")[-1], 0.0, atol=1e-8)
-    assert_allclose(sol.velocity("two")[-1], X, atol=1e-8)
     assert audit(sol).ok, audit(sol)
 
 
@@ -362,7 +336,8 @@ def test_a_bar_at_rest_on_another_sinks_by_the_law():
     assert_allclose(sol.position("bar")[:, 2], 0.15 - (g / k) ** (2 / 3), atol=1e-12)
 
 
-def test_balls_of_steel_meet_as_hertz_says():
+@pytest.mark.parametrize("kind", ["sphere_on_sphere", "capsule_on_capsule"])
+def test_balls_of_steel_meet_as_hertz_says(kind):
     """Deepest penetration and duration of an impact; momenta before and after.
 
     Source: Johnson, Contact Mechanics (1985), equations 11.22 to 11.24.
@@ -370,20 +345,20 @@ def test_balls_of_steel_meet_as_hertz_says():
     E, nu, R, m, v = 210e9, 0.3, 0.02, 0.26, 0.5
     k = hertz_stiffness(E, nu, E, nu, R / 2)
     mech = Mechanism(gravity=(0, 0, 0))
-    law = Impact(k, mu=0.0)
-    gap = 1e-6
-    one, two = (
-        mech.add_rigid(name, mass=m, inertia=(1e-5,) * 3, at=at, velocity=(u, 0, 0))
-        for name, at, u in (("one", (0, 0, 0), v), ("two", (2 * R + gap, 0, 0), 0.0))
-    )
-    mech.capsule_on_capsule("c", one.marker((0, 0, 0)), two.marker((0, 0, 0)), law, radius1=R,
-                            radius2=R)  # fmt: skip
+    ends = [
+        mech.add_rigid(name, mass=m, inertia=(1e-5,) * 3, at=(x, 0, 0), velocity=(u, 0, 0))
+        for name, x, u in (("one", 0, v), ("two", 2 * R + 1e-6, 0))
+    ]
+    ends = (part.marker((0, 0, 0)) for part in ends)
+    getattr(mech, kind)("c", *ends, Impact(k, mu=0.0), radius1=R, radius2=R)
     sol = simulate(mech, t_end=2e-4, dt=1e-7, method="dop853")
     depth = 2 * R - (sol.position("two") - sol.position("one"))[:, 0]
     deepest = (15 * (m / 2) * v**2 / (16 * np.sqrt(R / 2) * (E / (1 - nu**2) / 2))) ** 0.4
     assert_allclose(depth.max(), deepest, rtol=1e-4)
     assert_allclose(np.ptp(sol.t[depth > 0]), 2.943 * deepest / v, rtol=5e-3)
-    assert_allclose([sol.velocity("one")[-1, 0], sol.velocity("two")[-1, 0]], [0, v], atol=1e-7)
+    assert_allclose(sol.velocity("one")[-1], 0.0, atol=1e-8)
+    assert_allclose(sol.velocity("two")[-1], v * X, atol=1e-8)
+    assert audit(sol).ok, audit(sol)
 
 
 def test_momentum_and_energy_of_capsules_that_meet_in_space():
@@ -482,8 +457,7 @@ def test_points_of_the_surface_move_with_its_shapes(brick):
     bent = brick.surface.points + (brick.surface.shape @ q).reshape(-1, 3)
     wanted = [0.1, 0, 1.0] + bent @ rotation.matrix([0.6, 0, 0.8, 0]).T
     for k in np.flatnonzero(brick.surface_areas(below)):
-        at = at_point(sol, k)[0]
-        assert_allclose(at, wanted[k], atol=1e-12)
+        assert_allclose(at_point(sol, k)[0], wanted[k], atol=1e-12)
 
 
 def test_a_brick_sinks_into_its_foundation_by_its_weight(brick):
@@ -493,10 +467,8 @@ def test_a_brick_sinks_into_its_foundation_by_its_weight(brick):
     state = rom.equilibrium(mech)
     sol = rom.simulate(mech, t_end=1e-3, dt=1e-4, state=state)
     depth = WEIGHT / (4e8 * 0.12)
-    corners = np.flatnonzero(brick.surface_areas(below))
-    for k in corners:
-        height = at_point(sol, k)[:, 2]
-        assert_allclose(height, -depth, rtol=0.02)
+    for k in np.flatnonzero(brick.surface_areas(below)):
+        assert_allclose(at_point(sol, k)[:, 2], -depth, rtol=0.02)
     load = sol.interface_loads("ground")[(0.0, 0.0, 0.0)]
     assert_allclose(load[0, 2], -WEIGHT, rtol=1e-9)
     assert_allclose(sol.v, 0, atol=1e-9)

@@ -6,16 +6,8 @@ from numba import njit
 from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 
-from cases.mbs.mechanisms import (
-    lattice,
-    lattice_body,
-    prepared,
-    random_state,
-    simulate_quietly,
-    slider_crank,
-    tangents_at,
-    two_soft,
-)
+from cases.mbs import mechanisms
+from cases.mbs.mechanisms import simulate_quietly, slider_crank, tangents_at
 from cases.mbs.parts import on_axle, on_guide
 from cases.mbs.tangents import difference, forces_at, shifted
 from rom.errors import ConfigError, ModelError, SolverError
@@ -116,7 +108,7 @@ WAYS = {
 
 def controlled_arm(way):
     """Two light links that bend, hinged to the ground and to each other, both hinges controlled."""
-    body = lattice_body(lattice(stiffness=4e4, length=0.4, mass=0.02))
+    body = mechanisms.lattice_body(mechanisms.lattice(stiffness=4e4, length=0.4, mass=0.02))
     mech = Mechanism(gravity=(0, -g, 0))
     upper = mech.add_flexible("upper", body)
     lower = mech.add_flexible("lower", body, at=(0.4, 0, 0))
@@ -197,7 +189,7 @@ def test_a_sliding_block_stops_after_v_over_mu_g(method):
 
 def loaded(rng):
     """Two flexible bodies and the ground on joints with every force of this page."""
-    mech, one, two = two_soft(rng, (0, 0, -g))
+    mech, one, two = mechanisms.two_soft(rng, (0, 0, -g))
     mech.cylindrical("tube", one.marker("a"), two.marker("b"), axis=(1, 2, 2))
     mech.prismatic("guide", mech.ground.marker((0, 1, 0)), one.marker("b"), axis=X)
     mech.friction("pin", "tube", mu=0.3, radius=0.2, coulomb=0.4, static=1.5, stribeck_speed=2.0,
@@ -218,9 +210,9 @@ def loaded(rng):
 def test_tangents_are_derivatives_of_the_forces(seed):
     """By velocities, by coordinates of the mechanism at rest, and by the multipliers."""
     rng = np.random.default_rng(seed)
-    packed, W = prepared(loaded(rng))
+    packed, W = mechanisms.prepared(loaded(rng))
     packed.system.markers.twist[:] *= 1e-3
-    s, (q, v, a, lam) = packed.system, random_state(rng, packed)
+    s, (q, v, a, lam) = packed.system, mechanisms.random_state(rng, packed)
     packed.elements[motors.MOTORS_FAMILY].answer[:] = 1.7
     n, m = v.size, lam.size
 

@@ -3,6 +3,7 @@
 import ctypes
 import shutil
 import subprocess
+from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
@@ -14,6 +15,7 @@ import rom
 from cases.mbs.mechanisms import prepared, random_body, random_pose, random_state, simulate_quietly
 from cases.mbs.parts import on_axle, on_guide
 from cases.mbs.tangents import check_tangents
+from cases.refusals import refused
 from rom.errors import ConfigError, SolverError
 from rom.mbs.elements import laws
 
@@ -259,11 +261,9 @@ REFUSED = [
 ]
 
 
-@pytest.mark.parametrize("case", range(len(REFUSED)))
-def test_wrong_laws_are_refused_by_name(case):
-    add, text = REFUSED[case]
-    with pytest.raises(ConfigError, match=text):
-        hung(add)
+test_wrong_laws_are_refused_by_name = refused(
+    *((partial(hung, add), words) for add, words in REFUSED), error=ConfigError
+)
 
 
 @njit

@@ -21,6 +21,13 @@ def rotor(b, W, **more):
     return held_rotor(b, (W, 0.0), speed=SPEED, oil=VISCOSITY, **more)
 
 
+def assert_rests(place, b, e, attitude, within=1.0):
+    """At an eccentricity, within 0.01 clearances, and an angle [degrees]."""
+    x, y = place / b.clearance
+    assert np.hypot(x, y) == pytest.approx(e, abs=0.01)
+    assert np.degrees(np.arctan2(y, x)) == pytest.approx(attitude, abs=within)
+
+
 def threshold(K, C, W, c=1e-4):
     """Speed times sqrt(c/g) at which a rigid rotor of that weight begins to whirl."""
     found = component.stability(K, C, SPEED)
@@ -37,9 +44,7 @@ def test_a_rotor_rests_where_raimondi_and_boyd_say(row):
     mech = rotor(b, W)
     state = rom.equilibrium(mech, spin={"turn": SPEED})
     found = rom.mbs.snapshot(mech, state).journal_bearing("film")
-    x, y = found.motion[0, :2] / b.clearance
-    assert np.hypot(x, y) == pytest.approx(e, abs=0.01)
-    assert np.degrees(np.arctan2(y, x)) == pytest.approx(attitude, abs=1.0)
+    assert_rests(found.motion[0, :2], b, e, attitude)
     assert found.thinnest[0] == pytest.approx(b.clearance * (1 - e), rel=0.05)
     torque = found.power[0] / SPEED
     # of the oil there is: the table has shear all around, as this film
@@ -53,9 +58,7 @@ def test_coefficients_of_lund_and_thomsen(row):
     b = bearing(row[0], SIDES)
     W = load_along(b, row[1])[0]
     state, K, C = resting(rotor(b, W), SPEED)
-    x, y = state.q[:2] / b.clearance
-    assert np.hypot(x, y) == pytest.approx(row[2], abs=0.01)
-    assert np.degrees(np.arctan2(y, x)) == pytest.approx(row[3], abs=1.0)
+    assert_rests(state.q[:2], b, *row[2:4])
     assert_allclose(K.ravel() * 1e-4 / W, row[4:8], atol=0.05, rtol=0.04)
     assert_allclose(C[[0, 0, 1], [0, 1, 1]] * 1e-4 * SPEED / W, row[8:11], atol=0.05, rtol=0.04)
     assert C[0, 1] == pytest.approx(C[1, 0], rel=1e-6)
@@ -95,9 +98,7 @@ def test_where_oil_comes_in_matters_when_oil_is_conserved(row):
     b = bearing(0.5, [Groove(np.radians(row[0]), np.radians(20))], cavitation=row[1])
     W = load_along(b, 0.5)[0]
     state, K, _ = resting(rotor(b, W), SPEED)
-    x, y = state.q[:2] / b.clearance
-    assert np.hypot(x, y) == pytest.approx(row[2], abs=0.01)
-    assert np.degrees(np.arctan2(y, x)) == pytest.approx(row[3], abs=1.5)
+    assert_rests(state.q[:2], b, *row[2:4], within=1.5)
     assert_allclose(K.ravel() * 1e-4 / W, row[4:8], atol=0.2)
 
 

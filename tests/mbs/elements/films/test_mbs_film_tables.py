@@ -182,23 +182,6 @@ def test_a_motion_is_that_of_the_film_that_is_solved():
     assert_allclose(moved[1].power, moved[0].power, rtol=3e-3)
 
 
-def test_what_leaves_two_bodies_turns_into_heat():
-    """Momentum stays, and what they lose is what the table says of the power."""
-    mech = rom.Mechanism(gravity=ORIGIN)
-    own = {"mass": 2.0, "inertia": (0.01, 0.02, 0.03)}
-    journal = mech.add_rigid("journal", at=(0.3e-4, 0, 0), omega=(0, 0, 100.0), **own)
-    bush = mech.add_rigid("bush", at=ORIGIN, omega=(0, 0, -20.0), **own)
-    mech.journal_bearing("film", journal.marker(ORIGIN), bush.marker(ORIGIN), axis=(0, 0, 1),
-                         bearing=bearing(), oil=0.01, tabulated=True)  # fmt: skip
-    sol = rom.simulate(mech, t_end=0.02, dt=1e-5, method="bdf", save_every=20, progress=False)
-    p, L = sol.momentum
-    assert_allclose(p, 0.0, atol=1e-10)
-    assert_allclose(L, np.tile(L[0], (len(L), 1)), atol=1e-6 * np.abs(L[0]).max())
-    assert sol.energy.damping[-1] > 1.0
-    E = sol.energy.kinetic + sol.energy.damping
-    assert_allclose(E, E[0], rtol=1e-6)
-
-
 def test_the_temperature_is_that_of_the_film_that_is_solved():
     oil, found = iso_vg(46), []
     for tabulated in (False, True):

@@ -116,8 +116,8 @@ def test_wheels_that_hit_and_part_keep_energy_and_momentum(kind, losses):
     pitch = (1e-6 * np.arange(PAIRS[kind].teeth[0]) % 7, ())
     flanks = Correction((15e-6, 10e-6), (4e-3, 3e-3), 2.0, 4e-6, 5e-6, pitch,
                         run_out=((2e-6, 0.4), (0.0, 0.0)))  # fmt: skip
-    spin = 40.0, -40.0 * PAIRS[kind].rb[0] / PAIRS[kind].rb[1] + 2.0
-    given = {"inertia": (2e-3, 2e-3, 3e-3), "spin": spin, "stiffness": TABLE, "cells": 7}
+    omega = 40.0, -40.0 * PAIRS[kind].rb[0] / PAIRS[kind].rb[1] + 2.0
+    given = {"inertia": (2e-3, 2e-3, 3e-3), "omega": omega, "stiffness": TABLE, "cells": 7}
     mech = free_wheels(PAIRS[kind], correction=flanks, phase=0.1, **given, **losses)
     sol = rom.simulate(mech, t_end=6e-4, dt=2e-6, method="dop853", rtol=1e-10, progress=False)
     force = np.linalg.norm(sol.element("mesh").force[:, 0], axis=1)

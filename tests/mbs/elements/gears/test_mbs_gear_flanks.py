@@ -1,4 +1,4 @@
-"""Measured flanks, run-out, contact by Hertz, and slices that carry each other."""
+"""Measured flanks, run-out, contact by Hertz, slices that carry each other, stiffness."""
 
 from dataclasses import replace
 
@@ -8,20 +8,13 @@ from numpy.testing import assert_allclose
 from scipy.interpolate import RegularGridInterpolator
 from scipy.optimize import brentq
 
+import rom
 from cases.mbs.geared import ORIGIN, free_wheels
 from cases.mbs.mechanisms import prepared, residual_at
+from cases.mbs.parts import on_axle
 from cases.mbs.tangents import shifted
-from rom.components.gear_mesh import (
-    Correction,
-    GearPair,
-    Hertz,
-    Mesh,
-    bending_table,
-    contact_compliance,
-    flank_map,
-    pair_stiffness,
-    tooth_compliance,
-)
+from rom.components import gear_mesh
+from rom.components.gear_mesh import Correction, GearPair, Hertz, bending_table, contact_compliance
 from rom.components.gear_mesh.gears.meshes import GEAR_MESHES_FAMILY
 from rom.components.gear_mesh.gears.table import PHASE
 from rom.errors import ConfigError, ModelError
@@ -148,13 +141,13 @@ def test_a_file_of_numbers_is_a_map(tmp_path):
     path = tmp_path / "pinion.csv"
     path.write_text("\n\n".join("\n".join(",".join(map(repr, map(float, line))) for line in tooth)
                                 for tooth in maps))  # fmt: skip
-    assert_allclose(flank_map(path), maps)
+    assert_allclose(gear_mesh.flank_map(path), maps)
     path.write_text("1,2\n3\n")
     with pytest.raises(ModelError, match=r"pinion\.csv is no map of flanks"):
-        flank_map(path)
+        gear_mesh.flank_map(path)
     path.write_text("1,2\n3,x\n")
     with pytest.raises(ModelError, match=r"is no map of flanks: .*'x'"):
-        flank_map(path)
+        gear_mesh.flank_map(path)
 
 
 @pytest.mark.parametrize("pair", [SPUR, RING], ids=["external", "internal"])
@@ -257,7 +250,7 @@ def test_bending_with_hertz_is_that_of_weber_and_banaschek_at_one_load(teeth, mo
 
     depth = brentq(off, 1e-7, 1e-4, xtol=1e-16)
     assert force / depth * 1e-9 == pytest.approx(wanted, rel=0.015)
-    secant = pair_stiffness(pair, pair.pitch_point, force=force)
+    secant = gear_mesh.pair_stiffness(pair, pair.pitch_point, force=force)
     assert force / depth == pytest.approx(secant, rel=3e-4)
 
 
@@ -359,11 +352,70 @@ def test_hands_that_do_not_mesh_are_named():
     helical = replace(SPUR, helix=0.3)
     assert replace(helical, gear_helix=-0.3).gear_helix == -0.3
     with pytest.raises(ModelError, match="maps and run-out are for elements"):
-        Mesh(SPUR, K, Correction(maps=(np.zeros((2, 2)), None)))
+        gear_mesh.Mesh(SPUR, K, Correction(maps=(np.zeros((2, 2)), None)))
 
 
 def test_depths_of_teeth_are_those_of_the_compliance():
     _, hertz = bending_table(SPUR, n=3)
     middle = 0.5 * sum(SPUR.path)
     radius = float(np.hypot(SPUR.rb[0], middle))
-    assert hertz.depths[1, 0] == pytest.approx(tooth_compliance(SPUR, 0, radius)[2])
+    assert hertz.depths[1, 0] == pytest.approx(gear_mesh.tooth_compliance(SPUR, 0, radius)[2])
+
+
+# --- stiffness in a mechanism ---
+
+LOAD = 3e5  # along the line of action, over the face [N/m]
+
+
+def stiffness_of(pair, phase, law):
+    """Force along the line of action over the approach of the teeth and the face [N/m^2].
+
+    The gear is held, the pinion turns on its axle under a torque.
+    """
+    mech = rom.Mechanism(gravity=(0, 0, 0))
+    pinion = on_axle(mech, "pinion", inertia=(1e-3,) * 3)
+    ends = pinion, mech.ground.marker((pair.distance, 0, 0))
+    law = {"entry": 0.0, "conservative": False} | law
+    mech.gear_mesh("mesh", *ends, axis=(0, 0, 1), pair=pair, phase=phase, **law)
+    force = LOAD * pair.width
+    mech.torque("load", pinion, (0, 0, force * pair.rb[0]))
+    state = rom.equilibrium(mech)
+    approach = pair.rb[0] * rom.mbs.snapshot(mech, state).joint("axle").angle[0]
+    return force / approach / pair.width
+
+
+def pair_of(degrees, width):
+    return GearPair((50, 50), 3e-3, width, float(np.radians(degrees)))
+
+
+@pytest.mark.parametrize("contact", ["linear", "hertz"])
+def test_a_pair_of_teeth_softens_with_its_helix_as_in_iso_6336(contact):
+    """c' is 14.1, 13.8 and 12.8 N/(mm um) at 0, 15 and 30 degrees; here spur teeth are the unit.
+
+    The face is so narrow that one line bears over the whole of it at the pitch point.
+    """
+    found = []
+    for degrees in (0, 15, 30):
+        pair = pair_of(degrees, 4e-3)
+        law = {"stiffness": gear_mesh.stiffness_table(pair, force=LOAD)}
+        if contact == "hertz":
+            law = dict(zip(("stiffness", "hertz"), bending_table(pair), strict=True))
+        found.append(stiffness_of(pair, pair.pitch_point / pair.rb[0], law))
+    wanted = np.array([14.1, 13.8, 12.8])
+    assert 14.1 / found[0] * np.array(found) == pytest.approx(wanted, rel=0.04)
+    assert found[0] > 1.01 * found[1] > 1.05 * found[2]
+
+
+def test_the_mean_over_a_mesh_falls_with_the_helix_as_in_iso_6336():
+    """c_gamma is 22.0, 20.7 and 16.8; lines that overlap by one pitch bear evenly all the time."""
+    found = []
+    for degrees in (0, 15, 30):
+        pair = pair_of(degrees, 0.02)
+        if degrees:
+            pair = pair_of(degrees, float(pair.base_pitch / np.tan(pair.base_helix)))
+        law = {"stiffness": gear_mesh.stiffness_table(pair, force=LOAD), "cells": 100}
+        phases = pair.base_pitch / pair.rb[0] * (np.arange(8) + 0.37) / 8
+        each = np.array([stiffness_of(pair, phase, law) for phase in phases])
+        assert (np.ptp(each) < 1e-6 * each.mean()) == (degrees > 0)
+        found.append(each.mean())
+    assert 22.0 / found[0] * np.array(found) == pytest.approx([22.0, 20.7, 16.8], rel=0.02)

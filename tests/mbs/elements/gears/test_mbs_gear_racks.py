@@ -180,7 +180,7 @@ def test_a_torque_rests_on_the_rack_along_the_normal_of_its_teeth(helix, torque)
     ("pair", "losses"), few(2, [(SPUR, {}), (HELICAL, LOSSES), (SPUR, LOSSES), (HELICAL, {})])
 )
 def test_a_pinion_and_a_rack_that_hit_and_part_keep_energy_and_momentum(pair, losses):
-    given = {"inertia": (2e-3, 2e-3, 3e-3), "spin": (40.0, 0.0), "entry": 0.02, "phase": 0.1}
+    given = {"inertia": (2e-3, 2e-3, 3e-3), "omega": (40.0, 0.0), "entry": 0.02, "phase": 0.1}
     mech = free(pair, correction=FLANKS, **given, **losses)
     mech.parts["gear"].velocity[1] = 1.9
     exact = {"method": "dop853", "rtol": 1e-12, "atol": 1e-14}  # for loads that set in and part

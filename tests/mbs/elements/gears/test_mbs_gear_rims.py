@@ -174,29 +174,32 @@ def test_teeth_travel_around_a_round_rim_without_a_trace(tooth):
     assert between == pytest.approx(first, rel=2e-3)  # corners of the polygon
 
 
-def pressed(damping=0.0, friction=0.0):
-    """Two flexible wheels that move anyhow, teeth under load; coordinates and velocities."""
+def soft_wheels(method, reference, others=(), omega=(0.0, 0.0), **mesh):
+    """Two flexible wheels in mesh; other interfaces than their rims are rigid."""
     mech, wheels = rom.Mechanism(gravity=(0, 0, 0)), []
-    for name, x in (("pinion", 0.0), ("gear", PAIR.distance)):
-        body = rom.reduce(
-            tube(INNER, RIM, LENGTH, (16, 1, 4)), method=rom.CraigBampton(2), certify=False,
-            interfaces={"rim": rom.FourierLegendre(2, 1), "low": "rbe2"}, reference="low",
-        )  # fmt: skip
-        wheels.append(mech.add_flexible(name, body, at=(x, 0, 0)).marker("rim"))
-    rub = {"friction": friction, "transition_speed": 0.1} if friction else {}
-    mech.gear_mesh("mesh", *wheels, axis=(0, 0, 1), pair=PAIR, stiffness=K, phase=PHASE,
-                   entry=0.0, cells=5, damping=damping, **rub)  # fmt: skip
+    kinds = {"rim": rom.FourierLegendre(2, 1)} | dict.fromkeys(others, "rbe2")
+    for name, x, w in zip(("pinion", "gear"), (0.0, PAIR.distance), omega, strict=True):
+        given = {"interfaces": kinds, "reference": reference, "certify": False}
+        body = rom.reduce(tube(INNER, RIM, LENGTH, (16, 1, 4)), method=method, **given)
+        wheels.append(mech.add_flexible(name, body, at=(x, 0, 0), omega=(0, 0, w)).marker("rim"))
+    mech.gear_mesh("mesh", *wheels, axis=(0, 0, 1), pair=PAIR, phase=PHASE, cells=5, **mesh)
+    return mech
+
+
+def pressed(**losses):
+    """Two flexible wheels that move anyhow, teeth under load; coordinates and velocities."""
+    mech = soft_wheels(rom.CraigBampton(2), "low", ["low"], stiffness=K, entry=0.0, **losses)
     packed, W = prepared(mech)
     rng, n = np.random.default_rng(3), packed.v.size
     delta = 1e-6 * rng.normal(size=n)
     delta[5] = 3e-4
     r = packed.system.bodies.r[0]
     delta[6 : 6 + r], delta[12 + r :] = 1e-9 * rng.normal(size=(2, r))
-    return mech, packed, W, shifted(packed, packed.q, delta), 1e-3 * rng.normal(size=n)
+    return packed, W, shifted(packed, packed.q, delta), 1e-3 * rng.normal(size=n)
 
 
 def test_forces_on_rims_are_the_gradient_of_the_energy():
-    _, packed, W, q, v = pressed()
+    packed, W, q, v = pressed()
     gradient, whole = energy_gradient(packed, W, q, 1e-8), forces_at(packed, W, q, 0 * v)
     packed.elements[GEAR_MESHES_FAMILY].stiffness[:] = 0.0
     found, r = whole - forces_at(packed, W, q, 0 * v), packed.system.bodies.r[0]
@@ -207,9 +210,9 @@ def test_forces_on_rims_are_the_gradient_of_the_energy():
     assert_allclose(found, gradient, atol=2e-3 * np.abs(gradient).max())
 
 
-@pytest.mark.parametrize("friction", [0.0, 0.1])
-def test_tangents_of_rims_are_differences_of_their_forces(friction):
-    _, packed, W, q, v = pressed(damping=1e-5, friction=friction)
+@pytest.mark.parametrize("rub", [{}, {"friction": 0.1, "transition_speed": 0.1}], ids=str)
+def test_tangents_of_rims_are_differences_of_their_forces(rub):
+    packed, W, q, v = pressed(damping=1e-5, **rub)
     (K, stiff), (D, loss) = by_position(packed, W, q, v), by_velocity(packed, W, q, v)
     packed.elements[GEAR_MESHES_FAMILY].stiffness[:] = 0.0
     K_body, D_body = by_position(packed, W, q, v)[0], by_velocity(packed, W, q, v)[0]
@@ -238,15 +241,8 @@ def test_a_rack_presses_a_rim_as_a_gear_without_end_does():
 
 def test_free_wheels_with_soft_rims_keep_momentum_and_energy():
     """Their teeth hit and part again; what damping and sliding take away is counted."""
-    mech, wheels = rom.Mechanism(gravity=(0, 0, 0)), []
-    for name, x, spin in (("pinion", 0.0, 20.0), ("gear", PAIR.distance, 1.0)):
-        body = rom.reduce(
-            tube(INNER, RIM, LENGTH, (16, 1, 4)), method=rom.Guyan(), certify=False,
-            interfaces={"rim": rom.FourierLegendre(2, 1)}, reference="mean-axis",
-        )  # fmt: skip
-        wheels.append(mech.add_flexible(name, body, at=(x, 0, 0), omega=(0, 0, spin)).marker("rim"))
-    mech.gear_mesh("mesh", *wheels, axis=(0, 0, 1), pair=PAIR, stiffness=1e9, phase=PHASE, cells=5,
-                   damping=1e-6, friction=0.1, transition_speed=0.1)  # fmt: skip
+    losses = {"damping": 1e-6, "friction": 0.1, "transition_speed": 0.1}
+    mech = soft_wheels(rom.Guyan(), "mean-axis", omega=(20.0, 1.0), stiffness=1e9, **losses)
     sol = rom.simulate(mech, t_end=2e-4, method="dop853", rtol=1e-8, atol=1e-10)
     loads = [one.force.sum() for one in rom.mbs.tooth_loads(sol, "mesh")]
     assert max(loads) > 1000

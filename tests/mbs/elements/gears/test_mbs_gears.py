@@ -22,6 +22,7 @@ HELICAL = GearPair((26, 40), 4e-3, 0.05, helix=0.35, thinning=5e-5)
 FLANKS = Correction(relief=(15e-6, 10e-6), extent=(2e-3, 3e-3), power=1.5, crowning=4e-6,
                     slope=5e-6, pitch=(1e-6 * np.arange(26) % 7, ()))  # fmt: skip
 K = 1.3e10
+STILL = np.zeros(12)
 LAW = {"stiffness": K, "entry": 0.0, "conservative": False}
 
 
@@ -29,14 +30,9 @@ def wheels(pair=SPUR, turned=None, **more):
     return free_wheels(pair, turned=turned, **LAW | more)
 
 
-def moved(packed, q):
-    """Coordinates of the wheels that moved by q (12,) from the datum."""
-    return shifted(packed, packed.q, q)
-
-
-def wrench(packed, W, q, v):
-    """(12,) forces and moments of the teeth on both wheels."""
-    residual_at(packed.system, W, q, v, 0 * v, np.zeros(0))
+def wrench(packed, W, moved, v=STILL):
+    """(12,) forces and moments of the teeth on both wheels, which moved (12,) from the datum."""
+    residual_at(packed.system, W, shifted(packed, packed.q, moved), v, 0 * v, np.zeros(0))
     teeth = packed.elements[GEAR_MESHES_FAMILY]
     return W.wrench[[teeth.i[0], teeth.j[0]]].ravel()
 
@@ -56,12 +52,13 @@ def test_forces_in_the_plane_are_those_of_the_plane_model(pair, phase):
             q[at], v[at] = 2e-5 * rng.normal(), 1e-3 * rng.normal()
         q[5], q[11], v[5], v[11] = 0.3 + side * 1.2e-3, -0.3 * 26 / 40, 1e-2, 3e-3
         wanted = mesh.forces(q, phase, v)
-        found = wrench(packed, W, moved(packed, q), v)
+        found = wrench(packed, W, q, v)
         assert np.abs(wanted.force).max() > 1e3
         assert_allclose(found, wanted.force, atol=1e-8 * np.abs(wanted.force).max())
         assert W.power[2] == pytest.approx(wanted.lost, rel=1e-7)
         assert teeth.load[0] == pytest.approx(np.maximum(wanted.load, 0).sum(), rel=1e-8)
-        tangents_at(packed.system, W, moved(packed, q), v, 0 * v, np.zeros(0), (0.0, 0.0, 1.0))
+        there = shifted(packed, packed.q, q)
+        tangents_at(packed.system, W, there, v, 0 * v, np.zeros(0), (0.0, 0.0, 1.0))
         size = np.abs(wanted.stiffness).max()
         assert_allclose(teeth.tangent[0], wanted.stiffness, atol=1e-8 * size)
         W.power[:] = 0.0
@@ -74,7 +71,7 @@ def test_shifts_along_the_axis_and_tilts_add_what_they_do_in_first_order(pair):
     q = 1e-9 * np.random.default_rng(2).normal(size=12)
     q[[5, 11]] += 1e-4
     wanted = mesh.forces(q, 0.4).force
-    found = wrench(packed, W, moved(packed, q), np.zeros(12))
+    found = wrench(packed, W, q)
     bare = np.zeros(12)
     bare[[5, 11]] = q[[5, 11]]
     change = wanted - mesh.forces(bare, 0.4).force
@@ -92,7 +89,7 @@ def test_forces_of_helical_teeth_are_those_of_the_textbook(helix, turn):
     pair = GearPair((26, 40), 4e-3, 0.05, helix=helix, thinning=5e-5)
     packed, W = prepared(wheels(pair, phase=0.4))
     q = turn * np.eye(12)[5]
-    found = wrench(packed, W, moved(packed, q), np.zeros(12))
+    found = wrench(packed, W, q)
     r1, r2 = (z * 4e-3 / (2 * np.cos(helix)) for z in (26, 40))
     along = found[5] / r1
     assert along * turn < 0.0
@@ -130,7 +127,7 @@ def test_forces_turn_with_the_whole():
         part = q.reshape(4, 3).copy()
         if how is not None:  # translations in the world, rotations in the body
             part[[0, 2]] = part[[0, 2]] @ A.T
-        found.append(wrench(packed, W, moved(packed, part.ravel()), np.zeros(12)).reshape(4, 3))
+        found.append(wrench(packed, W, part.ravel()).reshape(4, 3))
     assert np.abs(found[0]).max() > 100
     assert_allclose(found[1], found[0] @ A.T, atol=1e-8 * np.abs(found[0]).max())
 
@@ -140,7 +137,7 @@ def test_tangents_are_derivatives_but_for_the_turning_of_forces(damping):
     packed, W = prepared(wheels(HELICAL, damping=damping, friction=0.1, transition_speed=0.1))
     q, v = np.zeros(12), 1e-4 * np.random.default_rng(0).normal(size=12)
     q[[5, 11]] = 1e-4, 0.0
-    at = moved(packed, q)
+    at = shifted(packed, packed.q, q)
     found, stiff = by_position(packed, W, at, v)
     assert_allclose(found, stiff, atol=3e-3 * np.abs(stiff).max())
     found, loss = by_velocity(packed, W, at, v)
@@ -168,18 +165,13 @@ def test_the_mesh_vibrates_as_a_spring_along_the_line_of_action():
     mech.torque("drive", mech.parts["pinion"].marker(ORIGIN), (0, 0, 50.0))
     mech.rotational_spring("coil", "gear axle", stiffness=1e5)
     state = rom.equilibrium(mech)
-    small = PlaneMesh(pair, K).forces(state_motion(mech, state), 0.0).stiffness
+    angle = [rom.snapshot(mech, state).joint(f"{n} axle").angle[0] for n in ("pinion", "gear")]
+    small = PlaneMesh(pair, K).forces(np.eye(12)[[5, 11]].T @ angle, 0.0).stiffness
     k = small[5, 5] / pair.rb[0] ** 2
     A = k * np.outer(pair.rb, pair.rb) + np.diag([0.0, 1e5])
     wanted = np.sqrt(np.linalg.eigvals(A / np.array(J)[:, None]))
     found = np.sort(rom.linearize(mech, state).frequencies) * 2 * np.pi
     assert_allclose(found, np.sort(wanted), rtol=1e-6)
-
-
-def state_motion(mech, state):
-    """(12,) turns of both wheels."""
-    angle = [rom.snapshot(mech, state).joint(f"{n} axle").angle[0] for n in ("pinion", "gear")]
-    return np.eye(12)[[5, 11]].T @ angle
 
 
 def test_many_turns_keep_the_ratio_of_the_teeth_and_the_torque():
@@ -221,7 +213,7 @@ def test_how_deep_rigid_flanks_are_in_each_other(turn, away):
     packed, W = prepared(wheels())
     q = np.zeros(12)
     q[5], q[6] = turn, away
-    wrench(packed, W, moved(packed, q), 0 * q)
+    wrench(packed, W, q)
     one, two = (np.arccos(SPUR.rb.sum() / (SPUR.distance + x)) for x in (0.0, away))
     opened = SPUR.rb.sum() * (np.tan(two) - two - np.tan(one) + one)
     closed = max(SPUR.rb[0] * turn, -SPUR.rb[0] * turn - SPUR.backlash)
@@ -313,20 +305,19 @@ def test_tips_inside_a_ring_pass_each_other_or_are_refused(z1, addendum):
     assert {True, None} <= seen
 
 
-def planetary(planets=3):
+def planetary():
     """Sun driven, ring held by a stiff coil, planets on a carrier that is braked."""
     mech = rom.Mechanism(gravity=(0, 0, 0))
     ground = mech.ground.marker(ORIGIN)
 
-    def body(name, J, at=ORIGIN, mass=0.2):
-        return mech.add_rigid(name, mass=mass, inertia=(J, J, J), at=at)
+    def body(name, J, at=ORIGIN):
+        return mech.add_rigid(name, mass=0.2, inertia=(J, J, J), at=at)
 
     sun, ring, carrier = (body(n, J) for n, J in (("sun", 1e-4), ("ring", 2e-3), ("carrier", 5e-4)))
     for part in (sun, ring, carrier):
         mech.revolute(f"{part.name} axle", ground, part.marker(ORIGIN), axis=Z)
     mech.rotational_spring("housing", "ring axle", stiffness=1e6, damping=20.0)
-    for k in range(planets):
-        angle = 2 * np.pi * k / planets
+    for k, angle in enumerate(2 * np.pi / 3 * np.arange(3)):
         at = 0.048 * np.array([np.cos(angle), np.sin(angle), 0.0])
         planet = body(f"planet {k}", 5e-5, at)
         mech.revolute(f"pin {k}", carrier.marker(at), planet.marker(ORIGIN), axis=Z)
@@ -410,7 +401,7 @@ def test_the_approach_is_that_of_two_involute_curves(pair, seed):
     q[5] = (1e-5 - approach_of_curves(pair, s, q[6:8], (0.0, q[11]))) / pair.rb[0]
     overlap = approach_of_curves(pair, s, q[6:8], (q[5], q[11]))
     assert overlap == pytest.approx(1e-5, rel=0.1)
-    wrench(packed, W, moved(packed, q), np.zeros(12))
+    wrench(packed, W, q)
     load = packed.elements[GEAR_MESHES_FAMILY].load[0]
     lines = round(load / (K * pair.width * overlap))  # all of them overlap alike
     assert lines in (1, 2)
@@ -427,7 +418,7 @@ def test_teeth_take_up_their_load_evenly_and_bear_as_much_as_at_once():
         mesh = packed.elements[GEAR_MESHES_FAMILY]
         for phase in phases:
             mesh.size[0, PHASE] = phase
-            wrench(packed, W, moved(packed, q), np.zeros(12))
+            wrench(packed, W, q)
             found.append(mesh.load[0])
         loads[entry] = np.array(found)
     one = K * pair.width * 1e-4 * pair.rb[0]  # of a line

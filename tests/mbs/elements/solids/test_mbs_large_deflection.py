@@ -11,15 +11,9 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 import rom
+from cases.mbs import tangents
 from cases.mbs.mechanisms import nodal_body, prepared, random_body, random_pose, random_state
-from cases.mbs.tangents import (
-    check_tangents,
-    constraint_derivatives,
-    difference,
-    energy_gradient,
-    forces_at,
-    shifted,
-)
+from cases.mbs.tangents import check_tangents, difference, forces_at, shifted
 from cases.mbs.trusses import FREE, MASSES, NODES, START, bar_forces, covariance_of, truss
 from rom import rotation
 from rom.body.nonlinear.quartic import Quartic, n_entries
@@ -114,7 +108,7 @@ def test_constraints_and_tangents_at_fitted_markers_are_exact(flat):
     packed.system.markers.twist[packed.system.markers.fit < 0] *= 1e-4
     s, state = packed.system, random_state(rng, packed)
     q, v, *_ = state
-    G, _ = constraint_derivatives(packed, W, q, v)
+    G, _ = tangents.constraint_derivatives(packed, W, q, v)
     linearize_constraints(s, W, q, v)
     assert_allclose(W.G, G, atol=2e-8 * np.abs(G).max())
     check_tangents(packed, W, state, np.eye(v.size), 1e-6)
@@ -228,7 +222,7 @@ def test_forces_are_slopes_of_the_energy_and_tangents_those_of_the_forces():
         linear.add_flexible(part.name, plain, at=part.at, orientation=part.p)
     other, W2 = prepared(linear)
     found = found - forces_at(other, W2, q, 0 * v, lam=lam)
-    slope = energy_gradient(packed, W, q)
+    slope = tangents.energy_gradient(packed, W, q)
     assert_allclose(found, slope, atol=1e-7 * np.abs(slope).max())
     for name, t in zip(mech.parts, at, strict=True):
         body = mech.parts[name].flexible
