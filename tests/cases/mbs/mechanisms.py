@@ -61,10 +61,8 @@ def nodal_body(x, Ms, phi, K=None, D=None, markers=None, name="body"):
         K=K,
         D=np.zeros((r, r)) if D is None else D,
         markers={
-            key: Marker(
-                key, np.asarray(p), np.asarray(T), np.asarray(R), "rbe2", np.zeros((6, 6 + r))
-            )
-            for key, (p, T, R) in (markers or {}).items()
+            key: Marker(key, *map(np.asarray, place), "rbe2", np.zeros((6, 6 + r)))
+            for key, place in (markers or {}).items()
         },
         omega=np.sort(omega),
         labels=tuple(f"shape {k}" for k in range(r)),

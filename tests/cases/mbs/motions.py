@@ -7,6 +7,7 @@ import numpy as np
 from benchmarks.models import rigid_chain
 from cases.beam import stiffened_beam
 from cases.mbs.mechanisms import random_body, simulate_quietly, slider_crank
+from cases.mbs.parts import X, turned
 from cases.paths import TESTS
 from rom.mbs.mechanism import Mechanism
 
@@ -94,6 +95,23 @@ def hub_and_panel(frame="root"):
     wing = mech.add_flexible("panel", panel.with_reference(frame), at=(0.3, 0, 0), **moving)
     mech.revolute("hinge", hub.marker((0.3, 0, 0)), wing.marker("root"), axis=z)
     mech.rotational_spring("coil", "hinge", stiffness=200.0)
+    return mech
+
+
+def flexible_four_bar(coupler, rocker, bend, angle):
+    """A driven crank of 0.2 m, two beams and the ground, one of the joints a ball."""
+    mech, z, fold = Mechanism(gravity=(0, -G, 0)), (0, 0, 1), turned(bend)
+    L, M = (body.marker("tip").point[0] for body in (coupler, rocker))
+    pins = {"o": (-0.1, 0, 0), "a": (0.1, 0, 0)}
+    crank = mech.add_rigid("crank", mass=1, inertia=(0.01,) * 3, at=(0.1, 0, 0), markers=pins)
+    one = mech.add_flexible("coupler", coupler, at=0.2 * X)
+    two = mech.add_flexible("rocker", rocker, at=(0.2 + L) * X, orientation=fold)
+    feet = mech.ground.marker((0, 0, 0)), mech.ground.marker((0.2 + L) * X + M * fold @ X)
+    mech.revolute("main", feet[0], crank.marker("o"), axis=z)
+    mech.revolute("pin", crank.marker("a"), one.marker("root"), axis=z)
+    mech.spherical("wrist", one.marker("tip"), two.marker("root"))
+    mech.revolute("foot", feet[1], two.marker("tip"), axis=z)
+    mech.drive("motor", "main", angle)
     return mech
 
 

@@ -7,7 +7,7 @@ from scipy.interpolate import CubicSpline
 
 import rom
 from cases.mbs.mechanisms import crank_torque, random_body, slider_crank
-from cases.mbs.parts import X, Z, on_hinge
+from cases.mbs.parts import X, Z, on_hinge, slender
 from rom.errors import ConfigError, ModelError
 from rom.rotation import matrix
 
@@ -144,15 +144,9 @@ def linkage(n, seed):
 def as_mechanism(n, hinges, bars, feet):
     mech, owner = rom.Mechanism(gravity=(0, -G, 0)), {}
     for k, ((start, end), foot) in enumerate(zip(bars, feet, strict=True)):
-        a = np.array([*(foot if start is None else hinges[start]), 0.0])
-        b = np.array([*hinges[end], 0.0])
-        length, x = np.linalg.norm(b - a), (b - a) / np.linalg.norm(b - a)
-        turned = np.column_stack([x, np.cross((0, 0, 1), x), (0, 0, 1)])
-        ends = {"a": (-length / 2, 0, 0), "b": (length / 2, 0, 0)}
-        inertia = (1e-3 * length**2, length**2 / 12, length**2 / 12)
-        where = {"at": (a + b) / 2, "orientation": turned}
-        bar = mech.add_rigid(f"bar {k}", mass=1.0, inertia=inertia, markers=ends, **where)
-        before = mech.ground.marker(a) if start is None else owner[start]
+        a = foot if start is None else hinges[start]
+        bar = slender(mech, f"bar {k}", a, hinges[end])
+        before = mech.ground.marker((*a, 0)) if start is None else owner[start]
         mech.revolute(f"foot {k}", before, bar.marker("a"), axis=(0, 0, 1))
         if end in owner:
             mech.revolute(f"head {k}", owner[end], bar.marker("b"), axis=(0, 0, 1))

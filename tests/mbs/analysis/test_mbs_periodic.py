@@ -10,6 +10,7 @@ from scipy.special import ellipk
 import rom
 from cases.beam import stiffened_beam
 from cases.mbs.parts import ORIGIN, X, Y, Z, below, on_guide, on_hinge
+from cases.refusals import refused, refuses
 from rom.errors import ConfigError, ModelError, SolverError
 
 STILL = {"gravity": (0, 0, 0)}
@@ -259,21 +260,21 @@ def test_settling_brings_the_start_nearer():
     assert found.passes <= 4
 
 
-@pytest.mark.parametrize(("more", "message"), [
-    ({"period": 1.0, "conservative": True}, "nothing drives"),
-    ({"period": 1.0, "turns": {"giude": 1.0}}, "no joint or body 'giude'"),
-    ({"period": 1.0, "turns": {"guide": 1.0}}, "'guide' is prismatic; take a revolute"),
-])  # fmt: skip
-def test_wrong_arguments_are_named(more, message):
-    with pytest.raises(ConfigError, match=message):
-        rom.periodic_motion(pushed(2 * np.pi), **more)
+def asked(mech=None, **more):
+    """Ask for a motion that repeats, by default of a mass that is pushed once a second."""
+    return lambda: rom.periodic_motion(mech or pushed(2 * np.pi), **more)
 
 
-def test_a_load_that_does_not_repeat_is_named():
-    with pytest.raises(ModelError, match=r"'push' does not repeat with the period 1.2 s"):
-        rom.periodic_motion(pushed(2 * np.pi), period=1.2)
-    with pytest.raises(ModelError, match="'push' changes with time, so that the period is not"):
-        rom.periodic_motion(pushed(2 * np.pi), guess=1.0)
+test_what_has_no_such_motion_is_refused_by_name = refused(
+    (asked(period=1.0, conservative=True), ConfigError, "nothing drives"),
+    (asked(period=1.0, turns={"giude": 1.0}), ConfigError, "no joint or body 'giude'"),
+    (asked(period=1.0, turns={"guide": 1.0}), ConfigError, "'guide' is prismatic; take a revolute"),
+    (asked(period=1.2), ModelError, "'push' does not repeat with the period 1.2 s"),
+    (asked(guess=1.0), ModelError, "'push' changes with time, so that the period is not"),
+    (asked(slider()[0], guess=3.0), SolverError, "state of rest, not a motion"),
+    # resonance without damping
+    (asked(pushed(2.0, damping=0.0), period=np.pi, rho_inf=1.0), SolverError, "no motion repeats"),
+)
 
 
 def timed(t, parameters, motion, memory, out):
@@ -305,14 +306,8 @@ def test_a_law_is_not_refused_for_the_digits_of_a_late_time():
 
 
 def test_a_start_of_another_mechanism_is_refused():
-    other = rom.equilibrium(double_pendulum())
-    with pytest.raises(ConfigError, match=r"the state has 14 coordinates.*this mechanism has 7"):
-        rom.periodic_motion(pushed(1.0), period=2 * np.pi, start=other)
-
-
-def test_rest_is_no_limit_cycle():
-    with pytest.raises(SolverError, match="state of rest, not a motion"):
-        rom.periodic_motion(slider(damping=0.4)[0], guess=3.0)
+    call = asked(period=1.0, start=rom.equilibrium(double_pendulum()))
+    refuses(ConfigError, r"the state has 14 coordinates.*this mechanism has 7", call)
 
 
 def test_where_no_motion_repeats_the_gap_is_told_and_the_last_attempt_kept():
@@ -322,11 +317,6 @@ def test_where_no_motion_repeats_the_gap_is_told_and_the_last_attempt_kept():
     with pytest.raises(SolverError, match="no motion repeats with the period 1 s") as caught:
         rom.periodic_motion(mech, period=1.0)
     assert caught.value.solution.t[-1] - caught.value.solution.t[0] == pytest.approx(1.0)
-
-
-def test_resonance_without_damping_is_not_called_a_motion():
-    with pytest.raises(SolverError, match="no motion repeats"):
-        rom.periodic_motion(pushed(2.0, damping=0.0), period=np.pi, rho_inf=1.0)
 
 
 def test_an_oscillator_with_gaps_has_the_motion_of_its_pieces():

@@ -9,6 +9,7 @@ import rom
 from cases.long import few
 from cases.mbs.mechanisms import prepared, random_body, simulate_quietly
 from cases.mbs.parts import on_axle, slender
+from cases.refusals import refuses
 from rom.errors import ConfigError, ModelError, RomWarning
 from rom.mbs.equations import packing
 from rom.mbs.equations.equations import linearize_constraints
@@ -161,11 +162,8 @@ def test_a_state_without_the_coil_is_refused():
     bare, wound = coil(), coil()
     bare.turns.clear()
     state = simulate(bare, t_end=0.01, dt=1e-3).final
-    with pytest.raises(
-        ConfigError,
-        match="0 followed joint coordinates and remembered numbers; this mechanism has 1",
-    ):
-        simulate(wound, t_end=0.02, dt=1e-3, state=state)
+    words = "0 followed joint coordinates and remembered numbers; this mechanism has 1"
+    refuses(ConfigError, words, simulate, wound, t_end=0.02, dt=1e-3, state=state)
 
 
 GRAVITY = (3.0, 0.0, -9.81)
@@ -185,10 +183,8 @@ def ladder(n, *, repeated=True):
         for side, x in enumerate((0.0, 1.0)):
             rail = mech.add_rigid(f"rail {k}.{side}", mass=1.0, inertia=(0.1,) * 3,
                                   at=(x, 0, -k - 0.5))  # fmt: skip
-            top, foot, end = (
-                above[side], rail.marker((0, 0, -0.5)), rung.marker((side - 0.5, 0, 0))
-            )  # fmt: skip
-            mech.revolute(f"up {k}.{side}", top, rail.marker((0, 0, 0.5)), axis=(0, 1, 0))
+            foot, end = rail.marker((0, 0, -0.5)), rung.marker((side - 0.5, 0, 0))
+            mech.revolute(f"up {k}.{side}", above[side], rail.marker((0, 0, 0.5)), axis=(0, 1, 0))
             if side == 0 or repeated:
                 mech.revolute(f"down {k}.{side}", foot, end, axis=(0, 1, 0))
             else:
@@ -253,9 +249,8 @@ def test_statics_and_small_motions_are_those_of_joints_that_repeat_nothing():
 
 
 def test_joints_that_share_loads_are_named_in_large_mechanisms():
-    with pytest.warns(
-        RomWarning, match="21 of 140 constraints repeat others; joints up 0.0, .* and 20 more"
-    ):
+    words = "21 of 140 constraints repeat others; joints up 0.0, .* and 20 more"
+    with pytest.warns(RomWarning, match=words):
         rom.simulate(ladder(LOOPS), t_end=1e-3, dt=1e-3)
 
 

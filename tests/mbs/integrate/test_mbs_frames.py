@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 
 from cases.beam import stiffened_beam
 from cases.long import ROM_LONG, few
-from cases.mbs.motions import hub_and_panel
+from cases.mbs.motions import flexible_four_bar, hub_and_panel
 from cases.mbs.parts import turned
 from cases.refusals import refuses
 from rom import rotation
@@ -51,20 +51,8 @@ def chain(rng, frame):
 def loop(rng, frame):
     """Four-bar linkage of a driven crank, two beams and the ground."""
     coupler, rocker = beams(rng, frame, 2)
-    L, M = (body.marker("tip").point[0] for body in (coupler, rocker))
-    mech, bend = Mechanism(gravity=(0, -9.81, 0)), -rng.uniform(0.8, 2.0)
-    pins = {"o": (-0.1, 0, 0), "a": (0.1, 0, 0)}
-    crank = mech.add_rigid("crank", mass=1, inertia=(0.01,) * 3, at=(0.1, 0, 0), markers=pins)
-    one = mech.add_flexible("coupler", coupler, at=0.2 * X)
-    two = mech.add_flexible("rocker", rocker, at=(0.2 + L) * X, orientation=turned(bend))
-    feet = mech.ground.marker((0, 0, 0)), mech.ground.marker((0.2 + L) * X + M * turned(bend) @ X)
-    mech.revolute("main", feet[0], crank.marker("o"), axis=Z)
-    mech.revolute("pin", crank.marker("a"), one.marker("root"), axis=Z)
-    mech.spherical("wrist", one.marker("tip"), two.marker("root"))
-    mech.revolute("foot", feet[1], two.marker("tip"), axis=Z)
-    speed = rng.uniform(2, 6)
-    mech.drive("motor", "main", lambda t: speed * t**2)
-    return mech
+    bend, speed = -rng.uniform(0.8, 2.0), rng.uniform(2, 6)
+    return flexible_four_bar(coupler, rocker, bend, lambda t: speed * t**2)
 
 
 def hub(rng, frame):
