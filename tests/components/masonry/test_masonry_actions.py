@@ -441,8 +441,6 @@ test_what_is_no_masonry_and_no_action_is_named_where_it_is_made = refused(
     (lambda: Masonry((), (), 1e9, 0.5), "all of 0 stones are held"),
     (lambda: Masonry((stone(box(), **SOFT),), (0,), 1e9, 0.5), "all of 1 stones are held"),
     (lambda: replace(ONE, gravity=(0.0, 0.0, -9.81)), "gravity = .* a row of 2"),
-    (lambda: replace(ONE, reach=-1.0), "reach = -1 must"),
-    (lambda: replace(ONE, stiffness=np.inf), "stiffness = inf"),
     (lambda: simulate(ONE, t_end=1.0, dt=0.1, actions=BaseMotion(1.0)), "actions = "),
     (lambda: simulate(ONE, t_end=1.0, dt=0.1, v=np.full((1, 6), np.nan)), "v = .* must be finite"),
     error=(ConfigError, ModelError),
