@@ -12,24 +12,17 @@ import rom
 from cases.components.updating import BOLTS, assert_right, crossed, family_of, halves, noisy_test
 from cases.files.schema import errors
 from cases.long import ROM_LONG
+from rom import updating
 from rom.cli.main import main
 from rom.cli.schemas import schema
 from rom.components.updating.frf_data import noisy
 from rom.parametric import FamilyAssembly
-from rom.updating import (
-    AddedMass,
-    Channels,
-    GroundSpring,
-    Responses,
-    candidates,
-    place,
-)
 
 pytestmark = pytest.mark.once  # the environment without FEniCSx has no h5py
 PARAMETERS = {name: rom.YoungsModulus(name, 0.4, 2.5) for name in ("inner", "outer")}
 TRUE = {"inner": 1.3, "outer": 0.8}
-SPRING = GroundSpring("tip", (0.0, 2e5, 3e5), 0.1, 10.0)
-MASS = AddedMass("tip", 0.4, 0.1, 10.0)
+SPRING = updating.GroundSpring("tip", (0.0, 2e5, 3e5), 0.1, 10.0)
+MASS = updating.AddedMass("tip", 0.4, 0.1, 10.0)
 WORDS = ["--family", "family.rom.npz", "--fixed", "root", "--damping", "0.02"]
 ATTACHED = ["--spring", "soil=tip:0,2e5,3e5:0.1:10", "--mass", "cable=tip:0.4:0.1:10"]
 
@@ -49,13 +42,13 @@ def folder(tmp_path_factory):
     w = 2 * np.pi * f[:, None]
     own = np.delete(np.arange(12), 10)  # of two along y on the rigid face of the tip one is enough
     for name, seeing, force in (
-        ("test.h5", sensors, Channels([[0.75, 0.1, 0.0]], [[0, 1, 2]])),
+        ("test.h5", sensors, updating.Channels([[0.75, 0.1, 0.0]], [[0, 1, 2]])),
         ("driven.h5", sensors.some(own), sensors.some([7])),
     ):
         seen, driven = (c.rows(true, "sensor") @ Phi for c in (seeing, force))
         H = np.einsum("sn,fn,en->fse", seen, 1 / (omega**2 - w**2 + 0.04j * w * omega), driven)
         H = noisy(H, np.sqrt(2) * 0.02, np.random.default_rng(2))
-        test = Responses(f, H, seeing, force, 1 / (1 + 2 * 50 * 0.02**2), 50)
+        test = updating.Responses(f, H, seeing, force, 1 / (1 + 2 * 50 * 0.02**2), 50)
         rom.io.write_responses(test, path / name)
     return path
 
@@ -142,8 +135,8 @@ def test_a_test_is_planned(capsys, ending):
              *ATTACHED[:2], "-o", f"plan.{ending}"]  # fmt: skip
     found = told(["update", *WORDS, *words, "--force", "--json"], capsys)
     family = rom.load("family.rom.npz")
-    offered = candidates(family.body, 20, fixed=("root",))
-    same = place(
+    offered = updating.candidates(family.body, 20, fixed=("root",))
+    same = updating.place(
         family, offered, offered, np.linspace(20, 900, 100), n_sensors=5, n_inputs=2, noise=0.02,
         fixed=("root",), attached={"soil": SPRING}, damping=0.02, prior={"inner": 0.3},
     )  # fmt: skip
@@ -171,7 +164,7 @@ def test_points_are_drawn_also_where_they_are_off_the_body(capsys, monkeypatch):
     test = rom.io.read_responses("test.h5")
     points = np.array(test.sensors.points)
     points[3, 2] += 0.5
-    off = replace(test, sensors=Channels(points, test.sensors.directions))
+    off = replace(test, sensors=updating.Channels(points, test.sensors.directions))
     rom.io.write_responses(off, "off.h5")
     capsys.readouterr()
     assert main(["update", "off.h5", *WORDS, "--picture", "points.png"]) == 2
@@ -237,7 +230,7 @@ def bolted(folder):
     points = [[x, y, 0.08] for x in (0.25, 0.5, 0.75, 1.0) for y in (0.0, 0.1)]
     channels = (
         crossed(points, ("frame",) * 8 + ("arm",) * 8),
-        Channels([[0.75, 0.1, 0]], [[0, 1, 2]]),
+        updating.Channels([[0.75, 0.1, 0]], [[0, 1, 2]]),
     )
     whole, f = FamilyAssembly(families), np.linspace(20, 900, 100)
     how = {"level": 0.03, "averages": 50, "seed": 4, "fixed": (("frame", "root"),)}

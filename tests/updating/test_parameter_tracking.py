@@ -10,19 +10,13 @@ from scipy.stats import chi2
 import rom
 from cases.components.updating import assert_alike, family_of, refuse
 from cases.mbs.fmu_instance import Instance, fmpy
+from rom import updating
 from rom.body.recovery import StressRecovery
 from rom.components.updating.observers import parameter_tracking
 from rom.components.updating.observers.operation import discrete
 from rom.components.updating.observers.parameter_tracking import LINEAR_REACH
 from rom.errors import ParameterError, SolverError
-from rom.updating import (
-    Channels,
-    Drift,
-    GroundSpring,
-    Sensors,
-    parameter_tracker,
-    tracker,
-)  # fmt: skip
+from rom.updating import Channels, Drift, Sensors
 
 DT = 1e-3
 PARAMETERS = {
@@ -36,7 +30,7 @@ FEW = (
     Sensors(Channels([[0.5, 0.1, 0], [1.0, 0.1, 0]], [[0, 0, 1]] * 2), "acceleration", 0.5),
 )
 WANTED = (Sensors(TIP, "displacement"), Sensors(GAUGE, "stress"))
-SPRING = {"clamp": GroundSpring("tip", (0.0, 0.0, 4e6), 0.2, 5.0)}
+SPRING = {"clamp": updating.GroundSpring("tip", (0.0, 0.0, 4e6), 0.2, 5.0)}
 DRIFTS = {"E_inner": Drift(0.05, 0.02), "clamp": Drift(0.05, 0.02)}
 
 
@@ -61,7 +55,7 @@ def made(family, **options):
         "walk": 3000.0, "fixed": ("root",), "unmodelled": 1e-3, "attached": SPRING, **options,
     }  # fmt: skip
     channels = [options.pop(name) for name in ("sensors", "forces", "wanted")]
-    return parameter_tracker(family, *channels, **options)
+    return updating.parameter_tracker(family, *channels, **options)
 
 
 def walked(t, rng, n_t):
@@ -128,7 +122,7 @@ def test_held_factors_are_those_of_the_body_there(family, factors, damping):
     body = family.at(**factors)
     held_ratios = rom.ModalDamping(damping, fixed=("root",))
     body = replace(body, D=held_ratios.matrix(body))
-    own = tracker(body, few, force, WANTED, dt=DT, walk=3000.0, fixed=("root",))
+    own = updating.tracker(body, few, force, WANTED, dt=DT, walk=3000.0, fixed=("root",))
     y = 50 * np.sqrt(held.R) * np.random.default_rng(1).standard_normal((300, 3))
     assert_alike(held.run(y), own.run(y), ("values", "deviations", "forces"), 1e-6)
 
@@ -284,7 +278,7 @@ def test_the_fmu_names_the_parameter_that_leaves_its_range(family, tmp_path):
 def test_what_cannot_be_followed_is_named(family, filter_):
     wide = {name: Drift(0.3) for name in DRIFTS}
     _, _, y = walked(replace(filter_, drifts=wide), np.random.default_rng(0), 200)
-    narrow = {"clamp": GroundSpring("tip", (0.0, 0.0, 4e6), 0.98, 1.02)}
+    narrow = {"clamp": updating.GroundSpring("tip", (0.0, 0.0, 4e6), 0.98, 1.02)}
     lost, left = made(family, parameters=wide, attached=narrow), r"has reached .* 0\.98 to 1\.02"
     unknown, junk = {"E_outer": Drift(0.1)}, {"clamp": 0.1}
     refuse(

@@ -11,16 +11,8 @@ from cases.refusals import refused
 from cases.solid import block, reduced
 from rom import rotation
 from rom.body.reference import reference_motion, rigid_elastic, rigid_mass
-from rom.components.best_matching import (
-    Bodies,
-    ShapeSphere,
-    emergent_rate,
-    frame,
-    generators,
-    match,
-    rigid_part,
-    stacked,
-)
+from rom.components import best_matching
+from rom.components.best_matching import Bodies, ShapeSphere, frame, match, stacked
 from rom.errors import ConfigError, ModelError, SolverError
 
 MASS = np.array([1.0, 1.5, 2.0])
@@ -42,8 +34,8 @@ def turned(angles):
 
 
 def projector(m, x, **keep):
-    R = generators(x, **keep)
-    return R @ rigid_part(m, R, np.eye(len(R)))
+    R = best_matching.generators(x, **keep)
+    return R @ best_matching.rigid_part(m, R, np.eye(len(R)))
 
 
 # --- the projection ---
@@ -192,8 +184,8 @@ def test_matched_energy_of_finite_elements_is_that_of_their_elastic_modes(model)
 
 def test_matched_shapes_are_those_of_the_mean_axis_body(model, bodies):
     at_root, mean_axis = bodies
-    R, Phi = generators(model.points), at_root.surface.shape
-    X = rigid_part(model.M, R, Phi)
+    R, Phi = best_matching.generators(model.points), at_root.surface.shape
+    X = best_matching.rigid_part(model.M, R, Phi)
     assert_allclose(X, reference_motion(at_root, "mean-axis"), atol=1e-9 * np.abs(X).max())
     assert np.abs(X).max() > 0.1
     rest = Phi - R @ X
@@ -223,7 +215,7 @@ def floating(body, model, t_end, amplitude):
     shake = (model.points[:, 0] - 0.2) ** 2
     v = np.column_stack([0 * shake, shake, 0.5 * shake]).ravel()
     Phi = body.surface.shape
-    system = np.hstack([generators(model.points), Phi])
+    system = np.hstack([best_matching.generators(model.points), Phi])
     start = np.linalg.lstsq(system, amplitude * v, rcond=None)[0]  # the same motion in any frame
     mech.add_flexible("beam", body, velocity=start[:3], omega=start[3:6], qd=start[6:])
     sol = rom.simulate(mech, t_end=t_end, dt=2e-5, save_every=10)
@@ -460,7 +452,7 @@ def test_time_is_read_off_pictures_taken_by_anyone(janus):
         y = X[k + 1] @ A.T + np.array([np.sin(9 * s), s**2, -s])
         dy = rate[k] * V[k + 1] @ A.T + X[k + 1] @ dA.T + [9 * np.cos(9 * s), 2 * s, -1]
         kinetic = -bodies.potential(y)
-        assert emergent_rate(MASS, y, dy, kinetic) == pytest.approx(rate[k], rel=1e-8)
+        assert best_matching.emergent_rate(MASS, y, dy, kinetic) == pytest.approx(rate[k], rel=1e-8)
 
 
 def test_time_is_read_off_a_stack_of_pictures(janus):
@@ -471,7 +463,7 @@ def test_time_is_read_off_a_stack_of_pictures(janus):
     film = np.einsum("tab,tnb->tna", turns, x) + rng.normal(size=(len(x), 1, 3)) * [1, 1, 0]
     laid = stacked(MASS, film, plane=True)
     middle, step = (laid[1:] + laid[:-1]) / 2, np.diff(laid, axis=0)
-    dt = [emergent_rate(MASS, *pair, -bodies.potential(pair[0]))
+    dt = [best_matching.emergent_rate(MASS, *pair, -bodies.potential(pair[0]))
           for pair in zip(middle, step, strict=True)]  # fmt: skip
     assert np.sum(dt) == pytest.approx(12.0, rel=1e-4)
     assert_allclose(dt, np.diff(t), rtol=5e-3)
@@ -488,7 +480,7 @@ test_messages_name_what_does_not_fit = refused(
     (lambda: frame(MASS, CORNERS, CORNERS[:2]), ConfigError, "2 particles for"),
     (lambda: match(MASS, np.nan * CORNERS, CORNERS), ConfigError, "is not finite"),
     (lambda: stacked(MASS, CORNERS), ConfigError, r"the film has shape \(3, 3\)"),
-    (lambda: emergent_rate(MASS, CORNERS, CORNERS, -1.0), ModelError, "E - V = -1 J"),
+    (lambda: best_matching.emergent_rate(MASS, CORNERS, CORNERS, -1.0), ModelError, "E - V = -1 J"),
     (lambda: Bodies(MASS).potential(CORNERS[:2]), ConfigError, "2 positions"),
     (lambda: Bodies(MASS).complexity(0 * CORNERS), ModelError, "in the same place"),
     (lambda: Bodies(MASS).move(CORNERS, CORNERS[:2], [0.0, 1.0]), ConfigError, "for 3 bodies"),

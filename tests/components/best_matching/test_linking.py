@@ -6,14 +6,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from rom.components.best_matching import (
-    Bodies,
-    Extended,
-    Linking,
-    ShapeSphere,
-    newton_gauge,
-    shape_gauge,
-)
+from rom.components import best_matching
+from rom.components.best_matching import Bodies, Extended, Linking
 from rom.errors import ConfigError, ModelError, SolverError
 
 MASS = np.array([1.0, 1.5, 2.0, 0.7, 1.2])
@@ -113,7 +107,7 @@ def test_newtons_variables_do_not_see_the_scale(five):
 
 def test_phi_zero_is_newton(five):
     linking, state, t, (x, v) = five
-    found = linking.move(state, newton_gauge, t)
+    found = linking.move(state, best_matching.newton_gauge, t)
     assert_allclose(found.x, x, atol=1e-9)
     assert_allclose(found.p, MASS[:, None] * v, atol=1e-9)
     assert_allclose(found.time, t, atol=1e-12)
@@ -127,7 +121,7 @@ def test_pi_as_clock_is_newton_without_size(five):
     linking, state, t, (x, v) = five
     clock = np.array([linking.bodies.growth(*s) for s in zip(x, v, strict=True)])
     small = state.scaled(np.log(np.sqrt(linking.bodies.size(state.x))))
-    found = linking.move(small, shape_gauge, clock)
+    found = linking.move(small, best_matching.shape_gauge, clock)
     assert_allclose(found.pi, clock, atol=1e-10)
     assert_allclose([linking.bodies.size(y) for y in found.x], 1.0, atol=1e-10)
     assert_allclose(np.exp(found.phi), np.sqrt([linking.bodies.size(y) for y in x]), rtol=1e-9)
@@ -171,10 +165,10 @@ def test_the_dividing_point_is_passed_and_three_bodies_agree_with_the_sphere():
     early = bodies.move(x, v, np.array([0.0, -6.0]))
     t = np.linspace(-6, 6, 121)
     x, v = bodies.move(early[0][-1], early[1][-1], t)
-    linking, sphere = Linking(bodies), ShapeSphere(bodies)
+    linking, sphere = Linking(bodies), best_matching.ShapeSphere(bodies)
     clock = np.array([bodies.growth(*s) for s in zip(x, v, strict=True)])
     start = Extended(x[0], THREE[:, None] * v[0], 0.0, clock[0], t[0])
-    found = linking.move(start, shape_gauge, clock)
+    found = linking.move(start, best_matching.shape_gauge, clock)
     newton = found.scaled(0.0)
     assert np.interp(0.0, found.pi, newton.time) == pytest.approx(-0.569365, abs=2e-3)
     assert_allclose(newton.time, t, atol=2e-9)
@@ -210,4 +204,4 @@ def test_what_has_a_size_a_frame_or_no_clock_is_refused():
     x, v = falling.at_rest_as_a_whole(x, -x)
     two = Linking(falling)
     with pytest.raises((SolverError, ModelError), match=r"same place|too close"):
-        two.move(two.state(x, v), newton_gauge, np.array([0.0, 5.0]))
+        two.move(two.state(x, v), best_matching.newton_gauge, np.array([0.0, 5.0]))

@@ -10,17 +10,8 @@ from scipy.linalg import eigh
 
 from cases.refusals import refuses
 from rom import rotation
-from rom.components.cosserat import (
-    clamped,
-    equilibrium,
-    linearised,
-    loads,
-    modes,
-    reference,
-    rod,
-    simulate,
-    straight,
-)
+from rom.components import cosserat
+from rom.components.cosserat import loads, simulate, straight
 from rom.components.cosserat.vibration import gyroscopic
 from rom.errors import ConfigError, SolverError
 
@@ -32,7 +23,7 @@ def elbow(n):
     s = np.linspace(0, 10, n + 1)[:, None]
     x = np.concatenate([s * [1, 0, 0], [10, 0, 0] + s[1:] * [0, 1, 0]])
     legs = [rotation.quaternion(A) for A in (ALONG_X, np.roll(ALONG_X, 1, axis=0))]
-    return rod(x, np.repeat(legs, n + 1, axis=0), stretch=1e6, bend=1e3, mass=1.0,
+    return cosserat.rod(x, np.repeat(legs, n + 1, axis=0), stretch=1e6, bend=1e3, mass=1.0,
                inertia=(10, 10, 20))  # fmt: skip
 
 
@@ -75,7 +66,9 @@ def test_a_free_rod_keeps_the_momentum_it_was_given():
 
     drift = []
     for dt in (0.1, 0.05):
-        motion = simulate(one, 10.0, dt, load=pushed, free=clamped(one, start=False), rho_inf=1.0)
+        motion = simulate(
+            one, 10.0, dt, load=pushed, free=cosserat.clamped(one, start=False), rho_inf=1.0
+        )
         v = np.append(motion.v, np.zeros((len(motion.t), 3)), axis=1).reshape(-1, n + 2, 6)
         u = v[:, :-1, 3:]
         momentum = np.einsum("i,tic->tc", one.mass, u)[motion.t > 5.01]
@@ -144,8 +137,8 @@ def test_viscosity_damps_a_mode_at_its_rate():
     """Stiffness-proportional damping: half the ratio times omega^2."""
     ratio = 2e-3
     one = straight(1.0, 10, stretch=1e5, bend=1.0, mass=1.0, inertia=1e-6, viscosity=ratio)
-    omega = 2 * np.pi * modes(one, reference(one), 1).frequencies[0]
-    bent = equilibrium(one, loads(one, tip=(1e-3, 0, 0)))
+    omega = 2 * np.pi * cosserat.modes(one, cosserat.reference(one), 1).frequencies[0]
+    bent = cosserat.equilibrium(one, loads(one, tip=(1e-3, 0, 0)))
     motion = simulate(one, 20 * np.pi / omega, np.pi / (50 * omega), start=bent, rho_inf=1.0)
     energy = motion.energies().sum(axis=1)[200:]  # after two periods, when higher modes are gone
     assert_allclose(np.log(energy[-1] / energy[0]) / (motion.t[-1] - motion.t[200]),
@@ -158,12 +151,12 @@ def test_frequencies_of_a_slender_cantilever():
     error = []
     for n in (20, 40):
         one = straight(1.0, n, stretch=1e7, bend=(1.0, 1e4, 1e4), mass=1.0, inertia=1e-9)
-        f = modes(one, reference(one), 3).frequencies
+        f = cosserat.modes(one, cosserat.reference(one), 3).frequencies
         error.append(np.abs(f / exact - 1))
     assert (error[1] < 6e-3).all()
     assert_allclose(error[0] / error[1], 4.0, rtol=0.05)
     one = straight(1.0, 80, stretch=(1e9, 1e9, 9.0), bend=(1e6, 1e6, 16.0), mass=1.0, inertia=4.0)
-    f = modes(one, reference(one), 2).frequencies
+    f = cosserat.modes(one, cosserat.reference(one), 2).frequencies
     assert_allclose(f, [0.5, 0.75], rtol=1e-3)  # sqrt(GJ / rho I) / 4 L, sqrt(EA / rho A) / 4 L
 
 
@@ -187,16 +180,16 @@ def test_rotation_stiffens_flapping_and_less_so_lagging(speed):
                    inertia=1e-9)  # fmt: skip
     for axis, squares in ((0, flap**2), (1, flap**2 - speed**2)):  # the soft direction is y
         spin = speed * np.roll([0, 1.0, 0], 0 if axis == 0 else 1)
-        shape = equilibrium(one, loads(one), spin=spin)
-        f = 2 * np.pi * modes(one, shape, 2, spin=spin).frequencies
+        shape = cosserat.equilibrium(one, loads(one), spin=spin)
+        f = 2 * np.pi * cosserat.modes(one, shape, 2, spin=spin).frequencies
         assert_allclose(f**2, squares, rtol=5e-3)
 
 
 def test_a_shaft_that_spins_whirls_slower_and_faster():
     """Seen in axes that turn with it, a round shaft has its frequency less and plus the speed."""
     one = straight(1.0, 20, stretch=1e5, bend=(1.0, 1.0, 1e3), mass=1.0, inertia=1e-7)
-    still = modes(one, reference(one), 1).frequencies[0]
-    turning = modes(one, reference(one), 2, spin=(0, 0, 1.0)).frequencies
+    still = cosserat.modes(one, cosserat.reference(one), 1).frequencies[0]
+    turning = cosserat.modes(one, cosserat.reference(one), 2, spin=(0, 0, 1.0)).frequencies
     assert_allclose(2 * np.pi * (turning - still), [-1.0, 1.0], rtol=1e-4)
 
 
@@ -204,8 +197,8 @@ def test_forces_of_steady_rotation_have_their_tangent():
     rng = np.random.default_rng(4)
     one = straight(1.0, 3, stretch=3.0, bend=2.0, mass=1.3, inertia=(0.3, 0.5, 0.9))
     spin = np.array([0.4, -1.1, 0.7])
-    shape = equilibrium(one, loads(one, tip=(0.3, 0.1, 0), tip_moment=(0, 0, 0.3)))
-    K = linearised(one, shape, spin=spin)[1] - linearised(one, shape)[1]
+    shape = cosserat.equilibrium(one, loads(one, tip=(0.3, 0.1, 0), tip_moment=(0, 0, 0.3)))
+    K = cosserat.linearised(one, shape, spin=spin)[1] - cosserat.linearised(one, shape)[1]
     n = len(K)
 
     def forces(d):
@@ -213,7 +206,7 @@ def test_forces_of_steady_rotation_have_their_tangent():
         p = [rotation.multiply(q, rotation.exp(e)) for q, e in zip(shape.p, rows[:, :3],
                                                                   strict=True)]  # fmt: skip
         there = type(shape)(shape.x + rows[:-1, 3:], np.array(p))
-        return linearised(one, there, spin=spin)[0] - linearised(one, there)[0]
+        return cosserat.linearised(one, there, spin=spin)[0] - cosserat.linearised(one, there)[0]
 
     d = rng.normal(size=n)
     assert_allclose(K @ d, (forces(1e-5 * d) - forces(-1e-5 * d)) / 2e-5, atol=1e-8)
@@ -256,8 +249,8 @@ def test_a_root_goes_its_way_and_what_it_needs_is_what_changes_the_momentum(recw
 def test_what_has_no_mass_or_inertia_follows_the_rest():
     """As without: a cantilever whose sections have none swings with its frequency."""
     one = straight(1.0, 10, stretch=1e6, bend=1.0, mass=1.0)
-    bent = equilibrium(one, loads(one, tip=(1e-3, 0, 0)))
-    omega = 2 * np.pi * modes(one, reference(one), 1).frequencies[0]
+    bent = cosserat.equilibrium(one, loads(one, tip=(1e-3, 0, 0)))
+    omega = 2 * np.pi * cosserat.modes(one, cosserat.reference(one), 1).frequencies[0]
     motion = simulate(one, 6 * np.pi / omega, np.pi / (50 * omega), start=bent)
     tip = motion.x[:, -1, 0] / bent.x[-1, 0]
     assert_allclose(tip, np.cos(omega * motion.t), atol=0.06)  # higher modes
@@ -274,5 +267,5 @@ def test_bad_runs_are_refused_and_lost_ones_kept():
     assert t.size > 1 and t.tolist() == (10.0 * np.arange(t.size)).tolist()
     unstable = straight(1.0, 20, stretch=1e4, bend=1.0, mass=1.0, inertia=1e-3)
     load = loads(unstable, tip=(0, 0, -3.0))
-    bent = equilibrium(unstable, load)
-    refuses(SolverError, "the shape is not stable", modes, unstable, bent, 1, load=load)
+    bent = cosserat.equilibrium(unstable, load)
+    refuses(SolverError, "the shape is not stable", cosserat.modes, unstable, bent, 1, load=load)

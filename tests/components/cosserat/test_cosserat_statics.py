@@ -13,20 +13,8 @@ import rom
 from cases.long import few
 from cases.refusals import refuses
 from rom import rotation
-from rom.components.cosserat import (
-    Shape,
-    along,
-    body,
-    clamped,
-    elastic_energy,
-    equilibrium,
-    linearised,
-    loads,
-    reference,
-    rod,
-    straight,
-    strain,
-)
+from rom.components import cosserat
+from rom.components.cosserat import along, equilibrium, linearised, loads, reference, rod, straight
 from rom.components.cosserat.linear_pieces import bend_in_pieces, cut
 from rom.components.wind.wind_turbine import blade
 from rom.errors import ConfigError, ModelError, SolverError
@@ -46,7 +34,7 @@ def moved(shape, d):
     d = np.append(d, np.zeros(3)).reshape(-1, 6)
     turned = [rotation.multiply(p, rotation.exp(phi)) for p, phi in zip(shape.p, d[:, :3],
                                                                       strict=True)]  # fmt: skip
-    return Shape(shape.x + d[:-1, 3:], np.array(turned))
+    return cosserat.Shape(shape.x + d[:-1, 3:], np.array(turned))
 
 
 def slopes(function, n, step=1e-5):
@@ -62,7 +50,9 @@ def test_forces_and_tangent_are_derivatives_of_the_energy():
     shape = moved(reference(one), 0.3 * rng.normal(size=n))
     load = rng.normal(size=one.x.shape), rng.normal(size=(len(one.p), 3))
     r, _ = linearised(one, shape)
-    assert_allclose(r, slopes(lambda d: elastic_energy(one, moved(shape, d)), n), atol=1e-8)
+    assert_allclose(
+        r, slopes(lambda d: cosserat.elastic_energy(one, moved(shape, d)), n), atol=1e-8
+    )
     loaded = linearised(one, shape, load)[1]
     assert_allclose(loaded, slopes(lambda d: linearised(one, moved(shape, d), load)[0], n),
                     atol=1e-8)  # fmt: skip
@@ -71,7 +61,7 @@ def test_forces_and_tangent_are_derivatives_of_the_energy():
 def test_reference_has_no_stress_whatever_its_corners():
     one = crooked(np.random.default_rng(1))
     assert_allclose(linearised(one, reference(one))[0], 0, atol=1e-14)
-    assert elastic_energy(one, reference(one)) < 1e-28
+    assert cosserat.elastic_energy(one, reference(one)) < 1e-28
 
 
 def test_a_rigid_motion_changes_nothing():
@@ -81,7 +71,9 @@ def test_a_rigid_motion_changes_nothing():
     shape = moved(reference(one), 0.3 * rng.normal(size=6 * one.h.size + 9))
     turn, away = rotation.exp([1.0, -2.0, 0.5]), [3.0, -1.0, 2.0]
     A = rotation.matrix(turn)
-    carried = Shape(shape.x @ A.T + away, np.array([rotation.multiply(turn, p) for p in shape.p]))
+    carried = cosserat.Shape(
+        shape.x @ A.T + away, np.array([rotation.multiply(turn, p) for p in shape.p])
+    )
     r, _ = linearised(one, shape)
     there, _ = linearised(one, carried)
     size = np.append(r, np.zeros(3)).reshape(-1, 6)
@@ -110,7 +102,7 @@ def test_elastica(alpha, deflection, shortening, angle):
 def rolled_up(n):
     one = straight(10.0, n, stretch=STIFF, bend=100.0)
     shape = equilibrium(one, loads(one, tip_moment=(0, 20 * np.pi, 0)))
-    a, k = strain(one, shape)
+    a, k = cosserat.strain(one, shape)
     assert_allclose(a, 0, atol=1e-9)
     angle = np.arcsin(2 * np.pi / 10 * one.l)  # where M = B k cos(angle / 2)
     assert_allclose(k[:, 1], 2 * np.sin(angle / 2) / one.l, rtol=1e-8)
@@ -258,7 +250,7 @@ def test_princeton_beam_in_a_mechanism(force, angle):
     """In one step of its load."""
     one, load = princeton(force, angle, mass=0.1, inertia=1e-5)
     mech = rom.Mechanism(gravity=(0, 0, 0))
-    beam = mech.add_nonlinear("beam", body(one))
+    beam = mech.add_nonlinear("beam", cosserat.body(one))
     mech.fixed("clamp", mech.ground.marker((0, 0, 0)), beam.marker("start"))
     mech.force("tip", beam.marker("end"), load)
     pose = rom.equilibrium(mech).q[-7:]
@@ -276,7 +268,9 @@ def test_a_spinning_rim_grows_until_its_tension_holds_it(speed):
 
     section = {"stretch": EA, "bend": 1e-4 * EA, "mass": mass, "inertia": 1e-4}
     mech = rom.Mechanism(gravity=(0, 0, 0))
-    rim = mech.add_nonlinear("rim", body(along(place, np.linspace(0, 2 * np.pi, n + 1), **section)))
+    rim = mech.add_nonlinear(
+        "rim", cosserat.body(along(place, np.linspace(0, 2 * np.pi, n + 1), **section))
+    )
     hub = mech.add_rigid("hub", mass=1, inertia=(1, 1, 1), at=(0, 0, 0),
                          markers={"axle": (0, 0, 0), "spoke": (R, 0, 0)})  # fmt: skip
     mech.revolute("axle", mech.ground.marker((0, 0, 0)), hub.marker("axle"), axis=(0, 0, 1))
@@ -311,7 +305,7 @@ def test_buckling_load_of_a_column():
     def lowest(P):
         load = loads(one, tip=(0, 0, -P))
         shape = equilibrium(one, load)
-        free = clamped(one)
+        free = cosserat.clamped(one)
         return eigh(linearised(one, shape, load)[1][np.ix_(free, free)], eigvals_only=True,
                     subset_by_index=(0, 0))[0]  # fmt: skip
 
@@ -337,7 +331,7 @@ def test_what_is_no_rod_is_named():
 
 def test_without_equilibrium_the_last_shape_is_kept():
     one = straight(1.0, 10, stretch=10.0, bend=1.0)
-    free = np.ones_like(clamped(one))
+    free = np.ones_like(cosserat.clamped(one))
     with pytest.raises(SolverError, match="no equilibrium beyond 0 % of the load") as error:
         equilibrium(one, loads(one, tip=(1.0, 0, 0)), free=free)
     assert error.value.share == 0.0 and np.isfinite(error.value.solution.x).all()
@@ -346,7 +340,7 @@ def test_without_equilibrium_the_last_shape_is_kept():
 def test_a_small_load_does_not_see_the_cuts():
     one = blade(16)
     force = np.outer(np.linspace(0, 1e-3, 17), [1.0, 0.5, 0])
-    free = clamped(one)
+    free = cosserat.clamped(one)
     K = linearised(one, reference(one))[1][np.ix_(free, free)]
     full = np.zeros((18, 6))
     full[:-1, 3:] = force

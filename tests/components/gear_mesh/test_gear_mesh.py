@@ -7,20 +7,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 from cases.gear_unit import Line, PlaneMesh, contact_lines, structural_vectors
-from rom.components.gear_mesh import (
-    Correction,
-    GearPair,
-    Mesh,
-    contact_compliance,
-    element_table,
-    iso_stiffness,
-    line_length,
-    pair_stiffness,
-    stiffness_table,
-    tooth_compliance,
-    tooth_model,
-    transmission_error,
-)
+from rom.components import gear_mesh
+from rom.components.gear_mesh import Correction, GearPair, Mesh
 from rom.components.gear_mesh.compliance import in_normal_section, normal_section, profile
 from rom.errors import ModelError
 
@@ -69,7 +57,7 @@ def test_contact_lines_are_as_long_as_their_series(a, b):
     theta = (p.path[0] + (tau * p.base_pitch - b * p.base_pitch / 2)) / p.rb[0]
     at = [lines(p, t) for t in theta]
     length = [x.length[~x.back].sum() * np.cos(p.base_helix) / width for x in at]
-    assert_allclose(length, line_length(p, tau), atol=2e-3)
+    assert_allclose(length, gear_mesh.line_length(p, tau), atol=2e-3)
     if b == 1.0 or a == 2.0:
         assert_allclose(length, a, rtol=1e-5)
 
@@ -209,15 +197,15 @@ TABLE = [
 @pytest.mark.parametrize("row", TABLE, ids=lambda r: f"{r[0]}-{r[1]}")
 def test_teeth_are_as_stiff_as_listed(row):
     p = GearPair(row[:2], row[2], 0.04)
-    at = pair_stiffness(p, p.pitch_point, force=3e5) / 1e9
+    at = gear_mesh.pair_stiffness(p, p.pitch_point, force=3e5) / 1e9
     assert at == pytest.approx(row[3], rel=0.015)
-    m, q = Mesh(p, stiffness_table(p, force=3e5)), 1e-4 * TURN
+    m, q = Mesh(p, gear_mesh.stiffness_table(p, force=3e5)), 1e-4 * TURN
     theta = np.linspace(0, 2 * np.pi / p.teeth[0], 100, endpoint=False)
     k = np.array([m.forces(q, t).stiffness[5, 5] for t in theta]) / (p.rb[0] ** 2 * 0.04e9)
     assert_allclose((k.mean(), k.min(), k.max()), row[4:7], rtol=0.02)
-    soft = pair_stiffness(p, p.pitch_point, force=3e5, body="sainsot") / 1e9
+    soft = gear_mesh.pair_stiffness(p, p.pitch_point, force=3e5, body="sainsot") / 1e9
     assert soft == pytest.approx(row[7], rel=0.015)
-    assert_allclose(np.array(iso_stiffness(p)) / 1e9, row[8:], rtol=4e-4)
+    assert_allclose(np.array(gear_mesh.iso_stiffness(p)) / 1e9, row[8:], rtol=4e-4)
 
 
 @pytest.mark.parametrize("degrees", [15.0, 17.5, 25.0])
@@ -225,7 +213,7 @@ def test_the_basic_rack_of_iso_6336_counts_by_its_pressure_angle(degrees):
     """C_B has the factor 1 - 0.02 (20 - alpha_n); c'_th has none. It was left out."""
     angles = np.radians([20.0, degrees]).tolist()
     pairs = [GearPair((50, 60), 4e-3, 0.04, pressure_angle=a) for a in angles]
-    usual, other = map(iso_stiffness, pairs)
+    usual, other = map(gear_mesh.iso_stiffness, pairs)
     assert other[0] == usual[0]
     assert other[1] / usual[1] == pytest.approx(1 - 0.02 * (20 - degrees), rel=1e-12)
 
@@ -235,9 +223,9 @@ def test_the_basic_rack_of_iso_6336_counts_by_its_pressure_angle(degrees):
 def test_stiffness_falls_with_the_helix_as_in_iso_6336(teeth, degrees):
     """Per width in the transverse plane: lines are longer by 1 / cos, normals inclined by cos^2."""
     pairs = [GearPair(teeth, 4e-3, 0.04, float(np.radians(d))) for d in (0, degrees)]
-    spur, helical = (pair_stiffness(p, p.pitch_point, force=3e5) * np.cos(p.base_helix)
+    spur, helical = (gear_mesh.pair_stiffness(p, p.pitch_point, force=3e5) * np.cos(p.base_helix)
                      for p in pairs)  # fmt: skip
-    norm = [iso_stiffness(p)[1] for p in pairs]
+    norm = [gear_mesh.iso_stiffness(p)[1] for p in pairs]
     assert helical / spur == pytest.approx(norm[1] / norm[0], rel=0.04)
     assert helical / spur < (0.96 if abs(degrees) == 30 else 1.0)
 
@@ -259,11 +247,11 @@ def test_helical_teeth_roll_as_the_spur_teeth_of_their_normal_section(degrees):
 def test_helical_teeth_are_as_stiff_a_little_further_apart_and_down_to_their_base_circle():
     tight = pair(HELIX)
     apart = pair(HELIX, centre_distance=tight.distance + 5e-5)
-    stiff = [pair_stiffness(p, p.pitch_point, force=3e5) for p in (tight, apart)]
+    stiff = [gear_mesh.pair_stiffness(p, p.pitch_point, force=3e5) for p in (tight, apart)]
     assert stiff[0] == pytest.approx(stiff[1], rel=1e-2)
     low = GearPair((10, 96), 2e-3, 0.02, -0.5152, pressure_angle=0.3552, shift=(-0.1228, -0.1703),
                    addendum=0.7409)  # fmt: skip
-    assert 5e9 < stiffness_table(low, force=2e5).min() < 2e10
+    assert 5e9 < gear_mesh.stiffness_table(low, force=2e5).min() < 2e10
 
 
 def test_tips_are_as_thick_as_their_flanks_are_apart():
@@ -275,15 +263,15 @@ def test_tips_are_as_thick_as_their_flanks_are_apart():
 
 def test_helical_teeth_of_finite_elements_soften_as_webers():
     p, spur = (GearPair((50, 50), 3e-3, 0.04, h) for h in (float(np.radians(20)), 0.0))
-    ratio = [element_table(g, force=3e5, bore=0.6, n=3)[1] for g in (p, spur)]
-    weber = [pair_stiffness(g, g.pitch_point, force=3e5) for g in (p, spur)]
+    ratio = [gear_mesh.element_table(g, force=3e5, bore=0.6, n=3)[1] for g in (p, spur)]
+    weber = [gear_mesh.pair_stiffness(g, g.pitch_point, force=3e5) for g in (p, spur)]
     assert ratio[0] / ratio[1] == pytest.approx(weber[0] / weber[1], rel=0.03)
 
 
 @pytest.mark.parametrize(("z", "bending", "whole"), [(26, 2.09, 4.52), (50, 1.85, 4.60)])
 def test_a_tooth_bends_as_listed(z, bending, whole):
     p = GearPair((z, 100), 4e-3, 0.04)
-    got = tooth_compliance(p, 0, 2e-3 * z)
+    got = gear_mesh.tooth_compliance(p, 0, 2e-3 * z)
     assert (got[0], got[0] + got[1]) == (pytest.approx(bending, rel=0.015),
                                          pytest.approx(whole, rel=0.015))  # fmt: skip
 
@@ -295,19 +283,21 @@ def test_a_tooth_bends_as_listed(z, bending, whole):
 ])  # fmt: skip
 def test_a_tooth_of_finite_elements_gives_way_as_another_program_says(z, bore, dolfinx, rel):
     p = GearPair((z, 100), 4e-3, 0.04)
-    coarse, fine = (tooth_model(p, 0, bore=bore, fine=f).compliance(p.r[0]) for f in (2, 3))
+    coarse, fine = (
+        gear_mesh.tooth_model(p, 0, bore=bore, fine=f).compliance(p.r[0]) for f in (2, 3)
+    )
     assert fine == pytest.approx(dolfinx, rel=rel)
     assert coarse == pytest.approx(fine, rel=0.012)
     if bore == 0.6:  # where Weber is meant for
-        bending, foundation, _ = tooth_compliance(p, 0, p.r[0])
+        bending, foundation, _ = gear_mesh.tooth_compliance(p, 0, p.r[0])
         assert bending + foundation == pytest.approx(fine, rel=0.15)
 
 
 def test_a_pair_of_finite_elements_is_as_stiff_as_webers():
     p = GearPair((50, 50), 3e-3, 0.04)
-    table = element_table(p, force=3e5, bore=0.6, n=9)
+    table = gear_mesh.element_table(p, force=3e5, bore=0.6, n=9)
     assert_allclose(table, table[::-1], rtol=1e-6)  # equal wheels
-    assert table[4] == pytest.approx(pair_stiffness(p, p.pitch_point, force=3e5), rel=0.1)
+    assert table[4] == pytest.approx(gear_mesh.pair_stiffness(p, p.pitch_point, force=3e5), rel=0.1)
     assert table[4] > 1.05 * table[0]  # a tooth is softest at its tip
 
 
@@ -316,7 +306,7 @@ def test_contact_is_between_a_logarithm_and_hertz():
     F, E, R, h = 3e5, 206e9, 0.02, 2e-3
     a = np.sqrt(8 * F * (1 - 0.09) * (R / 2) / (np.pi * E))
     one = 2 * (1 - 0.09) / np.pi * (np.log(2 * h / a) - 0.3 / 0.7 / 2)
-    assert contact_compliance([R, R], [h, h], F, E) == pytest.approx(2 * one, rel=1e-12)
+    assert gear_mesh.contact_compliance([R, R], [h, h], F, E) == pytest.approx(2 * one, rel=1e-12)
 
 
 # --- quasi-static transmission error ---
@@ -327,7 +317,7 @@ def error(correction, load, addendum=1.0, cells=1, n=200):
     p = pair(addendum=addendum)
     m = Mesh(p, K, correction(p), cells=cells)
     theta = np.linspace(0, 2 * np.pi / 26, n, endpoint=False) + 1e-5
-    te = transmission_error(m, load * p.width * K * 1e-5 * p.rb[0], theta)
+    te = gear_mesh.transmission_error(m, load * p.width * K * 1e-5 * p.rb[0], theta)
     return te / (load * 1e-5)
 
 
@@ -393,10 +383,10 @@ def test_damping_takes_power_from_teeth_in_contact():
     (lambda: Mesh(pair(), -1.0), "must be positive"),
     (lambda: Mesh(pair(), K, Correction(pitch=([0.0], ()))), "1 pitch errors for 26 teeth"),
     (lambda: Mesh(pair(), K).forces([0, 0, 0, 0, 0, 0, -0.1, 0, 0, 0, 0, 0], 0.0), "overlap"),
-    (lambda: transmission_error(Mesh(pair(), K), -1.0, 0.0), "torque = "),
-    (lambda: tooth_model(pair(), 0, bore=0.95), "bore = "),
-    (lambda: tooth_model(pair(), 0, fine=1).compliance(0.06), "radius on the flank"),
-    (lambda: tooth_compliance(pair(), 0, 0.04), "radius on the involute"),
+    (lambda: gear_mesh.transmission_error(Mesh(pair(), K), -1.0, 0.0), "torque = "),
+    (lambda: gear_mesh.tooth_model(pair(), 0, bore=0.95), "bore = "),
+    (lambda: gear_mesh.tooth_model(pair(), 0, fine=1).compliance(0.06), "radius on the flank"),
+    (lambda: gear_mesh.tooth_compliance(pair(), 0, 0.04), "radius on the involute"),
 ])  # fmt: skip
 def test_what_cannot_be_is_said(make, said):
     with pytest.raises(ModelError, match=said):

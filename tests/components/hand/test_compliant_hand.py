@@ -8,16 +8,9 @@ from cases.refusals import refuses
 from rom import rotation
 from rom.components.cosserat import Shape, elastic_energy, linearised, reference, straight
 from rom.components.cosserat.helical_spring import HelicalSpring, plate_compliance, spring_rod
+from rom.components.hand import compliant_hand
 from rom.components.hand.cable import Hole, Tendon
-from rom.components.hand.compliant_hand import (
-    PHALANX_RIGIDITY_RATIO,
-    Bar,
-    Finger,
-    close,
-    grasp,
-    hand,
-    rest,
-)
+from rom.components.hand.compliant_hand import PHALANX_RIGIDITY_RATIO, Finger, close, rest
 from rom.errors import ConfigError, ModelError, SolverError
 
 MM = 1e-3
@@ -206,7 +199,7 @@ def test_forces_of_a_cable_are_derivatives_of_its_length():
 
 
 def test_the_hand_has_fifteen_joints():
-    fingers = hand()
+    fingers = compliant_hand.hand()
     assert sum(len(f.springs) for f in fingers.values()) == 15
     assert_allclose([f.rod.x[-1, 2] / MM for f in fingers.values()], [49.5, 64, 70.7, 65.5, 53.3])
 
@@ -239,8 +232,8 @@ def test_a_stiffener_leaves_flexion_alone():
 
 def test_contact_with_a_bar_has_its_tangent_and_balances():
     """Reaction of the palm, found from the cable and joint, is what the bar takes."""
-    finger, bar = Finger(n=4), Bar((26 * MM, 34 * MM), 20 * MM)
-    postures = grasp(finger, bar, np.linspace(0.25, 2.5, 10))
+    finger, bar = Finger(n=4), compliant_hand.Bar((26 * MM, 34 * MM), 20 * MM)
+    postures = compliant_hand.grasp(finger, bar, np.linspace(0.25, 2.5, 10))
     last = postures[-1]
     pressure, normals = bar.pressure(last)
     assert pressure.max() > 0.05
@@ -258,6 +251,8 @@ def test_contact_with_a_bar_has_its_tangent_and_balances():
     there, back = (Shape(last.shape.x + s * d[:-1, 3:], last.shape.p) for s in (1, -1))
     change = (contact(there)[0] - contact(back)[0]) / 2
     assert_allclose(K @ d.ravel()[:-3], change, rtol=1e-4, atol=1e-9 * np.abs(r).max())
-    close_by = Bar((20 * MM, 34 * MM), 20 * MM)
-    refuses(ConfigError, r"the bar reaches 0\.005 m into", grasp, finger, close_by, [1.0])
+    close_by = compliant_hand.Bar((20 * MM, 34 * MM), 20 * MM)
+    refuses(
+        ConfigError, r"the bar reaches 0\.005 m into", compliant_hand.grasp, finger, close_by, [1.0]
+    )
     assert bar.pressure(held)[0].max() == 0.0

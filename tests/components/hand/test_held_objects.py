@@ -9,31 +9,17 @@ from numpy.testing import assert_allclose
 
 import rom
 from cases.refusals import refuses
-from rom.components.hand.budgets import (
-    mass_budget,
-    phalanx_stress,
-    spring_loads,
-    stress_budget,
-    wire_stress,
-)
+from rom.components.hand import budgets, held_objects
 from rom.components.hand.compliant_hand import HAND_SPRING, Finger, hand
-from rom.components.hand.held_objects import (
-    SKIN_CONTACT,
-    Held,
-    contact_forces,
-    contacts_of,
-    grip,
-    hold,
-    table,
-)
+from rom.components.hand.held_objects import SKIN_CONTACT, contact_forces, hold, table
 from rom.components.hand.moving_hand import Build, Drive, Seat, moving_hand, one_finger, tip_marker
 from rom.components.hand.winches import Motor, winches
 from rom.errors import ConfigError
 
 MM, g = 1e-3, 9.81
 THREE = ("thumb", "index", "middle")
-BAR = Held((26 * MM, 20 * MM, 28 * MM), 20 * MM, 0.05, axis=(0, 1, 0), length=0.06)
-BALL = Held((26 * MM, 20 * MM, 28 * MM), 20 * MM, 0.05)
+BAR = held_objects.Held((26 * MM, 20 * MM, 28 * MM), 20 * MM, 0.05, axis=(0, 1, 0), length=0.06)
+BALL = held_objects.Held((26 * MM, 20 * MM, 28 * MM), 20 * MM, 0.05)
 TIMES = {"t_end": 1.2, "dt": 1e-3, "rho_inf": 0.5}
 
 
@@ -72,7 +58,7 @@ def test_what_is_held_rests_by_the_balance_of_forces_and_moments(motion, held, u
     """No part of it by the change of momentum: it does not move any more."""
     sol = motion()
     forces = contact_forces(sol, "thing")
-    assert set(forces) == set(contacts_of(sol.mechanism, "thing"))
+    assert set(forces) == set(held_objects.contacts_of(sol.mechanism, "thing"))
     grips, weight = sum(np.linalg.norm(f[-1]) for f in forces.values()), held.mass * g
     assert grips > 1.5 * weight
     assert_allclose(sum(forces.values())[-1], weight * np.eye(3)[up], atol=1e-8 * grips)
@@ -113,7 +99,7 @@ def test_a_hand_that_floats_keeps_its_momenta_while_it_grips():
     sol = rom.simulate(mech, t_end=0.4, dt=2.5e-4, rho_inf=0.8)
     linear, angular = sol.momentum
     moved = BALL.mass * np.abs(sol.velocity("thing")).max()
-    assert sum(f[-1] for f in grip(sol, "thing", fingers).values()) > 0.3
+    assert sum(f[-1] for f in held_objects.grip(sol, "thing", fingers).values()) > 0.3
     assert_allclose(linear, 0, atol=1e-6 * moved)
     assert_allclose(angular, 0, atol=1e-5 * moved * 0.05)
     assert_allclose(sol.energy.balance, 0, atol=1e-4 * sol.energy.drives[-1])
@@ -141,9 +127,9 @@ def test_springs_bear_the_cable_and_the_weight_that_hangs():
     mech = moving_hand({"index": Finger(n=4)}, gravity=(0, 0, g), drives=slack)
     found = at_rest(mech)
     below = [part.mass for name, part in mech.parts.items() if name != "palm"]
-    assert_allclose(spring_loads(found, "index", 1)[0][-1], sum(below) * g, rtol=1e-6)
+    assert_allclose(budgets.spring_loads(found, "index", 1)[0][-1], sum(below) * g, rtol=1e-6)
     C = 10.0
-    shear, bending = wire_stress(HAND_SPRING, 1.0, 0.01)
+    shear, bending = budgets.wire_stress(HAND_SPRING, 1.0, 0.01)
     assert_allclose(shear, (39 / 36 + 0.0615) * 8 * 7e-3 / (np.pi * 0.7e-3**3))
     assert_allclose(bending, (4 * C**2 - C - 1) / (4 * C * (C - 1)) * 0.32 / (np.pi * 0.7e-3**3))
 
@@ -152,19 +138,19 @@ def test_loads_across_the_tip_bend_the_last_spring_and_phalanx():
     """Lever arms of 18 mm to the far end of the spring, 10 mm to its plate; a twist bends not."""
     finger, F = Finger(n=4), 5e-3
     found = at_rest(one_finger(finger, 0.0, (0.0, F, 0.0)))
-    assert_allclose(spring_loads(found, "finger", 3)[1][-1], F * 18 * MM, rtol=3e-3)
+    assert_allclose(budgets.spring_loads(found, "finger", 3)[1][-1], F * 18 * MM, rtol=3e-3)
     stress = 4 * F * 10 * MM / (np.pi * (5 * MM) ** 3)
-    assert_allclose(phalanx_stress(found, "finger", 3), stress, rtol=3e-3)
+    assert_allclose(budgets.phalanx_stress(found, "finger", 3), stress, rtol=3e-3)
     mech = one_finger(finger)
     mech.torque("twist", tip_marker(mech, finger), (0.0, 0.0, 1e-4))
-    assert spring_loads(at_rest(mech), "finger", 3)[1][-1] < 1e-7
+    assert budgets.spring_loads(at_rest(mech), "finger", 3)[1][-1] < 1e-7
 
 
 def test_wire_is_judged_by_shares_of_its_strength():
     """Music wire of 0.7 mm: 2211 / 0.7^0.145 MPa; 45 % of it in shear, 75 % in bending."""
     strength = 2211e6 / 0.7**0.145
     found, fingers = at_rest(one_finger(Finger(n=2), 2.0)), {"finger": Finger(n=2)}
-    rows = stress_budget(found, fingers, motor=3.0, bone=5e7).rows
+    rows = budgets.stress_budget(found, fingers, motor=3.0, bone=5e7).rows
     said = {row.quantity: row.limit for row in rows}
     for what, share in (("shear", 0.45), ("bending", 0.75)):
         limit = said[f"finger spring 1, {what} of the wire [Pa]"]
@@ -205,12 +191,12 @@ def test_budgets_add_up_and_say_what_is_too_much():
     """Masses of bars, wire and cable; limits of motor and bone that are exceeded."""
     finger, drives = Finger(n=4), {"index": Drive(tension=2.0)}
     mech = moving_hand({"index": finger}, drives=drives, build=Build(palm=0.1))
-    mass = mass_budget(mech, most=0.1)
+    mass = budgets.mass_budget(mech, most=0.1)
     bones = 1200 * np.pi * 5e-3**2 * 0.04
     wire = 3 * 7850 * np.pi / 4 * 0.7e-3**2 * np.hypot(np.pi * 7e-3 * 5, 8e-3)
     assert_allclose(mass.rows[-1].value, 0.1 + bones + wire + 1.6e-3 * 0.054, rtol=2e-3)
-    assert not mass.ok and mass_budget(mech, most=0.11).ok
-    stress = stress_budget(at_rest(mech), {"index": finger}, motor=1.9, bone=50e6)
+    assert not mass.ok and budgets.mass_budget(mech, most=0.11).ok
+    stress = budgets.stress_budget(at_rest(mech), {"index": finger}, motor=1.9, bone=50e6)
     assert [row.quantity for row in stress.rows if not row.ok] == ["index motor [N]"]
     assert_allclose(stress.rows[-1].value, 2.0, rtol=1e-9)
 

@@ -5,42 +5,28 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.integrate import quad, solve_ivp
 
-from cases.components.bearings import (
-    INLETS,
-    LUND_THOMSEN,
-    RAIMONDI_BOYD,
-    RUN,
-    SIDES,
-    TWO_LOBED,
-    bearing,
-    load,
-    numbers,
-)
+from cases.components import bearings
+from cases.components.bearings import RUN, bearing
+from rom.components import journal_bearing
 from rom.components.journal_bearing import (
     Groove,
     JournalBearing,
-    Oil,
     coefficients,
     equilibrium,
     film,
     iso_vg,
-    long_force,
-    long_pressure,
     short_attitude,
     short_coefficients,
     short_eccentricity,
     short_force,
-    short_sommerfeld,
     stability,
-    threshold_speed,
     warm_bearing,
-    warm_equilibrium,
 )
 from rom.errors import ConfigError, ModelError, SolverError
 
 
 @pytest.mark.once
-@pytest.mark.parametrize("row", RAIMONDI_BOYD, ids=lambda r: f"{r[0]}-{r[1]}")
+@pytest.mark.parametrize("row", bearings.RAIMONDI_BOYD, ids=lambda r: f"{r[0]}-{r[1]}")
 def test_a_full_bearing_has_the_numbers_of_raimondi_and_boyd(row):
     slender, e, S, attitude, friction, flow, side, peak = row
     b = bearing(slender, [Groove(np.pi)], (240, 16))
@@ -64,21 +50,21 @@ def agree(values, printed):
     assert np.all((off < 0.055) | (off < 0.045 * np.abs(printed))), values
 
 
-@pytest.mark.parametrize("row", LUND_THOMSEN, ids=lambda r: f"{r[0]}-{r[1]}")
+@pytest.mark.parametrize("row", bearings.LUND_THOMSEN, ids=lambda r: f"{r[0]}-{r[1]}")
 def test_two_grooves_have_the_coefficients_of_lund_and_thomsen(row):
-    b = bearing(row[0], SIDES)
-    f = equilibrium(b, load(b, row[1]), **RUN)
+    b = bearing(row[0], bearings.SIDES)
+    f = equilibrium(b, bearings.load(b, row[1]), **RUN)
     K, C = coefficients(f)
     assert f.eccentricity == pytest.approx(row[2], abs=0.006)
     assert np.degrees(np.arctan2(*f.motion[[1, 0]])) == pytest.approx(row[3], abs=1.0)
     agree([*K.ravel(), C[0, 0], C[0, 1], C[1, 0], C[1, 1]], [*row[4:10], row[9], row[10]])
-    assert threshold_speed(f) == pytest.approx(row[11], rel=0.02)
+    assert journal_bearing.threshold_speed(f) == pytest.approx(row[11], rel=0.02)
 
 
-@pytest.mark.parametrize("row", TWO_LOBED)
+@pytest.mark.parametrize("row", bearings.TWO_LOBED)
 def test_a_two_lobed_bearing_has_the_coefficients_of_lund_and_thomsen(row):
-    b = bearing(1.0, SIDES, preload=0.5)
-    f = equilibrium(b, load(b, row[0]), **RUN)
+    b = bearing(1.0, bearings.SIDES, preload=0.5)
+    f = equilibrium(b, bearings.load(b, row[0]), **RUN)
     K, C = coefficients(f)
     assert f.eccentricity == pytest.approx(row[1], abs=0.006)
     assert np.degrees(np.arctan2(*f.motion[[1, 0]])) == pytest.approx(row[2], abs=1.0)
@@ -88,7 +74,7 @@ def test_a_two_lobed_bearing_has_the_coefficients_of_lund_and_thomsen(row):
 # --- closed forms ---
 
 # eccentricity, S (L/D)^2, attitude [deg], Kxx Kxy Kyx Kyy, Cxx, Cxy, Cyy, whirl ratio, threshold
-SHORT = [numbers(line) for line in """
+SHORT = [bearings.numbers(line) for line in """
 .1 .989979 82.708 1.3284 10.3811 -9.7577 2.5308 20.4872 2.5325 19.7905 .5029 2.7413
 .3 .272176 68.178 1.7949 4.4825 -2.6246 2.4126 8.1530 2.4270 6.0612 .5194 2.6058
 .5 .106049 53.680 2.9233 3.9766 -.8577 2.2099 6.6148 2.2450 3.0539 .5146 2.5417
@@ -100,7 +86,7 @@ SHORT = [numbers(line) for line in """
 @pytest.mark.parametrize("row", SHORT, ids=lambda r: f"{r[0]}")
 def test_short_bearings_have_their_closed_form_by_quadrature_too(row):
     e, S, attitude, *rest = row
-    assert_allclose(short_sommerfeld(e), S, atol=6e-7)
+    assert_allclose(journal_bearing.short_sommerfeld(e), S, atol=6e-7)
     assert_allclose(np.degrees(short_attitude(e)), attitude, atol=6e-4)
     assert short_eccentricity(S) == pytest.approx(e, rel=3e-5)
     K, C = short_coefficients(e)
@@ -143,13 +129,13 @@ def test_the_film_of_a_long_bearing_is_sommerfelds():
     b = bearing(40.0, [Groove(np.pi)], (360, 8), cavitation="none")
     f = film(b, [0.5e-4, 0.0], **RUN)
     theta = np.linspace(0, 2 * np.pi, 361)[:-1]
-    P, exact = f.P[:, 0], long_pressure(theta - np.pi, 0.5)
+    P, exact = f.P[:, 0], journal_bearing.long_pressure(theta - np.pi, 0.5)
     assert_allclose(P, exact, atol=4e-4 * exact.max())
     for k, turn in ((0, lambda t: -np.cos(t)), (1, np.sin)):
-        F = quad(lambda t, turn=turn: long_pressure(t, 0.5) * turn(t), 0, np.pi)[0]
-        assert long_force(0.5)[k] == pytest.approx(F, rel=1e-9)
+        F = quad(lambda t, turn=turn: journal_bearing.long_pressure(t, 0.5) * turn(t), 0, np.pi)[0]
+        assert journal_bearing.long_force(0.5)[k] == pytest.approx(F, rel=1e-9)
     for e, S in ((0.2, 0.167359), (0.5, 0.061770), (0.8, 0.025491)):
-        assert 1 / (np.pi * np.hypot(*long_force(e))) == pytest.approx(S, rel=2e-5)
+        assert 1 / (np.pi * np.hypot(*journal_bearing.long_force(e))) == pytest.approx(S, rel=2e-5)
 
 
 # --- the film itself ---
@@ -244,14 +230,14 @@ def test_the_force_converges_with_the_square_of_the_cells():
 # --- inlets, statics, whirl ---
 
 
-@pytest.mark.parametrize("row", INLETS, ids=lambda r: f"{r[0]}-{r[1]}")
+@pytest.mark.parametrize("row", bearings.INLETS, ids=lambda r: f"{r[0]}-{r[1]}")
 def test_where_oil_comes_in_matters_when_oil_is_conserved(row):
     b = bearing(0.5, [Groove(np.radians(row[0]), np.radians(20))], cavitation=row[1])
-    f = equilibrium(b, load(b, 0.5), **RUN)
+    f = equilibrium(b, bearings.load(b, 0.5), **RUN)
     assert f.eccentricity == pytest.approx(row[2], abs=0.01)
     assert np.degrees(np.arctan2(*f.motion[[1, 0]])) == pytest.approx(row[3], abs=1.5)
     assert_allclose(coefficients(f)[0].ravel(), row[4:8], atol=0.2)
-    assert threshold_speed(f) == pytest.approx(row[8], rel=0.03)
+    assert journal_bearing.threshold_speed(f) == pytest.approx(row[8], rel=0.03)
 
 
 # torque on a pinion of 26 teeth, module 4: eccentricity, attitude [deg], travel along the load and
@@ -265,7 +251,7 @@ PINION = [
 
 @pytest.mark.parametrize("row", PINION, ids=lambda r: f"{r[0]} N m")
 def test_the_bearings_of_a_pinion_let_it_travel(row):
-    b = JournalBearing(0.05, 0.025, 50e-6, SIDES, cells=(180, 12), aligned=True)
+    b = JournalBearing(0.05, 0.025, 50e-6, bearings.SIDES, cells=(180, 12), aligned=True)
     W = row[0] / (0.052 * np.cos(np.radians(20))) / 2
     f = equilibrium(b, (W, 0.0), speed=100 * np.pi, viscosity=0.02)
     assert f.eccentricity == pytest.approx(row[1], abs=1.5e-3)
@@ -318,7 +304,9 @@ def test_oil_thins_by_walthers_law(grade, A, B, nu):
 
 def test_the_heat_that_leaves_is_the_heat_that_is_made():
     b, oil = bearing(1.0, [Groove(np.pi)], (120, 8)), iso_vg(46)
-    w = warm_equilibrium(b, (3000.0, 0.0), oil, speed=300.0, inlet=40.0, carried=1.0)
+    w = journal_bearing.warm_equilibrium(
+        b, (3000.0, 0.0), oil, speed=300.0, inlet=40.0, carried=1.0
+    )
     assert w.film.viscosity == pytest.approx(float(oil.viscosity(w.temperature)), rel=1e-6)
     assert 40 < w.temperature == pytest.approx(40 + w.rise / 2, abs=1e-5)
     assert oil.density * oil.heat * w.film.side_flow * w.rise == pytest.approx(w.power, rel=1e-9)
@@ -346,7 +334,7 @@ def test_heat_closes_and_opens_the_clearance():
 def test_a_groove_in_the_loaded_arc_leaves_no_film():
     b = bearing(0.5, [Groove(np.radians(20), np.radians(20))], cavitation="jfo")
     with pytest.raises(SolverError, match=r"no film carries .* N with oil from grooves at 20 deg"):
-        equilibrium(b, load(b, 0.05), **RUN)
+        equilibrium(b, bearings.load(b, 0.05), **RUN)
 
 
 @pytest.mark.parametrize(("make", "said"), [
@@ -360,10 +348,10 @@ def test_a_groove_in_the_loaded_arc_leaves_no_film():
     (lambda: film(bearing(), [0, 0, 1e-4, 0], **RUN), "bearing is aligned"),
     (lambda: film(bearing(), [0, 0], speed=-1.0, viscosity=0.1), "from its other end"),
     (lambda: equilibrium(bearing(), [0, 0], **RUN), "presses the journal nowhere"),
-    (lambda: short_sommerfeld(1.2), "must lie between 0 and 1"),
+    (lambda: journal_bearing.short_sommerfeld(1.2), "must lie between 0 and 1"),
     (lambda: short_eccentricity(0.0), "sommerfeld = "),
     (lambda: stability(np.eye(2), -np.eye(2), 1.0), "feeds the whirl"),
-    (lambda: Oil(5.0, 40.0), "hot oil is thinner"),
+    (lambda: journal_bearing.Oil(5.0, 40.0), "hot oil is thinner"),
     (lambda: iso_vg(10), "ISO VG 10"),
 ])  # fmt: skip
 def test_what_cannot_be_is_said(make, said):

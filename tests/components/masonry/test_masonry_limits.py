@@ -169,7 +169,6 @@ def test_a_wall_with_three_openings_gives_way_on_shaking_ground_where_statics_sa
 
 
 test_what_cannot_be_laid_is_refused = refused(
-    (lambda: wall(-1.0, 3), "length = -1"),
     (lambda: wall(3.0, 8, openings=[(2.0, 1.0, 2, 5)]), "is not in a wall of 3.0 m"),
     (lambda: wall(3.0, 5, openings=[(1.0, 2.0, 2, 5)]), "is not in a wall of 3.0 m and 5 courses"),
     (lambda: wall(4.0, 8, openings=[(1.0, 1.5, 2, 5), (1.6, 2.5, 5, 6)]), "in course 5 of .* meet"),

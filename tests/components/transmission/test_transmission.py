@@ -11,18 +11,10 @@ from scipy.optimize import brentq
 import rom
 from cases.gear_unit import NODES, journal, resting, stepped, tilting, unit, with_inlets
 from cases.long import few
+from rom.components import transmission
 from rom.components.gear_mesh import Correction, GearPair
 from rom.components.journal_bearing import equilibrium, stability
-from rom.components.transmission import (
-    Disc,
-    Shaft,
-    linearised,
-    mesh_response,
-    rest,
-    simulate,
-    threshold,
-    whirl,
-)
+from rom.components.transmission import Disc, rest, simulate, whirl
 from rom.components.transmission.mechanism import mechanism_of
 from rom.errors import ModelError, SolverError
 
@@ -41,7 +33,7 @@ def loaded():
 def test_a_free_shaft_has_the_frequencies_of_timoshenko():
     """Bending of a hinged beam from its quartic; torsion and stretching from wave speeds."""
     l, d = 1.0, 0.08
-    s = Shaft(np.linspace(0, l, 21), d)
+    s = transmission.Shaft(np.linspace(0, l, 21), d)
     M, K, _ = s.matrices()
     free = np.setdiff1d(np.arange(s.n), [0, 1, 2, 5, 120, 121])
     omega = np.sqrt(eigh(K[np.ix_(free, free)], M[np.ix_(free, free)], eigvals_only=True))
@@ -58,7 +50,7 @@ def test_a_free_shaft_has_the_frequencies_of_timoshenko():
 
 
 def test_a_free_rotor_precesses_by_the_ratio_of_its_inertias():
-    s = Shaft(NODES, 0.05, [Disc.of_ring(2, outer=0.3, inner=0.05, width=0.04)])
+    s = transmission.Shaft(NODES, 0.05, [Disc.of_ring(2, outer=0.3, inner=0.05, width=0.04)])
     M, K, G = s.matrices()
     n, speed = s.n, 500.0
     A = np.block([[np.zeros((n, n)), np.eye(n)],
@@ -169,7 +161,7 @@ def test_a_stiff_unit_whirls_as_its_bearings_say():
     """Constant force of helical teeth; a light load; the pinion's mode by Routh and Hurwitz."""
     s = rest(unit(helix=HELIX, speed=100.0))
     film = s.forces.films[0]
-    M, _, K = linearised(s)
+    M, _, K = transmission.linearised(s)
     assert_allclose(M, M.T, atol=1e-12)
     assert np.abs(K - K.T).max() > 1e5  # films are not elastic
     i = np.argmax(s.unit.journals[0][0][:2], axis=1)
@@ -212,7 +204,7 @@ def test_it_rests_as_another_program_says_and_whirls_as_its_mechanism(helix):
 @pytest.mark.long
 def test_fast_and_lightly_loaded_journals_whirl():
     light = unit(torque=8.0, clearance=90e-6)
-    limit = threshold(light, 150.0, 2500.0, within=0.02)
+    limit = transmission.threshold(light, 150.0, 2500.0, within=0.02)
     below, above = (rest(replace(light, speed=k * limit)) for k in (0.96, 1.04))
     assert whirl(below).stable and not whirl(above).stable
     first = whirl(above).values[0]
@@ -221,7 +213,7 @@ def test_fast_and_lightly_loaded_journals_whirl():
     with pytest.raises(ModelError, match=r"above the threshold: the journals whirl"):
         simulate(above, periods=1)
     with pytest.raises(ModelError, match="threshold must lie between"):
-        threshold(light, 0.9 * limit, 0.95 * limit)
+        transmission.threshold(light, 0.9 * limit, 0.95 * limit)
 
 
 # --- motion ---
@@ -270,7 +262,7 @@ def test_the_response_to_the_mesh_is_where_a_motion_settles():
     """To first order; the motion also feels that the stiffness changes while it vibrates."""
     u = unit(torque=300.0, speed=150.0, loss=4e-5)
     state = rest(u)
-    linear = mesh_response(state, harmonics=12)
+    linear = transmission.mesh_response(state, harmonics=12)
     run = simulate(state, periods=6, steps=50)
     last = run.t > run.t[-1] - 2 * u.mesh_period
     assert linear.frequency == pytest.approx(150 / (2 * np.pi) * 26)
@@ -287,7 +279,7 @@ def test_slow_units_have_the_error_of_their_teeth(helix, rel):
     p = GearPair((26, 157), 4e-3, 0.04, helix)
     width = p.base_pitch / np.tan(p.base_helix) if helix else 0.04
     u = replace(unit(speed=20.0, torque=50.0, helix=helix, width=width), viscosity=0.2)
-    linear = mesh_response(rest(u), harmonics=30, positions=128)
+    linear = transmission.mesh_response(rest(u), harmonics=30, positions=128)
     still = [rest(u, t) for t in 2 * np.pi / 26 * np.arange(16) / 16]
     error = np.array([u.mesh.pair.rb @ (u.wheels @ s.q)[[5, 11]] for s in still])
     assert linear.error_rms == pytest.approx(np.std(error), rel=rel)
@@ -299,8 +291,8 @@ def test_slow_units_have_the_error_of_their_teeth(helix, rel):
 @pytest.mark.parametrize(("make", "said"), [
     (lambda: unit(torque=-5.0), "contact is lost: a load of"),
     (lambda: unit(speed=0.0), "must be positive"),
-    (lambda: Shaft([0.0, 0.0], 0.05), "must ascend"),
-    (lambda: Shaft([0.0, 0.1], 0.05, [Disc(2, 1.0, 1.0, 1.0)]), "from 0 to 1"),
+    (lambda: transmission.Shaft([0.0, 0.0], 0.05), "must ascend"),
+    (lambda: transmission.Shaft([0.0, 0.1], 0.05, [Disc(2, 1.0, 1.0, 1.0)]), "from 0 to 1"),
     (lambda: replace(unit(), pinion=replace(unit().pinion, bearings={9: None})), "from 0 to 4"),
 ])  # fmt: skip
 def test_what_cannot_be_is_said(make, said):

@@ -10,19 +10,10 @@ from scipy.linalg import eigh
 import rom
 from cases.gear_unit import tilting
 from cases.paths import ROOT
+from rom.components import transmission
 from rom.components.gear_mesh import GearPair, Mesh
 from rom.components.journal_bearing import Groove, JournalBearing
-from rom.components.transmission import (
-    Disc,
-    Rotor,
-    Shaft,
-    SolidShaft,
-    Transmission,
-    mesh_response,
-    rest,
-    simulate,
-    whirl,
-)
+from rom.components.transmission import Disc, Rotor, Shaft, SolidShaft, Transmission, rest
 from rom.components.transmission.housing import motion_of
 from rom.errors import ModelError
 
@@ -206,15 +197,15 @@ def test_solids_rest_on_films_and_teeth_as_beams_do(states):
 
 
 def test_solids_respond_to_the_mesh_as_beams_do(states):
-    one, three = (mesh_response(s, harmonics=3) for s in states)
+    one, three = (transmission.mesh_response(s, harmonics=3) for s in states)
     assert three.error_rms == pytest.approx(one.error_rms, rel=0.01)
     assert three.load_factor == pytest.approx(one.load_factor, rel=0.01)
-    growth = [whirl(s).values[0] for s in states]
+    growth = [transmission.whirl(s).values[0] for s in states]
     assert growth[1].imag == pytest.approx(growth[0].imag, rel=0.01)
 
 
 def test_work_is_balanced_between_solids(states):
-    assert simulate(states[1], periods=0.2, steps=100).balance < 1e-6
+    assert transmission.simulate(states[1], periods=0.2, steps=100).balance < 1e-6
 
 
 def test_a_body_that_is_not_round_is_refused(solid):

@@ -8,17 +8,9 @@ from numpy.testing import assert_allclose
 
 from cases.refusals import refused, refuses
 from rom.components.histories import Table, recorded
+from rom.components.wind import control
 from rom.components.wind.blading import BETZ_LIMIT, blading, rotor_load
-from rom.components.wind.control import (
-    DOUBLING_PITCH,
-    HELD_GENERATOR,
-    PUBLISHED_PITCH,
-    Controller,
-    gain_factor,
-    generator_torque,
-    power_curve,
-    steady,
-)
+from rom.components.wind.control import DOUBLING_PITCH, Controller, generator_torque, steady
 from rom.components.wind.operation import operate
 from rom.components.wind.wake import late
 from rom.components.wind.wind_turbine import GEAR_RATIO, RATED_SPEED
@@ -201,7 +193,7 @@ def scaled(k):
 
 @pytest.mark.parametrize("call", [
     lambda blades: steady(9.0, blades),
-    lambda blades: power_curve([9.0], blades),
+    lambda blades: control.power_curve([9.0], blades),
     lambda blades: operate(lambda t: 9.0, 1.0, blades=blades),
 ])  # fmt: skip
 def test_another_rotor_needs_a_controller_of_its_own(call):
@@ -223,7 +215,7 @@ def test_the_power_curve_of_another_rotor_follows_a_controller_that_is_handed_ov
     """At the same ratio of tips to wind, twice the rotor has four times the power in any wind."""
     law = lambda wind: (min(0.11 * wind, 1.2), 0.01 * max(wind - 11.0, 0.0))  # noqa: E731
     winds = [2.0, 9.0, 15.0, 28.0]
-    large = power_curve(winds, scaled(2.0), held=law)
+    large = control.power_curve(winds, scaled(2.0), held=law)
     small = [rotor_load(straight(), w, 2 * law(w)[0], law(w)[1]) for w in winds]
     assert_allclose(large["speed"], [0.22, 0.99, 1.2, 1.2], rtol=1e-12)
     assert_allclose(large["power"], [4 * 0.944 * one.power for one in small], rtol=1e-3)
@@ -263,7 +255,7 @@ def test_gains_fall_with_the_pitch_as_published():
     Report, equations 7-9 to 7-12: gain = 2 I w z w0 / (N |dP/dpitch|) of -25.52e6 W/rad.
     """
     assert_allclose(np.degrees(DOUBLING_PITCH), 6.302336, rtol=1e-5)
-    assert_allclose([gain_factor(0.0), gain_factor(DOUBLING_PITCH)], [1.0, 0.5])
+    assert_allclose([control.gain_factor(0.0), control.gain_factor(DOUBLING_PITCH)], [1.0, 0.5])
     inertia, sensitivity, w, zeta = 43.784e6, 25.52e6, 0.6, 0.7
     P = 2 * inertia * RATED_SPEED * zeta * w / (GEAR_RATIO * sensitivity)
     I = inertia * RATED_SPEED * w**2 / (GEAR_RATIO * sensitivity)
@@ -271,19 +263,19 @@ def test_gains_fall_with_the_pitch_as_published():
     one.step(1.001 * GEAR_RATIO * RATED_SPEED, 1e3)
     error = 1e-3 * GEAR_RATIO * RATED_SPEED
     assert_allclose(one.pitch, P * error + I * error * 1e3, rtol=2e-3)
-    there = Controller.at(HELD_GENERATOR, DOUBLING_PITCH)
-    there.step(HELD_GENERATOR, 0.1)
+    there = Controller.at(control.HELD_GENERATOR, DOUBLING_PITCH)
+    there.step(control.HELD_GENERATOR, 0.1)
     assert_allclose(there.pitch, DOUBLING_PITCH)  # where the factor of `at` is that of the steps
 
 
 @pytest.fixture(scope="module")
 def curve():
-    return power_curve(np.arange(3.0, 25.5))
+    return control.power_curve(np.arange(3.0, 25.5))
 
 
 def test_pitch_above_the_rated_wind_is_that_of_the_report(curve):
     """Table 7-1, within a tenth of a degree to 21 m/s and 0.4 at 25."""
-    winds, pitch = np.array(PUBLISHED_PITCH).T
+    winds, pitch = np.array(control.PUBLISHED_PITCH).T
     found = np.degrees(np.interp(winds, curve["wind"], curve["pitch"]))
     assert_allclose(found[winds < 21.5], pitch[winds < 21.5], atol=0.11)
     assert_allclose(found, pitch, atol=0.4)
@@ -349,7 +341,7 @@ def test_the_filter_loses_three_decibels_at_a_quarter_hertz():
 def test_wind_beyond_the_curve_is_named(wind):
     refuses(ConfigError, "parked in a wind of", steady, wind)
     with pytest.raises(ConfigError):
-        power_curve([8.0, wind])
+        control.power_curve([8.0, wind])
 
 
 def test_other_blades_and_the_tower_change_the_curve_a_little():

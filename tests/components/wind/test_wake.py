@@ -8,17 +8,12 @@ import rom
 from cases.mbs.stiff_blades import on_driven_hub, same_strips, stiff_body
 from cases.refusals import refuses
 from rom import rotation
+from rom.components.wind import whole_turbine
 from rom.components.wind.blading import rotor_load
 from rom.components.wind.control import Controller, generator_torque, steady
 from rom.components.wind.operation import operate
 from rom.components.wind.wake import in_late_wind
-from rom.components.wind.whole_turbine import (
-    GEAR_RATIO,
-    N_BLADES,
-    PITCH_DAMPING,
-    PITCH_STIFFNESS,
-    turbine,
-)
+from rom.components.wind.whole_turbine import N_BLADES, PITCH_STIFFNESS, turbine
 from rom.components.wind.wind_turbine import ramp
 from rom.errors import ConfigError
 
@@ -127,7 +122,7 @@ def test_a_controlled_turbine_rides_through_a_gust_as_the_rigid_rotor_does(storm
     assert_allclose(speed[late].max() - 1.26711, beside.speed[late].max() - 1.26711, rtol=0.15)
     end = sol.t > 30.0
     assert_allclose(said["pitch"][end].mean(), beside.pitch[end].mean(), atol=np.radians(0.5))
-    power = said["torque"] * GEAR_RATIO * speed
+    power = said["torque"] * whole_turbine.GEAR_RATIO * speed
     assert_allclose(power[late].mean(), 5.29661e6, rtol=0.01)
     assert rom.audit(sol).ok
 
@@ -164,7 +159,7 @@ def test_the_control_in_a_mechanism_is_the_controller_at_its_speed():
         # by spring and damper, about the axis of the bearing
         apart = sol.omega(each.parts[0].name) - np.einsum("tji,tj->ti", seen, sol.omega("hub"))
         spring = PITCH_STIFFNESS * (found["pitch"] - angles)
-        damper = PITCH_DAMPING * apart[:, 2]
+        damper = whole_turbine.PITCH_DAMPING * apart[:, 2]
         acts = np.einsum("ti,ti->t", sol.law("control").moment[:, 3 + 2 * k], B[:, :, 2])
         assert np.abs(damper).max() > 1e4
         assert_allclose(acts[1:], -(spring + damper)[1:], atol=10.0)
@@ -178,14 +173,16 @@ def test_the_generator_is_braked_against_the_nacelle():
     assert_allclose(said.moment.sum(axis=1), 0.0, atol=1e-6 * np.abs(said.moment).max())
     braked = said.moment[:, 1] @ plant.axis
     assert_allclose(braked[1:], -said.outputs["torque"][1:], rtol=1e-7)
-    assert_allclose(braked[1], -generator_torque(GEAR_RATIO * 1.0), rtol=1e-3)
+    assert_allclose(braked[1], -generator_torque(whole_turbine.GEAR_RATIO * 1.0), rtol=1e-3)
     assert_allclose(said.moment[:, 0] @ plant.axis, -braked, rtol=1e-9)
 
 
 def test_the_actuator_is_that_of_the_report():
     """30 Hz and two percent of critical damping belong to one inertia, about that of a blade."""
     inertia = PITCH_STIFFNESS / (2 * np.pi * 30.0) ** 2
-    assert_allclose(PITCH_DAMPING, 2 * 0.02 * np.sqrt(PITCH_STIFFNESS * inertia), rtol=2e-3)
+    assert_allclose(
+        whole_turbine.PITCH_DAMPING, 2 * 0.02 * np.sqrt(PITCH_STIFFNESS * inertia), rtol=2e-3
+    )
 
 
 @pytest.mark.parametrize(

@@ -6,16 +6,8 @@ from numpy.testing import assert_allclose
 
 import rom
 from cases.refusals import refuses
-from rom.components.wind.whole_turbine import (
-    GEAR_RATIO,
-    GENERATOR_INERTIA,
-    HUB_INERTIA,
-    N_BLADES,
-    PLACES,
-    PUBLISHED_FREQUENCIES,
-    WHEEL_INERTIA,
-    turbine,
-)
+from rom.components.wind import whole_turbine
+from rom.components.wind.whole_turbine import GEAR_RATIO, turbine
 from rom.components.wind.wind_turbine import RATED_SPEED, blade, ramp, run_up
 from rom.errors import ConfigError
 
@@ -61,7 +53,7 @@ def test_driven_rotor_on_a_stiff_tower_runs_up_like_its_blades_alone():
                     shaft=(1e14, 1e11))  # fmt: skip
     whole.turn_by(ANGLE, SPEED)
     sol = rom.simulate(whole.mechanism, t_end=22.0, dt=0.02, rho_inf=0.9)
-    tips = [whole.tip(sol, k) for k in range(N_BLADES)]
+    tips = [whole.tip(sol, k) for k in range(whole_turbine.N_BLADES)]
     alone = run_up(blade(48), t_end=22.0, dt=0.02)
     for tip in tips:
         assert_allclose(tip, alone.tip, atol=1e-6)
@@ -76,7 +68,7 @@ def at_rest(**choices):
     whole = turbine(48, tower_segments=32, damped=False, **choices)
     whole.turn_by(lambda t: 0.0, lambda t: 0.0)
     small = rom.linearize(whole.mechanism, rom.equilibrium(whole.mechanism), n=14)
-    return small.frequencies[list(PLACES)]
+    return small.frequencies[list(whole_turbine.PLACES)]
 
 
 # what is left to two programs [%], whose beams have no shear; FAST has two given shapes for each
@@ -93,7 +85,7 @@ FAST_LEFT = (-0.2, -3.3, -1.2, 0.1, 1.7, 0.3, 0.4, 0.5, -4.1, 1.1, -2.7, -2.7, 3
     ],
 )
 def test_frequencies_at_rest_are_those_of_programs_that_know_as_much(program, choices, left):
-    published = np.array(list(PUBLISHED_FREQUENCIES.values()))[:, program]
+    published = np.array(list(whole_turbine.PUBLISHED_FREQUENCIES.values()))[:, program]
     deviation = 100 * (at_rest(**choices) / published - 1)
     assert_allclose(deviation, left, atol=0.06)
     assert np.median(np.abs(deviation)) < 1.3
@@ -101,7 +93,7 @@ def test_frequencies_at_rest_are_those_of_programs_that_know_as_much(program, ch
 
 def test_shear_weight_and_twist_explain_the_rest():
     """Weight softens a tower like that of a point mass; twist of the tower what yaws with it."""
-    names, f = list(PUBLISHED_FREQUENCIES), at_rest()
+    names, f = list(whole_turbine.PUBLISHED_FREQUENCIES), at_rest()
     light, stiff = at_rest(gravity=0.0), at_rest(torsion=1e3)
     assert_allclose(f[:2] / light[:2], 0.33071 / 0.33645, rtol=3e-3)
     yawing = [names.index(f"{n}flap, yawing") for n in ("blades ", "second ")]
@@ -142,8 +134,12 @@ def test_momentum_is_the_impulse_of_the_torque(driven):
     """About the shaft; the generator stores its own times the ratio of the gear."""
     _, sol = driven
     one = blade(16)
-    blades = N_BLADES * (one.mass @ one.x[:, 2] ** 2 + one.inertia[:, :2].sum() / 2)
-    still = HUB_INERTIA + WHEEL_INERTIA + GEAR_RATIO**2 * GENERATOR_INERTIA
+    blades = whole_turbine.N_BLADES * (one.mass @ one.x[:, 2] ** 2 + one.inertia[:, :2].sum() / 2)
+    still = (
+        whole_turbine.HUB_INERTIA
+        + whole_turbine.WHEEL_INERTIA
+        + GEAR_RATIO**2 * whole_turbine.GENERATOR_INERTIA
+    )
     speed = sol.omega("wheel")[:, 0]
     assert_allclose(sol.omega("generator")[:, 0], GEAR_RATIO * speed, rtol=1e-7, atol=1e-7)
     late = sol.t > 6.0

@@ -6,19 +6,8 @@ from numpy.testing import assert_allclose
 
 from rom import rotation
 from rom.components.cosserat import equilibrium, loads, modes, reference, simulate
-from rom.components.wind.wind_turbine import (
-    BLADE_LENGTH,
-    HUB_INERTIA,
-    RATED_SPEED,
-    SHAFT_STIFFNESS,
-    SLOW_GENERATOR_INERTIA,
-    blade,
-    ramp,
-    rotor,
-    run_up,
-    stations,
-    tower,
-)
+from rom.components.wind import wind_turbine
+from rom.components.wind.wind_turbine import HUB_INERTIA, SHAFT_STIFFNESS, blade, run_up
 
 RPM = np.pi / 30
 
@@ -31,9 +20,14 @@ def frequencies(rod, m=6, speed=0.0):
 
 def test_mass_of_the_blade():
     """16 845 kg before the factor; 17 740 kg is the definition."""
-    table = stations()
+    table = wind_turbine.stations()
     assert len(table["eta"]) == 49
-    plain = (table["mass"][1:] + table["mass"][:-1]) @ np.diff(table["eta"]) / 2 * BLADE_LENGTH
+    plain = (
+        (table["mass"][1:] + table["mass"][:-1])
+        @ np.diff(table["eta"])
+        / 2
+        * wind_turbine.BLADE_LENGTH
+    )
     assert_allclose(plain, 16844.75, rtol=1e-6)
     assert_allclose(blade(192).mass.sum(), 17608.8, rtol=1e-4)
     assert_allclose(blade(192).mass.sum(), 17740, rtol=0.01)
@@ -55,7 +49,7 @@ def test_rotation_stiffens_the_blade():
     rod = blade(96)
     assert_allclose([frequencies(rod, 1, n * RPM)[0] for n in (3, 6, 9)], [0.6747, 0.6845, 0.7005],
                     rtol=3e-4)  # fmt: skip
-    rated = frequencies(rod, 6, RATED_SPEED)
+    rated = frequencies(rod, 6, wind_turbine.RATED_SPEED)
     assert_allclose(rated, [0.7229, 1.0655, 1.9651, 3.6813, 4.3467, 5.5799], rtol=3e-4)
     assert_allclose(rated[0], 0.72365, rtol=0.002)  # assumed modes with centrifugal stiffness
 
@@ -75,12 +69,12 @@ def test_static_deflections():
 
 def test_tower():
     """Euler-Bernoulli elements of the tube with 350 t on top, alone and with gravity."""
-    rod = tower(60)
+    rod = wind_turbine.tower(60)
     assert_allclose(rod.mass.sum(), 347460, rtol=1e-3)
     stiff = rod._replace(stretch=1e2 * rod.stretch, inertia=1e-3 * rod.inertia)
     assert_allclose(frequencies(stiff)[[0, 2, 4]], [0.89136, 4.3746, 11.392], rtol=5e-3)
     for gravity, f in ((0.0, (0.33645, 3.0754)), (9.80665, (0.33071, 3.0662))):
-        loaded = tower(60, top=350e3)
+        loaded = wind_turbine.tower(60, top=350e3)
         loaded = loaded._replace(stretch=1e2 * loaded.stretch, inertia=1e-3 * loaded.inertia)
         load = loads(loaded, weight=(0, 0, -gravity))
         shape = equilibrium(loaded, load)
@@ -88,7 +82,7 @@ def test_tower():
 
 
 def test_the_ramp_is_smooth():
-    speed, angle = ramp(2.0, 20.0)
+    speed, angle = wind_turbine.ramp(2.0, 20.0)
     t = np.linspace(0.01, 30, 2000)
     slope = [(angle(s + 1e-5) - angle(s - 1e-5)) / 2e-5 for s in t]
     assert_allclose(slope, [speed(s) for s in t], atol=1e-8)
@@ -143,7 +137,7 @@ def rigid_blade(n=8):
 
 def test_a_locked_generator_leaves_the_shaft_to_twist():
     one = rigid_blade()
-    model = rotor(blade_rod=one)
+    model = wind_turbine.rotor(blade_rod=one)
     locked = model.free.copy()
     locked[2] = False
     f = modes(model.rod, reference(model.rod), 1, free=locked).frequencies[0]
@@ -153,7 +147,7 @@ def test_a_locked_generator_leaves_the_shaft_to_twist():
 
 @pytest.fixture(scope="module")
 def run():
-    model = rotor(16)
+    model = wind_turbine.rotor(16)
     motion = simulate(model.rod, 20.0, 0.02, free=model.free, rho_inf=0.9,
                       load=lambda t: model.torque(TORQUE * min(t / RISE, 1.0)))  # fmt: skip
     return model, motion
@@ -164,7 +158,7 @@ def test_momentum_is_the_impulse_of_the_torque(run):
     model, motion = run
     impulse = TORQUE * (20.0 - RISE / 2)
     assert_allclose(model.momentum(motion)[-1], impulse, rtol=1e-3)
-    inertia = inertia_of_blades(blade(16)) + HUB_INERTIA + SLOW_GENERATOR_INERTIA
+    inertia = inertia_of_blades(blade(16)) + HUB_INERTIA + wind_turbine.SLOW_GENERATOR_INERTIA
     assert_allclose(model.speeds(motion)[-200:, 0].mean(), TORQUE * (18.0 - RISE / 2) / inertia,
                     rtol=0.02)  # fmt: skip
 
@@ -186,5 +180,5 @@ def test_the_shaft_twists_as_the_rotor_needs(run):
     motion = run[1]
     turned = [rotation.log(rotation.multiply(p[0] * [1, -1, -1, -1], p[2])) for p in motion.p]
     inertia = inertia_of_blades(blade(16)) + HUB_INERTIA
-    share = inertia / (inertia + SLOW_GENERATOR_INERTIA)
+    share = inertia / (inertia + wind_turbine.SLOW_GENERATOR_INERTIA)
     assert_allclose(-np.array(turned)[-400:, 2].mean(), share * TORQUE / SHAFT_STIFFNESS, rtol=0.05)
