@@ -88,6 +88,6 @@ def test_the_certificate_has_the_ratio_of_each_mode_in_each_support():
 def test_ratios_and_the_interfaces_where_they_are_meant_must_fit():
     body = random_body(np.random.default_rng(0))
     refuses(InterfaceError, "no interface 'wall'", rom.ModalDamping(0.02, ("wall",)).matrix, body)
-    refuses(ConfigError, "negative", damped, body, rom.ModalDamping(-0.1))
+    refuses(ConfigError, "negative", rom.ModalDamping, -0.1)
     refuses(ConfigError, "2 ratios of ModalDamping for", damped, body, rom.ModalDamping([0.1, 0.2]))
     refuses(ConfigError, "directions", rom.ModalDamping(0.02, fixed={"root": "q"}).matrix, body)
