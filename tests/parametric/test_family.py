@@ -268,8 +268,7 @@ def test_a_thousand_points_need_no_full_model(family, tmp_path, monkeypatch):
     operators = rom.eigen.scipy.SciPyOperators
     for name in [name for name, thing in vars(operators).items() if callable(thing)]:
         monkeypatch.setattr(operators, name, gone)
-    for name in ("splu", "eigsh"):
-        monkeypatch.setattr(rom.eigen.scipy, name, gone)
+    monkeypatch.setattr(rom.eigen.scipy, "splu", gone)
     read, E = rom.load(path), np.geomspace(0.5, 2.0, 1000)
     found = [read.frequencies(8, fixed="root", E_web=e)[0] for e in E]
     assert np.all(np.diff(found) > 0), "stiffer is higher"
