@@ -1,5 +1,6 @@
 """Reduced bodies coupled on shared interfaces, against the whole in one piece."""
 
+import warnings
 from dataclasses import replace
 
 import numpy as np
@@ -8,9 +9,10 @@ from numpy.testing import assert_allclose
 
 import rom
 from cases.halves import COUPLED, FULL, ROOT, half, joined, study, whole
+from cases.long import few
 from cases.refusals import refuses
 from cases.solid import block, reduced
-from rom.errors import ConfigError, InterfaceError
+from rom.errors import ConfigError, InterfaceError, RomWarning
 from rom.model import Row
 
 
@@ -128,3 +130,43 @@ def test_certificates_of_an_assembly_and_of_its_few_functions():
     assert assembly.reduced(20).certificate.ok
     (poor,) = assembly.reduced(2, fixed=(ROOT,)).certificate.failures
     assert poor.quantity == "2 interface functions: worst error of 6 frequencies"
+
+
+def random_row(rng):
+    """Two or three blocks in a row, and the three lowest elastic frequencies of the whole."""
+    height, width, step = rng.uniform(0.05, 0.15, 3)
+    cells = rng.integers(4, 7, rng.integers(2, 4))
+    ends = np.r_[0, np.cumsum(cells)] * step
+    parts = [block((n * step, height, width), (n, 2, 2), origin=(x, 0, 0))
+             for n, x in zip(cells, ends[:-1], strict=True)]  # fmt: skip
+    whole = block((ends[-1], height, width), (cells.sum(), 2, 2))
+    return parts, rom.modes(whole, 9).frequencies[6:]
+
+
+def in_a_row(parts, method):
+    bodies, couplings = {}, []
+    for i, part in enumerate(parts):
+        touched = (["root"] if i else []) + (["tip"] if i < len(parts) - 1 else [])
+        kinds = dict.fromkeys(touched, "full")
+        bodies[f"part {i}"] = rom.reduce(part, method=method, interfaces=kinds, certify=False)
+        if i:
+            couplings.append(((f"part {i - 1}", "tip"), (f"part {i}", "root")))
+    return rom.Assembly(bodies, tuple(couplings))
+
+
+@pytest.mark.filterwarnings("ignore:.*fixed-interface modes are kept")
+@pytest.mark.parametrize("seed", few(1, range(4)))
+def test_enhanced_bodies_are_wrong_in_assemblies_and_that_is_said(seed):
+    """Their correction is that of one body."""
+    parts, full = random_row(np.random.default_rng(seed))
+
+    def error(method):
+        return np.abs(in_a_row(parts, method).frequencies()[6:9] / full - 1).max()
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", RomWarning)
+        moments = error(rom.MomentMatching((0.0,), 2))
+    with pytest.warns(RomWarning, match=r"part 0.*enhanced .* off by per cents"):
+        enhanced = error(rom.EnhancedCraigBampton(8))
+    plain = error(rom.CraigBampton(8))
+    assert moments < 1e-4 and moments < plain < 5e-3 and 5 * plain < enhanced

@@ -1,4 +1,6 @@
-"""Areas and volumes of meshes, and surfaces of nodes."""
+"""Areas and volumes of meshes, surfaces of nodes, and memory of this process."""
+
+from pathlib import Path
 
 import numpy as np
 from scipy.sparse import diags
@@ -49,3 +51,10 @@ def surface(name, n=400):
     x = 0.05 * x @ turn.T + np.array([0.4, -0.1, 2.0])
     S = diags(rng.uniform(0.5, 1.5, n)).tocsr()
     return Interface(name, np.arange(n), x, S, x.mean(axis=0))
+
+
+def memory_taken(*kinds):
+    """What this process takes now or has taken at most, by the names of Linux [bytes]."""
+    lines = Path("/proc/self/status").read_text().splitlines()
+    fields = dict(line.split(":", 1) for line in lines)
+    return np.array([1024 * int(fields[kind].split()[0]) for kind in kinds])

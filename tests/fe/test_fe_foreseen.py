@@ -13,6 +13,7 @@ import pytest
 import rom
 from cases.command import python
 from cases.long import few
+from cases.measures import memory_taken
 from cases.paths import RANKS, ROOT
 from cases.ranks.environment import ENVIRONMENT
 from cases.solid import reduced
@@ -47,20 +48,14 @@ def bar(size, solver="auto"):
     return rom.fe.model("meshes/beam.geo", material=STEEL, parameters=sizes, solver=solver)
 
 
-def resident(kind):
-    """What this process takes now or has taken at most [bytes], as Linux counts it."""
-    lines = Path("/proc/self/status").read_text().splitlines()
-    return 1024.0 * float(dict(line.split(":", 1) for line in lines)[kind].split()[0])
-
-
 def growth(work):
     """What a piece of work takes at most beyond what was there [bytes]."""
     gc.collect()
     memory.collect(MPI.COMM_WORLD)
     Path("/proc/self/clear_refs").write_text("5")  # the largest so far is forgotten
-    before = resident("VmRSS")
+    (before,) = memory_taken("VmRSS")
     work()
-    return resident("VmHWM") - before
+    return (memory_taken("VmHWM") - before)[0]
 
 
 def taken_and_foreseen(shape, solver):

@@ -1,6 +1,5 @@
 """Factorisation, shifts, counts and refusals of the PETSc operators."""
 
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,7 +10,9 @@ from scipy.sparse import block_diag, coo_matrix, csr_matrix, diags, identity
 
 import rom
 from cases.boxes import box, faces_held
+from cases.measures import memory_taken
 from cases.operators import petsc_operators
+from cases.refusals import refuses
 from rom.eigen import lanczos, search
 from rom.errors import InterfaceError, ModelError, ResourceError
 
@@ -49,11 +50,10 @@ def test_the_297_dof_beam_keeps_its_six_rigid_motions(small, exact, shift, monke
     assert_allclose(omega[6:] ** 2, exact[6:8], rtol=1e-8)
 
 
-@pytest.mark.parametrize(("sigma", "count"), [(1e3, 6), (3e7, 8), (1e9, 14)])
-def test_inertia_counts_the_modes_below_a_shift(small, exact, sigma, count):
+@pytest.mark.parametrize("sigma", [1e3, 3e7, 1e9])
+def test_inertia_counts_the_modes_below_a_shift(small, exact, sigma):
     """The counts of the dense solver; K - sigma M is indefinite."""
-    count = int(np.count_nonzero(exact < sigma))
-    assert small.operators.indefinite(sigma).negative_pivots() == count
+    assert small.operators.indefinite(sigma).negative_pivots() == np.count_nonzero(exact < sigma)
 
 
 def test_a_restart_of_the_krylov_space_loses_nothing(monkeypatch):
@@ -195,14 +195,11 @@ def test_a_part_that_hangs_on_a_line_is_named_by_its_far_end():
 
 
 @pytest.mark.parametrize("held", [("x0", (0,)), ("x0", (1, 2)), ("z0", (2,))])
-def test_a_plane_that_slides_is_no_support(small, held):
-    with pytest.raises(InterfaceError, match="leave a rigid motion free"):
-        small.operators.hold(faces_held(small, dict([held])))
-
-
-def test_nothing_held_cannot_be_factored(small):
-    with pytest.raises(InterfaceError, match="the 0 boundary dofs leave a rigid motion free"):
-        small.operators.hold([])
+def test_a_plane_that_slides_is_no_support_nor_is_nothing(small, held):
+    dofs = faces_held(small, dict([held]))
+    refuses(InterfaceError, "leave a rigid motion free", small.operators.hold, dofs)
+    nothing = "the 0 boundary dofs leave a rigid motion free"
+    refuses(InterfaceError, nothing, small.operators.hold, [])
 
 
 def test_the_memory_law_follows_the_measured_factors():
@@ -225,22 +222,15 @@ def test_a_factor_is_refused_after_the_analysis_when_the_law_was_too_kind(monkey
         model.operators.hold(model.interfaces["x0"].dofs)
 
 
-def used_bytes(*kinds):
-    """What this process has taken, by the names of Linux [bytes]."""
-    lines = Path("/proc/self/status").read_text().splitlines()
-    fields = dict(line.split(":", 1) for line in lines)
-    return [1024 * int(fields[kind].split()[0]) for kind in kinds]
-
-
 def test_factors_that_are_let_go_leave_no_memory_behind():
     """A process that has reserved more than the machine has cannot fork any more."""
     model = beam((20, 6, 6))
     boundary = model.interfaces["x0"].dofs
     model.operators.hold(boundary)
-    before = used_bytes("VmRSS", "VmSize")
+    before = memory_taken("VmRSS", "VmSize")
     for _ in range(15):  # a factor takes 10 MB
         model.operators.hold(boundary)
-    resident, reserved = np.subtract(used_bytes("VmRSS", "VmSize"), before)
+    resident, reserved = memory_taken("VmRSS", "VmSize") - before
     assert resident < 40e6
     assert reserved < 2e9
 
