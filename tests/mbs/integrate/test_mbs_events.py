@@ -12,6 +12,7 @@ from cases.mbs.mechanisms import simulate_quietly, slider_crank
 from cases.mbs.motions import G, ball, falling, heavy_top, pendulum
 from cases.refusals import refuses
 from rom.errors import ConfigError, SolverError
+from rom.mbs.integrate import fixed_step
 from rom.mbs.integrate.simulation import simulate
 from rom.mbs.results.interpolation import vector_rate
 
@@ -47,6 +48,15 @@ def test_events_that_do_not_end_the_run_change_no_bit_of_it(method):
     assert_allclose(sol.events["either"].t, np.sqrt(1 / G), atol=1e-10)
     assert sol.events["rise"].t.shape == (0,) and sol.events["rise"].q.shape == (0, 7)
     assert sol.status == "Reached t = 1 s."
+
+
+@pytest.mark.parametrize("chunk", [4096, 7])
+def test_steps_behind_the_event_that_ends_a_run_are_not_counted(chunk, monkeypatch):
+    """How many are taken at once depends on the clock."""
+    monkeypatch.setattr(fixed_step, "FIRST_CHUNK", chunk)
+    monkeypatch.setattr(fixed_step, "LARGEST_CHUNK", chunk)
+    sol = simulate(falling(), t_end=10.0, dt=1e-3)
+    assert sol.statistics["steps"] == np.ceil(np.sqrt(2 / G) / 1e-3)
 
 
 def test_looking_for_events_leaves_the_bits_of_a_mechanism_with_joints():
