@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import rom
-from cases.mbs.geared import ORIGIN, Z, free_wheels
+from cases.components.geared import ORIGIN, Z, free_wheels
 from cases.mbs.mechanisms import prepared
 from cases.mbs.tangents import assert_forces_are_the_gradient, by_position, by_velocity, shifted
 from rom.components.gear_mesh import Correction, GearPair, Hertz

@@ -9,7 +9,7 @@ from scipy.interpolate import RegularGridInterpolator
 from scipy.optimize import brentq
 
 import rom
-from cases.mbs.geared import ORIGIN, free_wheels
+from cases.components.geared import ORIGIN, free_wheels
 from cases.mbs.mechanisms import prepared, residual_at
 from cases.mbs.parts import on_axle
 from cases.mbs.tangents import shifted

@@ -6,8 +6,8 @@ from numpy.testing import assert_allclose
 from scipy.optimize import root
 
 import rom
+from cases.components.geared import ORIGIN, Z, free_wheels
 from cases.gear_unit import PlaneMesh
-from cases.mbs.geared import ORIGIN, Z, free_wheels
 from cases.mbs.mechanisms import prepared, random_body, residual_at, tangents_at
 from cases.mbs.parts import on_axle
 from cases.mbs.tangents import by_position, by_velocity, energy_gradient, forces_at, shifted
