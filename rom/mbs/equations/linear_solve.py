@@ -16,7 +16,6 @@ from numba import types
 
 from rom.mbs.kernels.algebra import (
     back_substitute,
-    back_substitute_at,
     factorise,
     range_basis,
     subtract_row,
@@ -151,7 +150,8 @@ def substitute(P, F, pivot, x, y):
         y[P.position[i]] = x[i]
     for k in range(P.size.size):
         d, at, L = P.size[k], P.start[k], P.below[k]
-        back_substitute_at(F, P.pivot[k], d, d, pivot, at, y)
+        A = F[P.pivot[k] : P.pivot[k] + d * d].reshape((d, d))
+        back_substitute(A, d, pivot[at : at + d], y[at : at + d])
         for p in range(P.next_first[k], P.next_first[k + 1]):
             to = P.start[P.next[p]]
             for i in range(P.size[P.next[p]]):

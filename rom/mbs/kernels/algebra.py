@@ -283,26 +283,20 @@ def eliminate_pair(A, i, p, k, n):
 @inner
 def back_substitute(A, n, pivot, x):
     """Solve in place with the factors of `factorise`."""
-    back_substitute_at(A.reshape(A.size), 0, A.shape[1], n, pivot, 0, x)
-
-
-@inner
-def back_substitute_at(F, A, wide, n, pivot, at, x):
-    """The same for x[at:at+n], with factors in rows of F that begin at A, ``wide`` apart."""
     for k in range(n):
-        p = pivot[at + k]
+        p = pivot[k]
         if p != k:
-            x[at + k], x[at + p] = x[at + p], x[at + k]
+            x[k], x[p] = x[p], x[k]
     for i in range(n):
-        s = x[at + i]
+        s = x[i]
         for j in range(i):
-            s -= F[A + i * wide + j] * x[at + j]
-        x[at + i] = s
+            s -= A[i, j] * x[j]
+        x[i] = s
     for i in range(n - 1, -1, -1):
-        s = x[at + i]
+        s = x[i]
         for j in range(i + 1, n):
-            s -= F[A + i * wide + j] * x[at + j]
-        x[at + i] = s / F[A + i * wide + i]
+            s -= A[i, j] * x[j]
+        x[i] = s / A[i, i]
 
 
 @inner
