@@ -25,6 +25,7 @@ from rom.process.child import lasting_scratch, trusted
 from rom.process.patience import Patience, Turns
 
 IMPORTS = re.compile(rb"^from (rom[.\w]*) import (\([^)]*\)|.*)", re.MULTILINE)
+NAMES, OWNERS = re.compile(rb"(\w+)(?: as (\w+))?"), re.compile(rb"\b(\w+)\.[A-Z][A-Z\d_]*\b")
 # in sources of kernels, and the folders of what they contain and are made by
 KERNEL_MARK, LAYOUT_FOLDERS = b"compiled import", {"kernels", "compiler"}
 COMPILE_RATE = 2.5e-4  # [s] of compiling per byte of functions in Python; 2.3e-4 measured
@@ -234,15 +235,15 @@ def _collect(source: Path, found: set[Path]) -> None:
 def _read(source: Path) -> tuple[bytes, tuple[Path, ...]]:
     """The text of a source, and the files with kernels, layouts or constants that it imports."""
     text = source.read_bytes()
-    paths, built_in = set(), set()
+    paths, built_in, owners = set(), set(), set(OWNERS.findall(text))
     for module, names in IMPORTS.findall(text):
         place = PACKAGE.joinpath(*module.decode().split(".")[1:])
-        for word, alias in re.findall(rb"(\w+)(?: as (\w+))?", names):
+        for word, alias in NAMES.findall(names):
             path = place / f"{word.decode()}.py"
             paths |= {path, place.with_suffix(".py")}
             if word.isupper():
                 built_in.add(place.with_suffix(".py"))
-            if re.search(rb"\b%s\.[A-Z][A-Z\d_]*\b" % (alias or word), text):
+            if (alias or word) in owners:
                 built_in.add(path)
     found = (path for path in paths if path.is_file() and (path in built_in or _has_kernels(path)))
     return text, tuple(sorted(found))
