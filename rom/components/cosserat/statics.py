@@ -1,8 +1,14 @@
 """Equilibrium of rods under dead loads: Newton's method with capped rotations, and continuation.
 
+Beside `rom.equilibrium`, which finds the same shapes of rods in mechanisms, for what that has not:
+rods without mass, loads that turn with the axes, any dof held, unstable shapes.
+
 Source:
     See docs/theory/rods.md.
 """
+
+from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 import numpy.typing as npt
@@ -14,7 +20,6 @@ from rom.components.cosserat.energy import (
     BAND_WIDTH,
     HALF_BANDWIDTH,
     Rod,
-    Work,
     add_turning,
     internal,
     work,
@@ -32,6 +37,7 @@ MIN_LOAD_STEP = 5e-5  # part of the load at which it is given up
 UNIT_ROW = np.arange(BAND_WIDTH) == HALF_BANDWIDTH  # of a dof that is held
 
 Loads = tuple[Array, Array]
+Correction = Callable[[Shape, Array], Array | None]
 
 
 @kernel
@@ -91,28 +97,33 @@ def turn_all(p, phi):
         turned(p[k], 0, vec(phi[k], 0), p[k])
 
 
-def newton(rod: Rod, shape: Shape, load: Loads, spin: Array, free: Mask, W: Work) -> Shape | None:
-    """The equilibrium near a shape; None if it was not found."""
-    x, p, length = shape.x.copy(), shape.p.copy(), rod.h.sum()
-    d, band = np.zeros(W.r.size + 3), np.zeros((3 * HALF_BANDWIDTH + 1, W.r.size), order="F")
-    turns, ways = d.reshape(-1, 2, 3).swapaxes(0, 1)
+def newton(
+    rod: Rod, shape: Shape, correction: Correction, more: npt.ArrayLike = ()
+) -> tuple[Shape, Array] | None:
+    """The shape near one where corrections vanish, and further unknowns; None if not found.
+
+    Args:
+        rod: the rod.
+        shape: where the search starts.
+        correction: function of a shape and the further unknowns (k,) that gives increments (6 N + 9
+            + k,) in the order of `clamped`; None where its equations are singular.
+        more: (k,) further unknowns at the start.
+    """
+    x, p, unknown = shape.x.copy(), shape.p.copy(), np.array(more, dtype=float)
+    n, length = 6 * rod.h.size + 9, rod.h.sum()
+    turns, ways = (d := np.zeros(n + 3)).reshape(-1, 2, 3).swapaxes(0, 1)
     for _ in range(MAX_ITERATIONS):
-        balance(rod, x, p, load, spin, W)
-        W.A[~free] = UNIT_ROW
-        band[HALF_BANDWIDTH:] = W.A.T  # that of the transposed tangent, as LAPACK stores it
-        lu, pivots, singular = dgbtrf(band, HALF_BANDWIDTH, HALF_BANDWIDTH, overwrite_ab=True)
-        if singular:
+        found = correction(Shape(x, p), unknown)
+        if found is None or not np.isfinite(found).all():
             return None
-        right = np.where(free, -W.r, 0.0)
-        d[:-3] = dgbtrs(lu, HALF_BANDWIDTH, HALF_BANDWIDTH, right, pivots, trans=1)[0]
+        d[:n] = found[:n]
         angle, moved = np.abs(turns).max(), np.abs(ways).max() / length
-        if not np.isfinite(angle + moved):
-            return None
         factor = min(1.0, MAX_ROTATION / max(angle, MAX_ROTATION))
         x += factor * ways[:-1]
         turn_all(p, factor * turns)
+        unknown += factor * found[n:]
         if max(angle, moved) < INCREMENT_RTOL:
-            return Shape(x, p)
+            return Shape(x, p), unknown
     return None
 
 
@@ -200,17 +211,29 @@ def equilibrium(
     shape = reference(rod) if start is None else start
     (force, moment), free = fitting(rod, load, free)
     W, speed = work(rod), np.array(spin, dtype=float)
+    band = np.zeros((3 * HALF_BANDWIDTH + 1, W.r.size), order="F")
+
+    def correction(share: float, shape: Shape, _: Array) -> Array | None:
+        balance(rod, shape.x, shape.p, (share * force, share * moment), share**0.5 * speed, W)
+        W.A[~free] = UNIT_ROW
+        band[HALF_BANDWIDTH:] = W.A.T  # that of the transposed tangent, as LAPACK stores it
+        lu, pivots, singular = dgbtrf(band, HALF_BANDWIDTH, HALF_BANDWIDTH, overwrite_ab=True)
+        if singular:
+            return None
+        right = np.where(free, -W.r, 0.0)
+        return dgbtrs(lu, HALF_BANDWIDTH, HALF_BANDWIDTH, right, pivots, trans=1)[0]
 
     def ahead(shape: Shape, share: float) -> Shape | None:
-        now = share * force, share * moment
-        return newton(rod, shape, now, np.sqrt(share) * speed, free, W)
+        found = newton(rod, shape, partial(correction, share))
+        return None if found is None else found[0]
 
     first = 1.0 / steps if start is None else 1.0
     share, shape = load_steps(ahead, shape, least=MIN_LOAD_STEP, first=first)
     if share < 1.0:
-        error = SolverError(f"no equilibrium beyond {100 * share:.4g} % of the load.",
-                            hint="The rod buckles or a mechanism is left free.",
-                            solution=shape)  # fmt: skip
+        text = f"no equilibrium beyond {100 * share:.4g} % of the load."
+        error = SolverError(
+            text, hint="The rod buckles or a mechanism is left free.", solution=shape
+        )
         error.share = share  # type: ignore[attr-defined]
         raise error
     return shape

@@ -22,7 +22,7 @@ from rom import rotation
 from rom.arguments import NotNegative, between, typed
 from rom.components.cosserat import Rod, Shape, clamped, linearised, loads, reference, rod
 from rom.components.cosserat.helical_spring import HelicalSpring
-from rom.components.cosserat.statics import MAX_ROTATION, turn_all
+from rom.components.cosserat.statics import newton
 from rom.components.hand.cable import Hole, Tendon
 from rom.errors import ConfigError, ModelError, SolverError
 from rom.model import Array, Mask
@@ -30,14 +30,11 @@ from rom.paths.load_steps import load_steps
 
 PHALANX_RIGIDITY_RATIO = 1e5  # rigidity of a phalanx over that of the springs
 STOP_STIFFNESS_RATIO = 50.0  # stiffness of touching coils over that of the spring
-INCREMENT_RTOL = 1e-9  # last increment, in rad and lengths of the rod
-MAX_ITERATIONS = 80
 MIN_STEP = 0.5**9  # of the way, at which it is given up
 HAND_SPRING = HelicalSpring(0.7e-3, 7e-3, 5, 8e-3)
 INDEX_LENGTHS = (18e-3, 12e-3, 10e-3)  # m
-LENGTHS = {  # m, of whole fingers
-    "thumb": 49.5e-3, "index": 64e-3, "middle": 70.7e-3, "ring": 65.5e-3, "little": 53.3e-3,
-}  # fmt: skip
+# m, of whole fingers
+LENGTHS = dict(thumb=49.5e-3, index=64e-3, middle=70.7e-3, ring=65.5e-3, little=53.3e-3)
 
 Extra = Callable[[Shape], tuple[Array, Array]]
 
@@ -68,8 +65,8 @@ class Finger:
 
     def __post_init__(self) -> None:
         if len(self.springs) != len(self.phalanges) or not self.springs:
-            raise ModelError(f"{len(self.springs)} springs and {len(self.phalanges)} phalanges.",
-                             hint="Each spring carries one phalanx.")  # fmt: skip
+            text = f"{len(self.springs)} springs and {len(self.phalanges)} phalanges."
+            raise ModelError(text, hint="Each spring carries one phalanx.")
         if min(self.phalanges[:-1], default=1.0) <= 0 or self.phalanges[-1] < 0:
             raise ModelError(f"phalanges of {self.phalanges} m: they must be > 0, the last >= 0.")
 
@@ -239,52 +236,50 @@ def close(
     drawn = pull is not None
     goal = np.append(np.asarray(load, dtype=float), (tension or 0.0) if pull is None else pull)
     begin = np.append(here.load, here.pull if drawn else here.tension)
-    share, here = load_steps(
-        lambda at, x: _balance(finger, at, begin + x * (goal - begin), drawn, way, extra),
-        here, least=MIN_STEP,
-    )  # fmt: skip
+
+    def ahead(at: Posture, share: float) -> Posture | None:
+        return _balance(at, begin + share * (goal - begin), drawn, way, extra)
+
+    share, here = load_steps(ahead, here, least=MIN_STEP)
     if share < 1.0:
-        raise SolverError(f"no posture beyond {100 * share:.3g} % of the way.",
-                          hint="A joint buckles, or the load is too large.",
-                          solution=here)  # fmt: skip
+        text = f"no posture beyond {100 * share:.3g} % of the way."
+        raise SolverError(text, hint="A joint buckles, or the load is too large.", solution=here)
     return here
 
 
-def _balance(finger: Finger, start: Posture, goal: Array, drawn: bool, way: float,
-             extra: Extra | None) -> Posture | None:  # fmt: skip
-    """Newton's method with capped rotations; one more unknown, the tension, when pull is given."""
-    one, cable = finger.rod, finger.tendon
+def _balance(
+    start: Posture, goal: Array, drawn: bool, way: float, extra: Extra | None
+) -> Posture | None:
+    """The posture near one; one more unknown, the tension, when pull is given."""
+    finger, one, cable = start.finger, start.finger.rod, start.finger.tendon
     free = np.flatnonzero(clamped(one))
     load, length = loads(one, tip=goal[:3]), cable.length(reference(one))
-    shape, tension = start.shape, start.tension if drawn else float(goal[3])
-    straight = replace(cable, friction=0.0)
-    for _ in range(MAX_ITERATIONS):
+    straight, own = replace(cable, friction=0.0), start.tension if drawn else goal[3]
+
+    def correction(shape: Shape, tension: Array) -> Array | None:
         r, K = linearised(one, shape, load)
         g, H = cable.forces(one, shape, way)
         for more, stiffness in (finger.stops(shape), *((extra(shape),) if extra else ())):
             r, K = r + more, K + stiffness
         r, K = (r + tension * g)[free], (K + tension * H)[np.ix_(free, free)]
-        X = np.linalg.solve(K, -np.column_stack([r, g[free]]))
+        change = 0.0
+        try:
+            X = np.linalg.solve(K, -np.column_stack([r, g[free]]))
+        except np.linalg.LinAlgError:
+            return None
         if drawn:
             row = straight.forces(one, shape)[0][free]
             missing = goal[3] - (length - cable.length(shape))
             change = (-missing - row @ X[:, 0]) / (row @ X[:, 1])
-        else:
-            change = 0.0
-        d = np.zeros(6 * len(one.x) + 6)
+        d = np.append(np.zeros(g.size), change)
         d[free] = X[:, 0] + change * X[:, 1]
-        rows = d.reshape(-1, 6)
-        turned = np.abs(rows[:, :3]).max()
-        if not np.isfinite(turned):
-            return None
-        factor, p = min(1.0, MAX_ROTATION / max(turned, MAX_ROTATION)), shape.p.copy()
-        turn_all(p, factor * rows[:, :3])
-        shape = Shape(shape.x + factor * rows[:-1, 3:], p)
-        tension += factor * change
-        if max(turned, np.abs(rows[:-1, 3:]).max() / one.x[-1, 2]) < INCREMENT_RTOL:
-            pull = length - cable.length(shape)
-            return Posture(finger, shape, tension, pull, tuple(goal[:3]))
-    return None
+        return d
+
+    found = newton(one, start.shape, correction, more=[own])
+    if found is None:
+        return None
+    shape, (tension,) = found
+    return Posture(finger, shape, tension, length - cable.length(shape), tuple(goal[:3]))
 
 
 def hand(friction: float = 0.0, n: int = 8) -> dict[str, Finger]:
