@@ -11,6 +11,7 @@ from itertools import product
 from operator import attrgetter
 from pathlib import Path
 from pkgutil import resolve_name
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -19,8 +20,9 @@ import rom
 import rom.view
 from cases.files.border_calls import body, calls, mistuned, model
 from cases.files.docstrings import public
+from cases.paths import ROOT
 from rom.arguments.border import _Border, _taken
-from rom.arguments.kinds import Unfit
+from rom.arguments.kinds import Names, Unfit, evaluated
 from rom.errors import RomError
 
 SECONDS = 5.0  # a wrong argument is refused before work starts
@@ -228,6 +230,31 @@ def test_every_function_refuses_what_its_annotations_rule_out():
                 bad.append(f"{name}: {argument}={kind} is taken")
     assert not bad, "\n".join(bad)
     assert ruled >= LEAST_RULED_OUT
+
+
+def limits(annotation):
+    """What numbers an annotation takes, however deep inside it says so."""
+    for limit in (x for x in getattr(annotation, "__metadata__", ()) if hasattr(x, "holds")):
+        words = getattr(limit, "words", limit.summary)
+        yield f"{words} ({limit.error.__name__})"
+    for inner in get_args(annotation):
+        yield from limits(inner)
+
+
+@pytest.mark.once
+def test_limits_and_units_of_numbers_are_those_on_record():
+    """One line an argument: whoever widens a limit or changes a unit changes that line too."""
+    found = set()
+    for _, function, _ in at_the_border():
+        plain = inspect.unwrap(getattr(function, "__func__", function))
+        name, known = plain.__qualname__, Names(vars(sys.modules[plain.__module__]))
+        for p in inspect.signature(plain).parameters.values():
+            for words in limits(evaluated(p.annotation, known)):
+                found.add(f"{name} {p.name}: {words}")
+    record = set((ROOT / "tests/reference/limits.txt").read_text().splitlines())
+    assert not found - record, f"not on record: {sorted(found - record)}"
+    gone = record - found if find_spec("dolfinx") else set()  # without it some are not there
+    assert not gone, f"on record alone: {sorted(gone)}"
 
 
 @pytest.mark.once
