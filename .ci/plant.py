@@ -3,7 +3,9 @@
 ``.venv/bin/python .ci/plant.py [PART OF A PATH ...] [--seed N] [--per-file N]`` copies the package,
 changes one operator or number at a time in compiled functions of the copy, and runs the tests that
 belong to the file until one fails. Survivors are listed at the end with their lines; exit code 1 if
-there are any. Hours for all files, minutes for one.
+there are any. Hours for all files, minutes for one. ``--draw N`` plants N mistakes instead, in
+kernels, formulas, readers and solvers in turn, each in a file drawn at random; transposed matrices
+too.
 """
 
 import argparse
@@ -18,11 +20,14 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
+KINDS = ("sign", "factor", "transposition")
 ROOT = Path(__file__).resolve().parents[1]
 DECORATORS = ("inner", "kernel", "spliced", "stage", "residuals", "tangents", "energy", "law",
               "multiplier_columns")  # fmt: skip
 # of imports without which a file has none of them
 MARKS = "compiled import|compiled_law|element_calls|kernels.stages"
+# of which sums and multiples are no numbers
+LISTS = (ast.List, ast.Tuple, ast.JoinedStr, ast.ListComp, ast.Dict)
 # {part of a path: test files and folders that belong to it, the likeliest first}
 TESTS = {
     "rom/mbs/elements/contact": ["tests/mbs/elements/test_mbs_contact.py"],
@@ -46,7 +51,25 @@ TESTS = {
     ],
     "rom/mbs/integrate/step_control": ["tests/mbs/integrate/test_mbs_adaptive.py"],
     "rom/mbs/integrate/": ["tests/mbs/integrate"],
+    "rom/mbs/analysis/": ["tests/mbs/analysis", "tests/mbs/published"],
     "rom/mbs/": ["tests/mbs/equations", "tests/mbs/joints", "tests/mbs/published", "tests/mbs"],
+    "rom/components/wheels/prestress": ["tests/prestress"],
+    "rom/components/wheels": ["tests/cyclic", "tests/prestress"],
+    "rom/components/families": ["tests/parametric"],
+    "rom/components/orbits": ["tests/mbs/analysis"],
+    "rom/components/updating": ["tests/updating", "tests/components/updating"],
+    "rom/fe/operators": ["tests/fe", "tests/eigen"],
+    "rom/eigen": ["tests/eigen", "tests/reduction", "tests/body"],
+    "rom/checks": ["tests/body", "tests/reduction"],
+    "rom/stages": ["tests/body", "tests/reduction"],
+    "rom/paths": ["tests/mbs/analysis", "tests/body"],
+    "rom/decks": ["tests/io", "tests/fe"],
+}
+AREAS = {  # folders from which mistakes are drawn; kernels are all files with compiled functions
+    "kernels": (),
+    "formulas": ("rom/components", "rom/body", "rom/reduction", "rom/assembly", "rom/checks"),
+    "readers": ("rom/io", "rom/decks", "rom/fe/mesh", "rom/components/updating/responses"),
+    "solvers": ("rom/eigen", "rom/fe/operators", "rom/mbs/equations", "rom/mbs/analysis"),
 }
 
 
@@ -57,29 +80,37 @@ def files() -> list[Path]:
     return sorted(path for path in kernels if any(places(texts[path])))
 
 
-def places(text: str) -> tuple[list[ast.AST], list[ast.AST]]:
-    """Sums and differences, and products, of compiled functions, indices left out."""
+def places(text: str, everywhere: bool = False) -> tuple[list[ast.AST], ...]:
+    """Sums and differences, products, and transposed matrices, indices left out.
+
+    Of compiled functions; everywhere: of all.
+    """
     signs: list[ast.AST] = []
     factors: list[ast.AST] = []
+    turned: list[ast.AST] = []
     tree = ast.parse(text)
     laws = {node.args[0].id for node in ast.walk(tree) if _compiles_a_law(node)}
     for function in ast.walk(tree):
         if not isinstance(function, ast.FunctionDef):
             continue
-        if function.name not in laws and not _compiled(function):
+        if not (everywhere or function.name in laws or _compiled(function)):
             continue
         indices = {id(x) for node in ast.walk(function) if isinstance(node, ast.Subscript)
                    for x in ast.walk(node.slice)}  # fmt: skip
         for node in ast.walk(function):
             if isinstance(node, ast.AugAssign) and isinstance(node.op, ast.Add | ast.Sub):
                 signs += [node] if _real(node.value) else []
+            if isinstance(node, ast.Attribute) and node.attr == "T" and everywhere:
+                turned.append(node)
             if not isinstance(node, ast.BinOp) or id(node) in indices:
+                continue
+            if everywhere and any(isinstance(x, LISTS) for x in (node.left, node.right)):
                 continue
             if isinstance(node.op, ast.Add | ast.Sub) and _real(node):
                 signs.append(node)
             elif isinstance(node.op, ast.Mult | ast.Div) and _real(node):
                 factors.append(node)
-    return signs, factors
+    return signs, factors, turned
 
 
 def _compiled(function: ast.FunctionDef) -> bool:
@@ -107,6 +138,8 @@ def planted(text: str, node: Any) -> str:
         return before + len(lines[line - 1].encode()[:column].decode())
 
     begin, end = at(node.lineno, node.col_offset), at(node.end_lineno, node.end_col_offset)
+    if isinstance(node, ast.Attribute):
+        return f"{text[:begin]}({ast.get_source_segment(text, node.value)}){text[end:]}"
     mark = {ast.Add: "-", ast.Sub: "+"}.get(type(node.op))
     if isinstance(node, ast.AugAssign):
         value = ast.get_source_segment(text, node.value)
@@ -118,11 +151,41 @@ def planted(text: str, node: Any) -> str:
 
 def tests_of(path: str) -> list[str]:
     """The tests that belong to a file."""
-    if path.startswith("rom/components/"):
-        own = f"tests/components/{path.split('/')[2]}"
-        if (ROOT / own).exists():
-            return [own]
-    return next((tests for part, tests in TESTS.items() if path.startswith(part)), ["tests"])
+    parts = path.split("/")
+    own = f"tests/components/{parts[2]}" if parts[1] == "components" else f"tests/{parts[1]}"
+    listed = next((tests for part, tests in TESTS.items() if path.startswith(part)), None)
+    return listed or [own if (ROOT / own).exists() else "tests"]
+
+
+def drawn(n: int, seed: int) -> list[tuple[str, str, Any]]:
+    """(file, kind, place) of n mistakes, area by area, in files drawn at random."""
+    chance, found = random.Random(seed), []
+    kernels = {path.relative_to(ROOT).as_posix() for path in files()}
+    others = {path.relative_to(ROOT).as_posix() for path in (ROOT / "rom").rglob("*.py")} - kernels
+    areas = {area: sorted(path for path in others if path.startswith(folders)) if folders else
+             sorted(kernels) for area, folders in AREAS.items()}  # fmt: skip
+    while len(found) < n:
+        area = [*areas][len(found) % len(areas)]
+        path = chance.choice(areas[area])
+        kinds = zip(KINDS, places((ROOT / path).read_text(), area != "kernels"), strict=True)
+        if there := [(kind, nodes) for kind, nodes in kinds if nodes]:
+            kind, nodes = chance.choice(there)
+            found.append((path, kind, chance.choice(nodes)))
+    return found
+
+
+def listed(given: argparse.Namespace) -> list[tuple[str, str, Any]]:
+    """(file, kind, place) of so many mistakes in each file of kernels."""
+    found = []
+    for path in files():
+        name, text = str(path.relative_to(ROOT)), path.read_text()
+        if given.parts and not any(part in name for part in given.parts):
+            continue
+        for kind, nodes in zip(KINDS[:2], places(text)[:2], strict=True):
+            chance = random.Random(f"{given.seed} {name} {kind}")  # the same ones each time
+            some = chance.sample(nodes, min(given.per_file, len(nodes)))
+            found += [(name, kind, node) for node in some]
+    return found
 
 
 def survives(path: str, text: str) -> bool:
@@ -145,9 +208,10 @@ def survives(path: str, text: str) -> bool:
                 test,
             ]
             environment = os.environ | {"PYTHONPATH": folder}
-            done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True,
-                                  timeout=1800, check=False)  # fmt: skip
-            if done.returncode:
+            try:
+                subprocess.run(command, cwd=ROOT, env=environment, capture_output=True,
+                               timeout=1800, check=True)  # fmt: skip
+            except subprocess.SubprocessError:
                 return False
     return True
 
@@ -158,21 +222,16 @@ def main() -> int:
     parser.add_argument("parts", nargs="*", help="of paths; all files of kernels without any")
     parser.add_argument("--seed", type=int, default=0, help="of the choice of places")
     parser.add_argument("--per-file", type=int, default=1, help="signs and factors in each file")
-    given, survivors, total = parser.parse_args(), [], 0
-    for path in files():
-        name, text = str(path.relative_to(ROOT)), path.read_text()
-        if given.parts and not any(part in name for part in given.parts):
-            continue
-        for kind, nodes in zip(("sign", "factor"), places(text), strict=True):
-            chosen = random.Random(f"{given.seed} {name} {kind}")  # the same ones each time
-            for node in chosen.sample(nodes, min(given.per_file, len(nodes))):
-                total += 1
-                alive = survives(name, planted(text, node))
-                line = f"{name}:{node.lineno}: {kind} of {ast.unparse(node)}"
-                sys.stdout.write(f"{'SURVIVES' if alive else 'red     '} {line}\n")
-                sys.stdout.flush()
-                survivors += [line] if alive else []
-    sys.stdout.write(f"{total} planted, {len(survivors)} survive\n")
+    parser.add_argument("--draw", type=int, default=0, help="mistakes drawn over all areas")
+    given, survivors = parser.parse_args(), []
+    chosen = drawn(given.draw, given.seed) if given.draw else listed(given)
+    for name, kind, node in chosen:
+        alive = survives(name, planted((ROOT / name).read_text(), node))
+        line = f"{name}:{node.lineno}: {kind} of {ast.unparse(node)}"
+        sys.stdout.write(f"{'SURVIVES' if alive else 'red     '} {line}\n")
+        sys.stdout.flush()
+        survivors += [line] if alive else []
+    sys.stdout.write(f"{len(chosen)} planted, {len(survivors)} survive\n")
     return int(bool(survivors))
 
 
