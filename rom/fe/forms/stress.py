@@ -1,6 +1,6 @@
 """Stress and gradient of displacements: averaged at nodes, or at the points of a quadrature."""
 
-from typing import Any
+from collections.abc import Callable, Iterator
 
 from mpi4py import MPI
 
@@ -8,6 +8,7 @@ import numpy as np
 import ufl
 from dolfinx import fem
 from scipy.sparse import csr_matrix
+from ufl.core.expr import Expr
 
 from rom.fe.compat import (
     assemble_matrix,
@@ -20,7 +21,7 @@ from rom.fe.compat import (
     to_global,
 )
 from rom.fe.forms.large_strain import FiniteStrain, LargeStrain
-from rom.fe.forms.material import geometric_stiffness, stiffness, stress
+from rom.fe.forms.material import Coefficients, geometric_stiffness, stiffness, stress
 from rom.fe.jit import compiling
 from rom.fe.operators.aij import gathered
 from rom.fe.operators.factor import dense_rows
@@ -34,8 +35,15 @@ class Stresses:
     ``regions`` are the region (cells,) of each cell and {region: tag}; None where not known.
     """
 
-    def __init__(self, V: Any, numbers: dict[str, Any], degree: int, regions: Any = None):
-        self.V, self.numbers, self.degree, self.regions = V, numbers, degree, regions
+    def __init__(
+        self,
+        V: fem.FunctionSpace,
+        numbers: Coefficients,
+        degree: int,
+        regions: tuple[Index, dict[str, int]] | None = None,
+    ):
+        self.V, self.numbers, self.degree = V, numbers, degree
+        self.regions = regions or (np.zeros(0, dtype=np.int64), {})
         self.mesh = V.mesh
         self.n_cells = self.mesh.topology.index_map(3).size_local
 
@@ -76,7 +84,7 @@ class Stresses:
         }
 
     def _means(
-        self, of: Any, width: int, U: Array, nodes: Index, group: Index
+        self, of: Callable[[fem.Function], Expr], width: int, U: Array, nodes: Index, group: Index
     ) -> tuple[Array, Index, Index, Array]:
         """Means over the cells of one group at nodes, for all pairs of the two that exist.
 
@@ -176,17 +184,17 @@ class Stresses:
         A.destroy()
         return K_geo
 
-    def finite_strain(self, *, neo_hookean: bool = False) -> Any:
+    def finite_strain(self, *, neo_hookean: bool = False) -> FiniteStrain:
         """The same solid in large motion, `large_strain.FiniteStrain`."""
         return FiniteStrain(
             self.V, self.numbers, self.degree, *self.regions, neo_hookean=neo_hookean
         )
 
-    def large_strain(self) -> Any:
+    def large_strain(self) -> LargeStrain:
         """Energy of shapes at finite strain, `large_strain.LargeStrain`."""
         return LargeStrain(self.V, self.numbers, self.degree)
 
-    def _second_variation(self, load: Any) -> ufl.Form:
+    def _second_variation(self, load: fem.Function) -> ufl.Form:
         """Bilinear form; quadrature exact on straight tetrahedra, as for the mass on others."""
         u, v = ufl.TrialFunction(self.V), ufl.TestFunction(self.V)
         sigma = stress(ufl.sym(ufl.grad(load)), self.numbers)
@@ -194,12 +202,14 @@ class Stresses:
         dx = ufl.Measure("dx", domain=self.mesh, metadata={"quadrature_degree": order})
         return geometric_stiffness(u, v, sigma) * dx
 
-    def _hooke(self, u: Any) -> Any:
+    def _hooke(self, u: fem.Function) -> Expr:
         """Stress xx, yy, zz, yz, xz, xy of a displacement, a ufl vector."""
         s = stress(ufl.sym(ufl.grad(u)), self.numbers)
         return ufl.as_vector([s[i, j] for i, j in PAIRS])
 
-    def _evaluated(self, of: Any, width: int, U: Array, cells: Integers, X: Array) -> Any:
+    def _evaluated(
+        self, of: Callable[[fem.Function], Expr], width: int, U: Array, cells: Integers, X: Array
+    ) -> Iterator[Array]:
         """(cells, points, width) numbers of each column, of a ufl vector of the displacement."""
         u = fem.Function(self.V)
         with compiling(self.mesh.comm):

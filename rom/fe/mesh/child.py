@@ -10,7 +10,6 @@ import math
 import sys
 from importlib import import_module
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -24,7 +23,7 @@ from rom.errors import (
     in_file,
 )
 from rom.fe import GMSH_LIBRARIES
-from rom.fe.mesh.solid import GEOMETRIES, Read
+from rom.fe.mesh.solid import GEOMETRIES, Notes, Read, Request
 from rom.fe.mesh.sources.builder import unmeshable
 from rom.process import child
 from rom.process.memory import total_bytes
@@ -38,7 +37,7 @@ VARIABLES = {"OMP_NUM_THREADS": "1", "LC_ALL": "C.UTF-8"}
 
 
 def read_apart(
-    request: dict[str, Any],
+    request: Request,
     *,
     where: str,
     size: int,
@@ -62,7 +61,7 @@ def read_apart(
         return _result(folder, done, request, limits)
 
 
-def _plain(value: Any) -> Any:
+def _plain(value: object) -> object:
     if isinstance(value, np.ndarray | np.generic):
         return value.tolist()
     raise TypeError(f"got {value!r}")
@@ -95,7 +94,7 @@ def _chosen(name: str, value: float | None, default: float) -> float:
     return 0.0 if math.isinf(value) else float(value)
 
 
-def _result(folder: Path, done: child.Ended, request: dict[str, Any], limits: child.Limits) -> Read:
+def _result(folder: Path, done: child.Ended, request: Request, limits: child.Limits) -> Read:
     answer = folder / "answer.json"
     if not answer.exists():
         raise _died(done, request, limits)
@@ -108,7 +107,7 @@ def _result(folder: Path, done: child.Ended, request: dict[str, Any], limits: ch
         return dict(arrays), notes
 
 
-def _died(done: child.Ended, request: dict[str, Any], limits: child.Limits) -> BaseException:
+def _died(done: child.Ended, request: Request, limits: child.Limits) -> BaseException:
     """What a reader without an answer means."""
     if done.overtime or done.signal == "SIGXCPU":
         return _too_long(request, limits)
@@ -133,7 +132,7 @@ def _died(done: child.Ended, request: dict[str, Any], limits: child.Limits) -> B
     return FileFormatError(text, hint="Open it in gmsh and save it again.")
 
 
-def _too_long(request: dict[str, Any], limits: child.Limits) -> RomError:
+def _too_long(request: Request, limits: child.Limits) -> RomError:
     if request["reader"] in GEOMETRIES:
         return ResourceError(
             f"meshing did not end within the limit of {limits.seconds:g} s.",
@@ -144,7 +143,7 @@ def _too_long(request: dict[str, Any], limits: child.Limits) -> RomError:
     return FileFormatError(text, hint=WRITE_AGAIN)
 
 
-def _too_large(request: dict[str, Any], limits: child.Limits) -> RomError:
+def _too_large(request: Request, limits: child.Limits) -> RomError:
     if request["reader"] in GEOMETRIES:
         return ResourceError(
             f"meshing needs more than the limit of {limits.memory / BYTES_PER_GIGABYTE:.3g} GB.",
@@ -166,7 +165,7 @@ def main(folder: str) -> None:
     _answer(folder, notes)
 
 
-def read(request: dict[str, Any]) -> Read:
+def read(request: Request) -> Read:
     """Read or make the mesh a request asks for; what the child does.
 
     Returns:
@@ -207,7 +206,7 @@ def _described(error: RomError | MemoryError) -> dict[str, str]:
             "hint": error.hint}  # fmt: skip
 
 
-def _answer(folder: str, notes: dict[str, Any]) -> None:
+def _answer(folder: str, notes: Notes) -> None:
     part = Path(folder, "answer.part")
     part.write_text(json.dumps(notes))
     part.rename(Path(folder, "answer.json"))

@@ -2,21 +2,24 @@
 
 from dataclasses import replace
 from itertools import combinations
-from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from rom.arguments import finite, whole
 from rom.errors import ConfigError, MeshError, TagError
 from rom.fe.mesh.solid import SolidMesh
 from rom.fe.mesh.topology import faces_of, row_ids
-from rom.model import Array, Index
+from rom.model import Array, Index, Mask
 from rom.names import named
 
+Cuts = dict[str, tuple[tuple[int, int], Index]]  # numbers of the two pieces, and facets
 PLANE_RTOL = 1e-6  # of the length along the axis: how far nodes of a cut may lie from its plane
 
 
-def cut(mesh: SolidMesh, n: int | None = None, axis: Any = None) -> dict[str, SolidMesh]:
+def cut(
+    mesh: SolidMesh, n: int | None = None, axis: npt.ArrayLike | None = None
+) -> dict[str, SolidMesh]:
     """{name: piece} of a mesh, cut into n along an axis, or by its regions.
 
     Where two pieces meet both have the surface, of one name: "cut 1" between the pieces "1" and
@@ -36,7 +39,7 @@ def cut(mesh: SolidMesh, n: int | None = None, axis: Any = None) -> dict[str, So
     faces = faces_of(mesh.cells, mesh.kind, len(mesh.points))
     piece, names = _by_planes(mesh, n, axis) if axis is not None else _by_regions(mesh, n)
     rows = mesh.cells[:, np.array(mesh.kind.face_nodes)]
-    cuts: dict[str, tuple[tuple[int, int], Index]] = {}
+    cuts: Cuts = {}
     inner = faces.count[faces.of_cell] == 2
     for i, j in combinations(range(len(names)), 2):
         both = [np.unique(faces.of_cell[piece == k][inner[piece == k]]) for k in (i, j)]
@@ -59,7 +62,7 @@ def cut(mesh: SolidMesh, n: int | None = None, axis: Any = None) -> dict[str, So
     return found
 
 
-def _by_planes(mesh: SolidMesh, n: int | None, axis: Any) -> tuple[Index, list[str]]:
+def _by_planes(mesh: SolidMesh, n: int | None, axis: npt.ArrayLike) -> tuple[Index, list[str]]:
     """The piece of each cell by its middle, and the names of the pieces."""
     a = finite("axis", axis, (3,))
     if n is None or not a.any():
@@ -90,14 +93,14 @@ def _by_regions(mesh: SolidMesh, n: int | None) -> tuple[Index, list[str]]:
     return np.searchsorted(tags, mesh.regions), [mesh.region_names[tag] for tag in tags]
 
 
-def _nothing_to_cut(n: Any, axis: Any) -> ConfigError:
+def _nothing_to_cut(n: object, axis: object) -> ConfigError:
     return ConfigError(
         f"n = {n!r} and axis = {axis!r} say no cuts.",
         hint="Give both, as n=4, axis=(1, 0, 0), or neither to make a piece of each region.",
     )
 
 
-def _refuse_rough(mesh: SolidMesh, cuts: Any, axis: Array) -> None:
+def _refuse_rough(mesh: SolidMesh, cuts: Cuts, axis: Array) -> None:
     """Say where the faces between two pieces do not lie in a plane."""
     along = mesh.points @ (axis / np.linalg.norm(axis))
     for name, (_, rows) in cuts.items():
@@ -111,7 +114,7 @@ def _refuse_rough(mesh: SolidMesh, cuts: Any, axis: Array) -> None:
             )
 
 
-def _piece(mesh: SolidMesh, piece: Index, k: int, cuts: Any, name: str) -> SolidMesh:
+def _piece(mesh: SolidMesh, piece: Index, k: int, cuts: Cuts, name: str) -> SolidMesh:
     """The cells of one piece, with the surfaces that it has."""
     own = piece == k
     outer = {key: rows for key, (pair, rows) in cuts.items() if k in pair}
@@ -131,7 +134,7 @@ def _piece(mesh: SolidMesh, piece: Index, k: int, cuts: Any, name: str) -> Solid
     )
 
 
-def _named_facets(mesh: SolidMesh, own: Any, name: str) -> dict[str, Index]:
+def _named_facets(mesh: SolidMesh, own: Mask, name: str) -> dict[str, Index]:
     """Those surfaces of the mesh that are faces of the cells of one piece."""
     kind, n = mesh.kind, len(mesh.points)
     listed = mesh.corners[own][:, np.array(kind.faces)].reshape(-1, kind.corners_per_face)

@@ -6,9 +6,8 @@ number.
 """
 
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -18,7 +17,7 @@ from rom.fe.mesh.cell_types import CELL_TYPES, DECK_EDGES
 from rom.fe.mesh.solid import SolidMesh
 from rom.fe.mesh.sources.abaqus import SIDES
 from rom.fe.mesh.topology import row_ids
-from rom.model import Index, Orthotropic
+from rom.model import Index, Material, Orthotropic
 from rom.names import ORIGIN_MARK, check_known
 
 STEPS = {
@@ -27,13 +26,14 @@ STEPS = {
 }
 ELEMENTS = {"tet4": "C3D4", "tet10": "C3D10"}
 NAME_PATTERN = re.compile(r"[A-Za-z][\w.-]{0,79}", re.ASCII)
+Materials = Material | Orthotropic | Mapping[str, Material | Orthotropic]
 PER_LINE = 8  # numbers
 
 
 def input_deck(
     mesh: SolidMesh,
     *,
-    material: Any = None,
+    material: Materials | None = None,
     degree: int = 2,
     fixed: Sequence[str] = (),
     step: str = "frequencies",
@@ -133,7 +133,7 @@ def _owners(mesh: SolidMesh, facets: Index, sides: Index) -> tuple[Index, Index]
     return place // len(sides), place % len(sides)
 
 
-def _materials(mesh: SolidMesh, material: Any) -> Iterator[str]:
+def _materials(mesh: SolidMesh, material: Materials) -> Iterator[str]:
     from rom.fe.forms.material import by_region
 
     solids = by_region(material, {name: tag for tag, name in mesh.region_names.items()})

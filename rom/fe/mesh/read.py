@@ -9,7 +9,7 @@ import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -31,11 +31,18 @@ from rom.fe.mesh.curving import without_middles
 from rom.fe.mesh.picks import EVERY_FACE, picks
 from rom.fe.mesh.quality import straighten
 from rom.fe.mesh.repair import repair
-from rom.fe.mesh.solid import GEOMETRIES, PROGRAMS, Arrays, SolidMesh
+from rom.fe.mesh.solid import GEOMETRIES, PROGRAMS, Arrays, Notes, Request, SolidMesh
 from rom.fe.mesh.validate import checked
 from rom.model import Array, Index
 from rom.names import check_known, check_text
 from rom.readable import check_readable
+
+if TYPE_CHECKING:
+    from mpi4py import MPI
+
+    from dolfinx.mesh import Mesh
+
+    from rom.fe.compat import MeshTags
 
 INCLUDES = {"abaqus": keywords.INCLUDE_PATTERN, "nastran": bulk.INCLUDE_PATTERN}
 LARGEST_FILE = 2**32  # bytes; some ten million nodes
@@ -143,7 +150,7 @@ class FlatMesh:
     triangles: Index
     curves: dict[str, Index]
     surfaces: dict[str, Index]
-    provenance: dict[str, Any]
+    provenance: Notes
 
     def nodes(self, name: str) -> Index:
         """(k,) nodes of a physical curve.
@@ -213,7 +220,9 @@ def _scaled_twice(size: float, scale: float) -> str:
     )
 
 
-def to_dolfinx(mesh: SolidMesh | None, comm: Any) -> tuple[Any, Any, dict[str, Any]]:
+def to_dolfinx(
+    mesh: SolidMesh | None, comm: "MPI.Comm"
+) -> "tuple[Mesh, MeshTags, dict[str, MeshTags]]":
     """Share a mesh among the ranks.
 
     Args:
@@ -256,9 +265,7 @@ def to_dolfinx(mesh: SolidMesh | None, comm: Any) -> tuple[Any, Any, dict[str, A
     return made, cell_tags, facet_tags
 
 
-def _solid(
-    arrays: Arrays, notes: dict[str, Any], provenance: dict[str, Any], scale: float
-) -> SolidMesh:
+def _solid(arrays: Arrays, notes: Notes, provenance: Notes, scale: float) -> SolidMesh:
     return SolidMesh(
         points=arrays["points"] * scale,
         cells=arrays["cells"],
@@ -284,13 +291,13 @@ def _request(
     trust: bool,
     faces: Mapping[str, Any] | None = None,
     order: int | None = None,
-) -> dict[str, Any]:
+) -> Request:
     """What is asked of the reader of a file, checked."""
     check_readable(path, LARGEST_FILE)
     reader = READERS.get(path.suffix.lower())
     if reader is None:
         raise ConfigError(f"no reader for the suffix {path.suffix!r}; known are {sorted(READERS)}.")
-    request = {
+    request: Request = {
         "path": str(path.absolute()),
         "reader": reader,
         "parameters": dict(parameters or {}),
@@ -311,7 +318,7 @@ def is_geometry(path: str | Path) -> bool:
     return READERS.get(Path(path).suffix.lower()) in GEOMETRIES
 
 
-def _check_request(request: dict[str, Any], scale: float) -> None:
+def _check_request(request: Request, scale: float) -> None:
     reader = request["reader"]
     if request["parameters"] and reader not in GEOMETRIES:
         raise ConfigError(

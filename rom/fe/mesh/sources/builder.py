@@ -3,18 +3,17 @@
 import inspect
 import sys
 import traceback
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from importlib.machinery import SourceFileLoader
 from pathlib import Path
 from types import ModuleType
-from typing import Any
 
 from rom.errors import ConfigError, FileFormatError, MeshError, RomError
-from rom.fe.mesh.solid import Made
+from rom.fe.mesh.solid import Made, Notes, Request
 from rom.names import named
 
 
-def make(gmsh: Any, path: Path, request: dict[str, Any]) -> Made:
+def make(gmsh: ModuleType, path: Path, request: Request) -> Made:
     """Call ``build(gmsh, **parameters)`` of the file; the parameters used, and their defaults."""
     build = getattr(_load(path), "build", None)
     if not callable(build):
@@ -50,7 +49,7 @@ def _load(path: Path) -> ModuleType:
     return module
 
 
-def _arguments(build: Any, given: dict[str, Any], path: Path) -> dict[str, Any]:
+def _arguments(build: Callable[..., object], given: Notes, path: Path) -> Notes:
     known = list(inspect.signature(build).parameters.values())[1:]
     names = [p.name for p in known if p.kind is not p.VAR_KEYWORD]
     unknown = sorted(set(given) - set(names))
@@ -71,7 +70,7 @@ def no_parameter(
     return ConfigError(text, hint=hint)
 
 
-def _defaults(build: Any) -> dict[str, Any]:
+def _defaults(build: Callable[..., object]) -> Notes:
     known = inspect.signature(build).parameters.values()
     return {p.name: p.default for p in known if p.default is not p.empty}
 

@@ -5,7 +5,7 @@ Of plane sections, triangles, curves and surfaces.
 
 import re
 from pathlib import Path
-from typing import Any
+from types import ModuleType
 
 import numpy as np
 
@@ -31,7 +31,7 @@ def declared_groups(path: Path) -> list[tuple[int, int, str]]:
     return [(int(d), int(t), n.decode("utf-8", "replace")) for d, t, n in NAMES.findall(section)]
 
 
-def check_declared(gmsh: Any, declared: Path) -> None:
+def check_declared(gmsh: ModuleType, declared: Path) -> None:
     """Refuse what gmsh drops in silence: empty groups, and the second group of a name."""
     present, groups = set(gmsh.model.getPhysicalGroups()), declared_groups(declared)
     _check_names({(dim, tag): name for dim, tag, name in groups})
@@ -51,7 +51,7 @@ def version(path: Path) -> int:
     return int(found[1]) if found else 0
 
 
-def collect(gmsh: Any, declared: Path, *, strict: bool, repeated: bool) -> Read:
+def collect(gmsh: ModuleType, declared: Path, *, strict: bool, repeated: bool) -> Read:
     """Arrays and notes of the mesh, as `rom.fe.mesh.child.read` returns them.
 
     The header of a ``.msh`` file, ``declared``, lists the names of the groups; ``strict`` where
@@ -82,14 +82,14 @@ def collect(gmsh: Any, declared: Path, *, strict: bool, repeated: bool) -> Read:
     )
 
 
-def _nodes(gmsh: Any) -> tuple[Index, Array]:
+def _nodes(gmsh: ModuleType) -> tuple[Index, Array]:
     """Tags, ascending, and (n, 3) points of all nodes."""
     tags, x, _ = gmsh.model.mesh.getNodes()
     order = np.argsort(tags, kind="stable")
     return tags[order].astype(np.int64), x.reshape(-1, 3)[order]
 
 
-def _group_names(gmsh: Any) -> Groups:
+def _group_names(gmsh: ModuleType) -> Groups:
     """{(dimension, tag): name}; nameless groups get one."""
     names = {
         (dim, tag): gmsh.model.getPhysicalName(dim, tag) or f"{DIMENSIONS[dim]}_{tag}"
@@ -124,7 +124,7 @@ def _remarks(groups: dict[tuple[int, int], str]) -> list[str]:
     return found
 
 
-def _solids(gmsh: Any) -> tuple[int, Blocks]:
+def _solids(gmsh: ModuleType) -> tuple[int, Blocks]:
     """Element type in gmsh, and element numbers and nodes of each volume."""
     blocks, kinds = {}, set()
     for _, volume in gmsh.model.getEntities(3):
@@ -139,7 +139,7 @@ def _solids(gmsh: Any) -> tuple[int, Blocks]:
     return kinds.pop(), {v: (ids, nodes.reshape(-1, size)) for v, (ids, nodes) in blocks.items()}
 
 
-def _check_kinds(gmsh: Any, kinds: set[int]) -> None:
+def _check_kinds(gmsh: ModuleType, kinds: set[int]) -> None:
     if not kinds:
         raise _no_solid(gmsh)
     names = sorted(gmsh.model.mesh.getElementProperties(kind)[0] for kind in kinds)
@@ -155,7 +155,7 @@ def _check_kinds(gmsh: Any, kinds: set[int]) -> None:
         )
 
 
-def _no_solid(gmsh: Any) -> MeshError:
+def _no_solid(gmsh: ModuleType) -> MeshError:
     types = gmsh.model.mesh.getElements(2)[1]
     n = sum(len(ids) for ids in types)
     if not n:
@@ -171,7 +171,7 @@ def _no_solid(gmsh: Any) -> MeshError:
     )
 
 
-def _regions(gmsh: Any, blocks: Blocks, groups: Groups, *, strict: bool) -> dict[int, int]:
+def _regions(gmsh: ModuleType, blocks: Blocks, groups: Groups, *, strict: bool) -> dict[int, int]:
     """{volume: region number}; every volume in exactly one group, or no group at all."""
     if not any(dim == 3 for dim, _ in groups):
         if groups and strict and any(dim == 2 for dim, _ in groups):
@@ -184,7 +184,7 @@ def _regions(gmsh: Any, blocks: Blocks, groups: Groups, *, strict: bool) -> dict
     return {volume: _region(gmsh, volume, blocks, groups) for volume in blocks}
 
 
-def _region(gmsh: Any, volume: int, blocks: Blocks, groups: Groups) -> int:
+def _region(gmsh: ModuleType, volume: int, blocks: Blocks, groups: Groups) -> int:
     tags = [int(t) for t in gmsh.model.getPhysicalGroupsForEntity(3, volume)]
     if min(tags, default=1) < 1:
         raise TagError(
@@ -207,13 +207,13 @@ def _region(gmsh: Any, volume: int, blocks: Blocks, groups: Groups) -> int:
     return tags[0]
 
 
-def _surfaces(gmsh: Any, tag: int) -> list[int]:
+def _surfaces(gmsh: ModuleType, tag: int) -> list[int]:
     """Those of a group, without the cuts of a partition, which have the group of their volume."""
     surfaces = gmsh.model.getEntitiesForPhysicalGroup(2, tag)
     return [int(s) for s in surfaces if gmsh.model.getParent(2, s)[0] != 3]
 
 
-def _facets(gmsh: Any, tag: int, name: str, *, repeated: bool) -> Index:
+def _facets(gmsh: ModuleType, tag: int, name: str, *, repeated: bool) -> Index:
     """(f, kf) node tags of a physical surface."""
     found = []
     for surface in _surfaces(gmsh, tag):
@@ -250,7 +250,7 @@ def _rows(tags: Index, nodes: Index, what: str) -> Index:
     return place
 
 
-def triangles(gmsh: Any) -> Read:
+def triangles(gmsh: ModuleType) -> Read:
     """Arrays and notes as `collect` returns them, of triangles in z = 0, facets being curves."""
     tags, points = _nodes(gmsh)
     cells, ids = _triangles(gmsh, tags)
@@ -274,7 +274,7 @@ def triangles(gmsh: Any) -> Read:
     return arrays | {f"surface {i}": rows for i, rows in enumerate(surfaces.values())}, notes
 
 
-def _triangles(gmsh: Any, tags: Index) -> tuple[Index, Index]:
+def _triangles(gmsh: ModuleType, tags: Index) -> tuple[Index, Index]:
     """Corners as positions among the tags, and numbers, of all triangles."""
     kinds, ids, nodes = gmsh.model.mesh.getElements(2)
     others = [gmsh.model.mesh.getElementProperties(kind)[0] for kind in kinds if kind != TRIANGLE]
@@ -287,7 +287,7 @@ def _triangles(gmsh: Any, tags: Index) -> tuple[Index, Index]:
     return np.searchsorted(tags, nodes[0].astype(np.int64)).reshape(-1, 3), ids[0].astype(np.int64)
 
 
-def _plane_surfaces(gmsh: Any, ids: Index) -> dict[str, Index]:
+def _plane_surfaces(gmsh: ModuleType, ids: Index) -> dict[str, Index]:
     """Triangles of each plane surface: those of physical ones if there are any, or of all."""
     named: dict[str, int] = {}
     for dim, tag in gmsh.model.getPhysicalGroups(2):
@@ -301,12 +301,12 @@ def _plane_surfaces(gmsh: Any, ids: Index) -> dict[str, Index]:
             for name, tag in named.items()}  # fmt: skip
 
 
-def _triangle_ids(gmsh: Any, surface: int) -> Index:
+def _triangle_ids(gmsh: ModuleType, surface: int) -> Index:
     found = gmsh.model.mesh.getElements(2, surface)[1]
     return np.concatenate([np.zeros(0, dtype=np.int64), *(x.astype(np.int64) for x in found)])
 
 
-def _lines(gmsh: Any, tag: int, tags: Index, place: Array) -> Index:
+def _lines(gmsh: ModuleType, tag: int, tags: Index, place: Array) -> Index:
     """(k, 2) nodes of the sides of a physical curve."""
     found = [np.zeros((0, 2), dtype=np.int64)]
     for curve in gmsh.model.getEntitiesForPhysicalGroup(1, tag):
