@@ -175,8 +175,8 @@ class Assembly:
         omega = natural_modes(M[:n, :n], K[:n, :n], n_rigid)[0]
         few = natural_modes(M, K, n_rigid)[0][n_rigid:][:N_COMPARED]
         table = {"reduced": few.tolist(), "full": self._elastic(few.size, fixed).tolist()}
-        report = Report("certificate of the condensed assembly",
-                        tuple(frequency_rows(f"{n} interface functions", table)))  # fmt: skip
+        rows = tuple(frequency_rows(f"{n} interface functions", table))
+        report = Report("certificate of the condensed assembly", rows)
         return CondensedAssembly(level, n, omega, basis, M, K, self._widths(), n_rigid, report)
 
     def _elastic(self, n: int, fixed: tuple[Place, ...]) -> Array:

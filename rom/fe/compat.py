@@ -146,9 +146,9 @@ def versions() -> dict[str, str]:
     """Versions of the libraries a model was made with."""
     from slepc4py import SLEPc
 
-    number = {name: ".".join(map(str, package.Sys.getVersion()))
-              for name, package in (("PETSc", PETSc), ("SLEPc", SLEPc))}  # fmt: skip
-    return {"dolfinx": dolfinx.__version__, **number}
+    found = {"PETSc": PETSc.Sys.getVersion(), "SLEPc": SLEPc.Sys.getVersion()}
+    numbers = {name: ".".join(map(str, version)) for name, version in found.items()}
+    return {"dolfinx": dolfinx.__version__, **numbers}
 
 
 def create_mesh(comm: MPI.Comm, cells: Integers, points: Array, shape: str, degree: int) -> Mesh:

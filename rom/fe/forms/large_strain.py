@@ -332,6 +332,8 @@ def quadratic_strain(H: Array) -> Array:
     flat = H.reshape(p, 3, 3 * r)
     products = np.matmul(flat.transpose(0, 2, 1), flat).reshape(p, 3, r, 3, r)
     j, k = np.triu_indices(r)
-    rows = [products[:, a, j, b, k] if a == b else
-            products[:, a, j, b, k] + products[:, b, j, a, k] for a, b in PAIRS]  # fmt: skip
+    rows = [products[:, a, j, b, k] for a, b in PAIRS]
+    for row, (a, b) in zip(rows, PAIRS, strict=True):
+        if a != b:
+            row += products[:, b, j, a, k]
     return np.stack(rows, axis=1)

@@ -112,12 +112,10 @@ def _boundary_triangles(V: fem.FunctionSpace, points: Array, degree: int) -> Ind
     topology.create_connectivity(2, 3)
     topology.create_connectivity(3, 2)
     facets = exterior_facet_indices(topology)
-    cells = np.array([topology.connectivity(2, 3).links(f)[0] for f in facets], dtype=np.int64)
-    local = np.array(
-        [np.flatnonzero(topology.connectivity(3, 2).links(c) == f)[0]
-         for f, c in zip(facets, cells, strict=True)],
-        dtype=np.int64,
-    )  # fmt: skip
+    cells_at, facets_of = (topology.connectivity(*dims).links for dims in ((2, 3), (3, 2)))
+    pairs = [(f, cells_at(f)[0]) for f in facets]
+    local = np.array([np.flatnonzero(facets_of(c) == f)[0] for f, c in pairs], dtype=np.int64)
+    cells = np.array([c for _, c in pairs], dtype=np.int64)
     name = cell_name(V.mesh)
     corners = [V.dofmap.dof_layout.entity_dofs(0, i)[0] for i in range(len(sub_entities(name)[0]))]
     table, parts = cell_dofs(V), [np.empty((0, 3), dtype=np.int64)]

@@ -70,11 +70,12 @@ class Stresses:
         Returns:
             The arrays of `rom.body.nonlinear.cauchy.CauchyRecovery`, equal on all ranks.
         """
+
+        def slopes(u: fem.Function) -> Expr:
+            return ufl.as_vector([ufl.grad(u)[a, b] for a in range(3) for b in range(3)])
+
         laws, of_cell = self._laws()
-        gradient, node, material, count = self._means(
-            lambda u: ufl.as_vector([ufl.grad(u)[a, b] for a in range(3) for b in range(3)]),
-            9, U, nodes, of_cell,
-        )  # fmt: skip
+        gradient, node, material, count = self._means(slopes, 9, U, nodes, of_cell)
         return {
             "gradient": gradient.reshape(9 * len(node), -1),
             "stiffness": laws,

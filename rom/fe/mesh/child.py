@@ -202,8 +202,8 @@ def _described(error: RomError | MemoryError) -> dict[str, str]:
     """What the parent needs to raise the error again."""
     if isinstance(error, MemoryError):
         return {"error": MemoryError.__name__}
-    return {"error": type(error).__name__, "message": error.message, "where": error.where,
-            "hint": error.hint}  # fmt: skip
+    told = {name: getattr(error, name) for name in ("message", "where", "hint")}
+    return {"error": type(error).__name__, **told}
 
 
 def _answer(folder: str, notes: Notes) -> None:

@@ -49,16 +49,16 @@ def cut(
             name = f"cut {i + 1}" if axis is not None else f"{names[i]}-{names[j]}"
             cuts[name] = (i, j), rows[of_first]
     if double := sorted(set(cuts) & set(mesh.facets)):
-        raise TagError(f"surface {named(double)} has the name of a cut.",
-                       hint="Give it another one.")  # fmt: skip
+        text = f"surface {named(double)} has the name of a cut."
+        raise TagError(text, hint="Give it another one.")
     if axis is not None:
         _refuse_rough(mesh, cuts, np.asarray(axis, dtype=float))
     found = {name: _piece(mesh, piece, k, cuts, name) for k, name in enumerate(names)}
     for cut_name, ((i, j), _) in cuts.items():
         doubled = set(found[names[i]].facets) & set(found[names[j]].facets) & set(mesh.facets)
         if doubled:
-            raise TagError(f"surface {named(sorted(doubled))} lies on {cut_name!r}.",
-                           hint="Leave it without a name: the cut has one.")  # fmt: skip
+            text = f"surface {named(sorted(doubled))} lies on {cut_name!r}."
+            raise TagError(text, hint="Leave it without a name: the cut has one.")
     return found
 
 

@@ -111,11 +111,10 @@ def _elements(mesh: SolidMesh) -> Iterator[str]:
 
 
 def _interfaces(mesh: SolidMesh) -> Iterator[str]:
-    sides = np.array(SIDES[4])
-    on_side = [[k for k, s in enumerate(mesh.kind.supports) if set(s) <= set(side)]
-               for side in SIDES[4]]  # fmt: skip
+    sides, supports = SIDES[4], mesh.kind.supports
+    on_side = [[k for k, s in enumerate(supports) if set(s) <= set(side)] for side in sides]
     for name, facets in mesh.facets.items():
-        cell, side = _owners(mesh, facets[:, :3], sides)
+        cell, side = _owners(mesh, facets[:, :3], np.array(sides))
         nodes = np.unique(mesh.cells[cell[:, None], np.array(on_side)[side]]) + 1
         yield f"*NSET, NSET={name}"
         for k in range(0, nodes.size, PER_LINE):

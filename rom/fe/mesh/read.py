@@ -6,7 +6,7 @@ can crash.
 """
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -113,10 +113,9 @@ def read_mesh(  # noqa: PLR0913  limits and trust beside what is read
     files = {path}  # a deck may include others
     if reader in INCLUDES:
         files |= {place[0] for place, _ in lines(path, INCLUDES[reader])}
-    arrays, notes = read_apart(
-        request, where=str(path), size=sum(file.stat().st_size for file in files),
-        time_limit=time_limit, memory_limit=memory_limit,
-    )  # fmt: skip
+    size = sum(file.stat().st_size for file in files)
+    limits = {"time_limit": time_limit, "memory_limit": memory_limit}
+    arrays, notes = read_apart(request, where=str(path), size=size, **limits)
     provenance = {
         "path": str(path),
         "sha256": _digest(*sorted(files)),
@@ -199,9 +198,9 @@ def read_triangles(
     X, T = arrays["points"][:, :2] * scale, arrays["cells"]
     u, v = X[T[:, 1]] - X[T[:, 0]], X[T[:, 2]] - X[T[:, 0]]
     T = np.where((u[:, 0] * v[:, 1] < u[:, 1] * v[:, 0])[:, None], T[:, ::-1], T)
-    curves = {name: _with_solid_on_left(arrays[f"facets {i}"], T)
-              for i, name in enumerate(notes["facet_names"])}  # fmt: skip
-    surfaces = {name: arrays[f"surface {i}"] for i, name in enumerate(notes["surface_names"])}
+    sides = _tables(arrays, "facets", notes["facet_names"])
+    curves = {name: _with_solid_on_left(rows, T) for name, rows in sides.items()}
+    surfaces = _tables(arrays, "surface", notes["surface_names"])
     return FlatMesh(X, T, curves, surfaces, provenance | notes["provenance"])
 
 
@@ -272,7 +271,7 @@ def _solid(arrays: Arrays, notes: Notes, provenance: Notes, scale: float) -> Sol
         cell_type=notes["cell_type"],
         regions=arrays["regions"],
         region_names={int(tag): name for tag, name in notes["region_names"].items()},
-        facets={name: arrays[f"facets {i}"] for i, name in enumerate(notes["facet_names"])},
+        facets=_tables(arrays, "facets", notes["facet_names"]),
         provenance=provenance,
         cell_ids=arrays["cell_ids"],
         axes={
@@ -281,6 +280,11 @@ def _solid(arrays: Arrays, notes: Notes, provenance: Notes, scale: float) -> Sol
         },
         faces=tuple(scaled(from_plain(Face, face), scale) for face in notes.get("faces", ())),
     )
+
+
+def _tables(arrays: Arrays, kind: str, names: Sequence[str]) -> dict[str, Index]:
+    """The arrays of one kind, by their names in the notes."""
+    return {name: arrays[f"{kind} {i}"] for i, name in enumerate(names)}
 
 
 def _request(

@@ -114,7 +114,7 @@ def cell_volumes(mesh: SolidMesh) -> Array:
 
 def vtk_cells(mesh: SolidMesh) -> tuple[Index, int]:
     """(m, k) node numbers in VTK's order, and VTK's number of the cell."""
-    more = {"tet10": DECK_EDGES["tet10"],
-            "hex27": (*DECK_EDGES["hex20"], *VTK_HEX_FACES, tuple(range(8)))}  # fmt: skip
+    in_bricks = (*DECK_EDGES["hex20"], *VTK_HEX_FACES, tuple(range(8)))
+    more = {"tet10": DECK_EDGES["tet10"], "hex27": in_bricks}
     order = mesh.kind.among(more.get(mesh.cell_type, ()))
     return np.hstack([mesh.corners, mesh.cells[:, list(order)]]), VTK_TYPES[mesh.cell_type]

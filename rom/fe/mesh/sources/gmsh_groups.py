@@ -258,19 +258,18 @@ def triangles(gmsh: ModuleType) -> Read:
     used, cells = np.unique(cells, return_inverse=True)
     points, cells = points[used], cells.reshape(-1, 3)
     extent = np.ptp(points, axis=0)
-    if np.abs(points[:, 2]).max() > FLAT_RTOL * extent.max():
-        raise MeshError(f"the mesh leaves the plane z = 0 by {np.abs(points[:, 2]).max():.3g} m.",
-                        hint="Draw a plane section in x and y.")  # fmt: skip
+    if (height := np.abs(points[:, 2]).max()) > FLAT_RTOL * extent.max():
+        text = f"the mesh leaves the plane z = 0 by {height:.3g} m."
+        raise MeshError(text, hint="Draw a plane section in x and y.")
     place = np.full(tags.size, -1)
     place[used] = np.arange(used.size)
     curves = {
         gmsh.model.getPhysicalName(dim, tag) or f"curve_{tag}": _lines(gmsh, tag, tags, place)
         for dim, tag in gmsh.model.getPhysicalGroups(1)
     }
-    arrays, notes = packed(
-        points, cells, "tri3", np.ones(len(cells), dtype=int), ids, facets=curves,
-        region_names={1: "body"}, surface_names=list(surfaces), warnings=[],
-    )  # fmt: skip
+    told = {"region_names": {1: "body"}, "surface_names": list(surfaces), "warnings": []}
+    regions = np.ones(len(cells), dtype=int)
+    arrays, notes = packed(points, cells, "tri3", regions, ids, facets=curves, **told)
     return arrays | {f"surface {i}": rows for i, rows in enumerate(surfaces.values())}, notes
 
 
@@ -279,11 +278,11 @@ def _triangles(gmsh: ModuleType, tags: Index) -> tuple[Index, Index]:
     kinds, ids, nodes = gmsh.model.mesh.getElements(2)
     others = [gmsh.model.mesh.getElementProperties(kind)[0] for kind in kinds if kind != TRIANGLE]
     if others:
-        raise MeshError(f"cells of the type {others[0]}: triangles with three nodes are needed.",
-                        hint="Leave out Recombine, and keep Mesh.ElementOrder = 1.")  # fmt: skip
+        text = f"cells of the type {others[0]}: triangles with three nodes are needed."
+        raise MeshError(text, hint="Leave out Recombine, and keep Mesh.ElementOrder = 1.")
     if not len(kinds):
-        raise MeshError("there are no triangles: the geometry has no plane surface.",
-                        hint="Add Plane Surface(1) = {...};")  # fmt: skip
+        text = "there are no triangles: the geometry has no plane surface."
+        raise MeshError(text, hint="Add Plane Surface(1) = {...};")
     return np.searchsorted(tags, nodes[0].astype(np.int64)).reshape(-1, 3), ids[0].astype(np.int64)
 
 
@@ -296,9 +295,9 @@ def _plane_surfaces(gmsh: ModuleType, ids: Index) -> dict[str, Index]:
         single = len(parts) == 1
         named |= {name if single else f"{name} {k}": part for k, part in enumerate(parts, 1)}
     named = named or {f"surface {tag}": tag for _, tag in gmsh.model.getEntities(2)}
+    found = {name: _triangle_ids(gmsh, tag) for name, tag in named.items()}
     order = np.argsort(ids, kind="stable")
-    return {name: order[np.searchsorted(ids[order], _triangle_ids(gmsh, tag))]
-            for name, tag in named.items()}  # fmt: skip
+    return {name: order[np.searchsorted(ids[order], some)] for name, some in found.items()}
 
 
 def _triangle_ids(gmsh: ModuleType, surface: int) -> Index:

@@ -62,8 +62,7 @@ GENERAL_OPTIONS = {"Terminal", "Verbosity", "ExpertMode", "NumThreads", "AbortOn
 OPERATOR_SIGNS = "=.,;+-*/^<>!&|?:)]}~%"  # behind a variable; no command has one behind it
 INCLUDE_COMMAND, MERGE_COMMANDS = "Include", ("Merge", "MergeWithBoundingBox")
 # endings, in these letters only, of files that gmsh gives to readers which run nothing
-SHAPES = (".step", ".STEP", ".stp", ".STP", ".iges", ".IGES", ".igs", ".IGS", ".brep", ".brp",
-          ".stl", ".STL")  # fmt: skip
+SHAPES = tuple(".step .STEP .stp .STP .iges .IGES .igs .IGS .brep .brp .stl .STL".split())
 MESHES, SCRIPTS = (".msh", ".pos"), (".geo", ".pos", ".opt", ".geo_unrolled", "")
 MESH_STARTS = (b"$MeshFormat", b"$Comments", b"$PostFormat", b"$View")
 LONGEST_TEXT = 1000  # characters; gmsh cuts at 1023 and runs what follows
