@@ -248,10 +248,9 @@ class Tree:
             )
         owner = {interface: key for key, model in models.items() for interface in model.interfaces}
         owner = {interface: key for interface, key in owner.items() if interface not in self.joints}
-        if unknown := [name for name in geometric.loads if name not in owner]:
-            raise InterfaceError(
-                f"the range of loads names {named(unknown)}; the pieces have {offered(owner)}."
-            )
+        for name in geometric.loads:
+            what = f"the range of loads names {name!r}; the pieces have"
+            check_known(name, owner, what, InterfaceError)
         largest = {name: np.abs(np.asarray(x, dtype=float)) for name, x in geometric.loads.items()}
         loads: dict[str, dict[str, Array]] = {key: {} for key in self.reference}
         for name, load in largest.items():
@@ -337,10 +336,8 @@ def reduce_pieces(
     ranges = dict.fromkeys(models) if nonlinear is None else tree.ranges(nonlinear, models)
     every = {interface: "rbe3" for model in models.values() for interface in model.interfaces}
     kinds, bodies = every | (interfaces or {}), dict[str, FlexibleBody]()
-    if unknown := [name for name in kinds if name not in every]:
-        raise InterfaceError(
-            f"there is no interface {named(unknown)}; the pieces have {offered(every)}."
-        )
+    for name in kinds:
+        check_known(name, every, f"there is no interface {name!r}; the pieces have", InterfaceError)
     repeated = tree.repeated(models, kinds)
     reduced = partial(reduce, method=method, damping=damping, certify=certify)
     for name, seen_from in tree.reference.items():

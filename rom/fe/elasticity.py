@@ -10,9 +10,9 @@ from mpi4py import MPI
 
 import numpy as np
 
-from rom.arguments import typed
+from rom.arguments import typed, whole
 from rom.eigen.verbs import rigid_motions
-from rom.errors import ConfigError, InterfaceError, MeshError, TagError, warn
+from rom.errors import InterfaceError, MeshError, TagError, warn
 from rom.fe.compat import assemble_matrix, cell_name, geometry_degree, lagrange, versions
 from rom.fe.costs import LEAST_SHARED_DOFS, reduction_seconds
 from rom.fe.forms.material import by_region, coefficients, described, doubts
@@ -34,7 +34,7 @@ from rom.names import check_known
 
 log = logging.getLogger("rom")
 WHOLE_REGION = "solid"  # name of the only region of a mesh without named regions
-DEGREES = (1, 2, 3)
+HIGHEST_DEGREE = 3  # of the displacement
 SOME_COORDINATES, SOME_MODES = 12, 20  # of two stiff interfaces, for the time of a small model
 
 
@@ -333,8 +333,7 @@ def _check_mesh(mesh: Any, degree: int) -> str:
     name = cell_name(mesh)
     if name not in ("tetrahedron", "hexahedron"):
         raise MeshError(f"the mesh has cells of the kind {name}; it takes tetrahedra or hexahedra.")
-    if degree not in DEGREES:
-        raise ConfigError(f"degree = {degree!r}; the displacement may have degree 1, 2 or 3.")
+    whole("degree", degree, 1, HIGHEST_DEGREE)
     if degree < (curved := geometry_degree(mesh)):
         raise MeshError(
             f"the cells have curved edges of degree {curved}, on which displacements of degree "

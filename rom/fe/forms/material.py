@@ -12,7 +12,7 @@ from ufl.core.expr import Expr
 from rom.errors import MaterialError, TagError
 from rom.fe.compat import per_cell
 from rom.model import PAIRS, Array, Index, Material, Orthotropic
-from rom.names import named, offered
+from rom.names import check_known, named
 from rom.plausible import FOAM_SPEED
 
 Solid = Material | Orthotropic
@@ -30,11 +30,8 @@ def by_region(material: Solid | Mapping[str, Solid], regions: dict[str, int]) ->
         raise MaterialError(
             f"material = {material!r} must be a Material, Orthotropic or dictionary."
         )
-    if unknown := [name for name in material if name not in regions]:
-        raise MaterialError(
-            f"there is no region {named(unknown)}; the mesh has {offered(regions)}."
-        )
     for name, value in material.items():
+        check_known(name, regions, f"there is no region {name!r}; the mesh has", MaterialError)
         if not isinstance(value, Solid):
             raise MaterialError(f"material[{name!r}] = {value!r} must be a rom.Material.")
     if missing := sorted(set(regions) - set(material)):
@@ -49,13 +46,8 @@ def by_region(material: Solid | Mapping[str, Solid], regions: dict[str, int]) ->
 def coefficients(mesh: Mesh, tags: Index, solids: dict[int, Solid]) -> Coefficients:
     """Coefficients of the forms: "rho", and "lam", "mu" or the full stiffness "C".
 
-    Constants for one material, one value per cell for several, so that other numbers never mean
-    another compilation.
-
-    Args:
-        mesh: dolfinx mesh.
-        tags: (cells of this rank with ghosts,) region of each cell.
-        solids: {tag: material}.
+    Constants for one material, one value per cell, which has a region's tag, for several, so that
+    other numbers never mean another compilation.
     """
     tables = {tag: _numbers(solid, _isotropic(solids)) for tag, solid in solids.items()}
     if len(set(map(id, solids.values()))) == 1:

@@ -48,27 +48,17 @@ class Stresses:
         self.n_cells = self.mesh.topology.index_map(3).size_local
 
     def at_nodes(self, U: Array, nodes: Index) -> Array:
-        """Stress at nodes: the mean of what their cells say, not weighted.
+        """(p, 6, k) stress xx, yy, zz, yz, xz, xy [Pa] at nodes (p,) of U (n_local, k) [m].
 
-        Args:
-            U: (n_local, k) displacements [m].
-            nodes: (p,) node numbers, equal on all ranks.
-
-        Returns:
-            (p, 6, k) stress xx, yy, zz, yz, xz, xy [Pa], equal on all ranks.
+        The mean of what their cells say, not weighted; nodes and stress are equal on all ranks.
         """
         one = np.zeros(self.n_cells, dtype=np.int64)
         return self._means(self._hooke, 6, U, nodes, one)[0]
 
     def gradients_at_nodes(self, U: Array, nodes: Index) -> dict[str, Array]:
-        """Displacement gradient at nodes: the mean of their cells, material by material.
+        """The arrays of `rom.body.nonlinear.cauchy.CauchyRecovery` at nodes (p,).
 
-        Args:
-            U: (n_local, k) displacements [m].
-            nodes: (p,) node numbers, equal on all ranks.
-
-        Returns:
-            The arrays of `rom.body.nonlinear.cauchy.CauchyRecovery`, equal on all ranks.
+        Gradients of displacements U (n_local, k) [m] are means of cells, material by material.
         """
 
         def slopes(u: fem.Function) -> Expr:
@@ -128,14 +118,7 @@ class Stresses:
         return every.reshape(-1, 6, 6), of_cell
 
     def at_gauss_points(self, U: Array) -> tuple[Array, Array]:
-        """Stress at the quadrature points of this rank's cells.
-
-        Args:
-            U: (n_local, k) displacements [m].
-
-        Returns:
-            (g, 3) points [m] and (g, 6, k) stress xx, yy, zz, yz, xz, xy [Pa].
-        """
+        """(g, 3) quadrature points of own cells [m], (g, 6, k) stress of U (n_local, k) [Pa]."""
         cells = np.arange(self.n_cells, dtype=np.int32)
         X, _ = quadrature_rule(self.mesh, 2 * (self.degree - 1))
         with compiling(self.mesh.comm):
@@ -146,16 +129,10 @@ class Stresses:
         return points, np.stack(found, axis=2)
 
     def geometric_stiffness(self, U: Array, Psi: Array) -> Array:
-        """Stiffness that the stress of loads gives to shapes, at any element degree.
+        """(l, r, r) stiffness that the stress of loads gives to shapes Psi (n_local, r).
 
-        The second variation of the strain energy, see `material.geometric_stiffness`.
-
-        Args:
-            U: (n_local, l) displacements under the loads [m].
-            Psi: (n_local, r) shapes.
-
-        Returns:
-            (l, r, r) symmetric, equal on all ranks.
+        Of displacements U (n_local, l) [m] under the loads: the second variation of the strain
+        energy, see `material.geometric_stiffness`; symmetric, equal on all ranks.
         """
         load = fem.Function(self.V)
         form = self._second_variation(load)
@@ -171,11 +148,7 @@ class Stresses:
         return 0.5 * (out + out.transpose(0, 2, 1))
 
     def prestress(self, u: Array) -> csr_matrix:
-        """(n, n) geometric stiffness of the stress of one displacement, equal on all ranks.
-
-        Args:
-            u: (n,) displacement of all dofs [m], equal on all ranks.
-        """
+        """(n, n) geometric stiffness of the stress of a displacement (n,) [m], on all ranks."""
         load = fem.Function(self.V)
         rows, per_node = self.V.dofmap.index_map.local_range, self.V.dofmap.index_map_bs
         give_own(load, u[rows[0] * per_node : rows[1] * per_node])

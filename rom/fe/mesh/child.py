@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from rom import errors
+from rom.arguments import not_negative
 from rom.errors import (
     ConfigError,
     FileFormatError,
@@ -89,9 +90,7 @@ def _chosen(name: str, value: float | None, default: float) -> float:
     """A limit; 0 for none."""
     if value is None:
         return default
-    if isinstance(value, bool) or not isinstance(value, int | float) or not value >= 0:
-        raise ConfigError(f"{name} = {value!r} must be a number from 0 on.", hint="0 is none.")
-    return 0.0 if math.isinf(value) else float(value)
+    return 0.0 if value == math.inf else not_negative(name, value)
 
 
 def _result(folder: Path, done: child.Ended, request: Request, limits: child.Limits) -> Read:
@@ -166,12 +165,7 @@ def main(folder: str) -> None:
 
 
 def read(request: Request) -> Read:
-    """Read or make the mesh a request asks for; what the child does.
-
-    Returns:
-        Arrays ``points``, ``cells``, ``regions``, ``cell_ids`` and ``facets 0``, ``facets 1``, ...;
-        notes ``cell_type``, ``region_names``, ``facet_names``, ``provenance``, ``warnings``.
-    """
+    """Arrays and notes of the mesh a request asks for, in the form of `packed`, in the child."""
     reader = request["reader"]
     try:
         if reader in ("abaqus", "nastran"):  # only its own libraries are loaded

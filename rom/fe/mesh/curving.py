@@ -68,13 +68,9 @@ def straightened(mesh: SolidMesh, cells: Mask, share: float) -> SolidMesh:
 
 
 def smallest_determinants(points: Array, cells: Index, kind: CellType, gap: Array) -> Array:
-    """(m,) smallest determinant of the geometry map in each cell.
+    """(m,) smallest determinant of the geometry map in curved cells (m, k) of one kind.
 
-    Args:
-        points: (n, 3) nodes [m].
-        cells: (m, k) node numbers of curved cells.
-        kind: their kind.
-        gap: (m,) by how much a value may be above the smallest [m^3].
+    Of points (n, 3) [m]; a value may be above the smallest by the gap (m,) [m^3].
     """
     found = [
         _smallest(points[cells[rows]], kind, gap[rows])

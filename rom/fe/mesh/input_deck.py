@@ -11,8 +11,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from rom.arguments import one_of
-from rom.errors import ConfigError, InterfaceError, MeshError, TagError
+from rom.arguments import one_of, whole
+from rom.errors import InterfaceError, MeshError, TagError
 from rom.fe.mesh.cell_types import CELL_TYPES, DECK_EDGES
 from rom.fe.mesh.solid import SolidMesh
 from rom.fe.mesh.sources.abaqus import SIDES
@@ -78,8 +78,7 @@ def _of_degree(mesh: SolidMesh, degree: int) -> SolidMesh:
             f"cells of the type {mesh.cell_type} have other shape functions there.",
             hint="Mesh with tetrahedra.",
         )
-    if degree not in (1, 2):
-        raise ConfigError(f"degree = {degree!r}; decks have elements of degree 1 or 2.")
+    whole("degree", degree, 1, 2, reason="decks have such elements")
     if degree == 1 and mesh.cell_type == "tet10":
         raise MeshError("the mesh has curved edges, which need degree=2.")
     return _with_edges(mesh) if degree == 2 and mesh.cell_type == "tet4" else mesh

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rom.arguments import typed
+from rom.arguments import positive, typed
 from rom.decks import bulk, keywords
 from rom.decks.lines import lines
 from rom.errors import (
@@ -323,29 +323,27 @@ def is_geometry(path: str | Path) -> bool:
 
 
 def _check_request(request: Request, scale: float) -> None:
-    reader = request["reader"]
-    if request["parameters"] and reader not in GEOMETRIES:
-        raise ConfigError(
-            f"a finished mesh takes no parameters, got {sorted(request['parameters'])}."
-        )
-    if request["faces"] and reader != "step":
-        raise ConfigError(
-            f"faces={sorted(request['faces'])} can be picked in a .step file only.",
-            hint="Name physical surfaces in the geometry instead.",
-        )
-    for name, wanted in request["faces"].items():
+    reader, faces, order = request["reader"], request["faces"], request["order"]
+    given, finished = sorted(request["parameters"]), reader not in GEOMETRIES
+    picked = f"faces={sorted(faces)} can be picked in a .step file only"
+    for wrong, text in (
+        (given and finished, f"a finished mesh takes no parameters, got {given}."),
+        (faces and reader != "step", f"{picked}; name physical surfaces in the geometry instead."),
+        (
+            order not in (None, 1, 2) or (order and finished),
+            f"order={order!r} must be 1 or 2, or None where the file is a mesh.",
+        ),
+    ):
+        if wrong:
+            raise ConfigError(text)
+    positive("scale", scale)
+    for name, wanted in faces.items():
         check_text(name, "a surface", TagError)
         try:
             if not (isinstance(wanted, str) and wanted == EVERY_FACE):
                 picks(wanted)
         except ConfigError as error:
             raise ConfigError(f"face {name!r}: {error.message}", hint=error.hint) from None
-    if request["order"] not in (None, 1, 2) or (request["order"] and reader not in GEOMETRIES):
-        raise ConfigError(
-            f"order={request['order']!r} must be 1 or 2, or None where the file is a mesh."
-        )
-    if not (np.isscalar(scale) and np.isfinite(scale) and scale > 0):
-        raise ConfigError(f"scale={scale!r} must be a positive number.")
 
 
 def _digest(*files: Path) -> str:

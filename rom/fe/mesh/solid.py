@@ -117,7 +117,11 @@ def packed(
     cell_ids: Integers,
     **notes: Any,
 ) -> Read:
-    """Arrays and notes in the form of `read`; ``facets`` and ``region_names`` among the notes."""
+    """Arrays "points", "cells", "regions", "cell_ids", "facets 0", ..., and notes on them.
+
+    Given are ``facets``, ``region_names``, ``warnings`` and mostly ``provenance`` as notes; noted
+    are the names of facets, in their order, and the type of the cells.
+    """
     facets = notes.pop("facets")
     arrays: Arrays = {
         "points": np.asarray(points, dtype=float),

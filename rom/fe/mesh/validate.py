@@ -193,24 +193,23 @@ def _check_names(mesh: SolidMesh) -> None:
 
 def _check_regions(mesh: SolidMesh) -> None:
     used = {int(r) for r in np.unique(mesh.regions)}
-    if nameless := sorted(used - mesh.region_names.keys()):
-        raise TagError(f"region {named(nameless)} has cells and needs a name in region_names.")
-    if unused := sorted(name for tag, name in mesh.region_names.items() if tag not in used):
-        raise TagError(f"region {named(unused)} needs cells; leave the name out without.")
     names = list(mesh.region_names.values())
-    if double := sorted({name for name in names if names.count(name) > 1}):
-        raise TagError(f"the name {named(double)} stands for several regions; each needs its own.")
+    nameless = sorted(used - mesh.region_names.keys())
+    unused = sorted(name for tag, name in mesh.region_names.items() if tag not in used)
+    double = sorted({name for name in names if names.count(name) > 1})
+    for some, text in (
+        (nameless, "region {} has cells and needs a name in region_names."),
+        (unused, "region {} needs cells; leave the name out without."),
+        (double, "the name {} stands for several regions; each needs its own."),
+    ):
+        if some:
+            raise TagError(text.format(named(some)))
 
 
 def checked(mesh: SolidMesh, remarks: Sequence[str] = ()) -> SolidMesh:
     """Repair and validate a mesh, e.g. one made by hand; issues its warnings as `RomWarning`.
 
-    Args:
-        mesh: as read or made.
-        remarks: warnings of the reader.
-
-    Raises:
-        MeshError, TagError: see `rom.fe.mesh.validate.validate`.
+    Remarks are warnings of the reader; errors those of `validate`.
     """
     where = str(mesh.provenance.get("path", ""))
     with in_file(where):

@@ -62,13 +62,7 @@ class Deck(Nodes):
 
 
 def read(path: str) -> Read:
-    """Read a deck; see `rom.fe.mesh.child.read`.
-
-    Raises:
-        FileFormatError: the deck is damaged, or has keywords whose mass or stiffness would be lost.
-        MeshError: no solid cells, or of several types.
-        TagError: an element in two sections, or in none.
-    """
+    """Read a deck, or refuse keywords whose mass or stiffness would be lost."""
     deck = Deck(Path(path))
     for block in deck.blocks():
         if block.keyword in MESH_KEYWORDS:

@@ -52,9 +52,8 @@ def _load(path: Path) -> ModuleType:
 def _arguments(build: Callable[..., object], given: Notes, path: Path) -> Notes:
     known = list(inspect.signature(build).parameters.values())[1:]
     names = [p.name for p in known if p.kind is not p.VAR_KEYWORD]
-    unknown = sorted(set(given) - set(names))
-    if unknown and len(names) == len(known):
-        raise no_parameter(path, unknown, names)
+    if len(names) == len(known):
+        check_parameters(path, given, names)
     defaults = _defaults(build)
     missing = sorted(set(names) - set(defaults) - set(given))
     if missing:
@@ -62,12 +61,13 @@ def _arguments(build: Callable[..., object], given: Notes, path: Path) -> Notes:
     return defaults | given
 
 
-def no_parameter(
-    path: Path, unknown: Iterable[str], known: Iterable[str], *, hint: str = ""
-) -> ConfigError:
-    """What is said of parameters that a geometry does not have, of whatever kind it is."""
-    text = f"{path.name} has no parameter {named(unknown)}; its parameters are {sorted(known)}."
-    return ConfigError(text, hint=hint)
+def check_parameters(
+    path: Path, given: Iterable[str], known: Iterable[str], *, hint: str = ""
+) -> None:
+    """Refuse parameters that a geometry does not have, of whatever kind it is."""
+    if unknown := sorted(set(given) - set(known)):
+        text = f"{path.name} has no parameter {named(unknown)}; its parameters are {sorted(known)}."
+        raise ConfigError(text, hint=hint)
 
 
 def _defaults(build: Callable[..., object]) -> Notes:

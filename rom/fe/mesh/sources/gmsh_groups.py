@@ -11,6 +11,7 @@ import numpy as np
 
 from rom.errors import FileFormatError, MeshError, TagError
 from rom.fe.mesh.solid import Read, packed
+from rom.fe.mesh.sources.deck import only_type
 from rom.model import Array, Index
 
 # gmsh element types
@@ -142,15 +143,10 @@ def _solids(gmsh: ModuleType) -> tuple[int, Blocks]:
 def _check_kinds(gmsh: ModuleType, kinds: set[int]) -> None:
     if not kinds:
         raise _no_solid(gmsh)
-    names = sorted(gmsh.model.mesh.getElementProperties(kind)[0] for kind in kinds)
-    if len(kinds) > 1:
-        raise MeshError(
-            f"the cells are of several types, {names}; one mesh needs one type.",
-            hint="Mesh all volumes with tetrahedra, or all with hexahedra.",
-        )
+    name = only_type(gmsh.model.mesh.getElementProperties(kind)[0] for kind in kinds)
     if not kinds <= SOLIDS.keys():
         raise MeshError(
-            f"cells of type {names[0]} are not supported.",
+            f"cells of type {name} are not supported.",
             hint="Supported are tetrahedra and hexahedra of first and second order.",
         )
 

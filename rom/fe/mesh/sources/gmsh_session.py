@@ -125,13 +125,11 @@ def geo_parameters(gmsh: ModuleType) -> Notes:
 
 def _full_name(name: str, known: Notes, path: Path) -> str:
     """Name as gmsh knows it; ``L`` also finds ``Geometry/L`` when there is only one."""
-    if name in known:
-        return name
     ends = [full for full in known if full.rpartition("/")[2] == name]
-    if len(ends) == 1:
-        return ends[0]
+    full = ends[0] if name not in known and len(ends) == 1 else name
     cure = 'A .geo parameter can be set only if it has a name: x = {1.0, Name "x"}.'
-    raise builder.no_parameter(path, [name], known, hint=cure)
+    builder.check_parameters(path, [full], known, hint=cure)
+    return full
 
 
 def _set(gmsh: ModuleType, name: str, value: object, path: Path, *, as_text: bool) -> None:

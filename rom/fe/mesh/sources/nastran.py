@@ -41,13 +41,7 @@ LOAD_CARDS = set(
 
 
 def read(path: str) -> Read:
-    """Read bulk data; see `rom.fe.mesh.child.read`.
-
-    Raises:
-        FileFormatError: the file is damaged, solids have no property, or there are cards whose mass
-            or stiffness would be lost.
-        MeshError: no solid cells, or of several types.
-    """
+    """Read bulk data, or refuse cards whose mass or stiffness would be lost."""
     found = _sorted(Path(path))
     ids, points, _ = grids(found[0])
     solids = [card for name in SOLIDS for card in found[0].get(name, ())]

@@ -103,14 +103,9 @@ END_TOKEN = Token("sign", ";", 0)
 
 
 def check_script(path: Path) -> None:
-    """Refuse a script that would do more than make a geometry.
+    """Refuse a script that would do more than make a geometry, or that hides what it does.
 
-    Args:
-        path: the script; what it includes and merges is read as well.
-
-    Raises:
-        UnsafeFileError: it starts a program, writes a file, or hides what it does.
-        FileFormatError: it includes itself.
+    What it includes and merges is read as well.
     """
     _check(path, (), [])
 
@@ -179,11 +174,7 @@ def _start(path: Path) -> bytes:
 
 
 def _tokens(path: Path) -> Iterator[Token]:
-    """Words, texts and signs, without comments and numbers.
-
-    Raises:
-        UnsafeFileError: gmsh may read the text in another way.
-    """
+    """Words, texts and signs, without comments and numbers; refused where gmsh may read another."""
     data = path.read_bytes()
     line, last = 1, 0
     for found in TOKEN_PATTERN.finditer(data):

@@ -12,10 +12,11 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
+from rom.arguments import positive
 from rom.errors import ConfigError, FileFormatError, MeshError, TagError
 from rom.fe.mesh.solid import Made, Request, shown
+from rom.fe.mesh.sources.builder import check_parameters
 from rom.fe.mesh.sources.cad_faces import diagonal, group, surfaces
-from rom.names import named
 
 FACE_PATTERN = re.compile(r"#(\d+)\s*=\s*ADVANCED_FACE\s*\(\s*'((?:[^']|'')*)'", re.IGNORECASE)
 SHELL_PATTERN = re.compile(
@@ -30,9 +31,7 @@ MOST_CELLS = 3e7  # beyond what a machine with 100 GB can mesh
 
 def make(gmsh: ModuleType, path: Path, request: Request) -> Made:
     """Import the file and name its faces; the element size used, and its default."""
-    unknown = sorted(set(request["parameters"]) - {"lc"})
-    if unknown:
-        raise ConfigError(f"a .step file has no parameter {named(unknown)}; there is ['lc'].")
+    check_parameters(path, request["parameters"], ["lc"])
     text = path.read_bytes().decode("latin-1")
     if not text.lstrip().startswith("ISO-10303-21"):
         raise FileFormatError("is not a STEP file: it does not start with ISO-10303-21.")
@@ -84,8 +83,7 @@ def _parts(gmsh: ModuleType, solids: list[int]) -> int:
 
 def _check_size(gmsh: ModuleType, lc: object) -> None:
     """Refuse a mesh size that is none, or far too fine, as when the units are mixed up."""
-    if not isinstance(lc, int | float) or not 0.0 < lc < float("inf"):
-        raise ConfigError(f"lc = {lc!r} must be a positive number of metres.")
+    lc = positive("lc", lc)
     volume = sum(gmsh.model.occ.getMass(3, tag) for _, tag in gmsh.model.getEntities(3))
     cells = CELLS_PER_CUBE * volume / lc**3
     if cells > MOST_CELLS:
