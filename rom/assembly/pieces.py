@@ -278,7 +278,7 @@ class Tree:
         found = dict[str, Repeated]()
         for key in self.reference:
             one = Repeated.found(key, [k for k in self.reference if k not in found], models, self)
-            if one and all(kinds[a] == kinds[b] for a, b in one.interfaces.items()):
+            if one and all(kinds.get(a) == kinds.get(b) for a, b in one.interfaces.items()):
                 found[key] = one
         return found
 
