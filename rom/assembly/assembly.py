@@ -18,7 +18,7 @@ from rom.assembly.condensed import (
     partition,
     per_body,
 )
-from rom.assembly.coupling import coupled_rows, rows_of_parts
+from rom.assembly.coupling import Place, coupled_rows, rows_of_parts
 from rom.body.flexible import FlexibleBody
 from rom.body.records import Marker, still_motions
 from rom.errors import ConfigError, warn
@@ -26,7 +26,6 @@ from rom.model import Array, Modes, Report
 from rom.names import check_known, named
 from rom.rows import N_COMPARED, frequency_rows, row
 
-Place = tuple[str, str]  # body, interface
 AT_MOST = "coordinates of the coupled interfaces"
 GAP_RTOL = 1e-9  # of the motion of the coupled interfaces
 

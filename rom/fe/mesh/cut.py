@@ -36,8 +36,19 @@ def cut(
         TagError: if there is one region only, a cut crosses a named surface, or a surface has the
             name of a cut.
     """
+    normal = None if axis is None else finite("axis", axis, (3,))
+    if (n is None) != (normal is None) or (normal is not None and not normal.any()):
+        raise ConfigError(
+            f"n = {n!r} and axis = {axis!r} say no cuts.",
+            hint="Give both, as n=4, axis=(1, 0, 0), or neither to make a piece of each region.",
+        )
     faces = faces_of(mesh.cells, mesh.kind, len(mesh.points))
-    piece, names = _by_planes(mesh, n, axis) if axis is not None else _by_regions(mesh, n)
+    if n is None or normal is None:
+        piece, names = _by_regions(mesh)
+    else:
+        piece, names = _by_planes(
+            mesh, whole("n", n, 2, reason="one piece is the whole body"), normal
+        )
     rows = mesh.cells[:, np.array(mesh.kind.face_nodes)]
     cuts: Cuts = {}
     inner = faces.count[faces.of_cell] == 2
@@ -46,13 +57,13 @@ def cut(
         shared = np.intersect1d(*both)
         if shared.size:
             of_first = np.isin(faces.of_cell, shared) & (piece == i)[:, None]
-            name = f"cut {i + 1}" if axis is not None else f"{names[i]}-{names[j]}"
+            name = f"cut {i + 1}" if normal is not None else f"{names[i]}-{names[j]}"
             cuts[name] = (i, j), rows[of_first]
     if double := sorted(set(cuts) & set(mesh.facets)):
         text = f"surface {named(double)} has the name of a cut."
         raise TagError(text, hint="Give it another one.")
-    if axis is not None:
-        _refuse_rough(mesh, cuts, np.asarray(axis, dtype=float))
+    if normal is not None:
+        _refuse_rough(mesh, cuts, normal)
     found = {name: _piece(mesh, piece, k, cuts, name) for k, name in enumerate(names)}
     for cut_name, ((i, j), _) in cuts.items():
         doubled = set(found[names[i]].facets) & set(found[names[j]].facets) & set(mesh.facets)
@@ -62,12 +73,8 @@ def cut(
     return found
 
 
-def _by_planes(mesh: SolidMesh, n: int | None, axis: npt.ArrayLike) -> tuple[Index, list[str]]:
+def _by_planes(mesh: SolidMesh, n: int, a: Array) -> tuple[Index, list[str]]:
     """The piece of each cell by its middle, and the names of the pieces."""
-    a = finite("axis", axis, (3,))
-    if n is None or not a.any():
-        raise _nothing_to_cut(n, axis)
-    whole("n", n, 2, reason="one piece is the whole body")
     along = mesh.points @ (a / np.linalg.norm(a))
     middle = along[mesh.corners].mean(axis=1)
     low, high = along.min(), along.max()
@@ -80,10 +87,8 @@ def _by_planes(mesh: SolidMesh, n: int | None, axis: npt.ArrayLike) -> tuple[Ind
     return piece, [str(k + 1) for k in range(n)]
 
 
-def _by_regions(mesh: SolidMesh, n: int | None) -> tuple[Index, list[str]]:
+def _by_regions(mesh: SolidMesh) -> tuple[Index, list[str]]:
     """The piece of each cell is its region."""
-    if n is not None:
-        raise _nothing_to_cut(n, None)
     tags = sorted(mesh.region_names)
     if len(tags) < 2:
         raise TagError(
@@ -91,13 +96,6 @@ def _by_regions(mesh: SolidMesh, n: int | None) -> tuple[Index, list[str]]:
             hint="Give n and axis, or name volumes that share faces in the geometry.",
         )
     return np.searchsorted(tags, mesh.regions), [mesh.region_names[tag] for tag in tags]
-
-
-def _nothing_to_cut(n: object, axis: object) -> ConfigError:
-    return ConfigError(
-        f"n = {n!r} and axis = {axis!r} say no cuts.",
-        hint="Give both, as n=4, axis=(1, 0, 0), or neither to make a piece of each region.",
-    )
 
 
 def _refuse_rough(mesh: SolidMesh, cuts: Cuts, axis: Array) -> None:

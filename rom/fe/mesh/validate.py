@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial import cKDTree
 
+from rom.arguments import one_of
 from rom.errors import MeshError, TagError, in_file, warn
 from rom.fe.mesh.cell_types import CELL_TYPES
 from rom.fe.mesh.quality import check_shape
@@ -49,8 +50,7 @@ def validate(mesh: SolidMesh) -> list[str]:
 
 
 def _check_tables(mesh: SolidMesh) -> None:
-    if mesh.cell_type not in CELL_TYPES:
-        raise MeshError(f"{mesh.cell_type!r} is no type of cells; known are {sorted(CELL_TYPES)}.")
+    one_of("the type of cells", mesh.cell_type, CELL_TYPES, error=MeshError)
     kind, m = mesh.kind, mesh.cells.shape[0]
     if not m:
         raise MeshError("there are no volume cells; mesh in 3D, or give the .geo or .step file.")

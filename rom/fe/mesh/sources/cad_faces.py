@@ -59,35 +59,29 @@ def faces(gmsh: ModuleType) -> list[Face]:
 def _face(gmsh: ModuleType, tag: int, outward: "_Outward", name: str) -> Face:
     kind = kind_of(gmsh, tag)
     area, middle = gmsh.model.occ.getMass(2, tag), gmsh.model.occ.getCenterOfMass(2, tag)
-    found = SHAPES[kind](gmsh, tag) if kind in SHAPES else {}
+    found: Notes = {}
     if kind == "plane":
         found = {"normal": vector(outward.normal(tag))}
+    elif kind != "other":
+        found = _of_revolution(gmsh, tag, kind)
     return Face(tag, kind, float(area), vector(middle), name=name, **found)
 
 
-def _cylinder(gmsh: ModuleType, tag: int) -> Notes:
-    ring = _circle(gmsh, tag)
-    point = np.mean(_ends(gmsh, tag), axis=0)
-    return {"radius": ring.radius, "axis": vector(ring.axis), "point": vector(point)}
-
-
-def _cone(gmsh: ModuleType, tag: int) -> Notes:
-    ring = _circle(gmsh, tag)
-    return {"axis": vector(ring.axis), "point": vector(ring.centre)}
-
-
-def _sphere(gmsh: ModuleType, tag: int) -> Notes:
-    equator = _circle_at(gmsh, tag, 0.0, 0.0)
-    return {"radius": equator.radius, "point": vector(equator.centre)}
-
-
-def _torus(gmsh: ModuleType, tag: int) -> Notes:
-    outer, inner = _circle_at(gmsh, tag, 0.0, 0.0), _circle_at(gmsh, tag, 0.0, np.pi)
-    radius = 0.5 * (outer.radius - inner.radius)
-    return {"radius": radius, "axis": vector(outer.axis), "point": vector(outer.centre)}
-
-
-SHAPES = {"cylinder": _cylinder, "cone": _cone, "sphere": _sphere, "torus": _torus}
+def _of_revolution(gmsh: ModuleType, tag: int, kind: str) -> Notes:
+    """Radius, axis and point of a round face, as far as its kind has them."""
+    if kind in ("cylinder", "cone"):
+        ring = _circle(gmsh, tag)
+        axis = {"axis": vector(ring.axis)}
+        if kind == "cone":
+            return axis | {"point": vector(ring.centre)}
+        middle = np.mean(_ends(gmsh, tag), axis=0)
+        return axis | {"radius": ring.radius, "point": vector(middle)}
+    outer = _circle_at(gmsh, tag, 0.0, 0.0)
+    point = {"point": vector(outer.centre)}
+    if kind == "sphere":
+        return point | {"radius": outer.radius}
+    radius = 0.5 * (outer.radius - _circle_at(gmsh, tag, 0.0, np.pi).radius)
+    return point | {"radius": radius, "axis": vector(outer.axis)}
 
 
 def axes(gmsh: ModuleType) -> dict[str, Axis]:
