@@ -10,13 +10,7 @@ from dolfinx import fem
 from dolfinx.mesh import Mesh
 from ufl.core.expr import Expr
 
-from rom.fe.compat import (
-    assemble_matrix,
-    cell_dofs,
-    cell_name,
-    degree_of_slopes,
-    geometry_degree,
-)
+from rom.fe.compat import assemble_matrix, cell_dofs, cell_name, degree_of_slopes, geometry_degree
 from rom.fe.forms.material import Coefficients, Solid, of_region, stress
 from rom.fe.forms.stress import Stresses
 from rom.fe.jit import compiling

@@ -20,10 +20,7 @@ from rom.fe.mesh.topology import row_ids
 from rom.model import Index, Material, Orthotropic
 from rom.names import ORIGIN_MARK, check_known
 
-STEPS = {
-    "frequencies": "*FREQUENCY\n{n}",
-    "matrices": "*FREQUENCY, SOLVER=MATRIXSTORAGE",
-}
+STEPS = {"frequencies": "*FREQUENCY\n{n}", "matrices": "*FREQUENCY, SOLVER=MATRIXSTORAGE"}
 ELEMENTS = {"tet4": "C3D4", "tet10": "C3D10"}
 NAME_PATTERN = re.compile(r"[A-Za-z][\w.-]{0,79}", re.ASCII)
 Materials = Material | Orthotropic | Mapping[str, Material | Orthotropic]
