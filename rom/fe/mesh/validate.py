@@ -132,18 +132,16 @@ def _check_connected(mesh: SolidMesh, faces: Faces) -> None:
     n_loose = parts_by_node(mesh.corners)[0]
     sizes = shown(np.sort(np.bincount(part))[::-1])
     if n_loose == 1:
-        raise MeshError(
-            f"the mesh has {n_parts} parts ({sizes} cells) that meet only in an edge or a point: "
-            "they would move against each other like a hinge.",
-            hint="Let the parts share faces.",
+        why, hint = "meet only in an edge or a point, like a hinge", "Let the parts share faces."
+    else:
+        same = _coincident_nodes(mesh, faces)
+        what = f"{same} nodes of them lie on nodes of others" if same else "they do not touch"
+        why, n_parts = f"are not connected; {what}", n_loose
+        hint = (
+            "One model is one body: fragment the volumes (BooleanFragments, Coherence) or merge "
+            "doubled nodes before meshing, or make a model of each part."
         )
-    same = _coincident_nodes(mesh, faces)
-    what = f"{same} nodes of them lie on nodes of others" if same else "they do not touch"
-    raise MeshError(
-        f"the mesh has {n_loose} parts ({sizes} cells) that are not connected; {what}.",
-        hint="One model is one body: fragment the volumes (BooleanFragments, Coherence) or merge "
-        "doubled nodes before meshing, or make a model of each part.",
-    )
+    raise MeshError(f"the mesh has {n_parts} parts ({sizes} cells) that {why}.", hint=hint)
 
 
 def _coincident_nodes(mesh: SolidMesh, faces: Faces) -> int:

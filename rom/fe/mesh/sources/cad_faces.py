@@ -279,17 +279,16 @@ class Picker:
         found = [f for f in planes if angle[f.number] < NORMAL_ANGLE]
         if len(found) == 1:
             return [found[0].number]
+        text = f"no plane face has the outward normal {wish.text[7:]}."
+        near = sorted(planes, key=lambda f: angle[f.number])[:MAX_SHOWN]
+        listed = ", ".join(f"{f.number} ({_words(f.normal or ())})" for f in near)
+        hint = f"The nearest are {listed}." if near else "The part has no plane face."
         if found:
             joined = "+".join(str(f.number) for f in found[:2])
             listed = shown([f"{f.number} (middle {_words(f.middle)} m)" for f in found])
-            raise TagError(
-                f"{len(found)} plane faces have the outward normal {wish.text[7:]}: {listed}.",
-                hint=f"Pick one by its number or by a point on it, or several as {joined}.",
-            )
-        near = sorted(planes, key=lambda f: angle[f.number])[:MAX_SHOWN]
-        listed = ", ".join(f"{f.number} ({_words(f.normal or ())})" for f in near)
-        there = f"The nearest are {listed}." if near else "The part has no plane face."
-        raise TagError(f"no plane face has the outward normal {wish.text[7:]}.", hint=there)
+            text = f"{len(found)} plane faces have the outward normal {wish.text[7:]}: {listed}."
+            hint = f"Pick one by its number or by a point on it, or several as {joined}."
+        raise TagError(text, hint=hint)
 
 
 def _angle(a: Array, b: Array) -> float:

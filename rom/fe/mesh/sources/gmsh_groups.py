@@ -183,24 +183,19 @@ def _regions(gmsh: ModuleType, blocks: Blocks, groups: Groups, *, strict: bool) 
 def _region(gmsh: ModuleType, volume: int, blocks: Blocks, groups: Groups) -> int:
     tags = [int(t) for t in gmsh.model.getPhysicalGroupsForEntity(3, volume)]
     if min(tags, default=1) < 1:
-        raise TagError(
-            f"volume {volume} is in the physical group {min(tags)}: numbers of groups start at 1.",
-            hint="A volume has no other side; write both numbers without a minus.",
-        )
-    names = [groups[3, tag] for tag in tags]
-    if len(tags) > 1:
-        raise TagError(
-            f"volume {volume} is in the physical groups {names[0]!r} and {names[1]!r}.",
-            hint="Each part of the body has one material: one group per volume.",
-        )
-    if not tags:
+        why = f"is in the physical group {min(tags)}: numbers of groups start at 1"
+        hint = "A volume has no other side; write both numbers without a minus."
+    elif len(tags) > 1:
+        one, other, *_ = (groups[3, tag] for tag in tags)
+        why = f"is in the physical groups {one!r} and {other!r}"
+        hint = "Each part of the body has one material: one group per volume."
+    elif not tags:
         others = sorted(name for (dim, _), name in groups.items() if dim == 3)
-        raise TagError(
-            f"volume {volume} with {len(blocks[volume][0])} cells is in no physical group, while "
-            f"{others} exist.",
-            hint="Put every volume into a group, or remove what does not belong to the body.",
-        )
-    return tags[0]
+        why = f"with {len(blocks[volume][0])} cells is in no physical group, while {others} exist"
+        hint = "Put every volume into a group, or remove what does not belong to the body."
+    else:
+        return tags[0]
+    raise TagError(f"volume {volume} {why}.", hint=hint)
 
 
 def _surfaces(gmsh: ModuleType, tag: int) -> list[int]:
