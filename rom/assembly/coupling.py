@@ -18,7 +18,7 @@ from rom.model import Array, Index, Interface, Row
 
 Place = tuple[str, str]  # body, interface
 Coupling = tuple[Place, Place]
-SAME_PLACE = 1e-6  # distance of two nodes or interfaces, of the size of the bodies, that still meet
+SAME_PLACE = 1e-6  # relative distance of two nodes or interfaces that still meet
 SAME_SURFACE = (0.05, 0.25)  # gap of centroids over extent, and of areas, of two faceted surfaces
 SAME_FUNCTIONS = 1e-6  # difference of functions at equal nodes, of the largest value
 MISSING_ROWS = (Row("certificate", 0.0, "> 0", False),)  # of a body that has none

@@ -138,19 +138,14 @@ def _materials(mesh: SolidMesh, material: Materials) -> Iterator[str]:
         if isinstance(solid, Orthotropic):
             axes = np.asarray(solid.axes, dtype=np.float64)[:2].ravel()
             turned = f", ORIENTATION={name}"
-            yield from _orthotropic(solid)
+            first, last = (*solid.E, *solid.nu, *solid.G[:2]), solid.G[2:]
+            yield f"*ELASTIC, TYPE=ENGINEERING CONSTANTS\n{_numbers(first)}\n{_numbers(last)}"
         else:
             yield f"*ELASTIC\n{_numbers((solid.E, solid.nu))}"
         yield f"*DENSITY\n{_numbers((solid.rho,))}"
         if turned:
             yield f"*ORIENTATION, NAME={name}, SYSTEM=RECTANGULAR\n{_numbers(axes)}"
         yield f"*SOLID SECTION, ELSET={name}, MATERIAL={name}{turned}"
-
-
-def _orthotropic(solid: Orthotropic) -> Iterator[str]:
-    yield "*ELASTIC, TYPE=ENGINEERING CONSTANTS"
-    yield _numbers((*solid.E, *solid.nu, *solid.G[:2]))
-    yield _numbers(solid.G[2:])
 
 
 def _step(fixed: Sequence[str], kind: str) -> Iterator[str]:
