@@ -18,7 +18,7 @@ from rom.assembly.condensed import (
     partition,
     per_body,
 )
-from rom.assembly.coupling import coupled_rows, rows_of_parts
+from rom.assembly.coupling import Place, coupled_rows, rows_of_parts
 from rom.body.flexible import FlexibleBody
 from rom.body.records import Marker, still_motions
 from rom.errors import ConfigError, warn
@@ -26,7 +26,6 @@ from rom.model import Array, Modes, Report
 from rom.names import check_known, named
 from rom.rows import N_COMPARED, frequency_rows, row
 
-Place = tuple[str, str]  # body, interface
 AT_MOST = "coordinates of the coupled interfaces"
 GAP_RTOL = 1e-9  # of the motion of the coupled interfaces
 
@@ -175,8 +174,8 @@ class Assembly:
         omega = natural_modes(M[:n, :n], K[:n, :n], n_rigid)[0]
         few = natural_modes(M, K, n_rigid)[0][n_rigid:][:N_COMPARED]
         table = {"reduced": few.tolist(), "full": self._elastic(few.size, fixed).tolist()}
-        report = Report("certificate of the condensed assembly",
-                        tuple(frequency_rows(f"{n} interface functions", table)))  # fmt: skip
+        rows = tuple(frequency_rows(f"{n} interface functions", table))
+        report = Report("certificate of the condensed assembly", rows)
         return CondensedAssembly(level, n, omega, basis, M, K, self._widths(), n_rigid, report)
 
     def _elastic(self, n: int, fixed: tuple[Place, ...]) -> Array:

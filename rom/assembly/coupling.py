@@ -16,7 +16,9 @@ from rom.eigen.verbs import dofs_of, new_part
 from rom.errors import InterfaceError
 from rom.model import Array, Index, Interface, Row
 
-SAME_PLACE = 1e-6  # distance of two nodes or interfaces, of the size of the bodies, that still meet
+Place = tuple[str, str]  # body, interface
+Coupling = tuple[Place, Place]
+SAME_PLACE = 1e-6  # relative distance of two nodes or interfaces that still meet
 SAME_SURFACE = (0.05, 0.25)  # gap of centroids over extent, and of areas, of two faceted surfaces
 SAME_FUNCTIONS = 1e-6  # difference of functions at equal nodes, of the largest value
 MISSING_ROWS = (Row("certificate", 0.0, "> 0", False),)  # of a body that has none
@@ -24,7 +26,7 @@ MIN_COMMON_RATIO = 0.5  # norm of a function on one mesh, of that on the other, 
 
 
 def coupled_rows(
-    coupling: Any, one: Marker, other: Marker, size: float, projection: Any
+    coupling: Coupling, one: Marker, other: Marker, size: float, projection: Any
 ) -> tuple[Array, Array]:
     """(n_c, 6 + r) of either body: interface coordinates that agree when both move together.
 
@@ -141,7 +143,7 @@ def _equal_coordinates(
     return (one.hold, other.hold) if same else None
 
 
-def _refuse_gap(coupling: Any, between: Array, limit: float) -> None:
+def _refuse_gap(coupling: Coupling, between: Array, limit: float) -> None:
     gap = float(np.linalg.norm(between))
     if gap > limit:
         raise InterfaceError(
@@ -150,7 +152,7 @@ def _refuse_gap(coupling: Any, between: Array, limit: float) -> None:
         )
 
 
-def _refuse_other_surface(coupling: Any, a: Patch, b: Patch) -> None:
+def _refuse_other_surface(coupling: Coupling, a: Patch, b: Patch) -> None:
     """Surfaces meshed differently still have nearly one centroid and one area."""
     extent = max(np.ptp(a.points, axis=0).max(), np.ptp(b.points, axis=0).max())
     weights = [np.asarray(p.surface_mass.sum(axis=1)).ravel() for p in (a, b)]

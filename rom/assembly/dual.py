@@ -29,7 +29,7 @@ import numpy as np
 from scipy.linalg import block_diag, eigh, null_space
 
 from rom.arguments import one_of, typed
-from rom.assembly.coupling import rows_of_parts
+from rom.assembly.coupling import SAME_PLACE, Place, rows_of_parts
 from rom.checks.draft import COMPARISON_STAGE, Draft, run, wanted
 from rom.errors import InterfaceError
 from rom.model import Array, FEModel, Index, Report, Row
@@ -40,10 +40,8 @@ from rom.rows import FREQUENCY_RTOL, N_COMPARED, frequency_rows, row
 from rom.stages.bodies import connect
 
 KINDS = ("macneal", "rubin", "dual")
-SAME_PLACE = 1e-6  # distance of two interfaces, of their distance from the origin, that still meet
 # of the whole one: residual flexibility below is none, the modes describe all
 FLEXIBILITY_RTOL = 1e-11
-Place = tuple[str, str]  # substructure, interface
 
 
 @typed

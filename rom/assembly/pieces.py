@@ -12,7 +12,8 @@ See docs/theory/pieces.md.
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from itertools import takewhile
+from functools import partial
+from itertools import product, takewhile
 from typing import Any
 
 import numpy as np
@@ -93,12 +94,12 @@ class Pieces:
                 "belong to each piece.",
                 hint="Add the bodies one by one.",
             )
-        parts = {key: mech.add_flexible(f"{name} {key}", body, **self._pose_of(key, pose))
-                 for key, body in self.bodies.items()}  # fmt: skip
+        added, pose_of = mech.add_flexible, self._pose_of
+        parts = {k: added(f"{name} {k}", x, **pose_of(k, pose)) for k, x in self.bodies.items()}
         for joint, (one, other) in self.joints.items():
             mech.fixed(f"{name} {joint}", parts[one].marker(joint), parts[other].marker(joint))
-        return {interface: parts[key].marker(interface) for key, body in self.bodies.items()
-                for interface in body.markers if interface not in self.joints}  # fmt: skip
+        owner = {interface: key for key, body in self.bodies.items() for interface in body.markers}
+        return {i: parts[key].marker(i) for i, key in owner.items() if i not in self.joints}
 
     def _pose_of(self, key: str, pose: dict[str, Any]) -> dict[str, Any]:
         """The pose of one piece where the whole has another."""
@@ -108,8 +109,8 @@ class Pieces:
         moving = (pose.get(of) for of in ("orientation", "velocity", "omega"))
         at, p, velocity, omega = start_pose(pose.get("at", (0.0, 0.0, 0.0)), *moving)
         A = rotation.matrix(p)
-        return {"at": at + A @ place, "orientation": p, "omega": omega,
-                "velocity": velocity + A @ np.cross(omega, place)}  # fmt: skip
+        velocity = velocity + A @ np.cross(omega, place)
+        return {"at": at + A @ place, "orientation": p, "velocity": velocity, "omega": omega}
 
 
 @dataclass(frozen=True)
@@ -138,9 +139,10 @@ class Repeated:
                 continue
             shift = (model.points - other.points).mean(axis=0)
             gaps = np.abs(model.points - other.points - shift).max()
-            same = {one.name: two.name for one in model.interfaces.values()
-                    for two in other.interfaces.values()
-                    if np.array_equal(one.nodes, two.nodes)}  # fmt: skip
+            pairs = product(model.interfaces.values(), other.interfaces.values())
+            same = {
+                one.name: two.name for one, two in pairs if np.array_equal(one.nodes, two.nodes)
+            }
             paired = len(same) == len(model.interfaces) == len(other.interfaces)
             if (
                 gaps > SAME_RTOL * np.ptp(model.points)
@@ -154,9 +156,8 @@ class Repeated:
 
     def named_as(self, body: FlexibleBody, key: str) -> FlexibleBody:
         """The other body under the names of this piece."""
-        markers = {name: replace(body.markers[old], name=name)
-                   for name, old in self.interfaces.items()}  # fmt: skip
         own = {old: name for name, old in self.interfaces.items()}
+        markers = {name: replace(body.markers[old], name=name) for old, name in own.items()}
         return replace(body, name=key, markers=markers, reference=own[body.reference])
 
 
@@ -245,27 +246,28 @@ class Tree:
                 "pieces is not known.",
                 hint="Name that force as a load of the interface farthest out.",
             )
-        owner = {interface: key for key, model in models.items() for interface in model.interfaces
-                 if interface not in self.joints}  # fmt: skip
-        if unknown := [name for name in geometric.loads if name not in owner]:
-            raise InterfaceError(
-                f"the range of loads names {named(unknown)}; the pieces have {offered(owner)}."
-            )
+        owner = {interface: key for key, model in models.items() for interface in model.interfaces}
+        owner = {interface: key for interface, key in owner.items() if interface not in self.joints}
+        for name in geometric.loads:
+            what = f"the range of loads names {name!r}; the pieces have"
+            check_known(name, owner, what, InterfaceError)
         largest = {name: np.abs(np.asarray(x, dtype=float)) for name, x in geometric.loads.items()}
         loads: dict[str, dict[str, Array]] = {key: {} for key in self.reference}
         for name, load in largest.items():
             loads[owner[name]][name] = load
         for joint, (one, _) in self.joints.items():
             beyond, at = self.beyond(joint), models[one].interfaces[joint].origin
-            moved = (_moved(load, models[owner[name]].interfaces[name].origin - at)
-                     for name, load in largest.items() if owner[name] in beyond)  # fmt: skip
+            far = [name for name in largest if owner[name] in beyond]
+            arms = (models[owner[name]].interfaces[name].origin - at for name in far)
+            moved = (_moved(largest[name], arm) for name, arm in zip(far, arms, strict=True))
             loads[one][joint] = sum(moved, start=np.zeros(6))
         turning = sum((six[3:] for of in loads.values() for six in of.values()), np.zeros(3)) > 0
         first = next(iter(self.reference))
         found: dict[str, Geometric | None] = {}
         for key, of in loads.items():
-            own = {name: six if key == first else _turned(six, turning)
-                   for name, six in of.items() if six.any()}  # fmt: skip
+            own = {name: six for name, six in of.items() if six.any()}
+            if key != first:
+                own = {name: _turned(six, turning) for name, six in own.items()}
             found[key] = replace(geometric, loads=own) if own else None
         return found
 
@@ -276,8 +278,7 @@ class Tree:
         found = dict[str, Repeated]()
         for key in self.reference:
             one = Repeated.found(key, [k for k in self.reference if k not in found], models, self)
-            if one and all(kinds.get(a, "rbe3") == kinds.get(b, "rbe3")
-                           for a, b in one.interfaces.items()):  # fmt: skip
+            if one and all(kinds.get(a) == kinds.get(b) for a, b in one.interfaces.items()):
                 found[key] = one
         return found
 
@@ -333,23 +334,21 @@ def reduce_pieces(
     """
     tree = Tree.of(models, reference)
     ranges = dict.fromkeys(models) if nonlinear is None else tree.ranges(nonlinear, models)
-    kinds, bodies = interfaces or {}, dict[str, FlexibleBody]()
-    every = {interface for model in models.values() for interface in model.interfaces}
-    if unknown := [name for name in kinds if name not in every]:
-        raise InterfaceError(
-            f"there is no interface {named(unknown)}; the pieces have {offered(every)}."
-        )
+    every = {interface: "rbe3" for model in models.values() for interface in model.interfaces}
+    kinds, bodies = every | (interfaces or {}), dict[str, FlexibleBody]()
+    for name in kinds:
+        check_known(name, every, f"there is no interface {name!r}; the pieces have", InterfaceError)
     repeated = tree.repeated(models, kinds)
+    reduced = partial(reduce, method=method, damping=damping, certify=certify)
     for name, seen_from in tree.reference.items():
         if name in repeated:
             continue
         copies = [(ranges[key], one) for key, one in repeated.items() if one.of == name]
-        bodies[name] = reduce(
-            models[name], method=method, reference=seen_from,
-            nonlinear=together(ranges[name], copies),
-            interfaces={key: kinds.get(key, "rbe3") for key in models[name].interfaces},
-            damping=damping, name=name, certify=certify,
-        )  # fmt: skip
+        loads = together(ranges[name], copies)
+        own = {key: kinds[key] for key in models[name].interfaces}
+        bodies[name] = reduced(
+            models[name], name=name, reference=seen_from, nonlinear=loads, interfaces=own
+        )
     bodies |= {key: one.named_as(bodies[one.of], key) for key, one in repeated.items()}
     places = {key: one.shift for key, one in repeated.items()}
     return Pieces({name: bodies[name] for name in models}, tree.joints, places)

@@ -2,8 +2,9 @@
 
 import inspect
 import logging
-from typing import Any
+from typing import Any, Protocol
 
+from mpi4py import MPI
 from petsc4py import PETSc
 
 import basix
@@ -11,11 +12,15 @@ import dolfinx
 import numpy as np
 import ufl
 from dolfinx import fem
+from dolfinx.common import IndexMap
 from dolfinx.fem import petsc as fem_petsc
+from dolfinx.mesh import Mesh
 
 from rom.fe.jit import JIT_OPTIONS
 from rom.model import Array, Index, Integers
 
+CellMap = Any  # from the reference cell: of another class in each version
+Compiled = Any  # a form ready to assemble: of another class in each version
 # ffcx routes all warnings of the process into a log; a warning belongs to whoever listens for it.
 logging.captureWarnings(False)
 
@@ -24,14 +29,22 @@ PARTS_KEEP_COLUMNS = (3, 23)  # the first PETSc not tried; 3.22 does not, 3.25 d
 CELLS_AT_ONCE = 100_000  # whose coordinates are computed, which takes some ten megabytes
 
 
-def lagrange(mesh: Any, degree: int) -> Any:
+class MeshTags(Protocol):
+    """Numbers of some entities of a mesh, whose class has another name in each version."""
+
+    name: str
+    indices: Integers
+    values: Integers
+
+
+def lagrange(mesh: Mesh, degree: int) -> fem.FunctionSpace:
     """Space of continuous displacements: three components at each node."""
     if hasattr(fem, "functionspace"):
         return fem.functionspace(mesh, ("Lagrange", degree, (3,)))
     return fem.VectorFunctionSpace(mesh, ("Lagrange", degree))
 
 
-def per_cell(mesh: Any, values: Array) -> Any:
+def per_cell(mesh: Mesh, values: Array) -> fem.Function:
     """A coefficient with one number or tensor (cells of this rank with ghosts, ...) per cell."""
     shape = values.shape[1:]
     if hasattr(fem, "functionspace"):
@@ -47,13 +60,13 @@ def per_cell(mesh: Any, values: Array) -> Any:
     return function
 
 
-def give_own(function: Any, own: Array) -> None:
+def give_own(function: fem.Function, own: Array) -> None:
     """Let a function have these values at the dofs of this rank, and those of others at ghosts."""
     function.x.array[: own.size] = own
     function.x.scatter_forward()
 
 
-def cell_dofs(space: Any) -> Integers:
+def cell_dofs(space: fem.FunctionSpace) -> Integers:
     """(cells, k) node numbers of each cell on this rank, ghosts included."""
     table = space.dofmap.list
     table = np.asarray(getattr(table, "array", table))
@@ -77,7 +90,7 @@ def assemble_matrix(form: ufl.Form) -> PETSc.Mat:
     return copy
 
 
-def assembled_vector(form: Any) -> Array:
+def assembled_vector(form: Compiled) -> Array:
     """(n_local,) vector of a compiled linear form, summed over the ranks that share a node."""
     b = fem_petsc.assemble_vector(form)
     b.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
@@ -86,23 +99,23 @@ def assembled_vector(form: Any) -> Array:
     return values
 
 
-def compiled(form: ufl.Form) -> Any:
+def compiled(form: ufl.Form) -> Compiled:
     """Form ready to assemble, with our options."""
     name = "jit_options" if hasattr(fem, "functionspace") else "jit_params"
     return fem.form(form, **{name: dict(JIT_OPTIONS)})
 
 
-def cell_name(mesh: Any) -> str:
+def cell_name(mesh: Mesh) -> str:
     """Shape of the cells: "tetrahedron" or "hexahedron"."""
     return mesh.topology.cell_type.name
 
 
-def geometry_degree(mesh: Any) -> int:
+def geometry_degree(mesh: Mesh) -> int:
     """Polynomial degree of the map from the reference cell: 2 for curved cells."""
     return _cell_map(mesh).degree
 
 
-def _cell_map(mesh: Any) -> Any:
+def _cell_map(mesh: Mesh) -> CellMap:
     """The map from the reference cell, of which all cells have the same kind."""
     geometry = mesh.geometry
     if hasattr(type(geometry), "cmaps"):
@@ -115,7 +128,7 @@ def sub_entities(name: str) -> list[list[list[int]]]:
     return basix.topology(getattr(basix.CellType, name))
 
 
-def to_global(index_map: Any, local: Integers) -> Index:
+def to_global(index_map: IndexMap, local: Integers) -> Index:
     """Global numbers of local entities."""
     return np.asarray(index_map.local_to_global(local.astype(np.int32)), dtype=np.int64)
 
@@ -133,12 +146,12 @@ def versions() -> dict[str, str]:
     """Versions of the libraries a model was made with."""
     from slepc4py import SLEPc
 
-    number = {name: ".".join(map(str, package.Sys.getVersion()))
-              for name, package in (("PETSc", PETSc), ("SLEPc", SLEPc))}  # fmt: skip
-    return {"dolfinx": dolfinx.__version__, **number}
+    found = {"PETSc": PETSc.Sys.getVersion(), "SLEPc": SLEPc.Sys.getVersion()}
+    numbers = {name: ".".join(map(str, version)) for name, version in found.items()}
+    return {"dolfinx": dolfinx.__version__, **numbers}
 
 
-def create_mesh(comm: Any, cells: Integers, points: Array, shape: str, degree: int) -> Any:
+def create_mesh(comm: MPI.Comm, cells: Integers, points: Array, shape: str, degree: int) -> Mesh:
     """Distributed mesh from arrays on rank 0; the other ranks give none.
 
     Cells (m, k) in the order of dolfinx, points (n, 3) [m], and the degree of the geometry.
@@ -162,7 +175,7 @@ def gmsh_order(shape: str, n_nodes: int) -> Integers:
     return np.array(perm_gmsh(getattr(CellType, shape), n_nodes))
 
 
-def tag_entities(mesh: Any, dim: int, nodes: Integers, values: Integers) -> Any:
+def tag_entities(mesh: Mesh, dim: int, nodes: Integers, values: Integers) -> MeshTags:
     """MeshTags (e,) of cells, dim 3, or facets, 2, that rank 0 knows by their nodes (e, k).
 
     Nodes have the numbers given to `create_mesh`, in the order of dolfinx.
@@ -185,13 +198,13 @@ def tag_entities(mesh: Any, dim: int, nodes: Integers, values: Integers) -> Any:
     return meshtags_from_entities(mesh, dim, adjacencylist(found), tags.astype(np.int32))
 
 
-def reference_points(space: Any) -> Array:
+def reference_points(space: fem.FunctionSpace) -> Array:
     """(k, 3) where the nodes of a cell lie in the reference cell."""
     points = space.element.interpolation_points
     return np.asarray(points() if callable(points) else points)
 
 
-def node_coordinates(space: Any) -> Array:
+def node_coordinates(space: fem.FunctionSpace) -> Array:
     """(k, 3) coordinates of the nodes this rank owns [m], the same bits from whatever cell.
 
     Shape functions of the geometry are halves, quarters or eighths at the nodes of second degree of
@@ -214,7 +227,7 @@ def node_coordinates(space: Any) -> Array:
     return x[: space.dofmap.index_map.size_local]
 
 
-def degree_of_slopes(mesh: Any, degree: int, power: int, in_bricks: int | None = None) -> int:
+def degree_of_slopes(mesh: Mesh, degree: int, power: int, in_bricks: int | None = None) -> int:
     """Quadrature degree for a power of the gradient of displacements, exact on straight tetrahedra.
 
     Curved cells get more; on hexahedra another power may count, ``in_bricks``.
@@ -225,14 +238,14 @@ def degree_of_slopes(mesh: Any, degree: int, power: int, in_bricks: int | None =
     return (in_bricks or power) * degree + 2 * curved
 
 
-def quadrature_rule(mesh: Any, degree: int) -> tuple[Array, Array]:
+def quadrature_rule(mesh: Mesh, degree: int) -> tuple[Array, Array]:
     """Points (k, 3) and weights (k,) of a quadrature exact for that degree, reference cell."""
     kind = getattr(basix.CellType, cell_name(mesh))
     points, weights = basix.make_quadrature(kind, max(degree, 1))
     return np.asarray(points), np.asarray(weights)
 
 
-def evaluated(expression: Any, mesh: Any, cells: Integers) -> Array:
+def evaluated(expression: fem.Expression, mesh: Mesh, cells: Integers) -> Array:
     """Values of an expression at its points in some cells."""
     parameters = inspect.signature(expression.eval).parameters
     arguments = (mesh, cells) if "mesh" in parameters else (cells,)

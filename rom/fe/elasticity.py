@@ -1,7 +1,7 @@
 """Stiffness and mass of a three-dimensional elastic body on a dolfinx mesh."""
 
 import logging
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -9,11 +9,12 @@ from typing import Any
 from mpi4py import MPI
 
 import numpy as np
+from dolfinx.mesh import Mesh
 
-from rom.arguments import typed
+from rom.arguments import one_of, typed, whole
 from rom.eigen.verbs import rigid_motions
-from rom.errors import ConfigError, InterfaceError, MeshError, TagError, warn
-from rom.fe.compat import assemble_matrix, cell_name, geometry_degree, lagrange, versions
+from rom.errors import InterfaceError, MeshError, TagError, warn
+from rom.fe.compat import MeshTags, assemble_matrix, cell_name, geometry_degree, lagrange, versions
 from rom.fe.costs import LEAST_SHARED_DOFS, reduction_seconds
 from rom.fe.forms.material import by_region, coefficients, described, doubts
 from rom.fe.forms.nodes import all_points, interface, outer_surface
@@ -22,7 +23,7 @@ from rom.fe.forms.stress import Stresses
 from rom.fe.jit import compiling
 from rom.fe.mesh.cad import Axis
 from rom.fe.mesh.curving import without_middles
-from rom.fe.mesh.solid import SolidMesh
+from rom.fe.mesh.solid import Notes, SolidMesh
 from rom.fe.operators.aij import symmetric, without_zeros, wrapped
 from rom.fe.operators.foreseen import automatic
 from rom.fe.operators.memory import give_back
@@ -34,7 +35,7 @@ from rom.names import check_known
 
 log = logging.getLogger("rom")
 WHOLE_REGION = "solid"  # name of the only region of a mesh without named regions
-DEGREES = (1, 2, 3)
+HIGHEST_DEGREE = 3  # of the displacement
 SOME_COORDINATES, SOME_MODES = 12, 20  # of two stiff interfaces, for the time of a small model
 
 
@@ -152,7 +153,7 @@ class _Options:
     """What `model` and `pieces` are asked for."""
 
     path: str | Path
-    material: Any
+    material: Material | Orthotropic | Mapping[str, Material | Orthotropic]
     degree: int
     parameters: dict[str, float] | None
     attachments: tuple[Attachment, ...]
@@ -196,7 +197,7 @@ class _Head:
     regions: dict[str, int]
     facets: tuple[str, ...]
     warnings: tuple[str, ...]
-    origin: dict[str, Any]
+    origin: Notes
     axes: dict[str, Axis]
 
     @classmethod
@@ -329,12 +330,10 @@ def assemble(
     )
 
 
-def _check_mesh(mesh: Any, degree: int) -> str:
+def _check_mesh(mesh: Mesh, degree: int) -> str:
     name = cell_name(mesh)
-    if name not in ("tetrahedron", "hexahedron"):
-        raise MeshError(f"the mesh has cells of the kind {name}; it takes tetrahedra or hexahedra.")
-    if degree not in DEGREES:
-        raise ConfigError(f"degree = {degree!r}; the displacement may have degree 1, 2 or 3.")
+    one_of("the kind of cells", name, ("tetrahedron", "hexahedron"), error=MeshError)
+    whole("degree", degree, 1, HIGHEST_DEGREE)
     if degree < (curved := geometry_degree(mesh)):
         raise MeshError(
             f"the cells have curved edges of degree {curved}, on which displacements of degree "
@@ -344,7 +343,7 @@ def _check_mesh(mesh: Any, degree: int) -> str:
     return name
 
 
-def _cell_regions(mesh: Any, cell_tags: Any, regions: dict[str, int]) -> Index:
+def _cell_regions(mesh: Mesh, cell_tags: MeshTags | None, regions: dict[str, int]) -> Index:
     """(cells of this rank with ghosts,) tag of each cell."""
     cells = mesh.topology.index_map(3)
     tags = np.full(cells.size_local + cells.num_ghosts, min(regions.values()), dtype=np.int64)
@@ -360,7 +359,7 @@ def _cell_regions(mesh: Any, cell_tags: Any, regions: dict[str, int]) -> Index:
     return tags
 
 
-def _check_attachments(attached: Sequence[Attachment], names: dict[str, Any]) -> None:
+def _check_attachments(attached: Sequence[Attachment], names: Iterable[str]) -> None:
     for item in attached:
         text = f"a mass of {item.mass:g} kg hangs on {item.interface!r}; use one of"
         check_known(item.interface, names, text, InterfaceError)

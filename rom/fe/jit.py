@@ -131,10 +131,9 @@ def _unfinished(source: Path) -> bool:
 
 
 def _defaults() -> dict[str, Any]:
-    for name in ("DOLFINX_DEFAULT_JIT_OPTIONS", "DOLFINX_DEFAULT_JIT_PARAMETERS"):
-        if hasattr(dolfinx.jit, name):
-            return getattr(dolfinx.jit, name)
-    raise AttributeError("dolfinx.jit has no table of default options")
+    """The options of dolfinx, called parameters in the oldest version."""
+    options = getattr(dolfinx.jit, "DOLFINX_DEFAULT_JIT_OPTIONS", None)
+    return options or dolfinx.jit.DOLFINX_DEFAULT_JIT_PARAMETERS
 
 
 def _ignore_option_files() -> None:

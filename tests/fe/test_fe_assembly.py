@@ -10,7 +10,7 @@ from scipy.sparse import csr_matrix
 import rom
 from cases.boxes import box, distort
 from cases.refusals import refuses
-from cases.solid import block
+from cases.solid import STEEL, block
 from rom.eigen.verbs import rigid_motions
 from rom.errors import ConfigError, InterfaceError, MaterialError, RomWarning, TagError
 
@@ -26,7 +26,6 @@ from rom.fe.forms import region  # noqa: E402
 from rom.fe.jit import cache_directory  # noqa: E402
 from rom.fe.operators.aij import aij, symmetric  # noqa: E402
 
-STEEL = rom.Material(E=210e9, nu=0.3, rho=7850.0)
 ELEMENTS = [(kind, degree) for kind in ("tetrahedron", "hexahedron") for degree in (1, 2)]
 every_element = pytest.mark.parametrize(("kind", "degree"), ELEMENTS)
 pytestmark = [pytest.mark.fenicsx, pytest.mark.filterwarnings("ignore:linear tetrahedra")]

@@ -7,6 +7,7 @@ from scipy.linalg import eigh
 
 import rom
 from cases.boxes import box
+from cases.solid import STEEL
 from rom.eigen import lanczos, search
 from rom.errors import InterfaceError
 
@@ -21,7 +22,6 @@ from rom.fe.operators import factor, petsc  # noqa: E402
 from rom.reduction.full_model import operators  # noqa: E402
 from rom.reduction.interfaces.connection import connect  # noqa: E402
 
-STEEL = rom.Material(E=210e9, nu=0.3, rho=7850.0)
 KINDS = ["rbe2", "rbe3", rom.Polynomial(1), "full"]
 
 

@@ -16,7 +16,7 @@ from cases.long import few
 from cases.measures import memory_taken
 from cases.paths import RANKS, ROOT
 from cases.ranks.environment import ENVIRONMENT
-from cases.solid import reduced
+from cases.solid import STEEL, reduced
 from rom.errors import ResourceError
 from rom.process.mpirun import mpirun
 from rom.reduction.full_model import operators
@@ -30,7 +30,6 @@ from rom.fe.operators import disk, factor, foreseen, memory  # noqa: E402
 from rom.fe.operators.foreseen import automatic  # noqa: E402
 from rom.fe.operators.solver import DIRECT_SOLVER, parsed  # noqa: E402
 
-STEEL = rom.Material(E=210e9, nu=0.3, rho=7850.0)
 SHAPES = {  # length, width, height, size of elements [m]
     "plate": (1.0, 1.0, 0.02, 0.05),
     "block": (1.0, 1.0, 1.0, 0.14),

@@ -10,6 +10,7 @@ from scipy.sparse.linalg import eigsh
 import rom
 from cases.boxes import box, faces_held
 from cases.long import few
+from cases.solid import STEEL
 from rom.eigen.verbs import rigid_motions
 
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")
@@ -184,7 +185,6 @@ def test_radial_modes_of_a_hollow_sphere_fv42(tmp_path):
     assert_allclose(radial[:2], exact[:2], rtol=1e-3)
 
 
-STEEL = rom.Material(E=210e9, nu=0.3, rho=7850.0)
 L, H = 1.0, 0.05
 EULER = np.sqrt(STEEL.E * H**2 / 12 / STEEL.rho) / (2 * np.pi * L**2)  # f = (beta L)^2 EULER
 

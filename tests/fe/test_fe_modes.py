@@ -8,11 +8,11 @@ from numpy.testing import assert_allclose
 from scipy.linalg import eigh
 from scipy.sparse import block_diag, coo_matrix, csr_matrix, diags, identity
 
-import rom
 from cases.boxes import box, faces_held
 from cases.measures import memory_taken
 from cases.operators import petsc_operators
 from cases.refusals import refuses
+from cases.solid import STEEL
 from rom.eigen import lanczos, search
 from rom.errors import InterfaceError, ModelError, ResourceError
 
@@ -21,8 +21,6 @@ pytestmark = pytest.mark.fenicsx
 
 from rom.fe.elasticity import assemble  # noqa: E402
 from rom.fe.operators import factor, memory, petsc, spectrum  # noqa: E402
-
-STEEL = rom.Material(E=210e9, nu=0.3, rho=7850.0)
 
 
 def beam(cells=(10, 2, 2), size=(1.0, 0.1, 0.08), degree=1):

@@ -7,12 +7,12 @@ import pytest
 from numpy.testing import assert_allclose
 
 from cases.paths import ROOT
+from cases.solid import STEEL
 
 pytest.importorskip("dolfinx", reason="needs finite elements")
 import rom
 
 pytestmark = pytest.mark.fenicsx
-STEEL = rom.Material(E=210e9, nu=0.3, rho=7850.0)
 ROD = ROOT / "meshes" / "connecting_rod.geo"
 KINDS = {"pin_a": "rbe2", "pin_b": "rbe2"}
 SUPPORTS = [(), ("pin_a",), ("pin_b",), ("pin_a", "pin_b")]

@@ -173,35 +173,31 @@ def test_a_body_on_soft_springs_swings_as_a_rigid_one(model, body):
     assert np.count_nonzero(body.frequencies(8, springs={"tip": [0, 0, 1.0]}) == 0.0) == 5
 
 
-def test_wrong_springs_are_named(model, body):
-    for springs, error, why in (
-        ({"tip": [1.0, 2.0]}, ConfigError, r"shape \(2,\): it takes 3 or 6"),
-        ({"tip": [1.0, -2.0, 0.0]}, ConfigError, "and positive or zero"),
-        ({"tip": np.eye(6) + np.eye(6, k=1)}, ConfigError, "must be symmetric"),
-        ({"tip": np.zeros(3)}, ConfigError, "needs a stiffness that is not zero"),
-        ({"tip": [np.nan, 1.0, 1.0]}, ConfigError, "springs"),
-        ({"foot": np.ones(3)}, InterfaceError, "no interface 'foot'"),
-    ):
-        refuses(error, why, rom.modes, model, 2, springs=springs)
-        refuses(error, why, body.frequencies, springs=springs)
-    with pytest.raises(InterfaceError, match="'tip' has the kind 'full'"):
-        rom.modes(model, 2, springs={"tip": np.ones(3)}, interfaces={"tip": "full"})
+WRONG = [
+    ({"springs": {"tip": [1.0, 2.0]}}, ConfigError, r"shape \(2,\): it takes 3 or 6"),
+    ({"springs": {"tip": [1.0, -2.0, 0.0]}}, ConfigError, "and positive or zero"),
+    ({"springs": {"tip": np.eye(6) + np.eye(6, k=1)}}, ConfigError, "must be symmetric"),
+    ({"springs": {"tip": np.zeros(3)}}, ConfigError, "needs a stiffness that is not zero"),
+    ({"springs": {"tip": [np.nan, 1.0, 1.0]}}, ConfigError, "springs"),
+    ({"springs": {"foot": np.ones(3)}}, InterfaceError, "no interface 'foot'"),
+    ({"fixed": {"root": "w"}}, ConfigError, "'root' is held in 'w'"),
+    ({"fixed": {"root": ""}}, ConfigError, "is held in ''"),
+    ({"fixed": {"root": "xx"}}, ConfigError, "each once"),
+    ({"fixed": {"root": "xyz q"}}, ConfigError, "directions are some of x, y, z, rx, ry, rz"),
+    ({"fixed": ("root", "root:y")}, ConfigError, "held twice"),
+    ({"fixed": {"foot": "x"}}, InterfaceError, "no interface 'foot'"),
+    ({"fixed": ("root:yz", "foot")}, InterfaceError, "no interface 'foot'"),
+]
 
 
-def test_wrong_supports_are_named(model, body):
-    for fixed, error, why in (
-        ({"root": "w"}, ConfigError, "'root' is held in 'w'"),
-        ({"root": ""}, ConfigError, "is held in ''"),
-        ({"root": "xx"}, ConfigError, "each once"),
-        ({"root": "xyz q"}, ConfigError, "directions are some of x, y, z, rx, ry, rz"),
-        (("root", "root:y"), ConfigError, "held twice"),
-        ({"foot": "x"}, InterfaceError, "no interface 'foot'"),
-        (("root:yz", "foot"), InterfaceError, "no interface 'foot'"),
-    ):
-        refuses(error, why, rom.modes, model, 2, fixed=fixed)
-        refuses(error, why, body.frequencies, fixed=fixed)
-    with pytest.raises(InterfaceError, match="kind 'full' and no rotation rx"):
-        rom.modes(model, 2, fixed={"root": "xyz rx"})
+def test_wrong_springs_and_supports_are_named(model, body):
+    for held, error, why in WRONG:
+        refuses(error, why, rom.modes, model, 2, **held)
+        refuses(error, why, body.frequencies, **held)
+    full = {"springs": {"tip": np.ones(3)}, "interfaces": {"tip": "full"}}
+    refuses(InterfaceError, "'tip' has the kind 'full'", rom.modes, model, 2, **full)
+    turned = {"root": "xyz rx"}
+    refuses(InterfaceError, "kind 'full' and no rotation rx", rom.modes, model, 2, fixed=turned)
 
 
 def test_a_name_may_have_a_colon_itself():

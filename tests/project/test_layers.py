@@ -38,7 +38,7 @@ rom: errors notebook rotation places fields lazy names readable process plausibl
   parametric updating prestress io mbs fmu view config report doctor cli components __main__
 cli: answer speech schemas options described ranks matrices output verbs parser main
 fe: costs parallel jit compat operators forms mesh elasticity probe
-fe.operators: solver memory disk aij foreseen factor substructures held spectrum iterative workers
+fe.operators: solver memory disk aij foreseen factor substructures spectrum iterative workers
   petsc
 fe.mesh: cell_types topology picks cad solid sources child curving quality repair validate cut read
   summary input_deck

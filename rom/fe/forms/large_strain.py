@@ -20,16 +20,18 @@ Source:
 
 from collections.abc import Iterator
 from functools import cached_property
-from typing import Any
 
 from mpi4py import MPI
+from petsc4py import PETSc
 
 import numpy as np
 import ufl
 from dolfinx import fem
 from scipy.sparse import csr_matrix
+from ufl.core.expr import Expr
 
 from rom.fe.compat import (
+    Compiled,
     assemble_matrix,
     assembled_vector,
     compiled,
@@ -39,7 +41,7 @@ from rom.fe.compat import (
     per_cell,
     quadrature_rule,
 )
-from rom.fe.forms.material import geometric_stiffness, stiffness, stress
+from rom.fe.forms.material import Coefficients, geometric_stiffness, stiffness, stress
 from rom.fe.forms.nodes import gathered as gathered_rows
 from rom.fe.jit import compiling
 from rom.fe.operators.aij import aij, gathered, symmetric, wrapped
@@ -59,9 +61,15 @@ class FiniteStrain:
     """
 
     def __init__(
-        self, V: Any, numbers: dict[str, Any], degree: int, tags: Array, names: dict[str, int],
-        *, neo_hookean: bool = False,
-    ):  # fmt: skip
+        self,
+        V: fem.FunctionSpace,
+        numbers: Coefficients,
+        degree: int,
+        tags: Index,
+        names: dict[str, int],
+        *,
+        neo_hookean: bool = False,
+    ):
         self.neo_hookean = neo_hookean
         self.V, self.mesh, self.numbers = V, V.mesh, numbers
         self.tags, self.names = tags, names
@@ -107,7 +115,7 @@ class FiniteStrain:
         self._give(self.u, u)
         return self._matrix(self._geometric)
 
-    def layout(self, A: csr_matrix) -> Any:
+    def layout(self, A: csr_matrix) -> PETSc.Mat:
         """The same matrix for the operators of the model."""
         if self.mesh.comm.size == 1:
             return wrapped(A)
@@ -121,11 +129,11 @@ class FiniteStrain:
         first, end = self.V.dofmap.index_map.local_range
         return 3 * first, 3 * end
 
-    def _give(self, function: Any, u: Array) -> None:
+    def _give(self, function: fem.Function, u: Array) -> None:
         """Let a function of the displacement's space have the values (n,) of the whole solid."""
         give_own(function, u[slice(*self._own)])
 
-    def _matrix(self, form: Any) -> csr_matrix:
+    def _matrix(self, form: Compiled) -> csr_matrix:
         A = assemble_matrix(form)
         if self.mesh.comm.size == 1:
             return symmetric(A)
@@ -134,12 +142,12 @@ class FiniteStrain:
         return found
 
     @cached_property
-    def _force(self) -> Any:
+    def _force(self) -> Compiled:
         v = ufl.TestFunction(self.V)
         return self._compiled(ufl.inner(ufl.dot(self._F, self._S), ufl.grad(v)))
 
     @cached_property
-    def _tangent(self) -> Any:
+    def _tangent(self) -> Compiled:
         w, v = ufl.TrialFunction(self.V), ufl.TestFunction(self.V)
         if self.neo_hookean:
             force = ufl.inner(ufl.dot(self._F, self._S), ufl.grad(v))
@@ -149,17 +157,17 @@ class FiniteStrain:
         return self._compiled(material + ufl.inner(ufl.dot(ufl.grad(w), self._S), ufl.grad(v)))
 
     @cached_property
-    def _geometric(self) -> Any:
+    def _geometric(self) -> Compiled:
         w, v = ufl.TrialFunction(self.V), ufl.TestFunction(self.V)
         sigma = self._stress(ufl.sym(ufl.grad(self.u)))
         return self._compiled(geometric_stiffness(w, v, sigma))
 
     @property
-    def _F(self) -> Any:
+    def _F(self) -> Expr:
         return ufl.Identity(3) + ufl.grad(self.u)
 
     @property
-    def _S(self) -> Any:
+    def _S(self) -> Expr:
         if self.neo_hookean:
             inverse, log = ufl.inv(ufl.dot(self._F.T, self._F)), ufl.ln(ufl.det(self._F))
             lam, mu = self.numbers["lam"], self.numbers["mu"]
@@ -167,10 +175,10 @@ class FiniteStrain:
         H = ufl.grad(self.u)  # F^T F - I would leave small strains no digits
         return self._stress(ufl.sym(H) + 0.5 * ufl.dot(H.T, H))
 
-    def _stress(self, strain: Any) -> Any:
+    def _stress(self, strain: Expr) -> Expr:
         return stress(strain - self.theta * ufl.Identity(3), self.numbers)
 
-    def _compiled(self, integrand: Any) -> Any:
+    def _compiled(self, integrand: Expr) -> Compiled:
         with compiling(self.mesh.comm):
             return compiled(integrand * self.dx)
 
@@ -178,7 +186,7 @@ class FiniteStrain:
 class LargeStrain:
     """Energy of shapes at finite strain, and the forces of second order that shapes cause."""
 
-    def __init__(self, V: Any, numbers: dict[str, Any], degree: int):
+    def __init__(self, V: fem.FunctionSpace, numbers: Coefficients, degree: int):
         self.V, self.mesh, self.numbers = V, V.mesh, numbers
         # for the fourth power of grad u, and for the linear stiffness
         self.order, self.few = (degree_of_slopes(V.mesh, degree, power) for power in (4, 2))
@@ -258,10 +266,10 @@ class LargeStrain:
         """(n_local, p) forces D^2 f [u_i, u_j] at no displacement [N], of pairs (p, 2) i and j."""
         a, b, v = fem.Function(self.V), fem.Function(self.V), ufl.TestFunction(self.V)
 
-        def L(u: Any) -> Any:
+        def L(u: Expr) -> Expr:
             return ufl.sym(ufl.grad(u))
 
-        def Q(u: Any, w: Any) -> Any:
+        def Q(u: Expr, w: Expr) -> Expr:
             return ufl.sym(ufl.dot(ufl.grad(u).T, ufl.grad(w)))
 
         density = sum(
@@ -324,6 +332,8 @@ def quadratic_strain(H: Array) -> Array:
     flat = H.reshape(p, 3, 3 * r)
     products = np.matmul(flat.transpose(0, 2, 1), flat).reshape(p, 3, r, 3, r)
     j, k = np.triu_indices(r)
-    rows = [products[:, a, j, b, k] if a == b else
-            products[:, a, j, b, k] + products[:, b, j, a, k] for a, b in PAIRS]  # fmt: skip
+    rows = [products[:, a, j, b, k] for a, b in PAIRS]
+    for row, (a, b) in zip(rows, PAIRS, strict=True):
+        if a != b:
+            row += products[:, b, j, a, k]
     return np.stack(rows, axis=1)

@@ -1,26 +1,28 @@
 """Material numbers as coefficients of the forms, and what a careful user wants to know of them."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict
-from typing import Any
 
 import numpy as np
 import ufl
 from dolfinx import fem
+from dolfinx.mesh import Mesh
+from ufl.core.expr import Expr
 
 from rom.errors import MaterialError, TagError
 from rom.fe.compat import per_cell
-from rom.model import PAIRS, Index, Material, Orthotropic
-from rom.names import named, offered
+from rom.model import PAIRS, Array, Index, Material, Orthotropic
+from rom.names import check_known, named
 from rom.plausible import FOAM_SPEED
 
 Solid = Material | Orthotropic
+Coefficients = dict[str, fem.Constant] | dict[str, fem.Function]
 MAX_PLAUSIBLE_SIZE = 20.0  # [m]; most machine parts above it are millimetres read as metres
 NEARLY_INCOMPRESSIBLE = 0.49
 MAX_STIFFNESS_RATIO = 1e8  # beyond it, conditioning costs half the digits
 
 
-def by_region(material: Any, regions: dict[str, int]) -> dict[int, Solid]:
+def by_region(material: Solid | Mapping[str, Solid], regions: dict[str, int]) -> dict[int, Solid]:
     """{tag: material}, from one material for all or from {region name: material}."""
     if isinstance(material, Solid):
         return dict.fromkeys(regions.values(), material)
@@ -28,11 +30,8 @@ def by_region(material: Any, regions: dict[str, int]) -> dict[int, Solid]:
         raise MaterialError(
             f"material = {material!r} must be a Material, Orthotropic or dictionary."
         )
-    if unknown := [name for name in material if name not in regions]:
-        raise MaterialError(
-            f"there is no region {named(unknown)}; the mesh has {offered(regions)}."
-        )
     for name, value in material.items():
+        check_known(name, regions, f"there is no region {name!r}; the mesh has", MaterialError)
         if not isinstance(value, Solid):
             raise MaterialError(f"material[{name!r}] = {value!r} must be a rom.Material.")
     if missing := sorted(set(regions) - set(material)):
@@ -44,16 +43,11 @@ def by_region(material: Any, regions: dict[str, int]) -> dict[int, Solid]:
     return {regions[name]: value for name, value in material.items()}
 
 
-def coefficients(mesh: Any, tags: Index, solids: dict[int, Solid]) -> dict[str, Any]:
+def coefficients(mesh: Mesh, tags: Index, solids: dict[int, Solid]) -> Coefficients:
     """Coefficients of the forms: "rho", and "lam", "mu" or the full stiffness "C".
 
-    Constants for one material, one value per cell for several, so that other numbers never mean
-    another compilation.
-
-    Args:
-        mesh: dolfinx mesh.
-        tags: (cells of this rank with ghosts,) region of each cell.
-        solids: {tag: material}.
+    Constants for one material, one value per cell, which has a region's tag, for several, so that
+    other numbers never mean another compilation.
     """
     tables = {tag: _numbers(solid, _isotropic(solids)) for tag, solid in solids.items()}
     if len(set(map(id, solids.values()))) == 1:
@@ -66,7 +60,7 @@ def coefficients(mesh: Any, tags: Index, solids: dict[int, Solid]) -> dict[str, 
     return {n: per_cell(mesh, np.array([tables[t][n] for t in order])[rows]) for n in names}
 
 
-def of_region(mesh: Any, tags: Index, solids: dict[int, Solid], tag: int) -> dict[str, Any]:
+def of_region(mesh: Mesh, tags: Index, solids: dict[int, Solid], tag: int) -> Coefficients:
     """Coefficients that vanish outside one region, one value per cell; see `coefficients`."""
     inside = tags == tag
     return {
@@ -79,14 +73,12 @@ def _isotropic(solids: dict[int, Solid]) -> bool:
     return all(isinstance(solid, Material) for solid in solids.values())
 
 
-def _numbers(solid: Solid, isotropic: bool) -> dict[str, Any]:
-    C = solid.stiffness
-    if isotropic:
-        return {"rho": np.float64(solid.rho), "lam": C[0, 1], "mu": C[3, 3]}
-    return {"rho": np.float64(solid.rho), "C": C}
+def _numbers(solid: Solid, isotropic: bool) -> dict[str, Array]:
+    C, rho = solid.stiffness, np.array(solid.rho, dtype=np.float64)
+    return {"rho": rho, "lam": C[0, 1], "mu": C[3, 3]} if isotropic else {"rho": rho, "C": C}
 
 
-def stress(strain: Any, numbers: dict[str, Any]) -> Any:
+def stress(strain: Expr, numbers: Coefficients) -> Expr:
     """Stress of Hooke's law, isotropic or with the (6, 6) stiffness C, of a ufl strain (3, 3)."""
     if "C" not in numbers:
         return 2 * numbers["mu"] * strain + numbers["lam"] * ufl.tr(strain) * ufl.Identity(3)
@@ -96,7 +88,7 @@ def stress(strain: Any, numbers: dict[str, Any]) -> Any:
     return ufl.as_matrix([[s[0], s[5], s[4]], [s[5], s[1], s[3]], [s[4], s[3], s[2]]])
 
 
-def stiffness(numbers: dict[str, Any], x: Any) -> Any:
+def stiffness(numbers: Coefficients, x: Expr) -> Expr:
     """The (6, 6) stiffness row by row, a ufl vector of the mesh."""
     rows = []
     for a, b in PAIRS:
@@ -107,7 +99,7 @@ def stiffness(numbers: dict[str, Any], x: Any) -> Any:
     return ufl.as_vector(rows)
 
 
-def geometric_stiffness(u: Any, v: Any, sigma: Any) -> Any:
+def geometric_stiffness(u: Expr, v: Expr, sigma: Expr) -> Expr:
     """Density of the stiffness that a stress gives to displacements u and v, a ufl expression.
 
     Second variation of the work of the stress on the engineering strain U - 1, with U the stretch
@@ -149,12 +141,12 @@ def doubts(solids: dict[str, Solid], size: float, cell: str, degree: int) -> Ite
         yield f"stiffness varies by {contrast:.1g} over the body; expect few correct digits."
 
 
-def described(solids: dict[str, Solid]) -> dict[str, Any]:
+def described(solids: dict[str, Solid]) -> dict[str, object]:
     """The material numbers by region, in plain Python, for the provenance."""
     return {name: _plain(asdict(solid)) for name, solid in solids.items()}
 
 
-def _plain(value: Any) -> Any:
+def _plain(value: object) -> object:
     if isinstance(value, dict):
         return {key: _plain(item) for key, item in value.items()}
     return np.asarray(value, dtype=float).tolist()

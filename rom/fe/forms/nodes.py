@@ -1,12 +1,10 @@
 """Interfaces and outer surface of a distributed model, the same on all ranks and any number."""
 
 from itertools import pairwise
-from typing import Any
 
 from mpi4py import MPI
 
 import numpy as np
-import numpy.typing as npt
 import ufl
 from dolfinx import fem
 from dolfinx.mesh import exterior_facet_indices
@@ -14,6 +12,7 @@ from scipy.sparse import csr_matrix
 
 from rom.errors import InterfaceError
 from rom.fe.compat import (
+    MeshTags,
     assemble_matrix,
     cell_dofs,
     cell_name,
@@ -32,7 +31,7 @@ def gathered(comm: MPI.Comm, rows: Numbers) -> Numbers:
     return np.concatenate(comm.allgather(rows)) if comm.size > 1 else rows
 
 
-def all_points(V: Any) -> Array:
+def all_points(V: fem.FunctionSpace) -> Array:
     """(n/3, 3) coordinates of all nodes in global numbering [m]."""
     return np.ascontiguousarray(gathered(V.mesh.comm, node_coordinates(V)))
 
@@ -43,7 +42,7 @@ def by_position(points: Array, size: float) -> Index:
     return np.lexsort((z, y, x))
 
 
-def interface(name: str, tags: Any, V: Any, points: Array) -> Interface:
+def interface(name: str, tags: MeshTags, V: fem.FunctionSpace, points: Array) -> Interface:
     """The nodes, surface mass and centroid of a surface, tagged by MeshTags of its facets."""
     comm, facets = V.mesh.comm, tags.indices
     if comm.allreduce(facets.size) == 0:
@@ -60,13 +59,13 @@ def interface(name: str, tags: Any, V: Any, points: Array) -> Interface:
     return Interface(name, nodes, points[nodes], S, weights @ points[nodes] / weights.sum())
 
 
-def _nodes(V: Any, facets: npt.NDArray[np.int32]) -> Index:
+def _nodes(V: fem.FunctionSpace, facets: Integers) -> Index:
     """Global numbers of all nodes on the facets, ascending."""
-    local = fem.locate_dofs_topological(V, 2, facets)
+    local = fem.locate_dofs_topological(V, 2, facets.astype(np.int32))
     return np.unique(gathered(V.mesh.comm, to_global(V.dofmap.index_map, local)))
 
 
-def _surface_mass(V: Any, facets: Integers, nodes: Index) -> csr_matrix:
+def _surface_mass(V: fem.FunctionSpace, facets: Integers, nodes: Index) -> csr_matrix:
     """(k, k) integrals of N_i N_j over the facets, on all ranks."""
     from dolfinx.mesh import meshtags
 
@@ -91,7 +90,7 @@ def _positions(nodes: Index, numbers: Integers) -> Integers:
     return order[np.searchsorted(nodes[order], numbers)]
 
 
-def outer_surface(V: Any, points: Array, degree: int) -> SurfaceMesh:
+def outer_surface(V: fem.FunctionSpace, points: Array, degree: int) -> SurfaceMesh:
     """Triangles of the boundary through all its nodes, seen from outside counter-clockwise.
 
     Quadratic facets are split at their middle nodes; of cubic ones the corners are used.
@@ -107,18 +106,16 @@ def outer_surface(V: Any, points: Array, degree: int) -> SurfaceMesh:
     return SurfaceMesh(nodes[order], corners[np.lexsort(corners.T[::-1])])
 
 
-def _boundary_triangles(V: Any, points: Array, degree: int) -> Index:
+def _boundary_triangles(V: fem.FunctionSpace, points: Array, degree: int) -> Index:
     """(t, 3) global nodes of this rank's boundary facets."""
     topology = V.mesh.topology
     topology.create_connectivity(2, 3)
     topology.create_connectivity(3, 2)
     facets = exterior_facet_indices(topology)
-    cells = np.array([topology.connectivity(2, 3).links(f)[0] for f in facets], dtype=np.int64)
-    local = np.array(
-        [np.flatnonzero(topology.connectivity(3, 2).links(c) == f)[0]
-         for f, c in zip(facets, cells, strict=True)],
-        dtype=np.int64,
-    )  # fmt: skip
+    cells_at, facets_of = (topology.connectivity(*dims).links for dims in ((2, 3), (3, 2)))
+    pairs = [(f, cells_at(f)[0]) for f in facets]
+    local = np.array([np.flatnonzero(facets_of(c) == f)[0] for f, c in pairs], dtype=np.int64)
+    cells = np.array([c for _, c in pairs], dtype=np.int64)
     name = cell_name(V.mesh)
     corners = [V.dofmap.dof_layout.entity_dofs(0, i)[0] for i in range(len(sub_entities(name)[0]))]
     table, parts = cell_dofs(V), [np.empty((0, 3), dtype=np.int64)]
@@ -136,7 +133,7 @@ def _outward(triangles: Index, points: Array, inside: Array) -> Index:
     return np.where(inward[:, None], triangles[:, [0, 2, 1]], triangles)
 
 
-def _patterns(V: Any, name: str, degree: int) -> list[list[list[int]]]:
+def _patterns(V: fem.FunctionSpace, name: str, degree: int) -> list[list[list[int]]]:
     """For each facet of the reference cell, triangles in the dof numbers of the cell."""
     layout, entities = V.dofmap.dof_layout, sub_entities(name)
     patterns = []

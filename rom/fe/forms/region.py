@@ -1,19 +1,17 @@
 """Weak forms of a solid, whole or region by region, and their matrices."""
 
 from collections.abc import Iterator, Mapping
-from typing import Any
+
+from petsc4py import PETSc
 
 import numpy as np
 import ufl
+from dolfinx import fem
+from dolfinx.mesh import Mesh
+from ufl.core.expr import Expr
 
-from rom.fe.compat import (
-    assemble_matrix,
-    cell_dofs,
-    cell_name,
-    degree_of_slopes,
-    geometry_degree,
-)
-from rom.fe.forms.material import Solid, of_region, stress
+from rom.fe.compat import assemble_matrix, cell_dofs, cell_name, degree_of_slopes, geometry_degree
+from rom.fe.forms.material import Coefficients, Solid, of_region, stress
 from rom.fe.forms.stress import Stresses
 from rom.fe.jit import compiling
 from rom.fe.operators.aij import symmetric, wrapped
@@ -29,7 +27,12 @@ class Regions(Mapping[str, Region]):
     """
 
     def __init__(
-        self, V: Any, tags: Index, solids: dict[int, Solid], names: dict[str, int], degree: int
+        self,
+        V: fem.FunctionSpace,
+        tags: Index,
+        solids: dict[int, Solid],
+        names: dict[str, int],
+        degree: int,
     ):
         self.V, self.tags, self.solids, self.names, self.degree = V, tags, solids, names, degree
 
@@ -41,12 +44,12 @@ class Regions(Mapping[str, Region]):
         stresses = Stresses(self.V, numbers, self.degree)
         return Region(K, M, stresses, lambda axis: self._stretched(tag, numbers, axis))
 
-    def _stretched(self, tag: int, numbers: dict[str, Any], axis: int) -> Layered:
+    def _stretched(self, tag: int, numbers: Coefficients, axis: int) -> Layered:
         with compiling(self.V.mesh.comm):
             parts = map(self._matrix, stretched_forms(self.V, numbers, self.degree, axis))
             return Layered(self._layers(tag, axis), *parts)
 
-    def _matrix(self, form: ufl.Form) -> Any:
+    def _matrix(self, form: ufl.Form) -> PETSc.Mat:
         A = assemble_matrix(form)
         return wrapped(symmetric(A)) if self.V.mesh.comm.size == 1 else A
 
@@ -66,7 +69,7 @@ class Regions(Mapping[str, Region]):
         return len(self.names)
 
 
-def forms(V: Any, numbers: dict[str, Any], degree: int) -> tuple[ufl.Form, ufl.Form]:
+def forms(V: fem.FunctionSpace, numbers: Coefficients, degree: int) -> tuple[ufl.Form, ufl.Form]:
     """Stiffness and mass; quadrature exact on straight cells, more than enough on curved ones."""
     u, v = ufl.TrialFunction(V), ufl.TestFunction(V)
     q_K, q_M = degree_of_slopes(V.mesh, degree, 2), _mass_degree(V.mesh, degree)
@@ -78,7 +81,7 @@ def forms(V: Any, numbers: dict[str, Any], degree: int) -> tuple[ufl.Form, ufl.F
 
 
 def stretched_forms(
-    V: Any, numbers: dict[str, Any], degree: int, axis: int
+    V: fem.FunctionSpace, numbers: Coefficients, degree: int, axis: int
 ) -> tuple[ufl.Form, ufl.Form, ufl.Form]:
     """Stiffness split by whether strains come from derivatives along an axis; see `Layered`."""
     u, v = ufl.TrialFunction(V), ufl.TestFunction(V)
@@ -86,7 +89,7 @@ def stretched_forms(
     dx = ufl.Measure("dx", domain=V.mesh, metadata={"quadrature_degree": q_K})
     P = ufl.as_matrix([[float(i == j == axis) for j in range(3)] for i in range(3)])
 
-    def strains(w: Any) -> tuple[Any, Any]:
+    def strains(w: Expr) -> tuple[Expr, Expr]:
         across = ufl.sym(ufl.dot(ufl.grad(w), P))
         return ufl.sym(ufl.grad(w)) - across, across
 
@@ -108,7 +111,7 @@ def joined(ends: Array) -> tuple[tuple[float, float], ...]:
     return tuple((low, high) for low, high in found)
 
 
-def _mass_degree(mesh: Any, degree: int) -> int:
+def _mass_degree(mesh: Mesh, degree: int) -> int:
     """Quadrature degree of M: the determinant of the map adds to that of the displacements.
 
     On hexahedra 3 g - 1 per direction, on tetrahedra 3 (g - 1) in total, g the degree of the

@@ -1,6 +1,6 @@
 """Stress and gradient of displacements: averaged at nodes, or at the points of a quadrature."""
 
-from typing import Any
+from collections.abc import Callable, Iterator
 
 from mpi4py import MPI
 
@@ -8,6 +8,7 @@ import numpy as np
 import ufl
 from dolfinx import fem
 from scipy.sparse import csr_matrix
+from ufl.core.expr import Expr
 
 from rom.fe.compat import (
     assemble_matrix,
@@ -20,7 +21,7 @@ from rom.fe.compat import (
     to_global,
 )
 from rom.fe.forms.large_strain import FiniteStrain, LargeStrain
-from rom.fe.forms.material import geometric_stiffness, stiffness, stress
+from rom.fe.forms.material import Coefficients, geometric_stiffness, stiffness, stress
 from rom.fe.jit import compiling
 from rom.fe.operators.aij import gathered
 from rom.fe.operators.factor import dense_rows
@@ -34,39 +35,37 @@ class Stresses:
     ``regions`` are the region (cells,) of each cell and {region: tag}; None where not known.
     """
 
-    def __init__(self, V: Any, numbers: dict[str, Any], degree: int, regions: Any = None):
-        self.V, self.numbers, self.degree, self.regions = V, numbers, degree, regions
+    def __init__(
+        self,
+        V: fem.FunctionSpace,
+        numbers: Coefficients,
+        degree: int,
+        regions: tuple[Index, dict[str, int]] | None = None,
+    ):
+        self.V, self.numbers, self.degree = V, numbers, degree
+        self.regions = regions or (np.zeros(0, dtype=np.int64), {})
         self.mesh = V.mesh
         self.n_cells = self.mesh.topology.index_map(3).size_local
 
     def at_nodes(self, U: Array, nodes: Index) -> Array:
-        """Stress at nodes: the mean of what their cells say, not weighted.
+        """(p, 6, k) stress xx, yy, zz, yz, xz, xy [Pa] at nodes (p,) of U (n_local, k) [m].
 
-        Args:
-            U: (n_local, k) displacements [m].
-            nodes: (p,) node numbers, equal on all ranks.
-
-        Returns:
-            (p, 6, k) stress xx, yy, zz, yz, xz, xy [Pa], equal on all ranks.
+        The mean of what their cells say, not weighted; nodes and stress are equal on all ranks.
         """
         one = np.zeros(self.n_cells, dtype=np.int64)
         return self._means(self._hooke, 6, U, nodes, one)[0]
 
     def gradients_at_nodes(self, U: Array, nodes: Index) -> dict[str, Array]:
-        """Displacement gradient at nodes: the mean of their cells, material by material.
+        """The arrays of `rom.body.nonlinear.cauchy.CauchyRecovery` at nodes (p,).
 
-        Args:
-            U: (n_local, k) displacements [m].
-            nodes: (p,) node numbers, equal on all ranks.
-
-        Returns:
-            The arrays of `rom.body.nonlinear.cauchy.CauchyRecovery`, equal on all ranks.
+        Gradients of displacements U (n_local, k) [m] are means of cells, material by material.
         """
+
+        def slopes(u: fem.Function) -> Expr:
+            return ufl.as_vector([ufl.grad(u)[a, b] for a in range(3) for b in range(3)])
+
         laws, of_cell = self._laws()
-        gradient, node, material, count = self._means(
-            lambda u: ufl.as_vector([ufl.grad(u)[a, b] for a in range(3) for b in range(3)]),
-            9, U, nodes, of_cell,
-        )  # fmt: skip
+        gradient, node, material, count = self._means(slopes, 9, U, nodes, of_cell)
         return {
             "gradient": gradient.reshape(9 * len(node), -1),
             "stiffness": laws,
@@ -76,7 +75,7 @@ class Stresses:
         }
 
     def _means(
-        self, of: Any, width: int, U: Array, nodes: Index, group: Index
+        self, of: Callable[[fem.Function], Expr], width: int, U: Array, nodes: Index, group: Index
     ) -> tuple[Array, Index, Index, Array]:
         """Means over the cells of one group at nodes, for all pairs of the two that exist.
 
@@ -119,14 +118,7 @@ class Stresses:
         return every.reshape(-1, 6, 6), of_cell
 
     def at_gauss_points(self, U: Array) -> tuple[Array, Array]:
-        """Stress at the quadrature points of this rank's cells.
-
-        Args:
-            U: (n_local, k) displacements [m].
-
-        Returns:
-            (g, 3) points [m] and (g, 6, k) stress xx, yy, zz, yz, xz, xy [Pa].
-        """
+        """(g, 3) quadrature points of own cells [m], (g, 6, k) stress of U (n_local, k) [Pa]."""
         cells = np.arange(self.n_cells, dtype=np.int32)
         X, _ = quadrature_rule(self.mesh, 2 * (self.degree - 1))
         with compiling(self.mesh.comm):
@@ -137,16 +129,10 @@ class Stresses:
         return points, np.stack(found, axis=2)
 
     def geometric_stiffness(self, U: Array, Psi: Array) -> Array:
-        """Stiffness that the stress of loads gives to shapes, at any element degree.
+        """(l, r, r) stiffness that the stress of loads gives to shapes Psi (n_local, r).
 
-        The second variation of the strain energy, see `material.geometric_stiffness`.
-
-        Args:
-            U: (n_local, l) displacements under the loads [m].
-            Psi: (n_local, r) shapes.
-
-        Returns:
-            (l, r, r) symmetric, equal on all ranks.
+        Of displacements U (n_local, l) [m] under the loads: the second variation of the strain
+        energy, see `material.geometric_stiffness`; symmetric, equal on all ranks.
         """
         load = fem.Function(self.V)
         form = self._second_variation(load)
@@ -162,11 +148,7 @@ class Stresses:
         return 0.5 * (out + out.transpose(0, 2, 1))
 
     def prestress(self, u: Array) -> csr_matrix:
-        """(n, n) geometric stiffness of the stress of one displacement, equal on all ranks.
-
-        Args:
-            u: (n,) displacement of all dofs [m], equal on all ranks.
-        """
+        """(n, n) geometric stiffness of the stress of a displacement (n,) [m], on all ranks."""
         load = fem.Function(self.V)
         rows, per_node = self.V.dofmap.index_map.local_range, self.V.dofmap.index_map_bs
         give_own(load, u[rows[0] * per_node : rows[1] * per_node])
@@ -176,17 +158,17 @@ class Stresses:
         A.destroy()
         return K_geo
 
-    def finite_strain(self, *, neo_hookean: bool = False) -> Any:
+    def finite_strain(self, *, neo_hookean: bool = False) -> FiniteStrain:
         """The same solid in large motion, `large_strain.FiniteStrain`."""
         return FiniteStrain(
             self.V, self.numbers, self.degree, *self.regions, neo_hookean=neo_hookean
         )
 
-    def large_strain(self) -> Any:
+    def large_strain(self) -> LargeStrain:
         """Energy of shapes at finite strain, `large_strain.LargeStrain`."""
         return LargeStrain(self.V, self.numbers, self.degree)
 
-    def _second_variation(self, load: Any) -> ufl.Form:
+    def _second_variation(self, load: fem.Function) -> ufl.Form:
         """Bilinear form; quadrature exact on straight tetrahedra, as for the mass on others."""
         u, v = ufl.TrialFunction(self.V), ufl.TestFunction(self.V)
         sigma = stress(ufl.sym(ufl.grad(load)), self.numbers)
@@ -194,12 +176,14 @@ class Stresses:
         dx = ufl.Measure("dx", domain=self.mesh, metadata={"quadrature_degree": order})
         return geometric_stiffness(u, v, sigma) * dx
 
-    def _hooke(self, u: Any) -> Any:
+    def _hooke(self, u: fem.Function) -> Expr:
         """Stress xx, yy, zz, yz, xz, xy of a displacement, a ufl vector."""
         s = stress(ufl.sym(ufl.grad(u)), self.numbers)
         return ufl.as_vector([s[i, j] for i, j in PAIRS])
 
-    def _evaluated(self, of: Any, width: int, U: Array, cells: Integers, X: Array) -> Any:
+    def _evaluated(
+        self, of: Callable[[fem.Function], Expr], width: int, U: Array, cells: Integers, X: Array
+    ) -> Iterator[Array]:
         """(cells, points, width) numbers of each column, of a ufl vector of the displacement."""
         u = fem.Function(self.V)
         with compiling(self.mesh.comm):

@@ -161,12 +161,7 @@ READ_TYPES = CELL_TYPES | {"hex20": SERENDIPITY}
 
 
 def jacobians(x: Array, gradients: Array) -> Array:
-    """(m, q) determinants of the geometry map.
-
-    Args:
-        x: (m, k, 3) node coordinates of the cells [m].
-        gradients: (q, k, 3) reference gradients of the shape functions.
-    """
+    """(m, q) determinants of the geometry map, of nodes x (m, k, 3) [m] and gradients (q, k, 3)."""
     # one tangent vector per reference direction: (m, 3, q)
     a, b, c = (np.einsum("mkx,qk->xmq", x, gradients[:, :, i], optimize=True) for i in range(3))
     return (

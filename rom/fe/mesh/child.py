@@ -10,11 +10,11 @@ import math
 import sys
 from importlib import import_module
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from rom import errors
+from rom.arguments import not_negative
 from rom.errors import (
     ConfigError,
     FileFormatError,
@@ -24,7 +24,7 @@ from rom.errors import (
     in_file,
 )
 from rom.fe import GMSH_LIBRARIES
-from rom.fe.mesh.solid import GEOMETRIES, Read
+from rom.fe.mesh.solid import GEOMETRIES, Notes, Read, Request
 from rom.fe.mesh.sources.builder import unmeshable
 from rom.process import child
 from rom.process.memory import total_bytes
@@ -38,7 +38,7 @@ VARIABLES = {"OMP_NUM_THREADS": "1", "LC_ALL": "C.UTF-8"}
 
 
 def read_apart(
-    request: dict[str, Any],
+    request: Request,
     *,
     where: str,
     size: int,
@@ -62,7 +62,7 @@ def read_apart(
         return _result(folder, done, request, limits)
 
 
-def _plain(value: Any) -> Any:
+def _plain(value: object) -> object:
     if isinstance(value, np.ndarray | np.generic):
         return value.tolist()
     raise TypeError(f"got {value!r}")
@@ -90,12 +90,10 @@ def _chosen(name: str, value: float | None, default: float) -> float:
     """A limit; 0 for none."""
     if value is None:
         return default
-    if isinstance(value, bool) or not isinstance(value, int | float) or not value >= 0:
-        raise ConfigError(f"{name} = {value!r} must be a number from 0 on.", hint="0 is none.")
-    return 0.0 if math.isinf(value) else float(value)
+    return 0.0 if value == math.inf else not_negative(name, value)
 
 
-def _result(folder: Path, done: child.Ended, request: dict[str, Any], limits: child.Limits) -> Read:
+def _result(folder: Path, done: child.Ended, request: Request, limits: child.Limits) -> Read:
     answer = folder / "answer.json"
     if not answer.exists():
         raise _died(done, request, limits)
@@ -108,7 +106,7 @@ def _result(folder: Path, done: child.Ended, request: dict[str, Any], limits: ch
         return dict(arrays), notes
 
 
-def _died(done: child.Ended, request: dict[str, Any], limits: child.Limits) -> BaseException:
+def _died(done: child.Ended, request: Request, limits: child.Limits) -> BaseException:
     """What a reader without an answer means."""
     if done.overtime or done.signal == "SIGXCPU":
         return _too_long(request, limits)
@@ -133,7 +131,7 @@ def _died(done: child.Ended, request: dict[str, Any], limits: child.Limits) -> B
     return FileFormatError(text, hint="Open it in gmsh and save it again.")
 
 
-def _too_long(request: dict[str, Any], limits: child.Limits) -> RomError:
+def _too_long(request: Request, limits: child.Limits) -> RomError:
     if request["reader"] in GEOMETRIES:
         return ResourceError(
             f"meshing did not end within the limit of {limits.seconds:g} s.",
@@ -144,7 +142,7 @@ def _too_long(request: dict[str, Any], limits: child.Limits) -> RomError:
     return FileFormatError(text, hint=WRITE_AGAIN)
 
 
-def _too_large(request: dict[str, Any], limits: child.Limits) -> RomError:
+def _too_large(request: Request, limits: child.Limits) -> RomError:
     if request["reader"] in GEOMETRIES:
         return ResourceError(
             f"meshing needs more than the limit of {limits.memory / BYTES_PER_GIGABYTE:.3g} GB.",
@@ -166,13 +164,8 @@ def main(folder: str) -> None:
     _answer(folder, notes)
 
 
-def read(request: dict[str, Any]) -> Read:
-    """Read or make the mesh a request asks for; what the child does.
-
-    Returns:
-        Arrays ``points``, ``cells``, ``regions``, ``cell_ids`` and ``facets 0``, ``facets 1``, ...;
-        notes ``cell_type``, ``region_names``, ``facet_names``, ``provenance``, ``warnings``.
-    """
+def read(request: Request) -> Read:
+    """Arrays and notes of the mesh a request asks for, in the form of `packed`, in the child."""
     reader = request["reader"]
     try:
         if reader in ("abaqus", "nastran"):  # only its own libraries are loaded
@@ -203,11 +196,11 @@ def _described(error: RomError | MemoryError) -> dict[str, str]:
     """What the parent needs to raise the error again."""
     if isinstance(error, MemoryError):
         return {"error": MemoryError.__name__}
-    return {"error": type(error).__name__, "message": error.message, "where": error.where,
-            "hint": error.hint}  # fmt: skip
+    told = {name: getattr(error, name) for name in ("message", "where", "hint")}
+    return {"error": type(error).__name__, **told}
 
 
-def _answer(folder: str, notes: dict[str, Any]) -> None:
+def _answer(folder: str, notes: Notes) -> None:
     part = Path(folder, "answer.part")
     part.write_text(json.dumps(notes))
     part.rename(Path(folder, "answer.json"))

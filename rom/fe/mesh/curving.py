@@ -68,13 +68,9 @@ def straightened(mesh: SolidMesh, cells: Mask, share: float) -> SolidMesh:
 
 
 def smallest_determinants(points: Array, cells: Index, kind: CellType, gap: Array) -> Array:
-    """(m,) smallest determinant of the geometry map in each cell.
+    """(m,) smallest determinant of the geometry map in curved cells (m, k) of one kind.
 
-    Args:
-        points: (n, 3) nodes [m].
-        cells: (m, k) node numbers of curved cells.
-        kind: their kind.
-        gap: (m,) by how much a value may be above the smallest [m^3].
+    Of points (n, 3) [m]; a value may be above the smallest by the gap (m,) [m^3].
     """
     found = [
         _smallest(points[cells[rows]], kind, gap[rows])
@@ -140,8 +136,8 @@ def _bernstein(shape: str, x: Array) -> Array:
     """(q, c) Bernstein polynomials at (q, 3) points."""
     exponents, degree = _exponents(shape), DEGREES[shape]
     if shape == "tetrahedron":
-        weights = np.array([factorial(degree) / np.prod([factorial(i) for i in e])
-                            for e in exponents])  # fmt: skip
+        divisors = [np.prod([factorial(i) for i in e]) for e in exponents]
+        weights = factorial(degree) / np.array(divisors)
         barycentric = np.column_stack([1 - x.sum(axis=1), x])
         return weights * np.prod(barycentric[:, None] ** exponents, axis=2)
     weights = np.array([np.prod([comb(degree, i) for i in e]) for e in exponents])
@@ -155,5 +151,5 @@ def _halves(shape: str, lattice: Array) -> list[Array]:
         return [0.5 * (lattice + corner) for corner in product((0, 1), repeat=3)]
     corners = np.array(CELL_TYPES["tet4"].corners, dtype=float)
     barycentric = np.column_stack([1 - lattice.sum(axis=1), lattice])
-    return [barycentric @ np.array([corners[list(s)].mean(axis=0) for s in half])
-            for half in TET_HALVES]  # fmt: skip
+    halves = ([corners[list(s)].mean(axis=0) for s in half] for half in TET_HALVES)
+    return [barycentric @ np.array(half) for half in halves]

@@ -2,21 +2,24 @@
 
 from dataclasses import replace
 from itertools import combinations
-from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from rom.arguments import finite, whole
 from rom.errors import ConfigError, MeshError, TagError
 from rom.fe.mesh.solid import SolidMesh
 from rom.fe.mesh.topology import faces_of, row_ids
-from rom.model import Array, Index
+from rom.model import Array, Index, Mask
 from rom.names import named
 
+Cuts = dict[str, tuple[tuple[int, int], Index]]  # numbers of the two pieces, and facets
 PLANE_RTOL = 1e-6  # of the length along the axis: how far nodes of a cut may lie from its plane
 
 
-def cut(mesh: SolidMesh, n: int | None = None, axis: Any = None) -> dict[str, SolidMesh]:
+def cut(
+    mesh: SolidMesh, n: int | None = None, axis: npt.ArrayLike | None = None
+) -> dict[str, SolidMesh]:
     """{name: piece} of a mesh, cut into n along an axis, or by its regions.
 
     Where two pieces meet both have the surface, of one name: "cut 1" between the pieces "1" and
@@ -33,38 +36,45 @@ def cut(mesh: SolidMesh, n: int | None = None, axis: Any = None) -> dict[str, So
         TagError: if there is one region only, a cut crosses a named surface, or a surface has the
             name of a cut.
     """
+    normal = None if axis is None else finite("axis", axis, (3,))
+    if (n is None) != (normal is None) or (normal is not None and not normal.any()):
+        raise ConfigError(
+            f"n = {n!r} and axis = {axis!r} say no cuts.",
+            hint="Give both, as n=4, axis=(1, 0, 0), or neither to make a piece of each region.",
+        )
     faces = faces_of(mesh.cells, mesh.kind, len(mesh.points))
-    piece, names = _by_planes(mesh, n, axis) if axis is not None else _by_regions(mesh, n)
+    if n is None or normal is None:
+        piece, names = _by_regions(mesh)
+    else:
+        piece, names = _by_planes(
+            mesh, whole("n", n, 2, reason="one piece is the whole body"), normal
+        )
     rows = mesh.cells[:, np.array(mesh.kind.face_nodes)]
-    cuts: dict[str, tuple[tuple[int, int], Index]] = {}
+    cuts: Cuts = {}
     inner = faces.count[faces.of_cell] == 2
     for i, j in combinations(range(len(names)), 2):
         both = [np.unique(faces.of_cell[piece == k][inner[piece == k]]) for k in (i, j)]
         shared = np.intersect1d(*both)
         if shared.size:
             of_first = np.isin(faces.of_cell, shared) & (piece == i)[:, None]
-            name = f"cut {i + 1}" if axis is not None else f"{names[i]}-{names[j]}"
+            name = f"cut {i + 1}" if normal is not None else f"{names[i]}-{names[j]}"
             cuts[name] = (i, j), rows[of_first]
     if double := sorted(set(cuts) & set(mesh.facets)):
-        raise TagError(f"surface {named(double)} has the name of a cut.",
-                       hint="Give it another one.")  # fmt: skip
-    if axis is not None:
-        _refuse_rough(mesh, cuts, np.asarray(axis, dtype=float))
+        text = f"surface {named(double)} has the name of a cut."
+        raise TagError(text, hint="Give it another one.")
+    if normal is not None:
+        _refuse_rough(mesh, cuts, normal)
     found = {name: _piece(mesh, piece, k, cuts, name) for k, name in enumerate(names)}
     for cut_name, ((i, j), _) in cuts.items():
         doubled = set(found[names[i]].facets) & set(found[names[j]].facets) & set(mesh.facets)
         if doubled:
-            raise TagError(f"surface {named(sorted(doubled))} lies on {cut_name!r}.",
-                           hint="Leave it without a name: the cut has one.")  # fmt: skip
+            text = f"surface {named(sorted(doubled))} lies on {cut_name!r}."
+            raise TagError(text, hint="Leave it without a name: the cut has one.")
     return found
 
 
-def _by_planes(mesh: SolidMesh, n: int | None, axis: Any) -> tuple[Index, list[str]]:
+def _by_planes(mesh: SolidMesh, n: int, a: Array) -> tuple[Index, list[str]]:
     """The piece of each cell by its middle, and the names of the pieces."""
-    a = finite("axis", axis, (3,))
-    if n is None or not a.any():
-        raise _nothing_to_cut(n, axis)
-    whole("n", n, 2, reason="one piece is the whole body")
     along = mesh.points @ (a / np.linalg.norm(a))
     middle = along[mesh.corners].mean(axis=1)
     low, high = along.min(), along.max()
@@ -77,10 +87,8 @@ def _by_planes(mesh: SolidMesh, n: int | None, axis: Any) -> tuple[Index, list[s
     return piece, [str(k + 1) for k in range(n)]
 
 
-def _by_regions(mesh: SolidMesh, n: int | None) -> tuple[Index, list[str]]:
+def _by_regions(mesh: SolidMesh) -> tuple[Index, list[str]]:
     """The piece of each cell is its region."""
-    if n is not None:
-        raise _nothing_to_cut(n, None)
     tags = sorted(mesh.region_names)
     if len(tags) < 2:
         raise TagError(
@@ -90,14 +98,7 @@ def _by_regions(mesh: SolidMesh, n: int | None) -> tuple[Index, list[str]]:
     return np.searchsorted(tags, mesh.regions), [mesh.region_names[tag] for tag in tags]
 
 
-def _nothing_to_cut(n: Any, axis: Any) -> ConfigError:
-    return ConfigError(
-        f"n = {n!r} and axis = {axis!r} say no cuts.",
-        hint="Give both, as n=4, axis=(1, 0, 0), or neither to make a piece of each region.",
-    )
-
-
-def _refuse_rough(mesh: SolidMesh, cuts: Any, axis: Array) -> None:
+def _refuse_rough(mesh: SolidMesh, cuts: Cuts, axis: Array) -> None:
     """Say where the faces between two pieces do not lie in a plane."""
     along = mesh.points @ (axis / np.linalg.norm(axis))
     for name, (_, rows) in cuts.items():
@@ -111,7 +112,7 @@ def _refuse_rough(mesh: SolidMesh, cuts: Any, axis: Array) -> None:
             )
 
 
-def _piece(mesh: SolidMesh, piece: Index, k: int, cuts: Any, name: str) -> SolidMesh:
+def _piece(mesh: SolidMesh, piece: Index, k: int, cuts: Cuts, name: str) -> SolidMesh:
     """The cells of one piece, with the surfaces that it has."""
     own = piece == k
     outer = {key: rows for key, (pair, rows) in cuts.items() if k in pair}
@@ -131,7 +132,7 @@ def _piece(mesh: SolidMesh, piece: Index, k: int, cuts: Any, name: str) -> Solid
     )
 
 
-def _named_facets(mesh: SolidMesh, own: Any, name: str) -> dict[str, Index]:
+def _named_facets(mesh: SolidMesh, own: Mask, name: str) -> dict[str, Index]:
     """Those surfaces of the mesh that are faces of the cells of one piece."""
     kind, n = mesh.kind, len(mesh.points)
     listed = mesh.corners[own][:, np.array(kind.faces)].reshape(-1, kind.corners_per_face)

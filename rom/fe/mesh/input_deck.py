@@ -6,34 +6,31 @@ number.
 """
 
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
-from rom.arguments import one_of
-from rom.errors import ConfigError, InterfaceError, MeshError, TagError
+from rom.arguments import one_of, whole
+from rom.errors import InterfaceError, MeshError, TagError
 from rom.fe.mesh.cell_types import CELL_TYPES, DECK_EDGES
 from rom.fe.mesh.solid import SolidMesh
 from rom.fe.mesh.sources.abaqus import SIDES
 from rom.fe.mesh.topology import row_ids
-from rom.model import Index, Orthotropic
+from rom.model import Index, Material, Orthotropic
 from rom.names import ORIGIN_MARK, check_known
 
-STEPS = {
-    "frequencies": "*FREQUENCY\n{n}",
-    "matrices": "*FREQUENCY, SOLVER=MATRIXSTORAGE",
-}
+STEPS = {"frequencies": "*FREQUENCY\n{n}", "matrices": "*FREQUENCY, SOLVER=MATRIXSTORAGE"}
 ELEMENTS = {"tet4": "C3D4", "tet10": "C3D10"}
 NAME_PATTERN = re.compile(r"[A-Za-z][\w.-]{0,79}", re.ASCII)
+Materials = Material | Orthotropic | Mapping[str, Material | Orthotropic]
 PER_LINE = 8  # numbers
 
 
 def input_deck(
     mesh: SolidMesh,
     *,
-    material: Any = None,
+    material: Materials | None = None,
     degree: int = 2,
     fixed: Sequence[str] = (),
     step: str = "frequencies",
@@ -78,8 +75,7 @@ def _of_degree(mesh: SolidMesh, degree: int) -> SolidMesh:
             f"cells of the type {mesh.cell_type} have other shape functions there.",
             hint="Mesh with tetrahedra.",
         )
-    if degree not in (1, 2):
-        raise ConfigError(f"degree = {degree!r}; decks have elements of degree 1 or 2.")
+    whole("degree", degree, 1, 2, reason="decks have such elements")
     if degree == 1 and mesh.cell_type == "tet10":
         raise MeshError("the mesh has curved edges, which need degree=2.")
     return _with_edges(mesh) if degree == 2 and mesh.cell_type == "tet4" else mesh
@@ -111,11 +107,10 @@ def _elements(mesh: SolidMesh) -> Iterator[str]:
 
 
 def _interfaces(mesh: SolidMesh) -> Iterator[str]:
-    sides = np.array(SIDES[4])
-    on_side = [[k for k, s in enumerate(mesh.kind.supports) if set(s) <= set(side)]
-               for side in SIDES[4]]  # fmt: skip
+    sides, supports = SIDES[4], mesh.kind.supports
+    on_side = [[k for k, s in enumerate(supports) if set(s) <= set(side)] for side in sides]
     for name, facets in mesh.facets.items():
-        cell, side = _owners(mesh, facets[:, :3], sides)
+        cell, side = _owners(mesh, facets[:, :3], np.array(sides))
         nodes = np.unique(mesh.cells[cell[:, None], np.array(on_side)[side]]) + 1
         yield f"*NSET, NSET={name}"
         for k in range(0, nodes.size, PER_LINE):
@@ -133,7 +128,7 @@ def _owners(mesh: SolidMesh, facets: Index, sides: Index) -> tuple[Index, Index]
     return place // len(sides), place % len(sides)
 
 
-def _materials(mesh: SolidMesh, material: Any) -> Iterator[str]:
+def _materials(mesh: SolidMesh, material: Materials) -> Iterator[str]:
     from rom.fe.forms.material import by_region
 
     solids = by_region(material, {name: tag for tag, name in mesh.region_names.items()})
@@ -143,19 +138,14 @@ def _materials(mesh: SolidMesh, material: Any) -> Iterator[str]:
         if isinstance(solid, Orthotropic):
             axes = np.asarray(solid.axes, dtype=np.float64)[:2].ravel()
             turned = f", ORIENTATION={name}"
-            yield from _orthotropic(solid)
+            first, last = (*solid.E, *solid.nu, *solid.G[:2]), solid.G[2:]
+            yield f"*ELASTIC, TYPE=ENGINEERING CONSTANTS\n{_numbers(first)}\n{_numbers(last)}"
         else:
             yield f"*ELASTIC\n{_numbers((solid.E, solid.nu))}"
         yield f"*DENSITY\n{_numbers((solid.rho,))}"
         if turned:
             yield f"*ORIENTATION, NAME={name}, SYSTEM=RECTANGULAR\n{_numbers(axes)}"
         yield f"*SOLID SECTION, ELSET={name}, MATERIAL={name}{turned}"
-
-
-def _orthotropic(solid: Orthotropic) -> Iterator[str]:
-    yield "*ELASTIC, TYPE=ENGINEERING CONSTANTS"
-    yield _numbers((*solid.E, *solid.nu, *solid.G[:2]))
-    yield _numbers(solid.G[2:])
 
 
 def _step(fixed: Sequence[str], kind: str) -> Iterator[str]:

@@ -10,16 +10,16 @@
 """
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from numbers import Integral, Real
-from typing import Any
 
 import numpy as np
 
 from rom.errors import ConfigError
 
 EVERY_FACE = "every"  # in place of a pick: names all faces without a name by their numbers
+KINDS_OF_LISTS = {3: "point", 6: "box"}
 WORDS = {"radius": 1, "normal": 3}  # and how many numbers follow
 PLUS_PATTERN = re.compile(r"(?<![eE])\+")  # joins picks; 1e+3 is one number
 GRAMMAR_HINT = (
@@ -43,7 +43,7 @@ class Pick:
     text: str
 
 
-def picks(wanted: Any) -> tuple[Pick, ...]:
+def picks(wanted: object) -> tuple[Pick, ...]:
     """What a face is picked by.
 
     Args:
@@ -53,7 +53,7 @@ def picks(wanted: Any) -> tuple[Pick, ...]:
         ConfigError: if it is none of them.
     """
     if isinstance(wanted, str):
-        return tuple(_of_text(part, wanted) for part in PLUS_PATTERN.split(wanted))
+        return tuple(_of_text(part.strip(), wanted) for part in PLUS_PATTERN.split(wanted))
     if isinstance(wanted, np.ndarray):
         wanted = wanted.tolist()
     if isinstance(wanted, Integral) and not isinstance(wanted, bool):
@@ -70,7 +70,6 @@ def is_pick(text: str) -> bool:
 
 
 def _of_text(part: str, whole: str) -> Pick:
-    part = part.strip()
     word, colon, numbers = part.partition(":")
     if part.isdecimal():
         return _number(int(part))
@@ -80,8 +79,13 @@ def _of_text(part: str, whole: str) -> Pick:
         why = f" ({part!r} has no meaning)" if part != whole else ""
         if size == 3 and values:
             why = f": {part!r} is not three numbers with commas, as in 0,0,1"
-        raise ConfigError(f"{whole!r} is no face{why}.", hint=GRAMMAR_HINT)
-    return _checked(Pick(kind, values, part))
+    elif kind == "radius" and not values[0] > 0:
+        why = ": its radius must be positive [m]"
+    elif kind == "normal" and not any(values):
+        why = ": a normal needs a direction, such as 0,0,1"
+    else:
+        return Pick(kind, values, part)
+    raise ConfigError(f"{whole!r} is no face{why}.", hint=GRAMMAR_HINT)
 
 
 def _floats(text: str) -> tuple[float, ...]:
@@ -97,26 +101,20 @@ def _number(number: int) -> Pick:
     return Pick("number", (number,), str(number))
 
 
-def _checked(pick: Pick) -> Pick:
-    if pick.kind == "radius" and not pick.values[0] > 0:
-        raise ConfigError(f"{pick.text!r} is no face: its radius must be positive [m].")
-    if pick.kind == "normal" and not any(pick.values):
-        raise ConfigError(f"{pick.text!r} is no face: a normal needs a direction, such as 0,0,1.")
-    return pick
-
-
-def _of_list(wanted: list[Any] | tuple[Any, ...]) -> Iterator[Pick]:
+def _of_list(wanted: Sequence[object]) -> Iterator[Pick]:
     """Three numbers are a point and six a box; other lists hold picks."""
-    plain = all(isinstance(x, Real) and not isinstance(x, bool) for x in wanted)
-    if plain and len(wanted) in (3, 6):
-        text = ",".join(f"{x:g}" for x in wanted)
-        if not all(abs(x) < float("inf") for x in wanted):
-            raise ConfigError(f"{text} is no face: its numbers are not finite.", hint=GRAMMAR_HINT)
-        yield Pick("point" if len(wanted) == 3 else "box", tuple(map(float, wanted)), text)
+    numbers = [x for x in wanted if isinstance(x, Real) and not isinstance(x, bool)]
+    plain = len(numbers) == len(wanted)
+    if plain and not all(x - x == 0 for x in numbers):
+        why = "its numbers are not finite"
+    elif plain and len(numbers) in KINDS_OF_LISTS:
+        text = ",".join(f"{x:g}" for x in numbers)
+        yield Pick(KINDS_OF_LISTS[len(numbers)], tuple(map(float, numbers)), text)
         return
-    if not wanted or (plain and not all(isinstance(x, Integral) for x in wanted)):
-        raise ConfigError(
-            f"{wanted!r} is no face: a point has 3 numbers, a box 6.", hint=GRAMMAR_HINT
-        )
-    for one in wanted:
-        yield from picks(one)
+    elif wanted and not (plain and any(not isinstance(x, Integral) for x in wanted)):
+        for one in wanted:
+            yield from picks(one)
+        return
+    else:
+        why = "a point has 3 numbers, a box 6"
+    raise ConfigError(f"{wanted!r} is no face: {why}.", hint=GRAMMAR_HINT)

@@ -21,11 +21,7 @@ BLOCK_SIZE = 20_000  # cells looked at together, bounds the memory
 
 
 def check_shape(mesh: SolidMesh) -> list[str]:
-    """Refuse cells without volume and inverted ones, warn about slender ones.
-
-    Raises:
-        MeshError: with the numbers of the cells and the worst quality.
-    """
+    """Refuse cells without volume and inverted ones by a MeshError, warn about slender ones."""
     quality, sampled = scaled_jacobian(mesh), _sampled(mesh) / _longest_edge(mesh) ** 3
     refuse_cells(
         mesh,
@@ -69,15 +65,11 @@ def scaled_jacobian(mesh: SolidMesh) -> Array:
 
 
 def straighten(mesh: SolidMesh) -> tuple[SolidMesh, list[str]]:
-    """Straighter edges where curved ones would turn a cell inside out.
+    """The mesh with straighter edges where curved ones would turn a cell inside out, and remarks.
 
     A tetrahedron with two faces on one smooth surface has no angle between them once both follow
     it. Its nodes go back towards the straight cell, no further than needed. For meshes made from a
-    geometry; in a finished mesh inverted cells are an error.
-
-    Returns:
-        The mesh, with the numbers of curved and straightened cells in its provenance, and a remark
-        where they are many.
+    geometry; in a finished mesh inverted cells are an error. Counts stand in the provenance.
     """
     if mesh.kind.degree == 1:
         return mesh, []

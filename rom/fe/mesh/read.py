@@ -6,14 +6,14 @@ can crash.
 """
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rom.arguments import typed
+from rom.arguments import positive, typed
 from rom.decks import bulk, keywords
 from rom.decks.lines import lines
 from rom.errors import (
@@ -31,11 +31,18 @@ from rom.fe.mesh.curving import without_middles
 from rom.fe.mesh.picks import EVERY_FACE, picks
 from rom.fe.mesh.quality import straighten
 from rom.fe.mesh.repair import repair
-from rom.fe.mesh.solid import GEOMETRIES, PROGRAMS, Arrays, SolidMesh
+from rom.fe.mesh.solid import GEOMETRIES, PROGRAMS, Arrays, Notes, Request, SolidMesh
 from rom.fe.mesh.validate import checked
 from rom.model import Array, Index
 from rom.names import check_known, check_text
 from rom.readable import check_readable
+
+if TYPE_CHECKING:
+    from mpi4py import MPI
+
+    from dolfinx.mesh import Mesh
+
+    from rom.fe.compat import MeshTags
 
 INCLUDES = {"abaqus": keywords.INCLUDE_PATTERN, "nastran": bulk.INCLUDE_PATTERN}
 LARGEST_FILE = 2**32  # bytes; some ten million nodes
@@ -106,10 +113,9 @@ def read_mesh(  # noqa: PLR0913  limits and trust beside what is read
     files = {path}  # a deck may include others
     if reader in INCLUDES:
         files |= {place[0] for place, _ in lines(path, INCLUDES[reader])}
-    arrays, notes = read_apart(
-        request, where=str(path), size=sum(file.stat().st_size for file in files),
-        time_limit=time_limit, memory_limit=memory_limit,
-    )  # fmt: skip
+    size = sum(file.stat().st_size for file in files)
+    limits = {"time_limit": time_limit, "memory_limit": memory_limit}
+    arrays, notes = read_apart(request, where=str(path), size=size, **limits)
     provenance = {
         "path": str(path),
         "sha256": _digest(*sorted(files)),
@@ -143,7 +149,7 @@ class FlatMesh:
     triangles: Index
     curves: dict[str, Index]
     surfaces: dict[str, Index]
-    provenance: dict[str, Any]
+    provenance: Notes
 
     def nodes(self, name: str) -> Index:
         """(k,) nodes of a physical curve.
@@ -192,9 +198,9 @@ def read_triangles(
     X, T = arrays["points"][:, :2] * scale, arrays["cells"]
     u, v = X[T[:, 1]] - X[T[:, 0]], X[T[:, 2]] - X[T[:, 0]]
     T = np.where((u[:, 0] * v[:, 1] < u[:, 1] * v[:, 0])[:, None], T[:, ::-1], T)
-    curves = {name: _with_solid_on_left(arrays[f"facets {i}"], T)
-              for i, name in enumerate(notes["facet_names"])}  # fmt: skip
-    surfaces = {name: arrays[f"surface {i}"] for i, name in enumerate(notes["surface_names"])}
+    sides = _tables(arrays, "facets", notes["facet_names"])
+    curves = {name: _with_solid_on_left(rows, T) for name, rows in sides.items()}
+    surfaces = _tables(arrays, "surface", notes["surface_names"])
     return FlatMesh(X, T, curves, surfaces, provenance | notes["provenance"])
 
 
@@ -213,7 +219,9 @@ def _scaled_twice(size: float, scale: float) -> str:
     )
 
 
-def to_dolfinx(mesh: SolidMesh | None, comm: Any) -> tuple[Any, Any, dict[str, Any]]:
+def to_dolfinx(
+    mesh: SolidMesh | None, comm: "MPI.Comm"
+) -> "tuple[Mesh, MeshTags, dict[str, MeshTags]]":
     """Share a mesh among the ranks.
 
     Args:
@@ -256,16 +264,14 @@ def to_dolfinx(mesh: SolidMesh | None, comm: Any) -> tuple[Any, Any, dict[str, A
     return made, cell_tags, facet_tags
 
 
-def _solid(
-    arrays: Arrays, notes: dict[str, Any], provenance: dict[str, Any], scale: float
-) -> SolidMesh:
+def _solid(arrays: Arrays, notes: Notes, provenance: Notes, scale: float) -> SolidMesh:
     return SolidMesh(
         points=arrays["points"] * scale,
         cells=arrays["cells"],
         cell_type=notes["cell_type"],
         regions=arrays["regions"],
         region_names={int(tag): name for tag, name in notes["region_names"].items()},
-        facets={name: arrays[f"facets {i}"] for i, name in enumerate(notes["facet_names"])},
+        facets=_tables(arrays, "facets", notes["facet_names"]),
         provenance=provenance,
         cell_ids=arrays["cell_ids"],
         axes={
@@ -276,6 +282,11 @@ def _solid(
     )
 
 
+def _tables(arrays: Arrays, kind: str, names: Sequence[str]) -> dict[str, Index]:
+    """The arrays of one kind, by their names in the notes."""
+    return {name: arrays[f"{kind} {i}"] for i, name in enumerate(names)}
+
+
 def _request(
     path: Path,
     parameters: Mapping[str, Any] | None,
@@ -284,13 +295,13 @@ def _request(
     trust: bool,
     faces: Mapping[str, Any] | None = None,
     order: int | None = None,
-) -> dict[str, Any]:
+) -> Request:
     """What is asked of the reader of a file, checked."""
     check_readable(path, LARGEST_FILE)
     reader = READERS.get(path.suffix.lower())
     if reader is None:
         raise ConfigError(f"no reader for the suffix {path.suffix!r}; known are {sorted(READERS)}.")
-    request = {
+    request: Request = {
         "path": str(path.absolute()),
         "reader": reader,
         "parameters": dict(parameters or {}),
@@ -311,30 +322,28 @@ def is_geometry(path: str | Path) -> bool:
     return READERS.get(Path(path).suffix.lower()) in GEOMETRIES
 
 
-def _check_request(request: dict[str, Any], scale: float) -> None:
-    reader = request["reader"]
-    if request["parameters"] and reader not in GEOMETRIES:
-        raise ConfigError(
-            f"a finished mesh takes no parameters, got {sorted(request['parameters'])}."
-        )
-    if request["faces"] and reader != "step":
-        raise ConfigError(
-            f"faces={sorted(request['faces'])} can be picked in a .step file only.",
-            hint="Name physical surfaces in the geometry instead.",
-        )
-    for name, wanted in request["faces"].items():
+def _check_request(request: Request, scale: float) -> None:
+    reader, faces, order = request["reader"], request["faces"], request["order"]
+    given, finished = sorted(request["parameters"]), reader not in GEOMETRIES
+    picked = f"faces={sorted(faces)} can be picked in a .step file only"
+    for wrong, text in (
+        (given and finished, f"a finished mesh takes no parameters, got {given}."),
+        (faces and reader != "step", f"{picked}; name physical surfaces in the geometry instead."),
+        (
+            order not in (None, 1, 2) or (order and finished),
+            f"order={order!r} must be 1 or 2, or None where the file is a mesh.",
+        ),
+    ):
+        if wrong:
+            raise ConfigError(text)
+    positive("scale", scale)
+    for name, wanted in faces.items():
         check_text(name, "a surface", TagError)
         try:
             if not (isinstance(wanted, str) and wanted == EVERY_FACE):
                 picks(wanted)
         except ConfigError as error:
             raise ConfigError(f"face {name!r}: {error.message}", hint=error.hint) from None
-    if request["order"] not in (None, 1, 2) or (request["order"] and reader not in GEOMETRIES):
-        raise ConfigError(
-            f"order={request['order']!r} must be 1 or 2, or None where the file is a mesh."
-        )
-    if not (np.isscalar(scale) and np.isfinite(scale) and scale > 0):
-        raise ConfigError(f"scale={scale!r} must be a positive number.")
 
 
 def _digest(*files: Path) -> str:

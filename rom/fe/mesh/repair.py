@@ -17,11 +17,8 @@ FACE_CORNER, FACE_EDGE, CELL_CORNER, CELL_EDGE = -0.25, 0.5, -0.25, 0.25
 def repair(mesh: SolidMesh) -> SolidMesh:
     """Complete 20-node hexahedra, turn mirrored cells round, drop unused nodes and facet copies.
 
-    A mesh with node numbers out of range or numbers that are not finite comes back unchanged; the
-    checks of `rom.fe.mesh.validate.validate` name the culprit.
-
-    Returns:
-        A mesh of the same body. Renumbers the nodes.
+    Renumbers the nodes. A mesh with node numbers out of range or numbers that are not finite comes
+    back unchanged; the checks of `rom.fe.mesh.validate.validate` name the culprit.
     """
     n = mesh.points.shape[0]
     rows = (mesh.cells, *mesh.facets.values())

@@ -1,8 +1,8 @@
 """The record of a solid mesh: plain NumPy arrays, on one process."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, NotRequired, TypedDict
 
 import numpy as np
 import numpy.typing as npt
@@ -13,6 +13,12 @@ from rom.fe.mesh.cell_types import READ_TYPES, CellType
 from rom.model import Array, Index, Integers, Mask
 
 MAX_SHOWN = 5  # culprits named in a message
+GEOMETRIES = ("geo", "builder", "step")  # readers that make a mesh
+PROGRAMS = ("builder",)  # can do what a user can: run only with trust, and then without limits
+Arrays = dict[str, npt.NDArray[Any]]
+Notes = dict[str, Any]  # what fits into JSON, by name
+Read = tuple[Arrays, Notes]
+Made = tuple[Notes, Notes]  # parameters used, defaults of some of them
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +46,7 @@ class SolidMesh:
     regions: Index
     region_names: dict[int, str]
     facets: dict[str, Index]
-    provenance: dict[str, Any] = field(default_factory=dict)
+    provenance: Notes = field(default_factory=dict)
     cell_ids: Index | None = None
     warnings: tuple[str, ...] | None = None
     axes: dict[str, Axis] = field(default_factory=dict)
@@ -79,7 +85,7 @@ def cell_names(mesh: SolidMesh, cells: Index) -> str:
     return shown(cells if mesh.cell_ids is None else mesh.cell_ids[cells])
 
 
-def shown(some: Any) -> str:
+def shown(some: Sequence[object] | Index) -> str:
     """The first few of some things, for messages."""
     return ", ".join(map(str, some[:MAX_SHOWN])) + (", ..." if len(some) > MAX_SHOWN else "")
 
@@ -91,13 +97,16 @@ def refuse_cells(mesh: SolidMesh, bad: Mask, text: Callable[[int], str], hint: s
         raise MeshError(f"{text(cells.size)}: cells {cell_names(mesh, cells)}.", hint=hint)
 
 
-Arrays = dict[str, npt.NDArray[Any]]
+class Request(TypedDict):
+    """What is asked of a reader, in what fits into JSON."""
 
-
-Read = tuple[Arrays, dict[str, Any]]  # arrays and notes
-GEOMETRIES = ("geo", "builder", "step")  # readers that make a mesh
-PROGRAMS = ("builder",)  # can do what a user can: run only with trust, and then without limits
-Made = tuple[dict[str, Any], dict[str, Any]]  # parameters used, defaults of some of them
+    path: str
+    reader: str
+    parameters: Notes
+    faces: Notes
+    order: int | None
+    flat: NotRequired[bool]  # triangles of a plane section
+    folder: NotRequired[str]  # of the process that reads
 
 
 def packed(
@@ -108,7 +117,11 @@ def packed(
     cell_ids: Integers,
     **notes: Any,
 ) -> Read:
-    """Arrays and notes in the form of `read`; ``facets`` and ``region_names`` among the notes."""
+    """Arrays "points", "cells", "regions", "cell_ids", "facets 0", ..., and notes on them.
+
+    Given are ``facets``, ``region_names``, ``warnings`` and mostly ``provenance`` as notes; noted
+    are the names of facets, in their order, and the type of the cells.
+    """
     facets = notes.pop("facets")
     arrays: Arrays = {
         "points": np.asarray(points, dtype=float),

@@ -1,14 +1,13 @@
 """What a mesh holds, in numbers."""
 
 from dataclasses import asdict
-from typing import Any
 
 import numpy as np
 
 from rom.fe.mesh.cad import Axis
 from rom.fe.mesh.cell_types import DECK_EDGES, jacobians
 from rom.fe.mesh.quality import aspect_ratio, scaled_jacobian
-from rom.fe.mesh.solid import SolidMesh
+from rom.fe.mesh.solid import Notes, SolidMesh
 from rom.fe.mesh.topology import faces_of, row_ids
 from rom.model import Array, Index
 
@@ -17,7 +16,7 @@ VTK_TYPES = {"tet4": 10, "tet10": 24, "hex8": 12, "hex27": 29}
 VTK_HEX_FACES = ((0, 3, 4, 7), (1, 2, 5, 6), (0, 1, 4, 5), (2, 3, 6, 7), (0, 1, 2, 3), (4, 5, 6, 7))
 
 
-def summary(mesh: SolidMesh) -> dict[str, Any]:
+def summary(mesh: SolidMesh) -> Notes:
     """Sizes, regions, interfaces and quality of a mesh, in plain Python."""
     volumes = cell_volumes(mesh)
     return {
@@ -96,7 +95,7 @@ def _edge_middles(mesh: SolidMesh, edges: Index) -> Index:
     return found
 
 
-def _axis(axis: Axis | None) -> dict[str, Any]:
+def _axis(axis: Axis | None) -> Notes:
     """Where a joint on this interface sits, if the CAD knows an axis."""
     return {"axis": list(axis.direction), "point": list(axis.point)} if axis else {}
 
@@ -115,7 +114,7 @@ def cell_volumes(mesh: SolidMesh) -> Array:
 
 def vtk_cells(mesh: SolidMesh) -> tuple[Index, int]:
     """(m, k) node numbers in VTK's order, and VTK's number of the cell."""
-    more = {"tet10": DECK_EDGES["tet10"],
-            "hex27": (*DECK_EDGES["hex20"], *VTK_HEX_FACES, tuple(range(8)))}  # fmt: skip
+    in_bricks = (*DECK_EDGES["hex20"], *VTK_HEX_FACES, tuple(range(8)))
+    more = {"tet10": DECK_EDGES["tet10"], "hex27": in_bricks}
     order = mesh.kind.among(more.get(mesh.cell_type, ()))
     return np.hstack([mesh.corners, mesh.cells[:, list(order)]]), VTK_TYPES[mesh.cell_type]

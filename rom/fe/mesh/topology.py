@@ -29,15 +29,7 @@ class Faces:
 
 
 def row_ids(rows: Index, n: int) -> tuple[Index, int]:
-    """Equal rows get equal numbers.
-
-    Args:
-        rows: (k, c) integers in [0, n).
-        n: upper bound of the entries.
-
-    Returns:
-        (k,) numbers 0, 1, ... of the distinct rows, and how many there are.
-    """
+    """(k,) numbers 0, 1, ... of the distinct rows (k, c) of integers in [0, n), and how many."""
     key, size = rows[:, 0].astype(np.int64), max(n, 1)
     for column in rows.T[1:]:
         if size > 2**62 // max(n, 1):  # the combined key would leave 64 bits

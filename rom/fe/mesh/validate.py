@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial import cKDTree
 
+from rom.arguments import one_of
 from rom.errors import MeshError, TagError, in_file, warn
 from rom.fe.mesh.cell_types import CELL_TYPES
 from rom.fe.mesh.quality import check_shape
@@ -49,8 +50,7 @@ def validate(mesh: SolidMesh) -> list[str]:
 
 
 def _check_tables(mesh: SolidMesh) -> None:
-    if mesh.cell_type not in CELL_TYPES:
-        raise MeshError(f"{mesh.cell_type!r} is no type of cells; known are {sorted(CELL_TYPES)}.")
+    one_of("the type of cells", mesh.cell_type, CELL_TYPES, error=MeshError)
     kind, m = mesh.kind, mesh.cells.shape[0]
     if not m:
         raise MeshError("there are no volume cells; mesh in 3D, or give the .geo or .step file.")
@@ -132,18 +132,16 @@ def _check_connected(mesh: SolidMesh, faces: Faces) -> None:
     n_loose = parts_by_node(mesh.corners)[0]
     sizes = shown(np.sort(np.bincount(part))[::-1])
     if n_loose == 1:
-        raise MeshError(
-            f"the mesh has {n_parts} parts ({sizes} cells) that meet only in an edge or a point: "
-            "they would move against each other like a hinge.",
-            hint="Let the parts share faces.",
+        why, hint = "meet only in an edge or a point, like a hinge", "Let the parts share faces."
+    else:
+        same = _coincident_nodes(mesh, faces)
+        what = f"{same} nodes of them lie on nodes of others" if same else "they do not touch"
+        why, n_parts = f"are not connected; {what}", n_loose
+        hint = (
+            "One model is one body: fragment the volumes (BooleanFragments, Coherence) or merge "
+            "doubled nodes before meshing, or make a model of each part."
         )
-    same = _coincident_nodes(mesh, faces)
-    what = f"{same} nodes of them lie on nodes of others" if same else "they do not touch"
-    raise MeshError(
-        f"the mesh has {n_loose} parts ({sizes} cells) that are not connected; {what}.",
-        hint="One model is one body: fragment the volumes (BooleanFragments, Coherence) or merge "
-        "doubled nodes before meshing, or make a model of each part.",
-    )
+    raise MeshError(f"the mesh has {n_parts} parts ({sizes} cells) that {why}.", hint=hint)
 
 
 def _coincident_nodes(mesh: SolidMesh, faces: Faces) -> int:
@@ -193,24 +191,23 @@ def _check_names(mesh: SolidMesh) -> None:
 
 def _check_regions(mesh: SolidMesh) -> None:
     used = {int(r) for r in np.unique(mesh.regions)}
-    if nameless := sorted(used - mesh.region_names.keys()):
-        raise TagError(f"region {named(nameless)} has cells and needs a name in region_names.")
-    if unused := sorted(name for tag, name in mesh.region_names.items() if tag not in used):
-        raise TagError(f"region {named(unused)} needs cells; leave the name out without.")
     names = list(mesh.region_names.values())
-    if double := sorted({name for name in names if names.count(name) > 1}):
-        raise TagError(f"the name {named(double)} stands for several regions; each needs its own.")
+    nameless = sorted(used - mesh.region_names.keys())
+    unused = sorted(name for tag, name in mesh.region_names.items() if tag not in used)
+    double = sorted({name for name in names if names.count(name) > 1})
+    for some, text in (
+        (nameless, "region {} has cells and needs a name in region_names."),
+        (unused, "region {} needs cells; leave the name out without."),
+        (double, "the name {} stands for several regions; each needs its own."),
+    ):
+        if some:
+            raise TagError(text.format(named(some)))
 
 
 def checked(mesh: SolidMesh, remarks: Sequence[str] = ()) -> SolidMesh:
     """Repair and validate a mesh, e.g. one made by hand; issues its warnings as `RomWarning`.
 
-    Args:
-        mesh: as read or made.
-        remarks: warnings of the reader.
-
-    Raises:
-        MeshError, TagError: see `rom.fe.mesh.validate.validate`.
+    Remarks are warnings of the reader; errors those of `validate`.
     """
     where = str(mesh.provenance.get("path", ""))
     with in_file(where):

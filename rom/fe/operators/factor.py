@@ -15,13 +15,7 @@ from scipy.linalg import lu_factor, lu_solve
 from rom.errors import SolverError
 from rom.fe.compat import same_layout
 from rom.fe.operators.disk import DISK_ERRORS, disk_too_small, reserve_disk, watched
-from rom.fe.operators.foreseen import (
-    analysed,
-    by_mumps,
-    entry_count,
-    stored_entries,
-    too_large,
-)
+from rom.fe.operators.foreseen import analysed, by_mumps, entry_count, stored_entries, too_large
 from rom.fe.operators.memory import allowed_bytes, factor_bytes, give_back
 from rom.fe.operators.solver import DIRECT_SOLVER, Solver
 from rom.model import Array

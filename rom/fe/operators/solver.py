@@ -31,20 +31,18 @@ class Solver:
 
 
 DIRECT_SOLVER = Solver()
+ITERATIVE_SOLVER = Solver(iterative=True)
+WHOLE_WORDS = {
+    "direct": DIRECT_SOLVER,
+    "iterative": ITERATIVE_SOLVER,
+    "auto": Solver(automatic=True),
+}
 
 
 def parsed(text: str) -> Solver:
-    """The solver named in words.
-
-    Raises:
-        ConfigError: listing the words that are known.
-    """
-    if text == "direct":
-        return DIRECT_SOLVER
-    if text == "iterative":
-        return Solver(iterative=True)
-    if text == "auto":
-        return Solver(automatic=True)
+    """The solver named in words; a ConfigError lists those that are known."""
+    if text in WHOLE_WORDS:
+        return WHOLE_WORDS[text]
     low_rank, out_of_core = 0.0, False
     for word in str(text).split("+"):
         name, colon, number = word.partition(":")

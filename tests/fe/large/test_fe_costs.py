@@ -7,11 +7,7 @@ from rom.fe import costs
 from rom.fe.costs import factor_cost, least_machines, reduction_seconds
 
 # dofs, flops, entries, of beams of quadratic tetrahedra, by the analysis of MUMPS
-COUNTED = [
-    (11_256, 4.870e8, 2.157e6),
-    (29_286, 4.173e9, 9.269e6),
-    (100_995, 6.606e10, 6.061e7),
-]
+COUNTED = [(11_256, 4.870e8, 2.157e6), (29_286, 4.173e9, 9.269e6), (100_995, 6.606e10, 6.061e7)]
 NOT_FITTED = (1_067_634, 7.88e12, 1.756e9, 17.8e9)  # the same and the memory taken
 # dofs, seconds of the factorisation, of 18 solutions for eight columns, of the whole: one thread
 TIMED = [(29_286, 0.39, 0.43, 1.05), (100_995, 2.9, 2.4, 6.4), (299_967, 16.8, 10.3, 31.8)]

@@ -12,7 +12,7 @@ from cases.long import SHARED_BY, few
 from cases.operators import petsc_operators
 from cases.paths import RANKS
 from cases.ranks.environment import written_on
-from cases.solid import reduced
+from cases.solid import STEEL, reduced
 from rom.errors import ModesMissedError
 
 pytest.importorskip("dolfinx", reason="dolfinx is not installed")
@@ -25,7 +25,6 @@ from rom.fe.operators.iterative.gradients import ConjugateGradients  # noqa: E40
 from rom.fe.operators.iterative.search import BlockSearch  # noqa: E402
 from rom.reduction.full_model import operators  # noqa: E402
 
-STEEL = rom.Material(E=210e9, nu=0.3, rho=7850.0)
 EDGE = 8  # points of a cube's edge
 MASS = 2.0
 

@@ -6,6 +6,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from cases.files.cells import solid
 from cases.files.damage import damaged, outcome
+from cases.refusals import refuses
 from rom.errors import FileFormatError, MeshError, ResourceError, RomError, RomWarning, TagError
 from rom.fe.mesh import child
 from rom.fe.mesh.cell_types import CELL_TYPES
@@ -208,8 +209,7 @@ def test_broken_abaqus_deck_is_refused(tmp_path, fault):
 )
 def test_broken_nastran_deck_is_refused(tmp_path, text):
     (tmp_path / "deck.bdf").write_text(text)
-    with pytest.raises((FileFormatError, MeshError), match=r"deck\.bdf"):
-        read_mesh(tmp_path / "deck.bdf")
+    refuses((FileFormatError, MeshError), r"deck\.bdf", read_mesh, tmp_path / "deck.bdf")
 
 
 @pytest.mark.parametrize("ending", [".inp", ".bdf"])

@@ -16,6 +16,7 @@ from cases.files.step_parts import (
     step_plate,
 )
 from cases.paths import ROOT
+from cases.refusals import refuses
 from rom.errors import ConfigError, MeshError, TagError
 from rom.fe.mesh.picks import picks
 from rom.fe.mesh.read import read_mesh
@@ -174,8 +175,7 @@ REFUSED = {
 
 @pytest.mark.parametrize(("text", "said"), REFUSED.items())
 def test_what_is_not_there_is_refused_with_what_is(meshed, text, said):
-    with pytest.raises(TagError, match=said):
-        pick(meshed, {"a": text}, "plate.step")
+    refuses(TagError, said, pick, meshed, {"a": text}, "plate.step")
 
 
 def test_two_planes_of_one_normal_are_listed(tmp_path):

@@ -6,6 +6,7 @@ from dataclasses import asdict
 import numpy as np
 import pytest
 
+from cases.refusals import refuses
 from rom.errors import ConfigError
 from rom.fe.mesh.cad import Axis, Face, from_plain, scaled
 from rom.fe.mesh.picks import Pick, is_pick, picks
@@ -40,8 +41,7 @@ def test_python_picks_by_numbers_points_and_boxes():
      True, 1.5, None, [], [1.0, 2.0], [True, False], (np.nan, 0, 0), {"number": 3}],
 )  # fmt: skip
 def test_what_picks_nothing_is_refused(wrong):
-    with pytest.raises(ConfigError, match="is no face"):
-        picks(wrong)
+    refuses(ConfigError, "is no face", picks, wrong)
 
 
 @pytest.mark.parametrize("name", ["pin_a", "bolt 3", "a", "e", "Grund:oben"])

@@ -10,7 +10,8 @@ Source:
 """
 
 from dataclasses import dataclass, field
-from itertools import product
+from functools import partial
+from itertools import chain, product
 from pathlib import Path
 
 import numpy as np
@@ -33,8 +34,7 @@ from rom.model import Index
 from rom.names import is_whole, named
 
 SOLIDS = {4: "tet4", 10: "tet10", 8: "hex8", 20: "hex20"}
-SKIN_TYPES = ("S3", "S4", "S6", "S8", "STRI3", "STRI65", "M3D3", "M3D4", "M3D6", "M3D8", "SFM3D",
-              "CPS")  # fmt: skip
+SKIN_TYPES = tuple("S3 S4 S6 S8 STRI3 STRI65 M3D3 M3D4 M3D6 M3D8 SFM3D CPS".split())
 LINE_TYPES = ("T3D2", "T3D3")  # without a section, as gmsh writes curves
 MOST_GENERATED = 10_000_000  # elements by a row
 # corners of the faces S1, S2, ... of a cell
@@ -62,13 +62,7 @@ class Deck(Nodes):
 
 
 def read(path: str) -> Read:
-    """Read a deck; see `rom.fe.mesh.child.read`.
-
-    Raises:
-        FileFormatError: the deck is damaged, or has keywords whose mass or stiffness would be lost.
-        MeshError: no solid cells, or of several types.
-        TagError: an element in two sections, or in none.
-    """
+    """Read a deck, or refuse keywords whose mass or stiffness would be lost."""
     deck = Deck(Path(path))
     for block in deck.blocks():
         if block.keyword in MESH_KEYWORDS:
@@ -84,21 +78,16 @@ def read(path: str) -> Read:
     cells = to_gmsh(positions(node_ids, raw, "node"), cell_type)
     names, regions = _regions(deck, ids)
     facets, remarks = _facets(deck, ids, cells, cell_type, node_ids)
-    return packed(
-        points, cells, cell_type, regions, ids,
-        facets=facets,
-        region_names=names,
-        warnings=[*deck.aside.remark(), *remarks, *unused(node_ids, cells)],
-        provenance={"parameters": {}},
-    )  # fmt: skip
+    remarks = [*deck.aside.remark(), *remarks, *unused(node_ids, cells)]
+    told = {"region_names": names, "warnings": remarks, "provenance": {"parameters": {}}}
+    return packed(points, cells, cell_type, regions, ids, facets=facets, **told)
 
 
 def _element(deck: Deck, block: Block) -> None:
     kind = block.option("TYPE").upper()
     digits = "".join(c for c in kind.removeprefix("C3D") if c.isdigit())
     if kind.startswith((*SKIN_TYPES, *LINE_TYPES)):
-        rows = [[block.whole(r, k) for k, w in enumerate(row) if w]
-                for r, row in enumerate(block.rows)]  # fmt: skip
+        rows = _numbers(block)
         deck.cell_sets.add(block.options.get("ELSET", kind), [row[0] for row in rows])
         if kind in LINE_TYPES:
             deck.aside.add(f"*ELEMENT, TYPE={kind}", block.place)
@@ -111,10 +100,15 @@ def _element(deck: Deck, block: Block) -> None:
         deck.unread.add(f"*ELEMENT, TYPE={kind}", block.place)
 
 
+def _numbers(block: Block) -> list[list[int]]:
+    """The whole numbers of each line."""
+    rows = enumerate(block.rows)
+    return [[block.whole(r, k) for k, word in enumerate(row) if word] for r, row in rows]
+
+
 def _table(block: Block, width: int) -> list[list[int]]:
     """Element number and nodes of each element, which may run over several lines."""
-    numbers = [block.whole(r, k) for r, row in enumerate(block.rows)
-               for k, word in enumerate(row) if word]  # fmt: skip
+    numbers = list(chain.from_iterable(_numbers(block)))
     if len(numbers) % width:
         raise block.wrong(f"{len(numbers)} numbers are no multiple of {width}: a line is cut")
     return [numbers[k : k + width] for k in range(0, len(numbers), width)]
@@ -139,16 +133,15 @@ def _copies(deck: Deck, block: Block) -> None:
             raise block.wrong(f"element {master} is not defined", r)
         cell_type, nodes = deck.solids[master]
         # along each direction: how often, and steps of nodes and elements
-        given = [(block.whole(r, 1, 1), block.whole(r, 2, 1), block.whole(r, 3, 1)),
-                 *((block.whole(r, k, 1), block.whole(r, k + 1, 0), block.whole(r, k + 2, 0))
-                   for k in (4, 7))]  # fmt: skip
+        whole, fields = partial(block.whole, r), ((1, 1), (4, 0), (7, 0))
+        given = [(whole(k, 1), whole(k + 1, step), whole(k + 2, step)) for k, step in fields]
         counts = [n for n, _, _ in given]
         if min(counts) < 1 or np.prod(counts, dtype=float) > MOST_GENERATED:
             raise block.wrong(f"{counts} elements along its directions", r)
         steps = np.array(list(product(*map(range, counts))), dtype=np.int64)[1:]
         by_node, by_cell = (steps @ np.array([row[k] for row in given]) for k in (1, 2))
-        rows = [[master + c, *(n + node for node in nodes)]
-                for c, n in zip(by_cell.tolist(), by_node.tolist(), strict=True)]  # fmt: skip
+        shifts = zip(by_cell.tolist(), by_node.tolist(), strict=True)
+        rows = [[master + c, *(n + node for node in nodes)] for c, n in shifts]
         _new_cells(deck, block, cell_type, rows)
         if "ELSET" in block.options:
             deck.cell_sets.add(block.option("ELSET"), [master])
@@ -171,14 +164,13 @@ MESH_KEYWORDS: Table = {
                       ("ELSET", "MATERIAL", "ORIENTATION", "CONTROLS")),
     "SURFACE SECTION": (lambda deck, block: None, ("ELSET",)),  # without a density
 }  # fmt: skip
-HARMLESS_KEYWORDS = {  # materials are given here; output
-    "HEADING", "PREPRINT", "ASSEMBLY", "END ASSEMBLY", "MATERIAL", "ELASTIC", "DENSITY",
-    "EXPANSION", "CONDUCTIVITY", "SPECIFIC HEAT", "PLASTIC", "CYCLIC HARDENING", "CREEP",
-    "DAMPING", "HYPERELASTIC", "VISCOELASTIC", "DEPVAR", "USER MATERIAL", "ORIENTATION",
-    "TRANSFORM", "SECTION CONTROLS", "AMPLITUDE", "PHYSICAL CONSTANTS", "SURFACE INTERACTION",
-    "SURFACE BEHAVIOR", "FRICTION", "RESTART", "TIME POINTS", "NODE PRINT", "EL PRINT",
-    "NODE FILE", "EL FILE", "FILE FORMAT",
-}  # fmt: skip
+HARMLESS_KEYWORDS = set(  # materials are given here; output
+    "HEADING,PREPRINT,ASSEMBLY,END ASSEMBLY,MATERIAL,ELASTIC,DENSITY,EXPANSION,CONDUCTIVITY,"
+    "SPECIFIC HEAT,PLASTIC,CYCLIC HARDENING,CREEP,DAMPING,HYPERELASTIC,VISCOELASTIC,DEPVAR,"
+    "USER MATERIAL,ORIENTATION,TRANSFORM,SECTION CONTROLS,AMPLITUDE,PHYSICAL CONSTANTS,"
+    "SURFACE INTERACTION,SURFACE BEHAVIOR,FRICTION,RESTART,TIME POINTS,NODE PRINT,EL PRINT,"
+    "NODE FILE,EL FILE,FILE FORMAT".split(",")
+)
 LOAD_KEYWORDS = set("STEP,BOUNDARY,INITIAL CONDITIONS,CLOAD,DLOAD,DSLOAD,TEMPERATURE".split(","))
 
 
@@ -215,8 +207,8 @@ def _facets(
     n = node_ids.size
     outer = outer_facets(cells, cell_type, n)
     facets: dict[str, Index] = {}
-    sets = {name: deck.node_sets.of(key) for key, name in deck.node_sets.names.items()
-            if name not in deck.surfaces}  # fmt: skip
+    known = deck.node_sets.names.items()
+    sets = {name: deck.node_sets.of(key) for key, name in known if name not in deck.surfaces}
     for name, (kind, rows) in deck.surfaces.items():
         if kind == "NODE":
             sets[name] = np.concatenate([_members(deck.node_sets, row[0]) for row in rows])

@@ -3,18 +3,17 @@
 import inspect
 import sys
 import traceback
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from importlib.machinery import SourceFileLoader
 from pathlib import Path
 from types import ModuleType
-from typing import Any
 
 from rom.errors import ConfigError, FileFormatError, MeshError, RomError
-from rom.fe.mesh.solid import Made
+from rom.fe.mesh.solid import Made, Notes, Request
 from rom.names import named
 
 
-def make(gmsh: Any, path: Path, request: dict[str, Any]) -> Made:
+def make(gmsh: ModuleType, path: Path, request: Request) -> Made:
     """Call ``build(gmsh, **parameters)`` of the file; the parameters used, and their defaults."""
     build = getattr(_load(path), "build", None)
     if not callable(build):
@@ -50,12 +49,11 @@ def _load(path: Path) -> ModuleType:
     return module
 
 
-def _arguments(build: Any, given: dict[str, Any], path: Path) -> dict[str, Any]:
+def _arguments(build: Callable[..., object], given: Notes, path: Path) -> Notes:
     known = list(inspect.signature(build).parameters.values())[1:]
     names = [p.name for p in known if p.kind is not p.VAR_KEYWORD]
-    unknown = sorted(set(given) - set(names))
-    if unknown and len(names) == len(known):
-        raise no_parameter(path, unknown, names)
+    if len(names) == len(known):
+        check_parameters(path, given, names)
     defaults = _defaults(build)
     missing = sorted(set(names) - set(defaults) - set(given))
     if missing:
@@ -63,15 +61,16 @@ def _arguments(build: Any, given: dict[str, Any], path: Path) -> dict[str, Any]:
     return defaults | given
 
 
-def no_parameter(
-    path: Path, unknown: Iterable[str], known: Iterable[str], *, hint: str = ""
-) -> ConfigError:
-    """What is said of parameters that a geometry does not have, of whatever kind it is."""
-    text = f"{path.name} has no parameter {named(unknown)}; its parameters are {sorted(known)}."
-    return ConfigError(text, hint=hint)
+def check_parameters(
+    path: Path, given: Iterable[str], known: Iterable[str], *, hint: str = ""
+) -> None:
+    """Refuse parameters that a geometry does not have, of whatever kind it is."""
+    if unknown := sorted(set(given) - set(known)):
+        text = f"{path.name} has no parameter {named(unknown)}; its parameters are {sorted(known)}."
+        raise ConfigError(text, hint=hint)
 
 
-def _defaults(build: Any) -> dict[str, Any]:
+def _defaults(build: Callable[..., object]) -> Notes:
     known = inspect.signature(build).parameters.values()
     return {p.name: p.default for p in known if p.default is not p.empty}
 

@@ -6,17 +6,18 @@ second of a sphere or torus the angle from its equator. Faces that are picked ge
 """
 
 from collections import Counter
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from types import ModuleType
 
 import numpy as np
 
 from rom.errors import TagError
 from rom.fe.mesh.cad import Axis, Face, Vector
 from rom.fe.mesh.picks import EVERY_FACE, Pick, picks
-from rom.fe.mesh.solid import MAX_SHOWN, shown
-from rom.model import Array
+from rom.fe.mesh.solid import MAX_SHOWN, Notes, shown
+from rom.model import Array, Index
 
 KINDS = {
     "Plane": "plane",
@@ -33,18 +34,18 @@ RADIUS_RTOL = 1e-5  # two radii are the same; a list of faces shows six digits
 NORMAL_ANGLE = 2e-3  # [rad] two normals are the same; less than the draft of a mould
 
 
-def surfaces(gmsh: Any) -> list[int]:
+def surfaces(gmsh: ModuleType) -> list[int]:
     """Numbers of the surfaces that bound a volume, ascending."""
     every = sorted(tag for _, tag in gmsh.model.getEntities(2))
     return [tag for tag in every if len(gmsh.model.getAdjacencies(2, tag)[0])]
 
 
-def kind_of(gmsh: Any, tag: int) -> str:
+def kind_of(gmsh: ModuleType, tag: int) -> str:
     """Kind of a surface, as in `Face`."""
     return KINDS.get(gmsh.model.getType(2, tag), "other")
 
 
-def faces(gmsh: Any) -> list[Face]:
+def faces(gmsh: ModuleType) -> list[Face]:
     """All faces of a meshed part of the OpenCASCADE kernel."""
     names = {
         int(tag): gmsh.model.getPhysicalName(2, group)
@@ -55,41 +56,35 @@ def faces(gmsh: Any) -> list[Face]:
     return [_face(gmsh, tag, outward, names.get(tag, "")) for tag in surfaces(gmsh)]
 
 
-def _face(gmsh: Any, tag: int, outward: "_Outward", name: str) -> Face:
+def _face(gmsh: ModuleType, tag: int, outward: "_Outward", name: str) -> Face:
     kind = kind_of(gmsh, tag)
     area, middle = gmsh.model.occ.getMass(2, tag), gmsh.model.occ.getCenterOfMass(2, tag)
-    found: dict[str, Any] = SHAPES[kind](gmsh, tag) if kind in SHAPES else {}
+    found: Notes = {}
     if kind == "plane":
         found = {"normal": vector(outward.normal(tag))}
+    elif kind != "other":
+        found = _of_revolution(gmsh, tag, kind)
     return Face(tag, kind, float(area), vector(middle), name=name, **found)
 
 
-def _cylinder(gmsh: Any, tag: int) -> dict[str, Any]:
-    ring = _circle(gmsh, tag)
-    point = np.mean(_ends(gmsh, tag), axis=0)
-    return {"radius": ring.radius, "axis": vector(ring.axis), "point": vector(point)}
+def _of_revolution(gmsh: ModuleType, tag: int, kind: str) -> Notes:
+    """Radius, axis and point of a round face, as far as its kind has them."""
+    if kind in ("cylinder", "cone"):
+        ring = _circle(gmsh, tag)
+        axis = {"axis": vector(ring.axis)}
+        if kind == "cone":
+            return axis | {"point": vector(ring.centre)}
+        middle = np.mean(_ends(gmsh, tag), axis=0)
+        return axis | {"radius": ring.radius, "point": vector(middle)}
+    outer = _circle_at(gmsh, tag, 0.0, 0.0)
+    point = {"point": vector(outer.centre)}
+    if kind == "sphere":
+        return point | {"radius": outer.radius}
+    radius = 0.5 * (outer.radius - _circle_at(gmsh, tag, 0.0, np.pi).radius)
+    return point | {"radius": radius, "axis": vector(outer.axis)}
 
 
-def _cone(gmsh: Any, tag: int) -> dict[str, Any]:
-    ring = _circle(gmsh, tag)
-    return {"axis": vector(ring.axis), "point": vector(ring.centre)}
-
-
-def _sphere(gmsh: Any, tag: int) -> dict[str, Any]:
-    equator = _circle_at(gmsh, tag, 0.0, 0.0)
-    return {"radius": equator.radius, "point": vector(equator.centre)}
-
-
-def _torus(gmsh: Any, tag: int) -> dict[str, Any]:
-    outer, inner = _circle_at(gmsh, tag, 0.0, 0.0), _circle_at(gmsh, tag, 0.0, np.pi)
-    radius = 0.5 * (outer.radius - inner.radius)
-    return {"radius": radius, "axis": vector(outer.axis), "point": vector(outer.centre)}
-
-
-SHAPES = {"cylinder": _cylinder, "cone": _cone, "sphere": _sphere, "torus": _torus}
-
-
-def axes(gmsh: Any) -> dict[str, Axis]:
+def axes(gmsh: ModuleType) -> dict[str, Axis]:
     """Axes of the named surfaces that consist of cylinder faces about one line."""
     found: dict[str, Axis] = {}
     for _, group in gmsh.model.getPhysicalGroups(2):
@@ -101,7 +96,7 @@ def axes(gmsh: Any) -> dict[str, Axis]:
     return found
 
 
-def _common_axis(gmsh: Any, tags: list[int]) -> Axis | None:
+def _common_axis(gmsh: ModuleType, tags: list[int]) -> Axis | None:
     """None if the faces have several axes, or go around less than a quarter turn."""
     if max(map(lambda tag: _arc(gmsh, tag), tags)) < SMALLEST_ARC:
         return None
@@ -126,13 +121,13 @@ class _Circle:
     radius: float
 
 
-def _circle(gmsh: Any, tag: int) -> _Circle:
+def _circle(gmsh: ModuleType, tag: int) -> _Circle:
     """The circle half-way along a surface of revolution."""
     u, v = np.mean(gmsh.model.getParametrizationBounds(2, tag), axis=0)
     return _circle_at(gmsh, tag, u, v)
 
 
-def _circle_at(gmsh: Any, tag: int, u: float, v: float) -> _Circle:
+def _circle_at(gmsh: ModuleType, tag: int, u: float, v: float) -> _Circle:
     """Three points of it, which may lie beyond the edges of the face, give it."""
     a, b, c = (_point(gmsh, tag, u + turn, v) for turn in (0.0, 0.5 * np.pi, np.pi))
     centre = 0.5 * (a + c)
@@ -141,28 +136,28 @@ def _circle_at(gmsh: Any, tag: int, u: float, v: float) -> _Circle:
     return _Circle(centre, axis, float(0.5 * np.linalg.norm(a - c)))
 
 
-def _ends(gmsh: Any, tag: int) -> tuple[Array, Array]:
+def _ends(gmsh: ModuleType, tag: int) -> tuple[Array, Array]:
     """Points of the axis at both ends of a cylinder face."""
     (u, low), (_, high) = gmsh.model.getParametrizationBounds(2, tag)
     return _circle_at(gmsh, tag, u, low).centre, _circle_at(gmsh, tag, u, high).centre
 
 
-def _arc(gmsh: Any, tag: int) -> float:
+def _arc(gmsh: ModuleType, tag: int) -> float:
     """Angle that a cylinder face goes around [rad]."""
     (low, _), (high, _) = gmsh.model.getParametrizationBounds(2, tag)
     return abs(high - low)
 
 
-def _point(gmsh: Any, tag: int, u: float, v: float) -> Array:
+def _point(gmsh: ModuleType, tag: int, u: float, v: float) -> Array:
     return np.array(gmsh.model.getValue(2, tag, [u, v]))
 
 
 class _Outward:
     """Normals that point out of the meshed solid."""
 
-    def __init__(self, gmsh: Any) -> None:
+    def __init__(self, gmsh: ModuleType) -> None:
         self.gmsh = gmsh
-        self.cells: dict[int, Any] = {}  # corner nodes of the cells, by volume
+        self.cells: dict[int, Index] = {}  # corner nodes of the cells, by volume
 
     def normal(self, tag: int) -> Array:
         """(3,) unit normal of a plane surface."""
@@ -186,14 +181,14 @@ class _Outward:
         return corner, inside
 
 
-def _corners(gmsh: Any, dim: int, tag: int) -> Any:
+def _corners(gmsh: ModuleType, dim: int, tag: int) -> Index:
     """(m, c) corner nodes of the elements of an entity."""
     kinds, _, nodes = gmsh.model.mesh.getElements(dim, tag)
     *_, n_nodes, _, n_corners = gmsh.model.mesh.getElementProperties(kinds[0])
     return nodes[0].reshape(-1, n_nodes)[:, :n_corners]
 
 
-def vector(values: Any) -> Vector:
+def vector(values: Iterable[float]) -> Vector:
     """Three plain numbers, without negative zeros."""
     x, y, z = (float(value) + 0.0 for value in values)
     return x, y, z
@@ -202,7 +197,7 @@ def vector(values: Any) -> Vector:
 class Picker:
     """Finds faces of a meshed part."""
 
-    def __init__(self, gmsh: Any) -> None:
+    def __init__(self, gmsh: ModuleType) -> None:
         self.gmsh = gmsh
         self.surfaces = surfaces(gmsh)
 
@@ -284,17 +279,16 @@ class Picker:
         found = [f for f in planes if angle[f.number] < NORMAL_ANGLE]
         if len(found) == 1:
             return [found[0].number]
+        text = f"no plane face has the outward normal {wish.text[7:]}."
+        near = sorted(planes, key=lambda f: angle[f.number])[:MAX_SHOWN]
+        listed = ", ".join(f"{f.number} ({_words(f.normal or ())})" for f in near)
+        hint = f"The nearest are {listed}." if near else "The part has no plane face."
         if found:
             joined = "+".join(str(f.number) for f in found[:2])
             listed = shown([f"{f.number} (middle {_words(f.middle)} m)" for f in found])
-            raise TagError(
-                f"{len(found)} plane faces have the outward normal {wish.text[7:]}: {listed}.",
-                hint=f"Pick one by its number or by a point on it, or several as {joined}.",
-            )
-        near = sorted(planes, key=lambda f: angle[f.number])[:MAX_SHOWN]
-        listed = ", ".join(f"{f.number} ({_words(f.normal or ())})" for f in near)
-        there = f"The nearest are {listed}." if near else "The part has no plane face."
-        raise TagError(f"no plane face has the outward normal {wish.text[7:]}.", hint=there)
+            text = f"{len(found)} plane faces have the outward normal {wish.text[7:]}: {listed}."
+            hint = f"Pick one by its number or by a point on it, or several as {joined}."
+        raise TagError(text, hint=hint)
 
 
 def _angle(a: Array, b: Array) -> float:
@@ -306,7 +300,7 @@ def _words(x: tuple[float, ...]) -> str:
     return ",".join(f"{value:.4g}" for value in x)
 
 
-def pick(gmsh: Any, wanted: dict[str, Any], file: str) -> dict[str, list[int]]:
+def pick(gmsh: ModuleType, wanted: Notes, file: str) -> dict[str, list[int]]:
     """Name the picked faces of a meshed geometry; their numbers, by name.
 
     Wanted is {name: what `rom.fe.mesh.picks.picks` takes, or `EVERY_FACE`}.
@@ -337,13 +331,13 @@ def pick(gmsh: Any, wanted: dict[str, Any], file: str) -> dict[str, list[int]]:
     return found
 
 
-def group(gmsh: Any, name: str, tags: list[int]) -> None:
+def group(gmsh: ModuleType, name: str, tags: list[int]) -> None:
     """Give surfaces a name."""
     number = gmsh.model.addPhysicalGroup(2, tags)
     gmsh.model.setPhysicalName(2, number, name)
 
 
-def diagonal(gmsh: Any) -> float:
+def diagonal(gmsh: ModuleType) -> float:
     """Of the box around the geometry [m]."""
     box = np.array(gmsh.model.getBoundingBox(-1, -1))
     return float(np.linalg.norm(box[3:] - box[:3]))

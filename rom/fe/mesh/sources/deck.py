@@ -21,18 +21,14 @@ def to_gmsh(cells: Index, cell_type: str, edges: Edges | None = None) -> Index:
 
 
 def only_type(found: Iterable[str]) -> str:
-    """The one cell type of a deck.
-
-    Raises:
-        MeshError: there is none, or several.
-    """
+    """The one cell type of a deck; a MeshError where there is none, or several."""
     types = sorted(set(found))
     if not types:
         raise MeshError("there are no volume cells in the deck.", hint="A solid is needed.")
     if len(types) > 1:
         raise MeshError(
             f"the cells are of several types, {types}; one mesh needs one type.",
-            hint="Use tetrahedra or hexahedra throughout.",
+            hint="Mesh all volumes with tetrahedra, or all with hexahedra.",
         )
     return types[0]
 
@@ -62,11 +58,7 @@ def facets_of_nodes(
 
 
 def positions(ids: Index, wanted: Index, what: str) -> Index:
-    """Rows of the wanted numbers among the numbers of a deck, which come in any order.
-
-    Raises:
-        FileFormatError: a number is defined twice, or not at all.
-    """
+    """Rows of the wanted numbers among those of a deck, in any order; refused twice, or missing."""
     order = np.argsort(ids, kind="stable")
     ordered = ids[order]
     if (twice := ordered[1:][ordered[1:] == ordered[:-1]]).size:

@@ -5,12 +5,13 @@ Of plane sections, triangles, curves and surfaces.
 
 import re
 from pathlib import Path
-from typing import Any
+from types import ModuleType
 
 import numpy as np
 
 from rom.errors import FileFormatError, MeshError, TagError
 from rom.fe.mesh.solid import Read, packed
+from rom.fe.mesh.sources.deck import only_type
 from rom.model import Array, Index
 
 # gmsh element types
@@ -31,7 +32,7 @@ def declared_groups(path: Path) -> list[tuple[int, int, str]]:
     return [(int(d), int(t), n.decode("utf-8", "replace")) for d, t, n in NAMES.findall(section)]
 
 
-def check_declared(gmsh: Any, declared: Path) -> None:
+def check_declared(gmsh: ModuleType, declared: Path) -> None:
     """Refuse what gmsh drops in silence: empty groups, and the second group of a name."""
     present, groups = set(gmsh.model.getPhysicalGroups()), declared_groups(declared)
     _check_names({(dim, tag): name for dim, tag, name in groups})
@@ -51,7 +52,7 @@ def version(path: Path) -> int:
     return int(found[1]) if found else 0
 
 
-def collect(gmsh: Any, declared: Path, *, strict: bool, repeated: bool) -> Read:
+def collect(gmsh: ModuleType, declared: Path, *, strict: bool, repeated: bool) -> Read:
     """Arrays and notes of the mesh, as `rom.fe.mesh.child.read` returns them.
 
     The header of a ``.msh`` file, ``declared``, lists the names of the groups; ``strict`` where
@@ -82,14 +83,14 @@ def collect(gmsh: Any, declared: Path, *, strict: bool, repeated: bool) -> Read:
     )
 
 
-def _nodes(gmsh: Any) -> tuple[Index, Array]:
+def _nodes(gmsh: ModuleType) -> tuple[Index, Array]:
     """Tags, ascending, and (n, 3) points of all nodes."""
     tags, x, _ = gmsh.model.mesh.getNodes()
     order = np.argsort(tags, kind="stable")
     return tags[order].astype(np.int64), x.reshape(-1, 3)[order]
 
 
-def _group_names(gmsh: Any) -> Groups:
+def _group_names(gmsh: ModuleType) -> Groups:
     """{(dimension, tag): name}; nameless groups get one."""
     names = {
         (dim, tag): gmsh.model.getPhysicalName(dim, tag) or f"{DIMENSIONS[dim]}_{tag}"
@@ -124,7 +125,7 @@ def _remarks(groups: dict[tuple[int, int], str]) -> list[str]:
     return found
 
 
-def _solids(gmsh: Any) -> tuple[int, Blocks]:
+def _solids(gmsh: ModuleType) -> tuple[int, Blocks]:
     """Element type in gmsh, and element numbers and nodes of each volume."""
     blocks, kinds = {}, set()
     for _, volume in gmsh.model.getEntities(3):
@@ -139,23 +140,18 @@ def _solids(gmsh: Any) -> tuple[int, Blocks]:
     return kinds.pop(), {v: (ids, nodes.reshape(-1, size)) for v, (ids, nodes) in blocks.items()}
 
 
-def _check_kinds(gmsh: Any, kinds: set[int]) -> None:
+def _check_kinds(gmsh: ModuleType, kinds: set[int]) -> None:
     if not kinds:
         raise _no_solid(gmsh)
-    names = sorted(gmsh.model.mesh.getElementProperties(kind)[0] for kind in kinds)
-    if len(kinds) > 1:
-        raise MeshError(
-            f"the cells are of several types, {names}; one mesh needs one type.",
-            hint="Mesh all volumes with tetrahedra, or all with hexahedra.",
-        )
+    name = only_type(gmsh.model.mesh.getElementProperties(kind)[0] for kind in kinds)
     if not kinds <= SOLIDS.keys():
         raise MeshError(
-            f"cells of type {names[0]} are not supported.",
+            f"cells of type {name} are not supported.",
             hint="Supported are tetrahedra and hexahedra of first and second order.",
         )
 
 
-def _no_solid(gmsh: Any) -> MeshError:
+def _no_solid(gmsh: ModuleType) -> MeshError:
     types = gmsh.model.mesh.getElements(2)[1]
     n = sum(len(ids) for ids in types)
     if not n:
@@ -171,7 +167,7 @@ def _no_solid(gmsh: Any) -> MeshError:
     )
 
 
-def _regions(gmsh: Any, blocks: Blocks, groups: Groups, *, strict: bool) -> dict[int, int]:
+def _regions(gmsh: ModuleType, blocks: Blocks, groups: Groups, *, strict: bool) -> dict[int, int]:
     """{volume: region number}; every volume in exactly one group, or no group at all."""
     if not any(dim == 3 for dim, _ in groups):
         if groups and strict and any(dim == 2 for dim, _ in groups):
@@ -184,36 +180,31 @@ def _regions(gmsh: Any, blocks: Blocks, groups: Groups, *, strict: bool) -> dict
     return {volume: _region(gmsh, volume, blocks, groups) for volume in blocks}
 
 
-def _region(gmsh: Any, volume: int, blocks: Blocks, groups: Groups) -> int:
+def _region(gmsh: ModuleType, volume: int, blocks: Blocks, groups: Groups) -> int:
     tags = [int(t) for t in gmsh.model.getPhysicalGroupsForEntity(3, volume)]
     if min(tags, default=1) < 1:
-        raise TagError(
-            f"volume {volume} is in the physical group {min(tags)}: numbers of groups start at 1.",
-            hint="A volume has no other side; write both numbers without a minus.",
-        )
-    names = [groups[3, tag] for tag in tags]
-    if len(tags) > 1:
-        raise TagError(
-            f"volume {volume} is in the physical groups {names[0]!r} and {names[1]!r}.",
-            hint="Each part of the body has one material: one group per volume.",
-        )
-    if not tags:
+        why = f"is in the physical group {min(tags)}: numbers of groups start at 1"
+        hint = "A volume has no other side; write both numbers without a minus."
+    elif len(tags) > 1:
+        one, other, *_ = (groups[3, tag] for tag in tags)
+        why = f"is in the physical groups {one!r} and {other!r}"
+        hint = "Each part of the body has one material: one group per volume."
+    elif not tags:
         others = sorted(name for (dim, _), name in groups.items() if dim == 3)
-        raise TagError(
-            f"volume {volume} with {len(blocks[volume][0])} cells is in no physical group, while "
-            f"{others} exist.",
-            hint="Put every volume into a group, or remove what does not belong to the body.",
-        )
-    return tags[0]
+        why = f"with {len(blocks[volume][0])} cells is in no physical group, while {others} exist"
+        hint = "Put every volume into a group, or remove what does not belong to the body."
+    else:
+        return tags[0]
+    raise TagError(f"volume {volume} {why}.", hint=hint)
 
 
-def _surfaces(gmsh: Any, tag: int) -> list[int]:
+def _surfaces(gmsh: ModuleType, tag: int) -> list[int]:
     """Those of a group, without the cuts of a partition, which have the group of their volume."""
     surfaces = gmsh.model.getEntitiesForPhysicalGroup(2, tag)
     return [int(s) for s in surfaces if gmsh.model.getParent(2, s)[0] != 3]
 
 
-def _facets(gmsh: Any, tag: int, name: str, *, repeated: bool) -> Index:
+def _facets(gmsh: ModuleType, tag: int, name: str, *, repeated: bool) -> Index:
     """(f, kf) node tags of a physical surface."""
     found = []
     for surface in _surfaces(gmsh, tag):
@@ -250,7 +241,7 @@ def _rows(tags: Index, nodes: Index, what: str) -> Index:
     return place
 
 
-def triangles(gmsh: Any) -> Read:
+def triangles(gmsh: ModuleType) -> Read:
     """Arrays and notes as `collect` returns them, of triangles in z = 0, facets being curves."""
     tags, points = _nodes(gmsh)
     cells, ids = _triangles(gmsh, tags)
@@ -258,36 +249,35 @@ def triangles(gmsh: Any) -> Read:
     used, cells = np.unique(cells, return_inverse=True)
     points, cells = points[used], cells.reshape(-1, 3)
     extent = np.ptp(points, axis=0)
-    if np.abs(points[:, 2]).max() > FLAT_RTOL * extent.max():
-        raise MeshError(f"the mesh leaves the plane z = 0 by {np.abs(points[:, 2]).max():.3g} m.",
-                        hint="Draw a plane section in x and y.")  # fmt: skip
+    if (height := np.abs(points[:, 2]).max()) > FLAT_RTOL * extent.max():
+        text = f"the mesh leaves the plane z = 0 by {height:.3g} m."
+        raise MeshError(text, hint="Draw a plane section in x and y.")
     place = np.full(tags.size, -1)
     place[used] = np.arange(used.size)
     curves = {
         gmsh.model.getPhysicalName(dim, tag) or f"curve_{tag}": _lines(gmsh, tag, tags, place)
         for dim, tag in gmsh.model.getPhysicalGroups(1)
     }
-    arrays, notes = packed(
-        points, cells, "tri3", np.ones(len(cells), dtype=int), ids, facets=curves,
-        region_names={1: "body"}, surface_names=list(surfaces), warnings=[],
-    )  # fmt: skip
+    told = {"region_names": {1: "body"}, "surface_names": list(surfaces), "warnings": []}
+    regions = np.ones(len(cells), dtype=int)
+    arrays, notes = packed(points, cells, "tri3", regions, ids, facets=curves, **told)
     return arrays | {f"surface {i}": rows for i, rows in enumerate(surfaces.values())}, notes
 
 
-def _triangles(gmsh: Any, tags: Index) -> tuple[Index, Index]:
+def _triangles(gmsh: ModuleType, tags: Index) -> tuple[Index, Index]:
     """Corners as positions among the tags, and numbers, of all triangles."""
     kinds, ids, nodes = gmsh.model.mesh.getElements(2)
     others = [gmsh.model.mesh.getElementProperties(kind)[0] for kind in kinds if kind != TRIANGLE]
     if others:
-        raise MeshError(f"cells of the type {others[0]}: triangles with three nodes are needed.",
-                        hint="Leave out Recombine, and keep Mesh.ElementOrder = 1.")  # fmt: skip
+        text = f"cells of the type {others[0]}: triangles with three nodes are needed."
+        raise MeshError(text, hint="Leave out Recombine, and keep Mesh.ElementOrder = 1.")
     if not len(kinds):
-        raise MeshError("there are no triangles: the geometry has no plane surface.",
-                        hint="Add Plane Surface(1) = {...};")  # fmt: skip
+        text = "there are no triangles: the geometry has no plane surface."
+        raise MeshError(text, hint="Add Plane Surface(1) = {...};")
     return np.searchsorted(tags, nodes[0].astype(np.int64)).reshape(-1, 3), ids[0].astype(np.int64)
 
 
-def _plane_surfaces(gmsh: Any, ids: Index) -> dict[str, Index]:
+def _plane_surfaces(gmsh: ModuleType, ids: Index) -> dict[str, Index]:
     """Triangles of each plane surface: those of physical ones if there are any, or of all."""
     named: dict[str, int] = {}
     for dim, tag in gmsh.model.getPhysicalGroups(2):
@@ -296,17 +286,17 @@ def _plane_surfaces(gmsh: Any, ids: Index) -> dict[str, Index]:
         single = len(parts) == 1
         named |= {name if single else f"{name} {k}": part for k, part in enumerate(parts, 1)}
     named = named or {f"surface {tag}": tag for _, tag in gmsh.model.getEntities(2)}
+    found = {name: _triangle_ids(gmsh, tag) for name, tag in named.items()}
     order = np.argsort(ids, kind="stable")
-    return {name: order[np.searchsorted(ids[order], _triangle_ids(gmsh, tag))]
-            for name, tag in named.items()}  # fmt: skip
+    return {name: order[np.searchsorted(ids[order], some)] for name, some in found.items()}
 
 
-def _triangle_ids(gmsh: Any, surface: int) -> Index:
+def _triangle_ids(gmsh: ModuleType, surface: int) -> Index:
     found = gmsh.model.mesh.getElements(2, surface)[1]
     return np.concatenate([np.zeros(0, dtype=np.int64), *(x.astype(np.int64) for x in found)])
 
 
-def _lines(gmsh: Any, tag: int, tags: Index, place: Array) -> Index:
+def _lines(gmsh: ModuleType, tag: int, tags: Index, place: Array) -> Index:
     """(k, 2) nodes of the sides of a physical curve."""
     found = [np.zeros((0, 2), dtype=np.int64)]
     for curve in gmsh.model.getEntitiesForPhysicalGroup(1, tag):

@@ -5,11 +5,11 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from types import ModuleType
 
 from rom.errors import ConfigError, FileFormatError, MeshError, RomError, UnsafeFileError
 from rom.fe.mesh.picks import EVERY_FACE
-from rom.fe.mesh.solid import PROGRAMS, Made, Read
+from rom.fe.mesh.solid import PROGRAMS, Made, Notes, Read, Request
 from rom.fe.mesh.sources import builder, step
 from rom.fe.mesh.sources.cad_faces import axes, faces, pick
 from rom.fe.mesh.sources.gmsh_groups import check_declared, collect, triangles, version
@@ -23,7 +23,7 @@ NO_MEMORY = re.compile("Out of memory|bad_alloc")
 MSH_START = (b"$MeshFormat", b"$Comments")
 
 
-def run(request: dict[str, Any]) -> Read:
+def run(request: Request) -> Read:
     """Answer a request for ``.geo``, ``.py``, ``.step`` or ``.msh``, see `child.read`."""
     import gmsh
 
@@ -53,7 +53,7 @@ def run(request: dict[str, Any]) -> Read:
 
 
 @contextmanager
-def session(gmsh: Any) -> Iterator[None]:
+def session(gmsh: ModuleType) -> Iterator[None]:
     """Run gmsh without the user's own settings, silent, on one thread."""
     gmsh.initialize([], False)
     try:
@@ -67,7 +67,7 @@ def session(gmsh: Any) -> Iterator[None]:
 
 
 @contextmanager
-def complaints(gmsh: Any, kind: type[RomError] = FileFormatError) -> Iterator[None]:
+def complaints(gmsh: ModuleType, kind: type[RomError] = FileFormatError) -> Iterator[None]:
     """Turn gmsh's exceptions into errors with its own words, file and line."""
     try:
         yield
@@ -79,7 +79,7 @@ def complaints(gmsh: Any, kind: type[RomError] = FileFormatError) -> Iterator[No
         raise kind(text, hint="Open the file in gmsh to see more.") from error
 
 
-def _complaint(gmsh: Any, error: Exception) -> str:
+def _complaint(gmsh: ModuleType, error: Exception) -> str:
     """First words of gmsh on an error, without folders."""
     message = (_log(gmsh, "Error") or [str(error)])[0]
     if NO_MEMORY.search(message):
@@ -87,12 +87,12 @@ def _complaint(gmsh: Any, error: Exception) -> str:
     return re.sub(r"'[^']*/([^'/]*)'", r"'\1'", message).rstrip(".")
 
 
-def _log(gmsh: Any, kind: str) -> list[str]:
+def _log(gmsh: ModuleType, kind: str) -> list[str]:
     lines = [line for line in gmsh.logger.get() if line.startswith(kind)]
     return [line.partition(":")[2].strip() for line in lines[:20]]
 
 
-def _geo(gmsh: Any, path: Path, request: dict[str, Any]) -> Made:
+def _geo(gmsh: ModuleType, path: Path, request: Request) -> Made:
     if not path.read_bytes().endswith((b"\n", b"\r")):
         raise FileFormatError(
             "the last line does not end, and gmsh would drop it in silence.",
@@ -113,7 +113,7 @@ def _geo(gmsh: Any, path: Path, request: dict[str, Any]) -> Made:
     return values, {name: known[name] for name in chosen if name in values}
 
 
-def geo_parameters(gmsh: Any) -> dict[str, Any]:
+def geo_parameters(gmsh: ModuleType) -> Notes:
     """Parameters of the open geometry that can be set from outside, with their values."""
     names = [n for n in gmsh.onelab.getNames() if not n.startswith(("Gmsh", "ONELAB", "0Modules"))]
     values = {}
@@ -123,18 +123,16 @@ def geo_parameters(gmsh: Any) -> dict[str, Any]:
     return values
 
 
-def _full_name(name: str, known: dict[str, Any], path: Path) -> str:
+def _full_name(name: str, known: Notes, path: Path) -> str:
     """Name as gmsh knows it; ``L`` also finds ``Geometry/L`` when there is only one."""
-    if name in known:
-        return name
     ends = [full for full in known if full.rpartition("/")[2] == name]
-    if len(ends) == 1:
-        return ends[0]
+    full = ends[0] if name not in known and len(ends) == 1 else name
     cure = 'A .geo parameter can be set only if it has a name: x = {1.0, Name "x"}.'
-    raise builder.no_parameter(path, [name], known, hint=cure)
+    builder.check_parameters(path, [full], known, hint=cure)
+    return full
 
 
-def _set(gmsh: Any, name: str, value: Any, path: Path, *, as_text: bool) -> None:
+def _set(gmsh: ModuleType, name: str, value: object, path: Path, *, as_text: bool) -> None:
     """Give a parameter a value of its kind."""
     if as_text and isinstance(value, str):
         gmsh.onelab.setString(name, [value])
@@ -145,7 +143,7 @@ def _set(gmsh: Any, name: str, value: Any, path: Path, *, as_text: bool) -> None
         raise ConfigError(f"parameter {name!r} of {path.name} must be a {kind}, got {value!r}.")
 
 
-def _msh(gmsh: Any, path: Path, request: dict[str, Any]) -> Made:
+def _msh(gmsh: ModuleType, path: Path, request: Request) -> Made:
     with path.open("rb") as stream:
         start = stream.read(512)
         stream.seek(max(path.stat().st_size - 512, 0))
@@ -167,7 +165,7 @@ def _msh(gmsh: Any, path: Path, request: dict[str, Any]) -> Made:
     return {}, {}
 
 
-def _flat(gmsh: Any, request: dict[str, Any], values: dict[str, Any]) -> Read:
+def _flat(gmsh: ModuleType, request: Request, values: Notes) -> Read:
     """Triangles of the surfaces, meshed here unless the file is a mesh."""
     if request["reader"] != "msh":
         gmsh.option.setNumber("Mesh.ElementOrder", 1)
@@ -177,12 +175,12 @@ def _flat(gmsh: Any, request: dict[str, Any], values: dict[str, Any]) -> Read:
     return arrays, notes | {"provenance": _provenance(gmsh, values)}
 
 
-def _provenance(gmsh: Any, values: dict[str, Any]) -> dict[str, Any]:
+def _provenance(gmsh: ModuleType, values: Notes) -> Notes:
     number = gmsh.option.getString("General.Version")
     return {"gmsh": number, "parameters": values, "gmsh_warnings": _log(gmsh, "Warning")}
 
 
-def _generate(gmsh: Any, request: dict[str, Any], declared: Path) -> None:
+def _generate(gmsh: ModuleType, request: Request, declared: Path) -> None:
     """Mesh the geometry, after noting the names of all its groups."""
     if not gmsh.model.getEntities(3):
         raise MeshError("the geometry has no volume: a solid is needed.")

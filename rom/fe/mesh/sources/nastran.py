@@ -41,13 +41,7 @@ LOAD_CARDS = set(
 
 
 def read(path: str) -> Read:
-    """Read bulk data; see `rom.fe.mesh.child.read`.
-
-    Raises:
-        FileFormatError: the file is damaged, solids have no property, or there are cards whose mass
-            or stiffness would be lost.
-        MeshError: no solid cells, or of several types.
-    """
+    """Read bulk data, or refuse cards whose mass or stiffness would be lost."""
     found = _sorted(Path(path))
     ids, points, _ = grids(found[0])
     solids = [card for name in SOLIDS for card in found[0].get(name, ())]
@@ -57,17 +51,14 @@ def read(path: str) -> Read:
     numbers = np.array([card.whole(0) for card in solids], dtype=np.int64)
     positions(numbers, numbers[:1], "element")  # refuses a number given twice
     cells = to_gmsh(positions(ids, raw, "node"), cell_type, EDGES.get(cell_type))
-    sets = {name: positions(ids, np.array(nodes, dtype=np.int64), "node")
-            for name, nodes in _sets(found[0], ids).items()}  # fmt: skip
+    labels = {name: np.array(nodes, dtype=np.int64) for name, nodes in _sets(found[0], ids).items()}
+    sets = {name: positions(ids, nodes, "node") for name, nodes in labels.items()}
     n = len(points)
     facets, remarks = facets_of_nodes(outer_facets(cells, cell_type, n), sets, cell_type, n)
-    return packed(
-        points, cells, cell_type, properties, numbers,
-        facets=facets,
-        region_names={int(p): f"property_{p}" for p in np.unique(properties)},
-        warnings=[*found[1], *remarks, *unused(ids, cells)],
-        provenance={"parameters": {}},
-    )  # fmt: skip
+    names = {int(p): f"property_{p}" for p in np.unique(properties)}
+    remarks = [*found[1], *remarks, *unused(ids, cells)]
+    told = {"region_names": names, "warnings": remarks, "provenance": {"parameters": {}}}
+    return packed(points, cells, cell_type, properties, numbers, facets=facets, **told)
 
 
 def _sorted(path: Path) -> tuple[dict[str, list[Card]], list[str]]:

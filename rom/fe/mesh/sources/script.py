@@ -62,8 +62,7 @@ GENERAL_OPTIONS = {"Terminal", "Verbosity", "ExpertMode", "NumThreads", "AbortOn
 OPERATOR_SIGNS = "=.,;+-*/^<>!&|?:)]}~%"  # behind a variable; no command has one behind it
 INCLUDE_COMMAND, MERGE_COMMANDS = "Include", ("Merge", "MergeWithBoundingBox")
 # endings, in these letters only, of files that gmsh gives to readers which run nothing
-SHAPES = (".step", ".STEP", ".stp", ".STP", ".iges", ".IGES", ".igs", ".IGS", ".brep", ".brp",
-          ".stl", ".STL")  # fmt: skip
+SHAPES = tuple(".step .STEP .stp .STP .iges .IGES .igs .IGS .brep .brp .stl .STL".split())
 MESHES, SCRIPTS = (".msh", ".pos"), (".geo", ".pos", ".opt", ".geo_unrolled", "")
 MESH_STARTS = (b"$MeshFormat", b"$Comments", b"$PostFormat", b"$View")
 LONGEST_TEXT = 1000  # characters; gmsh cuts at 1023 and runs what follows
@@ -104,14 +103,9 @@ END_TOKEN = Token("sign", ";", 0)
 
 
 def check_script(path: Path) -> None:
-    """Refuse a script that would do more than make a geometry.
+    """Refuse a script that would do more than make a geometry, or that hides what it does.
 
-    Args:
-        path: the script; what it includes and merges is read as well.
-
-    Raises:
-        UnsafeFileError: it starts a program, writes a file, or hides what it does.
-        FileFormatError: it includes itself.
+    What it includes and merges is read as well.
     """
     _check(path, (), [])
 
@@ -180,11 +174,7 @@ def _start(path: Path) -> bytes:
 
 
 def _tokens(path: Path) -> Iterator[Token]:
-    """Words, texts and signs, without comments and numbers.
-
-    Raises:
-        UnsafeFileError: gmsh may read the text in another way.
-    """
+    """Words, texts and signs, without comments and numbers; refused where gmsh may read another."""
     data = path.read_bytes()
     line, last = 1, 0
     for found in TOKEN_PATTERN.finditer(data):

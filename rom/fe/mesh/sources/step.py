@@ -6,16 +6,17 @@ order of the file, are the surfaces of gmsh in theirs.
 
 import re
 from pathlib import Path
-from typing import Any
+from types import ModuleType
 
 import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
+from rom.arguments import positive
 from rom.errors import ConfigError, FileFormatError, MeshError, TagError
-from rom.fe.mesh.solid import Made, shown
+from rom.fe.mesh.solid import Made, Request, shown
+from rom.fe.mesh.sources.builder import check_parameters
 from rom.fe.mesh.sources.cad_faces import diagonal, group, surfaces
-from rom.names import named
 
 FACE_PATTERN = re.compile(r"#(\d+)\s*=\s*ADVANCED_FACE\s*\(\s*'((?:[^']|'')*)'", re.IGNORECASE)
 SHELL_PATTERN = re.compile(
@@ -28,11 +29,9 @@ CELLS_PER_CUBE = 8.0  # tetrahedra in a cube of the element size
 MOST_CELLS = 3e7  # beyond what a machine with 100 GB can mesh
 
 
-def make(gmsh: Any, path: Path, request: dict[str, Any]) -> Made:
+def make(gmsh: ModuleType, path: Path, request: Request) -> Made:
     """Import the file and name its faces; the element size used, and its default."""
-    unknown = sorted(set(request["parameters"]) - {"lc"})
-    if unknown:
-        raise ConfigError(f"a .step file has no parameter {named(unknown)}; there is ['lc'].")
+    check_parameters(path, request["parameters"], ["lc"])
     text = path.read_bytes().decode("latin-1")
     if not text.lstrip().startswith("ISO-10303-21"):
         raise FileFormatError("is not a STEP file: it does not start with ISO-10303-21.")
@@ -50,7 +49,7 @@ def make(gmsh: Any, path: Path, request: dict[str, Any]) -> Made:
     return {"lc": lc}, {"lc": default}
 
 
-def _check_solid(gmsh: Any) -> None:
+def _check_solid(gmsh: ModuleType) -> None:
     """Refuse what is no single body, before it is meshed."""
     solids = [tag for _, tag in gmsh.model.getEntities(3)]
     if not solids:
@@ -72,7 +71,7 @@ def _check_solid(gmsh: Any) -> None:
         )
 
 
-def _parts(gmsh: Any, solids: list[int]) -> int:
+def _parts(gmsh: ModuleType, solids: list[int]) -> int:
     """Number of groups of solids that have faces in common."""
     place = {tag: k for k, tag in enumerate(solids)}
     pairs = [[place[int(t)] for t in gmsh.model.getAdjacencies(2, s)[0]] for s in surfaces(gmsh)]
@@ -82,10 +81,9 @@ def _parts(gmsh: Any, solids: list[int]) -> int:
     return int(connected_components(graph, directed=False)[0])
 
 
-def _check_size(gmsh: Any, lc: Any) -> None:
+def _check_size(gmsh: ModuleType, lc: object) -> None:
     """Refuse a mesh size that is none, or far too fine, as when the units are mixed up."""
-    if not isinstance(lc, int | float) or not 0.0 < lc < float("inf"):
-        raise ConfigError(f"lc = {lc!r} must be a positive number of metres.")
+    lc = positive("lc", lc)
     volume = sum(gmsh.model.occ.getMass(3, tag) for _, tag in gmsh.model.getEntities(3))
     cells = CELLS_PER_CUBE * volume / lc**3
     if cells > MOST_CELLS:
@@ -96,7 +94,7 @@ def _check_size(gmsh: Any, lc: Any) -> None:
         )
 
 
-def _name_faces(gmsh: Any, text: str) -> None:
+def _name_faces(gmsh: ModuleType, text: str) -> None:
     names = dict(FACE_PATTERN.findall(text))
     listed = [f for shell in SHELL_PATTERN.findall(text) for f in re.findall(r"#(\d+)", shell)]
     named = {f: names[f].strip() for f in listed if names.get(f, "").strip(" '")}

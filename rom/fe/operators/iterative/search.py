@@ -56,6 +56,8 @@ N_BOUND_STEPS = 40  # for the least eigenvalue of P K
 LEAST_MARGIN = 0.5  # on that eigenvalue, which is found from above
 LARGEST_MARGIN = 1.05  # on the largest one, which is found from below
 LEAST_SHARE = 0.03  # of v^T M v in v^T diag(M) v: 27 nodes of a cell can add up, no more
+Known = tuple[Array, Array, float]
+Bounds = tuple[float, float]
 GAP_SHARE = 0.8  # of the gap above the last mode, where the shift lies
 
 
@@ -193,7 +195,7 @@ class Verdict:
     direction: Array | None  # (n_local, 1) where A' is negative, M-orthogonal to the modes
 
 
-def spectral_bounds(ops: Any, inverse: ConjugateGradients, loads: Array) -> tuple[float, float]:
+def spectral_bounds(ops: Any, inverse: ConjugateGradients, loads: Array) -> Bounds:
     """The least and the largest eigenvalue of P K, with a margin."""
     found = Recurrence(ops.comm, lambda X: dense_rows(inverse.A, X), inverse.approximate, loads)
     for _ in range(min(N_BOUND_STEPS, ops.n - 1)):
@@ -203,9 +205,8 @@ def spectral_bounds(ops: Any, inverse: ConjugateGradients, loads: Array) -> tupl
 
 
 def searched(
-    ops: Any, inverse: ConjugateGradients, modes: tuple[Array, Array, float], sigma: float,
-    loads: Array, bounds: tuple[float, float],
-) -> Verdict:  # fmt: skip
+    ops: Any, inverse: ConjugateGradients, modes: Known, sigma: float, loads: Array, bounds: Bounds
+) -> Verdict:
     """Look for an eigenvalue below sigma beside the modes found.
 
     Those are Phi (n_local, k), M Phi, and the largest Rayleigh quotient theta, below sigma; loads
@@ -226,8 +227,8 @@ def searched(
         least = run.eigenvalues()[0]
         if least.min() < 0.0:
             column = int(least.argmin())
-            V = run.vector(column, Recurrence(ops.comm, apply, inverse.approximate,
-                                              loads[:, column : column + 1]))  # fmt: skip
+            again = Recurrence(ops.comm, apply, inverse.approximate, loads[:, column : column + 1])
+            V = run.vector(column, again)
             return Verdict(1.0, V - Phi @ ops.gram(MPhi, V))
         degree = np.array([len(run.diagonals) - 1.0])
         growth = log_chebyshev(degree, 1.0 + 2.0 * mu / bounds[1])

@@ -112,16 +112,10 @@ def _fits(module: Any) -> bool:
 
 
 class _Instance:
-    """A positive definite matrix in MUMPS, on this rank alone.
+    """One triangle K (n, n) of a positive definite matrix in MUMPS, on this rank alone.
 
-    Args:
-        module: of `library`.
-        K: (n, n) entries of one triangle.
-        options: (number, value) of ICNTL.
-
-    Attributes:
-        code: INFOG(1) of the last step, negative where that failed.
-        release: gives the memory back.
+    With the module of `library` and (number, value) of ICNTL. ``code`` is INFOG(1) of the last
+    step, negative where that failed; ``release`` gives the memory back.
     """
 
     def __init__(self, module: Any, K: coo_matrix, *options: tuple[int, int]):
@@ -177,15 +171,8 @@ def elimination_order(module: Any, pattern: csr_matrix, n_last: int) -> Index | 
 
     The order is the one MUMPS finds for itself; changing its end to these unknowns, which become a
     clique, costs no more fill. An order made for the others alone knows nothing of what they then
-    carry along: twice the flops.
-
-    Args:
-        module: of `library`.
-        pattern: (n, n) matrix with the entries of both triangles.
-        n_last: number of the unknowns at the end.
-
-    Returns:
-        The places; None where MUMPS finds no order or memory does not suffice.
+    carry along: twice the flops. The pattern (n, n) has the entries of both triangles; None where
+    MUMPS finds no order or memory does not suffice.
     """
     n, ffi = pattern.shape[0], module.ffi
     end = np.arange(n - n_last, n)
@@ -209,15 +196,9 @@ def elimination_order(module: Any, pattern: csr_matrix, n_last: int) -> Index | 
 class Inside(_Instance):
     """Factor of the stiffness of an inside, and the Schur complement that its border feels.
 
-    Args:
-        module: of `library`.
-        K: (n, n) entries [K_ii, K_ib; ., 0], of K_ii the upper triangle only.
-        m: unknowns of the border, the last ones.
-        places: (n,) of the unknowns in the order of elimination.
-
-    Attributes:
-        bytes: memory the factor will take, foreseen.
-        flops: of the factorisation, foreseen.
+    K (n, n) has the entries [K_ii, K_ib; ., 0], of K_ii the upper triangle only; the m unknowns of
+    the border are the last ones, places (n,) those in the order of elimination. Foreseen are the
+    ``bytes`` the factor will take and the ``flops`` of the factorisation.
     """
 
     def __init__(self, module: Any, K: coo_matrix, m: int, places: Index):

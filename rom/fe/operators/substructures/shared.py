@@ -37,14 +37,8 @@ class SubstructuredFactor:
         S = K_bb - sum K_bi K_ii^-1 K_ib,  u_b = S^-1 (f_b - sum K_bi K_ii^-1 f_i),
         u_i = K_ii^-1 (f_i - K_ib u_b).
 
-    Args:
-        A: the matrix.
-        split: its rows as insides and border.
-        inside: of this rank, analysed.
-
-    Attributes:
-        code: of MUMPS, the worst of all ranks.
-        ok: False when a part had no positive definite factor.
+    ``code`` is that of MUMPS, the worst of all ranks; ``ok`` is False when a part had no positive
+    definite factor.
     """
 
     def __init__(self, A: PETSc.Mat, split: "Split", inside: Inside):
@@ -189,15 +183,10 @@ def _whole(nodes: Index, block_size: int) -> Index:
 
 
 def covering(K: csr_matrix, first: int, comm: MPI.Comm) -> Index:
-    """(n_local,) whether a row belongs to the border.
+    """(n_local,) whether a row of K (n_local, n), with this first number, belongs to the border.
 
     Of two rows of different ranks that an entry joins, it is the one joined to more of other ranks:
     a node on the faces between two ranks sees half of its neighbours there, the next ones few.
-
-    Args:
-        K: (n_local, n) rows of this rank.
-        first: number of the first.
-        comm: the ranks.
     """
     n_local = K.shape[0]
     elsewhere = (K.indices < first) | (K.indices >= first + n_local)
